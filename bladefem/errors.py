@@ -1,0 +1,23 @@
+"""What can go wrong, in two kinds: the input is wrong (exit code 2), or no solution was found (exit code 1)."""
+
+from __future__ import annotations
+
+import difflib
+from collections.abc import Iterable
+
+__all__ = ["InputError", "NotSolvedError", "suggestion"]
+
+
+class InputError(ValueError):
+    """The input is wrong. The message is one sentence: field, value, what was expected."""
+
+
+class NotSolvedError(RuntimeError):
+    """The input was right and no acceptable solution was found. The message says which loop stopped and why."""
+
+
+def suggestion(word: str, known: Iterable[str]) -> str:
+    """The tail of an error message: "; did you mean 'twist'?", or the known words when none is close."""
+    known = sorted(known)
+    close = difflib.get_close_matches(word, known, n=1, cutoff=0.6)
+    return f"; did you mean '{close[0]}'?" if close else f"; known are {', '.join(known)}"

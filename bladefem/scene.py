@@ -1,0 +1,122 @@
+"""A scene: everything that an engineer decides, as frozen dataclasses in SI units. Reading TOML is in scene_file.py.
+
+Numerical settings that are ``None`` are chosen by error indicators from ``accuracy``.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from math import pi
+
+from geometry.parameters import Aerofoil, Disc, HertzPair, MeshSize, Plane, Platform, Punch, Shank, Wedge, ZMass
+from geometry.quantity import quantity
+
+__all__ = ["KINDS", "Contact", "Excitation", "Imported", "Material", "Materials", "Model", "Operation", "Scene", "Study"]
+
+KINDS = ("wedge sector", "plane blades", "z mass", "hertz", "punch", "imported")
+
+
+@dataclass(frozen=True)
+class Material:
+    """Linear elastic, isotropic. The default is a steel."""
+
+    E: float = quantity(2.1e11, "Pa", 1e6, 1e13, "Young's modulus")
+    nu: float = quantity(0.3, "1", -0.99, 0.499, "Poisson's ratio")
+    rho: float = quantity(7850.0, "kg/m^3", 1.0, 3e4, "density")
+
+
+@dataclass(frozen=True)
+class Materials:
+    """One material a body."""
+
+    blade: Material = field(default_factory=Material)
+    damper: Material = field(default_factory=Material)
+
+
+@dataclass(frozen=True)
+class Contact:
+    """Friction and contact stiffness of the seats. Areal stiffnesses spread over the patch; totals win when given."""
+
+    mu: float = quantity(0.3, "1", 0.0, 2.0, "friction coefficient")
+    kt_area: float = quantity(4.0e10, "N/m^3", 0.0, 1e15, "tangential contact stiffness for each unit of area")
+    kt: float | None = quantity(None, "N/m", 0.0, 1e12, "tangential stiffness of one whole patch")
+    kn_area: float | None = quantity(None, "N/m^3", 0.0, 1e15, "normal contact stiffness for each unit of area; by Mindlin from kt_area")
+    points: int | None = quantity(None, "1", 1, 5000, "friction elements on each patch; all mesh nodes when left out")
+    normal: str = quantity("coupled", choices=("coupled", "prescribed"), help="normal load follows the motion, or stays at its static value")
+
+
+@dataclass(frozen=True)
+class Operation:
+    """Where the engine runs."""
+
+    speed: float = quantity(8000 * 2 * pi / 60, "rad/s", 0.0, 1e5, "rotational speed")
+    stiffening: bool = quantity(True, help="centrifugal stress stiffening and spin softening in the modes")
+    damping: float = quantity(0.001, "1", 0.0, 0.5, "modal damping ratio of all modes without friction")
+
+
+@dataclass(frozen=True)
+class Excitation:
+    """A force pattern of one engine order, turning round the wheel."""
+
+    engine_order: int = quantity(6, "1", 0, 1000, "cycles of the pattern in one revolution")
+    force: float = quantity(1.0, "N", 0.0, 1e6, "amplitude on each blade")
+    at: str = quantity("tip_mid", help="named node set or face that carries the force")
+    direction: tuple[float, float, float] = quantity((0.0, 1.0, 0.0), "1", help="direction in the blade's own axes (radial, circumferential, axial)")
+    mode: int = quantity(1, "1", 1, 50, "mode whose resonance is studied, 1 = lowest")
+
+
+@dataclass(frozen=True)
+class Study:
+    """What is varied. Loads are the static normal force between damper and one seat."""
+
+    loads: tuple[float, ...] | None = quantity(None, "N", 0.0, 1e8, "normal loads per seat; eight round the optimum when left out")
+    masses: tuple[float, ...] | None = quantity(None, "kg", 1e-5, 10.0, "damper masses; the scene's own when left out")
+    band: tuple[float, float] | None = quantity(None, "Hz", 0.0, 1e6, "frequency band; from the free to the stuck resonance when left out")
+
+
+@dataclass(frozen=True)
+class Model:
+    """Numerical settings. None: chosen by error indicators so that the answer keeps the scene's accuracy."""
+
+    modes: int | None = quantity(None, "1", 1, 500, "modes kept in each nodal diameter")
+    harmonics: int | None = quantity(None, "1", 1, 99, "harmonics of the balance")
+    samples: int | None = quantity(None, "1", 16, 65536, "time samples a period")
+    damper: str | None = quantity(None, choices=("mass", "rigid", "elastic"), help="damper model")
+    reduction: str = quantity("rubin", choices=("rubin", "craig-bampton"), help="reduction basis")
+    nodal_diameters: tuple[int, ...] | None = quantity(None, "1", 0, 1000, "nodal diameters of the mode tables; all when left out")
+
+
+@dataclass(frozen=True)
+class Imported:
+    """A user's own mesh (.msh with named groups, and what meshio reads) or STEP file."""
+
+    file: str = quantity("", help="path, relative to the scene file")
+    scale: float = quantity(1.0, "1", 1e-9, 1e9, "factor from the file's length unit to metres")
+    sectors: int = quantity(0, "1", 0, 1000, "number of sectors; 0 for a single body without cyclic faces")
+    axis: tuple[float, float, float] = quantity((0.0, 0.0, 1.0), "1", help="engine axis through the origin")
+
+
+@dataclass(frozen=True)
+class Scene:
+    """All of it. Tables that a kind does not use must not be given."""
+
+    title: str = quantity("untitled", help="shown on pictures and in the report")
+    kind: str = quantity("wedge sector", choices=KINDS, help="which geometry")
+    accuracy: float = quantity(0.02, "1", 1e-6, 0.5, "wanted relative accuracy of the resonance amplitude")
+    aerofoil: Aerofoil = field(default_factory=Aerofoil)
+    platform: Platform = field(default_factory=Platform)
+    shank: Shank = field(default_factory=Shank)
+    disc: Disc = field(default_factory=Disc)
+    damper: Wedge = field(default_factory=Wedge)
+    plane: Plane = field(default_factory=Plane)
+    z_mass: ZMass = field(default_factory=ZMass)
+    hertz: HertzPair = field(default_factory=HertzPair)
+    punch: Punch = field(default_factory=Punch)
+    imported: Imported = field(default_factory=Imported)
+    mesh: MeshSize = field(default_factory=MeshSize)
+    material: Materials = field(default_factory=Materials)
+    contact: Contact = field(default_factory=Contact)
+    operation: Operation = field(default_factory=Operation)
+    excitation: Excitation = field(default_factory=Excitation)
+    study: Study = field(default_factory=Study)
+    model: Model = field(default_factory=Model)

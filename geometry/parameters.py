@@ -1,0 +1,129 @@
+"""The parameters of every shape that bladefem can draw. SI units, radians; no gmsh here.
+
+Axes, everywhere: z is the engine axis, the middle of a blade stands along +x (radial), y is circumferential.
+A sector spans the angles -pi/N .. +pi/N about z; the next blade is the sector turned by +2 pi/N.
+Plane models lie in x (radial), y (circumferential); z is their out-of-plane thickness; the next blade is at +pitch in y.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from math import pi
+
+from .quantity import quantity
+
+__all__ = ["Aerofoil", "Disc", "HertzPair", "MeshSize", "Plane", "Platform", "Punch", "Shank", "Wedge", "ZMass"]
+
+DEG = pi / 180
+
+
+@dataclass(frozen=True)
+class Aerofoil:
+    """The blade above its platform, a closed spline section lofted from root to tip."""
+
+    span: float = quantity(0.12, "m", 0.02, 1.0, "height from platform to tip")
+    chord_root: float = quantity(0.05, "m", 0.01, 0.5, "chord at the platform")
+    chord_tip: float = quantity(0.042, "m", 0.005, 0.5, "chord at the tip")
+    thickness_root: float = quantity(0.14, "1", 0.04, 0.4, "largest thickness over chord, root")
+    thickness_tip: float = quantity(0.08, "1", 0.03, 0.4, "largest thickness over chord, tip")
+    camber: float = quantity(0.08, "1", 0.0, 0.25, "camber over chord")
+    section: str = quantity("naca", choices=("naca", "biconvex"), help="section family")
+    stagger: float = quantity(25 * DEG, "rad", -70 * DEG, 70 * DEG, "angle of the root chord to the engine axis")
+    twist: float = quantity(20 * DEG, "rad", -60 * DEG, 60 * DEG, "turn of the tip section against the root section")
+    lean: float = quantity(0.0, "rad", -20 * DEG, 20 * DEG, "tilt of the stacking line in the circumferential direction")
+    sweep: float = quantity(0.0, "rad", -20 * DEG, 20 * DEG, "tilt of the stacking line in the axial direction")
+    fillet: float = quantity(0.0, "m", 0.0, 0.01, "radius between aerofoil and platform, 0 for a sharp edge")
+
+
+@dataclass(frozen=True)
+class Platform:
+    """The plate that the aerofoil stands on; its two inclined undersides are the seats of the dampers."""
+
+    length: float = quantity(0.06, "m", 0.01, 0.5, "axial length")
+    thickness: float = quantity(0.006, "m", 0.002, 0.05, "thickness at the rim of the plate")
+    gap: float = quantity(0.001, "m", 1e-4, 0.02, "circumferential gap between neighbouring platforms")
+    seat_width: float = quantity(0.006, "m", 0.002, 0.05, "width of the inclined seat, along the slope")
+
+
+@dataclass(frozen=True)
+class Shank:
+    """The neck between platform and disc."""
+
+    height: float = quantity(0.03, "m", 0.005, 0.2, "from the rim of the disc to the platform")
+    width: float = quantity(0.016, "m", 0.004, 0.1, "circumferential width")
+    length: float = quantity(0.045, "m", 0.01, 0.4, "axial length")
+
+
+@dataclass(frozen=True)
+class Disc:
+    """The segment of the disc below one blade, clamped at its bore."""
+
+    sectors: int = quantity(36, "1", 6, 200, "number of blades")
+    bore_radius: float = quantity(0.12, "m", 0.01, 2.0, "inner radius, clamped")
+    rim_radius: float = quantity(0.2, "m", 0.03, 3.0, "outer radius, where the shank starts")
+    width: float = quantity(0.045, "m", 0.01, 0.5, "axial width")
+
+
+@dataclass(frozen=True)
+class Wedge:
+    """The underplatform damper: a prism of triangular section, blunted at top and bottom, pressed outwards."""
+
+    angle: float = quantity(40 * DEG, "rad", 15 * DEG, 75 * DEG,
+                            "alpha: each flank against the radial plane between two blades")
+    length: float = quantity(0.04, "m", 0.005, 0.5, "axial length")
+    mass: float | None = quantity(None, "kg", 1e-4, 5.0, "mass; sets the density when given")
+    clearance: float = quantity(0.0, "m", 0.0, 0.002, "normal gap between flank and seat before seating")
+
+
+@dataclass(frozen=True)
+class Plane:
+    """Plane blades with flat dampers (the paper's Fig. 12): clamped at x = 0, platforms at a height."""
+
+    length: float = quantity(0.15, "m", 0.02, 1.0, "blade length from root to tip")
+    thickness: float = quantity(0.006, "m", 0.001, 0.1, "blade thickness, circumferential")
+    depth: float = quantity(0.03, "m", 0.001, 0.5, "out-of-plane thickness")
+    platform_height: float = quantity(0.045, "m", 0.005, 0.9, "height of the platform's underside")
+    platform_width: float = quantity(0.05, "m", 0.005, 0.5, "circumferential width of the platform")
+    platform_thickness: float = quantity(0.008, "m", 0.001, 0.1, "radial thickness of the platform")
+    pitch: float = quantity(0.054, "m", 0.006, 0.6, "distance between two blades")
+    seat_width: float = quantity(0.012, "m", 0.002, 0.2, "contact width on each platform, from its edge")
+    damper_height: float = quantity(0.006, "m", 0.001, 0.1, "radial height of the flat damper")
+
+
+@dataclass(frozen=True)
+class ZMass:
+    """The Z-shaped mass on a vibrating foundation (the paper's Sect. 4), three bars of one plate."""
+
+    width: float = quantity(0.06, "m", 0.01, 0.5, "along x")
+    height: float = quantity(0.06, "m", 0.01, 0.5, "along y")
+    bar: float = quantity(0.016, "m", 0.003, 0.2, "width of the three bars")
+    thickness: float = quantity(0.01, "m", 0.001, 0.1, "of the plate, along z")
+
+
+@dataclass(frozen=True)
+class HertzPair:
+    """A sphere (3-D) or cylinder (plane strain) cap against a block, symmetric halves; for verification."""
+
+    radius: float = quantity(0.05, "m", 0.001, 1.0, "radius of curvature of the indenter")
+    half_width: float = quantity(0.01, "m", 1e-4, 1.0, "half width of the meshed blocks")
+    contact_radius: float = quantity(1e-3, "m", 1e-5, 0.1, "expected contact radius, meshed finely")
+    dimension: int = quantity(3, "1", 2, 3, "3 for a sphere, 2 for a cylinder in plane strain")
+
+
+@dataclass(frozen=True)
+class Punch:
+    """A flat rigid punch on an elastic block; for verification."""
+
+    radius: float = quantity(2e-3, "m", 1e-5, 0.1, "radius (3-D) or half width (2-D) of the punch")
+    half_width: float = quantity(0.02, "m", 1e-4, 1.0, "half width of the block")
+    dimension: int = quantity(3, "1", 2, 3, "3 for a round punch, 2 for plane strain")
+
+
+@dataclass(frozen=True)
+class MeshSize:
+    """How finely a shape is meshed."""
+
+    size: float | None = quantity(None, "m", 1e-5, 1.0, "target element size; chosen from the thinnest part when left out")
+    contact_size: float | None = quantity(None, "m", 1e-6, 1.0, "element size on contact faces")
+    order: int = quantity(2, "1", 1, 2, "order of the elements; 1 is only for comparison")
+    curved: bool = quantity(True, help="second-order elements follow curved faces (invalid ones are straightened)")
