@@ -62,6 +62,7 @@ class Excitation:
     force: float = quantity(1.0, "N", 0.0, 1e6, "amplitude on each blade")
     at: str = quantity("tip_mid", help="named node set or face that carries the force")
     direction: tuple[float, float, float] = quantity((0.0, 1.0, 0.0), "1", help="direction in the blade's own axes (radial, circumferential, axial)")
+    phase: float = quantity(0.0, "rad", -pi, pi, "inter-blade phase of plane blades; on a wheel it follows from the engine order")
     mode: int = quantity(1, "1", 1, 50, "mode whose resonance is studied, 1 = lowest")
 
 
