@@ -1,0 +1,113 @@
+"""Linear bodies from plain matrices: for users without a finite-element model here, and for tests."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from pathlib import Path
+
+import numpy as np
+from scipy import io, linalg, sparse
+
+from ..data import PortModel
+from ..errors import InputError, suggestion
+
+__all__ = ["port_model_from_matrices", "read_matrices"]
+
+RIGID = 1e-10      # eigenvalues below this share of the largest one are rigid modes: omega = 0
+
+
+def port_model_from_matrices(M: np.ndarray, K: np.ndarray, ports: Mapping[str, np.ndarray], *,
+                             count: int | None = None, C: np.ndarray | None = None,
+                             nodal_diameter: int | None = None) -> PortModel:
+    """The body M, C, K seen from its ports, by normal modes and the residual flexibility of the modes left out.
+
+    Args:
+        M, K: (dofs, dofs) mass [kg] and stiffness [N/m], dense or sparse, real symmetric or Hermitian.
+        ports: name ("contact", "load", "probe") to dof numbers (k,), or to a matrix (k, dofs) of displacement readings.
+        count: modes kept; all when left out.
+        C: (dofs, dofs) viscous damping [N s/m]; enters as the full matrix of the kept modes.
+
+    Raises:
+        InputError: shapes do not fit, a matrix is not Hermitian or M is not positive definite.
+    """
+    M, K = _hermitian(M, "M"), _hermitian(K, "K")
+    if M.shape != K.shape:
+        raise InputError(f"M {M.shape} and K {K.shape}: expected the same shape")
+    P, slices = _selection(ports, M.shape[0])
+    try:
+        values, vectors = linalg.eigh(K, M)
+    except linalg.LinAlgError as error:
+        raise InputError("M is not positive definite: expected a mass matrix without massless dofs") from error
+    if values[0] < -RIGID * values[-1]:
+        raise InputError(f"K has the eigenvalue {values[0]:.3g}: expected a positive semidefinite stiffness")
+    values[values < RIGID * values[-1]] = 0.0
+    count = len(values) if count is None else count
+    if not np.count_nonzero(values == 0) <= count <= len(values):
+        raise InputError(f"count {count}: expected at least the rigid modes and at most {len(values)} modes")
+    shapes = P @ vectors
+    rest = shapes[:, count:] / np.sqrt(values[count:])
+    kept = vectors[:, :count]
+    damping = None if C is None else kept.conj().T @ _hermitian(C, "C") @ kept
+    return PortModel(np.sqrt(values[:count]), shapes[:, :count], rest @ rest.conj().T, slices, nodal_diameter,
+                     damping=damping)
+
+
+def read_matrices(path: str | Path) -> dict[str, np.ndarray]:
+    """Named arrays of a reduced model exported by another code.
+
+    Reads NumPy ``.npz``, Matlab ``.mat`` (version 7 and older), or one Matrix Market ``.mtx`` file, whose matrix is
+    named after the file. Sparse matrices come back dense.
+
+    Raises:
+        InputError: the file is missing or of another kind.
+    """
+    path = Path(path)
+    readers = {".npz": _read_npz, ".mat": _read_mat, ".mtx": _read_market}
+    if path.suffix not in readers:
+        raise InputError(f"file {path.name}: expected one of {', '.join(readers)}{suggestion(path.suffix, readers)}")
+    if not path.is_file():
+        raise InputError(f"file {path}: not found")
+    return readers[path.suffix](path)
+
+
+def _read_npz(path: Path) -> dict[str, np.ndarray]:
+    with np.load(path, allow_pickle=False) as archive:
+        return {name: archive[name] for name in archive.files}
+
+
+def _read_mat(path: Path) -> dict[str, np.ndarray]:
+    return {name: _dense(value) for name, value in io.loadmat(path).items() if not name.startswith("__")}
+
+
+def _read_market(path: Path) -> dict[str, np.ndarray]:
+    return {path.stem: _dense(io.mmread(path))}
+
+
+def _dense(matrix: np.ndarray) -> np.ndarray:
+    return matrix.toarray() if sparse.issparse(matrix) else np.asarray(matrix)
+
+
+def _hermitian(matrix: np.ndarray, name: str) -> np.ndarray:
+    matrix = np.atleast_2d(_dense(matrix))
+    if matrix.ndim != 2 or matrix.shape[0] != matrix.shape[1] or not np.isfinite(matrix).all():
+        raise InputError(f"{name} of shape {matrix.shape}: expected a square matrix of finite numbers")
+    error = abs(matrix - matrix.conj().T).max()
+    if error > 1e-8 * abs(matrix).max():
+        raise InputError(f"{name} differs from its transposed conjugate by {error:.3g}: expected a Hermitian matrix")
+    return (matrix + matrix.conj().T) / 2
+
+
+def _selection(ports: Mapping[str, np.ndarray], dofs: int) -> tuple[np.ndarray, dict[str, slice]]:
+    rows, slices, start = [], {}, 0
+    for name, value in ports.items():
+        value = np.asarray(value)
+        if value.ndim == 1:
+            if value.size and not (0 <= value.min() and value.max() < dofs):
+                raise InputError(f"ports['{name}']: expected dof numbers from 0 to {dofs - 1}")
+            value = np.eye(dofs)[value.astype(int)]
+        if value.ndim != 2 or value.shape[1] != dofs:
+            raise InputError(f"ports['{name}'] of shape {value.shape}: expected (k,) dofs or a (k, {dofs}) matrix")
+        rows.append(value)
+        slices[name] = slice(start, start + len(value))
+        start += len(value)
+    return np.vstack(rows), slices

@@ -1,0 +1,103 @@
+"""Bodies from matrices: the receptance of the reduced body is that of the matrices."""
+
+import numpy as np
+import pytest
+from scipy import io, linalg
+
+from bladefem.errors import InputError
+from bladefem.reduction.assemble import folded_diameter, join, pair_models, recombine, wheel_models
+from bladefem.reduction.beam import beam_matrices, reference_blade
+from bladefem.reduction.matrices import port_model_from_matrices, read_matrices
+
+
+def receptance(body, w):
+    damping = 0 if body.damping is None else 1j * w * body.damping
+    Z = np.diag(body.omega**2 - w**2) + damping
+    return body.shapes @ np.linalg.solve(Z, body.shapes.conj().T) + body.residual
+
+
+def test_cantilever_frequencies():
+    """Uniform beam: (1.875104, 4.694091, 7.854757)^2 sqrt(EI / (rho A)) / L^2 (Blevins 1979)."""
+    K, M = beam_matrices(elements=40)
+    exact = np.array([1.87510407, 4.69409113, 7.85475744])**2 * np.sqrt(2.1e11 * 0.006**2 / 12 / 7850) / 0.15**2
+    np.testing.assert_allclose(np.sqrt(linalg.eigvalsh(K, M)[:3]), exact, rtol=2e-6)
+
+
+def test_reference_blade_frequencies():
+    np.testing.assert_allclose(reference_blade().omega[:2] / 2 / np.pi, [220.86, 1236.6], rtol=5e-5)
+
+
+def test_receptance_of_all_modes_is_exact_and_residual_flexibility_makes_truncation_static_exact():
+    rng = np.random.default_rng(1)
+    K, M = beam_matrices()
+    C = 1e-5 * K + np.diag(rng.uniform(1, 2, len(K)))
+    ports = {"contact": np.array([10, 12]), "probe": rng.normal(size=(1, len(K)))}
+    P = np.vstack([np.eye(len(K))[ports["contact"]], ports["probe"]])
+    full = port_model_from_matrices(M, K, ports, C=C)
+    w = 2 * np.pi * 900
+    exact = P @ np.linalg.solve(K - w**2 * M + 1j * w * C, P.T)
+    np.testing.assert_allclose(receptance(full, w), exact, rtol=0, atol=1e-10 * abs(exact).max())
+    few = port_model_from_matrices(M, K, ports, count=3)
+    np.testing.assert_allclose(receptance(few, 0.0), P @ np.linalg.solve(K, P.T), rtol=1e-8)
+
+
+def test_free_body_has_rigid_modes():
+    K = 1e6 * np.array([[1.0, -1.0], [-1.0, 1.0]])
+    body = port_model_from_matrices(np.eye(2), K, {"contact": np.array([0])})
+    assert body.omega[0] == 0 and body.omega[1] == pytest.approx(np.sqrt(2e6))
+
+
+def test_files(tmp_path):
+    K, M = beam_matrices(elements=2)
+    np.savez(tmp_path / "a.npz", K=K, M=M)
+    io.savemat(tmp_path / "a.mat", {"K": K, "M": M})
+    io.mmwrite(tmp_path / "K.mtx", K)
+    for name in ("a.npz", "a.mat", "K.mtx"):
+        np.testing.assert_allclose(read_matrices(tmp_path / name)["K"], K, rtol=1e-14)
+
+
+@pytest.mark.parametrize(("change", "word"), [
+    ({"count": 99}, "count"), ({"M": -np.eye(4)}, "M"),
+    ({"K": np.ones((4, 3))}, "K"), ({"ports": {"load": np.array([9])}}, "load")])
+def test_bad_matrices(change, word):
+    K, M = beam_matrices(elements=2)
+    with pytest.raises(InputError, match=word):
+        port_model_from_matrices(**{"M": M, "K": K, "ports": {"contact": np.array([0])}} | change)
+
+
+def test_nodal_diameters():
+    assert [folded_diameter(h, 5, 12) for h in range(4)] == [(0, False), (5, False), (2, True), (3, False)]
+
+
+def test_the_wheel_sees_the_next_blade_turned():
+    """Against the ring of N blades coupled by springs written out in full: exact in every nodal diameter."""
+    N, EO, k = 6, 2, 3e5
+    body = reference_blade(1, modes=4)
+    pair = wheel_models({n: body for n in range(4)}, slice(1, 2), EO, N, 3)[1]
+    w = 2 * np.pi * 300
+    R = receptance(body, w)
+    contact, load = R[:1, :1], R[:1, 2:3]
+    wheel_R, B = np.kron(np.eye(N), contact), np.roll(np.eye(N), -1, axis=0)    # B x: the next blade's x
+    spring = (np.eye(N) - B).T @ (np.eye(N) - B) * k
+    force = np.exp(2j * np.pi * EO / N * np.arange(N))
+    free = np.kron(np.eye(N), load) @ force
+    wheel = np.linalg.solve(np.eye(N) + wheel_R @ spring, free)
+    P = receptance(pair, w)
+    relative = np.array([[1.0, -1.0]]) @ P[:2]                                 # a spring between this and the next
+    relative = np.linalg.solve(1 + k * relative[:, :2] @ np.array([[1.0], [-1.0]]), relative[:, 2:3])
+    np.testing.assert_allclose(relative[0, 0], (wheel[0] - wheel[1]), rtol=1e-10)
+
+
+def test_in_antiphase_and_in_phase_models_stay_real():
+    models = pair_models(reference_blade(2), slice(2, 4), np.pi, 3)
+    assert all(np.isrealobj(m.shapes) for m in models)
+    assert models[1].shapes[2, 0] == -models[1].shapes[0, 0] and models[2].shapes[2, 0] == models[2].shapes[0, 0]
+
+
+def test_two_bodies_as_one_with_relative_contact():
+    one = reference_blade(1, modes=3)
+    both = recombine(join((one, one)), np.array([[1.0, 0.0, -1.0, 0.0]]))
+    R, S = receptance(one, 1000.0), receptance(both, 1000.0)
+    assert both.ports == {"contact": slice(0, 1), "load": slice(1, 3), "probe": slice(3, 5)}
+    np.testing.assert_allclose(S[0, 0], 2 * R[0, 0], rtol=1e-12)
+    np.testing.assert_allclose(S[0, 1:3], [R[0, 2], -R[0, 2]], rtol=1e-12)
