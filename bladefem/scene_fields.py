@@ -1,0 +1,157 @@
+"""One field of a scene: what a user wrote becomes a checked SI value of the field's own type."""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Iterator
+from types import NoneType
+from typing import Any, NamedTuple, get_args, get_origin, get_type_hints
+
+from bladefem.errors import InputError, suggestion
+from bladefem.scene import Scene
+from bladefem.units import parse, show
+
+__all__ = ["TABLES", "Field", "convert", "each_field", "field_at", "used_tables"]
+
+_COMMON = ("mesh", "material", "contact", "study", "model")
+_ENGINE = (*_COMMON, "operation", "excitation")
+
+# Which tables each kind of scene reads; the others must not be given.
+TABLES = {
+    "wedge sector": ("aerofoil", "platform", "shank", "disc", "damper", *_ENGINE),
+    "plane blades": ("plane", *_ENGINE),
+    "z mass": ("z_mass", *_ENGINE),
+    "hertz": ("hertz", *_COMMON),
+    "punch": ("punch", *_COMMON),
+    "imported": ("imported", "damper", *_ENGINE),
+}
+
+
+class Field(NamedTuple):
+    """A leaf of the scene."""
+
+    name: str       # dotted, "aerofoil.twist"
+    kind: Any       # type hint: float, int | None, tuple[float, ...], ...
+    meta: dict      # unit, low, high, help, choices
+    default: Any
+
+
+def used_tables(kind: str) -> tuple[str, ...]:
+    """Names of the tables that this kind of scene reads."""
+    if kind not in TABLES:
+        raise InputError(f"kind = {kind!r}: expected one of {', '.join(TABLES)}{_near(kind, TABLES)}")
+    return TABLES[kind]
+
+
+def each_field(table: type = Scene, path: str = "") -> Iterator[Field]:
+    """All leaves of a (nested) dataclass, in the order in which they are written."""
+    hints = get_type_hints(table)
+    for f in dataclasses.fields(table):
+        name = f"{path}.{f.name}" if path else f.name
+        if dataclasses.is_dataclass(hints[f.name]):
+            yield from each_field(hints[f.name], name)
+        else:
+            yield Field(name, hints[f.name], dict(f.metadata), f.default)
+
+
+def field_at(name: str) -> Field:
+    """The leaf of that dotted name, or an error that names the nearest one."""
+    known = {f.name: f for f in each_field()}
+    if name in known:
+        return known[name]
+    last = name.rsplit(".", 1)[-1]
+    same = [k for k in known if k.rsplit(".", 1)[-1] == last]
+    tables = sorted({k.rsplit(".", 1)[0] for k in known if "." in k})
+    if name in tables:
+        raise InputError(f"{name}: expected a field of this table, such as "
+                         f"{next(k for k in known if k.startswith(name + '.'))}")
+    if same:
+        raise InputError(f"unknown key '{name}'; did you mean '{same[0]}'?")
+    table = name.rsplit(".", 1)[0] if "." in name else ""
+    inside = [k for k in known if k.rpartition(".")[0] == table]
+    raise InputError(f"unknown key '{name}'{suggestion(name, inside or [*tables, *known])}")
+
+
+def convert(value: object, field: Field) -> Any:
+    """The SI value of a field from what was written, of the field's own type and within its range.
+
+    ``None`` and "auto" leave an optional field to the program.
+
+    Raises:
+        InputError: wrong type, wrong unit, out of range, not finite, or not one of the choices.
+    """
+    kind = field.kind
+    if NoneType in get_args(kind):
+        if value is None or value == "auto":
+            return None
+        kind = next(k for k in get_args(kind) if k is not NoneType)
+    if get_origin(kind) is tuple:
+        return _tuple(value, get_args(kind), field)
+    return _SCALARS[kind](value, field)
+
+
+def _float(value: object, field: Field) -> float:
+    return _in_range(parse(value, field.meta.get("unit") or "1", field.name), field)
+
+
+def _int(value: object, field: Field) -> int:
+    number = parse(value, "1", field.name)
+    if number != int(number):
+        raise InputError(f"{field.name} = {value}: expected a whole number")
+    return _in_range(int(number), field)
+
+
+def _bool(value: object, field: Field) -> bool:
+    words = {"true": True, "yes": True, "on": True, "false": False, "no": False, "off": False}
+    if isinstance(value, str) and value.lower() in words:
+        return words[value.lower()]
+    if not isinstance(value, bool):
+        raise InputError(f"{field.name} = {value!r}: expected true or false")
+    return value
+
+
+def _str(value: object, field: Field) -> str:
+    if not isinstance(value, str):
+        raise InputError(f"{field.name} = {value!r}: expected text")
+    choices = field.meta.get("choices") or ()
+    if choices and value not in choices:
+        raise InputError(f"{field.name} = {value!r}: expected one of {', '.join(choices)}{_near(value, choices)}")
+    return value
+
+
+_SCALARS = {float: _float, int: _int, bool: _bool, str: _str}
+
+
+def _tuple(value: object, kinds: tuple, field: Field) -> tuple:
+    items = _items(value)
+    length = None if kinds[-1] is Ellipsis else len(kinds)
+    if length is not None and len(items) != length:
+        raise InputError(f"{field.name} = {value}: expected {length} values")
+    if not items:
+        raise InputError(f"{field.name} = {value}: expected at least one value")
+    return tuple(_SCALARS[kinds[0]](item, field) for item in items)
+
+
+def _items(value: object) -> list:
+    """A list from a list, a single value, or text like "20, 50, 100 N", where the last unit holds for all."""
+    if not isinstance(value, str):
+        return list(value) if hasattr(value, "__iter__") else [value]
+    items = [item.strip(" '\"") for item in value.strip("[]() ").split(",") if item.strip()]
+    unit = items[-1].lstrip("+-.0123456789eE_ ") if items else ""
+    return [f"{item} {unit}" if unit and item[-1] in "0123456789." else item for item in items]
+
+
+def _in_range(number: Any, field: Field) -> Any:
+    low, high, unit = field.meta.get("low"), field.meta.get("high"), field.meta.get("unit") or "1"
+    if (low is None or number >= low) and (high is None or number <= high):
+        return number
+    if low is None or high is None:
+        limit = f"at most {show(high, unit)}" if low is None else f"at least {show(low, unit)}"
+    else:
+        limit = f"{show(low, unit)} to {show(high, unit)}"
+    raise InputError(f"{field.name} = {show(number, unit)}: expected {limit}")
+
+
+def _near(word: str, known: Any) -> str:
+    near = suggestion(word, known)
+    return near if "did you mean" in near else ""
