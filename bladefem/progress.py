@@ -1,0 +1,38 @@
+"""Progress bars: on a terminal only, one for all ranks, and only for what takes over two seconds.
+
+Nothing in the numerics imports this file: long loops are generators, which the caller wraps here.
+"""
+
+from __future__ import annotations
+
+import os
+import sys
+from collections.abc import Iterable, Iterator
+from typing import Any, TypeVar
+
+__all__ = ["wanted", "watch"]
+
+T = TypeVar("T")
+
+
+def wanted(quiet: bool = False, rank: int = 0) -> bool:
+    """Whether a bar is shown: not quiet, on rank 0, and the error stream is a terminal (mpirun: the starter's was)."""
+    return not quiet and rank == 0 and (sys.stderr.isatty() or os.environ.get("BLADEFEM_TERMINAL") == "1")
+
+
+def watch(items: Iterable[T], label: str = "", total: int | None = None, shown: bool = True, **options: Any,
+          ) -> Iterator[T]:
+    """The same items, with a bar of the remaining time once two seconds have passed.
+
+    Args:
+        items: a list or a generator.
+        label: what is being done.
+        total: number of items, when ``items`` cannot say it.
+        shown: answer of :func:`wanted`.
+        options: passed on to tqdm.
+    """
+    if not shown:
+        yield from items
+        return
+    from tqdm import tqdm
+    yield from tqdm(items, desc=label, total=total, delay=2.0, leave=False, dynamic_ncols=True, **options)

@@ -1,0 +1,55 @@
+"""What holds for every test: a skip is a failure, and on several ranks each failure says which rank it was on."""
+
+from __future__ import annotations
+
+import gc
+import os
+import sys
+
+import pytest
+
+RANK = int(os.environ.get("OMPI_COMM_WORLD_RANK", os.environ.get("PMI_RANK", 0)))
+SIZE = int(os.environ.get("OMPI_COMM_WORLD_SIZE", os.environ.get("PMI_SIZE", 1)))
+
+
+@pytest.hookimpl(trylast=True)
+def pytest_configure(config: pytest.Config) -> None:
+    """Only rank 0 writes the usual report."""
+    if RANK > 0:
+        config.pluginmanager.unregister(config.pluginmanager.getplugin("terminalreporter"))
+
+
+def pytest_runtest_logreport(report: pytest.TestReport) -> None:
+    """The other ranks tell their failures only."""
+    if RANK > 0 and report.failed:
+        print(f"\nrank {RANK}: {report.nodeid}\n{report.longreprtext}", file=sys.stderr, flush=True)
+
+
+def _refuse_skip(report: pytest.TestReport | pytest.CollectReport) -> None:
+    if report.skipped and not hasattr(report, "wasxfail"):
+        report.outcome = "failed"
+        report.longrepr = f"{report.longrepr}\nA skipped test counts as failed: what it needs is part of the set-up."
+
+
+@pytest.hookimpl(hookwrapper=True)
+def pytest_runtest_makereport(item, call):
+    """A test that skips itself fails."""
+    outcome = yield
+    _refuse_skip(outcome.get_result())
+
+
+@pytest.hookimpl(hookwrapper=True)
+def pytest_make_collect_report(collector):
+    """A file that skips itself fails."""
+    outcome = yield
+    _refuse_skip(outcome.get_result())
+
+
+@pytest.fixture(autouse=SIZE > 1)
+def _collect_together():
+    """PETSc frees its objects collectively: all ranks do it at the same moment."""
+    yield
+    if SIZE > 1:
+        gc.collect()
+        from mpi4py import MPI
+        MPI.COMM_WORLD.Barrier()
