@@ -1,0 +1,132 @@
+"""Contact pressure: both faces unfolded onto the paper with one colour scale, and the same numbers as tables."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pandas as pd
+from matplotlib.cm import ScalarMappable
+from matplotlib.colors import Normalize
+from matplotlib.tri import Triangulation
+
+from bladefem.data import Patch, PressureMap
+
+from .skin import split_faces
+from .style import COLOURS, canvas, headline
+
+__all__ = ["contact_centre", "draw_pressure", "pressure_points", "pressure_summary", "unfold"]
+
+PRESSURE_COLOURS = "inferno_r"
+
+
+def contact_centre(seat: PressureMap) -> np.ndarray:
+    """(3,) force-weighted mean point [m]; the middle of the patch when nothing presses."""
+    weight = seat.force if seat.force.sum() > 0 else seat.patch.area
+    return weight @ seat.patch.points / weight.sum()
+
+
+def pressure_summary(seats: Sequence[PressureMap]) -> pd.DataFrame:
+    """One row a patch: resultant, peak and mean pressure, pressed share of the area, contact centre, proof."""
+    rows = []
+    for seat in seats:
+        pressed = seat.force > 1e-9 * max(seat.force.max(initial=0.0), 1e-300)
+        area = float(seat.patch.area[pressed].sum())
+        x, y, z = contact_centre(seat)
+        rows.append({"patch": seat.patch.name, "nodes": len(seat.force), "force": float(seat.force.sum()),
+                     "peak_pressure": float(seat.pressure.max(initial=0.0)),
+                     "mean_pressure": float(seat.force.sum()) / area if area > 0 else 0.0,
+                     "area": float(seat.patch.area.sum()), "contact_share": area / float(seat.patch.area.sum()),
+                     "centre_x": x, "centre_y": y, "centre_z": z, "complementarity": seat.complementarity})
+    return pd.DataFrame(rows)
+
+
+def pressure_points(seats: Sequence[PressureMap]) -> pd.DataFrame:
+    """One row a contact node: patch, position, area, force, pressure, gap (SI)."""
+    frames = [pd.DataFrame({"patch": seat.patch.name, "x": seat.patch.points[:, 0], "y": seat.patch.points[:, 1],
+                            "z": seat.patch.points[:, 2], "area": seat.patch.area, "force": seat.force,
+                            "pressure": seat.pressure, "gap": seat.gap}) for seat in seats]
+    return pd.concat(frames, ignore_index=True)
+
+
+def unfold(patch: Patch, points: np.ndarray | None = None) -> np.ndarray:
+    """(n, 2) coordinates in the patch's mean plane [m]: along the engine axis, and outwards along the slope."""
+    normal = patch.frame[:, 0].mean(axis=0)
+    normal = normal / np.linalg.norm(normal)
+    along = np.array([0.0, 0.0, 1.0]) - normal[2] * normal
+    if np.linalg.norm(along) < 0.1:
+        along = patch.frame[0, 1]
+    along = along / np.linalg.norm(along)
+    across = np.cross(normal, along)
+    across = across * (1.0 if across[0] >= 0 else -1.0)
+    offset = (patch.points if points is None else points) - patch.points.mean(axis=0)
+    return np.stack([offset @ along, offset @ across], axis=-1)
+
+
+def draw_pressure(seats: Sequence[PressureMap], file: str | Path | None = None, *, title: str = "") -> object:
+    """The pressure on each face, unfolded, with a common colour scale; a curve for plane models; returns the figure.
+
+    Args:
+        seats: the pressure maps, usually "this" and "next".
+        file: PNG to write.
+        title: headline.
+    """
+    peak = max([float(seat.pressure.max(initial=0.0)) for seat in seats] + [1e-6]) / 1e6
+    line = seats[0].patch.faces.shape[1] == 2
+    width, height = np.ptp(unfold(seats[0].patch), axis=0)
+    # Long faces one below the other, others side by side.
+    stacked = not line and width > 1.3 * height
+    shape = (len(seats), 1) if stacked else (1, len(seats))
+    size = (7.4, 0.9 + len(seats) * (1.2 + 5.2 * height / width)) if stacked else (4.0 * len(seats) + 0.8, 4.2)
+    with canvas(file, size=size, grid=shape, squeeze=False, sharex=stacked, sharey=True) as axes:
+        for ax, seat in zip(axes.flat, seats, strict=True):
+            (draw_line if line else draw_face)(ax, seat, peak)
+            ax.set_title(caption(seat), fontsize=9, fontweight="normal")
+        figure = axes[0, 0].figure
+        if not line:
+            figure.colorbar(ScalarMappable(Normalize(0, peak), PRESSURE_COLOURS), ax=list(axes.flat), aspect=25,
+                            label="contact pressure [MPa]")
+        axes[-1, 0].set_xlabel("along the face [mm]" if line else "along the engine axis [mm]")
+        figure.legend(*axes[0, 0].get_legend_handles_labels(), loc="outside lower center", ncols=3)
+        headline(figure, title or "contact pressure" + ("" if line else ", faces unfolded"))
+        return figure
+
+
+def caption(seat: PressureMap) -> str:
+    """Resultant, peak and pressed share of one face."""
+    row = pressure_summary([seat]).iloc[0]
+    return (f"seat \"{seat.patch.name}\": {row.force:.4g} N, peak {row.peak_pressure / 1e6:.3g} MPa,\n"
+            f"{100 * row.contact_share:.0f} % of {1e6 * row.area:.3g} mm² pressed")
+
+
+def draw_face(ax: Any, seat: PressureMap, peak: float) -> None:
+    """One face in its plane: pressure in colour, nodes as dots, peak and centre marked."""
+    xy = 1e3 * unfold(seat.patch)
+    corners = seat.patch.faces.shape[1]
+    triangles = split_faces(seat.patch.faces, corners).reshape(-1, 3)
+    pressure = seat.pressure / 1e6
+    flat = Triangulation(xy[:, 0], xy[:, 1], triangles)
+    ax.tripcolor(flat, pressure, shading="gouraud", cmap=PRESSURE_COLOURS, vmin=0, vmax=peak, rasterized=True)
+    open_nodes = seat.force <= 0
+    ax.plot(*xy[~open_nodes].T, ".", color="#ffffff", ms=1.5, alpha=0.5)
+    ax.plot(*xy[open_nodes].T, "o", mfc="none", mec="#888888", ms=2.5, mew=0.5, label="open node")
+    centre = 1e3 * unfold(seat.patch, contact_centre(seat)[None])[0]
+    ax.plot(*xy[np.argmax(pressure)], "^", mfc="white", mec="black", ms=7, label="peak", clip_on=False)
+    ax.plot(*centre, "P", mfc=COLOURS[5], mec="black", ms=8, label="centre of the force")
+    ax.set(ylabel="outwards [mm]", aspect="equal")
+    ax.grid(False)
+
+
+def draw_line(ax: Any, seat: PressureMap, peak: float) -> None:
+    """The face of a plane model: pressure over arc length."""
+    xy = 1e3 * unfold(seat.patch)
+    # The face of a plane model lies along t1 or the slope, whichever is the longer in the picture.
+    place = xy[:, np.argmax(np.ptp(xy, axis=0))]
+    order = np.argsort(place)
+    ax.fill_between(place[order], seat.pressure[order] / 1e6, color=COLOURS[0], alpha=0.2)
+    ax.plot(place[order], seat.pressure[order] / 1e6, "o-", color=COLOURS[0], ms=3)
+    ax.axvline(np.average(place, weights=np.maximum(seat.force, 1e-300)), color=COLOURS[1], ls="--", lw=1,
+               label="centre of the force")
+    ax.set(ylabel="contact pressure [MPa]", ylim=(0, 1.08 * peak))

@@ -1,0 +1,237 @@
+"""Mode shapes: one sector, the full wheel with its nodal lines, contact sheets, travelling waves."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from matplotlib.cm import ScalarMappable
+from matplotlib.colors import Normalize
+
+from bladefem.data import ModeSet
+from geometry.mesh import Mesh
+
+from .mesh import FRONT, RADIAL, carry_round, edge_lines, polydata, save_wheel_vtu, view_of
+from .skin import Skin, skin, wheel_count, wheel_skin
+from .style import DIVERGING, LIGHT, SEQUENTIAL, aim, canvas, headline, open_plotter, photograph, show_photograph
+
+__all__ = ["animate_wave", "best_phase", "draw_mode", "draw_mode_sheet", "draw_wheel_mode", "mode_title",
+           "save_modes_vtu"]
+
+WHEEL_VIEW = (0.0, -0.55, 1.0)
+COMPONENTS = ("radial", "circumferential", "axial")
+EXAGGERATION = 0.1      # largest drawn displacement over the sector's height
+
+
+def best_phase(shape: np.ndarray) -> complex:
+    """The factor e^{j phi} that makes the real part of a complex shape as large as possible."""
+    square = np.sum(np.asarray(shape) ** 2)
+    return np.exp(-0.5j * np.angle(square)) if abs(square) > 0 else 1.0 + 0.0j
+
+
+def mode_title(modes: ModeSet, number: int, family: str = "") -> str:
+    """"mode 1, first flap: 812.4 Hz, nodal diameter 6" (number counts from 0)."""
+    diameter = "" if modes.nodal_diameter is None else f", nodal diameter {modes.nodal_diameter}"
+    return f"mode {number + 1}{', ' + family if family else ''}: {modes.frequencies[number]:.5g} Hz{diameter}"
+
+
+def scale_of(mesh: Mesh, shape: np.ndarray) -> float:
+    """Factor that draws the largest displacement of a shape as a tenth of the sector's radial height."""
+    largest = np.max(np.linalg.norm(shape, axis=-1), initial=0.0)
+    height = np.ptp(mesh.points[:, 0])
+    return EXAGGERATION * height / largest if largest > 0 else 0.0
+
+
+def draw_mode(mesh: Mesh, modes: ModeSet, number: int, file: str | Path | None = None, *, family: str = "") -> object:
+    """A mode on its sector: deformed, coloured by magnitude, the undeformed edges behind; returns the figure.
+
+    Args:
+        mesh: the sector or body.
+        modes: shapes on the nodes of ``mesh``.
+        number: which mode, counted from 0.
+        file: PNG to write.
+        family: name of the mode family, shown in the title.
+    """
+    shape = np.real(modes.shapes[number] * best_phase(modes.shapes[number]))
+    factor = scale_of(mesh, shape)
+    with canvas(file, size=(5.4, 5.8)) as ax:
+        direction = view_of(mesh)
+        show_photograph(ax, photograph_shape(mesh, shape, factor, direction), direction, RADIAL)
+        headline(ax.figure, mode_title(modes, number, family))
+        add_colour_bar(ax, Normalize(0, 1), SEQUENTIAL, "displacement over its largest value [1]")
+        say_exaggeration(ax, mesh, modes)
+        return ax.figure
+
+
+def say_exaggeration(ax: Any, mesh: Mesh, modes: ModeSet) -> None:
+    """How much the picture exaggerates."""
+    height = 1e3 * np.ptp(mesh.points[:, 0])
+    wave = ",\nat the phase of the largest motion" if np.iscomplexobj(modes.shapes) else ""
+    ax.figure.supxlabel(f"largest displacement drawn as {EXAGGERATION * height:.3g} mm "
+                        f"({100 * EXAGGERATION:.0f} % of the height){wave}", fontsize=7.5, color="#555555")
+
+
+def add_colour_bar(ax: Any, norm: Normalize, colours: str, label: str) -> None:
+    """A thin bar to the right of a picture."""
+    bar = ax.figure.colorbar(ScalarMappable(norm, colours), ax=ax, shrink=0.6, aspect=30, pad=0.02)
+    bar.set_label(label, fontsize=8.5)
+    bar.ax.tick_params(labelsize=8)
+    bar.outline.set_linewidth(0.5)
+
+
+def photograph_shape(mesh: Mesh, shape: np.ndarray, factor: float, direction: tuple[float, float, float],
+                     size: tuple[int, int] = (1100, 1200)) -> np.ndarray:
+    """Rendering of a deformed sector coloured by relative magnitude, with the undeformed edges in grey."""
+    surface = skin(mesh)
+    moved = surface.points + factor * shape[surface.nodes]
+    magnitude = np.linalg.norm(shape, axis=1)
+    body = polydata(surface, moved)
+    body.point_data["magnitude"] = magnitude[surface.nodes] / max(magnitude.max(), 1e-300)
+    parts = [{"mesh": body, "scalars": "magnitude", "cmap": SEQUENTIAL, "clim": (0, 1)},
+             {"mesh": edge_lines(surface, moved, direction), "color": "black", "line_width": 0.5, "opacity": 0.25,
+              "lighting": False}]
+    outline = polydata(surface).extract_feature_edges(30.0, boundary_edges=True, non_manifold_edges=False,
+                                                      manifold_edges=False)
+    if outline.n_points:
+        parts.append({"mesh": outline, "color": "#888888", "line_width": 1.2, "lighting": False})
+    return photograph(parts, direction, RADIAL, size)
+
+
+def draw_mode_sheet(mesh: Mesh, modes: ModeSet, file: str | Path | None = None, *, count: int = 8,
+                    families: Sequence[str] = ()) -> object:
+    """The first modes of a sector side by side; returns the figure."""
+    count = min(count, len(modes.frequencies))
+    columns = min(count, 4)
+    rows = -(-count // columns)
+    direction = view_of(mesh)
+    with canvas(file, size=(2.45 * columns, 3.0 * rows + 0.5), grid=(rows, columns), squeeze=False) as axes:
+        for ax in axes.flat:
+            ax.set_axis_off()
+        for number, ax in zip(range(count), axes.flat, strict=False):
+            shape = np.real(modes.shapes[number] * best_phase(modes.shapes[number]))
+            show_photograph(ax, photograph_shape(mesh, shape, scale_of(mesh, shape), direction, (560, 640)))
+            name = families[number] if number < len(families) else ""
+            ax.set_title(f"{number + 1}  {modes.frequencies[number]:.5g} Hz\n{name}", fontsize=9)
+        diameter = "" if modes.nodal_diameter is None else f", nodal diameter {modes.nodal_diameter}"
+        headline(axes[0, 0].figure, f"first modes{diameter}")
+        axes[0, 0].figure.supxlabel("colour: displacement over its largest value, drawn as "
+                                    f"{100 * EXAGGERATION:.0f} % of the height", fontsize=7.5, color="#555555")
+        return axes[0, 0].figure
+
+
+def wheel_motion(mesh: Mesh, shape: np.ndarray, nodal_diameter: int) -> tuple[Skin, np.ndarray]:
+    """The skin of the wheel and the complex displacement (n, 3) of its points."""
+    wheel = wheel_skin(mesh)
+    one = wheel.nodes[:len(wheel.nodes) // wheel_count(mesh)]
+    return wheel, np.asarray(carry_round(mesh, shape[one] * best_phase(shape), nodal_diameter), dtype=complex)
+
+
+def components(wheel: Skin, motion: np.ndarray, flat: bool = False) -> np.ndarray:
+    """(n, 3) radial, circumferential and axial parts about the z axis; x, y and z for a flat row."""
+    if flat:
+        return motion
+    angle = np.arctan2(wheel.points[:, 1], wheel.points[:, 0])
+    cos, sin = np.cos(angle), np.sin(angle)
+    return np.stack([motion[:, 0] * cos + motion[:, 1] * sin, motion[:, 1] * cos - motion[:, 0] * sin, motion[:, 2]],
+                    axis=1)
+
+
+def wheel_component(mesh: Mesh, wheel: Skin, motion: np.ndarray, component: str | None) -> tuple[str, np.ndarray]:
+    """The wanted component of the motion, or the strongest one; scaled to a largest value of 1."""
+    parts = components(wheel, motion, flat=mesh.sector is not None and mesh.sector.count == 0)
+    which = COMPONENTS.index(component) if component else int(np.argmax(np.sum(np.abs(parts) ** 2, axis=0)))
+    return COMPONENTS[which], parts[:, which] / max(np.abs(parts[:, which]).max(), 1e-300)
+
+
+def draw_wheel_mode(mesh: Mesh, modes: ModeSet, number: int, file: str | Path | None = None, *, family: str = "",
+                    component: str | None = None) -> object:
+    """A mode on the full wheel: one signed component in colour, its nodal lines in black; returns the figure.
+
+    Args:
+        mesh: one sector.
+        modes: shapes on the nodes of ``mesh``.
+        number: which mode, counted from 0.
+        file: PNG to write.
+        family: name of the mode family, shown in the title.
+        component: "radial", "circumferential" or "axial"; the strongest when left out.
+    """
+    wheel, motion = wheel_motion(mesh, modes.shapes[number], modes.nodal_diameter or 0)
+    name, signed = wheel_component(mesh, wheel, motion, component)
+    moved = wheel.points + scale_of(mesh, modes.shapes[number]) * motion.real
+    surface = polydata(wheel, moved)
+    surface.point_data["signed"] = signed.real
+    parts: list[dict[str, Any]] = [{"mesh": surface, "scalars": "signed", "cmap": DIVERGING, "clim": (-1, 1)}]
+    surface.point_data["envelope"] = np.abs(signed)
+    # Where nothing moves (the clamp) the sign is noise, not a nodal line.
+    lines = surface.contour([0.0], scalars="signed").threshold(0.01, scalars="envelope")
+    if lines.n_points:
+        lines.points += 2e-3 * np.ptp(moved[:, 0]) * np.asarray(WHEEL_VIEW)
+        parts.append({"mesh": lines, "color": "black", "line_width": 2.2, "lighting": False})
+    direction, up = wheel_camera(mesh)
+    with canvas(file, size=(6.6, 6.0)) as ax:
+        show_photograph(ax, photograph(parts, direction, up))
+        headline(ax.figure, mode_title(modes, number, family))
+        add_colour_bar(ax, Normalize(-1, 1), DIVERGING, f"{name} displacement over its largest value [1]")
+        say_exaggeration(ax, mesh, modes)
+        return ax.figure
+
+
+def wheel_camera(mesh: Mesh) -> tuple[tuple[float, float, float], tuple[float, float, float]]:
+    """Direction and up for a wheel; a flat row is seen along z."""
+    return (WHEEL_VIEW, (0.0, 1.0, 0.0)) if mesh.dimension == 3 else (view_of(mesh, FRONT), RADIAL)
+
+
+def animate_wave(mesh: Mesh, modes: ModeSet, number: int, file: str | Path, *, frames: int = 24, pixels: int = 480,
+                 progress: Callable[[int, int], None] | None = None) -> Path:
+    """Write an endless GIF of one period: a travelling wave for complex modes, a standing one for real modes.
+
+    Args:
+        mesh: one sector.
+        modes: shapes on the nodes of ``mesh``.
+        number: which mode, counted from 0.
+        file: GIF to write.
+        frames: pictures in one period.
+        pixels: width and height.
+        progress: called with (frames done, frames).
+    """
+    import matplotlib
+    from PIL import Image, ImageDraw, ImageFont
+
+    font = ImageFont.truetype(str(Path(matplotlib.get_data_path(), "fonts/ttf/DejaVuSans.ttf")), max(pixels // 34, 9))
+    pictures = []
+    for k, image in enumerate(wave_frames(mesh, modes, number, frames, pixels)):
+        picture = Image.fromarray(image)
+        ImageDraw.Draw(picture).text((10, 8), mode_title(modes, number), fill="black", font=font)
+        pictures.append(picture.quantize(96))
+        if progress:
+            progress(k + 1, frames)
+    Path(file).parent.mkdir(parents=True, exist_ok=True)
+    pictures[0].save(file, save_all=True, append_images=pictures[1:], duration=1600 // frames, loop=0, optimize=True)
+    return Path(file)
+
+
+def wave_frames(mesh: Mesh, modes: ModeSet, number: int, frames: int, pixels: int):
+    """Yield (pixels, pixels, 3) pictures of Re(u e^{j 2 pi k / frames}), k = 0.. frames - 1."""
+    wheel, motion = wheel_motion(mesh, modes.shapes[number], modes.nodal_diameter or 0)
+    _, signed = wheel_component(mesh, wheel, motion, None)
+    factor = scale_of(mesh, modes.shapes[number])
+    surface = polydata(wheel, wheel.points.copy())
+    surface.point_data["signed"] = signed.real
+    plotter = open_plotter((pixels, pixels))
+    plotter.add_mesh(surface, scalars="signed", cmap=DIVERGING, clim=(-1, 1), **LIGHT)
+    aim(plotter, *wheel_camera(mesh), wheel.points, border=1.15)
+    for k in range(frames):
+        turn = np.exp(2j * np.pi * k / frames)
+        surface.points = wheel.points + factor * (motion * turn).real
+        surface.point_data["signed"] = (signed * turn).real
+        plotter.render()
+        yield np.asarray(plotter.screenshot(return_img=True))
+    plotter.close()
+
+
+def save_modes_vtu(mesh: Mesh, modes: ModeSet, file: str | Path, *, volume: bool = False) -> Path:
+    """Write all shapes of a mode set on the full wheel (or on the body alone without a sector)."""
+    fields = {f"mode {i + 1}, {f:.6g} Hz": modes.shapes[i] for i, f in enumerate(modes.frequencies)}
+    return save_wheel_vtu(mesh, file, fields, modes.nodal_diameter or 0, volume)

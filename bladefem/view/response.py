@@ -1,0 +1,220 @@
+"""Forced responses with friction: curves for several loads, the optimum, hysteresis loops, speed against accuracy.
+
+Response tables have one row a point, in SI units: load [N], frequency [Hz], amplitude [m], converged, method,
+residual, iterations. Summary tables have one row a load: load, peak_frequency, peak_amplitude, dissipated_energy [J],
+friction_damping [1]. Load 0 means no damper force, load inf full stick.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+import matplotlib
+import numpy as np
+import pandas as pd
+
+from .style import COLOURS, FAILED, canvas, log_axis
+
+__all__ = ["draw_accuracy", "draw_loops", "draw_optimum", "draw_responses", "loop_energy", "pareto_front"]
+
+MICRO = 1e6
+
+
+def draw_responses(points: pd.DataFrame, file: str | Path | None = None, *, ax: Any = None, title: str = "",
+                   logarithmic: bool = True) -> object:
+    """Amplitude over frequency, a curve a load; points without convergence are crosses in a gap; returns the figure.
+
+    Args:
+        points: response table (see the head of this file).
+        file: PNG to write.
+        ax: axes to draw into.
+        title: headline.
+        logarithmic: amplitude axis.
+    """
+    with canvas(file, ax, (7.6, 4.8)) as ax:
+        loads = np.sort(points["load"].unique())
+        colours = load_colours(loads)
+        for load in loads:
+            draw_curve(ax, points[points["load"] == load].sort_values("frequency", kind="stable"), load, colours[load])
+        failed = points[~points["converged"].astype(bool)]
+        if len(failed):
+            draw_failed(ax, failed)
+        ax.set(xlabel="excitation frequency [Hz]", ylabel="vibration amplitude [µm]",
+               title=title or "forced response")
+        ax.margins(x=0.01)
+        if logarithmic:
+            log_axis(ax, "y")
+        ax.legend(title="normal load per seat", alignment="left", loc="center left", bbox_to_anchor=(1.0, 0.5))
+        return ax.figure
+
+
+def load_colours(loads: np.ndarray) -> dict[float, Any]:
+    """Ordered colours for finite loads; the two linear limits in black and grey."""
+    finite = [load for load in loads if 0 < load < np.inf]
+    shades = matplotlib.colormaps["viridis"](np.linspace(0.0, 0.92, max(len(finite), 1)))
+    return {**dict(zip(finite, shades, strict=False)), 0.0: "#000000", np.inf: "#777777"}
+
+
+def load_name(load: float) -> str:
+    """"250 N", or the name of the limit."""
+    return {0.0: "0 (no damper)", np.inf: "∞ (full stick)"}.get(load, f"{load:.4g} N")
+
+
+def draw_curve(ax: Any, curve: pd.DataFrame, load: float, colour: Any) -> None:
+    """One load: broken where a point has not converged, the peak dotted."""
+    good = curve["converged"].to_numpy(bool)
+    amplitude = np.where(good, MICRO * curve["amplitude"], np.nan)
+    style = {0.0: "--", np.inf: ":"}.get(load, "-")
+    ax.plot(curve["frequency"], amplitude, style, color=colour, label=load_name(load))
+    if good.any():
+        top = np.nanargmax(amplitude)
+        ax.plot(curve["frequency"].iloc[top], amplitude[top], "o", color=colour, ms=4.5, mec="white", mew=0.6, zorder=4)
+
+
+def draw_failed(ax: Any, failed: pd.DataFrame) -> None:
+    """Points without a solution: crosses at their last amplitude, or on the lower edge when there is none."""
+    amplitude = MICRO * failed["amplitude"].to_numpy(float)
+    known = np.isfinite(amplitude) & (amplitude > 0)
+    label = f"not converged ({len(failed)})"
+    ax.plot(failed["frequency"][known], amplitude[known], "x", color=FAILED, ms=7, mew=1.8, zorder=5, label=label)
+    if not known.all():
+        ax.plot(failed["frequency"][~known], np.full(int((~known).sum()), 0.01), "x", color=FAILED, ms=7, mew=1.8,
+                transform=ax.get_xaxis_transform(), clip_on=False, label=None if known.any() else label)
+
+
+def draw_optimum(summary: pd.DataFrame, file: str | Path | None = None, *, ax: Any = None, title: str = "") -> object:
+    """Resonance amplitude and frequency over load, the optimum marked; a curve a mass if there is such a column.
+
+    Args:
+        summary: summary table (see the head of this file); an optional column "mass" [kg] makes several curves, an
+            optional column "converged" marks doubtful peaks.
+        file: PNG to write.
+        ax: two axes to draw into, amplitude and frequency.
+        title: headline.
+    """
+    with canvas(file, ax, (7.2, 5.8), (2, 1), sharex=True, height_ratios=[1.6, 1]) as axes:
+        groups = summary.groupby("mass") if "mass" in summary else [(None, summary)]
+        for (mass, table), colour in zip(groups, COLOURS * 9, strict=False):
+            draw_optimum_curve(axes, table, colour, None if mass is None else f"damper of {1e3 * mass:.4g} g")
+        draw_limits(axes, summary)
+        axes[0].set(ylabel="resonance amplitude [µm]", title=title or "optimum load")
+        axes[1].set(ylabel="resonance frequency [Hz]", xlabel="normal load per seat [N]")
+        log_axis(axes[0], "y")
+        log_axis(axes[1], "x")
+        axes[0].legend()
+        return axes[0].figure
+
+
+def draw_optimum_curve(axes: Any, table: pd.DataFrame, colour: str, label: str | None) -> None:
+    """One damper: two curves, its best load as a star with its numbers."""
+    finite = table[(table["load"] > 0) & np.isfinite(table["load"])].sort_values("load")
+    amplitude = MICRO * finite["peak_amplitude"]
+    axes[0].plot(finite["load"], amplitude, "o-", color=colour, label=label)
+    axes[1].plot(finite["load"], finite["peak_frequency"], "o-", color=colour)
+    if "converged" in finite:
+        doubtful = ~finite["converged"].astype(bool)
+        axes[0].plot(finite["load"][doubtful], amplitude[doubtful], "x", color=FAILED, ms=9, mew=2,
+                     label="not converged" if doubtful.any() else None)
+    best = finite.loc[finite["peak_amplitude"].idxmin()]
+    text = f"optimum {best['load']:.4g} N: {MICRO * best['peak_amplitude']:.4g} µm"
+    free = table.loc[table["load"] == 0, "peak_amplitude"]
+    if len(free):
+        text += f"\n{100 * (1 - best['peak_amplitude'] / free.iloc[0]):.1f} % below the free blade"
+    for axis, y in zip(axes, (MICRO * best["peak_amplitude"], best["peak_frequency"]), strict=True):
+        axis.plot(best["load"], y, "*", color=colour, ms=14, mec="black", mew=0.7, zorder=5)
+        axis.axvline(best["load"], color=colour, lw=0.8, ls=":", alpha=0.8)
+    axes[0].plot([], [], "*", color=colour, ms=11, mec="black", mew=0.7, label=text)
+    axes[1].annotate(f"{best['peak_frequency']:.5g} Hz", (best["load"], best["peak_frequency"]), (8, -4),
+                     textcoords="offset points", fontsize=8.5, va="top")
+
+
+def draw_limits(axes: Any, summary: pd.DataFrame) -> None:
+    """The free and the fully stuck blade as level lines, when the table has them."""
+    for load, style in ((0.0, "--"), (np.inf, "-.")):
+        row = summary[summary["load"] == load]
+        if len(row):
+            axes[0].axhline(MICRO * row["peak_amplitude"].iloc[0], color="#555555", ls=style, lw=1,
+                            label=load_name(load))
+            axes[1].axhline(row["peak_frequency"].iloc[0], color="#555555", ls=style, lw=1)
+
+
+def loop_energy(displacement: np.ndarray, force: np.ndarray) -> float:
+    """Energy dissipated in one closed loop [J], the area enclosed by (displacement [m], force [N])."""
+    return float(abs(0.5 * np.sum(displacement * np.roll(force, -1) - np.roll(displacement, -1) * force)))
+
+
+def draw_loops(loops: Mapping[str, tuple[np.ndarray, np.ndarray]], file: str | Path | None = None, *, ax: Any = None,
+               title: str = "") -> object:
+    """Friction force over relative displacement, one closed loop a name, with its energy; returns the figure.
+
+    Args:
+        loops: name -> (displacement (k,) [m], force (k,) [N]) over one period.
+        file: PNG to write.
+        ax: axes to draw into.
+        title: headline.
+    """
+    with canvas(file, ax, (6.4, 4.4)) as ax:
+        shades = matplotlib.colormaps["viridis"](np.linspace(0.0, 0.92, max(len(loops), 1)))
+        colours = COLOURS if len(loops) <= 6 else shades
+        for (name, (x, force)), colour in zip(loops.items(), colours, strict=False):
+            closed = np.append(np.arange(len(x)), 0)
+            energy = 1e3 * loop_energy(x, force)
+            energy *= energy > 1e-9 * np.ptp(x) * np.ptp(force)     # a stuck node's loop is a line
+            ax.plot(MICRO * np.asarray(x)[closed], np.asarray(force)[closed], color=colour,
+                    label=f"{name}: {energy:.3g} mJ a cycle")
+        ax.set(xlabel="relative displacement [µm]", ylabel="friction force [N]", title=title or "hysteresis loops")
+        ax.legend(loc="center left", bbox_to_anchor=(1.0, 0.5))
+        return ax.figure
+
+
+def pareto_front(time: np.ndarray, error: np.ndarray) -> np.ndarray:
+    """Indices of the points that no other beats in both time and error, by increasing time."""
+    order = np.lexsort((error, time))
+    best = np.minimum.accumulate(np.append(np.inf, error[order]))[:-1]
+    return order[error[order] < best]
+
+
+def draw_accuracy(table: pd.DataFrame, file: str | Path | None = None, *, ax: Any = None,
+                  tolerance: float | None = None, title: str = "") -> object:
+    """Error over time of each setting, the Pareto front, and a star on the automatic choice; returns the figure.
+
+    Args:
+        table: one row a setting: name, time [s], error [1]; optional bool columns "chosen" and "converged", optional
+            text column "family" for the colour.
+        file: PNG to write.
+        ax: axes to draw into.
+        tolerance: wanted relative accuracy, drawn as a line.
+        title: headline.
+    """
+    with canvas(file, ax, (7.2, 4.6)) as ax:
+        good = table["converged"].astype(bool) if "converged" in table else pd.Series(True, index=table.index)
+        families = table["family"] if "family" in table else pd.Series("setting", index=table.index)
+        for name, colour in zip(families.unique(), COLOURS * 9, strict=False):
+            part = table[(families == name) & good]
+            ax.plot(part["time"], part["error"], "o", color=colour, ms=5, alpha=0.8, label=name)
+        failed = table[~good]
+        if len(failed):
+            ax.plot(failed["time"], np.full(len(failed), 0.98), "x", color=FAILED, ms=7, mew=1.8,
+                    transform=ax.get_xaxis_transform(), label=f"not converged ({len(failed)})")
+        draw_front(ax, table[good])
+        if tolerance is not None:
+            ax.axhline(tolerance, color="#555555", ls="--", lw=1, label=f"wanted accuracy {100 * tolerance:.3g} %")
+        ax.set(xlabel="time [s]", ylabel="relative error [1]", title=title or "speed against accuracy")
+        log_axis(ax, "x")
+        log_axis(ax, "y")
+        ax.legend(loc="center left", bbox_to_anchor=(1.0, 0.5))
+        return ax.figure
+
+
+def draw_front(ax: Any, table: pd.DataFrame) -> None:
+    """The Pareto front as stairs with names, and the chosen setting."""
+    front = table.iloc[pareto_front(table["time"].to_numpy(float), table["error"].to_numpy(float))]
+    ax.step(front["time"], front["error"], where="post", color="#888888", lw=1, zorder=1, label="Pareto front")
+    for _, row in front.iterrows():
+        ax.annotate(str(row["name"]), (row["time"], row["error"]), (5, 5), textcoords="offset points", fontsize=7.5)
+    if "chosen" in table and table["chosen"].any():
+        chosen = table[table["chosen"].astype(bool)]
+        ax.plot(chosen["time"], chosen["error"], "*", color=COLOURS[4], mec="black", ms=15, mew=0.8, zorder=5,
+                label="automatic choice")

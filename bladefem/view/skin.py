@@ -1,0 +1,150 @@
+"""The outside of a mesh as plane triangles, with the body and the named face that each belongs to: plain numpy."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from geometry.mesh import Mesh
+
+__all__ = ["Skin", "outer_faces", "sector_motion", "skin", "split_faces", "wheel_skin"]
+
+# gmsh's node order: corners, then one node on each of these edges.
+EDGES = {
+    "triangle": ((0, 1), (1, 2), (2, 0)),
+    "quad": ((0, 1), (1, 2), (2, 3), (3, 0)),
+    "tetra": ((0, 1), (1, 2), (2, 0), (3, 0), (2, 3), (1, 3)),
+    "hexahedron": ((0, 1), (0, 3), (0, 4), (1, 2), (1, 5), (2, 3), (2, 6), (3, 7), (4, 5), (4, 7), (5, 6), (6, 7)),
+}
+SIDES = {
+    "tetra": ((0, 2, 1), (0, 1, 3), (0, 3, 2), (1, 2, 3)),
+    "hexahedron": ((0, 3, 2, 1), (0, 1, 5, 4), (1, 2, 6, 5), (2, 3, 7, 6), (3, 0, 4, 7), (4, 5, 6, 7)),
+}
+CORNERS = {"line": 2, "triangle": 3, "quad": 4, "tetra": 4, "hexahedron": 8}
+
+
+@dataclass(frozen=True)
+class Skin:
+    """Triangles on the outside of a mesh, for drawing."""
+
+    nodes: np.ndarray               # (n,) node numbers in the mesh
+    points: np.ndarray              # (n, 3) [m]
+    triangles: np.ndarray           # (t, 3) rows of points
+    labels: np.ndarray              # (t,) numbers of names
+    names: tuple[str, ...]          # bodies first, then named faces
+    edges: np.ndarray               # (e, 2) rows of points: the element edges
+
+
+def family(cell_type: str) -> str:
+    """meshio's word without its node count: tetra10 -> tetra."""
+    return cell_type.rstrip("0123456789")
+
+
+def outer_faces(cells: np.ndarray, cell_type: str) -> np.ndarray:
+    """(nf, k) faces that belong to one cell only; corners in a loop, then the mid-side nodes. Plane cells: themselves.
+
+    Args:
+        cells: (nc, nodes of a cell) in gmsh's order.
+        cell_type: meshio's word.
+    """
+    shape = family(cell_type)
+    if shape not in SIDES:
+        return cells[:, :2 * CORNERS[shape]]
+    quadratic = cells.shape[1] > CORNERS[shape]
+    middle = {frozenset(edge): CORNERS[shape] + i for i, edge in enumerate(EDGES[shape])}
+    loops = [side + tuple(middle[frozenset(e)] for e in zip(side, side[1:] + side[:1], strict=True)) * quadratic
+             for side in SIDES[shape]]
+    faces = cells[:, loops].reshape(-1, len(loops[0]))
+    corners = np.sort(faces[:, :len(SIDES[shape][0])], axis=1)
+    _, first, count = np.unique(corners, axis=0, return_index=True, return_counts=True)
+    return faces[np.sort(first[count == 1])]
+
+
+def split_faces(faces: np.ndarray, corners: int, coarse: bool = False) -> np.ndarray:
+    """(nf, m, 3) plane triangles of faces given as a corner loop and, for quadratic faces, a loop of mid-side nodes."""
+    if coarse or faces.shape[1] < 2 * corners:
+        pattern = [(0, i, i + 1) for i in range(1, corners - 1)]
+    else:
+        ring = [(i, corners + i, corners + (i - 1) % corners) for i in range(corners)]
+        pattern = ring + [(corners, corners + i, corners + i + 1) for i in range(1, corners - 1)]
+    return faces[:, pattern]
+
+
+def face_corners(mesh: Mesh) -> int:
+    """Corners of the outer faces: of the sides of solids, of the cells of plane meshes."""
+    shape = family(mesh.cell_type)
+    return len(SIDES[shape][0]) if shape in SIDES else CORNERS[shape]
+
+
+def skin(mesh: Mesh, coarse: bool = False, without: tuple[str, ...] = ()) -> Skin:
+    """The outer triangles of all bodies, labelled by body or named face.
+
+    Args:
+        mesh: plane or solid.
+        coarse: corners only, four times fewer triangles for second-order meshes.
+        without: named faces to leave out (the cut faces of a wheel).
+    """
+    corners = face_corners(mesh)
+    faces = [outer_faces(cells, mesh.cell_type) for cells in mesh.bodies.values()]
+    labels = np.repeat(np.arange(len(faces)), [len(f) for f in faces])
+    faces = np.concatenate(faces)
+    names = (*mesh.bodies, *mesh.faces)
+    if mesh.dimension == 3:
+        labels = label_faces(faces[:, :corners], labels, mesh, corners)
+    keep = ~np.isin(labels, [i for i, name in enumerate(names) if name in without])
+    faces, labels = faces[keep], labels[keep]
+    triangles = split_faces(faces, corners, coarse)
+    nodes, local = np.unique(triangles, return_inverse=True)
+    edges = np.searchsorted(nodes, face_edges(faces, corners, coarse))
+    return Skin(nodes, mesh.points[nodes], local.reshape(-1, 3), np.repeat(labels, triangles.shape[1]), names, edges)
+
+
+def label_faces(faces: np.ndarray, labels: np.ndarray, mesh: Mesh, corners: int) -> np.ndarray:
+    """Number of the named face where there is one, of the body elsewhere."""
+    labels = labels.copy()
+    known = {tuple(row): i for i, row in enumerate(np.sort(faces, axis=1).tolist())}
+    for number, named in enumerate(mesh.faces.values(), start=len(mesh.bodies)):
+        for row in np.sort(named[:, :corners], axis=1).tolist():
+            if tuple(row) in known:
+                labels[known[tuple(row)]] = number
+    return labels
+
+
+def face_edges(faces: np.ndarray, corners: int, coarse: bool) -> np.ndarray:
+    """(e, 2) straight pieces of the faces' edges, each once; through the mid-side nodes when there are any."""
+    start = faces[:, :corners]
+    end = np.roll(start, -1, axis=1)
+    if coarse or faces.shape[1] < 2 * corners:
+        pieces = np.stack([start, end], axis=2).reshape(-1, 2)
+    else:
+        middle = faces[:, corners:2 * corners]
+        pieces = np.concatenate([np.stack([start, middle], axis=2), np.stack([middle, end], axis=2)]).reshape(-1, 2)
+    return np.unique(np.sort(pieces, axis=1), axis=0)
+
+
+def sector_motion(mesh: Mesh, k: int) -> tuple[np.ndarray, np.ndarray]:
+    """Rotation (3, 3) and shift (3,) [m] from the meshed sector to the k-th next one."""
+    rotation, shift = np.eye(3), np.zeros(3)
+    for _ in range(k):
+        shift = mesh.sector.rotation @ shift + mesh.sector.shift
+        rotation = mesh.sector.rotation @ rotation
+    return rotation, shift
+
+
+def wheel_count(mesh: Mesh, shown: int = 5) -> int:
+    """Sectors in the picture of a wheel: all of them, or a few of a row without end."""
+    if mesh.sector is None:
+        return 1
+    return mesh.sector.count or shown
+
+
+def wheel_skin(mesh: Mesh, coarse: bool = True) -> Skin:
+    """The skin of the full wheel, copies of one sector in order; ``nodes`` repeats the sector's node numbers."""
+    one = skin(mesh, coarse, without=("cyclic_low", "cyclic_high"))
+    count, n = wheel_count(mesh), len(one.points)
+    motions = [sector_motion(mesh, k) for k in range(count)]
+    points = np.concatenate([one.points @ rotation.T + shift for rotation, shift in motions])
+    offsets = (np.arange(count) * n)[:, None, None]
+    return replace(one, nodes=np.tile(one.nodes, count), points=points, labels=np.tile(one.labels, count),
+                   triangles=(one.triangles + offsets).reshape(-1, 3), edges=(one.edges + offsets).reshape(-1, 2))

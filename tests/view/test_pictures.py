@@ -1,0 +1,177 @@
+"""Pictures exist, are not blank, and show what they should; skins and VTU files against known geometry."""
+
+import numpy as np
+import pytest
+import synthetic
+from matplotlib.image import imread
+
+from bladefem.view.contact import contact_centre, draw_pressure, pressure_points, pressure_summary, unfold
+from bladefem.view.mesh import carry_round, draw_mesh, draw_wheel, grid, save_vtu
+from bladefem.view.modes import animate_wave, best_phase, draw_mode, draw_mode_sheet, draw_wheel_mode, save_modes_vtu
+from bladefem.view.response import (
+    draw_accuracy,
+    draw_loops,
+    draw_optimum,
+    draw_responses,
+    loop_energy,
+    pareto_front,
+)
+from bladefem.view.skin import skin, wheel_skin
+
+
+def ink(file):
+    """Share of pixels that are not white."""
+    return np.mean(np.any(imread(file)[..., :3] < 0.98, axis=2))
+
+
+def area(surface):
+    a, b, c = (surface.points[surface.triangles[:, i]] for i in range(3))
+    return 0.5 * np.linalg.norm(np.cross(b - a, c - a), axis=1)
+
+
+def test_grid_volume_is_the_sectors_volume(sector):
+    """VTK integrates the straight-sided cells: chords of the polar grid, exact formula for each prism ring."""
+    cells = grid(sector).compute_cell_sizes(length=False, area=False)
+    disc = 0.04 * 8 * 0.5 * np.sin(2 * np.pi / 12 / 8) * (0.16**2 - 0.1**2)
+    blade = 0.04 * 2 * 0.5 * np.sin(2 * np.pi / 12 / 8) * (0.28**2 - 0.16**2)
+    body = np.asarray(cells["body"]) == 0
+    assert np.isclose(np.sum(cells["Volume"][body]), disc + blade, rtol=1e-9)
+    assert np.all(cells["Volume"] > 0)
+
+
+def test_skin_labels_every_named_face(sector):
+    surface = skin(sector)
+    for name, face in sector.faces.items():
+        assert np.sum(surface.labels == surface.names.index(name)) == 4 * len(face)
+    low = surface.labels == surface.names.index("cyclic_low")
+    assert np.isclose(area(surface)[low].sum(), 0.06 * 0.04)
+
+
+def test_coarse_skin_has_the_same_flat_area(sector):
+    fine, coarse = skin(sector), skin(sector, coarse=True)
+    assert len(fine.triangles) == 4 * len(coarse.triangles)
+    assert np.isclose(area(fine).sum(), area(coarse).sum())
+
+
+def test_hexahedra_and_vtk_order():
+    """A 20-node cube: the volume that VTK integrates is 1 and the skin's area 6."""
+    from bladefem.view.skin import EDGES
+    from geometry.mesh import Mesh
+
+    corners = np.array([[0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0], [0, 0, 1], [1, 0, 1], [1, 1, 1], [0, 1, 1.0]])
+    middle = np.array([corners[list(edge)].mean(axis=0) for edge in EDGES["hexahedron"]])
+    cube = Mesh(np.concatenate([corners, middle]), "hexahedron20", {"blade": np.arange(20)[None]})
+    assert np.isclose(area(skin(cube)).sum(), 6.0)
+    assert np.isclose(grid(cube).compute_cell_sizes()["Volume"][0], 1.0)
+
+
+def test_wheel_has_no_cut_faces_and_closes(sector):
+    """The wheel's triangles enclose the disc and blades: Gauss' theorem gives N times the sector's volume."""
+    wheel = wheel_skin(sector)
+    a, b, c = (wheel.points[wheel.triangles[:, i]] for i in range(3))
+    volume = np.einsum("ij,ij->", a, np.cross(b, c)) / 6
+    cells = grid(sector).compute_cell_sizes(length=False, area=False)
+    assert np.isclose(volume, 12 * np.sum(cells["Volume"]), rtol=1e-9)
+
+
+def test_carrying_round_repeats_the_wave(sector, wave):
+    """u = (r - r0)^2 e^{3 j angle} e_z on the whole wheel is what the sector's field becomes."""
+    around = carry_round(sector, wave.shapes[0], 3)
+    points = np.concatenate([sector.points @ np.linalg.matrix_power(sector.sector.rotation, k).T for k in range(12)])
+    r, angle = np.hypot(points[:, 0], points[:, 1]), np.arctan2(points[:, 1], points[:, 0])
+    # arctan2 jumps at pi, where e^{3 j angle} does not.
+    assert np.allclose(around[:, 2], (r - 0.1) ** 2 * np.exp(3j * angle), atol=1e-12)
+
+
+def test_best_phase_makes_the_real_part_largest():
+    shape = np.exp(0.7j) * np.array([[1.0, 0.2, 0], [0.3j, 0, 1]])
+    best = np.sum(np.real(shape * best_phase(shape)) ** 2)
+    others = [np.sum(np.real(shape * np.exp(1j * t)) ** 2) for t in np.linspace(0, np.pi, 200)]
+    assert best >= max(others) - 1e-12
+
+
+@pytest.mark.parametrize("draw", [draw_mesh, draw_wheel])
+def test_mesh_pictures(draw, sector, plane_row, folder):
+    for name, mesh in {"sector": sector, "row": plane_row}.items():
+        draw(mesh, folder / f"{draw.__name__}-{name}.png")
+        assert ink(folder / f"{draw.__name__}-{name}.png") > 0.05
+
+
+def test_mode_pictures(sector, wave, folder):
+    draw_mode(sector, wave, 0, folder / "mode.png", family="first flap")
+    draw_wheel_mode(sector, wave, 1, folder / "wheel.png")
+    draw_mode_sheet(sector, wave, folder / "sheet.png")
+    assert min(ink(folder / name) for name in ("mode.png", "wheel.png", "sheet.png")) > 0.1
+
+
+def test_wheel_picture_shows_six_nodal_radii(sector, wave, folder):
+    """The signed colour changes sign 2 n times round the rim; the picture's titled component is the axial one."""
+    figure = draw_wheel_mode(sector, wave, 0)
+    assert any("axial" in ax.get_ylabel() for ax in figure.axes)
+    assert "nodal diameter 3" in figure.get_suptitle()
+
+
+def test_travelling_wave_turns(sector, wave, folder):
+    from PIL import Image
+
+    animate_wave(sector, wave, 0, folder / "wave.gif", frames=4, pixels=160)
+    picture = Image.open(folder / "wave.gif")
+    frames = []
+    for k in range(picture.n_frames):
+        picture.seek(k)
+        frames.append(np.asarray(picture.convert("RGB"), float))
+    assert len(frames) == 4
+    assert np.abs(frames[0] - frames[2]).max() > 50
+
+
+def test_vtu_holds_the_fields(sector, wave, folder):
+    import pyvista
+
+    one = pyvista.read(save_vtu(sector, folder / "one.vtu", {"u": wave.shapes[0]}))
+    assert np.allclose(one["u (imag)"], wave.shapes[0].imag)
+    full = pyvista.read(save_modes_vtu(sector, wave, folder / "full.vtu"))
+    assert full.n_points == len(wheel_skin(sector).points)
+    volume = pyvista.read(save_modes_vtu(sector, wave, folder / "volume.vtu", volume=True))
+    assert volume.n_cells == 12 * sum(len(c) for c in sector.bodies.values())
+
+
+def test_pressure_numbers_and_picture(folder):
+    seats = synthetic.seats()
+    table = pressure_summary(seats)
+    assert np.allclose(table["force"], 120.0)
+    assert np.allclose(table["area"], 0.04 * 0.006)
+    # Centre of the parabola 1 - ((z - 4) / 20)^2 on -16..20 mm is 2.98 mm; sampled at 11 points 3.55.
+    assert np.allclose(contact_centre(seats[0])[2], 3.5509e-3, atol=1e-6)
+    assert len(pressure_points(seats)) == 2 * 77
+    draw_pressure(seats, folder / "pressure.png")
+    draw_pressure(synthetic.line_seats(), folder / "line.png")
+    assert min(ink(folder / name) for name in ("pressure.png", "line.png")) > 0.05
+
+
+def test_unfolding_keeps_lengths():
+    patch = synthetic.seats()[1].patch
+    flat = unfold(patch)
+    for i, j in ((0, 76), (3, 40), (10, 11)):
+        assert np.isclose(np.linalg.norm(flat[i] - flat[j]), np.linalg.norm(patch.points[i] - patch.points[j]))
+
+
+def test_response_charts(folder):
+    figure = draw_responses(synthetic.points(), folder / "response.png")
+    labels = [text.get_text() for text in figure.axes[0].get_legend().get_texts()]
+    assert "not converged (3)" in labels and "200 N" in labels
+    figure = draw_optimum(synthetic.summary(), folder / "optimum.png")
+    text = " ".join(t.get_text() for t in figure.axes[0].get_legend().get_texts())
+    assert "optimum 200 N" in text and "92.6 % below" in text
+    draw_accuracy(synthetic.accuracy(), folder / "accuracy.png", tolerance=0.02)
+    draw_loops(synthetic.loops(), folder / "loops.png")
+    assert min(ink(folder / f"{n}.png") for n in ("response", "optimum", "accuracy", "loops")) > 0.02
+
+
+def test_loop_energy_is_jenkins():
+    """4 F (A - F / k) for macro-slip, 0 in stick; 400 samples cut the corners by less than 1 %."""
+    energies = [loop_energy(*loop) for loop in synthetic.loops().values()]
+    assert np.allclose(energies, [0.0, 4 * 3 * 2e-6, 4 * 3 * 7e-6], rtol=1e-2, atol=1e-15)
+
+
+def test_pareto_front():
+    assert pareto_front(np.array([1.0, 2, 3, 4]), np.array([4.0, 5, 2, 3])).tolist() == [0, 2]
