@@ -64,6 +64,9 @@ def _encode(value: Any, arrays: list[np.ndarray]) -> Any:
     if dataclasses.is_dataclass(value) and not isinstance(value, type):
         return {"d": _home(type(value)), "v": {f.name: _encode(getattr(value, f.name), arrays)
                                                for f in dataclasses.fields(value) if f.init}}
+    if hasattr(value, "tocsc") and hasattr(value, "nnz"):      # a scipy.sparse matrix, which comes back as csc
+        csc = value.tocsc()
+        return {"p": [list(csc.shape), *(_array(a, arrays) for a in (csc.data, csc.indices, csc.indptr))]}
     if isinstance(value, slice):
         return {"s": [value.start, value.stop, value.step]}
     if isinstance(value, dict):
@@ -99,11 +102,17 @@ _DECODERS = {
     "f": lambda body, _: float.fromhex(body),
     "c": lambda body, _: complex(float.fromhex(body[0]), float.fromhex(body[1])),
     "a": lambda body, arrays: arrays[body],
+    "p": lambda body, arrays: _sparse(tuple(body[0]), *(arrays[part["a"]] for part in body[1:])),
     "s": lambda body, _: slice(*body),
     "m": lambda body, arrays: {_decode(k, arrays): _decode(v, arrays) for k, v in body},
     "l": lambda body, arrays: [_decode(v, arrays) for v in body],
     "t": lambda body, arrays: tuple(_decode(v, arrays) for v in body),
 }
+
+
+def _sparse(shape: tuple[int, int], data: np.ndarray, indices: np.ndarray, indptr: np.ndarray) -> Any:
+    from scipy.sparse import csc_matrix
+    return csc_matrix((data, indices, indptr), shape=shape)
 
 
 def _class(home: str) -> type:

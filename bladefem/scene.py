@@ -124,5 +124,5 @@ class Scene:
 
     def vary(self, *pair: object, **changes: object) -> Scene:
         """A checked copy with other values, ``vary(aerofoil__twist="25 deg")`` or ``vary("aerofoil.twist", 0.4)``."""
-        from bladefem.scene_file import vary
+        from .scene_file import vary
         return vary(self, *pair, **changes)

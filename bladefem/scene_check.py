@@ -9,10 +9,10 @@ from collections.abc import Iterator
 from math import cos, pi, sin, tan
 from pathlib import Path
 
-from bladefem.errors import InputError
-from bladefem.scene import Scene
-from bladefem.scene_fields import convert, each_field, used_tables
-from bladefem.units import show
+from .errors import InputError
+from .scene import Scene
+from .scene_fields import convert, each_field, used_tables
+from .units import show
 
 __all__ = ["validate"]
 

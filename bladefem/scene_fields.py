@@ -7,9 +7,9 @@ from collections.abc import Iterator
 from types import NoneType
 from typing import Any, NamedTuple, get_args, get_origin, get_type_hints
 
-from bladefem.errors import InputError, suggestion
-from bladefem.scene import Scene
-from bladefem.units import parse, show
+from .errors import InputError, suggestion
+from .scene import Scene
+from .units import parse, show
 
 __all__ = ["TABLES", "Field", "convert", "each_field", "field_at", "used_tables"]
 

@@ -9,11 +9,11 @@ from collections.abc import Iterable
 from pathlib import Path
 from typing import Any, NamedTuple, get_type_hints
 
-from bladefem.errors import InputError, suggestion
-from bladefem.scene import Scene
-from bladefem.scene_check import validate
-from bladefem.scene_fields import Field, convert, each_field, field_at, used_tables
-from bladefem.units import exact, show
+from .errors import InputError, suggestion
+from .scene import Scene
+from .scene_check import validate
+from .scene_fields import Field, convert, each_field, field_at, used_tables
+from .units import exact, show
 
 __all__ = ["Row", "dump", "given_keys", "load_scene", "read_tables", "resolved", "scene_of", "vary"]
 

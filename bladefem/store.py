@@ -20,10 +20,10 @@ from typing import Any
 
 import numpy as np
 
-from bladefem.encode import read_npz, tree_of, write_npz
-from bladefem.errors import InputError
+from .encode import read_npz, tree_of, write_npz
+from .errors import InputError
 
-__all__ = ["attributes", "code_of", "key_of", "open_folder", "read_results", "stage", "versions", "write_results",
+__all__ = ["attributes", "code_of", "key_of", "on_root", "open_folder", "read_results", "stage", "versions", "write_results",
            "write_table", "write_text", "writing"]
 
 # Raised when the meaning or the layout of stored stages changes: older files are then computed again.
@@ -99,11 +99,11 @@ def stage(folder: str | Path | None, name: str, key: str, compute: Callable[[], 
     if folder is None:
         return compute(), False
     path = Path(folder) / "stages" / f"{name}.npz"
-    found = _on_root(comm, lambda: _find(path, key))
+    found = on_root(comm, lambda: _find(path, key))
     if found is not None:
         return found[0], True
     result = compute()
-    _on_root(comm, lambda: _keep(path, key, result))
+    on_root(comm, lambda: _keep(path, key, result))
     return result, False
 
 
@@ -201,7 +201,7 @@ def _keep(path: Path, key: str, result: Any) -> None:
         write_npz(temporary, key, result)
 
 
-def _on_root(comm: Any, action: Callable[[], Any]) -> Any:
+def on_root(comm: Any, action: Callable[[], Any]) -> Any:
     """The value of ``action`` on rank 0, or its error, on every rank."""
     if comm is None or comm.size == 1:
         return action()

@@ -12,7 +12,7 @@ from fractions import Fraction
 from math import isfinite, pi
 from numbers import Real
 
-from bladefem.errors import InputError
+from .errors import InputError
 
 __all__ = ["exact", "parse", "show"]
 

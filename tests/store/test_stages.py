@@ -9,6 +9,7 @@ from dataclasses import fields
 
 import numpy as np
 import pytest
+import scipy.sparse
 
 from bladefem.data import Elements, ModeSet, Patch, PortModel, PressureMap, RigidBody
 from bladefem.encode import read_npz, write_npz
@@ -71,6 +72,13 @@ def assert_same(a, b):
 def test_nouns_come_back_bit_by_bit(noun, tmp_path):
     write_npz(tmp_path / "x.npz", "key", noun)
     assert_same(noun, read_npz(tmp_path / "x.npz", "key"))
+
+
+def test_sparse_matrices_come_back(tmp_path):
+    matrix = scipy.sparse.random(5, 7, 0.3, "csr", random_state=1)
+    write_npz(tmp_path / "x.npz", "key", {"B": matrix})
+    back = read_npz(tmp_path / "x.npz", "key")["B"]
+    assert back.shape == (5, 7) and abs(back - matrix).max() == 0
 
 
 @pytest.mark.parametrize("value", [object(), np.array([object()]), {1, 2}, print])
