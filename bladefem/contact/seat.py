@@ -1,0 +1,190 @@
+"""Seating a damper: quasi-static, frictionless contact between two platforms and the damper that floats between them.
+
+The wheel is at rest in the rotating frame and all blades move alike (nodal diameter 0), so the next blade's seat_left
+is this blade's seat_left in its own axes. With f >= 0 the pressing forces at the normal ports of both seats,
+
+    gap = clearance - u_blade + u_damper = g0 + (C_blade + C_damper) f + B q,    B^T f + load = 0,
+
+where q is the damper's rigid motion, found from equilibrium: no spring holds it. Directions that frictionless seats
+can't hold (the engine axis for a wedge, the circumference for a flat damper) drop out of both.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+import scipy.sparse as sp
+from scipy.optimize import nnls
+
+from geometry.mesh import Mesh
+
+from ..data import Patch, PressureMap
+from ..errors import InputError, NotSolvedError
+from ..fem.body import Body, assemble
+from ..fem.constraint import constrain, restrict
+from ..fem.flexibility import Flexibility, compliance, flexible
+from ..fem.linalg import dot
+from ..fem.loads import centrifugal, mass
+from ..scene import Materials
+from .lcp import LCPSolution, held_directions, solve_lcp
+from .patch import make_patch, normal_ports, port_matrix, rigid_ports
+
+__all__ = ["ContactProblem", "contact_problem", "seat", "solve", "spin_axis"]
+
+SIDEWAYS = 0.01         # accepted part of the load along directions that frictionless seats can't hold
+
+
+@dataclass(frozen=True)
+class ContactProblem:
+    """All that a new load state needs: dense matrices over the n normal ports of the patches, one after the other.
+
+    "For unit rotation" means for a speed of 1 rad/s; multiply by the speed squared.
+    """
+
+    patches: tuple[Patch, ...]
+    flexibility: np.ndarray         # (n, n) blade and damper, elastic [m/N]
+    clearance: np.ndarray           # (n,) gap before anything moves [m]
+    blade_swell: np.ndarray         # (n,) gap opened by the blade's centrifugal displacement, for unit rotation
+    damper_swell: np.ndarray        # (n,) gap opened by the damper's deformation under its load, for unit rotation
+    rigid: np.ndarray               # (n, d) gap opened by unit rigid motions of the damper; rotations per length
+    load: np.ndarray                # (d,) centrifugal load on the damper, for unit rotation
+    mass: float                     # of the damper as meshed [kg]
+
+
+def contact_problem(mesh: Mesh, patches: Sequence[Patch], blade: Flexibility, damper: Flexibility | Body,
+                    clearance: float | np.ndarray = 0.0) -> ContactProblem:
+    """Condense two bodies onto the normal ports of their patches.
+
+    Args:
+        blade: the factorised blade or cyclic sector in nodal diameter 0.
+        damper: the factorised floating damper, or its Body for a damper that does not deform.
+        clearance: gap before seating [m], one number or (n,) values (means over the ports' weights, see
+            ``patch.patch_means``); negative for an interference.
+
+    Raises:
+        InputError: the blade is not in nodal diameter 0, or the clearance does not fit the ports.
+    """
+    if blade.con.nodal_diameter not in (None, 0):
+        raise InputError(f"nodal_diameter is {blade.con.nodal_diameter}, expected 0: steady loads move all blades alike")
+    ports = normal_ports(patches, mesh)
+    body = damper if isinstance(damper, Body) else damper.con.body
+    pull = centrifugal(body, 1.0, spin_axis(mesh))
+    C, blade_swell = _condense(blade, port_matrix(patches, mesh)[:, ports],
+                               centrifugal(blade.con.body, 1.0, spin_axis(mesh)))
+    damper_swell = np.zeros(len(ports))
+    if not isinstance(damper, Body):
+        C_damper, damper_swell = _condense(damper, port_matrix(patches, mesh, "damper")[:, ports], pull)
+        C = C + C_damper
+    rigid, load = _rigid(mesh, patches, body, pull)
+    gap = np.broadcast_to(np.asarray(clearance, dtype=float), ports.shape)
+    if not np.isfinite(gap).all():
+        raise InputError("clearance is not a finite number, expected metres")
+    return ContactProblem(tuple(patches), C, gap.copy(), -blade_swell, damper_swell, rigid[ports], load, mass(body))
+
+
+def solve(problem: ContactProblem, speed: float, normal: float | None = None, damper_mass: float | None = None,
+          start: Sequence[PressureMap] | None = None) -> list[PressureMap]:
+    """Pressure maps of one load state.
+
+    Args:
+        speed: rotational speed [rad/s]; moves the blade, and loads the damper unless `normal` is given.
+        normal: wanted mean normal load of a seat [N]; the damper's load is scaled to give it.
+        damper_mass: mass of the damper [kg] instead of the meshed one.
+        start: maps of a neighbouring state, for a warm start.
+
+    Raises:
+        InputError: no load at all, or a negative one.
+        NotSolvedError: the load lifts the damper off, slides it out sideways, or the iteration stopped.
+    """
+    active = None if start is None else np.concatenate([m.force > 0 for m in start])
+    g0 = problem.clearance + speed**2 * problem.blade_swell
+    if normal is None:
+        scale = speed**2 * (1.0 if damper_mass is None else damper_mass / problem.mass)
+        if not scale > 0:
+            raise InputError(f"speed is {speed} rad/s, expected a positive one, or a normal load, to seat the damper")
+        return _maps(problem, _state(problem, g0, scale, active))
+    if not normal > 0:
+        raise InputError(f"normal load is {normal} N, expected a positive one")
+    return _maps(problem, _wanted(problem, g0, normal, active))
+
+
+def seat(mesh: Mesh, material: Materials, speed: float, clearance: float = 0.0, normal: float | None = None,
+         comm: object = None) -> list[PressureMap]:
+    """Everything from the mesh to the pressure maps of "this" and "next" in one call (``solve`` tells the arguments).
+
+    Assembles and factorises both bodies; keep the ContactProblem of ``contact_problem`` where more states follow.
+    """
+    patches = [make_patch(mesh, name) for name in ("this", "next")]
+    diameter = 0 if "cyclic" in mesh.pairs else None
+    blade = flexible(constrain(assemble(mesh, "blade", material.blade, comm), "clamp", diameter))
+    damper = flexible(constrain(assemble(mesh, "damper", material.damper, comm), None))
+    return solve(contact_problem(mesh, patches, blade, damper, clearance), speed, normal)
+
+
+def spin_axis(mesh: Mesh) -> tuple[float, float, float]:
+    """The engine axis z; for an endless row of plane blades the y axis, so that the pull is along x only."""
+    endless = mesh.sector is not None and mesh.sector.count == 0
+    return (0.0, 1.0, 0.0) if endless or (mesh.dimension == 2 and mesh.sector is None) else (0.0, 0.0, 1.0)
+
+
+def _condense(flex: Flexibility, P: sp.spmatrix, load: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Flexibility (n, n) at the ports, and their displacement (n,) under a load in mesh numbering."""
+    columns = restrict(flex.con, sp.hstack([P, sp.csc_matrix(load[:, None])], format="csc"))
+    G = dot(flex.con.body.comm, columns[:, :-1], compliance(flex, columns)).real
+    return (G[:, :-1] + G[:, :-1].T) / 2, G[:, -1]
+
+
+def _rigid(mesh: Mesh, patches: Sequence[Patch], body: Body, pull: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Rigid motions at all damper ports (ports, d) and the load that goes with them (d,), rotations times a length."""
+    inside = np.unique(np.concatenate([mesh.bodies[name].ravel() for name in body.material]))
+    origin = mesh.points[inside].mean(axis=0)
+    length = np.linalg.norm(mesh.points[inside] - origin, axis=1).max()
+    d = mesh.dimension
+    scale = np.r_[np.ones(d), np.full(1 if d == 2 else 3, 1 / length)]
+    force, arm = pull.reshape(-1, d), mesh.points - origin
+    full = np.zeros((len(force), 3))
+    full[:, :d] = force
+    moment = np.cross(arm, full).sum(axis=0)
+    load = np.r_[force.sum(axis=0), moment[2:] if d == 2 else moment]
+    return rigid_ports(patches, mesh, origin) * scale, load * scale
+
+
+def _state(problem: ContactProblem, g0: np.ndarray, scale: float, active: np.ndarray | None) -> LCPSolution:
+    """One contact solve with `scale` times the unit load on the damper."""
+    _, _, held = held_directions(problem.rigid)
+    load = held @ (held.T @ problem.load)
+    sideways = np.linalg.norm(problem.load - load) / np.linalg.norm(problem.load)
+    if sideways > SIDEWAYS:
+        raise NotSolvedError(f"{sideways:.1%} of the damper's load is along a direction in which frictionless seats "
+                             f"can't hold it, expected below {SIDEWAYS:.0%}")
+    solution = solve_lcp(problem.flexibility, g0 + scale * problem.damper_swell, problem.rigid, -scale * load, active)
+    if solution.reason:
+        raise NotSolvedError(f"the damper could not be seated: {solution.reason}")
+    return solution
+
+
+def _wanted(problem: ContactProblem, g0: np.ndarray, normal: float, active: np.ndarray | None) -> LCPSolution:
+    """Scale the damper's load until the mean normal load of a seat is `normal`; one step where seats are flat."""
+    total = normal * len(problem.patches)
+    _, _, held = held_directions(problem.rigid)
+    guess, _ = nnls((problem.rigid @ held).T, -held.T @ problem.load)
+    scale = total / guess.sum() if guess.sum() > 0 else 1.0
+    for _ in range(30):
+        solution = _state(problem, g0, scale, active)
+        error = solution.force.sum() / total - 1
+        if abs(error) < 1e-12:
+            return solution
+        scale, active = scale / (1 + error), solution.active
+        if abs(error) < 1e-10:
+            return _state(problem, g0, scale, active)
+    raise NotSolvedError(f"no damper load was found that presses with {normal:g} N on each seat, {error:.1e} is left")
+
+
+def _maps(problem: ContactProblem, solution: LCPSolution) -> list[PressureMap]:
+    """Cut the solution into one map a patch."""
+    cuts = np.cumsum([len(p.area) for p in problem.patches])[:-1]
+    gaps = np.split(solution.gap.clip(min=0.0), cuts)
+    return [PressureMap(p, f, g, solution.residual)
+            for p, f, g in zip(problem.patches, np.split(solution.force, cuts), gaps, strict=True)]

@@ -1,0 +1,110 @@
+"""A damper seated between its two platforms: statics must hold to round-off, whatever the meshes and the props."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from wedge import wedge_mesh
+
+from bladefem.contact.patch import make_patch
+from bladefem.contact.seat import contact_problem, seat, solve
+from bladefem.errors import InputError, NotSolvedError
+from bladefem.fem.body import assemble
+from bladefem.fem.constraint import constrain
+from bladefem.fem.flexibility import flexible
+from bladefem.scene import Material, Materials
+
+ALPHA = np.radians(40)
+SPEED = 800.0           # rad/s
+
+
+def condensed(mesh, rigid=False, prop=1.0, clearance=0.0):
+    patches = [make_patch(mesh, name) for name in ("this", "next")]
+    blade = flexible(constrain(assemble(mesh, "blade", Material()), "clamp"))
+    body = assemble(mesh, "damper", Material())
+    return contact_problem(mesh, patches, blade, body if rigid else flexible(constrain(body, None), prop), clearance)
+
+
+@pytest.fixture(scope="module")
+def solid():
+    return condensed(wedge_mesh(ALPHA))
+
+
+@pytest.mark.parametrize("dimension", [2, 3])
+@pytest.mark.parametrize("rigid", [False, True])
+def test_wedge_balance(dimension, rigid):
+    """N = F / (2 sin alpha) on each flank."""
+    problem = condensed(wedge_mesh(ALPHA, dimension=dimension), rigid)
+    pull = np.linalg.norm(problem.load[:dimension]) * SPEED**2
+    for seat_map in solve(problem, SPEED):
+        assert seat_map.force.sum() == pytest.approx(pull / (2 * np.sin(ALPHA)), rel=1e-8)
+        assert seat_map.complementarity < 1e-12
+        assert (seat_map.gap >= 0).all() and (seat_map.force >= 0).all()
+
+
+def test_force_on_damper_is_radial_and_through_its_centre(solid):
+    """All six balances, moments taken with the consistent port vectors."""
+    f = np.concatenate([m.force for m in solve(solid, SPEED)])
+    unbalanced = solid.rigid.T @ f + SPEED**2 * solid.load
+    assert np.abs(unbalanced).max() < 1e-9 * SPEED**2 * np.abs(solid.load).max()
+
+
+def test_props_of_the_floating_damper_have_no_influence():
+    """The support of the floating damper carries nothing: six decades of its stiffness change nothing."""
+    mesh = wedge_mesh(ALPHA)
+    soft, hard = (np.concatenate([m.force for m in solve(condensed(mesh, prop=p), SPEED)]) for p in (1e-3, 1e3))
+    assert np.abs(soft - hard).max() < 1e-9 * soft.max()
+
+
+def test_wanted_normal_load_and_damper_mass(solid):
+    for seat_map in solve(solid, SPEED, normal=123.0):
+        assert seat_map.force.sum() == pytest.approx(123.0, rel=1e-8)
+    single = solve(solid, SPEED)[0].force.sum()
+    assert solve(solid, SPEED, damper_mass=2 * solid.mass)[0].force.sum() == pytest.approx(2 * single, rel=1e-8)
+
+
+def test_clearance_is_taken_up_by_rigid_motion(solid):
+    """An even clearance moves the damper outwards by c / sin alpha and changes no force."""
+    wide = condensed(wedge_mesh(ALPHA), clearance=1e-4)
+    for a, b in zip(solve(solid, SPEED), solve(wide, SPEED), strict=True):
+        assert np.abs(a.force - b.force).max() < 1e-8 * a.force.max()
+
+
+def test_warm_start_gives_the_same(solid):
+    first = solve(solid, SPEED)
+    cold, warm = solve(solid, 0.9 * SPEED), solve(solid, 0.9 * SPEED, start=first)
+    for a, b in zip(cold, warm, strict=True):
+        assert np.abs(a.force - b.force).max() < 1e-11 * a.force.max()
+
+
+def test_one_call_equals_the_stages(solid):
+    maps = seat(wedge_mesh(ALPHA), Materials(), SPEED)
+    for a, b in zip(maps, solve(solid, SPEED), strict=True):
+        assert np.abs(a.force - b.force).max() < 1e-11 * a.force.max()
+
+
+def test_a_load_that_lifts_off_is_refused(solid):
+    with pytest.raises(NotSolvedError, match="lifts the body off"):
+        solve(replace(solid, load=-solid.load), SPEED)
+
+
+def test_a_load_that_slides_sideways_is_refused(solid):
+    axial = solid.load.copy()
+    axial[2] = np.linalg.norm(axial)
+    with pytest.raises(NotSolvedError, match="frictionless seats"):
+        solve(replace(solid, load=axial), SPEED)
+
+
+@pytest.mark.parametrize(("arguments", "word"), [((0.0,), "speed"), ((SPEED, -1.0), "normal load")])
+def test_no_load_is_bad_input(solid, arguments, word):
+    with pytest.raises(InputError, match=word):
+        solve(solid, *arguments)
+
+
+def test_unknown_pair_and_empty_patch_are_bad_input():
+    mesh = wedge_mesh(ALPHA)
+    with pytest.raises(InputError, match="not in the mesh"):
+        make_patch(mesh, "other")
+    faces = {**mesh.faces, "seat_right": mesh.faces["clamp"]}
+    with pytest.raises(InputError, match="no matched faces"):
+        make_patch(replace(mesh, faces=faces), "this")
