@@ -11,7 +11,7 @@ from .errors import InputError, suggestion
 from .scene import Scene
 from .units import parse, show
 
-__all__ = ["TABLES", "Field", "convert", "each_field", "field_at", "used_tables"]
+__all__ = ["TABLES", "Field", "convert", "each_field", "field_at", "split_values", "used_tables"]
 
 _COMMON = ("mesh", "material", "contact", "study", "model")
 _ENGINE = (*_COMMON, "operation", "excitation")
@@ -67,9 +67,10 @@ def field_at(name: str) -> Field:
                          f"{next(k for k in known if k.startswith(name + '.'))}")
     if same:
         raise InputError(f"unknown key '{name}'; did you mean '{same[0]}'?")
-    table = name.rsplit(".", 1)[0] if "." in name else ""
-    inside = [k for k in known if k.rpartition(".")[0] == table]
-    raise InputError(f"unknown key '{name}'{suggestion(name, inside or [*tables, *known])}")
+    near = _near(name, known)
+    inside = [k for k in known if "." in name and k.rpartition(".")[0] == name.rpartition(".")[0]]
+    tables_and_heads = [*tables, *(k for k in known if "." not in k)]
+    raise InputError(f"unknown key '{name}'{near or suggestion(name, inside or tables_and_heads)}")
 
 
 def convert(value: object, field: Field) -> Any:
@@ -132,13 +133,17 @@ def _tuple(value: object, kinds: tuple, field: Field) -> tuple:
     return tuple(_SCALARS[kinds[0]](item, field) for item in items)
 
 
-def _items(value: object) -> list:
-    """A list from a list, a single value, or text like "20, 50, 100 N", where the last unit holds for all."""
-    if not isinstance(value, str):
-        return list(value) if hasattr(value, "__iter__") else [value]
-    items = [item.strip(" '\"") for item in value.strip("[]() ").split(",") if item.strip()]
+def split_values(text: str) -> list[str]:
+    """Single values of a text like "20, 50, 100 N", where the last unit holds for those without one."""
+    items = [item.strip(" '\"") for item in text.strip("[]() ").split(",") if item.strip()]
     unit = items[-1].lstrip("+-.0123456789eE_ ") if items else ""
     return [f"{item} {unit}" if unit and item[-1] in "0123456789." else item for item in items]
+
+
+def _items(value: object) -> list:
+    if isinstance(value, str):
+        return split_values(value)
+    return list(value) if hasattr(value, "__iter__") else [value]
 
 
 def _in_range(number: Any, field: Field) -> Any:

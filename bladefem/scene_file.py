@@ -217,5 +217,5 @@ def _toml(value: Any, field: Field) -> str:
 
 
 def _neighbours(path: Path) -> str:
-    others = sorted(p.name for p in path.parent.glob("*.toml")) if path.parent.is_dir() else []
-    return suggestion(path.name, others) if others else ""
+    others = sorted(p.stem for p in path.parent.glob("*.toml")) if path.parent.is_dir() else []
+    return suggestion(path.stem, others) if others else ""

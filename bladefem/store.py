@@ -23,8 +23,8 @@ import numpy as np
 from .encode import read_npz, tree_of, write_npz
 from .errors import InputError
 
-__all__ = ["attributes", "code_of", "key_of", "on_root", "open_folder", "read_results", "stage", "versions", "write_results",
-           "write_table", "write_text", "writing"]
+__all__ = ["attributes", "code_of", "key_of", "on_root", "open_folder", "read_results", "stage", "versions",
+           "write_results", "write_table", "write_text", "writing"]
 
 # Raised when the meaning or the layout of stored stages changes: older files are then computed again.
 FORMAT = 1

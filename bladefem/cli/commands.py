@@ -1,0 +1,130 @@
+"""What each command does: read the scene, run the pipeline as far as needed, print a table."""
+
+from __future__ import annotations
+
+import argparse
+from functools import partial
+from pathlib import Path
+from typing import Any
+
+from ..errors import InputError
+from ..scene import Scene
+from . import tables
+
+__all__ = ["check", "contact", "info", "mesh", "modes", "report", "response", "study"]
+
+
+def check(options: argparse.Namespace, comm: Any) -> None:
+    """Print the resolved scene."""
+    from ..scene_file import given_keys, read_tables, resolved, scene_of
+    if comm is not None and comm.rank > 0:
+        return
+    file = scene_path(options.scene)
+    written = read_tables(file, options.overrides)
+    scene = scene_of(written, file.resolve().parent)
+    print(tables.resolved_scene(resolved(scene, given_keys(written))))
+
+
+def mesh(options: argparse.Namespace, comm: Any) -> None:
+    """Mesh, quality table, picture."""
+    run = until("mesh", options, comm)
+    if comm is None or comm.rank == 0:
+        print(tables.mesh_quality(run.mesh))
+        if options.view:
+            draw(run.mesh, options.view)
+
+
+def modes(options: argparse.Namespace, comm: Any) -> None:
+    """Natural frequencies."""
+    run = until("modes", options, comm)
+    if comm is None or comm.rank == 0:
+        print(tables.frequencies(run.modes))
+
+
+def contact(options: argparse.Namespace, comm: Any) -> None:
+    """Seat the damper."""
+    until("contact", options, comm)
+
+
+def response(options: argparse.Namespace, comm: Any) -> None:
+    """Forced response for each load."""
+    until("response", options, comm)
+
+
+def report(options: argparse.Namespace, comm: Any) -> None:
+    """Everything, with figures and report."""
+    until("report", options, comm)
+
+
+def study(options: argparse.Namespace, comm: Any) -> None:
+    """The response for several values of one field, each in its own folder inside the run folder."""
+    name, equals, text = options.vary.partition("=")
+    values = variants(name.strip(), text) if equals else []
+    if not values:
+        raise InputError(f"--vary {options.vary}: expected key=values, such as damper.angle='30, 40, 50 deg'")
+    base = Path(options.output or default_folder(options.scene))
+    for value in values:
+        one = argparse.Namespace(**vars(options))
+        one.overrides = [*options.overrides, f"{name.strip()}={value}"]
+        one.output = str(base / f"{name.strip()}={value}".replace(" ", "").replace("/", "_"))
+        if comm is None or comm.rank == 0:
+            print(f"\n{name.strip()} = {value}", flush=True)
+        until("response", one, comm)
+
+
+def variants(name: str, text: str) -> list[str]:
+    """Texts of the single values; the last unit holds for those without one, as in "30, 40, 50 deg"."""
+    from ..scene_fields import field_at, split_values
+    field_at(name)
+    return split_values(text)
+
+
+def info(options: argparse.Namespace, comm: Any) -> None:
+    """Versions and threads."""
+    from .info import facts
+    rows = facts()
+    if comm is None or comm.rank == 0:
+        print(tables.plain(rows))
+
+
+def until(stage: str, options: argparse.Namespace, comm: Any) -> Any:
+    """The pipeline up to a stage, with progress bars before and a summary after; collective."""
+    from ..progress import wanted, watch
+    from ..store import on_root, open_folder, write_text
+    folder = Path(options.output or default_folder(options.scene))
+
+    def prepare() -> Scene:
+        from ..scene_file import dump, load_scene
+        scene = load_scene(scene_path(options.scene), options.overrides)
+        write_text(open_folder(folder) / "scene.toml", dump(scene))
+        return scene
+
+    scene = on_root(comm, prepare)
+    rank = 0 if comm is None else comm.rank
+    from ..study import pipeline
+    run = pipeline.run(scene, folder, until=stage, comm=comm,
+                       progress=partial(watch, shown=wanted(options.quiet, rank)))
+    if rank == 0 and not options.quiet:
+        print(tables.summary(run, folder))
+    return run
+
+
+def scene_path(given: str) -> Path:
+    """The scene file, also of a run folder."""
+    path = Path(given)
+    return path / "scene.toml" if path.is_dir() else path
+
+
+def default_folder(given: str) -> Path:
+    """The run folder when none is named: that of the earlier run, or one with the scene's name."""
+    path = Path(given)
+    return path if path.is_dir() else Path("runs") / path.stem
+
+
+def draw(mesh_made: Any, file: str) -> None:
+    """The picture of the mesh."""
+    from ..store import open_folder
+    from ..view.mesh import draw_mesh
+    open_folder(Path(file).parent)
+    draw_mesh(mesh_made, file)
+    print(f"picture: {file}")

@@ -1,0 +1,70 @@
+"""What this installation is made of."""
+
+from __future__ import annotations
+
+import os
+import platform
+from pathlib import Path
+
+__all__ = ["facts"]
+
+
+def facts() -> list[tuple[str, str]]:
+    """Rows of name and value: versions, solvers, BLAS, MPI, threads."""
+    from ..store import versions
+    rows = [("python", platform.python_version()), ("system", _system()), *versions().items()]
+    rows += _solvers()
+    rows += [("BLAS", ", ".join(_loaded("openblas", "blis", "mkl", "refblas", "libblas")) or "unknown"), ("cores", str(os.cpu_count())),
+             ("OMP_NUM_THREADS", os.environ.get("OMP_NUM_THREADS", "not set"))]
+    return rows
+
+
+def _system() -> str:
+    try:
+        return platform.freedesktop_os_release().get("PRETTY_NAME", platform.platform())
+    except OSError:
+        return platform.platform()
+
+
+def _solvers() -> list[tuple[str, str]]:
+    """PETSc, MUMPS and MPI as they answer themselves."""
+    try:
+        from ..fem.compat import MPI, PETSc
+    except ImportError as error:
+        return [("PETSc", f"absent ({error})")]
+    implementation, version = MPI.get_vendor()
+    return [("PETSc", ".".join(map(str, PETSc.Sys.getVersion()))),
+            ("PETSc scalars", str(PETSc.ScalarType.__name__)),
+            ("MUMPS", _mumps(PETSc)),
+            ("MPI", f"{implementation} {'.'.join(map(str, version))}")]
+
+
+def _mumps(PETSc: object) -> str:
+    """Whether a factorisation with MUMPS works, and which ordering it chose."""
+    try:
+        size = 2000
+        matrix = PETSc.Mat().createAIJ([size, size], nnz=3, comm=PETSc.COMM_SELF)
+        for i in range(size):
+            matrix[i, i] = 2.0
+            matrix[i, (i + 1) % size] = -0.5
+        matrix.assemble()
+        solver = PETSc.PC().create(PETSc.COMM_SELF)
+        solver.setOperators(matrix)
+        solver.setType("lu")
+        solver.setFactorSolverType("mumps")
+        solver.setUp()
+        ordering = solver.getFactorMatrix().getMumpsInfog(7)
+    except Exception as error:          # PETSc raises its own error classes for a missing solver
+        return f"absent ({str(error).splitlines()[-1]})"
+    names = {0: "AMD", 2: "AMF", 3: "SCOTCH", 4: "PORD", 5: "METIS", 6: "QAMD"}
+    return f"present (ordering {names.get(ordering, ordering)})"
+
+
+def _loaded(*words: str) -> list[str]:
+    """Shared libraries of this process whose name holds one of the words."""
+    try:
+        lines = Path("/proc/self/maps").read_text(encoding="utf-8", errors="replace").splitlines()
+    except OSError:
+        return []
+    files = {os.path.realpath(line.split()[-1]) for line in lines if len(line.split()) > 5}
+    return sorted(f for f in files if any(word in Path(f).name.lower() for word in words))

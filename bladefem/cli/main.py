@@ -1,0 +1,83 @@
+"""The command ``bladefem``: arguments, exit codes, and what happens when something goes wrong.
+
+Exit codes: 0 done, 1 not solved, 2 bad input, 130 interrupted.
+"""
+
+from __future__ import annotations
+
+import argparse
+import os
+import sys
+from collections.abc import Sequence
+
+from . import commands, ranks
+
+__all__ = ["main", "parser"]
+
+_EXAMPLES = """examples:
+  bladefem check scenes/wedge.toml                          every value, defaults marked
+  bladefem mesh scenes/wedge.toml --view mesh.png           mesh and picture in seconds
+  bladefem modes scenes/wedge.toml --set operation.speed="9000 rpm"
+  bladefem run scenes/wedge.toml -o runs/wedge              everything, with report and figures
+  bladefem run runs/wedge --set contact.mu=0.2              again from a run folder: finished stages are kept
+
+exit codes: 0 done, 1 not solved, 2 bad input, 130 interrupted"""
+
+# command: (what it does, example, function)
+_COMMANDS = {
+    "check": ("print the resolved scene, defaults marked, and what is wrong with it",
+              "bladefem check scenes/wedge.toml --set aerofoil.twist='25 deg'", commands.check),
+    "mesh": ("draw and mesh the geometry, print the quality table",
+             "bladefem mesh scenes/wedge.toml --view mesh.png", commands.mesh),
+    "modes": ("natural frequencies, for each nodal diameter of a wheel",
+              "bladefem modes scenes/wedge.toml --set model.nodal_diameters=0,1,6", commands.modes),
+    "contact": ("seat the damper: pressure on each face",
+                "bladefem contact scenes/wedge.toml", commands.contact),
+    "response": ("forced response with friction for each load",
+                 "bladefem response scenes/wedge.toml --set study.loads='20, 50, 100 N'", commands.response),
+    "study": ("the same for several values of one parameter, side by side",
+              "bladefem study scenes/wedge.toml --vary damper.angle='30, 40, 50 deg'", commands.study),
+    "report": ("figures, tables and report of a run",
+               "bladefem report runs/wedge", commands.report),
+    "run": ("everything, from mesh to report", "bladefem run scenes/wedge.toml -o runs/wedge", commands.report),
+}
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Run one command and return its exit code; messages go to the error stream of rank 0."""
+    os.environ.setdefault("OMP_NUM_THREADS", "1")       # more BLAS threads only get in each other's way
+    options = parser().parse_args(arguments)
+    return ranks.guarded(lambda comm: options.function(options, comm), options)
+
+
+def parser() -> argparse.ArgumentParser:
+    """All commands with their arguments."""
+    top = argparse.ArgumentParser("bladefem", epilog=_EXAMPLES, formatter_class=argparse.RawDescriptionHelpFormatter,
+                                  description="Friction-damped turbine blades, from geometry to design chart.")
+    subs = top.add_subparsers(dest="command", required=True, metavar="command")
+    for name, (what, example, function) in _COMMANDS.items():
+        sub = _command(subs, name, what, example, function)
+        sub.add_argument("scene", help="scene file (TOML), or the folder of an earlier run")
+        sub.add_argument("--set", action="append", default=[], metavar="KEY=VALUE", dest="overrides",
+                         help="another value for one field, such as aerofoil.twist='25 deg'; may be repeated")
+        if name != "check":
+            sub.add_argument("-o", "--output", metavar="FOLDER", help="run folder (default: runs/<name of the scene>)")
+            sub.add_argument("-q", "--quiet", action="store_true", help="no progress bars and no summary")
+    subs.choices["mesh"].add_argument("--view", metavar="PNG", help="also draw the mesh into this file")
+    subs.choices["study"].add_argument("--vary", required=True, metavar="KEY=VALUES",
+                                       help="field and its values, such as damper.angle='30, 40, 50 deg'")
+    info = _command(subs, "info", "versions and threads of what bladefem runs on", "bladefem info", commands.info)
+    info.set_defaults(scene=None)
+    return top
+
+
+def _command(subs: argparse._SubParsersAction, name: str, what: str, example: str, function: object,
+             ) -> argparse.ArgumentParser:
+    sub = subs.add_parser(name, help=what, description=f"{what[0].upper()}{what[1:]}.", epilog=f"example:\n  {example}",
+                          formatter_class=argparse.RawDescriptionHelpFormatter)
+    sub.set_defaults(function=function, output=None, quiet=False)
+    return sub
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,98 @@
+"""What goes wrong becomes one sentence and an exit code, on one rank or on many; no rank waits for ever."""
+
+from __future__ import annotations
+
+import argparse
+import os
+import sys
+import time
+import traceback
+from collections.abc import Callable
+from typing import Any
+
+from ..errors import InputError, NotSolvedError
+
+__all__ = ["communicator", "guarded"]
+
+PATIENCE = 10.0     # [s] that a failed rank waits for the others to fail as well
+
+
+def communicator() -> Any:
+    """All ranks when started by mpirun, else None, so that simple commands do not load MPI.
+
+    Raises:
+        InputError: started by mpirun, but mpi4py does not load.
+    """
+    if max(int(os.environ.get(name, 1)) for name in ("OMPI_COMM_WORLD_SIZE", "PMI_SIZE")) == 1:
+        return None
+    try:
+        from mpi4py import MPI
+    except ImportError as error:
+        raise InputError(f"mpirun: mpi4py cannot be loaded ({error}); run ./setup.sh") from None
+    return MPI.COMM_WORLD
+
+
+def guarded(action: Callable[[Any], None], options: argparse.Namespace) -> int:
+    """The exit code of an action that gets the communicator; errors are told on rank 0."""
+    comm = None
+    try:
+        comm = communicator()
+        meeting = comm.Dup() if comm else None
+        action(comm)
+        return _flush()
+    except BrokenPipeError:
+        return _flush()
+    except KeyboardInterrupt:
+        return _tell(comm, "interrupted; finished stages are kept, the same command goes on after them", 130)
+    except Exception as error:
+        code, text = _sentence(error)
+        if comm is None:
+            return _tell(None, text, code)
+        if comm.rank == 0:
+            _tell(comm, text, code)
+        if not _all_arrive(meeting):
+            print(f"bladefem: rank {comm.rank} alone: {text}", file=sys.stderr, flush=True)
+            comm.Abort(code)
+        return code
+
+
+def _sentence(error: Exception) -> tuple[int, str]:
+    """Exit code and text: one sentence for what a user can mend, the whole traceback for our own mistakes."""
+    if isinstance(error, InputError):
+        return 2, str(error)
+    if isinstance(error, NotSolvedError):
+        return 1, f"not solved: {error}"
+    if isinstance(error, MemoryError):
+        return 1, f"not solved: out of memory ({error}); a coarser mesh.size needs less"
+    if isinstance(error, ModuleNotFoundError) and (error.name or "").partition(".")[0] in _INSTALLED:
+        return 2, f"{error.name} is not installed; run ./setup.sh"
+    return 1, "this is a mistake in the program, please report it:\n" + "".join(traceback.format_exception(error))
+
+
+_INSTALLED = {"dolfinx", "petsc4py", "slepc4py", "mpi4py", "gmsh", "pyvista", "matplotlib", "numba", "xarray", "h5py",
+              "h5netcdf", "pandas", "tqdm", "meshio", "jinja2", "scipy", "numpy"}
+
+
+def _tell(comm: Any, text: str, code: int) -> int:
+    if comm is None or comm.rank == 0:
+        print(f"bladefem: {text}", file=sys.stderr, flush=True)
+    return code
+
+
+def _all_arrive(meeting: Any) -> bool:
+    """Whether every rank failed as well; else one of them waits in a collective call that will never come."""
+    request, deadline = meeting.Ibarrier(), time.monotonic() + PATIENCE
+    while not request.Test():
+        if time.monotonic() > deadline:
+            return False
+        time.sleep(0.01)
+    return True
+
+
+def _flush() -> int:
+    """A reader that closes the pipe early (| head) is no error."""
+    try:
+        sys.stdout.flush()
+    except BrokenPipeError:
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+    return 0
