@@ -1,0 +1,97 @@
+"""Contact forces of all elements for periodic relative motion: harmonics, Jacobian, states and dissipated energy.
+
+Signs (data.py): w is blade minus damper in (normal, t1, t2); the blade feels -f. The normal force is
+max(0, n0 + kn w_n), the tangential one a return map of kt w onto |f| <= mu times it.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from bladefem.data import Elements
+from bladefem.errors import InputError
+from bladefem.friction.disc_batch import disc_batch
+from bladefem.friction.harmonics import harmonics_of
+from bladefem.friction.jenkins import jenkins_batch
+from bladefem.friction.tables import tables
+
+__all__ = ["GROSS_SLIP", "PARTIAL_SLIP", "SEPARATED", "STICK", "Forces", "evaluate", "states"]
+
+SEPARATED, STICK, PARTIAL_SLIP, GROSS_SLIP = 0, 1, 2, 3
+
+
+@dataclass(frozen=True)
+class Forces:
+    """Contact forces of n nodes with d = 1 + tangents directions; K = 2H+1 coefficients [mean, cos 1, sin 1, ...]."""
+
+    f: np.ndarray               # (n, d, K) [N]
+    dfdw: np.ndarray | None     # (n, d, K, d, K) [N/m]
+    state: np.ndarray           # (n,) SEPARATED, STICK, PARTIAL_SLIP (at most half of the contact time) or GROSS_SLIP
+    shares: np.ndarray          # (n, 3) share of the cycle in stick, slip and separation [1]
+    dissipated: np.ndarray      # (n,) energy a cycle [J]
+    cycles: np.ndarray          # (n,) periods marched until the force was periodic
+    converged: bool
+    reason: str
+
+
+def evaluate(elements: Elements, w: np.ndarray, samples: int, jacobian: bool = True, *,
+             load: np.ndarray | None = None, cycles: int = 1000) -> Forces:
+    """Harmonics of the contact forces for relative motion w (n, d, 2H+1) [m], sampled at ``samples`` instants.
+
+    load (n, samples) [N], where given, is the prescribed part of the normal load N(t) in place of the constant n0.
+    The error falls as samples^-2. Forces.converged is False, with the reason, when a 2-D element was not periodic
+    after ``cycles`` periods. Raises InputError for shapes that do not fit or too few samples (at least 4H+4).
+    """
+    w = np.ascontiguousarray(w, dtype=float)
+    nodes = _nodes(elements, w)
+    n, d, K = w.shape
+    load = _series(load, n, samples)
+    tab = tables(harmonics_of(w), samples)
+    F, J, shares, used = np.empty((n, d, K)), np.empty((n, d, K, d, K)), np.empty((n, 3)), np.full(n, 2)
+    if d == 2:
+        jenkins_batch(w, load, nodes, tab, F, J, shares)
+    else:
+        disc_batch(w, load, nodes, tab, cycles, F, J.reshape(n, d, K, d * K), shares, used)
+    failed = int(np.count_nonzero(used < 0))
+    reason = f"{failed} of {n} elements were not periodic after {cycles} cycles" if failed else "periodic"
+    return Forces(F, J if jacobian else None, states(shares), shares, dissipated(F, w), np.abs(used), failed == 0,
+                  reason)
+
+
+def dissipated(f: np.ndarray, w: np.ndarray) -> np.ndarray:
+    """(n,) work of the tangential forces f (n, d, K) on w (n, d, K) in one cycle [J], exact for these harmonics."""
+    h = np.arange(1, f.shape[2] // 2 + 1)
+    c, s = f[:, 1:, 1::2], f[:, 1:, 2::2]
+    return np.pi * np.einsum("ndh,h->n", c * w[:, 1:, 2::2] - s * w[:, 1:, 1::2], h)
+
+
+def states(shares: np.ndarray) -> np.ndarray:
+    """(n,) state codes from the shares (n, 3) of stick, slip and separation."""
+    stick, slip = shares[:, 0], shares[:, 1]
+    code = np.where(slip > 0.5 * (stick + slip), GROSS_SLIP, np.where(slip > 0, PARTIAL_SLIP, STICK))
+    return np.where(stick + slip > 1e-12, code, SEPARATED)
+
+
+def _nodes(elements: Elements, w: np.ndarray) -> np.ndarray:
+    """(n, 4) kt, kn, mu, n0 after checking that they fit w."""
+    columns = [np.asarray(getattr(elements, name), dtype=float) for name in ("kt", "kn", "mu", "n0")]
+    n, d = columns[0].size, 1 + elements.tangents
+    if d not in (2, 3):
+        raise InputError(f"elements: tangents is {elements.tangents}, expected 1 or 2")
+    if w.ndim != 3 or w.shape[:2] != (n, d):
+        raise InputError(f"w: shape {w.shape} does not fit {n} elements of {d} directions, expected ({n}, {d}, 2H+1)")
+    nodes = np.stack(np.broadcast_arrays(*columns), axis=1)
+    if (nodes[:, :3] < 0).any() or not np.isfinite(nodes).all():
+        raise InputError("elements: kt, kn and mu must be finite and not negative, n0 must be finite")
+    return np.ascontiguousarray(nodes)
+
+
+def _series(load: np.ndarray | None, n: int, samples: int) -> np.ndarray:
+    """(n, samples) prescribed loads, or (n, 0) for none."""
+    if load is None:
+        return np.zeros((n, 0))
+    if np.shape(load) != (n, samples):
+        raise InputError(f"load: shape {np.shape(load)}, expected ({n}, {samples}), one row an element")
+    return np.ascontiguousarray(load, dtype=float)
