@@ -67,7 +67,7 @@ def contact_problem(mesh: Mesh, patches: Sequence[Patch], blade: Flexibility, da
         InputError: the blade is not in nodal diameter 0, or the clearance does not fit the ports.
     """
     if blade.con.nodal_diameter not in (None, 0):
-        raise InputError(f"nodal_diameter is {blade.con.nodal_diameter}, expected 0: steady loads move all blades alike")
+        raise InputError(f"nodal_diameter is {blade.con.nodal_diameter}, expected 0: a static load moves all alike")
     ports = normal_ports(patches, mesh)
     body = damper if isinstance(damper, Body) else damper.con.body
     pull = centrifugal(body, 1.0, spin_axis(mesh))
@@ -85,7 +85,7 @@ def contact_problem(mesh: Mesh, patches: Sequence[Patch], blade: Flexibility, da
 
 
 def solve(problem: ContactProblem, speed: float, normal: float | None = None, damper_mass: float | None = None,
-          start: Sequence[PressureMap] | None = None) -> list[PressureMap]:
+          start: Sequence[PressureMap] | None = None, approach: np.ndarray | None = None) -> list[PressureMap]:
     """Pressure maps of one load state.
 
     Args:
@@ -93,13 +93,14 @@ def solve(problem: ContactProblem, speed: float, normal: float | None = None, da
         normal: wanted mean normal load of a seat [N]; the damper's load is scaled to give it.
         damper_mass: mass of the damper [kg] instead of the meshed one.
         start: maps of a neighbouring state, for a warm start.
+        approach: (n,) further displacement of the blades at the normal ports, pressing > 0 [m].
 
     Raises:
         InputError: no load at all, or a negative one.
         NotSolvedError: the load lifts the damper off, slides it out sideways, or the iteration stopped.
     """
     active = None if start is None else np.concatenate([m.force > 0 for m in start])
-    g0 = problem.clearance + speed**2 * problem.blade_swell
+    g0 = problem.clearance + speed**2 * problem.blade_swell - (0.0 if approach is None else approach)
     if normal is None:
         scale = speed**2 * (1.0 if damper_mass is None else damper_mass / problem.mass)
         if not scale > 0:

@@ -1,0 +1,113 @@
+"""A table of quasi-static contact states with interpolation, and whether quasi-static is right at all.
+
+The paper solves "a few independent contact states" beforehand and interpolates between them during the motion. Here
+the direct solve costs milliseconds too; the table says how far it is from it.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from itertools import product
+
+import numpy as np
+
+from ..data import Patch
+from ..errors import InputError
+from ..scene import Material
+
+__all__ = ["QuasiStatic", "StateTable", "interpolate", "quasi_static", "state_table"]
+
+MARGIN = 10.0           # what "much larger" means in T >> D / c
+
+
+@dataclass(frozen=True)
+class StateTable:
+    """Contact forces over a grid of states (load, relative positions, ...)."""
+
+    axes: tuple[np.ndarray, ...]    # k ascending coordinates
+    force: np.ndarray               # (len(axes[0]), ..., n) [N]
+    curvature: np.ndarray           # (k, len(axes[0]), ...) largest second difference / 8, over the largest force [1]
+
+
+def state_table(solve: Callable[..., np.ndarray], axes: Sequence[np.ndarray]) -> StateTable:
+    """Solve every state of a grid.
+
+    Args:
+        solve: from k coordinates to the (n,) forces, for instance the concatenated maps of ``seat.solve``.
+        axes: k coordinate lists, at least three ascending values each.
+
+    Raises:
+        InputError: an axis is too short or not ascending; whatever `solve` raises.
+    """
+    axes = tuple(np.asarray(a, dtype=float) for a in axes)
+    for k, a in enumerate(axes):
+        if len(a) < 3 or not (np.diff(a) > 0).all():
+            raise InputError(f"axis {k} of the state table is {a.tolist()}, expected at least 3 ascending values")
+    force = np.array([solve(*point) for point in product(*axes)])
+    force = force.reshape(*(len(a) for a in axes), -1)
+    return StateTable(axes, force, np.stack([_curvature(force, a, k) for k, a in enumerate(axes)]))
+
+
+def interpolate(table: StateTable, point: Sequence[float]) -> tuple[np.ndarray, float]:
+    """Forces (n,) by multilinear interpolation, and an error indicator relative to the table's largest force.
+
+    The indicator adds, over the axes, the interpolation error s (1 - s) h^2 f'' / 2 estimated from second differences
+    at the corners of the cell: 0 on a table point. Where the contact area changes, forces have kinks and the
+    indicator is of the right size, but no bound.
+
+    Raises:
+        InputError: the point is outside the table.
+    """
+    force, where, indicator = table.force, [], 0.0
+    for k, (a, x) in enumerate(zip(table.axes, point, strict=True)):
+        if not a[0] <= x <= a[-1]:
+            raise InputError(f"coordinate {k} is {x:g}, expected it inside the table, {a[0]:g} to {a[-1]:g}")
+        i = min(int(np.searchsorted(a, x, side="right")) - 1, len(a) - 2)
+        where.append((i, (x - a[i]) / (a[i + 1] - a[i])))
+    cell = tuple(slice(i, i + 2) for i, _ in where)
+    for k, (i, s) in enumerate(where):
+        force = (1 - s) * force[i] + s * force[i + 1]
+        indicator += 4 * s * (1 - s) * float(table.curvature[k][cell].max())
+    return force, indicator
+
+
+def _curvature(force: np.ndarray, a: np.ndarray, k: int) -> np.ndarray:
+    """Largest h^2 |f''| / 8 over the nodes, with the wider neighbouring step, at each table point along axis k."""
+    f = np.moveaxis(force, k, 0)
+    h = np.diff(a).reshape(-1, *[1] * (f.ndim - 1))
+    slope = np.diff(f, axis=0) / h
+    second = 2 * np.diff(slope, axis=0) / (h[1:] + h[:-1]) * np.maximum(h[1:], h[:-1])**2 / 8
+    size = np.abs(second).max(axis=-1) / np.abs(force).max()
+    size = np.concatenate([size[:1], size, size[-1:]])
+    return np.moveaxis(size, 0, k)
+
+
+@dataclass(frozen=True)
+class QuasiStatic:
+    """Whether contact may be computed as a sequence of static states: T >> D / c."""
+
+    period: float                   # shortest period of the motion [s]
+    transit: float                  # D / c, elastic waves across the patch [s]
+    holds: bool                     # period >= 10 transits
+    limit: float                    # frequency up to which it holds [Hz]
+
+    @property
+    def sentence(self) -> str:
+        """For the report."""
+        return (f"quasi-static contact {'holds' if self.holds else 'does NOT hold'}: the period {self.period:.3g} s is "
+                f"{self.period / self.transit:.3g} wave transits of the patch (at least {MARGIN:g} wanted; "
+                f"up to {self.limit:.3g} Hz)")
+
+
+def quasi_static(patch: Patch, material: Material, frequency: float) -> QuasiStatic:
+    """Compare the period with D / c, D the patch's largest extent and c = sqrt(E / rho) (the paper's Eq. 26).
+
+    Args:
+        frequency: highest frequency of the motion that matters [Hz]: the last harmonic kept.
+    """
+    if not frequency > 0:
+        raise InputError(f"frequency is {frequency} Hz, expected a positive one")
+    extent = float(np.linalg.norm(np.ptp(patch.points @ patch.frame[0].T, axis=0)))
+    transit = extent / np.sqrt(material.E / material.rho)
+    return QuasiStatic(1 / frequency, transit, bool(1 / frequency >= MARGIN * transit), 1 / (MARGIN * transit))

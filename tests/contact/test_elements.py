@@ -1,0 +1,162 @@
+"""Elements, resultants and state tables made from pressure maps."""
+
+import csv
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from test_seat import ALPHA, SPEED, condensed
+from wedge import wedge_mesh
+
+from bladefem.contact.seat import solve
+from bladefem.contact.states import interpolate, quasi_static, state_table
+from bladefem.contact.stiffness import aggregation, friction_elements, mindlin_ratio, normal_stiffness, pair_ratio
+from bladefem.contact.summary import resultant, write_maps
+from bladefem.data import PressureMap
+from bladefem.errors import InputError
+from bladefem.scene import Contact, Material
+
+
+@pytest.fixture(scope="module")
+def problem():
+    return condensed(wedge_mesh(ALPHA))
+
+
+@pytest.fixture(scope="module")
+def maps(problem):
+    return solve(problem, SPEED)
+
+
+def test_mindlin_ratio():
+    steel = Material()
+    assert mindlin_ratio(0.3) == pytest.approx(1.4 / 1.7, rel=1e-15)
+    assert pair_ratio(steel, steel) == pytest.approx(mindlin_ratio(0.3), rel=1e-14)
+    stiff = replace(steel, E=1e13)          # a rigid partner: the ratio of one body alone is the same for equal nu
+    assert pair_ratio(steel, stiff) == pytest.approx(mindlin_ratio(0.3), rel=1e-14)
+
+
+@pytest.mark.parametrize("points", [None, 1, 2, 3, 7, 24])
+def test_totals_do_not_depend_on_the_number_of_elements(maps, points):
+    contact = Contact(kt_area=4e10, points=points)
+    e, S = friction_elements(maps, contact, mindlin_ratio(0.3))
+    area = sum(m.patch.area.sum() for m in maps)
+    assert e.kt.sum() == pytest.approx(4e10 * area, rel=1e-12)
+    assert e.kn.sum() == pytest.approx(4e10 * area * 1.7 / 1.4, rel=1e-12)
+    assert e.n0.clip(min=0).sum() == pytest.approx(sum(m.force.sum() for m in maps), rel=1e-12)
+    assert S.shape == (3 * sum(len(m.force) for m in maps), 3 * len(e.kt))
+    if points and points < 10:
+        assert len(e.kt) == 2 * points
+        assert e.kt.max() / e.kt.min() < 3          # halving by area keeps the elements alike
+
+
+def test_aggregation_keeps_uniform_motion_and_total_force(maps):
+    """S^T of a uniform displacement is uniform; S spreads an element's force over its nodes without loss."""
+    _, S = friction_elements(maps, Contact(points=5), 1.0)
+    motion = np.tile([1.0, 2.0, 3.0], S.shape[0] // 3)
+    assert np.allclose(S.T @ motion, np.tile([1.0, 2.0, 3.0], 10), rtol=1e-13)
+    assert np.allclose(np.asarray(S.sum(axis=0)).ravel(), 1.0, rtol=1e-13)
+
+
+def test_total_stiffness_wins_over_areal(maps):
+    e, _ = friction_elements(maps, Contact(kt=1e6, kn_area=1e10), 1.0)
+    n = len(maps[0].force)
+    assert e.kt[:n].sum() == pytest.approx(1e6, rel=1e-13) and e.kt[n:].sum() == pytest.approx(1e6, rel=1e-13)
+    assert e.kn == pytest.approx(1e10 * np.concatenate([m.patch.area for m in maps]), rel=1e-13)
+
+
+def test_open_nodes_keep_their_gap(maps):
+    e, _ = friction_elements(maps, Contact(), 1.0)
+    gap = np.concatenate([m.gap for m in maps])
+    open_ = e.n0 <= 0
+    assert open_.any() and np.allclose(-e.n0[open_] / e.kn[open_], gap[open_], rtol=1e-12)
+    e, _ = friction_elements(maps, Contact(normal="prescribed"), 1.0)
+    assert (e.kn == 0).all() and (e.n0 >= 0).all()
+
+
+def test_coupled_normal_load_needs_a_stiffness(maps):
+    with pytest.raises(InputError, match="kn_area"):
+        friction_elements(maps, Contact(kn_area=0.0), 1.0)
+
+
+def test_elements_of_a_patch_are_connected_halves(maps):
+    patch = maps[0].patch
+    G = aggregation(patch, 2)
+    label = np.asarray(G.argmax(axis=1)).ravel()
+    z = patch.points[:, 2]                  # the longer side of this seat is axial
+    assert z[label == 0].max() <= z[label == 1].min() + 1e-12
+
+
+def test_normal_stiffness_of_eq_23(problem, maps):
+    k = normal_stiffness(problem, maps)
+    force = np.concatenate([m.force for m in maps])
+    assert (k[force > 0] > 0).all() and (k[force == 0] == 0).all()
+    pressed = force > 0
+    assert force[pressed] / k[pressed] == pytest.approx((problem.flexibility @ force)[pressed], rel=1e-12)
+
+
+def test_resultants_balance_the_pull(problem, maps):
+    """Next blade's seat turned back into this sector's frame: both forces and the pull add up to zero."""
+    turn = wedge_mesh(ALPHA).sector.rotation
+    this, following = (resultant(m) for m in maps)
+    total = this.force + turn @ following.force + SPEED**2 * problem.load[:3]
+    assert np.abs(total).max() < 1e-9 * np.linalg.norm(this.force)
+    assert this.normal == pytest.approx(np.linalg.norm(this.force), rel=1e-12)
+    assert this.share < 1 and this.peak > this.normal / this.area
+
+
+def test_maps_as_csv(maps, tmp_path):
+    write_maps(maps, tmp_path / "maps.csv")
+    with open(tmp_path / "maps.csv", newline="") as stream:
+        rows = list(csv.DictReader(stream))
+    assert len(rows) == sum(len(m.force) for m in maps)
+    assert sum(float(r["force_N"]) for r in rows) == pytest.approx(sum(m.force.sum() for m in maps), rel=1e-12)
+
+
+def tilted(problem):
+    """Direct solves over (normal load, opposite approach of the two platforms)."""
+    n = len(problem.patches[0].area)
+    lean = np.concatenate([np.linspace(-1, 1, n), np.zeros(n)])
+
+    def direct(load, tilt):
+        return np.concatenate([m.force for m in solve(problem, SPEED, normal=load, approach=tilt * lean)])
+    return direct
+
+
+def test_table_of_states_and_its_indicator(problem):
+    """Halving the steps divides the error by two or more (kinks), and the indicator follows the true error."""
+    direct = tilted(problem)
+    points = [(120.0, 0.4e-6), (170.0, -0.3e-6), (199.0, 0.9e-6), (133.0, 0.1e-6)]
+    errors, indicators = [], []
+    for steps in (2, 4, 8, 16):
+        table = state_table(direct, [np.linspace(100, 200, steps + 1), np.linspace(-1e-6, 1e-6, steps + 1)])
+        found = [interpolate(table, p) for p in points]
+        errors.append(max(np.abs(f - direct(*p)).max() for (f, _), p in zip(found, points, strict=True))
+                      / table.force.max())
+        indicators.append(max(i for _, i in found))
+    errors, indicators = np.array(errors), np.array(indicators)
+    assert errors[-1] < errors[0] / 10
+    assert (indicators > 0.3 * errors).all() and (indicators < 30 * errors).all()
+
+
+def test_table_is_exact_on_its_points(problem):
+    direct = tilted(problem)
+    table = state_table(direct, [[100.0, 150.0, 200.0], [-1e-6, 0.0, 1e-6]])
+    force, indicator = interpolate(table, (150.0, 1e-6))
+    assert np.allclose(force, direct(150.0, 1e-6), atol=1e-9) and indicator == 0
+    with pytest.raises(InputError, match="inside the table"):
+        interpolate(table, (99.0, 0.0))
+    with pytest.raises(InputError, match="ascending"):
+        state_table(direct, [[1.0, 2.0], [0.0, 1.0, 2.0]])
+
+
+def test_quasi_static_condition(maps):
+    """c = 5172 m/s for steel; the seat is about 33 mm across, so T = 10 D / c at some 16 kHz."""
+    slow, fast = (quasi_static(maps[0].patch, Material(), f) for f in (1000.0, 50000.0))
+    extent = np.hypot(0.03, 0.01 / np.cos(ALPHA))
+    assert slow.transit == pytest.approx(extent / np.sqrt(2.1e11 / 7850), rel=1e-12)
+    assert slow.holds and not fast.holds and "NOT" in fast.sentence
+
+
+def test_pressure_is_force_over_area(maps):
+    m = maps[0]
+    assert isinstance(m, PressureMap) and np.array_equal(m.pressure, m.force / m.patch.area)
