@@ -1,0 +1,5 @@
+"""Parametric shapes of friction-damped blades, drawn and meshed by gmsh; `build` makes the mesh of a scene."""
+
+from .dispatch import build
+
+__all__ = ["build"]

@@ -2,7 +2,8 @@
 
 Axes, everywhere: z is the engine axis, the middle of a blade stands along +x (radial), y is circumferential.
 A sector spans the angles -pi/N .. +pi/N about z; the next blade is the sector turned by +2 pi/N.
-Plane models lie in x (radial), y (circumferential); z is their out-of-plane thickness; the next blade is at +pitch in y.
+Plane models lie in x (radial), y (circumferential); z is their out-of-plane thickness; the next blade is at
++pitch in y.
 """
 
 from __future__ import annotations
@@ -30,8 +31,8 @@ class Aerofoil:
     section: str = quantity("naca", choices=("naca", "biconvex"), help="section family")
     stagger: float = quantity(25 * DEG, "rad", -70 * DEG, 70 * DEG, "angle of the root chord to the engine axis")
     twist: float = quantity(20 * DEG, "rad", -60 * DEG, 60 * DEG, "turn of the tip section against the root section")
-    lean: float = quantity(0.0, "rad", -20 * DEG, 20 * DEG, "tilt of the stacking line in the circumferential direction")
-    sweep: float = quantity(0.0, "rad", -20 * DEG, 20 * DEG, "tilt of the stacking line in the axial direction")
+    lean: float = quantity(0.0, "rad", -20 * DEG, 20 * DEG, "tilt of the stacking line, circumferential")
+    sweep: float = quantity(0.0, "rad", -20 * DEG, 20 * DEG, "tilt of the stacking line, axial")
     fillet: float = quantity(0.0, "m", 0.0, 0.01, "radius between aerofoil and platform, 0 for a sharp edge")
 
 
@@ -71,6 +72,7 @@ class Wedge:
     angle: float = quantity(40 * DEG, "rad", 15 * DEG, 75 * DEG,
                             "alpha: each flank against the radial plane between two blades")
     length: float = quantity(0.04, "m", 0.005, 0.5, "axial length")
+    base: float = quantity(0.002, "m", 2e-4, 0.05, "height of the straight part below the flanks (the blunted bottom)")
     mass: float | None = quantity(None, "kg", 1e-4, 5.0, "mass; sets the density when given")
     clearance: float = quantity(0.0, "m", 0.0, 0.002, "normal gap between flank and seat before seating")
 
@@ -123,7 +125,7 @@ class Punch:
 class MeshSize:
     """How finely a shape is meshed."""
 
-    size: float | None = quantity(None, "m", 1e-5, 1.0, "target element size; chosen from the thinnest part when left out")
+    size: float | None = quantity(None, "m", 1e-5, 1.0, "target element size; from the thinnest part when left out")
     contact_size: float | None = quantity(None, "m", 1e-6, 1.0, "element size on contact faces")
     order: int = quantity(2, "1", 1, 2, "order of the elements; 1 is only for comparison")
     curved: bool = quantity(True, help="second-order elements follow curved faces (invalid ones are straightened)")

@@ -1,0 +1,41 @@
+"""From a scene to its mesh. Anything with the right tables will do; nothing here knows bladefem's Scene."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from bladefem.errors import InputError, suggestion
+
+from .mesh import Mesh
+
+__all__ = ["build"]
+
+
+def build(scene: Any) -> Mesh:
+    """The mesh of a scene, by its ``kind``; the builders and gmsh are loaded when they are needed.
+
+    Args:
+        scene: has ``kind``, ``mesh`` (MeshSize) and the tables of its kind: aerofoil, platform, shank, disc, damper;
+            plane; z_mass; hertz; punch; imported.
+
+    Raises:
+        InputError: a parameter has to change, or the kind is unknown; one sentence.
+    """
+    if scene.kind not in BUILDERS:
+        raise InputError(f"kind = {scene.kind!r} is unknown{suggestion(str(scene.kind), BUILDERS)}")
+    return BUILDERS[scene.kind](scene)
+
+
+def _sector(scene: Any) -> Mesh:
+    from .sector import wedge_sector
+
+    return wedge_sector(scene.aerofoil, scene.platform, scene.shank, scene.disc, scene.damper, scene.mesh)
+
+
+def _plane(scene: Any) -> Mesh:
+    from .plane import plane_blades
+
+    return plane_blades(scene.plane, scene.mesh)
+
+
+BUILDERS = {"wedge sector": _sector, "plane blades": _plane}

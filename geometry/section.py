@@ -1,0 +1,76 @@
+"""Aerofoil sections as points: thickness and camber laws, placed on the blade by stagger, twist, lean and sweep."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from .parameters import Aerofoil
+
+__all__ = ["centroid", "outline", "place", "placement", "section"]
+
+BLUNT = 0.2         # trailing edge over largest thickness: a spline closed by a short straight edge meshes well
+POINTS = 24         # points on each side
+
+
+def half_thickness(family: str, x: np.ndarray, thickness: float) -> np.ndarray:
+    """Half thickness over chord at x = 0..1 along the chord.
+
+    The NACA law is the four-digit one (NACA report 460) with its last coefficient opened to a blunt trailing edge;
+    the biconvex law is a parabola on a rounded base.
+    """
+    if family == "naca":
+        last = 0.1036 - 0.1 * BLUNT
+        return 5 * thickness * (0.2969 * np.sqrt(x) - 0.1260 * x - 0.3516 * x**2 + 0.2843 * x**3 - last * x**4)
+    rounded = np.sqrt(1 - (1 - np.minimum(x / (2 * BLUNT * thickness), 1.0)) ** 2)
+    return thickness / 2 * ((1 - BLUNT) * 4 * x * (1 - x) + BLUNT * rounded)
+
+
+def section(family: str, thickness: float, camber: float, points: int = POINTS) -> np.ndarray:
+    """Closed section over chord, (2 points - 1, 2): trailing edge (suction side), leading edge, trailing edge.
+
+    Columns: along the chord (0 leading, 1 trailing edge) and across it (suction side positive).
+    """
+    x = (1 - np.cos(np.linspace(0, np.pi, points))) / 2
+    half, line, slope = half_thickness(family, x, thickness), 4 * camber * x * (1 - x), 4 * camber * (1 - 2 * x)
+    normal = np.column_stack([-slope, np.ones_like(x)]) / np.hypot(1, slope)[:, None]
+    middle = np.column_stack([x, line])
+    upper, lower = middle + half[:, None] * normal, middle - half[:, None] * normal
+    return np.vstack([upper[::-1], lower[1:]])
+
+
+def centroid(polygon: np.ndarray) -> np.ndarray:
+    """Centre of area of a simple polygon (n, 2)."""
+    a, b = polygon, np.roll(polygon, -1, axis=0)
+    cross = a[:, 0] * b[:, 1] - b[:, 0] * a[:, 1]
+    return ((a + b) * cross[:, None]).sum(axis=0) / (3 * cross.sum())
+
+
+def placement(blade: Aerofoil, radius: float, t: float) -> tuple[np.ndarray, np.ndarray, np.ndarray, float]:
+    """Frame of the section at the share t = 0..1 of the span; ``radius`` [m] is the platform's top.
+
+    Returns: origin (3,) [m], directions along the chord (to the trailing edge) and across it (3,), chord [m].
+    """
+    angle = blade.stagger + t * blade.twist
+    height = t * blade.span
+    chord = (1 - t) * blade.chord_root + t * blade.chord_tip
+    origin = np.array([radius + height, height * np.tan(blade.lean), height * np.tan(blade.sweep)])
+    along = np.array([0.0, np.sin(angle), np.cos(angle)])
+    across = np.array([0.0, np.cos(angle), -np.sin(angle)])
+    return origin, along, across, chord
+
+
+def place(blade: Aerofoil, radius: float, t: float, plane: np.ndarray) -> np.ndarray:
+    """Points (n, 3) [m] of chord coordinates (n, 2) in the section at share t, stacked on the centres of area."""
+    origin, along, across, chord = placement(blade, radius, t)
+    local = chord * (plane - centroid(shape(blade, t)))
+    return origin + local[:, :1] * along + local[:, 1:] * across
+
+
+def shape(blade: Aerofoil, t: float) -> np.ndarray:
+    """Section over chord at the share t of the span, (n, 2)."""
+    return section(blade.section, (1 - t) * blade.thickness_root + t * blade.thickness_tip, blade.camber)
+
+
+def outline(blade: Aerofoil, radius: float, t: float) -> np.ndarray:
+    """Section in space at the share t of the span, (n, 3) [m]."""
+    return place(blade, radius, t, shape(blade, t))

@@ -1,0 +1,128 @@
+"""A bladed sector with its underplatform wedge damper, drawn with OpenCASCADE and meshed so that all pairs match."""
+
+from __future__ import annotations
+
+from math import pi
+from types import ModuleType
+
+import numpy as np
+
+from bladefem.errors import InputError
+
+from .finish import complete, mesh_model
+from .mesh import Mesh
+from .parameters import Aerofoil, Disc, MeshSize, Platform, Shank, Wedge
+from .profile import Profile, profile
+from .section import outline
+from .sector_check import check_sector
+from .sector_names import link, motions, moved, name_faces, refined, seat, sector, trailing_curves
+from .session import attempt, gmsh_session
+from .sizing import sector_sizes, set_sizes
+
+__all__ = ["wedge_sector"]
+
+
+def wedge_sector(aerofoil: Aerofoil, platform: Platform, shank: Shank, disc: Disc, wedge: Wedge,
+                 size: MeshSize) -> Mesh:
+    """Blade, platform, shank and disc segment as body "blade", the wedge towards the next blade as "damper".
+
+    The wedge is meshed in contact; a clearance c then moves it inwards by c / sin(alpha).
+
+    Raises:
+        InputError: a parameter has to change; the message names it.
+    """
+    check_sector(aerofoil, platform, shank, disc, wedge)
+    shape = profile(platform, shank, disc, wedge)
+    sizes = sector_sizes(aerofoil, platform, shank, disc, wedge, size)
+    with gmsh_session() as gmsh:
+        blade = _blade(gmsh, aerofoil, platform, shank, disc, shape)
+        blade = _imprint(gmsh, blade, shape, wedge.length)
+        damper = _prism(gmsh, shape.wedge, wedge.length)
+        gmsh.model.occ.synchronize()
+        groups = name_faces(gmsh, blade, damper, aerofoil, disc, wedge, shape)
+        link(gmsh, groups, shape)
+        set_sizes(gmsh, shape, wedge, sizes, trailing_curves(gmsh, groups))
+        with attempt("mesh.size", "mesh this geometry"):
+            mesh = mesh_model(gmsh, groups, 3, size)
+    mesh = complete(refined(mesh, aerofoil, shape), motions(shape), sizes.base, sector(disc.sectors),
+                    flat=("seat_left", "seat_right", "damper_left", "damper_right"))
+    return moved(mesh, wedge, shape) if wedge.clearance else mesh
+
+
+def _prism(gmsh: ModuleType, polygon: np.ndarray, length: float) -> int:
+    """Volume over a polygon (n, 2) in the plane of the section, centred at z = 0."""
+    occ = gmsh.model.occ
+    points = [occ.addPoint(x, y, -length / 2) for x, y in polygon]
+    lines = [occ.addLine(a, b) for a, b in zip(points, points[1:] + points[:1], strict=True)]
+    face = occ.addPlaneSurface([occ.addCurveLoop(lines)])
+    return next(tag for dim, tag in occ.extrude([(2, face)], 0, 0, length) if dim == 3)
+
+
+def _disc(gmsh: ModuleType, disc: Disc, theta: float) -> int:
+    """Ring segment between -theta and +theta."""
+    occ = gmsh.model.occ
+    z = -disc.width / 2
+    centre = occ.addPoint(0, 0, z)
+    ends = [[occ.addPoint(r * np.cos(a), r * np.sin(a), z) for a in (-theta, theta)]
+            for r in (disc.bore_radius, disc.rim_radius)]
+    arcs = [occ.addCircleArc(a, centre, b) for a, b in ends]
+    sides = [occ.addLine(inner, outer) for inner, outer in zip(*ends, strict=True)]
+    face = occ.addPlaneSurface([occ.addCurveLoop([sides[0], arcs[1], -sides[1], -arcs[0]])])
+    occ.remove([(0, centre)])
+    return next(tag for dim, tag in occ.extrude([(2, face)], 0, 0, disc.width) if dim == 3)
+
+
+def _aerofoil(gmsh: ModuleType, blade: Aerofoil, top: float) -> int:
+    """Loft through closed sections, each one spline round the leading edge and a straight blunt trailing edge."""
+    occ = gmsh.model.occ
+    count = 3 + int(np.ceil(abs(blade.twist) / (12 * pi / 180)))
+    wires = []
+    for t in np.linspace(0, 1, count):
+        points = [occ.addPoint(*p) for p in outline(blade, top, t)]
+        wires.append(occ.addWire([occ.addSpline(points), occ.addLine(points[-1], points[0])]))
+    with attempt("aerofoil", "loft its sections"):
+        return next(tag for dim, tag in occ.addThruSections(wires, makeSolid=True) if dim == 3)
+
+
+def _blade(gmsh: ModuleType, aerofoil: Aerofoil, platform: Platform, shank: Shank, disc: Disc, shape: Profile) -> int:
+    """One solid of disc segment, shank, platform and aerofoil."""
+    occ = gmsh.model.occ
+    half = shank.width / 2
+    foot = np.sqrt(disc.rim_radius**2 - half**2) - 0.2 * (disc.rim_radius - disc.bore_radius)
+    plate = np.array([shape.inner, shape.outer, shape.corner])
+    parts = [_prism(gmsh, np.array([[foot, -half], [shape.underside, -half], [shape.underside, half], [foot, half]]),
+                    shank.length),
+             _prism(gmsh, np.vstack([plate, plate[::-1] * [1, -1]]), platform.length),
+             _aerofoil(gmsh, aerofoil, shape.top)]
+    with attempt("aerofoil", "join aerofoil, platform, shank and disc"):
+        solid, _ = occ.fuse([(3, _disc(gmsh, disc, shape.theta))], [(3, p) for p in parts])
+    volumes = [tag for dim, tag in solid if dim == 3]
+    if len(volumes) != 1:
+        raise InputError(f"aerofoil: joined with the platform it gives {len(volumes)} solids, expected one; "
+                         "change aerofoil.stagger or platform.length")
+    return _fillet(gmsh, volumes[0], aerofoil, shape) if aerofoil.fillet > 0 else volumes[0]
+
+
+def _fillet(gmsh: ModuleType, volume: int, aerofoil: Aerofoil, shape: Profile) -> int:
+    """Round the edge between aerofoil and platform."""
+    occ = gmsh.model.occ
+    occ.synchronize()
+    root = outline(aerofoil, shape.top, 0)
+    low, high = root.min(axis=0) - 1e-6, root.max(axis=0) + 1e-6
+    curves = [tag for _, tag in gmsh.model.getEntitiesInBoundingBox(*low, *high, dim=1)]
+    with attempt("aerofoil.fillet", "round the root of the aerofoil"):
+        solid = occ.fillet([volume], curves, [aerofoil.fillet])
+    return next(tag for dim, tag in solid if dim == 3)
+
+
+def _imprint(gmsh: ModuleType, blade: int, shape: Profile, length: float) -> int:
+    """Cut the outlines of both seats into the platform's undersides."""
+    occ = gmsh.model.occ
+    tools = []
+    for side in (-1, 1):
+        points = [occ.addPoint(*p) for p in seat(shape, length, side)]
+        lines = [occ.addLine(a, b) for a, b in zip(points, points[1:] + points[:1], strict=True)]
+        tools.append((2, occ.addPlaneSurface([occ.addCurveLoop(lines)])))
+    with attempt("damper.length", "imprint the seats on the platform"):
+        result, _ = occ.fragment([(3, blade)], tools)
+    return next(tag for dim, tag in result if dim == 3)

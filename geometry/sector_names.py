@@ -1,0 +1,128 @@
+"""Names on a wedge sector: which surface is which, which faces match, where the tip's nodes are."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from math import sin
+from types import ModuleType
+
+import numpy as np
+
+from .extract import Groups
+from .finish import Motion
+from .mesh import Mesh, Sector
+from .parameters import Aerofoil, Disc, Wedge
+from .profile import Profile, turn
+from .section import centroid, place, placement, shape
+
+__all__ = ["link", "motions", "moved", "name_faces", "refined", "seat", "sector",
+           "trailing_curves"]
+
+
+def seat(profile: Profile, length: float, side: int) -> np.ndarray:
+    """Corners (4, 3) [m] of the contact face on this blade, side +1 towards +y."""
+    (xi, yi), (xo, yo), z = profile.inner, profile.outer, length / 2
+    return np.array([[xi, side * yi, -z], [xo, side * yo, -z], [xo, side * yo, z], [xi, side * yi, z]])
+
+
+def name_faces(gmsh: ModuleType, blade: int, damper: int, aerofoil: Aerofoil, disc: Disc, wedge: Wedge,
+               profile: Profile) -> Groups:
+    """Find every named face by where its centre must be."""
+    theta, tolerance = profile.theta, 1e-6 * profile.top
+    middle = (disc.bore_radius + disc.rim_radius) / 2
+    cut = np.array([middle * np.cos(theta), middle * np.sin(theta), 0])
+    low, high = (seat(profile, wedge.length, side).mean(axis=0) for side in (-1, 1))
+    on_blade = _centres(gmsh, blade)
+    faces = {name: _at(on_blade, where, tolerance, name) for name, where in {
+        "cyclic_low": cut * [1, -1, 1], "cyclic_high": cut, "seat_left": low, "seat_right": high,
+        "clamp": np.array([disc.bore_radius * sin(theta) / theta, 0, 0])}.items()}
+    on_damper = _centres(gmsh, damper)
+    faces["damper_left"] = _at(on_damper, high, tolerance, "damper_left")
+    faces["damper_right"] = _at(on_damper, turn(2 * theta) @ low, tolerance, "damper_right")
+    faces["tip"] = [t for t, c in on_blade.items() if abs(c[0] - profile.top - aerofoil.span) < tolerance]
+    sides = [t for t, c in on_blade.items() if c[0] > profile.top + aerofoil.fillet + tolerance]
+    by_area = sorted(set(sides) - set(faces["tip"]), key=lambda t: gmsh.model.occ.getMass(2, t))
+    faces["aerofoil"], faces["trailing_edge"] = [by_area[-1]], by_area[:-1]
+    return Groups({"blade": [blade], "damper": [damper]}, faces)
+
+
+def trailing_curves(gmsh: ModuleType, groups: Groups) -> list[int]:
+    """Curves round the blunt trailing edge."""
+    faces = [(2, tag) for tag in groups.faces["trailing_edge"]]
+    return [abs(tag) for _, tag in gmsh.model.getBoundary(faces, oriented=False)]
+
+
+def _centres(gmsh: ModuleType, volume: int) -> dict[int, np.ndarray]:
+    """Centre of area of each face of a volume."""
+    faces = gmsh.model.getBoundary([(3, volume)], oriented=False)
+    return {tag: np.array(gmsh.model.occ.getCenterOfMass(2, tag)) for _, tag in faces}
+
+
+def _at(centres: dict[int, np.ndarray], where: np.ndarray, tolerance: float, name: str) -> list[int]:
+    """The one face with its centre there.
+
+    Raises:
+        ValueError: none or several.
+    """
+    found = [tag for tag, centre in centres.items() if np.linalg.norm(centre - where) < tolerance]
+    if len(found) != 1:
+        raise ValueError(f"face {name}: {len(found)} surfaces at its place, expected one")
+    return found
+
+
+def sector(count: int) -> Sector:
+    """The way to the next blade of a wheel."""
+    return Sector(count, turn(2 * np.pi / count), np.zeros(3))
+
+
+def motions(profile: Profile) -> dict[str, Motion]:
+    """Faces that match, with the motion from master to slave."""
+    on, stay, still = turn(2 * profile.theta), np.eye(3), np.zeros(3)
+    return {"cyclic": ("cyclic_low", "cyclic_high", on, still),
+            "this": ("seat_right", "damper_left", stay, still),
+            "next": ("seat_left", "damper_right", on, still)}
+
+
+def link(gmsh: ModuleType, groups: Groups, profile: Profile) -> None:
+    """Tell gmsh to copy the mesh of each master face onto its slave."""
+    for master, slave, rotation, shift in motions(profile).values():
+        affine = np.eye(4)
+        affine[:3, :3], affine[:3, 3] = rotation, shift
+        gmsh.model.mesh.setPeriodic(2, groups.faces[slave], groups.faces[master], affine.ravel().tolist())
+
+
+def refined(mesh: Mesh, aerofoil: Aerofoil, profile: Profile) -> Mesh:
+    """The mesh with the aerofoil's skin split into both sides, and with the tip's node sets.
+
+    tip_leading, tip_trailing and tip_mid are the corner nodes nearest to the ends and the middle of the camber line.
+    """
+    faces = {name: f for name, f in mesh.faces.items() if name != "aerofoil"}
+    skin = mesh.faces["aerofoil"]
+    above = _above_camber(mesh.points[skin[:, :3]].mean(axis=1), aerofoil, profile.top)
+    faces |= {"suction_side": skin[above], "pressure_side": skin[~above]}
+    line = np.array([[0, 0], [1, 0], [0.5, aerofoil.camber]])
+    wanted = place(aerofoil, profile.top, 1, line)
+    corners = np.unique(mesh.faces["tip"][:, :3])
+    nearest = [corners[[np.argmin(np.linalg.norm(mesh.points[corners] - w, axis=1))]] for w in wanted]
+    return replace(mesh, faces=faces, nodes=dict(zip(("tip_leading", "tip_trailing", "tip_mid"), nearest, strict=True)))
+
+
+def _above_camber(points: np.ndarray, aerofoil: Aerofoil, top: float) -> np.ndarray:
+    """Mask (n,) of points [m] on the suction side of the camber line of the section at their height."""
+    result = np.empty(len(points), dtype=bool)
+    for i, x in enumerate(points):
+        t = (x[0] - top) / aerofoil.span
+        origin, along, across, chord = placement(aerofoil, top, t)
+        centre = centroid(shape(aerofoil, t))
+        u, v = (x - origin) @ along / chord + centre[0], (x - origin) @ across / chord + centre[1]
+        result[i] = v > 4 * aerofoil.camber * u * (1 - u)
+    return result
+
+
+def moved(mesh: Mesh, wedge: Wedge, profile: Profile) -> Mesh:
+    """The mesh with the damper moved inwards so that both flanks clear their seats by wedge.clearance."""
+    shift = -wedge.clearance / sin(wedge.angle) * np.array([np.cos(profile.theta), np.sin(profile.theta), 0])
+    points = mesh.points.copy()
+    points[np.unique(mesh.bodies["damper"])] += shift
+    pairs = {n: replace(p, shift=p.shift + shift) if n != "cyclic" else p for n, p in mesh.pairs.items()}
+    return replace(mesh, points=points, pairs=pairs)

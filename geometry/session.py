@@ -1,0 +1,63 @@
+"""One gmsh session a build: opened, always closed, never nested, and set so that a mesh can be made twice the same."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from contextlib import contextmanager
+from types import ModuleType
+
+from bladefem.errors import InputError
+
+__all__ = ["attempt", "gmsh_session"]
+
+OPTIONS = {
+    "General.Terminal": 0,
+    "General.NumThreads": 1,            # more threads change the mesh from run to run
+    "Mesh.RandomSeed": 1,
+    "Mesh.RandomFactor": 1e-9,
+    "Mesh.RandomFactor3D": 1e-12,
+    "Mesh.Algorithm": 6,                # frontal-Delaunay
+    "Mesh.Algorithm3D": 1,              # Delaunay
+    "Mesh.MeshSizeExtendFromBoundary": 0,
+    "Mesh.MeshSizeFromPoints": 0,
+    "Mesh.Optimize": 1,
+    "Mesh.OptimizeThreshold": 0.35,
+    "Mesh.SecondOrderLinear": 0,
+}
+
+
+@contextmanager
+def gmsh_session() -> Iterator[ModuleType]:
+    """The gmsh module with a fresh model, closed on leaving.
+
+    Raises:
+        RuntimeError: a session is open already (gmsh has one global state; builds do not nest).
+    """
+    import gmsh
+
+    if gmsh.isInitialized():
+        raise RuntimeError("a gmsh session is already open; geometry builds do not nest")
+    gmsh.initialize(readConfigFiles=False, interruptible=False)
+    try:
+        for name, value in OPTIONS.items():
+            gmsh.option.setNumber(name, value)
+        gmsh.model.add("bladefem")
+        yield gmsh
+    finally:
+        gmsh.finalize()
+
+
+@contextmanager
+def attempt(parameter: str, action: str) -> Iterator[None]:
+    """Turn a failure of gmsh into one sentence that names the parameter to change.
+
+    Raises:
+        InputError: whatever gmsh raised inside the block.
+    """
+    try:
+        yield
+    except InputError:
+        raise
+    except Exception as error:              # gmsh raises bare Exception
+        reason = " ".join(str(error).split()) or "no reason given"
+        raise InputError(f"{parameter}: gmsh could not {action} ({reason}); change this parameter") from error

@@ -1,0 +1,76 @@
+"""Element sizes of a wedge sector: fine at the seats and round the edges of the aerofoil, coarser in the disc."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from types import ModuleType
+
+from .parameters import Aerofoil, Disc, MeshSize, Platform, Shank, Wedge
+from .profile import Profile
+from .section import BLUNT
+
+__all__ = ["Sizes", "sector_sizes", "set_sizes"]
+
+
+@dataclass(frozen=True)
+class Sizes:
+    """Target element sizes [m]."""
+
+    base: float         # aerofoil, platform and shank
+    contact: float      # seats and wedge
+    disc: float         # far from the platform
+    edge: float         # along the trailing edge
+    least: float        # where the surface curves most
+
+
+def sector_sizes(aerofoil: Aerofoil, platform: Platform, shank: Shank, disc: Disc, wedge: Wedge,
+                 size: MeshSize) -> Sizes:
+    """Sizes from the thinnest part of the sector where the user leaves them open."""
+    tip, root = aerofoil.thickness_tip * aerofoil.chord_tip, aerofoil.thickness_root * aerofoil.chord_root
+    base = size.size or min((tip + root) / 2, platform.thickness, shank.width / 2) * 0.6
+    contact = size.contact_size or min(base, platform.seat_width / 2, wedge.length / 6)
+    return Sizes(base, contact, max(base, min(3 * base, (disc.rim_radius - disc.bore_radius) / 3)),
+                 min(base, 4 * BLUNT * tip), base / 4)
+
+
+def set_sizes(gmsh: ModuleType, profile: Profile, wedge: Wedge, sizes: Sizes, edges: list[int]) -> None:
+    """Boxes round both seats, one for all above the rim, and elements that follow the curvature.
+
+    Args:
+        edges: curves along the trailing edge.
+    """
+    field = gmsh.model.mesh.field
+    reach = 4 * sizes.base
+    z = wedge.length / 2
+    (x_in, y_in), x_out = profile.inner, profile.outer[0]
+    boxes = [_box(field, sizes.base, sizes.disc, 5 * sizes.base, [profile.underside, 10, -10, 10, -10, 10])]
+    for low, high in ((y_in, 2 * y_in), (-2 * y_in, -y_in)):
+        boxes.append(_box(field, sizes.contact, sizes.disc, reach,
+                          [min(x_in, x_out) - wedge.base, max(x_in, x_out), low, high, -z, z]))
+    boxes.append(_near(field, edges, sizes.edge, sizes.base))
+    least = field.add("Min")
+    field.setNumbers(least, "FieldsList", boxes)
+    field.setAsBackgroundMesh(least)
+    gmsh.option.setNumber("Mesh.MeshSizeFromCurvature", 10)
+    gmsh.option.setNumber("Mesh.MeshSizeMin", min(sizes.least, sizes.contact))
+    gmsh.option.setNumber("Mesh.MeshSizeMax", sizes.disc)
+
+
+def _box(field: object, inside: float, outside: float, thickness: float, limits: list[float]) -> int:
+    tag = field.add("Box")
+    for name, value in zip(("XMin", "XMax", "YMin", "YMax", "ZMin", "ZMax"), limits, strict=True):
+        field.setNumber(tag, name, value)
+    field.setNumber(tag, "VIn", inside)
+    field.setNumber(tag, "VOut", outside)
+    field.setNumber(tag, "Thickness", thickness)
+    return tag
+
+
+def _near(field: object, curves: list[int], size: float, far: float) -> int:
+    distance, threshold = field.add("Distance"), field.add("Threshold")
+    field.setNumbers(distance, "CurvesList", curves)
+    field.setNumber(distance, "Sampling", 60)
+    for name, value in (("InField", distance), ("SizeMin", size), ("SizeMax", 10 * far), ("DistMin", size / 2),
+                        ("DistMax", 20 * far)):
+        field.setNumber(threshold, name, value)
+    return threshold
