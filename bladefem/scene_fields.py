@@ -61,16 +61,22 @@ def field_at(name: str) -> Field:
         return known[name]
     last = name.rsplit(".", 1)[-1]
     same = [k for k in known if k.rsplit(".", 1)[-1] == last]
-    tables = sorted({k.rsplit(".", 1)[0] for k in known if "." in k})
+    tables = sorted({_head(k) for k in known if "." in k})
     if name in tables:
         raise InputError(f"{name}: expected a field of this table, such as "
                          f"{next(k for k in known if k.startswith(name + '.'))}")
     if same:
         raise InputError(f"unknown key '{name}'; did you mean '{same[0]}'?")
-    near = _near(name, known)
-    inside = [k for k in known if "." in name and k.rpartition(".")[0] == name.rpartition(".")[0]]
-    tables_and_heads = [*tables, *(k for k in known if "." not in k)]
-    raise InputError(f"unknown key '{name}'{near or suggestion(name, inside or tables_and_heads)}")
+    head = _head(name)
+    if head in tables:
+        inside = [k.rpartition(".")[2] for k in known if _head(k) == head]
+        raise InputError(f"unknown key '{name}'{suggestion(last, inside)}")
+    outside = [*tables, *(k for k in known if not _head(k))]
+    raise InputError(f"unknown key '{name}'{_near(name, known) or suggestion(name, outside)}")
+
+
+def _head(name: str) -> str:
+    return name.rpartition(".")[0]
 
 
 def convert(value: object, field: Field) -> Any:
@@ -136,7 +142,8 @@ def _tuple(value: object, kinds: tuple, field: Field) -> tuple:
 def split_values(text: str) -> list[str]:
     """Single values of a text like "20, 50, 100 N", where the last unit holds for those without one."""
     items = [item.strip(" '\"") for item in text.strip("[]() ").split(",") if item.strip()]
-    unit = items[-1].lstrip("+-.0123456789eE_ ") if items else ""
+    last = items[-1] if items else ""
+    unit = last.lstrip("+-.0123456789eE_ ") if last[:1] in tuple("+-.0123456789") else ""
     return [f"{item} {unit}" if unit and item[-1] in "0123456789." else item for item in items]
 
 

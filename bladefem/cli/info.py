@@ -14,8 +14,8 @@ def facts() -> list[tuple[str, str]]:
     from ..store import versions
     rows = [("python", platform.python_version()), ("system", _system()), *versions().items()]
     rows += _solvers()
-    rows += [("BLAS", ", ".join(_loaded("openblas", "blis", "mkl", "refblas", "libblas")) or "unknown"), ("cores", str(os.cpu_count())),
-             ("OMP_NUM_THREADS", os.environ.get("OMP_NUM_THREADS", "not set"))]
+    rows += [("BLAS", ", ".join(_loaded("openblas", "blis", "mkl", "refblas", "libblas")) or "unknown"),
+             ("cores", str(os.cpu_count())), ("OMP_NUM_THREADS", os.environ.get("OMP_NUM_THREADS", "not set"))]
     return rows
 
 

@@ -1,0 +1,98 @@
+"""Bad input is refused before any work, in one sentence that names the field."""
+
+from __future__ import annotations
+
+import pytest
+
+from bladefem.errors import InputError
+from bladefem.scene import Contact, Scene
+from bladefem.scene_check import validate
+from bladefem.scene_file import load_scene, scene_of
+
+REFUSED = [
+    # unknown keys and tables
+    ("aerofoil.twits=3 deg", "unknown key 'aerofoil.twits'; did you mean 'twist'?"),
+    ("blade.twist=3 deg", "unknown key 'blade.twist'; did you mean 'aerofoil.twist'?"),
+    ("matrial.blade.E=3", "unknown key 'matrial.blade.E'; did you mean 'material.blade.E'?"),
+    ("nonsense=3", "unknown key 'nonsense'; known are"), ("aerofoil=3", "aerofoil: expected a field of this table"),
+    ("aerofoil", "expected key=value"), ("=3", "expected key=value"),
+    # units, types, ranges
+    ("damper.angle=20 mm", "'mm' is not a unit of this field, expected deg or rad"),
+    ("operation.speed=133 Hz", "expected rpm or rad/s"), ("damper.angle=90 deg", "expected 15 deg to 75 deg"),
+    ("contact.mu=nan", "finite"), ("aerofoil.span=inf", "finite"), ("contact.mu=-0.1", "expected 0 to 2"),
+    ("excitation.engine_order=6.5", "excitation.engine_order = 6.5: expected a whole number"),
+    ("excitation.engine_order=six", "expected a number"), ("disc.sectors=36 mm", "expected a plain number"),
+    ("operation.stiffening=maybe", "expected true or false"), ("contact.normal=couple", "did you mean 'coupled'?"),
+    ("model.damper=stiff", "expected one of mass, rigid, elastic"),
+    ("kind=wedge secter", "did you mean 'wedge sector'?"),
+    ("excitation.direction=1, 0", "expected 3 values"), ("study.band=100 Hz", "expected 2 values"),
+    ("study.loads=", "expected at least one value"), ("study.loads=-20 N", "expected 0 N to 100 MN"),
+    ("study.loads=20, nan N", "finite"), ("material.blade.nu=0.5", "material.blade.nu = 0.5"),
+    ("aerofoil.span=auto", "expected a number"),
+    # between fields
+    ("disc.bore_radius=250 mm", "disc.bore_radius = 250 mm: expected less than 200 mm, disc.rim_radius"),
+    ("shank.width=60 mm", "the pitch at disc.rim_radius"), ("shank.length=50 mm", "disc.width"),
+    ("disc.sectors=90", "shank.width"), ("platform.seat_width=30 mm", "platform.seat_width"),
+    ("damper.length=70 mm", "platform.length"), ("platform.length=45 mm", "aerofoil.chord_root"),
+    ("aerofoil.chord_root=90 mm", "platform.length"),
+    ("model.nodal_diameters=0, 19", "expected 0 to 18, half the number of sectors"),
+    ("study.band=200, 100 Hz", "lower frequency first"), ("excitation.direction=0, 0, 0", "expected a direction"),
+    ("plane.length=100 mm", "[plane]: a scene of kind 'wedge sector' does not use this table"),
+]
+
+
+@pytest.mark.parametrize(("override", "message"), REFUSED, ids=lambda v: str(v)[:40])
+def test_wedge_scene_refuses(override, message):
+    with pytest.raises(InputError) as refused:
+        load_scene("scenes/wedge.toml", [override])
+    assert message in str(refused.value)
+    assert "\n" not in str(refused.value)
+
+
+TOGETHER = [
+    ({"model": {"harmonics": 20, "samples": 32}}, "model.samples = 32: expected more than 40"),
+    ({"model": {"modes": 3}, "excitation": {"mode": 5}}, "excitation.mode = 5: expected at most model.modes = 3"),
+    ({"mesh": {"size": 0.001, "contact_size": 0.002}}, "mesh.contact_size"),
+    ({"kind": "plane blades", "plane": {"pitch": "40 mm"}}, "plane.platform_width"),
+    ({"kind": "plane blades", "plane": {"seat_width": "30 mm"}}, "plane.seat_width"),
+    ({"kind": "plane blades", "plane": {"platform_height": "145 mm"}}, "plane.platform_height"),
+    ({"kind": "z mass", "z_mass": {"bar": "31 mm"}}, "z_mass.bar"),
+    ({"kind": "hertz", "hertz": {"contact_radius": "20 mm"}}, "hertz.contact_radius"),
+    ({"kind": "hertz", "mesh": {"contact_size": "5 mm"}}, "mesh.contact_size"),
+    ({"kind": "punch", "punch": {"radius": "30 mm"}}, "punch.radius"),
+    ({"kind": "hertz", "operation": {"speed": 1}}, "does not use this table"),
+    ({"kind": "imported"}, "needs this table with file"),
+    ({"kind": "imported", "imported": {"file": "nowhere.msh"}}, "there is no such file"),
+    ({"kind": "imported", "imported": {"file": "nowhere.msh", "axis": [0, 0, 0]}}, "there is no such file"),
+    ({"kind": "imported", "imported": {"file": __file__, "axis": [0, 0, 0]}}, "imported.axis"),
+    ({"kind": "imported", "imported": {"file": __file__, "sectors": 2}}, "imported.sectors"),
+    ({"kind": "imported", "imported": {"file": __file__, "sectors": 8}, "model": {"nodal_diameters": [5]}}, "0 to 4"),
+    ({"aerofoil": 3}, "aerofoil = 3: expected a table [aerofoil]"),
+    ({"title": {"a": 1}}, "[title]: expected a single value"), ({"title": 3}, "expected text"),
+    ({"aerofol": {"twist": 1}}, "unknown table [aerofol]; did you mean 'aerofoil'?"),
+    ({"material": {"blad": {"E": 1}}}, "unknown table [material.blad]; did you mean 'material.blade'?"),
+    ({"study": {"loads": []}}, "expected at least one value"), ({"study": {"loads": [[1]]}}, "expected a number"),
+    ({"contact": {"mu": True}}, "expected a number"), ({"operation": {"stiffening": 1}}, "expected true or false"),
+]
+
+
+@pytest.mark.parametrize(("tables", "message"), TOGETHER, ids=lambda v: str(v)[:60])
+def test_tables_are_refused(tables, message):
+    with pytest.raises(InputError) as refused:
+        scene_of(tables)
+    assert message in str(refused.value)
+
+
+def test_scene_made_in_python_is_checked_as_well():
+    with pytest.raises(InputError, match=r"contact\.mu"):
+        validate(Scene(contact=Contact(mu=float("nan"))))
+
+
+def test_files_that_are_no_scenes(tmp_path):
+    (tmp_path / "wedge.toml").write_text("kind = \n")
+    (tmp_path / "binary.toml").write_bytes(b"\xff\xfe\x00")
+    for name, message in (("wedge.toml", "not valid TOML: .*line 1"), ("binary.toml", "cannot be read"),
+                          ("wegde.toml", "no such scene file; did you mean 'wedge'"), (".", "cannot be read"),
+                          ("nowhere/x.toml", "no such scene file")):
+        with pytest.raises(InputError, match=message):
+            load_scene(tmp_path / name)
