@@ -1,4 +1,4 @@
-"""One edge of a 2-D Coulomb element: the force turns on the circle |f| = mu N while the relative motion is a straight line.
+"""One edge of a 2-D Coulomb element: the force turns on the circle |f| = mu N along a straight motion.
 
 The path is a polygon whose edges touch the motion at the samples and whose knots lie half-way between them. Along an
 edge in slip the angle psi between force and motion obeys R psi' = -k |w'| sin psi, so that tan(psi/2) falls by a
@@ -108,7 +108,7 @@ def edge(fx, fy, dx, dy, N0, N1, mu):
 
 @njit(cache=True, inline="always")
 def sensitivity(fx, fy, dx, dy, N0, N1, mu, share):
-    """d(angle) of the slipping force at share 1 (end) or 0.5 (middle): by f0 (2), by the increment (2), by N0 and N1."""
+    """d(angle) of the slipping force at share 1 (end) or 0.5 (middle): by f0 (2), increment (2), N0 and N1."""
     R0, R1, Rm = mu * N0, mu * N1, 0.5 * mu * (N0 + N1)
     if N0 <= 0.0:
         L2 = dx * dx + dy * dy

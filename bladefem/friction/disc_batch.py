@@ -69,11 +69,11 @@ def _tangential(path, el, tab, limit, means, F, J, acc, C, rows):
     """Offsets and slip parts of the periodic tangential force; returns (cycles, negative if not periodic; slips)."""
     vx, vy, N = path
     phi = np.empty((2, 2))
-    fx, fy, events, count, done, guesses = periodic(vx, vy, N, el.mu, True, limit, phi)
-    if events == 0 and guesses > 0:         # a stuck state is not unique: take the one that marching finds
-        fx, fy, events, count, done, guesses = periodic(vx, vy, N, el.mu, False, limit, phi)
-    det = (1.0 - phi[0, 0]) * (1.0 - phi[1, 1]) - phi[0, 1] * phi[1, 0]
-    if abs(det) > 1e-9:
+    fx, fy, _, count, done, guesses = periodic(vx, vy, N, el.mu, True, limit, phi)
+    memory = abs((1.0 - phi[0, 0]) * (1.0 - phi[1, 1]) - phi[0, 1] * phi[1, 0]) < 1e-9
+    if memory and guesses > 0:              # a stuck state is not unique: take the one that marching finds
+        fx, fy, _, count, done, guesses = periodic(vx, vy, N, el.mu, False, limit, phi)
+    if not memory:
         C[:] = 0.0
         C[0, -2] = C[1, -1] = 1.0
         to_carry(C, 0, el.kt, tab.knots)

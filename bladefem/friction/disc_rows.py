@@ -1,4 +1,4 @@
-"""Running derivative of a 2-D element: rows of d(force)/d(coefficients), one period of them, and the closing of the ring.
+"""Running derivative of a 2-D element: rows of d(force)/d(coefficients) over one period.
 
 Rows have M = 3K+2 columns: normal, first and second tangential coefficients, and the force at the start of the period.
 The derivative is carried as C = D - kt V, so that C stays while an element sticks and a whole stretch of stick costs

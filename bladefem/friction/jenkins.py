@@ -65,7 +65,7 @@ def march_states(g, N, mu, state):
 
 @njit(cache=True)
 def _origin(i, state, g, N, el, at, rows):
-    """Rows (2, K) of d(f - kt w) by normal and tangential coefficients in the stick after event i; f - kt w there [N]."""
+    """Rows (2, K) of d(f - kt w) by normal and tangential coefficients in the stick after event i; f - kt w [N]."""
     S = g.size
     j = (i + 1) % S
     if state[i] != SEPARATED:
