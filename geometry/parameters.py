@@ -89,6 +89,7 @@ class Plane:
     platform_thickness: float = quantity(0.008, "m", 0.001, 0.1, "radial thickness of the platform")
     pitch: float = quantity(0.054, "m", 0.006, 0.6, "distance between two blades")
     seat_width: float = quantity(0.012, "m", 0.002, 0.2, "contact width on each platform, from its edge")
+    damper_mass: float = quantity(0.06, "kg", 1e-4, 5.0, "mass of a flat damper")
     damper_height: float = quantity(0.006, "m", 0.001, 0.1, "radial height of the flat damper")
 
 

@@ -7,11 +7,12 @@ from dataclasses import dataclass
 import numpy as np
 import scipy.sparse as sp
 
+from geometry.mesh import Mesh
+
 from ..contact.patch import port_matrix
 from ..data import Patch
 from ..errors import InputError, suggestion
 from ..scene import Excitation
-from geometry.mesh import Mesh
 
 __all__ = ["Ports", "blade_ports", "damper_ports", "named_nodes"]
 
@@ -40,7 +41,7 @@ def named_nodes(mesh: Mesh, name: str) -> np.ndarray:
 
 def blade_ports(mesh: Mesh, patches: list[Patch], excitation: Excitation) -> Ports:
     """Contact ports of all patches on the blade side, one load and one probe port along the excitation."""
-    contact = sp.hstack([port_matrix(mesh, patch, "blade") for patch in patches]) if patches else None
+    contact = port_matrix(patches, mesh, "blade") if patches else None
     nodes = named_nodes(mesh, excitation.at)
     load = _mean_displacement(mesh, nodes, np.asarray(excitation.direction, dtype=float))
     return _stack({"contact": contact, "load": load, "probe": load})
@@ -48,7 +49,7 @@ def blade_ports(mesh: Mesh, patches: list[Patch], excitation: Excitation) -> Por
 
 def damper_ports(mesh: Mesh, patches: list[Patch]) -> Ports:
     """Contact ports on the damper's side, in the same order and frames as the blade's."""
-    return _stack({"contact": sp.hstack([port_matrix(mesh, patch, "damper") for patch in patches])})
+    return _stack({"contact": port_matrix(patches, mesh, "damper")})
 
 
 def _stack(blocks: dict[str, sp.spmatrix | None]) -> Ports:
@@ -61,10 +62,11 @@ def _stack(blocks: dict[str, sp.spmatrix | None]) -> Ports:
 
 
 def _mean_displacement(mesh: Mesh, nodes: np.ndarray, direction: np.ndarray) -> sp.csc_matrix:
-    """(dim n_points, 1): the mean displacement of some nodes along a direction; as a load, one newton shared by them."""
+    """(dim n_points, 1): mean displacement of some nodes along a direction; as a load, one newton shared by them."""
     dim, size = mesh.dimension, np.linalg.norm(direction[:mesh.dimension])
     if size == 0:
-        raise InputError(f"excitation.direction: {direction.tolist()} has no part in the model's space, expected a direction")
+        raise InputError(f"excitation.direction: {direction.tolist()} is zero in the {dim} dimensions of the model, "
+                         "expected a direction")
     rows = (np.asarray(nodes)[:, None] * dim + np.arange(dim)).ravel()
     values = np.tile(direction[:dim] / size, len(nodes)) / len(nodes)
     return sp.csc_matrix((values, (rows, np.zeros_like(rows))), shape=(dim * len(mesh.points), 1))

@@ -1,0 +1,53 @@
+"""What each stage depends on, as a hash: a changed friction coefficient does not redo the mesh."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+
+from ..scene import Scene
+from ..store import code_of, key_of
+from .settings import Settings
+
+__all__ = ["contact_key", "mesh_key", "modes_key", "reduction_key", "response_key"]
+
+
+def mesh_key(scene: Scene) -> str:
+    """The mesh."""
+    shapes = (scene.aerofoil, scene.platform, scene.shank, scene.disc, replace(scene.damper, mass=None), scene.plane,
+              scene.z_mass, scene.hertz, scene.punch, scene.imported, scene.mesh)
+    return key_of(scene.kind, *shapes, code_of("geometry"), _stamp(scene))
+
+
+def _stamp(scene: Scene) -> float:
+    """An imported file counts by its time of change too."""
+    file = Path(scene.imported.file)
+    return file.stat().st_mtime if scene.kind == "imported" and file.exists() else 0.0
+
+
+def modes_key(scene: Scene) -> str:
+    """The modes without damper."""
+    return key_of(mesh_key(scene), scene.material.blade, scene.operation.speed if scene.operation.stiffening else 0.0,
+                  scene.model.nodal_diameters, code_of("bladefem.fem"))
+
+
+def contact_key(scene: Scene) -> str:
+    """The contact problem."""
+    return key_of(modes_key(scene), scene.material.damper, scene.damper.mass, scene.plane.damper_mass,
+                  code_of("bladefem.contact"))
+
+
+def reduction_key(scene: Scene, diameters: Sequence[int], modes: int) -> str:
+    """The reduced sector."""
+    return key_of(contact_key(scene), scene.excitation.at, np.array(scene.excitation.direction), scene.model.reduction,
+                  np.array(diameters), modes)
+
+
+def response_key(scene: Scene, settings: Settings, loads: Sequence[float]) -> str:
+    """The response curves."""
+    return key_of(contact_key(scene), np.array(loads), scene.contact, scene.operation, scene.excitation, scene.study,
+                  scene.accuracy, replace(settings, error=None, chosen=()), scene.model.reduction,
+                  code_of("bladefem.hbm", "bladefem.friction", "bladefem.reduction", "bladefem.study"))

@@ -1,0 +1,139 @@
+"""Forced responses for a list of damper loads, and the design curve: resonance amplitude against load."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from geometry.mesh import Mesh
+
+from ..data import Patch
+from ..errors import InputError
+from ..hbm.api import free
+from ..hbm.model import ReducedModel
+from ..hbm.resonance import free_resonances, stuck_resonances
+from ..hbm.solution import Solution
+from ..hbm.sweep import size, sweep
+from ..scene import Scene
+from .joint import LoadCase, joint_model
+from .settings import Settings
+from .stages import Reduced
+
+Progress = Callable[[Iterable[Any], str], Iterable[Any]]
+
+__all__ = ["Curve", "curve_of", "default_band", "default_loads", "free_peak", "study_loads", "summary", "unwatched"]
+
+
+def unwatched(items: Iterable[Any], label: str = "") -> Iterable[Any]:
+    """The progress display that shows nothing."""
+    return items
+
+
+@dataclass(frozen=True)
+class Curve:
+    """A frequency response; points in ascending frequency, unconverged ones included and marked."""
+
+    load: float                 # [N]
+    frequency: np.ndarray       # (k,) [Hz]
+    amplitude: np.ndarray       # (k,) root of the sum of squares of the harmonics at the probe [m]
+    first: np.ndarray           # (k,) complex first harmonic at the probe [m]
+    converged: np.ndarray       # (k,) bool
+    method: np.ndarray          # (k,) text
+    residual: np.ndarray        # (k,) relative residual of the balance
+    iterations: np.ndarray      # (k,)
+    slipping: np.ndarray        # (k,) number of elements that slip or lift off in a period
+    dissipated: np.ndarray      # (k,) friction work a period [J]
+    imbalance: np.ndarray       # (k,) |work put in - work lost| over work put in
+    peak: Solution              # the highest converged point
+
+    @property
+    def peak_frequency(self) -> float:
+        """[Hz]"""
+        return self.peak.frequency
+
+    @property
+    def peak_amplitude(self) -> float:
+        """[m]"""
+        return size(self.peak)
+
+
+def study_loads(scene: Scene, mesh: Mesh, reduced: Reduced, patches: list[Patch], cases: list[LoadCase],
+                settings: Settings, comm: Any = None, progress: Progress = unwatched) -> list[Curve]:
+    """One response curve a load case, shared over the ranks; every rank returns all of them.
+
+    Args:
+        progress: wraps the list of cases of this rank, as tqdm does; the second argument is a label.
+    """
+    rank, ranks = (comm.rank, comm.size) if comm is not None else (0, 1)
+    curves = {}
+    for i in progress(range(rank, len(cases), ranks), "forced responses"):
+        model = joint_model(scene, mesh, reduced, patches, cases[i], settings.harmonics, settings.damper)
+        curves[i] = curve_of(model, cases[i].load, scene.study.band or default_band(model, scene.excitation.mode),
+                             settings, scene.accuracy)
+    for part in comm.allgather(curves) if ranks > 1 else []:
+        curves.update(part)
+    return [curves[i] for i in range(len(cases))]
+
+
+def curve_of(model: ReducedModel, load: float, band: tuple[float, float], settings: Settings,
+             accuracy: float) -> Curve:
+    """Sweep a band [Hz] with points where the curve needs them.
+
+    Raises:
+        InputError: no point converged (the model is wrong rather than hard).
+    """
+    circular = (2 * np.pi * band[0], 2 * np.pi * band[1])
+    points = sorted(sweep(model, circular, settings.harmonics, settings.samples, peak=min(accuracy / 10, 1e-3)),
+                    key=lambda s: s.omega)
+    good = [p for p in points if p.converged]
+    if not good:
+        raise InputError(f"load {load:.4g} N: no point between {band[0]:.5g} and {band[1]:.5g} Hz was solved; "
+                         f"the first stopped because {points[0].reason}")
+    return Curve(load, *(np.array(column) for column in zip(*map(_record, points), strict=True)), max(good, key=size))
+
+
+def _record(p: Solution) -> tuple[object, ...]:
+    return (p.frequency, size(p), p.probe[1, 0], p.converged, p.method, p.residual, p.iterations,
+            p.states["slip"] + p.states["lift"], p.work.dissipated, p.work.imbalance)
+
+
+def default_band(model: ReducedModel, mode: int) -> tuple[float, float]:
+    """From a little below to a little above the resonances [Hz] of a mode with free and with sticking contacts."""
+    pair = np.array([free_resonances(model)[mode - 1], stuck_resonances(model)[mode - 1]]) / (2 * np.pi)
+    margin = max(0.02 * pair.mean(), 0.25 * np.ptp(pair))
+    return pair.min() - margin, pair.max() + margin
+
+
+def summary(curves: list[Curve], undamped: float) -> dict[str, np.ndarray]:
+    """The design table: one row a load.
+
+    Args:
+        undamped: resonance amplitude without damper [m].
+    """
+    return {
+        "load": np.array([c.load for c in curves]),
+        "peak_frequency": np.array([c.peak_frequency for c in curves]),
+        "peak_amplitude": np.array([c.peak_amplitude for c in curves]),
+        "reduction": undamped / np.array([c.peak_amplitude for c in curves]),
+        "dissipated": np.array([c.peak.work.dissipated for c in curves]),
+        "slipping": np.array([c.peak.states["slip"] + c.peak.states["lift"] for c in curves]),
+        "points": np.array([len(c.frequency) for c in curves]),
+        "unconverged": np.array([int((~c.converged).sum()) for c in curves]),
+    }
+
+
+def default_loads(scene: Scene, count: int = 8) -> tuple[float, ...]:
+    """Loads when none are given: three decades round the force at which friction can hold the excitation."""
+    held = scene.excitation.force / max(scene.contact.mu, 1e-3)
+    return tuple(float(f"{x:.2g}") for x in np.geomspace(held, 300 * held, count))
+
+
+def free_peak(model: ReducedModel, mode: int) -> tuple[float, float]:
+    """Resonance without damper: frequency [Hz] and amplitude [m] of the first harmonic at the probe."""
+    omega = free_resonances(model)[mode - 1]
+    near = omega * np.linspace(0.995, 1.005, 401)
+    heights = np.array([abs(free(model, w)[1, 0]) for w in near])
+    return near[heights.argmax()] / (2 * np.pi), float(heights.max())

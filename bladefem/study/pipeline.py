@@ -1,0 +1,187 @@
+"""From a scene to a report, stage by stage; each stage is kept in the run folder and found there by the next run."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable
+from contextlib import contextmanager
+from dataclasses import dataclass, field, replace
+from pathlib import Path
+from typing import Any
+
+from geometry.mesh import Mesh
+
+from ..contact.seat import ContactProblem
+from ..contact.seat import solve as seat
+from ..contact.stiffness import friction_elements, pair_ratio
+from ..data import ModeSet, PressureMap
+from ..errors import InputError
+from ..scene import Scene
+from ..store import stage
+from .joint import LoadCase, joint_model
+from .keys import contact_key, mesh_key, modes_key, reduction_key, response_key
+from .loads import Curve, Progress, default_loads, free_peak, study_loads, unwatched
+from .settings import Settings, choose_settings, first_settings
+from .stages import (
+    Bodies,
+    Reduced,
+    build_mesh,
+    contact_patches,
+    find_modes,
+    harmonic_diameters,
+    reduce_sector,
+    seat_damper,
+)
+
+__all__ = ["STAGES", "Response", "Run", "Seating", "run"]
+
+STAGES = ("mesh", "modes", "contact", "response", "report")
+
+
+@dataclass(frozen=True)
+class Seating:
+    """The seated damper: the condensed problem, and the pressure of each load."""
+
+    problem: ContactProblem
+    maps: dict[float, list[PressureMap]]    # mean normal load of a seat [N] to the map of each patch
+
+
+@dataclass(frozen=True)
+class Response:
+    """Forced responses and what they were made with."""
+
+    reduced: Reduced
+    settings: Settings
+    curves: list[Curve]
+    free_peak: tuple[float, float]          # resonance without damper: [Hz], [m]
+
+
+@dataclass(frozen=True)
+class Run:
+    """What a run has so far; stages after ``until`` are None."""
+
+    scene: Scene
+    folder: Path
+    mesh: Mesh
+    modes: list[ModeSet] | None = None
+    contact: Seating | None = None
+    response: Response | None = None
+    timings: dict[str, float] = field(default_factory=dict)     # stage to seconds
+    messages: list[str] = field(default_factory=list)
+
+
+def run(scene: Scene, folder: str | Path, until: str = "report", comm: Any = None,
+        progress: Progress = unwatched) -> Run:
+    """Run a scene as far as a stage, on all ranks of a communicator.
+
+    Args:
+        folder: the run folder; finished stages are picked up from it.
+        until: one of STAGES.
+        progress: wraps long loops, as tqdm does: progress(items, label).
+
+    Raises:
+        InputError: the scene cannot be run as it is; NotSolvedError: a stage found no solution.
+    """
+    clock = Clock({}, [])
+    keep = _Keeper(folder, comm, clock)
+    with clock("mesh"):
+        mesh = keep("mesh", mesh_key(scene), lambda: build_mesh(scene, comm))
+    result = Run(scene, Path(folder), mesh, timings=clock.seconds, messages=clock.messages)
+    if until == "mesh":
+        return result
+    _can_go_on(scene, mesh)
+    bodies = Bodies(scene, mesh, comm)
+    with clock("modes"):
+        result = replace(result, modes=keep("modes", modes_key(scene), lambda: find_modes(bodies)))
+    if until == "modes":
+        return result
+    patches = contact_patches(mesh)
+    with clock("contact"):
+        problem = keep("contact", contact_key(scene), lambda: seat_damper(bodies, patches))
+        loads = scene.study.loads or default_loads(scene)
+        maps = {load: seat(problem, scene.operation.speed, normal=load) for load in loads}
+        result = replace(result, contact=Seating(problem, maps))
+    if until == "contact":
+        return result
+    result = replace(result, response=_response(scene, bodies, result.contact, keep, clock, progress))
+    if until == "report":
+        from .output import write_run
+        with clock("report"):
+            write_run(result, comm)
+    return result
+
+
+@dataclass(frozen=True)
+class Clock:
+    """Seconds a stage, and what was worth saying."""
+
+    seconds: dict[str, float]
+    messages: list[str]
+
+    @contextmanager
+    def __call__(self, name: str) -> Any:
+        start = time.perf_counter()
+        try:
+            yield
+        finally:
+            self.seconds[name] = self.seconds.get(name, 0.0) + time.perf_counter() - start
+
+
+@dataclass(frozen=True)
+class _Keeper:
+    """Compute a stage or find it in the folder, and say so."""
+
+    folder: str | Path
+    comm: Any
+    clock: Clock
+
+    def __call__(self, name: str, key: str, compute: Callable[[], Any]) -> Any:
+        result, found = stage(self.folder, name, key, compute, self.comm)
+        if found:
+            self.clock.messages.append(f"{name}: found in the folder, not computed again")
+        return result
+
+
+def _response(scene: Scene, bodies: Bodies, contact: Seating, keep: _Keeper, clock: Clock,
+              progress: Progress) -> Response:
+    mesh, patches = bodies.mesh, list(contact.problem.patches)
+    settings = first_settings(scene)
+    cases = [_load_case(scene, mesh, load, maps) for load, maps in contact.maps.items()]
+    with clock("reduction"):
+        reduced = _reduced(scene, bodies, patches, settings, keep)
+    if settings.chosen:
+        with clock("choice of model"):
+            settings, reduced = choose_settings(
+                scene, settings, reduced, lambda s: _reduced(scene, bodies, patches, s, keep),
+                lambda r, s: joint_model(scene, mesh, r, patches, cases[len(cases) // 2], s.harmonics, s.damper))
+        clock.messages.append(settings.sentence())
+    with clock("response"):
+        curves = keep("response", response_key(scene, settings, list(contact.maps)),
+                      lambda: study_loads(scene, mesh, reduced, patches, cases, settings, bodies.comm, progress))
+    lost = sum(int((~c.converged).sum()) for c in curves)
+    if lost:
+        clock.messages.append(f"{lost} of {sum(len(c.frequency) for c in curves)} response points did not converge; "
+                              "they are marked in tables and pictures")
+    model = joint_model(scene, mesh, reduced, patches, cases[0], settings.harmonics, settings.damper)
+    return Response(reduced, settings, curves, free_peak(model, scene.excitation.mode))
+
+
+def _reduced(scene: Scene, bodies: Bodies, patches: list[Any], settings: Settings, keep: _Keeper) -> Reduced:
+    diameters = harmonic_diameters(scene, bodies.mesh, settings.harmonics)
+    key = reduction_key(scene, diameters, settings.modes)
+    return keep("reduction", key, lambda: reduce_sector(bodies, patches, diameters, settings.modes))
+
+
+def _load_case(scene: Scene, mesh: Mesh, load: float, maps: list[PressureMap]) -> LoadCase:
+    ratio = pair_ratio(scene.material.blade, scene.material.damper)
+    elements, selection = friction_elements(maps, scene.contact, ratio, mesh.dimension - 1)
+    return LoadCase(load, elements, selection)
+
+
+def _can_go_on(scene: Scene, mesh: Mesh) -> None:
+    """Verification scenes end with their mesh; a blade needs its clamp."""
+    if scene.kind in ("z mass", "hertz", "punch"):
+        raise InputError(f"kind '{scene.kind}' is a contact study: 'bladefem mesh' draws it, its demo computes it; "
+                         "modes and responses need a blade")
+    if "clamp" not in mesh.faces:
+        raise InputError(f"the mesh has no face 'clamp' to hold the blade; it has {', '.join(sorted(mesh.faces))}")

@@ -1,0 +1,168 @@
+"""The stages from a scene to what the balance needs: mesh, modes, seated damper, reduced sector."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from functools import cached_property
+from typing import Any
+
+from geometry.mesh import Mesh
+
+from ..contact.patch import make_patch
+from ..data import ModeSet, Patch, PortModel
+from ..errors import InputError
+from ..reduction.assemble import folded_diameter
+from ..scene import Material, Scene
+from ..store import on_root
+from .ports import blade_ports, damper_ports
+
+__all__ = ["Bodies", "Reduced", "build_mesh", "contact_patches", "find_modes", "harmonic_diameters", "is_wheel",
+           "reduce_sector", "seat_damper"]
+
+MODES_SHOWN = 10        # of each nodal diameter, in tables and pictures
+DAMPER_MODES = 16       # of the elastic damper, its six rigid ones included
+
+
+@dataclass(frozen=True)
+class Bodies:
+    """Blade and damper as finite elements, assembled and factorised when first asked for, then kept."""
+
+    scene: Scene
+    mesh: Mesh
+    comm: Any = None
+
+    @cached_property
+    def blade(self) -> Any:
+        """fem.body.Body of the blade, with the stiffness that it has under rotation."""
+        from ..fem.body import assemble
+        return assemble(self.mesh, "blade", self.scene.material.blade, self.comm)
+
+    @cached_property
+    def damper(self) -> Any:
+        """fem.flexibility.Flexibility of the floating damper."""
+        from ..fem.body import assemble
+        from ..fem.constraint import constrain
+        from ..fem.flexibility import flexible
+        return flexible(constrain(assemble(self.mesh, "damper", _damper_material(self.scene, self.mesh), self.comm),
+                                  clamp=None))
+
+    @cached_property
+    def frame(self) -> Any:
+        """fem.constraint.Transformation that serves every nodal diameter."""
+        from ..fem.constraint import transformation
+        return transformation(self.blade, "clamp", is_wheel(self.mesh))
+
+    @cached_property
+    def still(self) -> Any:
+        """fem.flexibility.Flexibility of the blade in nodal diameter 0, or clamped at its root."""
+        return self.factorised(0)
+
+    def factorised(self, diameter: int) -> Any:
+        """fem.flexibility.Flexibility of the blade in one nodal diameter."""
+        from ..fem.constraint import at_diameter
+        from ..fem.flexibility import flexible
+        return flexible(at_diameter(self.frame, diameter if is_wheel(self.mesh) else None))
+
+
+@dataclass(frozen=True)
+class Reduced:
+    """Blade and damper seen from their ports, before they are joined for an engine order."""
+
+    sector: dict[int, PortModel]    # nodal diameter to the blade's side; key 0 alone for blades clamped at the root
+    damper: PortModel               # floating: rigid modes have omega = 0
+    following: slice                # contact rows of the patch "next"
+    sectors: int                    # 0 for a row of blades without a wheel
+    mass: float                     # of the damper [kg]
+
+
+def build_mesh(scene: Scene, comm: Any = None) -> Mesh:
+    """The scene's mesh, drawn on rank 0 and the same on every rank.
+
+    Raises:
+        InputError: a parameter has to change; the message names it.
+    """
+    def draw() -> Mesh:
+        from geometry import build
+        return build(scene)
+    return on_root(comm, draw)
+
+
+def is_wheel(mesh: Mesh) -> bool:
+    """The blade is a sector of a wheel with elastic disc: it has cut faces."""
+    return "cyclic" in mesh.pairs
+
+
+def contact_patches(mesh: Mesh) -> list[Patch]:
+    """The patches of the damper: "this" on this blade's seat, "next" on the next blade's.
+
+    Raises:
+        InputError: the mesh has no such pairs of faces.
+    """
+    missing = [name for name in ("this", "next") if name not in mesh.pairs]
+    if missing:
+        raise InputError(f"the mesh has no contact pair '{missing[0]}': faces seat_right and damper_left (this), "
+                         "seat_left and damper_right (next) with matching nodes were expected")
+    return [make_patch(mesh, name) for name in ("this", "next")]
+
+
+def find_modes(bodies: Bodies, diameters: Sequence[int] | None = None, count: int = MODES_SHOWN) -> list[ModeSet]:
+    """Normal modes without damper: of the clamped blade, or of the sector in each nodal diameter.
+
+    Args:
+        diameters: nodal diameters; ``scene.model.nodal_diameters`` or all of the wheel when left out.
+        count: modes of each nodal diameter.
+    """
+    from ..fem.modes import modes
+    from ..fem.wheel import all_diameters
+    if not is_wheel(bodies.mesh):
+        return [modes(bodies.still.con, count, bodies.still)]
+    return all_diameters(bodies.blade, count, diameters or bodies.scene.model.nodal_diameters)
+
+
+def seat_damper(bodies: Bodies, patches: list[Patch]) -> Any:
+    """The contact problem of the damper between two platforms: after it, each load state costs milliseconds.
+
+    Returns:
+        contact.seat.ContactProblem, for :func:`bladefem.contact.seat.solve`.
+    """
+    from ..contact.seat import contact_problem
+    return contact_problem(bodies.mesh, patches, bodies.still, bodies.damper, bodies.scene.damper.clearance)
+
+
+def harmonic_diameters(scene: Scene, mesh: Mesh, harmonics: int) -> list[int]:
+    """Nodal diameters that harmonics 0..H of the engine order fall into, sorted; [0] for blades without a wheel."""
+    if not is_wheel(mesh):
+        return [0]
+    order, count = scene.excitation.engine_order, mesh.sector.count
+    return sorted({folded_diameter(h, order, count)[0] for h in range(harmonics + 1)})
+
+
+def reduce_sector(bodies: Bodies, patches: list[Patch], diameters: Sequence[int], modes: int) -> Reduced:
+    """Blade side in each nodal diameter and damper side, at the contact, load and probe ports.
+
+    Args:
+        patches: "this" and "next".
+        modes: modes kept in each nodal diameter.
+    """
+    from ..fem.loads import mass
+    from ..fem.ports import port_model
+    scene, mesh = bodies.scene, bodies.mesh
+    ports, other = blade_ports(mesh, patches, scene.excitation), damper_ports(mesh, patches)
+    sector = {}
+    for n in diameters:
+        flex = bodies.still if n == 0 else bodies.factorised(n)
+        sector[n] = port_model(flex.con, ports.matrix, ports.names, modes, kind=scene.model.reduction, flex=flex)
+    floating = port_model(bodies.damper.con, other.matrix, other.names, DAMPER_MODES, flex=bodies.damper)
+    first = len(patches[0].area) * mesh.dimension
+    return Reduced(sector, floating, slice(first, first + len(patches[1].area) * mesh.dimension),
+                   mesh.sector.count if is_wheel(mesh) else 0, mass(bodies.damper.con.body))
+
+
+def _damper_material(scene: Scene, mesh: Mesh) -> Material:
+    """The damper's material, its density set by the given mass where there is one."""
+    from ..fem.loads import volume
+    given = scene.plane.damper_mass if scene.kind == "plane blades" else scene.damper.mass
+    if given is None:
+        return scene.material.damper
+    return replace(scene.material.damper, rho=given / volume(mesh, "damper"))
