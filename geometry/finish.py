@@ -7,6 +7,7 @@ from types import ModuleType
 
 import numpy as np
 
+from .curving import second_order
 from .extract import Groups, extract
 from .matching import match, snap
 from .mesh import Mesh, Sector
@@ -22,8 +23,7 @@ def mesh_model(gmsh: ModuleType, groups: Groups, dimension: int, size: MeshSize)
     """Generate the mesh of the current model, raise its order, and extract it."""
     gmsh.model.mesh.generate(dimension)
     if size.order == 2:
-        gmsh.option.setNumber("Mesh.SecondOrderLinear", 0 if size.curved else 1)
-        gmsh.model.mesh.setOrder(2)
+        second_order(gmsh, size.curved)
     return extract(gmsh, groups, dimension)
 
 

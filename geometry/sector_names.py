@@ -109,14 +109,14 @@ def refined(mesh: Mesh, aerofoil: Aerofoil, profile: Profile) -> Mesh:
 
 def _above_camber(points: np.ndarray, aerofoil: Aerofoil, top: float) -> np.ndarray:
     """Mask (n,) of points [m] on the suction side of the camber line of the section at their height."""
-    result = np.empty(len(points), dtype=bool)
-    for i, x in enumerate(points):
-        t = (x[0] - top) / aerofoil.span
-        origin, along, across, chord = placement(aerofoil, top, t)
-        centre = centroid(shape(aerofoil, t))
-        u, v = (x - origin) @ along / chord + centre[0], (x - origin) @ across / chord + centre[1]
-        result[i] = v > 4 * aerofoil.camber * u * (1 - u)
-    return result
+    t = (points[:, 0] - top) / aerofoil.span
+    stations = np.linspace(0, 1, 41)
+    centres = np.array([centroid(shape(aerofoil, s)) for s in stations])
+    frames = [placement(aerofoil, top, s) for s in t]
+    away = points - np.array([frame[0] for frame in frames])
+    u, v = (np.array([a @ frame[1 + k] / frame[3] for a, frame in zip(away, frames, strict=True)])
+            + np.interp(t, stations, centres[:, k]) for k in (0, 1))
+    return v > 4 * aerofoil.camber * u * (1 - u)
 
 
 def moved(mesh: Mesh, wedge: Wedge, profile: Profile) -> Mesh:

@@ -20,9 +20,10 @@ OPTIONS = {
     "Mesh.Algorithm3D": 1,              # Delaunay
     "Mesh.MeshSizeExtendFromBoundary": 0,
     "Mesh.MeshSizeFromPoints": 0,
+    "Mesh.Renumber": 0,                 # node tags survive the change of order
     "Mesh.Optimize": 1,
     "Mesh.OptimizeThreshold": 0.35,
-    "Mesh.SecondOrderLinear": 0,
+    "Mesh.SecondOrderLinear": 1,        # curving.py moves the mid-side nodes
 }
 
 
@@ -56,8 +57,8 @@ def attempt(parameter: str, action: str) -> Iterator[None]:
     """
     try:
         yield
-    except InputError:
-        raise
-    except Exception as error:              # gmsh raises bare Exception
+    except Exception as error:
+        if type(error) is not Exception:    # gmsh raises the bare class; anything else is our own mistake
+            raise
         reason = " ".join(str(error).split()) or "no reason given"
         raise InputError(f"{parameter}: gmsh could not {action} ({reason}); change this parameter") from error
