@@ -1,0 +1,179 @@
+"""An elastic body on a distributed mesh: stiffness and mass as PETSc matrices, nodes known by the mesh's numbers."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from geometry.mesh import Mesh
+
+from ..errors import InputError, suggestion
+from ..scene import Material
+from . import shape
+from .compat import CELLS, MPI, PETSc, assemble_matrix, build_mesh, cell_dofs, dolfinx, scalar_space, ufl, vector_space
+from .loads import centrifugal, mass, surface_load, volume
+
+__all__ = ["Body", "assemble", "cells_of", "centrifugal", "lame", "mass", "rigid_modes", "surface_load", "volume"]
+
+
+@dataclass(frozen=True)
+class Body:
+    """A body assembled; the matrices know no constraint yet."""
+
+    mesh: Mesh
+    name: str                       # bodies of the mesh, joined by " + "
+    material: dict[str, Material]   # one a body
+    dim: int                        # displacement components of a node
+    K: PETSc.Mat                    # (dim*n, dim*n) [N/m], n nodes of this body, distributed, block size dim
+    M: PETSc.Mat                    # (dim*n, dim*n) [kg]
+    rows: np.ndarray                # (n_points,) PETSc block row of each mesh node, -1 outside; same on every rank
+    space: Any                      # dolfinx function space of the displacements
+    plane: str                      # "stress" or "strain", for plane meshes
+    comm: MPI.Comm
+
+    @property
+    def scalar_rows(self) -> np.ndarray:
+        """(n_points*dim,) PETSc row of each displacement in mesh numbering, -1 outside the body."""
+        rows = self.dim * self.rows[:, None] + np.arange(self.dim)
+        return np.where(self.rows[:, None] < 0, -1, rows).ravel()
+
+
+def assemble(mesh: Mesh, name: str | tuple[str, ...], material: Material | dict[str, Material],
+             comm: MPI.Comm | None = None, plane: str = "stress", quadrature: str = "exact") -> Body:
+    """Stiffness and mass of one body, or of several that share nodes.
+
+    Args:
+        name: a body of the mesh, or several.
+        material: one for all, or one a body.
+        comm: ranks that share the mesh; all of them when left out.
+        plane: "stress" or "strain" (plane meshes only); the mesh's depth multiplies both matrices.
+        quadrature: "exact" (up to the curvature of elements), or "ccx": degree 2 for both matrices, as CalculiX
+            integrates C3D10.
+
+    Raises:
+        InputError: unknown body, unknown element type, turned-over elements.
+    """
+    names = (name,) if isinstance(name, str) else tuple(name)
+    materials = material if isinstance(material, dict) else dict.fromkeys(names, material)
+    cells, used, local = _checked(mesh, names, materials)
+    comm = comm or MPI.COMM_WORLD
+    dim = mesh.dimension
+    domain, origin = build_mesh(comm, mesh.cell_type, local, mesh.points[used, :dim])
+    space = vector_space(domain, CELLS[mesh.cell_type][1])
+    owner = np.repeat(np.arange(len(names)), [len(mesh.bodies[n]) for n in names])[origin]
+    lam, mu, rho = (_piecewise(domain, values[owner])
+                    for values in np.array([lame(materials[n], dim, plane) for n in names]).T)
+    stiff, mass = _degrees(mesh, cells, quadrature)
+    u, v, depth = ufl.TrialFunction(space), ufl.TestFunction(space), _constant(domain, mesh.depth if dim == 2 else 1.0)
+    e_u, e_v = ufl.sym(ufl.grad(u)), ufl.sym(ufl.grad(v))
+    energy = depth * (lam * ufl.tr(e_u) * ufl.tr(e_v) + 2 * mu * ufl.inner(e_u, e_v))
+    K = assemble_matrix(energy * ufl.dx(metadata={"quadrature_degree": stiff}))
+    M = assemble_matrix(depth * rho * ufl.inner(u, v) * ufl.dx(metadata={"quadrature_degree": mass}))
+    rows = _rows(mesh, space, used[local], origin, comm)
+    return Body(mesh, " + ".join(names), {n: materials[n] for n in names}, dim, K, M, rows, space, plane, comm)
+
+
+def lame(material: Material, dim: int, plane: str) -> tuple[float, float, float]:
+    """Lame's lambda [Pa] (its plane-stress substitute where asked), shear modulus [Pa] and density [kg/m^3]."""
+    E, nu = material.E, material.nu
+    mu = E / (2 * (1 + nu))
+    lam = E * nu / ((1 + nu) * (1 - 2 * nu))
+    if dim == 2 and plane == "stress":
+        lam = 2 * mu * lam / (lam + 2 * mu)
+    return lam, mu, material.rho
+
+
+def cells_of(body: Body) -> np.ndarray:
+    """(nc, k) mesh node numbers of all cells of the body, gmsh's order."""
+    return np.concatenate([body.mesh.bodies[n] for n in body.material])
+
+
+def rigid_modes(body: Body) -> np.ndarray:
+    """(n_points, dim, d) translations and rotations about the body's centre; zero on other nodes. d is 3 or 6."""
+    inside = body.rows >= 0
+    x = np.where(inside[:, None], body.mesh.points - body.mesh.points[inside].mean(0), 0.0)[:, :body.dim]
+    moves = [np.where(inside[:, None], np.eye(body.dim)[i], 0.0) for i in range(body.dim)]
+    planes = [(0, 1)] if body.dim == 2 else [(1, 2), (2, 0), (0, 1)]
+    for a, b in planes:
+        turn = np.zeros_like(x)
+        turn[:, a], turn[:, b] = -x[:, b], x[:, a]
+        moves.append(turn / abs(x).max())
+    return np.stack(moves, axis=2)
+
+
+def _checked(mesh: Mesh, names: tuple[str, ...],
+             materials: dict[str, Material]) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Cells, their node numbers without gaps, and the cells in these; everything that can be wrong is found here."""
+    for n in names:
+        if n not in mesh.bodies:
+            raise InputError(f"the mesh has no body '{n}'{suggestion(n, mesh.bodies)}")
+        if n not in materials:
+            raise InputError(f"body '{n}' has no material{suggestion(n, materials)}")
+    if mesh.cell_type not in CELLS:
+        raise InputError(f"elements of type '{mesh.cell_type}' are not supported{suggestion(mesh.cell_type, CELLS)}")
+    cells = np.concatenate([mesh.bodies[n] for n in names])
+    if not np.isfinite(mesh.points[cells]).all():
+        raise InputError("the mesh has nodes whose coordinates are not finite numbers")
+    _check_jacobians(mesh, cells)
+    used, local = np.unique(cells, return_inverse=True)
+    return cells, used, local.reshape(cells.shape)
+
+
+def _check_jacobians(mesh: Mesh, cells: np.ndarray) -> None:
+    """dolfinx takes elements that are turned over in part without a word; this does not."""
+    d = mesh.dimension
+    bad = []
+    for block in np.array_split(np.arange(len(cells)), len(cells) // 5000 + 1):
+        _, tangents, _ = shape.geometry(mesh.cell_type, mesh.points[cells[block], :d], 4)
+        det = np.linalg.det(tangents)
+        bad.append(block[det.min(1) * det.max(1) <= 0])
+    bad = np.concatenate(bad)
+    if len(bad):
+        at = np.array2string(mesh.points[cells[bad[0]]].mean(0), precision=4)
+        raise InputError(f"{len(bad)} of {len(cells)} elements are turned over (the first near {at} m), "
+                         "expected positive Jacobians; straighten their edges or refine the mesh there")
+
+
+def _piecewise(domain: Any, values: np.ndarray) -> Any:
+    """One value a cell of this rank; the compiled form stays the same for every material."""
+    function = dolfinx.fem.Function(scalar_space(domain))
+    function.x.array[cell_dofs(function.function_space)[:, 0]] = values
+    return function
+
+
+def _constant(domain: Any, value: float) -> Any:
+    return dolfinx.fem.Constant(domain, float(value))
+
+
+def _degrees(mesh: Mesh, cells: np.ndarray, quadrature: str) -> tuple[int, int]:
+    """Quadrature degrees of stiffness and mass; elements with straight sides need less."""
+    if quadrature not in ("exact", "ccx"):
+        raise InputError(f"quadrature is '{quadrature}'{suggestion(quadrature, ('exact', 'ccx'))}")
+    _, degree = CELLS[mesh.cell_type]
+    if quadrature == "ccx":
+        return 2, 2
+    simplex = mesh.cell_type.startswith(("tri", "tet"))
+    if not simplex:
+        return 2 * degree, 2 * degree + 2
+    straight = degree == 1 or _straight(mesh, cells)
+    return (2 * degree - 2, 2 * degree) if straight else (4, 2 * degree + mesh.dimension * (degree - 1))
+
+
+def _straight(mesh: Mesh, cells: np.ndarray) -> bool:
+    """True where every node lies where the corners put it."""
+    k = shape.corners(mesh.cell_type)
+    linear, _ = shape.tabulate(mesh.cell_type.rstrip("0123456789"), shape.nodes(mesh.cell_type))
+    x = mesh.points[cells]
+    return bool(abs(x - np.einsum("qk,ckg->cqg", linear, x[:, :k])).max() < 1e-10 * np.ptp(mesh.points, axis=0).max())
+
+
+def _rows(mesh: Mesh, space: Any, cells: np.ndarray, origin: np.ndarray, comm: MPI.Comm) -> np.ndarray:
+    """PETSc block row of each mesh node, found through the cells: dofmap and input list the same nodes."""
+    permutation = dolfinx.cpp.io.perm_gmsh(dolfinx.cpp.mesh.to_type(CELLS[mesh.cell_type][0]), cells.shape[1])
+    blocks = cell_dofs(space).astype(np.int32)
+    rows = np.full(len(mesh.points), -1, np.int64)
+    rows[cells[origin][:, permutation].ravel()] = space.dofmap.index_map.local_to_global(blocks.ravel())
+    comm.Allreduce(MPI.IN_PLACE, rows, MPI.MAX)
+    return rows

@@ -1,0 +1,142 @@
+"""The one door to dolfinx, PETSc and SLEPc: versions 0.5 to 0.11 behind names that say what is wanted.
+
+Debian 12's dolfinx (0.5) switches ``sys.setdlopenflags`` to RTLD_GLOBAL on import and leaves it so, after which other
+wheels (h5py, vtk) resolve their symbols against the wrong libraries; the flags are put back here.
+"""
+
+from __future__ import annotations
+
+import logging
+import sys
+import time
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from ..errors import NotSolvedError
+
+_flags = sys.getdlopenflags()
+import dolfinx  # noqa: E402
+import dolfinx.fem.petsc  # noqa: E402
+import ufl  # noqa: E402
+from mpi4py import MPI  # noqa: E402
+from petsc4py import PETSc  # noqa: E402
+from slepc4py import SLEPc  # noqa: E402
+
+sys.setdlopenflags(_flags)
+
+__all__ = ["CELLS", "MPI", "PETSc", "SLEPc", "assemble_matrix", "assemble_vector", "build_mesh", "cell_dofs",
+           "compile_form", "dolfinx", "scalar_space", "ufl", "vector_space"]
+
+# meshio's word: dolfinx's cell, degree
+CELLS = {"triangle": ("triangle", 1), "triangle6": ("triangle", 2), "quad": ("quadrilateral", 1),
+         "quad9": ("quadrilateral", 2), "tetra": ("tetrahedron", 1), "tetra10": ("tetrahedron", 2),
+         "hexahedron": ("hexahedron", 1), "hexahedron27": ("hexahedron", 2)}
+
+
+def build_mesh(comm: MPI.Comm, cell_type: str, cells: np.ndarray, points: np.ndarray) -> tuple[Any, np.ndarray]:
+    """A distributed dolfinx mesh, and for each cell of this rank the row of ``cells`` that it came from.
+
+    Args:
+        cells: (nc, k) numbers into points, gmsh's order in the element, the same on every rank.
+        points: (n, gdim) [m], the same on every rank.
+    """
+    shape, degree = CELLS[cell_type]
+    permutation = dolfinx.cpp.io.perm_gmsh(dolfinx.cpp.mesh.to_type(shape), cells.shape[1])
+    mine = np.array_split(cells[:, permutation], comm.size)[comm.rank].astype(np.int64)
+    x = np.array_split(points, comm.size)[comm.rank]
+    gdim = points.shape[1]
+    if hasattr(ufl, "VectorElement"):
+        domain = ufl.Mesh(ufl.VectorElement("Lagrange", ufl.Cell(shape, geometric_dimension=gdim), degree))
+        mesh = dolfinx.mesh.create_mesh(comm, mine, x, domain)
+    else:
+        import basix.ufl
+        domain = ufl.Mesh(basix.ufl.element("Lagrange", shape, degree, shape=(gdim,)))
+        mesh = dolfinx.mesh.create_mesh(comm, cells=mine, x=np.ascontiguousarray(x), e=domain)
+    return mesh, np.asarray(mesh.topology.original_cell_index)
+
+
+def vector_space(mesh: Any, degree: int) -> Any:
+    """Continuous Lagrange vectors with as many components as the space has dimensions."""
+    gdim = mesh.geometry.dim
+    if hasattr(dolfinx.fem, "functionspace"):
+        return _patiently(lambda: dolfinx.fem.functionspace(mesh, ("Lagrange", degree, (gdim,))))
+    return _patiently(lambda: dolfinx.fem.VectorFunctionSpace(mesh, ("Lagrange", degree), dim=gdim))
+
+
+def scalar_space(mesh: Any) -> Any:
+    """One value a cell."""
+    make = getattr(dolfinx.fem, "functionspace", None) or dolfinx.fem.FunctionSpace
+    return _patiently(lambda: make(mesh, ("DG", 0)))
+
+
+def cell_dofs(space: Any) -> np.ndarray:
+    """(cells of this rank with ghosts, k) local block numbers of each cell's nodes."""
+    table = space.dofmap.list
+    index_map = space.mesh.topology.index_map(space.mesh.topology.dim)
+    rows = index_map.size_local + index_map.num_ghosts
+    return np.asarray(getattr(table, "array", table)).reshape(rows, -1)
+
+
+def compile_form(form: Any) -> Any:
+    """Compile a form, see ``_patiently``."""
+    return _patiently(lambda: dolfinx.fem.form(form))
+
+
+def _patiently(build: Callable[[], Any], patience: int = 12) -> Any:
+    """Run what may compile; a build by another process is waited for, a dead one is named.
+
+    Raises:
+        NotSolvedError: the form compiler's cache holds a build that never finished.
+    """
+    for _ in range(patience):
+        try:
+            with _quiet():
+                return build()
+        except (TimeoutError, RuntimeError) as error:
+            if "timed out" not in str(error):
+                raise
+            if not _unfinished(120.0):
+                break
+    stale = ", ".join(map(str, _unfinished(np.inf))) or "none found"
+    raise NotSolvedError("the form compiler's cache holds a build that never finished; "
+                         f"delete these files and start again: {stale}")
+
+
+def _unfinished(age: float) -> list[Path]:
+    """C files without the mark of a finished build, not older than ``age`` seconds."""
+    options = getattr(dolfinx.jit, "get_parameters", None) or dolfinx.jit.get_options
+    folder = Path(options()["cache_dir"])
+    return [c for c in folder.glob("*.c")
+            if not c.with_suffix(".c.cached").exists() and time.time() - c.stat().st_mtime <= age]
+
+
+@contextmanager
+def _quiet() -> Iterator[None]:
+    """ffcx and its compiler write to the root logger (and lower its level) in dolfinx 0.5; it warns of many points."""
+    root = logging.getLogger()
+    level, handlers = root.level, list(root.handlers)
+    logging.disable(logging.WARNING)
+    try:
+        yield
+    finally:
+        logging.disable(logging.NOTSET)
+        root.setLevel(level)
+        root.handlers[:] = handlers
+
+
+def assemble_matrix(form: Any) -> PETSc.Mat:
+    """Assembled matrix of a bilinear form, block size of its space kept."""
+    matrix = dolfinx.fem.petsc.assemble_matrix(compile_form(form))
+    matrix.assemble()
+    return matrix
+
+
+def assemble_vector(form: Any) -> PETSc.Vec:
+    """Assembled vector of a linear form, shares of neighbouring ranks added."""
+    vector = dolfinx.fem.petsc.assemble_vector(compile_form(form))
+    vector.ghostUpdate(addv=PETSc.InsertMode.ADD, mode=PETSc.ScatterMode.REVERSE)
+    return vector

@@ -1,0 +1,284 @@
+"""Clamps, ties and cyclic symmetry by an explicit transformation of the unknowns.
+
+u = T(n) q with T(n) = T0 + e^{j n theta} T1: free nodes keep their displacements, nodes of the high cut face repeat
+those of the low one, turned and shifted in phase by n theta. Then
+
+    K(n) = T(n)^H K T(n) = K0 + cos(n theta) Kc + j sin(n theta) Ks
+
+with three real sparse matrices that serve every nodal diameter n.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+import scipy.sparse as sp
+
+from geometry.mesh import Pair
+
+from ..errors import InputError, suggestion
+from .body import Body
+from .compat import PETSc
+
+__all__ = ["Constrained", "Transformation", "at_diameter", "clamped_nodes", "constrain", "expand", "restrict",
+           "transformation", "unknowns"]
+
+
+@dataclass(frozen=True)
+class Transformation:
+    """What serves every nodal diameter: the two parts of T and the projected matrices."""
+
+    body: Body
+    low: sp.csr_matrix              # T0 (n_points*dim, n_free) in mesh numbering, the same on every rank
+    high: sp.csr_matrix | None      # T1, None without cyclic symmetry
+    start: np.ndarray               # (ranks+1,) first unknown of each rank
+    K: tuple[PETSc.Mat, ...]        # (K0,) or (K0, Kc, Ks)
+    M: tuple[PETSc.Mat, ...]
+    sectors: int                    # 0 without cyclic symmetry
+
+
+@dataclass(frozen=True)
+class Constrained:
+    """A body with its constraints in one nodal diameter.
+
+    Complex pencils are stored doubled, real and imaginary part of each unknown side by side, so that the memory of a
+    complex vector is the memory of the doubled one.
+    """
+
+    body: Body
+    T: sp.csr_matrix                # (n_points*dim, n_free) real or complex, the same on every rank
+    own: slice                      # unknowns of this rank
+    K: PETSc.Mat                    # (n_free, n_free) or doubled [N/m]
+    M: PETSc.Mat                    # [kg]
+    doubled: bool
+    nodal_diameter: int | None
+
+    @property
+    def dtype(self) -> type:
+        """complex where the pencil is doubled."""
+        return complex if self.doubled else float
+
+
+def constrain(body: Body, clamp: str | None = "clamp", nodal_diameter: int | None = None,
+              ties: np.ndarray | None = None) -> Constrained:
+    """A body with its constraints, for one nodal diameter (None: no cyclic symmetry).
+
+    Args:
+        clamp: face or node set held fast; None for a floating body.
+        ties: (k, 3) node numbers, the first constrained to the mean of the two others.
+
+    Raises:
+        InputError: no such face, cut faces that do not match, a nodal diameter that the wheel does not have.
+    """
+    return at_diameter(transformation(body, clamp, nodal_diameter is not None, ties), nodal_diameter)
+
+
+def transformation(body: Body, clamp: str | None = "clamp", cyclic: bool = False,
+                   ties: np.ndarray | None = None) -> Transformation:
+    """The part of ``constrain`` that serves all nodal diameters."""
+    pair = _cyclic_pair(body) if cyclic else None
+    low, high = _parts(body, clamped_nodes(body, clamp), pair, ties)
+    low, high, start = _numbered(body, low, high)
+    T0 = _to_petsc(body, low, start)
+    if high is None:
+        return Transformation(body, low, None, start, (body.K.ptap(T0),), (body.M.ptap(T0),), 0)
+    T1 = _to_petsc(body, high, start)
+    K, M = _three(body.K, T0, T1), _three(body.M, T0, T1)
+    return Transformation(body, low, high, start, K, M, body.mesh.sector.count)
+
+
+def at_diameter(t: Transformation, nodal_diameter: int | None) -> Constrained:
+    """The constrained body in one nodal diameter, 0 <= n <= N/2."""
+    rank = t.body.comm.rank
+    own = slice(int(t.start[rank]), int(t.start[rank + 1]))
+    if nodal_diameter is None:
+        if t.high is not None:
+            raise InputError("nodal_diameter is None, expected a number: the body has cyclic faces")
+        return Constrained(t.body, t.low, own, _definite(t.K[0]), t.M[0], False, None)
+    n = _checked_diameter(nodal_diameter, t.sectors)
+    angle = 2 * np.pi * n / t.sectors
+    if 2 * n % t.sectors == 0:
+        sign = 1.0 if n == 0 else -1.0
+        K, M = (_sum(A[0], sign, A[1]) for A in (t.K, t.M))
+        return Constrained(t.body, (t.low + sign * t.high).tocsr(), own, _definite(K), M, False, n)
+    K, M = (_doubled(_sum(A[0], np.cos(angle), A[1]), A[2], np.sin(angle)) for A in (t.K, t.M))
+    T = (t.low + np.exp(1j * angle) * t.high).tocsr()
+    return Constrained(t.body, T, own, _definite(K), M, True, n)
+
+
+def clamped_nodes(body: Body, clamp: str | None) -> np.ndarray:
+    """Node numbers of a face or node set that belong to the body."""
+    if clamp is None:
+        return np.empty(0, int)
+    known = {**body.mesh.faces, **body.mesh.nodes}
+    if clamp not in known:
+        raise InputError(f"the mesh has no face or node set '{clamp}'{suggestion(clamp, known)}")
+    found = np.unique(known[clamp])
+    found = found[body.rows[found] >= 0]
+    if not len(found):
+        raise InputError(f"'{clamp}' touches no node of body '{body.name}', expected nodes to hold it by")
+    return found
+
+
+def restrict(con: Constrained, load: np.ndarray | sp.spmatrix) -> np.ndarray:
+    """T^H load: this rank's rows (n_own, k) of loads or port vectors (n_points*dim, k) in mesh numbering."""
+    T = con.T[:, con.own].conj().T.tocsr()
+    product = T @ load
+    return product.toarray() if sp.issparse(product) else np.asarray(product)
+
+
+def unknowns(con: Constrained, x: np.ndarray) -> np.ndarray:
+    """All unknowns (n_free, k) on every rank from this rank's rows (n_own, k)."""
+    parts = con.body.comm.allgather(x)
+    return np.concatenate(parts)
+
+
+def expand(con: Constrained, x: np.ndarray) -> np.ndarray:
+    """Displacements (n_points, dim, k) in mesh numbering on every rank from this rank's unknowns (n_own, k)."""
+    return (con.T @ unknowns(con, x)).reshape(len(con.body.mesh.points), con.body.dim, -1)
+
+
+def _checked_diameter(n: int, sectors: int) -> int:
+    if sectors < 1:
+        raise InputError("nodal_diameter is set, expected None: the mesh has no cyclic faces")
+    if n != int(n) or not 0 <= n <= sectors // 2:
+        raise InputError(f"nodal_diameter is {n}, expected a whole number from 0 to {sectors // 2}")
+    return int(n)
+
+
+def _cyclic_pair(body: Body) -> Pair:
+    """The matched cut faces of this body, checked."""
+    mesh = body.mesh
+    if "cyclic" not in mesh.pairs:
+        raise InputError(f"the mesh has no pair 'cyclic'{suggestion('cyclic', mesh.pairs)}")
+    if mesh.sector is None or mesh.sector.count < 2:
+        raise InputError("the mesh has no number of sectors, expected at least 2 for cyclic symmetry")
+    pair = mesh.pairs["cyclic"]
+    low, high = pair.nodes[:, body.rows[pair.nodes[0]] >= 0]
+    for side, nodes in ((pair.master, low), (pair.slave, high)):
+        face = np.unique(mesh.faces.get(side, nodes))
+        missing = np.setdiff1d(face[body.rows[face] >= 0], nodes)
+        if len(missing):
+            raise InputError(f"face '{side}' has {len(missing)} nodes without a partner, the first at "
+                             f"{mesh.points[missing[0]].round(6)} m; mesh the cut faces periodically")
+    _check_match(mesh.points, low, high, pair)
+    return Pair(pair.master, pair.slave, np.stack([low, high]), pair.rotation, pair.shift)
+
+
+def _check_match(points: np.ndarray, low: np.ndarray, high: np.ndarray, pair: Pair) -> None:
+    """Partners must coincide under the motion, to a tolerance that scales with the distance between nodes."""
+    error = np.linalg.norm(points[low] @ pair.rotation.T + pair.shift - points[high], axis=1)
+    tolerance = 1e-6 * np.ptp(points[low], axis=0).max() / max(np.sqrt(len(low)), 1)
+    worst = int(error.argmax())
+    if error[worst] > tolerance:
+        raise InputError(f"faces '{pair.master}' and '{pair.slave}' do not match: nodes {low[worst]} at "
+                         f"{points[low[worst]].round(6)} m and {high[worst]} at {points[high[worst]].round(6)} m are "
+                         f"{error[worst]:.2e} m apart after the rotation, expected at most {tolerance:.1e} m")
+    if np.intersect1d(low, high).size:
+        raise InputError("the cut faces share nodes (a solid hub on the axis), expected a bore")
+
+
+def _parts(body: Body, clamped: np.ndarray, pair: Pair | None,
+           ties: np.ndarray | None) -> tuple[sp.csr_matrix, sp.csr_matrix | None]:
+    """T0 and T1 on all nodes' displacements; columns of dependent nodes stay empty."""
+    n, d = len(body.mesh.points), body.dim
+    clamped = _with_partners(clamped, pair)
+    free = body.rows >= 0
+    free[clamped] = False
+    slaves = np.empty(0, int) if pair is None else pair.nodes[1]
+    keep = free.copy()
+    keep[slaves] = False
+    low = sp.diags(np.repeat(keep, d).astype(float)).tocsr()
+    high = None
+    if pair is not None:
+        alive = free[slaves]
+        rows, cols = pair.nodes[1][alive], pair.nodes[0][alive]
+        block = sp.coo_matrix((np.ones(len(rows)), (rows, cols)), shape=(n, n))
+        high = sp.kron(block, pair.rotation[:d, :d]).tocsr()
+    if ties is not None and len(ties):
+        tie = _tied(n, d, np.asarray(ties))
+        low, high = (A if A is None else (tie @ A @ tie).tocsr() for A in (low, high))
+    return low, high
+
+
+def _with_partners(clamped: np.ndarray, pair: Pair | None) -> np.ndarray:
+    """A node held on one cut face is held on the other."""
+    if pair is None:
+        return clamped
+    held = np.isin(pair.nodes[0], clamped) | np.isin(pair.nodes[1], clamped)
+    return np.union1d(clamped, pair.nodes[:, held].ravel())
+
+
+def _tied(n: int, d: int, ties: np.ndarray) -> sp.csr_matrix:
+    """Identity, but tied nodes are the mean of two others."""
+    keep = np.ones(n)
+    keep[ties[:, 0]] = 0
+    half = sp.coo_matrix((np.full(2 * len(ties), 0.5), (np.repeat(ties[:, 0], 2), ties[:, 1:].ravel())), shape=(n, n))
+    return sp.kron(sp.diags(keep) + half, sp.identity(d)).tocsr()
+
+
+def _numbered(body: Body, low: sp.csr_matrix, high: sp.csr_matrix | None
+              ) -> tuple[sp.csr_matrix, sp.csr_matrix | None, np.ndarray]:
+    """Drop empty columns; number the others by their PETSc row, so that an unknown lives where its node lives."""
+    used = abs(low).sum(0) if high is None else abs(low).sum(0) + abs(high).sum(0)
+    columns = np.flatnonzero(np.asarray(used).ravel())
+    rows = body.scalar_rows[columns]
+    order = np.argsort(rows)
+    columns, rows = columns[order], rows[order]
+    start = np.searchsorted(rows, body.K.owner_ranges if body.comm.size > 1 else [0, body.K.size[0]])
+    if not len(columns):
+        raise InputError(f"body '{body.name}' has no free node left, expected a smaller clamp")
+    cut = (A if A is None else A[:, columns].tocsr() for A in (low, high))
+    return *cut, np.asarray(start, int)
+
+
+def _to_petsc(body: Body, T: sp.csr_matrix, start: np.ndarray) -> PETSc.Mat:
+    """Rows of T that this rank owns, in PETSc's row order."""
+    first, last = body.K.owner_range
+    rank = body.comm.rank
+    nodes = np.argsort(body.scalar_rows, kind="stable")
+    nodes = nodes[np.count_nonzero(body.scalar_rows < 0):][first:last]
+    mine = T[nodes]
+    mine.sum_duplicates()
+    size = ((last - first, body.K.size[0]), (int(start[rank + 1] - start[rank]), T.shape[1]))
+    matrix = PETSc.Mat().createAIJ(size, csr=(mine.indptr.astype(PETSc.IntType), mine.indices.astype(PETSc.IntType),
+                                              mine.data), comm=body.comm)
+    matrix.assemble()
+    return matrix
+
+
+def _three(A: PETSc.Mat, T0: PETSc.Mat, T1: PETSc.Mat) -> tuple[PETSc.Mat, PETSc.Mat, PETSc.Mat]:
+    """K0, Kc and Ks."""
+    cross = T0.transposeMatMult(A.matMult(T1))
+    turned = cross.duplicate(copy=True)
+    turned.transpose()
+    K0 = _sum(A.ptap(T0), 1.0, A.ptap(T1))
+    return K0, _sum(cross, 1.0, turned), _sum(cross, -1.0, turned)
+
+
+def _sum(A: PETSc.Mat, factor: float, B: PETSc.Mat) -> PETSc.Mat:
+    """A + factor B as a new matrix."""
+    out = A.duplicate(copy=True)
+    out.axpy(factor, B, structure=PETSc.Mat.Structure.DIFFERENT_NONZERO_PATTERN)
+    return out
+
+
+def _doubled(A: PETSc.Mat, B: PETSc.Mat, factor: float) -> PETSc.Mat:
+    """The real twin of A + j factor B, parts interleaved: kron(A, I) + kron(factor B, [0 -1; 1 0])."""
+    def local(X: PETSc.Mat) -> sp.csr_matrix:
+        indptr, indices, data = X.getValuesCSR()
+        return sp.csr_matrix((data, indices, indptr), shape=(len(indptr) - 1, X.size[1]))
+    twin = sp.kron(local(A), np.eye(2), "csr") + factor * sp.kron(local(B), np.array([[0.0, -1.0], [1.0, 0.0]]), "csr")
+    twin.sum_duplicates()
+    (n, N), _ = A.sizes
+    out = PETSc.Mat().createAIJ(((2 * n, 2 * N), (2 * n, 2 * N)), comm=A.comm, csr=(
+        twin.indptr.astype(PETSc.IntType), twin.indices.astype(PETSc.IntType), twin.data))
+    out.assemble()
+    return out
+
+
+def _definite(A: PETSc.Mat) -> PETSc.Mat:
+    """Mark as symmetric."""
+    A.setOption(PETSc.Mat.Option.SYMMETRIC, True)
+    return A

@@ -1,0 +1,103 @@
+"""The static flexibility K^+ of a constrained body, also where the body can still move rigidly.
+
+Rigid motions R (M-orthonormal) are found exactly from geometry. A floating body is propped by springs at as many
+freedoms as it has rigid motions: loads without a resultant leave such a statically determinate support without force,
+so for them (K + C)^-1 is exact whatever the stiffness of the springs.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.linalg import qr
+
+from .body import rigid_modes
+from .compat import PETSc
+from .constraint import Constrained, unknowns
+from .linalg import Factor, apply, dot, factorise, solve
+
+__all__ = ["Flexibility", "compliance", "flexible", "rigid_basis"]
+
+
+@dataclass(frozen=True)
+class Flexibility:
+    """K^+ of a constrained body as one factorisation."""
+
+    con: Constrained
+    factor: Factor                  # of K, or of K with props
+    R: np.ndarray                   # (n_own, r) rigid motions, M-orthonormal
+    MR: np.ndarray                  # (n_own, r)
+
+
+def flexible(con: Constrained, prop: float = 1.0) -> Flexibility:
+    """Factorise K for modes, reduction and contact alike.
+
+    Args:
+        prop: stiffness of the props over the mean diagonal of K; floating bodies only, without influence.
+
+    Raises:
+        NotSolvedError: from MUMPS.
+    """
+    R = rigid_basis(con)
+    MR = apply(con.M, R, con.doubled) if R.shape[1] else R
+    K = _propped(con, R, prop) if R.shape[1] else con.K
+    return Flexibility(con, factorise(K, True, con.doubled), R, MR)
+
+
+def compliance(flex: Flexibility, B: np.ndarray) -> np.ndarray:
+    """K^+ B (n_own, k): loads without their rigid part give displacements without theirs."""
+    if not flex.R.shape[1]:
+        return solve(flex.factor, B)
+    comm = flex.con.body.comm
+    X = solve(flex.factor, B - flex.MR @ dot(comm, flex.R, B))
+    return X - flex.R @ dot(comm, flex.MR, X)
+
+
+def rigid_basis(con: Constrained) -> np.ndarray:
+    """(n_own, r) M-orthonormal rigid motions that clamp and cyclic symmetry allow; r = 0 for a held body.
+
+    A combination R c is allowed when it is T times its own values at the unknowns: c is in the null space of
+    R - T R_unknowns.
+    """
+    body = con.body
+    R = rigid_modes(body).reshape(con.T.shape[0], -1).astype(con.dtype)
+    weight = np.asarray(abs(con.T).max(1).todense()).ravel() > 0
+    inside = np.repeat(body.rows >= 0, body.dim)
+    columns = _columns(con)
+    q = R[columns]
+    _, s, vh = np.linalg.svd((R - con.T @ q)[inside | weight], full_matrices=False)
+    null = vh[s < 1e-8 * np.linalg.norm(R, 2)].conj().T
+    basis = (q @ null)[con.own]
+    if not basis.shape[1]:
+        return basis
+    gram = dot(body.comm, basis, apply(con.M, basis, con.doubled))
+    return basis @ np.linalg.inv(np.linalg.cholesky(gram)).conj().T
+
+
+def _columns(con: Constrained) -> np.ndarray:
+    """Mesh-numbered freedom that each unknown is the value of."""
+    T = con.T.tocoo()
+    single = np.flatnonzero(np.diff(con.T.indptr) == 1)
+    unit = np.isin(T.row, single) & (T.data == 1)
+    columns = np.full(con.T.shape[1], -1)
+    columns[T.col[unit]] = T.row[unit]
+    return columns
+
+
+def _propped(con: Constrained, R: np.ndarray, prop: float) -> PETSc.Mat:
+    """K with springs at the freedoms that hold the rigid motions best (pivoted QR)."""
+    everywhere = unknowns(con, R)
+    places = qr(everywhere.conj().T, mode="r", pivoting=True)[1][:R.shape[1]]
+    K = con.K.duplicate(copy=True)
+    diagonal = con.K.getDiagonal()
+    stiffness = prop * diagonal.sum() / diagonal.size
+    first = con.own.start
+    diagonal.set(0.0)
+    for p in places[(places >= first) & (places < con.own.stop)] - first:
+        diagonal.array[2 * p:2 * p + 2] = stiffness if con.doubled else 0.0
+        if not con.doubled:
+            diagonal.array[p] = stiffness
+    K.setDiagonal(diagonal, addv=PETSc.InsertMode.ADD_VALUES)
+    K.assemble()
+    return K

@@ -1,0 +1,131 @@
+"""Volumes and load vectors by quadrature in NumPy, in mesh numbering, the same on every rank."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+import scipy.sparse as sp
+
+from geometry.mesh import Mesh
+
+from ..errors import InputError, suggestion
+from . import shape
+
+if TYPE_CHECKING:
+    from .body import Body
+
+__all__ = ["centrifugal", "face_areas", "mass", "surface_load", "volume"]
+
+
+def volume(mesh: Mesh, name: str) -> float:
+    """Volume of a body [m^3], plane meshes with their depth.
+
+    Raises:
+        InputError: the mesh has no such body.
+    """
+    if name not in mesh.bodies:
+        raise InputError(f"the mesh has no body '{name}'{suggestion(name, mesh.bodies)}")
+    _, weight, _ = _measure(mesh, mesh.bodies[name], 6)
+    return float(weight.sum())
+
+
+def mass(body: Body) -> float:
+    """Mass of a body [kg]."""
+    return sum(material.rho * volume(body.mesh, name) for name, material in body.material.items())
+
+
+def centrifugal(body: Body, speed: float, axis: tuple[float, float, float] = (0.0, 0.0, 1.0),
+                centre: tuple[float, float, float] = (0.0, 0.0, 0.0)) -> np.ndarray:
+    """(n_points*dim,) consistent nodal forces [N] of a steady rotation.
+
+    Args:
+        speed: [rad/s].
+        axis, centre: direction of the axis and a point on it [m].
+    """
+    unit = np.asarray(axis, float) / np.linalg.norm(axis)
+    across = np.eye(3) - np.outer(unit, unit)
+    force = np.zeros((len(body.mesh.points), body.dim))
+    for name, material in body.material.items():
+        cells = body.mesh.bodies[name]
+        values, weight, x = _measure(body.mesh, cells, 8)
+        field = ((x - centre) @ across)[:, :, :body.dim] * (material.rho * speed ** 2)
+        np.add.at(force, cells, np.einsum("qk,cq,cqd->ckd", values, weight, field))
+    return force.ravel()
+
+
+def surface_load(body: Body, face: str, traction: tuple[float, ...] | np.ndarray | None = None,
+                 pressure: float | None = None) -> np.ndarray:
+    """(n_points*dim,) consistent nodal forces [N] on a named face.
+
+    Args:
+        traction: (dim,) force for each unit of area [Pa].
+        pressure: [Pa], positive towards the body.
+
+    Raises:
+        InputError: no such face, or not exactly one of traction and pressure given.
+    """
+    if (traction is None) == (pressure is None):
+        raise InputError("surface_load needs traction or pressure, expected exactly one of them")
+    facets = _facets(body, face)
+    d = body.dim
+    kind = shape.FACET_OF[body.mesh.cell_type]
+    values, tangents, w = shape.geometry(kind, body.mesh.points[facets][:, :, :d], 8)
+    normal = _outward(body, facets, _normals(tangents))
+    depth = body.mesh.depth if d == 2 else 1.0
+    if traction is not None:
+        field = np.linalg.norm(normal, axis=2)[:, :, None] * np.asarray(traction, float)[:d]
+    else:
+        field = -pressure * normal
+    force = np.zeros((len(body.mesh.points), d))
+    np.add.at(force, facets, depth * np.einsum("qk,q,cqd->ckd", values, w, field))
+    return force.ravel()
+
+
+def face_areas(body: Body, face: str) -> np.ndarray:
+    """(n_points,) integral of each node's shape function over a face [m^2]."""
+    traction = np.eye(body.dim)[0]
+    return surface_load(body, face, traction=traction).reshape(-1, body.dim)[:, 0]
+
+
+def _measure(mesh: Mesh, cells: np.ndarray, degree: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Shape values (q, k), volumes (nc, q) and places (nc, q, 3) of the quadrature points."""
+    d = mesh.dimension
+    values, tangents, w = shape.geometry(mesh.cell_type, mesh.points[cells][:, :, :d], degree)
+    weight = np.abs(np.linalg.det(tangents)) * w * (mesh.depth if d == 2 else 1.0)
+    return values, weight, np.einsum("qk,ckg->cqg", values, mesh.points[cells])
+
+
+def _facets(body: Body, face: str) -> np.ndarray:
+    faces = body.mesh.faces
+    if face not in faces:
+        raise InputError(f"the mesh has no face '{face}'{suggestion(face, faces)}")
+    facets = faces[face][(body.rows[faces[face]] >= 0).all(1)]
+    if not len(facets):
+        raise InputError(f"face '{face}' does not lie on body '{body.name}'")
+    return facets
+
+
+def _normals(tangents: np.ndarray) -> np.ndarray:
+    """(nf, q, d) normals with the length of the surface element."""
+    if tangents.shape[3] == 1:
+        t = tangents[..., 0]
+        return np.stack([t[..., 1], -t[..., 0]], axis=-1)
+    return np.cross(tangents[..., 0], tangents[..., 1])
+
+
+def _outward(body: Body, facets: np.ndarray, normal: np.ndarray) -> np.ndarray:
+    """Normals pointed away from the cell behind each facet."""
+    mesh, d = body.mesh, body.dim
+    cells = np.concatenate([mesh.bodies[n] for n in body.material])
+    corner = facets[:, :shape.corners(shape.FACET_OF[mesh.cell_type])]
+    shared = _incidence(corner, len(mesh.points)) @ _incidence(cells, len(mesh.points)).T
+    behind = np.asarray(shared.argmax(axis=1)).ravel()
+    inward = mesh.points[cells[behind]].mean(1) - mesh.points[corner].mean(1)
+    side = np.einsum("cd,cd->c", normal.mean(1), inward[:, :d])
+    return normal * -np.sign(side)[:, None, None]
+
+
+def _incidence(cells: np.ndarray, n: int) -> sp.csr_matrix:
+    rows = np.repeat(np.arange(len(cells)), cells.shape[1])
+    return sp.csr_matrix((np.ones(cells.size), (rows, cells.ravel())), shape=(len(cells), n))

@@ -1,0 +1,187 @@
+"""Normal modes by a shift-inverted block Lanczos iteration on complex vectors.
+
+The doubled pencil of a complex nodal diameter holds each eigenvalue twice and a Krylov method may return one of a pair
+only; here the iteration itself runs in complex arithmetic (the memory of a complex vector is that of the doubled one),
+so there is nothing to sort out. Blocks catch multiple eigenvalues, full reorthogonalisation keeps ghosts away, and the
+inertia of K - s M proves the count on demand. SLEPc solves the same pencil in ``slepc_modes``.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from scipy.linalg import eigh
+
+from ..data import ModeSet
+from ..errors import InputError, NotSolvedError
+from .compat import PETSc
+from .constraint import Constrained, expand, restrict
+from .flexibility import Flexibility, compliance, flexible
+from .linalg import apply, dot, inertia
+
+__all__ = ["canonical", "certificate", "count_below", "elastic_pairs", "mode_set", "modes", "pairs"]
+
+BLOCK = 8
+
+
+def modes(con: Constrained, count: int, flex: Flexibility | None = None, tolerance: float = 1e-10,
+          prove: bool = False) -> ModeSet:
+    """The lowest modes, rigid ones included, mass-normalised over the body (one sector of a wheel).
+
+    Args:
+        flex: factorisation to use again.
+        tolerance: largest error of an eigenvector's direction in the M-norm.
+        prove: count the eigenvalues by the inertia of one more factorisation.
+
+    Raises:
+        InputError: count is not positive.
+        NotSolvedError: no convergence; a lost mode (with ``prove``).
+    """
+    if count < 1:
+        raise InputError(f"count is {count}, expected at least 1 mode")
+    flex = flex or flexible(con)
+    lam, X = pairs(flex, count, tolerance)
+    if prove:
+        _prove(con, lam)
+    return mode_set(con, lam, X)
+
+
+def pairs(flex: Flexibility, count: int, tolerance: float = 1e-10) -> tuple[np.ndarray, np.ndarray]:
+    """(m,) eigenvalues [rad^2/s^2] and this rank's (n_own, m) M-orthonormal vectors, rigid motions first."""
+    r = min(flex.R.shape[1], count)
+    if r == count:
+        return np.zeros(r), flex.R[:, :r]
+    lam, X = elastic_pairs(flex, count - r, tolerance)
+    return np.concatenate([np.zeros(r), lam]), np.concatenate([flex.R[:, :r], X], axis=1)
+
+
+def mode_set(con: Constrained, lam: np.ndarray, X: np.ndarray) -> ModeSet:
+    """Modes with a certificate, in mesh numbering, in a basis and phase that do not depend on the ranks."""
+    X = canonical(con, lam, X)
+    residuals = certificate(con, lam, X)
+    shapes = expand(con, X).transpose(2, 0, 1)
+    if con.body.dim == 2:
+        shapes = np.concatenate([shapes, np.zeros_like(shapes[:, :, :1])], axis=2)
+    return ModeSet(np.sqrt(np.maximum(lam, 0)) / (2 * np.pi), shapes, con.nodal_diameter, residuals)
+
+
+def certificate(con: Constrained, lam: np.ndarray, X: np.ndarray) -> np.ndarray:
+    """(m,) |K x - lambda M x| / |K x|; for rigid motions |K x| over the largest |K x| of the set."""
+    if not X.shape[1]:
+        return np.zeros(0)
+    KX, comm = apply(con.K, X, con.doubled), con.body.comm
+    error = _norms(comm, KX - apply(con.M, X, con.doubled) * lam)
+    size = _norms(comm, KX)
+    scale = _norms(comm, np.abs(KX)).max() if (lam > 0).any() else _stiffness(con, X)
+    return error / np.where(lam > 0, size, scale)
+
+
+def _stiffness(con: Constrained, X: np.ndarray) -> float:
+    """A force to measure |K x| of rigid motions by."""
+    return con.K.norm(PETSc.NormType.INFINITY) * _norms(con.body.comm, X).max()
+
+
+def elastic_pairs(flex: Flexibility, count: int, tolerance: float,
+                  inverse: object = None) -> tuple[np.ndarray, np.ndarray]:
+    """The lowest elastic eigenpairs of K x = lambda M x: block Lanczos on K^+ M.
+
+    Args:
+        inverse: a function (n_own, k) -> (n_own, k) in place of K^+ (fixed interfaces).
+
+    Raises:
+        NotSolvedError: the space is exhausted before enough pairs converged.
+    """
+    con, comm = flex.con, flex.con.body.comm
+    inverse = inverse or (lambda B: compliance(flex, B))
+    V = MV = np.zeros((con.own.stop - con.own.start, 0), con.dtype)
+    H = np.zeros((0, 0), con.dtype)
+    block = inverse(_start(con, max(BLOCK, 2)))
+    while True:
+        block, Mblock, tail = _orthonormal(con, V, MV, block)
+        if V.shape[1]:
+            theta, S = eigh(H)
+            theta, S = theta[::-1], S[:, ::-1]
+            k = min(count, len(theta))
+            error = np.linalg.norm(tail @ S[len(S) - tail.shape[1]:, :k], axis=0) / theta[:k]
+            if (k == count and error.max() < tolerance) or not block.shape[1]:
+                return _finish(V, S[:, :k], theta[:k], count)
+        V, MV = np.concatenate([V, block], axis=1), np.concatenate([MV, Mblock], axis=1)
+        width = block.shape[1]
+        block = inverse(Mblock)
+        new = dot(comm, MV, block)
+        H = np.block([[H, new[:-width]], [new[:-width].conj().T, (new[-width:] + new[-width:].conj().T) / 2]])
+
+
+def _finish(V: np.ndarray, S: np.ndarray, theta: np.ndarray, count: int) -> tuple[np.ndarray, np.ndarray]:
+    if len(theta) < count:
+        raise NotSolvedError(f"{count} modes were asked of a body with {len(theta)} elastic ones")
+    return 1 / theta, V @ S
+
+
+def _start(con: Constrained, width: int) -> np.ndarray:
+    """Random loads, a function of mesh node numbers only: the same for any number of ranks."""
+    return restrict(con, _probe(con, width))
+
+
+def _probe(con: Constrained, width: int) -> np.ndarray:
+    return np.random.default_rng(20).standard_normal((con.T.shape[0], width))
+
+
+def _orthonormal(con: Constrained, V: np.ndarray, MV: np.ndarray,
+                 W: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """W made M-orthogonal to V and M-orthonormal in itself: basis, M basis, and coefficients (new, old)."""
+    comm = con.body.comm
+    size = None
+    back = np.eye(W.shape[1], dtype=con.dtype)
+    for _ in range(3):
+        if V.shape[1]:
+            W = W - V @ dot(comm, MV, W)
+        MW = apply(con.M, W, con.doubled)
+        gram = dot(comm, W, MW)
+        size = np.sqrt(np.maximum(gram.diagonal().real, 0)).max() if size is None else size
+        values, Q = np.linalg.eigh((gram + gram.conj().T) / 2)
+        good = values > (1e-13 * max(size, 1e-300)) ** 2 if size != 1.0 else values > 0.25
+        scale = np.sqrt(values[good])
+        W, MW = W @ (Q[:, good] / scale), MW @ (Q[:, good] / scale)
+        back = (Q[:, good] * scale).conj().T @ back
+        size = 1.0
+    return W, MW, back
+
+
+def canonical(con: Constrained, lam: np.ndarray, X: np.ndarray) -> np.ndarray:
+    """Bases of (nearly) multiple eigenvalues and phases of single ones, fixed by projecting given vectors."""
+    if not len(lam):
+        return X
+    W = restrict(con, _probe(con, len(lam)))
+    X = X.copy()
+    breaks = np.flatnonzero(np.diff(lam) > 1e-7 * lam[1:]) + 1
+    for group in np.split(np.arange(len(lam)), breaks):
+        Q, R = np.linalg.qr(dot(con.body.comm, X[:, group], W[:, :len(group)]))
+        phase = R.diagonal() / np.abs(R.diagonal())
+        X[:, group] = X[:, group] @ (Q * phase)
+    return X
+
+
+def count_below(con: Constrained, lam: float) -> int:
+    """Number of eigenvalues below lam [rad^2/s^2], by Sylvester's law of inertia."""
+    shifted = con.K.duplicate(copy=True)
+    shifted.axpy(-lam, con.M, structure=PETSc.Mat.Structure.DIFFERENT_NONZERO_PATTERN)
+    return inertia(shifted, con.doubled)
+
+
+def _prove(con: Constrained, lam: np.ndarray) -> None:
+    """Compare the number of modes with the inertia at a shift in the widest gap of the upper half."""
+    if len(lam) < 2:
+        upper, expected = lam[-1] * 1.0001, len(lam)
+    else:
+        half = max(len(lam) // 2, 1)
+        gap = half + int(np.argmax(np.diff(lam[half - 1:]) / lam[half:]))
+        upper, expected = (lam[gap - 1] + lam[gap]) / 2, gap
+    found = count_below(con, upper)
+    if found != expected:
+        raise NotSolvedError(f"{expected} modes were found below {np.sqrt(upper) / (2 * np.pi):.6g} Hz, "
+                             f"the inertia counts {found}")
+
+
+def _norms(comm: object, X: np.ndarray) -> np.ndarray:
+    squares = (np.abs(X) ** 2).sum(0)
+    return np.sqrt(comm.allreduce(squares) if comm.size > 1 else squares)

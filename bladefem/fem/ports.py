@@ -1,0 +1,113 @@
+"""A linear body seen from its ports: free modes and residual flexibility (Rubin), or Craig-Bampton.
+
+Both come from the one factorisation that also gives the modes.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+import scipy.sparse as sp
+from scipy.linalg import eigh
+
+from ..data import PortModel
+from ..errors import InputError, suggestion
+from .constraint import Constrained, restrict
+from .flexibility import Flexibility, compliance, flexible
+from .linalg import apply, dot
+from .modes import canonical, elastic_pairs, pairs
+
+__all__ = ["flexibility", "port_model"]
+
+KINDS = ("rubin", "craig-bampton")
+
+
+def port_model(con: Constrained, P: sp.spmatrix, names: dict[str, slice], count: int,
+               static_load: np.ndarray | None = None, kind: str = "rubin",
+               flex: Flexibility | None = None) -> PortModel:
+    """Reduce a constrained body to its ports.
+
+    Args:
+        P: (n_points*dim, p) port vectors in mesh numbering, real: displacements P^T u, forces P f.
+        names: slices of the p ports.
+        count: modes kept, rigid ones included.
+        static_load: (n_points*dim,) [N], its displacement at the ports is the static offset.
+        kind: "rubin" or "craig-bampton" (count is then the number of fixed-interface modes).
+        flex: factorisation to use again.
+
+    Raises:
+        InputError: P does not fit the mesh, or knows no such kind.
+        NotSolvedError: from the factorisation or the modes.
+    """
+    if kind not in KINDS:
+        raise InputError(f"reduction is '{kind}'{suggestion(kind, KINDS)}")
+    F = _restricted(con, P)
+    flex = flex or flexible(con)
+    columns = F if static_load is None else np.concatenate([F, restrict(con, static_load.reshape(-1, 1))], axis=1)
+    X = compliance(flex, columns)
+    offset = None if static_load is None else dot(con.body.comm, F, X[:, F.shape[1]:])[:, 0].real
+    X = X[:, :F.shape[1]]
+    reduce = _rubin if kind == "rubin" else _craig_bampton
+    omega, shapes, residual = reduce(flex, F, X, count)
+    return PortModel(omega, shapes, residual, names, con.nodal_diameter, offset)
+
+
+def flexibility(con: Constrained, P: sp.spmatrix, flex: Flexibility | None = None) -> np.ndarray:
+    """(p, p) static flexibility P^T T K^+ T^H P [m/N], Hermitian; without rigid motions where the body floats."""
+    F = _restricted(con, P)
+    return _hermitian(dot(con.body.comm, F, compliance(flex or flexible(con), F)))
+
+
+def _restricted(con: Constrained, P: sp.spmatrix) -> np.ndarray:
+    if P.shape[0] != con.T.shape[0]:
+        raise InputError(f"port vectors have {P.shape[0]} rows, expected {con.T.shape[0]} (nodes times components)")
+    return restrict(con, sp.csc_matrix(P)).astype(con.dtype)
+
+
+def _rubin(flex: Flexibility, F: np.ndarray, X: np.ndarray, count: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Free modes, and what the modes left out give to the static flexibility (Rubin 1975, doi:10.2514/3.60497)."""
+    con, comm = flex.con, flex.con.body.comm
+    lam, V = pairs(flex, count)
+    shapes = dot(comm, F, canonical(con, lam, V))
+    elastic = lam > 0
+    known = shapes[:, elastic] / lam[elastic] @ shapes[:, elastic].conj().T
+    return np.sqrt(lam), shapes, _hermitian(dot(comm, F, X) - known)
+
+
+def _craig_bampton(flex: Flexibility, F: np.ndarray, X: np.ndarray,
+                   count: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Constraint modes and fixed-interface modes (Craig and Bampton 1968, doi:10.2514/3.4741), then the eigenvectors
+    of the small matrices, which are free modes in form: nothing is left for a residual."""
+    comm = flex.con.body.comm
+    fixed = _fixed_inverse(flex, F, X)
+    _, inner = elastic_pairs(flex, count, 1e-10, fixed)
+    V = np.concatenate([flex.R, X, inner], axis=1)
+    doubled = flex.con.doubled
+    V = V / np.sqrt(np.abs(dot(comm, V, apply(flex.con.M, V, doubled)).diagonal()))
+    mass = _hermitian(dot(comm, V, apply(flex.con.M, V, doubled)))
+    stiff = _hermitian(dot(comm, V, apply(flex.con.K, V, doubled)))
+    size, Q = np.linalg.eigh(mass)
+    keep = size > 1e-12 * size[-1]                      # ports that repeat each other
+    W = Q[:, keep] / np.sqrt(size[keep])
+    lam, Z = eigh(_hermitian(W.conj().T @ stiff @ W))
+    lam[:flex.R.shape[1]] = 0.0
+    return np.sqrt(np.maximum(lam, 0)), dot(comm, F, V) @ W @ Z, np.zeros((F.shape[1],) * 2, F.dtype)
+
+
+def _fixed_inverse(flex: Flexibility, F: np.ndarray, X: np.ndarray) -> object:
+    """K^-1 with the ports held: the reactions f make F^H u zero, and leave no rigid load on a floating body.
+
+    u = K^+ (b - F f) + R c with [G, -F^H R; R^H F, 0] (f, c) = (F^H K^+ b, R^H b), G = F^H K^+ F.
+    """
+    comm, R = flex.con.body.comm, flex.R
+    G, FR = _hermitian(dot(comm, F, X)), dot(comm, F, R)
+    saddle = np.linalg.pinv(np.block([[G, -FR], [FR.conj().T, np.zeros((R.shape[1],) * 2)]]), rcond=1e-11)
+
+    def inverse(B: np.ndarray) -> np.ndarray:
+        U = compliance(flex, B)
+        both = saddle @ np.concatenate([dot(comm, F, U), dot(comm, R, B)])
+        return U - X @ both[:F.shape[1]] + R @ both[F.shape[1]:]
+    return inverse
+
+
+def _hermitian(A: np.ndarray) -> np.ndarray:
+    return (A + A.conj().T) / 2
