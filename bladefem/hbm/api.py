@@ -1,0 +1,103 @@
+"""Solve one point, a list of points or a band of frequencies; and the two linear limits."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from ..errors import InputError
+from ..friction.harmonics import to_complex, to_real
+from .linear import Linear, condense
+from .model import ReducedModel
+from .newton import Newton, Options, newton
+from .residual import Balance, start_in_stick
+from .solution import Solution, probe_motion, works
+
+__all__ = ["free", "solve", "stuck"]
+
+
+def solve(model: ReducedModel, omega: float, H: int = 3, samples: int = 128, *, start: Solution | None = None,
+          options: Options = Options()) -> Solution:
+    """The periodic response at circular frequency omega [rad/s] with harmonics 0..H.
+
+    Args:
+        samples: time samples a period for the friction forces.
+        start: a solved neighbour; full stick when left out.
+
+    Returns:
+        a Solution whose `converged` and `reason` must be read; it is never a silent guess.
+
+    Raises:
+        InputError: the frequency, H or samples are out of range.
+    """
+    balance = _balance(model, omega, H, samples)
+    w = start_in_stick(balance) if start is None else match_harmonics(start.w, H)
+    found, method, iterations = newton(balance, w, options), "newton", 0
+    if start is not None and not found.converged:
+        iterations = found.iterations
+        found = newton(balance, start_in_stick(balance), options)
+    return as_solution(balance, found, method, iterations + found.iterations)
+
+
+def free(model: ReducedModel, omega: float, H: int = 1) -> np.ndarray:
+    """(H+1, probes) amplitudes at the probes without contact forces [m]."""
+    linear = condense(model, omega, H)
+    return probe_motion(model, omega, np.zeros_like(linear.free), np.zeros(linear.B.shape[1]))
+
+
+def stuck(model: ReducedModel, omega: float, H: int = 1) -> np.ndarray:
+    """(H+1, probes) amplitudes at the probes with all contacts closed and sticking [m]."""
+    linear = condense(model, omega, H)
+    force = linear.springs * linear.stuck
+    return probe_motion(model, omega, force, _rigid(linear, linear.stuck[0], force[0]))
+
+
+def match_harmonics(w: np.ndarray, H: int) -> np.ndarray:
+    """Coefficients (n, d, *) cut or filled with zeros to 2H+1."""
+    matched = np.zeros((*w.shape[:2], 2 * H + 1))
+    kept = min(w.shape[2], 2 * H + 1)
+    matched[:, :, :kept] = w[:, :, :kept]
+    return matched
+
+
+def as_solution(balance: Balance, found: Newton, method: str, iterations: int) -> Solution:
+    """The record of a finished attempt."""
+    model, linear, state = balance.model, balance.linear, found.state
+    load = state.forces.f.copy()
+    if model.directions > model.elements.tangents:
+        load[:, 0, 0] -= np.maximum(model.elements.n0, 0.0)
+    force = to_complex(load.reshape(-1, load.shape[2])).T
+    mean = to_complex(state.w.reshape(-1, load.shape[2]))[:, 0]
+    stiffness = model.springs[:, :, None]
+    return Solution(
+        omega=linear.omega, harmonics=state.w.shape[2] // 2, samples=balance.samples, w=state.w, f=state.forces.f,
+        probe=probe_motion(model, linear.omega, force, _rigid(linear, mean, force[0])),
+        converged=found.converged, reason=found.reason, method=method, iterations=iterations, residual=state.error,
+        residual_displacement=float(abs(state.residual).max()),
+        residual_force=float(abs(stiffness * state.residual).max()), states=_states(state.forces.shares),
+        work=works(model, linear.omega, state.w, load, float(np.sum(state.forces.dissipated))))
+
+
+def _balance(model: ReducedModel, omega: float, H: int, samples: int) -> Balance:
+    if not (np.isfinite(omega) and omega > 0):
+        raise InputError(f"omega {omega}: expected a positive circular frequency")
+    if H < 1 or H != int(H):
+        raise InputError(f"H {H}: expected a whole number of harmonics, at least 1")
+    if max(model.excitation, default=0) > H:
+        raise InputError(f"H {H}: expected at least {max(model.excitation)}, the highest excited harmonic")
+    return Balance(model, condense(model, omega, H), samples)
+
+
+def _states(shares: np.ndarray) -> dict[str, int]:
+    """Number of nodes by what they do in a period, from the shares (n, 3) of stick, slip and separation."""
+    slips, apart = shares[:, 1] > 0, shares[:, 2] > 0
+    closed = shares[:, :2].sum(axis=1) > 1e-12
+    return {"stick": int((~slips & ~apart).sum()), "slip": int((slips & ~apart).sum()),
+            "lift": int((apart & closed).sum()), "open": int((~closed).sum())}
+
+
+def _rigid(linear: Linear, mean: np.ndarray, force: np.ndarray) -> np.ndarray:
+    """(r,) motions without stiffness that close  w_0 = free_0 - G_0 f_0 + B q."""
+    if linear.B.shape[1] == 0:
+        return np.zeros(0)
+    gap = mean - linear.free[0] + linear.G[0] @ force
+    return np.linalg.lstsq(linear.B, gap.real, rcond=None)[0]

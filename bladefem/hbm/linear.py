@@ -1,0 +1,115 @@
+"""The linear bodies at one frequency, condensed to the contact, with and without the contact springs.
+
+With f the contact forces of harmonic h (beyond the preload) the bodies say  w = free - G f + B q,  B^H f = g, where q
+are motions without stiffness (harmonic 0 only). Writing f = K w + p, K the springs of full stick, gives the form that
+the balance uses,  w = stuck - A p: here p vanishes at every node that sticks, and needs no unknowns there.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from ..data import PortModel, RigidBody
+from .model import Damping, ReducedModel
+
+__all__ = ["Linear", "condense", "receptance"]
+
+TINY_SPRING = 1e-9     # share of the contact stiffness that holds a damper in place when all its contacts slip
+
+
+@dataclass(frozen=True)
+class Linear:
+    """Flexibilities of the contact at one frequency, m = nodes * directions, complex amplitudes of e^{i h omega t}."""
+
+    omega: float
+    springs: np.ndarray     # (m,) K [N/m]
+    G: np.ndarray           # (H+1, m, m) flexibility without contact springs and rigid motions [m/N]
+    free: np.ndarray        # (H+1, m) relative displacement without contact forces [m]
+    A: np.ndarray           # (H+1, m, m) flexibility with contact springs [m/N]
+    stuck: np.ndarray       # (H+1, m) relative displacement in full stick [m]
+    B: np.ndarray           # (m, r) relative displacement by the motions without stiffness, harmonic 0
+    g: np.ndarray           # (r,) loads on these motions [N]
+
+
+def condense(model: ReducedModel, omega: float, harmonics: int) -> Linear:
+    """Flexibilities of harmonics 0..H at circular frequency omega [rad/s]."""
+    springs = model.springs.ravel()
+    m = len(springs)
+    G, A = np.zeros((2, harmonics + 1, m, m), dtype=complex)
+    free, stuck = np.zeros((2, harmonics + 1, m), dtype=complex)
+    for h in range(harmonics + 1):
+        G[h], free[h] = _flexibility(model, h, h * omega)
+    B, g = _rigid_motions(model)
+    A[0], stuck[0] = _with_springs(G[0].real, free[0].real, springs, B, g)
+    for h in range(1, harmonics + 1):
+        solved = np.linalg.solve(np.eye(m) + G[h] * springs, np.column_stack([G[h], free[h]]))
+        A[h], stuck[h] = solved[:, :m], solved[:, m]
+    return Linear(omega, springs, G, free, A, stuck, B, g)
+
+
+def receptance(body: PortModel, damping: Damping, w: float, rows: np.ndarray | slice,
+               columns: np.ndarray | slice) -> np.ndarray:
+    """(rows, columns) displacement [m] at the ports by unit harmonic forces [N]; at w = 0 without the rigid modes."""
+    elastic = body.omega > 0 if w == 0 else np.ones(len(body.omega), dtype=bool)
+    left, right = body.shapes[rows][:, elastic], body.shapes[columns][:, elastic]
+    stiffness = (body.omega**2 - w**2 + damping.term(body.omega, w))[elastic]
+    if body.damping is not None and w != 0:
+        return left @ np.linalg.solve(np.diag(stiffness) + 1j * w * body.damping, right.conj().T) \
+            + body.residual[rows][:, columns]
+    if np.isrealobj(left):      # two real products cost half of one complex product
+        flexibility = 1 / stiffness
+        return (left * flexibility.real) @ right.T + 1j * ((left * flexibility.imag) @ right.T) \
+            + body.residual[rows][:, columns]
+    return (left / stiffness) @ right.conj().T + body.residual[rows][:, columns]
+
+
+def _flexibility(model: ReducedModel, h: int, w: float) -> tuple[np.ndarray, np.ndarray]:
+    side, rows = model.side(h), _contact_rows(model.side(h), model)
+    G = receptance(side, model.damping, w, rows, rows)
+    free = np.zeros(len(G), dtype=complex)
+    if h in model.excitation:
+        free = receptance(side, model.damping, w, rows, side.ports["load"]) @ model.excitation[h]
+    if isinstance(model.damper, RigidBody):
+        if h > 0:
+            B = model.damper.B[model.rows]
+            G = G - B @ np.linalg.solve(model.damper.mass, B.T) / w**2
+    elif model.damper is not None:
+        damper = model.damper_side(h)
+        rows = _contact_rows(damper, model)
+        G = G + receptance(damper, model.damper_damping, w, rows, rows)
+    return G, free
+
+
+def _rigid_motions(model: ReducedModel) -> tuple[np.ndarray, np.ndarray]:
+    side = model.side(0)
+    rigid = side.omega == 0
+    motions = [side.shapes[_contact_rows(side, model)][:, rigid].real]
+    loads = [side.shapes[side.ports["load"]][:, rigid].real.T @ np.real(model.excitation.get(0, 0.0))
+             if 0 in model.excitation else np.zeros(rigid.sum())]
+    if isinstance(model.damper, RigidBody):
+        motions.append(-model.damper.B[model.rows])
+    elif model.damper is not None:
+        damper = model.damper_side(0)
+        motions.append(-damper.shapes[_contact_rows(damper, model)][:, damper.omega == 0].real)
+    loads.append(np.zeros(sum(part.shape[1] for part in motions) - rigid.sum()))
+    return np.column_stack(motions), np.concatenate(loads)
+
+
+def _with_springs(G: np.ndarray, free: np.ndarray, springs: np.ndarray, B: np.ndarray,
+                  g: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Flexibility and displacement of harmonic 0 with contact springs, motions without stiffness eliminated."""
+    m, r = B.shape
+    held = B.T @ (springs[:, None] * B)
+    scale = np.trace(held) / max(r, 1) or 1.0
+    # the tiny spring also serves motions that no contact spring sees
+    weak = TINY_SPRING * np.diag(np.where(np.diag(held) > 0, np.diag(held), scale))
+    system = np.block([[np.eye(m) + G * springs, -B], [B.T * springs, weak]])
+    right = np.block([[G, free[:, None]], [B.T, g[:, None]]])
+    solved = np.linalg.solve(system, right)
+    return solved[:m, :m], solved[:m, m]
+
+
+def _contact_rows(body: PortModel, model: ReducedModel) -> np.ndarray:
+    return np.arange(len(body.residual))[body.ports["contact"]][model.rows]

@@ -1,0 +1,110 @@
+"""What the balance knows: linear sides seen from their ports, friction elements between them, forces on them."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from functools import cached_property
+
+import numpy as np
+
+from ..data import Elements, PortModel, RigidBody
+from ..errors import InputError
+
+__all__ = ["Damping", "ReducedModel"]
+
+
+@dataclass(frozen=True)
+class Damping:
+    """Damping of the modes of a body, all contributions added: the term i w c of each mode's receptance."""
+
+    ratio: float | np.ndarray = 0.0         # share of critical damping of each mode [1]
+    structural: float | np.ndarray = 0.0    # loss factor: i eta omega_r^2, not for the mean [1]
+    mass: float = 0.0                       # Rayleigh, proportional to the mass [1/s]
+    stiffness: float = 0.0                  # Rayleigh, proportional to the stiffness [s]
+
+    def term(self, omega: np.ndarray, w: float) -> np.ndarray:
+        """(m,) what damping adds to omega_r^2 - w^2 at circular frequency w [1/s^2]."""
+        viscous = 2 * self.ratio * omega + self.mass + self.stiffness * omega**2
+        return 1j * (w * viscous + np.sign(w) * self.structural * omega**2)
+
+
+@dataclass(frozen=True)
+class ReducedModel:
+    """Blades and damper reduced to the contact, in the pair coordinates of `bladefem.data`.
+
+    Harmonic 0 is counted from the preload state, in which node i carries the normal force max(n0_i, 0) and no
+    tangential force; static offsets of the sides are part of that state, not of this model.
+
+    Raises:
+        InputError: numbers of contact dofs, elements and loads do not fit each other.
+    """
+
+    sides: tuple[PortModel, ...]            # blade side of harmonic h = 0, 1, ...; one alone serves all harmonics
+    elements: Elements
+    excitation: Mapping[int, np.ndarray]    # harmonic to complex amplitudes on the load port [N]
+    damping: Damping = field(default_factory=Damping)
+    damper: RigidBody | tuple[PortModel, ...] | None = None     # None: the other side of each contact is fixed
+    damper_damping: Damping = field(default_factory=Damping)
+
+    def __post_init__(self) -> None:
+        nodes, dofs = len(self.elements.kt), _port_size(self.sides[0], "contact")
+        if nodes == 0 or dofs not in (nodes * self.elements.tangents, nodes * (self.elements.tangents + 1)):
+            raise InputError(f"contact port of {dofs} dofs with {nodes} elements of {self.elements.tangents} tangents: "
+                             "expected tangents, or normal and tangents, for each element")
+        if self.tangential and np.any(self.elements.kn > 0):
+            raise InputError("elements.kn > 0 with tangential contact dofs only: expected normal dofs in the port")
+        for name in ("kt", "kn", "mu", "n0"):
+            value = getattr(self.elements, name)
+            if np.shape(value) != (nodes,) or not np.isfinite(value).all() or (name != "n0" and np.min(value) < 0):
+                raise InputError(f"elements.{name}: expected {nodes} finite numbers, not negative but for n0")
+        loads = _port_size(self.sides[0], "load")
+        for h, force in self.excitation.items():
+            if h < 0 or h != int(h) or np.shape(force) != (loads,) or not np.isfinite(force).all():
+                raise InputError(f"excitation of harmonic {h}: expected {loads} finite amplitudes of a harmonic >= 0")
+        if isinstance(self.damper, RigidBody) and self.damper.B.shape != (dofs, len(self.damper.mass)):
+            raise InputError(f"damper.B of shape {self.damper.B.shape}: expected ({dofs}, {len(self.damper.mass)})")
+
+    @cached_property
+    def tangential(self) -> bool:
+        """The port carries no normal displacements."""
+        return _port_size(self.sides[0], "contact") == len(self.elements.kt) * self.elements.tangents
+
+    @cached_property
+    def directions(self) -> int:
+        """Displacements of a node that enter the balance: the normal one does where some kn > 0."""
+        return self.elements.tangents + bool(np.any(self.elements.kn > 0))
+
+    @cached_property
+    def rows(self) -> np.ndarray:
+        """(nodes directions,) rows of the contact port that enter the balance."""
+        rows = np.arange(_port_size(self.sides[0], "contact")).reshape(len(self.elements.kt), -1)
+        return rows[:, rows.shape[1] - self.directions:].ravel()
+
+    @cached_property
+    def springs(self) -> np.ndarray:
+        """(nodes, directions) stiffness of the contact in full stick [N/m]."""
+        tangents = np.repeat(self.elements.kt[:, None], self.elements.tangents, axis=1)
+        return tangents if self.directions == self.elements.tangents else np.column_stack([self.elements.kn, tangents])
+
+    def side(self, h: int) -> PortModel:
+        """The blade side of harmonic h."""
+        return _pick(self.sides, h, "sides")
+
+    def damper_side(self, h: int) -> PortModel:
+        """The elastic damper of harmonic h."""
+        return _pick(self.damper, h, "damper")
+
+
+def _pick(models: tuple[PortModel, ...], h: int, name: str) -> PortModel:
+    if len(models) == 1:
+        return models[0]
+    if h >= len(models):
+        raise InputError(f"{name}: {len(models)} models given, expected one for harmonic {h}, or one for all harmonics")
+    return models[h]
+
+
+def _port_size(model: PortModel, name: str) -> int:
+    if name not in model.ports:
+        raise InputError(f"ports {', '.join(model.ports)}: expected a port '{name}'")
+    return len(range(*model.ports[name].indices(len(model.residual))))

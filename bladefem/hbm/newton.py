@@ -1,0 +1,74 @@
+"""Newton with a line search on the balance; it always says why it stopped."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from ..errors import InputError
+from .residual import Balance, State, direction, evaluate_balance
+
+__all__ = ["Newton", "Options", "newton"]
+
+SHORTEST = 2.0**-10     # step share below which the search direction is given up
+
+
+@dataclass(frozen=True)
+class Options:
+    """When a point is accepted and when it is given up.
+
+    Raises:
+        InputError: a value is out of range.
+    """
+
+    tolerance: float = 1e-10    # residual of the balance over the size of the motion [1]
+    iterations: int = 60        # Newton steps of one attempt
+
+    def __post_init__(self) -> None:
+        if not 1e-14 <= self.tolerance <= 1e-2:
+            raise InputError(f"tolerance {self.tolerance}: expected 1e-14 to 1e-2")
+        if self.iterations < 1:
+            raise InputError(f"iterations {self.iterations}: expected at least 1")
+
+
+@dataclass(frozen=True)
+class Newton:
+    """Where Newton ended."""
+
+    state: State
+    iterations: int
+    converged: bool
+    reason: str
+
+
+def newton(balance: Balance, w: np.ndarray, options: Options = Options()) -> Newton:
+    """Solve the balance from the displacements w (n, d, K)."""
+    state = evaluate_balance(balance, w)
+    for iteration in range(options.iterations + 1):
+        if state.error <= options.tolerance:
+            return Newton(state, iteration, True, "residual within tolerance")
+        if iteration == options.iterations:
+            break
+        try:
+            step = direction(balance, state)
+        except np.linalg.LinAlgError:
+            return Newton(state, iteration, False, "singular Jacobian")
+        if not np.isfinite(step).all():
+            return Newton(state, iteration, False, "Jacobian gave a step that is not finite")
+        better = _search(balance, state, step)
+        if better is None:
+            return Newton(state, iteration, False, f"line search stalled at residual {state.error:.1e}")
+        state = better
+    return Newton(state, options.iterations, False, f"residual {state.error:.1e} after {options.iterations} iterations")
+
+
+def _search(balance: Balance, state: State, step: np.ndarray) -> State | None:
+    """The first halving of the step that lowers the residual, or None."""
+    before, share = np.linalg.norm(state.residual), 1.0
+    while share >= SHORTEST:
+        trial = evaluate_balance(balance, state.w + share * step)
+        if np.linalg.norm(trial.residual) <= (1 - 1e-4 * share) * before:
+            return trial
+        share /= 2
+    return None

@@ -1,0 +1,134 @@
+"""The balance of harmonics in the unknown relative displacements of the contact, and its derivative.
+
+Residual, additive form:  r_h = w_h - stuck_h + A_h p_h,  p = f(w) - K w  [m]. It is (1 + G K)^-1 times the form without
+springs  w_h - free_h + G_h f_h; both are measured before a point is accepted. The derivative of p is one block a node,
+A is one block a harmonic, and both vanish together at nodes that stick: these are eliminated exactly.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+from scipy import linalg
+
+from ..friction.aft import Forces, evaluate
+from ..friction.harmonics import to_complex, to_real
+from .linear import Linear
+from .model import ReducedModel
+
+__all__ = ["Balance", "State", "contact_forces", "direction", "evaluate_balance", "start_in_stick"]
+
+STICKS = 1e-13      # a node whose p is below this share of its spring force sticks
+
+
+@dataclass(frozen=True)
+class Balance:
+    """One frequency's equations: H from the linear part, samples a period for the friction forces."""
+
+    model: ReducedModel
+    linear: Linear
+    samples: int
+
+
+@dataclass(frozen=True)
+class State:
+    """The balance at one guess of the displacements; n nodes, d directions, K = 2H+1 real coefficients."""
+
+    w: np.ndarray           # (n, d, K) relative displacements [m]
+    forces: Forces          # friction forces and their derivative, of the total load
+    p: np.ndarray           # (n, d, K) forces beyond preload and springs [N]
+    residual: np.ndarray    # (n, d, K) [m]
+    error: float            # residual of both forms over the size of the motion [1]
+
+
+def start_in_stick(balance: Balance) -> np.ndarray:
+    """(n, d, K) the displacements of full stick [m]."""
+    return _spread(balance, balance.linear.stuck)
+
+
+def evaluate_balance(balance: Balance, w: np.ndarray) -> State:
+    """Forces and residual at w (n, d, K)."""
+    model, linear = balance.model, balance.linear
+    forces = contact_forces(model, w, balance.samples)
+    p = forces.f - model.springs[:, :, None] * w
+    if model.directions > model.elements.tangents:
+        p[:, 0, 0] -= np.maximum(model.elements.n0, 0.0)
+    flexed = _spread(balance, _apply(linear.A, _harmonics(p)))
+    residual = w - _spread(balance, linear.stuck) + flexed
+    return State(w, forces, p, residual, _error(balance, w, residual))
+
+
+def contact_forces(model: ReducedModel, w: np.ndarray, samples: int) -> Forces:
+    """Friction forces in the directions (n, d, K) of the balance; displacements left out of it stay zero."""
+    missing = 1 + model.elements.tangents - model.directions
+    if missing == 0:
+        return evaluate(model.elements, w, samples)
+    forces = evaluate(model.elements, np.pad(w, ((0, 0), (missing, 0), (0, 0))), samples)
+    return replace(forces, f=forces.f[:, missing:], dfdw=forces.dfdw[:, missing:, :, missing:])
+
+
+def direction(balance: Balance, state: State) -> np.ndarray:
+    """(n, d, K) the Newton step [m], the linear system reduced to the nodes that slip or lift."""
+    n, d, K = state.w.shape
+    change = _force_change(balance, state)
+    active = np.flatnonzero(abs(change).reshape(n, -1).max(axis=1) > STICKS * balance.model.springs.max(axis=1))
+    step = -state.residual.copy()
+    if len(active) == 0:
+        return step
+    dofs = (active[:, None] * d + np.arange(d)).ravel()
+    J = _jacobian(balance.linear.A[:, dofs][:, :, dofs], change[active])
+    J[np.diag_indices_from(J)] += 1.0
+    step[active] = linalg.solve(J, step[active].ravel(), check_finite=False).reshape(-1, d, K)
+    if len(active) < n:
+        p = np.zeros_like(step)
+        p[active] = np.einsum("nij,nj->ni", change[active], step[active].reshape(len(active), -1)).reshape(-1, d, K)
+        others = np.setdiff1d(np.arange(n), active)
+        step[others] -= _spread(balance, _apply(balance.linear.A, _harmonics(p)))[others]
+    return step
+
+
+def _force_change(balance: Balance, state: State) -> np.ndarray:
+    """(n, dK, dK) derivative of p."""
+    n, d, K = state.w.shape
+    change = state.forces.dfdw.reshape(n, d * K, d * K).copy()
+    change[:, np.arange(d * K), np.arange(d * K)] -= np.repeat(balance.model.springs, K, axis=1)
+    return change
+
+
+def _jacobian(A: np.ndarray, change: np.ndarray) -> np.ndarray:
+    """(a K, a K) real matrix of  p -> A p  times `change` (nodes, dK, dK), for a = nodes * d dofs."""
+    nodes, size = change.shape[:2]
+    H, a = A.shape[0] - 1, A.shape[1]
+    d, K = a // nodes, 2 * H + 1
+    rows = change.reshape(nodes, d, K, size).transpose(2, 0, 1, 3)          # (K, nodes, d, dK)
+    rows = np.concatenate([rows[:1].astype(complex), rows[1::2] - 1j * rows[2::2]])
+    blocks = A.reshape(H + 1, a, nodes, d).transpose(0, 2, 1, 3)            # (H+1, nodes, a, d)
+    product = (blocks @ rows).transpose(0, 2, 1, 3).reshape(H + 1, a, nodes * size)
+    J = np.empty((a, K, nodes * size))
+    J[:, 0] = product[0].real
+    J[:, 1::2] = product[1:].real.transpose(1, 0, 2)
+    J[:, 2::2] = -product[1:].imag.transpose(1, 0, 2)
+    return J.reshape(a * K, nodes * size)
+
+
+def _error(balance: Balance, w: np.ndarray, residual: np.ndarray) -> float:
+    linear, r = balance.linear, _harmonics(residual)
+    with_springs = np.linalg.norm(r) / max(np.linalg.norm(_harmonics(w)), np.finfo(float).tiny)
+    r[1:] += _apply(linear.G[1:], linear.springs * r[1:])
+    scale = max(np.linalg.norm(linear.free), np.linalg.norm(linear.stuck), np.finfo(float).tiny)
+    return max(with_springs, np.linalg.norm(r) / scale)
+
+
+def _apply(flexibility: np.ndarray, forces: np.ndarray) -> np.ndarray:
+    return (flexibility @ forces[:, :, None])[:, :, 0]
+
+
+def _harmonics(x: np.ndarray) -> np.ndarray:
+    """(n, d, K) real coefficients as (H+1, n d) complex amplitudes."""
+    return to_complex(x.reshape(-1, x.shape[2])).T
+
+
+def _spread(balance: Balance, q: np.ndarray) -> np.ndarray:
+    """(H+1, n d) complex amplitudes as (n, d, K) real coefficients."""
+    return to_real(q.T).reshape(len(balance.model.springs), balance.model.directions, -1)
