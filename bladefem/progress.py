@@ -35,4 +35,4 @@ def watch(items: Iterable[T], label: str = "", total: int | None = None, shown: 
         yield from items
         return
     from tqdm import tqdm
-    yield from tqdm(items, desc=label, total=total, delay=2.0, leave=False, dynamic_ncols=True, **options)
+    yield from tqdm(items, desc=label, total=total, **({"delay": 2.0, "leave": False, "dynamic_ncols": True} | options))

@@ -31,8 +31,8 @@ def test_text_becomes_si(text, unit, value):
 
 WRONG = [
     ("20 mm", "rad", "a.b = 20 mm: 'mm' is not a unit of this field, expected deg or rad"),
-
-    ("133 Hz", "rad/s", "not a unit of this field, expected rpm or rad/s"), ("3 m", "1", "expected a plain number or %"),
+    ("133 Hz", "rad/s", "not a unit of this field, expected rpm or rad/s"),
+    ("3 m", "1", "expected a plain number or %"),
     ("nan", "m", "finite"), ("nan mm", "m", "finite"), ("-inf", "m", "finite"), ("1e400 m", "m", "finite"),
     (float("nan"), "m", "finite"), (float("inf"), "1", "finite"), ("3 mmm", "m", "unknown unit 'mmm'"),
     ("", "m", "expected a number"), ("mm", "m", "expected a number"), ("1,5 mm", "m", "expected a number"),

@@ -1,0 +1,186 @@
+"""Exit codes and messages of the command line; the pipeline itself is tested where it is."""
+
+from __future__ import annotations
+
+import os
+import subprocess
+import sys
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+
+import bladefem.study
+from bladefem.cli.main import main, parser
+from bladefem.data import ModeSet
+from bladefem.errors import InputError, NotSolvedError
+from bladefem.scene_file import load_scene
+from geometry.mesh import Mesh
+
+WEDGE = "scenes/wedge.toml"
+
+
+def fake_run(**given):
+    mesh = Mesh(np.zeros((4, 3)), "tetra", {"blade": np.array([[0, 1, 2, 3]])}, report={"worst Jacobian": 0.31})
+    modes = [ModeSet(np.array([812.4, 2000.0]), np.zeros((2, 4, 3)), n, np.array([1e-12, 2e-12])) for n in (0, 1)]
+    return SimpleNamespace(mesh=mesh, modes=modes, contact=None, response=None, timings={"mesh": 1.5, "modes": 4.5},
+                           messages=["resonance 812.4 Hz"], **given)
+
+
+@pytest.fixture
+def pipeline(monkeypatch):
+    """A pipeline that remembers its calls and does what ``behaviour`` says."""
+    calls, state = [], SimpleNamespace(behaviour=fake_run)
+
+    def run(scene, folder, until, comm=None, progress=None):
+        calls.append((scene, folder, until))
+        assert list(progress([1, 2], "label", total=2)) == [1, 2]
+        return state.behaviour()
+
+    module = SimpleNamespace(run=run, calls=calls, state=state)
+    monkeypatch.setitem(sys.modules, "bladefem.study.pipeline", module)
+    monkeypatch.setattr(bladefem.study, "pipeline", module, raising=False)
+    return module
+
+
+def test_check_prints_every_field_and_marks_what_was_given(capsys):
+    assert main(["check", WEDGE, "--set", "aerofoil.lean=3 deg"]) == 0
+    rows = {line.split()[0]: line for line in capsys.readouterr().out.splitlines()}
+    assert "3 deg" in rows["aerofoil.lean"] and " * " in rows["aerofoil.lean"]
+    assert " * " not in rows["aerofoil.sweep"] and "largest thickness" in rows["aerofoil.thickness_tip"]
+
+
+@pytest.mark.parametrize(("command", "until"), [("mesh", "mesh"), ("modes", "modes"), ("contact", "contact"),
+                                                ("response", "response"), ("report", "report"), ("run", "report")])
+def test_commands_run_the_pipeline_as_far_as_needed(command, until, pipeline, tmp_path, capsys):
+    folder = tmp_path / "run"
+    assert main([command, WEDGE, "-o", str(folder), "--set", "contact.mu=0.2"]) == 0
+    (scene, where, last), = pipeline.calls
+    assert (where, last, scene.contact.mu) == (folder, until, 0.2)
+    assert load_scene(folder / "scene.toml") == scene
+    out = capsys.readouterr().out
+    assert "resonance 812.4 Hz" in out and "total" in out and "75" in out
+    if command == "modes":
+        assert "812.40" in out and "2.0e-12" in out
+    if command == "mesh":
+        assert "worst Jacobian" in out and "0.31" in out
+
+
+def test_quiet_prints_no_summary(pipeline, tmp_path, capsys):
+    assert main(["response", WEDGE, "-o", str(tmp_path), "--quiet"]) == 0
+    assert capsys.readouterr().out == ""
+
+
+def test_a_run_folder_stands_for_its_scene(pipeline, tmp_path):
+    assert main(["response", WEDGE, "-o", str(tmp_path), "--set", "contact.mu=0.2"]) == 0
+    assert main(["report", str(tmp_path)]) == 0
+    assert pipeline.calls[1][0] == pipeline.calls[0][0] and pipeline.calls[1][1] == tmp_path
+
+
+def test_study_runs_each_value_in_its_own_folder(pipeline, tmp_path):
+    assert main(["study", WEDGE, "-o", str(tmp_path), "--vary", "damper.angle=30, 45 deg"]) == 0
+    assert [round(np.degrees(scene.damper.angle)) for scene, *_ in pipeline.calls] == [30, 45]
+    assert len({folder for _, folder, _ in pipeline.calls}) == 2
+    assert main(["study", WEDGE, "-o", str(tmp_path), "--vary", "damper.angle"]) == 2
+    assert main(["study", WEDGE, "-o", str(tmp_path), "--vary", "damper.angel=1"]) == 2
+
+
+def raiser(error):
+    def behaviour():
+        raise error
+    return behaviour
+
+
+@pytest.mark.parametrize(("error", "code", "message"), [
+    (InputError("study.loads = 0: expected more"), 2, "bladefem: study.loads = 0: expected more"),
+    (NotSolvedError("balance at 812 Hz: 40 steps"), 1, "bladefem: not solved: balance at 812 Hz: 40 steps"),
+    (MemoryError("12 GB"), 1, "out of memory"), (KeyboardInterrupt(), 130, "finished stages are kept"),
+    (ModuleNotFoundError("x", name="dolfinx.mesh"), 2, "dolfinx.mesh is not installed; run ./setup.sh"),
+    (ZeroDivisionError("our fault"), 1, "mistake in the program"), (BrokenPipeError(), 0, "")])
+def test_what_goes_wrong_has_an_exit_code_and_a_sentence(error, code, message, pipeline, tmp_path, capsys):
+    pipeline.state.behaviour = raiser(error)
+    assert main(["response", WEDGE, "-o", str(tmp_path)]) == code
+    text = capsys.readouterr().err
+    assert message in text
+    assert code != 2 or text.count("\n") == 1
+
+
+@pytest.mark.parametrize("arguments", [
+    ["check", "scenes/wegde.toml"], ["mesh", WEDGE, "--set", "aerofoil.twits=1"], ["mesh", "scenes"],
+    ["modes", WEDGE, "-o", "/proc/run"], ["modes", WEDGE, "-o", WEDGE]])
+def test_bad_input_stops_before_any_work(arguments, pipeline, capsys):
+    assert main(arguments) == 2
+    assert capsys.readouterr().err.count("\n") == 1 and pipeline.calls == []
+
+
+@pytest.mark.parametrize("arguments", [[], ["mehs", WEDGE], ["mesh"], ["study", WEDGE], ["check", WEDGE, "--nonsense"]])
+def test_wrong_arguments_exit_with_2(arguments, capsys):
+    with pytest.raises(SystemExit) as stop:
+        main(arguments)
+    assert stop.value.code == 2 and "usage" in capsys.readouterr().err
+
+
+@pytest.mark.parametrize("command", ["check", "mesh", "modes", "contact", "response", "study", "report", "run", "info"])
+def test_help_has_an_example(command, capsys):
+    with pytest.raises(SystemExit) as stop:
+        parser().parse_args([command, "--help"])
+    assert stop.value.code == 0 and f"bladefem {command}" in capsys.readouterr().out.split("example:")[1]
+
+
+def test_info_names_versions_and_solvers(capsys):
+    assert main(["info"]) == 0
+    rows = dict(line.split(maxsplit=1) for line in capsys.readouterr().out.splitlines())
+    assert {"dolfinx", "PETSc", "MUMPS", "BLAS", "MPI", "gmsh", "OMP_NUM_THREADS"} <= set(rows)
+    assert rows["MUMPS"].startswith("present") and "absent" not in rows["dolfinx"]
+
+
+def test_no_mpi_is_bad_input(monkeypatch, capsys):
+    monkeypatch.setenv("OMPI_COMM_WORLD_SIZE", "2")
+    monkeypatch.setitem(sys.modules, "mpi4py", None)
+    assert main(["check", WEDGE]) == 2
+    assert "mpi4py cannot be loaded" in capsys.readouterr().err
+
+
+def test_a_reader_that_closes_the_pipe_is_no_error():
+    env = clean_environment()
+    command = f"'{sys.executable}' -m bladefem.cli.main check {WEDGE} | head -n 1; exit ${{PIPESTATUS[0]}}"
+    done = subprocess.run(["bash", "-c", command], capture_output=True, text=True, env=env)
+    assert done.returncode == 0 and done.stderr == "" and done.stdout.count("\n") == 1
+
+
+def clean_environment() -> dict[str, str]:
+    """mpirun refuses to start inside a process that already is a rank."""
+    mpi = ("OMPI_", "PMIX_", "PRTE_", "ORTE_", "PMI_")
+    keep = ("OMPI_ALLOW", "OMPI_MCA_mpi_yield", "OMPI_MCA_btl")
+    return {k: v for k, v in os.environ.items() if not k.startswith(mpi) or k.startswith(keep)}
+
+
+ONE_RANK_FAILS = """
+import sys
+from types import SimpleNamespace
+import bladefem.cli.ranks as ranks
+from bladefem.errors import InputError
+ranks.PATIENCE = 1.0
+def action(comm):
+    if {all} or comm.rank == 1:
+        raise InputError("field = 1: expected 2")
+    comm.Barrier()
+sys.exit(ranks.guarded(action, SimpleNamespace()))
+"""
+
+
+@pytest.mark.parametrize(("all_ranks", "message"), [(True, "bladefem: field = 1: expected 2\n"),
+                                                    (False, "bladefem: rank 1 alone: field = 1: expected 2\n")])
+def test_no_rank_waits_for_ever(all_ranks, message):
+    command = ["mpirun", "--oversubscribe", "--bind-to", "none", "-n", "2", sys.executable, "-c",
+               ONE_RANK_FAILS.format(all=all_ranks)]
+    done = subprocess.run(command, capture_output=True, text=True, env=clean_environment(), timeout=60)
+    assert done.returncode == 2 and done.stderr.count(message) == 1, done.stderr
+
+
+@pytest.mark.mpi
+def test_all_ranks_stop_on_a_scene_that_is_wrong(tmp_path, capsys):
+    from mpi4py import MPI
+    assert main(["mesh", WEDGE, "-o", str(tmp_path), "--set", "contact.mu=-1"]) == 2
+    said = capsys.readouterr().err
+    assert ("contact.mu" in said) == (MPI.COMM_WORLD.rank == 0)
