@@ -1,0 +1,92 @@
+"""``./run`` finds the environment, passes arguments and exit codes on, and lets no failure through."""
+
+from __future__ import annotations
+
+import os
+import shutil
+import stat
+import subprocess
+from pathlib import Path
+
+import pytest
+
+ROOT = Path(__file__).parents[2]
+
+# Prints its arguments; the pytest pass whose words match FAIL ends with CODE.
+PYTHON = """#!/bin/sh
+echo "python $*"
+case "$*" in *"${FAIL:-nothing}"*) exit ${CODE:-1} ;; esac
+"""
+MPIRUN = """#!/bin/sh
+while [ "${1#-}" != "$1" ]; do case "$1" in -n) n=$2; shift 2 ;; --bind-to) shift 2 ;; *) shift ;; esac; done
+echo "ranks $n"
+exec "$@" "on $n"
+"""
+
+
+@pytest.fixture
+def place(tmp_path):
+    for name in ("run", ".ci"):
+        source = ROOT / name
+        (shutil.copytree if source.is_dir() else shutil.copy)(source, tmp_path / name)
+    for name, text in (("setup.sh", "#!/bin/sh\nexit ${SETUP_CODE:-0}\n"), (".venv/bin/python", PYTHON),
+                       (".venv/bin/mpirun", MPIRUN)):
+        path = tmp_path / name
+        path.parent.mkdir(parents=True, exist_ok=True)
+        path.write_text(text)
+        path.chmod(path.stat().st_mode | stat.S_IXUSR)
+    return tmp_path
+
+
+def run(place: Path, *arguments: str, **more: str) -> subprocess.CompletedProcess:
+    return subprocess.run([place / "run", *arguments], capture_output=True, text=True, env={**os.environ, **more})
+
+
+def test_alone_it_runs_the_main_job(place):
+    assert run(place).stdout == "python -m bladefem.cli.main run scenes/wedge.toml -o runs/wedge\n"
+
+
+@pytest.mark.parametrize(("arguments", "said"), [
+    (["bladefem", "check", "my scene.toml"], "python -m bladefem.cli.main check my scene.toml\n"),
+    (["python", "-c", "1"], "python -c 1\n"), (["demos/x.py", "a"], "python demos/x.py a\n"),
+    (["mpirun", "3", "demos/x.py", "a"], "ranks 3\npython demos/x.py a on 3\n")])
+def test_arguments_are_passed_on(arguments, said, place):
+    assert run(place, *arguments).stdout == said
+
+
+@pytest.mark.parametrize(("arguments", "code"), [(["nonsense"], 2), (["mpirun"], 2), (["mpirun", "x.py"], 2),
+                                                 (["--help"], 0)])
+def test_wrong_words_are_refused(arguments, code, place):
+    assert run(place, *arguments).returncode == code
+
+
+def test_failed_set_up_stops_everything(place):
+    done = run(place, "python", SETUP_CODE="3")
+    assert done.returncode == 3 and done.stdout == ""
+
+
+def test_exit_codes_come_through(place):
+    assert run(place, "python", "x", FAIL="x", CODE="130").returncode == 130
+    assert run(place, "mpirun", "2", "x.py", FAIL="x.py", CODE="2").returncode == 2
+
+
+def test_all_tests_run_on_one_two_and_four_ranks(place):
+    done = run(place, "test")
+    assert done.returncode == 0
+    lines = [line for line in done.stdout.splitlines() if line.startswith("python")]
+    assert ["on 2" in x for x in lines] == [True, False, False] and "on 4" in lines[1] and "-n 2" in lines[2]
+    assert all("-m mpi" in x for x in lines[:2])
+
+
+@pytest.mark.parametrize("failing", ["on 2", "on 4", "-q -n 2"])
+def test_a_failure_in_any_pass_fails_the_whole(failing, place):
+    for command in (place / "run", "test"), ("bash", place / ".ci" / "run"):
+        env = {**os.environ, "FAIL": failing, "CODE": "1"}
+        done = subprocess.run(command, capture_output=True, text=True, env=env)
+        assert done.returncode == 1
+        assert done.stdout.count("python") == 3     # the other passes still run
+
+
+def test_a_pass_without_tests_is_a_failure_unless_tests_were_selected(place):
+    assert run(place, "test", FAIL="on 4", CODE="5").returncode == 1
+    assert run(place, "test", "-k", "units", FAIL="on 4", CODE="5").returncode == 0
