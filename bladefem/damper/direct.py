@@ -1,0 +1,147 @@
+"""Direct time integration of the complete coupled system by Newmark's rule of average acceleration: the judge.
+
+A step is a small contact problem: w = w_free - G f with the friction law on w, G positive. It is solved by a Newton
+that starts from the stick predictor; started from slip, plain Newton on the displacements can jump between the two
+slip directions for ever (2-cycle at k h^2 / 4 m > 1). Where Newton repeats a set of states, Gauss-Seidel sweeps, which
+converge for every positive G with prescribed normal loads, take over. Second order in the step; for the error-free
+reference use the exact flow in ``events``.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numba import njit
+
+from bladefem.errors import InputError, NotSolvedError
+
+from .events import State
+from .explicit import Cycle, march_explicit, sampled, settle, stable_steps
+from .system import System
+
+__all__ = ["direct", "march_newmark"]
+
+
+def direct(system: System, omega: float, steps: int = 512, start: State | None = None, most: int = 2000,
+           tolerance: float = 1e-6, explicit: bool = False) -> Cycle:
+    """Integrate the coupled system until motion and friction forces repeat over one period.
+
+    Args:
+        steps: time steps a period.
+        most: largest number of periods.
+        tolerance: accepted relative change over a period.
+        explicit: leapfrog instead of Newmark.
+    Raises:
+        InputError: an explicit step beyond the stability limit.
+        NotSolvedError: a time step has no solution (possible only where the normal load follows the motion).
+    """
+    if not explicit:
+        return settle(march_newmark, system, omega, steps, start, most, tolerance)
+    if steps < stable_steps(system, omega):
+        raise InputError(f"steps = {steps} a period: expected at least {stable_steps(system, omega)}, the stability "
+                         f"limit of explicit integration (omega_max dt < 2)")
+    return settle(march_explicit, system, omega, steps, start, most, tolerance)
+
+
+def march_newmark(system: System, omega: float, state: State,
+                  steps: int) -> tuple[State, np.ndarray, np.ndarray, np.ndarray]:
+    """One period from t = 0: end state, q (s, d), w (s, n), friction force (s, n), rows as in ``march_explicit``.
+
+    Raises:
+        InputError: normal forces react on the motion; only the exact flow and the explicit march do that.
+        NotSolvedError: a time step has no solution.
+    """
+    if np.any(system.R):
+        raise InputError("System.R: expected zeros for Newmark's rule; use the exact flow or the explicit march")
+    d, h = len(system.stiffness), 2 * np.pi / omega / steps
+    S = np.linalg.inv(np.eye(d) + h / 2 * system.damping + h**2 / 4 * np.diag(system.stiffness))
+    lag = h**2 / 4 * S @ system.W.T
+    arrays = (system.stiffness, system.damping, system.W, system.V, system.kt, system.mu, S, system.W @ lag,
+              system.V @ lag)
+    p, g, n0 = (sampled(a, steps) for a in (system.force, system.drive, system.normal))
+    y = np.r_[state.q, state.v, state.z]
+    q, w, force, code = _newmark(arrays, y, p, g, n0, h)
+    if code:
+        raise NotSolvedError(f"Newmark step {code - 1} of {steps}: neither Newton nor Gauss-Seidel found the contact "
+                             f"forces")
+    return State(y[:d].copy(), y[d:2 * d].copy(), y[2 * d:].copy()), q, w, force
+
+
+@njit(cache=True)
+def _law(elastic, bound):
+    return min(max(elastic, -bound), bound)
+
+
+@njit(cache=True)
+def _contact(trial, load, kG, H, mu, f):
+    """Forces f with f = clip(trial - kG f, mu (load - H f)); True when found. Starts from the stick predictor."""
+    n = len(trial)
+    slip = np.zeros(n)
+    size = np.abs(trial).max() + np.abs(mu * load).max() + 1e-300
+    for _ in range(30):
+        A, b = np.eye(n), np.zeros(n)
+        for i in range(n):
+            if slip[i] == 0.0:
+                A[i] += kG[i]
+                b[i] = trial[i]
+            elif abs(slip[i]) == 1.0:
+                A[i] += slip[i] * mu[i] * H[i]
+                b[i] = slip[i] * mu[i] * load[i]
+        f[:] = np.linalg.solve(A, b)
+        changed = False
+        for i in range(n):
+            N, e = load[i], trial[i]
+            for k in range(n):
+                N -= H[i, k] * f[k]
+                e -= kG[i, k] * f[k]
+            now = 2.0 if N <= 0 else (0.0 if abs(e) <= mu[i] * N + 1e-14 * size else np.sign(e))
+            changed = changed or now != slip[i]
+            slip[i] = now
+        if not changed:
+            return True
+    for _ in range(20000):
+        worst = 0.0
+        for i in range(n):
+            N, e = load[i], trial[i]
+            for k in range(n):
+                if k != i:
+                    N -= H[i, k] * f[k]
+                    e -= kG[i, k] * f[k]
+            new = _law(e / (1 + kG[i, i]), mu[i] * max(N - H[i, i] * f[i], 0.0))
+            worst = max(worst, abs(new - f[i]))
+            f[i] = new
+        if worst <= 1e-13 * size:
+            return True
+    return False
+
+
+@njit(cache=True)
+def _newmark(arrays, y, p, g, n0, h):
+    L, D, W, V, kt, mu, S, G, H = arrays
+    n, d = W.shape
+    steps = p.shape[0] - 1
+    Q, R, F = np.empty((steps, d)), np.empty((steps, n)), np.empty((steps, n))
+    q, v, z = y[:d].copy(), y[d:2 * d].copy(), y[2 * d:]
+    kG = np.empty((n, n))
+    for i in range(n):
+        kG[i] = kt[i] * G[i]
+    f = np.empty(n)
+    w, N = g[0] + W @ q, n0[0] + V @ q
+    for i in range(n):
+        f[i] = _law(kt[i] * (w[i] - z[i]), mu[i] * max(N[i], 0.0))
+        z[i] = w[i] - f[i] / kt[i]
+    a = p[0] - L * q - D @ v - W.T @ f
+    for m in range(1, steps + 1):
+        q0, v0 = q + h * v + h * h / 4 * a, v + h / 2 * a
+        free = S @ (p[m] - L * q0 - D @ v0)
+        qf = q0 + h * h / 4 * free
+        wf, Nf = g[m] + W @ qf, n0[m] + V @ qf
+        if not _contact(kt * (wf - z), Nf, kG, H, mu, f):
+            return Q, R, F, m + 1
+        a = free - S @ (W.T @ f)
+        q, v = q0 + h * h / 4 * a, v0 + h / 2 * a
+        w = g[m] + W @ q
+        z[:] = w - f / kt
+        row = m % steps
+        Q[row], R[row], F[row] = q, w, f
+    y[:d], y[d:2 * d] = q, v
+    return Q, R, F, 0

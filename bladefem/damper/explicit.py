@@ -1,0 +1,135 @@
+"""Explicit time integration: leapfrog with the return map, the paper's way to the motion of the damper (Sect. 5.1).
+
+Cheap, second order, and treacherous in two ways. Beyond dt = 2 / omega_max the friction saturates and the run stays
+finite and wrong: such a step is refused. And a damper that sticks has no damping, so from rest it never settles: the
+cycle then comes back with its residual of periodicity and the reason "not periodic".
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+from numba import njit
+
+from bladefem.errors import InputError
+
+from .events import State, rest
+from .system import System
+
+__all__ = ["Cycle", "damper_cycle", "march_explicit", "settle", "stable_steps"]
+
+
+@dataclass(frozen=True)
+class Cycle:
+    """The last period of a march in time."""
+
+    q: np.ndarray                   # (s, d) at equal instants from the end of the period on [m kg^1/2]
+    force: np.ndarray               # (s, n) friction force on the damper side [N]
+    w: np.ndarray                   # (s, n) relative displacement [m]
+    state: State                    # at the end
+    residual: float                 # change of motion and force over the last period, relative [1]
+    periods: int                    # marched
+    reason: str                     # "periodic", or why the march stopped
+
+
+def stable_steps(system: System, omega: float) -> int:
+    """Fewest explicit steps a period: dt < 2 / omega_max, all elements stuck."""
+    return int(np.floor(system.fastest * np.pi / omega)) + 1
+
+
+def damper_cycle(system: System, omega: float, steps: int, start: State | None = None, most: int = 300,
+                 tolerance: float = 1e-6) -> Cycle:
+    """March explicitly until motion and friction forces repeat over one period.
+
+    Args:
+        steps: time steps a period.
+        start: from rest when left out.
+        most: largest number of periods.
+        tolerance: accepted relative change over a period.
+    Raises:
+        InputError: the step is beyond the stability limit.
+    """
+    if steps < stable_steps(system, omega):
+        raise InputError(f"steps = {steps} a period: expected at least {stable_steps(system, omega)}, the stability "
+                         f"limit of explicit integration (omega_max dt < 2)")
+    return settle(march_explicit, system, omega, steps, start, most, tolerance)
+
+
+def settle(march: Callable[..., tuple[State, np.ndarray, np.ndarray, np.ndarray]], system: System, omega: float,
+           steps: int, start: State | None, most: int, tolerance: float) -> Cycle:
+    """March period by period until it repeats; ``march(system, omega, state, steps)`` gives state, q, w, force."""
+    state, last, residual, period = start or rest(system), None, np.inf, 0
+    while residual >= tolerance and period < most:
+        period += 1
+        state, q, w, force = march(system, omega, state, steps)
+        if last is not None:
+            residual = max(_change(q, last[0]), _change(force, last[1]))
+        last = (q, force)
+        if not np.isfinite(q[-1]).all():
+            return Cycle(q, force, w, state, np.inf, period, "the motion grew beyond all bounds")
+    reason = "periodic" if residual < tolerance else f"not periodic after {most} periods, change {residual:.1e}"
+    return Cycle(q, force, w, state, residual, period, reason)
+
+
+def march_explicit(system: System, omega: float, state: State,
+                   steps: int) -> tuple[State, np.ndarray, np.ndarray, np.ndarray]:
+    """One period from t = 0: end state, q (s, d), w (s, n), friction force (s, n). No check of the step.
+
+    Row m of the histories is at t = m dt; row 0 is the end of the period, so that a settled cycle starts at t = 0.
+
+    Raises:
+        InputError: coupled damping; the leapfrog needs a diagonal one.
+    """
+    if np.abs(system.damping - np.diag(np.diag(system.damping))).max() > 0:
+        raise InputError("System.damping: expected a diagonal matrix for explicit integration")
+    d = len(system.stiffness)
+    p, g, n0 = (sampled(a, steps) for a in (system.force, system.drive, system.normal))
+    y = np.r_[state.q, state.v, state.z]
+    arrays = (system.stiffness, np.diag(system.damping).copy(), system.W, system.V, system.kt, system.mu, system.R,
+              system.normal[:, 0].copy())
+    q, w, force = _leapfrog(arrays, y, p, g, n0, 2 * np.pi / omega / steps)
+    return State(y[:d].copy(), y[d:2 * d].copy(), y[2 * d:].copy()), q, w, force
+
+
+def sampled(coefficients: np.ndarray, steps: int) -> np.ndarray:
+    """Values (steps + 1, rows) of Fourier coefficients (rows, 2H+1) at steps + 1 instants of one period."""
+    angle = 2 * np.pi * np.outer(np.arange(steps + 1) / steps, np.arange(1, coefficients.shape[1] // 2 + 1))
+    return coefficients[:, 0] + np.cos(angle) @ coefficients[:, 1::2].T + np.sin(angle) @ coefficients[:, 2::2].T
+
+
+def _change(now: np.ndarray, then: np.ndarray) -> float:
+    swing = np.abs(now - now.mean(axis=0)).max()
+    return float(np.abs((now - now.mean(axis=0)) - (then - then.mean(axis=0))).max() / max(swing, 1e-300))
+
+
+@njit(cache=True)
+def _leapfrog(arrays, y, p, g, n0, dt):
+    L, D, W, V, kt, mu, react, rest_load = arrays
+    n, d = W.shape
+    steps = p.shape[0] - 1
+    Q, R, F = np.empty((steps, d)), np.empty((steps, n)), np.empty((steps, n))
+    q, v, z = y[:d].copy(), y[d:2 * d].copy(), y[2 * d:]
+    a = np.empty(d)
+    for m in range(steps + 1):
+        a[:] = p[m] - L * q
+        row = m % steps
+        for i in range(n):
+            w, N = g[m, i], n0[m, i]
+            for k in range(d):
+                w += W[i, k] * q[k]
+                N += V[i, k] * q[k]
+            bound = mu[i] * max(N, 0.0)
+            f = min(max(kt[i] * (w - z[i]), -bound), bound)
+            z[i] = w - f / kt[i]
+            a -= f * W[i] + (max(N, 0.0) - rest_load[i]) * react[i]
+            R[row, i], F[row, i] = w, f
+        Q[row] = q
+        if m > 0:
+            v = (v + 0.5 * dt * a) / (1 + 0.5 * dt * D)
+        if m < steps:
+            v = v + 0.5 * dt * (a - D * v)
+            q = q + dt * v
+    y[:d], y[d:2 * d] = q, v
+    return Q, R, F
