@@ -2,7 +2,7 @@
 
 Response tables have one row a point, in SI units: load [N], frequency [Hz], amplitude [m], converged, method,
 residual, iterations. Summary tables have one row a load: load, peak_frequency, peak_amplitude, dissipated_energy [J],
-friction_damping [1]. Load 0 means no damper force, load inf full stick.
+friction_damping [1], reduction (free over damped amplitude). Load 0 means no damper, load inf full stick.
 """
 
 from __future__ import annotations
@@ -89,7 +89,7 @@ def draw_optimum(summary: pd.DataFrame, file: str | Path | None = None, *, ax: A
 
     Args:
         summary: summary table (see the head of this file); an optional column "mass" [kg] makes several curves, an
-            optional column "converged" marks doubtful peaks.
+            optional column "unconverged" (number of points) marks doubtful peaks.
         file: PNG to write.
         ax: two axes to draw into, amplitude and frequency.
         title: headline.
@@ -113,15 +113,17 @@ def draw_optimum_curve(axes: Any, table: pd.DataFrame, colour: str, label: str |
     amplitude = MICRO * finite["peak_amplitude"]
     axes[0].plot(finite["load"], amplitude, "o-", color=colour, label=label)
     axes[1].plot(finite["load"], finite["peak_frequency"], "o-", color=colour)
-    if "converged" in finite:
-        doubtful = ~finite["converged"].astype(bool)
+    doubtful = finite["unconverged"] > 0 if "unconverged" in finite else pd.Series(False, index=finite.index)
+    if doubtful.any():
         axes[0].plot(finite["load"][doubtful], amplitude[doubtful], "x", color=FAILED, ms=9, mew=2,
-                     label="not converged" if doubtful.any() else None)
+                     label="curve with unconverged points")
     best = finite.loc[finite["peak_amplitude"].idxmin()]
     text = f"optimum {best['load']:.4g} N: {MICRO * best['peak_amplitude']:.4g} µm"
     free = table.loc[table["load"] == 0, "peak_amplitude"]
     if len(free):
         text += f"\n{100 * (1 - best['peak_amplitude'] / free.iloc[0]):.1f} % below the free blade"
+    elif "reduction" in best:
+        text += f"\n{best['reduction']:.3g} times smaller than the free blade's"
     for axis, y in zip(axes, (MICRO * best["peak_amplitude"], best["peak_frequency"]), strict=True):
         axis.plot(best["load"], y, "*", color=colour, ms=14, mec="black", mew=0.7, zorder=5)
         axis.axvline(best["load"], color=colour, lw=0.8, ls=":", alpha=0.8)

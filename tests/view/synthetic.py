@@ -78,7 +78,8 @@ def summary():
     for load in LOADS:
         resonance, damping = state(load)
         rows.append({"load": load, "peak_frequency": resonance, "peak_amplitude": 1e-6 / (2 * damping),
-                     "dissipated_energy": 1e-3 * damping, "friction_damping": damping - 0.001, "converged": True})
+                     "dissipated_energy": 1e-3 * damping, "friction_damping": damping - 0.001,
+                     "unconverged": 3 if load == 400.0 else 0})
     return pd.DataFrame(rows)
 
 
@@ -106,3 +107,32 @@ def accuracy():
     worse = table.assign(time=3 * table["time"], error=2 * table["error"], chosen=False, family="fixed")
     worse.loc[2, "converged"] = False
     return pd.concat([table, worse], ignore_index=True)
+
+
+def wheel_frequencies(sectors=24):
+    """Two blade families that rise with the nodal diameter, crossing one disc family."""
+    n = np.arange(sectors // 2 + 1)
+    families = {"first flap": 800 - 200 / (1 + n), "disc": 300 + 60 * n**1.3, "first torsion": 2100 - 150 / (1 + n)}
+    table = pd.concat([pd.DataFrame({"nodal_diameter": n, "family": name, "frequency": f})
+                       for name, f in families.items()])
+    table = table.sort_values(["nodal_diameter", "frequency"])
+    return table.assign(mode=table.groupby("nodal_diameter").cumcount() + 1).reset_index(drop=True)
+
+
+def campbell():
+    """Three lines of one nodal diameter, f^2 = f0^2 + B (speed / 2 pi)^2."""
+    speed = np.linspace(0, 1200, 7)
+    return pd.concat([pd.DataFrame({"speed": speed, "mode": i + 1, "family": name,
+                                    "frequency": np.sqrt(f**2 + b * (speed / 2 / np.pi) ** 2)})
+                      for i, (name, f, b) in enumerate([("first flap", 600, 2.0), ("first edge", 1150, 1.1),
+                                                        ("first torsion", 1500, 0.6)])], ignore_index=True)
+
+
+def method_map():
+    """A grid of loads and frequencies with the method that solved each."""
+    load, frequency = np.meshgrid([20, 50, 100, 200, 400, 800], np.linspace(780, 1000, 23))
+    method = np.where(abs(frequency - 800 - load / 5) < 15, "homotopy", "newton")
+    method = np.where(abs(frequency - 800 - load / 5) < 5, "shooting", method)
+    return pd.DataFrame({"load": load.ravel(), "frequency": frequency.ravel(), "method": method.ravel(),
+                         "iterations": np.where(method == "newton", 6, 25).ravel(),
+                         "converged": (np.arange(load.size) % 37 != 5)})

@@ -1,0 +1,125 @@
+"""Sentences of a report: the answer first, and how far it can be trusted."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+import pandas as pd
+
+__all__ = ["Answer", "answer", "trust"]
+
+
+class Answer(NamedTuple):
+    """What the engineer asked for."""
+
+    numbers: list[tuple[str, str, str]]     # what, value, remark
+    cautions: list[str]
+
+
+def answer(summary: pd.DataFrame | None, points: pd.DataFrame | None = None) -> Answer:
+    """The best load and what it brings, from a summary table; cautions where that answer stands on weak ground.
+
+    Args:
+        summary: one row a load: load [N] (0: free blade, inf: full stick), peak_frequency [Hz], peak_amplitude [m],
+            optionally mass [kg], dissipated or dissipated_energy [J], friction_damping [1], reduction (free over
+            damped amplitude), unconverged (number of points).
+        points: response table, for the check that the peak lies inside the band.
+    """
+    if summary is None or summary.empty:
+        return Answer([], [])
+    finite = summary[(summary["load"] > 0) & np.isfinite(summary["load"])]
+    if finite.empty:
+        return Answer([], ["No damper load was studied."])
+    best = finite.loc[finite["peak_amplitude"].idxmin()]
+    numbers = [("optimum normal load per seat", f"{best['load']:.4g} N", mass_of(best)),
+               ("resonance amplitude there", f"{1e6 * best['peak_amplitude']:.4g} µm", reduction(summary, best)),
+               ("resonance frequency there", f"{best['peak_frequency']:.5g} Hz", shift(summary, best))]
+    if np.isfinite(best.get("friction_damping", np.nan)):
+        numbers.append(("friction damping ratio there", f"{100 * best['friction_damping']:.3g} %", energy(best)))
+    elif energy(best):
+        numbers.append(("friction work per cycle there", energy(best).split(" of ")[0], ""))
+    return Answer(numbers, cautions(finite, best, points))
+
+
+def mass_of(best: pd.Series) -> str:
+    """"with a damper of 12.5 g"."""
+    return f"with a damper of {1e3 * best['mass']:.4g} g" if "mass" in best else ""
+
+
+def reduction(summary: pd.DataFrame, best: pd.Series) -> str:
+    """How far the optimum is below the free blade."""
+    free = summary.loc[summary["load"] == 0, "peak_amplitude"]
+    if len(free):
+        share = 1 - best["peak_amplitude"] / free.iloc[0]
+        return f"{100 * share:.1f} % below the free blade's {1e6 * free.iloc[0]:.4g} µm"
+    if "reduction" in best:
+        return f"{best['reduction']:.3g} times smaller than the free blade's"
+    return ""
+
+
+def shift(summary: pd.DataFrame, best: pd.Series) -> str:
+    """Where the resonance lies between the free and the stuck blade."""
+    ends = [summary.loc[summary["load"] == load, "peak_frequency"] for load in (0.0, np.inf)]
+    words = ("free", "in full stick")
+    return ", ".join(f"{end.iloc[0]:.5g} Hz {word}" for end, word in zip(ends, words, strict=True) if len(end))
+
+
+def energy(best: pd.Series) -> str:
+    """Friction work at the optimum."""
+    work = best.get("dissipated_energy", best.get("dissipated", np.nan))
+    return f"{1e3 * work:.3g} mJ of friction work per cycle" if np.isfinite(work) else ""
+
+
+def cautions(finite: pd.DataFrame, best: pd.Series, points: pd.DataFrame | None) -> list[str]:
+    """Why the answer may not be the optimum."""
+    found = []
+    if len(finite) > 1 and best["load"] in (finite["load"].min(), finite["load"].max()):
+        end = "smallest" if best["load"] == finite["load"].min() else "largest"
+        found.append(f"The best load is the {end} one studied: the true optimum may lie beyond it; widen study.loads.")
+    if best.get("unconverged", 0) > 0:
+        found.append("The curve of the best load has points that did not converge: its peak may be missed.")
+    if points is not None and len(points):
+        curve = points[points["load"] == best["load"]]
+        if len(curve) and best["peak_frequency"] in (curve["frequency"].min(), curve["frequency"].max()):
+            found.append("At the best load the highest point lies at the end of the frequency band; widen study.band.")
+    return found
+
+
+def trust(points: pd.DataFrame | None) -> tuple[list[str], pd.DataFrame]:
+    """Sentences on convergence, and a row for each load with points that failed or needed a fallback.
+
+    Args:
+        points: response table: load [N], frequency [Hz], converged, method, residual, iterations, optionally reason.
+    """
+    if points is None or points.empty:
+        return [], pd.DataFrame()
+    good = points["converged"].astype(bool)
+    usual = points.loc[good, "method"].mode()
+    usual = usual.iloc[0] if len(usual) else ""
+    fallback = good & (points["method"] != usual)
+    worst = points.loc[good, "residual"].max() if good.any() else np.nan
+    text = [f"{int(good.sum())} of {len(points)} points converged; the largest accepted residual is {worst:.1e}."]
+    if (~good).any():
+        text.append(f"{int((~good).sum())} points did NOT converge. They are marked by crosses in the charts and "
+                    "take no part in any peak or optimum.")
+    if fallback.any():
+        used = points.loc[fallback, "method"].value_counts()
+        text.append(f"{int(fallback.sum())} points were not reached by {usual} and needed a fallback: "
+                    + ", ".join(f"{name} ({count})" for name, count in used.items()) + ".")
+    return text, doubtful_loads(points, good, fallback)
+
+
+def doubtful_loads(points: pd.DataFrame, good: pd.Series, fallback: pd.Series) -> pd.DataFrame:
+    """One row a load that has unconverged points or fallbacks."""
+    rows = []
+    for load, part in points.groupby("load"):
+        bad = part[~good[part.index]]
+        if bad.empty and not fallback[part.index].any():
+            continue
+        where = f"{bad['frequency'].min():.5g} to {bad['frequency'].max():.5g} Hz" if len(bad) else ""
+        reasons = "; ".join(map(str, bad["reason"].unique())) if "reason" in bad else ""
+        rows.append({"load": load, "points": len(part), "not converged": len(bad), "where": where,
+                     "by fallback": int(fallback[part.index].sum()), "worst residual": part["residual"].max(),
+                     **({"reason": reasons} if reasons else {})})
+    return pd.DataFrame(rows)

@@ -1,0 +1,135 @@
+"""Tables for people: columns with titles and units, written as CSV, Markdown and LaTeX."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import numpy as np
+import pandas as pd
+
+from bladefem.store import write_table, write_text
+
+__all__ = ["COLUMNS", "Column", "readable", "to_latex", "to_markdown", "units_of", "write_tables"]
+
+
+class Column(NamedTuple):
+    """How a column of SI numbers is shown."""
+
+    title: str
+    unit: str = ""          # SI, as stored; "" for words and plain numbers
+    shown: str = ""         # unit in the table, the SI unit when empty
+    factor: float = 1.0     # from SI to the shown unit
+    digits: int = 5
+
+
+RPM = 60 / (2 * np.pi)
+COLUMNS = {
+    "load": Column("normal load", "N"), "frequency": Column("frequency", "Hz"), "engine_order": Column("engine order"),
+    "amplitude": Column("amplitude", "m", "µm", 1e6), "mass": Column("damper mass", "kg", "g", 1e3),
+    "peak_frequency": Column("resonance", "Hz"), "peak_amplitude": Column("resonance amplitude", "m", "µm", 1e6),
+    "dissipated_energy": Column("friction work per cycle", "J", "mJ", 1e3, 4),
+    "dissipated": Column("friction work per cycle", "J", "mJ", 1e3, 4),
+    "friction_damping": Column("friction damping", "1", "%", 100.0, 3),
+    "reduction": Column("free over damped", "1", digits=4), "residual": Column("residual", "1", digits=2),
+    "nodal_diameter": Column("nodal diameter"), "mode": Column("mode"), "family": Column("family"),
+    "mac": Column("MAC", "1", digits=3), "aerofoil_share": Column("aerofoil's share", "1", "%", 100.0, 3),
+    "speed": Column("speed", "rad/s", "rpm", RPM),
+    "speed_at_resonance": Column("speed at resonance", "rad/s", "rpm", RPM),
+    "excitation": Column("excitation", "Hz"), "margin": Column("margin", "1", "%", 100.0, 3),
+    "patch": Column("seat"), "force": Column("normal force", "N"), "area": Column("area", "m^2", "mm²", 1e6),
+    "pressure": Column("pressure", "Pa", "MPa", 1e-6, 4),
+    "peak_pressure": Column("peak pressure", "Pa", "MPa", 1e-6, 4),
+    "mean_pressure": Column("mean pressure", "Pa", "MPa", 1e-6, 4),
+    "contact_share": Column("share pressed", "1", "%", 100.0, 3), "gap": Column("gap", "m", "µm", 1e6, 3),
+    **{name: Column(name, "m", "mm", 1e3) for name in "xyz"},
+    **{f"centre_{name}": Column(f"centre {name}", "m", "mm", 1e3) for name in "xyz"},
+    "complementarity": Column("complementarity", "1", digits=2), "time": Column("time", "s", digits=3),
+    "error": Column("relative error", "1", digits=2), "effective_mass": Column("effective mass", "kg", digits=4),
+    "share": Column("share", "1", "%", 100.0, 3), "factor": Column("participation", "kg^1/2", digits=4),
+}
+
+
+def units_of(table: pd.DataFrame) -> dict[str, str]:
+    """SI units of the known columns, for CSV heads."""
+    return {name: COLUMNS[name].unit for name in table if name in COLUMNS and COLUMNS[name].unit not in ("", "1")}
+
+
+def readable(table: pd.DataFrame) -> pd.DataFrame:
+    """The same table as text: titles with units in the head, numbers rounded and in the unit that people use."""
+    columns = {name: COLUMNS.get(name, Column(str(name).replace("_", " "))) for name in table}
+    return pd.DataFrame({head(column): [cell(value, column) for value in table[name]]
+                         for name, column in columns.items()})
+
+
+def head(column: Column) -> str:
+    """"resonance amplitude [µm]"."""
+    unit = column.shown or column.unit
+    return f"{column.title} [{unit}]" if unit and unit != "1" else column.title
+
+
+def cell(value: Any, column: Column) -> str:
+    """One entry: words as they are, numbers in the shown unit."""
+    if isinstance(value, bool | np.bool_):
+        return "yes" if value else "no"
+    if isinstance(value, int | np.integer) and column.factor == 1.0:
+        return str(value)
+    if not isinstance(value, float | int | np.floating | np.integer):
+        return "" if value is None else str(value)
+    if np.isinf(value):
+        return "∞" if value > 0 else "-∞"
+    return "" if np.isnan(value) else f"{value * column.factor:.{column.digits}g}"
+
+
+def is_number(text: str) -> bool:
+    """Whether a cell is aligned to the right."""
+    try:
+        float(text.replace("∞", "inf"))
+    except ValueError:
+        return text == ""
+    return True
+
+
+def numeric(table: pd.DataFrame) -> list[bool]:
+    """Which columns of a readable table hold numbers only."""
+    return [all(map(is_number, table[name])) for name in table]
+
+
+def to_markdown(table: pd.DataFrame) -> str:
+    """A GitHub table with units in the head; numbers to the right."""
+    text = readable(table)
+    lines = [text.columns, ["---:" if n else "---" for n in numeric(text)], *text.itertuples(index=False)]
+    return "\n".join("| " + " | ".join(str(c).replace("|", "\\|") for c in line) + " |" for line in lines) + "\n"
+
+
+def to_latex(table: pd.DataFrame, caption: str = "") -> str:
+    """A booktabs tabular in a table float, with units in the head."""
+    text = readable(table)
+    rows = [" & ".join(map(escape, row)) + r" \\" for row in text.itertuples(index=False)]
+    align = "".join("r" if n else "l" for n in numeric(text))
+    lines = [r"\begin{table}", r"  \centering", *([rf"  \caption{{{escape(caption)}}}"] if caption else []),
+             rf"  \begin{{tabular}}{{{align}}}", r"    \toprule",
+             "    " + " & ".join(map(escape, text.columns)) + r" \\", r"    \midrule",
+             *("    " + row for row in rows), r"    \bottomrule", r"  \end{tabular}", r"\end{table}"]
+    return "\n".join(lines) + "\n"
+
+
+LATEX = {"\\": r"\textbackslash{}", "%": r"\%", "&": r"\&", "_": r"\_", "#": r"\#", "$": r"\$", "{": r"\{", "}": r"\}",
+         "^": r"\textasciicircum{}", "~": r"\textasciitilde{}", "∞": r"$\infty$", "µ": r"\textmu{}", "²": r"$^2$",
+         "³": r"$^3$"}
+
+
+def escape(text: object) -> str:
+    """Text that LaTeX prints as it is."""
+    return "".join(LATEX.get(letter, letter) for letter in str(text))
+
+
+def write_tables(table: pd.DataFrame, stem: str | Path, caption: str = "",
+                 formats: Iterable[str] = ("csv", "md", "tex")) -> list[Path]:
+    """Write ``stem``.csv (SI, full digits), .md and .tex (readable units); returns the files."""
+    writers = {"csv": lambda file: write_table(file, table, units_of(table)),
+               "md": lambda file: write_text(file, to_markdown(table)),
+               "tex": lambda file: write_text(file, to_latex(table, caption))}
+    Path(stem).parent.mkdir(parents=True, exist_ok=True)
+    return [writers[kind](Path(stem).with_name(f"{Path(stem).name}.{kind}")) for kind in formats]

@@ -1,0 +1,158 @@
+"""Frequencies against speed and nodal diameter: Campbell, interference (SAFE) and nodal-diameter diagrams.
+
+Frequency tables have one row a mode: nodal_diameter, mode, frequency [Hz], optionally family, and speed [rad/s] for a
+Campbell diagram. Crossings come ready made, as tables of bladefem.study.crossings.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pandas as pd
+
+from .style import COLOURS, FAILED, canvas
+
+__all__ = ["draw_campbell", "draw_interference", "draw_nodal_diameters"]
+
+RPM = 60 / (2 * np.pi)
+MARKERS = "osD^vPX*"
+
+
+def draw_campbell(table: pd.DataFrame, orders: Sequence[int], file: str | Path | None = None, *,
+                  crossings: pd.DataFrame | None = None, operating: float | None = None, ax: Any = None,
+                  title: str = "") -> object:
+    """Frequencies over speed with engine-order lines; crossings are ringed; returns the figure.
+
+    Args:
+        table: columns speed [rad/s], mode, frequency [Hz], optionally nodal_diameter and family.
+        orders: engine orders to draw.
+        file: PNG to write.
+        crossings: rows of ``campbell_crossings``: speed, frequency, engine_order.
+        operating: speed to mark [rad/s].
+        ax: axes to draw into.
+        title: headline.
+    """
+    with canvas(file, ax, (7.6, 5.0)) as ax:
+        keys = [key for key in ("mode", "nodal_diameter") if key in table]
+        fastest = RPM * table["speed"].max()
+        for key, line in table.groupby(keys):
+            mode, *diameter = key
+            line = line.sort_values("speed")
+            colour = COLOURS[(int(mode) - 1) % len(COLOURS)]
+            first = not diameter or diameter[0] == table.loc[table["mode"] == mode, "nodal_diameter"].min()
+            ax.plot(RPM * line["speed"], line["frequency"], color=colour, lw=1.7 if not diameter else 1.2,
+                    label=line_name(line, mode) if first else None)
+            if diameter and diameter[0] in table["nodal_diameter"].drop_duplicates().iloc[[0, -1]].to_list():
+                ax.annotate(f"n = {diameter[0]}", (fastest, line["frequency"].iloc[-1]), (3, 0), fontsize=6.5,
+                            textcoords="offset points", va="center", color=colour, annotation_clip=False)
+        draw_order_lines(ax, orders, fastest, 1.12 * table["frequency"].max())
+        if crossings is not None and len(crossings):
+            ax.plot(RPM * crossings["speed"], crossings["frequency"], "o", mfc="none", mec=FAILED, mew=1.5, ms=9,
+                    zorder=5, label="crossing")
+        if operating is not None:
+            ax.axvline(RPM * operating, color="#555555", ls="--", lw=1.1, label=f"{RPM * operating:.5g} rpm")
+        ax.set(xlabel="rotational speed [rpm]", ylabel="frequency [Hz]", xlim=(0, fastest),
+               ylim=(0, 1.12 * table["frequency"].max()), title=title or "Campbell diagram")
+        ax.legend(loc="center left", bbox_to_anchor=(1.06, 0.5))
+        return ax.figure
+
+
+def line_name(rows: pd.DataFrame, mode: Any) -> str:
+    """"mode 1, first flap"."""
+    family = f", {rows['family'].iloc[0]}" if "family" in rows else ""
+    return f"mode {mode}{family}"
+
+
+def draw_order_lines(ax: Any, orders: Sequence[int], fastest: float, top: float) -> None:
+    """Engine-order rays, named where they leave the picture."""
+    for order in orders:
+        ax.plot([0, fastest], [0, order * fastest / 60], color="#999999", lw=0.8, zorder=1)
+        x = min(fastest, 60 * top / order) if order else fastest
+        inside = x < fastest
+        ax.annotate(f"EO {order}", (x, order * x / 60), (0, 2) if inside else (3, 0), textcoords="offset points",
+                    fontsize=7.5, color="#555555", ha="center" if inside else "left",
+                    va="bottom" if inside else "center", annotation_clip=False)
+
+
+def draw_nodal_diameters(table: pd.DataFrame, file: str | Path | None = None, *, ax: Any = None, title: str = "",
+                         ) -> object:
+    """Frequency over nodal diameter, a line a mode number, coloured by family when it is known; returns the figure.
+
+    Args:
+        table: columns nodal_diameter, mode, frequency [Hz], optionally family.
+        file: PNG to write.
+        ax: axes to draw into.
+        title: headline.
+    """
+    with canvas(file, ax, (7.6, 4.8)) as ax:
+        for _, line in table.groupby("mode"):
+            line = line.sort_values("nodal_diameter")
+            ax.plot(line["nodal_diameter"], line["frequency"], "-", color="#bbbbbb", lw=1, zorder=1)
+        draw_families(ax, table)
+        ax.set(xlabel="nodal diameter [1]", ylabel="frequency [Hz]", title=title or "natural frequencies of the wheel")
+        ax.set_ylim(bottom=0)
+        ax.xaxis.get_major_locator().set_params(integer=True)
+        ax.legend(loc="center left", bbox_to_anchor=(1.0, 0.5))
+        return ax.figure
+
+
+def draw_families(ax: Any, table: pd.DataFrame) -> None:
+    """A marker a mode, by family (or by mode number)."""
+    names = table["family"] if "family" in table else table["mode"].map("mode {}".format)
+    for i, name in enumerate(names.drop_duplicates()):
+        part = table[names == name]
+        ax.plot(part["nodal_diameter"], part["frequency"], MARKERS[i % len(MARKERS)], ms=4.5,
+                color=COLOURS[i % len(COLOURS)], label=name)
+
+
+def draw_interference(table: pd.DataFrame, sectors: int, speed: float, file: str | Path | None = None, *,
+                      orders: Sequence[int] = (), close: float = 0.05, ax: Any = None, title: str = "") -> object:
+    """SAFE diagram: modes over nodal diameter with the folded line of excitation frequencies; returns the figure.
+
+    Args:
+        table: columns nodal_diameter, mode, frequency [Hz], optionally family.
+        sectors: number of blades N.
+        speed: [rad/s].
+        file: PNG to write.
+        orders: engine orders to mark on the line.
+        close: relative margin under which a mode is ringed.
+        ax: axes to draw into.
+        title: headline.
+    """
+    with canvas(file, ax, (7.6, 4.8)) as ax:
+        draw_families(ax, table)
+        top = 1.1 * table["frequency"].max()
+        last = min(int(np.ceil(2 * np.pi * top / max(speed, 1e-9))), 6 * sectors, 2000)
+        every = np.arange(last + 1)
+        ax.plot(folded(every, sectors), every * speed / (2 * np.pi), "-", color="#999999", lw=1, zorder=1,
+                label=f"excitation at {RPM * speed:.5g} rpm")
+        draw_excitations(ax, table, sectors, speed, orders, close)
+        ax.set(xlabel="nodal diameter [1]", ylabel="frequency [Hz]", ylim=(0, top),
+               title=title or "interference (SAFE) diagram")
+        ax.xaxis.get_major_locator().set_params(integer=True)
+        ax.legend(loc="center left", bbox_to_anchor=(1.0, 0.5))
+        return ax.figure
+
+
+def draw_excitations(ax: Any, table: pd.DataFrame, sectors: int, speed: float, orders: Sequence[int], close: float,
+                     ) -> None:
+    """Chosen engine orders on the folded line, with rings round modes that are too near."""
+    rings = []
+    for order in orders:
+        n, f = int(folded(np.array(order), sectors)), order * speed / (2 * np.pi)
+        ax.plot(n, f, "P", color="black", ms=7, zorder=4)
+        ax.annotate(f"EO {order}", (n, f), (6, -3), textcoords="offset points", fontsize=7.5, va="top")
+        near = table[(table["nodal_diameter"] == n) & ((table["frequency"] / max(f, 1e-9) - 1).abs() < close)]
+        rings += near[["nodal_diameter", "frequency"]].to_numpy().tolist()
+    if rings:
+        ax.plot(*np.array(rings).T, "o", mfc="none", mec=FAILED, mew=1.6, ms=13, zorder=5,
+                label=f"closer than {100 * close:.3g} %")
+
+
+def folded(orders: np.ndarray, sectors: int) -> np.ndarray:
+    """Nodal diameters 0..N/2 that engine orders excite."""
+    rest = orders % sectors
+    return np.minimum(rest, sectors - rest)

@@ -1,0 +1,134 @@
+"""Tables in three formats, sentences of a report, and the two pages."""
+
+import base64
+import re
+import sys
+from html.parser import HTMLParser
+from pathlib import Path
+
+import numpy as np
+import pandas as pd
+import pytest
+
+from bladefem.errors import InputError
+from bladefem.report.statements import answer, trust
+from bladefem.report.tables import readable, to_latex, to_markdown, write_tables
+from bladefem.report.write import write_report
+from bladefem.scene import Scene
+
+sys.path.insert(0, str(Path(__file__).parents[1] / "view"))
+import synthetic
+
+PIXEL = base64.b64decode("iVBORw0KGgoAAAANSUhEUgAAAAEAAAABCAQAAAC1HAwCAAAAC0lEQVR42mNkYAAAAAYAAjCB0C8AAAAASUVORK5CYII=")
+
+
+class Balanced(HTMLParser):
+    """Counts elements and refuses wrongly nested ones."""
+
+    def __init__(self):
+        super().__init__()
+        self.open, self.count = [], {}
+
+    def handle_starttag(self, tag, attrs):
+        self.count[tag] = self.count.get(tag, 0) + 1
+        if tag not in ("meta", "img", "br", "link"):
+            self.open.append(tag)
+
+    def handle_endtag(self, tag):
+        assert self.open.pop() == tag
+
+
+@pytest.fixture
+def report(tmp_path):
+    picture = tmp_path / "figures" / "optimum.png"
+    picture.parent.mkdir()
+    picture.write_bytes(PIXEL)
+    tables = {"response/summary": synthetic.summary(), "response/points": synthetic.points(),
+              "modes/frequencies": synthetic.wheel_frequencies(40)}
+    return write_report(tmp_path, Scene(title="A <wedge> & its damper"), tables, {"response/optimum": picture},
+                        ["3 elements were straightened"], {"mesh": 1.0, "modes": 3.0})
+
+
+def test_readable_units():
+    text = readable(pd.DataFrame({"load": [0.0, np.inf], "peak_amplitude": [5e-4, 3.70371e-5], "family": ["a", "b"],
+                                  "points": [3, np.nan]}))
+    assert list(text.columns) == ["normal load [N]", "resonance amplitude [µm]", "family", "points"]
+    assert text.to_numpy().tolist() == [["0", "500", "a", "3"], ["∞", "37.037", "b", ""]]
+
+
+def test_markdown_and_latex_align_numbers_and_escape():
+    table = pd.DataFrame({"family": ["a_1 | 50 %"], "frequency": [812.4]})
+    assert to_markdown(table).splitlines()[1] == "| --- | ---: |"
+    assert r"a_1 \| 50 %" in to_markdown(table)
+    latex = to_latex(table, "Modes & more")
+    assert r"a\_1 | 50 \% & 812.4 \\" in latex and r"\caption{Modes \& more}" in latex and "{lr}" in latex
+
+
+def test_written_csv_is_si_with_units(tmp_path):
+    files = write_tables(synthetic.summary(), tmp_path / "tables" / "summary")
+    assert [f.suffix for f in files] == [".csv", ".md", ".tex"]
+    back = pd.read_csv(files[0])
+    assert "peak_amplitude [m]" in back
+    assert np.allclose(back["peak_amplitude [m]"], synthetic.summary()["peak_amplitude"], rtol=1e-8)
+
+
+def test_answer_names_the_optimum():
+    found = answer(synthetic.summary(), synthetic.points())
+    values = [value for _, value, _ in found.numbers]
+    assert values[:3] == ["200 N", "37.04 µm", "892 Hz"]
+    assert "92.6 % below" in found.numbers[1][2]
+    assert found.cautions == []
+
+
+def test_answer_warns_at_the_edge_of_loads_band_and_convergence():
+    few = synthetic.summary().query("20 <= load <= 400").iloc[-1:]
+    more = synthetic.summary().query("400 <= load <= 800")
+    assert any("smallest" in text for text in answer(more).cautions)
+    assert any("did not converge" in text for text in answer(few).cautions)
+    points = synthetic.points().query("load == 200 and frequency <= 892")
+    assert any("end of the frequency band" in text for text in answer(synthetic.summary(), points).cautions)
+    assert answer(None).numbers == []
+
+
+def test_failed_points_and_fallbacks_are_counted():
+    points = synthetic.points()
+    text, doubtful = trust(points)
+    failed, fallback = (~points["converged"]).sum(), ((points["method"] == "homotopy") & points["converged"]).sum()
+    assert f"{len(points) - failed} of {len(points)} points converged" in text[0]
+    assert "3 points did NOT converge" in text[1]
+    assert f"homotopy ({fallback})" in text[2]
+    assert doubtful["not converged"].sum() == 3 and doubtful["by fallback"].sum() == fallback
+
+
+def test_page_is_whole_and_self_contained(report):
+    page = report[0].read_text()
+    parser = Balanced()
+    parser.feed(page)
+    assert parser.open == []
+    assert not re.search(r'(?:src|href)="(?!data:|#)', page)
+    assert "A &lt;wedge&gt; &amp; its damper" in page
+    order = [page.index(f'<h2 id="{key}"') for key in ("answer", "inputs", "modes", "response", "accuracy", "timings",
+                                                       "versions")]
+    assert order == sorted(order)
+    assert '<h2 id="contact"' not in page      # nothing to say about it
+    assert "did NOT converge" in page and "3 elements were straightened" in page
+    assert "23 more rows are in the CSV file" in page      # 63 modes, 40 shown
+
+
+def test_markdown_page_links_the_figures(report):
+    text = report[1].read_text()
+    assert "![Optimum](<figures/optimum.png>)" in text
+    assert "| normal load [N] |" in text and "**200 N**" in text
+    assert "\n\n\n\n" not in text
+
+
+def test_bad_entries_are_refused(tmp_path):
+    with pytest.raises(InputError, match="section"):
+        write_report(tmp_path, Scene(), {"misc/table": synthetic.summary()}, {})
+    with pytest.raises(InputError, match="there is no file"):
+        write_report(tmp_path, Scene(), {}, {"mesh/mesh": tmp_path / "none.png"})
+
+
+def test_report_of_nothing_but_a_scene(tmp_path):
+    page, _ = write_report(tmp_path, Scene(kind="hertz"), {}, {})
+    assert "hertz.radius" in page.read_text()
