@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import argparse
+from collections.abc import Callable
 from functools import partial
 from pathlib import Path
 from typing import Any
@@ -28,48 +29,51 @@ def check(options: argparse.Namespace, comm: Any) -> None:
 def mesh(options: argparse.Namespace, comm: Any) -> None:
     """Mesh, quality table, picture."""
     run = until("mesh", options, comm)
-    if comm is None or comm.rank == 0:
-        print(tables.mesh_quality(run.mesh))
-        if options.view:
-            draw(run.mesh, options.view)
+    if options.view and (comm is None or comm.rank == 0):
+        draw(run.mesh, options.view)
+    tell(options, comm, lambda: tables.mesh_quality(run.mesh), run)
 
 
 def modes(options: argparse.Namespace, comm: Any) -> None:
     """Natural frequencies."""
     run = until("modes", options, comm)
-    if comm is None or comm.rank == 0:
-        print(tables.frequencies(run.modes))
+    tell(options, comm, lambda: tables.frequencies(run.modes), run)
 
 
 def contact(options: argparse.Namespace, comm: Any) -> None:
-    """Seat the damper."""
-    until("contact", options, comm)
+    """Seat the damper: force and pressure of each face under each load."""
+    run = until("contact", options, comm)
+    tell(options, comm, lambda: tables.pressures(run.contact.maps), run)
 
 
 def response(options: argparse.Namespace, comm: Any) -> None:
     """Forced response for each load."""
-    until("response", options, comm)
+    run = until("response", options, comm)
+    tell(options, comm, lambda: tables.responses(run.response), run)
 
 
 def report(options: argparse.Namespace, comm: Any) -> None:
     """Everything, with figures and report."""
-    until("report", options, comm)
+    run = until("report", options, comm)
+    tell(options, comm, lambda: tables.responses(run.response), run)
 
 
 def study(options: argparse.Namespace, comm: Any) -> None:
     """The response for several values of one field, each in its own folder inside the run folder."""
-    name, equals, text = options.vary.partition("=")
-    values = variants(name.strip(), text) if equals else []
+    name, equals, text = (part.strip() for part in options.vary.partition("="))
+    values = variants(name, text) if equals else []
     if not values:
         raise InputError(f"--vary {options.vary}: expected key=values, such as damper.angle='30, 40, 50 deg'")
     base = Path(options.output or default_folder(options.scene))
+    best = []
     for value in values:
         one = argparse.Namespace(**vars(options))
-        one.overrides = [*options.overrides, f"{name.strip()}={value}"]
-        one.output = str(base / f"{name.strip()}={value}".replace(" ", "").replace("/", "_"))
-        if comm is None or comm.rank == 0:
-            print(f"\n{name.strip()} = {value}", flush=True)
-        until("response", one, comm)
+        one.overrides = [*options.overrides, f"{name}={value}"]
+        one.output = str(base / f"{name}={value}".replace(" ", "").replace("/", "_"))
+        run = until("response", one, comm)
+        best.append((value, run.response))
+        tell(options, comm, lambda value=value: f"\n{name} = {value}", run)
+    tell(options, comm, lambda: "\n" + tables.side_by_side(name, best))
 
 
 def variants(name: str, text: str) -> list[str]:
@@ -88,7 +92,7 @@ def info(options: argparse.Namespace, comm: Any) -> None:
 
 
 def until(stage: str, options: argparse.Namespace, comm: Any) -> Any:
-    """The pipeline up to a stage, with progress bars before and a summary after; collective."""
+    """The pipeline up to a stage, with progress bars; collective."""
     from ..progress import wanted, watch
     from ..store import on_root, open_folder, write_text
     folder = Path(options.output or default_folder(options.scene))
@@ -102,11 +106,17 @@ def until(stage: str, options: argparse.Namespace, comm: Any) -> Any:
     scene = on_root(comm, prepare)
     rank = 0 if comm is None else comm.rank
     from ..study import pipeline
-    run = pipeline.run(scene, folder, until=stage, comm=comm,
-                       progress=partial(watch, shown=wanted(options.quiet, rank)))
-    if rank == 0 and not options.quiet:
-        print(tables.summary(run, folder))
-    return run
+    bars = partial(watch, shown=wanted(options.quiet, rank))
+    return pipeline.run(scene, folder, until=stage, comm=comm, progress=bars)
+
+
+def tell(options: argparse.Namespace, comm: Any, table: Callable[[], str], run: Any = None) -> None:
+    """A table and the summary of a run, on rank 0 unless quiet."""
+    if options.quiet or (comm is not None and comm.rank > 0):
+        return
+    print(table())
+    if run is not None:
+        print("\n" + tables.summary(run), flush=True)
 
 
 def scene_path(given: str) -> Path:
@@ -127,4 +137,3 @@ def draw(mesh_made: Any, file: str) -> None:
     from ..view.mesh import draw_mesh
     open_folder(Path(file).parent)
     draw_mesh(mesh_made, file)
-    print(f"picture: {file}")

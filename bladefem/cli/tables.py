@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from pathlib import Path
+from collections.abc import Mapping, Sequence
 from typing import Any
 
-__all__ = ["frequencies", "mesh_quality", "plain", "resolved_scene", "summary"]
+from ..units import show
+
+__all__ = ["frequencies", "mesh_quality", "plain", "pressures", "resolved_scene", "responses", "side_by_side",
+           "summary"]
 
 
 def plain(rows: Sequence[Sequence[object]], head: Sequence[str] = ()) -> str:
@@ -35,7 +37,8 @@ def mesh_quality(mesh: Any) -> str:
     rows += [[f"body {name}, cells", len(cells)] for name, cells in mesh.bodies.items()]
     rows += [[f"face {name}, cells", len(cells)] for name, cells in mesh.faces.items()]
     rows += [[f"pair {name}, matched nodes", pair.nodes.shape[1]] for name, pair in mesh.pairs.items()]
-    rows += [[name, f"{value:.4g}" if isinstance(value, float) else value] for name, value in mesh.report.items()]
+    rows += [[name, f"{value:.4g}" if isinstance(value, float) else value] for name, value in mesh.report.items()
+             if isinstance(value, (int, float, str)) and name not in ("cells", "nodes")]
     return plain(rows, ["mesh", "value"])
 
 
@@ -51,13 +54,46 @@ def frequencies(sets: Sequence[Any]) -> str:
     return plain(rows, head)
 
 
-def summary(run: Any, folder: Path) -> str:
-    """Messages of the run and where the time went."""
+def pressures(maps: Mapping[float, Sequence[Any]]) -> str:
+    """Force and pressure of each face, for each load."""
+    rows = []
+    for load, seats in maps.items():
+        for seat in seats:
+            share = seat.patch.area[seat.force > 0].sum() / seat.patch.area.sum()
+            rows.append([show(load, "N"), seat.patch.name, len(seat.force), f"{seat.force.sum():.6g}",
+                         f"{seat.pressure.max() / 1e6:.4g}", f"{100 * share:.1f}", f"{seat.complementarity:.1e}"])
+    return plain(rows, ["load", "face", "nodes", "force [N]", "peak [MPa]", "pressed [%]", "complementarity"])
+
+
+def responses(response: Any) -> str:
+    """Resonance against load, and what damping is gained over no damper."""
+    frequency, undamped = response.free_peak
+    rows = [["no damper", f"{frequency:.2f}", f"{undamped:.4e}", "1", "", ""]]
+    for c in response.curves:
+        rows.append([show(c.load, "N"), f"{c.peak_frequency:.2f}", f"{c.peak_amplitude:.4e}",
+                     f"{undamped / c.peak_amplitude:.3g}", len(c.frequency), int((~c.converged).sum())])
+    best = min(response.curves, key=lambda c: c.peak_amplitude)
+    table = plain(rows, ["load", "resonance [Hz]", "amplitude [m]", "reduction", "points", "unconverged"])
+    return f"{table}\nbest of these loads: {show(best.load, 'N')}, amplitude divided by " \
+           f"{undamped / best.peak_amplitude:.3g}"
+
+
+def side_by_side(name: str, results: Sequence[tuple[str, Any]]) -> str:
+    """The best load of each variant."""
+    rows = []
+    for value, response in results:
+        best = min(response.curves, key=lambda c: c.peak_amplitude)
+        rows.append([value, f"{response.free_peak[0]:.2f}", show(best.load, "N"), f"{best.peak_frequency:.2f}",
+                     f"{best.peak_amplitude:.4e}", f"{response.free_peak[1] / best.peak_amplitude:.3g}"])
+    return plain(rows, [name, "free [Hz]", "best load", "resonance [Hz]", "amplitude [m]", "reduction"])
+
+
+def summary(run: Any) -> str:
+    """Messages of the run, where the time went and where the results are."""
     total = sum(run.timings.values())
     rows = [[name, f"{t:.2f}", f"{100 * t / total if total else 0:.0f}"] for name, t in run.timings.items()]
-    parts = [*run.messages, "", plain([*rows, ["total", f"{total:.2f}", "100"]], ["stage", "time [s]", "share [%]"]),
-             f"results: {folder}"]
-    return "\n".join(parts)
+    table = plain([*rows, ["total", f"{total:.2f}", "100"]], ["stage", "time [s]", "share [%]"])
+    return "\n".join([*run.messages, table, f"results: {run.folder}"])
 
 
 def _is_number(text: str) -> bool:

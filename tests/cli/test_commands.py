@@ -12,7 +12,7 @@ import pytest
 
 import bladefem.study
 from bladefem.cli.main import main, parser
-from bladefem.data import ModeSet
+from bladefem.data import ModeSet, Patch, PressureMap
 from bladefem.errors import InputError, NotSolvedError
 from bladefem.scene_file import load_scene
 from geometry.mesh import Mesh
@@ -20,11 +20,19 @@ from geometry.mesh import Mesh
 WEDGE = "scenes/wedge.toml"
 
 
-def fake_run(**given):
+def fake_curve(load, amplitude):
+    return SimpleNamespace(load=load, peak_frequency=830.0, peak_amplitude=amplitude, frequency=np.arange(5.0),
+                           converged=np.array([True, True, False, True, True]))
+
+
+def fake_run(folder):
     mesh = Mesh(np.zeros((4, 3)), "tetra", {"blade": np.array([[0, 1, 2, 3]])}, report={"worst Jacobian": 0.31})
     modes = [ModeSet(np.array([812.4, 2000.0]), np.zeros((2, 4, 3)), n, np.array([1e-12, 2e-12])) for n in (0, 1)]
-    return SimpleNamespace(mesh=mesh, modes=modes, contact=None, response=None, timings={"mesh": 1.5, "modes": 4.5},
-                           messages=["resonance 812.4 Hz"], **given)
+    patch = Patch("this", np.zeros((2, 3)), np.array([1e-5, 3e-5]), np.zeros((2, 3, 3)), np.zeros((1, 2)), None, None)
+    seat = PressureMap(patch, np.array([40.0, 0.0]), np.array([0.0, 1e-6]), 1e-14)
+    response = SimpleNamespace(free_peak=(812.4, 8e-5), curves=[fake_curve(20.0, 4e-5), fake_curve(50.0, 2e-5)])
+    return SimpleNamespace(mesh=mesh, modes=modes, contact=SimpleNamespace(maps={40.0: [seat]}), response=response,
+                           timings={"mesh": 1.5, "modes": 4.5}, messages=["mesh: found"], folder=folder)
 
 
 @pytest.fixture
@@ -35,7 +43,7 @@ def pipeline(monkeypatch):
     def run(scene, folder, until, comm=None, progress=None):
         calls.append((scene, folder, until))
         assert list(progress([1, 2], "label", total=2)) == [1, 2]
-        return state.behaviour()
+        return state.behaviour(folder)
 
     module = SimpleNamespace(run=run, calls=calls, state=state)
     monkeypatch.setitem(sys.modules, "bladefem.study.pipeline", module)
@@ -59,11 +67,16 @@ def test_commands_run_the_pipeline_as_far_as_needed(command, until, pipeline, tm
     assert (where, last, scene.contact.mu) == (folder, until, 0.2)
     assert load_scene(folder / "scene.toml") == scene
     out = capsys.readouterr().out
-    assert "resonance 812.4 Hz" in out and "total" in out and "75" in out
-    if command == "modes":
-        assert "812.40" in out and "2.0e-12" in out
-    if command == "mesh":
-        assert "worst Jacobian" in out and "0.31" in out
+    assert "mesh: found" in out and "total" in out and "75" in out and out.endswith(f"results: {folder}\n")
+    assert all(word in out for word in SHOWN[command])
+
+
+SHOWN = {
+    "mesh": ["worst Jacobian", "0.31", "body blade, cells"], "modes": ["812.40", "2000.00", "2.0e-12"],
+    "contact": ["40 N", "this", "4 ", "25.0", "1.0e-14"], "report": ["best of these loads: 50 N"],
+    "response": ["no damper", "4.0000e-05", "best of these loads: 50 N, amplitude divided by 4"],
+    "run": ["best of these loads: 50 N"],
+}
 
 
 def test_quiet_prints_no_summary(pipeline, tmp_path, capsys):
@@ -77,16 +90,18 @@ def test_a_run_folder_stands_for_its_scene(pipeline, tmp_path):
     assert pipeline.calls[1][0] == pipeline.calls[0][0] and pipeline.calls[1][1] == tmp_path
 
 
-def test_study_runs_each_value_in_its_own_folder(pipeline, tmp_path):
+def test_study_runs_each_value_in_its_own_folder(pipeline, tmp_path, capsys):
     assert main(["study", WEDGE, "-o", str(tmp_path), "--vary", "damper.angle=30, 45 deg"]) == 0
     assert [round(np.degrees(scene.damper.angle)) for scene, *_ in pipeline.calls] == [30, 45]
     assert len({folder for _, folder, _ in pipeline.calls}) == 2
+    assert [line.split()[:5] for line in capsys.readouterr().out.splitlines()[-2:]] == [
+        ["30", "deg", "812.40", "50", "N"], ["45", "deg", "812.40", "50", "N"]]
     assert main(["study", WEDGE, "-o", str(tmp_path), "--vary", "damper.angle"]) == 2
     assert main(["study", WEDGE, "-o", str(tmp_path), "--vary", "damper.angel=1"]) == 2
 
 
 def raiser(error):
-    def behaviour():
+    def behaviour(_):
         raise error
     return behaviour
 
