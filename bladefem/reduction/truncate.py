@@ -1,0 +1,18 @@
+"""Fewer modes without a new reduction: what a mode left out gives statically goes into the residual flexibility."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+from ..data import PortModel
+
+__all__ = ["truncated"]
+
+
+def truncated(body: PortModel, count: int) -> PortModel:
+    """The same body with its lowest `count` modes; exactly what a Rubin reduction with `count` modes would give."""
+    left_out = slice(max(count, int((body.omega == 0).sum())), None)
+    high, omega = body.shapes[:, left_out], body.omega[left_out]
+    damping = None if body.damping is None else body.damping[:left_out.start, :left_out.start]
+    return replace(body, omega=body.omega[:left_out.start], shapes=body.shapes[:, :left_out.start],
+                   residual=body.residual + (high / omega**2) @ high.conj().T, damping=damping)
