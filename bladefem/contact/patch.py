@@ -17,7 +17,6 @@ a/20 (plane flat punch, r < 0.8 a); benchmarks/contact_hertz.py makes the table 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from itertools import combinations
 
 import numpy as np
 import scipy.sparse as sp
@@ -26,18 +25,19 @@ from geometry.mesh import Mesh
 
 from ..data import Patch
 from ..errors import InputError
-from .shape import corner_count, face_quadrature, shape, traction_shape
+from .mortar import mortar_means, mortar_patch, overlap
+from .shape import corner_count, face_quadrature, shape
+from .surface import frames, outward, surface
 
 __all__ = ["make_patch", "normal_ports", "patch_faces", "patch_means", "port_matrix", "rigid_ports"]
-
-BODY_CORNERS = {"triangle": 3, "quad": 4, "tetra": 4, "hexahedron": 8, "wedge": 6, "pyramid": 5}
 
 
 def make_patch(mesh: Mesh, pair: str) -> Patch:
     """The contact patch of a matched pair of faces, seen from the blade.
 
     Args:
-        mesh: with the pair of that name; its master is the blade's face.
+        mesh: with the pair of that name; its master is the blade's face. A pair without matched nodes (m = 0) is
+            taken as non-matching: both sides are then integrated over the faces' overlap (mortar.py).
         pair: "this", "next", or another name in mesh.pairs; it becomes the patch's name.
 
     Returns:
@@ -50,19 +50,21 @@ def make_patch(mesh: Mesh, pair: str) -> Patch:
     """
     if pair not in mesh.pairs:
         raise InputError(f"contact pair '{pair}' is not in the mesh; it has {', '.join(sorted(mesh.pairs)) or 'none'}")
+    if not mesh.pairs[pair].nodes.size:
+        return mortar_patch(mesh, pair)
     faces, slave = patch_faces(mesh, pair)
     corners = corner_count(mesh.dimension, faces.shape[1])
     nodes, numbers = np.unique(faces[:, :corners], return_inverse=True)
-    weighted, hats = _surface(mesh, faces)
+    weighted, hats = surface(mesh, faces)
     normals = np.zeros((len(nodes), 3))
     area = np.zeros(len(nodes))
     numbers = numbers.reshape(-1, corners)
-    sign = _outward(mesh, faces, weighted.sum(axis=1))
+    sign = outward(mesh, faces, weighted.sum(axis=1))
     for k in range(corners):
         np.add.at(normals, numbers[:, k], np.einsum("fqi,q->fi", weighted, hats[:, k]) * sign[:, None])
         np.add.at(area, numbers[:, k], np.linalg.norm(weighted, axis=2) @ hats[:, k])
     normals /= np.linalg.norm(normals, axis=1, keepdims=True)
-    return Patch(pair, mesh.points[nodes], area, _frames(normals, mesh.dimension), numbers, nodes, slave[nodes])
+    return Patch(pair, mesh.points[nodes], area, frames(normals, mesh.dimension), numbers, nodes, slave[nodes])
 
 
 def patch_faces(mesh: Mesh, pair: str) -> tuple[np.ndarray, np.ndarray]:
@@ -103,8 +105,10 @@ def patch_means(patch: Patch, mesh: Mesh, side: str = "blade") -> sp.csr_matrix:
 
     Initial gaps must be averaged by it too: at a corner or edge of the patch the mean is not the value at the node.
     """
+    if not mesh.pairs[patch.name].nodes.size:
+        return mortar_means(patch, mesh, overlap(mesh, patch.name), side)
     faces, slave = patch_faces(mesh, patch.name)
-    weighted, hats = _surface(mesh, faces)
+    weighted, hats = surface(mesh, faces)
     corners = hats.shape[1]
     N, _ = shape(faces.shape[1], corners, face_quadrature(corners)[0])
     blocks = np.einsum("fq,qk,qm->fmk", np.linalg.norm(weighted, axis=2), hats, N)
@@ -134,50 +138,3 @@ def _ports(patch: Patch, mesh: Mesh, side: str) -> sp.csc_matrix:
     frame = patch.frame if side == "blade" else patch.frame @ mesh.pairs[patch.name].rotation.T
     turn = sp.block_diag([F[:d, :d].T for F in frame], format="csr")
     return (sp.kron(patch_means(patch, mesh, side), sp.identity(d), format="csr") @ turn).tocsc()
-
-
-def _surface(mesh: Mesh, faces: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Normal vectors times quadrature weight and depth (nf, q, 3) [m^2], and traction functions (q, corners)."""
-    corners = corner_count(mesh.dimension, faces.shape[1])
-    points, weights = face_quadrature(corners)
-    _, dN = shape(faces.shape[1], corners, points)
-    tangents = np.einsum("qkd,fki->fqdi", dN, mesh.points[faces])
-    if mesh.dimension == 2:
-        normals = np.cross(tangents[:, :, 0], [0.0, 0.0, mesh.depth])
-    else:
-        normals = np.cross(tangents[:, :, 0], tangents[:, :, 1])
-    return normals * weights[:, None], traction_shape(corners, points)
-
-
-def _outward(mesh: Mesh, faces: np.ndarray, normals: np.ndarray) -> np.ndarray:
-    """Sign (nf,) that makes each face's normal point out of the body that owns it."""
-    k = corner_count(mesh.dimension, faces.shape[1])
-    kind = next((v for name, v in BODY_CORNERS.items() if mesh.cell_type.startswith(name)), None)
-    if kind is None:
-        raise InputError(f"cell type '{mesh.cell_type}' has no contact faces; known are {', '.join(BODY_CORNERS)}")
-    on_face = np.zeros(len(mesh.points), dtype=bool)
-    on_face[faces[:, :k]] = True
-    inside = {}
-    for cells in mesh.bodies.values():
-        corner = cells[:, :kind]
-        for cell in corner[on_face[corner].sum(axis=1) >= k]:
-            for face in map(frozenset, combinations(cell[on_face[cell]].tolist(), k)):
-                inside[face] = mesh.points[cell].mean(axis=0)
-    sign = np.empty(len(faces))
-    for i, face in enumerate(faces[:, :k]):
-        owner = inside.get(frozenset(face.tolist()))
-        if owner is None:
-            raise InputError(f"contact face with nodes {face.tolist()} does not belong to any body of the mesh")
-        sign[i] = np.sign(normals[i] @ (mesh.points[face].mean(axis=0) - owner))
-    return sign
-
-
-def _frames(normals: np.ndarray, dimension: int) -> np.ndarray:
-    """Frames (n, 3, 3) with rows normal, t1, t2."""
-    axis = np.zeros_like(normals)
-    axis[:, 2] = 1.0
-    if dimension == 3 and np.abs(normals[:, 2]).max() > np.cos(np.radians(25)):
-        axis[:] = [0.0, 1.0, 0.0]
-    t2 = axis - normals * np.einsum("ni,ni->n", axis, normals)[:, None]
-    t2 /= np.linalg.norm(t2, axis=1, keepdims=True)
-    return np.stack([normals, np.cross(normals, t2), t2], axis=1)

@@ -10,6 +10,7 @@ import numpy as np
 import scipy.sparse as sp
 from petsc4py import PETSc
 
+from bladefem.contact.patch import normal_ports, port_matrix
 from geometry.mesh import Mesh, Pair
 
 EDGES = {3: [(0, 1), (1, 2), (0, 2)], 4: [(0, 1), (1, 2), (0, 2), (0, 3), (2, 3), (1, 3)]}
@@ -116,22 +117,70 @@ def flexibility(K, fixed, P):
     return B.T @ X.getDenseArray()
 
 
-def facing_blocks(x, depth, y=None):
-    """Mesh of two blocks over the grid x (and y), `depth` the grid of distances from the contact plane."""
+def block(x, depth, y=None, sign=1):
+    """Points (n, 3), quadratic cells and the faces at depth 0 of a block over the grid x (and y)."""
     axes = [x] if y is None else [x, y]
-    points, cells = simplices(*axes, depth)
-    corners = points.shape[1] + 1
-    points, cells = quadratic(points, cells)
-    low = points.copy()
-    low[:, -1] *= -1
-    top, n = surface(points, cells, corners, corners - 2, 0.0), len(points)
-    matched = np.unique(top)
-    both = np.zeros((2 * n, 3))
-    both[:, :points.shape[1]] = np.vstack([low, points])
-    return Mesh(points=both, cell_type="triangle6" if corners == 3 else "tetra10",
-                bodies={"blade": cells, "damper": cells + n}, faces={"seat_right": top, "damper_left": top + n},
-                pairs={"this": Pair("seat_right", "damper_left", np.stack([matched, matched + n]), np.eye(3),
-                                    np.zeros(3))})
+    flat, cells = quadratic(*simplices(*axes, depth))
+    corners = flat.shape[1] + 1
+    faces = surface(flat, cells, corners, corners - 2, 0.0)
+    points = np.zeros((len(flat), 3))
+    points[:, :flat.shape[1]] = flat
+    points[:, flat.shape[1] - 1] *= sign
+    return points, cells, faces
+
+
+def facing_blocks(x, depth, y=None, upper=None):
+    """Mesh of two blocks over the grid x (and y), `depth` the grid of distances from the contact plane.
+
+    upper: another (x, depth, y) for the upper block, which then does not match.
+    """
+    low, cells, top = block(x, depth, y, -1)
+    high, over, bottom = block(*(upper or (x, depth, y)))
+    n, matched = len(low), np.unique(top)
+    nodes = np.zeros((2, 0), int) if upper else np.stack([matched, matched + n])
+    return Mesh(points=np.vstack([low, high]), cell_type="triangle6" if y is None else "tetra10",
+                bodies={"blade": cells, "damper": over + n}, faces={"seat_right": top, "damper_left": bottom + n},
+                pairs={"this": Pair("seat_right", "damper_left", nodes, np.eye(3), np.zeros(3))})
+
+
+def compliances(mesh, patch, E, nu, hold, nodes=slice(None), tangential=False):
+    """Flexibilities (blade, damper) at the normal (or t1) ports of some nodes; hold(points) gives the held freedoms.
+
+    Freedoms are numbered within each body; an E of None is a rigid body without flexibility.
+    """
+    d, out = mesh.dimension, []
+    columns = (normal_ports([patch], mesh) + tangential)[nodes]
+    for side, e, v in zip(("blade", "damper"), E, nu, strict=True):
+        if e is None:
+            out.append(np.zeros((len(columns),) * 2))
+            continue
+        used, local = np.unique(mesh.bodies[side], return_inverse=True)
+        points = mesh.points[used][:, :d]
+        P = port_matrix([patch], mesh, side)[:, columns].tocsr()
+        rows = (used[:, None] * d + np.arange(d)).ravel()
+        K = stiffness(points, local.reshape(mesh.bodies[side].shape), e, v)
+        out.append(flexibility(K, hold(points), P[rows]))
+    return out
+
+
+def rollers(points):
+    """Normal displacement held on the far side and on the planes x = 0 (and y = 0): uniform compression is free."""
+    d = points.shape[1]
+    far = np.abs(points[:, d - 1]).max()
+    out = [np.flatnonzero(np.isclose(np.abs(points[:, d - 1]), far)) * d + d - 1]
+    return np.unique(np.concatenate(out + [np.flatnonzero(np.isclose(points[:, k], 0)) * d + k for k in range(d - 1)]))
+
+
+def clamped(points):
+    """All held on the far side; symmetry at x = 0 (and y = 0)."""
+    return held(points, np.abs(points[:, -1]).max())
+
+
+def clamped_odd(points):
+    """All held on the far side; antisymmetry at x = 0 of a plane block: only the normal displacement is held there."""
+    far = np.flatnonzero(np.isclose(np.abs(points[:, 1]), np.abs(points[:, 1]).max()))
+    middle = np.flatnonzero(np.isclose(points[:, 0], 0.0))
+    return np.unique(np.concatenate([2 * far, 2 * far + 1, 2 * middle + 1]))
 
 
 def held(points, depth):
