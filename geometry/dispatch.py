@@ -38,4 +38,29 @@ def _plane(scene: Any) -> Mesh:
     return plane_blades(scene.plane, scene.mesh)
 
 
-BUILDERS = {"wedge sector": _sector, "plane blades": _plane}
+def _z_mass(scene: Any) -> Mesh:
+    from .zmass import z_mass
+
+    return z_mass(scene.z_mass, scene.mesh)
+
+
+def _hertz(scene: Any) -> Mesh:
+    from .contact_pairs import hertz_pair
+
+    return hertz_pair(scene.hertz, scene.mesh)
+
+
+def _punch(scene: Any) -> Mesh:
+    from .contact_pairs import punch
+
+    return punch(scene.punch, scene.mesh)
+
+
+def _imported(scene: Any) -> Mesh:
+    from .imported import read_geometry
+
+    return read_geometry(scene.imported, scene.mesh)
+
+
+BUILDERS = {"wedge sector": _sector, "plane blades": _plane, "z mass": _z_mass, "hertz": _hertz, "punch": _punch,
+            "imported": _imported}

@@ -9,6 +9,7 @@ import numpy as np
 
 from bladefem.errors import InputError
 
+from .draw import polygon, tie
 from .extract import Groups
 from .finish import Motion, complete, mesh_model
 from .mesh import Mesh, Sector
@@ -33,10 +34,8 @@ def plane_blades(plane: Plane, size: MeshSize) -> Mesh:
     motions = plane_motions(plane)
     with gmsh_session() as gmsh:
         groups = _draw(gmsh, plane)
-        for master, slave, _, shift in motions.values():
-            affine = np.eye(4)
-            affine[:3, 3] = shift
-            gmsh.model.mesh.setPeriodic(1, groups.faces[slave], groups.faces[master], affine.ravel().tolist())
+        for master, slave, rotation, shift in motions.values():
+            tie(gmsh, 1, groups.faces[master], groups.faces[slave], rotation, shift)
         _sizes(gmsh, groups, base, contact)
         with attempt("mesh.size", "mesh this geometry"):
             mesh = mesh_model(gmsh, groups, 2, size)
@@ -90,17 +89,9 @@ def damper_corners(plane: Plane) -> np.ndarray:
     return np.array([[low, a], [top, a], [top, b], [top, c], [top, d], [low, d]])
 
 
-def _polygon(gmsh: ModuleType, corners: np.ndarray) -> tuple[int, list[int], list[int]]:
-    """Surface, lines and points of a polygon (n, 2); line i runs from corner i to i + 1."""
-    geo = gmsh.model.occ
-    points = [geo.addPoint(x, y, 0) for x, y in corners]
-    lines = [geo.addLine(a, b) for a, b in zip(points, points[1:] + points[:1], strict=True)]
-    return geo.addPlaneSurface([geo.addCurveLoop(lines)]), lines, points
-
-
 def _draw(gmsh: ModuleType, plane: Plane) -> Groups:
-    blade, b, p = _polygon(gmsh, blade_corners(plane))
-    damper, d, _ = _polygon(gmsh, damper_corners(plane))
+    blade, b, p = polygon(gmsh, blade_corners(plane))
+    damper, d, _ = polygon(gmsh, damper_corners(plane))
     gmsh.model.occ.synchronize()
     faces = {"clamp": [b[14]], "tip": [b[6], b[7]], "seat_left": [b[2]], "seat_right": [b[11]],
              "pressure_side": [b[5]], "suction_side": [b[8]], "damper_left": [d[1]], "damper_right": [d[3]]}

@@ -9,6 +9,7 @@ import numpy as np
 
 from bladefem.errors import InputError
 
+from .draw import imprint, polygon, prism
 from .finish import complete, mesh_model
 from .mesh import Mesh
 from .parameters import Aerofoil, Disc, MeshSize, Platform, Shank, Wedge
@@ -36,8 +37,10 @@ def wedge_sector(aerofoil: Aerofoil, platform: Platform, shank: Shank, disc: Dis
     sizes = sector_sizes(aerofoil, platform, shank, disc, wedge, size)
     with gmsh_session() as gmsh:
         blade = _blade(gmsh, aerofoil, platform, shank, disc, shape)
-        blade = _imprint(gmsh, blade, shape, wedge.length)
-        damper = _prism(gmsh, shape.wedge, wedge.length)
+        seats = [polygon(gmsh, seat(shape, wedge.length, side))[0] for side in (-1, 1)]
+        with attempt("damper.length", "imprint the seats on the platform"):
+            blade = imprint(gmsh, blade, seats)
+        damper = prism(gmsh, shape.wedge, -wedge.length / 2, wedge.length / 2)
         gmsh.model.occ.synchronize()
         groups = name_faces(gmsh, blade, damper, aerofoil, disc, wedge, shape)
         link(gmsh, groups, shape)
@@ -47,15 +50,6 @@ def wedge_sector(aerofoil: Aerofoil, platform: Platform, shank: Shank, disc: Dis
     mesh = complete(refined(mesh, aerofoil, shape), motions(shape), sizes.base, sector(disc.sectors),
                     flat=("seat_left", "seat_right", "damper_left", "damper_right"))
     return moved(mesh, wedge, shape) if wedge.clearance else mesh
-
-
-def _prism(gmsh: ModuleType, polygon: np.ndarray, length: float) -> int:
-    """Volume over a polygon (n, 2) in the plane of the section, centred at z = 0."""
-    occ = gmsh.model.occ
-    points = [occ.addPoint(x, y, -length / 2) for x, y in polygon]
-    lines = [occ.addLine(a, b) for a, b in zip(points, points[1:] + points[:1], strict=True)]
-    face = occ.addPlaneSurface([occ.addCurveLoop(lines)])
-    return next(tag for dim, tag in occ.extrude([(2, face)], 0, 0, length) if dim == 3)
 
 
 def _disc(gmsh: ModuleType, disc: Disc, theta: float) -> int:
@@ -90,9 +84,9 @@ def _blade(gmsh: ModuleType, aerofoil: Aerofoil, platform: Platform, shank: Shan
     half = shank.width / 2
     foot = np.sqrt(disc.rim_radius**2 - half**2) - 0.2 * (disc.rim_radius - disc.bore_radius)
     plate = np.array([shape.inner, shape.outer, shape.corner])
-    parts = [_prism(gmsh, np.array([[foot, -half], [shape.underside, -half], [shape.underside, half], [foot, half]]),
-                    shank.length),
-             _prism(gmsh, np.vstack([plate, plate[::-1] * [1, -1]]), platform.length),
+    neck = np.array([[foot, -half], [shape.underside, -half], [shape.underside, half], [foot, half]])
+    parts = [prism(gmsh, neck, -shank.length / 2, shank.length / 2),
+             prism(gmsh, np.vstack([plate, plate[::-1] * [1, -1]]), -platform.length / 2, platform.length / 2),
              _aerofoil(gmsh, aerofoil, shape.top)]
     with attempt("aerofoil", "join aerofoil, platform, shank and disc"):
         solid, _ = occ.fuse([(3, _disc(gmsh, disc, shape.theta))], [(3, p) for p in parts])
@@ -113,16 +107,3 @@ def _fillet(gmsh: ModuleType, volume: int, aerofoil: Aerofoil, shape: Profile) -
     with attempt("aerofoil.fillet", "round the root of the aerofoil"):
         solid = occ.fillet([volume], curves, [aerofoil.fillet])
     return next(tag for dim, tag in solid if dim == 3)
-
-
-def _imprint(gmsh: ModuleType, blade: int, shape: Profile, length: float) -> int:
-    """Cut the outlines of both seats into the platform's undersides."""
-    occ = gmsh.model.occ
-    tools = []
-    for side in (-1, 1):
-        points = [occ.addPoint(*p) for p in seat(shape, length, side)]
-        lines = [occ.addLine(a, b) for a, b in zip(points, points[1:] + points[:1], strict=True)]
-        tools.append((2, occ.addPlaneSurface([occ.addCurveLoop(lines)])))
-    with attempt("damper.length", "imprint the seats on the platform"):
-        result, _ = occ.fragment([(3, blade)], tools)
-    return next(tag for dim, tag in result if dim == 3)

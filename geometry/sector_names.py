@@ -8,6 +8,7 @@ from types import ModuleType
 
 import numpy as np
 
+from .draw import centres, face_at, tie
 from .extract import Groups
 from .finish import Motion
 from .mesh import Mesh, Sector
@@ -32,13 +33,13 @@ def name_faces(gmsh: ModuleType, blade: int, damper: int, aerofoil: Aerofoil, di
     middle = (disc.bore_radius + disc.rim_radius) / 2
     cut = np.array([middle * np.cos(theta), middle * np.sin(theta), 0])
     low, high = (seat(profile, wedge.length, side).mean(axis=0) for side in (-1, 1))
-    on_blade = _centres(gmsh, blade)
-    faces = {name: _at(on_blade, where, tolerance, name) for name, where in {
+    on_blade = centres(gmsh, blade)
+    faces = {name: face_at(on_blade, where, tolerance, name) for name, where in {
         "cyclic_low": cut * [1, -1, 1], "cyclic_high": cut, "seat_left": low, "seat_right": high,
         "clamp": np.array([disc.bore_radius * sin(theta) / theta, 0, 0])}.items()}
-    on_damper = _centres(gmsh, damper)
-    faces["damper_left"] = _at(on_damper, high, tolerance, "damper_left")
-    faces["damper_right"] = _at(on_damper, turn(2 * theta) @ low, tolerance, "damper_right")
+    on_damper = centres(gmsh, damper)
+    faces["damper_left"] = face_at(on_damper, high, tolerance, "damper_left")
+    faces["damper_right"] = face_at(on_damper, turn(2 * theta) @ low, tolerance, "damper_right")
     faces["tip"] = [t for t, c in on_blade.items() if abs(c[0] - profile.top - aerofoil.span) < tolerance]
     sides = [t for t, c in on_blade.items() if c[0] > profile.top + aerofoil.fillet + tolerance]
     by_area = sorted(set(sides) - set(faces["tip"]), key=lambda t: gmsh.model.occ.getMass(2, t))
@@ -50,24 +51,6 @@ def trailing_curves(gmsh: ModuleType, groups: Groups) -> list[int]:
     """Curves round the blunt trailing edge."""
     faces = [(2, tag) for tag in groups.faces["trailing_edge"]]
     return [abs(tag) for _, tag in gmsh.model.getBoundary(faces, oriented=False)]
-
-
-def _centres(gmsh: ModuleType, volume: int) -> dict[int, np.ndarray]:
-    """Centre of area of each face of a volume."""
-    faces = gmsh.model.getBoundary([(3, volume)], oriented=False)
-    return {tag: np.array(gmsh.model.occ.getCenterOfMass(2, tag)) for _, tag in faces}
-
-
-def _at(centres: dict[int, np.ndarray], where: np.ndarray, tolerance: float, name: str) -> list[int]:
-    """The one face with its centre there.
-
-    Raises:
-        ValueError: none or several.
-    """
-    found = [tag for tag, centre in centres.items() if np.linalg.norm(centre - where) < tolerance]
-    if len(found) != 1:
-        raise ValueError(f"face {name}: {len(found)} surfaces at its place, expected one")
-    return found
 
 
 def sector(count: int) -> Sector:
@@ -86,9 +69,7 @@ def motions(profile: Profile) -> dict[str, Motion]:
 def link(gmsh: ModuleType, groups: Groups, profile: Profile) -> None:
     """Tell gmsh to copy the mesh of each master face onto its slave."""
     for master, slave, rotation, shift in motions(profile).values():
-        affine = np.eye(4)
-        affine[:3, :3], affine[:3, 3] = rotation, shift
-        gmsh.model.mesh.setPeriodic(2, groups.faces[slave], groups.faces[master], affine.ravel().tolist())
+        tie(gmsh, 2, groups.faces[master], groups.faces[slave], rotation, shift)
 
 
 def refined(mesh: Mesh, aerofoil: Aerofoil, profile: Profile) -> Mesh:

@@ -28,9 +28,9 @@ def sector_sizes(aerofoil: Aerofoil, platform: Platform, shank: Shank, disc: Dis
     """Sizes from the thinnest part of the sector where the user leaves them open."""
     tip, root = aerofoil.thickness_tip * aerofoil.chord_tip, aerofoil.thickness_root * aerofoil.chord_root
     base = size.size or min((tip + root) / 2, platform.thickness, shank.width / 2) * 0.6
-    contact = size.contact_size or min(base, platform.seat_width / 2, wedge.length / 6)
+    contact = size.contact_size or min(base, platform.seat_width, wedge.length / 6)
     return Sizes(base, contact, max(base, min(3 * base, (disc.rim_radius - disc.bore_radius) / 3)),
-                 min(base, 4 * BLUNT * tip), base / 4)
+                 min(base, 6 * BLUNT * tip), base / 4)
 
 
 def set_sizes(gmsh: ModuleType, profile: Profile, wedge: Wedge, sizes: Sizes, edges: list[int]) -> None:

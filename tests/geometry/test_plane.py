@@ -41,7 +41,8 @@ def test_seats_match_to_rounding(mesh, name, shift):
     assert not set(mesh.bodies["blade"].ravel()) & set(mesh.bodies["damper"].ravel())
 
 
-@pytest.mark.parametrize("face, outward", [("seat_left", [-PLANE.seat_width, 0]), ("seat_right", [-PLANE.seat_width, 0]),
+@pytest.mark.parametrize("face, outward", [("seat_left", [-PLANE.seat_width, 0]),
+                                           ("seat_right", [-PLANE.seat_width, 0]),
                                            ("damper_left", [PLANE.seat_width, 0]), ("clamp", [-PLANE.thickness, 0]),
                                            ("tip", [PLANE.thickness, 0])])
 def test_edges_look_out_of_their_body(mesh, face, outward):

@@ -1,0 +1,72 @@
+"""Small OpenCASCADE drawings that several builders share: polygons, prisms, imprints, faces found by their centre."""
+
+from __future__ import annotations
+
+from types import ModuleType
+
+import numpy as np
+
+__all__ = ["centres", "face_at", "imprint", "polygon", "prism", "set_background", "tie"]
+
+
+def polygon(gmsh: ModuleType, corners: np.ndarray) -> tuple[int, list[int], list[int]]:
+    """Surface, lines and points of a plane polygon (n, 2 or 3) [m]; line i runs from corner i to i + 1."""
+    occ = gmsh.model.occ
+    points = [occ.addPoint(*corner, *[0.0] * (3 - len(corner))) for corner in corners]
+    lines = [occ.addLine(a, b) for a, b in zip(points, points[1:] + points[:1], strict=True)]
+    return occ.addPlaneSurface([occ.addCurveLoop(lines)]), lines, points
+
+
+def prism(gmsh: ModuleType, corners: np.ndarray, low: float, high: float) -> int:
+    """Volume over a polygon (n, 2) [m] from z = low to z = high."""
+    face, _, _ = polygon(gmsh, np.column_stack([corners, np.full(len(corners), low)]))
+    return next(tag for dim, tag in gmsh.model.occ.extrude([(2, face)], 0, 0, high - low) if dim == 3)
+
+
+def imprint(gmsh: ModuleType, volume: int, faces: list[int]) -> int:
+    """The volume with the outlines of plane faces cut into its skin."""
+    result, _ = gmsh.model.occ.fragment([(3, volume)], [(2, face) for face in faces])
+    return next(tag for dim, tag in result if dim == 3)
+
+
+def centres(gmsh: ModuleType, body: int, dimension: int = 3) -> dict[int, np.ndarray]:
+    """Centre (3,) [m] of each boundary entity of a body."""
+    faces = gmsh.model.getBoundary([(dimension, body)], oriented=False)
+    return {tag: np.array(gmsh.model.occ.getCenterOfMass(dim, tag)) for dim, tag in faces}
+
+
+def face_at(found: dict[int, np.ndarray], where: np.ndarray, tolerance: float, name: str) -> list[int]:
+    """The one entity with its centre there.
+
+    Raises:
+        ValueError: none or several.
+    """
+    tags = [tag for tag, centre in found.items() if np.linalg.norm(centre - where) < tolerance]
+    if len(tags) != 1:
+        raise ValueError(f"face {name}: {len(tags)} entities at its place, expected one")
+    return tags
+
+
+def tie(gmsh: ModuleType, dimension: int, master: list[int], slave: list[int], rotation: np.ndarray,
+        shift: np.ndarray) -> None:
+    """Have gmsh copy the mesh of the master's curves or surfaces onto the slave's under a rigid motion."""
+    affine = np.eye(4)
+    affine[:3, :3], affine[:3, 3] = rotation, shift
+    gmsh.model.mesh.setPeriodic(dimension, slave, master, affine.ravel().tolist())
+
+
+def set_background(gmsh: ModuleType, least: float, **parameters: dict[str, object]) -> None:
+    """Use the smallest of some size fields, given as kind=[{option: value}, ...]; no element below ``least`` [m]."""
+    field, tags = gmsh.model.mesh.field, []
+    for kind, settings in parameters.items():
+        for setting in settings:
+            tags.append(field.add(kind))
+            for name, value in setting.items():
+                if isinstance(value, str):
+                    field.setString(tags[-1], name, value)
+                else:
+                    field.setNumber(tags[-1], name, value)
+    minimum = field.add("Min")
+    field.setNumbers(minimum, "FieldsList", tags)
+    field.setAsBackgroundMesh(minimum)
+    gmsh.option.setNumber("Mesh.MeshSizeMin", least)
