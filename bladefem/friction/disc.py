@@ -18,13 +18,13 @@ __all__ = ["crossing", "decay", "edge", "sensitivity", "turn"]
 SEPARATED, STICK, SLIP, CLOSING = 0, 1, 2, 3
 
 
-@njit(cache=True, inline="always")
+@njit(cache=True, error_model="numpy", inline="always")
 def decay(x):
     """Factor of tan(psi/2) over half an edge, tends to exp(-x/2) for small x and to 1/x for large x."""
     return 1.0 / (sqrt(1.0 + 0.25 * x * x) + 0.5 * x)
 
 
-@njit(cache=True, inline="always")
+@njit(cache=True, error_model="numpy", inline="always")
 def crossing(fx, fy, dx, dy, R0, dR):
     """Share of the edge after which |f + s d| reaches R0 + s dR; 0 if it starts on the circle and leaves it."""
     A = dx * dx + dy * dy - dR * dR
@@ -36,7 +36,7 @@ def crossing(fx, fy, dx, dy, R0, dR):
     return min(max((root - B) / A, 0.0), 1.0) if A > 0.0 else 0.0
 
 
-@njit(cache=True, inline="always")
+@njit(cache=True, error_model="numpy", inline="always")
 def turn(c, s, E):
     """(cos, sin, d psi_1 / d psi) of the angle after tan(psi/2) has fallen by E, from cos psi = c, sin psi = s."""
     e = E * E * (1.0 - c)
@@ -44,7 +44,7 @@ def turn(c, s, E):
     return (1.0 + c - e) / D, 2.0 * E * s / D, 2.0 * E / D
 
 
-@njit(cache=True, inline="always")
+@njit(cache=True, error_model="numpy", inline="always")
 def _direction(dx, dy, hx, hy, R):
     """(length, ux, uy) of the increment; a vanishing one is taken along the force."""
     L = sqrt(dx * dx + dy * dy)
@@ -55,7 +55,7 @@ def _direction(dx, dy, hx, hy, R):
     return (tiny, hx / H, hy / H) if H > 0.0 else (1e-300, 1.0, 0.0)
 
 
-@njit(cache=True, inline="always")
+@njit(cache=True, error_model="numpy", inline="always")
 def _slip_on(fx, fy, dx, dy, R0, R1, Rm, share, power):
     """(fx, fy) of unit length at share = 1 (end, power 2) or 0.5 (mid, power 1) of an edge that slips."""
     alpha = crossing(fx, fy, dx, dy, R0, R1 - R0)
@@ -71,7 +71,7 @@ def _slip_on(fx, fy, dx, dy, R0, R1, Rm, share, power):
     return c * ux - s * uy, c * uy + s * ux, alpha
 
 
-@njit(cache=True, inline="always")
+@njit(cache=True, error_model="numpy", inline="always")
 def edge(fx, fy, dx, dy, N0, N1, mu):
     """(state at the end, f at the end (2), state at the middle, f there (2)) after one edge from f = (fx, fy) [N]."""
     Nm = 0.5 * (N0 + N1)
@@ -106,7 +106,7 @@ def edge(fx, fy, dx, dy, N0, N1, mu):
     return end, ex, ey, mid, mx, my
 
 
-@njit(cache=True, inline="always")
+@njit(cache=True, error_model="numpy", inline="always")
 def sensitivity(fx, fy, dx, dy, N0, N1, mu, share):
     """d(angle) of the slipping force at share 1 (end) or 0.5 (middle): by f0 (2), increment (2), N0 and N1."""
     R0, R1, Rm = mu * N0, mu * N1, 0.5 * mu * (N0 + N1)

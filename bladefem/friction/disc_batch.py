@@ -6,27 +6,30 @@ import numpy as np
 from numba import njit
 
 from bladefem.friction.disc_rows import close, linear_period, start_rows, to_carry
-from bladefem.friction.orbit import periodic, start
+from bladefem.friction.orbit import EDGE_ROWS, edges, march, periodic, start
 from bladefem.friction.tables import Node, gram, values
 
 __all__ = ["disc_batch"]
 
+NEAR = 1e-7         # of the largest limit: marching stops and one linearised period finishes
+EXACT = 1e-6        # of the largest limit: longest step of that period, whose error is of the order of its square
+SINGULAR = 1e-9     # of det(I - Phi): below it the state keeps a memory of its start
 
-@njit(cache=True)
+
+@njit(cache=True, error_model="numpy")
 def _loads(w, load, el, tab, Ns, N):
     """Normal load at the samples Ns (S,) and at the knots N (S,) half a step before them [N]."""
-    values(tab.transposed, w, el.kn, Ns)
-    values(tab.knots_transposed, w, el.kn, N)
+    n0 = 0.0 if load.size else el.n0
+    values(tab.transposed, w, el.kn, n0, Ns)
+    values(tab.knots_transposed, w, el.kn, n0, N)
     if load.size == 0:
-        Ns += el.n0
-        N += el.n0
         return
     Ns += load
     for i in range(N.size):
         N[i] += 0.5 * (load[i] + load[i - 1])
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy")
 def _normal(w, load, el, Ns, tab, mean, F, J):
     """Normal force F (K,), its Jacobian J (K, 3K) and the basis means (4H+1,) of the samples in contact."""
     S, K = tab.at.shape
@@ -51,8 +54,8 @@ def _normal(w, load, el, Ns, tab, mean, F, J):
                 F[k] += load[i] * tab.at[i, k] / S * (1.0 if k == 0 else 2.0)
 
 
-@njit(cache=True)
-def _stick(w, kt, mean, F, J):
+@njit(cache=True, error_model="numpy")
+def _add_stick(w, kt, mean, F, J):
     """Add kt w over the set with basis means ``mean`` to both tangential directions."""
     K = w.shape[1]
     block = np.empty((K, K))
@@ -64,50 +67,95 @@ def _stick(w, kt, mean, F, J):
                 J[c, k, c * K + l] += kt * block[k, l]
 
 
-@njit(cache=True)
-def _tangential(path, el, tab, limit, means, F, J, acc, C, rows):
+@njit(cache=True, error_model="numpy")
+def _implicit(path, fx, fy, el, tab, form, C, sums):
+    """One linearised period from near the periodic state, which it finishes: (usable, missing fx, fy, slips).
+
+    Not usable where the state keeps a memory of its start, or where the linearised step is too long to be exact.
+    """
+    K = tab.at.shape[1]
+    _clear(sums)
+    C[:] = 0.0
+    C[0, 3 * K] = C[1, 3 * K + 1] = 1.0
+    to_carry(C, 0, el.kt, tab.knots)
+    ex, ey, slips = linear_period(path, fx, fy, el, tab, form, C, sums)
+    a, b, c, d = 1.0 - C[0, 3 * K], -C[0, 3 * K + 1], -C[1, 3 * K], 1.0 - C[1, 3 * K + 1]
+    det, rx, ry = a * d - b * c, ex - fx, ey - fy
+    if abs(det) < SINGULAR:
+        return False, rx, ry, slips
+    step = np.hypot(d * rx - b * ry, a * ry - c * rx) / abs(det)
+    return step <= EXACT * el.mu * path[2].max(), rx, ry, slips
+
+
+@njit(cache=True, error_model="numpy")
+def _remembered(path, count, el, tab, form, C, sums):
+    """Slips of a state that keeps a memory of its start, after carrying its derivative through ``count`` periods."""
+    fx, fy = start(path[0, 0], path[1, 0], path[2, 0], el.mu)
+    start_rows(path[0, 0], path[1, 0], path[2, 0], el, tab.knots, C)
+    slips = 0
+    for cycle in range(count):
+        if cycle > 0:
+            to_carry(C, 0, el.kt, tab.knots)
+        _clear(sums)
+        fx, fy, slips = linear_period(path, fx, fy, el, tab, form, C, sums)
+    return slips
+
+
+@njit(cache=True, error_model="numpy")
+def _tangential(path, el, tab, limit, form, C, sums, F, J):
     """Offsets and slip parts of the periodic tangential force; returns (cycles, negative if not periodic; slips)."""
-    vx, vy, N = path
-    phi = np.empty((2, 2))
-    fx, fy, _, count, done, guesses = periodic(vx, vy, N, el.mu, True, limit, phi)
-    memory = abs((1.0 - phi[0, 0]) * (1.0 - phi[1, 1]) - phi[0, 1] * phi[1, 0]) < 1e-9
-    if memory and guesses > 0:              # a stuck state is not unique: take the one that marching finds
-        fx, fy, _, count, done, guesses = periodic(vx, vy, N, el.mu, False, limit, phi)
-    if not memory:
-        C[:] = 0.0
-        C[0, -2] = C[1, -1] = 1.0
-        to_carry(C, 0, el.kt, tab.knots)
-    else:                                   # the state keeps a memory of its start: carry the derivative from there
-        fx, fy = start(vx[0], vy[0], N[0], el.mu)
-        start_rows(vx[0], vy[0], N[0], el, tab.knots, C)
-        for _ in range(count - 1):
-            fx, fy, _ = linear_period(path, fx, fy, el, tab, C, means, F, acc, rows)
-        means[:2], F[1:], acc[:] = 0.0, 0.0, 0.0
-    fx, fy, slips = linear_period(path, fx, fy, el, tab, C, means, F, acc, rows)
-    close(C, el.kt, tab.knots, acc, J)
+    K, phi, scale = tab.at.shape[1], np.empty((2, 2)), el.mu * path[2].max()
+    edges(path, el.mu, form)
+    fx, fy = start(path[0, 0], path[1, 0], path[2, 0], el.mu)
+    for cycle in range(1, 4):
+        gx, gy, events = march(path, el.mu, form, fx, fy)
+        change = np.hypot(gx - fx, gy - fy)
+        fx, fy = gx, gy
+        if events == 0:
+            slips = _remembered(path, cycle, el, tab, form, C, sums)
+            close(C, K, 0.0, 0.0, sums, F, J)
+            return cycle, slips
+        if change <= NEAR * scale:
+            usable, rx, ry, slips = _implicit(path, fx, fy, el, tab, form, C, sums)
+            if usable:
+                close(C, K, rx, ry, sums, F, J)
+                return cycle + 1, slips
+            break
+    fx, fy, count, done, _ = periodic(path, el.mu, fx, fy, True, limit, phi)
+    usable, rx, ry, slips = _implicit(path, fx, fy, el, tab, form, C, sums)
+    if not usable:                          # not unique: take the state that marching finds
+        fx, fy = start(path[0, 0], path[1, 0], path[2, 0], el.mu)
+        fx, fy, count, done, _ = periodic(path, el.mu, fx, fy, False, limit, phi)
+        slips = _remembered(path, count, el, tab, form, C, sums)
+        rx = ry = 0.0
+    close(C, K, rx, ry, sums, F, J)
     return (count if done else -count), slips
 
 
-@njit(cache=True)
-def disc_batch(w, load, nodes, tab, limit, F, J, shares, cycles):
+@njit(cache=True, error_model="numpy")
+def _clear(sums):
+    sums.F[:], sums.J[:], sums.stick[:] = 0.0, 0.0, 0.0
+
+
+@njit(cache=True, error_model="numpy")
+def disc_batch(w, load, nodes, tab, sums, limit, F, J, shares, cycles):
     """Forces F (n, 3, K), Jacobian J (n, 3, K, 3K), shares (n, 3) of stick, slip and separation, cycles (n,).
 
-    w (n, 3, K) [m]; load (n, S) [N] in place of n0, or (n, 0); nodes (n, 4): kt, kn, mu, n0. Cycles are negative where
-    the force was not periodic after ``limit`` cycles.
+    w (n, 3, K) [m]; load (n, S) [N] in place of n0, or (n, 0); nodes (n, 4): kt, kn, mu, n0; sums is scratch. Cycles
+    are negative where the force was not periodic after ``limit`` cycles.
     """
-    n, S, K = w.shape[0], tab.at.shape[0], tab.at.shape[1]
-    path, Ns = np.empty((3, S)), np.empty(S)
-    means = np.empty((3, tab.sums.shape[1]))
-    acc, C, rows = np.empty((2, K, 3 * K + 2)), np.empty((2, 3 * K + 2)), np.empty((3, 3 * K + 2))
+    n, S = w.shape[0], tab.at.shape[0]
+    path, Ns, form = np.empty((3, S)), np.empty(S), np.empty((EDGE_ROWS, S))
+    contact, C = np.empty(tab.sums.shape[1]), np.empty((2, sums.J.shape[2]))
     for e in range(n):
         el = Node(nodes[e, 0], nodes[e, 1], nodes[e, 2], nodes[e, 3])
-        values(tab.knots_transposed, w[e, 1], el.kt, path[0])
-        values(tab.knots_transposed, w[e, 2], el.kt, path[1])
+        values(tab.knots_transposed, w[e, 1], el.kt, 0.0, path[0])
+        values(tab.knots_transposed, w[e, 2], el.kt, 0.0, path[1])
         _loads(w[e, 0], load[e], el, tab, Ns, path[2])
-        F[e], J[e], means[:], acc[:] = 0.0, 0.0, 0.0, 0.0
-        _normal(w[e, 0], load[e], el, Ns, tab, means[2], F[e, 0], J[e, 0])
-        cycles[e], slips = _tangential(path, el, tab, limit, means, F[e], J[e], acc, C, rows)
-        _stick(w[e], el.kt, means[0], F[e], J[e])
+        F[e], J[e], contact[:] = 0.0, 0.0, 0.0
+        _normal(w[e, 0], load[e], el, Ns, tab, contact, F[e, 0], J[e, 0])
+        cycles[e], slips = _tangential(path, el, tab, limit, form, C, sums, F[e], J[e])
+        _add_stick(w[e], el.kt, sums.stick, F[e], J[e])
         shares[e, 1] = slips / S
-        shares[e, 2] = 1.0 - means[2, 0]
+        shares[e, 2] = 1.0 - contact[0]
         shares[e, 0] = 1.0 - shares[e, 1] - shares[e, 2]

@@ -1,7 +1,9 @@
 """Periodic state of 2-D Coulomb elements: fixed point of the period map, by marching and by Newton on its derivative.
 
-The force at the first knot maps to the force one period later. The map never expands, so that marching converges,
-but slowly near the stick limit; there Newton with the 2 x 2 derivative of the map takes a few periods.
+In slip the half-angle vector (P, Q) ~ (cos theta/2, sin theta/2) of the force moves by a 2 x 2 matrix on each edge,
+A = ((1 + E) I + (1 - E) [[ux, uy], [uy, -ux]]) / 2, so that marching needs no trigonometry and no division. The period
+map never expands: marching converges, but slowly near the stick limit, where Newton with the derivative of the map
+takes a few periods.
 """
 
 from __future__ import annotations
@@ -13,12 +15,43 @@ from numba import njit
 
 from bladefem.friction.disc import SLIP, STICK, edge, sensitivity
 
-__all__ = ["period", "periodic", "start"]
+__all__ = ["DIRECTION_X", "DIRECTION_Y", "EDGE_ROWS", "GROWTH", "HALF", "LENGTH", "edges", "half_angle", "march",
+           "period", "periodic", "start", "turned"]
 
-TOLERANCE = 1e-12       # of the largest friction limit: how well the force must repeat itself
+TOLERANCE = 1e-12       # of the largest friction limit: how well the force must repeat itself in marching
+DIRECTION_X, DIRECTION_Y, LENGTH, HALF, GROWTH, EDGE_ROWS = 0, 1, 2, 3, 4, 5
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy", fastmath={"contract", "nsz", "arcp"})
+def edges(path, mu, out):
+    """Fill out (5, S): direction (2), length [N], decay over half the edge in slip, growth of the limit."""
+    S = path.shape[1]
+    for i in range(S):
+        j = i + 1 if i + 1 < S else 0
+        dx, dy = path[0, j] - path[0, i], path[1, j] - path[1, i]
+        N0, N1 = path[2, i], path[2, j]
+        R = max(0.5 * mu * (N0 + N1), 1e-300)
+        L = max(sqrt(dx * dx + dy * dy), 1e-12 * R)
+        x = 0.5 * L / R
+        out[DIRECTION_X, i], out[DIRECTION_Y, i], out[LENGTH, i] = dx / L, dy / L, L
+        out[HALF, i] = 1.0 / (sqrt(1.0 + x * x) + x)
+        out[GROWTH, i] = mu * (N1 - N0) / L
+
+
+@njit(cache=True, error_model="numpy", inline="always")
+def half_angle(x, y):
+    """A vector along (cos theta/2, sin theta/2) for the direction (x, y) of unit length."""
+    return (1.0 + x, y) if x >= 0.0 else (y, 1.0 - x)
+
+
+@njit(cache=True, error_model="numpy", inline="always")
+def turned(P, Q, ux, uy, E):
+    """The half-angle vector after tan(psi/2) to the direction (ux, uy) has fallen by E."""
+    a, b = 1.0 + E, 1.0 - E
+    return 0.5 * ((a + b * ux) * P + b * uy * Q), 0.5 * (b * uy * P + (a - b * ux) * Q)
+
+
+@njit(cache=True, error_model="numpy")
 def start(vx, vy, N, mu):
     """Force at the first knot: k_t w, drawn back onto the circle."""
     R = mu * max(N, 0.0)
@@ -27,9 +60,45 @@ def start(vx, vy, N, mu):
     return scale * vx, scale * vy
 
 
-@njit(cache=True)
-def period(vx, vy, N, mu, fx, fy, phi):
-    """One period from f = (fx, fy) [N] at the first knot: (fx, fy, edges that slip or open); phi (2, 2) = df_end/df."""
+@njit(cache=True, error_model="numpy")
+def march(path, mu, form, fx, fy):
+    """One period of the force alone from (fx, fy) at the first knot: (fx, fy, edges that slip or open)."""
+    S, events, slipping, P, Q = path.shape[1], 0, False, 1.0, 0.0
+    for i in range(S):
+        j = i + 1 if i + 1 < S else 0
+        N0, N1 = path[2, i], path[2, j]
+        if slipping:
+            ux, uy = form[DIRECTION_X, i], form[DIRECTION_Y, i]
+            size, cx, cy = P * P + Q * Q, P * P - Q * Q, 2.0 * P * Q
+            if N1 > 0.0 and cx * ux + cy * uy >= form[GROWTH, i] * size:
+                P, Q = turned(P, Q, ux, uy, form[HALF, i] ** 2)
+                events += 1
+                continue
+            slipping = False
+            fx, fy = mu * N0 * cx / size, mu * N0 * cy / size
+        dx, dy = path[0, j] - path[0, i], path[1, j] - path[1, i]
+        if N0 > 0.0 and N1 > 0.0:
+            ex, ey, R1 = fx + dx, fy + dy, mu * N1
+            if ex * ex + ey * ey <= R1 * R1:
+                fx, fy = ex, ey
+                continue
+        end, fx, fy, _, _, _ = edge(fx, fy, dx, dy, N0, N1, mu)
+        events += end != STICK
+        if end == SLIP and N1 > 0.0:
+            R1 = mu * N1
+            slipping = R1 > 0.0
+            if slipping:
+                P, Q = half_angle(fx / R1, fy / R1)
+    if slipping:
+        size, R1 = P * P + Q * Q, mu * path[2, 0]
+        fx, fy = R1 * (P * P - Q * Q) / size, R1 * 2.0 * P * Q / size
+    return fx, fy, events
+
+
+@njit(cache=True, error_model="numpy")
+def period(path, mu, fx, fy, phi):
+    """One period from (fx, fy) [N] at the first knot: (fx, fy, edges that slip or open); phi (2, 2) = df_end/df."""
+    vx, vy, N = path
     S, events = vx.size, 0
     phi[:] = 0.0
     phi[0, 0] = phi[1, 1] = 1.0
@@ -48,9 +117,9 @@ def period(vx, vy, N, mu, fx, fy, phi):
     return fx, fy, events
 
 
-@njit(cache=True)
-def _newton(fx, fy, gx, gy, R, phi):
-    """(usable, fx, fy): the fixed point of the linearised period map, drawn back onto the circle of radius R."""
+@njit(cache=True, error_model="numpy")
+def newton(fx, fy, gx, gy, R, phi):
+    """(usable, fx, fy): the fixed point of the linearised period map f -> g, drawn back onto the circle of radius R."""
     a, b, c, d = 1.0 - phi[0, 0], -phi[0, 1], -phi[1, 0], 1.0 - phi[1, 1]
     det = a * d - b * c
     if abs(det) < 1e-9:
@@ -63,24 +132,23 @@ def _newton(fx, fy, gx, gy, R, phi):
     return True, x, y
 
 
-@njit(cache=True)
-def periodic(vx, vy, N, mu, newton, limit, phi):
-    """(fx, fy, events, cycles, converged, guesses) for kt w = (vx, vy) (S,) and N (S,) at the knots [N]; fills phi."""
-    fx, fy = start(vx[0], vy[0], N[0], mu)
-    scale, R = mu * max(N.max(), 0.0), mu * max(N[0], 0.0)
-    guess, guesses, before, sx, sy, events = False, 0, np.inf, 0.0, 0.0, 0
+@njit(cache=True, error_model="numpy")
+def periodic(path, mu, fx, fy, guessing, limit, phi):
+    """(fx, fy, cycles, converged, guesses) of the periodic force for path (3, S) [N], from (fx, fy); fills phi."""
+    scale, R = mu * max(path[2].max(), 0.0), mu * max(path[2, 0], 0.0)
+    guess, guesses, before, sx, sy = False, 0, np.inf, 0.0, 0.0
     for cycle in range(1, limit + 1):
-        gx, gy, events = period(vx, vy, N, mu, fx, fy, phi)
+        gx, gy, events = period(path, mu, fx, fy, phi)
         residual = hypot(gx - fx, gy - fy)
         if events == 0 or residual <= TOLERANCE * scale:
-            return gx, gy, events, cycle, True, guesses
+            return gx, gy, cycle, True, guesses
         if guess and residual > 0.5 * before:           # no better than marching: go back and march on
             fx, fy, guess = sx, sy, False
             continue
         before, sx, sy = residual, gx, gy
         guess = False
-        if newton and cycle > 1:
-            guess, gx, gy = _newton(fx, fy, gx, gy, R, phi)
+        if guessing:
+            guess, gx, gy = newton(fx, fy, gx, gy, R, phi)
             guesses += guess
         fx, fy = gx, gy
-    return fx, fy, events, limit, False, guesses
+    return fx, fy, limit, False, guesses

@@ -13,9 +13,9 @@ import numpy as np
 from numba import njit
 
 from bladefem.errors import InputError
-from bladefem.friction.harmonics import synthesis
+from bladefem.friction.harmonics import analysis, synthesis
 
-__all__ = ["Node", "Tables", "gram", "tables", "values", "weighted"]
+__all__ = ["Node", "Sums", "Tables", "columns", "empty_sums", "gram", "tables", "values", "weighted"]
 
 
 class Node(NamedTuple):
@@ -35,6 +35,22 @@ class Tables(NamedTuple):
     sums: np.ndarray        # (2S+1, 4H+1) running means of the basis up to 2H over two periods, for cyclic ranges
     knots: np.ndarray       # (S, K) synthesis at tau = 2 pi (i - 1/2) / S, harmonic h divided by cos(h pi / S)
     knots_transposed: np.ndarray    # (K, S)
+    analysis: np.ndarray    # (S, K) weights of a sample in the coefficients
+    pattern: np.ndarray     # (S, 3, M) rows of a 2-D element: normal sample, change between knots of either tangent
+
+
+class Sums(NamedTuple):
+    """What a 2-D element collects in one period; M columns as in disc_rows.py."""
+
+    F: np.ndarray           # (3, K) force harmonics of stretches and samples
+    J: np.ndarray           # (2, K, M) their rows
+    stick: np.ndarray       # (4H+1,) basis means of the samples in stick
+    which: np.ndarray       # (S+4,) samples that do not stick
+    force: np.ndarray       # (S+4, 2) their forces
+    rows: np.ndarray        # (S+4, 2, M) their rows
+    row: np.ndarray         # (M,) row of the angle in slip
+    mean: np.ndarray        # (4H+1,) scratch
+    weight: np.ndarray      # (K,) scratch
 
 
 @lru_cache(maxsize=8)
@@ -47,25 +63,34 @@ def tables(H: int, samples: int) -> Tables:
     sums = np.concatenate([np.zeros((1, 4 * H + 1)), np.cumsum(wide, axis=0)])
     knots = synthesis(H, samples, -0.5)
     knots[:, 1:] /= np.repeat(np.cos(np.pi / samples * np.arange(1, H + 1)), 2)
-    made = Tables(at, at.T.copy(), sums, knots, knots.T.copy())
+    made = Tables(at, at.T.copy(), sums, knots, knots.T.copy(), analysis(H, samples).T.copy(), _pattern(at, knots))
     for array in made:
         array.setflags(write=False)
     return made
 
 
-@njit(cache=True, inline="always")
-def _cos(m, p):
-    return m[0] if p == 0 else m[2 * abs(p) - 1]
+def columns(K: int) -> int:
+    """M: 3K+2 columns filled up to a multiple of 8."""
+    return (3 * K + 9) // 8 * 8
 
 
-@njit(cache=True, inline="always")
-def _sin(m, p):
-    if p == 0:
-        return 0.0
-    return m[2 * p] if p > 0 else -m[-2 * p]
+def _pattern(at: np.ndarray, knots: np.ndarray) -> np.ndarray:
+    S, K = at.shape
+    pattern = np.zeros((S, 3, columns(K)))
+    pattern[:, 0, :K] = at
+    pattern[:, 1, K:2 * K] = pattern[:, 2, 2 * K:3 * K] = np.roll(knots, -1, axis=0) - knots
+    return pattern
 
 
-@njit(cache=True)
+def empty_sums(H: int, samples: int) -> Sums:
+    """Scratch for one 2-D element."""
+    K, M = 2 * H + 1, columns(2 * H + 1)
+    return Sums(np.empty((3, K)), np.empty((2, K, M)), np.empty(4 * H + 1), np.empty(samples + 4, np.int64),
+                np.empty((samples + 4, 2)), np.empty((samples + 4, 2, M)), np.empty(M), np.empty(4 * H + 1),
+                np.empty(K))
+
+
+@njit(cache=True, error_model="numpy")
 def gram(m, out):
     """out (K, K) = analysis of synthesis restricted to a set whose basis means up to 2H are m (4H+1); I on a circle."""
     H = out.shape[0] // 2
@@ -75,14 +100,17 @@ def gram(m, out):
         out[0, 2 * a] = m[2 * a]
         out[2 * a - 1, 0] = 2 * m[2 * a - 1]
         out[2 * a, 0] = 2 * m[2 * a]
-        for b in range(1, H + 1):
-            out[2 * a - 1, 2 * b - 1] = _cos(m, a - b) + _cos(m, a + b)
-            out[2 * a, 2 * b] = _cos(m, a - b) - _cos(m, a + b)
-            out[2 * a - 1, 2 * b] = _sin(m, a + b) + _sin(m, b - a)
-            out[2 * a, 2 * b - 1] = _sin(m, a + b) + _sin(m, a - b)
+        for b in range(1, a + 1):
+            total, apart = 2 * (a + b), 2 * (a - b)
+            cos_apart, sin_apart = (m[apart - 1], m[apart]) if a > b else (m[0], 0.0)
+            cos, sin = m[total - 1], m[total]
+            out[2 * a - 1, 2 * b - 1] = out[2 * b - 1, 2 * a - 1] = cos_apart + cos
+            out[2 * a, 2 * b] = out[2 * b, 2 * a] = cos_apart - cos
+            out[2 * a, 2 * b - 1] = out[2 * b - 1, 2 * a] = sin + sin_apart
+            out[2 * a - 1, 2 * b] = out[2 * b, 2 * a - 1] = sin - sin_apart
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy")
 def weighted(m, out):
     """out (K,) = coefficients of the indicator function of a set with basis means m."""
     out[0] = m[0]
@@ -90,11 +118,13 @@ def weighted(m, out):
         out[k] = 2 * m[k]
 
 
-@njit(cache=True, fastmath={"contract", "reassoc", "nsz"})
-def values(transposed, c, factor, out):
-    """out (S,) = factor times the motion with coefficients c (K,)."""
-    out[:] = factor * c[0]
-    for k in range(1, c.size):
-        scaled = factor * c[k]
+@njit(cache=True, error_model="numpy", fastmath={"contract", "reassoc", "nsz"})
+def values(transposed, c, factor, offset, out):
+    """out (S,) = offset plus factor times the motion with coefficients c (K,); synthesis transposed (K, S)."""
+    first = offset + factor * c[0]
+    for i in range(out.size):
+        out[i] = first
+    for h in range(1, c.size, 2):
+        cos, sin = factor * c[h], factor * c[h + 1]
         for i in range(out.size):
-            out[i] += scaled * transposed[k, i]
+            out[i] += cos * transposed[h, i] + sin * transposed[h + 1, i]
