@@ -29,7 +29,7 @@ from .mortar import mortar_means, mortar_patch, overlap
 from .shape import corner_count, face_quadrature, shape
 from .surface import frames, outward, surface
 
-__all__ = ["make_patch", "normal_ports", "patch_faces", "patch_means", "port_matrix", "rigid_ports"]
+__all__ = ["initial_gap", "make_patch", "normal_ports", "patch_faces", "patch_means", "port_matrix", "rigid_ports"]
 
 
 def make_patch(mesh: Mesh, pair: str) -> Patch:
@@ -116,6 +116,14 @@ def patch_means(patch: Patch, mesh: Mesh, side: str = "blade") -> sp.csr_matrix:
     columns = np.repeat(patch.faces[:, None, :], faces.shape[1], axis=1)
     W = sp.coo_matrix((blocks.ravel(), (rows.ravel(), columns.ravel())), shape=(len(mesh.points), len(patch.area)))
     return W.tocsr() @ sp.diags(1 / patch.area)
+
+
+def initial_gap(patch: Patch, mesh: Mesh) -> np.ndarray:
+    """(n,) normal distance of the two faces as meshed [m], chi-weighted means: crowned and rounded faces included."""
+    pair = mesh.pairs[patch.name]
+    blade, damper = (patch_means(patch, mesh, side).T @ mesh.points for side in ("blade", "damper"))
+    apart = (damper - pair.shift) @ pair.rotation - blade
+    return np.einsum("ni,ni->n", apart, patch.frame[:, 0])
 
 
 def rigid_ports(patches: Sequence[Patch], mesh: Mesh, origin: np.ndarray) -> np.ndarray:

@@ -12,7 +12,7 @@ can't hold (the engine axis for a wedge, the circumference for a flat damper) dr
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 import scipy.sparse as sp
@@ -29,7 +29,7 @@ from ..fem.linalg import dot
 from ..fem.loads import centrifugal, mass
 from ..scene import Materials
 from .lcp import LCPSolution, held_directions, solve_lcp
-from .patch import make_patch, normal_ports, port_matrix, rigid_ports
+from .patch import initial_gap, make_patch, normal_ports, port_matrix, rigid_ports
 
 __all__ = ["ContactProblem", "contact_problem", "seat", "solve", "spin_axis"]
 
@@ -60,8 +60,8 @@ def contact_problem(mesh: Mesh, patches: Sequence[Patch], blade: Flexibility, da
     Args:
         blade: the factorised blade or cyclic sector in nodal diameter 0.
         damper: the factorised floating damper, or its Body for a damper that does not deform.
-        clearance: gap before seating [m], one number or (n,) values (means over the ports' weights, see
-            ``patch.patch_means``); negative for an interference.
+        clearance: gap before seating [m] on top of the one that the mesh has (``patch.initial_gap``), one number or
+            (n,) values (means over the ports' weights, see ``patch.patch_means``); negative for an interference.
 
     Raises:
         InputError: the blade is not in nodal diameter 0, or the clearance does not fit the ports.
@@ -78,14 +78,15 @@ def contact_problem(mesh: Mesh, patches: Sequence[Patch], blade: Flexibility, da
         C_damper, damper_swell = _condense(damper, port_matrix(patches, mesh, "damper")[:, ports], pull)
         C = C + C_damper
     rigid, load = _rigid(mesh, patches, body, pull)
-    gap = np.broadcast_to(np.asarray(clearance, dtype=float), ports.shape)
+    gap = np.concatenate([initial_gap(p, mesh) for p in patches]) + clearance
     if not np.isfinite(gap).all():
         raise InputError("clearance is not a finite number, expected metres")
-    return ContactProblem(tuple(patches), C, gap.copy(), -blade_swell, damper_swell, rigid[ports], load, mass(body))
+    return ContactProblem(tuple(patches), C, gap, -blade_swell, damper_swell, rigid[ports], load, mass(body))
 
 
 def solve(problem: ContactProblem, speed: float, normal: float | None = None, damper_mass: float | None = None,
-          start: Sequence[PressureMap] | None = None, approach: np.ndarray | None = None) -> list[PressureMap]:
+          start: Sequence[PressureMap] | None = None, approach: np.ndarray | None = None,
+          bedded: bool = False) -> list[PressureMap]:
     """Pressure maps of one load state.
 
     Args:
@@ -94,12 +95,14 @@ def solve(problem: ContactProblem, speed: float, normal: float | None = None, da
         damper_mass: mass of the damper [kg] instead of the meshed one.
         start: maps of a neighbouring state, for a warm start.
         approach: (n,) further displacement of the blades at the normal ports, pressing > 0 [m].
+        bedded: the faces have worn until they fit at this speed: gaps, and displacements by the rotation, open nothing.
 
     Raises:
         InputError: no load at all, or a negative one.
         NotSolvedError: the load lifts the damper off, slides it out sideways, or the iteration stopped.
     """
     active = None if start is None else np.concatenate([m.force > 0 for m in start])
+    problem = _fitted(problem) if bedded else problem
     g0 = problem.clearance + speed**2 * problem.blade_swell - (0.0 if approach is None else approach)
     if normal is None:
         scale = speed**2 * (1.0 if damper_mass is None else damper_mass / problem.mass)
@@ -128,6 +131,12 @@ def spin_axis(mesh: Mesh) -> tuple[float, float, float]:
     """The engine axis z; for an endless row of plane blades the y axis, so that the pull is along x only."""
     endless = mesh.sector is not None and mesh.sector.count == 0
     return (0.0, 1.0, 0.0) if endless or (mesh.dimension == 2 and mesh.sector is None) else (0.0, 0.0, 1.0)
+
+
+def _fitted(problem: ContactProblem) -> ContactProblem:
+    """The same bodies with faces that fit each other whatever the rotation."""
+    none = np.zeros_like(problem.clearance)
+    return replace(problem, clearance=none, blade_swell=none, damper_swell=none)
 
 
 def _condense(flex: Flexibility, P: sp.spmatrix, load: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

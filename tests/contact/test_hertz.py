@@ -5,8 +5,10 @@ import pytest
 from blocks import clamped, clamped_odd, compliances, facing_blocks, graded
 
 from bladefem.contact.lcp import solve_lcp
-from bladefem.contact.patch import make_patch, patch_means
+from bladefem.contact.patch import initial_gap, make_patch, patch_means
 from bladefem.contact.slip import slip_step
+from geometry.contact_pairs import hertz_pair
+from geometry.parameters import HertzPair, MeshSize
 
 A, RADIUS = 1e-3, 0.05          # contact radius or half width, radius of curvature [m]
 STEEL = ((2.1e11, 2.1e11), (0.3, 0.3))
@@ -90,3 +92,21 @@ def test_partial_slip_of_a_cylinder():
     rest = limit - state.force
     c = np.sqrt(4 * (rest @ e["r"]**2) / rest.sum())
     assert c / A == pytest.approx(np.sqrt(1 - ratio), rel=0.03)
+
+
+def test_crowned_faces_of_the_meshed_pair():
+    """The geometry's own Hertz pair, unstructured and with a bent face: the gap comes from the mesh alone."""
+    mesh = hertz_pair(HertzPair(radius=RADIUS, contact_radius=A, half_width=0.02, dimension=2),
+                      MeshSize(contact_size=A / 10))
+    patch = make_patch(mesh, "this")
+    gap = initial_gap(patch, mesh)
+    x = patch.points[:, 0]
+    inner = (x > 0) & (x < x.max())             # means over symmetric neighbourhoods
+    assert np.allclose(gap[inner], x[inner]**2 / (2 * RADIUS), atol=0.02 * A**2 / RADIUS)
+    C = sum(compliances(mesh, patch, *STEEL, clamped))
+    e = modulus(*STEEL)
+    s = solve_lcp(C, gap, -np.ones((len(C), 1)), [-np.pi * e * A**2 / (8 * RADIUS)])
+    p = s.force / patch.area
+    exact = e * A / (2 * RADIUS) * np.sqrt(np.clip(1 - (x / A)**2, 0, None))
+    assert p.max() == pytest.approx(exact.max(), rel=0.01)
+    assert np.sqrt(patch.area @ (p - exact)**2 / (patch.area @ exact**2)) < 0.04

@@ -70,6 +70,14 @@ def test_clearance_is_taken_up_by_rigid_motion(solid):
         assert np.abs(a.force - b.force).max() < 1e-8 * a.force.max()
 
 
+def test_bedded_faces_forget_gaps_and_rotation(solid):
+    """Worn faces: only the load's direction and size are left of the rotation."""
+    slow = solve(solid, SPEED, normal=50.0, bedded=True)
+    fast = solve(condensed(wedge_mesh(ALPHA), clearance=np.linspace(0, 1e-5, 50)), 3 * SPEED, normal=50.0, bedded=True)
+    for a, b in zip(slow, fast, strict=True):
+        assert np.abs(a.force - b.force).max() < 1e-9 * a.force.max()
+
+
 def test_warm_start_gives_the_same(solid):
     first = solve(solid, SPEED)
     cold, warm = solve(solid, 0.9 * SPEED), solve(solid, 0.9 * SPEED, start=first)
