@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+from itertools import cycle
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -11,7 +13,7 @@ from matplotlib.patches import Patch as Swatch
 from geometry.mesh import Mesh
 
 from .skin import CORNERS, Skin, family, sector_motion, skin, wheel_count, wheel_skin
-from .style import COLOURS, canvas, headline, photograph, show_photograph
+from .style import COLOURS, canvas, headline, photograph, show_photograph, size_for
 
 if TYPE_CHECKING:
     from pyvista import PolyData, UnstructuredGrid
@@ -27,7 +29,9 @@ VTK_ORDER = {
 }
 BODY_COLOURS = ("#c9d1d9", "#e3cfa4", "#b7cfc0", "#d5c3d8")
 FACE_COLOURS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9", "#7a5195", "#b5bd00", "#8c564b",
-                "#4d4d4d", "#17a2a2", "#c23b5a")
+                "#17a2a2", "#c23b5a")
+# The large faces of a blade in pale shades, so that the small ones that matter stand out.
+PALE = {"pressure_side": "#a9d3cf", "suction_side": "#c4bedd", "trailing_edge": "#8d9aa5", "tip": "#e8d66c"}
 FRONT = (0.35, -0.85, 0.62)
 BELOW = (-0.45, 0.8, 0.65)
 RADIAL = (1.0, 0.0, 0.0)
@@ -163,7 +167,8 @@ def boundary_lines(mesh: Mesh, face: np.ndarray) -> PolyData:
 def label_colours(mesh: Mesh) -> list[str]:
     """Light colours for bodies, strong ones for named faces."""
     bodies = [BODY_COLOURS[i % len(BODY_COLOURS)] for i in range(len(mesh.bodies))]
-    return bodies + [FACE_COLOURS[i % len(FACE_COLOURS)] for i in range(len(mesh.faces))]
+    strong = cycle(FACE_COLOURS)
+    return bodies + [PALE[name] if name in PALE else next(strong) for name in mesh.faces]
 
 
 def view_of(mesh: Mesh, direction: tuple[float, float, float] = FRONT) -> tuple[float, float, float]:
@@ -185,13 +190,26 @@ def photograph_mesh(mesh: Mesh, direction: tuple[float, float, float], edges: bo
     return photograph(parts, direction, RADIAL)
 
 
+def pulled(mesh: Mesh, share: float = 0.07) -> Mesh:
+    """The same mesh with the damper moved inwards by a share of the height, so that the contact faces can be seen."""
+    nodes = [cells.ravel() for name, cells in mesh.bodies.items() if name.startswith("damper")]
+    points = np.array(mesh.points, dtype=float)
+    if nodes:
+        points[np.unique(np.concatenate(nodes)), 0] -= share * np.ptp(points[:, 0])
+    return replace(mesh, points=points)
+
+
 def draw_mesh(mesh: Mesh, file: str | Path | None = None, *, title: str = "", edges: bool = True) -> object:
-    """Bodies and named faces in colour, from two sides, with a legend; returns the figure."""
+    """Bodies and named faces in colour, as they stand and with the damper pulled away; returns the figure."""
     views = (view_of(mesh),) if mesh.dimension == 2 else (FRONT, BELOW)
+    apart = pulled(mesh)
+    shown = (apart,) if mesh.dimension == 2 else (mesh, apart)
     with canvas(file, size=(2.4 + 3.4 * len(views), 5.6), grid=(1, len(views) + 1),
                 width_ratios=[1] * len(views) + [0.6]) as axes:
-        for ax, direction in zip(axes, views, strict=False):
-            show_photograph(ax, photograph_mesh(mesh, direction, edges), direction, RADIAL)
+        for ax, one, direction in zip(axes, shown, views, strict=False):
+            show_photograph(ax, photograph_mesh(one, direction, edges), direction, RADIAL)
+            if one is apart and "damper" in mesh.bodies:
+                ax.set_title("damper drawn away from its seats", fontsize=8.5, fontweight="normal", loc="center")
         headline(axes[0].figure, title or f"mesh of {' and '.join(mesh.bodies)}")
         draw_legend(axes[-1], mesh)
         return axes[0].figure
@@ -224,9 +242,10 @@ def draw_wheel(mesh: Mesh, file: str | Path | None = None, *, title: str = "") -
     direction = view_of(mesh, (0.35, -0.35, 1.0))
     image = photograph([{"mesh": surface, "scalars": "part", "cmap": palette, "clim": (-0.5, 3.5)}], direction,
                        (0.0, 1.0, 0.0) if mesh.dimension == 3 else RADIAL)
-    with canvas(file, size=(6.4, 6.4)) as ax:
+    what = "full wheel" if mesh.sector and mesh.sector.count else "part of the row"
+    with canvas(file, size=size_for(image, 5.8)) as ax:
         show_photograph(ax, image)
-        headline(ax.figure, title or f"full wheel, {wheel_count(mesh)} sectors (the meshed one in colour)")
+        headline(ax.figure, title or f"{what}, {wheel_count(mesh)} sectors (the meshed one in colour)")
         return ax.figure
 
 

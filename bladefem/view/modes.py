@@ -15,7 +15,18 @@ from geometry.mesh import Mesh
 
 from .mesh import FRONT, RADIAL, carry_round, edge_lines, polydata, save_wheel_vtu, view_of
 from .skin import Skin, skin, wheel_count, wheel_skin
-from .style import DIVERGING, LIGHT, SEQUENTIAL, aim, canvas, headline, open_plotter, photograph, show_photograph
+from .style import (
+    DIVERGING,
+    LIGHT,
+    SEQUENTIAL,
+    aim,
+    canvas,
+    headline,
+    open_plotter,
+    photograph,
+    show_photograph,
+    size_for,
+)
 
 __all__ = ["animate_wave", "best_phase", "draw_mode", "draw_mode_sheet", "draw_wheel_mode", "mode_title",
            "save_modes_vtu"]
@@ -56,9 +67,10 @@ def draw_mode(mesh: Mesh, modes: ModeSet, number: int, file: str | Path | None =
     """
     shape = np.real(modes.shapes[number] * best_phase(modes.shapes[number]))
     factor = scale_of(mesh, shape)
-    with canvas(file, size=(5.4, 5.8)) as ax:
-        direction = view_of(mesh)
-        show_photograph(ax, photograph_shape(mesh, shape, factor, direction), direction, RADIAL)
+    direction = view_of(mesh)
+    image = photograph_shape(mesh, shape, factor, direction)
+    with canvas(file, size=size_for(image, 5.2, beside=1.6)) as ax:
+        show_photograph(ax, image, direction, RADIAL)
         headline(ax.figure, mode_title(modes, number, family))
         add_colour_bar(ax, Normalize(0, 1), SEQUENTIAL, "displacement over its largest value [1]")
         say_exaggeration(ax, mesh, modes)
@@ -75,7 +87,7 @@ def say_exaggeration(ax: Any, mesh: Mesh, modes: ModeSet) -> None:
 
 def add_colour_bar(ax: Any, norm: Normalize, colours: str, label: str) -> None:
     """A thin bar to the right of a picture."""
-    bar = ax.figure.colorbar(ScalarMappable(norm, colours), ax=ax, shrink=0.6, aspect=30, pad=0.02)
+    bar = ax.figure.colorbar(ScalarMappable(norm, colours), ax=ax, shrink=0.6, aspect=30, pad=0.03)
     bar.set_label(label, fontsize=8.5)
     bar.ax.tick_params(labelsize=8)
     bar.outline.set_linewidth(0.5)
@@ -170,8 +182,9 @@ def draw_wheel_mode(mesh: Mesh, modes: ModeSet, number: int, file: str | Path | 
         lines.points += 2e-3 * np.ptp(moved[:, 0]) * np.asarray(WHEEL_VIEW)
         parts.append({"mesh": lines, "color": "black", "line_width": 2.2, "lighting": False})
     direction, up = wheel_camera(mesh)
-    with canvas(file, size=(6.6, 6.0)) as ax:
-        show_photograph(ax, photograph(parts, direction, up))
+    image = photograph(parts, direction, up)
+    with canvas(file, size=size_for(image, 5.2, beside=1.0)) as ax:
+        show_photograph(ax, image)
         headline(ax.figure, mode_title(modes, number, family))
         add_colour_bar(ax, Normalize(-1, 1), DIVERGING, f"{name} displacement over its largest value [1]")
         say_exaggeration(ax, mesh, modes)

@@ -14,7 +14,7 @@ from matplotlib.figure import Figure
 from matplotlib.ticker import FuncFormatter, LogLocator, NullFormatter
 
 __all__ = ["COLOURS", "DIVERGING", "FAILED", "SEQUENTIAL", "STYLE", "canvas", "headline", "log_axis", "photograph",
-           "show_photograph"]
+           "show_photograph", "size_for"]
 
 # Okabe and Ito, Color Universal Design (2008); yellow last because it is weak on white.
 COLOURS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9", "#000000", "#F0E442")
@@ -146,6 +146,15 @@ def show_photograph(ax: Any, image: np.ndarray, direction: tuple[float, float, f
         width, height = 0.75 / figure.get_figwidth(), 0.75 / figure.get_figheight()
         left = place.colspan.start / place.get_gridspec().ncols
         draw_triad(figure.add_axes((left, 0.0, width, height)), direction, up)
+
+
+def size_for(image: np.ndarray, height: float, beside: float = 0.3, widest: float = 9.0) -> tuple[float, float]:
+    """Figure size [inch] for a rendering about ``height`` tall, with room beside it and a line above and below."""
+    rows, columns = image.shape[:2]
+    width = height * columns / rows
+    if width > widest:
+        width, height = widest, widest * rows / columns
+    return max(width + beside, 4.4), height + 0.8
 
 
 def headline(figure: Any, text: str) -> None:
