@@ -5,18 +5,19 @@ from __future__ import annotations
 import numpy as np
 
 from ..errors import InputError
-from ..friction.harmonics import to_complex, to_real
+from ..friction.harmonics import to_complex
+from .fallback import Attempt, match_harmonics, solve_balance
 from .linear import Linear, condense
 from .model import ReducedModel
-from .newton import Newton, Options, newton
-from .residual import Balance, start_in_stick
+from .newton import DEFAULTS, Options
+from .residual import Balance
 from .solution import Solution, probe_motion, works
 
-__all__ = ["free", "solve", "stuck"]
+__all__ = ["as_solution", "free", "solve", "stuck"]
 
 
 def solve(model: ReducedModel, omega: float, H: int = 3, samples: int = 128, *, start: Solution | None = None,
-          options: Options = Options()) -> Solution:
+          options: Options = DEFAULTS) -> Solution:
     """The periodic response at circular frequency omega [rad/s] with harmonics 0..H.
 
     Args:
@@ -30,18 +31,16 @@ def solve(model: ReducedModel, omega: float, H: int = 3, samples: int = 128, *, 
         InputError: the frequency, H or samples are out of range.
     """
     balance = _balance(model, omega, H, samples)
-    w = start_in_stick(balance) if start is None else match_harmonics(start.w, H)
-    found, method, iterations = newton(balance, w, options), "newton", 0
-    if start is not None and not found.converged:
-        iterations = found.iterations
-        found = newton(balance, start_in_stick(balance), options)
-    return as_solution(balance, found, method, iterations + found.iterations)
+    attempts = solve_balance(balance, None if start is None else match_harmonics(start.w, H), options)
+    best = min(attempts, key=lambda a: (not a.end.converged, a.end.state.error))
+    reason = best.end.reason if best.end.converged else "; ".join(f"{a.method}: {a.end.reason}" for a in attempts)
+    return as_solution(balance, best, sum(a.end.iterations for a in attempts), reason)
 
 
 def free(model: ReducedModel, omega: float, H: int = 1) -> np.ndarray:
     """(H+1, probes) amplitudes at the probes without contact forces [m]."""
     linear = condense(model, omega, H)
-    return probe_motion(model, omega, np.zeros_like(linear.free), np.zeros(linear.B.shape[1]))
+    return probe_motion(model, omega, np.zeros_like(linear.free), np.zeros(len(linear.rigid)))
 
 
 def stuck(model: ReducedModel, omega: float, H: int = 1) -> np.ndarray:
@@ -51,17 +50,9 @@ def stuck(model: ReducedModel, omega: float, H: int = 1) -> np.ndarray:
     return probe_motion(model, omega, force, _rigid(linear, linear.stuck[0], force[0]))
 
 
-def match_harmonics(w: np.ndarray, H: int) -> np.ndarray:
-    """Coefficients (n, d, *) cut or filled with zeros to 2H+1."""
-    matched = np.zeros((*w.shape[:2], 2 * H + 1))
-    kept = min(w.shape[2], 2 * H + 1)
-    matched[:, :, :kept] = w[:, :, :kept]
-    return matched
-
-
-def as_solution(balance: Balance, found: Newton, method: str, iterations: int) -> Solution:
+def as_solution(balance: Balance, attempt: Attempt, iterations: int, reason: str) -> Solution:
     """The record of a finished attempt."""
-    model, linear, state = balance.model, balance.linear, found.state
+    model, linear, state = balance.model, balance.linear, attempt.end.state
     load = state.forces.f.copy()
     if model.directions > model.elements.tangents:
         load[:, 0, 0] -= np.maximum(model.elements.n0, 0.0)
@@ -71,9 +62,11 @@ def as_solution(balance: Balance, found: Newton, method: str, iterations: int) -
     return Solution(
         omega=linear.omega, harmonics=state.w.shape[2] // 2, samples=balance.samples, w=state.w, f=state.forces.f,
         probe=probe_motion(model, linear.omega, force, _rigid(linear, mean, force[0])),
-        converged=found.converged, reason=found.reason, method=method, iterations=iterations, residual=state.error,
+        converged=attempt.end.converged, reason=reason, method=attempt.method, iterations=iterations,
+        residual=state.error,
         residual_displacement=float(abs(state.residual).max()),
-        residual_force=float(abs(stiffness * state.residual).max()), states=_states(state.forces.shares),
+        residual_force=float(abs(stiffness * state.residual).max()), drift=_drift(linear, load),
+        states=_states(state.forces.shares),
         work=works(model, linear.omega, state.w, load, float(np.sum(state.forces.dissipated))))
 
 
@@ -85,6 +78,13 @@ def _balance(model: ReducedModel, omega: float, H: int, samples: int) -> Balance
     if max(model.excitation, default=0) > H:
         raise InputError(f"H {H}: expected at least {max(model.excitation)}, the highest excited harmonic")
     return Balance(model, condense(model, omega, H), samples)
+
+
+def _drift(linear: Linear, load: np.ndarray) -> float:
+    """Load on the holding springs over what the contacts could carry, both on the motions without stiffness."""
+    held = np.linalg.norm(linear.B.T @ load[:, :, 0].ravel() - linear.g)
+    carried = np.linalg.norm(abs(linear.B).T @ np.linalg.norm(load, axis=2).ravel())
+    return float(held / max(carried, np.finfo(float).tiny))
 
 
 def _states(shares: np.ndarray) -> dict[str, int]:
@@ -100,4 +100,4 @@ def _rigid(linear: Linear, mean: np.ndarray, force: np.ndarray) -> np.ndarray:
     if linear.B.shape[1] == 0:
         return np.zeros(0)
     gap = mean - linear.free[0] + linear.G[0] @ force
-    return np.linalg.lstsq(linear.B, gap.real, rcond=None)[0]
+    return linear.rigid @ (linear.B.T @ (linear.springs * gap.real))

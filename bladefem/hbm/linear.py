@@ -16,7 +16,7 @@ from .model import Damping, ReducedModel
 
 __all__ = ["Linear", "condense", "receptance"]
 
-TINY_SPRING = 1e-9     # share of the contact stiffness that holds a damper in place when all its contacts slip
+UNSEEN = 1e-12         # motions that the contact springs resist less than this, relatively, are left out
 
 
 @dataclass(frozen=True)
@@ -29,8 +29,9 @@ class Linear:
     free: np.ndarray        # (H+1, m) relative displacement without contact forces [m]
     A: np.ndarray           # (H+1, m, m) flexibility with contact springs [m/N]
     stuck: np.ndarray       # (H+1, m) relative displacement in full stick [m]
-    B: np.ndarray           # (m, r) relative displacement by the motions without stiffness, harmonic 0
-    g: np.ndarray           # (r,) loads on these motions [N]
+    B: np.ndarray           # (m, r) motions without stiffness of harmonic 0, scaled to B^T K B = 1
+    g: np.ndarray           # (r,) loads on these motions
+    rigid: np.ndarray       # (r0, r) the same motions in the rigid coordinates of blade, then damper
 
 
 def condense(model: ReducedModel, omega: float, harmonics: int) -> Linear:
@@ -41,12 +42,12 @@ def condense(model: ReducedModel, omega: float, harmonics: int) -> Linear:
     free, stuck = np.zeros((2, harmonics + 1, m), dtype=complex)
     for h in range(harmonics + 1):
         G[h], free[h] = _flexibility(model, h, h * omega)
-    B, g = _rigid_motions(model)
-    A[0], stuck[0] = _with_springs(G[0].real, free[0].real, springs, B, g)
+    B, g, rigid = _rigid_motions(model, springs)
+    A[0], stuck[0] = _with_springs(G[0].real, free[0].real, springs, B, g, model.hold)
     for h in range(1, harmonics + 1):
         solved = np.linalg.solve(np.eye(m) + G[h] * springs, np.column_stack([G[h], free[h]]))
         A[h], stuck[h] = solved[:, :m], solved[:, m]
-    return Linear(omega, springs, G, free, A, stuck, B, g)
+    return Linear(omega, springs, G, free, A, stuck, B, g, rigid)
 
 
 def receptance(body: PortModel, damping: Damping, w: float, rows: np.ndarray | slice,
@@ -82,32 +83,33 @@ def _flexibility(model: ReducedModel, h: int, w: float) -> tuple[np.ndarray, np.
     return G, free
 
 
-def _rigid_motions(model: ReducedModel) -> tuple[np.ndarray, np.ndarray]:
+def _rigid_motions(model: ReducedModel, springs: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     side = model.side(0)
-    rigid = side.omega == 0
-    motions = [side.shapes[_contact_rows(side, model)][:, rigid].real]
-    loads = [side.shapes[side.ports["load"]][:, rigid].real.T @ np.real(model.excitation.get(0, 0.0))
-             if 0 in model.excitation else np.zeros(rigid.sum())]
+    still = side.omega == 0
+    motions, loads = [side.shapes[_contact_rows(side, model)][:, still].real], np.zeros(still.sum())
+    if 0 in model.excitation:
+        loads = side.shapes[side.ports["load"]][:, still].real.T @ np.real(model.excitation[0])
     if isinstance(model.damper, RigidBody):
         motions.append(-model.damper.B[model.rows])
     elif model.damper is not None:
         damper = model.damper_side(0)
         motions.append(-damper.shapes[_contact_rows(damper, model)][:, damper.omega == 0].real)
-    loads.append(np.zeros(sum(part.shape[1] for part in motions) - rigid.sum()))
-    return np.column_stack(motions), np.concatenate(loads)
+    B = np.column_stack(motions)
+    loads = np.concatenate([loads, np.zeros(B.shape[1] - len(loads))])
+    held = B.T @ (springs[:, None] * B)
+    size = np.sqrt(np.where(np.diag(held) > 0, np.diag(held), 1.0))     # metres and radians alike
+    values, vectors = np.linalg.eigh(held / np.outer(size, size))
+    kept = values > UNSEEN
+    rigid = vectors[:, kept] / np.sqrt(values[kept]) / size[:, None]
+    return B @ rigid, rigid.T @ loads, rigid
 
 
 def _with_springs(G: np.ndarray, free: np.ndarray, springs: np.ndarray, B: np.ndarray,
-                  g: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+                  g: np.ndarray, hold: float) -> tuple[np.ndarray, np.ndarray]:
     """Flexibility and displacement of harmonic 0 with contact springs, motions without stiffness eliminated."""
     m, r = B.shape
-    held = B.T @ (springs[:, None] * B)
-    scale = np.trace(held) / max(r, 1) or 1.0
-    # the tiny spring also serves motions that no contact spring sees
-    weak = TINY_SPRING * np.diag(np.where(np.diag(held) > 0, np.diag(held), scale))
-    system = np.block([[np.eye(m) + G * springs, -B], [B.T * springs, weak]])
-    right = np.block([[G, free[:, None]], [B.T, g[:, None]]])
-    solved = np.linalg.solve(system, right)
+    system = np.block([[np.eye(m) + G * springs, -B], [B.T * springs, hold * np.eye(r)]])
+    solved = np.linalg.solve(system, np.block([[G, free[:, None]], [B.T, g[:, None]]]))
     return solved[:m, :m], solved[:m, m]
 
 

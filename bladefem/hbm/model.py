@@ -46,6 +46,9 @@ class ReducedModel:
     damping: Damping = field(default_factory=Damping)
     damper: RigidBody | tuple[PortModel, ...] | None = None     # None: the other side of each contact is fixed
     damper_damping: Damping = field(default_factory=Damping)
+    # A damper whose contacts all slip has an indifferent mean position, and drifts where friction pushes it: springs of
+    # this share of the contact stiffness hold the mean. What they carry is reported as Solution.drift.
+    hold: float = 1e-3
 
     def __post_init__(self) -> None:
         nodes, dofs = len(self.elements.kt), _port_size(self.sides[0], "contact")
@@ -58,6 +61,8 @@ class ReducedModel:
             value = getattr(self.elements, name)
             if np.shape(value) != (nodes,) or not np.isfinite(value).all() or (name != "n0" and np.min(value) < 0):
                 raise InputError(f"elements.{name}: expected {nodes} finite numbers, not negative but for n0")
+        if not 0 < self.hold <= 1:
+            raise InputError(f"hold {self.hold}: expected a share of the contact stiffness, above 0 and at most 1")
         loads = _port_size(self.sides[0], "load")
         for h, force in self.excitation.items():
             if h < 0 or h != int(h) or np.shape(force) != (loads,) or not np.isfinite(force).all():

@@ -2,16 +2,17 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
 
 from ..errors import InputError
-from .residual import Balance, State, direction, evaluate_balance
+from .residual import Balance, State, evaluate_balance, linearise
 
-__all__ = ["Newton", "Options", "newton"]
+__all__ = ["DEFAULTS", "Newton", "Options", "newton"]
 
-SHORTEST = 2.0**-10     # step share below which the search direction is given up
+SHORTEST = 2.0**-8     # step share below which the search direction is given up
 
 
 @dataclass(frozen=True)
@@ -32,6 +33,9 @@ class Options:
             raise InputError(f"iterations {self.iterations}: expected at least 1")
 
 
+DEFAULTS = Options()
+
+
 @dataclass(frozen=True)
 class Newton:
     """Where Newton ended."""
@@ -42,33 +46,43 @@ class Newton:
     reason: str
 
 
-def newton(balance: Balance, w: np.ndarray, options: Options = Options()) -> Newton:
-    """Solve the balance from the displacements w (n, d, K)."""
+def newton(balance: Balance, w: np.ndarray, options: Options = DEFAULTS, merit: str = "step") -> Newton:
+    """Solve the balance from the displacements w (n, d, K).
+
+    Args:
+        merit: what the line search lowers: "step", the Newton step that the last derivative would take next, which
+            does not depend on how the equations are scaled (Deuflhard, Newton Methods for Nonlinear Problems, 2004,
+            Sect. 3.3), or "residual".
+    """
     state = evaluate_balance(balance, w)
     for iteration in range(options.iterations + 1):
         if state.error <= options.tolerance:
             return Newton(state, iteration, True, "residual within tolerance")
+        if not np.isfinite(state.error):
+            return Newton(state, iteration, False, "residual is not finite")
         if iteration == options.iterations:
             break
         try:
-            step = direction(balance, state)
+            inverse = linearise(balance, state)
         except np.linalg.LinAlgError:
             return Newton(state, iteration, False, "singular Jacobian")
-        if not np.isfinite(step).all():
-            return Newton(state, iteration, False, "Jacobian gave a step that is not finite")
-        better = _search(balance, state, step)
+        better = _search(balance, state, inverse, merit)
         if better is None:
-            return Newton(state, iteration, False, f"line search stalled at residual {state.error:.1e}")
+            return Newton(state, iteration + 1, False, f"line search stalled at residual {state.error:.1e}")
         state = better
     return Newton(state, options.iterations, False, f"residual {state.error:.1e} after {options.iterations} iterations")
 
 
-def _search(balance: Balance, state: State, step: np.ndarray) -> State | None:
-    """The first halving of the step that lowers the residual, or None."""
-    before, share = np.linalg.norm(state.residual), 1.0
+def _search(balance: Balance, state: State, inverse: Callable[[np.ndarray], np.ndarray], merit: str) -> State | None:
+    """The first halving of the step that lowers the merit, or None."""
+    step = inverse(state.residual)
+    if not np.isfinite(step).all():
+        return None
+    measure, demand = (inverse, 0.25) if merit == "step" else (np.asarray, 1e-4)
+    before, share = np.linalg.norm(measure(state.residual)), 1.0
     while share >= SHORTEST:
-        trial = evaluate_balance(balance, state.w + share * step)
-        if np.linalg.norm(trial.residual) <= (1 - 1e-4 * share) * before:
+        trial = evaluate_balance(balance, state.w - share * step)
+        if np.linalg.norm(measure(trial.residual)) <= (1 - demand * share) * before:
             return trial
         share /= 2
     return None

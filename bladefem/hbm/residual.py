@@ -7,6 +7,7 @@ A is one block a harmonic, and both vanish together at nodes that stick: these a
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -17,7 +18,7 @@ from ..friction.harmonics import to_complex, to_real
 from .linear import Linear
 from .model import ReducedModel
 
-__all__ = ["Balance", "State", "contact_forces", "direction", "evaluate_balance", "start_in_stick"]
+__all__ = ["Balance", "State", "contact_forces", "evaluate_balance", "linearise", "start_in_stick"]
 
 STICKS = 1e-13      # a node whose p is below this share of its spring force sticks
 
@@ -68,24 +69,35 @@ def contact_forces(model: ReducedModel, w: np.ndarray, samples: int) -> Forces:
     return replace(forces, f=forces.f[:, missing:], dfdw=forces.dfdw[:, missing:, :, missing:])
 
 
-def direction(balance: Balance, state: State) -> np.ndarray:
-    """(n, d, K) the Newton step [m], the linear system reduced to the nodes that slip or lift."""
+def linearise(balance: Balance, state: State) -> Callable[[np.ndarray], np.ndarray]:
+    """The inverse of the balance's derivative: residual (n, d, K) to displacement (n, d, K) [m].
+
+    The linear system is reduced to the nodes that slip or lift; the others follow from their forces. Raises
+    numpy.linalg.LinAlgError where the derivative is singular.
+    """
     n, d, K = state.w.shape
     change = _force_change(balance, state)
     active = np.flatnonzero(abs(change).reshape(n, -1).max(axis=1) > STICKS * balance.model.springs.max(axis=1))
-    step = -state.residual.copy()
     if len(active) == 0:
-        return step
+        return np.copy
+    others, change = np.setdiff1d(np.arange(n), active), change[active]
     dofs = (active[:, None] * d + np.arange(d)).ravel()
-    J = _jacobian(balance.linear.A[:, dofs][:, :, dofs], change[active])
+    J = _jacobian(balance.linear.A[:, dofs][:, :, dofs], change)
     J[np.diag_indices_from(J)] += 1.0
-    step[active] = linalg.solve(J, step[active].ravel(), check_finite=False).reshape(-1, d, K)
-    if len(active) < n:
-        p = np.zeros_like(step)
-        p[active] = np.einsum("nij,nj->ni", change[active], step[active].reshape(len(active), -1)).reshape(-1, d, K)
-        others = np.setdiff1d(np.arange(n), active)
-        step[others] -= _spread(balance, _apply(balance.linear.A, _harmonics(p)))[others]
-    return step
+    factors = linalg.lu_factor(J, overwrite_a=True, check_finite=False)
+    if not abs(np.diag(factors[0])).min() > 0:
+        raise np.linalg.LinAlgError("singular Jacobian")
+
+    def solve(residual: np.ndarray) -> np.ndarray:
+        step = residual.copy()
+        step[active] = linalg.lu_solve(factors, residual[active].ravel(), check_finite=False).reshape(-1, d, K)
+        if len(others):
+            p = np.zeros_like(step)
+            p[active] = (change @ step[active].reshape(len(active), d * K, 1)).reshape(-1, d, K)
+            step[others] -= _spread(balance, _apply(balance.linear.A, _harmonics(p)))[others]
+        return step
+
+    return solve
 
 
 def _force_change(balance: Balance, state: State) -> np.ndarray:

@@ -46,6 +46,7 @@ class Solution:
     residual: float                 # over the size of the motion [1]
     residual_displacement: float    # largest entry of the residual [m]
     residual_force: float           # the same times the contact stiffness [N]
+    drift: float                    # mean load on the springs that hold the damper, over the contacts' load [1]
     states: dict[str, int]          # number of nodes that stick, slip, lift off, are open
     work: Work
 

@@ -8,9 +8,10 @@ from dataclasses import replace
 import numpy as np
 
 from ..errors import InputError
-from .api import match_harmonics, solve
+from .api import solve
+from .fallback import match_harmonics
 from .model import ReducedModel
-from .newton import Options
+from .newton import DEFAULTS, Options
 from .resonance import free_resonances, stuck_resonances
 from .solution import Solution
 
@@ -26,7 +27,7 @@ def size(solution: Solution, probe: int = 0) -> float:
 
 
 def response(model: ReducedModel, omegas: Iterable[float], H: int = 3, samples: int = 128, *,
-             options: Options = Options()) -> Iterator[Solution]:
+             options: Options = DEFAULTS) -> Iterator[Solution]:
     """Solve one point after the other, each started from the line through the last two."""
     last: list[Solution] = []
     for omega in omegas:
@@ -37,7 +38,7 @@ def response(model: ReducedModel, omegas: Iterable[float], H: int = 3, samples: 
 
 
 def sweep(model: ReducedModel, band: tuple[float, float], H: int = 3, samples: int = 128, *, peak: float = 1e-3,
-          curve: float = 0.02, probe: int = 0, options: Options = Options()) -> Iterator[Solution]:
+          curve: float = 0.02, probe: int = 0, options: Options = DEFAULTS) -> Iterator[Solution]:
     """Solve a band of circular frequencies [rad/s]; points come in the order of need, to be sorted by `omega`.
 
     A first look takes even steps and the resonances of both linear limits. Then every local maximum is closed in,

@@ -1,0 +1,127 @@
+"""What is tried, in order, when Newton does not reach a point; every attempt leaves its reason.
+
+1. Newton from the given start and from full stick, its line search on the step, then on the residual;
+2. harmonics in sequence, 3, 7, 15, ... up to H, each started from the one before;
+3. homotopy in the normal load, from a load under which everything sticks down to the true one.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from .linear import Linear
+from .newton import Newton, Options, newton
+from .residual import Balance, evaluate_balance, start_in_stick
+
+__all__ = ["Attempt", "match_harmonics", "solve_balance"]
+
+FIRST_LOAD, LARGEST_LOAD = 100.0, 1e8   # multiples of the normal load where a homotopy starts
+SMALLEST_STEP = 1e-3    # step in the logarithm of the load below which a homotopy gives up
+
+
+@dataclass(frozen=True)
+class Attempt:
+    """The end of one way to solve a point."""
+
+    method: str
+    end: Newton
+
+
+def solve_balance(balance: Balance, start: np.ndarray | None, options: Options) -> list[Attempt]:
+    """The attempts made, the last one converged unless every way failed."""
+    attempts = []
+    for attempt in _ways(balance, start, options):
+        attempts.append(attempt)
+        if attempt.end.converged:
+            break
+    return attempts
+
+
+def match_harmonics(w: np.ndarray, H: int) -> np.ndarray:
+    """Coefficients (n, d, *) cut or filled with zeros to 2H+1."""
+    matched = np.zeros((*w.shape[:2], 2 * H + 1))
+    kept = min(w.shape[2], 2 * H + 1)
+    matched[:, :, :kept] = w[:, :, :kept]
+    return matched
+
+
+def _ways(balance: Balance, start: np.ndarray | None, options: Options) -> Iterator[Attempt]:
+    stick = start_in_stick(balance)
+    for w in ([] if start is None else [start]) + [stick]:
+        yield Attempt("newton", newton(balance, w, options))
+    yield Attempt("newton on the residual", newton(balance, stick, options, "residual"))
+    if balance.linear.A.shape[0] > 4:
+        yield Attempt("harmonics in sequence", _more_harmonics(balance, options))
+    yield Attempt("load homotopy", _from_high_load(balance, options))
+
+
+def _more_harmonics(balance: Balance, options: Options) -> Newton:
+    """Solve with 3, 7, 15, ... harmonics, each from the one before."""
+    highest, iterations, w = balance.linear.A.shape[0] - 1, 0, None
+    sequence = [H for H in (3, 7, 15, 31, 63) if H < highest] + [highest]
+    for H in sequence:
+        less = replace(balance, linear=_truncate(balance.linear, H))
+        end = newton(less, start_in_stick(less) if w is None else match_harmonics(w, H), options)
+        if not end.converged and w is None:
+            second = newton(less, start_in_stick(less), options, "residual")
+            end = replace(second, iterations=end.iterations + second.iterations)
+        iterations += end.iterations
+        if not end.converged:
+            return _back(balance, end, iterations, f"with {H} harmonics: {end.reason}")
+        w = end.state.w
+    return replace(end, iterations=iterations)
+
+
+def _from_high_load(balance: Balance, options: Options) -> Newton:
+    """Follow the solution from a multiple of the normal load where it sticks, or is easy, down to the load itself."""
+    level, iterations = np.log(FIRST_LOAD), 0
+    while True:
+        end = newton(_loaded(balance, level), start_in_stick(balance), options)
+        iterations += end.iterations
+        if end.converged:
+            break
+        level += np.log(100.0)
+        if level > np.log(LARGEST_LOAD):
+            return _back(balance, end, iterations, f"no solution under {LARGEST_LOAD:.0e} times the load: {end.reason}")
+    path, step = [(level, end.state.w)], min(level, 1.0)
+    while level > 0:
+        target = max(level - step, 0.0)
+        end = newton(_loaded(balance, target), _ahead(path, target), replace(options, iterations=15))
+        iterations += end.iterations
+        if end.converged:
+            level, path = target, [*path[-1:], (target, end.state.w)]
+            step *= 2 if end.iterations <= 4 else 1
+        else:
+            step = (level - target) / 3
+            if step < SMALLEST_STEP:
+                return _back(balance, end, iterations, f"stopped at {np.exp(level):.3g} times the load: {end.reason}")
+    return replace(end, iterations=iterations)
+
+
+def _loaded(balance: Balance, level: float) -> Balance:
+    """The balance under exp(level) times the normal load; elements with an initial gap are pressed shut."""
+    elements = balance.model.elements
+    unit = np.where(elements.n0 > 0, elements.n0, abs(elements.n0).max())
+    raised = replace(elements, n0=elements.n0 + np.expm1(level) * unit)
+    return replace(balance, model=replace(balance.model, elements=raised))
+
+
+def _ahead(path: list[tuple[float, np.ndarray]], target: float) -> np.ndarray:
+    """The line through the last two points of the path, at the target."""
+    if len(path) == 1:
+        return path[0][1]
+    (old, before), (new, now) = path
+    return now + (target - new) / (new - old) * (now - before)
+
+
+def _truncate(linear: Linear, H: int) -> Linear:
+    return replace(linear, **{name: getattr(linear, name)[:H + 1] for name in ("G", "free", "A", "stuck")})
+
+
+def _back(balance: Balance, end: Newton, iterations: int, reason: str) -> Newton:
+    """A failed attempt as a state of the true balance."""
+    w = match_harmonics(end.state.w, balance.linear.A.shape[0] - 1)
+    return Newton(evaluate_balance(balance, w), iterations, False, reason)

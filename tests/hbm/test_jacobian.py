@@ -1,0 +1,34 @@
+"""The structured derivative against differences of the residual, and against the dense matrix."""
+
+import numpy as np
+import pytest
+from models import block, single_mass
+
+from bladefem.hbm.linear import condense
+from bladefem.hbm.reference import reference_model
+from bladefem.hbm.residual import Balance, evaluate_balance, linearise, start_in_stick
+
+
+def differences(balance, w, step):
+    columns = []
+    for e in np.eye(w.size) * step:
+        e = e.reshape(w.shape)
+        rise = evaluate_balance(balance, w + e).residual - evaluate_balance(balance, w - e).residual
+        columns.append(rise / (2 * step))
+    return np.array(columns).reshape(w.size, w.size).T
+
+
+@pytest.mark.parametrize(("model", "omega", "scale"), [
+    (single_mass(), 0.9, 1.5), (block(), 0.9, 3.0), (block(kn=0.0), 0.9, 3.0), (block(nodes=6, force=4.0), 1.1, 1.0),
+    (reference_model(points=2, load=0.3, phase=0.5, harmonics=3), 8000.0, 0.8)])
+def test_the_inverse_derivative_undoes_the_differences(model, omega, scale):
+    balance = Balance(model, condense(model, omega, 3), 128)
+    rng = np.random.default_rng(2)
+    w = start_in_stick(balance) * scale
+    w = w + 0.05 * abs(w).max() * rng.normal(size=w.shape)
+    state = evaluate_balance(balance, w)
+    J = differences(balance, w, 1e-7 * abs(w).max())
+    x = rng.normal(size=w.shape)
+    undone = linearise(balance, state)((J @ x.ravel()).reshape(w.shape))
+    assert (state.forces.shares[:, 1] > 0).any()
+    np.testing.assert_allclose(undone, x, rtol=0, atol=2e-6 * abs(x).max())
