@@ -19,7 +19,7 @@ _WHERE = {
     "seat_damper": "study.stages",
     "reduce_sector": "study.stages",
     "study_loads": "study.loads",
-    "run": "study.pipeline",
+    "run": "report.run",
 }
 __all__ = sorted(_WHERE)
 

@@ -105,8 +105,11 @@ def until(stage: str, options: argparse.Namespace, comm: Any) -> Any:
 
     scene = on_root(comm, prepare)
     rank = 0 if comm is None else comm.rank
-    from ..study import pipeline
     bars = partial(watch, shown=wanted(options.quiet, rank))
+    if stage == "report":
+        from ..report.run import run
+        return run(scene, folder, comm, bars)
+    from ..study import pipeline
     return pipeline.run(scene, folder, until=stage, comm=comm, progress=bars)
 
 

@@ -32,6 +32,9 @@ def joint_model(scene: Scene, mesh: Mesh, reduced: Reduced, patches: list[Patch]
                 harmonics: int, damper: str) -> ReducedModel:
     """The balance's model of one load case.
 
+    A harmonic whose nodal diameter was not reduced borrows the nearest one that was: far above the modes that matter
+    it moves quasi-statically, and the indicator of the harmonics sees what remains.
+
     Args:
         damper: "mass" (the paper's: tangential motion only, prescribed normal load), "rigid" or "elastic".
     """
@@ -76,5 +79,7 @@ def mass_damper(mesh: Mesh, patches: list[Patch], mass: float) -> RigidBody:
 def _sides(scene: Scene, reduced: Reduced, harmonics: int) -> tuple[PortModel, ...]:
     order = scene.excitation.engine_order
     if reduced.sectors:
-        return wheel_models(reduced.sector, reduced.following, order, reduced.sectors, harmonics)
+        nearest = {n: reduced.sector[min(reduced.sector, key=lambda known: abs(known - n))]
+                   for n in range(reduced.sectors // 2 + 1)}
+        return wheel_models(nearest, reduced.following, order, reduced.sectors, harmonics)
     return pair_models(reduced.sector[0], reduced.following, scene.excitation.phase, harmonics)

@@ -49,5 +49,5 @@ def reduction_key(scene: Scene, diameters: Sequence[int], modes: int) -> str:
 def response_key(scene: Scene, settings: Settings, loads: Sequence[float]) -> str:
     """The response curves."""
     return key_of(contact_key(scene), np.array(loads), scene.contact, scene.operation, scene.excitation, scene.study,
-                  scene.accuracy, replace(settings, error=None, chosen=()), scene.model.reduction,
+                  scene.accuracy, scene.model, replace(settings, error=None),
                   code_of("bladefem.hbm", "bladefem.friction", "bladefem.reduction", "bladefem.study"))

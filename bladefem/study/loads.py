@@ -3,28 +3,24 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
 
-from geometry.mesh import Mesh
-
-from ..data import Patch
-from ..errors import InputError
 from ..hbm.api import free
 from ..hbm.model import ReducedModel
-from ..hbm.resonance import free_resonances, stuck_resonances
+from ..hbm.resonance import free_resonances
 from ..hbm.solution import Solution
-from ..hbm.sweep import size, sweep
+from ..hbm.sweep import size
 from ..scene import Scene
-from .joint import LoadCase, joint_model
+from .choice import Join, choose, default_band, peak_of, response_points
+from .joint import LoadCase
 from .settings import Settings
-from .stages import Reduced
 
 Progress = Callable[[Iterable[Any], str], Iterable[Any]]
 
-__all__ = ["Curve", "curve_of", "default_band", "default_loads", "free_peak", "study_loads", "summary", "unwatched"]
+__all__ = ["Curve", "curve_of", "default_loads", "free_peak", "study_loads", "summary", "unwatched"]
 
 
 def unwatched(items: Iterable[Any], label: str = "") -> Iterable[Any]:
@@ -37,6 +33,7 @@ class Curve:
     """A frequency response; points in ascending frequency, unconverged ones included and marked."""
 
     load: float                 # [N]
+    settings: Settings          # with the estimated error at the resonance
     frequency: np.ndarray       # (k,) [Hz]
     amplitude: np.ndarray       # (k,) root of the sum of squares of the harmonics at the probe [m]
     first: np.ndarray           # (k,) complex first harmonic at the probe [m]
@@ -60,51 +57,41 @@ class Curve:
         return size(self.peak)
 
 
-def study_loads(scene: Scene, mesh: Mesh, reduced: Reduced, patches: list[Patch], cases: list[LoadCase],
-                settings: Settings, comm: Any = None, progress: Progress = unwatched) -> list[Curve]:
+def study_loads(scene: Scene, cases: list[LoadCase], join: Callable[[LoadCase], Join], settings: Settings,
+                comm: Any = None, progress: Progress = unwatched) -> list[Curve]:
     """One response curve a load case, shared over the ranks; every rank returns all of them.
 
     Args:
+        join: of a load case, the function that makes its models from settings.
+        settings: where every case starts; each then enriches what its own resonance needs, but for the modes.
         progress: wraps the list of cases of this rank, as tqdm does; the second argument is a label.
     """
     rank, ranks = (comm.rank, comm.size) if comm is not None else (0, 1)
-    curves = {}
-    for i in progress(range(rank, len(cases), ranks), "forced responses"):
-        model = joint_model(scene, mesh, reduced, patches, cases[i], settings.harmonics, settings.damper)
-        curves[i] = curve_of(model, cases[i].load, scene.study.band or default_band(model, scene.excitation.mode),
-                             settings, scene.accuracy)
+    curves = {i: curve_of(scene, cases[i].load, join(cases[i]), settings)
+              for i in progress(range(rank, len(cases), ranks), "forced responses")}
     for part in comm.allgather(curves) if ranks > 1 else []:
         curves.update(part)
     return [curves[i] for i in range(len(cases))]
 
 
-def curve_of(model: ReducedModel, load: float, band: tuple[float, float], settings: Settings,
-             accuracy: float) -> Curve:
-    """Sweep a band [Hz] with points where the curve needs them.
+def curve_of(scene: Scene, load: float, join: Join, settings: Settings) -> Curve:
+    """Sweep a band with points where the curve needs them, judge the resonance, sweep again if the model was poor.
 
     Raises:
-        InputError: no point converged (the model is wrong rather than hard).
+        NotSolvedError: no point converged.
     """
-    circular = (2 * np.pi * band[0], 2 * np.pi * band[1])
-    points = sorted(sweep(model, circular, settings.harmonics, settings.samples, peak=min(accuracy / 10, 1e-3)),
-                    key=lambda s: s.omega)
-    good = [p for p in points if p.converged]
-    if not good:
-        raise InputError(f"load {load:.4g} N: no point between {band[0]:.5g} and {band[1]:.5g} Hz was solved; "
-                         f"the first stopped because {points[0].reason}")
-    return Curve(load, *(np.array(column) for column in zip(*map(_record, points), strict=True)), max(good, key=size))
+    model, _ = join(settings)
+    band = scene.study.band or default_band(model, scene.excitation.mode)
+    points = response_points(model, settings, band, scene.accuracy)
+    used, _, _ = choose(join, settings, peak_of(points), scene.accuracy, fixed=("modes",))
+    if replace(used, error=None) != replace(settings, error=None):
+        points = response_points(join(used)[0], used, band, scene.accuracy)
+    return Curve(load, used, *(np.array(column) for column in zip(*map(_record, points), strict=True)), peak_of(points))
 
 
 def _record(p: Solution) -> tuple[object, ...]:
     return (p.frequency, size(p), p.probe[1, 0], p.converged, p.method, p.residual, p.iterations,
             p.states["slip"] + p.states["lift"], p.work.dissipated, p.work.imbalance)
-
-
-def default_band(model: ReducedModel, mode: int) -> tuple[float, float]:
-    """From a little below to a little above the resonances [Hz] of a mode with free and with sticking contacts."""
-    pair = np.array([free_resonances(model)[mode - 1], stuck_resonances(model)[mode - 1]]) / (2 * np.pi)
-    margin = max(0.02 * pair.mean(), 0.25 * np.ptp(pair))
-    return pair.min() - margin, pair.max() + margin
 
 
 def summary(curves: list[Curve], undamped: float) -> dict[str, np.ndarray]:
@@ -120,6 +107,8 @@ def summary(curves: list[Curve], undamped: float) -> dict[str, np.ndarray]:
         "reduction": undamped / np.array([c.peak_amplitude for c in curves]),
         "dissipated": np.array([c.peak.work.dissipated for c in curves]),
         "slipping": np.array([c.peak.states["slip"] + c.peak.states["lift"] for c in curves]),
+        "error": np.array([np.nan if c.settings.error is None else c.settings.error for c in curves]),
+        "harmonics": np.array([c.settings.harmonics for c in curves]),
         "points": np.array([len(c.frequency) for c in curves]),
         "unconverged": np.array([int((~c.converged).sum()) for c in curves]),
     }

@@ -1,4 +1,4 @@
-"""From a scene to a report, stage by stage; each stage is kept in the run folder and found there by the next run."""
+"""From a scene to forced responses, stage by stage; each is kept in the run folder and found there by the next run."""
 
 from __future__ import annotations
 
@@ -6,6 +6,7 @@ import time
 from collections.abc import Callable
 from contextlib import contextmanager
 from dataclasses import dataclass, field, replace
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -16,12 +17,14 @@ from ..contact.seat import solve as seat
 from ..contact.stiffness import friction_elements, pair_ratio
 from ..data import ModeSet, PressureMap
 from ..errors import InputError
+from ..hbm.model import ReducedModel
 from ..scene import Scene
 from ..store import stage
+from .choice import choose, default_band, peak_of, response_points
 from .joint import LoadCase, joint_model
 from .keys import contact_key, mesh_key, modes_key, reduction_key, response_key
 from .loads import Curve, Progress, default_loads, free_peak, study_loads, unwatched
-from .settings import Settings, choose_settings, first_settings
+from .settings import Settings, enriched, first_settings
 from .stages import (
     Bodies,
     Reduced,
@@ -35,7 +38,8 @@ from .stages import (
 
 __all__ = ["STAGES", "Response", "Run", "Seating", "run"]
 
-STAGES = ("mesh", "modes", "contact", "response", "report")
+EXACT_HARMONICS = 3      # higher ones borrow the nodal diameter next to their own
+STAGES = ("mesh", "modes", "contact", "response")
 
 
 @dataclass(frozen=True)
@@ -70,7 +74,7 @@ class Run:
     messages: list[str] = field(default_factory=list)
 
 
-def run(scene: Scene, folder: str | Path, until: str = "report", comm: Any = None,
+def run(scene: Scene, folder: str | Path, until: str = "response", comm: Any = None,
         progress: Progress = unwatched) -> Run:
     """Run a scene as far as a stage, on all ranks of a communicator.
 
@@ -103,12 +107,7 @@ def run(scene: Scene, folder: str | Path, until: str = "report", comm: Any = Non
         result = replace(result, contact=Seating(problem, maps))
     if until == "contact":
         return result
-    result = replace(result, response=_response(scene, bodies, result.contact, keep, clock, progress))
-    if until == "report":
-        from .output import write_run
-        with clock("report"):
-            write_run(result, comm)
-    return result
+    return replace(result, response=_response(scene, bodies, result.contact, keep, clock, progress))
 
 
 @dataclass(frozen=True)
@@ -144,32 +143,60 @@ class _Keeper:
 
 def _response(scene: Scene, bodies: Bodies, contact: Seating, keep: _Keeper, clock: Clock,
               progress: Progress) -> Response:
-    mesh, patches = bodies.mesh, list(contact.problem.patches)
-    settings = first_settings(scene)
-    cases = [_load_case(scene, mesh, load, maps) for load, maps in contact.maps.items()]
+    cases = [_load_case(scene, bodies.mesh, load, maps) for load, maps in contact.maps.items()]
     with clock("reduction"):
-        reduced = _reduced(scene, bodies, patches, settings, keep)
-    if settings.chosen:
-        with clock("choice of model"):
-            settings, reduced = choose_settings(
-                scene, settings, reduced, lambda s: _reduced(scene, bodies, patches, s, keep),
-                lambda r, s: joint_model(scene, mesh, r, patches, cases[len(cases) // 2], s.harmonics, s.damper))
-        clock.messages.append(settings.sentence())
+        settings, reduced = _reduced(scene, bodies, cases[len(cases) // 2], contact, keep)
+    join = partial(_join, scene, bodies.mesh, reduced, list(contact.problem.patches))
+    key = response_key(scene, settings, list(contact.maps))
     with clock("response"):
-        curves = keep("response", response_key(scene, settings, list(contact.maps)),
-                      lambda: study_loads(scene, mesh, reduced, patches, cases, settings, bodies.comm, progress))
+        curves = keep("response", key, lambda: study_loads(scene, cases, lambda case: partial(join, case), settings,
+                                                           bodies.comm, progress))
+    clock.messages.extend(_remarks(scene, settings, curves))
+    return Response(reduced, settings, curves, free_peak(join(cases[0], settings)[0], scene.excitation.mode))
+
+
+def _join(scene: Scene, mesh: Mesh, reduced: Reduced, patches: list[Any], case: LoadCase,
+          settings: Settings) -> tuple[ReducedModel, ReducedModel | None]:
+    """The model of some settings, with harmonics enough for its indicator, and the one with the elastic damper."""
+    harmonics = 2 * settings.harmonics + 1
+    model = joint_model(scene, mesh, reduced, patches, case, harmonics, settings.damper)
+    if settings.damper == "elastic":
+        return model, None
+    return model, joint_model(scene, mesh, reduced, patches, case, harmonics, "elastic")
+
+
+def _reduced(scene: Scene, bodies: Bodies, case: LoadCase, contact: Seating,
+             keep: _Keeper) -> tuple[Settings, Reduced]:
+    """The sector reduced with as many modes as the resonance of the middle load needs, and settings to start from."""
+    settings, patches = first_settings(scene), list(contact.problem.patches)
+    diameters = harmonic_diameters(scene, bodies.mesh, EXACT_HARMONICS)
+    while True:
+        key = reduction_key(scene, diameters, settings.modes)
+        reduced = keep("reduction", key, partial(reduce_sector, bodies, patches, diameters, settings.modes))
+        if not settings.chosen:
+            return settings, reduced
+        join = partial(_join, scene, bodies.mesh, reduced, patches, case)
+        model, _ = join(settings)
+        band = scene.study.band or default_band(model, scene.excitation.mode)
+        peak = peak_of(response_points(model, settings, band, 10 * scene.accuracy))
+        settings, _, found = choose(join, settings, peak, scene.accuracy, fixed=("modes",))
+        richer = enriched(settings, "modes")
+        if "modes" not in settings.chosen or found.modes <= scene.accuracy / 4 or richer is None:
+            return settings, reduced
+        settings = richer
+
+
+def _remarks(scene: Scene, settings: Settings, curves: list[Curve]) -> list[str]:
+    """What a reader of the results has to know."""
+    remarks = [settings.sentence()]
     lost = sum(int((~c.converged).sum()) for c in curves)
     if lost:
-        clock.messages.append(f"{lost} of {sum(len(c.frequency) for c in curves)} response points did not converge; "
-                              "they are marked in tables and pictures")
-    model = joint_model(scene, mesh, reduced, patches, cases[0], settings.harmonics, settings.damper)
-    return Response(reduced, settings, curves, free_peak(model, scene.excitation.mode))
-
-
-def _reduced(scene: Scene, bodies: Bodies, patches: list[Any], settings: Settings, keep: _Keeper) -> Reduced:
-    diameters = harmonic_diameters(scene, bodies.mesh, settings.harmonics)
-    key = reduction_key(scene, diameters, settings.modes)
-    return keep("reduction", key, lambda: reduce_sector(bodies, patches, diameters, settings.modes))
+        remarks.append(f"{lost} of {sum(len(c.frequency) for c in curves)} response points did not converge; they are "
+                       "marked in tables and pictures")
+    remarks += [f"load {c.load:g} N: estimated error {100 * c.settings.error:.2g} % of the resonance amplitude, above "
+                f"the wanted {100 * scene.accuracy:.2g} %" for c in curves
+                if c.settings.error is not None and c.settings.error > scene.accuracy]
+    return remarks
 
 
 def _load_case(scene: Scene, mesh: Mesh, load: float, maps: list[PressureMap]) -> LoadCase:

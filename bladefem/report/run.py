@@ -1,0 +1,120 @@
+"""All that a run leaves in its folder: tables, one netCDF file, ParaView files, pictures and the report."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pandas as pd
+
+from geometry.mesh import Mesh
+
+from ..data import ModeSet
+from ..reduction.assemble import folded_diameter
+from ..scene import Scene
+from ..store import on_root, write_results
+from ..study import pipeline
+from ..study.loads import Progress, summary, unwatched
+from ..study.modal import family_table
+from ..view import contact, mesh, modes, response, speed
+from .datasets import datasets
+from .tables import write_tables
+from .write import write_report
+
+__all__ = ["run", "write_run"]
+
+
+def run(scene: Scene, folder: str | Path, comm: Any = None, progress: Progress = unwatched) -> pipeline.Run:
+    """Everything: mesh, modes, contact, responses, and the folder with pictures and report.
+
+    Raises:
+        InputError: the scene cannot be run as it is; NotSolvedError: a stage found no solution.
+    """
+    result = pipeline.run(scene, folder, comm=comm, progress=progress)
+    return write_run(result, comm, progress)
+
+
+def write_run(result: pipeline.Run, comm: Any = None, progress: Progress = unwatched) -> pipeline.Run:
+    """Write the folder of a finished run, on rank 0; returns the run with the time that it took."""
+    start = time.perf_counter()
+    on_root(comm, lambda: _write(result, progress))
+    return replace(result, timings={**result.timings, "pictures and report": time.perf_counter() - start})
+
+
+def _write(result: pipeline.Run, progress: Progress) -> None:
+    folder = result.folder
+    tables = _tables(result)
+    for name, table in tables.items():
+        write_tables(table, folder / name.split("/")[1], name.split("/")[1])
+    write_results(folder / "results.nc", datasets(result, tables))
+    figures = {}
+    for name, draw in progress(list(_drawings(result, tables).items()), "pictures"):
+        figures[name] = folder / f"{name.split('/')[1]}.png"
+        draw(figures[name])
+    mesh.save_vtu(result.mesh, folder / "mesh.vtu")
+    modes.save_modes_vtu(result.mesh, excited_modes(result), folder / "modes.vtu")
+    write_report(folder, result.scene, tables, figures, result.messages, result.timings)
+
+
+def excited_modes(result: pipeline.Run) -> ModeSet:
+    """The modes of the nodal diameter that the engine order excites."""
+    sector = result.mesh.sector
+    if result.modes[0].nodal_diameter is None or sector is None:
+        return result.modes[0]
+    wanted, _ = folded_diameter(1, result.scene.excitation.engine_order, sector.count)
+    return min(result.modes, key=lambda m: abs(m.nodal_diameter - wanted))
+
+
+def _tables(result: pipeline.Run) -> dict[str, pd.DataFrame]:
+    """Tables of the report, "section/name", SI columns."""
+    seats = [m for maps in result.contact.maps.values() for m in maps]
+    loads = np.repeat(list(result.contact.maps), 2)
+    pressure = contact.pressure_summary(seats)
+    pressure.insert(0, "load", loads[:len(pressure)])
+    curves = result.response.curves
+    quality = result.mesh.report
+    return {"mesh/quality": pd.DataFrame({"what": list(quality), "value": [str(v) for v in quality.values()]}),
+            "modes/modes": family_table(excited_modes(result), result.mesh),
+            "modes/nodal_diameters": mode_table(result.modes, result.mesh),
+            "contact/pressure": pressure,
+            "response/summary": pd.DataFrame(summary(curves, result.response.free_peak[1])),
+            "response/points": pd.concat([points_of(c) for c in curves], ignore_index=True)}
+
+
+def mode_table(sets: list[ModeSet], geometry: Mesh) -> pd.DataFrame:
+    """One row a mode of each nodal diameter."""
+    rows = [pd.DataFrame({"nodal_diameter": 0 if s.nodal_diameter is None else s.nodal_diameter,
+                          "mode": np.arange(1, len(s.frequencies) + 1), "frequency": s.frequencies,
+                          "family": family_table(s, geometry)["family"], "residual": s.residuals}) for s in sets]
+    return pd.concat(rows, ignore_index=True)
+
+
+def points_of(curve: Any) -> pd.DataFrame:
+    """One row a response point."""
+    return pd.DataFrame({"load": curve.load, "frequency": curve.frequency, "amplitude": curve.amplitude,
+                         "phase": np.angle(curve.first), "converged": curve.converged, "method": curve.method,
+                         "residual": curve.residual, "iterations": curve.iterations, "slipping": curve.slipping,
+                         "dissipated": curve.dissipated, "imbalance": curve.imbalance})
+
+
+def _drawings(result: pipeline.Run, tables: dict[str, pd.DataFrame]) -> dict[str, Callable[[Path], object]]:
+    """What to draw: "section/name" to a function of the file."""
+    geometry, excited, loads = result.mesh, excited_modes(result), list(result.contact.maps)
+    middle = loads[len(loads) // 2]
+    drawings = {
+        "mesh/mesh": lambda file: mesh.draw_mesh(geometry, file, title=result.scene.title),
+        "modes/first_modes": lambda file: modes.draw_mode_sheet(geometry, excited, file),
+        "contact/pressure_on_both_seats": lambda file: contact.draw_pressure(
+            result.contact.maps[middle], file, title=f"normal load {middle:g} N per seat"),
+        "response/forced_response": lambda file: response.draw_responses(tables["response/points"], file),
+        "response/optimum": lambda file: response.draw_optimum(tables["response/summary"], file)}
+    if len(result.modes) > 1:
+        number = result.scene.excitation.mode - 1
+        drawings["modes/mode_on_the_wheel"] = lambda file: modes.draw_wheel_mode(geometry, excited, number, file)
+        drawings["modes/frequencies_by_nodal_diameter"] = lambda file: speed.draw_nodal_diameters(
+            tables["modes/nodal_diameters"], file)
+    return drawings
