@@ -1,0 +1,66 @@
+"""Frequency charts, heat maps and drawings of parts: what is labelled and marked."""
+
+import numpy as np
+import pytest
+import synthetic
+from test_pictures import ink
+
+from bladefem.scene import Scene
+from bladefem.study.crossings import campbell_crossings, fold
+from bladefem.view.maps import draw_map
+from bladefem.view.parts import PARTS
+from bladefem.view.speed import draw_campbell, draw_interference, draw_nodal_diameters, folded
+
+
+def texts(figure):
+    """All words of a figure's axes."""
+    return " ".join(t.get_text() for ax in figure.axes for t in [*ax.texts, ax.title, ax.xaxis.label, ax.yaxis.label,
+                                                                 *(ax.get_legend().texts if ax.get_legend() else [])])
+
+
+def test_campbell_marks_every_crossing(folder):
+    table = synthetic.campbell()
+    crossings = campbell_crossings(table, range(1, 11))
+    figure = draw_campbell(table, range(1, 11), folder / "campbell.png", crossings=crossings, operating=838.0)
+    rings = next(line for line in figure.axes[0].lines if line.get_label() == "crossing")
+    assert len(rings.get_xdata()) == len(crossings) == 14
+    assert all(f"EO {k}" in texts(figure) for k in range(1, 11))
+    assert ink(folder / "campbell.png") > 0.03
+
+
+def test_interference_rings_what_is_too_close(folder):
+    table = synthetic.wheel_frequencies()
+    figure = draw_interference(table, 24, 2 * np.pi * 771.0 / 6, folder / "safe.png", orders=[6, 12])
+    rings = next(line for line in figure.axes[0].lines if "closer" in str(line.get_label()))
+    assert rings.get_xydata()[0].tolist() == pytest.approx([6, 771.43], abs=0.01)
+    assert len(rings.get_xydata()) == 1
+    draw_nodal_diameters(table, folder / "diameters.png")
+    assert ink(folder / "diameters.png") > 0.02
+
+
+def test_folding_is_that_of_the_tables():
+    orders = np.arange(60)
+    for sectors in (7, 12):
+        assert folded(orders, sectors).tolist() == [fold(int(k), sectors) for k in orders]
+
+
+def test_maps_name_methods_and_cross_failures(folder):
+    table = synthetic.method_map()
+    figure = draw_map(table, "frequency", "load", "method", folder / "methods.png")
+    assert all(word in texts(figure) for word in ("newton", "homotopy", "shooting", "not converged (4)"))
+    draw_map(table, "frequency", "load", "iterations", folder / "iterations.png")
+    assert min(ink(folder / f"{n}.png") for n in ("methods", "iterations")) > 0.3
+
+
+@pytest.mark.parametrize("kind, part, table, skipped", [
+    ("wedge sector", "aerofoil", "aerofoil", {"section", "fillet"}),
+    ("wedge sector", "platform", "platform", {"length"}), ("wedge sector", "platform", "damper", {"mass"}),
+    ("wedge sector", "sector", "disc", set()), ("plane blades", "plane", "plane", {"damper_mass"}),
+    ("z mass", "z_mass", "z_mass", set())])
+def test_drawings_label_every_parameter(kind, part, table, skipped, folder):
+    scene = Scene(kind=kind)
+    figure = PARTS[kind][part](scene, folder / f"{part}.png")
+    names = set(type(getattr(scene, table)).__dataclass_fields__) - skipped
+    missing = {name for name in names if name not in texts(figure)}
+    assert not missing
+    assert ink(folder / f"{part}.png") > 0.05
