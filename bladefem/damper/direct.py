@@ -14,11 +14,11 @@ from numba import njit
 
 from bladefem.errors import InputError, NotSolvedError
 
-from .events import State
-from .explicit import Cycle, march_explicit, sampled, settle, stable_steps
+from .events import State, rest
+from .explicit import Cycle, March, explicit_march, sampled, settle, stable_steps
 from .system import System
 
-__all__ = ["direct", "march_newmark"]
+__all__ = ["direct", "newmark_march"]
 
 
 def direct(system: System, omega: float, steps: int = 512, start: State | None = None, most: int = 2000,
@@ -34,21 +34,19 @@ def direct(system: System, omega: float, steps: int = 512, start: State | None =
         InputError: an explicit step beyond the stability limit.
         NotSolvedError: a time step has no solution (possible only where the normal load follows the motion).
     """
-    if not explicit:
-        return settle(march_newmark, system, omega, steps, start, most, tolerance)
-    if steps < stable_steps(system, omega):
+    if explicit and steps < stable_steps(system, omega):
         raise InputError(f"steps = {steps} a period: expected at least {stable_steps(system, omega)}, the stability "
                          f"limit of explicit integration (omega_max dt < 2)")
-    return settle(march_explicit, system, omega, steps, start, most, tolerance)
+    march = (explicit_march if explicit else newmark_march)(system, omega, steps)
+    return settle(march, start or rest(system), most, tolerance)
 
 
-def march_newmark(system: System, omega: float, state: State,
-                  steps: int) -> tuple[State, np.ndarray, np.ndarray, np.ndarray]:
-    """One period from t = 0: end state, q (s, d), w (s, n), friction force (s, n), rows as in ``march_explicit``.
+def newmark_march(system: System, omega: float, steps: int) -> March:
+    """A function that marches one period from t = 0, as ``explicit_march`` does.
 
     Raises:
         InputError: normal forces react on the motion; only the exact flow and the explicit march do that.
-        NotSolvedError: a time step has no solution.
+        NotSolvedError: by the function, when a time step has no solution.
     """
     if np.any(system.R):
         raise InputError("System.R: expected zeros for Newmark's rule; use the exact flow or the explicit march")
@@ -57,13 +55,17 @@ def march_newmark(system: System, omega: float, state: State,
     lag = h**2 / 4 * S @ system.W.T
     arrays = (system.stiffness, system.damping, system.W, system.V, system.kt, system.mu, S, system.W @ lag,
               system.V @ lag)
-    p, g, n0 = (sampled(a, steps) for a in (system.force, system.drive, system.normal))
-    y = np.r_[state.q, state.v, state.z]
-    q, w, force, code = _newmark(arrays, y, p, g, n0, h)
-    if code:
-        raise NotSolvedError(f"Newmark step {code - 1} of {steps}: neither Newton nor Gauss-Seidel found the contact "
-                             f"forces")
-    return State(y[:d].copy(), y[d:2 * d].copy(), y[2 * d:].copy()), q, w, force
+    inputs = tuple(sampled(a, steps) for a in (system.force, system.drive, system.normal))
+
+    def march(state: State) -> tuple[State, np.ndarray, np.ndarray, np.ndarray]:
+        y = np.r_[state.q, state.v, state.z]
+        q, w, force, code = _newmark(arrays, y, inputs, h)
+        if code:
+            raise NotSolvedError(f"Newmark step {code - 1} of {steps}: neither Newton nor Gauss-Seidel found the "
+                                 f"contact forces")
+        return State(y[:d].copy(), y[d:2 * d].copy(), y[2 * d:].copy()), q, w, force
+
+    return march
 
 
 @njit(cache=True)
@@ -115,7 +117,8 @@ def _contact(trial, load, kG, H, mu, f):
 
 
 @njit(cache=True)
-def _newmark(arrays, y, p, g, n0, h):
+def _newmark(arrays, y, inputs, h):
+    p, g, n0 = inputs
     L, D, W, V, kt, mu, S, G, H = arrays
     n, d = W.shape
     steps = p.shape[0] - 1

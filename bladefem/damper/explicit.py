@@ -18,7 +18,9 @@ from bladefem.errors import InputError
 from .events import State, rest
 from .system import System
 
-__all__ = ["Cycle", "damper_cycle", "march_explicit", "settle", "stable_steps"]
+__all__ = ["Cycle", "damper_cycle", "explicit_march", "settle", "stable_steps"]
+
+March = Callable[[State], tuple[State, np.ndarray, np.ndarray, np.ndarray]]
 
 
 @dataclass(frozen=True)
@@ -54,16 +56,15 @@ def damper_cycle(system: System, omega: float, steps: int, start: State | None =
     if steps < stable_steps(system, omega):
         raise InputError(f"steps = {steps} a period: expected at least {stable_steps(system, omega)}, the stability "
                          f"limit of explicit integration (omega_max dt < 2)")
-    return settle(march_explicit, system, omega, steps, start, most, tolerance)
+    return settle(explicit_march(system, omega, steps), start or rest(system), most, tolerance)
 
 
-def settle(march: Callable[..., tuple[State, np.ndarray, np.ndarray, np.ndarray]], system: System, omega: float,
-           steps: int, start: State | None, most: int, tolerance: float) -> Cycle:
-    """March period by period until it repeats; ``march(system, omega, state, steps)`` gives state, q, w, force."""
-    state, last, residual, period = start or rest(system), None, np.inf, 0
+def settle(march: March, start: State, most: int, tolerance: float) -> Cycle:
+    """March period by period, from state to (state, q, w, force), until motion and force repeat."""
+    state, last, residual, period = start, None, np.inf, 0
     while residual >= tolerance and period < most:
         period += 1
-        state, q, w, force = march(system, omega, state, steps)
+        state, q, w, force = march(state)
         if last is not None:
             residual = max(_change(q, last[0]), _change(force, last[1]))
         last = (q, force)
@@ -73,11 +74,11 @@ def settle(march: Callable[..., tuple[State, np.ndarray, np.ndarray, np.ndarray]
     return Cycle(q, force, w, state, residual, period, reason)
 
 
-def march_explicit(system: System, omega: float, state: State,
-                   steps: int) -> tuple[State, np.ndarray, np.ndarray, np.ndarray]:
-    """One period from t = 0: end state, q (s, d), w (s, n), friction force (s, n). No check of the step.
+def explicit_march(system: System, omega: float, steps: int) -> March:
+    """A function that marches one period from t = 0: state to (state, q (s, d), w (s, n), friction force (s, n)).
 
     Row m of the histories is at t = m dt; row 0 is the end of the period, so that a settled cycle starts at t = 0.
+    The step is not checked here.
 
     Raises:
         InputError: coupled damping; the leapfrog needs a diagonal one.
@@ -85,12 +86,16 @@ def march_explicit(system: System, omega: float, state: State,
     if np.abs(system.damping - np.diag(np.diag(system.damping))).max() > 0:
         raise InputError("System.damping: expected a diagonal matrix for explicit integration")
     d = len(system.stiffness)
-    p, g, n0 = (sampled(a, steps) for a in (system.force, system.drive, system.normal))
-    y = np.r_[state.q, state.v, state.z]
-    arrays = (system.stiffness, np.diag(system.damping).copy(), system.W, system.V, system.kt, system.mu, system.R,
-              system.normal[:, 0].copy())
-    q, w, force = _leapfrog(arrays, y, p, g, n0, 2 * np.pi / omega / steps)
-    return State(y[:d].copy(), y[d:2 * d].copy(), y[2 * d:].copy()), q, w, force
+    inputs = tuple(sampled(a, steps) for a in (system.force, system.drive, system.normal))
+    arrays = tuple(np.ascontiguousarray(a) for a in (system.stiffness, np.diag(system.damping), system.W, system.V,
+                                                     system.kt, system.mu, system.R, system.normal[:, 0]))
+
+    def march(state: State) -> tuple[State, np.ndarray, np.ndarray, np.ndarray]:
+        y = np.r_[state.q, state.v, state.z]
+        q, w, force = _leapfrog(arrays, y, inputs, 2 * np.pi / omega / steps)
+        return State(y[:d].copy(), y[d:2 * d].copy(), y[2 * d:].copy()), q, w, force
+
+    return march
 
 
 def sampled(coefficients: np.ndarray, steps: int) -> np.ndarray:
@@ -105,16 +110,17 @@ def _change(now: np.ndarray, then: np.ndarray) -> float:
 
 
 @njit(cache=True)
-def _leapfrog(arrays, y, p, g, n0, dt):
+def _leapfrog(arrays, y, inputs, dt):
     L, D, W, V, kt, mu, react, rest_load = arrays
+    p, g, n0 = inputs
     n, d = W.shape
     steps = p.shape[0] - 1
     Q, R, F = np.empty((steps, d)), np.empty((steps, n)), np.empty((steps, n))
-    q, v, z = y[:d].copy(), y[d:2 * d].copy(), y[2 * d:]
-    a = np.empty(d)
+    q, v, z, a = y[:d], y[d:2 * d], y[2 * d:], np.empty(d)
     for m in range(steps + 1):
-        a[:] = p[m] - L * q
         row = m % steps
+        for k in range(d):
+            a[k] = p[m, k] - L[k] * q[k]
         for i in range(n):
             w, N = g[m, i], n0[m, i]
             for k in range(d):
@@ -123,13 +129,15 @@ def _leapfrog(arrays, y, p, g, n0, dt):
             bound = mu[i] * max(N, 0.0)
             f = min(max(kt[i] * (w - z[i]), -bound), bound)
             z[i] = w - f / kt[i]
-            a -= f * W[i] + (max(N, 0.0) - rest_load[i]) * react[i]
+            lift = max(N, 0.0) - rest_load[i]
+            for k in range(d):
+                a[k] -= f * W[i, k] + lift * react[i, k]
             R[row, i], F[row, i] = w, f
-        Q[row] = q
-        if m > 0:
-            v = (v + 0.5 * dt * a) / (1 + 0.5 * dt * D)
-        if m < steps:
-            v = v + 0.5 * dt * (a - D * v)
-            q = q + dt * v
-    y[:d], y[d:2 * d] = q, v
+        for k in range(d):
+            Q[row, k] = q[k]
+            if m > 0:
+                v[k] = (v[k] + 0.5 * dt * a[k]) / (1 + 0.5 * dt * D[k])
+            if m < steps:
+                v[k] += 0.5 * dt * (a[k] - D[k] * v[k])
+                q[k] += dt * v[k]
     return Q, R, F

@@ -1,0 +1,60 @@
+"""Where each method fails on the reference blade: 128 points of (load, frequency), 144 of (load, contact stiffness).
+
+python benchmarks/paper_maps.py [folder]      about a quarter of an hour, writes method_map.csv and prints the counts
+BLADEFEM_COARSE=1                             12 points
+"""
+
+import os
+import sys
+import time
+from pathlib import Path
+
+import numpy as np
+
+from bladefem.damper.maps import count_outcomes, method_map, write_rows
+from bladefem.hbm.api import solve
+from bladefem.hbm.linear import condense
+from bladefem.hbm.newton import newton
+from bladefem.hbm.reference import reference_model
+from bladefem.hbm.residual import Balance, start_in_stick
+
+COARSE = os.environ.get("BLADEFEM_COARSE") == "1"
+H, SAMPLES = 5, 256
+
+
+def grid() -> list[tuple[float, float, float]]:
+    """(limit, stiffness, frequency): loads over three decades, band of mode 2; stiffness over three decades."""
+    loads = np.geomspace(0.1, 100, 3 if COARSE else 16)
+    bands = [(load, 1e6, f) for load in loads for f in np.linspace(1200, 1420, 2 if COARSE else 8)]
+    loads = np.geomspace(0.1, 100, 3 if COARSE else 12)
+    return bands + [(load, kt, 1230.0) for load in loads for kt in np.geomspace(1e5, 1e8, 2 if COARSE else 12)]
+
+
+def model(load: float, stiffness: float):
+    return reference_model(stiffness, 0.06, load, points=5, modes=5)
+
+
+def plain(body, omega):
+    """Newton from full stick, once, without any fallback."""
+    balance = Balance(body, condense(body, omega, H), SAMPLES)
+    end = newton(balance, start_in_stick(balance))
+    return end.converged, end.iterations, end.state.error, end.reason
+
+
+def chain(body, omega):
+    """The same with all fallbacks."""
+    solution = solve(body, omega, H, SAMPLES)
+    return solution.converged, solution.iterations, solution.residual, f"{solution.method}: {solution.reason}"
+
+
+def main(folder: Path) -> None:
+    started = time.process_time()
+    rows = list(method_map(grid(), model, {"newton": plain, "newton, fallbacks": chain}))
+    write_rows(rows, folder / "method_map.csv")
+    print(f"{len(grid())} points, {time.process_time() - started:.0f} s of CPU")
+    for method, counts in count_outcomes(rows).items():
+        print(f"{method:18s}", ", ".join(f"{word} {counts[word]}" for word in sorted(counts)))
+
+
+if __name__ == "__main__":
+    main(Path(sys.argv[1]) if len(sys.argv) > 1 else Path("."))

@@ -1,0 +1,224 @@
+"""Iterations on the platform motion: Picard, the paper's discrete Newton (Eq. 34) in three readings, and better ones.
+
+Eq. 34 does not say what a division of vectors is. Read by amplitude of each component (phases from the map), as a
+complex secant, or on real and imaginary parts apart, it behaves differently; none converges everywhere. Its stopping
+rule, Eq. 35, measures a step, and a small step is no equilibrium: accept on the residual (criterion="residual").
+Anderson mixing works on the same map. ``describing`` is Newton on the additive equation, with the derivative of the
+damper's describing function by differences: no quotient, no spurious fixed point.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+
+from bladefem.errors import InputError
+from bladefem.hbm.solution import probe_motion
+
+from .paper import DamperResponse, Platform, balance, damper_response, equivalent, residual
+
+__all__ = ["METHODS", "Iterated", "Rules", "iterate"]
+
+HUGE = 1e4      # growth over the free motion at which an iteration is given up
+
+
+@dataclass(frozen=True)
+class Rules:
+    """How the loop runs and when it stops."""
+
+    averaged: bool = True           # one K_ad, C_ad for all harmonics, or one pair for each
+    criterion: str = "step"         # "step" (Eq. 35) or "residual" of the equilibrium
+    tolerance: float = 0.02         # of the criterion, relative [1]; the paper's 2 %
+    most: int = 60                  # evaluations of the map
+    damper: str = "shooting"        # how the damper is solved: "march" from rest (the paper's) or "shooting"
+    steps: int = 512                # time steps a period of the march
+
+    def __post_init__(self) -> None:
+        for name, choices in (("criterion", ("step", "residual")), ("damper", ("march", "shooting"))):
+            if getattr(self, name) not in choices:
+                raise InputError(f"{name} = '{getattr(self, name)}': expected one of {', '.join(choices)}")
+
+
+@dataclass(frozen=True)
+class Iterated:
+    """What an iteration returns, converged or not."""
+
+    method: str
+    u: np.ndarray                   # (H, n) platform motion [m]
+    probe: np.ndarray               # (H + 1, probes) response of the blade [m]
+    converged: bool                 # by its own criterion
+    residual: float                 # equilibrium |u - u_free + G f(u)| / |u| with the periodic damper motion [1]
+    iterations: int                 # evaluations of the damper
+    periods: int                    # periods of the damper that were integrated
+    reason: str
+
+    @property
+    def false(self) -> bool:
+        """Said to have converged, though the equilibrium is violated by more than five times 2 %."""
+        return self.converged and not self.residual < 0.1
+
+
+class _Map:
+    """g(u) in the independent platform motions c, packed as a real vector; counts its work."""
+
+    def __init__(self, side: Platform, rules: Rules):
+        self.side, self.rules, self.calls, self.periods = side, rules, 0, 0
+        self.last: DamperResponse | None = None
+        self.shape = (len(side.free), len(side.rows))
+
+    def spread(self, c: np.ndarray) -> np.ndarray:
+        return np.einsum("hnr,hr->hn", self.side.T, c)
+
+    def force(self, u: np.ndarray) -> np.ndarray:
+        self.last = damper_response(self.side, u, self.rules.damper, steps=self.rules.steps)
+        self.calls, self.periods = self.calls + 1, self.periods + self.last.periods
+        return self.last.force
+
+    def __call__(self, c: np.ndarray) -> np.ndarray:
+        u = self.spread(c)
+        stiffness = equivalent(self.force(u), u, self.side.omega, self.rules.averaged)
+        return balance(self.side, stiffness)[:, self.side.rows]
+
+    def error(self, c: np.ndarray) -> float:
+        u = self.spread(c)
+        return float(np.linalg.norm(residual(self.side, u, self.force(u))) / np.linalg.norm(u))
+
+
+def iterate(side: Platform, method: str = "amplitude", rules: Rules | None = None,
+            start: np.ndarray | None = None) -> Iterated:
+    """Look for the equilibrium of blade and damper.
+
+    Args:
+        method: one of METHODS: "picard", "amplitude", "complex", "parts" (Eq. 34 three ways), "anderson", "describing".
+        start: (H, n) first platform motion; without damper when left out, as in Fig. 14.
+    Raises:
+        InputError: unknown method.
+    """
+    if method not in METHODS:
+        raise InputError(f"method = '{method}': expected one of {', '.join(METHODS)}")
+    rules = rules or Rules()
+    g = _Map(side, rules)
+    c = (side.free if start is None else start)[:, side.rows]
+    with np.errstate(all="ignore"):
+        c, converged, reason = METHODS[method](g, c)
+    return _finish(method, g, c, converged, reason)
+
+
+def _finish(method: str, g: _Map, c: np.ndarray, converged: bool, reason: str) -> Iterated:
+    side, u = g.side, g.spread(c)
+    force, error = np.full_like(u, np.nan), np.inf
+    if np.isfinite(u).all() and np.abs(u).max() > 0:
+        exact = damper_response(side, u, "shooting")
+        force = exact.force
+        error = float(np.linalg.norm(residual(side, u, force)) / np.linalg.norm(u))
+    forces = np.concatenate([np.zeros((1, u.shape[1])), force])
+    probe = probe_motion(side.model, side.omega, forces, np.zeros(1))
+    return Iterated(method, u, probe, converged, error, g.calls, g.periods, reason)
+
+
+def _loop(g: _Map, c: np.ndarray, propose: Callable[[list, list], np.ndarray]) -> tuple[np.ndarray, bool, str]:
+    """The shell of all fixed-point methods: ``propose`` makes the next motion from the lists of motions and images."""
+    rules, size = g.rules, np.linalg.norm(c)
+    motions, images = [c], [g(c)]
+    while g.calls < rules.most:
+        new = images[0] if len(images) == 1 else propose(motions, images)
+        step = np.linalg.norm(new - motions[-1]) / np.linalg.norm(new)
+        if not np.isfinite(step) or np.linalg.norm(new) > HUGE * size:
+            return motions[-1], False, "diverged"
+        if rules.criterion == "step" and step < rules.tolerance:
+            return new, True, f"step {step:.1e} below {rules.tolerance:.1e}"
+        motions.append(new)
+        images.append(g(new))
+        if rules.criterion == "residual":
+            u = g.spread(new)
+            error = np.linalg.norm(residual(g.side, u, g.last.force)) / np.linalg.norm(u)
+            if error < rules.tolerance:
+                return new, True, f"residual {error:.1e} below {rules.tolerance:.1e}"
+    return motions[-1], False, f"no convergence in {rules.most} evaluations"
+
+
+def _picard(g: _Map, c: np.ndarray) -> tuple[np.ndarray, bool, str]:
+    return _loop(g, c, lambda motions, images: images[-1])
+
+
+def _secant(u1: np.ndarray, u0: np.ndarray, g1: np.ndarray, g0: np.ndarray) -> np.ndarray:
+    """Eq. 34, component by component; the image where the denominator vanishes."""
+    below = g1 - u1 - g0 + u0
+    return np.where(below != 0, (g1 * u0 - g0 * u1) / np.where(below != 0, below, 1), g1)
+
+
+def _amplitude(g: _Map, c: np.ndarray) -> tuple[np.ndarray, bool, str]:
+    def propose(motions: list, images: list) -> np.ndarray:
+        size = _secant(*(np.abs(x) for x in (motions[-1], motions[-2], images[-1], images[-2])))
+        return np.abs(size) * np.exp(1j * np.angle(images[-1]))
+    return _loop(g, c, propose)
+
+
+def _complex(g: _Map, c: np.ndarray) -> tuple[np.ndarray, bool, str]:
+    return _loop(g, c, lambda motions, images: _secant(motions[-1], motions[-2], images[-1], images[-2]))
+
+
+def _parts(g: _Map, c: np.ndarray) -> tuple[np.ndarray, bool, str]:
+    def propose(motions: list, images: list) -> np.ndarray:
+        four = (motions[-1], motions[-2], images[-1], images[-2])
+        return _secant(*(x.real for x in four)) + 1j * _secant(*(x.imag for x in four))
+    return _loop(g, c, propose)
+
+
+def _anderson(g: _Map, c: np.ndarray, depth: int = 5) -> tuple[np.ndarray, bool, str]:
+    def propose(motions: list, images: list) -> np.ndarray:
+        x, y = (np.array([_real(v) for v in values[-depth - 1:]]) for values in (motions, images))
+        f = y - x
+        weights = np.linalg.lstsq((f[1:] - f[:-1]).T, f[-1], rcond=1e-10)[0]
+        return _packed(y[-1] - weights @ (y[1:] - y[:-1]), c.shape)
+    return _loop(g, c, propose)
+
+
+def _describing(g: _Map, c: np.ndarray) -> tuple[np.ndarray, bool, str]:
+    """Newton on the additive residual, first from full stick, then from the motion without damper."""
+    side = g.side
+    stuck = balance(side, np.full_like(side.free, 1.0) * side.model.elements.kt)[:, side.rows]
+    found, converged, reason = _newton(g, stuck)
+    return (found, True, reason) if converged else _newton(g, c)
+
+
+def _newton(g: _Map, c: np.ndarray) -> tuple[np.ndarray, bool, str]:
+    """Step halving; Jacobian by differences in 2 H r directions."""
+    side, goal, most = g.side, min(g.rules.tolerance, 1e-2), g.calls + g.rules.most
+
+    def r(x: np.ndarray) -> np.ndarray:
+        u = g.spread(_packed(x, c.shape))
+        return _real(residual(side, u, g.force(u))[:, side.rows])
+
+    x = _real(c)
+    value = r(x)
+    while g.calls < most:
+        if np.linalg.norm(value) < goal * np.linalg.norm(x):
+            return _packed(x, c.shape), True, f"residual below {goal:.1e}"
+        delta = 1e-6 * np.linalg.norm(x)
+        J = np.column_stack([(r(x + delta * e) - value) / delta for e in np.eye(len(x))])
+        step = np.linalg.lstsq(J, -value, rcond=None)[0]
+        for halving in range(8):
+            trial = x + step * 0.5**halving
+            new = r(trial)
+            if np.linalg.norm(new) < np.linalg.norm(value):
+                break
+        else:
+            return _packed(x, c.shape), False, "line search stalled"
+        x, value = trial, new
+    return _packed(x, c.shape), False, f"no convergence in {g.rules.most} evaluations"
+
+
+def _real(c: np.ndarray) -> np.ndarray:
+    return np.concatenate([c.real.ravel(), c.imag.ravel()])
+
+
+def _packed(x: np.ndarray, shape: tuple[int, ...]) -> np.ndarray:
+    half = len(x) // 2
+    return (x[:half] + 1j * x[half:]).reshape(shape)
+
+
+METHODS = {"picard": _picard, "amplitude": _amplitude, "complex": _complex, "parts": _parts, "anderson": _anderson,
+           "describing": _describing}
