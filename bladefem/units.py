@@ -85,7 +85,7 @@ def exact(value: float, unit: str = "1") -> str:
         text = f"{number:.{digits}g} {written}".rstrip()
         if parse(text, unit) == value:
             return text
-    return f"{value!r} {'' if unit in ('', '1') else unit}".rstrip()
+    return f"{float(value)!r} {'' if unit in ('', '1') else unit}".rstrip()
 
 
 def _split(value: object, unit: str, name: str) -> tuple[float, str]:
