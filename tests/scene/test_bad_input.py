@@ -2,12 +2,16 @@
 
 from __future__ import annotations
 
+from pathlib import Path
+
 import pytest
 
 from bladefem.errors import InputError
 from bladefem.scene import Contact, Scene
 from bladefem.scene_check import validate
 from bladefem.scene_file import load_scene, scene_of
+
+WEDGE = Path(__file__).with_name("wedge.toml")
 
 REFUSED = [
     # unknown keys and tables
@@ -44,7 +48,7 @@ REFUSED = [
 @pytest.mark.parametrize(("override", "message"), REFUSED, ids=lambda v: str(v)[:40])
 def test_wedge_scene_refuses(override, message):
     with pytest.raises(InputError) as refused:
-        load_scene("scenes/wedge.toml", [override])
+        load_scene(WEDGE, [override])
     assert message in str(refused.value)
     assert "\n" not in str(refused.value)
 
