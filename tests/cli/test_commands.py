@@ -10,6 +10,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
+import bladefem.report
 import bladefem.study
 from bladefem.cli.main import main, parser
 from bladefem.data import ModeSet, Patch, PressureMap
@@ -45,10 +46,19 @@ def pipeline(monkeypatch):
         assert list(progress([1, 2], "label", total=2)) == [1, 2]
         return state.behaviour(folder)
 
-    module = SimpleNamespace(run=run, calls=calls, state=state)
-    monkeypatch.setitem(sys.modules, "bladefem.study.pipeline", module)
-    monkeypatch.setattr(bladefem.study, "pipeline", module, raising=False)
-    return module
+    def report(scene, folder, comm, progress):
+        return run(scene, folder, "report", comm, progress)
+
+    replace_module(monkeypatch, bladefem.study, "pipeline", run)
+    replace_module(monkeypatch, bladefem.report, "run", report)
+    return SimpleNamespace(calls=calls, state=state)
+
+
+def replace_module(monkeypatch, package, name, run):
+    """Put a stand-in with one function in the place of a module, loaded or not."""
+    module = SimpleNamespace(run=run)
+    monkeypatch.setitem(sys.modules, f"{package.__name__}.{name}", module)
+    monkeypatch.setattr(package, name, module, raising=False)
 
 
 def test_check_prints_every_field_and_marks_what_was_given(capsys):
