@@ -18,11 +18,24 @@ import scipy.sparse as sp
 from geometry.mesh import Pair
 
 from ..errors import InputError, suggestion
+from . import core
 from .body import Body
 from .compat import PETSc
+from .linalg import Doubled, Folded, Matrix, combined
 
-__all__ = ["Constrained", "Transformation", "at_diameter", "clamped_nodes", "constrain", "expand", "restrict",
+__all__ = ["Constrained", "Opened", "Transformation", "at_diameter", "clamped_nodes", "constrain", "expand", "restrict",
            "transformation", "unknowns"]
+
+
+@dataclass(frozen=True)
+class Opened:
+    """An open sector on one rank: its cut faces are free of each other, one factorisation serves all diameters."""
+
+    T: sp.csr_matrix                # (n_points*dim, n_open) mesh displacements from open unknowns
+    places: np.ndarray              # (n_open,) the displacement in mesh numbering that each open unknown is
+    K: sp.csr_matrix                # (n_open, n_open) [N/m]
+    M: sp.csr_matrix                # [kg]
+    core: core.Core                 # K with its interior eliminated
 
 
 @dataclass(frozen=True)
@@ -33,31 +46,27 @@ class Transformation:
     low: sp.csr_matrix              # T0 (n_points*dim, n_free) in mesh numbering, the same on every rank
     high: sp.csr_matrix | None      # T1, None without cyclic symmetry
     start: np.ndarray               # (ranks+1,) first unknown of each rank
-    K: tuple[PETSc.Mat, ...]        # (K0,) or (K0, Kc, Ks)
+    K: tuple[PETSc.Mat, ...]        # (K0,), or (K0, Kc, Ks); empty when opened
     M: tuple[PETSc.Mat, ...]
+    opened: Opened | None           # wheels on one rank
     sectors: int                    # 0 without cyclic symmetry
 
 
 @dataclass(frozen=True)
 class Constrained:
-    """A body with its constraints in one nodal diameter.
-
-    Complex pencils are stored doubled, real and imaginary part of each unknown side by side, so that the memory of a
-    complex vector is the memory of the doubled one.
-    """
+    """A body with its constraints in one nodal diameter."""
 
     body: Body
     T: sp.csr_matrix                # (n_points*dim, n_free) real or complex, the same on every rank
     own: slice                      # unknowns of this rank
-    K: PETSc.Mat                    # (n_free, n_free) or doubled [N/m]
-    M: PETSc.Mat                    # [kg]
-    doubled: bool
+    K: Matrix                       # (n_free, n_free) [N/m]
+    M: Matrix                       # [kg]
     nodal_diameter: int | None
 
     @property
     def dtype(self) -> type:
-        """complex where the pencil is doubled."""
-        return complex if self.doubled else float
+        """complex between nodal diameters 0 and N/2."""
+        return complex if np.iscomplexobj(self.T) else float
 
 
 def constrain(body: Body, clamp: str | None = "clamp", nodal_diameter: int | None = None,
@@ -74,18 +83,26 @@ def constrain(body: Body, clamp: str | None = "clamp", nodal_diameter: int | Non
     return at_diameter(transformation(body, clamp, nodal_diameter is not None, ties), nodal_diameter)
 
 
-def transformation(body: Body, clamp: str | None = "clamp", cyclic: bool = False,
-                   ties: np.ndarray | None = None) -> Transformation:
-    """The part of ``constrain`` that serves all nodal diameters."""
+def transformation(body: Body, clamp: str | None = "clamp", cyclic: bool = False, ties: np.ndarray | None = None,
+                   one_core: bool | None = None) -> Transformation:
+    """The part of ``constrain`` that serves all nodal diameters.
+
+    Args:
+        one_core: eliminate the interior once (one rank only, and the default there) instead of factorising the doubled
+            pencil of each nodal diameter.
+    """
     pair = _cyclic_pair(body) if cyclic else None
-    low, high = _parts(body, clamped_nodes(body, clamp), pair, ties)
-    low, high, start = _numbered(body, low, high)
-    T0 = _to_petsc(body, low, start)
+    clamped = _with_partners(clamped_nodes(body, clamp), pair)
+    low, high, start = _numbered(body, *_parts(body, clamped, pair, ties))
     if high is None:
-        return Transformation(body, low, None, start, (body.K.ptap(T0),), (body.M.ptap(T0),), 0)
-    T1 = _to_petsc(body, high, start)
-    K, M = _three(body.K, T0, T1), _three(body.M, T0, T1)
-    return Transformation(body, low, high, start, K, M, body.mesh.sector.count)
+        T0 = _to_petsc(body, low, start)
+        return Transformation(body, low, None, start, (body.K.ptap(T0),), (body.M.ptap(T0),), None, 0)
+    sectors = body.mesh.sector.count
+    if body.comm.size == 1 and one_core is not False:
+        opened = _opened(body, *_numbered(body, *_parts(body, clamped, None, ties)), low, high)
+        return Transformation(body, low, high, start, (), (), opened, sectors)
+    T0, T1 = _to_petsc(body, low, start), _to_petsc(body, high, start)
+    return Transformation(body, low, high, start, _three(body.K, T0, T1), _three(body.M, T0, T1), None, sectors)
 
 
 def at_diameter(t: Transformation, nodal_diameter: int | None) -> Constrained:
@@ -95,16 +112,20 @@ def at_diameter(t: Transformation, nodal_diameter: int | None) -> Constrained:
     if nodal_diameter is None:
         if t.high is not None:
             raise InputError("nodal_diameter is None, expected a number: the body has cyclic faces")
-        return Constrained(t.body, t.low, own, _definite(t.K[0]), t.M[0], False, None)
+        return Constrained(t.body, t.low, own, t.K[0], t.M[0], None)
     n = _checked_diameter(nodal_diameter, t.sectors)
     angle = 2 * np.pi * n / t.sectors
-    if 2 * n % t.sectors == 0:
-        sign = 1.0 if n == 0 else -1.0
-        K, M = (_sum(A[0], sign, A[1]) for A in (t.K, t.M))
-        return Constrained(t.body, (t.low + sign * t.high).tocsr(), own, _definite(K), M, False, n)
-    K, M = (_doubled(_sum(A[0], np.cos(angle), A[1]), A[2], np.sin(angle)) for A in (t.K, t.M))
-    T = (t.low + np.exp(1j * angle) * t.high).tocsr()
-    return Constrained(t.body, T, own, _definite(K), M, True, n)
+    real = 2 * n % t.sectors == 0
+    phase = np.exp(1j * angle) if not real else 1.0 if n == 0 else -1.0
+    T = (t.low + phase * t.high).tocsr()
+    if t.opened is not None:
+        C = T[t.opened.places]
+        return Constrained(t.body, T, own, Folded(t.opened.K, C, t.opened.core), Folded(t.opened.M, C, None), n)
+    if real:
+        K, M = (combined(A[0], phase, A[1]) for A in (t.K, t.M))
+    else:
+        K, M = (_doubled(combined(A[0], np.cos(angle), A[1]), A[2], np.sin(angle)) for A in (t.K, t.M))
+    return Constrained(t.body, T, own, K, M, n)
 
 
 def clamped_nodes(body: Body, clamp: str | None) -> np.ndarray:
@@ -183,7 +204,6 @@ def _parts(body: Body, clamped: np.ndarray, pair: Pair | None,
            ties: np.ndarray | None) -> tuple[sp.csr_matrix, sp.csr_matrix | None]:
     """T0 and T1 on all nodes' displacements; columns of dependent nodes stay empty."""
     n, d = len(body.mesh.points), body.dim
-    clamped = _with_partners(clamped, pair)
     free = body.rows >= 0
     free[clamped] = False
     slaves = np.empty(0, int) if pair is None else pair.nodes[1]
@@ -196,6 +216,7 @@ def _parts(body: Body, clamped: np.ndarray, pair: Pair | None,
         rows, cols = pair.nodes[1][alive], pair.nodes[0][alive]
         block = sp.coo_matrix((np.ones(len(rows)), (rows, cols)), shape=(n, n))
         high = sp.kron(block, pair.rotation[:d, :d]).tocsr()
+        high.eliminate_zeros()
     if ties is not None and len(ties):
         tie = _tied(n, d, np.asarray(ties))
         low, high = (A if A is None else (tie @ A @ tie).tocsr() for A in (low, high))
@@ -248,37 +269,39 @@ def _to_petsc(body: Body, T: sp.csr_matrix, start: np.ndarray) -> PETSc.Mat:
     return matrix
 
 
+def _opened(body: Body, T: sp.csr_matrix, _: None, start: np.ndarray, low: sp.csr_matrix,
+            high: sp.csr_matrix) -> Opened:
+    """Matrices of the open sector; zeros of the mass between different directions are dropped."""
+    to_open = _to_petsc(body, T, start)
+    K, M = (_csr(A.ptap(to_open)) for A in (body.K, body.M))
+    M.eliminate_zeros()
+    rows = T.tocoo()
+    unit = (rows.data == 1) & (np.diff(T.indptr)[rows.row] == 1)
+    places = np.empty(T.shape[1], int)
+    places[rows.col[unit]] = rows.row[unit]
+    return Opened(T, places, K, M, core.eliminate(K, core.rim_of((abs(low) + abs(high))[places].tocsr())))
+
+
 def _three(A: PETSc.Mat, T0: PETSc.Mat, T1: PETSc.Mat) -> tuple[PETSc.Mat, PETSc.Mat, PETSc.Mat]:
     """K0, Kc and Ks."""
     cross = T0.transposeMatMult(A.matMult(T1))
     turned = cross.duplicate(copy=True)
     turned.transpose()
-    K0 = _sum(A.ptap(T0), 1.0, A.ptap(T1))
-    return K0, _sum(cross, 1.0, turned), _sum(cross, -1.0, turned)
+    return combined(A.ptap(T0), 1.0, A.ptap(T1)), combined(cross, 1.0, turned), combined(cross, -1.0, turned)
 
 
-def _sum(A: PETSc.Mat, factor: float, B: PETSc.Mat) -> PETSc.Mat:
-    """A + factor B as a new matrix."""
-    out = A.duplicate(copy=True)
-    out.axpy(factor, B, structure=PETSc.Mat.Structure.DIFFERENT_NONZERO_PATTERN)
-    return out
-
-
-def _doubled(A: PETSc.Mat, B: PETSc.Mat, factor: float) -> PETSc.Mat:
+def _doubled(A: PETSc.Mat, B: PETSc.Mat, factor: float) -> Doubled:
     """The real twin of A + j factor B, parts interleaved: kron(A, I) + kron(factor B, [0 -1; 1 0])."""
-    def local(X: PETSc.Mat) -> sp.csr_matrix:
-        indptr, indices, data = X.getValuesCSR()
-        return sp.csr_matrix((data, indices, indptr), shape=(len(indptr) - 1, X.size[1]))
-    twin = sp.kron(local(A), np.eye(2), "csr") + factor * sp.kron(local(B), np.array([[0.0, -1.0], [1.0, 0.0]]), "csr")
+    twin = sp.kron(_csr(A), np.eye(2), "csr") + factor * sp.kron(_csr(B), np.array([[0.0, -1.0], [1.0, 0.0]]), "csr")
     twin.sum_duplicates()
     (n, N), _ = A.sizes
     out = PETSc.Mat().createAIJ(((2 * n, 2 * N), (2 * n, 2 * N)), comm=A.comm, csr=(
         twin.indptr.astype(PETSc.IntType), twin.indices.astype(PETSc.IntType), twin.data))
     out.assemble()
-    return out
+    return Doubled(out)
 
 
-def _definite(A: PETSc.Mat) -> PETSc.Mat:
-    """Mark as symmetric."""
-    A.setOption(PETSc.Mat.Option.SYMMETRIC, True)
-    return A
+def _csr(A: PETSc.Mat) -> sp.csr_matrix:
+    """This rank's rows."""
+    indptr, indices, data = A.getValuesCSR()
+    return sp.csr_matrix((data, indices, indptr), shape=(len(indptr) - 1, A.size[1]))

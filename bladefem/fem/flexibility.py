@@ -13,9 +13,8 @@ import numpy as np
 from scipy.linalg import qr
 
 from .body import rigid_modes
-from .compat import PETSc
 from .constraint import Constrained, unknowns
-from .linalg import Factor, apply, dot, factorise, solve
+from .linalg import Factor, apply, dense_rows, dot, factorise, scale, solve
 
 __all__ = ["Flexibility", "compliance", "flexible", "rigid_basis"]
 
@@ -40,9 +39,9 @@ def flexible(con: Constrained, prop: float = 1.0) -> Flexibility:
         NotSolvedError: from MUMPS.
     """
     R = rigid_basis(con)
-    MR = apply(con.M, R, con.doubled) if R.shape[1] else R
-    K = _propped(con, R, prop) if R.shape[1] else con.K
-    return Flexibility(con, factorise(K, True, con.doubled), R, MR)
+    if not R.shape[1]:
+        return Flexibility(con, factorise(con.K), R, R)
+    return Flexibility(con, factorise(con.K, springs=_props(con, R, prop)), R, apply(con.M, R))
 
 
 def compliance(flex: Flexibility, B: np.ndarray) -> np.ndarray:
@@ -71,7 +70,7 @@ def rigid_basis(con: Constrained) -> np.ndarray:
     basis = (q @ null)[con.own]
     if not basis.shape[1]:
         return basis
-    gram = dot(body.comm, basis, apply(con.M, basis, con.doubled))
+    gram = dot(body.comm, basis, apply(con.M, basis))
     return basis @ np.linalg.inv(np.linalg.cholesky(gram)).conj().T
 
 
@@ -85,19 +84,11 @@ def _columns(con: Constrained) -> np.ndarray:
     return columns
 
 
-def _propped(con: Constrained, R: np.ndarray, prop: float) -> PETSc.Mat:
-    """K with springs at the freedoms that hold the rigid motions best (pivoted QR)."""
+def _props(con: Constrained, R: np.ndarray, prop: float) -> np.ndarray:
+    """(n_own,) springs at the freedoms that hold the rigid motions best (pivoted QR)."""
     everywhere = unknowns(con, R)
-    places = qr(everywhere.conj().T, mode="r", pivoting=True)[1][:R.shape[1]]
-    K = con.K.duplicate(copy=True)
-    diagonal = con.K.getDiagonal()
-    stiffness = prop * diagonal.sum() / diagonal.size
-    first = con.own.start
-    diagonal.set(0.0)
-    for p in places[(places >= first) & (places < con.own.stop)] - first:
-        diagonal.array[2 * p:2 * p + 2] = stiffness if con.doubled else 0.0
-        if not con.doubled:
-            diagonal.array[p] = stiffness
-    K.setDiagonal(diagonal, addv=PETSc.InsertMode.ADD_VALUES)
-    K.assemble()
-    return K
+    allowed = dense_rows(con.K, len(everywhere))
+    places = allowed[qr(everywhere[allowed].conj().T, mode="r", pivoting=True)[1][:R.shape[1]]]
+    springs = np.zeros(len(everywhere))
+    springs[places] = prop * scale(con.K)
+    return springs[con.own]

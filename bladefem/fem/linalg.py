@@ -1,7 +1,12 @@
-"""Sparse factorisations by MUMPS through PETSc, and products with blocks of real or complex vectors.
+"""Sparse matrices of constrained bodies in three forms, their products and factorisations (MUMPS through PETSc).
 
-A block of vectors is a NumPy array (n_own, k), this rank's rows; complex blocks go with doubled matrices
-(see ``constraint.Constrained``).
+- a PETSc matrix: real, distributed;
+- ``Doubled``: the real twin of a complex Hermitian matrix, distributed; real and imaginary part of an unknown stand
+  side by side, so that the memory of a complex vector is that of the doubled one;
+- ``Folded``: C^H A C with the real matrix A of an open sector, for one rank; all nodal diameters share one
+  factorisation of A's interior (``core``).
+
+A block of vectors is a NumPy array (n_own, k), this rank's rows, columns contiguous.
 """
 
 from __future__ import annotations
@@ -9,137 +14,153 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
+import scipy.sparse as sp
+from scipy.linalg import blas
 
-from ..errors import NotSolvedError
+from . import core as interior
 from .compat import PETSc
+from .mumps import Factorised, factorise_matrix, solve_matrix
 
-__all__ = ["Factor", "apply", "dot", "factorise", "inertia", "solve"]
+__all__ = ["Doubled", "Factor", "Folded", "apply", "combined", "dense_rows", "dot", "factorise", "inertia", "scale",
+           "solve"]
 
-BATCH = 64      # columns a solve: from 32 on MUMPS runs at the speed of matrix products
+
+@dataclass(frozen=True)
+class Doubled:
+    """Real twin of a complex Hermitian matrix."""
+
+    matrix: PETSc.Mat
+
+
+@dataclass(frozen=True)
+class Folded:
+    """C^H A C: an open sector's matrix seen from the unknowns of one nodal diameter."""
+
+    A: sp.csr_matrix                # (n_open, n_open) real, symmetric
+    C: sp.csr_matrix                # (n_open, n_free) real or complex
+    core: interior.Core | None      # A with its interior eliminated, shared by all nodal diameters
+
+
+Matrix = PETSc.Mat | Doubled | Folded
 
 
 @dataclass(frozen=True)
 class Factor:
-    """A factorised matrix."""
+    """A factorised matrix; ``solve`` uses it."""
 
-    matrix: PETSc.Mat               # MUMPS factor
-    solver: PETSc.PC                # keeps the factor alive
+    parts: Factorised | interior.Rim
     doubled: bool
-    entries: int                    # in the factors, INFOG(29)
-    bytes: float                    # memory used by all ranks, INFOG(22)
+
+    @property
+    def negative(self) -> int:
+        """Number of negative eigenvalues (of the complex matrix where doubled); indefinite factorisations only."""
+        return self.parts.negative // 2 if self.doubled else self.parts.negative
+
+    @property
+    def bytes(self) -> float:
+        """Memory of the factors [bytes], all ranks."""
+        return self.parts.bytes
 
 
-def factorise(A: PETSc.Mat, definite: bool = True, doubled: bool = False) -> Factor:
-    """Factorise a symmetric matrix by MUMPS.
+def factorise(A: Matrix, definite: bool = True, springs: np.ndarray | None = None) -> Factor:
+    """Factorise a symmetric or Hermitian matrix.
 
     Args:
-        definite: Cholesky; else LDL^T with inertia.
+        definite: Cholesky; else L D L^T with the count of negative eigenvalues.
+        springs: (n_own,) added to the diagonal first; of a folded matrix on the cut face only.
 
     Raises:
         NotSolvedError: the matrix is singular or not definite, or memory ran out; the message holds MUMPS's INFOG.
     """
-    A.setOption(PETSc.Mat.Option.SYMMETRIC, True)
-    A.setOption(PETSc.Mat.Option.SPD, definite)
-    pc = PETSc.PC().create(A.comm)
-    pc.setOperators(A)
-    pc.setType(PETSc.PC.Type.CHOLESKY)
-    try:
-        pc.setFactorSolverType("mumps")
-        pc.setFactorSetUpSolverType()
-    except PETSc.Error as error:
-        raise NotSolvedError("PETSc was built without MUMPS, expected a PETSc with it (apt python3-petsc4py-real)") \
-            from error
-    F = pc.getFactorMatrix()
-    _settings(F, definite)
-    code, detail = _numeric(pc, F)
-    if code < 0:
-        raise NotSolvedError(_reason(code, detail, A.size[0]))
-    return Factor(F, pc, doubled, _entries(F.getMumpsInfog(29)), 1e6 * F.getMumpsInfog(22))
+    if isinstance(A, Folded):
+        core = A.core or interior.eliminate(A.A, interior.rim_of(A.C), definite)
+        return Factor(interior.close(core, A.C, definite, springs), False)
+    doubled = isinstance(A, Doubled)
+    matrix = A.matrix if doubled else A
+    if springs is not None:
+        matrix = matrix.duplicate(copy=True)
+        diagonal = matrix.createVecRight()
+        diagonal.array = np.repeat(springs, 2) if doubled else springs
+        matrix.setDiagonal(diagonal, addv=PETSc.InsertMode.ADD_VALUES)
+        matrix.assemble()
+    return Factor(factorise_matrix(matrix, definite), doubled)
 
 
 def solve(factor: Factor, B: np.ndarray) -> np.ndarray:
-    """A^-1 B for a block of vectors (n_own, k), in batches."""
-    if np.iscomplexobj(B) and not factor.doubled:
-        both = solve(factor, np.concatenate([B.real, B.imag], axis=1))
-        return both[:, :B.shape[1]] + 1j * both[:, B.shape[1]:]
-    out = np.empty(B.shape, complex if factor.doubled else float)
-    for first in range(0, B.shape[1], BATCH):
-        part = slice(first, first + BATCH)
-        right = _dense(factor.matrix, B[:, part], factor.doubled)
-        left = right.duplicate()
-        factor.matrix.matSolve(right, left)
-        out[:, part] = _array(left, factor.doubled)
+    """A^-1 B for a block of vectors (n_own, k)."""
+    if isinstance(factor.parts, interior.Rim):
+        return interior.solve(factor.parts, B)
+    if factor.doubled:
+        return _complex(solve_matrix(factor.parts, _real(B)))
+    if np.iscomplexobj(B):
+        return _join(solve_matrix(factor.parts, _split(B)))
+    return solve_matrix(factor.parts, B)
+
+
+def apply(A: Matrix, X: np.ndarray) -> np.ndarray:
+    """A X for a block of vectors (n_own, k)."""
+    if isinstance(A, Folded):
+        return np.asfortranarray(A.C.conj().T @ interior.times(A.A, A.C @ X))
+    if isinstance(A, Doubled):
+        return _complex(_times(A.matrix, _real(X)))
+    return _join(_times(A, _split(X))) if np.iscomplexobj(X) else _times(A, X)
+
+
+def combined(A: Matrix, factor: float, B: Matrix) -> Matrix:
+    """A + factor B."""
+    if isinstance(A, Folded):
+        return Folded((A.A + factor * B.A).tocsr(), A.C, None)
+    if isinstance(A, Doubled):
+        return Doubled(combined(A.matrix, factor, B.matrix))
+    out = A.duplicate(copy=True)
+    out.axpy(factor, B, structure=PETSc.Mat.Structure.DIFFERENT_NONZERO_PATTERN)
     return out
 
 
-def apply(A: PETSc.Mat, X: np.ndarray, doubled: bool) -> np.ndarray:
-    """A X for a block of vectors (n_own, k)."""
-    if np.iscomplexobj(X) and not doubled:
-        both = apply(A, np.concatenate([X.real, X.imag], axis=1), False)
-        return both[:, :X.shape[1]] + 1j * both[:, X.shape[1]:]
-    if X.shape[1] == 0:
-        return X.astype(complex if doubled else float)
-    return _array(A.matMult(_dense(A, X, doubled)), doubled)
+def scale(A: Matrix) -> float:
+    """Mean of the diagonal, a measure of size."""
+    if isinstance(A, Folded):
+        return float(A.A.diagonal().mean())
+    diagonal = (A.matrix if isinstance(A, Doubled) else A).getDiagonal()
+    return diagonal.sum() / diagonal.size
+
+
+def dense_rows(A: Matrix, n: int) -> np.ndarray:
+    """Numbers of the unknowns (0 to n-1) where ``factorise`` takes springs."""
+    return interior.masters(A.C) if isinstance(A, Folded) else np.arange(n)
 
 
 def dot(comm: object, X: np.ndarray, Y: np.ndarray) -> np.ndarray:
     """X^H Y over all ranks, (k, l)."""
-    part = np.ascontiguousarray(X.conj().T @ Y)
-    return comm.allreduce(part) if comm.size > 1 else part
+    if np.iscomplexobj(X) or np.iscomplexobj(Y):
+        part = blas.zgemm(1.0, X, Y, trans_a=2) if X.size and Y.size else X.conj().T @ Y
+    else:
+        part = X.T @ Y
+    return comm.allreduce(np.ascontiguousarray(part)) if comm.size > 1 else part
 
 
-def inertia(A: PETSc.Mat, doubled: bool) -> int:
-    """Number of negative eigenvalues (of the complex matrix where doubled)."""
-    factor = factorise(A, definite=False, doubled=doubled)
-    negative = factor.matrix.getInertia()[0]
-    return negative // 2 if doubled else negative
+def inertia(A: Matrix) -> int:
+    """Number of negative eigenvalues, by Sylvester's law."""
+    return factorise(A, definite=False).negative
 
 
-def _settings(F: PETSc.Mat, definite: bool) -> None:
-    F.setMumpsIcntl(4, 0)
-    F.setMumpsIcntl(14, 40)                 # per cent of memory beyond the estimate
-    if not definite:
-        F.setMumpsIcntl(13, 1)              # the last block too is counted
-        F.setMumpsIcntl(24, 1)
+def _times(A: PETSc.Mat, X: np.ndarray) -> np.ndarray:
+    rows = A.sizes[1]
+    right = PETSc.Mat().createDense((rows, (None, X.shape[1])), comm=A.comm)
+    right.setUp()
+    right.getDenseArray()[...] = X
+    right.assemble()
+    return np.array(A.matMult(right).getDenseArray(readonly=True), order="F")
 
 
-def _numeric(pc: PETSc.PC, F: PETSc.Mat) -> tuple[int, int]:
-    """Factorise; MUMPS's INFOG(1) and INFOG(2)."""
-    PETSc.Sys.pushErrorHandler("ignore")
-    try:
-        pc.setUp()
-    except PETSc.Error:
-        code = F.getMumpsInfog(1)
-        return (code, F.getMumpsInfog(2)) if code < 0 else (-99, 0)
-    finally:
-        PETSc.Sys.popErrorHandler()
-    return F.getMumpsInfog(1), F.getMumpsInfog(2)
+def _split(X: np.ndarray) -> np.ndarray:
+    return np.concatenate([X.real, X.imag], axis=1)
 
 
-def _reason(code: int, detail: int, size: int) -> str:
-    """MUMPS's complaint in words (users' guide 5.5, section 8)."""
-    words = {-10: "the matrix is singular (a body that floats, or a part without connection)",
-             -40: "the matrix is not positive definite (a body that floats, or a buckled state)",
-             -13: "memory ran out", -9: "memory ran out", -8: "memory ran out", -19: "memory ran out",
-             -5: "memory ran out", -7: "memory ran out", -11: "memory ran out", -20: "memory ran out"}
-    what = words.get(code, "the factorisation failed")
-    more = "; use more ranks on more memory, or fewer unknowns" if "memory" in what else ""
-    return f"MUMPS stopped on {size} unknowns: {what} (INFOG(1) = {code}, INFOG(2) = {detail}){more}"
-
-
-def _entries(infog: int) -> int:
-    """MUMPS gives millions as a negative number when the count is large."""
-    return -infog * 1_000_000 if infog < 0 else infog
-
-
-def _dense(A: PETSc.Mat, X: np.ndarray, doubled: bool) -> PETSc.Mat:
-    """A PETSc dense matrix of this block of vectors, rows as A's columns."""
-    rows, k = A.sizes[1], X.shape[1]
-    out = PETSc.Mat().createDense((rows, (None, k)), comm=A.comm)
-    out.setUp()
-    view = out.getDenseArray()
-    view[...] = _real(X) if doubled else X
-    out.assemble()
+def _join(both: np.ndarray) -> np.ndarray:
+    k = both.shape[1] // 2
+    out = np.empty((both.shape[0], k), complex, order="F")
+    out.real, out.imag = both[:, :k], both[:, k:]
     return out
 
 
@@ -148,6 +169,5 @@ def _real(X: np.ndarray) -> np.ndarray:
     return np.ascontiguousarray(X.T, dtype=complex).view(float).T
 
 
-def _array(D: PETSc.Mat, doubled: bool) -> np.ndarray:
-    view = D.getDenseArray(readonly=True)
-    return np.ascontiguousarray(view.T).view(complex).T.copy() if doubled else np.array(view)
+def _complex(X: np.ndarray) -> np.ndarray:
+    return np.ascontiguousarray(X.T).view(complex).T

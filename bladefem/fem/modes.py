@@ -13,10 +13,9 @@ from scipy.linalg import eigh
 
 from ..data import ModeSet
 from ..errors import InputError, NotSolvedError
-from .compat import PETSc
 from .constraint import Constrained, expand, restrict
 from .flexibility import Flexibility, compliance, flexible
-from .linalg import apply, dot, inertia
+from .linalg import apply, combined, dot, inertia, scale
 
 __all__ = ["canonical", "certificate", "count_below", "elastic_pairs", "mode_set", "modes", "pairs"]
 
@@ -68,8 +67,8 @@ def certificate(con: Constrained, lam: np.ndarray, X: np.ndarray) -> np.ndarray:
     """(m,) |K x - lambda M x| / |K x|; for rigid motions |K x| over the largest |K x| of the set."""
     if not X.shape[1]:
         return np.zeros(0)
-    KX, comm = apply(con.K, X, con.doubled), con.body.comm
-    error = _norms(comm, KX - apply(con.M, X, con.doubled) * lam)
+    KX, comm = apply(con.K, X), con.body.comm
+    error = _norms(comm, KX - apply(con.M, X) * lam)
     size = _norms(comm, KX)
     scale = _norms(comm, np.abs(KX)).max() if (lam > 0).any() else _stiffness(con, X)
     return error / np.where(lam > 0, size, scale)
@@ -77,7 +76,7 @@ def certificate(con: Constrained, lam: np.ndarray, X: np.ndarray) -> np.ndarray:
 
 def _stiffness(con: Constrained, X: np.ndarray) -> float:
     """A force to measure |K x| of rigid motions by."""
-    return con.K.norm(PETSc.NormType.INFINITY) * _norms(con.body.comm, X).max()
+    return scale(con.K) * _norms(con.body.comm, X).max()
 
 
 def elastic_pairs(flex: Flexibility, count: int, tolerance: float,
@@ -135,7 +134,7 @@ def _orthonormal(con: Constrained, V: np.ndarray, MV: np.ndarray,
     for _ in range(3):
         if V.shape[1]:
             W = W - V @ dot(comm, MV, W)
-        MW = apply(con.M, W, con.doubled)
+        MW = apply(con.M, W)
         gram = dot(comm, W, MW)
         size = np.sqrt(np.maximum(gram.diagonal().real, 0)).max() if size is None else size
         values, Q = np.linalg.eigh((gram + gram.conj().T) / 2)
@@ -163,9 +162,7 @@ def canonical(con: Constrained, lam: np.ndarray, X: np.ndarray) -> np.ndarray:
 
 def count_below(con: Constrained, lam: float) -> int:
     """Number of eigenvalues below lam [rad^2/s^2], by Sylvester's law of inertia."""
-    shifted = con.K.duplicate(copy=True)
-    shifted.axpy(-lam, con.M, structure=PETSc.Mat.Structure.DIFFERENT_NONZERO_PATTERN)
-    return inertia(shifted, con.doubled)
+    return inertia(combined(con.K, -lam, con.M))
 
 
 def _prove(con: Constrained, lam: np.ndarray) -> None:

@@ -81,10 +81,9 @@ def _craig_bampton(flex: Flexibility, F: np.ndarray, X: np.ndarray,
     fixed = _fixed_inverse(flex, F, X)
     _, inner = elastic_pairs(flex, count, 1e-10, fixed)
     V = np.concatenate([flex.R, X, inner], axis=1)
-    doubled = flex.con.doubled
-    V = V / np.sqrt(np.abs(dot(comm, V, apply(flex.con.M, V, doubled)).diagonal()))
-    mass = _hermitian(dot(comm, V, apply(flex.con.M, V, doubled)))
-    stiff = _hermitian(dot(comm, V, apply(flex.con.K, V, doubled)))
+    V = V / np.sqrt(np.abs(dot(comm, V, apply(flex.con.M, V)).diagonal()))
+    mass = _hermitian(dot(comm, V, apply(flex.con.M, V)))
+    stiff = _hermitian(dot(comm, V, apply(flex.con.K, V)))
     size, Q = np.linalg.eigh(mass)
     keep = size > 1e-12 * size[-1]                      # ports that repeat each other
     W = Q[:, keep] / np.sqrt(size[keep])

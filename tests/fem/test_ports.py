@@ -9,7 +9,7 @@ from bladefem.errors import InputError
 from bladefem.fem.body import assemble
 from bladefem.fem.constraint import constrain, restrict
 from bladefem.fem.flexibility import flexible
-from bladefem.fem.linalg import dot, factorise, solve
+from bladefem.fem.linalg import combined, dot, factorise, solve
 from bladefem.fem.modes import modes
 from bladefem.fem.ports import flexibility, port_model
 from bladefem.scene import Material
@@ -31,10 +31,8 @@ def model(kind, n, clamp):
 
 def full_receptance(con, P, w):
     """P^T (K - w^2 M)^-1 P by a direct solve."""
-    A = con.K.duplicate(copy=True)
-    A.axpy(-w ** 2, con.M)
-    F = restrict(con, P)
-    return dot(con.body.comm, F, solve(factorise(A, False, con.doubled), F.astype(con.dtype)))
+    F = restrict(con, P).astype(con.dtype)
+    return dot(con.body.comm, F, solve(factorise(combined(con.K, -w ** 2, con.M), definite=False), F))
 
 
 def receptance(ports, w):

@@ -1,0 +1,144 @@
+"""Cyclic symmetry with one factorisation for all nodal diameters.
+
+The unknowns of an open sector are its interior (i) and its two cut faces, the rim (b). Only the rim knows the nodal
+diameter, so the interior is eliminated once, in real arithmetic, down to the Schur complement S of the rim; nodal
+diameter n then costs a dense Cholesky of C_b(n)^H S C_b(n), as large as one cut face. A solve takes two sweeps over the
+interior's factors, about as much as one sweep over those of the doubled pencil. One rank only.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+import scipy.sparse as sp
+from scipy.linalg import cho_factor, cho_solve, lapack, lu_factor, lu_solve
+
+from ..errors import NotSolvedError
+from .compat import MPI, PETSc
+from .mumps import Factorised, factorise_matrix, schur_complement, solve_matrix
+
+__all__ = ["Core", "Rim", "close", "eliminate", "inner_solve", "masters", "rim_of", "solve", "times"]
+
+
+@dataclass(frozen=True)
+class Core:
+    """An open sector with its interior eliminated."""
+
+    factor: Factorised              # of the interior
+    inner: np.ndarray               # (ni,) open unknowns inside
+    rim: np.ndarray                 # (nb,) open unknowns on the cut faces
+    S: np.ndarray                   # (nb, nb) Schur complement of the rim [N/m]
+    coupling: sp.csr_matrix         # (nb, ni) A_bi
+
+
+@dataclass(frozen=True)
+class Rim:
+    """One nodal diameter on top of a core."""
+
+    core: Core
+    inner: np.ndarray               # (ni,) unknowns of the nodal diameter inside
+    masters: np.ndarray             # (nm,) and on the low cut face
+    C: sp.csr_matrix                # (nb, nm) rim from masters
+    dense: tuple                    # Cholesky factor, or LU where indefinite
+    negative: int                   # negative eigenvalues; -1 when Cholesky proved that there are none
+
+    @property
+    def bytes(self) -> float:
+        """Memory of the factors [bytes]."""
+        return self.core.factor.bytes + self.core.S.nbytes + self.dense[0].nbytes
+
+
+def rim_of(C: sp.csr_matrix) -> np.ndarray:
+    """Open unknowns on the cut faces: those not passed through one to one."""
+    column = np.bincount(C.indices, minlength=C.shape[1])
+    alone = (np.diff(C.indptr) == 1)
+    alone[alone] = column[C.indices[C.indptr[:-1][alone]]] == 1
+    return np.flatnonzero(~alone)
+
+
+def masters(C: sp.csr_matrix) -> np.ndarray:
+    """Unknowns of a nodal diameter on the cut face."""
+    return np.unique(C[rim_of(C)].indices)
+
+
+def eliminate(A: sp.csr_matrix, rim: np.ndarray, definite: bool = True) -> Core:
+    """Eliminate the interior.
+
+    Raises:
+        NotSolvedError: from MUMPS.
+    """
+    matrix = PETSc.Mat().createAIJ(A.shape, comm=MPI.COMM_SELF, csr=(
+        A.indptr.astype(PETSc.IntType), A.indices.astype(PETSc.IntType), A.data))
+    matrix.assemble()
+    factor = factorise_matrix(matrix, definite, rim)
+    inner = np.setdiff1d(np.arange(A.shape[0]), rim)
+    return Core(factor, inner, rim, schur_complement(factor, len(rim)), A[rim][:, inner].tocsr())
+
+
+def close(core: Core, C: sp.csr_matrix, definite: bool = True, springs: np.ndarray | None = None) -> Rim:
+    """Join the cut faces for one nodal diameter.
+
+    Raises:
+        NotSolvedError: the sector can still move (definite) or a shift hits an eigenvalue.
+    """
+    on_face = masters(C)
+    Cb = C[core.rim][:, on_face].tocsr()
+    S = Cb.conj().T @ (Cb.T @ core.S).T                 # S is symmetric
+    if springs is not None:
+        S = S + np.diag(springs[on_face])
+    inner = np.asarray(C[core.inner].indices)
+    if not definite:
+        dense, negative = _indefinite(S)
+        return Rim(core, inner, on_face, Cb, dense, negative + core.factor.negative)
+    try:
+        return Rim(core, inner, on_face, Cb, cho_factor(S, lower=True), -1)
+    except np.linalg.LinAlgError as error:
+        raise NotSolvedError("the sector's stiffness is not positive definite: it floats, or it has buckled") from error
+
+
+def solve(rim: Rim, B: np.ndarray) -> np.ndarray:
+    """Solve for a block of vectors (n_free, k)."""
+    core = rim.core
+    inside = inner_solve(core, B[rim.inner])
+    g = B[rim.masters] - rim.C.conj().T @ times(core.coupling, inside)
+    on_face = face_solve(rim, g)
+    inside -= inner_solve(core, times(core.coupling.T.tocsr(), rim.C @ on_face))
+    X = np.empty(B.shape, np.result_type(inside, on_face), order="F")
+    X[rim.inner], X[rim.masters] = inside, on_face
+    return X
+
+
+def face_solve(rim: Rim, g: np.ndarray) -> np.ndarray:
+    """Displacements of the low cut face (nm, k) under loads condensed onto it."""
+    return cho_solve(rim.dense, g) if rim.negative < 0 else lu_solve(rim.dense, g)
+
+
+def inner_solve(core: Core, B: np.ndarray) -> np.ndarray:
+    """A_ii^-1 B (ni, k), real or complex."""
+    parts = [B.real, B.imag] if np.iscomplexobj(B) else [B]
+    k = B.shape[1]
+    full = np.zeros((len(core.inner) + len(core.rim), k * len(parts)), order="F")
+    for i, part in enumerate(parts):
+        full[core.inner, i * k:(i + 1) * k] = part
+    X = solve_matrix(core.factor, full)[core.inner]
+    return X if len(parts) == 1 else X[:, :k] + 1j * X[:, k:]
+
+
+def times(A: sp.csr_matrix, X: np.ndarray) -> np.ndarray:
+    """Real sparse matrix times a complex block, without a complex copy of the matrix."""
+    if not np.iscomplexobj(X):
+        return A @ X
+    X = np.ascontiguousarray(X)
+    return (A @ X.view(float)).view(complex)
+
+
+def _indefinite(S: np.ndarray) -> tuple[tuple, int]:
+    """LU factors for solves, and the number of negative eigenvalues by Bunch and Kaufman's factorisation."""
+    factorise = lapack.zhetrf if np.iscomplexobj(S) else lapack.dsytrf
+    ldu, pivots, info = factorise(S, lower=1, lwork=64 * len(S))
+    if info:
+        raise NotSolvedError("the shift is an eigenvalue, expected a shift between two")
+    single = pivots > 0
+    negative = int((ldu.diagonal().real[single] < 0).sum()) + int((~single).sum()) // 2
+    return lu_factor(S), negative

@@ -1,0 +1,139 @@
+"""MUMPS through PETSc: Cholesky and L D L^T, blocks of right-hand sides, Schur complements, reasons in words.
+
+Two details that its interfaces hide. Debian 12's PETSc knows the PORD ordering only and falls back to it in silence, so
+the ordering used is kept (INFOG(7)). petsc4py does not wrap the Schur complement: three of PETSc's C functions are
+called by name.
+"""
+
+from __future__ import annotations
+
+import ctypes
+from dataclasses import dataclass
+
+import numpy as np
+
+from ..errors import NotSolvedError
+from .compat import PETSc
+
+__all__ = ["Factorised", "factorise_matrix", "schur_complement", "solve_matrix"]
+
+BATCH = 64      # columns a solve: from 32 on MUMPS runs at the speed of matrix products
+ROOM = 40       # per cent of memory beyond MUMPS's own estimate
+
+
+@dataclass(frozen=True)
+class Factorised:
+    """A real matrix factorised by MUMPS."""
+
+    matrix: PETSc.Mat               # the factor
+    solver: PETSc.PC                # keeps it alive
+    entries: int                    # in the factors
+    flops: float                    # of the factorisation
+    bytes: float                    # memory of all ranks
+    ordering: int                   # INFOG(7): 4 PORD, 5 METIS, ...
+    negative: int                   # negative pivots; -1 for Cholesky
+
+
+def factorise_matrix(A: PETSc.Mat, definite: bool, schur: np.ndarray | None = None) -> Factorised:
+    """Factorise a symmetric matrix.
+
+    Args:
+        definite: Cholesky; else L D L^T with the count of negative pivots.
+        schur: rows left out of the factorisation, for ``schur_complement`` (one rank only).
+
+    Raises:
+        NotSolvedError: the matrix is singular or not definite, or memory ran out; the message holds MUMPS's INFOG.
+    """
+    A.setOption(PETSc.Mat.Option.SYMMETRIC, True)
+    A.setOption(PETSc.Mat.Option.SPD, definite)
+    pc = PETSc.PC().create(A.comm)
+    pc.setOperators(A)
+    pc.setType(PETSc.PC.Type.CHOLESKY)
+    try:
+        pc.setFactorSolverType("mumps")
+        pc.setFactorSetUpSolverType()
+    except PETSc.Error as error:
+        raise NotSolvedError("PETSc was built without MUMPS, expected one with it (apt python3-petsc4py-real)") \
+            from error
+    F = pc.getFactorMatrix()
+    F.setMumpsIcntl(14, ROOM)
+    if not definite:
+        F.setMumpsIcntl(13, 1)      # the last block is counted too
+        F.setMumpsIcntl(24, 1)
+    if schur is not None:
+        index = PETSc.IS().createGeneral(schur.astype(PETSc.IntType), comm=F.comm)
+        _petsc("MatFactorSetSchurIS", F.handle, index.handle)
+    _numeric(pc, F, A.size[0])
+    if schur is not None:
+        F.setMumpsIcntl(26, 0)      # from here on a solve sees the interior only
+    negative = -1 if definite else F.getMumpsInfog(12)
+    return Factorised(F, pc, _large(F.getMumpsInfog(29)), F.getMumpsRinfog(3), 1e6 * F.getMumpsInfog(22),
+                      F.getMumpsInfog(7), negative)
+
+
+def solve_matrix(factor: Factorised, B: np.ndarray) -> np.ndarray:
+    """A^-1 B (n_own, k), in batches; with rows left out, A is the matrix without them and these rows of B are 0."""
+    F = factor.matrix
+    out = np.empty(B.shape, order="F")
+    for first in range(0, B.shape[1], BATCH):
+        part = slice(first, min(first + BATCH, B.shape[1]))
+        right = PETSc.Mat().createDense((F.sizes[1], (None, part.stop - part.start)), comm=F.comm)
+        right.setUp()
+        right.getDenseArray()[...] = B[:, part]
+        right.assemble()
+        left = right.duplicate()
+        F.matSolve(right, left)
+        out[:, part] = left.getDenseArray(readonly=True)
+    return out
+
+
+def schur_complement(factor: Factorised, n: int) -> np.ndarray:
+    """(n, n) A_bb - A_bi A_ii^-1 A_ib of the rows left out."""
+    matrix, status, data = ctypes.c_void_p(), ctypes.c_int(), ctypes.POINTER(ctypes.c_double)()
+    _petsc("MatFactorGetSchurComplement", factor.matrix.handle, ctypes.byref(matrix), ctypes.byref(status))
+    _petsc("MatDenseGetArray", matrix, ctypes.byref(data))
+    S = np.ctypeslib.as_array(data, (n, n)).copy()
+    _petsc("MatDenseRestoreArray", matrix, ctypes.byref(data))
+    _petsc("MatFactorRestoreSchurComplement", factor.matrix.handle, ctypes.byref(matrix), status)
+    lower, upper = np.tril(S, -1), np.triu(S, 1)        # a symmetric factorisation fills one triangle
+    half = lower if abs(lower).max(initial=0) >= abs(upper).max(initial=0) else upper
+    return half + half.T + np.diag(S.diagonal())
+
+
+def _petsc(name: str, *arguments: object) -> None:
+    """Call one of PETSc's C functions."""
+    function = getattr(ctypes.CDLL(PETSc.__file__), name)
+    code = function(*[ctypes.c_void_p(a) if isinstance(a, int) else a for a in arguments])
+    if code:
+        raise NotSolvedError(f"PETSc's {name} failed with error {code}")
+
+
+def _numeric(pc: PETSc.PC, F: PETSc.Mat, size: int) -> None:
+    """Factorise; failures become one sentence."""
+    PETSc.Sys.pushErrorHandler("ignore")
+    failed = False
+    try:
+        pc.setUp()
+    except PETSc.Error:
+        failed = True
+    finally:
+        PETSc.Sys.popErrorHandler()
+    code = F.getMumpsInfog(1)
+    if failed or code < 0:
+        raise NotSolvedError(_reason(code, F.getMumpsInfog(2), size))
+
+
+def _reason(code: int, detail: int, size: int) -> str:
+    """MUMPS's complaint in words (users' guide 5.5, section 8)."""
+    if code in (-5, -7, -8, -9, -11, -13, -19, -20):
+        what = "memory ran out; use more ranks on more memory, or fewer unknowns"
+    else:
+        what = {-10: "the matrix is singular (a part that floats, or that nothing joins to the rest)",
+                -40: "the matrix is not positive definite (a part that floats, or a buckled state)",
+                }.get(code, "the factorisation failed")
+    return f"MUMPS stopped on {size} unknowns: {what} (INFOG(1) = {code}, INFOG(2) = {detail})"
+
+
+def _large(infog: int) -> int:
+    """MUMPS gives large counts in millions, as a negative number."""
+    return -infog * 1_000_000 if infog < 0 else infog
