@@ -33,6 +33,8 @@ COLUMNS = {
     "dissipated": Column("friction work per cycle", "J", "mJ", 1e3, 4),
     "friction_damping": Column("friction damping", "1", "%", 100.0, 3),
     "reduction": Column("free over damped", "1", digits=4), "residual": Column("residual", "1", digits=2),
+    "phase": Column("phase", "rad", "deg", 180 / np.pi, 4), "imbalance": Column("energy imbalance", "1", digits=2),
+    "slipping": Column("slipping elements"), "points": Column("points"), "unconverged": Column("not converged"),
     "nodal_diameter": Column("nodal diameter"), "mode": Column("mode"), "family": Column("family"),
     "mac": Column("MAC", "1", digits=3), "aerofoil_share": Column("aerofoil's share", "1", "%", 100.0, 3),
     "speed": Column("speed", "rad/s", "rpm", RPM),

@@ -111,7 +111,8 @@ def family_table(modes: ModeSet, mesh: Mesh, clamped: ModeSet | None = None, bod
     """Names of the modes: one row a mode with frequency [Hz], family, MAC against it, and the aerofoil's share.
 
     A mode is called after the pure motion (or the mode of the clamped blade, itself named so) that it is closest to by
-    MAC on the aerofoil; "disc" when the aerofoil carries less than a tenth of the motion.
+    MAC on the aerofoil; "disc" when the aerofoil carries less than a tenth of the motion, "mixed" when no MAC reaches
+    0.3, and "..., coupled" when another mode of the set is closer to the same motion.
 
     Args:
         modes: shapes on the nodes of ``mesh``.
@@ -131,10 +132,18 @@ def family_table(modes: ModeSet, mesh: Mesh, clamped: ModeSet | None = None, bod
     match = mac_of(modes.shapes[:, nodes], np.stack(list(references.values())), volumes[nodes])
     energy = np.einsum("mni,n->mn", np.abs(modes.shapes) ** 2, volumes)
     share = energy[:, nodes].sum(axis=1) / np.maximum(energy.sum(axis=1), 1e-300)
-    best = match.argmax(axis=1)
-    names = [list(references)[k].split(" (")[0] if share[i] >= 0.1 else "disc" for i, k in enumerate(best)]
+    names = [name.split(" (")[0] for name in references]
+    names = [name_of(match, i, names) if share[i] >= 0.1 else "disc" for i in range(len(match))]
     return pd.DataFrame({"mode": np.arange(1, len(names) + 1), "frequency": modes.frequencies, "family": names,
                          "mac": match.max(axis=1), "aerofoil_share": share})
+
+
+def name_of(match: np.ndarray, i: int, names: list[str]) -> str:
+    """The name of mode i, from the MAC (modes, references) of all."""
+    best = match[i].argmax()
+    if match[i, best] < 0.3:
+        return "mixed"
+    return names[best] if match[:, best].argmax() == i else f"{names[best]}, coupled"
 
 
 def participation(modes: ModeSet, mass: Any, points: np.ndarray, directions: Sequence[str] = ("x", "y", "z"),

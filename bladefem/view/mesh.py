@@ -21,11 +21,12 @@ if TYPE_CHECKING:
 __all__ = ["draw_mesh", "draw_wheel", "grid", "polydata", "save_vtu", "save_wheel_vtu"]
 
 VTK_NUMBERS = {"triangle": 5, "triangle6": 22, "quad": 9, "quad8": 23, "quad9": 28, "tetra": 10, "tetra10": 24,
-               "hexahedron": 12, "hexahedron20": 25}
+               "hexahedron": 12, "hexahedron20": 25, "hexahedron27": 29}
 # gmsh's node order to VTK's, where they differ.
 VTK_ORDER = {
     "tetra10": (0, 1, 2, 3, 4, 5, 6, 7, 9, 8),
     "hexahedron20": (0, 1, 2, 3, 4, 5, 6, 7, 8, 11, 13, 9, 16, 18, 19, 17, 10, 12, 14, 15),
+    "hexahedron27": (0, 1, 2, 3, 4, 5, 6, 7, 8, 11, 13, 9, 16, 18, 19, 17, 10, 12, 14, 15, 22, 23, 21, 24, 20, 25, 26),
 }
 BODY_COLOURS = ("#c9d1d9", "#e3cfa4", "#b7cfc0", "#d5c3d8")
 FACE_COLOURS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9", "#7a5195", "#b5bd00", "#8c564b",

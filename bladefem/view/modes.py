@@ -33,6 +33,7 @@ __all__ = ["animate_wave", "best_phase", "draw_mode", "draw_mode_sheet", "draw_w
 
 WHEEL_VIEW = (0.0, -0.55, 1.0)
 COMPONENTS = ("radial", "circumferential", "axial")
+STILL = 1e-5            # share of the largest displacement below which a sign means nothing
 EXAGGERATION = 0.1      # largest drawn displacement over the sector's height
 
 
@@ -177,7 +178,7 @@ def draw_wheel_mode(mesh: Mesh, modes: ModeSet, number: int, file: str | Path | 
     parts: list[dict[str, Any]] = [{"mesh": surface, "scalars": "signed", "cmap": DIVERGING, "clim": (-1, 1)}]
     surface.point_data["envelope"] = np.abs(signed)
     # Where nothing moves (the clamp) the sign is noise, not a nodal line.
-    lines = surface.contour([0.0], scalars="signed").threshold(0.01, scalars="envelope")
+    lines = surface.contour([0.0], scalars="signed").threshold(STILL, scalars="envelope")
     if lines.n_points:
         lines.points += 2e-3 * np.ptp(moved[:, 0]) * np.asarray(WHEEL_VIEW)
         parts.append({"mesh": lines, "color": "black", "line_width": 2.2, "lighting": False})

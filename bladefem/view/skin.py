@@ -6,6 +6,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from bladefem.errors import InputError
 from geometry.mesh import Mesh
 
 __all__ = ["Skin", "outer_faces", "sector_motion", "skin", "split_faces", "wheel_skin"]
@@ -72,8 +73,14 @@ def split_faces(faces: np.ndarray, corners: int, coarse: bool = False) -> np.nda
 
 
 def face_corners(mesh: Mesh) -> int:
-    """Corners of the outer faces: of the sides of solids, of the cells of plane meshes."""
+    """Corners of the outer faces: of the sides of solids, of the cells of plane meshes.
+
+    Raises:
+        InputError: cells that cannot be drawn.
+    """
     shape = family(mesh.cell_type)
+    if shape not in EDGES:
+        raise InputError(f"cells of type '{mesh.cell_type}' cannot be drawn, expected {', '.join(EDGES)}")
     return len(SIDES[shape][0]) if shape in SIDES else CORNERS[shape]
 
 

@@ -74,6 +74,15 @@ def test_clamped_blade_as_reference_and_disc_modes():
     assert table["aerofoil_share"].iloc[1] == 0.0
 
 
+def test_second_best_modes_are_called_coupled_and_weak_ones_mixed():
+    mesh = prism((24, 2, 8))
+    pure = pure_shapes(mesh, np.arange(len(mesh.points)), 0.2)
+    noise = np.random.default_rng(0).normal(size=mesh.points.shape)
+    stack = np.stack([pure["first flap"], pure["first flap"] + 0.5 * pure["first edge"], noise])
+    table = family_table(ModeSet(np.arange(1.0, 4), stack, None, np.zeros(3)), mesh)
+    assert table["family"].tolist() == ["first flap", "first flap, coupled", "mixed"]
+
+
 def test_transfer_is_exact_for_quadratics_on_second_order_cells():
     block = second_order(prism((6, 2, 3), twist=0.4))
     x, y, z = block.points.T

@@ -53,16 +53,27 @@ def test_coarse_skin_has_the_same_flat_area(sector):
     assert np.isclose(area(fine).sum(), area(coarse).sum())
 
 
-def test_hexahedra_and_vtk_order():
-    """A 20-node cube: the volume that VTK integrates is 1 and the skin's area 6."""
+@pytest.mark.parametrize("count", [8, 20, 27])
+def test_hexahedra_and_vtk_order(count):
+    """A cube of one cell: the volume that VTK integrates is 1, misplaced nodes would fold it; the skin's area is 6."""
     from bladefem.view.skin import EDGES
     from geometry.mesh import Mesh
 
     corners = np.array([[0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0], [0, 0, 1], [1, 0, 1], [1, 1, 1], [0, 1, 1.0]])
     middle = np.array([corners[list(edge)].mean(axis=0) for edge in EDGES["hexahedron"]])
-    cube = Mesh(np.concatenate([corners, middle]), "hexahedron20", {"blade": np.arange(20)[None]})
+    faces = np.array([[0.5, 0.5, 0], [0.5, 0, 0.5], [0, 0.5, 0.5], [1, 0.5, 0.5], [0.5, 1, 0.5], [0.5, 0.5, 1]])
+    points = np.concatenate([corners, middle, faces, [[0.5, 0.5, 0.5]]])[:count]
+    cube = Mesh(points, "hexahedron" + (str(count) if count > 8 else ""), {"blade": np.arange(count)[None]})
     assert np.isclose(area(skin(cube)).sum(), 6.0)
     assert np.isclose(grid(cube).compute_cell_sizes()["Volume"][0], 1.0)
+
+
+def test_unknown_cells_are_refused():
+    from bladefem.errors import InputError
+    from geometry.mesh import Mesh
+
+    with pytest.raises(InputError, match="wedge"):
+        draw_mesh(Mesh(np.zeros((6, 3)), "wedge", {"blade": np.arange(6)[None]}))
 
 
 def test_wheel_has_no_cut_faces_and_closes(sector):
