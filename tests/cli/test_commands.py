@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import signal
 import subprocess
 import sys
 from types import SimpleNamespace
@@ -178,6 +179,30 @@ def clean_environment() -> dict[str, str]:
     mpi = ("OMPI_", "PMIX_", "PRTE_", "ORTE_", "PMI_")
     keep = ("OMPI_ALLOW", "OMPI_MCA_mpi_yield", "OMPI_MCA_btl")
     return {k: v for k, v in os.environ.items() if not k.startswith(mpi) or k.startswith(keep)}
+
+
+INTERRUPTED = """
+import sys, time
+from types import SimpleNamespace
+import bladefem.study
+def run(scene, folder, until, comm=None, progress=None):
+    from bladefem.store import stage
+    stage(folder, "mesh", "key", lambda: 1.5)
+    stage(folder, "modes", "key", lambda: print("started", flush=True) or time.sleep(60))
+bladefem.study.pipeline = SimpleNamespace(run=run)
+from bladefem.cli.main import main
+sys.exit(main(["modes", "scenes/wedge.toml", "-o", sys.argv[1]]))
+"""
+
+
+def test_an_interrupt_keeps_the_finished_stages(tmp_path):
+    job = subprocess.Popen([sys.executable, "-c", INTERRUPTED, tmp_path], stdout=subprocess.PIPE,
+                           stderr=subprocess.PIPE, text=True, env=clean_environment())
+    assert job.stdout.readline() == "started\n"
+    job.send_signal(signal.SIGINT)
+    said = job.communicate(timeout=30)[1]
+    assert job.returncode == 130 and "interrupted; finished stages are kept" in said and "Traceback" not in said
+    assert [p.name for p in (tmp_path / "stages").iterdir()] == ["mesh.npz"]
 
 
 ONE_RANK_FAILS = """

@@ -60,6 +60,17 @@ def test_wrong_words_are_refused(arguments, code, place):
     assert run(place, *arguments).returncode == code
 
 
+def test_no_mpirun_is_told(place):
+    (place / ".venv" / "bin" / "mpirun").unlink()
+    tools = place / "tools"
+    tools.mkdir()
+    for tool in ("dirname", "id", "sh"):
+        (tools / tool).symlink_to(shutil.which(tool))
+    for arguments in (["mpirun", "2", "x.py"], ["test"]):
+        done = run(place, *arguments, PATH=str(tools))
+        assert done.returncode == 2 and "mpirun is not installed" in done.stderr
+
+
 def test_failed_set_up_stops_everything(place):
     done = run(place, "python", SETUP_CODE="3")
     assert done.returncode == 3 and done.stdout == ""
