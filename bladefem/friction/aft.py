@@ -17,7 +17,8 @@ from bladefem.friction.harmonics import harmonics_of
 from bladefem.friction.jenkins import jenkins_batch
 from bladefem.friction.tables import empty_sums, tables
 
-__all__ = ["GROSS_SLIP", "PARTIAL_SLIP", "SEPARATED", "STICK", "Forces", "evaluate", "states"]
+__all__ = ["GROSS_SLIP", "PARTIAL_SLIP", "SEPARATED", "STICK", "Forces", "checked", "dissipated", "evaluate",
+           "states"]
 
 SEPARATED, STICK, PARTIAL_SLIP, GROSS_SLIP = 0, 1, 2, 3
 
@@ -44,8 +45,7 @@ def evaluate(elements: Elements, w: np.ndarray, samples: int, jacobian: bool = T
     The error falls as samples^-2. Forces.converged is False, with the reason, when a 2-D element was not periodic
     after ``cycles`` periods. Raises InputError for shapes that do not fit or too few samples (at least 4H+4).
     """
-    w = np.ascontiguousarray(w, dtype=float)
-    nodes = _nodes(elements, w)
+    w, nodes = checked(elements, w)
     n, d, K = w.shape
     load = _series(load, n, samples)
     tab = tables(harmonics_of(w), samples)
@@ -74,8 +74,9 @@ def states(shares: np.ndarray) -> np.ndarray:
     return np.where(stick + slip > 1e-12, code, SEPARATED)
 
 
-def _nodes(elements: Elements, w: np.ndarray) -> np.ndarray:
-    """(n, 4) kt, kn, mu, n0 after checking that they fit w."""
+def checked(elements: Elements, w: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """w (n, d, K) and the table (n, 4) of kt, kn, mu, n0, which fit each other; raises InputError where they do not."""
+    w = np.ascontiguousarray(w, dtype=float)
     columns = [np.asarray(getattr(elements, name), dtype=float) for name in ("kt", "kn", "mu", "n0")]
     n, d = columns[0].size, 1 + elements.tangents
     if d not in (2, 3):
@@ -85,7 +86,7 @@ def _nodes(elements: Elements, w: np.ndarray) -> np.ndarray:
     nodes = np.stack(np.broadcast_arrays(*columns), axis=1)
     if (nodes[:, :3] < 0).any() or not np.isfinite(nodes).all():
         raise InputError("elements: kt, kn and mu must be finite and not negative, n0 must be finite")
-    return np.ascontiguousarray(nodes)
+    return w, np.ascontiguousarray(nodes)
 
 
 def _series(load: np.ndarray | None, n: int, samples: int) -> np.ndarray:

@@ -144,18 +144,19 @@ def _stretches(state, g, N, el, tab, means, F, J, rows, weight):
 
 
 @njit(cache=True, error_model="numpy")
-def assemble(w, n0, el, means, F, J, block):
-    """Add the parts that are linear in the coefficients w (2, K): kt M_stick, mu (n0 + kn w) M_slip and M_contact."""
+def assemble(w, base, el, means, F, J, block):
+    """Add the parts linear in w (2, K): kt M_stick, mu M_slip and M_contact of base (K,) + kn w; block is scratch."""
     K = w.shape[1]
-    for row, factor, column, of in ((1, el.kt, 1, 0), (1, el.mu * el.kn, 0, 1), (0, el.kn, 0, 2)):
+    for row, factor, column, of in ((1, el.kt, 1, 0), (1, el.mu, 0, 1), (0, 1.0, 0, 2)):
         gram(means[of], block)
-        constant = 0.0 if of == 0 else n0 * (el.mu if of == 1 else 1.0)
+        stiffness = factor if of == 0 else factor * el.kn
         for k in range(K):
-            total = 0.0
+            total, fixed = 0.0, 0.0
             for l in range(K):
                 total += block[k, l] * w[column, l]
-                J[row, k, column, l] += factor * block[k, l]
-            F[row, k] += constant * block[k, 0] + factor * total
+                fixed += block[k, l] * base[l]
+                J[row, k, column, l] += stiffness * block[k, l]
+            F[row, k] += stiffness * total + (0.0 if of == 0 else factor * fixed)
 
 
 @njit(cache=True, error_model="numpy")
@@ -181,12 +182,12 @@ def jenkins_batch(w, load, nodes, tab, F, J, shares):
     n, S, K = w.shape[0], tab.at.shape[0], w.shape[2]
     g, N, low, high = np.empty(S), np.empty(S), np.empty(S), np.empty(S)
     state, means, block = np.empty(S, np.int8), np.empty((4, tab.sums.shape[1])), np.empty((K, K))
-    rows, weight = np.empty((2, K)), np.empty(K)
+    rows, weight, base = np.empty((2, K)), np.empty(K), np.zeros(K)
     for e in range(n):
         el = Node(nodes[e, 0], nodes[e, 1], nodes[e, 2], nodes[e, 3])
         values(tab.transposed, w[e, 1], el.kt, 0.0, g)
-        n0 = 0.0 if load.shape[1] else el.n0
-        values(tab.transposed, w[e, 0], el.kn, n0, N)
+        base[0] = 0.0 if load.shape[1] else el.n0
+        values(tab.transposed, w[e, 0], el.kn, base[0], N)
         if load.shape[1]:
             N += load[e]
         opens = bounds(g, N, el.mu, low, high) <= 0.0
@@ -196,7 +197,7 @@ def jenkins_batch(w, load, nodes, tab, F, J, shares):
             _stuck(last, sign, g, N, el, tab, means, F[e], J[e])
         else:
             _stretches(state, g, N, el, tab, means, F[e], J[e], rows, weight)
-        assemble(w[e], n0, el, means, F[e], J[e], block)
+        assemble(w[e], base, el, means, F[e], J[e], block)
         if load.shape[1]:
             _add_series(load[e], state, el.mu, tab, F[e])
         shares[e, 0] = means[0, 0]

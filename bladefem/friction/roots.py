@@ -1,0 +1,70 @@
+"""First upward crossing of zero by a trigonometric polynomial within a bracket: safeguarded Newton, never a lost root.
+
+Within a bracket the polynomial is taken to have at most one maximum, which is found from its slope.
+"""
+
+from __future__ import annotations
+
+from math import cos, sin
+
+from numba import njit
+
+__all__ = ["rise", "value"]
+
+NEVER = 1e300       # time of an event that does not happen
+
+
+@njit(cache=True, error_model="numpy")
+def value(c, tau):
+    """(value, slope, curvature) at tau of the motion with coefficients c (K,)."""
+    q, d, e = c[0], 0.0, 0.0
+    c1, s1 = cos(tau), sin(tau)
+    ch, sh = 1.0, 0.0
+    for h in range(1, (c.size + 1) // 2):
+        ch, sh = ch * c1 - sh * s1, sh * c1 + ch * s1
+        a, b = c[2 * h - 1], c[2 * h]
+        now = a * ch + b * sh
+        q += now
+        d += h * (b * ch - a * sh)
+        e -= h * h * now
+    return q, d, e
+
+
+@njit(cache=True, error_model="numpy")
+def _root(c, level, a, b, order):
+    """Zero in [a, b] of c - level (order 0), negative at a and positive at b, or of its slope falling through zero."""
+    x, sign = 0.5 * (a + b), 1.0 if order == 0 else -1.0
+    for _ in range(80):
+        q, d, e = value(c, x)
+        f, slope = (q - level, d) if order == 0 else (sign * d, sign * e)
+        if f > 0.0:
+            b = x
+        else:
+            a = x
+        step = f / slope if slope != 0.0 else 2.0 * (b - a)
+        new = x - step
+        if not a < new < b:
+            new = 0.5 * (a + b)
+        if abs(new - x) <= 4e-16 * max(abs(x), 1.0) or b - a <= 4e-16 * max(abs(x), 1.0):
+            return new
+        x = new
+    return x
+
+
+@njit(cache=True, error_model="numpy")
+def rise(c, level, a, b, small):
+    """Time in [a, b] at which the motion with coefficients c first exceeds ``level``, NEVER if it does not.
+
+    ``small`` is the rounding error of values: a touch that is no higher does not count.
+    """
+    qa, da, _ = value(c, a)
+    qb, db, _ = value(c, b)
+    if qa - level > small:
+        return a
+    if qb - level > small:
+        return _root(c, level, a, b, 0)
+    if da > 0.0 and db < 0.0:
+        peak = _root(c, level, a, b, 1)
+        if value(c, peak)[0] - level > small:
+            return _root(c, level, a, peak, 0)
+    return NEVER
