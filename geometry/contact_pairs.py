@@ -106,12 +106,12 @@ def _square(width: float) -> np.ndarray:
 
 def _solids(gmsh: ModuleType, width: float, seat: float, upper: float | None) -> tuple[int, int]:
     """Quarter blocks with the seat imprinted, or a quarter round punch above."""
-    blade = imprint(gmsh, prism(gmsh, _square(width), -width, 0.0), [_quarter_disc(gmsh, seat)])
+    blade = imprint(gmsh, prism(gmsh, _square(width), -width, 0.0), [(2, _quarter_disc(gmsh, seat))])
     if upper is None:
         solid = gmsh.model.occ.extrude([(2, _quarter_disc(gmsh, seat))], 0, 0, seat)
         damper = next(tag for dim, tag in solid if dim == 3)
     else:
-        damper = imprint(gmsh, prism(gmsh, _square(upper), 0.0, upper), [_quarter_disc(gmsh, seat)])
+        damper = imprint(gmsh, prism(gmsh, _square(upper), 0.0, upper), [(2, _quarter_disc(gmsh, seat))])
     gmsh.model.occ.synchronize()
     return blade, damper
 

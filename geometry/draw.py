@@ -23,9 +23,9 @@ def prism(gmsh: ModuleType, corners: np.ndarray, low: float, high: float) -> int
     return next(tag for dim, tag in gmsh.model.occ.extrude([(2, face)], 0, 0, high - low) if dim == 3)
 
 
-def imprint(gmsh: ModuleType, volume: int, faces: list[int]) -> int:
-    """The volume with the outlines of plane faces cut into its skin."""
-    result, _ = gmsh.model.occ.fragment([(3, volume)], [(2, face) for face in faces])
+def imprint(gmsh: ModuleType, volume: int, marks: list[tuple[int, int]]) -> int:
+    """The volume with plane faces and points (dimension, tag) cut into its skin."""
+    result, _ = gmsh.model.occ.fragment([(3, volume)], marks)
     return next(tag for dim, tag in result if dim == 3)
 
 

@@ -16,7 +16,7 @@ from .parameters import Aerofoil, Disc, MeshSize, Platform, Shank, Wedge
 from .profile import Profile, profile
 from .section import outline
 from .sector_check import check_sector
-from .sector_names import link, motions, moved, name_faces, refined, seat, sector, trailing_curves
+from .sector_names import link, mark_tip, motions, moved, name_faces, nose, seat, sector, split_skin, trailing_curves
 from .session import attempt, gmsh_session
 from .sizing import sector_sizes, set_sizes
 
@@ -37,17 +37,19 @@ def wedge_sector(aerofoil: Aerofoil, platform: Platform, shank: Shank, disc: Dis
     sizes = sector_sizes(aerofoil, platform, shank, disc, wedge, size)
     with gmsh_session() as gmsh:
         blade = _blade(gmsh, aerofoil, platform, shank, disc, shape)
-        seats = [polygon(gmsh, seat(shape, wedge.length, side))[0] for side in (-1, 1)]
+        marks = [(2, polygon(gmsh, seat(shape, wedge.length, side))[0]) for side in (-1, 1)]
+        marks.append((0, gmsh.model.occ.addPoint(*nose(aerofoil, shape))))
         with attempt("damper.length", "imprint the seats on the platform"):
-            blade = imprint(gmsh, blade, seats)
+            blade = imprint(gmsh, blade, marks)
         damper = prism(gmsh, shape.wedge, -wedge.length / 2, wedge.length / 2)
         gmsh.model.occ.synchronize()
         groups = name_faces(gmsh, blade, damper, aerofoil, disc, wedge, shape)
+        groups = mark_tip(gmsh, groups, aerofoil, shape)
         link(gmsh, groups, shape)
         set_sizes(gmsh, shape, wedge, sizes, trailing_curves(gmsh, groups))
         with attempt("mesh.size", "mesh this geometry"):
             mesh = mesh_model(gmsh, groups, 3, size)
-    mesh = complete(refined(mesh, aerofoil, shape), motions(shape), sizes.base, sector(disc.sectors),
+    mesh = complete(split_skin(mesh, aerofoil, shape), motions(shape), sizes.base, sector(disc.sectors),
                     flat=("seat_left", "seat_right", "damper_left", "damper_right"))
     return moved(mesh, wedge, shape) if wedge.clearance else mesh
 

@@ -14,9 +14,9 @@ from .finish import Motion
 from .mesh import Mesh, Sector
 from .parameters import Aerofoil, Disc, Wedge
 from .profile import Profile, turn
-from .section import centroid, place, placement, shape
+from .section import centroid, outline, place, placement, shape
 
-__all__ = ["link", "motions", "moved", "name_faces", "refined", "seat", "sector",
+__all__ = ["link", "mark_tip", "motions", "moved", "name_faces", "nose", "seat", "sector", "split_skin",
            "trailing_curves"]
 
 
@@ -72,20 +72,35 @@ def link(gmsh: ModuleType, groups: Groups, profile: Profile) -> None:
         tie(gmsh, 2, groups.faces[master], groups.faces[slave], rotation, shift)
 
 
-def refined(mesh: Mesh, aerofoil: Aerofoil, profile: Profile) -> Mesh:
-    """The mesh with the aerofoil's skin split into both sides, and with the tip's node sets.
-
-    tip_leading, tip_trailing and tip_mid are the corner nodes nearest to the ends and the middle of the camber line.
-    """
-    faces = {name: f for name, f in mesh.faces.items() if name != "aerofoil"}
+def split_skin(mesh: Mesh, aerofoil: Aerofoil, profile: Profile) -> Mesh:
+    """The mesh with the aerofoil's skin split into its two sides at the camber line."""
     skin = mesh.faces["aerofoil"]
     above = _above_camber(mesh.points[skin[:, :3]].mean(axis=1), aerofoil, profile.top)
-    faces |= {"suction_side": skin[above], "pressure_side": skin[~above]}
-    line = np.array([[0, 0], [1, 0], [0.5, aerofoil.camber]])
-    wanted = place(aerofoil, profile.top, 1, line)
-    corners = np.unique(mesh.faces["tip"][:, :3])
-    nearest = [corners[[np.argmin(np.linalg.norm(mesh.points[corners] - w, axis=1))]] for w in wanted]
-    return replace(mesh, faces=faces, nodes=dict(zip(("tip_leading", "tip_trailing", "tip_mid"), nearest, strict=True)))
+    faces = {name: f for name, f in mesh.faces.items() if name != "aerofoil"}
+    return replace(mesh, faces=faces | {"suction_side": skin[above], "pressure_side": skin[~above]})
+
+
+def mark_tip(gmsh: ModuleType, groups: Groups, aerofoil: Aerofoil, profile: Profile) -> Groups:
+    """Groups with three points of the tip that are nodes of any mesh.
+
+    tip_leading is the end of the camber line, where the tip's edge was cut; tip_trailing is the corner of the blunt
+    edge on the suction side; tip_mid (on the camber line at half chord) is embedded.
+    """
+    tip = groups.faces["tip"][0]
+    corners = {tag: np.array(gmsh.model.getValue(0, tag, []))
+               for _, tag in gmsh.model.getBoundary([(2, tip)], oriented=False, recursive=True)}
+    edge = outline(aerofoil, profile.top, 1)
+    leading, trailing = (min(corners, key=lambda tag, p=p: np.linalg.norm(corners[tag] - p))
+                         for p in (nose(aerofoil, profile), edge[0]))
+    middle = gmsh.model.occ.addPoint(*place(aerofoil, profile.top, 1, np.array([[0.5, aerofoil.camber]]))[0])
+    gmsh.model.occ.synchronize()
+    gmsh.model.mesh.embed(0, [middle], 2, tip)
+    return replace(groups, points={"tip_leading": [leading], "tip_mid": [middle], "tip_trailing": [trailing]})
+
+
+def nose(aerofoil: Aerofoil, profile: Profile) -> np.ndarray:
+    """Leading edge at the tip, (3,) [m]."""
+    return place(aerofoil, profile.top, 1, np.zeros((1, 2)))[0]
 
 
 def _above_camber(points: np.ndarray, aerofoil: Aerofoil, top: float) -> np.ndarray:

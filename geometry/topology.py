@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-__all__ = ["CORNERS", "DIMENSION", "EDGES", "FACETS", "GMSH_TYPES", "corner_count", "outward", "owners"]
+__all__ = ["CORNERS", "DIMENSION", "EDGES", "FACETS", "GMSH_TYPES", "boundary", "corner_count", "outward", "owners"]
 
 # gmsh's number of an element type -> meshio's word
 GMSH_TYPES = {1: "line", 8: "line3", 2: "triangle", 9: "triangle6", 3: "quad", 16: "quad8", 10: "quad9",
@@ -80,3 +80,21 @@ def outward(points: np.ndarray, cells: np.ndarray, cell_type: str, faces: np.nda
     result = faces.copy()
     result[wrong] = faces[wrong][:, REVERSED[word]]
     return result
+
+
+def boundary(cells: np.ndarray, cell_type: str) -> np.ndarray:
+    """Outer facets (nf, k) of the cells with their mid-side nodes: facets that one cell has for itself.
+
+    The node in the middle of a face (quad9) is left out: hexahedron27 gives facets of 8 nodes.
+    """
+    family = FAMILY[cell_type]
+    edges = {frozenset(pair): i for i, pair in enumerate(EDGES[family])}
+    k, second = corner_count(cell_type), cells.shape[1] > corner_count(cell_type)
+    table = []
+    for facet in FACETS[family]:
+        ring = list(zip(facet, facet[1:] + facet[:1], strict=True)) if len(facet) > 2 else [facet]
+        table.append([*facet, *([k + edges[frozenset(pair)] for pair in ring] if second else [])])
+    facets = cells[:, np.array(table)].reshape(-1, len(table[0]))
+    key = np.sort(facets[:, :len(FACETS[family][0])], axis=1)
+    _, first, count = np.unique(key, axis=0, return_index=True, return_counts=True)
+    return facets[first[count == 1]]

@@ -1,0 +1,212 @@
+"""A user's own mesh or STEP file as a Mesh: names, axes, pairs.
+
+Names are read without regard to case, blanks count as underscores. Volumes: "blade" and "damper"; when nothing is
+called "blade", every cell outside "damper" is blade. Faces, edges and node sets: the names of geometry.mesh.Mesh;
+others are kept. A node set becomes a face too when it holds all corners of outer facets (Abaqus NSET, Ansys
+components). The model is turned so that the engine axis is z and +x is midway between the cyclic faces. Pairs are
+matched, not made: the mesh must be periodic from cyclic_low to cyclic_high (either sense), and have matching nodes on
+seats and flanks.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from bladefem.errors import InputError, suggestion
+
+from .finish import Motion
+from .jacobian import straight_jacobian
+from .matching import match, snap
+from .mesh import Mesh, Pair, Sector
+from .parameters import MeshSize
+from .profile import turn
+from .quality import report, straighten
+from .raw_mesh import RawMesh, read_raw
+from .topology import DIMENSION, FAMILY, boundary, outward
+
+__all__ = ["mesh_of_raw", "read_geometry", "read_mesh"]
+
+LOOSE = 1e-4        # files carry few digits; a match within this share of the face is a match, and is then snapped
+FLIPPED = {"tetra": [0, 2, 1, 3], "tetra10": [0, 2, 1, 3, 6, 5, 4, 7, 9, 8], "triangle": [0, 2, 1],
+           "triangle6": [0, 2, 1, 5, 4, 3]}
+
+
+def read_geometry(imported: Any, size: MeshSize) -> Mesh:
+    """The mesh of a scene's [imported] table: STEP files are meshed, mesh files are read.
+
+    Args:
+        imported: has file, scale, sectors and axis.
+
+    Raises:
+        InputError: the file, its groups or its periodicity are not usable; one sentence.
+    """
+    axis = np.asarray(imported.axis, dtype=float)
+    if Path(imported.file).suffix.lower() in (".step", ".stp"):
+        from .step_file import read_step
+
+        return read_step(imported.file, size, imported.scale, imported.sectors, axis)
+    return read_mesh(imported.file, imported.scale, imported.sectors, axis)
+
+
+def read_mesh(file: str | Path, scale: float = 1.0, sectors: int = 0,
+              axis: np.ndarray | tuple[float, float, float] = (0.0, 0.0, 1.0)) -> Mesh:
+    """Mesh from .msh, .med, .unv, .inp, .bdf, .nas, .vtu or .cdb.
+
+    Args:
+        scale: factor from the file's unit to metres.
+        sectors: blades on the wheel, 0 for a single body.
+        axis: engine axis through the origin.
+
+    Raises:
+        InputError: as `read_geometry`.
+    """
+    return mesh_of_raw(read_raw(Path(file)), scale, sectors, axis, str(file))
+
+
+def mesh_of_raw(raw: RawMesh, scale: float, sectors: int, axis: np.ndarray | tuple[float, float, float],
+                source: str) -> Mesh:
+    """Names, axes, directions and pairs on what a file holds."""
+    mesh = _bodies(raw, source)
+    mesh = replace(mesh, points=_axes(mesh, scale, np.asarray(axis, dtype=float)))
+    mesh = _with_faces(mesh, raw)
+    mesh = _paired(mesh, sectors, source)
+    points, straightened = straighten(replace(mesh, points=snap(mesh.points, mesh.pairs)))
+    mesh = replace(mesh, points=points)
+    return replace(mesh, report={**report(mesh, straightened, _edge_length(mesh)), "source": source})
+
+
+def _word(name: str) -> str:
+    return "_".join(name.lower().split())
+
+
+def _bodies(raw: RawMesh, source: str) -> Mesh:
+    """Cells of the highest dimension, in bodies; only their nodes are kept, in file order."""
+    top = max((DIMENSION[FAMILY[word]] for word, _ in raw.blocks), default=0)
+    solid = [i for i, (word, _) in enumerate(raw.blocks) if DIMENSION[FAMILY[word]] == top]
+    kinds = sorted({raw.blocks[i][0] for i in solid})
+    if top < 2 or len(kinds) != 1 or not kinds[0].startswith(("tetra", "hexa", "triangle", "quad")):
+        raise InputError(f"imported.file = '{source}': cells are {', '.join(kinds) or 'missing'}, "
+                         "expected one kind of tetrahedra, hexahedra, triangles or quadrilaterals")
+    every = np.vstack([raw.blocks[i][1] for i in solid])
+    start = dict(zip(solid, np.cumsum([0] + [len(raw.blocks[i][1]) for i in solid]), strict=False))
+    rows = {_word(name): np.concatenate([rows + start[b] for b, rows in parts])
+            for name, parts in raw.groups.items() if parts and all(b in start for b, _ in parts)}
+    damper = np.unique(rows.get("damper", np.empty(0, dtype=int)))
+    blade = np.unique(rows["blade"]) if "blade" in rows else np.setdiff1d(np.arange(len(every)), damper)
+    if np.intersect1d(blade, damper).size:
+        raise InputError(f"imported.file = '{source}': groups blade and damper share cells, expected separate bodies")
+    bodies = {"blade": every[blade]} | ({"damper": every[damper]} if damper.size else {})
+    return Mesh(raw.points, kinds[0], {n: _positive(raw.points, c, kinds[0], source) for n, c in bodies.items()})
+
+
+def _positive(points: np.ndarray, cells: np.ndarray, word: str, source: str) -> np.ndarray:
+    """Cells with positive volume; a simplex of the other sense is renumbered."""
+    negative = straight_jacobian(points, cells, word) < 0
+    if not negative.any():
+        return cells
+    if word not in FLIPPED:
+        raise InputError(f"imported.file = '{source}': {negative.sum()} cells of type {word} are inside out")
+    result = cells.copy()
+    result[negative] = cells[negative][:, FLIPPED[word]]
+    return result
+
+
+def _axes(mesh: Mesh, scale: float, axis: np.ndarray) -> np.ndarray:
+    """Points [m] with the engine axis along z."""
+    z = axis / np.linalg.norm(axis)
+    if abs(z[2] - 1) < 1e-12:
+        return mesh.points * scale
+    radial = np.linalg.svd(z[None])[2][1]
+    return mesh.points * scale @ np.array([radial, np.cross(z, radial), z]).T
+
+
+def _with_faces(mesh: Mesh, raw: RawMesh) -> Mesh:
+    """Named faces and node sets; nodes that no body uses are dropped."""
+    cells = np.vstack(list(mesh.bodies.values()))
+    used = np.unique(cells)
+    number = np.full(len(mesh.points), -1)
+    number[used] = np.arange(len(used))
+    points, cells = mesh.points[used], number[cells]
+    faces = {_word(name): np.vstack([number[raw.blocks[b][1][rows]] for b, rows in parts])
+             for name, parts in raw.groups.items()
+             if parts and all(DIMENSION[FAMILY[raw.blocks[b][0]]] == mesh.dimension - 1 for b, _ in parts)}
+    sets = {_word(name): number[nodes][number[nodes] >= 0] for name, nodes in raw.node_sets.items()}
+    skin = boundary(cells, mesh.cell_type) if sets else None
+    for name, nodes in sets.items():
+        inside = np.isin(skin, nodes)[:, :2 + (mesh.dimension == 3)].all(axis=1)
+        if name not in faces and inside.any():
+            faces[name] = skin[inside]
+    bad = [name for name, f in faces.items() if (f < 0).any()]
+    if bad:
+        raise InputError(f"imported.file: face {bad[0]} has nodes that no cell uses, expected faces on the bodies")
+    return replace(mesh, points=points, bodies={n: number[c] for n, c in mesh.bodies.items()}, nodes=sets,
+                   faces={n: outward(points, cells, mesh.cell_type, f) for n, f in faces.items()})
+
+
+def _paired(mesh: Mesh, sectors: int, source: str) -> Mesh:
+    """Cyclic and contact pairs, as far as the names are there."""
+    on = turn(2 * np.pi / sectors) if sectors else np.eye(3)
+    pairs: dict[str, Pair] = {}
+    if sectors:
+        for name in ("cyclic_low", "cyclic_high"):
+            if name not in mesh.faces:
+                raise InputError(f"imported.file = '{source}': no face group '{name}', needed with imported.sectors = "
+                                 f"{sectors}{suggestion(name, mesh.faces)}")
+        mesh, pairs["cyclic"] = _cyclic(mesh, on)
+        mesh = replace(mesh, points=_centred(mesh))
+    shift = _pitch(mesh) if not sectors else np.zeros(3)
+    motions: dict[str, Motion] = {"this": ("seat_right", "damper_left", np.eye(3), np.zeros(3)),
+                                  "next": ("seat_left", "damper_right", on, shift)}
+    for name, (master, slave, rotation, way) in motions.items():
+        if master in mesh.faces and slave in mesh.faces:
+            pairs[name] = _matched(mesh, (master, slave), rotation, way, sectors)
+    row = Sector(sectors, on, shift) if sectors or shift.any() else None
+    return replace(mesh, pairs=pairs, sector=row)
+
+
+def _matched(mesh: Mesh, names: tuple[str, str], rotation: np.ndarray, shift: np.ndarray, sectors: int) -> Pair:
+    """A contact pair, with a hint when the number of sectors was left out."""
+    try:
+        return match(mesh.points, mesh.faces, names, mesh.dimension, rotation, shift, LOOSE)
+    except InputError as error:
+        hint = "" if sectors else "; on a wheel, imported.sectors must be given"
+        raise InputError(f"{error}{hint}") from None
+
+
+def _pitch(mesh: Mesh) -> np.ndarray:
+    """Shift [m] from seat_left to damper_right: a straight row of blades; zero when the faces are not there."""
+    if not {"seat_left", "damper_right"} <= set(mesh.faces):
+        return np.zeros(3)
+    low, high = (np.unique(mesh.faces[name]) for name in ("seat_left", "damper_right"))
+    return mesh.points[high].mean(axis=0) - mesh.points[low].mean(axis=0)
+
+
+def _cyclic(mesh: Mesh, on: np.ndarray) -> tuple[Mesh, Pair]:
+    """The cyclic pair; the names are swapped when the file has them the other way round."""
+    names = ("cyclic_low", "cyclic_high")
+    try:
+        return mesh, match(mesh.points, mesh.faces, names, mesh.dimension, on, None, LOOSE)
+    except InputError as first:
+        swapped = replace(mesh, faces={**mesh.faces, names[0]: mesh.faces[names[1]], names[1]: mesh.faces[names[0]]})
+        try:
+            return swapped, match(mesh.points, swapped.faces, names, mesh.dimension, on, None, LOOSE)
+        except InputError:
+            raise first from None
+
+
+def _centred(mesh: Mesh) -> np.ndarray:
+    """Points [m] turned about z so that +x is midway between the cyclic faces."""
+    low, high = (mesh.points[np.unique(mesh.faces[name])].mean(axis=0)[:2] for name in ("cyclic_low", "cyclic_high"))
+    middle = low / np.linalg.norm(low) + high / np.linalg.norm(high)
+    angle = np.arctan2(middle[1], middle[0])
+    return mesh.points if abs(angle) < 1e-9 else mesh.points @ turn(-angle).T
+
+
+def _edge_length(mesh: Mesh) -> float:
+    """Mean length [m] of the first edge of the cells."""
+    cells = np.vstack(list(mesh.bodies.values()))
+    return float(np.linalg.norm(mesh.points[cells[:, 1]] - mesh.points[cells[:, 0]], axis=1).mean())

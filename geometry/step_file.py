@@ -1,0 +1,172 @@
+"""STEP files through OpenCASCADE: import, names, periodic meshing, and then the same road as any imported mesh.
+
+Names come from the file: the solids' (MANIFOLD_SOLID_BREP, else the product's name) and the faces' (ADVANCED_FACE).
+What has no name is called body_1, body_2, ... and face_1, face_2, ... in gmsh's numbering, the order of the file.
+When no face is called cyclic_low, cyclic_high or clamp, they are looked for: two faces that the rotation to the next
+sector carries onto each other; the blade's face nearest to the engine axis.
+Solids are meshed separately: bodies that touch are not glued.
+"""
+
+from __future__ import annotations
+
+import re
+from pathlib import Path
+from types import ModuleType
+
+import numpy as np
+
+from bladefem.errors import InputError
+
+from .curving import second_order
+from .draw import centres, tie
+from .imported import mesh_of_raw
+from .mesh import Mesh
+from .parameters import MeshSize
+from .raw_mesh import from_gmsh_model
+from .session import attempt, gmsh_session
+
+__all__ = ["read_step"]
+
+PREFIX = {"": 1.0, ".MILLI.": 1e-3, ".CENTI.": 1e-2, ".DECI.": 0.1, ".MICRO.": 1e-6, ".KILO.": 1e3}
+
+
+def read_step(file: str | Path, size: MeshSize, scale: float = 1.0, sectors: int = 0,
+              axis: np.ndarray | tuple[float, float, float] = (0.0, 0.0, 1.0)) -> Mesh:
+    """Mesh of a STEP file with second-order tetrahedra.
+
+    Args:
+        scale: factor from the file's numbers to metres; 1 leaves it to the unit that the file states.
+        sectors: blades on the wheel, 0 for a single body.
+        axis: engine axis through the origin.
+
+    Raises:
+        InputError: the file cannot be read or meshed, or groups are missing.
+    """
+    path = Path(file)
+    if not path.is_file():
+        raise InputError(f"imported.file = '{file}': there is no such file")
+    axis = np.asarray(axis, dtype=float) / np.linalg.norm(axis)
+    text = path.read_text(errors="replace")
+    with gmsh_session() as gmsh:
+        with attempt("imported.file", f"import '{file}'"):
+            _import(gmsh, path, 1.0 if scale == 1.0 else scale / file_unit(text))
+        named = _names(gmsh, text)
+        named |= _found(gmsh, named, sectors, axis)
+        _periodic(gmsh, named, sectors, axis)
+        with attempt("mesh.size", f"mesh '{file}'"):
+            _generate(gmsh, size)
+        for (dimension, name), tags in named.items():
+            gmsh.model.setPhysicalName(dimension, gmsh.model.addPhysicalGroup(dimension, tags), name)
+        raw = from_gmsh_model(gmsh)
+    return mesh_of_raw(raw, 1.0, sectors, axis, str(file))
+
+
+def file_unit(text: str) -> float:
+    """Length unit [m] that a STEP file states; millimetre when it states none."""
+    found = re.search(r"LENGTH_UNIT\(\).{0,80}?SI_UNIT\(\s*(\$|\.\w+\.)\s*,\s*\.METRE\.", text, re.S)
+    if found:
+        return PREFIX.get(found[1].replace("$", ""), 1e-3)
+    return 0.0254 if re.search(r"CONVERSION_BASED_UNIT\(\s*'INCH'", text, re.I) else 1e-3
+
+
+def _import(gmsh: ModuleType, path: Path, factor: float) -> None:
+    """Shapes in metres."""
+    gmsh.option.setNumber("Geometry.OCCImportLabels", 1)
+    gmsh.option.setString("Geometry.OCCTargetUnit", "M")
+    shapes = gmsh.model.occ.importShapes(str(path))
+    if not any(dim == 3 for dim, _ in shapes):
+        raise InputError(f"imported.file = '{path}': no solids inside, expected at least one")
+    if factor != 1.0:
+        gmsh.model.occ.dilate(shapes, 0, 0, 0, factor, factor, factor)
+    gmsh.model.occ.synchronize()
+
+
+def _names(gmsh: ModuleType, text: str) -> dict[tuple[int, str], list[int]]:
+    """(dimension, name) -> entities, by the names in the file where they can be told apart."""
+    named: dict[tuple[int, str], list[int]] = {}
+    solids = _written(text)
+    volumes = [tag for _, tag in gmsh.model.getEntities(3)]
+    for i, volume in enumerate(volumes):
+        faces = [tag for _, tag in gmsh.model.getBoundary([(3, volume)], oriented=False)]
+        body, words = solids[i] if len(solids) == len(volumes) else ("", [])
+        words = words if len(words) == len(faces) else [""] * len(faces)
+        label = gmsh.model.getEntityName(3, volume).split("/")[-1]
+        named.setdefault((3, body or label or f"body_{volume}"), []).append(volume)
+        for face, word in zip(sorted(faces), words, strict=True):
+            named.setdefault((2, word or f"face_{face}"), []).append(face)
+    return named
+
+
+def _written(text: str) -> list[tuple[str, list[str]]]:
+    """Name of each solid and of its faces, in the order of the file."""
+    record = {int(n): body for n, body in re.findall(r"#(\d+)\s*=\s*(.*?);\s*(?=#|ENDSEC)", text, re.S)}
+    solids = []
+    for body in (record[n] for n in sorted(record) if record[n].startswith("MANIFOLD_SOLID_BREP")):
+        name, shell = re.match(r"MANIFOLD_SOLID_BREP\s*\(\s*'(.*?)'\s*,\s*#(\d+)", body, re.S).groups()
+        faces = re.findall(r"#(\d+)", record.get(int(shell), ""))
+        words = [re.match(r"\w+\s*\(\s*'(.*?)'", record.get(int(face), "X('')"), re.S) for face in faces]
+        solids.append((_plain(name), [_plain(word[1]) if word else "" for word in words]))
+    return solids
+
+
+def _plain(name: str) -> str:
+    """A name worth using; CAD systems write NONE and the like."""
+    return "" if name.strip().upper() in ("", "NONE", "$") else name.strip()
+
+
+def _found(gmsh: ModuleType, named: dict[tuple[int, str], list[int]], sectors: int,
+           axis: np.ndarray) -> dict[tuple[int, str], list[int]]:
+    """Cyclic faces and clamp by where they are, when no face has these names."""
+    words = {name.lower() for dim, name in named if dim == 2}
+    body = [tag for (dim, name), tags in named.items() if dim == 3 and name.lower() != "damper" for tag in tags]
+    middle = {tag: c for volume in body for tag, c in centres(gmsh, volume).items()}
+    found: dict[tuple[int, str], list[int]] = {}
+    if sectors and not {"cyclic_low", "cyclic_high"} & words:
+        low, high = _turned(gmsh, middle, rotation(axis, 2 * np.pi / sectors))
+        found |= {(2, "cyclic_low"): low, (2, "cyclic_high"): high} if low else {}
+    if sectors and "clamp" not in words:
+        radius = {tag: np.linalg.norm(c - (c @ axis) * axis) for tag, c in middle.items()
+                  if not any(tag in tags for tags in found.values())}
+        found[2, "clamp"] = [min(radius, key=radius.get)]
+    return found
+
+
+def _turned(gmsh: ModuleType, middle: dict[int, np.ndarray], on: np.ndarray) -> tuple[list[int], list[int]]:
+    """Faces that the rotation carries onto each other: same area, centre turned."""
+    scale = max(np.linalg.norm(c) for c in middle.values())
+    area = {tag: gmsh.model.occ.getMass(2, tag) for tag in middle}
+    pairs = [(a, b) for a, p in middle.items() for b, q in middle.items()
+             if a != b and np.linalg.norm(on @ p - q) < 1e-6 * scale and abs(area[a] / area[b] - 1) < 1e-6]
+    return [a for a, _ in pairs], [b for _, b in pairs]
+
+
+def rotation(axis: np.ndarray, angle: float) -> np.ndarray:
+    """Rotation (3, 3) about a unit axis (Rodrigues)."""
+    cross = np.array([[0, -axis[2], axis[1]], [axis[2], 0, -axis[0]], [-axis[1], axis[0], 0]])
+    return np.eye(3) + np.sin(angle) * cross + (1 - np.cos(angle)) * cross @ cross
+
+
+def _periodic(gmsh: ModuleType, named: dict[tuple[int, str], list[int]], sectors: int, axis: np.ndarray) -> None:
+    """Tie cyclic faces and contact faces where both sides are named and the motion fits."""
+    tags = {name.lower(): t for (dim, name), t in named.items() if dim == 2}
+    on = rotation(axis, 2 * np.pi / sectors) if sectors else np.eye(3)
+    for master, slave, motions in (("cyclic_low", "cyclic_high", (on, on.T)),
+                                   ("seat_right", "damper_left", (np.eye(3),)),
+                                   ("seat_left", "damper_right", (on, on.T))):
+        if master not in tags or slave not in tags or len(tags[master]) != len(tags[slave]):
+            continue
+        start, end = (np.mean([gmsh.model.occ.getCenterOfMass(2, t) for t in tags[n]], axis=0) for n in (master, slave))
+        best = min(motions, key=lambda r, a=start, b=end: np.linalg.norm(r @ a - b))
+        with attempt("imported.file", f"match the faces {master} and {slave}"):
+            tie(gmsh, 2, tags[master], tags[slave], best, np.zeros(3))
+
+
+def _generate(gmsh: ModuleType, size: MeshSize) -> None:
+    low, high = np.array(gmsh.model.getBoundingBox(-1, -1)).reshape(2, 3)
+    base = size.size or np.linalg.norm(high - low) / 40
+    gmsh.option.setNumber("Mesh.MeshSizeMax", base)
+    gmsh.option.setNumber("Mesh.MeshSizeMin", base / 4)
+    gmsh.option.setNumber("Mesh.MeshSizeFromCurvature", 10)
+    gmsh.model.mesh.generate(3)
+    if size.order == 2:
+        second_order(gmsh, size.curved)

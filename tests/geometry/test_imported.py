@@ -1,0 +1,120 @@
+"""Users' own files: the same mesh back from every format, and clear words when something is missing."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from writers import write_cdb, write_inp, write_step
+
+from bladefem.errors import InputError
+from geometry.draw import prism
+from geometry.export import write_msh
+from geometry.imported import read_mesh
+from geometry.parameters import Disc, MeshSize, Plane
+from geometry.plane import plane_blades
+from geometry.sector import _disc
+from geometry.step_file import read_step
+
+PAIRS = {"cyclic", "this", "next"}
+
+
+def same(found, mesh, tolerance=1e-12):
+    for name, pair in mesh.pairs.items():
+        assert found.pairs[name].nodes.shape == pair.nodes.shape
+        np.testing.assert_allclose(found.pairs[name].rotation, pair.rotation, atol=1e-12)
+    assert {n: c.shape for n, c in found.bodies.items()} == {n: c.shape for n, c in mesh.bodies.items()}
+    order, other = (np.lexsort(np.round(m.points, 9).T) for m in (found, mesh))
+    np.testing.assert_allclose(found.points[order], mesh.points[other], atol=tolerance)
+    assert found.report["min scaled jacobian"] == pytest.approx(mesh.report["min scaled jacobian"], rel=1e-6)
+
+
+@pytest.mark.parametrize("version, binary", [(2.2, False), (4.1, False), (4.1, True)])
+def test_msh(coarse_sector, tmp_path, version, binary):
+    write_msh(coarse_sector, tmp_path / "a.msh", version, binary)
+    found = read_mesh(tmp_path / "a.msh", sectors=36)
+    same(found, coarse_sector)
+    assert {n: f.shape for n, f in found.faces.items()} == {n: f.shape for n, f in coarse_sector.faces.items()}
+    for name, nodes in coarse_sector.nodes.items():
+        np.testing.assert_allclose(found.points[found.nodes[name]], coarse_sector.points[nodes], atol=1e-12)
+
+
+@pytest.mark.parametrize("suffix, write", [("inp", write_inp), ("cdb", write_cdb)])
+def test_abaqus_and_ansys(coarse_sector, tmp_path, suffix, write):
+    write(coarse_sector, tmp_path / f"a.{suffix}")
+    same(read_mesh(tmp_path / f"a.{suffix}", sectors=36), coarse_sector)
+
+
+def test_unit_axis_and_sense(coarse_sector, tmp_path):
+    """A file in millimetres, engine axis along x, cyclic names the other way round."""
+    swapped = {**coarse_sector.faces, "cyclic_low": coarse_sector.faces["cyclic_high"],
+               "cyclic_high": coarse_sector.faces["cyclic_low"]}
+    turned = 1e3 * coarse_sector.points[:, [2, 0, 1]]
+    write_msh(replace(coarse_sector, points=turned, faces=swapped), tmp_path / "a.msh")
+    found = read_mesh(tmp_path / "a.msh", 1e-3, 36, (1, 0, 0))
+    pair = found.pairs["cyclic"]
+    np.testing.assert_allclose(found.points[pair.nodes[1]], found.points[pair.nodes[0]] @ pair.rotation.T, atol=1e-14)
+    middle = found.points[np.unique(found.bodies["blade"])].mean(axis=0)
+    assert middle[0] > 0.2 and abs(middle[1]) < 0.01
+
+
+def test_missing_group_is_named(coarse_sector, tmp_path):
+    faces = {n: f for n, f in coarse_sector.faces.items() if n != "cyclic_high"} | {
+        "cyclic_hihg": coarse_sector.faces["cyclic_high"]}
+    write_msh(replace(coarse_sector, faces=faces), tmp_path / "a.msh")
+    with pytest.raises(InputError, match=r"no face group 'cyclic_high'.*did you mean 'cyclic_hihg'"):
+        read_mesh(tmp_path / "a.msh", sectors=36)
+
+
+def test_contact_faces_of_a_wheel_need_the_number_of_sectors(coarse_sector, tmp_path):
+    write_msh(coarse_sector, tmp_path / "a.msh")
+    with pytest.raises(InputError, match=r"imported\.sectors must be given"):
+        read_mesh(tmp_path / "a.msh")
+
+
+def test_unmatched_cyclic_faces_are_refused(coarse_sector, tmp_path):
+    write_msh(coarse_sector, tmp_path / "a.msh")
+    with pytest.raises(InputError, match=r"cyclic_low and cyclic_high do not match.*periodic"):
+        read_mesh(tmp_path / "a.msh", sectors=35)
+
+
+@pytest.mark.parametrize("name, text, words", [("a.msh", "no mesh", "a.msh"), ("a.xyz", "", "unknown kind"),
+                                               ("a.inp", "*NODE\n1, 0, 0, 0\n", "cells are missing"),
+                                               ("a.cdb", "/PREP7\n", "NBLOCK"), ("a.step", "ISO-10303-21;", "a.step")])
+def test_unusable_files(tmp_path, name, text, words):
+    (tmp_path / name).write_text(text)
+    with pytest.raises(InputError, match=words) as caught:
+        read_step(tmp_path / name, MeshSize()) if name.endswith("step") else read_mesh(tmp_path / name)
+    assert "\n" not in str(caught.value)
+
+
+def test_plane_row(tmp_path):
+    mesh = plane_blades(Plane(), MeshSize())
+    write_msh(mesh, tmp_path / "a.msh")
+    found = read_mesh(tmp_path / "a.msh")
+    same(found, mesh)
+    assert found.sector.count == 0 and found.sector.shift == pytest.approx([0, Plane().pitch, 0])
+
+
+def test_no_such_file(tmp_path):
+    with pytest.raises(InputError, match="no such file"):
+        read_mesh(tmp_path / "none.msh")
+
+
+def test_step_block_in_millimetres_with_named_faces(tmp_path):
+    square = np.array([[0.1, -0.01], [0.2, -0.01], [0.2, 0.01], [0.1, 0.01]])
+    write_step(tmp_path / "a.step", {"blade": ["clamp", "tip"]}, lambda gmsh: prism(gmsh, square, 0.0, 0.03))
+    mesh = read_step(tmp_path / "a.step", MeshSize(size=0.01))
+    assert {"clamp", "tip", "face_3"} <= set(mesh.faces) and set(mesh.bodies) == {"blade"}
+    assert np.ptp(mesh.points, axis=0) == pytest.approx([0.1, 0.02, 0.03], rel=1e-6)
+    same_numbers = read_step(tmp_path / "a.step", MeshSize(size=0.01), scale=1e-3)
+    assert np.ptp(same_numbers.points, axis=0) == pytest.approx([0.1, 0.02, 0.03], rel=1e-6)
+
+
+def test_step_sector_finds_its_cyclic_faces_and_its_bore(tmp_path):
+    disc = Disc()
+    write_step(tmp_path / "a.step", {}, lambda gmsh: _disc(gmsh, disc, np.pi / disc.sectors))
+    mesh = read_step(tmp_path / "a.step", MeshSize(size=0.012), sectors=disc.sectors)
+    pair = mesh.pairs["cyclic"]
+    np.testing.assert_allclose(mesh.points[pair.nodes[1]], mesh.points[pair.nodes[0]] @ pair.rotation.T, atol=1e-14)
+    radius = np.hypot(*mesh.points[np.unique(mesh.faces["clamp"])].T[:2])
+    np.testing.assert_allclose(radius, disc.bore_radius, rtol=1e-6)

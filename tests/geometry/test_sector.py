@@ -1,0 +1,189 @@
+"""The wedge sector: volumes, pairs, directions, the angle of the wedge, element orders, determinism, refusals."""
+
+from dataclasses import replace
+from math import cos, pi, sin, tan
+
+import numpy as np
+import pytest
+from measure import jacobians, volume
+from scipy.integrate import simpson
+
+from bladefem.errors import InputError
+from geometry.parameters import Aerofoil, Disc, MeshSize, Platform, Shank, Wedge
+from geometry.profile import profile, turn
+from geometry.section import outline
+from geometry.section import shape as section
+from geometry.sector import wedge_sector
+from geometry.topology import EDGES, normals
+
+PARTS = {"aerofoil": Aerofoil(), "platform": Platform(), "shank": Shank(), "disc": Disc(), "wedge": Wedge()}
+COARSE = MeshSize(size=7e-3)
+
+
+def build(size=COARSE, **changes):
+    parts = {name: replace(part, **changes.get(name, {})) for name, part in PARTS.items()}
+    return wedge_sector(*parts.values(), size)
+
+
+def shoelace(polygon):
+    x, y = polygon.T
+    return (x @ np.roll(y, -1) - y @ np.roll(x, -1)) / 2
+
+
+def test_volume_of_the_wedge_is_that_of_its_prism(coarse_sector):
+    w, p = Wedge(), Platform()
+    top = p.gap
+    bottom = top + 2 * p.seat_width * sin(w.angle)
+    area = (top + bottom) / 2 * p.seat_width * cos(w.angle) + bottom * w.base
+    found = volume(coarse_sector.points, coarse_sector.bodies["damper"])
+    assert found == pytest.approx(area * w.length, rel=1e-12)
+
+
+def test_volume_of_the_blade_is_the_sum_of_its_parts(coarse_sector):
+    """Disc segment, shank, platform exactly; the aerofoil by its sections. 1e-3: second-order arcs, splined skin."""
+    d, s, p, a = Disc(), Shank(), Platform(), Aerofoil()
+    shape = profile(p, s, d, Wedge())
+    ring = pi / d.sectors * (d.rim_radius**2 - d.bore_radius**2) * d.width
+    half = s.width / 2
+    sag = d.rim_radius**2 * np.arcsin(half / d.rim_radius)
+    under = sag + half * np.sqrt(d.rim_radius**2 - half**2)         # of the shank's width, below the rim
+    neck = ((d.rim_radius + s.height) * s.width - under) * s.length
+    plate = np.array([shape.inner, shape.outer, shape.corner])
+    slab = abs(shoelace(np.vstack([plate, plate[::-1] * [1, -1]]))) * p.length
+    stations = np.linspace(0, 1, 201)
+    chords = (1 - stations) * a.chord_root + stations * a.chord_tip
+    areas = [c**2 * abs(shoelace(section(a, t))) for t, c in zip(stations, chords, strict=True)]
+    expected = ring + neck + slab + simpson(areas, x=stations * a.span)
+    assert volume(coarse_sector.points, coarse_sector.bodies["blade"]) == pytest.approx(expected, rel=1e-3)
+
+
+def test_seats_stand_at_the_angle_of_the_wedge(coarse_sector):
+    """Normals of the blade's seats point into the damper, at alpha against the radial plane between two blades."""
+    alpha, theta = Wedge().angle, pi / Disc().sectors
+    radial, across = np.array([cos(theta), sin(theta), 0]), np.array([-sin(theta), cos(theta), 0])
+    seat = normals(coarse_sector.points, coarse_sector.faces["seat_right"], 3)
+    unit = seat / np.linalg.norm(seat, axis=1)[:, None]
+    np.testing.assert_allclose(unit, np.tile(-sin(alpha) * radial + cos(alpha) * across, (len(unit), 1)), atol=1e-12)
+    flanks = sum(normals(coarse_sector.points, coarse_sector.faces[f], 3).sum(axis=0)
+                 for f in ("damper_left", "damper_right"))
+    area = Platform().seat_width * Wedge().length
+    np.testing.assert_allclose(flanks, 2 * sin(alpha) * area * radial, atol=1e-12)      # N = F / (2 sin alpha)
+    low = normals(coarse_sector.points, coarse_sector.faces["cyclic_low"], 3).sum(axis=0)
+    assert low[1] < 0
+
+
+@pytest.mark.parametrize("name, angle", [("cyclic", 2 * pi / 36), ("this", 0.0), ("next", 2 * pi / 36)])
+def test_pairs_match_to_rounding_with_their_middle_nodes(coarse_sector, name, angle):
+    motion = turn(angle)
+    pair, x = coarse_sector.pairs[name], coarse_sector.points
+    np.testing.assert_allclose(pair.rotation, motion, atol=1e-15)
+    np.testing.assert_allclose(x[pair.nodes[1]], x[pair.nodes[0]] @ motion.T, rtol=0, atol=1e-12 * 0.2)
+    assert set(pair.nodes[0]) == set(np.unique(coarse_sector.faces[pair.master]))
+    assert set(pair.nodes[1]) == set(np.unique(coarse_sector.faces[pair.slave]))
+
+
+def test_cut_faces_belong_to_the_disc_only(coarse_sector):
+    x = coarse_sector.points[np.unique(coarse_sector.faces["cyclic_high"])]
+    radius = np.hypot(x[:, 0], x[:, 1])
+    assert radius.max() == pytest.approx(Disc().rim_radius) and radius.min() == pytest.approx(Disc().bore_radius)
+    np.testing.assert_allclose(np.arctan2(x[:, 1], x[:, 0]), pi / 36, atol=1e-12)
+    on_blade = coarse_sector.points[np.unique(coarse_sector.bodies["blade"])]
+    assert np.abs(np.arctan2(on_blade[:, 1], on_blade[:, 0])).max() <= pi / 36 + 1e-12
+
+
+def test_every_cell_is_positive_inside_and_its_middle_nodes_are_near_the_middle(coarse_sector):
+    rng = np.random.default_rng(1)
+    where = rng.dirichlet(np.ones(4), 40)
+    for cells in coarse_sector.bodies.values():
+        assert jacobians(coarse_sector.points, cells, where).min() > 0
+        for i, (a, b) in enumerate(EDGES["tetra"]):
+            ends = coarse_sector.points[cells[:, [a, b]]]
+            off = np.linalg.norm(coarse_sector.points[cells[:, 4 + i]] - ends.mean(axis=1), axis=1)
+            assert (off / np.linalg.norm(ends[:, 1] - ends[:, 0], axis=1)).max() < 0.41
+
+
+def test_middle_nodes_of_the_seats_are_exactly_in_the_middle(coarse_sector):
+    for name in ("seat_left", "seat_right", "damper_left", "damper_right"):
+        x = coarse_sector.points[coarse_sector.faces[name]]
+        np.testing.assert_allclose(x[:, 3:], (x[:, [0, 1, 2]] + x[:, [1, 2, 0]]) / 2, atol=1e-16)
+
+
+def test_tip_nodes_stand_on_the_section_whatever_the_mesh(coarse_sector):
+    x = {name: coarse_sector.points[nodes[0]] for name, nodes in coarse_sector.nodes.items()}
+    top = profile(*[PARTS[k] for k in ("platform", "shank", "disc", "wedge")]).top
+    section_points = outline(Aerofoil(), top, 1)
+    np.testing.assert_allclose(x["tip_trailing"], section_points[0], atol=1e-9)
+    np.testing.assert_allclose(x["tip_leading"], section_points[len(section_points) // 2], atol=1e-9)
+    middle = (section_points[0] + section_points[-1]) / 2
+    assert np.linalg.norm(x["tip_leading"] - middle) == pytest.approx(Aerofoil().chord_tip, rel=1e-9)
+    assert np.linalg.norm(x["tip_mid"] - (x["tip_leading"] + middle) / 2) == pytest.approx(
+        Aerofoil().camber * Aerofoil().chord_tip, rel=1e-9)
+    assert all(len(nodes) == 1 for nodes in coarse_sector.nodes.values())
+
+
+def test_the_default_mesh_is_fine_enough_and_is_the_same_twice():
+    first, second = build(MeshSize()), build(MeshSize())
+    np.testing.assert_array_equal(first.points, second.points)
+    assert 3 * len(first.points) >= 60_000
+    for name in ("seat_left", "seat_right"):
+        assert len(np.unique(first.faces[name][:, :3])) >= 30
+    assert first.report["min scaled jacobian"] > 0.1 and first.report["worst quality"] > 0.1
+
+
+def test_first_order_and_straight_meshes():
+    assert build(replace(COARSE, order=1)).cell_type == "tetra"
+    straight = build(replace(COARSE, curved=False))
+    assert straight.report["straightened"] == 0
+    assert straight.report["min scaled jacobian"] == pytest.approx(1, abs=1e-6)
+
+
+def test_clearance_moves_the_wedge_inwards():
+    gap = 2e-4
+    mesh = build(wedge={"clearance": gap})
+    for name, seat in (("this", "seat_right"), ("next", "seat_left")):
+        pair = mesh.pairs[name]
+        normal = normals(mesh.points, mesh.faces[seat], 3).sum(axis=0)
+        normal = pair.rotation @ normal / np.linalg.norm(normal)
+        opening = (mesh.points[pair.nodes[1]] - mesh.points[pair.nodes[0]] @ pair.rotation.T) @ normal
+        np.testing.assert_allclose(opening, gap, atol=1e-15)
+        np.testing.assert_allclose(mesh.points[pair.nodes[1]],
+                                   mesh.points[pair.nodes[0]] @ pair.rotation.T + pair.shift, atol=1e-14)
+
+
+@pytest.mark.parametrize("changes", [{"wedge": {"length": 0.06}}, {"aerofoil": {"section": "biconvex"}},
+                                     {"aerofoil": {"lean": 0.15, "sweep": -0.2}}, {"disc": {"sectors": 30}}])
+def test_variants_are_meshed(changes):
+    mesh = build(**changes)
+    assert mesh.report["min scaled jacobian"] > 0
+    assert set(mesh.pairs) == {"cyclic", "this", "next"}
+
+
+def test_fillet_adds_material_or_is_refused_by_name():
+    try:
+        mesh = build(MeshSize(size=4e-3), aerofoil={"fillet": 2e-3})
+    except InputError as error:
+        assert "aerofoil.fillet" in str(error)
+    else:
+        plain = build(MeshSize(size=4e-3))
+        assert volume(mesh.points, mesh.bodies["blade"]) > volume(plain.points, plain.bodies["blade"])
+
+
+@pytest.mark.parametrize("changes, field", [
+    ({"disc": {"bore_radius": 0.2}}, "disc.bore_radius"), ({"shank": {"width": 0.04}}, "shank.width"),
+    ({"shank": {"length": 0.05}}, "shank.length"), ({"platform": {"gap": 0.03}}, "platform.gap"),
+    ({"platform": {"seat_width": 0.02}}, "platform.seat_width"), ({"wedge": {"length": 0.061}}, "damper.length"),
+    ({"wedge": {"base": 0.029}}, "damper.base"), ({"aerofoil": {"chord_root": 0.09}}, "aerofoil.chord_root"),
+    ({"aerofoil": {"stagger": 1.2}}, "aerofoil.stagger"), ({"disc": {"sectors": 60}}, "platform|shank"),
+    ({"aerofoil": {"fillet": 0.009}}, "aerofoil.fillet|overhangs")])
+def test_impossible_proportions_name_the_field(changes, field):
+    with pytest.raises(InputError, match=field) as caught:
+        build(**changes)
+    assert "\n" not in str(caught.value)
+
+
+def test_slope_of_the_platform_at_the_midplane():
+    """The corner points of the profile: edge at half the gap from the radial plane between the blades."""
+    shape = profile(*[PARTS[k] for k in ("platform", "shank", "disc", "wedge")])
+    for x, y in (shape.outer, shape.corner):
+        assert (x * tan(shape.theta) - y) * cos(shape.theta) == pytest.approx(Platform().gap / 2)
+    assert np.linalg.norm(shape.outer - shape.inner) == pytest.approx(Platform().seat_width)

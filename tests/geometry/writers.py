@@ -1,0 +1,63 @@
+"""Small writers of foreign files, so that the readers are tested on text that another program would write."""
+
+import numpy as np
+
+TO_ABAQUS = {"tetra10": [0, 1, 2, 3, 4, 5, 6, 7, 9, 8]}
+
+
+def write_inp(mesh, file):
+    """Abaqus: one part of C3D10, bodies as ELSET, faces as NSET."""
+    lines = ["*HEADING", "*NODE"]
+    lines += [f"{i + 1}, {x:.15g}, {y:.15g}, {z:.15g}" for i, (x, y, z) in enumerate(mesh.points)]
+    number = 0
+    for name, cells in mesh.bodies.items():
+        lines.append(f"*ELEMENT, TYPE=C3D10, ELSET={name}")
+        for cell in cells[:, TO_ABAQUS["tetra10"]] + 1:
+            number += 1
+            lines.append(", ".join(map(str, [number, *cell])))
+    for name, faces in mesh.faces.items():
+        lines.append(f"*NSET, NSET={name.upper()}")
+        nodes = np.unique(faces) + 1
+        lines += [", ".join(map(str, nodes[i:i + 10])) for i in range(0, len(nodes), 10)]
+    file.write_text("\n".join(lines) + "\n")
+
+
+def write_cdb(mesh, file):
+    """Ansys archive with SOLID187, element components for the bodies, node components for the faces."""
+    n, count = len(mesh.points), sum(len(c) for c in mesh.bodies.values())
+    lines = ["/PREP7", f"NBLOCK,6,SOLID,{n},{n}", "(3i9,6e21.13e3)"]
+    lines += [f"{i + 1:9d}{0:9d}{0:9d}" + "".join(f"{v:21.13e}" for v in x) for i, x in enumerate(mesh.points)]
+    lines += ["N,R5.3,LOC,       -1,", f"EBLOCK,19,SOLID,{count},{count}", "(19i9)"]
+    number, members = 0, {}
+    for name, cells in mesh.bodies.items():
+        members[name] = (number + 1, number + len(cells))
+        for cell in cells[:, TO_ABAQUS["tetra10"]] + 1:
+            number += 1
+            head = [1, 1, 1, 1, 0, 0, 0, 0, 10, 0, number]
+            lines.append("".join(f"{v:9d}" for v in [*head, *cell[:8]]))
+            lines.append("".join(f"{v:9d}" for v in cell[8:]))
+    lines.append(f"{-1:9d}")
+    for name, (low, high) in members.items():
+        lines += [f"CMBLOCK,{name.upper():8s},ELEM,{2:8d}  ! element component", "(8i10)", f"{low:10d}{-high:10d}"]
+    for name, faces in mesh.faces.items():
+        nodes = np.unique(faces) + 1
+        lines += [f"CMBLOCK,{name.upper()},NODE,{len(nodes):8d}", "(8i10)"]
+        lines += ["".join(f"{v:10d}" for v in nodes[i:i + 8]) for i in range(0, len(nodes), 8)]
+    file.write_text("\n".join([*lines, "FINISH"]) + "\n")
+
+
+def write_step(file, names, build):
+    """STEP file of what build(gmsh) draws; names[solid] lists the names of that solid's faces, in order."""
+    from geometry.session import gmsh_session
+
+    with gmsh_session() as gmsh:
+        build(gmsh)
+        gmsh.model.occ.dilate(gmsh.model.occ.getEntities(3), 0, 0, 0, 1e3, 1e3, 1e3)    # millimetres
+        gmsh.model.occ.synchronize()
+        gmsh.write(str(file))
+    text = file.read_text()
+    for solid, faces in names.items():
+        text = text.replace("MANIFOLD_SOLID_BREP('',", f"MANIFOLD_SOLID_BREP('{solid}',", 1)
+        for face in faces:
+            text = text.replace("ADVANCED_FACE('',", f"ADVANCED_FACE('{face}',", 1)
+    file.write_text(text)
