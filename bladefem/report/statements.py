@@ -79,11 +79,21 @@ def cautions(finite: pd.DataFrame, best: pd.Series, points: pd.DataFrame | None)
         found.append(f"The best load is the {end} one studied: the true optimum may lie beyond it; widen study.loads.")
     if best.get("unconverged", 0) > 0:
         found.append("The curve of the best load has points that did not converge: its peak may be missed.")
-    if points is not None and len(points):
-        curve = points[points["load"] == best["load"]]
-        if len(curve) and best["peak_frequency"] in (curve["frequency"].min(), curve["frequency"].max()):
-            found.append("At the best load the highest point lies at the end of the frequency band; widen study.band.")
+    cut = cut_peaks(finite, points)
+    if cut:
+        named = ", ".join(f"{load:.4g} N" for load in cut)
+        found.append(f"For {len(cut)} of {len(finite)} loads ({named}) the highest point lies at the end of the "
+                     "frequency band, so that no resonance was seen; widen study.band.")
     return found
+
+
+def cut_peaks(finite: pd.DataFrame, points: pd.DataFrame | None) -> list[float]:
+    """Loads whose highest point is the first or last of its curve."""
+    if points is None or points.empty:
+        return []
+    ends = points.groupby("load")["frequency"].agg(["min", "max"])
+    return [row["load"] for _, row in finite.iterrows() if row["load"] in ends.index
+            and row["peak_frequency"] in ends.loc[row["load"]].to_numpy()]
 
 
 def trust(points: pd.DataFrame | None) -> tuple[list[str], pd.DataFrame]:

@@ -46,9 +46,10 @@ def mac_of(a: np.ndarray, b: np.ndarray, weight: np.ndarray) -> np.ndarray:
 
 
 def blade_root(mesh: Mesh) -> float:
-    """Height x [m] where the aerofoil starts: the lowest node of its sides, else the clamped face, else the lowest."""
+    """Height x [m] where the bending part starts: of a wheel the foot of the aerofoil, else the clamped face."""
+    wheel = mesh.sector is not None and mesh.sector.count > 0
     sides = [mesh.faces[name] for name in ("pressure_side", "suction_side") if name in mesh.faces]
-    if sides:
+    if sides and (wheel or "clamp" not in mesh.faces):
         return float(min(mesh.points[face.ravel(), 0].min() for face in sides))
     if "clamp" in mesh.faces:
         return float(mesh.points[mesh.faces["clamp"].ravel(), 0].max())
@@ -111,8 +112,8 @@ def family_table(modes: ModeSet, mesh: Mesh, clamped: ModeSet | None = None, bod
     """Names of the modes: one row a mode with frequency [Hz], family, MAC against it, and the aerofoil's share.
 
     A mode is called after the pure motion (or the mode of the clamped blade, itself named so) that it is closest to by
-    MAC on the aerofoil; "disc" when the aerofoil carries less than a tenth of the motion, "mixed" when no MAC reaches
-    0.3, and "..., coupled" when another mode of the set is closer to the same motion.
+    MAC on the aerofoil; "..., coupled" when another mode of the set is closer to the same motion, "mixed" when no MAC
+    reaches 0.3, "disc" ("foot" of a single blade) when the aerofoil carries less than a tenth of the motion.
 
     Args:
         modes: shapes on the nodes of ``mesh``.
@@ -133,7 +134,8 @@ def family_table(modes: ModeSet, mesh: Mesh, clamped: ModeSet | None = None, bod
     energy = np.einsum("mni,n->mn", np.abs(modes.shapes) ** 2, volumes)
     share = energy[:, nodes].sum(axis=1) / np.maximum(energy.sum(axis=1), 1e-300)
     names = [name.split(" (")[0] for name in references]
-    names = [name_of(match, i, names) if share[i] >= 0.1 else "disc" for i in range(len(match))]
+    below = "disc" if mesh.sector is not None and mesh.sector.count else "foot"
+    names = [name_of(match, i, names) if share[i] >= 0.1 else below for i in range(len(match))]
     return pd.DataFrame({"mode": np.arange(1, len(names) + 1), "frequency": modes.frequencies, "family": names,
                          "mac": match.max(axis=1), "aerofoil_share": share})
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -47,6 +48,12 @@ def mode_title(modes: ModeSet, number: int, family: str = "") -> str:
     """"mode 1, first flap: 812.4 Hz, nodal diameter 6" (number counts from 0)."""
     diameter = "" if modes.nodal_diameter is None else f", nodal diameter {modes.nodal_diameter}"
     return f"mode {number + 1}{', ' + family if family else ''}: {modes.frequencies[number]:.5g} Hz{diameter}"
+
+
+def moving(mesh: Mesh, shape: np.ndarray) -> Mesh:
+    """The mesh without bodies that stand still (a damper that is not part of the mode)."""
+    bodies = {name: cells for name, cells in mesh.bodies.items() if np.any(shape[cells])}
+    return replace(mesh, bodies=bodies) if bodies else mesh
 
 
 def scale_of(mesh: Mesh, shape: np.ndarray) -> float:
@@ -97,7 +104,7 @@ def add_colour_bar(ax: Any, norm: Normalize, colours: str, label: str) -> None:
 def photograph_shape(mesh: Mesh, shape: np.ndarray, factor: float, direction: tuple[float, float, float],
                      size: tuple[int, int] = (1100, 1200)) -> np.ndarray:
     """Rendering of a deformed sector coloured by relative magnitude, with the undeformed edges in grey."""
-    surface = skin(mesh)
+    surface = skin(moving(mesh, shape))
     moved = surface.points + factor * shape[surface.nodes]
     magnitude = np.linalg.norm(shape, axis=1)
     body = polydata(surface, moved)
@@ -136,7 +143,7 @@ def draw_mode_sheet(mesh: Mesh, modes: ModeSet, file: str | Path | None = None, 
 
 def wheel_motion(mesh: Mesh, shape: np.ndarray, nodal_diameter: int) -> tuple[Skin, np.ndarray]:
     """The skin of the wheel and the complex displacement (n, 3) of its points."""
-    wheel = wheel_skin(mesh)
+    wheel = wheel_skin(moving(mesh, shape))
     one = wheel.nodes[:len(wheel.nodes) // wheel_count(mesh)]
     return wheel, np.asarray(carry_round(mesh, shape[one] * best_phase(shape), nodal_diameter), dtype=complex)
 

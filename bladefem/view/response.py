@@ -84,13 +84,15 @@ def draw_failed(ax: Any, failed: pd.DataFrame) -> None:
                 transform=ax.get_xaxis_transform(), clip_on=False, label=None if known.any() else label)
 
 
-def draw_optimum(summary: pd.DataFrame, file: str | Path | None = None, *, ax: Any = None, title: str = "") -> object:
+def draw_optimum(summary: pd.DataFrame, file: str | Path | None = None, *, points: pd.DataFrame | None = None,
+                 ax: Any = None, title: str = "") -> object:
     """Resonance amplitude and frequency over load, the optimum marked; a curve a mass if there is such a column.
 
     Args:
         summary: summary table (see the head of this file); an optional column "mass" [kg] makes several curves, an
             optional column "unconverged" (number of points) marks doubtful peaks.
         file: PNG to write.
+        points: response table; peaks at the end of the frequency band, which are none, are then drawn hollow.
         ax: two axes to draw into, amplitude and frequency.
         title: headline.
     """
@@ -99,6 +101,7 @@ def draw_optimum(summary: pd.DataFrame, file: str | Path | None = None, *, ax: A
         for (mass, table), colour in zip(groups, COLOURS * 9, strict=False):
             draw_optimum_curve(axes, table, colour, None if mass is None else f"damper of {1e3 * mass:.4g} g")
         draw_limits(axes, summary)
+        draw_cut(axes, summary, points)
         axes[0].set(ylabel="resonance amplitude [µm]", title=title or "optimum load")
         axes[1].set(ylabel="resonance frequency [Hz]", xlabel="normal load per seat [N]")
         log_axis(axes[0], "y")
@@ -130,6 +133,18 @@ def draw_optimum_curve(axes: Any, table: pd.DataFrame, colour: str, label: str |
     axes[0].plot([], [], "*", color=colour, ms=11, mec="black", mew=0.7, label=text)
     axes[1].annotate(f"{best['peak_frequency']:.5g} Hz", (best["load"], best["peak_frequency"]), (8, -4),
                      textcoords="offset points", fontsize=8.5, va="top")
+
+
+def draw_cut(axes: Any, summary: pd.DataFrame, points: pd.DataFrame | None) -> None:
+    """Hollow marks on peaks that are only the end of the frequency band."""
+    if points is None or points.empty:
+        return
+    ends = summary["load"].map(points.groupby("load")["frequency"].agg(lambda f: (f.min(), f.max())))
+    cut = summary[[isinstance(end, tuple) and f in end for f, end in zip(summary["peak_frequency"], ends, strict=True)]]
+    if len(cut):
+        axes[0].plot(cut["load"], MICRO * cut["peak_amplitude"], "o", mfc="white", mec=FAILED, ms=8, mew=1.5, zorder=6,
+                     label="no peak: end of the frequency band")
+        axes[1].plot(cut["load"], cut["peak_frequency"], "o", mfc="white", mec=FAILED, ms=8, mew=1.5, zorder=6)
 
 
 def draw_limits(axes: Any, summary: pd.DataFrame) -> None:

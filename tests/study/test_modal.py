@@ -70,7 +70,7 @@ def test_clamped_blade_as_reference_and_disc_modes():
     mixed = 0.9 * pure["first flap"] + 0.1 * pure["second flap"]
     modes = ModeSet(np.array([90.0, 300.0]), np.stack([mixed, low]), 3, np.zeros(2))
     table = family_table(modes, mesh, clamped, root=0.25)
-    assert table["family"].tolist() == ["first flap", "disc"]
+    assert table["family"].tolist() == ["first flap", "foot"]
     assert table["aerofoil_share"].iloc[1] == 0.0
 
 

@@ -7,7 +7,15 @@ from matplotlib.image import imread
 
 from bladefem.view.contact import contact_centre, draw_pressure, pressure_points, pressure_summary, unfold
 from bladefem.view.mesh import carry_round, draw_mesh, draw_wheel, grid, save_vtu
-from bladefem.view.modes import animate_wave, best_phase, draw_mode, draw_mode_sheet, draw_wheel_mode, save_modes_vtu
+from bladefem.view.modes import (
+    animate_wave,
+    best_phase,
+    draw_mode,
+    draw_mode_sheet,
+    draw_wheel_mode,
+    moving,
+    save_modes_vtu,
+)
 from bladefem.view.response import (
     draw_accuracy,
     draw_loops,
@@ -176,6 +184,22 @@ def test_response_charts(folder):
     draw_accuracy(synthetic.accuracy(), folder / "accuracy.png", tolerance=0.02)
     draw_loops(synthetic.loops(), folder / "loops.png")
     assert min(ink(folder / f"{n}.png") for n in ("response", "optimum", "accuracy", "loops")) > 0.02
+
+
+def test_peaks_at_the_end_of_the_band_are_hollow():
+    points = synthetic.points().query("frequency <= 900")
+    summary = points.loc[points.dropna().groupby("load")["amplitude"].idxmax()].rename(
+        columns={"frequency": "peak_frequency", "amplitude": "peak_amplitude"})
+    figure = draw_optimum(summary, points=points)
+    hollow = next(line for line in figure.axes[0].lines if "no peak" in str(line.get_label()))
+    assert hollow.get_xdata().tolist() == [400.0, 800.0, 1600.0, np.inf]
+
+
+def test_bodies_at_rest_are_not_drawn(sector, wave):
+    still = wave.shapes[0].copy()
+    still[np.unique(sector.bodies["damper"])] = 0
+    assert list(moving(sector, still).bodies) == ["blade"]
+    assert list(moving(sector, wave.shapes[0]).bodies) == ["blade", "damper"]
 
 
 def test_loop_energy_is_jenkins():
