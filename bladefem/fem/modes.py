@@ -8,21 +8,23 @@ inertia of K - s M proves the count on demand. SLEPc solves the same pencil in `
 
 from __future__ import annotations
 
+from collections.abc import Callable
+
 import numpy as np
-from scipy.linalg import eigh
 
 from ..data import ModeSet
 from ..errors import InputError, NotSolvedError
 from .constraint import Constrained, expand, restrict
 from .flexibility import Flexibility, compliance, flexible
+from .lanczos import lowest
 from .linalg import apply, combined, dot, inertia, scale
 
 __all__ = ["canonical", "certificate", "count_below", "elastic_pairs", "mode_set", "modes", "pairs"]
 
-BLOCK = 8
+TOLERANCE = 1e-9    # error of a vector's direction; that of a frequency is its square
 
 
-def modes(con: Constrained, count: int, flex: Flexibility | None = None, tolerance: float = 1e-10,
+def modes(con: Constrained, count: int, flex: Flexibility | None = None, tolerance: float = TOLERANCE,
           prove: bool = False) -> ModeSet:
     """The lowest modes, rigid ones included, mass-normalised over the body (one sector of a wheel).
 
@@ -44,7 +46,7 @@ def modes(con: Constrained, count: int, flex: Flexibility | None = None, toleran
     return mode_set(con, lam, X)
 
 
-def pairs(flex: Flexibility, count: int, tolerance: float = 1e-10) -> tuple[np.ndarray, np.ndarray]:
+def pairs(flex: Flexibility, count: int, tolerance: float = TOLERANCE) -> tuple[np.ndarray, np.ndarray]:
     """(m,) eigenvalues [rad^2/s^2] and this rank's (n_own, m) M-orthonormal vectors, rigid motions first."""
     r = min(flex.R.shape[1], count)
     if r == count:
@@ -79,71 +81,26 @@ def _stiffness(con: Constrained, X: np.ndarray) -> float:
     return scale(con.K) * _norms(con.body.comm, X).max()
 
 
-def elastic_pairs(flex: Flexibility, count: int, tolerance: float,
-                  inverse: object = None) -> tuple[np.ndarray, np.ndarray]:
-    """The lowest elastic eigenpairs of K x = lambda M x: block Lanczos on K^+ M.
+def elastic_pairs(flex: Flexibility, count: int, tolerance: float = TOLERANCE,
+                  inverse: Callable[[np.ndarray], np.ndarray] | None = None,
+                  start: np.ndarray | None = None) -> tuple[np.ndarray, np.ndarray]:
+    """The lowest elastic eigenpairs of K x = lambda M x.
 
     Args:
-        inverse: a function (n_own, k) -> (n_own, k) in place of K^+ (fixed interfaces).
+        inverse: what stands for K^+ (fixed interfaces).
+        start: (n_own, k) good guesses; random loads, the same for any number of ranks, when left out.
 
     Raises:
-        NotSolvedError: the space is exhausted before enough pairs converged.
+        NotSolvedError: there are fewer, or no convergence.
     """
-    con, comm = flex.con, flex.con.body.comm
     inverse = inverse or (lambda B: compliance(flex, B))
-    V = MV = np.zeros((con.own.stop - con.own.start, 0), con.dtype)
-    H = np.zeros((0, 0), con.dtype)
-    block = inverse(_start(con, max(BLOCK, 2)))
-    while True:
-        block, Mblock, tail = _orthonormal(con, V, MV, block)
-        if V.shape[1]:
-            theta, S = eigh(H)
-            theta, S = theta[::-1], S[:, ::-1]
-            k = min(count, len(theta))
-            error = np.linalg.norm(tail @ S[len(S) - tail.shape[1]:, :k], axis=0) / theta[:k]
-            if (k == count and error.max() < tolerance) or not block.shape[1]:
-                return _finish(V, S[:, :k], theta[:k], count)
-        V, MV = np.concatenate([V, block], axis=1), np.concatenate([MV, Mblock], axis=1)
-        width = block.shape[1]
-        block = inverse(Mblock)
-        new = dot(comm, MV, block)
-        H = np.block([[H, new[:-width]], [new[:-width].conj().T, (new[-width:] + new[-width:].conj().T) / 2]])
-
-
-def _finish(V: np.ndarray, S: np.ndarray, theta: np.ndarray, count: int) -> tuple[np.ndarray, np.ndarray]:
-    if len(theta) < count:
-        raise NotSolvedError(f"{count} modes were asked of a body with {len(theta)} elastic ones")
-    return 1 / theta, V @ S
-
-
-def _start(con: Constrained, width: int) -> np.ndarray:
-    """Random loads, a function of mesh node numbers only: the same for any number of ranks."""
-    return restrict(con, _probe(con, width))
+    if start is None:
+        start = inverse(restrict(flex.con, _probe(flex.con, min(max(4, count // 3), 16))))
+    return lowest(flex.con, inverse, start, count, tolerance)
 
 
 def _probe(con: Constrained, width: int) -> np.ndarray:
     return np.random.default_rng(20).standard_normal((con.T.shape[0], width))
-
-
-def _orthonormal(con: Constrained, V: np.ndarray, MV: np.ndarray,
-                 W: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """W made M-orthogonal to V and M-orthonormal in itself: basis, M basis, and coefficients (new, old)."""
-    comm = con.body.comm
-    size = None
-    back = np.eye(W.shape[1], dtype=con.dtype)
-    for _ in range(3):
-        if V.shape[1]:
-            W = W - V @ dot(comm, MV, W)
-        MW = apply(con.M, W)
-        gram = dot(comm, W, MW)
-        size = np.sqrt(np.maximum(gram.diagonal().real, 0)).max() if size is None else size
-        values, Q = np.linalg.eigh((gram + gram.conj().T) / 2)
-        good = values > (1e-13 * max(size, 1e-300)) ** 2 if size != 1.0 else values > 0.25
-        scale = np.sqrt(values[good])
-        W, MW = W @ (Q[:, good] / scale), MW @ (Q[:, good] / scale)
-        back = (Q[:, good] * scale).conj().T @ back
-        size = 1.0
-    return W, MW, back
 
 
 def canonical(con: Constrained, lam: np.ndarray, X: np.ndarray) -> np.ndarray:

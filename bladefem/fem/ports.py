@@ -79,7 +79,7 @@ def _craig_bampton(flex: Flexibility, F: np.ndarray, X: np.ndarray,
     of the small matrices, which are free modes in form: nothing is left for a residual."""
     comm = flex.con.body.comm
     fixed = _fixed_inverse(flex, F, X)
-    _, inner = elastic_pairs(flex, count, 1e-10, fixed)
+    _, inner = elastic_pairs(flex, count, inverse=fixed)
     V = np.concatenate([flex.R, X, inner], axis=1)
     V = V / np.sqrt(np.abs(dot(comm, V, apply(flex.con.M, V)).diagonal()))
     mass = _hermitian(dot(comm, V, apply(flex.con.M, V)))
