@@ -39,7 +39,7 @@ class PortModel:
     ports: dict[str, slice]         # "contact" (node-major: normal, t1, t2), "load", "probe"
     nodal_diameter: int | None = None
     static_offset: np.ndarray | None = None     # (p,) displacement under the static loads (n = 0 only) [m]
-    damping: np.ndarray | None = None           # (m, m) viscous damping of the modes, added to the model's own [1/s]
+    damping: np.ndarray | None = None           # (m,) or coupled (m, m) viscous modal damping, beside the model's [1/s]
 
 
 @dataclass(frozen=True)

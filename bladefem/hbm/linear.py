@@ -10,8 +10,10 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
+from scipy.linalg import lapack
 
 from ..data import PortModel, RigidBody
+from ..errors import NotSolvedError
 from .model import Damping, ReducedModel
 
 __all__ = ["Linear", "condense", "receptance"]
@@ -45,8 +47,7 @@ def condense(model: ReducedModel, omega: float, harmonics: int) -> Linear:
     B, g, rigid = _rigid_motions(model, springs)
     A[0], stuck[0] = _with_springs(G[0].real, free[0].real, springs, B, g, model.hold)
     for h in range(1, harmonics + 1):
-        solved = np.linalg.solve(np.eye(m) + G[h] * springs, np.column_stack([G[h], free[h]]))
-        A[h], stuck[h] = solved[:, :m], solved[:, m]
+        A[h], stuck[h] = _sprung(G[h], free[h], springs)
     return Linear(omega, springs, G, free, A, stuck, B, g, rigid)
 
 
@@ -56,13 +57,17 @@ def receptance(body: PortModel, damping: Damping, w: float, rows: np.ndarray | s
     elastic = body.omega > 0 if w == 0 else np.ones(len(body.omega), dtype=bool)
     left, right = body.shapes[rows][:, elastic], body.shapes[columns][:, elastic]
     stiffness = (body.omega**2 - w**2 + damping.term(body.omega, w))[elastic]
-    if body.damping is not None and w != 0:
+    if body.damping is not None and body.damping.ndim == 1:
+        stiffness = stiffness + 1j * w * body.damping[elastic]
+    elif body.damping is not None and w != 0:
         return left @ np.linalg.solve(np.diag(stiffness) + 1j * w * body.damping, right.conj().T) \
             + body.residual[rows][:, columns]
     if np.isrealobj(left):      # two real products cost half of one complex product
         flexibility = 1 / stiffness
-        return (left * flexibility.real) @ right.T + 1j * ((left * flexibility.imag) @ right.T) \
-            + body.residual[rows][:, columns]
+        scaled = np.concatenate([left * flexibility.real, left * flexibility.imag]) @ right.T
+        result = scaled[len(left):] * 1j
+        result += scaled[:len(left)] + body.residual[rows][:, columns]
+        return result
     return (left / stiffness) @ right.conj().T + body.residual[rows][:, columns]
 
 
@@ -81,6 +86,19 @@ def _flexibility(model: ReducedModel, h: int, w: float) -> tuple[np.ndarray, np.
         rows = _contact_rows(damper, model)
         G = G + receptance(damper, model.damper_damping, w, rows, rows)
     return G, free
+
+
+def _sprung(G: np.ndarray, free: np.ndarray, springs: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """(1 + G K)^-1 times G and times free; in Fortran order, which spares LAPACK two copies."""
+    m = len(springs)
+    right = np.empty((m, m + 1), dtype=complex, order="F")
+    right[:, :m], right[:, m] = G, free
+    system = np.multiply(G, springs, order="F")
+    system[np.diag_indices(m)] += 1.0
+    _, _, solved, info = lapack.zgesv(system, right, overwrite_a=True, overwrite_b=True)
+    if info:
+        raise NotSolvedError("contact flexibility with springs is singular: a resonance without damping is hit exactly")
+    return solved[:, :m], solved[:, m]
 
 
 def _rigid_motions(model: ReducedModel, springs: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:

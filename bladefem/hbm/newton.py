@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
 
 from ..errors import InputError
-from .residual import Balance, State, evaluate_balance, linearise
+from .residual import Balance, Inverse, State, evaluate_balance, linearise
 
 __all__ = ["DEFAULTS", "Newton", "Options", "newton"]
 
@@ -73,16 +72,17 @@ def newton(balance: Balance, w: np.ndarray, options: Options = DEFAULTS, merit: 
     return Newton(state, options.iterations, False, f"residual {state.error:.1e} after {options.iterations} iterations")
 
 
-def _search(balance: Balance, state: State, inverse: Callable[[np.ndarray], np.ndarray], merit: str) -> State | None:
+def _search(balance: Balance, state: State, inverse: Inverse, merit: str) -> State | None:
     """The first halving of the step that lowers the merit, or None."""
-    step = inverse(state.residual)
+    step = inverse(state.residual, float(np.clip(0.1 * state.error, 1e-5, 1e-2)))
     if not np.isfinite(step).all():
         return None
-    measure, demand = (inverse, 0.25) if merit == "step" else (np.asarray, 1e-4)
-    before, share = np.linalg.norm(measure(state.residual)), 1.0
+    demand = 0.25 if merit == "step" else 1e-4
+    before, share = np.linalg.norm(step if merit == "step" else state.residual), 1.0
     while share >= SHORTEST:
         trial = evaluate_balance(balance, state.w - share * step)
-        if np.linalg.norm(measure(trial.residual)) <= (1 - demand * share) * before:
+        after = inverse(trial.residual, 0.1) if merit == "step" else trial.residual
+        if np.linalg.norm(after) <= (1 - demand * share) * before:
             return trial
         share /= 2
     return None

@@ -15,12 +15,18 @@ from scipy import linalg
 
 from ..friction.aft import Forces, evaluate
 from ..friction.harmonics import to_complex, to_real
+from .iterative import iterative_inverse
 from .linear import Linear
 from .model import ReducedModel
 
-__all__ = ["Balance", "State", "contact_forces", "evaluate_balance", "linearise", "start_in_stick"]
+__all__ = ["Balance", "Inverse", "State", "contact_forces", "evaluate_balance", "linearise", "start_in_stick"]
 
+DENSE = 600         # unknowns up to which a dense factorisation is faster than GMRES
+ACCURACY = 1e-5     # of a step by GMRES, relative
 STICKS = 1e-13      # a node whose p is below this share of its spring force sticks
+
+
+Inverse = Callable[..., np.ndarray]
 
 
 @dataclass(frozen=True)
@@ -69,8 +75,8 @@ def contact_forces(model: ReducedModel, w: np.ndarray, samples: int) -> Forces:
     return replace(forces, f=forces.f[:, missing:], dfdw=forces.dfdw[:, missing:, :, missing:])
 
 
-def linearise(balance: Balance, state: State) -> Callable[[np.ndarray], np.ndarray]:
-    """The inverse of the balance's derivative: residual (n, d, K) to displacement (n, d, K) [m].
+def linearise(balance: Balance, state: State) -> Inverse:
+    """The inverse of the balance's derivative: residual (n, d, K), accuracy [1] to displacement (n, d, K) [m].
 
     The linear system is reduced to the nodes that slip or lift; the others follow from their forces. Raises
     numpy.linalg.LinAlgError where the derivative is singular.
@@ -79,18 +85,15 @@ def linearise(balance: Balance, state: State) -> Callable[[np.ndarray], np.ndarr
     change = _force_change(balance, state)
     active = np.flatnonzero(abs(change).reshape(n, -1).max(axis=1) > STICKS * balance.model.springs.max(axis=1))
     if len(active) == 0:
-        return np.copy
+        return lambda residual, accuracy=0.0: residual.copy()
     others, change = np.setdiff1d(np.arange(n), active), change[active]
     dofs = (active[:, None] * d + np.arange(d)).ravel()
-    J = _jacobian(balance.linear.A[:, dofs][:, :, dofs], change)
-    J[np.diag_indices_from(J)] += 1.0
-    factors = linalg.lu_factor(J, overwrite_a=True, check_finite=False)
-    if not abs(np.diag(factors[0])).min() > 0:
-        raise np.linalg.LinAlgError("singular Jacobian")
+    A = balance.linear.A if len(active) == n else np.ascontiguousarray(balance.linear.A[:, dofs][:, :, dofs])
+    inverse = (_dense_inverse if len(dofs) * K <= DENSE else iterative_inverse)(A, change)
 
-    def solve(residual: np.ndarray) -> np.ndarray:
+    def solve(residual: np.ndarray, accuracy: float = ACCURACY) -> np.ndarray:
         step = residual.copy()
-        step[active] = linalg.lu_solve(factors, residual[active].ravel(), check_finite=False).reshape(-1, d, K)
+        step[active] = inverse(residual[active].reshape(-1, K), accuracy).reshape(-1, d, K)
         if len(others):
             p = np.zeros_like(step)
             p[active] = (change @ step[active].reshape(len(active), d * K, 1)).reshape(-1, d, K)
@@ -98,6 +101,15 @@ def linearise(balance: Balance, state: State) -> Callable[[np.ndarray], np.ndarr
         return step
 
     return solve
+
+
+def _dense_inverse(A: np.ndarray, change: np.ndarray) -> Inverse:
+    J = _jacobian(A, change)
+    J[np.diag_indices_from(J)] += 1.0
+    factors = linalg.lu_factor(J, overwrite_a=True, check_finite=False)
+    if not abs(np.diag(factors[0])).min() > 0:
+        raise np.linalg.LinAlgError("singular Jacobian")
+    return lambda residual, _: linalg.lu_solve(factors, residual.ravel(), check_finite=False).reshape(residual.shape)
 
 
 def _force_change(balance: Balance, state: State) -> np.ndarray:

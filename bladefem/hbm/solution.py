@@ -111,11 +111,15 @@ def _blade_work(model: ReducedModel, h: int, omega: float, force: np.ndarray) ->
 
 def _loss(side: PortModel, damping: object, h: int, omega: float, push: np.ndarray) -> float:
     """Work lost in a body's modes under the modal forces `push`."""
-    term = np.diag(damping.term(side.omega, h * omega))
+    term = damping.term(side.omega, h * omega)
+    stiffness = side.omega**2 - (h * omega)**2
+    if side.damping is not None and side.damping.ndim == 2:
+        term = np.diag(term) + 1j * h * omega * side.damping
+        amplitudes = np.linalg.solve(np.diag(stiffness) + term, push)
+        return float(np.pi * h * (amplitudes.conj() @ term @ amplitudes).imag)
     if side.damping is not None:
         term = term + 1j * h * omega * side.damping
-    amplitudes = np.linalg.solve(np.diag(side.omega**2 - (h * omega)**2) + term, push)
-    return float(np.pi * h * (amplitudes.conj() @ term @ amplitudes).imag)
+    return float(np.pi * h * np.sum(term.imag * abs(push / (stiffness + term))**2))
 
 
 def _rows(side: PortModel, model: ReducedModel) -> np.ndarray:

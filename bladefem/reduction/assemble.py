@@ -74,7 +74,7 @@ def join(bodies: tuple[PortModel, ...]) -> PortModel:
     order = np.concatenate(order)
     damping = None
     if any(body.damping is not None for body in bodies):
-        damping = block_diag(*(np.zeros((len(b.omega),) * 2) if b.damping is None else b.damping for b in bodies))
+        damping = block_diag(*map(_damping_matrix, bodies))
     return PortModel(np.concatenate([body.omega for body in bodies]),
                      block_diag(*(body.shapes for body in bodies))[order],
                      block_diag(*(body.residual for body in bodies))[np.ix_(order, order)],
@@ -95,6 +95,12 @@ def recombine(body: PortModel, selection: np.ndarray) -> PortModel:
     offset = None if body.static_offset is None else T @ body.static_offset
     return replace(body, shapes=T @ body.shapes, residual=T @ body.residual @ T.conj().T, ports=ports,
                    static_offset=offset)
+
+
+def _damping_matrix(body: PortModel) -> np.ndarray:
+    if body.damping is None:
+        return np.zeros((len(body.omega),) * 2)
+    return np.diag(body.damping) if body.damping.ndim == 1 else body.damping
 
 
 def _mirror(body: PortModel) -> PortModel:

@@ -25,7 +25,7 @@ def port_model_from_matrices(M: np.ndarray, K: np.ndarray, ports: Mapping[str, n
         M, K: (dofs, dofs) mass [kg] and stiffness [N/m], dense or sparse, real symmetric or Hermitian.
         ports: name ("contact", "load", "probe") to dof numbers (k,), or to a matrix (k, dofs) of displacement readings.
         count: modes kept; all when left out.
-        C: (dofs, dofs) viscous damping [N s/m]; enters as the full matrix of the kept modes.
+        C: (dofs, dofs) viscous damping [N s/m]; modes that it couples stay coupled.
 
     Raises:
         InputError: shapes do not fit, a matrix is not Hermitian or M is not positive definite.
@@ -47,7 +47,7 @@ def port_model_from_matrices(M: np.ndarray, K: np.ndarray, ports: Mapping[str, n
     shapes = P @ vectors
     rest = shapes[:, count:] / np.sqrt(values[count:])
     kept = vectors[:, :count]
-    damping = None if C is None else kept.conj().T @ _hermitian(C, "C") @ kept
+    damping = None if C is None else _modal_damping(kept.conj().T @ _hermitian(C, "C") @ kept)
     return PortModel(np.sqrt(values[:count]), shapes[:, :count], rest @ rest.conj().T, slices, nodal_diameter,
                      damping=damping)
 
@@ -95,6 +95,12 @@ def _hermitian(matrix: np.ndarray, name: str) -> np.ndarray:
     if error > 1e-8 * abs(matrix).max():
         raise InputError(f"{name} differs from its transposed conjugate by {error:.3g}: expected a Hermitian matrix")
     return (matrix + matrix.conj().T) / 2
+
+
+def _modal_damping(matrix: np.ndarray) -> np.ndarray:
+    """The diagonal (m,) where the damping does not couple the modes, else the matrix (m, m)."""
+    diagonal = np.diag(matrix).real.copy()
+    return diagonal if abs(matrix - np.diag(diagonal)).max() <= 1e-9 * abs(diagonal).max() else matrix
 
 
 def _selection(ports: Mapping[str, np.ndarray], dofs: int) -> tuple[np.ndarray, dict[str, slice]]:

@@ -11,8 +11,8 @@ from bladefem.reduction.matrices import port_model_from_matrices, read_matrices
 
 
 def receptance(body, w):
-    damping = 0 if body.damping is None else 1j * w * body.damping
-    Z = np.diag(body.omega**2 - w**2) + damping
+    damping = np.zeros(1) if body.damping is None else body.damping
+    Z = np.diag(body.omega**2 - w**2) + 1j * w * (np.diag(damping) if damping.ndim == 1 else damping)
     return body.shapes @ np.linalg.solve(Z, body.shapes.conj().T) + body.residual
 
 
@@ -39,6 +39,12 @@ def test_receptance_of_all_modes_is_exact_and_residual_flexibility_makes_truncat
     np.testing.assert_allclose(receptance(full, w), exact, rtol=0, atol=1e-10 * abs(exact).max())
     few = port_model_from_matrices(M, K, ports, count=3)
     np.testing.assert_allclose(receptance(few, 0.0), P @ np.linalg.solve(K, P.T), rtol=1e-8)
+
+
+def test_proportional_damping_stays_diagonal():
+    K, M = beam_matrices()
+    body = port_model_from_matrices(M, K, {"contact": np.array([0])}, C=1e-6 * K + 2.0 * M)
+    np.testing.assert_allclose(body.damping, 1e-6 * body.omega**2 + 2.0, rtol=1e-6)
 
 
 def test_free_body_has_rigid_modes():
