@@ -18,7 +18,7 @@ from .events import State, rest
 from .explicit import Cycle, March, explicit_march, sampled, settle, stable_steps
 from .system import System
 
-__all__ = ["direct", "newmark_march"]
+__all__ = ["contact_step", "direct", "newmark_march"]
 
 
 def direct(system: System, omega: float, steps: int = 512, start: State | None = None, most: int = 2000,
@@ -74,8 +74,13 @@ def _law(elastic, bound):
 
 
 @njit(cache=True)
-def _contact(trial, load, kG, H, mu, f):
-    """Forces f with f = clip(trial - kG f, mu (load - H f)); True when found. Starts from the stick predictor."""
+def contact_step(trial, load, kG, H, mu, f):
+    """Forces f (n,) with f = clip(trial - kG f, mu (load - H f)), written into ``f``; True when found.
+
+    Args:
+        trial, load: (n,) elastic and normal forces that the step would give without contact forces [N].
+        kG, H: (n, n) how contact forces lower them [1].
+    """
     n = len(trial)
     slip = np.zeros(n)
     size = np.abs(trial).max() + np.abs(mu * load).max() + 1e-300
@@ -138,7 +143,7 @@ def _newmark(arrays, y, inputs, h):
         free = S @ (p[m] - L * q0 - D @ v0)
         qf = q0 + h * h / 4 * free
         wf, Nf = g[m] + W @ qf, n0[m] + V @ qf
-        if not _contact(kt * (wf - z), Nf, kG, H, mu, f):
+        if not contact_step(kt * (wf - z), Nf, kG, H, mu, f):
             return Q, R, F, m + 1
         a = free - S @ (W.T @ f)
         q, v = q0 + h * h / 4 * a, v0 + h / 2 * a

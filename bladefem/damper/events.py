@@ -21,7 +21,6 @@ __all__ = ["CODES", "Flow", "State", "flow", "rest", "stuck_start"]
 
 STICK, APART = 0, 2             # +1 and -1: slip in that direction
 SLACK = 1e-12                   # of the normal force: states change once they are wrong by more than rounding
-ORDER = 18                      # terms of the series: (w h)^19 / 19! at w h <= 1 is below rounding
 CODES = {0: "done", 1: "too many events in one step: the states chatter"}
 
 
@@ -81,7 +80,9 @@ def flow(system: System, omega: float, start: State, samples: int = 256, periods
     if not (omega > 0 and samples >= 8):
         raise InputError(f"omega = {omega}, samples = {samples}: expected a frequency above zero, at least 8 samples")
     n, d = system.W.shape
-    parts = int(np.ceil(system.fastest * 2 * np.pi / omega / samples))
+    fastest = max(system.fastest, system.coefficients // 2 * omega)
+    parts = int(np.ceil(fastest * 2 * np.pi / omega / samples))
+    order = _order(fastest * 2 * np.pi / omega / samples / parts)
     arrays = tuple(np.ascontiguousarray(a, float) for a in (
         system.stiffness, system.damping, system.W, system.V, system.kt, system.mu, system.force, system.drive,
         system.normal, system.R))
@@ -89,23 +90,32 @@ def flow(system: System, omega: float, start: State, samples: int = 256, periods
     size = 2 * d + n if tangent else 0
     T = np.eye(2 * d + n)[:, :size].copy()
     y = np.r_[start.q, start.v, start.z]
-    events, code = _integrate(arrays, y, T, history, omega, (samples, parts))
+    events, code = _integrate(arrays, y, T, history, omega, (samples, parts, order))
     end = State(y[:d].copy(), y[d:2 * d].copy(), y[2 * d:].copy())
     return Flow(end, history[:, :d], history[:, d:2 * d], history[:, 2 * d + n:], history[:, 2 * d:2 * d + n], events,
                 CODES[code], T if tangent else None)
 
 
+def _order(x: float) -> int:
+    """Terms of the exponential series at x that reach rounding: x^(p+1) / (p+1)! < 1e-17."""
+    order, term = 1, x * x / 2
+    while term > 1e-17:
+        order += 1
+        term *= x / (order + 1)
+    return order
+
+
 @njit(cache=True)
-def _inputs(coefficients, omega, t, order, out):
-    """Taylor coefficients in time of a row of Fourier coefficients at t, for all rows; out (order+1, rows)."""
+def _inputs(coefficients, omega, t, out):
+    """Taylor coefficients in time of rows of Fourier coefficients at t; out (order+1, rows)."""
     out[:] = 0.0
-    out[0] += coefficients[:, 0]
-    for h in range(1, coefficients.shape[1] // 2 + 1):
+    for h in range(coefficients.shape[1] // 2 + 1):
         w = h * omega
-        c, s = np.cos(w * t), np.sin(w * t)
-        factor = 1.0
-        for j in range(order + 1):
-            out[j] += factor * (coefficients[:, 2 * h - 1] * c + coefficients[:, 2 * h] * s)
+        c, s, factor = np.cos(w * t), np.sin(w * t), 1.0
+        for j in range(out.shape[0] if h else 1):
+            for i in range(out.shape[1]):
+                out[j, i] += factor * (coefficients[i, 2 * h - 1] * c + coefficients[i, 2 * h] * s if h
+                                       else coefficients[i, 0])
             factor *= w / (j + 1)
             c, s = -s, c
 
@@ -114,29 +124,35 @@ def _inputs(coefficients, omega, t, order, out):
 def _expand(arrays, y, contact, omega, t, series):
     """Taylor series of q, v, w, N from the present state; contact forces by their law in each state."""
     L, D, W, V, kt, mu, P, G, Nn, R = arrays
-    Q, U, wc, nc = series
+    Q, U, wc, nc, p = series
     n, d = W.shape
-    order = Q.shape[0] - 1
-    p = np.empty((order + 1, d))
-    _inputs(P, omega, t, order, p)
-    _inputs(G, omega, t, order, wc)
-    _inputs(Nn, omega, t, order, nc)
+    _inputs(P, omega, t, p)
+    _inputs(G, omega, t, wc)
+    _inputs(Nn, omega, t, nc)
     Q[0], U[0] = y[:d], y[d:2 * d]
-    for j in range(order + 1):
-        a = p[j] - L * Q[j] - D @ U[j]
+    for j in range(Q.shape[0]):
+        a = p[j]
+        for k in range(d):
+            a[k] -= L[k] * Q[j, k]
+            for m in range(d):
+                a[k] -= D[k, m] * U[j, m]
         for i in range(n):
             for k in range(d):
                 wc[j, i] += W[i, k] * Q[j, k]
                 nc[j, i] += V[i, k] * Q[j, k]
-            f = 0.0
+            f, lift = 0.0, (-Nn[i, 0] if j == 0 else 0.0)
+            if contact[i] != APART:
+                lift += nc[j, i]
             if contact[i] == STICK:
                 f = kt[i] * (wc[j, i] - (y[2 * d + i] if j == 0 else 0.0))
             elif contact[i] != APART:
                 f = contact[i] * mu[i] * nc[j, i]
-            a -= f * W[i] + ((nc[j, i] if contact[i] != APART else 0.0) - (Nn[i, 0] if j == 0 else 0.0)) * R[i]
-        if j < order:
-            Q[j + 1] = U[j] / (j + 1)
-            U[j + 1] = a / (j + 1)
+            for k in range(d):
+                a[k] -= f * W[i, k] + lift * R[i, k]
+        if j < Q.shape[0] - 1:
+            for k in range(d):
+                Q[j + 1, k] = U[j, k] / (j + 1)
+                U[j + 1, k] = a[k] / (j + 1)
 
 
 @njit(cache=True)
@@ -223,43 +239,57 @@ def _switch(arrays, y, contact, T, i, rates):
 
 
 @njit(cache=True)
-def _carry(arrays, contact, T, x, order):
-    """Advance the tangent (columns of T) over x with fixed states: the homogeneous series."""
-    L, D, W, V, kt, mu, R = arrays[0], arrays[1], arrays[2], arrays[3], arrays[4], arrays[5], arrays[9]
-    n, d = W.shape
-    A = np.zeros((d, d))
-    Z = np.zeros((d, n))
-    for i in range(n):
-        for k in range(d):
-            if contact[i] == STICK:
-                A[k] += W[i, k] * kt[i] * W[i]
-                Z[k, i] = W[i, k] * kt[i]
-            elif contact[i] != APART:
-                A[k] += W[i, k] * contact[i] * mu[i] * V[i]
-            if contact[i] != APART:
-                A[k] += R[i, k] * V[i]
-    for k in range(d):
-        A[k, k] += L[k]
-    q, u = T[:d].copy(), T[d:2 * d].copy()
-    total_q, total_u = q.copy(), u.copy()
-    push = Z @ T[2 * d:]
-    for j in range(order):
-        a = -(A @ q) - D @ u
-        if j == 0:
-            a += push
-        q, u = u * (x / (j + 1)), a * (x / (j + 1))
-        total_q += q
-        total_u += u
-    T[:d], T[d:2 * d] = total_q, total_u
+def _carry(arrays, contact, T, x, order, memory):
+    """Advance the tangent (columns of T) over x with fixed states; the last matrix is kept for equal steps."""
+    key, flow = memory
+    n, d = arrays[2].shape
+    if key[n] != x or np.any(key[:n] != contact):
+        key[:n], key[n] = contact, x
+        _exponential(arrays, contact, x, order, flow)
+    T[:2 * d] = flow @ T
 
 
 @njit(cache=True)
-def _settle(arrays, y, contact, T, series, x):
+def _exponential(arrays, contact, x, order, flow):
+    """(2d, 2d + n) derivative of (q, v) after x by (q, v, z) before: the homogeneous series."""
+    L, D, W, V, kt, mu, R = arrays[0], arrays[1], arrays[2], arrays[3], arrays[4], arrays[5], arrays[9]
+    n, d = W.shape
+    A = np.zeros((d, 2 * d + n))        # acceleration by (q, v, z)
+    for k in range(d):
+        A[k, k] -= L[k]
+        A[k, d:2 * d] -= D[k]
+        for i in range(n):
+            if contact[i] != APART:
+                gain = W[i, k] * kt[i] if contact[i] == STICK else 0.0
+                lift = R[i, k] + (0.0 if contact[i] == STICK else contact[i] * mu[i] * W[i, k])
+                A[k, 2 * d + i] = gain
+                for m in range(d):
+                    A[k, m] -= gain * W[i, m] + lift * V[i, m]
+    flow[:] = 0.0
+    row, new = np.zeros((2 * d, 2 * d + n)), np.zeros((2 * d, 2 * d + n))
+    for k in range(2 * d):
+        row[k, k] = 1.0
+    for j in range(order + 1):
+        flow += row
+        factor = x / (j + 1)
+        for k in range(d):
+            new[k] = factor * row[d + k]
+            new[d + k] = 0.0
+            for m in range(2 * d):
+                if A[k, m] != 0.0:
+                    new[d + k] += factor * A[k, m] * row[m]
+            if j == 0:
+                new[d + k, 2 * d:] += factor * A[k, 2 * d:]
+        row, new = new, row
+
+
+@njit(cache=True)
+def _settle(arrays, y, contact, T, series, x, memory):
     """Move the state to x on its series; sliders of slipping and open elements follow."""
     W, V, kt, mu, wc, nc = arrays[2], arrays[3], arrays[4], arrays[5], series[2], series[3]
     n, d = W.shape
     if T.shape[1] > 0:
-        _carry(arrays, contact, T, x, series[0].shape[0] - 1)
+        _carry(arrays, contact, T, x, series[0].shape[0] - 1, memory)
     for k in range(d):
         y[k], y[d + k] = _value(series[0], k, x), _value(series[1], k, x)
     for i in range(n):
@@ -297,7 +327,11 @@ def _integrate(arrays, y, T, history, omega, parts):
     """All steps; returns the number of events and a code."""
     n, d = arrays[2].shape
     step = 2 * np.pi / omega / (parts[0] * parts[1])
-    series = (np.empty((ORDER + 1, d)), np.empty((ORDER + 1, d)), np.empty((ORDER + 1, n)), np.empty((ORDER + 1, n)))
+    order = parts[2]
+    series = (np.empty((order + 1, d)), np.empty((order + 1, d)), np.empty((order + 1, n)), np.empty((order + 1, n)),
+              np.empty((order + 1, d)))
+    memory = (np.full(n + 1, np.nan), np.empty((2 * d, 2 * d + n)))
+    events = 0
     contact = np.zeros(n, np.int64)
     _expand(arrays, y, contact, omega, 0.0, series)
     _begin(arrays, y, contact, T, series)
@@ -313,7 +347,7 @@ def _integrate(arrays, y, T, history, omega, parts):
                 row[2 * d + n + i] = arrays[4][i] * (series[2][0, i] - y[2 * d + i])
         while True:
             x, who = _first_event(arrays, y, contact, series, left, step)
-            _settle(arrays, y, contact, T, series, x)
+            _settle(arrays, y, contact, T, series, x, memory)
             if who < 0:
                 break
             rates = (_value(series[2], who, x), _value(series[3], who, x), _slope(series[2], who, x),

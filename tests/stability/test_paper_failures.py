@@ -1,0 +1,165 @@
+"""Where the paper's methods fail (F05-F11, F14), and what reaches the right answer there.
+
+Each test has two halves: the fragile method failing as recorded, and a detection or a method that does not fail.
+"""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from bladefem.damper.accelerate import Rules, iterate
+from bladefem.damper.direct import contact_step, direct
+from bladefem.damper.explicit import damper_cycle
+from bladefem.damper.paper import damper_response, platform
+from bladefem.damper.shooting import harmonics, periodic
+from bladefem.damper.system import damper_on_platforms, oscillator, ring
+from bladefem.hbm.api import solve
+from bladefem.hbm.reference import reference_model
+
+
+def blade(kt, load, mass, phase=0.0):
+    """The reference blade with five contact points a side and five modes; no residual flexibility."""
+    model = reference_model(kt, mass, load, phase=phase, points=5, modes=5)
+    return replace(model, sides=tuple(replace(side, residual=0 * side.residual) for side in model.sides))
+
+
+def judged(model, omega):
+    """First harmonic at the tip by shooting on the exact flow of the coupled system (phase 0)."""
+    system = ring(model.side(0), 0.002, model.elements, float(model.damper.mass[0, 0]), 1 + 0j)
+    solution = periodic(system, omega)
+    assert solution.converged
+    return harmonics(solution, system, 1)[0, 1]
+
+
+def test_f05_picard_and_secants_near_the_stick_slip_transition():
+    model, omega = blade(2e7, 2.115, 0.01), 2 * np.pi * 1213.42
+    side = platform(model, omega, 1)
+    for method in ("picard", "complex", "parts"):
+        assert not iterate(side, method, Rules(criterion="residual", tolerance=1e-6, damper="march")).converged
+    newton = iterate(side, "describing", Rules(criterion="residual", tolerance=1e-6))
+    assert newton.converged
+    assert newton.residual < 1e-4
+    full = solve(model, omega, 31, 4096)
+    assert full.converged
+    assert abs(full.probe[1, 0] / judged(model, omega) - 1) < 1e-4       # 4.5e-5; 1.0e-3 with H = 15
+
+
+def test_f06_a_small_step_is_no_equilibrium():
+    """Eq. 35 at 2 %: Picard crawls, the secants jump past; both stop with a tenth of the force missing or more."""
+    model, omega = blade(1e6, 1.4, 0.06), 2 * np.pi * 1340
+    side, true = platform(model, omega, 1), judged(model, omega)
+    stopped = iterate(side, "parts", Rules())
+    assert stopped.converged
+    assert stopped.false                                        # residual 13 % ...
+    assert abs(stopped.probe[1, 0] / true - 1) > 0.05           # ... and 9 % off at the tip
+    accepted = iterate(side, "amplitude", Rules(criterion="residual", tolerance=1e-4))
+    assert accepted.converged
+    assert abs(accepted.probe[1, 0] / true - 1) < 3e-3          # what one harmonic is worth here
+
+
+def torsion(load):
+    """The blade with a torsion of the platform, so that the contact points move differently."""
+    model = blade(1e6, load, 0.06)
+    side, tilt = model.side(0), np.tile(np.linspace(-1, 1, 5), 2)
+    shapes = np.column_stack([side.shapes.real, np.r_[5 * tilt, np.full(len(side.shapes) - 10, 5.0)]])
+    body = replace(side, omega=np.r_[side.omega, 2 * np.pi * 1400], shapes=shapes)
+    return replace(model, sides=(body,))
+
+
+def test_f07_the_quotient_pins_a_node():
+    model, omega = torsion(3.0), 2 * np.pi * 1280
+    side = platform(model, omega, 1)
+    assert len(side.rows) == 2                                  # translation and torsion
+    pinned = iterate(side, "anderson", Rules(tolerance=1e-9, most=150))
+    assert pinned.converged
+    size = np.abs(pinned.u[0])
+    assert size.min() < 1e-9 * size.max()                       # one node does not move at all
+    assert pinned.false                                         # and the residual tells: 0.15
+    true = iterate(side, "describing", Rules(criterion="residual", tolerance=1e-8, most=200))
+    full = solve(model, omega, 15, 1024)
+    assert true.converged
+    assert full.converged
+    assert abs(true.probe[1, 0] / full.probe[1, 0] - 1) < 1e-2
+    assert abs(pinned.probe[1, 0] / full.probe[1, 0] - 1) > 0.1
+
+
+@pytest.mark.parametrize("load", [20.0])
+def test_f08_a_stuck_damper_never_settles_from_rest(load):
+    model, omega = blade(1e6, load, 0.06), 2 * np.pi * 1367.8
+    side, true = platform(model, omega, 1), judged(model, omega)
+    motion = np.concatenate([np.zeros((1, 10)), side.free]).T
+    cycle = damper_cycle(damper_on_platforms(motion, model.elements, 0.06), omega, 512)
+    assert cycle.reason.startswith("not periodic after 300 periods")
+    paper = iterate(side, "amplitude", Rules(damper="march"))
+    assert paper.converged                                      # by Eq. 35
+    assert abs(paper.probe[1, 0] / true - 1) > 0.7              # 110 %
+    assert paper.false                                          # the residual knows
+    exact = damper_response(side, side.free, "shooting")
+    assert exact.reason == "periodic"
+    robust = iterate(side, "amplitude", Rules(criterion="residual", tolerance=1e-6))
+    assert robust.converged
+    assert abs(robust.probe[1, 0] / true - 1) < 1e-6
+
+
+def test_f09_one_stiffness_cannot_serve_two_harmonics():
+    model, omega = blade(1e6, 1.0, 0.06), 2 * np.pi * 247.32
+    model = replace(model, excitation={1: np.array([1.0]), 5: np.array([1.0])})
+    full, side = solve(model, omega, 25, 2048), platform(model, omega, 5)
+    assert full.converged
+    error = {}
+    for averaged in (True, False):
+        found = iterate(side, "amplitude", Rules(averaged=averaged, tolerance=1e-3))
+        assert found.converged
+        error[averaged] = np.abs(found.probe[[1, 5], 0] / full.probe[[1, 5], 0] - 1)
+    assert error[True][1] > 2                                   # fifth harmonic: off by more than 200 %
+    assert error[False][0] < 2e-3
+    assert error[False][1] < 0.05
+
+
+def test_f10_one_harmonic_of_the_platform_is_not_enough_for_stiff_contacts():
+    model, omega = blade(2e7, 2.115, 0.01), 2 * np.pi * 1213.42
+    one, full = iterate(platform(model, omega, 1), "describing", Rules(tolerance=1e-4)), solve(model, omega, 31, 4096)
+    assert one.converged
+    assert one.residual < 1e-4                                  # right within its own model ...
+    assert abs(one.probe[1, 0] / full.probe[1, 0] - 1) > 0.05   # ... and 9 % from the truth, which shooting confirms
+    assert abs(full.probe[1, 0] / judged(model, omega) - 1) < 1e-4
+
+
+def test_f11_travelling_wave_by_shooting_and_by_balance():
+    """Phase pi/3: six blades of a ring in time against one blade with phased harmonics."""
+    model, omega = reference_model(2e7, 0.06, 3.05, phase=np.pi / 3, points=1, modes=3), 2 * np.pi * 1355.4
+    model = replace(model, sides=tuple(replace(side, residual=0 * side.residual) for side in model.sides))
+    full = solve(model, omega, 31, 2048)
+    assert full.converged
+    system = ring(model.side(0), 0.002, model.elements, 0.06, 1 + 0j, blades=6, waves=1)
+    ringed = periodic(system, omega, samples=128)
+    assert ringed.converged
+    assert abs(full.probe[1, 0] / harmonics(ringed, system, 1)[0, 1] - 1) < 2e-4
+    side = platform(model, omega, 1)
+    assert not iterate(side, "picard", Rules(criterion="residual", tolerance=1e-6)).converged
+
+
+def test_f14_newton_hops_between_slip_directions():
+    """k h^2 / 4 m = 7.14: plain Newton started in slip alternates for ever; the stick predictor needs one solve."""
+    k, c, limit, aim = 1e8, 4 * 0.035 / 1e-8, 15.0, 1e-8        # c (x - aim) + clip(k x) = 0
+    assert k / c == pytest.approx(7.14, abs=0.01)
+    x, trace = aim + limit / c, []
+    for _ in range(50):
+        force, stiffness = np.clip(k * x, -limit, limit), k * (abs(k * x) < limit)
+        trace.append(c * (x - aim) + force)
+        x -= trace[-1] / (c + stiffness)
+    assert np.abs(trace[2:]) == pytest.approx(2 * limit, rel=1e-9)
+    assert (np.sign(trace[2:-1]) == -np.sign(trace[3:])).all()
+    force = np.empty(1)
+    assert contact_step(np.array([k * aim]), np.array([limit]), np.array([[k / c]]), np.zeros((1, 1)), np.ones(1), force)
+    assert force[0] == pytest.approx(k * aim / (1 + k / c), rel=1e-12)
+    assert c * (force[0] / k - aim) + force[0] == pytest.approx(0, abs=1e-12 * limit)
+
+
+def test_newmark_follows_a_damped_oscillator_through_stick_and_slip():
+    system, omega = oscillator(200 * np.pi, 0.02, 2e7, 3.0, 5 + 0j), 2 * np.pi * 100
+    cycle = direct(system, omega, 200)                          # k h^2 / 4 m = 12.5
+    assert cycle.reason == "periodic"
+    exact = harmonics(periodic(system, omega), system, 1)[0, 1]
+    assert abs(2 * np.fft.rfft(cycle.q[:, 0])[1] / 200 / exact - 1) < 5e-3
