@@ -99,7 +99,7 @@ def transformation(body: Body, clamp: str | None = "clamp", cyclic: bool = False
         return Transformation(body, low, None, start, (body.K.ptap(T0),), (body.M.ptap(T0),), None, 0)
     sectors = body.mesh.sector.count
     if body.comm.size == 1 and one_core is not False:
-        opened = _opened(body, *_numbered(body, *_parts(body, clamped, None, ties)), low, high)
+        opened = _opened(body, _numbered(body, *_parts(body, clamped, None, ties))[0], low, high)
         return Transformation(body, low, high, start, (), (), opened, sectors)
     T0, T1 = _to_petsc(body, low, start), _to_petsc(body, high, start)
     return Transformation(body, low, high, start, _three(body.K, T0, T1), _three(body.M, T0, T1), None, sectors)
@@ -269,17 +269,26 @@ def _to_petsc(body: Body, T: sp.csr_matrix, start: np.ndarray) -> PETSc.Mat:
     return matrix
 
 
-def _opened(body: Body, T: sp.csr_matrix, _: None, start: np.ndarray, low: sp.csr_matrix,
-            high: sp.csr_matrix) -> Opened:
+def _opened(body: Body, T: sp.csr_matrix, low: sp.csr_matrix, high: sp.csr_matrix) -> Opened:
     """Matrices of the open sector; zeros of the mass between different directions are dropped."""
-    to_open = _to_petsc(body, T, start)
-    K, M = (_csr(A.ptap(to_open)) for A in (body.K, body.M))
+    to_open = T[np.argsort(body.scalar_rows)[np.count_nonzero(body.scalar_rows < 0):]]
+    K, M = (_projected(_csr(A), to_open) for A in (body.K, body.M))
     M.eliminate_zeros()
     rows = T.tocoo()
     unit = (rows.data == 1) & (np.diff(T.indptr)[rows.row] == 1)
     places = np.empty(T.shape[1], int)
     places[rows.col[unit]] = rows.row[unit]
     return Opened(T, places, K, M, core.eliminate(K, core.rim_of((abs(low) + abs(high))[places].tocsr())))
+
+
+def _projected(A: sp.csr_matrix, T: sp.csr_matrix) -> sp.csr_matrix:
+    """T^T A T; a mere selection of unknowns is done by indexing."""
+    if T.nnz == T.shape[1] and (T.data == 1).all():
+        chosen = T.tocsc().indices
+        return A[chosen][:, chosen]
+    out = (T.T @ A @ T).tocsr()
+    out.sum_duplicates()
+    return out
 
 
 def _three(A: PETSc.Mat, T0: PETSc.Mat, T1: PETSc.Mat) -> tuple[PETSc.Mat, PETSc.Mat, PETSc.Mat]:

@@ -13,7 +13,7 @@ from scipy.linalg import eigh
 
 from ..errors import NotSolvedError
 from .constraint import Constrained
-from .linalg import apply, dot
+from .linalg import apply, dot, minus, mix
 
 __all__ = ["lowest", "orthonormal"]
 
@@ -29,6 +29,9 @@ def lowest(con: Constrained, inverse: Callable[[np.ndarray], np.ndarray], start:
         start: (n_own, k) first block.
         tolerance: largest |K^-1 M x - x / lambda| lambda in the M-norm: the direction's error times a gap.
 
+    The vectors returned are K^-1 M x lambda, one free step of inverse iteration beyond the Ritz vectors x: it wipes out
+    what rounding and the iteration leave in stiff directions.
+
     Returns:
         lam (count,) [rad^2/s^2] and this rank's (n_own, count) M-orthonormal vectors.
 
@@ -40,11 +43,11 @@ def lowest(con: Constrained, inverse: Callable[[np.ndarray], np.ndarray], start:
     H = np.zeros((0, 0), con.dtype)
     block, Mblock, _ = orthonormal(con, V, start.astype(con.dtype))
     for _ in range(STEPS):
-        V = np.concatenate([V, block], axis=1)
+        V = np.asfortranarray(np.concatenate([V, block], axis=1))
         W = inverse(Mblock)
         column = dot(comm, V, apply(con.M, W))
         H = _grown(H, column)
-        block, Mblock, tail = orthonormal(con, V, W - V @ column)
+        block, Mblock, tail = orthonormal(con, V, minus(W, V, column))
         theta, S = eigh(H)
         theta, S = theta[::-1], S[:, ::-1]
         k = min(count, len(theta))
@@ -52,7 +55,7 @@ def lowest(con: Constrained, inverse: Callable[[np.ndarray], np.ndarray], start:
         if not block.shape[1] and k < count:
             raise NotSolvedError(f"{count} modes were asked of a body that has {k} elastic ones")
         if (k == count and error.max() < tolerance) or not block.shape[1]:
-            return 1 / theta[:k], np.asfortranarray(V @ S[:, :k])
+            return 1 / theta[:k], mix(V, S[:, :k], block, tail @ S[len(S) - tail.shape[1]:, :k] / theta[:k])
     raise NotSolvedError(f"the modes did not converge in {STEPS} steps (error {error.max():.1e}, "
                          f"expected {tolerance:.1e})")
 
@@ -67,13 +70,13 @@ def orthonormal(con: Constrained, V: np.ndarray, W: np.ndarray) -> tuple[np.ndar
     for sweep in range(2):
         MW = apply(con.M, W)
         if V.shape[1]:
-            W = W - V @ dot(comm, V, MW)
+            W = minus(W, V, dot(comm, V, MW))
             MW = apply(con.M, W)
         gram = dot(comm, W, MW)
         size, Z = np.linalg.eigh((gram + gram.conj().T) / 2)
         good = size > (1e-26 * size[-1] if sweep == 0 else 0.25)
         root = np.sqrt(size[good])
-        W, MW = (np.asfortranarray(A @ (Z[:, good] / root)) for A in (W, MW))
+        W, MW = (mix(A, Z[:, good] / root) for A in (W, MW))
         R = (Z[:, good] * root).conj().T @ R
     return W, MW, R
 

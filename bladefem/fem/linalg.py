@@ -21,8 +21,8 @@ from . import core as interior
 from .compat import PETSc
 from .mumps import Factorised, factorise_matrix, solve_matrix
 
-__all__ = ["Doubled", "Factor", "Folded", "apply", "combined", "dense_rows", "dot", "factorise", "inertia", "scale",
-           "solve"]
+__all__ = ["Doubled", "Factor", "Folded", "apply", "combined", "dense_rows", "dot", "factorise", "inertia", "minus",
+           "mix", "scale", "solve"]
 
 
 @dataclass(frozen=True)
@@ -135,8 +135,21 @@ def dot(comm: object, X: np.ndarray, Y: np.ndarray) -> np.ndarray:
     if np.iscomplexobj(X) or np.iscomplexobj(Y):
         part = blas.zgemm(1.0, X, Y, trans_a=2) if X.size and Y.size else X.conj().T @ Y
     else:
-        part = X.T @ Y
+        part = blas.dgemm(1.0, X, Y, trans_a=1) if X.size and Y.size else X.T @ Y
     return comm.allreduce(np.ascontiguousarray(part)) if comm.size > 1 else part
+
+
+def minus(W: np.ndarray, V: np.ndarray, C: np.ndarray) -> np.ndarray:
+    """W - V C, columns contiguous."""
+    gemm = blas.zgemm if np.iscomplexobj(W) else blas.dgemm
+    return gemm(-1.0, V, C, 1.0, W) if V.size else W
+
+
+def mix(V: np.ndarray, C: np.ndarray, W: np.ndarray | None = None, D: np.ndarray | None = None) -> np.ndarray:
+    """V C + W D, columns contiguous."""
+    gemm = blas.zgemm if np.iscomplexobj(V) else blas.dgemm
+    out = gemm(1.0, V, C) if V.size and C.size else np.zeros((V.shape[0], C.shape[1]), V.dtype, order="F")
+    return out if W is None or not W.size else gemm(1.0, W, D, 1.0, out, overwrite_c=1)
 
 
 def inertia(A: Matrix) -> int:

@@ -21,7 +21,7 @@ from .linalg import apply, combined, dot, inertia, scale
 
 __all__ = ["canonical", "certificate", "count_below", "elastic_pairs", "mode_set", "modes", "pairs"]
 
-TOLERANCE = 1e-9    # error of a vector's direction; that of a frequency is its square
+TOLERANCE = 1e-8    # error of a vector's direction; that of a frequency is its square
 
 
 def modes(con: Constrained, count: int, flex: Flexibility | None = None, tolerance: float = TOLERANCE,
