@@ -53,7 +53,7 @@ def evaluate(elements: Elements, w: np.ndarray, samples: int, jacobian: bool = T
     if d == 2:
         jenkins_batch(w, load, nodes, tab, F, J, shares)
     else:
-        disc_batch(w, load, nodes, tab, empty_sums(K // 2, samples), cycles, F, J.reshape(n, d, K, d * K), shares, used)
+        disc_batch(w, load, nodes, tab, empty_sums(K // 2), cycles, F, J.reshape(n, d, K, d * K), shares, used)
     failed = int(np.count_nonzero(used < 0))
     reason = f"{failed} of {n} elements were not periodic after {cycles} cycles" if failed else "periodic"
     return Forces(F, J if jacobian else None, states(shares), shares, dissipated(F, w), np.abs(used), failed == 0,

@@ -146,7 +146,7 @@ def disc_batch(w, load, nodes, tab, sums, limit, F, J, shares, cycles):
     """
     n, S = w.shape[0], tab.at.shape[0]
     path, Ns, form = np.empty((3, S)), np.empty(S), np.empty((EDGE_ROWS, S))
-    contact, C = np.empty(tab.sums.shape[1]), np.empty((2, sums.J.shape[2]))
+    contact, C = np.empty(tab.sums.shape[1]), np.empty((2, sums.row.size))
     for e in range(n):
         el = Node(nodes[e, 0], nodes[e, 1], nodes[e, 2], nodes[e, 3])
         values(tab.knots_transposed, w[e, 1], el.kt, 0.0, path[0])

@@ -13,7 +13,6 @@ from numba import njit
 
 from bladefem.friction.disc import CLOSING, SLIP, STICK, edge, sensitivity
 from bladefem.friction.orbit import DIRECTION_X, DIRECTION_Y, GROWTH, HALF, LENGTH, half_angle, turned
-from bladefem.friction.tables import weighted
 
 __all__ = ["close", "linear_period", "start_rows", "to_carry"]
 
@@ -65,46 +64,70 @@ def to_carry(C, j, kt, knots):
         C[1, 2 * K + l] -= kt * knots[j, l]
 
 
-@njit(cache=True, error_model="numpy")
+@njit(cache=True, error_model="numpy", fastmath=FAST)
 def _add_stretch(a, b, cx, cy, C, tab, sums):
     """Add samples a <= i < b, which stick with f = kt w + (cx, cy)."""
-    K, mean, weight = tab.at.shape[1], sums.mean, sums.weight
+    K, M, mean = tab.at.shape[1], C.shape[1], sums.mean
     for p in range(mean.size):
         mean[p] = tab.sums[b, p] - tab.sums[a, p]
         sums.stick[p] += mean[p]
-    weighted(mean, weight)
     for k in range(K):
-        sums.F[1, k] += weight[k] * cx
-        sums.F[2, k] += weight[k] * cy
-        for d in range(2):
-            for l in range(C.shape[1]):
-                sums.J[d, k, l] += weight[k] * C[d, l]
+        weight = mean[k] if k == 0 else 2.0 * mean[k]
+        sums.F[1, k] += weight * cx
+        sums.F[2, k] += weight * cy
+        for l in range(M):
+            sums.J[k, l] += weight * C[0, l]
+        for l in range(M):
+            sums.J[k, M + l] += weight * C[1, l]
 
 
 @njit(cache=True, error_model="numpy", fastmath=FAST)
-def add_samples(count, tab, sums):
-    """Add the samples kept in sums.which, with their forces and rows, four at a time."""
-    K, M = tab.analysis.shape[1], sums.J.shape[2]
-    for m in range(count, (count + 3) // 4 * 4):
-        sums.which[m] = sums.which[0]
-        sums.rows[m] = 0.0
-        sums.force[m] = 0.0
-    for m in range(0, count, 4):
-        i0, i1, i2, i3 = sums.which[m], sums.which[m + 1], sums.which[m + 2], sums.which[m + 3]
-        for k in range(K):
-            a, b, c, d = tab.analysis[i0, k], tab.analysis[i1, k], tab.analysis[i2, k], tab.analysis[i3, k]
-            for e in range(2):
-                sums.F[1 + e, k] += (a * sums.force[m, e] + b * sums.force[m + 1, e] + c * sums.force[m + 2, e]
-                                     + d * sums.force[m + 3, e])
-                r0, r1, r2, r3 = sums.rows[m, e], sums.rows[m + 1, e], sums.rows[m + 2, e], sums.rows[m + 3, e]
-                out = sums.J[e, k]
-                for l in range(M):
-                    out[l] += a * r0[l] + b * r1[l] + c * r2[l] + d * r3[l]
+def _add_samples(count, sums):
+    """Add the samples that wait in sums.weights and sums.rows; returns their new number, 0."""
+    if count:
+        np.dot(sums.weights[:count].T, sums.rows[:count], sums.product)
+        for k in range(sums.product.shape[0]):
+            for l in range(sums.product.shape[1]):
+                sums.J[k, l] += sums.product[k, l]
+    return 0
 
 
 @njit(cache=True, error_model="numpy", fastmath=FAST)
-def _slip_step(P, Q, i, N0, N1, el, tab, form, row, count, sums):
-    """One edge in slip throughout: adds the sample, turns the row of the angle in place; returns the new (P, Q)."""
+def _keep(i, fx, fy, count, tab, sums):
+    """Force and weights of sample i, whose rows stand at ``count``; returns the number that wait."""
+    for k in range(tab.analysis.shape[1]):
+        P = tab.analysis[i, k]
+        sums.weights[count, k] = P
+        sums.F[1, k] += P * fx
+        sums.F[2, k] += P * fy
+    return _add_samples(count + 1, sums) if count + 1 == sums.rows.shape[0] else count + 1
+
+
+@njit(cache=True, error_model="numpy", fastmath=FAST)
+def _turn_rows(am, m, a1, t, i, tab, row, middle):
+    """middle = am row + m . pattern and row = a1 row + t . pattern, from (3,) weights of edge i's pattern rows."""
+    M, on = row.size, tab.pattern
+    m0, m1, m2 = m
+    t0, t1, t2 = t
+    for l in range(M):
+        middle[l] = am * row[l] + m0 * on[i, 0, l] + m1 * on[i, 1, l] + m2 * on[i, 2, l]
+    for l in range(M):
+        row[l] = a1 * row[l] + t0 * on[i, 0, l] + t1 * on[i, 1, l] + t2 * on[i, 2, l]
+
+
+@njit(cache=True, error_model="numpy", fastmath=FAST)
+def _sample_rows(gx, gy, nx, ny, i, tab, middle, count, sums):
+    """Rows of sample i in slip: (gx, gy) middle + (nx, ny) times the row of the normal motion."""
+    M, on, out = middle.size, tab.pattern, sums.rows
+    for l in range(M):
+        out[count, l] = gx * middle[l] + nx * on[i, 0, l]
+    for l in range(M):
+        out[count, M + l] = gy * middle[l] + ny * on[i, 0, l]
+
+
+@njit(cache=True, error_model="numpy", fastmath=FAST)
+def _slip_step(P, Q, i, N0, N1, el, tab, form, row, middle, count, sums):
+    """One edge in slip throughout: keeps its sample, turns the row of the angle in place; new (P, Q) and count."""
     ux, uy, L, h = form[DIRECTION_X, i], form[DIRECTION_Y, i], form[LENGTH, i], form[HALF, i]
     Rm, size = 0.5 * el.mu * (N0 + N1), P * P + Q * Q
     x = L / Rm
@@ -117,20 +140,49 @@ def _slip_step(P, Q, i, N0, N1, el, tab, form, row, count, sums):
     y1 = 2.0 * slope * (ux * 2.0 * P1 * Q1 - uy * (P1 * P1 - Q1 * Q1)) * inverse1
     ym = slope * (ux * ey - uy * ex)
     kx, ky, kn = el.kt * ux / L, el.kt * uy / L, el.mu * el.kn / Rm
-    q0, q1, r = -(1.0 - am) * ky + ym * kx, (1.0 - am) * kx + ym * ky, -ym * kn
-    s0, s1, t = -(1.0 - a1) * ky + y1 * kx, (1.0 - a1) * kx + y1 * ky, -y1 * kn
-    gx, gy = -Rm * ey, Rm * ex
-    nx, ny = el.mu * el.kn * ex, el.mu * el.kn * ey
-    outx, outy = sums.rows[count, 0], sums.rows[count, 1]
-    on, ox, oy = tab.pattern[i, 0], tab.pattern[i, 1], tab.pattern[i, 2]
-    for l in range(row.size):
-        middle = am * row[l] + r * on[l] + q0 * ox[l] + q1 * oy[l]
-        outx[l] = gx * middle + nx * on[l]
-        outy[l] = gy * middle + ny * on[l]
-        row[l] = a1 * row[l] + t * on[l] + s0 * ox[l] + s1 * oy[l]
-    sums.which[count] = i
-    sums.force[count, 0], sums.force[count, 1] = Rm * ex, Rm * ey
-    return P1, Q1
+    m = (-ym * kn, ym * kx - (1.0 - am) * ky, ym * ky + (1.0 - am) * kx)
+    t = (-y1 * kn, y1 * kx - (1.0 - a1) * ky, y1 * ky + (1.0 - a1) * kx)
+    _turn_rows(am, m, a1, t, i, tab, row, middle)
+    _sample_rows(-Rm * ey, Rm * ex, el.mu * el.kn * ex, el.mu * el.kn * ey, i, tab, middle, count, sums)
+    return P1, Q1, _keep(i, Rm * ex, Rm * ey, count, tab, sums)
+
+
+@njit(cache=True, error_model="numpy")
+def _forget(row, start):
+    """Clear what is left of the force at the start of the period before it becomes slow denormal numbers."""
+    if abs(row[start]) + abs(row[start + 1]) < 1e-60:
+        row[start] = row[start + 1] = 0.0
+
+
+@njit(cache=True, error_model="numpy")
+def _keep_mixed(i, mid, fx, fy, dx, dy, N0, N1, mx, my, el, tab, C, count, sums):
+    """Keep sample i of an edge that changes state, with force (mx, my) in the middle; returns slips and the count."""
+    if mid != SLIP and mid != CLOSING:
+        return 0, count
+    M, rows = sums.row.size, np.empty((2, sums.row.size))
+    if mid == SLIP:
+        _angle_row(C, i, sensitivity(fx, fy, dx, dy, N0, N1, el.mu, 0.5), el, tab, sums.middle)
+        R = max(0.5 * el.mu * (N0 + N1), 1e-300)
+        _force_rows(sums.middle, mx / R, my / R, R, el.mu * el.kn, tab.at[i], rows)
+    else:
+        _closing_rows(i, dx, dy, N0, N1, 0.5 * (N0 + N1) / (N1 - N0), el, tab.knots, rows)
+    sums.rows[count, :M] = rows[0]
+    sums.rows[count, M:] = rows[1]
+    return int(mid == SLIP), _keep(i, mx, my, count, tab, sums)
+
+
+@njit(cache=True, error_model="numpy")
+def _after_mixed(i, j, end, fx, fy, dx, dy, N0, N1, el, tab, C, sums):
+    """Bring C (2, M), and in slip the row of the angle, from knot i to knot j over an edge that changes state."""
+    if end == STICK:
+        return
+    if end == SLIP:
+        _angle_row(C, i, sensitivity(fx, fy, dx, dy, N0, N1, el.mu, 1.0), el, tab, sums.row)
+    if end == CLOSING:
+        _closing_rows(i, dx, dy, N0, N1, N1 / (N1 - N0), el, tab.knots, C)
+    else:
+        C[:] = 0.0
+    to_carry(C, j, el.kt, tab.knots)
 
 
 @njit(cache=True, error_model="numpy")
@@ -141,7 +193,7 @@ def linear_period(path, fx, fy, el, tab, form, C, sums):
     """
     S, knots, slips, count = path.shape[1], tab.knots, 0, 0
     run, cx, cy = -1, 0.0, 0.0              # first sample of the present stretch of stick, -1 outside
-    slipping, P, Q, row = False, 1.0, 0.0, sums.row
+    slipping, P, Q, row, middle = False, 1.0, 0.0, sums.row, sums.middle
     for i in range(S):
         j = i + 1 if i + 1 < S else 0
         N0, N1 = path[2, i], path[2, j]
@@ -149,8 +201,9 @@ def linear_period(path, fx, fy, el, tab, form, C, sums):
             size, ex, ey = P * P + Q * Q, P * P - Q * Q, 2.0 * P * Q
             ahead = ex * form[DIRECTION_X, i] + ey * form[DIRECTION_Y, i]
             if N1 > 0.0 and ahead >= form[GROWTH, i] * size:
-                P, Q = _slip_step(P, Q, i, N0, N1, el, tab, form, row, count, sums)
-                slips, count = slips + 1, count + 1
+                P, Q, count = _slip_step(P, Q, i, N0, N1, el, tab, form, row, middle, count, sums)
+                _forget(row, 3 * knots.shape[1])
+                slips += 1
                 continue
             slipping = False
             ex, ey = ex / size, ey / size
@@ -165,47 +218,33 @@ def linear_period(path, fx, fy, el, tab, form, C, sums):
                     run, cx, cy = i, fx - path[0, i], fy - path[1, i]
                 fx, fy = ex, ey
                 continue
+        elif N0 <= 0.0 and N1 <= 0.0 and run < 0:
+            continue
         end, ex, ey, mid, mx, my = edge(fx, fy, dx, dy, N0, N1, el.mu)
         if mid == STICK and run < 0:
             run, cx, cy = i, fx - path[0, i], fy - path[1, i]
         if run >= 0:
             _add_stretch(run, i + (mid == STICK), cx, cy, C, tab, sums)
             run = -1
-        if mid == SLIP:
-            _angle_row(C, i, sensitivity(fx, fy, dx, dy, N0, N1, el.mu, 0.5), el, tab, row)
-            R = max(0.5 * el.mu * (N0 + N1), 1e-300)
-            _force_rows(row, mx / R, my / R, R, el.mu * el.kn, tab.at[i], sums.rows[count])
-            slips += 1
-        elif mid == CLOSING:
-            _closing_rows(i, dx, dy, N0, N1, 0.5 * (N0 + N1) / (N1 - N0), el, knots, sums.rows[count])
-        if mid == SLIP or mid == CLOSING:
-            sums.which[count] = i
-            sums.force[count, 0], sums.force[count, 1] = mx, my
-            count += 1
-        if end == SLIP:
-            R = max(el.mu * N1, 1e-300)
-            _angle_row(C, i, sensitivity(fx, fy, dx, dy, N0, N1, el.mu, 1.0), el, tab, row)
-            slipping = el.mu > 0.0
-            P, Q = half_angle(ex / R, ey / R)
-            C[:] = 0.0
-            to_carry(C, j, el.kt, knots)    # kept if the limit is zero
-        elif end == CLOSING:
-            _closing_rows(i, dx, dy, N0, N1, N1 / (N1 - N0), el, knots, C)
-            to_carry(C, j, el.kt, knots)
-        else:
-            C[:] = 0.0
-            to_carry(C, j, el.kt, knots)
+        slip, count = _keep_mixed(i, mid, fx, fy, dx, dy, N0, N1, mx, my, el, tab, C, count, sums)
+        _after_mixed(i, j, end, fx, fy, dx, dy, N0, N1, el, tab, C, sums)
+        slips += slip
+        slipping = end == SLIP and el.mu * N1 > 0.0
+        if slipping:
+            P, Q = half_angle(ex / (el.mu * N1), ey / (el.mu * N1))
         fx, fy = ex, ey
     if run >= 0:
         _add_stretch(run, S, cx, cy, C, tab, sums)
+    _add_samples(count, sums)
     if slipping:
         size, R = P * P + Q * Q, el.mu * path[2, 0]
         ex, ey = (P * P - Q * Q) / size, 2.0 * P * Q / size
         fx, fy = R * ex, R * ey
         _force_rows(row, ex, ey, R, el.mu * el.kn, knots[0], C)
-    else:
+    elif path[2, 0] > 0.0:
         to_carry(C, 0, -el.kt, knots)
-    add_samples(count, tab, sums)
+    else:
+        C[:] = 0.0
     return fx, fy, slips
 
 
@@ -240,9 +279,10 @@ def close(C, K, rx, ry, sums, F, J):
     for l in range(3 * K):      # D at the start of the period takes the place of C
         x, y = C[0, l], C[1, l]
         C[0, l], C[1, l] = (d * x - b * y) / det, (a * y - c * x) / det
+    M = C.shape[1]
     for e in range(2):
         for k in range(K):
-            px, py = sums.J[e, k, 3 * K], sums.J[e, k, 3 * K + 1]
+            px, py = sums.J[k, e * M + 3 * K], sums.J[k, e * M + 3 * K + 1]
             F[1 + e, k] += sums.F[1 + e, k] + px * mx + py * my
             for l in range(3 * K):
-                J[1 + e, k, l] += sums.J[e, k, l] + px * C[0, l] + py * C[1, l]
+                J[1 + e, k, l] += sums.J[k, e * M + l] + px * C[0, l] + py * C[1, l]

@@ -24,18 +24,29 @@ DIRECTION_X, DIRECTION_Y, LENGTH, HALF, GROWTH, EDGE_ROWS = 0, 1, 2, 3, 4, 5
 
 @njit(cache=True, error_model="numpy", fastmath={"contract", "nsz", "arcp"})
 def edges(path, mu, out):
-    """Fill out (5, S): direction (2), length [N], decay over half the edge in slip, growth of the limit."""
+    """Fill out (5, S): direction (2), length [N], decay over half the edge in slip, growth of the limit.
+
+    One array is written in each loop, so that the compiler can use vector instructions.
+    """
     S = path.shape[1]
+    for row in range(3):
+        for i in range(S - 1):
+            out[row, i] = path[row, i + 1] - path[row, i]
+        out[row, S - 1] = path[row, 0] - path[row, S - 1]
     for i in range(S):
-        j = i + 1 if i + 1 < S else 0
-        dx, dy = path[0, j] - path[0, i], path[1, j] - path[1, i]
-        N0, N1 = path[2, i], path[2, j]
-        R = max(0.5 * mu * (N0 + N1), 1e-300)
-        L = max(sqrt(dx * dx + dy * dy), 1e-12 * R)
-        x = 0.5 * L / R
-        out[DIRECTION_X, i], out[DIRECTION_Y, i], out[LENGTH, i] = dx / L, dy / L, L
+        out[GROWTH, i] = mu * out[LENGTH, i]
+    for i in range(S):
+        out[HALF, i] = max(mu * path[2, i] + 0.5 * out[GROWTH, i], 1e-300)      # limit in the middle
+    for i in range(S):
+        out[LENGTH, i] = max(sqrt(out[0, i] ** 2 + out[1, i] ** 2), 1e-12 * out[HALF, i])
+    for i in range(S):
+        x = 0.5 * out[LENGTH, i] / out[HALF, i]
         out[HALF, i] = 1.0 / (sqrt(1.0 + x * x) + x)
-        out[GROWTH, i] = mu * (N1 - N0) / L
+    for i in range(S):
+        inverse = 1.0 / out[LENGTH, i]
+        out[0, i] *= inverse
+        out[1, i] *= inverse
+        out[GROWTH, i] *= inverse
 
 
 @njit(cache=True, error_model="numpy", inline="always")

@@ -18,6 +18,9 @@ from bladefem.friction.harmonics import analysis, synthesis
 __all__ = ["Node", "Sums", "Tables", "columns", "empty_sums", "gram", "tables", "values", "weighted"]
 
 
+WAITING = 32        # samples summed at once by matrix product, few enough to stay in the cache
+
+
 class Node(NamedTuple):
     """One element, as the kernels see it."""
 
@@ -43,14 +46,14 @@ class Sums(NamedTuple):
     """What a 2-D element collects in one period; M columns as in disc_rows.py."""
 
     F: np.ndarray           # (3, K) force harmonics of stretches and samples
-    J: np.ndarray           # (2, K, M) their rows
+    J: np.ndarray           # (K, 2M) their rows, first and second tangent
     stick: np.ndarray       # (4H+1,) basis means of the samples in stick
-    which: np.ndarray       # (S+4,) samples that do not stick
-    force: np.ndarray       # (S+4, 2) their forces
-    rows: np.ndarray        # (S+4, 2, M) their rows
+    weights: np.ndarray     # (WAITING, K) of the samples in slip that are not yet in J
+    rows: np.ndarray        # (WAITING, 2M) their rows
+    product: np.ndarray     # (K, 2M) scratch
     row: np.ndarray         # (M,) row of the angle in slip
+    middle: np.ndarray      # (M,) row of the angle at the sample
     mean: np.ndarray        # (4H+1,) scratch
-    weight: np.ndarray      # (K,) scratch
 
 
 @lru_cache(maxsize=8)
@@ -70,8 +73,8 @@ def tables(H: int, samples: int) -> Tables:
 
 
 def columns(K: int) -> int:
-    """M: 3K+2 columns filled up to a multiple of 8."""
-    return (3 * K + 9) // 8 * 8
+    """M: 3K+2 columns filled up to a multiple of 4."""
+    return (3 * K + 5) // 4 * 4
 
 
 def _pattern(at: np.ndarray, knots: np.ndarray) -> np.ndarray:
@@ -82,12 +85,11 @@ def _pattern(at: np.ndarray, knots: np.ndarray) -> np.ndarray:
     return pattern
 
 
-def empty_sums(H: int, samples: int) -> Sums:
+def empty_sums(H: int) -> Sums:
     """Scratch for one 2-D element."""
-    K, M = 2 * H + 1, columns(2 * H + 1)
-    return Sums(np.empty((3, K)), np.empty((2, K, M)), np.empty(4 * H + 1), np.empty(samples + 4, np.int64),
-                np.empty((samples + 4, 2)), np.empty((samples + 4, 2, M)), np.empty(M), np.empty(4 * H + 1),
-                np.empty(K))
+    K, M, P = 2 * H + 1, columns(2 * H + 1), 4 * H + 1
+    return Sums(np.empty((3, K)), np.empty((K, 2 * M)), np.empty(P), np.empty((WAITING, K)), np.empty((WAITING, 2 * M)),
+                np.empty((K, 2 * M)), np.empty(M), np.empty(M), np.empty(P))
 
 
 @njit(cache=True, error_model="numpy")
