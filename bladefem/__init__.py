@@ -12,6 +12,7 @@ __version__ = "0.1.0"
 _WHERE = {
     "InputError": "errors",
     "NotSolvedError": "errors",
+    "Bodies": "study.stages",
     "Scene": "scene",
     "load_scene": "scene_file",
     "build_mesh": "study.stages",

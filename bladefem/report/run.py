@@ -77,12 +77,19 @@ def _tables(result: pipeline.Run) -> dict[str, pd.DataFrame]:
     pressure.insert(0, "load", loads[:len(pressure)])
     curves = result.response.curves
     quality = result.mesh.report
-    return {"mesh/quality": pd.DataFrame({"what": list(quality), "value": [str(v) for v in quality.values()]}),
+    return {"mesh/quality": pd.DataFrame({"what": list(quality), "value": [_short(v) for v in quality.values()]}),
             "modes/modes": family_table(excited_modes(result), result.mesh),
             "modes/nodal_diameters": mode_table(result.modes, result.mesh),
             "contact/pressure": pressure,
             "response/summary": pd.DataFrame(summary(curves, result.response.free_peak[1])),
             "response/points": pd.concat([points_of(c) for c in curves], ignore_index=True)}
+
+
+def _short(value: object) -> str:
+    """A quality value for the eye."""
+    if isinstance(value, dict):
+        return ", ".join(f"{name} {_short(v)}" for name, v in value.items())
+    return f"{value:.4g}" if isinstance(value, float) else str(value)
 
 
 def mode_table(sets: list[ModeSet], geometry: Mesh) -> pd.DataFrame:
@@ -107,11 +114,13 @@ def _drawings(result: pipeline.Run, tables: dict[str, pd.DataFrame]) -> dict[str
     middle = loads[len(loads) // 2]
     drawings = {
         "mesh/mesh": lambda file: mesh.draw_mesh(geometry, file, title=result.scene.title),
-        "modes/first_modes": lambda file: modes.draw_mode_sheet(geometry, excited, file),
+        "modes/first_modes": lambda file: modes.draw_mode_sheet(
+            geometry, excited, file, families=list(tables["modes/modes"]["family"])),
         "contact/pressure_on_both_seats": lambda file: contact.draw_pressure(
             result.contact.maps[middle], file, title=f"normal load {middle:g} N per seat"),
         "response/forced_response": lambda file: response.draw_responses(tables["response/points"], file),
-        "response/optimum": lambda file: response.draw_optimum(tables["response/summary"], file)}
+        "response/optimum": lambda file: response.draw_optimum(
+            tables["response/summary"], file, points=tables["response/points"])}
     if len(result.modes) > 1:
         number = result.scene.excitation.mode - 1
         drawings["modes/mode_on_the_wheel"] = lambda file: modes.draw_wheel_mode(geometry, excited, number, file)

@@ -16,11 +16,12 @@ from ..hbm.sweep import size, sweep
 from .indicators import Indicators, indicate
 from .settings import Settings, enriched
 
-__all__ = ["Join", "choose", "default_band", "peak_of", "response_points"]
+__all__ = ["Join", "choose", "covered", "default_band", "peak_of", "response_points"]
 
 # Settings to the model to solve and, where that one is not elastic, the same with the elastic damper.
 Join = Callable[[Settings], tuple[ReducedModel, ReducedModel | None]]
 ROUNDS = 12
+WIDENINGS = 4
 
 
 def choose(join: Join, settings: Settings, peak: Solution, accuracy: float,
@@ -56,6 +57,27 @@ def _next(settings: Settings, found: Indicators, accuracy: float, fixed: tuple[s
         if richer is not None:
             return richer
     return None
+
+
+def covered(model: ReducedModel, settings: Settings, band: tuple[float, float] | None, mode: int,
+            accuracy: float) -> list[Solution]:
+    """A sweep of the given band [Hz], or of one that is widened until its highest point lies inside.
+
+    Raises:
+        NotSolvedError: no point converged.
+    """
+    if band is not None:
+        return response_points(model, settings, band, accuracy)
+    low, high = default_band(model, mode)
+    for _ in range(WIDENINGS):
+        points = response_points(model, settings, (low, high), accuracy)
+        good = [p.omega for p in points if p.converged]
+        top = peak_of(points).omega
+        if good[0] < top < good[-1]:
+            break
+        low, high = (low - (high - low), high) if top == good[0] else (low, high + (high - low))
+        low = max(low, 0.1 * high)
+    return points
 
 
 def response_points(model: ReducedModel, settings: Settings, band: tuple[float, float],

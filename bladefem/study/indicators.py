@@ -1,7 +1,8 @@
-"""How wrong is a solved point? One Newton step in a richer model tells, for each choice that was made.
+"""How wrong is a solved point? A few Newton steps in a richer model tell, for each choice that was made.
 
-With z the solution and dz one Newton step in the model enriched in direction d,
-eta_d = |T(z + dz) - T(z)| / |T(z + dz)|, where T is the first harmonic at the probe.
+With z the solution and dz the steps in the model enriched in direction d,
+eta_d = |T(z + dz) - T(z)| / |T(z + dz)|, where T is the first harmonic at the probe. One step is enough where the
+contacts stay closed; with lift-off it overshoots (16 % told for 0.4 % on the wedge of 46 nodes), three do not.
 """
 
 from __future__ import annotations
@@ -10,15 +11,19 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from ..hbm.api import as_solution, match_harmonics
+from ..hbm.api import as_solution
+from ..hbm.fallback import Attempt, match_harmonics
 from ..hbm.linear import condense
 from ..hbm.model import ReducedModel
-from ..hbm.newton import Newton
-from ..hbm.residual import Balance, direction, evaluate_balance
+from ..hbm.newton import Options, newton
+from ..hbm.residual import Balance
 from ..hbm.solution import Solution
 from ..reduction.truncate import truncated
 
-__all__ = ["Indicators", "fewer_modes", "indicate", "one_step", "richer"]
+__all__ = ["Indicators", "few_steps", "fewer_modes", "indicate"]
+
+
+STEPS = 3
 
 
 @dataclass(frozen=True)
@@ -51,28 +56,22 @@ def indicate(model: ReducedModel, solution: Solution, elastic: ReducedModel | No
     H, samples = solution.harmonics, solution.samples
     fewer = fewer_modes(model)
     return Indicators(
-        harmonics=_change(solution, one_step(model, solution, 2 * H + 1, max(samples, 8 * H + 8))),
-        samples=_change(solution, one_step(model, solution, H, 4 * samples)),
-        modes=_change(solution, one_step(fewer, solution, H, samples)),
-        damper=0.0 if elastic is None else _change(solution, one_step(elastic, solution, H, samples)))
+        harmonics=_change(solution, few_steps(model, solution, 2 * H + 1, max(samples, 8 * H + 8))),
+        samples=_change(solution, few_steps(model, solution, H, 4 * samples)),
+        modes=_change(solution, few_steps(fewer, solution, H, samples)),
+        damper=0.0 if elastic is None else _change(solution, few_steps(elastic, solution, H, samples)))
 
 
-def one_step(model: ReducedModel, solution: Solution, H: int, samples: int) -> Solution:
-    """One Newton step from a solution, in another model of the same contact nodes."""
+def few_steps(model: ReducedModel, solution: Solution, H: int, samples: int) -> Solution:
+    """At most STEPS Newton steps from a solution, in another model of the same contact nodes."""
     balance = Balance(model, condense(model, solution.omega, H), samples)
-    state = evaluate_balance(balance, _directions(model, match_harmonics(solution.w, H)))
-    moved = evaluate_balance(balance, state.w + direction(balance, state))
-    return as_solution(balance, Newton(moved, 1, False, "one step, for an error estimate"), "indicator", 1)
+    end = newton(balance, _directions(model, match_harmonics(solution.w, H)), Options(1e-6, STEPS))
+    return as_solution(balance, Attempt("indicator", end), end.iterations, end.reason)
 
 
 def fewer_modes(model: ReducedModel) -> ReducedModel:
     """The blades with half their modes: what these miss is more than what all of them miss."""
     return replace(model, sides=tuple(truncated(side, max(1, len(side.omega) // 2)) for side in model.sides))
-
-
-def richer(worst: str, value: int) -> int:
-    """The next value of harmonics, samples or modes."""
-    return 2 * value + 1 if worst == "harmonics" else 2 * value
 
 
 def _directions(model: ReducedModel, w: np.ndarray) -> np.ndarray:

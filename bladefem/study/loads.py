@@ -14,7 +14,7 @@ from ..hbm.resonance import free_resonances
 from ..hbm.solution import Solution
 from ..hbm.sweep import size
 from ..scene import Scene
-from .choice import Join, choose, default_band, peak_of, response_points
+from .choice import Join, choose, covered, peak_of
 from .joint import LoadCase
 from .settings import Settings
 
@@ -80,12 +80,10 @@ def curve_of(scene: Scene, load: float, join: Join, settings: Settings) -> Curve
     Raises:
         NotSolvedError: no point converged.
     """
-    model, _ = join(settings)
-    band = scene.study.band or default_band(model, scene.excitation.mode)
-    points = response_points(model, settings, band, scene.accuracy)
+    points = covered(join(settings)[0], settings, scene.study.band, scene.excitation.mode, scene.accuracy)
     used, _, _ = choose(join, settings, peak_of(points), scene.accuracy, fixed=("modes",))
     if replace(used, error=None) != replace(settings, error=None):
-        points = response_points(join(used)[0], used, band, scene.accuracy)
+        points = covered(join(used)[0], used, scene.study.band, scene.excitation.mode, scene.accuracy)
     return Curve(load, used, *(np.array(column) for column in zip(*map(_record, points), strict=True)), peak_of(points))
 
 

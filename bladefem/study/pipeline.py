@@ -20,7 +20,7 @@ from ..errors import InputError
 from ..hbm.model import ReducedModel
 from ..scene import Scene
 from ..store import stage
-from .choice import choose, default_band, peak_of, response_points
+from .choice import choose, covered, peak_of
 from .joint import LoadCase, joint_model
 from .keys import contact_key, mesh_key, modes_key, reduction_key, response_key
 from .loads import Curve, Progress, default_loads, free_peak, study_loads, unwatched
@@ -176,9 +176,7 @@ def _reduced(scene: Scene, bodies: Bodies, case: LoadCase, contact: Seating,
         if not settings.chosen:
             return settings, reduced
         join = partial(_join, scene, bodies.mesh, reduced, patches, case)
-        model, _ = join(settings)
-        band = scene.study.band or default_band(model, scene.excitation.mode)
-        peak = peak_of(response_points(model, settings, band, 10 * scene.accuracy))
+        peak = peak_of(covered(join(settings)[0], settings, scene.study.band, scene.excitation.mode, 1.0))
         settings, _, found = choose(join, settings, peak, scene.accuracy, fixed=("modes",))
         richer = enriched(settings, "modes")
         if "modes" not in settings.chosen or found.modes <= scene.accuracy / 4 or richer is None:
