@@ -7,7 +7,7 @@ One matrix P serves both (u_port = P^T u, nodal forces = P f), so the element st
 The choice of chi was measured, relative errors on quadratic tetrahedra with element size a/10 (Hertz sphere) and
 a/20 (plane flat punch, r < 0.8 a); benchmarks/contact_hertz.py makes the table again:
 
-    chi                              sphere: peak   pressure L2   radius    punch: L2
+    chi                              sphere: peak   pressure L2     edge    punch: L2
     hat functions                          0.2 %         6.8 %     3.4 %        1.3 %  (wiggles at the edge)
     their dual functions                   0.2 %         4.8 %     4.2 %        0.4 %
     a third hat, two thirds dual (used)    0.0 %         3.0 %     1.8 %        0.4 %
