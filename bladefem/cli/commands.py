@@ -18,12 +18,16 @@ __all__ = ["check", "contact", "info", "mesh", "modes", "report", "response", "s
 def check(options: argparse.Namespace, comm: Any) -> None:
     """Print the resolved scene."""
     from ..scene_file import given_keys, read_tables, resolved, scene_of
-    if comm is not None and comm.rank > 0:
-        return
+    from ..store import on_root
     file = scene_path(options.scene)
-    written = read_tables(file, options.overrides)
-    scene = scene_of(written, file.resolve().parent)
-    print(tables.resolved_scene(resolved(scene, given_keys(written))))
+
+    def table() -> str:
+        written = read_tables(file, options.overrides)
+        return tables.resolved_scene(resolved(scene_of(written, file.resolve().parent), given_keys(written)))
+
+    text = on_root(comm, table)
+    if comm is None or comm.rank == 0:
+        print(text)
 
 
 def mesh(options: argparse.Namespace, comm: Any) -> None:

@@ -51,7 +51,8 @@ def guarded(action: Callable[[Any], None], options: argparse.Namespace) -> int:
         if comm.rank == 0:
             _tell(comm, text, code)
         if not _all_arrive(meeting):
-            print(f"bladefem: rank {comm.rank} alone: {text}", file=sys.stderr, flush=True)
+            if comm.rank > 0:
+                print(f"bladefem: rank {comm.rank} alone: {text}", file=sys.stderr, flush=True)
             comm.Abort(code)
         return code
 

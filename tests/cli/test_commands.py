@@ -229,8 +229,9 @@ def test_no_rank_waits_for_ever(all_ranks, message):
 
 
 @pytest.mark.mpi
-def test_all_ranks_stop_on_a_scene_that_is_wrong(tmp_path, capsys):
+@pytest.mark.parametrize("arguments", [["check", WEDGE], ["mesh", WEDGE]])
+def test_all_ranks_stop_on_a_scene_that_is_wrong(arguments, capsys):
     from mpi4py import MPI
-    assert main(["mesh", WEDGE, "-o", str(tmp_path), "--set", "contact.mu=-1"]) == 2
+    assert main([*arguments, "--set", "contact.mu=-1"]) == 2
     said = capsys.readouterr().err
     assert ("contact.mu" in said) == (MPI.COMM_WORLD.rank == 0)
