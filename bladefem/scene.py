@@ -42,6 +42,7 @@ class Contact:
     kt: float | None = quantity(None, "N/m", 0.0, 1e12, "tangential stiffness of one whole patch")
     kn_area: float | None = quantity(None, "N/m^3", 0.0, 1e15, "normal contact stiffness for each unit of area; by Mindlin from kt_area")
     points: int | None = quantity(None, "1", 1, 5000, "friction elements on each patch; all mesh nodes when left out")
+    bedded: bool = quantity(True, help="seats have worn until they fit at the operating speed; false: as drawn")
     normal: str = quantity("coupled", choices=("coupled", "prescribed"), help="normal load follows the motion, or stays at its static value")
 
 

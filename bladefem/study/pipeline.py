@@ -103,7 +103,8 @@ def run(scene: Scene, folder: str | Path, until: str = "response", comm: Any = N
     with clock("contact"):
         problem = keep("contact", contact_key(scene), lambda: seat_damper(bodies, patches))
         loads = scene.study.loads or default_loads(scene)
-        maps = {load: seat(problem, scene.operation.speed, normal=load) for load in loads}
+        maps = {load: seat(problem, scene.operation.speed, normal=load, bedded=scene.contact.bedded)
+                for load in loads}
         result = replace(result, contact=Seating(problem, maps))
     if until == "contact":
         return result

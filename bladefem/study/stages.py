@@ -110,14 +110,16 @@ def find_modes(bodies: Bodies, diameters: Sequence[int] | None = None, count: in
     """Normal modes without damper: of the clamped blade, or of the sector in each nodal diameter.
 
     Args:
-        diameters: nodal diameters; ``scene.model.nodal_diameters`` or all of the wheel when left out.
+        diameters: nodal diameters; ``scene.model.nodal_diameters``, or all that the first harmonics of the engine
+            order fall into, when left out.
         count: modes of each nodal diameter.
     """
     from ..fem.modes import modes
-    from ..fem.wheel import all_diameters
     if not is_wheel(bodies.mesh):
         return [modes(bodies.still.con, count, bodies.still)]
-    return all_diameters(bodies.blade, count, diameters or bodies.scene.model.nodal_diameters)
+    wanted = diameters or bodies.scene.model.nodal_diameters or harmonic_diameters(bodies.scene, bodies.mesh, 3)
+    factors = {n: bodies.still if n == 0 else bodies.factorised(n) for n in wanted}
+    return [modes(flex.con, count, flex) for flex in factors.values()]
 
 
 def seat_damper(bodies: Bodies, patches: list[Patch]) -> Any:
