@@ -126,7 +126,8 @@ def _loop(g: _Map, c: np.ndarray, propose: Callable[[list, list], np.ndarray]) -
         new = images[0] if len(images) == 1 else propose(motions, images)
         step = np.linalg.norm(new - motions[-1]) / np.linalg.norm(new)
         if not np.isfinite(step) or np.linalg.norm(new) > HUGE * size:
-            return motions[-1], False, "diverged"
+            solved = g.last.reason == "periodic" or rules.damper == "march"
+            return motions[-1], False, "diverged" if solved else f"damper not solved: {g.last.reason}"
         if rules.criterion == "step" and step < rules.tolerance:
             return new, True, f"step {step:.1e} below {rules.tolerance:.1e}"
         motions.append(new)
@@ -199,6 +200,8 @@ def _newton(g: _Map, c: np.ndarray) -> tuple[np.ndarray, bool, str]:
             return _packed(x, c.shape), True, f"residual below {goal:.1e}"
         delta = 1e-6 * np.linalg.norm(x)
         J = np.column_stack([(r(x + delta * e) - value) / delta for e in np.eye(len(x))])
+        if not np.isfinite(J).all():
+            return _packed(x, c.shape), False, f"damper not solved: {g.last.reason}"
         step = np.linalg.lstsq(J, -value, rcond=None)[0]
         for halving in range(8):
             trial = x + step * 0.5**halving

@@ -196,6 +196,8 @@ def _first_event(arrays, y, contact, series, h, step):
     for i in range(n):
         left = 0.0
         size = SLACK * np.abs(arrays[8][i]).sum()
+        if mu[i] > 0:       # rounding of k_t (w - z) where the motion is large against the limit
+            size += 1e-14 * kt[i] * (abs(series[2][0, i]) + abs(y[2 * d + i])) / mu[i]
         slack = (size, size / step)
         for part in range(1, 5):
             right = min(h * part / 4, best)

@@ -152,7 +152,8 @@ def test_f14_newton_hops_between_slip_directions():
     assert np.abs(trace[2:]) == pytest.approx(2 * limit, rel=1e-9)
     assert (np.sign(trace[2:-1]) == -np.sign(trace[3:])).all()
     force = np.empty(1)
-    assert contact_step(np.array([k * aim]), np.array([limit]), np.array([[k / c]]), np.zeros((1, 1)), np.ones(1), force)
+    one = np.ones((1, 1))
+    assert contact_step(np.array([k * aim]), np.array([limit]), k / c * one, 0 * one, np.ones(1), force)
     assert force[0] == pytest.approx(k * aim / (1 + k / c), rel=1e-12)
     assert c * (force[0] / k - aim) + force[0] == pytest.approx(0, abs=1e-12 * limit)
 

@@ -1,0 +1,173 @@
+"""Pictures to lay beside those of the paper: loops, spectra, responses, resonance against load, maps of methods."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+
+import matplotlib
+import numpy as np
+from matplotlib.colors import ListedColormap
+from matplotlib.patches import Patch
+
+from .style import COLOURS, canvas, log_axis
+
+__all__ = ["draw_coupled_loops", "draw_fit", "draw_friction_loops", "draw_mass_loops", "draw_mass_spectra",
+           "draw_method_map", "draw_peaks", "draw_tip_responses"]
+
+OUTCOMES = {"converged": "#2c7fb8", "false": "#d62728", "no convergence": "#fdae61", "diverged": "#222222"}
+MICRO, MILLI = 1e6, 1e3
+
+
+def draw_fit(angle: np.ndarray, motion: np.ndarray, force: np.ndarray, linear: np.ndarray,
+             file: str | Path | None = None) -> object:
+    """A loop and its best linear force, against displacement and in time (the paper's Fig. 1); returns the figure.
+
+    Args:
+        angle: (s,) [rad].
+        motion: (s,) [m]. force, linear: (s,) [N].
+    """
+    with canvas(file, None, (9.0, 3.8), (1, 2)) as (left, right):
+        left.plot(MICRO * motion, force, label="friction")
+        left.plot(MICRO * motion, linear, "--", label="best linear force")
+        right.plot(angle / np.pi, force)
+        right.plot(angle / np.pi, linear, "--")
+        left.set(xlabel="relative displacement [µm]", ylabel="force [N]", title="hysteresis")
+        right.set(xlabel="phase [half turns]", ylabel="force [N]", title="in time")
+        left.legend()
+        return left.figure
+
+
+def draw_coupled_loops(loops: Mapping[str, Sequence[tuple[str, np.ndarray, np.ndarray]]],
+                       file: str | Path | None = None) -> object:
+    """Loops under a load that varies, one panel a case, each with several laws (Fig. 4); returns the figure.
+
+    Args:
+        loops: panel title to (law, displacement (s,) [m], force (s,) [N]).
+    """
+    with canvas(file, None, (4.0 * len(loops), 3.8), (1, len(loops)), squeeze=False) as axes:
+        for ax, (title, laws) in zip(axes[0], loops.items(), strict=True):
+            for (law, motion, force), style in zip(laws, ("-", "--", ":"), strict=False):
+                ax.plot(MICRO * motion, force, style, label=law)
+            ax.set(xlabel="relative displacement [µm]", title=title)
+        axes[0, 0].set_ylabel("friction force [N]")
+        axes[0, 0].legend()
+        return axes[0, 0].figure
+
+
+def draw_mass_loops(cases: Mapping[str, tuple[np.ndarray, np.ndarray, int]], file: str | Path | None = None) -> object:
+    """Friction force over relative displacement, drift taken out (Fig. 10); returns the figure.
+
+    Args:
+        cases: title to (displacement (s,) [m], force (s,) [N], number of loops).
+    """
+    rows = (len(cases) + 1) // 2
+    with canvas(file, None, (8.4, 3.4 * rows), (rows, 2), squeeze=False) as axes:
+        for ax, (title, (motion, force, loops)) in zip(axes.ravel(), cases.items(), strict=False):
+            ax.plot(MILLI * motion, force)
+            ax.set(xlabel="relative displacement [mm]", ylabel="friction force [N]",
+                   title=f"{title}: {loops} loop{'s' if loops > 1 else ''}")
+        return axes[0, 0].figure
+
+
+def draw_mass_spectra(cases: Mapping[str, tuple[np.ndarray, np.ndarray]], file: str | Path | None = None) -> object:
+    """Amplitude lines of the displacement (Fig. 11); returns the figure.
+
+    Args:
+        cases: title to (frequency (l,) [Hz], amplitude (l,) [m]).
+    """
+    rows = (len(cases) + 1) // 2
+    with canvas(file, None, (8.4, 2.8 * rows), (rows, 2), squeeze=False) as axes:
+        for ax, (title, (frequency, amplitude)) in zip(axes.ravel(), cases.items(), strict=False):
+            shown = frequency <= 500
+            ax.vlines(frequency[shown], 1e-4, np.maximum(MILLI * amplitude[shown], 1e-4), lw=2.2, color=COLOURS[0])
+            ax.set(xlabel="frequency [Hz]", ylabel="amplitude [mm]", title=title, ylim=(1e-4, 3))
+            ax.set_yscale("log")
+        return axes[0, 0].figure
+
+
+def draw_tip_responses(curves: Mapping[float, tuple[np.ndarray, np.ndarray]], file: str | Path | None = None,
+                       title: str = "") -> object:
+    """Tip amplitude over frequency for several loads (Fig. 15); returns the figure.
+
+    Args:
+        curves: friction limit of a seat [N] to (frequency (p,) [Hz], amplitude (p,) [m]).
+    """
+    with canvas(file, None, (7.6, 4.6)) as ax:
+        shades = matplotlib.colormaps["viridis"](np.linspace(0, 0.92, len(curves)))
+        for shade, (load, (frequency, amplitude)) in zip(shades, sorted(curves.items()), strict=True):
+            ax.plot(frequency, MICRO * amplitude, color=shade, label=f"{load:.3g}")
+        ax.set(xlabel="frequency [Hz]", ylabel="amplitude at the tip [µm]", title=title)
+        log_axis(ax, "y")
+        ax.legend(title="friction limit of a seat [N]", loc="center left", bbox_to_anchor=(1.0, 0.5))
+        return ax.figure
+
+
+def draw_friction_loops(loops: Mapping[float, tuple[np.ndarray, np.ndarray]],
+                        file: str | Path | None = None) -> object:
+    """Total friction force of a seat over its relative displacement at resonance (Fig. 16); returns the figure.
+
+    Args:
+        loops: friction limit of a seat [N] to (displacement (s,) [m], force (s,) [N]).
+    """
+    with canvas(file, None, (7.2, 4.6)) as ax:
+        shades = matplotlib.colormaps["viridis"](np.linspace(0, 0.92, len(loops)))
+        for shade, (load, (motion, force)) in zip(shades, sorted(loops.items()), strict=True):
+            ax.plot(MICRO * np.r_[motion, motion[0]], np.r_[force, force[0]], color=shade, label=f"{load:.3g}")
+        ax.set(xlabel="relative displacement [µm]", ylabel="friction force of a seat [N]", title="loops at resonance")
+        ax.legend(title="friction limit of a seat [N]", loc="center left", bbox_to_anchor=(1.0, 0.5))
+        return ax.figure
+
+
+def draw_peaks(curves: Mapping[float, np.ndarray], file: str | Path | None = None, title: str = "") -> object:
+    """Resonance frequency and amplitude over the load, a curve a damper mass (Fig. 17); returns the figure.
+
+    Args:
+        curves: damper mass [kg] to (loads, 3) of friction limit [N], frequency [Hz], amplitude [m].
+    """
+    with canvas(file, None, (9.4, 4.0), (1, 2)) as (left, right):
+        for mass, rows in sorted(curves.items()):
+            left.plot(rows[:, 0], rows[:, 1], "o-", ms=3, label=f"{1e3 * mass:.0f} g")
+            right.plot(rows[:, 0], MICRO * rows[:, 2], "o-", ms=3)
+        for ax in (left, right):
+            ax.set_xscale("log")
+            ax.set_xlabel("friction limit of a seat [N]")
+        left.set(ylabel="resonance frequency [Hz]", title=title)
+        right.set(ylabel="resonance amplitude [µm]")
+        log_axis(right, "y")
+        left.legend(title="damper")
+        return left.figure
+
+
+def draw_method_map(rows: Sequence[Mapping[str, object]], across: str, along: str,
+                    file: str | Path | None = None) -> object:
+    """Outcome of each method over two of load, stiffness, frequency: one panel a method; returns the figure.
+
+    Args:
+        rows: method-map rows that span a full grid in ``across`` and ``along``.
+    """
+    methods = list(dict.fromkeys(str(row["method"]) for row in rows))
+    x, y = (np.unique([float(row[name]) for row in rows]) for name in (across, along))
+    colours, words = ListedColormap(list(OUTCOMES.values())), list(OUTCOMES)
+    columns = 5
+    lines = -(-len(methods) // columns)
+    with canvas(file, None, (2.5 * columns, 2.3 * lines + 0.6), (lines, columns), squeeze=False, sharex=True,
+                sharey=True) as axes:
+        for ax, method in zip(axes.ravel(), methods, strict=False):
+            image = np.full((len(y), len(x)), np.nan)
+            for row in rows:
+                if row["method"] == method:
+                    image[np.searchsorted(y, float(row[along])), np.searchsorted(x, float(row[across]))] = \
+                        words.index(str(row["outcome"]))
+            ax.pcolormesh(x, y, image, cmap=colours, vmin=-0.5, vmax=len(words) - 0.5, shading="nearest")
+            ax.set(xscale="log", title=method)
+            ax.set_yscale("log" if y[-1] > 50 * y[0] else "linear")
+            ax.grid(False)
+        names = {"load": "friction limit of a seat [N]", "stiffness": "stiffness of a seat [N/m]",
+                 "frequency": "frequency [Hz]"}
+        figure = axes[0, 0].figure
+        figure.supxlabel(names[across], fontsize=10)
+        figure.supylabel(names[along], fontsize=10)
+        patches = [Patch(color=c, label=w) for w, c in OUTCOMES.items()]
+        figure.legend(handles=patches, loc="outside upper center", ncols=4)
+        return figure
