@@ -65,7 +65,10 @@ def newton(balance: Balance, w: np.ndarray, options: Options = DEFAULTS, merit: 
             inverse = linearise(balance, state)
         except np.linalg.LinAlgError:
             return Newton(state, iteration, False, "singular Jacobian")
-        better = _search(balance, state, inverse, merit)
+        try:
+            better = _search(balance, state, inverse, merit)
+        except np.linalg.LinAlgError as error:
+            return Newton(state, iteration + 1, False, str(error))
         if better is None:
             return Newton(state, iteration + 1, False, f"line search stalled at residual {state.error:.1e}")
         state = better
