@@ -12,9 +12,10 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.linalg import lapack
 
-from ..data import PortModel, RigidBody
+from ..data import RigidBody
 from ..errors import NotSolvedError
-from .model import Damping, ReducedModel
+from .bodies import contact_rows, receptance
+from .model import ReducedModel
 
 __all__ = ["Linear", "condense", "receptance"]
 
@@ -51,28 +52,8 @@ def condense(model: ReducedModel, omega: float, harmonics: int) -> Linear:
     return Linear(omega, springs, G, free, A, stuck, B, g, rigid)
 
 
-def receptance(body: PortModel, damping: Damping, w: float, rows: np.ndarray | slice,
-               columns: np.ndarray | slice) -> np.ndarray:
-    """(rows, columns) displacement [m] at the ports by unit harmonic forces [N]; at w = 0 without the rigid modes."""
-    elastic = body.omega > 0 if w == 0 else np.ones(len(body.omega), dtype=bool)
-    left, right = body.shapes[rows][:, elastic], body.shapes[columns][:, elastic]
-    stiffness = (body.omega**2 - w**2 + damping.term(body.omega, w))[elastic]
-    if body.damping is not None and body.damping.ndim == 1:
-        stiffness = stiffness + 1j * w * body.damping[elastic]
-    elif body.damping is not None and w != 0:
-        return left @ np.linalg.solve(np.diag(stiffness) + 1j * w * body.damping, right.conj().T) \
-            + body.residual[rows][:, columns]
-    if np.isrealobj(left):      # two real products cost half of one complex product
-        flexibility = 1 / stiffness
-        scaled = np.concatenate([left * flexibility.real, left * flexibility.imag]) @ right.T
-        result = scaled[len(left):] * 1j
-        result += scaled[:len(left)] + body.residual[rows][:, columns]
-        return result
-    return (left / stiffness) @ right.conj().T + body.residual[rows][:, columns]
-
-
 def _flexibility(model: ReducedModel, h: int, w: float) -> tuple[np.ndarray, np.ndarray]:
-    side, rows = model.side(h), _contact_rows(model.side(h), model)
+    side, rows = model.side(h), contact_rows(model.side(h), model)
     G = receptance(side, model.damping, w, rows, rows)
     free = np.zeros(len(G), dtype=complex)
     if h in model.excitation:
@@ -83,7 +64,7 @@ def _flexibility(model: ReducedModel, h: int, w: float) -> tuple[np.ndarray, np.
             G = G - B @ np.linalg.solve(model.damper.mass, B.T) / w**2
     elif model.damper is not None:
         damper = model.damper_side(h)
-        rows = _contact_rows(damper, model)
+        rows = contact_rows(damper, model)
         G = G + receptance(damper, model.damper_damping, w, rows, rows)
     return G, free
 
@@ -104,14 +85,14 @@ def _sprung(G: np.ndarray, free: np.ndarray, springs: np.ndarray) -> tuple[np.nd
 def _rigid_motions(model: ReducedModel, springs: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     side = model.side(0)
     still = side.omega == 0
-    motions, loads = [side.shapes[_contact_rows(side, model)][:, still].real], np.zeros(still.sum())
+    motions, loads = [side.shapes[contact_rows(side, model)][:, still].real], np.zeros(still.sum())
     if 0 in model.excitation:
         loads = side.shapes[side.ports["load"]][:, still].real.T @ np.real(model.excitation[0])
     if isinstance(model.damper, RigidBody):
         motions.append(-model.damper.B[model.rows])
     elif model.damper is not None:
         damper = model.damper_side(0)
-        motions.append(-damper.shapes[_contact_rows(damper, model)][:, damper.omega == 0].real)
+        motions.append(-damper.shapes[contact_rows(damper, model)][:, damper.omega == 0].real)
     B = np.column_stack(motions)
     loads = np.concatenate([loads, np.zeros(B.shape[1] - len(loads))])
     held = B.T @ (springs[:, None] * B)
@@ -129,7 +110,3 @@ def _with_springs(G: np.ndarray, free: np.ndarray, springs: np.ndarray, B: np.nd
     system = np.block([[np.eye(m) + G * springs, -B], [B.T * springs, hold * np.eye(r)]])
     solved = np.linalg.solve(system, np.block([[G, free[:, None]], [B.T, g[:, None]]]))
     return solved[:m, :m], solved[:m, m]
-
-
-def _contact_rows(body: PortModel, model: ReducedModel) -> np.ndarray:
-    return np.arange(len(body.residual))[body.ports["contact"]][model.rows]

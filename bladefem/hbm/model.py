@@ -25,8 +25,11 @@ class Damping:
 
     def term(self, omega: np.ndarray, w: float) -> np.ndarray:
         """(m,) what damping adds to omega_r^2 - w^2 at circular frequency w [1/s^2]."""
-        viscous = 2 * self.ratio * omega + self.mass + self.stiffness * omega**2
-        return 1j * (w * viscous + np.sign(w) * self.structural * omega**2)
+        return w * self.rate(omega) + 1j * np.sign(w) * self.structural * omega**2
+
+    def rate(self, omega: np.ndarray) -> np.ndarray:
+        """(m,) derivative of the term with w [1/s]."""
+        return 1j * (2 * self.ratio * omega + self.mass + self.stiffness * omega**2)
 
 
 @dataclass(frozen=True)

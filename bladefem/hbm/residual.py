@@ -19,7 +19,8 @@ from .iterative import iterative_inverse
 from .linear import Linear
 from .model import ReducedModel
 
-__all__ = ["Balance", "Inverse", "State", "contact_forces", "evaluate_balance", "linearise", "start_in_stick"]
+__all__ = ["Balance", "Inverse", "State", "as_amplitudes", "as_coefficients", "contact_forces", "evaluate_balance",
+           "linearise", "start_in_stick"]
 
 DENSE = 600         # unknowns up to which a dense factorisation is faster than GMRES
 ACCURACY = 1e-5     # of a step by GMRES, relative
@@ -51,7 +52,7 @@ class State:
 
 def start_in_stick(balance: Balance) -> np.ndarray:
     """(n, d, K) the displacements of full stick [m]."""
-    return _spread(balance, balance.linear.stuck)
+    return _shaped(balance, balance.linear.stuck)
 
 
 def evaluate_balance(balance: Balance, w: np.ndarray) -> State:
@@ -61,8 +62,8 @@ def evaluate_balance(balance: Balance, w: np.ndarray) -> State:
     p = forces.f - model.springs[:, :, None] * w
     if model.directions > model.elements.tangents:
         p[:, 0, 0] -= np.maximum(model.elements.n0, 0.0)
-    flexed = _spread(balance, _apply(linear.A, _harmonics(p)))
-    residual = w - _spread(balance, linear.stuck) + flexed
+    flexed = _shaped(balance, _apply(linear.A, as_amplitudes(p)))
+    residual = w - _shaped(balance, linear.stuck) + flexed
     return State(w, forces, p, residual, _error(balance, w, residual))
 
 
@@ -97,7 +98,7 @@ def linearise(balance: Balance, state: State) -> Inverse:
         if len(others):
             p = np.zeros_like(step)
             p[active] = (change @ step[active].reshape(len(active), d * K, 1)).reshape(-1, d, K)
-            step[others] -= _spread(balance, _apply(balance.linear.A, _harmonics(p)))[others]
+            step[others] -= _shaped(balance, _apply(balance.linear.A, as_amplitudes(p)))[others]
         return step
 
     return solve
@@ -137,8 +138,8 @@ def _jacobian(A: np.ndarray, change: np.ndarray) -> np.ndarray:
 
 
 def _error(balance: Balance, w: np.ndarray, residual: np.ndarray) -> float:
-    linear, r = balance.linear, _harmonics(residual)
-    with_springs = np.linalg.norm(r) / max(np.linalg.norm(_harmonics(w)), np.finfo(float).tiny)
+    linear, r = balance.linear, as_amplitudes(residual)
+    with_springs = np.linalg.norm(r) / max(np.linalg.norm(as_amplitudes(w)), np.finfo(float).tiny)
     r[1:] += _apply(linear.G[1:], linear.springs * r[1:])
     scale = max(np.linalg.norm(linear.free), np.linalg.norm(linear.stuck), np.finfo(float).tiny)
     return max(with_springs, np.linalg.norm(r) / scale)
@@ -148,11 +149,16 @@ def _apply(flexibility: np.ndarray, forces: np.ndarray) -> np.ndarray:
     return (flexibility @ forces[:, :, None])[:, :, 0]
 
 
-def _harmonics(x: np.ndarray) -> np.ndarray:
+def as_amplitudes(x: np.ndarray) -> np.ndarray:
     """(n, d, K) real coefficients as (H+1, n d) complex amplitudes."""
     return to_complex(x.reshape(-1, x.shape[2])).T
 
 
-def _spread(balance: Balance, q: np.ndarray) -> np.ndarray:
-    """(H+1, n d) complex amplitudes as (n, d, K) real coefficients."""
-    return to_real(q.T).reshape(len(balance.model.springs), balance.model.directions, -1)
+def as_coefficients(q: np.ndarray, shape: tuple[int, ...]) -> np.ndarray:
+    """(H+1, n d) complex amplitudes as real coefficients of the shape (n, d, K)."""
+    return to_real(q.T).reshape(shape)
+
+
+def _shaped(balance: Balance, q: np.ndarray) -> np.ndarray:
+    model = balance.model
+    return as_coefficients(q, (len(model.springs), model.directions, 2 * len(q) - 1))

@@ -6,9 +6,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..data import PortModel, RigidBody
+from ..data import RigidBody
 from ..friction.harmonics import to_complex
-from .linear import receptance
+from .bodies import contact_rows, drive, loss, pushed
 from .model import ReducedModel
 
 __all__ = ["Solution", "Work", "probe_motion", "works"]
@@ -67,14 +67,12 @@ def probe_motion(model: ReducedModel, omega: float, force: np.ndarray, rigid: np
     for h, contact in enumerate(force):
         side = model.side(h)
         probes = side.ports.get("probe", slice(0, 0))
-        columns = np.arange(len(side.residual))[side.ports["contact"]][model.rows]
-        q = -receptance(side, model.damping, h * omega, probes, columns) @ contact
-        if h in model.excitation:
-            q = q + receptance(side, model.damping, h * omega, probes, side.ports["load"]) @ model.excitation[h]
+        ports, push = pushed(model, h, contact)
+        amplitudes = drive(side, model.damping, h * omega, push)
         if h == 0:
-            free = side.omega == 0
-            q = q + side.shapes[probes][:, free] @ rigid[:free.sum()]
-        motion.append(q)
+            still = np.flatnonzero(side.omega == 0)
+            amplitudes[still] += rigid[:len(still)]
+        motion.append(side.shapes[probes] @ amplitudes + side.residual[probes] @ ports)
     return np.array(motion)
 
 
@@ -84,43 +82,18 @@ def works(model: ReducedModel, omega: float, w: np.ndarray, f: np.ndarray, dissi
     motion = to_complex(w.reshape(-1, w.shape[2])).T
     orders = np.arange(len(force))
     friction = np.pi * np.sum(orders[:, None] * (force * (1j * motion).conj()).real)
-    put_in = damped = 0.0
+    put_in = lost = 0.0
     for h in orders[1:]:
-        load, loss = _blade_work(model, h, omega, force[h])
-        put_in += load
-        damped += loss
+        side, w_h = model.side(h), h * omega
+        ports, push = pushed(model, h, force[h])
+        amplitudes = drive(side, model.damping, w_h, push)
+        lost += h * loss(side, model.damping, w_h, amplitudes)
+        if h in model.excitation:
+            at = side.ports["load"]
+            moved = side.shapes[at] @ amplitudes + side.residual[at] @ ports
+            put_in += np.pi * h * np.sum((model.excitation[h] * (1j * moved).conj()).real)
         if model.damper is not None and not isinstance(model.damper, RigidBody):
-            side = model.damper_side(h)
-            damped += _loss(side, model.damper_damping, h, omega, side.shapes[_rows(side, model)].conj().T @ force[h])
-    return Work(put_in, damped, float(friction), dissipated)
-
-
-def _blade_work(model: ReducedModel, h: int, omega: float, force: np.ndarray) -> tuple[float, float]:
-    side, rows = model.side(h), _rows(model.side(h), model)
-    load = model.excitation.get(h)
-    push = -side.shapes[rows].conj().T @ force
-    put_in = 0.0
-    if load is not None:
-        ports = side.ports["load"]
-        push = push + side.shapes[ports].conj().T @ load
-        motion = receptance(side, model.damping, h * omega, ports, ports) @ load \
-            - receptance(side, model.damping, h * omega, ports, rows) @ force
-        put_in = np.pi * h * np.sum((load * (1j * motion).conj()).real)
-    return put_in, _loss(side, model.damping, h, omega, push)
-
-
-def _loss(side: PortModel, damping: object, h: int, omega: float, push: np.ndarray) -> float:
-    """Work lost in a body's modes under the modal forces `push`."""
-    term = damping.term(side.omega, h * omega)
-    stiffness = side.omega**2 - (h * omega)**2
-    if side.damping is not None and side.damping.ndim == 2:
-        term = np.diag(term) + 1j * h * omega * side.damping
-        amplitudes = np.linalg.solve(np.diag(stiffness) + term, push)
-        return float(np.pi * h * (amplitudes.conj() @ term @ amplitudes).imag)
-    if side.damping is not None:
-        term = term + 1j * h * omega * side.damping
-    return float(np.pi * h * np.sum(term.imag * abs(push / (stiffness + term))**2))
-
-
-def _rows(side: PortModel, model: ReducedModel) -> np.ndarray:
-    return np.arange(len(side.residual))[side.ports["contact"]][model.rows]
+            other = model.damper_side(h)
+            push = other.shapes[contact_rows(other, model)].conj().T @ force[h]
+            lost += h * loss(other, model.damper_damping, w_h, drive(other, model.damper_damping, w_h, push))
+    return Work(float(put_in), float(lost), float(friction), dissipated)

@@ -15,7 +15,7 @@ from .newton import DEFAULTS, Options
 from .resonance import free_resonances, stuck_resonances
 from .solution import Solution
 
-__all__ = ["response", "size", "sweep"]
+__all__ = ["local_maxima", "response", "size", "sweep"]
 
 COARSE = 12     # intervals of the first look at a band
 BAND_LIMIT = 400    # points after which a sweep gives up refining
@@ -67,6 +67,12 @@ def sweep(model: ReducedModel, band: tuple[float, float], H: int = 3, samples: i
         yield solution
 
 
+def local_maxima(points: list[Solution], probe: int = 0) -> list[Solution]:
+    """Those of the points, sorted by frequency, that stand above both neighbours."""
+    heights = [size(point, probe) for point in points]
+    return [points[i] for i in range(1, len(points) - 1) if heights[i] >= max(heights[i - 1], heights[i + 1])]
+
+
 def _first_look(model: ReducedModel, band: tuple[float, float]) -> np.ndarray:
     seeds = np.concatenate([resonances(model, h) for resonances in (free_resonances, stuck_resonances)
                             for h in model.excitation if h > 0])
@@ -110,7 +116,9 @@ def _next_to_peak(omegas: np.ndarray, heights: np.ndarray, tolerance: float) -> 
     steep = max(up, down) > 6 * np.sqrt(tolerance)      # too far apart for a parabola to be trusted
     if rise < tolerance / 2 and not steep:
         return None
-    if abs(vertex) < 0.05 * min(left, right):           # the middle is the vertex already: narrow the steeper side
+    if max(left, right) > 8 * min(left, right):         # a lopsided bracket tells little: cut its long side
+        vertex = -2 * right if left > right else 2 * left
+    elif abs(vertex) < 0.05 * min(left, right):         # the middle is the vertex already: narrow the steeper side
         vertex = -0.3 * left if up > down else 0.3 * right
     return float(np.sqrt(omegas[1]**2 + vertex * (omegas[2]**2 - omegas[0]**2)))
 

@@ -1,0 +1,56 @@
+"""One model turned into another by one parameter: what continuation, peak tracking and sensitivities speak about."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import replace
+
+import numpy as np
+
+from ..data import Elements, RigidBody
+from ..errors import InputError, suggestion
+from .model import ReducedModel
+
+__all__ = ["PARAMETERS", "check_parameter", "vary"]
+
+
+def _elements(change: Callable[[Elements, float], Elements]) -> Callable[[ReducedModel, float], ReducedModel]:
+    return lambda model, value: replace(model, elements=change(model.elements, value))
+
+
+def _force(model: ReducedModel, factor: float) -> ReducedModel:
+    return replace(model, excitation={h: factor * np.asarray(force) for h, force in model.excitation.items()})
+
+
+def _mass(model: ReducedModel, factor: float) -> ReducedModel:
+    if isinstance(model.damper, RigidBody):
+        return replace(model, damper=replace(model.damper, mass=factor * model.damper.mass))
+    raise InputError("mass: only a rigid damper's mass is a parameter, expected damper to be a RigidBody")
+
+
+PARAMETERS: dict[str, Callable[[ReducedModel, float], ReducedModel]] = {
+    "force": _force,                                                                # factor of all excitations
+    "load": _elements(lambda e, factor: replace(e, n0=factor * e.n0)),              # factor of all normal loads
+    "mu": _elements(lambda e, factor: replace(e, mu=factor * e.mu)),                # factor
+    "kt": _elements(lambda e, factor: replace(e, kt=factor * e.kt)),                # factor
+    "kn": _elements(lambda e, factor: replace(e, kn=factor * e.kn)),                # factor
+    "gap": _elements(lambda e, gap: replace(e, n0=e.n0 - e.kn * gap)),              # added opening [m]
+    "mass": _mass,                                                                  # factor of a rigid damper's mass
+}
+
+
+def vary(model: ReducedModel, name: str, value: float) -> ReducedModel:
+    """The model with one parameter changed: a factor on its present value, or for "gap" an added opening [m].
+
+    Raises:
+        InputError: unknown name, or a parameter that the model does not have.
+    """
+    return PARAMETERS[check_parameter(name)](model, value)
+
+
+def check_parameter(name: str, also: tuple[str, ...] = ()) -> str:
+    """The name, if it is known."""
+    known = (*PARAMETERS, *also)
+    if name not in known:
+        raise InputError(f"parameter '{name}' is unknown{suggestion(name, known)}")
+    return name
