@@ -46,12 +46,17 @@ def modes(con: Constrained, count: int, flex: Flexibility | None = None, toleran
     return mode_set(con, lam, X)
 
 
-def pairs(flex: Flexibility, count: int, tolerance: float = TOLERANCE) -> tuple[np.ndarray, np.ndarray]:
-    """(m,) eigenvalues [rad^2/s^2] and this rank's (n_own, m) M-orthonormal vectors, rigid motions first."""
+def pairs(flex: Flexibility, count: int, tolerance: float = TOLERANCE,
+          start: np.ndarray | None = None) -> tuple[np.ndarray, np.ndarray]:
+    """(m,) eigenvalues [rad^2/s^2] and this rank's (n_own, m) M-orthonormal vectors, rigid motions first.
+
+    Args:
+        start: (n_own, k) good guesses of the vectors.
+    """
     r = min(flex.R.shape[1], count)
     if r == count:
         return np.zeros(r), flex.R[:, :r]
-    lam, X = elastic_pairs(flex, count - r, tolerance)
+    lam, X = elastic_pairs(flex, count - r, tolerance, start=start)
     return np.concatenate([np.zeros(r), lam]), np.concatenate([flex.R[:, :r], X], axis=1)
 
 
@@ -96,6 +101,8 @@ def elastic_pairs(flex: Flexibility, count: int, tolerance: float = TOLERANCE,
     inverse = inverse or (lambda B: compliance(flex, B))
     if start is None:
         start = inverse(restrict(flex.con, _probe(flex.con, min(max(4, count // 3), 16))))
+    elif flex.R.shape[1]:
+        start = start - flex.R @ dot(flex.con.body.comm, flex.MR, start)
     return lowest(flex.con, inverse, start, count, tolerance)
 
 

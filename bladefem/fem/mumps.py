@@ -19,6 +19,7 @@ __all__ = ["Factorised", "factorise_matrix", "schur_complement", "solve_matrix"]
 
 BATCH = 64      # columns a solve: from 32 on MUMPS runs at the speed of matrix products
 ROOM = 40       # per cent of memory beyond MUMPS's own estimate
+SPARSE = 0.2    # share of non-zero rows below which a right-hand side counts as sparse
 
 
 @dataclass(frozen=True)
@@ -72,16 +73,17 @@ def factorise_matrix(A: PETSc.Mat, definite: bool, schur: np.ndarray | None = No
 
 
 def solve_matrix(factor: Factorised, B: np.ndarray) -> np.ndarray:
-    """A^-1 B (n_own, k), in batches; with rows left out, A is the matrix without them and these rows of B are 0."""
+    """A^-1 B (n_own, k), in batches; with rows left out, A is the matrix without them and these rows of B are 0.
+
+    On one rank a block with few non-zero rows is handed over sparse: MUMPS then prunes the first sweep.
+    """
     F = factor.matrix
     out = np.empty(B.shape, order="F")
+    rows = np.flatnonzero(B.any(axis=1)) if F.comm.size == 1 else np.arange(B.shape[0])
     for first in range(0, B.shape[1], BATCH):
         part = slice(first, min(first + BATCH, B.shape[1]))
-        right = PETSc.Mat().createDense((F.sizes[1], (None, part.stop - part.start)), comm=F.comm)
-        right.setUp()
-        right.getDenseArray()[...] = B[:, part]
-        right.assemble()
-        left = right.duplicate()
+        left = _dense(F, part.stop - part.start)
+        right = _sparse(F, rows, B[rows, part]) if len(rows) < SPARSE * len(B) else _filled(F, B[:, part])
         F.matSolve(right, left)
         out[:, part] = left.getDenseArray(readonly=True)
     return out
@@ -98,6 +100,29 @@ def schur_complement(factor: Factorised, n: int) -> np.ndarray:
     lower, upper = np.tril(S, -1), np.triu(S, 1)        # a symmetric factorisation fills one triangle
     half = lower if abs(lower).max(initial=0) >= abs(upper).max(initial=0) else upper
     return half + half.T + np.diag(S.diagonal())
+
+
+def _dense(F: PETSc.Mat, k: int) -> PETSc.Mat:
+    out = PETSc.Mat().createDense((F.sizes[1], (None, k)), comm=F.comm)
+    out.setUp()
+    return out
+
+
+def _filled(F: PETSc.Mat, B: np.ndarray) -> PETSc.Mat:
+    out = _dense(F, B.shape[1])
+    out.getDenseArray()[...] = B
+    out.assemble()
+    return out
+
+
+def _sparse(F: PETSc.Mat, rows: np.ndarray, values: np.ndarray) -> PETSc.Mat:
+    """The block as the transpose of a sparse matrix, the form that PETSc hands on to MUMPS."""
+    k = values.shape[1]
+    starts = np.arange(k + 1, dtype=PETSc.IntType) * len(rows)
+    turned = PETSc.Mat().createAIJ((k, F.size[0]), comm=F.comm, csr=(
+        starts, np.tile(rows.astype(PETSc.IntType), k), values.T.ravel()))
+    turned.assemble()
+    return PETSc.Mat().createTranspose(turned)
 
 
 def _petsc(name: str, *arguments: object) -> None:

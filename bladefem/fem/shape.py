@@ -107,4 +107,5 @@ def geometry(cell_type: str, x: np.ndarray, degree: int) -> tuple[np.ndarray, np
     """
     at, w = quadrature(SHAPES[cell_type][0], degree)
     values, gradients = tabulate(cell_type, at)
-    return values, np.einsum("ckg,qkd->cqgd", x, gradients), w
+    tangents = np.tensordot(x, gradients, axes=([1], [1]))             # (nc, g, q, d)
+    return values, tangents.transpose(0, 2, 1, 3), w

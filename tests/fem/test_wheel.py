@@ -1,0 +1,68 @@
+"""All nodal diameters from a few: the same as each solved from scratch, and nothing lost."""
+
+import numpy as np
+import pytest
+from structured import sector
+
+from bladefem.errors import InputError, NotSolvedError
+from bladefem.fem import wheel
+from bladefem.fem.body import assemble
+from bladefem.fem.constraint import transformation
+from bladefem.fem.modes import count_below
+from bladefem.fem.wheel import all_diameters, eigenpairs
+from bladefem.scene import Material
+
+
+@pytest.mark.mpi
+@pytest.mark.parametrize("count, clamp", [(13, "clamp"), (14, None)])
+def test_warm_start_equals_direct(count, clamp):
+    """Frequencies, phases and shapes, for odd and even numbers of sectors, held and floating."""
+    body = assemble(sector(count, (4, 2, 1), bump=0.2), "blade", Material())
+    warm = all_diameters(body, 9, clamp=clamp)
+    cold = all_diameters(body, 9, clamp=clamp, direct=True)
+    assert [m.nodal_diameter for m in warm] == list(range(count // 2 + 1))
+    for a, b in zip(warm, cold, strict=True):
+        np.testing.assert_allclose(a.frequencies, b.frequencies, rtol=1e-10)
+        np.testing.assert_allclose(a.shapes, b.shapes, atol=1e-5 * abs(b.shapes).max())
+        assert a.residuals.max() < 1e-5
+
+
+@pytest.mark.mpi
+def test_one_core_equals_three_matrices():
+    """The interior eliminated once, and the doubled pencil of each diameter."""
+    body = assemble(sector(9, (3, 2, 1), bump=0.2), "blade", Material())
+    one, three = (all_diameters(transformation(body, "clamp", True, one_core=flag), 7) for flag in (None, False))
+    for a, b in zip(one, three, strict=True):
+        np.testing.assert_allclose(a.frequencies, b.frequencies, rtol=1e-10)
+
+
+def test_chosen_diameters_keep_their_order():
+    body = assemble(sector(8, (2, 2, 1)), "blade", Material())
+    assert [m.nodal_diameter for m in all_diameters(body, 3, [4, 0, 2])] == [4, 0, 2]
+    with pytest.raises(InputError, match="nodal_diameter is 5"):
+        all_diameters(body, 3, [5])
+    with pytest.raises(InputError, match="count is 0"):
+        all_diameters(body, 0)
+
+
+def test_a_lost_mode_is_noticed_and_found():
+    t = transformation(assemble(sector(8, (3, 2, 1), bump=0.2), "blade", Material()), "clamp", True)
+    found = {p.con.nodal_diameter: p for p in eigenpairs(t, 6, [0, 1, 2])}
+    whole = found[1]
+    found[1] = wheel.Eigenpairs(whole.flex, np.delete(whole.lam, 2), np.delete(whole.X, 2, axis=1))
+    repaired = wheel._proved(t, dict(found))[1]
+    np.testing.assert_allclose(repaired.lam[:6], whole.lam[:6], rtol=1e-10)
+
+
+def test_inertia_counts_like_the_spectrum():
+    t = transformation(assemble(sector(8, (3, 2, 1), bump=0.2), "blade", Material()), "clamp", True)
+    for p in eigenpairs(t, 8, [0, 1, 4]):
+        for k in (1, 4, 7):
+            assert count_below(p.con, (p.lam[k - 1] + p.lam[k]) / 2) == k
+
+
+def test_a_wrong_count_is_an_error(monkeypatch):
+    body = assemble(sector(8, (2, 2, 1), bump=0.2), "blade", Material())
+    monkeypatch.setattr(wheel, "_count_below", lambda *_: 99)
+    with pytest.raises(NotSolvedError, match="the inertia counts 99"):
+        all_diameters(body, 3, [0, 1])
