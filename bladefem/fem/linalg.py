@@ -163,7 +163,8 @@ def _times(A: PETSc.Mat, X: np.ndarray) -> np.ndarray:
     right.setUp()
     right.getDenseArray()[...] = X
     right.assemble()
-    return np.array(A.matMult(right).getDenseArray(readonly=True), order="F")
+    product = A.matMult(right)      # kept by name: newer petsc4py frees a nameless one under its array
+    return np.array(product.getDenseArray(readonly=True), order="F")
 
 
 def _split(X: np.ndarray) -> np.ndarray:
