@@ -7,24 +7,59 @@ from types import ModuleType
 
 import numpy as np
 
+from bladefem.errors import InputError
+
 from .curving import second_order
 from .extract import Groups, extract
 from .matching import match, snap
 from .mesh import Mesh, Sector
 from .parameters import MeshSize
-from .quality import edge_of_middle, report, straighten
+from .quality import edge_of_middle, report, shape_quality, straighten
 
-__all__ = ["Motion", "complete", "mesh_model"]
+__all__ = ["Motion", "check_count", "complete", "mesh_model"]
 
+MANY = 3e6          # cells; far beyond what one machine solves
+POOR = 0.1          # shape quality that asks for a second round of optimisation
 Motion = tuple[str, str, np.ndarray, np.ndarray]        # master, slave, rotation (3, 3), shift (3,) [m]
 
 
 def mesh_model(gmsh: ModuleType, groups: Groups, dimension: int, size: MeshSize) -> Mesh:
-    """Generate the mesh of the current model, raise its order, and extract it."""
+    """Generate the mesh of the current model, raise its order, and extract it.
+
+    Raises:
+        InputError: the elements are far too many.
+    """
+    if size.size:
+        check_count(gmsh, dimension, size.size)
     gmsh.model.mesh.generate(dimension)
+    if dimension == 3:
+        _improve(gmsh, groups)
     if size.order == 2:
         second_order(gmsh, size.curved)
     return extract(gmsh, groups, dimension)
+
+
+def check_count(gmsh: ModuleType, dimension: int, size: float, name: str = "mesh.size") -> None:
+    """Refuse a mesh that would never end.
+
+    Raises:
+        InputError: elements of this size [m] in all bodies would be more than MANY.
+    """
+    low, high = np.array(gmsh.model.getBoundingBox(-1, -1)).reshape(2, 3)
+    mass = sum(gmsh.model.occ.getMass(d, tag) for d, tag in gmsh.model.getEntities(dimension))
+    count = min(mass, np.prod((high - low)[:dimension])) / (0.12 * size**3 if dimension == 3 else 0.43 * size**2)
+    if count > MANY:
+        raise InputError(f"{name} = {size:.4g} m gives about {count:.1g} cells, expected at most {MANY:.0e}; "
+                         "choose larger elements, or check the length unit")
+
+
+def _improve(gmsh: ModuleType, groups: Groups) -> None:
+    """Let Netgen and then gmsh rework the tetrahedra when some are flat; either alone leaves more of them."""
+    for method in ("Netgen", ""):
+        mesh = extract(gmsh, Groups(groups.bodies, {}), 3)
+        if min(shape_quality(mesh.points, c, mesh.cell_type).min() for c in mesh.bodies.values()) > POOR:
+            return
+        gmsh.model.mesh.optimize(method, True)
 
 
 def complete(mesh: Mesh, motions: dict[str, Motion], size: float, sector: Sector | None = None,

@@ -6,7 +6,7 @@ import numpy as np
 
 from .parameters import Aerofoil
 
-__all__ = ["centroid", "outline", "place", "placement", "section"]
+__all__ = ["centroid", "grown", "outline", "place", "placement", "section"]
 
 BLUNT = 0.2         # trailing edge over largest thickness: a spline closed by a short straight edge meshes well
 POINTS = 24         # points on each side
@@ -71,6 +71,19 @@ def shape(blade: Aerofoil, t: float) -> np.ndarray:
     return section(blade.section, (1 - t) * blade.thickness_root + t * blade.thickness_tip, blade.camber)
 
 
-def outline(blade: Aerofoil, radius: float, t: float) -> np.ndarray:
-    """Section in space at the share t of the span, (n, 3) [m]."""
-    return place(blade, radius, t, shape(blade, t))
+def outline(blade: Aerofoil, radius: float, t: float, grow: float = 0.0) -> np.ndarray:
+    """Section in space at the share t of the span, (n, 3) [m], its outline moved outwards by ``grow`` [m]."""
+    chord = (1 - t) * blade.chord_root + t * blade.chord_tip
+    return place(blade, radius, t, grown(shape(blade, t), grow / chord))
+
+
+def grown(polygon: np.ndarray, distance: float) -> np.ndarray:
+    """Open outline (n, 2), anticlockwise from the trailing edge, moved outwards; its ends keep the corner."""
+    tangent = np.gradient(polygon, axis=0)
+    tangent /= np.linalg.norm(tangent, axis=1)[:, None]
+    outwards = np.column_stack([tangent[:, 1], -tangent[:, 0]])
+    blunt = polygon[0] - polygon[-1]
+    back = np.array([blunt[1], -blunt[0]]) / np.linalg.norm(blunt)
+    moved = polygon + distance * outwards
+    moved[[0, -1]] += distance * back
+    return moved

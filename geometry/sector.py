@@ -12,7 +12,7 @@ from bladefem.errors import InputError
 from .draw import imprint, polygon, prism
 from .finish import complete, mesh_model
 from .mesh import Mesh
-from .parameters import Aerofoil, Disc, MeshSize, Platform, Shank, Wedge
+from .parameters import DEG, Aerofoil, Disc, MeshSize, Platform, Shank, Wedge
 from .profile import Profile, profile
 from .section import outline
 from .sector_check import check_sector
@@ -20,7 +20,9 @@ from .sector_names import link, mark_tip, motions, moved, name_faces, nose, seat
 from .session import attempt, gmsh_session
 from .sizing import sector_sizes, set_sizes
 
-__all__ = ["wedge_sector"]
+__all__ = ["disc_segment", "wedge_sector"]
+
+LIFT = 15 * DEG     # a fillet meets the platform at this angle, since tangent faces are hard on Boolean unions
 
 
 def wedge_sector(aerofoil: Aerofoil, platform: Platform, shank: Shank, disc: Disc, wedge: Wedge,
@@ -54,7 +56,7 @@ def wedge_sector(aerofoil: Aerofoil, platform: Platform, shank: Shank, disc: Dis
     return moved(mesh, wedge, shape) if wedge.clearance else mesh
 
 
-def _disc(gmsh: ModuleType, disc: Disc, theta: float) -> int:
+def disc_segment(gmsh: ModuleType, disc: Disc, theta: float) -> int:
     """Ring segment between -theta and +theta."""
     occ = gmsh.model.occ
     z = -disc.width / 2
@@ -69,15 +71,30 @@ def _disc(gmsh: ModuleType, disc: Disc, theta: float) -> int:
 
 
 def _aerofoil(gmsh: ModuleType, blade: Aerofoil, top: float) -> int:
-    """Loft through closed sections, each one spline round the leading edge and a straight blunt trailing edge."""
+    """Solid lofted from platform to tip; with a fillet, two lofts sewn at a common ring: flared foot and blade.
+
+    One loft through all rings oscillates, and a Boolean union of two tangent lofts takes 10 s instead of 0.1 s.
+    """
+    occ, foot = gmsh.model.occ, blade.fillet / blade.span
+    stations = np.linspace(foot, 1, 3 + int(np.ceil(abs(blade.twist) / (12 * pi / 180))))
+    with attempt("aerofoil.twist", "loft the sections of the aerofoil"):
+        rings = [_ring(gmsh, outline(blade, top, t)) for t in stations]
+        if not foot:
+            return next(tag for dim, tag in occ.addThruSections(rings, makeSolid=True) if dim == 3)
+    with attempt("aerofoil.fillet", "round the root of the aerofoil"):
+        arc = np.linspace(LIFT, pi / 2, 6)[:-1]         # from the platform's plane to the blade's skin
+        flare = [_ring(gmsh, outline(blade, top, foot * (1 - np.cos(a) / np.cos(LIFT)), blade.fillet * (1 - np.sin(a))))
+                 for a in arc]
+        skin = [tag for wires in ([*flare, rings[0]], rings) for _, tag in occ.addThruSections(wires, makeSolid=False)]
+        ends = [occ.addPlaneSurface([ring]) for ring in (flare[0], rings[-1])]
+        return occ.addVolume([occ.addSurfaceLoop(skin + ends, sewing=True)])
+
+
+def _ring(gmsh: ModuleType, points: np.ndarray) -> int:
+    """Closed wire through points (n, 3): one spline round the leading edge and a straight blunt trailing edge."""
     occ = gmsh.model.occ
-    count = 3 + int(np.ceil(abs(blade.twist) / (12 * pi / 180)))
-    wires = []
-    for t in np.linspace(0, 1, count):
-        points = [occ.addPoint(*p) for p in outline(blade, top, t)]
-        wires.append(occ.addWire([occ.addSpline(points), occ.addLine(points[-1], points[0])]))
-    with attempt("aerofoil", "loft its sections"):
-        return next(tag for dim, tag in occ.addThruSections(wires, makeSolid=True) if dim == 3)
+    tags = [occ.addPoint(*p) for p in points]
+    return occ.addWire([occ.addSpline(tags), occ.addLine(tags[-1], tags[0])])
 
 
 def _blade(gmsh: ModuleType, aerofoil: Aerofoil, platform: Platform, shank: Shank, disc: Disc, shape: Profile) -> int:
@@ -91,21 +108,9 @@ def _blade(gmsh: ModuleType, aerofoil: Aerofoil, platform: Platform, shank: Shan
              prism(gmsh, np.vstack([plate, plate[::-1] * [1, -1]]), -platform.length / 2, platform.length / 2),
              _aerofoil(gmsh, aerofoil, shape.top)]
     with attempt("aerofoil", "join aerofoil, platform, shank and disc"):
-        solid, _ = occ.fuse([(3, _disc(gmsh, disc, shape.theta))], [(3, p) for p in parts])
+        solid, _ = occ.fuse([(3, disc_segment(gmsh, disc, shape.theta))], [(3, p) for p in parts])
     volumes = [tag for dim, tag in solid if dim == 3]
     if len(volumes) != 1:
         raise InputError(f"aerofoil: joined with the platform it gives {len(volumes)} solids, expected one; "
                          "change aerofoil.stagger or platform.length")
-    return _fillet(gmsh, volumes[0], aerofoil, shape) if aerofoil.fillet > 0 else volumes[0]
-
-
-def _fillet(gmsh: ModuleType, volume: int, aerofoil: Aerofoil, shape: Profile) -> int:
-    """Round the edge between aerofoil and platform."""
-    occ = gmsh.model.occ
-    occ.synchronize()
-    root = outline(aerofoil, shape.top, 0)
-    low, high = root.min(axis=0) - 1e-6, root.max(axis=0) + 1e-6
-    curves = [tag for _, tag in gmsh.model.getEntitiesInBoundingBox(*low, *high, dim=1)]
-    with attempt("aerofoil.fillet", "round the root of the aerofoil"):
-        solid = occ.fillet([volume], curves, [aerofoil.fillet])
-    return next(tag for dim, tag in solid if dim == 3)
+    return volumes[0]

@@ -76,8 +76,8 @@ def check_aerofoil(blade: Aerofoil, platform: Platform, section: Profile) -> Non
         if crosses_itself(shape(blade, t)):
             raise InputError(f"aerofoil.{name}: the section crosses itself, expected less thickness or less "
                              "aerofoil.camber")
-    root = outline(blade, section.top, 0.0)
-    edge = 1.01 * blade.fillet + 0.01 * platform.thickness
+    root = outline(blade, section.top, 0.0, blade.fillet)
+    edge = 0.1 * platform.thickness                     # less leaves a sliver between the aerofoil and the edge
     rules = ((2, platform.length / 2, "axially", "aerofoil.chord_root or a larger platform.length"),
              (1, section.corner[1], "circumferentially",
               "aerofoil.chord_root or aerofoil.stagger, or fewer disc.sectors"))
@@ -85,7 +85,8 @@ def check_aerofoil(blade: Aerofoil, platform: Platform, section: Profile) -> Non
         excess = np.abs(root[:, axis]).max() + edge - limit
         if excess > 0:
             raise InputError(f"aerofoil.chord_root = {blade.chord_root:.4g} m: the root section overhangs the platform "
-                             f"{what} by {excess:.3g} m; choose a smaller {cure}")
+                             f"{what} by {excess:.3g} m; choose a smaller {cure}"
+                             + (" or aerofoil.fillet" if blade.fillet else ""))
     thinnest = blade.thickness_root * blade.chord_root
     _at_most("aerofoil.fillet", blade.fillet, thinnest, "the thickness of the root section")
 

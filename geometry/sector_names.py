@@ -41,7 +41,10 @@ def name_faces(gmsh: ModuleType, blade: int, damper: int, aerofoil: Aerofoil, di
     faces["damper_left"] = face_at(on_damper, high, tolerance, "damper_left")
     faces["damper_right"] = face_at(on_damper, turn(2 * theta) @ low, tolerance, "damper_right")
     faces["tip"] = [t for t, c in on_blade.items() if abs(c[0] - profile.top - aerofoil.span) < tolerance]
-    sides = [t for t, c in on_blade.items() if c[0] > profile.top + aerofoil.fillet + tolerance]
+    above = {t: c[0] - profile.top for t, c in on_blade.items() if c[0] > profile.top + tolerance}
+    if aerofoil.fillet:
+        faces["fillet"] = [t for t, height in above.items() if height < aerofoil.fillet]
+    sides = [t for t, height in above.items() if height > aerofoil.fillet + tolerance]
     by_area = sorted(set(sides) - set(faces["tip"]), key=lambda t: gmsh.model.occ.getMass(2, t))
     faces["aerofoil"], faces["trailing_edge"] = [by_area[-1]], by_area[:-1]
     return Groups({"blade": [blade], "damper": [damper]}, faces)

@@ -19,6 +19,7 @@ from bladefem.errors import InputError
 
 from .curving import second_order
 from .draw import centres, tie
+from .finish import check_count
 from .imported import mesh_of_raw
 from .mesh import Mesh
 from .parameters import MeshSize
@@ -167,6 +168,7 @@ def _generate(gmsh: ModuleType, size: MeshSize) -> None:
     gmsh.option.setNumber("Mesh.MeshSizeMax", base)
     gmsh.option.setNumber("Mesh.MeshSizeMin", base / 4)
     gmsh.option.setNumber("Mesh.MeshSizeFromCurvature", 10)
+    check_count(gmsh, 3, base)
     gmsh.model.mesh.generate(3)
     if size.order == 2:
         second_order(gmsh, size.curved)

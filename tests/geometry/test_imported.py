@@ -7,12 +7,10 @@ import pytest
 from writers import write_cdb, write_inp, write_step
 
 from bladefem.errors import InputError
-from geometry.draw import prism
 from geometry.export import write_msh
 from geometry.imported import read_mesh
 from geometry.parameters import Disc, MeshSize, Plane
 from geometry.plane import plane_blades
-from geometry.sector import _disc
 from geometry.step_file import read_step
 
 PAIRS = {"cyclic", "this", "next"}
@@ -101,8 +99,7 @@ def test_no_such_file(tmp_path):
 
 
 def test_step_block_in_millimetres_with_named_faces(tmp_path):
-    square = np.array([[0.1, -0.01], [0.2, -0.01], [0.2, 0.01], [0.1, 0.01]])
-    write_step(tmp_path / "a.step", {"blade": ["clamp", "tip"]}, lambda gmsh: prism(gmsh, square, 0.0, 0.03))
+    write_step(tmp_path / "a.step", "block", {"blade": ["clamp", "tip"]})
     mesh = read_step(tmp_path / "a.step", MeshSize(size=0.01))
     assert {"clamp", "tip", "face_3"} <= set(mesh.faces) and set(mesh.bodies) == {"blade"}
     assert np.ptp(mesh.points, axis=0) == pytest.approx([0.1, 0.02, 0.03], rel=1e-6)
@@ -110,9 +107,15 @@ def test_step_block_in_millimetres_with_named_faces(tmp_path):
     assert np.ptp(same_numbers.points, axis=0) == pytest.approx([0.1, 0.02, 0.03], rel=1e-6)
 
 
+def test_step_with_a_wrong_scale_is_refused_before_it_is_meshed(tmp_path):
+    write_step(tmp_path / "a.step", "block", {})
+    with pytest.raises(InputError, match=r"mesh\.size.*cells"):
+        read_step(tmp_path / "a.step", MeshSize(size=1e-3), scale=1.0 + 1e-9)
+
+
 def test_step_sector_finds_its_cyclic_faces_and_its_bore(tmp_path):
     disc = Disc()
-    write_step(tmp_path / "a.step", {}, lambda gmsh: _disc(gmsh, disc, np.pi / disc.sectors))
+    write_step(tmp_path / "a.step", "disc", {})
     mesh = read_step(tmp_path / "a.step", MeshSize(size=0.012), sectors=disc.sectors)
     pair = mesh.pairs["cyclic"]
     np.testing.assert_allclose(mesh.points[pair.nodes[1]], mesh.points[pair.nodes[0]] @ pair.rotation.T, atol=1e-14)

@@ -1,5 +1,10 @@
 """Small writers of foreign files, so that the readers are tested on text that another program would write."""
 
+import os
+import subprocess
+import sys
+from pathlib import Path
+
 import numpy as np
 
 TO_ABAQUS = {"tetra10": [0, 1, 2, 3, 4, 5, 6, 7, 9, 8]}
@@ -46,18 +51,38 @@ def write_cdb(mesh, file):
     file.write_text("\n".join([*lines, "FINISH"]) + "\n")
 
 
-def write_step(file, names, build):
-    """STEP file of what build(gmsh) draws; names[solid] lists the names of that solid's faces, in order."""
-    from geometry.session import gmsh_session
+def write_step(file, kind, names):
+    """STEP file in millimetres of a "block" or a "disc" segment; names[solid] lists that solid's faces, in order.
 
-    with gmsh_session() as gmsh:
-        build(gmsh)
-        gmsh.model.occ.dilate(gmsh.model.occ.getEntities(3), 0, 0, 0, 1e3, 1e3, 1e3)    # millimetres
-        gmsh.model.occ.synchronize()
-        gmsh.write(str(file))
+    In a process of its own: reading a STEP file changes the unit in which OpenCASCADE writes the next one.
+    """
+    root = Path(__file__).parents[2]
+    subprocess.run([sys.executable, __file__, str(file), kind], check=True, cwd=root, stdout=subprocess.DEVNULL,
+                   env={**os.environ, "PYTHONPATH": str(root)})
     text = file.read_text()
     for solid, faces in names.items():
         text = text.replace("MANIFOLD_SOLID_BREP('',", f"MANIFOLD_SOLID_BREP('{solid}',", 1)
         for face in faces:
             text = text.replace("ADVANCED_FACE('',", f"ADVANCED_FACE('{face}',", 1)
     file.write_text(text)
+
+
+def draw_step(file, kind):
+    """The process of write_step."""
+    from geometry.draw import prism
+    from geometry.parameters import Disc
+    from geometry.sector import disc_segment
+    from geometry.session import gmsh_session
+
+    with gmsh_session() as gmsh:
+        if kind == "disc":
+            disc_segment(gmsh, Disc(), np.pi / Disc().sectors)
+        else:
+            prism(gmsh, np.array([[0.1, -0.01], [0.2, -0.01], [0.2, 0.01], [0.1, 0.01]]), 0.0, 0.03)
+        gmsh.model.occ.dilate(gmsh.model.occ.getEntities(3), 0, 0, 0, 1e3, 1e3, 1e3)
+        gmsh.model.occ.synchronize()
+        gmsh.write(file)
+
+
+if __name__ == "__main__":
+    draw_step(*sys.argv[1:])
