@@ -134,7 +134,7 @@ def _tangential(path, el, tab, limit, form, C, sums, F, J):
 
 @njit(cache=True, error_model="numpy")
 def _clear(sums):
-    sums.F[:], sums.J[:], sums.stick[:] = 0.0, 0.0, 0.0
+    sums.J[:], sums.stick[:] = 0.0, 0.0
 
 
 @njit(cache=True, error_model="numpy")

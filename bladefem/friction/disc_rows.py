@@ -1,9 +1,10 @@
 """Running derivative of a 2-D element: rows of d(force)/d(coefficients) over one period.
 
-Rows have M columns: normal, first and second tangential coefficients (K each), and the force at the start of the period
-(2), then zeros up to a multiple of 8. In stick the derivative is carried as C = D - kt V, which stays, so that a whole
-stretch of stick costs one rank-one update. In slip only the row of the angle is carried. The two columns of the start
-carry the derivative Phi of the period map; the derivative of the periodic state follows from D = Phi D + d.
+Rows have M columns: normal, first and second tangential coefficients (K each), the force at the start of the period
+(2), zeros up to a multiple of 4, and in what is summed the force itself in the last column. In stick the derivative is
+carried as C = D - kt V, which stays, so that a whole stretch of stick costs one rank-one update. In slip only the row
+of the angle is carried. The two columns of the start carry the derivative Phi of the period map; the derivative of the
+periodic state follows from D = Phi D + d.
 """
 
 from __future__ import annotations
@@ -12,7 +13,17 @@ import numpy as np
 from numba import njit
 
 from bladefem.friction.disc import CLOSING, SLIP, STICK, edge, sensitivity
-from bladefem.friction.orbit import DIRECTION_X, DIRECTION_Y, GROWTH, HALF, LENGTH, half_angle, turned
+from bladefem.friction.orbit import (
+    DIRECTION_X,
+    DIRECTION_Y,
+    GROWTH,
+    HALF,
+    INVERSE_LENGTH,
+    INVERSE_LIMIT,
+    SLOPE,
+    half_angle,
+    turned,
+)
 
 __all__ = ["close", "linear_period", "start_rows", "to_carry"]
 
@@ -65,110 +76,121 @@ def to_carry(C, j, kt, knots):
 
 
 @njit(cache=True, error_model="numpy", fastmath=FAST)
-def _add_stretch(a, b, cx, cy, C, tab, sums):
+def _add_stick(a, b, cx, cy, C, tab, sums):
     """Add samples a <= i < b, which stick with f = kt w + (cx, cy)."""
-    K, M, mean = tab.at.shape[1], C.shape[1], sums.mean
+    M, mean, J = C.shape[1], sums.mean, sums.J
+    C[0, M - 1], C[1, M - 1] = cx, cy
     for p in range(mean.size):
         mean[p] = tab.sums[b, p] - tab.sums[a, p]
         sums.stick[p] += mean[p]
-    for k in range(K):
+    for k in range(J.shape[0]):
         weight = mean[k] if k == 0 else 2.0 * mean[k]
-        sums.F[1, k] += weight * cx
-        sums.F[2, k] += weight * cy
         for l in range(M):
-            sums.J[k, l] += weight * C[0, l]
+            J[k, l] += weight * C[0, l]
         for l in range(M):
-            sums.J[k, M + l] += weight * C[1, l]
+            J[k, M + l] += weight * C[1, l]
 
 
 @njit(cache=True, error_model="numpy", fastmath=FAST)
-def _add_samples(count, sums):
-    """Add the samples that wait in sums.weights and sums.rows; returns their new number, 0."""
-    if count:
-        np.dot(sums.weights[:count].T, sums.rows[:count], sums.product)
-        for k in range(sums.product.shape[0]):
-            for l in range(sums.product.shape[1]):
-                sums.J[k, l] += sums.product[k, l]
-    return 0
+def _add_slip(i, count, tab, sums):
+    """Add samples i <= . < i + count, whose rows and forces stand in sums.rows."""
+    J, product = sums.J, sums.product
+    np.dot(tab.analysis[i:i + count].T, sums.rows[:count], product)
+    for k in range(J.shape[0]):
+        for l in range(J.shape[1]):
+            J[k, l] += product[k, l]
 
 
 @njit(cache=True, error_model="numpy", fastmath=FAST)
-def _keep(i, fx, fy, count, tab, sums):
-    """Force and weights of sample i, whose rows stand at ``count``; returns the number that wait."""
-    for k in range(tab.analysis.shape[1]):
-        P = tab.analysis[i, k]
-        sums.weights[count, k] = P
-        sums.F[1, k] += P * fx
-        sums.F[2, k] += P * fy
-    return _add_samples(count + 1, sums) if count + 1 == sums.rows.shape[0] else count + 1
+def _slip_steps(first, count, P, Q, path, el, form, turns):
+    """Follow the slip from knot ``first`` over ``count`` edges at most: (edges done, P, Q).
+
+    turns (.., 12) takes for each edge the weights of the old row of the angle and of the pattern's rows (normal, first,
+    second tangent) for the angle in the middle (4) and at the end (4), and the factors from it to force rows (4).
+    """
+    S, mu, kt, mukn = path.shape[1], el.mu, el.kt, el.mu * el.kn
+    for c in range(count):
+        i = first + c
+        N0, N1 = path[2, i], path[2, i + 1 if i + 1 < S else 0]
+        ux, uy, h = form[DIRECTION_X, i], form[DIRECTION_Y, i], form[HALF, i]
+        size = P * P + Q * Q
+        if N1 <= 0.0 or (P * P - Q * Q) * ux + 2.0 * P * Q * uy < form[GROWTH, i] * size:
+            return c, P, Q
+        P1, Q1 = turned(P, Q, ux, uy, h * h)
+        P, Q = turned(P, Q, ux, uy, h)
+        inverse1, inversem = 1.0 / (P1 * P1 + Q1 * Q1), 1.0 / (P * P + Q * Q)
+        ex, ey = (P * P - Q * Q) * inversem, 2.0 * P * Q * inversem
+        a1, am = h * h * size * inverse1, h * size * inversem
+        y1 = 2.0 * form[SLOPE, i] * (ux * 2.0 * P1 * Q1 - uy * (P1 * P1 - Q1 * Q1)) * inverse1
+        ym = form[SLOPE, i] * (ux * ey - uy * ex)
+        R, kl, kn = 0.5 * mu * (N0 + N1), kt * form[INVERSE_LENGTH, i], mukn * form[INVERSE_LIMIT, i]
+        kx, ky = kl * ux, kl * uy
+        turns[c, 0], turns[c, 1] = am, -ym * kn
+        turns[c, 2], turns[c, 3] = ym * kx - (1.0 - am) * ky, ym * ky + (1.0 - am) * kx
+        turns[c, 4], turns[c, 5] = a1, -y1 * kn
+        turns[c, 6], turns[c, 7] = y1 * kx - (1.0 - a1) * ky, y1 * ky + (1.0 - a1) * kx
+        turns[c, 8], turns[c, 9], turns[c, 10], turns[c, 11] = -R * ey, R * ex, mukn * ex, mukn * ey
+        P, Q = P1, Q1
+    return count, P, Q
 
 
 @njit(cache=True, error_model="numpy", fastmath=FAST)
-def _turn_rows(am, m, a1, t, i, tab, row, middle):
-    """middle = am row + m . pattern and row = a1 row + t . pattern, from (3,) weights of edge i's pattern rows."""
-    M, on = row.size, tab.pattern
-    m0, m1, m2 = m
-    t0, t1, t2 = t
-    for l in range(M):
-        middle[l] = am * row[l] + m0 * on[i, 0, l] + m1 * on[i, 1, l] + m2 * on[i, 2, l]
-    for l in range(M):
-        row[l] = a1 * row[l] + t0 * on[i, 0, l] + t1 * on[i, 1, l] + t2 * on[i, 2, l]
-
-
-@njit(cache=True, error_model="numpy", fastmath=FAST)
-def _sample_rows(gx, gy, nx, ny, i, tab, middle, count, sums):
-    """Rows of sample i in slip: (gx, gy) middle + (nx, ny) times the row of the normal motion."""
-    M, on, out = middle.size, tab.pattern, sums.rows
-    for l in range(M):
-        out[count, l] = gx * middle[l] + nx * on[i, 0, l]
-    for l in range(M):
-        out[count, M + l] = gy * middle[l] + ny * on[i, 0, l]
-
-
-@njit(cache=True, error_model="numpy", fastmath=FAST)
-def _slip_step(P, Q, i, N0, N1, el, tab, form, row, middle, count, sums):
-    """One edge in slip throughout: keeps its sample, turns the row of the angle in place; new (P, Q) and count."""
-    ux, uy, L, h = form[DIRECTION_X, i], form[DIRECTION_Y, i], form[LENGTH, i], form[HALF, i]
-    Rm, size = 0.5 * el.mu * (N0 + N1), P * P + Q * Q
-    x = L / Rm
-    slope = -0.5 * x / np.sqrt(1.0 + 0.25 * x * x)          # x d(ln h)/dx
-    P1, Q1 = turned(P, Q, ux, uy, h * h)
-    Pm, Qm = turned(P, Q, ux, uy, h)
-    inverse1, inversem = 1.0 / (P1 * P1 + Q1 * Q1), 1.0 / (Pm * Pm + Qm * Qm)
-    ex, ey = (Pm * Pm - Qm * Qm) * inversem, 2.0 * Pm * Qm * inversem
-    a1, am = h * h * size * inverse1, h * size * inversem
-    y1 = 2.0 * slope * (ux * 2.0 * P1 * Q1 - uy * (P1 * P1 - Q1 * Q1)) * inverse1
-    ym = slope * (ux * ey - uy * ex)
-    kx, ky, kn = el.kt * ux / L, el.kt * uy / L, el.mu * el.kn / Rm
-    m = (-ym * kn, ym * kx - (1.0 - am) * ky, ym * ky + (1.0 - am) * kx)
-    t = (-y1 * kn, y1 * kx - (1.0 - a1) * ky, y1 * ky + (1.0 - a1) * kx)
-    _turn_rows(am, m, a1, t, i, tab, row, middle)
-    _sample_rows(-Rm * ey, Rm * ex, el.mu * el.kn * ex, el.mu * el.kn * ey, i, tab, middle, count, sums)
-    return P1, Q1, _keep(i, Rm * ex, Rm * ey, count, tab, sums)
+def _turn_rows(first, count, start, pattern, turns, row, middle, rows):
+    """Turn the row (M,) of the angle along ``count`` edges; rows (.., 2M) of their samples, force last."""
+    M = row.size
+    for c in range(count):
+        i = first + c
+        am, m0, m1, m2 = turns[c, 0], turns[c, 1], turns[c, 2], turns[c, 3]
+        a1, t0, t1, t2 = turns[c, 4], turns[c, 5], turns[c, 6], turns[c, 7]
+        gx, gy, nx, ny = turns[c, 8], turns[c, 9], turns[c, 10], turns[c, 11]
+        for l in range(M):
+            middle[l] = am * row[l] + m0 * pattern[i, 0, l] + m1 * pattern[i, 1, l] + m2 * pattern[i, 2, l]
+        for l in range(M):
+            row[l] = a1 * row[l] + t0 * pattern[i, 0, l] + t1 * pattern[i, 1, l] + t2 * pattern[i, 2, l]
+        for l in range(M):
+            rows[c, l] = gx * middle[l] + nx * pattern[i, 0, l]
+        for l in range(M):
+            rows[c, M + l] = gy * middle[l] + ny * pattern[i, 0, l]
+        rows[c, M - 1], rows[c, 2 * M - 1] = gy, -gx
+        for l in range(start, M):           # forget the start before it becomes denormal and slow
+            if abs(row[l]) < 1e-60:
+                row[l] = 0.0
 
 
 @njit(cache=True, error_model="numpy")
-def _forget(row, start):
-    """Clear what is left of the force at the start of the period before it becomes slow denormal numbers."""
-    if abs(row[start]) + abs(row[start + 1]) < 1e-60:
-        row[start] = row[start + 1] = 0.0
+def _slide(i, P, Q, path, el, tab, form, sums):
+    """Follow the slip from knot i, half-angle vector (P, Q), to where it ends: (i, P, Q) there; samples are added."""
+    S, full = path.shape[1], sums.rows.shape[0]
+    while i < S:
+        most = min(full, S - i)
+        count, P, Q = _slip_steps(i, most, P, Q, path, el, form, sums.turns)
+        if count == 0:
+            break
+        _turn_rows(i, count, 3 * tab.at.shape[1], tab.pattern, sums.turns, sums.row, sums.middle, sums.rows)
+        _add_slip(i, count, tab, sums)
+        i += count
+        if count < most:
+            break
+    return i, P, Q
 
 
 @njit(cache=True, error_model="numpy")
-def _keep_mixed(i, mid, fx, fy, dx, dy, N0, N1, mx, my, el, tab, C, count, sums):
-    """Keep sample i of an edge that changes state, with force (mx, my) in the middle; returns slips and the count."""
+def _add_mixed(i, mid, fx, fy, dx, dy, N0, N1, mx, my, el, tab, C, sums):
+    """Add sample i, force (mx, my), of an edge that changes state; 1 if it slips."""
     if mid != SLIP and mid != CLOSING:
-        return 0, count
-    M, rows = sums.row.size, np.empty((2, sums.row.size))
+        return 0
+    M, rows = sums.row.size, np.zeros((2, sums.row.size))
     if mid == SLIP:
         _angle_row(C, i, sensitivity(fx, fy, dx, dy, N0, N1, el.mu, 0.5), el, tab, sums.middle)
         R = max(0.5 * el.mu * (N0 + N1), 1e-300)
         _force_rows(sums.middle, mx / R, my / R, R, el.mu * el.kn, tab.at[i], rows)
     else:
         _closing_rows(i, dx, dy, N0, N1, 0.5 * (N0 + N1) / (N1 - N0), el, tab.knots, rows)
-    sums.rows[count, :M] = rows[0]
-    sums.rows[count, M:] = rows[1]
-    return int(mid == SLIP), _keep(i, mx, my, count, tab, sums)
+    rows[0, M - 1], rows[1, M - 1] = mx, my
+    sums.rows[0, :M] = rows[0]
+    sums.rows[0, M:] = rows[1]
+    _add_slip(i, 1, tab, sums)
+    return int(mid == SLIP)
 
 
 @njit(cache=True, error_model="numpy")
@@ -186,63 +208,60 @@ def _after_mixed(i, j, end, fx, fy, dx, dy, N0, N1, el, tab, C, sums):
 
 
 @njit(cache=True, error_model="numpy")
+def _leave_slip(P, Q, i, N, el, tab, C, sums):
+    """Force at knot i from the half-angle vector; D from the row of the angle goes to C (2, M)."""
+    size = P * P + Q * Q
+    ex, ey, R = (P * P - Q * Q) / size, 2.0 * P * Q / size, el.mu * N
+    _force_rows(sums.row, ex, ey, R, el.mu * el.kn, tab.knots[i], C)
+    return R * ex, R * ey
+
+
+@njit(cache=True, error_model="numpy")
 def linear_period(path, fx, fy, el, tab, form, C, sums):
     """One period of path (3, S) = (kt w_1, kt w_2, N) at the knots from (fx, fy): (fx, fy, samples that slip).
 
     C (2, M) is carried on and ends as D at the first knot; sums collects.
     """
-    S, knots, slips, count = path.shape[1], tab.knots, 0, 0
+    S, slips, i, mu = path.shape[1], 0, 0, el.mu
     run, cx, cy = -1, 0.0, 0.0              # first sample of the present stretch of stick, -1 outside
-    slipping, P, Q, row, middle = False, 1.0, 0.0, sums.row, sums.middle
-    for i in range(S):
-        j = i + 1 if i + 1 < S else 0
-        N0, N1 = path[2, i], path[2, j]
+    slipping, P, Q = False, 1.0, 0.0
+    while i < S:
         if slipping:
-            size, ex, ey = P * P + Q * Q, P * P - Q * Q, 2.0 * P * Q
-            ahead = ex * form[DIRECTION_X, i] + ey * form[DIRECTION_Y, i]
-            if N1 > 0.0 and ahead >= form[GROWTH, i] * size:
-                P, Q, count = _slip_step(P, Q, i, N0, N1, el, tab, form, row, middle, count, sums)
-                _forget(row, 3 * knots.shape[1])
-                slips += 1
-                continue
+            a = i
+            i, P, Q = _slide(i, P, Q, path, el, tab, form, sums)
+            slips += i - a
+            if i == S:
+                break
             slipping = False
-            ex, ey = ex / size, ey / size
-            fx, fy = el.mu * N0 * ex, el.mu * N0 * ey
-            _force_rows(row, ex, ey, el.mu * N0, el.mu * el.kn, knots[i], C)
-            to_carry(C, i, el.kt, knots)
-        dx, dy = path[0, j] - path[0, i], path[1, j] - path[1, i]
-        if N0 > 0.0 and N1 > 0.0:
-            ex, ey, R1 = fx + dx, fy + dy, el.mu * N1
-            if ex * ex + ey * ey <= R1 * R1:
-                if run < 0:
-                    run, cx, cy = i, fx - path[0, i], fy - path[1, i]
-                fx, fy = ex, ey
-                continue
-        elif N0 <= 0.0 and N1 <= 0.0 and run < 0:
-            continue
-        end, ex, ey, mid, mx, my = edge(fx, fy, dx, dy, N0, N1, el.mu)
-        if mid == STICK and run < 0:
-            run, cx, cy = i, fx - path[0, i], fy - path[1, i]
-        if run >= 0:
-            _add_stretch(run, i + (mid == STICK), cx, cy, C, tab, sums)
-            run = -1
-        slip, count = _keep_mixed(i, mid, fx, fy, dx, dy, N0, N1, mx, my, el, tab, C, count, sums)
-        _after_mixed(i, j, end, fx, fy, dx, dy, N0, N1, el, tab, C, sums)
-        slips += slip
-        slipping = end == SLIP and el.mu * N1 > 0.0
-        if slipping:
-            P, Q = half_angle(ex / (el.mu * N1), ey / (el.mu * N1))
-        fx, fy = ex, ey
+            fx, fy = _leave_slip(P, Q, i, path[2, i], el, tab, C, sums)
+            to_carry(C, i, el.kt, tab.knots)
+        j = i + 1 if i + 1 < S else 0
+        dx, dy, N0, N1 = path[0, j] - path[0, i], path[1, j] - path[1, i], path[2, i], path[2, j]
+        ex, ey, R1 = fx + dx, fy + dy, mu * N1
+        if N0 > 0.0 and N1 > 0.0 and ex * ex + ey * ey <= R1 * R1:
+            if run < 0:
+                run, cx, cy = i, fx - path[0, i], fy - path[1, i]
+        elif N0 > 0.0 or N1 > 0.0:
+            end, ex, ey, mid, mx, my = edge(fx, fy, dx, dy, N0, N1, mu)
+            if mid == STICK and run < 0:
+                run, cx, cy = i, fx - path[0, i], fy - path[1, i]
+            if run >= 0:
+                _add_stick(run, i + (mid == STICK), cx, cy, C, tab, sums)
+                run = -1
+            slips += _add_mixed(i, mid, fx, fy, dx, dy, N0, N1, mx, my, el, tab, C, sums)
+            _after_mixed(i, j, end, fx, fy, dx, dy, N0, N1, el, tab, C, sums)
+            slipping = end == SLIP and R1 > 0.0
+            if slipping:
+                P, Q = half_angle(ex / R1, ey / R1)
+        else:
+            ex = ey = 0.0
+        fx, fy, i = ex, ey, i + 1
     if run >= 0:
-        _add_stretch(run, S, cx, cy, C, tab, sums)
-    _add_samples(count, sums)
+        _add_stick(run, S, cx, cy, C, tab, sums)
     if slipping:
-        size, R = P * P + Q * Q, el.mu * path[2, 0]
-        ex, ey = (P * P - Q * Q) / size, 2.0 * P * Q / size
-        fx, fy = R * ex, R * ey
-        _force_rows(row, ex, ey, R, el.mu * el.kn, knots[0], C)
+        fx, fy = _leave_slip(P, Q, 0, path[2, 0], el, tab, C, sums)
     elif path[2, 0] > 0.0:
-        to_carry(C, 0, -el.kt, knots)
+        to_carry(C, 0, -el.kt, tab.knots)
     else:
         C[:] = 0.0
     return fx, fy, slips
@@ -283,6 +302,6 @@ def close(C, K, rx, ry, sums, F, J):
     for e in range(2):
         for k in range(K):
             px, py = sums.J[k, e * M + 3 * K], sums.J[k, e * M + 3 * K + 1]
-            F[1 + e, k] += sums.F[1 + e, k] + px * mx + py * my
+            F[1 + e, k] += sums.J[k, e * M + M - 1] + px * mx + py * my
             for l in range(3 * K):
                 J[1 + e, k, l] += sums.J[k, e * M + l] + px * C[0, l] + py * C[1, l]

@@ -15,18 +15,18 @@ from numba import njit
 
 from bladefem.friction.disc import SLIP, STICK, edge, sensitivity
 
-__all__ = ["DIRECTION_X", "DIRECTION_Y", "EDGE_ROWS", "GROWTH", "HALF", "LENGTH", "edges", "half_angle", "march",
-           "period", "periodic", "start", "turned"]
+__all__ = ["DIRECTION_X", "DIRECTION_Y", "EDGE_ROWS", "GROWTH", "HALF", "INVERSE_LENGTH", "INVERSE_LIMIT",
+           "SLOPE", "edges", "half_angle", "march", "period", "periodic", "start", "turned"]
 
 TOLERANCE = 1e-12       # of the largest friction limit: how well the force must repeat itself in marching
-DIRECTION_X, DIRECTION_Y, LENGTH, HALF, GROWTH, EDGE_ROWS = 0, 1, 2, 3, 4, 5
+DIRECTION_X, DIRECTION_Y, INVERSE_LENGTH, HALF, GROWTH, SLOPE, INVERSE_LIMIT, EDGE_ROWS = range(8)
 
 
 @njit(cache=True, error_model="numpy", fastmath={"contract", "nsz", "arcp"})
 def edges(path, mu, out):
-    """Fill out (5, S): direction (2), length [N], decay over half the edge in slip, growth of the limit.
+    """Fill out (7, S): direction (2), 1/length, decay over half an edge, growth of the limit, x dln(decay)/dx, 1/limit.
 
-    One array is written in each loop, so that the compiler can use vector instructions.
+    Lengths and limits are forces [N]. One array is written in each loop, so that the compiler can use vectors.
     """
     S = path.shape[1]
     for row in range(3):
@@ -34,19 +34,23 @@ def edges(path, mu, out):
             out[row, i] = path[row, i + 1] - path[row, i]
         out[row, S - 1] = path[row, 0] - path[row, S - 1]
     for i in range(S):
-        out[GROWTH, i] = mu * out[LENGTH, i]
+        out[INVERSE_LIMIT, i] = 1.0 / max(mu * path[2, i] + 0.5 * mu * out[2, i], 1e-300)
     for i in range(S):
-        out[HALF, i] = max(mu * path[2, i] + 0.5 * out[GROWTH, i], 1e-300)      # limit in the middle
+        out[GROWTH, i] = mu * out[2, i]
     for i in range(S):
-        out[LENGTH, i] = max(sqrt(out[0, i] ** 2 + out[1, i] ** 2), 1e-12 * out[HALF, i])
+        out[INVERSE_LENGTH, i] = 1.0 / max(sqrt(out[0, i] ** 2 + out[1, i] ** 2), 1e-12 / out[INVERSE_LIMIT, i])
     for i in range(S):
-        x = 0.5 * out[LENGTH, i] / out[HALF, i]
+        x = 0.5 * out[INVERSE_LIMIT, i] / out[INVERSE_LENGTH, i]
+        out[SLOPE, i] = -x / sqrt(1.0 + x * x)
+    for i in range(S):
+        x = 0.5 * out[INVERSE_LIMIT, i] / out[INVERSE_LENGTH, i]
         out[HALF, i] = 1.0 / (sqrt(1.0 + x * x) + x)
     for i in range(S):
-        inverse = 1.0 / out[LENGTH, i]
-        out[0, i] *= inverse
-        out[1, i] *= inverse
-        out[GROWTH, i] *= inverse
+        out[0, i] *= out[INVERSE_LENGTH, i]
+    for i in range(S):
+        out[1, i] *= out[INVERSE_LENGTH, i]
+    for i in range(S):
+        out[GROWTH, i] *= out[INVERSE_LENGTH, i]
 
 
 @njit(cache=True, error_model="numpy", inline="always")

@@ -45,11 +45,10 @@ class Tables(NamedTuple):
 class Sums(NamedTuple):
     """What a 2-D element collects in one period; M columns as in disc_rows.py."""
 
-    F: np.ndarray           # (3, K) force harmonics of stretches and samples
-    J: np.ndarray           # (K, 2M) their rows, first and second tangent
+    J: np.ndarray           # (K, 2M) rows and forces, first and second tangent
     stick: np.ndarray       # (4H+1,) basis means of the samples in stick
-    weights: np.ndarray     # (WAITING, K) of the samples in slip that are not yet in J
-    rows: np.ndarray        # (WAITING, 2M) their rows
+    rows: np.ndarray        # (WAITING, 2M) of samples in slip that are not yet in J
+    turns: np.ndarray       # (WAITING, 12) how the row of the angle turns along them
     product: np.ndarray     # (K, 2M) scratch
     row: np.ndarray         # (M,) row of the angle in slip
     middle: np.ndarray      # (M,) row of the angle at the sample
@@ -73,8 +72,8 @@ def tables(H: int, samples: int) -> Tables:
 
 
 def columns(K: int) -> int:
-    """M: 3K+2 columns filled up to a multiple of 4."""
-    return (3 * K + 5) // 4 * 4
+    """M: 3K+3 columns filled up to a multiple of 4."""
+    return (3 * K + 6) // 4 * 4
 
 
 def _pattern(at: np.ndarray, knots: np.ndarray) -> np.ndarray:
@@ -88,8 +87,7 @@ def _pattern(at: np.ndarray, knots: np.ndarray) -> np.ndarray:
 def empty_sums(H: int) -> Sums:
     """Scratch for one 2-D element."""
     K, M, P = 2 * H + 1, columns(2 * H + 1), 4 * H + 1
-    return Sums(np.empty((3, K)), np.empty((K, 2 * M)), np.empty(P), np.empty((WAITING, K)), np.empty((WAITING, 2 * M)),
-                np.empty((K, 2 * M)), np.empty(M), np.empty(M), np.empty(P))
+    return Sums(*[np.empty(shape) for shape in ((K, 2 * M), P, (WAITING, 2 * M), (WAITING, 12), (K, 2 * M), M, M, P)])
 
 
 @njit(cache=True, error_model="numpy")
