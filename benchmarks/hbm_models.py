@@ -62,7 +62,8 @@ def chain(n0: float = 0.6, masses: int = 24) -> Problem:
     """
     link = 2 * np.eye(masses) - np.eye(masses, k=1) - np.eye(masses, k=-1)
     K = np.kron(link, np.diag([2.0, 3.0])) + np.kron(np.eye(masses), np.array([[1.0, 0.3], [0.3, 0.6]]))
-    elements = Elements(np.full(masses, 0.5), np.full(masses, 0.8), np.full(masses, 0.4), np.full(masses, n0), tangents=1)
+    kt, kn, mu, load = (np.full(masses, value) for value in (0.5, 0.8, 0.4, n0))
+    elements = Elements(kt, kn, mu, load, tangents=1)
     dofs = 2 * masses
     return Problem("chain with lift-off", np.eye(dofs), 0.01 * np.eye(dofs) + 0.01 * K, K, 2 * (masses // 3) + 1, 4.0,
                    np.eye(dofs), elements, (0.6, 1.6))

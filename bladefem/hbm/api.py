@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 
 from ..errors import InputError
@@ -34,6 +36,7 @@ def solve(model: ReducedModel, omega: float, H: int = 3, samples: int = 128, *, 
     attempts = solve_balance(balance, None if start is None else match_harmonics(start.w, H), options)
     best = min(attempts, key=lambda a: (not a.end.converged, a.end.state.error))
     reason = best.end.reason if best.end.converged else "; ".join(f"{a.method}: {a.end.reason}" for a in attempts)
+    balance = replace(balance, samples=best.samples or samples)
     return as_solution(balance, best, sum(a.end.iterations for a in attempts), reason)
 
 

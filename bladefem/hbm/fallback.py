@@ -1,8 +1,10 @@
 """What is tried, in order, when Newton does not reach a point; every attempt leaves its reason.
 
 1. Newton from the given start and from full stick, its line search on the step, then on the residual;
-2. harmonics in sequence, 3, 7, 15, ... up to H, each started from the one before;
-3. homotopy in the normal load, from a load under which everything sticks down to the true one.
+2. twice and four times the samples where Newton came close: sampled 2-D friction jumps a little at the limit of stick,
+   and there may be no exact zero; the solution then says how many samples it has;
+3. harmonics in sequence, 3, 7, 15, ... up to H, each started from the one before;
+4. homotopy in the normal load, from a load under which everything sticks down to the true one.
 """
 
 from __future__ import annotations
@@ -19,6 +21,7 @@ from .residual import Balance, evaluate_balance, start_in_stick
 __all__ = ["Attempt", "match_harmonics", "solve_balance"]
 
 FIRST_LOAD, LARGEST_LOAD = 100.0, 1e8   # multiples of the normal load where a homotopy starts
+CLOSE = 1e-3            # residual from which more samples are tried
 SMALLEST_STEP = 1e-3    # step in the logarithm of the load below which a homotopy gives up
 
 
@@ -28,6 +31,7 @@ class Attempt:
 
     method: str
     end: Newton
+    samples: int | None = None      # where they differ from those asked for
 
 
 def solve_balance(balance: Balance, start: np.ndarray | None, options: Options) -> list[Attempt]:
@@ -50,9 +54,17 @@ def match_harmonics(w: np.ndarray, H: int) -> np.ndarray:
 
 def _ways(balance: Balance, start: np.ndarray | None, options: Options) -> Iterator[Attempt]:
     stick = start_in_stick(balance)
+    near = None
     for w in ([] if start is None else [start]) + [stick]:
-        yield Attempt("newton", newton(balance, w, options))
-    yield Attempt("newton on the residual", newton(balance, stick, options, "residual"))
+        end = newton(balance, w, options)
+        yield Attempt("newton", end)
+        near = end if near is None or end.state.error < near.state.error else near
+    end = newton(balance, stick, options, "residual")
+    yield Attempt("newton on the residual", end)
+    near = min(near, end, key=lambda found: found.state.error)
+    for factor in (2, 4) if near.state.error < CLOSE else ():
+        denser = replace(balance, samples=factor * balance.samples)
+        yield Attempt("more samples", newton(denser, near.state.w, options), denser.samples)
     if balance.linear.A.shape[0] > 4:
         yield Attempt("harmonics in sequence", _more_harmonics(balance, options))
     yield Attempt("load homotopy", _from_high_load(balance, options))
