@@ -15,7 +15,8 @@ from . import shape
 from .compat import CELLS, MPI, PETSc, assemble_matrix, build_mesh, cell_dofs, dolfinx, scalar_space, ufl, vector_space
 from .loads import centrifugal, mass, surface_load, volume
 
-__all__ = ["Body", "assemble", "cells_of", "centrifugal", "lame", "mass", "rigid_modes", "surface_load", "volume"]
+__all__ = ["Body", "assemble", "cells_of", "centrifugal", "degrees", "lame", "mass", "properties", "rigid_modes",
+           "surface_load", "volume"]
 
 
 @dataclass(frozen=True)
@@ -62,17 +63,25 @@ def assemble(mesh: Mesh, name: str | tuple[str, ...], material: Material | dict[
     dim = mesh.dimension
     domain, origin = build_mesh(comm, mesh.cell_type, local, mesh.points[used, :dim])
     space = vector_space(domain, CELLS[mesh.cell_type][1])
-    owner = np.repeat(np.arange(len(names)), [len(mesh.bodies[n]) for n in names])[origin]
-    lam, mu, rho = (_piecewise(domain, values[owner])
-                    for values in np.array([lame(materials[n], dim, plane) for n in names]).T)
-    stiff, mass = _degrees(mesh, cells, quadrature)
-    u, v, depth = ufl.TrialFunction(space), ufl.TestFunction(space), _constant(domain, mesh.depth if dim == 2 else 1.0)
+    lam, mu, rho, depth = properties(mesh, {n: materials[n] for n in names}, domain, plane)
+    stiff, mass = degrees(mesh, cells, quadrature)
+    u, v = ufl.TrialFunction(space), ufl.TestFunction(space)
     e_u, e_v = ufl.sym(ufl.grad(u)), ufl.sym(ufl.grad(v))
     energy = depth * (lam * ufl.tr(e_u) * ufl.tr(e_v) + 2 * mu * ufl.inner(e_u, e_v))
     K = assemble_matrix(energy * ufl.dx(metadata={"quadrature_degree": stiff}))
     M = assemble_matrix(depth * rho * ufl.inner(u, v) * ufl.dx(metadata={"quadrature_degree": mass}))
     rows = _rows(mesh, space, used[local], origin, comm)
     return Body(mesh, " + ".join(names), {n: materials[n] for n in names}, dim, K, M, rows, space, plane, comm)
+
+
+def properties(mesh: Mesh, materials: dict[str, Material], domain: Any, plane: str) -> tuple[Any, Any, Any, Any]:
+    """Lame's constants [Pa] and density [kg/m^3], one value a cell of this rank, and the depth [m], for forms."""
+    owner = np.repeat(np.arange(len(materials)), [len(mesh.bodies[n]) for n in materials])
+    owner = owner[np.asarray(domain.topology.original_cell_index)]
+    dim = mesh.dimension
+    values = np.array([lame(material, dim, plane) for material in materials.values()])
+    depth = dolfinx.fem.Constant(domain, float(mesh.depth if dim == 2 else 1.0))
+    return *(_piecewise(domain, column[owner]) for column in values.T), depth
 
 
 def lame(material: Material, dim: int, plane: str) -> tuple[float, float, float]:
@@ -143,11 +152,7 @@ def _piecewise(domain: Any, values: np.ndarray) -> Any:
     return function
 
 
-def _constant(domain: Any, value: float) -> Any:
-    return dolfinx.fem.Constant(domain, float(value))
-
-
-def _degrees(mesh: Mesh, cells: np.ndarray, quadrature: str) -> tuple[int, int]:
+def degrees(mesh: Mesh, cells: np.ndarray, quadrature: str) -> tuple[int, int]:
     """Quadrature degrees of stiffness and mass; elements with straight sides need less."""
     if quadrature not in ("exact", "ccx"):
         raise InputError(f"quadrature is '{quadrature}'{suggestion(quadrature, ('exact', 'ccx'))}")

@@ -23,8 +23,8 @@ from .body import Body
 from .compat import PETSc
 from .linalg import Doubled, Folded, Matrix, combined
 
-__all__ = ["Constrained", "Opened", "Transformation", "at_diameter", "clamped_nodes", "constrain", "expand", "restrict",
-           "transformation", "unknowns"]
+__all__ = ["Constrained", "Opened", "Transformation", "at_diameter", "clamped_nodes", "constrain", "expand", "in_step",
+           "restrict", "transformation", "unknowns"]
 
 
 @dataclass(frozen=True)
@@ -126,6 +126,20 @@ def at_diameter(t: Transformation, nodal_diameter: int | None) -> Constrained:
     else:
         K, M = (_doubled(combined(A[0], np.cos(angle), A[1]), A[2], np.sin(angle)) for A in (t.K, t.M))
     return Constrained(t.body, T, own, K, M, n)
+
+
+def in_step(body: Body, clamp: str | None = "clamp") -> Constrained:
+    """All sectors move alike (nodal diameter 0), or no cyclic symmetry: for static states, nothing kept for others.
+
+    Raises:
+        InputError: see :func:`constrain`.
+    """
+    pair = _cyclic_pair(body) if "cyclic" in body.mesh.pairs else None
+    low, high = _parts(body, _with_partners(clamped_nodes(body, clamp), pair), pair, None)
+    T, _, start = _numbered(body, low if high is None else (low + high).tocsr(), None)
+    T0, rank = _to_petsc(body, T, start), body.comm.rank
+    return Constrained(body, T, slice(int(start[rank]), int(start[rank + 1])), body.K.ptap(T0), body.M.ptap(T0),
+                       None if pair is None else 0)
 
 
 def clamped_nodes(body: Body, clamp: str | None) -> np.ndarray:
