@@ -21,7 +21,7 @@ STEPS = 200
 
 
 def lowest(con: Constrained, inverse: Callable[[np.ndarray], np.ndarray], start: np.ndarray, count: int,
-           tolerance: float) -> tuple[np.ndarray, np.ndarray]:
+           tolerance: float, guard: int = 0) -> tuple[np.ndarray, np.ndarray]:
     """The lowest eigenpairs of K x = lambda M x.
 
     Args:
@@ -29,11 +29,13 @@ def lowest(con: Constrained, inverse: Callable[[np.ndarray], np.ndarray], start:
         start: (n_own, k) first block.
         tolerance: largest |K^-1 M x - x / lambda| lambda in the M-norm: the direction's error times a gap.
 
+        guard: pairs returned beyond count as far as they have come.
+
     The vectors returned are K^-1 M x lambda, one free step of inverse iteration beyond the Ritz vectors x: it wipes out
     what rounding and the iteration leave in stiff directions.
 
     Returns:
-        lam (count,) [rad^2/s^2] and this rank's (n_own, count) M-orthonormal vectors.
+        lam (count + guard,) [rad^2/s^2] and this rank's (n_own, count + guard) M-orthonormal vectors.
 
     Raises:
         NotSolvedError: fewer than ``count`` pairs exist, or the iteration does not converge.
@@ -50,35 +52,38 @@ def lowest(con: Constrained, inverse: Callable[[np.ndarray], np.ndarray], start:
         block, Mblock, tail = orthonormal(con, V, minus(W, V, column))
         theta, S = eigh(H)
         theta, S = theta[::-1], S[:, ::-1]
-        k = min(count, len(theta))
-        error = np.linalg.norm(tail @ S[len(S) - tail.shape[1]:, :k], axis=0) / theta[:k]
+        k = min(count + guard, len(theta))
+        rest = tail @ S[len(S) - tail.shape[1]:, :k] / theta[:k]
+        error = np.linalg.norm(rest[:, :count], axis=0).max(initial=0.0)
         if not block.shape[1] and k < count:
             raise NotSolvedError(f"{count} modes were asked of a body that has {k} elastic ones")
-        if (k == count and error.max() < tolerance) or not block.shape[1]:
-            return 1 / theta[:k], mix(V, S[:, :k], block, tail @ S[len(S) - tail.shape[1]:, :k] / theta[:k])
-    raise NotSolvedError(f"the modes did not converge in {STEPS} steps (error {error.max():.1e}, "
-                         f"expected {tolerance:.1e})")
+        if (k >= count and error < tolerance) or not block.shape[1]:
+            return 1 / theta[:k], mix(V, S[:, :k], block, rest)
+    raise NotSolvedError(f"the modes did not converge in {STEPS} steps (error {error:.1e}, expected {tolerance:.1e})")
 
 
 def orthonormal(con: Constrained, V: np.ndarray, W: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """W made M-orthogonal to V (twice is enough) and M-orthonormal: basis Q, M Q, and R with W = V (...) + Q R.
+    """W made M-orthonormal and, once more, M-orthogonal to V: basis Q, M Q, and R with W = V (...) + Q R.
 
     Directions that are rounding only are dropped, so Q may have fewer columns than W.
     """
     comm = con.body.comm
-    R = np.eye(W.shape[1], dtype=con.dtype)
-    for sweep in range(2):
+    W, MW, R = _scaled(comm, W, apply(con.M, W), 1e-26)
+    if V.shape[1]:
+        W = minus(W, V, dot(comm, V, MW))
         MW = apply(con.M, W)
-        if V.shape[1]:
-            W = minus(W, V, dot(comm, V, MW))
-            MW = apply(con.M, W)
-        gram = dot(comm, W, MW)
-        size, Z = np.linalg.eigh((gram + gram.conj().T) / 2)
-        good = size > (1e-26 * size[-1] if sweep == 0 else 0.25)
-        root = np.sqrt(size[good])
-        W, MW = (mix(A, Z[:, good] / root) for A in (W, MW))
-        R = (Z[:, good] * root).conj().T @ R
-    return W, MW, R
+    W, MW, S = _scaled(comm, W, MW, 0.25)
+    return W, MW, S @ R
+
+
+def _scaled(comm: object, W: np.ndarray, MW: np.ndarray, least: float) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """W Z, M W Z and R with W = (W Z) R; directions whose square is below ``least`` of the largest are dropped."""
+    gram = dot(comm, W, MW)
+    size, Z = np.linalg.eigh((gram + gram.conj().T) / 2)
+    good = size > least * max(size[-1], np.finfo(float).tiny) if len(size) else size > 0
+    root = np.sqrt(size[good])
+    W, MW = (mix(A, Z[:, good] / root) for A in (W, MW))
+    return W, MW, (Z[:, good] * root).conj().T
 
 
 def _grown(H: np.ndarray, column: np.ndarray) -> np.ndarray:

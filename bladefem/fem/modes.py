@@ -47,16 +47,17 @@ def modes(con: Constrained, count: int, flex: Flexibility | None = None, toleran
 
 
 def pairs(flex: Flexibility, count: int, tolerance: float = TOLERANCE,
-          start: np.ndarray | None = None) -> tuple[np.ndarray, np.ndarray]:
+          start: np.ndarray | None = None, guard: int = 0) -> tuple[np.ndarray, np.ndarray]:
     """(m,) eigenvalues [rad^2/s^2] and this rank's (n_own, m) M-orthonormal vectors, rigid motions first.
 
     Args:
         start: (n_own, k) good guesses of the vectors.
+        guard: pairs beyond count, as far as they have come.
     """
     r = min(flex.R.shape[1], count)
     if r == count:
         return np.zeros(r), flex.R[:, :r]
-    lam, X = elastic_pairs(flex, count - r, tolerance, start=start)
+    lam, X = elastic_pairs(flex, count - r, tolerance, start=start, guard=guard)
     return np.concatenate([np.zeros(r), lam]), np.concatenate([flex.R[:, :r], X], axis=1)
 
 
@@ -88,22 +89,24 @@ def _stiffness(con: Constrained, X: np.ndarray) -> float:
 
 def elastic_pairs(flex: Flexibility, count: int, tolerance: float = TOLERANCE,
                   inverse: Callable[[np.ndarray], np.ndarray] | None = None,
-                  start: np.ndarray | None = None) -> tuple[np.ndarray, np.ndarray]:
+                  start: np.ndarray | None = None, guard: int = 0) -> tuple[np.ndarray, np.ndarray]:
     """The lowest elastic eigenpairs of K x = lambda M x.
 
     Args:
         inverse: what stands for K^+ (fixed interfaces).
         start: (n_own, k) good guesses; random loads, the same for any number of ranks, when left out.
+        guard: pairs beyond count, as far as they have come.
 
     Raises:
         NotSolvedError: there are fewer, or no convergence.
     """
     inverse = inverse or (lambda B: compliance(flex, B))
     if start is None:
-        start = inverse(restrict(flex.con, _probe(flex.con, min(max(4, count // 3), 16))))
+        width = min(max(8 if flex.con.dtype is float else 4, count // 3), 16)
+        start = inverse(restrict(flex.con, _probe(flex.con, width)))
     elif flex.R.shape[1]:
         start = start - flex.R @ dot(flex.con.body.comm, flex.MR, start)
-    return lowest(flex.con, inverse, start, count, tolerance)
+    return lowest(flex.con, inverse, start, count, tolerance, guard)
 
 
 def _probe(con: Constrained, width: int) -> np.ndarray:

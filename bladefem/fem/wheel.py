@@ -20,11 +20,13 @@ from .body import Body
 from .constraint import Constrained, Transformation, at_diameter, transformation
 from .flexibility import Flexibility, flexible
 from .linalg import Folded, apply, combined, dot, inertia, mix
-from .modes import TOLERANCE, mode_set, pairs
+from .modes import mode_set, pairs
 
 __all__ = ["Eigenpairs", "all_diameters", "eigenpairs"]
 
-GUARD = 2       # modes beyond those asked for
+GUARD = 2               # modes beyond those asked for, carried along
+LEVELS = (3, 5)         # numbers of solved diameters from which the others are guessed
+CLOSE = 5e-6            # error of a vector's direction; that of a frequency is its square
 
 
 @dataclass(frozen=True)
@@ -66,29 +68,43 @@ def all_diameters(body: Body | Transformation, count: int, diameters: Sequence[i
 
 
 def eigenpairs(t: Transformation, count: int, diameters: Sequence[int], direct: bool = False) -> Iterator[Eigenpairs]:
-    """``count`` and a few more pairs in each nodal diameter, in the order in which they are solved."""
-    order = sorted(set(diameters))
-    cons = {n: at_diameter(t, n) for n in order}
-    size = next(iter(cons.values())).T.shape[1] if order else 0
-    more = min(count + GUARD, size)
-    seeds = order if direct or len(order) <= 3 else [order[i] for i in sorted({
-        0, 1, len(order) // 4, len(order) // 2, len(order) - 1})]
-    solved = []
-    for n in seeds:
-        solved.append(_pairs(flexible(cons[n]), more, None))
+    """``count`` pairs and some guards in each nodal diameter, in the order in which they are solved."""
+    cons = {n: at_diameter(t, n) for n in diameters}
+    solved, space = [], None
+    for i, n in enumerate(_bisected(sorted(cons))):
+        if i in LEVELS and not direct:
+            space = _space(t, [p.X for p in solved])
+        start = None if space is None else _guess(space, cons[n], 2 * np.pi * n / t.sectors, count + GUARD)
+        solved.append(_pairs(flexible(cons[n]), count, start))
         yield solved[-1]
-    rest = [n for n in order if n not in seeds]
-    if rest:
-        W = _span([p.X for p in solved], t)
-        K, M = _projected(t, W)
-        for n in rest:
-            guess = _small(K, M, 2 * np.pi * n / t.sectors, more)
-            start = mix(W, guess.real) + 1j * mix(W, guess.imag) if np.iscomplexobj(guess) else mix(W, guess)
-            yield _pairs(flexible(cons[n]), more, start)
+
+
+def _bisected(order: list[int]) -> list[int]:
+    """Both ends, then the middle of each part, and so on: each new one lies between known ones."""
+    out, width = [0, len(order) - 1], len(order) - 1
+    while width > 1:
+        width = (width + 1) // 2
+        out += range(0, len(order), width)
+    return [order[i] for i in dict.fromkeys([*out, *range(len(order))])] if order else []
 
 
 def _pairs(flex: Flexibility, count: int, start: np.ndarray | None) -> Eigenpairs:
-    return Eigenpairs(flex, *pairs(flex, count, TOLERANCE, start))
+    guard = min(GUARD, flex.con.T.shape[1] - count)
+    return Eigenpairs(flex, *pairs(flex, count, CLOSE, start, guard))
+
+
+def _space(t: Transformation, blocks: list[np.ndarray]) -> tuple[np.ndarray, list[np.ndarray], list[np.ndarray]]:
+    """A real basis of all parts of the vectors, and the projections of K0, Kc, Ks and of M0, Mc, Ms onto it."""
+    W = _span(blocks, t)
+    return W, *_projected(t, W)
+
+
+def _guess(space: tuple[np.ndarray, list[np.ndarray], list[np.ndarray]], con: Constrained, angle: float,
+           count: int) -> np.ndarray:
+    """(n_own, count) lowest vectors of the projected pencil."""
+    W, K, M = space
+    Z = _small(K, M, angle, count)
+    return mix(W, Z.real) + 1j * mix(W, Z.imag) if con.dtype is complex else mix(W, Z.real)
 
 
 def _span(blocks: list[np.ndarray], t: Transformation) -> np.ndarray:
@@ -97,9 +113,11 @@ def _span(blocks: list[np.ndarray], t: Transformation) -> np.ndarray:
     parts = [part for X in blocks for part in ((X.real, X.imag) if np.iscomplexobj(X) else (X,))]
     W = np.asfortranarray(np.concatenate(parts, axis=1))
     W /= np.sqrt(dot(comm, W, W).diagonal())
-    size, Z = np.linalg.eigh(dot(comm, W, W))
-    good = size > 1e-10 * size[-1]
-    return mix(W, Z[:, good] / np.sqrt(size[good]))
+    for _ in range(2):          # the second time for the digits that small directions lost in the first
+        size, Z = np.linalg.eigh(dot(comm, W, W))
+        good = size > 1e-13 * size[-1]
+        W = mix(W, Z[:, good] / np.sqrt(size[good]))
+    return W
 
 
 def _projected(t: Transformation, W: np.ndarray) -> tuple[list[np.ndarray], list[np.ndarray]]:
@@ -118,8 +136,8 @@ def _projected(t: Transformation, W: np.ndarray) -> tuple[list[np.ndarray], list
 
 def _small(K: list[np.ndarray], M: list[np.ndarray], angle: float, count: int) -> np.ndarray:
     """(m, count) lowest eigenvectors of the projected pencil."""
-    real = abs(np.sin(angle)) < 1e-12
-    pencil = [A[0] + np.cos(angle) * A[1] + (0 if real else 1j * np.sin(angle) * A[2]) for A in (K, M)]
+    sine = 1j * np.sin(angle) if abs(np.sin(angle)) > 1e-12 else 0.0
+    pencil = [A[0] + np.cos(angle) * A[1] + sine * A[2] for A in (K, M)]
     return eigh(*[(A + A.conj().T) / 2 for A in pencil])[1][:, :count]
 
 
@@ -130,7 +148,7 @@ def _proved(t: Transformation, found: dict[int, Eigenpairs]) -> dict[int, Eigenp
     for n, p in found.items():
         exact = _count_below(p.con, shift, shared)
         if exact != np.count_nonzero(p.lam < shift):
-            found[n] = p = _pairs(p.flex, max(len(p.lam), exact + GUARD), None)
+            found[n] = p = _pairs(p.flex, max(len(p.lam) - GUARD, exact + 1), None)
         if exact != np.count_nonzero(p.lam < shift):
             raise NotSolvedError(f"nodal diameter {n}: {np.count_nonzero(p.lam < shift)} modes were found below "
                                  f"{np.sqrt(shift) / (2 * np.pi):.6g} Hz, the inertia counts {exact}")
@@ -151,7 +169,7 @@ def _count_below(con: Constrained, shift: float, shared: Folded | None) -> int:
 
 def _gap(lists: list[np.ndarray]) -> float:
     """A shift in the widest relative gap of all eigenvalues, in the upper half of what every diameter covers."""
-    top = min(lam[-1] for lam in lists)
+    top = min(lam[-1 - GUARD] for lam in lists if len(lam) > GUARD)
     below = np.unique(np.concatenate([lam[lam <= top] for lam in lists]))
     below = below[below > 0]
     if len(below) < 2:
