@@ -158,9 +158,8 @@ def clamped_nodes(body: Body, clamp: str | None) -> np.ndarray:
 
 def restrict(con: Constrained, load: np.ndarray | sp.spmatrix) -> np.ndarray:
     """T^H load: this rank's rows (n_own, k) of loads or port vectors (n_points*dim, k) in mesh numbering."""
-    T = con.T[:, con.own].conj().T.tocsr()
-    product = T @ load
-    return product.toarray() if sp.issparse(product) else np.asarray(product)
+    product = con.T.conj().T @ load
+    return (product.tocsr()[con.own].toarray() if sp.issparse(product) else np.asarray(product)[con.own])
 
 
 def unknowns(con: Constrained, x: np.ndarray) -> np.ndarray:
