@@ -1,0 +1,87 @@
+"""The optimal linear approximation of contact forces, f ~ K_ad u + C_ad du/dt + F_c0 (the paper's Eq. 7-16, corrected).
+
+Two errors of print are corrected: in Eq. 16 both sums of C carry the factor k, and for a mean displacement F_c0 is
+that of Eq. 11, not f_0 alone. With both the approximation does exactly the work of the force. The sign is that of f,
+so that K_ad and C_ad are added to the structure and C_ad is not negative for dry friction.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from bladefem.errors import InputError
+from bladefem.friction.harmonics import derivative, harmonics_of
+
+__all__ = ["Approximation", "by_harmonic", "from_harmonics", "from_series", "work", "work_of"]
+
+
+@dataclass(frozen=True)
+class Approximation:
+    """f ~ stiffness u + damping du/dt + constant, for each element."""
+
+    stiffness: np.ndarray       # K_ad (...,) [N/m]
+    damping: np.ndarray         # C_ad (...,) [N s/m]
+    constant: np.ndarray        # F_c0 (...,) [N]
+
+
+def from_series(u: np.ndarray, f: np.ndarray, omega: float) -> Approximation:
+    """Least squares over one period sampled at equal steps, u and f (..., samples) (Eq. 11); omega in rad/s.
+
+    du/dt is the derivative of the trigonometric interpolation, so that u and du/dt are orthogonal as in Eq. 9.
+    Raises InputError for a motion that is constant.
+    """
+    u, f = np.asarray(u, dtype=float), np.asarray(f, dtype=float)
+    S = u.shape[-1]
+    spectrum = np.fft.rfft(u) * 1j * np.arange(S // 2 + 1)
+    if S % 2 == 0:
+        spectrum[..., -1] = 0.0
+    velocity = omega * np.fft.irfft(spectrum, S)
+    mean_u, mean_f = u.mean(-1), f.mean(-1)
+    moving = u - mean_u[..., None]
+    if not (np.abs(moving).max(-1) > 0).all():
+        raise InputError("u: an element does not move, expected a motion that varies over the period")
+    K = (moving * f).mean(-1) / (moving ** 2).mean(-1)
+    C = (velocity * f).mean(-1) / (velocity ** 2).mean(-1)
+    return Approximation(K, C, mean_f - K * mean_u)
+
+
+def from_harmonics(u: np.ndarray, f: np.ndarray, omega: float) -> Approximation:
+    """The same from coefficients u, f (..., 2H+1) [mean, cos 1, sin 1, ...] (Eq. 16, factor k in both sums)."""
+    h = _orders(u)
+    alternating = u[..., 1:]
+    K = (alternating * f[..., 1:]).sum(-1) / (alternating ** 2).sum(-1)
+    turned = u[..., 2::2] * f[..., 1::2] - u[..., 1::2] * f[..., 2::2]      # a f_c - b f_s
+    size = u[..., 1::2] ** 2 + u[..., 2::2] ** 2
+    C = (h * turned).sum(-1) / (omega * (h ** 2 * size).sum(-1))
+    return Approximation(K, C, f[..., 0] - K * u[..., 0])
+
+
+def by_harmonic(u: np.ndarray, f: np.ndarray, omega: float) -> Approximation:
+    """K_ad and C_ad of each harmonic alone, (..., H); nan where the motion lacks it; F_c0 is the mean force.
+
+    Each harmonic's approximation does the work of that harmonic, and reproduces its amplitude and phase.
+    """
+    h = _orders(u)
+    cu, su, cf, sf = u[..., 1::2], u[..., 2::2], f[..., 1::2], f[..., 2::2]
+    size = cu ** 2 + su ** 2
+    with np.errstate(invalid="ignore", divide="ignore"):
+        K, C = (cu * cf + su * sf) / size, (su * cf - cu * sf) / (omega * h * size)
+    return Approximation(K, C, np.asarray(f)[..., 0])
+
+
+def work(u: np.ndarray, f: np.ndarray) -> np.ndarray:
+    """(...,) work of f on u in one period [J], coefficients (..., 2H+1) (Eq. 12)."""
+    return np.pi * (derivative(u)[..., 1:] * np.asarray(f)[..., 1:]).sum(-1)
+
+
+def work_of(approximation: Approximation, u: np.ndarray, omega: float) -> np.ndarray:
+    """(...,) work of the averaged approximation on u (..., 2H+1) in one period [J] (Eq. 13)."""
+    return np.pi * omega * approximation.damping * (derivative(u)[..., 1:] ** 2).sum(-1)
+
+
+def _orders(u: np.ndarray) -> np.ndarray:
+    if not (np.abs(np.asarray(u)[..., 1:]).max(-1) > 0).all():
+        raise InputError("u: an element does not move, expected a motion that varies over the period")
+    return np.arange(1, harmonics_of(u) + 1)
