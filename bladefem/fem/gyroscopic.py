@@ -1,0 +1,97 @@
+"""Coriolis forces in the rotating frame: one mode of the body at rest becomes a forward and a backward wave.
+
+M q'' + Omega G q' + K(Omega) q = 0, G skew: 2 rho v . (a x u) over the body, a the axis. On the modes of one nodal
+diameter, mass-normalised, with g = Phi^H G Phi and the eigenvalues lambda of K(Omega), a motion z e^{j w t} obeys
+
+    (lambda - w^2 + j w Omega g) z = 0,
+
+Hermitian, so that every w is real (Meirovitch, AIAA J. 12 (1974), doi:10.2514/3.49486). Sector k carries the factor
+e^{j k n theta}: w > 0 travels against the count of the sectors, w < 0 with it.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from ..data import ModeSet
+from ..errors import InputError
+from .body import Body, cells_of, degrees, properties
+from .compat import PETSc, assemble_matrix, ufl
+from .linalg import apply, dot
+from .rotation import AXIS
+
+__all__ = ["Waves", "coriolis", "coupling", "waves"]
+
+
+@dataclass(frozen=True)
+class Waves:
+    """Travelling waves of one nodal diameter in the rotating frame; a standing mode has the same frequency in both."""
+
+    nodal_diameter: int | None
+    speed: float                    # [rad/s]
+    forward: np.ndarray             # (m,) [Hz], waves that run round faster than the wheel, ascending
+    backward: np.ndarray            # (m,) [Hz], ascending
+    forward_shapes: np.ndarray      # (modes, m) each wave as a sum of the modes that were coupled
+    backward_shapes: np.ndarray     # (modes, m)
+
+    @property
+    def stationary(self) -> tuple[np.ndarray, np.ndarray]:
+        """Frequencies (forward, backward) seen by an observer who does not turn [Hz]; negative: carried forward."""
+        shift = (self.nodal_diameter or 0) * self.speed / (2 * np.pi)
+        return self.forward + shift, self.backward - shift
+
+
+def coriolis(body: Body, axis: tuple[float, float, float] = AXIS) -> PETSc.Mat:
+    """G [kg]: times the speed [rad/s] it multiplies velocities in the rotating frame; skew."""
+    _, _, rho, depth = properties(body.mesh, body.material, body.space.mesh, body.plane)
+    a = np.asarray(axis, float) / np.linalg.norm(axis)
+    turn = np.array([[0, -a[2], a[1]], [a[2], 0, -a[0]], [-a[1], a[0], 0]])[:body.dim, :body.dim]
+    v, u = ufl.TestFunction(body.space), ufl.TrialFunction(body.space)
+    _, degree = degrees(body.mesh, cells_of(body), "exact")
+    form = 2 * depth * rho * ufl.inner(v, ufl.as_matrix(turn.tolist()) * u)
+    return assemble_matrix(form * ufl.dx(metadata={"quadrature_degree": degree}))
+
+
+def coupling(body: Body, modes: ModeSet, G: PETSc.Mat | None = None,
+             axis: tuple[float, float, float] = AXIS) -> np.ndarray:
+    """(m, m) skew-Hermitian g = Phi^H G Phi [1], real where the modes are.
+
+    Args:
+        modes: mass-normalised shapes on the nodes of the body's mesh.
+        G: from :func:`coriolis`, to use again.
+    """
+    first, last = body.K.owner_range
+    order = np.argsort(body.scalar_rows, kind="stable")[np.count_nonzero(body.scalar_rows < 0):][first:last]
+    X = modes.shapes[:, :, :body.dim].reshape(len(modes.frequencies), -1)[:, order].T
+    X = np.asfortranarray(X)
+    g = dot(body.comm, X, apply(coriolis(body, axis) if G is None else G, X))
+    return (g - g.conj().T) / 2
+
+
+def waves(modes: ModeSet, g: np.ndarray, speed: float, sense: int = 1) -> Waves:
+    """Forward and backward waves made of the modes of one nodal diameter.
+
+    Args:
+        modes: of the body with its stiffness at this speed.
+        g: their Coriolis coupling, :func:`coupling`.
+        speed: [rad/s], about the axis of ``g``.
+        sense: +1 where the sectors are counted in the sense of the rotation, else -1.
+
+    Raises:
+        InputError: the coupling does not fit the modes.
+    """
+    m = len(modes.frequencies)
+    if g.shape != (m, m):
+        raise InputError(f"Coriolis coupling of shape {g.shape}, expected ({m}, {m}) for {m} modes")
+    root = np.diag(2 * np.pi * modes.frequencies)
+    w, Z = np.linalg.eigh(np.block([[np.zeros((m, m)), root], [root, 1j * speed * g]]))
+    order = np.argsort(np.abs(w[:m])), m + np.argsort(w[m:])
+    turned = [(np.abs(w[part]) / (2 * np.pi), _normalised(Z[m:, part])) for part in order]
+    (forward, ahead), (backward, behind) = turned if sense > 0 else turned[::-1]
+    return Waves(modes.nodal_diameter, speed, forward, backward, ahead, behind)
+
+
+def _normalised(Z: np.ndarray) -> np.ndarray:
+    return Z / np.maximum(np.linalg.norm(Z, axis=0), 1e-300)
