@@ -1,0 +1,187 @@
+"""Stresses of a displacement field (static, mode or forced response), in NumPy and mesh numbering.
+
+Voigt order xx, yy, zz, xy, yz, zx, always six components: plane stress has zz = 0, plane strain lambda tr(e).
+Amplitudes of harmonic motion are complex, s(t) = Re(s e^{j w t}).
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cache
+
+import numpy as np
+
+from ..errors import InputError
+from . import shape
+from .body import Body, lame
+
+__all__ = ["GaussStress", "gauss_stress", "nodal_stress", "principal", "von_mises"]
+
+PAIRS = ((0, 0), (1, 1), (2, 2), (0, 1), (1, 2), (2, 0))
+BLOCK = 20000       # cells at a time
+PHASES = 64         # of a period, for principal stresses of complex fields
+
+
+@dataclass(frozen=True)
+class GaussStress:
+    """Stresses at the Gauss points of reduced integration, where they are best."""
+
+    points: np.ndarray      # (nc, q, 3) [m]
+    volume: np.ndarray      # (nc, q) [m^3]
+    stress: np.ndarray      # (nc, q, 6) [Pa], real or complex
+
+
+def gauss_stress(body: Body, u: np.ndarray, large: bool = False) -> GaussStress:
+    """Stresses in the cells, ordered as ``cells_of(body)``.
+
+    Args:
+        u: (n_points, 2 or 3) displacement [m], real or complex; mode shapes give stress per modal amplitude.
+        large: Cauchy stress of a Saint Venant-Kirchhoff body after large displacements (nonlinear preload).
+
+    Raises:
+        InputError: the field does not fit the mesh, or a complex one with large displacements.
+    """
+    mesh = body.mesh
+    if np.shape(u)[0] != len(mesh.points) or np.shape(u)[1] < body.dim:
+        raise InputError(f"displacement of shape {np.shape(u)}, expected ({len(mesh.points)}, {body.dim})")
+    if large and np.iscomplexobj(u):
+        raise InputError("displacement is complex, expected a real one for large displacements")
+    if not np.isfinite(u).all():
+        raise InputError("displacement has values that are not finite")
+    parts = [_of_cells(body, np.asarray(u)[:, :body.dim], name, block, large)
+             for name in body.material
+             for block in np.array_split(mesh.bodies[name], len(mesh.bodies[name]) // BLOCK + 1)]
+    return GaussStress(*(np.concatenate(column) for column in zip(*parts, strict=True)))
+
+
+def nodal_stress(body: Body, u: np.ndarray, large: bool = False) -> np.ndarray:
+    """(n_points, 6) stresses at the nodes [Pa]: each cell's Gauss points continued to its nodes, then the mean over
+    the cells of one material, weighted by volume; 0 outside the body.
+
+    A node between two materials takes the mean of the material with the larger von Mises stress there.
+    """
+    found = gauss_stress(body, u, large)
+    out = np.zeros((len(body.mesh.points), 6), found.stress.dtype)
+    largest = np.full(len(out), -1.0)
+    start = 0
+    for name in body.material:
+        cells = body.mesh.bodies[name]
+        part = slice(start, start + len(cells))
+        start += len(cells)
+        at_nodes = np.einsum("kq,cqs->cks", _continuation(body.mesh.cell_type), found.stress[part])
+        mean = _averaged(cells, at_nodes, found.volume[part].sum(1), len(out))
+        size = np.where(np.bincount(cells.ravel(), minlength=len(out)) > 0, von_mises(mean), -1.0)
+        better = size > largest
+        out[better], largest[better] = mean[better], size[better]
+    return out
+
+
+def von_mises(stress: np.ndarray) -> np.ndarray:
+    """(...) von Mises stress of (..., 6) [Pa]; of complex amplitudes the largest in a period, in closed form.
+
+    The square is a quadratic form Q of s(t): Q = (Q(s, s*) + Re(Q(s, s) e^{2 j w t})) / 2.
+    """
+    if not np.iscomplexobj(stress):
+        return np.sqrt(np.maximum(_form(stress, stress), 0.0))
+    mean, swing = _form(stress, stress.conj()).real, np.abs(_form(stress, stress))
+    return np.sqrt(np.maximum(mean + swing, 0.0) / 2)
+
+
+def principal(stress: np.ndarray) -> np.ndarray:
+    """(..., 3) principal stresses, descending [Pa]; of complex amplitudes the largest of each in a period."""
+    if not np.iscomplexobj(stress):
+        return np.linalg.eigvalsh(_tensor(stress))[..., ::-1]
+    turns = np.exp(2j * np.pi * np.arange(PHASES) / PHASES)
+    best = None
+    for turn in turns:
+        now = np.linalg.eigvalsh(_tensor((stress * turn).real))[..., ::-1]
+        best = now if best is None else np.maximum(best, now)
+    return best
+
+
+def _form(a: np.ndarray, b: np.ndarray) -> np.ndarray:
+    """The bilinear form whose square root is the von Mises stress."""
+    mean_a, mean_b = a[..., :3].mean(-1, keepdims=True), b[..., :3].mean(-1, keepdims=True)
+    normal = ((a[..., :3] - mean_a) * (b[..., :3] - mean_b)).sum(-1)
+    return 1.5 * normal + 3 * (a[..., 3:] * b[..., 3:]).sum(-1)
+
+
+def _tensor(stress: np.ndarray) -> np.ndarray:
+    out = np.empty((*stress.shape[:-1], 3, 3), stress.dtype)
+    for i, (a, b) in enumerate(PAIRS):
+        out[..., a, b] = out[..., b, a] = stress[..., i]
+    return out
+
+
+def _of_cells(body: Body, u: np.ndarray, name: str, cells: np.ndarray,
+              large: bool) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Places, volumes and stresses at the Gauss points of some cells of one material."""
+    mesh, d = body.mesh, body.dim
+    at, w = _best_points(mesh.cell_type)
+    values, gradients = shape.tabulate(mesh.cell_type, at)
+    tangents = np.einsum("ckg,qkd->cqgd", mesh.points[cells][:, :, :d], gradients)
+    volume = np.abs(np.linalg.det(tangents)) * w * (mesh.depth if d == 2 else 1.0)
+    slope = np.einsum("cki,qkd,cqdj->cqij", u[cells], gradients, np.linalg.inv(tangents), optimize=True)
+    strain = (slope + slope.swapaxes(2, 3)) / 2
+    if large:
+        strain = strain + slope.swapaxes(2, 3) @ slope / 2
+    lam, mu, _ = lame(body.material[name], d, body.plane)
+    trace = np.trace(strain, axis1=2, axis2=3)
+    stress = 2 * mu * strain + lam * trace[..., None, None] * np.eye(d)
+    across = lam * trace if d == 2 and body.plane == "strain" else None
+    if large:
+        F = np.eye(d) + slope
+        J = np.linalg.det(F)
+        stress = F @ stress @ F.swapaxes(2, 3) / J[..., None, None]
+        across = None if across is None else across / J
+    return np.einsum("qk,ckg->cqg", values, mesh.points[cells]), volume, _voigt(stress, across)
+
+
+def _voigt(stress: np.ndarray, across: np.ndarray | None) -> np.ndarray:
+    d = stress.shape[-1]
+    out = np.zeros((*stress.shape[:-2], 6), stress.dtype)
+    for i, (a, b) in enumerate(PAIRS):
+        if max(a, b) < d:
+            out[..., i] = stress[..., a, b]
+    if across is not None:
+        out[..., 2] = across
+    return out
+
+
+@cache
+def _best_points(cell_type: str) -> tuple[np.ndarray, np.ndarray]:
+    """Gauss points of degree 2 (p - 1): one for first-order simplices, four in a tetra10, eight in a hexahedron27."""
+    kind, degree = shape.SHAPES[cell_type]
+    if kind in ("tetra", "triangle") and degree == 2:
+        return _four_points(len(shape.nodes(kind)))
+    return shape.quadrature(kind, 2 * (degree - 1) if kind in ("tetra", "triangle") else 2 * degree - 1)
+
+
+def _four_points(corners: int) -> tuple[np.ndarray, np.ndarray]:
+    """The symmetric rule of degree 2 with a point for each corner of a simplex (Hammer and Stroud 1956)."""
+    d = corners - 1
+    near = (1 + d / np.sqrt(d + 2)) / (d + 1)
+    away = (1 - near) / d
+    weights = np.full((corners, corners), away)
+    np.fill_diagonal(weights, near)
+    return weights[:, 1:].copy(), np.full(corners, {2: 1 / 2, 3: 1 / 6}[d] / corners)
+
+
+@cache
+def _continuation(cell_type: str) -> np.ndarray:
+    """(k, q) from Gauss points to nodes, by the polynomial that the points determine."""
+    kind = shape.SHAPES[cell_type][0]
+    at, _ = _best_points(cell_type)
+    target = shape.nodes(cell_type)
+    if len(at) == 1:
+        return np.ones((len(target), 1))
+    lower, _ = shape.tabulate(kind, at)
+    return shape.tabulate(kind, target)[0] @ np.linalg.pinv(lower)
+
+
+def _averaged(cells: np.ndarray, values: np.ndarray, weight: np.ndarray, n: int) -> np.ndarray:
+    """(n, s) weighted mean of what the cells (nc, k) say about their nodes (nc, k, s)."""
+    total = np.bincount(cells.ravel(), np.repeat(weight, cells.shape[1]), n)
+    out = np.zeros((n, values.shape[2]), values.dtype)
+    np.add.at(out, cells, values * weight[:, None, None])
+    return out / np.maximum(total, 1e-300)[:, None]
