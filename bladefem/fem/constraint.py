@@ -100,7 +100,8 @@ def transformation(body: Body, clamp: str | None = "clamp", cyclic: bool = False
     sectors = body.mesh.sector.count
     if body.comm.size == 1 and one_core is not False:
         opened = _opened(body, _numbered(body, *_parts(body, clamped, None, ties))[0], low, high)
-        return Transformation(body, low, high, start, (), (), opened, sectors)
+        if opened is not None:
+            return Transformation(body, low, high, start, (), (), opened, sectors)
     T0, T1 = _to_petsc(body, low, start), _to_petsc(body, high, start)
     return Transformation(body, low, high, start, _three(body.K, T0, T1), _three(body.M, T0, T1), None, sectors)
 
@@ -282,8 +283,8 @@ def _to_petsc(body: Body, T: sp.csr_matrix, start: np.ndarray) -> PETSc.Mat:
     return matrix
 
 
-def _opened(body: Body, T: sp.csr_matrix, low: sp.csr_matrix, high: sp.csr_matrix) -> Opened:
-    """Matrices of the open sector; zeros of the mass between different directions are dropped."""
+def _opened(body: Body, T: sp.csr_matrix, low: sp.csr_matrix, high: sp.csr_matrix) -> Opened | None:
+    """Matrices of the open sector, None where it is all cut face; zeros between directions of the mass are dropped."""
     to_open = T[np.argsort(body.scalar_rows)[np.count_nonzero(body.scalar_rows < 0):]]
     K, M = (_projected(_csr(A), to_open) for A in (body.K, body.M))
     M.eliminate_zeros()
@@ -291,7 +292,8 @@ def _opened(body: Body, T: sp.csr_matrix, low: sp.csr_matrix, high: sp.csr_matri
     unit = (rows.data == 1) & (np.diff(T.indptr)[rows.row] == 1)
     places = np.empty(T.shape[1], int)
     places[rows.col[unit]] = rows.row[unit]
-    return Opened(T, places, K, M, core.eliminate(K, core.rim_of((abs(low) + abs(high))[places].tocsr())))
+    rim = core.rim_of((abs(low) + abs(high))[places].tocsr())
+    return None if len(rim) == len(places) else Opened(T, places, K, M, core.eliminate(K, rim))
 
 
 def _projected(A: sp.csr_matrix, T: sp.csr_matrix) -> sp.csr_matrix:

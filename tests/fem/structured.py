@@ -83,7 +83,8 @@ def sector(count, divisions=(3, 2, 1), cell_type="tetra10", inner=0.1, outer=0.2
         r, a, z = x[:, 0], x[:, 1] * theta, x[:, 2]
         z = z * (1 + bump * np.sin(7 * r / outer) * (0.3 + np.sin(np.pi * x[:, 1]) ** 2 * x[:, 1]))
         return np.roll(np.stack([r * np.cos(a), r * np.sin(a), z], 1), axis - 2, axis=1)
-    mesh = box(divisions, (outer - inner, 1.0, width), cell_type, origin=(inner, 0.0, 0.0), map=bend)
+    d = len(divisions)
+    mesh = box(divisions, (outer - inner, 1.0, width)[:d], cell_type, origin=(inner, 0.0, 0.0)[:d], map=bend)
     if straight:
         mesh = straightened(mesh)
     faces = {**mesh.faces, "cyclic_low": mesh.faces["y0"], "cyclic_high": mesh.faces["y1"]}
