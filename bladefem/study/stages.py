@@ -10,6 +10,7 @@ from typing import Any
 from geometry.mesh import Mesh
 
 from ..contact.patch import make_patch
+from ..contact.seat import spin_axis
 from ..data import ModeSet, Patch, PortModel
 from ..errors import InputError
 from ..reduction.assemble import folded_diameter
@@ -26,17 +27,42 @@ DAMPER_MODES = 16       # of the elastic damper, its six rigid ones included
 
 @dataclass(frozen=True)
 class Bodies:
-    """Blade and damper as finite elements, assembled and factorised when first asked for, then kept."""
+    """Blade and damper as finite elements, assembled and factorised when first asked for, then kept.
+
+    Vibrations use the stiffness under rotation (stress stiffening, spin softening) about the linear preload. Seating
+    the damper uses the elastic stiffness at rest, under the whole centrifugal load: both are first-order theory, in
+    which displacements grow with the square of the speed, and the stiffness under rotation would count the rotation
+    twice. For static displacements the difference is of the order of the strain.
+    """
 
     scene: Scene
     mesh: Mesh
     comm: Any = None
 
     @cached_property
-    def blade(self) -> Any:
-        """fem.body.Body of the blade, with the stiffness that it has under rotation."""
+    def still_blade(self) -> Any:
+        """fem.body.Body of the blade at rest."""
         from ..fem.body import assemble
         return assemble(self.mesh, "blade", self.scene.material.blade, self.comm)
+
+    @cached_property
+    def blade(self) -> Any:
+        """fem.body.Body of the blade, with the stiffness that it has under rotation."""
+        return self.blade_at(self.scene.operation.speed if self.scene.operation.stiffening else 0.0)
+
+    def blade_at(self, speed: float) -> Any:
+        """fem.body.Body of the blade with its stiffness at a speed [rad/s]."""
+        from ..fem.rotation import linear_tangent
+        if speed == 0:
+            return self.still_blade
+        u0 = speed ** 2 * self.swell
+        return replace(self.still_blade, K=linear_tangent(self.still_blade, u0, speed, spin_axis(self.mesh)))
+
+    @cached_property
+    def swell(self) -> Any:
+        """(n_points, dim) linear displacement of the blade for unit rotation [m s^2]."""
+        from ..fem.rotation import swell
+        return swell(self.still, spin_axis(self.mesh))
 
     @cached_property
     def damper(self) -> Any:
@@ -55,13 +81,17 @@ class Bodies:
 
     @cached_property
     def still(self) -> Any:
-        """fem.flexibility.Flexibility of the blade in nodal diameter 0, or clamped at its root."""
-        return self.factorised(0)
+        """fem.flexibility.Flexibility of the blade at rest under loads that are the same on all blades."""
+        from ..fem.constraint import in_step
+        from ..fem.flexibility import flexible
+        return flexible(in_step(self.still_blade))
 
     def factorised(self, diameter: int) -> Any:
-        """fem.flexibility.Flexibility of the blade in one nodal diameter."""
+        """fem.flexibility.Flexibility of the blade in one nodal diameter, or clamped at its root; under rotation."""
         from ..fem.constraint import at_diameter
         from ..fem.flexibility import flexible
+        if diameter == 0 and self.blade is self.still_blade:
+            return self.still
         return flexible(at_diameter(self.frame, diameter if is_wheel(self.mesh) else None))
 
 
@@ -116,10 +146,11 @@ def find_modes(bodies: Bodies, diameters: Sequence[int] | None = None, count: in
     """
     from ..fem.modes import modes
     if not is_wheel(bodies.mesh):
-        return [modes(bodies.still.con, count, bodies.still)]
+        flex = bodies.factorised(0)
+        return [modes(flex.con, count, flex)]
     wanted = diameters or bodies.scene.model.nodal_diameters or harmonic_diameters(bodies.scene, bodies.mesh, 3)
-    factors = {n: bodies.still if n == 0 else bodies.factorised(n) for n in wanted}
-    return [modes(flex.con, count, flex) for flex in factors.values()]
+    factors = [bodies.factorised(n) for n in wanted]
+    return [modes(flex.con, count, flex) for flex in factors]
 
 
 def seat_damper(bodies: Bodies, patches: list[Patch]) -> Any:
@@ -153,7 +184,7 @@ def reduce_sector(bodies: Bodies, patches: list[Patch], diameters: Sequence[int]
     ports, other = blade_ports(mesh, patches, scene.excitation), damper_ports(mesh, patches)
     sector = {}
     for n in diameters:
-        flex = bodies.still if n == 0 else bodies.factorised(n)
+        flex = bodies.factorised(n)
         sector[n] = port_model(flex.con, ports.matrix, ports.names, modes, kind=scene.model.reduction, flex=flex)
     floating = port_model(bodies.damper.con, other.matrix, other.names, DAMPER_MODES, flex=bodies.damper)
     first = len(patches[0].area) * mesh.dimension
