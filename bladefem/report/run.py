@@ -105,7 +105,9 @@ def points_of(curve: Any) -> pd.DataFrame:
     return pd.DataFrame({"load": curve.load, "frequency": curve.frequency, "amplitude": curve.amplitude,
                          "phase": np.angle(curve.first), "converged": curve.converged, "method": curve.method,
                          "residual": curve.residual, "iterations": curve.iterations, "slipping": curve.slipping,
-                         "dissipated": curve.dissipated, "imbalance": curve.imbalance})
+                         "dissipated": curve.dissipated, "imbalance": curve.imbalance,
+                         "estimated_error": curve.estimated, "tolerated_error": curve.tolerated,
+                         "error_checked": curve.checked})
 
 
 def _drawings(result: pipeline.Run, tables: dict[str, pd.DataFrame]) -> dict[str, Callable[[Path], object]]:

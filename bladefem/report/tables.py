@@ -48,7 +48,10 @@ COLUMNS = {
     **{name: Column(name, "m", "mm", 1e3) for name in "xyz"},
     **{f"centre_{name}": Column(f"centre {name}", "m", "mm", 1e3) for name in "xyz"},
     "complementarity": Column("complementarity", "1", digits=2), "time": Column("time", "s", digits=3),
-    "error": Column("relative error", "1", digits=2), "effective_mass": Column("effective mass", "kg", digits=4),
+    "error": Column("relative error", "1", digits=2),
+    "estimated_error": Column("estimated error", "1", "%", 100.0, 2),
+    "tolerated_error": Column("tolerated error", "1", "%", 100.0, 3), "error_checked": Column("error checked here"),
+    "effective_mass": Column("effective mass", "kg", digits=4),
     "share": Column("share", "1", "%", 100.0, 3), "factor": Column("participation", "kg^1/2", digits=4),
 }
 

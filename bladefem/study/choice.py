@@ -1,9 +1,9 @@
-"""Model no more than the scene needs: enrich what the indicators find worst until half the tolerance is met."""
+"""Model no more than the scene needs: enrich what the indicators find too wrong until half the tolerance is met."""
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from dataclasses import replace
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -13,63 +13,139 @@ from ..hbm.model import ReducedModel
 from ..hbm.resonance import free_resonances, stuck_resonances
 from ..hbm.solution import Solution
 from ..hbm.sweep import size, sweep
+from .family import Family, carried, member
 from .indicators import Indicators, indicate
 from .settings import Settings, enriched
 
-__all__ = ["Join", "choose", "covered", "default_band", "peak_of", "response_points"]
+__all__ = ["Checked", "adapted", "checked", "choose", "covered", "default_band", "estimated", "peak_of",
+           "response_points"]
 
-# Settings to the model to solve and, where that one is not elastic, the same with the elastic damper.
-Join = Callable[[Settings], tuple[ReducedModel, ReducedModel | None]]
 ROUNDS = 12
+PASSES = 3          # sweeps of one curve with ever richer settings
 WIDENINGS = 4
+SHARES = (0.7, 0.25)    # of the peak's height: where a curve is checked on each side beside the peak itself
 
 
-def choose(join: Join, settings: Settings, peak: Solution, accuracy: float,
+@dataclass(frozen=True)
+class Checked:
+    """A curve whose settings were checked at some of its points."""
+
+    settings: Settings          # with the error estimated at the resonance
+    points: list[Solution]      # sorted by frequency
+    errors: dict[float, float]  # circular frequency of the checked points to the estimated relative error
+
+
+def choose(family: Family, settings: Settings, point: Solution, accuracy: float,
            fixed: tuple[str, ...] = ()) -> tuple[Settings, Solution, Indicators]:
-    """Settings whose estimated error at a resonance is below half the accuracy, or the best that may be chosen.
+    """Settings whose estimated error at one point is below half the accuracy, or the best that may be chosen.
 
     Args:
-        join: makes the models of some settings.
-        peak: the resonance, solved with `settings`; its frequency is kept.
+        point: solved with `settings`; its frequency is kept.
         fixed: names that may not be changed here although they are not the user's.
     """
     for _ in range(ROUNDS):
-        model, elastic = join(settings)
-        peak = solve(model, peak.omega, settings.harmonics, settings.samples, start=peak)
-        found = indicate(model, peak, elastic)
+        found = indicate(family, settings, point)
         settings = replace(settings, error=found.total)
-        if found.total <= accuracy / 2:
+        better = None if found.total <= accuracy / 2 else _next(settings, found, accuracy, fixed)
+        if better is None:
             break
-        richer = _next(settings, found, accuracy, fixed)
-        if richer is None:
-            break
-        settings = richer
-    return settings, peak, found
+        point = _moved(family, settings, point, better)
+        settings = better
+    return settings, point, found
+
+
+def _moved(family: Family, settings: Settings, point: Solution, better: Settings) -> Solution:
+    """The same frequency solved with better settings."""
+    new = member(family, better)
+    start = replace(point, w=carried(point.w, member(family, settings), new, better.harmonics))
+    return solve(new.model, point.omega, better.harmonics, better.samples, start=start)
 
 
 def _next(settings: Settings, found: Indicators, accuracy: float, fixed: tuple[str, ...]) -> Settings | None:
-    """The settings enriched in the worst respect that is open; None when nothing open would help."""
-    open_names = [name for name in settings.chosen if name not in fixed]
-    for name in sorted(open_names, key=lambda n: -getattr(found, n)):
-        if getattr(found, name) < accuracy / 20:
-            return None
-        richer = enriched(settings, name)
-        if richer is not None:
-            return richer
-    return None
+    """Enriched in each open respect that takes more than its share, the worst at least; None when nothing helps."""
+    names = [name for name in settings.chosen if name not in fixed and found.errors.get(name, 0.0) > accuracy / 20]
+    names.sort(key=lambda name: -found.errors[name])
+    share, better = accuracy / 2 / max(len(settings.chosen), 1), settings
+    for name in names:
+        error = found.errors[name]
+        if better == settings or error > share:
+            need = error / share if np.isfinite(error) else 4.0
+            better = enriched(better, name, need) or better
+    return None if better == settings else better
 
 
-def covered(model: ReducedModel, settings: Settings, band: tuple[float, float] | None, mode: int,
-            accuracy: float) -> list[Solution]:
-    """A sweep of the given band [Hz], or of one that is widened until its highest point lies inside.
+def adapted(family: Family, settings: Settings, band: tuple[float, float] | None, mode: int, accuracy: float,
+            fixed: tuple[str, ...] = ()) -> Checked:
+    """A swept curve with settings that hold at its peak and on its flanks; swept again where they did not.
+
+    The tolerated error of a point is the accuracy times the height of the peak over the height of the point.
+
+    Args:
+        band: [Hz]; round the resonances when None.
 
     Raises:
         NotSolvedError: no point converged.
     """
-    if band is not None:
-        return response_points(model, settings, band, accuracy)
-    low, high = default_band(model, mode)
-    for _ in range(WIDENINGS):
+    widen = band is None
+    if settings.chosen:
+        rough = covered(member(family, settings).model, settings, band, mode, 1.0)
+        settings, _, _ = choose(family, settings, peak_of(rough), accuracy, fixed)
+        band = band or (rough[0].frequency, rough[-1].frequency)
+    for last in [False] * (PASSES - 1) + [True]:
+        points = covered(member(family, settings).model, settings, band, mode, accuracy, widen)
+        top, used, errors = peak_of(points), settings, {}
+        for point in watched(points):
+            tolerated = accuracy * size(top) / size(point)
+            if last:
+                found = indicate(family, settings, point)
+            else:
+                used, _, found = choose(family, settings, point, tolerated, fixed)
+                used = replace(used, error=settings.error)
+            errors[point.omega] = found.total
+            if used != settings:
+                break
+        if used == settings:
+            return Checked(replace(settings, error=errors[top.omega]), points, errors)
+        settings = used
+    return Checked(replace(settings, error=errors[top.omega]), points, errors)
+
+
+def watched(points: Sequence[Solution]) -> list[Solution]:
+    """The points that a curve is checked at: the peak, then one on each flank for each of SHARES of its height."""
+    good = [p for p in points if p.converged]
+    heights = np.array([size(p) for p in good])
+    top = int(heights.argmax())
+    chosen = [top]
+    for share in SHARES:
+        for side in (range(top), range(top + 1, len(good))):
+            if len(side):
+                chosen.append(min(side, key=lambda i: abs(heights[i] - share * heights[top])))
+    return [good[i] for i in dict.fromkeys(chosen)]
+
+
+def checked(curve: Checked) -> np.ndarray:
+    """(k,) bool: which points were checked themselves."""
+    return np.array([p.omega in curve.errors for p in curve.points])
+
+
+def estimated(curve: Checked) -> np.ndarray:
+    """(k,) estimated relative error of each point: linear in frequency between the checked ones, held beyond them."""
+    at = np.array(sorted(curve.errors))
+    return np.interp([p.omega for p in curve.points], at, [curve.errors[w] for w in at])
+
+
+def covered(model: ReducedModel, settings: Settings, band: tuple[float, float] | None, mode: int,
+            accuracy: float, widen: bool = False) -> list[Solution]:
+    """A sweep of a band [Hz], or of one round the resonances; that one is widened until its highest point lies inside.
+
+    Args:
+        widen: a given band may be widened as well.
+
+    Raises:
+        NotSolvedError: no point converged.
+    """
+    low, high = band or default_band(model, mode)
+    for _ in range(1 if band and not widen else WIDENINGS):
         points = response_points(model, settings, (low, high), accuracy)
         good = [p.omega for p in points if p.converged]
         top = peak_of(points).omega
@@ -82,14 +158,15 @@ def covered(model: ReducedModel, settings: Settings, band: tuple[float, float] |
 
 def response_points(model: ReducedModel, settings: Settings, band: tuple[float, float],
                     accuracy: float) -> list[Solution]:
-    """A sweep of a band [Hz], sorted by frequency.
+    """A sweep of a band [Hz], sorted by frequency; an accuracy of 1 asks for no more than the place of the peak.
 
     Raises:
         NotSolvedError: no point converged.
     """
     circular = (2 * np.pi * band[0], 2 * np.pi * band[1])
-    points = sorted(sweep(model, circular, settings.harmonics, settings.samples, peak=min(accuracy / 10, 1e-2)),
-                    key=lambda s: s.omega)
+    swept = sweep(model, circular, settings.harmonics, settings.samples, peak=min(accuracy / 10, 1e-2),
+                  curve=0.2 if accuracy >= 1 else 0.02)
+    points = sorted(swept, key=lambda s: s.omega)
     if not any(p.converged for p in points):
         raise NotSolvedError(f"no point between {band[0]:.5g} and {band[1]:.5g} Hz was solved; "
                              f"the first stopped because: {points[0].reason}")

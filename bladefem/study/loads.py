@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -14,9 +14,10 @@ from ..hbm.resonance import free_resonances
 from ..hbm.solution import Solution
 from ..hbm.sweep import size
 from ..scene import Scene
-from .choice import Join, choose, covered, peak_of
+from .choice import adapted, checked, estimated, peak_of
+from .family import Family
 from .joint import LoadCase
-from .settings import Settings
+from .settings import Settings, restarted
 
 Progress = Callable[[Iterable[Any], str], Iterable[Any]]
 
@@ -44,6 +45,9 @@ class Curve:
     slipping: np.ndarray        # (k,) number of elements that slip or lift off in a period
     dissipated: np.ndarray      # (k,) friction work a period [J]
     imbalance: np.ndarray       # (k,) |work put in - work lost| over work put in
+    estimated: np.ndarray       # (k,) estimated relative error of the first harmonic
+    tolerated: np.ndarray       # (k,) the same as wanted: the scene's accuracy times peak over amplitude
+    checked: np.ndarray         # (k,) bool: estimated at this very point; else between its neighbours
     peak: Solution              # the highest converged point
 
     @property
@@ -57,34 +61,36 @@ class Curve:
         return size(self.peak)
 
 
-def study_loads(scene: Scene, cases: list[LoadCase], join: Callable[[LoadCase], Join], settings: Settings,
+def study_loads(scene: Scene, cases: list[LoadCase], family: Callable[[LoadCase], Family], settings: Settings,
                 comm: Any = None, progress: Progress = unwatched) -> list[Curve]:
     """One response curve a load case, shared over the ranks; every rank returns all of them.
 
     Args:
-        join: of a load case, the function that makes its models from settings.
-        settings: where every case starts; each then enriches what its own resonance needs, but for the modes.
+        family: of a load case, its models.
+        settings: modes and damper model to keep; each case then takes the rest from what its own curve needs.
         progress: wraps the list of cases of this rank, as tqdm does; the second argument is a label.
     """
     rank, ranks = (comm.rank, comm.size) if comm is not None else (0, 1)
-    curves = {i: curve_of(scene, cases[i].load, join(cases[i]), settings)
+    curves = {i: curve_of(scene, cases[i].load, family(cases[i]), settings)
               for i in progress(range(rank, len(cases), ranks), "forced responses")}
     for part in comm.allgather(curves) if ranks > 1 else []:
         curves.update(part)
     return [curves[i] for i in range(len(cases))]
 
 
-def curve_of(scene: Scene, load: float, join: Join, settings: Settings) -> Curve:
-    """Sweep a band with points where the curve needs them, judge the resonance, sweep again if the model was poor.
+def curve_of(scene: Scene, load: float, family: Family, settings: Settings) -> Curve:
+    """Sweep a band with points where the curve needs them, with settings that hold at its peak and on its flanks.
 
     Raises:
         NotSolvedError: no point converged.
     """
-    points = covered(join(settings)[0], settings, scene.study.band, scene.excitation.mode, scene.accuracy)
-    used, _, _ = choose(join, settings, peak_of(points), scene.accuracy, fixed=("modes",))
-    if replace(used, error=None) != replace(settings, error=None):
-        points = covered(join(used)[0], used, scene.study.band, scene.excitation.mode, scene.accuracy)
-    return Curve(load, used, *(np.array(column) for column in zip(*map(_record, points), strict=True)), peak_of(points))
+    curve = adapted(family, restarted(settings), scene.study.band, scene.excitation.mode, scene.accuracy,
+                    fixed=("modes",))
+    top = peak_of(curve.points)
+    heights = np.array([size(p) for p in curve.points])
+    tolerated = scene.accuracy * size(top) / np.maximum(heights, 1e-6 * size(top))
+    return Curve(load, curve.settings, *(np.array(c) for c in zip(*map(_record, curve.points), strict=True)),
+                 estimated(curve), tolerated, checked(curve), top)
 
 
 def _record(p: Solution) -> tuple[object, ...]:

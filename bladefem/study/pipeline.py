@@ -6,25 +6,28 @@ import time
 from collections.abc import Callable
 from contextlib import contextmanager
 from dataclasses import dataclass, field, replace
-from functools import partial
+from functools import lru_cache, partial
 from pathlib import Path
 from typing import Any
+
+import numpy as np
 
 from geometry.mesh import Mesh
 
 from ..contact.seat import ContactProblem
 from ..contact.seat import solve as seat
-from ..contact.stiffness import friction_elements, pair_ratio
-from ..data import ModeSet, PressureMap
+from ..contact.stiffness import aggregation, friction_elements, pair_ratio
+from ..data import ModeSet, Patch, PressureMap
 from ..errors import InputError
-from ..hbm.model import ReducedModel
+from ..reduction.truncate import truncated
 from ..scene import Scene
 from ..store import stage
 from .choice import choose, covered, peak_of
+from .family import Family, Member, coarsened, member
 from .joint import LoadCase, joint_model
 from .keys import contact_key, mesh_key, modes_key, reduction_key, response_key
 from .loads import Curve, Progress, default_loads, free_peak, study_loads, unwatched
-from .settings import Settings, enriched, first_settings
+from .settings import DAMPERS, Settings, enriched, first_settings
 from .stages import (
     Bodies,
     Reduced,
@@ -36,7 +39,7 @@ from .stages import (
     seat_damper,
 )
 
-__all__ = ["STAGES", "Response", "Run", "Seating", "run"]
+__all__ = ["STAGES", "Response", "Run", "Seating", "family_of_case", "load_cases", "reduced_sector", "run"]
 
 EXACT_HARMONICS = 3      # higher ones borrow the nodal diameter next to their own
 STAGES = ("mesh", "modes", "contact", "response")
@@ -144,45 +147,66 @@ class _Keeper:
 
 def _response(scene: Scene, bodies: Bodies, contact: Seating, keep: _Keeper, clock: Clock,
               progress: Progress) -> Response:
-    cases = [_load_case(scene, bodies.mesh, load, maps) for load, maps in contact.maps.items()]
+    cases, patches = load_cases(scene, bodies.mesh, contact), list(contact.problem.patches)
     with clock("reduction"):
-        settings, reduced = _reduced(scene, bodies, cases[len(cases) // 2], contact, keep)
-    join = partial(_join, scene, bodies.mesh, reduced, list(contact.problem.patches))
+        settings, reduced = reduced_sector(scene, bodies, cases[len(cases) // 2], patches, keep)
+    family = partial(family_of_case, scene, bodies.mesh, reduced, patches)
     key = response_key(scene, settings, list(contact.maps))
     with clock("response"):
-        curves = keep("response", key, lambda: study_loads(scene, cases, lambda case: partial(join, case), settings,
-                                                           bodies.comm, progress))
+        curves = keep("response", key, lambda: study_loads(scene, cases, family, settings, bodies.comm, progress))
     clock.messages.extend(_remarks(scene, settings, curves))
-    return Response(reduced, settings, curves, free_peak(join(cases[0], settings)[0], scene.excitation.mode))
+    rich = member(family(cases[0]), settings).model
+    return Response(reduced, settings, curves, free_peak(rich, scene.excitation.mode))
 
 
-def _join(scene: Scene, mesh: Mesh, reduced: Reduced, patches: list[Any], case: LoadCase,
-          settings: Settings) -> tuple[ReducedModel, ReducedModel | None]:
-    """The model of some settings, with harmonics enough for its indicator, and the one with the elastic damper."""
-    harmonics = 2 * settings.harmonics + 1
-    model = joint_model(scene, mesh, reduced, patches, case, harmonics, settings.damper)
-    if settings.damper == "elastic":
-        return model, None
-    return model, joint_model(scene, mesh, reduced, patches, case, harmonics, "elastic")
+def load_cases(scene: Scene, mesh: Mesh, contact: Seating) -> list[LoadCase]:
+    """The friction elements of each load."""
+    return [_load_case(scene, mesh, load, maps) for load, maps in contact.maps.items()]
 
 
-def _reduced(scene: Scene, bodies: Bodies, case: LoadCase, contact: Seating,
-             keep: _Keeper) -> tuple[Settings, Reduced]:
-    """The sector reduced with as many modes as the resonance of the middle load needs, and settings to start from."""
-    settings, patches = first_settings(scene), list(contact.problem.patches)
+def family_of_case(scene: Scene, mesh: Mesh, reduced: Reduced, patches: list[Patch], case: LoadCase) -> Family:
+    """All models of a load case that the reduced sector allows."""
+    nodes = len(case.elements.kt)
+
+    @lru_cache(maxsize=4)
+    def build(settings: Settings) -> Member:
+        few = {n: truncated(body, settings.modes) for n, body in reduced.sector.items()}
+        model = joint_model(scene, mesh, replace(reduced, sector=few), patches, case, settings.harmonics,
+                            settings.damper)
+        groups = np.arange(nodes) if settings.points is None else _groups(patches, settings.points)
+        return Member(coarsened(model, groups), groups)
+
+    return Family(build, max(len(body.omega) for body in reduced.sector.values()), dampers=DAMPERS)
+
+
+def _groups(patches: list[Patch], points: int) -> np.ndarray:
+    """(nodes of all patches,) number of the element that each belongs to."""
+    parts = [aggregation(patch, points) for patch in patches]
+    starts = np.cumsum([0] + [part.shape[1] for part in parts])
+    return np.concatenate([start + part.indices for start, part in zip(starts, parts, strict=False)])
+
+
+def reduced_sector(scene: Scene, bodies: Bodies, case: LoadCase, patches: list[Patch],
+                   keep: Callable[[str, str, Callable[[], Any]], Any]) -> tuple[Settings, Reduced]:
+    """The sector with as many modes as the resonance of one load needs, and settings to start the others from.
+
+    Where the number of modes is open, twice as many are reduced as the balance takes: they judge it.
+    """
+    settings, spare = first_settings(scene), 1 if scene.model.modes else 2
     diameters = harmonic_diameters(scene, bodies.mesh, EXACT_HARMONICS)
     while True:
-        key = reduction_key(scene, diameters, settings.modes)
-        reduced = keep("reduction", key, partial(reduce_sector, bodies, patches, diameters, settings.modes))
+        count = spare * settings.modes
+        key = reduction_key(scene, diameters, count)
+        reduced = keep("reduction", key, partial(reduce_sector, bodies, patches, diameters, count))
         if not settings.chosen:
             return settings, reduced
-        join = partial(_join, scene, bodies.mesh, reduced, patches, case)
-        peak = peak_of(covered(join(settings)[0], settings, scene.study.band, scene.excitation.mode, 1.0))
-        settings, _, found = choose(join, settings, peak, scene.accuracy, fixed=("modes",))
-        richer = enriched(settings, "modes")
-        if "modes" not in settings.chosen or found.modes <= scene.accuracy / 4 or richer is None:
+        family = family_of_case(scene, bodies.mesh, reduced, patches, case)
+        rough = covered(member(family, settings).model, settings, scene.study.band, scene.excitation.mode, 1.0)
+        settings, _, found = choose(family, settings, peak_of(rough), scene.accuracy, fixed=("modes",))
+        more = enriched(settings, "modes")
+        if "modes" not in settings.chosen or found.errors["modes"] <= scene.accuracy / 10 or more is None:
             return settings, reduced
-        settings = richer
+        settings = more
 
 
 def _remarks(scene: Scene, settings: Settings, curves: list[Curve]) -> list[str]:

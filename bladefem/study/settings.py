@@ -3,13 +3,16 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from math import ceil, log2, sqrt
 
 from ..scene import Scene
 
-__all__ = ["DAMPERS", "Settings", "enriched", "first_settings"]
+__all__ = ["DAMPERS", "DIRECTIONS", "Settings", "enriched", "first_for", "first_settings", "restarted"]
 
 DAMPERS = ("mass", "rigid", "elastic")      # from poor to rich
-RICHEST = {"modes": 160, "harmonics": 31, "samples": 4096}
+DIRECTIONS = ("harmonics", "samples", "modes", "points", "damper")     # in which a model is enriched
+RICHEST = {"modes": 160, "harmonics": 31, "samples": 4096, "points": 4096}
+FIRST = {"modes": 10, "harmonics": 1, "samples": 64, "points": 4, "damper": "rigid"}
 
 
 @dataclass(frozen=True)
@@ -20,6 +23,7 @@ class Settings:
     harmonics: int
     samples: int                    # a period
     damper: str                     # one of DAMPERS
+    points: int | None = None       # friction elements on each patch; None: all that there are
     error: float | None = None      # estimated relative error of the resonance amplitude, None before the check
     chosen: tuple[str, ...] = ()    # names that are chosen here and not by the user
 
@@ -27,27 +31,60 @@ class Settings:
         """The settings in words."""
         error = "not estimated" if self.error is None else f"estimated error {100 * self.error:.2g} %"
         kind = "chosen: " + ", ".join(self.chosen) if self.chosen else "all given by the scene"
-        return (f"model: {self.modes} modes, {self.harmonics} harmonics, {self.samples} samples, {self.damper} damper "
-                f"({error}; {kind})")
+        points = "all contact points" if self.points is None else f"up to {self.points} contact points on each seat"
+        return (f"model: {self.modes} modes, {self.harmonics} harmonics, {self.samples} samples, {points}, "
+                f"{self.damper} damper ({error}; {kind})")
+
+
+def first_for(modes: int, dampers: bool = False) -> Settings:
+    """Where the choice starts for a model without a scene: everything open.
+
+    Args:
+        modes: most that there are.
+        dampers: whether there are several damper models.
+    """
+    names = tuple(name for name in DIRECTIONS if dampers or name != "damper")
+    return Settings(**(FIRST | {"modes": min(FIRST["modes"], modes)}), chosen=names)
 
 
 def first_settings(scene: Scene) -> Settings:
     """Where the choice starts: the smallest model that the indicators can judge."""
-    guess = {"modes": 20, "harmonics": 1, "samples": 64, "damper": "rigid"}
-    given = {name: getattr(scene.model, name) for name in guess}
+    given = {name: getattr(scene.model, name) for name in FIRST if name != "points"}
+    guess = FIRST | {"modes": max(FIRST["modes"], scene.excitation.mode + 6)}
     settings = Settings(**{name: guess[name] if value is None else value for name, value in given.items()},
-                        chosen=tuple(name for name, value in given.items() if value is None))
+                        points=FIRST["points"] if scene.contact.points is None else None,
+                        chosen=tuple(name for name, value in (given | {"points": scene.contact.points}).items()
+                                     if value is None))
     return _enough_samples(settings)
 
 
-def enriched(settings: Settings, name: str) -> Settings | None:
-    """The next richer settings in one respect; None where there is none."""
+def enriched(settings: Settings, name: str, need: float = 4.0) -> Settings | None:
+    """The next richer settings in one respect; None where there is none.
+
+    Args:
+        need: how many times smaller the error should become; samples and points are of second order, so that a large
+            need takes several doublings at once.
+    """
     value = getattr(settings, name)
     if name == "damper":
         place = DAMPERS.index(value) + 1
         return replace(settings, damper=DAMPERS[place]) if place < len(DAMPERS) else None
-    more = 2 * value + 1 if name == "harmonics" else 2 * value
-    return _enough_samples(replace(settings, **{name: more})) if more <= RICHEST[name] else None
+    if value is None:
+        return None
+    if name == "harmonics":
+        more = 2 * value + 1
+    elif name == "modes":
+        more = 2 * value
+    else:
+        more = value * 2 ** min(max(ceil(log2(sqrt(max(need, 1.0)))), 1), 3)
+    more = min(more, RICHEST[name])
+    return _enough_samples(replace(settings, **{name: more})) if more > value else None
+
+
+def restarted(settings: Settings) -> Settings:
+    """Back to the start in what is cheap to choose again; modes and damper model are kept for the next load case."""
+    names = [name for name in ("harmonics", "samples", "points") if name in settings.chosen]
+    return _enough_samples(replace(settings, **{name: FIRST[name] for name in names}))
 
 
 def _enough_samples(settings: Settings) -> Settings:
