@@ -18,7 +18,7 @@ from ..errors import NotSolvedError
 from .compat import MPI, PETSc
 from .mumps import Factorised, factorise_matrix, schur_complement, solve_matrix
 
-__all__ = ["Core", "Rim", "close", "eliminate", "inner_solve", "masters", "rim_of", "solve", "times"]
+__all__ = ["Core", "Rim", "close", "eliminate", "face_solve", "inner_solve", "masters", "rim_of", "solve", "times"]
 
 
 @dataclass(frozen=True)

@@ -5,19 +5,24 @@ Both come from the one factorisation that also gives the modes.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 import scipy.sparse as sp
 from scipy.linalg import eigh
 
 from ..data import PortModel
 from ..errors import InputError, suggestion
-from .constraint import Constrained, restrict
+from .constraint import Constrained, Opened, Transformation, restrict
+from .core import Rim, face_solve, inner_solve
 from .flexibility import Flexibility, compliance, flexible
 from .linalg import apply, dot
-from .modes import canonical, elastic_pairs, pairs
+from .modes import TOLERANCE, canonical, elastic_pairs, pairs
+from .wheel import eigenpairs
 
-__all__ = ["flexibility", "port_model"]
+__all__ = ["flexibility", "port_model", "port_models"]
 
+BATCH = 64      # ports in one sweep
 KINDS = ("rubin", "craig-bampton")
 
 
@@ -51,6 +56,32 @@ def port_model(con: Constrained, P: sp.spmatrix, names: dict[str, slice], count:
     return PortModel(omega, shapes, residual, names, con.nodal_diameter, offset)
 
 
+def port_models(t: Transformation, P: sp.spmatrix, names: dict[str, slice], count: int, diameters: Sequence[int],
+                static_load: np.ndarray | None = None, kind: str = "rubin") -> dict[int, PortModel]:
+    """``port_model`` in several nodal diameters, with all work shared that does not depend on them.
+
+    Where one rank holds the wheel, the static flexibility of all diameters takes one sweep over the ports.
+
+    Args:
+        static_load: (n_points*dim,) [N], of nodal diameter 0.
+    """
+    shared = _sweep(t.opened, P, static_load) if t.opened is not None and kind == "rubin" else None
+    out = {}
+    for p in eigenpairs(t, count, diameters, tolerance=TOLERANCE):
+        n = p.con.nodal_diameter
+        load = static_load if n == 0 else None
+        if shared is None or p.flex.R.shape[1]:
+            out[n] = port_model(p.con, P, names, count, load, kind, p.flex)
+            continue
+        G, offset = _closed(shared, p.flex.factor.parts)
+        lam = p.lam[:count]
+        shapes = dot(t.body.comm, _restricted(p.con, P), canonical(p.con, lam, p.X[:, :count]))
+        ports = P.shape[1]
+        out[n] = PortModel(np.sqrt(lam), shapes, _residual(G[:ports, :ports], lam, shapes), names, n,
+                           None if load is None else offset)
+    return {n: out[n] for n in diameters}
+
+
 def flexibility(con: Constrained, P: sp.spmatrix, flex: Flexibility | None = None) -> np.ndarray:
     """(p, p) static flexibility P^T T K^+ T^H P [m/N], Hermitian; without rigid motions where the body floats."""
     F = _restricted(con, P)
@@ -63,14 +94,40 @@ def _restricted(con: Constrained, P: sp.spmatrix) -> np.ndarray:
     return restrict(con, sp.csc_matrix(P)).astype(con.dtype)
 
 
+def _sweep(opened: Opened, P: sp.spmatrix, load: np.ndarray | None) -> tuple[np.ndarray, np.ndarray]:
+    """What the interior of an open sector gives: its flexibility at the ports (p, p), and the ports' loads as the rim
+    feels them (nb, p); a static load is the last column."""
+    columns = [P] if load is None else [P, sp.csc_matrix(load.reshape(-1, 1))]
+    F = sp.csc_matrix(opened.T.T @ sp.hstack(columns))
+    inside, rim = F[opened.core.inner], F[opened.core.rim].toarray()
+    G = np.empty((F.shape[1], F.shape[1]))
+    for first in range(0, F.shape[1], BATCH):
+        part = slice(first, first + BATCH)
+        Y = inner_solve(opened.core, inside[:, part].toarray())
+        G[:, part] = inside.T @ Y
+        rim[:, part] -= opened.core.coupling @ Y
+    return G, rim
+
+
+def _closed(shared: tuple[np.ndarray, np.ndarray], rim: Rim) -> tuple[np.ndarray, np.ndarray]:
+    """The flexibility (p, p) with the cut faces joined, and its last column's real part."""
+    g = rim.C.conj().T @ shared[1]
+    G = _hermitian(shared[0] + g.conj().T @ face_solve(rim, g))
+    return G, G[:-1, -1].real
+
+
 def _rubin(flex: Flexibility, F: np.ndarray, X: np.ndarray, count: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Free modes, and what the modes left out give to the static flexibility (Rubin 1975, doi:10.2514/3.60497)."""
-    con, comm = flex.con, flex.con.body.comm
+    comm = flex.con.body.comm
     lam, V = pairs(flex, count)
-    shapes = dot(comm, F, canonical(con, lam, V))
+    shapes = dot(comm, F, canonical(flex.con, lam, V))
+    return np.sqrt(lam), shapes, _residual(dot(comm, F, X), lam, shapes)
+
+
+def _residual(G: np.ndarray, lam: np.ndarray, shapes: np.ndarray) -> np.ndarray:
+    """Static flexibility less that of the elastic modes kept."""
     elastic = lam > 0
-    known = shapes[:, elastic] / lam[elastic] @ shapes[:, elastic].conj().T
-    return np.sqrt(lam), shapes, _hermitian(dot(comm, F, X) - known)
+    return _hermitian(G - shapes[:, elastic] / lam[elastic] @ shapes[:, elastic].conj().T)
 
 
 def _craig_bampton(flex: Flexibility, F: np.ndarray, X: np.ndarray,

@@ -67,7 +67,8 @@ def all_diameters(body: Body | Transformation, count: int, diameters: Sequence[i
     return [mode_set(found[n].con, found[n].lam[:count], found[n].X[:, :count]) for n in wanted]
 
 
-def eigenpairs(t: Transformation, count: int, diameters: Sequence[int], direct: bool = False) -> Iterator[Eigenpairs]:
+def eigenpairs(t: Transformation, count: int, diameters: Sequence[int], direct: bool = False,
+               tolerance: float = CLOSE) -> Iterator[Eigenpairs]:
     """``count`` pairs and some guards in each nodal diameter, in the order in which they are solved."""
     cons = {n: at_diameter(t, n) for n in diameters}
     solved, space = [], None
@@ -75,7 +76,7 @@ def eigenpairs(t: Transformation, count: int, diameters: Sequence[int], direct: 
         if i in LEVELS and not direct:
             space = _space(t, [p.X for p in solved])
         start = None if space is None else _guess(space, cons[n], 2 * np.pi * n / t.sectors, count + GUARD)
-        solved.append(_pairs(flexible(cons[n]), count, start))
+        solved.append(_pairs(flexible(cons[n]), count, start, tolerance))
         yield solved[-1]
 
 
@@ -88,9 +89,9 @@ def _bisected(order: list[int]) -> list[int]:
     return [order[i] for i in dict.fromkeys([*out, *range(len(order))])] if order else []
 
 
-def _pairs(flex: Flexibility, count: int, start: np.ndarray | None) -> Eigenpairs:
+def _pairs(flex: Flexibility, count: int, start: np.ndarray | None, tolerance: float = CLOSE) -> Eigenpairs:
     guard = min(GUARD, flex.con.T.shape[1] - count)
-    return Eigenpairs(flex, *pairs(flex, count, CLOSE, start, guard))
+    return Eigenpairs(flex, *pairs(flex, count, tolerance, start, guard))
 
 
 def _space(t: Transformation, blocks: list[np.ndarray]) -> tuple[np.ndarray, list[np.ndarray], list[np.ndarray]]:

@@ -7,11 +7,11 @@ from structured import box, sector
 
 from bladefem.errors import InputError
 from bladefem.fem.body import assemble
-from bladefem.fem.constraint import constrain, restrict
+from bladefem.fem.constraint import at_diameter, constrain, restrict, transformation
 from bladefem.fem.flexibility import flexible
 from bladefem.fem.linalg import combined, dot, factorise, solve
 from bladefem.fem.modes import modes
-from bladefem.fem.ports import flexibility, port_model
+from bladefem.fem.ports import flexibility, port_model, port_models
 from bladefem.scene import Material
 
 CASES = [("sector", 0, "clamp"), ("sector", 1, "clamp"), ("sector", 1, None), ("sector", 0, None), ("box", None, None),
@@ -77,6 +77,27 @@ def test_static_flexibility_and_offset():
     ports = port_model(con, P, names, 5, static_load=load)
     with_load = sp.hstack([P, sp.csr_matrix(load[:, None])])
     np.testing.assert_allclose(ports.static_offset, flexibility(con, with_load)[:9, 9], rtol=1e-9)
+
+
+@pytest.mark.mpi
+@pytest.mark.parametrize("kind, clamp", [("rubin", "clamp"), ("rubin", None), ("craig-bampton", "clamp")])
+def test_shared_sweep_equals_each_alone(kind, clamp):
+    """Ports inside and on the cut faces, five diameters at once and one by one."""
+    mesh = sector(9, (3, 2, 1), bump=0.2)
+    t = transformation(assemble(mesh, "blade", Material()), clamp, True)
+    nodes = [*np.unique(mesh.faces["x1"])[[0, 3]], mesh.pairs["cyclic"].nodes[0, -1], mesh.pairs["cyclic"].nodes[1, -2]]
+    places = (3 * np.array(nodes)[:, None] + np.arange(3)).ravel()
+    P = sp.csr_matrix((np.ones(12), (places, np.arange(12))), shape=(3 * len(mesh.points), 12))
+    load = np.random.default_rng(1).normal(size=P.shape[0])
+    together = port_models(t, P, {"contact": slice(0, 12)}, 8, [0, 1, 2, 3, 4], load, kind)
+    for n, a in together.items():
+        b = port_model(at_diameter(t, n), P, {"contact": slice(0, 12)}, 8, load if n == 0 else None, kind)
+        np.testing.assert_allclose(a.omega, b.omega, rtol=1e-10, atol=1e-6)
+        np.testing.assert_allclose(a.residual, b.residual, atol=1e-8 * max(abs(b.residual).max(), 1e-12))
+        np.testing.assert_allclose(a.shapes, b.shapes, atol=1e-6 * abs(b.shapes).max())
+        assert (a.static_offset is None) == (n != 0)
+    np.testing.assert_allclose(together[0].static_offset, port_model(
+        at_diameter(t, 0), P, {}, 2, load).static_offset, rtol=1e-8)
 
 
 def test_props_of_a_floating_body_leave_no_trace():
