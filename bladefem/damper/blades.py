@@ -12,14 +12,17 @@ What is true of the paper's statements on the reference blade (k_t 1e6 N/m a sea
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator
-from dataclasses import dataclass
+from collections.abc import Callable, Iterable, Iterator
+from dataclasses import dataclass, replace
 
 import numpy as np
+from scipy.optimize import minimize_scalar
 
 from bladefem.data import RigidBody
 from bladefem.errors import NotSolvedError
+from bladefem.friction.harmonics import synthesis
 from bladefem.hbm.model import ReducedModel
+from bladefem.hbm.reference import reference_model
 from bladefem.hbm.solution import Solution
 from bladefem.hbm.sweep import size, sweep
 
@@ -28,7 +31,23 @@ from .paper import platform
 from .shooting import Periodic, harmonics, periodic
 from .system import System, ring
 
-__all__ = ["Peak", "judge", "load_curve", "loop_response", "peak"]
+__all__ = ["Peak", "judge", "load_curve", "loop_response", "optimum", "paper_blade", "peak", "seat_loop"]
+
+
+def paper_blade(kt: float = 1e6, mass: float = 0.06, load: float = 10.0, *, phase: float = 0.0, points: int = 6,
+                harmonics: int = 31) -> ReducedModel:
+    """The reference blade with five modes and no residual flexibility, so that it can be integrated in time as well.
+
+    Args:
+        kt, load: stiffness [N/m] and friction limit [N] of a seat; the load on a parabola that vanishes one node
+            beyond both ends of the patch.
+        phase: interblade phase angle [rad].
+    """
+    model = reference_model(kt, mass, load, phase=phase, points=points, modes=5, harmonics=harmonics)
+    share = np.arange(1, points + 1) * np.arange(points, 0, -1.0)
+    sides = tuple(replace(side, residual=0 * side.residual) for side in model.sides)
+    limits = load * np.tile(share / share.sum(), 2)
+    return replace(model, sides=sides, elements=replace(model.elements, n0=limits))
 
 
 @dataclass(frozen=True)
@@ -62,6 +81,33 @@ def load_curve(models: Iterable[tuple[float, ReducedModel]], band: tuple[float, 
     """Resonance for each (load, model), as they are wanted (Fig. 17)."""
     for load, model in models:
         yield load, peak(model, band, H, samples)
+
+
+def optimum(model: Callable[[float], ReducedModel], loads: tuple[float, float], band: tuple[float, float], H: int = 3,
+            samples: int = 256) -> tuple[float, Peak]:
+    """The load between two bounds that makes the resonance smallest, to 1 %, and the resonance there.
+
+    Args:
+        model: from the load.
+    """
+    peaks: dict[float, Peak] = {}
+
+    def height(x: float) -> float:
+        peaks[x] = peak(model(float(np.exp(x))), band, H, samples)
+        return peaks[x].amplitude
+
+    coarse = np.linspace(*np.log(loads), 7)
+    best = int(np.argmin([height(x) for x in coarse]))
+    minimize_scalar(height, bounds=(coarse[max(best - 1, 0)], coarse[min(best + 1, 6)]), method="bounded",
+                    options={"xatol": 0.01})
+    x = min(peaks, key=lambda x: peaks[x].amplitude)
+    return float(np.exp(x)), peaks[x]
+
+
+def seat_loop(solution: Solution, points: int = 512) -> tuple[np.ndarray, np.ndarray]:
+    """Mean relative displacement [m] and total friction force [N] of the first seat over a period, (points,) each."""
+    nodes, basis = solution.w.shape[0] // 2, synthesis(solution.harmonics, points)
+    return basis @ solution.w[:nodes, 0].mean(axis=0), basis @ solution.f[:nodes, 0].sum(axis=0)
 
 
 def loop_response(model: ReducedModel, frequencies: Iterable[float], method: str = "amplitude",

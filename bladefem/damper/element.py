@@ -13,7 +13,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.integrate import trapezoid
 
-__all__ = ["Fit", "Loop", "coupled_loop", "linear_fit", "two_slope_loop", "work"]
+__all__ = ["Fit", "Loop", "coupled_loop", "linear_fit", "printed_loop", "two_slope_loop", "work"]
 
 
 @dataclass(frozen=True)
@@ -75,3 +75,24 @@ def linear_fit(loop: Loop) -> Fit:
 def work(loop: Loop) -> float:
     """Friction work in the period, the area of the loop [J]."""
     return float(trapezoid(loop.force, loop.motion))
+
+
+def printed_loop(kt: float, mu: float, load: tuple[float, float], amplitude: float, orders: tuple[int, int],
+                 samples: int = 1024, at_zero: int = 1) -> Loop:
+    """The same by Eq. 21 as printed, stepped forward: a historical variant, for comparison only.
+
+    Args:
+        at_zero: value of the Heaviside function at zero; 0 in Eq. 20, which freezes the force at its first slip.
+    """
+    angle = 2 * np.pi * np.arange(samples + 1) / samples
+    motion = amplitude * np.sin(orders[1] * angle)
+    normal = load[0] + load[1] * np.sin(orders[0] * angle)
+    f, force = 0.0, np.empty(samples + 1)
+    for _ in range(4):
+        for m in range(samples + 1):
+            inside = mu * normal[m - 1] - abs(f)
+            sticks = inside > 0 or (inside == 0 and at_zero == 1)
+            step = motion[m] - motion[m - 1] if m else 0.0
+            f = f + (kt * step if sticks else 0.0) - max(-inside, 0.0) * np.sign(f)
+            force[m] = f
+    return Loop(angle, motion, normal, force)
