@@ -26,12 +26,12 @@ comm = MPI.COMM_WORLD
 mesh = bladefem.build_mesh(scene, comm)
 
 # %% [markdown]
-# `Bodies` assembles and factorises what is asked for, once. The mesh is distributed over the ranks; frequencies and
+# `Bodies` assembles and factorises what is asked for, once; here the blade at rest. The mesh is distributed over the ranks; frequencies and
 # shapes come back the same on every rank.
 
 # %%
 bodies = bladefem.Bodies(scene, mesh, comm)
-found = modes(constrain(bodies.blade), 6)
+found = modes(constrain(bodies.still_blade), 6)
 
 # %% [markdown]
 # The families are named by comparing the motion of the aerofoil with pure bending and twisting (MAC).
