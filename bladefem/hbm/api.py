@@ -13,7 +13,7 @@ from .linear import Linear, condense
 from .model import ReducedModel
 from .newton import DEFAULTS, Options
 from .residual import Balance
-from .solution import Solution, probe_motion, works
+from .solution import Solution, at_probes, blade_motion, probe_motion, works_of
 
 __all__ = ["as_solution", "free", "solve", "stuck"]
 
@@ -23,7 +23,7 @@ def solve(model: ReducedModel, omega: float, H: int = 3, samples: int = 128, *, 
     """The periodic response at circular frequency omega [rad/s] with harmonics 0..H.
 
     Args:
-        samples: time samples a period for the friction forces.
+        samples: time samples a period for the friction forces; 0 locates the transitions of 1-D elements exactly.
         start: a solved neighbour; full stick when left out.
 
     Returns:
@@ -57,20 +57,20 @@ def as_solution(balance: Balance, attempt: Attempt, iterations: int, reason: str
     """The record of a finished attempt."""
     model, linear, state = balance.model, balance.linear, attempt.end.state
     load = state.forces.f.copy()
-    if model.directions > model.elements.tangents:
-        load[:, 0, 0] -= np.maximum(model.elements.n0, 0.0)
+    load[:, :, 0] -= model.preload.reshape(load.shape[:2])
     force = to_complex(load.reshape(-1, load.shape[2])).T
-    mean = to_complex(state.w.reshape(-1, load.shape[2]))[:, 0]
+    relative = to_complex(state.w.reshape(-1, load.shape[2])).T
+    blade = blade_motion(model, linear.omega, force)
     stiffness = model.springs[:, :, None]
     return Solution(
         omega=linear.omega, harmonics=state.w.shape[2] // 2, samples=balance.samples, w=state.w, f=state.forces.f,
-        probe=probe_motion(model, linear.omega, force, _rigid(linear, mean, force[0])),
+        probe=at_probes(blade, _rigid(linear, relative[0], force[0])),
         converged=attempt.end.converged, reason=reason, method=attempt.method, iterations=iterations,
         residual=state.error,
         residual_displacement=float(abs(state.residual).max()),
         residual_force=float(abs(stiffness * state.residual).max()), drift=_drift(linear, load),
         states=_states(state.forces.shares),
-        work=works(model, linear.omega, state.w, load, float(np.sum(state.forces.dissipated))))
+        work=works_of(model, linear.omega, relative, force, blade, float(np.sum(state.forces.dissipated))))
 
 
 def _balance(model: ReducedModel, omega: float, H: int, samples: int) -> Balance:

@@ -1,86 +1,156 @@
-"""Linear bodies driven by forces at their ports: modal amplitudes, motions, losses, and their rates with frequency."""
+"""Linear bodies at all harmonics of one frequency: modal flexibilities, receptances, motions under forces at the ports.
+
+The ports that the balance uses stand in the order contact, load, probe. Arrays carry the harmonic on their first axis,
+of length 1 where one body serves all harmonics.
+"""
 
 from __future__ import annotations
+
+from dataclasses import dataclass
 
 import numpy as np
 
 from ..data import PortModel
-from .model import Damping, ReducedModel
+from ..errors import InputError
 
-__all__ = ["contact_rows", "drive", "drive_rate", "impedance", "impedance_rate", "loss", "pushed", "receptance"]
+__all__ = ["Damping", "Stack", "amplitudes", "block", "flexibility", "impedance_rate", "lost", "motion", "receptance",
+           "stacked"]
+
+
+@dataclass(frozen=True)
+class Damping:
+    """Damping of the modes of a body, all contributions added: the term i w c of each mode's receptance."""
+
+    ratio: float | np.ndarray = 0.0         # share of critical damping of each mode [1]
+    structural: float | np.ndarray = 0.0    # loss factor: i eta omega_r^2, not for the mean [1]
+    mass: float = 0.0                       # Rayleigh, proportional to the mass [1/s]
+    stiffness: float = 0.0                  # Rayleigh, proportional to the stiffness [s]
+
+    def viscous(self, omega: np.ndarray) -> np.ndarray:
+        """(m,) viscous part: 2 zeta omega_r + alpha + beta omega_r^2 [1/s]."""
+        return 2 * self.ratio * omega + self.mass + self.stiffness * omega**2
+
+
+@dataclass(frozen=True)
+class Stack:
+    """One body in the nodal diameters of harmonics 0..H; S = 1 for all of them, else H+1. m modes, P ports."""
+
+    omega: np.ndarray           # (S, m) [rad/s]; filled up with 1 where a harmonic has fewer modes
+    viscous: np.ndarray         # (S, m) modal damping [1/s]
+    hysteretic: np.ndarray      # (S, m) loss factor times omega^2 [1/s^2]
+    coupled: np.ndarray | None  # (S, m, m) viscous damping that couples modes [1/s]
+    shapes: np.ndarray          # (S, P, m) [kg^-1/2]
+    residual: np.ndarray        # (S, P, P) [m/N]
+    contact: slice
+    load: slice
+    probe: slice
+
+
+def stacked(bodies: tuple[PortModel, ...], damping: Damping, rows: np.ndarray) -> Stack:
+    """The bodies of the harmonics as one; `rows` of the contact port enter the balance."""
+    ports = [_ports(body, rows) for body in bodies]
+    if len({tuple(map(len, parts)) for parts in ports}) > 1:
+        raise InputError("sides: the bodies of the harmonics have ports of different sizes, expected the same")
+    most = max(len(body.omega) for body in bodies)
+    order = [np.concatenate(parts) for parts in ports]
+    omega = np.array([_fill(body.omega, most, 1.0) for body in bodies])
+    own = [np.zeros(len(body.omega)) if body.damping is None or body.damping.ndim == 2 else body.damping
+           for body in bodies]
+    viscous = np.array([_fill(damping.viscous(body.omega) + c, most) for body, c in zip(bodies, own, strict=True)])
+    hysteretic = np.array([_fill(damping.structural * body.omega**2, most) for body in bodies])
+    coupled = None
+    if any(body.damping is not None and body.damping.ndim == 2 for body in bodies):
+        coupled = np.array([_square(body, most) for body in bodies])
+    shapes = np.array([np.pad(body.shapes[p], ((0, 0), (0, most - len(body.omega))))
+                       for body, p in zip(bodies, order, strict=True)])
+    residual = np.array([body.residual[np.ix_(p, p)] for body, p in zip(bodies, order, strict=True)])
+    a, b, c = np.cumsum([len(part) for part in ports[0]])
+    return Stack(omega, viscous, hysteretic, coupled, shapes, residual, slice(0, a), slice(a, b), slice(b, c))
+
+
+def flexibility(stack: Stack, w: np.ndarray) -> np.ndarray:
+    """(k, m), or (k, m, m) for coupled damping: inverse modal impedances at the circular frequencies w (k,) [s^2].
+
+    Rigid modes count as immovable at w = 0.
+    """
+    w = w[:, None]
+    Z = stack.omega**2 - w**2 + 1j * (w * stack.viscous + np.sign(w) * stack.hysteretic)
+    still = (w == 0) & (stack.omega == 0)
+    if stack.coupled is None:
+        return np.divide(1.0, Z, out=np.zeros_like(Z), where=~still)
+    full = 1j * w[:, :, None] * stack.coupled
+    modes = np.arange(Z.shape[1])
+    full[:, modes, modes] += np.where(still, 1.0, Z)
+    flexible = np.linalg.inv(full)
+    flexible[:, modes, modes] *= ~still
+    return flexible
+
+
+def block(stack: Stack, flexible: np.ndarray, rows: slice, columns: slice) -> np.ndarray:
+    """(k, rows, columns) receptances [m/N]."""
+    left, right = stack.shapes[:, rows], stack.shapes[:, columns].conj().swapaxes(1, 2)
+    residual = stack.residual[:, rows, columns]
+    if flexible.ndim == 3:
+        return left @ flexible @ right + residual
+    if len(left) == 1 and np.isrealobj(left):      # two real products in one, half the work of a complex one
+        parts = np.concatenate([flexible.real, flexible.imag])[:, None, :] * left
+        parts = (parts.reshape(-1, left.shape[2]) @ right[0]).reshape(2, len(flexible), left.shape[1], right.shape[2])
+        result = 1j * parts[1]
+        result += parts[0]
+        result += residual
+        return result
+    return (left * flexible[:, None, :]) @ right + residual
+
+
+def amplitudes(stack: Stack, flexible: np.ndarray, forces: np.ndarray) -> np.ndarray:
+    """(k, m) modal amplitudes under forces (k, P) at the ports."""
+    push = (forces[:, None, :] @ stack.shapes.conj())[:, 0]
+    return flexible * push if flexible.ndim == 2 else (flexible @ push[:, :, None])[:, :, 0]
+
+
+def motion(stack: Stack, modal: np.ndarray, forces: np.ndarray, rows: slice) -> np.ndarray:
+    """(k, rows) displacements by modal amplitudes (k, m) and by forces (k, P) on the residual flexibility [m]."""
+    return (stack.shapes[:, rows] @ modal[:, :, None] + stack.residual[:, rows] @ forces[:, :, None])[:, :, 0]
+
+
+def impedance_rate(stack: Stack, w: np.ndarray, modal: np.ndarray) -> np.ndarray:
+    """(k, m) derivative with w of the modal impedances, times modal amplitudes (k, m)."""
+    rate = (-2 * w[:, None] + 1j * stack.viscous) * modal
+    return rate if stack.coupled is None else rate + 1j * (stack.coupled @ modal[:, :, None])[:, :, 0]
+
+
+def lost(stack: Stack, w: np.ndarray, modal: np.ndarray) -> np.ndarray:
+    """(k,) work lost in the modes in one cycle of each circular frequency [J]."""
+    w = w[:, None]
+    loss = np.sum((w * stack.viscous + np.sign(w) * stack.hysteretic) * abs(modal)**2, axis=1)
+    if stack.coupled is not None:
+        loss = loss + w[:, 0] * np.sum(modal.conj() * (stack.coupled @ modal[:, :, None])[:, :, 0], axis=1).real
+    return np.pi * loss
 
 
 def receptance(body: PortModel, damping: Damping, w: float, rows: np.ndarray | slice,
                columns: np.ndarray | slice) -> np.ndarray:
-    """(rows, columns) displacement [m] at the ports by unit harmonic forces [N]; at w = 0 without the rigid modes."""
-    elastic = body.omega > 0 if w == 0 else np.ones(len(body.omega), dtype=bool)
-    left, right = body.shapes[rows][:, elastic], body.shapes[columns][:, elastic]
-    Z = impedance(body, damping, w)
-    if Z.ndim == 2:
-        return left @ np.linalg.solve(Z[np.ix_(elastic, elastic)], right.conj().T) + body.residual[rows][:, columns]
-    flexibility = 1 / Z[elastic]
-    if np.isrealobj(left):      # two real products cost half of one complex product
-        scaled = np.concatenate([left * flexibility.real, left * flexibility.imag]) @ right.T
-        result = scaled[len(left):] * 1j
-        result += scaled[:len(left)] + body.residual[rows][:, columns]
-        return result
-    return (left * flexibility) @ right.conj().T + body.residual[rows][:, columns]
+    """(rows, columns) displacement [m] of one body by unit harmonic forces [N]; at w = 0 without the rigid modes."""
+    both = [np.arange(len(body.residual))[part] for part in (rows, columns)]
+    ports = {"contact": np.concatenate(both)}
+    stack = stacked((PortModel(body.omega, body.shapes, body.residual, ports, damping=body.damping),), damping,
+                    np.arange(len(ports["contact"])))
+    split = len(both[0])
+    return block(stack, flexibility(stack, np.array([w])), slice(0, split), slice(split, None))[0]
 
 
-def impedance(body: PortModel, damping: Damping, w: float) -> np.ndarray:
-    """(m,), or (m, m) where damping couples the modes: omega_r^2 - w^2 + damping [1/s^2]."""
-    Z = body.omega**2 - w**2 + damping.term(body.omega, w)
-    if body.damping is None or w == 0:
-        return Z
-    return Z + 1j * w * body.damping if body.damping.ndim == 1 else np.diag(Z) + 1j * w * body.damping
+def _ports(body: PortModel, rows: np.ndarray) -> list[np.ndarray]:
+    everything = np.arange(len(body.residual))
+    return [everything[body.ports["contact"]][rows]] + [everything[body.ports.get(name, slice(0, 0))]
+                                                        for name in ("load", "probe")]
 
 
-def impedance_rate(body: PortModel, damping: Damping, w: float) -> np.ndarray:
-    """Derivative of the impedance with w, of the same shape [1/s]."""
-    Z = -2 * w + damping.rate(body.omega)
-    if body.damping is None:
-        return Z
-    return Z + 1j * body.damping if body.damping.ndim == 1 else np.diag(Z) + 1j * body.damping
+def _fill(values: np.ndarray, count: int, value: float = 0.0) -> np.ndarray:
+    return np.concatenate([values, np.full(count - len(values), value)])
 
 
-def drive(body: PortModel, damping: Damping, w: float, push: np.ndarray) -> np.ndarray:
-    """(m,) modal amplitudes under the modal forces `push`; rigid modes stay at rest at w = 0."""
-    Z = impedance(body, damping, w)
-    if w == 0:
-        elastic = body.omega > 0
-        return np.where(elastic, push / np.where(elastic, Z, 1.0), 0.0)
-    return push / Z if Z.ndim == 1 else np.linalg.solve(Z, push)
-
-
-def drive_rate(body: PortModel, damping: Damping, w: float, amplitudes: np.ndarray) -> np.ndarray:
-    """(m,) derivative with w of modal amplitudes under constant forces."""
-    rate = impedance_rate(body, damping, w)
-    return -drive(body, damping, w, rate * amplitudes if rate.ndim == 1 else rate @ amplitudes)
-
-
-def loss(body: PortModel, damping: Damping, w: float, amplitudes: np.ndarray) -> float:
-    """Work lost in the modes in one cycle of circular frequency w [J]."""
-    resisting = impedance(body, damping, w)
-    if resisting.ndim == 1:
-        return float(np.pi * np.sum(resisting.imag * abs(amplitudes)**2))
-    return float(np.pi * (amplitudes.conj() @ resisting @ amplitudes).imag)
-
-
-def pushed(model: ReducedModel, h: int, force: np.ndarray, load: float = 1.0) -> tuple[np.ndarray, np.ndarray]:
-    """Blade under harmonic h: forces at all its ports (p,) and on its modes (m,).
-
-    Args:
-        force: (m,) contact forces that the damper feels; the blade feels the opposite [N].
-        load: factor of the excitation.
-    """
-    body = model.side(h)
-    ports = np.zeros(len(body.residual), dtype=complex)
-    ports[contact_rows(body, model)] = -force
-    if h in model.excitation:
-        ports[body.ports["load"]] += load * model.excitation[h]
-    return ports, body.shapes.conj().T @ ports
-
-
-def contact_rows(body: PortModel, model: ReducedModel) -> np.ndarray:
-    """Rows of the body's ports that enter the balance."""
-    return np.arange(len(body.residual))[body.ports["contact"]][model.rows]
+def _square(body: PortModel, count: int) -> np.ndarray:
+    pad = count - len(body.omega)
+    if body.damping is None or body.damping.ndim == 1:
+        return np.zeros((count, count))
+    return np.pad(body.damping, ((0, pad), (0, pad)))

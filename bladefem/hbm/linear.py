@@ -14,11 +14,12 @@ from scipy.linalg import lapack
 
 from ..data import RigidBody
 from ..errors import NotSolvedError
-from .bodies import contact_rows, receptance
+from .bodies import amplitudes, block, flexibility, motion, receptance
 from .model import ReducedModel
 
 __all__ = ["Linear", "condense", "receptance"]
 
+SMALL = 64             # contact dofs below which all harmonics are solved in one call
 UNSEEN = 1e-12         # motions that the contact springs resist less than this, relatively, are left out
 
 
@@ -39,61 +40,66 @@ class Linear:
 
 def condense(model: ReducedModel, omega: float, harmonics: int) -> Linear:
     """Flexibilities of harmonics 0..H at circular frequency omega [rad/s]."""
-    springs = model.springs.ravel()
-    m = len(springs)
-    G, A = np.zeros((2, harmonics + 1, m, m), dtype=complex)
-    free, stuck = np.zeros((2, harmonics + 1, m), dtype=complex)
-    for h in range(harmonics + 1):
-        G[h], free[h] = _flexibility(model, h, h * omega)
+    springs, orders = model.springs.ravel(), omega * np.arange(harmonics + 1)
+    blades = model.blades(harmonics)
+    flexible = flexibility(blades, orders)
+    G = block(blades, flexible, blades.contact, blades.contact)
+    force = np.zeros((harmonics + 1, blades.shapes.shape[1]), dtype=complex)
+    force[:, blades.load] = model.loads(harmonics)
+    free = motion(blades, amplitudes(blades, flexible, force), force, blades.contact)
+    _add_damper(model, orders, G)
     B, g, rigid = _rigid_motions(model, springs)
-    A[0], stuck[0] = _with_springs(G[0].real, free[0].real, springs, B, g, model.hold)
-    for h in range(1, harmonics + 1):
-        A[h], stuck[h] = _sprung(G[h], free[h], springs)
+    A, stuck = _sprung(G, free, springs, 1 if B.shape[1] else 0)
+    if B.shape[1]:
+        A[0], stuck[0] = _with_springs(G[0].real, free[0].real, springs, B, g, model.hold)
     return Linear(omega, springs, G, free, A, stuck, B, g, rigid)
 
 
-def _flexibility(model: ReducedModel, h: int, w: float) -> tuple[np.ndarray, np.ndarray]:
-    side, rows = model.side(h), contact_rows(model.side(h), model)
-    G = receptance(side, model.damping, w, rows, rows)
-    free = np.zeros(len(G), dtype=complex)
-    if h in model.excitation:
-        free = receptance(side, model.damping, w, rows, side.ports["load"]) @ model.excitation[h]
+def _add_damper(model: ReducedModel, orders: np.ndarray, G: np.ndarray) -> None:
     if isinstance(model.damper, RigidBody):
-        if h > 0:
-            B = model.damper.B[model.rows]
-            G = G - B @ np.linalg.solve(model.damper.mass, B.T) / w**2
+        B = model.damper.B[model.rows]
+        G[1:] -= (B @ np.linalg.solve(model.damper.mass, B.T)) / orders[1:, None, None]**2
     elif model.damper is not None:
-        damper = model.damper_side(h)
-        rows = contact_rows(damper, model)
-        G = G + receptance(damper, model.damper_damping, w, rows, rows)
-    return G, free
+        damper = model.elastic_damper(len(orders) - 1)
+        G += block(damper, flexibility(damper, orders), damper.contact, damper.contact)
 
 
-def _sprung(G: np.ndarray, free: np.ndarray, springs: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """(1 + G K)^-1 times G and times free; in Fortran order, which spares LAPACK two copies."""
+def _sprung(G: np.ndarray, free: np.ndarray, springs: np.ndarray, first: int) -> tuple[np.ndarray, np.ndarray]:
+    """(1 + G K)^-1 times G and times free, from harmonic `first` on."""
     m = len(springs)
-    right = np.empty((m, m + 1), dtype=complex, order="F")
-    right[:, :m], right[:, m] = G, free
-    system = np.multiply(G, springs, order="F")
-    system[np.diag_indices(m)] += 1.0
-    _, _, solved, info = lapack.zgesv(system, right, overwrite_a=True, overwrite_b=True)
-    if info:
-        raise NotSolvedError("contact flexibility with springs is singular: a resonance without damping is hit exactly")
-    return solved[:, :m], solved[:, m]
+    if m < SMALL:
+        system = G[first:] * springs + np.eye(m)
+        solved = np.zeros((len(G), m, m + 1), dtype=complex)
+        solved[first:] = np.linalg.solve(system, np.concatenate([G[first:], free[first:, :, None]], axis=2))
+        return solved[:, :, :m].copy(), solved[:, :, m].copy()
+    A, stuck = np.empty_like(G), np.empty_like(free)
+    for h in range(first, len(G)):      # in Fortran order, which spares LAPACK two copies
+        right = np.empty((m, m + 1), dtype=complex, order="F")
+        right[:, :m], right[:, m] = G[h], free[h]
+        system = np.multiply(G[h], springs, order="F")
+        system[np.diag_indices(m)] += 1.0
+        _, _, solved, info = lapack.zgesv(system, right, overwrite_a=True, overwrite_b=True)
+        if info:
+            raise NotSolvedError("contact flexibility is singular: a resonance without damping is hit exactly")
+        A[h], stuck[h] = solved[:, :m], solved[:, m]
+    return A, stuck
 
 
 def _rigid_motions(model: ReducedModel, springs: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    side = model.side(0)
-    still = side.omega == 0
-    motions, loads = [side.shapes[contact_rows(side, model)][:, still].real], np.zeros(still.sum())
-    if 0 in model.excitation:
-        loads = side.shapes[side.ports["load"]][:, still].real.T @ np.real(model.excitation[0])
+    if model.damper is None and model.side(0).omega.min(initial=1.0) > 0:
+        return np.zeros((len(springs), 0)), np.zeros(0), np.zeros((0, 0))
+    blades = model.blades(0)
+    still = blades.omega[0] == 0
+    motions = [blades.shapes[0, blades.contact][:, still].real]
+    loads = blades.shapes[0, blades.load][:, still].real.T @ model.loads(0)[0].real
     if isinstance(model.damper, RigidBody):
         motions.append(-model.damper.B[model.rows])
     elif model.damper is not None:
-        damper = model.damper_side(0)
-        motions.append(-damper.shapes[contact_rows(damper, model)][:, damper.omega == 0].real)
+        damper = model.elastic_damper(0)
+        motions.append(-damper.shapes[0, damper.contact][:, damper.omega[0] == 0].real)
     B = np.column_stack(motions)
+    if B.shape[1] == 0:
+        return B, np.zeros(0), np.zeros((0, 0))
     loads = np.concatenate([loads, np.zeros(B.shape[1] - len(loads))])
     held = B.T @ (springs[:, None] * B)
     size = np.sqrt(np.where(np.diag(held) > 0, np.diag(held), 1.0))     # metres and radians alike

@@ -10,26 +10,9 @@ import numpy as np
 
 from ..data import Elements, PortModel, RigidBody
 from ..errors import InputError
+from .bodies import Damping, Stack, stacked
 
 __all__ = ["Damping", "ReducedModel"]
-
-
-@dataclass(frozen=True)
-class Damping:
-    """Damping of the modes of a body, all contributions added: the term i w c of each mode's receptance."""
-
-    ratio: float | np.ndarray = 0.0         # share of critical damping of each mode [1]
-    structural: float | np.ndarray = 0.0    # loss factor: i eta omega_r^2, not for the mean [1]
-    mass: float = 0.0                       # Rayleigh, proportional to the mass [1/s]
-    stiffness: float = 0.0                  # Rayleigh, proportional to the stiffness [s]
-
-    def term(self, omega: np.ndarray, w: float) -> np.ndarray:
-        """(m,) what damping adds to omega_r^2 - w^2 at circular frequency w [1/s^2]."""
-        return w * self.rate(omega) + 1j * np.sign(w) * self.structural * omega**2
-
-    def rate(self, omega: np.ndarray) -> np.ndarray:
-        """(m,) derivative of the term with w [1/s]."""
-        return 1j * (2 * self.ratio * omega + self.mass + self.stiffness * omega**2)
 
 
 @dataclass(frozen=True)
@@ -95,21 +78,58 @@ class ReducedModel:
         tangents = np.repeat(self.elements.kt[:, None], self.elements.tangents, axis=1)
         return tangents if self.directions == self.elements.tangents else np.column_stack([self.elements.kn, tangents])
 
+    @cached_property
+    def preload(self) -> np.ndarray:
+        """(nodes directions,) contact forces in the preload state [N]."""
+        force = np.zeros((len(self.elements.kt), self.directions))
+        if self.directions > self.elements.tangents:
+            force[:, 0] = np.maximum(self.elements.n0, 0.0)
+        return force.ravel()
+
+    @cached_property
+    def table(self) -> np.ndarray:
+        """(nodes, 4) kt, kn, mu, n0 of the elements, for kernels."""
+        e = self.elements
+        return np.column_stack([e.kt, e.kn, e.mu, e.n0]).astype(float)
+
     def side(self, h: int) -> PortModel:
         """The blade side of harmonic h."""
-        return _pick(self.sides, h, "sides")
+        return _first(self.sides, h, "sides")[-1]
 
-    def damper_side(self, h: int) -> PortModel:
-        """The elastic damper of harmonic h."""
-        return _pick(self.damper, h, "damper")
+    def blades(self, H: int) -> Stack:
+        """The blade side of harmonics 0..H."""
+        return self._stack("sides", H, self.damping)
+
+    def elastic_damper(self, H: int) -> Stack | None:
+        """The damper of harmonics 0..H, where it is elastic."""
+        return self._stack("damper", H, self.damper_damping) if isinstance(self.damper, tuple) else None
+
+    def loads(self, H: int) -> np.ndarray:
+        """(H+1, loads) excitation [N]."""
+        force = np.zeros((H + 1, _port_size(self.sides[0], "load")), dtype=complex)
+        for h, amplitudes in self.excitation.items():
+            if h <= H:
+                force[h] = amplitudes
+        return force
+
+    def _stack(self, name: str, H: int, damping: Damping) -> Stack:
+        bodies = _first(getattr(self, name), H, name)
+        key = (name, len(bodies))
+        if key not in self._stacks:
+            self._stacks[key] = stacked(bodies, damping, self.rows)
+        return self._stacks[key]
+
+    @cached_property
+    def _stacks(self) -> dict[tuple[str, int], Stack]:
+        return {}
 
 
-def _pick(models: tuple[PortModel, ...], h: int, name: str) -> PortModel:
+def _first(models: tuple[PortModel, ...], H: int, name: str) -> tuple[PortModel, ...]:
     if len(models) == 1:
-        return models[0]
-    if h >= len(models):
-        raise InputError(f"{name}: {len(models)} models given, expected one for harmonic {h}, or one for all harmonics")
-    return models[h]
+        return models
+    if H >= len(models):
+        raise InputError(f"{name}: {len(models)} models given, expected one for harmonic {H}, or one for all harmonics")
+    return models[:H + 1]
 
 
 def _port_size(model: PortModel, name: str) -> int:

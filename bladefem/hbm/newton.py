@@ -7,10 +7,13 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..errors import InputError
-from .residual import Balance, Inverse, State, evaluate_balance, linearise
+from ..friction.aft import Forces, dissipated, states
+from .compiled import CONVERGED, EXHAUSTED, INFINITE, SINGULAR, STALLED, compiled_newton
+from .residual import STICKS, Balance, Inverse, State, contact_arguments, evaluate_balance, linear_arguments, linearise
 
 __all__ = ["DEFAULTS", "Newton", "Options", "newton"]
 
+COMPILED = 100          # unknowns up to which the compiled loop with its plain LU is faster
 SHORTEST = 2.0**-8     # step share below which the search direction is given up
 
 
@@ -53,6 +56,8 @@ def newton(balance: Balance, w: np.ndarray, options: Options = DEFAULTS, merit: 
             does not depend on how the equations are scaled (Deuflhard, Newton Methods for Nonlinear Problems, 2004,
             Sect. 3.3), or "residual".
     """
+    if merit == "step" and _fits(balance):
+        return _fast(balance, w, options)
     state = evaluate_balance(balance, w)
     for iteration in range(options.iterations + 1):
         if state.error <= options.tolerance:
@@ -73,6 +78,30 @@ def newton(balance: Balance, w: np.ndarray, options: Options = DEFAULTS, merit: 
             return Newton(state, iteration + 1, False, f"line search stalled at residual {state.error:.1e}")
         state = better
     return Newton(state, options.iterations, False, f"residual {state.error:.1e} after {options.iterations} iterations")
+
+
+def _fits(balance: Balance) -> bool:
+    """Few enough unknowns of 1-D elements for the compiled loop."""
+    harmonics, m = balance.linear.stuck.shape
+    return balance.model.elements.tangents == 1 and m * (2 * harmonics - 1) <= COMPILED
+
+
+def _fast(balance: Balance, w: np.ndarray, options: Options) -> Newton:
+    end = np.ascontiguousarray(w.reshape(-1, w.shape[2]), dtype=float).copy()
+    d = balance.model.directions
+    steps, code, error, f, dfdw, shares, residual, p = compiled_newton(
+        end, d, linear_arguments(balance), contact_arguments(balance), STICKS, options.tolerance, options.iterations,
+        SHORTEST)
+    reasons = {CONVERGED: "residual within tolerance", EXHAUSTED: f"residual {error:.1e} after {steps} iterations",
+               STALLED: f"line search stalled at residual {error:.1e}", SINGULAR: "singular Jacobian",
+               INFINITE: "residual is not finite"}
+    shape = w.shape
+    full = np.zeros_like(f)
+    full[:, 2 - d:] = end.reshape(shape)
+    forces = Forces(f[:, 2 - d:], dfdw[:, 2 - d:, :, 2 - d:], states(shares), shares, dissipated(f, full),
+                    np.full(len(f), 2), True, "periodic")
+    state = State(end.reshape(shape), forces, p.reshape(shape), residual.reshape(shape), error)
+    return Newton(state, steps, code == CONVERGED, reasons[code])
 
 
 def _search(balance: Balance, state: State, inverse: Inverse, merit: str) -> State | None:

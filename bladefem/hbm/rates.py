@@ -13,9 +13,10 @@ import numpy as np
 
 from ..data import RigidBody
 from ..errors import InputError
-from .bodies import contact_rows, drive, drive_rate, pushed
+from .bodies import amplitudes, flexibility, impedance_rate, motion
 from .model import ReducedModel
 from .residual import Balance, State, as_amplitudes, as_coefficients
+from .solution import blade_motion
 from .vary import check_parameter
 
 __all__ = ["body_rate", "contact_load", "contact_rate", "rate"]
@@ -37,8 +38,7 @@ def rate(balance: Balance, state: State, name: str) -> np.ndarray:
 def contact_load(model: ReducedModel, state: State) -> np.ndarray:
     """(n, d, K) contact forces beyond the preload [N]."""
     load = state.forces.f.copy()
-    if model.directions > model.elements.tangents:
-        load[:, 0, 0] -= np.maximum(model.elements.n0, 0.0)
+    load[:, :, 0] -= model.preload.reshape(load.shape[:2])
     return load
 
 
@@ -74,33 +74,39 @@ def body_rate(model: ReducedModel, omega: float, force: np.ndarray, name: str) -
     Returns:
         (H+1, m) of the relative contact displacements and (H+1, probes) of the probes.
     """
-    contact, probe = [], []
-    for h, contact_force in enumerate(force):
-        side = model.side(h)
-        rows, probes = contact_rows(side, model), side.ports.get("probe", slice(0, 0))
-        w, moved = h * omega, np.zeros(len(side.residual), dtype=complex)
-        if name == "omega" and h:
-            _, push = pushed(model, h, contact_force)
-            moved = h * side.shapes @ drive_rate(side, model.damping, w, drive(side, model.damping, w, push))
-        elif name == "force":
-            ports, push = pushed(model, h, np.zeros_like(contact_force))
-            moved = side.shapes @ drive(side, model.damping, w, push) + side.residual @ ports
-        contact.append(moved[rows] - _damper_rate(model, h, omega, contact_force, name))
-        probe.append(moved[probes])
-    return np.array(contact), np.array(probe)
+    blades, ports, modal = blade_motion(model, omega, force)
+    orders = np.arange(len(force))
+    if name == "omega":
+        flexible = flexibility(blades, omega * orders)
+        push = impedance_rate(blades, omega * orders, modal) * orders[:, None]
+        modal = -(flexible * push if flexible.ndim == 2 else (flexible @ push[:, :, None])[:, :, 0])
+        modal[0], ports = 0.0, np.zeros_like(ports)
+    elif name == "force":
+        blades, ports, modal = blade_motion(model, omega, np.zeros_like(force))
+    else:
+        modal, ports = np.zeros_like(modal), np.zeros_like(ports)
+    contact = motion(blades, modal, ports, blades.contact) - _damper_rate(model, omega, force, name)
+    return contact, motion(blades, modal, ports, blades.probe)
 
 
-def _damper_rate(model: ReducedModel, h: int, omega: float, force: np.ndarray, name: str) -> np.ndarray:
-    """(m,) derivative of the damper's contact displacements under constant forces."""
-    if model.damper is None or h == 0 or name == "force":
-        return np.zeros(len(force), dtype=complex)
+def _damper_rate(model: ReducedModel, omega: float, force: np.ndarray, name: str) -> np.ndarray:
+    """(H+1, m) derivative of the damper's contact displacements under constant forces."""
+    if model.damper is None or name == "force":
+        return np.zeros_like(force)
+    w = omega * np.arange(len(force))
     if isinstance(model.damper, RigidBody):
         B = model.damper.B[model.rows]
-        motion = -B @ np.linalg.solve(model.damper.mass, B.T @ force) / (h * omega)**2
-        return motion * (-2 / omega if name == "omega" else -1.0)
+        moved = np.zeros_like(force)
+        moved[1:] = -(B @ np.linalg.solve(model.damper.mass, B.T @ force[1:].T)).T / w[1:, None]**2
+        return moved * (-2 / omega if name == "omega" else -1.0)
     if name == "mass":
         raise InputError("mass: expected damper to be a RigidBody")
-    body = model.damper_side(h)
-    rows = contact_rows(body, model)
-    amplitudes = drive(body, model.damper_damping, h * omega, body.shapes[rows].conj().T @ force)
-    return h * body.shapes[rows] @ drive_rate(body, model.damper_damping, h * omega, amplitudes)
+    damper = model.elastic_damper(len(force) - 1)
+    ports = np.zeros((len(force), damper.shapes.shape[1]), dtype=complex)
+    ports[:, damper.contact] = force
+    flexible = flexibility(damper, w)
+    modal = amplitudes(damper, flexible, ports)
+    push = impedance_rate(damper, w, modal) * np.arange(len(force))[:, None]
+    modal = -(flexible * push if flexible.ndim == 2 else (flexible @ push[:, :, None])[:, :, 0])
+    modal[0] = 0.0
+    return motion(damper, modal, np.zeros_like(ports), damper.contact)

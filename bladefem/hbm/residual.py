@@ -14,13 +14,15 @@ import numpy as np
 from scipy import linalg
 
 from ..friction.aft import Forces, evaluate
+from ..friction.events import evaluate_exact
 from ..friction.harmonics import to_complex, to_real
+from ..friction.tables import tables
 from .iterative import iterative_inverse
 from .linear import Linear
 from .model import ReducedModel
 
-__all__ = ["Balance", "Inverse", "State", "as_amplitudes", "as_coefficients", "contact_forces", "evaluate_balance",
-           "linearise", "start_in_stick"]
+__all__ = ["Balance", "Inverse", "State", "as_amplitudes", "as_coefficients", "contact_arguments",
+           "contact_forces", "evaluate_balance", "linear_arguments", "linearise", "start_in_stick"]
 
 DENSE = 600         # unknowns up to which a dense factorisation is faster than GMRES
 ACCURACY = 1e-5     # of a step by GMRES, relative
@@ -36,7 +38,7 @@ class Balance:
 
     model: ReducedModel
     linear: Linear
-    samples: int
+    samples: int        # 0: transitions located exactly, for elements of one tangent
 
 
 @dataclass(frozen=True)
@@ -60,8 +62,7 @@ def evaluate_balance(balance: Balance, w: np.ndarray) -> State:
     model, linear = balance.model, balance.linear
     forces = contact_forces(model, w, balance.samples)
     p = forces.f - model.springs[:, :, None] * w
-    if model.directions > model.elements.tangents:
-        p[:, 0, 0] -= np.maximum(model.elements.n0, 0.0)
+    p[:, :, 0] -= model.preload.reshape(p.shape[:2])
     flexed = _shaped(balance, _apply(linear.A, as_amplitudes(p)))
     residual = w - _shaped(balance, linear.stuck) + flexed
     return State(w, forces, p, residual, _error(balance, w, residual))
@@ -70,9 +71,11 @@ def evaluate_balance(balance: Balance, w: np.ndarray) -> State:
 def contact_forces(model: ReducedModel, w: np.ndarray, samples: int) -> Forces:
     """Friction forces in the directions (n, d, K) of the balance; displacements left out of it stay zero."""
     missing = 1 + model.elements.tangents - model.directions
+    if missing:
+        w = np.concatenate([np.zeros((len(w), missing, w.shape[2])), w], axis=1)
+    forces = evaluate(model.elements, w, samples) if samples else evaluate_exact(model.elements, w)
     if missing == 0:
-        return evaluate(model.elements, w, samples)
-    forces = evaluate(model.elements, np.pad(w, ((0, 0), (missing, 0), (0, 0))), samples)
+        return forces
     return replace(forces, f=forces.f[:, missing:], dfdw=forces.dfdw[:, missing:, :, missing:])
 
 
@@ -113,6 +116,25 @@ def _dense_inverse(A: np.ndarray, change: np.ndarray) -> Inverse:
     return lambda residual, _: linalg.lu_solve(factors, residual.ravel(), check_finite=False).reshape(residual.shape)
 
 
+def linear_arguments(balance: Balance) -> tuple[np.ndarray, ...]:
+    """What the compiled loop needs of the linear part."""
+    linear = balance.linear
+    G = linear.G.copy()
+    G[0] = 0.0
+    return linear.A, G, to_real(linear.stuck.T), linear.springs, _scale(linear)
+
+
+def contact_arguments(balance: Balance) -> tuple:
+    """What the compiled loop needs of the elements."""
+    H, model = len(balance.linear.stuck) - 1, balance.model
+    return (np.zeros((len(model.springs), 0)), model.table, tables(H, balance.samples or 4 * H + 4),
+            0 if balance.samples else 12 * (H + 1), model.preload)
+
+
+def _scale(linear: Linear) -> float:
+    return float(max(np.linalg.norm(linear.free), np.linalg.norm(linear.stuck), np.finfo(float).tiny))
+
+
 def _force_change(balance: Balance, state: State) -> np.ndarray:
     """(n, dK, dK) derivative of p."""
     n, d, K = state.w.shape
@@ -141,8 +163,7 @@ def _error(balance: Balance, w: np.ndarray, residual: np.ndarray) -> float:
     linear, r = balance.linear, as_amplitudes(residual)
     with_springs = np.linalg.norm(r) / max(np.linalg.norm(as_amplitudes(w)), np.finfo(float).tiny)
     r[1:] += _apply(linear.G[1:], linear.springs * r[1:])
-    scale = max(np.linalg.norm(linear.free), np.linalg.norm(linear.stuck), np.finfo(float).tiny)
-    return max(with_springs, np.linalg.norm(r) / scale)
+    return max(with_springs, np.linalg.norm(r) / _scale(linear))
 
 
 def _apply(flexibility: np.ndarray, forces: np.ndarray) -> np.ndarray:

@@ -6,12 +6,11 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..data import RigidBody
 from ..friction.harmonics import to_complex
-from .bodies import contact_rows, drive, loss, pushed
+from .bodies import Stack, amplitudes, flexibility, lost, motion
 from .model import ReducedModel
 
-__all__ = ["Solution", "Work", "probe_motion", "works"]
+__all__ = ["Solution", "Work", "at_probes", "blade_motion", "probe_motion", "works", "works_of"]
 
 
 @dataclass(frozen=True)
@@ -63,37 +62,49 @@ class Solution:
 
 def probe_motion(model: ReducedModel, omega: float, force: np.ndarray, rigid: np.ndarray) -> np.ndarray:
     """(H+1, probes) amplitudes at the probes by the excitation and contact forces (H+1, m) beyond the preload."""
-    motion = []
-    for h, contact in enumerate(force):
-        side = model.side(h)
-        probes = side.ports.get("probe", slice(0, 0))
-        ports, push = pushed(model, h, contact)
-        amplitudes = drive(side, model.damping, h * omega, push)
-        if h == 0:
-            still = np.flatnonzero(side.omega == 0)
-            amplitudes[still] += rigid[:len(still)]
-        motion.append(side.shapes[probes] @ amplitudes + side.residual[probes] @ ports)
-    return np.array(motion)
+    return at_probes(blade_motion(model, omega, force), rigid)
+
+
+def at_probes(blade: tuple[Stack, np.ndarray, np.ndarray], rigid: np.ndarray) -> np.ndarray:
+    """(H+1, probes) from the blades' motion, with the mean rigid motion added."""
+    blades, ports, modal = blade
+    modal = modal.copy()
+    modal[0, blades.omega[0] == 0] += rigid[:np.count_nonzero(blades.omega[0] == 0)]
+    return motion(blades, modal, ports, blades.probe)
+
+
+def blade_motion(model: ReducedModel, omega: float, force: np.ndarray) -> tuple[Stack, np.ndarray, np.ndarray]:
+    """Blades under the excitation and contact forces (H+1, m): stack, forces at all ports (H+1, P), modes (H+1, m)."""
+    H = len(force) - 1
+    blades = model.blades(H)
+    ports = np.zeros((H + 1, blades.shapes.shape[1]), dtype=complex)
+    ports[:, blades.contact], ports[:, blades.load] = -force, model.loads(H)
+    return blades, ports, amplitudes(blades, flexibility(blades, omega * np.arange(H + 1)), ports)
 
 
 def works(model: ReducedModel, omega: float, w: np.ndarray, f: np.ndarray, dissipated: float) -> Work:
     """Work of each kind in a period, for displacements and forces (n, d, K)."""
     force = to_complex(f.reshape(-1, f.shape[2])).T
-    motion = to_complex(w.reshape(-1, w.shape[2])).T
-    orders = np.arange(len(force))
-    friction = np.pi * np.sum(orders[:, None] * (force * (1j * motion).conj()).real)
-    put_in = lost = 0.0
-    for h in orders[1:]:
-        side, w_h = model.side(h), h * omega
-        ports, push = pushed(model, h, force[h])
-        amplitudes = drive(side, model.damping, w_h, push)
-        lost += h * loss(side, model.damping, w_h, amplitudes)
-        if h in model.excitation:
-            at = side.ports["load"]
-            moved = side.shapes[at] @ amplitudes + side.residual[at] @ ports
-            put_in += np.pi * h * np.sum((model.excitation[h] * (1j * moved).conj()).real)
-        if model.damper is not None and not isinstance(model.damper, RigidBody):
-            other = model.damper_side(h)
-            push = other.shapes[contact_rows(other, model)].conj().T @ force[h]
-            lost += h * loss(other, model.damper_damping, w_h, drive(other, model.damper_damping, w_h, push))
-    return Work(float(put_in), float(lost), float(friction), dissipated)
+    return works_of(model, omega, to_complex(w.reshape(-1, w.shape[2])).T, force, blade_motion(model, omega, force),
+                    dissipated)
+
+
+def works_of(model: ReducedModel, omega: float, relative: np.ndarray, force: np.ndarray,
+             blade: tuple[Stack, np.ndarray, np.ndarray], dissipated: float) -> Work:
+    """The same from complex amplitudes (H+1, m), and from the blades' motion under them."""
+    orders, (blades, ports, modal) = np.arange(len(force)), blade
+    lost_work = orders @ lost(blades, omega * orders, modal)
+    damper = model.elastic_damper(len(force) - 1)
+    if damper is not None:
+        at_ports = np.zeros((len(force), damper.shapes.shape[1]), dtype=complex)
+        at_ports[:, damper.contact] = force
+        moved = amplitudes(damper, flexibility(damper, omega * orders), at_ports)
+        lost_work += orders @ lost(damper, omega * orders, moved)
+    loaded = motion(blades, modal, ports, blades.load)
+    return Work(_work(orders, ports[:, blades.load], loaded), float(lost_work), _work(orders, force, relative),
+                dissipated)
+
+
+def _work(orders: np.ndarray, force: np.ndarray, moved: np.ndarray) -> float:
+    """Work of harmonic forces on harmonic displacements (H+1, *) in a period."""
+    return float(np.pi * np.sum(orders[:, None] * (force * (1j * moved).conj()).real))
