@@ -26,8 +26,8 @@ comm = MPI.COMM_WORLD
 mesh = bladefem.build_mesh(scene, comm)
 
 # %% [markdown]
-# `Bodies` assembles and factorises what is asked for, once; here the blade at rest. The mesh is distributed over the ranks; frequencies and
-# shapes come back the same on every rank.
+# `Bodies` assembles and factorises what is asked for, once; here the blade at rest. The mesh is distributed over the
+# ranks; frequencies and shapes come back the same on every rank.
 
 # %%
 bodies = bladefem.Bodies(scene, mesh, comm)

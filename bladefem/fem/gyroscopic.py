@@ -22,7 +22,7 @@ from .compat import PETSc, assemble_matrix, ufl
 from .linalg import apply, dot
 from .rotation import AXIS
 
-__all__ = ["Waves", "coriolis", "coupling", "waves"]
+__all__ = ["Waves", "coriolis", "coupling", "own_rows", "waves"]
 
 
 @dataclass(frozen=True)
@@ -62,12 +62,19 @@ def coupling(body: Body, modes: ModeSet, G: PETSc.Mat | None = None,
         modes: mass-normalised shapes on the nodes of the body's mesh.
         G: from :func:`coriolis`, to use again.
     """
-    first, last = body.K.owner_range
-    order = np.argsort(body.scalar_rows, kind="stable")[np.count_nonzero(body.scalar_rows < 0):][first:last]
-    X = modes.shapes[:, :, :body.dim].reshape(len(modes.frequencies), -1)[:, order].T
-    X = np.asfortranarray(X)
+    X = own_rows(body, modes.shapes)
     g = dot(body.comm, X, apply(coriolis(body, axis) if G is None else G, X))
     return (g - g.conj().T) / 2
+
+
+def own_rows(body: Body, shapes: np.ndarray) -> np.ndarray:
+    """(rows of this rank, m) of fields (m, n_points, 2 or 3) in mesh numbering, for products with the body's matrices.
+
+    Sums over the rows of one sector are sums over its body, both cut faces included.
+    """
+    first, last = body.K.owner_range
+    order = np.argsort(body.scalar_rows, kind="stable")[np.count_nonzero(body.scalar_rows < 0):][first:last]
+    return np.asfortranarray(shapes[:, :, :body.dim].reshape(len(shapes), -1)[:, order].T)
 
 
 def waves(modes: ModeSet, g: np.ndarray, speed: float, sense: int = 1) -> Waves:
