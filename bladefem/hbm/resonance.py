@@ -31,7 +31,7 @@ def stuck_resonances(model: ReducedModel, h: int = 1) -> np.ndarray:
         stiffness.append(np.zeros(len(model.damper.mass)))
         masses.append(model.damper.mass)
     elif model.damper is not None:
-        damper = model.damper_side(h)
+        damper = model.damper[h if len(model.damper) > 1 else 0]
         rows = np.arange(len(damper.residual))[damper.ports["contact"]][model.rows]
         shapes.append(-damper.shapes[rows])
         stiffness.append(damper.omega**2)
