@@ -3,8 +3,8 @@
 The path is a polygon whose edges touch the motion at the samples and whose knots lie half-way between them. Along an
 edge in slip the angle psi between force and motion obeys R psi' = -k |w'| sin psi, so that tan(psi/2) falls by a
 factor E (Krieg & Krieg 1977, doi:10.1115/1.3454568, for von Mises plasticity). With E = (sqrt(1 + x^2/4) - x/2)^2,
-x = k |dw| / R, in place of exp(-x), a circular orbit is exact at any number of samples, and the lag is second order
-from the slightest slip to rigid Coulomb friction; plain radial return lags by half a step.
+x = k |dw| / R, in place of exp(-x), a circular orbit is exact at any number of samples (while its lag exceeds half a
+step), and the error is second order from soft to rigid Coulomb friction; plain radial return lags by half a step.
 """
 
 from __future__ import annotations

@@ -11,8 +11,8 @@ from bladefem.friction.tables import Node, gram, values
 
 __all__ = ["disc_batch"]
 
-NEAR = 1e-7         # of the largest limit: marching stops and one linearised period finishes
-EXACT = 1e-6        # of the largest limit: longest step of that period, whose error is of the order of its square
+NEAR = 1e-8         # of the largest limit: marching stops and one linearised period finishes
+EXACT = 1e-7        # of the largest limit: longest step of that period, whose error is of the order of its square
 SINGULAR = 1e-9     # of det(I - Phi): below it the state keeps a memory of its start
 
 

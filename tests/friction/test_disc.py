@@ -1,0 +1,141 @@
+"""2-D elements: exact orbits, order, periodic state, derivatives, and the limits in which they are 1-D."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from friction_cases import coefficients, motion, numeric_jacobian, radial_return, random_case, single
+
+from bladefem.data import Elements
+from bladefem.friction.aft import SEPARATED, STICK, evaluate
+from bladefem.friction.closed_form import circular_orbit_work
+from bladefem.friction.events import evaluate_exact
+from bladefem.friction.harmonics import to_complex
+
+
+def ellipse(a: float, b: float, H: int = 3) -> np.ndarray:
+    """w = (0, a cos tau, b sin tau)."""
+    w = np.zeros((1, 3, 2 * H + 1))
+    w[0, 1, 1], w[0, 2, 2] = a, b
+    return w
+
+
+@pytest.mark.parametrize("samples", [16, 64, 512])
+@pytest.mark.parametrize("ratio", [1.05, 1.5, 10.0, 1e3, 1e5])
+def test_circular_orbit_is_exact_at_any_number_of_samples(ratio, samples):
+    """Work of the closed form to rounding (1e-6 asked), up to rigid Coulomb friction.
+
+    It holds as long as the lag acos(F / kA) is above half a step, so that the slip never pauses on an edge.
+    """
+    forces = evaluate(single(kt=2.0, mu=0.5, n0=4.0, tangents=2), ellipse(ratio, ratio), samples)
+    assert forces.dissipated[0] == pytest.approx(circular_orbit_work(ratio, 2.0, 2.0), rel=1e-10)
+    assert forces.shares[0, 1] == pytest.approx(1)
+
+
+@pytest.mark.parametrize("ratio", [1.3, 10.0, 300.0])
+def test_second_order_on_an_ellipse_from_soft_to_stiff(ratio):
+    """Against 65536 samples; plain radial return has order 1 and 4e-3 where this has 1e-5 (ratio 10, 1024 samples)."""
+    element, w = single(tangents=2), ellipse(ratio, 0.4 * ratio)
+    best = evaluate(element, w, 65536).f
+    errors = [np.linalg.norm(evaluate(element, w, S).f - best) for S in (256, 1024, 4096)]
+    assert np.log2(errors[0] / errors[2]) / 4 == pytest.approx(2, abs=0.35)
+    tau = 2 * np.pi * np.arange(1024) / 1024
+    path = np.stack([motion(w[0, 1], tau), motion(w[0, 2], tau)])
+    plain = coefficients(radial_return(1.0, 1.0, np.ones(1024), path), 3)
+    assert np.linalg.norm(plain - best[0, 1:]) > 20 * errors[1]
+
+
+@pytest.mark.parametrize("seed", range(2))
+def test_against_radial_return_extrapolated(seed):
+    """Plain radial return at 20 000 and 40 000 samples, extrapolated: independent of the half-angle map."""
+    elements, w = random_case(seed, 6, 2, 2)
+    ours = evaluate(elements, w, 4096).f
+    for e in range(6):
+        twins = []
+        for S in (20000, 40000):
+            tau = 2 * np.pi * np.arange(S) / S
+            N = elements.n0[e] + elements.kn[e] * motion(w[e, 0], tau)
+            path = np.stack([motion(w[e, 1], tau), motion(w[e, 2], tau)])
+            twins.append(coefficients(radial_return(elements.kt[e], elements.mu[e], N, path, 2), 2))
+        np.testing.assert_allclose(ours[e, 1:], 2 * twins[1] - twins[0], rtol=0, atol=2e-5 * max(1, np.abs(ours).max()))
+
+
+def test_motion_on_a_line_is_the_1d_element():
+    """A skewed line through the plane: the force of the 1-D element along it, none across; lift-off among the cases."""
+    elements, flat = random_case(2, 60, 3, 1)
+    angle = np.random.default_rng(2).uniform(0, 2 * np.pi, 60)
+    w = np.stack([flat[:, 0], flat[:, 1] * np.cos(angle)[:, None], flat[:, 1] * np.sin(angle)[:, None]], axis=1)
+    solid = Elements(elements.kt, elements.kn, elements.mu, elements.n0, tangents=2)
+    f, exact = evaluate(solid, w, 4096).f, evaluate_exact(elements, flat).f
+    along = f[:, 1] * np.cos(angle)[:, None] + f[:, 2] * np.sin(angle)[:, None]
+    across = f[:, 2] * np.cos(angle)[:, None] - f[:, 1] * np.sin(angle)[:, None]
+    np.testing.assert_allclose(along, exact[:, 1], rtol=0, atol=1e-4)
+    np.testing.assert_allclose(f[:, 0], exact[:, 0], rtol=0, atol=1e-5)
+    np.testing.assert_allclose(across, 0, rtol=0, atol=1e-12)
+
+
+def test_the_frame_of_the_tangents_does_not_matter():
+    elements, w = random_case(3, 80, 3, 2)
+    c, s = np.cos(0.7), np.sin(0.7)
+    Q = np.array([[1, 0, 0], [0, c, -s], [0, s, c]])
+    turned, f = (np.einsum("ab,nbk->nak", Q, x) for x in (w, evaluate(elements, w, 64).f))
+    np.testing.assert_allclose(evaluate(elements, turned, 64).f, f, rtol=0, atol=1e-9)
+
+
+def test_conjugate_motion_is_the_mirror_image():
+    """A travelling wave the other way round: time reversed in the first tangent's mirror gives the mirrored force."""
+    w = ellipse(3.0, 1.0)
+    mirrored = w * np.array([1, 1, -1])[None, :, None]
+    f, g = evaluate(single(tangents=2), w, 128).f, evaluate(single(tangents=2), mirrored, 128).f
+    np.testing.assert_allclose(to_complex(g), to_complex(f) * np.array([1, 1, -1])[None, :, None], atol=1e-13)
+
+
+@pytest.mark.parametrize("kn", [0.0, 1.0])
+def test_jacobian_against_finite_differences(kn):
+    """Implicit derivative of the periodic state; 200 elements, H = 3. Forces repeat to 6e-13, hence the step."""
+    elements, w = random_case(4, 200, 3, 2, kn)
+    forces = evaluate(elements, w, 64)
+    numeric = numeric_jacobian(lambda x: evaluate(elements, x, 64).f, w, 1e-6)
+    assert forces.converged
+    np.testing.assert_allclose(forces.dfdw, numeric, rtol=0, atol=1e-6)
+
+
+def test_jacobian_with_a_prescribed_load_series():
+    elements, w = random_case(5, 60, 2, 2)
+    load = np.random.default_rng(5).normal(size=(60, 48)) + 1.5
+    force = lambda x: evaluate(elements, x, 48, load=load)     # noqa: E731
+    np.testing.assert_allclose(force(w).dfdw, numeric_jacobian(lambda x: force(x).f, w, 1e-7), rtol=0, atol=1e-6)
+
+
+def test_full_stick_and_full_separation_are_linear():
+    w = random_case(6, 2, 3, 2)[1] * 1e-3
+    elements = Elements(*(np.array(x, dtype=float) for x in ([2, 2], [3, 3], [0.5, 0.5], [5, -5])), tangents=2)
+    forces = evaluate(elements, w, 64)
+    assert list(forces.state) == [STICK, SEPARATED]
+    expected = np.array([3, 2, 2])[:, None] * w[0] + np.array([5, 0, 0])[:, None] * np.eye(7)[0]
+    np.testing.assert_allclose(forces.f[0], expected, atol=1e-14)
+    np.testing.assert_allclose(forces.f[1], 0, atol=0)
+    eye = np.einsum("ab,kl->akbl", np.diag([3.0, 2, 2]), np.eye(7))
+    np.testing.assert_allclose(forces.dfdw[0], eye, atol=1e-13)
+
+
+def test_jacobian_of_a_shaken_down_element():
+    """A mean displacement beyond the limit and a small vibration: slips once, then sticks; the memory is in dfdw."""
+    w = random_case(7, 40, 2, 2)[1] * 0.05
+    w[:, 1, 0] += 2.0
+    elements = Elements(*(np.full(40, x) for x in (1.0, 0.3, 0.5, 2.0)), tangents=2)
+    forces = evaluate(elements, w, 64)
+    assert (forces.state == STICK).sum() > 5
+    numeric = numeric_jacobian(lambda x: evaluate(elements, x, 64).f, w, 1e-7)
+    np.testing.assert_allclose(forces.dfdw, numeric, rtol=0, atol=2e-5)
+
+
+def test_a_limit_on_the_cycles_is_reported():
+    forces = evaluate(single(tangents=2), ellipse(1.2, 0.5), 128, cycles=1)
+    assert not forces.converged
+    assert "1 of 1 elements" in forces.reason
+
+
+def test_dissipation_is_never_negative():
+    elements, w = random_case(8, 300, 3, 2)
+    assert evaluate(elements, w, 256).dissipated.min() > -1e-4
