@@ -14,6 +14,7 @@ from ..scene import Material
 from . import shape
 from .compat import CELLS, MPI, PETSc, assemble_matrix, build_mesh, cell_dofs, dolfinx, scalar_space, ufl, vector_space
 from .loads import centrifugal, mass, surface_load, volume
+from .memory import check
 
 __all__ = ["Body", "assemble", "cells_of", "centrifugal", "degrees", "lame", "mass", "properties", "rigid_modes",
            "surface_load", "volume"]
@@ -54,13 +55,14 @@ def assemble(mesh: Mesh, name: str | tuple[str, ...], material: Material | dict[
             integrates C3D10.
 
     Raises:
-        InputError: unknown body, unknown element type, turned-over elements.
+        InputError: unknown body, unknown element type, turned-over elements, more than memory can hold.
     """
     names = (name,) if isinstance(name, str) else tuple(name)
     materials = material if isinstance(material, dict) else dict.fromkeys(names, material)
     cells, used, local = _checked(mesh, names, materials)
     comm = comm or MPI.COMM_WORLD
     dim = mesh.dimension
+    check(dim * len(used), comm)
     domain, origin = build_mesh(comm, mesh.cell_type, local, mesh.points[used, :dim])
     space = vector_space(domain, CELLS[mesh.cell_type][1])
     lam, mu, rho, depth = properties(mesh, {n: materials[n] for n in names}, domain, plane)

@@ -1,7 +1,7 @@
 """The one door to dolfinx, PETSc and SLEPc: versions 0.5 to 0.11 behind names that say what is wanted.
 
 Debian 12's dolfinx (0.5) switches ``sys.setdlopenflags`` to RTLD_GLOBAL on import and leaves it so, after which other
-wheels (h5py, vtk) resolve their symbols against the wrong libraries; the flags are put back here.
+wheels (h5py, vtk) resolve their symbols against the wrong libraries; it is kept from doing so here.
 """
 
 from __future__ import annotations
@@ -18,7 +18,8 @@ import numpy as np
 
 from ..errors import NotSolvedError
 
-_flags = sys.getdlopenflags()
+_setdlopenflags = sys.setdlopenflags
+sys.setdlopenflags = lambda flags: None     # not even during the import: HDF5's symbols would stay global
 import dolfinx  # noqa: E402
 import dolfinx.fem.petsc  # noqa: E402
 import ufl  # noqa: E402
@@ -26,7 +27,7 @@ from mpi4py import MPI  # noqa: E402
 from petsc4py import PETSc  # noqa: E402
 from slepc4py import SLEPc  # noqa: E402
 
-sys.setdlopenflags(_flags)
+sys.setdlopenflags = _setdlopenflags
 
 __all__ = ["CELLS", "MPI", "PETSc", "SLEPc", "assemble_matrix", "assemble_vector", "build_mesh", "cell_dofs",
            "compile_form", "dolfinx", "scalar_space", "ufl", "vector_space"]

@@ -3,7 +3,7 @@
 The doubled pencil of a complex nodal diameter holds each eigenvalue twice and a Krylov method may return one of a pair
 only; here the iteration itself runs in complex arithmetic (the memory of a complex vector is that of the doubled one),
 so there is nothing to sort out. Blocks catch multiple eigenvalues, full reorthogonalisation keeps ghosts away, and the
-inertia of K - s M proves the count on demand. SLEPc solves the same pencil in ``slepc_modes``.
+inertia of K - s M proves the count on demand. The tests compare with SLEPc on the doubled pencil.
 """
 
 from __future__ import annotations

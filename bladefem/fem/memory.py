@@ -1,0 +1,68 @@
+"""Does a solve fit into memory? Said before anything is assembled, from a model fitted to measured peaks.
+
+Peak of the modes of one complex nodal diameter [GB], wedge sector, PORD ordering, measured and (modelled):
+
+    dofs            28 482      50 514      62 034
+    one core        0.47 (0.49) 0.77 (0.80) 1.01 (0.97)
+    doubled         0.79 (0.80) 1.39 (1.37)
+
+The factors grow with dofs^(4/3) as nested dissection of a solid does; solid blocks have about twice those of blades.
+"""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from ..errors import InputError
+from .compat import MPI
+
+__all__ = ["available", "check", "needed"]
+
+START = 1.2e8                       # interpreter and libraries of one rank [bytes]
+ONE_CORE, DOUBLED = (9.0e3, 115.0), (1.9e4, 160.0)      # bytes: a dofs + b dofs^(4/3)
+
+
+def needed(dofs: int, ranks: int = 1) -> float:
+    """Peak memory of a modal solve [bytes], all ranks together.
+
+    Args:
+        dofs: degrees of freedom of the body, three a node.
+    """
+    linear, factors = ONE_CORE if ranks == 1 else DOUBLED
+    return ranks * START + linear * dofs + factors * dofs ** (4 / 3)
+
+
+def available() -> float:
+    """Memory that this machine (or its container) can still give [bytes]; infinite where the system does not tell."""
+    out = float("inf")
+    meminfo = Path("/proc/meminfo")
+    if meminfo.exists():
+        rows = dict(line.split(":", 1) for line in meminfo.read_text().splitlines() if ":" in line)
+        out = 1024.0 * int(rows.get("MemAvailable", rows["MemFree"]).split()[0])
+    limit, used = Path("/sys/fs/cgroup/memory.max"), Path("/sys/fs/cgroup/memory.current")
+    if limit.exists() and used.exists() and limit.read_text().strip().isdigit():
+        out = min(out, float(limit.read_text()) - float(used.read_text()))
+    return out
+
+
+def check(dofs: int, comm: MPI.Comm, free: float | None = None) -> float:
+    """The memory that a solve will take [bytes], all ranks together.
+
+    Args:
+        free: memory that may be used on this machine [bytes]; what is available when left out.
+
+    Raises:
+        InputError: it does not fit; the message says what to change.
+    """
+    total = needed(dofs, comm.size)
+    here = comm.Split_type(MPI.COMM_TYPE_SHARED)
+    share = total * here.size / comm.size
+    here.Free()
+    free = available() if free is None else free
+    short = comm.allreduce(max(share - free, 0.0), MPI.MAX)
+    if short > 0:
+        fits = (free / share) ** (3 / 4) * dofs
+        raise InputError(f"the model has {dofs} degrees of freedom and needs about {share / 1e9:.1f} GB here, "
+                         f"{free / 1e9:.1f} GB are free; expected at most about {fits:.2g} degrees of freedom "
+                         "(a larger mesh.size), or ranks on more machines")
+    return total

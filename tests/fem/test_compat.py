@@ -1,0 +1,61 @@
+"""What importing and compiling must not leave behind, and a dead build that has to be named."""
+
+import logging
+import subprocess
+import sys
+
+import pytest
+
+from bladefem.errors import NotSolvedError
+from bladefem.fem import compat
+
+CHILD = """
+import sys
+flags = sys.getdlopenflags()
+import bladefem.fem.compat
+assert sys.getdlopenflags() == flags, "dlopen flags changed"
+import h5py
+h5py.File("x", "w", driver="core", backing_store=False)["a"] = [1.0]
+"""
+
+
+def test_import_leaves_the_loader_alone():
+    """dolfinx 0.5 sets RTLD_GLOBAL for good, after which h5py finds the wrong HDF5."""
+    import os
+    clean = {k: v for k, v in os.environ.items() if not k.startswith(("OMPI_", "PMIX_", "PRTE_", "ORTE_"))
+             or k.startswith("OMPI_ALLOW")}
+    done = subprocess.run([sys.executable, "-c", CHILD], capture_output=True, text=True, env=clean)
+    assert done.returncode == 0, done.stderr
+
+
+def test_a_dead_build_is_named(monkeypatch, tmp_path):
+    (tmp_path / "libffcx_forms_1.c").write_text("")
+    (tmp_path / "libffcx_forms_2.c").write_text("")
+    (tmp_path / "libffcx_forms_2.c.cached").write_text("")
+    name = "get_parameters" if hasattr(compat.dolfinx.jit, "get_parameters") else "get_options"
+    monkeypatch.setattr(compat.dolfinx.jit, name, lambda: {"cache_dir": tmp_path})
+
+    def build():
+        raise TimeoutError("JIT compilation timed out, probably due to a failed previous compile.")
+    with pytest.raises(NotSolvedError, match=r"never finished; .* libffcx|never finished; delete .*forms_1\.c$"):
+        compat._patiently(build, patience=2)
+
+
+def test_other_errors_pass():
+    def build():
+        raise RuntimeError("something else")
+    with pytest.raises(RuntimeError, match="something else"):
+        compat._patiently(build)
+
+
+def test_compiling_is_silent_and_leaves_logging_alone(caplog):
+    root = logging.getLogger()
+    before = root.level, list(root.handlers)
+
+    def build():
+        logging.getLogger().info("building 'libffcx'")
+        logging.getLogger().setLevel(logging.DEBUG)
+        return 1
+    assert compat._patiently(build) == 1
+    assert (root.level, list(root.handlers)) == before
+    assert not caplog.records

@@ -1,0 +1,23 @@
+"""The estimate of memory and its refusal."""
+
+import pytest
+
+from bladefem.errors import InputError
+from bladefem.fem.compat import MPI
+from bladefem.fem.memory import available, check, needed
+
+
+@pytest.mark.parametrize("dofs, ranks, measured", [(28482, 1, 0.47e9), (50514, 1, 0.77e9), (62034, 1, 1.01e9),
+                                                   (28482, 2, 0.91e9), (50514, 2, 1.51e9)])
+def test_model_follows_the_measured_peaks(dofs, ranks, measured):
+    """Wedge sector; two ranks: the doubled pencil's peak on one rank, and a second interpreter."""
+    assert needed(dofs, ranks) == pytest.approx(measured, rel=0.07)
+
+
+def test_too_large_is_refused_with_advice():
+    with pytest.raises(InputError, match=r"1000000 degrees of freedom .* 2.0 GB are free; expected"):
+        check(1_000_000, MPI.COMM_WORLD, free=2e9)
+
+
+def test_small_fits():
+    assert 0 < check(1000, MPI.COMM_SELF) < available()
