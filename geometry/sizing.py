@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from math import pi
 from types import ModuleType
 
 from .parameters import Aerofoil, Disc, MeshSize, Platform, Shank, Wedge
@@ -10,6 +11,9 @@ from .profile import Profile
 from .section import BLUNT
 
 __all__ = ["Sizes", "sector_sizes", "set_sizes"]
+
+
+SOME = 40_000        # cells above the rim at the finest, when the size is left open
 
 
 @dataclass(frozen=True)
@@ -25,12 +29,23 @@ class Sizes:
 
 def sector_sizes(aerofoil: Aerofoil, platform: Platform, shank: Shank, disc: Disc, wedge: Wedge,
                  size: MeshSize) -> Sizes:
-    """Sizes from the thinnest part of the sector where the user leaves them open."""
+    """Sizes from the thinnest part of the sector where the user leaves them open, in bounds of SOME cells."""
     tip, root = aerofoil.thickness_tip * aerofoil.chord_tip, aerofoil.thickness_root * aerofoil.chord_root
-    base = size.size or min((tip + root) / 2, platform.thickness, shank.width / 2) * 0.6
+    thin = 0.6 * min((tip + root) / 2, platform.thickness, shank.width / 2)
+    base = size.size or max(thin, _affordable(aerofoil, platform, shank, disc))
     contact = size.contact_size or min(base, platform.seat_width, wedge.length / 6)
     return Sizes(base, contact, max(base, min(3 * base, (disc.rim_radius - disc.bore_radius) / 3)),
                  min(base, 6 * BLUNT * tip), base / 4)
+
+
+def _affordable(aerofoil: Aerofoil, platform: Platform, shank: Shank, disc: Disc) -> float:
+    """Element size [m] that fills everything above the rim with SOME tetrahedra."""
+    chord = (aerofoil.chord_root + aerofoil.chord_tip) / 2
+    thickness = (aerofoil.thickness_root + aerofoil.thickness_tip) / 2
+    pitch = 2 * pi / disc.sectors * (disc.rim_radius + shank.height)
+    solid = (0.7 * thickness * chord**2 * aerofoil.span + shank.height * shank.width * shank.length
+             + pitch * platform.length * (platform.thickness + platform.seat_width / 2))
+    return (solid / (0.12 * SOME)) ** (1 / 3)
 
 
 def set_sizes(gmsh: ModuleType, profile: Profile, wedge: Wedge, sizes: Sizes, edges: list[int]) -> None:
