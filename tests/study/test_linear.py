@@ -1,0 +1,115 @@
+"""Forced response of one sector against a direct solve of the whole wheel, with each kind of damping."""
+
+import numpy as np
+import pytest
+from wheels import bodies
+
+from bladefem.errors import InputError
+from bladefem.fem.body import assemble
+from bladefem.fem.stress import nodal_stress, von_mises
+from bladefem.hbm.model import Damping
+from bladefem.scene import Material
+from bladefem.study.linear import (
+    displacement,
+    excitation_load,
+    forced,
+    peak,
+    pressure_load,
+    probe,
+    static_offset,
+)
+from geometry.mesh import Mesh
+
+COUNT, SMALL = 5, (2, 1, 1)
+
+
+def wheel_matrices(mesh):
+    """Dense K and M of the full wheel, free rows, and the (sectors, n) numbers of each sector's nodes."""
+    count, pairs, n = mesh.sector.count, mesh.pairs["cyclic"].nodes, len(mesh.points)
+    number = np.arange(count * n).reshape(count, n)
+    for s in range(count):
+        number[(s + 1) % count, pairs[0]] = number[s, pairs[1]]
+    number[0, pairs[0]] = number[count - 1, pairs[1]]
+    used, dense = np.unique(number, return_inverse=True)
+    dense = dense.reshape(number.shape)
+    points = np.empty((len(used), 3))
+    for s in range(count):
+        points[dense[s]] = mesh.points @ np.linalg.matrix_power(mesh.sector.rotation, s).T
+    clamp = np.concatenate([dense[s][mesh.faces["clamp"]] for s in range(count)])
+    whole = Mesh(points, mesh.cell_type, {"blade": np.concatenate([d[mesh.bodies["blade"]] for d in dense])})
+    body = assemble(whole, "blade", Material())
+    rows = body.scalar_rows
+    free = np.setdiff1d(np.arange(3 * len(points)), (3 * np.unique(clamp)[:, None] + np.arange(3)).ravel())
+    K, M = (A[:, :][np.ix_(rows, rows)] for A in (body.K, body.M))
+    return K, M, free, dense
+
+
+def whole_wheel(one, load, order, frequency, damping):
+    """Displacement of blade 0 when each blade's load is turned and shifted in phase."""
+    mesh = one.mesh
+    K, M, free, dense = wheel_matrices(mesh)
+    force = np.zeros((len(K) // 3, 3), complex)
+    for s in range(mesh.sector.count):
+        R = np.linalg.matrix_power(mesh.sector.rotation, s)
+        np.add.at(force, dense[s], np.exp(2j * np.pi * order * s / mesh.sector.count) * load.reshape(-1, 3) @ R.T)
+    w = 2 * np.pi * frequency
+    Z = K * (1 + 1j * damping.structural) - w ** 2 * M + 1j * w * (damping.mass * M + damping.stiffness * K)
+    u = np.zeros(len(K), complex)
+    u[free] = np.linalg.solve(Z[np.ix_(free, free)], force.ravel()[free])
+    return u.reshape(-1, 3)[dense[0]]
+
+
+@pytest.mark.parametrize("order", [0, 1, 3, 4, 7])
+@pytest.mark.parametrize("damping", [Damping(structural=0.01), Damping(mass=20.0, stiffness=1e-7)])
+def test_sector_answers_as_the_whole_wheel(order, damping):
+    """Every kind of wave: standing, with and against the count. The modes left out answer statically: 1e-4."""
+    one = bodies(order=order, count=COUNT, divisions=SMALL)
+    load = excitation_load(one).astype(complex) + pressure_load(one, "tip", 50.0 + 20.0j)
+    response = forced(one, load, damping, modes=25)
+    for frequency in (0.0, 0.97 * response.omega[0] / (2 * np.pi)):
+        exact = whole_wheel(one, load, order, frequency, damping)
+        if frequency == 0.0 and damping.structural:
+            continue        # a loss factor means nothing at rest
+        np.testing.assert_allclose(displacement(response, frequency), exact, atol=1e-4 * abs(exact).max())
+
+
+def test_resonance_of_a_single_mode():
+    """phi^2 F / (2 zeta omega^2) with the modal damping of the scene; the phase turns by a quarter."""
+    one = bodies(order=2)
+    response = forced(one)
+    vector = excitation_load(one) / one.scene.excitation.force
+    f, amplitude = peak(response, vector)
+    alone = abs(response.modal_load[0]) ** 2 / one.scene.excitation.force / (2 * 0.002 * response.omega[0] ** 2)
+    assert amplitude == pytest.approx(alone, rel=0.01)
+    assert f == pytest.approx(response.omega[0] / (2 * np.pi), rel=1e-4)
+    at = probe(response, vector, np.array([f, 0.5 * f]))
+    assert abs(np.angle(at[0]) + np.pi / 2) < 0.05 and abs(np.angle(at[1])) < 0.05
+    assert abs(at[0]) == pytest.approx(amplitude)
+    stress = von_mises(nodal_stress(one.blade, displacement(response, f)))
+    assert stress.max() > 0 and np.isfinite(stress).all()
+
+
+def test_pressure_reaches_the_whole_face():
+    """The resultant of a uniform pressure on the rim points inwards and has the size of pressure times chord area."""
+    one = bodies(bump=0.0)
+    load = pressure_load(one, "tip", 1e5).reshape(-1, 3).sum(0)
+    area = 2 * 0.25 * np.sin(np.pi / 6) * 0.03
+    assert np.linalg.norm(load) == pytest.approx(1e5 * area, rel=1e-3)
+    assert load[0] < 0
+
+
+def test_static_offset_of_rotation_and_pressure():
+    one = bodies(speed=2000.0)
+    alone, both = static_offset(one), static_offset(one, pressure_load(one, "tip", 1e6))
+    tip = np.unique(one.mesh.faces["tip"])
+    assert (np.linalg.norm(one.mesh.points[tip, :2] + alone[tip, :2], axis=1) > 0.25).all()
+    assert np.einsum("ni,ni->n", both[tip] - alone[tip], one.mesh.points[tip] * [1, 1, 0]).mean() < 0
+
+
+def test_wrong_loads_and_modes():
+    one = bodies(count=COUNT, divisions=SMALL)
+    for load in (np.zeros(3), np.zeros(3 * len(one.mesh.points))):
+        with pytest.raises(InputError, match="load of shape"):
+            forced(one, load)
+    with pytest.raises(InputError, match="mode is 30"):
+        peak(forced(one, modes=5), excitation_load(one), 30)
