@@ -1,0 +1,75 @@
+"""Speed and agreement against pyHarm (Safran, pyharm-os on PyPI): the same matrices, frequencies, harmonics, samples.
+
+    python -m venv pyharm && pyharm/bin/pip install -r benchmarks/pyharm-requirements.txt
+    python benchmarks/hbm_pyharm.py pyharm/bin/python [names of problems]
+
+Both codes solve every frequency, started from the last one, in CPU seconds of one thread (set OMP_NUM_THREADS=1). The
+error of the first harmonic at the probe is measured against bladefem with 15 harmonics and 4096 samples.
+"""
+
+from __future__ import annotations
+
+import resource
+import subprocess
+import sys
+import tempfile
+import time
+from pathlib import Path
+
+import numpy as np
+from hbm_models import PROBLEMS, Problem
+
+from bladefem.hbm.api import solve
+
+RUNS = {"single mass": (7, 256, 61), "beam": (7, 256, 31),        # harmonics, samples, frequencies
+        "chain with lift-off": (7, 256, 31), "3-D patch": (5, 128, 4)}
+
+
+def write(problem: Problem, omegas: np.ndarray, H: int, samples: int, path: Path) -> None:
+    """The problem as pyHarm's half reads it; contacts must be dofs of their own."""
+    e, one_dof = problem.elements, len(problem.contact) == len(problem.elements.kt)
+    directions = 1 if one_dof else 1 + e.tangents
+    first = np.argmax(problem.contact, axis=1)[::directions] // directions
+    np.savez(path, M=problem.M, C=problem.C, K=problem.K, load=problem.load, force=problem.force, directions=directions,
+             nodes=first, kt=e.kt, kn=e.kn, mu=e.mu, n0=e.n0, H=H, samples=samples, omegas=omegas, tolerance=1e-8)
+
+
+def ours(problem: Problem, omegas: np.ndarray, H: int, samples: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Amplitudes, converged, CPU seconds."""
+    model, last, rows = problem.model, None, []
+    solve(model, omegas[0], H, samples)         # compiled, or read from the cache
+    for omega in omegas:
+        begin = time.process_time()
+        last = solve(model, omega, H, samples, start=last)
+        rows.append((last.probe[1, 0], last.converged, time.process_time() - begin))
+    return tuple(np.array(column) for column in zip(*rows, strict=True))
+
+
+def main(python: str, *names: str) -> None:
+    print(f"{'problem':22s} {'ms/point':>9s} {'pyHarm':>9s} {'ratio':>6s} {'solved':>9s} {'pyHarm':>9s} "
+          f"{'error':>8s} {'pyHarm':>8s} {'MB':>5s} {'pyHarm':>6s}")
+    for name in names or PROBLEMS:
+        problem, (H, samples, count) = PROBLEMS[name](), RUNS[name]
+        omegas = np.linspace(*problem.band, count)
+        with tempfile.TemporaryDirectory() as folder:
+            write(problem, omegas, H, samples, Path(folder) / "problem.npz")
+            script = Path(__file__).with_name("hbm_pyharm_side.py")
+            subprocess.run([python, script, "problem.npz", "result.npz"], cwd=folder, check=True)
+            with np.load(Path(folder) / "result.npz") as archive:
+                theirs = dict(archive)
+        amplitude, converged, seconds = ours(problem, omegas, H, samples)
+        fine = H if problem.elements.tangents == 2 else 15
+        exact = np.array([solve(problem.model, w, fine, 1024 if fine == H else 4096).probe[1, 0] for w in omegas])
+        good = converged & theirs["converged"]
+        errors = [np.max(abs(a - exact)[good], initial=0) / abs(exact).max() for a in (amplitude, theirs["amplitude"])]
+        # time of all points, lost ones too, over those that were solved
+        pairs = (seconds, converged), (theirs["seconds"], theirs["converged"])
+        mine, other = (spent.sum() / max(solved.sum(), 1) for spent, solved in pairs)
+        memory = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024
+        print(f"{name:22s} {mine * 1e3:9.2f} {other * 1e3:9.1f} {other / mine:6.0f} {converged.sum():5d}/{count:<3d} "
+              f"{theirs['converged'].sum():5d}/{count:<3d} {errors[0]:8.1e} {errors[1]:8.1e} {memory:5.0f} "
+              f"{float(theirs['memory']):6.0f}", flush=True)
+
+
+if __name__ == "__main__":
+    main(*sys.argv[1:])
