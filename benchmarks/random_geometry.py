@@ -82,7 +82,7 @@ def main(count=200, seed=1):
             print(number, answer[0], f"{answer[1]:.1f} s", flush=True)
     process.kill()
     meshes = [r for r in rows if r[1] == "mesh"]
-    print(dict(kinds))
+    print(dict(kinds), flush=True)
     print(dict(reasons))
     if meshes:
         print(f"meshes: slowest {max(r[2] for r in meshes):.1f} s, median {np.median([r[2] for r in meshes]):.1f} s, "
