@@ -96,7 +96,7 @@ def run(scene: Scene, folder: str | Path, until: str = "response", comm: Any = N
     result = Run(scene, Path(folder), mesh, timings=clock.seconds, messages=clock.messages)
     if until == "mesh":
         return result
-    _can_go_on(scene, mesh)
+    check_blade(scene, mesh)
     bodies = Bodies(scene, mesh, comm)
     with clock("modes"):
         result = replace(result, modes=keep("modes", modes_key(scene), lambda: find_modes(bodies)))
@@ -228,7 +228,7 @@ def _load_case(scene: Scene, mesh: Mesh, load: float, maps: list[PressureMap]) -
     return LoadCase(load, elements, selection)
 
 
-def _can_go_on(scene: Scene, mesh: Mesh) -> None:
+def check_blade(scene: Scene, mesh: Mesh) -> None:
     """Verification scenes end with their mesh; a blade needs its clamp."""
     if scene.kind in ("z mass", "hertz", "punch"):
         raise InputError(f"kind '{scene.kind}' is a contact study: 'bladefem mesh' draws it, its demo computes it; "

@@ -1,0 +1,67 @@
+"""Richardson's estimate on made-up and real sequences; effective masses that add up to the wheel's mass."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from wheels import bodies
+
+from bladefem.errors import InputError
+from bladefem.fem.constraint import constrain
+from bladefem.fem.loads import mass
+from bladefem.fem.modes import modes
+from bladefem.scene_file import load_scene
+from bladefem.study.converge import converge, default_sizes, richardson
+from bladefem.study.effective import effective_masses
+
+
+@pytest.mark.parametrize("order", [1.0, 2.0, 4.0, 5.7])
+@pytest.mark.parametrize("sizes", [(4, 2, 1), (1.7, 1.31, 1.0)])
+def test_a_power_law_is_found(order, sizes):
+    h = np.array(sizes)
+    limit, found = richardson(h, 100 + 3 * h ** order)
+    assert limit == pytest.approx(100, rel=1e-9) and found == pytest.approx(order, rel=1e-6)
+
+
+@pytest.mark.parametrize("f", [(3, 1, 2), (1, 1, 1), (3, 2.9, 1)])
+def test_values_out_of_line_have_no_order(f):
+    limit, order = richardson(np.array([2, 1.4, 1]), np.array(f, float))
+    assert limit == f[2] and np.isnan(order)
+
+
+def test_plane_blade_converges():
+    """Frequencies fall as the mesh is refined, and the estimate lies below the finest by about what it says."""
+    scene = load_scene("scenes/plane.toml")
+    found = converge(scene, [6e-3, 4e-3, 2.8e-3], count=3)
+    assert len(found.points) == 9 and len(found.summary) == 3
+    finer = converge(scene, [2.8e-3, 2e-3, 1.4e-3], count=3).points.query("dofs == dofs.max()")["frequency"].to_numpy()
+    assert (finer < found.summary["frequency"].to_numpy()).all()
+    left = found.summary["frequency"].to_numpy() / finer - 1
+    assert (left < 5 * found.summary["error"] + 1e-5).all()
+
+
+def test_wrong_sizes():
+    scene = load_scene("scenes/plane.toml")
+    for sizes in ([1e-3, 2e-3, 3e-3], [2e-3, 1e-3]):
+        with pytest.raises(InputError, match="at least three element sizes, from coarse to fine"):
+            converge(scene, sizes)
+    with pytest.raises(InputError, match="its mesh is given"):
+        converge(replace(scene, kind="imported"), [3, 2, 1])
+    fine = replace(scene, mesh=replace(scene.mesh, size=1e-3))
+    assert default_sizes(fine, None) == pytest.approx([1.7e-3, 1.3e-3, 1e-3])
+
+
+def test_effective_masses_add_up():
+    """All modes of a nodal diameter together move the whole rigid wheel, but for what is held at the clamp."""
+    one = bodies(count=5, divisions=(3, 1, 1))
+    body = one.still_blade
+    free = 3 * (len(np.unique(one.mesh.bodies["blade"])) - len(np.unique(one.mesh.faces["clamp"])))
+    few = effective_masses([modes(constrain(body, "clamp", n), 40) for n in (0, 1, 2)], body)
+    assert set(few["direction"]) == {"z", "rz", "x, y"} and set(few["nodal_diameter"]) == {0, 1}
+    assert free > 40
+    for _, rows in few.groupby("direction"):
+        assert 0.75 < rows["sum"].iloc[-1] < 1.0
+    lateral = few[few["direction"] == "x, y"].iloc[0]
+    assert lateral["effective_mass"] / lateral["share"] == pytest.approx(5 * mass(body), rel=1e-6)
+    single = effective_masses([modes(constrain(body, "clamp"), 5)], body)
+    assert len(single) == 30 and "nodal_diameter" not in single
