@@ -32,7 +32,7 @@ class Factorised:
     flops: float                    # of the factorisation
     bytes: float                    # memory of all ranks
     ordering: int                   # INFOG(7): 4 PORD, 5 METIS, ...
-    negative: int                   # negative pivots; -1 for Cholesky
+    negative: int                   # negative pivots
 
 
 def factorise_matrix(A: PETSc.Mat, definite: bool, schur: np.ndarray | None = None) -> Factorised:
@@ -67,7 +67,10 @@ def factorise_matrix(A: PETSc.Mat, definite: bool, schur: np.ndarray | None = No
     _numeric(pc, F, A.size[0])
     if schur is not None:
         F.setMumpsIcntl(26, 0)      # from here on a solve sees the interior only
-    negative = -1 if definite else F.getMumpsInfog(12)
+    negative = F.getMumpsInfog(12)
+    if definite and negative:       # MUMPS goes on in silence
+        raise NotSolvedError(f"the matrix of {A.size[0]} unknowns is not positive definite, MUMPS met {negative} "
+                             "negative pivots: a part floats, nothing joins it to the rest, or the state has buckled")
     return Factorised(F, pc, _large(F.getMumpsInfog(29)), F.getMumpsRinfog(3), 1e6 * F.getMumpsInfog(22),
                       F.getMumpsInfog(7), negative)
 
@@ -153,8 +156,8 @@ def _reason(code: int, detail: int, size: int) -> str:
     if code in (-5, -7, -8, -9, -11, -13, -19, -20):
         what = "memory ran out; use more ranks on more memory, or fewer unknowns"
     else:
-        what = {-10: "the matrix is singular (a part that floats, or that nothing joins to the rest)",
-                -40: "the matrix is not positive definite (a part that floats, or a buckled state)",
+        what = {-10: "the matrix is singular: a part floats, or nothing joins it to the rest",
+                -40: "the matrix is not positive definite: a part floats, or the state has buckled",
                 }.get(code, "the factorisation failed")
     return f"MUMPS stopped on {size} unknowns: {what} (INFOG(1) = {code}, INFOG(2) = {detail})"
 
