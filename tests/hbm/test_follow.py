@@ -1,0 +1,68 @@
+"""Paths against points solved one by one, and a fold against the ends of its hysteresis."""
+
+
+
+from itertools import pairwise
+
+import numpy as np
+import pytest
+from models import block, single_mass
+
+from bladefem.data import Elements
+from bladefem.errors import InputError
+from bladefem.hbm.api import solve
+from bladefem.hbm.follow import follow
+from bladefem.hbm.model import Damping, ReducedModel
+from bladefem.hbm.sweep import size
+from bladefem.hbm.vary import vary
+from bladefem.reduction.matrices import port_model_from_matrices
+
+
+def stop(gap=1.0):
+    """A mass that meets a one-sided elastic stop: it hardens, and its resonance leans over."""
+    ports = {"contact": np.array([0, 1]), "load": np.array([0]), "probe": np.array([0])}
+    body = port_model_from_matrices(np.eye(2), np.diag([1.0, 50.0]), ports)
+    elements = Elements(np.array([1e-3]), np.array([1.0]), np.zeros(1), np.array([-gap]), tangents=1)
+    return ReducedModel((body,), elements, {1: np.array([0.1])}, Damping(ratio=0.02))
+
+
+@pytest.mark.parametrize(("model", "name", "bounds", "omega"), [
+    (single_mass(), "omega", (0.6, 1.8), 0.6), (single_mass(), "load", (0.2, 4.0), 1.1),
+    (block(force=1.0), "mu", (0.5, 2.0), 0.9), (block(force=1.0), "force", (0.8, 2.0), 0.9),
+    (block(force=1.0), "gap", (0.0, 0.3), 0.9)])
+def test_every_point_of_a_path_is_a_solution(model, name, bounds, omega):
+    start = solve(model, omega, 3, 128)
+    points = list(follow(model, name, start, bounds, 3, 128))
+    assert points[-1].value > bounds[1] and all(p.solution.converged for p in points)
+    for p in points[1::4]:
+        changed = model if name == "omega" else vary(model, name, p.value)
+        again = solve(changed, p.value if name == "omega" else omega, 3, 128, start=p.solution)
+        np.testing.assert_allclose(p.solution.probe, again.probe, rtol=0, atol=1e-8 * abs(again.probe).max())
+
+
+def test_folds_lie_where_sweeps_up_and_down_jump():
+    """A leaning resonance: the path turns back twice; fine sweeps up and down jump at the same two frequencies."""
+    model, H, samples = stop(), 5, 0
+    points = list(follow(model, "omega", solve(model, 0.8, H, samples), (0.8, 1.6), H, samples, longest=0.02))
+    folds = [max(a.value, b.value) if a.forward else min(a.value, b.value)
+             for a, b in pairwise(points) if b.fold]
+    assert len(folds) == 2 and folds[0] > folds[1]
+    for sign, fold in zip((1, -1), folds, strict=True):     # sweep across the fold in steps of 2e-4
+        omegas = fold + sign * np.arange(-0.01, 0.01, 2e-4)
+        branch = [p.solution for p in points[1:] if p.forward and (size(p.solution) > 1.02) == (sign > 0)]
+        last = min(branch, key=lambda s: abs(s.omega - omegas[0]))
+        heights = []
+        for omega in omegas:
+            last = solve(model, omega, H, samples, start=last)
+            heights.append(size(last))
+        jump = omegas[int(np.argmax(abs(np.diff(heights))))]
+        assert jump == pytest.approx(fold, abs=6e-4)
+
+
+def test_bad_bounds():
+    model = single_mass()
+    start = solve(model, 1.0)
+    with pytest.raises(InputError, match="bounds"):
+        next(follow(model, "load", start, (2.0, 3.0), 3, 128))
+    with pytest.raises(InputError, match="did you mean"):
+        next(follow(model, "omegas", start, (0.5, 2.0), 3, 128))

@@ -1,0 +1,48 @@
+"""The path of large patches: GMRES steps are those of the dense Jacobian, and no dense Jacobian is made."""
+
+from dataclasses import replace
+
+import numpy as np
+from hbm_models import patch
+
+from bladefem.hbm import residual as residual_module
+from bladefem.hbm.api import solve
+from bladefem.hbm.iterative import iterative_inverse
+from bladefem.hbm.linear import condense
+from bladefem.hbm.residual import Balance, evaluate_balance, linearise, start_in_stick
+
+
+def test_iterative_and_dense_steps_agree(monkeypatch):
+    model = patch(side=4, inner=6).model
+    balance = Balance(model, condense(model, 0.8, 3), 64)
+    state = evaluate_balance(balance, 1.2 * start_in_stick(balance))
+    assert (state.forces.shares[:, 1] > 0).any() and (state.forces.shares[:, 2] > 0).any()
+    dense = linearise(balance, state)(state.residual)
+    monkeypatch.setattr(residual_module, "DENSE", 0)
+    for accuracy in (1e-2, 1e-5):
+        step = linearise(balance, state)(state.residual, accuracy)
+        assert np.linalg.norm(step - dense) < 20 * accuracy * np.linalg.norm(dense)
+
+
+def test_the_preconditioner_takes_over_where_plain_gmres_is_too_slow(monkeypatch):
+    from bladefem.hbm import iterative
+    model = patch(side=4, inner=6).model
+    balance = Balance(model, condense(model, 0.8, 3), 64)
+    state = evaluate_balance(balance, 1.2 * start_in_stick(balance))
+    n, d, K = state.w.shape
+    change = state.forces.dfdw.reshape(n, d * K, d * K).copy()
+    change[:, np.arange(d * K), np.arange(d * K)] -= np.repeat(model.springs, K, axis=1)
+    right = state.residual.reshape(n * d, K)
+    full = iterative_inverse(balance.linear.A, change)(right, 1e-5)
+    monkeypatch.setattr(iterative, "BASIS", 12)
+    short = iterative_inverse(balance.linear.A, change)(right, 1e-3)
+    assert np.linalg.norm(short - full) < 0.05 * np.linalg.norm(full)
+
+
+def test_a_patch_with_lift_off_is_solved_and_balances_its_work():
+    model = patch(side=6, inner=9).model
+    for omega in (0.5, 0.9, 1.3):
+        solution = solve(model, omega, 3, 64)
+        assert solution.converged and solution.work.imbalance < 1e-8
+        lighter = solve(replace(model, excitation={1: 0.5 * model.excitation[1]}), omega, 3, 64, start=solution)
+        assert lighter.converged
