@@ -42,6 +42,7 @@ from .stages import (
 __all__ = ["STAGES", "Response", "Run", "Seating", "family_of_case", "load_cases", "reduced_sector", "run"]
 
 EXACT_HARMONICS = 3      # higher ones borrow the nodal diameter next to their own
+UNKNOWNS = 5000          # of the largest balance that the automatic choice solves; scene.model.harmonics may ask for more
 STAGES = ("mesh", "modes", "contact", "response")
 
 
@@ -176,7 +177,13 @@ def family_of_case(scene: Scene, mesh: Mesh, reduced: Reduced, patches: list[Pat
         groups = np.arange(nodes) if settings.points is None else _groups(patches, settings.points)
         return Member(coarsened(model, groups), groups)
 
-    return Family(build, max(len(body.omega) for body in reduced.sector.values()), dampers=DAMPERS)
+    return Family(build, max(len(body.omega) for body in reduced.sector.values()), _affordable(case), DAMPERS)
+
+
+def _affordable(case: LoadCase) -> int:
+    """Harmonics that UNKNOWNS allow with all contact points; the estimated error tells when more were needed."""
+    dofs = case.selection.shape[1]
+    return max((h for h in (3, 7, 15, 31) if dofs * (2 * h + 1) <= UNKNOWNS), default=3)
 
 
 def _groups(patches: list[Patch], points: int) -> np.ndarray:
@@ -192,7 +199,7 @@ def reduced_sector(scene: Scene, bodies: Bodies, case: LoadCase, patches: list[P
 
     Where the number of modes is open, twice as many are reduced as the balance takes: they judge it.
     """
-    settings, spare = first_settings(scene), 1 if scene.model.modes else 2
+    settings, spare = replace(first_settings(scene), most=_affordable(case)), 1 if scene.model.modes else 2
     diameters = harmonic_diameters(scene, bodies.mesh, EXACT_HARMONICS)
     while True:
         count = spare * settings.modes

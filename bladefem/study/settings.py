@@ -24,6 +24,7 @@ class Settings:
     samples: int                    # a period
     damper: str                     # one of DAMPERS
     points: int | None = None       # friction elements on each patch; None: all that there are
+    most: int = 31                  # harmonics beyond which the choice does not go
     error: float | None = None      # estimated relative error of the resonance amplitude, None before the check
     chosen: tuple[str, ...] = ()    # names that are chosen here and not by the user
 
@@ -77,7 +78,7 @@ def enriched(settings: Settings, name: str, need: float = 4.0) -> Settings | Non
         more = 2 * value
     else:
         more = value * 2 ** min(max(ceil(log2(sqrt(max(need, 1.0)))), 1), 3)
-    more = min(more, RICHEST[name])
+    more = min(more, RICHEST[name], settings.most if name == "harmonics" else more)
     return _enough_samples(replace(settings, **{name: more})) if more > value else None
 
 
