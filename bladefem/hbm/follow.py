@@ -28,6 +28,7 @@ from .vary import check_parameter, vary
 
 __all__ = ["PathPoint", "follow"]
 
+LIMIT = 5000            # points of a path
 CORRECTIONS = 12        # Newton steps of one corrector
 SMALLEST = 1e-5         # arc-length step, as a share of the range, below which only a leap can help
 LEAPS = (1e-4, 1e-3, 5e-3)      # shares of the range that are leapt
@@ -85,39 +86,40 @@ class _Spot:
         return dw * length, float(length)
 
 
-def follow(model: ReducedModel, name: str, start: Solution, bounds: tuple[float, float], H: int, samples: int, *,
-           forward: bool = True, step: float = 0.02, longest: float = 0.1, limit: int = 2000,
-           options: Options = DEFAULTS) -> Iterator[PathPoint]:
-    """The path from a converged solution until the parameter leaves its bounds.
+def follow(model: ReducedModel, name: str, start: Solution, bounds: tuple[float, float], *, forward: bool = True,
+           steps: tuple[float, float] = (0.02, 0.1), options: Options = DEFAULTS) -> Iterator[PathPoint]:
+    """The path from a converged solution, with its harmonics and samples, until the parameter leaves its bounds.
 
     Args:
         name: "omega", or a parameter of `bladefem.hbm.vary`; the start belongs to its factor 1, or gap 0.
         bounds: smallest and largest value; `start` lies between.
-        step, longest: first and longest arc-length step, as shares of the range.
+        steps: first and longest arc-length step, as shares of the range.
 
     Raises:
         InputError: unknown parameter, or a start outside the bounds.
         NotSolvedError: the path could not be followed further; the message says why.
     """
-    task, x = _prepare(model, name, start, bounds, H, samples, options)
+    task, x = _prepare(model, name, start, bounds, options)
     low, high = (_inner(name, bound) for bound in bounds)
     spot = _first(task, x, start, 1.0 if forward else -1.0)
     yield _point(task, spot, fold=False)
-    for _ in range(limit):
+    step, longest = steps
+    for _ in range(LIMIT):
         spot, step, fold = _advance(task, spot, step, longest)
         yield _point(task, spot, fold)
         if not low <= spot.x <= high:
             return
-    raise NotSolvedError(f"path in {name} stopped at {_value(name, spot.x):.6g} after {limit} points")
+    raise NotSolvedError(f"path in {name} stopped at {_value(name, spot.x):.6g} after {LIMIT} points")
 
 
-def _prepare(model: ReducedModel, name: str, start: Solution, bounds: tuple[float, float], H: int, samples: int,
+def _prepare(model: ReducedModel, name: str, start: Solution, bounds: tuple[float, float],
              options: Options) -> tuple[_Task, float]:
     check_parameter(name, also=("omega",))
     value = {"omega": start.omega, "gap": 0.0}.get(name, 1.0)
     if not bounds[0] <= value <= bounds[1] or bounds[0] >= bounds[1] or (name != "gap" and bounds[0] <= 0):
         raise InputError(f"bounds {bounds}: expected a range of {name} with the start {value:.6g} inside")
-    solution = solve(model, start.omega, H, samples, start=start, options=options)
+    H = start.harmonics
+    solution = solve(model, start.omega, H, start.samples, start=start, options=options)
     if not solution.converged:
         raise NotSolvedError(f"path in {name}: the start is not solved, {solution.reason}")
     width = _inner(name, bounds[1]) - _inner(name, bounds[0])

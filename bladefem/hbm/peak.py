@@ -53,7 +53,7 @@ class Optimum:
 
 
 def find_peak(model: ReducedModel, omega: float, H: int = 3, samples: int = 128, *, start: Solution | None = None,
-              tolerance: float = 1e-4, probe: int = 0, options: Options = DEFAULTS) -> Peak:
+              tolerance: float = 1e-4, options: Options = DEFAULTS) -> Peak:
     """The local maximum uphill of omega [rad/s].
 
     Args:
@@ -69,8 +69,8 @@ def find_peak(model: ReducedModel, omega: float, H: int = 3, samples: int = 128,
         start = solve(model, omega, H, samples, start=start, options=options)
         if not start.converged:
             raise NotSolvedError(f"peak search stopped at {start.frequency:.6g} Hz: {start.reason}")
-        height = size(start, probe)
-        uphill = sensitivities(model, start, ["omega"])["omega"].size[probe]
+        height = size(start, options.probe)
+        uphill = sensitivities(model, start, ["omega"])["omega"].size[options.probe]
         line = -2 * uphill / height**3
         low, high = (omega, high) if uphill > 0 else (low, omega)
         target = omega + np.sign(uphill) * reach
@@ -87,7 +87,7 @@ def find_peak(model: ReducedModel, omega: float, H: int = 3, samples: int = 128,
 
 
 def track_peak(model: ReducedModel, name: str, values: Iterable[float], omega: float, H: int = 3, samples: int = 128, *,
-               tolerance: float = 1e-4, probe: int = 0, options: Options = DEFAULTS) -> Iterator[Peak]:
+               options: Options = DEFAULTS) -> Iterator[Peak]:
     """Follow one peak while a parameter of `bladefem.hbm.vary` takes the given values: no frequency sweeps.
 
     Args:
@@ -102,15 +102,14 @@ def track_peak(model: ReducedModel, name: str, values: Iterable[float], omega: f
             ahead = (value - path[-1].value) / (path[-1].value - path[-2].value)
             guess += float(np.clip(ahead * (guess - path[-2].omega), -FARTHEST * guess, FARTHEST * guess))
         changed = vary(model, name, value)
-        peak = find_peak(changed, guess, H, samples, start=path[-1].solution if path else None, tolerance=tolerance,
-                         probe=probe, options=options)
-        slope = sensitivities(changed, peak.solution, [name])[name].size[probe]
+        peak = find_peak(changed, guess, H, samples, start=path[-1].solution if path else None, options=options)
+        slope = sensitivities(changed, peak.solution, [name])[name].size[options.probe]
         path = [*path[-1:], Peak(peak.solution, peak.height, peak.points, value, float(slope))]
         yield path[-1]
 
 
 def optimum(model: ReducedModel, band: tuple[float, float], bounds: tuple[float, float], H: int = 3,
-            samples: int = 128, *, name: str = "load", tolerance: float = 1e-3, probe: int = 0) -> Optimum:
+            samples: int = 128, *, name: str = "load", tolerance: float = 1e-3) -> Optimum:
     """The factor of a parameter, between two bounds, that makes the highest peak in a band [rad/s] lowest.
 
     Looks at five factors by sweeps, then closes in by the sign of the peak's exact derivative; where two peaks exchange
@@ -120,7 +119,7 @@ def optimum(model: ReducedModel, band: tuple[float, float], bounds: tuple[float,
         NotSolvedError: a peak could not be solved.
     """
     def highest(value: float) -> Peak:
-        return _highest(vary(model, name, value), band, H, samples, name, value, probe)
+        return _highest(vary(model, name, value), band, H, samples, name, value)
 
     tried = [highest(value) for value in np.geomspace(*bounds, 5)]
     best = int(np.argmin([peak.height for peak in tried]))
@@ -134,16 +133,16 @@ def optimum(model: ReducedModel, band: tuple[float, float], bounds: tuple[float,
     return Optimum(best_peak.value, best_peak, tuple(tried))
 
 
-def _highest(model: ReducedModel, band: tuple[float, float], H: int, samples: int, name: str, value: float,
-             probe: int) -> Peak:
-    points = sorted(sweep(model, band, H, samples, peak=0.02, curve=0.2, probe=probe), key=lambda s: s.omega)
-    tops = sorted(local_maxima([s for s in points if s.converged], probe), key=lambda s: -size(s, probe))
-    peaks = [find_peak(model, top.omega, H, samples, start=top, probe=probe)
-             for top in tops if size(top, probe) > 0.9 * size(tops[0], probe)]
+def _highest(model: ReducedModel, band: tuple[float, float], H: int, samples: int, name: str,
+             value: float) -> Peak:
+    points = sorted(sweep(model, band, H, samples, peak=0.02, curve=0.2), key=lambda s: s.omega)
+    tops = sorted(local_maxima([s for s in points if s.converged]), key=lambda s: -size(s))
+    peaks = [find_peak(model, top.omega, H, samples, start=top)
+             for top in tops if size(top) > 0.9 * size(tops[0])]
     if not peaks:
         raise NotSolvedError(f"no peak between {band[0]:.6g} and {band[1]:.6g} rad/s with {name} at {value:.4g}")
     top = max(peaks, key=lambda peak: peak.height)
-    slope = sensitivities(model, top.solution, [name])[name].size[probe]
+    slope = sensitivities(model, top.solution, [name])[name].size[0]
     return Peak(top.solution, top.height, len(points) + sum(peak.points for peak in peaks), value, float(slope))
 
 

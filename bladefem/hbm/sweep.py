@@ -38,7 +38,7 @@ def response(model: ReducedModel, omegas: Iterable[float], H: int = 3, samples: 
 
 
 def sweep(model: ReducedModel, band: tuple[float, float], H: int = 3, samples: int = 128, *, peak: float = 1e-3,
-          curve: float = 0.02, probe: int = 0, options: Options = DEFAULTS) -> Iterator[Solution]:
+          curve: float = 0.02, options: Options = DEFAULTS) -> Iterator[Solution]:
     """Solve a band of circular frequencies [rad/s]; points come in the order of need, to be sorted by `omega`.
 
     A first look takes even steps and the resonances of both linear limits. Then every local maximum is closed in,
@@ -58,7 +58,7 @@ def sweep(model: ReducedModel, band: tuple[float, float], H: int = 3, samples: i
         solved[solution.omega] = solution
         yield solution
     while len(solved) < BAND_LIMIT:
-        wanted = _wanted(solved, peak, curve, probe)
+        wanted = _wanted(solved, peak, curve, options.probe)
         if wanted is None:
             return
         near = sorted((s for s in solved.values() if s.converged), key=lambda s: abs(s.omega - wanted))[:1]

@@ -32,7 +32,7 @@ def stop(gap=1.0):
     (block(force=1.0), "gap", (0.0, 0.3), 0.9)])
 def test_every_point_of_a_path_is_a_solution(model, name, bounds, omega):
     start = solve(model, omega, 3, 128)
-    points = list(follow(model, name, start, bounds, 3, 128))
+    points = list(follow(model, name, start, bounds))
     assert points[-1].value > bounds[1] and all(p.solution.converged for p in points)
     for p in points[1::4]:
         changed = model if name == "omega" else vary(model, name, p.value)
@@ -43,7 +43,7 @@ def test_every_point_of_a_path_is_a_solution(model, name, bounds, omega):
 def test_folds_lie_where_sweeps_up_and_down_jump():
     """A leaning resonance: the path turns back twice; fine sweeps up and down jump at the same two frequencies."""
     model, H, samples = stop(), 5, 0
-    points = list(follow(model, "omega", solve(model, 0.8, H, samples), (0.8, 1.6), H, samples, longest=0.02))
+    points = list(follow(model, "omega", solve(model, 0.8, H, samples), (0.8, 1.6), steps=(0.02, 0.02)))
     folds = [max(a.value, b.value) if a.forward else min(a.value, b.value)
              for a, b in pairwise(points) if b.fold]
     assert len(folds) == 2 and folds[0] > folds[1]
@@ -63,6 +63,6 @@ def test_bad_bounds():
     model = single_mass()
     start = solve(model, 1.0)
     with pytest.raises(InputError, match="bounds"):
-        next(follow(model, "load", start, (2.0, 3.0), 3, 128))
+        next(follow(model, "load", start, (2.0, 3.0)))
     with pytest.raises(InputError, match="did you mean"):
-        next(follow(model, "omegas", start, (0.5, 2.0), 3, 128))
+        next(follow(model, "omegas", start, (0.5, 2.0)))
