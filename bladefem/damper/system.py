@@ -12,7 +12,7 @@ All periodic inputs are real Fourier coefficients [mean, cos, sin, cos 2, sin 2,
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -125,8 +125,3 @@ def oscillator(omega: float, ratio: float, kt: float, limit: float, force: compl
     return System(np.array([omega**2]), np.array([[2 * ratio * omega]]), np.ones((1, 1)), np.array([kt]), np.ones(1),
                   np.array([[0.0, force.real, -force.imag]]), zero, np.array([[limit, 0, 0]]), np.zeros((1, 1)),
                   np.ones((1, 1)))
-
-
-def with_load(system: System, factor: float) -> System:
-    """The same system with all prescribed normal loads multiplied."""
-    return replace(system, normal=factor * system.normal)
