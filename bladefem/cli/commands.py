@@ -12,7 +12,7 @@ from ..errors import InputError
 from ..scene import Scene
 from . import tables
 
-__all__ = ["check", "contact", "info", "mesh", "modes", "report", "response", "study"]
+__all__ = ["chart", "check", "contact", "info", "mesh", "modes", "report", "response", "study"]
 
 
 def check(options: argparse.Namespace, comm: Any) -> None:
@@ -60,6 +60,25 @@ def report(options: argparse.Namespace, comm: Any) -> None:
     """Everything, with figures and report."""
     run = until("report", options, comm)
     tell(options, comm, lambda: tables.responses(run.response), run)
+
+
+def chart(options: argparse.Namespace, comm: Any) -> None:
+    """Speed against accuracy of methods and models: tables and picture."""
+    from ..report.chart import write_chart
+    from ..store import on_root
+    from ..study.chart_scene import reference_chart, scene_chart
+    if options.reference:
+        folder, accuracy, title = Path(options.output or "runs/reference"), 0.02, "reference blade"
+        made = on_root(comm, lambda: reference_chart(accuracy, options.budget))
+    elif options.scene is None:
+        raise InputError("chart: expected a scene file, or --reference")
+    else:
+        from ..scene_file import load_scene
+        folder = Path(options.output or default_folder(options.scene))
+        scene = on_root(comm, lambda: load_scene(scene_path(options.scene), options.overrides))
+        made, accuracy, title = scene_chart(scene, folder, options.budget, comm), scene.accuracy, scene.title
+    files = on_root(comm, lambda: write_chart(made, folder, accuracy, title))
+    tell(options, comm, lambda: "\n".join([*made.remarks, "written: " + ", ".join(map(str, files))]))
 
 
 def study(options: argparse.Namespace, comm: Any) -> None:

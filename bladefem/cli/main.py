@@ -37,6 +37,8 @@ _COMMANDS = {
                  "bladefem response scenes/wedge.toml --set study.loads='20, 50, 100 N'", commands.response),
     "study": ("the same for several values of one parameter, side by side",
               "bladefem study scenes/wedge.toml --vary damper.angle='30, 40, 50 deg'", commands.study),
+    "chart": ("time against error of methods and models, with the automatic choice",
+              "bladefem chart scenes/plane.toml --budget 60", commands.chart),
     "report": ("figures, tables and report of a run",
                "bladefem report runs/wedge", commands.report),
     "run": ("everything, from mesh to report", "bladefem run scenes/wedge.toml -o runs/wedge", commands.report),
@@ -57,7 +59,8 @@ def parser() -> argparse.ArgumentParser:
     subs = top.add_subparsers(dest="command", required=True, metavar="command")
     for name, (what, example, function) in _COMMANDS.items():
         sub = _command(subs, name, what, example, function)
-        sub.add_argument("scene", help="scene file (TOML), or the folder of an earlier run")
+        sub.add_argument("scene", nargs="?" if name == "chart" else None,
+                         help="scene file (TOML), or the folder of an earlier run")
         sub.add_argument("--set", action="append", default=[], metavar="KEY=VALUE", dest="overrides",
                          help="another value for one field, such as aerofoil.twist='25 deg'; may be repeated")
         if name != "check":
@@ -66,6 +69,9 @@ def parser() -> argparse.ArgumentParser:
     subs.choices["mesh"].add_argument("--view", metavar="PNG", help="also draw the mesh into this file")
     subs.choices["study"].add_argument("--vary", required=True, metavar="KEY=VALUES",
                                        help="field and its values, such as damper.angle='30, 40, 50 deg'")
+    subs.choices["chart"].add_argument("--budget", type=float, default=120.0, metavar="SECONDS",
+                                       help="time for the chart; what would exceed it is left out and named")
+    subs.choices["chart"].add_argument("--reference", action="store_true", help="the built-in reference blade instead")
     info = _command(subs, "info", "versions and threads of what bladefem runs on", "bladefem info", commands.info)
     info.set_defaults(scene=None)
     return top

@@ -144,7 +144,7 @@ def covered(model: ReducedModel, settings: Settings, band: tuple[float, float] |
     Raises:
         NotSolvedError: no point converged.
     """
-    low, high = band or default_band(model, mode)
+    (low, high), limits = band or default_band(model, mode), _halfway(model, mode)
     for _ in range(1 if band and not widen else WIDENINGS):
         points = response_points(model, settings, (low, high), accuracy)
         good = [p.omega for p in points if p.converged]
@@ -152,8 +152,17 @@ def covered(model: ReducedModel, settings: Settings, band: tuple[float, float] |
         if good[0] < top < good[-1]:
             break
         low, high = (low - (high - low), high) if top == good[0] else (low, high + (high - low))
-        low = max(low, 0.1 * high)
+        low, high = max(low, limits[0]), min(high, limits[1])
     return points
+
+
+def _halfway(model: ReducedModel, mode: int) -> tuple[float, float]:
+    """Frequencies [Hz] half way to the neighbouring modes: beyond them the flank of another resonance may be higher."""
+    ends = np.sort([free_resonances(model), stuck_resonances(model)[:len(free_resonances(model))]], axis=0)
+    ends = ends / (2 * np.pi)
+    low = 0.1 * ends[0, 0] if mode == 1 else (ends[1, mode - 2] + ends[0, mode - 1]) / 2
+    high = 3 * ends[1, -1] if mode == ends.shape[1] else (ends[1, mode - 1] + ends[0, mode]) / 2
+    return min(low, 0.99 * ends[0, mode - 1]), max(high, 1.01 * ends[1, mode - 1])
 
 
 def response_points(model: ReducedModel, settings: Settings, band: tuple[float, float],

@@ -1,0 +1,183 @@
+"""Is the automatic choice ever wrong, and does it pay? Against a fixed rich model on 72 cases, and along a sweep.
+
+    python benchmarks/choice_cases.py [every]
+
+runs each ``every``-th case (1: all). Cases are the reference blade (contact stiffness, damper mass, interblade phase,
+load, frequency, one to sixteen contact points a side, 40 modes) and random elastic bodies with 3-D contacts and
+lift-off. "True error" is that of the first harmonic at the probe against H 31, 4096 samples, all points and modes.
+"""
+
+from __future__ import annotations
+
+import sys
+import time
+from collections.abc import Iterable, Iterator
+from dataclasses import dataclass
+
+import numpy as np
+
+from bladefem.data import Elements, PortModel, RigidBody
+from bladefem.hbm.api import solve
+from bladefem.hbm.model import Damping, ReducedModel
+from bladefem.hbm.reference import reference_model
+from bladefem.hbm.resonance import free_resonances, stuck_resonances
+from bladefem.hbm.solution import Solution
+from bladefem.hbm.sweep import response, size
+from bladefem.study.choice import choose
+from bladefem.study.family import Family, family_of, member
+from bladefem.study.indicators import indicate
+from bladefem.study.settings import Settings, first_for
+
+TRUTH, RICH = (31, 4096), (15, 1024)
+
+
+@dataclass(frozen=True)
+class Case:
+    """A rich model at one frequency."""
+
+    name: str
+    model: ReducedModel
+    patches: tuple[int, ...]
+    omega: float
+
+
+@dataclass(frozen=True)
+class Outcome:
+    """One case at one accuracy."""
+
+    settings: Settings
+    accepted: bool
+    told: float             # estimated error
+    true: float             # error against the truth
+    seconds: float          # search and solution
+
+
+def beam_cases() -> Iterator[Case]:
+    """60 cases: four blades, three loads, five frequencies between the free and the stuck resonance of mode 2."""
+    for kt, mass, phase, points in ((1e6, 0.06, 0.0, 1), (1e6, 0.03, 1.0, 4), (2e7, 0.06, np.pi, 8),
+                                    (3e6, 0.12, 0.5, 16)):
+        for load in (1.0, 8.0, 60.0):
+            model = reference_model(kt, mass, load, phase=phase, points=points, harmonics=63)
+            free, stuck = free_resonances(model)[1], stuck_resonances(model)[1]
+            for share in (-0.1, 0.1, 0.5, 0.9, 1.1):
+                omega = free + share * (stuck - free)
+                yield Case(f"beam kt {kt:.0e} m {mass} phase {phase:.1f} load {load:g} x{share:g} points {points}",
+                           model, (points, points), omega)
+
+
+def random_body(seed: int, nodes: int, modes: int = 24) -> ReducedModel:
+    """A blade of random modes with two patches of 3-D contacts and a rigid wedge of six freedoms.
+
+    Mode shapes are smooth over the patches, as those of a platform are: a rigid motion of the patch, and a little more.
+    """
+    rng = np.random.default_rng(seed)
+    omega = 2 * np.pi * np.sort(np.concatenate([[300.0, 900.0], rng.uniform(1500, 20000, modes - 2)]))
+    place = np.concatenate([np.column_stack([np.full(nodes, side), np.linspace(-0.01, 0.01, nodes), np.zeros(nodes)])
+                            for side in (-0.01, 0.01)])
+    rows = []
+    for x in place:
+        cross = np.array([[0, x[2], -x[1]], [-x[2], 0, x[0]], [x[1], -x[0], 0]])
+        rows.append(np.hstack([np.eye(3), cross]))
+    rigid = np.concatenate(rows)
+    bend = np.kron(np.cos(np.pi * place[:, 1] / 0.02)[:, None], np.eye(3))
+    shapes = rigid @ (rng.normal(size=(6, modes)) * np.array([1, 1, 1, 60, 60, 60])[:, None])
+    shapes += 0.3 * bend @ rng.normal(size=(3, modes))
+    tip = rng.normal(size=(1, modes)) * 4
+    tip[0, 0] = 6.0
+    allrows = np.vstack([shapes, tip, tip])
+    dofs = 6 * nodes
+    ports = {"contact": slice(0, dofs), "load": slice(dofs, dofs + 1), "probe": slice(dofs + 1, dofs + 2)}
+    body = PortModel(omega, allrows, np.zeros((dofs + 2,) * 2), ports)
+    share = 1 - (place[:, 1] / 0.0105) ** 2
+    share /= share[:nodes].sum()
+    elements = Elements(8e6 * share, 1e7 * share, np.full(2 * nodes, 0.3), 60.0 * share)
+    mass = np.diag([0.02, 0.02, 0.02, 2e-6, 2e-6, 2e-6])
+    return ReducedModel((body,), elements, {1: np.array([1.0])}, Damping(ratio=0.002), RigidBody(mass, rigid))
+
+
+def random_cases() -> Iterator[Case]:
+    """12 cases with lift-off."""
+    for seed in (1, 2, 3):
+        model = random_body(seed, 4)
+        free, stuck = free_resonances(model)[0], stuck_resonances(model)[0]
+        for share in (0.05, 0.4, 0.7, 0.95):
+            yield Case(f"random body {seed} x{share:g}", model, (4, 4), free + share * (stuck - free))
+
+
+def automatic(case: Case, family: Family, truth: complex, accuracy: float) -> Outcome:
+    """Choose and solve one point."""
+    start = time.perf_counter()
+    settings = first_for(family.modes)
+    point = solve(member(family, settings).model, case.omega, settings.harmonics, settings.samples)
+    settings, point, found = choose(family, settings, point, accuracy)
+    seconds = time.perf_counter() - start
+    return Outcome(settings, point.converged and found.total <= accuracy / 2, found.total,
+                   float(abs(point.probe[1, 0] / truth - 1)), seconds)
+
+
+def rich(case: Case) -> float:
+    """Seconds of the fixed rich model for one point."""
+    start = time.perf_counter()
+    solve(case.model, case.omega, *RICH)
+    return time.perf_counter() - start
+
+
+def sweep_ratio(case: Case, accuracy: float, points: int = 100) -> tuple[float, float]:
+    """Time of the automatic choice over that of the rich model along a sweep, and the largest error told in it."""
+    free, stuck = free_resonances(case.model), stuck_resonances(case.model)
+    near = min(range(len(free)), key=lambda i: abs(free[i] - case.omega))
+    low, high = sorted((free[near], stuck[near]))
+    omegas = np.linspace(low - 0.1 * (high - low), high + 0.1 * (high - low), points)
+    start = time.perf_counter()
+    family = family_of(case.model, case.patches)
+    settings = first_for(family.modes)
+    rough = response(member(family, settings).model, omegas[::8], settings.harmonics, settings.samples)
+    settings, _, _ = choose(family, settings, highest(rough), accuracy)
+    solved = list(response(member(family, settings).model, omegas, settings.harmonics, settings.samples))
+    top = highest(solved)
+    worst = max(indicate(family, settings, p).total * size(p) / size(top)
+                for p in (top, *solved[::points // 4]) if p.converged)
+    middle = time.perf_counter()
+    list(response(case.model, omegas, *RICH))
+    return (middle - start) / (time.perf_counter() - middle), worst
+
+
+def highest(points: Iterable[Solution]) -> Solution:
+    return max((p for p in points if p.converged), key=size)
+
+
+def main(every: int = 1) -> None:
+    cases = [*beam_cases(), *random_cases()][::every]
+    solve(cases[0].model, cases[0].omega, 3, 64)        # compile
+    for case in {c.model.directions: c for c in cases}.values():
+        automatic(case, family_of(case.model, case.patches), 1.0, 0.02)
+    results: dict[float, list[Outcome]] = {0.02: [], 0.001: []}
+    rich_seconds = 0.0
+    for case in cases:
+        truth = solve(case.model, case.omega, *TRUTH)
+        if not truth.converged:
+            print(f"{case.name:58s} left out: the truth did not converge")
+            continue
+        rich_seconds += rich(case)
+        for accuracy, outcomes in results.items():
+            outcomes.append(automatic(case, family_of(case.model, case.patches), truth.probe[1, 0], accuracy))
+            o = outcomes[-1]
+            print(f"{case.name:58s} {accuracy:6g} {'ok ' if o.accepted else 'NO '} told {o.told:8.1e} "
+                  f"true {o.true:8.1e} "
+                  f"H {o.settings.harmonics:2d} Nt {o.settings.samples:4d} modes {o.settings.modes:2d} points "
+                  f"{o.settings.points} {1e3 * o.seconds:7.1f} ms")
+    for accuracy, outcomes in results.items():
+        good = [o for o in outcomes if o.accepted]
+        wrong = sum(o.true > accuracy for o in good)
+        print(f"accuracy {accuracy:g}: {len(good)} of {len(outcomes)} accepted, {wrong} wrong, largest true error "
+              f"{max(o.true for o in good):.2g}, time over the rich model "
+              f"{sum(o.seconds for o in outcomes) / rich_seconds:.2f}")
+    for k in (len(cases) * 2 // 5, len(cases) * 7 // 10, len(cases) - 2):
+        for accuracy in results:
+            ratio, worst = sweep_ratio(cases[k], accuracy)
+            print(f"sweep of 100 points, {cases[k].name}, accuracy {accuracy:g}: time over the rich model {ratio:.2f}, "
+                  f"largest error told {worst:.1e} of the peak")
+
+
+if __name__ == "__main__":
+    main(int(sys.argv[1]) if len(sys.argv) > 1 else 1)

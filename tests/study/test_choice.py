@@ -1,0 +1,65 @@
+"""The automatic choice on eight blades: never wrong; contact points that single steps are blind to; estimates."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from bladefem.hbm.api import solve
+from bladefem.hbm.reference import reference_model
+from bladefem.hbm.resonance import free_resonances, stuck_resonances
+from bladefem.study.choice import adapted, checked, choose, estimated
+from bladefem.study.family import carried, coarsened, family_of, member
+from bladefem.study.settings import enriched, first_for
+
+
+@pytest.mark.parametrize("accuracy", [0.02, 0.001])
+@pytest.mark.parametrize(("kt", "mass", "phase", "points", "load", "share"), [
+    (1e6, 0.06, 0.0, 1, 1.0, 0.1), (1e6, 0.03, 1.0, 4, 1.0, 0.9), (1e6, 0.03, 1.0, 4, 8.0, 1.1),
+    (2e7, 0.06, np.pi, 8, 1.0, -0.1), (2e7, 0.06, np.pi, 8, 8.0, 0.5), (3e6, 0.12, 0.5, 8, 1.0, 0.1),
+    (3e6, 0.12, 0.5, 8, 8.0, 0.9), (1e6, 0.06, 0.0, 6, 3.0, 0.7)])
+def test_accepted_settings_keep_the_accuracy(kt, mass, phase, points, load, share, accuracy):
+    model = reference_model(kt, mass, load, phase=phase, points=points, modes=20, harmonics=63)
+    omega = free_resonances(model)[1] * (1 - share) + stuck_resonances(model)[1] * share
+    truth = solve(model, omega, 31, 4096).probe[1, 0]
+    family = family_of(model)
+    settings = first_for(family.modes)
+    point = solve(member(family, settings).model, omega, settings.harmonics, settings.samples)
+    settings, point, found = choose(family, settings, point, accuracy)
+    assert found.total <= accuracy / 2
+    assert abs(point.probe[1, 0] / truth - 1) < accuracy
+
+
+def test_a_curve_tells_its_error_at_every_point():
+    model = reference_model(load=3.0, points=4, modes=20, harmonics=63)
+    curve = adapted(family_of(model), first_for(20), (1150.0, 1600.0), 2, 0.02)
+    told = estimated(curve)
+    assert len(told) == len(curve.points) and np.isfinite(told).all()
+    assert 3 <= checked(curve).sum() <= 5
+    assert curve.settings.error <= 0.01
+
+
+def test_joined_contact_points_keep_stiffness_and_load():
+    model = reference_model(points=6, load=4.0, harmonics=3)
+    few = coarsened(model, np.repeat(np.arange(4), 3))
+    assert few.elements.kt.sum() == pytest.approx(model.elements.kt.sum())
+    assert few.elements.n0.sum() == pytest.approx(8.0)
+    omega = 2 * np.pi * 1300
+    stuck = [solve(m, omega, 1, 64).probe[1, 0] for m in (coarsened(heavy(model), np.repeat(np.arange(4), 3)),
+                                                          heavy(model))]
+    assert stuck[0] == pytest.approx(stuck[1], rel=1e-9)     # all points see one platform: in stick nothing is lost
+
+
+def heavy(model):
+    from bladefem.hbm.vary import vary
+    return vary(model, "load", 1e6)
+
+
+def test_displacements_are_carried_between_numbers_of_points():
+    family = family_of(reference_model(points=6, harmonics=7))
+    settings = first_for(family.modes)
+    coarse, fine = member(family, settings), member(family, enriched(settings, "points"))
+    w = np.arange(8.0)[:, None, None] * np.ones((1, 1, 3))
+    there = carried(w, coarse, fine, 3)
+    assert there.shape == (12, 1, 7)
+    np.testing.assert_allclose(carried(there, fine, coarse, 1), w)
