@@ -85,6 +85,8 @@ def _balance(model: ReducedModel, omega: float, H: int, samples: int) -> Balance
 
 def _drift(linear: Linear, load: np.ndarray) -> float:
     """Load on the holding springs over what the contacts could carry, both on the motions without stiffness."""
+    if linear.B.shape[1] == 0:
+        return 0.0
     held = np.linalg.norm(linear.B.T @ load[:, :, 0].ravel() - linear.g)
     carried = np.linalg.norm(abs(linear.B).T @ np.linalg.norm(load, axis=2).ravel())
     return float(held / max(carried, np.finfo(float).tiny))

@@ -4,7 +4,8 @@
 2. twice and four times the samples where Newton came close: sampled 2-D friction jumps a little at the limit of stick,
    and there may be no exact zero; the solution then says how many samples it has;
 3. harmonics in sequence, 3, 7, 15, ... up to H, each started from the one before;
-4. homotopy in the normal load, from a load under which everything sticks down to the true one.
+4. homotopy in the normal load, from a load under which everything sticks down to the true one;
+5. the same by path following in the excitation, which goes round the folds that contacts with lift-off have.
 """
 
 from __future__ import annotations
@@ -14,14 +15,18 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from ..errors import NotSolvedError
+from .arclength import Task, advance, spot_at
 from .linear import Linear
 from .newton import Newton, Options, newton
 from .residual import Balance, evaluate_balance, start_in_stick
+from .vary import vary
 
 __all__ = ["Attempt", "match_harmonics", "solve_balance"]
 
 FIRST_LOAD, LARGEST_LOAD = 100.0, 1e8   # multiples of the normal load where a homotopy starts
 CLOSE = 1e-3            # residual from which more samples are tried
+LONGEST_PATH = 400      # points of a path in the excitation
 SMALLEST_STEP = 1e-3    # step in the logarithm of the load below which a homotopy gives up
 
 
@@ -68,6 +73,7 @@ def _ways(balance: Balance, start: np.ndarray | None, options: Options) -> Itera
     if balance.linear.A.shape[0] > 4:
         yield Attempt("harmonics in sequence", _more_harmonics(balance, options))
     yield Attempt("load homotopy", _from_high_load(balance, options))
+    yield Attempt("path in the excitation", _along_excitation(balance, options))
 
 
 def _more_harmonics(balance: Balance, options: Options) -> Newton:
@@ -111,6 +117,40 @@ def _from_high_load(balance: Balance, options: Options) -> Newton:
             if step < SMALLEST_STEP:
                 return _back(balance, end, iterations, f"stopped at {np.exp(level):.3g} times the load: {end.reason}")
     return replace(end, iterations=iterations)
+
+
+def _along_excitation(balance: Balance, options: Options) -> Newton:
+    """Follow the solution round folds from a part of the excitation that is easily solved up to all of it.
+
+    The friction law is homogeneous: this is the path in the normal load, seen from the other side.
+    """
+    def part(x: float) -> Balance:
+        model, factor = vary(balance.model, "force", float(np.exp(x))), float(np.exp(x))
+        linear = replace(balance.linear, free=factor * balance.linear.free, stuck=factor * balance.linear.stuck,
+                         g=factor * balance.linear.g)
+        return replace(balance, model=model, linear=linear)
+
+    iterations = 0
+    for factor in (0.7, 0.5, 0.25, 0.1, 0.01, 1e-4):
+        x = float(np.log(factor))
+        end = newton(part(x), start_in_stick(part(x)), options)
+        iterations += end.iterations
+        if end.converged:
+            break
+    else:
+        return _back(balance, end, iterations, f"no solution for any part of the excitation: {end.reason}")
+    task = Task(part, "force", -x, float(np.linalg.norm(end.state.w)), options)
+    spot, step = spot_at(task, x, part(x), end.state, 0, 1.0), 0.05
+    try:
+        for _ in range(LONGEST_PATH):
+            spot, step, _ = advance(task, spot, step, 0.2)
+            iterations += spot.iterations
+            if spot.x >= 0:
+                end = newton(balance, spot.state.w, options)
+                return replace(end, iterations=iterations + end.iterations)
+    except NotSolvedError as error:
+        return _back(balance, replace(end, state=spot.state), iterations, str(error))
+    return _back(balance, replace(end, state=spot.state), iterations, f"not there after {LONGEST_PATH} points")
 
 
 def _loaded(balance: Balance, level: float) -> Balance:
