@@ -1,0 +1,87 @@
+"""Cost of one converged point against contact nodes and harmonics, with the floating-point limit of each part.
+
+    python benchmarks/hbm_scaling.py [cost.png]
+Square 3-D patches of `hbm_models.patch`. Limits: condensation 8/3 + 8 complex m^3 a harmonic (LU and m right-hand
+sides, m = 3 n), at the rate at which this machine multiplies matrices; a dense Jacobian would take 2/3 (m (2H+1))^3 a
+Newton step.
+
+Measured (CPU seconds, one thread, 48.6 GFlop/s in matrix products; H = 3):
+    nodes   point   condense   forces    limit   one dense step   Newton steps
+        9   0.005     0.0004   0.0004   0.00001          0.0001              4
+       49   0.028     0.008    0.0012   0.002            0.015               4
+      100   0.12      0.06     0.0025   0.018            0.13                8
+      196   0.67      0.32     0.0053   0.13             0.96                6
+      400   5.0       2.5      0.014    1.1              8.1                 8
+Forces grow linearly, the condensation with the cube; 25 nodes: H 1 to 31 takes 0.009 to 0.22 s a point.
+"""
+
+from __future__ import annotations
+
+import sys
+import time
+from collections.abc import Callable
+
+import numpy as np
+from hbm_models import patch
+
+from bladefem.hbm.api import solve
+from bladefem.hbm.linear import condense
+from bladefem.hbm.residual import Balance, evaluate_balance, start_in_stick
+
+SIDES, HARMONICS = (3, 5, 7, 10, 14, 20), (1, 3, 7, 15, 31)
+
+
+def rate(size: int = 600) -> float:
+    """Floating-point operations a second of a complex matrix product."""
+    a = np.random.default_rng(0).normal(size=(size, size)) + 1j
+    return 8 * size**3 / min(seconds(lambda: a @ a) for _ in range(5))
+
+
+def seconds(work: Callable[[], object]) -> float:
+    begin = time.process_time()
+    work()
+    return time.process_time() - begin
+
+
+def measure(side: int, H: int, speed: float) -> dict[str, float]:
+    """CPU seconds of a point and of its parts."""
+    model, samples, omega = patch(side, max(side**2 // 3, 3)).model, 8 * H + 64, 0.9
+    solution = solve(model, omega, H, samples)
+    balance = Balance(model, condense(model, omega, H), samples)
+    m = 3 * side**2
+    return {"nodes": side**2, "H": H, "point": seconds(lambda: solve(model, omega, H, samples)),
+            "condense": seconds(lambda: condense(model, omega, H)),
+            "forces": seconds(lambda: evaluate_balance(balance, start_in_stick(balance))),
+            "limit": (8 / 3 + 8) * m**3 * H / speed, "dense": 2 / 3 * (m * (2 * H + 1))**3 / speed,
+            "iterations": solution.iterations, "solved": solution.converged}
+
+
+def main(picture: str | None = None) -> None:
+    speed = rate()
+    print(f"matrix products: {speed / 1e9:.1f} GFlop/s")
+    heads = ("nodes", "H", "point", "condense", "forces", "limit", "dense step", "iterations")
+    print("  ".join(f"{head:>10s}" for head in heads))
+    rows = [measure(side, 3, speed) for side in SIDES] + [measure(5, H, speed) for H in HARMONICS]
+    for row in rows:
+        cells = "  ".join(f"{value:10.4g}" for name, value in row.items() if name != "solved")
+        print(cells, "" if row["solved"] else "lost")
+    if picture:
+        draw(rows, picture)
+
+
+def draw(rows: list[dict[str, float]], file: str) -> None:
+    import matplotlib
+    matplotlib.use("Agg")
+    from matplotlib import pyplot
+    figure, axes = pyplot.subplots(1, 2, figsize=(10, 4), sharey=True)
+    for axis, along, part in zip(axes, ("nodes", "H"), (rows[:len(SIDES)], rows[len(SIDES):]), strict=True):
+        for name in ("point", "condense", "forces", "limit", "dense"):
+            style = "k--" if name == "limit" else "o-"
+            axis.loglog([r[along] for r in part], [r[name] for r in part], style, label=name)
+        axis.set(xlabel={"nodes": "contact nodes, H = 3", "H": "harmonics, 25 nodes"}[along], ylabel="CPU time [s]")
+    axes[0].legend()
+    figure.savefig(file, dpi=150)
+
+
+if __name__ == "__main__":
+    main(*sys.argv[1:])
