@@ -42,7 +42,7 @@ from .stages import (
 __all__ = ["STAGES", "Response", "Run", "Seating", "family_of_case", "load_cases", "reduced_sector", "run"]
 
 EXACT_HARMONICS = 3      # higher ones borrow the nodal diameter next to their own
-UNKNOWNS = 5000          # of the largest balance that the automatic choice solves; scene.model.harmonics may ask for more
+UNKNOWNS = 5000          # of the largest balance that the automatic choice solves; model.harmonics may ask for more
 STAGES = ("mesh", "modes", "contact", "response")
 
 
