@@ -17,7 +17,7 @@ __all__ = ["draw_map"]
 
 
 def draw_map(table: pd.DataFrame, x: str, y: str, value: str, file: str | Path | None = None, *,
-             labels: tuple[str, str, str] | None = None, ax: Any = None, title: str = "") -> object:
+             labels: tuple[str, str, str] | None = None, title: str = "") -> object:
     """A rectangle a point, coloured by a number or by a word; unconverged points are crossed; returns the figure.
 
     Args:
@@ -26,7 +26,6 @@ def draw_map(table: pd.DataFrame, x: str, y: str, value: str, file: str | Path |
         value: column to colour by; words get a legend, numbers a colour bar.
         file: PNG to write.
         labels: with units, for the two axes and the colour; the column names when left out.
-        ax: axes to draw into.
         title: headline.
     """
     labels = labels or (x, y, value)
@@ -34,7 +33,7 @@ def draw_map(table: pd.DataFrame, x: str, y: str, value: str, file: str | Path |
     codes, names = pd.factorize(table[value], sort=True) if words else (table[value].to_numpy(float), ())
     cells = table.assign(_code=codes).pivot_table(index=y, columns=x, values="_code", aggfunc="last")
     columns, rows = np.arange(len(cells.columns)), np.arange(len(cells.index))
-    with canvas(file, ax, (7.2, 4.6)) as ax:
+    with canvas(file, None, (7.2, 4.6)) as ax:
         colours = ListedColormap(word_colours(codes, len(names))) if words else matplotlib.colormaps[SEQUENTIAL]
         norm = BoundaryNorm(np.arange(len(names) + 1) - 0.5, max(len(names), 1)) if words and len(names) > 1 else None
         image = ax.pcolormesh(columns, rows, cells.to_numpy(float), cmap=colours, norm=norm, edgecolors="white", lw=0.3)

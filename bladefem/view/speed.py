@@ -109,7 +109,7 @@ def draw_families(ax: Any, table: pd.DataFrame) -> None:
 
 
 def draw_interference(table: pd.DataFrame, sectors: int, speed: float, file: str | Path | None = None, *,
-                      orders: Sequence[int] = (), close: float = 0.05, ax: Any = None, title: str = "") -> object:
+                      orders: Sequence[int] = (), close: float = 0.05, title: str = "") -> object:
     """SAFE diagram: modes over nodal diameter with the folded line of excitation frequencies; returns the figure.
 
     Args:
@@ -119,10 +119,9 @@ def draw_interference(table: pd.DataFrame, sectors: int, speed: float, file: str
         file: PNG to write.
         orders: engine orders to mark on the line.
         close: relative margin under which a mode is ringed.
-        ax: axes to draw into.
         title: headline.
     """
-    with canvas(file, ax, (7.6, 4.8)) as ax:
+    with canvas(file, None, (7.6, 4.8)) as ax:
         draw_families(ax, table)
         top = 1.1 * table["frequency"].max()
         last = min(int(np.ceil(2 * np.pi * top / max(speed, 1e-9))), 6 * sectors, 2000)
