@@ -49,15 +49,17 @@ def evaluate(elements: Elements, w: np.ndarray, samples: int, jacobian: bool = T
     n, d, K = w.shape
     load = _series(load, n, samples)
     tab = tables(harmonics_of(w), samples)
-    F, J, shares, used = np.empty((n, d, K)), np.empty((n, d, K, d, K)), np.empty((n, 3)), np.full(n, 2)
+    F, shares, used = np.empty((n, d, K)), np.empty((n, 3)), np.full(n, 2)
     if d == 2:
+        J = np.empty((n, d, K, d, K))
         jenkins_batch(w, load, nodes, tab, F, J, shares)
     else:
-        disc_batch(w, load, nodes, tab, empty_sums(K // 2), cycles, F, J.reshape(n, d, K, d * K), shares, used)
+        J = np.empty((n, d, K, d * K) if jacobian else (n, 0, 0, 0))
+        disc_batch(w, load, nodes, tab, empty_sums(K // 2), cycles, F, J, shares, used)
     failed = int(np.count_nonzero(used < 0))
     reason = f"{failed} of {n} elements were not periodic after {cycles} cycles" if failed else "periodic"
-    return Forces(F, J if jacobian else None, states(shares), shares, dissipated(F, w), np.abs(used), failed == 0,
-                  reason)
+    return Forces(F, J.reshape(n, d, K, d, K) if jacobian else None, states(shares), shares, dissipated(F, w),
+                  np.abs(used), failed == 0, reason)
 
 
 def dissipated(f: np.ndarray, w: np.ndarray) -> np.ndarray:

@@ -6,7 +6,7 @@ import numpy as np
 from numba import njit
 
 from bladefem.friction.disc_rows import close, linear_period, start_rows, to_carry
-from bladefem.friction.orbit import EDGE_ROWS, edges, march, periodic, start
+from bladefem.friction.orbit import EDGE_ROWS, TOLERANCE, edges, march, periodic, record, start
 from bladefem.friction.tables import Node, gram, values
 
 __all__ = ["disc_batch"]
@@ -18,22 +18,26 @@ SINGULAR = 1e-9     # of det(I - Phi): below it the state keeps a memory of its 
 
 @njit(cache=True, error_model="numpy")
 def _loads(w, load, el, tab, Ns, N):
-    """Normal load at the samples Ns (S,) and at the knots N (S,) half a step before them [N]."""
-    n0 = 0.0 if load.size else el.n0
-    values(tab.transposed, w, el.kn, n0, Ns)
-    values(tab.knots_transposed, w, el.kn, n0, N)
-    if load.size == 0:
-        return
-    Ns += load
-    for i in range(N.size):
-        N[i] += 0.5 * (load[i] + load[i - 1])
+    """Normal load at the samples Ns (S,) and at the knots N (S,) half a step before them [N]; returns the least Ns."""
+    S = N.size
+    values(tab.knots_transposed, w, el.kn, 0.0 if load.size else el.n0, N)
+    for i in range(S - 1):
+        Ns[i] = 0.5 * (N[i] + N[i + 1])
+    Ns[S - 1] = 0.5 * (N[S - 1] + N[0])
+    if load.size:
+        Ns += load
+        for i in range(S):
+            N[i] += 0.5 * (load[i] + load[i - 1])
+    least = Ns[0]
+    for i in range(S):
+        least = min(least, Ns[i])
+    return least
 
 
 @njit(cache=True, error_model="numpy")
-def _normal(w, load, el, Ns, tab, mean, F, J):
-    """Normal force F (K,), its Jacobian J (K, 3K) and the basis means (4H+1,) of the samples in contact."""
-    S, K = tab.at.shape
-    a = 0
+def _contact(Ns, tab, mean):
+    """Add the basis means (4H+1,) of the samples in contact."""
+    S, a = Ns.size, 0
     while a < S:
         b = a
         while b < S and (Ns[b] > 0.0) == (Ns[a] > 0.0):
@@ -41,17 +45,34 @@ def _normal(w, load, el, Ns, tab, mean, F, J):
         if Ns[a] > 0.0:
             mean += tab.sums[b] - tab.sums[a]
         a = b
+
+
+@njit(cache=True, error_model="numpy")
+def _normal(w, load, el, Ns, tab, mean, F, J):
+    """Normal force F (K,), its Jacobian J (K, 3K) or (0, 0), with the basis means (4H+1,) of the samples in contact."""
+    S, K = tab.at.shape
     block = np.empty((K, K))
     gram(mean, block)
     for k in range(K):
         F[k] = 0.0 if load.size else el.n0 * block[k, 0]
         for l in range(K):
             F[k] += el.kn * block[k, l] * w[l]
-            J[k, l] = el.kn * block[k, l]
+            if J.size:
+                J[k, l] = el.kn * block[k, l]
     for i in range(load.size):
         if Ns[i] > 0.0:
             for k in range(K):
                 F[k] += load[i] * tab.at[i, k] / S * (1.0 if k == 0 else 2.0)
+
+
+@njit(cache=True, error_model="numpy")
+def _always_stuck(path, mu):
+    """Whether kt w stays within the limit at all knots, under load all the time: then f = kt w."""
+    for i in range(path.shape[1]):
+        R = mu * path[2, i]
+        if path[2, i] <= 0.0 or path[0, i] ** 2 + path[1, i] ** 2 > R * R:
+            return False
+    return True
 
 
 @njit(cache=True, error_model="numpy")
@@ -64,7 +85,8 @@ def _add_stick(w, kt, mean, F, J):
         for k in range(K):
             for l in range(K):
                 F[c, k] += kt * block[k, l] * w[c, l]
-                J[c, k, c * K + l] += kt * block[k, l]
+                if J.size:
+                    J[c, k, c * K + l] += kt * block[k, l]
 
 
 @njit(cache=True, error_model="numpy")
@@ -105,22 +127,25 @@ def _remembered(path, count, el, tab, form, C, sums):
 def _tangential(path, el, tab, limit, form, C, sums, F, J):
     """Offsets and slip parts of the periodic tangential force; returns (cycles, negative if not periodic; slips)."""
     K, phi, scale = tab.at.shape[1], np.empty((2, 2)), el.mu * path[2].max()
-    edges(path, el.mu, form)
     fx, fy = start(path[0, 0], path[1, 0], path[2, 0], el.mu)
-    for cycle in range(1, 4):
-        gx, gy, events = march(path, el.mu, form, fx, fy)
+    before = np.inf
+    for cycle in range(1, 16):
+        gx, gy, events, memory = march(path, el.mu, form, fx, fy)
         change = np.hypot(gx - fx, gy - fy)
         fx, fy = gx, gy
         if events == 0:
             slips = _remembered(path, cycle, el, tab, form, C, sums)
             close(C, K, 0.0, 0.0, sums, F, J)
             return cycle, slips
-        if change <= NEAR * scale:
+        if min(change, 2.0 * memory * scale) <= NEAR * scale:
             usable, rx, ry, slips = _implicit(path, fx, fy, el, tab, form, C, sums)
             if usable:
                 close(C, K, rx, ry, sums, F, J)
                 return cycle + 1, slips
             break
+        if cycle > 2 and change > 0.1 * before:     # marching is slow here: Newton
+            break
+        before = change
     fx, fy, count, done, _ = periodic(path, el.mu, fx, fy, True, limit, phi)
     usable, rx, ry, slips = _implicit(path, fx, fy, el, tab, form, C, sums)
     if not usable:                          # not unique: take the state that marching finds
@@ -133,6 +158,28 @@ def _tangential(path, el, tab, limit, form, C, sums, F, J):
 
 
 @njit(cache=True, error_model="numpy")
+def _force_only(path, el, tab, limit, form, trace, F):
+    """Tangential harmonics F (3, K) of the periodic force without a derivative; trace (2, S) is scratch."""
+    phi, scale = np.empty((2, 2)), el.mu * path[2].max()
+    fx, fy = start(path[0, 0], path[1, 0], path[2, 0], el.mu)
+    count, done, before, change = 0, False, np.inf, 0.0
+    while not done and (count < 3 or change <= 0.1 * before):
+        before = change
+        gx, gy, events, memory = march(path, el.mu, form, fx, fy)
+        change = np.hypot(gx - fx, gy - fy)
+        done = events == 0 or min(change, 2.0 * memory * scale) <= TOLERANCE * scale
+        fx, fy, count = gx, gy, count + 1
+    if not done:
+        fx, fy, count, done, _ = periodic(path, el.mu, fx, fy, True, limit, phi)
+        if abs((1.0 - phi[0, 0]) * (1.0 - phi[1, 1]) - phi[0, 1] * phi[1, 0]) < SINGULAR:
+            fx, fy = start(path[0, 0], path[1, 0], path[2, 0], el.mu)
+            fx, fy, count, done, _ = periodic(path, el.mu, fx, fy, False, limit, phi)
+    slips = record(path, el.mu, form, fx, fy, trace)
+    np.dot(trace, tab.analysis, F[1:])
+    return (count if done else -count), slips
+
+
+@njit(cache=True, error_model="numpy")
 def _clear(sums):
     sums.J[:], sums.stick[:] = 0.0, 0.0
 
@@ -141,20 +188,32 @@ def _clear(sums):
 def disc_batch(w, load, nodes, tab, sums, limit, F, J, shares, cycles):
     """Forces F (n, 3, K), Jacobian J (n, 3, K, 3K), shares (n, 3) of stick, slip and separation, cycles (n,).
 
-    w (n, 3, K) [m]; load (n, S) [N] in place of n0, or (n, 0); nodes (n, 4): kt, kn, mu, n0; sums is scratch. Cycles
-    are negative where the force was not periodic after ``limit`` cycles.
+    w (n, 3, K) [m]; load (n, S) [N] in place of n0, or (n, 0); nodes (n, 4): kt, kn, mu, n0; sums is scratch. J may be
+    (n, 0, 0, 0): then no derivative is made. Cycles are negative where the force was not periodic after ``limit``.
     """
-    n, S = w.shape[0], tab.at.shape[0]
-    path, Ns, form = np.empty((3, S)), np.empty(S), np.empty((EDGE_ROWS, S))
+    n, S, linear = w.shape[0], tab.at.shape[0], J.shape[1] > 0
+    path, Ns, form, trace = np.empty((3, S)), np.empty(S), np.empty((EDGE_ROWS, S)), np.empty((2, S))
     contact, C = np.empty(tab.sums.shape[1]), np.empty((2, sums.row.size))
     for e in range(n):
         el = Node(nodes[e, 0], nodes[e, 1], nodes[e, 2], nodes[e, 3])
         values(tab.knots_transposed, w[e, 1], el.kt, 0.0, path[0])
         values(tab.knots_transposed, w[e, 2], el.kt, 0.0, path[1])
-        _loads(w[e, 0], load[e], el, tab, Ns, path[2])
-        F[e], J[e], contact[:] = 0.0, 0.0, 0.0
-        _normal(w[e, 0], load[e], el, Ns, tab, contact, F[e, 0], J[e, 0])
-        cycles[e], slips = _tangential(path, el, tab, limit, form, C, sums, F[e], J[e])
+        F[e], J[e], contact[:], slips = 0.0, 0.0, 0.0, 0
+        if _loads(w[e, 0], load[e], el, tab, Ns, path[2]) > 0.0:
+            contact += tab.sums[S]
+        else:
+            _contact(Ns, tab, contact)
+        _normal(w[e, 0], load[e], el, Ns, tab, contact, F[e, 0], J[e, 0] if linear else J[e].reshape((0, 0)))
+        sums.stick[:] = 0.0
+        cycles[e] = 1
+        if _always_stuck(path, el.mu):
+            sums.stick[:] = tab.sums[S]
+        elif path[2].max() > 0.0:
+            edges(path, el.mu, form)
+            if linear:
+                cycles[e], slips = _tangential(path, el, tab, limit, form, C, sums, F[e], J[e])
+            else:
+                cycles[e], slips = _force_only(path, el, tab, limit, form, trace, F[e])
         _add_stick(w[e], el.kt, sums.stick, F[e], J[e])
         shares[e, 1] = slips / S
         shares[e, 2] = 1.0 - contact[0]

@@ -30,7 +30,7 @@ __all__ = ["close", "linear_period", "start_rows", "to_carry"]
 FAST = {"contract", "reassoc", "nsz"}
 
 
-@njit(cache=True, error_model="numpy", fastmath=FAST)
+@njit(cache=True, error_model="numpy", forceinline=True, fastmath=FAST)
 def _angle_row(C, i, by, el, tab, row):
     """Row (M,) of the angle of a slipping force, from by (6,): by force (2), increment (2), N_i and N_j."""
     K, p0, p1, q0, q1, r0, r1 = tab.at.shape[1], *by
@@ -44,7 +44,7 @@ def _angle_row(C, i, by, el, tab, row):
         row[2 * K + l] += el.kt * (p1 * V + q1 * (W - V))
 
 
-@njit(cache=True, error_model="numpy", fastmath=FAST)
+@njit(cache=True, error_model="numpy", forceinline=True, fastmath=FAST)
 def _force_rows(row, ex, ey, R, slope, normal, out):
     """Rows out (2, M) of R (ex, ey) from the row of its angle, slope = kn dR/dN and the row ``normal`` (K,) of N."""
     for l in range(row.size):
@@ -55,7 +55,7 @@ def _force_rows(row, ex, ey, R, slope, normal, out):
         out[1, l] += slope * ey * normal[l]
 
 
-@njit(cache=True, error_model="numpy")
+@njit(cache=True, error_model="numpy", forceinline=True)
 def _closing_rows(i, dx, dy, N0, N1, part, el, knots, out):
     """Rows out (2, M) of f = part d, part = N / (N1 - N0), of an element that closes in edge i and sticks."""
     K, j = knots.shape[1], i + 1 if i + 1 < knots.shape[0] else 0
@@ -66,7 +66,7 @@ def _closing_rows(i, dx, dy, N0, N1, part, el, knots, out):
         out[0, K + l] = out[1, 2 * K + l] = el.kt * part * (knots[j, l] - knots[i, l])
 
 
-@njit(cache=True, error_model="numpy")
+@njit(cache=True, error_model="numpy", forceinline=True)
 def to_carry(C, j, kt, knots):
     """C (2, M) from D to D - kt V at knot j."""
     K = knots.shape[1]
@@ -75,7 +75,7 @@ def to_carry(C, j, kt, knots):
         C[1, 2 * K + l] -= kt * knots[j, l]
 
 
-@njit(cache=True, error_model="numpy", fastmath=FAST)
+@njit(cache=True, error_model="numpy", forceinline=True, fastmath=FAST)
 def _add_stick(a, b, cx, cy, C, tab, sums):
     """Add samples a <= i < b, which stick with f = kt w + (cx, cy)."""
     M, mean, J = C.shape[1], sums.mean, sums.J
@@ -91,7 +91,7 @@ def _add_stick(a, b, cx, cy, C, tab, sums):
             J[k, M + l] += weight * C[1, l]
 
 
-@njit(cache=True, error_model="numpy", fastmath=FAST)
+@njit(cache=True, error_model="numpy", forceinline=True, fastmath=FAST)
 def _add_slip(i, count, tab, sums):
     """Add samples i <= . < i + count, whose rows and forces stand in sums.rows."""
     J, product = sums.J, sums.product
@@ -101,7 +101,7 @@ def _add_slip(i, count, tab, sums):
             J[k, l] += product[k, l]
 
 
-@njit(cache=True, error_model="numpy", fastmath=FAST)
+@njit(cache=True, error_model="numpy", forceinline=True, fastmath=FAST)
 def _slip_steps(first, count, P, Q, path, el, form, turns):
     """Follow the slip from knot ``first`` over ``count`` edges at most: (edges done, P, Q).
 
@@ -134,7 +134,7 @@ def _slip_steps(first, count, P, Q, path, el, form, turns):
     return count, P, Q
 
 
-@njit(cache=True, error_model="numpy", fastmath=FAST)
+@njit(cache=True, error_model="numpy", forceinline=True, fastmath=FAST)
 def _turn_rows(first, count, start, pattern, turns, row, middle, rows):
     """Turn the row (M,) of the angle along ``count`` edges; rows (.., 2M) of their samples, force last."""
     M = row.size
@@ -157,7 +157,7 @@ def _turn_rows(first, count, start, pattern, turns, row, middle, rows):
                 row[l] = 0.0
 
 
-@njit(cache=True, error_model="numpy")
+@njit(cache=True, error_model="numpy", forceinline=True)
 def _slide(i, P, Q, path, el, tab, form, sums):
     """Follow the slip from knot i, half-angle vector (P, Q), to where it ends: (i, P, Q) there; samples are added."""
     S, full = path.shape[1], sums.rows.shape[0]
@@ -174,7 +174,7 @@ def _slide(i, P, Q, path, el, tab, form, sums):
     return i, P, Q
 
 
-@njit(cache=True, error_model="numpy")
+@njit(cache=True, error_model="numpy", forceinline=True)
 def _add_mixed(i, mid, fx, fy, dx, dy, N0, N1, mx, my, el, tab, C, sums):
     """Add sample i, force (mx, my), of an edge that changes state; 1 if it slips."""
     if mid != SLIP and mid != CLOSING:
@@ -193,7 +193,7 @@ def _add_mixed(i, mid, fx, fy, dx, dy, N0, N1, mx, my, el, tab, C, sums):
     return int(mid == SLIP)
 
 
-@njit(cache=True, error_model="numpy")
+@njit(cache=True, error_model="numpy", forceinline=True)
 def _after_mixed(i, j, end, fx, fy, dx, dy, N0, N1, el, tab, C, sums):
     """Bring C (2, M), and in slip the row of the angle, from knot i to knot j over an edge that changes state."""
     if end == STICK:
@@ -207,7 +207,7 @@ def _after_mixed(i, j, end, fx, fy, dx, dy, N0, N1, el, tab, C, sums):
     to_carry(C, j, el.kt, tab.knots)
 
 
-@njit(cache=True, error_model="numpy")
+@njit(cache=True, error_model="numpy", forceinline=True)
 def _leave_slip(P, Q, i, N, el, tab, C, sums):
     """Force at knot i from the half-angle vector; D from the row of the angle goes to C (2, M)."""
     size = P * P + Q * Q

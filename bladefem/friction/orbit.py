@@ -16,7 +16,7 @@ from numba import njit
 from bladefem.friction.disc import SLIP, STICK, edge, sensitivity
 
 __all__ = ["DIRECTION_X", "DIRECTION_Y", "EDGE_ROWS", "GROWTH", "HALF", "INVERSE_LENGTH", "INVERSE_LIMIT",
-           "SLOPE", "edges", "half_angle", "march", "period", "periodic", "start", "turned"]
+           "SLOPE", "TOLERANCE", "edges", "half_angle", "march", "period", "periodic", "record", "start", "turned"]
 
 TOLERANCE = 1e-12       # of the largest friction limit: how well the force must repeat itself in marching
 DIRECTION_X, DIRECTION_Y, INVERSE_LENGTH, HALF, GROWTH, SLOPE, INVERSE_LIMIT, EDGE_ROWS = range(8)
@@ -77,19 +77,24 @@ def start(vx, vy, N, mu):
 
 @njit(cache=True, error_model="numpy")
 def march(path, mu, form, fx, fy):
-    """One period of the force alone from (fx, fy) at the first knot: (fx, fy, edges that slip or open)."""
-    S, events, slipping, P, Q = path.shape[1], 0, False, 1.0, 0.0
+    """One period of the force alone from (fx, fy) at the first knot: (fx, fy, edges that slip or open, memory).
+
+    memory bounds the length of d f_end / d f_start, as far as sustained slip and separation tell.
+    """
+    S, events, slipping, P, Q, memory = path.shape[1], 0, False, 1.0, 0.0, 1.0
     for i in range(S):
         j = i + 1 if i + 1 < S else 0
         N0, N1 = path[2, i], path[2, j]
         if slipping:
-            ux, uy = form[DIRECTION_X, i], form[DIRECTION_Y, i]
+            ux, uy, h = form[DIRECTION_X, i], form[DIRECTION_Y, i], form[HALF, i]
             size, cx, cy = P * P + Q * Q, P * P - Q * Q, 2.0 * P * Q
             if N1 > 0.0 and cx * ux + cy * uy >= form[GROWTH, i] * size:
-                P, Q = turned(P, Q, ux, uy, form[HALF, i] ** 2)
+                P, Q = turned(P, Q, ux, uy, h * h)
+                memory *= h * h
                 events += 1
                 continue
             slipping = False
+            memory *= N0 / size
             fx, fy = mu * N0 * cx / size, mu * N0 * cy / size
         dx, dy = path[0, j] - path[0, i], path[1, j] - path[1, i]
         if N0 > 0.0 and N1 > 0.0:
@@ -99,15 +104,49 @@ def march(path, mu, form, fx, fy):
                 continue
         end, fx, fy, _, _, _ = edge(fx, fy, dx, dy, N0, N1, mu)
         events += end != STICK
-        if end == SLIP and N1 > 0.0:
-            R1 = mu * N1
-            slipping = R1 > 0.0
-            if slipping:
-                P, Q = half_angle(fx / R1, fy / R1)
+        if end == SLIP and N1 > 0.0 and mu > 0.0:
+            P, Q = half_angle(fx / (mu * N1), fy / (mu * N1))
+            memory *= (P * P + Q * Q) / N1
+            slipping = True
+        elif end != STICK:
+            memory = 0.0
     if slipping:
         size, R1 = P * P + Q * Q, mu * path[2, 0]
+        memory *= path[2, 0] / size
         fx, fy = R1 * (P * P - Q * Q) / size, R1 * 2.0 * P * Q / size
-    return fx, fy, events
+    return fx, fy, events, memory
+
+
+@njit(cache=True, error_model="numpy")
+def record(path, mu, form, fx, fy, trace):
+    """Forces at the samples, trace (2, S) [N], over one period from (fx, fy) at the first knot; samples that slip."""
+    S, slips, slipping, P, Q = path.shape[1], 0, False, 1.0, 0.0
+    for i in range(S):
+        j = i + 1 if i + 1 < S else 0
+        N0, N1 = path[2, i], path[2, j]
+        if slipping:
+            ux, uy, h = form[DIRECTION_X, i], form[DIRECTION_Y, i], form[HALF, i]
+            size, cx, cy = P * P + Q * Q, P * P - Q * Q, 2.0 * P * Q
+            if N1 > 0.0 and cx * ux + cy * uy >= form[GROWTH, i] * size:
+                p, q = turned(P, Q, ux, uy, h)
+                R = 0.5 * mu * (N0 + N1) / (p * p + q * q)
+                trace[0, i], trace[1, i] = R * (p * p - q * q), R * 2.0 * p * q
+                P, Q = turned(P, Q, ux, uy, h * h)
+                slips += 1
+                continue
+            slipping = False
+            fx, fy = mu * N0 * cx / size, mu * N0 * cy / size
+        dx, dy = path[0, j] - path[0, i], path[1, j] - path[1, i]
+        if N0 > 0.0 and N1 > 0.0 and (fx + dx) ** 2 + (fy + dy) ** 2 <= (mu * N1) ** 2:
+            trace[0, i], trace[1, i] = fx + 0.5 * dx, fy + 0.5 * dy
+            fx, fy = fx + dx, fy + dy
+            continue
+        end, fx, fy, mid, trace[0, i], trace[1, i] = edge(fx, fy, dx, dy, N0, N1, mu)
+        slips += mid == SLIP
+        slipping = end == SLIP and mu * N1 > 0.0
+        if slipping:
+            P, Q = half_angle(fx / (mu * N1), fy / (mu * N1))
+    return slips
 
 
 @njit(cache=True, error_model="numpy")

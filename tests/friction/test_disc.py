@@ -139,3 +139,14 @@ def test_a_limit_on_the_cycles_is_reported():
 def test_dissipation_is_never_negative():
     elements, w = random_case(8, 300, 3, 2)
     assert evaluate(elements, w, 256).dissipated.min() > -1e-4
+
+
+def test_forces_without_jacobian_are_the_same():
+    """The path without derivatives converges by marching alone; both repeat to 1e-12, near the stick limit to 1e-9."""
+    elements, w = random_case(9, 300, 3, 2)
+    load = np.random.default_rng(9).normal(size=(300, 96)) + 1.0
+    for series in (None, load):
+        a, b = (evaluate(elements, w, 96, linear, load=series) for linear in (True, False))
+        np.testing.assert_allclose(a.f, b.f, rtol=0, atol=1e-9)
+        np.testing.assert_array_equal(a.state, b.state)
+        assert b.dfdw is None

@@ -1,0 +1,67 @@
+"""Cost of the friction kernels in ns for each node and sample, with and without the Jacobian, 1000 nodes.
+
+Processor time of this thread, the best of ten runs, so that other work on the machine counts little. Run it with
+``python benchmarks/friction_kernels.py``. The first call compiles and is not measured.
+"""
+
+from __future__ import annotations
+
+import time
+
+import numpy as np
+
+from bladefem.data import Elements
+from bladefem.friction.aft import evaluate
+from bladefem.friction.events import evaluate_exact
+
+NODES = 1000
+MIXES = {"stuck": 0.03, "partial": 0.8, "mixed": 1.6, "gross": 12.0}    # tangential amplitude over mu N / kt, about
+SIZES = ((3, 128), (5, 128), (7, 512))
+
+
+def case(H: int, amplitude: float, tangents: int) -> tuple[Elements, np.ndarray]:
+    """Elements under load that varies by a third or so, random motion with harmonics that fall as 1/h^2."""
+    rng = np.random.default_rng(H)
+    w = rng.normal(size=(NODES, 1 + tangents, 2 * H + 1))
+    w /= np.r_[1, np.repeat(np.arange(1, H + 1), 2)] ** 2
+    w[:, 1:] *= amplitude
+    w[:, 1:, 0] *= 0.1
+    w[:, 0] *= 0.3
+    elements = Elements(kt=np.ones(NODES), kn=np.ones(NODES), mu=rng.uniform(0.8, 1.2, NODES),
+                        n0=rng.uniform(0.7, 1.5, NODES), tangents=tangents)
+    return elements, w
+
+
+def cost(call, repeats: int = 10) -> float:
+    """Best processor time of a call [s]."""
+    call()
+    best = np.inf
+    for _ in range(repeats):
+        begin = time.thread_time()
+        call()
+        best = min(best, time.thread_time() - begin)
+    return best
+
+
+def main() -> None:
+    """Print the table."""
+    print("kernel      H  samples  mix      stick  slip   open   with dfdw   without   periods")
+    for tangents in (1, 2):
+        for H, samples in SIZES:
+            for mix, amplitude in MIXES.items():
+                elements, w = case(H, amplitude, tangents)
+                forces = evaluate(elements, w, samples)
+                ns, bare = (1e9 * cost(lambda e=elements, w=w, s=samples, j=j: evaluate(e, w, s, j)) / NODES / samples
+                            for j in (True, False))
+                shares = "  ".join(f"{x:.2f} " for x in forces.shares.mean(0))
+                print(f"{2 * tangents - 1}-D sampled {H:2d} {samples:7d}  {mix:8s} {shares} {ns:9.1f} {bare:9.1f} "
+                      f"{forces.cycles.mean():9.1f}")
+    print("\nexact 1-D, microseconds a node (independent of samples)")
+    for H, _ in SIZES:
+        for mix, amplitude in MIXES.items():
+            elements, w = case(H, amplitude, 1)
+            print(f"H {H}  {mix:8s} {1e6 * cost(lambda e=elements, w=w: evaluate_exact(e, w)) / NODES:8.2f}")
+
+
+if __name__ == "__main__":
+    main()
