@@ -146,15 +146,17 @@ def errors(peak: Peak, truth: Peak) -> dict[str, float]:
             "error_phasor": float(np.max(abs(peak.first - truth.first)) / np.max(abs(truth.first)))}
 
 
-def _bench(model: Callable[[int], ReducedModel], omegas: np.ndarray, budget: float, name: str,
+def _bench(model: Callable[[int], ReducedModel], chosen: int, omegas: np.ndarray, budget: float, name: str,
            remarks: list[str]) -> Bench:
-    """Climb the ladder while the next rung is expected to fit into the time."""
+    """Climb the ladder past the chosen harmonics, and on while the next rung is expected to fit into the time."""
+    least = 1 + next(k for k, (H, _) in enumerate(LADDER) if H >= chosen)
+    least = max(least, 2)
     best, before, start, used = None, None, time.perf_counter(), 0.0
     for rung, (H, samples) in enumerate(LADDER):
-        if best is not None and used * 6 > budget - (time.perf_counter() - start):
+        if rung >= least and used * 6 > budget - (time.perf_counter() - start):
             break
         begun = time.perf_counter()
-        points, _, left_out = timed_model(model(H), omegas, balance(H, samples), budget)
+        points, _, left_out = timed_model(model(H), omegas, balance(H, samples), np.inf if rung < least else budget)
         used = time.perf_counter() - begun
         if left_out or not all(p.converged for p in points):
             break
@@ -162,7 +164,7 @@ def _bench(model: Callable[[int], ReducedModel], omegas: np.ndarray, budget: flo
     if best is None:
         raise NotSolvedError(f"the reference of the {name} did not converge: {points[-1].reason}")
     rung, truth = best
-    doubt = errors(before[1], truth) if before else {"error": np.inf, "error_frequency": np.inf, "error_phasor": np.inf}
+    doubt = errors(before[1], truth) if before else {f"error{end}": np.nan for end in ("", "_frequency", "_phasor")}
     remarks.append(f"reference of the {name}: H {LADDER[rung][0]}, {LADDER[rung][1]} samples, resonance "
                    f"{truth.frequency:.6g} Hz, {truth.amplitude:.6g} m, changed by {doubt['error']:.1e} on "
                    "its last rung")
@@ -171,7 +173,7 @@ def _bench(model: Callable[[int], ReducedModel], omegas: np.ndarray, budget: flo
 
 def _methods(model: ReducedModel, simple: bool, chosen: Settings, omegas: np.ndarray, budget: float,
              remarks: list[str]) -> pd.DataFrame:
-    bench = _bench(lambda H: model, omegas, budget / 3, "methods", remarks)
+    bench = _bench(lambda H: model, chosen.harmonics, omegas, budget / 3, "methods", remarks)
     listed = list(methods(simple))
     listed.append(Method(f"automatic: H {chosen.harmonics}, {chosen.samples} samples", "automatic choice",
                          balance(chosen.harmonics, chosen.samples)))
@@ -180,7 +182,8 @@ def _methods(model: ReducedModel, simple: bool, chosen: Settings, omegas: np.nda
 
 def _models(family: Family, richest: Settings, chosen: Settings, omegas: np.ndarray, budget: float,
             remarks: list[str]) -> pd.DataFrame:
-    bench = _bench(lambda H: member(family, replace(richest, harmonics=H)).model, omegas, budget / 3, "models", remarks)
+    bench = _bench(lambda H: member(family, replace(richest, harmonics=H)).model, chosen.harmonics, omegas, budget / 3,
+                   "models", remarks)
     H, samples = max(chosen.harmonics, 3), max(chosen.samples, 256)
     listed = [*_variants(family, replace(richest, harmonics=H, samples=samples)),
               ("automatic", "automatic choice", chosen)]
@@ -205,29 +208,37 @@ def _variants(family: Family, rich: Settings) -> Iterator[tuple[str, str, Settin
 
 def _rows(jobs: list[tuple[str, str, ReducedModel, Callable]], bench: Bench) -> list[dict[str, object]]:
     """One row a job; what cheap ones leave of the time goes to the others."""
-    rows, end = [], time.perf_counter() + bench.budget
+    rows, end, slow = [], time.perf_counter() + bench.budget, set()
     for k, (name, kind, model, run) in enumerate(jobs):
-        share = max(end - time.perf_counter(), 0.2 * bench.budget) / (len(jobs) - k)
+        kinds = len({job[1] for job in jobs[k:]})
+        share = max(end - time.perf_counter(), 0.1 * bench.budget) / (kinds + 1)
+        if kind in slow:        # a call cannot be cut short: do not even begin
+            rows.append(_lost(name, kind, np.nan, "left out: a cheaper one of its kind took too long", bench))
+            continue
         rows.append(_row(name, kind, model, run, replace(bench, budget=share)))
+        if "first frequency" in rows[-1]["reason"]:
+            slow.add(kind)
     return rows
+
+
+def _lost(name: str, kind: str, seconds: float, reason: str, bench: Bench) -> dict[str, object]:
+    """The row of a variant without a result."""
+    return {"name": name, "family": kind, "time": seconds, "chosen": kind == "automatic choice",
+            "left_out": reason.startswith("left out"), "error": np.nan, "error_frequency": np.nan,
+            "error_phasor": np.nan, "converged": False, "reference_error": bench.doubt["error"], "reason": reason}
 
 
 def _row(name: str, kind: str, model: ReducedModel, run: Callable, bench: Bench) -> dict[str, object]:
     points, seconds, left_out = timed_model(model, bench.omegas, run, bench.budget)
-    row = {"name": name, "family": kind, "time": seconds, "chosen": kind == "automatic choice",
-           "left_out": bool(left_out)}
     lost = [p.reason for p in points if not p.converged]
     if left_out or lost:
-        return row | {"error": np.nan, "error_frequency": np.nan, "error_phasor": np.nan, "converged": False,
-                      "reference_error": bench.doubt["error"],
-                      "reason": left_out or f"{len(lost)} of {len(points)} frequencies: {lost[0]}"}
+        return _lost(name, kind, seconds, left_out or f"{len(lost)} of {len(points)} frequencies: {lost[0]}", bench)
     peak = resonance(bench.omegas, np.array([p.first for p in points]))
     told = [p.reason for p in points if "false" in p.reason]
     reason = f"{len(told)} false points: {told[0]}" if told else ""
     if not peak.inside:
         reason = "its resonance lies outside the compared frequencies"
-    return row | errors(peak, bench.truth) | {"converged": True, "reference_error": bench.doubt["error"],
-                                              "reason": reason}
+    return _lost(name, kind, seconds, reason, bench) | errors(peak, bench.truth) | {"converged": True}
 
 
 def _finished(rows: list[dict[str, object]], remarks: list[str]) -> pd.DataFrame:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from pathlib import Path
 
+import numpy as np
 import pandas as pd
 
 from .response import draw_accuracy
@@ -25,7 +26,7 @@ def draw_chart(methods: pd.DataFrame, models: pd.DataFrame, file: str | Path | N
     """
     with canvas(file, None, (9.5, 9.0), (2, 1)) as axes:
         for ax, table, what in zip(axes, (methods, models), ("methods", "models"), strict=True):
-            floor = max(table["reference_error"].iloc[0], 1e-12)
+            floor = max(np.nan_to_num(table["reference_error"].iloc[0]), 1e-12)
             shown = table[~table["left_out"]].assign(error=lambda t, floor=floor: t["error"].clip(lower=floor))
             draw_accuracy(shown, ax=ax, tolerance=tolerance, title=f"{title}: {what}" if title else what)
             ax.set_ylim(bottom=floor / 2)
