@@ -39,9 +39,25 @@ def mesh(options: argparse.Namespace, comm: Any) -> None:
 
 
 def modes(options: argparse.Namespace, comm: Any) -> None:
-    """Natural frequencies."""
-    run = until("modes", options, comm)
-    tell(options, comm, lambda: tables.frequencies(run.modes), run)
+    """Natural frequencies and shapes of all nodal diameters; Campbell diagram, mesh refinement, comparison."""
+    from ..report import modes as report
+    scene, folder, bars = prepared(options, comm)
+    found = report.run(scene, folder, modes_wanted(options), options.pictures, comm, bars)
+    tell(options, comm, lambda: tables.survey(found), found.run)
+
+
+def modes_wanted(options: argparse.Namespace) -> Any:
+    """What the options of ``modes`` ask for."""
+    from ..scene_fields import split_values
+    from ..study.campbell import read_speeds
+    from ..study.survey import Wanted
+    from ..units import parse
+    if options.pictures < 0:
+        raise InputError(f"--pictures {options.pictures}: expected a number of modes, 0 for none")
+    sizes = None if options.converge is None else [parse(item, "m", "converge")
+                                                   for item in split_values(options.converge)]
+    speeds = None if options.campbell is None else read_speeds(options.campbell)
+    return Wanted(speeds, sizes, Path(options.compare) if options.compare else None, options.direct)
 
 
 def contact(options: argparse.Namespace, comm: Any) -> None:
@@ -114,8 +130,8 @@ def info(options: argparse.Namespace, comm: Any) -> None:
         print(tables.plain(rows))
 
 
-def until(stage: str, options: argparse.Namespace, comm: Any) -> Any:
-    """The pipeline up to a stage, with progress bars; collective."""
+def prepared(options: argparse.Namespace, comm: Any) -> tuple[Scene, Path, Any]:
+    """The scene, the run folder with a copy of it, and progress bars; collective."""
     from ..progress import wanted, watch
     from ..store import on_root, open_folder, write_text
     folder = Path(options.output or default_folder(options.scene))
@@ -128,7 +144,12 @@ def until(stage: str, options: argparse.Namespace, comm: Any) -> Any:
 
     scene = on_root(comm, prepare)
     rank = 0 if comm is None else comm.rank
-    bars = partial(watch, shown=wanted(options.quiet, rank))
+    return scene, folder, partial(watch, shown=wanted(options.quiet, rank))
+
+
+def until(stage: str, options: argparse.Namespace, comm: Any) -> Any:
+    """The pipeline up to a stage, with progress bars; collective."""
+    scene, folder, bars = prepared(options, comm)
     if stage == "report":
         from ..report.run import run
         return run(scene, folder, comm, bars)

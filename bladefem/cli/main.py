@@ -29,8 +29,12 @@ _COMMANDS = {
               "bladefem check scenes/wedge.toml --set aerofoil.twist='25 deg'", commands.check),
     "mesh": ("draw and mesh the geometry, print the quality table",
              "bladefem mesh scenes/wedge.toml --view mesh.png", commands.mesh),
-    "modes": ("natural frequencies, for each nodal diameter of a wheel",
-              "bladefem modes scenes/wedge.toml --set model.nodal_diameters=0,1,6", commands.modes),
+    "modes": ("natural frequencies and mode shapes, for each nodal diameter of a wheel, with tables and pictures",
+              "bladefem modes scenes/wedge.toml --set model.nodal_diameters=0,1,6\n"
+              "  bladefem modes scenes/wedge.toml --campbell '0, 2000, ..., 12000 rpm'\n"
+              "  bladefem modes scenes/plane.toml --converge '6, 4, 2.8 mm'\n"
+              "  bladefem modes scenes/wedge.toml -o runs/b --set aerofoil.twist='25 deg' --compare runs/wedge",
+              commands.modes),
     "contact": ("seat the damper: pressure on each face",
                 "bladefem contact scenes/wedge.toml", commands.contact),
     "response": ("forced response with friction for each load",
@@ -67,6 +71,7 @@ def parser() -> argparse.ArgumentParser:
             sub.add_argument("-o", "--output", metavar="FOLDER", help="run folder (default: runs/<name of the scene>)")
             sub.add_argument("-q", "--quiet", action="store_true", help="no progress bars and no summary")
     subs.choices["mesh"].add_argument("--view", metavar="PNG", help="also draw the mesh into this file")
+    _modes_arguments(subs.choices["modes"])
     subs.choices["study"].add_argument("--vary", required=True, metavar="KEY=VALUES",
                                        help="field and its values, such as damper.angle='30, 40, 50 deg'")
     subs.choices["chart"].add_argument("--budget", type=float, default=120.0, metavar="SECONDS",
@@ -75,6 +80,16 @@ def parser() -> argparse.ArgumentParser:
     info = _command(subs, "info", "versions and threads of what bladefem runs on", "bladefem info", commands.info)
     info.set_defaults(scene=None)
     return top
+
+
+def _modes_arguments(sub: argparse.ArgumentParser) -> None:
+    sub.add_argument("--campbell", metavar="SPEEDS", help="Campbell and interference diagrams, at speeds such as "
+                     "'0, 2000, 4000 rpm' or '0, 1000, ..., 12000 rpm'")
+    sub.add_argument("--converge", metavar="SIZES", nargs="?", const="", help="refine the mesh: frequencies at three "
+                     "or more element sizes such as '6, 4, 2.8 mm' (chosen when left out), estimated limit and order")
+    sub.add_argument("--compare", metavar="FOLDER", help="MAC of the mode shapes against those of an earlier run")
+    sub.add_argument("--direct", action="store_true", help="solve every nodal diameter from scratch")
+    sub.add_argument("--pictures", metavar="N", type=int, default=4, help="modes that are drawn (4); 0: tables only")
 
 
 def _command(subs: argparse._SubParsersAction, name: str, what: str, example: str, function: object,

@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from math import pi
 from typing import Any
 
 from ..units import show
 
 __all__ = ["frequencies", "mesh_quality", "plain", "pressures", "resolved_scene", "responses", "side_by_side",
-           "summary"]
+           "summary", "survey"]
 
 
 def plain(rows: Sequence[Sequence[object]], head: Sequence[str] = ()) -> str:
@@ -52,6 +53,24 @@ def frequencies(sets: Sequence[Any]) -> str:
         values = [f"{f:.2f}" for f in s.frequencies]
         rows.append([name, *values, *[""] * (count - len(values)), f"{max(s.residuals):.1e}"])
     return plain(rows, head)
+
+
+def survey(found: Any) -> str:
+    """Frequencies, and the short tables of what was asked for beside them."""
+    parts = [frequencies(found.run.modes)]
+    if found.campbell is not None:
+        rows = [[row.engine_order, row.mode, f"{row.frequency:.2f}", f"{30 * row.speed / pi:.1f}"]
+                for row in found.campbell.crossings.itertuples()]
+        parts.append(plain(rows, ["engine order", "mode", "crossing [Hz]", "speed [rpm]"]) if rows
+                     else "no engine order crosses a mode in this range of speeds")
+    if found.convergence is not None:
+        rows = [[row.mode, f"{row.frequency:.2f}", f"{row.limit:.2f}", f"{row.order:.2f}", f"{100 * row.error:.3f}"]
+                for row in found.convergence.summary.itertuples()]
+        parts.append(plain(rows, ["mode", "finest [Hz]", "limit [Hz]", "order", "error [%]"]))
+    if found.mac is not None:
+        rows = [[i + 1, row.argmax() + 1, f"{row.max():.4f}"] for i, row in enumerate(found.mac)]
+        parts.append(plain(rows, ["mode", "mode of the other run", "MAC"]))
+    return "\n\n".join(parts)
 
 
 def pressures(maps: Mapping[float, Sequence[Any]]) -> str:

@@ -18,7 +18,7 @@ import numpy as np
 from ..data import ModeSet
 from ..errors import InputError
 from .body import Body, cells_of, degrees, properties
-from .compat import PETSc, assemble_matrix, ufl
+from .compat import PETSc, assemble_matrix, dolfinx, ufl
 from .linalg import apply, dot
 from .rotation import AXIS
 
@@ -50,7 +50,9 @@ def coriolis(body: Body, axis: tuple[float, float, float] = AXIS) -> PETSc.Mat:
     turn = np.array([[0, -a[2], a[1]], [a[2], 0, -a[0]], [-a[1], a[0], 0]])[:body.dim, :body.dim]
     v, u = ufl.TestFunction(body.space), ufl.TrialFunction(body.space)
     _, degree = degrees(body.mesh, cells_of(body), "exact")
-    form = 2 * depth * rho * ufl.inner(v, ufl.as_matrix(turn.tolist()) * u)
+    # a constant, since a matrix of zeros (a plane that holds the axis) would leave no form
+    cross = dolfinx.fem.Constant(body.space.mesh, np.ascontiguousarray(turn))
+    form = 2 * depth * rho * ufl.inner(v, cross * u)
     return assemble_matrix(form * ufl.dx(metadata={"quadrature_degree": degree}))
 
 

@@ -9,16 +9,18 @@ import pandas as pd
 
 from .tables import units_of
 
-__all__ = ["datasets"]
+__all__ = ["datasets", "mode_shapes"]
 
 
 def datasets(result: Any, tables: dict[str, pd.DataFrame]) -> dict[str, Any]:
     """Groups "modes", "contact", "points", "summary" of a finished run (study.pipeline.Run)."""
-    return {"modes": _modes(result), "contact": _contact(result), "points": _table(tables["response/points"], "point"),
+    return {"modes": mode_shapes(result), "contact": _contact(result),
+            "points": _table(tables["response/points"], "point"),
             "summary": _table(tables["response/summary"], "case")}
 
 
-def _modes(result: Any) -> Any:
+def mode_shapes(result: Any) -> Any:
+    """Frequencies, shapes and node positions of all nodal diameters."""
     import xarray as xr
     sets = result.modes
     diameters = [-1 if s.nodal_diameter is None else s.nodal_diameter for s in sets]

@@ -110,11 +110,11 @@ def _scaled(scene: Scene, size: float, sizes: Sequence[float]) -> float | None:
 def _summary(points: pd.DataFrame) -> pd.DataFrame:
     keys = [key for key in ("nodal_diameter", "mode") if key in points]
     rows = []
-    for key, line in points.groupby(keys):
+    for _, line in points.groupby(keys):
         line = line.sort_values("size", ascending=False)[-3:]
         f = line["frequency"].to_numpy()
         limit, order = richardson(line["size"].to_numpy() / line["size"].iloc[-1], f)
         error = abs(f[-1] / limit - 1) if np.isfinite(order) else abs(f[-1] - f[-2]) / f[-1]
-        rows.append({**dict(zip(keys, key if isinstance(key, tuple) else (key,), strict=True)), "frequency": f[-1],
+        rows.append({**{name: int(line[name].iloc[0]) for name in keys}, "frequency": f[-1],
                      "limit": limit, "order": order, "error": error})
     return pd.DataFrame(rows)

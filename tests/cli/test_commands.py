@@ -50,6 +50,12 @@ def pipeline(monkeypatch):
     def report(scene, folder, comm, progress):
         return run(scene, folder, "report", comm, progress)
 
+    def modes(scene, folder, wanted, pictures, comm, progress):
+        found = run(scene, folder, "modes", comm, progress)
+        state.wanted, state.pictures = wanted, pictures
+        return SimpleNamespace(run=found, campbell=None, convergence=None, mac=np.eye(2))
+
+    replace_module(monkeypatch, bladefem.report, "modes", modes)
     replace_module(monkeypatch, bladefem.study, "pipeline", run)
     replace_module(monkeypatch, bladefem.report, "run", report)
     return SimpleNamespace(calls=calls, state=state)
@@ -88,6 +94,19 @@ SHOWN = {
     "response": ["no damper", "4.0000e-05", "best of these loads: 50 N, amplitude divided by 4"],
     "run": ["best of these loads: 50 N"],
 }
+
+
+def test_options_of_modes(pipeline, tmp_path):
+    assert main(["modes", WEDGE, "-o", str(tmp_path), "--campbell", "0, 10, ..., 30 rad/s", "--converge", "6, 4, 2 mm",
+                 "--compare", "runs/other", "--direct", "--pictures", "0"]) == 0
+    wanted = pipeline.state.wanted
+    assert np.allclose(wanted.speeds, [0, 10, 20, 30]) and np.allclose(wanted.sizes, [6e-3, 4e-3, 2e-3])
+    assert str(wanted.other) == "runs/other" and wanted.direct and pipeline.state.pictures == 0
+    assert main(["modes", WEDGE, "-o", str(tmp_path), "--converge"]) == 0
+    wanted = pipeline.state.wanted
+    assert (wanted.speeds, wanted.sizes, wanted.other, wanted.direct) == (None, [], None, False)
+    assert main(["modes", WEDGE, "-o", str(tmp_path), "--campbell", "quick"]) == 2
+    assert main(["modes", WEDGE, "-o", str(tmp_path), "--pictures", "-1"]) == 2
 
 
 def test_quiet_prints_no_summary(pipeline, tmp_path, capsys):

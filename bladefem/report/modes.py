@@ -1,0 +1,138 @@
+"""What ``bladefem modes`` leaves in its folder: tables, pictures, an animated wave, ParaView and netCDF files."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pandas as pd
+
+from ..data import ModeSet
+from ..scene import Scene
+from ..store import on_root, write_results
+from ..study.loads import Progress, unwatched
+from ..study.modal import family_table
+from ..study.survey import Survey, Wanted, excited_set, survey
+from ..view import mesh, modes, speed
+from .datasets import mode_shapes
+from .run import mode_table
+from .tables import write_tables
+
+__all__ = ["PICTURES", "run", "tables_of"]
+
+PICTURES = 4        # modes that are drawn
+
+
+def run(scene: Scene, folder: str | Path, wanted: Wanted, pictures: int = PICTURES, comm: Any = None,
+        progress: Progress = unwatched) -> Survey:
+    """Survey the modes and write the folder.
+
+    Args:
+        pictures: number of modes drawn on the sector and on the wheel; 0 for tables only.
+
+    Raises:
+        InputError, NotSolvedError: see :func:`bladefem.study.survey.survey`.
+    """
+    result = survey(scene, folder, wanted, comm, progress)
+    start, stresses = time.perf_counter(), _stresses(result) if pictures else {}
+    on_root(comm, lambda: _write(result, pictures, stresses, progress))
+    timings = {**result.run.timings, "tables and pictures": time.perf_counter() - start}
+    return replace(result, run=replace(result.run, timings=timings))
+
+
+def tables_of(result: Survey) -> dict[str, pd.DataFrame]:
+    """All tables by file name, SI columns."""
+    run = result.run
+    excited = excited_set(run)
+    out = {"frequencies": mode_table(run.modes, run.mesh), "excited_modes": family_table(excited, run.mesh),
+           "effective_masses": result.masses}
+    if excited.nodal_diameter is None:
+        out["frequencies"] = out["frequencies"].drop(columns="nodal_diameter")
+    if result.campbell is not None:
+        found = result.campbell
+        out |= {"campbell": found.table, "crossings": found.crossings, "interference": found.interference,
+                "margins": found.margins}
+    if result.convergence is not None:
+        out |= {"convergence": result.convergence.summary, "convergence_points": result.convergence.points}
+    if result.mac is not None:
+        out["mac"] = mac_table(result.mac, excited, result.compared)
+    return out
+
+
+def mac_table(match: np.ndarray, mine: ModeSet, theirs: ModeSet) -> pd.DataFrame:
+    """One row a mode: its partner in the other run, both frequencies, and the whole row of the MAC matrix."""
+    best = match.argmax(axis=1)
+    table = pd.DataFrame({"mode": np.arange(1, len(match) + 1), "frequency": mine.frequencies, "partner": best + 1,
+                          "frequency_of_partner": theirs.frequencies[best], "mac": match.max(axis=1)})
+    return table.assign(**{f"MAC {j + 1}": match[:, j] for j in range(match.shape[1])})
+
+
+def _write(result: Survey, pictures: int, stresses: dict[str, np.ndarray], progress: Progress) -> None:
+    run, folder = result.run, Path(result.run.folder)
+    tables = tables_of(result)
+    for name, table in tables.items():
+        write_tables(table, folder / name, name.replace("_", " "))
+    write_results(folder / "modes.nc", {"modes": mode_shapes(run)})
+    if not pictures:
+        return
+    excited = excited_set(run)
+    modes.save_modes_vtu(run.mesh, excited, folder / "modes.vtu")
+    shapes = {f"mode {i + 1}, {f:.6g} Hz": excited.shapes[i] for i, f in enumerate(excited.frequencies[:pictures])}
+    mesh.save_vtu(run.mesh, folder / "stress.vtu", {**shapes, **stresses})
+    for name, draw in progress(list(_drawings(result, tables, pictures).items()), "pictures"):
+        draw(folder / name)
+
+
+def _stresses(result: Survey) -> dict[str, np.ndarray]:
+    """Node fields: displacement and stress under the rotation, stress of the first modes; collective."""
+    from ..fem.stress import nodal_stress, principal, von_mises
+    bodies, excited = result.bodies, excited_set(result.run)
+    body, rotating = bodies.still_blade, result.run.scene.operation.speed
+    fields = {}
+    if rotating > 0:
+        u0 = rotating ** 2 * bodies.swell
+        stress = nodal_stress(body, u0)
+        fields = {"rotation, displacement [m]": np.pad(u0, ((0, 0), (0, 3 - u0.shape[1]))),
+                  "rotation, von Mises [Pa]": von_mises(stress),
+                  "rotation, largest principal [Pa]": principal(stress)[:, 0]}
+    for i, shape in enumerate(excited.shapes[:PICTURES]):
+        largest = max(np.linalg.norm(shape, axis=1).max(), 1e-300)
+        fields[f"mode {i + 1}, von Mises for 1 mm [Pa]"] = von_mises(nodal_stress(body, 1e-3 / largest * shape))
+    return fields
+
+
+def _drawings(result: Survey, tables: dict[str, pd.DataFrame],
+              pictures: int) -> dict[str, Callable[[Path], object]]:
+    """File name to a function that draws it."""
+    run, excited, wheel = result.run, excited_set(result.run), len(result.run.modes) > 1
+    names = list(tables["excited_modes"]["family"])
+    shown = range(min(pictures, len(excited.frequencies)))
+    out: dict[str, Callable[[Path], object]] = {
+        "modes.png": lambda file: modes.draw_mode_sheet(run.mesh, excited, file, families=names)}
+    for i in shown:
+        out[f"mode_{i + 1}.png"] = lambda file, i=i: modes.draw_mode(run.mesh, excited, i, file, family=names[i])
+        if wheel:
+            out[f"mode_{i + 1}_wheel.png"] = lambda file, i=i: modes.draw_wheel_mode(run.mesh, excited, i, file,
+                                                                                     family=names[i])
+    out["wave.gif"] = lambda file: modes.animate_wave(run.mesh, excited, run.scene.excitation.mode - 1, file)
+    if wheel:
+        out["nodal_diameters.png"] = lambda file: speed.draw_nodal_diameters(tables["frequencies"], file)
+    return out | _speed_drawings(result, tables)
+
+
+def _speed_drawings(result: Survey, tables: dict[str, pd.DataFrame]) -> dict[str, Callable[[Path], object]]:
+    """Campbell and SAFE diagrams."""
+    if result.campbell is None:
+        return {}
+    found, scene = result.campbell, result.run.scene
+    orders = sorted({scene.excitation.engine_order, *found.crossings["engine_order"]})
+    out: dict[str, Callable[[Path], object]] = {"campbell.png": lambda file: speed.draw_campbell(
+        found.table, orders, file, crossings=found.crossings, operating=found.speed)}
+    if len(result.run.modes) > 1 and found.speed > 0:
+        out["interference.png"] = lambda file: speed.draw_interference(
+            tables["frequencies"], result.run.mesh.sector.count, found.speed, file, orders=orders)
+    return out

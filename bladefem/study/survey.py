@@ -1,0 +1,161 @@
+"""A survey of the modes: all nodal diameters, and what was asked for beside them."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Sequence
+from dataclasses import dataclass, field, replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pandas as pd
+
+from geometry.mesh import Mesh
+
+from ..data import ModeSet
+from ..encode import read_npz
+from ..errors import InputError
+from ..reduction.assemble import folded_diameter
+from ..scene import Scene
+from ..store import code_of, key_of, on_root, stage
+from . import pipeline
+from .campbell import Campbell, campbell
+from .converge import Convergence, converge, default_sizes
+from .effective import effective_masses
+from .keys import modes_key
+from .loads import Progress, unwatched
+from .modal import mac
+from .stages import MODES_SHOWN, Bodies, is_wheel
+
+__all__ = ["Survey", "Wanted", "excited_set", "survey"]
+
+ORDERS = 3      # engine orders above and below the scene's own, in Campbell and SAFE diagrams
+
+
+@dataclass(frozen=True)
+class Wanted:
+    """What to find beside the modes."""
+
+    speeds: Sequence[float] | None = None       # [rad/s] of a Campbell diagram
+    sizes: Sequence[float] | None = None        # [m] of a refinement study; empty: chosen
+    other: Path | None = None                   # folder of a run to compare with
+    direct: bool = False                        # every nodal diameter from scratch
+
+
+@dataclass(frozen=True)
+class Survey:
+    """What was found; the run's modes are those of all nodal diameters."""
+
+    run: pipeline.Run
+    bodies: Bodies
+    masses: pd.DataFrame                        # effective masses
+    campbell: Campbell | None = None
+    convergence: Convergence | None = None
+    mac: np.ndarray | None = None               # (modes, modes of the other run) in the excited nodal diameter
+    compared: ModeSet | None = field(default=None, repr=False)      # the other run's
+
+
+def survey(scene: Scene, folder: str | Path, wanted: Wanted, comm: Any = None,
+           progress: Progress = unwatched) -> Survey:
+    """Modes of every nodal diameter, and what is wanted beside them; collective.
+
+    Raises:
+        InputError, NotSolvedError: from the stages.
+    """
+    other = None if wanted.other is None else on_root(comm, lambda: _other(wanted.other))
+    start = pipeline.run(scene, folder, until="mesh", comm=comm, progress=progress)
+    pipeline.check_blade(scene, start.mesh)
+    bodies, clock = Bodies(scene, start.mesh, comm), time.perf_counter()
+    key = key_of(modes_key(scene), "survey", wanted.direct, code_of("bladefem.study"))
+    sets, found = stage(folder, "survey", key, lambda: _all_modes(bodies, wanted.direct), comm)
+    messages = [*start.messages, *(["modes: found in the folder, not computed again"] if found else [])]
+    run = replace(start, modes=sets, messages=messages)
+    clock = _timed(run, "modes", clock)
+    result = Survey(run, bodies, effective_masses(sets, bodies.still_blade))
+    clock = _timed(run, "effective masses", clock)
+    if wanted.speeds is not None:
+        result = replace(result, campbell=campbell(bodies, wanted.speeds, _orders(scene)))
+        clock = _timed(run, "campbell", clock)
+    if wanted.sizes is not None:
+        sizes = list(wanted.sizes) or default_sizes(scene, start.mesh)
+        n = excited_set(run).nodal_diameter
+        result = replace(result, convergence=converge(scene, sizes, None if n is None else [n], comm=comm,
+                                                      progress=progress))
+        clock = _timed(run, "mesh refinement", clock)
+    return result if other is None else _compared(result, *other)
+
+
+def excited_set(run: pipeline.Run) -> ModeSet:
+    """The modes of the nodal diameter that the engine order excites, or the nearest one that is there."""
+    if run.modes[0].nodal_diameter is None:
+        return run.modes[0]
+    wanted, _ = folded_diameter(1, run.scene.excitation.engine_order, run.mesh.sector.count)
+    return min(run.modes, key=lambda m: abs(m.nodal_diameter - wanted))
+
+
+def _all_modes(bodies: Bodies, direct: bool) -> list[ModeSet]:
+    from ..fem.modes import modes
+    from ..fem.wheel import all_diameters
+    if not is_wheel(bodies.mesh):
+        flex = bodies.factorised(0)
+        return [modes(flex.con, MODES_SHOWN, flex)]
+    return all_diameters(bodies.frame, MODES_SHOWN, bodies.scene.model.nodal_diameters, direct)
+
+
+def _orders(scene: Scene) -> list[int]:
+    order = scene.excitation.engine_order
+    return list(range(max(order - ORDERS, 1), order + ORDERS + 1))
+
+
+def _timed(run: pipeline.Run, name: str, since: float) -> float:
+    now = time.perf_counter()
+    run.timings[name] = now - since
+    return now
+
+
+def _other(folder: Path) -> tuple[Mesh, list[ModeSet]]:
+    """Mesh and modes of another run.
+
+    Raises:
+        InputError: the folder holds none.
+    """
+    mesh, sets = _kept(folder, "mesh"), _kept(folder, "survey") or _kept(folder, "modes")
+    if mesh is None or sets is None:
+        raise InputError(f"compare = {folder}: expected the folder of an earlier run of 'bladefem modes'")
+    return mesh, sets
+
+
+def _kept(folder: Path, name: str) -> Any:
+    """A stage of another run, whatever it was made from."""
+    path = Path(folder) / "stages" / f"{name}.npz"
+    try:
+        with np.load(path, allow_pickle=False) as file:
+            key = str(file["key"])
+        return read_npz(path, key)
+    except (OSError, KeyError, ValueError):
+        return None
+
+
+def _compared(result: Survey, mesh: Mesh, sets: list[ModeSet]) -> Survey:
+    """MAC against the same nodal diameter of another run; its shapes are interpolated where the mesh is another one."""
+    mine = excited_set(result.run)
+    theirs = [s for s in sets if s.nodal_diameter == mine.nodal_diameter]
+    if not theirs:
+        raise InputError(f"compare: the other run has no modes of nodal diameter {mine.nodal_diameter}")
+    own = result.run.mesh
+    same = mesh.points.shape == own.points.shape and np.array_equal(mesh.points, own.points)
+    match = mac(_of_blade(own, mine), _of_blade(mesh, theirs[0]) if same else theirs[0], _blade(own),
+                None if same else _blade(mesh))
+    return replace(result, mac=match, compared=theirs[0])
+
+
+def _blade(mesh: Mesh) -> Mesh:
+    """The blade alone: the damper is not part of the modes."""
+    return replace(mesh, bodies={"blade": mesh.bodies["blade"]})
+
+
+def _of_blade(mesh: Mesh, modes: ModeSet) -> ModeSet:
+    """The same modes, at rest away from the blade."""
+    inside = np.isin(np.arange(len(mesh.points)), mesh.bodies["blade"])
+    return replace(modes, shapes=np.where(inside[:, None], modes.shapes, 0.0))
