@@ -1,10 +1,16 @@
-"""Is the automatic choice ever wrong, and does it pay? Against a fixed rich model on 72 cases, and along a sweep.
+"""Is the automatic choice ever wrong, and does it pay? Against a fixed rich model on 68 cases, and along a sweep.
 
     python benchmarks/choice_cases.py [every]
 
 runs each ``every``-th case (1: all). Cases are the reference blade (contact stiffness, damper mass, interblade phase,
 load, frequency, one to sixteen contact points a side, 40 modes) and random elastic bodies with 3-D contacts and
 lift-off. "True error" is that of the first harmonic at the probe against H 31, 4096 samples, all points and modes.
+
+Measured on 68 cases at 2 % and at 0.1 %: all accepted, none wrong. Beams: largest true error 0.67 % and 0.052 % (told
+0.73 % and 0.050 %); bodies with lift-off 0.87 % and 0.037 %. Comparing H with 2H+1 instead of 4H+3 let one body of
+these pass at 0.1 % with a true error of 0.13 %. The figures of the beams were taken with 2H+1. A third body, hardly
+pressed, was dropped: its truth did not converge. The search does not pay for a single point of so small models (a
+sample of 12 cases: 2.1 times the rich model's time at 2 %, 4.4 times at 0.1 %, most of it on hard lift-off).
 """
 
 from __future__ import annotations
@@ -96,8 +102,8 @@ def random_body(seed: int, nodes: int, modes: int = 24) -> ReducedModel:
 
 
 def random_cases() -> Iterator[Case]:
-    """12 cases with lift-off."""
-    for seed in (1, 2, 3):
+    """8 cases with lift-off."""
+    for seed in (1, 2):
         model = random_body(seed, 4)
         free, stuck = free_resonances(model)[0], stuck_resonances(model)[0]
         for share in (0.05, 0.4, 0.7, 0.95):
