@@ -140,17 +140,18 @@ def _along_excitation(balance: Balance, options: Options) -> Newton:
     else:
         return _back(balance, end, iterations, f"no solution for any part of the excitation: {end.reason}")
     task = Task(part, "force", -x, float(np.linalg.norm(end.state.w)), options)
-    spot, step = spot_at(task, x, part(x), end.state, 0, 1.0), 0.05
+    reached = end.state
     try:
+        spot, step = spot_at(task, x, part(x), end.state, 0, 1.0), 0.05
         for _ in range(LONGEST_PATH):
             spot, step, _ = advance(task, spot, step, 0.2)
-            iterations += spot.iterations
+            iterations, reached = iterations + spot.iterations, spot.state
             if spot.x >= 0:
                 end = newton(balance, spot.state.w, options)
                 return replace(end, iterations=iterations + end.iterations)
-    except NotSolvedError as error:
-        return _back(balance, replace(end, state=spot.state), iterations, str(error))
-    return _back(balance, replace(end, state=spot.state), iterations, f"not there after {LONGEST_PATH} points")
+    except (NotSolvedError, np.linalg.LinAlgError) as error:
+        return _back(balance, replace(end, state=reached), iterations, str(error))
+    return _back(balance, replace(end, state=reached), iterations, f"not there after {LONGEST_PATH} points")
 
 
 def _loaded(balance: Balance, level: float) -> Balance:
