@@ -96,7 +96,7 @@ def linear_tangent(body: Body, u0: np.ndarray, speed: float, axis: tuple[float, 
 
 
 def preload(body: Body, speed: float, clamp: str | None = "clamp", axis: tuple[float, float, float] = AXIS,
-            tolerance: float = 1e-10) -> Preload:
+            tolerance: float = 1e-10, quadrature: str = "exact") -> Preload:
     """The nonlinear static state under a steady rotation, by Newton's method with load steps that halve when it fails.
 
     A body with the pair "cyclic" moves alike in all sectors (nodal diameter 0).
@@ -105,6 +105,7 @@ def preload(body: Body, speed: float, clamp: str | None = "clamp", axis: tuple[f
         speed: [rad/s].
         clamp: face or node set held fast.
         tolerance: wanted |unbalanced force| over |centrifugal force|; rounding may leave more in slender bodies.
+        quadrature: "exact" or "ccx", as in :func:`bladefem.fem.body.assemble`.
 
     Raises:
         InputError: speed is negative or not finite, no such face.
@@ -114,7 +115,7 @@ def preload(body: Body, speed: float, clamp: str | None = "clamp", axis: tuple[f
     u = np.zeros((len(body.mesh.points), body.dim))
     if speed == 0:
         return Preload(u, speed, 0, 0, 0.0)
-    forms, con, load = _forms(body, axis), in_step(body, clamp), centrifugal(body, speed, axis)
+    forms, con, load = _forms(body, axis, quadrature), in_step(body, clamp), centrifugal(body, speed, axis)
     size = _length(con, restrict(con, load.reshape(-1, 1)))
     done, part, iterations, steps, halvings = 0.0, 1.0, 0, 0, 0
     while done < 1.0:
@@ -131,9 +132,10 @@ def preload(body: Body, speed: float, clamp: str | None = "clamp", axis: tuple[f
     return Preload(u, speed, iterations, steps, error / size)
 
 
-def tangent(body: Body, state: Preload, axis: tuple[float, float, float] = AXIS) -> PETSc.Mat:
+def tangent(body: Body, state: Preload, axis: tuple[float, float, float] = AXIS,
+            quadrature: str = "exact") -> PETSc.Mat:
     """Stiffness of small vibrations about a nonlinear preload, spin softening included [N/m]."""
-    forms = _forms(body, axis)
+    forms = _forms(body, axis, quadrature)
     return _tangent(forms, state.displacement, state.speed ** 2)
 
 
@@ -195,7 +197,7 @@ def _length(con: Constrained, r: np.ndarray) -> float:
     return float(np.sqrt(con.body.comm.allreduce(float((np.abs(r) ** 2).sum()))))
 
 
-def _measures(body: Body, quadrature: str = "exact") -> tuple[Any, Any]:
+def _measures(body: Body, quadrature: str) -> tuple[Any, Any]:
     """Measures for the elastic and the inertial integrals; the elastic one is of fourth power in grad u."""
     stiff, mass = degrees(body.mesh, cells_of(body), quadrature)
     if quadrature == "exact" and stiff < 4:
@@ -209,7 +211,7 @@ def _across(body: Body, axis: tuple[float, float, float]) -> Any:
     return ufl.as_matrix((np.eye(3) - np.outer(unit, unit))[:body.dim, :body.dim].tolist())
 
 
-def _forms(body: Body, axis: tuple[float, float, float]) -> _Forms:
+def _forms(body: Body, axis: tuple[float, float, float], quadrature: str) -> _Forms:
     """First and second derivative of the potential."""
     domain = body.space.mesh
     u, speed2 = dolfinx.fem.Function(body.space), dolfinx.fem.Constant(domain, 0.0)
@@ -217,7 +219,7 @@ def _forms(body: Body, axis: tuple[float, float, float]) -> _Forms:
     lam, mu, rho, depth = properties(body.mesh, body.material, domain, body.plane)
     E = ufl.sym(ufl.grad(u)) + ufl.grad(u).T * ufl.grad(u) / 2      # F^T F - 1 would cancel small strains
     place = _across(body, axis) * (ufl.SpatialCoordinate(domain) + u)
-    elastic, inertial = _measures(body)
+    elastic, inertial = _measures(body, quadrature)
     potential = (depth * (lam / 2 * ufl.tr(E) ** 2 + mu * ufl.inner(E, E)) * elastic
                  - depth * rho * speed2 / 2 * ufl.inner(place, place) * inertial)
     force = ufl.derivative(potential, u, v)
