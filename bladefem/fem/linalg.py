@@ -19,7 +19,7 @@ from scipy.linalg import blas
 
 from . import core as interior
 from .compat import PETSc
-from .mumps import Factorised, factorise_matrix, solve_matrix
+from .mumps import Factorised, dense, factorise_matrix, solve_matrix, values
 
 __all__ = ["Doubled", "Factor", "Folded", "apply", "combined", "dense_rows", "dot", "factorise", "inertia", "minus",
            "mix", "scale", "solve"]
@@ -158,13 +158,12 @@ def inertia(A: Matrix) -> int:
 
 
 def _times(A: PETSc.Mat, X: np.ndarray) -> np.ndarray:
-    rows = A.sizes[1]
-    right = PETSc.Mat().createDense((rows, (None, X.shape[1])), comm=A.comm)
-    right.setUp()
-    right.getDenseArray()[...] = X
-    right.assemble()
-    product = A.matMult(right)      # kept by name: newer petsc4py frees a nameless one under its array
-    return np.array(product.getDenseArray(readonly=True), order="F")
+    right = dense(A, np.asfortranarray(X, dtype=float))
+    product = A.matMult(right)
+    out = values(product)
+    for matrix in (right, product):         # petsc4py keeps what is not destroyed for a later garbage collection
+        matrix.destroy()
+    return out
 
 
 def _split(X: np.ndarray) -> np.ndarray:

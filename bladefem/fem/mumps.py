@@ -15,7 +15,7 @@ import numpy as np
 from ..errors import NotSolvedError
 from .compat import PETSc
 
-__all__ = ["Factorised", "factorise_matrix", "schur_complement", "solve_matrix"]
+__all__ = ["Factorised", "dense", "factorise_matrix", "schur_complement", "solve_matrix", "values"]
 
 BATCH = 64      # columns a solve: from 32 on MUMPS runs at the speed of matrix products
 ROOM = 40       # per cent of memory beyond MUMPS's own estimate
@@ -85,10 +85,12 @@ def solve_matrix(factor: Factorised, B: np.ndarray) -> np.ndarray:
     rows = np.flatnonzero(B.any(axis=1)) if F.comm.size == 1 else np.arange(B.shape[0])
     for first in range(0, B.shape[1], BATCH):
         part = slice(first, min(first + BATCH, B.shape[1]))
-        left = _dense(F, part.stop - part.start)
-        right = _sparse(F, rows, B[rows, part]) if len(rows) < SPARSE * len(B) else _filled(F, B[:, part])
+        sparse = len(rows) < SPARSE * len(B)
+        right = _sparse(F, rows, B[rows, part]) if sparse else dense(F, np.asfortranarray(B[:, part], dtype=float))
+        left = dense(F, out[:, part])
         F.matSolve(right, left)
-        out[:, part] = left.getDenseArray(readonly=True)
+        for matrix in (right, left):        # petsc4py keeps what is not destroyed for a later garbage collection
+            matrix.destroy()
     return out
 
 
@@ -105,16 +107,24 @@ def schur_complement(factor: Factorised, n: int) -> np.ndarray:
     return half + half.T + np.diag(S.diagonal())
 
 
-def _dense(F: PETSc.Mat, k: int) -> PETSc.Mat:
-    out = PETSc.Mat().createDense((F.sizes[1], (None, k)), comm=F.comm)
-    out.setUp()
+def dense(A: PETSc.Mat, X: np.ndarray) -> PETSc.Mat:
+    """A dense PETSc matrix on the memory of X (n_own, k), columns contiguous."""
+    if X.size and not X.flags.f_contiguous:
+        raise ValueError("columns are not contiguous")
+    out = PETSc.Mat().createDense((A.sizes[1], (None, X.shape[1])), array=X.T.reshape(-1), comm=A.comm)
+    out.assemble()
     return out
 
 
-def _filled(F: PETSc.Mat, B: np.ndarray) -> PETSc.Mat:
-    out = _dense(F, B.shape[1])
-    out.getDenseArray()[...] = B
-    out.assemble()
+def values(D: PETSc.Mat) -> np.ndarray:
+    """(n_own, k) copy of a dense PETSc matrix."""
+    rows, columns = D.sizes[0][0], D.size[1]
+    if not rows * columns:
+        return np.zeros((rows, columns), order="F")
+    data = ctypes.POINTER(ctypes.c_double)()
+    _petsc("MatDenseGetArrayRead", D.handle, ctypes.byref(data))
+    out = np.ctypeslib.as_array(data, (columns, rows)).T.copy(order="F")
+    _petsc("MatDenseRestoreArrayRead", D.handle, ctypes.byref(data))
     return out
 
 
@@ -125,7 +135,9 @@ def _sparse(F: PETSc.Mat, rows: np.ndarray, values: np.ndarray) -> PETSc.Mat:
     turned = PETSc.Mat().createAIJ((k, F.size[0]), comm=F.comm, csr=(
         starts, np.tile(rows.astype(PETSc.IntType), k), values.T.ravel()))
     turned.assemble()
-    return PETSc.Mat().createTranspose(turned)
+    out = PETSc.Mat().createTranspose(turned)
+    turned.destroy()                        # out holds it
+    return out
 
 
 def _petsc(name: str, *arguments: object) -> None:
