@@ -26,12 +26,29 @@ RUNS = {"single mass": (7, 256, 61), "beam": (7, 256, 31),        # harmonics, s
 
 
 def write(problem: Problem, omegas: np.ndarray, H: int, samples: int, path: Path) -> None:
-    """The problem as pyHarm's half reads it; contacts must be dofs of their own."""
-    e, one_dof = problem.elements, len(problem.contact) == len(problem.elements.kt)
-    directions = 1 if one_dof else 1 + e.tangents
-    first = np.argmax(problem.contact, axis=1)[::directions] // directions
-    np.savez(path, M=problem.M, C=problem.C, K=problem.K, load=problem.load, force=problem.force, directions=directions,
-             nodes=first, kt=e.kt, kn=e.kn, mu=e.mu, n0=e.n0, H=H, samples=samples, omegas=omegas, tolerance=1e-8)
+    """The problem as pyHarm's half reads it: contacts are dofs of their own, three a node in the order normal, t1, t2.
+
+    Its normal displacement opens the contact, so those dofs change sign; the chain's missing second tangent becomes a
+    mass at rest. Its 3-D elements run in single precision and cannot meet 1e-8: they are let off at 1e-5 of the force.
+    """
+    e = problem.elements
+    tangential = len(problem.contact) == len(e.kt)
+    matrices, load = [problem.M, problem.C, problem.K], problem.load
+    if not tangential:
+        directions = 1 + e.tangents
+        count = len(problem.M) // directions
+        place = (3 * np.arange(count)[:, None] + np.arange(directions)).ravel()
+        signs = np.tile([-1.0, 1.0, 1.0], count)
+        full = []
+        for matrix, idle in zip(matrices, (1.0, 0.02, 1.0), strict=True):
+            wide = idle * np.eye(3 * count)
+            wide[np.ix_(place, place)] = matrix
+            full.append(signs[:, None] * wide * signs)
+        matrices, load = full, int(place[load])
+    first = np.argmax(problem.contact, axis=1)[::1 if tangential else directions] // (1 if tangential else directions)
+    np.savez(path, M=matrices[0], C=matrices[1], K=matrices[2], load=load, force=problem.force, nodes=first,
+             directions=1 if tangential else 3, kt=e.kt, kn=e.kn, mu=e.mu, n0=e.n0, H=H, samples=samples, omegas=omegas,
+             tolerance=1e-8 if tangential else 1e-5 * problem.force)
 
 
 def ours(problem: Problem, omegas: np.ndarray, H: int, samples: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
@@ -64,7 +81,7 @@ def main(python: str, *names: str) -> None:
         errors = [np.max(abs(a - exact)[good], initial=0) / abs(exact).max() for a in (amplitude, theirs["amplitude"])]
         # time of all points, lost ones too, over those that were solved
         pairs = (seconds, converged), (theirs["seconds"], theirs["converged"])
-        mine, other = (spent.sum() / max(solved.sum(), 1) for spent, solved in pairs)
+        mine, other = (spent.sum() / solved.sum() if solved.any() else np.nan for spent, solved in pairs)
         memory = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024
         print(f"{name:22s} {mine * 1e3:9.2f} {other * 1e3:9.1f} {other / mine:6.0f} {converged.sum():5d}/{count:<3d} "
               f"{theirs['converged'].sum():5d}/{count:<3d} {errors[0]:8.1e} {errors[1]:8.1e} {memory:5.0f} "

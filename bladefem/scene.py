@@ -11,7 +11,8 @@ from math import pi
 from geometry.parameters import Aerofoil, Disc, HertzPair, MeshSize, Plane, Platform, Punch, Shank, Wedge, ZMass
 from geometry.quantity import quantity
 
-__all__ = ["KINDS", "Contact", "Excitation", "Imported", "Material", "Materials", "Model", "Operation", "Scene", "Study"]
+__all__ = ["KINDS", "Contact", "Excitation", "Imported", "Material", "Materials", "Model", "Operation",
+           "Scene", "Study"]
 
 KINDS = ("wedge sector", "plane blades", "z mass", "hertz", "punch", "imported")
 
@@ -40,10 +41,12 @@ class Contact:
     mu: float = quantity(0.3, "1", 0.0, 2.0, "friction coefficient")
     kt_area: float = quantity(4.0e10, "N/m^3", 0.0, 1e15, "tangential contact stiffness for each unit of area")
     kt: float | None = quantity(None, "N/m", 0.0, 1e12, "tangential stiffness of one whole patch")
-    kn_area: float | None = quantity(None, "N/m^3", 0.0, 1e15, "normal contact stiffness for each unit of area; by Mindlin from kt_area")
+    kn_area: float | None = quantity(None, "N/m^3", 0.0, 1e15,
+                                     "normal contact stiffness for each unit of area; by Mindlin from kt_area")
     points: int | None = quantity(None, "1", 1, 5000, "friction elements on each patch; all mesh nodes when left out")
     bedded: bool = quantity(True, help="seats have worn until they fit at the operating speed; false: as drawn")
-    normal: str = quantity("coupled", choices=("coupled", "prescribed"), help="normal load follows the motion, or stays at its static value")
+    normal: str = quantity("coupled", choices=("coupled", "prescribed"),
+                           help="normal load follows the motion, or stays at its static value")
 
 
 @dataclass(frozen=True)
@@ -62,8 +65,10 @@ class Excitation:
     engine_order: int = quantity(6, "1", 0, 1000, "cycles of the pattern in one revolution")
     force: float = quantity(1.0, "N", 0.0, 1e6, "amplitude on each blade")
     at: str = quantity("tip_mid", help="named node set or face that carries the force")
-    direction: tuple[float, float, float] = quantity((0.0, 1.0, 0.0), "1", help="direction in the blade's own axes (radial, circumferential, axial)")
-    phase: float = quantity(0.0, "rad", -pi, pi, "inter-blade phase of plane blades; on a wheel it follows from the engine order")
+    direction: tuple[float, float, float] = quantity(
+        (0.0, 1.0, 0.0), "1", help="direction in the blade's own axes (radial, circumferential, axial)")
+    phase: float = quantity(0.0, "rad", -pi, pi,
+                            "inter-blade phase of plane blades; on a wheel it follows from the engine order")
     mode: int = quantity(1, "1", 1, 50, "mode whose resonance is studied, 1 = lowest")
 
 
@@ -71,9 +76,11 @@ class Excitation:
 class Study:
     """What is varied. Loads are the static normal force between damper and one seat."""
 
-    loads: tuple[float, ...] | None = quantity(None, "N", 0.0, 1e8, "normal loads per seat; eight round the optimum when left out")
+    loads: tuple[float, ...] | None = quantity(None, "N", 0.0, 1e8,
+                                               "normal loads per seat; eight round the optimum when left out")
     masses: tuple[float, ...] | None = quantity(None, "kg", 1e-5, 10.0, "damper masses; the scene's own when left out")
-    band: tuple[float, float] | None = quantity(None, "Hz", 0.0, 1e6, "frequency band; from the free to the stuck resonance when left out")
+    band: tuple[float, float] | None = quantity(None, "Hz", 0.0, 1e6,
+                                                "frequency band; from the free to the stuck resonance when left out")
 
 
 @dataclass(frozen=True)
@@ -85,7 +92,8 @@ class Model:
     samples: int | None = quantity(None, "1", 16, 65536, "time samples a period")
     damper: str | None = quantity(None, choices=("mass", "rigid", "elastic"), help="damper model")
     reduction: str = quantity("rubin", choices=("rubin", "craig-bampton"), help="reduction basis")
-    nodal_diameters: tuple[int, ...] | None = quantity(None, "1", 0, 1000, "nodal diameters of the mode tables; all when left out")
+    nodal_diameters: tuple[int, ...] | None = quantity(None, "1", 0, 1000,
+                                                       "nodal diameters of the mode tables; all when left out")
 
 
 @dataclass(frozen=True)

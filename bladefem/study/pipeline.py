@@ -69,7 +69,7 @@ class Run:
     """What a run has so far; stages after ``until`` are None."""
 
     scene: Scene
-    folder: Path
+    folder: Path | None
     mesh: Mesh
     modes: list[ModeSet] | None = None
     contact: Seating | None = None
@@ -94,7 +94,7 @@ def run(scene: Scene, folder: str | Path, until: str = "response", comm: Any = N
     keep = _Keeper(folder, comm, clock)
     with clock("mesh"):
         mesh = keep("mesh", mesh_key(scene), lambda: build_mesh(scene, comm))
-    result = Run(scene, Path(folder), mesh, timings=clock.seconds, messages=clock.messages)
+    result = Run(scene, None if folder is None else Path(folder), mesh, timings=clock.seconds, messages=clock.messages)
     if until == "mesh":
         return result
     check_blade(scene, mesh)

@@ -145,12 +145,12 @@ def find_modes(bodies: Bodies, diameters: Sequence[int] | None = None, count: in
         count: modes of each nodal diameter.
     """
     from ..fem.modes import modes
+    from ..fem.wheel import all_diameters
     if not is_wheel(bodies.mesh):
         flex = bodies.factorised(0)
         return [modes(flex.con, count, flex)]
     wanted = diameters or bodies.scene.model.nodal_diameters or harmonic_diameters(bodies.scene, bodies.mesh, 3)
-    factors = [bodies.factorised(n) for n in wanted]
-    return [modes(flex.con, count, flex) for flex in factors]
+    return all_diameters(bodies.frame, count, wanted)
 
 
 def seat_damper(bodies: Bodies, patches: list[Patch]) -> Any:
@@ -179,13 +179,15 @@ def reduce_sector(bodies: Bodies, patches: list[Patch], diameters: Sequence[int]
         modes: modes kept in each nodal diameter.
     """
     from ..fem.loads import mass
-    from ..fem.ports import port_model
+    from ..fem.ports import port_model, port_models
     scene, mesh = bodies.scene, bodies.mesh
     ports, other = blade_ports(mesh, patches, scene.excitation), damper_ports(mesh, patches)
-    sector = {}
-    for n in diameters:
-        flex = bodies.factorised(n)
-        sector[n] = port_model(flex.con, ports.matrix, ports.names, modes, kind=scene.model.reduction, flex=flex)
+    kind = scene.model.reduction
+    if is_wheel(mesh):
+        sector = port_models(bodies.frame, ports.matrix, ports.names, modes, diameters, kind=kind)
+    else:
+        flex = bodies.factorised(0)
+        sector = {0: port_model(flex.con, ports.matrix, ports.names, modes, kind=kind, flex=flex)}
     floating = port_model(bodies.damper.con, other.matrix, other.names, DAMPER_MODES, flex=bodies.damper)
     first = len(patches[0].area) * mesh.dimension
     return Reduced(sector, floating, slice(first, first + len(patches[1].area) * mesh.dimension),
