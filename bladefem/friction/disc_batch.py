@@ -6,14 +6,14 @@ import numpy as np
 from numba import njit
 
 from bladefem.friction.disc_rows import close, linear_period, start_rows, to_carry
-from bladefem.friction.orbit import EDGE_ROWS, TOLERANCE, edges, march, periodic, record, start
+from bladefem.friction.orbit import EDGE_ROWS, TOLERANCE, edges, march, period, periodic, record, start
 from bladefem.friction.tables import Node, gram, values
 
 __all__ = ["disc_batch"]
 
 NEAR = 1e-8         # of the largest limit: marching stops and one linearised period finishes
 EXACT = 1e-7        # of the largest limit: longest step of that period, whose error is of the order of its square
-SINGULAR = 1e-9     # of det(I - Phi): below it the state keeps a memory of its start
+SINGULAR = 1e-6     # of det(I - Phi): below it the state keeps a memory of its start
 
 
 @njit(cache=True, error_model="numpy")
@@ -124,6 +124,32 @@ def _remembered(path, count, el, tab, form, C, sums):
 
 
 @njit(cache=True, error_model="numpy")
+def _keeps_memory(phi):
+    """Whether the period map, derivative phi (2, 2), leaves a part of its start as it was."""
+    return abs((1.0 - phi[0, 0]) * (1.0 - phi[1, 1]) - phi[0, 1] * phi[1, 0]) < SINGULAR
+
+
+@njit(cache=True, error_model="numpy")
+def _marched(path, el, limit, phi):
+    """Periodic force by marching alone from the start: (fx, fy, cycles, done, False); not unique, but reproducible."""
+    fx, fy = start(path[0, 0], path[1, 0], path[2, 0], el.mu)
+    fx, fy, count, done, _ = periodic(path, el.mu, fx, fy, False, limit, phi)
+    return fx, fy, count, done, False
+
+
+@njit(cache=True, error_model="numpy")
+def _settle(path, el, limit, fx, fy, phi):
+    """Periodic force by Newton from (fx, fy), or by marching where it is not unique: (fx, fy, cycles, done, unique)."""
+    fx, fy, count, done, _ = periodic(path, el.mu, fx, fy, True, limit, phi)
+    if _keeps_memory(phi):
+        return _marched(path, el, limit, phi)
+    _, _, events = period(path, el.mu, fx, fy, phi)
+    if events == 0 or _keeps_memory(phi):
+        return _marched(path, el, limit, phi)
+    return fx, fy, count, done, True
+
+
+@njit(cache=True, error_model="numpy")
 def _tangential(path, el, tab, limit, form, C, sums, F, J):
     """Offsets and slip parts of the periodic tangential force; returns (cycles, negative if not periodic; slips)."""
     K, phi, scale = tab.at.shape[1], np.empty((2, 2)), el.mu * path[2].max()
@@ -146,11 +172,13 @@ def _tangential(path, el, tab, limit, form, C, sums, F, J):
         if cycle > 2 and change > 0.1 * before:     # marching is slow here: Newton
             break
         before = change
-    fx, fy, count, done, _ = periodic(path, el.mu, fx, fy, True, limit, phi)
-    usable, rx, ry, slips = _implicit(path, fx, fy, el, tab, form, C, sums)
-    if not usable:                          # not unique: take the state that marching finds
-        fx, fy = start(path[0, 0], path[1, 0], path[2, 0], el.mu)
-        fx, fy, count, done, _ = periodic(path, el.mu, fx, fy, False, limit, phi)
+    fx, fy, count, done, unique = _settle(path, el, limit, fx, fy, phi)
+    rx, ry = 0.0, 0.0
+    if unique:
+        unique, rx, ry, slips = _implicit(path, fx, fy, el, tab, form, C, sums)
+        if not unique:
+            fx, fy, count, done, unique = _marched(path, el, limit, phi)
+    if not unique:
         slips = _remembered(path, count, el, tab, form, C, sums)
         rx = ry = 0.0
     close(C, K, rx, ry, sums, F, J)
@@ -170,10 +198,7 @@ def _force_only(path, el, tab, limit, form, trace, F):
         done = events == 0 or min(change, 2.0 * memory * scale) <= TOLERANCE * scale
         fx, fy, count = gx, gy, count + 1
     if not done:
-        fx, fy, count, done, _ = periodic(path, el.mu, fx, fy, True, limit, phi)
-        if abs((1.0 - phi[0, 0]) * (1.0 - phi[1, 1]) - phi[0, 1] * phi[1, 0]) < SINGULAR:
-            fx, fy = start(path[0, 0], path[1, 0], path[2, 0], el.mu)
-            fx, fy, count, done, _ = periodic(path, el.mu, fx, fy, False, limit, phi)
+        fx, fy, count, done, _ = _settle(path, el, limit, fx, fy, phi)
     slips = record(path, el.mu, form, fx, fy, trace)
     np.dot(trace, tab.analysis, F[1:])
     return (count if done else -count), slips

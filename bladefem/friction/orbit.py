@@ -195,6 +195,8 @@ def periodic(path, mu, fx, fy, guessing, limit, phi):
         gx, gy, events = period(path, mu, fx, fy, phi)
         residual = hypot(gx - fx, gy - fy)
         if events == 0 or residual <= TOLERANCE * scale:
+            if guessing and events > 0:                 # a small residual leaves residual / (1 - contraction)
+                _, gx, gy = newton(fx, fy, gx, gy, R, phi)
             return gx, gy, cycle, True, guesses
         if guess and residual > 0.5 * before:           # no better than marching: go back and march on
             fx, fy, guess = sx, sy, False
