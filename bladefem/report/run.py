@@ -16,6 +16,7 @@ from geometry.mesh import Mesh
 from ..data import ModeSet
 from ..reduction.assemble import folded_diameter
 from ..scene import Scene
+from ..scene_file import dump
 from ..store import on_root, write_results
 from ..study import pipeline
 from ..study.loads import Progress, summary, unwatched
@@ -50,7 +51,7 @@ def _write(result: pipeline.Run, progress: Progress) -> None:
     tables = _tables(result)
     for name, table in tables.items():
         write_tables(table, folder / name.split("/")[1], name.split("/")[1])
-    write_results(folder / "results.nc", datasets(result, tables))
+    write_results(folder / "results.nc", datasets(result, tables), dump(result.scene))
     figures = {}
     for name, draw in progress(list(_drawings(result, tables).items()), "pictures"):
         figures[name] = folder / f"{name.split('/')[1]}.png"
