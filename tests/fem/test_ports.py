@@ -92,10 +92,16 @@ def test_shared_sweep_equals_each_alone(kind, clamp):
     together = port_models(t, P, {"contact": slice(0, 12)}, 8, [0, 1, 2, 3, 4], load, kind)
     for n, a in together.items():
         b = port_model(at_diameter(t, n), P, {"contact": slice(0, 12)}, 8, load if n == 0 else None, kind)
-        # the topmost Craig-Bampton value belongs to nearly dependent columns: 2.8e-10 seen on two ranks, hence 1e-9
-        np.testing.assert_allclose(a.omega, b.omega, rtol=1e-9, atol=1e-6)
+        # the upper Craig-Bampton values belong to nearly dependent columns, and MUMPS on several ranks does not round
+        # alike twice (5e-10 to 2e-9 seen there): of these the eight that were asked for count, the rest by what follows
+        np.testing.assert_allclose(a.omega[:8], b.omega[:8], rtol=1e-9, atol=1e-6)
         np.testing.assert_allclose(a.residual, b.residual, atol=1e-8 * max(abs(b.residual).max(), 1e-12))
-        np.testing.assert_allclose(a.shapes, b.shapes, atol=1e-6 * abs(b.shapes).max())
+        if kind == "rubin":
+            np.testing.assert_allclose(a.shapes, b.shapes, atol=1e-6 * abs(b.shapes).max())
+        else:       # eigenvectors of the small matrices have no sign or phase of their own: what they give together has
+            w2 = (0.3 * b.omega[0]) ** 2
+            one, other = ((m.shapes / (m.omega**2 - w2)) @ m.shapes.conj().T for m in (a, b))
+            np.testing.assert_allclose(one, other, atol=1e-8 * abs(other).max())
         assert (a.static_offset is None) == (n != 0)
     np.testing.assert_allclose(together[0].static_offset, port_model(
         at_diameter(t, 0), P, {}, 2, load).static_offset, rtol=1e-8)
