@@ -5,7 +5,8 @@ those of the low one, turned and shifted in phase by n theta. Then
 
     K(n) = T(n)^H K T(n) = K0 + cos(n theta) Kc + j sin(n theta) Ks
 
-with three real sparse matrices that serve every nodal diameter n.
+with three real sparse matrices that serve every nodal diameter n. A plane face named "symmetry_x", "symmetry_y" or
+"symmetry_z" slides in its plane: the displacement along that axis is zero there.
 """
 
 from __future__ import annotations
@@ -71,14 +72,15 @@ class Constrained:
 
 def constrain(body: Body, clamp: str | None = "clamp", nodal_diameter: int | None = None,
               ties: np.ndarray | None = None) -> Constrained:
-    """A body with its constraints, for one nodal diameter (None: no cyclic symmetry).
+    """A body with its constraints and symmetry planes, for one nodal diameter (None: no cyclic symmetry).
 
     Args:
         clamp: face or node set held fast; None for a floating body.
         ties: (k, 3) node numbers, the first constrained to the mean of the two others.
 
     Raises:
-        InputError: no such face, cut faces that do not match, a nodal diameter that the wheel does not have.
+        InputError: no such face, cut faces that do not match, a symmetry plane that is not plane, a nodal diameter
+            that the wheel does not have.
     """
     return at_diameter(transformation(body, clamp, nodal_diameter is not None, ties), nodal_diameter)
 
@@ -221,20 +223,39 @@ def _parts(body: Body, clamped: np.ndarray, pair: Pair | None,
     free = body.rows >= 0
     free[clamped] = False
     slaves = np.empty(0, int) if pair is None else pair.nodes[1]
-    keep = free.copy()
-    keep[slaves] = False
-    low = sp.diags(np.repeat(keep, d).astype(float)).tocsr()
+    keep = np.repeat(free, d) & ~_slid(body, pair)
+    keep[d * slaves[:, None] + np.arange(d)] = False
+    low = sp.diags(keep.astype(float)).tocsr()
     high = None
     if pair is not None:
         alive = free[slaves]
         rows, cols = pair.nodes[1][alive], pair.nodes[0][alive]
         block = sp.coo_matrix((np.ones(len(rows)), (rows, cols)), shape=(n, n))
-        high = sp.kron(block, pair.rotation[:d, :d]).tocsr()
+        moving = sp.diags((~_slid(body, pair)).astype(float))
+        high = (moving @ sp.kron(block, pair.rotation[:d, :d])).tocsr()
         high.eliminate_zeros()
     if ties is not None and len(ties):
         tie = _tied(n, d, np.asarray(ties))
         low, high = (A if A is None else (tie @ A @ tie).tocsr() for A in (low, high))
     return low, high
+
+
+def _slid(body: Body, pair: Pair | None) -> np.ndarray:
+    """(n_points*dim,) true where a symmetry plane holds the displacement along its axis."""
+    points, held = body.mesh.points, np.zeros((len(body.mesh.points), body.dim), bool)
+    for axis, name in enumerate(("symmetry_x", "symmetry_y", "symmetry_z")[:body.dim]):
+        nodes = np.unique(body.mesh.faces.get(name, np.empty(0, int)))
+        nodes = nodes[body.rows[nodes] >= 0]
+        if not len(nodes):
+            continue
+        if np.ptp(points[nodes, axis]) > 1e-6 * np.ptp(points, axis=0).max():
+            raise InputError(f"face '{name}' extends from {points[nodes, axis].min():.6g} to "
+                             f"{points[nodes, axis].max():.6g} m along {name[-1]}, expected a plane across that axis")
+        if pair is not None and abs(pair.rotation[axis, axis] - 1) > 1e-12:
+            raise InputError(f"face '{name}' is not across the axis of the wheel, expected cyclic faces or a symmetry "
+                             "plane, not both")
+        held[nodes, axis] = True
+    return held.ravel()
 
 
 def _with_partners(clamped: np.ndarray, pair: Pair | None) -> np.ndarray:

@@ -107,3 +107,46 @@ def test_a_floating_sector_without_props_says_so():
     with pytest.raises(NotSolvedError, match="float"):
         factorise(con.K)
     assert flexible(con).R.shape[1] == 2
+
+
+@pytest.mark.mpi
+def test_symmetry_planes_leave_the_symmetric_modes():
+    """Half and quarter of a bar, sliding in the cut planes, vibrate as the whole one does in its symmetric modes."""
+    whole = box((4, 4, 4), (1.0, 0.3, 0.2), origin=(0.0, -0.15, -0.1), cell_type="hexahedron27")
+    half = box((4, 4, 2), (1.0, 0.3, 0.1), cell_type="hexahedron27", origin=(0.0, -0.15, 0.0))
+    quarter = box((4, 2, 2), (1.0, 0.15, 0.1), cell_type="hexahedron27")
+    half = replace(half, faces={**half.faces, "symmetry_z": half.faces["z0"]})
+    quarter = replace(quarter, faces={**quarter.faces, "symmetry_z": quarter.faces["z0"],
+                                      "symmetry_y": quarter.faces["y0"]})
+    every, plane, both = (modes(constrain(assemble(m, "blade", STEEL)), k) for m, k in
+                          ((whole, 16), (half, 6), (quarter, 2)))
+    assert abs(every.frequencies - plane.frequencies[:, None]).min(1).max() < 1e-9 * every.frequencies[-1]
+    assert abs(plane.frequencies - both.frequencies[:, None]).min(1).max() < 1e-9 * every.frequencies[-1]
+    assert abs(plane.shapes[:, np.unique(half.faces["z0"]), 2]).max() == 0
+    assert constrain(assemble(quarter, "blade", STEEL), None).T.shape[1] == both.shapes[0].size - 2 * 45
+
+
+def test_a_floating_half_keeps_the_rigid_motions_in_its_plane():
+    mesh = box((2, 2, 2), (1.0, 1.0, 1.0))
+    mesh = replace(mesh, faces={**mesh.faces, "symmetry_y": mesh.faces["y0"]})
+    found = modes(constrain(assemble(mesh, "blade", STEEL), None), 5).frequencies
+    assert (found[:3] == 0).all() and (found[3:] > 0).all()
+
+
+def test_symmetry_planes_that_are_none_are_refused():
+    mesh = box((2, 1, 1), (1.0, 1.0, 1.0))
+    with pytest.raises(InputError, match="symmetry_y.*extends from 0 to 1 m"):
+        constrain(assemble(replace(mesh, faces={**mesh.faces, "symmetry_y": mesh.faces["x0"]}), "blade", STEEL))
+    wheel = sector(6, (2, 2, 1))
+    held = replace(wheel, faces={**wheel.faces, "symmetry_x": np.array([[wheel.points[:, 0].argmax()]])})
+    with pytest.raises(InputError, match="not across the axis"):
+        constrain(assemble(held, "blade", STEEL), "clamp", 1)
+
+
+@pytest.mark.parametrize("n", [0, 1])
+def test_half_the_thickness_of_a_wheel(n):
+    whole, half = sector(6, (3, 2, 2), "hexahedron27", width=0.04), sector(6, (3, 2, 1), "hexahedron27", width=0.02)
+    half = replace(half, faces={**half.faces, "symmetry_z": half.faces["z0"]})
+    every, plane = (modes(constrain(assemble(m, "blade", STEEL), "clamp", n), k).frequencies
+                    for m, k in ((whole, 12), (half, 3)))
+    assert (abs(every / plane[:, None] - 1).min(1) < 1e-9).all()
