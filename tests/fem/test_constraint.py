@@ -135,7 +135,7 @@ def test_a_floating_half_keeps_the_rigid_motions_in_its_plane():
 
 def test_symmetry_planes_that_are_none_are_refused():
     mesh = box((2, 1, 1), (1.0, 1.0, 1.0))
-    with pytest.raises(InputError, match="symmetry_y.*extends from 0 to 1 m"):
+    with pytest.raises(InputError, match=r"symmetry_y.*extends from 0 to 1 m"):
         constrain(assemble(replace(mesh, faces={**mesh.faces, "symmetry_y": mesh.faces["x0"]}), "blade", STEEL))
     wheel = sector(6, (2, 2, 1))
     held = replace(wheel, faces={**wheel.faces, "symmetry_x": np.array([[wheel.points[:, 0].argmax()]])})
