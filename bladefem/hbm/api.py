@@ -13,6 +13,7 @@ from .linear import Linear, condense
 from .model import ReducedModel
 from .newton import DEFAULTS, Options
 from .residual import Balance
+from .small import solve_small
 from .solution import Solution, at_probes, blade_motion, probe_motion, works_of
 
 __all__ = ["as_solution", "free", "solve", "stuck"]
@@ -32,7 +33,11 @@ def solve(model: ReducedModel, omega: float, H: int = 3, samples: int = 128, *, 
     Raises:
         InputError: the frequency, H or samples are out of range.
     """
-    balance = _balance(model, omega, H, samples)
+    _check(model, omega, H)
+    first = solve_small(model, omega, H, samples, None if start is None else start.w, options)
+    if first is not None:
+        return first
+    balance = Balance(model, condense(model, omega, H), samples)
     attempts = solve_balance(balance, None if start is None else match_harmonics(start.w, H), options)
     best = min(attempts, key=lambda a: (not a.end.converged, a.end.state.error))
     reason = best.end.reason if best.end.converged else "; ".join(f"{a.method}: {a.end.reason}" for a in attempts)
@@ -73,14 +78,14 @@ def as_solution(balance: Balance, attempt: Attempt, iterations: int, reason: str
         work=works_of(model, linear.omega, relative, force, blade, float(np.sum(state.forces.dissipated))))
 
 
-def _balance(model: ReducedModel, omega: float, H: int, samples: int) -> Balance:
-    if not (np.isfinite(omega) and omega > 0):
+def _check(model: ReducedModel, omega: float, H: int) -> None:
+    if not 0 < omega < np.inf:
         raise InputError(f"omega {omega}: expected a positive circular frequency")
     if H < 1 or H != int(H):
         raise InputError(f"H {H}: expected a whole number of harmonics, at least 1")
-    if max(model.excitation, default=0) > H:
-        raise InputError(f"H {H}: expected at least {max(model.excitation)}, the highest excited harmonic")
-    return Balance(model, condense(model, omega, H), samples)
+    highest = max((*model.excitation, *model.normal), default=0)
+    if highest > H:
+        raise InputError(f"H {H}: expected at least {highest}, the highest harmonic of excitation and normal load")
 
 
 def _drift(linear: Linear, load: np.ndarray) -> float:
@@ -94,7 +99,7 @@ def _drift(linear: Linear, load: np.ndarray) -> float:
 
 def _states(shares: np.ndarray) -> dict[str, int]:
     """Number of nodes by what they do in a period, from the shares (n, 3) of stick, slip and separation."""
-    slips, apart = shares[:, 1] > 0, shares[:, 2] > 0
+    slips, apart = shares[:, 1] > 0, shares[:, 2] > 1e-12
     closed = shares[:, :2].sum(axis=1) > 1e-12
     return {"stick": int((~slips & ~apart).sum()), "slip": int((slips & ~apart).sum()),
             "lift": int((apart & closed).sum()), "open": int((~closed).sum())}

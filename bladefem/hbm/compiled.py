@@ -11,13 +11,14 @@ from numba import njit
 from ..friction.events import _batch as exact_batch
 from ..friction.jenkins import jenkins_batch
 
-__all__ = ["CONVERGED", "EXHAUSTED", "INFINITE", "SINGULAR", "STALLED", "compiled_newton"]
+__all__ = ["CONVERGED", "EXHAUSTED", "INFINITE", "SINGULAR", "STALLED", "apply", "back_substitute", "compiled_newton",
+           "factorise", "norm"]
 
-CONVERGED, EXHAUSTED, STALLED, SINGULAR, INFINITE = 0, 1, 2, 3, 4
+CONVERGED, EXHAUSTED, STALLED, SINGULAR, INFINITE, SEARCHING = 0, 1, 2, 3, 4, 5
 
 
 @njit(cache=True, error_model="numpy")
-def _apply(A, x, out):
+def apply(A, x, out):
     """out (m, K) += A (H+1, m, m) times x (m, K), both as real coefficients."""
     m = x.shape[0]
     for i in range(m):
@@ -33,47 +34,67 @@ def _apply(A, x, out):
 
 
 @njit(cache=True, error_model="numpy")
-def _size(x):
+def norm(x):
+    """Root of the sum of squares."""
     total = 0.0
-    for value in x.ravel():
-        total += value * value
+    for i in range(x.shape[0]):
+        for k in range(x.shape[1]):
+            total += x[i, k] * x[i, k]
     return np.sqrt(total)
+
+
+@njit(cache=True, error_model="numpy")
+def _copy(source, target):
+    flat, to = source.reshape(source.size), target.reshape(target.size)
+    for i in range(flat.size):
+        to[i] = flat[i]
+
+
+@njit(cache=True, error_model="numpy")
+def _move(w, share, step, out):
+    """out becomes  w - share step."""
+    for i in range(w.shape[0]):
+        for k in range(w.shape[1]):
+            out[i, k] = w[i, k] - share * step[i, k] if share else w[i, k]
 
 
 @njit(cache=True, error_model="numpy")
 def _evaluate(w, d, linear, contact, work):
     """Forces and residual at w (m, K); fills work and returns the error of `bladefem.hbm.residual`."""
     A, G, stuck, springs, scale = linear
-    load, nodes, tab, brackets, preload = contact
+    load, base, nodes, tab, brackets, preload = contact
     full, F, J, shares, p, r = work
     n, K = nodes.shape[0], w.shape[1]
-    full[:, 2 - d:] = w.reshape(n, d, K)
+    for i in range(w.shape[0]):
+        for k in range(K):
+            full[i // d, 2 - d + i % d, k] = w[i, k]
     if brackets:
         F[:], J[:] = 0.0, 0.0
-        base = np.zeros((n, K))
-        base[:, 0] = nodes[:, 3]
         counts = np.empty(n, np.int64)
         exact_batch(full, base, nodes, brackets, F, J, shares, counts)
     else:
         jenkins_batch(full, load, nodes, tab, F, J, shares)
     for i in range(w.shape[0]):
         for k in range(K):
-            p[i, k] = F[i // d, 2 - d + i % d, k] - springs[i] * w[i, k]
-        p[i, 0] -= preload[i]
-    r[:] = w - stuck
-    _apply(A, p, r)
-    sprung = r * springs.reshape(-1, 1)
-    sprung[:, 0] = 0.0
-    bare = r.copy()
-    _apply(G, sprung, bare)
-    return max(_size(r) / max(_size(w), 1e-300), _size(bare) / scale)
+            p[i, k] = F[i // d, 2 - d + i % d, k] - springs[i] * w[i, k] - (preload[i] if k == 0 else 0.0)
+            r[i, k] = w[i, k] - stuck[i, k]
+    apply(A, p, r)
+    sprung, bare = np.empty(r.shape), np.empty(r.shape)
+    for i in range(w.shape[0]):
+        for k in range(K):
+            sprung[i, k] = springs[i] * r[i, k] if k else 0.0
+            bare[i, k] = r[i, k]
+    apply(G, sprung, bare)
+    return max(norm(r) / max(norm(w), 1e-300), norm(bare) / scale)
 
 
 @njit(cache=True, error_model="numpy")
 def _jacobian(A, J, springs, d, active, out):
     """out (a K, a K) = 1 + A dp/dw over the active nodes."""
     K = J.shape[2]
-    out[:] = 0.0
+    for i in range(out.shape[0]):
+        for j in range(out.shape[1]):
+            out[i, j] = 1.0 if i == j else 0.0
     row = np.empty(2)
     for x in range(active.size):
         for y in range(active.size):
@@ -96,12 +117,10 @@ def _jacobian(A, J, springs, d, active, out):
                                 out[i + c, column] += value.real * row[0] + value.imag * row[1]
                                 if h:
                                     out[i + 2 * h, column] += value.real * row[1] - value.imag * row[0]
-    for i in range(out.shape[0]):
-        out[i, i] += 1.0
 
 
 @njit(cache=True, error_model="numpy")
-def _factorise(M, pivots):
+def factorise(M, pivots):
     """LU factors in place with partial pivoting; False where a pivot is zero."""
     size = M.shape[0]
     for k in range(size):
@@ -125,7 +144,7 @@ def _factorise(M, pivots):
 
 
 @njit(cache=True, error_model="numpy")
-def _back(M, pivots, x):
+def back_substitute(M, pivots, x):
     """x becomes M^-1 x."""
     size = M.shape[0]
     for k in range(size):
@@ -145,35 +164,29 @@ def _solve(r, M, pivots, d, active, J, A, springs, step):
     """step (m, K) = inverse derivative times r: active nodes by the factors, the others from their forces."""
     m, K = r.shape
     a = active.size * d
-    step[:] = r
-    if a == 0:
-        return
-    x = np.empty(a * K)
-    for y in range(active.size):
-        x[y * d * K:(y + 1) * d * K] = r[active[y] * d:(active[y] + 1) * d].copy().ravel()
-    _back(M, pivots, x)
-    moved = x.reshape(a, K)
-    for y in range(active.size):
-        step[active[y] * d:(active[y] + 1) * d] = moved[y * d:(y + 1) * d]
-    if a == m:
-        return
-    p = np.zeros((m, K))
-    for node in active:
-        for b in range(d):
-            i = node * d + b
-            for k in range(K):
-                value = -springs[i] * step[i, k]
-                for e in range(d):
-                    for l in range(K):
-                        value += J[node, 2 - d + b, k, 2 - d + e, l] * step[node * d + e, l]
-                p[i, k] = value
-    shift = np.zeros((m, K))
-    _apply(A, p, shift)
-    slips = np.zeros(m // d, np.bool_)
-    slips[active] = True
+    x, slips = np.empty(a * K), np.zeros(m // d, np.bool_)
+    for y in range(a):
+        slips[active[y // d]] = True
+        for k in range(K):
+            x[y * K + k] = r[active[y // d] * d + y % d, k]
+    back_substitute(M, pivots, x)
+    p, shift = np.zeros((m, K)), np.zeros((m, K))
+    for y in range(a):
+        node, i = active[y // d], active[y // d] * d + y % d
+        for k in range(K):
+            step[i, k] = x[y * K + k]
+            if a == m:
+                continue
+            p[i, k] = -springs[i] * x[y * K + k]
+            for e in range(d):
+                for l in range(K):
+                    p[i, k] += J[node, 2 - d + y % d, k, 2 - d + e, l] * x[(y - y % d + e) * K + l]
+    if 0 < a < m:
+        apply(A, p, shift)
     for i in range(m):
-        if not slips[i // d]:
-            step[i] -= shift[i]
+        for k in range(K):
+            if not slips[i // d]:
+                step[i, k] = r[i, k] - shift[i, k]
 
 
 @njit(cache=True, error_model="numpy")
@@ -204,45 +217,44 @@ def compiled_newton(w, d, linear, contact, sticks, tolerance, iterations, shorte
     Args:
         d: directions a node, 1 (tangent) or 2 (normal, tangent).
         linear: A, G with its harmonic 0 left out (H+1, m, m), stuck (m, K), springs (m,), size of the linear motion.
-        contact: prescribed loads (n, 0), nodes (n, 4), tables, brackets (0: sampled), preload (m,).
+        contact: prescribed loads (n, S) or (n, 0), their coefficients (n, K), nodes (n, 4), tables, brackets
+            (0: sampled), preload (m,).
 
     Returns:
-        steps taken, how it ended, error, forces (n, 2, K), their derivative, shares (n, 3), residual (m, K), p (m, K).
+        steps taken, how it ended, error at w; of the last evaluation, which is at w if converged: forces (n, 2, K),
+        their derivative, shares (n, 3), residual (m, K), p (m, K).
     """
     m, K = w.shape
     n = m // d
     work = (np.zeros((n, 2, K)), np.zeros((n, 2, K)), np.zeros((n, 2, K, 2, K)), np.zeros((n, 3)), np.zeros((m, K)),
             np.zeros((m, K)))
     A, springs, J, r = linear[0], linear[3], work[2], work[5]
-    step, after, trial = np.empty((m, K)), np.empty((m, K)), np.empty((m, K))
-    error = _evaluate(w, d, linear, contact, work)
-    for iteration in range(iterations + 1):
-        if error <= tolerance:
-            return iteration, CONVERGED, error, work[1], J, work[3], r, work[4]
-        if not np.isfinite(error):
-            return iteration, INFINITE, error, work[1], J, work[3], r, work[4]
-        if iteration == iterations:
+    step, after, trial, old = np.empty((m, K)), np.empty((m, K)), w.copy(), np.empty(J.shape)
+    pivots, active, M = np.empty(0, np.int64), np.empty(0, np.int64), np.empty((0, 0))
+    code, steps, share, before, error = SEARCHING, -1, 1.0, np.inf, np.inf
+    while code == SEARCHING:
+        fresh = _evaluate(trial, d, linear, contact, work)
+        if steps >= 0:
+            _solve(r, M, pivots, d, active, old, A, springs, after)
+            if not norm(after) <= (1 - 0.25 * share) * before:
+                share /= 2
+                if share < shortest:
+                    code = STALLED
+                _move(w, share, step, trial)
+                continue
+        error, steps = fresh, steps + 1
+        _move(trial, 0.0, step, w)
+        if error <= tolerance or not np.isfinite(error) or steps == iterations:
+            code = CONVERGED if error <= tolerance else (EXHAUSTED if np.isfinite(error) else INFINITE)
             break
         active = _active(J, springs, d, sticks)
-        M = np.empty((active.size * d * K, active.size * d * K))
-        pivots = np.empty(M.shape[0], np.int64)
+        M, pivots = np.empty((active.size * d * K, active.size * d * K)), np.empty(active.size * d * K, np.int64)
         _jacobian(A, J, springs, d, active, M)
-        if not _factorise(M, pivots):
-            return iteration, SINGULAR, error, work[1], J, work[3], r, work[4]
-        old = J.copy()
+        if not factorise(M, pivots):
+            code = SINGULAR
+            break
+        _copy(J, old)
         _solve(r, M, pivots, d, active, old, A, springs, step)
-        before, share, better = _size(step), 1.0, False
-        while share >= shortest:
-            trial[:] = w - share * step
-            fresh = _evaluate(trial, d, linear, contact, work)
-            _solve(r, M, pivots, d, active, old, A, springs, after)
-            if _size(after) <= (1 - 0.25 * share) * before:
-                better = True
-                break
-            share /= 2
-        if not better:
-            _evaluate(w, d, linear, contact, work)
-            return iteration + 1, STALLED, error, work[1], J, work[3], r, work[4]
-        w[:] = trial
-        error = fresh
-    return iterations, EXHAUSTED, error, work[1], J, work[3], r, work[4]
+        before, share = norm(step), 1.0
+        _move(w, share, step, trial)
+    return steps, code, error, work[1], J, work[3], r, work[4]

@@ -17,7 +17,7 @@ from ..errors import NotSolvedError
 from .bodies import amplitudes, block, flexibility, motion, receptance
 from .model import ReducedModel
 
-__all__ = ["Linear", "condense", "receptance"]
+__all__ = ["Linear", "condense", "receptance", "rigid_motions"]
 
 SMALL = 64             # contact dofs below which all harmonics are solved in one call
 UNSEEN = 1e-12         # motions that the contact springs resist less than this, relatively, are left out
@@ -48,7 +48,7 @@ def condense(model: ReducedModel, omega: float, harmonics: int) -> Linear:
     force[:, blades.load] = model.loads(harmonics)
     free = motion(blades, amplitudes(blades, flexible, force), force, blades.contact)
     _add_damper(model, orders, G)
-    B, g, rigid = _rigid_motions(model, springs)
+    B, g, rigid = rigid_motions(model, springs)
     A, stuck = _sprung(G, free, springs, 1 if B.shape[1] else 0)
     if B.shape[1]:
         A[0], stuck[0] = _with_springs(G[0].real, free[0].real, springs, B, g, model.hold)
@@ -85,7 +85,8 @@ def _sprung(G: np.ndarray, free: np.ndarray, springs: np.ndarray, first: int) ->
     return A, stuck
 
 
-def _rigid_motions(model: ReducedModel, springs: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+def rigid_motions(model: ReducedModel, springs: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """B (m, r), g (r,) and rigid (r0, r) of `Linear`, which do not depend on the frequency."""
     if model.damper is None and model.side(0).omega.min(initial=1.0) > 0:
         return np.zeros((len(springs), 0)), np.zeros(0), np.zeros((0, 0))
     blades = model.blades(0)

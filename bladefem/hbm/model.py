@@ -2,14 +2,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Hashable, Mapping
 from dataclasses import dataclass, field
 from functools import cached_property
+from typing import Any
 
 import numpy as np
 
 from ..data import Elements, PortModel, RigidBody
 from ..errors import InputError
+from ..friction.harmonics import synthesis, to_real
 from .bodies import Damping, Stack, stacked
 
 __all__ = ["Damping", "ReducedModel"]
@@ -28,13 +30,15 @@ class ReducedModel:
 
     sides: tuple[PortModel, ...]            # blade side of harmonic h = 0, 1, ...; one alone serves all harmonics
     elements: Elements
-    excitation: Mapping[int, np.ndarray]    # harmonic to complex amplitudes on the load port [N]
+    excitation: Mapping[int, np.ndarray]    # harmonic to complex amplitudes on the load port [N]; 0: a static load
     damping: Damping = field(default_factory=Damping)
     damper: RigidBody | tuple[PortModel, ...] | None = None     # None: the other side of each contact is fixed
     damper_damping: Damping = field(default_factory=Damping)
     # A damper whose contacts all slip has an indifferent mean position, and drifts where friction pushes it: springs of
     # this share of the contact stiffness hold the mean. What they carry is reported as Solution.drift.
     hold: float = 1e-3
+    # Prescribed part of the normal load beside n0 and kn w_n: harmonic >= 1 to complex amplitudes of the nodes [N].
+    normal: Mapping[int, np.ndarray] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
         nodes, dofs = len(self.elements.kt), _port_size(self.sides[0], "contact")
@@ -53,6 +57,9 @@ class ReducedModel:
         for h, force in self.excitation.items():
             if h < 0 or h != int(h) or np.shape(force) != (loads,) or not np.isfinite(force).all():
                 raise InputError(f"excitation of harmonic {h}: expected {loads} finite amplitudes of a harmonic >= 0")
+        for h, force in self.normal.items():
+            if h < 1 or h != int(h) or np.shape(force) != (nodes,) or not np.isfinite(force).all():
+                raise InputError(f"normal of harmonic {h}: expected {nodes} finite amplitudes of a harmonic >= 1")
         if isinstance(self.damper, RigidBody) and self.damper.B.shape != (dofs, len(self.damper.mass)):
             raise InputError(f"damper.B of shape {self.damper.B.shape}: expected ({dofs}, {len(self.damper.mass)})")
 
@@ -92,6 +99,22 @@ class ReducedModel:
         e = self.elements
         return np.column_stack([e.kt, e.kn, e.mu, e.n0]).astype(float)
 
+    def normal_load(self, H: int) -> np.ndarray:
+        """(nodes, 2H+1) coefficients of the prescribed normal load n0 + N(t) [N]."""
+        load = np.zeros((len(self.elements.n0), H + 1), dtype=complex)
+        load[:, 0] = self.elements.n0
+        for h, amplitudes in self.normal.items():
+            if h <= H:
+                load[:, h] = amplitudes
+        return to_real(load)
+
+    def normal_series(self, samples: int) -> np.ndarray:
+        """(nodes, samples) the same at the samples; (nodes, 0) where it is constant or samples is 0."""
+        if not self.normal or not samples:
+            return np.zeros((len(self.elements.n0), 0))
+        H = max(self.normal)
+        return self.normal_load(H) @ synthesis(H, samples).T
+
     def side(self, h: int) -> PortModel:
         """The blade side of harmonic h."""
         return _first(self.sides, h, "sides")[-1]
@@ -114,13 +137,16 @@ class ReducedModel:
 
     def _stack(self, name: str, H: int, damping: Damping) -> Stack:
         bodies = _first(getattr(self, name), H, name)
-        key = (name, len(bodies))
-        if key not in self._stacks:
-            self._stacks[key] = stacked(bodies, damping, self.rows)
-        return self._stacks[key]
+        return self.once((name, len(bodies)), lambda: stacked(bodies, damping, self.rows))
+
+    def once(self, key: Hashable, make: Callable[[], Any]) -> Any:
+        """What `make` returns, kept with this model: what does not depend on the frequency is made once."""
+        if key not in self._kept:
+            self._kept[key] = make()
+        return self._kept[key]
 
     @cached_property
-    def _stacks(self) -> dict[tuple[str, int], Stack]:
+    def _kept(self) -> dict[Hashable, Any]:
         return {}
 
 

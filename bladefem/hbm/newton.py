@@ -9,7 +9,7 @@ import numpy as np
 from ..errors import InputError
 from ..friction.aft import Forces, dissipated, states
 from .compiled import CONVERGED, EXHAUSTED, INFINITE, SINGULAR, STALLED, compiled_newton
-from .residual import STICKS, Balance, Inverse, State, contact_arguments, evaluate_balance, linear_arguments, linearise
+from .residual import STICKS, Balance, Inverse, State, contact_table, evaluate_balance, linear_arguments, linearise
 
 __all__ = ["DEFAULTS", "Newton", "Options", "newton"]
 
@@ -89,20 +89,21 @@ def _fits(balance: Balance) -> bool:
 
 def _fast(balance: Balance, w: np.ndarray, options: Options) -> Newton:
     end = np.ascontiguousarray(w.reshape(-1, w.shape[2]), dtype=float).copy()
-    d = balance.model.directions
+    d, shape = balance.model.directions, w.shape
+    contact = contact_table(balance.model, shape[2] // 2, balance.samples)
     steps, code, error, f, dfdw, shares, residual, p = compiled_newton(
-        end, d, linear_arguments(balance), contact_arguments(balance), STICKS, options.tolerance, options.iterations,
-        SHORTEST)
+        end, d, linear_arguments(balance), contact, STICKS, options.tolerance, options.iterations, SHORTEST)
     reasons = {CONVERGED: "residual within tolerance", EXHAUSTED: f"residual {error:.1e} after {steps} iterations",
                STALLED: f"line search stalled at residual {error:.1e}", SINGULAR: "singular Jacobian",
                INFINITE: "residual is not finite"}
-    shape = w.shape
+    if code != CONVERGED:
+        return Newton(evaluate_balance(balance, end.reshape(shape)), steps, False, reasons[code])
     full = np.zeros_like(f)
     full[:, 2 - d:] = end.reshape(shape)
     forces = Forces(f[:, 2 - d:], dfdw[:, 2 - d:, :, 2 - d:], states(shares), shares, dissipated(f, full),
                     np.full(len(f), 2), True, "periodic")
     state = State(end.reshape(shape), forces, p.reshape(shape), residual.reshape(shape), error)
-    return Newton(state, steps, code == CONVERGED, reasons[code])
+    return Newton(state, steps, True, reasons[code])
 
 
 def _search(balance: Balance, state: State, inverse: Inverse, merit: str) -> State | None:

@@ -21,8 +21,8 @@ from .iterative import iterative_inverse
 from .linear import Linear
 from .model import ReducedModel
 
-__all__ = ["Balance", "Inverse", "State", "as_amplitudes", "as_coefficients", "contact_arguments",
-           "contact_forces", "evaluate_balance", "linear_arguments", "linearise", "start_in_stick"]
+__all__ = ["Balance", "Inverse", "State", "as_amplitudes", "as_coefficients", "contact_forces",
+           "contact_table", "evaluate_balance", "linear_arguments", "linearise", "start_in_stick"]
 
 DENSE = 600         # unknowns up to which a dense factorisation is faster than GMRES
 ACCURACY = 1e-5     # of a step by GMRES, relative
@@ -73,7 +73,11 @@ def contact_forces(model: ReducedModel, w: np.ndarray, samples: int) -> Forces:
     missing = 1 + model.elements.tangents - model.directions
     if missing:
         w = np.concatenate([np.zeros((len(w), missing, w.shape[2])), w], axis=1)
-    forces = evaluate(model.elements, w, samples) if samples else evaluate_exact(model.elements, w)
+    load, base = contact_table(model, w.shape[2] // 2, samples)[:2]
+    if samples:
+        forces = evaluate(model.elements, w, samples, load=load if load.shape[1] else None)
+    else:
+        forces = evaluate_exact(model.elements, w, load=base)
     if missing == 0:
         return forces
     return replace(forces, f=forces.f[:, missing:], dfdw=forces.dfdw[:, missing:, :, missing:])
@@ -124,11 +128,11 @@ def linear_arguments(balance: Balance) -> tuple[np.ndarray, ...]:
     return linear.A, G, to_real(linear.stuck.T), linear.springs, _scale(linear)
 
 
-def contact_arguments(balance: Balance) -> tuple:
+def contact_table(model: ReducedModel, H: int, samples: int) -> tuple:
     """What the compiled loop needs of the elements."""
-    H, model = len(balance.linear.stuck) - 1, balance.model
-    return (np.zeros((len(model.springs), 0)), model.table, tables(H, balance.samples or 4 * H + 4),
-            0 if balance.samples else 12 * (H + 1), model.preload)
+    return model.once(("contact", H, samples), lambda: (
+        model.normal_series(samples), model.normal_load(H), model.table, tables(H, samples or 4 * H + 4),
+        0 if samples else 12 * (H + 1), model.preload))
 
 
 def _scale(linear: Linear) -> float:

@@ -1,0 +1,293 @@
+"""A whole point of a small model of 1-D elements in one compiled call: flexibilities, Newton, works and states.
+
+The plain way through `bladefem.hbm.linear`, `newton` and `api` does the same in fifty NumPy calls, which is most of its
+time where there are few contacts. Both bodies are one here: the damper's modes, rigid ones with frequency zero, stand
+beside the blades' with the shapes that they give the relative displacement. A point that does not end well is left to
+the fallback chain; a test holds the two ways together.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import numpy as np
+from numba import njit
+
+from ..data import RigidBody
+from .bodies import Stack
+from .compiled import CONVERGED, back_substitute, compiled_newton, factorise, norm
+from .linear import rigid_motions
+from .model import ReducedModel
+from .newton import COMPILED, SHORTEST, Options
+from .residual import STICKS, contact_table
+from .solution import Solution, Work
+
+__all__ = ["solve_small"]
+
+STATES = ("stick", "slip", "lift", "open")
+
+
+def solve_small(model: ReducedModel, omega: float, H: int, samples: int, start: np.ndarray | None,
+                options: Options) -> Solution | None:
+    """The converged solution from displacements (n, d, *), or full stick; None where this way is not open."""
+    prepared = _prepared(model, H, samples)
+    if prepared is None:
+        return None
+    body, held, springs, contact = prepared
+    n, d = model.springs.shape
+    flexible, linear, mean, free = _linear(omega, body, held, springs, H)
+    w = linear[2].copy()
+    if start is not None:
+        kept = min(w.shape[1], start.shape[2])
+        w[:, :kept], w[:, kept:] = start.reshape(n * d, -1)[:, :kept], 0.0
+    steps, code, error, F, _, shares, residual, _ = compiled_newton(w, d, linear, contact, STICKS, options.tolerance,
+                                                                    options.iterations, SHORTEST)
+    if code != CONVERGED:
+        return None
+    f, probe, counts, measures = _measure(omega, body, held, springs, (flexible, mean, free), w, d, F, contact[5],
+                                          residual, shares)
+    moved, pushed, drift, *works = measures.tolist()
+    return Solution(omega, H, samples, w.reshape(n, d, -1), f, probe, True, "residual within tolerance", "newton",
+                    steps, error, moved, pushed, drift, dict(zip(STATES, counts.tolist(), strict=True)), Work(*works))
+
+
+def _prepared(model: ReducedModel, H: int, samples: int) -> tuple | None:
+    """What a point needs beside its frequency; made once."""
+    return model.once(("small", H, samples), lambda: _prepare(model, H, samples))
+
+
+def _prepare(model: ReducedModel, H: int, samples: int) -> tuple | None:
+    bodies = [model.blades(H)]
+    if isinstance(model.damper, tuple):
+        bodies.append(model.elastic_damper(H))
+    dofs = model.springs.size
+    if model.elements.tangents > 1 or dofs * (2 * H + 1) > COMPILED or any(b.coupled is not None for b in bodies):
+        return None
+    blades, loads = bodies[0], model.loads(H)
+    if isinstance(model.damper, RigidBody):
+        bodies.append(_rigid_body(model))
+    joined = {name: _joined(bodies, name) for name in ("omega", "viscous", "hysteretic")}
+    contact = _joined([blades, *(_reversed(b) for b in bodies[1:])], "shapes", lambda b: b.contact)
+    spare = contact.shape[2] - blades.shapes.shape[2]
+    load = np.pad(blades.shapes[:, blades.load], ((0, 0), (0, 0), (0, spare)))
+    probe = np.pad(blades.shapes[:, blades.probe], ((0, 0), (0, 0), (0, spare)))
+    flexible = sum(b.residual[:, b.contact, b.contact] for b in bodies)
+    body = (*joined.values(), *(np.ascontiguousarray(a, dtype=complex) for a in (
+        contact, flexible, probe, blades.residual[:, blades.probe, blades.contact],
+        (loads[:, None] @ load.conj())[:, 0],
+        (blades.residual[:, blades.contact, blades.load] @ loads[:, :, None])[:, :, 0],
+        (blades.residual[:, blades.probe, blades.load] @ loads[:, :, None])[:, :, 0])))
+    B, g, rigid = rigid_motions(model, model.springs.ravel())
+    still = np.flatnonzero(blades.omega[0] == 0)
+    held = (np.ascontiguousarray(B), g, np.ascontiguousarray(rigid[:len(still)]), still, model.hold)
+    return body, held, model.springs.ravel(), contact_table(model, H, samples)
+
+
+def _rigid_body(model: ReducedModel) -> Stack:
+    """The rigid damper by modes of frequency zero."""
+    root = np.linalg.cholesky(model.damper.mass)
+    shapes = np.linalg.solve(root, model.damper.B[model.rows].T).T[None]
+    none, m = np.zeros((1, shapes.shape[2])), shapes.shape[1]
+    return Stack(none, none, none, None, shapes, np.zeros((1, m, m)), slice(0, m), slice(m, m), slice(m, m))
+
+
+def _reversed(body: Stack) -> Stack:
+    return Stack(body.omega, body.viscous, body.hysteretic, None, -body.shapes, body.residual, body.contact, body.load,
+                 body.probe)
+
+
+def _joined(bodies: list[Stack], name: str, rows: Callable[[Stack], slice] = lambda _: slice(None)) -> np.ndarray:
+    """Modes of several bodies side by side, on the harmonics of the one that has most."""
+    most = max(len(body.omega) for body in bodies)
+    parts = [getattr(body, name) if name != "shapes" else body.shapes[:, rows(body)] for body in bodies]
+    return np.concatenate([np.broadcast_to(part, (most, *part.shape[1:])) for part in parts], axis=-1)
+
+
+@njit(cache=True, error_model="numpy")
+def _flexibilities(w, body, held, springs, H):
+    """Modal flexibilities (H+1, M), G and A (H+1, m, m), free and stuck (H+1, m) at circular frequency w."""
+    own, viscous, hysteretic, contact, residual = body[:5]
+    push, direct = body[7], body[8]
+    m, M, r = contact.shape[1], contact.shape[2], held[0].shape[1]
+    flexible = np.zeros((H + 1, M), np.complex128)
+    G, A = np.empty((H + 1, m, m), np.complex128), np.empty((H + 1, m, m), np.complex128)
+    free, stuck = np.empty((H + 1, m), np.complex128), np.empty((H + 1, m), np.complex128)
+    for h in range(H + 1):
+        s, w_h = min(h, own.shape[0] - 1), h * w
+        C, R = contact[s], residual[min(h, residual.shape[0] - 1)]
+        for k in range(M):
+            if h > 0 or own[s, k] > 0.0:
+                loss = w_h * viscous[s, k] + (hysteretic[s, k] if h else 0.0)
+                flexible[h, k] = 1.0 / complex(own[s, k]**2 - w_h**2, loss)
+        for i in range(m):
+            free[h, i] = direct[h, i]
+            for k in range(M):
+                free[h, i] += C[i, k] * flexible[h, k] * push[h, k]
+            for j in range(m):
+                total = R[i, j]
+                for k in range(M):
+                    total += C[i, k] * flexible[h, k] * C[j, k].conjugate()
+                G[h, i, j] = total.real if h == 0 else total
+            if h == 0:
+                free[0, i] = free[0, i].real
+        _spring(G[h], free[h], springs, held, r if h == 0 else 0, A[h], stuck[h])
+    return flexible, G, free, A, stuck
+
+
+@njit(cache=True, error_model="numpy")
+def _spring(G, free, springs, held, r, A, stuck):
+    """Fill A (m, m) = (1 + G K)^-1 G and stuck (m,), with r motions without stiffness eliminated."""
+    m = springs.size
+    system, pivots = np.zeros((m + r, m + r), np.complex128), np.empty(m + r, np.int64)
+    right = np.zeros(m + r, np.complex128)
+    for i in range(m):
+        for j in range(m):
+            system[i, j] = G[i, j] * springs[j]
+        system[i, i] += 1.0
+        for a in range(r):
+            system[i, m + a], system[m + a, i] = -held[0][i, a], held[0][i, a] * springs[i]
+    for a in range(r):
+        system[m + a, m + a] = held[4]
+    factorise(system, pivots)
+    for column in range(m + 1):
+        for i in range(m):
+            right[i] = free[i] if column == m else G[i, column]
+        for a in range(r):
+            right[m + a] = held[1][a] if column == m else held[0][column, a]
+        back_substitute(system, pivots, right)
+        for i in range(m):
+            if column == m:
+                stuck[i] = right[i]
+            else:
+                A[i, column] = right[i]
+
+
+@njit(cache=True, error_model="numpy")
+def _coefficients(q, out):
+    """out (m, K) real coefficients of the amplitudes q (H+1, m)."""
+    for i in range(q.shape[1]):
+        out[i, 0] = q[0, i].real
+        for h in range(1, q.shape[0]):
+            out[i, 2 * h - 1], out[i, 2 * h] = q[h, i].real, -q[h, i].imag
+
+
+@njit(cache=True, error_model="numpy")
+def _linear(omega, body, held, springs, H):
+    """Modal flexibilities (H+1, M), what the compiled Newton needs, G of the mean (m, m), free (H+1, m)."""
+    flexible, G, free, A, stuck = _flexibilities(omega, body, held, springs, H)
+    m = springs.size
+    still, motion = np.empty((m, 2 * H + 1)), np.empty((m, 2 * H + 1))
+    _coefficients(free, still)
+    _coefficients(stuck, motion)
+    mean = np.empty((m, m))
+    for i in range(m):
+        for j in range(m):
+            mean[i, j] = G[0, i, j].real
+            G[0, i, j] = 0.0
+    return flexible, (A, G, motion, springs, max(max(norm(still), norm(motion)), 1e-300)), mean, free
+
+
+@njit(cache=True, error_model="numpy")
+def _measure(omega, body, held, springs, linear, w, d, F, preload, residual, shares):
+    """Forces (n, d, K), probe (H+1, p), numbers of states (4,); residuals, drift and works (7,)."""
+    m, K = w.shape
+    f, load, out = np.empty((m // d, d, K)), np.empty((m, K)), np.zeros(7)
+    for i in range(m):
+        for k in range(K):
+            f[i // d, i % d, k] = F[i // d, 2 - d + i % d, k]
+            load[i, k] = f[i // d, i % d, k] - (preload[i] if k == 0 else 0.0)
+            out[0] = max(out[0], abs(residual[i, k]))
+            out[1] = max(out[1], springs[i] * abs(residual[i, k]))
+    out[2] = _drift(held, load)
+    modal, probe = _motion(body, held, linear, load, w, springs)
+    _works(omega, body, modal, load, w, d, out[3:])
+    return f, probe, _counts(shares), out
+
+
+@njit(cache=True, error_model="numpy")
+def _motion(body, held, linear, load, w, springs):
+    """Modal amplitudes (H+1, M) and probes (H+1, p) under the excitation and the contact load (m, K)."""
+    flexible, mean, free = linear
+    contact, probes, across, push, direct = body[3], body[5], body[6], body[7], body[9]
+    m, H, M = load.shape[0], flexible.shape[0] - 1, flexible.shape[1]
+    B, r = held[0], held[0].shape[1]
+    modal, probe = np.empty((H + 1, M), np.complex128), np.empty(direct.shape, np.complex128)
+    rigid = np.zeros(held[3].size)
+    for a in range(r):
+        along = 0.0
+        for i in range(m):
+            gap = w[i, 0] - free[0, i].real
+            for j in range(m):
+                gap += mean[i, j] * load[j, 0]
+            along += B[i, a] * springs[i] * gap
+        for k in range(rigid.size):
+            rigid[k] += held[2][k, a] * along
+    for h in range(H + 1):
+        s = min(h, contact.shape[0] - 1)
+        for k in range(M):
+            modal[h, k] = push[h, k]
+            for i in range(m):
+                modal[h, k] -= contact[s, i, k].conjugate() * _amplitude(load, i, h)
+            modal[h, k] *= flexible[h, k]
+        for a in range(probe.shape[1]):
+            probe[h, a] = direct[h, a]
+            for k in range(M):
+                probe[h, a] += probes[min(h, probes.shape[0] - 1), a, k] * modal[h, k]
+            for i in range(m):
+                probe[h, a] -= across[min(h, across.shape[0] - 1), a, i] * _amplitude(load, i, h)
+    for a in range(probe.shape[1]):
+        for k in range(rigid.size):
+            probe[0, a] += probes[0, a, held[3][k]] * rigid[k]
+    return modal, probe
+
+
+@njit(cache=True, error_model="numpy", inline="always")
+def _amplitude(x, i, h):
+    return complex(x[i, 2 * h - 1], -x[i, 2 * h]) if h else complex(x[i, 0], 0.0)
+
+
+@njit(cache=True, error_model="numpy")
+def _works(omega, body, modal, load, w, d, out):
+    """out (4,): work of the excitation, lost in the bodies, of the balanced friction forces, dissipated in contacts."""
+    own, viscous, hysteretic, push, direct = body[0], body[1], body[2], body[7], body[8]
+    for h in range(1, modal.shape[0]):
+        s = min(h, own.shape[0] - 1)
+        for k in range(modal.shape[1]):
+            q = modal[h, k]
+            out[0] -= np.pi * h * (push[h, k].conjugate() * q).imag
+            loss = h * omega * viscous[s, k] + hysteretic[s, k]
+            out[1] += np.pi * h * loss * (q.real**2 + q.imag**2)
+        for i in range(load.shape[0]):
+            force = _amplitude(load, i, h)
+            out[0] += np.pi * h * (direct[h, i].conjugate() * force).imag
+            friction = np.pi * h * (force * _amplitude(w, i, h).conjugate()).imag
+            out[2] += friction
+            out[3] += friction if i % d == d - 1 else 0.0
+
+
+@njit(cache=True, error_model="numpy")
+def _drift(held, load):
+    """Load on the holding springs over what the contacts could carry, both on the motions without stiffness."""
+    B, g = held[0], held[1]
+    up, down = 0.0, 0.0
+    for a in range(B.shape[1]):
+        push, most = -g[a], 0.0
+        for i in range(B.shape[0]):
+            push += B[i, a] * load[i, 0]
+            most += abs(B[i, a]) * norm(load[i:i + 1])
+        up, down = up + push**2, down + most**2
+    return np.sqrt(up) / max(np.sqrt(down), 1e-300)
+
+
+@njit(cache=True, error_model="numpy")
+def _counts(shares):
+    """(4,) nodes that stick, slip, lift off, are open, from the shares (n, 3) of stick, slip and separation."""
+    counts = np.zeros(4, np.int64)
+    for stick, slip, apart in shares:
+        if stick + slip <= 1e-12:
+            counts[3] += 1
+        elif apart > 1e-12:
+            counts[2] += 1
+        else:
+            counts[1 if slip > 0.0 else 0] += 1
+    return counts

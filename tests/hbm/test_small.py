@@ -1,0 +1,88 @@
+"""A point in one compiled call against the plain way, for every kind of body; prescribed and static loads."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from models import block, single_mass
+from plain import waves
+
+from bladefem.data import PortModel
+from bladefem.errors import InputError
+from bladefem.friction.harmonics import to_complex
+from bladefem.hbm import api
+from bladefem.hbm.api import solve
+from bladefem.hbm.model import Damping
+from bladefem.hbm.reference import reference_model
+
+
+def elastic_damper():
+    """The reference blade with a damper that has one rigid and one elastic mode, and structural damping."""
+    model = reference_model(load=1.4, phase=0.7, harmonics=5)
+    shapes = np.array([[4.0, 3.0], [4.0, -2.0]])
+    damper = PortModel(np.array([0.0, 9000.0]), shapes, np.diag([1e-9, 2e-9]), {"contact": slice(0, 2)})
+    return replace(model, damper=(damper,), damper_damping=Damping(structural=0.01), damping=Damping(0.002, 0.001))
+
+
+def normal_direction(**changes):
+    model = block(nodes=2, force=2.0)
+    elements = replace(model.elements, kt=np.full(3, 0.7), kn=np.full(3, 1.2), mu=np.full(3, 0.4),
+                       n0=np.array([0.4, 0.8, 1.2]), tangents=1)
+    return replace(model, elements=elements, **changes)
+
+
+SWELLING = replace(single_mass(), normal={1: np.array([0.3]), 2: np.array([0.1 - 0.2j])})
+STATIC = normal_direction(excitation={0: np.array([0.3]), 1: np.array([1.0]), 2: np.array([0.4j])})
+MODELS = {"single mass": (single_mass(), 1.1), "reference blade": (reference_model(load=1.4, phase=0.7), 8300.0),
+          "elastic damper": (elastic_damper(), 8300.0), "normal direction": (normal_direction(), 0.9),
+          "two harmonics and a static load": (STATIC, 0.9), "prescribed normal load": (SWELLING, 1.1)}
+
+
+@pytest.mark.parametrize("samples", [128, 0])
+@pytest.mark.parametrize("name", MODELS)
+def test_one_call_equals_the_plain_way(name, samples, monkeypatch):
+    model, omega = MODELS[name]
+    fast = solve(model, omega, 5, samples)
+    monkeypatch.setattr(api, "solve_small", lambda *_: None)
+    plain = solve(model, omega, 5, samples)
+    assert fast.converged and plain.converged and fast.states == plain.states
+    assert plain.states["slip"] + plain.states["lift"] > 0 and plain.work.imbalance < 1e-8
+    for field in ("w", "f", "probe"):
+        expected = getattr(plain, field)
+        np.testing.assert_allclose(getattr(fast, field), expected, rtol=0, atol=1e-8 * abs(expected).max())
+    assert fast.drift == pytest.approx(plain.drift, rel=1e-6, abs=1e-12)
+    for field in ("input", "damping", "friction", "dissipated"):
+        assert getattr(fast.work, field) == pytest.approx(getattr(plain.work, field), rel=1e-7), field
+
+
+def test_prescribed_normal_load_is_that_of_the_march():
+    """The balanced force is that of a Coulomb slider marched under the given N(t), and obeys its limit."""
+    solution = solve(SWELLING, 1.1, 5, 4096)
+    samples = 4096
+    w = solution.w[0, 0] @ waves(5, samples).T
+    N = np.maximum(SWELLING.normal_load(5)[0] @ waves(5, samples).T, 0.0)
+    assert N.min() < 0.15 and N.max() > 0.8
+    f, series = w[0], np.zeros(samples)
+    for _ in range(2):
+        for s in range(samples):
+            f = np.clip(f + w[s] - w[s - 1], -N[s], N[s])
+            series[s] = f
+    marched = np.fft.rfft(series)[:6] / samples * np.array([1, 2, 2, 2, 2, 2])
+    np.testing.assert_allclose(to_complex(solution.f[0, 0]), marched, rtol=0, atol=2e-3 * abs(marched).max())
+
+
+def test_3d_contacts_take_a_prescribed_normal_load():
+    """A normal load that swings in step with all nodes: the sampled 2-D law and the works agree."""
+    model = replace(block(), normal={1: np.full(4, 0.4 + 0.2j)})
+    solution = solve(model, 0.9, 5, 256)
+    assert solution.converged and solution.work.imbalance < 1e-8
+    assert abs(solution.probe - solve(block(), 0.9, 5, 256).probe).max() > 1e-2 * abs(solution.probe).max()
+
+
+def test_prescribed_normal_load_is_checked():
+    with pytest.raises(InputError, match="normal of harmonic 0"):
+        replace(single_mass(), normal={0: np.array([0.3])})
+    with pytest.raises(InputError, match="normal of harmonic 1"):
+        replace(single_mass(), normal={1: np.array([0.3, 0.2])})
+    with pytest.raises(InputError, match="at least 2"):
+        solve(SWELLING, 1.1, 1, 64)
