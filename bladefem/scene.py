@@ -11,7 +11,7 @@ from math import pi
 from geometry.parameters import Aerofoil, Disc, HertzPair, MeshSize, Plane, Platform, Punch, Shank, Wedge, ZMass
 from geometry.quantity import quantity
 
-__all__ = ["KINDS", "Contact", "Excitation", "Imported", "Material", "Materials", "Model", "Operation",
+__all__ = ["KINDS", "Contact", "Excitation", "Foundation", "Imported", "Material", "Materials", "Model", "Operation",
            "Scene", "Study"]
 
 KINDS = ("wedge sector", "plane blades", "z mass", "hertz", "punch", "imported")
@@ -97,6 +97,22 @@ class Model:
 
 
 @dataclass(frozen=True)
+class Foundation:
+    """What the Z-shaped mass stands on, how that moves, and what presses and pulls (the paper's Eq. 30, Table 1)."""
+
+    depth: float = quantity(0.06, "m", 0.002, 1.0, "of the elastic block below, clamped at its bottom")
+    frequency: float = quantity(100.0, "Hz", 1e-2, 1e5, "of its motion")
+    amplitude: tuple[float, float] = quantity((0.005, 0.0), "m", 0.0, 0.1, "of its motion along x and y")
+    phase: float = quantity(pi / 2, "rad", -pi, pi, "of the motion along y against that along x")
+    ratios: tuple[float, ...] = quantity((0.0, 0.25, 0.5, 2.0), "1", 0.0, 20.0,
+                                         "frequencies of the normal load over that of the motion")
+    pulsation: float = quantity(30.0, "N", 0.0, 1e6, "amplitude of the normal load about study.loads")
+    skew: tuple[float, float] = quantity((0.0, 0.0), "1", -1.0, 1.0,
+                                         "growth of the pressure on the top from the centre to the ends, along x and y")
+    pull: tuple[float, float] = quantity((0.0, 0.0), "N", -1e5, 1e5, "steady force on the mass along x and y")
+
+
+@dataclass(frozen=True)
 class Imported:
     """A user's own mesh (.msh with named groups, and what meshio reads) or STEP file."""
 
@@ -120,6 +136,7 @@ class Scene:
     damper: Wedge = field(default_factory=Wedge)
     plane: Plane = field(default_factory=Plane)
     z_mass: ZMass = field(default_factory=ZMass)
+    foundation: Foundation = field(default_factory=Foundation)
     hertz: HertzPair = field(default_factory=HertzPair)
     punch: Punch = field(default_factory=Punch)
     imported: Imported = field(default_factory=Imported)

@@ -20,7 +20,7 @@ _ENGINE = (*_COMMON, "operation", "excitation")
 TABLES = {
     "wedge sector": ("aerofoil", "platform", "shank", "disc", "damper", *_ENGINE),
     "plane blades": ("plane", *_ENGINE),
-    "z mass": ("z_mass", *_ENGINE),
+    "z mass": ("z_mass", "foundation", *_COMMON),
     "hertz": ("hertz", *_COMMON),
     "punch": ("punch", *_COMMON),
     "imported": ("imported", "damper", *_ENGINE),

@@ -16,7 +16,7 @@ def build(scene: Any) -> Mesh:
 
     Args:
         scene: has ``kind``, ``mesh`` (MeshSize) and the tables of its kind: aerofoil, platform, shank, disc, damper;
-            plane; z_mass; hertz; punch; imported.
+            plane; z_mass, foundation; hertz; punch; imported.
 
     Raises:
         InputError: a parameter has to change, or the kind is unknown; one sentence.
@@ -41,7 +41,7 @@ def _plane(scene: Any) -> Mesh:
 def _z_mass(scene: Any) -> Mesh:
     from .zmass import z_mass
 
-    return z_mass(scene.z_mass, scene.mesh)
+    return z_mass(scene.z_mass, scene.mesh, scene.foundation.depth)
 
 
 def _hertz(scene: Any) -> Mesh:

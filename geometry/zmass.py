@@ -1,19 +1,24 @@
-"""The Z-shaped mass: two bars along x and a diagonal between them, one plate standing on the plane z = 0."""
+"""The Z-shaped mass: two bars along x and a diagonal between them, one plate standing on a block or on the plane z = 0.
+"""
 
 from __future__ import annotations
+
+from types import ModuleType
 
 import numpy as np
 
 from bladefem.errors import InputError
 
-from .draw import centres, prism, set_background
+from .draw import centres, imprint, polygon, prism, set_background, tie
 from .extract import Groups
 from .finish import complete, mesh_model
 from .mesh import Mesh
 from .parameters import MeshSize, ZMass
 from .session import attempt, gmsh_session
 
-__all__ = ["z_corners", "z_mass"]
+__all__ = ["z_corners", "z_mass", "z_section"]
+
+WIDER = 2.0         # side of the foundation block over the larger side of the Z
 
 
 def z_corners(z: ZMass) -> np.ndarray:
@@ -23,8 +28,20 @@ def z_corners(z: ZMass) -> np.ndarray:
     return np.vstack([half, -half])
 
 
-def z_mass(z: ZMass, size: MeshSize) -> Mesh:
+def z_section(z: ZMass) -> tuple[float, float]:
+    """Area [m^2] and polar second moment of area about the centre [m^4] of the Z."""
+    here = z_corners(z)
+    there = np.roll(here, -1, axis=0)
+    cross = here[:, 0] * there[:, 1] - there[:, 0] * here[:, 1]
+    return float(cross.sum() / 2), float(cross @ (here**2 + here * there + there**2).sum(axis=1) / 12)
+
+
+def z_mass(z: ZMass, size: MeshSize, depth: float = 0.0) -> Mesh:
     """Body "damper" with the faces "footprint" (z = 0) and "top".
+
+    Args:
+        depth: of an elastic block under it [m]: body "blade" with the faces "seat" (below the Z, its nodes matched with
+            the footprint's: pair "this") and "clamp"; 0 for none.
 
     Raises:
         InputError: a parameter has to change; the message names it.
@@ -37,11 +54,36 @@ def z_mass(z: ZMass, size: MeshSize) -> Mesh:
     contact = size.contact_size or base
     with gmsh_session() as gmsh:
         body = prism(gmsh, z_corners(z), 0.0, z.thickness)
+        block = _block(gmsh, z, depth) if depth else None
         gmsh.model.occ.synchronize()
-        heights = {tag: centre[2] for tag, centre in centres(gmsh, body).items()}
-        faces = {"footprint": [min(heights, key=heights.get)], "top": [max(heights, key=heights.get)]}
+        groups = _names(gmsh, z, depth, body, block)
+        if block is not None:
+            tie(gmsh, 2, groups.faces["seat"], groups.faces["footprint"], np.eye(3), np.zeros(3))
         set_background(gmsh, min(base, contact) / 2,
-                       MathEval=[{"F": f"{contact} + {base - contact} * z / {z.thickness}"}])
+                       MathEval=[{"F": f"{contact} + {base - contact} * Max(0, z) / {z.thickness} - 0.6 * Min(0, z)"}])
         with attempt("mesh.size", "mesh this geometry"):
-            mesh = mesh_model(gmsh, Groups({"damper": [body]}, faces), 3, size)
-    return complete(mesh, {}, base)
+            mesh = mesh_model(gmsh, groups, 3, size)
+    pairs = {"this": ("seat", "footprint", np.eye(3), np.zeros(3))} if depth else {}
+    return complete(mesh, pairs, base, flat=("seat", "footprint") if depth else ())
+
+
+def _block(gmsh: ModuleType, z: ZMass, depth: float) -> int:
+    """The foundation with the Z cut into its top."""
+    w = WIDER / 2 * max(z.width, z.height)
+    square = np.array([[-w, -w], [w, -w], [w, w], [-w, w]])
+    mark, _, _ = polygon(gmsh, z_corners(z))
+    return imprint(gmsh, prism(gmsh, square, -depth, 0.0), [(2, mark)])
+
+
+def _names(gmsh: ModuleType, z: ZMass, depth: float, body: int, block: int | None) -> Groups:
+    """Faces by the heights of their centres; the seat is the inner one of the two faces on top of the block."""
+    found = {tag: centre[2] for tag, centre in centres(gmsh, body).items()}
+    faces = {"footprint": [min(found, key=found.get)], "top": [max(found, key=found.get)]}
+    if block is None:
+        return Groups({"damper": [body]}, faces)
+    found = {tag: centre[2] for tag, centre in centres(gmsh, block).items()}
+    area = z_section(z)[0]
+    level = [tag for tag, height in found.items() if abs(height) < 1e-6 * depth]
+    faces["seat"] = [min(level, key=lambda tag: abs(gmsh.model.occ.getMass(2, tag) - area))]
+    faces["clamp"] = [tag for tag, height in found.items() if abs(height + depth) < 1e-6 * depth]
+    return Groups({"blade": [block], "damper": [body]}, faces)

@@ -74,7 +74,13 @@ def response(options: argparse.Namespace, comm: Any) -> None:
 
 def report(options: argparse.Namespace, comm: Any) -> None:
     """Everything, with figures and report."""
-    run = until("report", options, comm)
+    scene, folder, bars = prepared(options, comm)
+    if scene.kind == "z mass":
+        from ..report import zmass
+        found = zmass.run(scene, folder, comm)
+        return tell(options, comm, lambda: zmass.motion_table(found.motions).to_string(index=False), found)
+    from ..report.run import run as whole
+    run = whole(scene, folder, comm, bars)
     tell(options, comm, lambda: tables.responses(run.response), run)
 
 
@@ -150,9 +156,6 @@ def prepared(options: argparse.Namespace, comm: Any) -> tuple[Scene, Path, Any]:
 def until(stage: str, options: argparse.Namespace, comm: Any) -> Any:
     """The pipeline up to a stage, with progress bars; collective."""
     scene, folder, bars = prepared(options, comm)
-    if stage == "report":
-        from ..report.run import run
-        return run(scene, folder, comm, bars)
     from ..study import pipeline
     return pipeline.run(scene, folder, until=stage, comm=comm, progress=bars)
 

@@ -54,7 +54,7 @@ class ContactProblem:
 
 
 def contact_problem(mesh: Mesh, patches: Sequence[Patch], blade: Flexibility, damper: Flexibility | Body,
-                    clearance: float | np.ndarray = 0.0) -> ContactProblem:
+                    clearance: float | np.ndarray = 0.0, pull: np.ndarray | None = None) -> ContactProblem:
     """Condense two bodies onto the normal ports of their patches.
 
     Args:
@@ -62,6 +62,7 @@ def contact_problem(mesh: Mesh, patches: Sequence[Patch], blade: Flexibility, da
         damper: the factorised floating damper, or its Body for a damper that does not deform.
         clearance: gap before seating [m] on top of the one that the mesh has (``patch.initial_gap``), one number or
             (n,) values (means over the ports' weights, see ``patch.patch_means``); negative for an interference.
+        pull: (n_points*dim,) load on the damper [N] instead of its centrifugal load; ``solve`` it with ``normal``.
 
     Raises:
         InputError: the blade is not in nodal diameter 0, or the clearance does not fit the ports.
@@ -70,7 +71,7 @@ def contact_problem(mesh: Mesh, patches: Sequence[Patch], blade: Flexibility, da
         raise InputError(f"nodal_diameter is {blade.con.nodal_diameter}, expected 0: a static load moves all alike")
     ports = normal_ports(patches, mesh)
     body = damper if isinstance(damper, Body) else damper.con.body
-    pull = centrifugal(body, 1.0, spin_axis(mesh))
+    pull = centrifugal(body, 1.0, spin_axis(mesh)) if pull is None else pull
     C, blade_swell = _condense(blade, port_matrix(patches, mesh)[:, ports],
                                centrifugal(blade.con.body, 1.0, spin_axis(mesh)))
     damper_swell = np.zeros(len(ports))

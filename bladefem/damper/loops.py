@@ -35,6 +35,7 @@ class Drive:
     phase: float = np.pi / 2        # of the y motion against the x motion [rad]
     load: float = 50.0              # mean P0 [N]
     pulsation: float = 30.0         # amplitude P1 [N]; not used when the ratio is zero
+    pull: tuple[float, float] = (0.0, 0.0)      # steady force on the mass [N]
 
 
 @dataclass(frozen=True)
@@ -75,7 +76,7 @@ def steady(body: MassOnFoundation, drive: Drive, steps: int = 2000, most: int = 
     start, last, residual, period = None, None, np.inf, 0
     while residual >= tolerance and period < most:
         period += 1
-        motion = march(body, base, load, dt, start)
+        motion = march(body, base, load, dt, start, drive.pull)
         residual = _change(motion, last)
         start, last = (motion.position[-1], motion.velocity[-1], motion.springs), motion
     reason = "periodic" if residual < tolerance else f"not periodic after {most} periods, change {residual:.1e}"

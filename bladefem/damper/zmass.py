@@ -91,7 +91,8 @@ def ellipse(amplitude: tuple[float, float], phase: float, frequency: float, time
 
 
 def march(body: MassOnFoundation, base: np.ndarray, load: np.ndarray, dt: float,
-          start: tuple[np.ndarray, np.ndarray, np.ndarray] | None = None) -> Motion:
+          start: tuple[np.ndarray, np.ndarray, np.ndarray] | None = None,
+          pull: tuple[float, float] = (0.0, 0.0)) -> Motion:
     """The motion of the mass under a sampled foundation motion and load.
 
     Args:
@@ -99,6 +100,8 @@ def march(body: MassOnFoundation, base: np.ndarray, load: np.ndarray, dt: float,
         load: (s + 1,) total normal load [N]; below zero means lifted off.
         dt: step between samples [s].
         start: (3,) position, (3,) velocity, (n, 2) spring forces; at rest and unloaded when left out.
+        pull: steady force through the centre of mass along x and y [N]. (A steady speed of the foundation needs none:
+            only the drift changes, by that speed.)
     Raises:
         InputError: the step is beyond the stability limit of the explicit march (2 over the highest stuck frequency).
     """
@@ -110,7 +113,7 @@ def march(body: MassOnFoundation, base: np.ndarray, load: np.ndarray, dt: float,
     position, velocity, springs = start or (np.zeros(3), np.zeros(3), np.zeros((n, 2)))
     nodes = np.column_stack([body.footprint.points, _springs(body), body.mu * body.footprint.share])
     springs = np.array(springs, float)
-    history = _march(np.r_[position, velocity], springs, nodes, np.array([body.mass, body.inertia]),
+    history = _march(np.r_[position, velocity], springs, nodes, np.array([body.mass, body.inertia, *pull]),
                      np.ascontiguousarray(base, float), np.ascontiguousarray(load, float), dt)
     return Motion(dt, history[:, :3], history[:, 3:6], history[:, 6:9], history[:, 9:], springs)
 
@@ -194,7 +197,10 @@ def _friction(springs, nodes, turn, step, limits, out):
 
 @njit(cache=True)
 def _march(state, springs, nodes, inertia, base, load, dt):
-    """Leapfrog with the return map; (s, 11): position 3, velocity 3, force and moment 3, slip 2."""
+    """Leapfrog with the return map; (s, 11): position 3, velocity 3, force and moment 3, slip 2.
+
+    ``inertia``: mass, moment of inertia, steady force along x and y.
+    """
     steps = base.shape[0] - 1
     history = np.empty((steps, 11))
     mass = np.array([inertia[0], inertia[0], inertia[1]])
@@ -202,7 +208,8 @@ def _march(state, springs, nodes, inertia, base, load, dt):
     out = np.zeros(5)
     step = np.zeros(2)
     _friction(springs, nodes, (q[2], q[2]), step, (max(load[0], 0.0), max(load[0], 0.0)), out)
-    a = out[:3] / mass
+    still = np.array([inertia[2], inertia[3], 0.0]) / mass
+    a = out[:3] / mass + still
     for n in range(steps):
         v += 0.5 * dt * a
         turned = q[2] + dt * v[2]
@@ -210,7 +217,7 @@ def _march(state, springs, nodes, inertia, base, load, dt):
         step[1] = base[n + 1, 1] - base[n, 1] - dt * v[1]
         _friction(springs, nodes, (q[2], turned), step, (max(load[n], 0.0), max(load[n + 1], 0.0)), out)
         q += dt * v
-        a = out[:3] / mass
+        a = out[:3] / mass + still
         v += 0.5 * dt * a
         history[n, :3], history[n, 3:6], history[n, 6:] = q, v, out
     return history

@@ -12,13 +12,13 @@ from ..scene import Scene
 from ..store import code_of, key_of
 from .settings import Settings
 
-__all__ = ["contact_key", "mesh_key", "modes_key", "reduction_key", "response_key"]
+__all__ = ["contact_key", "mesh_key", "modes_key", "reduction_key", "response_key", "zmass_key"]
 
 
 def mesh_key(scene: Scene) -> str:
     """The mesh."""
     shapes = (scene.aerofoil, scene.platform, scene.shank, scene.disc, replace(scene.damper, mass=None), scene.plane,
-              scene.z_mass, scene.hertz, scene.punch, scene.imported, scene.mesh)
+              scene.z_mass, scene.foundation.depth, scene.hertz, scene.punch, scene.imported, scene.mesh)
     return key_of(scene.kind, *shapes, code_of("geometry"), _stamp(scene))
 
 
@@ -38,6 +38,12 @@ def contact_key(scene: Scene) -> str:
     """The contact problem."""
     return key_of(modes_key(scene), scene.material.damper, scene.damper.mass, scene.plane.damper_mass,
                   code_of("bladefem.contact"))
+
+
+def zmass_key(scene: Scene) -> str:
+    """The pressure under the Z-shaped mass."""
+    return key_of(mesh_key(scene), scene.material, scene.foundation.skew, scene.study.loads,
+                  code_of("bladefem.fem", "bladefem.contact"))
 
 
 def reduction_key(scene: Scene, diameters: Sequence[int], modes: int) -> str:

@@ -9,11 +9,15 @@ import matplotlib
 import numpy as np
 from matplotlib.colors import ListedColormap
 from matplotlib.patches import Patch
+from matplotlib.tri import Triangulation
+
+from bladefem.damper.zmass import Footprint
+from bladefem.data import PressureMap
 
 from .style import COLOURS, canvas, log_axis
 
-__all__ = ["draw_coupled_loops", "draw_fit", "draw_friction_loops", "draw_mass_loops", "draw_mass_spectra",
-           "draw_method_map", "draw_peaks", "draw_tip_responses"]
+__all__ = ["draw_coupled_loops", "draw_fit", "draw_footprint", "draw_friction_loops", "draw_mass_loops",
+           "draw_mass_spectra", "draw_method_map", "draw_peaks", "draw_tip_responses"]
 
 OUTCOMES = {"converged": "#2c7fb8", "false": "#d62728", "no convergence": "#fdae61", "diverged": "#222222"}
 MICRO, MILLI = 1e6, 1e3
@@ -53,6 +57,28 @@ def draw_coupled_loops(loops: Mapping[str, Sequence[tuple[str, np.ndarray, np.nd
         axes[0, 0].set_ylabel("friction force [N]")
         axes[0, 0].legend()
         return axes[0, 0].figure
+
+
+def draw_footprint(seat: PressureMap, points: Footprint, file: str | Path | None = None) -> object:
+    """Pressure under the mass over its mean, and the contact points with their shares (Fig. 8 and 9); the figure.
+
+    Args:
+        seat: on the plane z = 0.
+        points: sizes of the marks go with the shares.
+    """
+    xy, mean = MILLI * seat.patch.points[:, :2], seat.force.sum() / seat.patch.area.sum()
+    with canvas(file, None, (9.4, 4.2), (1, 2), sharex=True, sharey=True) as (left, right):
+        flat = Triangulation(xy[:, 0], xy[:, 1], seat.patch.faces[:, :3])
+        image = left.tripcolor(flat, seat.pressure / mean, shading="gouraud", cmap="viridis", rasterized=True)
+        left.figure.colorbar(image, ax=left, label="pressure over its mean")
+        left.set(xlabel="x [mm]", ylabel="y [mm]", aspect="equal",
+                 title=f"{seat.force.sum():.4g} N, mean {mean / 1e3:.4g} kPa")
+        place, share = MILLI * points.points, len(points.share) * points.share
+        right.triplot(flat, color="#cccccc", lw=0.3)
+        marks = right.scatter(*place.T, c=share, s=8 + 60 * min(1.0, 40 / len(share)) * share, cmap="viridis", zorder=3)
+        right.figure.colorbar(marks, ax=right, label="share of the load over its mean")
+        right.set(xlabel="x [mm]", aspect="equal", title=f"{len(share)} contact points")
+        return left.figure
 
 
 def draw_mass_loops(cases: Mapping[str, tuple[np.ndarray, np.ndarray, int]], file: str | Path | None = None) -> object:

@@ -1,0 +1,98 @@
+"""The run folder of a scene of kind "z mass": pressure, loops, drift and spectra for each frequency ratio."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from time import perf_counter
+from typing import Any
+
+import numpy as np
+import pandas as pd
+
+from bladefem.damper.loops import Drive, Steady, spectrum
+from bladefem.damper.zmass import MassOnFoundation
+from bladefem.scene import Scene
+from bladefem.store import on_root
+from bladefem.study.zmass import Pressed, mass_on_foundation, motions, press
+from bladefem.view import contact, mesh, paper
+
+from .tables import write_tables
+from .write import write_report
+
+__all__ = ["MassRun", "draw_motions", "motion_table", "run"]
+
+
+@dataclass(frozen=True)
+class MassRun:
+    """What a run of the mass has; the same on every rank."""
+
+    folder: Path
+    pressed: Pressed
+    body: MassOnFoundation
+    motions: list[tuple[Drive, Steady]]
+    timings: dict[str, float]       # stage to seconds
+    messages: list[str]
+
+
+def run(scene: Scene, folder: str | Path, comm: Any = None) -> MassRun:
+    """Pressure on all ranks, motions and folder on rank 0.
+
+    Raises:
+        InputError, NotSolvedError: see ``study.zmass.press``.
+    """
+    start = perf_counter()
+    pressed = press(scene, folder, comm)
+    body, pressure = mass_on_foundation(scene, pressed.seat), perf_counter()
+    found = on_root(comm, lambda: list(motions(scene, body)))
+    timings = {"pressure": pressure - start, "motion": perf_counter() - pressure}
+    messages = [f"ratio {d.ratio}: {s.reason}" for d, s in found if s.reason != "periodic"]
+    result = MassRun(Path(folder), pressed, body, found, timings, messages)
+    on_root(comm, lambda: _write(scene, result))
+    return result
+
+
+def motion_table(found: list[tuple[Drive, Steady]]) -> pd.DataFrame:
+    """One row a frequency ratio: loops, drift [m/s], turning speed [rad/s], amplitude at the foundation's frequency."""
+    rows = []
+    for drive, result in found:
+        frequency, lines = spectrum(result)
+        main = lines[np.argmin(abs(frequency - drive.frequency)), 0]
+        rows.append({"ratio": str(drive.ratio), "load frequency [Hz]": float(drive.ratio) * drive.frequency,
+                     "loops": result.loops, "denominator": drive.ratio.denominator,
+                     "drift x [m/s]": result.drift[0], "drift y [m/s]": result.drift[1],
+                     "turning, mean [rad/s]": result.drift[2],
+                     "turning, largest [rad/s]": float(np.abs(result.motion.velocity[:, 2]).max()),
+                     "amplitude": main, "periodic": result.reason == "periodic"})
+    return pd.DataFrame(rows)
+
+
+def draw_motions(found: list[tuple[Drive, Steady]], loops: Path, spectra: Path) -> None:
+    """The pictures of Fig. 10 and 11."""
+    shown: dict[str, tuple[np.ndarray, np.ndarray, int]] = {}
+    lines: dict[str, tuple[np.ndarray, np.ndarray]] = {}
+    for drive, result in found:
+        name = f"load at {float(drive.ratio) * drive.frequency:g} Hz"
+        motion = result.relative[:, 0] + result.drift[0] * result.time
+        shown[name] = (motion - motion.mean(), result.motion.force[:, 0], result.loops)
+        frequency, amplitude = spectrum(result)
+        lines[name] = (frequency, amplitude[:, 0])
+    paper.draw_mass_loops(shown, loops)
+    paper.draw_mass_spectra(lines, spectra)
+
+
+def _write(scene: Scene, result: MassRun) -> None:
+    folder, seat = result.folder, result.pressed.seat
+    tables: Mapping[str, pd.DataFrame] = {"contact/pressure": contact.pressure_summary([seat]),
+                                          "response/motion": motion_table(result.motions)}
+    for name, table in tables.items():
+        write_tables(table, folder / name.split("/")[1], name.split("/")[1])
+    contact.pressure_points([seat]).to_csv(folder / "pressure_points.csv", index=False)
+    names = ("mesh/mesh", "contact/pressure_on_the_footprint", "response/loops", "response/spectra")
+    figures = {name: folder / f"{name.split('/')[1]}.png" for name in names}
+    mesh.draw_mesh(result.pressed.mesh, figures["mesh/mesh"], title=scene.title)
+    paper.draw_footprint(seat, result.body.footprint, figures["contact/pressure_on_the_footprint"])
+    draw_motions(result.motions, figures["response/loops"], figures["response/spectra"])
+    mesh.save_vtu(result.pressed.mesh, folder / "mesh.vtu")
+    write_report(folder, scene, tables, figures, result.messages, result.timings)
