@@ -8,19 +8,19 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from ..errors import NotSolvedError
-from ..hbm.api import solve
 from ..hbm.model import ReducedModel
 from ..hbm.resonance import free_resonances, stuck_resonances
 from ..hbm.solution import Solution
 from ..hbm.sweep import size, sweep
-from .family import Family, carried, member
-from .indicators import Indicators, indicate
+from .family import Family, member
+from .indicators import Indicators, indicate, moved
 from .settings import Settings, enriched
 
 __all__ = ["Checked", "adapted", "checked", "choose", "covered", "default_band", "estimated", "peak_of",
            "response_points"]
 
 ROUNDS = 12
+KEPT = ("modes", "damper")      # whose indicators, where they are small, outlast a change of the others
 PASSES = 3          # sweeps of one curve with ever richer settings
 WIDENINGS = 4
 SHARES = (0.7, 0.25)    # of the peak's height: where a curve is checked on each side beside the peak itself
@@ -43,22 +43,23 @@ def choose(family: Family, settings: Settings, point: Solution, accuracy: float,
         point: solved with `settings`; its frequency is kept.
         fixed: names that may not be changed here although they are not the user's.
     """
+    known: dict[str, float] = {}
     for _ in range(ROUNDS):
-        found = indicate(family, settings, point)
+        found = indicate(family, settings, point, known)
         settings = replace(settings, error=found.total)
         better = None if found.total <= accuracy / 2 else _next(settings, found, accuracy, fixed)
         if better is None:
             break
-        point = _moved(family, settings, point, better)
-        settings = better
+        known = {name: error for name in KEPT if (error := found.errors[name]) <= accuracy / 20
+                 and getattr(better, name) == getattr(settings, name)}
+        point, settings = _solved(family, settings, point, better, found), better
     return settings, point, found
 
 
-def _moved(family: Family, settings: Settings, point: Solution, better: Settings) -> Solution:
-    """The same frequency solved with better settings."""
-    new = member(family, better)
-    start = replace(point, w=carried(point.w, member(family, settings), new, better.harmonics))
-    return solve(new.model, point.omega, better.harmonics, better.samples, start=start)
+def _solved(family: Family, settings: Settings, point: Solution, better: Settings, found: Indicators) -> Solution:
+    """The point solved with better settings, from the solution with more harmonics where there is one."""
+    ahead = found.better.get("harmonics")
+    return moved(family, settings, ahead if ahead is not None and ahead.converged else point, better)
 
 
 def _next(settings: Settings, found: Indicators, accuracy: float, fixed: tuple[str, ...]) -> Settings | None:

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
-from functools import lru_cache
+from functools import cache, lru_cache
 
 import numpy as np
 
@@ -19,7 +19,9 @@ from ..reduction.assemble import recombine
 from ..reduction.truncate import truncated
 from .settings import Settings
 
-__all__ = ["Family", "Member", "carried", "coarsened", "family_of", "member"]
+__all__ = ["Family", "Member", "carried", "coarsened", "family_of", "member", "shared_harmonics"]
+
+SHARED = (7, 15, 31, 63)
 
 
 @dataclass(frozen=True)
@@ -91,7 +93,9 @@ def coarsened(model: ReducedModel, groups: np.ndarray) -> ReducedModel:
         damper = replace(damper, B=dofs @ damper.B)
     elif damper is not None:
         damper = tuple(recombine(body, dofs) for body in damper)
-    return replace(model, sides=tuple(recombine(body, dofs) for body in model.sides), elements=elements, damper=damper)
+    normal = {h: np.bincount(groups, f.real, m) + 1j * np.bincount(groups, f.imag, m) for h, f in model.normal.items()}
+    return replace(model, sides=tuple(recombine(body, dofs) for body in model.sides), elements=elements, damper=damper,
+                   normal=normal)
 
 
 def family_of(rich: ReducedModel, patches: Sequence[int] | None = None) -> Family:
@@ -103,14 +107,25 @@ def family_of(rich: ReducedModel, patches: Sequence[int] | None = None) -> Famil
     n = len(rich.elements.kt)
     sizes = list(patches or (n // 2, n - n // 2))
 
+    @cache
+    def side(h: int, modes: int) -> PortModel:
+        return truncated(rich.sides[h], min(modes, len(rich.sides[h].omega)))
+
     @lru_cache(maxsize=8)
-    def thinned(modes: int, points: int | None) -> Member:
+    def thinned(modes: int, points: int | None, harmonics: int) -> Member:
         groups = _runs(sizes, points)
-        few = replace(rich, sides=tuple(truncated(side, min(modes, len(side.omega))) for side in rich.sides))
+        few = replace(rich, sides=tuple(side(h, modes) for h in range(min(harmonics + 1, len(rich.sides)))))
         return Member(coarsened(few, groups), groups)
 
-    return Family(lambda settings: thinned(settings.modes, settings.points), max(len(s.omega) for s in rich.sides),
-                  len(rich.sides) - 1 if len(rich.sides) > 1 else 99)
+    def build(settings: Settings) -> Member:
+        return thinned(settings.modes, settings.points, shared_harmonics(settings.harmonics))
+
+    return Family(build, max(len(s.omega) for s in rich.sides), len(rich.sides) - 1 if len(rich.sides) > 1 else 99)
+
+
+def shared_harmonics(harmonics: int) -> int:
+    """Harmonics of the model that serves several numbers of them: what a model keeps for itself is made once."""
+    return next((most for most in SHARED if harmonics <= most), harmonics)
 
 
 def _runs(sizes: Sequence[int], points: int | None) -> np.ndarray:

@@ -12,6 +12,7 @@ __all__ = ["DAMPERS", "DIRECTIONS", "Settings", "enriched", "first_for", "first_
 DAMPERS = ("mass", "rigid", "elastic")      # from poor to rich
 DIRECTIONS = ("harmonics", "samples", "modes", "points", "damper")     # in which a model is enriched
 RICHEST = {"modes": 160, "harmonics": 31, "samples": 4096, "points": 4096}
+STEEP = 16.0        # how many times smaller an error has to be for two steps of the harmonics at once
 FIRST = {"modes": 10, "harmonics": 1, "samples": 64, "points": 4, "damper": "rigid"}
 
 
@@ -63,8 +64,8 @@ def enriched(settings: Settings, name: str, need: float = 4.0) -> Settings | Non
     """The next richer settings in one respect; None where there is none.
 
     Args:
-        need: how many times smaller the error should become; samples and points are of second order, so that a large
-            need takes several doublings at once.
+        need: how many times smaller the error should become; a step of the harmonics (1, 3, 7, ...) gives a factor of
+            eight or so, a doubling of samples and points four, so that a large need takes several at once.
     """
     value = getattr(settings, name)
     if name == "damper":
@@ -73,7 +74,7 @@ def enriched(settings: Settings, name: str, need: float = 4.0) -> Settings | Non
     if value is None:
         return None
     if name == "harmonics":
-        more = 2 * value + 1
+        more = 4 * value + 3 if need > STEEP else 2 * value + 1
     elif name == "modes":
         more = 2 * value
     else:
