@@ -13,7 +13,7 @@ from .residual import STICKS, Balance, Inverse, State, contact_table, evaluate_b
 
 __all__ = ["DEFAULTS", "Newton", "Options", "newton"]
 
-COMPILED = 100          # unknowns up to which the compiled loop with its plain LU is faster
+COMPILED = 300          # unknowns up to which the compiled loop with its plain LU is faster
 SHORTEST = 2.0**-8     # step share below which the search direction is given up
 
 
