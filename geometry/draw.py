@@ -6,7 +6,7 @@ from types import ModuleType
 
 import numpy as np
 
-__all__ = ["centres", "face_at", "imprint", "polygon", "prism", "set_background", "tie"]
+__all__ = ["centres", "clear_leftovers", "face_at", "imprint", "polygon", "prism", "set_background", "tie"]
 
 
 def polygon(gmsh: ModuleType, corners: np.ndarray) -> tuple[int, list[int], list[int]]:
@@ -27,6 +27,12 @@ def imprint(gmsh: ModuleType, volume: int, marks: list[tuple[int, int]]) -> int:
     """The volume with plane faces and points (dimension, tag) cut into its skin."""
     result, _ = gmsh.model.occ.fragment([(3, volume)], marks)
     return next(tag for dim, tag in result if dim == 3)
+
+
+def clear_leftovers(gmsh: ModuleType) -> None:
+    """Delete the construction surfaces, curves and points that bound no volume; they would be meshed, too."""
+    for dimension in (2, 1, 0):
+        gmsh.model.occ.remove(gmsh.model.occ.getEntities(dimension))        # leaves what bounds something else
 
 
 def centres(gmsh: ModuleType, body: int, dimension: int = 3) -> dict[int, np.ndarray]:

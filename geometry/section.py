@@ -25,12 +25,22 @@ def half_thickness(family: str, x: np.ndarray, thickness: float) -> np.ndarray:
     return thickness / 2 * ((1 - BLUNT) * 4 * x * (1 - x) + BLUNT * rounded)
 
 
+def spread(family: str, thickness: float, points: int) -> np.ndarray:
+    """Places (points,) along the chord, even in arc length plus turning angle, so that every nose is drawn round."""
+    x = np.linspace(0, 1, 2000) ** 3
+    dx, dy = np.diff(x), np.diff(half_thickness(family, x, thickness))
+    arc, angle = np.hypot(dx, dy), np.arctan2(dy, dx)
+    turn = np.abs(np.diff(angle, prepend=np.pi / 2))
+    measure = np.concatenate([[0.0], np.cumsum(arc / arc.sum() + turn / turn.sum())])
+    return np.interp(np.linspace(0, measure[-1], points), measure, x)
+
+
 def section(family: str, thickness: float, camber: float, points: int = POINTS) -> np.ndarray:
     """Closed section over chord, (2 points - 1, 2): trailing edge (suction side), leading edge, trailing edge.
 
     Columns: along the chord (0 leading, 1 trailing edge) and across it (suction side positive).
     """
-    x = (1 - np.cos(np.linspace(0, np.pi, points))) / 2
+    x = spread(family, thickness, points)
     half, line, slope = half_thickness(family, x, thickness), 4 * camber * x * (1 - x), 4 * camber * (1 - 2 * x)
     normal = np.column_stack([-slope, np.ones_like(x)]) / np.hypot(1, slope)[:, None]
     middle = np.column_stack([x, line])

@@ -9,14 +9,14 @@ import numpy as np
 
 from bladefem.errors import InputError
 
-from .draw import imprint, polygon, prism
+from .draw import clear_leftovers, imprint, polygon, prism
 from .finish import complete, mesh_model
 from .mesh import Mesh
 from .parameters import DEG, Aerofoil, Disc, MeshSize, Platform, Shank, Wedge
 from .profile import Profile, profile
 from .section import outline
 from .sector_check import check_sector
-from .sector_names import link, mark_tip, motions, moved, name_faces, nose, seat, sector, split_skin, trailing_curves
+from .sector_names import edge_curves, link, mark_tip, motions, moved, name_faces, seat, sector
 from .session import attempt, gmsh_session
 from .sizing import sector_sizes, set_sizes
 
@@ -40,18 +40,18 @@ def wedge_sector(aerofoil: Aerofoil, platform: Platform, shank: Shank, disc: Dis
     with gmsh_session() as gmsh:
         blade = _blade(gmsh, aerofoil, platform, shank, disc, shape)
         marks = [(2, polygon(gmsh, seat(shape, wedge.length, side))[0]) for side in (-1, 1)]
-        marks.append((0, gmsh.model.occ.addPoint(*nose(aerofoil, shape))))
         with attempt("damper.length", "imprint the seats on the platform"):
             blade = imprint(gmsh, blade, marks)
         damper = prism(gmsh, shape.wedge, -wedge.length / 2, wedge.length / 2)
+        clear_leftovers(gmsh)
         gmsh.model.occ.synchronize()
         groups = name_faces(gmsh, blade, damper, aerofoil, disc, wedge, shape)
         groups = mark_tip(gmsh, groups, aerofoil, shape)
         link(gmsh, groups, shape)
-        set_sizes(gmsh, shape, wedge, sizes, trailing_curves(gmsh, groups))
+        set_sizes(gmsh, shape, wedge, sizes, edge_curves(gmsh, groups))
         with attempt("mesh.size", "mesh this geometry"):
             mesh = mesh_model(gmsh, groups, 3, size)
-    mesh = complete(split_skin(mesh, aerofoil, shape), motions(shape), sizes.base, sector(disc.sectors),
+    mesh = complete(mesh, motions(shape), sizes.base, sector(disc.sectors),
                     flat=("seat_left", "seat_right", "damper_left", "damper_right"))
     return moved(mesh, wedge, shape) if wedge.clearance else mesh
 
@@ -83,18 +83,24 @@ def _aerofoil(gmsh: ModuleType, blade: Aerofoil, top: float) -> int:
             return next(tag for dim, tag in occ.addThruSections(rings, makeSolid=True) if dim == 3)
     with attempt("aerofoil.fillet", "round the root of the aerofoil"):
         arc = np.linspace(LIFT, pi / 2, 6)[:-1]         # from the platform's plane to the blade's skin
-        flare = [_ring(gmsh, outline(blade, top, foot * (1 - np.cos(a) / np.cos(LIFT)), blade.fillet * (1 - np.sin(a))))
-                 for a in arc]
+        flare = [_ring(gmsh, outline(blade, top, t, grow)) for t, grow in
+                 zip(foot * (1 - np.cos(arc) / np.cos(LIFT)), blade.fillet * (1 - np.sin(arc)), strict=True)]
         skin = [tag for wires in ([*flare, rings[0]], rings) for _, tag in occ.addThruSections(wires, makeSolid=False)]
         ends = [occ.addPlaneSurface([ring]) for ring in (flare[0], rings[-1])]
         return occ.addVolume([occ.addSurfaceLoop(skin + ends, sewing=True)])
 
 
 def _ring(gmsh: ModuleType, points: np.ndarray) -> int:
-    """Closed wire through points (n, 3): one spline round the leading edge and a straight blunt trailing edge."""
-    occ = gmsh.model.occ
+    """Closed wire through points (n, 3): a spline each for suction and pressure side, and the blunt trailing edge.
+
+    The splines meet at the leading edge, so that mesh nodes lie on it; a skin without a curve there is meshed with
+    notches. Their ends are free: they meet within a degree, and end tangents, as OpenCASCADE scales them, make a
+    flared ring bulge by 0.3 mm.
+    """
+    occ, middle = gmsh.model.occ, len(points) // 2
     tags = [occ.addPoint(*p) for p in points]
-    return occ.addWire([occ.addSpline(tags), occ.addLine(tags[-1], tags[0])])
+    sides = [occ.addSpline(tags[:middle + 1]), occ.addSpline(tags[middle:])]
+    return occ.addWire([*sides, occ.addLine(tags[-1], tags[0])])
 
 
 def _blade(gmsh: ModuleType, aerofoil: Aerofoil, platform: Platform, shank: Shank, disc: Disc, shape: Profile) -> int:

@@ -8,16 +8,17 @@ from types import ModuleType
 
 import numpy as np
 
+from bladefem.errors import InputError
+
 from .draw import centres, face_at, tie
 from .extract import Groups
 from .finish import Motion
 from .mesh import Mesh, Sector
 from .parameters import Aerofoil, Disc, Wedge
 from .profile import Profile, turn
-from .section import centroid, outline, place, placement, shape
+from .section import outline, place, placement
 
-__all__ = ["link", "mark_tip", "motions", "moved", "name_faces", "nose", "seat", "sector", "split_skin",
-           "trailing_curves"]
+__all__ = ["edge_curves", "link", "mark_tip", "motions", "moved", "name_faces", "seat", "sector"]
 
 
 def seat(profile: Profile, length: float, side: int) -> np.ndarray:
@@ -44,16 +45,28 @@ def name_faces(gmsh: ModuleType, blade: int, damper: int, aerofoil: Aerofoil, di
     above = {t: c[0] - profile.top for t, c in on_blade.items() if c[0] > profile.top + tolerance}
     if aerofoil.fillet:
         faces["fillet"] = [t for t, height in above.items() if height < aerofoil.fillet]
-    sides = [t for t, height in above.items() if height > aerofoil.fillet + tolerance]
-    by_area = sorted(set(sides) - set(faces["tip"]), key=lambda t: gmsh.model.occ.getMass(2, t))
-    faces["aerofoil"], faces["trailing_edge"] = [by_area[-1]], by_area[:-1]
+    sides = [t for t, height in above.items() if height > aerofoil.fillet + tolerance and t not in faces["tip"]]
+    faces |= _skin(gmsh, sides, aerofoil)
     return Groups({"blade": [blade], "damper": [damper]}, faces)
 
 
-def trailing_curves(gmsh: ModuleType, groups: Groups) -> list[int]:
-    """Curves round the blunt trailing edge."""
-    faces = [(2, tag) for tag in groups.faces["trailing_edge"]]
-    return [abs(tag) for _, tag in gmsh.model.getBoundary(faces, oriented=False)]
+def _skin(gmsh: ModuleType, sides: list[int], aerofoil: Aerofoil) -> dict[str, list[int]]:
+    """The three faces of the skin: the smallest is the trailing edge, the suction side lies across the chord."""
+    if len(sides) != 3:
+        raise InputError(f"aerofoil: joined with the platform its skin has {len(sides)} faces, expected 3; "
+                         "change aerofoil.lean, aerofoil.sweep or aerofoil.fillet")
+    trailing, *both = sorted(sides, key=lambda tag: gmsh.model.occ.getMass(2, tag))
+    across = placement(aerofoil, 0.0, 0.5)[2]
+    pressure, suction = sorted(both, key=lambda tag: across @ np.array(gmsh.model.occ.getCenterOfMass(2, tag)))
+    return {"trailing_edge": [trailing], "suction_side": [suction], "pressure_side": [pressure]}
+
+
+def edge_curves(gmsh: ModuleType, groups: Groups) -> tuple[list[int], list[int]]:
+    """Curves along the leading edge, and round the blunt trailing edge."""
+    trailing, suction, pressure = (
+        {abs(tag) for _, tag in gmsh.model.getBoundary([(2, groups.faces[name][0])], oriented=False)}
+        for name in ("trailing_edge", "suction_side", "pressure_side"))
+    return sorted(suction & pressure), sorted(trailing)
 
 
 def sector(count: int) -> Sector:
@@ -75,47 +88,22 @@ def link(gmsh: ModuleType, groups: Groups, profile: Profile) -> None:
         tie(gmsh, 2, groups.faces[master], groups.faces[slave], rotation, shift)
 
 
-def split_skin(mesh: Mesh, aerofoil: Aerofoil, profile: Profile) -> Mesh:
-    """The mesh with the aerofoil's skin split into its two sides at the camber line."""
-    skin = mesh.faces["aerofoil"]
-    above = _above_camber(mesh.points[skin[:, :3]].mean(axis=1), aerofoil, profile.top)
-    faces = {name: f for name, f in mesh.faces.items() if name != "aerofoil"}
-    return replace(mesh, faces=faces | {"suction_side": skin[above], "pressure_side": skin[~above]})
-
-
 def mark_tip(gmsh: ModuleType, groups: Groups, aerofoil: Aerofoil, profile: Profile) -> Groups:
     """Groups with three points of the tip that are nodes of any mesh.
 
-    tip_leading is the end of the camber line, where the tip's edge was cut; tip_trailing is the corner of the blunt
-    edge on the suction side; tip_mid (on the camber line at half chord) is embedded.
+    tip_leading is the end of the leading edge; tip_trailing is the corner of the blunt edge on the suction side;
+    tip_mid (on the camber line at half chord) is embedded.
     """
     tip = groups.faces["tip"][0]
     corners = {tag: np.array(gmsh.model.getValue(0, tag, []))
                for _, tag in gmsh.model.getBoundary([(2, tip)], oriented=False, recursive=True)}
     edge = outline(aerofoil, profile.top, 1)
     leading, trailing = (min(corners, key=lambda tag, p=p: np.linalg.norm(corners[tag] - p))
-                         for p in (nose(aerofoil, profile), edge[0]))
+                         for p in (edge[len(edge) // 2], edge[0]))
     middle = gmsh.model.occ.addPoint(*place(aerofoil, profile.top, 1, np.array([[0.5, aerofoil.camber]]))[0])
     gmsh.model.occ.synchronize()
     gmsh.model.mesh.embed(0, [middle], 2, tip)
     return replace(groups, points={"tip_leading": [leading], "tip_mid": [middle], "tip_trailing": [trailing]})
-
-
-def nose(aerofoil: Aerofoil, profile: Profile) -> np.ndarray:
-    """Leading edge at the tip, (3,) [m]."""
-    return place(aerofoil, profile.top, 1, np.zeros((1, 2)))[0]
-
-
-def _above_camber(points: np.ndarray, aerofoil: Aerofoil, top: float) -> np.ndarray:
-    """Mask (n,) of points [m] on the suction side of the camber line of the section at their height."""
-    t = (points[:, 0] - top) / aerofoil.span
-    stations = np.linspace(0, 1, 41)
-    centres = np.array([centroid(shape(aerofoil, s)) for s in stations])
-    frames = [placement(aerofoil, top, s) for s in t]
-    away = points - np.array([frame[0] for frame in frames])
-    u, v = (np.array([a @ frame[1 + k] / frame[3] for a, frame in zip(away, frames, strict=True)])
-            + np.interp(t, stations, centres[:, k]) for k in (0, 1))
-    return v > 4 * aerofoil.camber * u * (1 - u)
 
 
 def moved(mesh: Mesh, wedge: Wedge, profile: Profile) -> Mesh:

@@ -13,6 +13,7 @@ from .section import BLUNT
 __all__ = ["Sizes", "sector_sizes", "set_sizes"]
 
 
+NOSE = 0.6          # element along the leading edge over those of the aerofoil
 SOME = 40_000        # cells above the rim at the finest, when the size is left open
 
 
@@ -23,6 +24,7 @@ class Sizes:
     base: float         # aerofoil, platform and shank
     contact: float      # seats and wedge
     disc: float         # far from the platform
+    nose: float         # along the leading edge
     edge: float         # along the trailing edge
     least: float        # where the surface curves most
 
@@ -35,7 +37,7 @@ def sector_sizes(aerofoil: Aerofoil, platform: Platform, shank: Shank, disc: Dis
     base = size.size or max(thin, _affordable(aerofoil, platform, shank, disc))
     contact = size.contact_size or min(base, platform.seat_width, wedge.length / 6)
     return Sizes(base, contact, max(base, min(3 * base, (disc.rim_radius - disc.bore_radius) / 3)),
-                 min(base, 6 * BLUNT * tip), base / 4)
+                 NOSE * base, min(base, 6 * BLUNT * tip), base / 3)
 
 
 def _affordable(aerofoil: Aerofoil, platform: Platform, shank: Shank, disc: Disc) -> float:
@@ -48,11 +50,12 @@ def _affordable(aerofoil: Aerofoil, platform: Platform, shank: Shank, disc: Disc
     return (solid / (0.12 * SOME)) ** (1 / 3)
 
 
-def set_sizes(gmsh: ModuleType, profile: Profile, wedge: Wedge, sizes: Sizes, edges: list[int]) -> None:
+def set_sizes(gmsh: ModuleType, profile: Profile, wedge: Wedge, sizes: Sizes,
+              edges: tuple[list[int], list[int]]) -> None:
     """Boxes round both seats, one for all above the rim, and elements that follow the curvature.
 
     Args:
-        edges: curves along the trailing edge.
+        edges: curves along the leading edge, and round the trailing edge.
     """
     field = gmsh.model.mesh.field
     reach = 4 * sizes.base
@@ -62,11 +65,12 @@ def set_sizes(gmsh: ModuleType, profile: Profile, wedge: Wedge, sizes: Sizes, ed
     for low, high in ((y_in, 2 * y_in), (-2 * y_in, -y_in)):
         boxes.append(_box(field, sizes.contact, sizes.disc, reach,
                           [min(x_in, x_out) - wedge.base, max(x_in, x_out), low, high, -z, z]))
-    boxes.append(_near(field, edges, sizes.edge, sizes.base))
+    boxes += [_near(field, curves, size, sizes.base)
+              for curves, size in zip(edges, (sizes.nose, sizes.edge), strict=True)]
     least = field.add("Min")
     field.setNumbers(least, "FieldsList", boxes)
     field.setAsBackgroundMesh(least)
-    gmsh.option.setNumber("Mesh.MeshSizeFromCurvature", 10)
+    gmsh.option.setNumber("Mesh.MeshSizeFromCurvature", 8)
     gmsh.option.setNumber("Mesh.MeshSizeMin", min(sizes.least, sizes.contact))
     gmsh.option.setNumber("Mesh.MeshSizeMax", sizes.disc)
 
