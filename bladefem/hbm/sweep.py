@@ -15,7 +15,7 @@ from .newton import DEFAULTS, Options
 from .resonance import free_resonances, stuck_resonances
 from .solution import Solution
 
-__all__ = ["local_maxima", "response", "size", "sweep"]
+__all__ = ["first_look", "local_maxima", "response", "size", "sweep"]
 
 COARSE = 12     # intervals of the first look at a band
 BAND_LIMIT = 400    # points after which a sweep gives up refining
@@ -54,7 +54,7 @@ def sweep(model: ReducedModel, band: tuple[float, float], H: int = 3, samples: i
     if not 0 < band[0] < band[1] < np.inf:
         raise InputError(f"band {band}: expected 0 < low < high")
     solved: dict[float, Solution] = {}
-    for solution in response(model, _first_look(model, band), H, samples, options=options):
+    for solution in response(model, first_look(model, band), H, samples, options=options):
         solved[solution.omega] = solution
         yield solution
     while len(solved) < BAND_LIMIT:
@@ -73,7 +73,8 @@ def local_maxima(points: list[Solution], probe: int = 0) -> list[Solution]:
     return [points[i] for i in range(1, len(points) - 1) if heights[i] >= max(heights[i - 1], heights[i + 1])]
 
 
-def _first_look(model: ReducedModel, band: tuple[float, float]) -> np.ndarray:
+def first_look(model: ReducedModel, band: tuple[float, float]) -> np.ndarray:
+    """Circular frequencies of a coarse look at a band: even steps and the resonances of both linear limits [rad/s]."""
     seeds = np.concatenate([resonances(model, h) for resonances in (free_resonances, stuck_resonances)
                             for h in model.excitation if h > 0])
     inside = seeds[(seeds > band[0]) & (seeds < band[1])]
