@@ -13,8 +13,8 @@ import numpy as np
 from ..data import PortModel
 from ..errors import InputError
 
-__all__ = ["Damping", "Stack", "amplitudes", "block", "flexibility", "impedance_rate", "lost", "motion", "receptance",
-           "stacked"]
+__all__ = ["Damping", "Stack", "amplitudes", "block", "damping_rate", "flexibility", "impedance_rate", "lost", "motion",
+           "receptance", "stacked"]
 
 
 @dataclass(frozen=True)
@@ -117,6 +117,13 @@ def impedance_rate(stack: Stack, w: np.ndarray, modal: np.ndarray) -> np.ndarray
     """(k, m) derivative with w of the modal impedances, times modal amplitudes (k, m)."""
     rate = (-2 * w[:, None] + 1j * stack.viscous) * modal
     return rate if stack.coupled is None else rate + 1j * (stack.coupled @ modal[:, :, None])[:, :, 0]
+
+
+def damping_rate(stack: Stack, w: np.ndarray, modal: np.ndarray) -> np.ndarray:
+    """(k, m) the damping's part of the modal impedances, times modal amplitudes (k, m)."""
+    w = w[:, None]
+    rate = 1j * (w * stack.viscous + np.sign(w) * stack.hysteretic) * modal
+    return rate if stack.coupled is None else rate + 1j * w * (stack.coupled @ modal[:, :, None])[:, :, 0]
 
 
 def lost(stack: Stack, w: np.ndarray, modal: np.ndarray) -> np.ndarray:

@@ -3,8 +3,7 @@
 The friction law scales: f is homogeneous of degree one in (kt, kn, n0), and a function of kt w_t, kn w_n + n0 and mu N.
 Euler's relation therefore gives every derivative with a contact parameter from f and df/dw.
 
-Parameters and their units: "omega" [rad/s]; "force", "load", "mu", "kt", "kn", "mass" are logarithms of factors [1];
-"gap" is an opening [m].
+Parameters and their units: "omega" [rad/s]; "gap" is an opening [m]; all others are logarithms of factors [1].
 """
 
 from __future__ import annotations
@@ -13,20 +12,22 @@ import numpy as np
 
 from ..data import RigidBody
 from ..errors import InputError
-from .bodies import amplitudes, flexibility, impedance_rate, motion
+from .bodies import Stack, amplitudes, damping_rate, flexibility, impedance_rate, motion
 from .model import ReducedModel
 from .residual import Balance, State, as_amplitudes, as_coefficients
 from .solution import blade_motion
 from .vary import check_parameter
 
-__all__ = ["body_rate", "contact_load", "contact_rate", "rate"]
+BODIES = ("omega", "force", "mass", "damping")      # parameters that the contact law does not see
+
+__all__ = ["BODIES", "body_rate", "contact_load", "contact_rate", "rate"]
 
 
 def rate(balance: Balance, state: State, name: str) -> np.ndarray:
     """(n, d, K) derivative of the residual with a parameter at fixed displacements, at a solved state [m]."""
     linear = balance.linear
     check_parameter(name, also=("omega",))
-    if name in ("omega", "force", "mass"):
+    if name in BODIES:
         moved, _ = body_rate(balance.model, linear.omega, as_amplitudes(contact_load(balance.model, state)), name)
         moved[1:] -= (linear.A[1:] @ (linear.springs * moved[1:])[:, :, None])[:, :, 0]
         moved[0] -= linear.A[0] @ (linear.springs * moved[0])
@@ -69,24 +70,33 @@ def contact_rate(model: ReducedModel, state: State, name: str) -> np.ndarray:
 
 
 def body_rate(model: ReducedModel, omega: float, force: np.ndarray, name: str) -> tuple[np.ndarray, np.ndarray]:
-    """Derivatives of the bodies' motion under constant contact forces (H+1, m) with "omega", "force" or "mass".
+    """Derivatives of the bodies' motion under constant contact forces (H+1, m), with a parameter of BODIES.
 
     Returns:
         (H+1, m) of the relative contact displacements and (H+1, probes) of the probes.
     """
     blades, ports, modal = blade_motion(model, omega, force)
-    orders = np.arange(len(force))
-    if name == "omega":
-        flexible = flexibility(blades, omega * orders)
-        push = impedance_rate(blades, omega * orders, modal) * orders[:, None]
-        modal = -(flexible * push if flexible.ndim == 2 else (flexible @ push[:, :, None])[:, :, 0])
-        modal[0], ports = 0.0, np.zeros_like(ports)
+    if name in ("omega", "damping"):
+        modal, ports = _modal_rate(blades, omega, modal, name), np.zeros_like(ports)
     elif name == "force":
         blades, ports, modal = blade_motion(model, omega, np.zeros_like(force))
     else:
         modal, ports = np.zeros_like(modal), np.zeros_like(ports)
     contact = motion(blades, modal, ports, blades.contact) - _damper_rate(model, omega, force, name)
     return contact, motion(blades, modal, ports, blades.probe)
+
+
+def _modal_rate(body: Stack, omega: float, modal: np.ndarray, name: str) -> np.ndarray:
+    """(H+1, m) derivative of modal amplitudes under constant forces."""
+    orders = np.arange(len(modal))
+    flexible = flexibility(body, omega * orders)
+    if name == "omega":
+        push = impedance_rate(body, omega * orders, modal) * orders[:, None]
+    else:
+        push = damping_rate(body, omega * orders, modal)
+    rate = -(flexible * push if flexible.ndim == 2 else (flexible @ push[:, :, None])[:, :, 0])
+    rate[0] = 0.0
+    return rate
 
 
 def _damper_rate(model: ReducedModel, omega: float, force: np.ndarray, name: str) -> np.ndarray:
@@ -98,15 +108,11 @@ def _damper_rate(model: ReducedModel, omega: float, force: np.ndarray, name: str
         B = model.damper.B[model.rows]
         moved = np.zeros_like(force)
         moved[1:] = -(B @ np.linalg.solve(model.damper.mass, B.T @ force[1:].T)).T / w[1:, None]**2
-        return moved * (-2 / omega if name == "omega" else -1.0)
+        return moved * {"omega": -2 / omega, "mass": -1.0, "damping": 0.0}[name]
     if name == "mass":
         raise InputError("mass: expected damper to be a RigidBody")
     damper = model.elastic_damper(len(force) - 1)
     ports = np.zeros((len(force), damper.shapes.shape[1]), dtype=complex)
     ports[:, damper.contact] = force
-    flexible = flexibility(damper, w)
-    modal = amplitudes(damper, flexible, ports)
-    push = impedance_rate(damper, w, modal) * np.arange(len(force))[:, None]
-    modal = -(flexible * push if flexible.ndim == 2 else (flexible @ push[:, :, None])[:, :, 0])
-    modal[0] = 0.0
+    modal = _modal_rate(damper, omega, amplitudes(damper, flexibility(damper, w), ports), name)
     return motion(damper, modal, np.zeros_like(ports), damper.contact)

@@ -21,7 +21,7 @@ from .iterative import iterative_inverse
 from .linear import Linear
 from .model import ReducedModel
 
-__all__ = ["Balance", "Inverse", "State", "as_amplitudes", "as_coefficients", "contact_forces",
+__all__ = ["Balance", "Inverse", "State", "adjoint", "as_amplitudes", "as_coefficients", "contact_forces",
            "contact_table", "evaluate_balance", "linear_arguments", "linearise", "start_in_stick"]
 
 DENSE = 600         # unknowns up to which a dense factorisation is faster than GMRES
@@ -90,14 +90,12 @@ def linearise(balance: Balance, state: State) -> Inverse:
     numpy.linalg.LinAlgError where the derivative is singular.
     """
     n, d, K = state.w.shape
-    change = _force_change(balance, state)
-    active = np.flatnonzero(abs(change).reshape(n, -1).max(axis=1) > STICKS * balance.model.springs.max(axis=1))
+    change, active, dofs = _active(balance, state)
     if len(active) == 0:
         return lambda residual, accuracy=0.0: residual.copy()
     others, change = np.setdiff1d(np.arange(n), active), change[active]
-    dofs = (active[:, None] * d + np.arange(d)).ravel()
     A = balance.linear.A if len(active) == n else np.ascontiguousarray(balance.linear.A[:, dofs][:, :, dofs])
-    inverse = (_dense_inverse if len(dofs) * K <= DENSE else iterative_inverse)(A, change)
+    inverse = _inverse(A, change)
 
     def solve(residual: np.ndarray, accuracy: float = ACCURACY) -> np.ndarray:
         step = residual.copy()
@@ -109,6 +107,38 @@ def linearise(balance: Balance, state: State) -> Inverse:
         return step
 
     return solve
+
+
+def adjoint(balance: Balance, state: State) -> Inverse:
+    """The transposed inverse of the balance's derivative:  (1 + A C)^-T b = b - C^T (1 + A^T C^T)^-1 A^T b."""
+    K = state.w.shape[2]
+    change, active, dofs = _active(balance, state)
+    if len(active) == 0:
+        return lambda b, accuracy=0.0: b.copy()
+    turned = np.ascontiguousarray(balance.linear.A.conj().swapaxes(1, 2))
+    back = np.ascontiguousarray(change[active].swapaxes(1, 2))
+    inverse = _inverse(np.ascontiguousarray(turned[:, dofs][:, :, dofs]), back)
+
+    def solve(b: np.ndarray, accuracy: float = ACCURACY) -> np.ndarray:
+        flexed = _shaped(balance, _apply(turned, as_amplitudes(b)))[active]
+        x = inverse(flexed.reshape(-1, K), accuracy)
+        result = b.copy()
+        result[active] -= (back @ x.reshape(len(active), -1, 1)).reshape(flexed.shape)
+        return result
+
+    return solve
+
+
+def _active(balance: Balance, state: State) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Derivative of p (n, dK, dK), the nodes where it does not vanish, and their dofs."""
+    n, d, _ = state.w.shape
+    change = _force_change(balance, state)
+    active = np.flatnonzero(abs(change).reshape(n, -1).max(axis=1) > STICKS * balance.model.springs.max(axis=1))
+    return change, active, (active[:, None] * d + np.arange(d)).ravel()
+
+
+def _inverse(A: np.ndarray, change: np.ndarray) -> Inverse:
+    return (_dense_inverse if A.shape[1] * (2 * len(A) - 1) <= DENSE else iterative_inverse)(A, change)
 
 
 def _dense_inverse(A: np.ndarray, change: np.ndarray) -> Inverse:

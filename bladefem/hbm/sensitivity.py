@@ -10,7 +10,7 @@ import numpy as np
 from ..errors import InputError
 from .linear import condense
 from .model import ReducedModel
-from .rates import body_rate, contact_load, contact_rate, rate
+from .rates import BODIES, body_rate, contact_load, contact_rate, rate
 from .residual import Balance, Inverse, State, as_amplitudes, evaluate_balance, linearise
 from .solution import Solution, probe_motion
 
@@ -46,7 +46,7 @@ def _sensitivity(balance: Balance, state: State, inverse: Inverse, solution: Sol
     dw = -inverse(rate(balance, state, name), 1e-9)
     df = (state.forces.dfdw.reshape(n, d * K, d * K) @ dw.reshape(n, d * K, 1)).reshape(n, d, K)
     probe = np.zeros_like(solution.probe)
-    if name in ("omega", "force", "mass"):
+    if name in BODIES:
         load = as_amplitudes(contact_load(model, state))
         direct, probe = body_rate(model, linear.omega, load, name)
     else:

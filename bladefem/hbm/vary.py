@@ -7,9 +7,9 @@ from dataclasses import replace
 
 import numpy as np
 
-from ..data import Elements, RigidBody
+from ..data import Elements, PortModel, RigidBody
 from ..errors import InputError, suggestion
-from .model import ReducedModel
+from .model import Damping, ReducedModel
 
 __all__ = ["PARAMETERS", "check_parameter", "vary"]
 
@@ -28,14 +28,30 @@ def _mass(model: ReducedModel, factor: float) -> ReducedModel:
     raise InputError("mass: only a rigid damper's mass is a parameter, expected damper to be a RigidBody")
 
 
+def _load(model: ReducedModel, factor: float) -> ReducedModel:
+    normal = {h: factor * np.asarray(force) for h, force in model.normal.items()}
+    return replace(model, elements=replace(model.elements, n0=factor * model.elements.n0), normal=normal)
+
+
+def _damping(model: ReducedModel, factor: float) -> ReducedModel:
+    def scaled(body: PortModel) -> PortModel:
+        return body if body.damping is None else replace(body, damping=factor * body.damping)
+
+    ours, theirs = (Damping(factor * d.ratio, factor * d.structural, factor * d.mass, factor * d.stiffness)
+                    for d in (model.damping, model.damper_damping))
+    damper = tuple(map(scaled, model.damper)) if isinstance(model.damper, tuple) else model.damper
+    return replace(model, sides=tuple(map(scaled, model.sides)), damping=ours, damper=damper, damper_damping=theirs)
+
+
 PARAMETERS: dict[str, Callable[[ReducedModel, float], ReducedModel]] = {
     "force": _force,                                                                # factor of all excitations
-    "load": _elements(lambda e, factor: replace(e, n0=factor * e.n0)),              # factor of all normal loads
+    "load": _load,                                                                  # factor of all normal loads
     "mu": _elements(lambda e, factor: replace(e, mu=factor * e.mu)),                # factor
     "kt": _elements(lambda e, factor: replace(e, kt=factor * e.kt)),                # factor
     "kn": _elements(lambda e, factor: replace(e, kn=factor * e.kn)),                # factor
     "gap": _elements(lambda e, gap: replace(e, n0=e.n0 - e.kn * gap)),              # added opening [m]
     "mass": _mass,                                                                  # factor of a rigid damper's mass
+    "damping": _damping,                                                            # factor of the bodies' damping
 }
 
 

@@ -1,11 +1,14 @@
 """Sensitivities against central differences of solved points."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from models import block, single_mass
 
 from bladefem.errors import InputError
 from bladefem.hbm.api import solve
+from bladefem.hbm.gradient import node_gradients
 from bladefem.hbm.newton import Options
 from bladefem.hbm.reference import reference_model
 from bladefem.hbm.sensitivity import sensitivities
@@ -13,7 +16,7 @@ from bladefem.hbm.sweep import size
 from bladefem.hbm.vary import vary
 
 TIGHT = Options(tolerance=1e-13)
-COUPLED = ("omega", "force", "load", "mu", "kt", "kn", "gap")
+COUPLED = ("omega", "force", "load", "mu", "kt", "kn", "gap", "damping")
 
 
 def difference(model, near, name, step):
@@ -26,10 +29,12 @@ def difference(model, near, name, step):
 
 
 @pytest.mark.parametrize(("model", "omega", "names"), [
-    (single_mass(), 1.1, ("omega", "force", "load", "mu", "kt")), (block(force=1.5), 0.9, COUPLED),
+    (single_mass(), 1.1, ("omega", "force", "load", "mu", "kt", "damping")),
+    (replace(single_mass(), normal={1: np.array([0.2j])}), 1.1, ("omega", "force", "load", "mu", "kt", "damping")),
+    (block(force=1.5), 0.9, COUPLED),
     (block(force=0.5, damper=True), 1.3, (*COUPLED, "mass")),
     (reference_model(load=1.4, points=3, phase=0.7, harmonics=5), 8300.0,
-     ("omega", "force", "load", "mu", "kt", "mass"))])
+     ("omega", "force", "load", "mu", "kt", "mass", "damping"))])
 def test_sensitivities_equal_differences(model, omega, names):
     solution = solve(model, omega, 5, 512, options=TIGHT)
     assert solution.converged and solution.states["slip"] + solution.states["lift"]
@@ -48,3 +53,28 @@ def test_unknown_parameter():
         sensitivities(model, solve(model, 1.1), ["loads"])
     with pytest.raises(InputError, match="gap"):
         sensitivities(model, solve(model, 1.1), ["gap"])
+
+
+@pytest.mark.parametrize(("model", "omega", "names"), [
+    (block(force=1.5), 0.9, ("load", "mu", "kt", "kn", "gap")),
+    (block(force=0.5, damper=True), 1.3, ("load", "mu", "kt", "kn", "gap")),
+    (reference_model(load=1.4, points=3, phase=0.7, harmonics=5), 8300.0, ("load", "mu", "kt"))])
+def test_gradients_of_the_nodes(model, omega, names):
+    """Their sum is the direct derivative; the load of one node is checked by differences."""
+    solution = solve(model, omega, 5, 512, options=TIGHT)
+    found, direct = node_gradients(model, solution, names), sensitivities(model, solution, names)
+    for name in names:
+        assert found[name].sum() == pytest.approx(direct[name].size[0], rel=1e-7), name
+    def height(factor):
+        n0 = model.elements.n0.copy()
+        n0[1] *= factor
+        return size(solve(replace(model, elements=replace(model.elements, n0=n0)), omega, 5, 512, start=solution,
+                          options=TIGHT))
+    slope = (height(1 + 1e-5) - height(1 - 1e-5)) / 2e-5
+    assert found["load"][1] == pytest.approx(slope, rel=1e-3, abs=1e-4 * abs(found["load"]).max())
+
+
+def test_gradients_of_bodies_are_refused():
+    model = single_mass()
+    with pytest.raises(InputError, match="expected contact parameters"):
+        node_gradients(model, solve(model, 1.1), ["mass"])
