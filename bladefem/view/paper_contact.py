@@ -1,0 +1,60 @@
+"""Pictures of contact and stability for the paper's page: the punch of Fig. 5 and 6, branches of solutions."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+
+import numpy as np
+
+from .style import COLOURS, canvas, log_axis
+
+__all__ = ["draw_branches", "draw_punch"]
+
+
+def draw_punch(radius: np.ndarray, pressure: np.ndarray, exact: tuple[np.ndarray, np.ndarray],
+               rings: tuple[np.ndarray, np.ndarray, np.ndarray], file: str | Path | None = None) -> object:
+    """Pressure under a round punch, and the stiffness of rings of contact springs (Fig. 5, 6); returns the figure.
+
+    Args:
+        radius, pressure: (n,) of the nodes over the radius of the punch [1] and over the mean pressure [1].
+        exact: radius (k,) [1] and pressure (k,) [1] of Johnson's formula.
+        rings: middles (m,) [1], stiffness by finite elements (m,) and by Eq. 25 (m,) [N/m].
+    """
+    with canvas(file, None, (9.4, 4.0), (1, 2)) as (left, right):
+        order = np.argsort(radius)
+        left.plot(*exact, color=COLOURS[1], label="Johnson, Eq. 24 in terms of the force")
+        left.plot(radius[order], pressure[order], "o", ms=3, color=COLOURS[0], label="finite elements, all nodes")
+        left.set(xlabel="radius over that of the punch", ylabel="pressure over its mean", ylim=(0, 4),
+                 title="under a flat punch")
+        left.legend()
+        width = rings[0][1] - rings[0][0]
+        right.bar(rings[0], rings[1] / 1e6, 0.85 * width, color=COLOURS[5], label="force of the ring over the approach")
+        right.plot(rings[0], rings[2] / 1e6, "o-", color=COLOURS[1], ms=4, label="Eq. 25 over the ring")
+        right.set(xlabel="radius over that of the punch", ylabel="stiffness of a ring [N/µm]",
+                  title="discretised springs")
+        right.legend()
+        return left.figure
+
+
+def draw_branches(frequency: np.ndarray, amplitude: np.ndarray, multiplier: np.ndarray,
+                  marks: Sequence[tuple[float, float]], file: str | Path | None = None) -> object:
+    """A path of periodic solutions, unstable parts dashed, and its largest multiplier; returns the figure.
+
+    Args:
+        frequency: (p,) along the path [Hz]. amplitude: (p,) [m]. multiplier: (p,) largest modulus [1].
+        marks: (frequency [Hz], amplitude [m]) of single solutions.
+    """
+    unstable = multiplier > 1 + 1e-6
+    with canvas(file, None, (9.4, 4.0), (1, 2), sharex=True) as (left, right):
+        for ax, values in ((left, 1e6 * amplitude), (right, multiplier)):
+            ax.plot(frequency, np.where(unstable, np.nan, values), color=COLOURS[0], label="stable")
+            ax.plot(frequency, np.where(unstable, values, np.nan), "--", color=COLOURS[1], label="unstable")
+            ax.set_xlabel("frequency [Hz]")
+        left.plot([f for f, _ in marks], [1e6 * a for _, a in marks], "ko", ms=5, label="by shooting")
+        right.axhline(1.0, color="#888888", lw=0.8)
+        left.set(ylabel="amplitude [µm]", title="normal load follows the motion")
+        right.set(ylabel="largest Floquet multiplier", title="stability")
+        log_axis(left, "y")
+        left.legend()
+        return left.figure
