@@ -6,7 +6,8 @@ those of the low one, turned and shifted in phase by n theta. Then
     K(n) = T(n)^H K T(n) = K0 + cos(n theta) Kc + j sin(n theta) Ks
 
 with three real sparse matrices that serve every nodal diameter n. A plane face named "symmetry_x", "symmetry_y" or
-"symmetry_z" slides in its plane: the displacement along that axis is zero there.
+"symmetry_z" slides in its plane: the displacement along that axis is zero there. On a plane "antisymmetry_x", ... the
+two others are zero: the deformed body turns over in the mirror.
 """
 
 from __future__ import annotations
@@ -241,21 +242,29 @@ def _parts(body: Body, clamped: np.ndarray, pair: Pair | None,
 
 
 def _slid(body: Body, pair: Pair | None) -> np.ndarray:
-    """(n_points*dim,) true where a symmetry plane holds the displacement along its axis."""
-    points, held = body.mesh.points, np.zeros((len(body.mesh.points), body.dim), bool)
-    for axis, name in enumerate(("symmetry_x", "symmetry_y", "symmetry_z")[:body.dim]):
-        nodes = np.unique(body.mesh.faces.get(name, np.empty(0, int)))
-        nodes = nodes[body.rows[nodes] >= 0]
-        if not len(nodes):
-            continue
-        if np.ptp(points[nodes, axis]) > 1e-6 * np.ptp(points, axis=0).max():
-            raise InputError(f"face '{name}' extends from {points[nodes, axis].min():.6g} to "
-                             f"{points[nodes, axis].max():.6g} m along {name[-1]}, expected a plane across that axis")
-        if pair is not None and abs(pair.rotation[axis, axis] - 1) > 1e-12:
-            raise InputError(f"face '{name}' is not across the axis of the wheel, expected cyclic faces or a symmetry "
-                             "plane, not both")
-        held[nodes, axis] = True
+    """(n_points*dim,) true where a plane of symmetry or antisymmetry holds a displacement."""
+    held = np.zeros((len(body.mesh.points), body.dim), bool)
+    for axis, letter in enumerate("xyz"[:body.dim]):
+        across = np.arange(body.dim) == axis
+        for name, directions in ((f"symmetry_{letter}", across), (f"antisymmetry_{letter}", ~across)):
+            held[np.ix_(_plane(body, name, axis, pair), directions)] = True
     return held.ravel()
+
+
+def _plane(body: Body, name: str, axis: int, pair: Pair | None) -> np.ndarray:
+    """The body's nodes on a plane across an axis, checked."""
+    points = body.mesh.points
+    nodes = np.unique(body.mesh.faces.get(name, np.empty(0, int)))
+    nodes = nodes[body.rows[nodes] >= 0]
+    if not len(nodes):
+        return nodes
+    if np.ptp(points[nodes, axis]) > 1e-6 * np.ptp(points, axis=0).max():
+        raise InputError(f"face '{name}' extends from {points[nodes, axis].min():.6g} to "
+                         f"{points[nodes, axis].max():.6g} m along {name[-1]}, expected a plane across that axis")
+    if pair is not None and abs(pair.rotation[axis, axis] - 1) > 1e-12:
+        raise InputError(f"face '{name}' is not across the axis of the wheel, expected cyclic faces or a symmetry "
+                         "plane, not both")
+    return nodes
 
 
 def _with_partners(clamped: np.ndarray, pair: Pair | None) -> np.ndarray:

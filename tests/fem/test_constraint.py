@@ -126,6 +126,14 @@ def test_symmetry_planes_leave_the_symmetric_modes():
     assert constrain(assemble(quarter, "blade", STEEL), None).T.shape[1] == both.shapes[0].size - 2 * 45
 
 
+def test_an_antisymmetry_plane_leaves_the_other_modes():
+    whole = box((4, 4, 4), (1.0, 0.3, 0.2), origin=(0.0, -0.15, -0.1), cell_type="hexahedron27")
+    half = box((4, 4, 2), (1.0, 0.3, 0.1), cell_type="hexahedron27", origin=(0.0, -0.15, 0.0))
+    sides = [replace(half, faces={**half.faces, name: half.faces["z0"]}) for name in ("symmetry_z", "antisymmetry_z")]
+    every, even, odd = (modes(constrain(assemble(m, "blade", STEEL)), 8).frequencies for m in (whole, *sides))
+    np.testing.assert_allclose(np.sort(np.r_[even, odd])[:8], every, rtol=1e-9)
+
+
 def test_a_floating_half_keeps_the_rigid_motions_in_its_plane():
     mesh = box((2, 2, 2), (1.0, 1.0, 1.0))
     mesh = replace(mesh, faces={**mesh.faces, "symmetry_y": mesh.faces["y0"]})
