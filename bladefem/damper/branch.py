@@ -1,0 +1,97 @@
+"""Stability along a path of periodic solutions: the balance follows the path, Floquet multipliers judge each point.
+
+With prescribed normal loads and damping the periodic motion is unique (friction with a given limit is monotone in the
+displacement), and its multipliers stay within the unit circle. Where the normal load follows the motion and the contact
+can open, the stuck and the rocking motion coexist between two folds, with an unstable one between them.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+import numpy as np
+
+from bladefem.data import Elements, PortModel
+from bladefem.friction.harmonics import synthesis
+from bladefem.hbm.api import solve
+from bladefem.hbm.follow import follow
+from bladefem.hbm.model import Damping, ReducedModel
+from bladefem.hbm.solution import Solution
+
+from .events import State
+from .shooting import Periodic, harmonics, multipliers, periodic
+from .system import System
+
+__all__ = ["BranchPoint", "branch", "inclined_contact"]
+
+NEAR = 0.02         # relative distance beyond which shooting has left the solution of the balance
+
+
+@dataclass(frozen=True)
+class BranchPoint:
+    """A point of the path."""
+
+    frequency: float        # [Hz]
+    amplitude: float        # of the first harmonic at the probe, by shooting [m]
+    balance: float          # the same by the balance of harmonics [m]
+    multiplier: float       # largest modulus [1]; 1 for a contact that sticks all the time (neutral slider)
+    fold: bool              # the path turned back before this point
+    reason: str             # "periodic", or why shooting did not confirm the point
+
+
+def inclined_contact(load: float = 10.0, force: float = 2.0) -> tuple[ReducedModel, System]:
+    """One mass, 100 Hz, 0.5 % damping, on an inclined contact whose normal load follows it and can open.
+
+    Args:
+        load: static normal force [N].
+        force: amplitude of the excitation [N].
+
+    Returns:
+        The same system for the balance and for integration in time.
+    """
+    omega, angle, kn, kt = 200 * np.pi, 1.2, 8e5, 1e5
+    shapes = np.array([[np.sin(angle)], [np.cos(angle)], [1.0], [1.0]])
+    body = PortModel(np.array([omega]), shapes, np.zeros((4, 4)),
+                     {"contact": slice(0, 2), "load": slice(2, 3), "probe": slice(3, 4)})
+    elements = Elements(np.array([kt]), np.array([kn]), np.array([0.3]), np.array([load]), 1)
+    model = ReducedModel((body,), elements, {1: np.array([force], complex)}, Damping(ratio=0.005))
+    R = shapes[:1]
+    system = System(np.array([omega**2]), np.array([[0.01 * omega]]), shapes[1:2], elements.kt, elements.mu,
+                    np.array([[0.0, force, 0.0]]), np.zeros((1, 3)), np.array([[load, 0.0, 0.0]]), kn * R,
+                    np.ones((1, 1)), R)
+    return model, system
+
+
+def branch(model: ReducedModel, system: System, band: tuple[float, float], H: int = 15,
+           samples: int = 512) -> Iterator[BranchPoint]:
+    """The path in frequency that starts at the upper end of a band [Hz] and runs down, round its folds.
+
+    The system has one coordinate, which is the probe.
+
+    Raises:
+        NotSolvedError: the path could not be followed to an end of the band.
+    """
+    low, high = (2 * np.pi * f for f in band)
+    start = solve(model, high, H, samples)
+    for point in follow(model, "omega", start, (low, high), forward=False, steps=(0.005, 0.02)):
+        shot = periodic(system, point.solution.omega, _state(point.solution, system))
+        amplitude = float(abs(harmonics(shot, system, 1)[0, 1]))
+        wanted = float(abs(point.solution.probe[1, 0]))
+        yield BranchPoint(point.solution.frequency, amplitude, wanted, float(np.abs(multipliers(shot)[0])), point.fold,
+                          _verdict(shot, amplitude, wanted))
+
+
+def _verdict(shot: Periodic, amplitude: float, wanted: float) -> str:
+    if shot.converged and abs(amplitude / wanted - 1) > NEAR:
+        return "shooting went to another solution"
+    return shot.reason
+
+
+def _state(solution: Solution, system: System) -> State:
+    """State at t = 0 of a solution of the balance."""
+    orders = np.arange(len(solution.probe))[:, None]
+    q, v = solution.probe.sum(axis=0).real, (1j * orders * solution.omega * solution.probe).sum(axis=0).real
+    first = synthesis(solution.harmonics, solution.samples)[0]
+    slider = solution.w[:, -1] @ first - solution.f[:, -1] @ first / system.kt
+    return State(q, v, slider)
