@@ -18,7 +18,7 @@ import numpy as np
 from ..errors import NotSolvedError
 from .newton import Options, newton
 from .rates import rate
-from .residual import Balance, State, evaluate_balance, linearise
+from .residual import Balance, State, evaluate_balance, linearise, orientation
 
 __all__ = ["Spot", "Task", "advance", "spot_at"]
 
@@ -51,7 +51,16 @@ class Spot:
     iterations: int
     slope: np.ndarray       # (n, d, K) dw/dx
     sign: float             # of dx along the path
+    orientation: float      # sign of the determinant of dr/dw; 0 where it is not known
     leapt: bool = False
+
+    def branches(self, before: Spot) -> bool:
+        """Another path crosses this one since the spot before.
+
+        The determinant of the balance bordered by the tangent has the sign of det dr/dw times that of dx: at a fold
+        both change, at a crossing one of them (Keller 1977).
+        """
+        return not self.leapt and self.orientation * self.sign * before.orientation * before.sign < 0
 
     def tangent(self, task: Task, size: float) -> tuple[np.ndarray, float]:
         """Unit tangent in displacements over their size and the parameter over its width."""
@@ -124,4 +133,5 @@ def _leap(task: Task, spot: Spot, share: float) -> Spot | None:
 
 def spot_at(task: Task, x: float, balance: Balance, state: State, iterations: int, sign: float) -> Spot:
     """A solved state with the direction of its path, x rising along it for sign 1 and falling for -1."""
-    return Spot(x, balance, state, iterations, -linearise(balance, state)(rate(balance, state, task.name)), sign)
+    slope = -linearise(balance, state)(rate(balance, state, task.name))
+    return Spot(x, balance, state, iterations, slope, sign, orientation(balance, state))

@@ -32,6 +32,7 @@ class PathPoint:
     forward: bool           # the parameter rises along the path here
     fold: bool              # the parameter turned back between the point before and this one
     leapt: bool = False     # a small gap of the path lies before this point
+    branch: bool = False    # another path crosses between the point before and this one
 
 
 def follow(model: ReducedModel, name: str, start: Solution, bounds: tuple[float, float], *, forward: bool = True,
@@ -50,11 +51,12 @@ def follow(model: ReducedModel, name: str, start: Solution, bounds: tuple[float,
     task, x, state = _prepare(model, name, start, bounds, options)
     low, high = (_inner(name, bound) for bound in bounds)
     spot = spot_at(task, x, task.balance(x), state, 0, 1.0 if forward else -1.0)
-    yield _point(task, spot, fold=False)
+    yield _point(task, spot)
     step, longest = steps
     for _ in range(LIMIT):
+        before = spot
         spot, step, fold = advance(task, spot, step, longest)
-        yield _point(task, spot, fold)
+        yield _point(task, spot, fold, spot.branches(before))
         if not low <= spot.x <= high:
             return
     raise NotSolvedError(f"path in {name} stopped at {_value(name, spot.x):.6g} after {LIMIT} points")
@@ -79,10 +81,10 @@ def _prepare(model: ReducedModel, name: str, start: Solution, bounds: tuple[floa
     return task, x, evaluate_balance(balance(x), near.w)
 
 
-def _point(task: Task, spot: Spot, fold: bool) -> PathPoint:
+def _point(task: Task, spot: Spot, fold: bool = False, branch: bool = False) -> PathPoint:
     end = Newton(spot.state, spot.iterations, True, "residual within tolerance")
     solution = as_solution(spot.balance, Attempt("path following", end), spot.iterations, end.reason)
-    return PathPoint(_value(task.name, spot.x), solution, spot.sign > 0, fold, spot.leapt)
+    return PathPoint(_value(task.name, spot.x), solution, spot.sign > 0, fold, spot.leapt, branch)
 
 
 def _inner(name: str, value: float) -> float:

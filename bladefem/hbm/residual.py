@@ -22,7 +22,7 @@ from .linear import Linear
 from .model import ReducedModel
 
 __all__ = ["Balance", "Inverse", "State", "adjoint", "as_amplitudes", "as_coefficients", "contact_forces",
-           "contact_table", "evaluate_balance", "linear_arguments", "linearise", "start_in_stick"]
+           "contact_table", "evaluate_balance", "linear_arguments", "linearise", "orientation", "start_in_stick"]
 
 DENSE = 600         # unknowns up to which a dense factorisation is faster than GMRES
 ACCURACY = 1e-5     # of a step by GMRES, relative
@@ -127,6 +127,18 @@ def adjoint(balance: Balance, state: State) -> Inverse:
         return result
 
     return solve
+
+
+def orientation(balance: Balance, state: State) -> float:
+    """Sign of the determinant of the balance's derivative; 0 where there are too many unknowns to ask."""
+    change, active, dofs = _active(balance, state)
+    if len(dofs) == 0 or len(dofs) * state.w.shape[2] > DENSE:
+        return float(len(dofs) == 0)
+    if not len(dofs):           # everything sticks: the derivative is the identity
+        return 1.0
+    J = _jacobian(balance.linear.A[:, dofs][:, :, dofs], change[active])
+    J[np.diag_indices_from(J)] += 1.0
+    return float(np.linalg.slogdet(J)[0])
 
 
 def _active(balance: Balance, state: State) -> tuple[np.ndarray, np.ndarray, np.ndarray]:

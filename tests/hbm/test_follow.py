@@ -1,7 +1,6 @@
-"""Paths against points solved one by one, and a fold against the ends of its hysteresis."""
+"""Paths against points solved one by one, a fold against the ends of its hysteresis, branch points by symmetry."""
 
-
-
+from dataclasses import replace
 from itertools import pairwise
 
 import numpy as np
@@ -12,7 +11,9 @@ from bladefem.data import Elements
 from bladefem.errors import InputError
 from bladefem.hbm.api import solve
 from bladefem.hbm.follow import follow
+from bladefem.hbm.linear import condense
 from bladefem.hbm.model import Damping, ReducedModel
+from bladefem.hbm.residual import Balance, evaluate_balance
 from bladefem.hbm.sweep import size
 from bladefem.hbm.vary import vary
 from bladefem.reduction.matrices import port_model_from_matrices
@@ -57,6 +58,48 @@ def test_folds_lie_where_sweeps_up_and_down_jump():
             heights.append(size(last))
         jump = omegas[int(np.argmax(abs(np.diff(heights))))]
         assert jump == pytest.approx(fold, abs=6e-4)
+
+
+def twins(coupling):
+    """Two of these masses, coupled by a weak spring and driven alike: the motion in step loses its symmetry."""
+    link = 1.0 + coupling * np.array([[1.0, -1.0], [-1.0, 1.0]]) - (1.0 - np.eye(2))
+    K = np.kron(link, np.diag([1.0, 0.0])) + np.kron(np.eye(2), np.diag([0.0, 50.0]))
+    ports = {"contact": np.arange(4), "load": np.array([0, 2]), "probe": np.array([0, 2])}
+    elements = Elements(np.full(2, 1e-3), np.ones(2), np.zeros(2), np.full(2, -1.0), tangents=1)
+    return ReducedModel((port_model_from_matrices(np.eye(4), K, ports),), elements, {1: np.array([0.1, 0.1])},
+                        Damping(ratio=0.02))
+
+
+def test_branch_points_of_two_equal_masses():
+    """In step both masses are the single one; the derivative against each other is that of a mass on 1 + 2 coupling.
+
+    It turns singular between two points of the path where the path in step does not turn: there unequal motions begin.
+    """
+    coupling, H = 0.03, 5
+    points = list(follow(twins(coupling), "omega", solve(twins(coupling), 0.8, H, 0), (0.8, 1.6), steps=(0.03, 0.03)))
+    assert all(abs(p.solution.probe[1, 0] - p.solution.probe[1, 1]) < 1e-9 for p in points)
+    assert [p.fold for p in points].count(True) == 2
+    body = port_model_from_matrices(np.eye(2), np.diag([1.0 + 2 * coupling, 50.0]), {
+        "contact": np.array([0, 1]), "load": np.array([0]), "probe": np.array([0])})
+    apart = replace(stop(), sides=(body,), damping=Damping(ratio=0.02 / np.sqrt(1 + 2 * coupling)))
+    signs = []
+    for p in points:
+        balance, w = Balance(apart, condense(apart, p.value, H), 0), p.solution.w[:1]
+        steps = 1e-7 * abs(w).max() * np.eye(w.size).reshape(-1, *w.shape)
+        J = [(evaluate_balance(balance, w + e).residual - evaluate_balance(balance, w - e).residual).ravel()
+             for e in steps]
+        signs.append(np.linalg.slogdet(np.array(J))[0])
+    turns = [i for i in range(1, len(signs)) if signs[i] != signs[i - 1]]
+    found = [i for i, p in enumerate(points) if p.branch]
+    # one point lies on a crossing to 1e-4 of the determinant: differences put it on the other side
+    assert len(turns) == len(found) == 2 and max(abs(np.subtract(turns, found))) <= 1
+    first = next(p for p in points if p.branch)
+    model, unequal = twins(coupling), []
+    for push in np.linspace(0.05, 0.5, 10):     # beside the path, just after the crossing
+        near = first.solution.w * np.array([1 + push, 1 - push])[:, None, None]
+        end = solve(model, first.value - 0.002, H, 0, start=replace(first.solution, w=near))
+        unequal.append(end.converged and abs(end.probe[1, 0] - end.probe[1, 1]) > 0.02)
+    assert any(unequal)
 
 
 def test_bad_bounds():
