@@ -86,11 +86,13 @@ def pressures(maps: Mapping[float, Sequence[Any]]) -> str:
 
 def responses(response: Any) -> str:
     """Resonance against load, and what damping is gained over no damper."""
-    frequency, undamped = response.free_peak
-    rows = [["no damper", f"{frequency:.2f}", f"{undamped:.4e}", "1", "", ""]]
+    undamped, (free, stuck) = response.free_peak[1], response.limits
+    rows = [["no damper", f"{free.peak_frequency:.2f}", f"{free.peak_amplitude:.4e}", "1", "", ""]]
     for c in response.curves:
         rows.append([show(c.load, "N"), f"{c.peak_frequency:.2f}", f"{c.peak_amplitude:.4e}",
                      f"{undamped / c.peak_amplitude:.3g}", len(c.frequency), int((~c.converged).sum())])
+    rows.append(["full stick", f"{stuck.peak_frequency:.2f}", f"{stuck.peak_amplitude:.4e}",
+                 f"{undamped / stuck.peak_amplitude:.3g}", "", ""])
     best = min(response.curves, key=lambda c: c.peak_amplitude)
     table = plain(rows, ["load", "resonance [Hz]", "amplitude [m]", "reduction", "points", "unconverged"])
     return f"{table}\nbest of these loads: {show(best.load, 'N')}, amplitude divided by " \

@@ -19,6 +19,7 @@ from ..scene import Scene
 from ..scene_file import dump
 from ..store import on_root, write_results
 from ..study import pipeline
+from ..study.limits import Limit
 from ..study.loads import Progress, summary, unwatched
 from ..study.modal import family_table
 from ..view import contact, mesh, modes, response, speed
@@ -82,8 +83,9 @@ def _tables(result: pipeline.Run) -> dict[str, pd.DataFrame]:
             "modes/modes": family_table(excited_modes(result), result.mesh),
             "modes/nodal_diameters": mode_table(result.modes, result.mesh),
             "contact/pressure": pressure,
-            "response/summary": pd.DataFrame(summary(curves, result.response.free_peak[1])),
-            "response/points": pd.concat([points_of(c) for c in curves], ignore_index=True)}
+            "response/summary": pd.DataFrame(summary(curves, result.response.limits)),
+            "response/points": pd.concat([*map(points_of, curves), *map(linear_points, result.response.limits)],
+                                         ignore_index=True)}
 
 
 def _short(value: object) -> str:
@@ -111,6 +113,14 @@ def points_of(curve: Any) -> pd.DataFrame:
                          "error_checked": curve.checked})
 
 
+def linear_points(limit: Limit) -> pd.DataFrame:
+    """One row a point of a linear limit, with the columns of :func:`points_of`."""
+    return pd.DataFrame({"load": limit.load, "frequency": limit.frequency, "amplitude": abs(limit.first),
+                         "phase": np.angle(limit.first), "converged": True, "method": "linear", "residual": 0.0,
+                         "iterations": 0, "slipping": 0, "dissipated": 0.0, "imbalance": 0.0,
+                         "estimated_error": 0.0, "tolerated_error": 0.0, "error_checked": False})
+
+
 def _drawings(result: pipeline.Run, tables: dict[str, pd.DataFrame]) -> dict[str, Callable[[Path], object]]:
     """What to draw: "section/name" to a function of the file."""
     geometry, excited, loads = result.mesh, excited_modes(result), list(result.contact.maps)
@@ -123,7 +133,7 @@ def _drawings(result: pipeline.Run, tables: dict[str, pd.DataFrame]) -> dict[str
             result.contact.maps[middle], file, title=f"normal load {middle:g} N per seat"),
         "response/forced_response": lambda file: response.draw_responses(tables["response/points"], file),
         "response/optimum": lambda file: response.draw_optimum(
-            tables["response/summary"], file, points=tables["response/points"])}
+            tables["response/summary"], file, points=tables["response/points"], own=result.contact.own)}
     if len(result.modes) > 1:
         number = result.scene.excitation.mode - 1
         drawings["modes/mode_on_the_wheel"] = lambda file: modes.draw_wheel_mode(geometry, excited, number, file)

@@ -102,6 +102,7 @@ def trust(points: pd.DataFrame | None) -> tuple[list[str], pd.DataFrame]:
     Args:
         points: response table: load [N], frequency [Hz], converged, method, residual, iterations, optionally reason.
     """
+    points = points if points is None else points[points["method"] != "linear"]
     if points is None or points.empty:
         return [], pd.DataFrame()
     good = points["converged"].astype(bool)

@@ -52,8 +52,8 @@ def reduction_key(scene: Scene, diameters: Sequence[int], modes: int) -> str:
                   np.array(diameters), modes)
 
 
-def response_key(scene: Scene, settings: Settings, loads: Sequence[float]) -> str:
-    """The response curves."""
-    return key_of(contact_key(scene), np.array(loads), scene.contact, scene.operation, scene.excitation, scene.study,
-                  scene.accuracy, scene.model, replace(settings, error=None),
+def response_key(scene: Scene, settings: Settings, load: float) -> str:
+    """The response curve of one load, whichever others are studied with it."""
+    return key_of(contact_key(scene), load, scene.contact, scene.operation, scene.excitation,
+                  replace(scene.study, loads=()), scene.accuracy, scene.model, replace(settings, error=None),
                   code_of("bladefem.hbm", "bladefem.friction", "bladefem.reduction", "bladefem.study"))

@@ -18,15 +18,17 @@ from ..contact.seat import ContactProblem
 from ..contact.seat import solve as seat
 from ..contact.stiffness import aggregation, friction_elements, pair_ratio
 from ..data import ModeSet, Patch, PressureMap
-from ..errors import InputError
+from ..errors import InputError, NotSolvedError
 from ..reduction.truncate import truncated
 from ..scene import Scene
 from ..store import stage
+from ..units import show
 from .choice import choose, covered, peak_of
 from .family import Family, Member, coarsened, member
 from .joint import LoadCase, joint_model
 from .keys import contact_key, mesh_key, modes_key, reduction_key, response_key
-from .loads import Curve, Progress, default_loads, free_peak, study_loads, unwatched
+from .limits import Limit, linear_limits
+from .loads import Curve, Progress, default_loads, study_loads, unwatched
 from .settings import DAMPERS, Settings, enriched, first_settings
 from .stages import (
     Bodies,
@@ -52,6 +54,7 @@ class Seating:
 
     problem: ContactProblem
     maps: dict[float, list[PressureMap]]    # mean normal load of a seat [N] to the map of each patch
+    own: float | None = None                # that load by the damper's own mass at the operating speed [N]
 
 
 @dataclass(frozen=True)
@@ -61,7 +64,12 @@ class Response:
     reduced: Reduced
     settings: Settings
     curves: list[Curve]
-    free_peak: tuple[float, float]          # resonance without damper: [Hz], [m]
+    limits: tuple[Limit, Limit]             # no damper, full stick
+
+    @property
+    def free_peak(self) -> tuple[float, float]:
+        """Resonance without damper: [Hz], [m]."""
+        return self.limits[0].peak_frequency, self.limits[0].peak_amplitude
 
 
 @dataclass(frozen=True)
@@ -109,7 +117,7 @@ def run(scene: Scene, folder: str | Path, until: str = "response", comm: Any = N
         loads = scene.study.loads or default_loads(scene)
         maps = {load: seat(problem, scene.operation.speed, normal=load, bedded=scene.contact.bedded)
                 for load in loads}
-        result = replace(result, contact=Seating(problem, maps))
+        result = replace(result, contact=Seating(problem, maps, _own_load(scene, problem, clock.messages)))
     if until == "contact":
         return result
     return replace(result, response=_response(scene, bodies, result.contact, keep, clock, progress))
@@ -140,7 +148,13 @@ class _Keeper:
     clock: Clock
 
     def __call__(self, name: str, key: str, compute: Callable[[], Any]) -> Any:
-        result, found = stage(self.folder, name, key, compute, self.comm)
+        return self._said(name, *stage(self.folder, name, key, compute, self.comm))
+
+    def alone(self, name: str, key: str, compute: Callable[[], Any]) -> Any:
+        """The same for what one rank does without the others."""
+        return self._said(name, *stage(self.folder, name, key, compute))
+
+    def _said(self, name: str, result: Any, found: bool) -> Any:
         if found:
             self.clock.messages.append(f"{name}: found in the folder, not computed again")
         return result
@@ -152,12 +166,30 @@ def _response(scene: Scene, bodies: Bodies, contact: Seating, keep: _Keeper, clo
     with clock("reduction"):
         settings, reduced = reduced_sector(scene, bodies, cases[len(cases) // 2], patches, keep)
     family = partial(family_of_case, scene, bodies.mesh, reduced, patches)
-    key = response_key(scene, settings, list(contact.maps))
     with clock("response"):
-        curves = keep("response", key, lambda: study_loads(scene, cases, family, settings, bodies.comm, progress))
+        curves = study_loads(scene, cases, family, settings, bodies.comm, progress,
+                             lambda load, make: keep.alone(f"response_{load:g}N", response_key(scene, settings, load),
+                                                           make))
+        band = min(c.frequency[0] for c in curves), max(c.frequency[-1] for c in curves)
+        rich = member(family(cases[-1]), settings).model
+        limits = linear_limits(rich, scene.excitation.mode, band)
     clock.messages.extend(_remarks(scene, settings, curves))
-    rich = member(family(cases[0]), settings).model
-    return Response(reduced, settings, curves, free_peak(rich, scene.excitation.mode))
+    return Response(reduced, settings, curves, limits)
+
+
+def _own_load(scene: Scene, problem: ContactProblem, messages: list[str]) -> float | None:
+    """Mean normal load of a seat [N] by the damper's mass at the operating speed; None when nothing presses it."""
+    if not scene.operation.speed > 0:
+        return None
+    try:
+        maps = seat(problem, scene.operation.speed, bedded=scene.contact.bedded)
+    except NotSolvedError as error:
+        messages.append(f"the damper's own centrifugal load does not seat it: {error}")
+        return None
+    own = float(np.mean([m.force.sum() for m in maps]))
+    messages.append(f"own load: {1e3 * problem.mass:.3g} g press each seat with {own:.4g} N at "
+                    f"{show(scene.operation.speed, 'rad/s')}")
+    return own
 
 
 def load_cases(scene: Scene, mesh: Mesh, contact: Seating) -> list[LoadCase]:

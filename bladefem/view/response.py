@@ -85,7 +85,7 @@ def draw_failed(ax: Any, failed: pd.DataFrame) -> None:
 
 
 def draw_optimum(summary: pd.DataFrame, file: str | Path | None = None, *, points: pd.DataFrame | None = None,
-                 ax: Any = None, title: str = "") -> object:
+                 own: float | None = None, ax: Any = None, title: str = "") -> object:
     """Resonance amplitude and frequency over load, the optimum marked; a curve a mass if there is such a column.
 
     Args:
@@ -93,6 +93,7 @@ def draw_optimum(summary: pd.DataFrame, file: str | Path | None = None, *, point
             optional column "unconverged" (number of points) marks doubtful peaks.
         file: PNG to write.
         points: response table; peaks at the end of the frequency band, which are none, are then drawn hollow.
+        own: load that the damper's mass gives at the operating speed [N].
         ax: two axes to draw into, amplitude and frequency.
         title: headline.
     """
@@ -102,6 +103,10 @@ def draw_optimum(summary: pd.DataFrame, file: str | Path | None = None, *, point
             draw_optimum_curve(axes, table, colour, None if mass is None else f"damper of {1e3 * mass:.4g} g")
         draw_limits(axes, summary)
         draw_cut(axes, summary, points)
+        if own is not None:
+            for axis in axes:
+                axis.axvline(own, color="#555555", lw=1.2, ls=(0, (1, 1)),
+                             label=f"the damper's own load, {own:.4g} N" if axis is axes[0] else None)
         axes[0].set(ylabel="resonance amplitude [µm]", title=title or "optimum load")
         axes[1].set(ylabel="resonance frequency [Hz]", xlabel="normal load per seat [N]")
         log_axis(axes[0], "y")

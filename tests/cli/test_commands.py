@@ -32,7 +32,9 @@ def fake_run(folder):
     modes = [ModeSet(np.array([812.4, 2000.0]), np.zeros((2, 4, 3)), n, np.array([1e-12, 2e-12])) for n in (0, 1)]
     patch = Patch("this", np.zeros((2, 3)), np.array([1e-5, 3e-5]), np.zeros((2, 3, 3)), np.zeros((1, 2)), None, None)
     seat = PressureMap(patch, np.array([40.0, 0.0]), np.array([0.0, 1e-6]), 1e-14)
-    response = SimpleNamespace(free_peak=(812.4, 8e-5), curves=[fake_curve(20.0, 4e-5), fake_curve(50.0, 2e-5)])
+    limits = tuple(SimpleNamespace(peak_frequency=f, peak_amplitude=8e-5) for f in (812.4, 850.0))
+    response = SimpleNamespace(limits=limits, free_peak=(812.4, 8e-5),
+                               curves=[fake_curve(20.0, 4e-5), fake_curve(50.0, 2e-5)])
     return SimpleNamespace(mesh=mesh, modes=modes, contact=SimpleNamespace(maps={40.0: [seat]}), response=response,
                            timings={"mesh": 1.5, "modes": 4.5}, messages=["mesh: found"], folder=folder)
 

@@ -1,0 +1,58 @@
+"""The two linear responses between which friction works: no damper, and a load under which nothing slips."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+
+import numpy as np
+from scipy.optimize import minimize_scalar
+
+from ..data import Elements
+from ..hbm.api import free, stuck
+from ..hbm.model import ReducedModel
+from ..hbm.resonance import free_resonances, stuck_resonances
+
+__all__ = ["Limit", "linear_limits"]
+
+WIDTH = 0.02        # of the resonance frequency, each side: where its height is looked for
+COARSE = 41         # points of that search, before it is refined between the highest and its neighbours
+DETAIL = 80         # points of a drawn curve that crowd round its resonance
+
+
+@dataclass(frozen=True)
+class Limit:
+    """A linear frequency response, under the smallest or the largest load that there is."""
+
+    load: float             # 0: no damper, inf: full stick [N]
+    frequency: np.ndarray   # (k,) [Hz], ascending
+    first: np.ndarray       # (k,) complex first harmonic at the probe [m]
+    peak_frequency: float   # [Hz]
+    peak_amplitude: float   # [m]
+
+
+def linear_limits(model: ReducedModel, mode: int, band: tuple[float, float]) -> tuple[Limit, Limit]:
+    """No damper and full stick, in a frequency band [Hz]; nodes that the static load leaves open stay open."""
+    pressed = replace(model, elements=_pressed(model.elements))
+    return (_limit(0.0, model, free, free_resonances(model)[mode - 1], band),
+            _limit(np.inf, pressed, stuck, stuck_resonances(pressed)[mode - 1], band))
+
+
+def _pressed(elements: Elements) -> Elements:
+    closed = elements.n0 > 0
+    return replace(elements, kt=elements.kt * closed, kn=elements.kn * closed)
+
+
+def _limit(load: float, model: ReducedModel, response: Callable[[ReducedModel, float], np.ndarray], omega: float,
+           band: tuple[float, float]) -> Limit:
+    def first(frequency: float) -> complex:
+        return complex(response(model, 2 * np.pi * frequency)[1, 0])
+
+    near = omega / (2 * np.pi) * np.linspace(1 - WIDTH, 1 + WIDTH, COARSE)
+    top = min(max(int(np.argmax([abs(first(f)) for f in near])), 1), COARSE - 2)
+    found = minimize_scalar(lambda f: -abs(first(f)), bounds=(near[top - 1], near[top + 1]), method="bounded",
+                            options={"xatol": 1e-7 * near[top]})
+    crowd = found.x * (1 + np.outer((-1, 1), np.geomspace(1e-5, 3 * WIDTH, DETAIL // 2))).ravel()
+    frequency = np.unique(np.concatenate([np.linspace(*band, 60), crowd[(crowd > band[0]) & (crowd < band[1])],
+                                          [found.x]]))
+    return Limit(load, frequency, np.array([first(f) for f in frequency]), float(found.x), float(-found.fun))
