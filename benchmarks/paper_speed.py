@@ -16,9 +16,9 @@ import numpy as np
 from bladefem.damper.accelerate import Rules, iterate
 from bladefem.damper.blades import judge, paper_blade
 from bladefem.damper.direct import direct
-from bladefem.damper.events import stuck_start
 from bladefem.damper.paper import platform
 from bladefem.hbm.api import solve
+from bladefem.hbm.flow import stuck_start
 
 MODEL, FREQUENCY = paper_blade(load=1.4), 1315.5
 OMEGA = 2 * np.pi * FREQUENCY

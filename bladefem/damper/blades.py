@@ -28,10 +28,10 @@ from bladefem.hbm.reference import reference_model
 from bladefem.hbm.solution import Solution
 from bladefem.hbm.sweep import size, sweep
 
+from ..hbm.shooting import Periodic, harmonics, periodic
+from ..hbm.system import System, ring
 from .accelerate import Iterated, Rules, iterate
 from .paper import platform
-from .shooting import Periodic, harmonics, periodic
-from .system import System, ring
 
 __all__ = ["Peak", "judge", "load_curve", "loop_response", "optimum", "paper_blade", "peak", "seat_loop"]
 

@@ -19,9 +19,9 @@ from bladefem.hbm.follow import follow
 from bladefem.hbm.model import Damping, ReducedModel
 from bladefem.hbm.solution import Solution
 
-from .events import State
-from .shooting import Periodic, harmonics, multipliers, periodic
-from .system import System
+from ..hbm.flow import State
+from ..hbm.shooting import Periodic, harmonics, multipliers, periodic
+from ..hbm.system import System
 
 __all__ = ["BranchPoint", "branch", "inclined_contact"]
 

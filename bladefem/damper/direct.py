@@ -14,9 +14,9 @@ from numba import njit
 
 from bladefem.errors import InputError, NotSolvedError
 
-from .events import State, rest
+from ..hbm.flow import State, rest
+from ..hbm.system import System
 from .explicit import Cycle, March, explicit_march, sampled, settle, stable_steps
-from .system import System
 
 __all__ = ["contact_step", "direct", "newmark_march"]
 

@@ -15,8 +15,8 @@ from numba import njit
 
 from bladefem.errors import InputError
 
-from .events import State, rest
-from .system import System
+from ..hbm.flow import State, rest
+from ..hbm.system import System
 
 __all__ = ["Cycle", "damper_cycle", "explicit_march", "settle", "stable_steps"]
 

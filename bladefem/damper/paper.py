@@ -23,10 +23,10 @@ from bladefem.errors import InputError
 from bladefem.hbm.linear import receptance
 from bladefem.hbm.model import ReducedModel
 
-from .events import State
+from ..hbm.flow import State
+from ..hbm.shooting import periodic
+from ..hbm.system import damper_on_platforms
 from .explicit import damper_cycle, stable_steps
-from .shooting import periodic
-from .system import damper_on_platforms
 
 __all__ = ["DamperResponse", "Platform", "balance", "damper_response", "equivalent", "platform", "residual"]
 

@@ -13,19 +13,19 @@ import numpy as np
 
 from ..damper.accelerate import Rules, iterate
 from ..damper.direct import direct
-from ..damper.events import stuck_start
 from ..damper.paper import platform
-from ..damper.shooting import harmonics, periodic
-from ..damper.system import System, ring
 from ..data import PortModel, RigidBody
 from ..errors import InputError, NotSolvedError
 from ..friction.events import evaluate_exact
 from ..hbm.api import as_solution, solve
 from ..hbm.fallback import Attempt
+from ..hbm.flow import stuck_start
 from ..hbm.linear import condense
 from ..hbm.model import ReducedModel
 from ..hbm.newton import Newton
 from ..hbm.residual import Balance, State, evaluate_balance, linearise, start_in_stick
+from ..hbm.shooting import harmonics, periodic
+from ..hbm.system import System, ring
 from ..reduction.truncate import truncated
 
 __all__ = ["Method", "Point", "applicable", "balance", "exact", "methods", "tangential"]

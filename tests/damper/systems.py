@@ -4,8 +4,8 @@ from dataclasses import replace
 
 import numpy as np
 
-from bladefem.damper.system import System, ring
 from bladefem.data import Elements
+from bladefem.hbm.system import System, ring
 from bladefem.reduction.beam import reference_blade
 
 

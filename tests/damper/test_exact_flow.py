@@ -7,12 +7,12 @@ import pytest
 from systems import blades, rocking, seat
 
 from bladefem.damper.direct import direct
-from bladefem.damper.events import State, flow, stuck_start
 from bladefem.damper.explicit import damper_cycle, explicit_march, stable_steps
-from bladefem.damper.shooting import harmonics, multipliers, periodic, work
-from bladefem.damper.system import damper_on_platforms, oscillator
 from bladefem.data import Elements
 from bladefem.errors import InputError
+from bladefem.hbm.flow import State, flow, stuck_start
+from bladefem.hbm.shooting import harmonics, multipliers, periodic, work
+from bladefem.hbm.system import damper_on_platforms, oscillator
 
 OMEGA = 2 * np.pi * 1340
 

@@ -12,10 +12,10 @@ from bladefem.damper.accelerate import Rules, iterate
 from bladefem.damper.direct import contact_step, direct
 from bladefem.damper.explicit import damper_cycle
 from bladefem.damper.paper import damper_response, platform
-from bladefem.damper.shooting import harmonics, periodic
-from bladefem.damper.system import damper_on_platforms, oscillator, ring
 from bladefem.hbm.api import solve
 from bladefem.hbm.reference import reference_model
+from bladefem.hbm.shooting import harmonics, periodic
+from bladefem.hbm.system import damper_on_platforms, oscillator, ring
 
 
 def blade(kt, load, mass, phase=0.0):

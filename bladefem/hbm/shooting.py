@@ -13,7 +13,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from .events import Flow, State, flow, stuck_start
+from .flow import Flow, State, flow, stuck_start
 from .system import System
 
 __all__ = ["Periodic", "harmonics", "multipliers", "periodic", "work"]
