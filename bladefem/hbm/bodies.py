@@ -14,7 +14,7 @@ from ..data import PortModel
 from ..errors import InputError
 
 __all__ = ["Damping", "Stack", "amplitudes", "block", "damping_rate", "flexibility", "impedance_rate", "lost", "motion",
-           "receptance", "stacked"]
+           "receptance", "rigid_stack", "stacked"]
 
 
 @dataclass(frozen=True)
@@ -66,6 +66,13 @@ def stacked(bodies: tuple[PortModel, ...], damping: Damping, rows: np.ndarray) -
     residual = np.array([body.residual[np.ix_(p, p)] for body, p in zip(bodies, order, strict=True)])
     a, b, c = np.cumsum([len(part) for part in ports[0]])
     return Stack(omega, viscous, hysteretic, coupled, shapes, residual, slice(0, a), slice(a, b), slice(b, c))
+
+
+def rigid_stack(mass: np.ndarray, B: np.ndarray) -> Stack:
+    """A rigid body with contact displacements B q (m, r) by modes of frequency zero."""
+    shapes = np.linalg.solve(np.linalg.cholesky(mass), B.T).T[None]
+    none, m = np.zeros((1, shapes.shape[2])), shapes.shape[1]
+    return Stack(none, none, none, None, shapes, np.zeros((1, m, m)), slice(0, m), slice(m, m), slice(m, m))
 
 
 def flexibility(stack: Stack, w: np.ndarray) -> np.ndarray:

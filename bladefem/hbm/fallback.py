@@ -5,7 +5,8 @@
    and there may be no exact zero; the solution then says how many samples it has;
 3. harmonics in sequence, 3, 7, 15, ... up to H, each started from the one before;
 4. homotopy in the normal load, from a load under which everything sticks down to the true one;
-5. the same by path following in the excitation, which goes round the folds that contacts with lift-off have.
+5. the same by path following in the excitation, which goes round the folds that contacts with lift-off have;
+6. shooting in time, where the model has a form in time, and Newton from its harmonics.
 """
 
 from __future__ import annotations
@@ -15,8 +16,9 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from ..errors import NotSolvedError
+from ..errors import InputError, NotSolvedError
 from .arclength import Task, advance, spot_at
+from .in_time import shooting_start
 from .linear import Linear
 from .newton import Newton, Options, newton
 from .residual import Balance, evaluate_balance, start_in_stick
@@ -74,6 +76,7 @@ def _ways(balance: Balance, start: np.ndarray | None, options: Options) -> Itera
         yield Attempt("harmonics in sequence", _more_harmonics(balance, options))
     yield Attempt("load homotopy", _from_high_load(balance, options))
     yield Attempt("path in the excitation", _along_excitation(balance, options))
+    yield Attempt("shooting", _from_shooting(balance, near, options))
 
 
 def _more_harmonics(balance: Balance, options: Options) -> Newton:
@@ -152,6 +155,14 @@ def _along_excitation(balance: Balance, options: Options) -> Newton:
     except (NotSolvedError, np.linalg.LinAlgError) as error:
         return _back(balance, replace(end, state=reached), iterations, str(error))
     return _back(balance, replace(end, state=reached), iterations, f"not there after {LONGEST_PATH} points")
+
+
+def _from_shooting(balance: Balance, near: Newton, options: Options) -> Newton:
+    """Newton from the harmonics of a periodic solution in time."""
+    try:
+        return newton(balance, shooting_start(balance), options)
+    except (InputError, NotSolvedError) as error:
+        return Newton(near.state, 0, False, str(error))
 
 
 def _loaded(balance: Balance, level: float) -> Balance:

@@ -14,7 +14,7 @@ import numpy as np
 from numba import njit
 
 from ..data import RigidBody
-from .bodies import Stack
+from .bodies import Stack, rigid_stack
 from .compiled import CONVERGED, back_substitute, compiled_newton, factorise, norm
 from .linear import rigid_motions
 from .model import ReducedModel
@@ -65,7 +65,7 @@ def _prepare(model: ReducedModel, H: int, samples: int) -> tuple | None:
         return None
     blades, loads = bodies[0], model.loads(H)
     if isinstance(model.damper, RigidBody):
-        bodies.append(_rigid_body(model))
+        bodies.append(rigid_stack(model.damper.mass, model.damper.B[model.rows]))
     joined = {name: _joined(bodies, name) for name in ("omega", "viscous", "hysteretic")}
     contact = _joined([blades, *(_reversed(b) for b in bodies[1:])], "shapes", lambda b: b.contact)
     spare = contact.shape[2] - blades.shapes.shape[2]
@@ -81,14 +81,6 @@ def _prepare(model: ReducedModel, H: int, samples: int) -> tuple | None:
     still = np.flatnonzero(blades.omega[0] == 0)
     held = (np.ascontiguousarray(B), g, np.ascontiguousarray(rigid[:len(still)]), still, model.hold)
     return body, held, model.springs.ravel(), contact_table(model, H, samples)
-
-
-def _rigid_body(model: ReducedModel) -> Stack:
-    """The rigid damper by modes of frequency zero."""
-    root = np.linalg.cholesky(model.damper.mass)
-    shapes = np.linalg.solve(root, model.damper.B[model.rows].T).T[None]
-    none, m = np.zeros((1, shapes.shape[2])), shapes.shape[1]
-    return Stack(none, none, none, None, shapes, np.zeros((1, m, m)), slice(0, m), slice(m, m), slice(m, m))
 
 
 def _reversed(body: Stack) -> Stack:
