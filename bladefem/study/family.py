@@ -21,7 +21,7 @@ from .settings import Settings
 
 __all__ = ["Family", "Member", "carried", "coarsened", "family_of", "member", "shared_harmonics"]
 
-SHARED = (7, 15, 31, 63)
+SHARED = (1, 7, 15, 31, 63)
 
 
 @dataclass(frozen=True)
