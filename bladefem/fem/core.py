@@ -2,8 +2,8 @@
 
 The unknowns of an open sector are its interior (i) and its two cut faces, the rim (b). Only the rim knows the nodal
 diameter, so the interior is eliminated once, in real arithmetic, down to the Schur complement S of the rim; nodal
-diameter n then costs a dense Cholesky of C_b(n)^H S C_b(n), as large as one cut face. A solve takes two sweeps over the
-interior's factors, about as much as one sweep over those of the doubled pencil. One rank only.
+diameter n then costs a dense Cholesky of C_b(n)^H S C_b(n), as large as one cut face. A solve takes one sweep down and
+one up over the interior's factors for each of the real and imaginary parts. One rank only.
 """
 
 from __future__ import annotations
@@ -16,9 +16,12 @@ from scipy.linalg import cho_factor, cho_solve, lapack, lu_factor, lu_solve
 
 from ..errors import NotSolvedError
 from .compat import MPI, PETSc
-from .mumps import Factorised, factorise_matrix, schur_complement, solve_matrix
+from .mumps import Factorised, factorise_matrix, solve_matrix
+from .schur import Bridge, bridge, schur_complement, through
 
 __all__ = ["Core", "Rim", "close", "eliminate", "face_solve", "inner_solve", "masters", "rim_of", "solve", "times"]
+
+BATCH = 32      # complex columns a solve: from 32 real ones on MUMPS runs at the speed of matrix products
 
 
 @dataclass(frozen=True)
@@ -30,6 +33,7 @@ class Core:
     rim: np.ndarray                 # (nb,) open unknowns on the cut faces
     S: np.ndarray                   # (nb, nb) Schur complement of the rim [N/m]
     coupling: sp.csr_matrix         # (nb, ni) A_bi
+    bridge: Bridge | None           # to the rim's system amid a solve; None: two solves instead
 
 
 @dataclass(frozen=True)
@@ -73,7 +77,8 @@ def eliminate(A: sp.csr_matrix, rim: np.ndarray, definite: bool = True) -> Core:
     matrix.assemble()
     factor = factorise_matrix(matrix, definite, rim)
     inner = np.setdiff1d(np.arange(A.shape[0]), rim)
-    return Core(factor, inner, rim, schur_complement(factor, len(rim)), A[rim][:, inner].tocsr())
+    S = schur_complement(factor, len(rim))
+    return Core(factor, inner, rim, S, A[rim][:, inner].tocsr(), bridge(factor, len(rim)) if definite else None)
 
 
 def close(core: Core, C: sp.csr_matrix, definite: bool = True, springs: np.ndarray | None = None) -> Rim:
@@ -99,14 +104,32 @@ def close(core: Core, C: sp.csr_matrix, definite: bool = True, springs: np.ndarr
 
 def solve(rim: Rim, B: np.ndarray) -> np.ndarray:
     """Solve for a block of vectors (n_free, k)."""
+    X = np.empty(B.shape, np.result_type(B, rim.C.dtype), order="F")
+    one_go = _through if rim.core.bridge else _twice
+    for first in range(0, B.shape[1], BATCH):
+        part = slice(first, first + BATCH)
+        X[rim.inner, part], X[rim.masters, part] = one_go(rim, B[:, part])
+    return X
+
+
+def _through(rim: Rim, B: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Solution inside and on the low cut face, by one sweep down and one up."""
+    core, on_face = rim.core, []
+
+    def answer(r: np.ndarray) -> np.ndarray:
+        on_face.append(face_solve(rim, B[rim.masters] + rim.C.conj().T @ _whole(r, B)))
+        return _parts(rim.C @ on_face[-1], k)
+    B = B.astype(np.result_type(B, rim.C.dtype))
+    k = B.shape[1] * (2 if np.iscomplexobj(B) else 1)
+    return _whole(through(core.bridge, _widened(core, B[rim.inner]), answer)[core.inner], B), on_face[-1]
+
+
+def _twice(rim: Rim, B: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """The same by two solves inside."""
     core = rim.core
     inside = inner_solve(core, B[rim.inner])
-    g = B[rim.masters] - rim.C.conj().T @ times(core.coupling, inside)
-    on_face = face_solve(rim, g)
-    inside -= inner_solve(core, times(core.coupling.T.tocsr(), rim.C @ on_face))
-    X = np.empty(B.shape, np.result_type(inside, on_face), order="F")
-    X[rim.inner], X[rim.masters] = inside, on_face
-    return X
+    on_face = face_solve(rim, B[rim.masters] - rim.C.conj().T @ times(core.coupling, inside))
+    return inside - inner_solve(core, times(core.coupling.T.tocsr(), rim.C @ on_face)), on_face
 
 
 def face_solve(rim: Rim, g: np.ndarray) -> np.ndarray:
@@ -116,13 +139,28 @@ def face_solve(rim: Rim, g: np.ndarray) -> np.ndarray:
 
 def inner_solve(core: Core, B: np.ndarray) -> np.ndarray:
     """A_ii^-1 B (ni, k), real or complex."""
+    return _whole(solve_matrix(core.factor, _widened(core, B))[core.inner], B)
+
+
+def _widened(core: Core, B: np.ndarray) -> np.ndarray:
+    """Real and imaginary parts of (ni, k) side by side, with zeros on the rim."""
     parts = [B.real, B.imag] if np.iscomplexobj(B) else [B]
     k = B.shape[1]
     full = np.zeros((len(core.inner) + len(core.rim), k * len(parts)), order="F")
     for i, part in enumerate(parts):
         full[core.inner, i * k:(i + 1) * k] = part
-    X = solve_matrix(core.factor, full)[core.inner]
-    return X if len(parts) == 1 else X[:, :k] + 1j * X[:, k:]
+    return full
+
+
+def _parts(X: np.ndarray, k: int) -> np.ndarray:
+    """k real columns."""
+    return X.real if X.shape[1] == k else np.concatenate([X.real, X.imag], axis=1)
+
+
+def _whole(X: np.ndarray, like: np.ndarray) -> np.ndarray:
+    """The inverse of ``_parts``."""
+    k = like.shape[1]
+    return X if not np.iscomplexobj(like) else X[:, :k] + 1j * X[:, k:]
 
 
 def times(A: sp.csr_matrix, X: np.ndarray) -> np.ndarray:

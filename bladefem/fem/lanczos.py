@@ -18,6 +18,8 @@ from .linalg import apply, dot, minus, mix
 __all__ = ["lowest", "orthonormal"]
 
 STEPS = 200
+CLEAN = 1e-8    # share of old directions in a new one below which its image under M is corrected, not computed again
+ROOM = 20       # blocks
 
 
 def lowest(con: Constrained, inverse: Callable[[np.ndarray], np.ndarray], start: np.ndarray, count: int,
@@ -41,15 +43,16 @@ def lowest(con: Constrained, inverse: Callable[[np.ndarray], np.ndarray], start:
         NotSolvedError: fewer than ``count`` pairs exist, or the iteration does not converge.
     """
     comm = con.body.comm
-    V = np.empty((start.shape[0], 0), con.dtype, order="F")
+    V, MV = (np.empty((start.shape[0], 0), con.dtype, order="F") for _ in range(2))
     H = np.zeros((0, 0), con.dtype)
-    block, Mblock, _ = orthonormal(con, V, start.astype(con.dtype))
+    block, Mblock, _ = orthonormal(con, V, MV, start.astype(con.dtype))
     for _ in range(STEPS):
-        V = np.asfortranarray(np.concatenate([V, block], axis=1))
+        V, MV = (_joined(A, len(H), new) for A, new in ((V, block), (MV, Mblock)))
         W = inverse(Mblock)
-        column = dot(comm, V, apply(con.M, W))
+        done = slice(0, len(H) + block.shape[1])
+        column = dot(comm, MV[:, done], W)
         H = _grown(H, column)
-        block, Mblock, tail = orthonormal(con, V, minus(W, V, column))
+        block, Mblock, tail = orthonormal(con, V[:, done], MV[:, done], minus(W, V[:, done], column))
         theta, S = eigh(H)
         theta, S = theta[::-1], S[:, ::-1]
         k = min(count + guard, len(theta))
@@ -58,11 +61,12 @@ def lowest(con: Constrained, inverse: Callable[[np.ndarray], np.ndarray], start:
         if not block.shape[1] and k < count:
             raise NotSolvedError(f"{count} modes were asked of a body that has {k} elastic ones")
         if (k >= count and error < tolerance) or not block.shape[1]:
-            return 1 / theta[:k], mix(V, S[:, :k], block, rest)
+            return 1 / theta[:k], mix(V[:, done], S[:, :k], block, rest)
     raise NotSolvedError(f"the modes did not converge in {STEPS} steps (error {error:.1e}, expected {tolerance:.1e})")
 
 
-def orthonormal(con: Constrained, V: np.ndarray, W: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+def orthonormal(con: Constrained, V: np.ndarray, MV: np.ndarray,
+                W: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """W made M-orthonormal and, once more, M-orthogonal to V: basis Q, M Q, and R with W = V (...) + Q R.
 
     Directions that are rounding only are dropped, so Q may have fewer columns than W.
@@ -70,10 +74,22 @@ def orthonormal(con: Constrained, V: np.ndarray, W: np.ndarray) -> tuple[np.ndar
     comm = con.body.comm
     W, MW, R = _scaled(comm, W, apply(con.M, W), 1e-26)
     if V.shape[1]:
-        W = minus(W, V, dot(comm, V, MW))
-        MW = apply(con.M, W)
+        left = dot(comm, MV, W)
+        W = minus(W, V, left)
+        MW = minus(MW, MV, left) if abs(left).max(initial=0.0) < CLEAN else apply(con.M, W)
     W, MW, S = _scaled(comm, W, MW, 0.25)
     return W, MW, S @ R
+
+
+def _joined(V: np.ndarray, used: int, new: np.ndarray) -> np.ndarray:
+    """V with new columns after those used; memory for many more is reserved, it costs nothing until written."""
+    total = used + new.shape[1]
+    if total > V.shape[1]:
+        room = np.empty((V.shape[0], max(2 * used, ROOM * new.shape[1])), V.dtype, order="F")
+        room[:, :used] = V[:, :used]
+        V = room
+    V[:, used:total] = new
+    return V
 
 
 def _scaled(comm: object, W: np.ndarray, MW: np.ndarray, least: float) -> tuple[np.ndarray, np.ndarray, np.ndarray]:

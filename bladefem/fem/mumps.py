@@ -1,8 +1,8 @@
 """MUMPS through PETSc: Cholesky and L D L^T, blocks of right-hand sides, Schur complements, reasons in words.
 
 Two details that its interfaces hide. Debian 12's PETSc knows the PORD ordering only and falls back to it in silence, so
-the ordering used is kept (INFOG(7)). petsc4py does not wrap the Schur complement: three of PETSc's C functions are
-called by name.
+the ordering used is kept (INFOG(7)). petsc4py does not wrap all that is needed: some of PETSc's C functions are called
+by name.
 """
 
 from __future__ import annotations
@@ -15,7 +15,7 @@ import numpy as np
 from ..errors import NotSolvedError
 from .compat import PETSc
 
-__all__ = ["Factorised", "dense", "factorise_matrix", "schur_complement", "solve_matrix", "values"]
+__all__ = ["Factorised", "dense", "factorise_matrix", "petsc_call", "set_operation", "solve_matrix", "values"]
 
 BATCH = 128     # columns a solve: MUMPS works on them by matrix products, 256 are no faster
 ROOM = 40       # per cent of memory beyond MUMPS's own estimate
@@ -40,7 +40,7 @@ def factorise_matrix(A: PETSc.Mat, definite: bool, schur: np.ndarray | None = No
 
     Args:
         definite: Cholesky; else L D L^T with the count of negative pivots.
-        schur: rows left out of the factorisation, for ``schur_complement`` (one rank only).
+        schur: rows left out of the factorisation, see ``schur`` (one rank only).
 
     Raises:
         NotSolvedError: the matrix is singular or not definite, or memory ran out; the message holds MUMPS's INFOG.
@@ -63,10 +63,8 @@ def factorise_matrix(A: PETSc.Mat, definite: bool, schur: np.ndarray | None = No
         F.setMumpsIcntl(24, 1)
     if schur is not None:
         index = PETSc.IS().createGeneral(schur.astype(PETSc.IntType), comm=F.comm)
-        _petsc("MatFactorSetSchurIS", F.handle, index.handle)
+        petsc_call("MatFactorSetSchurIS", F.handle, index.handle)
     _numeric(pc, F, A.size[0])
-    if schur is not None:
-        F.setMumpsIcntl(26, 0)      # from here on a solve sees the interior only
     negative = F.getMumpsInfog(12)
     if definite and negative:       # MUMPS goes on in silence
         raise NotSolvedError(f"the matrix of {A.size[0]} unknowns is not positive definite, MUMPS met {negative} "
@@ -75,36 +73,28 @@ def factorise_matrix(A: PETSc.Mat, definite: bool, schur: np.ndarray | None = No
                       F.getMumpsInfog(7), negative)
 
 
-def solve_matrix(factor: Factorised, B: np.ndarray) -> np.ndarray:
+def solve_matrix(factor: Factorised, B: np.ndarray, whole: bool = False) -> np.ndarray:
     """A^-1 B (n_own, k), in batches; with rows left out, A is the matrix without them and these rows of B are 0.
+
+    Args:
+        whole: solve for the rows left out too (see ``schur``), all columns in one batch.
 
     On one rank a block with few non-zero rows is handed over sparse: MUMPS then prunes the first sweep.
     """
     F = factor.matrix
     out = np.empty(B.shape, order="F")
     rows = np.flatnonzero(B.any(axis=1)) if F.comm.size == 1 else np.arange(B.shape[0])
-    for first in range(0, B.shape[1], BATCH):
-        part = slice(first, min(first + BATCH, B.shape[1]))
-        sparse = len(rows) < SPARSE * len(B)
+    batch = max(B.shape[1], 1) if whole else BATCH
+    F.setMumpsIcntl(26, -1 if whole else 0)
+    for first in range(0, B.shape[1], batch):
+        part = slice(first, min(first + batch, B.shape[1]))
+        sparse = 0 < len(rows) < SPARSE * len(B)
         right = _sparse(F, rows, B[rows, part]) if sparse else dense(F, np.asfortranarray(B[:, part], dtype=float))
         left = dense(F, out[:, part])
         F.matSolve(right, left)
         for matrix in (right, left):        # petsc4py keeps what is not destroyed for a later garbage collection
             matrix.destroy()
     return out
-
-
-def schur_complement(factor: Factorised, n: int) -> np.ndarray:
-    """(n, n) A_bb - A_bi A_ii^-1 A_ib of the rows left out."""
-    matrix, status, data = ctypes.c_void_p(), ctypes.c_int(), ctypes.POINTER(ctypes.c_double)()
-    _petsc("MatFactorGetSchurComplement", factor.matrix.handle, ctypes.byref(matrix), ctypes.byref(status))
-    _petsc("MatDenseGetArray", matrix, ctypes.byref(data))
-    S = np.ctypeslib.as_array(data, (n, n)).copy()
-    _petsc("MatDenseRestoreArray", matrix, ctypes.byref(data))
-    _petsc("MatFactorRestoreSchurComplement", factor.matrix.handle, ctypes.byref(matrix), status)
-    lower, upper = np.tril(S, -1), np.triu(S, 1)        # a symmetric factorisation fills one triangle
-    half = lower if abs(lower).max(initial=0) >= abs(upper).max(initial=0) else upper
-    return half + half.T + np.diag(S.diagonal())
 
 
 def dense(A: PETSc.Mat, X: np.ndarray) -> PETSc.Mat:
@@ -122,9 +112,9 @@ def values(D: PETSc.Mat) -> np.ndarray:
     if not rows * columns:
         return np.zeros((rows, columns), order="F")
     data = ctypes.POINTER(ctypes.c_double)()
-    _petsc("MatDenseGetArrayRead", D.handle, ctypes.byref(data))
+    petsc_call("MatDenseGetArrayRead", D.handle, ctypes.byref(data))
     out = np.ctypeslib.as_array(data, (columns, rows)).T.copy(order="F")
-    _petsc("MatDenseRestoreArrayRead", D.handle, ctypes.byref(data))
+    petsc_call("MatDenseRestoreArrayRead", D.handle, ctypes.byref(data))
     return out
 
 
@@ -140,8 +130,13 @@ def _sparse(F: PETSc.Mat, rows: np.ndarray, values: np.ndarray) -> PETSc.Mat:
     return out
 
 
-def _petsc(name: str, *arguments: object) -> None:
-    """Call one of PETSc's C functions."""
+def set_operation(handle: int, place: int, function: object) -> None:
+    """Replace one of a matrix's operations, numbered as in PETSc's enumeration MatOperation."""
+    ctypes.CDLL(PETSc.__file__).MatSetOperation(ctypes.c_void_p(handle), place, function)
+
+
+def petsc_call(name: str, *arguments: object) -> None:
+    """Call one of PETSc's C functions; whole numbers are handles of its objects."""
     function = getattr(ctypes.CDLL(PETSc.__file__), name)
     code = function(*[ctypes.c_void_p(a) if isinstance(a, int) else a for a in arguments])
     if code:

@@ -1,0 +1,103 @@
+"""MUMPS with rows left out: their Schur complement, and solves whose reduced system the caller answers.
+
+PETSc sweeps down over the factors, solves with its own dense factors of the Schur complement S and sweeps up again. The
+nodal diameters of a wheel want another answer in between, C (C^H S C)^-1 C^H, so the dense solve of S is replaced by a
+call back into Python: two sweeps a solve instead of the four that A_ii^-1 before and after would take. Where PETSc does
+not call back (the place of the dense solve in its table of operations moved once), ``bridge`` says so.
+"""
+
+from __future__ import annotations
+
+import ctypes
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+
+from .mumps import Factorised, petsc_call, set_operation, solve_matrix
+
+__all__ = ["Bridge", "bridge", "schur_complement", "through"]
+
+MATSOLVE = (109, 100)           # MATOP_MAT_SOLVE: PETSc 3.1 to 3.19, later
+CALLBACK = ctypes.CFUNCTYPE(ctypes.c_int, ctypes.c_void_p, ctypes.c_void_p, ctypes.c_void_p)
+Answer = Callable[[np.ndarray], np.ndarray]
+
+
+@dataclass(frozen=True)
+class Bridge:
+    """The way from MUMPS's reduced system to whoever answers it."""
+
+    factor: Factorised
+    rows: int                   # of the Schur complement
+    answers: list[Answer]       # the one in use; empty between solves
+    raised: list[Exception]     # an exception cannot pass through C: it waits here
+    callback: object            # keeps the C function alive
+
+
+def schur_complement(factor: Factorised, n: int) -> np.ndarray:
+    """(n, n) A_bb - A_bi A_ii^-1 A_ib of the rows left out."""
+    S = _borrowed(factor, lambda handle: _array(handle, (n, n)).copy())
+    lower, upper = np.tril(S, -1), np.triu(S, 1)        # a symmetric factorisation fills one triangle
+    half = lower if abs(lower).max(initial=0) >= abs(upper).max(initial=0) else upper
+    return half + half.T + np.diag(S.diagonal())
+
+
+def bridge(factor: Factorised, n: int) -> Bridge | None:
+    """Put a call back in place of PETSc's dense solve; None where PETSc does not take it.
+
+    The Schur complement inside PETSc is destroyed: copy it first.
+    """
+    answers: list[Answer] = []
+    raised: list[Exception] = []
+
+    def answer(_: int, right: int, left: int) -> int:
+        try:
+            rows, columns = ctypes.c_int(), ctypes.c_int()
+            petsc_call("MatGetSize", left, ctypes.byref(rows), ctypes.byref(columns))
+            r = _array(left, (columns.value, rows.value)).T
+            r[:] = answers[-1](r)
+        except Exception as error:
+            raised.append(error)
+        return 0
+
+    def ones(handle: int) -> None:
+        _array(handle, (n, n))[:] = np.eye(n)           # of floating bodies S is singular; PETSc must factorise it
+
+    callback = CALLBACK(answer)
+    _borrowed(factor, ones)
+    petsc_call("MatFactorFactorizeSchurComplement", factor.matrix.handle)
+    _borrowed(factor, lambda handle: [set_operation(handle, place, callback) for place in MATSOLVE])
+    made = Bridge(factor, n, answers, raised, callback)
+    heard: list[int] = []
+    through(made, np.zeros((factor.matrix.size[0], 1)), lambda r: heard.append(1) or r)
+    return made if heard else None
+
+
+def through(made: Bridge, B: np.ndarray, answer: Answer) -> np.ndarray:
+    """Solutions (n, k) for B (n, k), zero on the rows left out, where there x_b = answer(-A_bi A_ii^-1 b_i) (nb, k)."""
+    made.answers.append(answer)
+    try:
+        X = solve_matrix(made.factor, B, whole=True)
+    finally:
+        made.answers.clear()
+    if made.raised:
+        raise made.raised.pop()
+    return X
+
+
+def _borrowed(factor: Factorised, use: Callable[[int], object]) -> object:
+    """Do something with PETSc's Schur complement."""
+    matrix, status = ctypes.c_void_p(), ctypes.c_int()
+    petsc_call("MatFactorGetSchurComplement", factor.matrix.handle, ctypes.byref(matrix), ctypes.byref(status))
+    out = use(matrix.value)
+    petsc_call("MatFactorRestoreSchurComplement", factor.matrix.handle, ctypes.byref(matrix), status)
+    return out
+
+
+def _array(handle: int, shape: tuple[int, int]) -> np.ndarray:
+    """The memory of a dense matrix, columns of it as rows."""
+    data = ctypes.POINTER(ctypes.c_double)()
+    petsc_call("MatDenseGetArray", handle, ctypes.byref(data))
+    out = np.ctypeslib.as_array(data, shape)
+    petsc_call("MatDenseRestoreArray", handle, ctypes.byref(data))      # forgets the pointer, not the memory
+    return out
