@@ -8,10 +8,25 @@ from bladefem.errors import InputError, suggestion
 
 from .mesh import Mesh
 
-__all__ = ["build"]
+__all__ = ["build", "build_here"]
 
 
 def build(scene: Any) -> Mesh:
+    """The mesh of a scene, made in a process of its own, so that a crash of gmsh becomes a sentence.
+
+    Args:
+        scene: as for `build_here`.
+
+    Raises:
+        InputError: a parameter has to change, or the kind is unknown; one sentence.
+    """
+    from .apart import build_apart
+
+    _check_kind(scene)
+    return build_apart(scene)
+
+
+def build_here(scene: Any) -> Mesh:
     """The mesh of a scene, by its ``kind``; the builders and gmsh are loaded when they are needed.
 
     Args:
@@ -21,9 +36,13 @@ def build(scene: Any) -> Mesh:
     Raises:
         InputError: a parameter has to change, or the kind is unknown; one sentence.
     """
+    _check_kind(scene)
+    return BUILDERS[scene.kind](scene)
+
+
+def _check_kind(scene: Any) -> None:
     if scene.kind not in BUILDERS:
         raise InputError(f"kind = {scene.kind!r} is unknown{suggestion(str(scene.kind), BUILDERS)}")
-    return BUILDERS[scene.kind](scene)
 
 
 def _sector(scene: Any) -> Mesh:

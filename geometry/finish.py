@@ -20,6 +20,8 @@ __all__ = ["Motion", "check_count", "complete", "mesh_model"]
 
 MANY = 3e6          # cells; far beyond what one machine solves
 POOR = 0.1          # shape quality that asks for a second round of optimisation
+FLAT = 0.02         # shape quality of a tetrahedron that is refused
+ALGORITHMS = {"hxt": 10, "delaunay": 1}
 Motion = tuple[str, str, np.ndarray, np.ndarray]        # master, slave, rotation (3, 3), shift (3,) [m]
 
 
@@ -27,16 +29,50 @@ def mesh_model(gmsh: ModuleType, groups: Groups, dimension: int, size: MeshSize)
     """Generate the mesh of the current model, raise its order, and extract it.
 
     Raises:
-        InputError: the elements are far too many.
+        InputError: the elements are far too many, or flat ones are left whatever is tried.
     """
     if size.size:
         check_count(gmsh, dimension, size.size)
-    gmsh.model.mesh.generate(dimension)
+    gmsh.model.mesh.generate(2)
     if dimension == 3:
-        _improve(gmsh, groups)
+        fill(gmsh, groups, size.algorithm)
+    refuse_flat(_corners(gmsh, groups, dimension))
     if size.order == 2:
         second_order(gmsh, size.curved)
     return extract(gmsh, groups, dimension)
+
+
+def fill(gmsh: ModuleType, groups: Groups, first: str) -> None:
+    """Fill the volumes with tetrahedra by one algorithm, then by the other when the first fails or leaves flat cells.
+
+    Raises:
+        Exception: gmsh's own, when the last algorithm fails.
+    """
+    for algorithm in sorted(ALGORITHMS, key=lambda name: name != first):
+        gmsh.option.setNumber("Mesh.Algorithm3D", ALGORITHMS[algorithm])
+        try:
+            gmsh.model.mesh.generate(3)
+            if improve(gmsh, groups) > FLAT:
+                return
+        except Exception:                       # gmsh raises the bare class
+            if algorithm != first:
+                raise
+
+
+def refuse_flat(mesh: Mesh) -> None:
+    """Refuse a mesh with flat cells, and say where they are.
+
+    Raises:
+        InputError: a cell's shape quality is not above FLAT.
+    """
+    cells = np.vstack(list(mesh.bodies.values()))
+    shape = shape_quality(mesh.points, cells, mesh.cell_type)
+    if shape.min() > FLAT:
+        return
+    x, y, z = 1e3 * mesh.points[cells[shape.argmin()]].mean(axis=0)
+    raise InputError(f"mesh.size: {np.count_nonzero(shape <= FLAT)} flat cells are left (the worst has shape quality "
+                     f"{shape.min():.1g} at x, y, z = {x:.4g}, {y:.4g}, {z:.4g} mm, expected above {FLAT}); choose a "
+                     "smaller mesh.size, or change the parts that nearly coincide there")
 
 
 def check_count(gmsh: ModuleType, dimension: int, size: float, name: str = "mesh.size") -> None:
@@ -53,13 +89,25 @@ def check_count(gmsh: ModuleType, dimension: int, size: float, name: str = "mesh
                          "choose larger elements, or check the length unit")
 
 
-def _improve(gmsh: ModuleType, groups: Groups) -> None:
-    """Let Netgen and then gmsh rework the tetrahedra when some are flat; either alone leaves more of them."""
+def improve(gmsh: ModuleType, groups: Groups) -> float:
+    """Let Netgen and then gmsh rework the tetrahedra when some are poor; the worst shape quality that is left.
+
+    Either alone leaves more of them.
+    """
     for method in ("Netgen", ""):
-        mesh = extract(gmsh, Groups(groups.bodies, {}), 3)
-        if min(shape_quality(mesh.points, c, mesh.cell_type).min() for c in mesh.bodies.values()) > POOR:
-            return
+        if (worst := _worst_shape(_corners(gmsh, groups, 3))) > POOR:
+            return worst
         gmsh.model.mesh.optimize(method, True)
+    return _worst_shape(_corners(gmsh, groups, 3))
+
+
+def _corners(gmsh: ModuleType, groups: Groups, dimension: int) -> Mesh:
+    """The first-order mesh as it stands, without its faces."""
+    return extract(gmsh, Groups(groups.bodies, {}), dimension)
+
+
+def _worst_shape(mesh: Mesh) -> float:
+    return min(shape_quality(mesh.points, cells, mesh.cell_type).min() for cells in mesh.bodies.values())
 
 
 def complete(mesh: Mesh, motions: dict[str, Motion], size: float, sector: Sector | None = None,

@@ -129,4 +129,6 @@ class MeshSize:
     size: float | None = quantity(None, "m", 1e-5, 1.0, "target element size; from the thinnest part when left out")
     contact_size: float | None = quantity(None, "m", 1e-6, 1.0, "element size on contact faces")
     order: int = quantity(2, "1", 1, 2, "order of the elements; 1 is only for comparison")
+    algorithm: str = quantity("hxt", choices=("hxt", "delaunay"),
+                              help="how gmsh fills volumes; the other one is tried when it fails or leaves flat cells")
     curved: bool = quantity(True, help="second-order elements follow curved faces (invalid ones are straightened)")

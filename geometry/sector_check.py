@@ -14,6 +14,8 @@ from .section import outline, shape
 
 __all__ = ["check_sector"]
 
+STRIP = 0.02        # of a length: a strip of this width keeps the shape quality of its elements above 0.05
+
 
 def check_sector(aerofoil: Aerofoil, platform: Platform, shank: Shank, disc: Disc, wedge: Wedge) -> None:
     """Refuse proportions that overlap or leave the sector.
@@ -35,13 +37,21 @@ def _at_most(name: str, value: float, limit: float, meaning: str, unit: str = "m
         raise InputError(f"{name} = {value:.4g} {unit} is too large: expected at most {limit:.4g} {unit} ({meaning})")
 
 
+def _no_strip(name: str, value: float, other: str, limit: float) -> None:
+    """Two ends that nearly coincide leave a strip that no good element fits into."""
+    _at_most(name, value, limit, other)
+    if 0 < limit - value < STRIP * limit:
+        raise InputError(f"{name} = {value:.6g} m ends {limit - value:.2g} m before {other}, expected the same length "
+                         f"or at most {(1 - STRIP) * limit:.4g} m")
+
+
 def check_disc(disc: Disc, shank: Shank, platform: Platform) -> None:
     """Ring and neck."""
     theta = pi / disc.sectors
     _at_most("disc.bore_radius", disc.bore_radius, 0.95 * disc.rim_radius, "95 % of disc.rim_radius")
     _at_most("shank.width", shank.width, 1.9 * disc.rim_radius * sin(theta), "95 % of the sector's width at the rim")
-    _at_most("shank.length", shank.length, platform.length, "platform.length")
-    _at_most("shank.length", shank.length, disc.width, "disc.width")
+    _no_strip("shank.length", shank.length, "platform.length", platform.length)
+    _no_strip("shank.length", shank.length, "disc.width", disc.width)
 
 
 def check_platform(section: Profile, platform: Platform, shank: Shank, wedge: Wedge) -> None:
@@ -52,7 +62,7 @@ def check_platform(section: Profile, platform: Platform, shank: Shank, wedge: We
     needed = platform.seat_width * sin(wedge.angle + section.theta)
     _at_most("platform.seat_width", platform.seat_width, max(0.98 * room / needed, 0) * platform.seat_width,
              "the platform's overhang beside the shank; or choose a smaller shank.width or damper.angle")
-    _at_most("damper.length", wedge.length, platform.length, "platform.length")
+    _no_strip("damper.length", wedge.length, "platform.length", platform.length)
 
 
 def check_pocket(section: Profile, shank: Shank, disc: Disc, wedge: Wedge) -> None:

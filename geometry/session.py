@@ -17,7 +17,6 @@ OPTIONS = {
     "Mesh.RandomFactor": 1e-9,
     "Mesh.RandomFactor3D": 1e-12,
     "Mesh.Algorithm": 6,                # frontal-Delaunay
-    "Mesh.Algorithm3D": 10,             # HXT: fewer nodes and no flat cells where Delaunay (1) leaves some
     "Mesh.MeshSizeExtendFromBoundary": 0,
     "Mesh.MeshSizeFromPoints": 0,
     "Mesh.Renumber": 0,                 # node tags survive the change of order

@@ -185,7 +185,8 @@ def test_fillet_is_a_quarter_groove_round_the_root():
 
 @pytest.mark.parametrize("changes, field", [
     ({"disc": {"bore_radius": 0.2}}, "disc.bore_radius"), ({"shank": {"width": 0.04}}, "shank.width"),
-    ({"shank": {"length": 0.05}}, "shank.length"), ({"platform": {"gap": 0.03}}, "platform.gap"),
+    ({"shank": {"length": 0.05}}, "shank.length"),
+    ({"shank": {"length": 0.0448}}, "shank.length.*before disc.width"), ({"platform": {"gap": 0.03}}, "platform.gap"),
     ({"platform": {"seat_width": 0.02}}, "platform.seat_width"), ({"wedge": {"length": 0.061}}, "damper.length"),
     ({"wedge": {"base": 0.029}}, "damper.base"), ({"aerofoil": {"chord_root": 0.09}}, "aerofoil.chord_root"),
     ({"aerofoil": {"stagger": 1.2}}, "aerofoil.stagger"), ({"disc": {"sectors": 60}}, "platform|shank"),
