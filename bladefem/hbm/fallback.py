@@ -29,6 +29,7 @@ __all__ = ["Attempt", "match_harmonics", "solve_balance"]
 FIRST_LOAD, LARGEST_LOAD = 100.0, 1e8   # multiples of the normal load where a homotopy starts
 CLOSE = 1e-3            # residual from which more samples are tried
 LONGEST_PATH = 400      # points of a path in the excitation
+FARTHEST = 30.0         # logarithm of the smallest part of the excitation that its path may visit
 SMALLEST_STEP = 1e-3    # step in the logarithm of the load below which a homotopy gives up
 
 
@@ -128,6 +129,8 @@ def _along_excitation(balance: Balance, options: Options) -> Newton:
     The friction law is homogeneous: this is the path in the normal load, seen from the other side.
     """
     def part(x: float) -> Balance:
+        if not -FARTHEST <= x <= 1.0:
+            raise NotSolvedError(f"the path left the excitations up to the wanted one, for exp({x:.3g}) times it")
         model, factor = vary(balance.model, "force", float(np.exp(x))), float(np.exp(x))
         linear = replace(balance.linear, free=factor * balance.linear.free, stuck=factor * balance.linear.stuck,
                          g=factor * balance.linear.g)

@@ -22,7 +22,20 @@ class ReducedModel:
     """Blades and damper reduced to the contact, in the pair coordinates of `bladefem.data`.
 
     Harmonic 0 is counted from the preload state, in which node i carries the normal force max(n0_i, 0) and no
-    tangential force; static offsets of the sides are part of that state, not of this model.
+    tangential force; static offsets of the sides are part of that state, not of this model. From plain matrices:
+
+    >>> import numpy as np
+    >>> from bladefem.data import Elements
+    >>> from bladefem.hbm.api import solve
+    >>> from bladefem.hbm.model import ReducedModel
+    >>> from bladefem.reduction.matrices import port_model_from_matrices
+    >>> M, K = np.eye(2), np.array([[2.0, -1.0], [-1.0, 1.0]])
+    >>> ports = {"contact": np.array([0]), "load": np.array([1]), "probe": np.array([1])}
+    >>> side = port_model_from_matrices(M, K, ports, C=0.02 * K)
+    >>> damper = Elements(kt=np.ones(1), kn=np.zeros(1), mu=np.full(1, 0.5), n0=np.ones(1), tangents=1)
+    >>> model = ReducedModel((side,), damper, {1: np.ones(1)})
+    >>> solve(model, omega=0.7, H=7, samples=256).converged
+    True
 
     Raises:
         InputError: numbers of contact dofs, elements and loads do not fit each other.

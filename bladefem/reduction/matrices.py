@@ -10,6 +10,7 @@ from scipy import io, linalg, sparse
 
 from ..data import PortModel
 from ..errors import InputError, suggestion
+from .exchange import read_ansys, read_dmig
 
 __all__ = ["port_model_from_matrices", "read_matrices"]
 
@@ -55,14 +56,16 @@ def port_model_from_matrices(M: np.ndarray, K: np.ndarray, ports: Mapping[str, n
 def read_matrices(path: str | Path) -> dict[str, np.ndarray]:
     """Named arrays of a reduced model exported by another code.
 
-    Reads NumPy ``.npz``, Matlab ``.mat`` (version 7 and older), or one Matrix Market ``.mtx`` file, whose matrix is
-    named after the file. Sparse matrices come back dense.
+    Reads NumPy ``.npz``, Matlab ``.mat`` (version 7 and older), one Matrix Market ``.mtx`` file, whose matrix is named
+    after the file, Nastran DMIG (``.bdf``, ``.dat``, ``.pch``, ``.dmig``), and Ansys ``.full`` where its library is
+    installed. Sparse matrices come back dense; the last two add "dofs" (n, 2), point and component of each row.
 
     Raises:
-        InputError: the file is missing or of another kind.
+        InputError: the file is missing, of another kind, or cannot be read.
     """
     path = Path(path)
-    readers = {".npz": _read_npz, ".mat": _read_mat, ".mtx": _read_market}
+    readers = {".npz": _read_npz, ".mat": _read_mat, ".mtx": _read_market, ".full": read_ansys,
+               **dict.fromkeys((".bdf", ".dat", ".pch", ".dmig"), read_dmig)}
     if path.suffix not in readers:
         raise InputError(f"file {path.name}: expected one of {', '.join(readers)}{suggestion(path.suffix, readers)}")
     if not path.is_file():

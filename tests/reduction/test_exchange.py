@@ -1,0 +1,75 @@
+"""Matrices written as DMIG in all three kinds of fields come back; what cannot be read is told."""
+
+import doctest
+
+import numpy as np
+import pytest
+
+from bladefem.errors import InputError
+from bladefem.hbm import model as hbm_model
+from bladefem.reduction.beam import beam_matrices
+from bladefem.reduction.matrices import port_model_from_matrices, read_matrices
+
+SHORT = """$ a spring and a mass, symmetric, and a real square matrix
+DMIG    STIF           0       6       1
+DMIG    STIF          27       1              27       1   3.+5
+              28       1 -2.5+5
+DMIG    STIF          28       1              28       1   2.5+5
+GRID          27
+DMIG    GYRO           0       1       2
+DMIG    GYRO          27       1              28       1  1.0D-3
+               4       0    -1.0
+"""
+
+
+def test_short_fields(tmp_path):
+    (tmp_path / "a.bdf").write_text(SHORT)
+    found = read_matrices(tmp_path / "a.bdf")
+    assert found["dofs"].tolist() == [[4, 0], [27, 1], [28, 1]]
+    np.testing.assert_array_equal(found["STIF"][1:, 1:], [[3e5, -2.5e5], [-2.5e5, 2.5e5]])
+    assert found["GYRO"][2, 1] == 1e-3 and found["GYRO"][0, 1] == -1.0 and found["GYRO"][1, 2] == 0.0
+
+
+@pytest.mark.parametrize("free", [False, True])
+def test_a_body_through_a_punch_file(tmp_path, free):
+    """The beam in long fields, as Nastran punches them, and separated by commas: the same frequencies."""
+    K, M = beam_matrices(elements=3)
+    lines = []
+    for name, matrix in (("KAAX", K), ("MAAX", M)):
+        lines.append(f"DMIG,{name},0,6,2" if free else f"DMIG    {name:8s}{0:8d}{6:8d}{2:8d}{0:8d}{'':8s}{len(K):8d}")
+        for j in range(len(K)):
+            head = (1 + j // 2, 3 + 2 * (j % 2))
+            if free:
+                lines.append(f"DMIG*,{name},{head[0]},{head[1]},")
+            else:
+                lines.append(f"DMIG*   {name:16s}{head[0]:16d}{head[1]:16d}{'':16s}*")
+            for i in range(j, len(K)):
+                value = f"{matrix[i, j]:.9E}".replace("E", "D")
+                row = (1 + i // 2, 3 + 2 * (i % 2))
+                term = f"*,{row[0]},{row[1]},{value}", f"*       {row[0]:16d}{row[1]:16d}{value:>16s}"
+                lines.append(term[0] if free else term[1])
+    (tmp_path / "beam.pch").write_text("\n".join(lines))
+    found = read_matrices(tmp_path / "beam.pch")
+    assert found["dofs"].tolist() == [[1, 3], [1, 5], [2, 3], [2, 5], [3, 3], [3, 5]]
+    ports = {"contact": np.array([0])}
+    omega = port_model_from_matrices(found["MAAX"], found["KAAX"], ports).omega
+    np.testing.assert_allclose(omega, port_model_from_matrices(M, K, ports).omega, rtol=1e-7)
+
+
+@pytest.mark.parametrize(("text", "word"), [
+    ("GRID,1", "expected DMIG"), ("DMIG,K,0,9,1,,,3\nDMIG,K,1,1,,2,1,1.0", "rectangular"),
+    ("DMIG,K,0,6,1\nDMIG,K,1,1,,two,1,1.0", "line 2"), ("DMIG,K,1,1,,2,1,1.0", "header")])
+def test_bad_dmig(tmp_path, text, word):
+    (tmp_path / "a.dmig").write_text(text)
+    with pytest.raises(InputError, match=word):
+        read_matrices(tmp_path / "a.dmig")
+
+
+def test_ansys_needs_its_library(tmp_path):
+    (tmp_path / "file.full").write_bytes(b"")
+    with pytest.raises(InputError, match="ansys-mapdl-reader"):
+        read_matrices(tmp_path / "file.full")
+
+
+def test_the_example_in_the_docstring():
+    assert doctest.testmod(hbm_model).attempted > 5 and doctest.testmod(hbm_model).failed == 0
