@@ -48,16 +48,20 @@ def modes(options: argparse.Namespace, comm: Any) -> None:
 
 def modes_wanted(options: argparse.Namespace) -> Any:
     """What the options of ``modes`` ask for."""
-    from ..scene_fields import split_values
     from ..study.campbell import read_speeds
     from ..study.survey import Wanted
-    from ..units import parse
     if options.pictures < 0:
         raise InputError(f"--pictures {options.pictures}: expected a number of modes, 0 for none")
-    sizes = None if options.converge is None else [parse(item, "m", "converge")
-                                                   for item in split_values(options.converge)]
+    sizes = _sizes(options.converge, "converge")
     speeds = None if options.campbell is None else read_speeds(options.campbell)
     return Wanted(speeds, sizes, Path(options.compare) if options.compare else None, options.direct)
+
+
+def _sizes(text: str | None, option: str) -> list[float] | None:
+    """Element sizes [m] as given to an option; empty where they are to be chosen."""
+    from ..scene_fields import split_values
+    from ..units import parse
+    return None if text is None else [parse(item, "m", option) for item in split_values(text)]
 
 
 def contact(options: argparse.Namespace, comm: Any) -> None:
@@ -98,7 +102,8 @@ def chart(options: argparse.Namespace, comm: Any) -> None:
         from ..scene_file import load_scene
         folder = Path(options.output or default_folder(options.scene))
         scene = on_root(comm, lambda: load_scene(scene_path(options.scene), options.overrides))
-        made, accuracy, title = scene_chart(scene, folder, options.budget, comm), scene.accuracy, scene.title
+        sizes = _sizes(options.mesh, "mesh")
+        made, accuracy, title = scene_chart(scene, folder, options.budget, comm, sizes), scene.accuracy, scene.title
     files = on_root(comm, lambda: write_chart(made, folder, accuracy, title))
     tell(options, comm, lambda: "\n".join([*made.remarks, "written: " + ", ".join(map(str, files))]))
 

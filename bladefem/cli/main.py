@@ -77,6 +77,8 @@ def parser() -> argparse.ArgumentParser:
     subs.choices["chart"].add_argument("--budget", type=float, default=120.0, metavar="SECONDS",
                                        help="time for the chart; what would exceed it is left out and named")
     subs.choices["chart"].add_argument("--reference", action="store_true", help="the built-in reference blade instead")
+    subs.choices["chart"].add_argument("--mesh", metavar="SIZES", nargs="?", const="", help="also compare meshes of "
+                                       "first and second order with these element sizes, such as '10, 7, 5 mm'")
     info = _command(subs, "info", "versions and threads of what bladefem runs on", "bladefem info", commands.info)
     info.set_defaults(scene=None)
     return top

@@ -1,4 +1,4 @@
-"""The chart of speed against accuracy as files: two tables, one picture, and the remarks."""
+"""The chart of speed against accuracy as files: tables, one picture, and the remarks."""
 
 from __future__ import annotations
 
@@ -12,12 +12,12 @@ __all__ = ["write_chart"]
 
 
 def write_chart(chart: Chart, folder: str | Path, accuracy: float, title: str = "") -> list[Path]:
-    """Write chart_methods.csv, chart_models.csv, chart.png and chart.txt; returns the files."""
+    """Write chart.png, chart.txt and one CSV a table (methods, models, meshes); returns the files."""
     folder = Path(folder)
     folder.mkdir(parents=True, exist_ok=True)
-    files = [folder / f"chart{end}" for end in ("_methods.csv", "_models.csv", ".png", ".txt")]
-    for file, table in zip(files, (chart.methods, chart.models), strict=False):
-        write_table(file, table, {"time": "s"})
-    draw_chart(chart.methods, chart.models, files[2], tolerance=accuracy, title=title)
-    write_text(files[3], "\n".join(chart.remarks) + "\n")
-    return files
+    tables = {name: table for name in ("methods", "models", "meshes")
+              if (table := getattr(chart, name)) is not None and len(table)}
+    files = [write_table(folder / f"chart_{name}.csv", table, {"time": "s"}) for name, table in tables.items()]
+    picture = folder / "chart.png"
+    draw_chart(tables, picture, tolerance=accuracy, title=title)
+    return [*files, picture, write_text(folder / "chart.txt", "\n".join(chart.remarks) + "\n")]

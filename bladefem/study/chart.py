@@ -9,7 +9,7 @@ own error, below which no other error means anything.
 from __future__ import annotations
 
 import time
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -18,7 +18,7 @@ import pandas as pd
 from ..errors import NotSolvedError
 from ..hbm.model import ReducedModel
 from ..hbm.sweep import size
-from .choice import choose, covered, peak_of
+from .choice import adapted, covered
 from .family import Family, member
 from .methods import Method, Point, applicable, balance, methods, tangential
 from .settings import DAMPERS, Settings
@@ -26,16 +26,19 @@ from .settings import DAMPERS, Settings
 __all__ = ["Chart", "Peak", "chart", "timed_model"]
 
 WIDTHS = (-6, -3, -1.5, -0.75, -0.3, 0, 0.3, 0.75, 1.5, 3, 6)      # frequencies, in half widths of the resonance
+DEARER = 3.0        # times that a variant may cost more than the cheaper one of its kind before it
 LADDER = ((3, 128), (7, 512), (15, 1024), (31, 4096))               # harmonics and samples of the reference
 
 
 @dataclass(frozen=True)
 class Chart:
-    """Two tables (name, family, time, errors, chosen, ...) and what a reader has to know."""
+    """Tables (name, family, time, errors, chosen, ...) and what a reader has to know."""
 
     methods: pd.DataFrame       # all on the same model
     models: pd.DataFrame        # all by the full balance
     remarks: list[str]
+    settings: Settings          # the automatic choice
+    meshes: pd.DataFrame | None = None      # all with the settings of the automatic choice; time is that of everything
 
 
 @dataclass(frozen=True)
@@ -59,7 +62,7 @@ class Bench:
 
 
 def chart(family: Family, settings: Settings, mode: int, accuracy: float, budget: float = 120.0,
-          band: tuple[float, float] | None = None) -> Chart:
+          band: tuple[float, float] | None = None, poorer: Mapping[str, Family] | None = None) -> Chart:
     """The chart of one load case.
 
     Args:
@@ -68,18 +71,20 @@ def chart(family: Family, settings: Settings, mode: int, accuracy: float, budget
         accuracy: wanted of the resonance amplitude.
         budget: seconds for everything; variants that would take more than their share are left out and named.
         band: [Hz] where the resonance is sought.
+        poorer: names of other families that are compared with the first one by their richest member.
 
     Raises:
         NotSolvedError: not even the poorest reference converged.
     """
     start = time.perf_counter()
-    rough = covered(member(family, settings).model, settings, band, mode, 1.0)
-    chosen, _, _ = choose(family, settings, peak_of(rough), accuracy)
+    curve = adapted(family, settings, band, mode, accuracy)
+    chosen = curve.settings
     remarks = [f"automatic choice: {chosen.sentence()}, found in {time.perf_counter() - start:.2g} s"]
     richest = replace(chosen, modes=family.modes, points=None, damper=family.dampers[-1] if family.dampers else "rigid")
-    swept = covered(member(family, chosen).model, chosen, (rough[0].frequency, rough[-1].frequency), mode, 0.05)
-    omegas = frequencies([(p.omega, size(p)) for p in swept if p.converged])
-    models = _models(family, richest, chosen, omegas, budget / 2, remarks)
+    omegas = frequencies([(p.omega, size(p)) for p in curve.points if p.converged])
+    shared = _bench(lambda H: member(family, replace(richest, harmonics=H)).model, chosen.harmonics, omegas, budget / 6,
+                    "models", remarks)
+    models = _models(family, richest, chosen, shared, poorer or {}, remarks)
     simple = replace(richest, damper="mass") if "mass" in family.dampers else richest
     highest = LADDER[-1][0]
     model = member(family, replace(simple, harmonics=highest)).model
@@ -91,8 +96,8 @@ def chart(family: Family, settings: Settings, mode: int, accuracy: float, budget
         remarks.append("methods are compared on the scene's tangential model: prescribed normal load, damper a mass; "
                        "what that model itself costs in accuracy stands among the models")
         omegas = _own_frequencies(model, omegas, mode)
-    table = _methods(model, not reason, chosen, omegas, budget / 2, remarks)
-    return Chart(table, models, remarks)
+    bench = shared if reason else _bench(lambda H: model, chosen.harmonics, omegas, budget / 6, "methods", remarks)
+    return Chart(_methods(model, not reason, chosen, bench, remarks), models, remarks, chosen)
 
 
 def frequencies(curve: Iterable[tuple[float, float]]) -> np.ndarray:
@@ -171,23 +176,21 @@ def _bench(model: Callable[[int], ReducedModel], chosen: int, omegas: np.ndarray
     return Bench(omegas, truth, doubt, 2 * budget)
 
 
-def _methods(model: ReducedModel, simple: bool, chosen: Settings, omegas: np.ndarray, budget: float,
-             remarks: list[str]) -> pd.DataFrame:
-    bench = _bench(lambda H: model, chosen.harmonics, omegas, budget / 3, "methods", remarks)
+def _methods(model: ReducedModel, simple: bool, chosen: Settings, bench: Bench, remarks: list[str]) -> pd.DataFrame:
     listed = list(methods(simple))
     listed.append(Method(f"automatic: H {chosen.harmonics}, {chosen.samples} samples", "automatic choice",
                          balance(chosen.harmonics, chosen.samples)))
     return _finished(_rows([(m.name, m.family, model, m.run) for m in listed], bench), remarks)
 
 
-def _models(family: Family, richest: Settings, chosen: Settings, omegas: np.ndarray, budget: float,
+def _models(family: Family, richest: Settings, chosen: Settings, bench: Bench, poorer: Mapping[str, Family],
             remarks: list[str]) -> pd.DataFrame:
-    bench = _bench(lambda H: member(family, replace(richest, harmonics=H)).model, chosen.harmonics, omegas, budget / 3,
-                   "models", remarks)
     H, samples = max(chosen.harmonics, 3), max(chosen.samples, 256)
-    listed = [*_variants(family, replace(richest, harmonics=H, samples=samples)),
-              ("automatic", "automatic choice", chosen)]
-    jobs = [(name, kind, member(family, s).model, balance(s.harmonics, s.samples)) for name, kind, s in listed]
+    rich = replace(richest, harmonics=H, samples=samples)
+    listed = [*((family, *variant) for variant in _variants(family, rich)),
+              *((other, name, "nodal diameters", rich) for name, other in poorer.items()),
+              (family, "automatic", "automatic choice", chosen)]
+    jobs = [(name, kind, member(whose, s).model, balance(s.harmonics, s.samples)) for whose, name, kind, s in listed]
     return _finished(_rows(jobs, bench), remarks)
 
 
@@ -208,16 +211,17 @@ def _variants(family: Family, rich: Settings) -> Iterator[tuple[str, str, Settin
 
 def _rows(jobs: list[tuple[str, str, ReducedModel, Callable]], bench: Bench) -> list[dict[str, object]]:
     """One row a job; what cheap ones leave of the time goes to the others."""
-    rows, end, slow = [], time.perf_counter() + bench.budget, set()
+    rows, end, last = [], time.perf_counter() + bench.budget, {}
     for k, (name, kind, model, run) in enumerate(jobs):
         kinds = len({job[1] for job in jobs[k:]})
         share = max(end - time.perf_counter(), 0.1 * bench.budget) / (kinds + 1)
-        if kind in slow:        # a call cannot be cut short: do not even begin
-            rows.append(_lost(name, kind, np.nan, "left out: a cheaper one of its kind took too long", bench))
+        expected = DEARER * last.get(kind, 0.0)
+        if expected * len(bench.omegas) > 2 * share:      # a call cannot be cut short: do not even begin
+            reason = f"left out: {expected:.2g} s a frequency are expected after the cheaper one of its kind"
+            rows.append(_lost(name, kind, np.nan, reason, bench))
             continue
         rows.append(_row(name, kind, model, run, replace(bench, budget=share)))
-        if "first frequency" in rows[-1]["reason"]:
-            slow.add(kind)
+        last[kind] = rows[-1]["time"]
     return rows
 
 

@@ -2,28 +2,35 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator, Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 from ..hbm.reference import reference_model
+from ..reduction.assemble import folded_diameter
 from ..scene import Scene
 from ..store import stage
 from .chart import Chart, chart
-from .family import family_of
+from .chart_mesh import default_meshes, mesh_table
+from .converge import element_size
+from .family import Family, family_of
 from .pipeline import family_of_case, load_cases, reduced_sector, run
 from .settings import first_for, restarted
-from .stages import Bodies
+from .stages import Bodies, Reduced
 
 __all__ = ["reference_chart", "scene_chart"]
 
 REFERENCE_LOAD, REFERENCE_BAND, REFERENCE_POINTS = 3.0, (1150.0, 1600.0), 4
 
 
-def scene_chart(scene: Scene, folder: str | Path, budget: float = 120.0, comm: Any = None) -> Chart:
+def scene_chart(scene: Scene, folder: str | Path, budget: float = 120.0, comm: Any = None,
+                sizes: Sequence[float] | None = None) -> Chart:
     """The chart of a scene under the middle one of its loads; finished stages are picked up from the folder.
 
     Args:
-        budget: seconds for the chart; mesh, contact and reduction come on top.
+        budget: seconds for the chart, and as much again for the meshes; contact and reduction come on top.
+        sizes: element sizes of a comparison of meshes [m], default_meshes when empty; none when left out.
     """
     done = run(scene, folder, until="contact", comm=comm)
     bodies, patches = Bodies(scene, done.mesh, comm), list(done.contact.problem.patches)
@@ -31,10 +38,27 @@ def scene_chart(scene: Scene, folder: str | Path, budget: float = 120.0, comm: A
     case = cases[len(cases) // 2]
     settings, reduced = reduced_sector(scene, bodies, case, patches,
                                        lambda name, key, make: stage(folder, name, key, make, comm)[0])
-    family = family_of_case(scene, done.mesh, reduced, patches, case)
-    made = chart(family, restarted(settings), scene.excitation.mode, scene.accuracy, budget, scene.study.band)
+
+    def family(known: Reduced) -> Family:
+        return family_of_case(scene, done.mesh, known, patches, case)
+
+    made = chart(family(reduced), restarted(settings), scene.excitation.mode, scene.accuracy, budget, scene.study.band,
+                 {name: family(fewer) for name, fewer in _fewer_diameters(reduced, scene.excitation.engine_order)})
     made.remarks.insert(0, f"normal load {case.load:g} N on each seat")
-    return made
+    if sizes is None:
+        return made
+    sizes = list(sizes) or default_meshes(scene, element_size(done.mesh, "blade"))
+    return replace(made, meshes=mesh_table(scene, made.settings, case.load, sizes, budget, made.remarks, comm))
+
+
+def _fewer_diameters(reduced: Reduced, order: int) -> Iterator[tuple[str, Reduced]]:
+    """The sector with the nodal diameters of the first harmonics only; the others borrow the nearest of them."""
+    if reduced.sectors:
+        met = dict.fromkeys(folded_diameter(h, order, reduced.sectors)[0] for h in (1, 0, *range(2, reduced.sectors)))
+        known = [n for n in met if n in reduced.sector]
+        for count in range(1, len(known)):
+            name = f"{count} of {len(known)} diameters"
+            yield name, replace(reduced, sector={n: reduced.sector[n] for n in known[:count]})
 
 
 def reference_chart(accuracy: float = 0.02, budget: float = 120.0) -> Chart:

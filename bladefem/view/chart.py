@@ -1,7 +1,8 @@
-"""The chart of speed against accuracy: methods above, models below."""
+"""The chart of speed against accuracy: methods, models, and meshes where they were compared."""
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from pathlib import Path
 
 import numpy as np
@@ -13,23 +14,26 @@ from .style import canvas
 __all__ = ["draw_chart"]
 
 
-def draw_chart(methods: pd.DataFrame, models: pd.DataFrame, file: str | Path | None = None, *,
+def draw_chart(tables: Mapping[str, pd.DataFrame], file: str | Path | None = None, *,
                tolerance: float | None = None, title: str = "") -> object:
-    """Error of the resonance amplitude over time for each frequency; returns the figure.
+    """Error of the resonance amplitude over time, one panel a table; returns the figure.
 
     Args:
-        methods, models: the tables of ``bladefem.study.chart.Chart``; rows that were left out are not drawn, errors
-            below the reference's own (grey) are drawn at it.
+        tables: name to table of ``bladefem.study.chart.Chart``, "methods" and "models" timed by frequency, "meshes"
+            from drawing to resonance; rows that were left out are not drawn, errors below the reference's own (grey)
+            are drawn at it.
         file: PNG to write.
         tolerance: wanted relative accuracy.
         title: headline.
     """
-    with canvas(file, None, (9.5, 9.0), (2, 1)) as axes:
-        for ax, table, what in zip(axes, (methods, models), ("methods", "models"), strict=True):
+    with canvas(file, None, (9.5, 4.3 * len(tables) + 0.4), (len(tables), 1), squeeze=False) as axes:
+        for ax, (what, table) in zip(axes[:, 0], tables.items(), strict=True):
             floor = max(np.nan_to_num(table["reference_error"].iloc[0]), 1e-12)
             shown = table[~table["left_out"]].assign(error=lambda t, floor=floor: t["error"].clip(lower=floor))
             draw_accuracy(shown, ax=ax, tolerance=tolerance, title=f"{title}: {what}" if title else what)
-            ax.set_ylim(bottom=floor / 2)
-            ax.axhspan(floor / 2, floor, color="#bbbbbb", alpha=0.5, zorder=0)
-            ax.set(xlabel="time for each frequency [s]", ylabel="relative error of the resonance amplitude [1]")
-        return axes[0].figure
+            bottom = floor / max(1.3, (ax.get_ylim()[1] / floor) ** 0.08)
+            ax.set_ylim(bottom=bottom)
+            ax.axhspan(bottom, floor, color="#bbbbbb", alpha=0.5, zorder=0)
+            spent = "time from drawing the mesh to the resonance" if what == "meshes" else "time for each frequency"
+            ax.set(xlabel=f"{spent} [s]", ylabel="relative error of the resonance amplitude [1]")
+        return axes[0, 0].figure

@@ -213,8 +213,11 @@ def draw_accuracy(table: pd.DataFrame, file: str | Path | None = None, *, ax: An
     with canvas(file, ax, (7.2, 4.6)) as ax:
         good = table["converged"].astype(bool) if "converged" in table else pd.Series(True, index=table.index)
         families = table["family"] if "family" in table else pd.Series("setting", index=table.index)
+        marked = table["chosen"].astype(bool) if "chosen" in table else pd.Series(False, index=table.index)
         for name, colour in zip(families.unique(), COLOURS * 9, strict=False):
-            part = table[(families == name) & good]
+            part = table[(families == name) & good & ~marked]
+            if part.empty:
+                continue
             ax.plot(part["time"], part["error"], "o", color=colour, ms=5, alpha=0.8, label=name)
         failed = table[~good]
         if len(failed):
