@@ -6,7 +6,21 @@ coarse, and made as users' are: in a process of their own, whose crash becomes a
 
     python benchmarks/random_geometry.py [count] [seed]
 
-FIGURES
+Measured (gmsh 4.15.2, two shared cores), 200 sets of two seeds; nothing crashed, every refusal named a field:
+
+                                                        seed 1      seed 2
+    meshes, round the defaults / anywhere               87 / 0      100 / 1
+    refusals, round the defaults / anywhere             63 / 50     50 / 49
+    of these: flat cells left after both algorithms     0           1
+    worst shape quality of all meshes                   0.030       0.021
+    meshes below 0.05 / 0.1 / 0.15                      4 / 8 / 46  4 / 16 / 56
+    smallest scaled Jacobian                            0.100       0.101
+    seconds, median / most                              1.4 / 4.6   2.4 / 8.2
+
+Shape quality is the ratio of inscribed to circumscribed radius, 1 at best; below 0.02 a mesh is refused. Before the
+shank's end had to be flush with the disc's or 2 % short of it, the worst cells were strips of 9e-6 to 3e-3 there.
+Nearly all sets from the whole ranges break a rule of proportion: a root chord longer than the platform, a bore larger
+than the rim.
 """
 
 import sys

@@ -10,7 +10,26 @@ from geometry.quantity import describe
 
 HERE = Path(__file__).parent
 TABLES = {"aerofoil": ["Aerofoil"], "platform": ["Platform", "Shank", "Wedge"], "sector": ["Disc"], "plane": ["Plane"],
-          "z_mass": ["ZMass"]}
+          "z_mass": ["ZMass"], "hertz": ["HertzPair"], "punch": ["Punch"]}
+NAMES = """## names
+
+Groups of the mesh, which are the contract with the finite elements and the names that `.msh` and STEP files need, too.
+
+| name | what | in |
+| --- | --- | --- |
+| blade, damper | bodies | all, each where it exists |
+| clamp | bore of the disc, root of a plane blade, far face of a block | all |
+| cyclic_low, cyclic_high | cut faces; the second is the first turned by one sector, node by node | wedge sector |
+| seat_left, seat_right | undersides of the platform; the contact face of a block is seat_right | all with contact |
+| damper_left, damper_right | flanks of the damper: on this blade's seat_right, on the next blade's seat_left | \
+all with contact |
+| suction_side, pressure_side, trailing_edge, tip, fillet | skin of the aerofoil | wedge sector |
+| tip_leading, tip_mid, tip_trailing | nodes of the tip: leading edge, half chord, trailing edge | blades |
+| load | far face of the indenter | hertz, punch |
+| symmetry_x, symmetry_y | planes x = 0 and y = 0 of both bodies; nodes slide in them (y in 3-D only) | hertz, punch |
+| footprint, top | lower and upper face of the mass | z mass |
+| seat | upper face of the elastic block below it, under the footprint | z mass |
+"""
 
 
 def number(value: object, unit: str) -> str:
@@ -22,7 +41,7 @@ def rows(name: str) -> list[str]:
     """The parameters of one table as Markdown."""
     text = [f"**{name}**", "", "| field | default | accepted | meaning |", "| --- | ---: | --- | --- |"]
     for field in describe(getattr(parameters, name)):
-        limits = " or ".join(field["choices"]) if field["choices"] else \
+        limits = "true or false" if isinstance(field["default"], bool) else " or ".join(field["choices"]) or \
             f"{number(field['low'], field['unit'])} to {number(field['high'], field['unit'])}"
         default = "auto" if field["default"] is None else number(field["default"], field["unit"])
         text.append(f"| {field['name']} | {default} | {limits} | {field['help']} |")
@@ -37,4 +56,5 @@ for kind, drawings in PARTS.items():
         page += [f"![{name}](parts/{name}.png)", ""]
         for table in TABLES[name]:
             page += rows(table)
+page += ["## element sizes", "", *rows("MeshSize"), NAMES]
 (HERE / "parts.md").write_text("\n".join(page), encoding="utf-8")

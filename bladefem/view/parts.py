@@ -18,6 +18,7 @@ from geometry.section import shape as section_shape
 from geometry.zmass import z_corners
 
 from .dimensions import angle, length, note, shape
+from .pairs import draw_hertz, draw_punch
 from .style import COLOURS, canvas, headline
 
 __all__ = ["PARTS", "draw_aerofoil", "draw_disc", "draw_plane", "draw_platform", "draw_z_mass"]
@@ -109,6 +110,7 @@ def draw_side(ax: Any, blade: Aerofoil) -> None:
     ax.plot(axis, [0, height[-1]], color=COLOURS[1], lw=1, ls="-.", zorder=3)
     note(ax, (np.mean(axis), 0.5 * height[-1]), f"stacking line\n{said(blade, 'lean')}\n{said(blade, 'sweep')}",
          (44, 0))
+    note(ax, (high[0], 0), said(blade, "fillet"), (12, 16))
     bare(ax, "side view", "z, engine axis", "x above the platform")
     ax.set_xlim(low.min() - 0.6 * tip, high.max() + 1.1 * tip)
 
@@ -270,4 +272,6 @@ PARTS: dict[str, dict[str, Callable[[Scene, str | Path | None], object]]] = {
         "sector": lambda s, file=None: draw_disc(s.aerofoil, s.platform, s.shank, s.disc, s.damper, file)},
     "plane blades": {"plane": lambda s, file=None: draw_plane(s.plane, file)},
     "z mass": {"z_mass": lambda s, file=None: draw_z_mass(s.z_mass, file)},
+    "hertz": {"hertz": lambda s, file=None: draw_hertz(s.hertz, file)},
+    "punch": {"punch": lambda s, file=None: draw_punch(s.punch, file)},
 }
