@@ -89,14 +89,18 @@ def responses(response: Any) -> str:
     undamped, (free, stuck) = response.free_peak[1], response.limits
     rows = [["no damper", f"{free.peak_frequency:.2f}", f"{free.peak_amplitude:.4e}", "1", "", ""]]
     for c in response.curves:
-        rows.append([show(c.load, "N"), f"{c.peak_frequency:.2f}", f"{c.peak_amplitude:.4e}",
+        rows.append([_case(c), f"{c.peak_frequency:.2f}", f"{c.peak_amplitude:.4e}",
                      f"{undamped / c.peak_amplitude:.3g}", len(c.frequency), int((~c.converged).sum())])
     rows.append(["full stick", f"{stuck.peak_frequency:.2f}", f"{stuck.peak_amplitude:.4e}",
                  f"{undamped / stuck.peak_amplitude:.3g}", "", ""])
     best = min(response.curves, key=lambda c: c.peak_amplitude)
     table = plain(rows, ["load", "resonance [Hz]", "amplitude [m]", "reduction", "points", "unconverged"])
-    return f"{table}\nbest of these loads: {show(best.load, 'N')}, amplitude divided by " \
-           f"{undamped / best.peak_amplitude:.3g}"
+    return f"{table}\nbest of these loads: {_case(best)}, amplitude divided by {undamped / best.peak_amplitude:.3g}"
+
+
+def _case(curve: Any) -> str:
+    """Load, and mass where several are studied."""
+    return show(curve.load, "N") + ("" if curve.mass is None else f" on {show(curve.mass, 'kg')}")
 
 
 def side_by_side(name: str, results: Sequence[tuple[str, Any]]) -> str:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import time
 from collections.abc import Callable
 from dataclasses import replace
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -88,6 +89,14 @@ def _tables(result: pipeline.Run) -> dict[str, pd.DataFrame]:
                                          ignore_index=True)}
 
 
+def _by_mass(points: pd.DataFrame) -> list[tuple[str, pd.DataFrame]]:
+    """Name of the picture and response points of each damper mass, the linear limits with all of them."""
+    if "mass" not in points:
+        return [("response/forced_response", points)]
+    return [(f"response/forced_response_{1e3 * mass:g}g", points[(points["mass"] == mass) | points["mass"].isna()])
+            for mass in points["mass"].dropna().unique()]
+
+
 def _short(value: object) -> str:
     """A quality value for the eye."""
     if isinstance(value, dict):
@@ -105,7 +114,8 @@ def mode_table(sets: list[ModeSet], geometry: Mesh) -> pd.DataFrame:
 
 def points_of(curve: Any) -> pd.DataFrame:
     """One row a response point."""
-    return pd.DataFrame({"load": curve.load, "frequency": curve.frequency, "amplitude": curve.amplitude,
+    mass = {} if curve.mass is None else {"mass": curve.mass}
+    return pd.DataFrame({"load": curve.load, **mass, "frequency": curve.frequency, "amplitude": curve.amplitude,
                          "phase": np.angle(curve.first), "converged": curve.converged, "method": curve.method,
                          "residual": curve.residual, "iterations": curve.iterations, "slipping": curve.slipping,
                          "dissipated": curve.dissipated, "imbalance": curve.imbalance,
@@ -131,7 +141,7 @@ def _drawings(result: pipeline.Run, tables: dict[str, pd.DataFrame]) -> dict[str
             geometry, excited, file, families=list(tables["modes/modes"]["family"])),
         "contact/pressure_on_both_seats": lambda file: contact.draw_pressure(
             result.contact.maps[middle], file, title=f"normal load {middle:g} N per seat"),
-        "response/forced_response": lambda file: response.draw_responses(tables["response/points"], file),
+        **{name: partial(response.draw_responses, points) for name, points in _by_mass(tables["response/points"])},
         "response/optimum": lambda file: response.draw_optimum(
             tables["response/summary"], file, points=tables["response/points"], own=result.contact.own)}
     if len(result.modes) > 1:

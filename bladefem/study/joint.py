@@ -26,6 +26,7 @@ class LoadCase:
     load: float             # mean normal force on each seat [N]
     elements: Elements
     selection: sp.spmatrix  # (contact dofs of the mesh's nodes, contact dofs of the elements), see friction_elements
+    mass: float | None = None   # of the damper [kg]; as meshed when None
 
 
 def joint_model(scene: Scene, mesh: Mesh, reduced: Reduced, patches: list[Patch], case: LoadCase,

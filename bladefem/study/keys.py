@@ -10,6 +10,7 @@ import numpy as np
 
 from ..scene import Scene
 from ..store import code_of, key_of
+from .joint import LoadCase
 from .settings import Settings
 
 __all__ = ["contact_key", "mesh_key", "modes_key", "reduction_key", "response_key", "zmass_key"]
@@ -52,8 +53,8 @@ def reduction_key(scene: Scene, diameters: Sequence[int], modes: int) -> str:
                   np.array(diameters), modes)
 
 
-def response_key(scene: Scene, settings: Settings, load: float) -> str:
-    """The response curve of one load, whichever others are studied with it."""
-    return key_of(contact_key(scene), load, scene.contact, scene.operation, scene.excitation,
-                  replace(scene.study, loads=()), scene.accuracy, scene.model, replace(settings, error=None),
+def response_key(scene: Scene, settings: Settings, case: LoadCase) -> str:
+    """The response curve of one load and mass, whichever others are studied with it."""
+    return key_of(contact_key(scene), case.load, case.mass, scene.contact, scene.operation, scene.excitation,
+                  replace(scene.study, loads=(), masses=()), scene.accuracy, scene.model, replace(settings, error=None),
                   code_of("bladefem.hbm", "bladefem.friction", "bladefem.reduction", "bladefem.study"))

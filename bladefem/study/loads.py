@@ -19,7 +19,7 @@ from .limits import Limit
 from .settings import Settings, restarted
 
 Progress = Callable[[Iterable[Any], str], Iterable[Any]]
-Keep = Callable[[float, Callable[[], Any]], Any]
+Keep = Callable[[LoadCase, Callable[[], Any]], Any]
 
 __all__ = ["Curve", "curve_of", "default_loads", "forgotten", "study_loads", "summary", "unwatched"]
 
@@ -29,7 +29,7 @@ def unwatched(items: Iterable[Any], label: str = "") -> Iterable[Any]:
     return items
 
 
-def forgotten(load: float, compute: Callable[[], Any]) -> Any:
+def forgotten(case: LoadCase, compute: Callable[[], Any]) -> Any:
     """The keeper that keeps nothing."""
     return compute()
 
@@ -39,6 +39,7 @@ class Curve:
     """A frequency response; points in ascending frequency, unconverged ones included and marked."""
 
     load: float                 # [N]
+    mass: float | None          # of the damper [kg]; as meshed when None
     settings: Settings          # with the estimated error at the resonance
     frequency: np.ndarray       # (k,) [Hz]
     amplitude: np.ndarray       # (k,) root of the sum of squares of the harmonics at the probe [m]
@@ -74,10 +75,10 @@ def study_loads(scene: Scene, cases: list[LoadCase], family: Callable[[LoadCase]
         family: of a load case, its models.
         settings: modes and damper model to keep; each case then takes the rest from what its own curve needs.
         progress: wraps the list of cases of this rank, as tqdm does; the second argument is a label.
-        keep: keep(load, compute) gives the curve of a load, found from an earlier run or computed and kept.
+        keep: keep(case, compute) gives the curve of a load, found from an earlier run or computed and kept.
     """
     rank, ranks = (comm.rank, comm.size) if comm is not None else (0, 1)
-    curves = {i: keep(cases[i].load, partial(curve_of, scene, cases[i], family, settings))
+    curves = {i: keep(cases[i], partial(curve_of, scene, cases[i], family, settings))
               for i in progress(range(rank, len(cases), ranks), "forced responses")}
     for part in comm.allgather(curves) if ranks > 1 else []:
         curves.update(part)
@@ -95,8 +96,8 @@ def curve_of(scene: Scene, case: LoadCase, family: Callable[[LoadCase], Family],
     top = peak_of(curve.points)
     heights = np.array([size(p) for p in curve.points])
     tolerated = scene.accuracy * size(top) / np.maximum(heights, 1e-6 * size(top))
-    return Curve(case.load, curve.settings, *(np.array(c) for c in zip(*map(_record, curve.points), strict=True)),
-                 estimated(curve), tolerated, checked(curve), top)
+    columns = (np.array(c) for c in zip(*map(_record, curve.points), strict=True))
+    return Curve(case.load, case.mass, curve.settings, *columns, estimated(curve), tolerated, checked(curve), top)
 
 
 def _record(p: Solution) -> tuple[object, ...]:
@@ -109,6 +110,8 @@ def summary(curves: list[Curve], limits: tuple[Limit, Limit]) -> dict[str, np.nd
     free, stuck = (_linear_row(limit) for limit in limits)
     rows = [free, *map(_row, curves), stuck]
     table = {name: np.array([row[name] for row in rows]) for name in free}
+    if any(c.mass is not None for c in curves):
+        table["mass"] = np.array([np.nan, *(c.mass for c in curves), np.nan])
     table["reduction"] = free["peak_amplitude"] / table["peak_amplitude"]
     return table
 

@@ -39,6 +39,7 @@ from .stages import (
     harmonic_diameters,
     reduce_sector,
     seat_damper,
+    weighted,
 )
 
 __all__ = ["STAGES", "Response", "Run", "Seating", "family_of_case", "load_cases", "reduced_sector", "run"]
@@ -168,13 +169,18 @@ def _response(scene: Scene, bodies: Bodies, contact: Seating, keep: _Keeper, clo
     family = partial(family_of_case, scene, bodies.mesh, reduced, patches)
     with clock("response"):
         curves = study_loads(scene, cases, family, settings, bodies.comm, progress,
-                             lambda load, make: keep.alone(f"response_{load:g}N", response_key(scene, settings, load),
-                                                           make))
+                             lambda case, make: keep.alone(f"response_{_name(case)}",
+                                                           response_key(scene, settings, case), make))
         band = min(c.frequency[0] for c in curves), max(c.frequency[-1] for c in curves)
         rich = member(family(cases[-1]), settings).model
         limits = linear_limits(rich, scene.excitation.mode, band)
     clock.messages.extend(_remarks(scene, settings, curves))
     return Response(reduced, settings, curves, limits)
+
+
+def _name(case: LoadCase) -> str:
+    """ "90N" or "90N_30g"."""
+    return f"{case.load:g}N" + ("" if case.mass is None else f"_{1e3 * case.mass:g}g")
 
 
 def _own_load(scene: Scene, problem: ContactProblem, messages: list[str]) -> float | None:
@@ -193,13 +199,14 @@ def _own_load(scene: Scene, problem: ContactProblem, messages: list[str]) -> flo
 
 
 def load_cases(scene: Scene, mesh: Mesh, contact: Seating) -> list[LoadCase]:
-    """The friction elements of each load."""
-    return [_load_case(scene, mesh, load, maps) for load, maps in contact.maps.items()]
+    """The friction elements of each load, for each mass of the damper."""
+    return [_load_case(scene, mesh, load, maps, mass) for mass in scene.study.masses or (None,)
+            for load, maps in contact.maps.items()]
 
 
 def family_of_case(scene: Scene, mesh: Mesh, reduced: Reduced, patches: list[Patch], case: LoadCase) -> Family:
     """All models of a load case that the reduced sector allows."""
-    nodes = len(case.elements.kt)
+    nodes, reduced = len(case.elements.kt), weighted(reduced, case.mass)
 
     @lru_cache(maxsize=4)
     def build(settings: Settings) -> Member:
@@ -261,10 +268,10 @@ def _remarks(scene: Scene, settings: Settings, curves: list[Curve]) -> list[str]
     return remarks
 
 
-def _load_case(scene: Scene, mesh: Mesh, load: float, maps: list[PressureMap]) -> LoadCase:
+def _load_case(scene: Scene, mesh: Mesh, load: float, maps: list[PressureMap], mass: float | None) -> LoadCase:
     ratio = pair_ratio(scene.material.blade, scene.material.damper)
     elements, selection = friction_elements(maps, scene.contact, ratio, mesh.dimension - 1)
-    return LoadCase(load, elements, selection)
+    return LoadCase(load, elements, selection, mass)
 
 
 def check_blade(scene: Scene, mesh: Mesh) -> None:

@@ -106,6 +106,15 @@ class Reduced:
     mass: float                     # of the damper [kg]
 
 
+def weighted(reduced: Reduced, mass: float | None) -> Reduced:
+    """The same with a damper of another density: its mass [kg] scales, its flexibility stays."""
+    if mass is None:
+        return reduced
+    root = (mass / reduced.mass) ** 0.5
+    damper = replace(reduced.damper, omega=reduced.damper.omega / root, shapes=reduced.damper.shapes / root)
+    return replace(reduced, damper=damper, mass=mass)
+
+
 def build_mesh(scene: Scene, comm: Any = None) -> Mesh:
     """The scene's mesh, drawn on rank 0 and the same on every rank.
 

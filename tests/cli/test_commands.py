@@ -23,7 +23,8 @@ WEDGE = "scenes/wedge.toml"
 
 
 def fake_curve(load, amplitude):
-    return SimpleNamespace(load=load, peak_frequency=830.0, peak_amplitude=amplitude, frequency=np.arange(5.0),
+    return SimpleNamespace(load=load, mass=None,
+                           peak_frequency=830.0, peak_amplitude=amplitude, frequency=np.arange(5.0),
                            converged=np.array([True, True, False, True, True]))
 
 
