@@ -4,10 +4,12 @@ from __future__ import annotations
 
 import argparse
 import os
+import signal
 import sys
 import time
 import traceback
 from collections.abc import Callable
+from contextlib import suppress
 from typing import Any
 
 from ..errors import InputError, NotSolvedError
@@ -35,6 +37,8 @@ def communicator() -> Any:
 def guarded(action: Callable[[Any], None], options: argparse.Namespace) -> int:
     """The exit code of an action that gets the communicator; errors are told on rank 0."""
     comm = None
+    with suppress(ValueError):      # only a main thread may; a batch system's SIGTERM then cleans up like Ctrl-C
+        signal.signal(signal.SIGTERM, signal.default_int_handler)
     try:
         comm = communicator()
         meeting = comm.Dup() if comm else None

@@ -111,7 +111,8 @@ def draw_optimum(summary: pd.DataFrame, file: str | Path | None = None, *, point
         axes[1].set(ylabel="resonance frequency [Hz]", xlabel="normal load per seat [N]")
         log_axis(axes[0], "y")
         log_axis(axes[1], "x")
-        axes[0].legend()
+        beside = {"loc": "center left", "bbox_to_anchor": (1.0, 0.5)} if "mass" in summary else {}
+        axes[0].legend(**beside)
         return axes[0].figure
 
 

@@ -217,11 +217,12 @@ sys.exit(main(["modes", "scenes/wedge.toml", "-o", sys.argv[1]]))
 """
 
 
-def test_an_interrupt_keeps_the_finished_stages(tmp_path):
+@pytest.mark.parametrize("sent", [signal.SIGINT, signal.SIGTERM])
+def test_an_interrupt_keeps_the_finished_stages(sent, tmp_path):
     job = subprocess.Popen([sys.executable, "-c", INTERRUPTED, tmp_path], stdout=subprocess.PIPE,
                            stderr=subprocess.PIPE, text=True, env=clean_environment())
     assert job.stdout.readline() == "started\n"
-    job.send_signal(signal.SIGINT)
+    job.send_signal(sent)
     said = job.communicate(timeout=30)[1]
     assert job.returncode == 130 and "interrupted; finished stages are kept" in said and "Traceback" not in said
     assert [p.name for p in (tmp_path / "stages").iterdir()] == ["mesh.npz"]
