@@ -13,11 +13,14 @@ import os
 from pathlib import Path
 
 import numpy as np
+from mpi4py import MPI
 from scipy.integrate import trapezoid
 
 from bladefem.damper.element import coupled_loop, linear_fit, printed_loop, two_slope_loop, work
 from bladefem.view.paper import draw_coupled_loops, draw_fit
 
+if MPI.COMM_WORLD.rank:                        # small enough for one rank; the others wait at the end
+    raise SystemExit
 coarse = "BLADEFEM_COARSE" in os.environ
 folder = Path("runs/demos/paper_element")
 samples = 2048 if coarse else 16384

@@ -1,13 +1,13 @@
 # %% [markdown]
-# # A mass on a vibrating foundation: the paper's Sect. 4, Fig. 8-11, Table 1
+# # A mass on a vibrating foundation: the paper's Sect. 4, Fig. 7-11, Table 1
 #
-# A Z-shaped plate lies on a foundation that moves by $x_b = x_0 \sin 2\pi f_b t$, pressed down by a load
+# A Z-shaped steel plate lies on a foundation that moves by $x_b = x_0 \sin 2\pi f_b t$, pressed down by a load
 # $P = P_0 + P_1 \sin 2\pi f_p t$. Friction alone drives it:
 #
 # $$ m\ddot x = \sum_i f_{ix}, \quad m\ddot y = \sum_i f_{iy}, \quad I\ddot\theta = \sum_i (x_i f_{iy} - y_i f_{ix}), $$
 #
-# with $|f_i| \le \mu N_i(t)$ at each of 40 nodes. The contact is a receding one: its pressure keeps its shape and
-# follows the load in proportion (Eq. 27).
+# with $|f_i| \le \mu N_i(t)$ at each of 40 points. Sizes, motion and loads stand in `scenes/zmass.toml`; the plate has
+# the mass and the moment of inertia of Table 1.
 
 # %%
 import os
@@ -15,15 +15,38 @@ from fractions import Fraction
 from pathlib import Path
 
 import numpy as np
+from mpi4py import MPI
 
+import bladefem
 from bladefem.damper.loops import Drive, ratio_table, spectrum, steady
-from bladefem.damper.zmass import MassOnFoundation, skewed, z_footprint
-from bladefem.view.paper import draw_mass_loops, draw_mass_spectra
+from bladefem.report.zmass import draw_motions
+from bladefem.study.zmass import mass_on_foundation, motions, press
+from bladefem.view.paper import draw_footprint
 
 coarse = "BLADEFEM_COARSE" in os.environ
-folder = Path("runs/demos/paper_zmass")
+folder, comm = Path("runs/demos/paper_zmass"), MPI.COMM_WORLD
 steps = 500 if coarse else 4000                # time steps a cycle of the foundation
-body = MassOnFoundation()                      # Table 1; k_t 1e6 N/m in all
+scene = bladefem.load_scene("scenes/zmass.toml", ["mesh.size=7 mm"] if coarse else [])
+
+# %% [markdown]
+# ## The pressure on the footprint (Fig. 8)
+#
+# Plate and foundation are finite elements in unilateral contact, here on all ranks together. On a rigid foundation a
+# uniform load on top gives a uniform pressure below; an elastic one presses back harder at the edges. The contact is a
+# receding one: its pressure keeps its shape and follows the load in proportion (Eq. 27).
+
+# %%
+seat = press(scene, comm=comm).seat
+skewed = scene.vary(foundation__skew=(0.5, 0.3), foundation__amplitude=(0.005, 0.003), foundation__ratios=(0.5,))
+skew = press(skewed, comm=comm).seat
+if comm.rank:                                  # the rest is small: rank 0 does it, the others wait at the end
+    raise SystemExit
+body = mass_on_foundation(scene, seat)
+mean = seat.force.sum() / seat.patch.area.sum()
+print(f"{1e3 * body.mass:.2f} g, {1e6 * body.inertia:.3f}e-6 kg m^2; pressure {seat.pressure.min() / mean:.3f} to "
+      f"{seat.pressure.max() / mean:.3f} of its mean at {len(seat.force)} nodes")
+if not coarse:
+    draw_footprint(seat, body.footprint, folder / "fig_8.png")
 
 # %% [markdown]
 # ## Loops and spectra for four load frequencies
@@ -33,7 +56,8 @@ body = MassOnFoundation()                      # Table 1; k_t 1e6 N/m in all
 # of the slip, halved, within the smallest period of (velocity, force).
 
 # %%
-results = {f"{int(100 * r)} Hz": steady(body, Drive(r), steps) for r in map(Fraction, ("0", "1/4", "1/2", "2"))}
+found = list(motions(scene, body, steps))
+results = {f"{float(d.ratio) * d.frequency:g} Hz": result for d, result in found}
 for name, result in results.items():
     frequency, lines = spectrum(result)
     main = lines[np.argmin(abs(frequency - 100)), 0]
@@ -42,14 +66,7 @@ for name, result in results.items():
 
 # %%
 if not coarse:
-    shown = {}
-    for name, result in results.items():
-        drift = result.drift[0] * result.time
-        motion = result.relative[:, 0] + drift
-        shown[f"load at {name}"] = (motion - motion.mean(), result.motion.force[:, 0], result.loops)
-    draw_mass_loops(shown, folder / "fig_10.png")
-    draw_mass_spectra({f"load at {name}": (spectrum(r)[0], spectrum(r)[1][:, 0]) for name, r in results.items()},
-                      folder / "fig_11.png")
+    draw_motions(found, folder / "fig_10.png", folder / "fig_11.png")
 
 # %% [markdown]
 # ## The rule of the denominator
@@ -75,12 +92,11 @@ for stroke in (2e-3, 1.2e-3, 0.8e-3):          # m
 # %% [markdown]
 # ## Rotation and the coupled plane
 #
-# A point-symmetric pressure never turns the mass and never uses the coupling of the two directions. A skewed load on
-# an elliptic foundation motion does both.
+# A point-symmetric pressure never turns the mass and never uses the coupling of the two directions. A load on top that
+# grows towards one corner, on an elliptic foundation motion, does both.
 
 # %%
-turning = MassOnFoundation(footprint=skewed(z_footprint(), (0.5, 0.3)))
-result = steady(turning, Drive(Fraction(1, 2), amplitude=(0.005, 0.003)), steps // 2, most=60)
+_, result = next(motions(skewed, mass_on_foundation(skewed, skew), steps // 2))
 print(f"skewed: drift {result.drift[0]:+.4f}, {result.drift[1]:+.4f} m/s, turning up to "
       f"{np.abs(result.motion.velocity[:, 2]).max():.2f} rad/s, {result.loops} loops")
 

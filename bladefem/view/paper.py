@@ -21,6 +21,7 @@ __all__ = ["draw_coupled_loops", "draw_fit", "draw_footprint", "draw_friction_lo
 
 OUTCOMES = {"converged": "#2c7fb8", "false": "#d62728", "no convergence": "#fdae61", "diverged": "#222222"}
 MICRO, MILLI = 1e6, 1e3
+LIMIT = "friction limit of a seat [N]"
 
 
 def draw_fit(angle: np.ndarray, motion: np.ndarray, force: np.ndarray, linear: np.ndarray,
@@ -113,43 +114,52 @@ def draw_mass_spectra(cases: Mapping[str, tuple[np.ndarray, np.ndarray]], file: 
 
 
 def draw_tip_responses(curves: Mapping[float, tuple[np.ndarray, np.ndarray]], file: str | Path | None = None,
-                       title: str = "") -> object:
+                       title: str = "", dots: Mapping[float, np.ndarray] | None = None, load: str = LIMIT) -> object:
     """Tip amplitude over frequency for several loads (Fig. 15); returns the figure.
 
     Args:
-        curves: friction limit of a seat [N] to (frequency (p,) [Hz], amplitude (p,) [m]).
+        curves: load [N] to (frequency (p,) [Hz], amplitude (p,) [m]).
+        dots: load [N] to the same (2, k) by another method.
+        load: what the loads are.
     """
     with canvas(file, None, (7.6, 4.6)) as ax:
         shades = matplotlib.colormaps["viridis"](np.linspace(0, 0.92, len(curves)))
-        for shade, (load, (frequency, amplitude)) in zip(shades, sorted(curves.items()), strict=True):
-            ax.plot(frequency, MICRO * amplitude, color=shade, label=f"{load:.3g}")
+        for shade, (value, (frequency, amplitude)) in zip(shades, sorted(curves.items()), strict=True):
+            ax.plot(frequency, MICRO * amplitude, color=shade, label=f"{value:.3g}")
+            if dots is not None and len(dots[value]):
+                inside = (dots[value][0] > frequency.min()) & (dots[value][0] < frequency.max())
+                ax.plot(dots[value][0][inside], MICRO * dots[value][1][inside], "o", ms=3.5, color=shade, mec="#444444",
+                        mew=0.4)
         ax.set(xlabel="frequency [Hz]", ylabel="amplitude at the tip [µm]", title=title)
         log_axis(ax, "y")
-        ax.legend(title="friction limit of a seat [N]", loc="center left", bbox_to_anchor=(1.0, 0.5))
+        ax.legend(title=load, loc="center left", bbox_to_anchor=(1.0, 0.5))
         return ax.figure
 
 
 def draw_friction_loops(loops: Mapping[float, tuple[np.ndarray, np.ndarray]],
-                        file: str | Path | None = None) -> object:
+                        file: str | Path | None = None, load: str = LIMIT) -> object:
     """Total friction force of a seat over its relative displacement at resonance (Fig. 16); returns the figure.
 
     Args:
-        loops: friction limit of a seat [N] to (displacement (s,) [m], force (s,) [N]).
+        loops: load [N] to (displacement (s,) [m], force (s,) [N]).
+        load: what the loads are.
     """
     with canvas(file, None, (7.2, 4.6)) as ax:
         shades = matplotlib.colormaps["viridis"](np.linspace(0, 0.92, len(loops)))
-        for shade, (load, (motion, force)) in zip(shades, sorted(loops.items()), strict=True):
-            ax.plot(MICRO * np.r_[motion, motion[0]], np.r_[force, force[0]], color=shade, label=f"{load:.3g}")
+        for shade, (value, (motion, force)) in zip(shades, sorted(loops.items()), strict=True):
+            ax.plot(MICRO * np.r_[motion, motion[0]], np.r_[force, force[0]], color=shade, label=f"{value:.3g}")
         ax.set(xlabel="relative displacement [µm]", ylabel="friction force of a seat [N]", title="loops at resonance")
-        ax.legend(title="friction limit of a seat [N]", loc="center left", bbox_to_anchor=(1.0, 0.5))
+        ax.legend(title=load, loc="center left", bbox_to_anchor=(1.0, 0.5))
         return ax.figure
 
 
-def draw_peaks(curves: Mapping[float, np.ndarray], file: str | Path | None = None, title: str = "") -> object:
+def draw_peaks(curves: Mapping[float, np.ndarray], file: str | Path | None = None, title: str = "",
+               load: str = LIMIT) -> object:
     """Resonance frequency and amplitude over the load, a curve a damper mass (Fig. 17); returns the figure.
 
     Args:
-        curves: damper mass [kg] to (loads, 3) of friction limit [N], frequency [Hz], amplitude [m].
+        curves: damper mass [kg] to (loads, 3) of load [N], frequency [Hz], amplitude [m].
+        load: what the loads are.
     """
     with canvas(file, None, (9.4, 4.0), (1, 2)) as (left, right):
         for mass, rows in sorted(curves.items()):
@@ -157,7 +167,7 @@ def draw_peaks(curves: Mapping[float, np.ndarray], file: str | Path | None = Non
             right.plot(rows[:, 0], MICRO * rows[:, 2], "o-", ms=3)
         for ax in (left, right):
             ax.set_xscale("log")
-            ax.set_xlabel("friction limit of a seat [N]")
+            ax.set_xlabel(load)
         left.set(ylabel="resonance frequency [Hz]", title=title)
         right.set(ylabel="resonance amplitude [µm]")
         log_axis(right, "y")

@@ -12,26 +12,28 @@ from .style import COLOURS, canvas, log_axis
 __all__ = ["draw_branches", "draw_punch"]
 
 
-def draw_punch(radius: np.ndarray, pressure: np.ndarray, exact: tuple[np.ndarray, np.ndarray],
-               rings: tuple[np.ndarray, np.ndarray, np.ndarray], file: str | Path | None = None) -> object:
-    """Pressure under a round punch, and the stiffness of rings of contact springs (Fig. 5, 6); returns the figure.
+def draw_punch(radius: np.ndarray, pressure: np.ndarray, stiffness: np.ndarray, exact: tuple[np.ndarray, np.ndarray],
+               springs: tuple[np.ndarray, np.ndarray], file: str | Path | None = None) -> object:
+    """Pressure under a round punch, and the stiffness of the contact within a radius (Fig. 5, 6); returns the figure.
 
     Args:
         radius, pressure: (n,) of the nodes over the radius of the punch [1] and over the mean pressure [1].
+        stiffness: (n,) force of the nodes over the approach [N/m].
         exact: radius (k,) [1] and pressure (k,) [1] of Johnson's formula.
-        rings: middles (m,) [1], stiffness by finite elements (m,) and by Eq. 25 (m,) [N/m].
+        springs: edges (m + 1,) [1] and stiffness (m,) [N/m] of rings of springs.
     """
     with canvas(file, None, (9.4, 4.0), (1, 2)) as (left, right):
         order = np.argsort(radius)
-        left.plot(*exact, color=COLOURS[1], label="Johnson, Eq. 24 in terms of the force")
+        left.plot(*exact, color=COLOURS[1], label="Johnson: Eq. 24 in terms of the force")
         left.plot(radius[order], pressure[order], "o", ms=3, color=COLOURS[0], label="finite elements, all nodes")
         left.set(xlabel="radius over that of the punch", ylabel="pressure over its mean", ylim=(0, 4),
                  title="under a flat punch")
         left.legend()
-        width = rings[0][1] - rings[0][0]
-        right.bar(rings[0], rings[1] / 1e6, 0.85 * width, color=COLOURS[5], label="force of the ring over the approach")
-        right.plot(rings[0], rings[2] / 1e6, "o-", color=COLOURS[1], ms=4, label="Eq. 25 over the ring")
-        right.set(xlabel="radius over that of the punch", ylabel="stiffness of a ring [N/µm]",
+        right.plot(radius[order], np.cumsum(stiffness[order]) / 1e6, "o", ms=3, color=COLOURS[0],
+                   label="finite elements: force over approach")
+        right.plot(springs[0], np.r_[0, np.cumsum(springs[1])] / 1e6, "s-", ms=4, mfc="none", color=COLOURS[1],
+                   label=f"{len(springs[1])} rings of springs, Eq. 25")
+        right.set(xlabel="radius over that of the punch", ylabel="stiffness within the radius [N/µm]",
                   title="discretised springs")
         right.legend()
         return left.figure

@@ -1,0 +1,30 @@
+"""What a page of claims is made of."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+from pathlib import Path
+
+__all__ = ["Chapter", "Claim"]
+
+
+@dataclass(frozen=True)
+class Claim:
+    """One row of the page."""
+
+    where: str              # figure or equation of the paper
+    claim: str              # what the paper says
+    ours: str               # what is found here
+    verdict: str            # "holds", "holds in part", "fails"
+    pictures: tuple[str, ...] = ()      # files beside the page
+    caption: str = ""       # of the pictures
+
+
+@dataclass(frozen=True)
+class Chapter:
+    """Claims that belong together; they are computed, and pictures drawn into a folder, when asked for."""
+
+    title: str
+    text: str
+    parts: tuple[Callable[[Path], Iterator[Claim]], ...]
