@@ -13,6 +13,7 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 
 from .claim import Chapter, Claim
+from .errata import ERRATA
 
 __all__ = ["as_html", "as_markdown", "main"]
 
@@ -45,7 +46,13 @@ def as_markdown(chapters: Sequence[Chapter], found: Found) -> str:
         for x in found[c.title]:
             lines += [line for picture in x.pictures for line in ("", f"![{x.where}](paper/{picture})")]
             lines += ["", f"*{x.where}: {x.caption}*"] if x.pictures else []
+    lines += ["", "## Formulas to correct", "", "| where | printed | right |", "| --- | --- | --- |"]
+    lines += [f"| {e.where} | {_cell(e.printed)} | {_cell(e.right)} |" for e in ERRATA]
     return "\n".join(lines) + "\n"
+
+
+def _cell(text: str) -> str:
+    return text.replace("|", "\\|")
 
 
 def as_html(chapters: Sequence[Chapter], found: Found) -> str:
@@ -61,6 +68,8 @@ def as_html(chapters: Sequence[Chapter], found: Found) -> str:
                   _table(("where", "the paper says", "found here", "verdict"),
                          [(x.where, x.claim, x.ours, x.verdict) for x in found[c.title]])]
         parts += [_figure(x) for x in found[c.title] if x.pictures]
+    rows = "".join("<tr>" + "".join(f"<td>{html.escape(cell)}" for cell in e) + "</tr>" for e in ERRATA)
+    parts += [f"<h2>Formulas to correct</h2><table><tr><th>where<th>printed<th>right</tr>{rows}</table>"]
     return "\n".join(parts) + "\n"
 
 
