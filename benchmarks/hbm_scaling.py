@@ -1,6 +1,6 @@
 """Cost of one converged point against contact nodes and harmonics, with the floating-point limit of each part.
 
-    python benchmarks/hbm_scaling.py [cost.png]
+    python benchmarks/hbm_scaling.py [docs/figures/hbm_scaling]        table, and cost as .png and .csv
 Square 3-D patches of `hbm_models.patch`. Limits: condensation 8/3 + 8 complex m^3 a harmonic (LU and m right-hand
 sides, m = 3 n), at the rate at which this machine multiplies matrices; a dense Jacobian would take 2/3 (m (2H+1))^3 a
 Newton step.
@@ -17,9 +17,12 @@ Forces grow linearly, the condensation with the cube; 25 nodes: H 1 to 31 takes 
 
 from __future__ import annotations
 
+import csv
 import sys
 import time
+import tracemalloc
 from collections.abc import Callable
+from pathlib import Path
 
 import numpy as np
 from hbm_models import patch
@@ -28,7 +31,7 @@ from bladefem.hbm.api import solve
 from bladefem.hbm.linear import condense
 from bladefem.hbm.residual import Balance, evaluate_balance, start_in_stick
 
-SIDES, HARMONICS = (3, 5, 7, 10, 14, 20), (1, 3, 7, 15, 31)
+SIDES, HARMONICS = (3, 5, 7, 10, 14, 20, 32), (1, 3, 7, 15, 31)
 
 
 def rate(size: int = 600) -> float:
@@ -47,40 +50,56 @@ def measure(side: int, H: int, speed: float) -> dict[str, float]:
     """CPU seconds of a point and of its parts."""
     model, samples, omega = patch(side, max(side**2 // 3, 3)).model, 8 * H + 64, 0.9
     solution = solve(model, omega, H, samples)
+    tracemalloc.start()
+    point = seconds(lambda: solve(model, omega, H, samples))
+    memory = tracemalloc.get_traced_memory()[1] / 2**20
+    tracemalloc.stop()
     balance = Balance(model, condense(model, omega, H), samples)
     m = 3 * side**2
-    return {"nodes": side**2, "H": H, "point": seconds(lambda: solve(model, omega, H, samples)),
-            "condense": seconds(lambda: condense(model, omega, H)),
+    return {"nodes": side**2, "H": H, "point": point, "condense": seconds(lambda: condense(model, omega, H)),
             "forces": seconds(lambda: evaluate_balance(balance, start_in_stick(balance))),
-            "limit": (8 / 3 + 8) * m**3 * H / speed, "dense": 2 / 3 * (m * (2 * H + 1))**3 / speed,
-            "iterations": solution.iterations, "solved": solution.converged}
+            "limit": (8 / 3 + 8) * m**3 * H / speed, "dense": 2 / 3 * (m * (2 * H + 1))**3 / speed, "memory": memory,
+            "dense memory": 8 * (m * (2 * H + 1))**2 / 2**20, "iterations": solution.iterations,
+            "solved": solution.converged}
 
 
-def main(picture: str | None = None) -> None:
+def main(target: str | None = None) -> None:
     speed = rate()
     print(f"matrix products: {speed / 1e9:.1f} GFlop/s")
-    heads = ("nodes", "H", "point", "condense", "forces", "limit", "dense step", "iterations")
-    print("  ".join(f"{head:>10s}" for head in heads))
-    rows = [measure(side, 3, speed) for side in SIDES] + [measure(5, H, speed) for H in HARMONICS]
-    for row in rows:
-        cells = "  ".join(f"{value:10.4g}" for name, value in row.items() if name != "solved")
-        print(cells, "" if row["solved"] else "lost")
-    if picture:
-        draw(rows, picture)
+    rows = []
+    for side, H in [(side, 3) for side in SIDES] + [(5, H) for H in HARMONICS]:
+        rows.append(measure(side, H, speed))
+        if len(rows) == 1:
+            print("  ".join(f"{head:>12s}" for head in rows[0]))
+        print("  ".join(f"{value:12.4g}" for value in rows[-1].values()), flush=True)
+    if target:
+        with Path(target).with_suffix(".csv").open("w", newline="") as file:
+            table = csv.DictWriter(file, rows[0])
+            table.writeheader()
+            table.writerows({key: f"{value:.4g}" for key, value in row.items()} for row in rows)
+        draw(rows, Path(target).with_suffix(".png"))
 
 
-def draw(rows: list[dict[str, float]], file: str) -> None:
+def draw(rows: list[dict[str, float]], file: Path) -> None:
     import matplotlib
     matplotlib.use("Agg")
     from matplotlib import pyplot
-    figure, axes = pyplot.subplots(1, 2, figsize=(10, 4), sharey=True)
-    for axis, along, part in zip(axes, ("nodes", "H"), (rows[:len(SIDES)], rows[len(SIDES):]), strict=True):
-        for name in ("point", "condense", "forces", "limit", "dense"):
-            style = "k--" if name == "limit" else "o-"
-            axis.loglog([r[along] for r in part], [r[name] for r in part], style, label=name)
-        axis.set(xlabel={"nodes": "contact nodes, H = 3", "H": "harmonics, 25 nodes"}[along], ylabel="CPU time [s]")
-    axes[0].legend()
-    figure.savefig(file, dpi=150)
+    figure, axes = pyplot.subplots(2, 2, figsize=(10, 7), sharey="row", sharex="col")
+    curves = {"point": ("o-", "one point"), "condense": ("s-", "flexibilities"), "forces": ("^-", "contact forces"),
+              "limit": ("k--", "floating-point limit"), "dense": ("0.6", "one dense Newton step, at the limit"),
+              "memory": ("o-", "one point"), "dense memory": ("0.6", "dense Jacobian")}
+    for column, (along, part) in enumerate({"nodes": rows[:len(SIDES)], "H": rows[len(SIDES):]}.items()):
+        for name, (style, label) in curves.items():
+            axis = axes[int("memory" in name), column]
+            axis.loglog([r[along] for r in part], [r[name] for r in part], style if style[0] != "0" else "--",
+                        color=style if style[0] == "0" else None, label=label)
+        axes[1, column].set_xlabel({"nodes": "contact nodes, H = 3", "H": "harmonics, 25 nodes"}[along])
+    axes[0, 0].set_ylabel("CPU time [s]")
+    axes[1, 0].set_ylabel("memory [MiB]")
+    axes[0, 0].legend()
+    axes[1, 0].legend()
+    figure.tight_layout()
+    figure.savefig(file, dpi=120)
 
 
 if __name__ == "__main__":

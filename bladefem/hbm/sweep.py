@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from dataclasses import replace
+from functools import partial
 
 import numpy as np
 
@@ -17,6 +18,7 @@ from .solution import Solution
 
 __all__ = ["first_look", "local_maxima", "response", "size", "sweep"]
 
+Keep = Callable[[float, Callable[[], Solution]], Solution]
 COARSE = 12     # intervals of the first look at a band
 BAND_LIMIT = 400    # points after which a sweep gives up refining
 
@@ -27,11 +29,16 @@ def size(solution: Solution, probe: int = 0) -> float:
 
 
 def response(model: ReducedModel, omegas: Iterable[float], H: int = 3, samples: int = 128, *,
-             options: Options = DEFAULTS) -> Iterator[Solution]:
-    """Solve one point after the other, each started from the line through the last two."""
+             options: Options = DEFAULTS, keep: Keep = lambda omega, compute: compute()) -> Iterator[Solution]:
+    """Solve one point after the other, each started from the line through the last two.
+
+    Args:
+        keep: is given each frequency and what solves it; see `bladefem.hbm.record`.
+    """
     last: list[Solution] = []
     for omega in omegas:
-        solution = solve(model, omega, H, samples, start=_line(last, omega, H), options=options)
+        start = _line(last, omega, H)
+        solution = keep(omega, partial(solve, model, omega, H, samples, start=start, options=options))
         yield solution
         if solution.converged:
             last = [*last[-1:], solution]
