@@ -65,8 +65,9 @@ def rigid_basis(con: Constrained) -> np.ndarray:
     inside = np.repeat(body.rows >= 0, body.dim)
     columns = _columns(con)
     q = R[columns]
-    _, s, vh = np.linalg.svd((R - con.T @ q)[inside | weight], full_matrices=False)
-    null = vh[s < 1e-8 * np.linalg.norm(R, 2)].conj().T
+    misfit = np.linalg.qr((R - con.T @ q)[inside | weight], mode="r")
+    _, s, vh = np.linalg.svd(misfit)
+    null = vh[s < 1e-8 * np.linalg.norm(R)].conj().T
     basis = (q @ null)[con.own]
     if not basis.shape[1]:
         return basis

@@ -22,9 +22,10 @@ from .linalg import apply, combined, dot, inertia, scale
 __all__ = ["canonical", "certificate", "count_below", "elastic_pairs", "mode_set", "modes", "pairs"]
 
 TOLERANCE = 1e-8    # error of a vector's direction; that of a frequency is its square
+SHOWN = 1e-6        # the same where modes are looked at, not reduced with
 
 
-def modes(con: Constrained, count: int, flex: Flexibility | None = None, tolerance: float = TOLERANCE,
+def modes(con: Constrained, count: int, flex: Flexibility | None = None, tolerance: float = SHOWN,
           prove: bool = False) -> ModeSet:
     """The lowest modes, rigid ones included, mass-normalised over the body (one sector of a wheel).
 

@@ -25,6 +25,8 @@ from .modes import mode_set, pairs
 __all__ = ["Eigenpairs", "all_diameters", "eigenpairs"]
 
 GUARD = 2               # modes beyond those asked for, carried along
+MORE = 12               # rough ones beyond, from which other diameters are guessed
+FIRST = (0, 1, 1 / 3, 1 / 6, 2 / 3)     # places of the diameters solved first: shapes change fastest at low ones
 LEVELS = (3, 5)         # numbers of solved diameters from which the others are guessed
 CLOSE = 5e-6            # error of a vector's direction; that of a frequency is its square
 
@@ -71,26 +73,31 @@ def eigenpairs(t: Transformation, count: int, diameters: Sequence[int], direct: 
                tolerance: float = CLOSE) -> Iterator[Eigenpairs]:
     """``count`` pairs and some guards in each nodal diameter, in the order in which they are solved."""
     cons = {n: at_diameter(t, n) for n in diameters}
-    solved, space = [], None
-    for i, n in enumerate(_bisected(sorted(cons))):
+    blocks: list[np.ndarray] = []
+    space = None
+    for i, n in enumerate(_sampled(sorted(cons))):
         if i in LEVELS and not direct:
-            space = _space(t, [p.X for p in solved])
+            space = _space(t, blocks)
         start = None if space is None else _guess(space, cons[n], 2 * np.pi * n / t.sectors, count + GUARD)
-        solved.append(_pairs(flexible(cons[n]), count, start, tolerance))
-        yield solved[-1]
+        helps = len(cons) > LEVELS[0] and i < LEVELS[-1] and not direct
+        found = _pairs(flexible(cons[n]), count, start, tolerance, MORE if helps else GUARD)
+        if helps:
+            blocks.append(found.X)
+        else:
+            blocks.clear()
+        few = slice(0, count + GUARD)
+        yield replace(found, lam=found.lam[few], X=found.X[:, few].copy(order="F") if helps else found.X)
 
 
-def _bisected(order: list[int]) -> list[int]:
-    """Both ends, then the middle of each part, and so on: each new one lies between known ones."""
-    out, width = [0, len(order) - 1], len(order) - 1
-    while width > 1:
-        width = (width + 1) // 2
-        out += range(0, len(order), width)
-    return [order[i] for i in dict.fromkeys([*out, *range(len(order))])] if order else []
+def _sampled(order: list[int]) -> list[int]:
+    """Those that guess well between them, then the others."""
+    first = [round(part * (len(order) - 1)) for part in FIRST] if order else []
+    return [order[i] for i in dict.fromkeys([*first, *range(len(order))])]
 
 
-def _pairs(flex: Flexibility, count: int, start: np.ndarray | None, tolerance: float = CLOSE) -> Eigenpairs:
-    guard = min(GUARD, flex.con.T.shape[1] - count)
+def _pairs(flex: Flexibility, count: int, start: np.ndarray | None, tolerance: float = CLOSE,
+           guard: int = GUARD) -> Eigenpairs:
+    guard = min(guard, flex.con.T.shape[1] - count)
     return Eigenpairs(flex, *pairs(flex, count, tolerance, start, guard))
 
 
@@ -109,29 +116,31 @@ def _guess(space: tuple[np.ndarray, list[np.ndarray], list[np.ndarray]], con: Co
 
 
 def _span(blocks: list[np.ndarray], t: Transformation) -> np.ndarray:
-    """(n_own, m) orthonormal real basis of all parts of the vectors."""
-    comm = t.body.comm
+    """(n_own, m) nearly orthonormal real basis of all parts of the vectors; what they have in common is taken once."""
     parts = [part for X in blocks for part in ((X.real, X.imag) if np.iscomplexobj(X) else (X,))]
-    W = np.asfortranarray(np.concatenate(parts, axis=1))
-    W /= np.sqrt(dot(comm, W, W).diagonal())
-    for _ in range(2):          # the second time for the digits that small directions lost in the first
-        size, Z = np.linalg.eigh(dot(comm, W, W))
-        good = size > 1e-13 * size[-1]
-        W = mix(W, Z[:, good] / np.sqrt(size[good]))
-    return W
+    W = np.empty((len(parts[0]), sum(part.shape[1] for part in parts)), order="F")
+    np.concatenate(parts, axis=1, out=W)
+    gram = dot(t.body.comm, W, W)
+    length = np.sqrt(gram.diagonal())
+    size, Z = np.linalg.eigh(gram / np.outer(length, length))
+    good = size > 1e-13 * size[-1]
+    return mix(W, Z[:, good] / np.sqrt(size[good]) / length[:, None])
 
 
 def _projected(t: Transformation, W: np.ndarray) -> tuple[list[np.ndarray], list[np.ndarray]]:
     """(m, m) projections of K0, Kc, Ks and of M0, Mc, Ms."""
     if t.opened is None:
         return tuple([dot(t.body.comm, W, apply(A, W)) for A in three] for three in (t.K, t.M))
-    low, high = (A[t.opened.places] @ W for A in (t.low, t.high))
-    faces = np.flatnonzero(np.diff(t.high[t.opened.places].indptr))
+    T1 = t.high[t.opened.places]
+    faces = np.flatnonzero(np.diff(T1.indptr))
+    low, high = t.low[t.opened.places] @ W, T1[faces] @ W
     out = []
     for A in (t.opened.K, t.opened.M):
-        A_high, A_low = A[:, faces] @ high[faces], A @ low
-        LH = low.T @ A_high
-        out.append([low.T @ A_low + high[faces].T @ A_high[faces], LH + LH.T, LH - LH.T])
+        beside = A[faces].T.tocsr()
+        near = np.flatnonzero(np.diff(beside.indptr))
+        A_high = beside[near] @ high
+        LH = low[near].T @ A_high
+        out.append([low.T @ (A @ low) + high.T @ (A[faces][:, faces] @ high), LH + LH.T, LH - LH.T])
     return tuple(out)
 
 
