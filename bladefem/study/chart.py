@@ -111,21 +111,21 @@ def frequencies(curve: Iterable[tuple[float, float]]) -> np.ndarray:
 
 def timed_model(model: ReducedModel, omegas: np.ndarray, run: Callable[[ReducedModel, float, object], Point],
                 budget: float) -> tuple[list[Point], float, str]:
-    """Points, seconds per frequency, and why it was left out, by solving the middle frequency first."""
+    """Points, seconds of CPU per frequency, and why it was left out, by solving the middle frequency first."""
     middle, points = omegas[len(omegas) // 2], []
-    begun = time.perf_counter()
+    begun = time.process_time()
     run(model, middle, None)            # kernels compiled, caches warm
-    spent = time.perf_counter() - begun
+    spent = time.process_time() - begun
     if spent > budget:
         return points, spent, f"left out: {spent:.2g} s for the first frequency exceed its share of time"
-    start, last = time.perf_counter(), None
+    start, last = time.process_time(), None
     for k, omega in enumerate(omegas):
         points.append(run(model, omega, last))
         last = points[-1].start
-        spent = time.perf_counter() - start
+        spent = time.process_time() - start
         if spent / (k + 1) * len(omegas) > 2 * budget and k < len(omegas) - 1:
             return points, spent / (k + 1), f"left out: {spent / (k + 1):.2g} s a frequency exceed its share of time"
-    return points, (time.perf_counter() - start) / len(omegas), ""
+    return points, (time.process_time() - start) / len(omegas), ""
 
 
 def resonance(omegas: np.ndarray, first: np.ndarray) -> Peak:

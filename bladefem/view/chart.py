@@ -13,6 +13,8 @@ from .style import canvas
 
 __all__ = ["draw_chart"]
 
+LABELS = {"meshes": ("CPU time from drawing the mesh to the resonance", "amplitude or frequency, the larger")}
+
 
 def draw_chart(tables: Mapping[str, pd.DataFrame], file: str | Path | None = None, *,
                tolerance: float | None = None, title: str = "") -> object:
@@ -29,11 +31,12 @@ def draw_chart(tables: Mapping[str, pd.DataFrame], file: str | Path | None = Non
     with canvas(file, None, (9.5, 4.3 * len(tables) + 0.4), (len(tables), 1), squeeze=False) as axes:
         for ax, (what, table) in zip(axes[:, 0], tables.items(), strict=True):
             floor = max(np.nan_to_num(table["reference_error"].iloc[0]), 1e-12)
-            shown = table[~table["left_out"]].assign(error=lambda t, floor=floor: t["error"].clip(lower=floor))
+            error = table["error"] if what != "meshes" else table[["error", "error_frequency"]].max(axis=1)
+            shown = table.assign(error=error.clip(lower=floor))[~table["left_out"]]
             draw_accuracy(shown, ax=ax, tolerance=tolerance, title=f"{title}: {what}" if title else what)
             bottom = floor / max(1.3, (ax.get_ylim()[1] / floor) ** 0.08)
             ax.set_ylim(bottom=bottom)
             ax.axhspan(bottom, floor, color="#bbbbbb", alpha=0.5, zorder=0)
-            spent = "time from drawing the mesh to the resonance" if what == "meshes" else "time for each frequency"
-            ax.set(xlabel=f"{spent} [s]", ylabel="relative error of the resonance amplitude [1]")
+            spent, of = LABELS.get(what, ("CPU time for each frequency", "resonance amplitude"))
+            ax.set(xlabel=f"{spent} [s]", ylabel=f"relative error of the {of} [1]")
         return axes[0, 0].figure

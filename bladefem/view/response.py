@@ -234,12 +234,23 @@ def draw_accuracy(table: pd.DataFrame, file: str | Path | None = None, *, ax: An
         return ax.figure
 
 
+def readable(front: pd.DataFrame) -> np.ndarray:
+    """(k,) bool: points of a front whose names can stand beside each other."""
+    place = np.log10(np.maximum(front[["time", "error"]].to_numpy(float), 1e-300))
+    place = place / np.maximum(np.ptp(place, axis=0), 1e-3)
+    kept: list[int] = []
+    for i in range(len(place)):
+        if all(abs(place[i, 0] - place[k, 0]) > 0.15 or abs(place[i, 1] - place[k, 1]) > 0.08 for k in kept):
+            kept.append(i)
+    return np.isin(np.arange(len(place)), kept)
+
+
 def draw_front(ax: Any, table: pd.DataFrame) -> None:
-    """The Pareto front as stairs with names, and the chosen setting."""
+    """The Pareto front as stairs, with names where there is room, and the chosen setting."""
     front = table.iloc[pareto_front(table["time"].to_numpy(float), table["error"].to_numpy(float))]
     ax.step(front["time"], front["error"], where="post", color="#888888", lw=1, zorder=1, label="Pareto front")
-    for _, row in front.iterrows():
-        ax.annotate(str(row["name"]), (row["time"], row["error"]), (5, 5), textcoords="offset points", fontsize=7.5)
+    for _, row in front[readable(front)].iterrows():
+        ax.annotate(str(row["name"]), (row["time"], row["error"]), (6, 8), textcoords="offset points", fontsize=7.5)
     if "chosen" in table and table["chosen"].any():
         chosen = table[table["chosen"].astype(bool)]
         ax.plot(chosen["time"], chosen["error"], "*", color=COLOURS[4], mec="black", ms=15, mew=0.8, zorder=5,

@@ -18,6 +18,7 @@ from bladefem.hbm.newton import DEFAULTS, newton
 from bladefem.hbm.reference import reference_model
 from bladefem.hbm.residual import Balance, evaluate_balance, start_in_stick
 from bladefem.hbm.sweep import size, sweep
+from bladefem.hbm.vary import vary
 from bladefem.reduction.matrices import port_model_from_matrices
 
 HZ = 2 * np.pi
@@ -82,6 +83,26 @@ def test_F11_newton_on_the_residual_stalls_and_the_chain_does_not():
     assert not stalled.converged and "stalled" in stalled.reason
     attempts = solve_balance(balance, None, DEFAULTS)
     assert attempts[-1].end.converged and sum(a.end.iterations for a in attempts) <= 60
+    reached = solve(model, omega, 31, 2048)
+    for other in (_by_harmonics(model, omega), _by_load(model, omega)):
+        assert other.converged and other.method == "newton"
+        np.testing.assert_allclose(other.w, reached.w, rtol=0, atol=1e-7 * abs(reached.w).max())
+
+
+def _by_harmonics(model, omega):
+    """3, 7, 15, 31 harmonics, each started from the one before."""
+    solution = None
+    for H in (3, 7, 15, 31):
+        solution = solve(model, omega, H, 2048, start=solution)
+    return solution
+
+
+def _by_load(model, omega):
+    """From a load under which all sticks down to the true one in 25 steps, as the catalogue has it."""
+    solution = None
+    for factor in np.geomspace(100, 1, 25):
+        solution = solve(vary(model, "load", factor), omega, 31, 2048, start=solution)
+    return solution
 
 
 def test_F14_a_stiff_contact_started_in_slip_ends_in_stick():

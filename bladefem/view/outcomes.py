@@ -1,0 +1,70 @@
+"""Where methods fail: a small map a method, over two planes of parameters, coloured by outcome and iterations."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import matplotlib
+import numpy as np
+import pandas as pd
+from matplotlib.colors import LogNorm
+from matplotlib.patches import Patch as Swatch
+
+from .style import canvas
+
+__all__ = ["draw_outcomes"]
+
+LOST = {"false": "#D55E00", "no convergence": "#222222", "diverged": "#CC79A7"}
+SHADES = "Blues"
+COLUMNS = 5         # of small maps
+
+
+def draw_outcomes(table: pd.DataFrame, planes: dict[str, tuple[str, str, str]], file: str | Path | None = None, *,
+                  title: str = "") -> object:
+    """One small map a method and plane; returns the figure.
+
+    Args:
+        table: one row a point and method: load, stiffness, frequency, method, outcome, iterations, residual, as
+            ``bladefem.damper.maps.method_map`` gives them, with a column "plane".
+        planes: name of a plane to the column on its vertical axis, its label and a factor of it as text ("1e-6").
+        file: PNG to write.
+        title: headline.
+    """
+    methods = list(dict.fromkeys(table["method"]))
+    rows = -(-len(methods) // COLUMNS)
+    with canvas(file, None, (2.25 * COLUMNS, 2.2 * rows * len(planes) + 0.9), (rows * len(planes), COLUMNS)) as axes:
+        norm = LogNorm(1, max(float(table["iterations"].max()), 10.0))
+        for p, (plane, (y, label, factor)) in enumerate(planes.items()):
+            for k, ax in enumerate(axes[p * rows:(p + 1) * rows].ravel()):
+                if k >= len(methods):
+                    ax.axis("off")
+                    continue
+                part = table[(table["plane"] == plane) & (table["method"] == methods[k])]
+                _draw(ax, part.assign(**{y: part[y] * float(factor)}), y, norm)
+                good = int((part["outcome"] == "converged").sum())
+                ax.set_title(f"{methods[k]}\n{good} of {len(part)}", fontsize=8.5)
+                ax.set_ylabel(label if k % COLUMNS == 0 else "", fontsize=8.5)
+                ax.set_xlabel("load [N]" if k >= len(methods) - COLUMNS else "", fontsize=8.5)
+        figure = axes[0, 0].figure
+        figure.colorbar(matplotlib.cm.ScalarMappable(norm, SHADES), ax=axes, label="iterations", aspect=40, shrink=0.6)
+        figure.legend(handles=[Swatch(color=colour, label=word) for word, colour in LOST.items()], ncols=3,
+                      loc="outside lower center")
+        if title:
+            figure.suptitle(title, fontsize=11, fontweight="bold")
+        return figure
+
+
+def _draw(ax: Any, part: pd.DataFrame, y: str, norm: LogNorm) -> None:
+    """Cells shaded by iterations, or in the colour of their failure."""
+    cells = part.pivot_table(index=y, columns="load", values="iterations", aggfunc="last")
+    words = part.pivot(index=y, columns="load", values="outcome").to_numpy()
+    colours = matplotlib.colormaps[SHADES](norm(np.maximum(cells.to_numpy(float), 1.0)))
+    for word, colour in LOST.items():
+        colours[words == word] = matplotlib.colors.to_rgba(colour)
+    ax.imshow(colours, origin="lower", aspect="auto", interpolation="nearest")
+    ax.grid(False)
+    for axis, values in ((ax.xaxis, cells.columns), (ax.yaxis, cells.index)):
+        chosen = np.unique(np.linspace(0, len(values) - 1, 4).astype(int))
+        axis.set_ticks(chosen, [f"{values[i]:.4g}" for i in chosen])
+    ax.tick_params(labelsize=7)
