@@ -24,6 +24,7 @@ from . import core
 from .body import Body
 from .compat import PETSc
 from .linalg import Doubled, Folded, Matrix, combined
+from .ordering import interior_first
 
 __all__ = ["Constrained", "Opened", "Transformation", "at_diameter", "clamped_nodes", "constrain", "expand", "in_step",
            "restrict", "transformation", "unknowns"]
@@ -323,7 +324,9 @@ def _opened(body: Body, T: sp.csr_matrix, low: sp.csr_matrix, high: sp.csr_matri
     places = np.empty(T.shape[1], int)
     places[rows.col[unit]] = rows.row[unit]
     rim = core.rim_of((abs(low) + abs(high))[places].tocsr())
-    return None if len(rim) == len(places) else Opened(T, places, K, M, core.eliminate(K, rim))
+    if len(rim) == len(places):
+        return None
+    return Opened(T, places, K, M, core.eliminate(K, rim, order=interior_first(K, rim, places // body.dim)))
 
 
 def _projected(A: sp.csr_matrix, T: sp.csr_matrix) -> sp.csr_matrix:

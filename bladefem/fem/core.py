@@ -34,6 +34,7 @@ class Core:
     S: np.ndarray                   # (nb, nb) Schur complement of the rim [N/m]
     coupling: sp.csr_matrix         # (nb, ni) A_bi
     bridge: Bridge | None           # to the rim's system amid a solve; None: two solves instead
+    order: np.ndarray | None        # (ni+nb,) place of each unknown in the elimination, to use again; None: MUMPS's own
 
 
 @dataclass(frozen=True)
@@ -66,8 +67,11 @@ def masters(C: sp.csr_matrix) -> np.ndarray:
     return np.unique(C[rim_of(C)].indices)
 
 
-def eliminate(A: sp.csr_matrix, rim: np.ndarray, definite: bool = True) -> Core:
+def eliminate(A: sp.csr_matrix, rim: np.ndarray, definite: bool = True, order: np.ndarray | None = None) -> Core:
     """Eliminate the interior.
+
+    Args:
+        order: see ``ordering.interior_first``.
 
     Raises:
         NotSolvedError: from MUMPS.
@@ -75,10 +79,12 @@ def eliminate(A: sp.csr_matrix, rim: np.ndarray, definite: bool = True) -> Core:
     matrix = PETSc.Mat().createAIJ(A.shape, comm=MPI.COMM_SELF, csr=(
         A.indptr.astype(PETSc.IntType), A.indices.astype(PETSc.IntType), A.data))
     matrix.assemble()
-    factor = factorise_matrix(matrix, definite, rim)
+    factor = factorise_matrix(matrix, definite, rim, order)
+    matrix.destroy()
     inner = np.setdiff1d(np.arange(A.shape[0]), rim)
     S = schur_complement(factor, len(rim))
-    return Core(factor, inner, rim, S, A[rim][:, inner].tocsr(), bridge(factor, len(rim)) if definite else None)
+    return Core(factor, inner, rim, S, A[rim][:, inner].tocsr(), bridge(factor, len(rim)) if definite else None,
+                order)
 
 
 def close(core: Core, C: sp.csr_matrix, definite: bool = True, springs: np.ndarray | None = None) -> Rim:

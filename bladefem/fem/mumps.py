@@ -8,6 +8,7 @@ by name.
 from __future__ import annotations
 
 import ctypes
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
@@ -19,6 +20,7 @@ __all__ = ["Factorised", "dense", "factorise_matrix", "petsc_call", "set_operati
 
 BATCH = 128     # columns a solve: MUMPS works on them by matrix products, 256 are no faster
 ROOM = 40       # per cent of memory beyond MUMPS's own estimate
+ANALYSIS = 25   # MATOP_LUFACTOR_SYMBOLIC
 SPARSE = 0.2    # share of non-zero rows below which a right-hand side counts as sparse
 
 
@@ -27,7 +29,6 @@ class Factorised:
     """A real matrix factorised by MUMPS."""
 
     matrix: PETSc.Mat               # the factor
-    solver: PETSc.PC                # keeps it alive
     entries: int                    # in the factors
     flops: float                    # of the factorisation
     bytes: float                    # memory of all ranks
@@ -35,27 +36,21 @@ class Factorised:
     negative: int                   # negative pivots
 
 
-def factorise_matrix(A: PETSc.Mat, definite: bool, schur: np.ndarray | None = None) -> Factorised:
+def factorise_matrix(A: PETSc.Mat, definite: bool, schur: np.ndarray | None = None,
+                     order: np.ndarray | None = None) -> Factorised:
     """Factorise a symmetric matrix.
 
     Args:
         definite: Cholesky; else L D L^T with the count of negative pivots.
         schur: rows left out of the factorisation, see ``schur`` (one rank only).
+        order: (n,) place of each row in the elimination (one rank only); MUMPS chooses when left out.
 
     Raises:
         NotSolvedError: the matrix is singular or not definite, or memory ran out; the message holds MUMPS's INFOG.
     """
     A.setOption(PETSc.Mat.Option.SYMMETRIC, True)
     A.setOption(PETSc.Mat.Option.SPD, definite)
-    pc = PETSc.PC().create(A.comm)
-    pc.setOperators(A)
-    pc.setType(PETSc.PC.Type.CHOLESKY)
-    try:
-        pc.setFactorSolverType("mumps")
-        pc.setFactorSetUpSolverType()
-    except PETSc.Error as error:
-        raise NotSolvedError("PETSc was built without MUMPS, expected one with it (apt python3-petsc4py-real)") \
-            from error
+    pc = _prepared(A, PETSc.PC.Type.CHOLESKY)
     F = pc.getFactorMatrix()
     F.setMumpsIcntl(14, ROOM)
     if not definite:
@@ -64,12 +59,13 @@ def factorise_matrix(A: PETSc.Mat, definite: bool, schur: np.ndarray | None = No
     if schur is not None:
         index = PETSc.IS().createGeneral(schur.astype(PETSc.IntType), comm=F.comm)
         petsc_call("MatFactorSetSchurIS", F.handle, index.handle)
-    _numeric(pc, F, A.size[0])
+    _numeric(F, A.size[0], pc.setUp if order is None else lambda: _in_order(F, A, order))
+    pc.destroy()                    # and with it PETSc's hold on A
     negative = F.getMumpsInfog(12)
     if definite and negative:       # MUMPS goes on in silence
         raise NotSolvedError(f"the matrix of {A.size[0]} unknowns is not positive definite, MUMPS met {negative} "
                              "negative pivots: a part floats, nothing joins it to the rest, or the state has buckled")
-    return Factorised(F, pc, _large(F.getMumpsInfog(29)), F.getMumpsRinfog(3), 1e6 * F.getMumpsInfog(22),
+    return Factorised(F, _large(F.getMumpsInfog(29)), F.getMumpsRinfog(3), 1e6 * F.getMumpsInfog(22),
                       F.getMumpsInfog(7), negative)
 
 
@@ -136,20 +132,48 @@ def set_operation(handle: int, place: int, function: object) -> None:
 
 
 def petsc_call(name: str, *arguments: object) -> None:
-    """Call one of PETSc's C functions; whole numbers are handles of its objects."""
+    """Call one of PETSc's C functions; large whole numbers are handles of its objects."""
     function = getattr(ctypes.CDLL(PETSc.__file__), name)
-    code = function(*[ctypes.c_void_p(a) if isinstance(a, int) else a for a in arguments])
+    code = function(*[ctypes.c_void_p(a) if isinstance(a, int) and a > 0xFFFF else a for a in arguments])
     if code:
         raise NotSolvedError(f"PETSc's {name} failed with error {code}")
 
 
-def _numeric(pc: PETSc.PC, F: PETSc.Mat, size: int) -> None:
+def _prepared(A: PETSc.Mat, kind: str) -> PETSc.PC:
+    """A solver with an empty factor of MUMPS's kind."""
+    pc = PETSc.PC().create(A.comm)
+    pc.setOperators(A)
+    pc.setType(kind)
+    try:
+        pc.setFactorSolverType("mumps")
+        pc.setFactorSetUpSolverType()
+    except PETSc.Error as error:
+        raise NotSolvedError("PETSc was built without MUMPS, expected one with it (apt python3-petsc4py-real)") \
+            from error
+    return pc
+
+
+def _in_order(F: PETSc.Mat, A: PETSc.Mat, order: np.ndarray) -> None:
+    """Factorise with a given ordering, which PETSc hands on to MUMPS in its analysis for LU only: that one is borrowed,
+    it does the same but for the ordering."""
+    unsymmetric, analysis = _prepared(A, PETSc.PC.Type.LU), ctypes.c_void_p()
+    petsc_call("MatGetOperation", unsymmetric.getFactorMatrix().handle, ANALYSIS, ctypes.byref(analysis))
+    set_operation(F.handle, ANALYSIS, analysis)
+    places = PETSc.IS().createGeneral(order.astype(PETSc.IntType), comm=F.comm)
+    info = (ctypes.c_double * 16)()             # MatFactorInfo, all defaults
+    petsc_call("MatLUFactorSymbolic", F.handle, A.handle, places.handle, places.handle, ctypes.byref(info))
+    petsc_call("MatLUFactorNumeric", F.handle, A.handle, ctypes.byref(info))
+    for made in (unsymmetric, places):
+        made.destroy()
+
+
+def _numeric(F: PETSc.Mat, size: int, factorise: Callable[[], None]) -> None:
     """Factorise; failures become one sentence."""
     PETSc.Sys.pushErrorHandler("ignore")
     failed = False
     try:
-        pc.setUp()
-    except PETSc.Error:
+        factorise()
+    except (PETSc.Error, NotSolvedError):
         failed = True
     finally:
         PETSc.Sys.popErrorHandler()

@@ -170,7 +170,8 @@ def _shifted(t: Transformation, shift: float) -> Folded | None:
     if t.opened is None:
         return None
     A = (t.opened.K - shift * t.opened.M).tocsr()
-    return Folded(A, t.low[t.opened.places], core.eliminate(A, t.opened.core.rim, definite=False))
+    return Folded(A, t.low[t.opened.places], core.eliminate(
+        A, t.opened.core.rim, definite=False, order=t.opened.core.order))
 
 
 def _count_below(con: Constrained, shift: float, shared: Folded | None) -> int:
