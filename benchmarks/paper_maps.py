@@ -1,6 +1,6 @@
 """Where each method fails on the reference blade: 128 points of (load, frequency), 144 of (load, contact stiffness).
 
-python benchmarks/paper_maps.py [folder]      about five minutes, writes method_map.csv and prints the counts
+python benchmarks/paper_maps.py [folder]      about five minutes, writes method_map.csv and .png, prints the counts
 BLADEFEM_COARSE=1                             12 points
 
 Recorded on 272 points, 279 s of CPU (docs/paper/method_map.csv): converged / false / none
@@ -14,6 +14,7 @@ import time
 from pathlib import Path
 
 import numpy as np
+import pandas as pd
 
 from bladefem.damper.maps import count_outcomes, method_map, write_rows
 from bladefem.hbm.api import solve
@@ -21,9 +22,12 @@ from bladefem.hbm.linear import condense
 from bladefem.hbm.newton import newton
 from bladefem.hbm.reference import reference_model
 from bladefem.hbm.residual import Balance, start_in_stick
+from bladefem.view.outcomes import draw_outcomes
 
 COARSE = os.environ.get("BLADEFEM_COARSE") == "1"
 H, SAMPLES = 5, 256
+FREQUENCY = 1230.0      # of the plane (load, stiffness) [Hz]
+PLANES = {"frequency": ("frequency", "frequency [Hz]", 1.0), "stiffness": ("stiffness", "stiffness [N/um]", 1e-6)}
 
 
 def grid() -> list[tuple[float, float, float]]:
@@ -31,7 +35,7 @@ def grid() -> list[tuple[float, float, float]]:
     loads = np.geomspace(0.1, 100, 3 if COARSE else 16)
     bands = [(load, 1e6, f) for load in loads for f in np.linspace(1200, 1420, 2 if COARSE else 8)]
     loads = np.geomspace(0.1, 100, 3 if COARSE else 12)
-    return bands + [(load, kt, 1230.0) for load in loads for kt in np.geomspace(1e5, 1e8, 2 if COARSE else 12)]
+    return bands + [(load, kt, FREQUENCY) for load in loads for kt in np.geomspace(1e5, 1e8, 2 if COARSE else 12)]
 
 
 def model(load: float, stiffness: float):
@@ -55,6 +59,9 @@ def main(folder: Path) -> None:
     started = time.process_time()
     rows = list(method_map(grid(), model, {"newton": plain, "newton, fallbacks": chain}))
     write_rows(rows, folder / "method_map.csv")
+    table = pd.DataFrame(rows)
+    table["plane"] = np.where(table["frequency"] == FREQUENCY, "stiffness", "frequency")
+    draw_outcomes(table, PLANES, folder / "method_map.png", title="Where methods fail on the reference blade")
     print(f"{len(grid())} points, {time.process_time() - started:.0f} s of CPU")
     for method, counts in count_outcomes(rows).items():
         print(f"{method:18s}", ", ".join(f"{word} {counts[word]}" for word in sorted(counts)))

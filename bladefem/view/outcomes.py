@@ -20,14 +20,14 @@ SHADES = "Blues"
 COLUMNS = 5         # of small maps
 
 
-def draw_outcomes(table: pd.DataFrame, planes: dict[str, tuple[str, str, str]], file: str | Path | None = None, *,
+def draw_outcomes(table: pd.DataFrame, planes: dict[str, tuple[str, str, float]], file: str | Path | None = None, *,
                   title: str = "") -> object:
     """One small map a method and plane; returns the figure.
 
     Args:
         table: one row a point and method: load, stiffness, frequency, method, outcome, iterations, residual, as
             ``bladefem.damper.maps.method_map`` gives them, with a column "plane".
-        planes: name of a plane to the column on its vertical axis, its label and a factor of it as text ("1e-6").
+        planes: name of a plane to the column on its vertical axis, its label and the factor to its unit.
         file: PNG to write.
         title: headline.
     """
@@ -41,7 +41,7 @@ def draw_outcomes(table: pd.DataFrame, planes: dict[str, tuple[str, str, str]], 
                     ax.axis("off")
                     continue
                 part = table[(table["plane"] == plane) & (table["method"] == methods[k])]
-                _draw(ax, part.assign(**{y: part[y] * float(factor)}), y, norm)
+                _draw(ax, part.assign(**{y: part[y] * factor}), y, norm)
                 good = int((part["outcome"] == "converged").sum())
                 ax.set_title(f"{methods[k]}\n{good} of {len(part)}", fontsize=8.5)
                 ax.set_ylabel(label if k % COLUMNS == 0 else "", fontsize=8.5)
