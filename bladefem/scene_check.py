@@ -95,6 +95,9 @@ def _z_mass(scene: Scene) -> Iterator[str]:
     z = scene.z_mass
     yield from _below("z_mass.bar", z.bar, z.height / 2, "half of z_mass.height")
     yield from _below("z_mass.bar", z.bar, z.width, "z_mass.width")
+    skew = scene.foundation.skew
+    if abs(skew[0]) + abs(skew[1]) > 1:
+        yield f"foundation.skew = {skew[0]:g}, {skew[1]:g}: expected a sum of sizes of at most 1"
 
 
 def _hertz(scene: Scene) -> Iterator[str]:

@@ -276,7 +276,9 @@ def _load_case(scene: Scene, mesh: Mesh, load: float, maps: list[PressureMap], m
 
 def check_blade(scene: Scene, mesh: Mesh) -> None:
     """Verification scenes end with their mesh; a blade needs its clamp."""
-    if scene.kind in ("z mass", "hertz", "punch"):
+    if scene.kind == "z mass":
+        raise InputError("kind 'z mass' has no blade: 'bladefem run' computes its pressure and motion")
+    if scene.kind in ("hertz", "punch"):
         raise InputError(f"kind '{scene.kind}' is a contact study: 'bladefem mesh' draws it, its demo computes it; "
                          "modes and responses need a blade")
     if "clamp" not in mesh.faces:

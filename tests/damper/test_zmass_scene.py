@@ -9,6 +9,7 @@ import pytest
 from bladefem.cli.main import main
 from bladefem.damper.loops import Drive, steady
 from bladefem.damper.zmass import Footprint, MassOnFoundation
+from bladefem.errors import InputError
 from bladefem.scene_file import load_scene
 from bladefem.study.zmass import clusters, drives, mass_on_foundation, motions, press
 
@@ -83,6 +84,13 @@ def test_clusters_stay_on_the_solid(pressed):
     near = np.linalg.norm(patch.points[None, :, :2] - np.column_stack(centres)[:, None], axis=2).min(axis=1)
     assert label.max() == 19
     assert near.max() < 0.005                                               # within an element of a node
+
+
+def test_refusals():
+    with pytest.raises(InputError, match=r"foundation\.skew.*at most 1"):
+        SCENE.vary(foundation__skew=(0.8, 0.5))
+    with pytest.raises(InputError, match="expected 'z mass'"):
+        press(load_scene("scenes/punch.toml"))
 
 
 def test_scene_drives_the_motion(tmp_path, monkeypatch):
