@@ -34,8 +34,10 @@ def draw_chart(tables: Mapping[str, pd.DataFrame], file: str | Path | None = Non
             error = table["error"] if what != "meshes" else table[["error", "error_frequency"]].max(axis=1)
             shown = table.assign(error=error.clip(lower=floor))[~table["left_out"]]
             draw_accuracy(shown, ax=ax, tolerance=tolerance, title=f"{title}: {what}" if title else what)
-            bottom = floor / max(1.3, (ax.get_ylim()[1] / floor) ** 0.08)
-            ax.set_ylim(bottom=bottom)
+            top = ax.get_ylim()[1]
+            margin = max(1.3, (top / floor) ** 0.08)
+            bottom = floor / margin
+            ax.set_ylim(bottom, top * margin)
             ax.axhspan(bottom, floor, color="#bbbbbb", alpha=0.5, zorder=0)
             spent, of = LABELS.get(what, ("CPU time for each frequency", "resonance amplitude"))
             ax.set(xlabel=f"{spent} [s]", ylabel=f"relative error of the {of} [1]")
