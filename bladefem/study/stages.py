@@ -7,6 +7,8 @@ from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Any
 
+import numpy as np
+
 from geometry.mesh import Mesh
 
 from ..contact.patch import make_patch
@@ -19,7 +21,7 @@ from ..store import on_root
 from .ports import blade_ports, damper_ports
 
 __all__ = ["Bodies", "Reduced", "build_mesh", "contact_patches", "find_modes", "harmonic_diameters", "is_wheel",
-           "reduce_sector", "seat_damper"]
+           "reduce_sector", "seat_damper", "wheel_modes"]
 
 MODES_SHOWN = 10        # of each nodal diameter, in tables and pictures
 DAMPER_MODES = 16       # of the elastic damper, its six rigid ones included
@@ -154,12 +156,32 @@ def find_modes(bodies: Bodies, diameters: Sequence[int] | None = None, count: in
         count: modes of each nodal diameter.
     """
     from ..fem.modes import modes
-    from ..fem.wheel import all_diameters
     if not is_wheel(bodies.mesh):
         flex = bodies.factorised(0)
         return [modes(flex.con, count, flex)]
     wanted = diameters or bodies.scene.model.nodal_diameters or harmonic_diameters(bodies.scene, bodies.mesh, 3)
-    return all_diameters(bodies.frame, count, wanted)
+    return wheel_modes(bodies, count, wanted)
+
+
+def wheel_modes(bodies: Bodies, count: int, diameters: Sequence[int] | None = None, direct: bool = False,
+                group: int | None = None) -> list[ModeSet]:
+    """Normal modes of a wheel in several nodal diameters, which groups of ranks share out.
+
+    Args:
+        diameters: 0 to N/2 when left out.
+        direct: solve every nodal diameter from scratch.
+        group: ranks in a group; as few as memory allows when left out.
+    """
+    from ..fem.compat import MPI
+    from ..fem.groups import group_size, shared_out
+    from ..fem.wheel import all_diameters
+    comm, mesh = bodies.comm or MPI.COMM_WORLD, bodies.mesh
+    wanted = list(range(mesh.sector.count // 2 + 1)) if diameters is None else list(diameters)
+    if comm.size == 1 or len(wanted) == 1:
+        return all_diameters(bodies.frame, count, wanted, direct)
+    size = group or group_size(comm, mesh.dimension * len(np.unique(mesh.bodies["blade"])))
+    return shared_out(comm, wanted, size, lambda part, some: all_diameters(
+        Bodies(bodies.scene, mesh, part).frame, count, some, direct))
 
 
 def seat_damper(bodies: Bodies, patches: list[Patch]) -> Any:

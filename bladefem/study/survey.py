@@ -26,7 +26,7 @@ from .effective import effective_masses
 from .keys import modes_key
 from .loads import Progress, unwatched
 from .modal import mac
-from .stages import MODES_SHOWN, Bodies, is_wheel
+from .stages import MODES_SHOWN, Bodies, is_wheel, wheel_modes
 
 __all__ = ["Survey", "Wanted", "excited_set", "survey"]
 
@@ -96,11 +96,10 @@ def excited_set(run: pipeline.Run) -> ModeSet:
 
 def _all_modes(bodies: Bodies, direct: bool) -> list[ModeSet]:
     from ..fem.modes import modes
-    from ..fem.wheel import all_diameters
     if not is_wheel(bodies.mesh):
         flex = bodies.factorised(0)
         return [modes(flex.con, MODES_SHOWN, flex)]
-    return all_diameters(bodies.frame, MODES_SHOWN, bodies.scene.model.nodal_diameters, direct)
+    return wheel_modes(bodies, MODES_SHOWN, bodies.scene.model.nodal_diameters, direct)
 
 
 def _orders(scene: Scene) -> list[int]:

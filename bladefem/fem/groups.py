@@ -1,0 +1,64 @@
+"""Ranks split into groups that share out nodal diameters; the mesh is distributed within each group."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from typing import TypeVar
+
+import numpy as np
+
+from .compat import MPI
+from .memory import available, needed
+
+__all__ = ["group_size", "shared_out"]
+
+Result = TypeVar("Result")
+SPARE = 0.8     # share of the free memory that groups may fill
+
+
+def group_size(comm: MPI.Comm, dofs: int, free: float | None = None) -> int:
+    """Ranks in a group: as few as memory allows, for a wheel is solved fastest by one rank; divides the ranks.
+
+    Args:
+        dofs: degrees of freedom of one sector.
+        free: memory of a machine [bytes]; what is available when left out.
+    """
+    here = comm.Split_type(MPI.COMM_TYPE_SHARED)
+    free = comm.allreduce(available() if free is None else free, MPI.MIN)
+    together = comm.allreduce(here.size, MPI.MAX)
+    here.Free()
+    for size in range(1, comm.size):
+        if comm.size % size == 0 and needed(dofs, size) * max(together // size, 1) < SPARE * free:
+            return size
+    return comm.size
+
+
+def shared_out(comm: MPI.Comm, tasks: Sequence[int], size: int,
+               work: Callable[[MPI.Comm, list[int]], list[Result]]) -> list[Result]:
+    """Results of all tasks, in their order and on every rank; collective.
+
+    Args:
+        size: ranks in a group.
+        work: results of some tasks, neighbours in number, by the ranks of one group, the same on each of them.
+
+    Raises:
+        whatever a group raised.
+    """
+    groups = max(min(comm.size // size, len(tasks)), 1)
+    color = comm.rank * groups // comm.size
+    mine = [int(n) for n in np.array_split(sorted(set(tasks)), groups)[color]]
+    part = comm.Split(color, comm.rank)
+    found: dict[int, Result] = {}
+    error = None
+    try:
+        found = dict(zip(mine, work(part, mine), strict=True))
+    except Exception as problem:        # the other groups must not wait for ever
+        error = problem
+    first = part.rank == 0
+    part.Free()
+    merged: dict[int, Result] = {}
+    for results, problem in comm.allgather((found if first and error is None else {}, error)):
+        if problem is not None:
+            raise problem
+        merged |= results
+    return [merged[n] for n in tasks]

@@ -1,0 +1,41 @@
+"""Groups of ranks share out nodal diameters: the same numbers however the ranks are grouped."""
+
+import numpy as np
+import pytest
+from structured import sector
+
+from bladefem.errors import InputError
+from bladefem.fem.compat import MPI
+from bladefem.fem.groups import group_size, shared_out
+from bladefem.fem.memory import needed
+from bladefem.scene import Scene
+from bladefem.study.stages import Bodies, wheel_modes
+
+pytestmark = pytest.mark.mpi
+
+
+def test_frequencies_do_not_depend_on_groups():
+    mesh, ranks = sector(8, (4, 2, 1), bump=0.2), MPI.COMM_WORLD.size
+    alone = wheel_modes(Bodies(Scene(), mesh, MPI.COMM_SELF), 8, [4, 0, 1, 3])
+    for size in {1, ranks}:
+        found = wheel_modes(Bodies(Scene(), mesh), 8, [4, 0, 1, 3], group=size)
+        assert [s.nodal_diameter for s in found] == [4, 0, 1, 3]
+        for a, b in zip(found, alone, strict=True):
+            np.testing.assert_allclose(a.frequencies, b.frequencies, rtol=1e-10)
+            np.testing.assert_allclose(a.shapes, b.shapes, atol=1e-4 * abs(b.shapes).max())     # see test_wheel
+
+
+def test_an_error_in_one_group_reaches_all():
+    def work(part, some):
+        if 0 in some:
+            raise InputError("the first group fails")
+        return some
+    with pytest.raises(InputError, match="the first group fails"):
+        shared_out(MPI.COMM_WORLD, [0, 1, 2], 1, work)
+    assert shared_out(MPI.COMM_WORLD, [2, 0, 1], 1, lambda part, some: [10 * n for n in some]) == [20, 0, 10]
+
+
+def test_groups_grow_where_memory_is_short():
+    comm = MPI.COMM_WORLD
+    assert group_size(comm, 1000, free=1e12) == 1
+    assert group_size(comm, 1000, free=0.5 * needed(1000)) == comm.size
