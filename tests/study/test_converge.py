@@ -3,6 +3,7 @@
 from dataclasses import replace
 
 import numpy as np
+import pandas as pd
 import pytest
 from wheels import bodies
 
@@ -11,8 +12,9 @@ from bladefem.fem.constraint import constrain
 from bladefem.fem.loads import mass
 from bladefem.fem.modes import modes
 from bladefem.scene_file import load_scene
-from bladefem.study.converge import converge, default_sizes, richardson
+from bladefem.study.converge import BELIEVED, _summary, converge, default_sizes, paired, richardson
 from bladefem.study.effective import effective_masses
+from bladefem.study.stages import Bodies, build_mesh, find_modes
 
 
 @pytest.mark.parametrize("order", [1.0, 2.0, 4.0, 5.7])
@@ -38,6 +40,25 @@ def test_plane_blade_converges():
     assert (finer < found.summary["frequency"].to_numpy()).all()
     left = found.summary["frequency"].to_numpy() / finer - 1
     assert (left < 5 * found.summary["error"] + 1e-5).all()
+    assert (found.points["mac"] > 0.99).all()
+    assert ((found.summary["reason"] == "") == found.summary["order"].between(*BELIEVED)).all()
+
+
+def test_modes_that_cross_keep_their_names():
+    """The first two modes of the coarser mesh change places: their shapes tell which is which."""
+    scene = load_scene("scenes/plane.toml")
+    meshes = [build_mesh(replace(scene, mesh=replace(scene.mesh, size=size))) for size in (6e-3, 4e-3)]
+    coarse, fine = (find_modes(Bodies(scene, mesh), None, 4)[0] for mesh in meshes)
+    turned = replace(coarse, frequencies=coarse.frequencies[[1, 0, 2, 3]], shapes=coarse.shapes[[1, 0, 2, 3]])
+    numbers, match = paired(meshes[0], turned, meshes[1], fine, 3)
+    assert list(numbers) == [1, 0, 2] and match.min() > 0.99
+
+
+def test_an_order_that_no_element_has_is_not_believed():
+    points = pd.DataFrame({"size": [2.0, 1.4, 1.0], "mode": 1, "frequency": [130.0, 103.0, 100.0], "mac": 1.0})
+    row = _summary(points).iloc[0]
+    assert "order 6.1 is none" in row["reason"] and row["limit"] == 100 and row["error"] == pytest.approx(0.09)
+    assert "MAC 0.50" in _summary(points.assign(mac=0.5)).iloc[0]["reason"]
 
 
 def test_wrong_sizes():
