@@ -24,7 +24,8 @@ from .model import ReducedModel
 __all__ = ["Balance", "Inverse", "State", "adjoint", "as_amplitudes", "as_coefficients", "contact_forces",
            "contact_table", "evaluate_balance", "linear_arguments", "linearise", "orientation", "start_in_stick"]
 
-DENSE = 600         # unknowns up to which a dense factorisation is faster than GMRES
+DENSE = 300         # unknowns up to which a dense factorisation is faster than GMRES
+WATCHED = 600       # unknowns up to which the sign of a determinant is worth its time
 ACCURACY = 1e-5     # of a step by GMRES, relative
 STICKS = 1e-13      # a node whose p is below this share of its spring force sticks
 
@@ -132,8 +133,8 @@ def adjoint(balance: Balance, state: State) -> Inverse:
 def orientation(balance: Balance, state: State) -> float:
     """Sign of the determinant of the balance's derivative; 0 where there are too many unknowns to ask."""
     change, active, dofs = _active(balance, state)
-    if len(dofs) == 0 or len(dofs) * state.w.shape[2] > DENSE:
-        return float(len(dofs) == 0)
+    if len(dofs) * state.w.shape[2] > WATCHED:
+        return 0.0
     if not len(dofs):           # everything sticks: the derivative is the identity
         return 1.0
     J = _jacobian(balance.linear.A[:, dofs][:, :, dofs], change[active])
