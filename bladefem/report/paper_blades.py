@@ -163,8 +163,8 @@ def _cost(model: ReducedModel, omega: float) -> Claim:
     seconds = [min(_timed(call) for _ in range(3)) for call in calls]
     loop, exact, rich = (s / seconds[0] for s in seconds[1:])
     return Claim("Abstract", "remarkably efficient",
-                 f"against integration of the whole system, yes; but at 4 N a point takes the loop {loop:.0f} times the "
-                 f"CPU of the full balance with 3 harmonics ({exact:.0f} times with the damper solved exactly), while "
+                 f"against integration of the whole system, yes; but at 4 N a point takes the loop {loop:.0f} times "
+                 f"the CPU of the full balance with 3 harmonics ({exact:.0f} times with the damper solved exactly), while "
                  f"15 harmonics take {rich:.1f} times", "holds in part")
 
 
