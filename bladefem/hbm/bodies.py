@@ -102,9 +102,9 @@ def block(stack: Stack, flexible: np.ndarray, rows: slice, columns: slice) -> np
     if len(left) == 1 and np.isrealobj(left):      # two real products in one, half the work of a complex one
         parts = np.concatenate([flexible.real, flexible.imag])[:, None, :] * left
         parts = (parts.reshape(-1, left.shape[2]) @ right[0]).reshape(2, len(flexible), left.shape[1], right.shape[2])
-        result = 1j * parts[1]
-        result += parts[0]
-        result += residual
+        result = np.empty(parts.shape[1:], dtype=complex)
+        np.add(parts[0], residual, out=result.real)
+        result.imag = parts[1]
         return result
     return (left * flexible[:, None, :]) @ right + residual
 

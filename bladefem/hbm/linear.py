@@ -16,6 +16,7 @@ from ..data import RigidBody
 from ..errors import NotSolvedError
 from .bodies import amplitudes, block, flexibility, motion, receptance
 from .model import ReducedModel
+from .woodbury import low_rank, updated
 
 __all__ = ["Linear", "condense", "receptance", "rigid_motions"]
 
@@ -48,10 +49,17 @@ def condense(model: ReducedModel, omega: float, harmonics: int) -> Linear:
     force[:, blades.load] = model.loads(harmonics)
     free = motion(blades, amplitudes(blades, flexible, force), force, blades.contact)
     _add_damper(model, orders, G)
-    B, g, rigid = rigid_motions(model, springs)
-    A, stuck = _sprung(G, free, springs, 1 if B.shape[1] else 0)
+    B, g, rigid = model.once("rigid motions", lambda: rigid_motions(model, springs))
+    first = 1 if B.shape[1] else 0
+    fixed = low_rank(model, harmonics) if len(springs) >= SMALL else None
+    if fixed is None:
+        A, stuck = _sprung(G, free, springs, first)
+    else:
+        A = updated(fixed, orders, first)
+        stuck = free - (A @ (springs * free)[:, :, None])[:, :, 0]
     if B.shape[1]:
-        A[0], stuck[0] = _with_springs(G[0].real, free[0].real, springs, B, g, model.hold)
+        A[0], stuck[0] = model.once("mean with springs", lambda: _with_springs(G[0].real, free[0].real, springs, B, g,
+                                                                              model.hold))
     return Linear(omega, springs, G, free, A, stuck, B, g, rigid)
 
 

@@ -16,8 +16,8 @@ from ..hbm.resonance import free_resonances, stuck_resonances
 __all__ = ["Limit", "linear_limits"]
 
 WIDTH = 0.02        # of the resonance frequency, each side: where its height is looked for
-COARSE = 41         # points of that search, before it is refined between the highest and its neighbours
-DETAIL = 80         # points of a drawn curve that crowd round its resonance
+COARSE = 21         # points of that search, before it is refined between the highest and its neighbours
+DETAIL = 50         # points of a drawn curve that crowd round its resonance
 
 
 @dataclass(frozen=True)
@@ -51,8 +51,8 @@ def _limit(load: float, model: ReducedModel, response: Callable[[ReducedModel, f
     near = omega / (2 * np.pi) * np.linspace(1 - WIDTH, 1 + WIDTH, COARSE)
     top = min(max(int(np.argmax([abs(first(f)) for f in near])), 1), COARSE - 2)
     found = minimize_scalar(lambda f: -abs(first(f)), bounds=(near[top - 1], near[top + 1]), method="bounded",
-                            options={"xatol": 1e-7 * near[top]})
+                            options={"xatol": 1e-6 * near[top]})
     crowd = found.x * (1 + np.outer((-1, 1), np.geomspace(1e-5, 3 * WIDTH, DETAIL // 2))).ravel()
-    frequency = np.unique(np.concatenate([np.linspace(*band, 60), crowd[(crowd > band[0]) & (crowd < band[1])],
+    frequency = np.unique(np.concatenate([np.linspace(*band, 40), crowd[(crowd > band[0]) & (crowd < band[1])],
                                           [found.x]]))
     return Limit(load, frequency, np.array([first(f) for f in frequency]), float(found.x), float(-found.fun))
