@@ -164,7 +164,7 @@ def _cost(model: ReducedModel, omega: float) -> Claim:
     loop, exact, rich = (s / seconds[0] for s in seconds[1:])
     return Claim("Abstract", "remarkably efficient",
                  f"against integration of the whole system, yes; but at 4 N a point takes the loop {loop:.0f} times "
-                 f"the CPU of the full balance with 3 harmonics ({exact:.0f} times with the damper solved exactly), while "
+                 f"the CPU of the full balance with 3 harmonics ({exact:.0f} times with the damper solved exactly), "
                  f"15 harmonics take {rich:.1f} times", "holds in part")
 
 
