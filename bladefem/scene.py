@@ -55,6 +55,8 @@ class Operation:
 
     speed: float = quantity(8000 * 2 * pi / 60, "rad/s", 0.0, 1e5, "rotational speed")
     stiffening: bool = quantity(True, help="centrifugal stress stiffening and spin softening in the modes")
+    preload: str = quantity("linear", choices=("linear", "nonlinear"),
+                            help="state that the modes vibrate about: first-order, or with large displacements")
     damping: float = quantity(0.001, "1", 0.0, 0.5, "modal damping ratio of all modes without friction")
 
 

@@ -1,7 +1,8 @@
 """Frequencies over speed: Campbell table, engine-order crossings, interference (SAFE) table and margins.
 
 The stiffness about the linear preload is a polynomial of second degree in the square of the speed, K0 + s K1 + s^2 K2,
-so three speeds give it everywhere. The modes at these three speeds span those between them.
+so three speeds give it everywhere; about the nonlinear preload the same is an interpolation. The modes at these three
+speeds span those between them.
 """
 
 from __future__ import annotations

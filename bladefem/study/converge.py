@@ -32,7 +32,7 @@ __all__ = ["RATIOS", "Convergence", "converge", "default_sizes", "element_size",
 
 RATIOS = (1.7, 1.3, 1.0)    # of the scene's own element size
 HIGHEST = 12.0              # order that is looked for
-BELIEVED = (0.7, 6.0)       # orders that frequencies can have: singular edges to 4 for P2, and some luck
+BELIEVED = (1.0, 6.0)       # orders that frequencies can have: from sharp re-entrant edges to 4 for P2, and some luck
 SAFETY = 3.0                # error over last change where no order is believed
 ALIKE = 0.8                 # MAC of the same mode on two meshes
 SPARE = 3                   # modes beyond those asked for, candidates for pairs

@@ -31,8 +31,9 @@ def _stamp(scene: Scene) -> float:
 
 def modes_key(scene: Scene) -> str:
     """The modes without damper."""
-    return key_of(mesh_key(scene), scene.material.blade, scene.operation.speed if scene.operation.stiffening else 0.0,
-                  scene.model.nodal_diameters, code_of("bladefem.fem"))
+    operation = scene.operation
+    return key_of(mesh_key(scene), scene.material.blade, operation.speed if operation.stiffening else 0.0,
+                  operation.preload, scene.model.nodal_diameters, code_of("bladefem.fem"))
 
 
 def contact_key(scene: Scene) -> str:

@@ -31,7 +31,8 @@ DAMPER_MODES = 16       # of the elastic damper, its six rigid ones included
 class Bodies:
     """Blade and damper as finite elements, assembled and factorised when first asked for, then kept.
 
-    Vibrations use the stiffness under rotation (stress stiffening, spin softening) about the linear preload. Seating
+    Vibrations use the stiffness under rotation (stress stiffening, spin softening) about the linear preload, or about
+    the nonlinear one where ``operation.preload`` says so. Seating
     the damper uses the elastic stiffness at rest, under the whole centrifugal load: both are first-order theory, in
     which displacements grow with the square of the speed, and the stiffness under rotation would count the rotation
     twice. For static displacements the difference is of the order of the strain.
@@ -54,9 +55,11 @@ class Bodies:
 
     def blade_at(self, speed: float) -> Any:
         """fem.body.Body of the blade with its stiffness at a speed [rad/s]."""
-        from ..fem.rotation import linear_tangent
+        from ..fem.rotation import linear_tangent, spinning
         if speed == 0:
             return self.still_blade
+        if self.scene.operation.preload == "nonlinear":
+            return spinning(self.still_blade, speed, "clamp", spin_axis(self.mesh))
         u0 = speed ** 2 * self.swell
         return replace(self.still_blade, K=linear_tangent(self.still_blade, u0, speed, spin_axis(self.mesh)))
 

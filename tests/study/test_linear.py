@@ -1,5 +1,7 @@
 """Forced response of one sector against a direct solve of the whole wheel, with each kind of damping."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from wheels import bodies
@@ -18,6 +20,7 @@ from bladefem.study.linear import (
     probe,
     static_offset,
 )
+from bladefem.study.stages import Bodies, wheel_modes
 from geometry.mesh import Mesh
 
 COUNT, SMALL = 5, (2, 1, 1)
@@ -113,3 +116,16 @@ def test_wrong_loads_and_modes():
             forced(one, load)
     with pytest.raises(InputError, match="mode is 30"):
         peak(forced(one, modes=5), excitation_load(one), 30)
+
+
+def test_preload_is_chosen_by_the_scene():
+    """Second-order in the strain: the two preloads part with the fourth power of the speed."""
+    parted = []
+    for speed in (500.0, 1000.0):
+        linear, exact = bodies(speed), bodies(speed)
+        scene = replace(exact.scene, operation=replace(exact.scene.operation, preload="nonlinear"))
+        exact = Bodies(scene, exact.mesh)
+        f, g = (wheel_modes(b, 2, [2])[0].frequencies for b in (linear, exact))
+        parted.append(abs(g / f - 1).max())
+    assert 0 < parted[1] < 1e-2
+    assert 10 < parted[1] / parted[0] < 24
