@@ -82,7 +82,7 @@ def chart(family: Family, settings: Settings, mode: int, accuracy: float, budget
     remarks = [f"automatic choice: {chosen.sentence()}, found in {time.perf_counter() - start:.2g} s"]
     richest = replace(chosen, modes=family.modes, points=None, damper=family.dampers[-1] if family.dampers else "rigid")
     omegas = frequencies([(p.omega, size(p)) for p in curve.points if p.converged])
-    shared = _bench(lambda H: member(family, replace(richest, harmonics=H)).model, chosen.harmonics, omegas, budget / 6,
+    shared = _bench(lambda H: member(family, replace(richest, harmonics=H)).model, chosen.harmonics, omegas, budget / 4,
                     "models", remarks)
     models = _models(family, richest, chosen, shared, poorer or {}, remarks)
     simple = replace(richest, damper="mass") if "mass" in family.dampers else richest
@@ -96,7 +96,7 @@ def chart(family: Family, settings: Settings, mode: int, accuracy: float, budget
         remarks.append("methods are compared on the scene's tangential model: prescribed normal load, damper a mass; "
                        "what that model itself costs in accuracy stands among the models")
         omegas = _own_frequencies(model, omegas, mode)
-    bench = shared if reason else _bench(lambda H: model, chosen.harmonics, omegas, budget / 6, "methods", remarks)
+    bench = shared if reason else _bench(lambda H: model, chosen.harmonics, omegas, budget / 4, "methods", remarks)
     return Chart(_methods(model, not reason, chosen, bench, remarks), models, remarks, chosen)
 
 
@@ -173,7 +173,7 @@ def _bench(model: Callable[[int], ReducedModel], chosen: int, omegas: np.ndarray
     remarks.append(f"reference of the {name}: H {LADDER[rung][0]}, {LADDER[rung][1]} samples, resonance "
                    f"{truth.frequency:.6g} Hz, {truth.amplitude:.6g} m, changed by {doubt['error']:.1e} on "
                    "its last rung")
-    return Bench(omegas, truth, doubt, 2 * budget)
+    return Bench(omegas, truth, doubt, budget)
 
 
 def _methods(model: ReducedModel, simple: bool, chosen: Settings, bench: Bench, remarks: list[str]) -> pd.DataFrame:

@@ -24,7 +24,7 @@ from ..scene import Scene
 from ..store import stage
 from ..units import show
 from .choice import choose, covered, peak_of
-from .family import Family, Member, coarsened, member
+from .family import Family, Member, coarsened, member, shared_harmonics
 from .joint import LoadCase, joint_model
 from .keys import contact_key, mesh_key, modes_key, reduction_key, response_key
 from .limits import Limit, linear_limits
@@ -206,9 +206,13 @@ def load_cases(scene: Scene, mesh: Mesh, contact: Seating) -> list[LoadCase]:
 
 def family_of_case(scene: Scene, mesh: Mesh, reduced: Reduced, patches: list[Patch], case: LoadCase) -> Family:
     """All models of a load case that the reduced sector allows."""
-    nodes, reduced = len(case.elements.kt), weighted(reduced, case.mass)
+    nodes, reduced, most = len(case.elements.kt), weighted(reduced, case.mass), _affordable(case)
 
-    @lru_cache(maxsize=4)
+    def shared(settings: Settings) -> Member:
+        harmonics = max(settings.harmonics, min(shared_harmonics(settings.harmonics), most))
+        return build(replace(settings, harmonics=harmonics))
+
+    @lru_cache(maxsize=6)       # a point's own model and those of its five indicators
     def build(settings: Settings) -> Member:
         few = {n: truncated(body, settings.modes) for n, body in reduced.sector.items()}
         model = joint_model(scene, mesh, replace(reduced, sector=few), patches, case, settings.harmonics,
@@ -216,7 +220,7 @@ def family_of_case(scene: Scene, mesh: Mesh, reduced: Reduced, patches: list[Pat
         groups = np.arange(nodes) if settings.points is None else _groups(patches, settings.points)
         return Member(coarsened(model, groups), groups)
 
-    return Family(build, max(len(body.omega) for body in reduced.sector.values()), _affordable(case), DAMPERS)
+    return Family(shared, max(len(body.omega) for body in reduced.sector.values()), most, DAMPERS)
 
 
 def _affordable(case: LoadCase) -> int:
