@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from pathlib import Path
+
 import numpy as np
 import pandas as pd
 import pytest
@@ -9,11 +11,14 @@ import pytest
 from bladefem.hbm.api import solve
 from bladefem.hbm.reference import reference_model
 from bladefem.report.chart import write_chart
+from bladefem.scene_file import load_scene
 from bladefem.study.chart import chart, resonance
+from bladefem.study.chart_mesh import mesh_table
 from bladefem.study.family import family_of
 from bladefem.study.methods import applicable, exact, shooting, tangential
-from bladefem.study.settings import first_for
+from bladefem.study.settings import Settings, first_for
 
+PLANE = Path(__file__).parents[2] / "scenes" / "plane.toml"
 
 @pytest.fixture(scope="module")
 def made():
@@ -68,3 +73,22 @@ def test_resonance_of_one_mode_is_exact():
     peak = resonance(omega, first)
     assert peak.frequency * 2 * np.pi == pytest.approx(1.0, rel=1e-9)
     assert peak.amplitude == pytest.approx(50.0, rel=1e-9)
+
+
+def test_meshes_of_second_order_agree_and_those_of_first_do_not():
+    """Plane blade in bending: 12 and 8 mm differ by 1 % of the frequency, linear triangles are far too stiff."""
+    scene, remarks = load_scene(PLANE), []
+    table = mesh_table(scene, Settings(10, 1, 64, "rigid", 4), 40.0, [0.012, 0.008], 300.0, remarks)
+    rows = table.set_index(["family", "name"])
+    assert list(rows.index) == [(order, size) for order in ("order 1", "order 2") for size in ("12 mm", "8 mm")]
+    assert rows.loc[("order 2", "8 mm"), "error_frequency"] == 0.0
+    assert rows.loc[("order 2", "12 mm"), "error_frequency"] < 0.02
+    assert rows.loc["order 1", "error_frequency"].min() > 0.05
+    assert "8 mm of second order" in remarks[0]
+
+
+def test_a_mesh_that_would_take_too_long_is_left_out_and_named():
+    remarks = []
+    table = mesh_table(load_scene(PLANE), Settings(10, 1, 64, "rigid", 4), 40.0, [0.012, 1e-4], 10.0, remarks)
+    assert table["left_out"].tolist() == [False, True, False, True]
+    assert sum("0.1 mm: left out" in remark for remark in remarks) == 2
