@@ -48,7 +48,8 @@ def tables_of(result: Survey) -> dict[str, pd.DataFrame]:
     """All tables by file name, SI columns."""
     run = result.run
     excited = excited_set(run)
-    out = {"frequencies": mode_table(run.modes, run.mesh), "excited_modes": family_table(excited, run.mesh),
+    out = {"frequencies": mode_table(run.modes, run.mesh),
+           "excited_modes": family_table(excited, run.mesh, result.clamped),
            "effective_masses": result.masses}
     if excited.nodal_diameter is None:
         out["frequencies"] = out["frequencies"].drop(columns="nodal_diameter")

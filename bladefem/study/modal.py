@@ -133,7 +133,7 @@ def family_table(modes: ModeSet, mesh: Mesh, clamped: ModeSet | None = None, bod
     match = mac_of(modes.shapes[:, nodes], np.stack(list(references.values())), volumes[nodes])
     energy = np.einsum("mni,n->mn", np.abs(modes.shapes) ** 2, volumes)
     share = energy[:, nodes].sum(axis=1) / np.maximum(energy.sum(axis=1), 1e-300)
-    names = [name.split(" (")[0] for name in references]
+    names = [name.split(" (")[0].removesuffix(", coupled") for name in references]
     below = "disc" if mesh.sector is not None and mesh.sector.count else "foot"
     names = [name_of(match, i, names) if share[i] >= 0.1 else below for i in range(len(match))]
     return pd.DataFrame({"mode": np.arange(1, len(names) + 1), "frequency": modes.frequencies, "family": names,

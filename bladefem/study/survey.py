@@ -25,10 +25,10 @@ from .converge import Convergence, converge, default_sizes
 from .effective import effective_masses
 from .keys import modes_key
 from .loads import Progress, unwatched
-from .modal import mac
+from .modal import blade_root, mac
 from .stages import MODES_SHOWN, Bodies, is_wheel, wheel_modes
 
-__all__ = ["Survey", "Wanted", "excited_set", "survey"]
+__all__ = ["Survey", "Wanted", "clamped_blade", "excited_set", "survey"]
 
 ORDERS = 3      # engine orders above and below the scene's own, in Campbell and SAFE diagrams
 
@@ -54,6 +54,7 @@ class Survey:
     convergence: Convergence | None = None
     mac: np.ndarray | None = None               # (modes, modes of the other run) in the excited nodal diameter
     compared: ModeSet | None = field(default=None, repr=False)      # the other run's
+    clamped: ModeSet | None = field(default=None, repr=False)       # of the aerofoil clamped at its root, at rest
 
 
 def survey(scene: Scene, folder: str | Path, wanted: Wanted, comm: Any = None,
@@ -72,8 +73,8 @@ def survey(scene: Scene, folder: str | Path, wanted: Wanted, comm: Any = None,
     messages = [*start.messages, *(["modes: found in the folder, not computed again"] if found else [])]
     run = replace(start, modes=sets, messages=messages)
     clock = _timed(run, "modes", clock)
-    result = Survey(run, bodies, effective_masses(sets, bodies.still_blade))
-    clock = _timed(run, "effective masses", clock)
+    result = Survey(run, bodies, effective_masses(sets, bodies.still_blade), clamped=clamped_blade(bodies))
+    clock = _timed(run, "effective masses, clamped blade", clock)
     if wanted.speeds is not None:
         result = replace(result, campbell=campbell(bodies, wanted.speeds, _orders(scene)))
         clock = _timed(run, "campbell", clock)
@@ -84,6 +85,22 @@ def survey(scene: Scene, folder: str | Path, wanted: Wanted, comm: Any = None,
                                                       progress=progress))
         clock = _timed(run, "mesh refinement", clock)
     return result if other is None else _compared(result, *other)
+
+
+def clamped_blade(bodies: Bodies) -> ModeSet | None:
+    """Modes of the aerofoil alone, held at its root: what the modes of the wheel are called after.
+
+    Returns:
+        None where the modes are those of a clamped blade already, or the mesh names no aerofoil.
+    """
+    from ..fem.constraint import constrain
+    from ..fem.modes import modes
+    mesh = bodies.mesh
+    if not is_wheel(mesh) or not {"pressure_side", "suction_side"} & set(mesh.faces):
+        return None
+    root = np.flatnonzero(mesh.points[:, 0] <= blade_root(mesh) + 1e-9)
+    held = replace(mesh, nodes={**mesh.nodes, "aerofoil_root": root})
+    return modes(constrain(replace(bodies.still_blade, mesh=held), "aerofoil_root"), MODES_SHOWN)
 
 
 def excited_set(run: pipeline.Run) -> ModeSet:

@@ -4,7 +4,10 @@ import numpy as np
 import pytest
 
 from bladefem.data import ModeSet
-from bladefem.study.modal import family_table, mac, mac_of, participation, pure_shapes
+from bladefem.scene_file import load_scene
+from bladefem.study.modal import blade_root, family_table, mac, mac_of, participation, pure_shapes
+from bladefem.study.stages import Bodies, build_mesh, find_modes
+from bladefem.study.survey import clamped_blade
 from bladefem.study.transfer import MIDDLES, nodal_volumes, simplices, transfer
 from geometry.mesh import Mesh
 
@@ -138,3 +141,16 @@ def test_first_bending_mode_carries_0_613_of_a_beams_mass():
     points = np.stack([s, 0 * s, 0 * s], 1)
     table = participation(ModeSet(np.ones(1), shape, None, np.zeros(1)), np.eye(1200) / 400, points, ("y",))
     assert np.isclose(table["share"].iloc[0], 0.6131, atol=2e-4)
+
+
+def test_wheel_modes_are_called_after_the_clamped_aerofoil():
+    """The disc shifts and mixes the modes; beyond the lowest the clamped aerofoil is much closer than a beam is."""
+    scene = load_scene("scenes/wedge.toml", ["mesh.size=24 mm"])
+    whole = Bodies(scene, build_mesh(scene))
+    held = clamped_blade(whole)
+    modes = find_modes(whole, [6], 8)[0]
+    pure, named = (family_table(modes, whole.mesh, clamped) for clamped in (None, held))
+    assert named["family"][0] == "first flap" and named["mac"][0] > pure["mac"][0]
+    assert not named["family"].str.contains("coupled, coupled").any()
+    root = whole.mesh.points[:, 0] <= blade_root(whole.mesh)
+    assert abs(held.shapes[:, root]).max() == 0 and held.frequencies[0] > modes.frequencies[0]
