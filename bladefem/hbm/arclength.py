@@ -11,11 +11,12 @@ Nonlinear Vibration Problems, 2019, Sect. 4.)
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
 from ..errors import NotSolvedError
+from .iterative import Memory
 from .newton import Options, newton
 from .rates import rate
 from .residual import Balance, State, evaluate_balance, linearise, orientation
@@ -39,6 +40,7 @@ class Task:
     width: float            # of the range of x: its scale
     size: float             # of the displacements at the start: their least scale [m]
     options: Options
+    memory: Memory = field(default_factory=Memory)
 
 
 @dataclass(frozen=True)
@@ -103,7 +105,7 @@ def _correct(task: Task, spot: Spot, step: float) -> tuple[Spot | None, str]:
         if iteration == CORRECTIONS or not np.isfinite(state.error):
             return None, f"corrector left a residual of {state.error:.1e}"
         try:
-            inverse = linearise(balance, state)
+            inverse = linearise(balance, state, task.memory)
             back, along = inverse(state.residual), inverse(rate(balance, state, task.name))
         except np.linalg.LinAlgError as error:
             return None, str(error)
@@ -133,5 +135,5 @@ def _leap(task: Task, spot: Spot, share: float) -> Spot | None:
 
 def spot_at(task: Task, x: float, balance: Balance, state: State, iterations: int, sign: float) -> Spot:
     """A solved state with the direction of its path, x rising along it for sign 1 and falling for -1."""
-    slope = -linearise(balance, state)(rate(balance, state, task.name))
+    slope = -linearise(balance, state, task.memory)(rate(balance, state, task.name))
     return Spot(x, balance, state, iterations, slope, sign, orientation(balance, state))

@@ -7,18 +7,30 @@ that is not enough, one complex block a harmonic is factorised, with the part of
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import dataclass
 
 import numpy as np
 from scipy.sparse.linalg import LinearOperator, gmres
 
 from ..friction.harmonics import to_complex, to_real
 
-__all__ = ["iterative_inverse"]
+__all__ = ["Memory", "iterative_inverse"]
 
 BASIS = 80          # vectors kept by GMRES
+SLOW = 40           # products of one solve from which new harmonic blocks pay
 
 
-def iterative_inverse(A: np.ndarray, change: np.ndarray) -> Callable[[np.ndarray, float], np.ndarray]:
+@dataclass
+class Memory:
+    """Harmonic blocks of an earlier derivative, which serve the next ones of the same Newton run as well."""
+
+    nodes: bytes = b""                  # the active nodes that the blocks belong to
+    blocks: np.ndarray | None = None    # (H+1, a, a)
+    slow: bool = False                  # the last system took long: blocks are worth their time
+
+
+def iterative_inverse(A: np.ndarray, change: np.ndarray,
+                      memory: Memory | None = None) -> Callable[[np.ndarray, float], np.ndarray]:
     """The inverse of 1 + A change, applied to residuals (a, K) to a relative accuracy, for a = nodes * d dofs.
 
     The products run in single precision, which halves the traffic and is exact enough for any accuracy asked for.
@@ -26,30 +38,37 @@ def iterative_inverse(A: np.ndarray, change: np.ndarray) -> Callable[[np.ndarray
     Args:
         A: (H+1, a, a) flexibility with contact springs [m/N].
         change: (nodes, dK, dK) derivative of the forces beyond the springs [N/m].
+        memory: of the Newton run; changed in place.
     """
     a, K = A.shape[1], 2 * A.shape[0] - 1
-    light = A.astype(np.complex64)
+    light, memory, count = A.astype(np.complex64), memory or Memory(), 0
 
     def product(x: np.ndarray) -> np.ndarray:
+        nonlocal count
+        count += 1
         forces = (change @ x.reshape(len(change), -1, 1)).reshape(a, K)
         return x.ravel() + _flex(light, forces).ravel()
 
     operator = LinearOperator((a * K, a * K), matvec=product, dtype=float)
-    blocks: list[np.ndarray] = []
+    whole = LinearOperator((a * K, a * K), matvec=lambda x: _flex(memory.blocks, x.reshape(a, K)).ravel(), dtype=float)
+
+    def renew() -> None:
+        memory.blocks, memory.slow = _harmonic_blocks(A, change).astype(np.complex64), False
 
     def solve(residual: np.ndarray, accuracy: float) -> np.ndarray:
-        target = accuracy * float(np.linalg.norm(residual))
+        nonlocal count
+        target, count = accuracy * float(np.linalg.norm(residual)), 0
         if target == 0.0:
             return np.zeros_like(residual)
-        if not blocks:
-            x, failed = _gmres(operator, residual, target, 1)
-            if not failed or np.linalg.norm(product(x) - residual.ravel()) <= 10 * target:
-                return x.reshape(residual.shape)
-            blocks.append(_harmonic_blocks(A, change).astype(np.complex64))
-        whole = LinearOperator((a * K, a * K), matvec=lambda x: _flex(blocks[0], x.reshape(a, K)).ravel(), dtype=float)
-        x, failed = _gmres(operator, residual, target, 3, whole)
-        if failed:
-            raise np.linalg.LinAlgError("GMRES did not solve for the Newton step")
+        if memory.slow:
+            renew()
+        x, failed = _gmres(operator, residual, target, 1, None if memory.blocks is None else whole)
+        if failed and np.linalg.norm(product(x) - residual.ravel()) > 10 * target:
+            renew()
+            x, failed = _gmres(operator, residual, target, 3, whole)
+            if failed:
+                raise np.linalg.LinAlgError("GMRES did not solve for the Newton step")
+        memory.slow = memory.slow or count > SLOW
         return x.reshape(residual.shape)
 
     return solve

@@ -9,6 +9,7 @@ import numpy as np
 from ..errors import InputError
 from ..friction.aft import Forces, dissipated, states
 from .compiled import CONVERGED, EXHAUSTED, INFINITE, SINGULAR, STALLED, compiled_newton
+from .iterative import Memory
 from .residual import STICKS, Balance, Inverse, State, contact_table, evaluate_balance, linear_arguments, linearise
 
 __all__ = ["DEFAULTS", "Newton", "Options", "newton"]
@@ -59,7 +60,7 @@ def newton(balance: Balance, w: np.ndarray, options: Options = DEFAULTS, merit: 
     """
     if merit == "step" and _fits(balance):
         return _fast(balance, w, options)
-    state = evaluate_balance(balance, w)
+    state, memory = evaluate_balance(balance, w), Memory()
     for iteration in range(options.iterations + 1):
         if state.error <= options.tolerance:
             return Newton(state, iteration, True, "residual within tolerance")
@@ -68,7 +69,7 @@ def newton(balance: Balance, w: np.ndarray, options: Options = DEFAULTS, merit: 
         if iteration == options.iterations:
             break
         try:
-            inverse = linearise(balance, state)
+            inverse = linearise(balance, state, memory)
         except np.linalg.LinAlgError:
             return Newton(state, iteration, False, "singular Jacobian")
         try:

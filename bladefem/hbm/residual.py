@@ -17,7 +17,7 @@ from ..friction.aft import Forces, evaluate
 from ..friction.events import evaluate_exact
 from ..friction.harmonics import to_complex, to_real
 from ..friction.tables import tables
-from .iterative import iterative_inverse
+from .iterative import Memory, iterative_inverse
 from .linear import Linear
 from .model import ReducedModel
 
@@ -84,11 +84,12 @@ def contact_forces(model: ReducedModel, w: np.ndarray, samples: int) -> Forces:
     return replace(forces, f=forces.f[:, missing:], dfdw=forces.dfdw[:, missing:, :, missing:])
 
 
-def linearise(balance: Balance, state: State) -> Inverse:
+def linearise(balance: Balance, state: State, memory: Memory | None = None) -> Inverse:
     """The inverse of the balance's derivative: residual (n, d, K), accuracy [1] to displacement (n, d, K) [m].
 
-    The linear system is reduced to the nodes that slip or lift; the others follow from their forces. Raises
-    numpy.linalg.LinAlgError where the derivative is singular.
+    A memory carries what iterations know from one derivative to the next. The linear system is reduced to the nodes
+    that slip or lift; the others follow from their forces. Raises numpy.linalg.LinAlgError where the derivative is
+    singular.
     """
     n, d, K = state.w.shape
     change, active, dofs = _active(balance, state)
@@ -96,7 +97,9 @@ def linearise(balance: Balance, state: State) -> Inverse:
         return lambda residual, accuracy=0.0: residual.copy()
     others, change = np.setdiff1d(np.arange(n), active), change[active]
     A = balance.linear.A if len(active) == n else np.ascontiguousarray(balance.linear.A[:, dofs][:, :, dofs])
-    inverse = _inverse(A, change)
+    if memory is not None and memory.nodes != active.tobytes():
+        memory.nodes, memory.blocks, memory.slow = active.tobytes(), None, memory.slow or memory.blocks is not None
+    inverse = _inverse(A, change, memory)
 
     def solve(residual: np.ndarray, accuracy: float = ACCURACY) -> np.ndarray:
         step = residual.copy()
@@ -150,8 +153,10 @@ def _active(balance: Balance, state: State) -> tuple[np.ndarray, np.ndarray, np.
     return change, active, (active[:, None] * d + np.arange(d)).ravel()
 
 
-def _inverse(A: np.ndarray, change: np.ndarray) -> Inverse:
-    return (_dense_inverse if A.shape[1] * (2 * len(A) - 1) <= DENSE else iterative_inverse)(A, change)
+def _inverse(A: np.ndarray, change: np.ndarray, memory: Memory | None = None) -> Inverse:
+    if A.shape[1] * (2 * len(A) - 1) <= DENSE:
+        return _dense_inverse(A, change)
+    return iterative_inverse(A, change, memory)
 
 
 def _dense_inverse(A: np.ndarray, change: np.ndarray) -> Inverse:

@@ -46,3 +46,14 @@ def test_a_patch_with_lift_off_is_solved_and_balances_its_work():
         assert solution.converged and solution.work.imbalance < 1e-8
         lighter = solve(replace(model, excitation={1: 0.5 * model.excitation[1]}), omega, 3, 64, start=solution)
         assert lighter.converged
+
+
+def test_blocks_serve_a_whole_newton_run(monkeypatch):
+    """A patch of which all nodes lift off: blocks are made once and then again only where nodes change their state."""
+    from bladefem.hbm import iterative
+    made, model = [], patch(side=6, inner=12, n0=0.1).model
+    plain = iterative._harmonic_blocks
+    monkeypatch.setattr(iterative, "_harmonic_blocks", lambda *a: made.append(1) or plain(*a))
+    solution = solve(model, 0.5, 5, 128)
+    assert solution.converged and solution.work.imbalance < 1e-8 and solution.states["lift"] == 36
+    assert 0 < len(made) < solution.iterations / 2
