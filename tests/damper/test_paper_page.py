@@ -4,23 +4,36 @@ import csv
 from pathlib import Path
 
 from bladefem.damper.maps import COLUMNS, count_outcomes, write_rows
-from bladefem.report.claims import Claim, element
+from bladefem.report.claim import Chapter, Claim
+from bladefem.report.claims import CHAPTERS, element
 from bladefem.report.paper import as_html, as_markdown
 
 MAP = Path(__file__).resolve().parents[2] / "docs/paper/method_map.csv"
 
 
-def test_page_shows_claim_number_and_verdict(tmp_path):
+def test_page_shows_claim_number_verdict_and_picture(tmp_path):
     claims = list(element(tmp_path))
-    page, web = as_markdown({"Element": claims}), as_html({"Element": claims})
+    chapters = [Chapter("Element", "One element.", (element,))]
+    page, web = (write(chapters, {"Element": claims}) for write in (as_markdown, as_html))
     assert "**fails**" in page
     assert all(c.ours in page for c in claims)
+    assert page.index("At a glance") < page.index("One element.")
     assert (tmp_path / "fig_4.png").stat().st_size > 10_000
-    assert "fig_4.png" in web
+    assert "fig_4.png" in web and "figcaption" in web
 
 
 def test_html_escapes_what_claims_say():
-    assert "a &lt; b" in as_html({"x": [Claim("Eq. 1", "a < b", "yes", "holds")]})
+    chapter = Chapter("x", "", ())
+    assert "a &lt; b" in as_html([chapter], {"x": [Claim("Eq. 1", "a < b", "yes", "holds")]})
+
+
+def test_committed_page_has_every_chapter_and_its_pictures():
+    page = (MAP.parents[1] / "paper.md").read_text(encoding="utf-8")
+    assert all(f"## {chapter.title}" in page for chapter in CHAPTERS)
+    pictures = [line.split("(")[1].rstrip(")") for line in page.splitlines() if line.startswith("![")]
+    assert len(pictures) >= 18
+    assert all((MAP.parents[1] / picture).is_file() for picture in pictures)
+    assert page.count("**holds") + page.count("**fails**") == 2 * int(page.split(" claims: ")[0].split()[-1])
 
 
 def test_method_map_covers_every_method_on_at_least_250_points():
