@@ -14,6 +14,7 @@ import pandas as pd
 
 from geometry.mesh import Mesh
 
+from ..contact.states import quasi_static
 from ..data import ModeSet
 from ..reduction.assemble import folded_diameter
 from ..scene import Scene
@@ -60,7 +61,15 @@ def _write(result: pipeline.Run, progress: Progress) -> None:
         draw(figures[name])
     mesh.save_vtu(result.mesh, folder / "mesh.vtu")
     modes.save_modes_vtu(result.mesh, excited_modes(result), folder / "modes.vtu")
-    write_report(folder, result.scene, tables, figures, result.messages, result.timings)
+    contact.save_pressure_vtu(result.contact.maps, folder / "pressure.vtu")
+    write_report(folder, result.scene, tables, figures, [*result.messages, _static_contact(result)], result.timings)
+
+
+def _static_contact(result: pipeline.Run) -> str:
+    """Whether the contact may be taken as quasi-static up to the last harmonic kept of the highest frequency."""
+    patch = next(iter(result.contact.maps.values()))[0].patch
+    highest = max(curve.settings.harmonics * float(np.max(curve.frequency)) for curve in result.response.curves)
+    return quasi_static(patch, result.scene.material.blade, highest).sentence
 
 
 def excited_modes(result: pipeline.Run) -> ModeSet:

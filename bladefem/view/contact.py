@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -17,9 +17,11 @@ from bladefem.data import Patch, PressureMap
 from .skin import split_faces
 from .style import COLOURS, canvas, headline
 
-__all__ = ["contact_centre", "draw_pressure", "pressure_points", "pressure_summary", "unfold"]
+__all__ = ["contact_centre", "draw_pressure", "pressure_points", "pressure_summary", "save_pressure_vtu",
+           "unfold"]
 
 PRESSURE_COLOURS = "inferno_r"
+VTK_FACES = {2: 3, 3: 5, 4: 9}       # corners of a face: VTK's number for line, triangle, quadrilateral
 
 
 def contact_centre(seat: PressureMap) -> np.ndarray:
@@ -49,6 +51,31 @@ def pressure_points(seats: Sequence[PressureMap]) -> pd.DataFrame:
                             "z": seat.patch.points[:, 2], "area": seat.patch.area, "force": seat.force,
                             "pressure": seat.pressure, "gap": seat.gap}) for seat in seats]
     return pd.concat(frames, ignore_index=True)
+
+
+def save_pressure_vtu(states: Mapping[float, Sequence[PressureMap]], file: str | Path) -> Path:
+    """Write all faces with pressure, gap and normal force of each load [N] at their nodes as a VTU file for ParaView.
+
+    Args:
+        states: mean normal load to the maps of the same patches.
+        file: to write, ``.vtu``.
+    """
+    import pyvista
+
+    patches = [seat.patch for seat in next(iter(states.values()))]
+    first = np.cumsum([0, *(len(p.area) for p in patches)])
+    cells = np.concatenate([p.faces + start for p, start in zip(patches, first[:-1], strict=True)])
+    kinds = np.full(len(cells), VTK_FACES[cells.shape[1]], dtype=np.uint8)
+    table = np.insert(cells, 0, cells.shape[1], axis=1).ravel()
+    grid = pyvista.UnstructuredGrid(table, kinds, np.concatenate([p.points for p in patches]).astype(float))
+    grid.point_data["area [m2]"] = np.concatenate([p.area for p in patches])
+    grid.point_data["normal"] = np.concatenate([p.frame[:, 0] for p in patches])
+    for load, seats in states.items():
+        for name, values in (("pressure [Pa]", "pressure"), ("gap [m]", "gap"), ("normal force [N]", "force")):
+            grid.point_data[f"{name} at {load:.6g} N"] = np.concatenate([getattr(seat, values) for seat in seats])
+    Path(file).parent.mkdir(parents=True, exist_ok=True)
+    grid.save(str(file))
+    return Path(file)
 
 
 def unfold(patch: Patch, points: np.ndarray | None = None) -> np.ndarray:

@@ -5,7 +5,14 @@ import pytest
 import synthetic
 from matplotlib.image import imread
 
-from bladefem.view.contact import contact_centre, draw_pressure, pressure_points, pressure_summary, unfold
+from bladefem.view.contact import (
+    contact_centre,
+    draw_pressure,
+    pressure_points,
+    pressure_summary,
+    save_pressure_vtu,
+    unfold,
+)
 from bladefem.view.mesh import carry_round, draw_mesh, draw_wheel, grid, save_vtu
 from bladefem.view.modes import (
     animate_wave,
@@ -165,6 +172,17 @@ def test_pressure_numbers_and_picture(folder):
     draw_pressure(seats, folder / "pressure.png")
     draw_pressure(synthetic.line_seats(), folder / "line.png")
     assert min(ink(folder / name) for name in ("pressure.png", "line.png")) > 0.05
+
+
+def test_pressure_for_paraview(folder):
+    import pyvista
+
+    for name, seats in (("faces", synthetic.seats()), ("lines", synthetic.line_seats())):
+        grid = pyvista.read(save_pressure_vtu({40.0: seats, 80.0: seats}, folder / f"{name}.vtu"))
+        assert grid.n_cells == sum(len(s.patch.faces) for s in seats)
+        pressure = np.concatenate([s.pressure for s in seats])
+        np.testing.assert_allclose(grid["pressure [Pa] at 80 N"], pressure)
+        np.testing.assert_allclose(grid["area [m2]"] @ grid["pressure [Pa] at 40 N"], sum(s.force.sum() for s in seats))
 
 
 def test_unfolding_keeps_lengths():
