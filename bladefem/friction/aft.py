@@ -38,7 +38,7 @@ class Forces:
 
 
 def evaluate(elements: Elements, w: np.ndarray, samples: int, jacobian: bool = True, *,
-             load: np.ndarray | None = None, cycles: int = 1000) -> Forces:
+             load: np.ndarray | None = None, cycles: int = 4000) -> Forces:
     """Harmonics of the contact forces for relative motion w (n, d, 2H+1) [m], sampled at ``samples`` instants.
 
     load (n, samples) [N], where given, is the prescribed part of the normal load N(t) in place of the constant n0.

@@ -19,6 +19,7 @@ __all__ = ["DIRECTION_X", "DIRECTION_Y", "EDGE_ROWS", "GROWTH", "HALF", "INVERSE
            "SLOPE", "TOLERANCE", "edges", "half_angle", "march", "period", "periodic", "record", "start", "turned"]
 
 TOLERANCE = 1e-12       # of the largest friction limit: how well the force must repeat itself in marching
+FREE = 30               # periods in which Newton's steps need not pay at once: states of the edges have to settle first
 DIRECTION_X, DIRECTION_Y, INVERSE_LENGTH, HALF, GROWTH, SLOPE, INVERSE_LIMIT, EDGE_ROWS = range(8)
 
 
@@ -198,7 +199,7 @@ def periodic(path, mu, fx, fy, guessing, limit, phi):
             if guessing and events > 0:                 # a small residual leaves residual / (1 - contraction)
                 _, gx, gy = newton(fx, fy, gx, gy, R, phi)
             return gx, gy, cycle, True, guesses
-        if guess and residual > 0.5 * before:           # no better than marching: go back and march on
+        if guess and cycle > FREE and residual > 0.5 * before:      # no better than marching: go back and march on
             fx, fy, guess = sx, sy, False
             continue
         before, sx, sy = residual, gx, gy

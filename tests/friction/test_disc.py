@@ -130,6 +130,21 @@ def test_jacobian_of_a_shaken_down_element():
     np.testing.assert_allclose(forces.dfdw, numeric, rtol=0, atol=2e-5)
 
 
+def test_elements_about_to_stick_are_periodic_too():
+    """1000 elements whose motion reaches about the limit: two in a thousand shake down over hundreds of periods."""
+    rng = np.random.default_rng(3)
+    w = rng.normal(size=(1000, 3, 7)) / np.r_[1, np.repeat(np.arange(1, 4), 2)] ** 2
+    w[:, 1:] *= 0.8
+    w[:, 1:, 0] *= 0.1
+    w[:, 0] *= 0.3
+    elements = Elements(np.ones(1000), np.ones(1000), rng.uniform(0.8, 1.2, 1000), rng.uniform(0.7, 1.5, 1000), 2)
+    forces = evaluate(elements, w, 128)
+    assert forces.converged
+    assert np.median(forces.cycles) <= 6
+    assert forces.cycles.max() > 100
+    np.testing.assert_allclose(evaluate(elements, w, 128, False).f, forces.f, rtol=0, atol=1e-10)
+
+
 def test_a_limit_on_the_cycles_is_reported():
     forces = evaluate(single(tangents=2), ellipse(1.2, 0.5), 128, cycles=1)
     assert not forces.converged
