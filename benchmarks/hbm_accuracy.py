@@ -6,6 +6,15 @@
 advanced exactly over a step, contact forces linear in it, the 2-D slip law integrated along each step by its closed
 form, marched from the balance's own state for a number of periods and extrapolated in the step. Errors are those of the
 first harmonic at the probe, relative, the worst of the frequencies.
+
+Measured (exact: transitions located; the patch has 2048 samples at H 31, 1024 at 15, 256 at 5):
+    H                          5/7       15        31        63
+    single mass            1.6e-04   1.2e-05   4.7e-07   2.7e-08
+    beam, 20 elements      1.8e-05   2.5e-06   8.3e-08   9.6e-10
+    chain with lift-off    5.1e-05   3.4e-06   2.9e-08   5.8e-08
+    3-D patch, 100 nodes   6.2e-04   3.5e-06   8.3e-07
+The marched patch differs by 1.3e-6 between 1024 and 2048 steps before it is extrapolated, so that 8e-7 is the limit of
+the reference as much as of the balance.
 """
 
 from __future__ import annotations

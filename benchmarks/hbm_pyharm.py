@@ -5,6 +5,13 @@
 
 Both codes solve every frequency, started from the last one, in CPU seconds of one thread (set OMP_NUM_THREADS=1). The
 error of the first harmonic at the probe is measured against bladefem with 15 harmonics and 4096 samples.
+
+pyHarm's only element with friction under varying normal load is three-dimensional: the chain gives it a third, idle
+direction, 72 dofs in place of 48. That is its best way to this problem, yet not like for like.
+
+Measured on two shared cores, H 7, 256 samples, ms a point:
+    single mass    0.05 against  3.2:   66 times, errors equal (2.6e-4)
+    beam           0.04 against 97.7: 2182 times, errors equal (6.1e-5)
 """
 
 from __future__ import annotations
