@@ -240,7 +240,7 @@ def readable(front: pd.DataFrame) -> np.ndarray:
     place = place / np.maximum(np.ptp(place, axis=0), 1e-3)
     kept: list[int] = []
     for i in range(len(place)):
-        if all(abs(place[i, 0] - place[k, 0]) > 0.15 or abs(place[i, 1] - place[k, 1]) > 0.08 for k in kept):
+        if all(abs(place[i, 0] - place[k, 0]) > 0.25 or abs(place[i, 1] - place[k, 1]) > 0.08 for k in kept):
             kept.append(i)
     return np.isin(np.arange(len(place)), kept)
 
