@@ -11,12 +11,13 @@ The factors grow with dofs^(4/3) as nested dissection of a solid does; solid blo
 
 from __future__ import annotations
 
+import ctypes
 from pathlib import Path
 
 from ..errors import InputError
 from .compat import MPI
 
-__all__ = ["available", "check", "needed"]
+__all__ = ["available", "check", "give_back", "needed"]
 
 START = 1.2e8                       # interpreter and libraries of one rank [bytes]
 ONE_CORE, DOUBLED = (9.0e3, 115.0), (1.9e4, 160.0)      # bytes: a dofs + b dofs^(4/3)
@@ -43,6 +44,13 @@ def available() -> float:
     if limit.exists() and used.exists() and limit.read_text().strip().isdigit():
         out = min(out, float(limit.read_text()) - float(used.read_text()))
     return out
+
+
+def give_back() -> None:
+    """Return freed memory to the system: MPI tells the C library to keep all of it, in pieces that do not fit."""
+    trim = getattr(ctypes.CDLL(None), "malloc_trim", None)      # GNU only
+    if trim is not None:
+        trim(0)
 
 
 def check(dofs: int, comm: MPI.Comm, free: float | None = None) -> float:

@@ -20,6 +20,7 @@ from .body import Body
 from .constraint import Constrained, Transformation, at_diameter, transformation
 from .flexibility import Flexibility, flexible
 from .linalg import Folded, apply, combined, dot, inertia, mix
+from .memory import give_back
 from .modes import mode_set, pairs
 
 __all__ = ["Eigenpairs", "all_diameters", "eigenpairs"]
@@ -28,6 +29,7 @@ GUARD = 2               # modes beyond those asked for, carried along
 MORE = 12               # rough ones beyond, from which other diameters are guessed
 FIRST = (0, 1, 1 / 3, 1 / 6, 2 / 3)     # places of the diameters solved first: shapes change fastest at low ones
 LEVELS = (3, 5)         # numbers of solved diameters from which the others are guessed
+CHUNK = 32              # columns of a sparse product at a time, to spare memory
 CLOSE = 5e-6            # error of a vector's direction; that of a frequency is its square
 
 
@@ -77,14 +79,14 @@ def eigenpairs(t: Transformation, count: int, diameters: Sequence[int], direct: 
     space = None
     for i, n in enumerate(_sampled(sorted(cons))):
         if i in LEVELS and not direct:
+            give_back()
             space = _space(t, blocks)
+            blocks = blocks if i < LEVELS[-1] else []
         start = None if space is None else _guess(space, cons[n], 2 * np.pi * n / t.sectors, count + GUARD)
         helps = len(cons) > LEVELS[0] and i < LEVELS[-1] and not direct
         found = _pairs(flexible(cons[n]), count, start, tolerance, MORE if helps else GUARD)
         if helps:
             blocks.append(found.X)
-        else:
-            blocks.clear()
         few = slice(0, count + GUARD)
         yield replace(found, lam=found.lam[few], X=found.X[:, few].copy(order="F") if helps else found.X)
 
@@ -138,9 +140,9 @@ def _projected(t: Transformation, W: np.ndarray) -> tuple[list[np.ndarray], list
     for A in (t.opened.K, t.opened.M):
         beside = A[faces].T.tocsr()
         near = np.flatnonzero(np.diff(beside.indptr))
-        A_high = beside[near] @ high
-        LH = low[near].T @ A_high
-        out.append([low.T @ (A @ low) + high.T @ (A[faces][:, faces] @ high), LH + LH.T, LH - LH.T])
+        LH = low[near].T @ (beside[near] @ high)
+        LL = np.concatenate([low.T @ (A @ low[:, k:k + CHUNK]) for k in range(0, low.shape[1], CHUNK)], axis=1)
+        out.append([LL + high.T @ (A[faces][:, faces] @ high), LH + LH.T, LH - LH.T])
     return tuple(out)
 
 
@@ -153,6 +155,7 @@ def _small(K: list[np.ndarray], M: list[np.ndarray], angle: float, count: int) -
 
 def _proved(t: Transformation, found: dict[int, Eigenpairs]) -> dict[int, Eigenpairs]:
     """Compare counts with inertia at one shift; a diameter that lost a mode is solved from scratch."""
+    give_back()
     shift = _gap([p.lam for p in found.values()])
     shared = _shifted(t, shift)
     for n, p in found.items():
