@@ -1,9 +1,12 @@
 """Does a solve fit into memory? Said before anything is assembled, from a model fitted to measured peaks.
 
-Peak of the modes of one complex nodal diameter [GB], wedge sector, PORD ordering, measured and (modelled):
+Peak of the modes of one complex nodal diameter [GB], wedge sector, measured and (modelled); benchmarks/fem_cost.py
+remakes the first row and draws it, all in core:
 
-    dofs            28 482      50 514      62 034
-    one core        0.47 (0.49) 0.77 (0.80) 1.01 (0.97)
+    dofs            12 530      45 550      151 000     240 300     395 100
+    one core        0.22 (0.21) 0.56 (0.56) 2.05 (2.06) 3.68 (3.61) 6.66 (6.65)
+
+    dofs            28 482      50 514
     doubled         0.79 (0.80) 1.39 (1.37)
 
 The factors grow with dofs^(4/3) as nested dissection of a solid does; solid blocks have about twice those of blades.
@@ -20,7 +23,7 @@ from .compat import MPI
 __all__ = ["available", "check", "give_back", "needed"]
 
 START = 1.2e8                       # interpreter and libraries of one rank [bytes]
-ONE_CORE, DOUBLED = (9.0e3, 115.0), (1.9e4, 160.0)      # bytes: a dofs + b dofs^(4/3)
+ONE_CORE, DOUBLED = (3.29e3, 180.5), (1.9e4, 160.0)      # bytes: a dofs + b dofs^(4/3)
 
 
 def needed(dofs: int, ranks: int = 1) -> float:

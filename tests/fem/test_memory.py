@@ -7,8 +7,8 @@ from bladefem.fem.compat import MPI
 from bladefem.fem.memory import available, check, needed
 
 
-@pytest.mark.parametrize("dofs, ranks, measured", [(28482, 1, 0.47e9), (50514, 1, 0.77e9), (62034, 1, 1.01e9),
-                                                   (28482, 2, 0.91e9), (50514, 2, 1.51e9)])
+@pytest.mark.parametrize("dofs, ranks, measured", [(12530, 1, 0.22e9), (45550, 1, 0.56e9), (151000, 1, 2.05e9),
+                                                   (395100, 1, 6.66e9), (28482, 2, 0.91e9), (50514, 2, 1.51e9)])
 def test_model_follows_the_measured_peaks(dofs, ranks, measured):
     """Wedge sector; two ranks: the doubled pencil's peak on one rank, and a second interpreter."""
     assert needed(dofs, ranks) == pytest.approx(measured, rel=0.07)
