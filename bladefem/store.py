@@ -23,8 +23,8 @@ import numpy as np
 from .encode import read_npz, tree_of, write_npz
 from .errors import InputError
 
-__all__ = ["attributes", "code_of", "key_of", "on_root", "open_folder", "read_results", "stage", "versions",
-           "write_results", "write_table", "write_text", "writing"]
+__all__ = ["attributes", "bind_h5py", "code_of", "key_of", "on_root", "open_folder", "read_results", "stage",
+           "versions", "write_results", "write_table", "write_text", "writing"]
 
 # Raised when the meaning or the layout of stored stages changes: older files are then computed again.
 FORMAT = 1
@@ -116,7 +116,7 @@ def write_results(path: str | Path, groups: Mapping[str, Any], scene_text: str =
         scene_text: the resolved scene, kept as an attribute with the versions of what made the file.
     """
     import xarray as xr
-    _bind_h5py()
+    bind_h5py()
     path = Path(path)
     root = groups.get("/", xr.Dataset()).assign_attrs(attributes(scene_text))
     with writing(path) as temporary:
@@ -134,7 +134,7 @@ def read_results(path: str | Path, group: str = "/") -> Any:
         InputError: no such file or group.
     """
     import xarray as xr
-    _bind_h5py()
+    bind_h5py()
     try:
         with xr.open_dataset(path, group=group, engine="h5netcdf") as dataset:
             return _complex(dataset.load())
@@ -225,11 +225,11 @@ def _feed(digest: Any, part: Any) -> None:
         digest.update(np.ascontiguousarray(array).tobytes())
 
 
-def _bind_h5py() -> None:
+def bind_h5py() -> None:
     """Import h5py so that it keeps to its own HDF5.
 
-    dolfinx 0.5 opens the system's HDF5 with global symbols; an h5py wheel that is imported later would resolve against
-    them and fail ("Not a datatype") unless it is bound deeply.
+    dolfinx loads the system's HDF5; an h5py wheel that is imported later would resolve against it and fail ("Not a
+    datatype") unless it is bound deeply.
     """
     flags = sys.getdlopenflags()
     sys.setdlopenflags(os.RTLD_NOW | getattr(os, "RTLD_DEEPBIND", 0))

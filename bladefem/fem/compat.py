@@ -17,7 +17,9 @@ from typing import Any
 import numpy as np
 
 from ..errors import NotSolvedError
+from ..store import bind_h5py
 
+bind_h5py()     # before dolfinx, so that users may import h5py after it
 _setdlopenflags = sys.setdlopenflags
 sys.setdlopenflags = lambda flags: None     # not even during the import: HDF5's symbols would stay global
 import dolfinx  # noqa: E402
