@@ -1,9 +1,11 @@
 """Contact faces whose meshes do not match: both sides are integrated over the exact overlap of their elements.
 
-Each slave face is laid onto the plane of each master face and clipped by it; shape functions of both are integrated
-over the pieces, so a uniform pressure loads both bodies with their own consistent nodal forces and a linear
-displacement of either is measured without error: the contact patch test holds. Faces are taken as flat between their
-corners. Source of the method: Puso and Laursen, DOI 10.1016/j.cma.2003.10.010.
+Both faces are seen along the mean normal of the master, and the slave's faces are clipped by the master's;
+shape functions of both are integrated over the pieces, on the curved master with its own normal at each point. So a
+uniform pressure loads both bodies with their own consistent nodal forces and a linear displacement of either is
+measured without error: the contact patch test holds, on curved faces too where both lie on one surface and the edges
+of one are straight in the coordinates of the other. Source of the method: Puso and Laursen,
+DOI 10.1016/j.cma.2003.10.010.
 """
 
 from __future__ import annotations
@@ -11,7 +13,6 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-import scipy.sparse as sp
 from scipy.spatial import cKDTree
 
 from geometry.mesh import Mesh
@@ -19,11 +20,13 @@ from geometry.mesh import Mesh
 from ..data import Patch
 from ..errors import InputError
 from .shape import LINEAR, corner_count, face_quadrature, shape, traction_shape
-from .surface import frames, outward, surface
+from .surface import FaceRule, frames, outward, surface
 
-__all__ = ["Overlap", "mortar_means", "mortar_patch", "overlap"]
+__all__ = ["Overlap", "mortar_faces", "mortar_patch", "overlap"]
 
 SLIVER = 1e-9           # pieces below this part of a face's area are dropped
+STEEP = np.cos(np.radians(75))
+STEPS = 8               # of Newton's method to the place on a curved face
 COVERED = 1e-6          # a face counts as covered when less than this part of it is left over
 
 
@@ -36,6 +39,7 @@ class Overlap:
     face: np.ndarray                # (s, 2) which master and which slave face a piece belongs to
     at: tuple[np.ndarray, np.ndarray]   # two (s, q, d) reference coordinates on the master and on the slave face
     weight: np.ndarray              # (s, q) [m^2]
+    normal: np.ndarray              # (s, q, 3) unit vectors out of the master
     covered: np.ndarray             # (nf,) bool, master faces that are covered by slaves
 
 
@@ -43,23 +47,33 @@ def overlap(mesh: Mesh, pair: str) -> Overlap:
     """Cut the two faces of a pair against each other.
 
     Raises:
-        InputError: faces that are not lines or triangles, or that do not overlap.
+        InputError: faces that are not lines or triangles, that do not overlap, or a master that turns by more than 75
+            degrees from its mean normal.
     """
     p, d = mesh.pairs[pair], mesh.dimension
     master, slave = mesh.faces[p.master], mesh.faces[p.slave]
     if corner_count(d, master.shape[1]) != d or corner_count(d, slave.shape[1]) != d:
         raise InputError(f"contact pair '{pair}' does not match and has quadrilaterals, expected lines or triangles")
-    X = mesh.points[master[:, :d]]
-    Y = (mesh.points[slave[:, :d]] - p.shift) @ p.rotation
-    pieces = [(i, j, cut) for i, j in _close(X, Y) for cut in (_cut_line if d == 2 else _cut_triangle)(X[i], Y[j])]
+    places = (mesh.points, (mesh.points - p.shift) @ p.rotation)
+    X, Y = places[0][master[:, :d]], places[1][slave[:, :d]]
+    weighted, _ = surface(mesh, master)
+    sign = outward(mesh, master, weighted.sum(axis=1))
+    view = _view(weighted.sum(axis=1) * sign[:, None], d, pair)
+    close = np.array(_close(X, Y), dtype=int).reshape(-1, 2)
+    # The corners of the slave in the master's own coordinates, in which its edges are taken as straight.
+    corners = _located(places[0][master[close[:, 0]]], Y[close[:, 1]] @ view.T, view)
+    cut = _cut_line if d == 2 else _cut_triangle
+    pieces = [(i, j, piece) for (i, j), polygon in zip(close, corners, strict=True) for piece in cut(polygon)]
     if not pieces:
         raise InputError(f"contact pair '{pair}': faces '{p.master}' and '{p.slave}' do not overlap")
     face = np.array([piece[:2] for piece in pieces])
-    at, weight = _quadrature(X[face[:, 0]], Y[face[:, 1]], np.array([piece[2] for piece in pieces]))
-    weight = weight * (mesh.depth if d == 2 else 1.0)
-    whole = np.linalg.norm(surface(mesh, master)[0], axis=2).sum(axis=1)
+    nodes = places[0][master[face[:, 0]]], places[1][slave[face[:, 1]]]
+    at, vector = _quadrature(*nodes, np.array([piece[2] for piece in pieces]), view)
+    vector = vector * ((mesh.depth if d == 2 else 1.0) * sign[face[:, 0], None, None])
+    weight = np.linalg.norm(vector, axis=2)
+    whole = np.linalg.norm(weighted, axis=2).sum(axis=1)
     found = np.bincount(face[:, 0], weight.sum(axis=1), len(master))
-    return Overlap(master, slave, face, at, weight, found > whole * (1 - COVERED))
+    return Overlap(master, slave, face, at, weight, vector / weight[:, :, None], found > whole * (1 - COVERED))
 
 
 def mortar_patch(mesh: Mesh, pair: str) -> Patch:
@@ -84,20 +98,16 @@ def mortar_patch(mesh: Mesh, pair: str) -> Patch:
                  across[nearest])
 
 
-def mortar_means(patch: Patch, mesh: Mesh, o: Overlap, side: str) -> sp.csr_matrix:
-    """W (n_points, n) as in ``patch.patch_means``."""
-    s = 0 if side == "blade" else 1
+def mortar_faces(patch: Patch, mesh: Mesh, side: str) -> FaceRule:
+    """The quadrature rule of the patch on one of its sides."""
+    o, s = overlap(mesh, patch.name), 0 if side == "blade" else 1
     faces = (o.master, o.slave)[s][o.face[:, s]]
     d, q = o.at[s].shape[2] + 1, o.at[s].shape[1]
     N, _ = shape(faces.shape[1], d, o.at[s].reshape(-1, d - 1))
-    blocks = np.einsum("sq,sqm,sqk->smk", o.weight, N.reshape(len(faces), q, -1), _traction(o))
     number = np.full(len(mesh.points), -1)
     number[patch.blade_nodes] = np.arange(len(patch.blade_nodes))
-    columns = number[o.master[o.face[:, 0], :d]]
-    W = sp.coo_matrix((blocks.ravel(), (np.repeat(faces, d, axis=1).ravel(),
-                                        np.repeat(columns[:, None, :], faces.shape[1], axis=1).ravel())),
-                      shape=(len(mesh.points), len(patch.area)))
-    return W.tocsr() @ sp.diags(1 / patch.area)
+    return FaceRule(faces, number[o.master[o.face[:, 0], :d]], N.reshape(len(faces), q, -1),
+                    _traction(o) * o.weight[:, :, None], o.normal)
 
 
 def _traction(o: Overlap) -> np.ndarray:
@@ -116,16 +126,14 @@ def _close(X: np.ndarray, Y: np.ndarray) -> list[tuple[int, int]]:
     return [(i, j) for i, js in enumerate(near) for j in sorted(js) if np.linalg.norm(cx[i] - cy[j]) < rx[i] + ry[j]]
 
 
-def _cut_line(x: np.ndarray, y: np.ndarray) -> list[np.ndarray]:
-    """Common part of two lines as (2, 1) reference coordinates on the first, laid onto it."""
-    t = x[1] - x[0]
-    a, b = np.sort((y - x[0]) @ t / (t @ t)).clip(0, 1)
-    return [np.array([[2 * a - 1], [2 * b - 1]])] if b - a > SLIVER else []
+def _cut_line(ends: np.ndarray) -> list[np.ndarray]:
+    """The part (2, 1) of a line (2, 1) within the reference line."""
+    a, b = np.sort(ends[:, 0]).clip(-1, 1)
+    return [np.array([[a], [b]])] if b - a > 2 * SLIVER else []
 
 
-def _cut_triangle(x: np.ndarray, y: np.ndarray) -> list[np.ndarray]:
-    """Common part of two triangles as triangles (3, 2) in reference coordinates of the first (Sutherland-Hodgman)."""
-    polygon = (y - x[0]) @ np.linalg.pinv(x[1:] - x[0])
+def _cut_triangle(polygon: np.ndarray) -> list[np.ndarray]:
+    """The part of a triangle (3, 2) within the reference triangle as triangles (3, 2) (Sutherland-Hodgman)."""
     for level in (lambda p: p[0], lambda p: p[1], lambda p: 1 - p[0] - p[1]):
         polygon = _clip(polygon, level)
         if len(polygon) < 3:
@@ -146,16 +154,59 @@ def _clip(polygon: list[np.ndarray] | np.ndarray, level: object) -> list[np.ndar
     return kept
 
 
-def _quadrature(X: np.ndarray, Y: np.ndarray, pieces: np.ndarray) -> tuple[tuple[np.ndarray, np.ndarray], np.ndarray]:
-    """Reference points on both faces and weights [m, m^2], from pieces (s, k, d) in the master's coordinates."""
+def _view(normals: np.ndarray, d: int, pair: str) -> np.ndarray:
+    """(d - 1, 3) axes across the mean of the outward normals (nf, 3)."""
+    axis = normals.sum(axis=0) / np.linalg.norm(normals.sum(axis=0))
+    if (normals @ axis < STEEP * np.linalg.norm(normals, axis=1)).any():
+        raise InputError(f"contact pair '{pair}' does not match and its master turns by more than 75 degrees from its "
+                         "mean normal, expected a face seen from one side: split it")
+    if d == 2:
+        return np.array([[-axis[1], axis[0], 0.0]])
+    first = np.cross(axis, np.eye(3)[np.argmin(np.abs(axis))])
+    first /= np.linalg.norm(first)
+    return np.array([first, np.cross(axis, first)])
+
+
+def _quadrature(X: np.ndarray, Y: np.ndarray, pieces: np.ndarray,
+                view: np.ndarray) -> tuple[tuple[np.ndarray, np.ndarray], np.ndarray]:
+    """Reference points on both faces and area vectors (s, q, 3), from pieces (s, k, d) in the master's coordinates.
+
+    X, Y (s, m, 3): the faces' nodes.
+    """
     d = pieces.shape[2]
     points, w = face_quadrature(d + 1)
-    L, _ = LINEAR[d + 1](points)
-    on_master = np.einsum("qk,skd->sqd", L, pieces)
-    place = np.einsum("sqk,ski->sqi", LINEAR[d + 1](on_master.reshape(-1, d))[0].reshape(*on_master.shape[:2], -1), X)
-    tangents = Y[:, 1:] - Y[:, :1]
-    local = np.einsum("sqi,sid->sqd", place - Y[:, :1], np.linalg.pinv(tangents))
-    on_slave = 2 * local - 1 if d == 1 else local
-    side = np.einsum("skd,sdi->ski", pieces[:, 1:] - pieces[:, :1], (X[:, 1:] - X[:, :1]) / (2 if d == 1 else 1))
-    normal = side[:, 0] / 2 if d == 1 else np.cross(side[:, 0], side[:, 1])
-    return (on_master, on_slave), np.linalg.norm(normal, axis=1)[:, None] * w
+    on_master = np.einsum("qk,skd->sqd", LINEAR[d + 1](points)[0], pieces)
+    place, tangents = _mapped(X, on_master)
+    edges = pieces[:, 1:] - pieces[:, :1]
+    if d == 1:
+        vector = np.cross(tangents[:, :, 0], [0.0, 0.0, 1.0]) * (edges[:, :, 0] / 2)[:, :, None]
+    else:
+        vector = np.cross(tangents[:, :, 0], tangents[:, :, 1]) * np.abs(np.linalg.det(edges))[:, None, None]
+    return (on_master, _located(Y, place @ view.T, view)), vector * w[:, None]
+
+
+def _located(nodes: np.ndarray, target: np.ndarray, view: np.ndarray) -> np.ndarray:
+    """Reference points (s, q, d) where faces with nodes (s, m, 3) are seen at target (s, q, d), also beyond the faces.
+
+    The first step of Newton's method is the last on straight faces.
+    """
+    s, q, d = target.shape
+    at = np.full((s, q, d), 0.0 if d == 1 else 1 / 3)
+    for _ in range(STEPS):
+        there, slopes = _mapped(nodes, at)
+        off = (target - there @ view.T)[..., None]
+        slopes = (slopes @ view.T).swapaxes(2, 3)
+        if (np.abs(np.linalg.det(slopes)) < SLIVER * np.abs(slopes).max(axis=(2, 3))**d).any():
+            raise InputError("a face of a contact pair that does not match is seen edge-on along the master's mean "
+                             "normal, expected faces seen from the front: split the pair")
+        at = at + np.linalg.solve(slopes, off)[..., 0]
+    return at
+
+
+def _mapped(nodes: np.ndarray, at: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Places (s, q, 3) and tangents (s, q, d, 3) on faces with nodes (s, m, 3) at reference points (s, q, d)."""
+    s, q, d = at.shape
+    m = nodes.shape[1]
+    N, dN = shape(m, d + 1, at.reshape(-1, d))
+    return (np.einsum("sqm,smi->sqi", N.reshape(s, q, m), nodes),
+            np.einsum("sqmd,smi->sqdi", dN.reshape(s, q, m, d), nodes))

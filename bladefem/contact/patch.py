@@ -25,9 +25,9 @@ from geometry.mesh import Mesh
 
 from ..data import Patch
 from ..errors import InputError
-from .mortar import mortar_means, mortar_patch, overlap
+from .mortar import mortar_faces, mortar_patch
 from .shape import corner_count, face_quadrature, shape
-from .surface import frames, outward, surface
+from .surface import FaceRule, frames, outward, surface
 
 __all__ = ["initial_gap", "make_patch", "normal_ports", "patch_faces", "patch_means", "port_matrix", "rigid_ports"]
 
@@ -105,25 +105,20 @@ def patch_means(patch: Patch, mesh: Mesh, side: str = "blade") -> sp.csr_matrix:
 
     Initial gaps must be averaged by it too: at a corner or edge of the patch the mean is not the value at the node.
     """
-    if not mesh.pairs[patch.name].nodes.size:
-        return mortar_means(patch, mesh, overlap(mesh, patch.name), side)
-    faces, slave = patch_faces(mesh, patch.name)
-    weighted, hats = surface(mesh, faces)
-    corners = hats.shape[1]
-    N, _ = shape(faces.shape[1], corners, face_quadrature(corners)[0])
-    blocks = np.einsum("fq,qk,qm->fmk", np.linalg.norm(weighted, axis=2), hats, N)
-    rows = np.repeat((faces if side == "blade" else slave[faces])[:, :, None], corners, axis=2)
-    columns = np.repeat(patch.faces[:, None, :], faces.shape[1], axis=1)
+    rule = _rule(patch, mesh, side)
+    blocks = np.einsum("fqk,fqm->fmk", rule.traction, rule.shape)
+    rows = np.repeat(rule.nodes[:, :, None], blocks.shape[2], axis=2)
+    columns = np.repeat(rule.columns[:, None, :], blocks.shape[1], axis=1)
     W = sp.coo_matrix((blocks.ravel(), (rows.ravel(), columns.ravel())), shape=(len(mesh.points), len(patch.area)))
     return W.tocsr() @ sp.diags(1 / patch.area)
 
 
 def initial_gap(patch: Patch, mesh: Mesh) -> np.ndarray:
     """(n,) normal distance of the two faces as meshed [m], chi-weighted means: crowned and rounded faces included."""
-    pair = mesh.pairs[patch.name]
-    blade, damper = (patch_means(patch, mesh, side).T @ mesh.points for side in ("blade", "damper"))
-    apart = (damper - pair.shift) @ pair.rotation - blade
-    return np.einsum("ni,ni->n", apart, patch.frame[:, 0])
+    pair, d = mesh.pairs[patch.name], mesh.dimension
+    blade, damper = (_ports(patch, mesh, side)[:, ::d].T @ place[:, :d].ravel()
+                     for side, place in (("blade", mesh.points), ("damper", mesh.points - pair.shift)))
+    return damper - blade
 
 
 def rigid_ports(patches: Sequence[Patch], mesh: Mesh, origin: np.ndarray) -> np.ndarray:
@@ -141,8 +136,30 @@ def rigid_ports(patches: Sequence[Patch], mesh: Mesh, origin: np.ndarray) -> np.
 
 
 def _ports(patch: Patch, mesh: Mesh, side: str) -> sp.csc_matrix:
-    """Port vectors of one patch (dimension * n_points, dimension * n)."""
-    d = mesh.dimension
-    frame = patch.frame if side == "blade" else patch.frame @ mesh.pairs[patch.name].rotation.T
-    turn = sp.block_diag([F[:d, :d].T for F in frame], format="csr")
-    return (sp.kron(patch_means(patch, mesh, side), sp.identity(d), format="csr") @ turn).tocsc()
+    """Port vectors of one patch (dimension * n_points, dimension * n), with the master's own frame at each point."""
+    d, rule = mesh.dimension, _rule(patch, mesh, side)
+    frame = frames(rule.normal.reshape(-1, 3), d, patch.frame[:, 0])
+    if side != "blade":
+        frame = frame @ mesh.pairs[patch.name].rotation.T
+    frame = frame[:, :d, :d].reshape(*rule.normal.shape[:2], d, d)
+    blocks = np.einsum("fqk,fqm,fqai->fmika", rule.traction, rule.shape, frame, optimize=True)
+    rows = (rule.nodes[:, :, None] * d + np.arange(d)).reshape(len(blocks), -1)
+    columns = (rule.columns[:, :, None] * d + np.arange(d)).reshape(len(blocks), -1)
+    size = (d * len(mesh.points), d * len(patch.area))
+    P = sp.coo_matrix((blocks.ravel(), (np.repeat(rows, columns.shape[1], axis=1).ravel(),
+                                        np.tile(columns, (1, rows.shape[1])).ravel())), shape=size)
+    return (P.tocsr() @ sp.diags(np.repeat(1 / patch.area, d))).tocsc()
+
+
+def _rule(patch: Patch, mesh: Mesh, side: str) -> FaceRule:
+    """The quadrature rule of the patch on one of its sides."""
+    if not mesh.pairs[patch.name].nodes.size:
+        return mortar_faces(patch, mesh, side)
+    faces, slave = patch_faces(mesh, patch.name)
+    weighted, chi = surface(mesh, faces)
+    corners, size = chi.shape[1], np.linalg.norm(weighted, axis=2)
+    N, _ = shape(faces.shape[1], corners, face_quadrature(corners)[0])
+    sign = outward(mesh, faces, weighted.sum(axis=1))
+    return FaceRule(faces if side == "blade" else slave[faces], patch.faces,
+                    np.broadcast_to(N, (len(faces), *N.shape)), size[:, :, None] * chi,
+                    weighted * (sign[:, None] / size)[:, :, None])

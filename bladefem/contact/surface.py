@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from itertools import combinations
 
 import numpy as np
@@ -11,9 +12,20 @@ from geometry.mesh import Mesh
 from ..errors import InputError
 from .shape import corner_count, face_quadrature, shape, traction_shape
 
-__all__ = ["frames", "outward", "surface"]
+__all__ = ["FaceRule", "frames", "outward", "surface"]
 
 BODY_CORNERS = {"triangle": 3, "quad": 4, "tetra": 4, "hexahedron": 8, "wedge": 6, "pyramid": 5}
+
+
+@dataclass(frozen=True)
+class FaceRule:
+    """Quadrature over the faces (or pieces of faces) of a patch, seen from one of its bodies."""
+
+    nodes: np.ndarray               # (f, m) nodes of the body
+    columns: np.ndarray             # (f, k) nodes of the patch that carry the traction
+    shape: np.ndarray               # (f, q, m) the body's shape functions
+    traction: np.ndarray            # (f, q, k) traction functions times weights [m^2]
+    normal: np.ndarray              # (f, q, 3) unit vectors out of the master
 
 
 def surface(mesh: Mesh, faces: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -52,11 +64,11 @@ def outward(mesh: Mesh, faces: np.ndarray, normals: np.ndarray) -> np.ndarray:
     return sign
 
 
-def frames(normals: np.ndarray, dimension: int) -> np.ndarray:
-    """Frames (n, 3, 3) with rows normal, t1, t2."""
-    axis = np.zeros_like(normals)
+def frames(normals: np.ndarray, dimension: int, like: np.ndarray | None = None) -> np.ndarray:
+    """Frames (n, 3, 3) with rows normal, t1, t2; ``like`` are the normals (k, 3) that decide which axis gives t2."""
+    axis, like = np.zeros_like(normals), normals if like is None else like
     axis[:, 2] = 1.0
-    if dimension == 3 and np.abs(normals[:, 2]).max() > np.cos(np.radians(25)):
+    if dimension == 3 and np.abs(like[:, 2]).max() > np.cos(np.radians(25)):
         axis[:] = [0.0, 1.0, 0.0]
     t2 = axis - normals * np.einsum("ni,ni->n", axis, normals)[:, None]
     t2 /= np.linalg.norm(t2, axis=1, keepdims=True)
