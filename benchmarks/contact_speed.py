@@ -4,11 +4,17 @@
 
 Recorded on a shared two-core machine under other load, one thread (trust ratios):
 
-    complementarity, 484 nodes (232 pressed): cold 1.7 ms in 2 steps; one Cholesky factor of all nodes 1.8 ms
-    complementarity, 2025 nodes (949 pressed): cold 55 ms in 3 steps; one Cholesky factor of all nodes 95 ms
-    wedge sector, 64875 dofs, 90 contact nodes: condensed in 6.6 s, then a load state costs 0.86 ms, warm 0.38 ms
-    compliance, 146520 dofs (blade's proportions), 200 right-hand sides: factor 10.5 s, solves 6.4 s of CPU
-    compliance, 156816 dofs (block), 1000 right-hand sides: factor 28.7 s, solves 53 s of CPU
+    complementarity, 484 nodes (232 pressed): cold 1.4 ms in 2 steps; one Cholesky factor of all nodes 1.4 ms
+    complementarity, 2025 nodes (949 pressed): cold 54 ms in 3 steps; one Cholesky factor of all nodes 99 ms
+    wedge sector, 63069 dofs, 90 contact nodes: condensed in 2.4 s, then a load state costs 0.89 ms, warm 0.37 ms
+    compliance, 146520 dofs (blade's proportions), 1000 right-hand sides: factor 7.6 s, contact ports 19.7 s (12.4 s on
+        an idle machine), dense columns 21.6 s of CPU
+    compliance, 156816 dofs (block), 1000 right-hand sides: factor 21.2 s, contact ports 26.3 s (21.0 s idle), dense
+        columns 33.1 s of CPU
+
+Contact ports are sparse: MUMPS leaves out the parts of the first sweep that they do not reach. A Schur complement of
+[[K, P], [P^T, 0]] on the ports, which saves the second sweep, was tried: 15 s instead of 8 + 12 s for the blade, but 60
+instead of 25 + 21 s for the block, since MUMPS orders worse around the ports and their rows travel to the last front.
 """
 
 from __future__ import annotations
@@ -18,6 +24,8 @@ import time
 from pathlib import Path
 
 import numpy as np
+import scipy.sparse as sp
+from scipy.spatial import cKDTree
 
 sys.path[:0] = [str(Path(__file__).parents[1] / "tests" / name) for name in ("contact", "fem")]
 
@@ -28,7 +36,7 @@ from bladefem.contact.lcp import solve_lcp  # noqa: E402
 from bladefem.contact.patch import make_patch  # noqa: E402
 from bladefem.contact.seat import contact_problem, solve  # noqa: E402
 from bladefem.fem.body import assemble  # noqa: E402
-from bladefem.fem.constraint import constrain  # noqa: E402
+from bladefem.fem.constraint import constrain, restrict  # noqa: E402
 from bladefem.fem.flexibility import compliance, flexible  # noqa: E402
 from bladefem.scene import Material, Scene  # noqa: E402
 from geometry import build  # noqa: E402
@@ -70,19 +78,28 @@ def states():
 
 
 def right_hand_sides(divisions, size, count=1000):
-    body = assemble(box(divisions, size, "tetra10"), "blade", Material())
+    """CPU of ``count`` columns: normal ports of the upper face (means over nine nodes), and dense random columns."""
+    mesh = box(divisions, size, "tetra10")
+    con = constrain(assemble(mesh, "blade", Material()), "clamp")
     start = time.process_time()
-    flex = flexible(constrain(body, "clamp"))
+    flex = flexible(con)
     factor = time.process_time() - start
-    B = np.random.default_rng(0).standard_normal((flex.con.own.stop, count))
-    start = time.process_time()
-    compliance(flex, B)
-    print(f"compliance, {B.shape[0]} dofs, {count} right-hand sides: factor {factor:.1f} s, "
-          f"solves {time.process_time() - start:.1f} s of CPU", flush=True)
+    top = np.flatnonzero(np.isclose(mesh.points[:, 2], size[2]))
+    centres = top[np.linspace(0, len(top) - 1, count).astype(int)]
+    near = top[cKDTree(mesh.points[top]).query(mesh.points[centres], 9)[1]]
+    ports = sp.csc_matrix((np.full(near.size, 1 / 9), (3 * near.ravel() + 2, np.repeat(np.arange(count), 9))),
+                          shape=(3 * len(mesh.points), count))
+    spent = []
+    for columns in (restrict(con, ports), np.random.default_rng(0).standard_normal((con.own.stop, count))):
+        start = time.process_time()
+        compliance(flex, columns)
+        spent.append(time.process_time() - start)
+    print(f"compliance, {con.own.stop} dofs, {count} right-hand sides: factor {factor:.1f} s, contact ports "
+          f"{spent[0]:.1f} s, dense columns {spent[1]:.1f} s of CPU", flush=True)
 
 
 if __name__ == "__main__":
     lcp()
     states()
-    right_hand_sides((60, 18, 5), (0.15, 0.045, 0.0125), 200)   # a blade's proportions
+    right_hand_sides((60, 18, 5), (0.15, 0.045, 0.0125))        # a blade's proportions
     right_hand_sides((24, 16, 16), (0.06, 0.04, 0.04))          # a block: wider fronts, the worst shape
