@@ -61,7 +61,7 @@ def stacked(bodies: tuple[PortModel, ...], damping: Damping, rows: np.ndarray) -
     coupled = None
     if any(body.damping is not None and body.damping.ndim == 2 for body in bodies):
         coupled = np.array([_square(body, most) for body in bodies])
-    shapes = np.array([np.pad(body.shapes[p], ((0, 0), (0, most - len(body.omega))))
+    shapes = np.array([_widened(body.shapes[p], most)
                        for body, p in zip(bodies, order, strict=True)])
     residual = np.array([body.residual[np.ix_(p, p)] for body, p in zip(bodies, order, strict=True)])
     a, b, c = np.cumsum([len(part) for part in ports[0]])
@@ -157,6 +157,12 @@ def _ports(body: PortModel, rows: np.ndarray) -> list[np.ndarray]:
     everything = np.arange(len(body.residual))
     return [everything[body.ports["contact"]][rows]] + [everything[body.ports.get(name, slice(0, 0))]
                                                         for name in ("load", "probe")]
+
+
+def _widened(shapes: np.ndarray, count: int) -> np.ndarray:
+    """Shapes (P, m) filled up with zeros to (P, count)."""
+    spare = count - shapes.shape[1]
+    return np.pad(shapes, ((0, 0), (0, spare))) if spare else shapes
 
 
 def _fill(values: np.ndarray, count: int, value: float = 0.0) -> np.ndarray:

@@ -53,10 +53,11 @@ def solve_small(model: ReducedModel, omega: float, H: int, samples: int, start: 
 
 def _prepared(model: ReducedModel, H: int, samples: int) -> tuple | None:
     """What a point needs beside its frequency; made once."""
-    return model.once(("small", H, samples), lambda: _prepare(model, H, samples))
+    linear = model.once(("small", H), lambda: _prepare(model, H))
+    return None if linear is None else (*linear, contact_table(model, H, samples))
 
 
-def _prepare(model: ReducedModel, H: int, samples: int) -> tuple | None:
+def _prepare(model: ReducedModel, H: int) -> tuple | None:
     bodies = [model.blades(H)]
     if isinstance(model.damper, tuple):
         bodies.append(model.elastic_damper(H))
@@ -77,10 +78,10 @@ def _prepare(model: ReducedModel, H: int, samples: int) -> tuple | None:
         (loads[:, None] @ load.conj())[:, 0],
         (blades.residual[:, blades.contact, blades.load] @ loads[:, :, None])[:, :, 0],
         (blades.residual[:, blades.probe, blades.load] @ loads[:, :, None])[:, :, 0])))
-    B, g, rigid = rigid_motions(model, model.springs.ravel())
+    B, g, rigid = model.once("rigid", lambda: rigid_motions(model, model.springs.ravel()))
     still = np.flatnonzero(blades.omega[0] == 0)
     held = (np.ascontiguousarray(B), g, np.ascontiguousarray(rigid[:len(still)]), still, model.hold)
-    return body, held, model.springs.ravel(), contact_table(model, H, samples)
+    return body, held, model.springs.ravel()
 
 
 def _reversed(body: Stack) -> Stack:
