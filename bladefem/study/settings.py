@@ -78,7 +78,7 @@ def enriched(settings: Settings, name: str, need: float = 4.0) -> Settings | Non
     elif name == "modes":
         more = 2 * value
     else:
-        more = value * 2 ** min(max(ceil(log2(sqrt(max(need, 1.0)))), 1), 3)
+        more = value * 2 ** min(max(ceil(log2(sqrt(max(need, 1.0)))), 1), 2 if name == "points" else 3)
     more = min(more, RICHEST[name], settings.most if name == "harmonics" else more)
     return _enough_samples(replace(settings, **{name: more})) if more > value else None
 
