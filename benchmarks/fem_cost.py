@@ -10,8 +10,8 @@ largest run also solves nodal diameter 0 with the same factors. Recorded on two 
     memory [GB]      0.22    0.28    0.56    1.09     2.05     3.68     6.66
     entries [1e6]     1.7     3.6    13.8    35.7     79.3      155      316
 
-Memory follows 0.12 GB + 3290 B n + 180.5 B n^(4/3), which bladefem.fem.memory warns with; processor time n^1.46 over the
-four largest. By that model a million dofs take 21.5 GB and about 4 minutes.
+Memory follows 0.12 GB + 3290 B n + 180.5 B n^(4/3), which bladefem.fem.memory warns with; processor time grows with
+n^1.46 over the four largest. By that model a million dofs take 21.5 GB and about 4 minutes.
 """
 
 from __future__ import annotations

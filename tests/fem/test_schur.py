@@ -1,0 +1,53 @@
+"""Solves through the rim's reduced system, and factorisations in a given order."""
+
+import numpy as np
+import pytest
+from structured import sector
+
+from bladefem.fem import core, ordering
+from bladefem.fem.body import assemble
+from bladefem.fem.constraint import at_diameter, transformation
+from bladefem.fem.flexibility import flexible
+from bladefem.fem.modes import modes
+from bladefem.fem.schur import through
+from bladefem.scene import Material
+
+
+def opened(divisions=(4, 3, 1)):
+    return transformation(assemble(sector(8, divisions, bump=0.2), "blade", Material()), "clamp", True)
+
+
+@pytest.mark.parametrize("n", [0, 1, 4])
+@pytest.mark.parametrize("columns", [1, 40])
+def test_one_sweep_each_way_equals_two_solves(n, columns):
+    rim = flexible(at_diameter(opened(), n)).factor.parts
+    size = len(rim.inner) + len(rim.masters)
+    B = np.random.default_rng(1).standard_normal((size, columns)) + (1j if n == 1 else 0)
+    assert rim.core.bridge is not None
+    X = np.zeros_like(B)
+    X[rim.inner], X[rim.masters] = core._twice(rim, B)
+    np.testing.assert_allclose(core.solve(rim, B), X, atol=1e-11 * abs(X).max())
+
+
+def test_what_the_answer_raises_comes_through():
+    made = opened().opened.core.bridge
+
+    def fails(r):
+        raise ZeroDivisionError("on purpose")
+    B = np.ones((made.factor.matrix.size[0], 1))
+    with pytest.raises(ZeroDivisionError, match="on purpose"):
+        through(made, B, fails)
+    assert through(made, B, lambda r: r).shape == B.shape
+
+
+def test_given_order_gives_the_same_modes(monkeypatch):
+    """Nested dissection puts the interior first, is taken by MUMPS (ordering 1), and changes nothing else."""
+    own = opened()
+    monkeypatch.setattr(ordering, "WORTHWHILE", 0)
+    given = opened()
+    found, kept = given.opened.core, own.opened.core
+    assert kept.order is None and found.factor.ordering == 1
+    assert sorted(found.order) == list(range(len(found.order)))
+    assert found.order[found.rim].min() == len(found.inner)
+    a, b = (modes(at_diameter(t, 3), 6).frequencies for t in (own, given))
+    np.testing.assert_allclose(a, b, rtol=1e-11)
