@@ -1,16 +1,21 @@
 """The page "The paper, claim by claim":  python -m bladefem.report.paper [folder]  writes paper.md and paper.html.
 
-Pictures and the method map live in the folder ``paper`` beside the page. Three minutes on one core; the method map
-itself is made by benchmarks/paper_maps.py and only read here. Under mpirun rank 0 does the work alone.
+Pictures, claims (claims.json) and the method map live in the folder ``paper`` beside the page. Three minutes on one
+core; titles of chapters after the folder remake those alone. The method map itself is made by benchmarks/paper_maps.py
+and only read here. Under mpirun rank 0 does the work alone.
 """
 
 from __future__ import annotations
 
 import html
+import json
 import sys
 from collections import Counter
 from collections.abc import Mapping, Sequence
+from dataclasses import asdict
 from pathlib import Path
+
+from bladefem.errors import InputError, suggestion
 
 from .claim import Chapter, Claim
 from .errata import ERRATA
@@ -91,17 +96,46 @@ def _figure(claim: Claim) -> str:
     return f"<figure>{images}<figcaption>{html.escape(claim.where)}: {html.escape(claim.caption)}</figcaption></figure>"
 
 
-def main(folder: Path) -> None:
-    """Write paper.md and paper.html into the folder, pictures into its sub-folder ``paper``."""
+def main(folder: Path, titles: Sequence[str] = ()) -> None:
+    """Write paper.md and paper.html into the folder, pictures into its sub-folder ``paper``.
+
+    Args:
+        titles: of the chapters to remake; all when empty.
+
+    Raises:
+        InputError: no such chapter, or one that was never made.
+    """
     from .claims import CHAPTERS
     pictures = folder / "paper"
     pictures.mkdir(parents=True, exist_ok=True)
-    found = {c.title: [claim for part in c.parts for claim in part(pictures)] for c in CHAPTERS}
+    known = [c.title for c in CHAPTERS]
+    for title in titles:
+        if title not in known:
+            raise InputError(f"chapter '{title}' is unknown{suggestion(title, known)}")
+    found = _kept(pictures / "claims.json") if titles else {}
+    for c in CHAPTERS:
+        if c.title in titles or not titles:
+            found[c.title] = [claim for part in c.parts for claim in part(pictures)]
+        elif c.title not in found:
+            raise InputError(f"chapter '{c.title}' was never made, expected a run without titles first")
+    kept = {title: [asdict(claim) for claim in claims] for title, claims in found.items()}
+    (pictures / "claims.json").write_text(json.dumps(kept, indent=1, ensure_ascii=False) + "\n", encoding="utf-8")
     (folder / "paper.md").write_text(as_markdown(CHAPTERS, found), encoding="utf-8")
     (folder / "paper.html").write_text(as_html(CHAPTERS, found), encoding="utf-8")
+
+
+def _kept(file: Path) -> dict[str, list[Claim]]:
+    """Claims of an earlier run."""
+    if not file.is_file():
+        return {}
+    kept = json.loads(file.read_text(encoding="utf-8"))
+    return {title: [Claim(**{**c, "pictures": tuple(c["pictures"])}) for c in claims] for title, claims in kept.items()}
 
 
 if __name__ == "__main__":
     from mpi4py import MPI
     if MPI.COMM_WORLD.rank == 0:
-        main(Path(sys.argv[1]) if len(sys.argv) > 1 else Path("docs"))
+        try:
+            main(Path(sys.argv[1]) if len(sys.argv) > 1 else Path("docs"), sys.argv[2:])
+        except InputError as error:
+            sys.exit(f"paper: {error}")

@@ -18,7 +18,7 @@ from bladefem.damper.paper import platform
 from bladefem.friction.harmonics import synthesis
 from bladefem.hbm.api import solve
 from bladefem.hbm.model import ReducedModel
-from bladefem.hbm.sweep import size, sweep
+from bladefem.hbm.sweep import response, size, sweep
 from bladefem.scene import Scene
 from bladefem.scene_file import load_scene
 from bladefem.study.row import Row, paper_model, row_of_blades, whole_model
@@ -27,11 +27,12 @@ from bladefem.view.contact import draw_pressure
 from bladefem.view.mesh import draw_mesh
 from bladefem.view.modes import draw_mode_sheet
 from bladefem.view.paper import draw_friction_loops, draw_peaks, draw_tip_responses
+from bladefem.view.paper_contact import draw_sweeps
 
 from .claim import Claim
 
 __all__ = ["LOADS", "MASSES", "SCENES", "accuracy", "finite_elements", "first_mode", "normal_motion", "optima",
-           "responses", "row_and_scene"]
+           "responses", "row_and_scene", "two_motions"]
 
 LOADS = (1.0, 2.0, 4.0, 6.0, 10.0, 20.0, 50.0, 200.0)      # normal load of a seat [N]
 MASSES = (0.03, 0.06, 0.09, 0.12)                           # of a damper [kg]
@@ -236,6 +237,30 @@ def normal_motion(_: Path) -> Iterator[Claim]:
         bounce = np.sqrt(model.elements.kn.sum() / row.reduced.mass) / 2 / np.pi
         yield Claim("Fig. 13, Sect. 5.1", f"the damper's normal motion does not matter ({contact} contact, it bounces "
                     f"at {bounce:.0f} Hz)", "; ".join(lines), "fails")
+
+
+def two_motions(folder: Path) -> Iterator[Claim]:
+    """Sweeps up and down where the normal load follows the motion, and where it does not."""
+    row, scene = row_and_scene("soft")
+    frequency = np.linspace(1125, 1150, 51)
+    up, down, unsolved = _both_ways(whole_model(scene, row, 4.0), frequency)
+    plain = _both_ways(model_of("soft", 4.0), frequency)
+    draw_sweeps(frequency, up, down, folder / "stability_blades.png")
+    apart = frequency[np.abs(up / down - 1) > 0.01]
+    yield Claim("Fig. 15", "one response for a frequency",
+                "plane blades, 4 N, rigid damper whose normal load follows: sweeps up and down part from "
+                f"{apart.min():.1f} to {apart.max():.1f} Hz and reach {1e6 * up.max():.1f} and {1e6 * down.max():.1f} "
+                f"µm, {unsolved} points unsolved; with the paper's constant loads they agree to "
+                f"{np.abs(plain[0] / plain[1] - 1).max():.0e}", "fails", ("stability_blades.png",),
+                "The same blade and damper swept up and down: two motions at one frequency where seats lift off.")
+
+
+def _both_ways(model: ReducedModel, frequency: np.ndarray) -> tuple[np.ndarray, np.ndarray, int]:
+    """Amplitudes [m] of a sweep up and one down, and how many points were not solved."""
+    up = list(response(model, 2 * np.pi * frequency, 3, 256))
+    down = list(response(model, 2 * np.pi * frequency[::-1], 3, 256))[::-1]
+    sizes = (np.array([size(s) for s in way]) for way in (up, down))
+    return *sizes, sum(not s.converged for s in [*up, *down])
 
 
 def _variation(top: Peak, model: ReducedModel) -> float:

@@ -9,7 +9,7 @@ import numpy as np
 
 from .style import COLOURS, canvas, log_axis
 
-__all__ = ["draw_branches", "draw_punch"]
+__all__ = ["draw_branches", "draw_punch", "draw_sweeps"]
 
 
 def draw_punch(radius: np.ndarray, pressure: np.ndarray, stiffness: np.ndarray, exact: tuple[np.ndarray, np.ndarray],
@@ -60,3 +60,13 @@ def draw_branches(frequency: np.ndarray, amplitude: np.ndarray, multiplier: np.n
         log_axis(left, "y")
         left.legend()
         return left.figure
+
+
+def draw_sweeps(frequency: np.ndarray, up: np.ndarray, down: np.ndarray, file: str | Path | None = None) -> object:
+    """Amplitudes (p,) [m] of sweeps with rising and falling frequency (p,) [Hz]; returns the figure."""
+    with canvas(file, None, (6.4, 4.0)) as ax:
+        ax.plot(frequency, 1e6 * up, ">-", ms=3.5, label="upwards")
+        ax.plot(frequency, 1e6 * down, "<--", ms=3.5, label="downwards")
+        ax.set(xlabel="frequency [Hz]", ylabel="amplitude at the tip [µm]", title="plane blades, 4 N a seat")
+        ax.legend()
+        return ax.figure

@@ -3,10 +3,13 @@
 import csv
 from pathlib import Path
 
+import pytest
+
 from bladefem.damper.maps import COLUMNS, count_outcomes, write_rows
+from bladefem.errors import InputError
 from bladefem.report.claim import Chapter, Claim
 from bladefem.report.claims import CHAPTERS, element
-from bladefem.report.paper import as_html, as_markdown
+from bladefem.report.paper import as_html, as_markdown, main
 
 MAP = Path(__file__).resolve().parents[2] / "docs/paper/method_map.csv"
 
@@ -25,6 +28,17 @@ def test_page_shows_claim_number_verdict_and_picture(tmp_path):
 def test_html_escapes_what_claims_say():
     chapter = Chapter("x", "", ())
     assert "a &lt; b" in as_html([chapter], {"x": [Claim("Eq. 1", "a < b", "yes", "holds")]})
+
+
+def test_one_chapter_is_remade_and_the_others_kept(tmp_path, monkeypatch):
+    chapters = tuple(Chapter(t, "", (lambda _, t=t: iter([Claim("Eq. 1", "x", t, "holds")]),)) for t in "ab")
+    monkeypatch.setattr("bladefem.report.claims.CHAPTERS", chapters)
+    main(tmp_path)
+    first = (tmp_path / "paper.md").read_text(encoding="utf-8")
+    main(tmp_path, ["b"])
+    assert (tmp_path / "paper.md").read_text(encoding="utf-8") == first
+    with pytest.raises(InputError, match="unknown"):
+        main(tmp_path, ["c"])
 
 
 def test_committed_page_has_every_chapter_and_its_pictures():

@@ -8,6 +8,7 @@ from bladefem.damper.blades import judge, optimum, peak
 from bladefem.damper.paper import platform
 from bladefem.hbm.api import solve
 from bladefem.hbm.resonance import free_resonances
+from bladefem.hbm.sweep import response, size
 from bladefem.scene_file import load_scene
 from bladefem.study.row import paper_model, row_of_blades, whole_model
 
@@ -73,3 +74,14 @@ def test_normal_motion_matters_near_the_optimum(row):
                      (paper_model(SOFT, row, load), whole_model(SOFT, row, load))] for load in (4.0, 20.0))
     assert light[1] > 2 * light[0]
     assert heavy[1] == pytest.approx(heavy[0], rel=0.05)
+
+
+def test_two_motions_where_the_normal_load_follows(row):
+    """4 N, 1145 Hz: sweeps from below and from above end on different motions; under a constant load on one."""
+    ends = {}
+    for name, model in (("follows", whole_model(SOFT, row, 4.0)), ("constant", paper_model(SOFT, row, 4.0))):
+        ways = [list(response(model, 2 * np.pi * np.linspace(start, 1145.0, 21), 3, 256)) for start in (1125.0, 1165.0)]
+        assert all(s.converged for way in ways for s in way)
+        ends[name] = [size(way[-1]) for way in ways]
+    assert ends["constant"][1] == pytest.approx(ends["constant"][0], rel=1e-6)
+    assert max(ends["follows"]) > 4 * min(ends["follows"])                # 24.9 and 4.5 um
