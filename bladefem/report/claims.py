@@ -159,7 +159,8 @@ def mass(folder: Path) -> Iterator[Claim]:
                 f"{max(np.abs(r.motion.velocity[:, 2]).max() for r in turned):.1f} rad/s, at 50 Hz it drifts at "
                 f"{turned[1].drift[0]:.3f}, {turned[1].drift[1]:.3f} m/s, and under constant load it keeps turning by "
                 f"{turned[0].drift[2]:+.2f} rad/s on average, so that nothing repeats exactly. Eq. 29 limits each axis "
-                "by itself: on a circle it loses half of the work; here the force stays on Coulomb's circle", "holds in part")
+                "by itself: on a circle it loses half of the work; here the force stays on Coulomb's circle",
+                "holds in part")
 
 
 def reference(_: Path) -> Iterator[Claim]:
