@@ -5,14 +5,18 @@ Square 3-D patches of `hbm_models.patch`. Limits: condensation 8/3 + 8 complex m
 sides, m = 3 n), at the rate at which this machine multiplies matrices; a dense Jacobian would take 2/3 (m (2H+1))^3 a
 Newton step.
 
-Measured (CPU seconds, one thread, 48.6 GFlop/s in matrix products; H = 3):
-    nodes   point   condense   forces    limit   one dense step   Newton steps
-        9   0.005     0.0004   0.0004   0.00001          0.0001              4
-       49   0.028     0.008    0.0012   0.002            0.015               4
-      100   0.12      0.06     0.0025   0.018            0.13                8
-      196   0.67      0.32     0.0053   0.13             0.96                6
-      400   5.0       2.5      0.014    1.1              8.1                 8
-Forces grow linearly, the condensation with the cube; 25 nodes: H 1 to 31 takes 0.009 to 0.22 s a point.
+Memory is the peak of the arrays made for a point.
+
+Measured (CPU seconds, one thread, 50 GFlop/s in matrix products; H = 3):
+    nodes   point   condense   forces    limit   one dense step   MiB   dense MiB   Newton steps
+        9   0.005     0.0002   0.0003   0.00001          0.0001     1         0.3              4
+       49   0.033     0.009    0.0016   0.002            0.015      8           8              4
+      100   0.13      0.06     0.0026   0.017            0.12      19          34              8
+      196   0.53      0.32     0.010    0.13             0.93     121         129              6
+      400   4.6       2.8      0.014    1.1              7.9      493         538              8
+Forces grow linearly, the condensation with the cube, 2.5 times above its limit: all contact dofs of these patches have
+modes of their own, so that nothing can be condensed by rank. 25 nodes: H 1 to 31 takes 0.009 to 0.22 s and 2 to 37 MiB
+a point.
 """
 
 from __future__ import annotations
@@ -49,11 +53,11 @@ def seconds(work: Callable[[], object]) -> float:
 def measure(side: int, H: int, speed: float) -> dict[str, float]:
     """CPU seconds of a point and of its parts."""
     model, samples, omega = patch(side, max(side**2 // 3, 3)).model, 8 * H + 64, 0.9
-    solution = solve(model, omega, H, samples)
     tracemalloc.start()
-    point = seconds(lambda: solve(model, omega, H, samples))
+    solution = solve(model, omega, H, samples)
     memory = tracemalloc.get_traced_memory()[1] / 2**20
     tracemalloc.stop()
+    point = seconds(lambda: solve(model, omega, H, samples))
     balance = Balance(model, condense(model, omega, H), samples)
     m = 3 * side**2
     return {"nodes": side**2, "H": H, "point": point, "condense": seconds(lambda: condense(model, omega, H)),
@@ -67,17 +71,21 @@ def main(target: str | None = None) -> None:
     speed = rate()
     print(f"matrix products: {speed / 1e9:.1f} GFlop/s")
     rows = []
-    for side, H in [(side, 3) for side in SIDES] + [(5, H) for H in HARMONICS]:
+    for side, H in [(5, H) for H in HARMONICS] + [(side, 3) for side in SIDES]:
         rows.append(measure(side, H, speed))
         if len(rows) == 1:
             print("  ".join(f"{head:>12s}" for head in rows[0]))
         print("  ".join(f"{value:12.4g}" for value in rows[-1].values()), flush=True)
-    if target:
-        with Path(target).with_suffix(".csv").open("w", newline="") as file:
-            table = csv.DictWriter(file, rows[0])
-            table.writeheader()
-            table.writerows({key: f"{value:.4g}" for key, value in row.items()} for row in rows)
-        draw(rows, Path(target).with_suffix(".png"))
+        if target and len(rows) > len(HARMONICS):
+            write(rows, Path(target))
+
+
+def write(rows: list[dict[str, float]], target: Path) -> None:
+    with target.with_suffix(".csv").open("w", newline="") as file:
+        table = csv.DictWriter(file, rows[0])
+        table.writeheader()
+        table.writerows({key: f"{value:.4g}" for key, value in row.items()} for row in rows)
+    draw(rows, target.with_suffix(".png"))
 
 
 def draw(rows: list[dict[str, float]], file: Path) -> None:
@@ -85,14 +93,14 @@ def draw(rows: list[dict[str, float]], file: Path) -> None:
     matplotlib.use("Agg")
     from matplotlib import pyplot
     figure, axes = pyplot.subplots(2, 2, figsize=(10, 7), sharey="row", sharex="col")
-    curves = {"point": ("o-", "one point"), "condense": ("s-", "flexibilities"), "forces": ("^-", "contact forces"),
-              "limit": ("k--", "floating-point limit"), "dense": ("0.6", "one dense Newton step, at the limit"),
-              "memory": ("o-", "one point"), "dense memory": ("0.6", "dense Jacobian")}
-    for column, (along, part) in enumerate({"nodes": rows[:len(SIDES)], "H": rows[len(SIDES):]}.items()):
+    curves = {"point": ("C0o-", "one point"), "condense": ("C1s-", "flexibilities"),
+              "forces": ("C2^-", "contact forces"), "limit": ("k--", "floating-point limit"),
+              "dense": ("C7:", "one dense Newton step, at the limit"), "memory": ("C0o-", "one point"),
+              "dense memory": ("C7:", "dense Jacobian")}
+    for column, (along, part) in enumerate({"nodes": rows[len(HARMONICS):], "H": rows[:len(HARMONICS)]}.items()):
         for name, (style, label) in curves.items():
             axis = axes[int("memory" in name), column]
-            axis.loglog([r[along] for r in part], [r[name] for r in part], style if style[0] != "0" else "--",
-                        color=style if style[0] == "0" else None, label=label)
+            axis.loglog([r[along] for r in part], [r[name] for r in part], style, label=label)
         axes[1, column].set_xlabel({"nodes": "contact nodes, H = 3", "H": "harmonics, 25 nodes"}[along])
     axes[0, 0].set_ylabel("CPU time [s]")
     axes[1, 0].set_ylabel("memory [MiB]")
@@ -100,6 +108,7 @@ def draw(rows: list[dict[str, float]], file: Path) -> None:
     axes[1, 0].legend()
     figure.tight_layout()
     figure.savefig(file, dpi=120)
+    pyplot.close(figure)
 
 
 if __name__ == "__main__":
