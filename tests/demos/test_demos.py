@@ -18,7 +18,7 @@ PINNED = {
     "blade_modes": 347.115898,
     "sector_modes": 427.67990401,
     "damper_seating": 1.0,
-    "forced_response": 65.834212,
+    "forced_response": 180.857634,
     "change_geometry": 1.2263424601,
 }
 
