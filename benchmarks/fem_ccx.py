@@ -6,6 +6,16 @@
 The mesh is the default wedge sector with 24 blades. Facts about ccx: nodes of the slave face stay off *BOUNDARY,
 middle nodes 9 and 10 are swapped against gmsh, numbers have at most 20 characters, every frequency is printed
 twice. ccx integrates the mass of C3D10 with degree 2; ``quadrature="ccx"`` copies that.
+
+Recorded with ccx 2.20 on two shared cores, ten modes each, processor time of ccx over that of bladefem, peak memory of
+bladefem over that of ccx, largest relative difference of a frequency:
+
+    dofs     nodal diameters  elements  ccx [s]  bladefem [s]  ratio  memory [GB]  ratio  ccx's mass  exact mass
+    45 549   5                curved       19.0           2.7    7.0         0.57   1.50     1.8e-07     6.6e-05
+    45 549   0                curved       18.3           3.0    6.0         0.55   1.45     3.1e-07     6.8e-05
+    45 549   0 to 12          curved      240.8          10.8   22.3         0.97   2.24     3.4e-07     7.1e-05
+    45 549   5                straight     18.8           3.1    6.0         0.57   1.51     3.3e-07     7.1e-06
+    151 047  5                curved      156.9          13.8   11.4         2.09   1.18     1.4e-07     1.3e-05
 """
 
 from __future__ import annotations
@@ -26,6 +36,7 @@ from bladefem.scene import Scene
 from geometry.mesh import Mesh
 
 COUNT, SECTORS = 10, 24
+MANY = 60e3      # degrees of freedom from which one nodal diameter is enough waiting
 HERE = Path(__file__).resolve()
 GOLDEN = HERE.parent.parent / "tests" / "fem" / "ccx_sector.json"
 OURS = """
@@ -156,10 +167,10 @@ def main() -> None:
             golden(folder)
             return
         for dofs in [float(a) for a in sys.argv[1:]] or [45000.0]:
-            for curved in (True, False):
+            for curved in (True, False) if dofs < MANY else (True,):
                 mesh = sector_mesh(dofs, curved)
                 compare(mesh, [5], folder)
-                if dofs < 60000 and curved:
+                if dofs < MANY and curved:
                     compare(mesh, [0], folder)
                     compare(mesh, list(range(SECTORS // 2 + 1)), folder)
 
