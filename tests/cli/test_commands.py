@@ -219,8 +219,10 @@ sys.exit(main(["modes", "scenes/wedge.toml", "-o", sys.argv[1]]))
 
 @pytest.mark.parametrize("sent", [signal.SIGINT, signal.SIGTERM])
 def test_an_interrupt_keeps_the_finished_stages(sent, tmp_path):
+    old = signal.signal(signal.SIGINT, signal.default_int_handler)  # shells start jobs in the background deaf to it
     job = subprocess.Popen([sys.executable, "-c", INTERRUPTED, tmp_path], stdout=subprocess.PIPE,
                            stderr=subprocess.PIPE, text=True, env=clean_environment())
+    signal.signal(signal.SIGINT, old)
     assert job.stdout.readline() == "started\n"
     job.send_signal(sent)
     said = job.communicate(timeout=30)[1]
