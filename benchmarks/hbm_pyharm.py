@@ -29,7 +29,7 @@ from hbm_models import PROBLEMS, Problem
 from bladefem.hbm.api import solve
 
 RUNS = {"single mass": (7, 256, 61), "beam": (7, 256, 31),        # harmonics, samples, frequencies
-        "chain with lift-off": (7, 256, 31), "3-D patch": (5, 128, 4)}
+        "chain": (7, 256, 31), "chain with lift-off": (7, 256, 31), "3-D patch": (5, 128, 4)}
 
 
 def write(problem: Problem, omegas: np.ndarray, H: int, samples: int, path: Path) -> None:
