@@ -66,7 +66,11 @@ def _sizes(text: str | None, option: str) -> list[float] | None:
 
 def contact(options: argparse.Namespace, comm: Any) -> None:
     """Seat the damper: force and pressure of each face under each load."""
-    run = until("contact", options, comm)
+    scene, folder, bars = prepared(options, comm)
+    if scene.kind in WITHOUT_BLADE:
+        return without_blade(scene, folder, options, comm)
+    from ..study import pipeline
+    run = pipeline.run(scene, folder, until="contact", comm=comm, progress=bars)
     tell(options, comm, lambda: tables.pressures(run.contact.maps), run)
 
 
@@ -79,13 +83,26 @@ def response(options: argparse.Namespace, comm: Any) -> None:
 def report(options: argparse.Namespace, comm: Any) -> None:
     """Everything, with figures and report."""
     scene, folder, bars = prepared(options, comm)
+    if scene.kind in WITHOUT_BLADE:
+        return without_blade(scene, folder, options, comm)
+    from ..report.run import run as whole
+    run = whole(scene, folder, comm, bars)
+    tell(options, comm, lambda: tables.responses(run.response), run)
+
+
+WITHOUT_BLADE = ("z mass", "hertz", "punch")
+
+
+def without_blade(scene: Scene, folder: Path, options: argparse.Namespace, comm: Any) -> None:
+    """All that there is to such a scene: its contact, and the motion of the mass."""
     if scene.kind == "z mass":
         from ..report import zmass
         found = zmass.run(scene, folder, comm)
         return tell(options, comm, lambda: zmass.motion_table(found.motions).to_string(index=False), found)
-    from ..report.run import run as whole
-    run = whole(scene, folder, comm, bars)
-    tell(options, comm, lambda: tables.responses(run.response), run)
+    from ..report import pair
+    from ..report.tables import readable
+    result = pair.run(scene, folder, comm)
+    return tell(options, comm, lambda: tables.frame(readable(pair.pair_summary(result.states))), result)
 
 
 def chart(options: argparse.Namespace, comm: Any) -> None:

@@ -8,7 +8,7 @@ from typing import Any
 
 from ..units import show
 
-__all__ = ["frequencies", "mesh_quality", "plain", "pressures", "resolved_scene", "responses", "side_by_side",
+__all__ = ["frame", "frequencies", "mesh_quality", "plain", "pressures", "resolved_scene", "responses", "side_by_side",
            "summary", "survey"]
 
 
@@ -24,6 +24,11 @@ def plain(rows: Sequence[Sequence[object]], head: Sequence[str] = ()) -> str:
     if head:
         lines.insert(1, "-" * max(map(len, lines)))
     return "\n".join(lines)
+
+
+def frame(table: Any) -> str:
+    """A pandas table of texts, titles at the head."""
+    return plain(table.to_numpy().tolist(), list(table.columns))
 
 
 def resolved_scene(rows: Sequence[Any]) -> str:

@@ -9,14 +9,14 @@ import pandas as pd
 
 from .tables import units_of
 
-__all__ = ["datasets", "mode_shapes"]
+__all__ = ["datasets", "mode_shapes", "table_dataset"]
 
 
 def datasets(result: Any, tables: dict[str, pd.DataFrame]) -> dict[str, Any]:
     """Groups "modes", "contact", "points", "summary" of a finished run (study.pipeline.Run)."""
     return {"modes": mode_shapes(result), "contact": _contact(result),
-            "points": _table(tables["response/points"], "point"),
-            "summary": _table(tables["response/summary"], "case")}
+            "points": table_dataset(tables["response/points"], "point"),
+            "summary": table_dataset(tables["response/summary"], "case")}
 
 
 def mode_shapes(result: Any) -> Any:
@@ -50,7 +50,8 @@ def _contact(result: Any) -> Any:
         {"load": ("load", list(maps), {"units": "N"}), "direction": ["x", "y", "z"]})
 
 
-def _table(table: pd.DataFrame, rows: str) -> Any:
+def table_dataset(table: pd.DataFrame, rows: str) -> Any:
+    """The columns of a table as variables with units along one dimension."""
     import xarray as xr
     units = units_of(table)
     return xr.Dataset({name: (rows, column.to_numpy(dtype=str) if column.dtype == object else column.to_numpy(),

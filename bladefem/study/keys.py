@@ -13,7 +13,7 @@ from ..store import code_of, key_of
 from .joint import LoadCase
 from .settings import Settings
 
-__all__ = ["contact_key", "mesh_key", "modes_key", "reduction_key", "response_key", "zmass_key"]
+__all__ = ["contact_key", "mesh_key", "modes_key", "pair_key", "reduction_key", "response_key", "zmass_key"]
 
 
 def mesh_key(scene: Scene) -> str:
@@ -46,6 +46,12 @@ def zmass_key(scene: Scene) -> str:
     """The pressure under the Z-shaped mass."""
     return key_of(mesh_key(scene), scene.material, scene.foundation.skew, scene.study.loads,
                   code_of("bladefem.fem", "bladefem.contact"))
+
+
+def pair_key(scene: Scene) -> str:
+    """The pressure between the bodies of a verification pair."""
+    return key_of(mesh_key(scene), scene.material, scene.study.loads,
+                  code_of("bladefem.fem", "bladefem.contact", "bladefem.study"))
 
 
 def reduction_key(scene: Scene, diameters: Sequence[int], modes: int) -> str:

@@ -279,11 +279,10 @@ def _load_case(scene: Scene, mesh: Mesh, load: float, maps: list[PressureMap], m
 
 
 def check_blade(scene: Scene, mesh: Mesh) -> None:
-    """Verification scenes end with their mesh; a blade needs its clamp."""
-    if scene.kind == "z mass":
-        raise InputError("kind 'z mass' has no blade: 'bladefem run' computes its pressure and motion")
-    if scene.kind in ("hertz", "punch"):
-        raise InputError(f"kind '{scene.kind}' is a contact study: 'bladefem mesh' draws it, its demo computes it; "
-                         "modes and responses need a blade")
+    """Modes and responses need a blade, and a blade needs its clamp."""
+    found = {"z mass": "pressure and motion", "hertz": "contact pressure", "punch": "contact pressure"}
+    if scene.kind in found:
+        raise InputError(f"kind '{scene.kind}' has no blade to vibrate: 'bladefem run' computes its "
+                         f"{found[scene.kind]}, 'bladefem mesh' draws it")
     if "clamp" not in mesh.faces:
         raise InputError(f"the mesh has no face 'clamp' to hold the blade; it has {', '.join(sorted(mesh.faces))}")

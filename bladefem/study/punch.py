@@ -3,7 +3,8 @@
 Johnson, Contact Mechanics (1985), Sect. 3.8 and 2.8, the paper's Eq. 24 corrected: in terms of the whole force P
 
     round:  p = P / (2 pi a sqrt(a^2 - r^2)),   u = P (1 - nu^2) / (2 a E)
-    plane:  p = P / (pi sqrt(a^2 - x^2)) for a force P a unit of depth; u depends on how far the body reaches.
+    plane:  p = P / (pi sqrt(a^2 - x^2)) for a force P a unit of depth, in plane strain; u grows with the logarithm of
+            how far the body reaches, by 2 P (1 - nu^2) / (pi E) each time that it reaches e times as far.
 
 Eq. 25 is the stiffness of a ring: the force on it over u, so that the rings together carry 2 a E / (1 - nu^2). Such
 springs give back the pressure and the approach of the load that they were made for, and nothing else: tilted, they
@@ -17,6 +18,8 @@ from typing import Any
 
 import numpy as np
 
+from geometry.mesh import Mesh
+
 from ..contact.lcp import solve_lcp
 from ..contact.patch import make_patch, normal_ports, patch_means, port_matrix
 from ..data import Patch
@@ -24,13 +27,14 @@ from ..errors import InputError, NotSolvedError
 from ..scene import Scene
 from .stages import build_mesh
 
-__all__ = ["Indented", "indent", "johnson_approach", "johnson_pressure", "ring_stiffness", "spring_tilt"]
+__all__ = ["Indented", "flexibility", "indent", "johnson_approach", "johnson_pressure", "ring_stiffness", "spring_tilt"]
 
 
 @dataclass(frozen=True)
 class Indented:
     """The quarter (half, in the plane) under the punch, and what it took to solve it; the same on every rank."""
 
+    mesh: Mesh
     patch: Patch
     radius: np.ndarray          # (n,) distance of the nodes from the axis [m]
     force: np.ndarray           # (n,) on the nodes of the meshed part [N]
@@ -39,6 +43,7 @@ class Indented:
     flexibility: np.ndarray     # (n, n) of the nodes of the meshed part, symmetric motion [m/N]
     tilted: np.ndarray | None   # (n, n) of the same under loads odd in x; None in the plane
     arm: np.ndarray             # (n,) mean of x over what each node stands for [m]
+    complementarity: float      # the proof of optimality, see PressureMap
 
     @property
     def pressure(self) -> np.ndarray:
@@ -62,16 +67,17 @@ def indent(scene: Scene, comm: Any = None) -> Indented:
         raise InputError(f"kind = '{scene.kind}': expected 'punch'")
     total = 1000.0 if scene.study.loads is None else scene.study.loads[0]
     mesh = build_mesh(scene, comm)
-    body, patch = assemble(mesh, "blade", scene.material.blade, comm), make_patch(mesh, "this")
+    body, patch = assemble(mesh, "blade", scene.material.blade, comm, plane="strain"), make_patch(mesh, "this")
     ports = port_matrix([patch], mesh)[:, normal_ports([patch], mesh)]
-    solid, even = mesh.dimension == 3, _flexibility(body, ports)
+    solid, even = mesh.dimension == 3, flexibility(body, ports)
     part = 4 if solid else 2
     found = solve_lcp(even, np.zeros(len(even)), -np.ones((len(even), 1)), [-total / part])
     if found.reason:
         raise NotSolvedError(f"the punch: {found.reason}")
     radius = np.linalg.norm(patch.points[:, :mesh.dimension - 1], axis=1)
-    return Indented(patch, radius, found.force, float(found.rigid[0]), total, even,
-                    _flexibility(_odd(body), ports) if solid else None, patch_means(patch, mesh).T @ mesh.points[:, 0])
+    return Indented(mesh, patch, radius, found.force, float(found.rigid[0]), total, even,
+                    flexibility(_odd(body), ports) if solid else None, patch_means(patch, mesh).T @ mesh.points[:, 0],
+                    found.residual)
 
 
 def johnson_pressure(r: np.ndarray, a: float, force: float, plane: bool = False) -> np.ndarray:
@@ -95,11 +101,12 @@ def spring_tilt(edges: np.ndarray, a: float, E: float, nu: float) -> float:
     return float(np.diff(E / (1 - nu**2) * (s**3 / 3 - a**2 * s)).sum())
 
 
-def _flexibility(body: Any, ports: Any) -> np.ndarray:
+def flexibility(body: Any, ports: Any, held: str = "clamp") -> np.ndarray:
+    """(n, n) displacements at the ports for unit forces there [m/N]; the body is held at a face. Collective."""
     from ..fem.constraint import constrain, restrict
     from ..fem.flexibility import compliance, flexible
     from ..fem.linalg import dot
-    flex = flexible(constrain(body))
+    flex = flexible(constrain(body, held))
     columns = restrict(flex.con, ports)
     C = dot(body.comm, columns, compliance(flex, columns))
     return (C + C.T) / 2

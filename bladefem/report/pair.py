@@ -1,0 +1,122 @@
+"""The run folder of a verification pair, kinds "hertz" and "punch": pressures beside their closed forms."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+from time import perf_counter
+from typing import Any
+
+import numpy as np
+import pandas as pd
+
+from bladefem.scene import Scene
+from bladefem.scene_file import dump
+from bladefem.store import on_root, write_results
+from bladefem.study.hertz import hertz_pressure
+from bladefem.study.pairs import INNER, PairState, radii, solve_pair
+from bladefem.study.punch import johnson_pressure
+from bladefem.view import contact, indentation, mesh
+from geometry.mesh import Mesh
+
+from .datasets import table_dataset
+from .tables import write_tables
+from .write import write_report
+
+__all__ = ["PairRun", "pair_summary", "run"]
+
+
+@dataclass(frozen=True)
+class PairRun:
+    """What a run of a pair has; the same on every rank."""
+
+    folder: Path
+    mesh: Mesh
+    states: list[PairState]
+    timings: dict[str, float]       # stage to seconds
+    messages: list[str]
+
+
+def run(scene: Scene, folder: str | Path, comm: Any = None) -> PairRun:
+    """Mesh and pressures on all ranks, the folder on rank 0.
+
+    Raises:
+        InputError, NotSolvedError: see ``study.pairs.solve_pair``.
+    """
+    start = perf_counter()
+    found, states = solve_pair(scene, folder, comm)
+    timings = {"mesh and pressure": perf_counter() - start}
+    result = PairRun(Path(folder), found, states, timings, _messages(scene, states))
+    start = perf_counter()
+    on_root(comm, lambda: _write(scene, result))
+    timings["pictures and report"] = perf_counter() - start
+    return result
+
+
+def pair_summary(states: list[PairState]) -> pd.DataFrame:
+    """One row a load: contact radius, pressure in the middle and approach, computed and closed form; error."""
+    rows = []
+    for state in states:
+        middle = int(np.argmin(np.linalg.norm(state.seat.patch.points, axis=1)))
+        rows.append({"load": state.load, "middle_pressure": state.seat.pressure[middle],
+                     "middle_pressure_exact": state.exact[middle], "contact_radius": state.radius[0],
+                     "contact_radius_exact": state.radius[1], "approach": state.approach[0],
+                     "approach_exact": np.nan if state.approach[1] is None else state.approach[1],
+                     "pressure_error": state.error, "complementarity": state.seat.complementarity})
+    table = pd.DataFrame(rows)
+    if all(state.radius[0] == state.radius[1] for state in states):        # a punch has its own
+        table = table.drop(columns=["contact_radius", "contact_radius_exact"])
+    return table.drop(columns="approach_exact") if table["approach_exact"].isna().all() else table
+
+
+def _messages(scene: Scene, states: list[PairState]) -> list[str]:
+    where = f" within {INNER:g} of the punch's radius" if scene.kind == "punch" else ""
+    worst = max(state.error for state in states)
+    solid = scene.hertz.dimension == 3 if scene.kind == "hertz" else scene.punch.dimension == 3
+    known = "the closed form is that of half spaces, the blocks are held at their far faces" if solid else \
+        "plane strain; loads act on a metre of depth, and the approach, which has no closed form, on the blocks' size"
+    return [f"pressure within {100 * worst:.2g} % (L2{where}) of the closed form",
+            f"approach: {known}" if solid else known]
+
+
+def _points(result: PairRun) -> pd.DataFrame:
+    """One row a contact node of each load."""
+    return pd.concat([pd.DataFrame({
+        "load": s.load, "radius": radii(s.seat, result.mesh.dimension), "area": s.seat.patch.area,
+        "pressure": s.seat.pressure, "pressure_exact": s.exact, "gap": s.seat.gap}) for s in result.states],
+        ignore_index=True)
+
+
+def _write(scene: Scene, result: PairRun) -> None:
+    folder, states = result.folder, result.states
+    quality = {name: value for name, value in result.mesh.report.items() if not isinstance(value, dict)}
+    tables = {"mesh/quality": pd.DataFrame({"what": list(quality), "value": [str(v) for v in quality.values()]}),
+              "contact/summary": pair_summary(states), "contact/points": _points(result)}
+    for name, table in tables.items():
+        write_tables(table, folder / name.split("/")[1], name.split("/")[1])
+    write_results(folder / "results.nc", {"summary": table_dataset(tables["contact/summary"], "load_case"),
+                                          "points": table_dataset(tables["contact/points"], "point")}, dump(scene))
+    figures = {name: folder / f"{name.split('/')[1]}.png" for name in ("mesh/mesh", "contact/pressure")}
+    mesh.draw_mesh(result.mesh, figures["mesh/mesh"], title=scene.title)
+    _draw(scene, result, figures["contact/pressure"])
+    mesh.save_vtu(result.mesh, folder / "mesh.vtu")
+    contact.save_pressure_vtu({s.load: [s.seat] for s in states}, folder / "pressure.vtu")
+    write_report(folder, scene, {k: v for k, v in tables.items() if k != "contact/points"}, figures, result.messages,
+                 result.timings)
+
+
+def _draw(scene: Scene, result: PairRun, file: Path) -> None:
+    """Pressure over the radius, with the closed form drawn as a curve of its own."""
+    largest = max(result.states, key=lambda s: s.load)
+    edge, solid = largest.radius[1], result.mesh.dimension == 3
+    radius = radii(largest.seat, result.mesh.dimension)
+
+    def exact(load: float) -> tuple[np.ndarray, np.ndarray]:
+        if scene.kind == "hertz":
+            r = np.linspace(0, radius.max(), 400)
+            return r, hertz_pressure(scene, load, r)
+        r = np.linspace(0, 0.999 * edge, 400)
+        return r, johnson_pressure(r, edge, load, not solid)
+
+    indentation.draw_indentation({s.load: s.seat for s in result.states}, radius, exact, edge, file,
+                                 title=scene.title)

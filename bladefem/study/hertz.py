@@ -1,0 +1,114 @@
+"""A sphere or a cylinder pressed on a block, from its scene, and Hertz' closed form beside it.
+
+Johnson, Contact Mechanics (1985), Sect. 4.2; P is the whole force, in the plane that on a metre of cylinder:
+
+    1 / E* = (1 - nu_1^2) / E_1 + (1 - nu_2^2) / E_2
+    sphere:     a^3 = 3 P R / (4 E*),      p = p0 sqrt(1 - (r/a)^2),   p0 = 3 P / (2 pi a^2)
+    cylinder:   a^2 = 4 P R / (pi E*),     p = p0 sqrt(1 - (x/a)^2),   p0 = 2 P / (pi a)
+
+The two blocks are held at their far faces; they are no half spaces, which moves their approach but hardly the pressure.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from geometry.contact_pairs import WIDER
+from geometry.mesh import Mesh
+
+from ..contact.lcp import solve_lcp
+from ..contact.patch import initial_gap, make_patch, normal_ports, port_matrix
+from ..data import PressureMap
+from ..errors import InputError, NotSolvedError
+from ..scene import Materials, Scene
+from ..units import show
+from .punch import flexibility
+from .stages import build_mesh
+
+__all__ = ["Pressed", "hertz_load", "hertz_pressure", "hertz_radius", "press_pair", "second_moment_radius"]
+
+FINEST, WIDEST = 2.0, 0.9 * WIDER   # contact radius over the element size, and over the expected radius, at least/most
+
+
+@dataclass(frozen=True)
+class Pressed:
+    """A quarter (half, in the plane) of the contact under each whole load [N]; the same on every rank."""
+
+    mesh: Mesh
+    maps: dict[float, PressureMap]
+    approach: dict[float, float]        # of the far faces [m]
+
+
+def press_pair(scene: Scene, comm: Any = None) -> Pressed:
+    """Press the pair of a scene of kind "hertz" with each of its loads.
+
+    Raises:
+        InputError: another kind of scene, or a load whose contact does not fit the mesh. NotSolvedError: the contact
+            iteration stopped.
+    """
+    from ..fem.body import assemble
+    if scene.kind != "hertz":
+        raise InputError(f"kind = '{scene.kind}': expected 'hertz'")
+    loads = _loads(scene)
+    mesh = build_mesh(scene, comm)
+    patch = make_patch(mesh, "this")
+    ports, C = normal_ports([patch], mesh), 0.0
+    for name, material, held in (("blade", scene.material.blade, "clamp"), ("damper", scene.material.damper, "load")):
+        body = assemble(mesh, name, material, comm, plane="strain")
+        C = C + flexibility(body, port_matrix([patch], mesh, name)[:, ports], held)
+    gap, part = initial_gap(patch, mesh), 4 if mesh.dimension == 3 else 2
+    maps, approach = {}, {}
+    for load in loads:
+        found = solve_lcp(C, gap, -np.ones((len(C), 1)), [-load / part])
+        if found.reason:
+            raise NotSolvedError(f"load {show(load, 'N')}: {found.reason}")
+        maps[load] = PressureMap(patch, found.force, found.gap, found.residual)
+        approach[load] = float(found.rigid[0])
+    return Pressed(mesh, maps, approach)
+
+
+def hertz_radius(scene: Scene, load: float) -> float:
+    """Contact radius or half width [m] under a whole load [N], in the plane [N/m]."""
+    R, E = scene.hertz.radius, _modulus(scene.material)
+    return (0.75 * load * R / E)**(1 / 3) if scene.hertz.dimension == 3 else (4 * load * R / (np.pi * E))**0.5
+
+
+def hertz_load(scene: Scene, a: float) -> float:
+    """The whole load [N], in the plane [N/m], that gives a contact radius [m]."""
+    R, E = scene.hertz.radius, _modulus(scene.material)
+    return 4 * E * a**3 / (3 * R) if scene.hertz.dimension == 3 else np.pi * E * a**2 / (4 * R)
+
+
+def hertz_pressure(scene: Scene, load: float, r: np.ndarray) -> np.ndarray:
+    """Pressure [Pa] at the radii r [m], zero outside of the contact."""
+    a = hertz_radius(scene, load)
+    peak = 1.5 * load / (np.pi * a**2) if scene.hertz.dimension == 3 else 2 * load / (np.pi * a)
+    return peak * np.sqrt(np.clip(1 - (np.asarray(r) / a)**2, 0.0, None))
+
+
+def second_moment_radius(scene: Scene, seat: PressureMap) -> float:
+    """Contact radius [m] from the second moment of the pressure: the pressed area itself jumps from node to node."""
+    dimension = scene.hertz.dimension
+    r = np.linalg.norm(seat.patch.points[:, :dimension - 1], axis=1)
+    return float(np.sqrt((2.5 if dimension == 3 else 4.0) * (seat.force @ r**2) / seat.force.sum()))
+
+
+def _modulus(materials: Materials) -> float:
+    return 1 / sum((1 - m.nu**2) / m.E for m in (materials.blade, materials.damper))
+
+
+def _loads(scene: Scene) -> tuple[float, ...]:
+    """The loads of the study, or the one that gives the expected contact radius."""
+    expected = scene.hertz.contact_radius
+    loads = scene.study.loads or (hertz_load(scene, expected),)
+    fine = scene.mesh.contact_size or expected / 10
+    low, high = (hertz_load(scene, a) for a in (FINEST * fine, WIDEST * expected))
+    for load in loads:
+        if not low <= load <= high:
+            raise InputError(f"study.loads = {show(load, 'N')}: the contact radius would be "
+                             f"{show(hertz_radius(scene, load), 'm')}, hertz.contact_radius and mesh.contact_size "
+                             f"are made for {show(low, 'N')} to {show(high, 'N')}")
+    return loads

@@ -1,0 +1,70 @@
+"""Hertz and punch scenes from the file to the run folder, against closed forms."""
+
+import numpy as np
+import pandas as pd
+import pytest
+
+from bladefem.cli.main import main
+from bladefem.errors import InputError
+from bladefem.scene_file import load_scene
+from bladefem.study.hertz import hertz_load, hertz_radius
+from bladefem.study.pairs import solve_pair
+
+HERTZ = load_scene("scenes/hertz.toml")
+CYLINDER = load_scene("scenes/hertz.toml", ["hertz.dimension=2", "mesh.contact_size=50 um", "study.loads=auto"])
+
+
+def test_sphere():
+    """h = a/5: pressure 3.3 % (L2), in the middle 0.5 %, radius 0.3 %; blocks of ten radii only: -5.5 % approach."""
+    _, (state,) = solve_pair(HERTZ.vary(mesh__contact_size=2e-4))
+    middle = np.argmin(np.linalg.norm(state.seat.patch.points, axis=1))
+    assert state.error < 0.04 and state.seat.complementarity < 1e-9
+    assert state.seat.pressure[middle] == pytest.approx(state.exact[middle], rel=0.01)
+    assert state.radius[0] == pytest.approx(state.radius[1], rel=0.01)
+    assert state.approach[0] == pytest.approx(state.approach[1], rel=0.08)
+
+
+def test_cylinder_is_in_plane_strain():
+    """h = a/20: pressure 0.7 % (L2), half width -0.3 %; in plane stress, E* = E/2, it would be 4.8 % less."""
+    _, (state,) = solve_pair(CYLINDER)
+    E, nu = CYLINDER.material.blade.E, CYLINDER.material.blade.nu
+    closed = np.sqrt(8 * state.load * CYLINDER.hertz.radius * (1 - nu**2) / (np.pi * E))
+    assert state.radius[1] == pytest.approx(closed) == pytest.approx(CYLINDER.hertz.contact_radius)
+    assert state.radius[0] == pytest.approx(closed, rel=0.01)
+    assert state.error < 0.02
+
+
+@pytest.mark.parametrize("dimension", [2, 3])
+def test_load_and_radius_belong_together(dimension):
+    scene = HERTZ.vary(hertz__dimension=dimension)
+    assert hertz_radius(scene, hertz_load(scene, 3e-4)) == pytest.approx(3e-4)
+
+
+def test_loads_that_the_mesh_cannot_show_are_refused():
+    for load in (1.0, 1e5):
+        with pytest.raises(InputError, match=r"study\.loads = .*made for 24\.6\d* N to 17\.9\d* kN"):
+            solve_pair(HERTZ.vary(study__loads=(load,)))
+    with pytest.raises(InputError, match="expected hertz or punch"):
+        solve_pair(load_scene("scenes/plane.toml"))
+
+
+@pytest.mark.parametrize("command, scene, options", [
+    ("run", "punch", ["punch.dimension=2", "study.loads=1 kN, 2 kN", "mesh.contact_size=0.4 mm"]),
+    ("contact", "hertz", ["hertz.dimension=2", "study.loads=1 MN"])])
+def test_commands_leave_a_run_folder(command, scene, options, tmp_path, capsys):
+    given = [part for option in options for part in ("--set", option)]
+    assert main([command, f"scenes/{scene}.toml", "-o", str(tmp_path), *given]) == 0
+    said = capsys.readouterr().out
+    assert "closed form [MPa]" in said and "of the closed form" in said and f"results: {tmp_path}" in said
+    points = pd.read_csv(tmp_path / "points.csv")
+    assert {"pressure [Pa]", "pressure_exact [Pa]", "radius [m]"} <= set(points)
+    pressed = np.isfinite(points["pressure_exact [Pa]"]) & (points["radius [m]"] < 6e-4)
+    assert np.allclose(points["pressure [Pa]"][pressed], points["pressure_exact [Pa]"][pressed], rtol=0.05)
+    for name in ("mesh.png", "pressure.png", "report.html", "report.md", "results.nc", "pressure.vtu", "scene.toml"):
+        assert (tmp_path / name).stat().st_size > 500, name
+
+
+@pytest.mark.parametrize("command", ["modes", "response"])
+def test_modes_and_responses_name_the_command_that_serves(command, tmp_path, capsys):
+    assert main([command, "scenes/punch.toml", "--set", "punch.dimension=2", "-o", str(tmp_path)]) == 2
+    assert "'bladefem run' computes its contact pressure" in capsys.readouterr().err
