@@ -110,7 +110,7 @@ class HertzPair:
     radius: float = quantity(0.05, "m", 0.001, 1.0, "radius of curvature of the indenter")
     half_width: float = quantity(0.01, "m", 1e-4, 1.0, "half width of the meshed blocks")
     contact_radius: float = quantity(1e-3, "m", 1e-5, 0.1, "expected contact radius, meshed finely")
-    dimension: int = quantity(3, "1", 2, 3, "3 for a sphere, 2 for a cylinder in plane strain")
+    dimension: int = quantity(3, "1", 2, 3, "3 for a sphere, 2 for a cylinder in plane strain, loads on a metre of it")
 
 
 @dataclass(frozen=True)
@@ -119,7 +119,7 @@ class Punch:
 
     radius: float = quantity(2e-3, "m", 1e-5, 0.1, "radius (3-D) or half width (2-D) of the punch")
     half_width: float = quantity(0.02, "m", 1e-4, 1.0, "half width of the block")
-    dimension: int = quantity(3, "1", 2, 3, "3 for a round punch, 2 for plane strain")
+    dimension: int = quantity(3, "1", 2, 3, "3 for a round punch, 2 for plane strain, loads on a metre of depth")
 
 
 @dataclass(frozen=True)
