@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from numbers import Integral, Real
 
 import numpy as np
 
@@ -31,9 +32,9 @@ def solve(model: ReducedModel, omega: float, H: int = 3, samples: int = 128, *, 
         a Solution whose `converged` and `reason` must be read; it is never a silent guess.
 
     Raises:
-        InputError: the frequency, H or samples are out of range.
+        InputError: the frequency, H or samples are out of range, or the start belongs to another model.
     """
-    _check(model, omega, H)
+    _check(model, omega, H, start)
     first = solve_small(model, omega, H, samples, None if start is None else start.w, options)
     if first is not None:
         return first
@@ -78,11 +79,13 @@ def as_solution(balance: Balance, attempt: Attempt, iterations: int, reason: str
         work=works_of(model, linear.omega, relative, force, blade, float(np.sum(state.forces.dissipated))))
 
 
-def _check(model: ReducedModel, omega: float, H: int) -> None:
-    if not 0 < omega < np.inf:
+def _check(model: ReducedModel, omega: float, H: int, start: Solution | None) -> None:
+    if not isinstance(omega, Real) or not 0 < omega < np.inf:
         raise InputError(f"omega {omega}: expected a positive circular frequency")
-    if H < 1 or H != int(H):
+    if not isinstance(H, Integral) or H < 1:
         raise InputError(f"H {H}: expected a whole number of harmonics, at least 1")
+    if start is not None and (not isinstance(start, Solution) or start.w.shape[:2] != model.springs.shape):
+        raise InputError("start: expected a Solution of a model with the same contact nodes")
     highest = max((*model.excitation, *model.normal), default=0)
     if highest > H:
         raise InputError(f"H {H}: expected at least {highest}, the highest harmonic of excitation and normal load")

@@ -19,12 +19,22 @@ __all__ = ["Damping", "Stack", "amplitudes", "block", "damping_rate", "flexibili
 
 @dataclass(frozen=True)
 class Damping:
-    """Damping of the modes of a body, all contributions added: the term i w c of each mode's receptance."""
+    """Damping of the modes of a body, all contributions added: the term i w c of each mode's receptance.
+
+    Raises:
+        InputError: a negative number, or none.
+    """
 
     ratio: float | np.ndarray = 0.0         # share of critical damping of each mode [1]
     structural: float | np.ndarray = 0.0    # loss factor: i eta omega_r^2, not for the mean [1]
     mass: float = 0.0                       # Rayleigh, proportional to the mass [1/s]
     stiffness: float = 0.0                  # Rayleigh, proportional to the stiffness [s]
+
+    def __post_init__(self) -> None:
+        for name in ("ratio", "structural", "mass", "stiffness"):
+            value = np.asarray(getattr(self, name))
+            if not (np.isfinite(value).all() and np.all(value >= 0)):
+                raise InputError(f"damping.{name} {value}: expected finite numbers, none of them negative")
 
     def viscous(self, omega: np.ndarray) -> np.ndarray:
         """(m,) viscous part: 2 zeta omega_r + alpha + beta omega_r^2 [1/s]."""

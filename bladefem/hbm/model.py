@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Hashable, Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import Any
 
@@ -13,6 +13,7 @@ from ..data import Elements, PortModel, RigidBody
 from ..errors import InputError
 from ..friction.harmonics import synthesis, to_real
 from .bodies import Damping, Stack, stacked
+from .check import check_model, port_size
 
 __all__ = ["Damping", "ReducedModel"]
 
@@ -38,7 +39,7 @@ class ReducedModel:
     True
 
     Raises:
-        InputError: numbers of contact dofs, elements and loads do not fit each other.
+        InputError: contact dofs, elements, loads and bodies do not fit each other, or are no numbers.
     """
 
     sides: tuple[PortModel, ...]            # blade side of harmonic h = 0, 1, ...; one alone serves all harmonics
@@ -54,32 +55,17 @@ class ReducedModel:
     normal: Mapping[int, np.ndarray] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
-        nodes, dofs = len(self.elements.kt), _port_size(self.sides[0], "contact")
-        if nodes == 0 or dofs not in (nodes * self.elements.tangents, nodes * (self.elements.tangents + 1)):
-            raise InputError(f"contact port of {dofs} dofs with {nodes} elements of {self.elements.tangents} tangents: "
-                             "expected tangents, or normal and tangents, for each element")
-        if self.tangential and np.any(self.elements.kn > 0):
-            raise InputError("elements.kn > 0 with tangential contact dofs only: expected normal dofs in the port")
-        for name in ("kt", "kn", "mu", "n0"):
-            value = getattr(self.elements, name)
-            if np.shape(value) != (nodes,) or not np.isfinite(value).all() or (name != "n0" and np.min(value) < 0):
-                raise InputError(f"elements.{name}: expected {nodes} finite numbers, not negative but for n0")
-        if not 0 < self.hold <= 1:
-            raise InputError(f"hold {self.hold}: expected a share of the contact stiffness, above 0 and at most 1")
-        loads = _port_size(self.sides[0], "load")
-        for h, force in self.excitation.items():
-            if h < 0 or h != int(h) or np.shape(force) != (loads,) or not np.isfinite(force).all():
-                raise InputError(f"excitation of harmonic {h}: expected {loads} finite amplitudes of a harmonic >= 0")
-        for h, force in self.normal.items():
-            if h < 1 or h != int(h) or np.shape(force) != (nodes,) or not np.isfinite(force).all():
-                raise InputError(f"normal of harmonic {h}: expected {nodes} finite amplitudes of a harmonic >= 1")
-        if isinstance(self.damper, RigidBody) and self.damper.B.shape != (dofs, len(self.damper.mass)):
-            raise InputError(f"damper.B of shape {self.damper.B.shape}: expected ({dofs}, {len(self.damper.mass)})")
+        parts = {name: np.asarray(getattr(self.elements, name), dtype=float) for name in ("kt", "kn", "mu", "n0")}
+        if any(value.ndim != 1 for value in parts.values()):
+            raise InputError("elements: expected kt, kn, mu and n0 as arrays with one number for each contact node")
+        if any(value is not getattr(self.elements, name) for name, value in parts.items()):
+            object.__setattr__(self, "elements", replace(self.elements, **parts))
+        check_model(self)
 
     @cached_property
     def tangential(self) -> bool:
         """The port carries no normal displacements."""
-        return _port_size(self.sides[0], "contact") == len(self.elements.kt) * self.elements.tangents
+        return port_size(self.sides[0], "contact") == len(self.elements.kt) * self.elements.tangents
 
     @cached_property
     def directions(self) -> int:
@@ -89,7 +75,7 @@ class ReducedModel:
     @cached_property
     def rows(self) -> np.ndarray:
         """(nodes directions,) rows of the contact port that enter the balance."""
-        rows = np.arange(_port_size(self.sides[0], "contact")).reshape(len(self.elements.kt), -1)
+        rows = np.arange(port_size(self.sides[0], "contact")).reshape(len(self.elements.kt), -1)
         return rows[:, rows.shape[1] - self.directions:].ravel()
 
     @cached_property
@@ -142,7 +128,7 @@ class ReducedModel:
 
     def loads(self, H: int) -> np.ndarray:
         """(H+1, loads) excitation [N]."""
-        force = np.zeros((H + 1, _port_size(self.sides[0], "load")), dtype=complex)
+        force = np.zeros((H + 1, port_size(self.sides[0], "load")), dtype=complex)
         for h, amplitudes in self.excitation.items():
             if h <= H:
                 force[h] = amplitudes
@@ -170,8 +156,3 @@ def _first(models: tuple[PortModel, ...], H: int, name: str) -> tuple[PortModel,
         raise InputError(f"{name}: {len(models)} models given, expected one for harmonic {H}, or one for all harmonics")
     return models[:H + 1]
 
-
-def _port_size(model: PortModel, name: str) -> int:
-    if name not in model.ports:
-        raise InputError(f"ports {', '.join(model.ports)}: expected a port '{name}'")
-    return len(range(*model.ports[name].indices(len(model.residual))))

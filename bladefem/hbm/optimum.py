@@ -11,12 +11,12 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..errors import NotSolvedError
+from ..errors import InputError, NotSolvedError
 from .model import ReducedModel
 from .peak import Peak, cubic_minimum, find_peak, with_slope
 from .resonance import free_resonances, stuck_resonances
 from .sweep import first_look, local_maxima, response, size
-from .vary import vary
+from .vary import check_parameter, vary
 
 __all__ = ["Optimum", "optimum"]
 
@@ -60,8 +60,14 @@ def optimum(model: ReducedModel, band: tuple[float, float], bounds: tuple[float,
         tolerance: of the height, relative.
 
     Raises:
+        InputError: an empty band or range.
         NotSolvedError: a peak could not be solved, or the band has none.
     """
+    for what, (low, high) in {"band": band, "bounds": bounds}.items():
+        if not 0 < low < high < np.inf:
+            raise InputError(f"{what} ({low}, {high}): expected 0 < low < high")
+    if check_parameter(name) == "gap":
+        raise InputError("name 'gap': expected a parameter that is a factor")
     search = _Search(model, band, H, samples, name, tolerance)
     middle = float(np.sqrt(bounds[0] * bounds[1]))
     seeds = np.concatenate([f(vary(model, name, middle)) for f in (stuck_resonances, free_resonances)])

@@ -13,6 +13,7 @@ import numpy as np
 
 from ..errors import NotSolvedError
 from .api import solve
+from .check import check_probe
 from .model import ReducedModel
 from .newton import DEFAULTS, Options
 from .sensitivity import sensitivities
@@ -54,8 +55,10 @@ def find_peak(model: ReducedModel, omega: float, H: int = 3, samples: int = 128,
         tolerance: relative accuracy of the height; the frequency follows with its square root.
 
     Raises:
+        InputError: no such probe.
         NotSolvedError: a point was not solved, or no maximum was closed in.
     """
+    check_probe(model, options.probe)
     low = high = last = None
     bend, start = (near.bend, near.solution) if isinstance(near, Peak) else (0.0, near)
     reach = FIRST_STEP * omega

@@ -10,6 +10,7 @@ import numpy as np
 
 from ..errors import InputError
 from .api import solve
+from .check import check_probe
 from .fallback import match_harmonics
 from .model import ReducedModel
 from .newton import DEFAULTS, Options
@@ -60,6 +61,7 @@ def sweep(model: ReducedModel, band: tuple[float, float], H: int = 3, samples: i
     """
     if not 0 < band[0] < band[1] < np.inf:
         raise InputError(f"band {band}: expected 0 < low < high")
+    check_probe(model, options.probe)
     solved: dict[float, Solution] = {}
     for solution in response(model, first_look(model, band), H, samples, options=options):
         solved[solution.omega] = solution

@@ -34,6 +34,10 @@ def port_model_from_matrices(M: np.ndarray, K: np.ndarray, ports: Mapping[str, n
     M, K = _hermitian(M, "M"), _hermitian(K, "K")
     if M.shape != K.shape:
         raise InputError(f"M {M.shape} and K {K.shape}: expected the same shape")
+    if C is not None:
+        C = _hermitian(C, "C")
+        if C.shape != M.shape:
+            raise InputError(f"C {C.shape} and M {M.shape}: expected the same shape")
     P, slices = _selection(ports, M.shape[0])
     try:
         values, vectors = linalg.eigh(K, M)
@@ -48,7 +52,7 @@ def port_model_from_matrices(M: np.ndarray, K: np.ndarray, ports: Mapping[str, n
     shapes = P @ vectors
     rest = shapes[:, count:] / np.sqrt(values[count:])
     kept = vectors[:, :count]
-    damping = None if C is None else _modal_damping(kept.conj().T @ _hermitian(C, "C") @ kept)
+    damping = None if C is None else _modal_damping(kept.conj().T @ C @ kept)
     return PortModel(np.sqrt(values[:count]), shapes[:, :count], rest @ rest.conj().T, slices, nodal_diameter,
                      damping=damping)
 
@@ -107,14 +111,16 @@ def _modal_damping(matrix: np.ndarray) -> np.ndarray:
 
 
 def _selection(ports: Mapping[str, np.ndarray], dofs: int) -> tuple[np.ndarray, dict[str, slice]]:
+    if not isinstance(ports, Mapping) or not ports:
+        raise InputError(f"ports of type {type(ports).__name__}: expected a dict of names to dof numbers, not empty")
     rows, slices, start = [], {}, 0
     for name, value in ports.items():
         value = np.asarray(value)
         if value.ndim == 1:
-            if value.size and not (0 <= value.min() and value.max() < dofs):
-                raise InputError(f"ports['{name}']: expected dof numbers from 0 to {dofs - 1}")
+            if value.size and not (np.all(value == value.astype(int)) and 0 <= value.min() and value.max() < dofs):
+                raise InputError(f"ports['{name}']: expected whole dof numbers from 0 to {dofs - 1}")
             value = np.eye(dofs)[value.astype(int)]
-        if value.ndim != 2 or value.shape[1] != dofs:
+        if value.ndim != 2 or value.shape[1] != dofs or not np.isfinite(value).all():
             raise InputError(f"ports['{name}'] of shape {value.shape}: expected (k,) dofs or a (k, {dofs}) matrix")
         rows.append(value)
         slices[name] = slice(start, start + len(value))
