@@ -21,13 +21,37 @@ _WHERE = {
     "reduce_sector": "study.stages",
     "study_loads": "study.loads",
     "run": "report.run",
+    # the balance alone, for matrices of one's own
+    "Elements": "data",
+    "RigidBody": "data",
+    "body_from_matrices": "reduction.matrices:port_model_from_matrices",
+    "read_matrices": "reduction.matrices",
+    "Damping": "hbm.model",
+    "ReducedModel": "hbm.model",
+    "Options": "hbm.newton",
+    "free": "hbm.api",
+    "solve": "hbm.api",
+    "stuck": "hbm.api",
+    "local_maxima": "hbm.sweep",
+    "response": "hbm.sweep",
+    "size": "hbm.sweep",
+    "sweep": "hbm.sweep",
+    "recorded": "hbm.record",
+    "follow": "hbm.follow",
+    "find_peak": "hbm.peak",
+    "track_peak": "hbm.peak",
+    "optimum": "hbm.optimum",
+    "sensitivities": "hbm.sensitivity",
+    "node_gradients": "hbm.gradient",
+    "vary": "hbm.vary",
 }
 __all__ = sorted(_WHERE)
 
 
 def __getattr__(name: str) -> object:
     if name in _WHERE:
-        return getattr(import_module(f".{_WHERE[name]}", __name__), name)
+        module, _, other = _WHERE[name].partition(":")
+        return getattr(import_module(f".{module}", __name__), other or name)
     raise AttributeError(f"module 'bladefem' has no attribute '{name}'")
 
 

@@ -20,6 +20,7 @@ PINNED = {
     "damper_seating": 1.0,
     "forced_response": 180.857634,
     "change_geometry": 1.2263424601,
+    "plain_matrices": 3.79187236,
 }
 
 
