@@ -32,7 +32,8 @@ def mesh_model(gmsh: ModuleType, groups: Groups, dimension: int, size: MeshSize)
         InputError: the elements are far too many, or flat ones are left whatever is tried.
     """
     if size.size:
-        check_count(gmsh, dimension, size.size)
+        check_count(gmsh, dimension, size.scale * size.size)
+    gmsh.option.setNumber("Mesh.MeshSizeFactor", size.scale)
     gmsh.model.mesh.generate(2)
     if dimension == 3:
         fill(gmsh, groups, size.algorithm)

@@ -131,4 +131,5 @@ class MeshSize:
     order: int = quantity(2, "1", 1, 2, "order of the elements; 1 is only for comparison")
     algorithm: str = quantity("hxt", choices=("hxt", "delaunay"),
                               help="how gmsh fills volumes; the other one is tried when it fails or leaves flat cells")
+    scale: float = quantity(1.0, "1", 0.02, 50.0, "factor on all element sizes, also those that are left open")
     curved: bool = quantity(True, help="second-order elements follow curved faces (invalid ones are straightened)")

@@ -168,7 +168,8 @@ def _generate(gmsh: ModuleType, size: MeshSize) -> None:
     gmsh.option.setNumber("Mesh.MeshSizeMax", base)
     gmsh.option.setNumber("Mesh.MeshSizeMin", base / 4)
     gmsh.option.setNumber("Mesh.MeshSizeFromCurvature", 10)
-    check_count(gmsh, 3, base)
+    check_count(gmsh, 3, size.scale * base)
+    gmsh.option.setNumber("Mesh.MeshSizeFactor", size.scale)
     gmsh.model.mesh.generate(3)
     if size.order == 2:
         second_order(gmsh, size.curved)

@@ -17,7 +17,7 @@ from ..store import on_root, write_results
 from ..study.loads import Progress, unwatched
 from ..study.modal import family_table
 from ..study.survey import Survey, Wanted, excited_set, survey
-from ..view import mesh, modes, speed
+from ..view import convergence, mesh, modes, speed
 from .datasets import mode_shapes
 from .run import mode_table
 from .tables import write_tables
@@ -122,6 +122,9 @@ def _drawings(result: Survey, tables: dict[str, pd.DataFrame],
     out["wave.gif"] = lambda file: modes.animate_wave(run.mesh, excited, run.scene.excitation.mode - 1, file)
     if wheel:
         out["nodal_diameters.png"] = lambda file: speed.draw_nodal_diameters(tables["frequencies"], file)
+    if result.convergence is not None:
+        out["convergence.png"] = lambda file: convergence.draw_convergence(
+            tables["convergence_points"], tables["convergence"], file)
     return out | _speed_drawings(result, tables)
 
 

@@ -41,6 +41,7 @@ COLUMNS = {
     "speed_at_resonance": Column("speed at resonance", "rad/s", "rpm", RPM),
     **{name: Column(name, "Hz") for name in ("forward", "backward", "limit")},
     "frequency_of_partner": Column("frequency of partner", "Hz"), "size": Column("element size", "m", "mm", 1e3, 4),
+    "scatter": Column("scatter of meshes", "1", "%", 100.0, 2),
     "order": Column("observed order", "1", digits=3), "sum": Column("sum of shares", "1", "%", 100.0, 4),
     "excitation": Column("excitation", "Hz"), "margin": Column("margin", "1", "%", 100.0, 3),
     "patch": Column("seat"), "force": Column("normal force", "N"), "area": Column("area", "m^2", "mm²", 1e6),

@@ -15,7 +15,6 @@ from ..errors import NotSolvedError
 from ..hbm.sweep import size as height
 from ..scene import Scene
 from .choice import covered, peak_of
-from .converge import RATIOS
 from .family import member
 from .pipeline import EXACT_HARMONICS, Seating, family_of_case, load_cases
 from .settings import Settings
@@ -23,6 +22,7 @@ from .stages import Bodies, build_mesh, contact_patches, harmonic_diameters, red
 
 __all__ = ["Resonance", "default_meshes", "mesh_table", "on_mesh"]
 
+RATIOS = (1.7, 1.3, 1.0)    # of the scene's own element size
 HARMONICS = 3       # at the most: what more of them change does not hang on the mesh
 PEAK = 0.01         # accuracy at which the sweep looks for the peak: it is found to a tenth of it
 

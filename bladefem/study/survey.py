@@ -79,7 +79,7 @@ def survey(scene: Scene, folder: str | Path, wanted: Wanted, comm: Any = None,
         result = replace(result, campbell=campbell(bodies, wanted.speeds, _orders(scene)))
         clock = _timed(run, "campbell", clock)
     if wanted.sizes is not None:
-        sizes = list(wanted.sizes) or default_sizes(scene, start.mesh)
+        sizes = list(wanted.sizes) or default_sizes(scene)
         n = excited_set(run).nodal_diameter
         result = replace(result, convergence=converge(scene, sizes, None if n is None else [n], comm=comm,
                                                       progress=progress))

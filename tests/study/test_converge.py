@@ -5,14 +5,27 @@ from dataclasses import replace
 import numpy as np
 import pandas as pd
 import pytest
+from structured import box
 from wheels import bodies
 
 from bladefem.errors import InputError
+from bladefem.fem.body import assemble
 from bladefem.fem.constraint import constrain
 from bladefem.fem.loads import mass
 from bladefem.fem.modes import modes
+from bladefem.scene import Material
 from bladefem.scene_file import load_scene
-from bladefem.study.converge import BELIEVED, _summary, converge, default_sizes, paired, richardson
+from bladefem.study.converge import (
+    BELIEVED,
+    RATIOS,
+    _summary,
+    converge,
+    default_sizes,
+    fitted,
+    of_meshes,
+    paired,
+    richardson,
+)
 from bladefem.study.effective import effective_masses
 from bladefem.study.stages import Bodies, build_mesh, find_modes
 
@@ -29,6 +42,42 @@ def test_a_power_law_is_found(order, sizes):
 def test_values_out_of_line_have_no_order(f):
     limit, order = richardson(np.array([2, 1.4, 1]), np.array(f, float))
     assert limit == f[2] and np.isnan(order)
+
+
+def test_more_meshes_are_fitted_and_their_scatter_told():
+    h = np.array([2.0, 1.7, 1.4, 1.2, 1.0])
+    exact = 100 + 3 * h ** 3
+    assert fitted(h, exact) == pytest.approx((100, 3, 0), abs=1e-4)
+    noise = 0.3 * np.array([1, -1, 1, -1, 1])
+    limit, order, scatter = fitted(h, exact + noise)
+    assert limit == pytest.approx(100, abs=1.5) and 2 < order < 4 and 0.2 < scatter < 0.6
+    assert np.isnan(fitted(h, 100 + noise)[1])
+
+
+@pytest.mark.parametrize("cell_type, order", [("triangle", 2), ("quad", 2), ("triangle6", 4), ("quad9", 4)])
+@pytest.mark.parametrize("divisions", [(6, 9, 12), (6, 7, 8, 10, 12)])
+def test_cantilever_has_the_order_of_its_elements(cell_type, order, divisions):
+    """Extension of a clamped bar at nu = 0 is f = (2k - 1) c / 4L: order 2 and 4, and a limit far nearer to it."""
+    material = Material(nu=0.0)
+    exact = np.sqrt(material.E / material.rho) / 4
+    runs = []
+    for n in divisions:
+        mesh = box((n, n), (1.0, 1.0), cell_type)
+        runs.append((mesh, [modes(constrain(assemble(mesh, "blade", material)), 6)]))
+    found = of_meshes(runs, 4).summary
+    row = found.loc[(found["limit"] / exact - 1).abs().idxmin()]
+    assert row["reason"] == "" and row["order"] == pytest.approx(order, abs=0.15)
+    assert abs(row["limit"] / exact - 1) < 0.05 * abs(row["frequency"] / exact - 1)
+    assert row["error"] == pytest.approx(row["frequency"] / exact - 1, rel=0.1)
+
+
+def test_sizes_scale_the_whole_mesh():
+    """Every size is scaled alike, also those that the scene does not name: cells grow with the square of the ratio."""
+    scene = load_scene("scenes/plane.toml")
+    meshes = [build_mesh(replace(scene, mesh=replace(scene.mesh, scale=s))) for s in (1.0, 0.5, 0.25)]
+    cells = [len(mesh.bodies["blade"]) for mesh in meshes]
+    assert np.log2(cells[1] / cells[0]) == pytest.approx(2, abs=0.35)
+    assert np.log2(cells[2] / cells[1]) == pytest.approx(2, abs=0.35)
 
 
 def test_plane_blade_converges():
@@ -69,7 +118,8 @@ def test_wrong_sizes():
     with pytest.raises(InputError, match="its mesh is given"):
         converge(replace(scene, kind="imported"), [3, 2, 1])
     fine = replace(scene, mesh=replace(scene.mesh, size=1e-3))
-    assert default_sizes(fine, None) == pytest.approx([1.7e-3, 1.3e-3, 1e-3])
+    assert default_sizes(fine) == pytest.approx([1e-3 * r for r in RATIOS])
+    assert default_sizes(replace(scene, mesh=replace(scene.mesh, size=None))) == list(RATIOS)
 
 
 def test_effective_masses_add_up():

@@ -1,12 +1,14 @@
 """Frequency charts, heat maps and drawings of parts: what is labelled and marked."""
 
 import numpy as np
+import pandas as pd
 import pytest
 import synthetic
 from test_pictures import ink
 
 from bladefem.scene import Scene
 from bladefem.study.crossings import campbell_crossings, fold
+from bladefem.view.convergence import draw_convergence
 from bladefem.view.maps import draw_map
 from bladefem.view.parts import PARTS
 from bladefem.view.speed import draw_campbell, draw_interference, draw_nodal_diameters, folded
@@ -65,3 +67,19 @@ def test_drawings_label_every_parameter(kind, part, table, skipped, folder):
     missing = {name for name in names if name not in texts(figure)}
     assert not missing
     assert ink(folder / f"{part}.png") > 0.05
+
+
+def test_refinement_shows_the_limit_and_doubts(folder):
+    """Believed orders are drawn down to their limit, the others are named."""
+    h = np.array([4e-3, 3e-3, 2e-3])
+    points = pd.DataFrame({"size": np.tile(h, 2), "mode": np.repeat([1, 2], 3),
+                           "frequency": [*(100 + 1e5 * h ** 2), 50.0, 51.0, 50.5]})
+    summary = pd.DataFrame({"mode": [1, 2], "frequency": [100.4, 50.5], "limit": [100.0, 50.5],
+                            "order": [2.0, np.nan], "reason": ["", "the frequencies do not fall into line"]})
+    figure = draw_convergence(points, summary, folder / "convergence.png")
+    labels = [text.get_text() for text in figure.axes[0].get_legend().get_texts()]
+    assert set(labels) == {"mode 1: order 2.0, limit 100 Hz", "mode 2: no order"}
+    fit = next(line for line in figure.axes[0].lines if len(line.get_xdata()) == 80)
+    assert fit.get_ydata()[0] == pytest.approx(100 * (100 / 100.4 - 1)) and fit.get_ydata()[-1] == pytest.approx(
+        100 * (101.6 / 100.4 - 1))
+    assert (folder / "convergence.png").stat().st_size > 5000
