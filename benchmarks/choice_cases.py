@@ -40,7 +40,7 @@ from bladefem.hbm.solution import Solution
 from bladefem.hbm.sweep import response, size
 from bladefem.study.choice import choose
 from bladefem.study.family import Family, family_of, member
-from bladefem.study.indicators import indicate
+from bladefem.study.indicators import judge
 from bladefem.study.settings import Settings, first_for
 
 TRUTH, RICH = (31, 4096), (15, 1024)
@@ -131,7 +131,7 @@ def automatic(case: Case, family: Family, truth: complex, accuracy: float) -> Ou
 
 
 def rich(case: Case) -> float:
-    """Seconds of CPU of the fixed rich model for one point."""
+    """Seconds of CPU of the fixed rich model for one point; the frequencies of a blade share the model."""
     start = time.process_time()
     solve(case.model, case.omega, *RICH)
     return time.process_time() - start
@@ -150,7 +150,7 @@ def sweep_ratio(case: Case, accuracy: float, points: int = 100) -> tuple[float, 
     settings, _, _ = choose(family, settings, highest(rough), accuracy)
     solved = list(response(member(family, settings).model, omegas, settings.harmonics, settings.samples))
     top = highest(solved)
-    worst = max(indicate(family, settings, p).total * size(p) / size(top)
+    worst = max(judge(family, settings, p).total * size(p) / size(top)
                 for p in (top, *solved[::points // 4]) if p.converged)
     middle = time.process_time()
     list(response(case.model, omegas, *RICH))
@@ -168,6 +168,7 @@ def main(every: int = 1) -> None:
         automatic(case, family_of(case.model, case.patches), 1.0, 0.02)
     results: dict[float, list[Outcome]] = {0.02: [], 0.001: []}
     fixed: list[float] = []
+    made: dict[tuple[int, float], Family] = {}      # one a blade and accuracy, as there is one rich model a blade
     for case in cases:
         truth = solve(case.model, case.omega, *TRUTH)
         if not truth.converged:
@@ -175,7 +176,8 @@ def main(every: int = 1) -> None:
             continue
         fixed.append(rich(case))
         for accuracy, outcomes in results.items():
-            outcomes.append(automatic(case, family_of(case.model, case.patches), truth.probe[1, 0], accuracy))
+            family = made.setdefault((id(case.model), accuracy), family_of(case.model, case.patches))
+            outcomes.append(automatic(case, family, truth.probe[1, 0], accuracy))
             o = outcomes[-1]
             print(f"{case.name:58s} {accuracy:6g} {'ok ' if o.accepted else 'NO '} told {o.told:8.1e} "
                   f"true {o.true:8.1e} "

@@ -13,7 +13,7 @@ from ..hbm.resonance import free_resonances, stuck_resonances
 from ..hbm.solution import Solution
 from ..hbm.sweep import size, sweep
 from .family import Family, member
-from .indicators import Indicators, indicate, moved
+from .indicators import Indicators, grips, indicate, judge, moved
 from .settings import Settings, enriched
 
 __all__ = ["Checked", "adapted", "checked", "choose", "covered", "default_band", "estimated", "peak_of",
@@ -21,6 +21,8 @@ __all__ = ["Checked", "adapted", "checked", "choose", "covered", "default_band",
 
 ROUNDS = 12
 KEPT = ("modes", "damper")      # whose indicators, where they are small, outlast a change of the others
+LIKELY = ((0.003, {"harmonics": 7, "samples": 256, "points": 16}),      # accuracy from which, where contacts slip
+          (0.03, {"harmonics": 3, "samples": 64, "points": 16}))
 PASSES = 3          # sweeps of one curve with ever richer settings
 WIDENINGS = 4
 SHARES = (0.7, 0.25)    # of the peak's height: where a curve is checked on each side beside the peak itself
@@ -35,25 +37,49 @@ class Checked:
     errors: dict[float, float]  # circular frequency of the checked points to the estimated relative error
 
 
-def choose(family: Family, settings: Settings, point: Solution, accuracy: float,
-           fixed: tuple[str, ...] = ()) -> tuple[Settings, Solution, Indicators]:
+def choose(family: Family, settings: Settings, point: Solution, accuracy: float, fixed: tuple[str, ...] = (),
+           apart: bool = False) -> tuple[Settings, Solution, Indicators]:
     """Settings whose estimated error at one point is below half the accuracy, or the best that may be chosen.
+
+    Nothing is refined because something was not solved: where a richer model of the point is not, its respect is left
+    as it is, and the error is unknown (infinite).
 
     Args:
         point: solved with `settings`; its frequency is kept.
         fixed: names that may not be changed here although they are not the user's.
+        apart: the error is wanted by its sources.
     """
     known: dict[str, float] = {}
+    likely = _likely(family, settings, point, accuracy, fixed)
+    if likely != settings:
+        further = moved(family, settings, point, likely)
+        settings, point = (likely, further) if further.converged else (settings, point)
     for _ in range(ROUNDS):
-        found = indicate(family, settings, point, known)
+        found = judge(family, settings, point) if not apart else None
+        if found is None or found.total > accuracy / 2:
+            found = indicate(family, settings, point, known)
         settings = replace(settings, error=found.total)
         better = None if found.total <= accuracy / 2 else _next(settings, found, accuracy, fixed)
-        if better is None:
+        further = None if better is None else _solved(family, settings, point, better, found)
+        if further is None or not further.converged:
             break
         known = {name: error for name in KEPT if (error := found.errors[name]) <= accuracy / 20
-                 and getattr(better, name) == getattr(settings, name)}
-        point, settings = _solved(family, settings, point, better, found), better
+                 and getattr(better, name) == getattr(settings, name)} | dict.fromkeys(found.unknown, np.inf)
+        point, settings = further, better
     return settings, point, found
+
+
+def _likely(family: Family, settings: Settings, point: Solution, accuracy: float, fixed: tuple[str, ...]) -> Settings:
+    """Where a search that has not begun had better begin: with what most points need whose contacts slip."""
+    usual = next((usual for finest, usual in LIKELY if accuracy <= finest), None)
+    if usual is None or settings.error is not None or not point.converged:
+        return settings
+    if grips(member(family, settings).model, point):
+        return settings
+    most = {"harmonics": min(settings.most, family.harmonics)}
+    raised = {name: max(getattr(settings, name), min(value, most.get(name, value))) for name, value in usual.items()
+              if name in settings.chosen and name not in fixed and getattr(settings, name) is not None}
+    return replace(settings, **raised)
 
 
 def _solved(family: Family, settings: Settings, point: Solution, better: Settings, found: Indicators) -> Solution:
@@ -64,14 +90,13 @@ def _solved(family: Family, settings: Settings, point: Solution, better: Setting
 
 def _next(settings: Settings, found: Indicators, accuracy: float, fixed: tuple[str, ...]) -> Settings | None:
     """Enriched in each open respect that takes more than its share, the worst at least; None when nothing helps."""
-    names = [name for name in settings.chosen if name not in fixed and found.errors.get(name, 0.0) > accuracy / 20]
+    names = [name for name in settings.chosen if name not in fixed and name not in found.unknown
+             and found.errors.get(name, 0.0) > accuracy / 20]
     names.sort(key=lambda name: -found.errors[name])
     share, better = accuracy / 2 / max(len(settings.chosen), 1), settings
     for name in names:
-        error = found.errors[name]
-        if better == settings or error > share:
-            need = error / share if np.isfinite(error) else 4.0
-            better = enriched(better, name, need) or better
+        if better == settings or found.errors[name] > share:
+            better = enriched(better, name, found.errors[name] / share) or better
     return None if better == settings else better
 
 
@@ -79,7 +104,8 @@ def adapted(family: Family, settings: Settings, band: tuple[float, float] | None
             fixed: tuple[str, ...] = ()) -> Checked:
     """A swept curve with settings that hold at its peak and on its flanks; swept again where they did not.
 
-    The tolerated error of a point is the accuracy times the height of the peak over the height of the point.
+    The tolerated error of a point is the accuracy times the height of the peak over the height of the point. A curve
+    with points that were not solved is swept again for the sake of its peak only: each of them costs all fallbacks.
 
     Args:
         band: [Hz]; round the resonances when None.
@@ -95,10 +121,11 @@ def adapted(family: Family, settings: Settings, band: tuple[float, float] | None
     for last in [False] * (PASSES - 1) + [True]:
         points = covered(member(family, settings).model, settings, band, mode, accuracy, widen)
         top, used, errors = peak_of(points), settings, {}
+        whole = all(p.converged for p in points)
         for point in watched(points):
             tolerated = accuracy * size(top) / size(point)
-            if last:
-                found = indicate(family, settings, point)
+            if last or not (whole or point is top):
+                found = judge(family, settings, point)
             else:
                 used, _, found = choose(family, settings, point, tolerated, fixed)
                 used = replace(used, error=settings.error)
@@ -130,9 +157,17 @@ def checked(curve: Checked) -> np.ndarray:
 
 
 def estimated(curve: Checked) -> np.ndarray:
-    """(k,) estimated relative error of each point: linear in frequency between the checked ones, held beyond them."""
+    """(k,) estimated relative error of each point: linear in frequency between the checked ones, held beyond them.
+
+    Unknown (infinite) at points that were not solved, and where the nearest checked one tells nothing.
+    """
     at = np.array(sorted(curve.errors))
-    return np.interp([p.omega for p in curve.points], at, [curve.errors[w] for w in at])
+    told, omegas = np.array([curve.errors[w] for w in at]), np.array([p.omega for p in curve.points])
+    if not np.isfinite(told).any():
+        return np.full(len(omegas), np.inf)
+    blind = ~np.isfinite(told[abs(omegas[:, None] - at).argmin(axis=1)])
+    between = np.interp(omegas, at[np.isfinite(told)], told[np.isfinite(told)])
+    return np.where(blind | [not p.converged for p in curve.points], np.inf, between)
 
 
 def covered(model: ReducedModel, settings: Settings, band: tuple[float, float] | None, mode: int,

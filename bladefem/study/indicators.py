@@ -10,6 +10,12 @@ contact points with the finest ones, because a number half as large again can be
 indicator of 1e-14).
 
 Where all contacts stick, friction is linear: harmonics and samples are exact, and are not looked at.
+
+A point, or a richer model of it, that was not solved gives no indicator: its error is unknown (infinite), and nobody
+refines because of it.
+
+One model that is richer in all respects at once (`judge`) tells the whole error for the price of one; which respect
+is to blame takes one model each (`indicate`).
 """
 
 from __future__ import annotations
@@ -27,8 +33,7 @@ from ..hbm.solution import Solution
 from .family import Family, carried, member
 from .settings import DAMPERS, DIRECTIONS, Settings
 
-__all__ = ["Indicators", "grips", "indicate", "moved", "richer"]
-
+__all__ = ["Indicators", "grips", "indicate", "judge", "moved", "richer"]
 
 ENOUGH = Options(1e-5, 30)      # for a point that only tells how wrong another one is
 GRIP = (512, 1e-3)              # instants at which full stick is confirmed, and the share of the limit kept in hand
@@ -36,15 +41,23 @@ GRIP = (512, 1e-3)              # instants at which full stick is confirmed, and
 
 @dataclass(frozen=True)
 class Indicators:
-    """Estimated relative errors of the first harmonic at the probe, by their source (settings.DIRECTIONS)."""
+    """Estimated relative errors of the first harmonic at the probe, by their source.
+
+    Sources are settings.DIRECTIONS, and "together" for several of them at once; infinite where a model was not solved.
+    """
 
     errors: Mapping[str, float]
     better: Mapping[str, Solution] = field(default_factory=dict, repr=False)    # the richer solutions that were found
 
     @property
     def total(self) -> float:
-        """Their sum; infinite where the richer model could not be solved either."""
+        """Their sum; infinite where one is unknown."""
         return float(sum(self.errors.values()))
+
+    @property
+    def unknown(self) -> tuple[str, ...]:
+        """Sources that tell nothing, because the richer model was not solved."""
+        return tuple(name for name, error in self.errors.items() if not np.isfinite(error))
 
     @property
     def worst(self) -> str:
@@ -68,8 +81,37 @@ def indicate(family: Family, settings: Settings, solution: Solution,
         other = None if name in errors else richer(family, settings, name)
         if other is not None:
             better[name] = moved(family, settings, solution, other, ENOUGH)
-            errors[name] = _change(solution, better[name]) if better[name].converged else np.inf
+            errors[name] = _change(solution, better[name])
     return Indicators({name: errors.get(name, 0.0) for name in DIRECTIONS}, better)
+
+
+def judge(family: Family, settings: Settings, solution: Solution) -> Indicators:
+    """The whole error of a point at once: against one model that is richer in every respect that has a richer one.
+
+    Respects that are at their richest are compared with a poorer model, one by one, as `indicate` does.
+    """
+    if not solution.converged:
+        return indicate(family, settings, solution)
+    exact = ("harmonics", "samples") if grips(member(family, settings).model, solution) else ()
+    rich, errors, better = settings, {}, {}
+    for name in DIRECTIONS:
+        other = None if name in exact else richer(family, settings, name)
+        if other is None:
+            continue
+        if _poorer(settings, other, name):
+            errors[name] = _change(solution, moved(family, settings, solution, other, ENOUGH))
+        else:
+            rich = replace(rich, **{name: getattr(other, name)})
+            rich = replace(rich, samples=max(rich.samples, other.samples))
+    if rich != settings:
+        better["together"] = moved(family, settings, solution, rich, ENOUGH)
+        errors["together"] = _change(solution, better["together"])
+    return Indicators(errors, better)
+
+
+def _poorer(settings: Settings, other: Settings, name: str) -> bool:
+    """Whether the model that judges a respect has less of it, because there is no more."""
+    return name in ("harmonics", "modes") and getattr(other, name) < getattr(settings, name)
 
 
 def grips(model: ReducedModel, solution: Solution) -> bool:
@@ -115,5 +157,7 @@ def moved(family: Family, settings: Settings, solution: Solution, other: Setting
 
 
 def _change(solution: Solution, better: Solution) -> float:
+    if not better.converged:
+        return np.inf
     old, new = solution.probe[1, 0], better.probe[1, 0]
     return float(abs(new - old) / max(abs(new), np.finfo(float).tiny))

@@ -29,6 +29,7 @@ from .joint import LoadCase, joint_model
 from .keys import contact_key, mesh_key, modes_key, reduction_key, response_key
 from .limits import Limit, linear_limits
 from .loads import Curve, Progress, default_loads, study_loads, unwatched
+from .ports import named_nodes
 from .settings import DAMPERS, Settings, enriched, first_settings
 from .stages import (
     Bodies,
@@ -107,12 +108,14 @@ def run(scene: Scene, folder: str | Path, until: str = "response", comm: Any = N
     if until == "mesh":
         return result
     check_blade(scene, mesh)
+    if until == "response":
+        named_nodes(mesh, scene.excitation.at)
+    patches = [] if until == "modes" else contact_patches(mesh)     # what the mesh lacks is told before long work
     bodies = Bodies(scene, mesh, comm)
     with clock("modes"):
         result = replace(result, modes=keep("modes", modes_key(scene), lambda: find_modes(bodies)))
     if until == "modes":
         return result
-    patches = contact_patches(mesh)
     with clock("contact"):
         problem = keep("contact", contact_key(scene), lambda: seat_damper(bodies, patches))
         loads = scene.study.loads or default_loads(scene)
@@ -252,9 +255,10 @@ def reduced_sector(scene: Scene, bodies: Bodies, case: LoadCase, patches: list[P
             return settings, reduced
         family = family_of_case(scene, bodies.mesh, reduced, patches, case)
         rough = covered(member(family, settings).model, settings, scene.study.band, scene.excitation.mode, 1.0)
-        settings, _, found = choose(family, settings, peak_of(rough), scene.accuracy, fixed=("modes",))
+        settings, _, found = choose(family, settings, peak_of(rough), scene.accuracy, fixed=("modes",), apart=True)
         more = enriched(settings, "modes")
-        if "modes" not in settings.chosen or found.errors["modes"] <= scene.accuracy / 10 or more is None:
+        known = "modes" in settings.chosen and "modes" not in found.unknown
+        if not known or found.errors["modes"] <= scene.accuracy / 10 or more is None:
             return settings, reduced
         settings = more
 
@@ -266,9 +270,13 @@ def _remarks(scene: Scene, settings: Settings, curves: list[Curve]) -> list[str]
     if lost:
         remarks.append(f"{lost} of {sum(len(c.frequency) for c in curves)} response points did not converge; they are "
                        "marked in tables and pictures")
-    remarks += [f"load {c.load:g} N: estimated error {100 * c.settings.error:.2g} % of the resonance amplitude, above "
-                f"the wanted {100 * scene.accuracy:.2g} %" for c in curves
-                if c.settings.error is not None and c.settings.error > scene.accuracy]
+    for c in curves:
+        if c.settings.error == np.inf:
+            remarks.append(f"load {c.load:g} N: the error of the resonance amplitude is unknown, since richer models "
+                           "of it were not solved; nothing was refined because of that")
+        elif c.settings.error is not None and c.settings.error > scene.accuracy:
+            remarks.append(f"load {c.load:g} N: estimated error {100 * c.settings.error:.2g} % of the resonance "
+                           f"amplitude, above the wanted {100 * scene.accuracy:.2g} %")
     return remarks
 
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from math import ceil, log2, sqrt
+from math import ceil, inf, log2, sqrt
 
 from ..scene import Scene
 
@@ -26,12 +26,14 @@ class Settings:
     damper: str                     # one of DAMPERS
     points: int | None = None       # friction elements on each patch; None: all that there are
     most: int = 31                  # harmonics beyond which the choice does not go
-    error: float | None = None      # estimated relative error of the resonance amplitude, None before the check
+    error: float | None = None      # relative, of the resonance amplitude; None before the check, inf: unknown
     chosen: tuple[str, ...] = ()    # names that are chosen here and not by the user
 
     def sentence(self) -> str:
         """The settings in words."""
         error = "not estimated" if self.error is None else f"estimated error {100 * self.error:.2g} %"
+        if self.error == inf:
+            error = "error unknown: richer models were not solved"
         kind = "chosen: " + ", ".join(self.chosen) if self.chosen else "all given by the scene"
         points = "all contact points" if self.points is None else f"up to {self.points} contact points on each seat"
         return (f"model: {self.modes} modes, {self.harmonics} harmonics, {self.samples} samples, {points}, "
@@ -86,7 +88,7 @@ def enriched(settings: Settings, name: str, need: float = 4.0) -> Settings | Non
 def restarted(settings: Settings) -> Settings:
     """Back to the start in what is cheap to choose again; modes and damper model are kept for the next load case."""
     names = [name for name in ("harmonics", "samples", "points") if name in settings.chosen]
-    return _enough_samples(replace(settings, **{name: FIRST[name] for name in names}))
+    return _enough_samples(replace(settings, **{name: FIRST[name] for name in names}, error=None))
 
 
 def _enough_samples(settings: Settings) -> Settings:
