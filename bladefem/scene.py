@@ -95,7 +95,8 @@ class Model:
     damper: str | None = quantity(None, choices=("mass", "rigid", "elastic"), help="damper model")
     reduction: str = quantity("rubin", choices=("rubin", "craig-bampton"), help="reduction basis")
     nodal_diameters: tuple[int, ...] | None = quantity(None, "1", 0, 1000,
-                                                       "nodal diameters of the mode tables; all when left out")
+                                                       "nodal diameters of the mode tables; when left out those "
+                                                       "that the engine order excites ('bladefem modes': all)")
 
 
 @dataclass(frozen=True)

@@ -155,8 +155,8 @@ def _items(value: object) -> list:
 
 def _in_range(number: Any, field: Field) -> Any:
     low, high, unit = field.meta.get("low"), field.meta.get("high"), field.meta.get("unit") or "1"
-    if (low is None or number >= low) and (high is None or number <= high):
-        return number
+    if (low is None or number >= low - 1e-12 * abs(low)) and (high is None or number <= high + 1e-12 * abs(high)):
+        return number       # "10 um" is 9.999...e-06
     if low is None or high is None:
         limit = f"at most {show(high, unit)}" if low is None else f"at least {show(low, unit)}"
     else:

@@ -103,6 +103,23 @@ def report(mesh: Mesh, straightened: int, size: float) -> dict[str, object]:
             "pairs": {name: pair.nodes.shape[1] for name, pair in mesh.pairs.items()}}
 
 
+WORDS = {"size": "element size [mm]", "cells": "elements",
+         "min scaled jacobian": "smallest scaled Jacobian (straight: 1)",
+         "worst quality": "worst shape (regular: 1)", "mean quality": "mean shape",
+         "straightened": "elements straightened", "pairs": "matched nodes of pair"}
+
+
+def quality_rows(mesh: Mesh) -> list[tuple[str, str]]:
+    """Mesh.report for the eye: what, and its value as text."""
+    rows = []
+    for name, value in mesh.report.items():
+        words, value = WORDS.get(name, name), 1e3 * value if name == "size" else value
+        for part, number in (value.items() if isinstance(value, dict) else (("", value),)):
+            text = f"{number:.4g}" if isinstance(number, float) else str(number)
+            rows.append((f"{words} {part}".strip(), text))
+    return rows
+
+
 def quality_table(mesh: Mesh) -> list[dict[str, object]]:
     """One row a body: cells, nodes, volume [m^3] of the straight cells, worst and mean shape, worst Jacobian."""
     rows = []

@@ -88,15 +88,14 @@ def check_aerofoil(blade: Aerofoil, platform: Platform, section: Profile) -> Non
                              "aerofoil.camber")
     root = outline(blade, section.top, 0.0, blade.fillet)
     edge = 0.1 * platform.thickness                     # less leaves a sliver between the aerofoil and the edge
-    rules = ((2, platform.length / 2, "axially", "aerofoil.chord_root or a larger platform.length"),
-             (1, section.corner[1], "circumferentially",
-              "aerofoil.chord_root or aerofoil.stagger, or fewer disc.sectors"))
+    smaller = "aerofoil.chord_root or aerofoil.fillet" if blade.fillet else "aerofoil.chord_root"
+    rules = ((2, platform.length / 2, "axially", f"{smaller} or a larger platform.length"),
+             (1, section.corner[1], "circumferentially", f"{smaller} or aerofoil.stagger, or fewer disc.sectors"))
     for axis, limit, what, cure in rules:
         excess = np.abs(root[:, axis]).max() + edge - limit
         if excess > 0:
             raise InputError(f"aerofoil.chord_root = {blade.chord_root:.4g} m: the root section overhangs the platform "
-                             f"{what} by {excess:.3g} m; choose a smaller {cure}"
-                             + (" or aerofoil.fillet" if blade.fillet else ""))
+                             f"{what} by {excess:.3g} m; choose a smaller {cure}")
     thinnest = blade.thickness_root * blade.chord_root
     _at_most("aerofoil.fillet", blade.fillet, thinnest, "the thickness of the root section")
 

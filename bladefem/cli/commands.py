@@ -30,8 +30,13 @@ def check(options: argparse.Namespace, comm: Any) -> None:
         print(text)
 
 
+PICTURES = (".png", ".pdf", ".svg", ".jpg")
+
+
 def mesh(options: argparse.Namespace, comm: Any) -> None:
     """Mesh, quality table, picture."""
+    if options.view and Path(options.view).suffix.lower() not in PICTURES:
+        raise InputError(f"--view {options.view}: expected a file name that ends with {' or '.join(PICTURES)}")
     run = until("mesh", options, comm)
     if options.view and (comm is None or comm.rank == 0):
         draw(run.mesh, options.view)

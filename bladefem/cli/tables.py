@@ -6,6 +6,8 @@ from collections.abc import Mapping, Sequence
 from math import pi
 from typing import Any
 
+from geometry.quality import quality_rows
+
 from ..units import show
 
 __all__ = ["frame", "frequencies", "mesh_quality", "plain", "pressures", "resolved_scene", "responses", "side_by_side",
@@ -42,9 +44,7 @@ def mesh_quality(mesh: Any) -> str:
     rows = [["points", len(mesh.points)]]
     rows += [[f"body {name}, cells", len(cells)] for name, cells in mesh.bodies.items()]
     rows += [[f"face {name}, cells", len(cells)] for name, cells in mesh.faces.items()]
-    rows += [[f"pair {name}, matched nodes", pair.nodes.shape[1]] for name, pair in mesh.pairs.items()]
-    rows += [[name, f"{value:.4g}" if isinstance(value, float) else value] for name, value in mesh.report.items()
-             if isinstance(value, (int, float, str)) and name not in ("cells", "nodes")]
+    rows += [row for row in quality_rows(mesh) if row[0] not in ("elements", "nodes")]
     return plain(rows, ["mesh", "value"])
 
 

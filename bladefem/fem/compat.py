@@ -22,6 +22,9 @@ from ..store import bind_h5py
 bind_h5py()     # before dolfinx, so that users may import h5py after it
 _setdlopenflags = sys.setdlopenflags
 sys.setdlopenflags = lambda flags: None     # not even during the import: HDF5's symbols would stay global
+import petsc4py  # noqa: E402
+
+petsc4py.init(["bladefem", "-no_signal_handler"])   # else a reader that closes the pipe (| head) aborts MPI
 import dolfinx  # noqa: E402
 import dolfinx.fem.petsc  # noqa: E402
 import ufl  # noqa: E402

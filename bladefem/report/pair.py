@@ -18,6 +18,7 @@ from bladefem.study.pairs import INNER, PairState, radii, solve_pair
 from bladefem.study.punch import johnson_pressure
 from bladefem.view import contact, indentation, mesh
 from geometry.mesh import Mesh
+from geometry.quality import quality_rows
 
 from .datasets import table_dataset
 from .tables import write_tables
@@ -89,8 +90,7 @@ def _points(result: PairRun) -> pd.DataFrame:
 
 def _write(scene: Scene, result: PairRun) -> None:
     folder, states = result.folder, result.states
-    quality = {name: value for name, value in result.mesh.report.items() if not isinstance(value, dict)}
-    tables = {"mesh/quality": pd.DataFrame({"what": list(quality), "value": [str(v) for v in quality.values()]}),
+    tables = {"mesh/quality": pd.DataFrame(quality_rows(result.mesh), columns=["what", "value"]),
               "contact/summary": pair_summary(states), "contact/points": _points(result)}
     for name, table in tables.items():
         write_tables(table, folder / name.split("/")[1], name.split("/")[1])

@@ -13,6 +13,7 @@ import numpy as np
 import pandas as pd
 
 from geometry.mesh import Mesh
+from geometry.quality import quality_rows
 
 from ..contact.states import quasi_static
 from ..data import ModeSet
@@ -62,7 +63,8 @@ def _write(result: pipeline.Run, progress: Progress) -> None:
     mesh.save_vtu(result.mesh, folder / "mesh.vtu")
     modes.save_modes_vtu(result.mesh, excited_modes(result), folder / "modes.vtu")
     contact.save_pressure_vtu(result.contact.maps, folder / "pressure.vtu")
-    write_report(folder, result.scene, tables, figures, [*result.messages, _static_contact(result)], result.timings)
+    messages = [*result.messages, _static_contact(result), *_beyond_stick(result)]
+    write_report(folder, result.scene, tables, figures, messages, result.timings)
 
 
 def _static_contact(result: pipeline.Run) -> str:
@@ -70,6 +72,14 @@ def _static_contact(result: pipeline.Run) -> str:
     patch = next(iter(result.contact.maps.values()))[0].patch
     highest = max(curve.settings.harmonics * float(np.max(curve.frequency)) for curve in result.response.curves)
     return quasi_static(patch, result.scene.material.blade, highest).sentence
+
+
+def _beyond_stick(result: pipeline.Run) -> list[str]:
+    """Why a resonance may lie above that of full stick."""
+    stuck = result.response.limits[1].peak_frequency
+    above = [curve for curve in result.response.curves if curve.peak_frequency > stuck]
+    return ["resonances above that of full stick: contact points that the static load leaves open close in vibration, "
+            "and count as open in full stick"] if above else []
 
 
 def excited_modes(result: pipeline.Run) -> ModeSet:
@@ -88,8 +98,7 @@ def _tables(result: pipeline.Run) -> dict[str, pd.DataFrame]:
     pressure = contact.pressure_summary(seats)
     pressure.insert(0, "load", loads[:len(pressure)])
     curves = result.response.curves
-    quality = result.mesh.report
-    return {"mesh/quality": pd.DataFrame({"what": list(quality), "value": [_short(v) for v in quality.values()]}),
+    return {"mesh/quality": pd.DataFrame(quality_rows(result.mesh), columns=["what", "value"]),
             "modes/modes": family_table(excited_modes(result), result.mesh),
             "modes/nodal_diameters": mode_table(result.modes, result.mesh),
             "contact/pressure": pressure,
@@ -104,13 +113,6 @@ def _by_mass(points: pd.DataFrame) -> list[tuple[str, pd.DataFrame]]:
         return [("response/forced_response", points)]
     return [(f"response/forced_response_{1e3 * mass:g}g", points[(points["mass"] == mass) | points["mass"].isna()])
             for mass in points["mass"].dropna().unique()]
-
-
-def _short(value: object) -> str:
-    """A quality value for the eye."""
-    if isinstance(value, dict):
-        return ", ".join(f"{name} {_short(v)}" for name, v in value.items())
-    return f"{value:.4g}" if isinstance(value, float) else str(value)
 
 
 def mode_table(sets: list[ModeSet], geometry: Mesh) -> pd.DataFrame:

@@ -112,7 +112,7 @@ def draw_optimum(summary: pd.DataFrame, file: str | Path | None = None, *, point
         log_axis(axes[0], "y")
         log_axis(axes[1], "x")
         beside = {"loc": "center left", "bbox_to_anchor": (1.0, 0.5)} if "mass" in summary else {}
-        axes[0].legend(**beside)
+        axes[0].legend(**beside, frameon=True, framealpha=0.9, edgecolor="none").set_zorder(7)
         return axes[0].figure
 
 

@@ -18,7 +18,7 @@ from .style import COLOURS, FAILED, canvas
 __all__ = ["draw_campbell", "draw_interference", "draw_nodal_diameters"]
 
 RPM = 60 / (2 * np.pi)
-MARKERS = "osD^vPX*"
+MARKERS = "osD^vPX*<>h"       # not as many as colours, so that a pair comes again late
 
 
 def draw_campbell(table: pd.DataFrame, orders: Sequence[int], file: str | Path | None = None, *,

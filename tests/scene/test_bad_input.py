@@ -9,6 +9,7 @@ import pytest
 from bladefem.errors import InputError
 from bladefem.scene import Contact, Scene
 from bladefem.scene_check import validate
+from bladefem.scene_fields import convert, field_at
 from bladefem.scene_file import load_scene, scene_of
 
 WEDGE = Path(__file__).with_name("wedge.toml")
@@ -92,6 +93,14 @@ def test_tables_are_refused(tables, message):
 def test_scene_made_in_python_is_checked_as_well():
     with pytest.raises(InputError, match=r"contact\.mu"):
         validate(Scene(contact=Contact(mu=float("nan"))))
+
+
+@pytest.mark.parametrize("limit", ["mesh.size=10 um", "disc.sectors=200", "damper.angle=75 deg",
+                                   "contact.kt_area=1e6 N/mm^3"])
+def test_limits_themselves_are_allowed(limit):
+    """As text too: 10 um is 9.999999999999999e-06 m."""
+    name, _, text = limit.partition("=")
+    convert(text, field_at(name))
 
 
 def test_files_that_are_no_scenes(tmp_path):
