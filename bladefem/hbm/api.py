@@ -111,6 +111,6 @@ def _states(shares: np.ndarray) -> dict[str, int]:
 def _rigid(linear: Linear, mean: np.ndarray, force: np.ndarray) -> np.ndarray:
     """(r,) motions without stiffness that close  w_0 = free_0 - G_0 f_0 + B q."""
     if linear.B.shape[1] == 0:
-        return np.zeros(0)
+        return np.zeros(len(linear.rigid))
     gap = mean - linear.free[0] + linear.G[0] @ force
     return linear.rigid @ (linear.B.T @ (linear.springs * gap.real))

@@ -24,6 +24,8 @@ def check_model(model: ReducedModel) -> None:
     if not 0 < model.hold <= 1:
         raise InputError(f"hold {model.hold}: expected a share of the contact stiffness, above 0 and at most 1")
     _check_amplitudes("excitation", model.excitation, port_size(model.sides[0], "load"), 0)
+    if not model.coupled and 0 in model.excitation:
+        raise InputError("excitation of harmonic 0 with coupled = False: expected the static load in elements.n0")
     _check_amplitudes("normal", model.normal, len(model.elements.kt), 1)
     if isinstance(model.damper, RigidBody):
         _check_rigid(model.damper, dofs)

@@ -60,6 +60,9 @@ def condense(model: ReducedModel, omega: float, harmonics: int) -> Linear:
     if B.shape[1]:
         A[0], stuck[0] = model.once("mean with springs", lambda: _with_springs(G[0].real, free[0].real, springs, B, g,
                                                                               model.hold))
+    if not model.coupled:       # w_0 = 0
+        G[0], free[0], A[0], stuck[0] = 0.0, 0.0, 0.0, 0.0
+        B, g, rigid = B[:, :0], g[:0], rigid[:, :0]
     return Linear(omega, springs, G, free, A, stuck, B, g, rigid)
 
 

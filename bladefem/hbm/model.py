@@ -51,6 +51,9 @@ class ReducedModel:
     # A damper whose contacts all slip has an indifferent mean position, and drifts where friction pushes it: springs of
     # this share of the contact stiffness hold the mean. What they carry is reported as Solution.drift.
     hold: float = 1e-3
+    # Whether the mean displacements take part in the balance. Uncoupled, the contacts vibrate about the preload state,
+    # whose static solution is left as it is; mean forces that friction raises are reported and do not act back.
+    coupled: bool = True
     # Prescribed part of the normal load beside n0 and kn w_n: harmonic >= 1 to complex amplitudes of the nodes [N].
     normal: Mapping[int, np.ndarray] = field(default_factory=dict)
 

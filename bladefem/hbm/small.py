@@ -62,7 +62,8 @@ def _prepare(model: ReducedModel, H: int) -> tuple | None:
     if isinstance(model.damper, tuple):
         bodies.append(model.elastic_damper(H))
     dofs = model.springs.size
-    if model.elements.tangents > 1 or dofs * (2 * H + 1) > COMPILED or any(b.coupled is not None for b in bodies):
+    large = model.elements.tangents > 1 or dofs * (2 * H + 1) > COMPILED
+    if large or not model.coupled or any(b.coupled is not None for b in bodies):
         return None
     blades, loads = bodies[0], model.loads(H)
     if isinstance(model.damper, RigidBody):

@@ -30,7 +30,9 @@ def stop(gap=1.0):
 @pytest.mark.parametrize(("model", "name", "bounds", "omega"), [
     (single_mass(), "omega", (0.6, 1.8), 0.6), (single_mass(), "load", (0.2, 4.0), 1.1),
     (block(force=1.0), "mu", (0.5, 2.0), 0.9), (block(force=1.0), "force", (0.8, 2.0), 0.9),
-    (block(force=1.0), "gap", (0.0, 0.3), 0.9)])
+    (block(force=1.0), "gap", (0.0, 0.3), 0.9), (block(force=1.0), "kt", (0.5, 2.0), 0.9),
+    (block(force=1.0), "kn", (0.5, 2.0), 0.9), (block(damper=True), "mass", (0.7, 1.5), 1.3),
+    (block(damper=True), "damping", (0.5, 2.0), 1.3)])
 def test_every_point_of_a_path_is_a_solution(model, name, bounds, omega):
     start = solve(model, omega, 3, 128)
     points = list(follow(model, name, start, bounds))

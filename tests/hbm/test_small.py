@@ -79,6 +79,25 @@ def test_3d_contacts_take_a_prescribed_normal_load():
     assert abs(solution.probe - solve(block(), 0.9, 5, 256).probe).max() > 1e-2 * abs(solution.probe).max()
 
 
+@pytest.mark.parametrize("model", [normal_direction(), replace(block(), excitation={1: np.array([1.0])}),
+                                   block(damper=True)], ids=["1-D", "3-D", "damper"])
+def test_uncoupled_the_mean_stays_where_the_preload_left_it(model):
+    """Against the same bodies immovable in harmonic 0 alone; coupled, the lift-off pushes the mean outwards."""
+    side = model.side(1)
+    fixed = replace(side, omega=np.ones_like(side.omega), shapes=0 * side.shapes, residual=0 * side.residual)
+    uncoupled = solve(replace(model, coupled=False), 0.9, 5, 128)
+    immovable = solve(replace(model, sides=(fixed, *[side] * 5), coupled=model.damper is None), 0.9, 5, 128)
+    coupled = solve(model, 0.9, 5, 128)
+    assert uncoupled.converged and immovable.converged and coupled.converged
+    assert abs(uncoupled.w[:, :, 0]).max() < 1e-15 * abs(uncoupled.w).max()
+    assert abs(coupled.w[:, :, 0]).max() > 1e-3 * abs(coupled.w).max()
+    np.testing.assert_allclose(immovable.probe[1:], uncoupled.probe[1:], rtol=0, atol=1e-8 * abs(coupled.probe).max())
+    assert abs(coupled.probe[1:] - uncoupled.probe[1:]).max() > 1e-3 * abs(coupled.probe).max()
+    assert uncoupled.work.imbalance < 1e-8
+    with pytest.raises(InputError, match="static load in"):
+        replace(model, coupled=False, excitation={0: np.array([1.0])})
+
+
 def test_prescribed_normal_load_is_checked():
     with pytest.raises(InputError, match="normal of harmonic 0"):
         replace(single_mass(), normal={0: np.array([0.3])})
