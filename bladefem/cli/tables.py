@@ -69,8 +69,9 @@ def survey(found: Any) -> str:
         parts.append(plain(rows, ["engine order", "mode", "crossing [Hz]", "speed [rpm]"]) if rows
                      else "no engine order crosses a mode in this range of speeds")
     if found.convergence is not None:
-        rows = [[row.mode, f"{row.frequency:.2f}", *(["", ""] if row.reason else [f"{row.limit:.2f}", f"{row.order:.2f}"]),
-                 f"{100 * row.error:.3f}", row.reason] for row in found.convergence.summary.itertuples()]
+        rows = [[row.mode, f"{row.frequency:.2f}", "" if row.reason else f"{row.limit:.2f}",
+                 "" if row.reason else f"{row.order:.2f}", f"{100 * row.error:.3f}", row.reason]
+                for row in found.convergence.summary.itertuples()]
         parts.append(plain(rows, ["mode", "finest [Hz]", "limit [Hz]", "order", "error [%]", "why no limit"]))
     if found.mac is not None:
         rows = [[i + 1, row.argmax() + 1, f"{row.max():.4f}"] for i, row in enumerate(found.mac)]

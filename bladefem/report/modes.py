@@ -48,7 +48,7 @@ def tables_of(result: Survey) -> dict[str, pd.DataFrame]:
     """All tables by file name, SI columns."""
     run = result.run
     excited = excited_set(run)
-    out = {"frequencies": mode_table(run.modes, run.mesh),
+    out = {"frequencies": mode_table(run.modes, run.mesh, result.clamped),
            "excited_modes": family_table(excited, run.mesh, result.clamped),
            "effective_masses": result.masses}
     if excited.nodal_diameter is None:
@@ -119,7 +119,8 @@ def _drawings(result: Survey, tables: dict[str, pd.DataFrame],
         if wheel:
             out[f"mode_{i + 1}_wheel.png"] = lambda file, i=i: modes.draw_wheel_mode(run.mesh, excited, i, file,
                                                                                      family=names[i])
-    out["wave.gif"] = lambda file: modes.animate_wave(run.mesh, excited, run.scene.excitation.mode - 1, file)
+    turning = min(run.scene.excitation.mode, len(excited.frequencies)) - 1
+    out["wave.gif"] = lambda file: modes.animate_wave(run.mesh, excited, turning, file, family=names[turning])
     if wheel:
         out["nodal_diameters.png"] = lambda file: speed.draw_nodal_diameters(tables["frequencies"], file)
     if result.convergence is not None:

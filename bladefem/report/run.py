@@ -115,11 +115,12 @@ def _by_mass(points: pd.DataFrame) -> list[tuple[str, pd.DataFrame]]:
             for mass in points["mass"].dropna().unique()]
 
 
-def mode_table(sets: list[ModeSet], geometry: Mesh) -> pd.DataFrame:
-    """One row a mode of each nodal diameter."""
+def mode_table(sets: list[ModeSet], geometry: Mesh, clamped: ModeSet | None = None) -> pd.DataFrame:
+    """One row a mode of each nodal diameter, named after the clamped blade's modes where these are given."""
     rows = [pd.DataFrame({"nodal_diameter": 0 if s.nodal_diameter is None else s.nodal_diameter,
                           "mode": np.arange(1, len(s.frequencies) + 1), "frequency": s.frequencies,
-                          "family": family_table(s, geometry)["family"], "residual": s.residuals}) for s in sets]
+                          "family": family_table(s, geometry, clamped)["family"],
+                          "residual": s.residuals}) for s in sets]
     return pd.concat(rows, ignore_index=True)
 
 

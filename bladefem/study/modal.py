@@ -111,14 +111,15 @@ def family_table(modes: ModeSet, mesh: Mesh, clamped: ModeSet | None = None, bod
                  root: float | None = None) -> pd.DataFrame:
     """Names of the modes: one row a mode with frequency [Hz], family, MAC against it, and the aerofoil's share.
 
-    A mode is called after the pure motion (or the mode of the clamped blade, itself named so) that it is closest to by
-    MAC on the aerofoil; "..., coupled" when another mode of the set is closer to the same motion, "mixed" when no MAC
-    reaches 0.3, "disc" ("foot" of a single blade) when the aerofoil carries less than a tenth of the motion.
+    A mode is called after the mode of the clamped blade (itself named so) or the pure motion that it is closest to by
+    MAC on the aerofoil; "..., coupled" when another mode of that name is closer, "mixed" when no MAC reaches 0.3,
+    "disc" ("foot" of a single blade) when the aerofoil carries less than a tenth of the motion. Where the platform
+    gives way, modes that the clamp mixes come apart, and the pure motion is the closer one.
 
     Args:
         modes: shapes on the nodes of ``mesh``.
         mesh: sector or blade.
-        clamped: modes of the blade clamped at its root, on the same nodes, as references instead of pure motions.
+        clamped: modes of the blade clamped at its root, on the same nodes, as references beside pure motions.
         body: the aerofoil's body; the whole mesh when there is no such body.
         root: height x of the aerofoil's root [m]; found from the named faces when left out.
     """
@@ -126,26 +127,30 @@ def family_table(modes: ModeSet, mesh: Mesh, clamped: ModeSet | None = None, bod
     volumes = nodal_volumes(mesh)
     nodes = np.unique(mesh.bodies.get(body, np.concatenate(list(mesh.bodies.values()))))
     nodes = nodes[mesh.points[nodes, 0] >= root]
-    references = pure_shapes(mesh, nodes, root)
+    pure = pure_shapes(mesh, nodes, root)
+    names, references = list(pure), list(pure.values())
     if clamped is not None:
-        names = family_table(clamped, mesh, None, body, root)["family"]
-        references = {f"{name} ({i + 1})": clamped.shapes[i][nodes] for i, name in enumerate(names)}
-    match = mac_of(modes.shapes[:, nodes], np.stack(list(references.values())), volumes[nodes])
+        found = family_table(clamped, mesh, None, body, root)["family"]
+        names += [name.removesuffix(", coupled") for name in found]
+        references += list(clamped.shapes[:, nodes])
+    match = mac_of(modes.shapes[:, nodes], np.stack(references), volumes[nodes])
+    match[:, [name == "mixed" for name in names]] = 0.0
     energy = np.einsum("mni,n->mn", np.abs(modes.shapes) ** 2, volumes)
     share = energy[:, nodes].sum(axis=1) / np.maximum(energy.sum(axis=1), 1e-300)
-    names = [name.split(" (")[0].removesuffix(", coupled") for name in references]
     below = "disc" if mesh.sector is not None and mesh.sector.count else "foot"
-    names = [name_of(match, i, names) if share[i] >= 0.1 else below for i in range(len(match))]
-    return pd.DataFrame({"mode": np.arange(1, len(names) + 1), "frequency": modes.frequencies, "family": names,
-                         "mac": match.max(axis=1), "aerofoil_share": share})
+    return pd.DataFrame({"mode": np.arange(1, len(match) + 1), "frequency": modes.frequencies,
+                         "family": families(match, names, share, below), "mac": match.max(axis=1),
+                         "aerofoil_share": share})
 
 
-def name_of(match: np.ndarray, i: int, names: list[str]) -> str:
-    """The name of mode i, from the MAC (modes, references) of all."""
-    best = match[i].argmax()
-    if match[i, best] < 0.3:
-        return "mixed"
-    return names[best] if match[:, best].argmax() == i else f"{names[best]}, coupled"
+def families(match: np.ndarray, names: Sequence[str], share: np.ndarray, below: str) -> list[str]:
+    """Names of the modes from the MAC (modes, references), the references' names and the aerofoil's share."""
+    best = match.max(axis=1)
+    own = [names[k] for k in match.argmax(axis=1)]
+    own = [below if share[i] < 0.1 else name if best[i] >= 0.3 else "mixed" for i, name in enumerate(own)]
+    closer = [any(other == name and best[k] > best[i] for k, other in enumerate(own)) for i, name in enumerate(own)]
+    return [f"{name}, coupled" if again and name not in ("mixed", below) else name
+            for name, again in zip(own, closer, strict=True)]
 
 
 def participation(modes: ModeSet, mass: Any, points: np.ndarray, directions: Sequence[str] = ("x", "y", "z"),

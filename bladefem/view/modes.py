@@ -87,10 +87,14 @@ def draw_mode(mesh: Mesh, modes: ModeSet, number: int, file: str | Path | None =
 
 def say_exaggeration(ax: Any, mesh: Mesh, modes: ModeSet) -> None:
     """How much the picture exaggerates."""
-    height = 1e3 * np.ptp(mesh.points[:, 0])
     wave = ",\nat the phase of the largest motion" if np.iscomplexobj(modes.shapes) else ""
-    ax.figure.supxlabel(f"largest displacement drawn as {EXAGGERATION * height:.3g} mm "
-                        f"({100 * EXAGGERATION:.0f} % of the height){wave}", fontsize=7.5, color="#555555")
+    ax.figure.supxlabel(f"{exaggeration(mesh)}{wave}", fontsize=7.5, color="#555555")
+
+
+def exaggeration(mesh: Mesh) -> str:
+    """"largest displacement drawn as 12 mm (10 % of the height)"."""
+    return (f"largest displacement drawn as {1e3 * EXAGGERATION * np.ptp(mesh.points[:, 0]):.3g} mm "
+            f"({100 * EXAGGERATION:.0f} % of the height)")
 
 
 def add_colour_bar(ax: Any, norm: Normalize, colours: str, label: str) -> None:
@@ -204,8 +208,8 @@ def wheel_camera(mesh: Mesh) -> tuple[tuple[float, float, float], tuple[float, f
     return (WHEEL_VIEW, (0.0, 1.0, 0.0)) if mesh.dimension == 3 else (view_of(mesh, FRONT), RADIAL)
 
 
-def animate_wave(mesh: Mesh, modes: ModeSet, number: int, file: str | Path, *, frames: int = 24, pixels: int = 480,
-                 progress: Callable[[int, int], None] | None = None) -> Path:
+def animate_wave(mesh: Mesh, modes: ModeSet, number: int, file: str | Path, *, family: str = "", frames: int = 24,
+                 pixels: int = 480, progress: Callable[[int, int], None] | None = None) -> Path:
     """Write an endless GIF of one period: a travelling wave for complex modes, a standing one for real modes.
 
     Args:
@@ -213,6 +217,7 @@ def animate_wave(mesh: Mesh, modes: ModeSet, number: int, file: str | Path, *, f
         modes: shapes on the nodes of ``mesh``.
         number: which mode, counted from 0.
         file: GIF to write.
+        family: name of the mode family, shown in the title.
         frames: pictures in one period.
         pixels: width and height.
         progress: called with (frames done, frames).
@@ -220,11 +225,13 @@ def animate_wave(mesh: Mesh, modes: ModeSet, number: int, file: str | Path, *, f
     import matplotlib
     from PIL import Image, ImageDraw, ImageFont
 
-    font = ImageFont.truetype(str(Path(matplotlib.get_data_path(), "fonts/ttf/DejaVuSans.ttf")), max(pixels // 34, 9))
+    face = str(Path(matplotlib.get_data_path(), "fonts/ttf/DejaVuSans.ttf"))
+    font, small = (ImageFont.truetype(face, max(pixels // k, 9)) for k in (34, 42))
     pictures = []
     for k, image in enumerate(wave_frames(mesh, modes, number, frames, pixels)):
         picture = Image.fromarray(image)
-        ImageDraw.Draw(picture).text((10, 8), mode_title(modes, number), fill="black", font=font)
+        ImageDraw.Draw(picture).text((10, 8), mode_title(modes, number, family), fill="black", font=font)
+        ImageDraw.Draw(picture).text((10, pixels - 2 * font.size), exaggeration(mesh), fill="#555555", font=small)
         pictures.append(picture.quantize(96))
         if progress:
             progress(k + 1, frames)

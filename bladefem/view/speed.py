@@ -45,9 +45,8 @@ def draw_campbell(table: pd.DataFrame, orders: Sequence[int], file: str | Path |
             first = not diameter or diameter[0] == table.loc[table["mode"] == mode, "nodal_diameter"].min()
             ax.plot(RPM * line["speed"], line["frequency"], color=colour, lw=1.7 if not diameter else 1.2,
                     label=line_name(line, mode) if first else None)
-            if diameter and diameter[0] in table["nodal_diameter"].drop_duplicates().iloc[[0, -1]].to_list():
-                ax.annotate(f"n = {diameter[0]}", (fastest, line["frequency"].iloc[-1]), (3, 0), fontsize=6.5,
-                            textcoords="offset points", va="center", color=colour, annotation_clip=False)
+        if "nodal_diameter" in table:
+            name_diameters(ax, table, fastest)
         draw_order_lines(ax, orders, fastest, 1.12 * table["frequency"].max())
         if crossings is not None and len(crossings):
             ax.plot(RPM * crossings["speed"], crossings["frequency"], "o", mfc="none", mec=FAILED, mew=1.5, ms=9,
@@ -58,6 +57,22 @@ def draw_campbell(table: pd.DataFrame, orders: Sequence[int], file: str | Path |
                ylim=(0, 1.12 * table["frequency"].max()), title=title or "Campbell diagram")
         ax.legend(loc="center left", bbox_to_anchor=(1.06, 0.5))
         return ax.figure
+
+
+def name_diameters(ax: Any, table: pd.DataFrame, fastest: float) -> None:
+    """Names of the nodal diameters at the right end of each mode's lines: both ends of a fan, one name for a bundle."""
+    apart = 0.03 * table["frequency"].max()
+    last = table[table["speed"] == table["speed"].max()].sort_values("nodal_diameter")
+    for mode, ends in last.groupby("mode"):
+        low, high = ends.iloc[0], ends.iloc[-1]
+        if abs(high["frequency"] - low["frequency"]) > apart:
+            named = [(f"n = {row['nodal_diameter']:.0f}", row["frequency"]) for row in (low, high)]
+        else:
+            span = f"{low['nodal_diameter']:.0f}" + (f" to {high['nodal_diameter']:.0f}" if len(ends) > 1 else "")
+            named = [(f"n = {span}", ends["frequency"].mean())]
+        for text, height in named:
+            ax.annotate(text, (fastest, height), (3, 0), fontsize=6.5, textcoords="offset points", va="center",
+                        color=COLOURS[(int(mode) - 1) % len(COLOURS)], annotation_clip=False)
 
 
 def line_name(rows: pd.DataFrame, mode: Any) -> str:
@@ -100,12 +115,17 @@ def draw_nodal_diameters(table: pd.DataFrame, file: str | Path | None = None, *,
 
 
 def draw_families(ax: Any, table: pd.DataFrame) -> None:
-    """A marker a mode, by family (or by mode number)."""
+    """A marker a mode, by family (or by mode number); coupled modes are hollow."""
     names = table["family"] if "family" in table else table["mode"].map("mode {}".format)
-    for i, name in enumerate(names.drop_duplicates()):
-        part = table[names == name]
-        ax.plot(part["nodal_diameter"], part["frequency"], MARKERS[i % len(MARKERS)], ms=4.5,
-                color=COLOURS[i % len(COLOURS)], label=name)
+    plain = names.str.removesuffix(", coupled")
+    for i, name in enumerate(plain.drop_duplicates()):
+        for hollow in (False, True):
+            part = table[(plain == name) & ((names != plain) == hollow)]
+            if len(part):
+                style = MARKERS[(i + i // len(COLOURS)) % len(MARKERS)]
+                colour = COLOURS[i % len(COLOURS)]
+                ax.plot(part["nodal_diameter"], part["frequency"], style, ms=4.5, mec=colour, ls="none",
+                        mfc="white" if hollow else colour, label=f"{name}, coupled" if hollow else name)
 
 
 def draw_interference(table: pd.DataFrame, sectors: int, speed: float, file: str | Path | None = None, *,
@@ -143,7 +163,8 @@ def draw_excitations(ax: Any, table: pd.DataFrame, sectors: int, speed: float, o
     for order in orders:
         n, f = int(folded(np.array(order), sectors)), order * speed / (2 * np.pi)
         ax.plot(n, f, "P", color="black", ms=7, zorder=4)
-        ax.annotate(f"EO {order}", (n, f), (6, -3), textcoords="offset points", fontsize=7.5, va="top")
+        ax.annotate(f"EO {order}", (n, f), (4, -6), textcoords="offset points", fontsize=7, va="top", zorder=6,
+                    bbox={"facecolor": "white", "alpha": 0.75, "edgecolor": "none", "pad": 0.5})
         near = table[(table["nodal_diameter"] == n) & ((table["frequency"] / max(f, 1e-9) - 1).abs() < close)]
         rings += near[["nodal_diameter", "frequency"]].to_numpy().tolist()
     if rings:

@@ -77,6 +77,17 @@ def test_clamped_blade_as_reference_and_disc_modes():
     assert table["aerofoil_share"].iloc[1] == 0.0
 
 
+def test_modes_that_the_clamp_mixes_are_named_after_the_closer_reference():
+    """A torsion that the clamped blade only has mixed with flap keeps its name, and so does the mixture."""
+    mesh = prism((24, 2, 8))
+    pure = pure_shapes(mesh, np.arange(len(mesh.points)), 0.2)
+    flap, turn = (pure[name] / np.linalg.norm(pure[name]) for name in ("second flap", "first torsion"))
+    clamped = ModeSet(np.array([500.0, 510.0]), np.stack([flap + 0.9 * turn, turn - 0.9 * flap]), None, np.zeros(2))
+    modes = ModeSet(np.array([490.0, 495.0]), np.stack([turn, flap + 0.8 * turn]), 3, np.zeros(2))
+    table = family_table(modes, mesh, clamped, root=0.2)
+    assert table["family"].tolist() == ["first torsion", "second flap"] and table["mac"].min() > 0.99
+
+
 def test_second_best_modes_are_called_coupled_and_weak_ones_mixed():
     mesh = prism((24, 2, 8))
     pure = pure_shapes(mesh, np.arange(len(mesh.points)), 0.2)
