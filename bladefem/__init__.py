@@ -37,6 +37,8 @@ _WHERE = {
     "size": "hbm.sweep",
     "sweep": "hbm.sweep",
     "recorded": "hbm.record",
+    "shared": "hbm.share",
+    "shared_response": "hbm.share",
     "follow": "hbm.follow",
     "find_peak": "hbm.peak",
     "track_peak": "hbm.peak",
