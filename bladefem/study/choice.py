@@ -104,8 +104,9 @@ def adapted(family: Family, settings: Settings, band: tuple[float, float] | None
             fixed: tuple[str, ...] = ()) -> Checked:
     """A swept curve with settings that hold at its peak and on its flanks; swept again where they did not.
 
-    The tolerated error of a point is the accuracy times the height of the peak over the height of the point. A curve
-    with points that were not solved is swept again for the sake of its peak only: each of them costs all fallbacks.
+    The tolerated error of a point is the accuracy times the height of the peak over the height of the point. Where
+    points were not solved, richer settings are asked for by the peak only, and used only between the nearest of them:
+    each would cost all fallbacks again.
 
     Args:
         band: [Hz]; round the resonances when None.
@@ -118,8 +119,13 @@ def adapted(family: Family, settings: Settings, band: tuple[float, float] | None
         rough = covered(member(family, settings).model, settings, band, mode, 1.0)
         settings, _, _ = choose(family, settings, peak_of(rough), accuracy, fixed)
         band = band or (rough[0].frequency, rough[-1].frequency)
+    points: list[Solution] = []
     for last in [False] * (PASSES - 1) + [True]:
-        points = covered(member(family, settings).model, settings, band, mode, accuracy, widen)
+        model, inner = member(family, settings).model, _solvable(points)
+        if inner is None:
+            points = covered(model, settings, band, mode, accuracy, widen)
+        else:
+            points = _replaced(points, response_points(model, settings, inner, accuracy))
         top, used, errors = peak_of(points), settings, {}
         whole = all(p.converged for p in points)
         for point in watched(points):
@@ -136,6 +142,22 @@ def adapted(family: Family, settings: Settings, band: tuple[float, float] | None
             return Checked(replace(settings, error=errors[top.omega]), points, errors)
         settings = used
     return Checked(replace(settings, error=errors[top.omega]), points, errors)
+
+
+def _solvable(points: Sequence[Solution]) -> tuple[float, float] | None:
+    """Frequencies [Hz] round the peak, a little inside the nearest unsolved points; None where all were solved."""
+    lost = np.array([p.frequency for p in points if not p.converged])
+    if not len(lost):
+        return None
+    top = peak_of(points).frequency
+    low = max((0.9 * f + 0.1 * top for f in lost if f < top), default=points[0].frequency)
+    high = min((0.9 * f + 0.1 * top for f in lost if f > top), default=points[-1].frequency)
+    return low, high
+
+
+def _replaced(old: Sequence[Solution], new: Sequence[Solution]) -> list[Solution]:
+    """Points sorted by frequency, the new ones in place of the old ones in their band."""
+    return sorted([*new, *(p for p in old if not new[0].omega <= p.omega <= new[-1].omega)], key=lambda p: p.omega)
 
 
 def watched(points: Sequence[Solution]) -> list[Solution]:

@@ -271,6 +271,10 @@ def _remarks(scene: Scene, settings: Settings, curves: list[Curve]) -> list[str]
         remarks.append(f"{lost} of {sum(len(c.frequency) for c in curves)} response points did not converge; they are "
                        "marked in tables and pictures")
     for c in curves:
+        near = np.flatnonzero(c.frequency == c.peak_frequency)[0] + np.array([-1, 1])
+        if not c.converged[near[(near >= 0) & (near < len(c.frequency))]].all():
+            remarks.append(f"load {c.load:g} N: the highest point that was solved stands beside one that was not; the "
+                           "resonance may be higher")
         if c.settings.error == np.inf:
             remarks.append(f"load {c.load:g} N: the error of the resonance amplitude is unknown, since richer models "
                            "of it were not solved; nothing was refined because of that")
