@@ -199,14 +199,18 @@ def _variants(family: Family, rich: Settings) -> Iterator[tuple[str, str, Settin
     yield "all of it", "rich model", rich
     for modes in (1, 2, 3, 5, 10, 20, 40, 80):
         if modes < family.modes:
-            yield f"{modes} modes", "modes", replace(rich, modes=modes)
+            yield _counted(modes, "mode"), "modes", replace(rich, modes=modes)
     nodes = len(member(family, rich).groups) // 2
     for points in (1, 2, 4, 8, 16, 32, 64):
         if points < nodes:
-            yield f"{points} points", "contact points", replace(rich, points=points)
+            yield _counted(points, "point"), "contact points", replace(rich, points=points)
     for damper in DAMPERS:
         if damper in family.dampers and damper != rich.damper:
             yield f"{damper} damper", "damper model", replace(rich, damper=damper)
+
+
+def _counted(count: int, what: str) -> str:
+    return f"{count} {what}" + ("" if count == 1 else "s")
 
 
 def _rows(jobs: list[tuple[str, str, ReducedModel, Callable]], bench: Bench) -> list[dict[str, object]]:

@@ -31,7 +31,7 @@ from ..reduction.truncate import truncated
 __all__ = ["Method", "Point", "applicable", "balance", "exact", "methods", "tangential"]
 
 HARMONICS = (1, 3, 5, 7, 9, 15, 31)
-PERIODS = 500       # most that are integrated at one frequency
+PERIODS = 2000      # most that are integrated at one frequency
 STIFF = 30.0        # frequency of the modes that stand for the residual flexibility, over the excitation's
 
 

@@ -8,6 +8,7 @@ from pathlib import Path
 import numpy as np
 import pandas as pd
 
+from .labels import names_apart
 from .response import draw_accuracy
 from .style import canvas
 
@@ -41,4 +42,6 @@ def draw_chart(tables: Mapping[str, pd.DataFrame], file: str | Path | None = Non
             ax.axhspan(bottom, floor, color="#bbbbbb", alpha=0.5, zorder=0)
             spent, of = LABELS.get(what, ("CPU time for each frequency", "resonance amplitude"))
             ax.set(xlabel=f"{spent} [s]", ylabel=f"relative error of the {of} [1]")
+        for ax in axes[:, 0]:
+            names_apart(ax)
         return axes[0, 0].figure

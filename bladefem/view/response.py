@@ -15,6 +15,7 @@ import matplotlib
 import numpy as np
 import pandas as pd
 
+from .labels import names_apart
 from .style import COLOURS, FAILED, canvas, log_axis
 
 __all__ = ["draw_accuracy", "draw_loops", "draw_optimum", "draw_responses", "loop_energy", "pareto_front"]
@@ -207,10 +208,11 @@ def draw_accuracy(table: pd.DataFrame, file: str | Path | None = None, *, ax: An
         table: one row a setting: name, time [s], error [1]; optional bool columns "chosen" and "converged", optional
             text column "family" for the colour.
         file: PNG to write.
-        ax: axes to draw into.
+        ax: axes to draw into; names are to be moved apart (names_apart) when its limits are set.
         tolerance: wanted relative accuracy, drawn as a line.
         title: headline.
     """
+    alone = ax is None
     with canvas(file, ax, (7.2, 4.6)) as ax:
         good = table["converged"].astype(bool) if "converged" in table else pd.Series(True, index=table.index)
         families = table["family"] if "family" in table else pd.Series("setting", index=table.index)
@@ -224,6 +226,9 @@ def draw_accuracy(table: pd.DataFrame, file: str | Path | None = None, *, ax: An
         if len(failed):
             ax.plot(failed["time"], np.full(len(failed), 0.98), "x", color=FAILED, ms=7, mew=1.8,
                     transform=ax.get_xaxis_transform(), label=f"not converged ({len(failed)})")
+            for _, row in failed[failed["time"].notna()].iterrows():
+                ax.annotate(str(row["name"]), (row["time"], 0.98), (6, -13), xycoords=ax.get_xaxis_transform(),
+                            textcoords="offset points", fontsize=7.5, color=FAILED)
         draw_front(ax, table[good])
         if tolerance is not None:
             ax.axhline(tolerance, color="#555555", ls="--", lw=1, label=f"wanted accuracy {100 * tolerance:.3g} %")
@@ -231,25 +236,16 @@ def draw_accuracy(table: pd.DataFrame, file: str | Path | None = None, *, ax: An
         log_axis(ax, "x")
         log_axis(ax, "y")
         ax.legend(loc="center left", bbox_to_anchor=(1.0, 0.5))
+        if alone:
+            names_apart(ax)
         return ax.figure
-
-
-def readable(front: pd.DataFrame) -> np.ndarray:
-    """(k,) bool: points of a front whose names can stand beside each other."""
-    place = np.log10(np.maximum(front[["time", "error"]].to_numpy(float), 1e-300))
-    place = place / np.maximum(np.ptp(place, axis=0), 1e-3)
-    kept: list[int] = []
-    for i in range(len(place)):
-        if all(abs(place[i, 0] - place[k, 0]) > 0.25 or abs(place[i, 1] - place[k, 1]) > 0.08 for k in kept):
-            kept.append(i)
-    return np.isin(np.arange(len(place)), kept)
 
 
 def draw_front(ax: Any, table: pd.DataFrame) -> None:
     """The Pareto front as stairs, with names where there is room, and the chosen setting."""
     front = table.iloc[pareto_front(table["time"].to_numpy(float), table["error"].to_numpy(float))]
     ax.step(front["time"], front["error"], where="post", color="#888888", lw=1, zorder=1, label="Pareto front")
-    for _, row in front[readable(front)].iterrows():
+    for _, row in (front.sort_values("chosen", ascending=False) if "chosen" in front else front).iterrows():
         ax.annotate(str(row["name"]), (row["time"], row["error"]), (6, 8), textcoords="offset points", fontsize=7.5)
     if "chosen" in table and table["chosen"].any():
         chosen = table[table["chosen"].astype(bool)]

@@ -1,0 +1,36 @@
+"""Names beside points that cover neither one another nor the points."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from matplotlib.transforms import Bbox
+
+__all__ = ["names_apart"]
+
+PLACES = ((6, 7, "left"), (6, -13, "left"), (-6, 7, "right"), (-6, -13, "right"), (11, -3, "left"), (-11, -3, "right"))
+
+
+def names_apart(ax: Any) -> None:
+    """Give each annotation of finished axes a free place beside its point, first come first served; drop the others."""
+    ax.figure.draw_without_rendering()
+    taken = [box for line in ax.lines if line.get_marker() not in ("None", "", None) for box in _markers(line)]
+    inside = ax.get_window_extent()
+    for text in list(ax.texts):
+        for x, y, side in PLACES:
+            text.xyann = (x, y)
+            text.set_ha(side)
+            box = text.get_window_extent()
+            if inside.x0 <= box.x0 and box.x1 <= inside.x1 and inside.y0 <= box.y0 and not box.count_overlaps(taken):
+                taken.append(box)
+                break
+        else:
+            text.remove()
+
+
+def _markers(line: Any) -> list[Bbox]:
+    """Where the markers of a line stand on the page [pixels]."""
+    half = line.get_markersize() / 2 * line.figure.dpi / 72
+    places = line.get_transform().transform(np.asarray(line.get_xydata(), float))
+    return [Bbox([p - half, p + half]) for p in places if np.isfinite(p).all()]
