@@ -53,13 +53,18 @@ def modes(options: argparse.Namespace, comm: Any) -> None:
 
 def modes_wanted(options: argparse.Namespace) -> Any:
     """What the options of ``modes`` ask for."""
+    from ..study.answer import read_damping, read_loads
     from ..study.campbell import read_speeds
     from ..study.survey import Wanted
     if options.pictures < 0:
         raise InputError(f"--pictures {options.pictures}: expected a number of modes, 0 for none")
     sizes = _sizes(options.converge, "converge")
     speeds = None if options.campbell is None else read_speeds(options.campbell)
-    return Wanted(speeds, sizes, Path(options.compare) if options.compare else None, options.direct)
+    loads = None if options.forced is None else read_loads(options.forced)
+    if loads is None and options.damping:
+        raise InputError("--damping: expected together with --forced")
+    return Wanted(speeds, sizes, Path(options.compare) if options.compare else None, options.direct, loads,
+                  read_damping(options.damping) if options.damping else None)
 
 
 def _sizes(text: str | None, option: str) -> list[float] | None:

@@ -32,6 +32,7 @@ _COMMANDS = {
     "modes": ("natural frequencies and mode shapes, for each nodal diameter of a wheel, with tables and pictures",
               "bladefem modes scenes/wedge.toml --set model.nodal_diameters=0,1,6\n"
               "  bladefem modes scenes/wedge.toml --campbell '0, 2000, ..., 12000 rpm'\n"
+              "  bladefem modes scenes/wedge.toml --forced 'pressure_side=500 Pa' --damping 'structural=0.2 %'\n"
               "  bladefem modes scenes/plane.toml --converge '6, 4, 2.8 mm'\n"
               "  bladefem modes scenes/wedge.toml -o runs/b --set aerofoil.twist='25 deg' --compare runs/wedge",
               commands.modes),
@@ -90,6 +91,10 @@ def _modes_arguments(sub: argparse.ArgumentParser) -> None:
     sub.add_argument("--converge", metavar="SIZES", nargs="?", const="", help="refine the mesh: frequencies at three "
                      "or more element sizes such as '6, 4, 2.8 mm' (chosen when left out), estimated limit and order")
     sub.add_argument("--compare", metavar="FOLDER", help="MAC of the mode shapes against those of an earlier run")
+    sub.add_argument("--forced", metavar="LOADS", nargs="?", const="", help="linear response to the engine order, "
+                     "of the scene's excitation or of loads such as 'excitation, pressure_side=500 Pa'")
+    sub.add_argument("--damping", metavar="KINDS", help="for --forced instead of the scene's: 'ratio=0.1 %%', "
+                     "'structural=0.2 %%', 'mass=20 1/s, stiffness=1e-7 s'")
     sub.add_argument("--direct", action="store_true", help="solve every nodal diameter from scratch")
     sub.add_argument("--pictures", metavar="N", type=int, default=4, help="modes that are drawn (4); 0: tables only")
 

@@ -73,6 +73,10 @@ def survey(found: Any) -> str:
                  "" if row.reason else f"{row.order:.2f}", f"{100 * row.error:.3f}", row.reason]
                 for row in found.convergence.summary.itertuples()]
         parts.append(plain(rows, ["mode", "finest [Hz]", "limit [Hz]", "order", "error [%]", "why no limit"]))
+    if found.answer is not None:
+        rows = [[row.mode, f"{row.frequency:.2f}", f"{row.amplitude:.4e}", f"{180 * row.phase / pi:.1f}",
+                 f"{row.largest:.4e}"] for row in found.answer.resonances.itertuples()]
+        parts.append(plain(rows, ["mode", "resonance [Hz]", "amplitude [m]", "phase [deg]", "largest [m]"]))
     if found.mac is not None:
         rows = [[i + 1, row.argmax() + 1, f"{row.max():.4f}"] for i, row in enumerate(found.mac)]
         parts.append(plain(rows, ["mode", "mode of the other run", "MAC"]))

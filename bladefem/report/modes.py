@@ -14,10 +14,11 @@ import pandas as pd
 from ..data import ModeSet
 from ..scene import Scene
 from ..store import on_root, write_results
+from ..study.answer import stress_states, stress_table
 from ..study.loads import Progress, unwatched
 from ..study.modal import family_table
 from ..study.survey import Survey, Wanted, excited_set, survey
-from ..view import convergence, mesh, modes, speed
+from ..view import convergence, forced, mesh, modes, speed
 from .datasets import mode_shapes
 from .run import mode_table
 from .tables import write_tables
@@ -38,8 +39,8 @@ def run(scene: Scene, folder: str | Path, wanted: Wanted, pictures: int = PICTUR
         InputError, NotSolvedError: see :func:`bladefem.study.survey.survey`.
     """
     result = survey(scene, folder, wanted, comm, progress)
-    start, stresses = time.perf_counter(), _stresses(result) if pictures else {}
-    on_root(comm, lambda: _write(result, pictures, stresses, progress))
+    start, stresses = time.perf_counter(), _stresses(result)
+    on_root(comm, lambda: _write(result, pictures, *stresses, progress))
     timings = {**result.run.timings, "tables and pictures": time.perf_counter() - start}
     return replace(result, run=replace(result.run, timings=timings))
 
@@ -59,6 +60,8 @@ def tables_of(result: Survey) -> dict[str, pd.DataFrame]:
                 "margins": found.margins}
     if result.convergence is not None:
         out |= {"convergence": result.convergence.summary, "convergence_points": result.convergence.points}
+    if result.answer is not None:
+        out |= {"forced_response": result.answer.points, "resonances": result.answer.resonances}
     if result.mac is not None:
         out["mac"] = mac_table(result.mac, excited, result.compared)
     return out
@@ -72,9 +75,10 @@ def mac_table(match: np.ndarray, mine: ModeSet, theirs: ModeSet) -> pd.DataFrame
     return table.assign(**{f"MAC {j + 1}": match[:, j] for j in range(match.shape[1])})
 
 
-def _write(result: Survey, pictures: int, stresses: dict[str, np.ndarray], progress: Progress) -> None:
+def _write(result: Survey, pictures: int, stresses: pd.DataFrame, fields: dict[str, np.ndarray],
+           progress: Progress) -> None:
     run, folder = result.run, Path(result.run.folder)
-    tables = tables_of(result)
+    tables = tables_of(result) | {"stresses": stresses}
     for name, table in tables.items():
         write_tables(table, folder / name, name.replace("_", " "))
     write_results(folder / "modes.nc", {"modes": mode_shapes(run)})
@@ -83,27 +87,29 @@ def _write(result: Survey, pictures: int, stresses: dict[str, np.ndarray], progr
     excited = excited_set(run)
     modes.save_modes_vtu(run.mesh, excited, folder / "modes.vtu")
     shapes = {f"mode {i + 1}, {f:.6g} Hz": excited.shapes[i] for i, f in enumerate(excited.frequencies[:pictures])}
-    mesh.save_vtu(run.mesh, folder / "stress.vtu", {**shapes, **stresses})
+    mesh.save_vtu(run.mesh, folder / "stress.vtu", {**shapes, **fields})
     for name, draw in progress(list(_drawings(result, tables, pictures).items()), "pictures"):
         draw(folder / name)
 
 
-def _stresses(result: Survey) -> dict[str, np.ndarray]:
-    """Node fields: displacement and stress under the rotation, stress of the first modes; collective."""
-    from ..fem.stress import nodal_stress, principal, von_mises
-    bodies, excited = result.bodies, excited_set(result.run)
-    body, rotating = bodies.still_blade, result.run.scene.operation.speed
+def _stresses(result: Survey) -> tuple[pd.DataFrame, dict[str, np.ndarray]]:
+    """Table of extremes and node fields: displacement and stress under the rotation, of the first modes and of the
+    resonances; collective."""
+    from ..fem.stress import principal, von_mises
+    states = stress_states(result.bodies, excited_set(result.run), PICTURES, result.answer)
+    table, nodal = stress_table(result.bodies, states)
     fields = {}
-    if rotating > 0:
-        u0 = rotating ** 2 * bodies.swell
-        stress = nodal_stress(body, u0)
-        fields = {"rotation, displacement [m]": np.pad(u0, ((0, 0), (0, 3 - u0.shape[1]))),
-                  "rotation, von Mises [Pa]": von_mises(stress),
-                  "rotation, largest principal [Pa]": principal(stress)[:, 0]}
-    for i, shape in enumerate(excited.shapes[:PICTURES]):
-        largest = max(np.linalg.norm(shape, axis=1).max(), 1e-300)
-        fields[f"mode {i + 1}, von Mises for 1 mm [Pa]"] = von_mises(nodal_stress(body, 1e-3 / largest * shape))
-    return fields
+    for name, stress in nodal.items():
+        if not name.startswith("mode"):
+            fields |= _vectors(f"{name}, displacement", states[name])
+        fields[f"{name}, von Mises [Pa]"] = von_mises(stress)
+        fields[f"{name}, largest principal [Pa]"] = principal(stress)[:, 0]
+    return table, fields
+
+
+def _vectors(name: str, u: np.ndarray) -> dict[str, np.ndarray]:
+    """A displacement as one field, or as real and imaginary part."""
+    return {f"{name}, real [m]": u.real, f"{name}, imaginary [m]": u.imag} if np.iscomplexobj(u) else {f"{name} [m]": u}
 
 
 def _drawings(result: Survey, tables: dict[str, pd.DataFrame],
@@ -123,6 +129,10 @@ def _drawings(result: Survey, tables: dict[str, pd.DataFrame],
     out["wave.gif"] = lambda file: modes.animate_wave(run.mesh, excited, turning, file, family=names[turning])
     if wheel:
         out["nodal_diameters.png"] = lambda file: speed.draw_nodal_diameters(tables["frequencies"], file)
+    if result.answer is not None:
+        out["forced_response.png"] = lambda file: forced.draw_forced(
+            tables["forced_response"], tables["resonances"], file,
+            title=f"linear response to engine order {run.scene.excitation.engine_order}")
     if result.convergence is not None:
         out["convergence.png"] = lambda file: convergence.draw_convergence(
             tables["convergence_points"], tables["convergence"], file)

@@ -20,7 +20,8 @@ from ..reduction.assemble import folded_diameter
 from .ports import blade_ports
 from .stages import Bodies, is_wheel
 
-__all__ = ["Forced", "displacement", "excitation_load", "forced", "peak", "pressure_load", "probe", "static_offset"]
+__all__ = ["Forced", "displacement", "excitation_load", "forced", "half_widths", "peak", "pressure_load", "probe",
+           "static_offset"]
 
 MODES = 20
 
@@ -114,11 +115,17 @@ def peak(response: Forced, vector: np.ndarray, mode: int = 1) -> tuple[float, fl
     if not 1 <= mode <= len(response.omega):
         raise InputError(f"mode is {mode}, expected 1 to {len(response.omega)}")
     w = response.omega[mode - 1]
-    width = np.clip(3 * abs(_damping(response, w)[mode - 1]) / w ** 2, 1e-6, 0.05)
+    width = np.clip(6 * half_widths(response)[mode - 1], 1e-6, 0.05)
     f = w / (2 * np.pi)
     best = minimize_scalar(lambda x: -abs(probe(response, vector, np.array([x * f]))[0]),
                            bounds=(1 - width, 1 + width), method="bounded", options={"xatol": 1e-10})
     return float(best.x * f), float(-best.fun)
+
+
+def half_widths(response: Forced) -> np.ndarray:
+    """(m,) half of the half-power bandwidth of each mode over its frequency: its damping ratio at resonance."""
+    w = response.omega
+    return abs(np.array([_damping(response, x)[i] for i, x in enumerate(w)])) / (2 * w ** 2)
 
 
 def static_offset(bodies: Bodies, load: np.ndarray | None = None) -> np.ndarray:

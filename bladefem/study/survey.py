@@ -16,10 +16,12 @@ from geometry.mesh import Mesh
 from ..data import ModeSet
 from ..encode import read_npz
 from ..errors import InputError
+from ..hbm.model import Damping
 from ..reduction.assemble import folded_diameter
 from ..scene import Scene
 from ..store import code_of, key_of, on_root, stage
 from . import pipeline
+from .answer import Answer, answer
 from .campbell import Campbell, campbell
 from .converge import Convergence, converge, default_sizes
 from .effective import effective_masses
@@ -41,6 +43,8 @@ class Wanted:
     sizes: Sequence[float] | None = None        # [m] of a refinement study; empty: chosen
     other: Path | None = None                   # folder of a run to compare with
     direct: bool = False                        # every nodal diameter from scratch
+    loads: Sequence[tuple[str, float]] | None = None    # of a linear forced response; empty: the scene's excitation
+    damping: Damping | None = None              # of that response; the scene's modal damping when left out
 
 
 @dataclass(frozen=True)
@@ -52,6 +56,7 @@ class Survey:
     masses: pd.DataFrame                        # effective masses
     campbell: Campbell | None = None
     convergence: Convergence | None = None
+    answer: Answer | None = None                # linear forced response
     mac: np.ndarray | None = None               # (modes, modes of the other run) in the excited nodal diameter
     compared: ModeSet | None = field(default=None, repr=False)      # the other run's
     clamped: ModeSet | None = field(default=None, repr=False)       # of the aerofoil clamped at its root, at rest
@@ -84,6 +89,9 @@ def survey(scene: Scene, folder: str | Path, wanted: Wanted, comm: Any = None,
         result = replace(result, convergence=converge(scene, sizes, None if n is None else [n], comm=comm,
                                                       progress=progress))
         clock = _timed(run, "mesh refinement", clock)
+    if wanted.loads is not None:
+        result = replace(result, answer=answer(bodies, wanted.loads, wanted.damping))
+        clock = _timed(run, "forced response", clock)
     return result if other is None else _compared(result, *other)
 
 

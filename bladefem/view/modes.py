@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -209,7 +209,7 @@ def wheel_camera(mesh: Mesh) -> tuple[tuple[float, float, float], tuple[float, f
 
 
 def animate_wave(mesh: Mesh, modes: ModeSet, number: int, file: str | Path, *, family: str = "", frames: int = 24,
-                 pixels: int = 480, progress: Callable[[int, int], None] | None = None) -> Path:
+                 pixels: int = 480) -> Path:
     """Write an endless GIF of one period: a travelling wave for complex modes, a standing one for real modes.
 
     Args:
@@ -220,7 +220,6 @@ def animate_wave(mesh: Mesh, modes: ModeSet, number: int, file: str | Path, *, f
         family: name of the mode family, shown in the title.
         frames: pictures in one period.
         pixels: width and height.
-        progress: called with (frames done, frames).
     """
     import matplotlib
     from PIL import Image, ImageDraw, ImageFont
@@ -228,13 +227,11 @@ def animate_wave(mesh: Mesh, modes: ModeSet, number: int, file: str | Path, *, f
     face = str(Path(matplotlib.get_data_path(), "fonts/ttf/DejaVuSans.ttf"))
     font, small = (ImageFont.truetype(face, max(pixels // k, 9)) for k in (34, 42))
     pictures = []
-    for k, image in enumerate(wave_frames(mesh, modes, number, frames, pixels)):
+    for image in wave_frames(mesh, modes, number, frames, pixels):
         picture = Image.fromarray(image)
         ImageDraw.Draw(picture).text((10, 8), mode_title(modes, number, family), fill="black", font=font)
         ImageDraw.Draw(picture).text((10, pixels - 2 * font.size), exaggeration(mesh), fill="#555555", font=small)
         pictures.append(picture.quantize(96))
-        if progress:
-            progress(k + 1, frames)
     Path(file).parent.mkdir(parents=True, exist_ok=True)
     pictures[0].save(file, save_all=True, append_images=pictures[1:], duration=1600 // frames, loop=0, optimize=True)
     return Path(file)

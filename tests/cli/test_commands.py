@@ -56,7 +56,7 @@ def pipeline(monkeypatch):
     def modes(scene, folder, wanted, pictures, comm, progress):
         found = run(scene, folder, "modes", comm, progress)
         state.wanted, state.pictures = wanted, pictures
-        return SimpleNamespace(run=found, campbell=None, convergence=None, mac=np.eye(2))
+        return SimpleNamespace(run=found, campbell=None, convergence=None, answer=None, mac=np.eye(2))
 
     replace_module(monkeypatch, bladefem.report, "modes", modes)
     replace_module(monkeypatch, bladefem.study, "pipeline", run)
@@ -108,6 +108,11 @@ def test_options_of_modes(pipeline, tmp_path):
     assert main(["modes", WEDGE, "-o", str(tmp_path), "--converge"]) == 0
     wanted = pipeline.state.wanted
     assert (wanted.speeds, wanted.sizes, wanted.other, wanted.direct) == (None, [], None, False)
+    assert wanted.loads is None and wanted.damping is None
+    assert main(["modes", WEDGE, "-o", str(tmp_path), "--forced", "tip=2 kPa", "--damping", "structural=0.2 %"]) == 0
+    wanted = pipeline.state.wanted
+    assert wanted.loads == [("tip", 2000.0)] and wanted.damping.structural == pytest.approx(0.002)
+    assert main(["modes", WEDGE, "-o", str(tmp_path), "--damping", "ratio=1 %"]) == 2
     assert main(["modes", WEDGE, "-o", str(tmp_path), "--campbell", "quick"]) == 2
     assert main(["modes", WEDGE, "-o", str(tmp_path), "--pictures", "-1"]) == 2
 

@@ -18,16 +18,18 @@ PLANE = ["modes", "scenes/plane.toml", "--set", "mesh.size=5 mm"]
 def folder(tmp_path_factory):
     """A plane blade with everything but the refinement study, one mode drawn."""
     place = tmp_path_factory.mktemp("plane")
-    assert main([*PLANE, "-o", str(place), "--campbell", "0, 3000, 6000 rpm", "--pictures", "1"]) == 0
+    assert main([*PLANE, "-o", str(place), "--campbell", "0, 3000, 6000 rpm", "--pictures", "1", "--forced",
+                 "excitation, pressure_side=100 Pa"]) == 0
     return place
 
 
 def test_folder_holds_tables_pictures_and_shapes(folder):
     names = {file.name for file in folder.iterdir()}
     for table in ("frequencies", "excited_modes", "effective_masses", "campbell", "crossings", "interference",
-                  "margins"):
+                  "margins", "forced_response", "resonances", "stresses"):
         assert {f"{table}.{kind}" for kind in ("csv", "md", "tex")} <= names
-    assert {"modes.png", "mode_1.png", "wave.gif", "campbell.png", "modes.vtu", "stress.vtu"} <= names
+    assert {"modes.png", "mode_1.png", "wave.gif", "campbell.png", "forced_response.png", "modes.vtu",
+            "stress.vtu"} <= names
     shapes = read_results(folder / "modes.nc", "modes")
     table = pd.read_csv(folder / "frequencies.csv")
     np.testing.assert_allclose(shapes["frequency"].values.ravel(), table["frequency [Hz]"], rtol=1e-8)

@@ -11,10 +11,12 @@ from bladefem.fem.body import assemble
 from bladefem.fem.stress import nodal_stress, von_mises
 from bladefem.hbm.model import Damping
 from bladefem.scene import Material
+from bladefem.study.answer import answer, read_damping, read_loads, stress_states, stress_table
 from bladefem.study.linear import (
     displacement,
     excitation_load,
     forced,
+    half_widths,
     peak,
     pressure_load,
     probe,
@@ -129,3 +131,51 @@ def test_preload_is_chosen_by_the_scene():
         parted.append(abs(g / f - 1).max())
     assert 0 < parted[1] < 1e-2
     assert 10 < parted[1] / parted[0] < 24
+
+
+def test_curve_holds_every_resonance_and_its_half_power_points():
+    """Peaks of the curve are the resonances; across each the amplitude falls to 1/sqrt 2 at the modal damping ratio."""
+    one = bodies(order=2)
+    found = answer(one, [("excitation", 0.0)], Damping(structural=0.004), count=2)
+    assert half_widths(found.response) == pytest.approx(0.002)
+    points, row = found.points, found.resonances.iloc[0]
+    below = points["frequency"] < 1.2 * row["natural"]
+    assert row["amplitude"] == pytest.approx(points["amplitude"][below].max(), rel=1e-3)
+    vector = excitation_load(one) / one.scene.excitation.force
+    sides = abs(probe(found.response, vector, row["natural"] * np.array([0.998, 1.002])))
+    assert sides / row["amplitude"] == pytest.approx(np.sqrt(0.5), rel=0.01)
+    assert np.linalg.norm(found.shapes[0], axis=1).max() == pytest.approx(row["largest"])
+    doubled = answer(one, [("excitation", 0.0), ("excitation", 0.0)], Damping(structural=0.004), count=2)
+    assert doubled.points["amplitude"].to_numpy() == pytest.approx(2 * points["amplitude"].to_numpy())
+
+
+def test_words_for_loads_and_damping():
+    assert read_loads("") == [] and read_loads("excitation, tip=2 kPa") == [("excitation", 0.0), ("tip", 2000.0)]
+    assert read_damping("ratio=0.1 %, structural=0.002") == Damping(ratio=0.001, structural=0.002)
+    assert read_damping("mass=20 1/s, stiffness=1e-7 s") == Damping(mass=20.0, stiffness=1e-7)
+    for read, text, words in ((read_loads, "tip", "face=pressure"), (read_loads, "tip=2 N", "Pa"),
+                              (read_damping, "viscous=1", "'viscous' is unknown"), (read_damping, "mass=1 kg", "1/s")):
+        with pytest.raises(InputError, match=words):
+            read(text)
+    one = bodies(count=COUNT, divisions=SMALL)
+    with pytest.raises(InputError, match="tip"):
+        answer(one, [("tpi", 1.0)])
+    with pytest.raises(InputError, match="some damping"):
+        answer(one, (), Damping())
+
+
+def test_table_of_stresses_has_the_extremes_of_every_state():
+    """Stress is linear in the state, so a scaled mode and a resonance of it have the same place and ratio."""
+    one = bodies(speed=1000.0)
+    modes = wheel_modes(one, 2, [2])[0]
+    states = stress_states(one, modes, 2)
+    assert list(states) == ["rotation", "mode 1 for 1 mm", "mode 2 for 1 mm"]
+    table, nodal = stress_table(one, {**states, "half": 0.5j * states["mode 1 for 1 mm"]})
+    table = table.set_index("state")
+    first, half = table.loc["mode 1 for 1 mm"], table.loc["half"]
+    assert first["largest"] == pytest.approx(1e-3)
+    assert half["von_mises"] == pytest.approx(first["von_mises"] / 2)
+    assert (half["x"], half["y"]) == (first["x"], first["y"])
+    assert first["pressing"] == pytest.approx(-first["principal"])      # every motion comes back with the other sign
+    assert table.loc["rotation", "von_mises"] == pytest.approx(von_mises(nodal["rotation"]).max())
+    assert (table["von_mises_gauss"] > 0.3 * table["von_mises"]).all()

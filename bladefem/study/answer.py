@@ -1,0 +1,150 @@
+"""Linear forced response for a report: curve of amplitude and phase, every resonance, stresses of all states."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field, fields
+
+import numpy as np
+import pandas as pd
+
+from ..data import ModeSet
+from ..errors import InputError, suggestion
+from ..hbm.model import Damping
+from ..scene_fields import split_values
+from ..units import parse
+from .linear import Forced, displacement, excitation_load, forced, peak, pressure_load, probe, static_offset
+from .ports import blade_ports
+from .stages import Bodies
+
+__all__ = ["Answer", "answer", "read_damping", "read_loads", "stress_states", "stress_table"]
+
+SHOWN = 5           # resonances
+AROUND = 41         # points across each resonance
+BETWEEN = 500       # points over the whole band
+WIDTHS = 12.0       # half-widths of a resonance that are drawn closely
+LARGEST = 1e-3      # displacement [m] that the stresses of a mode are given for
+
+
+@dataclass(frozen=True)
+class Answer:
+    """SI columns; complex amplitudes e^{j w t}."""
+
+    response: Forced
+    points: pd.DataFrame        # frequency [Hz], amplitude [m], phase [rad] of the excited nodes along the excitation
+    resonances: pd.DataFrame    # mode, natural [Hz], frequency [Hz], amplitude [m], phase [rad], largest [m] anywhere
+    shapes: np.ndarray = field(repr=False)      # (resonances, n_points, 3) complex displacement [m] at each
+
+
+def answer(bodies: Bodies, loads: Sequence[tuple[str, float]] = (), damping: Damping | None = None,
+           count: int = SHOWN) -> Answer:
+    """Response to the engine order over the band of the first modes; collective.
+
+    Args:
+        loads: pressure waves as names of faces and amplitudes [Pa]; "excitation" is the scene's force, and it alone
+            acts when nothing is given. All are in phase on one blade.
+        damping: modal, structural or Rayleigh; the scene's modal damping when left out.
+        count: resonances.
+
+    Raises:
+        InputError: no such face, no load at all, no damping.
+    """
+    excitation = bodies.scene.excitation
+    parts = [excitation_load(bodies) if face == "excitation" else pressure_load(bodies, face, value)
+             for face, value in loads or [("excitation", 0.0)]]
+    damping = damping or Damping(ratio=bodies.scene.operation.damping)
+    if not any(getattr(damping, f.name) for f in fields(damping)):
+        raise InputError("operation.damping = 0: expected some damping for a forced response")
+    found = forced(bodies, np.sum(parts, axis=0), damping)
+    ports = blade_ports(bodies.mesh, [], excitation)
+    vector = ports.matrix[:, ports.names["probe"]].toarray()[:, 0]
+    count = min(count, len(found.omega))
+    peaks = [peak(found, vector, mode) for mode in range(1, count + 1)]
+    seen = probe(found, vector, np.array([f for f, _ in peaks]))
+    shapes = np.stack([displacement(found, f) for f, _ in peaks]).astype(complex)
+    resonances = pd.DataFrame({"mode": np.arange(1, count + 1), "natural": found.omega[:count] / (2 * np.pi),
+                               "frequency": [f for f, _ in peaks], "amplitude": abs(seen), "phase": np.angle(seen),
+                               "largest": [np.linalg.norm(u, axis=1).max() for u in shapes]})
+    return Answer(found, _curve(found, vector, count), resonances, shapes)
+
+
+def read_loads(text: str) -> list[tuple[str, float]]:
+    """Loads from a text such as "excitation, pressure_side=500 Pa"; empty: the scene's excitation.
+
+    Raises:
+        InputError: no face, no pressure.
+    """
+    out = []
+    for item in split_values(text):
+        name, equals, value = (part.strip() for part in item.partition("="))
+        if name == "excitation" and not equals:
+            out.append((name, 0.0))
+        elif not name or not value:
+            raise InputError(f"forced = {text}: expected 'excitation' or face=pressure, such as pressure_side='500 Pa'")
+        else:
+            out.append((name, parse(value, "Pa", f"forced, {name}")))
+    return out
+
+
+def read_damping(text: str) -> Damping:
+    """Damping from a text such as "ratio=0.1 %, structural=0.2 %" or "mass=20 1/s, stiffness=1e-7 s"; they add.
+
+    Raises:
+        InputError: another word, another unit, a negative number.
+    """
+    units = {"ratio": "1", "structural": "1", "mass": "1/s", "stiffness": "s"}
+    values = {}
+    for item in text.split(","):
+        name, _, value = (part.strip() for part in item.partition("="))
+        if name not in units:
+            raise InputError(f"damping = {text}: '{name}' is unknown{suggestion(name, units)}")
+        values[name] = parse(value, units[name], f"damping, {name}")
+    return Damping(**values)
+
+
+def stress_states(bodies: Bodies, modes: ModeSet, count: int, found: Answer | None = None) -> dict[str, np.ndarray]:
+    """Displacements (n_points, 3) [m] by name: of rotation, of modes scaled to 1 mm, of resonances."""
+    states = {}
+    if bodies.scene.operation.speed > 0:
+        u0 = static_offset(bodies)
+        states["rotation"] = np.pad(u0, ((0, 0), (0, 3 - u0.shape[1])))
+    for i, shape in enumerate(modes.shapes[:count]):
+        largest = max(np.linalg.norm(shape, axis=1).max(), 1e-300)
+        states[f"mode {i + 1} for 1 mm"] = LARGEST / largest * shape
+    for i, shape in enumerate(() if found is None else found.shapes):
+        states[f"resonance {i + 1}"] = shape
+    return states
+
+
+def stress_table(bodies: Bodies, states: dict[str, np.ndarray]) -> tuple[pd.DataFrame, dict[str, np.ndarray]]:
+    """Extremes of each state, and its nodal stresses (n_points, 6) [Pa].
+
+    Returns:
+        columns state, largest [m], von_mises [Pa] at the nodes and where x, y, z [m], von_mises_gauss [Pa] at the
+        Gauss points, principal [Pa] the largest, pressing [Pa] the smallest principal stress; of harmonic motion the
+        extremes in a period.
+    """
+    from ..fem.stress import gauss_stress, nodal_stress, principal, von_mises
+    rows, nodal = [], {}
+    for name, u in states.items():
+        stress = nodal_stress(bodies.still_blade, u)
+        size, sides = von_mises(stress), principal(stress)
+        worst, nodal[name] = size.argmax(), stress
+        low = -principal(-stress)[:, 0].max() if np.iscomplexobj(stress) else sides[:, 2].min()
+        rows.append({"state": name, "largest": np.linalg.norm(u, axis=1).max(), "von_mises": size[worst],
+                     **dict(zip("xyz", bodies.mesh.points[worst], strict=True)),
+                     "von_mises_gauss": von_mises(gauss_stress(bodies.still_blade, u).stress).max(),
+                     "principal": sides[:, 0].max(), "pressing": low})
+    return pd.DataFrame(rows), nodal
+
+
+def _curve(found: Forced, vector: np.ndarray, count: int) -> pd.DataFrame:
+    """Points over the band, close together at the resonances."""
+    from .linear import half_widths
+    f, width = found.omega[:count] / (2 * np.pi), half_widths(found)[:count]
+    near = (f + np.outer(np.sinh(np.linspace(-4, 4, AROUND)) / np.sinh(4), WIDTHS * width * f)).ravel()
+    band = 0.6 * f[0], 1.15 * f[-1]
+    every = np.unique(np.concatenate([np.geomspace(*band, BETWEEN), near]))
+    every = every[(every >= band[0]) & (every <= band[1])]
+    seen = probe(found, vector, every)
+    return pd.DataFrame({"frequency": every, "amplitude": abs(seen), "phase": np.angle(seen)})
