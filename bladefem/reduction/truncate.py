@@ -13,6 +13,7 @@ def truncated(body: PortModel, count: int) -> PortModel:
     """The same body with its lowest `count` modes; exactly what a Rubin reduction with `count` modes would give."""
     left_out = slice(max(count, int((body.omega == 0).sum())), None)
     high, omega = body.shapes[:, left_out], body.omega[left_out]
-    damping = None if body.damping is None else body.damping[:left_out.start, :left_out.start]
-    return replace(body, omega=body.omega[:left_out.start], shapes=body.shapes[:, :left_out.start],
+    kept = slice(left_out.start)
+    damping = None if body.damping is None else body.damping[(kept,) * body.damping.ndim]
+    return replace(body, omega=body.omega[kept], shapes=body.shapes[:, kept],
                    residual=body.residual + (high / omega**2) @ high.conj().T, damping=damping)

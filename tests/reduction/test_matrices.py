@@ -8,6 +8,7 @@ from bladefem.errors import InputError
 from bladefem.reduction.assemble import folded_diameter, join, pair_models, recombine, wheel_models
 from bladefem.reduction.beam import beam_matrices, reference_blade
 from bladefem.reduction.matrices import port_model_from_matrices, read_matrices
+from bladefem.reduction.truncate import truncated
 
 
 def receptance(body, w):
@@ -39,6 +40,16 @@ def test_receptance_of_all_modes_is_exact_and_residual_flexibility_makes_truncat
     np.testing.assert_allclose(receptance(full, w), exact, rtol=0, atol=1e-10 * abs(exact).max())
     few = port_model_from_matrices(M, K, ports, count=3)
     np.testing.assert_allclose(receptance(few, 0.0), P @ np.linalg.solve(K, P.T), rtol=1e-8)
+
+
+@pytest.mark.parametrize("C", [None, 1e-5, np.diag(np.arange(40.0))], ids=["none", "proportional", "coupling modes"])
+def test_modes_left_out_later_are_those_left_out_at_once(C):
+    K, M = beam_matrices()
+    ports = {"contact": np.array([10, 12]), "probe": np.array([38])}
+    C = C * K if isinstance(C, float) else C
+    cut = truncated(port_model_from_matrices(M, K, ports, C=C), 4)
+    once = port_model_from_matrices(M, K, ports, C=C, count=4)
+    np.testing.assert_allclose(receptance(cut, 3000.0), receptance(once, 3000.0), rtol=1e-9)
 
 
 def test_proportional_damping_stays_diagonal():
