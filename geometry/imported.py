@@ -10,6 +10,7 @@ seats and flanks.
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -26,11 +27,13 @@ from .parameters import MeshSize
 from .profile import turn
 from .quality import report, straighten
 from .raw_mesh import RawMesh, read_raw
+from .renaming import read_names, renamed
 from .topology import DIMENSION, FAMILY, boundary, outward
 
 __all__ = ["mesh_of_raw", "read_geometry", "read_mesh"]
 
 LOOSE = 1e-4        # files carry few digits; a match within this share of the face is a match, and is then snapped
+SMALLEST, LARGEST = 1e-4, 20.0      # of a model [m]: beyond these its unit was taken for another
 FLIPPED = {"tetra": [0, 2, 1, 3], "tetra10": [0, 2, 1, 3, 6, 5, 4, 7, 9, 8], "triangle": [0, 2, 1],
            "triangle6": [0, 2, 1, 5, 4, 3]}
 
@@ -48,23 +51,27 @@ def read_geometry(imported: Any, size: MeshSize) -> Mesh:
     if Path(imported.file).suffix.lower() in (".step", ".stp"):
         from .step_file import read_step
 
-        return read_step(imported.file, size, imported.scale, imported.sectors, axis)
-    return read_mesh(imported.file, imported.scale, imported.sectors, axis)
+        return read_step(imported.file, size, imported.scale, imported.sectors, axis, imported.names or ())
+    return read_mesh(imported.file, imported.scale, imported.sectors, axis, imported.names or ())
 
 
 def read_mesh(file: str | Path, scale: float = 1.0, sectors: int = 0,
-              axis: np.ndarray | tuple[float, float, float] = (0.0, 0.0, 1.0)) -> Mesh:
+              axis: np.ndarray | tuple[float, float, float] = (0.0, 0.0, 1.0), names: Iterable[str] = ()) -> Mesh:
     """Mesh from .msh, .med, .unv, .inp, .bdf, .nas, .vtu or .cdb.
 
     Args:
         scale: factor from the file's unit to metres.
         sectors: blades on the wheel, 0 for a single body.
         axis: engine axis through the origin.
+        names: "new = old" for groups that the file calls otherwise, see renaming.py.
 
     Raises:
         InputError: as `read_geometry`.
     """
-    return mesh_of_raw(read_raw(Path(file)), scale, sectors, axis, str(file))
+    raw, wanted = read_raw(Path(file)), read_names(names)
+    if wanted:
+        raw = replace(raw, groups=renamed(raw.groups, wanted))
+    return mesh_of_raw(raw, scale, sectors, axis, str(file))
 
 
 def mesh_of_raw(raw: RawMesh, scale: float, sectors: int, axis: np.ndarray | tuple[float, float, float],
@@ -72,6 +79,10 @@ def mesh_of_raw(raw: RawMesh, scale: float, sectors: int, axis: np.ndarray | tup
     """Names, axes, directions and pairs on what a file holds."""
     mesh = _bodies(raw, source)
     mesh = replace(mesh, points=_axes(mesh, scale, np.asarray(axis, dtype=float)))
+    across = float(np.ptp(mesh.points, axis=0).max())
+    if not SMALLEST < across < LARGEST:
+        raise InputError(f"imported.scale = {scale:g}: the model would be {across:.3g} m across, expected the factor "
+                         "from the file's unit to metres (0.001 for millimetres)")
     mesh = _with_faces(mesh, raw)
     mesh = _paired(mesh, sectors, source)
     points, straightened = straighten(replace(mesh, points=snap(mesh.points, mesh.pairs)))

@@ -3,13 +3,14 @@
 Names come from the file: the solids' (MANIFOLD_SOLID_BREP, else the product's name) and the faces' (ADVANCED_FACE).
 What has no name is called body_1, body_2, ... and face_1, face_2, ... in gmsh's numbering, the order of the file.
 When no face is called cyclic_low, cyclic_high or clamp, they are looked for: two faces that the rotation to the next
-sector carries onto each other; the blade's face nearest to the engine axis.
+sector carries onto each other; the blade's face nearest to the engine axis. The user may name what the file does not.
 Solids are meshed separately: bodies that touch are not glued.
 """
 
 from __future__ import annotations
 
 import re
+from collections.abc import Iterable
 from pathlib import Path
 from types import ModuleType
 
@@ -24,21 +25,24 @@ from .imported import mesh_of_raw
 from .mesh import Mesh
 from .parameters import MeshSize
 from .raw_mesh import from_gmsh_model
+from .renaming import read_names, renamed
 from .session import attempt, gmsh_session
 
 __all__ = ["read_step"]
 
+Named = dict[tuple[int, str], list[int]]       # (dimension, name) to entities
 PREFIX = {"": 1.0, ".MILLI.": 1e-3, ".CENTI.": 1e-2, ".DECI.": 0.1, ".MICRO.": 1e-6, ".KILO.": 1e3}
 
 
 def read_step(file: str | Path, size: MeshSize, scale: float = 1.0, sectors: int = 0,
-              axis: np.ndarray | tuple[float, float, float] = (0.0, 0.0, 1.0)) -> Mesh:
+              axis: np.ndarray | tuple[float, float, float] = (0.0, 0.0, 1.0), names: Iterable[str] = ()) -> Mesh:
     """Mesh of a STEP file with second-order tetrahedra.
 
     Args:
         scale: factor from the file's numbers to metres; 1 leaves it to the unit that the file states.
         sectors: blades on the wheel, 0 for a single body.
         axis: engine axis through the origin.
+        names: "new = old" for faces and solids that the file calls otherwise, see renaming.py.
 
     Raises:
         InputError: the file cannot be read or meshed, or groups are missing.
@@ -51,7 +55,7 @@ def read_step(file: str | Path, size: MeshSize, scale: float = 1.0, sectors: int
     with gmsh_session() as gmsh:
         with attempt("imported.file", f"import '{file}'"):
             _import(gmsh, path, 1.0 if scale == 1.0 else scale / file_unit(text))
-        named = _names(gmsh, text)
+        named = _renamed(_names(gmsh, text), read_names(names))
         named |= _found(gmsh, named, sectors, axis)
         _periodic(gmsh, named, sectors, axis)
         with attempt("mesh.size", f"mesh '{file}'"):
@@ -82,7 +86,7 @@ def _import(gmsh: ModuleType, path: Path, factor: float) -> None:
     gmsh.model.occ.synchronize()
 
 
-def _names(gmsh: ModuleType, text: str) -> dict[tuple[int, str], list[int]]:
+def _names(gmsh: ModuleType, text: str) -> Named:
     """(dimension, name) -> entities, by the names in the file where they can be told apart."""
     named: dict[tuple[int, str], list[int]] = {}
     solids = _written(text)
@@ -96,6 +100,17 @@ def _names(gmsh: ModuleType, text: str) -> dict[tuple[int, str], list[int]]:
         for face, word in zip(sorted(faces), words, strict=True):
             named.setdefault((2, word or f"face_{face}"), []).append(face)
     return named
+
+
+def _renamed(named: Named, wanted: dict[str, list[str]]) -> Named:
+    """The user's names for solids and faces; a new name belongs to the dimension of its first old one."""
+    solids = {name.lower() for dim, name in named if dim == 3}
+    result = {}
+    for dim in (3, 2):
+        groups = {name: tags for (d, name), tags in named.items() if d == dim}
+        here = {new: olds for new, olds in wanted.items() if (olds[0].lower() in solids) == (dim == 3)}
+        result |= {(dim, name): tags for name, tags in renamed(groups, here).items()}
+    return result
 
 
 def _written(text: str) -> list[tuple[str, list[str]]]:

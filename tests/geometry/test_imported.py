@@ -107,6 +107,29 @@ def test_step_block_in_millimetres_with_named_faces(tmp_path):
     assert np.ptp(same_numbers.points, axis=0) == pytest.approx([0.1, 0.02, 0.03], rel=1e-6)
 
 
+def test_groups_get_the_users_names(coarse_sector, tmp_path):
+    """STEP faces without a name, two to one; groups of a mesh file; old names that are not there."""
+    write_step(tmp_path / "a.step", "block", {})
+    size = MeshSize(size=0.01)
+    plain = read_step(tmp_path / "a.step", size).faces
+    mesh = read_step(tmp_path / "a.step", size, names=["clamp = face_1", "sides = face_3 + FACE_4"])
+    assert len(mesh.faces["clamp"]) == len(plain["face_1"]) and "face_1" not in mesh.faces
+    assert len(mesh.faces["sides"]) == len(plain["face_3"]) + len(plain["face_4"])
+    write_msh(replace(coarse_sector, faces={**coarse_sector.faces, "bore": coarse_sector.faces["clamp"]}),
+              tmp_path / "a.msh")
+    assert "foot" in read_mesh(tmp_path / "a.msh", sectors=36, names=["foot=bore"]).faces
+    with pytest.raises(InputError, match=r"imported\.names: the file has no group 'face_9'"):
+        read_step(tmp_path / "a.step", size, names=["clamp = face_9"])
+    with pytest.raises(InputError, match="expected \"new = old\""):
+        read_mesh(tmp_path / "a.msh", sectors=36, names=["foot"])
+
+
+def test_a_file_in_millimetres_is_not_taken_for_metres(coarse_sector, tmp_path):
+    write_msh(replace(coarse_sector, points=1e3 * coarse_sector.points), tmp_path / "a.msh")
+    with pytest.raises(InputError, match=r"imported\.scale = 1: the model would be .* m across"):
+        read_mesh(tmp_path / "a.msh", sectors=36)
+
+
 def test_step_with_a_wrong_scale_is_refused_before_it_is_meshed(tmp_path):
     write_step(tmp_path / "a.step", "block", {})
     with pytest.raises(InputError, match=r"mesh\.size.*cells"):
