@@ -123,6 +123,8 @@ class Imported:
     scale: float = quantity(1.0, "1", 1e-9, 1e9, "factor from the file's length unit to metres")
     sectors: int = quantity(0, "1", 0, 1000, "number of sectors; 0 for a single body without cyclic faces")
     axis: tuple[float, float, float] = quantity((0.0, 0.0, 1.0), "1", help="engine axis through the origin")
+    materials: tuple[str, ...] | None = quantity(
+        None, help="materials of named volumes, as texts like 'disc: E=114 GPa; nu=0.34; rho=4430 kg/m^3'")
     names: tuple[str, ...] | None = quantity(None, help="names for groups of the file that has others, such as "
                                                         "'clamp = face_3 + face_4', 'tip = face_1'")
 

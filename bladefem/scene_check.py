@@ -12,6 +12,7 @@ from pathlib import Path
 from .errors import InputError
 from .scene import Scene
 from .scene_fields import convert, each_field, used_tables
+from .scene_parts import part_materials
 from .units import show
 
 __all__ = ["validate"]
@@ -116,6 +117,7 @@ def _punch(scene: Scene) -> Iterator[str]:
 
 def _imported(scene: Scene) -> Iterator[str]:
     file = scene.imported.file
+    part_materials(scene)
     if not file:
         yield "[imported]: a scene of kind 'imported' needs this table with file = \"path to a mesh or STEP file\""
     elif not Path(file).is_file():

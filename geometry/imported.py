@@ -1,7 +1,8 @@
 """A user's own mesh or STEP file as a Mesh: names, axes, pairs.
 
-Names are read without regard to case, blanks count as underscores. Volumes: "blade" and "damper"; when nothing is
-called "blade", every cell outside "damper" is blade. Faces, edges and node sets: the names of geometry.mesh.Mesh;
+Names are read without regard to case, blanks count as underscores. Volumes: every cell outside "damper" belongs to the
+body "blade", whatever its volume is called; the names are kept as its parts, which may have materials of their own.
+Faces, edges and node sets: the names of geometry.mesh.Mesh;
 others are kept. A node set becomes a face too when it holds all corners of outer facets (Abaqus NSET, Ansys
 components). The model is turned so that the engine axis is z and +x is midway between the cyclic faces. Pairs are
 matched, not made: the mesh must be periodic from cyclic_low to cyclic_high (either sense), and have matching nodes on
@@ -107,11 +108,14 @@ def _bodies(raw: RawMesh, source: str) -> Mesh:
     rows = {_word(name): np.concatenate([rows + start[b] for b, rows in parts])
             for name, parts in raw.groups.items() if parts and all(b in start for b, _ in parts)}
     damper = np.unique(rows.get("damper", np.empty(0, dtype=int)))
-    blade = np.unique(rows["blade"]) if "blade" in rows else np.setdiff1d(np.arange(len(every)), damper)
-    if np.intersect1d(blade, damper).size:
+    blade = np.setdiff1d(np.arange(len(every)), damper)
+    if "blade" in rows and np.intersect1d(rows["blade"], damper).size:
         raise InputError(f"imported.file = '{source}': groups blade and damper share cells, expected separate bodies")
     bodies = {"blade": every[blade]} | ({"damper": every[damper]} if damper.size else {})
-    return Mesh(raw.points, kinds[0], {n: _positive(raw.points, c, kinds[0], source) for n, c in bodies.items()})
+    parts = {name: np.searchsorted(blade, np.unique(some)) for name, some in rows.items()
+             if some.size and not np.isin(some, damper).any()}
+    return Mesh(raw.points, kinds[0], {n: _positive(raw.points, c, kinds[0], source) for n, c in bodies.items()},
+                parts=parts)
 
 
 def _positive(points: np.ndarray, cells: np.ndarray, word: str, source: str) -> np.ndarray:

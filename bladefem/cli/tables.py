@@ -43,6 +43,7 @@ def mesh_quality(mesh: Any) -> str:
     """Sizes of bodies and faces, then what the mesher reports."""
     rows = [["points", len(mesh.points)]]
     rows += [[f"body {name}, cells", len(cells)] for name, cells in mesh.bodies.items()]
+    rows += [[f"volume {name}, cells", len(part)] for name, part in mesh.parts.items()]
     rows += [[f"face {name}, cells", len(cells)] for name, cells in mesh.faces.items()]
     rows += [row for row in quality_rows(mesh) if row[0] not in ("elements", "nodes")]
     return plain(rows, ["mesh", "value"])

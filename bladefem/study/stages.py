@@ -14,14 +14,15 @@ from geometry.mesh import Mesh
 from ..contact.patch import make_patch
 from ..contact.seat import spin_axis
 from ..data import ModeSet, Patch, PortModel
-from ..errors import InputError
+from ..errors import InputError, suggestion
 from ..reduction.assemble import folded_diameter
 from ..scene import Material, Scene
+from ..scene_parts import part_materials
 from ..store import on_root
 from .ports import blade_ports, damper_ports
 
-__all__ = ["Bodies", "Reduced", "build_mesh", "contact_patches", "find_modes", "harmonic_diameters", "is_wheel",
-           "reduce_sector", "seat_damper", "wheel_modes"]
+__all__ = ["Bodies", "Reduced", "blade_parts", "build_mesh", "contact_patches", "find_modes", "harmonic_diameters",
+           "is_wheel", "reduce_sector", "seat_damper", "wheel_modes"]
 
 MODES_SHOWN = 10        # of each nodal diameter, in tables and pictures
 DAMPER_MODES = 16       # of the elastic damper, its six rigid ones included
@@ -46,7 +47,8 @@ class Bodies:
     def still_blade(self) -> Any:
         """fem.body.Body of the blade at rest."""
         from ..fem.body import assemble
-        return assemble(self.mesh, "blade", self.scene.material.blade, self.comm)
+        mesh, materials = blade_parts(self.scene, self.mesh)
+        return assemble(mesh, tuple(materials), materials, self.comm)
 
     @cached_property
     def blade(self) -> Any:
@@ -226,6 +228,29 @@ def reduce_sector(bodies: Bodies, patches: list[Patch], diameters: Sequence[int]
     first = len(patches[0].area) * mesh.dimension
     return Reduced(sector, floating, slice(first, first + len(patches[1].area) * mesh.dimension),
                    mesh.sector.count if is_wheel(mesh) else 0, mass(bodies.damper.con.body))
+
+
+def blade_parts(scene: Scene, mesh: Mesh) -> tuple[Mesh, dict[str, Material]]:
+    """The mesh with the volumes of other materials as bodies beside the rest of the blade, and the material of each.
+
+    Raises:
+        InputError: a volume with a material that the mesh does not have, or that shares cells with another one.
+    """
+    given = part_materials(scene) if scene.kind == "imported" else {}
+    if not given:
+        return mesh, {"blade": scene.material.blade}
+    cells, owner = mesh.bodies["blade"], np.zeros(len(mesh.bodies["blade"]), int)
+    for i, name in enumerate(given, 1):
+        if name not in mesh.parts:
+            raise InputError(f"imported.materials: the mesh has no volume '{name}'{suggestion(name, mesh.parts)}")
+        if owner[mesh.parts[name]].any():
+            raise InputError(f"imported.materials: volume '{name}' shares cells with another one, "
+                             "expected separate ones")
+        owner[mesh.parts[name]] = i
+    names = [("blade", scene.material.blade), *given.items()]
+    some = [(i, name) for i, (name, _) in enumerate(names) if (owner == i).any()]
+    bodies = {f"blade, {name}": cells[owner == i] for i, name in some}
+    return replace(mesh, bodies={**mesh.bodies, **bodies}), {f"blade, {name}": names[i][1] for i, name in some}
 
 
 def _damper_material(scene: Scene, mesh: Mesh) -> Material:

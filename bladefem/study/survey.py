@@ -107,7 +107,7 @@ def clamped_blade(bodies: Bodies) -> ModeSet | None:
     if not is_wheel(mesh) or not {"pressure_side", "suction_side"} & set(mesh.faces):
         return None
     root = np.flatnonzero(mesh.points[:, 0] <= blade_root(mesh) + 1e-9)
-    held = replace(mesh, nodes={**mesh.nodes, "aerofoil_root": root})
+    held = replace(bodies.still_blade.mesh, nodes={**mesh.nodes, "aerofoil_root": root})
     return modes(constrain(replace(bodies.still_blade, mesh=held), "aerofoil_root"), MODES_SHOWN)
 
 
