@@ -27,7 +27,7 @@ from bladefem.view.outcomes import draw_outcomes
 COARSE = os.environ.get("BLADEFEM_COARSE") == "1"
 H, SAMPLES = 5, 256
 FREQUENCY = 1230.0      # of the plane (load, stiffness) [Hz]
-PLANES = {"frequency": ("frequency", "frequency [Hz]", 1.0), "stiffness": ("stiffness", "stiffness [N/um]", 1e-6)}
+PLANES = {"frequency": ("frequency", "frequency [Hz]", 1.0), "stiffness": ("stiffness", "stiffness [N/µm]", 1e-6)}
 
 
 def grid() -> list[tuple[float, float, float]]:

@@ -9,7 +9,8 @@ from matplotlib.transforms import Bbox
 
 __all__ = ["names_apart"]
 
-PLACES = ((6, 7, "left"), (6, -13, "left"), (-6, 7, "right"), (-6, -13, "right"), (11, -3, "left"), (-11, -3, "right"))
+PLACES = ((6, 7, "left"), (6, -13, "left"), (-6, 7, "right"), (-6, -13, "right"), (9, 11, "left"), (9, -17, "left"),
+          (-9, 11, "right"), (-9, -17, "right"), (11, -3, "left"))     # offsets [points] and which end is held
 
 
 def names_apart(ax: Any) -> None:
@@ -22,7 +23,8 @@ def names_apart(ax: Any) -> None:
             text.xyann = (x, y)
             text.set_ha(side)
             box = text.get_window_extent()
-            if inside.x0 <= box.x0 and box.x1 <= inside.x1 and inside.y0 <= box.y0 and not box.count_overlaps(taken):
+            fits = inside.x0 <= box.x0 and box.x1 <= inside.x1 and inside.y0 <= box.y0 and box.y1 <= inside.y1 + 2
+            if fits and not box.count_overlaps(taken):
                 taken.append(box)
                 break
         else:

@@ -10,6 +10,7 @@ import numpy as np
 import pandas as pd
 from matplotlib.colors import LogNorm
 from matplotlib.patches import Patch as Swatch
+from matplotlib.ticker import MaxNLocator
 
 from .style import canvas
 
@@ -65,6 +66,17 @@ def _draw(ax: Any, part: pd.DataFrame, y: str, norm: LogNorm) -> None:
     ax.imshow(colours, origin="lower", aspect="auto", interpolation="nearest")
     ax.grid(False)
     for axis, values in ((ax.xaxis, cells.columns), (ax.yaxis, cells.index)):
-        chosen = np.unique(np.linspace(0, len(values) - 1, 4).astype(int))
-        axis.set_ticks(chosen, [f"{values[i]:.4g}" for i in chosen])
+        ticks, places = _round_ticks(np.asarray(values, float))
+        axis.set_ticks(places, [f"{tick:g}" for tick in ticks])
     ax.tick_params(labelsize=7)
+
+
+def _round_ticks(values: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Round numbers within a grid, decades where it spans two of them, and where they fall among its cells."""
+    cells = np.arange(len(values))
+    if len(values) < 2 or values[0] <= 0 or values[-1] < 50 * values[0]:
+        ticks = np.array([t for t in MaxNLocator(4, steps=(1, 2, 5, 10)).tick_values(values[0], values[-1])
+                          if values[0] <= t <= values[-1]])
+        return ticks, np.interp(ticks, values, cells)
+    ticks = 10.0 ** np.arange(np.ceil(np.log10(values[0]) - 1e-9), np.floor(np.log10(values[-1]) + 1e-9) + 1)
+    return ticks, np.interp(np.log(ticks), np.log(values), cells)
