@@ -20,6 +20,13 @@ __all__ = ["RawMesh", "from_gmsh_model", "read_by_gmsh", "read_by_meshio", "read
 # Rows: gmsh's place <- VTK's (meshio's, Abaqus', Ansys', Nastran's) number, where they differ.
 FROM_VTK = {"tetra10": [0, 1, 2, 3, 4, 5, 6, 7, 9, 8],
             "hexahedron20": [0, 1, 2, 3, 4, 5, 6, 7, 8, 11, 16, 9, 17, 10, 18, 19, 12, 15, 13, 14]}
+# Element type -> corners of each face without a middle node, in the order in which gmsh numbers these nodes -> the
+# nodes in the middle of its edges.
+WITHOUT_CENTRE = {"quad8": {(0, 1, 2, 3): (4, 5, 6, 7)},
+                  "hexahedron20": {(0, 3, 2, 1): (9, 13, 11, 8), (0, 1, 5, 4): (8, 12, 16, 10),
+                                   (0, 4, 7, 3): (10, 17, 15, 9), (1, 2, 6, 5): (11, 14, 18, 12),
+                                   (2, 3, 7, 6): (13, 15, 19, 14), (4, 5, 6, 7): (16, 18, 19, 17)}}
+COMPLETE = {"quad8": "quad9", "hexahedron20": "hexahedron27"}
 
 
 @dataclass(frozen=True)
@@ -44,7 +51,7 @@ def read_raw(file: Path) -> RawMesh:
     if suffix not in READERS:
         raise InputError(f"imported.file = '{file}': unknown kind of mesh; known are {', '.join(sorted(READERS))}")
     try:
-        return READERS[suffix](file)
+        return completed(READERS[suffix](file))
     except InputError:
         raise
     except Exception as error:              # readers of foreign files raise whatever they like
@@ -98,6 +105,34 @@ def read_by_meshio(file: Path) -> RawMesh:
     points = np.zeros((len(mesh.points), 3))
     points[:, :mesh.points.shape[1]] = mesh.points
     return RawMesh(points, blocks, groups, sets)
+
+
+def completed(raw: RawMesh) -> RawMesh:
+    """Hexahedra of 20 nodes and faces of 8 get the nodes in the middle of faces and cells that 27 and 9 have.
+
+    They lie where the serendipity shape functions put them (corners -1/4; middles of edges 1/2 on a face, 1/4 in a
+    cell), so the shape stays and the displacements get richer.
+    """
+    if not any(kind in WITHOUT_CENTRE for kind, _ in raw.blocks):
+        return raw
+    x = raw.points
+    corner = np.vstack([cells[:, face] for kind, cells in raw.blocks for face in WITHOUT_CENTRE.get(kind, {})])
+    middle = np.vstack([cells[:, edges] for kind, cells in raw.blocks
+                        for edges in WITHOUT_CENTRE.get(kind, {}).values()])
+    _, first, number = np.unique(np.sort(corner, axis=1), axis=0, return_index=True, return_inverse=True)
+    points = [x, x[middle[first]].sum(1) / 2 - x[corner[first]].sum(1) / 4]
+    number, size, start, blocks = number.ravel() + len(x), len(x) + len(first), 0, []
+    for kind, cells in raw.blocks:
+        more = [cells]
+        for _ in WITHOUT_CENTRE.get(kind, {}):
+            more.append(number[start:start + len(cells)])
+            start += len(cells)
+        if kind == "hexahedron20":
+            points.append(x[cells[:, 8:]].sum(1) / 4 - x[cells[:, :8]].sum(1) / 4)
+            more.append(size + np.arange(len(cells)))
+            size += len(cells)
+        blocks.append((COMPLETE.get(kind, kind), np.column_stack(more)))
+    return RawMesh(np.vstack(points), blocks, raw.groups, raw.node_sets)
 
 
 def _to_gmsh(word: str, cells: np.ndarray) -> np.ndarray:

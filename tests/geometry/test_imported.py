@@ -2,15 +2,20 @@
 
 from dataclasses import replace
 
+import meshio
 import numpy as np
 import pytest
+from structured import box, sector
 from writers import write_cdb, write_inp, write_step
 
 from bladefem.errors import InputError
+from bladefem.fem.loads import volume
 from geometry.export import write_msh
 from geometry.imported import read_mesh
 from geometry.parameters import Disc, MeshSize, Plane
 from geometry.plane import plane_blades
+from geometry.profile import turn
+from geometry.session import gmsh_session
 from geometry.step_file import read_step
 
 PAIRS = {"cyclic", "this", "next"}
@@ -144,3 +149,46 @@ def test_step_sector_finds_its_cyclic_faces_and_its_bore(tmp_path):
     np.testing.assert_allclose(mesh.points[pair.nodes[1]], mesh.points[pair.nodes[0]] @ pair.rotation.T, atol=1e-14)
     radius = np.hypot(*mesh.points[np.unique(mesh.faces["clamp"])].T[:2])
     np.testing.assert_allclose(radius, disc.bore_radius, rtol=1e-6)
+
+
+@pytest.mark.parametrize("kind", ["hexahedron20", "hexahedron27", "hexahedron", "tetra", "tetra10"])
+@pytest.mark.parametrize("suffix", ["msh", "med"])
+def test_every_kind_of_cell_gives_the_same_mesh_back(kind, suffix, tmp_path):
+    """Hexahedra of 20 nodes get those in the middle of faces and cells, where a mesh of 27 has them on flat faces."""
+    whole = sector(6, (3, 2, 1), kind.replace("20", "27"), inner=0.1, outer=0.3, straight=True)
+    written = without_centres(whole) if kind.endswith("20") else whole
+    write_msh(written, tmp_path / "a.msh")
+    if suffix == "med":
+        with gmsh_session() as gmsh:
+            gmsh.merge(str(tmp_path / "a.msh"))
+            gmsh.write(str(tmp_path / "a.med"))
+    found = read_mesh(tmp_path / f"a.{suffix}", sectors=6)
+    assert found.cell_type == whole.cell_type and found.pairs["cyclic"].nodes.shape == whole.pairs["cyclic"].nodes.shape
+    assert found.faces["clamp"].shape == whole.faces["clamp"].shape
+    order, other = (np.lexsort(np.round(x, 9).T) for x in (found.points, turned_home(whole)))
+    np.testing.assert_allclose(found.points[order], turned_home(whole)[other], atol=1e-12)
+    assert volume(found, "blade") == pytest.approx(volume(whole, "blade"), rel=1e-12)
+
+
+def without_centres(mesh):
+    """The same mesh with the 20- and 8-node cells that older programs have."""
+    return replace(mesh, cell_type="hexahedron20", bodies={n: c[:, :20] for n, c in mesh.bodies.items()},
+                   faces={n: f[:, :8] for n, f in mesh.faces.items()})
+
+
+def turned_home(mesh):
+    """Points turned as the reader turns them, +x midway between the cyclic faces."""
+    low, high = (mesh.points[np.unique(mesh.faces[f"cyclic_{name}"])].mean(axis=0)[:2] for name in ("low", "high"))
+    return mesh.points @ turn(-np.arctan2(*(low / np.linalg.norm(low) + high / np.linalg.norm(high))[::-1])).T
+
+
+def test_nastran_with_faces_as_shells(tmp_path):
+    """Bulk data of 10-node tetrahedra; shells of the property 7 are the clamped face."""
+    block = box((4, 2, 2), (0.1, 0.02, 0.03), "tetra10")
+    cells = block.bodies["blade"][:, [0, 1, 2, 3, 4, 5, 6, 7, 9, 8]]
+    meshio.write(tmp_path / "a.bdf", meshio.Mesh(
+        block.points, [("tetra10", cells), ("triangle6", block.faces["clamp"])],
+        cell_data={"nastran:ref": [np.ones(len(cells), int), np.full(len(block.faces["clamp"]), 7)]}))
+    found = read_mesh(tmp_path / "a.bdf")
+    assert set(found.parts) == {"pid_1"} and found.faces["pid_7"].shape == block.faces["clamp"].shape
+    assert volume(found, "blade") == pytest.approx(0.1 * 0.02 * 0.03, rel=1e-6)
