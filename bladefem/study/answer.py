@@ -13,7 +13,17 @@ from ..errors import InputError, suggestion
 from ..hbm.model import Damping
 from ..scene_fields import split_values
 from ..units import parse
-from .linear import Forced, displacement, excitation_load, forced, peak, pressure_load, probe, static_offset
+from .linear import (
+    Forced,
+    displacement,
+    excitation_load,
+    forced,
+    half_widths,
+    peak,
+    pressure_load,
+    probe,
+    static_offset,
+)
 from .ports import blade_ports
 from .stages import Bodies
 
@@ -32,7 +42,8 @@ class Answer:
 
     response: Forced
     points: pd.DataFrame        # frequency [Hz], amplitude [m], phase [rad] of the excited nodes along the excitation
-    resonances: pd.DataFrame    # mode, natural [Hz], frequency [Hz], amplitude [m], phase [rad], largest [m] anywhere
+    resonances: pd.DataFrame    # mode, natural [Hz], frequency [Hz], amplitude [m], phase [rad], largest [m] anywhere,
+                                # peaked: the amplitude has a maximum there; else the natural frequency is taken
     shapes: np.ndarray = field(repr=False)      # (resonances, n_points, 3) complex displacement [m] at each
 
 
@@ -59,12 +70,15 @@ def answer(bodies: Bodies, loads: Sequence[tuple[str, float]] = (), damping: Dam
     ports = blade_ports(bodies.mesh, [], excitation)
     vector = ports.matrix[:, ports.names["probe"]].toarray()[:, 0]
     count = min(count, len(found.omega))
-    peaks = [peak(found, vector, mode) for mode in range(1, count + 1)]
-    seen = probe(found, vector, np.array([f for f, _ in peaks]))
-    shapes = np.stack([displacement(found, f) for f, _ in peaks]).astype(complex)
-    resonances = pd.DataFrame({"mode": np.arange(1, count + 1), "natural": found.omega[:count] / (2 * np.pi),
-                               "frequency": [f for f, _ in peaks], "amplitude": abs(seen), "phase": np.angle(seen),
-                               "largest": [np.linalg.norm(u, axis=1).max() for u in shapes]})
+    natural = found.omega[:count] / (2 * np.pi)
+    best = np.array([peak(found, vector, mode)[0] for mode in range(1, count + 1)])
+    peaked = abs(best / natural - 1) < np.maximum(4 * half_widths(found)[:count], 1e-6)
+    best = np.where(peaked, best, natural)
+    seen = probe(found, vector, best)
+    shapes = np.stack([displacement(found, f) for f in best]).astype(complex)
+    resonances = pd.DataFrame({"mode": np.arange(1, count + 1), "natural": natural, "frequency": best,
+                               "amplitude": abs(seen), "phase": np.angle(seen),
+                               "largest": [np.linalg.norm(u, axis=1).max() for u in shapes], "peaked": peaked})
     return Answer(found, _curve(found, vector, count), resonances, shapes)
 
 
@@ -140,7 +154,6 @@ def stress_table(bodies: Bodies, states: dict[str, np.ndarray]) -> tuple[pd.Data
 
 def _curve(found: Forced, vector: np.ndarray, count: int) -> pd.DataFrame:
     """Points over the band, close together at the resonances."""
-    from .linear import half_widths
     f, width = found.omega[:count] / (2 * np.pi), half_widths(found)[:count]
     near = (f + np.outer(np.sinh(np.linspace(-4, 4, AROUND)) / np.sinh(4), WIDTHS * width * f)).ravel()
     band = 0.6 * f[0], 1.15 * f[-1]

@@ -18,13 +18,15 @@ def draw_forced(points: pd.DataFrame, resonances: pd.DataFrame, file: str | Path
 
     Args:
         points: columns frequency [Hz], amplitude [m], phase [rad].
-        resonances: columns mode, frequency [Hz], amplitude [m].
+        resonances: columns mode, frequency [Hz], amplitude [m], peaked (else the mark is hollow).
         file: PNG to write.
         title: headline.
     """
     with canvas(file, None, (7.6, 5.4), (2, 1), sharex=True, height_ratios=(2.2, 1)) as (above, below):
         above.plot(points["frequency"], 1e6 * points["amplitude"], color=COLOURS[0], lw=1.4)
-        above.plot(resonances["frequency"], 1e6 * resonances["amplitude"], "o", color=COLOURS[1], ms=4)
+        for seen, part in resonances.groupby("peaked"):
+            above.plot(part["frequency"], 1e6 * part["amplitude"], "o", color=COLOURS[1], ms=4,
+                       mfc=COLOURS[1] if seen else "white")
         for row in resonances.itertuples():
             above.annotate(f"{row.mode}: {row.frequency:.5g} Hz", (row.frequency, 1e6 * row.amplitude), (0, 5),
                            textcoords="offset points", ha="center", fontsize=7)

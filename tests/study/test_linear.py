@@ -145,6 +145,7 @@ def test_curve_holds_every_resonance_and_its_half_power_points():
     sides = abs(probe(found.response, vector, row["natural"] * np.array([0.998, 1.002])))
     assert sides / row["amplitude"] == pytest.approx(np.sqrt(0.5), rel=0.01)
     assert np.linalg.norm(found.shapes[0], axis=1).max() == pytest.approx(row["largest"])
+    assert row["peaked"]
     doubled = answer(one, [("excitation", 0.0), ("excitation", 0.0)], Damping(structural=0.004), count=2)
     assert doubled.points["amplitude"].to_numpy() == pytest.approx(2 * points["amplitude"].to_numpy())
 
