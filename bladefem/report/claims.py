@@ -28,6 +28,7 @@ from bladefem.view.paper import draw_coupled_loops, draw_fit, draw_footprint
 from bladefem.view.paper_contact import draw_branches, draw_punch
 
 from . import paper_blades as blades
+from . import paper_time
 from .claim import Chapter, Claim
 from .zmass import draw_motions
 
@@ -248,8 +249,8 @@ CHAPTERS = (
             "coefficient 0.3, inter-blade phase 0 (Eq. 32 holds for no other). Soft contact: 1e6 N/m a seat; stiff "
             "contact: 1.44e7 N/m. The damper moves along the row only, as in the paper, unless said otherwise; the "
             "judge is the exact integration of the coupled system in time. demos/paper_blades.py.",
-            (blades.finite_elements, blades.accuracy, blades.responses, blades.first_mode, blades.normal_motion,
-             blades.optima)),
+            (blades.finite_elements, blades.accuracy, paper_time.in_time, blades.responses, blades.first_mode,
+             blades.normal_motion, blades.optima)),
     Chapter("Reference blade", "A beam with a lumped platform mass, so that anyone can repeat it without finite "
             "elements: 150 x 30 x 6 mm, steel, 0.05 kg at 45 mm; loads are friction limits of a seat.", (reference,)),
     Chapter("Stability of the solutions", "Floquet multipliers of periodic motions, on the path through its folds.",

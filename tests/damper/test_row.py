@@ -7,8 +7,11 @@ from bladefem.damper.accelerate import Rules, iterate
 from bladefem.damper.blades import judge, optimum, peak
 from bladefem.damper.paper import platform
 from bladefem.hbm.api import solve
+from bladefem.hbm.in_time import time_system
 from bladefem.hbm.resonance import free_resonances
+from bladefem.hbm.shooting import harmonics, periodic
 from bladefem.hbm.sweep import response, size
+from bladefem.report.paper_time import in_one_body
 from bladefem.scene_file import load_scene
 from bladefem.study.row import paper_model, row_of_blades, whole_model
 
@@ -85,3 +88,17 @@ def test_two_motions_where_the_normal_load_follows(row):
         ends[name] = [size(way[-1]) for way in ways]
     assert ends["constant"][1] == pytest.approx(ends["constant"][0], rel=1e-6)
     assert max(ends["follows"]) > 4 * min(ends["follows"])                # 24.9 and 4.5 um
+
+
+def test_the_whole_plane_model_against_integration_in_time(row):
+    """Three freedoms of the damper, normal loads that follow and may open: 6e-4 at resonance under 20 N.
+
+    Points that always stick may carry any mean force, so that the two need not agree to the last digit.
+    """
+    model = in_one_body(whole_model(SOFT, row, 20.0))
+    omega = 2 * np.pi * 1181.5
+    found, system = solve(model, omega, 5, 512), time_system(model, 1)
+    exact = periodic(system, omega, samples=256)
+    assert found.converged and exact.converged
+    assert found.states["lift"] + found.states["slip"] > 0
+    assert abs(found.probe[1, 0] / harmonics(exact, system, 1)[0, 1] - 1) < 2e-3
