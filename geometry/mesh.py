@@ -46,11 +46,11 @@ class Mesh:
     bodies: dict[str, np.ndarray]   # name -> (nc, k) node numbers of its cells
     faces: dict[str, np.ndarray] = field(default_factory=dict)   # name -> (nf, kf) node numbers (edges in 2-D)
     nodes: dict[str, np.ndarray] = field(default_factory=dict)   # name -> (k,) node numbers
-    parts: dict[str, np.ndarray] = field(default_factory=dict)   # named volumes of the blade -> rows of bodies["blade"]
     pairs: dict[str, Pair] = field(default_factory=dict)
     sector: Sector | None = None
     depth: float = 1.0              # out-of-plane thickness of a plane mesh [m]
     report: dict[str, object] = field(default_factory=dict)      # quality: cells, worst Jacobian, straightened, ...
+    parts: dict[str, np.ndarray] = field(default_factory=dict)   # named volumes of the blade -> rows of bodies["blade"]
 
     @property
     def dimension(self) -> int:
