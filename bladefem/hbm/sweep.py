@@ -4,7 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Iterator
 from dataclasses import replace
-from functools import partial
+from functools import cache, partial
+from itertools import chain
 
 import numpy as np
 
@@ -15,11 +16,13 @@ from .fallback import match_harmonics
 from .model import ReducedModel
 from .newton import DEFAULTS, Options
 from .resonance import free_resonances, stuck_resonances
+from .sensitivity import sensitivities
 from .solution import Solution
 
 __all__ = ["first_look", "local_maxima", "response", "size", "sweep"]
 
 Keep = Callable[[float, Callable[[], Solution]], Solution]
+Slope = Callable[[float], float]     # of the height with the frequency, at a solved one
 COARSE = 12     # intervals of the first look at a band
 BAND_LIMIT = 400    # points after which a sweep gives up refining
 
@@ -49,8 +52,9 @@ def sweep(model: ReducedModel, band: tuple[float, float], H: int = 3, samples: i
           curve: float = 0.02, options: Options = DEFAULTS) -> Iterator[Solution]:
     """Solve a band of circular frequencies [rad/s]; points come in the order of need, to be sorted by `omega`.
 
-    A first look takes even steps and the resonances of both linear limits. Then every local maximum is closed in,
-    with 1/amplitude^2 a parabola in omega^2 as it is for one mode, until parabola and solution agree.
+    A first look takes even steps and the resonances of both linear limits. Then every local maximum is closed in: the
+    slope of its highest point is exact, and 1/amplitude^2 a parabola in omega^2, as it is for one mode, that has this
+    slope and meets a neighbour; its vertex is solved next, until it is no higher than the tolerance allows.
 
     Args:
         peak: relative accuracy of each maximum.
@@ -63,11 +67,16 @@ def sweep(model: ReducedModel, band: tuple[float, float], H: int = 3, samples: i
         raise InputError(f"band {band}: expected 0 < low < high")
     check_probe(model, options.probe)
     solved: dict[float, Solution] = {}
+
+    @cache
+    def slope(omega: float) -> float:
+        return float(sensitivities(model, solved[omega], ["omega"])["omega"].size[options.probe])
+
     for solution in response(model, first_look(model, band), H, samples, options=options):
         solved[solution.omega] = solution
         yield solution
     while len(solved) < BAND_LIMIT:
-        wanted = _wanted(solved, peak, curve, options.probe)
+        wanted = _wanted(solved, slope, (peak, curve), options.probe)
         if wanted is None:
             return
         near = sorted((s for s in solved.values() if s.converged), key=lambda s: abs(s.omega - wanted))[:1]
@@ -92,45 +101,41 @@ def first_look(model: ReducedModel, band: tuple[float, float]) -> np.ndarray:
     return np.unique(np.concatenate([grid[[0, -1]], keep, inside]))
 
 
-def _wanted(solved: dict[float, Solution], peak: float, curve: float, probe: int) -> float | None:
+def _wanted(solved: dict[float, Solution], slope: Slope, accuracy: tuple[float, float], probe: int) -> float | None:
     """The next frequency to solve: a maximum that is not closed in yet, else the worst corner; None when done."""
-    tried = np.array(sorted(solved))
+    tried, curve = np.array(sorted(solved)), accuracy[1]
     omegas = np.array([w for w in tried if solved[w].converged])
     if len(omegas) < 3:
         return None
     finest = 1e-7 * (tried[-1] - tried[0])
     heights = np.array([size(solved[w], probe) for w in omegas])
-    for target in (*_peak_targets(omegas, heights, peak, curve), *_corner_targets(omegas, heights, curve)):
+    for target in chain(_peak_targets(omegas, heights, slope, accuracy), _corner_targets(omegas, heights, curve)):
         if abs(tried - target).min() > finest:
             return float(target)
     return None
 
 
-def _peak_targets(omegas: np.ndarray, heights: np.ndarray, peak: float, curve: float) -> Iterator[float]:
+def _peak_targets(omegas: np.ndarray, heights: np.ndarray, slope: Slope,
+                  accuracy: tuple[float, float]) -> Iterator[float]:
+    peak, curve = accuracy
     for i in range(1, len(omegas) - 1):
         if heights[i] >= max(heights[i - 1], heights[i + 1]) and heights[i] > curve * heights.max():
-            target = _next_to_peak(omegas[i - 1:i + 2], heights[i - 1:i + 2], peak)
+            target = _next_to_peak(omegas[i - 1:i + 2], heights[i - 1:i + 2], slope(float(omegas[i])), peak)
             if target is not None:
                 yield target
 
 
-def _next_to_peak(omegas: np.ndarray, heights: np.ndarray, tolerance: float) -> float | None:
-    """Where to look next for the maximum bracketed by three points; None when it is known to the tolerance."""
-    x, y = (omegas**2 - omegas[1]**2) / (omegas[2]**2 - omegas[0]**2), (heights[1] / heights)**2
-    (left, right), (up, down) = (-x[0], x[2]), (y[0] - 1, y[2] - 1)
-    a = (up / left + down / right) / (left + right)
-    if a <= 0:      # three equal heights: nothing to gain
-        return None
-    slope = down / right - a * right
-    vertex, rise = -slope / (2 * a), slope**2 / (4 * a)
-    steep = max(up, down) > 6 * np.sqrt(tolerance)      # too far apart for a parabola to be trusted
-    if rise < tolerance / 2 and not steep:
-        return None
-    if max(left, right) > 8 * min(left, right):         # a lopsided bracket tells little: cut its long side
-        vertex = -2 * right if left > right else 2 * left
-    elif abs(vertex) < 0.05 * min(left, right):         # the middle is the vertex already: narrow the steeper side
-        vertex = -0.3 * left if up > down else 0.3 * right
-    return float(np.sqrt(omegas[1]**2 + vertex * (omegas[2]**2 - omegas[0]**2)))
+def _next_to_peak(omegas: np.ndarray, heights: np.ndarray, slope: float, tolerance: float) -> float | None:
+    """Where to look next for the maximum enclosed by three points, the middle one with its slope; None when known."""
+    (left, _, right), (up, _, down) = abs(omegas**2 - omegas[1]**2), (heights[1] / heights)**2 - 1
+    exact = -slope / heights[1] / omegas[1]         # of 1/height^2 over that of the middle, with omega^2
+    through = (down * left**2 - up * right**2) / (left * right * (left + right))
+    for tilt in (exact, through):                   # sampled friction ripples: the three heights are asked as well
+        bends = (up + tilt * left) / left**2, (down - tilt * right) / right**2
+        uphill = bends[int(tilt < 0)]               # not negative; the flatter parabola promises the larger gain
+        if uphill > 0 and tilt**2 / 4 >= tolerance * min(b for b in bends if b > 0):
+            return float(np.sqrt(omegas[1]**2 - tilt / (2 * uphill)))
+    return None
 
 
 def _corner_targets(omegas: np.ndarray, heights: np.ndarray, curve: float) -> Iterator[float]:
