@@ -16,9 +16,25 @@ Recorded on an idle core whose matrix products run at 45 GFLOP/s, ns for each no
 The 40 ns wanted for 3-D are met in stick and without derivative in gross slip only. A sample in slip turns the row of
 the angle, M = 3K + 3 numbers filled up to 24, 36, 48, by 20 M operations and adds it to both tangents' K harmonics by
 4 K M: 1150, 2300 and 3840 operations for H 3, 5 and 7. At the speed of matrix products that alone is 26, 51 and 85 ns;
-measured are 27, 37 and 57 % of it. A reverse sweep (adjoint of 2K numbers, samples i, S/2 - i, S/2 + i, S - i added up
-before the products) needs 580, 1020 and 1550 operations and was tried, with explicit vectors too: its rows of 16 to 32
-numbers are too short, and it took 1.4, 1.2 and 0.9 times as long in the same run.
+measured are 27, 37 and 57 % of it. Two other ways were tried:
+
+- A reverse sweep (adjoint of 2K numbers, samples i, S/2 - i, S/2 + i, S - i added up before the products), with
+  explicit vectors too: 580, 1020 and 1550 operations, but rows of 16 to 32 numbers are too short; 1.4, 1.2 and 0.9
+  times as long.
+- Eight nodes in the lanes of one vector throughout (march, coefficients, one row of the angle through slip and stick,
+  the same four samples added up, sums over time); a lane that changes state does its edge alone. The sums alone take
+  17, 29 and 39 ns instead of 70, 110 and 115. The whole, complete and equal to this kernel to 1e-13 in the forces, in
+  the same runs on a busy machine, 8 lanes against this kernel with (without) derivative, ns:
+
+      H, samples       3, 128                  5, 128                  7, 512
+      stuck            31 (18) : 14 (9)        53 (22) : 24 (13)       44 (16) : 14 (9)
+      partial          140 (113) : 132 (65)    170 (107) : 141 (64)    134 (75) : 132 (51)
+      mixed            89 (60) : 101 (46)      142 (84) : 135 (50)     97 (43) : 135 (37)
+      gross            57 (29) : 100-123 (30)  90 (35) : 133-140 (34)  71 (22) : 151 (26)
+
+  It wins 1.5 to 2 times where all nodes slip and loses where they stick or change state: some lane of eight changes its
+  state at a third of the samples, and alone it costs as much as eight together. Below 16 nodes it is slower too (one
+  node 1.7 times). The time to compile is the same. Nodes sorted by their state might change this; that was not tried.
 """
 
 from __future__ import annotations
