@@ -242,8 +242,8 @@ def _row(name: str, kind: str, model: ReducedModel, run: Callable, bench: Bench)
     if left_out or lost:
         return _lost(name, kind, seconds, left_out or f"{len(lost)} of {len(points)} frequencies: {lost[0]}", bench)
     peak = resonance(bench.omegas, np.array([p.first for p in points]))
-    told = [p.reason for p in points if "false" in p.reason]
-    reason = f"{len(told)} false points: {told[0]}" if told else ""
+    told = [p.reason for p in points if "false" in p.reason or "not periodic" in p.reason]
+    reason = f"{len(told)} of {len(points)} frequencies: {told[0]}" if told else ""
     if not peak.inside:
         reason = "its resonance lies outside the compared frequencies"
     return _lost(name, kind, seconds, reason, bench) | errors(peak, bench.truth) | {"converged": True}

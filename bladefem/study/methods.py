@@ -31,7 +31,7 @@ from ..reduction.truncate import truncated
 __all__ = ["Method", "Point", "applicable", "balance", "exact", "methods", "tangential"]
 
 HARMONICS = (1, 3, 5, 7, 9, 15, 31)
-PERIODS = 2000      # most that are integrated at one frequency
+PERIODS = 500       # most that are integrated at one frequency
 STIFF = 30.0        # frequency of the modes that stand for the residual flexibility, over the excitation's
 
 
@@ -161,7 +161,10 @@ def paper(H: int, averaged: bool) -> Callable[[ReducedModel, float, object], Poi
 
 
 def integrated(steps: int, explicit: bool) -> Callable[[ReducedModel, float, object], Point]:
-    """Time steps until the motion repeats; the next frequency starts from the last one's end."""
+    """Time steps until the motion repeats; the next frequency starts from the last one's end.
+
+    A stuck damper without damping may ring for ever: after PERIODS the last one counts, and the reason says so.
+    """
     def run(model: ReducedModel, omega: float, start: object) -> Point:
         system = in_time(model, omega)
         try:
@@ -170,7 +173,7 @@ def integrated(steps: int, explicit: bool) -> Callable[[ReducedModel, float, obj
         except (InputError, NotSolvedError) as error:
             return Point(np.nan, False, str(error))
         lines = 2 * np.fft.rfft(cycle.q @ system.probe.T, axis=0) / len(cycle.q)
-        return Point(complex(lines[1, 0]), cycle.reason == "periodic", cycle.reason, cycle.state)
+        return Point(complex(lines[1, 0]), bool(np.isfinite(lines[1, 0])), cycle.reason, cycle.state)
     return run
 
 

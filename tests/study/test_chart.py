@@ -41,8 +41,8 @@ def test_automatic_choice_is_marked_and_right(made):
 
 def test_poor_models_are_seen(made):
     models = made.models.set_index("name")
-    assert models.loc["1 modes", "error"] > 0.1          # mode 2 is studied
-    assert any("1 modes: its resonance lies outside" in remark for remark in made.remarks)
+    assert models.loc["1 mode", "error"] > 0.1          # mode 2 is studied
+    assert any("1 mode: its resonance lies outside" in remark for remark in made.remarks)
     assert any("changed by" in remark for remark in made.remarks)
 
 
