@@ -68,9 +68,9 @@ def methods(one_dimensional: bool) -> Iterator[Method]:
         kind = "" if H == 1 else ", averaged" if averaged else ", each harmonic"
         yield Method(f"paper H {H}{kind}", "paper's iteration", paper(H, averaged))
     for steps in (32, 64, 256):
-        yield Method(f"Newmark {steps}", "direct integration", integrated(steps, explicit=False))
+        yield Method(f"Newmark {steps}", "integration, Newmark", integrated(steps, explicit=False))
     for steps in (512, 2048):
-        yield Method(f"explicit {steps}", "direct integration", integrated(steps, explicit=True))
+        yield Method(f"explicit {steps}", "integration, explicit", integrated(steps, explicit=True))
     yield Method("shooting", "shooting", shooting)
 
 
