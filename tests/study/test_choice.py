@@ -9,8 +9,11 @@ from bladefem.hbm.api import solve
 from bladefem.hbm.reference import reference_model
 from bladefem.hbm.resonance import free_resonances, stuck_resonances
 from bladefem.hbm.sweep import size
+from bladefem.scene_file import load_scene
 from bladefem.study.choice import adapted, checked, choose, estimated, peak_of
 from bladefem.study.family import carried, coarsened, family_of, member
+from bladefem.study.joint import LoadCase
+from bladefem.study.loads import curve_of
 from bladefem.study.settings import enriched, first_for
 
 
@@ -66,3 +69,16 @@ def test_displacements_are_carried_between_numbers_of_points():
     there = carried(w, coarse, fine, 3)
     assert there.shape == (12, 1, 7)
     np.testing.assert_allclose(carried(there, fine, coarse, 1), w)
+
+
+def test_a_response_reports_told_against_tolerated_error_at_each_point():
+    """The tolerated error grows down the flanks; each converged point keeps to it."""
+    scene = load_scene("scenes/plane.toml", ["accuracy=2 %", "study.band=1150 Hz, 1600 Hz"])
+    model = reference_model(load=3.0, points=4, modes=20, harmonics=63)
+    case = LoadCase(3.0, model.elements, np.eye(8))
+    curve = curve_of(scene, case, lambda _: family_of(model), first_for(20))
+    assert curve.tolerated.min() == pytest.approx(0.02)
+    np.testing.assert_allclose(curve.tolerated * curve.amplitude, 0.02 * curve.peak_amplitude)
+    assert curve.converged.all()
+    assert (curve.estimated < curve.tolerated).all()
+    assert curve.checked[curve.frequency == curve.peak_frequency].all()
