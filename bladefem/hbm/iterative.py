@@ -17,6 +17,9 @@ from ..friction.harmonics import to_complex, to_real
 __all__ = ["Memory", "iterative_inverse"]
 
 BASIS = 80          # vectors kept by GMRES
+PASSES = 6          # of GMRES, each on what the last one left
+POOR = 0.1          # reduction by one pass from which the next one runs in double precision
+SINGLE = 1e-3       # reduction of the residual by one pass in single precision that can be trusted
 SLOW = 40           # products of one solve from which new harmonic blocks pay
 
 
@@ -33,7 +36,8 @@ def iterative_inverse(A: np.ndarray, change: np.ndarray,
                       memory: Memory | None = None) -> Callable[[np.ndarray, float], np.ndarray]:
     """The inverse of 1 + A change, applied to residuals (a, K) to a relative accuracy, for a = nodes * d dofs.
 
-    The products run in single precision, which halves the traffic and is exact enough for any accuracy asked for.
+    The products run in single precision, which halves the traffic; what they leave is measured in double precision and
+    solved for again, since next to a singular derivative the step is far longer than the residual.
 
     Args:
         A: (H+1, a, a) flexibility with contact springs [m/N].
@@ -43,17 +47,21 @@ def iterative_inverse(A: np.ndarray, change: np.ndarray,
     a, K = A.shape[1], 2 * A.shape[0] - 1
     light, memory, count = A.astype(np.complex64), memory or Memory(), 0
 
-    def product(x: np.ndarray) -> np.ndarray:
+    def product(x: np.ndarray, flexibility: np.ndarray) -> np.ndarray:
         nonlocal count
         count += 1
         forces = (change @ x.reshape(len(change), -1, 1)).reshape(a, K)
-        return x.ravel() + _flex(light, forces).ravel()
+        return x.ravel() + _flex(flexibility, forces).ravel()
 
-    operator = LinearOperator((a * K, a * K), matvec=product, dtype=float)
-    whole = LinearOperator((a * K, a * K), matvec=lambda x: _flex(memory.blocks, x.reshape(a, K)).ravel(), dtype=float)
+    def prepared(x: np.ndarray) -> np.ndarray:
+        return x.ravel() if memory.blocks is None else _flex(memory.blocks, x.reshape(a, K)).ravel()
+
+    def krylov(rest: np.ndarray, target: float, flexibility: np.ndarray) -> tuple[np.ndarray, int]:
+        y, failed = _gmres(lambda y: product(prepared(y), flexibility), rest, target)
+        return prepared(y), failed
 
     def renew() -> None:
-        memory.blocks, memory.slow = _harmonic_blocks(A, change).astype(np.complex64), False
+        memory.blocks, memory.slow = _harmonic_blocks(A, change), False
 
     def solve(residual: np.ndarray, accuracy: float) -> np.ndarray:
         nonlocal count
@@ -62,37 +70,49 @@ def iterative_inverse(A: np.ndarray, change: np.ndarray,
             return np.zeros_like(residual)
         if memory.slow:
             renew()
-        x, failed = _gmres(operator, residual, target, 1, None if memory.blocks is None else whole)
-        if failed and np.linalg.norm(product(x) - residual.ravel()) > 10 * target:
-            renew()
-            x, failed = _gmres(operator, residual, target, 3, whole)
-            if failed:
-                raise np.linalg.LinAlgError("GMRES did not solve for the Newton step")
+        x, rest, flexibility, fresh = np.zeros(a * K), residual.ravel(), light, memory.slow
+        for _ in range(PASSES):
+            left = float(np.linalg.norm(rest))
+            part, failed = krylov(rest, max(target, SINGLE * left), flexibility)
+            after = rest - product(part, A)
+            gain = np.linalg.norm(after) / left
+            if gain < 1:
+                x, rest = x + part, after
+            if np.linalg.norm(rest) <= 2 * target:
+                break
+            if failed and not fresh:
+                fresh = True
+                renew()
+            elif gain > POOR:
+                flexibility = A
+        else:
+            raise np.linalg.LinAlgError("GMRES did not solve for the Newton step")
         memory.slow = memory.slow or count > SLOW
         return x.reshape(residual.shape)
 
     return solve
 
 
-def _gmres(operator: LinearOperator, residual: np.ndarray, target: float, restarts: int,
-           preconditioner: LinearOperator | None = None) -> tuple[np.ndarray, int]:
+def _gmres(product: Callable[[np.ndarray], np.ndarray], residual: np.ndarray,
+           target: float) -> tuple[np.ndarray, int]:
+    operator = LinearOperator((residual.size, residual.size), matvec=product, dtype=float)
     # the relative tolerance has two names in the versions of SciPy: left at its default, atol rules where it is larger
-    return gmres(operator, residual.ravel(), M=preconditioner, atol=target, restart=BASIS, maxiter=restarts)
+    return gmres(operator, residual, atol=target, restart=BASIS, maxiter=1)
 
 
 def _harmonic_blocks(A: np.ndarray, change: np.ndarray) -> np.ndarray:
-    """(H+1, a, a) inverses of  1 + A_h D_h,  D_h the complex-linear part of `change` that maps harmonic h to h."""
+    """(H+1, a, a) inverses of  1 + A_h D_h  in single precision, D_h what of `change` maps harmonic h to h."""
     nodes, (count, a) = len(change), A.shape[:2]
     d = a // nodes
     split = change.reshape(nodes, d, 2 * count - 1, d, 2 * count - 1)
-    inverse = np.empty_like(A)
+    inverse = np.empty(A.shape, dtype=np.complex64)
     for h in range(count):
         c, s = (0, 0) if h == 0 else (2 * h - 1, 2 * h)
         D = (split[:, :, c, :, c] + split[:, :, s, :, s]) / 2
         if h:
             D = D + 0.5j * (split[:, :, c, :, s] - split[:, :, s, :, c])
         product = (A[h].reshape(a, nodes, d).transpose(1, 0, 2) @ D).transpose(1, 0, 2).reshape(a, a)
-        inverse[h] = np.linalg.inv(np.eye(a) + product)
+        inverse[h] = np.linalg.inv((np.eye(a) + product).astype(np.complex64))
     return inverse
 
 

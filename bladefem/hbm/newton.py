@@ -12,7 +12,7 @@ from .compiled import CONVERGED, EXHAUSTED, INFINITE, SINGULAR, STALLED, compile
 from .iterative import Memory
 from .residual import STICKS, Balance, Inverse, State, contact_table, evaluate_balance, linear_arguments, linearise
 
-__all__ = ["DEFAULTS", "Newton", "Options", "newton"]
+__all__ = ["DEFAULTS", "Newton", "Options", "fits", "newton"]
 
 COMPILED = 300          # unknowns up to which the compiled loop with its plain LU is faster
 SHORTEST = 2.0**-8     # step share below which the search direction is given up
@@ -58,7 +58,7 @@ def newton(balance: Balance, w: np.ndarray, options: Options = DEFAULTS, merit: 
             does not depend on how the equations are scaled (Deuflhard, Newton Methods for Nonlinear Problems, 2004,
             Sect. 3.3), or "residual".
     """
-    if merit == "step" and _fits(balance):
+    if merit == "step" and fits(balance):
         return _fast(balance, w, options)
     state, memory = evaluate_balance(balance, w), Memory()
     for iteration in range(options.iterations + 1):
@@ -82,7 +82,7 @@ def newton(balance: Balance, w: np.ndarray, options: Options = DEFAULTS, merit: 
     return Newton(state, options.iterations, False, f"residual {state.error:.1e} after {options.iterations} iterations")
 
 
-def _fits(balance: Balance) -> bool:
+def fits(balance: Balance) -> bool:
     """Few enough unknowns of 1-D elements for the compiled loop."""
     harmonics, m = balance.linear.stuck.shape
     return balance.model.elements.tangents == 1 and m * (2 * harmonics - 1) <= COMPILED

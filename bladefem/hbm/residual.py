@@ -25,6 +25,7 @@ __all__ = ["Balance", "Inverse", "State", "adjoint", "as_amplitudes", "as_coeffi
            "contact_table", "evaluate_balance", "linear_arguments", "linearise", "orientation", "start_in_stick"]
 
 DENSE = 300         # unknowns up to which a dense factorisation is faster than GMRES
+LARGEST = 5000      # unknowns up to which it is the last resort where GMRES does not arrive: 200 MB, some seconds
 WATCHED = 600       # unknowns up to which the sign of a determinant is worth its time
 ACCURACY = 1e-5     # of a step by GMRES, relative
 STICKS = 1e-13      # a node whose p is below this share of its spring force sticks
@@ -154,9 +155,27 @@ def _active(balance: Balance, state: State) -> tuple[np.ndarray, np.ndarray, np.
 
 
 def _inverse(A: np.ndarray, change: np.ndarray, memory: Memory | None = None) -> Inverse:
-    if A.shape[1] * (2 * len(A) - 1) <= DENSE:
+    unknowns = A.shape[1] * (2 * len(A) - 1)
+    if unknowns <= DENSE:
         return _dense_inverse(A, change)
-    return iterative_inverse(A, change, memory)
+    iterative = iterative_inverse(A, change, memory)
+    return iterative if unknowns > LARGEST else _with_factors_at_need(iterative, A, change)
+
+
+def _with_factors_at_need(iterative: Inverse, A: np.ndarray, change: np.ndarray) -> Inverse:
+    """GMRES, and the dense factors from the first time on that it does not arrive."""
+    dense: Inverse | None = None
+
+    def solve(residual: np.ndarray, accuracy: float) -> np.ndarray:
+        nonlocal dense
+        if dense is None:
+            try:
+                return iterative(residual, accuracy)
+            except np.linalg.LinAlgError:
+                dense = _dense_inverse(A, change)
+        return dense(residual, accuracy)
+
+    return solve
 
 
 def _dense_inverse(A: np.ndarray, change: np.ndarray) -> Inverse:
