@@ -223,11 +223,11 @@ def family_of_case(scene: Scene, mesh: Mesh, reduced: Reduced, patches: list[Pat
         groups = np.arange(nodes) if settings.points is None else _groups(patches, settings.points)
         return Member(coarsened(model, groups), groups)
 
-    return Family(shared, max(len(body.omega) for body in reduced.sector.values()), most, DAMPERS)
+    return Family(shared, max(len(body.omega) for body in reduced.sector.values()), 2 * most + 1, DAMPERS)
 
 
 def _affordable(case: LoadCase) -> int:
-    """Harmonics that UNKNOWNS allow with all contact points; the estimated error tells when more were needed."""
+    """Harmonics that UNKNOWNS allow with all contact points; twice as many judge them, at single points."""
     dofs = case.selection.shape[1]
     return max((h for h in (3, 7, 15, 31) if dofs * (2 * h + 1) <= UNKNOWNS), default=3)
 
