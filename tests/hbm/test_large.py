@@ -39,6 +39,39 @@ def test_the_preconditioner_takes_over_where_plain_gmres_is_too_slow(monkeypatch
     assert np.linalg.norm(short - full) < 0.05 * np.linalg.norm(full)
 
 
+def nearly_singular() -> tuple[np.ndarray, np.ndarray]:
+    """A and change of 12 nodes, 3 directions, 3 harmonics, where 1 + A change has an eigenvalue of 1e-5."""
+    random = np.random.default_rng(7)
+    half = random.standard_normal((4, 36, 36)) + 1j * random.standard_normal((4, 36, 36))
+    A = half @ half.conj().swapaxes(1, 2) / 36
+    A[0] = A[0].real
+    change = random.standard_normal((12, 21, 21)) - 2 * np.eye(21)
+    values = np.linalg.eigvals(residual_module._jacobian(A, change))
+    lowest = values[abs(values.imag) < 1e-9].real.min()
+    return A, change * (1e-5 - 1) / lowest
+
+
+def test_steps_next_to_a_singular_derivative_reach_their_accuracy():
+    """The step is 10^4 times the residual there: products in single precision leave some percent of it behind."""
+    A, change = nearly_singular()
+    J = np.eye(252) + residual_module._jacobian(A, change)
+    right = np.random.default_rng(1).standard_normal((36, 7))
+    step = iterative_inverse(A, change)(right, 1e-5)
+    assert np.linalg.norm(step) > 100 * np.linalg.norm(right)
+    assert np.linalg.norm(J @ step.ravel() - right.ravel()) < 2.1e-5 * np.linalg.norm(right)
+
+
+def test_dense_factors_are_the_last_resort(monkeypatch):
+    from bladefem.hbm import iterative
+    A, change = nearly_singular()
+    right = np.random.default_rng(1).standard_normal((36, 7))
+    monkeypatch.setattr(residual_module, "DENSE", 0)
+    monkeypatch.setattr(iterative, "PASSES", 0)
+    step = residual_module._inverse(A, change)(right, 1e-5)
+    J = np.eye(252) + residual_module._jacobian(A, change)
+    assert np.linalg.norm(J @ step.ravel() - right.ravel()) < 1e-9 * np.linalg.norm(right)
+
+
 def test_a_patch_with_lift_off_is_solved_and_balances_its_work():
     model = patch(side=6, inner=9).model
     for omega in (0.5, 0.9, 1.3):
