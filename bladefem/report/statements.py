@@ -74,6 +74,8 @@ def energy(best: pd.Series) -> str:
 def cautions(finite: pd.DataFrame, best: pd.Series, points: pd.DataFrame | None) -> list[str]:
     """Why the answer may not be the optimum."""
     found = []
+    if len(finite) == 1:
+        found.append("Only one load was studied: whether it is the optimum is not known; give more study.loads.")
     if len(finite) > 1 and best["load"] in (finite["load"].min(), finite["load"].max()):
         end = "smallest" if best["load"] == finite["load"].min() else "largest"
         found.append(f"The best load is the {end} one studied: the true optimum may lie beyond it; widen study.loads.")

@@ -83,6 +83,7 @@ def test_answer_names_the_optimum():
 def test_answer_warns_at_the_edge_of_loads_band_and_convergence():
     few = synthetic.summary().query("20 <= load <= 400").iloc[-1:]
     more = synthetic.summary().query("400 <= load <= 800")
+    assert any("Only one load" in text for text in answer(few).cautions)
     assert any("smallest" in text for text in answer(more).cautions)
     assert any("did not converge" in text for text in answer(few).cautions)
     points = synthetic.points().query("load == 200 and frequency <= 892")
