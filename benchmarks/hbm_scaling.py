@@ -2,21 +2,29 @@
 
     python benchmarks/hbm_scaling.py [docs/figures/hbm_scaling]        table, and cost as .png and .csv
 Square 3-D patches of `hbm_models.patch`. Limits: condensation 8/3 + 8 complex m^3 a harmonic (LU and m right-hand
-sides, m = 3 n), at the rate at which this machine multiplies matrices; a dense Jacobian would take 2/3 (m (2H+1))^3 a
-Newton step.
+sides, m = 3 n), or 8 m k (m + k) with k modes, at the rate at which this machine multiplies matrices; a dense Jacobian
+would take 2/3 (m (2H+1))^3 a Newton step.
 
 Memory is the peak of the arrays made for a point.
 
-Measured (CPU seconds, one thread, 50 GFlop/s in matrix products; H = 3):
+Measured (CPU seconds, one thread, 48 GFlop/s in matrix products; H = 3):
+    all modes
     nodes   point   condense   forces    limit   one dense step   MiB   dense MiB   Newton steps
-        9   0.005     0.0002   0.0003   0.00001          0.0001     1         0.3              4
-       49   0.033     0.009    0.0016   0.002            0.015      8           8              4
-      100   0.13      0.06     0.0026   0.017            0.12      19          34              8
-      196   0.53      0.32     0.010    0.13             0.93     121         129              6
-      400   4.6       2.8      0.014    1.1              7.9      493         538              8
-Forces grow linearly, the condensation with the cube, 2.5 times above its limit: all contact dofs of these patches have
-modes of their own, so that nothing can be condensed by rank. 25 nodes: H 1 to 31 takes 0.009 to 0.22 s and 2 to 37 MiB
-a point.
+        9   0.005     0.0002   0.0006   0.00001          0.0001     1         0.3              4
+       49   0.021     0.008    0.0012   0.002            0.015      8           8              4
+      100   0.10      0.065    0.0025   0.018            0.13      19          34              7
+      196   0.57      0.34     0.0070   0.13             0.96     121         129              5
+      400   5.5       2.8      0.015    1.1              8.2      499         538              9
+     1024   165       44       0.11     19               137     3076        3528              8
+    60 modes and the residual flexibility of the others
+      100   0.11      0.014    0.0024   0.003                     26                           7
+      196   0.26      0.041    0.0054   0.011                    122                           6
+      400   2.8       0.23     0.021    0.045                    493                           9
+     1024   130       4.1      0.078    0.29                    3094                           8
+Forces grow linearly. With all modes the condensation grows with the cube, 2.3 to 3.6 times above its limit; with few it
+grows with the square. At 1000 nodes three quarters and more go into the Newton steps, that is into products with the
+flexibilities of the nodes that slip and into copies of them, which traffic limits: a whole point then costs as much as
+one dense Newton step at the limit. 25 nodes: H 1 to 31 takes 0.010 to 0.22 s and 2 to 37 MiB a point.
 """
 
 from __future__ import annotations
@@ -115,7 +123,7 @@ def draw(rows: list[dict[str, float]], file: Path) -> None:
     figure, axes = pyplot.subplots(2, 2, figsize=(10, 7), sharey="row", sharex="col")
     curves = {"point": ("o-", "one point"), "condense": ("s-", "flexibilities"), "forces": ("^-", "contact forces"),
               "limit": ("--", "floating-point limit"), "memory": ("o-", "one point"),
-              "dense": (":", "one dense Newton step, at the limit"), "dense memory": (":", "dense Jacobian")}
+              "dense": (":", "one dense Newton step, at the limit"), "dense memory": (":", "its matrix")}
     by_nodes = rows[len(HARMONICS):]
     whole = [row for row in by_nodes if row["modes"] != MODES]
     few = [row for row in by_nodes if row["modes"] == MODES]
@@ -123,16 +131,16 @@ def draw(rows: list[dict[str, float]], file: Path) -> None:
                                                (0, "nodes", few, f"{MODES} modes", "C1"),
                                                (1, "H", rows[:len(HARMONICS)], "all modes", "C0")):
         for name, (style, label) in curves.items():
-            if "dense" not in name or part is not few:
+            if not name.startswith("dense") or part is not few:
                 axis = axes[int("memory" in name), column]
-                axis.loglog([r[along] for r in part], [r[name] for r in part], style, label=f"{label}, {title}",
-                            color="grey" if "dense" in name else colour)
+                titled = label if name.startswith("dense") else f"{label}, {title}"
+                axis.loglog([r[along] for r in part], [r[name] for r in part], style, label=titled,
+                            color="grey" if name.startswith("dense") else colour)
         axes[1, column].set_xlabel({"nodes": "contact nodes, H = 3", "H": "harmonics, 25 nodes"}[along])
     axes[0, 0].set_ylabel("CPU time [s]")
     axes[1, 0].set_ylabel("memory [MiB]")
-    axes[0, 0].legend(fontsize="x-small", loc="upper left")
-    axes[1, 0].legend(fontsize="small")
-    figure.tight_layout()
+    figure.legend(*axes[0, 0].get_legend_handles_labels(), fontsize="small", loc="lower center", ncol=3)
+    figure.tight_layout(rect=(0, 0.1, 1, 1))
     figure.savefig(file, dpi=120)
     pyplot.close(figure)
 
