@@ -13,7 +13,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from bladefem.data import Elements, PortModel
-from bladefem.friction.harmonics import synthesis
+from bladefem.friction.harmonics import synthesis, to_complex
 from bladefem.hbm.api import solve
 from bladefem.hbm.follow import follow
 from bladefem.hbm.model import Damping, ReducedModel
@@ -23,7 +23,7 @@ from ..hbm.flow import State
 from ..hbm.shooting import Periodic, harmonics, multipliers, periodic
 from ..hbm.system import System
 
-__all__ = ["BranchPoint", "branch", "inclined_contact"]
+__all__ = ["BranchPoint", "branch", "inclined_contact", "state_of"]
 
 NEAR = 0.02         # relative distance beyond which shooting has left the solution of the balance
 
@@ -67,15 +67,13 @@ def branch(model: ReducedModel, system: System, band: tuple[float, float], H: in
            samples: int = 512) -> Iterator[BranchPoint]:
     """The path in frequency that starts at the upper end of a band [Hz] and runs down, round its folds.
 
-    The system has one coordinate, which is the probe.
-
     Raises:
         NotSolvedError: the path could not be followed to an end of the band.
     """
     low, high = (2 * np.pi * f for f in band)
     start = solve(model, high, H, samples)
     for point in follow(model, "omega", start, (low, high), forward=False, steps=(0.005, 0.02)):
-        shot = periodic(system, point.solution.omega, _state(point.solution, system))
+        shot = periodic(system, point.solution.omega, state_of(point.solution, system))
         amplitude = float(abs(harmonics(shot, system, 1)[0, 1]))
         wanted = float(abs(point.solution.probe[1, 0]))
         yield BranchPoint(point.solution.frequency, amplitude, wanted, float(np.abs(multipliers(shot)[0])), point.fold,
@@ -88,10 +86,29 @@ def _verdict(shot: Periodic, amplitude: float, wanted: float) -> str:
     return shot.reason
 
 
-def _state(solution: Solution, system: System) -> State:
-    """State at t = 0 of a solution of the balance."""
-    orders = np.arange(len(solution.probe))[:, None]
-    q, v = solution.probe.sum(axis=0).real, (1j * orders * solution.omega * solution.probe).sum(axis=0).real
+def state_of(solution: Solution, system: System) -> State:
+    """State at t = 0 of a solution of the balance.
+
+    Args:
+        system: the solution's model in time, without residual flexibility (`bladefem.hbm.in_time.time_system`).
+    """
+    omega, orders = solution.omega, np.arange(solution.harmonics + 1)
+    f = to_complex(solution.f.reshape(-1, solution.f.shape[2])).reshape(*solution.f.shape[:2], -1)
+    load, inputs = -system.W.T @ f[:, -1], to_complex(system.force)
+    load[:, :inputs.shape[1]] += inputs[:, :len(orders)]
+    if solution.f.shape[1] == 2:
+        normal = f[:, 0].copy()
+        normal[:, 0] -= system.normal[:, 0]
+        load -= system.R.T @ normal
+    q = np.zeros_like(load)
+    for h in orders[1:]:
+        q[:, h] = np.linalg.solve(np.diag(system.stiffness - (h * omega) ** 2) + 1j * h * omega * system.damping,
+                                  load[:, h])
+    held = system.stiffness > 0
+    q[held, 0] = load[held, 0] / system.stiffness[held]
+    readings = np.concatenate([system.R, system.W][-solution.w.shape[1]:])
+    rest = np.concatenate(solution.w[:, :, 0].T) - (readings[:, held] @ q[held, 0]).real
+    q[~held, 0] = np.linalg.lstsq(readings[:, ~held], rest, rcond=None)[0]      # rigid motions close the mean
     first = synthesis(solution.harmonics, solution.samples)[0]
     slider = solution.w[:, -1] @ first - solution.f[:, -1] @ first / system.kt
-    return State(q, v, slider)
+    return State(q.sum(axis=1).real, (q @ (1j * orders * omega)).real, slider)

@@ -252,7 +252,8 @@ def two_motions(folder: Path) -> Iterator[Claim]:
                 f"{apart.min():.1f} to {apart.max():.1f} Hz and reach {1e6 * up.max():.1f} and {1e6 * down.max():.1f} "
                 f"µm, {unsolved} points unsolved; with the paper's constant loads they agree to "
                 f"{np.abs(plain[0] / plain[1] - 1).max():.0e}", "fails", ("stability_blades.png",),
-                "The same blade and damper swept up and down: two motions at one frequency where seats lift off.")
+                "The same blade and damper swept up and down: two motions at one frequency where seats lift off. The "
+                "upper one is unstable in time (Fig. 13, 14 above).")
 
 
 def _both_ways(model: ReducedModel, frequency: np.ndarray) -> tuple[np.ndarray, np.ndarray, int]:

@@ -9,11 +9,12 @@ from pathlib import Path
 import numpy as np
 
 from bladefem.damper.blades import judge, peak
+from bladefem.damper.branch import state_of
 from bladefem.damper.direct import direct
 from bladefem.hbm.api import solve
 from bladefem.hbm.in_time import time_system
 from bladefem.hbm.model import ReducedModel
-from bladefem.hbm.shooting import harmonics, periodic
+from bladefem.hbm.shooting import harmonics, multipliers, periodic
 from bladefem.study.row import whole_model
 
 from .claim import Claim
@@ -21,7 +22,8 @@ from .paper_blades import BANDS, LOADS, MASSES, model_of, row_and_scene
 
 __all__ = ["following", "in_one_body", "in_time"]
 
-STEPS, TOLERANCE = 1024, 1e-6       # of the explicit march from rest
+STEPS, TOLERANCE = 1024, 1e-6       # of the explicit march
+UNSTABLE = 1.001                    # largest multiplier; 1 where a contact sticks all the time
 
 
 def in_time(_: Path) -> Iterator[Claim]:
@@ -51,24 +53,27 @@ def in_time(_: Path) -> Iterator[Claim]:
 def following(loads: tuple[float, ...] = (4.0, 20.0, 100.0)) -> Iterator[Claim]:
     """The rigid damper with its three freedoms, on contacts whose normal load follows and that may open."""
     row, scene = row_and_scene("soft")
-    told, worst = [], 0.0
+    told, worst, largest = [], 0.0, 0.0
     for load in loads:
         model = in_one_body(whole_model(scene, row, load))
         top = peak(model, BANDS["soft", 2], 5).solution
+        found = solve(model, top.omega, 9, 1024, start=top)
         system = time_system(model, 1)
-        exact = periodic(system, top.omega, samples=512)
-        cycle = direct(system, top.omega, STEPS, most=4000, tolerance=TOLERANCE, explicit=True)
+        begin = state_of(found, system)
+        exact = periodic(system, top.omega, begin, samples=512)
+        error = abs(found.probe[1, 0] / harmonics(exact, system, 1)[0, 1] - 1)
+        multiplier = np.abs(multipliers(exact)).max()
+        cycle = direct(system, top.omega, STEPS, begin if multiplier > UNSTABLE else None, 4000, TOLERANCE, True)
         marched = 2 * np.fft.rfft(cycle.q @ system.probe[0])[1] / len(cycle.q)
-        tips = harmonics(exact, system, 1)[0, 1], marched
-        found = solve(model, top.omega, 9, 1024, start=top).probe[1, 0]
-        errors = [abs(found / tip - 1) for tip in tips]
-        worst = max(worst, min(errors))
-        told.append(f"{load:g} N at {top.frequency:.1f} Hz {errors[0]:.0e} from the exact flow ({exact.reason}), "
-                    f"{errors[1]:.0e} from explicit steps from rest ({cycle.reason}, {cycle.periods} periods)")
+        worst, largest = max(worst, error), max(largest, multiplier)
+        end = (f"unstable: explicit steps leave it, {cycle.reason}" if multiplier > UNSTABLE else
+               f"{abs(found.probe[1, 0] / marched - 1):.0e} from explicit steps from rest, {cycle.periods} periods")
+        told.append(f"{load:g} N at {top.frequency:.1f} Hz {error:.0e} from the exact flow, largest multiplier "
+                    f"{multiplier:.4f}, {end}")
     yield Claim("Fig. 13, 14", "the same where the damper moves in its plane and the normal load follows",
                 "balance with 9 harmonics: " + "; ".join(told) + ". Points that always stick may carry any mean force "
-                "that they can hold, and two motions may exist, so that not all need to agree",
-                "holds" if worst < 0.01 else "holds in part")
+                "that they can hold, so that not all digits need to agree",
+                "fails" if worst > 0.01 else "holds in part" if largest > UNSTABLE else "holds")
 
 
 def in_one_body(model: ReducedModel) -> ReducedModel:

@@ -5,11 +5,12 @@ import pytest
 
 from bladefem.damper.accelerate import Rules, iterate
 from bladefem.damper.blades import judge, optimum, peak
+from bladefem.damper.branch import state_of
 from bladefem.damper.paper import platform
 from bladefem.hbm.api import solve
 from bladefem.hbm.in_time import time_system
 from bladefem.hbm.resonance import free_resonances
-from bladefem.hbm.shooting import harmonics, periodic
+from bladefem.hbm.shooting import harmonics, multipliers, periodic
 from bladefem.hbm.sweep import response, size
 from bladefem.report.paper_time import in_one_body
 from bladefem.scene_file import load_scene
@@ -102,3 +103,14 @@ def test_the_whole_plane_model_against_integration_in_time(row):
     assert found.converged and exact.converged
     assert found.states["lift"] + found.states["slip"] > 0
     assert abs(found.probe[1, 0] / harmonics(exact, system, 1)[0, 1] - 1) < 2e-3
+
+
+def test_the_rocking_motion_of_the_plane_model_is_unstable_in_time(row):
+    """4 N, 1148 Hz, all contacts lift off: a solution of the exact flow too (0.1 %), largest multiplier 1.09."""
+    model = in_one_body(whole_model(SOFT, row, 4.0))
+    start = solve(model, 2 * np.pi * 1150.0, 5, 256)
+    found, system = solve(model, 2 * np.pi * 1148.0, 9, 512, start=start), time_system(model, 1)
+    assert found.converged and found.states["lift"] > 10
+    exact = periodic(system, found.omega, state_of(found, system), samples=256, most=12)
+    assert abs(found.probe[1, 0] / harmonics(exact, system, 1)[0, 1] - 1) < 5e-3
+    assert 1.05 < np.abs(multipliers(exact)).max() < 1.15
