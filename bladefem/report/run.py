@@ -26,7 +26,8 @@ from ..study.limits import Limit
 from ..study.loads import Progress, summary, unwatched
 from ..study.modal import family_table
 from ..view import contact, mesh, modes, response, speed
-from .datasets import datasets
+from .datasets import datasets, table_dataset
+from .nodes import cycles_of, draw_wear, node_table, save_cycles_vtu
 from .tables import write_tables
 from .write import write_report
 
@@ -55,14 +56,21 @@ def _write(result: pipeline.Run, progress: Progress) -> None:
     tables = _tables(result)
     for name, table in tables.items():
         write_tables(table, folder / name.split("/")[1], name.split("/")[1])
-    write_results(folder / "results.nc", datasets(result, tables), dump(result.scene))
+    patches, cycles = list(result.contact.problem.patches), cycles_of(result)
+    nodes = node_table(patches, cycles)
+    nodes.to_csv(folder / "nodes.csv", index=False)
+    groups = {**datasets(result, tables), "nodes": table_dataset(nodes, "row")}
+    write_results(folder / "results.nc", groups, dump(result.scene))
+    drawings = {**_drawings(result, tables),
+                "contact/friction_work": lambda file: draw_wear(patches, cycles, file)}
     figures = {}
-    for name, draw in progress(list(_drawings(result, tables).items()), "pictures"):
+    for name, draw in progress(list(drawings.items()), "pictures"):
         figures[name] = folder / f"{name.split('/')[1]}.png"
         draw(figures[name])
     mesh.save_vtu(result.mesh, folder / "mesh.vtu")
     modes.save_modes_vtu(result.mesh, excited_modes(result), folder / "modes.vtu")
     contact.save_pressure_vtu(result.contact.maps, folder / "pressure.vtu")
+    save_cycles_vtu(patches, cycles, folder / "friction_work.vtu")
     messages = [*result.messages, _static_contact(result), *_beyond_stick(result)]
     write_report(folder, result.scene, tables, figures, messages, result.timings)
 

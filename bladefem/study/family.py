@@ -13,13 +13,13 @@ from functools import cache, lru_cache
 
 import numpy as np
 
-from ..data import PortModel, RigidBody
+from ..data import Elements, PortModel, RigidBody
 from ..hbm.model import ReducedModel
 from ..reduction.assemble import recombine
 from ..reduction.truncate import truncated
 from .settings import Settings
 
-__all__ = ["Family", "Member", "carried", "coarsened", "family_of", "member", "shared_harmonics"]
+__all__ = ["Family", "Member", "carried", "coarsened", "family_of", "joined", "member", "shared_harmonics"]
 
 SHARED = (1, 7, 15, 31, 63)
 
@@ -72,22 +72,11 @@ def coarsened(model: ReducedModel, groups: np.ndarray) -> ReducedModel:
     Args:
         groups: (n,) number of the element of each node, 0 .. m-1.
     """
-    e = model.elements
     m = int(groups.max()) + 1
     if m == len(groups):
         return model
-
-    def total(x: np.ndarray) -> np.ndarray:
-        return np.bincount(groups, x, m)
-
-    weight = np.where(total(e.kt)[groups] > 0, e.kt, 1.0)
-    pick = np.zeros((m, len(groups)))
-    pick[groups, np.arange(len(groups))] = weight / total(weight)[groups]
-    pressed = total(np.maximum(e.n0, 0.0))
-    limit = total(e.mu * np.maximum(e.n0, 0.0))
-    elements = replace(e, kt=total(e.kt), kn=total(e.kn), n0=np.where(pressed > 0, pressed, total(e.n0)),
-                       mu=np.where(pressed > 0, limit / np.where(pressed > 0, pressed, 1.0), pick @ e.mu))
-    dofs = np.kron(pick, np.eye(e.tangents + (not model.tangential)))
+    elements, pick = joined(model.elements, groups), _means(model.elements, groups)
+    dofs = np.kron(pick, np.eye(elements.tangents + (not model.tangential)))
     damper: RigidBody | tuple[PortModel, ...] | None = model.damper
     if isinstance(damper, RigidBody):
         damper = replace(damper, B=dofs @ damper.B)
@@ -96,6 +85,29 @@ def coarsened(model: ReducedModel, groups: np.ndarray) -> ReducedModel:
     normal = {h: np.bincount(groups, f.real, m) + 1j * np.bincount(groups, f.imag, m) for h, f in model.normal.items()}
     return replace(model, sides=tuple(recombine(body, dofs) for body in model.sides), elements=elements, damper=damper,
                    normal=normal)
+
+
+def joined(e: Elements, groups: np.ndarray) -> Elements:
+    """The elements of ``coarsened``."""
+    m = int(groups.max()) + 1
+    if m == len(groups):
+        return e
+
+    def total(x: np.ndarray) -> np.ndarray:
+        return np.bincount(groups, x, m)
+
+    pressed = total(np.maximum(e.n0, 0.0))
+    limit = total(e.mu * np.maximum(e.n0, 0.0))
+    return replace(e, kt=total(e.kt), kn=total(e.kn), n0=np.where(pressed > 0, pressed, total(e.n0)),
+                   mu=np.where(pressed > 0, limit / np.where(pressed > 0, pressed, 1.0), _means(e, groups) @ e.mu))
+
+
+def _means(e: Elements, groups: np.ndarray) -> np.ndarray:
+    """(m, n) from the nodes' motion to the elements', weighted by stiffness."""
+    weight = np.where(np.bincount(groups, e.kt)[groups] > 0, e.kt, 1.0)
+    pick = np.zeros((int(groups.max()) + 1, len(groups)))
+    pick[groups, np.arange(len(groups))] = weight / np.bincount(groups, weight)[groups]
+    return pick
 
 
 def family_of(rich: ReducedModel, patches: Sequence[int] | None = None) -> Family:

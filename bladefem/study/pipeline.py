@@ -16,7 +16,7 @@ from geometry.mesh import Mesh
 
 from ..contact.seat import ContactProblem
 from ..contact.seat import solve as seat
-from ..contact.stiffness import aggregation, friction_elements, pair_ratio
+from ..contact.stiffness import friction_elements, pair_ratio
 from ..data import ModeSet, Patch, PressureMap
 from ..errors import InputError, NotSolvedError
 from ..reduction.truncate import truncated
@@ -24,6 +24,7 @@ from ..scene import Scene
 from ..store import stage
 from ..units import show
 from .choice import choose, covered, peak_of
+from .cycle import labels
 from .family import Family, Member, coarsened, member, shared_harmonics
 from .joint import LoadCase, joint_model
 from .keys import contact_key, mesh_key, modes_key, reduction_key, response_key
@@ -220,7 +221,7 @@ def family_of_case(scene: Scene, mesh: Mesh, reduced: Reduced, patches: list[Pat
         few = {n: truncated(body, settings.modes) for n, body in reduced.sector.items()}
         model = joint_model(scene, mesh, replace(reduced, sector=few), patches, case, settings.harmonics,
                             settings.damper)
-        groups = np.arange(nodes) if settings.points is None else _groups(patches, settings.points)
+        groups = np.arange(nodes) if settings.points is None else labels(patches, settings.points)
         return Member(coarsened(model, groups), groups)
 
     return Family(shared, max(len(body.omega) for body in reduced.sector.values()), 2 * most + 1, DAMPERS)
@@ -230,13 +231,6 @@ def _affordable(case: LoadCase) -> int:
     """Harmonics that UNKNOWNS allow with all contact points; twice as many judge them, at single points."""
     dofs = case.selection.shape[1]
     return max((h for h in (3, 7, 15, 31) if dofs * (2 * h + 1) <= UNKNOWNS), default=3)
-
-
-def _groups(patches: list[Patch], points: int) -> np.ndarray:
-    """(nodes of all patches,) number of the element that each belongs to."""
-    parts = [aggregation(patch, points) for patch in patches]
-    starts = np.cumsum([0] + [part.shape[1] for part in parts])
-    return np.concatenate([start + part.indices for start, part in zip(starts, parts, strict=False)])
 
 
 def reduced_sector(scene: Scene, bodies: Bodies, case: LoadCase, patches: list[Patch],

@@ -12,13 +12,14 @@ from matplotlib.cm import ScalarMappable
 from matplotlib.colors import Normalize
 from matplotlib.tri import Triangulation
 
+from bladefem.contact.summary import resultant
 from bladefem.data import Patch, PressureMap
 
 from .skin import split_faces
 from .style import COLOURS, canvas, headline
 
-__all__ = ["contact_centre", "draw_pressure", "pressure_points", "pressure_summary", "save_pressure_vtu",
-           "unfold"]
+__all__ = ["contact_centre", "draw_pressure", "pressure_points", "pressure_summary", "save_faces_vtu",
+           "save_pressure_vtu", "unfold"]
 
 PRESSURE_COLOURS = "inferno_r"
 VTK_FACES = {2: 3, 3: 5, 4: 9}       # corners of a face: VTK's number for line, triangle, quadrilateral
@@ -31,17 +32,21 @@ def contact_centre(seat: PressureMap) -> np.ndarray:
 
 
 def pressure_summary(seats: Sequence[PressureMap]) -> pd.DataFrame:
-    """One row a patch: resultant, peak and mean pressure, pressed share of the area, contact centre, proof."""
+    """One row a patch: resultant, peak and mean pressure, pressed share of the area, contact centre, moment, proof.
+
+    The moment is that of the forces on the damper about the engine's origin, in the blade's axes [N m].
+    """
     rows = []
     for seat in seats:
         pressed = seat.force > 1e-9 * max(seat.force.max(initial=0.0), 1e-300)
         area = float(seat.patch.area[pressed].sum())
-        x, y, z = contact_centre(seat)
+        (x, y, z), moment = contact_centre(seat), resultant(seat).moment
         rows.append({"patch": seat.patch.name, "nodes": len(seat.force), "force": float(seat.force.sum()),
                      "peak_pressure": float(seat.pressure.max(initial=0.0)),
                      "mean_pressure": float(seat.force.sum()) / area if area > 0 else 0.0,
                      "area": float(seat.patch.area.sum()), "contact_share": area / float(seat.patch.area.sum()),
-                     "centre_x": x, "centre_y": y, "centre_z": z, "complementarity": seat.complementarity})
+                     "centre_x": x, "centre_y": y, "centre_z": z, "moment_x": moment[0], "moment_y": moment[1],
+                     "moment_z": moment[2], "complementarity": seat.complementarity})
     return pd.DataFrame(rows)
 
 
@@ -60,9 +65,17 @@ def save_pressure_vtu(states: Mapping[float, Sequence[PressureMap]], file: str |
         states: mean normal load to the maps of the same patches.
         file: to write, ``.vtu``.
     """
+    fields = {}
+    for load, seats in states.items():
+        for name, values in (("pressure [Pa]", "pressure"), ("gap [m]", "gap"), ("normal force [N]", "force")):
+            fields[f"{name} at {load:.6g} N"] = np.concatenate([getattr(seat, values) for seat in seats])
+    return save_faces_vtu([seat.patch for seat in next(iter(states.values()))], fields, file)
+
+
+def save_faces_vtu(patches: Sequence[Patch], fields: Mapping[str, np.ndarray], file: str | Path) -> Path:
+    """Write fields (nodes of all patches,) on the faces, with areas and normals, as a VTU file for ParaView."""
     import pyvista
 
-    patches = [seat.patch for seat in next(iter(states.values()))]
     first = np.cumsum([0, *(len(p.area) for p in patches)])
     cells = np.concatenate([p.faces + start for p, start in zip(patches, first[:-1], strict=True)])
     kinds = np.full(len(cells), VTK_FACES[cells.shape[1]], dtype=np.uint8)
@@ -70,9 +83,8 @@ def save_pressure_vtu(states: Mapping[float, Sequence[PressureMap]], file: str |
     grid = pyvista.UnstructuredGrid(table, kinds, np.concatenate([p.points for p in patches]).astype(float))
     grid.point_data["area [m2]"] = np.concatenate([p.area for p in patches])
     grid.point_data["normal"] = np.concatenate([p.frame[:, 0] for p in patches])
-    for load, seats in states.items():
-        for name, values in (("pressure [Pa]", "pressure"), ("gap [m]", "gap"), ("normal force [N]", "force")):
-            grid.point_data[f"{name} at {load:.6g} N"] = np.concatenate([getattr(seat, values) for seat in seats])
+    for name, values in fields.items():
+        grid.point_data[name] = np.asarray(values)
     Path(file).parent.mkdir(parents=True, exist_ok=True)
     grid.save(str(file))
     return Path(file)

@@ -1,0 +1,57 @@
+"""What the contact nodes do at each resonance, for the run's folder: CSV, netCDF, ParaView, picture."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+
+import numpy as np
+import pandas as pd
+
+from ..data import Patch
+from ..study.cycle import ContactCycle, contact_cycle
+from ..study.pipeline import Run, load_cases
+from ..view.contact import save_faces_vtu
+from ..view.wear import draw_work
+
+__all__ = ["cycles_of", "draw_wear", "node_table", "save_cycles_vtu"]
+
+
+def cycles_of(result: Run) -> list[ContactCycle]:
+    """The period at the resonance of each curve of a finished run."""
+    patches, points = list(result.contact.problem.patches), result.scene.contact.points
+    cases = {(case.load, case.mass): case for case in load_cases(result.scene, result.mesh, result.contact)}
+    return [contact_cycle(cases[curve.load, curve.mass], curve, patches, points) for curve in result.response.curves]
+
+
+def node_table(patches: Sequence[Patch], cycles: Sequence[ContactCycle]) -> pd.DataFrame:
+    """One row a contact node and resonance: place, shares of the period, state, work a period and area (SI)."""
+    place = np.concatenate([p.points for p in patches])
+    names = np.repeat([p.name for p in patches], [len(p.area) for p in patches])
+    area = np.concatenate([p.area for p in patches])
+    frames = []
+    for c in cycles:
+        mass = {} if c.mass is None else {"mass": c.mass}
+        frames.append(pd.DataFrame({
+            "load": c.load, **mass, "patch": names, "x": place[:, 0], "y": place[:, 1], "z": place[:, 2], "area": area,
+            "stick": c.shares[:, 0], "slip": c.shares[:, 1], "separated": c.shares[:, 2], "state": c.state,
+            "work": c.work}))
+    return pd.concat(frames, ignore_index=True)
+
+
+def save_cycles_vtu(patches: Sequence[Patch], cycles: Sequence[ContactCycle], file: Path) -> Path:
+    """Work and shares of all loads on the faces."""
+    fields: dict[str, np.ndarray] = {}
+    for c in cycles:
+        at = f"at {c.load:.6g} N" + ("" if c.mass is None else f", {1e3 * c.mass:.6g} g")
+        fields |= {f"friction work [J/m2] {at}": c.work, f"state {at}": c.state}
+        fields |= {f"share of {name} {at}": c.shares[:, k] for k, name in enumerate(("stick", "slip", "separation"))}
+    return save_faces_vtu(patches, fields, file)
+
+
+def draw_wear(patches: Sequence[Patch], cycles: Sequence[ContactCycle], file: Path) -> object:
+    """The load whose resonance wears the faces most."""
+    area = np.concatenate([p.area for p in patches])
+    worst = max(cycles, key=lambda c: float(c.work @ area))
+    return draw_work(patches, worst.work, worst.state, file,
+                     title=f"friction work of a period at the resonance, {worst.load:g} N per seat")

@@ -1,0 +1,62 @@
+"""What the contact nodes do in one period at a resonance: stick, slip, separation, and friction work an area."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from ..contact.stiffness import aggregation
+from ..data import Elements, Patch
+from ..friction.aft import evaluate
+from .family import joined
+from .joint import LoadCase
+from .loads import Curve
+
+__all__ = ["ContactCycle", "contact_cycle", "labels"]
+
+
+@dataclass(frozen=True)
+class ContactCycle:
+    """One period of all contact nodes, patch after patch; nodes of one friction element share its values."""
+
+    load: float             # [N]
+    mass: float | None      # of the damper [kg]
+    shares: np.ndarray      # (nodes, 3) share of the period in stick, slip and separation [1]
+    state: np.ndarray       # (nodes,) SEPARATED, STICK, PARTIAL_SLIP or GROSS_SLIP of friction.aft
+    work: np.ndarray        # (nodes,) friction work a period and area, the wear-work map [J/m^2]
+
+
+def contact_cycle(case: LoadCase, curve: Curve, patches: Sequence[Patch], points: int | None) -> ContactCycle:
+    """The period at the highest point of a response curve.
+
+    Args:
+        case: the load of the curve.
+        points: friction elements that the scene allows each patch (``contact.points``), None for all nodes.
+    """
+    area = np.concatenate([patch.area for patch in patches])
+    elements, groups = case.elements, labels(patches, points)
+    if len(elements.kt) == len(area):       # of all nodes; the choice may have joined some
+        groups = labels(patches, curve.settings.points)
+        elements = joined(elements, groups)
+    elements, w = _in_all_directions(elements, curve.peak.w)
+    forces = evaluate(elements, w, curve.peak.samples or 512, jacobian=False)
+    return ContactCycle(case.load, case.mass, forces.shares[groups], forces.state[groups],
+                        (forces.dissipated / np.bincount(groups, area))[groups])
+
+
+def labels(patches: Sequence[Patch], points: int | None) -> np.ndarray:
+    """(nodes of all patches,) number of the element that each belongs to, ``points`` elements on each patch."""
+    parts = [aggregation(patch, points) for patch in patches]
+    starts = np.cumsum([0] + [part.shape[1] for part in parts])
+    return np.concatenate([start + part.indices for start, part in zip(starts, parts, strict=False)])
+
+
+def _in_all_directions(elements: Elements, w: np.ndarray) -> tuple[Elements, np.ndarray]:
+    """Elements and motion in all directions; without normal motion the load keeps its static value."""
+    missing = 1 + elements.tangents - w.shape[1]
+    if missing == 0:
+        return elements, w
+    w = np.concatenate([np.zeros((len(w), missing, w.shape[2])), w], axis=1)
+    return replace(elements, kn=np.zeros_like(elements.kn)), w

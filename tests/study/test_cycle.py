@@ -1,0 +1,71 @@
+"""What contact nodes do in a period at the resonance: maps of work and states against closed forms."""
+
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+
+from bladefem.data import Elements, Patch
+from bladefem.friction.aft import GROSS_SLIP, STICK
+from bladefem.friction.closed_form import circular_orbit_work
+from bladefem.report.nodes import draw_wear, node_table, save_cycles_vtu
+from bladefem.study.cycle import contact_cycle
+from bladefem.study.joint import LoadCase
+
+KT, MU, N = 2e6, 0.3, 10.0
+
+
+def strip(name: str, shift: float) -> Patch:
+    """Two by four nodes, 1 mm apart, of equal areas."""
+    x, z = np.meshgrid(np.arange(2), np.arange(4), indexing="ij")
+    points = 1e-3 * np.stack([x.ravel(), np.full(8, shift), z.ravel()], axis=1)
+    faces = np.array([[i, i + 1, i + 5] for i in range(3)] + [[i, i + 5, i + 4] for i in range(3)])
+    frame = np.tile(np.array([[0.0, 1, 0], [0, 0, 1], [1, 0, 0]]), (8, 1, 1))
+    return Patch(name=name, blade_nodes=np.arange(8), damper_nodes=np.arange(8), points=points, frame=frame,
+                 area=np.full(8, 1e-6), faces=faces)
+
+
+def orbits(radius: np.ndarray, directions: int) -> np.ndarray:
+    """(nodes, directions, 7) circular orbits [m], with no normal motion."""
+    w = np.zeros((len(radius), directions, 7))
+    w[:, -2, 1] = w[:, -1, 2] = radius
+    return w
+
+
+def at_resonance(radius: np.ndarray, directions: int, joined: int | None):
+    patches = [strip("this", 0.0), strip("next", 1.0)]
+    elements = Elements(np.full(16, KT), np.full(16, KT), np.full(16, MU), np.full(16, N), 2)
+    peak = SimpleNamespace(w=orbits(radius, directions), samples=64)
+    curve = SimpleNamespace(settings=SimpleNamespace(points=joined), peak=peak)
+    return patches, contact_cycle(LoadCase(8 * N, elements, None), curve, patches, None)
+
+
+@pytest.mark.parametrize("directions", [2, 3])
+def test_work_and_states_of_circular_orbits(directions):
+    """Half of the nodes stick; a model without normal motion (2 directions) keeps its static load."""
+    radius = np.r_[np.full(8, 0.5), np.full(8, 3.0)] * MU * N / KT
+    patches, cycle = at_resonance(radius, directions, None)
+    exact = [circular_orbit_work(r, KT, MU * N) for r in radius]
+    np.testing.assert_allclose(1e-6 * cycle.work, exact, rtol=1e-10, atol=1e-18)
+    assert list(cycle.state) == [STICK] * 8 + [GROSS_SLIP] * 8
+    table = node_table(patches, [cycle])
+    assert (table["area"] * table["work"]).sum() == pytest.approx(sum(exact), rel=1e-10)
+    assert list(table["patch"]) == ["this"] * 8 + ["next"] * 8
+
+
+def test_joined_nodes_share_the_work_of_their_element():
+    """One element on each patch, as the choice of the model may leave: 8 springs and loads in one."""
+    radius = np.array([0.5, 3.0]) * MU * N / KT
+    _, cycle = at_resonance(radius, 3, 1)
+    np.testing.assert_allclose(cycle.work[:8], 0, atol=1e-12)
+    np.testing.assert_allclose(8e-6 * cycle.work[8:], circular_orbit_work(radius[1], 8 * KT, 8 * MU * N), rtol=1e-10)
+
+
+def test_pictures_and_paraview(tmp_path):
+    import pyvista
+    patches, cycle = at_resonance(np.full(16, 3.0) * MU * N / KT, 3, None)
+    draw_wear(patches, [cycle], tmp_path / "work.png")
+    assert (tmp_path / "work.png").stat().st_size > 10_000
+    grid = pyvista.read(save_cycles_vtu(patches, [cycle], tmp_path / "work.vtu"))
+    np.testing.assert_allclose(grid["friction work [J/m2] at 80 N"], cycle.work)
+    np.testing.assert_allclose(grid["share of slip at 80 N"], 1)
