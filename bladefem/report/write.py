@@ -84,7 +84,8 @@ def contents(scene: Scene, tables: Mapping[str, pd.DataFrame], figures: Mapping[
         shown["accuracy/loads with doubtful points"] = doubtful
     total = sum(timings.values())
     return {"title": scene.title, "kind": scene.kind, "answer": answer(tables.get("response/summary"), points),
-            "inputs": resolved(scene, given), "mark": "changed" if given is None else "given", "statements": statements, "messages": messages, "versions": versions(),
+            "inputs": resolved(scene, given), "mark": "changed" if given is None else "given",
+            "statements": statements, "messages": messages, "versions": versions(),
             "timings": [(name, t, t / total if total else 0.0) for name, t in timings.items()], "total": total,
             "sections": [section(key, title, shown, figures) for key, title in SECTIONS.items()]}
 
