@@ -19,7 +19,8 @@ from .compat import MPI, PETSc
 from .mumps import Factorised, factorise_matrix, solve_matrix
 from .schur import Bridge, bridge, schur_complement, through
 
-__all__ = ["Core", "Rim", "close", "eliminate", "face_solve", "inner_solve", "masters", "rim_of", "solve", "times"]
+__all__ = ["Core", "Rim", "close", "eliminate", "face_solve", "inner_solve", "masters", "negative", "rim_of", "solve",
+           "times"]
 
 BATCH = 32      # complex columns a solve: from 32 real ones on MUMPS runs at the speed of matrix products
 
@@ -67,11 +68,13 @@ def masters(C: sp.csr_matrix) -> np.ndarray:
     return np.unique(C[rim_of(C)].indices)
 
 
-def eliminate(A: sp.csr_matrix, rim: np.ndarray, definite: bool = True, order: np.ndarray | None = None) -> Core:
+def eliminate(A: sp.csr_matrix, rim: np.ndarray, definite: bool = True, order: np.ndarray | None = None,
+              keep: bool = True) -> Core:
     """Eliminate the interior.
 
     Args:
         order: see ``ordering.interior_first``.
+        keep: keep the factors, for solves; else for :func:`negative` alone.
 
     Raises:
         NotSolvedError: from MUMPS.
@@ -79,7 +82,7 @@ def eliminate(A: sp.csr_matrix, rim: np.ndarray, definite: bool = True, order: n
     matrix = PETSc.Mat().createAIJ(A.shape, comm=MPI.COMM_SELF, csr=(
         A.indptr.astype(PETSc.IntType), A.indices.astype(PETSc.IntType), A.data))
     matrix.assemble()
-    factor = factorise_matrix(matrix, definite, rim, order)
+    factor = factorise_matrix(matrix, definite, rim, order, keep)
     matrix.destroy()
     inner = np.setdiff1d(np.arange(A.shape[0]), rim)
     S = schur_complement(factor, len(rim))
@@ -100,12 +103,21 @@ def close(core: Core, C: sp.csr_matrix, definite: bool = True, springs: np.ndarr
         S = S + np.diag(springs[on_face])
     inner = np.asarray(C[core.inner].indices)
     if not definite:
-        dense, negative = _indefinite(S)
-        return Rim(core, inner, on_face, Cb, dense, negative + core.factor.negative)
+        return Rim(core, inner, on_face, Cb, lu_factor(S), core.factor.negative + _negative(S))
     try:
         return Rim(core, inner, on_face, Cb, cho_factor(S, lower=True), -1)
     except np.linalg.LinAlgError as error:
         raise NotSolvedError("the sector's stiffness is not positive definite: it floats, or it has buckled") from error
+
+
+def negative(core: Core, C: sp.csr_matrix) -> int:
+    """Number of negative eigenvalues of C^H A C, by Sylvester's law of inertia.
+
+    Raises:
+        NotSolvedError: zero is an eigenvalue.
+    """
+    Cb = C[core.rim][:, masters(C)].tocsr()
+    return core.factor.negative + _negative(Cb.conj().T @ (Cb.T @ core.S).T)
 
 
 def solve(rim: Rim, B: np.ndarray) -> np.ndarray:
@@ -177,12 +189,11 @@ def times(A: sp.csr_matrix, X: np.ndarray) -> np.ndarray:
     return (A @ X.view(float)).view(complex)
 
 
-def _indefinite(S: np.ndarray) -> tuple[tuple, int]:
-    """LU factors for solves, and the number of negative eigenvalues by Bunch and Kaufman's factorisation."""
+def _negative(S: np.ndarray) -> int:
+    """Number of negative eigenvalues of a Hermitian matrix, by Bunch and Kaufman's factorisation."""
     factorise = lapack.zhetrf if np.iscomplexobj(S) else lapack.dsytrf
     ldu, pivots, info = factorise(S, lower=1, lwork=64 * len(S))
     if info:
         raise NotSolvedError("the shift is an eigenvalue, expected a shift between two")
     single = pivots > 0
-    negative = int((ldu.diagonal().real[single] < 0).sum()) + int((~single).sum()) // 2
-    return lu_factor(S), negative
+    return int((ldu.diagonal().real[single] < 0).sum()) + int((~single).sum()) // 2

@@ -57,9 +57,11 @@ def rigid_basis(con: Constrained) -> np.ndarray:
     """(n_own, r) M-orthonormal rigid motions that clamp and cyclic symmetry allow; r = 0 for a held body.
 
     A combination R c is allowed when it is T times its own values at the unknowns: c is in the null space of
-    R - T R_unknowns.
+    R - T R_unknowns. Of a wheel, translations and rotations are waves of nodal diameter 0 and 1 only.
     """
     body = con.body
+    if (con.nodal_diameter or 0) > 1:
+        return np.zeros((con.own.stop - con.own.start, 0), con.dtype)
     R = rigid_modes(body).reshape(con.T.shape[0], -1).astype(con.dtype)
     weight = np.asarray(abs(con.T).max(1).todense()).ravel() > 0
     inside = np.repeat(body.rows >= 0, body.dim)

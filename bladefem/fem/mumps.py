@@ -37,13 +37,14 @@ class Factorised:
 
 
 def factorise_matrix(A: PETSc.Mat, definite: bool, schur: np.ndarray | None = None,
-                     order: np.ndarray | None = None) -> Factorised:
+                     order: np.ndarray | None = None, keep: bool = True) -> Factorised:
     """Factorise a symmetric matrix.
 
     Args:
         definite: Cholesky; else L D L^T with the count of negative pivots.
         schur: rows left out of the factorisation, see ``schur`` (one rank only).
         order: (n,) place of each row in the elimination (one rank only); MUMPS chooses when left out.
+        keep: keep the factors; without them only the count and the Schur complement are left.
 
     Raises:
         NotSolvedError: the matrix is singular or not definite, or memory ran out; the message holds MUMPS's INFOG.
@@ -56,6 +57,8 @@ def factorise_matrix(A: PETSc.Mat, definite: bool, schur: np.ndarray | None = No
     if not definite:
         F.setMumpsIcntl(13, 1)      # the last block is counted too
         F.setMumpsIcntl(24, 1)
+    if not keep:
+        F.setMumpsIcntl(31, 1)
     if schur is not None:
         index = PETSc.IS().createGeneral(schur.astype(PETSc.IntType), comm=F.comm)
         petsc_call("MatFactorSetSchurIS", F.handle, index.handle)

@@ -19,7 +19,7 @@ from . import core
 from .body import Body
 from .constraint import Constrained, Transformation, at_diameter, transformation
 from .flexibility import Flexibility, flexible
-from .linalg import Folded, apply, combined, dot, inertia, mix
+from .linalg import apply, combined, dot, inertia, mix
 from .memory import give_back
 from .modes import mode_set, pairs
 
@@ -68,7 +68,11 @@ def all_diameters(body: Body | Transformation, count: int, diameters: Sequence[i
     found = {p.con.nodal_diameter: p for p in eigenpairs(t, count, wanted, direct)}
     if prove:
         found = _proved(t, found)
-    return [mode_set(found[n].con, found[n].lam[:count], found[n].X[:, :count]) for n in wanted]
+    sets = {}
+    for n in sorted(found):         # vectors go as shapes come: both at once would be the peak of memory
+        p = found.pop(n)
+        sets[n] = mode_set(p.con, p.lam[:count], p.X[:, :count])
+    return [sets[n] for n in wanted]
 
 
 def eigenpairs(t: Transformation, count: int, diameters: Sequence[int], direct: bool = False,
@@ -165,20 +169,21 @@ def _proved(t: Transformation, found: dict[int, Eigenpairs]) -> dict[int, Eigenp
         if exact != np.count_nonzero(p.lam < shift):
             raise NotSolvedError(f"nodal diameter {n}: {np.count_nonzero(p.lam < shift)} modes were found below "
                                  f"{np.sqrt(shift) / (2 * np.pi):.6g} Hz, the inertia counts {exact}")
+    del shared
+    give_back()
     return found
 
 
-def _shifted(t: Transformation, shift: float) -> Folded | None:
+def _shifted(t: Transformation, shift: float) -> core.Core | None:
     """K - shift M of the open sector with its interior eliminated, for all nodal diameters."""
     if t.opened is None:
         return None
-    A = (t.opened.K - shift * t.opened.M).tocsr()
-    return Folded(A, t.low[t.opened.places], core.eliminate(
-        A, t.opened.core.rim, definite=False, order=t.opened.core.order))
+    return core.eliminate((t.opened.K - shift * t.opened.M).tocsr(), t.opened.core.rim, definite=False,
+                          order=t.opened.core.order, keep=False)
 
 
-def _count_below(con: Constrained, shift: float, shared: Folded | None) -> int:
-    return inertia(combined(con.K, -shift, con.M) if shared is None else replace(shared, C=con.K.C))
+def _count_below(con: Constrained, shift: float, shared: core.Core | None) -> int:
+    return inertia(combined(con.K, -shift, con.M)) if shared is None else core.negative(shared, con.K.C)
 
 
 def _gap(lists: list[np.ndarray]) -> float:
