@@ -31,6 +31,7 @@ from .session import attempt, gmsh_session
 __all__ = ["read_step"]
 
 Named = dict[tuple[int, str], list[int]]       # (dimension, name) to entities
+CONTACT = ("seat_left", "seat_right", "damper_left", "damper_right")
 PREFIX = {"": 1.0, ".MILLI.": 1e-3, ".CENTI.": 1e-2, ".DECI.": 0.1, ".MICRO.": 1e-6, ".KILO.": 1e3}
 
 
@@ -59,7 +60,8 @@ def read_step(file: str | Path, size: MeshSize, scale: float = 1.0, sectors: int
         named |= _found(gmsh, named, sectors, axis)
         _periodic(gmsh, named, sectors, axis)
         with attempt("mesh.size", f"mesh '{file}'"):
-            _generate(gmsh, size)
+            _generate(gmsh, size, [tag for (dim, name), tags in named.items() if dim == 2 and name.lower() in CONTACT
+                                   for tag in tags])
         for (dimension, name), tags in named.items():
             gmsh.model.setPhysicalName(dimension, gmsh.model.addPhysicalGroup(dimension, tags), name)
         raw = from_gmsh_model(gmsh)
@@ -177,12 +179,27 @@ def _periodic(gmsh: ModuleType, named: dict[tuple[int, str], list[int]], sectors
             tie(gmsh, 2, tags[master], tags[slave], best, np.zeros(3))
 
 
-def _generate(gmsh: ModuleType, size: MeshSize) -> None:
+def _refined(gmsh: ModuleType, faces: list[int], fine: float, base: float) -> None:
+    """Size ``fine`` on some faces [m], growing to ``base`` within five of its elements."""
+    field = gmsh.model.mesh.field
+    distance, threshold = field.add("Distance"), field.add("Threshold")
+    field.setNumbers(distance, "SurfacesList", faces)
+    field.setNumber(distance, "Sampling", 60)
+    for name, value in (("InField", distance), ("SizeMin", fine), ("SizeMax", base), ("DistMin", fine),
+                        ("DistMax", 5 * base)):
+        field.setNumber(threshold, name, value)
+    field.setAsBackgroundMesh(threshold)
+
+
+def _generate(gmsh: ModuleType, size: MeshSize, contact: list[int]) -> None:
+    """Elements that follow the curvature, of ``size.contact_size`` on the contact faces and coarser away from them."""
     low, high = np.array(gmsh.model.getBoundingBox(-1, -1)).reshape(2, 3)
     base = size.size or np.linalg.norm(high - low) / 40
     gmsh.option.setNumber("Mesh.MeshSizeMax", base)
-    gmsh.option.setNumber("Mesh.MeshSizeMin", base / 4)
+    gmsh.option.setNumber("Mesh.MeshSizeMin", min(base / 4, size.contact_size or base))
     gmsh.option.setNumber("Mesh.MeshSizeFromCurvature", 10)
+    if size.contact_size and contact:
+        _refined(gmsh, contact, size.contact_size, base)
     check_count(gmsh, 3, size.scale * base)
     gmsh.option.setNumber("Mesh.MeshSizeFactor", size.scale)
     gmsh.model.mesh.generate(3)

@@ -28,12 +28,13 @@ def effective_masses(sets: Sequence[ModeSet], body: Any) -> pd.DataFrame:
         body: fem.body.Body, for its mass; collective on its ranks.
 
     Returns:
-        nodal_diameter (wheels), mode, frequency [Hz], direction, effective_mass [kg or kg m^2] of the whole wheel (both
-        waves of a pair together), share [1] of its rigid mass, sum [1] of the shares up to this mode.
+        nodal_diameter (wheels), mode, frequency [Hz], direction, factor [kg^1/2 or kg^1/2 m] of participation with
+        mass-normalised modes of the whole wheel (both waves of a pair together), effective_mass [kg or kg m^2] its
+        square, share [1] of the rigid mass, sum [1] of the shares up to this mode.
     """
     frames = [_rows(modes, body, direction, factor)
               for modes in sets for direction, factor in _directions(modes, body)]
-    columns = ["mode", "frequency", "direction", "effective_mass", "share", "sum"]
+    columns = ["mode", "frequency", "direction", "factor", "effective_mass", "share", "sum"]
     return pd.concat(frames, ignore_index=True) if frames else pd.DataFrame(columns=columns)
 
 
@@ -61,8 +62,8 @@ def _rows(modes: ModeSet, body: Any, direction: str, factor: float) -> pd.DataFr
     coupling = dot(body.comm, own_rows(body, modes.shapes), moved)[:, 0]
     share = np.abs(coupling) ** 2 / total
     table = pd.DataFrame({"mode": np.arange(1, len(share) + 1), "frequency": modes.frequencies,
-                          "direction": direction, "effective_mass": factor * share * total, "share": share,
-                          "sum": np.cumsum(share)})
+                          "direction": direction, "factor": np.sqrt(factor * total * share),
+                          "effective_mass": factor * share * total, "share": share, "sum": np.cumsum(share)})
     if modes.nodal_diameter is not None:
         table.insert(0, "nodal_diameter", modes.nodal_diameter)
     return table

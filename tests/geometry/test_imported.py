@@ -135,6 +135,19 @@ def test_a_file_in_millimetres_is_not_taken_for_metres(coarse_sector, tmp_path):
         read_mesh(tmp_path / "a.msh", sectors=36)
 
 
+def test_step_is_finer_on_contact_faces(tmp_path):
+    """mesh.contact_size holds on a face that is called after a seat; far from it the elements are as large as ever."""
+    write_step(tmp_path / "a.step", "block", {"blade": ["clamp", "seat_left"]})
+    size = MeshSize(size=0.01, contact_size=0.003)
+    mesh, plain = read_step(tmp_path / "a.step", size), read_step(tmp_path / "a.step", MeshSize(size=0.01))
+    fine, coarse = (len(found.faces["seat_left"]) for found in (mesh, plain))
+    assert fine > 6 * coarse
+    clamp = [len(found.faces["clamp"]) for found in (mesh, plain)]
+    assert clamp[0] < 3 * clamp[1]
+    scaled = read_step(tmp_path / "a.step", replace(size, scale=2.0))
+    assert 2.5 < fine / len(scaled.faces["seat_left"]) < 6
+
+
 def test_step_with_a_wrong_scale_is_refused_before_it_is_meshed(tmp_path):
     write_step(tmp_path / "a.step", "block", {})
     with pytest.raises(InputError, match=r"mesh\.size.*cells"):

@@ -134,5 +134,6 @@ def test_effective_masses_add_up():
         assert 0.75 < rows["sum"].iloc[-1] < 1.0
     lateral = few[few["direction"] == "x, y"].iloc[0]
     assert lateral["effective_mass"] / lateral["share"] == pytest.approx(5 * mass(body), rel=1e-6)
+    assert few["factor"].to_numpy() ** 2 == pytest.approx(few["effective_mass"].to_numpy())
     single = effective_masses([modes(constrain(body, "clamp"), 5)], body)
     assert len(single) == 30 and "nodal_diameter" not in single
