@@ -16,9 +16,9 @@ Measured on two busy cores, ms a solved point, and the error at the points that 
     chain                      5.0       865     174   31  31/31     3.1e-05    3.1e-05    183   529
     chain with lift-off       36       14608     411   31  15/31     5.7e-05    2.8e-01    194   548
     3-D patch                199      112108     563    4    4/4     3.8e-05    2.3e-01    224  2202
-H 7 and 256 samples; the patch H 5 and 128. Lost points count in the time. Where contacts lift off pyHarm's accepted
-points are not all solutions: its single-precision elements are let off at a coarse residual. A dense Newton step of the
-patch has 24 GFlop, 0.5 s at the machine's limit.
+H 7 and 256 samples; the patch H 5 and 128. Lost points count in the time. Where contacts lift off some points that
+pyHarm accepts are far from the reference: other motions, or its coarse residual. A dense Newton step of the patch has
+24 GFlop, 0.5 s at the machine's limit.
 """
 
 from __future__ import annotations

@@ -89,18 +89,17 @@ def body_rate(model: ReducedModel, omega: float, force: np.ndarray, name: str) -
 def _modal_rate(body: Stack, omega: float, modal: np.ndarray, name: str) -> np.ndarray:
     """(H+1, m) derivative of modal amplitudes under constant forces."""
     orders = np.arange(len(modal))
-    flexible = flexibility(body, omega * orders)
     if name == "omega":
         push = impedance_rate(body, omega * orders, modal) * orders[:, None]
     else:
         push = damping_rate(body, omega * orders, modal)
-    rate = -(flexible * push if flexible.ndim == 2 else (flexible @ push[:, :, None])[:, :, 0])
-    rate[0] = 0.0
-    return rate
+    return _pushed(body, omega * orders, push)
 
 
 def _damper_rate(model: ReducedModel, omega: float, force: np.ndarray, name: str) -> np.ndarray:
     """(H+1, m) derivative of the damper's contact displacements under constant forces."""
+    if name == "mass" and model.damper is None:
+        raise InputError("mass: expected a model with a damper")
     if model.damper is None or name == "force":
         return np.zeros_like(force)
     w = omega * np.arange(len(force))
@@ -109,10 +108,22 @@ def _damper_rate(model: ReducedModel, omega: float, force: np.ndarray, name: str
         moved = np.zeros_like(force)
         moved[1:] = -(B @ np.linalg.solve(model.damper.mass, B.T @ force[1:].T)).T / w[1:, None]**2
         return moved * {"omega": -2 / omega, "mass": -1.0, "damping": 0.0}[name]
-    if name == "mass":
-        raise InputError("mass: expected damper to be a RigidBody")
     damper = model.elastic_damper(len(force) - 1)
     ports = np.zeros((len(force), damper.shapes.shape[1]), dtype=complex)
     ports[:, damper.contact] = force
-    modal = _modal_rate(damper, omega, amplitudes(damper, flexibility(damper, w), ports), name)
-    return motion(damper, modal, np.zeros_like(ports), damper.contact)
+    modal = amplitudes(damper, flexibility(damper, w), ports)
+    if name == "mass":
+        own = model.damper_damping      # with the mass: omega^2 m, half of 2 zeta sqrt(k m), and alpha m
+        push = (-w[:, None]**2 + 1j * w[:, None] * (own.ratio * damper.omega + own.mass)) * modal
+        rate = _pushed(damper, w, push)
+    else:
+        rate = _modal_rate(damper, omega, modal, name)
+    return motion(damper, rate, np.zeros_like(ports), damper.contact)
+
+
+def _pushed(body: Stack, w: np.ndarray, push: np.ndarray) -> np.ndarray:
+    """(H+1, m) derivative of modal amplitudes from that of the impedance times the amplitudes; none of the mean."""
+    flexible = flexibility(body, w)
+    rate = -(flexible * push if flexible.ndim == 2 else (flexible @ push[:, :, None])[:, :, 0])
+    rate[0] = 0.0
+    return rate

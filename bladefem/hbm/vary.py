@@ -23,9 +23,18 @@ def _force(model: ReducedModel, factor: float) -> ReducedModel:
 
 
 def _mass(model: ReducedModel, factor: float) -> ReducedModel:
+    if model.damper is None:
+        raise InputError("mass: expected a model with a damper")
     if isinstance(model.damper, RigidBody):
         return replace(model, damper=replace(model.damper, mass=factor * model.damper.mass))
-    raise InputError("mass: only a rigid damper's mass is a parameter, expected damper to be a RigidBody")
+    return replace(model, damper=tuple(_heavier(body, factor) for body in model.damper))
+
+
+def _heavier(body: PortModel, factor: float) -> PortModel:
+    """The elastic body with another density: modes keep their form, and the viscous matrix its values."""
+    root = float(np.sqrt(factor))
+    damping = None if body.damping is None else body.damping / factor
+    return replace(body, omega=body.omega / root, shapes=body.shapes / root, damping=damping)
 
 
 def _load(model: ReducedModel, factor: float) -> ReducedModel:
@@ -50,7 +59,7 @@ PARAMETERS: dict[str, Callable[[ReducedModel, float], ReducedModel]] = {
     "kt": _elements(lambda e, factor: replace(e, kt=factor * e.kt)),                # factor
     "kn": _elements(lambda e, factor: replace(e, kn=factor * e.kn)),                # factor
     "gap": _elements(lambda e, gap: replace(e, n0=e.n0 - e.kn * gap)),              # added opening [m]
-    "mass": _mass,                                                                  # factor of a rigid damper's mass
+    "mass": _mass,                                                                  # factor of the damper's mass
     "damping": _damping,                                                            # factor of the bodies' damping
 }
 

@@ -9,6 +9,7 @@ from models import block, single_mass
 from bladefem.errors import InputError
 from bladefem.hbm.api import solve
 from bladefem.hbm.gradient import node_gradients
+from bladefem.hbm.model import Damping
 from bladefem.hbm.newton import Options
 from bladefem.hbm.reference import reference_model
 from bladefem.hbm.sensitivity import sensitivities
@@ -17,6 +18,14 @@ from bladefem.hbm.vary import vary
 
 TIGHT = Options(tolerance=1e-13)
 COUPLED = ("omega", "force", "load", "mu", "kt", "kn", "gap", "damping")
+
+
+def elastic_damper(**changes):
+    """Contacts in 3-D between a body and a floating elastic one."""
+    damper = block(nodes=4, seed=5, dofs=14).side(1)
+    damper = replace(damper, omega=np.maximum(1.5 * damper.omega - 0.9, 0.0), ports={"contact": slice(0, 12)})
+    model = block(force=0.8)
+    return replace(model, damper=(damper,), damper_damping=Damping(0.02, 0.01, mass=0.03, stiffness=0.02), **changes)
 
 
 def difference(model, near, name, step):
@@ -33,6 +42,7 @@ def difference(model, near, name, step):
     (replace(single_mass(), normal={1: np.array([0.2j])}), 1.1, ("omega", "force", "load", "mu", "kt", "damping")),
     (block(force=1.5), 0.9, COUPLED),
     (block(force=0.5, damper=True), 1.3, (*COUPLED, "mass")), (replace(block(force=1.5), coupled=False), 0.9, COUPLED),
+    (elastic_damper(), 1.1, (*COUPLED, "mass")),
     (reference_model(load=1.4, points=3, phase=0.7, harmonics=5), 8300.0,
      ("omega", "force", "load", "mu", "kt", "mass", "damping"))])
 def test_sensitivities_equal_differences(model, omega, names):
@@ -51,6 +61,8 @@ def test_unknown_parameter():
     model = single_mass()
     with pytest.raises(InputError, match="did you mean 'load'"):
         sensitivities(model, solve(model, 1.1), ["loads"])
+    with pytest.raises(InputError, match="with a damper"):
+        sensitivities(model, solve(model, 1.1), ["mass"])
     with pytest.raises(InputError, match="gap"):
         sensitivities(model, solve(model, 1.1), ["gap"])
 
