@@ -25,6 +25,7 @@ from ..study import pipeline
 from ..study.limits import Limit
 from ..study.loads import Progress, summary, unwatched
 from ..study.modal import family_table
+from ..study.state_check import state_sentence
 from ..view import contact, mesh, modes, response, speed
 from .datasets import datasets, table_dataset
 from .nodes import cycles_of, draw_wear, node_table, save_cycles_vtu
@@ -71,7 +72,7 @@ def _write(result: pipeline.Run, progress: Progress) -> None:
     modes.save_modes_vtu(result.mesh, excited_modes(result), folder / "modes.vtu")
     contact.save_pressure_vtu(result.contact.maps, folder / "pressure.vtu")
     save_cycles_vtu(patches, cycles, folder / "friction_work.vtu")
-    messages = [*result.messages, _static_contact(result), *_beyond_stick(result)]
+    messages = [*result.messages, _static_contact(result), _states(result), *_beyond_stick(result)]
     write_report(folder, result.scene, tables, figures, messages, result.timings)
 
 
@@ -80,6 +81,13 @@ def _static_contact(result: pipeline.Run) -> str:
     patch = next(iter(result.contact.maps.values()))[0].patch
     highest = max(curve.settings.harmonics * float(np.max(curve.frequency)) for curve in result.response.curves)
     return quasi_static(patch, result.scene.material.blade, highest).sentence
+
+
+def _states(result: pipeline.Run) -> str:
+    """Whether the paper's table of states would do for the loads of the run and the normal motion at its resonances."""
+    motions = [c.peak.w[:, 0, 1:] for c in result.response.curves if c.peak.w.shape[1] == result.mesh.dimension]
+    travel = max((float(np.abs(w).max()) for w in motions), default=0.0)
+    return state_sentence(result.scene, result.contact.problem, list(result.contact.maps), travel or 1e-6)
 
 
 def _beyond_stick(result: pipeline.Run) -> list[str]:

@@ -8,6 +8,7 @@ import pytest
 from test_seat import ALPHA, SPEED, condensed
 from wedge import wedge_mesh
 
+import bladefem
 from bladefem.contact.seat import solve
 from bladefem.contact.states import interpolate, quasi_static, state_table
 from bladefem.contact.stiffness import aggregation, friction_elements, mindlin_ratio, normal_stiffness, pair_ratio
@@ -15,6 +16,7 @@ from bladefem.contact.summary import resultant, write_maps
 from bladefem.data import PressureMap
 from bladefem.errors import InputError
 from bladefem.scene import Contact, Material
+from bladefem.study.state_check import check_states, state_sentence
 
 
 @pytest.fixture(scope="module")
@@ -136,6 +138,17 @@ def test_table_of_states_and_its_indicator(problem):
     errors, indicators = np.array(errors), np.array(indicators)
     assert errors[-1] < errors[0] / 10
     assert (indicators > 0.3 * errors).all() and (indicators < 30 * errors).all()
+
+
+def test_the_user_is_told_whether_the_table_is_enough(problem):
+    """A narrow range of loads without tilt is linear to 1 %; micrometres of tilt move the contact area."""
+    scene = bladefem.load_scene("scenes/wedge.toml", ["contact.bedded=true"])
+    narrow = check_states(scene, problem, [100.0, 110.0], 1e-10)
+    wide = check_states(scene, problem, [20.0, 200.0], 5e-6)
+    assert narrow.states == 25 and narrow.enough and narrow.error < 1e-3
+    assert not wide.enough and wide.error > 0.05 and wide.indicator > 0.02
+    assert "is enough" in state_sentence(scene, problem, [100.0, 110.0], 1e-10)
+    assert "is NOT enough" in state_sentence(scene, problem, [20.0, 200.0], 5e-6)
 
 
 def test_table_is_exact_on_its_points(problem):

@@ -1,0 +1,80 @@
+"""The paper's table of quasi-static contact states beside the direct solve: is the table enough for this scene?"""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Sequence
+from dataclasses import dataclass
+from itertools import product
+
+import numpy as np
+
+from ..contact.seat import ContactProblem, solve
+from ..contact.states import interpolate, state_table
+from ..errors import NotSolvedError
+from ..scene import Scene
+
+__all__ = ["StateCheck", "check_states", "state_sentence"]
+
+STATES = 5              # of each axis
+ENOUGH = 0.01           # of the largest nodal force
+
+
+@dataclass(frozen=True)
+class StateCheck:
+    """Interpolated against directly solved contact forces in the middle of the table's cells."""
+
+    states: int                     # solved for the table
+    error: float                    # largest, over the largest nodal force [1]
+    indicator: float                # largest that the table tells of itself [1]
+    direct: float                   # time of a direct solve [s]
+
+    @property
+    def enough(self) -> bool:
+        """The table may take the place of direct solves."""
+        return max(self.error, self.indicator) <= ENOUGH
+
+
+def check_states(scene: Scene, problem: ContactProblem, loads: Sequence[float], travel: float) -> StateCheck:
+    """Table over the normal load and a tilt of the platforms, for the paper's load and relative position.
+
+    Args:
+        loads: smallest and largest make the first axis [N].
+        travel: approach at the ends of a seat [m]; the second axis runs from minus to plus this.
+
+    Raises:
+        NotSolvedError: a state has no solution.
+    """
+    tilt = np.concatenate([np.linspace(-1, 1, len(patch.area)) for patch in problem.patches])
+
+    def direct(load: float, approach: float) -> np.ndarray:
+        maps = solve(problem, scene.operation.speed, normal=load, approach=approach * tilt,
+                     bedded=scene.contact.bedded)
+        return np.concatenate([m.force for m in maps])
+
+    low, high = min(loads), max(loads)
+    axes = [np.linspace(low, high if high > low else 2 * low, STATES), np.linspace(-travel, travel, STATES)]
+    table, error, indicator = state_table(direct, axes), 0.0, 0.0
+    middles = list(product(*[(a[1:] + a[:-1]) / 2 for a in axes]))
+    exact, begin = [], time.perf_counter()
+    for middle in middles:
+        exact.append(direct(*middle))
+    spent = (time.perf_counter() - begin) / len(middles)
+    largest = float(np.abs(table.force).max())
+    for middle, force in zip(middles, exact, strict=True):
+        found, told = interpolate(table, middle)
+        error, indicator = max(error, float(np.abs(found - force).max()) / largest), max(indicator, told)
+    return StateCheck(table.force[..., 0].size, error, indicator, spent)
+
+
+def state_sentence(scene: Scene, problem: ContactProblem, loads: Sequence[float], travel: float) -> str:
+    """For the report."""
+    try:
+        check = check_states(scene, problem, loads, travel)
+    except NotSolvedError as error:
+        return f"a table of contact states could not be made: {error}"
+    verdict = "is enough" if check.enough else "is NOT enough"
+    return (f"a table of {check.states} contact states over {min(loads):.4g} to {max(loads):.4g} N and ±"
+            f"{1e6 * travel:.3g} µm of tilt at the seats' ends {verdict}: interpolation misses "
+            f"nodal forces by up to {100 * check.error:.2g} % of the largest (its indicator says "
+            f"{100 * check.indicator:.2g} %); the direct solve, used here, takes {1e3 * check.direct:.2g} ms a state")
