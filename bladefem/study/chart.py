@@ -154,8 +154,7 @@ def errors(peak: Peak, truth: Peak) -> dict[str, float]:
 def _bench(model: Callable[[int], ReducedModel], chosen: int, omegas: np.ndarray, budget: float, name: str,
            remarks: list[str]) -> Bench:
     """Climb the ladder past the chosen harmonics, and on while the next rung is expected to fit into the time."""
-    least = 1 + next(k for k, (H, _) in enumerate(LADDER) if H >= chosen)
-    least = max(least, 2)
+    least = 2 + next((k for k, (H, _) in enumerate(LADDER) if H >= chosen), len(LADDER))
     best, before, start, used = None, None, time.perf_counter(), 0.0
     for rung, (H, samples) in enumerate(LADDER):
         if rung >= least and used * 6 > budget - (time.perf_counter() - start):
