@@ -14,6 +14,8 @@ TABLES = {"aerofoil": ["Aerofoil"], "platform": ["Platform", "Shank", "Wedge"], 
 NAMES = """## names
 
 Groups of the mesh, which are the contract with the finite elements and the names that `.msh` and STEP files need, too.
+A file that calls them otherwise gets these names in its scene: `names = ["clamp = face_3 + face_4", "tip = face_1"]`
+under `[imported]`; `bladefem mesh` lists what the file has.
 
 | name | what | in |
 | --- | --- | --- |
