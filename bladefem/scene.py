@@ -39,7 +39,9 @@ class Contact:
     """Friction and contact stiffness of the seats. Areal stiffnesses spread over the patch; totals win when given."""
 
     mu: float = quantity(0.3, "1", 0.0, 2.0, "friction coefficient")
-    kt_area: float = quantity(4.0e10, "N/m^3", 0.0, 1e15, "tangential contact stiffness for each unit of area")
+    kt_area: float | None = quantity(None, "N/m^3", 0.0, 1e15,
+                                     "tangential contact stiffness for each unit of area; by Mindlin from kn_area, "
+                                     "40 N/mm^3 without either")
     kt: float | None = quantity(None, "N/m", 0.0, 1e12, "tangential stiffness of one whole patch")
     kn_area: float | None = quantity(None, "N/m^3", 0.0, 1e15,
                                      "normal contact stiffness for each unit of area; by Mindlin from kt_area")

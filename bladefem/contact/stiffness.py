@@ -12,7 +12,10 @@ from ..errors import InputError
 from ..scene import Contact, Material
 from .seat import ContactProblem
 
-__all__ = ["aggregation", "friction_elements", "mindlin_ratio", "normal_stiffness", "pair_ratio"]
+__all__ = ["aggregation", "friction_elements", "mindlin_ratio", "normal_stiffness", "pair_ratio",
+           "tangential_stiffness"]
+
+USUAL = 4e10            # tangential stiffness for each unit of area where the scene tells none [N/m^3]
 
 
 def mindlin_ratio(nu: float) -> float:
@@ -31,6 +34,13 @@ def pair_ratio(a: Material, b: Material) -> float:
     return normal / tangential
 
 
+def tangential_stiffness(contact: Contact, ratio: float) -> float:
+    """k_t for each unit of area [N/m^3]: as measured (given), else ratio times the normal one, else a usual value."""
+    if contact.kt_area is not None:
+        return contact.kt_area
+    return USUAL if contact.kn_area is None else ratio * contact.kn_area
+
+
 def friction_elements(maps: Sequence[PressureMap], contact: Contact, ratio: float,
                       tangents: int = 2) -> tuple[Elements, sp.csr_matrix]:
     """Node-to-node elements of all patches, one after the other.
@@ -38,7 +48,7 @@ def friction_elements(maps: Sequence[PressureMap], contact: Contact, ratio: floa
     Args:
         maps: static pressure of each patch.
         contact: mu, stiffnesses (totals of a patch win over areal ones), points, and how the normal load behaves.
-        ratio: k_t / k_n, used where no normal stiffness is given (``pair_ratio``).
+        ratio: k_t / k_n, used where only one of the two is given (``pair_ratio``).
         tangents: 2 for solids, 1 for plane models.
 
     Returns:
@@ -50,7 +60,8 @@ def friction_elements(maps: Sequence[PressureMap], contact: Contact, ratio: floa
     """
     G = [aggregation(m.patch, contact.points) for m in maps]
     area = [a.T @ m.patch.area for a, m in zip(_members(G), maps, strict=True)]
-    kt = np.concatenate([contact.kt_area * a if contact.kt is None else contact.kt * a / a.sum() for a in area])
+    areal = tangential_stiffness(contact, ratio)
+    kt = np.concatenate([areal * a if contact.kt is None else contact.kt * a / a.sum() for a in area])
     kn = kt / ratio if contact.kn_area is None else contact.kn_area * np.concatenate(area)
     if contact.normal == "coupled" and not (kn > 0).all():
         raise InputError("contact.kn_area is 0, expected a positive value where contact.normal is 'coupled'")

@@ -66,6 +66,17 @@ def test_total_stiffness_wins_over_areal(maps):
     assert e.kn == pytest.approx(1e10 * np.concatenate([m.patch.area for m in maps]), rel=1e-13)
 
 
+def test_tangential_stiffness_by_mindlin_from_the_normal_one(maps):
+    """Given kn alone; a measured kt wins; the usual value where neither is given."""
+    ratio, area = mindlin_ratio(0.3), np.concatenate([m.patch.area for m in maps])
+    found = {name: friction_elements(maps, contact, ratio)[0] for name, contact in
+             {"kn": Contact(kn_area=3e10), "both": Contact(kn_area=3e10, kt_area=1e10), "none": Contact()}.items()}
+    np.testing.assert_allclose(found["kn"].kt, ratio * found["kn"].kn, rtol=1e-14)
+    np.testing.assert_allclose(found["kn"].kn, 3e10 * area, rtol=1e-14)
+    np.testing.assert_allclose(found["both"].kt, 1e10 * area, rtol=1e-14)
+    np.testing.assert_allclose(found["none"].kt, 4e10 * area, rtol=1e-14)
+
+
 def test_open_nodes_keep_their_gap(maps):
     e, _ = friction_elements(maps, Contact(), 1.0)
     gap = np.concatenate([m.gap for m in maps])
