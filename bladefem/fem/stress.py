@@ -91,12 +91,24 @@ def principal(stress: np.ndarray) -> np.ndarray:
     """(..., 3) principal stresses, descending [Pa]; of complex amplitudes the largest of each in a period."""
     if not np.iscomplexobj(stress):
         return np.linalg.eigvalsh(_tensor(stress))[..., ::-1]
-    turns = np.exp(2j * np.pi * np.arange(PHASES) / PHASES)
-    best = None
-    for turn in turns:
-        now = np.linalg.eigvalsh(_tensor((stress * turn).real))[..., ::-1]
-        best = now if best is None else np.maximum(best, now)
+    best = np.full((*stress.shape[:-1], 3), -np.inf)
+    for turn in np.exp(2j * np.pi * np.arange(PHASES // 2) / PHASES):       # half a period later the sign is the other
+        now = _roots((stress * turn).real)
+        best = np.maximum(best, np.maximum(now, -now[..., ::-1]))
     return best
+
+
+def _roots(s: np.ndarray) -> np.ndarray:
+    """(..., 3) principal stresses of real (..., 6), descending, by the cosine formula (Smith 1961,
+    doi:10.1145/355578.366316); double ones to eight digits, many times faster than an eigenvalue solver."""
+    mean = s[..., :3].mean(-1)
+    a, b, c = (s[..., i] - mean for i in range(3))
+    xy, yz, zx = s[..., 3], s[..., 4], s[..., 5]
+    radius = np.sqrt((a * a + b * b + c * c + 2 * (xy * xy + yz * yz + zx * zx)) / 6)
+    det = a * (b * c - yz * yz) - xy * (xy * c - yz * zx) + zx * (xy * yz - b * zx)
+    angle = np.arccos(np.clip(det / np.maximum(2 * radius ** 3, 1e-300), -1, 1)) / 3
+    first, last = 2 * radius * np.cos(angle), 2 * radius * np.cos(angle + 2 * np.pi / 3)
+    return mean[..., None] + np.stack([first, -first - last, last], axis=-1)
 
 
 def _form(a: np.ndarray, b: np.ndarray) -> np.ndarray:

@@ -95,15 +95,14 @@ def _write(result: Survey, pictures: int, stresses: pd.DataFrame, fields: dict[s
 def _stresses(result: Survey) -> tuple[pd.DataFrame, dict[str, np.ndarray]]:
     """Table of extremes and node fields: displacement and stress under the rotation, of the first modes and of the
     resonances; collective."""
-    from ..fem.stress import principal, von_mises
     states = stress_states(result.bodies, excited_set(result.run), PICTURES, result.answer)
-    table, nodal = stress_table(result.bodies, states)
+    table, nodes = stress_table(result.bodies, states)
     fields = {}
-    for name, stress in nodal.items():
+    for name, (size, largest) in nodes.items():
         if not name.startswith("mode"):
             fields |= _vectors(f"{name}, displacement", states[name])
-        fields[f"{name}, von Mises [Pa]"] = von_mises(stress)
-        fields[f"{name}, largest principal [Pa]"] = principal(stress)[:, 0]
+        fields[f"{name}, von Mises [Pa]"] = size
+        fields[f"{name}, largest principal [Pa]"] = largest
     return table, fields
 
 

@@ -124,14 +124,14 @@ def stress_states(bodies: Bodies, modes: ModeSet, count: int, found: Answer | No
         states["rotation"] = np.pad(u0, ((0, 0), (0, 3 - u0.shape[1])))
     for i, shape in enumerate(modes.shapes[:count]):
         largest = max(np.linalg.norm(shape, axis=1).max(), 1e-300)
-        states[f"mode {i + 1} for 1 mm"] = LARGEST / largest * shape
+        states[f"mode {i + 1} for 1 mm"] = LARGEST / largest * shape.astype(complex)     # it swings to both sides
     for i, shape in enumerate(() if found is None else found.shapes):
         states[f"resonance {i + 1}"] = shape
     return states
 
 
 def stress_table(bodies: Bodies, states: dict[str, np.ndarray]) -> tuple[pd.DataFrame, dict[str, np.ndarray]]:
-    """Extremes of each state, and its nodal stresses (n_points, 6) [Pa].
+    """Extremes of each state, and node fields of von Mises and largest principal stress (2, n_points) [Pa] by its name.
 
     Returns:
         columns state, largest [m], von_mises [Pa] at the nodes and where x, y, z [m], von_mises_gauss [Pa] at the
@@ -139,17 +139,17 @@ def stress_table(bodies: Bodies, states: dict[str, np.ndarray]) -> tuple[pd.Data
         extremes in a period.
     """
     from ..fem.stress import gauss_stress, nodal_stress, principal, von_mises
-    rows, nodal = [], {}
+    rows, nodes = [], {}
     for name, u in states.items():
         stress = nodal_stress(bodies.still_blade, u)
         size, sides = von_mises(stress), principal(stress)
-        worst, nodal[name] = size.argmax(), stress
-        low = -principal(-stress)[:, 0].max() if np.iscomplexobj(stress) else sides[:, 2].min()
+        worst, nodes[name] = size.argmax(), np.stack([size, sides[:, 0]])
+        low = -sides[:, 0].max() if np.iscomplexobj(stress) else sides[:, 2].min()
         rows.append({"state": name, "largest": np.linalg.norm(u, axis=1).max(), "von_mises": size[worst],
                      **dict(zip("xyz", bodies.mesh.points[worst], strict=True)),
                      "von_mises_gauss": von_mises(gauss_stress(bodies.still_blade, u).stress).max(),
                      "principal": sides[:, 0].max(), "pressing": low})
-    return pd.DataFrame(rows), nodal
+    return pd.DataFrame(rows), nodes
 
 
 def _curve(found: Forced, vector: np.ndarray, count: int) -> pd.DataFrame:
