@@ -13,9 +13,12 @@ bladefem over that of ccx, largest relative difference of a frequency:
     dofs     nodal diameters  elements  ccx [s]  bladefem [s]  ratio  memory [GB]  ratio  ccx's mass  exact mass
     45 549   5                curved       19.0           2.7    7.0         0.57   1.50     1.8e-07     6.6e-05
     45 549   0                curved       18.3           3.0    6.0         0.55   1.45     3.1e-07     6.8e-05
-    45 549   0 to 12          curved      240.8          10.8   22.3         0.97   2.24     3.4e-07     7.1e-05
+    45 549   0 to 12          curved      240.8          10.8   22.3         0.84   1.95     3.4e-07     7.1e-05
     45 549   5                straight     18.8           3.1    6.0         0.57   1.51     3.3e-07     7.1e-06
     151 047  5                curved      156.9          13.8   11.4         2.09   1.18     1.4e-07     1.3e-05
+
+All 13 diameters in one run stay below the 25 times less that were aimed at. Their memory was measured again, bladefem's
+side alone, after the count by inertia had stopped keeping factors (0.97 GB before).
 """
 
 from __future__ import annotations
@@ -137,9 +140,10 @@ def sector_mesh(dofs: float, curved: bool = True) -> Mesh:
 def compare(mesh: Mesh, diameters: list[int], folder: Path) -> None:
     """One line: agreement with both quadratures, ratio of processor time and of memory."""
     theirs, cpu, memory = run_ccx(mesh, diameters, folder)
-    errors = {}
-    for quadrature in ("exact", "ccx"):
-        ours, mine, mine_memory = run_ours(mesh, diameters, folder, quadrature)
+    errors, mine, mine_memory = {}, np.inf, 0.0
+    for quadrature in ("exact", "ccx"):     # the same work twice: the better time, the worse memory
+        ours, seconds, memory_now = run_ours(mesh, diameters, folder, quadrature)
+        mine, mine_memory = min(mine, seconds), max(mine_memory, memory_now)
         errors[quadrature] = max(abs(ours[n][:COUNT] / theirs[n][:COUNT] - 1).max() for n in diameters)
     dofs = 3 * len(np.unique(mesh.bodies["blade"]))
     print(f"{dofs:7d} dofs, nodal diameters {diameters[0]}-{diameters[-1]}: ccx {cpu:.1f} s, bladefem {mine:.1f} s, "
