@@ -105,12 +105,12 @@ WITHOUT_BLADE = ("z mass", "hertz", "punch")
 
 def without_blade(scene: Scene, folder: Path, options: argparse.Namespace, comm: Any) -> None:
     """All that there is to such a scene: its contact, and the motion of the mass."""
+    from ..report.tables import readable
     if scene.kind == "z mass":
         from ..report import zmass
         found = zmass.run(scene, folder, comm)
-        return tell(options, comm, lambda: zmass.motion_table(found.motions).to_string(index=False), found)
+        return tell(options, comm, lambda: tables.frame(readable(zmass.motion_table(found.motions))), found)
     from ..report import pair
-    from ..report.tables import readable
     result = pair.run(scene, folder, comm)
     return tell(options, comm, lambda: tables.frame(readable(pair.pair_summary(result.states))), result)
 
