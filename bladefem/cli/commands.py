@@ -12,7 +12,8 @@ from ..errors import InputError
 from ..scene import Scene
 from . import tables
 
-__all__ = ["chart", "check", "contact", "info", "mesh", "modes", "report", "response", "study"]
+__all__ = ["chart", "check", "contact", "info", "mesh", "modes", "reduce", "report", "response",
+           "study"]
 
 
 def check(options: argparse.Namespace, comm: Any) -> None:
@@ -82,6 +83,12 @@ def contact(options: argparse.Namespace, comm: Any) -> None:
     from ..study import pipeline
     run = pipeline.run(scene, folder, until="contact", comm=comm, progress=bars)
     tell(options, comm, lambda: tables.pressures(run.contact.maps), run)
+
+
+def reduce(options: argparse.Namespace, comm: Any) -> None:
+    """Blade and damper reduced to their contact, load and probe points; a later response starts from there."""
+    run = until("reduction", options, comm)
+    tell(options, comm, lambda: tables.reduction(run.reduced), run)
 
 
 def response(options: argparse.Namespace, comm: Any) -> None:

@@ -38,6 +38,8 @@ _COMMANDS = {
               commands.modes),
     "contact": ("seat the damper: pressure on each face",
                 "bladefem contact scenes/wedge.toml", commands.contact),
+    "reduce": ("reduce blade and damper to their contact points, ready for responses on many ranks",
+               "bladefem reduce scenes/wedge.toml", commands.reduce),
     "response": ("forced response with friction for each load",
                  "bladefem response scenes/wedge.toml --set study.loads='20, 50, 100 N'", commands.response),
     "study": ("the same for several values of one parameter, side by side",

@@ -10,8 +10,8 @@ from geometry.quality import quality_rows
 
 from ..units import show
 
-__all__ = ["frame", "frequencies", "mesh_quality", "plain", "pressures", "resolved_scene", "responses", "side_by_side",
-           "summary", "survey"]
+__all__ = ["frame", "frequencies", "mesh_quality", "plain", "pressures", "reduction", "resolved_scene", "responses",
+           "side_by_side", "summary", "survey"]
 
 
 def plain(rows: Sequence[Sequence[object]], head: Sequence[str] = ()) -> str:
@@ -59,6 +59,16 @@ def frequencies(sets: Sequence[Any]) -> str:
         values = [f"{f:.2f}" for f in s.frequencies]
         rows.append([name, *values, *[""] * (count - len(values)), f"{max(s.residuals):.1e}"])
     return plain(rows, head)
+
+
+def reduction(reduced: Any) -> str:
+    """Size of the reduced bodies: a row for each nodal diameter of the blade, one for the damper."""
+    def row(name: str, body: Any) -> list[object]:
+        return [name, len(body.omega), f"{body.omega.max() / (2 * pi):.1f}", body.shapes.shape[0]]
+
+    rows = [row(f"sector, nodal diameter {n}" if reduced.sectors else "blade", body)
+            for n, body in reduced.sector.items()]
+    return plain([*rows, row("damper", reduced.damper)], ["body", "modes", "highest [Hz]", "port freedoms"])
 
 
 def survey(found: Any) -> str:

@@ -71,6 +71,8 @@ def _ways(balance: Balance, start: np.ndarray | None, options: Options) -> Itera
             end = newton(balance, w, options, merit)
             yield Attempt(method, end)
             near = end if near is None or end.state.error < near.state.error else near
+    if not options.fallbacks:
+        return
     for factor in (2, 4) if near.state.error < CLOSE else ():
         denser = replace(balance, samples=factor * balance.samples)
         yield Attempt("more samples", newton(denser, near.state.w, options), denser.samples)

@@ -20,7 +20,7 @@ BASIS = 80          # vectors kept by GMRES
 PASSES = 6          # of GMRES, each on what the last one left
 POOR = 0.1          # reduction by one pass from which the next one runs in double precision
 SINGLE = 1e-3       # reduction of the residual by one pass in single precision that can be trusted
-SLOW = 40           # products of one solve from which new harmonic blocks pay
+SLOW = 80           # products of one solve from which new harmonic blocks pay: they cost about as many
 
 
 @dataclass
@@ -45,19 +45,21 @@ def iterative_inverse(A: np.ndarray, change: np.ndarray,
         memory: of the Newton run; changed in place.
     """
     a, K = A.shape[1], 2 * A.shape[0] - 1
-    light, memory, count = A.astype(np.complex64), memory or Memory(), 0
+    single, double = (A.astype(np.complex64), change.astype(np.float32)), (A, change)
+    memory, count = memory or Memory(), 0
 
-    def product(x: np.ndarray, flexibility: np.ndarray) -> np.ndarray:
+    def product(x: np.ndarray, parts: tuple[np.ndarray, np.ndarray]) -> np.ndarray:
         nonlocal count
         count += 1
-        forces = (change @ x.reshape(len(change), -1, 1)).reshape(a, K)
+        flexibility, stiffness = parts
+        forces = (stiffness @ x.reshape(len(stiffness), -1, 1).astype(stiffness.dtype)).reshape(a, K)
         return x.ravel() + _flex(flexibility, forces).ravel()
 
     def prepared(x: np.ndarray) -> np.ndarray:
         return x.ravel() if memory.blocks is None else _flex(memory.blocks, x.reshape(a, K)).ravel()
 
-    def krylov(rest: np.ndarray, target: float, flexibility: np.ndarray) -> tuple[np.ndarray, int]:
-        y, failed = _gmres(lambda y: product(prepared(y), flexibility), rest, target)
+    def krylov(rest: np.ndarray, target: float, parts: tuple[np.ndarray, np.ndarray]) -> tuple[np.ndarray, int]:
+        y, failed = _gmres(lambda y: product(prepared(y), parts), rest, target)
         return prepared(y), failed
 
     def renew() -> None:
@@ -70,11 +72,11 @@ def iterative_inverse(A: np.ndarray, change: np.ndarray,
             return np.zeros_like(residual)
         if memory.slow:
             renew()
-        x, rest, flexibility, fresh = np.zeros(a * K), residual.ravel(), light, memory.slow
+        x, rest, parts, fresh = np.zeros(a * K), residual.ravel(), single, memory.slow
         for _ in range(PASSES):
             left = float(np.linalg.norm(rest))
-            part, failed = krylov(rest, max(target, SINGLE * left), flexibility)
-            after = rest - product(part, A)
+            part, failed = krylov(rest, max(target, SINGLE * left), parts)
+            after = rest - product(part, double)
             gain = np.linalg.norm(after) / left
             if gain < 1:
                 x, rest = x + part, after
@@ -84,7 +86,7 @@ def iterative_inverse(A: np.ndarray, change: np.ndarray,
                 fresh = True
                 renew()
             elif gain > POOR:
-                flexibility = A
+                parts = double
         else:
             raise np.linalg.LinAlgError("GMRES did not solve for the Newton step")
         memory.slow = memory.slow or count > SLOW

@@ -29,6 +29,7 @@ class Options:
     tolerance: float = 1e-10    # residual of the balance over the size of the motion [1]
     iterations: int = 60        # Newton steps of one attempt
     probe: int = 0              # whose height sweeps and peaks measure
+    fallbacks: bool = True      # whether more is tried where Newton fails
 
     def __post_init__(self) -> None:
         if not 1e-14 <= self.tolerance <= 1e-2:

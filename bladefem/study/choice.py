@@ -95,7 +95,7 @@ def _next(settings: Settings, found: Indicators, accuracy: float, fixed: tuple[s
     names.sort(key=lambda name: -found.errors[name])
     share, better = accuracy / 2 / max(len(settings.chosen), 1), settings
     for name in names:
-        if better == settings or found.errors[name] > share:
+        if name == names[0] or found.errors[name] > share:
             better = enriched(better, name, found.errors[name] / share) or better
     return None if better == settings else better
 

@@ -35,7 +35,7 @@ from .settings import DAMPERS, DIRECTIONS, Settings
 
 __all__ = ["Indicators", "grips", "indicate", "judge", "moved", "richer"]
 
-ENOUGH = Options(1e-5, 30)      # for a point that only tells how wrong another one is
+ENOUGH = Options(1e-5, 30, fallbacks=False)     # for a point that only tells how wrong another one is
 GRIP = (512, 1e-3)              # instants at which full stick is confirmed, and the share of the limit kept in hand
 
 

@@ -48,7 +48,7 @@ __all__ = ["STAGES", "Response", "Run", "Seating", "family_of_case", "load_cases
 
 EXACT_HARMONICS = 3      # higher ones borrow the nodal diameter next to their own
 UNKNOWNS = 5000          # of the largest balance that the automatic choice solves; model.harmonics may ask for more
-STAGES = ("mesh", "modes", "contact", "response")
+STAGES = ("mesh", "modes", "contact", "reduction", "response")
 
 
 @dataclass(frozen=True)
@@ -64,7 +64,6 @@ class Seating:
 class Response:
     """Forced responses and what they were made with."""
 
-    reduced: Reduced
     settings: Settings
     curves: list[Curve]
     limits: tuple[Limit, Limit]             # no damper, full stick
@@ -84,6 +83,7 @@ class Run:
     mesh: Mesh
     modes: list[ModeSet] | None = None
     contact: Seating | None = None
+    reduced: Reduced | None = None
     response: Response | None = None
     timings: dict[str, float] = field(default_factory=dict)     # stage to seconds
     messages: list[str] = field(default_factory=list)
@@ -125,7 +125,14 @@ def run(scene: Scene, folder: str | Path, until: str = "response", comm: Any = N
         result = replace(result, contact=Seating(problem, maps, _own_load(scene, problem, clock.messages)))
     if until == "contact":
         return result
-    return replace(result, response=_response(scene, bodies, result.contact, keep, clock, progress))
+    cases = load_cases(scene, mesh, result.contact)
+    with clock("reduction"):
+        settings, reduced = reduced_sector(scene, bodies, cases[len(cases) // 2], list(patches), keep)
+    result = replace(result, reduced=reduced)
+    if until == "reduction":
+        return result
+    family = partial(family_of_case, scene, mesh, reduced, list(patches))
+    return replace(result, response=_response(scene, cases, family, settings, keep, clock, progress))
 
 
 @dataclass(frozen=True)
@@ -165,21 +172,17 @@ class _Keeper:
         return result
 
 
-def _response(scene: Scene, bodies: Bodies, contact: Seating, keep: _Keeper, clock: Clock,
-              progress: Progress) -> Response:
-    cases, patches = load_cases(scene, bodies.mesh, contact), list(contact.problem.patches)
-    with clock("reduction"):
-        settings, reduced = reduced_sector(scene, bodies, cases[len(cases) // 2], patches, keep)
-    family = partial(family_of_case, scene, bodies.mesh, reduced, patches)
+def _response(scene: Scene, cases: list[LoadCase], family: Callable[[LoadCase], Family], settings: Settings,
+              keep: _Keeper, clock: Clock, progress: Progress) -> Response:
     with clock("response"):
-        curves = study_loads(scene, cases, family, settings, bodies.comm, progress,
+        curves = study_loads(scene, cases, family, settings, keep.comm, progress,
                              lambda case, make: keep.alone(f"response_{_name(case)}",
                                                            response_key(scene, settings, case), make))
         band = min(c.frequency[0] for c in curves), max(c.frequency[-1] for c in curves)
         rich = member(family(cases[-1]), settings).model
         limits = linear_limits(rich, scene.excitation.mode, band)
     clock.messages.extend(_remarks(scene, settings, curves))
-    return Response(reduced, settings, curves, limits)
+    return Response(settings, curves, limits)
 
 
 def _name(case: LoadCase) -> str:

@@ -36,7 +36,10 @@ def fake_run(folder):
     limits = tuple(SimpleNamespace(peak_frequency=f, peak_amplitude=8e-5) for f in (812.4, 850.0))
     response = SimpleNamespace(limits=limits, free_peak=(812.4, 8e-5),
                                curves=[fake_curve(20.0, 4e-5), fake_curve(50.0, 2e-5)])
+    body = SimpleNamespace(omega=np.array([500.0, 1000.0]), shapes=np.zeros((6, 2)))
+    reduced = SimpleNamespace(sectors=24, sector={9: body}, damper=body)
     return SimpleNamespace(mesh=mesh, modes=modes, contact=SimpleNamespace(maps={40.0: [seat]}), response=response,
+                           reduced=reduced,
                            timings={"mesh": 1.5, "modes": 4.5}, messages=["mesh: found"], folder=folder)
 
 
@@ -79,7 +82,8 @@ def test_check_prints_every_field_and_marks_what_was_given(capsys):
 
 
 @pytest.mark.parametrize(("command", "until"), [("mesh", "mesh"), ("modes", "modes"), ("contact", "contact"),
-                                                ("response", "response"), ("report", "report"), ("run", "report")])
+                                                ("reduce", "reduction"), ("response", "response"),
+                                                ("report", "report"), ("run", "report")])
 def test_commands_run_the_pipeline_as_far_as_needed(command, until, pipeline, tmp_path, capsys):
     folder = tmp_path / "run"
     assert main([command, WEDGE, "-o", str(folder), "--set", "contact.mu=0.2"]) == 0
@@ -93,7 +97,8 @@ def test_commands_run_the_pipeline_as_far_as_needed(command, until, pipeline, tm
 
 SHOWN = {
     "mesh": ["worst Jacobian", "0.31", "body blade, cells"], "modes": ["812.40", "2000.00", "2.0e-12"],
-    "contact": ["40 N", "this", "4 ", "25.0", "1.0e-14"], "report": ["best of these loads: 50 N"],
+    "contact": ["40 N", "this", "4 ", "25.0", "1.0e-14"],
+    "reduce": ["sector, nodal diameter 9", "159.2", "damper", "port freedoms"], "report": ["best of these loads: 50 N"],
     "response": ["no damper", "4.0000e-05", "best of these loads: 50 N, amplitude divided by 4"],
     "run": ["best of these loads: 50 N"],
 }
@@ -173,7 +178,8 @@ def test_wrong_arguments_exit_with_2(arguments, capsys):
     assert stop.value.code == 2 and "usage" in capsys.readouterr().err
 
 
-@pytest.mark.parametrize("command", ["check", "mesh", "modes", "contact", "response", "study", "report", "run", "info"])
+@pytest.mark.parametrize("command", ["check", "mesh", "modes", "contact", "reduce", "response", "study", "report",
+                                     "run", "info"])
 def test_help_has_an_example(command, capsys):
     with pytest.raises(SystemExit) as stop:
         parser().parse_args([command, "--help"])

@@ -43,7 +43,16 @@ def run(place: Path, *arguments: str, **more: str) -> subprocess.CompletedProces
 
 
 def test_alone_it_runs_the_main_job(place):
-    assert run(place).stdout == "python -m bladefem.cli.main run scenes/wedge.toml -o runs/wedge\n"
+    assert (run(place, BLADEFEM_RANKS="1").stdout
+            == "python -m bladefem.cli.main run scenes/wedge.toml -o runs/wedge\n")
+    assert run(place, BLADEFEM_RANKS="3").stdout == (
+        "python -m bladefem.cli.main reduce scenes/wedge.toml -o runs/wedge\n"
+        "ranks 3\npython -m bladefem.cli.main run runs/wedge on 3\n")
+
+
+def test_the_main_job_stops_where_its_first_half_fails(place):
+    done = run(place, BLADEFEM_RANKS="2", FAIL="reduce", CODE="2")
+    assert done.returncode == 2 and "ranks" not in done.stdout
 
 
 @pytest.mark.parametrize(("arguments", "said"), [
