@@ -10,7 +10,7 @@ from ..errors import InputError
 from .bodies import block, flexibility
 from .linear import condense
 from .model import ReducedModel
-from .rates import BODIES, contact_rate
+from .rates import BODIES, by_imbalance, contact_rate, hold_rate
 from .residual import Balance, adjoint, as_amplitudes, as_coefficients, evaluate_balance
 from .solution import Solution
 from .vary import check_parameter
@@ -42,9 +42,18 @@ def node_gradients(model: ReducedModel, solution: Solution, names: Iterable[str]
     n, d, K = state.w.shape
     by_force = _by_force(model, solution, probe)
     by_motion = (state.forces.dfdw.reshape(n, d * K, d * K).swapaxes(1, 2) @ by_force.reshape(n, d * K, 1))
-    turned = _transposed(balance.linear.A, adjoint(balance, state)(by_motion.reshape(n, d, K), 1e-9))
-    weight = by_force - turned
-    return {name: np.sum(weight * contact_rate(model, state, name), axis=(1, 2)) for name in names}
+    back = adjoint(balance, state)(by_motion.reshape(n, d, K), 1e-9)
+    weight = by_force - _transposed(balance.linear.A, back)
+    held = _by_hold(balance, back)
+    return {name: np.sum(weight * contact_rate(model, state, name), axis=(1, 2))
+            - (np.sum(held * hold_rate(balance, state, name), axis=1) if name in ("kt", "kn") else 0.0)
+            for name in names}
+
+
+def _by_hold(balance: Balance, back: np.ndarray) -> np.ndarray:
+    """(n, d) weights of what the springs that hold a body take at each node, from the adjoint solution."""
+    B = balance.linear.B
+    return (B @ (by_imbalance(balance.linear).T @ back[:, :, 0].ravel())).reshape(back.shape[:2])
 
 
 def _by_force(model: ReducedModel, solution: Solution, probe: int) -> np.ndarray:

@@ -13,6 +13,7 @@ import numpy as np
 from ..data import RigidBody
 from ..errors import InputError
 from .bodies import Stack, amplitudes, damping_rate, flexibility, impedance_rate, motion
+from .linear import Linear
 from .model import ReducedModel
 from .residual import Balance, State, as_amplitudes, as_coefficients
 from .solution import blade_motion
@@ -20,7 +21,7 @@ from .vary import check_parameter
 
 BODIES = ("omega", "force", "mass", "damping")      # parameters that the contact law does not see
 
-__all__ = ["BODIES", "body_rate", "contact_load", "contact_rate", "rate"]
+__all__ = ["BODIES", "body_rate", "by_imbalance", "contact_load", "contact_rate", "hold_rate", "rate"]
 
 
 def rate(balance: Balance, state: State, name: str) -> np.ndarray:
@@ -31,9 +32,31 @@ def rate(balance: Balance, state: State, name: str) -> np.ndarray:
         moved, _ = body_rate(balance.model, linear.omega, as_amplitudes(contact_load(balance.model, state)), name)
         moved[1:] -= (linear.A[1:] @ (linear.springs * moved[1:])[:, :, None])[:, :, 0]
         moved[0] -= linear.A[0] @ (linear.springs * moved[0])
+        if name == "force" and np.any(linear.g):
+            moved[0] += by_imbalance(linear) @ linear.g / balance.model.hold
         return -as_coefficients(moved, state.w.shape)
     force = as_amplitudes(contact_rate(balance.model, state, name))
-    return as_coefficients((linear.A @ force[:, :, None])[:, :, 0], state.w.shape)
+    moved = (linear.A @ force[:, :, None])[:, :, 0]
+    if name in ("kt", "kn") and linear.B.shape[1]:
+        moved[0] += by_imbalance(linear) @ (linear.B.T @ hold_rate(balance, state, name).ravel())
+    return as_coefficients(moved, state.w.shape)
+
+
+def by_imbalance(linear: Linear) -> np.ndarray:
+    """(m, r) mean displacements by a unit of imbalance on each motion without stiffness, times the hold [m]."""
+    return linear.B - linear.A[0].real @ (linear.springs[:, None] * linear.B)
+
+
+def hold_rate(balance: Balance, state: State, name: str) -> np.ndarray:
+    """(n, d) springs of a contact parameter times the mean motion without stiffness at their nodes [N].
+
+    The springs that hold this motion are a share of the contact stiffness and change with kt and kn as it does.
+    """
+    model, linear = balance.model, balance.linear
+    force = as_amplitudes(contact_load(model, state))[0]
+    still = (as_amplitudes(state.w)[0] - linear.free[0] + linear.G[0] @ force).real.reshape(model.springs.shape)
+    normal = np.arange(model.directions) < model.directions - model.elements.tangents
+    return model.springs * still * (normal == (name == "kn"))
 
 
 def contact_load(model: ReducedModel, state: State) -> np.ndarray:
