@@ -1,18 +1,24 @@
 """Progress bars: on a terminal only, one for all ranks, and only for what takes over two seconds.
 
-Nothing in the numerics imports this file: long loops are generators, which the caller wraps here.
+Long loops take a :data:`Progress` that wraps what they go through; :func:`unwatched` shows nothing and is the default.
 """
 
 from __future__ import annotations
 
 import os
 import sys
-from collections.abc import Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from typing import Any, TypeVar
 
-__all__ = ["wanted", "watch"]
+__all__ = ["Progress", "unwatched", "wanted", "watch"]
 
 T = TypeVar("T")
+Progress = Callable[..., Iterable[Any]]     # progress(items, label, total): see watch
+
+
+def unwatched(items: Iterable[T], label: str = "", total: int | None = None, **options: Any) -> Iterable[T]:
+    """The progress display that shows nothing."""
+    return items
 
 
 def wanted(quiet: bool = False, rank: int = 0) -> bool:

@@ -13,6 +13,7 @@ from scipy.linalg import eigh
 
 from ..data import PortModel
 from ..errors import InputError, suggestion
+from ..progress import Progress, unwatched
 from .constraint import Constrained, Opened, Transformation, restrict
 from .core import Rim, face_solve, inner_solve
 from .flexibility import Flexibility, compliance, flexible
@@ -57,7 +58,8 @@ def port_model(con: Constrained, P: sp.spmatrix, names: dict[str, slice], count:
 
 
 def port_models(t: Transformation, P: sp.spmatrix, names: dict[str, slice], count: int, diameters: Sequence[int],
-                static_load: np.ndarray | None = None, kind: str = "rubin") -> dict[int, PortModel]:
+                static_load: np.ndarray | None = None, kind: str = "rubin",
+                progress: Progress = unwatched) -> dict[int, PortModel]:
     """``port_model`` in several nodal diameters, with all work shared that does not depend on them.
 
     Where one rank holds the wheel, the static flexibility of all diameters takes one sweep over the ports.
@@ -67,7 +69,7 @@ def port_models(t: Transformation, P: sp.spmatrix, names: dict[str, slice], coun
     """
     shared = _sweep(t.opened, P, static_load) if t.opened is not None and kind == "rubin" else None
     out = {}
-    for p in eigenpairs(t, count, diameters, tolerance=TOLERANCE):
+    for p in progress(eigenpairs(t, count, diameters, tolerance=TOLERANCE), "nodal diameters", len(diameters)):
         n = p.con.nodal_diameter
         load = static_load if n == 0 else None
         if shared is None or p.flex.R.shape[1]:

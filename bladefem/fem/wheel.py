@@ -15,6 +15,7 @@ from scipy.linalg import eigh
 
 from ..data import ModeSet
 from ..errors import InputError, NotSolvedError
+from ..progress import Progress, unwatched
 from . import core
 from .body import Body
 from .constraint import Constrained, Transformation, at_diameter, transformation
@@ -48,7 +49,8 @@ class Eigenpairs:
 
 
 def all_diameters(body: Body | Transformation, count: int, diameters: Sequence[int] | None = None,
-                  direct: bool = False, prove: bool = True, clamp: str | None = "clamp") -> list[ModeSet]:
+                  direct: bool = False, prove: bool = True, clamp: str | None = "clamp",
+                  progress: Progress = unwatched) -> list[ModeSet]:
     """The lowest modes in each nodal diameter.
 
     Args:
@@ -56,6 +58,7 @@ def all_diameters(body: Body | Transformation, count: int, diameters: Sequence[i
         diameters: 0 to N/2 when left out.
         direct: solve every nodal diameter from scratch.
         prove: count the eigenvalues below the highest common gap by inertia.
+        progress: shows which nodal diameter is at work.
 
     Raises:
         InputError: a nodal diameter that the wheel does not have, count not positive.
@@ -65,7 +68,8 @@ def all_diameters(body: Body | Transformation, count: int, diameters: Sequence[i
         raise InputError(f"count is {count}, expected at least 1 mode")
     t = transformation(body, clamp, True) if isinstance(body, Body) else body
     wanted = list(range(t.sectors // 2 + 1)) if diameters is None else list(diameters)
-    found = {p.con.nodal_diameter: p for p in eigenpairs(t, count, wanted, direct)}
+    steps = progress(eigenpairs(t, count, wanted, direct), "nodal diameters", len(wanted))
+    found = {p.con.nodal_diameter: p for p in steps}
     if prove:
         found = _proved(t, found)
     sets = {}

@@ -16,7 +16,7 @@ from .model import ReducedModel
 from .newton import DEFAULTS, Newton, Options
 from .residual import Balance, State, evaluate_balance
 from .solution import Solution
-from .vary import check_parameter, vary
+from .vary import check_parameter, inner, outer, vary
 
 __all__ = ["PathPoint", "follow"]
 
@@ -49,7 +49,7 @@ def follow(model: ReducedModel, name: str, start: Solution, bounds: tuple[float,
         NotSolvedError: the path could not be followed further; the message says why.
     """
     task, x, state = _prepare(model, name, start, bounds, options)
-    low, high = (_inner(name, bound) for bound in bounds)
+    low, high = (inner(name, bound) for bound in bounds)
     spot = spot_at(task, x, task.balance(x), state, 0, 1.0 if forward else -1.0)
     yield _point(task, spot)
     step, longest = steps
@@ -59,7 +59,7 @@ def follow(model: ReducedModel, name: str, start: Solution, bounds: tuple[float,
         yield _point(task, spot, fold, spot.branches(before))
         if not low <= spot.x <= high:
             return
-    raise NotSolvedError(f"path in {name} stopped at {_value(name, spot.x):.6g} after {LIMIT} points")
+    raise NotSolvedError(f"path in {name} stopped at {outer(name, spot.x):.6g} after {LIMIT} points")
 
 
 def _prepare(model: ReducedModel, name: str, start: Solution, bounds: tuple[float, float],
@@ -73,10 +73,10 @@ def _prepare(model: ReducedModel, name: str, start: Solution, bounds: tuple[floa
         raise NotSolvedError(f"path in {name}: the start is not solved, {near.reason}")
 
     def balance(x: float) -> Balance:
-        changed = model if name == "omega" else vary(model, name, _value(name, x))
+        changed = model if name == "omega" else vary(model, name, outer(name, x))
         return Balance(changed, condense(changed, x if name == "omega" else start.omega, near.harmonics), near.samples)
 
-    width, x = _inner(name, bounds[1]) - _inner(name, bounds[0]), _inner(name, value)
+    width, x = inner(name, bounds[1]) - inner(name, bounds[0]), inner(name, value)
     task = Task(balance, name, width, float(np.linalg.norm(near.w)) or 1.0, options)
     return task, x, evaluate_balance(balance(x), near.w)
 
@@ -84,12 +84,4 @@ def _prepare(model: ReducedModel, name: str, start: Solution, bounds: tuple[floa
 def _point(task: Task, spot: Spot, fold: bool = False, branch: bool = False) -> PathPoint:
     end = Newton(spot.state, spot.iterations, True, "residual within tolerance")
     solution = as_solution(spot.balance, Attempt("path following", end), spot.iterations, end.reason)
-    return PathPoint(_value(task.name, spot.x), solution, spot.sign > 0, fold, spot.leapt, branch)
-
-
-def _inner(name: str, value: float) -> float:
-    return value if name in ("omega", "gap") else float(np.log(value))
-
-
-def _value(name: str, x: float) -> float:
-    return x if name in ("omega", "gap") else float(np.exp(x))
+    return PathPoint(outer(task.name, spot.x), solution, spot.sign > 0, fold, spot.leapt, branch)

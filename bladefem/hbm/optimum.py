@@ -16,13 +16,13 @@ from .model import ReducedModel
 from .peak import Peak, cubic_minimum, find_peak, with_slope
 from .resonance import free_resonances, stuck_resonances
 from .sweep import first_look, local_maxima, response, size
-from .vary import check_parameter, vary
+from .vary import check_parameter, inner, outer, vary
 
 __all__ = ["Optimum", "optimum"]
 
 LEVELS = 30             # values of the parameter tried before giving up
 WORTH = 0.7             # share of the highest peak below which the others are not solved again
-FIRST = 0.1             # first step, as a share of the logarithmic range
+FIRST = 0.1             # first step, as a share of the range (of a factor: of its logarithm)
 NEARLY = 0.9            # share of the highest peak from which a point of the coarse look is climbed
 SAME = 0.02             # dip of the height between two peaks, or distance where it is unknown: below it they are one
 
@@ -46,36 +46,50 @@ class _Search:
     H: int
     samples: int
     name: str
+    bounds: tuple[float, float]
     tolerance: float
+
+    def width(self, low: float, high: float) -> float:
+        """Between two values of the parameter, in its own coordinate: the logarithm of a factor, the gap itself."""
+        return inner(self.name, high) - inner(self.name, low)
+
+    def moved(self, value: float, by: float) -> float:
+        """The value farther along the coordinate, inside the bounds."""
+        return float(np.clip(outer(self.name, inner(self.name, value) + by), *self.bounds))
+
+    @property
+    def finest(self) -> float:
+        """Width of a bracket that is closed in."""
+        return self.tolerance * (self.width(*self.bounds) if self.name == "gap" else 1.0)
 
 
 def optimum(model: ReducedModel, band: tuple[float, float], bounds: tuple[float, float], H: int = 3,
             samples: int = 128, *, name: str = "load", tolerance: float = 1e-3) -> Optimum:
-    """The factor of a parameter, between two bounds, that makes the highest peak in a band [rad/s] lowest.
+    """The value of a parameter, between two bounds, that makes the highest peak in a band [rad/s] lowest.
 
     Peaks are sought uphill of the resonances of both linear limits, or of the middle; at the end a coarse look over the
     whole band must find nothing higher, or the search goes on with what it found.
 
     Args:
+        bounds: of a parameter of `bladefem.hbm.vary`: factors above zero, or for "gap" added openings [m].
         tolerance: of the height, relative.
 
     Raises:
-        InputError: an empty band or range.
+        InputError: an empty band or range, or an unknown parameter.
         NotSolvedError: a peak could not be solved, or the band has none.
     """
-    for what, (low, high) in {"band": band, "bounds": bounds}.items():
-        if not 0 < low < high < np.inf:
-            raise InputError(f"{what} ({low}, {high}): expected 0 < low < high")
-    if check_parameter(name) == "gap":
-        raise InputError("name 'gap': expected a parameter that is a factor")
-    search = _Search(model, band, H, samples, name, tolerance)
-    middle = float(np.sqrt(bounds[0] * bounds[1]))
+    check_parameter(name)
+    for what, (low, high), least in (("band", band, 0.0), ("bounds", bounds, -np.inf if name == "gap" else 0.0)):
+        if not least < low < high < np.inf:
+            raise InputError(f"{what} ({low}, {high}): expected {least:g} < low < high")
+    search = _Search(model, band, H, samples, name, bounds, tolerance)
+    middle = outer(name, (inner(name, bounds[0]) + inner(name, bounds[1])) / 2)
     seeds = np.concatenate([f(vary(model, name, middle)) for f in (stuck_resonances, free_resonances)])
     seeds = seeds[(seeds > band[0]) & (seeds < band[1])]
     known, points = _first(search, middle, seeds if seeds.size else np.array([np.sqrt(band[0] * band[1])]))
     tried = [_top(known, middle)]
     for _ in range(LEVELS):
-        known, tried, points = _close_in(search, bounds, known, tried, points)
+        known, tried, points = _close_in(search, known, tried, points)
         best = min(tried, key=lambda peak: peak.height)
         missed, count = _look(search, best.value, best)
         points += count
@@ -114,22 +128,22 @@ def _same(peak: Peak, omega: float) -> bool:
     return peak.bend * peak.height**2 / 4 * (peak.omega - omega)**2 < SAME
 
 
-def _close_in(search: _Search, bounds: tuple[float, float], known: list[Peak], tried: list[Peak],
+def _close_in(search: _Search, known: list[Peak], tried: list[Peak],
               points: int) -> tuple[list[Peak], list[Peak], int]:
     """Go downhill until falling and rising heights enclose the minimum to the tolerance, or a bound is reached."""
-    step, narrow = FIRST * np.log(bounds[1] / bounds[0]), False
+    step, narrow = FIRST * search.width(*search.bounds), False
     for _ in range(LEVELS):
         low = max((p for p in tried if p.slope < 0), key=lambda p: p.value, default=None)
         high = min((p for p in tried if p.slope >= 0), key=lambda p: p.value, default=None)
         if low is None or high is None:
             end, sign = (low, 1.0) if high is None else (high, -1.0)
-            value = float(np.clip(end.value * np.exp(sign * step), *bounds))
+            value = search.moved(end.value, sign * step)
             if value == end.value:
                 return known, tried, points
             step *= 2
         else:
-            value, gain = _between(low, high, narrow)
-            if gain < search.tolerance or np.log(high.value / low.value) < search.tolerance:
+            value, gain = _between(search, low, high, narrow)
+            if gain < search.tolerance or search.width(low.value, high.value) < search.finest:
                 return known, tried, points
             narrow = not narrow
         peaks, count = _level(search, value, known)
@@ -138,23 +152,23 @@ def _close_in(search: _Search, bounds: tuple[float, float], known: list[Peak], t
     raise NotSolvedError(f"optimum of {search.name} not closed in with {LEVELS} values, last at {value:.4g}")
 
 
-def _between(low: Peak, high: Peak, tangents: bool) -> tuple[float, float]:
+def _between(search: _Search, low: Peak, high: Peak, tangents: bool) -> tuple[float, float]:
     """The next value inside a bracket, and the most that could still be gained, relative to the lower end."""
-    width = np.log(high.value / low.value)
+    width = search.width(low.value, high.value)
     down, up, rise = low.slope * width, high.slope * width, high.height - low.height
     meet = (rise - up) / (down - up) if down != up else 0.5
     floor = low.height + meet * down
     gain = 1 - floor / min(low.height, high.height)
     share = meet if tangents else cubic_minimum(down, up, rise)
-    return float(low.value * np.exp(np.clip(share, 0.05, 0.95) * width)), float(gain)
+    return search.moved(low.value, float(np.clip(share, 0.05, 0.95)) * width), float(gain)
 
 
 def _level(search: _Search, value: float, known: list[Peak]) -> tuple[list[Peak], int]:
     """The known peaks at another value: solved where they may be the highest, estimated where they cannot."""
     model, found, points = vary(search.model, search.name, value), [], 0
-    ordered = sorted(known, key=lambda peak: -_estimate(peak, value))
+    ordered = sorted(known, key=lambda peak: -_estimate(search, peak, value))
     for old in ordered:
-        if found and _estimate(old, value) < WORTH * max(peak.height for peak in found if peak.value == value):
+        if found and _estimate(search, old, value) < WORTH * max(peak.height for peak in found if peak.value == value):
             found.append(old)
             continue
         peak = find_peak(model, old.omega, search.H, search.samples, near=old, tolerance=search.tolerance)
@@ -169,8 +183,8 @@ def _level(search: _Search, value: float, known: list[Peak]) -> tuple[list[Peak]
     return [met], points + count
 
 
-def _estimate(peak: Peak, value: float) -> float:
-    return peak.height * float(np.exp(peak.slope / peak.height * np.log(value / peak.value)))
+def _estimate(search: _Search, peak: Peak, value: float) -> float:
+    return peak.height * float(np.exp(peak.slope / peak.height * search.width(peak.value, value)))
 
 
 def _top(peaks: list[Peak], value: float) -> Peak:

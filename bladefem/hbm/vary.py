@@ -11,7 +11,7 @@ from ..data import Elements, PortModel, RigidBody
 from ..errors import InputError, suggestion
 from .model import Damping, ReducedModel
 
-__all__ = ["PARAMETERS", "check_parameter", "vary"]
+__all__ = ["PARAMETERS", "check_parameter", "inner", "outer", "vary"]
 
 
 def _elements(change: Callable[[Elements, float], Elements]) -> Callable[[ReducedModel, float], ReducedModel]:
@@ -64,6 +64,9 @@ PARAMETERS: dict[str, Callable[[ReducedModel, float], ReducedModel]] = {
 }
 
 
+ADDED = ("omega", "gap")        # parameters that are no factors
+
+
 def vary(model: ReducedModel, name: str, value: float) -> ReducedModel:
     """The model with one parameter changed: a factor on its present value, or for "gap" an added opening [m].
 
@@ -79,3 +82,13 @@ def check_parameter(name: str, also: tuple[str, ...] = ()) -> str:
     if name not in known:
         raise InputError(f"parameter '{name}' is unknown{suggestion(name, known)}")
     return name
+
+
+def inner(name: str, value: float) -> float:
+    """The coordinate in which a parameter is followed and derived: omega and the gap themselves, else a logarithm."""
+    return value if name in ADDED else float(np.log(value))
+
+
+def outer(name: str, x: float) -> float:
+    """The value of a parameter at such a coordinate."""
+    return x if name in ADDED else float(np.exp(x))

@@ -12,10 +12,10 @@ import numpy as np
 import pandas as pd
 
 from ..data import ModeSet
+from ..progress import Progress, unwatched
 from ..scene import Scene
 from ..store import on_root, write_results
 from ..study.answer import stress_states, stress_table
-from ..study.loads import Progress, unwatched
 from ..study.modal import family_table
 from ..study.survey import Survey, Wanted, excited_set, survey
 from ..view import convergence, forced, mesh, modes, speed

@@ -17,13 +17,14 @@ from geometry.quality import quality_rows
 
 from ..contact.states import quasi_static
 from ..data import ModeSet
+from ..progress import Progress, unwatched
 from ..reduction.assemble import folded_diameter
 from ..scene import Scene
 from ..scene_file import dump
 from ..store import on_root, write_results
 from ..study import pipeline
 from ..study.limits import Limit
-from ..study.loads import Progress, summary, unwatched
+from ..study.loads import summary
 from ..study.modal import family_table
 from ..study.state_check import state_sentence
 from ..view import contact, mesh, modes, response, speed

@@ -82,7 +82,7 @@ def campbell_table(bodies: Bodies, speeds: Sequence[float], diameters: Sequence[
     from ..fem.gyroscopic import coriolis
     squares = np.linspace(0.0, max(speeds) ** 2, 3)
     at = [bodies.blade_at(float(np.sqrt(s))) for s in squares]
-    sets = [_modes(bodies, body, diameters, count + GUARD) for body in at]
+    sets = [_modes(bodies, body, diameters, count + GUARD) for body in bodies.progress(at, "speeds")]
     G = coriolis(bodies.still_blade, spin_axis(bodies.mesh))
     rows = [_lines(at, [s[i] for s in sets], squares, speeds, G, sense_of(bodies.mesh)) for i in range(len(sets[0]))]
     return pd.concat(rows, ignore_index=True)

@@ -25,8 +25,8 @@ from geometry.mesh import Mesh
 
 from ..data import ModeSet
 from ..errors import InputError
+from ..progress import Progress, unwatched
 from ..scene import Scene
-from .loads import Progress, unwatched
 from .modal import mac_of
 from .stages import Bodies, build_mesh, find_modes
 from .transfer import nodal_volumes, transfer

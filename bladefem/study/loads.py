@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable
+from collections.abc import Callable
 from dataclasses import dataclass
 from functools import partial
 from typing import Any
@@ -11,6 +11,7 @@ import numpy as np
 
 from ..hbm.solution import Solution
 from ..hbm.sweep import size
+from ..progress import Progress, unwatched
 from ..scene import Scene
 from .choice import adapted, checked, estimated, peak_of
 from .family import Family
@@ -18,15 +19,9 @@ from .joint import LoadCase
 from .limits import Limit
 from .settings import Settings, restarted
 
-Progress = Callable[[Iterable[Any], str], Iterable[Any]]
 Keep = Callable[[LoadCase, Callable[[], Any]], Any]
 
-__all__ = ["Curve", "curve_of", "default_loads", "forgotten", "study_loads", "summary", "unwatched"]
-
-
-def unwatched(items: Iterable[Any], label: str = "") -> Iterable[Any]:
-    """The progress display that shows nothing."""
-    return items
+__all__ = ["Curve", "curve_of", "default_loads", "forgotten", "study_loads", "summary"]
 
 
 def forgotten(case: LoadCase, compute: Callable[[], Any]) -> Any:

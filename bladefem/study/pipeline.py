@@ -19,6 +19,7 @@ from ..contact.seat import solve as seat
 from ..contact.stiffness import friction_elements, pair_ratio
 from ..data import ModeSet, Patch, PressureMap
 from ..errors import InputError, NotSolvedError
+from ..progress import Progress, unwatched
 from ..reduction.truncate import truncated
 from ..scene import Scene
 from ..store import stage
@@ -29,7 +30,7 @@ from .family import Family, Member, coarsened, member, shared_harmonics
 from .joint import LoadCase, joint_model
 from .keys import contact_key, mesh_key, modes_key, reduction_key, response_key
 from .limits import Limit, linear_limits
-from .loads import Curve, Progress, default_loads, study_loads, unwatched
+from .loads import Curve, default_loads, study_loads
 from .ports import named_nodes
 from .settings import DAMPERS, Settings, enriched, first_settings
 from .stages import (
@@ -101,7 +102,7 @@ def run(scene: Scene, folder: str | Path, until: str = "response", comm: Any = N
     Raises:
         InputError: the scene cannot be run as it is; NotSolvedError: a stage found no solution.
     """
-    clock = Clock({}, [])
+    clock = Clock({}, [], progress)
     keep = _Keeper(folder, comm, clock)
     with clock("mesh"):
         mesh = keep("mesh", mesh_key(scene), lambda: build_mesh(scene, comm))
@@ -112,7 +113,7 @@ def run(scene: Scene, folder: str | Path, until: str = "response", comm: Any = N
     if until == "response":
         named_nodes(mesh, scene.excitation.at)
     patches = [] if until == "modes" else contact_patches(mesh)     # what the mesh lacks is told before long work
-    bodies = Bodies(scene, mesh, comm)
+    bodies = Bodies(scene, mesh, comm, progress)
     with clock("modes"):
         result = replace(result, modes=keep("modes", modes_key(scene), lambda: find_modes(bodies)))
     if until == "modes":
@@ -137,16 +138,18 @@ def run(scene: Scene, folder: str | Path, until: str = "response", comm: Any = N
 
 @dataclass(frozen=True)
 class Clock:
-    """Seconds a stage, and what was worth saying."""
+    """Seconds a stage, and what was worth saying; shows the stage at work."""
 
     seconds: dict[str, float]
     messages: list[str]
+    progress: Progress = unwatched
 
     @contextmanager
     def __call__(self, name: str) -> Any:
         start = time.perf_counter()
         try:
-            yield
+            for _ in self.progress([name], name, delay=0.0, bar_format="{desc} ..."):
+                yield
         finally:
             self.seconds[name] = self.seconds.get(name, 0.0) + time.perf_counter() - start
 

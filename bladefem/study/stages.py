@@ -15,6 +15,7 @@ from ..contact.patch import make_patch
 from ..contact.seat import spin_axis
 from ..data import ModeSet, Patch, PortModel
 from ..errors import InputError, suggestion
+from ..progress import Progress, unwatched
 from ..reduction.assemble import folded_diameter
 from ..scene import Material, Scene
 from ..scene_parts import part_materials
@@ -42,6 +43,7 @@ class Bodies:
     scene: Scene
     mesh: Mesh
     comm: Any = None
+    progress: Progress = unwatched
 
     @cached_property
     def still_blade(self) -> Any:
@@ -183,10 +185,10 @@ def wheel_modes(bodies: Bodies, count: int, diameters: Sequence[int] | None = No
     comm, mesh = bodies.comm or MPI.COMM_WORLD, bodies.mesh
     wanted = list(range(mesh.sector.count // 2 + 1)) if diameters is None else list(diameters)
     if comm.size == 1 or len(wanted) == 1:
-        return all_diameters(bodies.frame, count, wanted, direct)
+        return all_diameters(bodies.frame, count, wanted, direct, progress=bodies.progress)
     size = group or group_size(comm, mesh.dimension * len(np.unique(mesh.bodies["blade"])))
     return shared_out(comm, wanted, size, lambda part, some: all_diameters(
-        Bodies(bodies.scene, mesh, part).frame, count, some, direct))
+        Bodies(bodies.scene, mesh, part).frame, count, some, direct, progress=bodies.progress))
 
 
 def seat_damper(bodies: Bodies, patches: list[Patch]) -> Any:
@@ -220,7 +222,8 @@ def reduce_sector(bodies: Bodies, patches: list[Patch], diameters: Sequence[int]
     ports, other = blade_ports(mesh, patches, scene.excitation), damper_ports(mesh, patches)
     kind = scene.model.reduction
     if is_wheel(mesh):
-        sector = port_models(bodies.frame, ports.matrix, ports.names, modes, diameters, kind=kind)
+        sector = port_models(bodies.frame, ports.matrix, ports.names, modes, diameters, kind=kind,
+                             progress=bodies.progress)
     else:
         flex = bodies.factorised(0)
         sector = {0: port_model(flex.con, ports.matrix, ports.names, modes, kind=kind, flex=flex)}

@@ -17,6 +17,7 @@ from ..data import ModeSet
 from ..encode import read_npz
 from ..errors import InputError
 from ..hbm.model import Damping
+from ..progress import Progress, unwatched
 from ..reduction.assemble import folded_diameter
 from ..scene import Scene
 from ..store import code_of, key_of, on_root, stage
@@ -26,7 +27,6 @@ from .campbell import Campbell, campbell
 from .converge import Convergence, converge, default_sizes
 from .effective import effective_masses
 from .keys import modes_key
-from .loads import Progress, unwatched
 from .modal import blade_root, mac
 from .stages import MODES_SHOWN, Bodies, is_wheel, wheel_modes
 
@@ -72,7 +72,7 @@ def survey(scene: Scene, folder: str | Path, wanted: Wanted, comm: Any = None,
     other = None if wanted.other is None else on_root(comm, lambda: _other(wanted.other))
     start = pipeline.run(scene, folder, until="mesh", comm=comm, progress=progress)
     pipeline.check_blade(scene, start.mesh)
-    bodies, clock = Bodies(scene, start.mesh, comm), time.perf_counter()
+    bodies, clock = Bodies(scene, start.mesh, comm, progress), time.perf_counter()
     key = key_of(modes_key(scene), "survey", wanted.direct, code_of("bladefem.study"))
     sets, found = stage(folder, "survey", key, lambda: _all_modes(bodies, wanted.direct), comm)
     messages = [*start.messages, *(["modes: found in the folder, not computed again"] if found else [])]
