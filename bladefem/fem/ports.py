@@ -5,7 +5,7 @@ Both come from the one factorisation that also gives the modes.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 
 import numpy as np
 import scipy.sparse as sp
@@ -13,7 +13,6 @@ from scipy.linalg import eigh
 
 from ..data import PortModel
 from ..errors import InputError, suggestion
-from ..progress import Progress, unwatched
 from .constraint import Constrained, Opened, Transformation, restrict
 from .core import Rim, face_solve, inner_solve
 from .flexibility import Flexibility, compliance, flexible
@@ -58,9 +57,8 @@ def port_model(con: Constrained, P: sp.spmatrix, names: dict[str, slice], count:
 
 
 def port_models(t: Transformation, P: sp.spmatrix, names: dict[str, slice], count: int, diameters: Sequence[int],
-                static_load: np.ndarray | None = None, kind: str = "rubin",
-                progress: Progress = unwatched) -> dict[int, PortModel]:
-    """``port_model`` in several nodal diameters, with all work shared that does not depend on them.
+                static_load: np.ndarray | None = None, kind: str = "rubin") -> Iterator[tuple[int, PortModel]]:
+    """``port_model`` in several nodal diameters, as they are solved, with all work shared that does not depend on them.
 
     Where one rank holds the wheel, the static flexibility of all diameters takes one sweep over the ports.
 
@@ -68,20 +66,18 @@ def port_models(t: Transformation, P: sp.spmatrix, names: dict[str, slice], coun
         static_load: (n_points*dim,) [N], of nodal diameter 0.
     """
     shared = _sweep(t.opened, P, static_load) if t.opened is not None and kind == "rubin" else None
-    out = {}
-    for p in progress(eigenpairs(t, count, diameters, tolerance=TOLERANCE), "nodal diameters", len(diameters)):
+    for p in eigenpairs(t, count, diameters, tolerance=TOLERANCE):
         n = p.con.nodal_diameter
         load = static_load if n == 0 else None
         if shared is None or p.flex.R.shape[1]:
-            out[n] = port_model(p.con, P, names, count, load, kind, p.flex)
+            yield n, port_model(p.con, P, names, count, load, kind, p.flex)
             continue
         G, offset = _closed(shared, p.flex.factor.parts)
         lam = p.lam[:count]
         shapes = dot(t.body.comm, _restricted(p.con, P), canonical(p.con, lam, p.X[:, :count]))
         ports = P.shape[1]
-        out[n] = PortModel(np.sqrt(lam), shapes, _residual(G[:ports, :ports], lam, shapes), names, n,
+        yield n, PortModel(np.sqrt(lam), shapes, _residual(G[:ports, :ports], lam, shapes), names, n,
                            None if load is None else offset)
-    return {n: out[n] for n in diameters}
 
 
 def flexibility(con: Constrained, P: sp.spmatrix, flex: Flexibility | None = None) -> np.ndarray:

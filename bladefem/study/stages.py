@@ -222,8 +222,8 @@ def reduce_sector(bodies: Bodies, patches: list[Patch], diameters: Sequence[int]
     ports, other = blade_ports(mesh, patches, scene.excitation), damper_ports(mesh, patches)
     kind = scene.model.reduction
     if is_wheel(mesh):
-        sector = port_models(bodies.frame, ports.matrix, ports.names, modes, diameters, kind=kind,
-                             progress=bodies.progress)
+        solved = port_models(bodies.frame, ports.matrix, ports.names, modes, diameters, kind=kind)
+        sector = dict(bodies.progress(solved, "nodal diameters", len(diameters)))
     else:
         flex = bodies.factorised(0)
         sector = {0: port_model(flex.con, ports.matrix, ports.names, modes, kind=kind, flex=flex)}
