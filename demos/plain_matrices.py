@@ -2,14 +2,14 @@
 # # A friction damper on matrices of your own
 #
 # No finite elements here: mass, damping and stiffness are NumPy arrays. They may as well come from a file,
-# `bladefem.read_matrices` reads `.npz`, `.mat`, Matrix Market, Nastran DMIG and Ansys `.full`.
+# `bladefem.balance.read_matrices` reads `.npz`, `.mat`, Matrix Market, Nastran DMIG and Ansys `.full`.
 #
 # Two blades on soft discs, a spring between them, and a friction element from the first one to the ground.
 
 # %%
 import numpy as np
 
-import bladefem as bf
+from bladefem import balance as bf
 
 M = np.diag([1.0, 1.0])                                                     # [kg]
 K = np.array([[1.5e6, -0.5e6], [-0.5e6, 1.5e6]])                            # [N/m]

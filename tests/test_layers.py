@@ -15,8 +15,8 @@ ROOT = Path(__file__).parents[1]
 FILES = sorted([*ROOT.glob("bladefem/**/*.py"), *ROOT.glob("geometry/**/*.py")])
 
 # From left to right; a layer imports only from itself and its left.
-LAYERS = ["errors", "progress", "geometry", "units", "scene", "data", "fem", "contact", "reduction", "friction", "hbm", "damper",
-          "study", "view", "report", "cli"]
+LAYERS = ["errors", "lazy", "progress", "geometry", "units", "scene", "data", "fem", "contact", "reduction", "friction",
+          "hbm", "balance", "damper", "study", "view", "report", "cli"]
 # Modules beside the packages, and the layer that they belong to.
 BESIDE = {"scene_fields": "scene", "scene_parts": "scene", "scene_check": "scene", "scene_file": "scene",
           "encode": "data", "store": "data"}
