@@ -61,6 +61,8 @@ def solve_lcp(C: np.ndarray, g0: np.ndarray, R: np.ndarray | None = None, load: 
     reason = _unbalanced(R, load) if load.size else ""
     if reason:
         return LCPSolution(np.zeros(n), g0.copy(), np.zeros(R.shape[1]), np.zeros(n, bool), np.inf, 0, reason)
+    travel = -(U.T @ g0)        # closes even gaps, however wide, before round-off could drown the elastic ones in them
+    g0 = g0 + U @ travel
     active = _winkler_set(C, g0, U, reduced) if start is None else np.asarray(start, dtype=bool)
     try:
         f, y, active, its, settled = _primal_dual(C, g0, U, reduced, active, max_iterations)
@@ -76,7 +78,7 @@ def solve_lcp(C: np.ndarray, g0: np.ndarray, R: np.ndarray | None = None, load: 
         residual = max(residual, float(np.abs(U.T @ f - reduced).max(initial=0.0) / (np.abs(f).max() + 1e-300)))
     reason = "" if residual <= tolerance else (
         f"the contact iteration stopped after {its} steps with a residual of {residual:.1e}, wanted {tolerance:.1e}")
-    return LCPSolution(f, gap, V @ (y / S), active, residual, its, reason)
+    return LCPSolution(f, gap, V @ ((y + travel) / S), active, residual, its, reason)
 
 
 def complementarity(force: np.ndarray, gap: np.ndarray, scale: float) -> float:

@@ -33,6 +33,7 @@ from .patch import initial_gap, make_patch, normal_ports, port_matrix, rigid_por
 
 __all__ = ["ContactProblem", "contact_problem", "seat", "solve", "spin_axis"]
 
+HOVERING = 1e4          # gaps over elastic displacements beyond which a load is too light to be solved for
 SIDEWAYS = 0.01         # accepted part of the load along directions that frictionless seats can't hold
 
 
@@ -172,8 +173,21 @@ def _state(problem: ContactProblem, g0: np.ndarray, scale: float, active: np.nda
                              f"can't hold it, expected below {SIDEWAYS:.0%}")
     solution = solve_lcp(problem.flexibility, g0 + scale * problem.damper_swell, problem.rigid, -scale * load, active)
     if solution.reason:
-        raise NotSolvedError(f"the damper could not be seated: {solution.reason}")
+        raise NotSolvedError(f"the damper could not be seated{_too_light(problem, g0, scale, load)}: "
+                             f"{solution.reason}")
     return solution
+
+
+def _too_light(problem: ContactProblem, g0: np.ndarray, scale: float, load: np.ndarray) -> str:
+    """Empty, or that the load cannot bring faces together that the damper's travel alone leaves apart."""
+    U, S, held = held_directions(problem.rigid)
+    misfit = float(np.ptp(g0 - U @ (U.T @ g0)))
+    bent = float(problem.flexibility.diagonal().max() * np.linalg.norm(scale * (held.T @ load) / S))
+    if misfit <= HOVERING * bent:
+        return ""
+    return (f" and rests on single points: the load bends the bodies by some {1e6 * bent:.1g} um, while the gaps of "
+            f"the seats differ by {1e6 * misfit:.3g} um, so it hardly touches; expected a larger study.loads, faces "
+            "that fit, or contact.bedded = true")
 
 
 def _wanted(problem: ContactProblem, g0: np.ndarray, normal: float, active: np.ndarray | None) -> LCPSolution:

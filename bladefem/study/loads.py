@@ -14,8 +14,9 @@ from ..hbm.sweep import size
 from ..progress import Progress, unwatched
 from ..scene import Scene
 from .choice import adapted, checked, estimated, peak_of
-from .family import Family
+from .family import Family, member
 from .joint import LoadCase
+from .liftoff import named
 from .limits import Limit
 from .settings import Settings, restarted
 
@@ -93,8 +94,9 @@ def curve_of(scene: Scene, case: LoadCase, family: Callable[[LoadCase], Family],
     Raises:
         NotSolvedError: no point converged.
     """
-    curve = adapted(family(case), restarted(settings), scene.study.band, scene.excitation.mode, scene.accuracy,
-                    fixed=("modes",))
+    models, mode = family(case), scene.excitation.mode
+    with named(case, member(models, settings).model, mode, scene.excitation.force):
+        curve = adapted(models, restarted(settings), scene.study.band, mode, scene.accuracy, fixed=("modes",))
     top = peak_of(curve.points)
     heights = np.array([size(p) for p in curve.points])
     tolerated = scene.accuracy * size(top) / np.maximum(heights, 1e-6 * size(top))

@@ -29,6 +29,7 @@ from .cycle import labels
 from .family import Family, Member, coarsened, member, shared_harmonics
 from .joint import LoadCase, joint_model
 from .keys import contact_key, mesh_key, modes_key, reduction_key, response_key
+from .liftoff import named
 from .limits import Limit, linear_limits
 from .loads import Curve, default_loads, study_loads
 from .ports import named_nodes
@@ -254,7 +255,9 @@ def reduced_sector(scene: Scene, bodies: Bodies, case: LoadCase, patches: list[P
         if not settings.chosen:
             return settings, reduced
         family = family_of_case(scene, bodies.mesh, reduced, patches, case)
-        rough = covered(member(family, settings).model, settings, scene.study.band, scene.excitation.mode, 1.0)
+        model, mode = member(family, settings).model, scene.excitation.mode
+        with named(case, model, mode, scene.excitation.force):
+            rough = covered(model, settings, scene.study.band, mode, 1.0)
         settings, _, found = choose(family, settings, peak_of(rough), scene.accuracy, fixed=("modes",), apart=True)
         more = enriched(settings, "modes")
         known = "modes" in settings.chosen and "modes" not in found.unknown

@@ -83,6 +83,22 @@ def test_clearance_is_taken_up_by_rigid_motion(solid):
         assert np.abs(a.force - b.force).max() < 1e-8 * a.force.max()
 
 
+def test_a_wide_even_clearance_under_a_tiny_load(solid):
+    """2 mm are 1e10 times what 1 mN bends, and known to 4e-19 m: the travel that closes them is taken out first."""
+    wide = condensed(wedge_mesh(ALPHA), clearance=2e-3)
+    for a, b in zip(solve(solid, 0.0, normal=1e-3), solve(wide, 0.0, normal=1e-3), strict=True):
+        assert np.abs(a.force - b.force).max() < 1e-3 * a.force.max()       # measured 1.3e-4
+        assert b.complementarity < 1e-9
+
+
+def test_a_load_too_light_for_uneven_gaps_is_told(solid):
+    """Faces that miss each other by 20 um need a load that bends them; this one leaves the damper on single points."""
+    rough = replace(solid, clearance=2e-5 * np.random.default_rng(3).random(len(solid.clearance)))
+    assert sum(m.force.sum() for m in solve(rough, 0.0, normal=100.0)) == pytest.approx(200.0)
+    with pytest.raises(NotSolvedError, match=r"hardly touches; expected a larger study\.loads"):
+        solve(rough, 0.0, normal=1e-9)
+
+
 def test_bedded_faces_forget_gaps_and_rotation(solid):
     """Worn faces: only the load's direction and size are left of the rotation."""
     slow = solve(solid, SPEED, normal=50.0, bedded=True)
