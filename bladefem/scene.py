@@ -12,7 +12,7 @@ from geometry.parameters import Aerofoil, Disc, HertzPair, MeshSize, Plane, Plat
 from geometry.quantity import quantity
 
 __all__ = ["KINDS", "Contact", "Excitation", "Foundation", "Imported", "Material", "Materials", "Model", "Operation",
-           "Scene", "Study"]
+           "Scene", "Seat", "Study"]
 
 KINDS = ("wedge sector", "plane blades", "z mass", "hertz", "punch", "imported")
 
@@ -35,20 +35,47 @@ class Materials:
 
 
 @dataclass(frozen=True)
+class Seat:
+    """One seat's own values, where the two differ; what is left out is as in [contact]."""
+
+    mu: float | None = quantity(None, "1", 0.0, 2.0, "friction coefficient of this seat; contact.mu when left out")
+    kt_area: float | None = quantity(None, "N/m^3", 0.0, 1e15, "its tangential stiffness for each unit of area")
+    kt: float | None = quantity(None, "N/m", 0.0, 1e12, "its whole tangential stiffness")
+    kn_area: float | None = quantity(None, "N/m^3", 0.0, 1e15, "its normal stiffness for each unit of area")
+    kn: float | None = quantity(None, "N/m", 0.0, 1e12, "its whole normal stiffness")
+
+
+@dataclass(frozen=True)
 class Contact:
-    """Friction and contact stiffness of the seats. Areal stiffnesses spread over the patch; totals win when given."""
+    """Friction, contact stiffness, shape and wear of the seats. Areal stiffnesses spread over the patch; totals win."""
 
     mu: float = quantity(0.3, "1", 0.0, 2.0, "friction coefficient")
     kt_area: float | None = quantity(None, "N/m^3", 0.0, 1e15,
-                                     "tangential contact stiffness for each unit of area; by Mindlin from kn_area, "
-                                     "40 N/mm^3 without either")
+                                     "tangential contact stiffness for each unit of area; by Mindlin from the normal "
+                                     "one, 40 N/mm^3 without either")
     kt: float | None = quantity(None, "N/m", 0.0, 1e12, "tangential stiffness of one whole patch")
     kn_area: float | None = quantity(None, "N/m^3", 0.0, 1e15,
-                                     "normal contact stiffness for each unit of area; by Mindlin from kt_area")
+                                     "normal contact stiffness for each unit of area; by Mindlin from the tangential")
+    kn: float | None = quantity(None, "N/m", 0.0, 1e12, "normal stiffness of one whole patch")
+    stiffness: str = quantity("given", choices=("given", "map"),
+                              help="normal stiffness: as given above, or of each node from the pressure map, its "
+                                   "static force over the approach of the bodies there (the paper's Eq. 23)")
     points: int | None = quantity(None, "1", 1, 5000, "friction elements on each patch; all mesh nodes when left out")
     bedded: bool = quantity(True, help="seats have worn until they fit at the operating speed; false: as drawn")
     normal: str = quantity("coupled", choices=("coupled", "prescribed"),
                            help="normal load follows the motion, or stays at its static value")
+    crown: float | None = quantity(None, "m", 1e-3, 1e4,
+                                   "radius of crowned seats along the engine axis; flat when left out")
+    crown_across: float | None = quantity(None, "m", 1e-3, 1e4,
+                                          "radius of crowned seats along the slope; flat when left out")
+    edge_radius: float | None = quantity(None, "m", 1e-3, 1e4,
+                                         "radius of the seats' edges, eased; sharp when left out")
+    edge_width: float | None = quantity(None, "m", 1e-5, 0.1, "width of the eased strip along the edges")
+    wear_coefficient: float | None = quantity(None, "m^3/J", 0.0, 1e-6,
+                                              "worn volume for each joule of friction work (m^3/J is m^2/N); Archard's "
+                                              "coefficient over mu")
+    left: Seat = field(default_factory=Seat)
+    right: Seat = field(default_factory=Seat)
 
 
 @dataclass(frozen=True)

@@ -13,6 +13,7 @@ from .errors import InputError
 from .scene import Scene
 from .scene_fields import convert, each_field, used_tables
 from .scene_parts import part_materials
+from .scene_seats import contact_problems
 from .units import show
 
 __all__ = ["validate"]
@@ -28,7 +29,7 @@ def validate(scene: Scene) -> None:
     for field in each_field():
         if "." not in field.name or field.name.split(".")[0] in tables:
             convert(_value(scene, field.name), field)
-    problems = [*_CHECKS.get(scene.kind, _nothing)(scene), *_numerics(scene)]
+    problems = [*_CHECKS.get(scene.kind, _nothing)(scene), *_numerics(scene), *contact_problems(scene)]
     if "study" in tables:
         problems += _study(scene)
     if "excitation" in tables:

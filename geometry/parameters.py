@@ -74,7 +74,8 @@ class Wedge:
     length: float = quantity(0.04, "m", 0.005, 0.5, "axial length")
     base: float = quantity(0.002, "m", 2e-4, 0.05, "height of the straight part below the flanks (the blunted bottom)")
     mass: float | None = quantity(None, "kg", 1e-4, 5.0, "mass; sets the density when given")
-    clearance: float = quantity(0.0, "m", 0.0, 0.002, "normal gap between flank and seat before seating")
+    clearance: float = quantity(0.0, "m", -5e-4, 0.002, "normal gap between flank and seat before seating; negative: "
+                                "an interference, which the damper takes up as it travels inwards")
 
 
 @dataclass(frozen=True)

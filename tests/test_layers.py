@@ -18,8 +18,8 @@ FILES = sorted([*ROOT.glob("bladefem/**/*.py"), *ROOT.glob("geometry/**/*.py")])
 LAYERS = ["errors", "lazy", "progress", "geometry", "units", "scene", "data", "fem", "contact", "reduction", "friction",
           "hbm", "balance", "damper", "study", "view", "report", "cli"]
 # Modules beside the packages, and the layer that they belong to.
-BESIDE = {"scene_fields": "scene", "scene_parts": "scene", "scene_check": "scene", "scene_file": "scene",
-          "encode": "data", "store": "data"}
+BESIDE = {"scene_fields": "scene", "scene_parts": "scene", "scene_check": "scene", "scene_seats": "scene",
+          "scene_file": "scene", "encode": "data", "store": "data"}
 # Each foreign library has one home.
 HOMES = {"gmsh": "geometry", "dolfinx": "fem", "ufl": "fem", "basix": "fem", "petsc4py": "fem", "slepc4py": "fem",
          "matplotlib": "view", "pyvista": "view", "vtk": "view", "tqdm": "progress", "argparse": "cli"}

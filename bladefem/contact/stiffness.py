@@ -3,17 +3,18 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 
 import numpy as np
 import scipy.sparse as sp
 
 from ..data import Elements, Patch, PressureMap
 from ..errors import InputError
-from ..scene import Contact, Material
+from ..scene import Contact, Material, Seat
 from .seat import ContactProblem
 
-__all__ = ["aggregation", "friction_elements", "mindlin_ratio", "normal_stiffness", "pair_ratio",
-           "tangential_stiffness"]
+__all__ = ["aggregation", "friction_elements", "mapped_stiffness", "mindlin_ratio", "normal_stiffness", "pair_ratio",
+           "seat_contact", "stiffnesses"]
 
 USUAL = 4e10            # tangential stiffness for each unit of area where the scene tells none [N/m^3]
 
@@ -34,18 +35,48 @@ def pair_ratio(a: Material, b: Material) -> float:
     return normal / tangential
 
 
-def tangential_stiffness(contact: Contact, ratio: float) -> float:
-    """k_t for each unit of area [N/m^3]: as measured (given), else ratio times the normal one, else a usual value."""
-    if contact.kt_area is not None:
-        return contact.kt_area
-    return USUAL if contact.kn_area is None else ratio * contact.kn_area
+def seat_contact(contact: Contact, patch: str) -> Contact:
+    """The values of one seat: "this" is the blade's right one, "next" the next blade's left one.
+
+    A stiffness of the seat itself, total or areal, wins over both of [contact].
+    """
+    own = {"this": contact.right, "next": contact.left}.get(patch, Seat())
+    changes: dict[str, float | None] = {} if own.mu is None else {"mu": own.mu}
+    for total, areal in (("kt", "kt_area"), ("kn", "kn_area")):
+        if getattr(own, total) is not None or getattr(own, areal) is not None:
+            changes |= {total: getattr(own, total), areal: getattr(own, areal)}
+    return replace(contact, **changes)
 
 
-def friction_elements(maps: Sequence[PressureMap], contact: Contact, ratio: float,
+def stiffnesses(contact: Contact, ratio: float, area: np.ndarray,
+                mapped: np.ndarray | None = None) -> tuple[np.ndarray, np.ndarray]:
+    """k_t and k_n (n,) [N/m] of the points of a patch.
+
+    Each is as given, else follows from the other by ``ratio`` = k_t / k_n; without either k_t has a usual value.
+
+    Args:
+        area: (n,) what each point stands for [m^2]; totals are shared by it.
+        mapped: (n,) k_n from the pressure map, in place of a given one.
+    """
+    kt, kn = _shared(contact.kt, contact.kt_area, area), _shared(contact.kn, contact.kn_area, area)
+    kn = kn if mapped is None else mapped
+    if kt is None:
+        kt = USUAL * area if kn is None else ratio * kn
+    return kt, kt / ratio if kn is None else kn
+
+
+def _shared(total: float | None, areal: float | None, area: np.ndarray) -> np.ndarray | None:
+    if total is not None:
+        return total * area / area.sum()
+    return None if areal is None else areal * area
+
+
+def friction_elements(problem: ContactProblem | None, maps: Sequence[PressureMap], contact: Contact, ratio: float,
                       tangents: int = 2) -> tuple[Elements, sp.csr_matrix]:
     """Node-to-node elements of all patches, one after the other.
 
     Args:
+        problem: that the maps solve; only read for a normal stiffness from the map.
         maps: static pressure of each patch.
         contact: mu, stiffnesses (totals of a patch win over areal ones), points, and how the normal load behaves.
         ratio: k_t / k_n, used where only one of the two is given (``pair_ratio``).
@@ -59,20 +90,24 @@ def friction_elements(maps: Sequence[PressureMap], contact: Contact, ratio: floa
         InputError: a normal load that follows the motion needs a normal stiffness.
     """
     G = [aggregation(m.patch, contact.points) for m in maps]
-    area = [a.T @ m.patch.area for a, m in zip(_members(G), maps, strict=True)]
-    areal = tangential_stiffness(contact, ratio)
-    kt = np.concatenate([areal * a if contact.kt is None else contact.kt * a / a.sum() for a in area])
-    kn = kt / ratio if contact.kn_area is None else contact.kn_area * np.concatenate(area)
+    members, seats = _members(G), [seat_contact(contact, m.patch.name) for m in maps]
+    area = [a.T @ m.patch.area for a, m in zip(members, maps, strict=True)]
+    mapped: list[np.ndarray | None] = [None] * len(maps)
+    if contact.stiffness == "map":
+        mapped = [a.T @ k for a, k in zip(members, mapped_stiffness(problem, maps), strict=True)]
+    kt, kn = map(np.concatenate, zip(*(stiffnesses(c, ratio, a, k) for c, a, k in
+                                       zip(seats, area, mapped, strict=True)), strict=True))
     if contact.normal == "coupled" and not (kn > 0).all():
-        raise InputError("contact.kn_area is 0, expected a positive value where contact.normal is 'coupled'")
-    force = np.concatenate([a.T @ m.force for a, m in zip(_members(G), maps, strict=True)])
+        raise InputError("contact: a normal stiffness (kn, kn_area, or by Mindlin from kt, kt_area) is 0, expected a "
+                         "positive value where contact.normal is 'coupled'")
+    force = np.concatenate([a.T @ m.force for a, m in zip(members, maps, strict=True)])
     gap = np.concatenate([g.T @ m.gap for g, m in zip(G, maps, strict=True)])
     if contact.normal == "prescribed":
         kn, n0 = np.zeros_like(kn), force
     else:
         n0 = np.where(force > 0, force, -kn * gap)
     S = sp.kron(sp.block_diag(G), sp.identity(1 + tangents), format="csr")
-    return Elements(kt, kn, np.full(len(kt), contact.mu), n0, tangents), S
+    return Elements(kt, kn, np.repeat([c.mu for c in seats], [len(a) for a in area]), n0, tangents), S
 
 
 def normal_stiffness(problem: ContactProblem, maps: Sequence[PressureMap]) -> np.ndarray:
@@ -84,6 +119,19 @@ def normal_stiffness(problem: ContactProblem, maps: Sequence[PressureMap]) -> np
     force = np.concatenate([m.force for m in maps])
     approach = problem.flexibility @ force
     return np.divide(force, approach, out=np.zeros_like(force), where=(force > 0) & (approach > 0))
+
+
+def mapped_stiffness(problem: ContactProblem, maps: Sequence[PressureMap]) -> list[np.ndarray]:
+    """``normal_stiffness`` of each patch; nodes that nothing presses take their patch's mean for their area.
+
+    So they can close when they vibrate, which a stiffness of zero would never let them.
+    """
+    cuts = np.cumsum([len(m.force) for m in maps])[:-1]
+    found = []
+    for k, m in zip(np.split(normal_stiffness(problem, maps), cuts), maps, strict=True):
+        mean = k.sum() / m.patch.area[k > 0].sum() if (k > 0).any() else 0.0
+        found.append(np.where(k > 0, k, mean * m.patch.area))
+    return found
 
 
 def aggregation(patch: Patch, points: int | None) -> sp.csr_matrix:

@@ -38,6 +38,12 @@ def modes_key(scene: Scene) -> str:
 
 def contact_key(scene: Scene) -> str:
     """The contact problem."""
+    contact = scene.contact
+    return key_of(_bodies_key(scene), contact.crown, contact.crown_across, contact.edge_radius, contact.edge_width)
+
+
+def _bodies_key(scene: Scene) -> str:
+    """Blade, damper and their patches, whatever the shape of the seats."""
     return key_of(modes_key(scene), scene.material.damper, scene.damper.mass, scene.plane.damper_mass,
                   code_of("bladefem.contact"))
 
@@ -56,7 +62,7 @@ def pair_key(scene: Scene) -> str:
 
 def reduction_key(scene: Scene, diameters: Sequence[int], modes: int) -> str:
     """The reduced sector."""
-    return key_of(contact_key(scene), scene.excitation.at, np.array(scene.excitation.direction), scene.model.reduction,
+    return key_of(_bodies_key(scene), scene.excitation.at, np.array(scene.excitation.direction), scene.model.reduction,
                   np.array(diameters), modes)
 
 

@@ -9,6 +9,7 @@ from typing import Any
 
 import numpy as np
 
+from ..contact.stiffness import seat_contact
 from ..hbm.solution import Solution
 from ..hbm.sweep import size
 from ..progress import Progress, unwatched
@@ -135,5 +136,6 @@ def _linear_row(limit: Limit) -> dict[str, float]:
 
 def default_loads(scene: Scene, count: int = 8) -> tuple[float, ...]:
     """Loads when none are given: three decades round the force at which friction can hold the excitation."""
-    held = scene.excitation.force / max(scene.contact.mu, 1e-3)
+    mu = np.mean([seat_contact(scene.contact, patch).mu for patch in ("this", "next")])
+    held = scene.excitation.force / max(mu, 1e-3)
     return tuple(float(f"{x:.2g}") for x in np.geomspace(held, 300 * held, count))

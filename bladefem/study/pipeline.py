@@ -211,8 +211,8 @@ def _own_load(scene: Scene, problem: ContactProblem, messages: list[str]) -> flo
 
 def load_cases(scene: Scene, mesh: Mesh, contact: Seating) -> list[LoadCase]:
     """The friction elements of each load, for each mass of the damper."""
-    return [_load_case(scene, mesh, load, maps, mass) for mass in scene.study.masses or (None,)
-            for load, maps in contact.maps.items()]
+    return [_load_case(scene, mesh, contact, load, mass) for mass in scene.study.masses or (None,)
+            for load in contact.maps]
 
 
 def family_of_case(scene: Scene, mesh: Mesh, reduced: Reduced, patches: list[Patch], case: LoadCase) -> Family:
@@ -287,9 +287,10 @@ def _remarks(scene: Scene, settings: Settings, curves: list[Curve]) -> list[str]
     return remarks
 
 
-def _load_case(scene: Scene, mesh: Mesh, load: float, maps: list[PressureMap], mass: float | None) -> LoadCase:
+def _load_case(scene: Scene, mesh: Mesh, contact: Seating, load: float, mass: float | None) -> LoadCase:
     ratio = pair_ratio(scene.material.blade, scene.material.damper)
-    elements, selection = friction_elements(maps, scene.contact, ratio, mesh.dimension - 1)
+    elements, selection = friction_elements(contact.problem, contact.maps[load], scene.contact, ratio,
+                                            mesh.dimension - 1)
     return LoadCase(load, elements, selection, mass)
 
 

@@ -85,6 +85,6 @@ def whole_model(scene: Scene, row: Row, load: float, damper: str = "rigid", harm
 def _joint(scene: Scene, row: Row, load: float, damper: str, harmonics: int) -> ReducedModel:
     maps = solve(row.problem, 0.0, normal=load, bedded=scene.contact.bedded)
     ratio = pair_ratio(scene.material.blade, scene.material.damper)
-    elements, selection = friction_elements(maps, scene.contact, ratio, row.mesh.dimension - 1)
+    elements, selection = friction_elements(row.problem, maps, scene.contact, ratio, row.mesh.dimension - 1)
     case = LoadCase(load, elements, selection)
     return joint_model(scene, row.mesh, row.reduced, list(row.problem.patches), case, harmonics, damper)

@@ -197,8 +197,13 @@ def seat_damper(bodies: Bodies, patches: list[Patch]) -> Any:
     Returns:
         contact.seat.ContactProblem, for :func:`bladefem.contact.seat.solve`.
     """
+    from ..contact.profile import seat_gap
     from ..contact.seat import contact_problem
-    return contact_problem(bodies.mesh, patches, bodies.still, bodies.damper, bodies.scene.damper.clearance)
+    scene = bodies.scene
+    gap = np.concatenate([seat_gap(patch, bodies.mesh, scene.contact) for patch in patches])
+    if scene.kind == "imported":        # a wedge that was drawn here has its clearance in the mesh
+        gap = gap + scene.damper.clearance
+    return contact_problem(bodies.mesh, patches, bodies.still, bodies.damper, gap)
 
 
 def harmonic_diameters(scene: Scene, mesh: Mesh, harmonics: int) -> list[int]:

@@ -21,7 +21,7 @@ from geometry.zmass import z_section
 
 from ..contact.patch import make_patch
 from ..contact.seat import contact_problem, solve
-from ..contact.stiffness import pair_ratio, tangential_stiffness
+from ..contact.stiffness import pair_ratio, stiffnesses
 from ..damper.loops import Drive, Steady, steady
 from ..damper.zmass import Footprint, MassOnFoundation
 from ..data import PressureMap
@@ -61,10 +61,8 @@ def mass_on_foundation(scene: Scene, seat: PressureMap) -> MassOnFoundation:
     line = scene.material.damper.rho * scene.z_mass.thickness
     label = clusters(seat.patch.points[:, :2], seat.patch.area, scene.contact.points)
     size = np.bincount(label, seat.patch.area)
-    share, kt = np.bincount(label, seat.force) / seat.force.sum(), scene.contact.kt
-    if kt is None:
-        ratio = pair_ratio(scene.material.blade, scene.material.damper)
-        kt = tangential_stiffness(scene.contact, ratio) * size.sum()
+    share = np.bincount(label, seat.force) / seat.force.sum()
+    kt = float(stiffnesses(scene.contact, pair_ratio(scene.material.blade, scene.material.damper), size)[0].sum())
     points = [np.bincount(label, seat.patch.area * x) / size for x in seat.patch.points[:, :2].T]
     return MassOnFoundation(line * area, line * polar, scene.contact.mu, kt,
                             Footprint(np.column_stack(points), share, size / size.sum()))

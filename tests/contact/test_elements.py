@@ -15,7 +15,7 @@ from bladefem.contact.stiffness import aggregation, friction_elements, mindlin_r
 from bladefem.contact.summary import resultant, write_maps
 from bladefem.data import PressureMap
 from bladefem.errors import InputError
-from bladefem.scene import Contact, Material
+from bladefem.scene import Contact, Material, Seat
 from bladefem.study.state_check import check_states, state_sentence
 
 
@@ -40,7 +40,7 @@ def test_mindlin_ratio():
 @pytest.mark.parametrize("points", [None, 1, 2, 3, 7, 24])
 def test_totals_do_not_depend_on_the_number_of_elements(maps, points):
     contact = Contact(kt_area=4e10, points=points)
-    e, S = friction_elements(maps, contact, mindlin_ratio(0.3))
+    e, S = friction_elements(None, maps, contact, mindlin_ratio(0.3))
     area = sum(m.patch.area.sum() for m in maps)
     assert e.kt.sum() == pytest.approx(4e10 * area, rel=1e-12)
     assert e.kn.sum() == pytest.approx(4e10 * area * 1.7 / 1.4, rel=1e-12)
@@ -53,14 +53,16 @@ def test_totals_do_not_depend_on_the_number_of_elements(maps, points):
 
 def test_aggregation_keeps_uniform_motion_and_total_force(maps):
     """S^T of a uniform displacement is uniform; S spreads an element's force over its nodes without loss."""
-    _, S = friction_elements(maps, Contact(points=5), 1.0)
+    _, S = friction_elements(None, maps, Contact(points=5), 1.0)
     motion = np.tile([1.0, 2.0, 3.0], S.shape[0] // 3)
     assert np.allclose(S.T @ motion, np.tile([1.0, 2.0, 3.0], 10), rtol=1e-13)
     assert np.allclose(np.asarray(S.sum(axis=0)).ravel(), 1.0, rtol=1e-13)
 
 
 def test_total_stiffness_wins_over_areal(maps):
-    e, _ = friction_elements(maps, Contact(kt=1e6, kn_area=1e10), 1.0)
+    e, _ = friction_elements(None, maps, Contact(kt=1e6, kn_area=1e10), 1.0)
+    whole, _ = friction_elements(None, maps, Contact(kn=2e6, kn_area=1e10), 0.5)
+    assert whole.kn.sum() == pytest.approx(4e6, rel=1e-13) and whole.kt.sum() == pytest.approx(2e6, rel=1e-13)
     n = len(maps[0].force)
     assert e.kt[:n].sum() == pytest.approx(1e6, rel=1e-13) and e.kt[n:].sum() == pytest.approx(1e6, rel=1e-13)
     assert e.kn == pytest.approx(1e10 * np.concatenate([m.patch.area for m in maps]), rel=1e-13)
@@ -69,7 +71,7 @@ def test_total_stiffness_wins_over_areal(maps):
 def test_tangential_stiffness_by_mindlin_from_the_normal_one(maps):
     """Given kn alone; a measured kt wins; the usual value where neither is given."""
     ratio, area = mindlin_ratio(0.3), np.concatenate([m.patch.area for m in maps])
-    found = {name: friction_elements(maps, contact, ratio)[0] for name, contact in
+    found = {name: friction_elements(None, maps, contact, ratio)[0] for name, contact in
              {"kn": Contact(kn_area=3e10), "both": Contact(kn_area=3e10, kt_area=1e10), "none": Contact()}.items()}
     np.testing.assert_allclose(found["kn"].kt, ratio * found["kn"].kn, rtol=1e-14)
     np.testing.assert_allclose(found["kn"].kn, 3e10 * area, rtol=1e-14)
@@ -77,18 +79,51 @@ def test_tangential_stiffness_by_mindlin_from_the_normal_one(maps):
     np.testing.assert_allclose(found["none"].kt, 4e10 * area, rtol=1e-14)
 
 
+def test_seats_have_values_of_their_own(maps):
+    """mu, k_t and k_n of the left and right seat; a total of a seat wins over the areal value of both."""
+    contact = Contact(mu=0.3, kt_area=4e10, left=Seat(mu=0.1, kt=2e6), right=Seat(kn_area=1e10))
+    e, _ = friction_elements(None, maps, contact, 0.8)
+    right, left = np.split(np.arange(len(e.kt)), 2)         # "this" is the right seat, "next" the left one
+    areas = [m.patch.area for m in maps]
+    np.testing.assert_allclose(e.mu, np.repeat([0.3, 0.1], len(right)))
+    np.testing.assert_allclose(e.kt[right], 4e10 * areas[0], rtol=1e-14)
+    np.testing.assert_allclose(e.kn[right], 1e10 * areas[0], rtol=1e-14)
+    np.testing.assert_allclose(e.kt[left], 2e6 * areas[1] / areas[1].sum(), rtol=1e-14)
+    np.testing.assert_allclose(e.kn[left], e.kt[left] / 0.8, rtol=1e-14)
+
+
+@pytest.mark.parametrize("points", [None, 3])
+def test_stiffness_from_the_map(problem, maps, points):
+    """k_n of the pressed nodes is Eq. 23, k_t follows by Mindlin or is given; open nodes have their patch's mean."""
+    ratio = mindlin_ratio(0.3)
+    e, _ = friction_elements(problem, maps, Contact(stiffness="map", points=points), ratio)
+    np.testing.assert_allclose(e.kt, ratio * e.kn, rtol=1e-14)
+    force, eq23 = np.concatenate([m.force for m in maps]), normal_stiffness(problem, maps)
+    if points is None:
+        np.testing.assert_allclose(e.kn[force > 0] * (problem.flexibility @ force)[force > 0], force[force > 0])
+        assert (force == 0).any() and (e.kn > 0).all()
+    for side in np.split(np.arange(len(force)), 2):
+        area, pressed = maps[0].patch.area, eq23[side] > 0
+        whole = eq23[side].sum() * area.sum() / area[pressed].sum()
+        part = np.split(e.kn, 2)[int(side[0] > 0)]
+        assert part.sum() == pytest.approx(whole, rel=1e-12)
+    given, _ = friction_elements(problem, maps, Contact(stiffness="map", kt=1e6, points=points), ratio)
+    np.testing.assert_array_equal(given.kn, e.kn)
+    assert given.kt.sum() == pytest.approx(2e6, rel=1e-13)
+
+
 def test_open_nodes_keep_their_gap(maps):
-    e, _ = friction_elements(maps, Contact(), 1.0)
+    e, _ = friction_elements(None, maps, Contact(), 1.0)
     gap = np.concatenate([m.gap for m in maps])
     open_ = e.n0 <= 0
     assert open_.any() and np.allclose(-e.n0[open_] / e.kn[open_], gap[open_], rtol=1e-12)
-    e, _ = friction_elements(maps, Contact(normal="prescribed"), 1.0)
+    e, _ = friction_elements(None, maps, Contact(normal="prescribed"), 1.0)
     assert (e.kn == 0).all() and (e.n0 >= 0).all()
 
 
 def test_coupled_normal_load_needs_a_stiffness(maps):
-    with pytest.raises(InputError, match="kn_area"):
-        friction_elements(maps, Contact(kn_area=0.0), 1.0)
+    with pytest.raises(InputError, match=r"a normal stiffness .* is 0"):
+        friction_elements(None, maps, Contact(kn_area=0.0), 1.0)
 
 
 def test_elements_of_a_patch_are_connected_halves(maps):

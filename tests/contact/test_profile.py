@@ -1,0 +1,106 @@
+"""Crowned seats and eased edges: gaps by formula, Hertz' pressure on flat meshes, and a crowned damper in its scene."""
+
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+from blocks import clamped, compliances, facing_blocks, graded
+from test_hertz import RADIUS, STEEL, A, modulus
+from wedge import wedge_mesh
+
+import bladefem
+from bladefem.contact.lcp import solve_lcp
+from bladefem.contact.patch import make_patch, patch_means
+from bladefem.contact.profile import seat_gap
+from bladefem.contact.seat import solve
+from bladefem.errors import InputError
+from bladefem.fem.body import assemble
+from bladefem.fem.constraint import constrain
+from bladefem.fem.flexibility import flexible
+from bladefem.scene import Contact, Material
+from bladefem.study.stages import seat_damper
+
+ALPHA = np.radians(40)
+
+
+def test_gaps_by_formula():
+    """A patch of 20 by 12 mm: parabolas from its middle, and from the inner side of the eased strips."""
+    mesh = facing_blocks(np.linspace(0, 0.012, 13), np.linspace(0, 0.01, 3), np.linspace(0, 0.02, 11))
+    patch = make_patch(mesh, "this")
+    along, across = (mesh.points[:, :2] @ patch.frame[0, k, :2] for k in (2, 1))
+    lengths = [np.ptp(v[patch.blade_nodes]) for v in (along, across)]
+    s = [v - (v[patch.blade_nodes].min() + v[patch.blade_nodes].max()) / 2 for v in (along, across)]
+    means = patch_means(patch, mesh).T
+    crowned = seat_gap(patch, mesh, Contact(crown=5.0, crown_across=0.7))
+    np.testing.assert_allclose(crowned, means @ (s[0]**2 / 10 + s[1]**2 / 1.4), atol=1e-18)
+    eased = seat_gap(patch, mesh, Contact(edge_radius=0.1, edge_width=2e-3))
+    strip = [np.clip(np.abs(v) - (length / 2 - 2e-3), 0, None)**2 / 0.2 for v, length in zip(s, lengths, strict=True)]
+    np.testing.assert_allclose(eased, means @ sum(strip), atol=1e-18)
+    assert not seat_gap(patch, mesh, Contact()).any()
+    with pytest.raises(InputError, match=r"contact.edge_width = 500 um: narrower .* or a smaller mesh.contact_size"):
+        seat_gap(patch, mesh, Contact(edge_radius=0.1, edge_width=5e-4))
+
+
+def test_a_crowned_flat_mesh_is_a_hertz_cylinder():
+    """Two steel blocks, one with a crown of 50 mm, a/10: peak 1 %, half width by the second moment 3 %."""
+    half = graded(A / 10, 1.2 * A, 15 * A, 1.4)
+    mesh = facing_blocks(np.r_[-half[:0:-1], half], graded(A / 10, 0.5 * A, 15 * A, 1.4))
+    patch = make_patch(mesh, "this")
+    C = sum(compliances(mesh, patch, *STEEL, clamped))
+    gap, e = seat_gap(patch, mesh, Contact(crown_across=RADIUS)), modulus(*STEEL)
+    load = np.pi * e * A**2 / (4 * RADIUS)
+    s = solve_lcp(C, gap, -np.ones((len(C), 1)), [-load])
+    p, x = s.force / patch.area, patch.points[:, 0]
+    assert s.reason == ""
+    assert p.max() == pytest.approx(e * A / (2 * RADIUS), rel=0.01)
+    assert 2 * np.sqrt(s.force @ x**2 / load) == pytest.approx(A, rel=0.03)
+
+
+@pytest.fixture(scope="module")
+def bodies():
+    """A small wedge between two stubs with a scene's contact; what a run asks of Bodies."""
+    mesh = wedge_mesh(ALPHA, divisions=(6, 3, 10))
+    still = flexible(constrain(assemble(mesh, "blade", Material()), "clamp"))
+    damper = flexible(constrain(assemble(mesh, "damper", Material()), None))
+    return lambda *given: SimpleNamespace(
+        scene=bladefem.load_scene("scenes/wedge.toml", ["contact.bedded=false", *given]), mesh=mesh, still=still,
+        damper=damper)
+
+
+def seated(bodies, *given, kind=None):
+    found = bodies(*given)
+    if kind:
+        found.scene = SimpleNamespace(kind=kind, contact=found.scene.contact, damper=found.scene.damper)
+    patches = [make_patch(found.mesh, name) for name in ("this", "next")]
+    return solve(seat_damper(found, patches), 0.0, normal=500.0)
+
+
+def test_a_crowned_damper_presses_in_the_middle(bodies):
+    """Equilibrium holds; the ends of the seat open, the pressure moves to the middle and grows."""
+    flat, crowned = seated(bodies), seated(bodies, "contact.crown=0.5 m")
+    for a, b in zip(flat, crowned, strict=True):
+        z = np.abs(b.patch.points[:, 2])
+        assert b.force.sum() == pytest.approx(500.0, rel=1e-9)
+        assert (b.force[z > 0.014] == 0).all() and (a.force[z > 0.014] > 0).any()
+        assert b.force @ z < 0.6 * (a.force @ z)
+        assert b.pressure[z < 0.005].max() > 1.5 * a.pressure[z < 0.005].max()
+        assert b.complementarity < 1e-9
+
+
+def test_eased_edges_carry_less(bodies):
+    flat, eased = seated(bodies), seated(bodies, "contact.edge_radius=20 mm", "contact.edge_width=3 mm")
+    for a, b in zip(flat, eased, strict=True):
+        edge = np.abs(b.patch.points[:, 2]) > 0.0149
+        assert b.force.sum() == pytest.approx(500.0, rel=1e-9)
+        assert b.force[edge].sum() < 0.5 * a.force[edge].sum()
+
+
+@pytest.mark.parametrize("clearance", ["0.3 mm", "-0.3 mm"])
+def test_clearance_and_interference_count_once(bodies, clearance):
+    """A drawn wedge has its clearance in the mesh already; on a user's mesh the field moves the gap, not the force."""
+    plain, wide = seated(bodies), seated(bodies, f"damper.clearance={clearance}", kind="imported")
+    for a, b in zip(plain, wide, strict=True):
+        assert np.abs(a.force - b.force).max() < 1e-7 * a.force.max()
+    found = bodies(f"damper.clearance={clearance}")
+    patches = [make_patch(found.mesh, "this"), make_patch(found.mesh, "next")]
+    assert np.abs(seat_damper(found, patches).clearance).max() < 1e-15
