@@ -102,8 +102,14 @@ def _z_mass(scene: Scene) -> Iterator[str]:
         yield f"foundation.skew = {skew[0]:g}, {skew[1]:g}: expected a sum of sizes of at most 1"
 
 
+def _one_of(name: str, given: float | None, scene: Scene) -> Iterator[str]:
+    if given is not None and scene.study.loads is not None:
+        yield f"{name} = {show(given, 'm')}: it takes the place of study.loads, expected only one of the two"
+
+
 def _hertz(scene: Scene) -> Iterator[str]:
     hertz = scene.hertz
+    yield from _one_of("hertz.interference", hertz.interference, scene)
     yield from _below("hertz.contact_radius", hertz.contact_radius, hertz.half_width, "hertz.half_width")
     yield from _at_most("hertz.half_width", hertz.half_width, hertz.radius, "hertz.radius")
     if scene.mesh.contact_size is not None:
@@ -111,6 +117,7 @@ def _hertz(scene: Scene) -> Iterator[str]:
 
 
 def _punch(scene: Scene) -> Iterator[str]:
+    yield from _one_of("punch.interference", scene.punch.interference, scene)
     yield from _below("punch.radius", scene.punch.radius, scene.punch.half_width, "punch.half_width")
     if scene.mesh.contact_size is not None:
         yield from _below("mesh.contact_size", scene.mesh.contact_size, scene.punch.radius, "punch.radius")

@@ -112,6 +112,8 @@ class HertzPair:
     half_width: float = quantity(0.01, "m", 1e-4, 1.0, "half width of the meshed blocks")
     contact_radius: float = quantity(1e-3, "m", 1e-5, 0.1, "expected contact radius, meshed finely")
     dimension: int = quantity(3, "1", 2, 3, "3 for a sphere, 2 for a cylinder in plane strain, loads on a metre of it")
+    interference: float | None = quantity(None, "m", 1e-9, 0.01, "how far the far faces are held closer than where the "
+                                          "bodies touch, in place of study.loads")
 
 
 @dataclass(frozen=True)
@@ -121,6 +123,8 @@ class Punch:
     radius: float = quantity(2e-3, "m", 1e-5, 0.1, "radius (3-D) or half width (2-D) of the punch")
     half_width: float = quantity(0.02, "m", 1e-4, 1.0, "half width of the block")
     dimension: int = quantity(3, "1", 2, 3, "3 for a round punch, 2 for plane strain, loads on a metre of depth")
+    interference: float | None = quantity(None, "m", 1e-9, 0.01, "how far the punch is held inside of the block's "
+                                          "face, in place of study.loads")
 
 
 @dataclass(frozen=True)

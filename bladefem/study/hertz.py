@@ -52,7 +52,8 @@ def press_pair(scene: Scene, comm: Any = None) -> Pressed:
     from ..fem.body import assemble
     if scene.kind != "hertz":
         raise InputError(f"kind = '{scene.kind}': expected 'hertz'")
-    loads = _loads(scene)
+    given = scene.hertz.interference
+    loads = _loads(scene) if given is None else ()
     mesh = build_mesh(scene, comm)
     patch = make_patch(mesh, "this")
     ports, C = normal_ports([patch], mesh), 0.0
@@ -61,12 +62,15 @@ def press_pair(scene: Scene, comm: Any = None) -> Pressed:
         C = C + flexibility(body, port_matrix([patch], mesh, name)[:, ports], held)
     gap, part = initial_gap(patch, mesh), 4 if mesh.dimension == 3 else 2
     maps, approach = {}, {}
-    for load in loads:
-        found = solve_lcp(C, gap, -np.ones((len(C), 1)), [-load / part])
+    for wanted in loads if given is None else (None,):
+        found = solve_lcp(C, gap - given) if wanted is None else \
+            solve_lcp(C, gap, -np.ones((len(C), 1)), [-wanted / part])
         if found.reason:
-            raise NotSolvedError(f"load {show(load, 'N')}: {found.reason}")
+            raise NotSolvedError(f"{_said(scene, wanted)}: {found.reason}")
+        load = part * float(found.force.sum()) if wanted is None else wanted
+        _check_load(scene, load)
         maps[load] = PressureMap(patch, found.force, found.gap, found.residual)
-        approach[load] = float(found.rigid[0])
+        approach[load] = given if wanted is None else float(found.rigid[0])
     return Pressed(mesh, maps, approach)
 
 
@@ -102,13 +106,26 @@ def _modulus(materials: Materials) -> float:
 
 def _loads(scene: Scene) -> tuple[float, ...]:
     """The loads of the study, or the one that gives the expected contact radius."""
+    loads = scene.study.loads or (hertz_load(scene, scene.hertz.contact_radius),)
+    for load in loads:
+        _check_load(scene, load)
+    return loads
+
+
+def _check_load(scene: Scene, load: float) -> None:
+    """Its contact must fit the mesh."""
     expected = scene.hertz.contact_radius
-    loads = scene.study.loads or (hertz_load(scene, expected),)
     fine = scene.mesh.contact_size or expected / 10
     low, high = (hertz_load(scene, a) for a in (FINEST * fine, WIDEST * expected))
-    for load in loads:
-        if not low <= load <= high:
-            raise InputError(f"study.loads = {show(load, 'N')}: the contact radius would be "
-                             f"{show(hertz_radius(scene, load), 'm')}, hertz.contact_radius and mesh.contact_size "
-                             f"are made for {show(low, 'N')} to {show(high, 'N')}")
-    return loads
+    if not low <= load <= high:
+        raise InputError(f"{_said(scene, load)}: the contact radius would be "
+                         f"{show(hertz_radius(scene, load), 'm')}, hertz.contact_radius and mesh.contact_size "
+                         f"are made for {show(low, 'N')} to {show(high, 'N')}")
+
+
+def _said(scene: Scene, load: float | None) -> str:
+    """What was given, and the load that it means."""
+    given = scene.hertz.interference
+    if given is None:
+        return f"study.loads = {show(load, 'N')}"
+    return f"hertz.interference = {show(given, 'm')}" + ("" if load is None else f" (a load of {show(load, 'N')})")

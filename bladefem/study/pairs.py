@@ -67,7 +67,10 @@ def _hertz(scene: Scene, comm: Any) -> tuple[Mesh, list[PairState]]:
 
 def _punch(scene: Scene, comm: Any) -> tuple[Mesh, list[PairState]]:
     found = indent(scene, comm)
-    return found.mesh, [_punched(scene, found, load) for load in scene.study.loads or (found.total,)]
+    loads, given = scene.study.loads or (found.total,), scene.punch.interference
+    if given is not None:
+        loads = (found.total * given / found.approach,)
+    return found.mesh, [_punched(scene, found, load) for load in loads]
 
 
 def _punched(scene: Scene, found: Indented, load: float) -> PairState:

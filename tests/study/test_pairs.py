@@ -48,6 +48,28 @@ def test_loads_that_the_mesh_cannot_show_are_refused():
         solve_pair(load_scene("scenes/plane.toml"))
 
 
+@pytest.mark.parametrize("kind", ["hertz", "punch"])
+def test_an_interference_gives_the_load_that_gives_it(kind):
+    """Far faces held closer by the approach of a load carry that load and the same pressure: the problem turned."""
+    base = ["mesh.contact_size=0.2 mm", f"{kind}.dimension=2"]
+    scene = load_scene(f"scenes/{kind}.toml", [*base, "study.loads=1 MN" if kind == "hertz" else "study.loads=3 kN"])
+    _, (pressed,) = solve_pair(scene)
+    held = [*base, "study.loads=auto", f"{kind}.interference={pressed.approach[0]!r}"]
+    _, (state,) = solve_pair(load_scene(f"scenes/{kind}.toml", held))
+    assert state.load == pytest.approx(pressed.load, rel=1e-9)
+    assert state.approach[0] == pytest.approx(pressed.approach[0], rel=1e-12)
+    np.testing.assert_allclose(state.seat.force, pressed.seat.force, atol=1e-9 * pressed.seat.force.max())
+
+
+def test_wrong_interference_is_refused():
+    for kind in ("hertz", "punch"):
+        with pytest.raises(InputError, match=f"{kind}.interference = 1 um: it takes the place of study.loads"):
+            load_scene(f"scenes/{kind}.toml", [f"{kind}.interference=1 um"])
+    thin = ["hertz.dimension=2", "mesh.contact_size=0.2 mm", "study.loads=auto", "hertz.interference=10 nm"]
+    with pytest.raises(InputError, match=r"hertz\.interference = 0\.01 um \(a load of .*\): the contact radius would be"):
+        solve_pair(load_scene("scenes/hertz.toml", thin))
+
+
 @pytest.mark.parametrize("command, scene, options", [
     ("run", "punch", ["punch.dimension=2", "study.loads=1 kN, 2 kN", "mesh.contact_size=0.4 mm"]),
     ("contact", "hertz", ["hertz.dimension=2", "study.loads=1 MN"])])
