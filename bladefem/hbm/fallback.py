@@ -8,7 +8,8 @@
 3. harmonics in sequence, 3, 7, 15, ... up to H, each started from the one before;
 4. homotopy in the normal load, from a load under which everything sticks down to the true one;
 5. the same by path following in the excitation, which goes round the folds that contacts with lift-off have;
-6. shooting in time, where the model has a form in time, and Newton from its harmonics.
+6. shooting in time, where the model has a form in time, and Newton from its harmonics;
+7. the path in the excitation again with four times the samples, which coarse ones can interrupt at lift-off.
 """
 
 from __future__ import annotations
@@ -81,6 +82,9 @@ def _ways(balance: Balance, start: np.ndarray | None, options: Options) -> Itera
     yield Attempt("load homotopy", _from_high_load(balance, options))
     yield Attempt("path in the excitation", _along_excitation(balance, options))
     yield Attempt("shooting", _from_shooting(balance, near, options))
+    if balance.samples:
+        denser = replace(balance, samples=4 * balance.samples)
+        yield Attempt("path in the excitation, more samples", _along_excitation(denser, options), denser.samples)
 
 
 def _more_harmonics(balance: Balance, options: Options) -> Newton:

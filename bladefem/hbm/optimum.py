@@ -57,6 +57,10 @@ class _Search:
         """The value farther along the coordinate, inside the bounds."""
         return float(np.clip(outer(self.name, inner(self.name, value) + by), *self.bounds))
 
+    def inside(self, peak: Peak) -> bool:
+        """Whether the peak lies in the band."""
+        return self.band[0] < peak.omega < self.band[1]
+
     @property
     def finest(self) -> float:
         """Width of a bracket that is closed in."""
@@ -67,8 +71,9 @@ def optimum(model: ReducedModel, band: tuple[float, float], bounds: tuple[float,
             samples: int = 128, *, name: str = "load", tolerance: float = 1e-3) -> Optimum:
     """The value of a parameter, between two bounds, that makes the highest peak in a band [rad/s] lowest.
 
-    Peaks are sought uphill of the resonances of both linear limits, or of the middle; at the end a coarse look over the
-    whole band must find nothing higher, or the search goes on with what it found.
+    Of several minima it is the one downhill from the middle of the bounds; others are found with narrower bounds. Peaks
+    are sought uphill of the resonances of both linear limits, or of the middle of the band; at the end a coarse look
+    over the whole band must find nothing higher, or the search goes on with what it found.
 
     Args:
         bounds: of a parameter of `bladefem.hbm.vary`: factors above zero, or for "gap" added openings [m].
@@ -84,97 +89,147 @@ def optimum(model: ReducedModel, band: tuple[float, float], bounds: tuple[float,
             raise InputError(f"{what} ({low}, {high}): expected {least:g} < low < high")
     search = _Search(model, band, H, samples, name, bounds, tolerance)
     middle = outer(name, (inner(name, bounds[0]) + inner(name, bounds[1])) / 2)
-    seeds = np.concatenate([f(vary(model, name, middle)) for f in (stuck_resonances, free_resonances)])
-    seeds = seeds[(seeds > band[0]) & (seeds < band[1])]
-    known, points = _first(search, middle, seeds if seeds.size else np.array([np.sqrt(band[0] * band[1])]))
-    tried = [_top(known, middle)]
+    first, points = _first(search, middle)
+    levels = {middle: first}
     for _ in range(LEVELS):
-        known, tried, points = _close_in(search, known, tried, points)
+        points += _close_in(search, levels)
+        tried = _tops(levels)
         best = min(tried, key=lambda peak: peak.height)
         missed, count = _look(search, best.value, best)
         points += count
         if missed is None:
             return Optimum(best.value, best, tuple(tried), points)
-        known, tried = [*known, missed], [missed]
+        levels, count = _reconsidered(search, levels, missed)
+        points += count
     raise NotSolvedError(f"optimum of {name} between {bounds}: every look over the band found a higher peak")
 
 
-def _first(search: _Search, value: float, seeds: np.ndarray) -> tuple[list[Peak], int]:
-    """Peaks uphill of the seeds, and the points spent."""
+def _first(search: _Search, value: float) -> tuple[list[Peak], int]:
+    """Peaks uphill of the resonances of both limits at the first value, and the points spent."""
     model, known, points, reason = vary(search.model, search.name, value), [], 0, "the climb leaves it"
-    for omega in seeds:
+    seeds = np.concatenate([resonances(model) for resonances in (stuck_resonances, free_resonances)])
+    seeds = seeds[(seeds > search.band[0]) & (seeds < search.band[1])]
+    for omega in seeds if seeds.size else [float(np.sqrt(search.band[0] * search.band[1]))]:
         try:
             peak = find_peak(model, omega, search.H, search.samples, tolerance=search.tolerance)
         except NotSolvedError as error:
             reason = str(error)
             continue
         points += peak.points
-        if _new(search, peak, known):
-            known.append(with_slope(model, peak, search.name, value))
+        if search.inside(peak):
+            known = _with(search, with_slope(model, peak, search.name, value), known)
     if not known:
         raise NotSolvedError(f"no peak in the band {search.band} with {search.name} at {value:.4g}: {reason}")
     return known, points
 
 
-def _new(search: _Search, peak: Peak, known: list[Peak]) -> bool:
-    inside = search.band[0] < peak.omega < search.band[1]
-    return inside and not any(_same(peak, other.omega) and _same(other, peak.omega) for other in known)
+def _with(search: _Search, peak: Peak, known: list[Peak]) -> list[Peak]:
+    """The known peaks and this one; of those without a dip between them the highest."""
+    same = [other for other in known if other.value == peak.value and _same(peak, other) and _same(other, peak)]
+    if any(other.height >= peak.height for other in same):
+        return known
+    return [*(other for other in known if not any(other is one for one in same)), peak]
 
 
-def _same(peak: Peak, omega: float) -> bool:
-    """Too close for a dip between them: the parabola of the peak loses less than SAME of its height up to omega."""
+def _same(peak: Peak, other: Peak) -> bool:
+    """No dip before the other: the parabola of the peak loses less than SAME of its height on the way."""
     if peak.bend == 0:
-        return abs(peak.omega - omega) < SAME * peak.omega
-    return peak.bend * peak.height**2 / 4 * (peak.omega - omega)**2 < SAME
+        return abs(peak.omega - other.omega) < SAME * peak.omega
+    return peak.bend * peak.height**2 / 4 * (peak.omega - other.omega)**2 < SAME
 
 
-def _close_in(search: _Search, known: list[Peak], tried: list[Peak],
-              points: int) -> tuple[list[Peak], list[Peak], int]:
-    """Go downhill until falling and rising heights enclose the minimum to the tolerance, or a bound is reached."""
-    step, narrow = FIRST * search.width(*search.bounds), False
+def _close_in(search: _Search, levels: dict[float, list[Peak]]) -> int:
+    """Go downhill from the lowest level until the minimum is enclosed to the tolerance, or a bound is reached.
+
+    Adds to the levels; returns the points spent.
+    """
+    step, narrow, points = FIRST * search.width(*search.bounds), False, 0
     for _ in range(LEVELS):
-        low = max((p for p in tried if p.slope < 0), key=lambda p: p.value, default=None)
-        high = min((p for p in tried if p.slope >= 0), key=lambda p: p.value, default=None)
+        low, high = _bracket(_tops(levels))
         if low is None or high is None:
             end, sign = (low, 1.0) if high is None else (high, -1.0)
             value = search.moved(end.value, sign * step)
             if value == end.value:
-                return known, tried, points
+                return points
             step *= 2
         else:
             value, gain = _between(search, low, high, narrow)
             if gain < search.tolerance or search.width(low.value, high.value) < search.finest:
-                return known, tried, points
+                return points
             narrow = not narrow
-        peaks, count = _level(search, value, known)
+        levels[value], count = _level(search, value, _nearby(levels, value))
         points += count
-        known, tried = peaks, [*tried, _top(peaks, value)]
     raise NotSolvedError(f"optimum of {search.name} not closed in with {LEVELS} values, last at {value:.4g}")
 
 
+def _tops(levels: dict[float, list[Peak]]) -> list[Peak]:
+    """The highest peak of each level."""
+    return [max((peak for peak in peaks if peak.value == value), key=lambda peak: peak.height)
+            for value, peaks in levels.items()]
+
+
+def _nearby(levels: dict[float, list[Peak]], value: float) -> list[Peak]:
+    """The peaks of the next levels below and above a value, without those of one that stand where the other's do."""
+    below, above = (levels.get(near, []) for near in _neighbours(levels, value))
+    return below + [p for p in above if not any(_same(p, other) or _same(other, p) for other in below)]
+
+
+def _neighbours(levels: dict[float, list[Peak]], value: float) -> tuple[float | None, float | None]:
+    """The next values below and above."""
+    return max((v for v in levels if v < value), default=None), min((v for v in levels if v > value), default=None)
+
+
+def _reconsidered(search: _Search, levels: dict[float, list[Peak]],
+                  missed: Peak) -> tuple[dict[float, list[Peak]], int]:
+    """The level where a peak was missed and its neighbours, with that peak; and the points spent."""
+    kept, points = {missed.value: _with(search, missed, levels[missed.value])}, 0
+    for value in _neighbours(levels, missed.value):
+        if value is not None:
+            found, count = _level(search, value, [missed])
+            kept[value], points = _with(search, found[0], levels[value]), points + count
+    return kept, points
+
+
+def _bracket(tried: list[Peak]) -> tuple[Peak | None, Peak | None]:
+    """The lowest height tried and its neighbour downhill, which is no lower: a minimum lies between; None at an end."""
+    best = min(tried, key=lambda peak: peak.height)
+    if best.slope < 0:
+        return best, min((p for p in tried if p.value > best.value), key=lambda p: p.value, default=None)
+    return max((p for p in tried if p.value < best.value), key=lambda p: p.value, default=None), best
+
+
 def _between(search: _Search, low: Peak, high: Peak, tangents: bool) -> tuple[float, float]:
-    """The next value inside a bracket, and the most that could still be gained, relative to the lower end."""
+    """The next value inside a bracket, and the most that could still be gained, relative to its lower end.
+
+    The cubic sees smooth minima, the tangents corners, where two peaks exchange their order; of two minima in a bracket
+    neither can be trusted, and it is halved.
+    """
     width = search.width(low.value, high.value)
     down, up, rise = low.slope * width, high.slope * width, high.height - low.height
-    meet = (rise - up) / (down - up) if down != up else 0.5
-    floor = low.height + meet * down
-    gain = 1 - floor / min(low.height, high.height)
-    share = meet if tangents else cubic_minimum(down, up, rise)
-    return search.moved(low.value, float(np.clip(share, 0.05, 0.95)) * width), float(gain)
+    if not down < 0 <= up:
+        return search.moved(low.value, width / 2), np.inf
+    meet, smooth = (rise - up) / (down - up), cubic_minimum(down, up, rise)
+    floor = low.height + smooth * (down + smooth * (3 * rise - 2 * down - up + smooth * (down + up - 2 * rise)))
+    if 0 < meet < 1:
+        floor = min(floor, low.height + meet * down)
+    share = meet if tangents and 0 < meet < 1 else smooth
+    return (search.moved(low.value, float(np.clip(share, 0.05, 0.95)) * width),
+            float(1 - floor / min(low.height, high.height)))
 
 
 def _level(search: _Search, value: float, known: list[Peak]) -> tuple[list[Peak], int]:
     """The known peaks at another value: solved where they may be the highest, estimated where they cannot."""
     model, found, points = vary(search.model, search.name, value), [], 0
-    ordered = sorted(known, key=lambda peak: -_estimate(search, peak, value))
-    for old in ordered:
+    for old in sorted(known, key=lambda peak: -_estimate(search, peak, value)):
         if found and _estimate(search, old, value) < WORTH * max(peak.height for peak in found if peak.value == value):
             found.append(old)
             continue
+        if any(peak.value == value and _same(peak, old) for peak in found):
+            continue
         peak = find_peak(model, old.omega, search.H, search.samples, near=old, tolerance=search.tolerance)
         points += peak.points
-        if _new(search, peak, [p for p in found if p.value == value]):
-            found.append(with_slope(model, peak, search.name, value))
+        if search.inside(peak):
+            found = _with(search, with_slope(model, peak, search.name, value), found)
     if any(peak.value == value for peak in found):
         return found, points
     met, count = _look(search, value)       # the known peaks left the band, or became one with another
@@ -187,21 +242,17 @@ def _estimate(search: _Search, peak: Peak, value: float) -> float:
     return peak.height * float(np.exp(peak.slope / peak.height * search.width(peak.value, value)))
 
 
-def _top(peaks: list[Peak], value: float) -> Peak:
-    return max((peak for peak in peaks if peak.value == value), key=lambda peak: peak.height)
-
-
 def _look(search: _Search, value: float, best: Peak | None = None) -> tuple[Peak | None, int]:
     """The highest peak that a coarse look over the band meets, if it is higher than the best; points spent."""
-    model = vary(search.model, search.name, value)
+    model, met = vary(search.model, search.name, value), best
     found = response(model, first_look(model, search.band), search.H, search.samples)
     points = [point for point in found if point.converged]
-    met, spent = best, len(points)
+    spent = len(points)
     for top in sorted(local_maxima(points), key=lambda point: -size(point))[:2]:
-        if met and (size(top) < NEARLY * met.height or _same(met, top.omega)):
+        if met and (size(top) < NEARLY * met.height or abs(top.omega / met.omega - 1) < SAME):
             continue
         peak = find_peak(model, top.omega, search.H, search.samples, near=top, tolerance=search.tolerance)
         spent += peak.points
-        if _new(search, peak, []) and (met is None or peak.height > met.height * (1 + search.tolerance)):
+        if search.inside(peak) and (met is None or peak.height > met.height * (1 + search.tolerance)):
             met = peak
     return (None if met is best else with_slope(model, met, search.name, value)), spent
