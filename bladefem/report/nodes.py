@@ -12,9 +12,10 @@ from ..data import Patch
 from ..study.cycle import ContactCycle, contact_cycle
 from ..study.pipeline import Run, load_cases
 from ..view.contact import save_faces_vtu
+from ..view.response import draw_loops
 from ..view.wear import draw_work
 
-__all__ = ["cycles_of", "draw_wear", "node_table", "save_cycles_vtu"]
+__all__ = ["cycles_of", "draw_hysteresis", "draw_wear", "loop_table", "node_table", "save_cycles_vtu"]
 
 
 def cycles_of(result: Run) -> list[ContactCycle]:
@@ -39,6 +40,14 @@ def node_table(patches: Sequence[Patch], cycles: Sequence[ContactCycle]) -> pd.D
     return pd.concat(frames, ignore_index=True)
 
 
+def loop_table(cycles: Sequence[ContactCycle]) -> pd.DataFrame:
+    """Friction force and relative displacement of each patch in one period at each resonance (SI)."""
+    return pd.concat([pd.DataFrame({
+        "load": c.load, **({} if c.mass is None else {"mass": c.mass}), "patch": name,
+        "phase": 2 * np.pi * np.arange(len(loop.force)) / len(loop.force), "displacement": loop.displacement,
+        "force": loop.force}) for c in cycles for name, loop in c.loops.items()], ignore_index=True)
+
+
 def save_cycles_vtu(patches: Sequence[Patch], cycles: Sequence[ContactCycle], file: Path) -> Path:
     """Work and shares of all loads on the faces."""
     fields: dict[str, np.ndarray] = {}
@@ -55,3 +64,11 @@ def draw_wear(patches: Sequence[Patch], cycles: Sequence[ContactCycle], file: Pa
     worst = max(cycles, key=lambda c: float(c.work @ area))
     return draw_work(patches, worst.work, worst.state, file,
                      title=f"friction work of a period at the resonance, {worst.load:g} N per seat")
+
+
+def draw_hysteresis(cycles: Sequence[ContactCycle], file: Path) -> object:
+    """Hysteresis of one seat at the resonance of each load."""
+    name = next(iter(cycles[0].loops))
+    loops = {f"{c.load:.4g} N" + ("" if c.mass is None else f", {1e3 * c.mass:.4g} g"): c.loops[name] for c in cycles}
+    return draw_loops({label: (loop.displacement, loop.force) for label, loop in loops.items()}, file,
+                      title=f'friction of the whole seat "{name}" at resonance')

@@ -29,7 +29,7 @@ from ..study.modal import family_table
 from ..study.state_check import state_sentence
 from ..view import contact, mesh, modes, response, speed
 from .datasets import datasets, table_dataset
-from .nodes import cycles_of, draw_wear, node_table, save_cycles_vtu
+from .nodes import cycles_of, draw_hysteresis, draw_wear, loop_table, node_table, save_cycles_vtu
 from .tables import write_tables
 from .write import write_report
 
@@ -60,10 +60,14 @@ def _write(result: pipeline.Run, progress: Progress) -> None:
         write_tables(table, folder / name.split("/")[1], name.split("/")[1])
     patches, cycles = list(result.contact.problem.patches), cycles_of(result)
     nodes = node_table(patches, cycles)
+    loops = loop_table(cycles)
     nodes.to_csv(folder / "nodes.csv", index=False)
-    groups = {**datasets(result, tables), "nodes": table_dataset(nodes, "row")}
+    loops.to_csv(folder / "hysteresis.csv", index=False)
+    groups = {**datasets(result, tables), "nodes": table_dataset(nodes, "row"),
+              "hysteresis": table_dataset(loops, "row")}
     write_results(folder / "results.nc", groups, dump(result.scene))
     drawings = {**_drawings(result, tables),
+                "response/hysteresis": lambda file: draw_hysteresis(cycles, file),
                 "contact/friction_work": lambda file: draw_wear(patches, cycles, file)}
     figures = {}
     for name, draw in progress(list(drawings.items()), "pictures"):

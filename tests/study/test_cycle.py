@@ -11,6 +11,7 @@ from bladefem.friction.closed_form import circular_orbit_work
 from bladefem.report.nodes import draw_wear, node_table, save_cycles_vtu
 from bladefem.study.cycle import contact_cycle
 from bladefem.study.joint import LoadCase
+from bladefem.view.response import loop_energy
 
 KT, MU, N = 2e6, 0.3, 10.0
 
@@ -69,3 +70,19 @@ def test_pictures_and_paraview(tmp_path):
     grid = pyvista.read(save_cycles_vtu(patches, [cycle], tmp_path / "work.vtu"))
     np.testing.assert_allclose(grid["friction work [J/m2] at 80 N"], cycle.work)
     np.testing.assert_allclose(grid["share of slip at 80 N"], 1)
+
+
+def test_hysteresis_of_a_patch_is_the_loop_of_its_springs():
+    """All nodes of a patch move alike along one line: a loop of the textbook, 4 mu N (X - mu N / kt), forces add up."""
+    patches = [strip("this", 0.0), strip("next", 1.0)]
+    elements = Elements(np.full(16, KT), np.full(16, KT), np.full(16, MU), np.full(16, N), 2)
+    w = np.zeros((16, 3, 7))
+    w[:8, 1, 1], w[:8, 2, 1], w[8:, 2, 2] = 1.8 * MU * N / KT, 2.4 * MU * N / KT, 0.5 * MU * N / KT
+    curve = SimpleNamespace(settings=SimpleNamespace(points=None), peak=SimpleNamespace(w=w, samples=64))
+    loops = contact_cycle(LoadCase(8 * N, elements, None), curve, patches, None).loops
+    sliding, stuck = loops["this"], loops["next"]
+    limit = 8 * MU * N
+    assert loop_energy(sliding.displacement, sliding.force) == pytest.approx(4 * limit * 2 * MU * N / KT, rel=1e-3)
+    assert abs(sliding.displacement).max() == pytest.approx(3 * MU * N / KT, rel=1e-12)
+    assert abs(sliding.force).max() == pytest.approx(limit, rel=0.02)        # the corners of 63 harmonics
+    np.testing.assert_allclose(stuck.force, 8 * KT * stuck.displacement, atol=1e-9 * limit)
