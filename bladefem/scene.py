@@ -122,6 +122,9 @@ class Model:
     harmonics: int | None = quantity(None, "1", 1, 99, "harmonics of the balance")
     samples: int | None = quantity(None, "1", 16, 65536, "time samples a period")
     damper: str | None = quantity(None, choices=("mass", "rigid", "elastic"), help="damper model")
+    static: str = quantity("coupled", choices=("coupled", "uncoupled"),
+                           help="the mean displacements take part in the balance, or stay as the static contact "
+                                "solution left them")
     reduction: str = quantity("rubin", choices=("rubin", "craig-bampton"), help="reduction basis")
     nodal_diameters: tuple[int, ...] | None = quantity(None, "1", 0, 1000,
                                                        "nodal diameters of the mode tables; when left out those "

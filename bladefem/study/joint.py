@@ -56,7 +56,8 @@ def joint_model(scene: Scene, mesh: Mesh, reduced: Reduced, patches: list[Patch]
     if isinstance(other, RigidBody) and not whole:
         other = replace(other, B=pick @ other.B)
     return ReducedModel(sides, elements, {1: np.array([scene.excitation.force], dtype=complex)},
-                        Damping(ratio=scene.operation.damping), other, Damping(ratio=scene.operation.damping))
+                        Damping(ratio=scene.operation.damping), other, Damping(ratio=scene.operation.damping),
+                        coupled=scene.model.static == "coupled")
 
 
 def rigid_damper(reduced: Reduced) -> RigidBody:

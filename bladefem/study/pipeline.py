@@ -269,6 +269,8 @@ def reduced_sector(scene: Scene, bodies: Bodies, case: LoadCase, patches: list[P
 def _remarks(scene: Scene, settings: Settings, curves: list[Curve]) -> list[str]:
     """What a reader of the results has to know."""
     remarks = [settings.sentence()]
+    if scene.model.static == "uncoupled":
+        remarks.append("mean displacements held as the static contact solution left them (model.static)")
     lost = sum(int((~c.converged).sum()) for c in curves)
     if lost:
         remarks.append(f"{lost} of {sum(len(c.frequency) for c in curves)} response points did not converge; they are "

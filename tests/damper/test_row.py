@@ -7,6 +7,7 @@ from bladefem.damper.accelerate import Rules, iterate
 from bladefem.damper.blades import judge, optimum, peak
 from bladefem.damper.branch import state_of
 from bladefem.damper.paper import platform
+from bladefem.errors import InputError
 from bladefem.hbm.api import solve
 from bladefem.hbm.in_time import time_system
 from bladefem.hbm.resonance import free_resonances
@@ -30,6 +31,19 @@ def test_resonances_and_loads_of_the_scene(row):
     assert model.elements.n0.sum() == pytest.approx(60.0)                    # both seats
     assert model.elements.kt[:11].sum() == pytest.approx(1e6)
     assert np.ptp(model.damper.B) == 0                                      # it moves along the row only
+
+
+def test_a_static_part_held_lets_no_mean_displacement_in(row):
+    """model.static = "uncoupled": mean forces that friction raises are reported, the mean stays where it was."""
+    held = whole_model(SOFT.vary(model__static="uncoupled"), row, 6.0, harmonics=3)
+    free = whole_model(SOFT, row, 6.0, harmonics=3)
+    assert free.coupled and not held.coupled
+    one, other = (solve(model, 2 * np.pi * 1148.7, 3, 128) for model in (free, held))
+    assert one.converged and other.converged
+    assert abs(other.w[:, :, 0]).max() == 0 < abs(one.w[:, :, 0]).max()
+    assert abs(one.probe[1, 0] / other.probe[1, 0] - 1) > 1e-6
+    with pytest.raises(InputError, match=r"model\.static"):
+        load_scene("scenes/plane.toml", ["model.static=held"])
 
 
 def test_normal_loads_are_proportional(row):
