@@ -12,7 +12,7 @@ from ..data import Patch
 from ..study.cycle import ContactCycle, contact_cycle
 from ..study.pipeline import Run, load_cases
 from ..view.contact import save_faces_vtu
-from ..view.response import draw_loops
+from ..view.response import draw_seat_loops
 from ..view.wear import draw_work
 
 __all__ = ["cycles_of", "draw_hysteresis", "draw_wear", "loop_table", "node_table", "save_cycles_vtu"]
@@ -67,8 +67,7 @@ def draw_wear(patches: Sequence[Patch], cycles: Sequence[ContactCycle], file: Pa
 
 
 def draw_hysteresis(cycles: Sequence[ContactCycle], file: Path) -> object:
-    """Hysteresis of one seat at the resonance of each load."""
-    name = next(iter(cycles[0].loops))
-    loops = {f"{c.load:.4g} N" + ("" if c.mass is None else f", {1e3 * c.mass:.4g} g"): c.loops[name] for c in cycles}
-    return draw_loops({label: (loop.displacement, loop.force) for label, loop in loops.items()}, file,
-                      title=f'friction of the whole seat "{name}" at resonance')
+    """Hysteresis of both seats at the resonance of each load."""
+    cases = {f"{c.load:.4g} N" + ("" if c.mass is None else f", {1e3 * c.mass:.4g} g"):
+             {f'"{name}"': (loop.displacement, loop.force) for name, loop in c.loops.items()} for c in cycles}
+    return draw_seat_loops(cases, file)

@@ -18,7 +18,8 @@ import pandas as pd
 from .labels import names_apart
 from .style import COLOURS, FAILED, canvas, log_axis
 
-__all__ = ["draw_accuracy", "draw_loops", "draw_optimum", "draw_responses", "loop_energy", "pareto_front"]
+__all__ = ["draw_accuracy", "draw_loops", "draw_optimum", "draw_responses", "draw_seat_loops", "loop_energy",
+           "pareto_front"]
 
 MICRO = 1e6
 
@@ -176,9 +177,11 @@ def draw_loops(loops: Mapping[str, tuple[np.ndarray, np.ndarray]], file: str | P
     Args:
         loops: name -> (displacement (k,) [m], force (k,) [N]) over one period.
         file: PNG to write.
-        ax: axes to draw into.
+        ax: axes to draw into; the legend is then inside them.
         title: headline.
     """
+    beside = {"loc": "center left", "bbox_to_anchor": (1.0, 0.5)}
+    place = beside if ax is None else {"loc": "lower right", "fontsize": 7.5}
     with canvas(file, ax, (6.4, 4.4)) as ax:
         shades = matplotlib.colormaps["viridis"](np.linspace(0.0, 0.92, max(len(loops), 1)))
         colours = COLOURS if len(loops) <= 6 else shades
@@ -189,8 +192,29 @@ def draw_loops(loops: Mapping[str, tuple[np.ndarray, np.ndarray]], file: str | P
             ax.plot(MICRO * np.asarray(x)[closed], np.asarray(force)[closed], color=colour,
                     label=f"{name}: {energy:.3g} mJ a cycle")
         ax.set(xlabel="relative displacement [µm]", ylabel="friction force [N]", title=title or "hysteresis loops")
-        ax.legend(loc="center left", bbox_to_anchor=(1.0, 0.5))
+        ax.legend(**place)
         return ax.figure
+
+
+def draw_seat_loops(cases: Mapping[str, Mapping[str, tuple[np.ndarray, np.ndarray]]], file: str | Path | None = None,
+                    ) -> object:
+    """``draw_loops`` of all seats, a panel a load, each on its own scale; returns the figure.
+
+    Args:
+        cases: name of the load -> name of the seat -> (displacement (k,) [m], force (k,) [N]).
+    """
+    across = min(len(cases), 4)
+    down = -(-len(cases) // across)
+    with canvas(file, None, (3.3 * across + 0.6, 2.9 * down + 0.3), (down, across), squeeze=False) as axes:
+        for ax, (name, seats) in zip(axes.flat, cases.items(), strict=False):
+            draw_loops(seats, ax=ax, title=name)
+            ax.label_outer()
+            ax.tick_params(labelbottom=True, labelleft=True)
+            low, high = ax.get_ylim()
+            ax.set_ylim(low - 0.2 * (high - low), high)     # room for the legend
+        for ax in axes.flat[len(cases):]:
+            ax.set_axis_off()
+        return axes[0, 0].figure
 
 
 def pareto_front(time: np.ndarray, error: np.ndarray) -> np.ndarray:

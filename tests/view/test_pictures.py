@@ -28,6 +28,7 @@ from bladefem.view.response import (
     draw_loops,
     draw_optimum,
     draw_responses,
+    draw_seat_loops,
     loop_energy,
     pareto_front,
 )
@@ -201,7 +202,8 @@ def test_response_charts(folder):
     assert "optimum 200 N" in text and "92.6 % below" in text
     draw_accuracy(synthetic.accuracy(), folder / "accuracy.png", tolerance=0.02)
     draw_loops(synthetic.loops(), folder / "loops.png")
-    assert min(ink(folder / f"{n}.png") for n in ("response", "optimum", "accuracy", "loops")) > 0.02
+    draw_seat_loops({f"{n} N": synthetic.loops() for n in range(5)}, folder / "seats.png")
+    assert min(ink(folder / f"{n}.png") for n in ("response", "optimum", "accuracy", "loops", "seats")) > 0.02
 
 
 def test_peaks_at_the_end_of_the_band_are_hollow():
