@@ -97,7 +97,7 @@ def linearise(balance: Balance, state: State, memory: Memory | None = None) -> I
     if len(active) == 0:
         return lambda residual, accuracy=0.0: residual.copy()
     others, change = np.setdiff1d(np.arange(n), active), change[active]
-    A = balance.linear.A if len(active) == n else np.ascontiguousarray(balance.linear.A[:, dofs][:, :, dofs])
+    A = _among(balance.linear.A, dofs)
     if memory is not None and memory.nodes != active.tobytes():
         memory.nodes, memory.blocks, memory.slow = active.tobytes(), None, memory.slow or memory.blocks is not None
     inverse = _inverse(A, change, memory)
@@ -122,7 +122,7 @@ def adjoint(balance: Balance, state: State) -> Inverse:
         return lambda b, accuracy=0.0: b.copy()
     turned = np.ascontiguousarray(balance.linear.A.conj().swapaxes(1, 2))
     back = np.ascontiguousarray(change[active].swapaxes(1, 2))
-    inverse = _inverse(np.ascontiguousarray(turned[:, dofs][:, :, dofs]), back)
+    inverse = _inverse(_among(turned, dofs), back)
 
     def solve(b: np.ndarray, accuracy: float = ACCURACY) -> np.ndarray:
         flexed = _shaped(balance, _apply(turned, as_amplitudes(b)))[active]
@@ -141,7 +141,7 @@ def orientation(balance: Balance, state: State) -> float:
         return 0.0
     if not len(dofs):           # everything sticks: the derivative is the identity
         return 1.0
-    J = _jacobian(balance.linear.A[:, dofs][:, :, dofs], change[active])
+    J = _jacobian(_among(balance.linear.A, dofs), change[active])
     J[np.diag_indices_from(J)] += 1.0
     return float(np.linalg.slogdet(J)[0])
 
@@ -152,6 +152,11 @@ def _active(balance: Balance, state: State) -> tuple[np.ndarray, np.ndarray, np.
     change = _force_change(balance, state)
     active = np.flatnonzero(abs(change).reshape(n, -1).max(axis=1) > STICKS * balance.model.springs.max(axis=1))
     return change, active, (active[:, None] * d + np.arange(d)).ravel()
+
+
+def _among(A: np.ndarray, dofs: np.ndarray) -> np.ndarray:
+    """(H+1, a, a) the flexibilities among some of the dofs, in one copy where one is needed."""
+    return A if len(dofs) == A.shape[1] else A[np.ix_(np.arange(len(A)), dofs, dofs)]
 
 
 def _inverse(A: np.ndarray, change: np.ndarray, memory: Memory | None = None) -> Inverse:
