@@ -35,12 +35,25 @@ from slepc4py import SLEPc  # noqa: E402
 sys.setdlopenflags = _setdlopenflags
 
 __all__ = ["CELLS", "MPI", "PETSc", "SLEPc", "assemble_matrix", "assemble_vector", "build_mesh", "cell_dofs",
-           "compile_form", "dolfinx", "scalar_space", "ufl", "vector_space"]
+           "compile_form", "dolfinx", "no_error_messages", "scalar_space", "ufl", "vector_space"]
 
 # meshio's word: dolfinx's cell, degree
 CELLS = {"triangle": ("triangle", 1), "triangle6": ("triangle", 2), "quad": ("quadrilateral", 1),
          "quad9": ("quadrilateral", 2), "tetra": ("tetrahedron", 1), "tetra10": ("tetrahedron", 2),
          "hexahedron": ("hexahedron", 1), "hexahedron27": ("hexahedron", 2)}
+
+
+@contextmanager
+def no_error_messages() -> Iterator[None]:
+    """PETSc raises its errors without printing them first."""
+    try:
+        PETSc.Sys.pushErrorHandler("ignore")
+    except ValueError:
+        PETSc.Sys.pushErrorHandler("return")
+    try:
+        yield
+    finally:
+        PETSc.Sys.popErrorHandler()
 
 
 def build_mesh(comm: MPI.Comm, cell_type: str, cells: np.ndarray, points: np.ndarray) -> tuple[Any, np.ndarray]:

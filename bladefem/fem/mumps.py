@@ -14,7 +14,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..errors import NotSolvedError
-from .compat import PETSc
+from .compat import PETSc, no_error_messages
 
 __all__ = ["Factorised", "dense", "factorise_matrix", "petsc_call", "set_operation", "solve_matrix", "values"]
 
@@ -172,14 +172,12 @@ def _in_order(F: PETSc.Mat, A: PETSc.Mat, order: np.ndarray) -> None:
 
 def _numeric(F: PETSc.Mat, size: int, factorise: Callable[[], None]) -> None:
     """Factorise; failures become one sentence."""
-    PETSc.Sys.pushErrorHandler("ignore")
     failed = False
     try:
-        factorise()
+        with no_error_messages():
+            factorise()
     except (PETSc.Error, NotSolvedError):
         failed = True
-    finally:
-        PETSc.Sys.popErrorHandler()
     code = F.getMumpsInfog(1)
     if failed or code < 0:
         raise NotSolvedError(_reason(code, F.getMumpsInfog(2), size))
