@@ -16,8 +16,11 @@ from .newton import DEFAULTS, Options
 from .residual import Balance
 from .small import solve_small
 from .solution import Solution, at_probes, blade_motion, probe_motion, works_of
+from .sticking import INSTANTS, grips
 
 __all__ = ["as_solution", "free", "solve", "stuck"]
+
+STUCK = Options(iterations=1, fallbacks=False)
 
 
 def solve(model: ReducedModel, omega: float, H: int = 3, samples: int = 128, *, start: Solution | None = None,
@@ -35,6 +38,9 @@ def solve(model: ReducedModel, omega: float, H: int = 3, samples: int = 128, *, 
         InputError: the frequency, H or samples are out of range, or the start belongs to another model.
     """
     _check(model, omega, H, start)
+    lean = _stuck_throughout(model, omega, H, samples, start) if options.frugal else None
+    if lean is not None:
+        return lean
     first = solve_small(model, omega, H, samples, None if start is None else start.w, options)
     if first is not None:
         return first
@@ -77,6 +83,19 @@ def as_solution(balance: Balance, attempt: Attempt, iterations: int, reason: str
         residual_force=float(abs(stiffness * state.residual).max()), drift=_drift(linear, load),
         states=_states(state.forces.shares),
         work=works_of(model, linear.omega, relative, force, blade, float(np.sum(state.forces.dissipated))))
+
+
+def _stuck_throughout(model: ReducedModel, omega: float, H: int, samples: int,
+                      start: Solution | None) -> Solution | None:
+    """The point with the excited harmonics alone, if all contacts stick; looked for only where the start sticks.
+
+    It is accepted with a little of the friction limit in hand, and with the tolerance of rounding: it is linear.
+    """
+    low = max((1, *model.excitation, *model.normal))
+    if low >= H or not (start is None or start.states["stick"] == len(model.elements.kt)):
+        return None
+    found = solve(model, omega, low, min(samples, INSTANTS * low), options=STUCK)
+    return found if found.converged and grips(model, found) else None
 
 
 def _check(model: ReducedModel, omega: float, H: int, start: Solution | None) -> None:

@@ -30,6 +30,7 @@ class Options:
     iterations: int = 60        # Newton steps of one attempt
     probe: int = 0              # whose height sweeps and peaks measure
     fallbacks: bool = True      # whether more is tried where Newton fails
+    frugal: bool = False        # whether harmonics that are not excited are left out where all contacts stick
 
     def __post_init__(self) -> None:
         if not 1e-14 <= self.tolerance <= 1e-2:

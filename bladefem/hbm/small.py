@@ -29,26 +29,37 @@ STATES = ("stick", "slip", "lift", "open")
 
 def solve_small(model: ReducedModel, omega: float, H: int, samples: int, start: np.ndarray | None,
                 options: Options) -> Solution | None:
-    """The converged solution from displacements (n, d, *), or full stick; None where this way is not open."""
+    """The converged solution from displacements (n, d, *), else from full stick; None where this way is not open."""
     prepared = _prepared(model, H, samples)
     if prepared is None:
         return None
     body, held, springs, contact = prepared
     n, d = model.springs.shape
-    flexible, linear, mean, free = _linear(omega, body, held, springs, H)
-    w = linear[2].copy()
-    if start is not None:
-        kept = min(w.shape[1], start.shape[2])
-        w[:, :kept], w[:, kept:] = start.reshape(n * d, -1)[:, :kept], 0.0
-    steps, code, error, F, _, shares, residual, _ = compiled_newton(w, d, linear, contact, STICKS, options.tolerance,
-                                                                    options.iterations, SHORTEST)
+    begin = np.empty((n * d, 0)) if start is None else np.ascontiguousarray(start.reshape(n * d, -1), dtype=float)
+    w, ends, f, probe, counts, measures = _point(omega, body, held, springs, contact, d, H, begin, options.tolerance,
+                                                 options.iterations)
+    steps, code, error = ends
     if code != CONVERGED:
-        return None
-    f, probe, counts, measures = _measure(omega, body, held, springs, (flexible, mean, free), w, d, F, contact[5],
-                                          residual, shares)
+        return None if start is None else solve_small(model, omega, H, samples, None, options)
     moved, pushed, drift, *works = measures.tolist()
     return Solution(omega, H, samples, w.reshape(n, d, -1), f, probe, True, "residual within tolerance", "newton",
                     steps, error, moved, pushed, drift, dict(zip(STATES, counts.tolist(), strict=True)), Work(*works))
+
+
+@njit(cache=True, error_model="numpy")
+def _point(omega, body, held, springs, contact, d, H, start, tolerance, iterations):
+    """Displacements (m, K), (steps, code, error), and what `_measure` gives, from a start (m, *), or full stick."""
+    flexible, linear, mean, free = _linear(omega, body, held, springs, H)
+    w = linear[2].copy()
+    kept = min(w.shape[1], start.shape[1])
+    for i in range(w.shape[0] if kept else 0):
+        for k in range(w.shape[1]):
+            w[i, k] = start[i, k] if k < kept else 0.0
+    steps, code, error, F, _, shares, residual, _ = compiled_newton(w, d, linear, contact, STICKS, tolerance,
+                                                                    iterations, SHORTEST)
+    f, probe, counts, measures = _measure(omega, body, held, springs, (flexible, mean, free), w, d, F, contact[5],
+                                          residual, shares)
+    return w, (steps, code, error), f, probe, counts, measures
 
 
 def _prepared(model: ReducedModel, H: int, samples: int) -> tuple | None:

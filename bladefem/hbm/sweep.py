@@ -6,6 +6,7 @@ from collections.abc import Callable, Iterable, Iterator
 from dataclasses import replace
 from functools import cache, partial
 from itertools import chain
+from math import prod
 
 import numpy as np
 
@@ -24,6 +25,7 @@ __all__ = ["first_look", "local_maxima", "response", "size", "sweep"]
 Keep = Callable[[float, Callable[[], Solution]], Solution]
 Slope = Callable[[float], float]     # of the height with the frequency, at a solved one
 COARSE = 12     # intervals of the first look at a band
+PARABOLA = 3    # points that a start is extrapolated from
 BAND_LIMIT = 400    # points after which a sweep gives up refining
 
 
@@ -34,18 +36,18 @@ def size(solution: Solution, probe: int = 0) -> float:
 
 def response(model: ReducedModel, omegas: Iterable[float], H: int = 3, samples: int = 128, *,
              options: Options = DEFAULTS, keep: Keep = lambda omega, compute: compute()) -> Iterator[Solution]:
-    """Solve one point after the other, each started from the line through the last two.
+    """Solve one point after the other, each started from the curve through the last ones.
 
     Args:
         keep: is given each frequency and what solves it; see `bladefem.hbm.record`.
     """
     last: list[Solution] = []
     for omega in omegas:
-        start = _line(last, omega, H)
+        start = _ahead(last, omega, H)
         solution = keep(omega, partial(solve, model, omega, H, samples, start=start, options=options))
         yield solution
         if solution.converged:
-            last = [*last[-1:], solution]
+            last = [*last[-2:], solution]
 
 
 def sweep(model: ReducedModel, band: tuple[float, float], H: int = 3, samples: int = 128, *, peak: float = 1e-3,
@@ -150,14 +152,15 @@ def _corner_targets(omegas: np.ndarray, heights: np.ndarray, curve: float) -> It
             yield omegas[i + 1] + (right / 2 if right > left else -left / 2)
 
 
-def _line(last: list[Solution], omega: float, H: int) -> Solution | None:
-    """A start: the last solution, moved along the line through the last two."""
-    if not last:
-        return None
-    if len(last) == 1:
-        return last[0]
-    old, new = last
-    share = (omega - new.omega) / (new.omega - old.omega)
-    if abs(share) > 2:
+def _ahead(last: list[Solution], omega: float, H: int) -> Solution | None:
+    """A start: the last solution, moved along the line through the last two, or the parabola through the last three."""
+    if len(last) < 2:
+        return last[-1] if last else None
+    new, known = last[-1], last[-PARABOLA:]
+    if abs(omega - new.omega) > 2 * abs(new.omega - last[-2].omega):
         return new
-    return replace(new, w=new.w + share * (match_harmonics(new.w, H) - match_harmonics(old.w, H)))
+    w = np.zeros_like(match_harmonics(new.w, H))
+    for p in known:
+        share = prod((omega - other.omega) / (p.omega - other.omega) for other in known if other is not p)
+        w += share * match_harmonics(p.w, H)
+    return replace(new, w=w)

@@ -9,15 +9,17 @@ import numpy as np
 
 from ..errors import NotSolvedError
 from ..hbm.model import ReducedModel
+from ..hbm.newton import Options
 from ..hbm.resonance import free_resonances, stuck_resonances
 from ..hbm.solution import Solution
+from ..hbm.sticking import grips
 from ..hbm.sweep import size, sweep
 from .family import Family, member
-from .indicators import Indicators, grips, indicate, judge, moved
+from .indicators import Indicators, indicate, judge, moved
 from .settings import Settings, enriched
 
 __all__ = ["Checked", "adapted", "checked", "choose", "covered", "default_band", "estimated", "peak_of",
-           "response_points"]
+           "response_points", "sufficient"]
 
 ROUNDS = 12
 KEPT = ("modes", "damper")      # whose indicators, where they are small, outlast a change of the others
@@ -25,6 +27,7 @@ LIKELY = ((0.003, {"harmonics": 7, "samples": 256, "points": 16}),      # accura
           (0.03, {"harmonics": 3, "samples": 64, "points": 16}))
 PASSES = 3          # sweeps of one curve with ever richer settings
 WIDENINGS = 4
+EXTRA, NARROW = 2, 0.15     # points checked in gaps wider than this share of the frequencies at which contacts move
 SHARES = (0.7, 0.25)    # of the peak's height: where a curve is checked on each side beside the peak itself
 
 
@@ -161,7 +164,12 @@ def _replaced(old: Sequence[Solution], new: Sequence[Solution]) -> list[Solution
 
 
 def watched(points: Sequence[Solution]) -> list[Solution]:
-    """The points that a curve is checked at: the peak, then one on each flank for each of SHARES of its height."""
+    """The points that a curve is checked at.
+
+    The peak, one on each flank for each of SHARES of its height, the highest of the others at which contacts begin to
+    slip or to lift, since a short slip needs more samples than a long one, and EXTRA more in the widest gaps between
+    these where contacts move: internal resonances of higher harmonics keep to no height.
+    """
     good = [p for p in points if p.converged]
     heights = np.array([size(p) for p in good])
     top = int(heights.argmax())
@@ -170,7 +178,26 @@ def watched(points: Sequence[Solution]) -> list[Solution]:
         for side in (range(top), range(top + 1, len(good))):
             if len(side):
                 chosen.append(min(side, key=lambda i: abs(heights[i] - share * heights[top])))
+    kinds = [_kind(p) for p in good]
+    begin = {max(i, i + 1, key=kinds.__getitem__) for i in range(len(good) - 1) if kinds[i] != kinds[i + 1]}
+    chosen += sorted(begin - set(chosen), key=heights.__getitem__)[-1:]
+    places = np.array([p.omega for p in good])
+    moving = np.flatnonzero([any(kind) for kind in kinds] & (heights >= SHARES[-1] * heights[top]))
+    for _ in range(EXTRA if len(moving) > 2 else 0):
+        gaps = abs(places[moving, None] - places[chosen]).min(axis=1)
+        if gaps.max() > NARROW * np.ptp(places[moving]):
+            chosen.append(int(moving[gaps.argmax()]))
     return [good[i] for i in dict.fromkeys(chosen)]
+
+
+def _kind(point: Solution) -> tuple[bool, bool]:
+    """Whether contacts lift off, and whether they slip."""
+    return point.states["lift"] + point.states["open"] > 0, point.states["slip"] > 0
+
+
+def sufficient(accuracy: float) -> Options:
+    """When a point is accepted whose model may be wrong by the accuracy anyway."""
+    return Options(tolerance=float(np.clip(1e-3 * accuracy, 1e-10, 1e-6)), frugal=True)
 
 
 def checked(curve: Checked) -> np.ndarray:
@@ -232,7 +259,7 @@ def response_points(model: ReducedModel, settings: Settings, band: tuple[float, 
     """
     circular = (2 * np.pi * band[0], 2 * np.pi * band[1])
     swept = sweep(model, circular, settings.harmonics, settings.samples, peak=min(accuracy / 10, 1e-2),
-                  curve=0.2 if accuracy >= 1 else 0.02)
+                  curve=0.2 if accuracy >= 1 else 0.02, options=sufficient(accuracy))
     points = sorted(swept, key=lambda s: s.omega)
     if not any(p.converged for p in points):
         raise NotSolvedError(f"no point between {band[0]:.5g} and {band[1]:.5g} Hz was solved; "

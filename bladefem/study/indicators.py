@@ -25,18 +25,16 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from ..friction.harmonics import synthesis
 from ..hbm.api import solve
-from ..hbm.model import ReducedModel
 from ..hbm.newton import DEFAULTS, Options
 from ..hbm.solution import Solution
+from ..hbm.sticking import grips
 from .family import Family, carried, member
 from .settings import DAMPERS, DIRECTIONS, Settings
 
-__all__ = ["Indicators", "grips", "indicate", "judge", "moved", "richer"]
+__all__ = ["Indicators", "indicate", "judge", "moved", "richer"]
 
 ENOUGH = Options(1e-5, 30, fallbacks=False)     # for a point that only tells how wrong another one is
-GRIP = (512, 1e-3)              # instants at which full stick is confirmed, and the share of the limit kept in hand
 
 
 @dataclass(frozen=True)
@@ -112,20 +110,6 @@ def judge(family: Family, settings: Settings, solution: Solution) -> Indicators:
 def _poorer(settings: Settings, other: Settings, name: str) -> bool:
     """Whether the model that judges a respect has less of it, because there is no more."""
     return name in ("harmonics", "modes") and getattr(other, name) < getattr(settings, name)
-
-
-def grips(model: ReducedModel, solution: Solution) -> bool:
-    """All contacts stick, with a little of the friction limit in hand at every instant."""
-    if solution.states["stick"] < len(model.elements.kt):
-        return False
-    instants, spare = GRIP
-    force = solution.f @ synthesis(solution.harmonics, instants).T
-    tangents = model.elements.tangents
-    normal = force[:, 0] if model.directions > tangents else model.elements.n0[:, None]
-    if model.normal and model.directions == tangents:
-        normal = model.normal_series(instants)
-    pull = np.linalg.norm(force[:, -tangents:], axis=1)
-    return bool(np.all(pull < (1 - spare) * model.elements.mu[:, None] * normal))
 
 
 def richer(family: Family, settings: Settings, name: str) -> Settings | None:

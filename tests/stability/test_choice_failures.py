@@ -18,11 +18,12 @@ from bladefem.hbm.reference import reference_model
 from bladefem.hbm.residual import Balance
 from bladefem.hbm.resonance import free_resonances, stuck_resonances
 from bladefem.hbm.solution import Solution
+from bladefem.hbm.sticking import grips
 from bladefem.hbm.sweep import response, size, sweep
 from bladefem.study import indicators
 from bladefem.study.choice import Checked, adapted, choose, covered, estimated, peak_of
 from bladefem.study.family import family_of, member
-from bladefem.study.indicators import grips, indicate, richer
+from bladefem.study.indicators import indicate, richer
 from bladefem.study.settings import DIRECTIONS, Settings, first_for
 
 HZ = 2 * np.pi

@@ -41,7 +41,7 @@ def test_a_curve_tells_its_error_at_every_point():
     true = [abs(p.probe[1, 0] / solve(model, p.omega, 31, 2048).probe[1, 0] - 1) * size(p) / top for p in curve.points]
     assert max(true) < 0.02         # at every point, of the peak: measured 0.19 %
     assert len(told) == len(curve.points) and np.isfinite(told).all()
-    assert 3 <= checked(curve).sum() <= 5
+    assert 3 <= checked(curve).sum() <= 8
     assert curve.settings.error <= 0.01
 
 

@@ -1,0 +1,59 @@
+"""The automatic choice along a hundred frequencies, and points that stick with one harmonic."""
+
+import numpy as np
+import pytest
+
+from bladefem.hbm.api import solve
+from bladefem.hbm.newton import Options
+from bladefem.hbm.reference import reference_model
+from bladefem.hbm.resonance import free_resonances, stuck_resonances
+from bladefem.hbm.sweep import response, size
+from bladefem.study.along import along
+from bladefem.study.choice import peak_of, watched
+from bladefem.study.family import family_of
+from bladefem.study.settings import first_for
+
+
+@pytest.fixture(scope="module")
+def blade():
+    """Two contact points; between free and stuck resonance all but a few of the frequencies stick."""
+    return reference_model(1e6, 0.06, 8.0, phase=0.0, points=1, harmonics=63)
+
+
+@pytest.fixture(scope="module")
+def omegas(blade):
+    ends = [sorted((free_resonances(blade)[i], stuck_resonances(blade)[i])) for i in (0, 1)]
+    return {name: np.linspace(1.1 * low - 0.1 * high, 1.1 * high - 0.1 * low, 100)
+            for name, (low, high) in zip(("first", "second"), ends, strict=True)}
+
+
+@pytest.mark.parametrize("mode", ["first", "second"])
+@pytest.mark.parametrize("accuracy", [0.02, 0.001])
+def test_no_point_is_wrong(blade, omegas, mode, accuracy):
+    """In phasors over the peak, measured 4e-3 and 4e-4.
+
+    Round the second resonance slips that only begin were 3e-3 wrong at 0.1 %; round the first one a higher harmonic is
+    in resonance half way down the slipping stretch, which 7 harmonics miss by 1.2 %.
+    """
+    curve = along(family_of(blade, (1, 1)), omegas[mode], first_for(len(blade.side(1).omega)), accuracy)
+    truth = list(response(blade, omegas[mode], 31, 2048))
+    top = max(size(p) for p in truth)
+    assert [p.omega for p in curve.points] == list(omegas[mode])
+    assert all(p.converged for p in curve.points)
+    assert max(abs(p.probe[1, 0] - q.probe[1, 0]) for p, q in zip(curve.points, truth, strict=True)) < accuracy * top
+    assert all(error <= accuracy * top / size(p) for p in curve.points if (error := curve.errors.get(p.omega)))
+
+
+def test_the_first_slip_is_watched(blade, omegas):
+    points = list(response(blade, omegas["second"], 7, 256))
+    slips = [p.states["slip"] > 0 for p in points]
+    onset = [p for p, before, now in zip(points[1:], slips, slips[1:], strict=False) if now > before]
+    assert onset and all(p in watched(points) or p is peak_of(points) for p in onset)
+
+
+def test_points_that_stick_take_the_excited_harmonic_alone(blade, omegas):
+    frugal = Options(frugal=True)
+    for omega in [*omegas["second"][::9], *omegas["first"][::20]]:
+        lean, full = solve(blade, omega, 7, 256, options=frugal), solve(blade, omega, 7, 256)
+        assert (lean.harmonics == 1) == (full.states["stick"] == 2)
+        assert lean.probe[1, 0] == pytest.approx(full.probe[1, 0], rel=1e-9)
