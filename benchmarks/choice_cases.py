@@ -34,7 +34,6 @@ import sys
 import time
 from collections.abc import Iterator
 from dataclasses import dataclass
-from functools import lru_cache
 
 import numpy as np
 
@@ -144,15 +143,23 @@ def rich(case: Case) -> float:
     return time.process_time() - start
 
 
-def sweep_ratio(case: Case, accuracy: float, points: int = 100) -> tuple[float, float, float]:
-    """Time of the automatic choice over that of the rich model along a sweep; largest error told, and true ones.
-
-    Errors are in phasors over the highest point: told of the choice, true of the choice, true of the rich model.
-    """
+def swept(case: Case, points: int = 100) -> np.ndarray:
+    """Circular frequencies round the free and the stuck resonance next to a case [rad/s]."""
     free, stuck = free_resonances(case.model), stuck_resonances(case.model)
     near = min(range(len(free)), key=lambda i: abs(free[i] - case.omega))
     low, high = sorted((free[near], stuck[near]))
-    omegas = np.linspace(low - 0.1 * (high - low), high + 0.1 * (high - low), points)
+    return np.linspace(low - 0.1 * (high - low), high + 0.1 * (high - low), points)
+
+
+def sweep_ratio(case: Case, omegas: np.ndarray, truth: list[Solution],
+                accuracy: float) -> tuple[float, float, float, float]:
+    """Time of the automatic choice over that of the rich model along a sweep; largest error told, and true ones.
+
+    Errors are in phasors over the highest point: told of the choice, true of the choice, true of the rich model.
+
+    Args:
+        truth: every third point with the richest model.
+    """
     seconds, fixed = [], []
     for _ in range(3 if case.model.directions == 1 else 1):
         start = time.process_time()
@@ -162,16 +169,9 @@ def sweep_ratio(case: Case, accuracy: float, points: int = 100) -> tuple[float, 
         plain = list(response(case.model, omegas, *RICH))
         seconds.append(middle - start)
         fixed.append(time.process_time() - middle)
-    truth = truths(case.model, tuple(omegas))
     top = max(size(p) for p in truth if p.converged)
     told = max(error * size(p) / top for p in curve.points if (error := curve.errors.get(p.omega)))
     return min(seconds) / min(fixed), told, farthest(curve.points, truth, top), farthest(plain, truth, top)
-
-
-@lru_cache(maxsize=2)
-def truths(model: ReducedModel, omegas: tuple[float, ...]) -> list[Solution]:
-    """Every third point of a sweep with the richest model."""
-    return list(response(model, omegas[::3], *TRUTH))
 
 
 def farthest(points: list[Solution], truth: list[Solution], top: float) -> float:
@@ -210,8 +210,10 @@ def main(every: int = 1) -> None:
               f"{max(o.true for o in good):.2g}, time over the rich model: all {sum(spent) / sum(fixed):.2f}, beams "
               f"{sum(spent[:beams]) / sum(fixed[:beams]):.2f}, bodies {sum(spent[beams:]) / sum(fixed[beams:]):.2f}")
     for k in (len(cases) // 12, len(cases) * 2 // 5, len(cases) * 3 // 5, len(cases) * 7 // 10, len(cases) - 2):
+        omegas = swept(cases[k])
+        truth = list(response(cases[k].model, omegas[::3], *TRUTH))
         for accuracy in results:
-            ratio, told, true, plain = sweep_ratio(cases[k], accuracy)
+            ratio, told, true, plain = sweep_ratio(cases[k], omegas, truth, accuracy)
             print(f"sweep of 100 points, {cases[k].name}, accuracy {accuracy:g}: time over the rich model {ratio:.2f}, "
                   f"largest error told {told:.1e} of the peak, true {true:.1e}, of the rich model {plain:.1e}",
                   flush=True)
