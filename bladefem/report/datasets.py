@@ -9,12 +9,17 @@ import pandas as pd
 
 from .tables import units_of
 
-__all__ = ["datasets", "mode_shapes", "table_dataset"]
+__all__ = ["datasets", "mode_shapes", "resultants", "table_dataset"]
+
+MEANING = {"force": "contact force on the damper", "moment": "its moment about the engine's origin",
+           "centre": "force-weighted middle of the contact", "forces": "sum of the normal forces",
+           "areas": "whole face"}
 
 
 def datasets(result: Any, tables: dict[str, pd.DataFrame]) -> dict[str, Any]:
-    """Groups "modes", "contact", "points", "summary" of a finished run (study.pipeline.Run)."""
+    """Groups "modes", "contact", "resultants", "points", "summary" of a finished run (study.pipeline.Run)."""
     return {"modes": mode_shapes(result), "contact": _contact(result),
+            "resultants": resultants(tables["contact/pressure"]),
             "points": table_dataset(tables["response/points"], "point"),
             "summary": table_dataset(tables["response/summary"], "case")}
 
@@ -48,6 +53,27 @@ def _contact(result: Any) -> Any:
          "position": (("contact", "direction"), np.concatenate([m.patch.points for m in patches]), {"units": "m"}),
          "patch": ("contact", np.repeat([m.patch.name for m in patches], [len(m.force) for m in patches]))},
         {"load": ("load", list(maps), {"units": "N"}), "direction": ["x", "y", "z"]})
+
+
+def resultants(table: pd.DataFrame) -> Any:
+    """Force, moment, centre, area and peak pressure of each face under each load: the table's rows by (load, seat).
+
+    Args:
+        table: ``view.contact.pressure_summary`` with the load in front, one row a load and seat.
+    """
+    import xarray as xr
+    loads, seats = table["load"].unique(), table["patch"].unique()
+    units, data = units_of(table), {}
+    vectors = {name: [f"{name}_{axis}" for axis in "xyz"] for name in ("force", "moment", "centre")}
+    for name, columns in vectors.items():
+        values = table[columns].to_numpy().reshape(len(loads), len(seats), 3)
+        data[name] = (("load", "seat", "direction"), values, {"units": units[columns[0]], "long_name": MEANING[name]})
+    for name in table.columns.drop(["load", "patch", *(column for some in vectors.values() for column in some)]):
+        data["normal_force" if name == "force" else name] = (
+            ("load", "seat"), table[name].to_numpy().reshape(len(loads), len(seats)),
+            {"units": units.get(name, "1"), "long_name": MEANING.get(f"{name}s", name.replace("_", " "))})
+    return xr.Dataset(data, {"load": ("load", loads, {"units": "N"}), "seat": list(seats),
+                             "direction": ["x", "y", "z"]})
 
 
 def table_dataset(table: pd.DataFrame, rows: str) -> Any:

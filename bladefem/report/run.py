@@ -21,7 +21,7 @@ from ..progress import Progress, unwatched
 from ..reduction.assemble import folded_diameter
 from ..scene import Scene
 from ..scene_file import dump
-from ..store import on_root, write_results
+from ..store import on_root, write_results, write_table
 from ..study import pipeline
 from ..study.limits import Limit
 from ..study.loads import summary
@@ -29,8 +29,17 @@ from ..study.modal import family_table
 from ..study.state_check import state_sentence
 from ..view import contact, mesh, modes, response, speed
 from .datasets import datasets, table_dataset
-from .nodes import cycles_of, draw_hysteresis, draw_wear, loop_table, node_table, save_cycles_vtu
-from .tables import write_tables
+from .nodes import (
+    cycles_of,
+    draw_hysteresis,
+    draw_wear,
+    loop_table,
+    node_table,
+    save_cycles_vtu,
+    wear_sentence,
+    wear_table,
+)
+from .tables import units_of, write_tables
 from .write import write_report
 
 __all__ = ["run", "write_run"]
@@ -55,13 +64,14 @@ def write_run(result: pipeline.Run, comm: Any = None, progress: Progress = unwat
 
 def _write(result: pipeline.Run, progress: Progress) -> None:
     folder = result.folder
-    tables = _tables(result)
+    patches, cycles = list(result.contact.problem.patches), cycles_of(result)
+    coefficient = result.scene.contact.wear_coefficient
+    worn = coefficient is not None
+    tables = {**_tables(result), **({"contact/wear": wear_table(patches, cycles, coefficient)} if worn else {})}
     for name, table in tables.items():
         write_tables(table, folder / name.split("/")[1], name.split("/")[1])
-    patches, cycles = list(result.contact.problem.patches), cycles_of(result)
-    nodes = node_table(patches, cycles)
-    loops = loop_table(cycles)
-    nodes.to_csv(folder / "nodes.csv", index=False)
+    nodes, loops = node_table(patches, cycles, coefficient), loop_table(cycles)
+    write_table(folder / "nodes.csv", nodes, units_of(nodes))
     loops.to_csv(folder / "hysteresis.csv", index=False)
     groups = {**datasets(result, tables), "nodes": table_dataset(nodes, "row"),
               "hysteresis": table_dataset(loops, "row")}
@@ -76,8 +86,9 @@ def _write(result: pipeline.Run, progress: Progress) -> None:
     mesh.save_vtu(result.mesh, folder / "mesh.vtu")
     modes.save_modes_vtu(result.mesh, excited_modes(result), folder / "modes.vtu")
     contact.save_pressure_vtu(result.contact.maps, folder / "pressure.vtu")
-    save_cycles_vtu(patches, cycles, folder / "friction_work.vtu")
-    messages = [*result.messages, _static_contact(result), _states(result), *_beyond_stick(result)]
+    save_cycles_vtu(patches, cycles, folder / "friction_work.vtu", coefficient)
+    messages = [*result.messages, _static_contact(result), _states(result), *_beyond_stick(result),
+                *([wear_sentence(cycles, coefficient)] if worn else [])]
     write_report(folder, result.scene, tables, figures, messages, result.timings)
 
 

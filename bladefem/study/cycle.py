@@ -35,10 +35,19 @@ class ContactCycle:
 
     load: float             # [N]
     mass: float | None      # of the damper [kg]
+    frequency: float        # of the resonance [Hz]
     shares: np.ndarray      # (nodes, 3) share of the period in stick, slip and separation [1]
     state: np.ndarray       # (nodes,) SEPARATED, STICK, PARTIAL_SLIP or GROSS_SLIP of friction.aft
     work: np.ndarray        # (nodes,) friction work a period and area, the wear-work map [J/m^2]
     loops: dict[str, Loop]  # name of the patch to its hysteresis
+
+    def wear(self, coefficient: float) -> np.ndarray:
+        """(nodes,) depth worn off in an hour of this resonance [m], both faces together.
+
+        The worn volume is the coefficient [m^3/J] times the friction work (Fouvry, Kapsa, Vincent, Wear 200, 1996):
+        Archard's law, whose coefficient for each newton of pressure and metre of slip is mu times as much.
+        """
+        return 3600.0 * self.frequency * coefficient * self.work
 
 
 def contact_cycle(case: LoadCase, curve: Curve, patches: Sequence[Patch], points: int | None) -> ContactCycle:
@@ -57,7 +66,7 @@ def contact_cycle(case: LoadCase, curve: Curve, patches: Sequence[Patch], points
     forces = evaluate(elements, w, curve.peak.samples or 512, jacobian=False)
     starts = np.cumsum([0] + [len(patch.area) for patch in patches])
     rows = [np.unique(groups[a:b]) for a, b in pairwise(starts)]
-    return ContactCycle(case.load, case.mass, forces.shares[groups], forces.state[groups],
+    return ContactCycle(case.load, case.mass, curve.peak.frequency, forces.shares[groups], forces.state[groups],
                         (forces.dissipated / np.bincount(groups, area))[groups],
                         {patch.name: _loop(elements, w, some) for patch, some in zip(patches, rows, strict=True)})
 

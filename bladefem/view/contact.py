@@ -34,19 +34,21 @@ def contact_centre(seat: PressureMap) -> np.ndarray:
 def pressure_summary(seats: Sequence[PressureMap]) -> pd.DataFrame:
     """One row a patch: resultant, peak and mean pressure, pressed share of the area, contact centre, moment, proof.
 
-    The moment is that of the forces on the damper about the engine's origin, in the blade's axes [N m].
+    Force (vector) and moment about the engine's origin are those on the damper, in the blade's axes [N, N m].
     """
     rows = []
     for seat in seats:
         pressed = seat.force > 1e-9 * max(seat.force.max(initial=0.0), 1e-300)
         area = float(seat.patch.area[pressed].sum())
-        (x, y, z), moment = contact_centre(seat), resultant(seat).moment
+        (x, y, z), total = contact_centre(seat), resultant(seat)
+        (fx, fy, fz), moment = total.force, total.moment
         rows.append({"patch": seat.patch.name, "nodes": len(seat.force), "force": float(seat.force.sum()),
                      "peak_pressure": float(seat.pressure.max(initial=0.0)),
                      "mean_pressure": float(seat.force.sum()) / area if area > 0 else 0.0,
                      "area": float(seat.patch.area.sum()), "contact_share": area / float(seat.patch.area.sum()),
-                     "centre_x": x, "centre_y": y, "centre_z": z, "moment_x": moment[0], "moment_y": moment[1],
-                     "moment_z": moment[2], "complementarity": seat.complementarity})
+                     "centre_x": x, "centre_y": y, "centre_z": z, "force_x": fx, "force_y": fy, "force_z": fz,
+                     "moment_x": moment[0], "moment_y": moment[1], "moment_z": moment[2],
+                     "complementarity": seat.complementarity})
     return pd.DataFrame(rows)
 
 

@@ -8,7 +8,7 @@ import pytest
 from bladefem.data import Elements, Patch
 from bladefem.friction.aft import GROSS_SLIP, STICK
 from bladefem.friction.closed_form import circular_orbit_work
-from bladefem.report.nodes import draw_wear, node_table, save_cycles_vtu
+from bladefem.report.nodes import draw_wear, node_table, save_cycles_vtu, wear_sentence, wear_table
 from bladefem.study.cycle import contact_cycle
 from bladefem.study.joint import LoadCase
 from bladefem.view.response import loop_energy
@@ -36,7 +36,7 @@ def orbits(radius: np.ndarray, directions: int) -> np.ndarray:
 def at_resonance(radius: np.ndarray, directions: int, joined: int | None):
     patches = [strip("this", 0.0), strip("next", 1.0)]
     elements = Elements(np.full(16, KT), np.full(16, KT), np.full(16, MU), np.full(16, N), 2)
-    peak = SimpleNamespace(w=orbits(radius, directions), samples=64)
+    peak = SimpleNamespace(w=orbits(radius, directions), samples=64, frequency=250.0)
     curve = SimpleNamespace(settings=SimpleNamespace(points=joined), peak=peak)
     return patches, contact_cycle(LoadCase(8 * N, elements, None), curve, patches, None)
 
@@ -78,7 +78,8 @@ def test_hysteresis_of_a_patch_is_the_loop_of_its_springs():
     elements = Elements(np.full(16, KT), np.full(16, KT), np.full(16, MU), np.full(16, N), 2)
     w = np.zeros((16, 3, 7))
     w[:8, 1, 1], w[:8, 2, 1], w[8:, 2, 2] = 1.8 * MU * N / KT, 2.4 * MU * N / KT, 0.5 * MU * N / KT
-    curve = SimpleNamespace(settings=SimpleNamespace(points=None), peak=SimpleNamespace(w=w, samples=64))
+    peak = SimpleNamespace(w=w, samples=64, frequency=250.0)
+    curve = SimpleNamespace(settings=SimpleNamespace(points=None), peak=peak)
     loops = contact_cycle(LoadCase(8 * N, elements, None), curve, patches, None).loops
     sliding, stuck = loops["this"], loops["next"]
     limit = 8 * MU * N
@@ -86,3 +87,24 @@ def test_hysteresis_of_a_patch_is_the_loop_of_its_springs():
     assert abs(sliding.displacement).max() == pytest.approx(3 * MU * N / KT, rel=1e-12)
     assert abs(sliding.force).max() == pytest.approx(limit, rel=0.02)        # the corners of 63 harmonics
     np.testing.assert_allclose(stuck.force, 8 * KT * stuck.displacement, atol=1e-9 * limit)
+
+
+def test_wear_is_archards_law_on_circular_orbits(tmp_path):
+    """Depth in an hour: k_Archard pressure times sliding path, 2 pi sqrt(r^2 - (mu N / k_t)^2) a period at 250 Hz."""
+    import pyvista
+    radius = np.r_[np.full(8, 0.5), np.full(8, 3.0)] * MU * N / KT
+    patches, cycle = at_resonance(radius, 3, None)
+    archard = 3e-15                                     # m^3 for each newton and metre
+    path = 2 * np.pi * np.sqrt(np.clip(radius**2 - (MU * N / KT)**2, 0, None))
+    exact = archard * N / 1e-6 * path * 250.0 * 3600
+    np.testing.assert_allclose(cycle.wear(archard / MU), exact, rtol=1e-10, atol=1e-20)
+    table = node_table(patches, [cycle], archard / MU)
+    np.testing.assert_allclose(table["wear_per_hour"], exact, rtol=1e-10, atol=1e-20)
+    assert "wear_per_hour" not in node_table(patches, [cycle])
+    faces = wear_table(patches, [cycle], archard / MU)
+    assert list(faces["patch"]) == ["this", "next"] and faces["largest_wear"][0] == pytest.approx(0, abs=1e-20)
+    assert faces["largest_wear"][1] == pytest.approx(faces["mean_wear"][1]) == pytest.approx(exact[-1])
+    assert faces["wear_volume"][1] == pytest.approx(8e-6 * exact[-1])
+    assert f"up to {1e6 * exact[-1]:.3g} µm in an hour" in wear_sentence([cycle], archard / MU)
+    grid = pyvista.read(save_cycles_vtu(patches, [cycle], tmp_path / "work.vtu", archard / MU))
+    np.testing.assert_allclose(grid["wear in an hour [m] at 80 N"], exact, rtol=1e-10, atol=1e-20)

@@ -58,8 +58,8 @@ def test_maps_name_methods_and_cross_failures(folder):
     ("wedge sector", "aerofoil", "aerofoil", {"section"}),
     ("wedge sector", "platform", "platform", {"length"}), ("wedge sector", "platform", "damper", {"mass"}),
     ("wedge sector", "sector", "disc", set()), ("plane blades", "plane", "plane", {"damper_mass"}),
-    ("z mass", "z_mass", "z_mass", set()), ("hertz", "hertz", "hertz", {"dimension"}),
-    ("punch", "punch", "punch", {"dimension"})])
+    ("z mass", "z_mass", "z_mass", set()), ("hertz", "hertz", "hertz", {"dimension", "interference"}),
+    ("punch", "punch", "punch", {"dimension", "interference"})])
 def test_drawings_label_every_parameter(kind, part, table, skipped, folder):
     scene = Scene(kind=kind)
     figure = PARTS[kind][part](scene, folder / f"{part}.png")
