@@ -185,7 +185,7 @@ def _response(scene: Scene, cases: list[LoadCase], family: Callable[[LoadCase], 
         band = min(c.frequency[0] for c in curves), max(c.frequency[-1] for c in curves)
         rich = member(family(cases[-1]), settings).model
         limits = linear_limits(rich, scene.excitation.mode, band)
-    clock.messages.extend(_remarks(scene, settings, curves))
+    clock.messages.extend(_remarks(scene, settings, curves, -(-len(cases[0].elements.kt) // 2)))
     return Response(settings, curves, limits)
 
 
@@ -266,9 +266,9 @@ def reduced_sector(scene: Scene, bodies: Bodies, case: LoadCase, patches: list[P
         settings = more
 
 
-def _remarks(scene: Scene, settings: Settings, curves: list[Curve]) -> list[str]:
-    """What a reader of the results has to know."""
-    remarks = [settings.sentence()]
+def _remarks(scene: Scene, settings: Settings, curves: list[Curve], nodes: int) -> list[str]:
+    """What a reader of the results has to know; ``nodes`` are the contact points of a seat."""
+    remarks = [settings.sentence(nodes)]
     if scene.model.static == "uncoupled":
         remarks.append("mean displacements held as the static contact solution left them (model.static)")
     lost = sum(int((~c.converged).sum()) for c in curves)

@@ -29,13 +29,17 @@ class Settings:
     error: float | None = None      # relative, of the resonance amplitude; None before the check, inf: unknown
     chosen: tuple[str, ...] = ()    # names that are chosen here and not by the user
 
-    def sentence(self) -> str:
-        """The settings in words."""
+    def sentence(self, nodes: int | None = None) -> str:
+        """The settings in words; ``nodes`` are those that a seat has, where known."""
         error = "not estimated" if self.error is None else f"estimated error {100 * self.error:.2g} %"
         if self.error == inf:
             error = "error unknown: richer models were not solved"
         kind = "chosen: " + ", ".join(self.chosen) if self.chosen else "all given by the scene"
         points = "all contact points" if self.points is None else f"up to {self.points} contact points on each seat"
+        if nodes is not None:
+            some = self.points is not None and self.points < nodes
+            points = f"{self.points} of {nodes} contact points on each seat" if some else \
+                f"all {nodes} contact points of each seat"
         return (f"model: {self.modes} modes, {self.harmonics} harmonics, {self.samples} samples, {points}, "
                 f"{self.damper} damper ({error}; {kind})")
 

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -14,7 +16,7 @@ from bladefem.study.choice import adapted, checked, choose, estimated, peak_of
 from bladefem.study.family import carried, coarsened, family_of, member
 from bladefem.study.joint import LoadCase
 from bladefem.study.loads import curve_of
-from bladefem.study.settings import enriched, first_for
+from bladefem.study.settings import Settings, enriched, first_for
 
 
 @pytest.mark.parametrize("accuracy", [0.02, 0.001])
@@ -82,3 +84,11 @@ def test_a_response_reports_told_against_tolerated_error_at_each_point():
     assert curve.converged.all()
     assert (curve.estimated < curve.tolerated).all()
     assert curve.checked[curve.frequency == curve.peak_frequency].all()
+
+
+def test_settings_tell_how_many_contact_points_there_are():
+    settings = Settings(10, 7, 64, "rigid", points=64)
+    assert "up to 64 contact points" in settings.sentence()
+    assert "all 23 contact points of each seat" in settings.sentence(23)
+    assert "64 of 81 contact points on each seat" in settings.sentence(81)
+    assert "all 23 contact points" in replace(settings, points=None).sentence(23)
