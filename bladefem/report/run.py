@@ -134,9 +134,17 @@ def _tables(result: pipeline.Run) -> dict[str, pd.DataFrame]:
             "modes/modes": family_table(excited_modes(result), result.mesh),
             "modes/nodal_diameters": mode_table(result.modes, result.mesh),
             "contact/pressure": pressure,
+            **_own_load(result),
             "response/summary": pd.DataFrame(summary(curves, result.response.limits)),
             "response/points": pd.concat([*map(points_of, curves), *map(linear_points, result.response.limits)],
                                          ignore_index=True)}
+
+
+def _own_load(result: pipeline.Run) -> dict[str, pd.DataFrame]:
+    """The load that the damper's own mass makes at the operating speed, where it makes any."""
+    own = result.contact.own
+    return {} if own is None else {"contact/own_load": pd.DataFrame({
+        "mass": [result.contact.problem.mass], "speed": [result.scene.operation.speed], "load": [own]})}
 
 
 def _by_mass(points: pd.DataFrame) -> list[tuple[str, pd.DataFrame]]:

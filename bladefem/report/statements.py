@@ -17,7 +17,7 @@ class Answer(NamedTuple):
     cautions: list[str]
 
 
-def answer(summary: pd.DataFrame | None, points: pd.DataFrame | None = None) -> Answer:
+def answer(summary: pd.DataFrame | None, points: pd.DataFrame | None = None, own: pd.DataFrame | None = None) -> Answer:
     """The best load and what it brings, from a summary table; cautions where that answer stands on weak ground.
 
     Args:
@@ -25,6 +25,7 @@ def answer(summary: pd.DataFrame | None, points: pd.DataFrame | None = None) -> 
             optionally mass [kg], dissipated or dissipated_energy [J], friction_damping [1], reduction (free over
             damped amplitude), unconverged (number of points).
         points: response table, for the check that the peak lies inside the band.
+        own: one row: mass [kg] of the damper, its speed [rad/s], the load [N] of a seat by that mass alone.
     """
     if summary is None or summary.empty:
         return Answer([], [])
@@ -32,14 +33,41 @@ def answer(summary: pd.DataFrame | None, points: pd.DataFrame | None = None) -> 
     if finite.empty:
         return Answer([], ["No damper load was studied."])
     best = finite.loc[finite["peak_amplitude"].idxmin()]
-    numbers = [("optimum normal load per seat", f"{best['load']:.4g} N", mass_of(best)),
+    numbers = [("optimum normal load per seat", f"{best['load']:.4g} N", mass_of(best) or among(finite, best)),
                ("resonance amplitude there", f"{1e6 * best['peak_amplitude']:.4g} µm", reduction(summary, best)),
                ("resonance frequency there", f"{best['peak_frequency']:.5g} Hz", shift(summary, best))]
     if np.isfinite(best.get("friction_damping", np.nan)):
         numbers.append(("friction damping ratio there", f"{100 * best['friction_damping']:.3g} %", energy(best)))
     elif energy(best):
         numbers.append(("friction work per cycle there", energy(best).split(" of ")[0], ""))
-    return Answer(numbers, cautions(finite, best, points))
+    return Answer([*numbers, *own_mass(finite, best, own)], cautions(finite, best, points))
+
+
+def among(finite: pd.DataFrame, best: pd.Series) -> str:
+    """How close the loads beside the best one are, and where a parabola through the three has its lowest point."""
+    table = finite.sort_values("load", ignore_index=True)
+    i = int(np.flatnonzero(table["load"] == best["load"])[0])
+    if not 0 < i < len(table) - 1:
+        return f"best of {len(table)}"
+    x, y = (np.log(table[name].iloc[i - 1:i + 2].to_numpy()) for name in ("load", "peak_amplitude"))
+    a, b, _ = np.polyfit(x - x[1], y, 2)
+    return f"best of {len(table)}; a parabola through it and its neighbours has its lowest point at " \
+           f"{best['load'] * np.exp(-b / (2 * a)):.3g} N"
+
+
+def own_mass(finite: pd.DataFrame, best: pd.Series, own: pd.DataFrame | None) -> list[tuple[str, str, str]]:
+    """What the damper does as it is, pressed by its own mass, and which mass would press it best."""
+    if own is None or "mass" in finite or len(finite) < 2:
+        return []
+    mass, speed, load = own[["mass", "speed", "load"]].iloc[0]
+    table = finite.sort_values("load")
+    there = "outside the loads studied"
+    if table["load"].iloc[0] <= load <= table["load"].iloc[-1]:
+        between = np.interp(np.log(load), np.log(table["load"]), np.log(table["peak_amplitude"]))
+        there = f"resonance amplitude about {1e6 * np.exp(between):.2g} µm, between the loads studied"
+    return [("load of a seat by the damper's own mass", f"{load:.4g} N",
+             f"{1e3 * mass:.3g} g at {speed * 30 / np.pi:.5g} rpm; {there}"),
+            ("mass that makes the optimum load", f"{1e3 * mass * best['load'] / load:.3g} g", "at the same speed")]
 
 
 def mass_of(best: pd.Series) -> str:

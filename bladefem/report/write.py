@@ -83,7 +83,8 @@ def contents(scene: Scene, tables: Mapping[str, pd.DataFrame], figures: Mapping[
     if len(doubtful):
         shown["accuracy/loads with doubtful points"] = doubtful
     total = sum(timings.values())
-    return {"title": scene.title, "kind": scene.kind, "answer": answer(tables.get("response/summary"), points),
+    found = answer(tables.get("response/summary"), points, tables.get("contact/own_load"))
+    return {"title": scene.title, "kind": scene.kind, "answer": found,
             "inputs": resolved(scene, given), "mark": "changed" if given is None else "given",
             "statements": statements, "messages": messages, "versions": versions(),
             "timings": [(name, t, t / total if total else 0.0) for name, t in timings.items()], "total": total,

@@ -80,6 +80,18 @@ def test_answer_names_the_optimum():
     assert found.cautions == []
 
 
+def test_answer_says_which_mass_would_press_best():
+    """Loads 100, 200, 400 N with amplitudes 4, 1, 4 in logarithms: the lowest point of the parabola is the middle."""
+    summary = pd.DataFrame({"load": [100.0, 200.0, 400.0], "peak_amplitude": [4e-5, 1e-5, 4e-5],
+                            "peak_frequency": [880.0, 890.0, 900.0]})
+    own = pd.DataFrame({"mass": [0.012], "speed": [800.0], "load": [np.sqrt(2) * 200.0]})
+    found = answer(summary, None, own).numbers
+    assert found[0][2] == "best of 3; a parabola through it and its neighbours has its lowest point at 200 N"
+    assert found[-2][1:] == ("282.8 N",
+                             "12 g at 7639.4 rpm; resonance amplitude about 20 µm, between the loads studied")
+    assert found[-1][1] == "8.49 g"
+
+
 def test_answer_warns_at_the_edge_of_loads_band_and_convergence():
     few = synthetic.summary().query("20 <= load <= 400").iloc[-1:]
     more = synthetic.summary().query("400 <= load <= 800")
