@@ -77,8 +77,11 @@ def resultants(table: pd.DataFrame) -> Any:
 
 
 def table_dataset(table: pd.DataFrame, rows: str) -> Any:
-    """The columns of a table as variables with units along one dimension."""
+    """The columns of a table as variables with units along one dimension; "drift x [m/s]" becomes drift_x in m/s."""
     import xarray as xr
-    units = units_of(table)
-    return xr.Dataset({name: (rows, column.to_numpy(dtype=str) if column.dtype == object else column.to_numpy(),
-                              {"units": units.get(name, "1")}) for name, column in table.items()})
+    units, data = units_of(table), {}
+    for name, column in table.items():
+        plain, _, unit = str(name).rstrip("]").partition(" [")
+        values = column.to_numpy(dtype=str) if column.dtype == object else column.to_numpy()
+        data["_".join(plain.replace(",", "").split())] = (rows, values, {"units": unit or units.get(name, "1")})
+    return xr.Dataset(data)

@@ -20,7 +20,7 @@ from bladefem.view import contact, indentation, mesh
 from geometry.mesh import Mesh
 from geometry.quality import quality_rows
 
-from .datasets import table_dataset
+from .datasets import resultants, table_dataset
 from .tables import write_tables
 from .write import write_report
 
@@ -88,14 +88,24 @@ def _points(result: PairRun) -> pd.DataFrame:
         ignore_index=True)
 
 
+def _resultants(states: list[PairState]) -> pd.DataFrame:
+    """One row a load: force, moment, centre, area and peak of the meshed quarter, or half in the plane."""
+    table = contact.pressure_summary([s.seat for s in states])
+    table.insert(0, "load", [s.load for s in states])
+    return table
+
+
 def _write(scene: Scene, result: PairRun) -> None:
     folder, states = result.folder, result.states
     tables = {"mesh/quality": pd.DataFrame(quality_rows(result.mesh), columns=["what", "value"]),
-              "contact/summary": pair_summary(states), "contact/points": _points(result)}
+              "contact/summary": pair_summary(states), "contact/points": _points(result),
+              "contact/resultants_of_the_meshed_part": _resultants(states)}
     for name, table in tables.items():
         write_tables(table, folder / name.split("/")[1], name.split("/")[1])
-    write_results(folder / "results.nc", {"summary": table_dataset(tables["contact/summary"], "load_case"),
-                                          "points": table_dataset(tables["contact/points"], "point")}, dump(scene))
+    write_results(folder / "results.nc", {
+        "summary": table_dataset(tables["contact/summary"], "load_case"),
+        "resultants": resultants(tables["contact/resultants_of_the_meshed_part"]),
+        "points": table_dataset(tables["contact/points"], "point")}, dump(scene))
     figures = {name: folder / f"{name.split('/')[1]}.png" for name in ("mesh/mesh", "contact/pressure")}
     mesh.draw_mesh(result.mesh, figures["mesh/mesh"], title=scene.title)
     _draw(scene, result, figures["contact/pressure"])

@@ -14,10 +14,12 @@ import pandas as pd
 from bladefem.damper.loops import Drive, Steady, spectrum
 from bladefem.damper.zmass import MassOnFoundation
 from bladefem.scene import Scene
-from bladefem.store import on_root
-from bladefem.study.zmass import Pressed, mass_on_foundation, motions, press
+from bladefem.scene_file import dump
+from bladefem.store import on_root, write_results
+from bladefem.study.zmass import Pressed, mass_on_foundation, mean_load, motions, press
 from bladefem.view import contact, mesh, paper
 
+from .datasets import resultants, table_dataset
 from .tables import write_tables
 from .write import write_report
 
@@ -88,7 +90,12 @@ def _write(scene: Scene, result: MassRun) -> None:
                                           "response/motion": motion_table(result.motions)}
     for name, table in tables.items():
         write_tables(table, folder / name.split("/")[1], name.split("/")[1])
-    contact.pressure_points([seat]).to_csv(folder / "pressure_points.csv", index=False)
+    points, load = contact.pressure_points([seat]), mean_load(scene)
+    points.to_csv(folder / "pressure_points.csv", index=False)
+    write_results(folder / "results.nc", {
+        "resultants": resultants(tables["contact/pressure"].assign(load=load)), "nodes": table_dataset(points, "node"),
+        "motion": table_dataset(tables["response/motion"], "case")}, dump(scene))
+    contact.save_pressure_vtu({load: [seat]}, folder / "pressure.vtu")
     names = ("mesh/mesh", "contact/pressure_on_the_footprint", "response/loops", "response/spectra")
     figures = {name: folder / f"{name.split('/')[1]}.png" for name in names}
     mesh.draw_mesh(result.pressed.mesh, figures["mesh/mesh"], title=scene.title)

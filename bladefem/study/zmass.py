@@ -31,7 +31,7 @@ from ..store import stage
 from .keys import zmass_key
 from .stages import build_mesh
 
-__all__ = ["Pressed", "drives", "mass_on_foundation", "motions", "press"]
+__all__ = ["Pressed", "drives", "mass_on_foundation", "mean_load", "motions", "press"]
 
 DENOMINATOR = 1000      # largest of a frequency ratio
 

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 import pandas as pd
 from matplotlib.cm import ScalarMappable
-from matplotlib.colors import Normalize
+from matplotlib.colors import ListedColormap, Normalize
 from matplotlib.tri import Triangulation
 
 from bladefem.contact.summary import resultant
@@ -18,10 +18,11 @@ from bladefem.data import Patch, PressureMap
 from .skin import split_faces
 from .style import COLOURS, canvas, headline
 
-__all__ = ["contact_centre", "draw_pressure", "pressure_points", "pressure_summary", "save_faces_vtu",
-           "save_pressure_vtu", "unfold"]
+__all__ = ["OPEN", "PRESSURE_COLOURS", "arrangement", "colour_pressure", "contact_centre", "draw_pressure",
+           "pressure_points", "pressure_summary", "save_faces_vtu", "save_pressure_vtu", "seat_name", "unfold"]
 
 PRESSURE_COLOURS = "inferno_r"
+OPEN = "#e6e6e6"                     # faces that nothing presses
 VTK_FACES = {2: 3, 3: 5, 4: 9}       # corners of a face: VTK's number for line, triangle, quadrilateral
 
 
@@ -116,40 +117,48 @@ def draw_pressure(seats: Sequence[PressureMap], file: str | Path | None = None, 
     """
     peak = max([float(seat.pressure.max(initial=0.0)) for seat in seats] + [1e-6]) / 1e6
     line = seats[0].patch.faces.shape[1] == 2
-    width, height = np.ptp(unfold(seats[0].patch), axis=0)
-    # Long faces one below the other, others side by side.
-    stacked = not line and width > 1.3 * height
-    shape = (len(seats), 1) if stacked else (1, len(seats))
-    size = (7.4, 0.9 + len(seats) * (1.2 + 5.2 * height / width)) if stacked else (4.0 * len(seats) + 0.8, 4.2)
+    shape, size = arrangement([seat.patch for seat in seats])
+    stacked = shape[0] > 1
     with canvas(file, size=size, grid=shape, squeeze=False, sharex=stacked, sharey=True) as axes:
         for ax, seat in zip(axes.flat, seats, strict=True):
             (draw_line if line else draw_face)(ax, seat, peak)
-            ax.set_title(caption(seat), fontsize=9, fontweight="normal")
+            ax.set_title(caption(seat, ", " if stacked else ",\n"), fontsize=9, fontweight="normal")
         figure = axes[0, 0].figure
         if not line:
             figure.colorbar(ScalarMappable(Normalize(0, peak), PRESSURE_COLOURS), ax=list(axes.flat), aspect=25,
-                            label="contact pressure [MPa]")
+                            pad=0.02, label="contact pressure [MPa]")
         axes[-1, 0].set_xlabel("along the face [mm]" if line else "along the engine axis [mm]")
         figure.legend(*axes[0, 0].get_legend_handles_labels(), loc="outside lower center", ncols=3)
         headline(figure, title or "contact pressure" + ("" if line else ", faces unfolded"))
         return figure
 
 
-def caption(seat: PressureMap) -> str:
+def arrangement(patches: Sequence[Patch]) -> tuple[tuple[int, int], tuple[float, float]]:
+    """Rows and columns of a picture of faces, and its size [inch]: long faces one below the other, others abreast."""
+    width, height = np.ptp(unfold(patches[0]), axis=0)
+    count, line = len(patches), patches[0].faces.shape[1] == 2
+    if line or width <= 1.3 * height:
+        return (1, count), (4.0 * count + 0.8, 4.2)
+    return (count, 1), (7.4, 1.1 + count * (0.75 + 5.4 * height / width))
+
+
+def seat_name(patch: Patch) -> str:
+    """What an engineer calls the seat of a patch."""
+    names = {"this": "right seat (this)", "next": "left seat of the next blade (next)"}
+    return names.get(patch.name, f'seat "{patch.name}"')
+
+
+def caption(seat: PressureMap, between: str = ",\n") -> str:
     """Resultant, peak and pressed share of one face."""
     row = pressure_summary([seat]).iloc[0]
-    return (f"seat \"{seat.patch.name}\": {row.force:.4g} N, peak {row.peak_pressure / 1e6:.3g} MPa,\n"
+    return (f"{seat_name(seat.patch)}: {row.force:.4g} N, peak {row.peak_pressure / 1e6:.3g} MPa{between}"
             f"{100 * row.contact_share:.0f} % of {1e6 * row.area:.3g} mm² pressed")
 
 
 def draw_face(ax: Any, seat: PressureMap, peak: float) -> None:
     """One face in its plane: pressure in colour, nodes as dots, peak and centre marked."""
-    xy = 1e3 * unfold(seat.patch)
-    corners = seat.patch.faces.shape[1]
-    triangles = split_faces(seat.patch.faces, corners).reshape(-1, 3)
-    pressure = seat.pressure / 1e6
-    flat = Triangulation(xy[:, 0], xy[:, 1], triangles)
-    ax.tripcolor(flat, pressure, shading="gouraud", cmap=PRESSURE_COLOURS, vmin=0, vmax=peak, rasterized=True)
+    xy, pressure = 1e3 * unfold(seat.patch), seat.pressure / 1e6
+    colour_pressure(ax, xy, seat, Normalize(0, peak))
     open_nodes = seat.force <= 0
     ax.plot(*xy[~open_nodes].T, ".", color="#ffffff", ms=1.5, alpha=0.5)
     ax.plot(*xy[open_nodes].T, "o", mfc="none", mec="#888888", ms=2.5, mew=0.5, label="open node")
@@ -158,6 +167,18 @@ def draw_face(ax: Any, seat: PressureMap, peak: float) -> None:
     ax.plot(*centre, "P", mfc=COLOURS[5], mec="black", ms=8, label="centre of the force")
     ax.set(ylabel="outwards [mm]", aspect="equal")
     ax.grid(False)
+
+
+def colour_pressure(ax: Any, xy: np.ndarray, seat: PressureMap, norm: Normalize) -> bool:
+    """Pressure [MPa] in colour over xy (n, 2); grey where no corner of a face is pressed, which is returned."""
+    triangles = split_faces(seat.patch.faces, seat.patch.faces.shape[1]).reshape(-1, 3)
+    closed = (seat.force[triangles] > 0).any(axis=1)
+    flat = Triangulation(*xy.T, triangles)
+    ax.tripcolor(flat, np.zeros(len(triangles)), cmap=ListedColormap([OPEN]), rasterized=True)
+    if closed.any():
+        flat.set_mask(~closed)
+        ax.tripcolor(flat, seat.pressure / 1e6, shading="gouraud", cmap=PRESSURE_COLOURS, norm=norm, rasterized=True)
+    return not closed.all()
 
 
 def draw_line(ax: Any, seat: PressureMap, peak: float) -> None:

@@ -9,12 +9,11 @@ from typing import Any
 import numpy as np
 from matplotlib.cm import ScalarMappable
 from matplotlib.colors import Normalize
-from matplotlib.tri import Triangulation
+from matplotlib.patches import Patch
 
 from bladefem.data import PressureMap
 
-from .contact import PRESSURE_COLOURS
-from .skin import split_faces
+from .contact import OPEN, PRESSURE_COLOURS, colour_pressure
 from .style import COLOURS, canvas, headline
 
 __all__ = ["draw_indentation"]
@@ -38,26 +37,33 @@ def draw_indentation(seats: dict[float, PressureMap], radius: np.ndarray, exact:
     flat = seats[largest].patch.faces.shape[1] == 2
     with canvas(file, None, (5.6, 4.0) if flat else (9.6, 4.0), (1, 1 if flat else 2), squeeze=False) as axes:
         if not flat:
-            _from_above(axes[0, 0], seats[largest], edge)
+            _from_above(axes[0, 0], seats[largest], edge, 1.5 * _inner(seats[largest], radius, edge))
             axes[0, 0].set_title(f"load {largest:.5g} N, meshed quarter", fontsize=9, fontweight="normal")
         _over_radius(axes[0, -1], seats, radius, exact, edge)
         axes[0, -1].set_xlabel("distance from the middle [mm]" if flat else "distance from the axis [mm]")
+        axes[0, 0].figure.get_layout_engine().set(wspace=0.06)
         headline(axes[0, 0].figure, title or "contact pressure")
         return axes[0, 0].figure
 
 
-def _from_above(ax: Any, seat: PressureMap, edge: float) -> None:
-    xy, faces = 1e3 * seat.patch.points[:, :2], seat.patch.faces
-    triangles = split_faces(faces, faces.shape[1]).reshape(-1, 3)
-    norm = Normalize(0, seat.pressure.max() / 1e6)
-    ax.tripcolor(Triangulation(*xy.T, triangles), seat.pressure / 1e6, shading="gouraud", cmap=PRESSURE_COLOURS,
-                 norm=norm, rasterized=True)
+def _inner(seat: PressureMap, radius: np.ndarray, edge: float) -> float:
+    """Largest pressure [Pa] that is no singularity of an edge."""
+    return float(seat.pressure[radius < 0.9 * edge].max())
+
+
+def _from_above(ax: Any, seat: PressureMap, edge: float, most: float) -> None:
+    peak = float(seat.pressure.max())
+    norm = Normalize(0, min(peak, most) / 1e6)
+    opened = colour_pressure(ax, 1e3 * seat.patch.points[:, :2], seat, norm)
+    handles: list[Any] = [Patch(color=OPEN, label="open")] if opened else []
     turn = np.linspace(0, np.pi / 2, 60)
-    ax.plot(1e3 * edge * np.cos(turn), 1e3 * edge * np.sin(turn), "--", color=COLOURS[5], label="edge, closed form")
-    ax.figure.colorbar(ScalarMappable(norm, PRESSURE_COLOURS), ax=ax, label="contact pressure [MPa]", aspect=25)
+    handles += ax.plot(1e3 * edge * np.cos(turn), 1e3 * edge * np.sin(turn), "--", color=COLOURS[5],
+                       label="edge, closed form")
+    ax.figure.colorbar(ScalarMappable(norm, PRESSURE_COLOURS), ax=ax, label="contact pressure [MPa]", aspect=25,
+                       extend="max" if peak > most else "neither")
     ax.set(xlabel="x [mm]", ylabel="y [mm]", aspect="equal")
     ax.grid(False)
-    ax.legend(loc="upper right")
+    ax.legend(handles=handles, loc="upper right")
 
 
 def _over_radius(ax: Any, seats: dict[float, PressureMap], radius: np.ndarray, exact: Callable[[float], Curve],
@@ -68,6 +74,6 @@ def _over_radius(ax: Any, seats: dict[float, PressureMap], radius: np.ndarray, e
         ax.plot(1e3 * r, p / 1e6, "-", color="black", lw=1, zorder=1, label="" if i else "closed form")
         ax.plot(1e3 * radius[order], seat.pressure[order] / 1e6, "o", ms=2.5, color=COLOURS[i % len(COLOURS)],
                 label=f"finite elements, {load:.5g} N")
-    inner = max(seat.pressure[radius < 0.9 * edge].max() for seat in seats.values())
+    inner = max(_inner(seat, radius, edge) for seat in seats.values())
     ax.set(ylabel="contact pressure [MPa]", xlim=(0, 1e3 * radius.max()), ylim=(0, 1.5 * inner / 1e6))
     ax.legend()

@@ -13,14 +13,15 @@ from matplotlib.tri import Triangulation
 
 from bladefem.data import Patch
 
-from .contact import unfold
+from .contact import arrangement, seat_name, unfold
 from .skin import split_faces
 from .style import COLOURS, canvas, headline
 
 __all__ = ["draw_work"]
 
 WORK_COLOURS = "inferno_r"
-MARKS = {0: ("o", "separated"), 1: ("s", "stuck"), 2: ("^", "slips up to half of its contact time"), 3: (".", "slips")}
+MARKS = {0: ("o", "separated"), 1: ("s", "stuck"), 2: ("^", "slips up to half of its contact time"),
+         3: ("D", "slips longer")}
 
 
 def draw_work(patches: Sequence[Patch], work: np.ndarray, state: np.ndarray, file: str | Path | None = None, *,
@@ -35,19 +36,17 @@ def draw_work(patches: Sequence[Patch], work: np.ndarray, state: np.ndarray, fil
     cuts = np.cumsum([len(p.area) for p in patches])[:-1]
     parts = list(zip(patches, np.split(work, cuts), np.split(state, cuts), strict=True))
     line, most = patches[0].faces.shape[1] == 2, max(float(work.max(initial=0.0)), 1e-300)
-    width, height = np.ptp(unfold(patches[0]), axis=0)
-    stacked = not line and width > 1.3 * height
-    shape = (len(parts), 1) if stacked else (1, len(parts))
-    size = (7.4, 0.9 + len(parts) * (1.2 + 5.2 * height / width)) if stacked else (4.0 * len(parts) + 0.8, 4.2)
+    shape, size = arrangement(patches)
+    stacked = shape[0] > 1
     with canvas(file, size=size, grid=shape, squeeze=False, sharex=stacked, sharey=True) as axes:
         for ax, (patch, w, s) in zip(axes.flat, parts, strict=True):
             (_line if line else _face)(ax, patch, w, s, most)
             total = 1e3 * float(w @ patch.area)
-            ax.set_title(f'seat "{patch.name}": {total:.3g} mJ a period', fontsize=9, fontweight="normal")
+            ax.set_title(f"{seat_name(patch)}: {total:.3g} mJ a period", fontsize=9, fontweight="normal")
         figure = axes[0, 0].figure
         if not line:
             figure.colorbar(ScalarMappable(Normalize(0, most), WORK_COLOURS), ax=list(axes.flat), aspect=25,
-                            label="friction work [J/m²]")
+                            pad=0.02, label="friction work [J/m²]")
         axes[-1, 0].set_xlabel("along the face [mm]" if line else "along the engine axis [mm]")
         named = {label: handle for ax in axes.flat for handle, label in zip(*ax.get_legend_handles_labels(),
                                                                            strict=True)}
@@ -63,7 +62,8 @@ def _face(ax: Any, patch: Patch, work: np.ndarray, state: np.ndarray, most: floa
                  vmax=most, rasterized=True)
     for code, (mark, label) in MARKS.items():
         if (state == code).any():
-            ax.plot(*xy[state == code].T, mark, mfc="none", mec=COLOURS[code], ms=3, mew=0.7, ls="", label=label)
+            ax.plot(*xy[state == code].T, mark, mfc="white", mec=COLOURS[code], ms=4, mew=1, ls="", label=label,
+                    clip_on=False)
     ax.set(ylabel="outwards [mm]", aspect="equal")
     ax.grid(False)
 

@@ -11,6 +11,7 @@ from bladefem.damper.loops import Drive, steady
 from bladefem.damper.zmass import Footprint, MassOnFoundation
 from bladefem.errors import InputError
 from bladefem.scene_file import load_scene
+from bladefem.store import read_results
 from bladefem.study.zmass import clusters, drives, mass_on_foundation, motions, press
 
 SCENE = load_scene("scenes/zmass.toml", ["mesh.size=7 mm"])
@@ -102,3 +103,7 @@ def test_scene_drives_the_motion(tmp_path, monkeypatch):
     text = (tmp_path / "motion.csv").read_text()
     assert "1/2" in text and "loops" in text
     assert (tmp_path / "report.html").stat().st_size > 100_000
+    assert (tmp_path / "pressure.vtu").stat().st_size > 3_000
+    face = read_results(tmp_path / "results.nc", "resultants").sel(load=50.0, seat="this")
+    assert float(face["normal_force"]) == pytest.approx(50.0, rel=1e-6) and face["normal_force"].attrs["units"] == "N"
+    assert read_results(tmp_path / "results.nc", "motion")["drift_x"].attrs["units"] == "m/s"

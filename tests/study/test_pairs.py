@@ -7,6 +7,7 @@ import pytest
 from bladefem.cli.main import main
 from bladefem.errors import InputError
 from bladefem.scene_file import load_scene
+from bladefem.store import read_results
 from bladefem.study.hertz import hertz_load, hertz_radius
 from bladefem.study.pairs import solve_pair
 
@@ -82,6 +83,9 @@ def test_commands_leave_a_run_folder(command, scene, options, tmp_path, capsys):
     assert {"pressure [Pa]", "pressure_exact [Pa]", "radius [m]"} <= set(points)
     pressed = np.isfinite(points["pressure_exact [Pa]"]) & (points["radius [m]"] < 6e-4)
     assert np.allclose(points["pressure [Pa]"][pressed], points["pressure_exact [Pa]"][pressed], rtol=0.05)
+    face = read_results(tmp_path / "results.nc", "resultants").isel(seat=0)
+    part = face["normal_force"].to_numpy()          # of the half in the plane
+    np.testing.assert_allclose(part, face["load"] / 2, rtol=1e-9)
     for name in ("mesh.png", "pressure.png", "report.html", "report.md", "results.nc", "pressure.vtu", "scene.toml"):
         assert (tmp_path / name).stat().st_size > 500, name
 
