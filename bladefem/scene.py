@@ -112,6 +112,8 @@ class Study:
     masses: tuple[float, ...] | None = quantity(None, "kg", 1e-5, 10.0, "damper masses; the scene's own when left out")
     band: tuple[float, float] | None = quantity(None, "Hz", 0.0, 1e6,
                                                 "frequency band; from the free to the stuck resonance when left out")
+    stability: bool = quantity(False, help="also Floquet multipliers of the points of each curve, where normal loads "
+                                           "follow the motion")
 
 
 @dataclass(frozen=True)

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -13,14 +12,14 @@ from bladefem.damper.branch import state_of
 from bladefem.damper.direct import direct
 from bladefem.hbm.api import solve
 from bladefem.hbm.in_time import time_system
-from bladefem.hbm.model import ReducedModel
 from bladefem.hbm.shooting import harmonics, multipliers, periodic
 from bladefem.study.row import whole_model
+from bladefem.study.stability import in_one_body
 
 from .claim import Claim
 from .paper_blades import BANDS, LOADS, MASSES, model_of, row_and_scene
 
-__all__ = ["following", "in_one_body", "in_time"]
+__all__ = ["following", "in_time"]
 
 STEPS, TOLERANCE = 1024, 1e-6       # of the explicit march
 UNSTABLE = 1.001                    # largest multiplier; 1 where a contact sticks all the time
@@ -74,12 +73,3 @@ def following(loads: tuple[float, ...] = (4.0, 20.0, 100.0)) -> Iterator[Claim]:
                 "balance with 9 harmonics: " + "; ".join(told) + ". Points that always stick may carry any mean force "
                 "that they can hold, so that not all digits need to agree",
                 "fails" if worst > 0.01 else "holds in part" if largest > UNSTABLE else "holds")
-
-
-def in_one_body(model: ReducedModel) -> ReducedModel:
-    """One body for all harmonics, without residual flexibility: what can be integrated in time.
-
-    The blades are clamped and move in phase, so that all harmonics have the same body already.
-    """
-    side = model.side(1)
-    return replace(model, sides=(replace(side, shapes=side.shapes.real, residual=0 * side.residual.real),))

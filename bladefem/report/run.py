@@ -172,7 +172,9 @@ def points_of(curve: Any) -> pd.DataFrame:
                          "residual": curve.residual, "iterations": curve.iterations, "slipping": curve.slipping,
                          "dissipated": curve.dissipated, "imbalance": curve.imbalance,
                          "estimated_error": curve.estimated, "tolerated_error": curve.tolerated,
-                         "error_checked": curve.checked})
+                         "error_checked": curve.checked,
+                         **({"stability": curve.stability, "multiplier": curve.multiplier} if any(curve.stability)
+                            else {})})
 
 
 def linear_points(limit: Limit) -> pd.DataFrame:

@@ -74,6 +74,7 @@ COLUMNS = {
     "error": Column("relative error", "1", digits=2),
     "estimated_error": Column("estimated error", "1", "%", 100.0, 2),
     "tolerated_error": Column("tolerated error", "1", "%", 100.0, 3), "error_checked": Column("error checked here"),
+    "stability": Column("stability"), "multiplier": Column("largest Floquet multiplier", "1", digits=6),
     "effective_mass": Column("effective mass", "kg", digits=4),
     "share": Column("share", "1", "%", 100.0, 3), "factor": Column("participation", "kg^1/2", digits=4),
 }

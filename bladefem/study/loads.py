@@ -20,6 +20,7 @@ from .joint import LoadCase
 from .liftoff import named
 from .limits import Limit
 from .settings import Settings, restarted
+from .stability import Stability, stability_of
 
 Keep = Callable[[LoadCase, Callable[[], Any]], Any]
 
@@ -51,6 +52,8 @@ class Curve:
     estimated: np.ndarray       # (k,) estimated relative error of the first harmonic
     tolerated: np.ndarray       # (k,) the same as wanted: the scene's accuracy times peak over amplitude
     checked: np.ndarray         # (k,) bool: estimated at this very point; else between its neighbours
+    stability: np.ndarray       # (k,) "unique", "stable", "unstable", "unknown", or "" where it was not asked for
+    multiplier: np.ndarray      # (k,) largest modulus of the Floquet multipliers; NaN where not computed
     peak: Solution              # the highest converged point
 
     @property
@@ -102,7 +105,11 @@ def curve_of(scene: Scene, case: LoadCase, family: Callable[[LoadCase], Family],
     heights = np.array([size(p) for p in curve.points])
     tolerated = scene.accuracy * size(top) / np.maximum(heights, 1e-6 * size(top))
     columns = (np.array(c) for c in zip(*map(_record, curve.points), strict=True))
-    return Curve(case.load, case.mass, curve.settings, *columns, estimated(curve), tolerated, checked(curve), top)
+    marks = Stability(np.full(len(heights), ""), np.full(len(heights), np.nan))
+    if scene.study.stability:
+        marks = stability_of(member(models, curve.settings).model, curve.points)
+    return Curve(case.load, case.mass, curve.settings, *columns, estimated(curve), tolerated, checked(curve),
+                 marks.verdict, marks.multiplier, top)
 
 
 def _record(p: Solution) -> tuple[object, ...]:

@@ -34,6 +34,7 @@ from .limits import Limit, linear_limits
 from .loads import Curve, default_loads, study_loads
 from .ports import named_nodes
 from .settings import DAMPERS, Settings, enriched, first_settings
+from .stability import stability_sentence
 from .stages import (
     Bodies,
     Reduced,
@@ -271,6 +272,8 @@ def _remarks(scene: Scene, settings: Settings, curves: list[Curve], nodes: int) 
     remarks = [settings.sentence(nodes)]
     if scene.model.static == "uncoupled":
         remarks.append("mean displacements held as the static contact solution left them (model.static)")
+    if scene.study.stability:
+        remarks.append(stability_sentence([(c.stability, c.multiplier) for c in curves]))
     lost = sum(int((~c.converged).sum()) for c in curves)
     if lost:
         remarks.append(f"{lost} of {sum(len(c.frequency) for c in curves)} response points did not converge; they are "

@@ -43,6 +43,10 @@ def draw_responses(points: pd.DataFrame, file: str | Path | None = None, *, ax: 
         failed = points[~points["converged"].astype(bool)]
         if len(failed):
             draw_failed(ax, failed)
+        if "stability" in points and (points["stability"] == "unstable").any():
+            unstable = points[points["stability"] == "unstable"]
+            ax.plot(unstable["frequency"], MICRO * unstable["amplitude"], "s", mfc="white", mec=FAILED, ms=4.5, mew=1.2,
+                    zorder=5, label=f"unstable ({len(unstable)})")
         ax.set(xlabel="excitation frequency [Hz]", ylabel="vibration amplitude [µm]",
                title=title or "forced response")
         ax.margins(x=0.01)

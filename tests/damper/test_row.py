@@ -13,9 +13,9 @@ from bladefem.hbm.in_time import time_system
 from bladefem.hbm.resonance import free_resonances
 from bladefem.hbm.shooting import harmonics, multipliers, periodic
 from bladefem.hbm.sweep import response, size
-from bladefem.report.paper_time import in_one_body
 from bladefem.scene_file import load_scene
 from bladefem.study.row import paper_model, row_of_blades, whole_model
+from bladefem.study.stability import in_one_body
 
 SOFT = load_scene("scenes/plane.toml", ["contact.kt=1e6 N/m"])
 
