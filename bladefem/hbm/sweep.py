@@ -154,10 +154,11 @@ def _corner_targets(omegas: np.ndarray, heights: np.ndarray, curve: float) -> It
 
 def _ahead(last: list[Solution], omega: float, H: int) -> Solution | None:
     """A start: the last solution, moved along the line through the last two, or the parabola through the last three."""
-    if len(last) < 2:
+    if len(last) < 2 or last[-1].harmonics < H:     # fewer: all contacts stick, and will be looked at like that first
         return last[-1] if last else None
     new, known = last[-1], last[-PARABOLA:]
-    if abs(omega - new.omega) > 2 * abs(new.omega - last[-2].omega):
+    apart = {p.omega for p in known}
+    if len(apart) < len(known) or abs(omega - new.omega) > 2 * abs(new.omega - last[-2].omega):
         return new
     w = np.zeros_like(match_harmonics(new.w, H))
     for p in known:
