@@ -127,7 +127,10 @@ def draw_pressure(seats: Sequence[PressureMap], file: str | Path | None = None, 
         if not line:
             figure.colorbar(ScalarMappable(Normalize(0, peak), PRESSURE_COLOURS), ax=list(axes.flat), aspect=25,
                             pad=0.02, label="contact pressure [MPa]")
-        axes[-1, 0].set_xlabel("along the face [mm]" if line else "along the engine axis [mm]")
+        for ax in axes[-1]:
+            ax.set_xlabel("along the face [mm]" if line else "along the engine axis [mm]")
+        for ax in axes[:, 1:].flat:
+            ax.set_ylabel("")
         figure.legend(*axes[0, 0].get_legend_handles_labels(), loc="outside lower center", ncols=3)
         headline(figure, title or "contact pressure" + ("" if line else ", faces unfolded"))
         return figure
