@@ -194,7 +194,7 @@ def _drawings(result: pipeline.Run, tables: dict[str, pd.DataFrame]) -> dict[str
         "modes/first_modes": lambda file: modes.draw_mode_sheet(
             geometry, excited, file, families=list(tables["modes/modes"]["family"])),
         "contact/pressure_on_both_seats": lambda file: contact.draw_pressure(
-            result.contact.maps[middle], file, title=f"normal load {middle:g} N per seat"),
+            result.contact.maps[middle], file, title=f"contact pressure under {middle:g} N per seat"),
         **{name: partial(response.draw_responses, points) for name, points in _by_mass(tables["response/points"])},
         "response/optimum": lambda file: response.draw_optimum(
             tables["response/summary"], file, points=tables["response/points"], own=result.contact.own)}
