@@ -26,6 +26,7 @@ from ..study import pipeline
 from ..study.limits import Limit
 from ..study.loads import summary
 from ..study.modal import family_table
+from ..study.stability import UNIQUE
 from ..study.state_check import state_sentence
 from ..view import contact, mesh, modes, response, speed
 from .datasets import datasets, table_dataset
@@ -136,8 +137,13 @@ def _tables(result: pipeline.Run) -> dict[str, pd.DataFrame]:
             "contact/pressure": pressure,
             **_own_load(result),
             "response/summary": pd.DataFrame(summary(curves, result.response.limits)),
-            "response/points": pd.concat([*map(points_of, curves), *map(linear_points, result.response.limits)],
-                                         ignore_index=True)}
+            "response/points": _joined([*map(points_of, curves), *map(linear_points, result.response.limits)])}
+
+
+def _joined(parts: list[pd.DataFrame]) -> pd.DataFrame:
+    """Response points of all curves; the linear limits have one motion each."""
+    points = pd.concat(parts, ignore_index=True)
+    return points.fillna({"stability": UNIQUE}) if "stability" in points else points
 
 
 def _own_load(result: pipeline.Run) -> dict[str, pd.DataFrame]:

@@ -269,7 +269,7 @@ def reduced_sector(scene: Scene, bodies: Bodies, case: LoadCase, patches: list[P
 
 def _remarks(scene: Scene, settings: Settings, curves: list[Curve], nodes: int) -> list[str]:
     """What a reader of the results has to know; ``nodes`` are the contact points of a seat."""
-    remarks = [settings.sentence(nodes)]
+    remarks = [settings.sentence(nodes), settings.method]
     if scene.model.static == "uncoupled":
         remarks.append("mean displacements held as the static contact solution left them (model.static)")
     if scene.study.stability:

@@ -89,6 +89,8 @@ def test_a_response_reports_told_against_tolerated_error_at_each_point():
 def test_settings_tell_how_many_contact_points_there_are():
     settings = Settings(10, 7, 64, "rigid", points=64)
     assert "up to 64 contact points" in settings.sentence()
+    assert "method: balance of harmonics by Newton" in settings.method
+    assert "equivalent linearisation" in replace(settings, harmonics=1).method
     assert "all 23 contact points of each seat" in settings.sentence(23)
     assert "64 of 81 contact points on each seat" in settings.sentence(81)
     assert "all 23 contact points" in replace(settings, points=None).sentence(23)
