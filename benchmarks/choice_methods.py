@@ -1,0 +1,86 @@
+"""Is another method ever faster than the sampled balance by Newton, where it is as accurate? On the 68 choice cases.
+
+    python benchmarks/choice_methods.py [every]
+
+Each method takes each case with rising harmonics or steps until the first harmonic at the probe is right to 2 %, 0.1 %
+and 0.001 %; the CPU time of the cheapest that is enough, over that of the cheapest sampled balance that is enough.
+The truth is H 63 with 16384 samples. Starts are cold.
+
+Measured: MEASURED
+"""
+
+from __future__ import annotations
+
+import sys
+import time
+from collections.abc import Callable, Iterator
+
+import numpy as np
+from choice_cases import Case, beam_cases, random_cases
+
+from bladefem.hbm.api import solve
+from bladefem.study.methods import Point, applicable, balance, integrated, paper, shooting, tangential
+
+WANTED = (0.02, 1e-3, 1e-5)
+HARMONICS, SAMPLES = (1, 3, 7, 15, 31), (64, 128, 256, 512, 1024, 4096)
+Run = Callable[[object, float, object], Point]
+
+
+def ways(case: Case) -> dict[str, list[Run]]:
+    """Methods that take a case, each from cheap to dear."""
+    if case.model.elements.tangents > 1:
+        return {}
+    found = {"exact events": [balance(H, 0) for H in HARMONICS]}
+    if not applicable(case.model):
+        found |= {"the paper's iteration": [paper(H, averaged=True) for H in (1, 3)], "shooting": [shooting],
+                  "Newmark": [integrated(steps, explicit=False) for steps in (64, 256)],
+                  "explicit steps": [integrated(steps, explicit=True) for steps in (512, 2048)]}
+    return found
+
+
+def spent(case: Case, run: Run, truth: complex) -> tuple[float, float]:
+    """CPU seconds, better of two, and error."""
+    seconds = []
+    for _ in range(2):
+        start = time.process_time()
+        point = run(tangential(case.model), case.omega, None)
+        seconds.append(time.process_time() - start)
+    return min(seconds), abs(point.first / truth - 1) if point.converged else np.inf
+
+
+def cheapest(trials: Iterator[tuple[float, float]]) -> dict[float, float]:
+    """Seconds for each wanted accuracy; infinite where no trial has it."""
+    trials = list(trials)
+    return {wanted: min((s for s, error in trials if error <= wanted), default=np.inf) for wanted in WANTED}
+
+
+def main(every: int = 1) -> None:
+    cases = [*beam_cases(), *random_cases()][::every]
+    ratios: dict[str, dict[float, list[float]]] = {}
+    alone = 0
+    for k, case in enumerate(cases):
+        others = ways(case)
+        if not others:
+            alone += 1
+            continue
+        truth = complex(solve(case.model, case.omega, 63, 16384).probe[1, 0])
+        sampled = [balance(H, samples) for H in HARMONICS for samples in SAMPLES if samples >= 8 * H + 8]
+        if k == 0:
+            spent(case, sampled[0], truth)      # compile
+            spent(case, others["exact events"][0], truth)
+        base = cheapest(spent(case, run, truth) for run in sampled)
+        for name, runs in others.items():
+            own = cheapest(spent(case, run, truth) for run in runs)
+            for wanted in WANTED:
+                ratios.setdefault(name, {}).setdefault(wanted, []).append(own[wanted] / base[wanted])
+    print(f"{alone} cases that no other method takes")
+    for name, found in ratios.items():
+        for wanted, values in found.items():
+            good = np.array([v for v in values if np.isfinite(v)])
+            print(f"{name:22s} {wanted:7g}: enough in {len(good)} of {len(values)}"
+                  + (f", times the balance {good.min():.2f} to {good.max():.0f}, median {np.median(good):.1f}"
+                     if len(good) else ""), flush=True)
+
+
+if __name__ == "__main__":
+    main(int(sys.argv[1]) if len(sys.argv) > 1 else 1)
