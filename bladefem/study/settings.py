@@ -35,6 +35,8 @@ class Settings:
         kind = "balance of harmonics"
         if self.harmonics == 1:
             kind = "equivalent linearisation, which is the balance of one harmonic and whose error the next ones tell,"
+        if self.samples == 0:
+            return f"method: {kind} by Newton, slip and lift-off located exactly, as the scene asks for"
         return (f"method: {kind} by Newton with friction sampled, because no other method is faster where it is as "
                 "accurate")
 

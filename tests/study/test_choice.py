@@ -91,6 +91,7 @@ def test_settings_tell_how_many_contact_points_there_are():
     assert "up to 64 contact points" in settings.sentence()
     assert "method: balance of harmonics by Newton" in settings.method
     assert "equivalent linearisation" in replace(settings, harmonics=1).method
+    assert "located exactly" in replace(settings, samples=0).method
     assert "all 23 contact points of each seat" in settings.sentence(23)
     assert "64 of 81 contact points on each seat" in settings.sentence(81)
     assert "all 23 contact points" in replace(settings, points=None).sentence(23)
