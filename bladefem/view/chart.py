@@ -12,8 +12,10 @@ from .labels import names_apart
 from .response import draw_accuracy
 from .style import canvas
 
-__all__ = ["draw_chart"]
+__all__ = ["draw_chart", "draw_errors"]
 
+ERRORS = {"error": "resonance amplitude", "error_frequency": "resonance frequency",
+          "error_phasor": "worst phasor over the highest one"}
 LABELS = {"meshes": ("CPU time from drawing the mesh to the resonance", "amplitude or frequency, the larger")}
 
 
@@ -44,4 +46,32 @@ def draw_chart(tables: Mapping[str, pd.DataFrame], file: str | Path | None = Non
             ax.set(xlabel=f"{spent} [s]", ylabel=f"relative error of the {of} [1]")
         for ax in axes[:, 0]:
             names_apart(ax)
+        return axes[0, 0].figure
+
+
+def draw_errors(tables: Mapping[str, pd.DataFrame], file: str | Path | None = None, *,
+                tolerance: float | None = None, title: str = "") -> object:
+    """The three errors of the tables side by side over time, a row a table; returns the figure.
+
+    Args:
+        tables, file, tolerance, title: as for ``draw_chart``; what a table does not know leaves its place empty.
+    """
+    size = (5.2 * len(ERRORS) + 1.6, 4.0 * len(tables) + 0.4)
+    with canvas(file, None, size, (len(tables), len(ERRORS)), squeeze=False) as axes:
+        for row, (what, table) in zip(axes, tables.items(), strict=True):
+            for ax, (column, of) in zip(row, ERRORS.items(), strict=True):
+                if column not in table or not (table[column] > 0).any():
+                    ax.set_axis_off()
+                    continue
+                least = table.loc[table[column] > 0, column].min()
+                shown = table.assign(error=table[column].clip(lower=least))[~table["left_out"]]
+                draw_accuracy(shown, ax=ax, tolerance=tolerance if column != "error_frequency" else None, title=of)
+                spent = LABELS.get(what, ("CPU time for each frequency", ""))[0]
+                ax.set(xlabel=f"{spent} [s]", ylabel=f"{title}: {what}, relative error [1]" if title else
+                       f"{what}, relative error [1]")
+                if ax is not row[-1]:
+                    ax.get_legend().remove()
+        for ax in axes.flat:
+            if ax.axison:
+                names_apart(ax)
         return axes[0, 0].figure
