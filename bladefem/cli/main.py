@@ -1,6 +1,6 @@
 """The command ``bladefem``: arguments, exit codes, and what happens when something goes wrong.
 
-Exit codes: 0 done, 1 not solved, 2 bad input, 130 interrupted.
+Exit codes: 0 done, 1 not solved, 2 bad input, 130 interrupted, 143 ended by SIGTERM.
 """
 
 from __future__ import annotations
@@ -21,7 +21,7 @@ _EXAMPLES = """examples:
   bladefem run scenes/wedge.toml -o runs/wedge              everything, with report and figures
   bladefem run runs/wedge --set contact.mu=0.2              again from a run folder: finished stages are kept
 
-exit codes: 0 done, 1 not solved, 2 bad input, 130 interrupted"""
+exit codes: 0 done, 1 not solved, 2 bad input, 130 interrupted, 143 ended by SIGTERM"""
 
 # command: (what it does, example, function)
 _COMMANDS = {

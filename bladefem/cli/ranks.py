@@ -8,8 +8,8 @@ import signal
 import sys
 import time
 import traceback
-from collections.abc import Callable
-from contextlib import suppress
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager, suppress
 from typing import Any
 
 from ..errors import InputError, NotSolvedError
@@ -36,9 +36,12 @@ def communicator() -> Any:
 
 def guarded(action: Callable[[Any], None], options: argparse.Namespace) -> int:
     """The exit code of an action that gets the communicator; errors are told on rank 0."""
+    with _interruptible() as stopped:
+        return _guarded(action, stopped)
+
+
+def _guarded(action: Callable[[Any], None], stopped: list[int]) -> int:
     comm = None
-    with suppress(ValueError):      # only a main thread may; a batch system's SIGTERM then cleans up like Ctrl-C
-        signal.signal(signal.SIGTERM, signal.default_int_handler)
     try:
         comm = communicator()
         meeting = comm.Dup() if comm else None
@@ -47,8 +50,10 @@ def guarded(action: Callable[[Any], None], options: argparse.Namespace) -> int:
     except BrokenPipeError:
         return _flush()
     except KeyboardInterrupt:
-        return _tell(comm, "interrupted; finished stages are kept, the same command goes on after them", 130)
+        return _stopped(comm, stopped)
     except Exception as error:
+        if stopped:         # a library made an error of its own out of the interrupt
+            return _stopped(comm, stopped)
         code, text = _sentence(error)
         if comm is None:
             return _tell(None, text, code)
@@ -76,6 +81,33 @@ def _sentence(error: Exception) -> tuple[int, str]:
 
 _INSTALLED = {"dolfinx", "petsc4py", "slepc4py", "mpi4py", "gmsh", "pyvista", "matplotlib", "numba", "xarray", "h5py",
               "h5netcdf", "pandas", "tqdm", "meshio", "jinja2", "scipy", "numpy"}
+
+
+@contextmanager
+def _interruptible() -> Iterator[list[int]]:
+    """The signals that came; a batch system's SIGTERM cleans up like Ctrl-C, to which background jobs stay deaf."""
+    stopped, before = [], {}
+
+    def stop(number: int, _: Any) -> None:
+        stopped.append(number)
+        raise KeyboardInterrupt
+
+    with suppress(ValueError):      # only a main thread may
+        for number in (signal.SIGTERM, signal.SIGINT):
+            if number == signal.SIGTERM or signal.getsignal(number) is signal.default_int_handler:
+                before[number] = signal.signal(number, stop)
+    try:
+        yield stopped
+    finally:
+        for number, handler in before.items():
+            signal.signal(number, handler)
+
+
+def _stopped(comm: Any, signals: list[int]) -> int:
+    """Ctrl-C, or the end that a batch system asks for: 128 plus the signal's number, as shells have it."""
+    ended = signal.SIGTERM in signals
+    return _tell(comm, f"{'ended by SIGTERM' if ended else 'interrupted'}; finished stages are kept, the same command "
+                       "goes on after them", 143 if ended else 130)
 
 
 def _tell(comm: Any, text: str, code: int) -> int:

@@ -30,7 +30,7 @@ class Bridge:
     factor: Factorised
     rows: int                   # of the Schur complement
     answers: list[Answer]       # the one in use; empty between solves
-    raised: list[Exception]     # an exception cannot pass through C: it waits here
+    raised: list[BaseException]     # an exception, Ctrl-C too, cannot pass through C: it waits here
     callback: object            # keeps the C function alive
 
 
@@ -48,7 +48,7 @@ def bridge(factor: Factorised, n: int) -> Bridge | None:
     The Schur complement inside PETSc is destroyed: copy it first.
     """
     answers: list[Answer] = []
-    raised: list[Exception] = []
+    raised: list[BaseException] = []
 
     def answer(_: int, right: int, left: int) -> int:
         try:
@@ -56,7 +56,7 @@ def bridge(factor: Factorised, n: int) -> Bridge | None:
             petsc_call("MatGetSize", left, ctypes.byref(rows), ctypes.byref(columns))
             r = _array(left, (columns.value, rows.value)).T
             r[:] = answers[-1](r)
-        except Exception as error:
+        except BaseException as error:
             raised.append(error)
         return 0
 

@@ -230,8 +230,8 @@ sys.exit(main(["modes", "scenes/wedge.toml", "-o", sys.argv[1]]))
 """
 
 
-@pytest.mark.parametrize("sent", [signal.SIGINT, signal.SIGTERM])
-def test_an_interrupt_keeps_the_finished_stages(sent, tmp_path):
+@pytest.mark.parametrize(("sent", "code"), [(signal.SIGINT, 130), (signal.SIGTERM, 143)])
+def test_an_interrupt_keeps_the_finished_stages(sent, code, tmp_path):
     old = signal.signal(signal.SIGINT, signal.default_int_handler)  # shells start jobs in the background deaf to it
     job = subprocess.Popen([sys.executable, "-c", INTERRUPTED, tmp_path], stdout=subprocess.PIPE,
                            stderr=subprocess.PIPE, text=True, env=clean_environment())
@@ -239,8 +239,24 @@ def test_an_interrupt_keeps_the_finished_stages(sent, tmp_path):
     assert job.stdout.readline() == "started\n"
     job.send_signal(sent)
     said = job.communicate(timeout=30)[1]
-    assert job.returncode == 130 and "interrupted; finished stages are kept" in said and "Traceback" not in said
+    assert job.returncode == code and "finished stages are kept" in said and "Traceback" not in said
+    assert said.count("\n") == 1 and ("SIGTERM" in said) == (code == 143)
     assert [p.name for p in (tmp_path / "stages").iterdir()] == ["mesh.npz"]
+
+
+@pytest.mark.parametrize("raised", [KeyboardInterrupt, RuntimeError])
+def test_a_signal_that_a_library_turns_into_an_error_is_still_an_interrupt(raised, pipeline, tmp_path, capsys):
+    def behaviour(_):
+        try:
+            signal.raise_signal(signal.SIGTERM)
+        except KeyboardInterrupt:
+            raise raised("error code 1386866960") from None
+
+    pipeline.state.behaviour, before = behaviour, signal.getsignal(signal.SIGTERM)
+    assert main(["response", WEDGE, "-o", str(tmp_path)]) == 143
+    said = capsys.readouterr().err
+    assert said.startswith("bladefem: ended by SIGTERM; finished stages are kept") and said.count("\n") == 1
+    assert signal.getsignal(signal.SIGTERM) is before
 
 
 ONE_RANK_FAILS = """
