@@ -16,10 +16,10 @@ import pytest
 HERE = Path(__file__).resolve().parents[2]
 PINNED = {
     "blade_modes": 347.115898,
-    "sector_modes": 427.67990401,
+    "sector_modes": 372.39525292,
     "damper_seating": 1.0,
-    "forced_response": 180.857634,
-    "change_geometry": 1.2263424601,
+    "forced_response": 181.358259,
+    "change_geometry": 1.2595481622,
     "plain_matrices": 3.79187236,
 }
 
