@@ -9,7 +9,7 @@ from typing import Any, NamedTuple, get_args, get_origin, get_type_hints
 
 from .errors import InputError, suggestion
 from .scene import Scene
-from .units import parse, show
+from .units import is_plain, parse, readable_units, show
 
 __all__ = ["TABLES", "Field", "convert", "each_field", "field_at", "split_values", "used_tables"]
 
@@ -25,6 +25,9 @@ TABLES = {
     "punch": ("punch", *_COMMON),
     "imported": ("imported", "damper", *_ENGINE),
 }
+
+
+QUESTION = "did you mean '"
 
 
 class Field(NamedTuple):
@@ -70,7 +73,8 @@ def field_at(name: str) -> Field:
     head = _head(name)
     if head in tables:
         inside = [k.rpartition(".")[2] for k in known if _head(k) == head]
-        raise InputError(f"unknown key '{name}'{suggestion(last, inside)}")
+        near = suggestion(last, inside)
+        raise InputError(f"unknown key '{name}'{near.replace(QUESTION, f'{QUESTION}{head}.')}")
     outside = [*tables, *(k for k in known if not _head(k))]
     raise InputError(f"unknown key '{name}'{_near(name, known) or suggestion(name, outside)}")
 
@@ -98,7 +102,7 @@ def convert(value: object, field: Field) -> Any:
 
 
 def _float(value: object, field: Field) -> float:
-    return _in_range(parse(value, field.meta.get("unit") or "1", field.name), field)
+    return _in_range(parse(value, field.meta.get("unit") or "1", field.name), field, value)
 
 
 def _int(value: object, field: Field) -> int:
@@ -153,15 +157,30 @@ def _items(value: object) -> list:
     return list(value) if hasattr(value, "__iter__") else [value]
 
 
-def _in_range(number: Any, field: Field) -> Any:
+def _in_range(number: Any, field: Field, written: object = "") -> Any:
     low, high, unit = field.meta.get("low"), field.meta.get("high"), field.meta.get("unit") or "1"
-    if (low is None or number >= low - 1e-12 * abs(low)) and (high is None or number <= high + 1e-12 * abs(high)):
-        return number       # "10 um" is 9.999...e-06
+    if _between(number, low, high):
+        return number
     if low is None or high is None:
         limit = f"at most {show(high, unit)}" if low is None else f"at least {show(low, unit)}"
     else:
         limit = f"{show(low, unit)} to {show(high, unit)}"
-    raise InputError(f"{field.name} = {show(number, unit)}: expected {limit}")
+    raise InputError(f"{field.name} = {show(number, unit)}: expected {limit}{_forgotten_unit(written, field)}")
+
+
+def _between(number: float, low: float | None, high: float | None) -> bool:
+    """Within a range, round-off apart: "10 um" is 9.999...e-06."""
+    return (low is None or number >= low - 1e-12 * abs(low)) and (high is None or number <= high + 1e-12 * abs(high))
+
+
+def _forgotten_unit(written: object, field: Field) -> str:
+    """The tail of a message where a plain number would do in the unit that people use: 65 was meant as 65 deg."""
+    number, meta = str(written).strip(), field.meta
+    unit = meta.get("unit") or "1"
+    for name in readable_units(unit) if is_plain(number) else ():
+        if name != unit and _between(parse(f"{number} {name}", unit), meta.get("low"), meta.get("high")):
+            return f"; did you mean '{number} {name}'?"
+    return ""
 
 
 def _near(word: str, known: Any) -> str:

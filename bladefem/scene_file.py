@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+import difflib
 import json
 import tomllib
 from collections.abc import Iterable
@@ -12,7 +13,7 @@ from typing import Any, NamedTuple, get_type_hints
 from .errors import InputError, suggestion
 from .scene import Scene
 from .scene_check import validate
-from .scene_fields import Field, convert, each_field, field_at, used_tables
+from .scene_fields import TABLES, Field, convert, each_field, field_at, used_tables
 from .units import exact, show
 
 __all__ = ["Row", "dump", "given_keys", "load_scene", "read_tables", "resolved", "scene_of", "vary"]
@@ -217,5 +218,17 @@ def _toml(value: Any, field: Field) -> str:
 
 
 def _neighbours(path: Path) -> str:
-    others = sorted(p.stem for p in path.parent.glob("*.toml")) if path.parent.is_dir() else []
-    return suggestion(path.stem, others) if others else ""
+    """The scene of a name like that, in its folder or among the examples beside it; else the scenes that there are."""
+    folders = [folder for folder in (path.parent, path.parent / "scenes") if folder.is_dir()]
+    others = {str(p): p.stem for folder in folders for p in sorted(folder.glob("*.toml")) if _is_scene(p)}
+    near = difflib.get_close_matches(path.stem, others.values(), n=1, cutoff=0.6)
+    best = [name for name, stem in others.items() if stem in near]
+    return suggestion(best[0], best) if best else suggestion("", others) if others else ""
+
+
+def _is_scene(path: Path) -> bool:
+    """A TOML file with a kind of scene in it."""
+    try:
+        return tomllib.loads(path.read_text(encoding="utf-8")).get("kind") in TABLES
+    except (OSError, ValueError):
+        return False

@@ -14,7 +14,7 @@ from numbers import Real
 
 from .errors import InputError
 
-__all__ = ["exact", "parse", "show"]
+__all__ = ["exact", "is_plain", "parse", "readable_units", "show"]
 
 # unit: (factor to SI, exponents of kg, m, s, rad)
 _UNITS = {
@@ -70,6 +70,17 @@ def parse(value: object, unit: str = "1", name: str = "value") -> float:
     if not isfinite(result):
         raise InputError(f"{name} = {value}: expected a finite number{_in(unit)}")
     return result
+
+
+def is_plain(text: str) -> bool:
+    """Whether a text is a number without a unit."""
+    match = _NUMBER.fullmatch(text)
+    return bool(match) and not match[2]
+
+
+def readable_units(unit: str) -> tuple[str, ...]:
+    """Units in which people read a quantity that has this SI unit, the largest first."""
+    return _READABLE.get(unit, (unit,))
 
 
 def show(value: float, unit: str = "1") -> str:

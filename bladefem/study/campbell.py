@@ -18,7 +18,7 @@ from scipy.linalg import eigh
 from ..data import ModeSet
 from ..errors import InputError
 from ..scene_fields import split_values
-from ..units import parse
+from ..units import is_plain, parse
 from .crossings import campbell_crossings, fold, interference_table, margins, wave
 from .stages import Bodies, is_wheel
 
@@ -92,9 +92,12 @@ def read_speeds(text: str) -> list[float]:
     """Speeds [rad/s] from a text such as "0, 2000, 4000 rpm", or "0, 500, ..., 12000 rpm" with equal steps.
 
     Raises:
-        InputError: not speeds, or dots without a step before and an end after them.
+        InputError: not speeds, no unit, or dots without a step before and an end after them.
     """
     items = split_values(text)
+    for item in items:
+        if is_plain(item) and parse(item, "rad/s", "campbell"):
+            raise InputError(f"campbell = {text}: expected a unit, such as '{text.strip()} rpm'")
     numbers = [None if item.startswith("...") else parse(item, "rad/s", "campbell") for item in items]
     out: list[float] = []
     for i, number in enumerate(numbers):

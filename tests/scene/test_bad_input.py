@@ -16,7 +16,7 @@ WEDGE = Path(__file__).with_name("wedge.toml")
 
 REFUSED = [
     # unknown keys and tables
-    ("aerofoil.twits=3 deg", "unknown key 'aerofoil.twits'; did you mean 'twist'?"),
+    ("aerofoil.twits=3 deg", "unknown key 'aerofoil.twits'; did you mean 'aerofoil.twist'?"),
     ("blade.twist=3 deg", "unknown key 'blade.twist'; did you mean 'aerofoil.twist'?"),
     ("matrial.blade.E=3", "unknown key 'matrial.blade.E'; did you mean 'material.blade.E'?"),
     ("nonsense=3", "unknown key 'nonsense'; known are"), ("aerofoil=3", "aerofoil: expected a field of this table"),
@@ -36,6 +36,10 @@ REFUSED = [
     ("study.loads=0, 20 N", "lifts off"),
     ("study.loads=20, nan N", "finite"), ("material.blade.nu=0.5", "material.blade.nu = 0.5"),
     ("aerofoil.span=auto", "expected a number"),
+    # a unit forgotten
+    ("damper.angle=65", "expected 15 deg to 75 deg; did you mean '65 deg'?"),
+    ("aerofoil.twist=10", "did you mean '10 deg'?"), ("mesh.size=8", "did you mean '8 mm'?"),
+    ("material.blade.E=210", "did you mean '210 GPa'?"), ("damper.mass=20", "did you mean '20 g'?"),
     # between fields
     ("disc.bore_radius=250 mm", "disc.bore_radius = 250 mm: expected less than 200 mm, disc.rim_radius"),
     ("shank.width=60 mm", "the pitch at disc.rim_radius"), ("shank.length=50 mm", "disc.width"),
@@ -106,8 +110,28 @@ def test_limits_themselves_are_allowed(limit):
 def test_files_that_are_no_scenes(tmp_path):
     (tmp_path / "wedge.toml").write_text("kind = \n")
     (tmp_path / "binary.toml").write_bytes(b"\xff\xfe\x00")
+    (tmp_path / "pyproject.toml").write_text("[project]\n")
     for name, message in (("wedge.toml", "not valid TOML: .*line 1"), ("binary.toml", "cannot be read"),
-                          ("wegde.toml", "no such scene file; did you mean 'wedge'"), (".", "cannot be read"),
-                          ("nowhere/x.toml", "no such scene file")):
+                          (".", "cannot be read"),
+                          ("nowhere/x.toml", "no such scene file$"), ("project.toml", "no such scene file$")):
         with pytest.raises(InputError, match=message):
             load_scene(tmp_path / name)
+
+
+def test_scenes_of_a_similar_name_are_offered(tmp_path):
+    """Also from the folder scenes beside; files without a kind are no scenes."""
+    (tmp_path / "scenes").mkdir()
+    (tmp_path / "pyproject.toml").write_text("[project]\n")
+    for name in ("rim.toml", "scenes/wedge.toml"):
+        (tmp_path / name).write_text('kind = "punch"\n')
+    for name, message in (("wegde.toml", f"did you mean '{tmp_path}/scenes/wedge.toml'?"),
+                          ("nope.toml", f"known are {tmp_path}/rim.toml, {tmp_path}/scenes/wedge.toml")):
+        with pytest.raises(InputError) as refused:
+            load_scene(tmp_path / name)
+        assert str(refused.value).endswith(message)
+
+
+def test_a_number_that_fits_no_usual_unit_gets_no_advice():
+    with pytest.raises(InputError) as refused:
+        load_scene(WEDGE, ["damper.angle=100"])
+    assert "did you mean" not in str(refused.value)

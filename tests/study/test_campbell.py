@@ -60,6 +60,12 @@ def test_wrong_speeds_are_refused(text):
         read_speeds(text)
 
 
+@pytest.mark.parametrize("text", ["8000", "0, 2000, 8000"])
+def test_speeds_without_a_unit_are_refused(text):
+    with pytest.raises(InputError, match=f"expected a unit, such as '{text} rpm'"):
+        read_speeds(text)
+
+
 def test_too_few_speeds(wheel):
     with pytest.raises(InputError, match="at least two"):
         campbell_table(wheel, [1.0], [0])
