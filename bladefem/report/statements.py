@@ -7,7 +7,11 @@ from typing import NamedTuple
 import numpy as np
 import pandas as pd
 
-__all__ = ["Answer", "answer", "trust"]
+from bladefem.scene import Scene
+
+__all__ = ["Answer", "answer", "trust", "wrong_speed"]
+
+APART = 0.1     # of the resonance frequency: farther off, an engine order does not drive it
 
 
 class Answer(NamedTuple):
@@ -64,10 +68,25 @@ def own_mass(finite: pd.DataFrame, best: pd.Series, own: pd.DataFrame | None) ->
     there = "outside the loads studied"
     if table["load"].iloc[0] <= load <= table["load"].iloc[-1]:
         between = np.interp(np.log(load), np.log(table["load"]), np.log(table["peak_amplitude"]))
-        there = f"resonance amplitude about {1e6 * np.exp(between):.2g} µm, between the loads studied"
+        there = f"resonance amplitude about {1e6 * np.exp(between):.3g} µm, between the loads studied"
     return [("load of a seat by the damper's own mass", f"{load:.4g} N",
              f"{1e3 * mass:.3g} g at {speed * 30 / np.pi:.5g} rpm; {there}"),
             ("mass that makes the optimum load", f"{1e3 * mass * best['load'] / load:.3g} g", "at the same speed")]
+
+
+def wrong_speed(scene: Scene, summary: pd.DataFrame | None) -> list[str]:
+    """A caution where the engine order, at the scene's speed, excites far from the resonances that were studied."""
+    if summary is None or scene.kind == "plane blades" or not scene.operation.speed > 0:
+        return []
+    excited = scene.excitation.engine_order * scene.operation.speed / (2 * np.pi)
+    peaks = summary["peak_frequency"]
+    if (1 - APART) * peaks.min() <= excited <= (1 + APART) * peaks.max():
+        return []
+    rpm = scene.operation.speed * 30 / np.pi
+    return [f"At {rpm:.5g} rpm engine order {scene.excitation.engine_order} excites at {excited:.5g} Hz and does not "
+            f"meet these resonances: with the stiffness of this speed they belong to "
+            f"{rpm * peaks.min() / excited:.4g} to {rpm * peaks.max() / excited:.4g} rpm. 'bladefem modes --campbell' "
+            "shows where they cross."]
 
 
 def mass_of(best: pd.Series) -> str:

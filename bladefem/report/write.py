@@ -16,7 +16,7 @@ from bladefem.scene import Scene
 from bladefem.scene_file import resolved
 from bladefem.store import open_folder, versions, write_text
 
-from .statements import answer, trust
+from .statements import answer, trust, wrong_speed
 from .tables import numeric, readable, to_markdown
 
 __all__ = ["SECTIONS", "write_report"]
@@ -83,7 +83,9 @@ def contents(scene: Scene, tables: Mapping[str, pd.DataFrame], figures: Mapping[
     if len(doubtful):
         shown["accuracy/loads with doubtful points"] = doubtful
     total = sum(timings.values())
-    found = answer(tables.get("response/summary"), points, tables.get("contact/own_load"))
+    summary = tables.get("response/summary")
+    found = answer(summary, points, tables.get("contact/own_load"))
+    found = found._replace(cautions=[*wrong_speed(scene, summary), *found.cautions])
     return {"title": scene.title, "kind": scene.kind, "answer": found,
             "inputs": resolved(scene, given), "mark": "changed" if given is None else "given",
             "statements": statements, "messages": messages, "versions": versions(),

@@ -11,10 +11,10 @@ import pandas as pd
 import pytest
 
 from bladefem.errors import InputError
-from bladefem.report.statements import answer, trust
+from bladefem.report.statements import answer, trust, wrong_speed
 from bladefem.report.tables import readable, to_latex, to_markdown, write_tables
 from bladefem.report.write import write_report
-from bladefem.scene import Scene
+from bladefem.scene import Excitation, Operation, Scene
 
 sys.path.insert(0, str(Path(__file__).parents[1] / "view"))
 import synthetic
@@ -90,6 +90,16 @@ def test_answer_says_which_mass_would_press_best():
     assert found[-2][1:] == ("282.8 N",
                              "12 g at 7639.4 rpm; resonance amplitude about 20 µm, between the loads studied")
     assert found[-1][1] == "8.49 g"
+
+
+def test_a_speed_that_does_not_drive_the_resonance_is_named():
+    """Engine order 9 needs 60 f / 9 rpm."""
+    summary = pd.DataFrame({"load": [0.0, 90.0], "peak_frequency": [420.0, 450.0], "peak_amplitude": [1e-3, 1e-4]})
+    fast, right = (Scene(excitation=Excitation(engine_order=9), operation=Operation(speed=rpm * np.pi / 30))
+                   for rpm in (8000.0, 2900.0))
+    assert wrong_speed(right, summary) == [] == wrong_speed(Scene(operation=Operation(speed=0.0)), summary)
+    assert "excites at 1200 Hz" in wrong_speed(fast, summary)[0]
+    assert "2800 to 3000 rpm" in wrong_speed(fast, summary)[0]
 
 
 def test_answer_warns_at_the_edge_of_loads_band_and_convergence():
