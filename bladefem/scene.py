@@ -122,7 +122,8 @@ class Model:
 
     modes: int | None = quantity(None, "1", 1, 500, "modes kept in each nodal diameter")
     harmonics: int | None = quantity(None, "1", 1, 99, "harmonics of the balance")
-    samples: int | None = quantity(None, "1", 16, 65536, "time samples a period")
+    samples: int | None = quantity(None, "1", 0, 65536, "time samples a period; 0: changes of contact state are "
+                                   "located exactly (plane blades)")
     damper: str | None = quantity(None, choices=("mass", "rigid", "elastic"), help="damper model")
     static: str = quantity("coupled", choices=("coupled", "uncoupled"),
                            help="the mean displacements take part in the balance, or stay as the static contact "

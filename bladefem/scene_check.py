@@ -153,7 +153,12 @@ def _numerics(scene: Scene) -> Iterator[str]:
     mesh, model = scene.mesh, scene.model
     if mesh.size is not None and mesh.contact_size is not None:
         yield from _at_most("mesh.contact_size", mesh.contact_size, mesh.size, "mesh.size")
-    if model.harmonics is not None and model.samples is not None and model.samples <= 2 * model.harmonics:
+    if model.samples == 0 and scene.kind in ("wedge sector", "z mass"):
+        yield ("model.samples = 0: changes of contact state are located exactly in plane models only, expected at "
+               "least 16")
+    if model.samples is not None and 0 < model.samples < 16:
+        yield f"model.samples = {model.samples}: expected 16 to 65536, or 0 in plane models"
+    if model.harmonics is not None and model.samples and model.samples <= 2 * model.harmonics:
         yield (f"model.samples = {model.samples}: expected more than {2 * model.harmonics} for "
                f"model.harmonics = {model.harmonics}")
 

@@ -119,9 +119,9 @@ def richer(family: Family, settings: Settings, name: str) -> Settings | None:
         more = min(4 * H + 3 if H < 7 else 2 * H + 1, family.harmonics)
         if more <= H:       # as with the modes
             return replace(settings, harmonics=max(1, H // 2))
-        return replace(settings, harmonics=more, samples=max(settings.samples, 8 * more + 8))
-    if name == "samples":
-        return replace(settings, samples=4 * settings.samples)
+        return replace(settings, harmonics=more, samples=settings.samples and max(settings.samples, 8 * more + 8))
+    if name == "samples":       # 0: located exactly
+        return replace(settings, samples=4 * settings.samples) if settings.samples else None
     if name == "modes":     # where there are no more, half of them, which are more wrong than all
         more = min(2 * settings.modes, family.modes)
         return replace(settings, modes=more if more > settings.modes else max(1, settings.modes // 2))

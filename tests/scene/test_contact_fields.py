@@ -33,6 +33,8 @@ def test_seats_and_units(tmp_path):
     ("wedge", ["contact.crown=2 m"], "contact.crown = 2 m: bedded .* expected contact.bedded = false"),
     ("wedge", ["contact.edge_radius=40 mm", "contact.bedded=false"], "contact.edge_width: expected beside"),
     ("wedge", ["contact.wear_coefficient=1 mm"], "not a unit of this field, expected m.3/J"),
+    ("wedge", ["model.samples=0"], "model.samples = 0: .* in plane models only"),
+    ("plane", ["model.samples=9"], "model.samples = 9: expected 16 to 65536, or 0 in plane models"),
     ("plane", ["contact.crown=2 m", "contact.bedded=false"], "contact.crown: plane blades .* contact.crown_across"),
     ("zmass", ["contact.left.mu=0.1"], "contact.left: a scene of kind 'z mass' has no two seats"),
     ("hertz", ["contact.wear_coefficient=1e-14"], "contact.wear_coefficient: a scene of kind 'hertz'"),
