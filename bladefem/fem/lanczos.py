@@ -1,12 +1,14 @@
 """Shift-inverted block Lanczos iteration on real or complex vectors, with full reorthogonalisation.
 
 Parlett, The Symmetric Eigenvalue Problem (1998), chapter 13; blocks catch multiple eigenvalues, and complex arithmetic
-leaves no doubled eigenvalues to sort out.
+leaves no doubled eigenvalues to sort out. Directions of the residual that matter to no wanted pair wait instead of
+being solved with: with good first guesses most do. They stay part of the residual, so its norm remains exact.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import dataclass, field
 
 import numpy as np
 from scipy.linalg import eigh
@@ -19,7 +21,20 @@ __all__ = ["lowest", "orthonormal"]
 
 STEPS = 200
 CLEAN = 1e-8    # share of old directions in a new one below which its image under M is corrected, not computed again
-ROOM = 20       # blocks
+EVEN = 1e-6     # least square of a column, of the largest, up to which one normalisation is enough
+FAINT = 0.1     # share of the tolerance below which a direction of the residual waits
+
+
+@dataclass
+class _Space:
+    """K^-1 M V = V H + P C, with V and P M-orthonormal; V and P are lists of blocks, with their products by M."""
+
+    V: list[np.ndarray] = field(default_factory=list)
+    MV: list[np.ndarray] = field(default_factory=list)
+    H: np.ndarray = field(default_factory=lambda: np.zeros((0, 0)))
+    P: list[np.ndarray] = field(default_factory=list)       # at most two blocks: those that waited, the new ones
+    MP: list[np.ndarray] = field(default_factory=list)
+    C: np.ndarray = field(default_factory=lambda: np.zeros((0, 0)))
 
 
 def lowest(con: Constrained, inverse: Callable[[np.ndarray], np.ndarray], start: np.ndarray, count: int,
@@ -30,7 +45,6 @@ def lowest(con: Constrained, inverse: Callable[[np.ndarray], np.ndarray], start:
         inverse: K^-1 (or what stands for it) on blocks (n_own, k).
         start: (n_own, k) first block.
         tolerance: largest |K^-1 M x - x / lambda| lambda in the M-norm: the direction's error times a gap.
-
         guard: pairs returned beyond count as far as they have come.
 
     The vectors returned are K^-1 M x lambda, one free step of inverse iteration beyond the Ritz vectors x: it wipes out
@@ -42,68 +56,77 @@ def lowest(con: Constrained, inverse: Callable[[np.ndarray], np.ndarray], start:
     Raises:
         NotSolvedError: fewer than ``count`` pairs exist, or the iteration does not converge.
     """
-    comm = con.body.comm
-    V, MV = (np.empty((start.shape[0], 0), con.dtype, order="F") for _ in range(2))
-    H = np.zeros((0, 0), con.dtype)
-    block, Mblock, _ = orthonormal(con, V, MV, start.astype(con.dtype))
+    space = _Space()
+    block, Mblock, _ = orthonormal(con, [], [], start.astype(con.dtype))
     for _ in range(STEPS):
-        V, MV = (_joined(A, len(H), new) for A, new in ((V, block), (MV, Mblock)))
-        W = inverse(Mblock)
-        done = slice(0, len(H) + block.shape[1])
-        column = dot(comm, MV[:, done], W)
-        H = _grown(H, column)
-        block, Mblock, tail = orthonormal(con, V[:, done], MV[:, done], minus(W, V[:, done], column))
-        theta, S = eigh(H)
+        _extend(con, space, block, Mblock, inverse(Mblock))
+        theta, S = eigh(space.H)
         theta, S = theta[::-1], S[:, ::-1]
         k = min(count + guard, len(theta))
-        rest = tail @ S[len(S) - tail.shape[1]:, :k] / theta[:k]
+        rest = space.C @ S[:, :k] / theta[:k]
         error = np.linalg.norm(rest[:, :count], axis=0).max(initial=0.0)
-        if not block.shape[1] and k < count:
+        if not len(rest) and k < count:
             raise NotSolvedError(f"{count} modes were asked of a body that has {k} elastic ones")
-        if (k >= count and error < tolerance) or not block.shape[1]:
-            return 1 / theta[:k], mix(V[:, done], S[:, :k], block, rest)
+        if (k >= count and error < tolerance) or not len(rest):
+            return 1 / theta[:k], mix([*space.V, *space.P], np.concatenate([S[:, :k], rest]))
+        block, Mblock = _next(space, rest[:, :count], FAINT * tolerance if k >= count else 0.0)
     raise NotSolvedError(f"the modes did not converge in {STEPS} steps (error {error:.1e}, expected {tolerance:.1e})")
 
 
-def orthonormal(con: Constrained, V: np.ndarray, MV: np.ndarray,
-                W: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+def orthonormal(con: Constrained, V: list[np.ndarray], MV: list[np.ndarray], W: np.ndarray,
+                size: float = 0.0) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """W made M-orthonormal and, once more, M-orthogonal to V: basis Q, M Q, and R with W = V (...) + Q R.
 
-    Directions that are rounding only are dropped, so Q may have fewer columns than W.
+    Args:
+        size: M-norm of what W was taken from. Directions that are rounding beside it are dropped, so that Q may have
+            fewer columns than W.
     """
     comm = con.body.comm
-    W, MW, R = _scaled(comm, W, apply(con.M, W), 1e-26)
-    if V.shape[1]:
-        left = dot(comm, MV, W)
-        W = minus(W, V, left)
-        MW = minus(MW, MV, left) if abs(left).max(initial=0.0) < CLEAN else apply(con.M, W)
-    W, MW, S = _scaled(comm, W, MW, 0.25)
+    W, MW, R, spread = _scaled(comm, W, apply(con.M, W), 1e-26, size ** 2)
+    left = dot(comm, MV, W)
+    W, clean = minus(W, V, left), abs(left).max(initial=0.0) < CLEAN
+    MW = minus(MW, MV, left) if clean else apply(con.M, W)
+    if clean and spread > EVEN:
+        return W, MW, R
+    W, MW, S, _ = _scaled(comm, W, MW, 0.25, 1.0)
     return W, MW, S @ R
 
 
-def _joined(V: np.ndarray, used: int, new: np.ndarray) -> np.ndarray:
-    """V with new columns after those used; memory for many more is reserved, it costs nothing until written."""
-    total = used + new.shape[1]
-    if total > V.shape[1]:
-        room = np.empty((V.shape[0], max(2 * used, ROOM * new.shape[1])), V.dtype, order="F")
-        room[:, :used] = V[:, :used]
-        V = room
-    V[:, used:total] = new
-    return V
+def _extend(con: Constrained, space: _Space, block: np.ndarray, Mblock: np.ndarray, W: np.ndarray) -> None:
+    """One more block of V, with its image W = K^-1 M block; what is left of that becomes a block of P."""
+    comm, old = con.body.comm, len(space.H)
+    space.V.append(block)
+    space.MV.append(Mblock)
+    known, Mknown = [*space.V, *space.P], [*space.MV, *space.MP]
+    column = dot(comm, Mknown, W)
+    Q, MQ, tail = orthonormal(con, known, Mknown, minus(W, known, column), np.linalg.norm(column))
+    total = old + block.shape[1]
+    corner = (column[old:total] + column[old:total].conj().T) / 2
+    space.H = np.block([[space.H, column[:old]], [column[:old].conj().T, corner]])
+    space.C = np.block([[space.C, column[total:]], [np.zeros((Q.shape[1], old)), tail]])
+    space.P.append(Q)
+    space.MP.append(MQ)
 
 
-def _scaled(comm: object, W: np.ndarray, MW: np.ndarray, least: float) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """W Z, M W Z and R with W = (W Z) R; directions whose square is below ``least`` of the largest are dropped."""
+def _next(space: _Space, rest: np.ndarray, faint: float) -> tuple[np.ndarray, np.ndarray]:
+    """The next block and its product by M, taken out of P: the directions that carry the residuals ``rest``."""
+    U, s, _ = np.linalg.svd(rest)
+    strong = np.count_nonzero(s > faint) if faint else len(U)
+    P, MP, weak = space.P, space.MP, U[:, strong:]
+    space.P, space.MP = ([mix(P, weak)], [mix(MP, weak)]) if weak.size else ([], [])
+    space.C = weak.conj().T @ space.C
+    return (P[0], MP[0]) if len(P) == 1 and not weak.size else (mix(P, U[:, :strong]), mix(MP, U[:, :strong]))
+
+
+def _scaled(comm: object, W: np.ndarray, MW: np.ndarray, least: float,
+            largest: float = np.finfo(float).tiny) -> tuple[np.ndarray, np.ndarray, np.ndarray, float]:
+    """W Z, M W Z and R with W = (W Z) R, and the least square of a column, of the largest one's.
+
+    Directions whose square is below ``least`` of the largest, and of a given one, are dropped.
+    """
     gram = dot(comm, W, MW)
     size, Z = np.linalg.eigh((gram + gram.conj().T) / 2)
-    good = size > least * max(size[-1], np.finfo(float).tiny) if len(size) else size > 0
-    root = np.sqrt(size[good])
-    W, MW = (mix(A, Z[:, good] / root) for A in (W, MW))
-    return W, MW, (Z[:, good] * root).conj().T
-
-
-def _grown(H: np.ndarray, column: np.ndarray) -> np.ndarray:
-    """The projected operator with one more block."""
-    old = len(H)
-    corner = (column[old:] + column[old:].conj().T) / 2
-    return np.block([[H, column[:old]], [column[:old].conj().T, corner]])
+    good = size > least * max(size[-1], largest) if len(size) else size > 0
+    root, Z = np.sqrt(size[good]), Z[:, good]
+    W, MW = (mix(A, Z / root) for A in (W, MW))
+    return W, MW, (Z * root).conj().T, float((root[0] / root[-1]) ** 2) if len(root) else 1.0

@@ -11,6 +11,7 @@ A block of vectors is a NumPy array (n_own, k), this rank's rows, columns contig
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass
 
 import numpy as np
@@ -42,6 +43,7 @@ class Folded:
 
 
 Matrix = PETSc.Mat | Doubled | Folded
+Block = np.ndarray | list[np.ndarray]
 
 
 @dataclass(frozen=True)
@@ -130,31 +132,54 @@ def dense_rows(A: Matrix, n: int) -> np.ndarray:
     return interior.masters(A.C) if isinstance(A, Folded) else np.arange(n)
 
 
-def dot(comm: object, X: np.ndarray, Y: np.ndarray) -> np.ndarray:
-    """X^H Y over all ranks, (k, l)."""
-    if np.iscomplexobj(X) or np.iscomplexobj(Y):
-        part = blas.zgemm(1.0, X, Y, trans_a=2) if X.size and Y.size else X.conj().T @ Y
+def dot(comm: object, X: Block, Y: np.ndarray) -> np.ndarray:
+    """X^H Y over all ranks, (k, l); X may be a list of blocks side by side."""
+    if isinstance(X, list):
+        parts = [_dot(block, Y) for block in X]
+        part = np.concatenate(parts) if parts else np.zeros((0, Y.shape[1]), Y.dtype)
     else:
-        part = blas.dgemm(1.0, X, Y, trans_a=1) if X.size and Y.size else X.T @ Y
+        part = _dot(X, Y)
     return comm.allreduce(np.ascontiguousarray(part)) if comm.size > 1 else part
 
 
-def minus(W: np.ndarray, V: np.ndarray, C: np.ndarray) -> np.ndarray:
-    """W - V C, columns contiguous."""
+def minus(W: np.ndarray, V: list[np.ndarray], C: np.ndarray) -> np.ndarray:
+    """W - V C, in W's own memory where its columns are contiguous; V is a list of blocks side by side."""
     gemm = blas.zgemm if np.iscomplexobj(W) else blas.dgemm
-    return gemm(-1.0, V, C, 1.0, W) if V.size else W
+    for block, part in _paired(V, C):
+        W = gemm(-1.0, block, part, 1.0, W, overwrite_c=1)
+    return W
 
 
-def mix(V: np.ndarray, C: np.ndarray, W: np.ndarray | None = None, D: np.ndarray | None = None) -> np.ndarray:
-    """V C + W D, columns contiguous."""
-    gemm = blas.zgemm if np.iscomplexobj(V) else blas.dgemm
-    out = gemm(1.0, V, C) if V.size and C.size else np.zeros((V.shape[0], C.shape[1]), V.dtype, order="F")
-    return out if W is None or not W.size else gemm(1.0, W, D, 1.0, out, overwrite_c=1)
+def mix(V: Block, C: np.ndarray) -> np.ndarray:
+    """V C, columns contiguous; V may be a list of blocks side by side."""
+    blocks = V if isinstance(V, list) else [V]
+    gemm = blas.zgemm if np.iscomplexobj(blocks[0]) else blas.dgemm
+    out = None
+    for block, part in _paired(blocks, C):
+        out = gemm(1.0, block, part) if out is None else gemm(1.0, block, part, 1.0, out, overwrite_c=1)
+    return np.zeros((len(blocks[0]), C.shape[1]), blocks[0].dtype, order="F") if out is None else out
 
 
 def inertia(A: Matrix) -> int:
     """Number of negative eigenvalues, by Sylvester's law."""
     return factorise(A, definite=False).negative
+
+
+def _dot(X: np.ndarray, Y: np.ndarray) -> np.ndarray:
+    """X^H Y on this rank."""
+    if not (X.size and Y.size):
+        return X.conj().T @ Y
+    if np.iscomplexobj(X) or np.iscomplexobj(Y):
+        return blas.zgemm(1.0, X, Y, trans_a=2)
+    return blas.dgemm(1.0, X, Y, trans_a=1)
+
+
+def _paired(blocks: list[np.ndarray], C: np.ndarray) -> Iterator[tuple[np.ndarray, np.ndarray]]:
+    """Each block with the rows of C that belong to it, empty ones left out."""
+    ends = np.cumsum([block.shape[1] for block in blocks]).tolist()
+    for block, first, last in zip(blocks, [0, *ends], ends, strict=False):
+        if block.size and C.shape[1]:
+            yield block, C[first:last]
 
 
 def _times(A: PETSc.Mat, X: np.ndarray) -> np.ndarray:

@@ -64,9 +64,10 @@ def pairs(flex: Flexibility, count: int, tolerance: float = TOLERANCE,
 
 def mode_set(con: Constrained, lam: np.ndarray, X: np.ndarray) -> ModeSet:
     """Modes with a certificate, in mesh numbering, in a basis and phase that do not depend on the ranks."""
-    X = canonical(con, lam, X)
-    residuals = certificate(con, lam, X)
-    shapes = expand(con, X).transpose(2, 0, 1)
+    shapes = expand(con, X)
+    images = shapes.reshape(-1, shapes.shape[2]).conj().T @ _probe(con, len(lam))
+    turn = _rotation(lam, images)
+    residuals, shapes = certificate(con, lam, X @ turn), (shapes @ turn).transpose(2, 0, 1)
     if con.body.dim == 2:
         shapes = np.concatenate([shapes, np.zeros_like(shapes[:, :, :1])], axis=2)
     return ModeSet(np.sqrt(np.maximum(lam, 0)) / (2 * np.pi), shapes, con.nodal_diameter, residuals)
@@ -77,10 +78,10 @@ def certificate(con: Constrained, lam: np.ndarray, X: np.ndarray) -> np.ndarray:
     if not X.shape[1]:
         return np.zeros(0)
     KX, comm = apply(con.K, X), con.body.comm
-    error = _norms(comm, KX - apply(con.M, X) * lam)
     size = _norms(comm, KX)
-    scale = _norms(comm, np.abs(KX)).max() if (lam > 0).any() else _stiffness(con, X)
-    return error / np.where(lam > 0, size, scale)
+    scale = size.max() if (lam > 0).any() else _stiffness(con, X)
+    KX -= apply(con.M, X) * lam
+    return _norms(comm, KX) / np.where(lam > 0, size, scale)
 
 
 def _stiffness(con: Constrained, X: np.ndarray) -> float:
@@ -103,7 +104,7 @@ def elastic_pairs(flex: Flexibility, count: int, tolerance: float = TOLERANCE,
     """
     inverse = inverse or (lambda B: compliance(flex, B))
     if start is None:
-        width = min(max(8 if flex.con.dtype is float else 4, count // 3), 16)
+        width = min(max(8 if flex.con.dtype is float else 6, count // 3), 16)
         start = inverse(restrict(flex.con, _probe(flex.con, width)))
     elif flex.R.shape[1]:
         start = start - flex.R @ dot(flex.con.body.comm, flex.MR, start)
@@ -116,16 +117,17 @@ def _probe(con: Constrained, width: int) -> np.ndarray:
 
 def canonical(con: Constrained, lam: np.ndarray, X: np.ndarray) -> np.ndarray:
     """Bases of (nearly) multiple eigenvalues and phases of single ones, fixed by projecting given vectors."""
-    if not len(lam):
-        return X
-    W = restrict(con, _probe(con, len(lam)))
-    X = X.copy()
+    return X @ _rotation(lam, dot(con.body.comm, X, restrict(con, _probe(con, len(lam)))))
+
+
+def _rotation(lam: np.ndarray, images: np.ndarray) -> np.ndarray:
+    """(m, m) the same as a rotation of the given basis, from its products X^H W (m, m) with given vectors."""
+    out = np.zeros(images.shape, images.dtype)
     breaks = np.flatnonzero(np.diff(lam) > 1e-7 * lam[1:]) + 1
-    for group in np.split(np.arange(len(lam)), breaks):
-        Q, R = np.linalg.qr(dot(con.body.comm, X[:, group], W[:, :len(group)]))
-        phase = R.diagonal() / np.abs(R.diagonal())
-        X[:, group] = X[:, group] @ (Q * phase)
-    return X
+    for group in np.split(np.arange(len(lam)), breaks) if len(lam) else []:
+        Q, R = np.linalg.qr(images[group, :len(group)])
+        out[np.ix_(group, group)] = Q * (R.diagonal() / np.abs(R.diagonal()))
+    return out
 
 
 def count_below(con: Constrained, lam: float) -> int:
@@ -148,5 +150,5 @@ def _prove(con: Constrained, lam: np.ndarray) -> None:
 
 
 def _norms(comm: object, X: np.ndarray) -> np.ndarray:
-    squares = (np.abs(X) ** 2).sum(0)
+    squares = (X.real ** 2 + X.imag ** 2).sum(0) if np.iscomplexobj(X) else (X ** 2).sum(0)
     return np.sqrt(comm.allreduce(squares) if comm.size > 1 else squares)

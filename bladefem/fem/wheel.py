@@ -20,7 +20,7 @@ from . import core
 from .body import Body
 from .constraint import Constrained, Transformation, at_diameter, transformation
 from .flexibility import Flexibility, flexible
-from .linalg import apply, combined, dot, inertia, mix
+from .linalg import apply, combined, dot, inertia, minus, mix
 from .memory import give_back
 from .modes import mode_set, pairs
 
@@ -29,9 +29,18 @@ __all__ = ["Eigenpairs", "all_diameters", "eigenpairs"]
 GUARD = 2               # modes beyond those asked for, carried along
 MORE = 12               # rough ones beyond, from which other diameters are guessed
 FIRST = (0, 1, 1 / 3, 1 / 6, 2 / 3)     # places of the diameters solved first: shapes change fastest at low ones
-LEVELS = (3, 5)         # numbers of solved diameters from which the others are guessed
+LEVELS = (3, 4, 5)         # numbers of solved diameters from which the others are guessed
 CHUNK = 32              # columns of a sparse product at a time, to spare memory
 CLOSE = 5e-6            # error of a vector's direction; that of a frequency is its square
+
+
+@dataclass(frozen=True)
+class _Space:
+    """What the vectors of some nodal diameters span."""
+
+    W: np.ndarray                   # (n_own, m) nearly orthonormal, real
+    K: list[np.ndarray]             # (m, m) projections of K0, Kc, Ks
+    M: list[np.ndarray]
 
 
 @dataclass(frozen=True)
@@ -71,7 +80,7 @@ def all_diameters(body: Body | Transformation, count: int, diameters: Sequence[i
     steps = progress(eigenpairs(t, count, wanted, direct), "nodal diameters", len(wanted))
     found = {p.con.nodal_diameter: p for p in steps}
     if prove:
-        found = _proved(t, found)
+        found = _proved(t, found, count)
     sets = {}
     for n in sorted(found):         # vectors go as shapes come: both at once would be the peak of memory
         p = found.pop(n)
@@ -88,10 +97,10 @@ def eigenpairs(t: Transformation, count: int, diameters: Sequence[int], direct: 
     for i, n in enumerate(_sampled(sorted(cons))):
         if i in LEVELS and not direct:
             give_back()
-            space = _space(t, blocks)
-            blocks = blocks if i < LEVELS[-1] else []
-        start = None if space is None else _guess(space, cons[n], 2 * np.pi * n / t.sectors, count + GUARD)
+            space, blocks = _space(t, blocks, space), []
         helps = len(cons) > LEVELS[0] and i < LEVELS[-1] and not direct
+        guess = count + (GUARD if helps else 0)         # the last ones need a step or two: guards would not pay
+        start = None if space is None else _guess(space, cons[n], 2 * np.pi * n / t.sectors, guess)
         found = _pairs(flexible(cons[n]), count, start, tolerance, MORE if helps else GUARD)
         if helps:
             blocks.append(found.X)
@@ -111,47 +120,76 @@ def _pairs(flex: Flexibility, count: int, start: np.ndarray | None, tolerance: f
     return Eigenpairs(flex, *pairs(flex, count, tolerance, start, guard))
 
 
-def _space(t: Transformation, blocks: list[np.ndarray]) -> tuple[np.ndarray, list[np.ndarray], list[np.ndarray]]:
-    """A real basis of all parts of the vectors, and the projections of K0, Kc, Ks and of M0, Mc, Ms onto it."""
-    W = _span(blocks, t)
-    return W, *_projected(t, W)
+def _space(t: Transformation, blocks: list[np.ndarray], known: _Space | None) -> _Space:
+    """The parts of more vectors added to a space; what it has already is projected once."""
+    new = _span(blocks, t, known)
+    old = 0 if known is None else known.W.shape[1]
+    W = new if known is None else np.concatenate([known.W, new], axis=1, out=np.empty(
+        (len(new), old + new.shape[1]), order="F"))
+    columns = _projected(t, W, slice(old, W.shape[1]))
+    if known is None:
+        return _Space(W, *columns)
+    return _Space(W, *([_grown(*each) for each in zip(A, B, (1, 1, -1), strict=True)]
+                       for A, B in zip((known.K, known.M), columns, strict=True)))
 
 
-def _guess(space: tuple[np.ndarray, list[np.ndarray], list[np.ndarray]], con: Constrained, angle: float,
-           count: int) -> np.ndarray:
+def _grown(A: np.ndarray, columns: np.ndarray, sign: int) -> np.ndarray:
+    """A symmetric (sign 1) or skew (-1) matrix with more columns, and the rows that they imply."""
+    old = len(A)
+    return np.block([[A, columns[:old]], [sign * columns[:old].T, columns[old:]]])
+
+
+def _guess(space: _Space, con: Constrained, angle: float, count: int) -> np.ndarray:
     """(n_own, count) lowest vectors of the projected pencil."""
-    W, K, M = space
-    Z = _small(K, M, angle, count)
-    return mix(W, Z.real) + 1j * mix(W, Z.imag) if con.dtype is complex else mix(W, Z.real)
+    Z = _small(space.K, space.M, angle, count)
+    if con.dtype is not complex:
+        return mix(space.W, Z.real)
+    out = np.empty((len(space.W), count), complex, order="F")
+    out.real, out.imag = mix(space.W, Z.real), mix(space.W, Z.imag)
+    return out
 
 
-def _span(blocks: list[np.ndarray], t: Transformation) -> np.ndarray:
-    """(n_own, m) nearly orthonormal real basis of all parts of the vectors; what they have in common is taken once."""
+def _span(blocks: list[np.ndarray], t: Transformation, known: _Space | None) -> np.ndarray:
+    """(n_own, m) nearly orthonormal real basis of what all parts of the vectors add to the space known."""
     parts = [part for X in blocks for part in ((X.real, X.imag) if np.iscomplexobj(X) else (X,))]
     W = np.empty((len(parts[0]), sum(part.shape[1] for part in parts)), order="F")
     np.concatenate(parts, axis=1, out=W)
     gram = dot(t.body.comm, W, W)
     length = np.sqrt(gram.diagonal())
+    if known is not None:
+        W = minus(W, [known.W], dot(t.body.comm, known.W, W))
+        gram = dot(t.body.comm, W, W)
     size, Z = np.linalg.eigh(gram / np.outer(length, length))
-    good = size > 1e-13 * size[-1]
+    good = size > 1e-13
     return mix(W, Z[:, good] / np.sqrt(size[good]) / length[:, None])
 
 
-def _projected(t: Transformation, W: np.ndarray) -> tuple[list[np.ndarray], list[np.ndarray]]:
-    """(m, m) projections of K0, Kc, Ks and of M0, Mc, Ms."""
+def _projected(t: Transformation, W: np.ndarray, new: slice) -> tuple[list[np.ndarray], list[np.ndarray]]:
+    """(m, new) columns of the projections of K0, Kc, Ks and of M0, Mc, Ms."""
     if t.opened is None:
-        return tuple([dot(t.body.comm, W, apply(A, W)) for A in three] for three in (t.K, t.M))
+        return tuple([dot(t.body.comm, W, apply(A, W[:, new])) for A in three] for three in (t.K, t.M))
     T1 = t.high[t.opened.places]
     faces = np.flatnonzero(np.diff(T1.indptr))
     low, high = t.low[t.opened.places] @ W, T1[faces] @ W
     out = []
-    for A in (t.opened.K, t.opened.M):
+    for A, (LL, HL) in zip((t.opened.K, t.opened.M), _inside(t, low, high, faces, new), strict=True):
         beside = A[faces].T.tocsr()
         near = np.flatnonzero(np.diff(beside.indptr))
-        LH = low[near].T @ (beside[near] @ high)
-        LL = np.concatenate([low.T @ (A @ low[:, k:k + CHUNK]) for k in range(0, low.shape[1], CHUNK)], axis=1)
-        out.append([LL + high.T @ (A[faces][:, faces] @ high), LH + LH.T, LH - LH.T])
+        LH = low[near].T @ (beside[near] @ high[:, new])
+        out.append([LL + high.T @ (A[faces][:, faces] @ high[:, new]), LH + HL, LH - HL])
     return tuple(out)
+
+
+def _inside(t: Transformation, low: np.ndarray, high: np.ndarray, faces: np.ndarray,
+            new: slice) -> list[tuple[np.ndarray, np.ndarray]]:
+    """low^T A low and high^T A low of some columns, a few at a time, for K and for M."""
+    pieces: list[list] = [[], []]
+    for first in range(new.start, low.shape[1], CHUNK):
+        moved = np.ascontiguousarray(low[:, first:first + CHUNK])
+        for piece, A in zip(pieces, (t.opened.K, t.opened.M), strict=True):
+            image = A @ moved
+            piece.append((low.T @ image, high.T @ image[faces]))
+    return [tuple(np.concatenate(part, axis=1) for part in zip(*piece, strict=True)) for piece in pieces]
 
 
 def _small(K: list[np.ndarray], M: list[np.ndarray], angle: float, count: int) -> np.ndarray:
@@ -161,15 +199,15 @@ def _small(K: list[np.ndarray], M: list[np.ndarray], angle: float, count: int) -
     return eigh(*[(A + A.conj().T) / 2 for A in pencil])[1][:, :count]
 
 
-def _proved(t: Transformation, found: dict[int, Eigenpairs]) -> dict[int, Eigenpairs]:
+def _proved(t: Transformation, found: dict[int, Eigenpairs], count: int) -> dict[int, Eigenpairs]:
     """Compare counts with inertia at one shift; a diameter that lost a mode is solved from scratch."""
     give_back()
-    shift = _gap([p.lam for p in found.values()])
+    shift = _gap([p.lam[:count] for p in found.values()])
     shared = _shifted(t, shift)
     for n, p in found.items():
         exact = _count_below(p.con, shift, shared)
         if exact != np.count_nonzero(p.lam < shift):
-            found[n] = p = _pairs(p.flex, max(len(p.lam) - GUARD, exact + 1), None)
+            found[n] = p = _pairs(p.flex, max(count, exact + 1), None)
         if exact != np.count_nonzero(p.lam < shift):
             raise NotSolvedError(f"nodal diameter {n}: {np.count_nonzero(p.lam < shift)} modes were found below "
                                  f"{np.sqrt(shift) / (2 * np.pi):.6g} Hz, the inertia counts {exact}")
@@ -192,7 +230,7 @@ def _count_below(con: Constrained, shift: float, shared: core.Core | None) -> in
 
 def _gap(lists: list[np.ndarray]) -> float:
     """A shift in the widest relative gap of all eigenvalues, in the upper half of what every diameter covers."""
-    top = min(lam[-1 - GUARD] for lam in lists if len(lam) > GUARD)
+    top = min(lam[-1] for lam in lists)
     below = np.unique(np.concatenate([lam[lam <= top] for lam in lists]))
     below = below[below > 0]
     if len(below) < 2:
