@@ -1,4 +1,4 @@
-"""Energy and wear: dissipated energy, its map over a patch, slip distance and Archard's wear work."""
+"""Energy and wear: dissipated energy, its map over a patch, slip distance, Archard's wear work; free static force."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from bladefem.errors import InputError
 from bladefem.friction.aft import Forces
 from bladefem.friction.harmonics import harmonics_of, synthesis
 
-__all__ = ["energy_density", "slip_distance", "wear_depth"]
+__all__ = ["energy_density", "free_static_force", "slip_distance", "wear_depth"]
 
 
 def energy_density(forces: Forces, patch: Patch) -> np.ndarray:
@@ -34,3 +34,16 @@ def slip_distance(elements: Elements, w: np.ndarray, forces: Forces, samples: in
     slider = (w[:, 1:] - forces.f[:, 1:] / np.asarray(elements.kt)[:, None, None]) @ T.T
     path = np.linalg.norm(np.diff(slider, axis=-1, append=slider[..., :1]), axis=1).sum(-1)
     return np.where(forces.shares[:, 1] > 0, path, 0.0)
+
+
+def free_static_force(elements: Elements, w: np.ndarray, samples: int = 512) -> np.ndarray:
+    """(n,) size up to which any static friction force is in equilibrium with the vibration w [N]; 0 where it slips.
+
+    A stuck node may carry any mean force within [-r, r], r = min over the period of mu N - k_t |w_t - its mean|
+    (mu N - k_t A where N is constant): its history decides, and vibration does not tell. Sampled.
+    """
+    T = synthesis(harmonics_of(w), samples)
+    load = np.asarray(elements.n0)[:, None] + np.asarray(elements.kn)[:, None] * (w[:, 0] @ T.T)
+    swing = (w[:, 1:, 1:] @ T[:, 1:].T) * np.asarray(elements.kt)[:, None, None]
+    limit = np.asarray(elements.mu)[:, None] * np.maximum(load, 0.0)
+    return np.clip((limit - np.linalg.norm(swing, axis=1)).min(axis=1), 0.0, None)

@@ -42,7 +42,7 @@ def node_table(patches: Sequence[Patch], cycles: Sequence[ContactCycle],
         frames.append(pd.DataFrame({
             "load": c.load, **mass, "patch": names, "x": place[:, 0], "y": place[:, 1], "z": place[:, 2], "area": area,
             "stick": c.shares[:, 0], "slip": c.shares[:, 1], "separated": c.shares[:, 2], "state": c.state,
-            "work": c.work, **wear}))
+            "work": c.work, "free_static_force": c.spare, **wear}))
     return pd.concat(frames, ignore_index=True)
 
 

@@ -11,6 +11,7 @@ import numpy as np
 from ..contact.stiffness import aggregation
 from ..data import Elements, Patch
 from ..friction.aft import evaluate
+from ..friction.energy import free_static_force
 from ..friction.harmonics import synthesis
 from .family import joined
 from .joint import LoadCase
@@ -39,6 +40,7 @@ class ContactCycle:
     shares: np.ndarray      # (nodes, 3) share of the period in stick, slip and separation [1]
     state: np.ndarray       # (nodes,) SEPARATED, STICK, PARTIAL_SLIP or GROSS_SLIP of friction.aft
     work: np.ndarray        # (nodes,) friction work a period and area, the wear-work map [J/m^2]
+    spare: np.ndarray       # (nodes,) size up to which the static friction force of their element is free [N]
     loops: dict[str, Loop]  # name of the patch to its hysteresis
 
     def wear(self, coefficient: float) -> np.ndarray:
@@ -67,7 +69,7 @@ def contact_cycle(case: LoadCase, curve: Curve, patches: Sequence[Patch], points
     starts = np.cumsum([0] + [len(patch.area) for patch in patches])
     rows = [np.unique(groups[a:b]) for a, b in pairwise(starts)]
     return ContactCycle(case.load, case.mass, curve.peak.frequency, forces.shares[groups], forces.state[groups],
-                        (forces.dissipated / np.bincount(groups, area))[groups],
+                        (forces.dissipated / np.bincount(groups, area))[groups], free_static_force(elements, w)[groups],
                         {patch.name: _loop(elements, w, some) for patch, some in zip(patches, rows, strict=True)})
 
 

@@ -13,6 +13,7 @@ from bladefem.errors import InputError
 from bladefem.friction.aft import STICK, evaluate
 from bladefem.friction.approximation import from_series
 from bladefem.friction.closed_form import circular_orbit_work, jenkins
+from bladefem.friction.energy import free_static_force
 from bladefem.friction.events import evaluate_exact
 from bladefem.friction.march import check_step, stable_step, step_2d
 from bladefem.friction.orbit import period, start
@@ -161,6 +162,11 @@ def test_F15_the_static_force_of_a_stuck_element_is_that_of_its_mean_displacemen
             assert forces.f[0, 1, 0] == pytest.approx(expected, abs=1e-12)
             np.testing.assert_allclose(forces.f[0, 1, 1:], 0.6 * np.eye(6)[0], atol=1e-12)
             assert forces.state[0] == STICK
+    for kind, motion in ((element(1.0, mu=1.0), moved(3, t_c1=0.6, t_m=9.0)),
+                         (element(1.0, mu=1.0, tangents=2), moved(3, 3, t_c1=0.6, u_s1=0.3, t_m=9.0))):
+        assert free_static_force(kind, motion)[0] == pytest.approx(0.4, abs=1e-12)      # the interval is [-0.4, 0.4]
+    assert free_static_force(element(1.0, 1.0, 1.0), moved(3, t_c1=0.2, n_c1=0.5))[0] == pytest.approx(0.3)
+    assert free_static_force(element(1.0, mu=1.0), moved(3, t_c1=1.2))[0] == 0
     naive = corrected(0.6 * np.cos(clock(64, 2)), np.ones(129), 1.0, 1.0)       # the same march, started from f = 0
     assert naive[64:128].mean() == pytest.approx(-0.4, abs=1e-12)               # a false static force
 

@@ -14,6 +14,7 @@ from bladefem.hbm.sweep import size
 from bladefem.scene_file import load_scene
 from bladefem.study.choice import adapted, checked, choose, estimated, peak_of
 from bladefem.study.family import carried, coarsened, family_of, member
+from bladefem.study.indicators import indicate, richer
 from bladefem.study.joint import LoadCase
 from bladefem.study.loads import curve_of
 from bladefem.study.settings import Settings, enriched, first_for
@@ -95,3 +96,14 @@ def test_settings_tell_how_many_contact_points_there_are():
     assert "all 23 contact points of each seat" in settings.sentence(23)
     assert "64 of 81 contact points on each seat" in settings.sentence(81)
     assert "all 23 contact points" in replace(settings, points=None).sentence(23)
+
+
+def test_exact_events_stay_exact_in_the_models_that_judge():
+    """samples 0: richer models locate changes of state too, and there is no error of sampling."""
+    family = family_of(reference_model(points=4, load=0.3))
+    settings = replace(first_for(family.modes), harmonics=3, samples=0)
+    assert richer(family, settings, "samples") is None
+    assert richer(family, settings, "harmonics").samples == 0
+    point = solve(member(family, settings).model, 2 * np.pi * 1237.0, 3, 0)
+    found = indicate(family, settings, point)
+    assert point.converged and found.errors["samples"] == 0 and 0 < found.errors["harmonics"] < 0.1
