@@ -12,9 +12,10 @@ from ..friction.events import _batch as exact_batch
 from ..friction.jenkins import jenkins_batch
 
 __all__ = ["CONVERGED", "EXHAUSTED", "INFINITE", "SINGULAR", "STALLED", "apply", "back_substitute", "compiled_newton",
-           "factorise", "norm"]
+           "factorise", "factorise_large", "norm"]
 
 CONVERGED, EXHAUSTED, STALLED, SINGULAR, INFINITE, SEARCHING = 0, 1, 2, 3, 4, 5
+BLOCK, LARGE = 32, 64       # columns of a block; unknowns from which blocks pay
 
 
 @njit(cache=True, error_model="numpy")
@@ -144,6 +145,40 @@ def factorise(M, pivots):
 
 
 @njit(cache=True, error_model="numpy")
+def factorise_large(M, pivots):
+    """The same for a contiguous real matrix, in blocks of columns: most of the work is one matrix product a block."""
+    size = M.shape[0]
+    for low in range(0, size, BLOCK):
+        high = min(low + BLOCK, size)
+        for k in range(low, high):
+            best = k
+            for i in range(k + 1, size):
+                if abs(M[i, k]) > abs(M[best, k]):
+                    best = i
+            pivots[k] = best
+            if not abs(M[best, k]) > 0.0:
+                return False
+            if best != k:
+                for j in range(size):
+                    M[k, j], M[best, j] = M[best, j], M[k, j]
+            for i in range(k + 1, size):
+                factor = M[i, k] / M[k, k]
+                M[i, k] = factor
+                if factor != 0.0:
+                    for j in range(k + 1, high):
+                        M[i, j] -= factor * M[k, j]
+        for k in range(low, high if high < size else low):
+            for i in range(k + 1, high):
+                factor = M[i, k]
+                for j in range(high, size):
+                    M[i, j] -= factor * M[k, j]
+        if high < size:
+            left, right = np.ascontiguousarray(M[high:, low:high]), np.ascontiguousarray(M[low:high, high:])
+            M[high:, high:] -= np.dot(left, right)
+    return True
+
+
+@njit(cache=True, error_model="numpy")
 def back_substitute(M, pivots, x):
     """x becomes M^-1 x."""
     size = M.shape[0]
@@ -250,7 +285,7 @@ def compiled_newton(w, d, linear, contact, sticks, tolerance, iterations, shorte
         active = _active(J, springs, d, sticks)
         M, pivots = np.empty((active.size * d * K, active.size * d * K)), np.empty(active.size * d * K, np.int64)
         _jacobian(A, J, springs, d, active, M)
-        if not factorise(M, pivots):
+        if not (factorise_large(M, pivots) if pivots.size > LARGE else factorise(M, pivots)):
             code = SINGULAR
             break
         _copy(J, old)
