@@ -18,7 +18,6 @@ from geometry.quality import quality_rows
 from ..contact.states import quasi_static
 from ..data import ModeSet
 from ..progress import Progress, unwatched
-from ..reduction.assemble import folded_diameter
 from ..scene import Scene
 from ..scene_file import dump
 from ..store import on_root, write_results, write_table
@@ -28,6 +27,8 @@ from ..study.loads import summary
 from ..study.modal import family_table
 from ..study.stability import UNIQUE
 from ..study.state_check import state_sentence
+from ..study.strength import Strength
+from ..study.survey import excited_set
 from ..view import contact, mesh, modes, response, speed
 from .datasets import datasets, table_dataset
 from .nodes import (
@@ -85,7 +86,7 @@ def _write(result: pipeline.Run, progress: Progress) -> None:
         figures[name] = folder / f"{name.split('/')[1]}.png"
         draw(figures[name])
     mesh.save_vtu(result.mesh, folder / "mesh.vtu")
-    modes.save_modes_vtu(result.mesh, excited_modes(result), folder / "modes.vtu")
+    modes.save_modes_vtu(result.mesh, excited_set(result), folder / "modes.vtu")
     contact.save_pressure_vtu(result.contact.maps, folder / "pressure.vtu")
     save_cycles_vtu(patches, cycles, folder / "friction_work.vtu", coefficient)
     messages = [*result.messages, _static_contact(result), _states(result), *_beyond_stick(result),
@@ -115,15 +116,6 @@ def _beyond_stick(result: pipeline.Run) -> list[str]:
             "and count as open in full stick"] if above else []
 
 
-def excited_modes(result: pipeline.Run) -> ModeSet:
-    """The modes of the nodal diameter that the engine order excites."""
-    sector = result.mesh.sector
-    if result.modes[0].nodal_diameter is None or sector is None:
-        return result.modes[0]
-    wanted, _ = folded_diameter(1, result.scene.excitation.engine_order, sector.count)
-    return min(result.modes, key=lambda m: abs(m.nodal_diameter - wanted))
-
-
 def _tables(result: pipeline.Run) -> dict[str, pd.DataFrame]:
     """Tables of the report, "section/name", SI columns."""
     seats = [m for maps in result.contact.maps.values() for m in maps]
@@ -132,11 +124,12 @@ def _tables(result: pipeline.Run) -> dict[str, pd.DataFrame]:
     pressure.insert(0, "load", loads[:len(pressure)])
     curves = result.response.curves
     return {"mesh/quality": pd.DataFrame(quality_rows(result.mesh), columns=["what", "value"]),
-            "modes/modes": family_table(excited_modes(result), result.mesh),
-            "modes/nodal_diameters": mode_table(result.modes, result.mesh),
+            "modes/modes": family_table(excited_set(result), result.mesh, result.clamped),
+            "modes/nodal_diameters": mode_table(result.modes, result.mesh, result.clamped),
+            "modes/stresses": _stresses(result.strength),
             "contact/pressure": pressure,
             **_own_load(result),
-            "response/summary": pd.DataFrame(summary(curves, result.response.limits)),
+            "response/summary": _summary(result),
             "response/points": _joined([*map(points_of, curves), *map(linear_points, result.response.limits)])}
 
 
@@ -144,6 +137,22 @@ def _joined(parts: list[pd.DataFrame]) -> pd.DataFrame:
     """Response points of all curves; the linear limits have one motion each."""
     points = pd.concat(parts, ignore_index=True)
     return points.fillna({"stability": UNIQUE}) if "stability" in points else points
+
+
+def _summary(result: pipeline.Run) -> pd.DataFrame:
+    """The design table, with the alternating stress of the mode studied."""
+    table = pd.DataFrame(summary(result.response.curves, result.response.limits))
+    table.insert(table.columns.get_loc("reduction") + 1, "alternating_stress",
+                 result.strength.alternating * table["peak_amplitude"])
+    return table
+
+
+def _stresses(found: Strength) -> pd.DataFrame:
+    """Where the blade is stressed most, by rotation and by the mode studied."""
+    rows = [("rotation", found.steady, found.steady_at),
+            (f"mode {found.mode}, 1 mm at the probe", 1e-3 * found.alternating, found.alternating_at)]
+    return pd.DataFrame([{"state": name, "von_mises_gauss": size, **dict(zip("xyz", place, strict=True))}
+                         for name, size, place in rows if size > 0])
 
 
 def _own_load(result: pipeline.Run) -> dict[str, pd.DataFrame]:
@@ -193,7 +202,7 @@ def linear_points(limit: Limit) -> pd.DataFrame:
 
 def _drawings(result: pipeline.Run, tables: dict[str, pd.DataFrame]) -> dict[str, Callable[[Path], object]]:
     """What to draw: "section/name" to a function of the file."""
-    geometry, excited, loads = result.mesh, excited_modes(result), list(result.contact.maps)
+    geometry, excited, loads = result.mesh, excited_set(result), list(result.contact.maps)
     middle = loads[len(loads) // 2]
     drawings = {
         "mesh/mesh": lambda file: mesh.draw_mesh(geometry, file, title=result.scene.title),

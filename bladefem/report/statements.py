@@ -44,7 +44,7 @@ def answer(summary: pd.DataFrame | None, points: pd.DataFrame | None = None, own
         numbers.append(("friction damping ratio there", f"{100 * best['friction_damping']:.3g} %", energy(best)))
     elif energy(best):
         numbers.append(("friction work per cycle there", energy(best).split(" of ")[0], ""))
-    return Answer([*numbers, *own_mass(finite, best, own)], cautions(finite, best, points))
+    return Answer([*numbers, *stress(summary, best), *own_mass(finite, best, own)], cautions(finite, best, points))
 
 
 def among(finite: pd.DataFrame, best: pd.Series) -> str:
@@ -57,6 +57,16 @@ def among(finite: pd.DataFrame, best: pd.Series) -> str:
     a, b, _ = np.polyfit(x - x[1], y, 2)
     return f"best of {len(table)}; a parabola through it and its neighbours has its lowest point at " \
            f"{best['load'] * np.exp(-b / (2 * a)):.3g} N"
+
+
+def stress(summary: pd.DataFrame, best: pd.Series) -> list[tuple[str, str, str]]:
+    """What the amplitude means for the blade."""
+    if not np.isfinite(best.get("alternating_stress", np.nan)):
+        return []
+    free = summary.loc[summary["load"] == 0, "alternating_stress"]
+    beside = f"; {1e-6 * free.iloc[0]:.3g} MPa without damper" if len(free) else ""
+    return [("alternating stress there", f"{1e-6 * best['alternating_stress']:.3g} MPa",
+             f"largest von Mises amplitude of the mode alone{beside}")]
 
 
 def own_mass(finite: pd.DataFrame, best: pd.Series, own: pd.DataFrame | None) -> list[tuple[str, str, str]]:

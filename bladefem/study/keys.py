@@ -13,7 +13,8 @@ from ..store import code_of, key_of
 from .joint import LoadCase
 from .settings import Settings
 
-__all__ = ["contact_key", "mesh_key", "modes_key", "pair_key", "reduction_key", "response_key", "zmass_key"]
+__all__ = ["contact_key", "mesh_key", "modes_key", "pair_key", "reduction_key", "response_key", "strength_key",
+           "zmass_key"]
 
 
 def mesh_key(scene: Scene) -> str:
@@ -34,6 +35,11 @@ def modes_key(scene: Scene) -> str:
     operation = scene.operation
     return key_of(mesh_key(scene), scene.material.blade, operation.speed if operation.stiffening else 0.0,
                   operation.preload, scene.model.nodal_diameters, code_of("bladefem.fem"))
+
+
+def strength_key(scene: Scene) -> str:
+    """Stresses of the mode studied and of rotation."""
+    return key_of(modes_key(scene), scene.operation.speed, scene.excitation, code_of("bladefem.study"))
 
 
 def contact_key(scene: Scene) -> str:

@@ -25,10 +25,11 @@ from ..scene import Scene
 from ..store import stage
 from ..units import show
 from .choice import choose, covered, peak_of
+from .clamped import clamped_blade
 from .cycle import labels
 from .family import Family, Member, coarsened, member, shared_harmonics
 from .joint import LoadCase, joint_model
-from .keys import contact_key, mesh_key, modes_key, reduction_key, response_key
+from .keys import contact_key, mesh_key, modes_key, reduction_key, response_key, strength_key
 from .liftoff import named
 from .limits import Limit, linear_limits
 from .loads import Curve, default_loads, study_loads
@@ -40,12 +41,14 @@ from .stages import (
     Reduced,
     build_mesh,
     contact_patches,
+    excited_modes,
     find_modes,
     harmonic_diameters,
     reduce_sector,
     seat_damper,
     weighted,
 )
+from .strength import Strength, strength
 
 __all__ = ["STAGES", "Response", "Run", "Seating", "family_of_case", "load_cases", "reduced_sector", "run"]
 
@@ -85,7 +88,9 @@ class Run:
     folder: Path | None
     mesh: Mesh
     modes: list[ModeSet] | None = None
+    clamped: ModeSet | None = None      # of the aerofoil held at its root, at rest; None where the blade is that itself
     contact: Seating | None = None
+    strength: Strength | None = None
     reduced: Reduced | None = None
     response: Response | None = None
     timings: dict[str, float] = field(default_factory=dict)     # stage to seconds
@@ -117,7 +122,8 @@ def run(scene: Scene, folder: str | Path, until: str = "response", comm: Any = N
     patches = [] if until == "modes" else contact_patches(mesh)     # what the mesh lacks is told before long work
     bodies = Bodies(scene, mesh, comm, progress)
     with clock("modes"):
-        result = replace(result, modes=keep("modes", modes_key(scene), lambda: find_modes(bodies)))
+        result = replace(result, modes=keep("modes", modes_key(scene), lambda: find_modes(bodies)),
+                         clamped=keep("clamped", modes_key(scene), lambda: clamped_blade(bodies)))
     if until == "modes":
         return result
     with clock("contact"):
@@ -128,6 +134,9 @@ def run(scene: Scene, folder: str | Path, until: str = "response", comm: Any = N
         result = replace(result, contact=Seating(problem, maps, _own_load(scene, problem, clock.messages)))
     if until == "contact":
         return result
+    with clock("stresses"):
+        excited = excited_modes(scene, mesh, result.modes)
+        result = replace(result, strength=keep("strength", strength_key(scene), lambda: strength(bodies, excited)))
     cases = load_cases(scene, mesh, result.contact)
     with clock("reduction"):
         settings, reduced = reduced_sector(scene, bodies, cases[len(cases) // 2], list(patches), keep)

@@ -22,8 +22,8 @@ from ..scene_parts import part_materials
 from ..store import on_root
 from .ports import blade_ports, damper_ports
 
-__all__ = ["Bodies", "Reduced", "blade_parts", "build_mesh", "contact_patches", "find_modes", "harmonic_diameters",
-           "is_wheel", "reduce_sector", "seat_damper", "wheel_modes"]
+__all__ = ["Bodies", "Reduced", "blade_parts", "build_mesh", "contact_patches", "excited_modes", "find_modes",
+           "harmonic_diameters", "is_wheel", "reduce_sector", "seat_damper", "wheel_modes"]
 
 MODES_SHOWN = 10        # of each nodal diameter, in tables and pictures
 DAMPER_MODES = 16       # of the elastic damper, its six rigid ones included
@@ -168,6 +168,14 @@ def find_modes(bodies: Bodies, diameters: Sequence[int] | None = None, count: in
         return [modes(flex.con, count, flex)]
     wanted = diameters or bodies.scene.model.nodal_diameters or harmonic_diameters(bodies.scene, bodies.mesh, 3)
     return wheel_modes(bodies, count, wanted)
+
+
+def excited_modes(scene: Scene, mesh: Mesh, modes: Sequence[ModeSet]) -> ModeSet:
+    """The modes of the nodal diameter that the engine order excites, or of the nearest one that is there."""
+    if modes[0].nodal_diameter is None or mesh.sector is None:
+        return modes[0]
+    wanted, _ = folded_diameter(1, scene.excitation.engine_order, mesh.sector.count)
+    return min(modes, key=lambda m: abs(m.nodal_diameter - wanted))
 
 
 def wheel_modes(bodies: Bodies, count: int, diameters: Sequence[int] | None = None, direct: bool = False,

@@ -18,19 +18,19 @@ from ..encode import read_npz
 from ..errors import InputError
 from ..hbm.model import Damping
 from ..progress import Progress, unwatched
-from ..reduction.assemble import folded_diameter
 from ..scene import Scene
 from ..store import code_of, key_of, on_root, stage
 from . import pipeline
 from .answer import Answer, answer
 from .campbell import Campbell, campbell
+from .clamped import clamped_blade
 from .converge import Convergence, converge, default_sizes
 from .effective import effective_masses
 from .keys import modes_key
-from .modal import blade_root, mac
-from .stages import MODES_SHOWN, Bodies, is_wheel, wheel_modes
+from .modal import mac
+from .stages import MODES_SHOWN, Bodies, excited_modes, is_wheel, wheel_modes
 
-__all__ = ["Survey", "Wanted", "clamped_blade", "excited_set", "survey"]
+__all__ = ["Survey", "Wanted", "excited_set", "survey"]
 
 ORDERS = 3      # engine orders above and below the scene's own, in Campbell and SAFE diagrams
 
@@ -95,28 +95,9 @@ def survey(scene: Scene, folder: str | Path, wanted: Wanted, comm: Any = None,
     return result if other is None else _compared(result, *other)
 
 
-def clamped_blade(bodies: Bodies) -> ModeSet | None:
-    """Modes of the aerofoil alone, held at its root: what the modes of the wheel are called after.
-
-    Returns:
-        None where the modes are those of a clamped blade already, or the mesh names no aerofoil.
-    """
-    from ..fem.constraint import constrain
-    from ..fem.modes import modes
-    mesh = bodies.mesh
-    if not is_wheel(mesh) or not {"pressure_side", "suction_side"} & set(mesh.faces):
-        return None
-    root = np.flatnonzero(mesh.points[:, 0] <= blade_root(mesh) + 1e-9)
-    held = replace(bodies.still_blade.mesh, nodes={**mesh.nodes, "aerofoil_root": root})
-    return modes(constrain(replace(bodies.still_blade, mesh=held), "aerofoil_root"), MODES_SHOWN)
-
-
 def excited_set(run: pipeline.Run) -> ModeSet:
     """The modes of the nodal diameter that the engine order excites, or the nearest one that is there."""
-    if run.modes[0].nodal_diameter is None:
-        return run.modes[0]
-    wanted, _ = folded_diameter(1, run.scene.excitation.engine_order, run.mesh.sector.count)
-    return min(run.modes, key=lambda m: abs(m.nodal_diameter - wanted))
+    return excited_modes(run.scene, run.mesh, run.modes)
 
 
 def _all_modes(bodies: Bodies, direct: bool) -> list[ModeSet]:
