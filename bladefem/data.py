@@ -13,6 +13,8 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
+from .errors import InputError
+
 __all__ = ["Elements", "ModeSet", "Patch", "PortModel", "PressureMap", "RigidBody"]
 
 
@@ -31,6 +33,9 @@ class PortModel:
     """A linear body seen from its ports (contact, load and probe freedoms) in one nodal diameter.
 
     Receptance at circular frequency w:  shapes diag(1/(omega^2 - w^2 + damping)) shapes^H + residual  [m/N].
+
+    Raises:
+        InputError: arrays that do not fit each other, numbers that are not finite, or a negative frequency or damping.
     """
 
     omega: np.ndarray               # (m,) [rad/s], ascending; 0 for rigid modes
@@ -40,6 +45,19 @@ class PortModel:
     nodal_diameter: int | None = None
     static_offset: np.ndarray | None = None     # (p,) displacement under the static loads (n = 0 only) [m]
     damping: np.ndarray | None = None           # (m,) or coupled (m, m) viscous modal damping, beside the model's [1/s]
+
+    def __post_init__(self) -> None:
+        p, m = len(self.residual), len(self.omega)
+        wanted = {"omega": [(m,)], "shapes": [(p, m)], "residual": [(p, p)], "damping": [(m,), (m, m)]}
+        for name, shapes in wanted.items():
+            value = getattr(self, name)
+            if value is None and name == "damping":
+                continue
+            if np.shape(value) not in shapes or not np.isfinite(value).all():
+                raise InputError(f"PortModel.{name} of shape {np.shape(value)}: expected finite numbers of shape "
+                                 f"{' or '.join(map(str, shapes))}")
+            if (name == "omega" or np.ndim(value) == 1) and np.any(value < 0):
+                raise InputError(f"PortModel.{name} from {np.min(value):.4g}: expected no negative number")
 
 
 @dataclass(frozen=True)

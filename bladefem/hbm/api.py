@@ -20,6 +20,7 @@ from .sticking import INSTANTS, grips
 
 __all__ = ["as_solution", "free", "solve", "stuck"]
 
+STIFF = 1e5             # contact springs over the bodies' stiffness from which a failure is put down to it
 STUCK = Options(iterations=1, fallbacks=False)
 
 
@@ -36,8 +37,9 @@ def solve(model: ReducedModel, omega: float, H: int = 3, samples: int = 128, *, 
 
     Raises:
         InputError: the frequency, H or samples are out of range, or the start belongs to another model.
+        NotSolvedError: a resonance without damping is hit exactly.
     """
-    _check(model, omega, H, start)
+    _check(model, omega, H, samples, start)
     lean = _stuck_throughout(model, omega, H, samples, start) if options.frugal else None
     if lean is not None:
         return lean
@@ -47,7 +49,7 @@ def solve(model: ReducedModel, omega: float, H: int = 3, samples: int = 128, *, 
     balance = Balance(model, condense(model, omega, H), samples)
     attempts = solve_balance(balance, None if start is None else match_harmonics(start.w, H), options)
     best = min(attempts, key=lambda a: (not a.end.converged, a.end.state.error))
-    reason = best.end.reason if best.end.converged else "; ".join(f"{a.method}: {a.end.reason}" for a in attempts)
+    reason = best.end.reason if best.end.converged else _reasons(balance, attempts)
     balance = replace(balance, samples=best.samples or samples)
     return as_solution(balance, best, sum(a.end.iterations for a in attempts), reason)
 
@@ -98,11 +100,25 @@ def _stuck_throughout(model: ReducedModel, omega: float, H: int, samples: int,
     return found if found.converged and grips(model, found) else None
 
 
-def _check(model: ReducedModel, omega: float, H: int, start: Solution | None) -> None:
+def _reasons(balance: Balance, attempts: list[Attempt]) -> str:
+    """Why every attempt failed, and what may help."""
+    linear = balance.linear
+    ratio = float(np.median(linear.springs * abs(np.diagonal(linear.G[1]))))
+    stiff = [f"contacts {ratio:.1g} times as stiff as the bodies: expected less than {STIFF:.0e} where they slip or "
+             "lift off"] if ratio > STIFF else []
+    return "; ".join([f"{a.method}: {a.end.reason}" for a in attempts] + stiff)
+
+
+def _check(model: ReducedModel, omega: float, H: int, samples: int, start: Solution | None) -> None:
     if not isinstance(omega, Real) or not 0 < omega < np.inf:
         raise InputError(f"omega {omega}: expected a positive circular frequency")
     if not isinstance(H, Integral) or H < 1:
         raise InputError(f"H {H}: expected a whole number of harmonics, at least 1")
+    if not isinstance(samples, Integral) or samples < 0:
+        raise InputError(f"samples {samples}: expected a whole number a period, or 0 to locate transitions exactly")
+    if samples == 0 and model.elements.tangents > 1:
+        raise InputError("samples 0: transitions are located exactly for elements with one tangent only, expected "
+                         "samples above 0 with two")
     if start is not None and (not isinstance(start, Solution) or start.w.shape[:2] != model.springs.shape):
         raise InputError("start: expected a Solution of a model with the same contact nodes")
     highest = max((*model.excitation, *model.normal), default=0)

@@ -11,10 +11,12 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..data import PortModel
-from ..errors import InputError
+from ..errors import InputError, NotSolvedError
 
 __all__ = ["Damping", "Stack", "amplitudes", "block", "damping_rate", "flexibility", "impedance_rate", "lost", "motion",
            "receptance", "rigid_stack", "stacked"]
+
+SPARE = 1e100           # frequency of the modes that fill up a harmonic which has fewer [rad/s]: nothing moves them
 
 
 @dataclass(frozen=True)
@@ -45,7 +47,7 @@ class Damping:
 class Stack:
     """One body in the nodal diameters of harmonics 0..H; S = 1 for all of them, else H+1. m modes, P ports."""
 
-    omega: np.ndarray           # (S, m) [rad/s]; filled up with 1 where a harmonic has fewer modes
+    omega: np.ndarray           # (S, m) [rad/s]; filled up with SPARE where a harmonic has fewer modes
     viscous: np.ndarray         # (S, m) modal damping [1/s]
     hysteretic: np.ndarray      # (S, m) loss factor times omega^2 [1/s^2]
     coupled: np.ndarray | None  # (S, m, m) viscous damping that couples modes [1/s]
@@ -63,7 +65,7 @@ def stacked(bodies: tuple[PortModel, ...], damping: Damping, rows: np.ndarray) -
         raise InputError("sides: the bodies of the harmonics have ports of different sizes, expected the same")
     most = max(len(body.omega) for body in bodies)
     order = [np.concatenate(parts) for parts in ports]
-    omega = np.array([_fill(body.omega, most, 1.0) for body in bodies])
+    omega = np.array([_fill(body.omega, most, SPARE) for body in bodies])
     own = [np.zeros(len(body.omega)) if body.damping is None or body.damping.ndim == 2 else body.damping
            for body in bodies]
     viscous = np.array([_fill(damping.viscous(body.omega) + c, most) for body, c in zip(bodies, own, strict=True)])
@@ -89,11 +91,18 @@ def flexibility(stack: Stack, w: np.ndarray) -> np.ndarray:
     """(k, m), or (k, m, m) for coupled damping: inverse modal impedances at the circular frequencies w (k,) [s^2].
 
     Rigid modes count as immovable at w = 0.
+
+    Raises:
+        NotSolvedError: a resonance without damping is hit exactly.
     """
     w = w[:, None]
     Z = stack.omega**2 - w**2 + 1j * (w * stack.viscous + np.sign(w) * stack.hysteretic)
     still = (w == 0) & (stack.omega == 0)
     if stack.coupled is None:
+        hit = np.any((Z == 0) & ~still, axis=1)
+        if hit.any():
+            raise NotSolvedError(f"a resonance without damping is hit exactly, at {w[hit][0, 0]:.10g} rad/s: expected "
+                                 "some damping, or another frequency")
         return np.divide(1.0, Z, out=np.zeros_like(Z), where=~still)
     full = 1j * w[:, :, None] * stack.coupled
     modes = np.arange(Z.shape[1])

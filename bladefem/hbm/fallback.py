@@ -9,7 +9,7 @@
 4. homotopy in the normal load, from a load under which everything sticks down to the true one;
 5. the same by path following in the excitation, which goes round the folds that contacts with lift-off have;
 6. shooting in time, where the model has a form in time, and Newton from its harmonics;
-7. the path in the excitation again with four times the samples, which coarse ones can interrupt at lift-off.
+7. the path in the excitation again with twice the samples, which coarse ones can interrupt at lift-off.
 """
 
 from __future__ import annotations
@@ -80,10 +80,11 @@ def _ways(balance: Balance, start: np.ndarray | None, options: Options) -> Itera
     if balance.linear.A.shape[0] > 4:
         yield Attempt("harmonics in sequence", _more_harmonics(balance, options))
     yield Attempt("load homotopy", _from_high_load(balance, options))
-    yield Attempt("path in the excitation", _along_excitation(balance, options))
+    path = _along_excitation(balance, options)
+    yield Attempt("path in the excitation", path)
     yield Attempt("shooting", _from_shooting(balance, near, options))
-    if balance.samples:
-        denser = replace(balance, samples=4 * balance.samples)
+    if balance.samples and path.iterations < LONGEST_PATH:      # it was interrupted, and did not get lost
+        denser = replace(balance, samples=2 * balance.samples)
         yield Attempt("path in the excitation, more samples", _along_excitation(denser, options), denser.samples)
 
 

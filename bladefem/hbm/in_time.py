@@ -19,6 +19,7 @@ from .system import System
 __all__ = ["shooting_start", "time_system"]
 
 LARGEST = 200           # coordinates and elements up to which shooting is tried
+FASTEST = 1e4           # highest frequency over the excitation's up to which shooting is tried: 1 s an iteration
 MASSLESS = 1e-9         # residual flexibility, over that of the contact springs, that is left out
 
 
@@ -59,6 +60,9 @@ def shooting_start(balance: Balance) -> np.ndarray:
     system = time_system(model, H)
     if sum(system.W.shape) > LARGEST:
         raise InputError(f"{sum(system.W.shape)} coordinates and elements are too many, expected at most {LARGEST}")
+    ratio = system.fastest / balance.linear.omega
+    if ratio > FASTEST:
+        raise InputError(f"motions {ratio:.1g} times as fast as the excitation, expected at most {FASTEST:.0e}")
     solution = periodic(system, balance.linear.omega, samples=max(256, 8 * H))
     if not solution.converged:
         raise NotSolvedError(solution.reason)

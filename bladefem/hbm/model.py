@@ -71,6 +71,13 @@ class ReducedModel:
         return port_size(self.sides[0], "contact") == len(self.elements.kt) * self.elements.tangents
 
     @cached_property
+    def damped(self) -> bool:
+        """The blades lose work by themselves."""
+        own = self.damping
+        return (any(np.any(x) for x in (own.ratio, own.structural, own.mass, own.stiffness))
+                or any(side.damping is not None for side in self.sides))
+
+    @cached_property
     def directions(self) -> int:
         """Displacements of a node that enter the balance: the normal one does where some kn > 0."""
         return self.elements.tangents + bool(np.any(self.elements.kn > 0))
@@ -94,6 +101,13 @@ class ReducedModel:
         if self.directions > self.elements.tangents:
             force[:, 0] = np.maximum(self.elements.n0, 0.0)
         return force.ravel()
+
+    @cached_property
+    def compression(self) -> float:
+        """Size of what the preload presses the contact springs together [m]; above zero."""
+        springs = self.springs.ravel()
+        pressed = np.divide(self.preload, springs, out=np.zeros_like(self.preload), where=springs > 0)
+        return float(max(np.linalg.norm(pressed), np.finfo(float).tiny))
 
     @cached_property
     def table(self) -> np.ndarray:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from numbers import Integral
 
 import numpy as np
 
@@ -35,8 +36,8 @@ class Options:
     def __post_init__(self) -> None:
         if not 1e-14 <= self.tolerance <= 1e-2:
             raise InputError(f"tolerance {self.tolerance}: expected 1e-14 to 1e-2")
-        if self.iterations < 1:
-            raise InputError(f"iterations {self.iterations}: expected at least 1")
+        if not isinstance(self.iterations, Integral) or self.iterations < 1:
+            raise InputError(f"iterations {self.iterations}: expected a whole number, at least 1")
 
 
 DEFAULTS = Options()

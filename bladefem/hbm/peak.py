@@ -66,6 +66,8 @@ def find_peak(model: ReducedModel, omega: float, H: int = 3, samples: int = 128,
         start = solve(model, omega, H, samples, start=start, options=options)
         if not start.converged:
             raise NotSolvedError(f"peak search stopped at {start.frequency:.6g} Hz: {start.reason}")
+        if size(start, options.probe) == 0:
+            raise NotSolvedError(f"peak search at {start.frequency:.6g} Hz: probe {options.probe} does not move")
         now = _Look(start, size(start, options.probe),
                     float(sensitivities(model, start, ["omega"])["omega"].size[options.probe]))
         low, high = (now, high) if now.slope > 0 else (low, now)

@@ -28,6 +28,8 @@ DENSE = 300         # unknowns up to which a dense factorisation is faster than 
 LARGEST = 5000      # unknowns up to which it is the last resort where GMRES does not arrive: 200 MB, some seconds
 WATCHED = 600       # unknowns up to which the sign of a determinant is worth its time
 ACCURACY = 1e-5     # of a step by GMRES, relative
+QUIET = 1e-8        # of the preload's compression: smaller motions drown in its rounding,
+AT_REST = 1e-4      # and their residual is measured by this share of it
 STICKS = 1e-13      # a node whose p is below this share of its spring force sticks
 
 
@@ -237,9 +239,12 @@ def _jacobian(A: np.ndarray, change: np.ndarray) -> np.ndarray:
 
 def _error(balance: Balance, w: np.ndarray, residual: np.ndarray) -> float:
     linear, r = balance.linear, as_amplitudes(residual)
-    with_springs = np.linalg.norm(r) / max(np.linalg.norm(as_amplitudes(w)), np.finfo(float).tiny)
+    size, scale, pressed = np.linalg.norm(as_amplitudes(w)), _scale(linear), balance.model.compression
+    if scale < QUIET * pressed:
+        size, scale = max(size, AT_REST * pressed), max(scale, AT_REST * pressed)
+    with_springs = np.linalg.norm(r) / max(size, np.finfo(float).tiny)
     r[1:] += _apply(linear.G[1:], linear.springs * r[1:])
-    return max(with_springs, np.linalg.norm(r) / _scale(linear))
+    return float(max(with_springs, np.linalg.norm(r) / scale))
 
 
 def _apply(flexibility: np.ndarray, forces: np.ndarray) -> np.ndarray:

@@ -36,8 +36,11 @@ def solve_small(model: ReducedModel, omega: float, H: int, samples: int, start: 
     body, held, springs, contact = prepared
     n, d = model.springs.shape
     begin = np.empty((n * d, 0)) if start is None else np.ascontiguousarray(start.reshape(n * d, -1), dtype=float)
-    w, ends, f, probe, counts, measures = _point(omega, body, held, springs, contact, d, H, begin, options.tolerance,
-                                                 options.iterations)
+    try:
+        w, ends, f, probe, counts, measures = _point(omega, body, held, springs, contact, d, H, begin,
+                                                     options.tolerance, options.iterations)
+    except ZeroDivisionError:       # a resonance without damping: the plain way tells which
+        return None
     steps, code, error = ends
     if code != CONVERGED:
         return None if start is None else solve_small(model, omega, H, samples, None, options)

@@ -10,7 +10,7 @@ from math import prod
 
 import numpy as np
 
-from ..errors import InputError
+from ..errors import InputError, NotSolvedError
 from .api import solve
 from .check import check_probe
 from .fallback import match_harmonics
@@ -24,6 +24,8 @@ __all__ = ["first_look", "local_maxima", "response", "size", "sweep"]
 
 Keep = Callable[[float, Callable[[], Solution]], Solution]
 Slope = Callable[[float], float]     # of the height with the frequency, at a solved one
+BESIDE = 1e-7   # of a frequency: how far beside a resonance without damping a sweep solves, where it hits it exactly
+SHY = 1e-5      # the same for the first look at a model without damping, whose flexibility stuck is all rounding there
 COARSE = 12     # intervals of the first look at a band
 PARABOLA = 3    # points that a start is extrapolated from
 BAND_LIMIT = 400    # points after which a sweep gives up refining
@@ -38,13 +40,15 @@ def response(model: ReducedModel, omegas: Iterable[float], H: int = 3, samples: 
              options: Options = DEFAULTS, keep: Keep = lambda omega, compute: compute()) -> Iterator[Solution]:
     """Solve one point after the other, each started from the curve through the last ones.
 
+    Where a resonance without damping is hit exactly, the point 1e-7 beside it is solved, as its `omega` says.
+
     Args:
         keep: is given each frequency and what solves it; see `bladefem.hbm.record`.
     """
     last: list[Solution] = []
     for omega in omegas:
         start = _ahead(last, omega, H)
-        solution = keep(omega, partial(solve, model, omega, H, samples, start=start, options=options))
+        solution = keep(omega, partial(_solve, model, omega, H, samples, start, options))
         yield solution
         if solution.converged:
             last = [*last[-2:], solution]
@@ -82,9 +86,18 @@ def sweep(model: ReducedModel, band: tuple[float, float], H: int = 3, samples: i
         if wanted is None:
             return
         near = sorted((s for s in solved.values() if s.converged), key=lambda s: abs(s.omega - wanted))[:1]
-        solution = solve(model, wanted, H, samples, start=near[0] if near else None, options=options)
+        solution = _solve(model, wanted, H, samples, near[0] if near else None, options)
         solved[wanted] = solution
         yield solution
+
+
+def _solve(model: ReducedModel, omega: float, H: int, samples: int, start: Solution | None,
+           options: Options) -> Solution:
+    """The point, or the one a hair beside it."""
+    try:
+        return solve(model, omega, H, samples, start=start, options=options)
+    except NotSolvedError:
+        return solve(model, omega * (1 + BESIDE), H, samples, start=start, options=options)
 
 
 def local_maxima(points: list[Solution], probe: int = 0) -> list[Solution]:
@@ -98,6 +111,8 @@ def first_look(model: ReducedModel, band: tuple[float, float]) -> np.ndarray:
     seeds = np.concatenate([resonances(model, h) for resonances in (free_resonances, stuck_resonances)
                             for h in model.excitation if h > 0])
     inside = seeds[(seeds > band[0]) & (seeds < band[1])]
+    if not model.damped:
+        inside = inside * (1 + SHY)
     grid = np.linspace(*band, COARSE + 1)
     keep = [x for x in grid[1:-1] if not np.any(abs(inside - x) < 0.2 * (grid[1] - grid[0]))]
     return np.unique(np.concatenate([grid[[0, -1]], keep, inside]))

@@ -71,8 +71,10 @@ def vary(model: ReducedModel, name: str, value: float) -> ReducedModel:
     """The model with one parameter changed: a factor on its present value, or for "gap" an added opening [m].
 
     Raises:
-        InputError: unknown name, or a parameter that the model does not have.
+        InputError: unknown name, a parameter that the model does not have, or a negative factor.
     """
+    if name not in ADDED and not 0 <= value < np.inf:
+        raise InputError(f"{name} {value}: expected a finite factor, not negative")
     return PARAMETERS[check_parameter(name)](model, value)
 
 

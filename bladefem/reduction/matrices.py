@@ -9,7 +9,7 @@ import numpy as np
 from scipy import io, linalg, sparse
 
 from ..data import PortModel
-from ..errors import InputError, suggestion
+from ..errors import InputError
 from .exchange import read_ansys, read_dmig
 
 __all__ = ["port_model_from_matrices", "read_matrices"]
@@ -53,6 +53,8 @@ def port_model_from_matrices(M: np.ndarray, K: np.ndarray, ports: Mapping[str, n
     rest = shapes[:, count:] / np.sqrt(values[count:])
     kept = vectors[:, :count]
     damping = None if C is None else _modal_damping(kept.conj().T @ C @ kept)
+    if damping is not None and np.min(lowest := damping if damping.ndim == 1 else np.diag(damping).real) < 0:
+        raise InputError(f"C damps a mode by {np.min(lowest):.3g} 1/s: expected no negative damping")
     return PortModel(np.sqrt(values[:count]), shapes[:, :count], rest @ rest.conj().T, slices, nodal_diameter,
                      damping=damping)
 
@@ -68,13 +70,19 @@ def read_matrices(path: str | Path) -> dict[str, np.ndarray]:
         InputError: the file is missing, of another kind, or cannot be read.
     """
     path = Path(path)
+    suffix = path.suffix.lower()
     readers = {".npz": _read_npz, ".mat": _read_mat, ".mtx": _read_market, ".full": read_ansys,
                **dict.fromkeys((".bdf", ".dat", ".pch", ".dmig"), read_dmig)}
-    if path.suffix not in readers:
-        raise InputError(f"file {path.name}: expected one of {', '.join(readers)}{suggestion(path.suffix, readers)}")
+    if suffix not in readers:
+        raise InputError(f"file {path.name}: expected one of {', '.join(readers)}")
     if not path.is_file():
         raise InputError(f"file {path}: not found")
-    return readers[path.suffix](path)
+    try:
+        return readers[suffix](path)
+    except InputError:
+        raise
+    except Exception as error:      # of the many kinds that NumPy's and SciPy's readers raise
+        raise InputError(f"file {path}: cannot be read as {suffix}, {error}") from error
 
 
 def _read_npz(path: Path) -> dict[str, np.ndarray]:
