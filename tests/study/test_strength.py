@@ -11,7 +11,7 @@ from bladefem.study.stages import Bodies, excited_modes, find_modes
 from bladefem.study.strength import strength
 
 sys.path.insert(0, str(Path(__file__).parents[1] / "fem"))
-from structured import box  # noqa: E402
+from structured import box
 
 L, T, E, RHO, SPEED = 0.15, 0.004, 210e9, 7850.0, 800.0
 
