@@ -5,6 +5,7 @@ import pytest
 from models import block, single_mass
 
 from bladefem.errors import NotSolvedError
+from bladefem.hbm import sweep
 from bladefem.hbm.optimum import optimum
 from bladefem.hbm.share import shared, shared_response
 from bladefem.hbm.sweep import response, size
@@ -33,6 +34,35 @@ def test_any_number_of_ranks_gives_the_same_numbers(model, omegas, tmp_path):
         assert len(together) == len(omegas)
         for one, other in zip(together, alone, strict=True):
             assert np.array_equal(one.w, other.w) and one.iterations == other.iterations and one.work == other.work
+    comm.Barrier()
+
+
+@pytest.mark.mpi
+def test_a_killed_run_goes_on_with_any_number_of_ranks(tmp_path, monkeypatch):
+    """Killed on one rank in its second block; only the points that were not written are solved again."""
+    from mpi4py import MPI
+    comm, model, plain, solved = MPI.COMM_WORLD, single_mass(), sweep.solve, []
+    folder = comm.bcast(tmp_path)
+    alone = shared_response(model, OMEGAS, 3, 64)
+
+    def until(most):
+        def work(*args, **kwargs):
+            if len(solved) == most:
+                raise KeyboardInterrupt
+            solved.append(args[1])
+            return plain(*args, **kwargs)
+        return work
+
+    if comm.rank == 0:
+        monkeypatch.setattr(sweep, "solve", until(20))
+        with pytest.raises(KeyboardInterrupt):
+            shared_response(model, OMEGAS, 3, 64, folder=folder)
+    comm.Barrier()
+    solved.clear()
+    monkeypatch.setattr(sweep, "solve", until(len(OMEGAS)))
+    again = shared_response(model, OMEGAS, 3, 64, comm=comm, folder=folder)
+    assert comm.allreduce(len(solved)) == len(OMEGAS) - 20
+    assert all(np.array_equal(one.w, other.w) for one, other in zip(again, alone, strict=True))
     comm.Barrier()
 
 
