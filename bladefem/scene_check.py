@@ -11,12 +11,12 @@ from pathlib import Path
 
 from .errors import InputError
 from .scene import Scene
-from .scene_fields import convert, each_field, used_tables
+from .scene_fields import convert, each_field, used_tables, value_at
 from .scene_parts import part_materials
 from .scene_seats import contact_problems
 from .units import show
 
-__all__ = ["validate"]
+__all__ = ["refuse_response", "validate"]
 
 
 def validate(scene: Scene) -> None:
@@ -28,7 +28,7 @@ def validate(scene: Scene) -> None:
     tables = used_tables(scene.kind)
     for field in each_field():
         if "." not in field.name or field.name.split(".")[0] in tables:
-            convert(_value(scene, field.name), field)
+            convert(value_at(scene, field.name), field)
     problems = [*_CHECKS.get(scene.kind, _nothing)(scene), *_numerics(scene), *contact_problems(scene)]
     if "study" in tables:
         problems += _study(scene)
@@ -38,11 +38,19 @@ def validate(scene: Scene) -> None:
         raise InputError(problems[0])
 
 
-def _value(scene: Scene, name: str) -> object:
-    value: object = scene
-    for part in name.split("."):
-        value = getattr(value, part)
-    return value
+def refuse_response(scene: Scene) -> None:
+    """What modes can do without and a response cannot: damping, and a force.
+
+    Raises:
+        InputError: one of them is zero.
+    """
+    if "operation" not in used_tables(scene.kind):
+        return
+    if not scene.operation.damping > 0:
+        raise InputError("operation.damping = 0: expected above 0 for a response, a resonance without damping has no "
+                         "bounds")
+    if not scene.excitation.force > 0:
+        raise InputError("excitation.force = 0 N: expected above 0 N for a response")
 
 
 def _nothing(_: Scene) -> Iterator[str]:

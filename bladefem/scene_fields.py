@@ -11,7 +11,7 @@ from .errors import InputError, suggestion
 from .scene import Scene
 from .units import is_plain, parse, readable_units, show
 
-__all__ = ["TABLES", "Field", "convert", "each_field", "field_at", "split_values", "used_tables"]
+__all__ = ["TABLES", "Field", "convert", "each_field", "field_at", "split_values", "used_tables", "value_at"]
 
 _COMMON = ("mesh", "material", "contact", "study", "model")
 _ENGINE = (*_COMMON, "operation", "excitation")
@@ -81,6 +81,14 @@ def field_at(name: str) -> Field:
 
 def _head(name: str) -> str:
     return name.rpartition(".")[0]
+
+
+def value_at(scene: Scene, name: str) -> Any:
+    """The value of a dotted field."""
+    value: Any = scene
+    for part in name.split("."):
+        value = getattr(value, part)
+    return value
 
 
 def convert(value: object, field: Field) -> Any:

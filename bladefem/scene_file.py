@@ -13,7 +13,7 @@ from typing import Any, NamedTuple, get_type_hints
 from .errors import InputError, suggestion
 from .scene import Scene
 from .scene_check import validate
-from .scene_fields import TABLES, Field, convert, each_field, field_at, used_tables
+from .scene_fields import TABLES, Field, convert, each_field, field_at, used_tables, value_at
 from .units import exact, show
 
 __all__ = ["Row", "dump", "given_keys", "load_scene", "read_tables", "resolved", "scene_of", "vary"]
@@ -105,7 +105,7 @@ def resolved(scene: Scene, given: Iterable[str] | None = None) -> list[Row]:
     given = None if given is None else set(given)
     rows = []
     for field in _used_fields(scene):
-        value = _value_at(scene, field.name)
+        value = value_at(scene, field.name)
         default = value == field.default if given is None else field.name not in given
         rows.append(Row(field.name, _shown(value, field), default, field.meta.get("help", "")))
     return rows
@@ -115,7 +115,7 @@ def dump(scene: Scene) -> str:
     """TOML text that :func:`load_scene` turns back into the very same scene, defaults written out."""
     lines, table = [], ""
     for field in _used_fields(scene):
-        value = _value_at(scene, field.name)
+        value = value_at(scene, field.name)
         head, _, key = field.name.rpartition(".")
         if head != table:
             lines += ["", f"[{head}]"]
@@ -185,13 +185,6 @@ def _replace(table: Any, path: list[str], value: object, name: str) -> Any:
 def _used_fields(scene: Scene) -> Iterable[Field]:
     tables = used_tables(scene.kind)
     return (f for f in each_field() if "." not in f.name or f.name.split(".")[0] in tables)
-
-
-def _value_at(scene: Scene, name: str) -> Any:
-    value: Any = scene
-    for part in name.split("."):
-        value = getattr(value, part)
-    return value
 
 
 def _shown(value: Any, field: Field) -> str:

@@ -19,7 +19,7 @@ LAYERS = ["errors", "lazy", "progress", "geometry", "units", "scene", "data", "f
           "hbm", "balance", "damper", "study", "view", "report", "cli"]
 # Modules beside the packages, and the layer that they belong to.
 BESIDE = {"scene_fields": "scene", "scene_parts": "scene", "scene_check": "scene", "scene_seats": "scene",
-          "scene_file": "scene", "encode": "data", "store": "data"}
+          "scene_file": "scene", "scene_doubts": "scene", "encode": "data", "store": "data", "run_folder": "data"}
 # Each foreign library has one home.
 HOMES = {"gmsh": "geometry", "dolfinx": "fem", "ufl": "fem", "basix": "fem", "petsc4py": "fem", "slepc4py": "fem",
          "matplotlib": "view", "pyvista": "view", "vtk": "view", "tqdm": "progress", "argparse": "cli"}

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import argparse
+import sys
 from collections.abc import Callable
 from functools import partial
 from pathlib import Path
@@ -12,19 +13,22 @@ from ..errors import InputError
 from ..scene import Scene
 from . import tables
 
-__all__ = ["chart", "check", "contact", "info", "mesh", "modes", "reduce", "report", "response",
-           "study"]
+__all__ = ["chart", "check", "contact", "default_folder", "info", "mesh", "modes", "prepared", "reduce", "report",
+           "response", "tell", "until"]
 
 
 def check(options: argparse.Namespace, comm: Any) -> None:
-    """Print the resolved scene."""
+    """Print the resolved scene, and what in it is improbable."""
+    from ..scene_doubts import doubts
     from ..scene_file import given_keys, read_tables, resolved, scene_of
     from ..store import on_root
     file = scene_path(options.scene)
 
     def table() -> str:
         written = read_tables(file, options.overrides)
-        return tables.resolved_scene(resolved(scene_of(written, file.resolve().parent), given_keys(written)))
+        scene = scene_of(written, file.resolve().parent)
+        rows = tables.resolved_scene(resolved(scene, given_keys(written)))
+        return "\n".join([rows, *(f"note: {doubt}" for doubt in doubts(scene))])
 
     text = on_root(comm, table)
     if comm is None or comm.rank == 0:
@@ -87,19 +91,19 @@ def contact(options: argparse.Namespace, comm: Any) -> None:
 
 def reduce(options: argparse.Namespace, comm: Any) -> None:
     """Blade and damper reduced to their contact, load and probe points; a later response starts from there."""
-    run = until("reduction", options, comm)
+    run = until("reduction", options, comm, responds=True)
     tell(options, comm, lambda: tables.reduction(run.reduced), run)
 
 
 def response(options: argparse.Namespace, comm: Any) -> None:
     """Forced response for each load."""
-    run = until("response", options, comm)
+    run = until("response", options, comm, responds=True)
     tell(options, comm, lambda: tables.responses(run.response), run)
 
 
 def report(options: argparse.Namespace, comm: Any) -> None:
     """Everything, with figures and report."""
-    scene, folder, bars = prepared(options, comm)
+    scene, folder, bars = prepared(options, comm, responds=True)
     if scene.kind in WITHOUT_BLADE:
         return without_blade(scene, folder, options, comm)
     from ..report.run import run as whole
@@ -133,38 +137,11 @@ def chart(options: argparse.Namespace, comm: Any) -> None:
     elif options.scene is None:
         raise InputError("chart: expected a scene file, or --reference")
     else:
-        from ..scene_file import load_scene
-        folder = Path(options.output or default_folder(options.scene))
-        scene = on_root(comm, lambda: load_scene(scene_path(options.scene), options.overrides))
         sizes = _sizes(options.mesh, "mesh")
+        scene, folder, _ = prepared(options, comm, responds=True)
         made, accuracy, title = scene_chart(scene, folder, options.budget, comm, sizes), scene.accuracy, scene.title
     files = on_root(comm, lambda: write_chart(made, folder, accuracy, title))
     tell(options, comm, lambda: "\n".join([*made.remarks, "written: " + ", ".join(map(str, files))]))
-
-
-def study(options: argparse.Namespace, comm: Any) -> None:
-    """The response for several values of one field, each in its own folder inside the run folder."""
-    name, equals, text = (part.strip() for part in options.vary.partition("="))
-    values = variants(name, text) if equals else []
-    if not values:
-        raise InputError(f"--vary {options.vary}: expected key=values, such as damper.angle='30, 40, 50 deg'")
-    base = Path(options.output or default_folder(options.scene))
-    best = []
-    for value in values:
-        one = argparse.Namespace(**vars(options))
-        one.overrides = [*options.overrides, f"{name}={value}"]
-        one.output = str(base / f"{name}={value}".replace(" ", "").replace("/", "_"))
-        run = until("response", one, comm)
-        best.append((value, run.response))
-        tell(options, comm, lambda value=value: f"\n{name} = {value}", run)
-    tell(options, comm, lambda: "\n" + tables.side_by_side(name, best))
-
-
-def variants(name: str, text: str) -> list[str]:
-    """Texts of the single values; the last unit holds for those without one, as in "30, 40, 50 deg"."""
-    from ..scene_fields import field_at, split_values
-    field_at(name)
-    return split_values(text)
 
 
 def info(options: argparse.Namespace, comm: Any) -> None:
@@ -175,16 +152,23 @@ def info(options: argparse.Namespace, comm: Any) -> None:
         print(tables.plain(rows))
 
 
-def prepared(options: argparse.Namespace, comm: Any) -> tuple[Scene, Path, Any]:
-    """The scene, the run folder with a copy of it, and progress bars; collective."""
+def prepared(options: argparse.Namespace, comm: Any, responds: bool = False) -> tuple[Scene, Path, Any]:
+    """The scene, the run folder with a copy of it, kept for this command, and progress bars; collective.
+
+    Args:
+        responds: a forced response is to come.
+    """
     from ..progress import wanted, watch
-    from ..store import on_root, open_folder, write_text
+    from ..store import on_root
     folder = Path(options.output or default_folder(options.scene))
 
     def prepare() -> Scene:
-        from ..scene_file import dump, load_scene
-        scene = load_scene(scene_path(options.scene), options.overrides)
-        write_text(open_folder(folder) / "scene.toml", dump(scene))
+        from ..run_folder import locked, take_folder
+        scene = given_scene(options, responds)
+        options.held.enter_context(locked(folder))
+        moved = take_folder(folder, scene)
+        if moved and not options.quiet:
+            print(f"bladefem: {moved}", file=sys.stderr, flush=True)
         return scene
 
     scene = on_root(comm, prepare)
@@ -192,9 +176,19 @@ def prepared(options: argparse.Namespace, comm: Any) -> tuple[Scene, Path, Any]:
     return scene, folder, partial(watch, shown=wanted(options.quiet, rank))
 
 
-def until(stage: str, options: argparse.Namespace, comm: Any) -> Any:
+def given_scene(options: argparse.Namespace, responds: bool) -> Scene:
+    """The scene of the file and the options, checked."""
+    from ..scene_check import refuse_response
+    from ..scene_file import load_scene
+    scene = load_scene(scene_path(options.scene), options.overrides)
+    if responds:
+        refuse_response(scene)
+    return scene
+
+
+def until(stage: str, options: argparse.Namespace, comm: Any, responds: bool = False) -> Any:
     """The pipeline up to a stage, with progress bars; collective."""
-    scene, folder, bars = prepared(options, comm)
+    scene, folder, bars = prepared(options, comm, responds)
     from ..study import pipeline
     return pipeline.run(scene, folder, until=stage, comm=comm, progress=bars)
 

@@ -9,8 +9,9 @@ import argparse
 import os
 import sys
 from collections.abc import Sequence
+from contextlib import ExitStack
 
-from . import commands, ranks
+from . import commands, ranks, study
 
 __all__ = ["main", "parser"]
 
@@ -43,7 +44,7 @@ _COMMANDS = {
     "response": ("forced response with friction for each load",
                  "bladefem response scenes/wedge.toml --set study.loads='20, 50, 100 N'", commands.response),
     "study": ("the same for several values of one parameter, side by side",
-              "bladefem study scenes/wedge.toml --vary damper.angle='30, 40, 50 deg'", commands.study),
+              "bladefem study scenes/wedge.toml --vary damper.angle='30, 40, 50 deg'", study.study),
     "chart": ("time against error of methods and models, with the automatic choice",
               "bladefem chart scenes/plane.toml --budget 60", commands.chart),
     "report": ("figures, tables and report of a run",
@@ -56,7 +57,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
     """Run one command and return its exit code; messages go to the error stream of rank 0."""
     os.environ.setdefault("OMP_NUM_THREADS", "1")       # more BLAS threads only get in each other's way
     options = parser().parse_args(arguments)
-    return ranks.guarded(lambda comm: options.function(options, comm), options)
+    with ExitStack() as options.held:                   # run folders, kept for this command
+        return ranks.guarded(lambda comm: options.function(options, comm), options)
 
 
 def parser() -> argparse.ArgumentParser:

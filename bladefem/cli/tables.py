@@ -11,7 +11,7 @@ from geometry.quality import quality_rows
 from ..units import show
 
 __all__ = ["frame", "frequencies", "mesh_quality", "plain", "pressures", "reduction", "resolved_scene", "responses",
-           "side_by_side", "summary", "survey"]
+           "summary", "survey", "table"]
 
 
 def plain(rows: Sequence[Sequence[object]], head: Sequence[str] = ()) -> str:
@@ -85,9 +85,7 @@ def survey(found: Any) -> str:
                 for row in found.convergence.summary.itertuples()]
         parts.append(plain(rows, ["mode", "finest [Hz]", "limit [Hz]", "order", "error [%]", "why no limit"]))
     if found.answer is not None:
-        rows = [[row.mode, f"{row.frequency:.2f}", f"{row.amplitude:.4e}", f"{180 * row.phase / pi:.1f}",
-                 f"{row.largest:.4e}"] for row in found.answer.resonances.itertuples()]
-        parts.append(plain(rows, ["mode", "resonance [Hz]", "amplitude [m]", "phase [deg]", "largest [m]"]))
+        parts.append(table(found.answer.resonances[["mode", "frequency", "amplitude", "phase", "largest"]]))
     if found.mac is not None:
         rows = [[i + 1, row.argmax() + 1, f"{row.max():.4f}"] for i, row in enumerate(found.mac)]
         parts.append(plain(rows, ["mode", "mode of the other run", "MAC"]))
@@ -106,17 +104,19 @@ def pressures(maps: Mapping[float, Sequence[Any]]) -> str:
 
 
 def responses(response: Any) -> str:
-    """Resonance against load, and what damping is gained over no damper."""
-    undamped, (free, stuck) = response.free_peak[1], response.limits
-    rows = [["no damper", f"{free.peak_frequency:.2f}", f"{free.peak_amplitude:.4e}", "1", "", ""]]
-    for c in response.curves:
-        rows.append([_case(c), f"{c.peak_frequency:.2f}", f"{c.peak_amplitude:.4e}",
-                     f"{undamped / c.peak_amplitude:.3g}", len(c.frequency), int((~c.converged).sum())])
-    rows.append(["full stick", f"{stuck.peak_frequency:.2f}", f"{stuck.peak_amplitude:.4e}",
-                 f"{undamped / stuck.peak_amplitude:.3g}", "", ""])
-    best = min(response.curves, key=lambda c: c.peak_amplitude)
-    table = plain(rows, ["load", "resonance [Hz]", "amplitude [m]", "reduction", "points", "unconverged"])
-    return f"{table}\nbest of these loads: {_case(best)}, amplitude divided by {undamped / best.peak_amplitude:.3g}"
+    """Resonance against load, and what damping is gained over no damper; in the units of the report."""
+    import pandas as pd
+
+    from ..study.loads import summary
+    undamped, curves = response.free_peak[1], response.curves
+    rows = pd.DataFrame(summary(curves, response.limits))[list(SHOWN)]
+    rows.insert(0, "seat load", ["no damper", *map(_case, curves), "full stick"])
+    best = min(curves, key=lambda c: c.peak_amplitude)
+    return (f"{table(rows)}\nbest of these loads: {_case(best)}, amplitude divided by "
+            f"{undamped / best.peak_amplitude:.3g}")
+
+
+SHOWN = ("peak_frequency", "peak_amplitude", "reduction", "dissipated", "error", "points", "unconverged")
 
 
 def _case(curve: Any) -> str:
@@ -124,14 +124,10 @@ def _case(curve: Any) -> str:
     return show(curve.load, "N") + ("" if curve.mass is None else f" on {show(curve.mass, 'kg')}")
 
 
-def side_by_side(name: str, results: Sequence[tuple[str, Any]]) -> str:
-    """The best load of each variant."""
-    rows = []
-    for value, response in results:
-        best = min(response.curves, key=lambda c: c.peak_amplitude)
-        rows.append([value, f"{response.free_peak[0]:.2f}", show(best.load, "N"), f"{best.peak_frequency:.2f}",
-                     f"{best.peak_amplitude:.4e}", f"{response.free_peak[1] / best.peak_amplitude:.3g}"])
-    return plain(rows, [name, "free [Hz]", "best load", "resonance [Hz]", "amplitude [m]", "reduction"])
+def table(rows: Any) -> str:
+    """A pandas table of SI columns, in the units of the report."""
+    from ..report.tables import readable
+    return frame(readable(rows))
 
 
 def summary(run: Any) -> str:

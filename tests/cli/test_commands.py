@@ -9,6 +9,7 @@ import sys
 from types import SimpleNamespace
 
 import numpy as np
+import pandas as pd
 import pytest
 
 import bladefem.report
@@ -16,6 +17,7 @@ import bladefem.study
 from bladefem.cli.main import main, parser
 from bladefem.data import ModeSet, Patch, PressureMap
 from bladefem.errors import InputError, NotSolvedError
+from bladefem.run_folder import locked
 from bladefem.scene_file import load_scene
 from geometry.mesh import Mesh
 
@@ -23,9 +25,14 @@ WEDGE = "scenes/wedge.toml"
 
 
 def fake_curve(load, amplitude):
-    return SimpleNamespace(load=load, mass=None,
+    peak = SimpleNamespace(work=SimpleNamespace(dissipated=2e-3), states={"slip": 3, "lift": 0})
+    return SimpleNamespace(load=load, mass=None, peak=peak, settings=SimpleNamespace(error=0.013, harmonics=3),
                            peak_frequency=830.0, peak_amplitude=amplitude, frequency=np.arange(5.0),
                            converged=np.array([True, True, False, True, True]))
+
+
+def fake_limit(load, frequency):
+    return SimpleNamespace(load=load, peak_frequency=frequency, peak_amplitude=8e-5, frequency=np.arange(3.0))
 
 
 def fake_run(folder):
@@ -33,7 +40,7 @@ def fake_run(folder):
     modes = [ModeSet(np.array([812.4, 2000.0]), np.zeros((2, 4, 3)), n, np.array([1e-12, 2e-12])) for n in (0, 1)]
     patch = Patch("this", np.zeros((2, 3)), np.array([1e-5, 3e-5]), np.zeros((2, 3, 3)), np.zeros((1, 2)), None, None)
     seat = PressureMap(patch, np.array([40.0, 0.0]), np.array([0.0, 1e-6]), 1e-14)
-    limits = tuple(SimpleNamespace(peak_frequency=f, peak_amplitude=8e-5) for f in (812.4, 850.0))
+    limits = fake_limit(0.0, 812.4), fake_limit(np.inf, 850.0)
     response = SimpleNamespace(limits=limits, free_peak=(812.4, 8e-5),
                                curves=[fake_curve(20.0, 4e-5), fake_curve(50.0, 2e-5)])
     body = SimpleNamespace(omega=np.array([500.0, 1000.0]), shapes=np.zeros((6, 2)))
@@ -99,7 +106,8 @@ SHOWN = {
     "mesh": ["worst Jacobian", "0.31", "body blade, cells"], "modes": ["812.40", "2000.00", "2.0e-12"],
     "contact": ["40 N", "this", "4 ", "25.0", "1.0e-14"],
     "reduce": ["sector, nodal diameter 9", "159.2", "damper", "port freedoms"], "report": ["best of these loads: 50 N"],
-    "response": ["no damper", "4.0000e-05", "best of these loads: 50 N, amplitude divided by 4"],
+    "response": ["no damper", "resonance amplitude [µm]", "estimated error [%]", " 40  ", " 1.3  ",
+                 "best of these loads: 50 N, amplitude divided by 4"],
     "run": ["best of these loads: 50 N"],
 }
 
@@ -134,13 +142,71 @@ def test_a_run_folder_stands_for_its_scene(pipeline, tmp_path):
 
 
 def test_study_runs_each_value_in_its_own_folder(pipeline, tmp_path, capsys):
-    assert main(["study", WEDGE, "-o", str(tmp_path), "--vary", "damper.angle=30, 45 deg"]) == 0
+    assert main(["study", WEDGE, "-o", str(tmp_path), "--vary", "damper.angle=30, 45, 30 deg"]) == 0
     assert [round(np.degrees(scene.damper.angle)) for scene, *_ in pipeline.calls] == [30, 45]
     assert len({folder for _, folder, _ in pipeline.calls}) == 2
-    assert [line.split()[:5] for line in capsys.readouterr().out.splitlines()[-2:]] == [
-        ["30", "deg", "812.40", "50", "N"], ["45", "deg", "812.40", "50", "N"]]
-    assert main(["study", WEDGE, "-o", str(tmp_path), "--vary", "damper.angle"]) == 2
-    assert main(["study", WEDGE, "-o", str(tmp_path), "--vary", "damper.angel=1"]) == 2
+    out = capsys.readouterr().out
+    assert out.startswith("damper.angle = 30 deg (1 of 2)\n") and "damper.angle = 45 deg (2 of 2)\n" in out
+    assert "resonance amplitude [µm]" in out and "study.csv" in out.splitlines()[-1]
+    table, loads = (pd.read_csv(tmp_path / f"{name}.csv") for name in ("study", "study_loads"))
+    assert list(table["value"]) == ["30 deg", "45 deg"]
+    np.testing.assert_allclose(table["damper.angle [rad]"], np.radians([30, 45]))
+    assert set(table["load [N]"]) == {50.0} and set(table["peak_amplitude [m]"]) == {2e-5} and len(loads) == 8
+    assert {f"study.{kind}" for kind in ("csv", "md", "tex", "png")} <= {p.name for p in tmp_path.iterdir()}
+    assert "| 30 deg | 0.5236 | 812.4 | 80 | 50 | 830 | 20 |" in (tmp_path / "study.md").read_text()
+
+
+@pytest.mark.parametrize("vary", ["damper.angle", "damper.angel=1", "damper.angle=30, 80 deg",
+                                  "excitation.force=1, 0 N", "aerofoil.twist=10, 20", "mesh.size=",
+                                  "kind=wedge sector, punch"])
+def test_study_checks_all_values_before_the_first_run(vary, pipeline, tmp_path, capsys):
+    assert main(["study", WEDGE, "-o", str(tmp_path), "--vary", vary]) == 2
+    assert capsys.readouterr().err.count("\n") == 1 and pipeline.calls == []
+
+
+@pytest.mark.parametrize("command", ["run", "response", "reduce"])
+@pytest.mark.parametrize("override", ["operation.damping=0", "excitation.force=0 N"])
+def test_a_response_needs_damping_and_a_force(command, override, pipeline, tmp_path, capsys):
+    assert main([command, WEDGE, "-o", str(tmp_path / "run"), "--set", override]) == 2
+    said = capsys.readouterr().err
+    assert override.split("=")[0] in said and "expected above 0" in said and said.count("\n") == 1
+    assert pipeline.calls == [] and not (tmp_path / "run").exists()
+    assert main(["modes", WEDGE, "-o", str(tmp_path / "run"), "--set", override]) == 0
+
+
+def test_a_chart_needs_damping(tmp_path, capsys):
+    assert main(["chart", WEDGE, "-o", str(tmp_path), "--set", "operation.damping=0"]) == 2
+    assert "operation.damping = 0: expected above 0" in capsys.readouterr().err
+
+
+def test_check_notes_what_is_improbable(capsys):
+    assert main(["check", WEDGE, "--set", "material.blade.E=210 MPa"]) == 0
+    assert capsys.readouterr().out.splitlines()[-1].startswith("note: material.blade.E = 210 MPa: ")
+
+
+def test_results_of_another_scene_are_put_away(pipeline, tmp_path, capsys):
+    mesh = ["mesh", WEDGE, "-o", str(tmp_path)]
+    assert main(mesh) == 0
+    for name in ("report.html", "first.png"):
+        (tmp_path / name).write_text("first")
+    capsys.readouterr()
+    assert main(mesh) == 0 and capsys.readouterr().err == ""
+    assert main([*mesh, "--set", "contact.mu=0.2"]) == 0
+    said = capsys.readouterr().err
+    assert said == f"bladefem: {tmp_path} holds results of another scene: 2 files moved to {tmp_path / 'earlier'}\n"
+    assert {p.name for p in (tmp_path / "earlier").iterdir()} == {"report.html", "first.png", "scene.toml"}
+    (tmp_path / "second.png").write_text("second")
+    assert main([*mesh, "--quiet"]) == 0 and capsys.readouterr().err == ""
+    assert {p.name for p in (tmp_path / "earlier").iterdir()} == {"second.png", "scene.toml"}
+
+
+def test_one_command_at_a_time_in_a_folder(pipeline, tmp_path, capsys):
+    with locked(tmp_path):
+        assert main(["mesh", WEDGE, "-o", str(tmp_path)]) == 2
+        said = capsys.readouterr().err
+        assert "another command works in it" in said and said.count("\n") == 1
+        assert pipeline.calls == [] and not (tmp_path / "scene.toml").exists()
+    assert main(["mesh", WEDGE, "-o", str(tmp_path)]) == 0
 
 
 def raiser(error):
