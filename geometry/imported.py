@@ -5,8 +5,8 @@ body "blade", whatever its volume is called; the names are kept as its parts, wh
 Faces, edges and node sets: the names of geometry.mesh.Mesh;
 others are kept. A node set becomes a face too when it holds all corners of outer facets (Abaqus NSET, Ansys
 components). The model is turned so that the engine axis is z and +x is midway between the cyclic faces. Pairs are
-matched, not made: the mesh must be periodic from cyclic_low to cyclic_high (either sense), and have matching nodes on
-seats and flanks.
+matched, not made: the mesh must be periodic from cyclic_low to cyclic_high (either sense). Seats and flanks of a wheel
+may have nodes of their own, which leaves their pair without matched nodes; those of other models must match.
 """
 
 from __future__ import annotations
@@ -17,6 +17,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from scipy.spatial import cKDTree
 
 from bladefem.errors import InputError, suggestion
 
@@ -34,6 +35,7 @@ from .topology import DIMENSION, FAMILY, boundary, outward
 __all__ = ["mesh_of_raw", "read_geometry", "read_mesh"]
 
 LOOSE = 1e-4        # files carry few digits; a match within this share of the face is a match, and is then snapped
+OPPOSITE = -0.98    # cosine between outward normals of two faces that look at each other
 SMALLEST, LARGEST = 1e-4, 20.0      # of a model [m]: beyond these its unit was taken for another
 FLIPPED = {"tetra": [0, 2, 1, 3], "tetra10": [0, 2, 1, 3, 6, 5, 4, 7, 9, 8], "triangle": [0, 2, 1],
            "triangle6": [0, 2, 1, 5, 4, 3]}
@@ -184,12 +186,37 @@ def _paired(mesh: Mesh, sectors: int, source: str) -> Mesh:
 
 
 def _matched(mesh: Mesh, names: tuple[str, str], rotation: np.ndarray, shift: np.ndarray, sectors: int) -> Pair:
-    """A contact pair, with a hint when the number of sectors was left out."""
+    """A contact pair; without matched nodes where those of a wheel's seat and flank differ but lie on each other.
+
+    Raises:
+        InputError: neither; with a hint when the number of sectors was left out.
+    """
     try:
         return match(mesh.points, mesh.faces, names, mesh.dimension, rotation, shift, LOOSE)
     except InputError as error:
+        if sectors and _facing(mesh, names, rotation, shift):
+            return Pair(*names, np.zeros((2, 0), dtype=int), rotation, shift)
         hint = "" if sectors else "; on a wheel, imported.sectors must be given"
         raise InputError(f"{error}{hint}") from None
+
+
+def _facing(mesh: Mesh, names: tuple[str, str], rotation: np.ndarray, shift: np.ndarray) -> bool:
+    """Two faces look at each other, and half of the smaller one's nodes are within an edge of the other's."""
+    master, slave = (mesh.points[np.unique(mesh.faces[name])] for name in names)
+    edges, normals = zip(*(_measured(mesh, name) for name in names), strict=True)
+    apart = cKDTree(master).query((slave - shift) @ rotation)[0]
+    back = cKDTree((slave - shift) @ rotation).query(master)[0]
+    near = max((apart < max(edges)).mean(), (back < max(edges)).mean())
+    return bool(near > 0.5 and normals[0] @ (normals[1] @ rotation) < OPPOSITE)
+
+
+def _measured(mesh: Mesh, name: str) -> tuple[float, np.ndarray]:
+    """Longest edge [m] and mean outward normal (3,) of a face group, from its elements' corners."""
+    x = mesh.points[mesh.faces[name][:, :mesh.dimension]]
+    first, last = x[:, 1] - x[:, 0], x[:, -1] - x[:, 0]
+    normal = np.cross(first, last if mesh.dimension == 3 else [0.0, 0.0, 1.0]).sum(axis=0)
+    edge = max(np.linalg.norm(first, axis=1).max(), np.linalg.norm(last, axis=1).max())
+    return float(edge), normal / np.linalg.norm(normal)
 
 
 def _pitch(mesh: Mesh) -> np.ndarray:

@@ -8,8 +8,11 @@ import pytest
 from structured import box, sector
 from writers import write_cdb, write_inp, write_step
 
+from bladefem.contact.seat import seat
+from bladefem.contact.summary import resultant
 from bladefem.errors import InputError
 from bladefem.fem.loads import volume
+from bladefem.scene import Materials
 from geometry.export import write_msh
 from geometry.imported import read_mesh
 from geometry.parameters import Disc, MeshSize, Plane
@@ -72,6 +75,32 @@ def test_contact_faces_of_a_wheel_need_the_number_of_sectors(coarse_sector, tmp_
     write_msh(coarse_sector, tmp_path / "a.msh")
     with pytest.raises(InputError, match=r"imported\.sectors must be given"):
         read_mesh(tmp_path / "a.msh")
+
+
+def test_seats_with_other_nodes_than_the_damper(coarse_sector, tmp_path):
+    """A damper meshed on its own: the pairs have no matched nodes, the seating by mortar carries the same loads."""
+    body = np.unique(coarse_sector.bodies["damper"])
+    points, z = coarse_sector.points.copy(), coarse_sector.points[body, 2]
+    half = np.ptp(z) / 2
+    points[body, 2] += 0.08 * half * np.sin(np.pi * (z - z.mean()) / half)     # along the flanks, ends in place
+    write_msh(replace(coarse_sector, points=points), tmp_path / "a.msh")
+    found = read_mesh(tmp_path / "a.msh", sectors=36)
+    assert all(found.pairs[name].nodes.shape == (2, 0) for name in ("this", "next"))
+    assert found.pairs["cyclic"].nodes.shape == coarse_sector.pairs["cyclic"].nodes.shape
+    ours, theirs = (seat(mesh, Materials(), 838.0, normal=100.0) for mesh in (found, coarse_sector))
+    for a, b in zip(ours, theirs, strict=True):
+        assert a.force.sum() == pytest.approx(100.0, rel=1e-9) and a.complementarity < 1e-9
+        assert a.patch.area.sum() == pytest.approx(b.patch.area.sum(), rel=1e-4)    # slivers of the overlap
+        for one, other in zip(resultant(a).force, resultant(b).force, strict=True):
+            assert one == pytest.approx(other, abs=0.02)
+
+
+def test_seats_that_do_not_touch_the_damper_are_refused(coarse_sector, tmp_path):
+    points = coarse_sector.points.copy()
+    points[np.unique(coarse_sector.bodies["damper"]), 0] -= 0.03
+    write_msh(replace(coarse_sector, points=points), tmp_path / "a.msh")
+    with pytest.raises(InputError, match="seat_right and damper_left do not match"):
+        read_mesh(tmp_path / "a.msh", sectors=36)
 
 
 def test_unmatched_cyclic_faces_are_refused(coarse_sector, tmp_path):
