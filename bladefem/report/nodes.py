@@ -89,12 +89,10 @@ def save_cycles_vtu(patches: Sequence[Patch], cycles: Sequence[ContactCycle], fi
     return save_faces_vtu(patches, fields, file)
 
 
-def draw_wear(patches: Sequence[Patch], cycles: Sequence[ContactCycle], file: Path) -> object:
-    """The load whose resonance wears the faces most."""
-    area = np.concatenate([p.area for p in patches])
-    worst = max(cycles, key=lambda c: float(c.work @ area))
-    return draw_work(patches, worst.work, worst.state, file,
-                     title=f"friction work of a period at the resonance, {worst.load:g} N per seat")
+def draw_wear(patches: Sequence[Patch], cycle: ContactCycle, file: Path) -> object:
+    """Where a period at the resonance of one load wears the faces."""
+    return draw_work(patches, cycle.work, cycle.state, file,
+                     title=f"friction work of a period at the resonance, {cycle.load:g} N per seat")
 
 
 def draw_hysteresis(cycles: Sequence[ContactCycle], file: Path) -> object:

@@ -29,6 +29,7 @@ from ..study.stability import UNIQUE
 from ..study.state_check import state_sentence
 from ..study.strength import Strength
 from ..study.survey import excited_set
+from ..units import show
 from ..view import contact, mesh, modes, response, speed
 from .datasets import datasets, table_dataset
 from .nodes import (
@@ -80,7 +81,7 @@ def _write(result: pipeline.Run, progress: Progress) -> None:
     write_results(folder / "results.nc", groups, dump(result.scene))
     drawings = {**_drawings(result, tables),
                 "response/hysteresis": lambda file: draw_hysteresis(cycles, file),
-                "contact/friction_work": lambda file: draw_wear(patches, cycles, file)}
+                "contact/friction_work": lambda file: draw_wear(patches, cycles[_best(result)], file)}
     figures = {}
     for name, draw in progress(list(drawings.items()), "pictures"):
         figures[name] = folder / f"{name.split('/')[1]}.png"
@@ -200,17 +201,29 @@ def linear_points(limit: Limit) -> pd.DataFrame:
                          "estimated_error": 0.0, "tolerated_error": 0.0, "error_checked": False})
 
 
+def _best(result: pipeline.Run) -> int:
+    """Number of the curve with the lowest resonance: pictures of one load show that one."""
+    return int(np.argmin([curve.peak_amplitude for curve in result.response.curves]))
+
+
+def _title(scene: Scene) -> str:
+    """What shakes the blade, and where it is seen."""
+    excitation, speed = scene.excitation, scene.operation.speed
+    order = f", engine order {excitation.engine_order} at {show(speed, 'rad/s')}" if speed > 0 else ""
+    return f"motion of {excitation.at} under {show(excitation.force, 'N')}{order}"
+
+
 def _drawings(result: pipeline.Run, tables: dict[str, pd.DataFrame]) -> dict[str, Callable[[Path], object]]:
     """What to draw: "section/name" to a function of the file."""
-    geometry, excited, loads = result.mesh, excited_set(result), list(result.contact.maps)
-    middle = loads[len(loads) // 2]
+    geometry, excited, best = result.mesh, excited_set(result), result.response.curves[_best(result)].load
     drawings = {
         "mesh/mesh": lambda file: mesh.draw_mesh(geometry, file, title=result.scene.title),
         "modes/first_modes": lambda file: modes.draw_mode_sheet(
             geometry, excited, file, families=list(tables["modes/modes"]["family"])),
         "contact/pressure_on_both_seats": lambda file: contact.draw_pressure(
-            result.contact.maps[middle], file, title=f"contact pressure under {middle:g} N per seat"),
-        **{name: partial(response.draw_responses, points) for name, points in _by_mass(tables["response/points"])},
+            result.contact.maps[best], file, title=f"contact pressure under {best:g} N per seat"),
+        **{name: partial(response.draw_responses, points, title=_title(result.scene))
+           for name, points in _by_mass(tables["response/points"])},
         "response/optimum": lambda file: response.draw_optimum(
             tables["response/summary"], file, points=tables["response/points"], own=result.contact.own)}
     if len(result.modes) > 1:

@@ -14,6 +14,7 @@ from typing import Any
 import matplotlib
 import numpy as np
 import pandas as pd
+from scipy.interpolate import PchipInterpolator
 
 from .labels import names_apart
 from .style import COLOURS, FAILED, canvas, log_axis
@@ -69,14 +70,31 @@ def load_name(load: float) -> str:
 
 
 def draw_curve(ax: Any, curve: pd.DataFrame, load: float, colour: Any) -> None:
-    """One load: broken where a point has not converged, the peak dotted."""
+    """One load: dots are points that were solved, the line between them keeps their slopes; broken where one failed."""
     good = curve["converged"].to_numpy(bool)
-    amplitude = np.where(good, MICRO * curve["amplitude"], np.nan)
+    frequency, amplitude = curve["frequency"].to_numpy(float), np.where(good, MICRO * curve["amplitude"], np.nan)
     style = {0.0: "--", np.inf: ":"}.get(load, "-")
-    ax.plot(curve["frequency"], amplitude, style, color=colour, label=load_name(load))
+    ax.plot(*between(frequency, amplitude), style, color=colour, label=load_name(load))
+    if 0 < load < np.inf:
+        ax.plot(frequency, amplitude, ".", color=colour, ms=2.5)
     if good.any():
         top = np.nanargmax(amplitude)
         ax.plot(curve["frequency"].iloc[top], amplitude[top], "o", color=colour, ms=4.5, mec="white", mew=0.6, zorder=4)
+
+
+def between(x: np.ndarray, y: np.ndarray, steps: int = 8) -> tuple[np.ndarray, np.ndarray]:
+    """A curve through positive points without overshoot (monotone cubics of log y), NaN where a point is missing."""
+    runs = np.split(np.arange(len(x)), np.flatnonzero(~np.isfinite(y)))
+    xs, ys = [], []
+    for run in runs:
+        run = run[np.isfinite(y[run]) & (y[run] > 0)]
+        run = run[np.unique(x[run], return_index=True)[1]]
+        if len(run) > 1:
+            fine = np.interp(np.arange(steps * (len(run) - 1) + 1) / steps, np.arange(len(run)), x[run])
+            xs.append(fine)
+            ys.append(np.exp(PchipInterpolator(x[run], np.log(y[run]))(fine)))
+    gap = [np.nan]
+    return tuple(np.concatenate([gap, *(part for piece in pieces for part in (piece, gap))]) for pieces in (xs, ys))
 
 
 def draw_failed(ax: Any, failed: pd.DataFrame) -> None:

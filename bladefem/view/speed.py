@@ -105,7 +105,9 @@ def draw_nodal_diameters(table: pd.DataFrame, file: str | Path | None = None, *,
     with canvas(file, ax, (7.6, 4.8)) as ax:
         for _, line in table.groupby("mode"):
             line = line.sort_values("nodal_diameter")
-            ax.plot(line["nodal_diameter"], line["frequency"], "-", color="#bbbbbb", lw=1, zorder=1)
+            apart = np.flatnonzero(np.diff(line["nodal_diameter"]) > 1) + 1      # modes may veer between them: no line
+            ax.plot(np.insert(line["nodal_diameter"].to_numpy(float), apart, np.nan),
+                    np.insert(line["frequency"].to_numpy(float), apart, np.nan), "-", color="#bbbbbb", lw=1, zorder=1)
         draw_families(ax, table)
         ax.set(xlabel="nodal diameter [1]", ylabel="frequency [Hz]", title=title or "natural frequencies of the wheel")
         ax.set_ylim(bottom=0)

@@ -65,7 +65,7 @@ def test_joined_nodes_share_the_work_of_their_element():
 def test_pictures_and_paraview(tmp_path):
     import pyvista
     patches, cycle = at_resonance(np.full(16, 3.0) * MU * N / KT, 3, None)
-    draw_wear(patches, [cycle], tmp_path / "work.png")
+    draw_wear(patches, cycle, tmp_path / "work.png")
     assert (tmp_path / "work.png").stat().st_size > 10_000
     grid = pyvista.read(save_cycles_vtu(patches, [cycle], tmp_path / "work.vtu"))
     np.testing.assert_allclose(grid["friction work [J/m2] at 80 N"], cycle.work)

@@ -24,6 +24,7 @@ from bladefem.view.modes import (
     save_modes_vtu,
 )
 from bladefem.view.response import (
+    between,
     draw_accuracy,
     draw_loops,
     draw_optimum,
@@ -204,6 +205,15 @@ def test_response_charts(folder):
     draw_loops(synthetic.loops(), folder / "loops.png")
     draw_seat_loops({f"{n} N": synthetic.loops() for n in range(5)}, folder / "seats.png")
     assert min(ink(folder / f"{n}.png") for n in ("response", "optimum", "accuracy", "loops", "seats")) > 0.02
+
+
+def test_a_curve_between_its_points_stays_between_them():
+    """No overshoot at a sharp peak, a gap where a point is missing, and the points themselves."""
+    x, y = np.arange(7.0), np.array([1.0, 2.0, 50.0, 3.0, np.nan, 4.0, 5.0])
+    fine, drawn = between(x, y)
+    assert np.nanmax(drawn) == pytest.approx(50.0) and np.nanmin(drawn) == pytest.approx(1.0)
+    assert not ((fine > 3) & (fine < 5)).any() and np.isnan(drawn).sum() == 3
+    assert set(x[np.isfinite(y)]) <= set(fine)
 
 
 def test_peaks_at_the_end_of_the_band_are_hollow():
