@@ -7,6 +7,7 @@ from pathlib import Path
 
 import numpy as np
 import pandas as pd
+from matplotlib.axes import Axes
 
 from .labels import names_apart
 from .response import draw_accuracy
@@ -42,6 +43,7 @@ def draw_chart(tables: Mapping[str, pd.DataFrame], file: str | Path | None = Non
             bottom = floor / margin
             ax.set_ylim(bottom, top * margin)
             ax.axhspan(bottom, floor, color="#bbbbbb", alpha=0.5, zorder=0)
+            _name_star(ax, what)
             spent, of = LABELS.get(what, ("CPU time for each frequency", "resonance amplitude"))
             ax.set(xlabel=f"{spent} [s]", ylabel=f"relative error of the {of} [1]")
         for ax in axes[:, 0]:
@@ -64,14 +66,23 @@ def draw_errors(tables: Mapping[str, pd.DataFrame], file: str | Path | None = No
                     ax.set_axis_off()
                     continue
                 least = table.loc[table[column] > 0, column].min()
-                shown = table.assign(error=table[column].clip(lower=least))[~table["left_out"]]
-                draw_accuracy(shown, ax=ax, tolerance=tolerance if column != "error_frequency" else None, title=of)
+                kept = table.assign(error=table[column].clip(lower=least))[~table["left_out"]]
+                draw_accuracy(kept, ax=ax, tolerance=tolerance if column != "error_frequency" else None, title=of)
+                _name_star(ax, what)
                 spent = LABELS.get(what, ("CPU time for each frequency", ""))[0]
                 ax.set(xlabel=f"{spent} [s]", ylabel=f"{title}: {what}, relative error [1]" if title else
                        f"{what}, relative error [1]")
-                if ax is not row[-1]:
-                    ax.get_legend().remove()
+            shown = [ax for ax in row if ax.axison]
+            for ax in shown[:-1]:
+                ax.get_legend().remove()
         for ax in axes.flat:
             if ax.axison:
                 names_apart(ax)
         return axes[0, 0].figure
+
+
+def _name_star(ax: Axes, what: str) -> None:
+    """The mesh is the scene's, no indicator chooses it."""
+    for text in ax.get_legend().get_texts():
+        if what == "meshes" and text.get_text() == "automatic choice":
+            text.set_text("mesh of the scene")
