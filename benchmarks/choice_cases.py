@@ -22,17 +22,18 @@ Sweeps of 100 points, search and checks included, over the rich model, and the l
 points over the peak:
 
     contact points             at 2 %          at 0.1 %        rich model itself
-    2                          0.98  7e-4      1.65  8e-5      5e-5
-    8                          0.37  3e-3      0.41  5e-5      2e-5
-    16                         0.11  7e-3      0.21  3e-4      9e-6
-    32                         0.31  1e-3      0.53  3e-4      4e-5
+    2                          0.87  7e-4      1.6   8e-5      5e-5
+    8                          0.33  3e-3      0.40  5e-5      2e-5
+    16                         0.12  7e-3      0.20  3e-4      9e-6
+    32                         0.25  1e-3      0.55  3e-4      4e-5
     8 in 3-D, lifting off      0.60  4e-3      1.88  3e-4      5e-3
 
-Missed: a third of the rich model's time, but for 16 points, and 32 at 2 %. It was kept by more while a rich point took
-0.34 ms to 7.4 ms with 2 to 32 points; it takes 0.17 ms to 5.5 ms now, and the choice half of what it took. With 2
-points a call costs 0.06 ms, whatever it solves, and the search 7 ms; with 32 points Python costs half of a point. The
-last body's peak lies outside the swept frequencies: its highest point within them lifts off, and needs 15 harmonics at
-2 %, as many as the rich model has, and 31 at 0.1 %, where the rich model is 0.46 % off and misses the accuracy.
+Missed: a third of the rich model's time with 2 points and with lift-off, and at 0.1 % with 8 and 32 points. A rich
+point of 2, 8, 16, 32 contacts takes 0.17, 0.54, 2.1 and 6.4 ms; it took 0.34, 1.1, 2.6 and 7.4 ms before sweeps began
+on parabolas and small points were one compiled call, and the choice takes half of what it took. With 2 points a call
+costs 0.06 ms, whatever it solves, and the search 7 ms; with 32 points Python costs half of a point. The last body's
+peak lies outside the swept frequencies: its highest point within them lifts off, and needs 15 harmonics at 2 %, as many
+as the rich model has, and 31 at 0.1 %, where the rich model is 0.46 % off and misses the accuracy.
 """
 
 from __future__ import annotations
