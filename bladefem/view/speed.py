@@ -45,34 +45,61 @@ def draw_campbell(table: pd.DataFrame, orders: Sequence[int], file: str | Path |
             first = not diameter or diameter[0] == table.loc[table["mode"] == mode, "nodal_diameter"].min()
             ax.plot(RPM * line["speed"], line["frequency"], color=colour, lw=1.7 if not diameter else 1.2,
                     label=line_name(line, mode) if first else None)
-        if "nodal_diameter" in table:
-            name_diameters(ax, table, fastest)
-        draw_order_lines(ax, orders, fastest, 1.12 * table["frequency"].max())
+        top = 1.12 * table["frequency"].max()
+        names = diameter_names(table) if "nodal_diameter" in table else []
+        name_lines(ax, fastest, top, names + draw_order_lines(ax, orders, fastest, top))
         if crossings is not None and len(crossings):
             ax.plot(RPM * crossings["speed"], crossings["frequency"], "o", mfc="none", mec=FAILED, mew=1.5, ms=9,
                     zorder=5, label="crossing")
         if operating is not None:
             ax.axvline(RPM * operating, color="#555555", ls="--", lw=1.1, label=f"{RPM * operating:.5g} rpm")
         ax.set(xlabel="rotational speed [rpm]", ylabel="frequency [Hz]", xlim=(0, fastest),
-               ylim=(0, 1.12 * table["frequency"].max()), title=title or "Campbell diagram")
-        ax.legend(loc="center left", bbox_to_anchor=(1.06, 0.5))
+               ylim=(0, top), title=title or "Campbell diagram")
+        ax.legend(loc="center left", bbox_to_anchor=(1.14, 0.5))
         return ax.figure
 
 
-def name_diameters(ax: Any, table: pd.DataFrame, fastest: float) -> None:
-    """Names of the nodal diameters at the right end of each mode's lines: both ends of a fan, one name for a bundle."""
-    apart = 0.03 * table["frequency"].max()
+def diameter_names(table: pd.DataFrame) -> list[tuple[float, str, str]]:
+    """(height, text, colour) of the nodal diameters at the right end of each mode's lines: both ends of a fan, one name
+    for a bundle."""
+    apart, names = 0.03 * table["frequency"].max(), []
     last = table[table["speed"] == table["speed"].max()].sort_values("nodal_diameter")
     for mode, ends in last.groupby("mode"):
         low, high = ends.iloc[0], ends.iloc[-1]
+        colour = COLOURS[(int(mode) - 1) % len(COLOURS)]
         if abs(high["frequency"] - low["frequency"]) > apart:
-            named = [(f"n = {row['nodal_diameter']:.0f}", row["frequency"]) for row in (low, high)]
+            names += [(row["frequency"], f"n = {row['nodal_diameter']:.0f}", colour) for row in (low, high)]
         else:
             span = f"{low['nodal_diameter']:.0f}" + (f" to {high['nodal_diameter']:.0f}" if len(ends) > 1 else "")
-            named = [(f"n = {span}", ends["frequency"].mean())]
-        for text, height in named:
-            ax.annotate(text, (fastest, height), (3, 0), fontsize=6.5, textcoords="offset points", va="center",
-                        color=COLOURS[(int(mode) - 1) % len(COLOURS)], annotation_clip=False)
+            names.append((ends["frequency"].mean(), f"n = {span}", colour))
+    return names
+
+
+def name_lines(ax: Any, x: float, top: float, names: list[tuple[float, str, str]]) -> None:
+    """Names beside the right ends of lines, moved apart where they would overlap; a thin line leads to a moved one."""
+    names = sorted(names)
+    places = spread(np.array([height for height, _, _ in names]), 0.03 * top)
+    for place, (height, text, colour) in zip(places, names, strict=True):
+        moved = abs(place - height) > 0.004 * top
+        ax.annotate(text, (x, height), (1.025, place), textcoords=ax.get_yaxis_transform(), fontsize=7, va="center",
+                    color=colour, annotation_clip=False,
+                    arrowprops={"arrowstyle": "-", "color": colour, "lw": 0.5} if moved else None)
+
+
+def spread(heights: np.ndarray, apart: float) -> np.ndarray:
+    """Ascending heights moved as little as leaves them ``apart``: groups that collide are centred on their mean."""
+    groups: list[list[float]] = []
+    for height in heights:
+        groups.append([height])
+        while len(groups) > 1 and _middle(groups[-1]) - _middle(groups[-2]) < apart * (
+                len(groups[-1]) + len(groups[-2])) / 2:
+            groups[-2:] = [groups[-2] + groups[-1]]
+    return np.array([_middle(group) + apart * (i - (len(group) - 1) / 2)
+                     for group in groups for i in range(len(group))])
+
+
+def _middle(group: list[float]) -> float:
+    return sum(group) / len(group)
 
 
 def line_name(rows: pd.DataFrame, mode: Any) -> str:
@@ -81,15 +108,22 @@ def line_name(rows: pd.DataFrame, mode: Any) -> str:
     return f"mode {mode}{family}"
 
 
-def draw_order_lines(ax: Any, orders: Sequence[int], fastest: float, top: float) -> None:
-    """Engine-order rays, named where they leave the picture."""
+def draw_order_lines(ax: Any, orders: Sequence[int], fastest: float, top: float) -> list[tuple[float, str, str]]:
+    """Engine-order rays, named where they leave the picture above.
+
+    Returns:
+        (height, text, colour) of those that leave it on the right.
+    """
+    names = []
     for order in orders:
         ax.plot([0, fastest], [0, order * fastest / 60], color="#999999", lw=0.8, zorder=1)
         x = min(fastest, 60 * top / order) if order else fastest
-        inside = x < fastest
-        ax.annotate(f"EO {order}", (x, order * x / 60), (0, 2) if inside else (3, 0), textcoords="offset points",
-                    fontsize=7.5, color="#555555", ha="center" if inside else "left",
-                    va="bottom" if inside else "center", annotation_clip=False)
+        if x < fastest:
+            ax.annotate(f"EO {order}", (x, top), (0, 2), textcoords="offset points", fontsize=7, color="#555555",
+                        ha="center", va="bottom", annotation_clip=False)
+        else:
+            names.append((order * fastest / 60, f"EO {order}", "#555555"))
+    return names
 
 
 def draw_nodal_diameters(table: pd.DataFrame, file: str | Path | None = None, *, ax: Any = None, title: str = "",
@@ -162,10 +196,10 @@ def draw_excitations(ax: Any, table: pd.DataFrame, sectors: int, speed: float, o
                      ) -> None:
     """Chosen engine orders on the folded line, with rings round modes that are too near."""
     rings = []
-    for order in orders:
+    for i, order in enumerate(orders):
         n, f = int(folded(np.array(order), sectors)), order * speed / (2 * np.pi)
-        ax.plot(n, f, "P", color="black", ms=7, zorder=4)
-        ax.annotate(f"EO {order}", (n, f), (4, -6), textcoords="offset points", fontsize=7, va="top", zorder=6,
+        ax.plot(n, f, "P", color="black", ms=7, zorder=4, label=None if i else "engine order")
+        ax.annotate(f"{order}", (n, f), (9, -4), textcoords="offset points", fontsize=7, va="center", zorder=6,
                     bbox={"facecolor": "white", "alpha": 0.75, "edgecolor": "none", "pad": 0.5})
         near = table[(table["nodal_diameter"] == n) & ((table["frequency"] / max(f, 1e-9) - 1).abs() < close)]
         rings += near[["nodal_diameter", "frequency"]].to_numpy().tolist()

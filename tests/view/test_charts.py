@@ -11,7 +11,7 @@ from bladefem.study.crossings import campbell_crossings, fold
 from bladefem.view.convergence import draw_convergence
 from bladefem.view.maps import draw_map
 from bladefem.view.parts import PARTS
-from bladefem.view.speed import draw_campbell, draw_interference, draw_nodal_diameters, folded
+from bladefem.view.speed import draw_campbell, draw_interference, draw_nodal_diameters, folded, spread
 
 
 def texts(figure):
@@ -83,3 +83,11 @@ def test_refinement_shows_the_limit_and_doubts(folder):
     assert fit.get_ydata()[0] == pytest.approx(100 * (100 / 100.4 - 1)) and fit.get_ydata()[-1] == pytest.approx(
         100 * (101.6 / 100.4 - 1))
     assert (folder / "convergence.png").stat().st_size > 5000
+
+
+def test_names_beside_lines_stay_apart():
+    """Two that collide part about their mean, and push no third that is far; a chain of them stays in order."""
+    np.testing.assert_allclose(spread(np.array([1.0, 1.1, 5.0]), 0.5), [0.8, 1.3, 5.0])
+    moved = spread(np.array([0.0, 0.4, 0.5, 0.6, 1.2, 3.0]), 0.5)
+    assert (np.diff(moved) > 0.5 - 1e-12).all() and moved[-1] == 3.0
+    assert moved[:5].mean() == pytest.approx(np.mean([0.0, 0.4, 0.5, 0.6, 1.2]))
