@@ -1,276 +1,237 @@
 """Running derivative of a 2-D element: rows of d(force)/d(coefficients) over one period.
 
-Rows have M columns: normal, first and second tangential coefficients (K each), the force at the start of the period
-(2), zeros up to a multiple of 4, and in what is summed the force itself in the last column. In stick the derivative is
+Rows have 3W columns, W the K = 2H+1 coefficients filled up to a multiple of 8: normal, first and second tangential
+coefficients. The columns K and W + K take the derivative with the force at the start of the period; they carry the
+derivative Phi of the period map, and that of the periodic state follows from D = Phi D + d. In stick the derivative is
 carried as C = D - kt V, which stays, so that a whole stretch of stick costs one rank-one update. In slip only the row
-of the angle is carried. The two columns of the start carry the derivative Phi of the period map; the derivative of the
-periodic state follows from D = Phi D + d.
+of the angle is carried; the rows of all samples are kept, and summed at the end of the period.
 """
 
 from __future__ import annotations
 
+from typing import NamedTuple
+
 import numpy as np
 from numba import njit
 
-from bladefem.friction.disc import CLOSING, SLIP, STICK, edge, sensitivity
-from bladefem.friction.orbit import (
-    DIRECTION_X,
-    DIRECTION_Y,
-    GROWTH,
-    HALF,
-    INVERSE_LENGTH,
-    INVERSE_LIMIT,
-    SLOPE,
-    half_angle,
-    turned,
-)
+from bladefem.friction.disc import CLOSING, SLIP, STICK, sensitivity
+from bladefem.friction.lane_kernels import TURNS, add_folded, find_turns, join_rows, turn_rows
+from bladefem.friction.orbit import CHANGING, SLIDING, STICKING
+from bladefem.friction.tables import filled, tiled
 
-__all__ = ["close", "linear_period", "start_rows", "to_carry"]
+__all__ = ["Rows", "add_period", "close", "empty_rows", "start_rows", "to_carry", "unit_rows"]
 
 FAST = {"contract", "reassoc", "nsz"}
+LOT = 64            # samples after which a row is looked at for faint numbers
+FAINT = 1e-60       # of them: forgotten before they become denormal and slow
 
 
-@njit(cache=True, error_model="numpy", forceinline=True, fastmath=FAST)
+class Rows(NamedTuple):
+    """Scratch of one 2-D element; M = 3W, width as in lane_kernels.py."""
+
+    J: np.ndarray           # (2, tiled, M) summed rows, first and second tangent
+    stick: np.ndarray       # (4H+1,) basis means of the samples in stick
+    C: np.ndarray           # (2, M) carried rows
+    closing: np.ndarray     # (2, M) rows at a sample in which the element closes
+    row: np.ndarray         # (M,) row of the angle in slip
+    rows: np.ndarray        # (S + 1, M) rows of the angle at the samples; the last stands for none and is zero
+    turns: np.ndarray       # (7, width) how the row turns
+    g: np.ndarray           # (2, width) factors from a sample's row to those of the force [N]
+    chosen: np.ndarray      # numbers of the fours with samples that slip
+
+
+def empty_rows(H: int, S: int, width: int) -> Rows:
+    """Scratch for H harmonics and S samples."""
+    M = 3 * filled(2 * H + 1)
+    return Rows(np.zeros((2, tiled(H), M)), np.zeros(4 * H + 1), np.zeros((2, M)), np.zeros((2, M)), np.zeros(M),
+                np.zeros((S + 1, M)), np.zeros((TURNS, width)), np.zeros((2, width)), np.zeros(S // 2 + 1, np.int64))
+
+
+@njit(_nrt=False, cache=True, error_model="numpy", forceinline=True, fastmath=FAST)
 def _angle_row(C, i, by, el, tab, row):
     """Row (M,) of the angle of a slipping force, from by (6,): by force (2), increment (2), N_i and N_j."""
-    K, p0, p1, q0, q1, r0, r1 = tab.at.shape[1], *by
+    K, W, p0, p1, q0, q1, r0, r1 = tab.at.shape[1], tab.wide.shape[1], *by
     j = i + 1 if i + 1 < tab.at.shape[0] else 0
     for l in range(row.size):
         row[l] = p0 * C[0, l] + p1 * C[1, l]
     for l in range(K):
-        V, W = tab.knots[i, l], tab.knots[j, l]
-        row[l] += el.kn * (r0 * V + r1 * W)
-        row[K + l] += el.kt * (p0 * V + q0 * (W - V))
-        row[2 * K + l] += el.kt * (p1 * V + q1 * (W - V))
+        V, U = tab.knots[i, l], tab.knots[j, l]
+        row[l] += el.kn * (r0 * V + r1 * U)
+        row[W + l] += el.kt * (p0 * V + q0 * (U - V))
+        row[2 * W + l] += el.kt * (p1 * V + q1 * (U - V))
 
 
-@njit(cache=True, error_model="numpy", forceinline=True, fastmath=FAST)
-def _force_rows(row, ex, ey, R, slope, normal, out):
-    """Rows out (2, M) of R (ex, ey) from the row of its angle, slope = kn dR/dN and the row ``normal`` (K,) of N."""
-    for l in range(row.size):
-        out[0, l] = -R * ey * row[l]
-        out[1, l] = R * ex * row[l]
-    for l in range(normal.size):
-        out[0, l] += slope * ex * normal[l]
-        out[1, l] += slope * ey * normal[l]
-
-
-@njit(cache=True, error_model="numpy", forceinline=True)
-def _closing_rows(i, dx, dy, N0, N1, part, el, knots, out):
+@njit(_nrt=False, cache=True, error_model="numpy", forceinline=True)
+def _closing_rows(i, dx, dy, N0, N1, part, el, tab, out):
     """Rows out (2, M) of f = part d, part = N / (N1 - N0), of an element that closes in edge i and sticks."""
-    K, j = knots.shape[1], i + 1 if i + 1 < knots.shape[0] else 0
+    K, W, j = tab.at.shape[1], tab.wide.shape[1], i + 1 if i + 1 < tab.at.shape[0] else 0
     out[:] = 0.0
     for l in range(K):
-        change = el.kn * (N1 * knots[i, l] - N0 * knots[j, l]) / (N1 - N0) ** 2
+        change = el.kn * (N1 * tab.knots[i, l] - N0 * tab.knots[j, l]) / (N1 - N0) ** 2
         out[0, l], out[1, l] = dx * change, dy * change
-        out[0, K + l] = out[1, 2 * K + l] = el.kt * part * (knots[j, l] - knots[i, l])
+        out[0, W + l] = out[1, 2 * W + l] = el.kt * part * (tab.knots[j, l] - tab.knots[i, l])
 
 
-@njit(cache=True, error_model="numpy", forceinline=True)
-def to_carry(C, j, kt, knots):
+@njit(_nrt=False, cache=True, error_model="numpy", forceinline=True)
+def to_carry(C, j, kt, tab):
     """C (2, M) from D to D - kt V at knot j."""
-    K = knots.shape[1]
-    for l in range(K):
-        C[0, K + l] -= kt * knots[j, l]
-        C[1, 2 * K + l] -= kt * knots[j, l]
+    W = tab.wide.shape[1]
+    for l in range(tab.at.shape[1]):
+        C[0, W + l] -= kt * tab.knots[j, l]
+        C[1, 2 * W + l] -= kt * tab.knots[j, l]
 
 
-@njit(cache=True, error_model="numpy", forceinline=True, fastmath=FAST)
-def _add_stick(a, b, cx, cy, C, tab, sums):
-    """Add samples a <= i < b, which stick with f = kt w + (cx, cy)."""
-    M, mean, J = C.shape[1], sums.mean, sums.J
-    C[0, M - 1], C[1, M - 1] = cx, cy
-    for p in range(mean.size):
-        mean[p] = tab.sums[b, p] - tab.sums[a, p]
-        sums.stick[p] += mean[p]
-    for k in range(J.shape[0]):
-        weight = mean[k] if k == 0 else 2.0 * mean[k]
-        for l in range(M):
-            J[k, l] += weight * C[0, l]
-        for l in range(M):
-            J[k, M + l] += weight * C[1, l]
+@njit(_nrt=False, cache=True, error_model="numpy", forceinline=True, fastmath=FAST)
+def _add_stick(a, b, tab, scratch):
+    """Add samples a <= i < b, which stick with the carried rows C."""
+    C, J, stick = scratch.C, scratch.J, scratch.stick
+    for p in range(stick.size):
+        stick[p] += tab.sums[b, p] - tab.sums[a, p]
+    for k in range(tab.at.shape[1]):
+        weight = (tab.sums[b, k] - tab.sums[a, k]) * (2.0 if k else 1.0)
+        for e in range(2):
+            for l in range(C.shape[1]):
+                J[e, k, l] += weight * C[e, l]
 
 
-@njit(cache=True, error_model="numpy", forceinline=True, fastmath=FAST)
-def _add_slip(i, count, tab, sums):
-    """Add samples i <= . < i + count, whose rows and forces stand in sums.rows."""
-    J, product = sums.J, sums.product
-    np.dot(tab.analysis[i:i + count].T, sums.rows[:count], product)
-    for k in range(J.shape[0]):
-        for l in range(J.shape[1]):
-            J[k, l] += product[k, l]
-
-
-@njit(cache=True, error_model="numpy", forceinline=True, fastmath=FAST)
-def _slip_steps(first, count, P, Q, path, el, form, turns):
-    """Follow the slip from knot ``first`` over ``count`` edges at most: (edges done, P, Q).
-
-    turns (.., 12) takes for each edge the weights of the old row of the angle and of the pattern's rows (normal, first,
-    second tangent) for the angle in the middle (4) and at the end (4), and the factors from it to force rows (4).
-    """
-    S, mu, kt, mukn = path.shape[1], el.mu, el.kt, el.mu * el.kn
-    for c in range(count):
-        i = first + c
-        N0, N1 = path[2, i], path[2, i + 1 if i + 1 < S else 0]
-        ux, uy, h = form[DIRECTION_X, i], form[DIRECTION_Y, i], form[HALF, i]
-        size = P * P + Q * Q
-        if N1 <= 0.0 or (P * P - Q * Q) * ux + 2.0 * P * Q * uy < form[GROWTH, i] * size:
-            return c, P, Q
-        P1, Q1 = turned(P, Q, ux, uy, h * h)
-        P, Q = turned(P, Q, ux, uy, h)
-        inverse1, inversem = 1.0 / (P1 * P1 + Q1 * Q1), 1.0 / (P * P + Q * Q)
-        ex, ey = (P * P - Q * Q) * inversem, 2.0 * P * Q * inversem
-        a1, am = h * h * size * inverse1, h * size * inversem
-        y1 = 2.0 * form[SLOPE, i] * (ux * 2.0 * P1 * Q1 - uy * (P1 * P1 - Q1 * Q1)) * inverse1
-        ym = form[SLOPE, i] * (ux * ey - uy * ex)
-        R, kl, kn = 0.5 * mu * (N0 + N1), kt * form[INVERSE_LENGTH, i], mukn * form[INVERSE_LIMIT, i]
-        kx, ky = kl * ux, kl * uy
-        turns[c, 0], turns[c, 1] = am, -ym * kn
-        turns[c, 2], turns[c, 3] = ym * kx - (1.0 - am) * ky, ym * ky + (1.0 - am) * kx
-        turns[c, 4], turns[c, 5] = a1, -y1 * kn
-        turns[c, 6], turns[c, 7] = y1 * kx - (1.0 - a1) * ky, y1 * ky + (1.0 - a1) * kx
-        turns[c, 8], turns[c, 9], turns[c, 10], turns[c, 11] = -R * ey, R * ex, mukn * ex, mukn * ey
-        P, Q = P1, Q1
-    return count, P, Q
-
-
-@njit(cache=True, error_model="numpy", forceinline=True, fastmath=FAST)
-def _turn_rows(first, count, start, pattern, turns, row, middle, rows):
-    """Turn the row (M,) of the angle along ``count`` edges; rows (.., 2M) of their samples, force last."""
-    M = row.size
-    for c in range(count):
-        i = first + c
-        am, m0, m1, m2 = turns[c, 0], turns[c, 1], turns[c, 2], turns[c, 3]
-        a1, t0, t1, t2 = turns[c, 4], turns[c, 5], turns[c, 6], turns[c, 7]
-        gx, gy, nx, ny = turns[c, 8], turns[c, 9], turns[c, 10], turns[c, 11]
-        for l in range(M):
-            middle[l] = am * row[l] + m0 * pattern[i, 0, l] + m1 * pattern[i, 1, l] + m2 * pattern[i, 2, l]
-        for l in range(M):
-            row[l] = a1 * row[l] + t0 * pattern[i, 0, l] + t1 * pattern[i, 1, l] + t2 * pattern[i, 2, l]
-        for l in range(M):
-            rows[c, l] = gx * middle[l] + nx * pattern[i, 0, l]
-        for l in range(M):
-            rows[c, M + l] = gy * middle[l] + ny * pattern[i, 0, l]
-        rows[c, M - 1], rows[c, 2 * M - 1] = gy, -gx
-        for l in range(start, M):           # forget the start before it becomes denormal and slow
-            if abs(row[l]) < 1e-60:
+@njit(_nrt=False, cache=True, error_model="numpy", forceinline=True)
+def _slide(a, b, tab, scratch):
+    """Turn the row of the angle along the edges a <= i < b."""
+    row, width, W = scratch.row, scratch.turns.shape[1], tab.wide.shape[1]
+    while a < b:
+        stop = min(b, a + LOT)
+        turn_rows(scratch.turns, width, tab.wide, tab.change, W, a, stop, row, scratch.rows)
+        for l in range(row.size):
+            if abs(row[l]) < FAINT:
                 row[l] = 0.0
+        a = stop
 
 
-@njit(cache=True, error_model="numpy", forceinline=True)
-def _slide(i, P, Q, path, el, tab, form, sums):
-    """Follow the slip from knot i, half-angle vector (P, Q), to where it ends: (i, P, Q) there; samples are added."""
-    S, full = path.shape[1], sums.rows.shape[0]
-    while i < S:
-        most = min(full, S - i)
-        count, P, Q = _slip_steps(i, most, P, Q, path, el, form, sums.turns)
-        if count == 0:
-            break
-        _turn_rows(i, count, 3 * tab.at.shape[1], tab.pattern, sums.turns, sums.row, sums.middle, sums.rows)
-        _add_slip(i, count, tab, sums)
-        i += count
-        if count < most:
-            break
-    return i, P, Q
-
-
-@njit(cache=True, error_model="numpy", forceinline=True)
-def _add_mixed(i, mid, fx, fy, dx, dy, N0, N1, mx, my, el, tab, C, sums):
-    """Add sample i, force (mx, my), of an edge that changes state; 1 if it slips."""
-    if mid != SLIP and mid != CLOSING:
-        return 0
-    M, rows = sums.row.size, np.zeros((2, sums.row.size))
+@njit(_nrt=False, cache=True, error_model="numpy", forceinline=True)
+def _add_mixed(i, mid, fx, fy, path, el, tab, scratch, slips, normal, trace):
+    """Add sample i of an edge that changes state and slips there or closes, from the force (fx, fy) at its begin."""
+    dx, dy, N0, N1 = path[0, i + 1] - path[0, i], path[1, i + 1] - path[1, i], path[2, i], path[2, i + 1]
     if mid == SLIP:
-        _angle_row(C, i, sensitivity(fx, fy, dx, dy, N0, N1, el.mu, 0.5), el, tab, sums.middle)
-        R = max(0.5 * el.mu * (N0 + N1), 1e-300)
-        _force_rows(sums.middle, mx / R, my / R, R, el.mu * el.kn, tab.at[i], rows)
-    else:
-        _closing_rows(i, dx, dy, N0, N1, 0.5 * (N0 + N1) / (N1 - N0), el, tab.knots, rows)
-    rows[0, M - 1], rows[1, M - 1] = mx, my
-    sums.rows[0, :M] = rows[0]
-    sums.rows[0, M:] = rows[1]
-    _add_slip(i, 1, tab, sums)
-    return int(mid == SLIP)
+        _angle_row(scratch.C, i, sensitivity(fx, fy, dx, dy, N0, N1, el.mu, 0.5), el, tab, scratch.rows[i])
+        N = max(0.5 * (N0 + N1), 1e-300)
+        scratch.g[0, i], scratch.g[1, i], slips[i] = -trace[1, i], trace[0, i], 1.0
+        normal[0, i], normal[1, i] = el.kn * trace[0, i] / N, el.kn * trace[1, i] / N
+    elif mid == CLOSING:
+        rows = scratch.closing
+        _closing_rows(i, dx, dy, N0, N1, 0.5 * (N0 + N1) / (N1 - N0), el, tab, rows)
+        for e in range(2):
+            for k in range(tab.at.shape[1]):
+                for l in range(rows.shape[1]):
+                    scratch.J[e, k, l] += tab.analysis[i, k] * rows[e, l]
 
 
-@njit(cache=True, error_model="numpy", forceinline=True)
-def _after_mixed(i, j, end, fx, fy, dx, dy, N0, N1, el, tab, C, sums):
-    """Bring C (2, M), and in slip the row of the angle, from knot i to knot j over an edge that changes state."""
-    if end == STICK:
-        return
+@njit(_nrt=False, cache=True, error_model="numpy", forceinline=True)
+def _after_mixed(i, end, by, path, el, tab, scratch):
+    """Bring C (2, M), and in slip the row of the angle, from knot i over an edge that changes state."""
+    C = scratch.C
     if end == SLIP:
-        _angle_row(C, i, sensitivity(fx, fy, dx, dy, N0, N1, el.mu, 1.0), el, tab, sums.row)
+        _angle_row(C, i, (by[0], by[1], by[2], by[3], by[4], by[5]), el, tab, scratch.row)
+        return
+    C[:] = 0.0
     if end == CLOSING:
-        _closing_rows(i, dx, dy, N0, N1, N1 / (N1 - N0), el, tab.knots, C)
-    else:
-        C[:] = 0.0
-    to_carry(C, j, el.kt, tab.knots)
+        dx, dy, N0, N1 = path[0, i + 1] - path[0, i], path[1, i + 1] - path[1, i], path[2, i], path[2, i + 1]
+        _closing_rows(i, dx, dy, N0, N1, N1 / (N1 - N0), el, tab, C)
+        to_carry(C, i + 1 if i + 1 < tab.at.shape[0] else 0, el.kt, tab)
 
 
-@njit(cache=True, error_model="numpy", forceinline=True)
-def _leave_slip(P, Q, i, N, el, tab, C, sums):
-    """Force at knot i from the half-angle vector; D from the row of the angle goes to C (2, M)."""
-    size = P * P + Q * Q
-    ex, ey, R = (P * P - Q * Q) / size, 2.0 * P * Q / size, el.mu * N
-    _force_rows(sums.row, ex, ey, R, el.mu * el.kn, tab.knots[i], C)
-    return R * ex, R * ey
+@njit(_nrt=False, cache=True, error_model="numpy", forceinline=True, fastmath=FAST)
+def _leave_slip(fx, fy, i, N, el, tab, scratch):
+    """D from the row of the angle goes to C (2, M), at knot i under the force (fx, fy)."""
+    C, row = scratch.C, scratch.row
+    for l in range(row.size):
+        C[0, l] = -fy * row[l]
+        C[1, l] = fx * row[l]
+    for l in range(tab.at.shape[1]):
+        C[0, l] += el.kn * fx / N * tab.knots[i, l]
+        C[1, l] += el.kn * fy / N * tab.knots[i, l]
 
 
-@njit(cache=True, error_model="numpy")
-def linear_period(path, fx, fy, el, tab, form, C, sums):
-    """One period of path (3, S) = (kt w_1, kt w_2, N) at the knots from (fx, fy): (fx, fy, samples that slip).
+@njit(_nrt=False, cache=True, error_model="numpy", forceinline=True)
+def _turns(path, pieces, el, trail, scratch, normal, trace):
+    """How the row of the angle turns along all edges that slide; their forces and factors."""
+    scratch.g[:], normal[:] = 0.0, 0.0
+    for piece in range(pieces):
+        if trail.kinds[piece] == SLIDING:
+            find_turns(trail.begins[piece], trail.begins[piece + 1], path, trail.form, trail.knots, trail.slips,
+                       path.shape[1], el.kt, el.kn, el.mu, scratch.turns, scratch.g, normal, trace)
 
-    C (2, M) is carried on and ends as D at the first knot; sums collects.
+
+@njit(_nrt=False, cache=True, error_model="numpy")
+def add_period(path, fx, fy, pieces, el, tab, trail, scratch, normal, trace, summing):
+    """Carry the derivative C (2, M) through the period of the trail, which ends with the force (fx, fy).
+
+    If it is summing, it fills J and stick of the scratch, trace (2, width) where edges slide and normal (2, width),
+    which is n in rows n p_0 of the force (find_turns).
     """
-    S, slips, i, mu = path.shape[1], 0, 0, el.mu
-    run, cx, cy = -1, 0.0, 0.0              # first sample of the present stretch of stick, -1 outside
-    slipping, P, Q = False, 1.0, 0.0
-    while i < S:
+    C, forces, run, slipping = scratch.C, trail.forces, -1, False   # run: first sample of the present stretch of stick
+    _turns(path, pieces, el, trail, scratch, normal, trace)
+    if summing:
+        scratch.J[:], scratch.stick[:] = 0.0, 0.0
+    for piece in range(pieces):
+        i, kind, ax, ay = trail.begins[piece], trail.kinds[piece], forces[0, piece], forces[1, piece]
+        if kind == SLIDING:
+            _slide(i, trail.begins[piece + 1], tab, scratch)
+            continue
         if slipping:
-            a = i
-            i, P, Q = _slide(i, P, Q, path, el, tab, form, sums)
-            slips += i - a
-            if i == S:
-                break
+            _leave_slip(ax, ay, i, path[2, i], el, tab, scratch)
+            to_carry(C, i, el.kt, tab)
             slipping = False
-            fx, fy = _leave_slip(P, Q, i, path[2, i], el, tab, C, sums)
-            to_carry(C, i, el.kt, tab.knots)
-        j = i + 1 if i + 1 < S else 0
-        dx, dy, N0, N1 = path[0, j] - path[0, i], path[1, j] - path[1, i], path[2, i], path[2, j]
-        ex, ey, R1 = fx + dx, fy + dy, mu * N1
-        if N0 > 0.0 and N1 > 0.0 and ex * ex + ey * ey <= R1 * R1:
-            if run < 0:
-                run, cx, cy = i, fx - path[0, i], fy - path[1, i]
-        elif N0 > 0.0 or N1 > 0.0:
-            end, ex, ey, mid, mx, my = edge(fx, fy, dx, dy, N0, N1, mu)
+        if kind == STICKING and run < 0:
+            run = i
+        if kind == CHANGING:
+            change = trail.changes[piece]
+            end, mid = int(change[0]), int(change[1])
             if mid == STICK and run < 0:
-                run, cx, cy = i, fx - path[0, i], fy - path[1, i]
-            if run >= 0:
-                _add_stick(run, i + (mid == STICK), cx, cy, C, tab, sums)
-                run = -1
-            slips += _add_mixed(i, mid, fx, fy, dx, dy, N0, N1, mx, my, el, tab, C, sums)
-            _after_mixed(i, j, end, fx, fy, dx, dy, N0, N1, el, tab, C, sums)
-            slipping = end == SLIP and R1 > 0.0
-            if slipping:
-                P, Q = half_angle(ex / R1, ey / R1)
-        else:
-            ex = ey = 0.0
-        fx, fy, i = ex, ey, i + 1
-    if run >= 0:
-        _add_stick(run, S, cx, cy, C, tab, sums)
+                run = i
+            if summing:
+                if run >= 0:
+                    _add_stick(run, i + (mid == STICK), tab, scratch)
+                _add_mixed(i, mid, ax, ay, path, el, tab, scratch, trail.slips, normal, trace)
+            run, slipping = -1, end == SLIP
+            if end != STICK:
+                _after_mixed(i, end, change[2:], path, el, tab, scratch)
+    if run >= 0 and summing:
+        _add_stick(run, tab.at.shape[0], tab, scratch)
     if slipping:
-        fx, fy = _leave_slip(P, Q, 0, path[2, 0], el, tab, C, sums)
+        _leave_slip(fx, fy, 0, path[2, 0], el, tab, scratch)
     elif path[2, 0] > 0.0:
-        to_carry(C, 0, -el.kt, tab.knots)
+        to_carry(C, 0, -el.kt, tab)
     else:
         C[:] = 0.0
-    return fx, fy, slips
+    if summing:
+        _add_slip(trail.slips, tab, scratch)
 
 
-@njit(cache=True, error_model="numpy")
-def start_rows(vx, vy, N, el, knots, C):
+@njit(_nrt=False, cache=True, error_model="numpy", forceinline=True)
+def _add_slip(slips, tab, scratch):
+    """Add the samples that slip, fours without one left out."""
+    count, fours = 0, tab.fours
+    for q in range(fours.shape[0]):
+        if slips[fours[q, 0]] + slips[fours[q, 1]] + slips[fours[q, 2]] + slips[fours[q, 3]] > 0.0:
+            scratch.chosen[count] = q
+            count += 1
+    for e in range(2):
+        add_folded(scratch.rows, scratch.g[e], fours, scratch.chosen, count, tab.weights, scratch.J[e])
+
+
+@njit(_nrt=False, cache=True, error_model="numpy")
+def unit_rows(kt, tab, C):
+    """Carried rows C (2, M) of a force at the first knot that is given."""
+    K, W = tab.at.shape[1], tab.wide.shape[1]
+    C[:] = 0.0
+    C[0, K] = C[1, W + K] = 1.0
+    to_carry(C, 0, kt, tab)
+
+
+@njit(_nrt=False, cache=True, error_model="numpy")
+def start_rows(vx, vy, N, el, tab, C):
     """Carried rows C (2, M) of the force at the first knot: kt w = (vx, vy) drawn back onto the circle mu N."""
-    K = knots.shape[1]
+    K, W = tab.at.shape[1], tab.wide.shape[1]
     C[:] = 0.0
     R = el.mu * max(N, 0.0)
     length = np.hypot(vx, vy)
@@ -278,30 +239,34 @@ def start_rows(vx, vy, N, el, knots, C):
         return
     ex, ey = vx / length, vy / length
     for l in range(K):
-        turn = el.kt * R / length * knots[0, l]
-        C[0, K + l], C[0, 2 * K + l] = ey * ey * turn, -ex * ey * turn
-        C[1, K + l], C[1, 2 * K + l] = -ex * ey * turn, ex * ex * turn
+        turn = el.kt * R / length * tab.knots[0, l]
+        C[0, W + l], C[0, 2 * W + l] = ey * ey * turn, -ex * ey * turn
+        C[1, W + l], C[1, 2 * W + l] = -ex * ey * turn, ex * ex * turn
         if R > 0.0:
-            C[0, l], C[1, l] = ex * el.mu * el.kn * knots[0, l], ey * el.mu * el.kn * knots[0, l]
-    to_carry(C, 0, el.kt, knots)
+            C[0, l], C[1, l] = ex * el.mu * el.kn * tab.knots[0, l], ey * el.mu * el.kn * tab.knots[0, l]
+    to_carry(C, 0, el.kt, tab)
 
 
-@njit(cache=True, error_model="numpy", fastmath=FAST)
-def close(C, K, rx, ry, sums, F, J):
-    """Periodic F (3, K) and J (3, K, 3K) from the sums, the rows C (2, M) at the end and its misfit (rx, ry).
+@njit(_nrt=False, cache=True, error_model="numpy", fastmath=FAST)
+def close(rx, ry, scratch, F, J):
+    """J (2, K, 3K) and what F (3, K) lacks, from the sums, the rows C (2, M) at the end and its misfit (rx, ry).
 
     The start of the period is moved to the fixed point of the linearised map.
     """
-    a, b, c, d = 1.0 - C[0, 3 * K], -C[0, 3 * K + 1], -C[1, 3 * K], 1.0 - C[1, 3 * K + 1]
+    C, K, W = scratch.C, F.shape[1], scratch.C.shape[1] // 3
+    a, b, c, d = 1.0 - C[0, K], -C[0, W + K], -C[1, K], 1.0 - C[1, W + K]
     det = a * d - b * c
     mx, my = (d * rx - b * ry) / det, (a * ry - c * rx) / det
-    for l in range(3 * K):      # D at the start of the period takes the place of C
+    for l in range(3 * W):      # D at the start of the period takes the place of C
         x, y = C[0, l], C[1, l]
         C[0, l], C[1, l] = (d * x - b * y) / det, (a * y - c * x) / det
-    M = C.shape[1]
     for e in range(2):
         for k in range(K):
-            px, py = sums.J[k, e * M + 3 * K], sums.J[k, e * M + 3 * K + 1]
-            F[1 + e, k] += sums.J[k, e * M + M - 1] + px * mx + py * my
-            for l in range(3 * K):
-                J[1 + e, k, l] += sums.J[k, e * M + l] + px * C[0, l] + py * C[1, l]
+            px, py = scratch.J[e, k, K], scratch.J[e, k, W + K]
+            F[1 + e, k] += px * mx + py * my
+    join_rows(scratch.J, scratch.J.shape[1], C, K, W, J)
+    for l in range(K):      # the last row, which blocks of eight would leave
+        for part in range(3):
+            m = part * W + l
+            J[1, K - 1, part * K + l] = (scratch.J[1, K - 1, m] + scratch.J[1, K - 1, K] * C[0, m]
+                                         + scratch.J[1, K - 1, W + K] * C[1, m])

@@ -1,73 +1,62 @@
 """Periodic state of 2-D Coulomb elements: fixed point of the period map, by marching and by Newton on its derivative.
 
 In slip the half-angle vector (P, Q) ~ (cos theta/2, sin theta/2) of the force moves by a 2 x 2 matrix on each edge,
-A = ((1 + E) I + (1 - E) [[ux, uy], [uy, -ux]]) / 2, so that marching needs no trigonometry and no division. The period
-map never expands: marching converges, but slowly near the stick limit, where Newton with the derivative of the map
-takes a few periods.
+A = ((1 + E) I + (1 - E) [[ux, uy], [uy, -ux]]) / 2, so that marching needs no trigonometry and no division. Marching
+converges, but slowly near the stick limit, where Newton with the derivative of the period map takes a
+few periods. The derivative costs next to nothing: stick leaves it as it is, and along an edge in slip the row of the
+angle falls by det A |P, Q|^2 / |A (P, Q)|^2.
+
+Nothing here makes an array, so that Numba need not count references to them (_nrt), which costs as much as the rest.
 """
 
 from __future__ import annotations
 
-from math import hypot, sqrt
+from math import sqrt
+from typing import NamedTuple
 
 import numpy as np
 from numba import njit
 
 from bladefem.friction.disc import SLIP, STICK, edge, sensitivity
+from bladefem.friction.lane_kernels import ACROSS, AHEAD, AWAY, EDGE_ROWS, FALL, LIMIT_AHEAD, LIMIT_AWAY, TWICE_Y
 
-__all__ = ["DIRECTION_X", "DIRECTION_Y", "EDGE_ROWS", "GROWTH", "HALF", "INVERSE_LENGTH", "INVERSE_LIMIT",
-           "SLOPE", "TOLERANCE", "edges", "half_angle", "march", "period", "periodic", "record", "start", "turned"]
+__all__ = ["CHANGING", "SLIDING", "STICKING", "TOLERANCE", "Trail", "empty_trail", "follow", "periodic", "start"]
 
 TOLERANCE = 1e-12       # of the largest friction limit: how well the force must repeat itself in marching
+MARCHED = 2             # periods before Newton: load that varies allows several states, and marching chooses
 FREE = 30               # periods in which Newton's steps need not pay at once: states of the edges have to settle first
-DIRECTION_X, DIRECTION_Y, INVERSE_LENGTH, HALF, GROWTH, SLOPE, INVERSE_LIMIT, EDGE_ROWS = range(8)
+SINGULAR = 1e-6         # of det(I - Phi): below it the state keeps a memory of its start
+TOUCH = 1e-9            # of the limit: an edge that reaches no further beyond may be one that only touches it
+OPEN, STICKING, SLIDING, CHANGING = range(4)    # pieces of a period; a change of state is a piece of one edge
 
 
-@njit(cache=True, error_model="numpy", fastmath={"contract", "nsz", "arcp"})
-def edges(path, mu, out):
-    """Fill out (7, S): direction (2), 1/length, decay over half an edge, growth of the limit, x dln(decay)/dx, 1/limit.
+class Trail(NamedTuple):
+    """One period of a node along its knots and samples; rows of ``width`` numbers as in lane_kernels.py."""
 
-    Lengths and limits are forces [N]. One array is written in each loop, so that the compiler can use vectors.
-    """
-    S = path.shape[1]
-    for row in range(3):
-        for i in range(S - 1):
-            out[row, i] = path[row, i + 1] - path[row, i]
-        out[row, S - 1] = path[row, 0] - path[row, S - 1]
-    for i in range(S):
-        out[INVERSE_LIMIT, i] = 1.0 / max(mu * path[2, i] + 0.5 * mu * out[2, i], 1e-300)
-    for i in range(S):
-        out[GROWTH, i] = mu * out[2, i]
-    for i in range(S):
-        out[INVERSE_LENGTH, i] = 1.0 / max(sqrt(out[0, i] ** 2 + out[1, i] ** 2), 1e-12 / out[INVERSE_LIMIT, i])
-    for i in range(S):
-        x = 0.5 * out[INVERSE_LIMIT, i] / out[INVERSE_LENGTH, i]
-        out[SLOPE, i] = -x / sqrt(1.0 + x * x)
-    for i in range(S):
-        x = 0.5 * out[INVERSE_LIMIT, i] / out[INVERSE_LENGTH, i]
-        out[HALF, i] = 1.0 / (sqrt(1.0 + x * x) + x)
-    for i in range(S):
-        out[0, i] *= out[INVERSE_LENGTH, i]
-    for i in range(S):
-        out[1, i] *= out[INVERSE_LENGTH, i]
-    for i in range(S):
-        out[GROWTH, i] *= out[INVERSE_LENGTH, i]
+    form: np.ndarray        # (7, width) edges
+    knots: np.ndarray       # (2, width) half-angle vectors of edges that slide
+    slips: np.ndarray       # (width,) 1 where an edge slides
+    kinds: np.ndarray       # (S + 1,) of the pieces
+    begins: np.ndarray      # (S + 1,) their first edges; one more, S, closes the list
+    forces: np.ndarray      # (2, S + 1) at the knots where they begin [N]
+    changes: np.ndarray     # (S + 1, 8) of an edge that changes state: at its end and middle the state; if it slips at
+                            # its end, d(angle) there by force (2), increment (2), loads at its ends (2)
 
 
-@njit(cache=True, error_model="numpy", inline="always")
+def empty_trail(S: int, width: int) -> Trail:
+    """Scratch for one node."""
+    whole = [np.zeros(S + 1, np.int64) for _ in range(2)]
+    return Trail(np.zeros((EDGE_ROWS, width)), np.zeros((2, width)), np.zeros(width), *whole, np.zeros((2, S + 1)),
+                 np.zeros((S + 1, 8)))
+
+
+@njit(_nrt=False, cache=True, error_model="numpy", inline="always")
 def half_angle(x, y):
     """A vector along (cos theta/2, sin theta/2) for the direction (x, y) of unit length."""
     return (1.0 + x, y) if x >= 0.0 else (y, 1.0 - x)
 
 
-@njit(cache=True, error_model="numpy", inline="always")
-def turned(P, Q, ux, uy, E):
-    """The half-angle vector after tan(psi/2) to the direction (ux, uy) has fallen by E."""
-    a, b = 1.0 + E, 1.0 - E
-    return 0.5 * ((a + b * ux) * P + b * uy * Q), 0.5 * (b * uy * P + (a - b * ux) * Q)
-
-
-@njit(cache=True, error_model="numpy")
+@njit(_nrt=False, cache=True, error_model="numpy")
 def start(vx, vy, N, mu):
     """Force at the first knot: k_t w, drawn back onto the circle."""
     R = mu * max(N, 0.0)
@@ -76,136 +65,153 @@ def start(vx, vy, N, mu):
     return scale * vx, scale * vy
 
 
-@njit(cache=True, error_model="numpy")
-def march(path, mu, form, fx, fy):
-    """One period of the force alone from (fx, fy) at the first knot: (fx, fy, edges that slip or open, memory).
+@njit(_nrt=False, cache=True, error_model="numpy", inline="always")
+def _begin(trail, pieces, kind, i, fx, fy):
+    """Note a piece of the period that begins at knot i under the force (fx, fy); the number of pieces."""
+    trail.kinds[pieces], trail.begins[pieces] = kind, i
+    trail.forces[0, pieces], trail.forces[1, pieces] = fx, fy
+    return pieces + 1
 
-    memory bounds the length of d f_end / d f_start, as far as sustained slip and separation tell.
+
+@njit(_nrt=False, cache=True, error_model="numpy", forceinline=True)
+def _change(path, i, mu, fx, fy, phi, trace, change):
+    """One edge on which the state may change: (state at its end, force there, sample slips, it is more than a touch).
+
+    Fills change (8,) and carries on phi (2, 2), of which in slip the first row is that of the angle.
     """
-    S, events, slipping, P, Q, memory = path.shape[1], 0, False, 1.0, 0.0, 1.0
-    for i in range(S):
-        j = i + 1 if i + 1 < S else 0
-        N0, N1 = path[2, i], path[2, j]
-        if slipping:
-            ux, uy, h = form[DIRECTION_X, i], form[DIRECTION_Y, i], form[HALF, i]
-            size, cx, cy = P * P + Q * Q, P * P - Q * Q, 2.0 * P * Q
-            if N1 > 0.0 and cx * ux + cy * uy >= form[GROWTH, i] * size:
-                P, Q = turned(P, Q, ux, uy, h * h)
-                memory *= h * h
-                events += 1
-                continue
-            slipping = False
-            memory *= N0 / size
-            fx, fy = mu * N0 * cx / size, mu * N0 * cy / size
-        dx, dy = path[0, j] - path[0, i], path[1, j] - path[1, i]
-        if N0 > 0.0 and N1 > 0.0:
-            ex, ey, R1 = fx + dx, fy + dy, mu * N1
-            if ex * ex + ey * ey <= R1 * R1:
-                fx, fy = ex, ey
-                continue
-        end, fx, fy, _, _, _ = edge(fx, fy, dx, dy, N0, N1, mu)
-        events += end != STICK
-        if end == SLIP and N1 > 0.0 and mu > 0.0:
-            P, Q = half_angle(fx / (mu * N1), fy / (mu * N1))
-            memory *= (P * P + Q * Q) / N1
-            slipping = True
-        elif end != STICK:
-            memory = 0.0
-    if slipping:
-        size, R1 = P * P + Q * Q, mu * path[2, 0]
-        memory *= path[2, 0] / size
-        fx, fy = R1 * (P * P - Q * Q) / size, R1 * 2.0 * P * Q / size
-    return fx, fy, events, memory
+    dx, dy, N0, N1 = path[0, i + 1] - path[0, i], path[1, i + 1] - path[1, i], path[2, i], path[2, i + 1]
+    end, ex, ey, mid, trace[0, i], trace[1, i] = edge(fx, fy, dx, dy, N0, N1, mu)
+    change[0], change[1] = end, mid
+    if end == SLIP:
+        p0, p1, change[4], change[5], change[6], change[7] = sensitivity(fx, fy, dx, dy, N0, N1, mu, 1.0)
+        change[2], change[3] = p0, p1
+        phi[0, 0], phi[0, 1] = p0 * phi[0, 0] + p1 * phi[1, 0], p0 * phi[0, 1] + p1 * phi[1, 1]
+    elif end != STICK:
+        phi[:, :] = 0.0
+    touch = (1.0 + TOUCH) * mu * N1
+    return end, ex, ey, mid == SLIP, end == SLIP and (fx + dx) ** 2 + (fy + dy) ** 2 > touch * touch
 
 
-@njit(cache=True, error_model="numpy")
-def record(path, mu, form, fx, fy, trace):
-    """Forces at the samples, trace (2, S) [N], over one period from (fx, fy) at the first knot; samples that slip."""
-    S, slips, slipping, P, Q = path.shape[1], 0, False, 1.0, 0.0
-    for i in range(S):
-        j = i + 1 if i + 1 < S else 0
-        N0, N1 = path[2, i], path[2, j]
-        if slipping:
-            ux, uy, h = form[DIRECTION_X, i], form[DIRECTION_Y, i], form[HALF, i]
-            size, cx, cy = P * P + Q * Q, P * P - Q * Q, 2.0 * P * Q
-            if N1 > 0.0 and cx * ux + cy * uy >= form[GROWTH, i] * size:
-                p, q = turned(P, Q, ux, uy, h)
-                R = 0.5 * mu * (N0 + N1) / (p * p + q * q)
-                trace[0, i], trace[1, i] = R * (p * p - q * q), R * 2.0 * p * q
-                P, Q = turned(P, Q, ux, uy, h * h)
-                slips += 1
-                continue
-            slipping = False
-            fx, fy = mu * N0 * cx / size, mu * N0 * cy / size
-        dx, dy = path[0, j] - path[0, i], path[1, j] - path[1, i]
-        if N0 > 0.0 and N1 > 0.0 and (fx + dx) ** 2 + (fy + dy) ** 2 <= (mu * N1) ** 2:
-            trace[0, i], trace[1, i] = fx + 0.5 * dx, fy + 0.5 * dy
-            fx, fy = fx + dx, fy + dy
-            continue
-        end, fx, fy, mid, trace[0, i], trace[1, i] = edge(fx, fy, dx, dy, N0, N1, mu)
-        slips += mid == SLIP
-        slipping = end == SLIP and mu * N1 > 0.0
-        if slipping:
-            P, Q = half_angle(fx / (mu * N1), fy / (mu * N1))
-    return slips
+@njit(_nrt=False, cache=True, error_model="numpy", inline="always")
+def _leave(P, Q, R, fade, phi):
+    """Force of size R along the half-angle vector; phi (2, 2) from the row of the angle, which fell by fade."""
+    size = P * P + Q * Q
+    fx, fy, fall = R * (P * P - Q * Q) / size, R * 2.0 * P * Q / size, fade / size
+    for c in range(2):
+        phi[0, c], phi[1, c] = -fy * fall * phi[0, c], fx * fall * phi[0, c]
+    return fx, fy
 
 
-@njit(cache=True, error_model="numpy")
-def period(path, mu, fx, fy, phi):
-    """One period from (fx, fy) [N] at the first knot: (fx, fy, edges that slip or open); phi (2, 2) = df_end/df."""
-    vx, vy, N = path
-    S, events = vx.size, 0
-    phi[:] = 0.0
-    phi[0, 0] = phi[1, 1] = 1.0
-    for i in range(S):
-        j = i + 1 if i + 1 < S else 0
-        dx, dy = vx[j] - vx[i], vy[j] - vy[i]
-        end, ex, ey, _, _, _ = edge(fx, fy, dx, dy, N[i], N[j], mu)
-        if end == SLIP and N[i] > 0.0:
-            p0, p1, _, _, _, _ = sensitivity(fx, fy, dx, dy, N[i], N[j], mu, 1.0)
-            a, b = p0 * phi[0, 0] + p1 * phi[1, 0], p0 * phi[0, 1] + p1 * phi[1, 1]
-            phi[0, 0], phi[0, 1], phi[1, 0], phi[1, 1] = -ey * a, -ey * b, ex * a, ex * b
-        elif end != STICK:
-            phi[:] = 0.0
-        events += end != STICK
+@njit(_nrt=False, cache=True, error_model="numpy", forceinline=True, fastmath={"contract", "nsz"})
+def _slide(first, S, P, Q, fade, form, knots, slips):
+    """Follow slip from a knot to where it ends: (knot, P, Q) there, fade times the determinants of its edges' maps."""
+    form, p, q, slips = form[:, first:], knots[0, first:], knots[1, first:], slips[first:]
+    for i in range(S - first):
+        if P * (P * form[LIMIT_AHEAD, i] + Q * form[TWICE_Y, i]) < Q * Q * form[LIMIT_AWAY, i]:
+            return first + i, P, Q, fade
+        p[i], q[i], slips[i] = P, Q, 1.0
+        fade *= form[FALL, i]
+        P, Q = form[AHEAD, i] * P + form[ACROSS, i] * Q, form[ACROSS, i] * P + form[AWAY, i] * Q
+    return S, P, Q, fade
+
+
+@njit(_nrt=False, cache=True, error_model="numpy", forceinline=True, fastmath={"contract", "nsz"})
+def _stick(first, S, fx, fy, path, mu, trace):
+    """Follow stick from a knot under load to where it ends: (knot, fx, fy) there."""
+    path, x, y = path[:, first:], trace[0, first:], trace[1, first:]
+    for i in range(S - first):
+        ex, ey, R = fx + (path[0, i + 1] - path[0, i]), fy + (path[1, i + 1] - path[1, i]), mu * path[2, i + 1]
+        if ex * ex + ey * ey > R * R or path[2, i + 1] <= 0.0:
+            return first + i, fx, fy
+        x[i], y[i] = 0.5 * (fx + ex), 0.5 * (fy + ey)
         fx, fy = ex, ey
-    return fx, fy, events
+    return S, fx, fy
 
 
-@njit(cache=True, error_model="numpy")
+@njit(_nrt=False, cache=True, error_model="numpy")
+def follow(path, mu, fx, fy, trail, trace, phi):
+    """One period from (fx, fy) at the first knot: (fx, fy, edges that slip or open, that surely slip, samples, pieces).
+
+    The samples are those that slip. path (3, width) is (kt w_1, kt w_2, N) at the knots [N]. Fills the trail,
+    phi (2, 2) = df_end/df_start and trace (2, width), the forces at the samples [N] that do not slide all along.
+    """
+    S, events, sure, slips, pieces, i = trail.kinds.size - 1, 0, 0, 0, 0, 0
+    phi[0, 0] = phi[1, 1] = 1.0
+    phi[0, 1] = phi[1, 0] = 0.0
+    trail.slips[:] = 0.0
+    while i < S:
+        begin, ax, ay, N0, N1 = i, fx, fy, path[2, i], path[2, i + 1]
+        if N0 <= 0.0 and N1 <= 0.0:
+            pieces = _begin(trail, pieces, OPEN, i, 0.0, 0.0)
+            trace[0, i] = trace[1, i] = fx = fy = 0.0
+            phi[:, :] = 0.0
+            events, i = events + 1, i + 1
+            continue
+        if N0 > 0.0:
+            i, fx, fy = _stick(i, S, fx, fy, path, mu, trace)
+            if i > begin:
+                pieces = _begin(trail, pieces, STICKING, begin, ax, ay)
+                continue
+        pieces = _begin(trail, pieces, CHANGING, i, fx, fy)
+        end, fx, fy, slipped, slipping = _change(path, i, mu, fx, fy, phi, trace, trail.changes[pieces - 1])
+        events, sure, slips, i = events + (end != STICK), sure + slipping, slips + slipped, i + 1
+        if end == SLIP and mu * N1 > 0.0:
+            begin, (P, Q) = i, half_angle(fx / (mu * N1), fy / (mu * N1))
+            i, P, Q, fade = _slide(i, S, P, Q, P * P + Q * Q, trail.form, trail.knots, trail.slips)
+            if i > begin:
+                pieces = _begin(trail, pieces, SLIDING, begin, fx, fy)
+            events, sure, slips = events + i - begin, sure + i - begin, slips + i - begin
+            fx, fy = _leave(P, Q, mu * path[2, i], fade, phi)
+        elif end == SLIP:
+            phi[:, :] = 0.0
+    trail.begins[pieces] = S
+    return fx, fy, events, sure, slips, pieces
+
+
+@njit(_nrt=False, cache=True, error_model="numpy")
 def newton(fx, fy, gx, gy, R, phi):
-    """(usable, fx, fy): the fixed point of the linearised period map f -> g, drawn back onto the circle of radius R."""
+    """det(I - Phi) and the fixed point of the linearised period map f -> g, in the circle of radius R."""
     a, b, c, d = 1.0 - phi[0, 0], -phi[0, 1], -phi[1, 0], 1.0 - phi[1, 1]
     det = a * d - b * c
     if abs(det) < 1e-9:
-        return False, gx, gy
+        return det, gx, gy
     rx, ry = gx - fx, gy - fy
     x, y = fx + (d * rx - b * ry) / det, fy + (a * ry - c * rx) / det
-    length = hypot(x, y)
+    length = sqrt(x * x + y * y)
     if length > R:
         x, y = x * R / length, y * R / length
-    return True, x, y
+    return det, x, y
 
 
-@njit(cache=True, error_model="numpy")
-def periodic(path, mu, fx, fy, guessing, limit, phi):
-    """(fx, fy, cycles, converged, guesses) of the periodic force for path (3, S) [N], from (fx, fy); fills phi."""
-    scale, R = mu * max(path[2].max(), 0.0), mu * max(path[2, 0], 0.0)
-    guess, guesses, before, sx, sy = False, 0, np.inf, 0.0, 0.0
+@njit(_nrt=False, cache=True, error_model="numpy")
+def _remembers(phi):
+    """Whether anything of the force at the start is left at the end."""
+    return phi[0, 0] != 0.0 or phi[0, 1] != 0.0 or phi[1, 0] != 0.0 or phi[1, 1] != 0.0
+
+
+@njit(_nrt=False, cache=True, error_model="numpy")
+def periodic(path, mu, largest, near, limit, trail, trace, phi):
+    """Periodic force by Newton from kt w: (unique, fx, fy, gx, gy, slips, pieces, cycles).
+
+    The last period went from f to g, and Newton's step from f is at most ``near`` times the limit under the largest
+    load: the trail is that of the periodic state but for what is linear in the step. Not unique: the state keeps a
+    memory of its start, as it does where Newton ended on the rim of stick, at forces that touch the limit and no more.
+    """
+    scale, R = mu * largest, mu * max(path[2, 0], 0.0)
+    fx, fy = start(path[0, 0], path[1, 0], path[2, 0], mu)
+    guess, before, sx, sy = False, np.inf, 0.0, 0.0
     for cycle in range(1, limit + 1):
-        gx, gy, events = period(path, mu, fx, fy, phi)
-        residual = hypot(gx - fx, gy - fy)
-        if events == 0 or residual <= TOLERANCE * scale:
-            if guessing and events > 0:                 # a small residual leaves residual / (1 - contraction)
-                _, gx, gy = newton(fx, fy, gx, gy, R, phi)
-            return gx, gy, cycle, True, guesses
+        gx, gy, events, sure, slips, pieces = follow(path, mu, fx, fy, trail, trace, phi)
+        residual = sqrt((gx - fx) ** 2 + (gy - fy) ** 2)
+        det, x, y = newton(fx, fy, gx, gy, R, phi)
+        if events == 0 or (residual <= TOLERANCE * scale and abs(det) < SINGULAR):
+            return False, fx, fy, gx, gy, slips, pieces, cycle
+        if abs(det) >= SINGULAR and sqrt((x - fx) ** 2 + (y - fy) ** 2) <= near * scale:
+            return sure > 0 or not _remembers(phi), fx, fy, gx, gy, slips, pieces, cycle
         if guess and cycle > FREE and residual > 0.5 * before:      # no better than marching: go back and march on
             fx, fy, guess = sx, sy, False
             continue
         before, sx, sy = residual, gx, gy
-        guess = False
-        if guessing:
-            guess, gx, gy = newton(fx, fy, gx, gy, R, phi)
-            guesses += guess
-        fx, fy = gx, gy
-    return fx, fy, limit, False, guesses
+        guess = cycle >= MARCHED and abs(det) >= 1e-9
+        fx, fy = (x, y) if guess else (gx, gy)
+    return True, fx, fy, gx, gy, slips, pieces, -limit

@@ -14,11 +14,10 @@ from numba import njit
 
 from bladefem.errors import InputError
 from bladefem.friction.harmonics import analysis, synthesis
+from bladefem.friction.lane_kernels import TILE
+from bladefem.friction.lanes import LANES
 
-__all__ = ["Node", "Sums", "Tables", "columns", "empty_sums", "gram", "tables", "values", "weighted"]
-
-
-WAITING = 32        # samples summed at once by matrix product, few enough to stay in the cache
+__all__ = ["Node", "Tables", "add_gram", "filled", "gram", "tables", "tiled", "values", "weighted"]
 
 
 class Node(NamedTuple):
@@ -31,28 +30,19 @@ class Node(NamedTuple):
 
 
 class Tables(NamedTuple):
-    """Read-only arrays for H harmonics and S samples; K = 2H+1."""
+    """Read-only arrays for H harmonics and S samples; K = 2H+1, width and W as in lane_kernels.py."""
 
     at: np.ndarray          # (S, K) synthesis at the samples
     transposed: np.ndarray  # (K, S) the same, for synthesis that runs along time
     sums: np.ndarray        # (2S+1, 4H+1) running means of the basis up to 2H over two periods, for cyclic ranges
     knots: np.ndarray       # (S, K) synthesis at tau = 2 pi (i - 1/2) / S, harmonic h divided by cos(h pi / S)
-    knots_transposed: np.ndarray    # (K, S)
-    analysis: np.ndarray    # (S, K) weights of a sample in the coefficients
-    pattern: np.ndarray     # (S, 3, M) rows of a 2-D element: normal sample, change between knots of either tangent
-
-
-class Sums(NamedTuple):
-    """What a 2-D element collects in one period; M columns as in disc_rows.py."""
-
-    J: np.ndarray           # (K, 2M) rows and forces, first and second tangent
-    stick: np.ndarray       # (4H+1,) basis means of the samples in stick
-    rows: np.ndarray        # (WAITING, 2M) of samples in slip that are not yet in J
-    turns: np.ndarray       # (WAITING, 12) how the row of the angle turns along them
-    product: np.ndarray     # (K, 2M) scratch
-    row: np.ndarray         # (M,) row of the angle in slip
-    middle: np.ndarray      # (M,) row of the angle at the sample
-    mean: np.ndarray        # (4H+1,) scratch
+    along: np.ndarray       # (K, width) the same, which runs along time and begins again after S
+    analysis: np.ndarray    # (width, K) weights of a sample in the coefficients
+    means: np.ndarray       # (width, 4H+1) weights of a sample in the basis means up to 2H
+    wide: np.ndarray        # (S, W) synthesis at the samples, zeros beyond K
+    change: np.ndarray      # (S, W) its change from knot to knot
+    fours: np.ndarray       # (., 4) samples i, S/2 - i, S/2 + i, S - i; S stands for none
+    weights: np.ndarray     # (., tile) of the samples i in the coefficients, zeros beyond K
 
 
 @lru_cache(maxsize=8)
@@ -65,29 +55,37 @@ def tables(H: int, samples: int) -> Tables:
     sums = np.concatenate([np.zeros((1, 4 * H + 1)), np.cumsum(wide, axis=0)])
     knots = synthesis(H, samples, -0.5)
     knots[:, 1:] /= np.repeat(np.cos(np.pi / samples * np.arange(1, H + 1)), 2)
-    made = Tables(at, at.T.copy(), sums, knots, knots.T.copy(), analysis(H, samples).T.copy(), _pattern(at, knots))
+    more, weights = filled(samples) + LANES - samples, analysis(H, samples).T
+    along, blank = knots[np.arange(samples + more) % samples].T, ((0, more), (0, 0))
+    columns = ((0, 0), (0, filled(2 * H + 1) - 2 * H - 1))
+    made = Tables(at, at.T.copy(), sums, knots, along.copy(), np.pad(weights, blank), np.pad(wide[:samples], blank),
+                  np.pad(at, columns), np.pad(np.roll(knots, -1, axis=0) - knots, columns), _fours(samples),
+                  np.pad(weights[:samples // 2 + 1], ((0, 0), (0, tiled(H) - 2 * H - 1))))
     for array in made:
         array.setflags(write=False)
     return made
 
 
-def columns(K: int) -> int:
-    """M: 3K+3 columns filled up to a multiple of 4."""
-    return (3 * K + 6) // 4 * 4
+def filled(size: int) -> int:
+    """The next multiple of the lanes of a vector."""
+    return -(-size // LANES) * LANES
 
 
-def _pattern(at: np.ndarray, knots: np.ndarray) -> np.ndarray:
-    S, K = at.shape
-    pattern = np.zeros((S, 3, columns(K)))
-    pattern[:, 0, :K] = at
-    pattern[:, 1, K:2 * K] = pattern[:, 2, 2 * K:3 * K] = np.roll(knots, -1, axis=0) - knots
-    return pattern
+def tiled(H: int) -> int:
+    """Number of coefficients that folded sums fill, at least 2H+1: harmonics by twos up to 8, then by eights."""
+    return 4 * (H // 2) + 3 if H < TILE else 2 * TILE * (H // TILE + 1) - 1
 
 
-def empty_sums(H: int) -> Sums:
-    """Scratch for one 2-D element."""
-    K, M, P = 2 * H + 1, columns(2 * H + 1), 4 * H + 1
-    return Sums(*[np.empty(shape) for shape in ((K, 2 * M), P, (WAITING, 2 * M), (WAITING, 12), (K, 2 * M), M, M, P)])
+def _fours(S: int) -> np.ndarray:
+    """(., 4) samples that share the values of all harmonics but for signs; where S is odd only pairs do."""
+    i = np.arange((S // 2 if S % 2 else S // 4) + 1)
+    four = np.stack([i, S // 2 - i, S // 2 + i, S - i], axis=1)
+    if S % 2:
+        four[:, 1:3] = S
+    four[0, 1] = four[0, 3] = S
+    if S % 4 == 0:
+        four[-1, 1:3] = S
+    return four
 
 
 @njit(cache=True, error_model="numpy")
@@ -108,6 +106,24 @@ def gram(m, out):
             out[2 * a, 2 * b] = out[2 * b, 2 * a] = cos_apart - cos
             out[2 * a, 2 * b - 1] = out[2 * b - 1, 2 * a] = sin + sin_apart
             out[2 * a - 1, 2 * b] = out[2 * b, 2 * a - 1] = sin - sin_apart
+
+
+@njit(_nrt=False, cache=True, error_model="numpy")
+def add_gram(factor, m, out):
+    """out (K, K) += factor times the Gram matrix of means m (4H+1,)."""
+    H = out.shape[0] // 2
+    out[0, 0] += factor * m[0]
+    for a in range(1, 2 * H + 1):
+        out[0, a] += factor * m[a]
+        out[a, 0] += 2.0 * factor * m[a]
+    for a in range(1, H + 1):
+        for b in range(1, H + 1):
+            total, apart, turn = 2 * (a + b), 2 * abs(a - b), 1.0 if a > b else -1.0
+            cos_apart, sin_apart = (m[apart - 1], turn * m[apart]) if apart else (m[0], 0.0)
+            out[2 * a - 1, 2 * b - 1] += factor * (cos_apart + m[total - 1])
+            out[2 * a, 2 * b] += factor * (cos_apart - m[total - 1])
+            out[2 * a, 2 * b - 1] += factor * (m[total] + sin_apart)
+            out[2 * a - 1, 2 * b] += factor * (m[total] - sin_apart)
 
 
 @njit(cache=True, error_model="numpy")
