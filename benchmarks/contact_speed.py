@@ -2,15 +2,19 @@
 
     PYTHONPATH=. python benchmarks/contact_speed.py
 
-Recorded on a shared two-core machine under other load, one thread (trust ratios):
+Recorded in processor time on a shared two-core machine with four to nine jobs running beside it, one thread; "idle"
+are runs of the same code alone on the machine:
 
-    complementarity, 484 nodes (232 pressed): cold 1.4 ms in 2 steps; one Cholesky factor of all nodes 1.4 ms
-    complementarity, 2025 nodes (949 pressed): cold 54 ms in 3 steps; one Cholesky factor of all nodes 99 ms
-    wedge sector, 63069 dofs, 90 contact nodes: condensed in 2.4 s, then a load state costs 0.89 ms, warm 0.37 ms
-    compliance, 146520 dofs (blade's proportions), 1000 right-hand sides: factor 7.6 s, contact ports 19.7 s (12.4 s on
-        an idle machine), dense columns 21.6 s of CPU
-    compliance, 156816 dofs (block), 1000 right-hand sides: factor 21.2 s, contact ports 26.3 s (21.0 s idle), dense
-        columns 33.1 s of CPU
+    complementarity, 484 nodes (232 pressed): cold 1.4 ms, warm 1.1 ms; one Cholesky factor of all nodes 1.5 ms
+    complementarity, 2025 nodes (949 pressed): cold 55 ms, warm 51 ms; one Cholesky factor of all nodes 87 ms
+    wedge sector, 63069 dofs, 90 contact nodes: condensed in 2.7 s, then a load state costs 0.89 ms, warm 0.39 ms
+    compliance, 146520 dofs (blade's proportions), 1000 right-hand sides: factor 7.3 s, contact ports 20.8 s (12.4 s
+        idle), dense columns 21.8 s of CPU
+    compliance, 156816 dofs (block), 1000 right-hand sides: factor 22.8 s, contact ports 30.2 s (21.0 s idle), dense
+        columns 35.1 s of CPU
+
+The factor is not part of the right-hand sides: modes and reduction need it, too. A blade is within 25 s for 1000 of them
+on a busy machine; a block only on an idle one, since sweeps over its wide fronts wait for memory.
 
 Contact ports are sparse: MUMPS leaves out the parts of the first sweep that they do not reach. A Schur complement of
 [[K, P], [P^T, 0]] on the ports, which saves the second sweep, was tried: 15 s instead of 8 + 12 s for the blade, but 60
@@ -43,12 +47,12 @@ from geometry import build  # noqa: E402
 
 
 def best(call, repeats=5):
-    """Shortest wall time [ms] and the last result."""
+    """Shortest processor time [ms] and the last result."""
     times = []
     for _ in range(repeats):
-        start = time.perf_counter()
+        start = time.process_time()
         out = call()
-        times.append(1e3 * (time.perf_counter() - start))
+        times.append(1e3 * (time.process_time() - start))
     return min(times), out
 
 
