@@ -76,7 +76,7 @@ def mac_table(match: np.ndarray, mine: ModeSet, theirs: ModeSet) -> pd.DataFrame
 
 
 def _write(result: Survey, pictures: int, stresses: pd.DataFrame, fields: dict[str, np.ndarray],
-           progress: Progress) -> None:
+           inside: dict[str, np.ndarray], progress: Progress) -> None:
     run, folder = result.run, Path(result.run.folder)
     tables = tables_of(result) | {"stresses": stresses}
     for name, table in tables.items():
@@ -87,23 +87,22 @@ def _write(result: Survey, pictures: int, stresses: pd.DataFrame, fields: dict[s
     excited = excited_set(run)
     modes.save_modes_vtu(run.mesh, excited, folder / "modes.vtu")
     shapes = {f"mode {i + 1}, {f:.6g} Hz": excited.shapes[i] for i, f in enumerate(excited.frequencies[:pictures])}
-    mesh.save_vtu(run.mesh, folder / "stress.vtu", {**shapes, **fields})
+    mesh.save_vtu(run.mesh, folder / "stress.vtu", {**shapes, **fields}, inside)
     for name, draw in progress(list(_drawings(result, tables, pictures).items()), "pictures"):
         draw(folder / name)
 
 
-def _stresses(result: Survey) -> tuple[pd.DataFrame, dict[str, np.ndarray]]:
-    """Table of extremes and node fields: displacement and stress under the rotation, of the first modes and of the
-    resonances; collective."""
+def _stresses(result: Survey) -> tuple[pd.DataFrame, dict[str, np.ndarray], dict[str, np.ndarray]]:
+    """Table of extremes and fields at nodes or in cells: displacement and stress under the rotation, of the first modes
+    and of the resonances; collective."""
     states = stress_states(result.bodies, excited_set(result.run), PICTURES, result.answer)
-    table, nodes = stress_table(result.bodies, states)
-    fields = {}
-    for name, (size, largest) in nodes.items():
+    table, nodes, cells = stress_table(result.bodies, states)
+    fields, inside = ({f"{name}, {kind} [Pa]": field for name, values in each.items() for kind, field in values.items()}
+                      for each in (nodes, cells))
+    for name in nodes:
         if not name.startswith("mode"):
             fields |= _vectors(f"{name}, displacement", states[name])
-        fields[f"{name}, von Mises [Pa]"] = size
-        fields[f"{name}, largest principal [Pa]"] = largest
-    return table, fields
+    return table, fields, inside
 
 
 def _vectors(name: str, u: np.ndarray) -> dict[str, np.ndarray]:

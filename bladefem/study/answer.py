@@ -35,6 +35,8 @@ BETWEEN = 500       # points over the whole band
 WIDTHS = 12.0       # half-widths of a resonance that are drawn closely
 LARGEST = 1e-3      # displacement [m] that the stresses of a mode are given for
 
+Fields = dict[str, dict[str, np.ndarray]]
+
 
 @dataclass(frozen=True)
 class Answer:
@@ -130,8 +132,9 @@ def stress_states(bodies: Bodies, modes: ModeSet, count: int, found: Answer | No
     return states
 
 
-def stress_table(bodies: Bodies, states: dict[str, np.ndarray]) -> tuple[pd.DataFrame, dict[str, np.ndarray]]:
-    """Extremes of each state, and node fields of von Mises and largest principal stress (2, n_points) [Pa] by its name.
+def stress_table(bodies: Bodies, states: dict[str, np.ndarray]) -> tuple[pd.DataFrame, Fields, Fields]:
+    """Extremes of each state; its stresses [Pa] at the nodes (n_points,), and the largest at the Gauss points of each
+    cell of all bodies (nc,), 0 outside the blade.
 
     Returns:
         columns state, largest [m], von_mises [Pa] at the nodes and where x, y, z [m], von_mises_gauss [Pa] at the
@@ -139,17 +142,28 @@ def stress_table(bodies: Bodies, states: dict[str, np.ndarray]) -> tuple[pd.Data
         extremes in a period.
     """
     from ..fem.stress import gauss_stress, nodal_stress, principal, von_mises
-    rows, nodes = [], {}
+    rows, fields, cells = [], {}, {}
     for name, u in states.items():
         stress = nodal_stress(bodies.still_blade, u)
         size, sides = von_mises(stress), principal(stress)
-        worst, nodes[name] = size.argmax(), np.stack([size, sides[:, 0]])
+        inside = von_mises(gauss_stress(bodies.still_blade, u).stress).max(1)
+        worst, fields[name] = size.argmax(), {"von Mises": size, "largest principal": sides[:, 0]}
+        cells[name] = {"von Mises at Gauss points": _of_all_bodies(bodies, inside)}
+        if not np.iscomplexobj(stress):     # motion swings to both sides: its smallest is minus the largest
+            fields[name]["smallest principal"] = sides[:, 2]
         low = -sides[:, 0].max() if np.iscomplexobj(stress) else sides[:, 2].min()
         rows.append({"state": name, "largest": np.linalg.norm(u, axis=1).max(), "von_mises": size[worst],
                      **dict(zip("xyz", bodies.mesh.points[worst], strict=True)),
-                     "von_mises_gauss": von_mises(gauss_stress(bodies.still_blade, u).stress).max(),
+                     "von_mises_gauss": inside.max(),
                      "principal": sides[:, 0].max(), "pressing": low})
-    return pd.DataFrame(rows), nodes
+    return pd.DataFrame(rows), fields, cells
+
+
+def _of_all_bodies(bodies: Bodies, values: np.ndarray) -> np.ndarray:
+    """Values in the blade's cells (nc of the blade,) as values in all cells of the mesh."""
+    sizes = {name: len(bodies.mesh.bodies[name]) for name in bodies.still_blade.material}
+    parts = dict(zip(sizes, np.split(values, np.cumsum(list(sizes.values()))[:-1]), strict=True))
+    return np.concatenate([parts.get(name, np.zeros(len(cells))) for name, cells in bodies.mesh.bodies.items()])
 
 
 def _curve(found: Forced, vector: np.ndarray, count: int) -> pd.DataFrame:

@@ -38,12 +38,14 @@ BELOW = (-0.45, 0.8, 0.65)
 RADIAL = (1.0, 0.0, 0.0)
 
 
-def grid(mesh: Mesh, fields: dict[str, np.ndarray] | None = None) -> UnstructuredGrid:
+def grid(mesh: Mesh, fields: dict[str, np.ndarray] | None = None,
+         inside: dict[str, np.ndarray] | None = None) -> UnstructuredGrid:
     """The whole mesh for pyvista, nodes in VTK's order, with the body's number on each cell.
 
     Args:
         mesh: plane or solid.
         fields: name with unit -> (n_points, ...) values at the nodes; complex ones become two fields.
+        inside: name with unit -> (nc, ...) values in the cells of all bodies, in their order.
     """
     import pyvista
 
@@ -54,6 +56,8 @@ def grid(mesh: Mesh, fields: dict[str, np.ndarray] | None = None) -> Unstructure
     result.cell_data["body"] = np.repeat(np.arange(len(mesh.bodies)), [len(c) for c in mesh.bodies.values()])
     for name, values in split_complex(fields or {}).items():
         result.point_data[name] = values
+    for name, values in (inside or {}).items():
+        result.cell_data[name] = values
     return result
 
 
@@ -74,10 +78,11 @@ def split_complex(fields: dict[str, np.ndarray]) -> dict[str, np.ndarray]:
     return parts
 
 
-def save_vtu(mesh: Mesh, file: str | Path, fields: dict[str, np.ndarray] | None = None) -> Path:
-    """Write the mesh and node fields, (n_points,) or (n_points, 3), as a compressed VTU file."""
+def save_vtu(mesh: Mesh, file: str | Path, fields: dict[str, np.ndarray] | None = None,
+             inside: dict[str, np.ndarray] | None = None) -> Path:
+    """Write the mesh and its fields, see ``grid``, as a compressed VTU file."""
     Path(file).parent.mkdir(parents=True, exist_ok=True)
-    grid(mesh, fields).save(str(file))
+    grid(mesh, fields, inside).save(str(file))
     return Path(file)
 
 

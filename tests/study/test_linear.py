@@ -171,12 +171,19 @@ def test_table_of_stresses_has_the_extremes_of_every_state():
     modes = wheel_modes(one, 2, [2])[0]
     states = stress_states(one, modes, 2)
     assert list(states) == ["rotation", "mode 1 for 1 mm", "mode 2 for 1 mm"]
-    table, nodes = stress_table(one, {**states, "half": 0.5j * states["mode 1 for 1 mm"]})
+    table, fields, cells = stress_table(one, {**states, "half": 0.5j * states["mode 1 for 1 mm"]})
     table = table.set_index("state")
     first, half = table.loc["mode 1 for 1 mm"], table.loc["half"]
     assert first["largest"] == pytest.approx(1e-3)
     assert half["von_mises"] == pytest.approx(first["von_mises"] / 2)
     assert (half["x"], half["y"]) == (first["x"], first["y"])
     assert first["pressing"] == pytest.approx(-first["principal"])      # every motion comes back with the other sign
-    assert table.loc["rotation", "von_mises"] == pytest.approx(nodes["rotation"][0].max())
+    turning = fields["rotation"]
+    assert table.loc["rotation", "von_mises"] == pytest.approx(turning["von Mises"].max())
+    assert table.loc["rotation", "von_mises_gauss"] == pytest.approx(
+        cells["rotation"]["von Mises at Gauss points"].max())
+    assert all(len(values["von Mises at Gauss points"]) == sum(map(len, one.mesh.bodies.values()))
+               for values in cells.values())
+    assert (turning["smallest principal"] <= turning["largest principal"]).all()
+    assert "smallest principal" not in fields["half"]
     assert (table["von_mises_gauss"] > 0.3 * table["von_mises"]).all()
