@@ -13,6 +13,7 @@ from typing import Any, TypeVar
 __all__ = ["Progress", "unwatched", "wanted", "watch"]
 
 T = TypeVar("T")
+SIZE = {"ncols": 80, "nrows": 24}       # of a terminal that does not know its own
 Progress = Callable[..., Iterable[Any]]     # progress(items, label, total): see watch
 
 
@@ -41,4 +42,13 @@ def watch(items: Iterable[T], label: str = "", total: int | None = None, shown: 
         yield from items
         return
     from tqdm import tqdm
-    yield from tqdm(items, desc=label, total=total, **({"delay": 2.0, "leave": False, "dynamic_ncols": True} | options))
+    size = SIZE if _without_size() else {"dynamic_ncols": True}
+    yield from tqdm(items, desc=label, total=total, **({"delay": 2.0, "leave": False} | size | options))
+
+
+def _without_size() -> bool:
+    """Whether the terminal says that it has no columns, as some in containers do; tqdm would show nothing there."""
+    try:
+        return os.get_terminal_size(sys.stderr.fileno()).columns == 0
+    except (OSError, ValueError, AttributeError):
+        return False

@@ -81,7 +81,7 @@ def study_loads(scene: Scene, cases: list[LoadCase], family: Callable[[LoadCase]
     """
     rank, ranks = (comm.rank, comm.size) if comm is not None else (0, 1)
     curves = {i: keep(cases[i], partial(curve_of, scene, cases[i], family, settings))
-              for i in progress(dealt(len(cases), rank, ranks), "forced responses")}
+              for i in progress(dealt(len(cases), rank, ranks), "forced responses", delay=0.0)}
     for part in comm.allgather(curves) if ranks > 1 else []:
         curves.update(part)
     return [curves[i] for i in range(len(cases))]

@@ -22,6 +22,8 @@ from ..errors import InputError, NotSolvedError
 from ..progress import Progress, unwatched
 from ..reduction.truncate import truncated
 from ..scene import Scene
+from ..scene_check import refuse_response
+from ..scene_doubts import doubts
 from ..store import stage
 from ..units import show
 from .choice import choose, covered, peak_of
@@ -30,17 +32,16 @@ from .cycle import labels
 from .family import Family, Member, coarsened, member, shared_harmonics
 from .joint import LoadCase, joint_model
 from .keys import contact_key, mesh_key, modes_key, reduction_key, response_key, strength_key
+from .lacking import found_patches
 from .liftoff import named
 from .limits import Limit, linear_limits
 from .loads import Curve, default_loads, study_loads
-from .ports import named_nodes
 from .settings import DAMPERS, Settings, enriched, first_settings
 from .stability import stability_sentence
 from .stages import (
     Bodies,
     Reduced,
     build_mesh,
-    contact_patches,
     excited_modes,
     find_modes,
     harmonic_diameters,
@@ -109,7 +110,9 @@ def run(scene: Scene, folder: str | Path, until: str = "response", comm: Any = N
     Raises:
         InputError: the scene cannot be run as it is; NotSolvedError: a stage found no solution.
     """
-    clock = Clock({}, [], progress)
+    if until in STAGES[3:]:
+        refuse_response(scene)
+    clock = Clock({}, doubts(scene), progress)
     keep = _Keeper(folder, comm, clock)
     with clock("mesh"):
         mesh = keep("mesh", mesh_key(scene), lambda: build_mesh(scene, comm))
@@ -117,9 +120,7 @@ def run(scene: Scene, folder: str | Path, until: str = "response", comm: Any = N
     if until == "mesh":
         return result
     check_blade(scene, mesh)
-    if until == "response":
-        named_nodes(mesh, scene.excitation.at)
-    patches = [] if until == "modes" else contact_patches(mesh)     # what the mesh lacks is told before long work
+    patches = [] if until == "modes" else found_patches(scene, mesh, excited=until in STAGES[3:])
     bodies = Bodies(scene, mesh, comm, progress)
     with clock("modes"):
         result = replace(result, modes=keep("modes", modes_key(scene), lambda: find_modes(bodies)),
@@ -214,7 +215,7 @@ def _own_load(scene: Scene, problem: ContactProblem, messages: list[str]) -> flo
         messages.append(f"the damper's own centrifugal load does not seat it: {error}")
         return None
     own = float(np.mean([m.force.sum() for m in maps]))
-    messages.append(f"own load: {1e3 * problem.mass:.3g} g press each seat with {own:.4g} N at "
+    messages.append(f"own load: the damper's {1e3 * problem.mass:.3g} g press each seat with {own:.4g} N at "
                     f"{show(scene.operation.speed, 'rad/s')}")
     return own
 

@@ -27,6 +27,7 @@ from .clamped import clamped_blade
 from .converge import Convergence, converge, default_sizes
 from .effective import effective_masses
 from .keys import modes_key
+from .lacking import refuse_loads
 from .modal import mac
 from .stages import MODES_SHOWN, Bodies, excited_modes, is_wheel, wheel_modes
 
@@ -72,6 +73,8 @@ def survey(scene: Scene, folder: str | Path, wanted: Wanted, comm: Any = None,
     other = None if wanted.other is None else on_root(comm, lambda: _other(wanted.other))
     start = pipeline.run(scene, folder, until="mesh", comm=comm, progress=progress)
     pipeline.check_blade(scene, start.mesh)
+    if wanted.loads is not None:
+        refuse_loads(scene, start.mesh, wanted.loads, wanted.damping)
     bodies, clock = Bodies(scene, start.mesh, comm, progress), time.perf_counter()
     key = key_of(modes_key(scene), "survey", wanted.direct, code_of("bladefem.study"))
     sets, found = stage(folder, "survey", key, lambda: _all_modes(bodies, wanted.direct), comm)

@@ -2,8 +2,15 @@
 
 from __future__ import annotations
 
+import fcntl
 import io
+import os
+import pty
+import select
+import struct
+import subprocess
 import sys
+import termios
 
 from bladefem.progress import wanted, watch
 
@@ -36,3 +43,22 @@ def test_a_long_loop_shows_its_label(monkeypatch):
     monkeypatch.setattr(sys, "stderr", screen)
     assert len(list(watch(range(3), "loads", delay=0.0, mininterval=0.0))) == 3
     assert "loads" in screen.getvalue()
+
+
+SIZELESS = """
+from bladefem.progress import watch
+for _ in watch(range(3), "loads", delay=0.0):
+    pass
+"""
+
+
+def test_a_terminal_without_size_has_bars_too():
+    """Some in containers say 0 x 0."""
+    ours, theirs = pty.openpty()
+    fcntl.ioctl(theirs, termios.TIOCSWINSZ, struct.pack("4H", 0, 0, 0, 0))
+    subprocess.run([sys.executable, "-c", SIZELESS], stderr=theirs, check=True)
+    assert select.select([ours], [], [], 1.0)[0]
+    text = os.read(ours, 10_000).decode()
+    assert "loads:   0%|" in text and "0/3" in text
+    os.close(ours)
+    os.close(theirs)
