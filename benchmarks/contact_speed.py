@@ -13,8 +13,8 @@ are runs of the same code alone on the machine:
     compliance, 156816 dofs (block), 1000 right-hand sides: factor 22.8 s, contact ports 30.2 s (21.0 s idle), dense
         columns 35.1 s of CPU
 
-The factor is not part of the right-hand sides: modes and reduction need it, too. A blade is within 25 s for 1000 of them
-on a busy machine; a block only on an idle one, since sweeps over its wide fronts wait for memory.
+The factor is not part of the right-hand sides: modes and reduction need it, too. A blade is within 25 s for 1000 of
+them on a busy machine; a block only on an idle one, since sweeps over its wide fronts wait for memory.
 
 Contact ports are sparse: MUMPS leaves out the parts of the first sweep that they do not reach. A Schur complement of
 [[K, P], [P^T, 0]] on the ports, which saves the second sweep, was tried: 15 s instead of 8 + 12 s for the blade, but 60
