@@ -86,4 +86,4 @@ def _put_away(folder: Path) -> str:
     except OSError as error:
         raise InputError(f"folder {earlier}: results of another scene cannot be moved there "
                          f"({error.strerror or error})") from None
-    return f"{folder} holds results of another scene: {len(results)} files moved to {earlier}"
+    return f"{folder} holds results of another scene: {len(results)} file{'s'[:len(results) > 1]} moved to {earlier}"

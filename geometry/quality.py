@@ -84,7 +84,8 @@ def _with_partners(nodes: np.ndarray, pairs: dict[str, Pair], count: int) -> np.
 
 
 def report(mesh: Mesh, straightened: int, size: float) -> dict[str, object]:
-    """What Mesh.report holds: counts, worst Jacobian and shape, cells straightened, element size [m].
+    """What Mesh.report holds: counts, worst Jacobian and shape, cells straightened, element size wanted [m] and
+    mean edge length [m].
 
     Raises:
         InputError: a cell has a Jacobian that is not positive.
@@ -98,12 +99,20 @@ def report(mesh: Mesh, straightened: int, size: float) -> dict[str, object]:
                          "expected a smaller mesh.size or less extreme proportions")
     every = np.concatenate(list(shape.values()))
     return {"cells": len(every), "nodes": len(mesh.points), "cell type": mesh.cell_type, "size": size,
+            "edge": _mean_edge(mesh),
             "min scaled jacobian": float(worst), "worst quality": float(every.min()),
             "mean quality": float(every.mean()), "straightened": straightened,
             "pairs": {name: pair.nodes.shape[1] for name, pair in mesh.pairs.items()}}
 
 
-WORDS = {"size": "element size [mm]", "cells": "elements",
+def _mean_edge(mesh: Mesh) -> float:
+    """Mean length [m] of the straight edges."""
+    edges = np.unique(np.sort(np.vstack([cells[:, edge] for cells in mesh.bodies.values()
+                                         for edge in EDGES[FAMILY[mesh.cell_type]]]), axis=1), axis=0)
+    return float(np.linalg.norm(mesh.points[edges[:, 0]] - mesh.points[edges[:, 1]], axis=1).mean())
+
+
+WORDS = {"size": "element size, wanted [mm]", "edge": "mean edge length [mm]", "cells": "elements",
          "min scaled jacobian": "smallest scaled Jacobian (straight: 1)",
          "worst quality": "worst shape (regular: 1)", "mean quality": "mean shape",
          "straightened": "elements straightened", "pairs": "matched nodes of pair"}
@@ -113,7 +122,7 @@ def quality_rows(mesh: Mesh) -> list[tuple[str, str]]:
     """Mesh.report for the eye: what, and its value as text."""
     rows = []
     for name, value in mesh.report.items():
-        words, value = WORDS.get(name, name), 1e3 * value if name == "size" else value
+        words, value = WORDS.get(name, name), 1e3 * value if name in ("size", "edge") else value
         for part, number in (value.items() if isinstance(value, dict) else (("", value),)):
             text = f"{number:.4g}" if isinstance(number, float) else str(number)
             rows.append((f"{words} {part}".strip(), text))

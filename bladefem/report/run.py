@@ -18,6 +18,7 @@ from geometry.quality import quality_rows
 from ..contact.states import quasi_static
 from ..data import ModeSet
 from ..progress import Progress, unwatched
+from ..run_folder import take_folder
 from ..scene import Scene
 from ..scene_file import dump
 from ..store import on_root, write_results, write_table
@@ -67,6 +68,7 @@ def write_run(result: pipeline.Run, comm: Any = None, progress: Progress = unwat
 
 def _write(result: pipeline.Run, progress: Progress) -> None:
     folder = result.folder
+    moved = take_folder(folder, result.scene)
     patches, cycles = list(result.contact.problem.patches), cycles_of(result)
     coefficient = result.scene.contact.wear_coefficient
     worn = coefficient is not None
@@ -90,7 +92,8 @@ def _write(result: pipeline.Run, progress: Progress) -> None:
     modes.save_modes_vtu(result.mesh, excited_set(result), folder / "modes.vtu")
     contact.save_pressure_vtu(result.contact.maps, folder / "pressure.vtu")
     save_cycles_vtu(patches, cycles, folder / "friction_work.vtu", coefficient)
-    messages = [*result.messages, _static_contact(result), _states(result), *_beyond_stick(result),
+    messages = [*filter(None, [moved]), *result.messages, _static_contact(result), _states(result),
+                *_beyond_stick(result),
                 *([wear_sentence(cycles, coefficient)] if worn else [])]
     write_report(folder, result.scene, tables, figures, messages, result.timings)
 
