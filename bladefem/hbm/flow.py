@@ -333,7 +333,6 @@ def _integrate(arrays, y, T, history, omega, parts):
     series = (np.empty((order + 1, d)), np.empty((order + 1, d)), np.empty((order + 1, n)), np.empty((order + 1, n)),
               np.empty((order + 1, d)))
     memory = (np.full(n + 1, np.nan), np.empty((2 * d, 2 * d + n)))
-    events = 0
     contact = np.zeros(n, np.int64)
     _expand(arrays, y, contact, omega, 0.0, series)
     _begin(arrays, y, contact, T, series)

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from functools import partial
 
 import numpy as np
 from scipy.sparse.linalg import LinearOperator, gmres
@@ -32,6 +33,9 @@ class Memory:
     slow: bool = False                  # the last system took long: blocks are worth their time
 
 
+Parts = tuple[np.ndarray, np.ndarray]       # A (H+1, a, a) and change (nodes, dK, dK), in one precision
+
+
 def iterative_inverse(A: np.ndarray, change: np.ndarray,
                       memory: Memory | None = None) -> Callable[[np.ndarray, float], np.ndarray]:
     """The inverse of 1 + A change, applied to residuals (a, K) to a relative accuracy, for a = nodes * d dofs.
@@ -44,55 +48,65 @@ def iterative_inverse(A: np.ndarray, change: np.ndarray,
         change: (nodes, dK, dK) derivative of the forces beyond the springs [N/m].
         memory: of the Newton run; changed in place.
     """
-    a, K = A.shape[1], 2 * A.shape[0] - 1
-    single, double = (A.astype(np.complex64), change.astype(np.float32)), (A, change)
-    memory, count = memory or Memory(), 0
+    single = A.astype(np.complex64), change.astype(np.float32)
+    return partial(_solve, _System(single, (A, change), memory or Memory()))
 
-    def product(x: np.ndarray, parts: tuple[np.ndarray, np.ndarray]) -> np.ndarray:
-        nonlocal count
-        count += 1
-        flexibility, stiffness = parts
-        forces = (stiffness @ x.reshape(len(stiffness), -1, 1).astype(stiffness.dtype)).reshape(a, K)
-        return x.ravel() + _flex(flexibility, forces).ravel()
 
-    def prepared(x: np.ndarray) -> np.ndarray:
-        return x.ravel() if memory.blocks is None else _flex(memory.blocks, x.reshape(a, K)).ravel()
+@dataclass
+class _System:
+    """1 + A change in both precisions, its preconditioner, and how often it was applied in the present solve."""
 
-    def krylov(rest: np.ndarray, target: float, parts: tuple[np.ndarray, np.ndarray]) -> tuple[np.ndarray, int]:
-        y, failed = _gmres(lambda y: product(prepared(y), parts), rest, target)
-        return prepared(y), failed
+    single: Parts
+    double: Parts
+    memory: Memory
+    count: int = 0
 
-    def renew() -> None:
-        memory.blocks, memory.slow = _harmonic_blocks(A, change), False
+    def product(self, x: np.ndarray, parts: Parts) -> np.ndarray:
+        """The system times x, flat."""
+        self.count += 1
+        A, change = parts
+        forces = change @ x.reshape(len(change), -1, 1).astype(change.dtype)
+        return x + _flex(A, forces.reshape(A.shape[1], -1)).ravel()
 
-    def solve(residual: np.ndarray, accuracy: float) -> np.ndarray:
-        nonlocal count
-        target, count = accuracy * float(np.linalg.norm(residual)), 0
-        if target == 0.0:
-            return np.zeros_like(residual)
-        if memory.slow:
-            renew()
-        x, rest, parts, fresh = np.zeros(a * K), residual.ravel(), single, memory.slow
-        for _ in range(PASSES):
-            left = float(np.linalg.norm(rest))
-            part, failed = krylov(rest, max(target, SINGLE * left), parts)
-            after = rest - product(part, double)
-            gain = np.linalg.norm(after) / left
-            if gain < 1:
-                x, rest = x + part, after
-            if np.linalg.norm(rest) <= 2 * target:
-                break
-            if failed and not fresh:
-                fresh = True
-                renew()
-            elif gain > POOR:
-                parts = double
-        else:
-            raise np.linalg.LinAlgError("GMRES did not solve for the Newton step")
-        memory.slow = memory.slow or count > SLOW
-        return x.reshape(residual.shape)
+    def prepared(self, x: np.ndarray) -> np.ndarray:
+        """The preconditioner times x, flat."""
+        blocks = self.memory.blocks
+        return x if blocks is None else _flex(blocks, x.reshape(blocks.shape[1], -1)).ravel()
 
-    return solve
+    def krylov(self, rest: np.ndarray, target: float, parts: Parts) -> tuple[np.ndarray, int]:
+        """What one pass of GMRES finds, and whether it stopped before the target."""
+        y, failed = _gmres(lambda y: self.product(self.prepared(y), parts), rest, target)
+        return self.prepared(y), failed
+
+    def renew(self) -> None:
+        """New harmonic blocks."""
+        self.memory.blocks, self.memory.slow = _harmonic_blocks(*self.double), False
+
+
+def _solve(system: _System, residual: np.ndarray, accuracy: float) -> np.ndarray:
+    memory, target, fresh = system.memory, accuracy * float(np.linalg.norm(residual)), system.memory.slow
+    if target == 0.0:
+        return np.zeros_like(residual)
+    if fresh:
+        system.renew()
+    system.count, parts = 0, system.single
+    x, rest = np.zeros(residual.size), residual.ravel()
+    for _ in range(PASSES):
+        left = float(np.linalg.norm(rest))
+        part, failed = system.krylov(rest, max(target, SINGLE * left), parts)
+        after = rest - system.product(part, system.double)
+        gain = np.linalg.norm(after) / left
+        if gain < 1:
+            x, rest = x + part, after
+        if np.linalg.norm(rest) <= 2 * target:
+            memory.slow = memory.slow or system.count > SLOW
+            return x.reshape(residual.shape)
+        if failed and not fresh:
+            fresh = True
+            system.renew()
+        elif gain > POOR:
+            parts = system.double
+    raise np.linalg.LinAlgError("GMRES did not solve for the Newton step")
 
 
 def _gmres(product: Callable[[np.ndarray], np.ndarray], residual: np.ndarray,
