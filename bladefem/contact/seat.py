@@ -113,7 +113,10 @@ def solve(problem: ContactProblem, speed: float, normal: float | None = None, da
         return _maps(problem, _state(problem, g0, scale, active))
     if not normal > 0:
         raise InputError(f"normal load is {normal} N, expected a positive one")
-    return _maps(problem, _wanted(problem, g0, normal, active))
+    try:
+        return _maps(problem, _wanted(problem, g0, normal, active))
+    except NotSolvedError as error:
+        raise NotSolvedError(f"normal load {normal:g} N on each seat: {error}") from error
 
 
 def seat(mesh: Mesh, material: Materials, speed: float, clearance: float = 0.0, normal: float | None = None,
