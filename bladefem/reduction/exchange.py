@@ -59,8 +59,9 @@ def read_dmig(path: str | Path) -> dict[str, np.ndarray]:
 def read_ansys(path: str | Path) -> dict[str, np.ndarray]:
     """K and M of an Ansys ``.full`` file, dense, and "dofs" (n, 2): node and degree of freedom of each row.
 
-    Ansys' own library reads it (pip install ansys-mapdl-reader); it has no reader for ``.sub``: write the generation
-    pass as ``.full``, or as DMIG or Matrix Market.
+    Constrained freedoms, whose rows are empty, are left out. Ansys' own library reads the file (pip install
+    ansys-mapdl-reader); it has no reader for ``.sub``: write the generation pass as ``.full``, or as DMIG or Matrix
+    Market.
 
     Raises:
         InputError: the library is not installed.
@@ -71,7 +72,9 @@ def read_ansys(path: str | Path) -> dict[str, np.ndarray]:
         raise InputError(f"file {path}: needs the package ansys-mapdl-reader, which is not installed") from error
     dofs, K, M = reader.read_binary(str(path)).load_km(as_sparse=False, sort=True)
     whole = [upper + upper.T - np.diag(np.diag(upper)) for upper in (np.triu(K), np.triu(M))]
-    return {"K": whole[0], "M": whole[1], "dofs": np.asarray(dofs)}
+    free = np.flatnonzero(np.any(whole[0], axis=0) | np.any(whole[1], axis=0))
+    K, M = (matrix[np.ix_(free, free)] for matrix in whole)
+    return {"K": K, "M": M, "dofs": np.asarray(dofs)[free]}
 
 
 def _entries(path: Path) -> Iterator[tuple[int, list[str]]]:
