@@ -24,12 +24,12 @@ def study(options: argparse.Namespace, comm: Any) -> None:
     prepared(options, comm)
     count, done = len(parts), []
     for i, ((value, one), scene) in enumerate(zip(parts, scenes, strict=True), 1):
-        tell(options, comm, lambda text=f"{name} = {value} ({i} of {count})": text)
+        tell(options, comm, lambda text=f"\n{name} = {value} ({i} of {count})": text)
         run = until("response", one, comm)
         done.append(Variant(value, scene, run.response))
-        tell(options, comm, lambda: "", run)
+        tell(options, comm, lambda run=run: tables.responses(run.response), run)
     table, files = on_root(comm, lambda: write_study(name, done, base))
-    tell(options, comm, lambda: f"\n{tables.table(table)}\nwritten: {', '.join(map(str, files))}")
+    tell(options, comm, lambda: f"\n{tables.side_by_side(name, table)}\nwritten: {', '.join(map(str, files))}")
 
 
 def _varied(text: str) -> list[tuple[str, str]]:

@@ -11,7 +11,7 @@ from geometry.quality import quality_rows
 from ..units import show
 
 __all__ = ["frame", "frequencies", "mesh_quality", "plain", "pressures", "reduction", "resolved_scene", "responses",
-           "summary", "survey", "table"]
+           "side_by_side", "summary", "survey", "table"]
 
 
 def plain(rows: Sequence[Sequence[object]], head: Sequence[str] = ()) -> str:
@@ -122,6 +122,12 @@ SHOWN = ("peak_frequency", "peak_amplitude", "reduction", "dissipated", "error",
 def _case(curve: Any) -> str:
     """Load, and mass where several are studied."""
     return show(curve.load, "N") + ("" if curve.mass is None else f" on {show(curve.mass, 'kg')}")
+
+
+def side_by_side(name: str, best: Any) -> str:
+    """The best load of each value of a field; the files hold more columns."""
+    columns = ["value", "free_frequency", "load", *(c for c in SHOWN if c not in ("dissipated", "points"))]
+    return table(best[columns].rename(columns={"value": name}))
 
 
 def table(rows: Any) -> str:

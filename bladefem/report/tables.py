@@ -91,9 +91,14 @@ def units_of(table: pd.DataFrame) -> dict[str, str]:
 
 def readable(table: pd.DataFrame) -> pd.DataFrame:
     """The same table as text: titles with units in the head, numbers rounded and in the unit that people use."""
-    columns = {name: COLUMNS.get(name, Column(str(name).replace("_", " "))) for name in table}
+    columns = {name: COLUMNS.get(name, Column(_words(str(name)))) for name in table}
     return pd.DataFrame({head(column): [cell(value, column) for value in table[name]]
                          for name, column in columns.items()})
+
+
+def _words(name: str) -> str:
+    """Underscores are spaces, but in fields of a scene, "plane.damper_mass"."""
+    return name if "." in name else name.replace("_", " ")
 
 
 def head(column: Column) -> str:

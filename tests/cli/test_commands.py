@@ -146,7 +146,7 @@ def test_study_runs_each_value_in_its_own_folder(pipeline, tmp_path, capsys):
     assert [round(np.degrees(scene.damper.angle)) for scene, *_ in pipeline.calls] == [30, 45]
     assert len({folder for _, folder, _ in pipeline.calls}) == 2
     out = capsys.readouterr().out
-    assert out.startswith("damper.angle = 30 deg (1 of 2)\n") and "damper.angle = 45 deg (2 of 2)\n" in out
+    assert out.startswith("\ndamper.angle = 30 deg (1 of 2)\n") and "damper.angle = 45 deg (2 of 2)\n" in out
     assert "resonance amplitude [µm]" in out and "study.csv" in out.splitlines()[-1]
     table, loads = (pd.read_csv(tmp_path / f"{name}.csv") for name in ("study", "study_loads"))
     assert list(table["value"]) == ["30 deg", "45 deg"]
