@@ -16,14 +16,9 @@ from ..damper.direct import direct
 from ..damper.paper import platform
 from ..data import PortModel, RigidBody
 from ..errors import InputError, NotSolvedError
-from ..friction.events import evaluate_exact
-from ..hbm.api import as_solution, solve
-from ..hbm.fallback import Attempt
+from ..hbm.api import solve
 from ..hbm.flow import stuck_start
-from ..hbm.linear import condense
 from ..hbm.model import ReducedModel
-from ..hbm.newton import Newton
-from ..hbm.residual import Balance, State, evaluate_balance, linearise, start_in_stick
 from ..hbm.shooting import harmonics, periodic
 from ..hbm.system import System, ring
 from ..reduction.truncate import truncated
@@ -107,46 +102,9 @@ def balance(H: int, samples: int) -> Callable[[ReducedModel, float, object], Poi
     return run
 
 
-def exact(H: int, most: int = 40) -> Callable[[ReducedModel, float, object], Point]:
+def exact(H: int) -> Callable[[ReducedModel, float, object], Point]:
     """Full balance with forces exact to rounding, for elements of one direction."""
-    def run(model: ReducedModel, omega: float, start: object) -> Point:
-        equations = Balance(model, condense(model, omega, H), 8 * H + 8)
-        state = _exact_state(equations, start_in_stick(equations) if start is None else start)
-        for iteration in range(most):
-            if state.error < 1e-10:
-                end = Newton(state, iteration, True, "residual within tolerance")
-                s = as_solution(equations, Attempt("exact", end), iteration, end.reason)
-                return Point(complex(s.probe[1, 0]), True, s.reason, state.w)
-            state = _shorter(equations, state)
-        return Point(np.nan, False, f"residual {state.error:.1e} after {most} iterations")
-    return run
-
-
-def _shorter(equations: Balance, state: State) -> State:
-    """A Newton step, halved until the residual falls."""
-    step = linearise(equations, state)(state.residual)
-    for halving in range(8):
-        trial = _exact_state(equations, state.w - step * 0.5**halving)
-        if np.linalg.norm(trial.residual) < np.linalg.norm(state.residual):
-            break
-    return trial
-
-
-def _exact_state(equations: Balance, w: np.ndarray) -> State:
-    """The state of the balance with exact forces: what evaluate_balance gives, its sampled forces replaced."""
-    model = equations.model
-    state = evaluate_balance(equations, w)
-    forces = evaluate_exact(model.elements, np.pad(w, ((0, 0), (1, 0), (0, 0))))
-    forces = replace(forces, f=forces.f[:, 1:], dfdw=forces.dfdw[:, 1:, :, 1:])
-    change = forces.f - state.forces.f
-    c = np.concatenate([change[:, :, :1].astype(complex), change[:, :, 1::2] - 1j * change[:, :, 2::2]], axis=2)
-    moved = (equations.linear.A @ c.reshape(-1, c.shape[2]).T[:, :, None])[:, :, 0].T.reshape(c.shape)
-    residual = state.residual.copy()
-    residual[:, :, 0] += moved[:, :, 0].real
-    residual[:, :, 1::2] += moved[:, :, 1:].real
-    residual[:, :, 2::2] -= moved[:, :, 1:].imag
-    error = float(np.linalg.norm(residual) / max(np.linalg.norm(w), np.finfo(float).tiny))
-    return replace(state, forces=forces, p=state.p + change, residual=residual, error=error)
+    return balance(H, 0)
 
 
 def paper(H: int, averaged: bool) -> Callable[[ReducedModel, float, object], Point]:
