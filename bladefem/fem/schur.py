@@ -9,7 +9,10 @@ not call back (the place of the dense solve in its table of operations moved onc
 from __future__ import annotations
 
 import ctypes
-from collections.abc import Callable
+import signal
+import threading
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass
 
 import numpy as np
@@ -77,12 +80,35 @@ def through(made: Bridge, B: np.ndarray, answer: Answer) -> np.ndarray:
     """Solutions (n, k) for B (n, k), zero on the rows left out, where there x_b = answer(-A_bi A_ii^-1 b_i) (nb, k)."""
     made.answers.append(answer)
     try:
-        X = solve_matrix(made.factor, B, whole=True)
+        with _signals_wait():
+            X = solve_matrix(made.factor, B, whole=True)
     finally:
         made.answers.clear()
     if made.raised:
         raise made.raised.pop()
     return X
+
+
+@contextmanager
+def _signals_wait() -> Iterator[None]:
+    """Ctrl-C and SIGTERM wait for the end of the block.
+
+    What their handlers raise at the entry of a function that C calls is dropped by ctypes, and PETSc gets a random
+    error code.
+    """
+    came: list[int] = []
+    before = {}
+    if threading.current_thread() is threading.main_thread():       # no other one runs handlers
+        for number in (signal.SIGINT, signal.SIGTERM):
+            if signal.getsignal(number) not in (None, signal.SIG_IGN):
+                before[number] = signal.signal(number, lambda number, _: came.append(number))
+    try:
+        yield
+    finally:
+        for number, handler in before.items():
+            signal.signal(number, handler)
+        if came:
+            signal.raise_signal(came[0])
 
 
 def _borrowed(factor: Factorised, use: Callable[[int], object]) -> object:

@@ -1,5 +1,7 @@
 """Solves through the rim's reduced system, and factorisations in a given order."""
 
+import signal
+
 import numpy as np
 import pytest
 from structured import sector
@@ -39,6 +41,23 @@ def test_what_the_answer_raises_comes_through(error):
     B = np.ones((made.factor.matrix.size[0], 1))
     with pytest.raises(error, match="on purpose"):
         through(made, B, fails)
+    assert through(made, B, lambda r: r).shape == B.shape
+
+
+def test_a_signal_waits_for_the_end_of_the_sweep():
+    """Its handler must not raise at the entry of the call back, where nothing can catch it; here it would at once."""
+    made = opened().opened.core.bridge
+    B, done = np.ones((made.factor.matrix.size[0], 1)), []
+
+    def stop(*_):
+        raise KeyboardInterrupt
+    before = signal.signal(signal.SIGTERM, stop)
+    try:
+        with pytest.raises(KeyboardInterrupt):
+            through(made, B, lambda r: (signal.raise_signal(signal.SIGTERM), done.append(1), r)[-1])
+        assert done and signal.getsignal(signal.SIGTERM) is stop
+    finally:
+        signal.signal(signal.SIGTERM, before)
     assert through(made, B, lambda r: r).shape == B.shape
 
 
