@@ -12,7 +12,7 @@ from bladefem.hbm.model import Damping, ReducedModel
 from bladefem.hbm.optimum import optimum
 from bladefem.hbm.peak import find_peak, track_peak
 from bladefem.hbm.reference import reference_model
-from bladefem.hbm.sweep import size
+from bladefem.hbm.sweep import response, size
 from bladefem.hbm.vary import vary
 from bladefem.reduction.matrices import port_model_from_matrices
 
@@ -75,6 +75,20 @@ def highest(model, band, count=101):
         assert last.converged
         heights.append(size(last))
     return max(heights)
+
+
+def test_the_optimum_sees_the_higher_of_two_maxima_of_one_hump():
+    """Two dofs, forces of two harmonics: 3.8433 um at the best load, by 1600 frequencies at ten loads. Its height was
+    once taken from the lower maximum, 1.4 % below what the band holds."""
+    body = port_model_from_matrices(np.eye(2), np.array([[1.5e6, -0.5e6], [-0.5e6, 1.5e6]]),
+                                    {"contact": [0], "load": [0, 1], "probe": [0, 1]},
+                                    C=4e-6 * np.array([[1.5e6, -0.5e6], [-0.5e6, 1.5e6]]))
+    force = {1: np.array([1.0, 0.5j]), 3: np.array([0.0, 0.2])}
+    model, band = ReducedModel((body,), Elements([1e6], [0.0], [0.4], [10.0], 1), force), (800.0, 1600.0)
+    best = optimum(model, band, (0.01, 10.0), 7, 256)
+    there = max(size(p) for p in response(vary(model, "load", best.value), np.linspace(1050, 1130, 81), 7, 256))
+    assert best.peak.height == pytest.approx(3.8433e-6, rel=1e-3)
+    assert best.peak.height == pytest.approx(there, rel=1e-3)
 
 
 def light_block(damper=False):
