@@ -109,6 +109,7 @@ class Study:
 
     loads: tuple[float, ...] | None = quantity(None, "N", 0.0, 1e8,
                                                "normal loads per seat; eight round the optimum when left out")
+    own_load: bool = quantity(False, help="also the load that the damper's own mass makes at the operating speed")
     masses: tuple[float, ...] | None = quantity(None, "kg", 1e-5, 10.0, "damper masses; the scene's own when left out")
     band: tuple[float, float] | None = quantity(None, "Hz", 0.0, 1e6,
                                                 "frequency band; from the free to the stuck resonance when left out")

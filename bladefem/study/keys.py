@@ -75,5 +75,6 @@ def reduction_key(scene: Scene, diameters: Sequence[int], modes: int) -> str:
 def response_key(scene: Scene, settings: Settings, case: LoadCase) -> str:
     """The response curve of one load and mass, whichever others are studied with it."""
     return key_of(contact_key(scene), case.load, case.mass, scene.contact, scene.operation, scene.excitation,
-                  replace(scene.study, loads=(), masses=()), scene.accuracy, scene.model, replace(settings, error=None),
+                  replace(scene.study, loads=(), masses=(), own_load=False), scene.accuracy, scene.model,
+                  replace(settings, error=None),
                   code_of("bladefem.hbm", "bladefem.friction", "bladefem.reduction", "bladefem.study"))

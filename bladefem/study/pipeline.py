@@ -51,7 +51,8 @@ from .stages import (
 )
 from .strength import Strength, strength
 
-__all__ = ["STAGES", "Response", "Run", "Seating", "family_of_case", "load_cases", "reduced_sector", "run"]
+__all__ = ["STAGES", "Response", "Run", "Seating", "family_of_case", "load_cases", "reduced_sector", "run",
+           "studied_loads"]
 
 EXACT_HARMONICS = 3      # higher ones borrow the nodal diameter next to their own
 UNKNOWNS = 5000          # of the largest balance that the automatic choice solves; model.harmonics may ask for more
@@ -129,10 +130,10 @@ def run(scene: Scene, folder: str | Path, until: str = "response", comm: Any = N
         return result
     with clock("contact"):
         problem = keep("contact", contact_key(scene), lambda: seat_damper(bodies, patches))
-        loads = scene.study.loads or default_loads(scene)
+        own = _own_load(scene, problem, clock.messages)
         maps = {load: seat(problem, scene.operation.speed, normal=load, bedded=scene.contact.bedded)
-                for load in loads}
-        result = replace(result, contact=Seating(problem, maps, _own_load(scene, problem, clock.messages)))
+                for load in studied_loads(scene, own)}
+        result = replace(result, contact=Seating(problem, maps, own))
     if until == "contact":
         return result
     with clock("stresses"):
@@ -218,6 +219,17 @@ def _own_load(scene: Scene, problem: ContactProblem, messages: list[str]) -> flo
     messages.append(f"own load: the damper's {1e3 * problem.mass:.3g} g press each seat with {own:.4g} N at "
                     f"{show(scene.operation.speed, 'rad/s')}")
     return own
+
+
+def studied_loads(scene: Scene, own: float | None) -> list[float]:
+    """Mean normal loads of a seat to study [N], ascending with the damper's own one where that is wanted."""
+    given = scene.study.loads or default_loads(scene)
+    if not scene.study.own_load:
+        return list(given)
+    if own is None:
+        raise InputError("study.own_load = true: nothing presses the damper on its seats at operation.speed = "
+                         f"{show(scene.operation.speed, 'rad/s')}, expected a speed that does, or study.loads alone")
+    return sorted({*given, own})
 
 
 def load_cases(scene: Scene, mesh: Mesh, contact: Seating) -> list[LoadCase]:
