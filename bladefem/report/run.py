@@ -48,6 +48,9 @@ from .write import write_report
 
 __all__ = ["run", "write_run"]
 
+MESH = ("the estimated errors are those of modes, harmonics, samples, contact points and damper model; the mesh's part is "
+        "shown by 'bladefem modes --converge' (frequencies) and 'bladefem chart --mesh' (resonance)")
+
 
 def run(scene: Scene, folder: str | Path, comm: Any = None, progress: Progress = unwatched) -> pipeline.Run:
     """Everything: mesh, modes, contact, responses, and the folder with pictures and report.
@@ -92,9 +95,8 @@ def _write(result: pipeline.Run, progress: Progress) -> None:
     modes.save_modes_vtu(result.mesh, excited_set(result), folder / "modes.vtu")
     contact.save_pressure_vtu(result.contact.maps, folder / "pressure.vtu")
     save_cycles_vtu(patches, cycles, folder / "friction_work.vtu", coefficient)
-    messages = [*filter(None, [moved]), *result.messages, _static_contact(result), _states(result),
-                *_beyond_stick(result),
-                *([wear_sentence(cycles, coefficient)] if worn else [])]
+    messages = [*filter(None, [moved]), *result.messages, MESH, _static_contact(result), _states(result),
+                *_beyond_stick(result), *([wear_sentence(cycles, coefficient)] if worn else [])]
     write_report(folder, result.scene, tables, figures, messages, result.timings)
 
 
