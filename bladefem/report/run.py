@@ -48,8 +48,8 @@ from .write import write_report
 
 __all__ = ["run", "write_run"]
 
-MESH = ("the estimated errors are those of modes, harmonics, samples, contact points and damper model; the mesh's part is "
-        "shown by 'bladefem modes --converge' (frequencies) and 'bladefem chart --mesh' (resonance)")
+MESH = ("the estimated errors are those of modes, harmonics, samples, contact points and damper model; the mesh's part "
+        "is shown by 'bladefem modes --converge' (frequencies) and 'bladefem chart --mesh' (resonance)")
 
 
 def run(scene: Scene, folder: str | Path, comm: Any = None, progress: Progress = unwatched) -> pipeline.Run:
