@@ -13,10 +13,8 @@ import numpy as np
 from bladefem.data import Elements
 from bladefem.errors import InputError
 from bladefem.friction.disc_batch import disc_batch
-from bladefem.friction.disc_rows import empty_rows
 from bladefem.friction.harmonics import harmonics_of
 from bladefem.friction.jenkins import jenkins_batch
-from bladefem.friction.orbit import empty_trail
 from bladefem.friction.tables import tables
 
 __all__ = ["GROSS_SLIP", "PARTIAL_SLIP", "SEPARATED", "STICK", "Forces", "checked", "dissipated", "evaluate",
@@ -57,9 +55,7 @@ def evaluate(elements: Elements, w: np.ndarray, samples: int, jacobian: bool = T
         jenkins_batch(w, load, nodes, tab, F, J, shares)
     else:
         J = np.zeros((n, d, K, d * K) if jacobian else (n, 0, 0, 0))
-        width = tab.along.shape[1]
-        disc_batch(w, load, nodes, tab, empty_trail(samples, width), empty_rows(K // 2, samples, width), cycles, F, J,
-                   shares, used)
+        disc_batch(w, load, nodes, tab, cycles, F, J, shares, used)
     failed = int(np.count_nonzero(used < 0))
     reason = f"{failed} of {n} elements were not periodic after {cycles} cycles" if failed else "periodic"
     return Forces(F, J.reshape(n, d, K, d, K) if jacobian else None, states(shares), shares, dissipated(F, w),

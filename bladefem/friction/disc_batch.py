@@ -7,9 +7,9 @@ from math import sqrt
 import numpy as np
 from numba import njit
 
-from bladefem.friction.disc_rows import add_period, close, start_rows, to_carry, unit_rows
+from bladefem.friction.disc_rows import add_period, close, empty_rows, start_rows, to_carry, unit_rows
 from bladefem.friction.lane_kernels import find_edges, find_forces
-from bladefem.friction.orbit import TOLERANCE, follow, periodic, start
+from bladefem.friction.orbit import TOLERANCE, empty_trail, follow, periodic, start
 from bladefem.friction.tables import Node, add_gram
 
 __all__ = ["disc_batch"]
@@ -205,17 +205,16 @@ def _harmonics(trace, normal, tab, F, J):
 
 
 @njit(cache=True, error_model="numpy")
-def disc_batch(w, load, nodes, tab, trail, scratch, limit, F, J, shares, cycles):
+def disc_batch(w, load, nodes, tab, limit, F, J, shares, cycles):
     """Forces F (n, 3, K), Jacobian J (n, 3, K, 3K), shares (n, 3) of stick, slip and separation, cycles (n,).
 
-    w (n, 3, K) [m]; load (n, S) [N] in place of n0, or (n, 0); nodes (n, 4): kt, kn, mu, n0; trail and scratch are
-    overwritten. J holds zeros, or is (n, 0, 0, 0): then no derivative is made. Cycles are negative where the force was
-    not periodic after ``limit``.
+    w (n, 3, K) [m]; load (n, S) [N] in place of n0, or (n, 0); nodes (n, 4): kt, kn, mu, n0. J holds zeros, or is
+    (n, 0, 0, 0): then no derivative is made. Cycles are negative where the force was not periodic after ``limit``.
     """
     n, width = w.shape[0], tab.along.shape[1]
     path, trace, normal = np.empty((NODES, 3, width)), np.empty((NODES, 2, width)), np.empty((NODES, 2, width))
     spare = np.empty(tab.sums.shape[1]), np.empty((w.shape[2], w.shape[2])), np.empty((2, 2))
-    F[:] = 0.0
+    trail, scratch, F[:] = empty_trail(tab.at.shape[0], width), empty_rows(tab), 0.0
     for first in range(0, n, NODES):
         last, moving = min(first + NODES, n), False
         _paths(w[first:last], load[first:last], nodes[first:last], tab, path)

@@ -17,7 +17,6 @@ from numba import njit
 from bladefem.friction.disc import CLOSING, SLIP, STICK, sensitivity
 from bladefem.friction.lane_kernels import TURNS, add_folded, find_turns, join_rows, turn_rows
 from bladefem.friction.orbit import CHANGING, SLIDING, STICKING
-from bladefem.friction.tables import filled, tiled
 
 __all__ = ["Rows", "add_period", "close", "empty_rows", "start_rows", "to_carry", "unit_rows"]
 
@@ -40,11 +39,13 @@ class Rows(NamedTuple):
     chosen: np.ndarray      # numbers of the fours with samples that slip
 
 
-def empty_rows(H: int, S: int, width: int) -> Rows:
-    """Scratch for H harmonics and S samples."""
-    M = 3 * filled(2 * H + 1)
-    return Rows(np.zeros((2, tiled(H), M)), np.zeros(4 * H + 1), np.zeros((2, M)), np.zeros((2, M)), np.zeros(M),
-                np.zeros((S + 1, M)), np.zeros((TURNS, width)), np.zeros((2, width)), np.zeros(S // 2 + 1, np.int64))
+@njit(cache=True, error_model="numpy")
+def empty_rows(tab):
+    """Scratch for one node."""
+    (S, W), (tile, width), fours = tab.wide.shape, (tab.weights.shape[1], tab.along.shape[1]), tab.fours.shape[0]
+    return Rows(np.zeros((2, tile, 3 * W)), np.zeros(tab.sums.shape[1]), np.zeros((2, 3 * W)), np.zeros((2, 3 * W)),
+                np.zeros(3 * W), np.zeros((S + 1, 3 * W)), np.zeros((TURNS, width)), np.zeros((2, width)),
+                np.zeros(fours, np.int64))
 
 
 @njit(_nrt=False, cache=True, error_model="numpy", forceinline=True, fastmath=FAST)

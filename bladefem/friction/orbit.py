@@ -6,7 +6,7 @@ converges, but slowly near the stick limit, where Newton with the derivative of 
 few periods. The derivative costs next to nothing: stick leaves it as it is, and along an edge in slip the row of the
 angle falls by det A |P, Q|^2 / |A (P, Q)|^2.
 
-Nothing here makes an array, so that Numba need not count references to them (_nrt), which costs as much as the rest.
+Only `empty_trail` makes arrays: elsewhere Numba need not count references (_nrt), which costs as much as the rest.
 """
 
 from __future__ import annotations
@@ -43,11 +43,11 @@ class Trail(NamedTuple):
                             # its end, d(angle) there by force (2), increment (2), loads at its ends (2)
 
 
-def empty_trail(S: int, width: int) -> Trail:
+@njit(cache=True, error_model="numpy")
+def empty_trail(S, width):
     """Scratch for one node."""
-    whole = [np.zeros(S + 1, np.int64) for _ in range(2)]
-    return Trail(np.zeros((EDGE_ROWS, width)), np.zeros((2, width)), np.zeros(width), *whole, np.zeros((2, S + 1)),
-                 np.zeros((S + 1, 8)))
+    return Trail(np.zeros((EDGE_ROWS, width)), np.zeros((2, width)), np.zeros(width), np.zeros(S + 1, np.int64),
+                 np.zeros(S + 1, np.int64), np.zeros((2, S + 1)), np.zeros((S + 1, 8)))
 
 
 @njit(_nrt=False, cache=True, error_model="numpy", inline="always")

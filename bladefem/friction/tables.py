@@ -17,7 +17,7 @@ from bladefem.friction.harmonics import analysis, synthesis
 from bladefem.friction.lane_kernels import TILE
 from bladefem.friction.lanes import LANES
 
-__all__ = ["Node", "Tables", "add_gram", "filled", "gram", "tables", "tiled", "values", "weighted"]
+__all__ = ["Node", "Tables", "add_gram", "gram", "tables", "values", "weighted"]
 
 
 class Node(NamedTuple):
@@ -55,23 +55,23 @@ def tables(H: int, samples: int) -> Tables:
     sums = np.concatenate([np.zeros((1, 4 * H + 1)), np.cumsum(wide, axis=0)])
     knots = synthesis(H, samples, -0.5)
     knots[:, 1:] /= np.repeat(np.cos(np.pi / samples * np.arange(1, H + 1)), 2)
-    more, weights = filled(samples) + LANES - samples, analysis(H, samples).T
+    more, weights = _filled(samples) + LANES - samples, analysis(H, samples).T
     along, blank = knots[np.arange(samples + more) % samples].T, ((0, more), (0, 0))
-    columns = ((0, 0), (0, filled(2 * H + 1) - 2 * H - 1))
+    columns = ((0, 0), (0, _filled(2 * H + 1) - 2 * H - 1))
     made = Tables(at, at.T.copy(), sums, knots, along.copy(), np.pad(weights, blank), np.pad(wide[:samples], blank),
                   np.pad(at, columns), np.pad(np.roll(knots, -1, axis=0) - knots, columns), _fours(samples),
-                  np.pad(weights[:samples // 2 + 1], ((0, 0), (0, tiled(H) - 2 * H - 1))))
+                  np.pad(weights[:samples // 2 + 1], ((0, 0), (0, _tiled(H) - 2 * H - 1))))
     for array in made:
         array.setflags(write=False)
     return made
 
 
-def filled(size: int) -> int:
+def _filled(size: int) -> int:
     """The next multiple of the lanes of a vector."""
     return -(-size // LANES) * LANES
 
 
-def tiled(H: int) -> int:
+def _tiled(H: int) -> int:
     """Number of coefficients that folded sums fill, at least 2H+1: harmonics by twos up to 8, then by eights."""
     return 4 * (H // 2) + 3 if H < TILE else 2 * TILE * (H // TILE + 1) - 1
 
