@@ -3,38 +3,46 @@
 Processor time of this thread, the best of ten runs, so that other work on the machine counts little. Run it with
 ``python benchmarks/friction_kernels.py``. The first call compiles and is not measured.
 
-Recorded on an idle core whose matrix products run at 45 GFLOP/s, ns for each node and sample with (without) Jacobian:
+Recorded on one core whose matrix products run at 45 GFLOP/s while the other was busy, ns for each node and sample with
+(without) Jacobian:
 
     H, samples       3, 128         5, 128         7, 512
-    1-D, stuck       7.4            9.7            6.6
-    1-D, gross       12             16             9.2
-    3-D, stuck       10 (8)         18 (11)        13 (8)
-    3-D, partial     115 (59)       144 (62)       128 (50)
-    3-D, mixed       96 (42)        138 (47)       131 (35)
-    3-D, gross       94 (27)        138 (32)       150 (25)
+    1-D, stuck       7.8            10             8.2
+    1-D, gross       12             18             11
+    3-D, stuck       7.8 (5.9)      19 (7.2)       13 (5.3)
+    3-D, partial     61 (34)        82 (34)        61 (24)
+    3-D, mixed       50 (27)        94 (34)        63 (19)
+    3-D, gross       44 (20)        78 (21)        63 (15)
 
-The 40 ns wanted for 3-D are met in stick and without derivative in gross slip only. A sample in slip turns the row of
-the angle, M = 3K + 3 numbers filled up to 24, 36, 48, by 20 M operations and adds it to both tangents' K harmonics by
-4 K M: 1150, 2300 and 3840 operations for H 3, 5 and 7. At the speed of matrix products that alone is 26, 51 and 85 ns;
-measured are 27, 37 and 57 % of it. Two other ways were tried:
+The kernel before, on the same machine in the same hours: stuck 11 (8), 22 (11), 14 (9); partial 142 (63), 153 (77),
+139 (51); mixed 103 (43), 139 (48), 169 (49); gross 101 (27), 139 (32), 153 (26). One node with H 3 and 128 samples
+takes 44 us stuck and 54 us in slip, sixteen 56 and 145 to 164 (before: 44 and 62, 64 and 260). All of it compiles in
+33 s of processor time (before: 44 s).
 
-- A reverse sweep (adjoint of 2K numbers, samples i, S/2 - i, S/2 + i, S - i added up before the products), with
-  explicit vectors too: 580, 1020 and 1550 operations, but rows of 16 to 32 numbers are too short; 1.4, 1.2 and 0.9
-  times as long.
-- Eight nodes in the lanes of one vector throughout (march, coefficients, one row of the angle through slip and stick,
-  the same four samples added up, sums over time); a lane that changes state does its edge alone. The sums alone take
-  17, 29 and 39 ns instead of 70, 110 and 115. The whole, complete and equal to this kernel to 1e-13 in the forces, in
-  the same runs on a busy machine, 8 lanes against this kernel with (without) derivative, ns:
+The 40 ns wanted for 3-D are met in stick and without derivative, and missed with it: in gross slip by a tenth at H 3,
+by nine and six tenths at H 5 and 7. Parts of a sample in gross slip at H 3, 5, 7, each timed alone, ns: sums over time
+6, 19, 20; rows of the angle 4, 10, 13; motion and edges 4; a period of the force 4, of which it takes two; coefficients
+of the rows 3; the rest are edges that change state, harmonics and the joining of the sums at the end of a period. Sums
+run at the speed of the vectors: for each column block of eight, four samples i, S/2 - i, S/2 + i, S - i take 20
+operations to be added up and 2K to be summed, 26, 66 and 75 cycles a sample. With one period of the force that makes
+21, 40 and 44 ns before any edge changes state: H 5 and 7 cannot reach 40 in gross slip while rows are formed sample by
+sample. H 5 fills 11 columns up to 16, and memory for the Jacobian, new in each call, costs it 10 ns. In partial slip
+marching takes 5 to 6 periods where the median is 4: one or two nodes in a thousand shake down over a thousand periods.
 
-      H, samples       3, 128                  5, 128                  7, 512
-      stuck            31 (18) : 14 (9)        53 (22) : 24 (13)       44 (16) : 14 (9)
-      partial          140 (113) : 132 (65)    170 (107) : 141 (64)    134 (75) : 132 (51)
-      mixed            89 (60) : 101 (46)      142 (84) : 135 (50)     97 (43) : 135 (37)
-      gross            57 (29) : 100-123 (30)  90 (35) : 133-140 (34)  71 (22) : 151 (26)
+Tried, and slower:
 
-  It wins 1.5 to 2 times where all nodes slip and loses where they stick or change state: some lane of eight changes its
-  state at a third of the samples, and alone it costs as much as eight together. Below 16 nodes it is slower too (one
-  node 1.7 times). The time to compile is the same. Nodes sorted by their state might change this; that was not tried.
+- Rows of one node in lots of 32, added by matrix products of 32 samples (the kernel before).
+- A reverse sweep (adjoint of 2K numbers, the same four samples added up before the products), with explicit vectors
+  too: 1.4, 1.2 and 0.9 times as long as the kernel before.
+- Eight nodes in the lanes of one vector throughout; a lane that changes state does its edge alone. Gross 57, 90, 71 ns,
+  but partial 140, 170, 134, as some lane of eight changes its state at a third of the samples. Its forces were equal to
+  the kernel of its day to 1e-12 for nearly all nodes. One node took 1.7 times as long.
+- References to arrays counted in the inner functions, as Numba does unless told: a fifth of the time.
+
+Against the kernel before, these cases and 9600 random elements: forces equal to 1e-12 of a node's largest for all but
+eight of 21 600 nodes; seven of these shake down slowly or touch the limit (1e-10), one has several periodic states and
+takes another. Jacobians differ by up to 5e-9: against one with the periodic state to 1e-13, H 3, 52 of 1000 nodes in
+partial slip were off by more than 1e-10 before, and 8 are now.
 """
 
 from __future__ import annotations
