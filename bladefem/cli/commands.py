@@ -74,9 +74,9 @@ def modes_wanted(options: argparse.Namespace) -> Any:
 
 def _sizes(text: str | None, option: str) -> list[float] | None:
     """Element sizes [m] as given to an option; empty where they are to be chosen."""
-    from ..scene_fields import split_values
-    from ..units import parse
-    return None if text is None else [parse(item, "m", option) for item in split_values(text)]
+    from ..scene_fields import convert, field_at, split_values
+    size = field_at("mesh.size")._replace(name=option)
+    return None if text is None else [convert(item, size) for item in split_values(text)]
 
 
 def contact(options: argparse.Namespace, comm: Any) -> None:

@@ -15,7 +15,6 @@ __all__ = ["study"]
 
 def study(options: argparse.Namespace, comm: Any) -> None:
     """The response for several values of one field, each in its own folder inside the run folder."""
-    from ..report.study import Variant, write_study
     from ..store import on_root
     base = Path(options.output or default_folder(options.scene))
     parts = [(value, _one(options, base, name, value)) for name, value in _varied(options.vary)]
@@ -26,9 +25,10 @@ def study(options: argparse.Namespace, comm: Any) -> None:
     for i, ((value, one), scene) in enumerate(zip(parts, scenes, strict=True), 1):
         tell(options, comm, lambda text=f"\n{name} = {value} ({i} of {count})": text)
         run = until("response", one, comm)
-        done.append(Variant(value, scene, run.response))
+        done.append((value, scene, run.response))
         tell(options, comm, lambda run=run: tables.responses(run.response), run)
-    table, files = on_root(comm, lambda: write_study(name, done, base))
+    from ..report.study import Variant, write_study  # here, since it is slow to load
+    table, files = on_root(comm, lambda: write_study(name, [Variant(*one) for one in done], base))
     tell(options, comm, lambda: f"\n{tables.side_by_side(name, table)}\nwritten: {', '.join(map(str, files))}")
 
 

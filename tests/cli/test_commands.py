@@ -112,7 +112,7 @@ SHOWN = {
 }
 
 
-def test_options_of_modes(pipeline, tmp_path):
+def test_options_of_modes(pipeline, tmp_path, capsys):
     assert main(["modes", WEDGE, "-o", str(tmp_path), "--campbell", "0, 10, ..., 30 rad/s", "--converge", "6, 4, 2 mm",
                  "--compare", "runs/other", "--direct", "--pictures", "0"]) == 0
     wanted = pipeline.state.wanted
@@ -128,6 +128,9 @@ def test_options_of_modes(pipeline, tmp_path):
     assert main(["modes", WEDGE, "-o", str(tmp_path), "--damping", "ratio=1 %"]) == 2
     assert main(["modes", WEDGE, "-o", str(tmp_path), "--campbell", "quick"]) == 2
     assert main(["modes", WEDGE, "-o", str(tmp_path), "--pictures", "-1"]) == 2
+    capsys.readouterr()
+    assert main(["modes", WEDGE, "-o", str(tmp_path), "--converge", "8, 6, 4"]) == 2
+    assert "converge = 8 m: expected 10 um to 1 m; did you mean '8 mm'?" in capsys.readouterr().err
 
 
 def test_quiet_prints_no_summary(pipeline, tmp_path, capsys):
