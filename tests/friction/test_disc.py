@@ -100,6 +100,14 @@ def test_jacobian_against_finite_differences(kn):
     np.testing.assert_allclose(forces.dfdw, numeric, rtol=0, atol=1e-6)
 
 
+@pytest.mark.parametrize(("H", "samples"), [(1, 9), (2, 18), (5, 64), (7, 65), (9, 46)])
+def test_jacobian_for_any_number_of_harmonics_and_samples(H, samples):
+    """Sums over time are folded and tiled: odd, even and fourfold numbers of samples; tiles up to 8 and beyond."""
+    elements, w = random_case(9, 40, H, 2)
+    numeric = numeric_jacobian(lambda x: evaluate(elements, x, samples).f, w, 1e-7)
+    np.testing.assert_allclose(evaluate(elements, w, samples).dfdw, numeric, rtol=0, atol=1e-5)
+
+
 def test_jacobian_with_a_prescribed_load_series():
     elements, w = random_case(5, 60, 2, 2)
     load = np.random.default_rng(5).normal(size=(60, 48)) + 1.5
