@@ -29,7 +29,8 @@ def compile_kernels() -> None:
     for samples in (64, 0):
         solve(line, 1.0, 2, samples)
         balance = Balance(line, condense(line, 1.0, 2), samples)
-        newton(balance, start_in_stick(balance), merit="residual")
+        for merit in ("step", "residual"):
+            newton(balance, start_in_stick(balance), merit=merit)
     ports["contact"] = np.arange(3)
     body = port_model_from_matrices(np.eye(3), np.diag([1.0, 1.2, 1.4]) + 0.1, ports)
     plane = ReducedModel((body,), replace(one, tangents=2), {1: np.ones(1)}, Damping(0.01))
