@@ -358,3 +358,11 @@ def test_all_ranks_stop_on_a_scene_that_is_wrong(arguments, capsys):
     assert main([*arguments, "--set", "contact.mu=-1"]) == 2
     said = capsys.readouterr().err
     assert ("contact.mu" in said) == (MPI.COMM_WORLD.rank == 0)
+
+
+@pytest.mark.mpi
+def test_all_ranks_stop_where_another_command_works(tmp_path, capsys):
+    from mpi4py import MPI
+    with locked(tmp_path):
+        assert main(["mesh", WEDGE, "-o", str(tmp_path)]) == 2
+    assert ("another command" in capsys.readouterr().err) == (MPI.COMM_WORLD.rank == 0)
