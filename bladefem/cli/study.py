@@ -25,10 +25,10 @@ def study(options: argparse.Namespace, comm: Any) -> None:
     for i, ((value, one), scene) in enumerate(zip(parts, scenes, strict=True), 1):
         tell(options, comm, lambda text=f"\n{name} = {value} ({i} of {count})": text)
         run = until("response", one, comm)
-        done.append((value, scene, run.response))
         tell(options, comm, lambda run=run: tables.responses(run.response), run)
-    from ..report.study import Variant, write_study  # here, since it is slow to load
-    table, files = on_root(comm, lambda: write_study(name, [Variant(*one) for one in done], base))
+        from ..report.study import Variant, write_study  # not before the first line: it is slow to load
+        done.append(Variant(value, scene, run.response))
+        table, files = on_root(comm, lambda: write_study(name, done, base))     # so that an interruption leaves some
     tell(options, comm, lambda: f"\n{tables.side_by_side(name, table)}\nwritten: {', '.join(map(str, files))}")
 
 

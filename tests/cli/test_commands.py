@@ -159,6 +159,17 @@ def test_study_runs_each_value_in_its_own_folder(pipeline, tmp_path, capsys):
     assert "| 30 deg | 0.5236 | 812.4 | 80 | 50 | 830 | 20 |" in (tmp_path / "study.md").read_text()
 
 
+def test_a_study_that_breaks_off_leaves_what_is_done(pipeline, tmp_path):
+    def behaviour(folder):
+        if "45" in str(folder):
+            raise NotSolvedError("balance at 812 Hz: 40 steps")
+        return fake_run(folder)
+
+    pipeline.state.behaviour = behaviour
+    assert main(["study", WEDGE, "-o", str(tmp_path), "--vary", "damper.angle=30, 45, 50 deg"]) == 1
+    assert list(pd.read_csv(tmp_path / "study.csv")["value"]) == ["30 deg"]
+
+
 @pytest.mark.parametrize("vary", ["damper.angle", "damper.angel=1", "damper.angle=30, 80 deg",
                                   "excitation.force=1, 0 N", "aerofoil.twist=10, 20", "mesh.size=",
                                   "kind=wedge sector, punch"])
