@@ -229,7 +229,7 @@ def studied_loads(scene: Scene, own: float | None) -> list[float]:
     if own is None:
         raise InputError("study.own_load = true: nothing presses the damper on its seats at operation.speed = "
                          f"{show(scene.operation.speed, 'rad/s')}, expected a speed that does, or study.loads alone")
-    return sorted({*given, own})
+    return sorted({*given, float(f"{own:.4g}")})
 
 
 def load_cases(scene: Scene, mesh: Mesh, contact: Seating) -> list[LoadCase]:

@@ -9,7 +9,7 @@ from bladefem.study.pipeline import studied_loads
 
 def test_own_load_takes_its_place_among_the_others():
     scene = Scene(study=Study(loads=(60.0, 200.0), own_load=True))
-    assert studied_loads(scene, 121.4) == [60.0, 121.4, 200.0]
+    assert studied_loads(scene, 121.38246) == [60.0, 121.4, 200.0]
     assert studied_loads(scene, 200.0) == [60.0, 200.0]
     assert studied_loads(Scene(study=Study(loads=(200.0, 60.0))), 121.4) == [200.0, 60.0]
 
