@@ -6,6 +6,7 @@ import os
 import signal
 import subprocess
 import sys
+from pathlib import Path
 from types import SimpleNamespace
 
 import numpy as np
@@ -298,6 +299,7 @@ def clean_environment() -> dict[str, str]:
 
 INTERRUPTED = """
 import sys, time
+from pathlib import Path
 from types import SimpleNamespace
 import bladefem.study
 def run(scene, folder, until, comm=None, progress=None):
@@ -341,6 +343,7 @@ def test_a_signal_that_a_library_turns_into_an_error_is_still_an_interrupt(raise
 
 ONE_RANK_FAILS = """
 import sys
+from pathlib import Path
 from types import SimpleNamespace
 import bladefem.cli.ranks as ranks
 from bladefem.errors import InputError
