@@ -123,8 +123,14 @@ def _jacobian(A, J, springs, d, active, out):
 @njit(cache=True, error_model="numpy")
 def factorise(M, pivots):
     """LU factors in place with partial pivoting; False where a pivot is zero."""
+    return eliminated(M, pivots, 0, M.shape[0])
+
+
+@njit(cache=True, error_model="numpy")
+def eliminated(M, pivots, low, high):
+    """Columns low to high of such factors, rows exchanged as a whole; False where a pivot is zero."""
     size = M.shape[0]
-    for k in range(size):
+    for k in range(low, high):
         best = k
         for i in range(k + 1, size):
             if abs(M[i, k]) > abs(M[best, k]):
@@ -139,7 +145,7 @@ def factorise(M, pivots):
             factor = M[i, k] / M[k, k]
             M[i, k] = factor
             if factor != 0.0:
-                for j in range(k + 1, size):
+                for j in range(k + 1, high):
                     M[i, j] -= factor * M[k, j]
     return True
 
@@ -150,23 +156,8 @@ def factorise_large(M, pivots):
     size = M.shape[0]
     for low in range(0, size, BLOCK):
         high = min(low + BLOCK, size)
-        for k in range(low, high):
-            best = k
-            for i in range(k + 1, size):
-                if abs(M[i, k]) > abs(M[best, k]):
-                    best = i
-            pivots[k] = best
-            if not abs(M[best, k]) > 0.0:
-                return False
-            if best != k:
-                for j in range(size):
-                    M[k, j], M[best, j] = M[best, j], M[k, j]
-            for i in range(k + 1, size):
-                factor = M[i, k] / M[k, k]
-                M[i, k] = factor
-                if factor != 0.0:
-                    for j in range(k + 1, high):
-                        M[i, j] -= factor * M[k, j]
+        if not eliminated(M, pivots, low, high):
+            return False
         for k in range(low, high if high < size else low):
             for i in range(k + 1, high):
                 factor = M[i, k]

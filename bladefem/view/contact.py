@@ -18,7 +18,7 @@ from bladefem.data import Patch, PressureMap
 from .skin import split_faces
 from .style import COLOURS, canvas, headline
 
-__all__ = ["OPEN", "PRESSURE_COLOURS", "arrangement", "colour_pressure", "contact_centre", "draw_pressure",
+__all__ = ["OPEN", "PRESSURE_COLOURS", "arrangement", "colour_pressure", "contact_centre", "draw_pressure", "label_outer",
            "pressure_points", "pressure_summary", "save_faces_vtu", "save_pressure_vtu", "seat_name", "unfold"]
 
 PRESSURE_COLOURS = "inferno_r"
@@ -127,13 +127,18 @@ def draw_pressure(seats: Sequence[PressureMap], file: str | Path | None = None, 
         if not line:
             figure.colorbar(ScalarMappable(Normalize(0, peak), PRESSURE_COLOURS), ax=list(axes.flat), aspect=25,
                             pad=0.02, label="contact pressure [MPa]")
-        for ax in axes[-1]:
-            ax.set_xlabel("along the face [mm]" if line else "along the engine axis [mm]")
-        for ax in axes[:, 1:].flat:
-            ax.set_ylabel("")
+        label_outer(axes, line)
         figure.legend(*axes[0, 0].get_legend_handles_labels(), loc="outside lower center", ncols=3)
         headline(figure, title or "contact pressure" + ("" if line else ", faces unfolded"))
         return figure
+
+
+def label_outer(axes: np.ndarray, line: bool) -> None:
+    """Directions named on the outer axes (rows, columns) only."""
+    for ax in axes[-1]:
+        ax.set_xlabel("along the face [mm]" if line else "along the engine axis [mm]")
+    for ax in axes[:, 1:].flat:
+        ax.set_ylabel("")
 
 
 def arrangement(patches: Sequence[Patch]) -> tuple[tuple[int, int], tuple[float, float]]:

@@ -13,7 +13,7 @@ from matplotlib.tri import Triangulation
 
 from bladefem.data import Patch
 
-from .contact import arrangement, seat_name, unfold
+from .contact import arrangement, label_outer, seat_name, unfold
 from .skin import split_faces
 from .style import COLOURS, canvas, headline
 
@@ -47,10 +47,7 @@ def draw_work(patches: Sequence[Patch], work: np.ndarray, state: np.ndarray, fil
         if not line:
             figure.colorbar(ScalarMappable(Normalize(0, most), WORK_COLOURS), ax=list(axes.flat), aspect=25,
                             pad=0.02, label="friction work [J/m²]")
-        for ax in axes[-1]:
-            ax.set_xlabel("along the face [mm]" if line else "along the engine axis [mm]")
-        for ax in axes[:, 1:].flat:
-            ax.set_ylabel("")
+        label_outer(axes, line)
         named = {label: handle for ax in axes.flat for handle, label in zip(*ax.get_legend_handles_labels(),
                                                                            strict=True)}
         figure.legend(named.values(), named.keys(), loc="outside lower center", ncols=2)
