@@ -18,8 +18,9 @@ from bladefem.data import Patch, PressureMap
 from .skin import split_faces
 from .style import COLOURS, canvas, headline
 
-__all__ = ["OPEN", "PRESSURE_COLOURS", "arrangement", "colour_pressure", "contact_centre", "draw_pressure", "label_outer",
-           "pressure_points", "pressure_summary", "save_faces_vtu", "save_pressure_vtu", "seat_name", "unfold"]
+__all__ = ["OPEN", "PRESSURE_COLOURS", "arrangement", "colour_pressure", "contact_centre", "draw_pressure",
+           "label_outer", "pressure_points", "pressure_summary", "save_faces_vtu", "save_pressure_vtu", "seat_name",
+           "unfold"]
 
 PRESSURE_COLOURS = "inferno_r"
 OPEN = "#e6e6e6"                     # faces that nothing presses
