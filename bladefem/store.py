@@ -11,6 +11,7 @@ import hashlib
 import os
 import sys
 import tempfile
+import time
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager, suppress
 from importlib import metadata
@@ -23,11 +24,11 @@ import numpy as np
 from .encode import read_npz, tree_of, write_npz
 from .errors import InputError
 
-__all__ = ["attributes", "bind_h5py", "code_of", "key_of", "on_root", "open_folder", "read_results", "stage",
-           "versions", "write_results", "write_table", "write_text", "writing"]
+__all__ = ["attributes", "bind_h5py", "code_of", "found_remark", "key_of", "on_root", "open_folder",
+           "read_results", "stage", "versions", "write_results", "write_table", "write_text", "writing"]
 
 # Raised when the meaning or the layout of stored stages changes: older files are then computed again.
-FORMAT = 1
+FORMAT = 2
 
 
 def open_folder(path: str | Path) -> Path:
@@ -83,7 +84,7 @@ def code_of(*packages: str) -> str:
 
 
 def stage(folder: str | Path | None, name: str, key: str, compute: Callable[[], Any], comm: Any = None,
-          ) -> tuple[Any, bool]:
+          ) -> tuple[Any, float | None]:
     """The result of a stage: found in the folder when it was made from the same things, else computed and kept.
 
     Args:
@@ -94,17 +95,19 @@ def stage(folder: str | Path | None, name: str, key: str, compute: Callable[[], 
         comm: communicator; rank 0 reads and writes for all, each rank gets the same.
 
     Returns:
-        the result, and whether it was found.
+        the result, and where it was found the seconds that it once took.
     """
     if folder is None:
-        return compute(), False
+        return compute(), None
     path = Path(folder) / "stages" / f"{name}.npz"
     found = on_root(comm, lambda: _find(path, key))
     if found is not None:
-        return found[0], True
+        return found
+    start = time.perf_counter()
     result = compute()
-    on_root(comm, lambda: _keep(path, key, result))
-    return result, False
+    seconds = time.perf_counter() - start
+    on_root(comm, lambda: _keep(path, key, (result, seconds)))
+    return result, None
 
 
 def write_results(path: str | Path, groups: Mapping[str, Any], scene_text: str = "") -> Path:
@@ -187,18 +190,24 @@ def _version(distribution: str) -> str:
         return "absent"
 
 
-def _find(path: Path, key: str) -> tuple[Any] | None:
-    """The stored result in a tuple, or None when there is none, it is older, or it is damaged."""
+def found_remark(name: str, seconds: float) -> str:
+    """That a stage was found, for the messages of a run."""
+    return f"{name}: found in the folder, where it was made in {seconds:.1f} s"
+
+
+def _find(path: Path, key: str) -> tuple[Any, float] | None:
+    """The stored result and its seconds, or None when there is none, it is older, or it is damaged."""
     try:
-        return (read_npz(path, key),)
-    except (OSError, ValueError):
+        result, seconds = read_npz(path, key)
+    except (OSError, ValueError, TypeError):
         return None
+    return result, seconds
 
 
-def _keep(path: Path, key: str, result: Any) -> None:
+def _keep(path: Path, key: str, made: tuple[Any, float]) -> None:
     open_folder(path.parent)
     with writing(path) as temporary:
-        write_npz(temporary, key, result)
+        write_npz(temporary, key, made)
 
 
 def on_root(comm: Any, action: Callable[[], Any]) -> Any:

@@ -24,7 +24,7 @@ from ..reduction.truncate import truncated
 from ..scene import Scene
 from ..scene_check import refuse_response
 from ..scene_doubts import doubts
-from ..store import stage
+from ..store import found_remark, stage
 from ..units import show
 from .choice import choose, covered, peak_of
 from .clamped import clamped_blade
@@ -182,9 +182,9 @@ class _Keeper:
         """The same for what one rank does without the others."""
         return self._said(name, *stage(self.folder, name, key, compute))
 
-    def _said(self, name: str, result: Any, found: bool) -> Any:
-        if found:
-            self.clock.messages.append(f"{name}: found in the folder, not computed again")
+    def _said(self, name: str, result: Any, seconds: float | None) -> Any:
+        if seconds is not None:
+            self.clock.messages.append(found_remark(name, seconds))
         return result
 
 

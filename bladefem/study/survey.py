@@ -19,7 +19,7 @@ from ..errors import InputError
 from ..hbm.model import Damping
 from ..progress import Progress, unwatched
 from ..scene import Scene
-from ..store import code_of, key_of, on_root, stage
+from ..store import code_of, found_remark, key_of, on_root, stage
 from . import pipeline
 from .answer import Answer, answer
 from .campbell import Campbell, campbell
@@ -77,8 +77,8 @@ def survey(scene: Scene, folder: str | Path, wanted: Wanted, comm: Any = None,
         refuse_loads(scene, start.mesh, wanted.loads, wanted.damping)
     bodies, clock = Bodies(scene, start.mesh, comm, progress), time.perf_counter()
     key = key_of(modes_key(scene), "survey", wanted.direct, code_of("bladefem.study"))
-    sets, found = stage(folder, "survey", key, lambda: _all_modes(bodies, wanted.direct), comm)
-    messages = [*start.messages, *(["modes: found in the folder, not computed again"] if found else [])]
+    sets, before = stage(folder, "survey", key, lambda: _all_modes(bodies, wanted.direct), comm)
+    messages = [*start.messages, *([] if before is None else [found_remark("modes", before)])]
     run = replace(start, modes=sets, messages=messages)
     clock = _timed(run, "modes", clock)
     result = Survey(run, bodies, effective_masses(sets, bodies.still_blade), clamped=clamped_blade(bodies))
@@ -140,7 +140,7 @@ def _kept(folder: Path, name: str) -> Any:
     try:
         with np.load(path, allow_pickle=False) as file:
             key = str(file["key"])
-        return read_npz(path, key)
+        return read_npz(path, key)[0]
     except (OSError, KeyError, ValueError):
         return None
 

@@ -11,13 +11,12 @@ from matplotlib.axes import Axes
 
 from .labels import names_apart
 from .response import draw_accuracy
-from .style import canvas
+from .style import canvas, log_axis
 
 __all__ = ["draw_chart", "draw_errors"]
 
 ERRORS = {"error": "resonance amplitude", "error_frequency": "resonance frequency",
           "error_phasor": "worst phasor over the highest one"}
-LABELS = {"meshes": ("CPU time from drawing the mesh to the resonance", "amplitude or frequency, the larger")}
 
 
 def draw_chart(tables: Mapping[str, pd.DataFrame], file: str | Path | None = None, *,
@@ -42,10 +41,12 @@ def draw_chart(tables: Mapping[str, pd.DataFrame], file: str | Path | None = Non
             margin = max(1.3, (top / floor) ** 0.08)
             bottom = floor / margin
             ax.set_ylim(bottom, top * margin)
-            ax.axhspan(bottom, floor, color="#bbbbbb", alpha=0.5, zorder=0)
+            ax.axhspan(bottom, floor, color="#bbbbbb", alpha=0.5, zorder=0, label="below the reference's own error")
+            ax.legend(loc="center left", bbox_to_anchor=(1.0, 0.5))
             _name_star(ax, what)
-            spent, of = LABELS.get(what, ("CPU time for each frequency", "resonance amplitude"))
-            ax.set(xlabel=f"{spent} [s]", ylabel=f"relative error of the {of} [1]")
+            _name_time(ax, what)
+            of = "amplitude or frequency, the larger" if what == "meshes" else ERRORS["error"]
+            ax.set(ylabel=f"error of the {of} [%]")
         for ax in axes[:, 0]:
             names_apart(ax)
         return axes[0, 0].figure
@@ -69,9 +70,8 @@ def draw_errors(tables: Mapping[str, pd.DataFrame], file: str | Path | None = No
                 kept = table.assign(error=table[column].clip(lower=least))[~table["left_out"]]
                 draw_accuracy(kept, ax=ax, tolerance=tolerance if column != "error_frequency" else None, title=of)
                 _name_star(ax, what)
-                spent = LABELS.get(what, ("CPU time for each frequency", ""))[0]
-                ax.set(xlabel=f"{spent} [s]", ylabel=f"{title}: {what}, relative error [1]" if title else
-                       f"{what}, relative error [1]")
+                _name_time(ax, what)
+                ax.set(ylabel=f"{title}: {what}, error [%]" if title else f"{what}, error [%]")
             shown = [ax for ax in row if ax.axison]
             for ax in shown[:-1]:
                 ax.get_legend().remove()
@@ -79,6 +79,15 @@ def draw_errors(tables: Mapping[str, pd.DataFrame], file: str | Path | None = No
             if ax.axison:
                 names_apart(ax)
         return axes[0, 0].figure
+
+
+def _name_time(ax: Axes, what: str) -> None:
+    """Meshes take seconds, the other variants milliseconds a frequency."""
+    if what == "meshes":
+        ax.set(xlabel="CPU time from drawing the mesh to the resonance [s]")
+    else:
+        log_axis(ax, "x", 1e3)
+        ax.set(xlabel="CPU time for each frequency [ms]")
 
 
 def _name_star(ax: Axes, what: str) -> None:

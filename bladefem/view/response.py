@@ -278,9 +278,9 @@ def draw_accuracy(table: pd.DataFrame, file: str | Path | None = None, *, ax: An
         draw_front(ax, table[good])
         if tolerance is not None:
             ax.axhline(tolerance, color="#555555", ls="--", lw=1, label=f"wanted accuracy {100 * tolerance:.3g} %")
-        ax.set(xlabel="time [s]", ylabel="relative error [1]", title=title or "speed against accuracy")
+        ax.set(xlabel="time [s]", ylabel="error [%]", title=title or "speed against accuracy")
         log_axis(ax, "x")
-        log_axis(ax, "y")
+        log_axis(ax, "y", 100.0)
         ax.legend(loc="center left", bbox_to_anchor=(1.0, 0.5))
         if alone:
             names_apart(ax)

@@ -57,14 +57,14 @@ def canvas(file: str | Path | None = None, ax: Any = None, size: tuple[float, fl
             np.ravel(ax)[0].figure.savefig(file)
 
 
-def log_axis(ax: Any, which: str) -> None:
-    """A logarithmic "x" or "y" axis with plain numbers, also at 2 and 5 when there are few decades."""
+def log_axis(ax: Any, which: str, factor: float = 1.0) -> None:
+    """A logarithmic "x" or "y" axis with plain numbers, times a factor, also at 2 and 5 when there are few decades."""
     axis = ax.xaxis if which == "x" else ax.yaxis
     (ax.set_xscale if which == "x" else ax.set_yscale)("log")
     low, high = axis.get_view_interval()
     few = 0 < low < high < 300 * low
     axis.set_major_locator(LogLocator(10, subs=(1.0, 2.0, 5.0) if few else (1.0,), numticks=12))
-    axis.set_major_formatter(FuncFormatter(lambda x, _: f"{x:g}"))
+    axis.set_major_formatter(FuncFormatter(lambda x, _: f"{factor * x:g}"))
     axis.set_minor_formatter(NullFormatter())
 
 
