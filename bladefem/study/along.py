@@ -1,76 +1,121 @@
-"""The automatic choice along given frequencies."""
+"""The automatic choice along given frequencies: none gets more than the accuracy of the highest point asks for."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import replace
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
 
 from ..errors import NotSolvedError
-from ..hbm.api import solve
 from ..hbm.newton import Options
 from ..hbm.solution import Solution
 from ..hbm.sticking import grips
 from ..hbm.sweep import response, size
-from .choice import Checked, choose, peak_of, sufficient, watched
+from .choice import Checked, following, likely, peak_of, sufficient, watched
 from .family import Family, member
-from .indicators import judge
+from .indicators import indicate, judge, moved
 from .settings import Settings
 
 __all__ = ["along"]
 
-STRIDE = 8          # frequencies from one of the first look to the next
-PASSES = 3          # with ever richer settings
+PASSES = 16         # of richer settings, each round one point
+COARSE = 0.02       # accuracy that the first sweep is made for where contacts may lift off
+QUIET = 2           # neighbours that richer settings do not change, beyond which the others are left as they are
+
+
+@dataclass
+class _Curve:
+    """A sweep under way; lists in the order of the frequencies."""
+
+    family: Family
+    options: Options
+    points: list[Solution]
+    used: list[Settings]            # of each point
+    errors: dict[float, float]      # circular frequency of the judged points to the estimated relative error
 
 
 def along(family: Family, omegas: Sequence[float], settings: Settings, accuracy: float) -> Checked:
     """Response at ascending circular frequencies [rad/s], everywhere within the accuracy of its highest point.
 
-    The choice is made at the highest point of a first look, and made again where a check of the curve finds too much.
+    All of them are solved with what contacts that slip commonly need. Then the curve is judged at some of its points,
+    the peak first; round one that is too wrong richer settings are taken, as far as they change anything.
 
     Args:
         settings: to start the choice from.
 
+    Returns:
+        the points and the settings of the highest; others may have been solved with fewer harmonics, samples, ...
+
     Raises:
         NotSolvedError: no point converged.
     """
-    options = sufficient(accuracy)
-    rough = list(response(member(family, settings).model, omegas[::STRIDE], settings.harmonics, settings.samples,
-                          options=options))
-    if not any(p.converged for p in rough):
-        raise NotSolvedError(f"none of {len(rough)} first frequencies was solved; the first stopped because: "
-                             f"{rough[0].reason}")
-    settings, judged, found = choose(family, settings, peak_of(rough), accuracy)
-    points: list[Solution] = []
-    for last in [False] * (PASSES - 1) + [True]:
-        points = _solved(family, omegas, settings, points, options)
-        top, errors, used = peak_of(points), {}, settings
-        for point in watched(points):
-            tolerated = accuracy * size(top) / size(point)
-            told = found.total if point.omega == judged.omega else judge(family, settings, point).total
-            errors[point.omega] = told
-            if told > tolerated / 2 and not last:
-                used, judged, found = choose(family, settings, point, tolerated)
-                used = replace(used, error=settings.error)
-            if used != settings:
-                break
-        if used == settings:
+    options, settings = sufficient(accuracy), _first(family, settings, accuracy)
+    points = list(response(member(family, settings).model, omegas, settings.harmonics, settings.samples,
+                           options=options))
+    if not any(p.converged for p in points):
+        raise NotSolvedError(f"none of {len(points)} frequencies was solved; the first stopped because: "
+                             f"{points[0].reason}")
+    curve, final = _Curve(family, options, points, [settings] * len(points), {}), set()
+    for _ in range(PASSES):
+        limit = accuracy * size(peak_of(points)) / 2
+        wrong = next((i for i in _judged(curve) if curve.errors[points[i].omega] * size(points[i]) > limit
+                      and i not in final), None)
+        if wrong is None:
             break
-        if not _alike(used, settings):
-            points = []
-        settings = used
-    return Checked(replace(settings, error=errors[top.omega]), points, errors)
+        found = indicate(family, curve.used[wrong], points[wrong])
+        better = following(curve.used[wrong], found, 2 * limit / size(points[wrong]))
+        if better is not None:
+            _raise(curve, wrong, better, limit)
+        if curve.used[wrong] != better:     # there is none, or it was not solved
+            final.add(wrong)
+    top, *_ = _judged(curve)
+    return Checked(replace(curve.used[top], error=curve.errors[points[top].omega]), points, curve.errors)
+
+
+def _first(family: Family, settings: Settings, accuracy: float) -> Settings:
+    """What all points are solved with; where contacts may lift off, few harmonics lead the way for more."""
+    fine, coarse = (likely(family, settings, told) for told in (accuracy, max(accuracy, COARSE)))
+    model = member(family, fine).model
+    lifts = model.directions > model.elements.tangents
+    return replace(fine, harmonics=coarse.harmonics, samples=coarse.samples) if lifts else fine
+
+
+def _judged(curve: _Curve) -> Iterator[int]:
+    """Numbers of the points that are watched, the peak first, each with its error told."""
+    places = {p.omega: i for i, p in enumerate(curve.points)}
+    for point in watched(curve.points):
+        i = places[point.omega]
+        if point.omega not in curve.errors:
+            curve.errors[point.omega] = judge(curve.family, curve.used[i], point).total
+        yield i
+
+
+def _raise(curve: _Curve, at: int, better: Settings, limit: float) -> None:
+    """Solve a point with better settings, and its neighbours of the same settings as far as that changes them [m]."""
+    old, quiet = curve.used[at], 0
+    _change(curve, at, better)
+    for side in (range(at + 1, len(curve.points)), range(at - 1, -1, -1)):
+        quiet = 0
+        for i in side:
+            if curve.used[i] != old or quiet == QUIET:
+                break
+            quiet = quiet + 1 if _change(curve, i, better) <= limit else 0
+
+
+def _change(curve: _Curve, i: int, better: Settings) -> float:
+    """Put the point of better settings in place of the present one; the distance of their first harmonics [m]."""
+    old, settings = curve.points[i], curve.used[i]
+    if _alike(settings, better) and old.converged and grips(member(curve.family, settings).model, old):
+        return 0.0
+    new = moved(curve.family, settings, old, better, curve.options)
+    if old.converged and not new.converged:
+        return np.inf
+    curve.points[i], curve.used[i] = new, better
+    curve.errors.pop(old.omega, None)
+    return float(abs(new.probe[1, 0] - old.probe[1, 0])) if old.converged else np.inf
 
 
 def _alike(one: Settings, other: Settings) -> bool:
     """Whether they differ in harmonics and samples at most, so that what sticks with one sticks with the other."""
     return (one.modes, one.points, one.damper) == (other.modes, other.points, other.damper)
-
-
-def _solved(family: Family, omegas: Sequence[float], settings: Settings, old: list[Solution],
-            options: Options) -> list[Solution]:
-    """All frequencies; those that stick in an old sweep with the same contacts stay, the others start from there."""
-    model, H, samples = member(family, settings).model, settings.harmonics, settings.samples
-    if not old:
-        return list(response(model, omegas, H, samples, options=options))
-    return [p if p.converged and grips(model, p)
-            else solve(model, p.omega, H, samples, start=p, options=options) for p in old]

@@ -18,13 +18,13 @@ from .family import Family, member
 from .indicators import Indicators, indicate, judge, moved
 from .settings import Settings, enriched
 
-__all__ = ["Checked", "adapted", "checked", "choose", "covered", "default_band", "estimated", "peak_of",
-           "response_points", "sufficient"]
+__all__ = ["Checked", "adapted", "checked", "choose", "covered", "default_band", "estimated", "following", "likely",
+           "peak_of", "response_points", "sufficient", "watched"]
 
 ROUNDS = 12
 KEPT = ("modes", "damper")      # whose indicators, where they are small, outlast a change of the others
-LIKELY = ((0.003, {"harmonics": 7, "samples": 256, "points": 16}),      # accuracy from which, where contacts slip
-          (0.03, {"harmonics": 3, "samples": 64, "points": 16}))
+LIKELY = ((0.003, {"harmonics": 7, "samples": 256, "modes": 20, "points": 16}),     # accuracy from which, where
+          (0.03, {"harmonics": 3, "samples": 64, "modes": 10, "points": 16}))       # contacts slip
 PASSES = 3          # sweeps of one curve with ever richer settings
 WIDENINGS = 4
 EXTRA, NARROW = 2, 0.15     # points checked in gaps wider than this share of the frequencies at which contacts move
@@ -53,16 +53,16 @@ def choose(family: Family, settings: Settings, point: Solution, accuracy: float,
         apart: the error is wanted by its sources.
     """
     known: dict[str, float] = {}
-    likely = _likely(family, settings, point, accuracy, fixed)
-    if likely != settings:
-        further = moved(family, settings, point, likely)
-        settings, point = (likely, further) if further.converged else (settings, point)
+    if settings.error is None and point.converged and not grips(member(family, settings).model, point):
+        usual = likely(family, settings, accuracy, fixed)
+        further = moved(family, settings, point, usual) if usual != settings else point
+        settings, point = (usual, further) if further.converged else (settings, point)
     for _ in range(ROUNDS):
         found = judge(family, settings, point) if not apart else None
         if found is None or found.total > accuracy / 2:
             found = indicate(family, settings, point, known)
         settings = replace(settings, error=found.total)
-        better = None if found.total <= accuracy / 2 else _next(settings, found, accuracy, fixed)
+        better = None if found.total <= accuracy / 2 else following(settings, found, accuracy, fixed)
         further = None if better is None else _solved(family, settings, point, better, found)
         if further is None or not further.converged:
             break
@@ -72,14 +72,10 @@ def choose(family: Family, settings: Settings, point: Solution, accuracy: float,
     return settings, point, found
 
 
-def _likely(family: Family, settings: Settings, point: Solution, accuracy: float, fixed: tuple[str, ...]) -> Settings:
-    """Where a search that has not begun had better begin: with what most points need whose contacts slip."""
-    usual = next((usual for finest, usual in LIKELY if accuracy <= finest), None)
-    if usual is None or settings.error is not None or not point.converged:
-        return settings
-    if grips(member(family, settings).model, point):
-        return settings
-    most = {"harmonics": min(settings.most, family.harmonics)}
+def likely(family: Family, settings: Settings, accuracy: float, fixed: tuple[str, ...] = ()) -> Settings:
+    """Where a search had better begin than at its first settings: with what most points need whose contacts slip."""
+    usual = next((usual for finest, usual in LIKELY if accuracy <= finest), {})
+    most = {"harmonics": min(settings.most, family.harmonics), "modes": family.modes}
     raised = {name: max(getattr(settings, name), min(value, most.get(name, value))) for name, value in usual.items()
               if name in settings.chosen and name not in fixed and getattr(settings, name) is not None}
     return replace(settings, **raised)
@@ -91,7 +87,7 @@ def _solved(family: Family, settings: Settings, point: Solution, better: Setting
     return moved(family, settings, ahead if ahead is not None and ahead.converged else point, better)
 
 
-def _next(settings: Settings, found: Indicators, accuracy: float, fixed: tuple[str, ...]) -> Settings | None:
+def following(settings: Settings, found: Indicators, accuracy: float, fixed: tuple[str, ...] = ()) -> Settings | None:
     """Enriched in each open respect that takes more than its share, the worst at least; None when nothing helps."""
     names = [name for name in settings.chosen if name not in fixed and name not in found.unknown
              and found.errors.get(name, 0.0) > accuracy / 20]
@@ -167,8 +163,9 @@ def watched(points: Sequence[Solution]) -> list[Solution]:
     """The points that a curve is checked at.
 
     The peak, one on each flank for each of SHARES of its height, the highest of the others at which contacts begin to
-    slip or to lift, since a short slip needs more samples than a long one, and EXTRA more in the widest gaps between
-    these where contacts move: internal resonances of higher harmonics keep to no height.
+    slip or to lift, since a short slip needs more samples than a long one, the highest at which more of them do, where
+    the curve has a kink, and EXTRA more in the widest gaps between these where contacts move: internal resonances of
+    higher harmonics keep to no height.
     """
     good = [p for p in points if p.converged]
     heights = np.array([size(p) for p in good])
@@ -178,9 +175,10 @@ def watched(points: Sequence[Solution]) -> list[Solution]:
         for side in (range(top), range(top + 1, len(good))):
             if len(side):
                 chosen.append(min(side, key=lambda i: abs(heights[i] - share * heights[top])))
-    kinds = [_kind(p) for p in good]
-    begin = {max(i, i + 1, key=kinds.__getitem__) for i in range(len(good) - 1) if kinds[i] != kinds[i + 1]}
-    chosen += sorted(begin - set(chosen), key=heights.__getitem__)[-1:]
+    kinds = [(p.states["lift"] + p.states["open"], p.states["slip"]) for p in good]
+    for part in ([(a > 0, b > 0) for a, b in kinds], kinds):
+        begin = {max(i, i + 1, key=part.__getitem__) for i in range(len(good) - 1) if part[i] != part[i + 1]}
+        chosen += sorted(begin - set(chosen), key=heights.__getitem__)[-1:]
     places = np.array([p.omega for p in good])
     moving = np.flatnonzero([any(kind) for kind in kinds] & (heights >= SHARES[-1] * heights[top]))
     for _ in range(EXTRA if len(moving) > 2 else 0):
@@ -188,11 +186,6 @@ def watched(points: Sequence[Solution]) -> list[Solution]:
         if gaps.max() > NARROW * np.ptp(places[moving]):
             chosen.append(int(moving[gaps.argmax()]))
     return [good[i] for i in dict.fromkeys(chosen)]
-
-
-def _kind(point: Solution) -> tuple[bool, bool]:
-    """Whether contacts lift off, and whether they slip."""
-    return point.states["lift"] + point.states["open"] > 0, point.states["slip"] > 0
 
 
 def sufficient(accuracy: float) -> Options:
