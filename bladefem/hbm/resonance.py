@@ -8,7 +8,7 @@ from scipy import linalg
 from ..data import RigidBody
 from .model import ReducedModel
 
-__all__ = ["free_resonances", "stuck_resonances"]
+__all__ = ["free_resonances", "stuck_partners", "stuck_resonances"]
 
 
 def free_resonances(model: ReducedModel, h: int = 1) -> np.ndarray:
@@ -18,7 +18,22 @@ def free_resonances(model: ReducedModel, h: int = 1) -> np.ndarray:
 
 
 def stuck_resonances(model: ReducedModel, h: int = 1) -> np.ndarray:
-    """(m,) circular frequencies omega at which harmonic h meets a mode with all contacts sticking [rad/s].
+    """(m,) circular frequencies omega at which harmonic h meets a mode with all contacts sticking [rad/s]."""
+    return _stuck(model, h)[0]
+
+
+def stuck_partners(model: ReducedModel) -> np.ndarray:
+    """(m,) circular frequency of the stuck mode that has most of each free mode in it, by kinetic energy [rad/s].
+
+    It need not be the one of the same number: on soft contacts a damper has modes of its own below the blade's.
+    """
+    omega, shapes = _stuck(model, 1)
+    blade = model.side(1).omega
+    return omega[np.argmax(np.abs(shapes[:len(blade)][blade > 0]), axis=1)]
+
+
+def _stuck(model: ReducedModel, h: int) -> tuple[np.ndarray, np.ndarray]:
+    """Frequencies (m,) [rad/s] and shapes (n, m) of mass 1, the blade's modes first, with all contacts sticking.
 
     The springs stand in series with the residual flexibility, so that the modes see (K^-1 + R)^-1.
     """
@@ -42,5 +57,6 @@ def stuck_resonances(model: ReducedModel, h: int = 1) -> np.ndarray:
     contact = np.linalg.inv(np.diag(1 / springs[closed]) + flexibility[np.ix_(closed, closed)])
     relative = np.column_stack(shapes)[closed]
     K = np.diag(np.concatenate(stiffness)) + relative.conj().T @ contact @ relative
-    values = linalg.eigh((K + K.conj().T) / 2, linalg.block_diag(*masses), eigvals_only=True)
-    return np.sqrt(values[values > 1e-9 * values[-1]]) / h
+    values, shapes = linalg.eigh((K + K.conj().T) / 2, linalg.block_diag(*masses))
+    elastic = values > 1e-9 * values[-1]
+    return np.sqrt(values[elastic]) / h, shapes[:, elastic]

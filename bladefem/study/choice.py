@@ -10,7 +10,7 @@ import numpy as np
 from ..errors import NotSolvedError
 from ..hbm.model import ReducedModel
 from ..hbm.newton import Options
-from ..hbm.resonance import free_resonances, stuck_resonances
+from ..hbm.resonance import free_resonances, stuck_partners
 from ..hbm.solution import Solution
 from ..hbm.sticking import grips
 from ..hbm.sweep import size, sweep
@@ -236,8 +236,7 @@ def covered(model: ReducedModel, settings: Settings, band: tuple[float, float] |
 
 def _halfway(model: ReducedModel, mode: int) -> tuple[float, float]:
     """Frequencies [Hz] half way to the neighbouring modes: beyond them the flank of another resonance may be higher."""
-    ends = np.sort([free_resonances(model), stuck_resonances(model)[:len(free_resonances(model))]], axis=0)
-    ends = ends / (2 * np.pi)
+    ends = np.sort([free_resonances(model), stuck_partners(model)], axis=0) / (2 * np.pi)
     low = 0.1 * ends[0, 0] if mode == 1 else (ends[1, mode - 2] + ends[0, mode - 1]) / 2
     high = 3 * ends[1, -1] if mode == ends.shape[1] else (ends[1, mode - 1] + ends[0, mode]) / 2
     return min(low, 0.99 * ends[0, mode - 1]), max(high, 1.01 * ends[1, mode - 1])
@@ -267,6 +266,6 @@ def peak_of(points: list[Solution]) -> Solution:
 
 def default_band(model: ReducedModel, mode: int) -> tuple[float, float]:
     """From a little below to a little above the resonances [Hz] of a mode with free and with sticking contacts."""
-    pair = np.array([free_resonances(model)[mode - 1], stuck_resonances(model)[mode - 1]]) / (2 * np.pi)
+    pair = np.array([free_resonances(model)[mode - 1], stuck_partners(model)[mode - 1]]) / (2 * np.pi)
     margin = max(0.01 * pair.mean(), 0.15 * np.ptp(pair))
     return pair.min() - margin, pair.max() + margin

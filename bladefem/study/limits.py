@@ -11,7 +11,7 @@ from scipy.optimize import minimize_scalar
 from ..data import Elements
 from ..hbm.api import free, stuck
 from ..hbm.model import ReducedModel
-from ..hbm.resonance import free_resonances, stuck_resonances
+from ..hbm.resonance import free_resonances, stuck_partners
 
 __all__ = ["Limit", "linear_limits"]
 
@@ -35,7 +35,7 @@ def linear_limits(model: ReducedModel, mode: int, band: tuple[float, float]) -> 
     """No damper and full stick, in a frequency band [Hz]; nodes that the static load leaves open stay open."""
     pressed = replace(model, elements=_pressed(model.elements))
     return (_limit(0.0, model, free, free_resonances(model)[mode - 1], band),
-            _limit(np.inf, pressed, stuck, stuck_resonances(pressed)[mode - 1], band))
+            _limit(np.inf, pressed, stuck, stuck_partners(pressed)[mode - 1], band))
 
 
 def _pressed(elements: Elements) -> Elements:
