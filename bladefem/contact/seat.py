@@ -96,7 +96,8 @@ def solve(problem: ContactProblem, speed: float, normal: float | None = None, da
         normal: wanted mean normal load of a seat [N]; the damper's load is scaled to give it.
         damper_mass: mass of the damper [kg] instead of the meshed one.
         start: maps of a neighbouring state, for a warm start.
-        approach: (n,) further displacement of the blades at the normal ports, pressing > 0 [m].
+        approach: (n,) further displacement of the blades at the normal ports, pressing > 0 [m]: means over the ports'
+            weights (``patch.patch_means``), as the clearance, not values at the nodes.
         bedded: the faces have worn until they fit at this speed: gaps, and displacements by the rotation, open nothing.
 
     Raises:

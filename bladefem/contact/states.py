@@ -27,7 +27,8 @@ class StateTable:
 
     axes: tuple[np.ndarray, ...]    # k ascending coordinates
     force: np.ndarray               # (len(axes[0]), ..., n) [N]
-    curvature: np.ndarray           # (k, len(axes[0]), ...) largest second difference / 8, over the largest force [1]
+    curvature: np.ndarray           # (k, len(axes[0]), ...) largest second difference / 8, over the largest force;
+                                    # 0 where all states are open [1]
 
 
 def state_table(solve: Callable[..., np.ndarray], axes: Sequence[np.ndarray]) -> StateTable:
@@ -78,7 +79,7 @@ def _curvature(force: np.ndarray, a: np.ndarray, k: int) -> np.ndarray:
     h = np.diff(a).reshape(-1, *[1] * (f.ndim - 1))
     slope = np.diff(f, axis=0) / h
     second = 2 * np.diff(slope, axis=0) / (h[1:] + h[:-1]) * np.maximum(h[1:], h[:-1])**2 / 8
-    size = np.abs(second).max(axis=-1) / np.abs(force).max()
+    size = np.abs(second).max(axis=-1) / (np.abs(force).max() or 1.0)       # faces may be open in all states
     size = np.concatenate([size[:1], size, size[-1:]])
     return np.moveaxis(size, 0, k)
 

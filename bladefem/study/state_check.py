@@ -14,10 +14,11 @@ from ..contact.states import interpolate, state_table
 from ..errors import NotSolvedError
 from ..scene import Scene
 
-__all__ = ["StateCheck", "check_states", "state_sentence"]
+__all__ = ["StateCheck", "check_states", "platform_tilt", "state_sentence"]
 
 STATES = 5              # of each axis
 ENOUGH = 0.01           # of the largest nodal force
+SEEN = 1e-6             # of the largest turn of a seat, below which a turn counts as none
 
 
 @dataclass(frozen=True)
@@ -45,7 +46,7 @@ def check_states(scene: Scene, problem: ContactProblem, loads: Sequence[float], 
     Raises:
         NotSolvedError: a state has no solution.
     """
-    tilt = np.concatenate([np.linspace(-1, 1, len(patch.area)) for patch in problem.patches])
+    tilt = platform_tilt(problem)
 
     def direct(load: float, approach: float) -> np.ndarray:
         maps = solve(problem, scene.operation.speed, normal=load, approach=approach * tilt,
@@ -65,6 +66,22 @@ def check_states(scene: Scene, problem: ContactProblem, loads: Sequence[float], 
         found, told = interpolate(table, middle)
         error, indicator = max(error, float(np.abs(found - force).max()) / largest), max(indicator, told)
     return StateCheck(table.force[..., 0].size, error, indicator, spent)
+
+
+def platform_tilt(problem: ContactProblem) -> np.ndarray:
+    """(n,) approach of a platform that turns about the engine axis: -1 to 1 on the first seat, none on the others.
+
+    Taken from the ports' own rigid motions: means over what a port stands for, not values at its node, and linear in
+    place. Both seats turned alike would be followed by the floating damper, which changes no pressure. A seat that
+    faces the engine axis turns about the axis that moves it most; one without extent has no tilt.
+    """
+    own, turns = len(problem.patches[0].area), problem.rigid[:, -1 if problem.rigid.shape[1] < 6 else -3:]
+    spread = np.ptp(turns[:own], axis=0)
+    axis = -1 if spread[-1] > SEEN * spread.max() else int(np.argmax(spread))
+    tilt, moved = np.zeros(len(turns)), turns[:own, axis]
+    if spread[axis] > 0:
+        tilt[:own] = (2 * moved - moved.max() - moved.min()) / spread[axis]
+    return tilt
 
 
 def state_sentence(scene: Scene, problem: ContactProblem, loads: Sequence[float], travel: float) -> str:

@@ -9,6 +9,7 @@ from test_seat import ALPHA, SPEED, condensed
 from wedge import wedge_mesh
 
 import bladefem
+from bladefem.contact.patch import patch_means
 from bladefem.contact.seat import solve
 from bladefem.contact.states import interpolate, quasi_static, state_table
 from bladefem.contact.stiffness import aggregation, friction_elements, mindlin_ratio, normal_stiffness, pair_ratio
@@ -16,7 +17,7 @@ from bladefem.contact.summary import resultant, write_maps
 from bladefem.data import PressureMap
 from bladefem.errors import InputError
 from bladefem.scene import Contact, Material, Seat
-from bladefem.study.state_check import check_states, state_sentence
+from bladefem.study.state_check import check_states, platform_tilt, state_sentence
 
 
 @pytest.fixture(scope="module")
@@ -162,12 +163,53 @@ def test_maps_as_csv(maps, tmp_path):
 
 def tilted(problem):
     """Direct solves over (normal load, opposite approach of the two platforms)."""
-    n = len(problem.patches[0].area)
-    lean = np.concatenate([np.linspace(-1, 1, n), np.zeros(n)])
+    lean = platform_tilt(problem)
 
     def direct(load, tilt):
         return np.concatenate([m.force for m in solve(problem, SPEED, normal=load, approach=tilt * lean)])
     return direct
+
+
+@pytest.mark.parametrize("dimension", [2, 3])
+def test_a_tilt_of_one_platform_is_linear_in_place(dimension):
+    """As port means: the chi-weighted means of the place along the slope, scaled to -1 and 1; nothing on the other."""
+    mesh = wedge_mesh(ALPHA, dimension=dimension)
+    problem = condensed(mesh)
+    patch, tilt = problem.patches[0], platform_tilt(problem)
+    place = patch_means(patch, mesh).T @ (mesh.points @ patch.frame[0, 1])
+    exact = np.interp(place, [place.min(), place.max()], [-1.0, 1.0])
+    n = len(place)
+    assert min(np.abs(tilt[:n] - exact).max(), np.abs(tilt[:n] + exact).max()) < 1e-12
+    assert (tilt[n:] == 0).all()
+
+
+def test_what_the_floating_damper_follows_moves_no_force(problem):
+    """Both platforms lifted, shifted and tilted alike along the axis; a tilt of one alone does move the pressure."""
+    before, mesh = direct_force(problem, 0.0), wedge_mesh(ALPHA)
+    z = np.concatenate([patch_means(p, mesh).T @ mesh.points[:, 2] for p in problem.patches])
+    for common in (z / np.abs(z).max(), np.ones(len(z)), *(problem.rigid.T / np.abs(problem.rigid).max())):
+        assert np.abs(direct_force(problem, 9e-6 * common) - before).max() < 1e-10 * before.max()
+    assert np.abs(direct_force(problem, 1e-6 * platform_tilt(problem)) - before).max() > 0.01 * before.max()
+
+
+def direct_force(problem, approach):
+    return np.concatenate([m.force for m in solve(problem, SPEED, normal=80.0, approach=approach, bedded=True)])
+
+
+def test_a_seat_that_faces_the_axis_and_one_without_extent(problem):
+    """The turn about the axis moves nothing there: another one does, or none, and no 0/0."""
+    n = len(problem.patches[0].area)
+    facing, point = problem.rigid.copy(), np.ones_like(problem.rigid)
+    facing[:, -1] = 0.0
+    other = platform_tilt(replace(problem, rigid=facing))
+    assert np.ptp(other[:n]) == 2 and (other[n:] == 0).all()
+    assert (platform_tilt(replace(problem, rigid=point)) == 0).all()
+
+
+def test_a_table_of_open_states_has_no_error():
+    table = state_table(lambda load, lift: np.zeros(4), [[0.0, 1.0, 2.0], [0.0, 1.0, 2.0]])
+    force, indicator = interpolate(table, (0.5, 1.5))
+    assert (force == 0).all() and indicator == 0
 
 
 def test_table_of_states_and_its_indicator(problem):
