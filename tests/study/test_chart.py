@@ -2,20 +2,24 @@
 
 from __future__ import annotations
 
+import time
 from pathlib import Path
 
 import numpy as np
 import pandas as pd
 import pytest
+from numba import njit
 
 from bladefem.hbm.api import solve
 from bladefem.hbm.reference import reference_model
 from bladefem.report.chart import write_chart
 from bladefem.scene_file import load_scene
-from bladefem.study.chart import chart, resonance
+from bladefem.study.chart import chart
 from bladefem.study.chart_mesh import mesh_table
+from bladefem.study.chart_rows import Bench, Job, resonance, rows
+from bladefem.study.clock import running
 from bladefem.study.family import family_of
-from bladefem.study.methods import applicable, exact, shooting, tangential
+from bladefem.study.methods import Point, applicable, exact, shooting, tangential
 from bladefem.study.settings import Settings, first_for
 
 PLANE = Path(__file__).parents[2] / "scenes" / "plane.toml"
@@ -23,7 +27,22 @@ PLANE = Path(__file__).parents[2] / "scenes" / "plane.toml"
 @pytest.fixture(scope="module")
 def made():
     family = family_of(reference_model(load=3.0, points=2, modes=12, harmonics=63))
-    return chart(family, first_for(family.modes), 2, 0.02, 12.0, (1150.0, 1600.0))
+    return chart(family, first_for(family.modes), 2, 0.02, 8.0, (1150.0, 1600.0))
+
+
+class FalseClock:
+    """Runs only where it is told to."""
+    time = 0.0
+
+    def now(self):
+        return self.time
+
+
+def _bench(run):
+    """Nine frequencies round a resonance at 1 rad/s, its reference by the same function."""
+    omegas = np.linspace(0.96, 1.04, 9)
+    return Bench(omegas, resonance(omegas, np.array([run(None, omega, None).first for omega in omegas])),
+                 {"error": 0.0})
 
 
 def test_balance_converges_with_harmonics(made):
@@ -44,6 +63,53 @@ def test_poor_models_are_seen(made):
     assert models.loc["1 mode", "error"] > 0.1          # mode 2 is studied
     assert any("1 mode: its resonance lies outside" in remark for remark in made.remarks)
     assert any("changed by" in remark for remark in made.remarks)
+
+
+def test_every_kind_of_method_is_solved(made):
+    """Compiled for the first time or not, and whatever was tried before it."""
+    table = made.methods[made.methods["converged"]]
+    assert {f"H {H}" for H in (1, 3, 5, 7, 9, 15, 31)} <= set(table["name"])
+    assert set(made.methods["family"]) == set(table["family"]) >= {
+        "paper's iteration", "integration, Newmark", "integration, explicit", "shooting", "balance, exact events"}
+
+
+def test_compilation_is_nobodys_time():
+    """A kernel that takes seconds to compile and nothing to run, with a budget of less than the former."""
+    @njit
+    def kernel(x):
+        return np.sort(np.full(3, x)).sum() + x
+
+    def run(model, omega, start):
+        return Point(1 / (0.02j + kernel(omega) / 4 - 1), True, "")
+
+    bench = _bench(lambda model, omega, start: Point(1 / (0.02j + omega - 1), True, ""))
+    begun = time.process_time()
+    with running() as clock:
+        row, = rows([Job("slow to compile", "new", None, run, bench)], clock.now() + 0.1, clock)
+    spent = time.process_time() - begun
+    assert row["converged"] and row["error"] < 1e-12
+    assert clock.compiled > 0.9 * spent > 10 * row["time"]
+
+
+def test_the_budget_is_used_and_cheap_ones_go_first():
+    """By a false clock: of a dear family only what fits, though it comes first; a cheap one's failure bars nobody."""
+    clock = FalseClock()
+
+    def costing(seconds, converged=True):
+        def run(model, omega, start):
+            clock.time += seconds
+            return Point(1 / (0.02j + omega - 1), converged, "" if converged else "lost")
+        return run
+
+    costs = {"dear 1": 1.0, "dear 2": 2.0, "dear 3": 8.0, "cheap 1": 0.01, "lost 1": 0.1, "lost 2": 0.2}
+    jobs = [Job(name, name[:-2], None, costing(s, name != "lost 1"), _bench(costing(s)), ordered=True)
+            for name, s in costs.items()]
+    clock.time = 0.0
+    table = pd.DataFrame(rows(jobs, 50.0, clock)).set_index("name")
+    assert list(table.index) == list(costs)
+    assert list(table.index[table["converged"]]) == ["dear 1", "dear 2", "cheap 1", "lost 2"]
+    assert list(table.index[table["left_out"]]) == ["dear 3"]
+    assert clock.time < 60.0
 
 
 def test_files_are_written(made, tmp_path):
