@@ -2,7 +2,8 @@
 
 Two errors of print are corrected: in Eq. 16 both sums of C carry the factor k, and for a mean displacement F_c0 is
 that of Eq. 11, not f_0 alone. With both the approximation does exactly the work of the force. The sign is that of f,
-so that K_ad and C_ad are added to the structure and C_ad is not negative for dry friction.
+so that K_ad and C_ad are added to the structure and C_ad is not negative for dry friction. An element that does not
+move has no approximation: all three are nan there.
 """
 
 from __future__ import annotations
@@ -11,15 +12,16 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from bladefem.errors import InputError
 from bladefem.friction.harmonics import derivative, harmonics_of
 
-__all__ = ["Approximation", "by_harmonic", "from_harmonics", "from_series", "work", "work_of"]
+__all__ = ["Approximation", "by_harmonic", "force_of", "from_harmonics", "from_series", "work", "work_of"]
+
+FAINT = 1e-12       # of an element's largest harmonic: what is smaller is rounding
 
 
 @dataclass(frozen=True)
 class Approximation:
-    """f ~ stiffness u + damping du/dt + constant, for each element."""
+    """f ~ stiffness u + damping du/dt + constant, for each element; nan where it does not move."""
 
     stiffness: np.ndarray       # K_ad (...,) [N/m]
     damping: np.ndarray         # C_ad (...,) [N s/m]
@@ -30,31 +32,26 @@ def from_series(u: np.ndarray, f: np.ndarray, omega: float) -> Approximation:
     """Least squares over one period sampled at equal steps, u and f (..., samples) (Eq. 11); omega in rad/s.
 
     du/dt is the derivative of the trigonometric interpolation, so that u and du/dt are orthogonal as in Eq. 9.
-    Raises InputError for a motion that is constant.
     """
     u, f = np.asarray(u, dtype=float), np.asarray(f, dtype=float)
-    S = u.shape[-1]
-    spectrum = np.fft.rfft(u) * 1j * np.arange(S // 2 + 1)
-    if S % 2 == 0:
-        spectrum[..., -1] = 0.0
-    velocity = omega * np.fft.irfft(spectrum, S)
-    mean_u, mean_f = u.mean(-1), f.mean(-1)
-    moving = u - mean_u[..., None]
-    if not (np.abs(moving).max(-1) > 0).all():
-        raise InputError("u: an element does not move, expected a motion that varies over the period")
+    rate, mean = _rate(u, omega), u.mean(-1)
+    moving = u - mean[..., None]
+    moving[np.abs(moving).max(-1) == 0] = np.nan
     K = (moving * f).mean(-1) / (moving ** 2).mean(-1)
-    C = (velocity * f).mean(-1) / (velocity ** 2).mean(-1)
-    return Approximation(K, C, mean_f - K * mean_u)
+    with np.errstate(invalid="ignore"):
+        C = (rate * f).mean(-1) / (rate ** 2).mean(-1)
+    return Approximation(K, C, f.mean(-1) - K * mean)
 
 
 def from_harmonics(u: np.ndarray, f: np.ndarray, omega: float) -> Approximation:
     """The same from coefficients u, f (..., 2H+1) [mean, cos 1, sin 1, ...] (Eq. 16, factor k in both sums)."""
-    h = _orders(u)
-    alternating = u[..., 1:]
-    K = (alternating * f[..., 1:]).sum(-1) / (alternating ** 2).sum(-1)
+    u, f = np.asarray(u, dtype=float), np.asarray(f, dtype=float)
+    h = np.arange(1, harmonics_of(u) + 1)
     turned = u[..., 2::2] * f[..., 1::2] - u[..., 1::2] * f[..., 2::2]      # a f_c - b f_s
     size = u[..., 1::2] ** 2 + u[..., 2::2] ** 2
-    C = (h * turned).sum(-1) / (omega * (h ** 2 * size).sum(-1))
+    with np.errstate(invalid="ignore"):                                     # 0 / 0 at rest
+        K = (u[..., 1:] * f[..., 1:]).sum(-1) / size.sum(-1)
+        C = (h * turned).sum(-1) / (omega * (h ** 2 * size).sum(-1))
     return Approximation(K, C, f[..., 0] - K * u[..., 0])
 
 
@@ -63,12 +60,19 @@ def by_harmonic(u: np.ndarray, f: np.ndarray, omega: float) -> Approximation:
 
     Each harmonic's approximation does the work of that harmonic, and reproduces its amplitude and phase.
     """
-    h = _orders(u)
+    u, f = np.asarray(u, dtype=float), np.asarray(f, dtype=float)
+    h = np.arange(1, harmonics_of(u) + 1)
     cu, su, cf, sf = u[..., 1::2], u[..., 2::2], f[..., 1::2], f[..., 2::2]
     size = cu ** 2 + su ** 2
-    with np.errstate(invalid="ignore", divide="ignore"):
-        K, C = (cu * cf + su * sf) / size, (su * cf - cu * sf) / (omega * h * size)
-    return Approximation(K, C, np.asarray(f)[..., 0])
+    size = np.where(size > FAINT ** 2 * size.max(-1, keepdims=True), size, np.nan)
+    return Approximation((cu * cf + su * sf) / size, (su * cf - cu * sf) / (omega * h * size), f[..., 0])
+
+
+def force_of(approximation: Approximation, u: np.ndarray, omega: float) -> np.ndarray:
+    """(..., samples) the linear force [N] on a motion u (..., samples) [m] of one period at equal steps."""
+    K, C, constant = (np.asarray(x)[..., None] for x in
+                      (approximation.stiffness, approximation.damping, approximation.constant))
+    return K * u + C * _rate(u, omega) + constant
 
 
 def work(u: np.ndarray, f: np.ndarray) -> np.ndarray:
@@ -77,11 +81,14 @@ def work(u: np.ndarray, f: np.ndarray) -> np.ndarray:
 
 
 def work_of(approximation: Approximation, u: np.ndarray, omega: float) -> np.ndarray:
-    """(...,) work of the averaged approximation on u (..., 2H+1) in one period [J] (Eq. 13)."""
-    return np.pi * omega * approximation.damping * (derivative(u)[..., 1:] ** 2).sum(-1)
+    """(...,) work of the averaged approximation on u (..., 2H+1) in one period [J] (Eq. 13); 0 at rest."""
+    return np.pi * omega * np.nan_to_num(approximation.damping) * (derivative(u)[..., 1:] ** 2).sum(-1)
 
 
-def _orders(u: np.ndarray) -> np.ndarray:
-    if not (np.abs(np.asarray(u)[..., 1:]).max(-1) > 0).all():
-        raise InputError("u: an element does not move, expected a motion that varies over the period")
-    return np.arange(1, harmonics_of(u) + 1)
+def _rate(u: np.ndarray, omega: float) -> np.ndarray:
+    """(..., samples) du/dt of the trigonometric interpolation."""
+    S = u.shape[-1]
+    spectrum = np.fft.rfft(u) * 1j * np.arange(S // 2 + 1)
+    if S % 2 == 0:
+        spectrum[..., -1] = 0.0
+    return omega * np.fft.irfft(spectrum, S)

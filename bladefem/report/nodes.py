@@ -14,6 +14,7 @@ from ..study.pipeline import Run, load_cases
 from ..view.contact import save_faces_vtu
 from ..view.response import draw_seat_loops
 from ..view.wear import draw_work
+from .linear import linear_columns
 
 __all__ = ["cycles_of", "draw_hysteresis", "draw_wear", "loop_table", "node_table", "save_cycles_vtu",
            "wear_sentence", "wear_table"]
@@ -42,7 +43,7 @@ def node_table(patches: Sequence[Patch], cycles: Sequence[ContactCycle],
         frames.append(pd.DataFrame({
             "load": c.load, **mass, "patch": names, "x": place[:, 0], "y": place[:, 1], "z": place[:, 2], "area": area,
             "stick": c.shares[:, 0], "slip": c.shares[:, 1], "separated": c.shares[:, 2], "state": c.state,
-            "work": c.work, "free_static_force": c.spare, **wear}))
+            "work": c.work, "free_static_force": c.spare, **linear_columns(c), **wear}))
     return pd.concat(frames, ignore_index=True)
 
 

@@ -33,6 +33,7 @@ from ..study.survey import excited_set
 from ..units import show
 from ..view import contact, mesh, modes, response, speed
 from .datasets import datasets, table_dataset
+from .linear import harmonic_table, linear_sentence
 from .nodes import (
     cycles_of,
     draw_hysteresis,
@@ -82,6 +83,7 @@ def _write(result: pipeline.Run, progress: Progress) -> None:
     write_table(folder / "nodes.csv", nodes, units_of(nodes))
     loops.to_csv(folder / "hysteresis.csv", index=False)
     groups = {**datasets(result, tables), "nodes": table_dataset(nodes, "row"),
+              "approximation": table_dataset(harmonic_table(patches, cycles), "row"),
               "hysteresis": table_dataset(loops, "row")}
     write_results(folder / "results.nc", groups, dump(result.scene))
     drawings = {**_drawings(result, tables),
@@ -96,7 +98,8 @@ def _write(result: pipeline.Run, progress: Progress) -> None:
     contact.save_pressure_vtu(result.contact.maps, folder / "pressure.vtu")
     save_cycles_vtu(patches, cycles, folder / "friction_work.vtu", coefficient)
     messages = [*filter(None, [moved]), *result.messages, MESH, _static_contact(result), _states(result),
-                *_beyond_stick(result), *([wear_sentence(cycles, coefficient)] if worn else [])]
+                linear_sentence(cycles), *_beyond_stick(result),
+                *([wear_sentence(cycles, coefficient)] if worn else [])]
     write_report(folder, result.scene, tables, figures, messages, result.timings)
 
 

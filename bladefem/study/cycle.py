@@ -1,4 +1,7 @@
-"""What the contact nodes do in one period at a resonance: stick, slip, separation, friction work, hysteresis loops."""
+"""What the contact nodes do in one period at a resonance: stick, slip, separation, friction work, hysteresis loops.
+
+Beside them the linear element that comes closest to each friction element there (the paper's K_ad, C_ad, F_c0).
+"""
 
 from __future__ import annotations
 
@@ -10,7 +13,8 @@ import numpy as np
 
 from ..contact.stiffness import aggregation
 from ..data import Elements, Patch
-from ..friction.aft import evaluate
+from ..friction.aft import Forces, evaluate
+from ..friction.approximation import Approximation, by_harmonic, from_harmonics, work_of
 from ..friction.energy import free_static_force
 from ..friction.harmonics import synthesis
 from .family import joined
@@ -32,7 +36,10 @@ class Loop:
 
 @dataclass(frozen=True)
 class ContactCycle:
-    """One period of all contact nodes, patch after patch; nodes of one friction element share its values."""
+    """One period of all contact nodes, patch after patch; nodes of one friction element share its values.
+
+    Its linear approximation is shared out by area, so that the sum over the nodes is that of the element.
+    """
 
     load: float             # [N]
     mass: float | None      # of the damper [kg]
@@ -42,6 +49,9 @@ class ContactCycle:
     work: np.ndarray        # (nodes,) friction work a period and area, the wear-work map [J/m^2]
     spare: np.ndarray       # (nodes,) size up to which the static friction force of their element is free [N]
     loops: dict[str, Loop]  # name of the patch to its hysteresis
+    linear: Approximation   # (nodes, tangents) K_ad, C_ad, F_c0 averaged over the harmonics; nan at rest
+    harmonic: Approximation     # (nodes, tangents, H) K_ad, C_ad of each harmonic alone; nan where the motion lacks it
+    mismatch: float         # largest |work of the approximation - friction work| over the largest friction work [1]
 
     def wear(self, coefficient: float) -> np.ndarray:
         """(nodes,) depth worn off in an hour of this resonance [m], both faces together.
@@ -68,9 +78,26 @@ def contact_cycle(case: LoadCase, curve: Curve, patches: Sequence[Patch], points
     forces = evaluate(elements, w, curve.peak.samples or 512, jacobian=False)
     starts = np.cumsum([0] + [len(patch.area) for patch in patches])
     rows = [np.unique(groups[a:b]) for a, b in pairwise(starts)]
+    part = area / np.bincount(groups, area)[groups]
+    averaged, each, mismatch = _linear(forces, w, 2 * np.pi * curve.peak.frequency)
     return ContactCycle(case.load, case.mass, curve.peak.frequency, forces.shares[groups], forces.state[groups],
-                        (forces.dissipated / np.bincount(groups, area))[groups], free_static_force(elements, w)[groups],
-                        {patch.name: _loop(elements, w, some) for patch, some in zip(patches, rows, strict=True)})
+                        part / area * forces.dissipated[groups], free_static_force(elements, w)[groups],
+                        {patch.name: _loop(elements, w, some) for patch, some in zip(patches, rows, strict=True)},
+                        _dealt(averaged, groups, part), _dealt(each, groups, part), mismatch)
+
+
+def _linear(forces: Forces, w: np.ndarray, omega: float) -> tuple[Approximation, Approximation, float]:
+    """Optimal approximation of the tangential forces (n, d, K), averaged and by harmonic, and its error in work."""
+    u, f = w[:, 1:], forces.f[:, 1:]
+    averaged, spent = from_harmonics(u, f, omega), forces.dissipated
+    apart = np.abs(work_of(averaged, u, omega).sum(1) - spent).max() / max(spent.max(), 1e-300)
+    return averaged, by_harmonic(u, f, omega), float(apart) if (forces.shares[:, 1] > 0).any() else 0.0
+
+
+def _dealt(approximation: Approximation, groups: np.ndarray, part: np.ndarray) -> Approximation:
+    """The approximation (elements, ...) shared out to the nodes of its elements, part (nodes,) [1]."""
+    return Approximation(*(x[groups] * part.reshape(-1, *[1] * (x.ndim - 1)) for x in
+                           (approximation.stiffness, approximation.damping, approximation.constant)))
 
 
 def _loop(elements: Elements, w: np.ndarray, rows: np.ndarray) -> Loop:

@@ -6,8 +6,7 @@ import numpy as np
 import pytest
 from friction_cases import decay, random_case, single
 
-from bladefem.errors import InputError
-from bladefem.friction.approximation import by_harmonic, from_harmonics, from_series, work, work_of
+from bladefem.friction.approximation import by_harmonic, force_of, from_harmonics, from_series, work, work_of
 from bladefem.friction.closed_form import jenkins
 from bladefem.friction.events import evaluate_exact
 from bladefem.friction.harmonics import derivative, synthesis
@@ -75,8 +74,27 @@ def test_a_mean_displacement_belongs_to_the_constant():
     assert fit.stiffness[0] * 0.7 + fit.constant[0] == pytest.approx(0.2, abs=1e-15)
 
 
-def test_an_element_at_rest_is_refused():
-    with pytest.raises(InputError, match="does not move"):
-        from_harmonics(np.array([[1.0, 0.0, 0.0]]), np.zeros((1, 3)), OMEGA)
-    with pytest.raises(InputError, match="does not move"):
-        from_series(np.ones((1, 8)), np.zeros((1, 8)), OMEGA)
+def test_linear_force_of_a_series(signals):
+    """K u + C du/dt + F_c0 at every sample; its work is that of the force."""
+    u, f = signals
+    T, fit = synthesis(5, 64), from_harmonics(u, f, OMEGA)
+    expected = fit.stiffness[:, None] * (u @ T.T) + fit.damping[:, None] * OMEGA * (derivative(u) @ T.T)
+    np.testing.assert_allclose(force_of(fit, u @ T.T, OMEGA), expected + fit.constant[:, None], rtol=0, atol=1e-12)
+
+
+def test_an_element_at_rest_has_none_and_leaves_the_others_theirs():
+    u, f = np.array([[1.0, 0.0, 0.0], [0.7, 1.0, 0.0]]), np.array([[0.3, 0.0, 0.0], [0.2, 0.5, -0.3]])
+    T = synthesis(1, 8)
+    for fit in (from_harmonics(u, f, OMEGA), from_series(u @ T.T, f @ T.T, OMEGA), by_harmonic(u, f, OMEGA)):
+        assert np.isnan(fit.stiffness[0]).all()
+        assert np.isnan(fit.damping[0]).all()
+        assert fit.stiffness[1] == pytest.approx(0.5)
+        assert fit.damping[1] == pytest.approx(0.3 / OMEGA)
+    np.testing.assert_allclose(work_of(from_harmonics(u, f, OMEGA), u, OMEGA), work(u, f), rtol=1e-12)
+
+
+def test_a_harmonic_of_rounding_has_none():
+    u, f = np.array([[0.0, 1.0, 0.0, 1e-17, 0.0]]), np.array([[0.0, 0.5, -0.3, 1e-16, 1e-16]])
+    fit = by_harmonic(u, f, OMEGA)
+    assert fit.stiffness[0, 0] == pytest.approx(0.5)
+    assert np.isnan(fit.stiffness[0, 1])

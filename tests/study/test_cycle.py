@@ -8,6 +8,7 @@ import pytest
 from bladefem.data import Elements, Patch
 from bladefem.friction.aft import GROSS_SLIP, STICK
 from bladefem.friction.closed_form import circular_orbit_work
+from bladefem.report.linear import harmonic_table, linear_sentence
 from bladefem.report.nodes import draw_wear, node_table, save_cycles_vtu, wear_sentence, wear_table
 from bladefem.study.cycle import contact_cycle
 from bladefem.study.joint import LoadCase
@@ -60,6 +61,34 @@ def test_joined_nodes_share_the_work_of_their_element():
     _, cycle = at_resonance(radius, 3, 1)
     np.testing.assert_allclose(cycle.work[:8], 0, atol=1e-12)
     np.testing.assert_allclose(8e-6 * cycle.work[8:], circular_orbit_work(radius[1], 8 * KT, 8 * MU * N), rtol=1e-10)
+
+
+@pytest.mark.parametrize("joined", [None, 1])
+def test_optimal_approximation_of_circular_orbits(joined):
+    """The force of size F lags by asin(W / 2 pi F A): K = F cos / A, omega C = F sin / A; stuck nodes have K = k_t."""
+    radius = (np.r_[np.full(8, 0.5), np.full(8, 3.0)] if joined is None else np.array([0.5, 3.0])) * MU * N / KT
+    patches, cycle = at_resonance(radius, 3, joined)
+    sine = circular_orbit_work(radius[-1], KT, MU * N) / (2 * np.pi * MU * N * radius[-1])
+    K, C = MU * N / radius[-1] * np.sqrt(1 - sine**2), MU * N / radius[-1] * sine / (2 * np.pi * 250.0)
+    np.testing.assert_allclose(cycle.linear.stiffness, np.repeat([[KT], [K]], 8, axis=0) * [1, 1], rtol=1e-9)
+    np.testing.assert_allclose(cycle.linear.damping, np.repeat([[0.0], [C]], 8, axis=0) * [1, 1], atol=1e-9 * C)
+    np.testing.assert_allclose(cycle.linear.constant, 0, atol=1e-9 * MU * N)
+    table, harmonics = node_table(patches, [cycle]), harmonic_table(patches, [cycle])
+    np.testing.assert_allclose(table["k_ad_t2"], cycle.linear.stiffness[:, 1])
+    assert {"c_ad_t1", "c_ad_t2", "f_c0_t1", "f_c0_t2"} <= set(table)
+    assert len(harmonics) == 16 * 2 * 3
+    first = harmonics[harmonics["harmonic"] == 1]
+    np.testing.assert_allclose(first["c_ad"].to_numpy().reshape(16, 2), cycle.linear.damping, atol=1e-9 * C)
+    assert harmonics[harmonics["harmonic"] > 1]["k_ad"].isna().all()        # the orbit has the first one only
+    assert cycle.mismatch < 1e-12
+    assert "apart by" in linear_sentence([cycle])
+
+
+def test_a_node_at_rest_has_no_approximation():
+    _, cycle = at_resonance(np.r_[np.zeros(8), np.full(8, 3.0)] * MU * N / KT, 3, None)
+    assert np.isnan(cycle.linear.stiffness[:8]).all()
+    assert np.isfinite(cycle.linear.stiffness[8:]).all()
+    assert cycle.mismatch < 1e-12
 
 
 def test_pictures_and_paraview(tmp_path):
