@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import replace
 from numbers import Integral, Real
 
@@ -14,11 +15,11 @@ from .linear import Linear, condense
 from .model import ReducedModel
 from .newton import DEFAULTS, Options
 from .residual import Balance
-from .small import solve_small
+from .small import small, solve_each, solve_small
 from .solution import Solution, at_probes, blade_motion, probe_motion, works_of
-from .sticking import INSTANTS, grips
+from .sticking import INSTANTS, gripping, grips
 
-__all__ = ["as_solution", "free", "solve", "stuck"]
+__all__ = ["as_solution", "free", "solve", "sticking", "stuck"]
 
 STIFF = 1e5             # contact springs over the bodies' stiffness from which a failure is put down to it
 STUCK = Options(iterations=1, fallbacks=False)
@@ -87,15 +88,24 @@ def as_solution(balance: Balance, attempt: Attempt, iterations: int, reason: str
         work=works_of(model, linear.omega, relative, force, blade, float(np.sum(state.forces.dissipated))))
 
 
+def sticking(model: ReducedModel, omegas: Sequence[float], H: int, samples: int) -> list[Solution]:
+    """The first frequencies [rad/s], as long as all contacts stick, with the excited harmonics alone; small models.
+
+    A point is accepted with a little of the friction limit in hand, and with the tolerance of rounding: it is linear.
+    """
+    low = max((1, *model.excitation, *model.normal))
+    samples = min(samples, INSTANTS * low)
+    return gripping(model, solve_each(model, np.array(omegas), low, samples, None, STUCK)) if low < H else []
+
+
 def _stuck_throughout(model: ReducedModel, omega: float, H: int, samples: int,
                       start: Solution | None) -> Solution | None:
-    """The point with the excited harmonics alone, if all contacts stick; looked for only where the start sticks.
-
-    It is accepted with a little of the friction limit in hand, and with the tolerance of rounding: it is linear.
-    """
+    """The same for one point of any model; looked for only where the start sticks."""
     low = max((1, *model.excitation, *model.normal))
     if low >= H or not (start is None or start.states["stick"] == len(model.elements.kt)):
         return None
+    if small(model, low):
+        return next(iter(sticking(model, [omega], H, samples)), None)
     found = solve(model, omega, low, min(samples, INSTANTS * low), options=STUCK)
     return found if found.converged and grips(model, found) else None
 

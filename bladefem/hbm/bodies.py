@@ -60,7 +60,8 @@ class Stack:
 
 def stacked(bodies: tuple[PortModel, ...], damping: Damping, rows: np.ndarray) -> Stack:
     """The bodies of the harmonics as one; `rows` of the contact port enter the balance."""
-    ports = [_ports(body, rows) for body in bodies]
+    first = _ports(bodies[0], rows)
+    ports = [first if body.ports == bodies[0].ports else _ports(body, rows) for body in bodies]
     if len({tuple(map(len, parts)) for parts in ports}) > 1:
         raise InputError("sides: the bodies of the harmonics have ports of different sizes, expected the same")
     most = max(len(body.omega) for body in bodies)
@@ -75,7 +76,7 @@ def stacked(bodies: tuple[PortModel, ...], damping: Damping, rows: np.ndarray) -
         coupled = np.array([_square(body, most) for body in bodies])
     shapes = np.array([_widened(body.shapes[p], most)
                        for body, p in zip(bodies, order, strict=True)])
-    residual = np.array([body.residual[np.ix_(p, p)] for body, p in zip(bodies, order, strict=True)])
+    residual = np.array([body.residual[p[:, None], p] for body, p in zip(bodies, order, strict=True)])
     a, b, c = np.cumsum([len(part) for part in ports[0]])
     return Stack(omega, viscous, hysteretic, coupled, shapes, residual, slice(0, a), slice(a, b), slice(b, c))
 
@@ -185,7 +186,8 @@ def _widened(shapes: np.ndarray, count: int) -> np.ndarray:
 
 
 def _fill(values: np.ndarray, count: int, value: float = 0.0) -> np.ndarray:
-    return np.concatenate([values, np.full(count - len(values), value)])
+    spare = count - len(values)
+    return np.concatenate([values, np.full(spare, value)]) if spare else values
 
 
 def _square(body: PortModel, count: int) -> np.ndarray:

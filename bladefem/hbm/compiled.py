@@ -10,28 +10,16 @@ from numba import njit
 
 from ..friction.events import _batch as exact_batch
 from ..friction.jenkins import jenkins_batch
+from .krylov import apply, conjugate_residuals
 
-__all__ = ["CONVERGED", "EXHAUSTED", "INFINITE", "SINGULAR", "STALLED", "apply", "back_substitute", "compiled_newton",
+__all__ = ["CONVERGED", "EXHAUSTED", "INFINITE", "SINGULAR", "STALLED", "back_substitute", "compiled_newton",
            "factorise", "factorise_large", "norm"]
 
 CONVERGED, EXHAUSTED, STALLED, SINGULAR, INFINITE, SEARCHING = 0, 1, 2, 3, 4, 5
-BLOCK, LARGE = 32, 64       # columns of a block; unknowns from which blocks pay
-
-
-@njit(cache=True, error_model="numpy")
-def apply(A, x, out):
-    """out (m, K) += A (H+1, m, m) times x (m, K), both as real coefficients."""
-    m = x.shape[0]
-    for i in range(m):
-        for j in range(m):
-            out[i, 0] += A[0, i, j].real * x[j, 0]
-    for h in range(1, A.shape[0]):
-        c, s = 2 * h - 1, 2 * h
-        for i in range(m):
-            for j in range(m):
-                re, im = A[h, i, j].real, A[h, i, j].imag
-                out[i, c] += re * x[j, c] + im * x[j, s]
-                out[i, s] += re * x[j, s] - im * x[j, c]
+BLOCK = 32                  # columns of a block
+LARGE = 64                  # unknowns from which blocks pay, and iterations where they arrive
+FINEST, COARSEST = 1e-6, 1e-4     # accuracy of a step by iterations, relative,
+ROUGH = 1e-3                # and of the one that the line search looks at; coarser ones mislead it
 
 
 @njit(cache=True, error_model="numpy")
@@ -42,13 +30,6 @@ def norm(x):
         for k in range(x.shape[1]):
             total += x[i, k] * x[i, k]
     return np.sqrt(total)
-
-
-@njit(cache=True, error_model="numpy")
-def _copy(source, target):
-    flat, to = source.reshape(source.size), target.reshape(target.size)
-    for i in range(flat.size):
-        to[i] = flat[i]
 
 
 @njit(cache=True, error_model="numpy")
@@ -90,34 +71,23 @@ def _evaluate(w, d, linear, contact, work):
 
 
 @njit(cache=True, error_model="numpy")
-def _jacobian(A, J, springs, d, active, out):
-    """out (a K, a K) = 1 + A dp/dw over the active nodes."""
-    K = J.shape[2]
-    for i in range(out.shape[0]):
-        for j in range(out.shape[1]):
-            out[i, j] = 1.0 if i == j else 0.0
-    row = np.empty(2)
-    for x in range(active.size):
-        for y in range(active.size):
-            for b in range(d):
-                j = active[y] * d + b
-                for e in range(d):
-                    for l in range(K):
-                        column = (y * d + e) * K + l
-                        for h in range(A.shape[0]):
-                            c = max(2 * h - 1, 0)
-                            row[0] = J[active[y], 2 - d + b, c, 2 - d + e, l]
-                            row[1] = J[active[y], 2 - d + b, 2 * h, 2 - d + e, l] if h else 0.0
-                            if b == e and l == c:
-                                row[0] -= springs[j]
-                            elif b == e and l == 2 * h:
-                                row[1] -= springs[j]
-                            for a in range(d):
-                                value = A[h, active[x] * d + a, j]
-                                i = (x * d + a) * K
-                                out[i + c, column] += value.real * row[0] + value.imag * row[1]
-                                if h:
-                                    out[i + 2 * h, column] += value.real * row[1] - value.imag * row[0]
+def _jacobian(A, C):
+    """(a K, a K) the matrix 1 + A C for A (H+1, a, a) and one block of C (nodes, dK, dK) a node."""
+    a, K = A.shape[1], 2 * A.shape[0] - 1
+    size = C.shape[1]
+    d = size // K
+    out = np.eye(a * K)
+    for i in range(a):
+        for j in range(a):
+            block, left, b = C[j // d], j // d * size, j % d * K
+            for h in range(A.shape[0]):
+                re, im, cos, sin = A[h, i, j].real, A[h, i, j].imag, max(2 * h - 1, 0), 2 * h
+                for column in range(size):
+                    out[i * K + cos, left + column] += re * block[b + cos, column]
+                    if h:
+                        out[i * K + cos, left + column] += im * block[b + sin, column]
+                        out[i * K + sin, left + column] += re * block[b + sin, column] - im * block[b + cos, column]
+    return out
 
 
 @njit(cache=True, error_model="numpy")
@@ -186,54 +156,80 @@ def back_substitute(M, pivots, x):
 
 
 @njit(cache=True, error_model="numpy")
-def _solve(r, M, pivots, d, active, J, A, springs, step):
-    """step (m, K) = inverse derivative times r: active nodes by the factors, the others from their forces."""
-    m, K = r.shape
-    a = active.size * d
-    x, slips = np.empty(a * K), np.zeros(m // d, np.bool_)
-    for y in range(a):
-        slips[active[y // d]] = True
-        for k in range(K):
-            x[y * K + k] = r[active[y // d] * d + y % d, k]
-    back_substitute(M, pivots, x)
-    p, shift = np.zeros((m, K)), np.zeros((m, K))
-    for y in range(a):
-        node, i = active[y // d], active[y // d] * d + y % d
-        for k in range(K):
-            step[i, k] = x[y * K + k]
-            if a == m:
-                continue
-            p[i, k] = -springs[i] * x[y * K + k]
-            for e in range(d):
-                for l in range(K):
-                    p[i, k] += J[node, 2 - d + y % d, k, 2 - d + e, l] * x[(y - y % d + e) * K + l]
-    if 0 < a < m:
-        apply(A, p, shift)
-    for i in range(m):
-        for k in range(K):
-            if not slips[i // d]:
-                step[i, k] = r[i, k] - shift[i, k]
+def _factors(A, C):
+    """LU factors and pivots of 1 + A C; without pivots where it is singular."""
+    M = _jacobian(A, C)
+    pivots = np.empty(M.shape[0], np.int64)
+    regular = factorise_large(M, pivots) if pivots.size > LARGE else factorise(M, pivots)
+    return M, pivots if regular else pivots[:0]
 
 
 @njit(cache=True, error_model="numpy")
-def _active(J, springs, d, sticks):
-    """Numbers of the nodes whose forces do not follow the springs of full stick."""
+def _inverse(r, accuracy, A, C, factors):
+    """(a K,) the solution of (1 + A C) x = r, and the factors where they were needed."""
+    x = np.empty(r.size)
+    if r.size > LARGE and factors[1].size == 0 and conjugate_residuals(A, C, r, accuracy, x):
+        return x, factors
+    if factors[1].size == 0:
+        factors = _factors(A, C)
+    x[:] = r
+    if factors[1].size:
+        back_substitute(factors[0], factors[1], x)
+    else:
+        x[:] = np.nan
+    return x, factors
+
+
+@njit(cache=True, error_model="numpy")
+def _spread(x, r, d, active, C, A, step):
+    """Fill step (m, K) with x at the active nodes; the others follow from their residual and the active forces."""
+    m, K = r.shape
+    p, shift, size = np.zeros((m, K)), np.zeros((m, K)), d * K
+    if 0 < active.size < m // d:
+        for y in range(active.size):
+            p[active[y] * d:(active[y] + 1) * d] = np.dot(C[y], x[y * size:(y + 1) * size]).reshape(d, K)
+        apply(A, p, shift)
+    for i in range(m):
+        for k in range(K):
+            step[i, k] = r[i, k] - shift[i, k]
+    for y in range(active.size):
+        step[active[y] * d:(active[y] + 1) * d] = x[y * size:(y + 1) * size].reshape(d, K)
+
+
+@njit(cache=True, error_model="numpy")
+def _moving(J, springs, d, sticks):
+    """Numbers of the nodes whose forces do not follow the springs of full stick, and dp/dw there (nodes, dK, dK)."""
     n, K = J.shape[0], J.shape[2]
-    found = np.zeros(n, np.bool_)
+    C, found, count = np.empty((n, d * K, d * K)), np.empty(n, np.int64), 0
     for node in range(n):
-        stiffest = 0.0
+        block, stiffest, largest = C[count], 0.0, 0.0
         for b in range(d):
             stiffest = max(stiffest, springs[node * d + b])
-        for b in range(d):
             for k in range(K):
                 for e in range(d):
                     for l in range(K):
                         value = J[node, 2 - d + b, k, 2 - d + e, l]
                         if b == e and k == l:
                             value -= springs[node * d + b]
-                        if abs(value) > sticks * stiffest:
-                            found[node] = True
-    return np.flatnonzero(found)
+                        block[b * K + k, e * K + l] = value
+                        largest = max(largest, abs(value))
+        if largest > sticks * stiffest:
+            found[count] = node
+            count += 1
+    return found[:count], C[:count]
+
+
+@njit(cache=True, error_model="numpy")
+def _among(A, active, d):
+    """(H+1, a, a) the flexibilities among the freedoms of the active nodes."""
+    if active.size * d == A.shape[1]:
+        return A
+    out = np.empty((A.shape[0], active.size * d, active.size * d), A.dtype)
+    for h in range(A.shape[0]):
+        for i in range(out.shape[1]):
+            for j in range(out.shape[2]):
+                out[h, i, j] = A[h, active[i // d] * d + i % d, active[j // d] * d + j % d]
+    return out
 
 
 @njit(cache=True, error_model="numpy")
@@ -255,13 +251,14 @@ def compiled_newton(w, d, linear, contact, sticks, tolerance, iterations, shorte
     work = (np.zeros((n, 2, K)), np.zeros((n, 2, K)), np.zeros((n, 2, K, 2, K)), np.zeros((n, 3)), np.zeros((m, K)),
             np.zeros((m, K)))
     A, springs, J, r = linear[0], linear[3], work[2], work[5]
-    step, after, trial, old = np.empty((m, K)), np.empty((m, K)), w.copy(), np.empty(J.shape)
-    pivots, active, M = np.empty(0, np.int64), np.empty(0, np.int64), np.empty((0, 0))
+    step, after, trial = np.empty((m, K)), np.empty((m, K)), w.copy()
+    active, C = _moving(J, springs, d, np.inf)
+    few, factors = A, (np.empty((0, 0)), np.empty(0, np.int64))
     code, steps, share, before, error = SEARCHING, -1, 1.0, np.inf, np.inf
     while code == SEARCHING:
         fresh = _evaluate(trial, d, linear, contact, work)
         if steps >= 0:
-            _solve(r, M, pivots, d, active, old, A, springs, after)
+            factors = _step(r, ROUGH, d, active, C, A, few, factors, after)
             if not norm(after) <= (1 - 0.25 * share) * before:
                 share /= 2
                 if share < shortest:
@@ -273,14 +270,23 @@ def compiled_newton(w, d, linear, contact, sticks, tolerance, iterations, shorte
         if error <= tolerance or not np.isfinite(error) or steps == iterations:
             code = CONVERGED if error <= tolerance else (EXHAUSTED if np.isfinite(error) else INFINITE)
             break
-        active = _active(J, springs, d, sticks)
-        M, pivots = np.empty((active.size * d * K, active.size * d * K)), np.empty(active.size * d * K, np.int64)
-        _jacobian(A, J, springs, d, active, M)
-        if not (factorise_large(M, pivots) if pivots.size > LARGE else factorise(M, pivots)):
-            code = SINGULAR
-            break
-        _copy(J, old)
-        _solve(r, M, pivots, d, active, old, A, springs, step)
+        active, C = _moving(J, springs, d, sticks)
+        few, factors = _among(A, active, d), (factors[0][:0, :0], factors[1][:0])
+        factors = _step(r, min(max(0.1 * error, FINEST), COARSEST), d, active, C, A, few, factors, step)
         before, share = norm(step), 1.0
+        if not np.isfinite(before):
+            code = SINGULAR
         _move(w, share, step, trial)
     return steps, code, error, work[1], J, work[3], r, work[4]
+
+
+@njit(cache=True, error_model="numpy")
+def _step(r, accuracy, d, active, C, A, few, factors, step):
+    """Fill step (m, K) with the inverse derivative times r (m, K); returns the factors where they were needed."""
+    K = r.shape[1]
+    among = np.empty((active.size * d, K))
+    for y in range(active.size):
+        among[y * d:(y + 1) * d] = r[active[y] * d:(active[y] + 1) * d]
+    x, factors = _inverse(among.reshape(among.size), accuracy, few, C, factors)
+    _spread(x, r, d, active, C, A, step)
+    return factors

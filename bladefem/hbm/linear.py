@@ -18,7 +18,7 @@ from .bodies import amplitudes, block, flexibility, motion, receptance
 from .model import ReducedModel
 from .woodbury import low_rank, updated
 
-__all__ = ["Linear", "condense", "receptance", "rigid_motions"]
+__all__ = ["SMALL", "Linear", "condense", "receptance", "rigid_motions"]
 
 SMALL = 64             # contact dofs below which all harmonics are solved in one call
 UNSEEN = 1e-12         # motions that the contact springs resist less than this, relatively, are left out

@@ -15,14 +15,14 @@ from numba import njit
 
 from ..data import RigidBody
 from .bodies import Stack, rigid_stack
-from .compiled import CONVERGED, back_substitute, compiled_newton, factorise, norm
-from .linear import rigid_motions
+from .compiled import CONVERGED, compiled_newton, norm
+from .linear import SMALL, rigid_motions
 from .model import ReducedModel
 from .newton import COMPILED, SHORTEST, Options
 from .residual import STICKS, contact_table
 from .solution import Solution, Work
 
-__all__ = ["solve_small"]
+__all__ = ["small", "solve_each", "solve_small"]
 
 STATES = ("stick", "slip", "lift", "open")
 
@@ -30,54 +30,79 @@ STATES = ("stick", "slip", "lift", "open")
 def solve_small(model: ReducedModel, omega: float, H: int, samples: int, start: np.ndarray | None,
                 options: Options) -> Solution | None:
     """The converged solution from displacements (n, d, *), else from full stick; None where this way is not open."""
+    found = solve_each(model, np.array([omega]), H, samples, start, options)
+    if found and found[0] is None and start is not None:
+        found = solve_each(model, np.array([omega]), H, samples, None, options)
+    return found[0] if found else None
+
+
+def solve_each(model: ReducedModel, omegas: np.ndarray, H: int, samples: int, start: np.ndarray | None,
+               options: Options) -> list[Solution | None]:
+    """All frequencies from one start in one call, None for what did not converge; empty where this way is not open."""
     prepared = _prepared(model, H, samples)
     if prepared is None:
-        return None
+        return []
     body, held, springs, contact = prepared
     n, d = model.springs.shape
     begin = np.empty((n * d, 0)) if start is None else np.ascontiguousarray(start.reshape(n * d, -1), dtype=float)
     try:
-        w, ends, f, probe, counts, measures = _point(omega, body, held, springs, contact, d, H, begin,
-                                                     options.tolerance, options.iterations)
-    except ZeroDivisionError:       # a resonance without damping: the plain way tells which
-        return None
-    steps, code, error = ends
-    if code != CONVERGED:
-        return None if start is None else solve_small(model, omega, H, samples, None, options)
-    moved, pushed, drift, *works = measures.tolist()
-    return Solution(omega, H, samples, w.reshape(n, d, -1), f, probe, True, "residual within tolerance", "newton",
-                    steps, error, moved, pushed, drift, dict(zip(STATES, counts.tolist(), strict=True)), Work(*works))
+        w, ends, f, probe, counts, measures = _points(omegas, body, held, springs, contact, d, H, begin,
+                                                      options.tolerance, options.iterations)
+    except (ZeroDivisionError, np.linalg.LinAlgError):  # a resonance without damping: the plain way tells which
+        return []
+    w = w.reshape(len(omegas), n, d, -1)
+    parts = zip(omegas.tolist(), ends.tolist(), counts.tolist(), measures.tolist(), strict=True)
+    return [Solution(omega, H, samples, w[i], f[i], probe[i], True, "residual within tolerance", "newton", int(steps),
+                     error, moved, pushed, drift, dict(zip(STATES, states, strict=True)), Work(*works))
+            if code == CONVERGED else None
+            for i, (omega, (steps, code, error), states, (moved, pushed, drift, *works)) in enumerate(parts)]
 
 
 @njit(cache=True, error_model="numpy")
-def _point(omega, body, held, springs, contact, d, H, start, tolerance, iterations):
-    """Displacements (m, K), (steps, code, error), and what `_measure` gives, from a start (m, *), or full stick."""
-    flexible, linear, mean, free = _linear(omega, body, held, springs, H)
-    w = linear[2].copy()
-    kept = min(w.shape[1], start.shape[1])
-    for i in range(w.shape[0] if kept else 0):
-        for k in range(w.shape[1]):
-            w[i, k] = start[i, k] if k < kept else 0.0
-    steps, code, error, F, _, shares, residual, _ = compiled_newton(w, d, linear, contact, STICKS, tolerance,
-                                                                    iterations, SHORTEST)
-    f, probe, counts, measures = _measure(omega, body, held, springs, (flexible, mean, free), w, d, F, contact[5],
-                                          residual, shares)
-    return w, (steps, code, error), f, probe, counts, measures
+def _points(omegas, body, held, springs, contact, d, H, start, tolerance, iterations):
+    """Displacements (p, m, K), steps, code and error (p, 3), and what `_measure` gives, from a start or full stick."""
+    p, m, K = omegas.size, springs.size, 2 * H + 1
+    w, f = np.empty((p, m, K)), np.empty((p, m // d, d, K))
+    ends, counts, measures = np.empty((p, 3)), np.empty((p, 4), np.int64), np.empty((p, 7))
+    probe = np.empty((p, *body[9].shape), np.complex128)
+    kept = min(K, start.shape[1])
+    for i in range(p):
+        flexible, linear, mean, free = _linear(omegas[i], body, held, springs, H)
+        w[i] = linear[2]
+        if kept:
+            w[i] = 0.0
+            w[i, :, :kept] = start[:, :kept]
+        steps, code, error, F, _, shares, residual, _ = compiled_newton(w[i], d, linear, contact, STICKS, tolerance,
+                                                                        iterations, SHORTEST)
+        ends[i, 0], ends[i, 1], ends[i, 2] = steps, code, error
+        f[i], probe[i], counts[i], measures[i] = _measure(omegas[i], body, held, springs, (flexible, mean, free), w[i],
+                                                          d, F, contact[5], residual, shares)
+    return w, ends, f, probe, counts, measures
+
+
+def small(model: ReducedModel, H: int) -> bool:
+    """Whether this way is open."""
+    return _linear_part(model, H) is not None
 
 
 def _prepared(model: ReducedModel, H: int, samples: int) -> tuple | None:
     """What a point needs beside its frequency; made once."""
-    linear = model.once(("small", H), lambda: _prepare(model, H))
+    linear = _linear_part(model, H)
     return None if linear is None else (*linear, contact_table(model, H, samples))
 
 
+def _linear_part(model: ReducedModel, H: int) -> tuple | None:
+    return model.once(("small", H), lambda: _prepare(model, H))
+
+
 def _prepare(model: ReducedModel, H: int) -> tuple | None:
+    dofs = model.springs.size
+    if model.elements.tangents > 1 or dofs > SMALL or dofs * (2 * H + 1) > COMPILED or not model.coupled:
+        return None
     bodies = [model.blades(H)]
     if isinstance(model.damper, tuple):
         bodies.append(model.elastic_damper(H))
-    dofs = model.springs.size
-    large = model.elements.tangents > 1 or dofs * (2 * H + 1) > COMPILED
-    if large or not model.coupled or any(b.coupled is not None for b in bodies):
+    if any(b.coupled is not None for b in bodies):
         return None
     blades, loads = bodies[0], model.loads(H)
     if isinstance(model.damper, RigidBody):
@@ -127,17 +152,11 @@ def _flexibilities(w, body, held, springs, H):
             if h > 0 or own[s, k] > 0.0:
                 loss = w_h * viscous[s, k] + (hysteretic[s, k] if h else 0.0)
                 flexible[h, k] = 1.0 / complex(own[s, k]**2 - w_h**2, loss)
-        for i in range(m):
-            free[h, i] = direct[h, i]
-            for k in range(M):
-                free[h, i] += C[i, k] * flexible[h, k] * push[h, k]
-            for j in range(m):
-                total = R[i, j]
-                for k in range(M):
-                    total += C[i, k] * flexible[h, k] * C[j, k].conjugate()
-                G[h, i, j] = total.real if h == 0 else total
-            if h == 0:
-                free[0, i] = free[0, i].real
+        pushed = C * flexible[h]
+        free[h] = direct[h] + np.dot(pushed, push[h])
+        G[h] = R + np.dot(pushed, C.conj().T)
+        if h == 0:
+            free[0], G[0] = free[0].real, G[0].real
         _spring(G[h], free[h], springs, held, r if h == 0 else 0, A[h], stuck[h])
     return flexible, G, free, A, stuck
 
@@ -146,28 +165,14 @@ def _flexibilities(w, body, held, springs, H):
 def _spring(G, free, springs, held, r, A, stuck):
     """Fill A (m, m) = (1 + G K)^-1 G and stuck (m,), with r motions without stiffness eliminated."""
     m = springs.size
-    system, pivots = np.zeros((m + r, m + r), np.complex128), np.empty(m + r, np.int64)
-    right = np.zeros(m + r, np.complex128)
-    for i in range(m):
-        for j in range(m):
-            system[i, j] = G[i, j] * springs[j]
-        system[i, i] += 1.0
-        for a in range(r):
-            system[i, m + a], system[m + a, i] = -held[0][i, a], held[0][i, a] * springs[i]
+    system, right = np.eye(m + r, dtype=np.complex128), np.empty((m + r, m + 1), np.complex128)
+    system[:m, :m] += G * springs
+    right[:m, :m], right[:m, m] = G, free
     for a in range(r):
-        system[m + a, m + a] = held[4]
-    factorise(system, pivots)
-    for column in range(m + 1):
-        for i in range(m):
-            right[i] = free[i] if column == m else G[i, column]
-        for a in range(r):
-            right[m + a] = held[1][a] if column == m else held[0][column, a]
-        back_substitute(system, pivots, right)
-        for i in range(m):
-            if column == m:
-                stuck[i] = right[i]
-            else:
-                A[i, column] = right[i]
+        system[:m, m + a], system[m + a, :m], system[m + a, m + a] = -held[0][:, a], held[0][:, a] * springs, held[4]
+        right[m + a, :m], right[m + a, m] = held[0][:, a], held[1][a]
+    solved = np.linalg.solve(system, right)
+    A[:], stuck[:] = solved[:m, :m], solved[:m, m]
 
 
 @njit(cache=True, error_model="numpy")

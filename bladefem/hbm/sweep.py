@@ -11,7 +11,7 @@ from math import prod
 import numpy as np
 
 from ..errors import InputError, NotSolvedError
-from .api import solve
+from .api import solve, sticking
 from .check import check_probe
 from .fallback import match_harmonics
 from .model import ReducedModel
@@ -28,12 +28,14 @@ BESIDE = 1e-7   # of a frequency: how far beside a resonance without damping a s
 SHY = 1e-5      # the same for the first look at a model without damping, whose flexibility stuck is all rounding there
 COARSE = 12     # intervals of the first look at a band
 PARABOLA = 3    # points that a start is extrapolated from
+BLOCK = 16      # points that are solved at once as long as all contacts stick
 BAND_LIMIT = 400    # points after which a sweep gives up refining
 
 
 def size(solution: Solution, probe: int = 0) -> float:
     """Root of the sum of squares of the moving harmonics' amplitudes at a probe: what a peak is measured by [m]."""
-    return float(np.linalg.norm(solution.probe[1:, probe]))
+    moving = solution.probe[1:, probe]
+    return float(np.sqrt(np.vdot(moving, moving).real))
 
 
 def response(model: ReducedModel, omegas: Iterable[float], H: int = 3, samples: int = 128, *,
@@ -45,10 +47,16 @@ def response(model: ReducedModel, omegas: Iterable[float], H: int = 3, samples: 
     Args:
         keep: is given each frequency and what solves it; see `bladefem.hbm.record`.
     """
+    omegas, nodes = list(omegas), len(model.elements.kt)
     last: list[Solution] = []
-    for omega in omegas:
-        start = _ahead(last, omega, H)
-        solution = keep(omega, partial(_solve, model, omega, H, samples, start, options))
+    stuck: list[Solution] = []
+    for i, omega in enumerate(omegas):
+        if options.frugal and not stuck and (not last or last[-1].states["stick"] == nodes):
+            stuck = sticking(model, omegas[i:i + BLOCK], H, samples)[::-1]
+        compute = partial(stuck.__getitem__, -1) if stuck else partial(_solve, model, omega, H, samples,
+                                                                       _ahead(last, omega, H), options)
+        solution = keep(omega, compute)
+        stuck = stuck[:-1]
         yield solution
         if solution.converged:
             last = [*last[-2:], solution]

@@ -16,6 +16,6 @@ def test_the_installation_can_compile_the_kernels_ahead():
     from bladefem.friction import disc_batch, events, jenkins
     from bladefem.hbm import compiled, small, warm
     warm.compile_kernels()
-    for kernel in (compiled.compiled_newton, small._point, jenkins.jenkins_batch, events._batch,
+    for kernel in (compiled.compiled_newton, small._points, jenkins.jenkins_batch, events._batch,
                    disc_batch.disc_batch):
         assert kernel.signatures

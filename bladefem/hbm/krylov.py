@@ -1,0 +1,64 @@
+"""Generalised conjugate residuals on  x + A C x = r: A couples contacts harmonic by harmonic, C harmonics node by node.
+
+Eisenstat, Elman and Schultz, SIAM J. Numer. Anal. 20 (1983), doi:10.1137/0720023. The springs of full stick inside A
+are the preconditioner already: where contacts move alike, a few directions are enough.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numba import njit
+
+__all__ = ["apply", "conjugate_residuals"]
+
+DIRECTIONS = 60     # after which it is given up
+
+
+@njit(cache=True, error_model="numpy")
+def apply(A, x, out):
+    """out (m, K) += A (H+1, m, m) times x (m, K), both as real coefficients."""
+    m = x.shape[0]
+    for i in range(m):
+        for j in range(m):
+            out[i, 0] += A[0, i, j].real * x[j, 0]
+    for h in range(1, A.shape[0]):
+        c, s = 2 * h - 1, 2 * h
+        for i in range(m):
+            for j in range(m):
+                re, im = A[h, i, j].real, A[h, i, j].imag
+                out[i, c] += re * x[j, c] + im * x[j, s]
+                out[i, s] += re * x[j, s] - im * x[j, c]
+
+
+@njit(cache=True, error_model="numpy")
+def conjugate_residuals(A, C, r, accuracy, x):
+    """Fill x (N,) with the solution for r (N,), to a relative residual; False where it is not found.
+
+    A (H+1, m, m) complex, C (nodes, N/nodes, N/nodes) real.
+    """
+    N, m, block = r.size, A.shape[1], C.shape[1]
+    P, Q, forces, rest = np.empty((DIRECTIONS, N)), np.empty((DIRECTIONS, N)), np.empty(N), r.copy()
+    goal = accuracy * np.sqrt(np.dot(r, r))
+    x[:] = 0.0
+    for k in range(DIRECTIONS):
+        if np.sqrt(np.dot(rest, rest)) <= goal:
+            return True
+        P[k], Q[k] = rest, rest
+        for i in range(0, N, block):
+            np.dot(C[i // block], rest[i:i + block], forces[i:i + block])
+        apply(A, forces.reshape(m, N // m), Q[k].reshape(m, N // m))
+        for i in range(k):
+            share = np.dot(Q[i], Q[k])
+            for j in range(N):
+                P[k, j] -= share * P[i, j]
+                Q[k, j] -= share * Q[i, j]
+        length = np.sqrt(np.dot(Q[k], Q[k]))
+        if not length > 0.0:
+            return False
+        step = np.dot(Q[k], rest) / length**2
+        for j in range(N):
+            x[j] += step * P[k, j]
+            rest[j] -= step * Q[k, j]
+            P[k, j] /= length
+            Q[k, j] /= length
+    return False
