@@ -17,10 +17,11 @@ from bladefem.friction.harmonics import harmonics_of
 from bladefem.friction.jenkins import jenkins_batch
 from bladefem.friction.tables import tables
 
-__all__ = ["GROSS_SLIP", "PARTIAL_SLIP", "SEPARATED", "STICK", "Forces", "checked", "dissipated", "evaluate",
-           "states"]
+__all__ = ["GROSS_SLIP", "PARTIAL_SLIP", "PERIODIC", "SEPARATED", "STICK", "Forces", "checked", "dissipated",
+           "evaluate", "finite_load", "states", "verdict"]
 
 SEPARATED, STICK, PARTIAL_SLIP, GROSS_SLIP = 0, 1, 2, 3
+PERIODIC = "periodic"
 
 
 @dataclass(frozen=True)
@@ -43,7 +44,8 @@ def evaluate(elements: Elements, w: np.ndarray, samples: int, jacobian: bool = T
 
     load (n, samples) [N], where given, is the prescribed part of the normal load N(t) in place of the constant n0.
     The error falls as samples^-2. Forces.converged is False, with the reason, when a 2-D element was not periodic
-    after ``cycles`` periods. Raises InputError for shapes that do not fit or too few samples (at least 4H+4).
+    after ``cycles`` periods or the motion is not finite. Raises InputError for shapes that do not fit or too few
+    samples (at least 4H+4).
     """
     w, nodes = checked(elements, w)
     n, d, K = w.shape
@@ -56,10 +58,17 @@ def evaluate(elements: Elements, w: np.ndarray, samples: int, jacobian: bool = T
     else:
         J = np.zeros((n, d, K, d * K) if jacobian else (n, 0, 0, 0))
         disc_batch(w, load, nodes, tab, cycles, F, J, shares, used)
-    failed = int(np.count_nonzero(used < 0))
-    reason = f"{failed} of {n} elements were not periodic after {cycles} cycles" if failed else "periodic"
+    reason = verdict(F, used, f"were not periodic after {cycles} cycles")
     return Forces(F, J.reshape(n, d, K, d, K) if jacobian else None, states(shares), shares, dissipated(F, w),
-                  np.abs(used), failed == 0, reason)
+                  np.abs(used), reason == PERIODIC, reason)
+
+
+def verdict(f: np.ndarray, used: np.ndarray, failure: str) -> str:
+    """PERIODIC, or the failure of the elements with used < 0, or that forces f are not finite."""
+    failed = int(np.count_nonzero(used < 0))
+    if failed:
+        return f"{failed} of {len(used)} elements {failure}"
+    return PERIODIC if np.isfinite(f).all() else "the motion or the force of an element is not finite"
 
 
 def dissipated(f: np.ndarray, w: np.ndarray) -> np.ndarray:
@@ -97,4 +106,12 @@ def _series(load: np.ndarray | None, n: int, samples: int) -> np.ndarray:
         return np.zeros((n, 0))
     if np.shape(load) != (n, samples):
         raise InputError(f"load: shape {np.shape(load)}, expected ({n}, {samples}), one row an element")
-    return np.ascontiguousarray(load, dtype=float)
+    return finite_load(load)
+
+
+def finite_load(load: np.ndarray) -> np.ndarray:
+    """A prescribed load; raises InputError where it is not finite."""
+    load = np.ascontiguousarray(load, dtype=float)
+    if not np.isfinite(load).all():
+        raise InputError("load: contains values that are not finite")
+    return load

@@ -15,7 +15,7 @@ from numba import njit
 
 from bladefem.data import Elements
 from bladefem.errors import InputError
-from bladefem.friction.aft import Forces, checked, dissipated, states
+from bladefem.friction.aft import PERIODIC, Forces, checked, dissipated, finite_load, states, verdict
 from bladefem.friction.harmonics import harmonics_of
 from bladefem.friction.jenkins import SEPARATED, SLIP_DOWN, SLIP_UP, STICK, assemble
 from bladefem.friction.roots import NEVER, rise, value
@@ -26,6 +26,7 @@ __all__ = ["evaluate_exact", "transitions"]
 UP, DOWN, OPEN, STOP_UP, STOP_DOWN, CLOSE = 0, 1, 2, 3, 4, 5     # polynomials whose rise ends a state
 START, AFTER_UP, AFTER_DOWN, CONTACT = 0, 1, 2, 3                # how the slider got to its place
 MOST = 512                                                       # stretches kept in one period
+MOST_AT_ONCE = 25                                                # events in one bracket
 
 
 def evaluate_exact(elements: Elements, w: np.ndarray, jacobian: bool = True, *, load: np.ndarray | None = None,
@@ -34,7 +35,8 @@ def evaluate_exact(elements: Elements, w: np.ndarray, jacobian: bool = True, *, 
 
     load (n, 2H+1) [N], where given, holds the coefficients of a prescribed normal load in place of the constant n0.
     brackets is the number of intervals of a period searched for transitions, 12 (H+1) when left out. Raises InputError
-    for shapes that do not fit. Forces.converged is False where a period has more than 512 transitions.
+    for shapes that do not fit and fewer than 4H+4 brackets. Forces.converged is False where a period has more than 512
+    transitions, a bracket more than 25, or the motion is not finite.
     """
     w, nodes = checked(elements, w)
     n, d, K = w.shape
@@ -46,13 +48,15 @@ def evaluate_exact(elements: Elements, w: np.ndarray, jacobian: bool = True, *, 
     if load is not None:
         if np.shape(load) != (n, K):
             raise InputError(f"load: shape {np.shape(load)}, expected coefficients ({n}, {K})")
-        base = np.ascontiguousarray(load, dtype=float)
+        base = finite_load(load)
+    brackets = 12 * (H + 1) if brackets is None else brackets
+    if brackets < 4 * (H + 1):
+        raise InputError(f"brackets: {brackets} intervals for {H} harmonics, expected at least {4 * (H + 1)}")
     F, J, shares, counts = np.zeros((n, d, K)), np.zeros((n, d, K, d, K)), np.empty((n, 3)), np.empty(n, dtype=np.int64)
-    _batch(w, base, nodes, brackets or 12 * (H + 1), F, J, shares, counts)
-    failed = int(np.count_nonzero(counts < 0))
-    reason = f"{failed} of {n} elements have more than {MOST} transitions a period" if failed else "periodic"
-    return Forces(F, J if jacobian else None, states(shares), shares, dissipated(F, w), np.full(n, 2), failed == 0,
-                  reason)
+    _batch(w, base, nodes, brackets, F, J, shares, counts)
+    reason = verdict(F, counts, f"have more than {MOST} transitions a period, or {MOST_AT_ONCE} nearly at once")
+    return Forces(F, J if jacobian else None, states(shares), shares, dissipated(F, w), np.full(n, 2),
+                  reason == PERIODIC, reason)
 
 
 def transitions(elements: Elements, w: np.ndarray, brackets: int | None = None) -> list[tuple[float, float, int]]:
@@ -150,14 +154,16 @@ def _steady(q, brackets, spans):
     """
     state, b, how = _begin(q)
     when, count, small = 0.0, 0, np.empty(6)
-    for i in range(6):
-        small[i] = 4e-15 * np.abs(q[i]).sum()
+    for i in range(6):      # rounding of the value, and of the time: slopes are up to h times the coefficients
+        small[i] = 4e-15 * abs(q[i, 0])
+        for k in range(1, q.shape[1]):
+            small[i] += 4e-15 * (1.0 + 2.0 * pi * ((k + 1) // 2)) * abs(q[i, k])
     step = 2.0 * pi / brackets
     for _ in range(2):
         count, begun = 0, 0.0
         for i in range(brackets):
             t, end = i * step, (i + 1) * step
-            for _ in range(24):
+            for _ in range(MOST_AT_ONCE):
                 at, which = _next(state, b, q, t, end, small)
                 if at > end:
                     break
@@ -169,6 +175,8 @@ def _steady(q, brackets, spans):
                     count += 1
                 state, b, how = _enter(q, at, which, b)
                 begun, t, when = at, at, at
+            else:
+                return -1, b, how, when
         spans[count, 0], spans[count, 1], spans[count, 2], spans[count, 3] = begun, 2.0 * pi, state, how
         spans[count, 4] = when
         count += 1

@@ -1,6 +1,6 @@
-"""First upward crossing of zero by a trigonometric polynomial within a bracket: safeguarded Newton, never a lost root.
+"""First upward crossing of zero by a trigonometric polynomial within a bracket: safeguarded Newton.
 
-Within a bracket the polynomial is taken to have at most one maximum, which is found from its slope.
+No root is lost where a bracket holds at most one maximum, which is found from its slope, or one and a minimum.
 """
 
 from __future__ import annotations
@@ -52,19 +52,38 @@ def _root(c, level, a, b, order):
 
 
 @njit(cache=True, error_model="numpy")
+def _inflection(c, a, b, bend):
+    """Time in [a, b] at which the curvature, of the sign ``bend`` at a, changes its sign."""
+    for _ in range(50):
+        middle = 0.5 * (a + b)
+        if value(c, middle)[2] * bend > 0.0:
+            a = middle
+        else:
+            b = middle
+    return b
+
+
+@njit(cache=True, error_model="numpy")
 def rise(c, level, a, b, small):
     """Time in [a, b] at which the motion with coefficients c first exceeds ``level``, NEVER if it does not.
 
     ``small`` is the rounding error of values: a touch that is no higher does not count.
     """
-    qa, da, _ = value(c, a)
-    qb, db, _ = value(c, b)
+    qa, da, ea = value(c, a)
+    qb, db, eb = value(c, b)
     if qa - level > small:
         return a
     if qb - level > small:
         return _root(c, level, a, b, 0)
+    low, high = a, b
+    if da * ea < 0.0 and db * eb > 0.0 and ea * eb < 0.0:       # the slope may change its sign twice
+        middle = _inflection(c, a, b, ea)
+        if da < 0.0:
+            low, da = middle, value(c, middle)[1]
+        else:
+            high, db = middle, value(c, middle)[1]
     if da > 0.0 and db < 0.0:
-        peak = _root(c, level, a, b, 1)
+        peak = _root(c, level, low, high, 1)
         if value(c, peak)[0] - level > small:
             return _root(c, level, a, peak, 0)
     return NEVER
