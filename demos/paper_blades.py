@@ -115,7 +115,7 @@ for load in (6.0,) if coarse else (1.0, 6.0, 50.0):
 # transient never dies, and the loop settles on a wrong stiffness or not at all.
 
 # %%
-for load in (50.0,) if coarse else (50.0, 200.0):
+for load in (200.0,) if coarse else (20.0, 200.0):
     model = model_of(load)
     top = peaks.get(load) or peak(model, band, H, samples).solution
     truth = judge(model, top.frequency)[1][1]

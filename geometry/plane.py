@@ -16,6 +16,8 @@ from .mesh import Mesh, Sector
 from .parameters import MeshSize, Plane
 from .session import attempt, gmsh_session
 
+SEAT_ELEMENTS = 40      # on each seat: half of it lifts off, and with 10 a resonance between stick and slip is 30 % low
+
 __all__ = ["blade_corners", "check_plane", "damper_corners", "plane_blades"]
 
 
@@ -30,7 +32,7 @@ def plane_blades(plane: Plane, size: MeshSize) -> Mesh:
     """
     check_plane(plane)
     base = size.size or min(plane.thickness / 2, plane.platform_thickness / 3, plane.damper_height / 2)
-    contact = size.contact_size or min(base, plane.seat_width / 10)
+    contact = size.contact_size or min(base, plane.seat_width / SEAT_ELEMENTS)
     motions = plane_motions(plane)
     with gmsh_session() as gmsh:
         groups = _draw(gmsh, plane)

@@ -28,6 +28,7 @@ from ..store import found_remark, stage
 from ..units import show
 from .choice import choose, covered, peak_of
 from .clamped import clamped_blade
+from .contact_mesh import coarse_sentence
 from .cycle import labels
 from .family import Family, Member, coarsened, member, shared_harmonics
 from .joint import LoadCase, joint_model
@@ -133,6 +134,8 @@ def run(scene: Scene, folder: str | Path, until: str = "response", comm: Any = N
         own = _own_load(scene, problem, clock.messages)
         maps = {load: seat(problem, scene.operation.speed, normal=load, bedded=scene.contact.bedded)
                 for load in studied_loads(scene, own)}
+        if mesh.dimension == 2:
+            clock.messages.extend(filter(None, [coarse_sentence(m for pair in maps.values() for m in pair)]))
         result = replace(result, contact=Seating(problem, maps, own))
     if until == "contact":
         return result

@@ -8,7 +8,8 @@ from pathlib import Path
 import pytest
 
 HERE = Path(__file__).resolve().parents[2]
-PINNED = {"element": 0.542996, "contact": 0.97322916, "zmass": 0.105900, "blades": 10.41135}
+# blades: 10.6852 on half the element size, 10.41 on the seats of ten elements that are too coarse
+PINNED = {"element": 0.542996, "contact": 0.97322916, "zmass": 0.105900, "blades": 10.67432}
 
 
 def output(name: str, ranks: int = 1) -> list[str]:

@@ -1,4 +1,8 @@
-"""Plane blades from finite elements, as the paper computes them: limits, methods against each other, pinned figures."""
+"""Plane blades from finite elements, as the paper computes them: limits, methods against each other, pinned figures.
+
+Figures are those of the default mesh, 41 nodes a seat; with 81 the resonances of these tests move by 0.02 % and their
+amplitudes by at most 0.6 % (63 N: 32.4 to 32.6 um; least amplitudes: 0.15 %).
+"""
 
 import numpy as np
 import pytest
@@ -27,9 +31,9 @@ def row():
 
 def test_resonances_and_loads_of_the_scene(row):
     model = paper_model(SOFT, row, 30.0)
-    assert free_resonances(model)[:2] / 2 / np.pi == pytest.approx([220.56, 1123.5], rel=1e-4)
+    assert free_resonances(model)[:2] / 2 / np.pi == pytest.approx([220.535, 1123.31], rel=1e-4)
     assert model.elements.n0.sum() == pytest.approx(60.0)                    # both seats
-    assert model.elements.kt[:11].sum() == pytest.approx(1e6)
+    assert model.elements.kt[:41].sum() == pytest.approx(1e6)
     assert np.ptp(model.damper.B) == 0                                      # it moves along the row only
 
 
@@ -51,11 +55,19 @@ def test_normal_loads_are_proportional(row):
     np.testing.assert_allclose(a, b, atol=1e-9)
 
 
+def test_the_contact_mesh_is_fine_enough(row):
+    """63 N, between stick and slip: 32.39 um with 41 nodes a seat, 32.57 um with 81; 11 nodes give 23.4 um (F27)."""
+    finer = row_of_blades(SOFT.vary(mesh__contact_size=SOFT.plane.seat_width / 80))
+    default, half = (peak(paper_model(SOFT, r, 63.0), (1050, 1300), 3, 128) for r in (row, finer))
+    assert default.amplitude == pytest.approx(half.amplitude, rel=0.02)
+    assert default.frequency == pytest.approx(half.frequency, rel=5e-4)
+
+
 def test_frequency_rises_on_soft_contacts_and_falls_on_stiff_ones(row):
-    """Fig. 15 and its exception: 1123.7 to 1182 Hz, and 1123.5 to 1008 Hz."""
+    """Fig. 15 and its exception: 1123.6 to 1176 Hz, and 1123.3 to 1008 Hz."""
     soft = [peak(paper_model(SOFT, row, load), (1050, 1300), 3, 128).frequency for load in (1.0, 6.0, 200.0)]
     assert soft == sorted(soft)
-    assert soft[-1] == pytest.approx(1182.0, rel=2e-3)
+    assert soft[-1] == pytest.approx(1176.0, rel=1e-3)
     scene = load_scene("scenes/plane.toml", ["contact.kt=1.44e7 N/m"])
     assert peak(paper_model(scene, row_of_blades(scene), 200.0), (850, 1250), 3, 128).frequency < 1015
 
@@ -72,15 +84,15 @@ def test_full_balance_and_the_loop_against_exact_integration(row):
 
 
 def test_marching_the_damper_from_rest_is_accepted_and_wrong(row):
-    """F06 on finite elements: 50 N, 1173.3 Hz; the step is small, the answer 109 % off."""
-    model = paper_model(SOFT, row, 50.0)
-    solution, tip, _ = judge(model, 1173.34)
+    """F06 on finite elements: 200 N, 1176.3 Hz; the step is small, the answer 99 % off."""
+    model = paper_model(SOFT, row, 200.0)
+    solution, tip, _ = judge(model, 1176.26)
     found = iterate(platform(model, solution.omega, 1), "amplitude", Rules(damper="march"))
     assert found.converged and found.residual > 0.1
     assert abs(found.probe[1, 0] / tip[1] - 1) > 0.5
 
 
-@pytest.mark.parametrize(("mass", "amplitude"), [(0.03, 6.57e-6), (0.12, 12.38e-6)])
+@pytest.mark.parametrize(("mass", "amplitude"), [(0.03, 6.62e-6), (0.12, 12.49e-6)])
 def test_least_amplitude_grows_with_the_mass_on_soft_contacts(row, mass, amplitude):
     _, best = optimum(lambda load: paper_model(SOFT, row, load, mass), (3.0, 12.0), (950, 1500), 3, 128)
     assert best.amplitude == pytest.approx(amplitude, rel=0.01)
