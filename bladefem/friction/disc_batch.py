@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from math import sqrt
-
 import numpy as np
 from numba import njit
 
@@ -111,81 +109,75 @@ def _within(path, mu):
 
 
 @njit(_nrt=False, cache=True, error_model="numpy")
-def _march(path, el, largest, tab, limit, trail, scratch, normal, trace, phi, linear):
-    """Periodic force by marching from kt w, reproducible where it is not unique, with its rows: (slips, cycles).
+def _forces(w, load, el, path, tab, limit, trail, spare, trace, F, J, shares):
+    """Normal force of one node, and its last period as periodic returns it; 0 cycles where it sticks or stays open.
 
-    Cycles are negative if it is not periodic after ``limit``.
+    There F (3, K) and J (3, K, 3K) are complete; elsewhere F lacks the harmonics of trace (2, width), J its tangents.
     """
-    fx, fy = start(path[0, 0], path[1, 0], path[2, 0], el.mu)
-    scale, slips, cycle, done = el.mu * largest, 0, 0, False
-    if linear:
-        start_rows(path[0, 0], path[1, 0], path[2, 0], el, tab, scratch.C)
-    while not done and cycle < limit:
-        gx, gy, events, _, slips, pieces = follow(path, el.mu, fx, fy, trail, trace, phi)
-        done = events == 0 or sqrt((gx - fx) ** 2 + (gy - fy) ** 2) <= TOLERANCE * scale
-        if linear:
-            if cycle > 0:
-                to_carry(scratch.C, 0, el.kt, tab)
-            add_period(path, gx, gy, pieces, el, tab, trail, scratch, normal, trace, done or cycle + 1 == limit)
-        fx, fy, cycle = gx, gy, cycle + 1
-    return slips, cycle if done else -cycle
-
-
-@njit(_nrt=False, cache=True, error_model="numpy")
-def _tangential(path, el, largest, tab, limit, trail, scratch, normal, trace, phi, F, J):
-    """Rows of the periodic tangential force in J (3, K, 3K), normal (2, width) and trace (2, width): (slips, cycles).
-
-    Cycles are negative if it is not periodic. F (3, K) takes what trace lacks of the periodic force.
-    """
-    rx, ry = 0.0, 0.0
-    unique, fx, fy, gx, gy, slips, pieces, cycles = periodic(path, el.mu, largest, EXACT, limit, trail, trace, phi)
-    if unique:
-        rx, ry = gx - fx, gy - fy
-        unit_rows(el.kt, tab, scratch.C)
-        add_period(path, gx, gy, pieces, el, tab, trail, scratch, normal, trace, True)
-    else:
-        slips, cycles = _march(path, el, largest, tab, limit, trail, scratch, normal, trace, phi, True)
-    close(rx, ry, scratch, F, J[1:])
-    return slips, cycles
-
-
-@njit(_nrt=False, cache=True, error_model="numpy")
-def _force_only(path, el, largest, tab, limit, trail, scratch, trace, phi):
-    """Periodic tangential force at the samples, trace (2, width) [N]: (slips, cycles, negative if not periodic)."""
-    unique, _, _, _, _, slips, _, cycles = periodic(path, el.mu, largest, TOLERANCE, limit, trail, trace, phi)
-    if not unique:
-        slips, cycles = _march(path, el, largest, tab, limit, trail, scratch, trace, trace, phi, False)
-    find_forces(path, trail.form, trail.knots, trail.slips, path.shape[1], el.mu, trace)
-    return slips, cycles
-
-
-@njit(_nrt=False, cache=True, error_model="numpy")
-def _node(w, load, el, path, tab, limit, trail, scratch, spare, normal, trace, F, J, shares):
-    """Cycles of one node; F (3, K) and J (3, K, 3K) lack what the harmonics of trace and normal (2, width) give.
-
-    Cycles are 0 where these are none, since it sticks or stays open.
-    """
-    K, linear, cycles, slips, (mean, block, phi) = F.shape[1], J.shape[0] > 0, 0, 0, spare
-    least, largest = _range(path[2])
+    K, linear, (mean, block, phi) = F.shape[1], J.shape[0] > 0, spare
+    found, (least, largest) = (True, 0.0, 0.0, 0.0, 0.0, 0, 0, 0), _range(path[2])
+    J[:1] = 0.0
     closed = _normal(w[0], load, el, path[2], least, tab, mean, block, F[0], J[0, :, :K] if linear else J[:, :, 0])
-    if least > 0.0 and _within(path, el.mu):
-        for c in range(1, 3):
-            for k in range(K):
-                F[c, k] = el.kt * w[c, k]
-                if linear:
-                    J[c, k, c * K + k] = el.kt
-    elif largest > 0.0:
+    if largest > 0.0 and not (least > 0.0 and _within(path, el.mu)):
         find_edges(path, path.shape[1], el.mu, trail.form)
-        if linear:
-            slips, cycles = _tangential(path, el, largest, tab, limit, trail, scratch, normal, trace, phi, F, J)
-            for c in range(1, 3):
-                add_gram(el.kt, scratch.stick, J[c, :, c * K:(c + 1) * K])
-        else:
-            slips, cycles = _force_only(path, el, largest, tab, limit, trail, scratch, trace, phi)
-    shares[1] = slips / tab.at.shape[0]
+        found = periodic(path, el.mu, largest, EXACT if linear else TOLERANCE, limit, trail, trace, phi)
+        if not linear:
+            find_forces(path, trail.form, trail.knots, trail.slips, path.shape[1], el.mu, trace)
+    else:
+        J[1:] = 0.0
+        _stuck(w, el.kt if largest > 0.0 else 0.0, F, J)
+    shares[1] = found[5] / tab.at.shape[0]
     shares[2] = 1.0 - closed
     shares[0] = 1.0 - shares[1] - shares[2]
-    return cycles
+    return found
+
+
+@njit(_nrt=False, cache=True, error_model="numpy", forceinline=True)
+def _stuck(w, kt, F, J):
+    """Tangential forces of springs kt."""
+    K = F.shape[1]
+    for c in range(1, 3):
+        for k in range(K):
+            F[c, k] = kt * w[c, k]
+            if J.shape[0]:
+                J[c, k, c * K + k] = kt
+
+
+@njit(_nrt=False, cache=True, error_model="numpy")
+def _rows(path, found, el, tab, trail, scratch, normal, trace, phi, F, J):
+    """Rows J (2, K, 3K) of the tangential forces in the state that was found, which lack n p_0 of normal (2, width).
+
+    F (3, K) takes what trace (2, width) lacks of the periodic force.
+    """
+    unique, fx, fy, gx, gy, _, pieces, cycles = found
+    if unique:
+        unit_rows(el.kt, tab, scratch.C)
+        add_period(path, gx, gy, pieces, el, tab, trail, scratch, normal, trace, unique)
+    else:
+        gx, gy = fx, fy = start(path[0, 0], path[1, 0], path[2, 0], el.mu)
+        start_rows(path[0, 0], path[1, 0], path[2, 0], el, tab, scratch.C)
+        for cycle in range(cycles):
+            if cycle > 0:
+                to_carry(scratch.C, 0, el.kt, tab)
+            fx, fy = gx, gy
+            gx, gy, _, _, _, pieces = follow(path, el.mu, fx, fy, trail, trace, phi)
+            add_period(path, gx, gy, pieces, el, tab, trail, scratch, normal, trace, cycle + 1 == cycles)
+    close(gx - fx, gy - fy, tab, scratch, F, J)
+    for e in range(2):
+        add_gram(el.kt, scratch.stick, J[e, :, (e + 1) * F.shape[1]:(e + 2) * F.shape[1]])
+
+
+@njit(_nrt=False, cache=True, error_model="numpy")
+def _lot(w, load, nodes, path, tab, limit, trail, scratch, spare, normal, trace, F, J, shares, cycles):
+    """disc_batch for some nodes but for the harmonics of trace and normal (n, 2, width); returns whether any moves."""
+    moving = False
+    for e in range(w.shape[0]):
+        el = Node(nodes[e, 0], nodes[e, 1], nodes[e, 2], nodes[e, 3])
+        found = _forces(w[e], load[e], el, path[e], tab, limit, trail, spare, trace[e], F[e], J[e], shares[e])
+        if found[7] and J.shape[1]:
+            _rows(path[e], found, el, tab, trail, scratch, normal[e], trace[e], spare[2], F[e], J[e, 1:])
+        cycles[e], moving = found[7] or 1, moving or found[7] != 0
+    return moving
 
 
 @njit(cache=True, error_model="numpy")
@@ -205,24 +197,21 @@ def _harmonics(trace, normal, tab, F, J):
 
 
 @njit(cache=True, error_model="numpy")
-def disc_batch(w, load, nodes, tab, limit, F, J, shares, cycles):
+def disc_batch(w, load, nodes, tab, patterns, limit, F, J, shares, cycles):
     """Forces F (n, 3, K), Jacobian J (n, 3, K, 3K), shares (n, 3) of stick, slip and separation, cycles (n,).
 
-    w (n, 3, K) [m]; load (n, S) [N] in place of n0, or (n, 0); nodes (n, 4): kt, kn, mu, n0. J holds zeros, or is
-    (n, 0, 0, 0): then no derivative is made. Cycles are negative where the force was not periodic after ``limit``.
+    w (n, 3, K) [m]; load (n, S) [N] in place of n0, or (n, 0); nodes (n, 4): kt, kn, mu, n0; patterns in the precision
+    in which the derivative is summed. If J is (n, 0, 0, 0), no derivative is made. Cycles are negative where the force
+    was not periodic after ``limit``.
     """
     n, width = w.shape[0], tab.along.shape[1]
     path, trace, normal = np.empty((NODES, 3, width)), np.empty((NODES, 2, width)), np.empty((NODES, 2, width))
     spare = np.empty(tab.sums.shape[1]), np.empty((w.shape[2], w.shape[2])), np.empty((2, 2))
-    trail, scratch, F[:] = empty_trail(tab.at.shape[0], width), empty_rows(tab), 0.0
+    trail, scratch, F[:] = empty_trail(tab.at.shape[0], width), empty_rows(tab, patterns), 0.0
     for first in range(0, n, NODES):
-        last, moving = min(first + NODES, n), False
+        last = min(first + NODES, n)
         _paths(w[first:last], load[first:last], nodes[first:last], tab, path)
         trace[:], normal[:] = 0.0, 0.0
-        for e in range(first, last):
-            el, q = Node(nodes[e, 0], nodes[e, 1], nodes[e, 2], nodes[e, 3]), e - first
-            marched = _node(w[e], load[e], el, path[q], tab, limit, trail, scratch, spare, normal[q], trace[q], F[e],
-                            J[e], shares[e])
-            cycles[e], moving = marched if marched else 1, moving or marched != 0
-        if moving:
+        if _lot(w[first:last], load[first:last], nodes[first:last], path, tab, limit, trail, scratch, spare, normal,
+                trace, F[first:last], J[first:last], shares[first:last], cycles[first:last]):
             _harmonics(trace, normal, tab, F[first:last], J[first:last])

@@ -1,7 +1,7 @@
 """Running derivative of a 2-D element: rows of d(force)/d(coefficients) over one period.
 
-Rows have 3W columns, W the K = 2H+1 coefficients filled up to a multiple of 8: normal, first and second tangential
-coefficients. The columns K and W + K take the derivative with the force at the start of the period; they carry the
+Rows have W columns for each of normal, first and second tangential coefficients, W the K = 2H+1 coefficients filled up
+to a multiple of 8, and M in all. The columns K and W + K take the derivative with the force at the start of the period; they carry the
 derivative Phi of the period map, and that of the periodic state follows from D = Phi D + d. In stick the derivative is
 carried as C = D - kt V, which stays, so that a whole stretch of stick costs one rank-one update. In slip only the row
 of the angle is carried; the rows of all samples are kept, and summed at the end of the period.
@@ -16,17 +16,19 @@ from numba import njit
 
 from bladefem.friction.disc import CLOSING, SLIP, STICK, sensitivity
 from bladefem.friction.lane_kernels import TURNS, add_folded, find_turns, join_rows, turn_rows
+from bladefem.friction.lanes import BLOCK
 from bladefem.friction.orbit import CHANGING, SLIDING, STICKING
+from bladefem.friction.tables import Patterns
 
 __all__ = ["Rows", "add_period", "close", "empty_rows", "start_rows", "to_carry", "unit_rows"]
 
 FAST = {"contract", "reassoc", "nsz"}
 LOT = 64            # samples after which a row is looked at for faint numbers
-FAINT = 1e-60       # of them: forgotten before they become denormal and slow
+FAINT, SHORT_FAINT = 1e-60, 1e-30       # of 8 and of 4 bytes: forgotten before they become denormal and slow
 
 
 class Rows(NamedTuple):
-    """Scratch of one 2-D element; M = 3W, width as in lane_kernels.py."""
+    """Scratch of one 2-D element, rows in the precision of the patterns; M and width as in lane_kernels.py."""
 
     J: np.ndarray           # (2, tiled, M) summed rows, first and second tangent
     stick: np.ndarray       # (4H+1,) basis means of the samples in stick
@@ -37,21 +39,25 @@ class Rows(NamedTuple):
     turns: np.ndarray       # (7, width) how the row turns
     g: np.ndarray           # (2, width) factors from a sample's row to those of the force [N]
     chosen: np.ndarray      # numbers of the fours with samples that slip
+    patterns: Patterns
 
 
 @njit(cache=True, error_model="numpy")
-def empty_rows(tab):
+def empty_rows(tab, patterns):
     """Scratch for one node."""
-    (S, W), (tile, width), fours = tab.wide.shape, (tab.weights.shape[1], tab.along.shape[1]), tab.fours.shape[0]
-    return Rows(np.zeros((2, tile, 3 * W)), np.zeros(tab.sums.shape[1]), np.zeros((2, 3 * W)), np.zeros((2, 3 * W)),
-                np.zeros(3 * W), np.zeros((S + 1, 3 * W)), np.zeros((TURNS, width)), np.zeros((2, width)),
-                np.zeros(fours, np.int64))
+    (S, W), tile, width, dtype = patterns.at.shape, patterns.weights.shape[1], tab.along.shape[1], patterns.at.dtype
+    lanes = BLOCK // patterns.at.itemsize
+    M = (3 * W + lanes - 1) // lanes * lanes
+    return Rows(np.zeros((2, tile, M), dtype), np.zeros(tab.sums.shape[1]), np.zeros((2, M), dtype),
+                np.zeros((2, M), dtype), np.zeros(M, dtype), np.zeros((S + 1, M), dtype),
+                np.zeros((TURNS, width), dtype), np.zeros((2, width), dtype), np.zeros(tab.fours.shape[0], np.int64),
+                patterns)
 
 
 @njit(_nrt=False, cache=True, error_model="numpy", forceinline=True, fastmath=FAST)
 def _angle_row(C, i, by, el, tab, row):
     """Row (M,) of the angle of a slipping force, from by (6,): by force (2), increment (2), N_i and N_j."""
-    K, W, p0, p1, q0, q1, r0, r1 = tab.at.shape[1], tab.wide.shape[1], *by
+    K, W, p0, p1, q0, q1, r0, r1 = tab.at.shape[1], tab.W, *by
     j = i + 1 if i + 1 < tab.at.shape[0] else 0
     for l in range(row.size):
         row[l] = p0 * C[0, l] + p1 * C[1, l]
@@ -65,7 +71,7 @@ def _angle_row(C, i, by, el, tab, row):
 @njit(_nrt=False, cache=True, error_model="numpy", forceinline=True)
 def _closing_rows(i, dx, dy, N0, N1, part, el, tab, out):
     """Rows out (2, M) of f = part d, part = N / (N1 - N0), of an element that closes in edge i and sticks."""
-    K, W, j = tab.at.shape[1], tab.wide.shape[1], i + 1 if i + 1 < tab.at.shape[0] else 0
+    K, W, j = tab.at.shape[1], tab.W, i + 1 if i + 1 < tab.at.shape[0] else 0
     out[:] = 0.0
     for l in range(K):
         change = el.kn * (N1 * tab.knots[i, l] - N0 * tab.knots[j, l]) / (N1 - N0) ** 2
@@ -76,7 +82,7 @@ def _closing_rows(i, dx, dy, N0, N1, part, el, tab, out):
 @njit(_nrt=False, cache=True, error_model="numpy", forceinline=True)
 def to_carry(C, j, kt, tab):
     """C (2, M) from D to D - kt V at knot j."""
-    W = tab.wide.shape[1]
+    W = tab.W
     for l in range(tab.at.shape[1]):
         C[0, W + l] -= kt * tab.knots[j, l]
         C[1, 2 * W + l] -= kt * tab.knots[j, l]
@@ -96,14 +102,14 @@ def _add_stick(a, b, tab, scratch):
 
 
 @njit(_nrt=False, cache=True, error_model="numpy", forceinline=True)
-def _slide(a, b, tab, scratch):
+def _slide(a, b, scratch):
     """Turn the row of the angle along the edges a <= i < b."""
-    row, width, W = scratch.row, scratch.turns.shape[1], tab.wide.shape[1]
+    row, patterns, faint = scratch.row, scratch.patterns, FAINT if scratch.row.itemsize == 8 else SHORT_FAINT
     while a < b:
         stop = min(b, a + LOT)
-        turn_rows(scratch.turns, width, tab.wide, tab.change, W, a, stop, row, scratch.rows)
+        turn_rows(scratch.turns, patterns.at, patterns.change, a, stop, row, scratch.rows)
         for l in range(row.size):
-            if abs(row[l]) < FAINT:
+            if abs(row[l]) < faint:
                 row[l] = 0.0
         a = stop
 
@@ -176,7 +182,7 @@ def add_period(path, fx, fy, pieces, el, tab, trail, scratch, normal, trace, sum
     for piece in range(pieces):
         i, kind, ax, ay = trail.begins[piece], trail.kinds[piece], forces[0, piece], forces[1, piece]
         if kind == SLIDING:
-            _slide(i, trail.begins[piece + 1], tab, scratch)
+            _slide(i, trail.begins[piece + 1], scratch)
             continue
         if slipping:
             _leave_slip(ax, ay, i, path[2, i], el, tab, scratch)
@@ -216,14 +222,13 @@ def _add_slip(slips, tab, scratch):
         if slips[fours[q, 0]] + slips[fours[q, 1]] + slips[fours[q, 2]] + slips[fours[q, 3]] > 0.0:
             scratch.chosen[count] = q
             count += 1
-    for e in range(2):
-        add_folded(scratch.rows, scratch.g[e], fours, scratch.chosen, count, tab.weights, scratch.J[e])
+    add_folded(scratch.rows, scratch.g, fours, scratch.chosen, count, scratch.patterns.weights, scratch.J)
 
 
 @njit(_nrt=False, cache=True, error_model="numpy")
 def unit_rows(kt, tab, C):
     """Carried rows C (2, M) of a force at the first knot that is given."""
-    K, W = tab.at.shape[1], tab.wide.shape[1]
+    K, W = tab.at.shape[1], tab.W
     C[:] = 0.0
     C[0, K] = C[1, W + K] = 1.0
     to_carry(C, 0, kt, tab)
@@ -232,7 +237,7 @@ def unit_rows(kt, tab, C):
 @njit(_nrt=False, cache=True, error_model="numpy")
 def start_rows(vx, vy, N, el, tab, C):
     """Carried rows C (2, M) of the force at the first knot: kt w = (vx, vy) drawn back onto the circle mu N."""
-    K, W = tab.at.shape[1], tab.wide.shape[1]
+    K, W = tab.at.shape[1], tab.W
     C[:] = 0.0
     R = el.mu * max(N, 0.0)
     length = np.hypot(vx, vy)
@@ -248,24 +253,24 @@ def start_rows(vx, vy, N, el, tab, C):
     to_carry(C, 0, el.kt, tab)
 
 
-@njit(_nrt=False, cache=True, error_model="numpy", fastmath=FAST)
-def close(rx, ry, scratch, F, J):
+@njit(_nrt=False, cache=True, error_model="numpy", fastmath=FAST, forceinline=True)
+def close(rx, ry, tab, scratch, F, J):
     """J (2, K, 3K) and what F (3, K) lacks, from the sums, the rows C (2, M) at the end and its misfit (rx, ry).
 
     The start of the period is moved to the fixed point of the linearised map.
     """
-    C, K, W = scratch.C, F.shape[1], scratch.C.shape[1] // 3
+    C, K, W = scratch.C, F.shape[1], tab.W
     a, b, c, d = 1.0 - C[0, K], -C[0, W + K], -C[1, K], 1.0 - C[1, W + K]
     det = a * d - b * c
     mx, my = (d * rx - b * ry) / det, (a * ry - c * rx) / det
-    for l in range(3 * W):      # D at the start of the period takes the place of C
+    for l in range(C.shape[1]):      # D at the start of the period takes the place of C
         x, y = C[0, l], C[1, l]
         C[0, l], C[1, l] = (d * x - b * y) / det, (a * y - c * x) / det
     for e in range(2):
         for k in range(K):
             px, py = scratch.J[e, k, K], scratch.J[e, k, W + K]
             F[1 + e, k] += px * mx + py * my
-    join_rows(scratch.J, scratch.J.shape[1], C, K, W, J)
+    join_rows(scratch.J, scratch.J.shape[1], C.shape[1], C, K, W, J)
     for l in range(K):      # the last row, which blocks of eight would leave
         for part in range(3):
             m = part * W + l

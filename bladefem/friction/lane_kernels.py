@@ -1,15 +1,15 @@
-"""Kernels of 2-D elements in vectors of eight: edges, slip along them, rows of the angle, sums over time.
+"""Kernels of 2-D elements in vectors: edges, slip along them, rows of the angle, sums over time.
 
 The arrays of one node along time have rows of ``width`` numbers, samples filled up to a multiple of eight and eight
 more. Rows of the derivative have 3 W columns, W the harmonics filled up to a multiple of eight: normal, first, second
-tangent.
+tangent. They may be of 8 or of 4 bytes a number, and are filled up to blocks of 64 bytes: M numbers in all.
 """
 
 from __future__ import annotations
 
 from numba import njit
 
-from bladefem.friction.lanes import LANES, Code, kernel
+from bladefem.friction.lanes import BLOCK, LANES, Code, kernel
 
 __all__ = ["ACROSS", "AHEAD", "AWAY", "EDGE_ROWS", "FALL", "LIMIT_AHEAD", "LIMIT_AWAY", "TILE", "TURNS", "TWICE_Y",
            "add_folded", "find_edges", "find_forces", "find_turns", "join_rows", "turn_rows"]
@@ -106,14 +106,9 @@ def find_forces(code: Code, path, form, knots, slips, width, mu, trace):
             code.store(slip.above(0.5, R * along, code.load(trace, (row, width), i)), trace, (row, width), i)
 
 
-@kernel
-def turn_rows(code: Code, turns, width, at, change, W, begin, end, row, rows):
-    """Turn the row (3W,) of the angle along the edges begin <= i < end; rows (.., 3W) in their middles, without b.
-
-    at, change (.., W): normal pattern, and that of either tangent.
-    """
-    columns = code.place((3, W))
-    with code.loop(0, W, LANES) as l:
+def _turn_rows(code: Code, turns, width, at, change, W, begin, end, row, rows, M):
+    columns = code.whole(M)
+    with code.loop(0, W, code.lanes(row)) as l:
         state = [code.variable(code.load(row, (part, W), l)) for part in range(3)]
         with code.loop(begin, end) as i:
             *m, a, t0, t1, t2 = (code.spread(code.one(turns, (q, width), i)) for q in range(TURNS))
@@ -126,22 +121,39 @@ def turn_rows(code: Code, turns, width, at, change, W, begin, end, row, rows):
             code.store(code.get(state[part]), row, (part, W), l)
 
 
-@kernel
-def join_rows(code: Code, sums, tiled, C, K, W, out):
-    """Rows sums (2, tiled, 3W) + px C[0] + py C[1] without what fills up the K columns of each part: out (2, K, 3K).
+_turn_blocks, _turn_halves = kernel(_turn_rows), kernel(_turn_rows, BLOCK // 2)
 
-    px, py are the columns K and W + K of a row, C (2, 3W). The last row is left out; blocks reach into the row after.
+
+@njit(cache=True, error_model="numpy")
+def turn_rows(turns, at, change, begin, end, row, rows):
+    """Turn the row (M,) of the angle along the edges begin <= i < end; rows (.., M) in their middles, without b.
+
+    turns (7, width) as find_turns has them; at, change (.., W): normal pattern, and that of either tangent.
     """
-    columns = code.place((3, W))
+    width, W, M = turns.shape[1], at.shape[1], row.size
+    if W * row.itemsize % BLOCK == 0:
+        _turn_blocks(turns, width, at, change, W, begin, end, row, rows, M)
+    else:
+        _turn_halves(turns, width, at, change, W, begin, end, row, rows, M)
+
+
+def _join_rows(code: Code, sums, tiled, M, C, K, W, out):
+    """Rows sums (2, tiled, M) + px C[0] + py C[1] without what fills up the K columns of each part: out (2, K, 3K).
+
+    px, py are the columns K and W + K of a row, C (2, M). The last row is left out; blocks reach into the row after.
+    """
     with code.loop(0, code.place((K, 2), -1)) as n:
         second = code.builder.zext(code.builder.icmp_signed(">=", n, K), n.type)
         row = code.place(n, (second, code.place(tiled, (K, -1))))
-        px, py = (code.spread(code.one(sums, (row, columns), spot)) for spot in (K, code.place(W, K)))
+        px, py = (code.spread(code.one(sums, (row, M), spot)) for spot in (K, code.place(W, K)))
         for part in range(3):
-            with code.loop(0, K, LANES) as l:
+            with code.loop(0, K, code.lanes(sums)) as l:
                 m = code.place((part, W), l)
-                joined = code.load(sums, (row, columns), m) + px * code.load(C, m) + py * code.load(C, columns, m)
+                joined = code.load(sums, (row, M), m) + px * code.load(C, m) + py * code.load(C, M, m)
                 code.store(joined, out, (code.place((n, 3), part), K), l)
+
+
+join_rows = kernel(_join_rows, BLOCK // 2)
 
 
 def _add_folded(harmonics: int, first: bool):
@@ -150,12 +162,12 @@ def _add_folded(harmonics: int, first: bool):
 
     @kernel
     def add(code: Code, rows, columns, l, g, fours, chosen, count, weights, tile, out, k):
-        """Add sum_i weights[i, k + .] g_i rows[i, l:l + 8] to the rows of out (.., columns) from k on.
+        """Add sum_i weights[i, k + .] g_i rows[i] to the rows of out (.., columns) from k on, a block from column l.
 
         The sum runs over the chosen (count,) of fours (., 4) of samples i, S/2 - i, S/2 + i, S - i, which are added up
         first: cos and sin of even and odd harmonics are equal there but for their signs.
         """
-        sums = [code.variable() for _ in kinds]
+        sums = [code.variable(code.zeros(out)) for _ in kinds]
         with code.loop(0, count) as n:
             place = code.one(chosen, n)
             four = [code.one(fours, (place, 4), q) for q in range(4)]
@@ -180,16 +192,22 @@ _add_two, _add_four, _add_six, _add_eight, _add_eight_more = (
 
 @njit(cache=True, error_model="numpy")
 def add_folded(rows, g, fours, chosen, count, weights, out):
-    """Add sum_i weights[i, k] g_i rows[i] over the chosen (count,) of fours (., 4) to out (tiled, columns)."""
+    """Add sum_i weights[i, k] g[e, i] rows[i] over the chosen (count,) of fours (., 4) to out (2, tiled, M)."""
     columns, tile = rows.shape[1], weights.shape[1]
-    for l in range(0, columns, LANES):
-        if tile == 3:
-            _add_two(rows, columns, l, g, fours, chosen, count, weights, tile, out, 0)
-        elif tile == 7:
-            _add_four(rows, columns, l, g, fours, chosen, count, weights, tile, out, 0)
-        elif tile == 11:
-            _add_six(rows, columns, l, g, fours, chosen, count, weights, tile, out, 0)
-        else:
-            _add_eight(rows, columns, l, g, fours, chosen, count, weights, tile, out, 0)
-        for k in range(2 * TILE - 1, tile, 2 * TILE):
-            _add_eight_more(rows, columns, l, g, fours, chosen, count, weights, tile, out, k)
+    for l in range(0, columns, BLOCK // rows.itemsize):
+        for e in range(2):
+            _add_block(rows, columns, l, g[e], fours, chosen, count, weights, tile, out[e])
+
+
+@njit(cache=True, error_model="numpy")
+def _add_block(rows, columns, l, g, fours, chosen, count, weights, tile, out):
+    if tile == 3:
+        _add_two(rows, columns, l, g, fours, chosen, count, weights, tile, out, 0)
+    elif tile == 7:
+        _add_four(rows, columns, l, g, fours, chosen, count, weights, tile, out, 0)
+    elif tile == 11:
+        _add_six(rows, columns, l, g, fours, chosen, count, weights, tile, out, 0)
+    else:
+        _add_eight(rows, columns, l, g, fours, chosen, count, weights, tile, out, 0)
+    for k in range(2 * TILE - 1, tile, 2 * TILE):
+        _add_eight_more(rows, columns, l, g, fours, chosen, count, weights, tile, out, k)

@@ -1,8 +1,9 @@
 """Numbers in the lanes of a vector: how kernels are written whose loops do not become vectors by themselves.
 
 Numba turns a loop into vectors only where it is long, writes one array and needs no sum to stay in registers. The
-functions of lane_kernels.py are written for blocks of 8 numbers instead; any processor runs them, with as many
-instructions a block as its vectors ask for.
+functions of lane_kernels.py are written for blocks instead, of 64 bytes unless they ask for less; any processor runs
+them, with as many instructions a block as its vectors ask for. A block has the precision of the array it comes from,
+and takes that of the array it goes to, so that one text serves arrays of 8 and of 4 bytes a number.
 """
 
 from __future__ import annotations
@@ -15,11 +16,10 @@ from numba import types
 from numba.core import cgutils
 from numba.extending import intrinsic
 
-__all__ = ["LANES", "Code", "Lanes", "kernel"]
+__all__ = ["BLOCK", "LANES", "Code", "Lanes", "kernel"]
 
-LANES = 8
-BLOCK, WHOLE, HALF = ir.VectorType(ir.DoubleType(), LANES), ir.IntType(64), ir.IntType(32)
-UNDEFINED = ir.Constant(BLOCK, ir.Undefined)
+BLOCK, LANES = 64, 8        # bytes of a block; numbers of 8 bytes in it
+WHOLE, HALF = ir.IntType(64), ir.IntType(32)
 FUSED = ("contract",)       # a product and a sum may be rounded once
 
 
@@ -30,9 +30,12 @@ class Lanes:
         self.builder, self.value = builder, value
 
     def _with(self, name: str, other: Lanes | float, swapped: bool = False) -> Lanes:
-        value = other.value if isinstance(other, Lanes) else ir.Constant(BLOCK, [float(other)] * LANES)
-        pair = (value, self.value) if swapped else (self.value, value)
+        pair = (self._value(other), self.value) if swapped else (self.value, self._value(other))
         return Lanes(self.builder, getattr(self.builder, name)(*pair, flags=FUSED))
+
+    def _value(self, other: Lanes | float) -> ir.Value:
+        block = self.value.type
+        return other.value if isinstance(other, Lanes) else ir.Constant(block, [float(other)] * block.count)
 
     def __add__(self, other: Lanes | float) -> Lanes:
         return self._with("fadd", other)
@@ -56,22 +59,29 @@ class Lanes:
 
     def sqrt(self) -> Lanes:
         """Root."""
-        root = cgutils.get_or_insert_function(self.builder.module, ir.FunctionType(BLOCK, [BLOCK]),
-                                              f"llvm.sqrt.v{LANES}f64")
+        block = self.value.type
+        root = cgutils.get_or_insert_function(self.builder.module, ir.FunctionType(block, [block]),
+                                              f"llvm.sqrt.v{block.count}{block.element.intrinsic_name}")
         return Lanes(self.builder, self.builder.call(root, [self.value]))
 
     def above(self, other: Lanes | float, yes: Lanes, no: Lanes) -> Lanes:
         """yes where this block is larger, no elsewhere."""
-        value = other.value if isinstance(other, Lanes) else ir.Constant(BLOCK, [float(other)] * LANES)
-        larger = self.builder.fcmp_ordered(">", self.value, value)
+        larger = self.builder.fcmp_ordered(">", self.value, self._value(other))
         return Lanes(self.builder, self.builder.select(larger, yes.value, no.value))
 
 
 class Code:
     """Loads, stores, sums and loops of a kernel; arrays are addressed flat, by products and sums of whole numbers."""
 
-    def __init__(self, builder: ir.IRBuilder) -> None:
-        self.builder = builder
+    def __init__(self, builder: ir.IRBuilder, size: int) -> None:
+        self.builder, self.size = builder, size
+
+    def lanes(self, array: ir.Value) -> int:
+        """How many of an array's numbers are a block."""
+        return self._type(array.type.pointee).count
+
+    def _type(self, number: ir.Type) -> ir.VectorType:
+        return ir.VectorType(number, self.size // (8 if isinstance(number, ir.DoubleType) else 4))
 
     def whole(self, number: ir.Value | int) -> ir.Value:
         """A whole number."""
@@ -86,16 +96,21 @@ class Code:
             total = self.builder.add(total, self.whole(term))
         return total
 
-    def _block(self, array: ir.Value, place: ir.Value) -> ir.Value:
-        return self.builder.bitcast(self.builder.gep(array, [place]), BLOCK.as_pointer())
+    def _block(self, array: ir.Value, count: int, terms: tuple) -> ir.Value:
+        place = self.builder.gep(array, [self.place(*terms)])
+        return self.builder.bitcast(place, ir.VectorType(array.type.pointee, count).as_pointer())
 
     def load(self, array: ir.Value, *terms: ir.Value | int | tuple) -> Lanes:
-        """Eight numbers from a place on."""
-        return Lanes(self.builder, self.builder.load(self._block(array, self.place(*terms)), align=8))
+        """The numbers from a place on."""
+        return Lanes(self.builder, self.builder.load(self._block(array, self.lanes(array), terms), align=4))
 
     def store(self, block: Lanes, array: ir.Value, *terms: ir.Value | int | tuple) -> None:
-        """Eight numbers to a place."""
-        self.builder.store(block.value, self._block(array, self.place(*terms)), align=8)
+        """Numbers to a place on."""
+        value, spot = block.value, self._block(array, block.value.type.count, terms)
+        if value.type.element != array.type.pointee:
+            shorter = isinstance(value.type.element, ir.DoubleType)
+            value = (self.builder.fptrunc if shorter else self.builder.fpext)(value, spot.type.pointee)
+        self.builder.store(value, spot, align=4)
 
     def one(self, array: ir.Value, *terms: ir.Value | int | tuple) -> ir.Value:
         """The number at a place."""
@@ -103,14 +118,19 @@ class Code:
 
     def spread(self, number: ir.Value) -> Lanes:
         """A number in all lanes."""
-        first = self.builder.insert_element(UNDEFINED, number, HALF(0))
-        zeros = ir.Constant(ir.VectorType(HALF, LANES), [0] * LANES)
-        return Lanes(self.builder, self.builder.shuffle_vector(first, UNDEFINED, zeros))
+        undefined = ir.Constant(self._type(number.type), ir.Undefined)
+        first = self.builder.insert_element(undefined, number, HALF(0))
+        zeros = ir.Constant(ir.VectorType(HALF, undefined.type.count), None)
+        return Lanes(self.builder, self.builder.shuffle_vector(first, undefined, zeros))
 
-    def variable(self, start: Lanes | None = None) -> ir.Value:
-        """A block that changes, zero at first; it lives in a register."""
-        spot = cgutils.alloca_once(self.builder, BLOCK)
-        self.builder.store(ir.Constant(BLOCK, [0.0] * LANES) if start is None else start.value, spot)
+    def zeros(self, array: ir.Value) -> Lanes:
+        """Zeros in an array's precision."""
+        return Lanes(self.builder, ir.Constant(self._type(array.type.pointee), None))
+
+    def variable(self, start: Lanes) -> ir.Value:
+        """A block that changes; it lives in a register."""
+        spot = cgutils.alloca_once(self.builder, start.value.type)
+        self.builder.store(start.value, spot)
         return spot
 
     def get(self, variable: ir.Value) -> Lanes:
@@ -137,13 +157,16 @@ class _Loop:
         self.context.__exit__(*error)
 
 
-def kernel(write: Callable) -> Callable:
-    """What compiled code may call as the function that write(code, *arguments) writes: contiguous arrays, numbers."""
+def kernel(write: Callable, size: int = BLOCK) -> Callable:
+    """What compiled code may call as the function that write(code, *arguments) writes: contiguous arrays, numbers.
+
+    size is that of a block [bytes].
+    """
     def typed(context, *given):
         def generate(target, builder, call, values):
             flat = [target.make_array(t)(target, builder, v).data if isinstance(t, types.Array) else v
                     for t, v in zip(call.args, values, strict=True)]
-            write(Code(builder), *flat)
+            write(Code(builder, size), *flat)
             return target.get_dummy_value()
         return types.void(*[t if isinstance(t, types.Array | types.Float) else types.int64 for t in given]), generate
 

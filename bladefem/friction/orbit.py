@@ -26,6 +26,8 @@ TOLERANCE = 1e-12       # of the largest friction limit: how well the force must
 MARCHED = 2             # periods before Newton: load that varies allows several states, and marching chooses
 FREE = 30               # periods in which Newton's steps need not pay at once: states of the edges have to settle first
 SINGULAR = 1e-6         # of det(I - Phi): below it the state keeps a memory of its start
+LEAP = 0.9              # of the way that is left: how far slow marching leaps
+SLOW = 0.7              # of the change in the period before: from there on marching is slow
 TOUCH = 1e-9            # of the limit: an edge that reaches no further beyond may be one that only touches it
 OPEN, STICKING, SLIDING, CHANGING = range(4)    # pieces of a period; a change of state is a piece of one edge
 
@@ -190,12 +192,10 @@ def _remembers(phi):
 
 
 @njit(_nrt=False, cache=True, error_model="numpy")
-def periodic(path, mu, largest, near, limit, trail, trace, phi):
-    """Periodic force by Newton from kt w: (unique, fx, fy, gx, gy, slips, pieces, cycles).
+def _iterated(path, mu, largest, near, limit, trail, trace, phi):
+    """Periodic force by Newton from kt w, returned as by periodic.
 
-    The last period went from f to g, and Newton's step from f is at most ``near`` times the limit under the largest
-    load: the trail is that of the periodic state but for what is linear in the step. Not unique: the state keeps a
-    memory of its start, as it does where Newton ended on the rim of stick, at forces that touch the limit and no more.
+    Not unique is also where it ended on the rim of stick, at forces that touch the limit and no more.
     """
     scale, R = mu * largest, mu * max(path[2, 0], 0.0)
     fx, fy = start(path[0, 0], path[1, 0], path[2, 0], mu)
@@ -215,3 +215,59 @@ def periodic(path, mu, largest, near, limit, trail, trace, phi):
         guess = cycle >= MARCHED and abs(det) >= 1e-9
         fx, fy = (x, y) if guess else (gx, gy)
     return True, fx, fy, gx, gy, slips, pieces, -limit
+
+
+@njit(_nrt=False, cache=True, error_model="numpy")
+def _order(trail, pieces):
+    """A number by which to tell the states of one period from those of another."""
+    order = pieces
+    for piece in range(pieces):
+        order = 31 * order + 4 * trail.begins[piece] + trail.kinds[piece]
+        if trail.kinds[piece] == CHANGING:
+            order = 31 * order + int(4.0 * trail.changes[piece, 0] + trail.changes[piece, 1])
+    return order
+
+
+@njit(_nrt=False, cache=True, error_model="numpy")
+def _marched(path, mu, largest, leap, limit, trail, trace, phi):
+    """Periodic force by marching from kt w, with leaps (their share of the way left) where it is slow.
+
+    Returned as by periodic.
+
+    The force may approach the corner between the limits of two instants by a little in each period. Where two periods
+    in turn have the same states, it leaps along Newton's step, but not all the way, so that it keeps coming from the
+    same side; where the states differ after the leap it goes back and leaps half as far.
+    """
+    scale, R = mu * largest, mu * max(path[2, 0], 0.0)
+    fx, fy = start(path[0, 0], path[1, 0], path[2, 0], mu)
+    bx, by, share, leapt, last, before = fx, fy, leap, False, 0, 0.0
+    for cycle in range(1, limit + 1):
+        gx, gy, events, _, slips, pieces = follow(path, mu, fx, fy, trail, trace, phi)
+        residual, order = sqrt((gx - fx) ** 2 + (gy - fy) ** 2), _order(trail, pieces)
+        det, x, y = newton(fx, fy, gx, gy, R, phi)
+        if leapt and order != last:
+            fx, fy, share, leapt, last = bx, by, 0.5 * share, False, 0
+            continue
+        if events == 0 or residual <= TOLERANCE * scale:
+            return events > 0 and abs(det) >= SINGULAR, fx, fy, gx, gy, slips, pieces, cycle
+        share = min(2.0 * share, leap) if leapt else share
+        leapt = leap > 0.0 and order == last and residual > SLOW * before and det >= SINGULAR
+        bx, by, last, before = gx, gy, order, residual
+        fx, fy = (gx + share * (x - gx), gy + share * (y - gy)) if leapt else (gx, gy)
+    return True, fx, fy, gx, gy, slips, pieces, -limit
+
+
+@njit(_nrt=False, cache=True, error_model="numpy")
+def periodic(path, mu, largest, near, limit, trail, trace, phi):
+    """Periodic force: (unique, fx, fy, gx, gy, slips, pieces, cycles), cycles negative if none was found in ``limit``.
+
+    The last period went from f to g, and Newton's step from f is at most ``near`` times the limit under the largest
+    load: the trail is that of the periodic state but for what is linear in the step. Not unique: the state keeps a
+    memory of its start, and so many periods of marching from kt w lead there.
+    """
+    found = _iterated(path, mu, largest, near, limit, trail, trace, phi)
+    if not found[0] and found[7] > MARCHED:
+        found = _marched(path, mu, largest, LEAP, limit, trail, trace, phi)
+        if not found[0]:
+            found = _marched(path, mu, largest, 0.0, limit, trail, trace, phi)
+    return found

@@ -17,7 +17,7 @@ from bladefem.friction.harmonics import analysis, synthesis
 from bladefem.friction.lane_kernels import TILE
 from bladefem.friction.lanes import LANES
 
-__all__ = ["Node", "Tables", "add_gram", "gram", "tables", "values", "weighted"]
+__all__ = ["Node", "Patterns", "Tables", "add_gram", "gram", "patterns", "tables", "values", "weighted"]
 
 
 class Node(NamedTuple):
@@ -39,10 +39,16 @@ class Tables(NamedTuple):
     along: np.ndarray       # (K, width) the same, which runs along time and begins again after S
     analysis: np.ndarray    # (width, K) weights of a sample in the coefficients
     means: np.ndarray       # (width, 4H+1) weights of a sample in the basis means up to 2H
-    wide: np.ndarray        # (S, W) synthesis at the samples, zeros beyond K
-    change: np.ndarray      # (S, W) its change from knot to knot
     fours: np.ndarray       # (., 4) samples i, S/2 - i, S/2 + i, S - i; S stands for none
-    weights: np.ndarray     # (., tile) of the samples i in the coefficients, zeros beyond K
+    W: int                  # K filled up to a multiple of 8
+
+
+class Patterns(NamedTuple):
+    """Read-only arrays for the derivative of 2-D elements, in its precision."""
+
+    at: np.ndarray          # (S, W) synthesis at the samples, zeros beyond K
+    change: np.ndarray      # (S, W) its change from knot to knot
+    weights: np.ndarray     # (., tile) of the samples i of the fours in the coefficients, zeros beyond K
 
 
 @lru_cache(maxsize=8)
@@ -57,10 +63,21 @@ def tables(H: int, samples: int) -> Tables:
     knots[:, 1:] /= np.repeat(np.cos(np.pi / samples * np.arange(1, H + 1)), 2)
     more, weights = _filled(samples) + LANES - samples, analysis(H, samples).T
     along, blank = knots[np.arange(samples + more) % samples].T, ((0, more), (0, 0))
-    columns = ((0, 0), (0, _filled(2 * H + 1) - 2 * H - 1))
     made = Tables(at, at.T.copy(), sums, knots, along.copy(), np.pad(weights, blank), np.pad(wide[:samples], blank),
-                  np.pad(at, columns), np.pad(np.roll(knots, -1, axis=0) - knots, columns), _fours(samples),
-                  np.pad(weights[:samples // 2 + 1], ((0, 0), (0, _tiled(H) - 2 * H - 1))))
+                  _fours(samples), _filled(2 * H + 1))
+    for array in made[:-1]:
+        array.setflags(write=False)
+    return made
+
+
+@lru_cache(maxsize=8)
+def patterns(H: int, samples: int, dtype: type) -> Patterns:
+    """Patterns for H harmonics and S samples."""
+    tab = tables(H, samples)
+    columns = ((0, 0), (0, tab.W - 2 * H - 1))
+    change = np.roll(tab.knots, -1, axis=0) - tab.knots
+    weights = np.pad(tab.analysis[:samples // 2 + 1], ((0, 0), (0, _tiled(H) - 2 * H - 1)))
+    made = Patterns(*(x.astype(dtype) for x in (np.pad(tab.at, columns), np.pad(change, columns), weights)))
     for array in made:
         array.setflags(write=False)
     return made
