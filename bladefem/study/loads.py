@@ -15,6 +15,7 @@ from ..hbm.sweep import size
 from ..progress import Progress, unwatched
 from ..scene import Scene
 from .choice import adapted, checked, estimated, peak_of
+from .contact_mesh import halved_change
 from .family import Family, member
 from .joint import LoadCase
 from .liftoff import named
@@ -54,6 +55,7 @@ class Curve:
     checked: np.ndarray         # (k,) bool: estimated at this very point; else between its neighbours
     stability: np.ndarray       # (k,) "unique", "stable", "unstable", "unknown", or "" where it was not asked for
     multiplier: np.ndarray      # (k,) largest modulus of the Floquet multipliers; NaN where not computed
+    halved: float               # relative change of the peak's height with half as many contact points; NaN: unknown
     peak: Solution              # the highest converged point
 
     @property
@@ -109,7 +111,7 @@ def curve_of(scene: Scene, case: LoadCase, family: Callable[[LoadCase], Family],
     if scene.study.stability:
         marks = stability_of(member(models, curve.settings).model, curve.points)
     return Curve(case.load, case.mass, curve.settings, *columns, estimated(curve), tolerated, checked(curve),
-                 marks.verdict, marks.multiplier, top)
+                 marks.verdict, marks.multiplier, halved_change(models, curve.settings, top), top)
 
 
 def _record(p: Solution) -> tuple[object, ...]:
@@ -131,14 +133,14 @@ def summary(curves: list[Curve], limits: tuple[Limit, Limit]) -> dict[str, np.nd
 def _row(c: Curve) -> dict[str, float]:
     return {"load": c.load, "peak_frequency": c.peak_frequency, "peak_amplitude": c.peak_amplitude, "reduction": 1.0,
             "dissipated": c.peak.work.dissipated, "slipping": c.peak.states["slip"] + c.peak.states["lift"],
-            "error": np.nan if c.settings.error is None else c.settings.error, "harmonics": c.settings.harmonics,
-            "points": len(c.frequency), "unconverged": int((~c.converged).sum())}
+            "error": np.nan if c.settings.error is None else c.settings.error, "halved": c.halved,
+            "harmonics": c.settings.harmonics, "points": len(c.frequency), "unconverged": int((~c.converged).sum())}
 
 
 def _linear_row(limit: Limit) -> dict[str, float]:
     return {"load": limit.load, "peak_frequency": limit.peak_frequency, "peak_amplitude": limit.peak_amplitude,
-            "reduction": 1.0, "dissipated": 0.0, "slipping": 0, "error": 0.0, "harmonics": 1,
-            "points": len(limit.frequency), "unconverged": 0}
+            "reduction": 1.0, "dissipated": 0.0, "slipping": 0, "error": 0.0, "halved": 0.0,
+            "harmonics": 1, "points": len(limit.frequency), "unconverged": 0}
 
 
 def default_loads(scene: Scene, count: int = 8) -> tuple[float, ...]:

@@ -28,7 +28,7 @@ from ..store import found_remark, stage
 from ..units import show
 from .choice import choose, covered, peak_of
 from .clamped import clamped_blade
-from .contact_mesh import coarse_sentence
+from .contact_mesh import coarse_sentence, halved_sentence
 from .cycle import labels
 from .family import Family, Member, coarsened, member, shared_harmonics
 from .joint import LoadCase, joint_model
@@ -299,6 +299,9 @@ def _remarks(scene: Scene, settings: Settings, curves: list[Curve], nodes: int) 
         remarks.append("mean displacements held as the static contact solution left them (model.static)")
     if scene.study.stability:
         remarks.append(stability_sentence([(c.stability, c.multiplier) for c in curves]))
+    halved = halved_sentence([c.load for c in curves], [c.halved for c in curves], scene.accuracy)
+    if halved:
+        remarks.append(halved)
     lost = sum(int((~c.converged).sum()) for c in curves)
     if lost:
         remarks.append(f"{lost} of {sum(len(c.frequency) for c in curves)} response points did not converge; they are "
