@@ -78,6 +78,7 @@ COLUMNS = {
     "error": Column("estimated error", "1", "%", 100.0, 2),
     "free_frequency": Column("without damper", "Hz"),
     "free_amplitude": Column("amplitude without damper", "m", "µm", 1e6),
+    "halved": Column("change with half the contact points", "1", "%", 100.0, 2),
     "estimated_error": Column("estimated error", "1", "%", 100.0, 2),
     "tolerated_error": Column("tolerated error", "1", "%", 100.0, 3), "error_checked": Column("error checked here"),
     "stability": Column("stability"), "multiplier": Column("largest Floquet multiplier", "1", digits=6),
