@@ -80,12 +80,12 @@ def _sizes(text: str | None, option: str) -> list[float] | None:
 
 
 def contact(options: argparse.Namespace, comm: Any) -> None:
-    """Seat the damper: force and pressure of each face under each load."""
+    """Seat the damper: force and pressure of each face under each load, with tables, picture and ParaView file."""
     scene, folder, bars = prepared(options, comm)
     if scene.kind in WITHOUT_BLADE:
         return without_blade(scene, folder, options, comm)
-    from ..study import pipeline
-    run = pipeline.run(scene, folder, until="contact", comm=comm, progress=bars)
+    from ..report import pressure
+    run = pressure.run(scene, folder, comm, bars)
     tell(options, comm, lambda: tables.pressures(run.contact.maps), run)
 
 

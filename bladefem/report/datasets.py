@@ -2,14 +2,16 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
 import pandas as pd
 
+from ..data import PressureMap
 from .tables import units_of
 
-__all__ = ["datasets", "mode_shapes", "resultants", "table_dataset"]
+__all__ = ["contact_arrays", "datasets", "mode_shapes", "resultants", "table_dataset"]
 
 MEANING = {"force": "contact force on the damper", "moment": "its moment about the engine's origin",
            "centre": "force-weighted middle of the contact", "forces": "sum of the normal forces",
@@ -18,7 +20,7 @@ MEANING = {"force": "contact force on the damper", "moment": "its moment about t
 
 def datasets(result: Any, tables: dict[str, pd.DataFrame]) -> dict[str, Any]:
     """Groups "modes", "contact", "resultants", "points", "summary" of a finished run (study.pipeline.Run)."""
-    return {"modes": mode_shapes(result), "contact": _contact(result),
+    return {"modes": mode_shapes(result), "contact": contact_arrays(result.contact.maps),
             "resultants": resultants(tables["contact/pressure"]),
             "points": table_dataset(tables["response/points"], "point"),
             "summary": table_dataset(tables["response/summary"], "case")}
@@ -40,9 +42,9 @@ def mode_shapes(result: Any) -> Any:
          "mode": np.arange(1, count + 1), "direction": ["x", "y", "z"]})
 
 
-def _contact(result: Any) -> Any:
+def contact_arrays(maps: Mapping[float, Sequence[PressureMap]]) -> Any:
+    """Force, gap and pressure of each contact node under each load [N], with its place and patch."""
     import xarray as xr
-    maps = result.contact.maps
     patches = next(iter(maps.values()))
     force = np.array([np.concatenate([m.force for m in seats]) for seats in maps.values()])
     gap = np.array([np.concatenate([m.gap for m in seats]) for seats in maps.values()])

@@ -29,7 +29,7 @@ def cycles_of(result: Run) -> list[ContactCycle]:
 
 def node_table(patches: Sequence[Patch], cycles: Sequence[ContactCycle],
                coefficient: float | None = None) -> pd.DataFrame:
-    """One row a contact node and resonance: place, shares of the period, state, work a period and area (SI).
+    """One row a contact node and resonance: place, element, shares of the period, state, work a period and area (SI).
 
     A wear coefficient [m^3/J] adds the depth worn off in an hour.
     """
@@ -42,6 +42,7 @@ def node_table(patches: Sequence[Patch], cycles: Sequence[ContactCycle],
         wear = {} if coefficient is None else {"wear_per_hour": c.wear(coefficient)}
         frames.append(pd.DataFrame({
             "load": c.load, **mass, "patch": names, "x": place[:, 0], "y": place[:, 1], "z": place[:, 2], "area": area,
+            **{name: getattr(c.elements, name) for name in ("mu", "kt", "kn", "n0")},
             "stick": c.shares[:, 0], "slip": c.shares[:, 1], "separated": c.shares[:, 2], "state": c.state,
             "work": c.work, "free_static_force": c.spare, **linear_columns(c), **wear}))
     return pd.concat(frames, ignore_index=True)

@@ -31,7 +31,7 @@ from ..study.state_check import state_sentence
 from ..study.strength import Strength
 from ..study.survey import excited_set
 from ..units import show
-from ..view import contact, mesh, modes, response, speed
+from ..view import mesh, modes, response, speed
 from .datasets import datasets, table_dataset
 from .linear import harmonic_table, linear_sentence
 from .nodes import (
@@ -44,6 +44,7 @@ from .nodes import (
     wear_sentence,
     wear_table,
 )
+from .pressure import PICTURE, draw_seats, pressure_table, write_points
 from .tables import units_of, write_tables
 from .write import write_report
 
@@ -95,7 +96,7 @@ def _write(result: pipeline.Run, progress: Progress) -> None:
         draw(figures[name])
     mesh.save_vtu(result.mesh, folder / "mesh.vtu")
     modes.save_modes_vtu(result.mesh, excited_set(result), folder / "modes.vtu")
-    contact.save_pressure_vtu(result.contact.maps, folder / "pressure.vtu")
+    write_points(folder, result.contact.maps)
     save_cycles_vtu(patches, cycles, folder / "friction_work.vtu", coefficient)
     messages = [*filter(None, [moved]), *result.messages, MESH, _static_contact(result), _states(result),
                 linear_sentence(cycles), *_beyond_stick(result),
@@ -127,16 +128,12 @@ def _beyond_stick(result: pipeline.Run) -> list[str]:
 
 def _tables(result: pipeline.Run) -> dict[str, pd.DataFrame]:
     """Tables of the report, "section/name", SI columns."""
-    seats = [m for maps in result.contact.maps.values() for m in maps]
-    loads = np.repeat(list(result.contact.maps), 2)
-    pressure = contact.pressure_summary(seats)
-    pressure.insert(0, "load", loads[:len(pressure)])
     curves = result.response.curves
     return {"mesh/quality": pd.DataFrame(quality_rows(result.mesh), columns=["what", "value"]),
             "modes/modes": family_table(excited_set(result), result.mesh, result.clamped),
             "modes/nodal_diameters": mode_table(result.modes, result.mesh, result.clamped),
             "modes/stresses": _stresses(result.strength),
-            "contact/pressure": pressure,
+            "contact/pressure": pressure_table(result.contact.maps),
             **_own_load(result),
             "response/summary": _summary(result),
             "response/points": _joined([*map(points_of, curves), *map(linear_points, result.response.limits)])}
@@ -228,8 +225,7 @@ def _drawings(result: pipeline.Run, tables: dict[str, pd.DataFrame]) -> dict[str
         "mesh/mesh": lambda file: mesh.draw_mesh(geometry, file, title=result.scene.title),
         "modes/first_modes": lambda file: modes.draw_mode_sheet(
             geometry, excited, file, families=list(tables["modes/modes"]["family"])),
-        "contact/pressure_on_both_seats": lambda file: contact.draw_pressure(
-            result.contact.maps[best], file, title=f"contact pressure under {best:g} N per seat"),
+        f"contact/{PICTURE}": lambda file: draw_seats(result.contact.maps, best, file),
         **{name: partial(response.draw_responses, points, title=_title(result.scene))
            for name, points in _by_mass(tables["response/points"])},
         "response/optimum": lambda file: response.draw_optimum(

@@ -63,7 +63,8 @@ COLUMNS = {
     "pressure_error": Column("pressure's L2 error", "1", "%", 100.0, 2),
     "contact_share": Column("share pressed", "1", "%", 100.0, 3), "gap": Column("gap", "m", "µm", 1e6, 3),
     **{name: Column(name, "m", "mm", 1e3) for name in "xyz"}, "work": Column("friction work an area", "J/m^2"),
-    "free_static_force": Column("free static friction", "N", digits=4),
+    "mu": Column("friction coefficient"), "kt": Column("k_t", "N/m"), "kn": Column("k_n", "N/m"),
+    "n0": Column("static normal force", "N"), "free_static_force": Column("free static friction", "N", digits=4),
     **{f"{name}{t}": Column(f"{title}{t.replace('_', ' ')}", unit, digits=4) for t in ("", "_t1", "_t2")
        for name, title, unit in (("k_ad", "K_ad", "N/m"), ("c_ad", "C_ad", "N s/m"), ("f_c0", "F_c0", "N"))},
     "wear_per_hour": Column("wear in an hour", "m", "µm", 1e6, 4),

@@ -38,7 +38,8 @@ class Loop:
 class ContactCycle:
     """One period of all contact nodes, patch after patch; nodes of one friction element share its values.
 
-    Its linear approximation is shared out by area, so that the sum over the nodes is that of the element.
+    Its stiffness, static load and linear approximation are shared out by area, so that the sum over the nodes is that
+    of the element.
     """
 
     load: float             # [N]
@@ -51,6 +52,7 @@ class ContactCycle:
     loops: dict[str, Loop]  # name of the patch to its hysteresis
     linear: Approximation   # (nodes, tangents) K_ad, C_ad, F_c0 averaged over the harmonics; nan at rest
     harmonic: Approximation     # (nodes, tangents, H) K_ad, C_ad of each harmonic alone; nan where the motion lacks it
+    elements: Elements      # (nodes,) what the period was computed with; an element's own mu, shares of the rest
     mismatch: float         # largest |work of the approximation - friction work| over the largest friction work [1]
 
     def wear(self, coefficient: float) -> np.ndarray:
@@ -83,7 +85,9 @@ def contact_cycle(case: LoadCase, curve: Curve, patches: Sequence[Patch], points
     return ContactCycle(case.load, case.mass, curve.peak.frequency, forces.shares[groups], forces.state[groups],
                         part / area * forces.dissipated[groups], free_static_force(elements, w)[groups],
                         {patch.name: _loop(elements, w, some) for patch, some in zip(patches, rows, strict=True)},
-                        _dealt(averaged, groups, part), _dealt(each, groups, part), mismatch)
+                        _dealt(averaged, groups, part), _dealt(each, groups, part),
+                        Elements(elements.kt[groups] * part, elements.kn[groups] * part, elements.mu[groups],
+                                 elements.n0[groups] * part, elements.tangents), mismatch)
 
 
 def _linear(forces: Forces, w: np.ndarray, omega: float) -> tuple[Approximation, Approximation, float]:

@@ -64,12 +64,16 @@ def pipeline(monkeypatch):
     def report(scene, folder, comm, progress):
         return run(scene, folder, "report", comm, progress)
 
+    def contact(scene, folder, comm, progress):
+        return run(scene, folder, "contact", comm, progress)
+
     def modes(scene, folder, wanted, pictures, comm, progress):
         found = run(scene, folder, "modes", comm, progress)
         state.wanted, state.pictures = wanted, pictures
         return SimpleNamespace(run=found, campbell=None, convergence=None, answer=None, mac=np.eye(2))
 
     replace_module(monkeypatch, bladefem.report, "modes", modes)
+    replace_module(monkeypatch, bladefem.report, "pressure", contact)
     replace_module(monkeypatch, bladefem.study, "pipeline", run)
     replace_module(monkeypatch, bladefem.report, "run", report)
     return SimpleNamespace(calls=calls, state=state)

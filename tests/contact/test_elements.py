@@ -1,6 +1,5 @@
 """Elements, resultants and state tables made from pressure maps."""
 
-import csv
 from dataclasses import replace
 
 import numpy as np
@@ -13,7 +12,7 @@ from bladefem.contact.patch import patch_means
 from bladefem.contact.seat import solve
 from bladefem.contact.states import interpolate, quasi_static, state_table
 from bladefem.contact.stiffness import aggregation, friction_elements, mindlin_ratio, normal_stiffness, pair_ratio
-from bladefem.contact.summary import resultant, write_maps
+from bladefem.contact.summary import resultant
 from bladefem.data import PressureMap
 from bladefem.errors import InputError
 from bladefem.scene import Contact, Material, Seat
@@ -151,14 +150,6 @@ def test_resultants_balance_the_pull(problem, maps):
     assert np.abs(total).max() < 1e-9 * np.linalg.norm(this.force)
     assert this.normal == pytest.approx(np.linalg.norm(this.force), rel=1e-12)
     assert this.share < 1 and this.peak > this.normal / this.area
-
-
-def test_maps_as_csv(maps, tmp_path):
-    write_maps(maps, tmp_path / "maps.csv")
-    with open(tmp_path / "maps.csv", newline="") as stream:
-        rows = list(csv.DictReader(stream))
-    assert len(rows) == sum(len(m.force) for m in maps)
-    assert sum(float(r["force_N"]) for r in rows) == pytest.approx(sum(m.force.sum() for m in maps), rel=1e-12)
 
 
 def tilted(problem):

@@ -53,14 +53,18 @@ def test_work_and_states_of_circular_orbits(directions):
     table = node_table(patches, [cycle])
     assert (table["area"] * table["work"]).sum() == pytest.approx(sum(exact), rel=1e-10)
     assert list(table["patch"]) == ["this"] * 8 + ["next"] * 8
+    np.testing.assert_allclose(table[["mu", "kt", "kn", "n0"]], np.tile([MU, KT, KT * (directions == 3), N], (16, 1)))
 
 
 def test_joined_nodes_share_the_work_of_their_element():
     """One element on each patch, as the choice of the model may leave: 8 springs and loads in one."""
     radius = np.array([0.5, 3.0]) * MU * N / KT
-    _, cycle = at_resonance(radius, 3, 1)
+    patches, cycle = at_resonance(radius, 3, 1)
     np.testing.assert_allclose(cycle.work[:8], 0, atol=1e-12)
     np.testing.assert_allclose(8e-6 * cycle.work[8:], circular_orbit_work(radius[1], 8 * KT, 8 * MU * N), rtol=1e-10)
+    sums = node_table(patches, [cycle]).groupby("patch")[["kt", "kn", "n0"]].sum()
+    np.testing.assert_allclose(sums, np.tile([8 * KT, 8 * KT, 8 * N], (2, 1)))
+    np.testing.assert_allclose(cycle.elements.mu, MU)
 
 
 @pytest.mark.parametrize("joined", [None, 1])
