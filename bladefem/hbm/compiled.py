@@ -19,6 +19,7 @@ CONVERGED, EXHAUSTED, STALLED, SINGULAR, INFINITE, SEARCHING = 0, 1, 2, 3, 4, 5
 BLOCK = 32                  # columns of a block
 LARGE = 64                  # unknowns from which blocks pay, and iterations where they arrive
 FINEST, COARSEST = 1e-6, 1e-4     # accuracy of a step by iterations, relative,
+CLOSE = 1e-2                # where no more is needed to arrive,
 ROUGH = 1e-3                # and of the one that the line search looks at; coarser ones mislead it
 
 
@@ -257,7 +258,7 @@ def compiled_newton(w, d, linear, contact, sticks, tolerance, iterations, shorte
     code, steps, share, before, error = SEARCHING, -1, 1.0, np.inf, np.inf
     while code == SEARCHING:
         fresh = _evaluate(trial, d, linear, contact, work)
-        if steps >= 0:
+        if steps >= 0 and not fresh <= tolerance:
             factors = _step(r, ROUGH, d, active, C, A, few, factors, after)
             if not norm(after) <= (1 - 0.25 * share) * before:
                 share /= 2
@@ -272,7 +273,8 @@ def compiled_newton(w, d, linear, contact, sticks, tolerance, iterations, shorte
             break
         active, C = _moving(J, springs, d, sticks)
         few, factors = _among(A, active, d), (factors[0][:0, :0], factors[1][:0])
-        factors = _step(r, min(max(0.1 * error, FINEST), COARSEST), d, active, C, A, few, factors, step)
+        needed = max(FINEST, min(0.1 * error, COARSEST), min(0.1 * tolerance / error, CLOSE))
+        factors = _step(r, needed, d, active, C, A, few, factors, step)
         before, share = norm(step), 1.0
         if not np.isfinite(before):
             code = SINGULAR

@@ -14,20 +14,21 @@ __all__ = ["apply", "conjugate_residuals"]
 DIRECTIONS = 60     # after which it is given up
 
 
-@njit(cache=True, error_model="numpy")
+@njit(cache=True, error_model="numpy", fastmath={"contract", "reassoc"})
 def apply(A, x, out):
     """out (m, K) += A (H+1, m, m) times x (m, K), both as real coefficients."""
     m = x.shape[0]
-    for i in range(m):
-        for j in range(m):
-            out[i, 0] += A[0, i, j].real * x[j, 0]
-    for h in range(1, A.shape[0]):
-        c, s = 2 * h - 1, 2 * h
+    for h in range(A.shape[0]):
+        c, s, turn = max(2 * h - 1, 0), 2 * h, 1.0 if h else 0.0
         for i in range(m):
+            cos, sin = 0.0, 0.0
             for j in range(m):
-                re, im = A[h, i, j].real, A[h, i, j].imag
-                out[i, c] += re * x[j, c] + im * x[j, s]
-                out[i, s] += re * x[j, s] - im * x[j, c]
+                re, im = A[h, i, j].real, turn * A[h, i, j].imag
+                cos += re * x[j, c] + im * x[j, s]
+                sin += re * x[j, s] - im * x[j, c]
+            out[i, c] += cos
+            if h:
+                out[i, s] += sin
 
 
 @njit(cache=True, error_model="numpy")

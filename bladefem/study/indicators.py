@@ -34,7 +34,7 @@ from .settings import DAMPERS, DIRECTIONS, Settings
 
 __all__ = ["Indicators", "indicate", "judge", "moved", "richer"]
 
-ENOUGH = Options(1e-5, 30, fallbacks=False)     # for a point that only tells how wrong another one is
+ENOUGH = Options(1e-5, 30, fallbacks=False, frugal=True)    # for a point that only tells how wrong another one is
 
 
 @dataclass(frozen=True)
