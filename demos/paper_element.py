@@ -31,21 +31,20 @@ samples = 2048 if coarse else 16384
 # %%
 kt, limit, amplitude = 1e6, 10.0, 30e-6        # N/m, N, m
 loop = two_slope_loop(kt, limit, amplitude, samples)
-fit = linear_fit(loop)
+fit, linear = linear_fit(loop)
 theta = np.arccos(1 - 2 * limit / (kt * amplitude))
 closed = kt / np.pi * (theta - np.sin(2 * theta) / 2), kt / np.pi * np.sin(theta) ** 2
 print(f"K  {fit.stiffness:12.1f} N/m, closed form {closed[0]:12.1f}")
 print(f"wC {fit.damping:12.1f} N/m, closed form {closed[1]:12.1f}")
 if not coarse:
-    draw_fit(loop.angle, loop.motion, loop.force, fit.force, folder / "fig_1.png")
+    draw_fit(loop.angle, loop.motion, loop.force, linear, folder / "fig_1.png")
 
 # %% [markdown]
 # Eq. 13 says that the linear force does the work of the friction force. It does, for any motion and any load, because
 # $u$ and $\dot u$ are orthogonal over a period.
 
 # %%
-linear = trapezoid(fit.force, loop.motion)
-print(f"work {work(loop):.6e} J, of the linear force {linear:.6e} J, "
+print(f"work {work(loop):.6e} J, of the linear force {trapezoid(linear, loop.motion):.6e} J, "
       f"closed form {4 * limit * (amplitude - limit / kt):.6e} J")
 
 # %% [markdown]

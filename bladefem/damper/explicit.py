@@ -15,6 +15,7 @@ from numba import njit
 
 from bladefem.errors import InputError
 
+from ..friction.march import stable_step, step_1d
 from ..hbm.flow import State, rest
 from ..hbm.system import System
 
@@ -38,7 +39,7 @@ class Cycle:
 
 def stable_steps(system: System, omega: float) -> int:
     """Fewest explicit steps a period: dt < 2 / omega_max, all elements stuck."""
-    return int(np.floor(system.fastest * np.pi / omega)) + 1
+    return int(np.floor(2 * np.pi / omega / stable_step(system.fastest))) + 1
 
 
 def damper_cycle(system: System, omega: float, steps: int, start: State | None = None, most: int = 300,
@@ -116,7 +117,7 @@ def _leapfrog(arrays, y, inputs, dt):
     n, d = W.shape
     steps = p.shape[0] - 1
     Q, R, F = np.empty((steps, d)), np.empty((steps, n)), np.empty((steps, n))
-    q, v, z, a = y[:d], y[d:2 * d], y[2 * d:], np.empty(d)
+    q, v, z, a, before = y[:d], y[d:2 * d], y[2 * d:], np.empty(d), np.empty(n)
     for m in range(steps + 1):
         row = m % steps
         for k in range(d):
@@ -126,9 +127,8 @@ def _leapfrog(arrays, y, inputs, dt):
             for k in range(d):
                 w += W[i, k] * q[k]
                 N += V[i, k] * q[k]
-            bound = mu[i] * max(N, 0.0)
-            f = min(max(kt[i] * (w - z[i]), -bound), bound)
-            z[i] = w - f / kt[i]
+            f = step_1d(kt[i] * (w - z[i]), before[i] if m > 0 else N, N, mu[i])
+            z[i], before[i] = w - f / kt[i], N
             lift = max(N, 0.0) - rest_load[i]
             for k in range(d):
                 a[k] -= f * W[i, k] + lift * react[i, k]

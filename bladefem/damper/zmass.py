@@ -18,6 +18,8 @@ from numba import njit
 
 from bladefem.errors import InputError
 
+from ..friction.march import stable_step, step_2d
+
 __all__ = ["Footprint", "MassOnFoundation", "Motion", "ellipse", "march", "pulsating_load", "skewed", "z_footprint"]
 
 
@@ -105,7 +107,7 @@ def march(body: MassOnFoundation, base: np.ndarray, load: np.ndarray, dt: float,
     Raises:
         InputError: the step is beyond the stability limit of the explicit march (2 over the highest stuck frequency).
     """
-    limit = stable_step(body)
+    limit = stable_step(_fastest(body))
     if not 0 < dt < limit:
         raise InputError(f"dt = {dt:.3g} s, expected a positive step below {limit:.3g} s, the stability limit of the "
                          f"explicit march")
@@ -118,13 +120,13 @@ def march(body: MassOnFoundation, base: np.ndarray, load: np.ndarray, dt: float,
     return Motion(dt, history[:, :3], history[:, 3:6], history[:, 6:9], history[:, 9:], springs)
 
 
-def stable_step(body: MassOnFoundation) -> float:
-    """Largest stable step of the leapfrog march, 2 / omega_max of the fully stuck mass [s]."""
+def _fastest(body: MassOnFoundation) -> float:
+    """Highest circular frequency of the fully stuck mass [rad/s]."""
     k, points = _springs(body), body.footprint.points
     offset = np.linalg.norm(k @ points)
     stiffness = np.array([[body.kt, offset], [offset, k @ (points**2).sum(axis=1)]])
     scale = 1 / np.sqrt([body.mass, body.inertia])
-    return 2 / np.sqrt(np.linalg.eigvalsh(stiffness * np.outer(scale, scale)).max())
+    return float(np.sqrt(np.linalg.eigvalsh(stiffness * np.outer(scale, scale)).max()))
 
 
 def _springs(body: MassOnFoundation) -> np.ndarray:
@@ -134,45 +136,8 @@ def _springs(body: MassOnFoundation) -> np.ndarray:
 
 
 @njit(cache=True)
-def _return(px, py, dx, dy, before, after):
-    """Force x, y and whether it slipped, for a straight step of elastic force (dx, dy), the limit before and after.
-
-    Sticks as long as it can, then slips: the angle psi between force and motion obeys psi' = -k |w'| sin(psi) / limit,
-    solved exactly for a straight step (Krieg and Krieg, J. Pressure Vessel Tech. 99 (1977) 510, for plasticity); the
-    plain radial return lags by half a step on curved paths.
-    """
-    tx, ty = px + dx, py + dy
-    if tx * tx + ty * ty <= after * after:
-        return tx, ty, 0.0
-    if after <= 0.0:
-        return 0.0, 0.0, 0.0
-    path = np.hypot(dx, dy)
-    grow = after - before
-    a = path * path - grow * grow
-    b = px * dx + py * dy - before * grow
-    c = px * px + py * py - before * before
-    stick = 0.0
-    if a > 0.0 and b * b - a * c > 0.0:
-        stick = min(max((np.sqrt(b * b - a * c) - b) / a, 0.0), 1.0)
-    elif a < 0.0 and b * b - a * c > 0.0 and c < 0.0:
-        stick = min(max((-np.sqrt(b * b - a * c) - b) / a, 0.0), 1.0)
-    px, py = px + stick * dx, py + stick * dy
-    size = np.hypot(px, py)
-    if size == 0.0 or path == 0.0:
-        scale = after / np.hypot(tx, ty)
-        return tx * scale, ty * scale, 1.0
-    mean = 0.5 * (before + stick * grow + after)
-    cosine, sine = (px * dx + py * dy) / (size * path), (dx * py - dy * px) / (size * path)
-    half = np.arctan2(sine, 1.0 + cosine) if cosine > -1.0 else 0.5 * np.pi
-    angle = 2.0 * np.arctan(np.tan(half) * np.exp(-(1.0 - stick) * path / mean))
-    fx = after * (np.cos(angle) * dx - np.sin(angle) * dy) / path
-    fy = after * (np.cos(angle) * dy + np.sin(angle) * dx) / path
-    return fx, fy, 1.0
-
-
-@njit(cache=True)
-def _friction(springs, nodes, turn, step, limits, out):
-    """Friction of all nodes over one step; ``out``: force x, y, moment, slip x, y. ``limits``: load before, after."""
+def _friction(springs, nodes, turn, step, loads, out):
+    """Friction of all nodes over one step; ``out``: force x, y, moment, slip x, y. ``loads``: total before, after."""
     before, after = turn
     c0, s0, c1, s1 = np.cos(before), np.sin(before), np.cos(after), np.sin(after)
     out[:] = 0.0
@@ -183,7 +148,7 @@ def _friction(springs, nodes, turn, step, limits, out):
         dx = step[0] - (rx - (c0 * x - s0 * y))
         dy = step[1] - (ry - (s0 * x + c0 * y))
         px, py = springs[i, 0], springs[i, 1]
-        fx, fy, slips = _return(px, py, k * dx, k * dy, share * limits[0], share * limits[1])
+        fx, fy, slips = step_2d(px, py, k * dx, k * dy, loads[0], loads[1], share)
         weight += share
         out[3] += slips * share * (dx - (fx - px) / k)
         out[4] += slips * share * (dy - (fy - py) / k)
@@ -207,7 +172,7 @@ def _march(state, springs, nodes, inertia, base, load, dt):
     q, v = state[:3].copy(), state[3:].copy()
     out = np.zeros(5)
     step = np.zeros(2)
-    _friction(springs, nodes, (q[2], q[2]), step, (max(load[0], 0.0), max(load[0], 0.0)), out)
+    _friction(springs, nodes, (q[2], q[2]), step, (load[0], load[0]), out)
     still = np.array([inertia[2], inertia[3], 0.0]) / mass
     a = out[:3] / mass + still
     for n in range(steps):
@@ -215,7 +180,7 @@ def _march(state, springs, nodes, inertia, base, load, dt):
         turned = q[2] + dt * v[2]
         step[0] = base[n + 1, 0] - base[n, 0] - dt * v[0]
         step[1] = base[n + 1, 1] - base[n, 1] - dt * v[1]
-        _friction(springs, nodes, (q[2], turned), step, (max(load[n], 0.0), max(load[n + 1], 0.0)), out)
+        _friction(springs, nodes, (q[2], turned), step, (load[n], load[n + 1]), out)
         q += dt * v
         a = out[:3] / mass + still
         v += 0.5 * dt * a

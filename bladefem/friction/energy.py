@@ -1,39 +1,13 @@
-"""Energy and wear: dissipated energy, its map over a patch, slip distance, Archard's wear work; free static force."""
+"""What vibration leaves undetermined: the static friction force of stuck nodes."""
 
 from __future__ import annotations
 
 import numpy as np
 
-from bladefem.data import Elements, Patch
-from bladefem.errors import InputError
-from bladefem.friction.aft import Forces
+from bladefem.data import Elements
 from bladefem.friction.harmonics import harmonics_of, synthesis
 
-__all__ = ["energy_density", "free_static_force", "slip_distance", "wear_depth"]
-
-
-def energy_density(forces: Forces, patch: Patch) -> np.ndarray:
-    """(n,) dissipated energy a cycle and area [J/m^2]: the wear-work map of a patch."""
-    if patch.area.shape != forces.dissipated.shape:
-        raise InputError(f"patch: {patch.area.size} nodes do not fit {forces.dissipated.size} elements")
-    return forces.dissipated / patch.area
-
-
-def wear_depth(forces: Forces, patch: Patch, coefficient: float, cycles: float) -> np.ndarray:
-    """(n,) worn depth [m] after ``cycles`` cycles, coefficient [m^3/J] times energy an area (Archard)."""
-    return coefficient * cycles * energy_density(forces, patch)
-
-
-def slip_distance(elements: Elements, w: np.ndarray, forces: Forces, samples: int = 512) -> np.ndarray:
-    """(n,) length of the slider's path in one cycle [m], from f and w of all harmonics at ``samples`` instants.
-
-    The force of H harmonics has ripples, which the slider w - f/kt follows: a figure for maps, exact as H grows.
-    Nodes that never slip give 0.
-    """
-    T = synthesis(harmonics_of(w), samples)
-    slider = (w[:, 1:] - forces.f[:, 1:] / np.asarray(elements.kt)[:, None, None]) @ T.T
-    path = np.linalg.norm(np.diff(slider, axis=-1, append=slider[..., :1]), axis=1).sum(-1)
-    return np.where(forces.shares[:, 1] > 0, path, 0.0)
+__all__ = ["free_static_force"]
 
 
 def free_static_force(elements: Elements, w: np.ndarray, samples: int = 512) -> np.ndarray:

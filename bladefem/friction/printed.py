@@ -18,9 +18,12 @@ them. Work ratio: work of one period over that of the corrected law.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
 
 import numpy as np
+
+from .march import step_1d
 
 Motion = Callable[[float], tuple[float, float]]
 
@@ -32,22 +35,22 @@ def differential(g: np.ndarray, N: np.ndarray, kt: float, mu: float, heaviside_a
 
     The second branch, with its factor 1/dt, takes the excess off within one step.
     """
-    f = np.zeros(g.size)
-    for i in range(1, g.size):
-        old, room = f[i - 1], mu * N[i - 1] - abs(f[i - 1])
-        f[i] = old + kt * (g[i] - g[i - 1]) * np.heaviside(room, heaviside_at_zero)
-        f[i] -= np.heaviside(-room, heaviside_at_zero) * abs(room) * np.sign(old)
-    return f
+    f, forces = 0.0, [0.0]
+    for dg, load in zip(np.diff(g).tolist(), N[:-1].tolist(), strict=True):
+        room = mu * load - abs(f)
+        sticks = room > 0 or (room == 0 and heaviside_at_zero == 1)
+        f += (kt * dg if sticks else 0.0) + (math.copysign(room, -f) if room < 0 and f else 0.0)
+        forces.append(f)
+    return np.array(forces)
 
 
 def corrected(g: np.ndarray, N: np.ndarray, kt: float, mu: float, f0: float = 0.0) -> np.ndarray:
     """Force (samples,) [N] of the return map f = clamp(f + kt dg, -mu N+, mu N+), from f0."""
-    f = np.empty(g.size)
-    f[0] = f0
-    for i in range(1, g.size):
-        limit = mu * max(N[i], 0.0)
-        f[i] = min(max(f[i - 1] + kt * (g[i] - g[i - 1]), -limit), limit)
-    return f
+    forces = [f0]
+    loads = N.tolist()
+    for dg, before, now in zip(np.diff(g).tolist(), loads[:-1], loads[1:], strict=True):
+        forces.append(step_1d(forces[-1] + kt * dg, before, now, mu))
+    return np.array(forces)
 
 
 def corrected_rate(motion: Motion, load: Motion, kt: float, mu: float, times: np.ndarray) -> np.ndarray:

@@ -42,14 +42,14 @@ RATIOS = [Fraction(r) for r in "0 1/5 1/4 1/3 2/5 1/2 3/5 2/3 3/4 4/5 1 6/5 4/3 
 def element(folder: Path) -> Iterator[Claim]:
     """Fig. 1, 3, 4."""
     loop = two_slope_loop(1e6, 10.0, 30e-6, 16384)
-    fit = linear_fit(loop)
-    draw_fit(loop.angle, loop.motion, loop.force, fit.force, folder / "fig_1.png")
+    fit, linear = linear_fit(loop)
+    draw_fit(loop.angle, loop.motion, loop.force, linear, folder / "fig_1.png")
     theta = np.arccos(1 - 2 / 3)
     closed = 1e6 / np.pi * (theta - np.sin(2 * theta) / 2)
     yield Claim("Fig. 1, Eq. 11", "the best linear force is K u + C u' + F0",
                 f"K = {fit.stiffness:.0f} N/m, closed form {closed:.0f} N/m", "holds", ("fig_1.png",),
                 "Amplitude 30 µm: the loop and the linear force that is closest to it in the mean square.")
-    same = np.sum((fit.force[1:] + fit.force[:-1]) / 2 * np.diff(loop.motion)) / work(loop)
+    same = np.sum((linear[1:] + linear[:-1]) / 2 * np.diff(loop.motion)) / work(loop)
     yield Claim("Eq. 13", "it does the work of the friction force", f"ratio of works {same:.7f}", "holds")
     yield _printed_damping()
     double = coupled_loop(1e6, 0.5, (20.0, 12.0), 30e-6, (1, 2), 16384)

@@ -1,17 +1,15 @@
-"""An array of Jenkins elements is the partial slip of Cattaneo and Mindlin; energy and wear of its nodes."""
+"""An array of Jenkins elements is the partial slip of Cattaneo and Mindlin."""
 
 from __future__ import annotations
 
 import numpy as np
 import pytest
 
-from bladefem.data import Elements, Patch
-from bladefem.errors import InputError
+from bladefem.data import Elements
 from bladefem.friction.aft import evaluate
 from bladefem.friction.closed_form import iwan_force, iwan_limits
-from bladefem.friction.energy import energy_density, slip_distance, wear_depth
 from bladefem.friction.events import evaluate_exact
-from bladefem.friction.march import step_1d
+from bladefem.friction.printed import corrected
 
 KT, LIMIT = 3.0, 2.0
 GROSS = 1.5 * LIMIT / KT        # displacement at which the whole sphere slips [m]
@@ -46,11 +44,8 @@ def test_first_loading_follows_cattaneo_and_mindlin():
     """200 elements: 2e-5 of the limit; the error falls with the power 1.5 of their number (root at gross slip)."""
     worst = []
     for n in (50, 200):
-        elements, f, total = array(n), np.zeros(n), [0.0]
-        path = np.linspace(0, 0.99 * GROSS, 400)
-        for dw in np.diff(path):
-            f = step_1d(f, np.full(n, dw), elements.n0, elements.n0, elements.kt, elements.mu)
-            total.append(f.sum())
+        elements, path = array(n), np.linspace(0, 0.99 * GROSS, 400)
+        total = sum(corrected(path, np.full(400, elements.n0[e]), elements.kt[e], elements.mu[e]) for e in range(n))
         worst.append(np.abs(total - iwan_force(path, KT, LIMIT)).max() / LIMIT)
     assert worst[1] < 3e-5
     assert worst[0] / worst[1] > 6
@@ -79,22 +74,3 @@ def test_plane_and_solid_arrays_agree():
     solid = Elements(elements.kt, elements.kn, elements.mu, elements.n0, tangents=2)
     both = np.concatenate([w, np.zeros_like(w[:, :1])], axis=1)
     np.testing.assert_allclose(evaluate(solid, both, 1024).f[:, :2], evaluate_exact(elements, w).f, atol=2e-5)
-
-
-def patch(n: int) -> Patch:
-    return Patch("this", np.zeros((n, 3)), np.full(n, 2e-6), np.tile(np.eye(3), (n, 1, 1)), np.zeros((0, 3), int),
-                 np.arange(n), np.arange(n))
-
-
-def test_energy_wear_and_slip_of_an_element():
-    """W = 4 F (A - F/k) over the area; the slider goes 4 (A - F/k) a cycle, seen through 15 harmonics within 3 %."""
-    element = Elements(*(np.array([x]) for x in (KT, 0.0, 0.4, LIMIT / 0.4)), tangents=1)
-    w = together(element, 2.0, H=15)
-    forces = evaluate_exact(element, w)
-    slip = 4 * (2.0 - LIMIT / KT)
-    assert energy_density(forces, patch(1))[0] == pytest.approx(LIMIT * slip / 2e-6)
-    assert wear_depth(forces, patch(1), 1e-15, 1e6)[0] == pytest.approx(LIMIT * slip / 2e-6 * 1e-9)
-    assert slip_distance(element, w, forces)[0] == pytest.approx(slip, rel=0.03)
-    assert slip_distance(element, 0.1 * w, evaluate_exact(element, 0.1 * w))[0] == 0
-    with pytest.raises(InputError, match="do not fit"):
-        energy_density(forces, patch(2))

@@ -5,9 +5,14 @@ W is the work of the last period; the numbers are those of the failure catalogue
 
 from __future__ import annotations
 
+from fractions import Fraction
+
 import numpy as np
 import pytest
 
+from bladefem.damper.explicit import damper_cycle, explicit_march, stable_steps
+from bladefem.damper.loops import Drive, steady
+from bladefem.damper.zmass import MassOnFoundation, march
 from bladefem.data import Elements
 from bladefem.errors import InputError
 from bladefem.friction.aft import STICK, evaluate
@@ -15,8 +20,10 @@ from bladefem.friction.approximation import from_series
 from bladefem.friction.closed_form import circular_orbit_work, jenkins
 from bladefem.friction.energy import free_static_force
 from bladefem.friction.events import evaluate_exact
-from bladefem.friction.march import check_step, stable_step, step_2d
+from bladefem.friction.march import stable_step, step_2d
 from bladefem.friction.printed import corrected, corrected_rate, differential, per_axis, per_axis_printed
+from bladefem.hbm.flow import stuck_start
+from bladefem.hbm.system import damper_on_platforms
 
 MU, KT = 0.5, 5.0
 
@@ -91,7 +98,7 @@ def test_F04_limits_for_each_axis_are_not_coulomb(minor, ratio, force_error):
     g, N, last = np.stack([np.cos(x), minor * np.sin(x)], axis=1), np.ones_like(x), slice(3 * steps, None)
     right = np.zeros_like(g)
     for i in range(1, len(x)):
-        right[i] = step_2d(right[i - 1:i], (g[i] - g[i - 1])[None], N[:1], N[:1], np.array([KT]), np.array([MU]))[0]
+        right[i] = step_2d(*right[i - 1], *(KT * (g[i] - g[i - 1])), 1.0, 1.0, MU)[:2]
     forces = evaluate(element(tangents=2), moved(3, 3, t_c1=1.0, u_s1=minor), 2048)
     kind, printed = per_axis(g, N, KT, MU), per_axis_printed(g, N, KT, MU)
     assert work(kind[last], g[last]) / forces.dissipated[0] == pytest.approx(ratio, abs=0.003)
@@ -122,34 +129,38 @@ def test_F12_too_few_samples_and_exact_events():
     np.testing.assert_allclose(f[1:], 1e4 * np.array([closed.stiffness, -closed.damping]), rtol=0, atol=1e-11)
 
 
-def explicit_damper(steps: int, periods: int = 40) -> tuple[float, float]:
-    """K_ad and omega C_ad, in units of m omega^2, of a damper by central differences, step unchecked."""
-    m, kt, omega, U, limit = 0.005, 1e8, 2 * np.pi * 200, 1e-4, 20.0
-    dt = 2 * np.pi / omega / steps
-    x, v, f, u_old = 0.0, 0.0, 0.0, U
-    u = U * np.cos(omega * dt * np.arange(steps * periods + 1))
-    force = np.empty(steps * periods)
-    for i in range(steps * periods):
-        v += dt * 2 * f / m
-        x_old, x = x, x + dt * v
-        f = min(max(f + kt * ((u[i + 1] - u_old) - (x - x_old)), -limit), limit)
-        u_old = u[i + 1]
-        force[i] = 2 * f
-    fit = from_series(u[-steps:], force[-steps:], omega)
-    return fit.stiffness / (m * omega ** 2), omega * fit.damping / (m * omega ** 2)
+def explicit_damper(steps: int) -> tuple[float, float]:
+    """K_ad and omega C_ad of a stuck damper, in units of m omega^2, by the explicit march, step unchecked."""
+    system, omega = two_seats()
+    march_, state = explicit_march(system, omega, steps), stuck_start(system, omega)
+    for _ in range(40):
+        state, _, _, force = march_(state)
+    assert np.isfinite(force).all()
+    u = np.cos(2 * np.pi * np.arange(steps) / steps)
+    fit = from_series(1e-4 * u, force.sum(1), omega)
+    return fit.stiffness / (0.005 * omega**2), omega * fit.damping / (0.005 * omega**2)
+
+
+def two_seats():
+    """A damper of 5 g between two platforms that move by 0.1 mm at 200 Hz, k_t = 1e8 N/m a side."""
+    seat = Elements(np.full(2, 1e8), np.zeros(2), np.ones(2), np.full(2, 20.0), 1)
+    return damper_on_platforms(np.tile([0, 1e-4], (2, 1)), seat, 0.005), 2 * np.pi * 200
 
 
 def test_F13_an_explicit_step_beyond_the_limit_is_refused():
     """The stuck damper is a mass, |K_ad| = m omega^2. Beyond the limit friction saturates and all stays finite."""
-    period_, m, kt = 1 / 200, 0.005, 1e8
-    assert period_ / stable_step(kt, m) == pytest.approx(500, abs=1)
+    system, omega = two_seats()
+    assert 1 / 200 / stable_step(np.sqrt(2 * 1e8 / 0.005)) == pytest.approx(500, abs=1)
+    assert stable_steps(system, omega) in (500, 501)
     fine, coarse = explicit_damper(2000), explicit_damper(300)
-    assert abs(fine[0]) == pytest.approx(1.0, abs=0.02)
-    assert np.isfinite(coarse).all()
-    assert abs(abs(coarse[0]) - 1) + abs(coarse[1]) > 0.1
-    check_step(period_ / 2000, kt, m)
-    with pytest.raises(InputError, match="unstable"):
-        check_step(period_ / 300, kt, m)
+    assert fine[0] == pytest.approx(-1.0, abs=0.02)
+    assert abs(coarse[0] + 1) + abs(coarse[1]) > 0.1
+    good = damper_cycle(system, omega, 2000, stuck_start(system, omega)).force.sum(1)
+    assert abs(2 * np.fft.rfft(good)[1] / 2000 / (0.005 * omega**2 * 1e-4) + 1) < 0.02
+    with pytest.raises(InputError, match="stability limit"):
+        damper_cycle(system, omega, 300)
+    with pytest.raises(InputError, match="stability limit"):
+        march(MassOnFoundation(), np.zeros((3, 2)), np.full(3, 50.0), 1e-3)
 
 
 def test_F15_the_static_force_of_a_stuck_element_is_that_of_its_mean_displacement():
@@ -171,34 +182,30 @@ def test_F15_the_static_force_of_a_stuck_element_is_that_of_its_mean_displacemen
 
 def test_F16_velocity_and_force_repeat_where_the_displacement_drifts():
     """Mass dragged by a vibrating floor under pulsating load at fp / fb = 1: drift, yet (v, f) is periodic."""
-    steps, periods = 2000, 60
-    x, v, f, slips = 0.0, 0.0, 0.0, []
-    trace = np.empty((steps * periods, 3))
-    dt = 2 * np.pi / steps
-    t = dt * np.arange(steps * periods + 1)
-    floor, N = 2.0 * np.sin(t), 1 + 0.8 * np.cos(t)
-    for i in range(steps * periods):
-        v += dt * f
-        x += dt * v
-        f = min(max(f + 50.0 * (floor[i + 1] - floor[i] - dt * v), -N[i + 1]), N[i + 1])
-        trace[i] = x, v, f
-        slips.append(abs(f) == N[i + 1])
-    a, b = trace[-2 * steps:-steps], trace[-steps:]
-    assert np.mean(slips) > 0.1
-    np.testing.assert_allclose(a[:, 1:], b[:, 1:], atol=1e-3)
-    assert abs(b[-1, 0] - a[-1, 0]) > 0.1
+    body, found = MassOnFoundation(), steady(MassOnFoundation(), Drive(Fraction(1)), 2000)
+    assert found.reason == "periodic"
+    assert found.drift[0] == pytest.approx(-0.6307, rel=0.01)
+    last = found.motion
+    again = march(body, np.r_[found.base[-1:], found.base], np.r_[found.load[-1:], found.load], last.dt,
+                  (last.position[-1], last.velocity[-1], last.springs.copy()))
+    for name in ("velocity", "force"):
+        now, before = getattr(again, name), getattr(last, name)
+        np.testing.assert_allclose(now, before, rtol=0, atol=1e-6 * np.abs(before).max())
+    moved_on = again.position[-1, 0] - last.position[-1, 0]         # a test of the displacement would never end
+    assert moved_on == pytest.approx(found.drift[0] / 100, rel=1e-6)
+    assert abs(moved_on) > 1e-3
 
 
 @pytest.mark.parametrize(("amplitude", "marched"), [(1.02, 131), (1.2, 13)])
 def test_F17_marching_a_2d_element_takes_many_periods_and_newton_few(amplitude, marched):
-    one, tau = np.ones(1), 2 * np.pi * np.arange(513) / 512
-    steps = np.diff(amplitude * np.stack([np.cos(tau), 0.5 * np.sin(tau)], axis=1), axis=0)[:, None]
-    f, change, count = np.array([[1.0, 0.0]]), 1.0, 0
+    tau = 2 * np.pi * np.arange(513) / 512
+    steps = np.diff(amplitude * np.stack([np.cos(tau), 0.5 * np.sin(tau)], axis=1), axis=0)
+    f, change, count = (1.0, 0.0), 1.0, 0
     while change > 1e-8:
         before = f
         for dw in steps:
-            f = step_2d(f, dw, one, one, one, one)
-        change, count = np.linalg.norm(f - before), count + 1
+            f = step_2d(*f, *dw, 1.0, 1.0, 1.0)[:2]
+        change, count = np.hypot(f[0] - before[0], f[1] - before[1]), count + 1
     assert 0.6 * marched < count < 1.3 * marched
     w = moved(3, 3, t_c1=amplitude, u_s1=0.5 * amplitude)
     forces = evaluate(element(1.0, mu=1.0, tangents=2), w, 512)
