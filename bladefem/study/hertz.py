@@ -1,10 +1,10 @@
 """A sphere or a cylinder pressed on a block, from its scene, and Hertz' closed form beside it.
 
-Johnson, Contact Mechanics (1985), Sect. 4.2; P is the whole force, in the plane that on a metre of cylinder:
+Johnson, Contact Mechanics (1985), Sect. 4.2; P is the whole force, in the plane that on a metre of cylinder, and a the
+radius or half width of the contact (contact/hertz.py):
 
-    1 / E* = (1 - nu_1^2) / E_1 + (1 - nu_2^2) / E_2
-    sphere:     a^3 = 3 P R / (4 E*),      p = p0 sqrt(1 - (r/a)^2),   p0 = 3 P / (2 pi a^2)
-    cylinder:   a^2 = 4 P R / (pi E*),     p = p0 sqrt(1 - (x/a)^2),   p0 = 2 P / (pi a)
+    sphere:     p = p0 sqrt(1 - (r/a)^2),   p0 = 3 P / (2 pi a^2)
+    cylinder:   p = p0 sqrt(1 - (x/a)^2),   p0 = 2 P / (pi a)
 
 The two blocks are held at their far faces; they are no half spaces, which moves their approach but hardly the pressure.
 """
@@ -19,18 +19,19 @@ import numpy as np
 from geometry.contact_pairs import WIDER
 from geometry.mesh import Mesh
 
+from ..contact.hertz import FINEST, contact_modulus, line_width, point_radius
 from ..contact.lcp import solve_lcp
 from ..contact.patch import initial_gap, make_patch, normal_ports, port_matrix
 from ..data import PressureMap
 from ..errors import InputError, NotSolvedError
-from ..scene import Materials, Scene
+from ..scene import Scene
 from ..units import show
 from .punch import flexibility
 from .stages import build_mesh
 
 __all__ = ["Pressed", "hertz_load", "hertz_pressure", "hertz_radius", "press_pair", "second_moment_radius"]
 
-FINEST, WIDEST = 2.0, 0.9 * WIDER   # contact radius over the element size, and over the expected radius, at least/most
+WIDEST = 0.9 * WIDER    # contact radius over the expected one, at most
 
 
 @dataclass(frozen=True)
@@ -76,13 +77,13 @@ def press_pair(scene: Scene, comm: Any = None) -> Pressed:
 
 def hertz_radius(scene: Scene, load: float) -> float:
     """Contact radius or half width [m] under a whole load [N], in the plane [N/m]."""
-    R, E = scene.hertz.radius, _modulus(scene.material)
-    return (0.75 * load * R / E)**(1 / 3) if scene.hertz.dimension == 3 else (4 * load * R / (np.pi * E))**0.5
+    width = point_radius if scene.hertz.dimension == 3 else line_width
+    return width(load, scene.hertz.radius, contact_modulus(scene.material.blade, scene.material.damper))
 
 
 def hertz_load(scene: Scene, a: float) -> float:
     """The whole load [N], in the plane [N/m], that gives a contact radius [m]."""
-    R, E = scene.hertz.radius, _modulus(scene.material)
+    R, E = scene.hertz.radius, contact_modulus(scene.material.blade, scene.material.damper)
     return 4 * E * a**3 / (3 * R) if scene.hertz.dimension == 3 else np.pi * E * a**2 / (4 * R)
 
 
@@ -98,10 +99,6 @@ def second_moment_radius(scene: Scene, seat: PressureMap) -> float:
     dimension = scene.hertz.dimension
     r = np.linalg.norm(seat.patch.points[:, :dimension - 1], axis=1)
     return float(np.sqrt((2.5 if dimension == 3 else 4.0) * (seat.force @ r**2) / seat.force.sum()))
-
-
-def _modulus(materials: Materials) -> float:
-    return 1 / sum((1 - m.nu**2) / m.E for m in (materials.blade, materials.damper))
 
 
 def _loads(scene: Scene) -> tuple[float, ...]:

@@ -14,6 +14,7 @@ import numpy as np
 
 from geometry.mesh import Mesh
 
+from ..contact.profile import unresolved_crown
 from ..contact.seat import ContactProblem
 from ..contact.seat import solve as seat
 from ..contact.stiffness import friction_elements, pair_ratio
@@ -136,6 +137,7 @@ def run(scene: Scene, folder: str | Path, until: str = "response", comm: Any = N
                 for load in studied_loads(scene, own)}
         if mesh.dimension == 2:
             clock.messages.extend(filter(None, [coarse_sentence(m for pair in maps.values() for m in pair)]))
+        clock.messages.extend(filter(None, [unresolved_crown(maps, scene, mesh.depth)]))
         result = replace(result, contact=Seating(problem, maps, own))
     if until == "contact":
         return result
