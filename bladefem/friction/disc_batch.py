@@ -116,7 +116,7 @@ def _forces(w, load, el, path, tab, limit, trail, spare, trace, F, J, shares):
     """
     K, linear, (mean, block, phi) = F.shape[1], J.shape[0] > 0, spare
     found, (least, largest) = (True, 0.0, 0.0, 0.0, 0.0, 0, 0, 0), _range(path[2])
-    J[:1] = 0.0
+    J[:] = 0.0
     closed = _normal(w[0], load, el, path[2], least, tab, mean, block, F[0], J[0, :, :K] if linear else J[:, :, 0])
     if largest > 0.0 and not (least > 0.0 and _within(path, el.mu)):
         find_edges(path, path.shape[1], el.mu, trail.form)
@@ -124,7 +124,6 @@ def _forces(w, load, el, path, tab, limit, trail, spare, trace, F, J, shares):
         if not linear:
             find_forces(path, trail.form, trail.knots, trail.slips, path.shape[1], el.mu, trace)
     else:
-        J[1:] = 0.0
         _stuck(w, el.kt if largest > 0.0 else 0.0, F, J)
     shares[1] = found[5] / tab.at.shape[0]
     shares[2] = 1.0 - closed

@@ -1,10 +1,10 @@
 """Running derivative of a 2-D element: rows of d(force)/d(coefficients) over one period.
 
 Rows have W columns for each of normal, first and second tangential coefficients, W the K = 2H+1 coefficients filled up
-to a multiple of 8, and M in all. The columns K and W + K take the derivative with the force at the start of the period; they carry the
-derivative Phi of the period map, and that of the periodic state follows from D = Phi D + d. In stick the derivative is
-carried as C = D - kt V, which stays, so that a whole stretch of stick costs one rank-one update. In slip only the row
-of the angle is carried; the rows of all samples are kept, and summed at the end of the period.
+to a multiple of 8, and M in all. The columns K and W + K take the derivative with the force at the start of the period;
+they carry the derivative Phi of the period map, and that of the periodic state follows from D = Phi D + d. In stick the
+derivative is carried as C = D - kt V, which stays, so that a whole stretch of stick costs one rank-one update. In slip
+only the row of the angle is carried; the rows of all samples are kept, and summed at the end of the period.
 """
 
 from __future__ import annotations

@@ -106,22 +106,26 @@ def find_forces(code: Code, path, form, knots, slips, width, mu, trace):
             code.store(slip.above(0.5, R * along, code.load(trace, (row, width), i)), trace, (row, width), i)
 
 
-def _turn_rows(code: Code, turns, width, at, change, W, begin, end, row, rows, M):
-    columns = code.whole(M)
-    with code.loop(0, W, code.lanes(row)) as l:
-        state = [code.variable(code.load(row, (part, W), l)) for part in range(3)]
-        with code.loop(begin, end) as i:
-            *m, a, t0, t1, t2 = (code.spread(code.one(turns, (q, width), i)) for q in range(TURNS))
-            by_load, by_motion = code.load(at, (i, W), l), code.load(change, (i, W), l)
-            for part, (t, p) in enumerate(((t0, by_load), (t1, by_motion), (t2, by_motion))):
-                before = code.get(state[part])
-                code.store(before + m[part] * p, rows, (i, columns), (part, W), l)
-                code.set(state[part], t * p + a * before)
-        for part in range(3):
-            code.store(code.get(state[part]), row, (part, W), l)
+def _turn_rows(half: bool):
+    """Kernel for turn_rows in blocks or halves of blocks."""
+    @kernel
+    def turn(code: Code, turns, width, at, change, W, begin, end, row, rows, M):
+        code, columns = code.half() if half else code, code.whole(M)
+        with code.loop(0, W, code.lanes(row)) as l:
+            state = [code.variable(code.load(row, (part, W), l)) for part in range(3)]
+            with code.loop(begin, end) as i:
+                *m, a, t0, t1, t2 = (code.spread(code.one(turns, (q, width), i)) for q in range(TURNS))
+                by_load, by_motion = code.load(at, (i, W), l), code.load(change, (i, W), l)
+                for part, (t, p) in enumerate(((t0, by_load), (t1, by_motion), (t2, by_motion))):
+                    before = code.get(state[part])
+                    code.store(before + m[part] * p, rows, (i, columns), (part, W), l)
+                    code.set(state[part], t * p + a * before)
+            for part in range(3):
+                code.store(code.get(state[part]), row, (part, W), l)
+    return turn
 
 
-_turn_blocks, _turn_halves = kernel(_turn_rows), kernel(_turn_rows, BLOCK // 2)
+_turn_blocks, _turn_halves = _turn_rows(False), _turn_rows(True)
 
 
 @njit(cache=True, error_model="numpy")
@@ -137,11 +141,13 @@ def turn_rows(turns, at, change, begin, end, row, rows):
         _turn_halves(turns, width, at, change, W, begin, end, row, rows, M)
 
 
-def _join_rows(code: Code, sums, tiled, M, C, K, W, out):
+@kernel
+def join_rows(code: Code, sums, tiled, M, C, K, W, out):
     """Rows sums (2, tiled, M) + px C[0] + py C[1] without what fills up the K columns of each part: out (2, K, 3K).
 
     px, py are the columns K and W + K of a row, C (2, M). The last row is left out; blocks reach into the row after.
     """
+    code = code.half()
     with code.loop(0, code.place((K, 2), -1)) as n:
         second = code.builder.zext(code.builder.icmp_signed(">=", n, K), n.type)
         row = code.place(n, (second, code.place(tiled, (K, -1))))
@@ -151,9 +157,6 @@ def _join_rows(code: Code, sums, tiled, M, C, K, W, out):
                 m = code.place((part, W), l)
                 joined = code.load(sums, (row, M), m) + px * code.load(C, m) + py * code.load(C, M, m)
                 code.store(joined, out, (code.place((n, 3), part), K), l)
-
-
-join_rows = kernel(_join_rows, BLOCK // 2)
 
 
 def _add_folded(harmonics: int, first: bool):

@@ -1,9 +1,9 @@
 """Numbers in the lanes of a vector: how kernels are written whose loops do not become vectors by themselves.
 
 Numba turns a loop into vectors only where it is long, writes one array and needs no sum to stay in registers. The
-functions of lane_kernels.py are written for blocks instead, of 64 bytes unless they ask for less; any processor runs
-them, with as many instructions a block as its vectors ask for. A block has the precision of the array it comes from,
-and takes that of the array it goes to, so that one text serves arrays of 8 and of 4 bytes a number.
+functions of lane_kernels.py are written for blocks of 64 bytes instead; any processor runs them, with as many
+instructions a block as its vectors ask for. A block has the precision of the array it comes from, and takes that of the
+array it goes to, so that one text serves arrays of 8 and of 4 bytes a number.
 """
 
 from __future__ import annotations
@@ -73,8 +73,12 @@ class Lanes:
 class Code:
     """Loads, stores, sums and loops of a kernel; arrays are addressed flat, by products and sums of whole numbers."""
 
-    def __init__(self, builder: ir.IRBuilder, size: int) -> None:
+    def __init__(self, builder: ir.IRBuilder, size: int = BLOCK) -> None:
         self.builder, self.size = builder, size
+
+    def half(self) -> Code:
+        """The same for blocks of half the size."""
+        return Code(self.builder, self.size // 2)
 
     def lanes(self, array: ir.Value) -> int:
         """How many of an array's numbers are a block."""
@@ -157,16 +161,13 @@ class _Loop:
         self.context.__exit__(*error)
 
 
-def kernel(write: Callable, size: int = BLOCK) -> Callable:
-    """What compiled code may call as the function that write(code, *arguments) writes: contiguous arrays, numbers.
-
-    size is that of a block [bytes].
-    """
+def kernel(write: Callable) -> Callable:
+    """What compiled code may call as the function that write(code, *arguments) writes: contiguous arrays, numbers."""
     def typed(context, *given):
         def generate(target, builder, call, values):
             flat = [target.make_array(t)(target, builder, v).data if isinstance(t, types.Array) else v
                     for t, v in zip(call.args, values, strict=True)]
-            write(Code(builder, size), *flat)
+            write(Code(builder), *flat)
             return target.get_dummy_value()
         return types.void(*[t if isinstance(t, types.Array | types.Float) else types.int64 for t in given]), generate
 

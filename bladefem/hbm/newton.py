@@ -63,7 +63,7 @@ def newton(balance: Balance, w: np.ndarray, options: Options = DEFAULTS, merit: 
     """
     if merit == "step" and fits(balance):
         return _fast(balance, w, options)
-    state, memory = evaluate_balance(balance, w), Memory()
+    state, memory = evaluate_balance(balance, w, "single"), Memory()
     for iteration in range(options.iterations + 1):
         if state.error <= options.tolerance:
             return Newton(state, iteration, True, "residual within tolerance")
@@ -118,7 +118,7 @@ def _search(balance: Balance, state: State, inverse: Inverse, merit: str) -> Sta
     demand = 0.25 if merit == "step" else 1e-4
     before, share = np.linalg.norm(step if merit == "step" else state.residual), 1.0
     while share >= SHORTEST:
-        trial = evaluate_balance(balance, state.w - share * step)
+        trial = evaluate_balance(balance, state.w - share * step, "single")
         after = inverse(trial.residual, 0.1) if merit == "step" else trial.residual
         if np.linalg.norm(after) <= (1 - demand * share) * before:
             return trial

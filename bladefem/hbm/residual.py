@@ -61,10 +61,10 @@ def start_in_stick(balance: Balance) -> np.ndarray:
     return _shaped(balance, balance.linear.stuck)
 
 
-def evaluate_balance(balance: Balance, w: np.ndarray) -> State:
-    """Forces and residual at w (n, d, K)."""
+def evaluate_balance(balance: Balance, w: np.ndarray, precision: str = "double") -> State:
+    """Forces and residual at w (n, d, K); precision is that of the forces' derivative."""
     model, linear = balance.model, balance.linear
-    forces = contact_forces(model, w, balance.samples)
+    forces = contact_forces(model, w, balance.samples, precision)
     p = forces.f - model.springs[:, :, None] * w
     p[:, :, 0] -= model.preload.reshape(p.shape[:2])
     flexed = _shaped(balance, _apply(linear.A, as_amplitudes(p)))
@@ -72,14 +72,14 @@ def evaluate_balance(balance: Balance, w: np.ndarray) -> State:
     return State(w, forces, p, residual, _error(balance, w, residual))
 
 
-def contact_forces(model: ReducedModel, w: np.ndarray, samples: int) -> Forces:
+def contact_forces(model: ReducedModel, w: np.ndarray, samples: int, precision: str = "double") -> Forces:
     """Friction forces in the directions (n, d, K) of the balance; displacements left out of it stay zero."""
     missing = 1 + model.elements.tangents - model.directions
     if missing:
         w = np.concatenate([np.zeros((len(w), missing, w.shape[2])), w], axis=1)
     load, base = contact_table(model, w.shape[2] // 2, samples)[:2]
     if samples:
-        forces = evaluate(model.elements, w, samples, load=load if load.shape[1] else None)
+        forces = evaluate(model.elements, w, samples, load=load if load.shape[1] else None, precision=precision)
     else:
         forces = evaluate_exact(model.elements, w, load=base)
     if missing == 0:

@@ -15,7 +15,7 @@ from .api import solve
 from .linear import condense
 from .model import Damping, ReducedModel
 from .newton import newton
-from .residual import Balance, start_in_stick
+from .residual import Balance, evaluate_balance, start_in_stick
 
 __all__ = ["compile_kernels"]
 
@@ -36,6 +36,8 @@ def compile_kernels() -> None:
     plane = ReducedModel((body,), replace(one, tangents=2), {1: np.ones(1)}, Damping(0.01))
     for force in (0.5, 1.0, 2.0):
         solve(replace(plane, excitation={1: np.full(1, force)}), 1.0, 2, 64)
+    balance = Balance(plane, condense(plane, 1.0, 2), 64)
+    evaluate_balance(balance, start_in_stick(balance))      # with the derivative in double, as rates take it
 
 
 if __name__ == "__main__":

@@ -120,8 +120,8 @@ def test_jacobian_for_any_number_of_harmonics_and_samples(H, samples):
 def test_a_derivative_summed_in_single_precision_is_that_in_double(H):
     """1000 elements; half are within 6e-8, 99 in a hundred within 5e-7. Forces are equal.
 
-    The worst, up to 1e-4, slip while the load begins, where the angle hangs on the motion as 1/force, or are so close to
-    the limit that their periodic state is nearly not unique.
+    The worst, up to 1e-4, slip while the load begins, where the angle hangs on the motion as 1/force, or are so close
+    to the limit that their periodic state is nearly not unique.
     """
     elements, w = random_case(10, 1000, H, 2)
     double, single = (evaluate(elements, w, 96, precision=precision) for precision in ("double", "single"))
@@ -169,7 +169,7 @@ def plainly_marched(element: Elements, w: np.ndarray, samples: int) -> tuple[np.
     knots = tables(H, samples).knots[np.arange(samples + 1) % samples] @ w.T
     N, path = element.n0[0] + element.kn[0] * knots[:, 0], kt * knots[:, 1:]
     (x, y), out, d = path[0] * min(1, mu * N[0] / np.hypot(*path[0])), np.empty((2, samples)), np.diff(path, axis=0)
-    for period in range(1, 4000):
+    for period in range(1, 4000):       # noqa: B007
         before = x, y
         for i in range(samples):
             _, x, y, _, out[0, i], out[1, i] = edge(x, y, d[i, 0], d[i, 1], N[i], N[i + 1], mu)
