@@ -41,7 +41,7 @@ def solve(model: ReducedModel, omega: float, H: int = 3, samples: int = 128, *, 
         NotSolvedError: a resonance without damping is hit exactly.
     """
     _check(model, omega, H, samples, start)
-    lean = _stuck_throughout(model, omega, H, samples, start) if options.frugal else None
+    lean = _stuck_throughout(model, omega, H, start) if options.frugal else None
     if lean is not None:
         return lean
     first = solve_small(model, omega, H, samples, None if start is None else start.w, options)
@@ -88,25 +88,24 @@ def as_solution(balance: Balance, attempt: Attempt, iterations: int, reason: str
         work=works_of(model, linear.omega, relative, force, blade, float(np.sum(state.forces.dissipated))))
 
 
-def sticking(model: ReducedModel, omegas: Sequence[float], H: int, samples: int) -> list[Solution]:
+def sticking(model: ReducedModel, omegas: Sequence[float], H: int) -> list[Solution]:
     """The first frequencies [rad/s], as long as all contacts stick, with the excited harmonics alone; small models.
 
     A point is accepted with a little of the friction limit in hand, and with the tolerance of rounding: it is linear.
     """
     low = max((1, *model.excitation, *model.normal))
-    samples = min(samples, INSTANTS * low)
-    return gripping(model, solve_each(model, np.array(omegas), low, samples, None, STUCK)) if low < H else []
+    found = solve_each(model, np.array(omegas), low, INSTANTS * low, None, STUCK) if low < H else []
+    return gripping(model, found)
 
 
-def _stuck_throughout(model: ReducedModel, omega: float, H: int, samples: int,
-                      start: Solution | None) -> Solution | None:
+def _stuck_throughout(model: ReducedModel, omega: float, H: int, start: Solution | None) -> Solution | None:
     """The same for one point of any model; looked for only where the start sticks."""
     low = max((1, *model.excitation, *model.normal))
     if low >= H or not (start is None or start.states["stick"] == len(model.elements.kt)):
         return None
     if small(model, low):
-        return next(iter(sticking(model, [omega], H, samples)), None)
-    found = solve(model, omega, low, min(samples, INSTANTS * low), options=STUCK)
+        return next(iter(sticking(model, [omega], H)), None)
+    found = solve(model, omega, low, INSTANTS * low, options=STUCK)
     return found if found.converged and grips(model, found) else None
 
 

@@ -52,7 +52,7 @@ def response(model: ReducedModel, omegas: Iterable[float], H: int = 3, samples: 
     stuck: list[Solution] = []
     for i, omega in enumerate(omegas):
         if options.frugal and not stuck and (not last or last[-1].states["stick"] == nodes):
-            stuck = sticking(model, omegas[i:i + BLOCK], H, samples)[::-1]
+            stuck = sticking(model, omegas[i:i + BLOCK], H)[::-1]
         compute = partial(stuck.__getitem__, -1) if stuck else partial(_solve, model, omega, H, samples,
                                                                        _ahead(last, omega, H), options)
         solution = keep(omega, compute)
@@ -176,9 +176,14 @@ def _corner_targets(omegas: np.ndarray, heights: np.ndarray, curve: float) -> It
 
 
 def _ahead(last: list[Solution], omega: float, H: int) -> Solution | None:
-    """A start: the last solution, moved along the line through the last two, or the parabola through the last three."""
-    if len(last) < 2 or last[-1].harmonics < H:     # fewer: all contacts stick, and will be looked at like that first
-        return last[-1] if last else None
+    """A start: the last solution, moved along the line through the last two, or the parabola through the last three.
+
+    None, which is full stick at the new frequency, where all contacts stuck at the last one.
+    """
+    if not last or last[-1].states["stick"] == len(last[-1].w):
+        return None
+    if len(last) < 2:
+        return last[-1]
     new, known = last[-1], last[-PARABOLA:]
     apart = {p.omega for p in known}
     if len(apart) < len(known) or abs(omega - new.omega) > 2 * abs(new.omega - last[-2].omega):

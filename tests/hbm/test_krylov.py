@@ -47,7 +47,7 @@ def test_points_that_stick_are_the_same_at_once_and_one_by_one():
     omegas = stuck_resonances(model)[1] * np.linspace(0.9, 1.1, 60)
     frugal = Options(frugal=True)
     alone = [solve(model, omega, 7, 256, options=frugal) for omega in omegas]
-    found = sticking(model, omegas, 7, 256)
+    found = sticking(model, omegas, 7)
     assert 5 < len(found) < 60 and len(found) == [p.harmonics for p in alone].index(7)
     for one, other in zip(found, alone, strict=False):
         np.testing.assert_allclose(one.probe, other.probe, rtol=1e-12)
