@@ -173,7 +173,9 @@ def _numerics(scene: Scene) -> Iterator[str]:
 
 def _study(scene: Scene) -> Iterator[str]:
     if scene.study.loads is not None and min(scene.study.loads) == 0:
-        yield "study.loads = 0 N: a damper without load lifts off, expected more than 0 N"
+        pair = scene.kind in ("hertz", "punch")
+        why = "nothing presses the two bodies together" if pair else "a damper without load lifts off"
+        yield f"study.loads = 0 N: {why}, expected more than 0 N"
     band = scene.study.band
     if band is not None and not band[0] < band[1]:
         yield (f"study.band = {show(band[0], 'Hz')}, {show(band[1], 'Hz')}: expected the lower frequency first")

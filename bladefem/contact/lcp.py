@@ -15,6 +15,9 @@ import numpy as np
 from scipy.linalg import LinAlgError, cho_factor, cho_solve
 from scipy.optimize import nnls
 
+from ..errors import InputError
+from .given import given
+
 __all__ = ["LCPSolution", "complementarity", "held_directions", "solve_lcp"]
 
 ROUND_OFF = 1e-12       # relative size below which a force or gap counts as zero when the active set is updated
@@ -51,11 +54,13 @@ def solve_lcp(C: np.ndarray, g0: np.ndarray, R: np.ndarray | None = None, load: 
     Returns:
         LCPSolution; `reason` is not empty when the load can't be balanced by pressing forces or the loops ran out.
 
+    Raises:
+        InputError: shapes that do not fit, values that are not finite, no node at all, or a load where nothing floats.
+
     Source: semismooth Newton form of the active set, Hintermueller, Ito, Kunisch, DOI 10.1137/S1052623401383558.
     """
+    C, g0, R, load = _given(C, g0, R, load)
     n = len(g0)
-    R = np.zeros((n, 0)) if R is None else R
-    load = np.zeros(R.shape[1]) if load is None else np.asarray(load, dtype=float)
     U, S, V = held_directions(R)
     reduced = (V.T @ load) / S
     reason = _unbalanced(R, load) if load.size else ""
@@ -63,7 +68,7 @@ def solve_lcp(C: np.ndarray, g0: np.ndarray, R: np.ndarray | None = None, load: 
         return LCPSolution(np.zeros(n), g0.copy(), np.zeros(R.shape[1]), np.zeros(n, bool), np.inf, 0, reason)
     travel = -(U.T @ g0)        # closes even gaps, however wide, before round-off could drown the elastic ones in them
     g0 = g0 + U @ travel
-    active = _winkler_set(C, g0, U, reduced) if start is None else np.asarray(start, dtype=bool)
+    active = _winkler_set(C, g0, U, reduced) if start is None else given("start", start, (n,)) > 0
     try:
         f, y, active, its, settled = _primal_dual(C, g0, U, reduced, active, max_iterations)
         if not settled:
@@ -79,6 +84,19 @@ def solve_lcp(C: np.ndarray, g0: np.ndarray, R: np.ndarray | None = None, load: 
     reason = "" if residual <= tolerance else (
         f"the contact iteration stopped after {its} steps with a residual of {residual:.1e}, wanted {tolerance:.1e}")
     return LCPSolution(f, gap, V @ ((y + travel) / S), active, residual, its, reason)
+
+
+def _given(C: np.ndarray, g0: np.ndarray, R: np.ndarray | None,
+           load: np.ndarray | None) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
+    """All four as arrays that fit each other, without floating body and load where these are left out."""
+    g0 = given("g0", g0, (None,))
+    if len(g0) == 0:
+        raise InputError("g0 is empty, expected the gap of at least one contact node")
+    if R is None and load is not None:
+        raise InputError("load is given without R, expected the rigid motions of the body that it acts on")
+    R = np.zeros((len(g0), 0)) if R is None else given("R", R, (len(g0), None))
+    load = np.zeros(R.shape[1]) if load is None else given("load", load, (R.shape[1],))
+    return given("C", C, (len(g0), len(g0))), g0, R, load
 
 
 def complementarity(force: np.ndarray, gap: np.ndarray, scale: float) -> float:

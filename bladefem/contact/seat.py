@@ -28,6 +28,7 @@ from ..fem.flexibility import Flexibility, compliance, flexible
 from ..fem.linalg import dot
 from ..fem.loads import centrifugal, mass
 from ..scene import Materials
+from .given import given
 from .lcp import LCPSolution, held_directions, solve_lcp
 from .patch import initial_gap, make_patch, normal_ports, port_matrix, rigid_ports
 
@@ -80,9 +81,8 @@ def contact_problem(mesh: Mesh, patches: Sequence[Patch], blade: Flexibility, da
         C_damper, damper_swell = _condense(damper, port_matrix(patches, mesh, "damper")[:, ports], pull)
         C = C + C_damper
     rigid, load = _rigid(mesh, patches, body, pull)
-    gap = np.concatenate([initial_gap(p, mesh) for p in patches]) + clearance
-    if not np.isfinite(gap).all():
-        raise InputError("clearance is not a finite number, expected metres")
+    gap = np.concatenate([initial_gap(p, mesh) for p in patches])
+    gap = gap + given("clearance", clearance, gap.shape if np.ndim(clearance) else ())
     return ContactProblem(tuple(patches), C, gap, -blade_swell, damper_swell, rigid[ports], load, mass(body))
 
 
@@ -101,23 +101,33 @@ def solve(problem: ContactProblem, speed: float, normal: float | None = None, da
         bedded: the faces have worn until they fit at this speed: gaps, and displacements by the rotation, open nothing.
 
     Raises:
-        InputError: no load at all, or a negative one.
+        InputError: no load at all, a negative one, or one that is not finite; an approach of another shape.
         NotSolvedError: the load lifts the damper off, slides it out sideways, or the iteration stopped.
     """
+    _check_load(speed, normal, damper_mass)
     active = None if start is None else np.concatenate([m.force > 0 for m in start])
     problem = _fitted(problem) if bedded else problem
-    g0 = problem.clearance + speed**2 * problem.blade_swell - (0.0 if approach is None else approach)
+    moved = 0.0 if approach is None else given("approach", approach, problem.clearance.shape)
+    g0 = problem.clearance + speed**2 * problem.blade_swell - moved
     if normal is None:
         scale = speed**2 * (1.0 if damper_mass is None else damper_mass / problem.mass)
-        if not scale > 0:
-            raise InputError(f"speed is {speed} rad/s, expected a positive one, or a normal load, to seat the damper")
         return _maps(problem, _state(problem, g0, scale, active))
-    if not normal > 0:
-        raise InputError(f"normal load is {normal} N, expected a positive one")
     try:
         return _maps(problem, _wanted(problem, g0, normal, active))
     except NotSolvedError as error:
         raise NotSolvedError(f"normal load {normal:g} N on each seat: {error}") from error
+
+
+def _check_load(speed: float, normal: float | None, damper_mass: float | None) -> None:
+    """A finite load that presses."""
+    if not np.isfinite(speed):
+        raise InputError(f"speed is {speed} rad/s, expected a finite number")
+    if normal is not None and not 0 < normal < np.inf:
+        raise InputError(f"normal load is {normal} N, expected a positive, finite one")
+    if normal is None and not speed**2 > 0:
+        raise InputError(f"speed is {speed} rad/s, expected a positive one, or a normal load, to seat the damper")
+    if damper_mass is not None and not 0 < damper_mass < np.inf:
+        raise InputError(f"damper_mass is {damper_mass} kg, expected a positive, finite one")
 
 
 def seat(mesh: Mesh, material: Materials, speed: float, clearance: float = 0.0, normal: float | None = None,

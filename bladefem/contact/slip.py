@@ -12,9 +12,10 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.linalg import cho_factor, cho_solve
+from scipy.linalg import LinAlgError, cho_factor, cho_solve
 
 from ..errors import InputError, NotSolvedError
+from .given import given
 
 __all__ = ["SlipState", "slip_step"]
 
@@ -44,15 +45,23 @@ def slip_step(C: np.ndarray, limit: np.ndarray, before: SlipState | None = None,
         total: sum of the tangential forces at the end of the step [N].
 
     Raises:
-        InputError: not exactly one of shift and total, or a total beyond the sum of the limits.
+        InputError: not exactly one of shift and total, a total beyond the sum of the limits, a negative limit, a
+            flexibility that is not positive definite, shapes that do not fit, values that are not finite.
         NotSolvedError: the active sets did not settle.
     """
-    n = len(limit)
+    limit, n = given("limit", limit, (None,)), len(limit)
+    C = given("C", C, (n, n))
+    if (limit < 0).any():
+        raise InputError(f"limit of a node is {limit.min():g} N, expected at least 0 N")
+    for name, value in (("shift", shift), ("total", total)):
+        if value is not None:
+            given(name, value, ())
     if (shift is None) == (total is None):
         raise InputError("slip_step needs exactly one of shift and total")
     if total is not None and not abs(total) < limit.sum():
         raise InputError(f"total tangential force is {total:g} N, expected below the limits' sum {limit.sum():g} N")
     before = before or SlipState(np.zeros(n), 0.0, np.zeros(n), np.zeros(n, int), 0.0)
+    given("before.force", before.force, (n,))
     state = np.where(limit > 0, before.state, 1)
     seen = set()
     for _ in range(max_iterations):
@@ -78,7 +87,11 @@ def _stuck(C: np.ndarray, limit: np.ndarray, before: SlipState, state: np.ndarra
             raise NotSolvedError("every node slips, so the total force can't be reached by stick")
         return q, move
     load = C[np.ix_(S, S)] @ before.force[S] - C[np.ix_(S, rest)] @ (q - before.force)[rest]
-    X = cho_solve(cho_factor(C[np.ix_(S, S)], lower=True), np.column_stack([load, np.ones(len(S))]))
+    try:
+        factor = cho_factor(C[np.ix_(S, S)], lower=True)
+    except LinAlgError:
+        raise InputError("C is not positive definite, expected the flexibility of an elastic body") from None
+    X = cho_solve(factor, np.column_stack([load, np.ones(len(S))]))
     if shift is None:
         move = (total - q[rest].sum() - X[:, 0].sum()) / X[:, 1].sum()
     q[S] = X[:, 0] + move * X[:, 1]

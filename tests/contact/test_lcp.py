@@ -123,6 +123,35 @@ def test_cattaneo_mindlin():
     assert state.force.sum() == pytest.approx(Q, rel=0.01)         # the loop closes
 
 
+@pytest.mark.parametrize(("arguments", "word"), [
+    ((np.eye(4), [0, np.nan, 0, 0]), r"g0\[1\] is nan"), ((np.nan * np.eye(4), np.zeros(4)), r"C\[0, 0\] is nan"),
+    ((np.eye(3), np.zeros(4)), r"C has shape \(3, 3\), expected \(4, 4\)"),
+    ((np.eye(4), np.zeros((4, 1))), r"g0 has shape \(4, 1\)"), ((np.zeros((0, 0)), []), "g0 is empty"),
+    ((np.eye(4), np.zeros(4), -np.ones((3, 1)), [-1.0]), r"R has shape \(3, 1\), expected \(4, any\)"),
+    ((np.eye(4), np.zeros(4), -np.ones((4, 1)), [-1.0, 0.0]), r"load has shape \(2,\)"),
+    ((np.eye(4), np.zeros(4), -np.ones((4, 1)), [-np.inf]), r"load\[0\] is -inf"),
+    ((np.eye(4), np.zeros(4), -np.ones((4, 1)), [np.nan]), r"load\[0\] is nan"),
+    ((np.eye(4), np.zeros(4), None, [-1.0]), "load is given without R"),
+    ((np.eye(4), np.zeros(4), None, None, np.ones(3, bool)), r"start has shape \(3,\)")])
+def test_contact_problem_that_makes_no_sense(arguments, word):
+    with pytest.raises(InputError, match=word):
+        solve_lcp(*arguments)
+
+
+@pytest.mark.parametrize(("C", "limit", "given", "word"), [
+    (np.eye(2), [1.0, np.nan], {"shift": 1.0}, r"limit\[1\] is nan"),
+    (np.eye(2), [1.0, -1.0], {"shift": 1.0}, "limit of a node is -1 N"),
+    (np.eye(2), np.ones(2), {"shift": np.nan}, "shift is nan"),
+    (np.eye(2), np.ones(2), {"total": np.inf}, "total is inf"),
+    (np.eye(2) * np.nan, np.ones(2), {"shift": 1.0}, r"C\[0, 0\] is nan"),
+    (np.eye(3), np.ones(2), {"shift": 1.0}, r"C has shape \(3, 3\)"),
+    (-np.eye(2), np.ones(2), {"shift": 1.0}, "C is not positive definite"),
+    (np.eye(2), np.ones(2), {"shift": 1.0, "before": slip_step(np.eye(3), np.ones(3), shift=0.1)}, r"before\.force")])
+def test_slip_that_makes_no_sense(C, limit, given, word):
+    with pytest.raises(InputError, match=word):
+        slip_step(C, np.array(limit), **given)
+
+
 def test_slip_step_input():
     with pytest.raises(InputError, match="exactly one"):
         slip_step(np.eye(2), np.ones(2))

@@ -132,10 +132,21 @@ def test_a_load_that_slides_sideways_is_refused(solid):
         solve(replace(solid, load=axial), SPEED)
 
 
-@pytest.mark.parametrize(("arguments", "word"), [((0.0,), "speed"), ((SPEED, -1.0), "normal load")])
-def test_no_load_is_bad_input(solid, arguments, word):
+@pytest.mark.parametrize(("speed", "given", "word"), [
+    (0.0, {}, "speed is 0.0 rad/s"), (np.nan, {}, "speed is nan"), (SPEED, {"normal": -1.0}, "normal load is -1"),
+    (SPEED, {"normal": np.inf}, "normal load is inf"), (SPEED, {"damper_mass": np.inf}, "damper_mass is inf"),
+    (SPEED, {"damper_mass": -1.0}, "damper_mass is -1"),
+    (SPEED, {"approach": np.full(50, np.nan)}, r"approach\[0\] is nan"),
+    (SPEED, {"approach": np.zeros(49)}, r"approach has shape \(49,\), expected \(50\)")])
+def test_no_load_is_bad_input(solid, speed, given, word):
     with pytest.raises(InputError, match=word):
-        solve(solid, *arguments)
+        solve(solid, speed, **given)
+
+
+@pytest.mark.parametrize("clearance", [np.nan, np.zeros(3)])
+def test_clearance_that_does_not_fit_is_bad_input(clearance):
+    with pytest.raises(InputError, match="clearance"):
+        condensed(wedge_mesh(ALPHA, dimension=2), clearance=clearance)
 
 
 def test_unknown_pair_and_empty_patch_are_bad_input():

@@ -71,6 +71,7 @@ TOGETHER = [
     ({"kind": "hertz", "hertz": {"contact_radius": "20 mm"}}, "hertz.contact_radius"),
     ({"kind": "hertz", "mesh": {"contact_size": "5 mm"}}, "mesh.contact_size"),
     ({"kind": "punch", "punch": {"radius": "30 mm"}}, "punch.radius"),
+    ({"kind": "punch", "study": {"loads": [0]}}, "study.loads = 0 N: nothing presses the two bodies together"),
     ({"kind": "hertz", "operation": {"speed": 1}}, "does not use this table"),
     ({"kind": "imported"}, "needs this table with file"),
     ({"kind": "imported", "imported": {"file": "nowhere.msh"}}, "there is no such file"),
