@@ -5,24 +5,31 @@ from __future__ import annotations
 import time
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
+from functools import partial
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pandas as pd
 
+from geometry.mesh import Mesh
+from geometry.parameters import MeshSize
+
 from ..contact.seat import solve as seat
-from ..errors import NotSolvedError
+from ..errors import InputError, NotSolvedError
 from ..hbm.sweep import size as height
 from ..scene import Scene
+from ..store import on_root
 from .choice import covered, peak_of
+from .clock import running
 from .family import member
 from .pipeline import EXACT_HARMONICS, Seating, family_of_case, load_cases
 from .settings import Settings
 from .stages import Bodies, build_mesh, contact_patches, harmonic_diameters, reduce_sector, seat_damper
 
-__all__ = ["Resonance", "default_meshes", "mesh_table", "on_mesh"]
+__all__ = ["MeshVariant", "Resonance", "mesh_table", "mesh_variants", "on_mesh"]
 
-RATIOS = (1.7, 1.3, 1.0)    # of the scene's own element size
+RATIOS = (1.7, 1.3, 1.0)    # of the scene's own element sizes, when none are given
 HARMONICS = 3       # at the most: what more of them change does not hang on the mesh
 PEAK = 0.01         # accuracy at which the sweep looks for the peak: it is found to a tenth of it
 
@@ -37,13 +44,52 @@ class Resonance:
     seconds: float      # of CPU: drawing, seating, reduction and response
 
 
-def default_meshes(scene: Scene, own: float) -> list[float]:
-    """Element sizes [m] down to that of the scene.
+@dataclass(frozen=True)
+class MeshVariant:
+    """Element sizes everywhere, those on the seats included."""
+
+    name: str
+    mesh: MeshSize
+    order: int
+    cells: float        # about how many, over those of another variant
+    own: bool           # the mesh of the scene
+
+    def of(self, scene: Scene) -> Scene:
+        """The scene with this mesh."""
+        return replace(scene, mesh=self.mesh)
+
+
+def mesh_variants(scene: Scene, sizes: Sequence[float], drawn: Mesh) -> list[MeshVariant]:
+    """Meshes of first and then of second order, from coarse to fine; seats are refined as everything else is.
 
     Args:
-        own: mean element size, where the scene leaves it open [m].
+        sizes: element sizes [m]; where the scene leaves its own open the seats of the finest are as fine as they would
+            be by default. When empty the scene's own sizes are scaled, and last its seats alone are halved.
+        drawn: the mesh of the scene.
+
+    Raises:
+        InputError: a scene whose mesh is given.
     """
-    return [ratio * (scene.mesh.size or own) for ratio in RATIOS]
+    if scene.kind == "imported" and Path(scene.imported.file).suffix.lower() not in (".step", ".stp"):
+        raise InputError("kind 'imported': its mesh is given, expected a scene that is meshed here")
+    power, own = drawn.dimension, scene.mesh
+    base = own.size or min(sizes, default=None)
+    listed = [(f"{1e3 * size:.3g} mm", size / base, replace(own, size=base)) for size in sorted(sizes, reverse=True)]
+    if not sizes:
+        listed = [(f"{1e3 * base * ratio:.3g} mm" if base else f"own size x {ratio:g}", ratio, own) for ratio in RATIOS]
+    made = [MeshVariant(name, replace(mesh, order=order, scale=own.scale * ratio), order, ratio**-power,
+                        ratio == 1.0 and (mesh, order) == (own, own.order))
+            for order in (1, 2) for name, ratio, mesh in listed]
+    if not sizes:
+        halved = replace(own, order=2, contact_size=_seat_size(drawn) / (2 * own.scale))
+        made.append(MeshVariant("own size, seats halved", halved, 2, 2.0 ** (power - 1), False))
+    return made
+
+
+def _seat_size(mesh: Mesh) -> float:
+    """Usual length of an edge on the seats [m]."""
+    facets = np.concatenate([mesh.faces[name] for name in ("seat_left", "seat_right")])
+    return float(np.median(np.linalg.norm(mesh.points[facets[:, 1]] - mesh.points[facets[:, 0]], axis=1)))
 
 
 def on_mesh(scene: Scene, settings: Settings, load: float, comm: Any = None) -> Resonance:
@@ -52,7 +98,14 @@ def on_mesh(scene: Scene, settings: Settings, load: float, comm: Any = None) -> 
     Raises:
         InputError: the scene cannot be meshed; NotSolvedError: no point was solved.
     """
-    start = time.process_time()
+    with running() as clock:
+        start = clock.now()
+        found = _resonance(scene, settings, load, comm)
+        return replace(found, seconds=clock.now() - start)
+
+
+def _resonance(scene: Scene, settings: Settings, load: float, comm: Any) -> Resonance:
+    """On one mesh, its time left open."""
     mesh = build_mesh(scene, comm)
     bodies, patches = Bodies(scene, mesh, comm), contact_patches(mesh)
     problem = seat_damper(bodies, patches)
@@ -63,23 +116,22 @@ def on_mesh(scene: Scene, settings: Settings, load: float, comm: Any = None) -> 
     model = member(family_of_case(scene, mesh, reduced, patches, case), settings).model
     points = covered(model, settings, scene.study.band, scene.excitation.mode, PEAK)
     top = peak_of(points)
-    return Resonance(top.frequency, height(top), mesh.dimension * len(mesh.points), time.process_time() - start)
+    return Resonance(top.frequency, height(top), mesh.dimension * len(mesh.points), np.nan)
 
 
-def mesh_table(scene: Scene, settings: Settings, load: float, sizes: Sequence[float], budget: float,
+def mesh_table(scene: Scene, settings: Settings, load: float, variants: Sequence[MeshVariant], budget: float,
                remarks: list[str], comm: Any = None) -> pd.DataFrame:
-    """One row a mesh of first and second order: name, family, CPU time [s], dofs, errors against the richest one.
+    """One row a mesh: name, family, CPU time [s], dofs, errors against the richest one.
 
-    The richest is the finest of second order that was solved; its own error is its change from the one before.
+    The richest is the last of second order that was solved; its own error is its change from the one before.
 
     Args:
-        sizes: element sizes [m].
-        settings: of the balance; HARMONICS at the most are used.
-        budget: seconds; meshes that are expected to take more than what is left are named and left out.
+        settings: of the balance; HARMONICS at the most are used, and all contact points.
+        budget: CPU seconds; meshes that are expected to take more than what is left are named and left out.
         remarks: what a reader has to know is added here.
     """
-    few = replace(settings, harmonics=min(settings.harmonics, HARMONICS))
-    rows = list(_rows(scene, few, load, sorted(sizes, reverse=True), budget, comm))
+    few = replace(settings, harmonics=min(settings.harmonics, HARMONICS), points=None)
+    rows = list(_rows(scene, few, load, variants, budget, comm))
     rich = [row for row in rows if row["found"] is not None and row["order"] == 2]
     if not rich:
         remarks += [f"mesh {row['name']}: {row['reason']}" for row in rows]
@@ -93,37 +145,33 @@ def mesh_table(scene: Scene, settings: Settings, load: float, sizes: Sequence[fl
     return pd.DataFrame([_told(row, truth, doubt) for row in rows])
 
 
-def _rows(scene: Scene, settings: Settings, load: float, sizes: Sequence[float], budget: float,
+def _rows(scene: Scene, settings: Settings, load: float, variants: Sequence[MeshVariant], budget: float,
           comm: Any) -> Iterator[dict[str, Any]]:
-    end = time.perf_counter() + budget
-    for order in (1, 2):
-        last = None
-        for size in sizes:
-            row = {"name": f"{1e3 * size:.3g} mm", "order": order, "found": None, "reason": "",
-                   "chosen": order == scene.mesh.order and size == scene.mesh.size}
-            left, expected = end - time.perf_counter(), 0.0 if last is None else _expected(scene, *last, size)
-            if expected > left:
-                row["reason"] = f"left out: {expected:.2g} s expected, {max(left, 0.0):.2g} s left"
-            else:
-                row |= _tried(scene, settings, load, size, order, comm)
-            if row["found"] is not None:
-                last = size, row["found"].seconds
-            yield row
+    end, last = time.process_time() + budget, None
+    for variant in variants:
+        last = last if last and last[0].order == variant.order else None
+        row = {"name": variant.name, "order": variant.order, "found": None, "reason": "", "chosen": variant.own}
+        expected = 0.0 if last is None else last[1] * variant.cells / last[0].cells
+        left, expected = on_root(comm, partial(_left_and, end, expected))
+        if expected > left:
+            row["reason"] = f"left out: {expected:.2g} s expected, {max(left, 0.0):.2g} s left"
+        else:
+            row |= _tried(variant.of(scene), settings, load, comm)
+        if row["found"] is not None:
+            last = variant, row["found"].seconds
+        yield row
 
 
-def _tried(scene: Scene, settings: Settings, load: float, size: float, order: int, comm: Any) -> dict[str, Any]:
-    given = scene.mesh.contact_size
-    contact = given if given is None or scene.mesh.size is None else given * size / scene.mesh.size
-    other = replace(scene, mesh=replace(scene.mesh, size=size, order=order, contact_size=contact))
+def _left_and(end: float, expected: float) -> tuple[float, float]:
+    """Seconds that are left and that are expected, for all ranks to decide by."""
+    return end - time.process_time(), expected
+
+
+def _tried(scene: Scene, settings: Settings, load: float, comm: Any) -> dict[str, Any]:
     try:
-        return {"found": on_mesh(other, settings, load, comm)}
+        return {"found": on_mesh(scene, settings, load, comm)}
     except NotSolvedError as error:
         return {"reason": str(error)}
-
-
-def _expected(scene: Scene, size: float, seconds: float, finer: float) -> float:
-    """Seconds of a finer mesh, in proportion to its cells."""
-    return seconds * (size / finer) ** (2 if scene.kind == "plane blades" else 3)
 
 
 def _told(row: dict[str, Any], truth: Resonance, doubt: float) -> dict[str, object]:

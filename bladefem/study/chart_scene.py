@@ -12,8 +12,7 @@ from ..reduction.assemble import folded_diameter
 from ..scene import Scene
 from ..store import stage
 from .chart import Chart, chart
-from .chart_mesh import default_meshes, mesh_table
-from .converge import element_size
+from .chart_mesh import mesh_table, mesh_variants
 from .family import Family, family_of
 from .pipeline import family_of_case, load_cases, reduced_sector, run
 from .settings import first_for, restarted
@@ -30,9 +29,10 @@ def scene_chart(scene: Scene, folder: str | Path, budget: float = 120.0, comm: A
 
     Args:
         budget: seconds for the chart, and as much again for the meshes; contact and reduction come on top.
-        sizes: element sizes of a comparison of meshes [m], default_meshes when empty; none when left out.
+        sizes: element sizes of a comparison of meshes [m], chosen when empty; none when left out.
     """
     done = run(scene, folder, until="contact", comm=comm)
+    variants = [] if sizes is None else mesh_variants(scene, sizes, done.mesh)
     bodies, patches = Bodies(scene, done.mesh, comm), list(done.contact.problem.patches)
     cases = load_cases(scene, done.mesh, done.contact)
     case = cases[len(cases) // 2]
@@ -47,8 +47,7 @@ def scene_chart(scene: Scene, folder: str | Path, budget: float = 120.0, comm: A
     made.remarks.insert(0, f"normal load {case.load:g} N on each seat")
     if sizes is None:
         return made
-    sizes = list(sizes) or default_meshes(scene, element_size(done.mesh, "blade"))
-    return replace(made, meshes=mesh_table(scene, made.settings, case.load, sizes, budget, made.remarks, comm))
+    return replace(made, meshes=mesh_table(scene, made.settings, case.load, variants, budget, made.remarks, comm))
 
 
 def _fewer_diameters(reduced: Reduced, order: int) -> Iterator[tuple[str, Reduced]]:
