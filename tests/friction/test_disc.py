@@ -110,10 +110,14 @@ def test_jacobian_against_finite_differences(kn, precision):
 
 @pytest.mark.parametrize(("H", "samples"), [(1, 9), (2, 18), (5, 64), (7, 65), (9, 46)])
 def test_jacobian_for_any_number_of_harmonics_and_samples(H, samples):
-    """Sums over time are folded and tiled: odd, even and fourfold numbers of samples; tiles up to 8 and beyond."""
+    """Sums over time are folded and tiled: odd, even and fourfold numbers of samples; tiles up to 8 and beyond.
+
+    To 1e-6 of the largest of an element: measured 2e-7.
+    """
     elements, w = random_case(9, 40, H, 2)
-    numeric = numeric_jacobian(lambda x: evaluate(elements, x, samples).f, w, 1e-7)
-    np.testing.assert_allclose(evaluate(elements, w, samples).dfdw, numeric, rtol=0, atol=1e-5)
+    numeric = numeric_jacobian(lambda x: evaluate(elements, x, samples).f, w, 1e-6)
+    largest = np.maximum(np.abs(numeric).max(axis=(1, 2, 3, 4), keepdims=True), 1e-9)
+    np.testing.assert_allclose(evaluate(elements, w, samples).dfdw / largest, numeric / largest, rtol=0, atol=1e-6)
 
 
 @pytest.mark.parametrize("H", [1, 3, 5, 9])
