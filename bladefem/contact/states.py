@@ -27,8 +27,7 @@ class StateTable:
 
     axes: tuple[np.ndarray, ...]    # k ascending coordinates
     force: np.ndarray               # (len(axes[0]), ..., n) [N]
-    curvature: np.ndarray           # (k, len(axes[0]), ...) largest second difference / 8, over the largest force;
-                                    # 0 where all states are open [1]
+    bend: np.ndarray                # (k, len(axes[0]), ..., n) second differences |f''| h^2 along each axis [N]
 
 
 def state_table(solve: Callable[..., np.ndarray], axes: Sequence[np.ndarray]) -> StateTable:
@@ -47,15 +46,15 @@ def state_table(solve: Callable[..., np.ndarray], axes: Sequence[np.ndarray]) ->
             raise InputError(f"axis {k} of the state table is {a.tolist()}, expected at least 3 ascending values")
     force = np.array([solve(*point) for point in product(*axes)])
     force = force.reshape(*(len(a) for a in axes), -1)
-    return StateTable(axes, force, np.stack([_curvature(force, a, k) for k, a in enumerate(axes)]))
+    return StateTable(axes, force, np.stack([_bend(force, a, k) for k, a in enumerate(axes)]))
 
 
 def interpolate(table: StateTable, point: Sequence[float]) -> tuple[np.ndarray, float]:
     """Forces (n,) by multilinear interpolation, and an error indicator relative to the table's largest force.
 
-    The indicator adds, over the axes, the interpolation error s (1 - s) h^2 f'' / 2 estimated from second differences
-    at the corners of the cell: 0 on a table point. Where the contact area changes, forces have kinks and the
-    indicator is of the right size, but no bound.
+    The indicator adds, over the axes, b c / (b + c) from the second differences b and c at the two ends of the cell,
+    times 4 s (1 - s): 0 on a table point. For a force with one kink in the cell, as where a node opens or closes, that
+    is the largest interpolation error; for a smooth one, b = c = h^2 f'', it is four times as large as that.
 
     Raises:
         InputError: the point is outside the table.
@@ -69,19 +68,18 @@ def interpolate(table: StateTable, point: Sequence[float]) -> tuple[np.ndarray, 
     cell = tuple(slice(i, i + 2) for i, _ in where)
     for k, (i, s) in enumerate(where):
         force = (1 - s) * force[i] + s * force[i + 1]
-        indicator += 4 * s * (1 - s) * float(table.curvature[k][cell].max())
-    return force, indicator
+        b, c = np.moveaxis(table.bend[k][cell], k, 0)
+        indicator += 4 * s * (1 - s) * float((b * c / np.maximum(b + c, 1e-300)).max())
+    return force, indicator / (float(np.abs(table.force).max()) or 1.0)     # all states may be open
 
 
-def _curvature(force: np.ndarray, a: np.ndarray, k: int) -> np.ndarray:
-    """Largest h^2 |f''| / 8 over the nodes, with the wider neighbouring step, at each table point along axis k."""
+def _bend(force: np.ndarray, a: np.ndarray, k: int) -> np.ndarray:
+    """h^2 |f''| with the wider neighbouring step h, at each table point along axis k; at the ends that next to them."""
     f = np.moveaxis(force, k, 0)
     h = np.diff(a).reshape(-1, *[1] * (f.ndim - 1))
     slope = np.diff(f, axis=0) / h
-    second = 2 * np.diff(slope, axis=0) / (h[1:] + h[:-1]) * np.maximum(h[1:], h[:-1])**2 / 8
-    size = np.abs(second).max(axis=-1) / (np.abs(force).max() or 1.0)       # faces may be open in all states
-    size = np.concatenate([size[:1], size, size[-1:]])
-    return np.moveaxis(size, 0, k)
+    bend = np.abs(2 * np.diff(slope, axis=0) / (h[1:] + h[:-1]) * np.maximum(h[1:], h[:-1])**2)
+    return np.moveaxis(np.concatenate([bend[:1], bend, bend[-1:]]), 0, k)
 
 
 @dataclass(frozen=True)

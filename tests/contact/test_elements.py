@@ -204,7 +204,7 @@ def test_a_table_of_open_states_has_no_error():
 
 
 def test_table_of_states_and_its_indicator(problem):
-    """Halving the steps divides the error by two or more (kinks), and the indicator follows the true error."""
+    """Halving the steps divides the error by two or more (kinks), and the indicator lies above the true error."""
     direct = tilted(problem)
     points = [(120.0, 0.4e-6), (170.0, -0.3e-6), (199.0, 0.9e-6), (133.0, 0.1e-6)]
     errors, indicators = [], []
@@ -216,7 +216,7 @@ def test_table_of_states_and_its_indicator(problem):
         indicators.append(max(i for _, i in found))
     errors, indicators = np.array(errors), np.array(indicators)
     assert errors[-1] < errors[0] / 10
-    assert (indicators > 0.3 * errors).all() and (indicators < 30 * errors).all()
+    assert (indicators > errors).all() and (indicators < 6 * errors).all()      # measured 2.0 to 3.4 times
 
 
 def test_the_user_is_told_whether_the_table_is_enough(problem):
@@ -225,9 +225,23 @@ def test_the_user_is_told_whether_the_table_is_enough(problem):
     narrow = check_states(scene, problem, [100.0, 110.0], 1e-10)
     wide = check_states(scene, problem, [20.0, 200.0], 5e-6)
     assert narrow.states == 25 and narrow.enough and narrow.error < 1e-3
-    assert not wide.enough and wide.error > 0.05 and wide.indicator > 0.02
+    assert not wide.enough and wide.indicator > wide.error > 0.05
     assert "is enough" in state_sentence(scene, problem, [100.0, 110.0], 1e-10)
     assert "is NOT enough" in state_sentence(scene, problem, [20.0, 200.0], 5e-6)
+
+
+@pytest.mark.parametrize("kink", [0.4, 0.5, 0.55])
+def test_indicator_of_a_kink_and_of_a_parabola(kink):
+    """Exact for the largest error of one kink in the cell; four times that of a smooth force."""
+    axes = [np.linspace(0, 1, 6), np.linspace(0, 1, 3)]
+    bent = state_table(lambda x, y: np.array([abs(x - kink), 1.0]), axes)
+    force, told = interpolate(bent, (0.5, 0.0))
+    assert told == pytest.approx((kink - 0.4) * (0.6 - kink) * 2 / 0.2, abs=1e-15)
+    if kink == 0.5:
+        assert told == pytest.approx(force[0])
+    curved = state_table(lambda x, y: np.array([x**2, 1.0]), axes)
+    force, told = interpolate(curved, (0.5, 0.0))
+    assert told == pytest.approx(4 * (force[0] - 0.25))
 
 
 def test_table_is_exact_on_its_points(problem):
