@@ -50,9 +50,7 @@ from bladefem.hbm.api import solve
 from bladefem.hbm.model import Damping, ReducedModel
 from bladefem.hbm.reference import reference_model
 from bladefem.hbm.resonance import free_resonances, stuck_resonances
-from bladefem.hbm.solution import Solution
-from bladefem.hbm.sweep import response, size
-from bladefem.study.along import along
+from bladefem.hbm.warm import compile_kernels
 from bladefem.study.choice import choose
 from bladefem.study.family import Family, family_of, member
 from bladefem.study.settings import Settings, first_for
@@ -151,46 +149,9 @@ def rich(case: Case) -> float:
     return time.process_time() - start
 
 
-def swept(case: Case, points: int = 100) -> np.ndarray:
-    """Circular frequencies round the free and the stuck resonance next to a case [rad/s]."""
-    free, stuck = free_resonances(case.model), stuck_resonances(case.model)
-    near = min(range(len(free)), key=lambda i: abs(free[i] - case.omega))
-    low, high = sorted((free[near], stuck[near]))
-    return np.linspace(low - 0.1 * (high - low), high + 0.1 * (high - low), points)
-
-
-def sweep_ratio(case: Case, omegas: np.ndarray, truth: list[Solution],
-                accuracy: float) -> tuple[float, float, float, float]:
-    """Time of the automatic choice over that of the rich model along a sweep; largest error told, and true ones.
-
-    Errors are in phasors over the highest point: told of the choice, true of the choice, true of the rich model.
-
-    Args:
-        truth: every third point with the richest model.
-    """
-    seconds, fixed = [], []
-    for _ in range(3 if case.model.directions == 1 else 1):
-        start = time.process_time()
-        family = family_of(case.model, case.patches)
-        curve = along(family, omegas, first_for(family.modes), accuracy)
-        middle = time.process_time()
-        plain = list(response(case.model, omegas, *RICH))
-        seconds.append(middle - start)
-        fixed.append(time.process_time() - middle)
-    top = max(size(p) for p in truth if p.converged)
-    told = max(error * size(p) / top for p in curve.points if (error := curve.errors.get(p.omega)))
-    return min(seconds) / min(fixed), told, farthest(curve.points, truth, top), farthest(plain, truth, top)
-
-
-def farthest(points: list[Solution], truth: list[Solution], top: float) -> float:
-    """Largest distance of phasors over the highest point, where both were solved."""
-    return max(abs(p.probe[1, 0] - q.probe[1, 0]) / top for p, q in zip(points[::3], truth, strict=True)
-               if p.converged and q.converged)
-
-
 def main(every: int = 1) -> None:
     cases = [*beam_cases(), *random_cases()][::every]
-    solve(cases[0].model, cases[0].omega, 3, 64)        # compile
+    compile_kernels()
     for case in {c.model.directions: c for c in cases}.values():
         automatic(case, family_of(case.model, case.patches), 1.0, 0.02)
     results: dict[float, list[Outcome]] = {0.02: [], 0.001: []}
@@ -217,14 +178,6 @@ def main(every: int = 1) -> None:
         print(f"accuracy {accuracy:g}: {len(good)} of {len(outcomes)} accepted, {wrong} wrong, largest true error "
               f"{max(o.true for o in good):.2g}, time over the rich model: all {sum(spent) / sum(fixed):.2f}, beams "
               f"{sum(spent[:beams]) / sum(fixed[:beams]):.2f}, bodies {sum(spent[beams:]) / sum(fixed[beams:]):.2f}")
-    for k in (len(cases) // 12, len(cases) * 2 // 5, len(cases) * 3 // 5, len(cases) * 7 // 10, len(cases) - 2):
-        omegas = swept(cases[k])
-        truth = list(response(cases[k].model, omegas[::3], *TRUTH))
-        for accuracy in results:
-            ratio, told, true, plain = sweep_ratio(cases[k], omegas, truth, accuracy)
-            print(f"sweep of 100 points, {cases[k].name}, accuracy {accuracy:g}: time over the rich model {ratio:.2f}, "
-                  f"largest error told {told:.1e} of the peak, true {true:.1e}, of the rich model {plain:.1e}",
-                  flush=True)
 
 
 if __name__ == "__main__":

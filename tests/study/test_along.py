@@ -51,6 +51,15 @@ def test_the_first_slip_is_watched(blade, omegas):
     assert onset and all(p in watched(points) or p is peak_of(points) for p in onset)
 
 
+def test_only_points_that_need_it_get_richer_settings(blade, omegas):
+    """At 0.1 % slips that only begin take 15 harmonics here, the peak 7, and what sticks the excited one."""
+    curve = along(family_of(blade, (1, 1)), omegas["second"], first_for(len(blade.side(1).omega)), 0.001)
+    slipping = [p.harmonics for p in curve.points if p.states["slip"]]
+    assert curve.settings.harmonics == min(slipping) < max(slipping)
+    assert slipping.count(max(slipping)) < 10
+    assert {p.harmonics for p in curve.points if not p.states["slip"]} <= {1, curve.settings.harmonics}
+
+
 def test_points_that_stick_take_the_excited_harmonic_alone(blade, omegas):
     frugal = Options(frugal=True)
     for omega in [*omegas["second"][::9], *omegas["first"][::20]]:
