@@ -130,7 +130,9 @@ def chart(options: argparse.Namespace, comm: Any) -> None:
     """Speed against accuracy of methods and models: tables and picture."""
     from ..report.chart import write_chart
     from ..store import on_root
+    from ..study.chart import check_budget
     from ..study.chart_scene import reference_chart, scene_chart
+    check_budget(options.budget)
     if options.reference:
         folder, accuracy, title = Path(options.output or "runs/reference"), 0.02, "reference blade"
         made = on_root(comm, lambda: reference_chart(accuracy, options.budget))

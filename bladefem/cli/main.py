@@ -80,7 +80,7 @@ def parser() -> argparse.ArgumentParser:
     subs.choices["study"].add_argument("--vary", required=True, metavar="KEY=VALUES",
                                        help="field and its values, such as damper.angle='30, 40, 50 deg'")
     subs.choices["chart"].add_argument("--budget", type=float, default=120.0, metavar="SECONDS",
-                                       help="time for the chart; what would exceed it is left out and named")
+                                       help="CPU time for the variants; what would exceed it is left out and named")
     subs.choices["chart"].add_argument("--reference", action="store_true", help="the built-in reference blade instead")
     subs.choices["chart"].add_argument("--mesh", metavar="SIZES", nargs="?", const="", help="also compare meshes of "
                                        "first and second order with these element sizes, such as '10, 7, 5 mm'")

@@ -10,8 +10,8 @@ from typing import Any
 from ..hbm.reference import reference_model
 from ..reduction.assemble import folded_diameter
 from ..scene import Scene
-from ..store import stage
-from .chart import Chart, chart
+from ..store import on_root, stage
+from .chart import Chart, chart, check_budget
 from .chart_mesh import mesh_table, mesh_variants
 from .family import Family, family_of
 from .pipeline import family_of_case, load_cases, reduced_sector, run
@@ -28,9 +28,11 @@ def scene_chart(scene: Scene, folder: str | Path, budget: float = 120.0, comm: A
     """The chart of a scene under the middle one of its loads; finished stages are picked up from the folder.
 
     Args:
-        budget: seconds for the chart, and as much again for the meshes; contact and reduction come on top.
+        budget: CPU seconds for the chart, and as much again for the meshes; contact, reduction and the automatic
+            choice come on top.
         sizes: element sizes of a comparison of meshes [m], chosen when empty; none when left out.
     """
+    check_budget(budget)
     done = run(scene, folder, until="contact", comm=comm)
     variants = [] if sizes is None else mesh_variants(scene, sizes, done.mesh)
     bodies, patches = Bodies(scene, done.mesh, comm), list(done.contact.problem.patches)
@@ -42,8 +44,9 @@ def scene_chart(scene: Scene, folder: str | Path, budget: float = 120.0, comm: A
     def family(known: Reduced) -> Family:
         return family_of_case(scene, done.mesh, known, patches, case)
 
-    made = chart(family(reduced), restarted(settings), scene.excitation.mode, scene.accuracy, budget, scene.study.band,
-                 {name: family(fewer) for name, fewer in _fewer_diameters(reduced, scene.excitation.engine_order)})
+    made = on_root(comm, lambda: chart(
+        family(reduced), restarted(settings), scene.excitation.mode, scene.accuracy, budget, scene.study.band,
+        {name: family(fewer) for name, fewer in _fewer_diameters(reduced, scene.excitation.engine_order)}))
     made.remarks.insert(0, f"normal load {case.load:g} N on each seat")
     if sizes is None:
         return made

@@ -193,6 +193,14 @@ def test_a_response_needs_damping_and_a_force(command, override, pipeline, tmp_p
     assert main(["modes", WEDGE, "-o", str(tmp_path / "run"), "--set", override]) == 0
 
 
+@pytest.mark.parametrize("budget", ["-3", "0", "nan", "inf"])
+@pytest.mark.parametrize("what", [[WEDGE], ["--reference"]])
+def test_a_chart_needs_a_time(budget, what, tmp_path, capsys):
+    assert main(["chart", *what, "-o", str(tmp_path / "run"), "--budget", budget]) == 2
+    assert "expected a positive, finite number of seconds" in capsys.readouterr().err
+    assert not (tmp_path / "run").exists()
+
+
 def test_a_chart_needs_damping(tmp_path, capsys):
     assert main(["chart", WEDGE, "-o", str(tmp_path), "--set", "operation.damping=0"]) == 2
     assert "operation.damping = 0: expected above 0" in capsys.readouterr().err
