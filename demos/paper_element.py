@@ -1,5 +1,5 @@
 # %% [markdown]
-# # One friction element: the paper's Fig. 1, 3 and 4
+# # One friction element: the paper's Fig. 1, 3 and 4, and Eq. 29
 #
 # A node-to-node element carries the force $f = k_t (g - z)$ while it sticks and $f = \pm\mu N$ while it slips; the
 # slider $z$ follows when the limit is reached. For a motion $g = g_0 \sin\omega t$ under constant load the loop is a
@@ -17,6 +17,8 @@ from mpi4py import MPI
 from scipy.integrate import trapezoid
 
 from bladefem.damper.element import coupled_loop, linear_fit, printed_loop, two_slope_loop, work
+from bladefem.friction.closed_form import circular_orbit_work
+from bladefem.friction.printed import per_axis
 from bladefem.view.paper import draw_coupled_loops, draw_fit
 
 if MPI.COMM_WORLD.rank:                        # small enough for one rank; the others wait at the end
@@ -79,6 +81,19 @@ apart = right.load < 0
 flips = np.count_nonzero(np.diff(np.sign(printed.force[apart])) != 0) / np.count_nonzero(apart)
 print(f"open contact: force {np.abs(right.force[apart]).max():.1f} N; printed law "
       f"{np.abs(printed.force[apart]).max():.1f} N, changing sign in {100 * flips:.0f} % of the steps")
+
+# %% [markdown]
+# ## Two directions (Eq. 29)
+#
+# On a circular orbit of radius $A$ the force stays on Coulomb's circle and the work is
+# $2\pi\mu N\sqrt{A^2 - (\mu N / k_t)^2}$. A limit for each axis, $\sqrt{(\mu N)^2 - f_\perp^2}$, loses more than half of it here.
+
+# %%
+angle = 2 * np.pi * np.arange(4 * samples + 1) / samples
+orbit, steady = amplitude * np.column_stack([np.cos(angle), np.sin(angle)]), slice(3 * samples, None)
+force = per_axis(orbit, np.full(len(orbit), limit), kt, 1.0)[steady]
+lost = np.sum((force[1:] + force[:-1]) / 2 * np.diff(orbit[steady], axis=0))
+print(f"circular orbit: limits for each axis do {lost / circular_orbit_work(amplitude, kt, limit):.3f} of the work")
 
 # %%
 print(f"work lost by the printed law at half the frequency [1]: {1 - ratios['load at half the frequency']:.6f}")
