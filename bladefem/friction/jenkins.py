@@ -18,7 +18,7 @@ __all__ = ["SEPARATED", "SLIP_DOWN", "SLIP_UP", "STICK", "assemble", "bounds", "
 SEPARATED, STICK, SLIP_UP, SLIP_DOWN = 0, 1, 2, 3
 
 
-@njit(cache=True, error_model="numpy")
+@njit(_nrt=False, cache=True, error_model="numpy")
 def bounds(g, N, mu, low, high):
     """Fill the bounds low, high (S,) of the slider, g -+ mu N [N]; returns the smallest N."""
     least = N[0]
@@ -30,7 +30,7 @@ def bounds(g, N, mu, low, high):
     return least
 
 
-@njit(cache=True, error_model="numpy")
+@njit(_nrt=False, cache=True, error_model="numpy")
 def _scan(b, g, N, low, high, opens, first, state):
     """States of one period from slider b: (slider, last event, its sign, period without event).
 
@@ -60,7 +60,7 @@ def _scan(b, g, N, low, high, opens, first, state):
     return b, last, sign, quiet
 
 
-@njit(cache=True, error_model="numpy")
+@njit(_nrt=False, cache=True, error_model="numpy")
 def march_states(g, N, low, high, opens, state):
     """Fill the states (S,) of the steady period for g = kt w, normal load N and slider bounds (S,), all [N].
 
@@ -80,7 +80,7 @@ def march_states(g, N, low, high, opens, state):
     return event, way, quiet
 
 
-@njit(cache=True, error_model="numpy")
+@njit(_nrt=False, cache=True, error_model="numpy")
 def _origin(i, state, g, N, el, at, rows):
     """Rows (2, K) of d(f - kt w) by normal and tangential coefficients in the stick after event i; f - kt w [N]."""
     S = g.size
@@ -111,7 +111,7 @@ def _stuck(last, sign, g, N, el, tab, means, F, J):
             J[1, 0, 0] += sign * el.mu * el.kn * tab.at[last]
 
 
-@njit(cache=True, error_model="numpy")
+@njit(_nrt=False, cache=True, error_model="numpy")
 def _stretches(state, g, N, el, tab, means, F, J, rows, weight):
     """Add to the basis means (3, 4H+1) of stick, signed slip and contact, and the offsets of sticking to F and J."""
     S, K, P = g.size, F.shape[1], means.shape[1]
@@ -126,14 +126,15 @@ def _stretches(state, g, N, el, tab, means, F, J, rows, weight):
         if code == SEPARATED:
             continue
         sign = 1.0 if code == SLIP_UP else (-1.0 if code == SLIP_DOWN else 0.0)
+        stick = 1.0 if code == STICK else 0.0
         for p in range(P):
             mean = tab.sums[i, p] - tab.sums[a, p]
-            means[2, p] += mean
+            means[0, p] += stick * mean
             means[1, p] += sign * mean
+            means[2, p] += mean
             means[3, p] = mean
         if code != STICK:
             continue
-        means[0] += means[3]
         c = _origin((a - 1) % S, state, g, N, el, tab.at, rows)
         weighted(means[3], weight)
         for k in range(K):
@@ -143,7 +144,7 @@ def _stretches(state, g, N, el, tab, means, F, J, rows, weight):
                     J[1, k, d, l] += weight[k] * rows[d, l]
 
 
-@njit(cache=True, error_model="numpy")
+@njit(_nrt=False, cache=True, error_model="numpy")
 def assemble(w, base, el, means, F, J, block):
     """Add the parts linear in w (2, K): kt M_stick, mu M_slip and M_contact of base (K,) + kn w; block is scratch."""
     K = w.shape[1]

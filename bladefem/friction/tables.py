@@ -105,7 +105,7 @@ def _fours(S: int) -> np.ndarray:
     return four
 
 
-@njit(cache=True, error_model="numpy")
+@njit(_nrt=False, cache=True, error_model="numpy")
 def gram(m, out):
     """out (K, K) = analysis of synthesis restricted to a set whose basis means up to 2H are m (4H+1); I on a circle."""
     H = out.shape[0] // 2
@@ -143,7 +143,7 @@ def add_gram(factor, m, out):
             out[2 * a - 1, 2 * b] += factor * (m[total] - sin_apart)
 
 
-@njit(cache=True, error_model="numpy")
+@njit(_nrt=False, cache=True, error_model="numpy")
 def weighted(m, out):
     """out (K,) = coefficients of the indicator function of a set with basis means m."""
     out[0] = m[0]
@@ -151,7 +151,7 @@ def weighted(m, out):
         out[k] = 2 * m[k]
 
 
-@njit(cache=True, error_model="numpy", fastmath={"contract", "reassoc", "nsz"})
+@njit(_nrt=False, cache=True, error_model="numpy", fastmath={"contract", "reassoc", "nsz"})
 def values(transposed, c, factor, offset, out):
     """out (S,) = offset plus factor times the motion with coefficients c (K,); synthesis transposed (K, S)."""
     first = offset + factor * c[0]
