@@ -71,6 +71,7 @@ class Patch:
     faces: np.ndarray               # (nf, k) corner numbers into points, for pictures
     blade_nodes: np.ndarray         # (n,) node numbers in the mesh
     damper_nodes: np.ndarray        # (n,) node numbers in the mesh
+    places: np.ndarray | None = None    # (n, 3) where their forces act: mean places of what they stand for [m]
 
 
 @dataclass(frozen=True)

@@ -17,6 +17,7 @@ a/20 (plane flat punch, r < 0.8 a); benchmarks/contact_hertz.py makes the table 
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 
 import numpy as np
 import scipy.sparse as sp
@@ -50,8 +51,12 @@ def make_patch(mesh: Mesh, pair: str) -> Patch:
     """
     if pair not in mesh.pairs:
         raise InputError(f"contact pair '{pair}' is not in the mesh; it has {', '.join(sorted(mesh.pairs)) or 'none'}")
-    if not mesh.pairs[pair].nodes.size:
-        return mortar_patch(mesh, pair)
+    patch = _matched(mesh, pair) if mesh.pairs[pair].nodes.size else mortar_patch(mesh, pair)
+    return replace(patch, places=patch_means(patch, mesh).T @ mesh.points)
+
+
+def _matched(mesh: Mesh, pair: str) -> Patch:
+    """The patch of faces that match."""
     faces, slave = patch_faces(mesh, pair)
     corners = corner_count(mesh.dimension, faces.shape[1])
     nodes, numbers = np.unique(faces[:, :corners], return_inverse=True)

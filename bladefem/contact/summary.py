@@ -25,12 +25,16 @@ class Resultant:
 
 
 def resultant(pressure: PressureMap) -> Resultant:
-    """Resultant of one pressure map, with forces at the nodes' own places."""
+    """Resultant of one pressure map, with forces at the mean places of what their nodes stand for.
+
+    There, not at the nodes, do the moments of flat faces balance: a node at an edge stands for what is inside of it.
+    """
     patch, f = pressure.patch, pressure.force
+    places = patch.points if patch.places is None else patch.places
     vectors = patch.frame[:, 0] * f[:, None]
     pressed = f > 0
     weight = f if pressed.any() else patch.area
     area = float(patch.area[pressed].sum())
-    return Resultant(vectors.sum(axis=0), np.cross(patch.points, vectors).sum(axis=0), float(f.sum()),
-                     weight @ patch.points / weight.sum(), area, area / float(patch.area.sum()),
+    return Resultant(vectors.sum(axis=0), np.cross(places, vectors).sum(axis=0), float(f.sum()),
+                     weight @ places / weight.sum(), area, area / float(patch.area.sum()),
                      float(pressure.pressure.max(initial=0.0)))

@@ -18,19 +18,13 @@ from bladefem.data import Patch, PressureMap
 from .skin import split_faces
 from .style import COLOURS, canvas, headline
 
-__all__ = ["OPEN", "PRESSURE_COLOURS", "arrangement", "colour_pressure", "contact_centre", "draw_pressure",
+__all__ = ["OPEN", "PRESSURE_COLOURS", "arrangement", "colour_pressure", "draw_pressure",
            "label_outer", "pressure_points", "pressure_summary", "save_faces_vtu", "save_pressure_vtu", "seat_name",
            "unfold"]
 
 PRESSURE_COLOURS = "inferno_r"
 OPEN = "#e6e6e6"                     # faces that nothing presses
 VTK_FACES = {2: 3, 3: 5, 4: 9}       # corners of a face: VTK's number for line, triangle, quadrilateral
-
-
-def contact_centre(seat: PressureMap) -> np.ndarray:
-    """(3,) force-weighted mean point [m]; the middle of the patch when nothing presses."""
-    weight = seat.force if seat.force.sum() > 0 else seat.patch.area
-    return weight @ seat.patch.points / weight.sum()
 
 
 def pressure_summary(seats: Sequence[PressureMap]) -> pd.DataFrame:
@@ -42,8 +36,8 @@ def pressure_summary(seats: Sequence[PressureMap]) -> pd.DataFrame:
     for seat in seats:
         pressed = seat.force > 1e-9 * max(seat.force.max(initial=0.0), 1e-300)
         area = float(seat.patch.area[pressed].sum())
-        (x, y, z), total = contact_centre(seat), resultant(seat)
-        (fx, fy, fz), moment = total.force, total.moment
+        total = resultant(seat)
+        (x, y, z), (fx, fy, fz), moment = total.centre, total.force, total.moment
         rows.append({"patch": seat.patch.name, "nodes": len(seat.force), "force": float(seat.force.sum()),
                      "peak_pressure": float(seat.pressure.max(initial=0.0)),
                      "mean_pressure": float(seat.force.sum()) / area if area > 0 else 0.0,
@@ -171,7 +165,7 @@ def draw_face(ax: Any, seat: PressureMap, peak: float) -> None:
     open_nodes = seat.force <= 0
     ax.plot(*xy[~open_nodes].T, ".", color="#ffffff", ms=1.5, alpha=0.5)
     ax.plot(*xy[open_nodes].T, "o", mfc="none", mec="#888888", ms=2.5, mew=0.5, label="open node")
-    centre = 1e3 * unfold(seat.patch, contact_centre(seat)[None])[0]
+    centre = 1e3 * unfold(seat.patch, resultant(seat).centre[None])[0]
     ax.plot(*xy[np.argmax(pressure)], "^", mfc="white", mec="black", ms=7, label="peak", clip_on=False)
     ax.plot(*centre, "P", mfc=COLOURS[5], mec="black", ms=8, label="centre of the force")
     ax.set(ylabel="outwards [mm]", aspect="equal")

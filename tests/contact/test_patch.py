@@ -12,6 +12,7 @@ from bladefem.contact.lcp import solve_lcp
 from bladefem.contact.patch import initial_gap, make_patch, normal_ports, patch_means, port_matrix, rigid_ports
 from bladefem.contact.seat import solve
 from bladefem.contact.shape import corner_count, face_quadrature, shape, traction_shape
+from bladefem.contact.summary import resultant
 from bladefem.contact.surface import outward, surface
 from bladefem.errors import InputError
 from bladefem.fem.body import assemble
@@ -118,6 +119,9 @@ def test_non_matching_wedge_is_balanced_too():
     loose = solve(condensed(replace(mesh, pairs=pairs)), SPEED)
     for a, b in zip(loose, solve(condensed(mesh), SPEED), strict=True):
         assert np.abs(a.force - b.force).max() < 1e-7 * b.force.max()
+    this, following = (resultant(m) for m in loose)
+    moment = this.moment + mesh.sector.rotation @ following.moment
+    assert np.abs(moment).max() < 1e-9 * np.linalg.norm(this.moment)
 
 
 def bent(dimension, matching, steep):

@@ -5,8 +5,8 @@ import pytest
 import synthetic
 from matplotlib.image import imread
 
+from bladefem.contact.summary import resultant
 from bladefem.view.contact import (
-    contact_centre,
     draw_pressure,
     pressure_points,
     pressure_summary,
@@ -169,7 +169,7 @@ def test_pressure_numbers_and_picture(folder):
     assert np.allclose(table["force"], 120.0)
     assert np.allclose(table["area"], 0.04 * 0.006)
     # Centre of the parabola 1 - ((z - 4) / 20)^2 on -16..20 mm is 2.98 mm; sampled at 11 points 3.55.
-    assert np.allclose(contact_centre(seats[0])[2], 3.5509e-3, atol=1e-6)
+    assert np.allclose(resultant(seats[0]).centre[2], 3.5509e-3, atol=1e-6)
     assert len(pressure_points(seats)) == 2 * 77
     draw_pressure(seats, folder / "pressure.png")
     draw_pressure(synthetic.line_seats(), folder / "line.png")
