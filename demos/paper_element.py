@@ -86,8 +86,8 @@ print(f"open contact: force {np.abs(right.force[apart]).max():.1f} N; printed la
 # ## Two directions (Eq. 29)
 #
 # On a circular orbit of radius $A$ the force stays on Coulomb's circle and the work is
-# $2\pi\mu N\sqrt{A^2 - (\mu N / k_t)^2}$. A limit for each axis, $\sqrt{(\mu N)^2 - f_\perp^2}$, loses more than half of
-# it here.
+# $2\pi\mu N\sqrt{A^2 - (\mu N / k_t)^2}$. A limit for each axis, $\sqrt{(\mu N)^2 - f_\perp^2}$, loses more than half
+# of it here.
 
 # %%
 angle = 2 * np.pi * np.arange(4 * samples + 1) / samples

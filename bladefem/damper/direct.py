@@ -16,7 +16,7 @@ from bladefem.errors import InputError, NotSolvedError
 
 from ..hbm.flow import State, rest
 from ..hbm.system import System
-from .explicit import Cycle, March, explicit_march, sampled, settle, stable_steps
+from .explicit import Cycle, March, check_steps, explicit_march, sampled, settle
 
 __all__ = ["contact_step", "direct", "newmark_march"]
 
@@ -34,9 +34,8 @@ def direct(system: System, omega: float, steps: int = 512, start: State | None =
         InputError: an explicit step beyond the stability limit.
         NotSolvedError: a time step has no solution (possible only where the normal load follows the motion).
     """
-    if explicit and steps < stable_steps(system, omega):
-        raise InputError(f"steps = {steps} a period: expected at least {stable_steps(system, omega)}, the stability "
-                         f"limit of explicit integration (omega_max dt < 2)")
+    if explicit:
+        check_steps(system, omega, steps)
     march = (explicit_march if explicit else newmark_march)(system, omega, steps)
     return settle(march, start or rest(system), most, tolerance)
 

@@ -19,7 +19,7 @@ from ..friction.march import stable_step, step_1d
 from ..hbm.flow import State, rest
 from ..hbm.system import System
 
-__all__ = ["Cycle", "damper_cycle", "explicit_march", "settle", "stable_steps"]
+__all__ = ["Cycle", "check_steps", "damper_cycle", "explicit_march", "settle", "stable_steps"]
 
 March = Callable[[State], tuple[State, np.ndarray, np.ndarray, np.ndarray]]
 
@@ -42,6 +42,14 @@ def stable_steps(system: System, omega: float) -> int:
     return int(np.floor(2 * np.pi / omega / stable_step(system.fastest))) + 1
 
 
+def check_steps(system: System, omega: float, steps: int) -> None:
+    """Raise InputError when there are fewer steps a period than ``stable_steps``."""
+    least = stable_steps(system, omega)
+    if steps < least:
+        raise InputError(f"steps = {steps} a period: expected at least {least}, the stability limit of explicit "
+                         "integration (omega_max dt < 2)")
+
+
 def damper_cycle(system: System, omega: float, steps: int, start: State | None = None, most: int = 300,
                  tolerance: float = 1e-6) -> Cycle:
     """March explicitly until motion and friction forces repeat over one period.
@@ -54,9 +62,7 @@ def damper_cycle(system: System, omega: float, steps: int, start: State | None =
     Raises:
         InputError: the step is beyond the stability limit.
     """
-    if steps < stable_steps(system, omega):
-        raise InputError(f"steps = {steps} a period: expected at least {stable_steps(system, omega)}, the stability "
-                         f"limit of explicit integration (omega_max dt < 2)")
+    check_steps(system, omega, steps)
     return settle(explicit_march(system, omega, steps), start or rest(system), most, tolerance)
 
 

@@ -23,6 +23,8 @@ from bladefem.errors import InputError
 from bladefem.hbm.linear import receptance
 from bladefem.hbm.model import ReducedModel
 
+from ..friction.approximation import by_harmonic, from_harmonics
+from ..friction.harmonics import to_real
 from ..hbm.flow import State
 from ..hbm.shooting import periodic
 from ..hbm.system import damper_on_platforms
@@ -109,13 +111,10 @@ def equivalent(force: np.ndarray, u: np.ndarray, omega: float, averaged: bool = 
     Averaged: K_ad + i h w C_ad of Eq. 16, with the factor k that the printed C lacks. Otherwise each harmonic gets its
     own quotient. Nodes that do not move get zero.
     """
-    h = np.arange(1, len(u) + 1)[:, None]
-    power = u.conj() * force
-    if averaged:
-        K = _quotient(power.real.sum(axis=0), (np.abs(u) ** 2).sum(axis=0))
-        C = _quotient((h * power.imag).sum(axis=0), omega * (h**2 * np.abs(u) ** 2).sum(axis=0))
-        return K + 1j * h * omega * C
-    return _quotient(power, np.abs(u) ** 2)
+    mean = np.zeros((1, u.shape[1]))
+    u, force = (to_real(np.vstack([mean, x]).T) for x in (u, force))
+    fit, h = (from_harmonics if averaged else by_harmonic)(u, force, omega), np.arange(1, u.shape[1] // 2 + 1)[:, None]
+    return np.nan_to_num(fit.stiffness.T + 1j * h * omega * fit.damping.T)
 
 
 def balance(side: Platform, stiffness: np.ndarray) -> np.ndarray:
@@ -128,10 +127,6 @@ def balance(side: Platform, stiffness: np.ndarray) -> np.ndarray:
 def residual(side: Platform, u: np.ndarray, force: np.ndarray) -> np.ndarray:
     """u - u_free + G f, (H, n) [m]: zero in equilibrium, whatever the loop thinks."""
     return u - side.free + np.einsum("hij,hj->hi", side.G, force)
-
-
-def _quotient(a: np.ndarray, b: np.ndarray) -> np.ndarray:
-    return np.divide(a, b, out=np.zeros_like(a), where=b > 0)
 
 
 def _lines(signal: np.ndarray, H: int) -> np.ndarray:
