@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 
 import numpy as np
@@ -47,8 +47,7 @@ def draw_chart(tables: Mapping[str, pd.DataFrame], file: str | Path | None = Non
             _name_time(ax, what)
             of = "amplitude or frequency, the larger" if what == "meshes" else ERRORS["error"]
             ax.set(ylabel=f"error of the {of} [%]")
-        for ax in axes[:, 0]:
-            names_apart(ax)
+        names_apart(*axes[:, 0])
         return axes[0, 0].figure
 
 
@@ -71,14 +70,22 @@ def draw_errors(tables: Mapping[str, pd.DataFrame], file: str | Path | None = No
                 draw_accuracy(kept, ax=ax, tolerance=tolerance if column != "error_frequency" else None, title=of)
                 _name_star(ax, what)
                 _name_time(ax, what)
-                ax.set(ylabel=f"{title}: {what}, error [%]" if title else f"{what}, error [%]")
-            shown = [ax for ax in row if ax.axison]
-            for ax in shown[:-1]:
-                ax.get_legend().remove()
-        for ax in axes.flat:
-            if ax.axison:
-                names_apart(ax)
+                ax.set(ylabel=f"{what}: error [%]")
+            _one_legend(row)
+        axes[0, 0].figure.suptitle(title or None)
+        names_apart(*(ax for ax in axes.flat if ax.axison))
         return axes[0, 0].figure
+
+
+def _one_legend(row: Sequence[Axes]) -> None:
+    """At the right of the row, or in the place that it leaves empty: a legend between two charts pushes them apart."""
+    shown = [ax for ax in row if ax.axison]
+    for ax in shown[:-1]:
+        ax.get_legend().remove()
+    if shown and shown[-1] is not row[-1]:
+        legend = shown[-1].get_legend()
+        row[-1].legend(legend.legend_handles, [text.get_text() for text in legend.get_texts()], loc="center left")
+        legend.remove()
 
 
 def _name_time(ax: Axes, what: str) -> None:

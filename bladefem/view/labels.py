@@ -13,9 +13,18 @@ PLACES = ((6, 7, "left"), (6, -13, "left"), (-6, 7, "right"), (-6, -13, "right")
           (-9, 11, "right"), (-9, -17, "right"), (11, -3, "left"))     # offsets [points] and which end is held
 
 
-def names_apart(ax: Any) -> None:
-    """Give each annotation of finished axes a free place beside its point, first come first served; drop the others."""
-    ax.figure.draw_without_rendering()
+def names_apart(*axes: Any) -> None:
+    """Give each annotation of finished axes a free place beside its point, first come first served; drop the others.
+
+    Args:
+        axes: of one figure; it is laid out once for all of them, which is what takes time.
+    """
+    axes[0].figure.draw_without_rendering()
+    for ax in axes:
+        _apart(ax)
+
+
+def _apart(ax: Any) -> None:
     taken = [box for line in ax.lines if line.get_marker() not in ("None", "", None) for box in _markers(line)]
     inside = ax.get_window_extent()
     for text in list(ax.texts):

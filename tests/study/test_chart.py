@@ -5,6 +5,7 @@ from __future__ import annotations
 import time
 from pathlib import Path
 
+import matplotlib.pyplot as plt
 import numpy as np
 import pandas as pd
 import pytest
@@ -22,13 +23,14 @@ from bladefem.study.family import family_of
 from bladefem.study.methods import Point, applicable, exact, shooting, tangential
 from bladefem.study.settings import Settings, first_for
 from bladefem.study.stages import build_mesh
+from bladefem.view.chart import draw_errors
 
 PLANE = Path(__file__).parents[2] / "scenes" / "plane.toml"
 
 @pytest.fixture(scope="module")
 def made():
     family = family_of(reference_model(load=3.0, points=2, modes=12, harmonics=63))
-    return chart(family, first_for(family.modes), 2, 0.02, 8.0, (1150.0, 1600.0))
+    return chart(family, first_for(family.modes), 2, 0.02, 5.0, (1150.0, 1600.0))
 
 
 class FalseClock:
@@ -117,6 +119,19 @@ def test_files_are_written(made, tmp_path):
     files = write_chart(made, tmp_path, 0.02, "reference blade")
     assert all(file.stat().st_size > 100 for file in files)
     assert len(pd.read_csv(files[0])) == len(made.methods)
+
+
+def test_names_of_axes_fit_and_each_row_has_one_legend(made):
+    """A table without phasors leaves its third place to the legend."""
+    figure = draw_errors({"methods": made.methods, "meshes": made.models.drop(columns="error_phasor")}, title="x" * 60)
+    figure.draw_without_rendering()
+    assert sum(ax.get_legend() is not None for ax in figure.axes) == 2
+    assert figure.axes[5].get_legend() is not None
+    page = figure.bbox
+    for ax in figure.axes[:5]:
+        name = ax.yaxis.label.get_window_extent()
+        assert page.y0 <= name.y0 and name.y1 <= page.y1 and page.x0 <= name.x0
+    plt.close(figure)
 
 
 def test_exact_events_and_shooting_agree_with_the_balance():
