@@ -17,7 +17,7 @@ from mpi4py import MPI
 from scipy.integrate import trapezoid
 
 from bladefem.damper.element import coupled_loop, linear_fit, printed_loop, two_slope_loop, work
-from bladefem.friction.closed_form import circular_orbit_work
+from bladefem.friction.closed_form import circular_orbit_work, jenkins
 from bladefem.friction.printed import per_axis
 from bladefem.view.paper import draw_coupled_loops, draw_fit
 
@@ -34,10 +34,9 @@ samples = 2048 if coarse else 16384
 kt, limit, amplitude = 1e6, 10.0, 30e-6        # N/m, N, m
 loop = two_slope_loop(kt, limit, amplitude, samples)
 fit, linear = linear_fit(loop)
-theta = np.arccos(1 - 2 * limit / (kt * amplitude))
-closed = kt / np.pi * (theta - np.sin(2 * theta) / 2), kt / np.pi * np.sin(theta) ** 2
-print(f"K  {fit.stiffness:12.1f} N/m, closed form {closed[0]:12.1f}")
-print(f"wC {fit.damping:12.1f} N/m, closed form {closed[1]:12.1f}")
+closed = jenkins(amplitude, kt, limit)
+print(f"K  {fit.stiffness:12.1f} N/m, closed form {closed.stiffness:12.1f}")
+print(f"wC {fit.damping:12.1f} N/m, closed form {closed.damping:12.1f}")
 if not coarse:
     draw_fit(loop.angle, loop.motion, loop.force, linear, folder / "fig_1.png")
 
@@ -47,7 +46,7 @@ if not coarse:
 
 # %%
 print(f"work {work(loop):.6e} J, of the linear force {trapezoid(linear, loop.motion):.6e} J, "
-      f"closed form {4 * limit * (amplitude - limit / kt):.6e} J")
+      f"closed form {closed.energy:.6e} J")
 
 # %% [markdown]
 # ## Normal load that varies (Fig. 4)

@@ -14,7 +14,7 @@ import numpy as np
 
 from bladefem.friction.harmonics import derivative, harmonics_of
 
-__all__ = ["Approximation", "by_harmonic", "force_of", "from_harmonics", "from_series", "work", "work_of"]
+__all__ = ["Approximation", "by_harmonic", "force_of", "from_harmonics", "from_series", "work_of"]
 
 FAINT = 1e-12       # of an element's largest harmonic: what is smaller is rounding
 
@@ -73,11 +73,6 @@ def force_of(approximation: Approximation, u: np.ndarray, omega: float) -> np.nd
     K, C, constant = (np.asarray(x)[..., None] for x in
                       (approximation.stiffness, approximation.damping, approximation.constant))
     return K * u + C * _rate(u, omega) + constant
-
-
-def work(u: np.ndarray, f: np.ndarray) -> np.ndarray:
-    """(...,) work of f on u in one period [J], coefficients (..., 2H+1) (Eq. 12)."""
-    return np.pi * (derivative(u)[..., 1:] * np.asarray(f)[..., 1:]).sum(-1)
 
 
 def work_of(approximation: Approximation, u: np.ndarray, omega: float) -> np.ndarray:

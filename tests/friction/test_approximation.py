@@ -6,12 +6,18 @@ import numpy as np
 import pytest
 from friction_cases import decay, random_case, single
 
-from bladefem.friction.approximation import by_harmonic, force_of, from_harmonics, from_series, work, work_of
+from bladefem.friction.aft import dissipated
+from bladefem.friction.approximation import by_harmonic, force_of, from_harmonics, from_series, work_of
 from bladefem.friction.closed_form import jenkins
 from bladefem.friction.events import evaluate_exact
 from bladefem.friction.harmonics import derivative, synthesis
 
 OMEGA = 3.0
+
+
+def work(u: np.ndarray, f: np.ndarray) -> np.ndarray:
+    """(n,) work of f (n, K) on u (n, K) in one period, as the kernels tell it (Eq. 12)."""
+    return dissipated(np.stack([0 * f, f], axis=1), np.stack([0 * u, u], axis=1))
 
 
 @pytest.fixture(scope="module")
