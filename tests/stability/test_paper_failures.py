@@ -78,6 +78,9 @@ def torsion(load):
 
 
 def test_f07_the_quotient_pins_a_node():
+    """At 3 N and 1280 Hz a node is pinned, 16 % off. Where it was first seen (1.4 N, 1340 Hz) Anderson here converges
+    rightly: least over largest motion 0.54, 2e-3 off.
+    """
     model, omega = torsion(3.0), 2 * np.pi * 1280
     side = platform(model, omega, 1)
     assert len(side.rows) == 2                                  # translation and torsion
@@ -113,6 +116,10 @@ def test_f08_a_stuck_damper_never_settles_from_rest(load):
 
 
 def test_f09_one_stiffness_cannot_serve_two_harmonics():
+    """One averaged stiffness: 8.4 % off in the first harmonic, the fifth thirty times its size; one for each: 1.2 %.
+
+    By every method and both ways to solve the damper; recorded were 15.6 % and 321 %, with another patch.
+    """
     model, omega = blade(1e6, 1.0, 0.06), 2 * np.pi * 247.32
     model = replace(model, excitation={1: np.array([1.0]), 5: np.array([1.0])})
     full, side = solve(model, omega, 25, 2048), platform(model, omega, 5)
@@ -122,7 +129,8 @@ def test_f09_one_stiffness_cannot_serve_two_harmonics():
         found = iterate(side, "amplitude", Rules(averaged=averaged, tolerance=1e-3))
         assert found.converged
         error[averaged] = np.abs(found.probe[[1, 5], 0] / full.probe[[1, 5], 0] - 1)
-    assert error[True][1] > 2                                   # fifth harmonic: off by more than 200 %
+    assert error[True][0] == pytest.approx(0.084, abs=0.003)
+    assert error[True][1] > 20
     assert error[False][0] < 2e-3
     assert error[False][1] < 0.05
 
