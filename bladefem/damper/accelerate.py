@@ -53,6 +53,7 @@ class Iterated:
     iterations: int                 # evaluations of the damper
     periods: int                    # periods of the damper that were integrated
     reason: str
+    steps: tuple[float, ...] = ()   # left side of Eq. 35 over the motion, turn by turn [1]
 
     @property
     def false(self) -> bool:
@@ -66,6 +67,7 @@ class _Map:
     def __init__(self, side: Platform, rules: Rules):
         self.side, self.rules, self.calls, self.periods = side, rules, 0, 0
         self.last: DamperResponse | None = None
+        self.steps: list[float] = []
         self.shape = (len(side.free), len(side.rows))
 
     def spread(self, c: np.ndarray) -> np.ndarray:
@@ -115,7 +117,8 @@ def _finish(method: str, g: _Map, c: np.ndarray, converged: bool, reason: str) -
         error = float(np.linalg.norm(residual(side, u, force)) / np.linalg.norm(u))
     forces = np.concatenate([np.zeros((1, u.shape[1])), force])
     probe = probe_motion(side.model, side.omega, forces, np.zeros(1))
-    return Iterated(method, u, probe, converged, error, g.calls, g.periods, reason)
+    return Iterated(method, u, probe, converged, error, g.calls, g.periods, reason,
+                    tuple(g.steps))
 
 
 def _loop(g: _Map, c: np.ndarray, propose: Callable[[list, list], np.ndarray]) -> tuple[np.ndarray, bool, str]:
@@ -125,6 +128,7 @@ def _loop(g: _Map, c: np.ndarray, propose: Callable[[list, list], np.ndarray]) -
     while g.calls < rules.most:
         new = images[0] if len(images) == 1 else propose(motions, images)
         step = np.linalg.norm(new - motions[-1]) / np.linalg.norm(new)
+        g.steps.append(float(step))
         if not np.isfinite(step) or np.linalg.norm(new) > HUGE * size:
             solved = g.last.reason == "periodic" or rules.damper == "march"
             return motions[-1], False, "diverged" if solved else f"damper not solved: {g.last.reason}"

@@ -6,7 +6,7 @@ from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from pathlib import Path
 
-__all__ = ["Chapter", "Claim"]
+__all__ = ["Chapter", "Claim", "verdict"]
 
 
 @dataclass(frozen=True)
@@ -28,3 +28,8 @@ class Chapter:
     title: str
     text: str
     parts: tuple[Callable[[Path], Iterator[Claim]], ...]
+
+
+def verdict(whole: bool, part: bool = False) -> str:
+    """The word for a claim that numbers bear out as a whole, in part, or not."""
+    return "holds" if whole else "holds in part" if part else "fails"

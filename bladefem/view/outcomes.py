@@ -44,7 +44,8 @@ def draw_outcomes(table: pd.DataFrame, planes: dict[str, tuple[str, str, float]]
                 part = table[(table["plane"] == plane) & (table["method"] == methods[k])]
                 _draw(ax, part.assign(**{y: part[y] * factor}), y, norm)
                 good = int((part["outcome"] == "converged").sum())
-                ax.set_title(f"{methods[k]}\n{good} of {len(part)}", fontsize=8.5)
+                false = int((part["outcome"] == "false").sum())
+                ax.set_title(f"{methods[k]}\n{good} of {len(part)}, {false} false", fontsize=8.5)
                 ax.set_ylabel(label if k % COLUMNS == 0 else "", fontsize=8.5)
                 ax.set_xlabel("load [N]" if k >= len(methods) - COLUMNS else "", fontsize=8.5)
         figure = axes[0, 0].figure

@@ -1,4 +1,4 @@
-"""Pictures to lay beside those of the paper: loops, spectra, responses, resonance against load, maps of methods."""
+"""Pictures to lay beside those of the paper: loops, spectra, responses, resonance against load."""
 
 from __future__ import annotations
 
@@ -7,8 +7,7 @@ from pathlib import Path
 
 import matplotlib
 import numpy as np
-from matplotlib.colors import ListedColormap
-from matplotlib.patches import Patch
+from matplotlib.ticker import MaxNLocator
 from matplotlib.tri import Triangulation
 
 from bladefem.damper.zmass import Footprint
@@ -16,10 +15,9 @@ from bladefem.data import PressureMap
 
 from .style import COLOURS, canvas, log_axis
 
-__all__ = ["draw_coupled_loops", "draw_fit", "draw_footprint", "draw_friction_loops", "draw_mass_loops",
-           "draw_mass_spectra", "draw_method_map", "draw_peaks", "draw_tip_responses"]
+__all__ = ["draw_coupled_loops", "draw_fit", "draw_footprint", "draw_friction_loops", "draw_histories",
+           "draw_mass_loops", "draw_mass_spectra", "draw_peaks", "draw_tip_responses"]
 
-OUTCOMES = {"converged": "#2c7fb8", "false": "#d62728", "no convergence": "#fdae61", "diverged": "#222222"}
 MICRO, MILLI = 1e6, 1e3
 LIMIT = "friction limit of a seat [N]"
 
@@ -114,22 +112,26 @@ def draw_mass_spectra(cases: Mapping[str, tuple[np.ndarray, np.ndarray]], file: 
 
 
 def draw_tip_responses(curves: Mapping[float, tuple[np.ndarray, np.ndarray]], file: str | Path | None = None,
-                       title: str = "", dots: Mapping[float, np.ndarray] | None = None, load: str = LIMIT) -> object:
+                       title: str = "", dots: Mapping[float, np.ndarray] | None = None, load: str = LIMIT,
+                       crosses: Mapping[float, np.ndarray] | None = None) -> object:
     """Tip amplitude over frequency for several loads (Fig. 15); returns the figure.
 
     Args:
         curves: load [N] to (frequency (p,) [Hz], amplitude (p,) [m]).
         dots: load [N] to the same (2, k) by another method.
         load: what the loads are.
+        crosses: as dots, by a third method.
     """
+    marks = ((dots or {}, {"marker": "o", "ms": 3.5, "mec": "#444444", "mew": 0.4}),
+             (crosses or {}, {"marker": "x", "ms": 5.5, "mew": 1.3}))
     with canvas(file, None, (7.6, 4.6)) as ax:
         shades = matplotlib.colormaps["viridis"](np.linspace(0, 0.92, len(curves)))
         for shade, (value, (frequency, amplitude)) in zip(shades, sorted(curves.items()), strict=True):
             ax.plot(frequency, MICRO * amplitude, color=shade, label=f"{value:.3g}")
-            if dots is not None and len(dots[value]):
-                inside = (dots[value][0] > frequency.min()) & (dots[value][0] < frequency.max())
-                ax.plot(dots[value][0][inside], MICRO * dots[value][1][inside], "o", ms=3.5, color=shade, mec="#444444",
-                        mew=0.4)
+            for points, how in marks:
+                x, y = points.get(value, np.empty((2, 0)))
+                inside = (x > frequency.min()) & (x < frequency.max())
+                ax.plot(x[inside], MICRO * y[inside], ls="none", color=shade, **{"mec": shade, **how})
         ax.set(xlabel="frequency [Hz]", ylabel="amplitude at the tip [µm]", title=title)
         log_axis(ax, "y")
         ax.legend(title=load, loc="center left", bbox_to_anchor=(1.0, 0.5))
@@ -153,18 +155,26 @@ def draw_friction_loops(loops: Mapping[float, tuple[np.ndarray, np.ndarray]],
         return ax.figure
 
 
-def draw_peaks(curves: Mapping[float, np.ndarray], file: str | Path | None = None, title: str = "",
-               load: str = LIMIT) -> object:
+def draw_peaks(curves: Mapping[float, np.ndarray], file: str | Path | None = None, title: str = "", load: str = LIMIT,
+               best: Mapping[float, tuple[float, float]] | None = None, loop: np.ndarray | None = None) -> object:
     """Resonance frequency and amplitude over the load, a curve a damper mass (Fig. 17); returns the figure.
 
     Args:
         curves: damper mass [kg] to (loads, 3) of load [N], frequency [Hz], amplitude [m].
         load: what the loads are.
+        best: damper mass [kg] to its optimum load [N] and the amplitude there [m].
+        loop: (k, 3) as curves, by another method.
     """
     with canvas(file, None, (9.4, 4.0), (1, 2)) as (left, right):
         for mass, rows in sorted(curves.items()):
-            left.plot(rows[:, 0], rows[:, 1], "o-", ms=3, label=f"{1e3 * mass:.0f} g")
+            line, = left.plot(rows[:, 0], rows[:, 1], "o-", ms=3, label=f"{1e3 * mass:.0f} g")
             right.plot(rows[:, 0], MICRO * rows[:, 2], "o-", ms=3)
+            if best is not None:
+                right.plot(best[mass][0], MICRO * best[mass][1], "*", ms=11, color=line.get_color(), mec="white",
+                           mew=0.6)
+        if loop is not None:
+            left.plot(loop[:, 0], loop[:, 1], "kx", ms=6, label="paper's loop")
+            right.plot(loop[:, 0], MICRO * loop[:, 2], "kx", ms=6)
         for ax in (left, right):
             ax.set_xscale("log")
             ax.set_xlabel(load)
@@ -175,35 +185,27 @@ def draw_peaks(curves: Mapping[float, np.ndarray], file: str | Path | None = Non
         return left.figure
 
 
-def draw_method_map(rows: Sequence[Mapping[str, object]], across: str, along: str,
-                    file: str | Path | None = None) -> object:
-    """Outcome of each method over two of load, stiffness, frequency: one panel a method; returns the figure.
+def draw_histories(lines: Mapping[tuple[float, str], tuple[Sequence[float], float]], wanted: float,
+                   file: str | Path | None = None, title: str = "") -> object:
+    """Steps of an iteration over its turns, one panel a way to run it (Fig. 14); returns the figure.
 
     Args:
-        rows: method-map rows that span a full grid in ``across`` and ``along``.
+        lines: (load [N], way) to the relative steps and the error of the end [%].
+        wanted: step at which it stops.
     """
-    methods = list(dict.fromkeys(str(row["method"]) for row in rows))
-    x, y = (np.unique([float(row[name]) for row in rows]) for name in (across, along))
-    colours, words = ListedColormap(list(OUTCOMES.values())), list(OUTCOMES)
-    columns = 5
-    lines = -(-len(methods) // columns)
-    with canvas(file, None, (2.5 * columns, 2.3 * lines + 0.6), (lines, columns), squeeze=False, sharex=True,
-                sharey=True) as axes:
-        for ax, method in zip(axes.ravel(), methods, strict=False):
-            image = np.full((len(y), len(x)), np.nan)
-            for row in rows:
-                if row["method"] == method:
-                    image[np.searchsorted(y, float(row[along])), np.searchsorted(x, float(row[across]))] = \
-                        words.index(str(row["outcome"]))
-            ax.pcolormesh(x, y, image, cmap=colours, vmin=-0.5, vmax=len(words) - 0.5, shading="nearest")
-            ax.set(xscale="log", title=method)
-            ax.set_yscale("log" if y[-1] > 50 * y[0] else "linear")
-            ax.grid(False)
-        names = {"load": "friction limit of a seat [N]", "stiffness": "stiffness of a seat [N/m]",
-                 "frequency": "frequency [Hz]"}
-        figure = axes[0, 0].figure
-        figure.supxlabel(names[across], fontsize=10)
-        figure.supylabel(names[along], fontsize=10)
-        patches = [Patch(color=c, label=w) for w, c in OUTCOMES.items()]
-        figure.legend(handles=patches, loc="outside upper center", ncols=4)
-        return figure
+    ways, loads = (list(dict.fromkeys(key[k] for key in lines)) for k in (1, 0))
+    shades = dict(zip(loads, matplotlib.colormaps["viridis"](np.linspace(0, 0.92, len(loads))), strict=True))
+    with canvas(file, None, (4.8 * len(ways), 3.8), (1, len(ways)), squeeze=False, sharey=True) as axes:
+        for ax, way in zip(axes[0], ways, strict=True):
+            for load in loads:
+                steps, error = lines[load, way]
+                ax.plot(np.arange(1, len(steps) + 1), steps, "o-", ms=3.5, color=shades[load],
+                        label=f"{load:g} N: {error:.3g} % off")
+            ax.axhline(wanted, color="#888888", ls="--", lw=1)
+            ax.set(xlabel="turn", title=way)
+            ax.set_yscale("log")
+            ax.xaxis.set_major_locator(MaxNLocator(integer=True))
+            ax.legend()
+        axes[0, 0].set_ylabel("step over motion")
+        axes[0, 0].figure.suptitle(title, fontsize=11)
+        return axes[0, 0].figure

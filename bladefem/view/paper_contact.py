@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 
 import numpy as np
@@ -10,6 +10,8 @@ import numpy as np
 from .style import COLOURS, canvas, log_axis
 
 __all__ = ["draw_branches", "draw_punch", "draw_sweeps"]
+
+STABLE = 1.001      # largest multiplier of a stable motion: sliders that never move have exactly 1
 
 
 def draw_punch(radius: np.ndarray, pressure: np.ndarray, stiffness: np.ndarray, exact: tuple[np.ndarray, np.ndarray],
@@ -62,11 +64,30 @@ def draw_branches(frequency: np.ndarray, amplitude: np.ndarray, multiplier: np.n
         return left.figure
 
 
-def draw_sweeps(frequency: np.ndarray, up: np.ndarray, down: np.ndarray, file: str | Path | None = None) -> object:
-    """Amplitudes (p,) [m] of sweeps with rising and falling frequency (p,) [Hz]; returns the figure."""
-    with canvas(file, None, (6.4, 4.0)) as ax:
-        ax.plot(frequency, 1e6 * up, ">-", ms=3.5, label="upwards")
-        ax.plot(frequency, 1e6 * down, "<--", ms=3.5, label="downwards")
-        ax.set(xlabel="frequency [Hz]", ylabel="amplitude at the tip [µm]", title="plane blades, 4 N a seat")
-        ax.legend()
-        return ax.figure
+def draw_sweeps(frequency: np.ndarray, ways: Mapping[str, tuple[np.ndarray, np.ndarray]],
+                file: str | Path | None = None) -> object:
+    """Sweeps with rising and falling frequency, each point marked by its stability; returns the figure.
+
+    Args:
+        frequency: (p,) ascending [Hz].
+        ways: name to amplitudes (p,) [m] and largest Floquet multipliers (p,) [1], NaN where unknown.
+    """
+    looks = ({"marker": "o", "mfc": "white"}, {"marker": "s", "mec": "#222222"}, {"marker": "x", "mec": "#888888"})
+    with canvas(file, None, (9.4, 4.0), (1, 2), sharex=True) as (left, right):
+        for (name, (amplitude, multiplier)), colour, style in zip(ways.items(), COLOURS, ("-", "--"), strict=False):
+            left.plot(frequency, 1e6 * amplitude, style, color=colour, lw=1.2, label=name)
+            right.plot(frequency, multiplier, style, color=colour, marker=".", lw=1.2)
+            for kind, look in zip(_kinds(multiplier), looks, strict=True):
+                left.plot(frequency[kind], 1e6 * amplitude[kind], ls="none", color=colour, ms=4.5, **look)
+        for word, look in zip(("stable", "unstable", "not closed in time"), looks, strict=True):
+            left.plot([], [], ls="none", color="#888888", ms=4.5, label=word, **look)
+        right.axhline(1.0, color="#888888", lw=0.8)
+        left.set(xlabel="frequency [Hz]", ylabel="amplitude at the tip [µm]", title="plane blades, 4 N a seat")
+        right.set(xlabel="frequency [Hz]", ylabel="largest Floquet multiplier", title="stability")
+        left.legend()
+        return left.figure
+
+
+def _kinds(multiplier: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Which points are stable, unstable, unknown."""
+    return multiplier <= STABLE, multiplier > STABLE, np.isnan(multiplier)
