@@ -78,9 +78,9 @@ def element(folder: Path) -> Iterator[Claim]:
 
 def _printed_damping() -> Claim:
     """Eq. 16 on a motion and a force of one harmonic, and of three."""
-    rng, printed, mended = np.random.default_rng(3), {}, {}
+    printed, mended = {}, {}
     for highest in (1, 3):
-        k = np.arange(1, highest + 1)
+        rng, k = np.random.default_rng(3), np.arange(1, highest + 1)
         a, b, fs, fc = rng.normal(size=(4, highest))
         t = 2 * np.pi * np.arange(256)[:, None] / 256
         rate = (k * (a * np.cos(k * t) - b * np.sin(k * t))).sum(axis=1)
