@@ -162,7 +162,7 @@ def _rows(path, found, el, tab, trail, scratch, normal, trace, phi, F, J):
             gx, gy, _, _, _, pieces = follow(path, el.mu, fx, fy, trail, trace, phi)
             add_period(path, gx, gy, pieces, el, tab, trail, scratch, normal, trace, cycle + 1 == cycles)
     close(gx - fx, gy - fy, tab, scratch, F, J)
-    for e in range(2):
+    for e in range(2 if scratch.stick[0] > 0.0 else 0):
         add_gram(el.kt, scratch.stick, J[e, :, (e + 1) * F.shape[1]:(e + 2) * F.shape[1]])
 
 

@@ -108,21 +108,8 @@ def _fours(S: int) -> np.ndarray:
 @njit(_nrt=False, cache=True, error_model="numpy")
 def gram(m, out):
     """out (K, K) = analysis of synthesis restricted to a set whose basis means up to 2H are m (4H+1); I on a circle."""
-    H = out.shape[0] // 2
-    out[0, 0] = m[0]
-    for a in range(1, H + 1):
-        out[0, 2 * a - 1] = m[2 * a - 1]
-        out[0, 2 * a] = m[2 * a]
-        out[2 * a - 1, 0] = 2 * m[2 * a - 1]
-        out[2 * a, 0] = 2 * m[2 * a]
-        for b in range(1, a + 1):
-            total, apart = 2 * (a + b), 2 * (a - b)
-            cos_apart, sin_apart = (m[apart - 1], m[apart]) if a > b else (m[0], 0.0)
-            cos, sin = m[total - 1], m[total]
-            out[2 * a - 1, 2 * b - 1] = out[2 * b - 1, 2 * a - 1] = cos_apart + cos
-            out[2 * a, 2 * b] = out[2 * b, 2 * a] = cos_apart - cos
-            out[2 * a, 2 * b - 1] = out[2 * b - 1, 2 * a] = sin + sin_apart
-            out[2 * a - 1, 2 * b] = out[2 * b, 2 * a - 1] = sin - sin_apart
+    out[:, :] = 0.0
+    add_gram(1.0, m, out)
 
 
 @njit(_nrt=False, cache=True, error_model="numpy")
@@ -130,17 +117,26 @@ def add_gram(factor, m, out):
     """out (K, K) += factor times the Gram matrix of means m (4H+1,)."""
     H = out.shape[0] // 2
     out[0, 0] += factor * m[0]
-    for a in range(1, 2 * H + 1):
-        out[0, a] += factor * m[a]
-        out[a, 0] += 2.0 * factor * m[a]
+    for k in range(1, 2 * H + 1):
+        out[0, k] += factor * m[k]
+        out[k, 0] += 2.0 * factor * m[k]
     for a in range(1, H + 1):
-        for b in range(1, H + 1):
-            total, apart, turn = 2 * (a + b), 2 * abs(a - b), 1.0 if a > b else -1.0
-            cos_apart, sin_apart = (m[apart - 1], turn * m[apart]) if apart else (m[0], 0.0)
-            out[2 * a - 1, 2 * b - 1] += factor * (cos_apart + m[total - 1])
-            out[2 * a, 2 * b] += factor * (cos_apart - m[total - 1])
-            out[2 * a, 2 * b - 1] += factor * (m[total] + sin_apart)
-            out[2 * a - 1, 2 * b] += factor * (m[total] - sin_apart)
+        cos, sin, one = factor * m[4 * a - 1], factor * m[4 * a], factor * m[0]
+        out[2 * a - 1, 2 * a - 1] += one + cos
+        out[2 * a, 2 * a] += one - cos
+        out[2 * a, 2 * a - 1] += sin
+        out[2 * a - 1, 2 * a] += sin
+        for b in range(1, a):
+            cos, sin = factor * m[2 * (a + b) - 1], factor * m[2 * (a + b)]
+            cos_apart, sin_apart = factor * m[2 * (a - b) - 1], factor * m[2 * (a - b)]
+            out[2 * a - 1, 2 * b - 1] += cos_apart + cos
+            out[2 * b - 1, 2 * a - 1] += cos_apart + cos
+            out[2 * a, 2 * b] += cos_apart - cos
+            out[2 * b, 2 * a] += cos_apart - cos
+            out[2 * a, 2 * b - 1] += sin + sin_apart
+            out[2 * b - 1, 2 * a] += sin + sin_apart
+            out[2 * a - 1, 2 * b] += sin - sin_apart
+            out[2 * b, 2 * a - 1] += sin - sin_apart
 
 
 @njit(_nrt=False, cache=True, error_model="numpy")
