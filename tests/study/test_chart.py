@@ -30,7 +30,7 @@ PLANE = Path(__file__).parents[2] / "scenes" / "plane.toml"
 @pytest.fixture(scope="module")
 def made():
     family = family_of(reference_model(load=3.0, points=2, modes=12, harmonics=63))
-    return chart(family, first_for(family.modes), 2, 0.02, 5.0, (1150.0, 1600.0))
+    return chart(family, first_for(family.modes), 2, 0.02, 8.0, (1150.0, 1600.0))
 
 
 class FalseClock:
