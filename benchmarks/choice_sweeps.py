@@ -75,7 +75,7 @@ def chosen(swept: Swept, accuracy: float) -> list[Solution]:
 def timed(swept: Swept, run: Callable[..., list[Solution]], *given: object) -> tuple[float, list[Solution]]:
     """CPU seconds, best of several where they are short, and points."""
     best, points = np.inf, []
-    for _ in range(5 if swept.case.model.directions == 1 else 1):
+    for _ in range(9 if swept.case.model.directions == 1 else 1):
         start = time.process_time()
         points = run(swept, *given)
         best = min(best, time.process_time() - start)

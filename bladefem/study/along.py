@@ -15,7 +15,7 @@ from ..hbm.sweep import response, size
 from .choice import Checked, following, likely, peak_of, sufficient, watched
 from .family import Family, member
 from .indicators import indicate, judge, moved
-from .settings import Settings
+from .settings import Settings, enriched
 
 __all__ = ["along"]
 
@@ -74,11 +74,16 @@ def along(family: Family, omegas: Sequence[float], settings: Settings, accuracy:
 
 
 def _first(family: Family, settings: Settings, accuracy: float) -> Settings:
-    """What all points are solved with; where contacts may lift off, few harmonics lead the way for more."""
+    """What all points are solved with; where contacts may lift off, few harmonics lead the way for more.
+
+    With few modes the way may end on another of two solutions there, which were 0.17 % of the peak apart.
+    """
     fine, coarse = (likely(family, settings, told) for told in (accuracy, max(accuracy, COARSE)))
     model = member(family, fine).model
-    lifts = model.directions > model.elements.tangents
-    return replace(fine, harmonics=coarse.harmonics, samples=coarse.samples) if lifts else fine
+    if model.directions == model.elements.tangents:
+        return fine
+    led = replace(fine, harmonics=coarse.harmonics, samples=coarse.samples)
+    return enriched(led, "modes") or led if accuracy < COARSE and "modes" in led.chosen else led
 
 
 def _judged(curve: _Curve) -> Iterator[int]:

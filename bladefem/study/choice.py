@@ -23,8 +23,8 @@ __all__ = ["Checked", "adapted", "checked", "choose", "covered", "default_band",
 
 ROUNDS = 12
 KEPT = ("modes", "damper")      # whose indicators, where they are small, outlast a change of the others
-LIKELY = ((0.003, {"harmonics": 7, "samples": 256, "modes": 20, "points": 16}),     # accuracy from which, where
-          (0.03, {"harmonics": 3, "samples": 64, "modes": 10, "points": 16}))       # contacts slip
+LIKELY = ((0.003, {"harmonics": 7, "samples": 256, "points": 16}),      # accuracy from which, where contacts slip
+          (0.03, {"harmonics": 3, "samples": 64, "points": 16}))
 PASSES = 3          # sweeps of one curve with ever richer settings
 WIDENINGS = 4
 EXTRA, NARROW = 2, 0.15     # points checked in gaps wider than this share of the frequencies at which contacts move
@@ -75,7 +75,7 @@ def choose(family: Family, settings: Settings, point: Solution, accuracy: float,
 def likely(family: Family, settings: Settings, accuracy: float, fixed: tuple[str, ...] = ()) -> Settings:
     """Where a search had better begin than at its first settings: with what most points need whose contacts slip."""
     usual = next((usual for finest, usual in LIKELY if accuracy <= finest), {})
-    most = {"harmonics": min(settings.most, family.harmonics), "modes": family.modes}
+    most = {"harmonics": min(settings.most, family.harmonics)}
     raised = {name: max(getattr(settings, name), min(value, most.get(name, value))) for name, value in usual.items()
               if name in settings.chosen and name not in fixed and getattr(settings, name) is not None}
     return replace(settings, **raised)
