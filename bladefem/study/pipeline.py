@@ -14,7 +14,7 @@ import numpy as np
 
 from geometry.mesh import Mesh
 
-from ..contact.profile import unresolved_crown
+from ..contact.peak import peak_remarks
 from ..contact.seat import ContactProblem
 from ..contact.seat import solve as seat
 from ..contact.stiffness import friction_elements, pair_ratio
@@ -137,7 +137,7 @@ def run(scene: Scene, folder: str | Path, until: str = "response", comm: Any = N
                 for load in studied_loads(scene, own)}
         if mesh.dimension == 2:
             clock.messages.extend(filter(None, [coarse_sentence(m for pair in maps.values() for m in pair)]))
-        clock.messages.extend(filter(None, [unresolved_crown(maps, scene, mesh.depth)]))
+        clock.messages.extend(peak_remarks(maps, scene, mesh.depth))
         result = replace(result, contact=Seating(problem, maps, own))
     if until == "contact":
         return result

@@ -12,7 +12,8 @@ import bladefem
 from bladefem.contact.hertz import FINEST, contact_modulus, line_width, point_radius
 from bladefem.contact.lcp import solve_lcp
 from bladefem.contact.patch import make_patch, patch_means
-from bladefem.contact.profile import seat_gap, unresolved_crown
+from bladefem.contact.peak import narrow_sentence, peak_remarks
+from bladefem.contact.profile import seat_gap
 from bladefem.contact.seat import solve
 from bladefem.data import PressureMap
 from bladefem.errors import InputError
@@ -92,19 +93,35 @@ def test_crowns_too_narrow_for_the_mesh_are_told(dimension):
         return f"{float(f'{1e6 * width:.2g}'):g} um"
 
     def said(**contact):
-        return unresolved_crown(maps, Scene(contact=Contact(bedded=False, **contact)), depth)
+        return narrow_sentence(maps, Scene(contact=Contact(bedded=False, **contact)), depth)
 
     a = line_width(80 / 0.03, 0.5, contact_modulus(Material(), Material()))
     assert a == pytest.approx(np.sqrt(4 * 80 / 0.03 * 0.5 * 2 * 0.91 / (np.pi * 2.1e11)), rel=1e-12)
     found = said(crown_across=0.5)
     assert f"under 80 N Hertz' contact on the crowned seats has a half width of {micrometres(a)}" in found
     assert f"mesh.contact_size <= {micrometres(a / 4)}" in found
-    assert said(crown_across=1e4) == said() == unresolved_crown({}, Scene()) == ""      # pressed from end to end, flat
-    assert unresolved_crown(maps, Scene(contact=Contact(bedded=True, crown=0.5)), depth) == ""
+    assert said(crown_across=1e4) == said() == narrow_sentence({}, Scene()) == ""      # pressed from end to end, flat
+    assert narrow_sentence(maps, Scene(contact=Contact(bedded=True, crown=0.5)), depth) == ""
     if dimension == 3:
         point = point_radius(80, 0.5, contact_modulus(Material(), Material()))
         assert f"half width of {micrometres(point)}" in said(crown=0.5, crown_across=0.5)
         assert said(crown=0.5, crown_across=1e4) == said(crown=0.5) != ""
+
+
+@pytest.mark.parametrize("dimension", [2, 3])
+def test_a_peak_at_a_sharp_edge_is_told(dimension):
+    patch = make_patch(wedge_mesh(ALPHA, divisions=(4, 3, 4), dimension=dimension), "this")
+    edge = np.argmax(np.linalg.norm(patch.points - patch.points.mean(axis=0), axis=1))
+    middle = np.argmin(np.linalg.norm(patch.points - patch.points.mean(axis=0), axis=1))
+
+    def said(top, load=1.0, **contact):
+        force = load * patch.area * np.where(np.arange(len(patch.area)) == top, 3.0, 1.0)
+        maps = {80.0: [PressureMap(patch, force, 0 * force, 0.0)]}
+        return peak_remarks(maps, Scene(contact=Contact(**contact)))
+
+    assert "under 1 of 1 loads it stands at a sharp edge" in said(edge)[0]
+    assert said(middle) == said(edge, 0.0) == []
+    assert said(edge, bedded=False, edge_radius=1.0, edge_width=1e-3) == []
 
 
 def test_a_circle_smaller_than_its_seat_is_refused():
