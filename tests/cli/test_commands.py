@@ -28,6 +28,7 @@ WEDGE = "scenes/wedge.toml"
 def fake_curve(load, amplitude):
     peak = SimpleNamespace(work=SimpleNamespace(dissipated=2e-3), states={"slip": 3, "lift": 0})
     return SimpleNamespace(load=load, mass=None, peak=peak, settings=SimpleNamespace(error=0.013, harmonics=3),
+                           halved=np.nan,
                            peak_frequency=830.0, peak_amplitude=amplitude, frequency=np.arange(5.0),
                            converged=np.array([True, True, False, True, True]))
 

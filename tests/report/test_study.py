@@ -14,7 +14,8 @@ from bladefem.scene import Scene
 def curve(load, amplitude):
     peak = SimpleNamespace(work=SimpleNamespace(dissipated=1e-3), states={"slip": 2, "lift": 0})
     return SimpleNamespace(load=load, mass=None, peak=peak, peak_frequency=830.0, peak_amplitude=amplitude,
-                           settings=SimpleNamespace(error=0.01, harmonics=3), frequency=np.arange(4.0),
+                           settings=SimpleNamespace(error=0.01, harmonics=3), halved=np.nan,
+                           frequency=np.arange(4.0),
                            converged=np.ones(4, bool))
 
 
