@@ -1,7 +1,7 @@
 """The page "The paper, claim by claim":  python -m bladefem.report.paper [folder]  writes paper.md and paper.html.
 
-Pictures, claims (claims.json) and the method map live in the folder ``paper`` beside the page. Three minutes on one
-core; titles of chapters after the folder remake those alone. The method map itself is made by benchmarks/paper_maps.py
+Pictures, claims (claims.json) and the method map live in the folder ``paper`` beside the page. Eleven minutes of
+CPU; titles of chapters after the folder remake those alone. The method map itself is made by benchmarks/paper_maps.py
 and only read here. Under mpirun rank 0 does the work alone.
 """
 

@@ -86,7 +86,7 @@ def finite_elements(folder: Path) -> Iterator[Claim]:
     yield Claim("Sect. 5.1", "contact points carry the distributed normal load",
                 f"the damper bends: {pressed} of {sum(len(m.force) for m in maps)} points press, {width:.1f} of "
                 f"{1e3 * scene.plane.seat_width:g} mm, and lean to the edge of the platform; shares at 30 N and 60 N "
-                f"differ by {change:.0e}", verdict(change < 1e-6, change < 0.02), ("fig_13.png",),
+                f"differ by {change:.0g}", verdict(change < 1e-6, change < 0.02), ("fig_13.png",),
                 "Quasi-static contact of the two seats of Fig. 13; points beside the pressed part carry nothing at any "
                 "load, so that full stick of the whole seat is never reached.")
 
