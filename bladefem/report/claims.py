@@ -215,9 +215,10 @@ CHAPTERS = (
     Chapter("Blades with underplatform dampers", "scenes/plane.toml: a clamped blade of 150 x 6 x 30 mm with its "
             "platform, plane stress, a flat damper of 60 g to each side, 1 N at the tip, damping ratio 0.002, friction "
             "coefficient 0.3, inter-blade phase 0 (Eq. 32 holds for no other). Soft contact: 1e6 N/m a seat; stiff "
-            "contact: 1.44e7 N/m. Seats of 40 elements, half of which press; with 160 a resonance of mode 2 grows by 0.2 % "
-            "at 6 N, 0.9 % at 63 N, 1.9 % at 100 N, 5 % at 200 N (soft contact). The damper moves along the row only, as in the paper, unless said otherwise; the "
-            "judge is the exact integration of the coupled system in time. demos/paper_blades.py.",
+            "contact: 1.44e7 N/m. Seats of 40 elements, half of which press; with 160 a resonance of mode 2 grows by "
+            "0.2 % at 6 N, 0.9 % at 63 N, 1.9 % at 100 N, 5 % at 200 N (soft contact). The damper moves along the row "
+            "only, as in the paper, unless said otherwise; the judge is the exact integration of the coupled system "
+            "in time. demos/paper_blades.py.",
             (blades.finite_elements, paper_loop.accuracy, paper_time.in_time, paper_response.responses,
              blades.first_mode, blades.normal_motion, paper_optima.optima)),
     Chapter("Reference blade", "A beam with a lumped platform mass, so that anyone can repeat it without finite "

@@ -132,6 +132,9 @@ def draw_tip_responses(curves: Mapping[float, tuple[np.ndarray, np.ndarray]], fi
                 x, y = points.get(value, np.empty((2, 0)))
                 inside = (x > frequency.min()) & (x < frequency.max())
                 ax.plot(x[inside], MICRO * y[inside], ls="none", color=shade, **{"mec": shade, **how})
+        for name, (points, how) in zip(("loop, damper exact", "paper's loop"), marks, strict=True):
+            if points:
+                ax.plot([], [], ls="none", color="#444444", label=name, **how)
         ax.set(xlabel="frequency [Hz]", ylabel="amplitude at the tip [µm]", title=title)
         log_axis(ax, "y")
         ax.legend(title=load, loc="center left", bbox_to_anchor=(1.0, 0.5))
