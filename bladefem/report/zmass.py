@@ -15,12 +15,12 @@ from bladefem.damper.loops import Drive, Steady, spectrum
 from bladefem.damper.zmass import MassOnFoundation
 from bladefem.scene import Scene
 from bladefem.scene_file import dump
-from bladefem.store import on_root, write_results
+from bladefem.store import on_root, write_results, write_table
 from bladefem.study.zmass import Pressed, mass_on_foundation, mean_load, motions, press
 from bladefem.view import contact, mesh, paper
 
 from .datasets import resultants, table_dataset
-from .tables import write_tables
+from .tables import units_of, write_tables
 from .write import write_report
 
 __all__ = ["MassRun", "draw_motions", "motion_table", "run"]
@@ -91,7 +91,7 @@ def _write(scene: Scene, result: MassRun) -> None:
     for name, table in tables.items():
         write_tables(table, folder / name.split("/")[1], name.split("/")[1])
     points, load = contact.pressure_points([seat]), mean_load(scene)
-    points.to_csv(folder / "pressure_points.csv", index=False)
+    write_table(folder / "pressure_points.csv", points, units_of(points))
     write_results(folder / "results.nc", {
         "resultants": resultants(tables["contact/pressure"].assign(load=load)), "nodes": table_dataset(points, "node"),
         "motion": table_dataset(tables["response/motion"], "case")}, dump(scene))

@@ -6,6 +6,7 @@ from collections.abc import Callable, Sequence
 
 from geometry.mesh import Mesh
 
+from ..contact.profile import seat_gap
 from ..data import Patch
 from ..errors import InputError, suggestion
 from ..hbm.model import Damping
@@ -20,10 +21,11 @@ def found_patches(scene: Scene, mesh: Mesh, excited: bool) -> list[Patch]:
     """The contact patches of a mesh that also has the nodes to excite, where these are needed.
 
     Raises:
-        InputError: it lacks one or both.
+        InputError: it lacks one or both, or cannot show crowns and eased edges as [contact] wants them.
     """
     patches: list[Patch] = []
-    looks: list[Callable[[], object]] = [lambda: patches.extend(contact_patches(mesh))]
+    looks: list[Callable[[], object]] = [lambda: patches.extend(contact_patches(mesh)),
+                                         lambda: [seat_gap(patch, mesh, scene.contact) for patch in patches]]
     if excited:
         looks.insert(0, lambda: named_nodes(mesh, scene.excitation.at))
     _all_told(looks)

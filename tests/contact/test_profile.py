@@ -21,6 +21,7 @@ from bladefem.fem.body import assemble
 from bladefem.fem.constraint import constrain
 from bladefem.fem.flexibility import flexible
 from bladefem.scene import Contact, Material, Scene
+from bladefem.study.lacking import found_patches
 from bladefem.study.stages import seat_damper
 
 ALPHA = np.radians(40)
@@ -129,6 +130,8 @@ def test_a_circle_smaller_than_its_seat_is_refused():
     for name, length in (("crown", 20), ("crown_across", 12)):
         with pytest.raises(InputError, match=rf"contact.{name} = 5 mm: a circle that cannot span the seat of {length}"):
             seat_gap(make_patch(mesh, "this"), mesh, Contact(**{name: 0.005}))
+    with pytest.raises(InputError, match="circle that cannot span"):       # before modes and factors
+        found_patches(Scene(contact=Contact(bedded=False, crown=0.002)), wedge_mesh(ALPHA), excited=False)
 
 
 def seated(bodies, *given, kind=None):
