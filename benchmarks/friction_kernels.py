@@ -3,31 +3,37 @@
 Processor time of this thread, the best of ten runs, so that other work on the machine counts little. Run it with
 ``python benchmarks/friction_kernels.py``. The first call compiles and is not measured.
 
-Recorded on one core whose matrix products run at 45 GFLOP/s while the other was busy, ns for each node and sample with
-(without) Jacobian:
+Recorded in one run while the other core was busy. With the Jacobian summed in double, in single precision (as Newton
+takes it), and without it:
 
-    H, samples       3, 128         5, 128         7, 512
-    1-D, stuck       7.8            10             8.2
-    1-D, gross       12             18             11
-    3-D, stuck       7.8 (5.9)      19 (7.2)       13 (5.3)
-    3-D, partial     61 (34)        82 (34)        61 (24)
-    3-D, mixed       50 (27)        94 (34)        63 (19)
-    3-D, gross       44 (20)        78 (21)        63 (15)
+    H, samples       3, 128              5, 128              7, 512
+    3-D, stuck       8.7   8.6   5.7     15    15    7.2     9.8   9.6   5.2
+    3-D, partial     51    48    28      68    60    31      52    40    20
+    3-D, mixed       51    49    27      79    64    30      62    43    20
+    3-D, gross       45    43    19      71    56    21      62    41    16
+    1-D, stuck       6.9                 10                  7.9
+    1-D, gross       10                  15                  10
 
-The kernel before, on the same machine in the same hours: stuck 11 (8), 22 (11), 14 (9); partial 142 (63), 153 (77),
-139 (51); mixed 103 (43), 139 (48), 169 (49); gross 101 (27), 139 (32), 153 (26). One node with H 3 and 128 samples
-takes 44 us stuck and 54 us in slip, sixteen 56 and 145 to 164 (before: 44 and 62, 64 and 260). All of it compiles in
-33 s of processor time (before: 44 s).
+The kernel before (double only, a quieter hour; in the same hours as above 5 to 10 % more): partial 58, 75, 54, mixed 48,
+83, 56, gross 42, 68, 54; 1-D gross 12, 17, 11. Its partial slip took 5.7, 4.9, 6.3 periods, now 3.8, 4.0, 4.0.
 
-The 40 ns wanted for 3-D are met in stick and without derivative, and missed with it: in gross slip by a tenth at H 3,
-by nine and six tenths at H 5 and 7. Parts of a sample in gross slip at H 3, 5, 7, each timed alone, ns: sums over time
-6, 19, 20; rows of the angle 4, 10, 13; motion and edges 4; a period of the force 4, of which it takes two; coefficients
-of the rows 3; the rest are edges that change state, harmonics and the joining of the sums at the end of a period. Sums
-run at the speed of the vectors: for each column block of eight, four samples i, S/2 - i, S/2 + i, S - i take 20
-operations to be added up and 2K to be summed, 26, 66 and 75 cycles a sample. With one period of the force that makes
-21, 40 and 44 ns before any edge changes state: H 5 and 7 cannot reach 40 in gross slip while rows are formed sample by
-sample. H 5 fills 11 columns up to 16, and memory for the Jacobian, new in each call, costs it 10 ns. In partial slip
-marching takes 5 to 6 periods where the median is 4: one or two nodes in a thousand shake down over a thousand periods.
+1-D meets the 15 ns wanted, at H 5 in slip barely (13 to 16). The 40 wanted for 3-D are met in stick and without the
+derivative; in single precision H 7 is at 40 to 43, H 3 a tenth to a quarter above, H 5 half above. Parts of a sample in
+gross slip in single (double), each timed alone, ns at H 3, 5, 7: sums over time 4, 8, 9 (6, 14, 20), rows of the angle
+2, 4, 4 (4, 9, 10). What is left is mostly not sums: two periods of the force of 3.5 each, at the latency of the product
+that moves the half-angle vector from edge to edge; motion, edges and their turns 6; joining and storing the Jacobian, 9
+KB a node at H 5, 5; harmonics and Gram matrices 4. H 5 fills 11 columns up to 16. That the caller hands in the array
+for the Jacobian saves nothing: its memory is reused from call to call.
+
+Calls of Newton for scenes/wedge.toml at 20 %, 96 nodes: H 3, 64 samples, sticks for 0.54, slips 0.30, is open 0.17 of
+the period, 2.6 periods: 54 ns in batches of 21 000 nodes, 67 in calls of 96. H 1: 0.67, 0.17, 0.17, 1.4 periods: 25 and
+33. H 15, 256 samples: 0.51, 0.32, 0.17, 2.9 periods: 130 and 107 (in double 210).
+
+Against the kernel before, these cases and 9600 random elements: forces equal to 1e-12 of a node's largest for all but 66
+of 67 200, slow shakedowns that the kernel before left up to 1e-10 from their limit; Jacobians in double likewise to 1e-9
+for all but 29 of 33 600, up to 2e-7. In single half are within 5e-8, all but 113 within 1e-6, the worst 7e-5; 32 points
+of square patches take as many Newton steps to the same displacements, to 5e-13. Both forms compile in 42 s of processor
+time on the busy machine, of which the second takes 15.
 
 Tried, and slower:
 
@@ -38,11 +44,6 @@ Tried, and slower:
   but partial 140, 170, 134, as some lane of eight changes its state at a third of the samples. Its forces were equal to
   the kernel of its day to 1e-12 for nearly all nodes. One node took 1.7 times as long.
 - References to arrays counted in the inner functions, as Numba does unless told: a fifth of the time.
-
-Against the kernel before, these cases and 9600 random elements: forces equal to 1e-12 of a node's largest for all but
-eight of 21 600 nodes; seven of these shake down slowly or touch the limit (1e-10), one has several periodic states and
-takes another. Jacobians differ by up to 5e-9: against one with the periodic state to 1e-13, H 3, 52 of 1000 nodes in
-partial slip were off by more than 1e-10 before, and 8 are now.
 """
 
 from __future__ import annotations
@@ -86,17 +87,18 @@ def cost(call, repeats: int = 10) -> float:
 
 def main() -> None:
     """Print the table."""
-    print("kernel      H  samples  mix      stick  slip   open   with dfdw   without   periods")
+    print("kernel      H  samples  mix      stick  slip   open   with dfdw    single   without   periods")
     for tangents in (1, 2):
         for H, samples in SIZES:
             for mix, amplitude in MIXES.items():
                 elements, w = case(H, amplitude, tangents)
                 forces = evaluate(elements, w, samples)
-                ns, bare = (1e9 * cost(lambda e=elements, w=w, s=samples, j=j: evaluate(e, w, s, j)) / NODES / samples
-                            for j in (True, False))
+                calls = ({}, {"precision": "single"}, {"jacobian": False})
+                ns = (1e9 * cost(lambda e=elements, w=w, s=samples, c=c: evaluate(e, w, s, **c)) / NODES / samples
+                      for c in calls)
                 shares = "  ".join(f"{x:.2f} " for x in forces.shares.mean(0))
-                print(f"{2 * tangents - 1}-D sampled {H:2d} {samples:7d}  {mix:8s} {shares} {ns:9.1f} {bare:9.1f} "
-                      f"{forces.cycles.mean():9.1f}")
+                print(f"{2 * tangents - 1}-D sampled {H:2d} {samples:7d}  {mix:8s} {shares} "
+                      f"{' '.join(f'{x:9.1f}' for x in ns)} {forces.cycles.mean():9.1f}")
     print("\nexact 1-D, microseconds a node (independent of samples)")
     for H, _ in SIZES:
         for mix, amplitude in MIXES.items():
