@@ -12,37 +12,39 @@ takes it), and without it:
     3-D, mixed       51    49    27      79    64    30      62    43    20
     3-D, gross       45    43    19      71    56    21      62    41    16
     1-D, stuck       6.9                 10                  7.9
-    1-D, gross       10                  15                  10
+    1-D, gross       10                  15 to 18            10
 
-The kernel before (double only, a quieter hour; in the same hours as above 5 to 10 % more): partial 58, 75, 54, mixed 48,
-83, 56, gross 42, 68, 54; 1-D gross 12, 17, 11. Its partial slip took 5.7, 4.9, 6.3 periods, now 3.8, 4.0, 4.0.
+The kernel before, double only, minutes later: partial 59, 81, 61, mixed 50, 86, 62, gross 44, 74, 65; 1-D gross some
+hours before 13, 17, 11. Partial slip took it 5.7, 4.9, 6.3 periods, now 3.8, 4.0, 4.0.
 
-1-D meets the 15 ns wanted, at H 5 in slip barely (13 to 16). The 40 wanted for 3-D are met in stick and without the
-derivative; in single precision H 7 is at 40 to 43, H 3 a tenth to a quarter above, H 5 half above. Parts of a sample in
-gross slip in single (double), each timed alone, ns at H 3, 5, 7: sums over time 4, 8, 9 (6, 14, 20), rows of the angle
-2, 4, 4 (4, 9, 10). What is left is mostly not sums: two periods of the force of 3.5 each, at the latency of the product
-that moves the half-angle vector from edge to edge; motion, edges and their turns 6; joining and storing the Jacobian, 9
-KB a node at H 5, 5; harmonics and Gram matrices 4. H 5 fills 11 columns up to 16. That the caller hands in the array
-for the Jacobian saves nothing: its memory is reused from call to call.
+1-D meets the 15 ns wanted but for H 5 in gross slip: 15 to 18 in this run, 14 in a quieter hour. The 40 wanted for 3-D
+are met in stick and without the derivative; in single precision H 7 is at 40 to 43, H 3 a tenth to a quarter above, H 5
+half above. Parts of a sample in gross slip in single (double), each timed alone, ns at H 3, 5, 7: sums over time 4, 8,
+9 (6, 14, 20), rows of the angle 2, 4, 4 (4, 9, 10). By a profile the rest is mostly not sums: two periods of the force
+of 3.5 each, at the latency of the product that moves the half-angle vector from edge to edge; motion, edges and their
+turns 6; joining and storing the Jacobian, 9 KB a node at H 5, 5; harmonics and Gram matrices 4. H 5 fills 11 columns up
+to 16. That the caller hands in the array for the Jacobian saves nothing: its memory is reused from call to call.
 
 Calls of Newton for scenes/wedge.toml at 20 %, 96 nodes: H 3, 64 samples, sticks for 0.54, slips 0.30, is open 0.17 of
 the period, 2.6 periods: 54 ns in batches of 21 000 nodes, 67 in calls of 96. H 1: 0.67, 0.17, 0.17, 1.4 periods: 25 and
 33. H 15, 256 samples: 0.51, 0.32, 0.17, 2.9 periods: 130 and 107 (in double 210).
 
-Against the kernel before, these cases and 9600 random elements: forces equal to 1e-12 of a node's largest for all but 66
-of 67 200, slow shakedowns that the kernel before left up to 1e-10 from their limit; Jacobians in double likewise to 1e-9
-for all but 29 of 33 600, up to 2e-7. In single half are within 5e-8, all but 113 within 1e-6, the worst 7e-5; 32 points
-of square patches take as many Newton steps to the same displacements, to 5e-13. Both forms compile in 42 s of processor
-time on the busy machine, of which the second takes 15.
+Against the kernel before, these cases and 9600 random elements, with and without Jacobian: forces equal to 1e-12 of a
+node's largest for all but 66 of 67 200, of which the worst shake down slowly and were left up to 1e-10 from their
+limit. Jacobians in double are equal to 1e-9 for all but 29 of 33 600, the worst 2e-7, mostly the same nodes. In single
+half are within 5e-8, all but 113 within 1e-6, the worst 7e-5; 32 points of square patches take as many Newton steps to
+the same displacements, to 5e-13. Both forms compile in 42 s of processor time on the busy machine, the second in 15.
 
 Tried, and slower:
 
-- Rows of one node in lots of 32, added by matrix products of 32 samples (the kernel before).
+- Rows of one node in lots of 32, added by matrix products of 32 samples (an earlier kernel).
 - A reverse sweep (adjoint of 2K numbers, the same four samples added up before the products), with explicit vectors
-  too: 1.4, 1.2 and 0.9 times as long as the kernel before.
+  too: 1.4, 1.2 and 0.9 times as long as that kernel.
 - Eight nodes in the lanes of one vector throughout; a lane that changes state does its edge alone. Gross 57, 90, 71 ns,
   but partial 140, 170, 134, as some lane of eight changes its state at a third of the samples. Its forces were equal to
   the kernel of its day to 1e-12 for nearly all nodes. One node took 1.7 times as long.
+- A first period of which only the second half is followed: 1 ns less in gross slip, nothing elsewhere.
+- Leaps as long as the number of stretches of slip stays, not all states: half the periods, but a wrong limit at times.
 - References to arrays counted in the inner functions, as Numba does unless told: a fifth of the time.
 """
 
