@@ -110,8 +110,9 @@ def curve_of(scene: Scene, case: LoadCase, family: Callable[[LoadCase], Family],
     marks = Stability(np.full(len(heights), ""), np.full(len(heights), np.nan))
     if scene.study.stability:
         marks = stability_of(member(models, curve.settings).model, curve.points)
+    halved = np.nan if scene.contact.points else halved_change(models, curve.settings, top)
     return Curve(case.load, case.mass, curve.settings, *columns, estimated(curve), tolerated, checked(curve),
-                 marks.verdict, marks.multiplier, halved_change(models, curve.settings, top), top)
+                 marks.verdict, marks.multiplier, halved, top)
 
 
 def _record(p: Solution) -> tuple[object, ...]:
