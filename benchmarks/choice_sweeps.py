@@ -8,24 +8,25 @@ response ("cold"). Errors are the largest at any frequency, in phasors over the 
 4096 samples:
 
     contact points              rich           cold           largest error     of the rich model   a rich point
-    2                           0.53  0.90     0.53  0.90     1.7e-3  4.0e-4    7.7e-5              0.18 ms
-    8                           0.35  0.43     0.36  0.45     3.2e-3  2.1e-4    1.5e-5              0.28 ms
-    16                          0.28  0.35     0.25  0.31     3.2e-3  2.8e-4    8.9e-6              0.57 ms
-    32                          0.20  0.33     0.14  0.23     2.1e-3  3.3e-4    4.8e-5              2.8 ms
-    8 in 3-D, lifting off       0.23  0.42     0.16  0.29     6.4e-3  5.3e-4    6.7e-3              84 to 105 ms
-    all five                    0.23  0.42
+    2                           0.47  0.82     0.46  0.81     1.7e-3  4.0e-4    7.7e-5              0.17 ms
+    8                           0.37  0.48     0.38  0.49     3.2e-3  2.1e-4    1.5e-5              0.27 ms
+    16                          0.42  0.49     0.37  0.44     3.2e-3  2.8e-4    8.9e-6              0.55 ms
+    32                          0.19  0.33     0.13  0.22     2.1e-3  3.3e-4    4.8e-5              2.9 ms
+    8 in 3-D, lifting off       0.24  0.42     0.17  0.30     6.4e-3  5.3e-4    6.7e-3              90 ms
+    all five                    0.24  0.42
 
-The body that lifts off is swept over its peak, in the band that a study would take. The rich model is 0.67 % off there
-and misses 0.1 %; over 31 harmonics and 1024 samples, which hold it, the choice takes 0.084 and 0.15. Beside the peak,
-between stick and free, where the highest point lifts off as well: 0.25 and 1.05 (errors 4.1e-3 and 5.0e-4, of the rich
-model 4.6e-3). At one frequency of it two solutions coexist, 0.12 % of the peak apart, which 10 modes do not tell.
+One run on an idle machine; small sweeps scatter by 15 to 40 % (16 points: 0.28 and 0.35 an hour before). The body that
+lifts off is swept over its peak, in the band that a study would take. The rich model is 0.67 % off there and misses
+0.1 %; over 31 harmonics and 1024 samples, 0.12 % off, the choice takes 0.087 and 0.15. Beside the peak, between stick
+and free, where the highest point lifts off as well: 0.25 and 1.05 (errors 4.1e-3 and 5.0e-4, of the rich model 4.6e-3).
+At one frequency of it two solutions coexist, 0.12 % of the peak apart, which 10 modes do not tell.
 
-A third of the rich model's time is missed with 2 points, a little with 8 and, at 0.1 %, with 16, and with lift-off at
-0.1 % against the model that misses the accuracy. A rich point took 0.17, 0.54, 2.1, 6.4 and 86 ms before points of up
-to 64 contact freedoms became one compiled call; the choice gained as much (sweeps at 0.1 %: 27, 23, 38 and 298 ms, now
-16, 12, 20 and 94). With few contacts a third is a few milliseconds: models of the choice take half a millisecond each
-to make, and its five to nine checks a quarter each. 3 harmonics for all points at 0.1 % would be faster with 8 and 32
-points (0.26, 0.24), but leave 0.09 % at points that are not checked.
+A third of the rich model's time is missed with 2 to 16 points, and with lift-off at 0.1 % against the model that misses
+the accuracy. A rich point took 0.17, 0.54, 2.1, 6.4 and 86 ms before points of up to 64 contact freedoms became one
+compiled call; the choice gained as much (sweeps at 0.1 %: 27, 23, 38 and 298 ms, now 14, 13, 27 and 95). With few
+contacts a third is a few milliseconds: models of the choice take half a millisecond each to make, and its five to nine
+checks a quarter each. 3 harmonics for all points at 0.1 % would be faster with 8 and 32 points (0.26, 0.24), but leave
+0.09 % at points that are not checked.
 """
 
 from __future__ import annotations
