@@ -4,12 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import replace
-from numbers import Integral, Real
 
 import numpy as np
 
 from ..errors import InputError
 from ..friction.harmonics import to_complex
+from .check import check_point
 from .fallback import Attempt, match_harmonics, solve_balance
 from .linear import Linear, condense
 from .model import ReducedModel
@@ -40,7 +40,9 @@ def solve(model: ReducedModel, omega: float, H: int = 3, samples: int = 128, *, 
         InputError: the frequency, H or samples are out of range, or the start belongs to another model.
         NotSolvedError: a resonance without damping is hit exactly.
     """
-    _check(model, omega, H, samples, start)
+    check_point(model, omega, H, samples)
+    if start is not None and (not isinstance(start, Solution) or start.w.shape[:2] != model.springs.shape):
+        raise InputError("start: expected a Solution of a model with the same contact nodes")
     lean = _stuck_throughout(model, omega, H, start) if options.frugal else None
     if lean is not None:
         return lean
@@ -94,7 +96,7 @@ def sticking(model: ReducedModel, omegas: Sequence[float], H: int) -> list[Solut
     A point is accepted with a little of the friction limit in hand, and with the tolerance of rounding: it is linear.
     """
     low = max((1, *model.excitation, *model.normal))
-    found = solve_each(model, np.array(omegas), low, INSTANTS * low, None, STUCK) if low < H else []
+    found = solve_each(model, np.array(omegas), low, INSTANTS * low, STUCK) if low < H else []
     return gripping(model, found)
 
 
@@ -116,23 +118,6 @@ def _reasons(balance: Balance, attempts: list[Attempt]) -> str:
     stiff = [f"contacts {ratio:.1g} times as stiff as the bodies: expected less than {STIFF:.0e} where they slip or "
              "lift off"] if ratio > STIFF else []
     return "; ".join([f"{a.method}: {a.end.reason}" for a in attempts] + stiff)
-
-
-def _check(model: ReducedModel, omega: float, H: int, samples: int, start: Solution | None) -> None:
-    if not isinstance(omega, Real) or not 0 < omega < np.inf:
-        raise InputError(f"omega {omega}: expected a positive circular frequency")
-    if not isinstance(H, Integral) or H < 1:
-        raise InputError(f"H {H}: expected a whole number of harmonics, at least 1")
-    if not isinstance(samples, Integral) or samples < 0:
-        raise InputError(f"samples {samples}: expected a whole number a period, or 0 to locate transitions exactly")
-    if samples == 0 and model.elements.tangents > 1:
-        raise InputError("samples 0: transitions are located exactly for elements with one tangent only, expected "
-                         "samples above 0 with two")
-    if start is not None and (not isinstance(start, Solution) or start.w.shape[:2] != model.springs.shape):
-        raise InputError("start: expected a Solution of a model with the same contact nodes")
-    highest = max((*model.excitation, *model.normal), default=0)
-    if highest > H:
-        raise InputError(f"H {H}: expected at least {highest}, the highest harmonic of excitation and normal load")
 
 
 def _drift(linear: Linear, load: np.ndarray) -> float:

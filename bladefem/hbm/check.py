@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from numbers import Integral, Real
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -13,7 +14,7 @@ from ..errors import InputError
 if TYPE_CHECKING:
     from .model import ReducedModel
 
-__all__ = ["check_model", "check_probe", "port_size"]
+__all__ = ["check_model", "check_point", "check_probe", "port_size"]
 
 
 def check_model(model: ReducedModel) -> None:
@@ -37,6 +38,22 @@ def check_model(model: ReducedModel) -> None:
     _check_ratio("damping", model.damping.ratio, model.sides)
     if isinstance(model.damper, tuple):
         _check_ratio("damper_damping", model.damper_damping.ratio, model.damper)
+
+
+def check_point(model: ReducedModel, omega: float, H: int, samples: int) -> None:
+    """Raise InputError where frequency, harmonics or samples are out of range."""
+    if not isinstance(omega, Real) or not 0 < omega < np.inf:
+        raise InputError(f"omega {omega}: expected a positive circular frequency")
+    if not isinstance(H, Integral) or H < 1:
+        raise InputError(f"H {H}: expected a whole number of harmonics, at least 1")
+    if not isinstance(samples, Integral) or samples < 0:
+        raise InputError(f"samples {samples}: expected a whole number a period, or 0 to locate transitions exactly")
+    if samples == 0 and model.elements.tangents > 1:
+        raise InputError("samples 0: transitions are located exactly for elements with one tangent only, expected "
+                         "samples above 0 with two")
+    highest = max((*model.excitation, *model.normal), default=0)
+    if highest > H:
+        raise InputError(f"H {H}: expected at least {highest}, the highest harmonic of excitation and normal load")
 
 
 def check_probe(model: ReducedModel, probe: int) -> None:

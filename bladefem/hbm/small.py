@@ -8,12 +8,13 @@ the fallback chain; a test holds the two ways together.
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 
 import numpy as np
 from numba import njit
 
 from ..data import RigidBody
+from .ahead import AHEAD, ahead, shifted
 from .bodies import Stack, rigid_stack
 from .compiled import CONVERGED, compiled_newton, norm
 from .linear import SMALL, rigid_motions
@@ -22,7 +23,7 @@ from .newton import COMPILED, SHORTEST, Options
 from .residual import STICKS, contact_table
 from .solution import Solution, Work
 
-__all__ = ["small", "solve_each", "solve_small"]
+__all__ = ["small", "solve_along", "solve_each", "solve_small"]
 
 STATES = ("stick", "slip", "lift", "open")
 
@@ -30,54 +31,88 @@ STATES = ("stick", "slip", "lift", "open")
 def solve_small(model: ReducedModel, omega: float, H: int, samples: int, start: np.ndarray | None,
                 options: Options) -> Solution | None:
     """The converged solution from displacements (n, d, *), else from full stick; None where this way is not open."""
-    found = solve_each(model, np.array([omega]), H, samples, start, options)
-    if found and found[0] is None and start is not None:
-        found = solve_each(model, np.array([omega]), H, samples, None, options)
-    return found[0] if found else None
+    for known in ([] if start is None else [(omega, start)], []):
+        found = _solved(model, np.array([omega]), H, samples, known, options)
+        if found or start is None:
+            return found[0] if found else None
+    return None
 
 
-def solve_each(model: ReducedModel, omegas: np.ndarray, H: int, samples: int, start: np.ndarray | None,
-               options: Options) -> list[Solution | None]:
-    """All frequencies from one start in one call, None for what did not converge; empty where this way is not open."""
+def solve_each(model: ReducedModel, omegas: np.ndarray, H: int, samples: int, options: Options) -> list[Solution]:
+    """The first frequencies from full stick, as long as they converge; none where this way is not open."""
+    return _solved(model, omegas, H, samples, [], options)
+
+
+def solve_along(model: ReducedModel, omegas: np.ndarray, H: int, samples: int, last: Sequence[Solution],
+                options: Options) -> list[Solution]:
+    """The first frequencies, each from the curve through the last ones, as long as they converge; see `ahead`.
+
+    None where this way is not open.
+
+    Args:
+        last: solved points before them; full stick where there is none, or where the last one sticks.
+        options: frugal ones end with the first at which all contacts stick.
+    """
+    stuck = not last or last[-1].states["stick"] == len(last[-1].w)
+    known = [(p.omega, p.w) for p in ([] if stuck else last[-AHEAD:])]
+    return _solved(model, omegas, H, samples, known, options, 2 if options.frugal else 1)
+
+
+def _solved(model: ReducedModel, omegas: np.ndarray, H: int, samples: int, known: Sequence[tuple[float, np.ndarray]],
+            options: Options, chained: int = 0) -> list[Solution]:
+    """The first frequencies, as long as they converge; `known` and `chained` as `_points` takes them."""
     prepared = _prepared(model, H, samples)
     if prepared is None:
         return []
     body, held, springs, contact = prepared
-    n, d = model.springs.shape
-    begin = np.empty((n * d, 0)) if start is None else np.ascontiguousarray(start.reshape(n * d, -1), dtype=float)
+    (n, d), K = model.springs.shape, 2 * H + 1
+    at, begin = np.zeros(AHEAD), np.zeros((AHEAD, n * d, K))
+    for i, (omega, w) in enumerate(known):
+        kept = min(K, w.shape[2])
+        at[i], begin[i, :, :kept] = omega, w[:, :, :kept].reshape(n * d, kept)
     try:
-        w, ends, f, probe, counts, measures = _points(omegas, body, held, springs, contact, d, H, begin,
-                                                      options.tolerance, options.iterations)
+        w, ends, f, probe, counts, measures = _points(omegas, body, held, springs, contact, d, H, begin, at, len(known),
+                                                      chained, options.tolerance, options.iterations)
     except (ZeroDivisionError, np.linalg.LinAlgError):  # a resonance without damping: the plain way tells which
         return []
-    w = w.reshape(len(omegas), n, d, -1)
-    parts = zip(omegas.tolist(), ends.tolist(), counts.tolist(), measures.tolist(), strict=True)
-    return [Solution(omega, H, samples, w[i], f[i], probe[i], True, "residual within tolerance", "newton", int(steps),
-                     error, moved, pushed, drift, dict(zip(STATES, states, strict=True)), Work(*works))
-            if code == CONVERGED else None
-            for i, (omega, (steps, code, error), states, (moved, pushed, drift, *works)) in enumerate(parts)]
+    parts = zip(omegas.tolist(), w.reshape(len(w), n, d, K), f, probe, ends.tolist(), counts.tolist(),
+                measures.tolist(), strict=False)
+    return [Solution(omega, H, samples, *fields, True, "residual within tolerance", "newton", int(steps), error, moved,
+                     pushed, drift, dict(zip(STATES, states, strict=True)), Work(*works))
+            for omega, *fields, (steps, error), states, (moved, pushed, drift, *works) in parts]
 
 
 @njit(cache=True, error_model="numpy")
-def _points(omegas, body, held, springs, contact, d, H, start, tolerance, iterations):
-    """Displacements (p, m, K), steps, code and error (p, 3), and what `_measure` gives, from a start or full stick."""
+def _points(omegas, body, held, springs, contact, d, H, known, at, count, chained, tolerance, iterations):
+    """Displacements (p, m, K), steps and error (p, 2), and what `_measure` gives, of the first frequencies.
+
+    They start from the curve through `count` of known (3, m, K) at the frequencies at (3,), which are changed here;
+    from full stick where count is 0. Ends before the first that does not converge. If chained is 0 all have the same
+    start; else the known are those solved last, and none where all contacts stick; 2 ends with such a point.
+    """
     p, m, K = omegas.size, springs.size, 2 * H + 1
     w, f = np.empty((p, m, K)), np.empty((p, m // d, d, K))
-    ends, counts, measures = np.empty((p, 3)), np.empty((p, 4), np.int64), np.empty((p, 7))
-    probe = np.empty((p, *body[9].shape), np.complex128)
-    kept = min(K, start.shape[1])
+    ends, counts, measures = np.empty((p, 2)), np.empty((p, 4), np.int64), np.empty((p, 7))
+    probe, done = np.empty((p, *body[9].shape), np.complex128), 0
     for i in range(p):
         flexible, linear, mean, free = _linear(omegas[i], body, held, springs, H)
-        w[i] = linear[2]
-        if kept:
-            w[i] = 0.0
-            w[i, :, :kept] = start[:, :kept]
+        if count:
+            ahead(omegas[i], known, at, count, w[i])
+        else:
+            w[i] = linear[2]
         steps, code, error, F, _, shares, residual, _ = compiled_newton(w[i], d, linear, contact, STICKS, tolerance,
                                                                         iterations, SHORTEST)
-        ends[i, 0], ends[i, 1], ends[i, 2] = steps, code, error
+        if code != CONVERGED:
+            break
+        done, ends[i, 0], ends[i, 1] = i + 1, steps, error
         f[i], probe[i], counts[i], measures[i] = _measure(omegas[i], body, held, springs, (flexible, mean, free), w[i],
                                                           d, F, contact[5], residual, shares)
-    return w, ends, f, probe, counts, measures
+        if chained:
+            sticks = counts[i, 0] == m // d
+            count = 0 if sticks else shifted(omegas[i], w[i], known, at, count)
+            if chained == 2 and sticks:
+                break
+    return w[:done], ends[:done], f[:done], probe[:done], counts[:done], measures[:done]
 
 
 def small(model: ReducedModel, H: int) -> bool:

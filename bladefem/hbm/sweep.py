@@ -2,22 +2,23 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import replace
 from functools import cache, partial
 from itertools import chain
-from math import prod
 
 import numpy as np
 
 from ..errors import InputError, NotSolvedError
+from .ahead import AHEAD, ahead
 from .api import solve, sticking
-from .check import check_probe
+from .check import check_point, check_probe
 from .fallback import match_harmonics
 from .model import ReducedModel
 from .newton import DEFAULTS, Options
 from .resonance import free_resonances, stuck_resonances
 from .sensitivity import sensitivities
+from .small import solve_along
 from .solution import Solution
 
 __all__ = ["first_look", "local_maxima", "response", "size", "sweep"]
@@ -27,8 +28,7 @@ Slope = Callable[[float], float]     # of the height with the frequency, at a so
 BESIDE = 1e-7   # of a frequency: how far beside a resonance without damping a sweep solves, where it hits it exactly
 SHY = 1e-5      # the same for the first look at a model without damping, whose flexibility stuck is all rounding there
 COARSE = 12     # intervals of the first look at a band
-PARABOLA = 3    # points that a start is extrapolated from
-BLOCK = 16      # points that are solved at once as long as all contacts stick
+BLOCK = 16      # points that are solved at once
 BAND_LIMIT = 400    # points after which a sweep gives up refining
 
 
@@ -47,19 +47,32 @@ def response(model: ReducedModel, omegas: Iterable[float], H: int = 3, samples: 
     Args:
         keep: is given each frequency and what solves it; see `bladefem.hbm.record`.
     """
-    omegas, nodes = list(omegas), len(model.elements.kt)
-    last: list[Solution] = []
-    stuck: list[Solution] = []
+    omegas, last, ready = list(omegas), [], {}
+
+    def compute(i: int) -> Solution:
+        if i not in ready:
+            ready.clear()
+            ready.update(enumerate(_at_once(model, omegas[i:i + BLOCK], H, samples, last, options), i))
+        return ready[i] if i in ready else _solve(model, omegas[i], H, samples, _ahead(last, omegas[i], H), options)
+
     for i, omega in enumerate(omegas):
-        if options.frugal and not stuck and (not last or last[-1].states["stick"] == nodes):
-            stuck = sticking(model, omegas[i:i + BLOCK], H)[::-1]
-        compute = partial(stuck.__getitem__, -1) if stuck else partial(_solve, model, omega, H, samples,
-                                                                       _ahead(last, omega, H), options)
-        solution = keep(omega, compute)
-        stuck = stuck[:-1]
+        solution = keep(omega, partial(compute, i))
         yield solution
         if solution.converged:
-            last = [*last[-2:], solution]
+            last = [*last[1 - AHEAD:], solution]
+
+
+def _at_once(model: ReducedModel, omegas: Sequence[float], H: int, samples: int, last: list[Solution],
+             options: Options) -> list[Solution]:
+    """The first of some frequencies that one call solves: those where all contacts stick, or points of a small model.
+
+    Both end where the other way is better, or where Newton needs more than a good start.
+    """
+    for omega in omegas:
+        check_point(model, omega, H, samples)
+    sticks = not last or _sticks(last[-1])
+    found = sticking(model, omegas, H) if options.frugal and sticks else []
+    return found or solve_along(model, np.array(omegas), H, samples, last, options)
 
 
 def sweep(model: ReducedModel, band: tuple[float, float], H: int = 3, samples: int = 128, *, peak: float = 1e-3,
@@ -176,20 +189,14 @@ def _corner_targets(omegas: np.ndarray, heights: np.ndarray, curve: float) -> It
 
 
 def _ahead(last: list[Solution], omega: float, H: int) -> Solution | None:
-    """A start: the last solution, moved along the line through the last two, or the parabola through the last three.
-
-    None, which is full stick at the new frequency, where all contacts stuck at the last one.
-    """
-    if not last or last[-1].states["stick"] == len(last[-1].w):
+    """A start on the curve through the last solutions; None, which is full stick, where the last one sticks."""
+    if not last or _sticks(last[-1]):
         return None
-    if len(last) < 2:
-        return last[-1]
-    new, known = last[-1], last[-PARABOLA:]
-    apart = {p.omega for p in known}
-    if len(apart) < len(known) or abs(omega - new.omega) > 2 * abs(new.omega - last[-2].omega):
-        return new
-    w = np.zeros_like(match_harmonics(new.w, H))
-    for p in known:
-        share = prod((omega - other.omega) / (p.omega - other.omega) for other in known if other is not p)
-        w += share * match_harmonics(p.w, H)
-    return replace(new, w=w)
+    known = np.array([match_harmonics(p.w, H) for p in last])
+    w, at = np.empty(known.shape[1:]), np.array([p.omega for p in last])
+    ahead(omega, known.reshape(len(last), -1, 2 * H + 1), at, len(last), w.reshape(-1, 2 * H + 1))
+    return replace(last[-1], w=w)
+
+
+def _sticks(solution: Solution) -> bool:
+    return solution.states["stick"] == len(solution.w)

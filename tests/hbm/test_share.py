@@ -41,25 +41,25 @@ def test_any_number_of_ranks_gives_the_same_numbers(model, omegas, tmp_path):
 def test_a_killed_run_goes_on_with_any_number_of_ranks(tmp_path, monkeypatch):
     """Killed on one rank in its second block; only the points that were not written are solved again."""
     from mpi4py import MPI
-    comm, model, plain, solved = MPI.COMM_WORLD, single_mass(), sweep.solve, []
+    comm, model, plain, solved = MPI.COMM_WORLD, single_mass(), sweep.solve_along, []
     folder = comm.bcast(tmp_path)
     alone = shared_response(model, OMEGAS, 3, 64)
 
     def until(most):
-        def work(*args, **kwargs):
+        def work(model, omegas, *args):     # one of them at a time
             if len(solved) == most:
                 raise KeyboardInterrupt
-            solved.append(args[1])
-            return plain(*args, **kwargs)
+            solved.append(omegas[0])
+            return plain(model, omegas[:1], *args)
         return work
 
     if comm.rank == 0:
-        monkeypatch.setattr(sweep, "solve", until(20))
+        monkeypatch.setattr(sweep, "solve_along", until(20))
         with pytest.raises(KeyboardInterrupt):
             shared_response(model, OMEGAS, 3, 64, folder=folder)
     comm.Barrier()
     solved.clear()
-    monkeypatch.setattr(sweep, "solve", until(len(OMEGAS)))
+    monkeypatch.setattr(sweep, "solve_along", until(len(OMEGAS)))
     again = shared_response(model, OMEGAS, 3, 64, comm=comm, folder=folder)
     assert comm.allreduce(len(solved)) == len(OMEGAS) - 20
     assert all(np.array_equal(one.w, other.w) for one, other in zip(again, alone, strict=True))
