@@ -13,15 +13,20 @@ from math import sqrt
 
 from numba import njit
 
-__all__ = ["crossing", "decay", "edge", "sensitivity", "turn"]
+__all__ = ["CLOSING", "SEPARATED", "SLIP", "STICK", "edge", "middle"]
 
 SEPARATED, STICK, SLIP, CLOSING = 0, 1, 2, 3
 
 
 @njit(cache=True, error_model="numpy", inline="always")
 def decay(x):
-    """Factor of tan(psi/2) over half an edge, tends to exp(-x/2) for small x and to 1/x for large x."""
-    return 1.0 / (sqrt(1.0 + 0.25 * x * x) + 0.5 * x)
+    """Factor of tan(psi/2) over half an edge and the slope of its logarithm.
+
+    The factor tends to exp(-x/2) for small x and to 1/x for large x.
+    """
+    root = sqrt(1.0 + 0.25 * x * x)
+    both = 1.0 / (root * (root + 0.5 * x))
+    return root * both, -0.5 * (root + 0.5 * x) * both
 
 
 @njit(cache=True, error_model="numpy", inline="always")
@@ -56,87 +61,86 @@ def _direction(dx, dy, hx, hy, R):
 
 
 @njit(cache=True, error_model="numpy", inline="always")
-def _slip_on(fx, fy, dx, dy, R0, R1, Rm, share, power):
-    """(fx, fy) of unit length at share = 1 (end, power 2) or 0.5 (mid, power 1) of an edge that slips."""
-    alpha = crossing(fx, fy, dx, dy, R0, R1 - R0)
-    hx, hy = fx + alpha * dx, fy + alpha * dy
+def _slip(fx, fy, dx, dy, N0, N1, mu, share):
+    """Unit force (2) at share 1 (end) or 0.5 (middle) of an edge that slips there, and share after which it slips.
+
+    Then d(angle) of that force by f0 (2), increment (2), N0 and N1.
+    """
+    R0, dR, Rm = mu * N0, mu * (N1 - N0), 0.5 * mu * (N0 + N1)
+    alpha = crossing(fx, fy, dx, dy, R0, dR)
+    hx, hy, R = fx + alpha * dx, fy + alpha * dy, R0 + alpha * dR
     H = sqrt(hx * hx + hy * hy)
     L, ux, uy = _direction(dx, dy, hx, hy, Rm)
     if H <= 0.0:
-        return ux, uy, alpha
-    E = decay(L / Rm * (1.0 - alpha / share))
-    if power == 2:
-        E *= E
-    c, s, _ = turn((hx * ux + hy * uy) / H, (hy * ux - hx * uy) / H, E)
-    return c * ux - s * uy, c * uy + s * ux, alpha
+        return ux, uy, alpha, 0.0, 0.0, -uy / L, ux / L, 0.0, 0.0
+    x = L / Rm
+    y, inverse = x * (1.0 - alpha / share), 1.0 / H
+    E, fall = decay(y)
+    if share == 1.0:
+        E, fall = E * E, 2.0 * fall
+    C, S, a = turn((hx * ux + hy * uy) * inverse, (hy * ux - hx * uy) * inverse, E)
+    nx, ny, SW = -hy * inverse * inverse, hx * inverse * inverse, S * fall       # n: d(angle of h)/dh
+    p0, p1, along, across = a * nx, a * ny, SW * y / L, (1.0 - a) / L
+    q0, q1, r0 = alpha * p0 - across * uy + along * ux, alpha * p1 + across * ux + along * uy, -0.5 * mu * along * x
+    r1, den = r0, hx * dx + hy * dy - R * dR
+    if alpha > 0.0 and den > 0.0:
+        G = (a * (nx * dx + ny * dy) - SW * x / share) / den
+        p0, p1 = p0 - G * hx, p1 - G * hy
+        q0, q1 = q0 - G * alpha * hx, q1 - G * alpha * hy
+        r0, r1 = r0 + G * R * mu * (1.0 - alpha), r1 + G * R * mu * alpha
+    return C * ux - S * uy, C * uy + S * ux, alpha, p0, p1, q0, q1, r0, r1
+
+
+@njit(cache=True, error_model="numpy", inline="always")
+def _closed(dx, dy, N0, N1, mu):
+    """State and force at the end of an edge that closes: from f = 0 and R = 0 the force follows the motion."""
+    rest, R1, length = N1 / (N1 - N0), mu * N1, sqrt(dx * dx + dy * dy)
+    if rest * length <= R1:
+        return CLOSING, rest * dx, rest * dy
+    return SLIP, R1 / length * dx, R1 / length * dy
 
 
 @njit(cache=True, error_model="numpy", inline="always")
 def edge(fx, fy, dx, dy, N0, N1, mu):
-    """(state at the end, f at the end (2), state at the middle, f there (2)) after one edge from f = (fx, fy) [N]."""
-    Nm = 0.5 * (N0 + N1)
-    R0, R1, Rm = mu * N0, mu * N1, mu * Nm
-    end, ex, ey, mid, mx, my = SEPARATED, 0.0, 0.0, SEPARATED, 0.0, 0.0
+    """(state at the end, f there (2), state in the middle, by (6)) after one edge from f = (fx, fy) [N].
+
+    In slip, by is d(angle) at the end by f0 (2), increment (2), N0 and N1.
+    """
+    end, ex, ey, mid, none = SEPARATED, 0.0, 0.0, SEPARATED, (0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
     if N0 <= 0.0:
-        if N1 > 0.0:                        # closes: from f = 0 and R = 0 the force follows the motion
-            rest = N1 / (N1 - N0)
-            L = rest * sqrt(dx * dx + dy * dy)
-            scale = rest if L <= R1 else rest * R1 / L
-            end = CLOSING if L <= R1 else SLIP
-            ex, ey = scale * dx, scale * dy
-            if Nm > 0.0:
-                mid, mx, my = end, Nm / N1 * ex, Nm / N1 * ey
-        return end, ex, ey, mid, mx, my
-    if Nm > 0.0:
-        mid, mx, my = STICK, fx + 0.5 * dx, fy + 0.5 * dy
+        if N1 > 0.0:
+            end, ex, ey = _closed(dx, dy, N0, N1, mu)
+            mid = end if N0 + N1 > 0.0 else SEPARATED
+            if end == SLIP:
+                L2 = dx * dx + dy * dy
+                none = (0.0, 0.0, -dy / L2, dx / L2, 0.0, 0.0)
+        return end, ex, ey, mid, none
+    Rm, R1 = 0.5 * mu * (N0 + N1), mu * N1
     if N1 > 0.0:
-        end, ex, ey = STICK, fx + dx, fy + dy
-        if ex * ex + ey * ey > R1 * R1:
-            end = SLIP
-            ex, ey, alpha = _slip_on(fx, fy, dx, dy, R0, R1, Rm, 1.0, 2)
-            ex, ey = R1 * ex, R1 * ey
-            if alpha < 0.5:
-                mid = SLIP
-                mx, my, alpha = _slip_on(fx, fy, dx, dy, R0, R1, Rm, 0.5, 1)
-                mx, my = Rm * mx, Rm * my
-    elif Nm > 0.0 and mx * mx + my * my > Rm * Rm:
-        mid = SLIP
-        mx, my, alpha = _slip_on(fx, fy, dx, dy, R0, R1, Rm, 0.5, 1)
-        mx, my = Rm * mx, Rm * my
-    return end, ex, ey, mid, mx, my
+        ex, ey = fx + dx, fy + dy
+        if ex * ex + ey * ey <= R1 * R1:
+            return STICK, ex, ey, STICK, none
+        ex, ey, alpha, p0, p1, q0, q1, r0, r1 = _slip(fx, fy, dx, dy, N0, N1, mu, 1.0)
+        return SLIP, R1 * ex, R1 * ey, SLIP if alpha < 0.5 else STICK, (p0, p1, q0, q1, r0, r1)
+    if N0 + N1 > 0.0:
+        mid = SLIP if (fx + 0.5 * dx) ** 2 + (fy + 0.5 * dy) ** 2 > Rm * Rm else STICK
+    return end, ex, ey, mid, none
 
 
 @njit(cache=True, error_model="numpy", inline="always")
-def sensitivity(fx, fy, dx, dy, N0, N1, mu, share):
-    """d(angle) of the slipping force at share 1 (end) or 0.5 (middle): by f0 (2), increment (2), N0 and N1."""
-    R0, R1, Rm = mu * N0, mu * N1, 0.5 * mu * (N0 + N1)
+def middle(fx, fy, dx, dy, N0, N1, mu, mid):
+    """f (2) in the middle, where the state is mid, of an edge from f = (fx, fy) [N]; by (6) as edge has it."""
+    Rm, by = 0.5 * mu * (N0 + N1), (0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
+    if mid == SEPARATED:
+        return 0.0, 0.0, by
+    if mid == STICK:
+        return fx + 0.5 * dx, fy + 0.5 * dy, by
+    if mid == CLOSING:
+        part = 0.5 * (N0 + N1) / (N1 - N0)
+        return part * dx, part * dy, by
     if N0 <= 0.0:
         L2 = dx * dx + dy * dy
-        return 0.0, 0.0, -dy / L2, dx / L2, 0.0, 0.0
-    dR = R1 - R0
-    alpha = crossing(fx, fy, dx, dy, R0, dR)
-    hx, hy, R = fx + alpha * dx, fy + alpha * dy, R0 + alpha * dR
-    L, ux, uy = _direction(dx, dy, hx, hy, Rm)
-    if R <= 0.0:
-        return 0.0, 0.0, -uy / L, ux / L, 0.0, 0.0
-    x, tau = L / Rm, 1.0 - alpha / share
-    y = x * tau
-    E = decay(y)
-    W = -0.5 / sqrt(1.0 + 0.25 * y * y)
-    if share == 1.0:
-        E *= E
-        W *= 2.0
-    _, S, a = turn((hx * ux + hy * uy) / R, (hy * ux - hx * uy) / R, E)
-    nx, ny = -hy / (R * R), hx / (R * R)        # d(angle of h)/dh
-    p0, p1 = a * nx, a * ny
-    q0 = alpha * p0 - (1.0 - a) * uy / L + S * W * y * ux / L
-    q1 = alpha * p1 + (1.0 - a) * ux / L + S * W * y * uy / L
-    r0 = r1 = -0.5 * mu * S * W * y / Rm
-    den = hx * dx + hy * dy - R * dR
-    if alpha > 0.0 and den > 0.0:
-        G = (a * (nx * dx + ny * dy) - S * W * x / share) / den
-        p0, p1 = p0 - G * hx, p1 - G * hy
-        q0, q1 = q0 - G * alpha * hx, q1 - G * alpha * hy
-        r0 += G * R * mu * (1.0 - alpha)
-        r1 += G * R * mu * alpha
-    return p0, p1, q0, q1, r0, r1
+        scale = Rm / sqrt(L2)
+        return scale * dx, scale * dy, (0.0, 0.0, -dy / L2, dx / L2, 0.0, 0.0)
+    ux, uy, _, p0, p1, q0, q1, r0, r1 = _slip(fx, fy, dx, dy, N0, N1, mu, 0.5)
+    return Rm * ux, Rm * uy, (p0, p1, q0, q1, r0, r1)

@@ -6,9 +6,9 @@ import numpy as np
 from numba import njit
 
 from bladefem.friction.disc_rows import add_period, close, empty_rows, start_rows, to_carry, unit_rows
-from bladefem.friction.lane_kernels import find_edges, find_forces
-from bladefem.friction.orbit import TOLERANCE, empty_trail, follow, periodic, start
-from bladefem.friction.tables import Node, add_gram
+from bladefem.friction.lane_kernels import find_edges
+from bladefem.friction.orbit import TOLERANCE, empty_trail, follow, forces_along, periodic, start
+from bladefem.friction.tables import Node, empty_gram, gram
 
 __all__ = ["disc_batch"]
 
@@ -58,12 +58,12 @@ def _contact(N, load, tab, mean):
 
 
 @njit(_nrt=False, cache=True, error_model="numpy")
-def _normal(w, load, el, N, least, tab, mean, block, F, J):
-    """Normal force F (K,) and its Jacobian J (K, K) or (0, 0); returns the share of the samples in contact.
+def _normal(w, load, el, N, least, tab, spare, F, J):
+    """Normal force F (K,) and its Jacobian J (K, 3K) or (0, 0); returns the share of the samples in contact.
 
-    N (width,) is the load at the knots, at least ``least`` [N]; mean (4H+1,) and block (K, K) are scratch.
+    N (width,) is the load at the knots, at least ``least`` [N]; spare is scratch: mean (4H+1,), block (K, K), around.
     """
-    K = F.size
+    K, J[:] = F.size, 0.0
     if load.size == 0 and least > 0.0:
         for k in range(K):
             F[k] = el.kn * w[k]
@@ -71,9 +71,9 @@ def _normal(w, load, el, N, least, tab, mean, block, F, J):
         for k in range(J.shape[0]):
             J[k, k] = el.kn
         return 1.0
+    mean, block, around = spare
     _contact(N, load, tab, mean)
-    block[:, :] = 0.0
-    add_gram(1.0, mean, block)
+    gram(mean, around, block)
     for k in range(K):
         F[k] = 0.0 if load.size else el.n0 * block[k, 0]
         for l in range(K):
@@ -109,20 +109,19 @@ def _within(path, mu):
 
 
 @njit(_nrt=False, cache=True, error_model="numpy")
-def _forces(w, load, el, path, tab, limit, trail, spare, trace, F, J, shares):
+def _forces(w, load, el, path, tab, limit, trail, phi, spare, trace, F, J, shares):
     """Normal force of one node, and its last period as periodic returns it; 0 cycles where it sticks or stays open.
 
-    There F (3, K) and J (3, K, 3K) are complete; elsewhere F lacks the harmonics of trace (2, width), J its tangents.
+    There F (3, K) and J (3, K, 3K) are complete; elsewhere F lacks the harmonics of trace (2, width), J the tangents.
     """
-    K, linear, (mean, block, phi) = F.shape[1], J.shape[0] > 0, spare
+    linear = J.shape[0] > 0
     found, (least, largest) = (True, 0.0, 0.0, 0.0, 0.0, 0, 0, 0), _range(path[2])
-    J[:] = 0.0
-    closed = _normal(w[0], load, el, path[2], least, tab, mean, block, F[0], J[0, :, :K] if linear else J[:, :, 0])
+    closed = _normal(w[0], load, el, path[2], least, tab, spare, F[0], J[0] if linear else J[:, :, 0])
     if largest > 0.0 and not (least > 0.0 and _within(path, el.mu)):
         find_edges(path, path.shape[1], el.mu, trail.form)
-        found = periodic(path, el.mu, largest, EXACT if linear else TOLERANCE, limit, trail, trace, phi)
+        found = periodic(path, el.mu, largest, EXACT if linear else TOLERANCE, limit, trail, phi)
         if not linear:
-            find_forces(path, trail.form, trail.knots, trail.slips, path.shape[1], el.mu, trace)
+            forces_along(path, el.mu, found[6], trail, trace)
     else:
         _stuck(w, el.kt if largest > 0.0 else 0.0, F, J)
     shares[1] = found[5] / tab.at.shape[0]
@@ -134,7 +133,7 @@ def _forces(w, load, el, path, tab, limit, trail, spare, trace, F, J, shares):
 @njit(_nrt=False, cache=True, error_model="numpy", forceinline=True)
 def _stuck(w, kt, F, J):
     """Tangential forces of springs kt."""
-    K = F.shape[1]
+    K, J[1:] = F.shape[1], 0.0
     for c in range(1, 3):
         for k in range(K):
             F[c, k] = kt * w[c, k]
@@ -143,15 +142,15 @@ def _stuck(w, kt, F, J):
 
 
 @njit(_nrt=False, cache=True, error_model="numpy")
-def _rows(path, found, el, tab, trail, scratch, normal, trace, phi, F, J):
-    """Rows J (2, K, 3K) of the tangential forces in the state that was found, which lack n p_0 of normal (2, width).
+def _rows(path, found, el, tab, trail, scratch, trace, phi, F, J):
+    """Rows J (2, K, 3K) of the tangential forces in the state that was found.
 
-    F (3, K) takes what trace (2, width) lacks of the periodic force.
+    F (3, K) takes what trace (2, width), zero on entry, lacks of the periodic force.
     """
     unique, fx, fy, gx, gy, _, pieces, cycles = found
     if unique:
         unit_rows(el.kt, tab, scratch.C)
-        add_period(path, gx, gy, pieces, el, tab, trail, scratch, normal, trace, unique)
+        add_period(path, gx, gy, pieces, el, tab, trail, scratch, trace, unique)
     else:
         gx, gy = fx, fy = start(path[0, 0], path[1, 0], path[2, 0], el.mu)
         start_rows(path[0, 0], path[1, 0], path[2, 0], el, tab, scratch.C)
@@ -159,40 +158,33 @@ def _rows(path, found, el, tab, trail, scratch, normal, trace, phi, F, J):
             if cycle > 0:
                 to_carry(scratch.C, 0, el.kt, tab)
             fx, fy = gx, gy
-            gx, gy, _, _, _, pieces = follow(path, el.mu, fx, fy, trail, trace, phi)
-            add_period(path, gx, gy, pieces, el, tab, trail, scratch, normal, trace, cycle + 1 == cycles)
-    close(gx - fx, gy - fy, tab, scratch, F, J)
-    for e in range(2 if scratch.stick[0] > 0.0 else 0):
-        add_gram(el.kt, scratch.stick, J[e, :, (e + 1) * F.shape[1]:(e + 2) * F.shape[1]])
+            gx, gy, _, _, _, pieces = follow(path, el.mu, fx, fy, trail, phi)
+            add_period(path, gx, gy, pieces, el, tab, trail, scratch, trace, cycle + 1 == cycles)
+    close(gx - fx, gy - fy, el.kt, tab, scratch, F, J)
 
 
 @njit(_nrt=False, cache=True, error_model="numpy")
-def _lot(w, load, nodes, path, tab, limit, trail, scratch, spare, normal, trace, F, J, shares, cycles):
-    """disc_batch for some nodes but for the harmonics of trace and normal (n, 2, width); returns whether any moves."""
+def _lot(w, load, nodes, path, tab, limit, trail, scratch, phi, spare, trace, F, J, shares, cycles):
+    """disc_batch for some nodes but for the harmonics of trace (n, 2, width); returns whether any moves."""
     moving = False
     for e in range(w.shape[0]):
         el = Node(nodes[e, 0], nodes[e, 1], nodes[e, 2], nodes[e, 3])
-        found = _forces(w[e], load[e], el, path[e], tab, limit, trail, spare, trace[e], F[e], J[e], shares[e])
+        found = _forces(w[e], load[e], el, path[e], tab, limit, trail, phi, spare, trace[e], F[e], J[e], shares[e])
         if found[7] and J.shape[1]:
-            _rows(path[e], found, el, tab, trail, scratch, normal[e], trace[e], spare[2], F[e], J[e, 1:])
+            _rows(path[e], found, el, tab, trail, scratch, trace[e], phi, F[e], J[e, 1:])
         cycles[e], moving = found[7] or 1, moving or found[7] != 0
     return moving
 
 
 @njit(cache=True, error_model="numpy")
-def _harmonics(trace, normal, tab, F, J):
-    """Add the harmonics of trace (n, 2, width) to F (n, 3, K), and the rows n p_0 of normal (n, 2, width) to J."""
-    n, width, K = F.shape[0], trace.shape[2], F.shape[2]
+def _harmonics(trace, tab, F):
+    """Add the harmonics of trace (n, 2, width) to F (n, 3, K)."""
+    n, width = F.shape[0], trace.shape[2]
     forces = np.dot(trace.reshape((2 * trace.shape[0], width))[:2 * n], tab.analysis)
     for e in range(n):
-        for k in range(K):
+        for k in range(F.shape[2]):
             F[e, 1, k] += forces[2 * e, k]
             F[e, 2, k] += forces[2 * e + 1, k]
-    if J.shape[1]:
-        means = np.dot(normal.reshape((2 * trace.shape[0], width))[:2 * n], tab.means)
-        for e in range(n):
-            for c in range(2):
-                add_gram(1.0, means[2 * e + c], J[e, 1 + c, :, :K])
 
 
 @njit(cache=True, error_model="numpy")
@@ -204,13 +196,13 @@ def disc_batch(w, load, nodes, tab, patterns, limit, F, J, shares, cycles):
     was not periodic after ``limit``.
     """
     n, width = w.shape[0], tab.along.shape[1]
-    path, trace, normal = np.empty((NODES, 3, width)), np.empty((NODES, 2, width)), np.empty((NODES, 2, width))
-    spare = np.empty(tab.sums.shape[1]), np.empty((w.shape[2], w.shape[2])), np.empty((2, 2))
+    path, trace, phi = np.empty((NODES, 3, width)), np.empty((NODES, 2, width)), np.empty((2, 2))
+    spare = np.empty(tab.sums.shape[1]), np.empty((w.shape[2], w.shape[2])), empty_gram(w.shape[2] // 2)
     trail, scratch, F[:] = empty_trail(tab.at.shape[0], width), empty_rows(tab, patterns), 0.0
     for first in range(0, n, NODES):
         last = min(first + NODES, n)
         _paths(w[first:last], load[first:last], nodes[first:last], tab, path)
-        trace[:], normal[:] = 0.0, 0.0
-        if _lot(w[first:last], load[first:last], nodes[first:last], path, tab, limit, trail, scratch, spare, normal,
+        trace[:] = 0.0
+        if _lot(w[first:last], load[first:last], nodes[first:last], path, tab, limit, trail, scratch, phi, spare,
                 trace, F[first:last], J[first:last], shares[first:last], cycles[first:last]):
-            _harmonics(trace, normal, tab, F[first:last], J[first:last])
+            _harmonics(trace, tab, F[first:last])

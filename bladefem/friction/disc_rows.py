@@ -14,11 +14,11 @@ from typing import NamedTuple
 import numpy as np
 from numba import njit
 
-from bladefem.friction.disc import CLOSING, SLIP, STICK, sensitivity
-from bladefem.friction.lane_kernels import TURNS, add_folded, find_turns, join_rows, turn_rows
-from bladefem.friction.lanes import BLOCK
-from bladefem.friction.orbit import CHANGING, SLIDING, STICKING
-from bladefem.friction.tables import Patterns
+from bladefem.friction.disc import CLOSING, SLIP, STICK
+from bladefem.friction.lane_kernels import TURNS, find_turns
+from bladefem.friction.orbit import CHANGING, SLIDING, STICKING, middle_force, stuck_forces
+from bladefem.friction.row_kernels import add_folded, add_products, combine, join_rows, turn_rows
+from bladefem.friction.tables import Patterns, empty_gram, gram
 
 __all__ = ["Rows", "add_period", "close", "empty_rows", "start_rows", "to_carry", "unit_rows"]
 
@@ -28,16 +28,20 @@ FAINT, SHORT_FAINT = 1e-60, 1e-30       # of 8 and of 4 bytes: forgotten before 
 
 
 class Rows(NamedTuple):
-    """Scratch of one 2-D element, rows in the precision of the patterns; M and width as in lane_kernels.py."""
+    """Scratch of one 2-D element, rows of M = 3 W numbers in the precision of the patterns, as in row_kernels.py."""
 
     J: np.ndarray           # (2, tiled, M) summed rows, first and second tangent
     stick: np.ndarray       # (4H+1,) basis means of the samples in stick
+    gram: np.ndarray        # (K, W) their Gram matrix
+    around: np.ndarray      # (2, ..) scratch of gram
+    share: np.ndarray       # (K,) coefficients of the samples of one stretch of stick
     C: np.ndarray           # (2, M) carried rows
     closing: np.ndarray     # (2, M) rows at a sample in which the element closes
     row: np.ndarray         # (M,) row of the angle in slip
     rows: np.ndarray        # (S + 1, M) rows of the angle at the samples; the last stands for none and is zero
     turns: np.ndarray       # (7, width) how the row turns
     g: np.ndarray           # (2, width) factors from a sample's row to those of the force [N]
+    normal: np.ndarray      # (2, width) n in the rows n p_0 of the force, p_0 the pattern of the normal load [N/m]
     chosen: np.ndarray      # numbers of the fours with samples that slip
     patterns: Patterns
 
@@ -45,27 +49,20 @@ class Rows(NamedTuple):
 @njit(cache=True, error_model="numpy")
 def empty_rows(tab, patterns):
     """Scratch for one node."""
-    (S, W), tile, width, dtype = patterns.at.shape, patterns.weights.shape[1], tab.along.shape[1], patterns.at.dtype
-    lanes = BLOCK // patterns.at.itemsize
-    M = (3 * W + lanes - 1) // lanes * lanes
-    return Rows(np.zeros((2, tile, M), dtype), np.zeros(tab.sums.shape[1]), np.zeros((2, M), dtype),
-                np.zeros((2, M), dtype), np.zeros(M, dtype), np.zeros((S + 1, M), dtype),
-                np.zeros((TURNS, width), dtype), np.zeros((2, width), dtype), np.zeros(tab.fours.shape[0], np.int64),
-                patterns)
+    (S, W), tile, width, dtype = patterns.change.shape, patterns.weights.shape[1], tab.along.shape[1], patterns.at.dtype
+    K, M = tab.at.shape[1], 3 * W
+    return Rows(np.zeros((2, tile, M), dtype), np.zeros(tab.sums.shape[1]), np.zeros((K, W), dtype), empty_gram(K // 2),
+                np.zeros(K), np.zeros((2, M), dtype), np.zeros((2, M), dtype), np.zeros(M, dtype),
+                np.zeros((S + 1, M), dtype), np.zeros((TURNS, width), dtype), np.zeros((2, width), dtype),
+                np.zeros((2, width), dtype), np.zeros(tab.fours.shape[0], np.int64), patterns)
 
 
-@njit(_nrt=False, cache=True, error_model="numpy", forceinline=True, fastmath=FAST)
-def _angle_row(C, i, by, el, tab, row):
+@njit(_nrt=False, cache=True, error_model="numpy", forceinline=True)
+def _angle_row(i, by, el, scratch, row):
     """Row (M,) of the angle of a slipping force, from by (6,): by force (2), increment (2), N_i and N_j."""
-    K, W, p0, p1, q0, q1, r0, r1 = tab.at.shape[1], tab.W, *by
-    j = i + 1 if i + 1 < tab.at.shape[0] else 0
-    for l in range(row.size):
-        row[l] = p0 * C[0, l] + p1 * C[1, l]
-    for l in range(K):
-        V, U = tab.knots[i, l], tab.knots[j, l]
-        row[l] += el.kn * (r0 * V + r1 * U)
-        row[W + l] += el.kt * (p0 * V + q0 * (U - V))
-        row[2 * W + l] += el.kt * (p1 * V + q1 * (U - V))
+    C, knots, (p0, p1, q0, q1, r0, r1) = scratch.C, scratch.patterns.knots, by
+    parts = el.kn * r0, el.kt * (p0 - q0), el.kt * (p1 - q1), el.kn * r1, el.kt * q0, el.kt * q1
+    combine(p0, C[0], p1, C[1], parts, i, i + 1 if i + 1 < knots.shape[0] else 0, knots, knots.shape[1], row)
 
 
 @njit(_nrt=False, cache=True, error_model="numpy", forceinline=True)
@@ -88,17 +85,16 @@ def to_carry(C, j, kt, tab):
         C[1, 2 * W + l] -= kt * tab.knots[j, l]
 
 
-@njit(_nrt=False, cache=True, error_model="numpy", forceinline=True, fastmath=FAST)
+@njit(_nrt=False, cache=True, error_model="numpy", forceinline=True)
 def _add_stick(a, b, tab, scratch):
     """Add samples a <= i < b, which stick with the carried rows C."""
-    C, J, stick = scratch.C, scratch.J, scratch.stick
+    stick, share, J = scratch.stick, scratch.share, scratch.J
     for p in range(stick.size):
-        stick[p] += tab.sums[b, p] - tab.sums[a, p]
-    for k in range(tab.at.shape[1]):
-        weight = (tab.sums[b, k] - tab.sums[a, k]) * (2.0 if k else 1.0)
-        for e in range(2):
-            for l in range(C.shape[1]):
-                J[e, k, l] += weight * C[e, l]
+        mean = tab.sums[b, p] - tab.sums[a, p]
+        stick[p] += mean
+        if p < share.size:
+            share[p] = 2.0 * mean if p else mean
+    add_products(share, share.size, scratch.C, J.shape[2], J, J.shape[1])
 
 
 @njit(_nrt=False, cache=True, error_model="numpy", forceinline=True)
@@ -115,16 +111,17 @@ def _slide(a, b, scratch):
 
 
 @njit(_nrt=False, cache=True, error_model="numpy", forceinline=True)
-def _add_mixed(i, mid, fx, fy, path, el, tab, scratch, slips, normal, trace):
+def _add_mixed(i, mid, fx, fy, path, el, tab, scratch, slips, trace):
     """Add sample i of an edge that changes state and slips there or closes, from the force (fx, fy) at its begin."""
-    dx, dy, N0, N1 = path[0, i + 1] - path[0, i], path[1, i + 1] - path[1, i], path[2, i], path[2, i + 1]
+    by = middle_force(i, mid, fx, fy, path, el.mu, trace)
+    N0, N1 = path[2, i], path[2, i + 1]
     if mid == SLIP:
-        _angle_row(scratch.C, i, sensitivity(fx, fy, dx, dy, N0, N1, el.mu, 0.5), el, tab, scratch.rows[i])
+        _angle_row(i, by, el, scratch, scratch.rows[i])
         N = max(0.5 * (N0 + N1), 1e-300)
         scratch.g[0, i], scratch.g[1, i], slips[i] = -trace[1, i], trace[0, i], 1.0
-        normal[0, i], normal[1, i] = el.kn * trace[0, i] / N, el.kn * trace[1, i] / N
+        scratch.normal[0, i], scratch.normal[1, i] = el.kn * trace[0, i] / N, el.kn * trace[1, i] / N
     elif mid == CLOSING:
-        rows = scratch.closing
+        dx, dy, rows = path[0, i + 1] - path[0, i], path[1, i + 1] - path[1, i], scratch.closing
         _closing_rows(i, dx, dy, N0, N1, 0.5 * (N0 + N1) / (N1 - N0), el, tab, rows)
         for e in range(2):
             for k in range(tab.at.shape[1]):
@@ -137,7 +134,7 @@ def _after_mixed(i, end, by, path, el, tab, scratch):
     """Bring C (2, M), and in slip the row of the angle, from knot i over an edge that changes state."""
     C = scratch.C
     if end == SLIP:
-        _angle_row(C, i, (by[0], by[1], by[2], by[3], by[4], by[5]), el, tab, scratch.row)
+        _angle_row(i, (by[0], by[1], by[2], by[3], by[4], by[5]), el, scratch, scratch.row)
         return
     C[:] = 0.0
     if end == CLOSING:
@@ -146,37 +143,33 @@ def _after_mixed(i, end, by, path, el, tab, scratch):
         to_carry(C, i + 1 if i + 1 < tab.at.shape[0] else 0, el.kt, tab)
 
 
-@njit(_nrt=False, cache=True, error_model="numpy", forceinline=True, fastmath=FAST)
-def _leave_slip(fx, fy, i, N, el, tab, scratch):
-    """D from the row of the angle goes to C (2, M), at knot i under the force (fx, fy)."""
-    C, row = scratch.C, scratch.row
-    for l in range(row.size):
-        C[0, l] = -fy * row[l]
-        C[1, l] = fx * row[l]
-    for l in range(tab.at.shape[1]):
-        C[0, l] += el.kn * fx / N * tab.knots[i, l]
-        C[1, l] += el.kn * fy / N * tab.knots[i, l]
+@njit(_nrt=False, cache=True, error_model="numpy", forceinline=True)
+def _leave_slip(fx, fy, i, N, kt, kn, scratch):
+    """D - kt V goes to C (2, M), from the row of the angle, at knot i under the force (fx, fy)."""
+    C, row, knots = scratch.C, scratch.row, scratch.patterns.knots
+    for e, across, along in ((0, -fy, fx), (1, fx, fy)):
+        parts = kn * along / N, -kt * (1 - e), -kt * e, 0.0, 0.0, 0.0
+        combine(across, row, 0.0, row, parts, i, i, knots, knots.shape[1], C[e])
 
 
 @njit(_nrt=False, cache=True, error_model="numpy", forceinline=True)
-def _turns(path, pieces, el, trail, scratch, normal, trace):
+def _turns(path, pieces, el, trail, scratch, trace):
     """How the row of the angle turns along all edges that slide; their forces and factors."""
-    scratch.g[:], normal[:] = 0.0, 0.0
+    scratch.g[:], scratch.normal[:] = 0.0, 0.0
     for piece in range(pieces):
         if trail.kinds[piece] == SLIDING:
             find_turns(trail.begins[piece], trail.begins[piece + 1], path, trail.form, trail.knots, trail.slips,
-                       path.shape[1], el.kt, el.kn, el.mu, scratch.turns, scratch.g, normal, trace)
+                       path.shape[1], el.kt, el.kn, el.mu, scratch.turns, scratch.g, scratch.normal, trace)
 
 
 @njit(_nrt=False, cache=True, error_model="numpy")
-def add_period(path, fx, fy, pieces, el, tab, trail, scratch, normal, trace, summing):
+def add_period(path, fx, fy, pieces, el, tab, trail, scratch, trace, summing):
     """Carry the derivative C (2, M) through the period of the trail, which ends with the force (fx, fy).
 
-    If it is summing, it fills J and stick of the scratch, trace (2, width) where edges slide and normal (2, width),
-    which is n in rows n p_0 of the force (find_turns).
+    If it is summing, it fills J and stick of the scratch and the forces trace (2, width) at the samples, zero on entry.
     """
     C, forces, run, slipping = scratch.C, trail.forces, -1, False   # run: first sample of the present stretch of stick
-    _turns(path, pieces, el, trail, scratch, normal, trace)
+    _turns(path, pieces, el, trail, scratch, trace)
     if summing:
         scratch.J[:], scratch.stick[:] = 0.0, 0.0
     for piece in range(pieces):
@@ -185,11 +178,11 @@ def add_period(path, fx, fy, pieces, el, tab, trail, scratch, normal, trace, sum
             _slide(i, trail.begins[piece + 1], scratch)
             continue
         if slipping:
-            _leave_slip(ax, ay, i, path[2, i], el, tab, scratch)
-            to_carry(C, i, el.kt, tab)
+            _leave_slip(ax, ay, i, path[2, i], el.kt, el.kn, scratch)
             slipping = False
-        if kind == STICKING and run < 0:
-            run = i
+        if kind == STICKING and summing:
+            run = run if run >= 0 else i
+            stuck_forces(i, trail.begins[piece + 1], ax, ay, path, trace)
         if kind == CHANGING:
             change = trail.changes[piece]
             end, mid = int(change[0]), int(change[1])
@@ -198,14 +191,14 @@ def add_period(path, fx, fy, pieces, el, tab, trail, scratch, normal, trace, sum
             if summing:
                 if run >= 0:
                     _add_stick(run, i + (mid == STICK), tab, scratch)
-                _add_mixed(i, mid, ax, ay, path, el, tab, scratch, trail.slips, normal, trace)
+                _add_mixed(i, mid, ax, ay, path, el, tab, scratch, trail.slips, trace)
             run, slipping = -1, end == SLIP
             if end != STICK:
                 _after_mixed(i, end, change[2:], path, el, tab, scratch)
     if run >= 0 and summing:
         _add_stick(run, tab.at.shape[0], tab, scratch)
     if slipping:
-        _leave_slip(fx, fy, 0, path[2, 0], el, tab, scratch)
+        _leave_slip(fx, fy, 0, path[2, 0], 0.0, el.kn, scratch)
     elif path[2, 0] > 0.0:
         to_carry(C, 0, -el.kt, tab)
     else:
@@ -222,7 +215,8 @@ def _add_slip(slips, tab, scratch):
         if slips[fours[q, 0]] + slips[fours[q, 1]] + slips[fours[q, 2]] + slips[fours[q, 3]] > 0.0:
             scratch.chosen[count] = q
             count += 1
-    add_folded(scratch.rows, scratch.g, fours, scratch.chosen, count, scratch.patterns.weights, scratch.J)
+    add_folded(scratch.rows, scratch.g, scratch.normal, scratch.patterns.at, fours, scratch.chosen, count,
+               scratch.patterns.weights, scratch.J)
 
 
 @njit(_nrt=False, cache=True, error_model="numpy")
@@ -254,25 +248,25 @@ def start_rows(vx, vy, N, el, tab, C):
 
 
 @njit(_nrt=False, cache=True, error_model="numpy", fastmath=FAST, forceinline=True)
-def close(rx, ry, tab, scratch, F, J):
+def close(rx, ry, kt, tab, scratch, F, J):
     """J (2, K, 3K) and what F (3, K) lacks, from the sums, the rows C (2, M) at the end and its misfit (rx, ry).
 
     The start of the period is moved to the fixed point of the linearised map.
     """
     C, K, W = scratch.C, F.shape[1], tab.W
     a, b, c, d = 1.0 - C[0, K], -C[0, W + K], -C[1, K], 1.0 - C[1, W + K]
-    det = a * d - b * c
-    mx, my = (d * rx - b * ry) / det, (a * ry - c * rx) / det
+    inverse = 1.0 / (a * d - b * c)
+    a, b, c, d = a * inverse, b * inverse, c * inverse, d * inverse
+    mx, my = d * rx - b * ry, a * ry - c * rx
     for l in range(C.shape[1]):      # D at the start of the period takes the place of C
         x, y = C[0, l], C[1, l]
-        C[0, l], C[1, l] = (d * x - b * y) / det, (a * y - c * x) / det
+        C[0, l], C[1, l] = d * x - b * y, a * y - c * x
     for e in range(2):
         for k in range(K):
             px, py = scratch.J[e, k, K], scratch.J[e, k, W + K]
             F[1 + e, k] += px * mx + py * my
-    join_rows(scratch.J, scratch.J.shape[1], C.shape[1], C, K, W, J)
-    for l in range(K):      # the last row, which blocks of eight would leave
-        for part in range(3):
-            m = part * W + l
-            J[1, K - 1, part * K + l] = (scratch.J[1, K - 1, m] + scratch.J[1, K - 1, K] * C[0, m]
-                                         + scratch.J[1, K - 1, W + K] * C[1, m])
+    if scratch.stick[0] > 0.0:
+        gram(scratch.stick, scratch.around, scratch.gram)
+    else:
+        scratch.gram[:] = 0.0
+    join_rows(scratch.J, scratch.J.shape[1], W, C, kt, scratch.gram, K, J)

@@ -19,7 +19,7 @@ from bladefem.friction.aft import PERIODIC, Forces, checked, dissipated, finite_
 from bladefem.friction.harmonics import harmonics_of
 from bladefem.friction.jenkins import SEPARATED, SLIP_DOWN, SLIP_UP, STICK, assemble
 from bladefem.friction.roots import NEVER, rise, value
-from bladefem.friction.tables import Node, weighted
+from bladefem.friction.tables import Node, empty_gram, weighted
 
 __all__ = ["evaluate_exact", "transitions"]
 
@@ -219,6 +219,7 @@ def _batch(w, base, nodes, brackets, F, J, shares, counts):
     n, K = w.shape[0], w.shape[2]
     spans, means, mean = np.empty((MOST, 5)), np.empty((4, 2 * K - 1)), np.empty(2 * K - 1)
     rows, weight, basis, block = np.empty((2, K)), np.empty(K), np.empty(K), np.empty((K, K))
+    around = empty_gram(K // 2)
     for e in range(n):
         el = Node(nodes[e, 0], nodes[e, 1], nodes[e, 2], nodes[e, 3])
         q = _polynomials(w[e], base[e], el)
@@ -243,6 +244,6 @@ def _batch(w, base, nodes, brackets, F, J, shares, counts):
                 for d in range(2):
                     for l in range(K):
                         J[e, 1, k, d, l] -= weight[k] * rows[d, l]
-        assemble(w[e], base[e], el, means, F[e], J[e], block)
+        assemble(w[e], base[e], el, means, F[e], J[e], around, block)
         shares[e, 0], shares[e, 1] = means[0, 0], means[3, 0]
         shares[e, 2] = 1.0 - shares[e, 0] - shares[e, 1]

@@ -11,7 +11,7 @@ from __future__ import annotations
 import numpy as np
 from numba import njit
 
-from bladefem.friction.tables import Node, gram, values, weighted
+from bladefem.friction.tables import Node, empty_gram, gram, values, weighted
 
 __all__ = ["SEPARATED", "SLIP_DOWN", "SLIP_UP", "STICK", "assemble", "bounds", "jenkins_batch", "march_states"]
 
@@ -145,11 +145,14 @@ def _stretches(state, g, N, el, tab, means, F, J, rows, weight):
 
 
 @njit(_nrt=False, cache=True, error_model="numpy")
-def assemble(w, base, el, means, F, J, block):
-    """Add the parts linear in w (2, K): kt M_stick, mu M_slip and M_contact of base (K,) + kn w; block is scratch."""
+def assemble(w, base, el, means, F, J, around, block):
+    """Add the parts linear in w (2, K): kt M_stick, mu M_slip and M_contact of base (K,) + kn w.
+
+    around as empty_gram makes it and block (K, K) are scratch.
+    """
     K = w.shape[1]
     for row, factor, column, of in ((1, el.kt, 1, 0), (1, el.mu, 0, 1), (0, 1.0, 0, 2)):
-        gram(means[of], block)
+        gram(means[of], around, block)
         stiffness = factor if of == 0 else factor * el.kn
         for k in range(K):
             total, fixed = 0.0, 0.0
@@ -183,7 +186,7 @@ def jenkins_batch(w, load, nodes, tab, F, J, shares):
     n, S, K = w.shape[0], tab.at.shape[0], w.shape[2]
     g, N, low, high = np.empty(S), np.empty(S), np.empty(S), np.empty(S)
     state, means, block = np.empty(S, np.int8), np.empty((4, tab.sums.shape[1])), np.empty((K, K))
-    rows, weight, base = np.empty((2, K)), np.empty(K), np.zeros(K)
+    rows, weight, base, around = np.empty((2, K)), np.empty(K), np.zeros(K), empty_gram(K // 2)
     for e in range(n):
         el = Node(nodes[e, 0], nodes[e, 1], nodes[e, 2], nodes[e, 3])
         values(tab.transposed, w[e, 1], el.kt, 0.0, g)
@@ -198,7 +201,7 @@ def jenkins_batch(w, load, nodes, tab, F, J, shares):
             _stuck(last, sign, g, N, el, tab, means, F[e], J[e])
         else:
             _stretches(state, g, N, el, tab, means, F[e], J[e], rows, weight)
-        assemble(w[e], base, el, means, F[e], J[e], block)
+        assemble(w[e], base, el, means, F[e], J[e], around, block)
         if load.shape[1]:
             _add_series(load[e], state, el.mu, tab, F[e])
         shares[e, 0] = means[0, 0]

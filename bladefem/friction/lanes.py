@@ -66,8 +66,11 @@ class Lanes:
 
     def above(self, other: Lanes | float, yes: Lanes, no: Lanes) -> Lanes:
         """yes where this block is larger, no elsewhere."""
-        larger = self.builder.fcmp_ordered(">", self.value, self._value(other))
-        return Lanes(self.builder, self.builder.select(larger, yes.value, no.value))
+        return Lanes(self.builder, self.builder.select(self.over(other), yes.value, no.value))
+
+    def over(self, other: Lanes | float) -> ir.Value:
+        """Bits, set where this block is larger."""
+        return self.builder.fcmp_ordered(">", self.value, self._value(other))
 
 
 class Code:
@@ -80,12 +83,20 @@ class Code:
         """The same for blocks of half the size."""
         return Code(self.builder, self.size // 2)
 
+    def eight(self, array: ir.Value) -> Code:
+        """The same for blocks of eight of an array's numbers."""
+        return Code(self.builder, LANES * _bytes(array.type.pointee))
+
     def lanes(self, array: ir.Value) -> int:
         """How many of an array's numbers are a block."""
         return self._type(array.type.pointee).count
 
     def _type(self, number: ir.Type) -> ir.VectorType:
-        return ir.VectorType(number, self.size // (8 if isinstance(number, ir.DoubleType) else 4))
+        return ir.VectorType(number, self.size // _bytes(number))
+
+    def each(self, numbers: ir.Value) -> list[ir.Value]:
+        """The numbers of a tuple."""
+        return cgutils.unpack_tuple(self.builder, numbers)
 
     def whole(self, number: ir.Value | int) -> ir.Value:
         """A whole number."""
@@ -108,24 +119,48 @@ class Code:
         """The numbers from a place on."""
         return Lanes(self.builder, self.builder.load(self._block(array, self.lanes(array), terms), align=4))
 
+    def fit(self, block: Lanes, array: ir.Value) -> Lanes:
+        """A block in an array's precision."""
+        return Lanes(self.builder, self._fit(block.value, array.type.pointee))
+
     def store(self, block: Lanes, array: ir.Value, *terms: ir.Value | int | tuple) -> None:
         """Numbers to a place on."""
-        value, spot = block.value, self._block(array, block.value.type.count, terms)
-        if value.type.element != array.type.pointee:
-            shorter = isinstance(value.type.element, ir.DoubleType)
-            value = (self.builder.fptrunc if shorter else self.builder.fpext)(value, spot.type.pointee)
-        self.builder.store(value, spot, align=4)
+        value = self._fit(block.value, array.type.pointee)
+        self.builder.store(value, self._block(array, value.type.count, terms), align=4)
+
+    def store_first(self, count: ir.Value, block: Lanes, array: ir.Value, *terms: ir.Value | int | tuple) -> None:
+        """Of a block the numbers before the place count, to a place on."""
+        value = self._fit(block.value, array.type.pointee)
+        spot, lanes = self._block(array, value.type.count, terms), value.type.count
+        steps = ir.Constant(ir.VectorType(WHOLE, lanes), list(range(lanes)))
+        inside = self.builder.icmp_signed("<", steps, self._spread(count, lanes))
+        kind = f"v{lanes}{value.type.element.intrinsic_name}"
+        name = f"llvm.masked.store.{kind}.p0{kind}"
+        function = ir.FunctionType(ir.VoidType(), [value.type, spot.type, HALF, inside.type])
+        self.builder.call(cgutils.get_or_insert_function(self.builder.module, function, name),
+                          [value, spot, HALF(4), inside])
+
+    def _fit(self, value: ir.Value, number: ir.Type) -> ir.Value:
+        """A block or number in another precision."""
+        block = isinstance(value.type, ir.VectorType)
+        fit = ir.VectorType(number, value.type.count) if block else number
+        if value.type == fit:
+            return value
+        return (self.builder.fpext if isinstance(number, ir.DoubleType) else self.builder.fptrunc)(value, fit)
 
     def one(self, array: ir.Value, *terms: ir.Value | int | tuple) -> ir.Value:
         """The number at a place."""
         return self.builder.load(self.builder.gep(array, [self.place(*terms)]))
 
-    def spread(self, number: ir.Value) -> Lanes:
-        """A number in all lanes."""
-        undefined = ir.Constant(self._type(number.type), ir.Undefined)
+    def spread(self, number: ir.Value, array: ir.Value | None = None) -> Lanes:
+        """A number in all lanes, in the precision of an array if one is given."""
+        number = number if array is None else self._fit(number, array.type.pointee)
+        return Lanes(self.builder, self._spread(number, self._type(number.type).count))
+
+    def _spread(self, number: ir.Value, count: int) -> ir.Value:
+        undefined = ir.Constant(ir.VectorType(number.type, count), ir.Undefined)
         first = self.builder.insert_element(undefined, number, HALF(0))
-        zeros = ir.Constant(ir.VectorType(HALF, undefined.type.count), None)
-        return Lanes(self.builder, self.builder.shuffle_vector(first, undefined, zeros))
+        return self.builder.shuffle_vector(first, undefined, ir.Constant(ir.VectorType(HALF, count), None))
 
     def zeros(self, array: ir.Value) -> Lanes:
         """Zeros in an array's precision."""
@@ -145,9 +180,33 @@ class Code:
         """Change a variable."""
         self.builder.store(block.value, variable)
 
+    def search(self, begin: ir.Value, end: ir.Value, over: Callable[[ir.Value], ir.Value]) -> ir.Value:
+        """First place from begin on where a bit of over(place) is set, the bits of a block from there on; or end."""
+        builder, spot = self.builder, cgutils.alloca_once_value(self.builder, begin)
+        head, body, found, done = (builder.append_basic_block(name) for name in ("head", "body", "found", "done"))
+        builder.branch(head)
+        builder.position_at_end(head)
+        i = builder.load(spot)
+        builder.cbranch(builder.icmp_signed("<", i, end), body, done)
+        builder.position_at_end(body)
+        bits = over(i)
+        bits = builder.bitcast(bits, ir.IntType(bits.type.count))
+        builder.store(builder.add(i, self.whole(LANES)), spot)
+        builder.cbranch(builder.icmp_unsigned("!=", bits, bits.type(0)), found, head)
+        builder.position_at_end(found)
+        builder.store(builder.add(i, builder.cttz(builder.zext(bits, WHOLE), ir.IntType(1)(1))), spot)
+        builder.branch(done)
+        builder.position_at_end(done)
+        last = builder.load(spot)
+        return builder.select(builder.icmp_signed("<", last, end), last, end)
+
     def loop(self, begin: ir.Value | int, end: ir.Value, step: int = 1):
         """``with code.loop(begin, end, step) as i``."""
         return _Loop(self.builder, self.whole(begin), end, WHOLE(step))
+
+
+def _bytes(number: ir.Type) -> int:
+    return 8 if isinstance(number, ir.DoubleType) else 4
 
 
 class _Loop:
@@ -162,14 +221,19 @@ class _Loop:
 
 
 def kernel(write: Callable) -> Callable:
-    """What compiled code may call as the function that write(code, *arguments) writes: contiguous arrays, numbers."""
+    """What compiled code may call as the function that write(code, *arguments) writes: contiguous arrays, numbers.
+
+    If write is said to return something, it is a whole number.
+    """
+    result = types.int64 if signature(write).return_annotation == "int" else types.void
+
     def typed(context, *given):
         def generate(target, builder, call, values):
             flat = [target.make_array(t)(target, builder, v).data if isinstance(t, types.Array) else v
                     for t, v in zip(call.args, values, strict=True)]
-            write(Code(builder), *flat)
-            return target.get_dummy_value()
-        return types.void(*[t if isinstance(t, types.Array | types.Float) else types.int64 for t in given]), generate
+            return write(Code(builder), *flat) or target.get_dummy_value()
+        kept = types.Array | types.Float | types.BaseTuple
+        return result(*[t if isinstance(t, kept) else types.int64 for t in given]), generate
 
     typed.__signature__ = signature(write)      # the names of the arguments, which Numba counts
     return intrinsic(typed)

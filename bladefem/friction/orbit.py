@@ -17,10 +17,22 @@ from typing import NamedTuple
 import numpy as np
 from numba import njit
 
-from bladefem.friction.disc import SLIP, STICK, edge, sensitivity
-from bladefem.friction.lane_kernels import ACROSS, AHEAD, AWAY, EDGE_ROWS, FALL, LIMIT_AHEAD, LIMIT_AWAY, TWICE_Y
+from bladefem.friction.disc import SLIP, STICK, edge, middle
+from bladefem.friction.lane_kernels import (
+    ACROSS,
+    AHEAD,
+    AWAY,
+    EDGE_ROWS,
+    FALL,
+    LIMIT_AHEAD,
+    LIMIT_AWAY,
+    TWICE_Y,
+    find_forces,
+    stuck_until,
+)
 
-__all__ = ["CHANGING", "SLIDING", "STICKING", "TOLERANCE", "Trail", "empty_trail", "follow", "periodic", "start"]
+__all__ = ["CHANGING", "SLIDING", "STICKING", "TOLERANCE", "Trail", "empty_trail", "follow", "forces_along",
+           "middle_force", "periodic", "start", "stuck_forces"]
 
 TOLERANCE = 1e-12       # of the largest friction limit: how well the force must repeat itself in marching
 MARCHED = 2             # periods before Newton: load that varies allows several states, and marching chooses
@@ -76,16 +88,16 @@ def _begin(trail, pieces, kind, i, fx, fy):
 
 
 @njit(_nrt=False, cache=True, error_model="numpy", forceinline=True)
-def _change(path, i, mu, fx, fy, phi, trace, change):
+def _change(path, i, mu, fx, fy, phi, change):
     """One edge on which the state may change: (state at its end, force there, sample slips, it is more than a touch).
 
     Fills change (8,) and carries on phi (2, 2), of which in slip the first row is that of the angle.
     """
     dx, dy, N0, N1 = path[0, i + 1] - path[0, i], path[1, i + 1] - path[1, i], path[2, i], path[2, i + 1]
-    end, ex, ey, mid, trace[0, i], trace[1, i] = edge(fx, fy, dx, dy, N0, N1, mu)
+    end, ex, ey, mid, by = edge(fx, fy, dx, dy, N0, N1, mu)
     change[0], change[1] = end, mid
     if end == SLIP:
-        p0, p1, change[4], change[5], change[6], change[7] = sensitivity(fx, fy, dx, dy, N0, N1, mu, 1.0)
+        p0, p1, change[4], change[5], change[6], change[7] = by
         change[2], change[3] = p0, p1
         phi[0, 0], phi[0, 1] = p0 * phi[0, 0] + p1 * phi[1, 0], p0 * phi[0, 1] + p1 * phi[1, 1]
     elif end != STICK:
@@ -117,48 +129,36 @@ def _slide(first, S, P, Q, fade, form, knots, slips):
     return S, P, Q, fade
 
 
-@njit(_nrt=False, cache=True, error_model="numpy", forceinline=True, fastmath={"contract", "nsz"})
-def _stick(first, S, fx, fy, path, mu, trace):
-    """Follow stick from a knot under load to where it ends: (knot, fx, fy) there."""
-    path, x, y = path[:, first:], trace[0, first:], trace[1, first:]
-    for i in range(S - first):
-        ex, ey, R = fx + (path[0, i + 1] - path[0, i]), fy + (path[1, i + 1] - path[1, i]), mu * path[2, i + 1]
-        if ex * ex + ey * ey > R * R or path[2, i + 1] <= 0.0:
-            return first + i, fx, fy
-        x[i], y[i] = 0.5 * (fx + ex), 0.5 * (fy + ey)
-        fx, fy = ex, ey
-    return S, fx, fy
-
-
 @njit(_nrt=False, cache=True, error_model="numpy")
-def follow(path, mu, fx, fy, trail, trace, phi):
+def follow(path, mu, fx, fy, trail, phi):
     """One period from (fx, fy) at the first knot: (fx, fy, edges that slip or open, that surely slip, samples, pieces).
 
-    The samples are those that slip. path (3, width) is (kt w_1, kt w_2, N) at the knots [N]. Fills the trail,
-    phi (2, 2) = df_end/df_start and trace (2, width), the forces at the samples [N] that do not slide all along.
+    The samples are those that slip. path (3, width) is (kt w_1, kt w_2, N) at the knots [N]. Fills the trail and
+    phi (2, 2) = df_end/df_start.
     """
     S, events, sure, slips, pieces, i = trail.kinds.size - 1, 0, 0, 0, 0, 0
     phi[0, 0] = phi[1, 1] = 1.0
     phi[0, 1] = phi[1, 0] = 0.0
     trail.slips[:] = 0.0
     while i < S:
-        begin, ax, ay, N0, N1 = i, fx, fy, path[2, i], path[2, i + 1]
-        if N0 <= 0.0 and N1 <= 0.0:
-            pieces = _begin(trail, pieces, OPEN, i, 0.0, 0.0)
-            trace[0, i] = trace[1, i] = fx = fy = 0.0
+        if path[2, i] > 0.0:
+            cx, cy = fx - path[0, i], fy - path[1, i]
+            stop = stuck_until(path, path.shape[1], i, S, cx, cy, mu)
+            if stop > i:
+                pieces = _begin(trail, pieces, STICKING, i, fx, fy)
+                i, fx, fy = stop, cx + path[0, stop], cy + path[1, stop]
+                if i == S:
+                    break
+        elif path[2, i + 1] <= 0.0:
+            pieces, fx, fy = _begin(trail, pieces, OPEN, i, 0.0, 0.0), 0.0, 0.0
             phi[:, :] = 0.0
             events, i = events + 1, i + 1
             continue
-        if N0 > 0.0:
-            i, fx, fy = _stick(i, S, fx, fy, path, mu, trace)
-            if i > begin:
-                pieces = _begin(trail, pieces, STICKING, begin, ax, ay)
-                continue
-        pieces = _begin(trail, pieces, CHANGING, i, fx, fy)
-        end, fx, fy, slipped, slipping = _change(path, i, mu, fx, fy, phi, trace, trail.changes[pieces - 1])
+        pieces, R = _begin(trail, pieces, CHANGING, i, fx, fy), mu * path[2, i + 1]
+        end, fx, fy, slipped, slipping = _change(path, i, mu, fx, fy, phi, trail.changes[pieces - 1])
         events, sure, slips, i = events + (end != STICK), sure + slipping, slips + slipped, i + 1
-        if end == SLIP and mu * N1 > 0.0:
-            begin, (P, Q) = i, half_angle(fx / (mu * N1), fy / (mu * N1))
+        if end == SLIP and R > 0.0:
+            begin, (P, Q) = i, half_angle(fx / R, fy / R)
             i, P, Q, fade = _slide(i, S, P, Q, P * P + Q * Q, trail.form, trail.knots, trail.slips)
             if i > begin:
                 pieces = _begin(trail, pieces, SLIDING, begin, fx, fy)
@@ -168,6 +168,35 @@ def follow(path, mu, fx, fy, trail, trace, phi):
             phi[:, :] = 0.0
     trail.begins[pieces] = S
     return fx, fy, events, sure, slips, pieces
+
+
+@njit(_nrt=False, cache=True, error_model="numpy", forceinline=True, fastmath={"contract", "nsz"})
+def stuck_forces(a, b, fx, fy, path, trace):
+    """Forces trace (2, width) at the samples a <= i < b, which stick from the force (fx, fy) at knot a on."""
+    for c, f in ((0, fx), (1, fy)):
+        v, out, first = path[c, a:b + 1], trace[c, a:b], f - path[c, a]
+        for i in range(out.size):
+            out[i] = first + 0.5 * (v[i] + v[i + 1])
+
+
+@njit(_nrt=False, cache=True, error_model="numpy", forceinline=True)
+def middle_force(i, mid, fx, fy, path, mu, trace):
+    """Force trace (2, width) at sample i of an edge from (fx, fy) on that changes state; by as middle has it."""
+    dx, dy, N0, N1 = path[0, i + 1] - path[0, i], path[1, i + 1] - path[1, i], path[2, i], path[2, i + 1]
+    trace[0, i], trace[1, i], by = middle(fx, fy, dx, dy, N0, N1, mu, mid)
+    return by
+
+
+@njit(_nrt=False, cache=True, error_model="numpy")
+def forces_along(path, mu, pieces, trail, trace):
+    """Forces trace (2, width) at all samples of a period [N], zero on entry."""
+    for piece in range(pieces):
+        i, kind, fx, fy = trail.begins[piece], trail.kinds[piece], trail.forces[0, piece], trail.forces[1, piece]
+        if kind == STICKING:
+            stuck_forces(i, trail.begins[piece + 1], fx, fy, path, trace)
+        elif kind == CHANGING:
+            middle_force(i, int(trail.changes[piece, 1]), fx, fy, path, mu, trace)
+    find_forces(path, trail.form, trail.knots, trail.slips, path.shape[1], mu, trace)
 
 
 @njit(_nrt=False, cache=True, error_model="numpy")
@@ -192,7 +221,7 @@ def _remembers(phi):
 
 
 @njit(_nrt=False, cache=True, error_model="numpy")
-def _iterated(path, mu, largest, near, limit, trail, trace, phi):
+def _iterated(path, mu, largest, near, limit, trail, phi):
     """Periodic force by Newton from kt w, returned as by periodic.
 
     Not unique is also where it ended on the rim of stick, at forces that touch the limit and no more.
@@ -201,7 +230,7 @@ def _iterated(path, mu, largest, near, limit, trail, trace, phi):
     fx, fy = start(path[0, 0], path[1, 0], path[2, 0], mu)
     guess, before, sx, sy = False, np.inf, 0.0, 0.0
     for cycle in range(1, limit + 1):
-        gx, gy, events, sure, slips, pieces = follow(path, mu, fx, fy, trail, trace, phi)
+        gx, gy, events, sure, slips, pieces = follow(path, mu, fx, fy, trail, phi)
         residual = sqrt((gx - fx) ** 2 + (gy - fy) ** 2)
         det, x, y = newton(fx, fy, gx, gy, R, phi)
         if events == 0 or (residual <= TOLERANCE * scale and abs(det) < SINGULAR):
@@ -229,7 +258,7 @@ def _order(trail, pieces):
 
 
 @njit(_nrt=False, cache=True, error_model="numpy")
-def _marched(path, mu, largest, leap, limit, trail, trace, phi):
+def _marched(path, mu, largest, leap, limit, trail, phi):
     """Periodic force by marching from kt w, with leaps (their share of the way left) where it is slow.
 
     Returned as by periodic.
@@ -242,7 +271,7 @@ def _marched(path, mu, largest, leap, limit, trail, trace, phi):
     fx, fy = start(path[0, 0], path[1, 0], path[2, 0], mu)
     bx, by, share, leapt, last, before = fx, fy, leap, False, 0, 0.0
     for cycle in range(1, limit + 1):
-        gx, gy, events, _, slips, pieces = follow(path, mu, fx, fy, trail, trace, phi)
+        gx, gy, events, _, slips, pieces = follow(path, mu, fx, fy, trail, phi)
         residual, order = sqrt((gx - fx) ** 2 + (gy - fy) ** 2), _order(trail, pieces)
         det, x, y = newton(fx, fy, gx, gy, R, phi)
         if leapt and order != last:
@@ -258,16 +287,16 @@ def _marched(path, mu, largest, leap, limit, trail, trace, phi):
 
 
 @njit(_nrt=False, cache=True, error_model="numpy")
-def periodic(path, mu, largest, near, limit, trail, trace, phi):
+def periodic(path, mu, largest, near, limit, trail, phi):
     """Periodic force: (unique, fx, fy, gx, gy, slips, pieces, cycles), cycles negative if none was found in ``limit``.
 
     The last period went from f to g, and Newton's step from f is at most ``near`` times the limit under the largest
     load: the trail is that of the periodic state but for what is linear in the step. Not unique: the state keeps a
     memory of its start, and so many periods of marching from kt w lead there.
     """
-    found = _iterated(path, mu, largest, near, limit, trail, trace, phi)
+    found = _iterated(path, mu, largest, near, limit, trail, phi)
     if not found[0] and found[7] > MARCHED:
-        found = _marched(path, mu, largest, LEAP, limit, trail, trace, phi)
+        found = _marched(path, mu, largest, LEAP, limit, trail, phi)
         if not found[0]:
-            found = _marched(path, mu, largest, 0.0, limit, trail, trace, phi)
+            found = _marched(path, mu, largest, 0.0, limit, trail, phi)
     return found

@@ -14,10 +14,10 @@ from numba import njit
 
 from bladefem.errors import InputError
 from bladefem.friction.harmonics import analysis, synthesis
-from bladefem.friction.lane_kernels import TILE
 from bladefem.friction.lanes import LANES
+from bladefem.friction.row_kernels import TILE, fill_gram
 
-__all__ = ["Node", "Patterns", "Tables", "add_gram", "gram", "patterns", "tables", "values", "weighted"]
+__all__ = ["Node", "Patterns", "Tables", "empty_gram", "gram", "patterns", "tables", "values", "weighted"]
 
 
 class Node(NamedTuple):
@@ -30,7 +30,7 @@ class Node(NamedTuple):
 
 
 class Tables(NamedTuple):
-    """Read-only arrays for H harmonics and S samples; K = 2H+1, width and W as in lane_kernels.py."""
+    """Read-only arrays for H harmonics and S samples; K = 2H+1, width as in lane_kernels.py, W as in row_kernels.py."""
 
     at: np.ndarray          # (S, K) synthesis at the samples
     transposed: np.ndarray  # (K, S) the same, for synthesis that runs along time
@@ -38,7 +38,6 @@ class Tables(NamedTuple):
     knots: np.ndarray       # (S, K) synthesis at tau = 2 pi (i - 1/2) / S, harmonic h divided by cos(h pi / S)
     along: np.ndarray       # (K, width) the same, which runs along time and begins again after S
     analysis: np.ndarray    # (width, K) weights of a sample in the coefficients
-    means: np.ndarray       # (width, 4H+1) weights of a sample in the basis means up to 2H
     fours: np.ndarray       # (., 4) samples i, S/2 - i, S/2 + i, S - i; S stands for none
     W: int                  # K filled up to a multiple of 8
 
@@ -46,7 +45,8 @@ class Tables(NamedTuple):
 class Patterns(NamedTuple):
     """Read-only arrays for the derivative of 2-D elements, in its precision."""
 
-    at: np.ndarray          # (S, W) synthesis at the samples, zeros beyond K
+    at: np.ndarray          # (S + 1, W) synthesis at the samples, zeros beyond K and at last
+    knots: np.ndarray       # (S, W) synthesis at the knots as in Tables, always in double precision
     change: np.ndarray      # (S, W) its change from knot to knot
     weights: np.ndarray     # (., tile) of the samples i of the fours in the coefficients, zeros beyond K
 
@@ -63,8 +63,8 @@ def tables(H: int, samples: int) -> Tables:
     knots[:, 1:] /= np.repeat(np.cos(np.pi / samples * np.arange(1, H + 1)), 2)
     more, weights = _filled(samples) + LANES - samples, analysis(H, samples).T
     along, blank = knots[np.arange(samples + more) % samples].T, ((0, more), (0, 0))
-    made = Tables(at, at.T.copy(), sums, knots, along.copy(), np.pad(weights, blank), np.pad(wide[:samples], blank),
-                  _fours(samples), _filled(2 * H + 1))
+    made = Tables(at, at.T.copy(), sums, knots, along.copy(), np.pad(weights, blank), _fours(samples),
+                  _filled(2 * H + 1))
     for array in made[:-1]:
         array.setflags(write=False)
     return made
@@ -74,10 +74,10 @@ def tables(H: int, samples: int) -> Tables:
 def patterns(H: int, samples: int, dtype: type) -> Patterns:
     """Patterns for H harmonics and S samples."""
     tab = tables(H, samples)
-    columns = ((0, 0), (0, tab.W - 2 * H - 1))
+    pad = lambda x, rows=0: np.pad(x, ((0, rows), (0, tab.W - 2 * H - 1)))     # noqa: E731
     change = np.roll(tab.knots, -1, axis=0) - tab.knots
     weights = np.pad(tab.analysis[:samples // 2 + 1], ((0, 0), (0, _tiled(H) - 2 * H - 1)))
-    made = Patterns(*(x.astype(dtype) for x in (np.pad(tab.at, columns), np.pad(change, columns), weights)))
+    made = Patterns(pad(tab.at, 1).astype(dtype), pad(tab.knots), pad(change).astype(dtype), weights.astype(dtype))
     for array in made:
         array.setflags(write=False)
     return made
@@ -105,38 +105,27 @@ def _fours(S: int) -> np.ndarray:
     return four
 
 
-@njit(_nrt=False, cache=True, error_model="numpy")
-def gram(m, out):
-    """out (K, K) = analysis of synthesis restricted to a set whose basis means up to 2H are m (4H+1); I on a circle."""
-    out[:, :] = 0.0
-    add_gram(1.0, m, out)
+@njit(cache=True, error_model="numpy")
+def empty_gram(H):
+    """Scratch for gram."""
+    return np.zeros((2, 6 * H + 2 + 2 * LANES))
 
 
 @njit(_nrt=False, cache=True, error_model="numpy")
-def add_gram(factor, m, out):
-    """out (K, K) += factor times the Gram matrix of means m (4H+1,)."""
-    H = out.shape[0] // 2
-    out[0, 0] += factor * m[0]
-    for k in range(1, 2 * H + 1):
-        out[0, k] += factor * m[k]
-        out[k, 0] += 2.0 * factor * m[k]
-    for a in range(1, H + 1):
-        cos, sin, one = factor * m[4 * a - 1], factor * m[4 * a], factor * m[0]
-        out[2 * a - 1, 2 * a - 1] += one + cos
-        out[2 * a, 2 * a] += one - cos
-        out[2 * a, 2 * a - 1] += sin
-        out[2 * a - 1, 2 * a] += sin
-        for b in range(1, a):
-            cos, sin = factor * m[2 * (a + b) - 1], factor * m[2 * (a + b)]
-            cos_apart, sin_apart = factor * m[2 * (a - b) - 1], factor * m[2 * (a - b)]
-            out[2 * a - 1, 2 * b - 1] += cos_apart + cos
-            out[2 * b - 1, 2 * a - 1] += cos_apart + cos
-            out[2 * a, 2 * b] += cos_apart - cos
-            out[2 * b, 2 * a] += cos_apart - cos
-            out[2 * a, 2 * b - 1] += sin + sin_apart
-            out[2 * b - 1, 2 * a] += sin + sin_apart
-            out[2 * a - 1, 2 * b] += sin - sin_apart
-            out[2 * b, 2 * a - 1] += sin - sin_apart
+def gram(m, around, out):
+    """Analysis of synthesis restricted to a set whose basis means up to 2H are m (4H+1); I on a circle.
+
+    It goes to the first K columns of out (K, ..); around as empty_gram makes it.
+    """
+    K, H = out.shape[0], out.shape[0] // 2
+    for q in range(-H, 2 * H + 1):
+        cos, sin = (m[2 * abs(q) - 1], m[2 * q] if q > 0 else -m[-2 * q]) if q else (m[0], 0.0)
+        around[0, 2 * (q + H)], around[0, 2 * (q + H) + 1] = cos, sin
+        around[1, 2 * (q + H)], around[1, 2 * (q + H) + 1] = sin, -cos
+    fill_gram(around, around.shape[1], H, K, out.shape[1], out)
+    out[0, 0] = m[0]
+    for k in range(1, K):
+        out[0, k], out[k, 0] = m[k], 2.0 * m[k]
 
 
 @njit(_nrt=False, cache=True, error_model="numpy")

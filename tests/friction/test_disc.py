@@ -10,7 +10,7 @@ from bladefem.data import Elements
 from bladefem.errors import InputError
 from bladefem.friction.aft import SEPARATED, STICK, evaluate
 from bladefem.friction.closed_form import circular_orbit_work
-from bladefem.friction.disc import edge
+from bladefem.friction.disc import edge, middle
 from bladefem.friction.events import evaluate_exact
 from bladefem.friction.harmonics import to_complex
 from bladefem.friction.tables import tables
@@ -176,7 +176,10 @@ def plainly_marched(element: Elements, w: np.ndarray, samples: int) -> tuple[np.
     for period in range(1, 4000):       # noqa: B007
         before = x, y
         for i in range(samples):
-            _, x, y, _, out[0, i], out[1, i] = edge(x, y, d[i, 0], d[i, 1], N[i], N[i + 1], mu)
+            here = d[i, 0], d[i, 1], N[i], N[i + 1], mu
+            _, ex, ey, mid, _ = edge(x, y, *here)
+            out[0, i], out[1, i], _ = middle(x, y, *here, mid)
+            x, y = ex, ey
         if np.hypot(x - before[0], y - before[1]) < 1e-13:
             break
     return coefficients(out, H), period
