@@ -13,7 +13,7 @@ from numba import njit
 
 from bladefem.errors import InputError
 
-__all__ = ["stable_step", "step_1d", "step_2d"]
+__all__ = ["second_period", "stable_step", "step_1d", "step_2d"]
 
 
 @njit(cache=True)
@@ -71,6 +71,26 @@ def _stick(a, b, c):
     if a < 0.0 and inside > 0.0 and c < 0.0:
         return min(max((-np.sqrt(inside) - b) / a, 0.0), 1.0)
     return 0.0
+
+
+@njit(cache=True)
+def second_period(g, N, mu, f):
+    """Fill f (n, tangents, S), friction forces at S instants of the second period from rest, which is nearly periodic.
+
+    g (n, tangents, S) is kt w, N (n, S) the normal load, negative where open, all [N]; mu (n,).
+    """
+    n, tangents, S = g.shape
+    for e in range(n):
+        x = y = 0.0
+        for i in range(2 * S):
+            j = i % S
+            dx, before, now = g[e, 0, j] - g[e, 0, j - 1], N[e, j - 1], N[e, j]
+            if tangents == 1:
+                x = step_1d(x + dx, before, now, mu[e])
+            else:
+                x, y, _ = step_2d(x, y, dx, g[e, 1, j] - g[e, 1, j - 1], before, now, mu[e])
+                f[e, 1, j] = y
+            f[e, 0, j] = x
 
 
 def stable_step(fastest: float) -> float:

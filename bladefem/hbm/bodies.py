@@ -6,7 +6,7 @@ of length 1 where one body serves all harmonics.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -56,6 +56,11 @@ class Stack:
     contact: slice
     load: slice
     probe: slice
+
+    def first(self, count: int) -> Stack:
+        """The body in the first nodal diameters."""
+        names = ("omega", "viscous", "hysteretic", "coupled", "shapes", "residual")
+        return replace(self, **{name: part[:count] for name in names if (part := getattr(self, name)) is not None})
 
 
 def stacked(bodies: tuple[PortModel, ...], damping: Damping, rows: np.ndarray) -> Stack:

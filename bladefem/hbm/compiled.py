@@ -10,7 +10,7 @@ from numba import njit
 
 from ..friction.events import _batch as exact_batch
 from ..friction.jenkins import jenkins_batch
-from .krylov import apply, conjugate_residuals
+from .krylov import apply, apply_modes, conjugate_residuals
 
 __all__ = ["CONVERGED", "EXHAUSTED", "INFINITE", "SINGULAR", "STALLED", "back_substitute", "compiled_newton",
            "factorise", "factorise_large", "norm"]
@@ -44,7 +44,7 @@ def _move(w, share, step, out):
 @njit(cache=True, error_model="numpy")
 def _evaluate(w, d, linear, contact, work):
     """Forces and residual at w (m, K); fills work and returns the error of `bladefem.hbm.residual`."""
-    A, G, stuck, springs, scale = linear
+    A, G, stuck, springs, scale, shapes, residual, modal = linear
     load, base, nodes, tab, brackets, preload = contact
     full, F, J, shares, p, r = work
     n, K = nodes.shape[0], w.shape[1]
@@ -67,7 +67,10 @@ def _evaluate(w, d, linear, contact, work):
         for k in range(K):
             sprung[i, k] = springs[i] * r[i, k] if k else 0.0
             bare[i, k] = r[i, k]
-    apply(G, sprung, bare)
+    if G.shape[0] == A.shape[0]:
+        apply(G, sprung, bare)
+    else:
+        apply_modes(shapes, residual, modal, sprung, bare)
     return max(norm(r) / max(norm(w), 1e-300), norm(bare) / scale)
 
 
@@ -239,7 +242,8 @@ def compiled_newton(w, d, linear, contact, sticks, tolerance, iterations, shorte
 
     Args:
         d: directions a node, 1 (tangent) or 2 (normal, tangent).
-        linear: A, G with its harmonic 0 left out (H+1, m, m), stuck (m, K), springs (m,), size of the linear motion.
+        linear: A, G with its harmonic 0 left out (H+1, m, m), stuck (m, K), springs (m,), size of the linear motion,
+            and where G is not there C, R, D of `apply_modes`, which stand for it.
         contact: prescribed loads (n, S) or (n, 0), their coefficients (n, K), nodes (n, 4), tables, brackets
             (0: sampled), preload (m,).
 

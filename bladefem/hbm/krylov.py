@@ -9,7 +9,7 @@ from __future__ import annotations
 import numpy as np
 from numba import njit
 
-__all__ = ["apply", "conjugate_residuals"]
+__all__ = ["apply", "apply_modes", "conjugate_residuals"]
 
 DIRECTIONS = 60     # after which it is given up
 
@@ -17,18 +17,42 @@ DIRECTIONS = 60     # after which it is given up
 @njit(cache=True, error_model="numpy", fastmath={"contract", "reassoc"})
 def apply(A, x, out):
     """out (m, K) += A (H+1, m, m) times x (m, K), both as real coefficients."""
-    m = x.shape[0]
+    m, along = x.shape[0], np.ascontiguousarray(x.T)
     for h in range(A.shape[0]):
         c, s, turn = max(2 * h - 1, 0), 2 * h, 1.0 if h else 0.0
+        by_cos, by_sin = along[c], along[s]
         for i in range(m):
-            cos, sin = 0.0, 0.0
+            row, cos, sin = A[h, i], 0.0, 0.0
             for j in range(m):
-                re, im = A[h, i, j].real, turn * A[h, i, j].imag
-                cos += re * x[j, c] + im * x[j, s]
-                sin += re * x[j, s] - im * x[j, c]
+                re, im = row[j].real, turn * row[j].imag
+                cos += re * by_cos[j] + im * by_sin[j]
+                sin += re * by_sin[j] - im * by_cos[j]
             out[i, c] += cos
             if h:
                 out[i, s] += sin
+
+
+@njit(cache=True, error_model="numpy", fastmath={"contract", "reassoc"})
+def apply_modes(C, R, D, x, out):
+    """out (m, K) += (R + C D C^H) x for x (m, K) but for the mean, from C (S, m, M), R (S', m, m) and D (H+1, M)."""
+    m, M, along = x.shape[0], C.shape[2], np.ascontiguousarray(x.T)
+    q = np.empty(M, np.complex128)
+    for h in range(1, D.shape[0]):
+        shapes, rest, c, s = C[min(h, C.shape[0] - 1)], R[min(h, R.shape[0] - 1)], 2 * h - 1, 2 * h
+        q[:] = 0.0
+        for i in range(m):
+            force = complex(along[c, i], -along[s, i])
+            for k in range(M):
+                q[k] += shapes[i, k].conjugate() * force
+        q *= D[h]
+        for i in range(m):
+            moved = 0.0j
+            for k in range(M):
+                moved += shapes[i, k] * q[k]
+            for j in range(m):
+                moved += rest[i, j] * complex(along[c, j], -along[s, j])
+            out[i, c] += moved.real
+            out[i, s] -= moved.imag
 
 
 @njit(cache=True, error_model="numpy")

@@ -153,7 +153,13 @@ class ReducedModel:
 
     def _stack(self, name: str, H: int, damping: Damping) -> Stack:
         bodies = _first(getattr(self, name), H, name)
-        return self.once((name, len(bodies)), lambda: stacked(bodies, damping, self.rows))
+        return self.once(("stack", name, len(bodies)), lambda: self._made(name, bodies, damping))
+
+    def _made(self, name: str, bodies: tuple[PortModel, ...], damping: Damping) -> Stack:
+        """The stack, which is the beginning of a larger one where that is there already."""
+        larger = (stack for key, stack in self._kept.items() if key[:2] == ("stack", name) and key[2] > len(bodies))
+        found = next(larger, None)
+        return stacked(bodies, damping, self.rows) if found is None else found.first(len(bodies))
 
     def once(self, key: Hashable, make: Callable[[], Any]) -> Any:
         """What `make` returns, kept with this model: what does not depend on the frequency is made once."""

@@ -199,7 +199,8 @@ def linear_arguments(balance: Balance) -> tuple[np.ndarray, ...]:
     linear = balance.linear
     G = linear.G.copy()
     G[0] = 0.0
-    return linear.A, G, to_real(linear.stuck.T), linear.springs, _scale(linear)
+    none = np.zeros((0, 0, 0), dtype=complex)
+    return linear.A, G, to_real(linear.stuck.T), linear.springs, _scale(linear), none, none, none.reshape(0, 0)
 
 
 def contact_table(model: ReducedModel, H: int, samples: int) -> tuple:

@@ -21,10 +21,13 @@ from .linear import SMALL, rigid_motions
 from .model import ReducedModel
 from .newton import COMPILED, SHORTEST, Options
 from .residual import STICKS, contact_table
+from .small_linear import linear_part
 from .solution import Solution, Work
+from .woodbury import staying
 
 __all__ = ["small", "solve_along", "solve_each", "solve_small"]
 
+FEW = 2             # contact freedoms for each mode from which the springs are added by the modes
 STATES = ("stick", "slip", "lift", "open")
 
 
@@ -95,7 +98,7 @@ def _points(omegas, body, held, springs, contact, d, H, known, at, count, chaine
     ends, counts, measures = np.empty((p, 2)), np.empty((p, 4), np.int64), np.empty((p, 7))
     probe, done = np.empty((p, *body[9].shape), np.complex128), 0
     for i in range(p):
-        flexible, linear, mean, free = _linear(omegas[i], body, held, springs, H)
+        flexible, linear, mean, free = linear_part(omegas[i], body, held, springs, H)
         if count:
             ahead(omegas[i], known, at, count, w[i])
         else:
@@ -147,16 +150,17 @@ def _prepare(model: ReducedModel, H: int) -> tuple | None:
     spare = contact.shape[2] - blades.shapes.shape[2]
     load = np.pad(blades.shapes[:, blades.load], ((0, 0), (0, 0), (0, spare)))
     probe = np.pad(blades.shapes[:, blades.probe], ((0, 0), (0, 0), (0, spare)))
-    flexible = sum(b.residual[:, b.contact, b.contact] for b in bodies)
+    residual, springs = sum(b.residual[:, b.contact, b.contact] for b in bodies), model.springs.ravel()
+    fixed = staying(residual, contact, springs) if FEW * contact.shape[2] <= dofs else [np.zeros((0, 0, 0))] * 4
     body = (*joined.values(), *(np.ascontiguousarray(a, dtype=complex) for a in (
-        contact, flexible, probe, blades.residual[:, blades.probe, blades.contact],
+        contact, residual, probe, blades.residual[:, blades.probe, blades.contact],
         (loads[:, None] @ load.conj())[:, 0],
         (blades.residual[:, blades.contact, blades.load] @ loads[:, :, None])[:, :, 0],
-        (blades.residual[:, blades.probe, blades.load] @ loads[:, :, None])[:, :, 0])))
-    B, g, rigid = model.once("rigid", lambda: rigid_motions(model, model.springs.ravel()))
+        (blades.residual[:, blades.probe, blades.load] @ loads[:, :, None])[:, :, 0], *fixed)))
+    B, g, rigid = model.once("rigid", lambda: rigid_motions(model, springs))
     still = np.flatnonzero(blades.omega[0] == 0)
     held = (np.ascontiguousarray(B), g, np.ascontiguousarray(rigid[:len(still)]), still, model.hold)
-    return body, held, model.springs.ravel()
+    return body, held, springs
 
 
 def _reversed(body: Stack) -> Stack:
@@ -169,70 +173,6 @@ def _joined(bodies: list[Stack], name: str, rows: Callable[[Stack], slice] = lam
     most = max(len(body.omega) for body in bodies)
     parts = [getattr(body, name) if name != "shapes" else body.shapes[:, rows(body)] for body in bodies]
     return np.concatenate([np.broadcast_to(part, (most, *part.shape[1:])) for part in parts], axis=-1)
-
-
-@njit(cache=True, error_model="numpy")
-def _flexibilities(w, body, held, springs, H):
-    """Modal flexibilities (H+1, M), G and A (H+1, m, m), free and stuck (H+1, m) at circular frequency w."""
-    own, viscous, hysteretic, contact, residual = body[:5]
-    push, direct = body[7], body[8]
-    m, M, r = contact.shape[1], contact.shape[2], held[0].shape[1]
-    flexible = np.zeros((H + 1, M), np.complex128)
-    G, A = np.empty((H + 1, m, m), np.complex128), np.empty((H + 1, m, m), np.complex128)
-    free, stuck = np.empty((H + 1, m), np.complex128), np.empty((H + 1, m), np.complex128)
-    for h in range(H + 1):
-        s, w_h = min(h, own.shape[0] - 1), h * w
-        C, R = contact[s], residual[min(h, residual.shape[0] - 1)]
-        for k in range(M):
-            if h > 0 or own[s, k] > 0.0:
-                loss = w_h * viscous[s, k] + (hysteretic[s, k] if h else 0.0)
-                flexible[h, k] = 1.0 / complex(own[s, k]**2 - w_h**2, loss)
-        pushed = C * flexible[h]
-        free[h] = direct[h] + np.dot(pushed, push[h])
-        G[h] = R + np.dot(pushed, C.conj().T)
-        if h == 0:
-            free[0], G[0] = free[0].real, G[0].real
-        _spring(G[h], free[h], springs, held, r if h == 0 else 0, A[h], stuck[h])
-    return flexible, G, free, A, stuck
-
-
-@njit(cache=True, error_model="numpy")
-def _spring(G, free, springs, held, r, A, stuck):
-    """Fill A (m, m) = (1 + G K)^-1 G and stuck (m,), with r motions without stiffness eliminated."""
-    m = springs.size
-    system, right = np.eye(m + r, dtype=np.complex128), np.empty((m + r, m + 1), np.complex128)
-    system[:m, :m] += G * springs
-    right[:m, :m], right[:m, m] = G, free
-    for a in range(r):
-        system[:m, m + a], system[m + a, :m], system[m + a, m + a] = -held[0][:, a], held[0][:, a] * springs, held[4]
-        right[m + a, :m], right[m + a, m] = held[0][:, a], held[1][a]
-    solved = np.linalg.solve(system, right)
-    A[:], stuck[:] = solved[:m, :m], solved[:m, m]
-
-
-@njit(cache=True, error_model="numpy")
-def _coefficients(q, out):
-    """out (m, K) real coefficients of the amplitudes q (H+1, m)."""
-    for i in range(q.shape[1]):
-        out[i, 0] = q[0, i].real
-        for h in range(1, q.shape[0]):
-            out[i, 2 * h - 1], out[i, 2 * h] = q[h, i].real, -q[h, i].imag
-
-
-@njit(cache=True, error_model="numpy")
-def _linear(omega, body, held, springs, H):
-    """Modal flexibilities (H+1, M), what the compiled Newton needs, G of the mean (m, m), free (H+1, m)."""
-    flexible, G, free, A, stuck = _flexibilities(omega, body, held, springs, H)
-    m = springs.size
-    still, motion = np.empty((m, 2 * H + 1)), np.empty((m, 2 * H + 1))
-    _coefficients(free, still)
-    _coefficients(stuck, motion)
-    mean = np.empty((m, m))
-    for i in range(m):
-        for j in range(m):
-            mean[i, j] = G[0, i, j].real
-            G[0, i, j] = 0.0
-    return flexible, (A, G, motion, springs, max(max(norm(still), norm(motion)), 1e-300)), mean, free
 
 
 @njit(cache=True, error_model="numpy")

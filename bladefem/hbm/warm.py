@@ -15,7 +15,9 @@ from .api import solve
 from .linear import condense
 from .model import Damping, ReducedModel
 from .newton import newton
+from .overtones import overtones
 from .residual import Balance, evaluate_balance, start_in_stick
+from .sweep import response
 
 __all__ = ["compile_kernels"]
 
@@ -27,10 +29,12 @@ def compile_kernels() -> None:
     one = Elements(np.ones(1), np.ones(1), np.full(1, 0.4), np.full(1, 0.5), tangents=1)
     line = ReducedModel((body,), one, {1: np.ones(1)}, Damping(0.01))
     for samples in (64, 0):
-        solve(line, 1.0, 2, samples)
+        point = solve(line, 1.0, 2, samples)
         balance = Balance(line, condense(line, 1.0, 2), samples)
         for merit in ("step", "residual"):
             newton(balance, start_in_stick(balance), merit=merit)
+    overtones(line, [point], 5)
+    list(response(line, [1.0, 1.1], 2, 64))
     ports["contact"] = np.arange(3)
     body = port_model_from_matrices(np.eye(3), np.diag([1.0, 1.2, 1.4]) + 0.1, ports)
     plane = ReducedModel((body,), replace(one, tangents=2), {1: np.ones(1)}, Damping(0.01))

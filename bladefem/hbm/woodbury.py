@@ -20,7 +20,7 @@ from ..errors import NotSolvedError
 from .bodies import Stack, flexibility, rigid_stack
 from .model import ReducedModel
 
-__all__ = ["LowRank", "low_rank", "updated"]
+__all__ = ["LowRank", "bodies_of", "low_rank", "staying", "updated"]
 
 FEW = 3         # contact freedoms for each mode below which the update is not worth it
 
@@ -38,7 +38,7 @@ class LowRank:
 
 def low_rank(model: ReducedModel, harmonics: int) -> LowRank | None:
     """The parts that stay; None where modes are coupled by damping or too many."""
-    bodies = _bodies(model, harmonics)
+    bodies = bodies_of(model, harmonics)
     m, k = model.springs.size, sum(body.omega.shape[1] for body in bodies)
     if any(body.coupled is not None for body in bodies) or FEW * k > m:
         return None
@@ -64,7 +64,8 @@ def updated(fixed: LowRank, orders: np.ndarray, first: int) -> np.ndarray:
     return found
 
 
-def _bodies(model: ReducedModel, harmonics: int) -> tuple[Stack, ...]:
+def bodies_of(model: ReducedModel, harmonics: int) -> tuple[Stack, ...]:
+    """Blades, and the damper where there is one, in the nodal diameters of harmonics 0..H."""
     blades = model.blades(harmonics)
     if isinstance(model.damper, RigidBody):
         body = model.damper
@@ -78,8 +79,12 @@ def _fixed(bodies: tuple[Stack, ...], springs: np.ndarray) -> LowRank:
     R = sum(body.residual[:, body.contact, body.contact] for body in bodies)
     L = np.concatenate([np.broadcast_to(body.shapes[:, body.contact], (size, *body.shapes[:, body.contact].shape[1:]))
                         for body in bodies], axis=2)
-    R = np.broadcast_to(R, (size, *R.shape[1:]))
-    m = len(springs)
+    return LowRank(bodies, *staying(R, L, springs))
+
+
+def staying(R: np.ndarray, L: np.ndarray, springs: np.ndarray) -> tuple[np.ndarray, ...]:
+    """A (S, m, m), U (S, m, k), its conjugate transpose and N (S, k, k) from R (S or 1, m, m) and L (S, m, k)."""
+    R, m = np.broadcast_to(R, (len(L), *R.shape[1:])), len(springs)
     solved = np.linalg.solve(R * springs + np.eye(m), np.concatenate([R, L], axis=2))
     A, U = np.ascontiguousarray(solved[:, :, :m]), np.ascontiguousarray(solved[:, :, m:]).astype(complex)
-    return LowRank(bodies, A, U, U.conj().swapaxes(1, 2).copy(), L.conj().swapaxes(1, 2) @ (springs[:, None] * U))
+    return A, U, U.conj().swapaxes(1, 2).copy(), L.conj().swapaxes(1, 2) @ (springs[:, None] * U)

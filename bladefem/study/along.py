@@ -12,15 +12,17 @@ from ..hbm.newton import Options
 from ..hbm.solution import Solution
 from ..hbm.sticking import grips
 from ..hbm.sweep import response, size
-from .choice import Checked, following, likely, peak_of, sufficient, watched
+from .choice import KEPT, Checked, following, likely, sufficient
 from .family import Family, member
-from .indicators import indicate, judge, moved
+from .indicators import Indicators, indicate, judge, moved
 from .settings import Settings, enriched
+from .watched import hidden, peak_of, watched
 
 __all__ = ["along"]
 
 PASSES = 16         # of richer settings, each round one point
 COARSE = 0.02       # accuracy that the first sweep is made for where contacts may lift off
+CAUTION, LEAST = 2.0, 0.02     # error left over the last change: what hidden motion tells, times this; at least
 QUIET = 2           # neighbours that richer settings do not change, beyond which the others are left as they are
 
 
@@ -30,9 +32,16 @@ class _Curve:
 
     family: Family
     options: Options
+    accuracy: float
     points: list[Solution]
     used: list[Settings]            # of each point
+    moved: np.ndarray               # of each point what `hidden` gives
     errors: dict[float, float]      # circular frequency of the judged points to the estimated relative error
+
+    @property
+    def limit(self) -> float:
+        """Tolerated error [m], with the other half in hand."""
+        return self.accuracy * size(peak_of(self.points)) / 2
 
 
 def along(family: Family, omegas: Sequence[float], settings: Settings, accuracy: float) -> Checked:
@@ -56,19 +65,22 @@ def along(family: Family, omegas: Sequence[float], settings: Settings, accuracy:
     if not any(p.converged for p in points):
         raise NotSolvedError(f"none of {len(points)} frequencies was solved; the first stopped because: "
                              f"{points[0].reason}")
-    curve, final = _Curve(family, options, points, [settings] * len(points), {}), set()
+    used = [settings] * len(points)
+    curve, final = _Curve(family, options, accuracy, points, used, hidden(family, used, points), {}), set()
+    known: dict[str, float] = {}
     for _ in range(PASSES):
-        limit = accuracy * size(peak_of(points)) / 2
+        limit = curve.limit
         wrong = next((i for i in _judged(curve) if curve.errors[points[i].omega] * size(points[i]) > limit
                       and i not in final), None)
         if wrong is None:
             break
-        found = indicate(family, curve.used[wrong], points[wrong])
+        found = indicate(family, curve.used[wrong], points[wrong], known)
         better = following(curve.used[wrong], found, 2 * limit / size(points[wrong]))
         if better is not None:
-            _raise(curve, wrong, better, limit)
+            _raise(curve, wrong, better, found)
         if curve.used[wrong] != better:     # there is none, or it was not solved
             final.add(wrong)
+        known = {name: found.errors[name] for name in KEPT if found.errors[name] <= accuracy / 20}
     top, *_ = _judged(curve)
     return Checked(replace(curve.used[top], error=curve.errors[points[top].omega]), points, curve.errors)
 
@@ -87,25 +99,49 @@ def _first(family: Family, settings: Settings, accuracy: float) -> Settings:
 
 
 def _judged(curve: _Curve) -> Iterator[int]:
-    """Numbers of the points that are watched, the peak first, each with its error told."""
+    """Numbers of the points whose error is told: those that are watched, the peak first, then others that tell it."""
     places = {p.omega: i for i, p in enumerate(curve.points)}
-    for point in watched(curve.points):
+    for point in watched(curve.points, curve.moved, curve.accuracy):
         i = places[point.omega]
         if point.omega not in curve.errors:
             curve.errors[point.omega] = judge(curve.family, curve.used[i], point).total
         yield i
+    yield from sorted(places[omega] for omega in curve.errors)
 
 
-def _raise(curve: _Curve, at: int, better: Settings, limit: float) -> None:
-    """Solve a point with better settings, and its neighbours of the same settings as far as that changes them [m]."""
-    old, quiet = curve.used[at], 0
-    _change(curve, at, better)
+def _raise(curve: _Curve, at: int, better: Settings, found: Indicators) -> None:
+    """Solve a point with better settings, and its neighbours of the same settings as far as that changes them."""
+    old, limit = curve.used[at], curve.limit
+    changed = {at: _change(curve, at, better)}
     for side in (range(at + 1, len(curve.points)), range(at - 1, -1, -1)):
         quiet = 0
         for i in side:
             if curve.used[i] != old or quiet == QUIET:
                 break
-            quiet = quiet + 1 if _change(curve, i, better) <= limit else 0
+            changed[i] = _change(curve, i, better)
+            quiet = quiet + 1 if changed[i] <= limit else 0
+    _foretell(curve, old, {i: change for i, change in changed.items() if 0 < change < np.inf}, found)
+
+
+def _foretell(curve: _Curve, old: Settings, changed: dict[int, float], found: Indicators) -> None:
+    """The error of points that took more harmonics, from what these changed [m]; no richer model is solved.
+
+    The next harmonics change a point as much less as those that are left out now move less than before.
+    """
+    places = sorted(changed)
+    if not places or not _alike(old, curve.used[places[0]]) or not 0 < found.errors["harmonics"] < np.inf \
+            or not np.isfinite(found.total):
+        return
+    new = curve.used[places[0]]
+    samples = found.errors["samples"] * (max(old.samples, 1) / max(new.samples, 1)) ** 2
+    by_harmonics = found.errors["harmonics"] / (found.errors["harmonics"] + found.errors["samples"] - samples)
+    rest = found.total - found.errors["harmonics"] - found.errors["samples"] + samples
+    before = curve.moved[places].copy()
+    curve.moved[places] = hidden(curve.family, [new] * len(places), [curve.points[i] for i in places])
+    left = np.clip(CAUTION * curve.moved[places] / np.maximum(before, np.finfo(float).tiny), LEAST, 1.0)
+    for i, part in zip(places, left * by_harmonics, strict=True):
+        point = curve.points[i]
+        curve.errors[point.omega] = rest + float(part) * changed[i] / size(point)
 
 
 def _change(curve: _Curve, i: int, better: Settings) -> float:

@@ -20,12 +20,13 @@ from ..errors import InputError, NotSolvedError
 from ..hbm.sweep import size as height
 from ..scene import Scene
 from ..store import on_root
-from .choice import covered, peak_of
+from .choice import covered
 from .clock import running
 from .family import member
 from .pipeline import EXACT_HARMONICS, Seating, family_of_case, load_cases
 from .settings import Settings
 from .stages import Bodies, build_mesh, contact_patches, harmonic_diameters, reduce_sector, seat_damper
+from .watched import peak_of
 
 __all__ = ["MeshVariant", "Resonance", "mesh_table", "mesh_variants", "on_mesh"]
 

@@ -17,9 +17,10 @@ from ..hbm.sweep import size, sweep
 from .family import Family, member
 from .indicators import Indicators, indicate, judge, moved
 from .settings import Settings, enriched
+from .watched import hidden, peak_of, watched
 
 __all__ = ["Checked", "adapted", "checked", "choose", "covered", "default_band", "estimated", "following", "likely",
-           "peak_of", "response_points", "sufficient", "watched"]
+           "response_points", "sufficient"]
 
 ROUNDS = 12
 KEPT = ("modes", "damper")      # whose indicators, where they are small, outlast a change of the others
@@ -27,8 +28,6 @@ LIKELY = ((0.003, {"harmonics": 7, "samples": 256, "points": 16}),      # accura
           (0.03, {"harmonics": 3, "samples": 64, "points": 16}))
 PASSES = 3          # sweeps of one curve with ever richer settings
 WIDENINGS = 4
-EXTRA, NARROW = 2, 0.15     # points checked in gaps wider than this share of the frequencies at which contacts move
-SHARES = (0.7, 0.25)    # of the peak's height: where a curve is checked on each side beside the peak itself
 
 
 @dataclass(frozen=True)
@@ -127,7 +126,7 @@ def adapted(family: Family, settings: Settings, band: tuple[float, float] | None
             points = _replaced(points, response_points(model, settings, inner, accuracy))
         top, used, errors = peak_of(points), settings, {}
         whole = all(p.converged for p in points)
-        for point in watched(points):
+        for point in watched(points, hidden(family, [settings] * len(points), points), accuracy):
             tolerated = accuracy * size(top) / size(point)
             if last or not (whole or point is top):
                 found = judge(family, settings, point)
@@ -157,35 +156,6 @@ def _solvable(points: Sequence[Solution]) -> tuple[float, float] | None:
 def _replaced(old: Sequence[Solution], new: Sequence[Solution]) -> list[Solution]:
     """Points sorted by frequency, the new ones in place of the old ones in their band."""
     return sorted([*new, *(p for p in old if not new[0].omega <= p.omega <= new[-1].omega)], key=lambda p: p.omega)
-
-
-def watched(points: Sequence[Solution]) -> list[Solution]:
-    """The points that a curve is checked at.
-
-    The peak, one on each flank for each of SHARES of its height, the highest of the others at which contacts begin to
-    slip or to lift, since a short slip needs more samples than a long one, the highest at which more of them do, where
-    the curve has a kink, and EXTRA more in the widest gaps between these where contacts move: internal resonances of
-    higher harmonics keep to no height.
-    """
-    good = [p for p in points if p.converged]
-    heights = np.array([size(p) for p in good])
-    top = int(heights.argmax())
-    chosen = [top]
-    for share in SHARES:
-        for side in (range(top), range(top + 1, len(good))):
-            if len(side):
-                chosen.append(min(side, key=lambda i: abs(heights[i] - share * heights[top])))
-    kinds = [(p.states["lift"] + p.states["open"], p.states["slip"]) for p in good]
-    for part in ([(a > 0, b > 0) for a, b in kinds], kinds):
-        begin = {max(i, i + 1, key=part.__getitem__) for i in range(len(good) - 1) if part[i] != part[i + 1]}
-        chosen += sorted(begin - set(chosen), key=heights.__getitem__)[-1:]
-    places = np.array([p.omega for p in good])
-    moving = np.flatnonzero([any(kind) for kind in kinds] & (heights >= SHARES[-1] * heights[top]))
-    for _ in range(EXTRA if len(moving) > 2 else 0):
-        gaps = abs(places[moving, None] - places[chosen]).min(axis=1)
-        if gaps.max() > NARROW * np.ptp(places[moving]):
-            chosen.append(int(moving[gaps.argmax()]))
-    return [good[i] for i in dict.fromkeys(chosen)]
 
 
 def sufficient(accuracy: float) -> Options:
@@ -257,11 +227,6 @@ def response_points(model: ReducedModel, settings: Settings, band: tuple[float, 
         raise NotSolvedError(f"no point between {band[0]:.5g} and {band[1]:.5g} Hz was solved; "
                              f"the first stopped because: {points[0].reason}")
     return points
-
-
-def peak_of(points: list[Solution]) -> Solution:
-    """The highest converged point."""
-    return max((p for p in points if p.converged), key=size)
 
 
 def default_band(model: ReducedModel, mode: int) -> tuple[float, float]:

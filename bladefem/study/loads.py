@@ -14,7 +14,7 @@ from ..hbm.solution import Solution
 from ..hbm.sweep import size
 from ..progress import Progress, unwatched
 from ..scene import Scene
-from .choice import adapted, checked, estimated, peak_of
+from .choice import adapted, checked, estimated
 from .contact_mesh import halved_change
 from .family import Family, member
 from .joint import LoadCase
@@ -22,6 +22,7 @@ from .liftoff import named
 from .limits import Limit
 from .settings import Settings, restarted
 from .stability import Stability, stability_of
+from .watched import peak_of
 
 Keep = Callable[[LoadCase, Callable[[], Any]], Any]
 

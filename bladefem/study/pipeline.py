@@ -27,7 +27,7 @@ from ..scene_check import refuse_response
 from ..scene_doubts import doubts
 from ..store import found_remark, stage
 from ..units import show
-from .choice import choose, covered, peak_of
+from .choice import choose, covered
 from .clamped import clamped_blade
 from .contact_mesh import coarse_sentence, halved_sentence
 from .cycle import labels
@@ -52,6 +52,7 @@ from .stages import (
     weighted,
 )
 from .strength import Strength, strength
+from .watched import peak_of
 
 __all__ = ["STAGES", "Response", "Run", "Seating", "family_of_case", "load_cases", "reduced_sector", "run",
            "studied_loads"]

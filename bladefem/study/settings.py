@@ -12,7 +12,7 @@ __all__ = ["DAMPERS", "DIRECTIONS", "Settings", "enriched", "first_for", "first_
 DAMPERS = ("mass", "rigid", "elastic")      # from poor to rich
 DIRECTIONS = ("harmonics", "samples", "modes", "points", "damper")     # in which a model is enriched
 RICHEST = {"modes": 160, "harmonics": 31, "samples": 4096, "points": 4096}
-STEEP = 40.0        # how many times smaller an error has to be for two steps of the harmonics at once
+STEEP = 40.0        # how many times smaller an error has to be for two steps of the first harmonics at once
 FIRST = {"modes": 10, "harmonics": 1, "samples": 64, "points": 4, "damper": "rigid"}
 
 
@@ -91,7 +91,7 @@ def enriched(settings: Settings, name: str, need: float = 4.0) -> Settings | Non
     if value is None:
         return None
     if name == "harmonics":
-        more = 4 * value + 3 if need > STEEP else 2 * value + 1
+        more = 4 * value + 3 if value < 7 and need > STEEP else 2 * value + 1
     elif name == "modes":
         more = 2 * value
     else:

@@ -18,7 +18,7 @@ def test_a_killed_response_goes_on(tmp_path, monkeypatch):
     (tmp_path / "stages" / "point-000004.npz").write_bytes(b"half a file")
     solved = []
     plain = sweep.solve_along
-    monkeypatch.setattr(sweep, "solve_along", lambda model, omegas, *a: solved.extend(omegas) or plain(model, omegas, *a))
+    monkeypatch.setattr(sweep, "solve_along", lambda m, omegas, *a: solved.extend(omegas) or plain(m, omegas, *a))
     again = list(recorded(tmp_path, model, OMEGAS, 5, 128))
     assert solved == list(OMEGAS[3:])
     for one, other in zip(again, whole, strict=True):

@@ -10,11 +10,12 @@ from plain import waves
 from bladefem.data import PortModel
 from bladefem.errors import InputError
 from bladefem.friction.harmonics import to_complex
-from bladefem.hbm import api
+from bladefem.hbm import api, sweep
 from bladefem.hbm.api import solve
 from bladefem.hbm.compiled import back_substitute, factorise, factorise_large
 from bladefem.hbm.model import Damping
 from bladefem.hbm.reference import reference_model
+from bladefem.hbm.sweep import response
 
 
 def elastic_damper():
@@ -122,3 +123,19 @@ def test_blocks_of_columns_give_the_same_factors(size):
     np.testing.assert_allclose(x, np.arange(size), atol=1e-8)
     other[:, 0] = 0.0
     assert not factorise_large(other, two)
+
+
+@pytest.mark.parametrize("points", [1, 16])
+def test_a_sweep_at_once_is_the_sweep_point_by_point(points, monkeypatch):
+    """Blocks of a sweep in one call, with modes that add the springs and without; from slip into stick and back."""
+    model = reference_model(3e6, 0.12, 8.0, phase=0.5, points=points, harmonics=3, modes=10)
+    omegas = 2 * np.pi * np.linspace(780, 1300, 40)
+    fast = list(response(model, omegas, 3, 64))
+    monkeypatch.setattr(sweep, "solve_along", lambda *_: [])
+    monkeypatch.setattr(api, "solve_small", lambda *_: None)
+    plain = list(response(replace(model), omegas, 3, 64))
+    assert {p.states["stick"] == 2 * points for p in fast} == {True, False}
+    for one, other in zip(fast, plain, strict=True):
+        assert one.converged and one.states == other.states and one.iterations == other.iterations
+        np.testing.assert_allclose(one.w, other.w, rtol=0, atol=1e-8 * abs(other.w).max())
+        np.testing.assert_allclose(one.probe, other.probe, rtol=0, atol=1e-8 * abs(other.probe).max())

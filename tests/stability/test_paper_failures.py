@@ -17,9 +17,10 @@ from bladefem.hbm.reference import reference_model
 from bladefem.hbm.shooting import harmonics, periodic
 from bladefem.hbm.sweep import size, sweep
 from bladefem.hbm.system import damper_on_platforms, oscillator, ring
-from bladefem.study.choice import adapted, peak_of
+from bladefem.study.choice import adapted
 from bladefem.study.family import family_of
 from bladefem.study.settings import first_for
+from bladefem.study.watched import peak_of
 
 HZ = 2 * np.pi
 

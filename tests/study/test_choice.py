@@ -12,12 +12,13 @@ from bladefem.hbm.reference import reference_model
 from bladefem.hbm.resonance import free_resonances, stuck_resonances
 from bladefem.hbm.sweep import size
 from bladefem.scene_file import load_scene
-from bladefem.study.choice import adapted, checked, choose, estimated, peak_of
+from bladefem.study.choice import adapted, checked, choose, estimated
 from bladefem.study.family import carried, coarsened, family_of, member
 from bladefem.study.indicators import indicate, richer
 from bladefem.study.joint import LoadCase
 from bladefem.study.loads import curve_of
 from bladefem.study.settings import Settings, enriched, first_for
+from bladefem.study.watched import peak_of
 
 
 @pytest.mark.parametrize("accuracy", [0.02, 0.001])
