@@ -8,13 +8,15 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from ..errors import NotSolvedError
+from ..hbm.ahead import AHEAD, ahead
+from ..hbm.api import solve
 from ..hbm.newton import Options
 from ..hbm.solution import Solution
 from ..hbm.sticking import grips
 from ..hbm.sweep import response, size
 from .choice import KEPT, Checked, following, likely, sufficient
-from .family import Family, member
-from .indicators import Indicators, indicate, judge, moved
+from .family import Family, carried, member
+from .indicators import Indicators, indicate, judge
 from .settings import Settings, enriched
 from .watched import hidden, peak_of, watched
 
@@ -112,13 +114,14 @@ def _judged(curve: _Curve) -> Iterator[int]:
 def _raise(curve: _Curve, at: int, better: Settings, found: Indicators) -> None:
     """Solve a point with better settings, and its neighbours of the same settings as far as that changes them."""
     old, limit = curve.used[at], curve.limit
-    changed = {at: _change(curve, at, better)}
+    first: list[tuple[float, np.ndarray]] = []
+    changed = {at: _change(curve, at, better, first)}
     for side in (range(at + 1, len(curve.points)), range(at - 1, -1, -1)):
-        quiet = 0
+        quiet, gained = 0, first.copy()
         for i in side:
             if curve.used[i] != old or quiet == QUIET:
                 break
-            changed[i] = _change(curve, i, better)
+            changed[i] = _change(curve, i, better, gained)
             quiet = quiet + 1 if changed[i] <= limit else 0
     _foretell(curve, old, {i: change for i, change in changed.items() if 0 < change < np.inf}, found)
 
@@ -144,17 +147,35 @@ def _foretell(curve: _Curve, old: Settings, changed: dict[int, float], found: In
         curve.errors[point.omega] = rest + float(part) * changed[i] / size(point)
 
 
-def _change(curve: _Curve, i: int, better: Settings) -> float:
-    """Put the point of better settings in place of the present one; the distance of their first harmonics [m]."""
+def _change(curve: _Curve, i: int, better: Settings, gained: list[tuple[float, np.ndarray]]) -> float:
+    """Put the point of better settings in place of the present one; the distance of their first harmonics [m].
+
+    Args:
+        gained: frequencies of the neighbours that were changed before, and what that added to their displacements: its
+            curve is added to the start, and this point to the list.
+    """
     old, settings = curve.points[i], curve.used[i]
-    if _alike(settings, better) and old.converged and grips(member(curve.family, settings).model, old):
+    poor, rich = member(curve.family, settings), member(curve.family, better)
+    if _alike(settings, better) and old.converged and grips(poor.model, old):
         return 0.0
-    new = moved(curve.family, settings, old, better, curve.options)
+    carried_over = carried(old.w, poor, rich, better.harmonics)
+    start = replace(old, w=carried_over + _expected(gained, old.omega)) if gained else replace(old, w=carried_over)
+    new = solve(rich.model, old.omega, better.harmonics, better.samples, start=start, options=curve.options)
     if old.converged and not new.converged:
         return np.inf
+    gained.append((new.omega, new.w - carried_over))
     curve.points[i], curve.used[i] = new, better
     curve.errors.pop(old.omega, None)
     return float(abs(new.probe[1, 0] - old.probe[1, 0])) if old.converged else np.inf
+
+
+def _expected(gained: list[tuple[float, np.ndarray]], omega: float) -> np.ndarray:
+    """The curve through the last of them."""
+    at, known = np.array([w for w, _ in gained[-AHEAD:]]), np.array([w for _, w in gained[-AHEAD:]])
+    result = np.empty(known.shape[1:])
+    flat = (len(known), -1, known.shape[-1])
+    ahead(omega, known.reshape(flat), at, len(known), result.reshape(flat[1:]))
+    return result
 
 
 def _alike(one: Settings, other: Settings) -> bool:
