@@ -59,17 +59,20 @@ def _contact(N, load, tab, mean):
 
 @njit(_nrt=False, cache=True, error_model="numpy")
 def _normal(w, load, el, N, least, tab, spare, F, J):
-    """Normal force F (K,) and its Jacobian J (K, 3K) or (0, 0); returns the share of the samples in contact.
+    """Normal force F (K,) and its Jacobian J[0], J (3, K, 3K) or (0, 0, 0); returns the share in contact.
 
     N (width,) is the load at the knots, at least ``least`` [N]; spare is scratch: mean (4H+1,), block (K, K), around.
     """
-    K, J[:] = F.size, 0.0
+    K = F.size
+    for k in range(J.shape[1]):
+        for l in range(J.shape[2]):
+            J[0, k, l] = 0.0
     if load.size == 0 and least > 0.0:
         for k in range(K):
             F[k] = el.kn * w[k]
         F[0] += el.n0
-        for k in range(J.shape[0]):
-            J[k, k] = el.kn
+        for k in range(J.shape[1]):
+            J[0, k, k] = el.kn
         return 1.0
     mean, block, around = spare
     _contact(N, load, tab, mean)
@@ -78,9 +81,9 @@ def _normal(w, load, el, N, least, tab, spare, F, J):
         F[k] = 0.0 if load.size else el.n0 * block[k, 0]
         for l in range(K):
             F[k] += el.kn * block[k, l] * w[l]
-    for k in range(J.shape[0]):
+    for k in range(J.shape[1]):
         for l in range(K):
-            J[k, l] = el.kn * block[k, l]
+            J[0, k, l] = el.kn * block[k, l]
     for i in range(load.size):
         if _load(N, load, i) > 0.0:
             for k in range(K):
@@ -108,7 +111,7 @@ def _within(path, mu):
     return beyond == 0
 
 
-@njit(_nrt=False, cache=True, error_model="numpy")
+@njit(_nrt=False, cache=True, error_model="numpy", forceinline=True)
 def _forces(w, load, el, path, tab, limit, trail, phi, spare, trace, F, J, shares):
     """Normal force of one node, and its last period as periodic returns it; 0 cycles where it sticks or stays open.
 
@@ -116,7 +119,7 @@ def _forces(w, load, el, path, tab, limit, trail, phi, spare, trace, F, J, share
     """
     linear = J.shape[0] > 0
     found, (least, largest) = (True, 0.0, 0.0, 0.0, 0.0, 0, 0, 0), _range(path[2])
-    closed = _normal(w[0], load, el, path[2], least, tab, spare, F[0], J[0] if linear else J[:, :, 0])
+    closed = _normal(w[0], load, el, path[2], least, tab, spare, F[0], J)
     if largest > 0.0 and not (least > 0.0 and _within(path, el.mu)):
         find_edges(path, path.shape[1], el.mu, trail.form)
         found = periodic(path, el.mu, largest, EXACT if linear else TOLERANCE, limit, trail, phi)

@@ -219,7 +219,7 @@ def _add_slip(slips, tab, scratch):
                scratch.patterns.weights, scratch.J)
 
 
-@njit(_nrt=False, cache=True, error_model="numpy")
+@njit(_nrt=False, cache=True, error_model="numpy", forceinline=True)
 def unit_rows(kt, tab, C):
     """Carried rows C (2, M) of a force at the first knot that is given."""
     K, W = tab.at.shape[1], tab.W

@@ -8,42 +8,51 @@ from __future__ import annotations
 
 from bladefem.friction.lanes import LANES, Code, kernel
 
-__all__ = ["ACROSS", "AHEAD", "AWAY", "EDGE_ROWS", "FALL", "LIMIT_AHEAD", "LIMIT_AWAY", "TURNS", "TWICE_Y",
-           "find_edges", "find_forces", "find_turns", "stuck_until"]
+__all__ = ["ACROSS", "AHEAD", "AWAY", "EDGE_ROWS", "FALL", "LIMIT_AHEAD", "LIMIT_AWAY", "PAIR_AHEAD",
+           "PAIR_AWAY", "PAIR_TO_P", "PAIR_TO_Q", "TURNS", "TWICE_Y", "find_edges", "find_forces", "find_turns",
+           "stuck_until"]
 
 (DIRECTION_X, DIRECTION_Y, INVERSE_LENGTH, HALF, SLOPE, INVERSE_LIMIT, AHEAD, ACROSS, AWAY, FALL, LIMIT_AHEAD, TWICE_Y,
- LIMIT_AWAY, EDGE_ROWS) = range(14)
+ LIMIT_AWAY, PAIR_AHEAD, PAIR_TO_P, PAIR_TO_Q, PAIR_AWAY, EDGE_ROWS) = range(18)
 TURNS = 7           # m (3), a, t (3) of find_turns
 FAINT = 1e-12       # of the limit: the shortest edge
-LEAST = 1e-100      # [N]: the least limit
+LEAST = 1e-60       # [N]: the least limit
 
 
 @kernel
 def find_edges(code: Code, path, width, mu, out):
-    """Fill out (13, width) from path (3, width), which is (kt w_1, kt w_2, N) at the knots [N].
+    """Fill out (17, width) from path (3, width), which is (kt w_1, kt w_2, N) at the knots [N].
 
     Rows: direction u (2), 1/length, decay over half an edge, x dln(decay)/dx, 1/limit; of the map of the half-angle
     vector (P, Q) its elements 11, 12 = 21, 22 and determinant; of the form in P and Q whose sign tells whether slip
-    goes on its factors of P^2, P Q and -Q^2. Lengths and limits are forces [N].
+    goes on its factors of P^2, P Q and -Q^2; of the map of this edge and the next its elements 11, 12, 21, 22. Lengths
+    and limits are forces [N].
     """
     mu = code.spread(mu)
     with code.loop(0, code.place(width, -LANES), LANES) as i:
         dx, dy, dN = (code.load(path, (row, width), i, 1) - code.load(path, (row, width), i) for row in range(3))
         limit = mu * (code.load(path, (2, width), i) + 0.5 * dN)
         limit = limit.above(LEAST, limit, limit * 0.0 + LEAST)
-        square, least = dx * dx + dy * dy, FAINT * limit
-        length = square.above(least * least, square, least * least).sqrt()
-        product = 1.0 / (length * limit)
-        inverse, inverse_limit = limit * product, length * product
-        x = 0.5 * length * inverse_limit
-        root = (1.0 + x * x).sqrt()
-        half = 1.0 / (root * (root + x))
-        ux, uy, slope, half = dx * inverse, dy * inverse, (-1.0 * x) * (root + x) * half, root * half
+        twice, square, least = 2.0 * limit, dx * dx + dy * dy, FAINT * limit
+        square = square.above(least * least, square, least * least)
+        length, root = square.sqrt(), (square + twice * twice).sqrt()       # root = 2 limit sqrt(1 + x^2/4)
+        both, roots = length * limit, root * (root + length)
+        product = 1.0 / (both * roots)                                      # one division for four
+        by_both, by_roots = roots * product, both * product
+        inverse, inverse_limit = limit * by_both, length * by_both
+        ux, uy = dx * inverse, dy * inverse
+        slope, half = -1.0 * length * (root + length) * by_roots, twice * root * by_roots
         fall = half * half
         a, b, growth = 0.5 + 0.5 * fall, 0.5 - 0.5 * fall, mu * dN * inverse
         growth = (code.load(path, (2, width), i, 1)).above(0.0, growth, growth * 0.0 + 2.0)     # opens: no slip goes on
         for row, values in enumerate((ux, uy, inverse, half, slope, inverse_limit, a + b * ux, b * uy, a - b * ux, fall,
                                       ux - growth, 2.0 * uy, ux + growth)):
+            code.store(values, out, (row, width), i)
+    with code.loop(0, code.place(width, -LANES), LANES) as i:
+        a, b, d = (code.load(out, (row, width), i) for row in (AHEAD, ACROSS, AWAY))
+        A, B, D = (code.load(out, (row, width), i, 1) for row in (AHEAD, ACROSS, AWAY))
+        for row, values in ((PAIR_AHEAD, A * a + B * b), (PAIR_TO_P, A * b + B * d), (PAIR_TO_Q, B * a + D * b),
+                            (PAIR_AWAY, B * b + D * d)):
             code.store(values, out, (row, width), i)
 
 
@@ -82,14 +91,14 @@ def find_turns(code: Code, begin, end, path, form, knots, slips, width, kt, kn, 
         bx, by = (1.0 - ux) * P - uy * Q, (1.0 + ux) * Q - uy * P
         Pm, Qm, P1, Q1 = ax + h * bx, ay + h * by, ax + h * h * bx, ay + h * h * by
         size, middle, last = 4.0 * (P * P + Q * Q), Pm * Pm + Qm * Qm, P1 * P1 + Q1 * Q1
-        inverse = 1.0 / (size * middle * last)
-        inverse_middle, inverse_last = size * last * inverse, size * middle * inverse
+        inverse, shrunk = 1.0 / (h * size * middle * last), h * size      # shrunk: size after half the edge
+        inverse_middle, inverse_last = shrunk * last * inverse, shrunk * middle * inverse
         ex, ey = (Pm * Pm - Qm * Qm) * inverse_middle, 2.0 * Pm * Qm * inverse_middle
-        b, a = h * size * inverse_middle, h * h * size * inverse_last
+        b, a = shrunk * inverse_middle, h * shrunk * inverse_last
         ym = slope * (ux * ey - uy * ex)
         y1 = 2.0 * slope * (2.0 * ux * P1 * Q1 - uy * (P1 * P1 - Q1 * Q1)) * inverse_last
         kl, by_load = kt * form_at(INVERSE_LENGTH), mukn * form_at(INVERSE_LIMIT)
-        kx, ky, over = kl * ux, kl * uy, middle * (middle * last * inverse) / h
+        kx, ky, over = kl * ux, kl * uy, middle * (middle * last * inverse)
         m = (-1.0 * ym * by_load, ym * kx - (1.0 - b) * ky, ym * ky + (1.0 - b) * kx)
         t = (-1.0 * y1 * by_load, y1 * kx - (1.0 - a) * ky, y1 * ky + (1.0 - a) * kx)
         for row, values in enumerate((*(over * x for x in m), a, *t)):

@@ -26,6 +26,10 @@ from bladefem.friction.lane_kernels import (
     FALL,
     LIMIT_AHEAD,
     LIMIT_AWAY,
+    PAIR_AHEAD,
+    PAIR_AWAY,
+    PAIR_TO_P,
+    PAIR_TO_Q,
     TWICE_Y,
     find_forces,
     stuck_until,
@@ -47,7 +51,7 @@ OPEN, STICKING, SLIDING, CHANGING = range(4)    # pieces of a period; a change o
 class Trail(NamedTuple):
     """One period of a node along its knots and samples; rows of ``width`` numbers as in lane_kernels.py."""
 
-    form: np.ndarray        # (7, width) edges
+    form: np.ndarray        # (.., width) edges
     knots: np.ndarray       # (2, width) half-angle vectors of edges that slide
     slips: np.ndarray       # (width,) 1 where an edge slides
     kinds: np.ndarray       # (S + 1,) of the pieces
@@ -116,17 +120,48 @@ def _leave(P, Q, R, fade, phi):
     return fx, fy
 
 
+@njit(_nrt=False, cache=True, error_model="numpy", inline="always")
+def _ends(P, Q, form, i):
+    """Whether slip under the half-angle vector (P, Q) ends on edge i."""
+    return P * (P * form[LIMIT_AHEAD, i] + Q * form[TWICE_Y, i]) < Q * Q * form[LIMIT_AWAY, i]
+
+
+@njit(_nrt=False, cache=True, error_model="numpy", inline="always")
+def _moved(P, Q, form, i):
+    """Half-angle vector after edge i."""
+    return form[AHEAD, i] * P + form[ACROSS, i] * Q, form[ACROSS, i] * P + form[AWAY, i] * Q
+
+
 @njit(_nrt=False, cache=True, error_model="numpy", forceinline=True, fastmath={"contract", "nsz"})
-def _slide(first, S, P, Q, fade, form, knots, slips):
-    """Follow slip from a knot to where it ends: (knot, P, Q) there, fade times the determinants of its edges' maps."""
-    form, p, q, slips = form[:, first:], knots[0, first:], knots[1, first:], slips[first:]
-    for i in range(S - first):
-        if P * (P * form[LIMIT_AHEAD, i] + Q * form[TWICE_Y, i]) < Q * Q * form[LIMIT_AWAY, i]:
-            return first + i, P, Q, fade
-        p[i], q[i], slips[i] = P, Q, 1.0
-        fade *= form[FALL, i]
-        P, Q = form[AHEAD, i] * P + form[ACROSS, i] * Q, form[ACROSS, i] * P + form[AWAY, i] * Q
-    return S, P, Q, fade
+def _slide(first, S, P, Q, form, knots):
+    """Follow slip from a knot to where it ends: (knot, P, Q) there; by two edges at once, as a product is slow."""
+    form, p, q = form[:, first:], knots[0, first:], knots[1, first:]
+    for i in range(0, S - first - 1, 2):
+        if _ends(P, Q, form, i):
+            return first + i, P, Q
+        p[i], q[i] = P, Q
+        P1, Q1 = _moved(P, Q, form, i)
+        if _ends(P1, Q1, form, i + 1):
+            return first + i + 1, P1, Q1
+        p[i + 1], q[i + 1] = P1, Q1
+        P, Q = form[PAIR_AHEAD, i] * P + form[PAIR_TO_P, i] * Q, form[PAIR_TO_Q, i] * P + form[PAIR_AWAY, i] * Q
+    i = S - first - 1
+    if i % 2 == 0:
+        if _ends(P, Q, form, i):
+            return S - 1, P, Q
+        p[i], q[i] = P, Q
+        P, Q = _moved(P, Q, form, i)
+    return S, P, Q
+
+
+@njit(_nrt=False, cache=True, error_model="numpy", forceinline=True, fastmath={"reassoc"})
+def _fall(a, b, form, slips):
+    """Note that the edges a <= i < b slide: the product of the determinants of their maps."""
+    fall, falls, slips = 1.0, form[FALL, a:b], slips[a:b]
+    for i in range(slips.size):
+        fall *= falls[i]
+        slips[i] = 1.0
+    return fall
 
 
 @njit(_nrt=False, cache=True, error_model="numpy")
@@ -159,9 +194,11 @@ def follow(path, mu, fx, fy, trail, phi):
         events, sure, slips, i = events + (end != STICK), sure + slipping, slips + slipped, i + 1
         if end == SLIP and R > 0.0:
             begin, (P, Q) = i, half_angle(fx / R, fy / R)
-            i, P, Q, fade = _slide(i, S, P, Q, P * P + Q * Q, trail.form, trail.knots, trail.slips)
+            fade = P * P + Q * Q
+            i, P, Q = _slide(i, S, P, Q, trail.form, trail.knots)
             if i > begin:
                 pieces = _begin(trail, pieces, SLIDING, begin, fx, fy)
+                fade *= _fall(begin, i, trail.form, trail.slips)
             events, sure, slips = events + i - begin, sure + i - begin, slips + i - begin
             fx, fy = _leave(P, Q, mu * path[2, i], fade, phi)
         elif end == SLIP:
@@ -220,7 +257,7 @@ def _remembers(phi):
     return phi[0, 0] != 0.0 or phi[0, 1] != 0.0 or phi[1, 0] != 0.0 or phi[1, 1] != 0.0
 
 
-@njit(_nrt=False, cache=True, error_model="numpy")
+@njit(_nrt=False, cache=True, error_model="numpy", forceinline=True)
 def _iterated(path, mu, largest, near, limit, trail, phi):
     """Periodic force by Newton from kt w, returned as by periodic.
 
@@ -286,7 +323,7 @@ def _marched(path, mu, largest, leap, limit, trail, phi):
     return True, fx, fy, gx, gy, slips, pieces, -limit
 
 
-@njit(_nrt=False, cache=True, error_model="numpy")
+@njit(_nrt=False, cache=True, error_model="numpy", forceinline=True)
 def periodic(path, mu, largest, near, limit, trail, phi):
     """Periodic force: (unique, fx, fy, gx, gy, slips, pieces, cycles), cycles negative if none was found in ``limit``.
 

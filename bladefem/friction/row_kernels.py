@@ -99,22 +99,31 @@ def fill_gram(code: Code, around, length, H, K, columns, out):
 def join_rows(code: Code, sums, tiled, W, C, kt, gram, K, out):
     """Rows sums (2, tiled, M) + px C[0] + py C[1] without what fills up the K columns of each part: out (2, K, 3K).
 
-    px, py are the columns K and W + K of a row, C (2, M). kt gram (K, W) is added in the tangent of the row.
+    px, py are the columns K and W + K of a row, C (2, M). kt gram (K, W) is added in the tangent of the row. Blocks
+    reach into the row after, which is written later; the last row is written to its end only.
     """
     M, code = code.place((W, 3)), code.eight(sums)
     kt = code.spread(kt, sums)
-    for e in range(2):
-        with code.loop(0, K) as k:
-            row = code.place((code.place((e, tiled), k), M))
-            px, py = (code.spread(code.one(sums, row, spot)) for spot in (K, code.place(W, K)))
-            for part in range(3):
-                with code.loop(0, K, code.lanes(sums)) as l:
-                    m = code.place((part, W), l)
-                    joined = code.load(sums, row, m) + px * code.load(C, m) + py * code.load(C, M, m)
-                    if part == 1 + e:
-                        joined = joined + kt * code.load(gram, (k, W), l)
-                    spot = code.place((code.place((code.place((e, K), k), 3), part), K), l)
+
+    def write(e, k, last):
+        row = code.place((code.place((e, tiled), k), M))
+        px, py = (code.spread(code.one(sums, row, spot)) for spot in (K, code.place(W, K)))
+        for part in range(3):
+            with code.loop(0, K, code.lanes(sums)) as l:
+                m = code.place((part, W), l)
+                joined = code.load(sums, row, m) + px * code.load(C, m) + py * code.load(C, M, m)
+                if part == 1 + e:
+                    joined = joined + kt * code.load(gram, (k, W), l)
+                spot = code.place((code.place((code.place((e, K), k), 3), part), K), l)
+                if last:
                     code.store_first(code.place(K, (l, -1)), joined, out, spot)
+                else:
+                    code.store(joined, out, spot)
+
+    for e in range(2):
+        with code.loop(0, code.place(K, -e)) as k:
+            write(e, k, False)
+    write(1, code.place(K, -1), True)
 
 
 def _add_folded(harmonics: int, narrow: bool, first: bool = True, *, load: bool):
