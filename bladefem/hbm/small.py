@@ -17,7 +17,7 @@ from ..data import RigidBody
 from .ahead import AHEAD, ahead, shifted
 from .bodies import Stack, rigid_stack
 from .compiled import CONVERGED, compiled_newton, norm
-from .linear import SMALL, rigid_motions
+from .linear import rigid_motions
 from .model import ReducedModel
 from .newton import COMPILED, SHORTEST, Options
 from .residual import STICKS, contact_table
@@ -27,6 +27,7 @@ from .woodbury import staying
 
 __all__ = ["small", "solve_along", "solve_each", "solve_small"]
 
+SMALL = 200         # contact freedoms up to which points are solved here
 FEW = 2             # contact freedoms for each mode from which the springs are added by the modes
 STATES = ("stick", "slip", "lift", "open")
 
