@@ -39,6 +39,7 @@ class _Curve:
     used: list[Settings]            # of each point
     moved: np.ndarray               # of each point what `hidden` gives
     errors: dict[float, float]      # circular frequency of the judged points to the estimated relative error
+    foretold: set[float]            # those of them that no richer model has judged
 
     @property
     def limit(self) -> float:
@@ -68,7 +69,7 @@ def along(family: Family, omegas: Sequence[float], settings: Settings, accuracy:
         raise NotSolvedError(f"none of {len(points)} frequencies was solved; the first stopped because: "
                              f"{points[0].reason}")
     used = [settings] * len(points)
-    curve, final = _Curve(family, options, accuracy, points, used, hidden(family, used, points), {}), set()
+    curve, final = _Curve(family, options, accuracy, points, used, hidden(family, used, points), {}, set()), set()
     known: dict[str, float] = {}
     for _ in range(PASSES):
         limit = curve.limit
@@ -107,8 +108,25 @@ def _judged(curve: _Curve) -> Iterator[int]:
         i = places[point.omega]
         if point.omega not in curve.errors:
             curve.errors[point.omega] = judge(curve.family, curve.used[i], point).total
+        _confirm(curve, i)
         yield i
-    yield from sorted(places[omega] for omega in curve.errors)
+    for i in sorted(places[omega] for omega in curve.errors):
+        _confirm(curve, i)
+        yield i
+
+
+def _confirm(curve: _Curve, i: int) -> None:
+    """Judge a point that was foretold to be too wrong; how true that was holds for the others of the same settings."""
+    point = curve.points[i]
+    told = curve.errors[point.omega]
+    if point.omega not in curve.foretold or told * size(point) <= curve.limit:
+        return
+    true = judge(curve.family, curve.used[i], point).total
+    for other, used in zip(curve.points, curve.used, strict=True):
+        if other.omega in curve.foretold and used == curve.used[i] and np.isfinite(true):
+            curve.errors[other.omega] *= true / told
+    curve.errors[point.omega] = true
+    curve.foretold.discard(point.omega)
 
 
 def _raise(curve: _Curve, at: int, better: Settings, found: Indicators) -> None:
@@ -145,6 +163,7 @@ def _foretell(curve: _Curve, old: Settings, changed: dict[int, float], found: In
     for i, part in zip(places, left * by_harmonics, strict=True):
         point = curve.points[i]
         curve.errors[point.omega] = rest + float(part) * changed[i] / size(point)
+        curve.foretold.add(point.omega)
 
 
 def _change(curve: _Curve, i: int, better: Settings, gained: list[tuple[float, np.ndarray]]) -> float:
@@ -152,20 +171,22 @@ def _change(curve: _Curve, i: int, better: Settings, gained: list[tuple[float, n
 
     Args:
         gained: frequencies of the neighbours that were changed before, and what that added to their displacements: its
-            curve is added to the start, and this point to the list.
+            curve is added to the start where nothing lifts off, and this point to the list.
     """
     old, settings = curve.points[i], curve.used[i]
     poor, rich = member(curve.family, settings), member(curve.family, better)
     if _alike(settings, better) and old.converged and grips(poor.model, old):
         return 0.0
     carried_over = carried(old.w, poor, rich, better.harmonics)
-    start = replace(old, w=carried_over + _expected(gained, old.omega)) if gained else replace(old, w=carried_over)
+    smooth = gained and not old.states["lift"]
+    start = replace(old, w=carried_over + _expected(gained, old.omega) if smooth else carried_over)
     new = solve(rich.model, old.omega, better.harmonics, better.samples, start=start, options=curve.options)
     if old.converged and not new.converged:
         return np.inf
     gained.append((new.omega, new.w - carried_over))
     curve.points[i], curve.used[i] = new, better
     curve.errors.pop(old.omega, None)
+    curve.foretold.discard(old.omega)
     return float(abs(new.probe[1, 0] - old.probe[1, 0])) if old.converged else np.inf
 
 
