@@ -171,14 +171,14 @@ def _change(curve: _Curve, i: int, better: Settings, gained: list[tuple[float, n
 
     Args:
         gained: frequencies of the neighbours that were changed before, and what that added to their displacements: its
-            curve is added to the start where nothing lifts off, and this point to the list.
+            curve is added to the start, but for harmonics where contacts lift off; and this point to the list.
     """
     old, settings = curve.points[i], curve.used[i]
     poor, rich = member(curve.family, settings), member(curve.family, better)
     if _alike(settings, better) and old.converged and grips(poor.model, old):
         return 0.0
     carried_over = carried(old.w, poor, rich, better.harmonics)
-    smooth = gained and not old.states["lift"]
+    smooth = gained and not (old.states["lift"] and _alike(settings, better))
     start = replace(old, w=carried_over + _expected(gained, old.omega) if smooth else carried_over)
     new = solve(rich.model, old.omega, better.harmonics, better.samples, start=start, options=curve.options)
     if old.converged and not new.converged:
