@@ -7,13 +7,15 @@ from numba import njit
 
 from bladefem.friction.disc_rows import add_period, close, empty_rows, start_rows, to_carry, unit_rows
 from bladefem.friction.lane_kernels import find_edges
+from bladefem.friction.lanes import zeros
 from bladefem.friction.orbit import TOLERANCE, empty_trail, follow, forces_along, periodic, start
 from bladefem.friction.tables import Node, empty_gram, gram
 
 __all__ = ["disc_batch"]
 
 NODES = 8           # whose motion and harmonics are one matrix product
-EXACT = 1e-11       # of the largest limit: longest step by which a linearised period is finished
+EXACT, SHORT_EXACT = 1e-11, 1e-8        # of the largest limit: longest step by which a linearised period is finished,
+#                     whose square the force takes, and the step itself the derivative, in 8 and in 4 bytes
 
 
 @njit(cache=True, error_model="numpy")
@@ -112,7 +114,7 @@ def _within(path, mu):
 
 
 @njit(_nrt=False, cache=True, error_model="numpy", forceinline=True)
-def _forces(w, load, el, path, tab, limit, trail, phi, spare, trace, F, J, shares):
+def _forces(w, load, el, path, tab, near, limit, trail, phi, spare, trace, F, J, shares):
     """Normal force of one node, and its last period as periodic returns it; 0 cycles where it sticks or stays open.
 
     There F (3, K) and J (3, K, 3K) are complete; elsewhere F lacks the harmonics of trace (2, width), J the tangents.
@@ -122,7 +124,7 @@ def _forces(w, load, el, path, tab, limit, trail, phi, spare, trace, F, J, share
     closed = _normal(w[0], load, el, path[2], least, tab, spare, F[0], J)
     if largest > 0.0 and not (least > 0.0 and _within(path, el.mu)):
         find_edges(path, path.shape[1], el.mu, trail.form)
-        found = periodic(path, el.mu, largest, EXACT if linear else TOLERANCE, limit, trail, phi)
+        found = periodic(path, el.mu, largest, near, limit, trail, phi)
         if not linear:
             forces_along(path, el.mu, found[6], trail, trace)
     else:
@@ -167,12 +169,13 @@ def _rows(path, found, el, tab, trail, scratch, trace, phi, F, J):
 
 
 @njit(_nrt=False, cache=True, error_model="numpy")
-def _lot(w, load, nodes, path, tab, limit, trail, scratch, phi, spare, trace, F, J, shares, cycles):
+def _lot(w, load, nodes, path, tab, near, limit, trail, scratch, phi, spare, trace, F, J, shares, cycles):
     """disc_batch for some nodes but for the harmonics of trace (n, 2, width); returns whether any moves."""
     moving = False
     for e in range(w.shape[0]):
         el = Node(nodes[e, 0], nodes[e, 1], nodes[e, 2], nodes[e, 3])
-        found = _forces(w[e], load[e], el, path[e], tab, limit, trail, phi, spare, trace[e], F[e], J[e], shares[e])
+        found = _forces(w[e], load[e], el, path[e], tab, near, limit, trail, phi, spare, trace[e], F[e], J[e],
+                        shares[e])
         if found[7] and J.shape[1]:
             _rows(path[e], found, el, tab, trail, scratch, trace[e], phi, F[e], J[e, 1:])
         cycles[e], moving = found[7] or 1, moving or found[7] != 0
@@ -199,13 +202,15 @@ def disc_batch(w, load, nodes, tab, patterns, limit, F, J, shares, cycles):
     was not periodic after ``limit``.
     """
     n, width = w.shape[0], tab.along.shape[1]
-    path, trace, phi = np.empty((NODES, 3, width)), np.empty((NODES, 2, width)), np.empty((2, 2))
+    path = zeros(3 * NODES * width, np.float64).reshape((NODES, 3, width))
+    trace, phi = zeros(2 * NODES * width, np.float64).reshape((NODES, 2, width)), np.empty((2, 2))
     spare = np.empty(tab.sums.shape[1]), np.empty((w.shape[2], w.shape[2])), empty_gram(w.shape[2] // 2)
+    near = (EXACT if patterns.at.itemsize == 8 else SHORT_EXACT) if J.shape[1] else TOLERANCE
     trail, scratch, F[:] = empty_trail(tab.at.shape[0], width), empty_rows(tab, patterns), 0.0
     for first in range(0, n, NODES):
         last = min(first + NODES, n)
         _paths(w[first:last], load[first:last], nodes[first:last], tab, path)
         trace[:] = 0.0
-        if _lot(w[first:last], load[first:last], nodes[first:last], path, tab, limit, trail, scratch, phi, spare,
+        if _lot(w[first:last], load[first:last], nodes[first:last], path, tab, near, limit, trail, scratch, phi, spare,
                 trace, F[first:last], J[first:last], shares[first:last], cycles[first:last]):
             _harmonics(trace, tab, F[first:last])

@@ -16,6 +16,7 @@ from numba import njit
 
 from bladefem.friction.disc import CLOSING, SLIP, STICK
 from bladefem.friction.lane_kernels import TURNS, find_turns
+from bladefem.friction.lanes import zeros
 from bladefem.friction.orbit import CHANGING, SLIDING, STICKING, middle_force, stuck_forces
 from bladefem.friction.row_kernels import add_folded, add_products, combine, join_rows, turn_rows
 from bladefem.friction.tables import Patterns, empty_gram, gram
@@ -51,10 +52,11 @@ def empty_rows(tab, patterns):
     """Scratch for one node."""
     (S, W), tile, width, dtype = patterns.change.shape, patterns.weights.shape[1], tab.along.shape[1], patterns.at.dtype
     K, M = tab.at.shape[1], 3 * W
-    return Rows(np.zeros((2, tile, M), dtype), np.zeros(tab.sums.shape[1]), np.zeros((K, W), dtype), empty_gram(K // 2),
-                np.zeros(K), np.zeros((2, M), dtype), np.zeros((2, M), dtype), np.zeros(M, dtype),
-                np.zeros((S + 1, M), dtype), np.zeros((TURNS, width), dtype), np.zeros((2, width), dtype),
-                np.zeros((2, width), dtype), np.zeros(tab.fours.shape[0], np.int64), patterns)
+    return Rows(zeros(2 * tile * M, dtype).reshape((2, tile, M)), np.zeros(tab.sums.shape[1]), np.zeros((K, W), dtype),
+                empty_gram(K // 2), np.zeros(K), zeros(2 * M, dtype).reshape((2, M)), np.zeros((2, M), dtype),
+                zeros(M, dtype), zeros((S + 1) * M, dtype).reshape((S + 1, M)),
+                zeros(TURNS * width, dtype).reshape((TURNS, width)), zeros(2 * width, dtype).reshape((2, width)),
+                zeros(2 * width, dtype).reshape((2, width)), np.zeros(tab.fours.shape[0], np.int64), patterns)
 
 
 @njit(_nrt=False, cache=True, error_model="numpy", forceinline=True)

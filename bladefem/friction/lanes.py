@@ -11,12 +11,13 @@ from __future__ import annotations
 from collections.abc import Callable
 from inspect import signature
 
+import numpy as np
 from llvmlite import ir
-from numba import types
+from numba import njit, types
 from numba.core import cgutils
 from numba.extending import intrinsic
 
-__all__ = ["BLOCK", "LANES", "Code", "Lanes", "kernel"]
+__all__ = ["BLOCK", "LANES", "Code", "Lanes", "kernel", "zeros"]
 
 BLOCK, LANES = 64, 8        # bytes of a block; numbers of 8 bytes in it
 WHOLE, HALF = ir.IntType(64), ir.IntType(32)
@@ -218,6 +219,14 @@ class _Loop:
 
     def __exit__(self, *error: object) -> None:
         self.context.__exit__(*error)
+
+
+@njit(cache=True, error_model="numpy")
+def zeros(size, dtype):
+    """Zeros (size,) that begin where a block does in memory, so that no load of a block crosses a line of the cache."""
+    room = np.zeros(size + BLOCK, dtype)
+    first = -room.ctypes.data % BLOCK // room.itemsize
+    return room[first:first + size]
 
 
 def kernel(write: Callable) -> Callable:

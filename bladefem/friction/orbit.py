@@ -34,6 +34,7 @@ from bladefem.friction.lane_kernels import (
     find_forces,
     stuck_until,
 )
+from bladefem.friction.lanes import zeros
 
 __all__ = ["CHANGING", "SLIDING", "STICKING", "TOLERANCE", "Trail", "empty_trail", "follow", "forces_along",
            "middle_force", "periodic", "start", "stuck_forces"]
@@ -64,8 +65,9 @@ class Trail(NamedTuple):
 @njit(cache=True, error_model="numpy")
 def empty_trail(S, width):
     """Scratch for one node."""
-    return Trail(np.zeros((EDGE_ROWS, width)), np.zeros((2, width)), np.zeros(width), np.zeros(S + 1, np.int64),
-                 np.zeros(S + 1, np.int64), np.zeros((2, S + 1)), np.zeros((S + 1, 8)))
+    form, knots = zeros(EDGE_ROWS * width, np.float64), zeros(2 * width, np.float64)
+    return Trail(form.reshape((EDGE_ROWS, width)), knots.reshape((2, width)), zeros(width, np.float64),
+                 np.zeros(S + 1, np.int64), np.zeros(S + 1, np.int64), np.zeros((2, S + 1)), np.zeros((S + 1, 8)))
 
 
 @njit(_nrt=False, cache=True, error_model="numpy", inline="always")

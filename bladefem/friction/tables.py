@@ -14,7 +14,7 @@ from numba import njit
 
 from bladefem.errors import InputError
 from bladefem.friction.harmonics import analysis, synthesis
-from bladefem.friction.lanes import LANES
+from bladefem.friction.lanes import BLOCK, LANES
 from bladefem.friction.row_kernels import TILE, fill_gram
 
 __all__ = ["Node", "Patterns", "Tables", "empty_gram", "gram", "patterns", "tables", "values", "weighted"]
@@ -77,10 +77,20 @@ def patterns(H: int, samples: int, dtype: type) -> Patterns:
     pad = lambda x, rows=0: np.pad(x, ((0, rows), (0, tab.W - 2 * H - 1)))     # noqa: E731
     change = np.roll(tab.knots, -1, axis=0) - tab.knots
     weights = np.pad(tab.analysis[:samples // 2 + 1], ((0, 0), (0, _tiled(H) - 2 * H - 1)))
-    made = Patterns(pad(tab.at, 1).astype(dtype), pad(tab.knots), pad(change).astype(dtype), weights.astype(dtype))
+    at, change, weights = (_aligned(x.astype(dtype)) for x in (pad(tab.at, 1), pad(change), weights))
+    made = Patterns(at, pad(tab.knots), change, weights)
     for array in made:
         array.setflags(write=False)
     return made
+
+
+def _aligned(array: np.ndarray) -> np.ndarray:
+    """A copy that begins as lanes.zeros does."""
+    room = np.empty(array.nbytes + BLOCK, np.uint8)
+    first = -room.ctypes.data % BLOCK
+    copy = room[first:first + array.nbytes].view(array.dtype).reshape(array.shape)
+    copy[:] = array
+    return copy
 
 
 def _filled(size: int) -> int:
