@@ -11,6 +11,7 @@ from __future__ import annotations
 import numpy as np
 from numba import njit
 
+from bladefem.friction.lanes import zeros
 from bladefem.friction.tables import Node, empty_gram, gram, values, weighted
 
 __all__ = ["SEPARATED", "SLIP_DOWN", "SLIP_UP", "STICK", "assemble", "bounds", "jenkins_batch", "march_states"]
@@ -184,7 +185,7 @@ def jenkins_batch(w, load, nodes, tab, F, J, shares):
     w (n, 2, K) [m]; load (n, S) [N] in place of n0, or (n, 0); nodes (n, 4): kt, kn, mu, n0.
     """
     n, S, K = w.shape[0], tab.at.shape[0], w.shape[2]
-    g, N, low, high = np.empty(S), np.empty(S), np.empty(S), np.empty(S)
+    g, N, low, high = zeros(S, np.float64), zeros(S, np.float64), zeros(S, np.float64), zeros(S, np.float64)
     state, means, block = np.empty(S, np.int8), np.empty((4, tab.sums.shape[1])), np.empty((K, K))
     rows, weight, base, around = np.empty((2, K)), np.empty(K), np.zeros(K), empty_gram(K // 2)
     for e in range(n):

@@ -63,8 +63,8 @@ def tables(H: int, samples: int) -> Tables:
     knots[:, 1:] /= np.repeat(np.cos(np.pi / samples * np.arange(1, H + 1)), 2)
     more, weights = _filled(samples) + LANES - samples, analysis(H, samples).T
     along, blank = knots[np.arange(samples + more) % samples].T, ((0, more), (0, 0))
-    made = Tables(at, at.T.copy(), sums, knots, along.copy(), np.pad(weights, blank), _fours(samples),
-                  _filled(2 * H + 1))
+    arrays = at, at.T, sums, knots, along, np.pad(weights, blank), _fours(samples)
+    made = Tables(*map(_aligned, arrays), _filled(2 * H + 1))
     for array in made[:-1]:
         array.setflags(write=False)
     return made
@@ -149,10 +149,16 @@ def weighted(m, out):
 @njit(_nrt=False, cache=True, error_model="numpy", fastmath={"contract", "reassoc", "nsz"})
 def values(transposed, c, factor, offset, out):
     """out (S,) = offset plus factor times the motion with coefficients c (K,); synthesis transposed (K, S)."""
-    first = offset + factor * c[0]
+    first, h = offset + factor * c[0], 1
     for i in range(out.size):
         out[i] = first
-    for h in range(1, c.size, 2):
-        cos, sin = factor * c[h], factor * c[h + 1]
+    while h + 2 < c.size:       # two harmonics at once
+        a, b, d, e = factor * c[h], factor * c[h + 1], factor * c[h + 2], factor * c[h + 3]
         for i in range(out.size):
-            out[i] += cos * transposed[h, i] + sin * transposed[h + 1, i]
+            out[i] += (a * transposed[h, i] + b * transposed[h + 1, i]
+                       + (d * transposed[h + 2, i] + e * transposed[h + 3, i]))
+        h += 4
+    if h < c.size:
+        a, b = factor * c[h], factor * c[h + 1]
+        for i in range(out.size):
+            out[i] += a * transposed[h, i] + b * transposed[h + 1, i]
