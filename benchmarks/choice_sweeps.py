@@ -1,32 +1,8 @@
-"""Does the automatic choice pay along a sweep of 100 frequencies? Search and checks included, against fixed models.
+"""Does the automatic choice pay along a sweep of 100 frequencies? Search and checks included, against a fixed model.
 
     python benchmarks/choice_sweeps.py [number of the sweep ...]
 
-CPU time of the choice at 2 % and at 0.1 %, over that of a fixed rich model (15 harmonics, 1024 samples, all points and
-modes), whose points start from the curve through the last ones ("rich", the measure asked for) or from the linear
-response ("cold"). Errors are the largest at any frequency, in phasors over the highest point, against 31 harmonics and
-4096 samples:
-
-    contact points              rich           cold           largest error     of the rich model   a rich point
-    2                           0.47  0.82     0.46  0.81     1.7e-3  4.0e-4    7.7e-5              0.17 ms
-    8                           0.37  0.48     0.38  0.49     3.2e-3  2.1e-4    1.5e-5              0.27 ms
-    16                          0.42  0.49     0.37  0.44     3.2e-3  2.8e-4    8.9e-6              0.55 ms
-    32                          0.19  0.33     0.13  0.22     2.1e-3  3.3e-4    4.8e-5              2.9 ms
-    8 in 3-D, lifting off       0.24  0.42     0.17  0.30     6.4e-3  5.3e-4    6.7e-3              90 ms
-    all five                    0.24  0.42
-
-One run on an idle machine; small sweeps scatter by 15 to 40 % (16 points: 0.28 and 0.35 an hour before). The body that
-lifts off is swept over its peak, in the band that a study would take. The rich model is 0.67 % off there and misses
-0.1 %; over 31 harmonics and 1024 samples, 0.12 % off, the choice takes 0.087 and 0.15. Beside the peak, between stick
-and free, where the highest point lifts off as well: 0.25 and 1.05 (errors 4.1e-3 and 5.0e-4, of the rich model 4.6e-3).
-At one frequency of it two solutions coexist, 0.12 % of the peak apart, which 10 modes do not tell.
-
-A third of the rich model's time is missed with 2 to 16 points, and with lift-off at 0.1 % against the model that misses
-the accuracy. A rich point took 0.17, 0.54, 2.1, 6.4 and 86 ms before points of up to 64 contact freedoms became one
-compiled call; the choice gained as much (sweeps at 0.1 %: 27, 23, 38 and 298 ms, now 14, 13, 27 and 95). With few
-contacts a third is a few milliseconds: models of the choice take half a millisecond each to make, and its five to nine
-checks a quarter each. 3 harmonics for all points at 0.1 % would be faster with 8 and 32 points (0.26, 0.24), but leave
-0.09 % at points that are not checked.
+DOCUMENT
 """
 
 from __future__ import annotations
@@ -35,41 +11,74 @@ import sys
 import time
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
+from pathlib import Path
 
 import numpy as np
 from choice_cases import RICH, TRUTH, Case, beam_cases, random_cases
 
 from bladefem.hbm.api import solve
+from bladefem.hbm.model import ReducedModel
 from bladefem.hbm.resonance import free_resonances, stuck_resonances
 from bladefem.hbm.solution import Solution
 from bladefem.hbm.sweep import response, size
 from bladefem.hbm.warm import compile_kernels
+from bladefem.scene_file import load_scene
 from bladefem.study.along import along
 from bladefem.study.choice import default_band
-from bladefem.study.family import family_of
-from bladefem.study.settings import first_for
+from bladefem.study.family import Family, family_of, member
+from bladefem.study.pipeline import family_of_case, load_cases, reduced_sector, run
+from bladefem.study.settings import Settings, first_for, restarted
+from bladefem.study.stages import Bodies
 
 HOLDS = (31, 1024)      # harmonics and samples of a fixed model that keeps 0.1 % over lift-off
+ACCURACIES = (0.02, 0.001)
+SCENE = "plane.toml"      # under the middle one of its loads
 
 
 @dataclass(frozen=True)
 class Swept:
-    """A model at 100 circular frequencies [rad/s]."""
+    """Models at 100 circular frequencies [rad/s]; both makers begin anew, so that what they make ready is counted."""
 
     name: str
-    case: Case
+    rich: Callable[[], ReducedModel]
+    family: Callable[[], Family]
+    first: Settings
     omegas: np.ndarray
+    repeats: int
+    truth: tuple[int, int] = TRUTH
+    every: int = 1          # frequency is compared with the truth
 
 
 def sweeps() -> Iterator[Swept]:
-    """Four beams round a mode, and a body that lifts off: over its peak, and beside it between stick and free."""
-    cases = [*beam_cases(), *random_cases()]
-    for part, points in ((1 / 12, 2), (2 / 5, 8), (3 / 5, 16), (7 / 10, 32)):
-        case = cases[int(len(cases) * part)]
-        yield Swept(f"{points} points", case, between(case))
-    body = cases[-2]
-    yield Swept("8 points in 3-D, lifting off", body, 2 * np.pi * np.linspace(*default_band(body.model, 1), 100))
-    yield Swept("8 points in 3-D, beside the peak", body, between(body))
+    """All beams of choice_cases.py round mode 2, a body that lifts off over its peak, and plane blades with dampers."""
+    for case in list(beam_cases())[2::5]:
+        yield of_case(case.name.split(" x")[0], case, between(case), 9)
+    body = list(random_cases())[-2]
+    yield of_case("body in 3-D that lifts off", body, around(body.model, 1), 1)
+    yield of_scene()
+
+
+def of_case(name: str, case: Case, omegas: np.ndarray, repeats: int) -> Swept:
+    family = family_of(case.model, case.patches)
+    return Swept(name, lambda: replace(case.model), lambda: family_of(case.model, case.patches),
+                 first_for(family.modes), omegas, repeats)
+
+
+def of_scene() -> Swept:
+    scene = load_scene(Path(__file__).parents[1] / "scenes" / SCENE, [])
+    done = run(scene, None, until="contact")
+    patches, cases = list(done.contact.problem.patches), load_cases(scene, done.mesh, done.contact)
+    case = cases[len(cases) // 2]
+    settings, reduced = reduced_sector(scene, Bodies(scene, done.mesh), case, patches, lambda name, key, make: make())
+
+    def family() -> Family:
+        return family_of_case(scene, done.mesh, reduced, patches, case)
+
+    def rich() -> ReducedModel:
+        return member(family(), Settings(family().modes, RICH[0], RICH[1], "elastic")).model
+
+    return Swept(f"{SCENE}, {case.load:g} N", rich, family, restarted(settings),
+                 around(rich(), scene.excitation.mode), 1, RICH, 4)
 
 
 def between(case: Case, points: int = 100) -> np.ndarray:
@@ -80,57 +89,77 @@ def between(case: Case, points: int = 100) -> np.ndarray:
     return np.linspace(low - 0.1 * (high - low), high + 0.1 * (high - low), points)
 
 
-def fixed(swept: Swept, settings: tuple[int, int]) -> list[Solution]:
-    """A fixed model, each point started from the curve through the last ones; made ready anew, as chosen ones are."""
-    return list(response(replace(swept.case.model), swept.omegas, *settings))
+def around(model: ReducedModel, mode: int, points: int = 100) -> np.ndarray:
+    """Circular frequencies of the band that a study would take [rad/s]."""
+    return 2 * np.pi * np.linspace(*default_band(model, mode), points)
 
 
-def cold(swept: Swept, settings: tuple[int, int]) -> list[Solution]:
-    """The same, each point started from the linear response with all contacts sticking."""
-    model = replace(swept.case.model)
-    return [solve(model, omega, *settings) for omega in swept.omegas]
+def fixed(swept: Swept, settings: tuple[int, int], every: int = 1) -> list[Solution]:
+    """A fixed model, each point started from the curve through the last ones."""
+    return list(response(swept.rich(), swept.omegas[::every], *settings))
 
 
 def chosen(swept: Swept, accuracy: float) -> list[Solution]:
     """The automatic choice."""
-    family = family_of(swept.case.model, swept.case.patches)
-    return along(family, swept.omegas, first_for(family.modes), accuracy).points
+    return along(swept.family(), swept.omegas, swept.first, accuracy).points
 
 
-def timed(swept: Swept, run: Callable[..., list[Solution]], *given: object) -> tuple[float, list[Solution]]:
-    """CPU seconds, best of several where they are short, and points."""
-    best, points = np.inf, []
-    for _ in range(9 if swept.case.model.directions == 1 else 1):
-        start = time.process_time()
-        points = run(swept, *given)
-        best = min(best, time.process_time() - start)
-    return best, points
+def measured(swept: Swept) -> dict[str, tuple[float, list[Solution]]]:
+    """CPU seconds and points of each way, best of several that take turns, since other work comes and goes."""
+    ways: dict[str, Callable[[], list[Solution]]] = {"rich": lambda: fixed(swept, RICH)}
+    ways |= {f"{100 * a:g} %": lambda a=a: chosen(swept, a) for a in ACCURACIES}
+    if swept.rich().elements.tangents > 1:
+        ways["31 harmonics"] = lambda: fixed(swept, HOLDS)
+    found: dict[str, tuple[float, list[Solution]]] = {}
+    for _ in range(swept.repeats):
+        for name, way in ways.items():
+            start = time.process_time()
+            points = way()
+            found[name] = min(time.process_time() - start, found.get(name, (np.inf,))[0]), points
+    return found
 
 
-def farthest(points: list[Solution], truth: list[Solution]) -> float:
-    """Largest distance of first harmonics over the highest point, where both were solved."""
+def farthest(points: list[Solution], truth: list[Solution], others: list[Solution] = ()) -> float:
+    """Largest distance of first harmonics over the highest point, where both were solved.
+
+    Args:
+        others: further true solutions, where several coexist; the nearer one counts.
+    """
     top = max(size(p) for p in truth if p.converged)
-    return max(abs(p.probe[1, 0] - q.probe[1, 0]) / top for p, q in zip(points, truth, strict=True)
-               if p.converged and q.converged)
+    return max(min(abs(p.probe[1, 0] - q.probe[1, 0]) for q in both if q.converged) / top
+               for p, *both in zip(points, truth, *([others] if others else []), strict=True)
+               if p.converged and both[0].converged)
+
+
+def from_there(swept: Swept, points: list[Solution]) -> list[Solution]:
+    """True solutions next to the points: where contacts lift off several coexist. Joined points start from stick."""
+    H, samples = swept.truth
+    model = swept.rich()
+    if model.directions == model.elements.tangents:
+        return []
+    return [solve(model, p.omega, H, samples, start=p if p.w.shape[:2] == model.springs.shape else None)
+            for p in points]
 
 
 def main(numbers: list[int]) -> None:
     compile_kernels()
+    total: dict[str, float] = {}
     for number, swept in enumerate(sweeps()):
         if numbers and number not in numbers:
             continue
-        truth = fixed(swept, TRUTH)
-        models = {"rich": (fixed, RICH), "rich, cold": (cold, RICH)}
-        if swept.case.model.directions > 1:
-            models["H 31"] = fixed, HOLDS
-        spent = {name: timed(swept, *model) for name, model in models.items()}
-        print(f"{swept.name}: " + ", ".join(f"{name} {1e3 * s:.1f} ms, {farthest(points, truth):.1e} off"
-                                            for name, (s, points) in spent.items()), flush=True)
-        for accuracy in (0.02, 0.001):
-            seconds, points = timed(swept, chosen, accuracy)
-            print(f"    {accuracy:g}: {1e3 * seconds:.1f} ms, {farthest(points, truth):.1e} off, "
-                  f"{sum(not p.converged for p in points)} unsolved, over "
-                  + ", ".join(f"{name} {seconds / s:.3f}" for name, (s, _) in spent.items()), flush=True)
+        found, truth = measured(swept), fixed(swept, swept.truth, swept.every)
+        rich = found["rich"][0]
+        print(f"{number:2d} {swept.name:42s} ", end="")
+        for name, (seconds, points) in found.items():
+            some, lost = points[::swept.every], sum(not p.converged for p in points)
+            print(f"{name}: {1e3 * seconds:.4g} ms ({seconds / rich:.2f}), "
+                  f"{farthest(some, truth, from_there(swept, some)):.1e} off" + f", {lost} unsolved" * (lost > 0),
+                  end="  ", flush=True)
+        print()
+        for name, (seconds, _) in found.items():
+            total[name] = total.get(name, 0.0) + seconds
+    print("   all: " + "  ".join(f"{name}: {seconds / total['rich']:.2f}" for name, seconds in total.items()
+                                 if name != "31 harmonics"))
 
 
 if __name__ == "__main__":

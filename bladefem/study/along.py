@@ -24,7 +24,8 @@ __all__ = ["along"]
 
 PASSES = 16         # of richer settings, each round one point
 COARSE = 0.02       # accuracy that the first sweep is made for where contacts may lift off
-CAUTION, LEAST = 2.0, 0.02     # error left over the last change: what hidden motion tells, times this; at least
+TINY = float(np.finfo(float).tiny)
+NEAR, LEAST = 3, 0.25       # neighbours for which a point that is less wrong than foretold speaks, and how much at most
 QUIET = 2           # neighbours that richer settings do not change, beyond which the others are left as they are
 
 
@@ -116,15 +117,20 @@ def _judged(curve: _Curve) -> Iterator[int]:
 
 
 def _confirm(curve: _Curve, i: int) -> None:
-    """Judge a point that was foretold to be too wrong; how true that was holds for the others of the same settings."""
+    """Judge a point that was foretold to be too wrong.
+
+    Where it is more wrong than that, so are all the others of the same settings; less goes for its neighbours only: an
+    error that changes its sign along the curve vanishes somewhere.
+    """
     point = curve.points[i]
     told = curve.errors[point.omega]
     if point.omega not in curve.foretold or told * size(point) <= curve.limit:
         return
     true = judge(curve.family, curve.used[i], point).total
-    for other, used in zip(curve.points, curve.used, strict=True):
-        if other.omega in curve.foretold and used == curve.used[i] and np.isfinite(true):
-            curve.errors[other.omega] *= true / told
+    for j, other in enumerate(curve.points):
+        alike = other.omega in curve.foretold and curve.used[j] == curve.used[i] and np.isfinite(true)
+        if alike and (true > told or abs(j - i) <= NEAR):
+            curve.errors[other.omega] *= max(true / told, LEAST)
     curve.errors[point.omega] = true
     curve.foretold.discard(point.omega)
 
@@ -147,7 +153,7 @@ def _raise(curve: _Curve, at: int, better: Settings, found: Indicators) -> None:
 def _foretell(curve: _Curve, old: Settings, changed: dict[int, float], found: Indicators) -> None:
     """The error of points that took more harmonics, from what these changed [m]; no richer model is solved.
 
-    The next harmonics change a point as much less as those that are left out now move less than before.
+    What is still left out changes a point by as much of the motion that `hidden` tells as it did where it did most.
     """
     places = sorted(changed)
     if not places or not _alike(old, curve.used[places[0]]) or not 0 < found.errors["harmonics"] < np.inf \
@@ -157,13 +163,12 @@ def _foretell(curve: _Curve, old: Settings, changed: dict[int, float], found: In
     samples = found.errors["samples"] * (max(old.samples, 1) / max(new.samples, 1)) ** 2
     by_harmonics = found.errors["harmonics"] / (found.errors["harmonics"] + found.errors["samples"] - samples)
     rest = found.total - found.errors["harmonics"] - found.errors["samples"] + samples
-    before = curve.moved[places].copy()
+    sizes = np.array([size(curve.points[i]) for i in places])
+    most = by_harmonics * np.max(list(map(changed.__getitem__, places)) / sizes / np.maximum(curve.moved[places], TINY))
     curve.moved[places] = hidden(curve.family, [new] * len(places), [curve.points[i] for i in places])
-    left = np.clip(CAUTION * curve.moved[places] / np.maximum(before, np.finfo(float).tiny), LEAST, 1.0)
-    for i, part in zip(places, left * by_harmonics, strict=True):
-        point = curve.points[i]
-        curve.errors[point.omega] = rest + float(part) * changed[i] / size(point)
-        curve.foretold.add(point.omega)
+    for i in places:
+        curve.errors[curve.points[i].omega] = float(rest + most * curve.moved[i])
+        curve.foretold.add(curve.points[i].omega)
 
 
 def _change(curve: _Curve, i: int, better: Settings, gained: list[tuple[float, np.ndarray]]) -> float:

@@ -58,7 +58,7 @@ __all__ = ["STAGES", "Response", "Run", "Seating", "family_of_case", "load_cases
            "studied_loads"]
 
 EXACT_HARMONICS = 3      # higher ones borrow the nodal diameter next to their own
-UNKNOWNS = 5000          # of the largest balance that the automatic choice solves; model.harmonics may ask for more
+UNKNOWNS = 6000          # of the largest balance that the automatic choice solves; model.harmonics may ask for more
 STAGES = ("mesh", "modes", "contact", "reduction", "response")
 
 
