@@ -1,41 +1,49 @@
 """Cost of the friction kernels in ns for each node and sample, with and without the Jacobian, 1000 nodes.
 
-Processor time of this thread, the best of ten runs, so that other work on the machine counts little. Run it with
+Processor time of this thread, the best of forty runs, so that other work on the machine counts little. Run it with
 ``python benchmarks/friction_kernels.py``. The first call compiles and is not measured.
 
 Recorded in one run while the other core was busy. With the Jacobian summed in double, in single precision (as Newton
 takes it), and without it:
 
-    H, samples       3, 128              5, 128              7, 512
-    3-D, stuck       8.7   8.6   5.7     15    15    7.2     9.8   9.6   5.2
-    3-D, partial     51    48    28      68    60    31      52    40    20
-    3-D, mixed       51    49    27      79    64    30      62    43    20
-    3-D, gross       45    43    19      71    56    21      62    41    16
-    1-D, stuck       6.9                 10                  7.9
-    1-D, gross       10                  15 to 18            10
+    H, samples       3, 128            5, 128            5, 256            7, 256            7, 512
+    3-D, stuck       6.4  6.6  4.7     10   9.2  5.9     6.7  6.4  4.5     9.5  9.8  5.5     7.2  6.9  4.7
+    3-D, partial     40   36   22      57   48   24      43   34   18      48   37   19      38   29   15
+    3-D, mixed       44   39   22      66   52   25      51   38   18      58   44   21      48   35   17
+    3-D, gross       40   36   17      62   47   18      50   37   15      57   43   16      49   35   15
+    1-D, stuck       6.8               9.1               6.1               10                7.5
+    1-D, mixed       17                13                9.6               14                9.3
+    1-D, gross       10                14                10                15                9.8
 
-The kernel before, double only, minutes later: partial 59, 81, 61, mixed 50, 86, 62, gross 44, 74, 65; 1-D gross some
-hours before 13, 17, 11. Partial slip took it 5.7, 4.9, 6.3 periods, now 3.8, 4.0, 4.0.
+The kernel before and this one in turn within one minute, 250 nodes whose Jacobian stays in the cache, in single:
+partial 44, 58, 42, 48, 39, now 33, 42, 34, 37, 31; mixed 48, 61, 46, 53, 43, now 39, 50, 39, 44, 37; gross 40, 54, 43,
+48, 40, now 35, 46, 39, 43, 37. On a calmer machine H 5 at 128 samples took 41, 47, 43 and H 7 at 256 took 36, 42, 40.
 
-1-D meets the 15 ns wanted but for H 5 in gross slip: 15 to 18 in this run, 14 in a quieter hour. The 40 wanted for 3-D
-are met in stick and without the derivative; in single precision H 7 is at 40 to 43, H 3 a tenth to a quarter above, H 5
-half above. Parts of a sample in gross slip in single (double), each timed alone, ns at H 3, 5, 7: sums over time 4, 8,
-9 (6, 14, 20), rows of the angle 2, 4, 4 (4, 9, 10). By a profile the rest is mostly not sums: two periods of the force
-of 3.5 each, at the latency of the product that moves the half-angle vector from edge to edge; motion, edges and their
-turns 6; joining and storing the Jacobian, 9 KB a node at H 5, 5; harmonics and Gram matrices 4. H 5 fills 11 columns up
-to 16. That the caller hands in the array for the Jacobian saves nothing: its memory is reused from call to call.
+Of what was wanted, 40 ns in 3-D and 15 in 1-D, single precision meets the first but for few samples a harmonic: H 5 at
+128 samples is up to a third above, H 7 at 256 up to a tenth. At H 5 a node costs 2.4 to 3.7 us and 19 to 28 ns a
+sample, at H 7 3.8 to 4.4 us and 20 to 28 ns: once a node come changes of state, the start of the period and writing the
+Jacobian, 9 KB at H 5. 1-D meets its 15 but at H 3 in mixed slip, whose turns the processor cannot foretell.
+
+Parts of 47 ns at H 5, 128 samples, mixed, by a profile: sums over time 9, of which the part of the normal load 4; slip
+from edge to edge 5; edges 3; how they turn the rows 2.5; rows 3; stick 1.5; changes of state 3; motion and harmonics
+2.5; Jacobian written 2.5. H 5 fills 11 columns up to 16.
 
 Calls of Newton for scenes/wedge.toml at 20 %, 96 nodes: H 3, 64 samples, sticks for 0.54, slips 0.30, is open 0.17 of
-the period, 2.6 periods: 54 ns in batches of 21 000 nodes, 67 in calls of 96. H 1: 0.67, 0.17, 0.17, 1.4 periods: 25 and
-33. H 15, 256 samples: 0.51, 0.32, 0.17, 2.9 periods: 130 and 107 (in double 210).
+the period, 2.6 periods: 47 ns in batches of 21 000 nodes (before 56), 56 in calls of 96. H 1: 0.67, 0.17, 0.17, 1.4
+periods: 22 (25) and 36. H 15, 256 samples: 0.51, 0.32, 0.17, 2.9 periods: 123 (125) and 117 (in double 150, 160).
 
-Against the kernel before, these cases and 9600 random elements, with and without Jacobian: forces equal to 1e-12 of a
-node's largest for all but 66 of 67 200, of which the worst shake down slowly and were left up to 1e-10 from their
-limit. Jacobians in double are equal to 1e-9 for all but 29 of 33 600, the worst 2e-7, mostly the same nodes. In single
-half are within 5e-8, all but 113 within 1e-6, the worst 7e-5; 32 points of square patches take as many Newton steps to
-the same displacements, to 5e-13. Both forms compile in 42 s of processor time on the busy machine, the second in 15.
+Against the kernel before, these cases and 9600 random elements, with and without Jacobian: forces equal to 3e-13 of a
+node's largest, all but 5 of 67 200 to 1e-13; Jacobians in double to 3e-10. In single half are within 9e-8 of double
+(6e-8 before), all but 100 of 21 600 within 1e-6 (113), the worst 6e-5 (7e-5); 32 points of square patches take as many
+Newton steps to the same displacements, to 4e-13. Both forms compile in 50 to 57 s of processor time on the busy machine, the
+second in 20 (48 and 17).
 
-Tried, and slower:
+What paid since: vectors look for the end of stick; an edge and its derivative share their roots; slip goes on by two
+edges at once, as a product waits for the last; the normal load is summed with the rows, not by means and Gram matrices;
+each number of the Jacobian is written once; scratch begins at lines of the cache (a tenth at H 7); calls of a node in
+line (a twentieth); in single a period is finished from 1e-8 of the limit, not 1e-11 (a twentieth of partial slip).
+
+Tried, and slower or no faster:
 
 - Rows of one node in lots of 32, added by matrix products of 32 samples (an earlier kernel).
 - A reverse sweep (adjoint of 2K numbers, the same four samples added up before the products), with explicit vectors
@@ -46,6 +54,9 @@ Tried, and slower:
 - A first period of which only the second half is followed: 1 ns less in gross slip, nothing elsewhere.
 - Leaps as long as the number of stretches of slip stays, not all states: half the periods, but a wrong limit at times.
 - References to arrays counted in the inner functions, as Numba does unless told: a fifth of the time.
+- Both tangents in one pass of the sums over time: a fiftieth less at H 3, a tenth more at H 5 for want of registers.
+- The edges that slip marked once, not in each period; Gram matrices in vectors for 1-D: nothing.
+- The Jacobian of a node written by masked stores: a tenth more than by stores that reach into the next row.
 """
 
 from __future__ import annotations
@@ -60,7 +71,7 @@ from bladefem.friction.events import evaluate_exact
 
 NODES = 1000
 MIXES = {"stuck": 0.03, "partial": 0.8, "mixed": 1.6, "gross": 12.0}    # tangential amplitude over mu N / kt, about
-SIZES = ((3, 128), (5, 128), (7, 512))
+SIZES = ((3, 128), (5, 128), (5, 256), (7, 256), (7, 512))
 
 
 def case(H: int, amplitude: float, tangents: int) -> tuple[Elements, np.ndarray]:
@@ -76,7 +87,7 @@ def case(H: int, amplitude: float, tangents: int) -> tuple[Elements, np.ndarray]
     return elements, w
 
 
-def cost(call, repeats: int = 10) -> float:
+def cost(call, repeats: int = 40) -> float:
     """Best processor time of a call [s]."""
     call()
     best = np.inf
@@ -102,7 +113,7 @@ def main() -> None:
                 print(f"{2 * tangents - 1}-D sampled {H:2d} {samples:7d}  {mix:8s} {shares} "
                       f"{' '.join(f'{x:9.1f}' for x in ns)} {forces.cycles.mean():9.1f}")
     print("\nexact 1-D, microseconds a node (independent of samples)")
-    for H, _ in SIZES:
+    for H in sorted({H for H, _ in SIZES}):
         for mix, amplitude in MIXES.items():
             elements, w = case(H, amplitude, 1)
             print(f"H {H}  {mix:8s} {1e6 * cost(lambda e=elements, w=w: evaluate_exact(e, w)) / NODES:8.2f}")
