@@ -35,8 +35,8 @@ periods: 22 (25) and 36. H 15, 256 samples: 0.51, 0.32, 0.17, 2.9 periods: 123 (
 Against the kernel before, these cases and 9600 random elements, with and without Jacobian: forces equal to 3e-13 of a
 node's largest, all but 5 of 67 200 to 1e-13; Jacobians in double to 3e-10. In single half are within 9e-8 of double
 (6e-8 before), all but 100 of 21 600 within 1e-6 (113), the worst 6e-5 (7e-5); 32 points of square patches take as many
-Newton steps to the same displacements, to 4e-13. Both forms compile in 50 to 57 s of processor time on the busy machine, the
-second in 20 (48 and 17).
+Newton steps to the same displacements, to 4e-13. Both forms compile in 50 to 57 s of processor time here,
+the second in 20 (48 and 17).
 
 What paid since: vectors look for the end of stick; an edge and its derivative share their roots; slip goes on by two
 edges at once, as a product waits for the last; the normal load is summed with the rows, not by means and Gram matrices;
