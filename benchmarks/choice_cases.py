@@ -10,8 +10,8 @@ Measured on 68 cases, CPU time, search included, over that of the fixed rich mod
 modes), all accepted, none wrong:
 
     accuracy   largest true error   all cases   60 beams   8 bodies with lift-off
-    2 %              0.67 %            0.13       0.89            0.09
-    0.1 %            0.052 %           0.19       1.00            0.14
+    2 %              0.67 %            0.13       1.05            0.09
+    0.1 %            0.052 %           0.18       1.09            0.13
 
 Frequencies of a blade share its models, the chosen ones and the rich one. What pays: one model that is richer in all
 respects tells the whole error for the price of one, and slipping points begin where they usually end. Comparing 1 and 3
