@@ -41,8 +41,8 @@ apart; there the true solution next to the chosen one counts. The body's rich mo
 
 What made it faster since ratios of 0.24 and 0.42 (of four beams and the body): harmonics that were left out are
 listened to at all points instead of judged at more of them, which also found two internal resonances that had been
-missed (0.6 % off where 0.1 % was told); errors of points that took more harmonics are foretold, not judged by 31; richer
-points start from what their neighbours gained; sweeps are compiled, which the rich model gains from as well.
+missed (0.6 % off where 0.1 % was told); errors of points that took more harmonics are foretold, not judged by 31;
+richer points start from what their neighbours gained; sweeps are compiled, which the rich model gains from as well.
 """
 
 from __future__ import annotations
