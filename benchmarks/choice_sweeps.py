@@ -7,28 +7,29 @@ modes), whose points start from the curve through the last ones. Errors are the 
 over the highest point, against 31 harmonics and 4096 samples (plane blades: every fourth, against the rich model):
 
     sweep                               2 %    0.1 %    largest error     of the rich model   a rich point
-    2 contacts, 1, 8, 60 N              0.61   0.69     8.2e-3  3.1e-4    4.4e-5              0.2 to 0.4 ms
-                                        0.52   0.92     1.7e-3  4.0e-4    7.7e-5
-                                        1.00   0.69     2.5e-4  8.6e-5    8.6e-5
-    8 contacts                          0.38   0.48     2.7e-3  1.6e-4    2.4e-5              0.4 to 0.6 ms
-                                        0.42   0.57     3.0e-3  2.3e-4    1.3e-5
-                                        0.45   0.55     3.2e-3  2.1e-4    1.5e-5
-    16 contacts, stiff                  0.34   0.55     6.1e-3  7.1e-4    1.3e-4              0.5 to 1.8 ms
-                                        0.31   0.75     2.8e-3  2.7e-4    1.0e-4
-                                        0.29   0.36     3.2e-3  2.8e-4    8.9e-6
-    32 contacts                         0.17   0.26     2.1e-3  3.3e-4    4.8e-5              1.3 to 2.6 ms
-                                        0.21   0.41     9.3e-4  2.6e-4    1.9e-5
-                                        0.18   0.21     9.3e-4  1.5e-4    7.3e-6
-    body in 3-D that lifts off          0.14   0.29     6.4e-3  4.8e-4    6.7e-3              120 ms
-    plane blades, 82 contacts, 20 N     0.17   0.81     7.6e-3  5.3e-4                        60 ms
-    beams and body together             0.15   0.30
-    all                                 0.16   0.46
+    2 contacts, 1, 8, 60 N              0.59   0.67     8.2e-3  3.1e-4    4.4e-5              0.15 to 0.3 ms
+                                        0.53   0.90     1.7e-3  4.0e-4    7.7e-5
+                                        0.90   0.64     2.5e-4  8.6e-5    8.6e-5
+    8 contacts                          0.36   0.44     2.7e-3  1.6e-4    2.4e-5              0.3 to 0.4 ms
+                                        0.38   0.49     3.0e-3  2.3e-4    1.3e-5
+                                        0.45   0.52     3.2e-3  2.1e-4    1.5e-5
+    16 contacts, stiff                  0.34   0.53     6.1e-3  7.1e-4    1.3e-4              0.5 to 1.7 ms
+                                        0.28   0.72     2.8e-3  2.7e-4    1.0e-4
+                                        0.27   0.33     3.2e-3  2.8e-4    8.9e-6
+    32 contacts                         0.17   0.28     2.1e-3  3.3e-4    4.8e-5              1.3 to 2.4 ms
+                                        0.19   0.39     9.3e-4  2.6e-4    1.9e-5
+                                        0.17   0.20     9.3e-4  1.5e-4    7.3e-6
+    body in 3-D that lifts off          0.16   0.26     6.4e-3  4.8e-4    6.7e-3              94 ms
+    plane blades, 82 contacts, 20 N     0.17   0.93     7.6e-3  5.3e-4                        43 ms
+    the twelve beams                    0.27   0.41
+    beams and body together             0.17   0.28
+    all                                 0.17   0.47
 
-One run on a machine shared with others; ratios scatter by a sixth, times by half. A third is kept together, in each
+One run on an idle machine; ratios scatter by a sixth. A third is kept together, in each
 sweep that takes the rich model long at 2 %, and at 0.1 % with 32 contacts and with lift-off but for one beam. It is
 missed
 
-- with 2 and 8 contacts, where the whole sweep takes the rich model 20 to 60 ms: half of the choice's time is making
+- with 2 and 8 contacts, where the whole sweep takes the rich model 15 to 42 ms: half of the choice's time is making
   models (a millisecond each) and checks;
 - at 0.1 % where higher harmonics are in resonance (16 contacts): seven harmonics alone take a quarter, and parts of the
   curve need 15;
@@ -37,7 +38,7 @@ missed
 
 Where contacts lift off several solutions can coexist, on the plane blades at 1018 Hz two that lie 0.45 % of the peak
 apart; there the true solution next to the chosen one counts. The body's rich model is 0.67 % off and misses 0.1 %; over
-31 harmonics and 1024 samples the choice takes 0.06 and 0.13.
+31 harmonics and 1024 samples the choice takes 0.06 and 0.10.
 
 What made it faster since ratios of 0.24 and 0.42 (of four beams and the body): harmonics that were left out are
 listened to at all points instead of judged at more of them, which also found two internal resonances that had been
