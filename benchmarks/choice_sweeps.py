@@ -26,8 +26,8 @@ over the highest point, against 31 harmonics and 4096 samples (plane blades: eve
     all                                 0.17   0.47
 
 One run on an idle machine; ratios scatter by a sixth. Beams and body together keep a third; with the plane blades they
-do not at 0.1 %. By itself each sweep that takes the rich model more than 50 ms keeps it at 2 % (0.34 one of them), and at
-0.1 % two of three with 32 contacts, one with 16 and the body. It is missed
+do not at 0.1 %. By itself each sweep that takes the rich model more than 50 ms keeps it at 2 % (0.34 one of them), and
+at 0.1 % two of three with 32 contacts, one with 16 and the body. It is missed
 
 - with 2 and 8 contacts, where the whole sweep takes the rich model 15 to 42 ms: half of the choice's time is making
   models (a millisecond each) and checks;

@@ -205,6 +205,6 @@ def test_F28_internal_resonances_between_the_checks(monkeypatch):
         top = max(size(p) for p in curve.points)
         return max(abs(curve.points[i].probe[1, 0] - p.probe[1, 0]) / top for i, p in zip(spikes, truth, strict=True))
 
-    assert worst() < 1e-3                           # measured 7e-5 in the spikes, 7e-4 elsewhere
+    assert worst() < 1e-3                           # measured 8e-5 in the spikes, 7e-4 elsewhere
     monkeypatch.setattr(watched, "LOUDEST", 0)
     assert worst() > 4e-3
