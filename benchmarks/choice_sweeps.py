@@ -20,7 +20,7 @@ over the highest point, against 31 harmonics and 4096 samples (plane blades: eve
                                         0.19   0.39     9.3e-4  2.6e-4    1.9e-5
                                         0.17   0.20     9.3e-4  1.5e-4    7.3e-6
     body in 3-D that lifts off          0.16   0.26     6.4e-3  4.8e-4    6.7e-3              94 ms
-    plane blades, 82 contacts, 20 N     0.17   0.93     7.6e-3  5.3e-4                        43 ms
+    plane blades, 82 contacts, 20 N     0.17   0.93     7.6e-3  4.1e-4                        43 ms
     the twelve beams                    0.27   0.41
     beams and body together             0.17   0.28
     all                                 0.17   0.47

@@ -147,25 +147,32 @@ def _raise(curve: _Curve, at: int, better: Settings, found: Indicators) -> None:
                 break
             changed[i] = _change(curve, i, better, gained)
             quiet = quiet + 1 if changed[i] <= limit else 0
-    _foretell(curve, old, {i: change for i, change in changed.items() if 0 < change < np.inf}, found)
+    raised = sorted(i for i in changed if curve.used[i] == better)
+    before = curve.moved.copy()
+    curve.moved[raised] = hidden(curve.family, [better] * len(raised), [curve.points[i] for i in raised])
+    if _alike(old, better):
+        _foretell(curve, (old, better), {i: changed[i] for i in raised if changed[i] < np.inf}, before, found)
 
 
-def _foretell(curve: _Curve, old: Settings, changed: dict[int, float], found: Indicators) -> None:
+def _foretell(curve: _Curve, settings: tuple[Settings, Settings], changed: dict[int, float], before: np.ndarray,
+              found: Indicators) -> None:
     """The error of points that took more harmonics, from what these changed [m]; no richer model is solved.
 
     What is still left out changes a point by as much of the motion that `hidden` tells as it did where it did most.
+
+    Args:
+        settings: the former and the present ones.
+        before: what `hidden` told of all points with the former ones.
+        found: what the former ones were wrong by, at one of the points.
     """
     places = sorted(changed)
-    if not places or not _alike(old, curve.used[places[0]]) or not 0 < found.errors["harmonics"] < np.inf \
-            or not np.isfinite(found.total):
+    if not places or not 0 < found.errors["harmonics"] < np.inf or not np.isfinite(found.total):
         return
-    new = curve.used[places[0]]
+    old, new = settings
     samples = found.errors["samples"] * (max(old.samples, 1) / max(new.samples, 1)) ** 2
     by_harmonics = found.errors["harmonics"] / (found.errors["harmonics"] + found.errors["samples"] - samples)
     rest = found.total - found.errors["harmonics"] - found.errors["samples"] + samples
-    sizes = np.array([size(curve.points[i]) for i in places])
-    most = by_harmonics * np.max(list(map(changed.__getitem__, places)) / sizes / np.maximum(curve.moved[places], TINY))
-    curve.moved[places] = hidden(curve.family, [new] * len(places), [curve.points[i] for i in places])
+    most = by_harmonics * max(changed[i] / size(curve.points[i]) / max(before[i], TINY) for i in places)
     for i in places:
         curve.errors[curve.points[i].omega] = float(rest + most * curve.moved[i])
         curve.foretold.add(curve.points[i].omega)
