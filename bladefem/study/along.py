@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from ..errors import NotSolvedError
+from ..errors import InputError, NotSolvedError
 from ..hbm.ahead import AHEAD, ahead
 from ..hbm.api import solve
 from ..hbm.newton import Options
@@ -61,8 +61,13 @@ def along(family: Family, omegas: Sequence[float], settings: Settings, accuracy:
         the points and the settings of the highest; others may have been solved with fewer harmonics, samples, ...
 
     Raises:
+        InputError: no frequencies, or an accuracy that is none.
         NotSolvedError: no point converged.
     """
+    if not len(omegas):
+        raise InputError("omegas: none given, expected at least one circular frequency")
+    if not 0 < accuracy < 1:
+        raise InputError(f"accuracy {accuracy}: expected a relative error above 0 and below 1, such as 0.02")
     options, settings = sufficient(accuracy), _first(family, settings, accuracy)
     points = list(response(member(family, settings).model, omegas, settings.harmonics, settings.samples,
                            options=options))

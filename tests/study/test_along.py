@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 
+from bladefem.errors import InputError
 from bladefem.hbm.api import solve
 from bladefem.hbm.newton import Options
 from bladefem.hbm.reference import reference_model
@@ -66,3 +67,11 @@ def test_points_that_stick_take_the_excited_harmonic_alone(blade, omegas):
         lean, full = solve(blade, omega, 7, 256, options=frugal), solve(blade, omega, 7, 256)
         assert (lean.harmonics == 1) == (full.states["stick"] == 2)
         assert lean.probe[1, 0] == pytest.approx(full.probe[1, 0], rel=1e-9)
+
+
+@pytest.mark.parametrize(("omegas", "accuracy", "named"), [([], 0.02, "omegas"), ([8300.0], -1.0, "accuracy -1"),
+                                                           ([8300.0], np.nan, "accuracy nan"),
+                                                           ([np.nan], 0.02, "omega nan")])
+def test_bad_input_is_named(blade, omegas, accuracy, named):
+    with pytest.raises(InputError, match=named):
+        along(family_of(blade, (1, 1)), omegas, first_for(len(blade.side(1).omega)), accuracy)
