@@ -24,6 +24,7 @@ from .woodbury import bodies_of
 __all__ = ["overtones"]
 
 INSTANTS = 4        # for each harmonic
+BESIDE = 1e-7       # of a frequency: how far beside it bodies are looked at, which without damping may be hit exactly
 
 
 def overtones(model: ReducedModel, points: Sequence[Solution], most: int) -> np.ndarray:
@@ -41,7 +42,8 @@ def overtones(model: ReducedModel, points: Sequence[Solution], most: int) -> np.
                          f"points, below {most}")
     w = np.array([p.w for p in points])
     forces, orders = _harmonics(model, w, most), np.arange(H + 1, most + 1)
-    motion = sum(_motion(body, orders, np.array([p.omega for p in points]), forces) for body in bodies_of(model, most))
+    omegas = (1 + BESIDE) * np.array([p.omega for p in points])
+    motion = sum(_motion(body, orders, omegas, forces) for body in bodies_of(model, most))
     first = np.sum(w[..., 1:3]**2, axis=(1, 2, 3))
     return np.sqrt(np.sum(abs(motion)**2, axis=(0, 2)) / np.maximum(first, np.finfo(float).tiny))
 

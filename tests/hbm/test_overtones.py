@@ -1,5 +1,7 @@
 """The motion of harmonics that were left out: against the solution that has them, and where one meets a mode."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from models import block, single_mass
@@ -8,6 +10,7 @@ from bladefem.errors import InputError
 from bladefem.friction.aft import evaluate
 from bladefem.friction.harmonics import to_complex
 from bladefem.hbm.api import solve
+from bladefem.hbm.model import Damping
 from bladefem.hbm.overtones import _harmonics, overtones
 from bladefem.hbm.reference import reference_model
 
@@ -39,3 +42,10 @@ def test_points_of_other_harmonics_are_refused():
     model = single_mass()
     with pytest.raises(InputError, match="harmonics"):
         overtones(model, [solve(model, 0.9, 3, 128), solve(model, 0.9, 5, 128)], 7)
+
+
+def test_a_resonance_without_damping_is_no_failure():
+    model = replace(block(nodes=2, force=2.0), damping=Damping())
+    points = [solve(model, float(omega) / 5, 3, 128) for omega in model.side(1).omega]      # harmonic 5 hits it exactly
+    moved = overtones(model, [p for p in points if p.converged and p.states["stick"] < 3], 7)
+    assert len(moved) and np.isfinite(moved).all()
