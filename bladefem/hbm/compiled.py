@@ -10,14 +10,16 @@ from numba import njit
 
 from ..friction.events import _batch as exact_batch
 from ..friction.jenkins import jenkins_batch
-from .krylov import apply, apply_modes, conjugate_residuals
+from .coarse import MANY, no_level, second_level
+from .flex import among, apply, apply_modes, flexed, formed
+from .krylov import conjugate_residuals
+from .lu import back_substitute, factorise, factorise_large
 
-__all__ = ["CONVERGED", "EXHAUSTED", "INFINITE", "SINGULAR", "STALLED", "back_substitute", "compiled_newton",
-           "factorise", "factorise_large", "norm"]
+__all__ = ["CONVERGED", "EXHAUSTED", "INFINITE", "SINGULAR", "STALLED", "compiled_newton", "norm"]
 
 CONVERGED, EXHAUSTED, STALLED, SINGULAR, INFINITE, SEARCHING = 0, 1, 2, 3, 4, 5
-BLOCK = 32                  # columns of a block
 LARGE = 64                  # unknowns from which blocks pay, and iterations where they arrive
+DENSE = 5000                # unknowns up to which dense factors are the last resort: 200 MB, some seconds
 FINEST, COARSEST = 1e-6, 1e-4     # accuracy of a step by iterations, relative,
 CLOSE = 1e-2                # where no more is needed to arrive,
 ROUGH = 1e-3                # and of the one that the line search looks at; coarser ones mislead it
@@ -44,7 +46,7 @@ def _move(w, share, step, out):
 @njit(cache=True, error_model="numpy")
 def _evaluate(w, d, linear, contact, work):
     """Forces and residual at w (m, K); fills work and returns the error of `bladefem.hbm.residual`."""
-    A, G, stuck, springs, scale, shapes, residual, modal = linear
+    flex, G, stuck, springs, scale, shapes, residual, modal, _ = linear
     load, base, nodes, tab, brackets, preload = contact
     full, F, J, shares, p, r = work
     n, K = nodes.shape[0], w.shape[1]
@@ -61,13 +63,13 @@ def _evaluate(w, d, linear, contact, work):
         for k in range(K):
             p[i, k] = F[i // d, 2 - d + i % d, k] - springs[i] * w[i, k] - (preload[i] if k == 0 else 0.0)
             r[i, k] = w[i, k] - stuck[i, k]
-    apply(A, p, r)
+    flexed(flex, p, r)
     sprung, bare = np.empty(r.shape), np.empty(r.shape)
     for i in range(w.shape[0]):
         for k in range(K):
             sprung[i, k] = springs[i] * r[i, k] if k else 0.0
             bare[i, k] = r[i, k]
-    if G.shape[0] == A.shape[0]:
+    if 2 * G.shape[0] - 1 == K:
         apply(G, sprung, bare)
     else:
         apply_modes(shapes, residual, modal, sprung, bare)
@@ -95,87 +97,22 @@ def _jacobian(A, C):
 
 
 @njit(cache=True, error_model="numpy")
-def factorise(M, pivots):
-    """LU factors in place with partial pivoting; False where a pivot is zero."""
-    return eliminated(M, pivots, 0, M.shape[0])
-
-
-@njit(cache=True, error_model="numpy")
-def eliminated(M, pivots, low, high):
-    """Columns low to high of such factors, rows exchanged as a whole; False where a pivot is zero."""
-    size = M.shape[0]
-    for k in range(low, high):
-        best = k
-        for i in range(k + 1, size):
-            if abs(M[i, k]) > abs(M[best, k]):
-                best = i
-        pivots[k] = best
-        if not abs(M[best, k]) > 0.0:
-            return False
-        if best != k:
-            for j in range(size):
-                M[k, j], M[best, j] = M[best, j], M[k, j]
-        for i in range(k + 1, size):
-            factor = M[i, k] / M[k, k]
-            M[i, k] = factor
-            if factor != 0.0:
-                for j in range(k + 1, high):
-                    M[i, j] -= factor * M[k, j]
-    return True
-
-
-@njit(cache=True, error_model="numpy")
-def factorise_large(M, pivots):
-    """The same for a contiguous real matrix, in blocks of columns: most of the work is one matrix product a block."""
-    size = M.shape[0]
-    for low in range(0, size, BLOCK):
-        high = min(low + BLOCK, size)
-        if not eliminated(M, pivots, low, high):
-            return False
-        for k in range(low, high if high < size else low):
-            for i in range(k + 1, high):
-                factor = M[i, k]
-                for j in range(high, size):
-                    M[i, j] -= factor * M[k, j]
-        if high < size:
-            left, right = np.ascontiguousarray(M[high:, low:high]), np.ascontiguousarray(M[low:high, high:])
-            M[high:, high:] -= np.dot(left, right)
-    return True
-
-
-@njit(cache=True, error_model="numpy")
-def back_substitute(M, pivots, x):
-    """x becomes M^-1 x."""
-    size = M.shape[0]
-    for k in range(size):
-        if pivots[k] != k:
-            x[k], x[pivots[k]] = x[pivots[k]], x[k]
-    for i in range(size):
-        for j in range(i):
-            x[i] -= M[i, j] * x[j]
-    for i in range(size - 1, -1, -1):
-        for j in range(i + 1, size):
-            x[i] -= M[i, j] * x[j]
-        x[i] /= M[i, i]
-
-
-@njit(cache=True, error_model="numpy")
-def _factors(A, C):
+def _factors(flex, C):
     """LU factors and pivots of 1 + A C; without pivots where it is singular."""
-    M = _jacobian(A, C)
+    M = _jacobian(formed(flex), C)
     pivots = np.empty(M.shape[0], np.int64)
     regular = factorise_large(M, pivots) if pivots.size > LARGE else factorise(M, pivots)
     return M, pivots if regular else pivots[:0]
 
 
 @njit(cache=True, error_model="numpy")
-def _inverse(r, accuracy, A, C, factors):
+def _inverse(r, accuracy, flex, C, factors, level):
     """(a K,) the solution of (1 + A C) x = r, and the factors where they were needed."""
     x = np.empty(r.size)
-    if r.size > LARGE and factors[1].size == 0 and conjugate_residuals(A, C, r, accuracy, x):
+    if r.size > LARGE and factors[1].size == 0 and conjugate_residuals(flex, C, r, accuracy, level, x):
         return x, factors
-    if factors[1].size == 0:
-        factors = _factors(A, C)
+    if factors[1].size == 0 and r.size <= DENSE:
+        factors = _factors(flex, C)
     x[:] = r
     if factors[1].size:
         back_substitute(factors[0], factors[1], x)
@@ -185,14 +122,14 @@ def _inverse(r, accuracy, A, C, factors):
 
 
 @njit(cache=True, error_model="numpy")
-def _spread(x, r, d, active, C, A, step):
+def _spread(x, r, d, active, C, flex, step):
     """Fill step (m, K) with x at the active nodes; the others follow from their residual and the active forces."""
     m, K = r.shape
     p, shift, size = np.zeros((m, K)), np.zeros((m, K)), d * K
     if 0 < active.size < m // d:
         for y in range(active.size):
             p[active[y] * d:(active[y] + 1) * d] = np.dot(C[y], x[y * size:(y + 1) * size]).reshape(d, K)
-        apply(A, p, shift)
+        flexed(flex, p, shift)
     for i in range(m):
         for k in range(K):
             step[i, k] = r[i, k] - shift[i, k]
@@ -224,26 +161,14 @@ def _moving(J, springs, d, sticks):
 
 
 @njit(cache=True, error_model="numpy")
-def _among(A, active, d):
-    """(H+1, a, a) the flexibilities among the freedoms of the active nodes."""
-    if active.size * d == A.shape[1]:
-        return A
-    out = np.empty((A.shape[0], active.size * d, active.size * d), A.dtype)
-    for h in range(A.shape[0]):
-        for i in range(out.shape[1]):
-            for j in range(out.shape[2]):
-                out[h, i, j] = A[h, active[i // d] * d + i % d, active[j // d] * d + j % d]
-    return out
-
-
-@njit(cache=True, error_model="numpy")
 def compiled_newton(w, d, linear, contact, sticks, tolerance, iterations, shortest):
     """Newton from w (m, K), changed in place to the end.
 
     Args:
         d: directions a node, 1 (tangent) or 2 (normal, tangent).
-        linear: A, G with its harmonic 0 left out (H+1, m, m), stuck (m, K), springs (m,), size of the linear motion,
-            and where G is not there C, R, D of `apply_modes`, which stand for it.
+        linear: the flexibility A as `flex` gives it, G with its harmonic 0 left out (H+1, m, m), stuck (m, K), springs
+            (m,), size of the linear motion, where G is not there C, R, D of `apply_modes`, which stand for it, and the
+            common motions (m, q or 0) of `coarse`.
         contact: prescribed loads (n, S) or (n, 0), their coefficients (n, K), nodes (n, 4), tables, brackets
             (0: sampled), preload (m,).
 
@@ -255,15 +180,15 @@ def compiled_newton(w, d, linear, contact, sticks, tolerance, iterations, shorte
     n = m // d
     work = (np.zeros((n, 2, K)), np.zeros((n, 2, K)), np.zeros((n, 2, K, 2, K)), np.zeros((n, 3)), np.zeros((m, K)),
             np.zeros((m, K)))
-    A, springs, J, r = linear[0], linear[3], work[2], work[5]
+    flex, springs, J, r, motions = linear[0], linear[3], work[2], work[5], linear[8]
     step, after, trial = np.empty((m, K)), np.empty((m, K)), w.copy()
     active, C = _moving(J, springs, d, np.inf)
-    few, factors = A, (np.empty((0, 0)), np.empty(0, np.int64))
+    few, factors, level = flex, (np.empty((0, 0)), np.empty(0, np.int64)), no_level()
     code, steps, share, before, error = SEARCHING, -1, 1.0, np.inf, np.inf
     while code == SEARCHING:
         fresh = _evaluate(trial, d, linear, contact, work)
         if steps >= 0 and not fresh <= tolerance:
-            factors = _step(r, ROUGH, d, active, C, A, few, factors, after)
+            factors = _step(r, ROUGH, d, active, C, flex, few, factors, level, after)
             if not norm(after) <= (1 - 0.25 * share) * before:
                 share /= 2
                 if share < shortest:
@@ -276,9 +201,11 @@ def compiled_newton(w, d, linear, contact, sticks, tolerance, iterations, shorte
             code = CONVERGED if error <= tolerance else (EXHAUSTED if np.isfinite(error) else INFINITE)
             break
         active, C = _moving(J, springs, d, sticks)
-        few, factors = _among(A, active, d), (factors[0][:0, :0], factors[1][:0])
+        few, factors = among(flex, active, d), (factors[0][:0, :0], factors[1][:0])
+        wide = motions.size > 0 and active.size * d * K >= MANY
+        level = second_level(few, C, motions, active, d) if wide else no_level()
         needed = max(FINEST, min(0.1 * error, COARSEST), min(0.1 * tolerance / error, CLOSE))
-        factors = _step(r, needed, d, active, C, A, few, factors, step)
+        factors = _step(r, needed, d, active, C, flex, few, factors, level, step)
         before, share = norm(step), 1.0
         if not np.isfinite(before):
             code = SINGULAR
@@ -287,12 +214,12 @@ def compiled_newton(w, d, linear, contact, sticks, tolerance, iterations, shorte
 
 
 @njit(cache=True, error_model="numpy")
-def _step(r, accuracy, d, active, C, A, few, factors, step):
+def _step(r, accuracy, d, active, C, flex, few, factors, level, step):
     """Fill step (m, K) with the inverse derivative times r (m, K); returns the factors where they were needed."""
     K = r.shape[1]
     among = np.empty((active.size * d, K))
     for y in range(active.size):
         among[y * d:(y + 1) * d] = r[active[y] * d:(active[y] + 1) * d]
-    x, factors = _inverse(among.reshape(among.size), accuracy, few, C, factors)
-    _spread(x, r, d, active, C, A, step)
+    x, factors = _inverse(among.reshape(among.size), accuracy, few, C, factors, level)
+    _spread(x, r, d, active, C, flex, step)
     return factors

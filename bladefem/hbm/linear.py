@@ -18,7 +18,7 @@ from .bodies import amplitudes, block, flexibility, motion, receptance
 from .model import ReducedModel
 from .woodbury import low_rank, updated
 
-__all__ = ["SMALL", "Linear", "condense", "receptance", "rigid_motions"]
+__all__ = ["SMALL", "Linear", "condense", "receptance", "rigid_motions", "with_springs"]
 
 SMALL = 64             # contact dofs below which all harmonics are solved in one call
 UNSEEN = 1e-12         # motions that the contact springs resist less than this, relatively, are left out
@@ -58,8 +58,8 @@ def condense(model: ReducedModel, omega: float, harmonics: int) -> Linear:
         A = updated(fixed, orders, first)
         stuck = free - (A @ (springs * free)[:, :, None])[:, :, 0]
     if B.shape[1]:
-        A[0], stuck[0] = model.once("mean with springs", lambda: _with_springs(G[0].real, free[0].real, springs, B, g,
-                                                                              model.hold))
+        A[0], stuck[0] = model.once("mean with springs", lambda: with_springs(G[0].real, free[0].real, springs, B, g,
+                                                                             model.hold))
     if not model.coupled:       # w_0 = 0
         G[0], free[0], A[0], stuck[0] = 0.0, 0.0, 0.0, 0.0
         B, g, rigid = B[:, :0], g[:0], rigid[:, :0]
@@ -121,7 +121,7 @@ def rigid_motions(model: ReducedModel, springs: np.ndarray) -> tuple[np.ndarray,
     return B @ rigid, rigid.T @ loads, rigid
 
 
-def _with_springs(G: np.ndarray, free: np.ndarray, springs: np.ndarray, B: np.ndarray,
+def with_springs(G: np.ndarray, free: np.ndarray, springs: np.ndarray, B: np.ndarray,
                   g: np.ndarray, hold: float) -> tuple[np.ndarray, np.ndarray]:
     """Flexibility and displacement of harmonic 0 with contact springs, motions without stiffness eliminated."""
     m, r = B.shape

@@ -15,7 +15,7 @@ from .residual import STICKS, Balance, Inverse, State, contact_table, evaluate_b
 
 __all__ = ["DEFAULTS", "Newton", "Options", "fits", "newton"]
 
-COMPILED = 5000         # unknowns of 1-D elements up to which the loop is compiled: beyond, no dense factors help out
+COMPILED = 20000        # unknowns of 1-D elements up to which the loop is compiled
 SHORTEST = 2.0**-8     # step share below which the search direction is given up
 
 

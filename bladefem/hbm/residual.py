@@ -17,6 +17,8 @@ from ..friction.aft import Forces, evaluate
 from ..friction.events import evaluate_exact
 from ..friction.harmonics import to_complex, to_real
 from ..friction.tables import tables
+from .coarse import common_motions
+from .flex import by_harmonic
 from .iterative import Memory, iterative_inverse
 from .linear import Linear
 from .model import ReducedModel
@@ -200,7 +202,9 @@ def linear_arguments(balance: Balance) -> tuple[np.ndarray, ...]:
     G = linear.G.copy()
     G[0] = 0.0
     none = np.zeros((0, 0, 0), dtype=complex)
-    return linear.A, G, to_real(linear.stuck.T), linear.springs, _scale(linear), none, none, none.reshape(0, 0)
+    motions = common_motions(balance.model, len(G) - 1)
+    return (by_harmonic(linear.A), G, to_real(linear.stuck.T), linear.springs, _scale(linear), none, none,
+            none.reshape(0, 0), motions)
 
 
 def contact_table(model: ReducedModel, H: int, samples: int) -> tuple:

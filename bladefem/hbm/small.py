@@ -16,8 +16,9 @@ from numba import njit
 from ..data import RigidBody
 from .ahead import AHEAD, ahead, shifted
 from .bodies import Stack, rigid_stack
+from .coarse import common_motions
 from .compiled import CONVERGED, compiled_newton, norm
-from .linear import rigid_motions
+from .linear import rigid_motions, with_springs
 from .model import ReducedModel
 from .newton import COMPILED, SHORTEST, Options
 from .residual import STICKS, contact_table
@@ -28,6 +29,7 @@ from .woodbury import staying
 __all__ = ["small", "solve_along", "solve_each", "solve_small"]
 
 SMALL = 200         # contact freedoms up to which points are solved here
+WIDE = 64           # contact freedoms from which a flexibility that serves all harmonics is not formed
 FEW = 2             # contact freedoms for each mode from which the springs are added by the modes
 STATES = ("stick", "slip", "lift", "open")
 
@@ -99,7 +101,7 @@ def _points(omegas, body, held, springs, contact, d, H, known, at, count, chaine
     ends, counts, measures = np.empty((p, 2)), np.empty((p, 4), np.int64), np.empty((p, 7))
     probe, done = np.empty((p, *body[9].shape), np.complex128), 0
     for i in range(p):
-        flexible, linear, mean, free = linear_part(omegas[i], body, held, springs, H)
+        flexible, linear, free = linear_part(omegas[i], body, springs, H)
         if count:
             ahead(omegas[i], known, at, count, w[i])
         else:
@@ -109,8 +111,8 @@ def _points(omegas, body, held, springs, contact, d, H, known, at, count, chaine
         if code != CONVERGED:
             break
         done, ends[i, 0], ends[i, 1] = i + 1, steps, error
-        f[i], probe[i], counts[i], measures[i] = _measure(omegas[i], body, held, springs, (flexible, mean, free), w[i],
-                                                          d, F, contact[5], residual, shares)
+        f[i], probe[i], counts[i], measures[i] = _measure(omegas[i], body, held, springs, (flexible, free), w[i], d, F,
+                                                          contact[5], residual, shares)
         if chained:
             sticks = counts[i, 0] == m // d
             count = 0 if sticks else shifted(omegas[i], w[i], known, at, count)
@@ -152,16 +154,48 @@ def _prepare(model: ReducedModel, H: int) -> tuple | None:
     load = np.pad(blades.shapes[:, blades.load], ((0, 0), (0, 0), (0, spare)))
     probe = np.pad(blades.shapes[:, blades.probe], ((0, 0), (0, 0), (0, spare)))
     residual, springs = sum(b.residual[:, b.contact, b.contact] for b in bodies), model.springs.ravel()
+    direct = (blades.residual[:, blades.contact, blades.load] @ loads[:, :, None])[:, :, 0]
+    push = (loads[:, None] @ load.conj())[:, 0]
+    B, g, rigid = model.once("rigid", lambda: rigid_motions(model, springs))
     fixed = staying(residual, contact, springs) if FEW * contact.shape[2] <= dofs else [np.zeros((0, 0, 0))] * 4
     body = (*joined.values(), *(np.ascontiguousarray(a, dtype=complex) for a in (
-        contact, residual, probe, blades.residual[:, blades.probe, blades.contact],
-        (loads[:, None] @ load.conj())[:, 0],
-        (blades.residual[:, blades.contact, blades.load] @ loads[:, :, None])[:, :, 0],
-        (blades.residual[:, blades.probe, blades.load] @ loads[:, :, None])[:, :, 0], *fixed)))
-    B, g, rigid = model.once("rigid", lambda: rigid_motions(model, springs))
+        contact, residual, probe, blades.residual[:, blades.probe, blades.contact], push, direct,
+        (blades.residual[:, blades.probe, blades.load] @ loads[:, :, None])[:, :, 0], *fixed)),
+        common_motions(model, H),
+        _mean(joined, contact[0], residual[0], push[0], direct[0], (springs, B, g, model.hold)),
+        _one_for_all(fixed, dofs), *_pushed(fixed, springs, push, direct))
     still = np.flatnonzero(blades.omega[0] == 0)
     held = (np.ascontiguousarray(B), g, np.ascontiguousarray(rigid[:len(still)]), still, model.hold)
     return body, held, springs
+
+
+def _mean(joined: dict[str, np.ndarray], shapes: np.ndarray, residual: np.ndarray, push: np.ndarray, direct: np.ndarray,
+          held: tuple) -> tuple[np.ndarray, ...]:
+    """Of the mean, whatever the frequency: A (m, m), stuck (m,), G (m, m); see `linear`."""
+    own = joined["omega"][0]
+    D = np.divide(1.0, own**2, out=np.zeros_like(own), where=own > 0)
+    G, free = (residual + (shapes * D) @ shapes.conj().T).real, (direct + shapes @ (D * push)).real
+    A, stuck = with_springs(G, free, *held)
+    return np.ascontiguousarray(A), stuck.astype(complex), np.ascontiguousarray(G)
+
+
+def _one_for_all(fixed: Sequence[np.ndarray], dofs: int) -> tuple[np.ndarray, np.ndarray]:
+    """R (m, m) and U (m, M) of `flex`; without rows where it takes its other form."""
+    R, U = fixed[:2]
+    if dofs < WIDE or len(U) != 1 or np.iscomplexobj(R) or np.any(U.imag):
+        return np.zeros((0, 0)), np.zeros((0, 0))
+    return np.ascontiguousarray(R[0]), np.ascontiguousarray(U[0].real)
+
+
+def _pushed(fixed: Sequence[np.ndarray], springs: np.ndarray, push: np.ndarray,
+            direct: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """(H+1, m) what a direct push at the contact moves beside the modes in full stick, (H+1, M) what pushes these."""
+    R, _, UH, _ = fixed
+    if not len(R):
+        return np.zeros((0, 0), dtype=complex), np.zeros((0, 0), dtype=complex)
+    at = np.minimum(np.arange(len(push)), len(R) - 1)
+    sprung = (springs * direct)[:, :, None]
+    return (direct - (R[at] @ sprung)[:, :, 0]).astype(complex), (push - (UH[at] @ sprung)[:, :, 0]).astype(complex)
 
 
 def _reversed(body: Stack) -> Stack:
@@ -196,7 +230,8 @@ def _measure(omega, body, held, springs, linear, w, d, F, preload, residual, sha
 @njit(cache=True, error_model="numpy")
 def _motion(body, held, linear, load, w, springs):
     """Modal amplitudes (H+1, M) and probes (H+1, p) under the excitation and the contact load (m, K)."""
-    flexible, mean, free = linear
+    flexible, free = linear
+    mean = body[15][2]
     contact, probes, across, push, direct = body[3], body[5], body[6], body[7], body[9]
     m, H, M = load.shape[0], flexible.shape[0] - 1, flexible.shape[1]
     B, r = held[0], held[0].shape[1]

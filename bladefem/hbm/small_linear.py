@@ -1,7 +1,8 @@
 """The linear bodies of a small model at one frequency, compiled: flexibilities without and with contact springs.
 
 `bladefem.hbm.linear` does the same in NumPy. Where there are few modes for the contact freedoms, neither flexibility
-without springs, G = R + C D C^H, is formed, nor is a system as large as the contact solved: see `woodbury`.
+without springs, G = R + C D C^H, is formed, nor is a system as large as the contact solved: see `woodbury`. Where they
+are the same for all harmonics as well, not even the flexibility with springs is formed: see `flex`.
 """
 
 from __future__ import annotations
@@ -10,33 +11,50 @@ import numpy as np
 from numba import njit
 
 from .compiled import norm
+from .flex import by_harmonic
 
 __all__ = ["linear_part"]
 
 
 @njit(cache=True, error_model="numpy")
-def linear_part(omega, body, held, springs, H):
-    """Modal flexibilities D (H+1, M), what the compiled Newton needs, G of the mean (m, m), free (H+1, m)."""
-    own, contact, residual, m = body[0], body[3], body[4], springs.size
-    D, free, A, stuck = _modal(omega, body, H), np.empty((H + 1, m), np.complex128), np.empty(
-        (H + 1, m, m), np.complex128), np.empty((H + 1, m), np.complex128)
-    few = body[10].shape[0] > 0
-    G = np.empty((1 if few else H + 1, m, m), np.complex128)
+def linear_part(omega, body, springs, H):
+    """Modal flexibilities D (H+1, M), what the compiled Newton needs, free (H+1, m).
+
+    Args:
+        body: what `small` has prepared.
+    """
+    contact, residual, push, direct, m = body[3], body[4], body[7], body[8], springs.size
+    D, free, stuck = _modal(omega, body, H), np.empty((H + 1, m), np.complex128), np.empty((H + 1, m), np.complex128)
     for h in range(H + 1):
-        s = min(h, own.shape[0] - 1)
-        pushed = contact[s] * D[h]
-        free[h] = body[8][h] + np.dot(pushed, body[7][h])
-        if few and h:
-            _spring_by_modes(omega, h, body, springs, A[h], stuck[h])
-            continue
-        G[h] = residual[min(h, residual.shape[0] - 1)] + np.dot(pushed, contact[s].conj().T)
-        if h == 0:
-            free[0], G[0] = free[0].real, G[0].real
-        _spring(G[h], free[h], springs, held, held[0].shape[1] if h == 0 else 0, A[h], stuck[h])
-    mean = G[0].real.copy()
-    G[0] = 0.0
+        s = min(h, contact.shape[0] - 1)
+        for i in range(m):
+            free[h, i] = direct[h, i]
+            for k in range(D.shape[1]):
+                free[h, i] += contact[s, i, k] * D[h, k] * push[h, k]
+    mean, stuck[0] = body[15][0], body[15][1]
+    few, one = body[10].shape[0] > 0, body[16][0].shape[0] > 0
+    G = np.zeros((1 if few else H + 1, m, m), np.complex128)
+    if one:
+        T = np.zeros((H + 1, D.shape[1], D.shape[1]), np.complex128)
+        for h in range(1, H + 1):
+            T[h] = np.linalg.inv(_loaded(omega, h, body))
+        R, U = body[16]
+        flex = (np.empty((0, 0, 0), np.complex128), mean, R, U, T)
+        _stick_by_modes(T, body, stuck)
+    else:
+        A = np.empty((H + 1, m, m), np.complex128)
+        A[0] = mean
+        for h in range(1, H + 1):
+            if few:
+                _spring_by_modes(omega, h, body, A[h], stuck[h])
+                continue
+            shapes = contact[min(h, contact.shape[0] - 1)]
+            G[h] = residual[min(h, residual.shape[0] - 1)] + np.dot(shapes * D[h], shapes.conj().T)
+            _spring(G[h], free[h], springs, A[h], stuck[h])
+        flex = by_harmonic(A)
     still, motion = _coefficients(free), _coefficients(stuck)
-    return D, (A, G, motion, springs, max(max(norm(still), norm(motion)), 1e-300), contact, residual, D), mean, free
+    scale = max(max(norm(still), norm(motion)), 1e-300)
+    return D, (flex, G, motion, springs, scale, contact, residual, D, body[14]), free
 
 
 @njit(cache=True, error_model="numpy")
@@ -58,32 +76,47 @@ def _modal(omega, body, H):
 
 
 @njit(cache=True, error_model="numpy")
-def _spring_by_modes(omega, h, body, springs, A, stuck):
-    """Fill A (m, m) and stuck (m,) of harmonic h, from the parts of `woodbury.staying` at the end of body."""
-    s = min(h, body[10].shape[0] - 1)
-    fixed, U, UH, N, direct = body[10][s], body[11][s], body[12][s], body[13][s], body[8][h]
-    m, M = U.shape
-    system, right = N.copy(), np.empty((M, m + 1), np.complex128)
-    for k in range(M):
+def _loaded(omega, h, body):
+    """(M, M) impedances of the modes with the contact springs: the inverse of `woodbury`'s T."""
+    system = body[13][min(h, body[13].shape[0] - 1)].copy()
+    for k in range(system.shape[0]):
         system[k, k] += _impedance(omega, h, k, body)
-    right[:, :m], right[:, m] = UH, body[7][h]
-    solved = np.dot(U, np.linalg.solve(system, right))
-    A[:] = fixed + solved[:, :m]
-    stuck[:] = direct + solved[:, m] - np.dot(A, springs * direct)
+    return system
 
 
 @njit(cache=True, error_model="numpy")
-def _spring(G, free, springs, held, r, A, stuck):
-    """Fill A (m, m) = (1 + G K)^-1 G and stuck (m,), with r motions without stiffness eliminated."""
+def _stick_by_modes(T, body, stuck):
+    """Fill stuck (H+1, m) but for the mean from T (H+1, M, M)."""
+    U, still, push = body[11][0], body[17], body[18]
+    for h in range(1, T.shape[0]):
+        modal = np.dot(T[h], push[h])
+        for i in range(U.shape[0]):
+            stuck[h, i] = still[h, i]
+            for k in range(U.shape[1]):
+                stuck[h, i] += U[i, k] * modal[k]
+
+
+@njit(cache=True, error_model="numpy")
+def _spring_by_modes(omega, h, body, A, stuck):
+    """Fill A (m, m) and stuck (m,) of harmonic h, from the parts of `woodbury.staying` in body."""
+    s = min(h, body[10].shape[0] - 1)
+    fixed, U, UH = body[10][s], body[11][s], body[12][s]
+    m, M = U.shape
+    right = np.empty((M, m + 1), np.complex128)
+    right[:, :m], right[:, m] = UH, body[18][h]
+    solved = np.dot(U, np.linalg.solve(_loaded(omega, h, body), right))
+    A[:] = fixed + solved[:, :m]
+    stuck[:] = body[17][h] + solved[:, m]
+
+
+@njit(cache=True, error_model="numpy")
+def _spring(G, free, springs, A, stuck):
+    """Fill A (m, m) = (1 + G K)^-1 G and stuck (m,)."""
     m = springs.size
-    system, right = np.eye(m + r, dtype=np.complex128), np.empty((m + r, m + 1), np.complex128)
-    system[:m, :m] += G * springs
-    right[:m, :m], right[:m, m] = G, free
-    for a in range(r):
-        system[:m, m + a], system[m + a, :m], system[m + a, m + a] = -held[0][:, a], held[0][:, a] * springs, held[4]
-        right[m + a, :m], right[m + a, m] = held[0][:, a], held[1][a]
-    solved = np.linalg.solve(system, right)
-    A[:], stuck[:] = solved[:m, :m], solved[:m, m]
+    right = np.empty((m, m + 1), np.complex128)
+    right[:, :m], right[:, m] = G, free
+    solved = np.linalg.solve(np.eye(m) + G * springs, right)
+    A[:], stuck[:] = solved[:, :m], solved[:, m]
 
 
 @njit(cache=True, error_model="numpy")

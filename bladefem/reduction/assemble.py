@@ -38,8 +38,8 @@ def pair_model(body: PortModel, following: slice | np.ndarray, phase: float) -> 
 
 
 def pair_models(body: PortModel, following: slice | np.ndarray, phase: float, harmonics: int) -> tuple[PortModel, ...]:
-    """One model a harmonic 0..`harmonics` for blades clamped at their roots: a single blade serves all of them."""
-    return tuple(pair_model(body, following, h * phase) for h in range(harmonics + 1))
+    """One model a harmonic 0..`harmonics` for blades clamped at their roots, one for all where they move in step."""
+    return tuple(pair_model(body, following, h * phase) for h in range(harmonics + 1 if phase else 1))
 
 
 def wheel_models(sector: Mapping[int, PortModel], following: slice | np.ndarray, engine_order: int, sectors: int,

@@ -3,9 +3,12 @@
 import numpy as np
 import pytest
 
+from bladefem.hbm import small
 from bladefem.hbm.api import solve, sticking
+from bladefem.hbm.coarse import no_level, second_level
 from bladefem.hbm.compiled import _jacobian
-from bladefem.hbm.krylov import apply, conjugate_residuals
+from bladefem.hbm.flex import among, apply, by_harmonic, flexed, formed, seen_by
+from bladefem.hbm.krylov import conjugate_residuals
 from bladefem.hbm.newton import Options
 from bladefem.hbm.reference import reference_model
 from bladefem.hbm.resonance import stuck_resonances
@@ -36,9 +39,68 @@ def test_conjugate_residuals_reach_the_accuracy_or_say_no(accuracy):
     A, C = system(1.0)
     J = _jacobian(A, C)
     r, x = np.random.default_rng(5).normal(size=len(J)), np.empty(len(J))
-    assert conjugate_residuals(A, C, r, accuracy, x)
+    assert conjugate_residuals(by_harmonic(A), C, r, accuracy, no_level(), x)
     assert np.linalg.norm(J @ x - r) <= 1.01 * accuracy * np.linalg.norm(r)
-    assert not conjugate_residuals(*system(100.0), r, accuracy, x)      # no 60 directions are enough there
+    A, C = system(100.0)
+    assert not conjugate_residuals(by_harmonic(A), C, r, accuracy, no_level(), x)   # no 60 directions are enough there
+
+
+def by_modes(nodes=6, d=2, H=4, M=3):
+    """A flexibility of the second form, whose modes are soft and whose rest is stiff."""
+    rng = np.random.default_rng(7)
+    m, mean, R = nodes * d, *(x @ x.T for x in 0.1 * rng.normal(size=(2, nodes * d, nodes * d)))
+    T = 5 * (rng.normal(size=(H + 1, M, M)) + 1j * rng.normal(size=(H + 1, M, M)))
+    return np.zeros((0, 0, 0), complex), mean, R, rng.normal(size=(m, M)), T
+
+
+def test_both_forms_of_a_flexibility_are_the_same():
+    flex, x = by_modes(), np.random.default_rng(8).normal(size=(12, 9))
+    A = formed(flex)
+    np.testing.assert_allclose(A[2], flex[2] + flex[3] @ flex[4][2] @ flex[3].T, atol=1e-13)
+    np.testing.assert_array_equal(A[0], flex[1])
+    one, other = np.ones((2, 12, 9))
+    flexed(flex, x, one)
+    apply(A, x, other)
+    np.testing.assert_allclose(one, other, atol=1e-12)
+    Z = x[:, :2].copy()
+    np.testing.assert_allclose(seen_by(flex, Z), Z.T @ A, atol=1e-12)
+    np.testing.assert_allclose(seen_by(by_harmonic(A), Z), Z.T @ A, atol=1e-12)
+    some = np.array([1, 4])
+    rows = np.array([2, 3, 8, 9])
+    for form in (flex, by_harmonic(A)):
+        np.testing.assert_allclose(formed(among(form, some, 2)), A[:, rows[:, None], rows], atol=1e-12)
+        assert among(form, np.arange(6), 2)[0] is not None
+
+
+def test_a_second_level_needs_fewer_directions_for_the_same_step():
+    """The modes of the flexibility are the motions that contacts have in common: they alone take iterations long."""
+    flex, (_, C) = by_modes(), system(3.0)
+    Q, _ = np.linalg.qr(flex[3])
+    J, x = _jacobian(formed(flex), C), np.empty(C.shape[0] * C.shape[1])
+    r = np.random.default_rng(9).normal(size=len(x))
+    level = second_level(flex, C, Q, np.arange(6), 2)
+    Z = np.kron(Q, np.eye(9))
+    np.testing.assert_allclose(level[0].T @ level[0], np.eye(3), atol=1e-12)
+    M = np.linalg.inv(np.eye(len(x)) + Z @ (np.linalg.inv(Z.T @ J @ Z) - np.eye(27)) @ Z.T)
+    before, after = (np.sum(abs(np.linalg.eigvals(j) - 1) > 0.5) for j in (J, J @ np.linalg.inv(M)))
+    assert after < before / 2, (before, after)
+    assert conjugate_residuals(flex, C, r, 1e-10, level, x)
+    np.testing.assert_allclose(J @ x, r, atol=1e-9 * np.linalg.norm(r))
+
+
+def test_a_model_that_all_harmonics_share_is_solved_by_its_modes(monkeypatch):
+    """As with a matrix for each harmonic; 32 contacts, from full stick to full slip."""
+    found = []
+    for wide in (1, 1000):
+        monkeypatch.setattr(small, "WIDE", wide)
+        model = reference_model(2e6, 0.06, 8.0, points=16, modes=10)
+        assert (len(small._prepared(model, 7, 256)[0][16][0]) > 0) == (wide == 1)
+        found.append(list(response(model, np.linspace(4800, 6200, 30), 7, 256)))
+    assert len({point.states["slip"] for point in found[0]}) > 3
+    for one, other in zip(*found, strict=True):
+        assert one.converged and other.converged and one.states == other.states
+        np.testing.assert_allclose(one.w, other.w, atol=1e-9 * abs(other.w).max())
+        np.testing.assert_allclose(one.probe, other.probe, atol=1e-9 * abs(other.probe).max())
 
 
 def test_points_that_stick_are_the_same_at_once_and_one_by_one():

@@ -12,7 +12,7 @@ from bladefem.errors import InputError
 from bladefem.friction.harmonics import to_complex
 from bladefem.hbm import api, sweep
 from bladefem.hbm.api import solve
-from bladefem.hbm.compiled import back_substitute, factorise, factorise_large
+from bladefem.hbm.lu import back_substitute, factorise, factorise_large
 from bladefem.hbm.model import Damping
 from bladefem.hbm.reference import reference_model
 from bladefem.hbm.sweep import response
