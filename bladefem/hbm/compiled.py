@@ -5,6 +5,8 @@ It takes the same steps, with the line search on the step, and ends for the same
 
 from __future__ import annotations
 
+from typing import NamedTuple
+
 import numpy as np
 from numba import njit
 
@@ -15,7 +17,7 @@ from .flex import among, apply, apply_modes, flexed, formed
 from .krylov import conjugate_residuals
 from .lu import back_substitute, factorise, factorise_large
 
-__all__ = ["CONVERGED", "EXHAUSTED", "INFINITE", "SINGULAR", "STALLED", "compiled_newton", "norm"]
+__all__ = ["CONVERGED", "EXHAUSTED", "INFINITE", "SINGULAR", "STALLED", "Condensed", "compiled_newton", "norm"]
 
 CONVERGED, EXHAUSTED, STALLED, SINGULAR, INFINITE, SEARCHING = 0, 1, 2, 3, 4, 5
 LARGE = 64                  # unknowns from which blocks pay, and iterations where they arrive
@@ -23,6 +25,20 @@ DENSE = 5000                # unknowns up to which dense factors are the last re
 FINEST, COARSEST = 1e-6, 1e-4     # accuracy of a step by iterations, relative,
 CLOSE = 1e-2                # where no more is needed to arrive,
 ROUGH = 1e-3                # and of the one that the line search looks at; coarser ones mislead it
+
+
+class Condensed(NamedTuple):
+    """The bodies at one frequency, seen from the m contact freedoms."""
+
+    flex: tuple             # flexibility with contact springs, see `flex`
+    G: np.ndarray           # (H+1, m, m) the same without springs, but for the mean; (1, m, m) where `modal` tells it
+    stuck: np.ndarray       # (m, K) displacement in full stick [m]
+    springs: np.ndarray     # (m,) [N/m]
+    scale: float            # size of the linear motion [m]
+    shapes: np.ndarray      # (S, m, M), residual (S, m, m) and modal (H+1, M): these give G by `apply_modes`; or empty
+    residual: np.ndarray
+    modal: np.ndarray
+    motions: np.ndarray     # (m, q) that the contacts have in common, see `coarse`
 
 
 @njit(cache=True, error_model="numpy")
@@ -46,7 +62,7 @@ def _move(w, share, step, out):
 @njit(cache=True, error_model="numpy")
 def _evaluate(w, d, linear, contact, work):
     """Forces and residual at w (m, K); fills work and returns the error of `bladefem.hbm.residual`."""
-    flex, G, stuck, springs, scale, shapes, residual, modal, _ = linear
+    G, stuck, springs = linear.G, linear.stuck, linear.springs
     load, base, nodes, tab, brackets, preload = contact
     full, F, J, shares, p, r = work
     n, K = nodes.shape[0], w.shape[1]
@@ -63,7 +79,7 @@ def _evaluate(w, d, linear, contact, work):
         for k in range(K):
             p[i, k] = F[i // d, 2 - d + i % d, k] - springs[i] * w[i, k] - (preload[i] if k == 0 else 0.0)
             r[i, k] = w[i, k] - stuck[i, k]
-    flexed(flex, p, r)
+    flexed(linear.flex, p, r)
     sprung, bare = np.empty(r.shape), np.empty(r.shape)
     for i in range(w.shape[0]):
         for k in range(K):
@@ -72,8 +88,8 @@ def _evaluate(w, d, linear, contact, work):
     if 2 * G.shape[0] - 1 == K:
         apply(G, sprung, bare)
     else:
-        apply_modes(shapes, residual, modal, sprung, bare)
-    return max(norm(r) / max(norm(w), 1e-300), norm(bare) / scale)
+        apply_modes(linear.shapes, linear.residual, linear.modal, sprung, bare)
+    return max(norm(r) / max(norm(w), 1e-300), norm(bare) / linear.scale)
 
 
 @njit(cache=True, error_model="numpy")
@@ -166,9 +182,7 @@ def compiled_newton(w, d, linear, contact, sticks, tolerance, iterations, shorte
 
     Args:
         d: directions a node, 1 (tangent) or 2 (normal, tangent).
-        linear: the flexibility A as `flex` gives it, G with its harmonic 0 left out (H+1, m, m), stuck (m, K), springs
-            (m,), size of the linear motion, where G is not there C, R, D of `apply_modes`, which stand for it, and the
-            common motions (m, q or 0) of `coarse`.
+        linear: the `Condensed` bodies.
         contact: prescribed loads (n, S) or (n, 0), their coefficients (n, K), nodes (n, 4), tables, brackets
             (0: sampled), preload (m,).
 
@@ -180,7 +194,7 @@ def compiled_newton(w, d, linear, contact, sticks, tolerance, iterations, shorte
     n = m // d
     work = (np.zeros((n, 2, K)), np.zeros((n, 2, K)), np.zeros((n, 2, K, 2, K)), np.zeros((n, 3)), np.zeros((m, K)),
             np.zeros((m, K)))
-    flex, springs, J, r, motions = linear[0], linear[3], work[2], work[5], linear[8]
+    flex, springs, motions, J, r = linear.flex, linear.springs, linear.motions, work[2], work[5]
     step, after, trial = np.empty((m, K)), np.empty((m, K)), w.copy()
     active, C = _moving(J, springs, d, np.inf)
     few, factors, level = flex, (np.empty((0, 0)), np.empty(0, np.int64)), no_level()

@@ -11,7 +11,7 @@ from ..errors import InputError
 from ..friction.aft import Forces, dissipated, states
 from .compiled import CONVERGED, EXHAUSTED, INFINITE, SINGULAR, STALLED, compiled_newton
 from .iterative import Memory
-from .residual import STICKS, Balance, Inverse, State, contact_table, evaluate_balance, linear_arguments, linearise
+from .residual import STICKS, Balance, Inverse, State, condensed, contact_table, evaluate_balance, linearise
 
 __all__ = ["DEFAULTS", "Newton", "Options", "fits", "newton"]
 
@@ -96,7 +96,7 @@ def _fast(balance: Balance, w: np.ndarray, options: Options) -> Newton:
     d, shape = balance.model.directions, w.shape
     contact = contact_table(balance.model, shape[2] // 2, balance.samples)
     steps, code, error, f, dfdw, shares, residual, p = compiled_newton(
-        end, d, linear_arguments(balance), contact, STICKS, options.tolerance, options.iterations, SHORTEST)
+        end, d, condensed(balance), contact, STICKS, options.tolerance, options.iterations, SHORTEST)
     reasons = {CONVERGED: "residual within tolerance", EXHAUSTED: f"residual {error:.1e} after {steps} iterations",
                STALLED: f"line search stalled at residual {error:.1e}", SINGULAR: "singular Jacobian",
                INFINITE: "residual is not finite"}

@@ -18,13 +18,14 @@ from ..friction.events import evaluate_exact
 from ..friction.harmonics import to_complex, to_real
 from ..friction.tables import tables
 from .coarse import common_motions
+from .compiled import Condensed
 from .flex import by_harmonic
 from .iterative import Memory, iterative_inverse
 from .linear import Linear
 from .model import ReducedModel
 
-__all__ = ["Balance", "Inverse", "State", "adjoint", "as_amplitudes", "as_coefficients", "contact_forces",
-           "contact_table", "evaluate_balance", "linear_arguments", "linearise", "orientation", "start_in_stick"]
+__all__ = ["Balance", "Inverse", "State", "adjoint", "as_amplitudes", "as_coefficients", "condensed",
+           "contact_forces", "contact_table", "evaluate_balance", "linearise", "orientation", "start_in_stick"]
 
 DENSE = 300         # unknowns up to which a dense factorisation is faster than GMRES
 LARGEST = 5000      # unknowns up to which it is the last resort where GMRES does not arrive: 200 MB, some seconds
@@ -196,15 +197,13 @@ def _dense_inverse(A: np.ndarray, change: np.ndarray) -> Inverse:
     return lambda residual, _: linalg.lu_solve(factors, residual.ravel(), check_finite=False).reshape(residual.shape)
 
 
-def linear_arguments(balance: Balance) -> tuple[np.ndarray, ...]:
-    """What the compiled loop needs of the linear part."""
+def condensed(balance: Balance) -> Condensed:
+    """The linear part as the compiled loop takes it."""
     linear = balance.linear
-    G = linear.G.copy()
+    G, none = linear.G.copy(), np.zeros((0, 0, 0), dtype=complex)
     G[0] = 0.0
-    none = np.zeros((0, 0, 0), dtype=complex)
-    motions = common_motions(balance.model, len(G) - 1)
-    return (by_harmonic(linear.A), G, to_real(linear.stuck.T), linear.springs, _scale(linear), none, none,
-            none.reshape(0, 0), motions)
+    return Condensed(by_harmonic(linear.A), G, to_real(linear.stuck.T), linear.springs, _scale(linear), none, none,
+                     none.reshape(0, 0), common_motions(balance.model, len(G) - 1))
 
 
 def contact_table(model: ReducedModel, H: int, samples: int) -> tuple:

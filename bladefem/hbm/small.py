@@ -1,36 +1,28 @@
 """A whole point of a small model of 1-D elements in one compiled call: flexibilities, Newton, works and states.
 
 The plain way through `bladefem.hbm.linear`, `newton` and `api` does the same in fifty NumPy calls, which is most of its
-time where there are few contacts. Both bodies are one here: the damper's modes, rigid ones with frequency zero, stand
-beside the blades' with the shapes that they give the relative displacement. A point that does not end well is left to
-the fallback chain; a test holds the two ways together.
+time where there are few contacts. A point that does not end well is left to the fallback chain; a test holds the two
+ways together.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 
 import numpy as np
 from numba import njit
 
-from ..data import RigidBody
 from .ahead import AHEAD, ahead, shifted
-from .bodies import Stack, rigid_stack
-from .coarse import common_motions
 from .compiled import CONVERGED, compiled_newton, norm
-from .linear import rigid_motions, with_springs
 from .model import ReducedModel
-from .newton import COMPILED, SHORTEST, Options
+from .newton import SHORTEST, Options
 from .residual import STICKS, contact_table
+from .small_bodies import prepared_bodies
 from .small_linear import linear_part
 from .solution import Solution, Work
-from .woodbury import staying
 
 __all__ = ["small", "solve_along", "solve_each", "solve_small"]
 
-SMALL = 200         # contact freedoms up to which points are solved here
-WIDE = 64           # contact freedoms from which a flexibility that serves all harmonics is not formed
-FEW = 2             # contact freedoms for each mode from which the springs are added by the modes
 STATES = ("stick", "slip", "lift", "open")
 
 
@@ -70,14 +62,14 @@ def _solved(model: ReducedModel, omegas: np.ndarray, H: int, samples: int, known
     prepared = _prepared(model, H, samples)
     if prepared is None:
         return []
-    body, held, springs, contact = prepared
+    bodies, springs, contact = prepared
     (n, d), K = model.springs.shape, 2 * H + 1
     at, begin = np.zeros(AHEAD), np.zeros((AHEAD, n * d, K))
     for i, (omega, w) in enumerate(known):
         kept = min(K, w.shape[2])
         at[i], begin[i, :, :kept] = omega, w[:, :, :kept].reshape(n * d, kept)
     try:
-        w, ends, f, probe, counts, measures = _points(omegas, body, held, springs, contact, d, H, begin, at, len(known),
+        w, ends, f, probe, counts, measures = _points(omegas, bodies, springs, contact, d, H, begin, at, len(known),
                                                       chained, options.tolerance, options.iterations)
     except (ZeroDivisionError, np.linalg.LinAlgError):  # a resonance without damping: the plain way tells which
         return []
@@ -89,7 +81,7 @@ def _solved(model: ReducedModel, omegas: np.ndarray, H: int, samples: int, known
 
 
 @njit(cache=True, error_model="numpy")
-def _points(omegas, body, held, springs, contact, d, H, known, at, count, chained, tolerance, iterations):
+def _points(omegas, bodies, springs, contact, d, H, known, at, count, chained, tolerance, iterations):
     """Displacements (p, m, K), steps and error (p, 2), and what `_measure` gives, of the first frequencies.
 
     They start from the curve through `count` of known (3, m, K) at the frequencies at (3,), which are changed here;
@@ -99,19 +91,19 @@ def _points(omegas, body, held, springs, contact, d, H, known, at, count, chaine
     p, m, K = omegas.size, springs.size, 2 * H + 1
     w, f = np.empty((p, m, K)), np.empty((p, m // d, d, K))
     ends, counts, measures = np.empty((p, 2)), np.empty((p, 4), np.int64), np.empty((p, 7))
-    probe, done = np.empty((p, *body[9].shape), np.complex128), 0
+    probe, done = np.empty((p, *bodies.straight.shape), np.complex128), 0
     for i in range(p):
-        flexible, linear, free = linear_part(omegas[i], body, springs, H)
+        flexible, linear, free = linear_part(omegas[i], bodies, springs, H)
         if count:
             ahead(omegas[i], known, at, count, w[i])
         else:
-            w[i] = linear[2]
+            w[i] = linear.stuck
         steps, code, error, F, _, shares, residual, _ = compiled_newton(w[i], d, linear, contact, STICKS, tolerance,
                                                                         iterations, SHORTEST)
         if code != CONVERGED:
             break
         done, ends[i, 0], ends[i, 1] = i + 1, steps, error
-        f[i], probe[i], counts[i], measures[i] = _measure(omegas[i], body, held, springs, (flexible, free), w[i], d, F,
+        f[i], probe[i], counts[i], measures[i] = _measure(omegas[i], bodies, springs, (flexible, free), w[i], d, F,
                                                           contact[5], residual, shares)
         if chained:
             sticks = counts[i, 0] == m // d
@@ -123,95 +115,17 @@ def _points(omegas, body, held, springs, contact, d, H, known, at, count, chaine
 
 def small(model: ReducedModel, H: int) -> bool:
     """Whether this way is open."""
-    return _linear_part(model, H) is not None
+    return prepared_bodies(model, H) is not None
 
 
 def _prepared(model: ReducedModel, H: int, samples: int) -> tuple | None:
     """What a point needs beside its frequency; made once."""
-    linear = _linear_part(model, H)
-    return None if linear is None else (*linear, contact_table(model, H, samples))
-
-
-def _linear_part(model: ReducedModel, H: int) -> tuple | None:
-    return model.once(("small", H), lambda: _prepare(model, H))
-
-
-def _prepare(model: ReducedModel, H: int) -> tuple | None:
-    dofs = model.springs.size
-    if model.elements.tangents > 1 or dofs > SMALL or dofs * (2 * H + 1) > COMPILED or not model.coupled:
-        return None
-    bodies = [model.blades(H)]
-    if isinstance(model.damper, tuple):
-        bodies.append(model.elastic_damper(H))
-    if any(b.coupled is not None for b in bodies):
-        return None
-    blades, loads = bodies[0], model.loads(H)
-    if isinstance(model.damper, RigidBody):
-        bodies.append(rigid_stack(model.damper.mass, model.damper.B[model.rows]))
-    joined = {name: _joined(bodies, name) for name in ("omega", "viscous", "hysteretic")}
-    contact = _joined([blades, *(_reversed(b) for b in bodies[1:])], "shapes", lambda b: b.contact)
-    spare = contact.shape[2] - blades.shapes.shape[2]
-    load = np.pad(blades.shapes[:, blades.load], ((0, 0), (0, 0), (0, spare)))
-    probe = np.pad(blades.shapes[:, blades.probe], ((0, 0), (0, 0), (0, spare)))
-    residual, springs = sum(b.residual[:, b.contact, b.contact] for b in bodies), model.springs.ravel()
-    direct = (blades.residual[:, blades.contact, blades.load] @ loads[:, :, None])[:, :, 0]
-    push = (loads[:, None] @ load.conj())[:, 0]
-    B, g, rigid = model.once("rigid", lambda: rigid_motions(model, springs))
-    fixed = staying(residual, contact, springs) if FEW * contact.shape[2] <= dofs else [np.zeros((0, 0, 0))] * 4
-    body = (*joined.values(), *(np.ascontiguousarray(a, dtype=complex) for a in (
-        contact, residual, probe, blades.residual[:, blades.probe, blades.contact], push, direct,
-        (blades.residual[:, blades.probe, blades.load] @ loads[:, :, None])[:, :, 0], *fixed)),
-        common_motions(model, H),
-        _mean(joined, contact[0], residual[0], push[0], direct[0], (springs, B, g, model.hold)),
-        _one_for_all(fixed, dofs), *_pushed(fixed, springs, push, direct))
-    still = np.flatnonzero(blades.omega[0] == 0)
-    held = (np.ascontiguousarray(B), g, np.ascontiguousarray(rigid[:len(still)]), still, model.hold)
-    return body, held, springs
-
-
-def _mean(joined: dict[str, np.ndarray], shapes: np.ndarray, residual: np.ndarray, push: np.ndarray, direct: np.ndarray,
-          held: tuple) -> tuple[np.ndarray, ...]:
-    """Of the mean, whatever the frequency: A (m, m), stuck (m,), G (m, m); see `linear`."""
-    own = joined["omega"][0]
-    D = np.divide(1.0, own**2, out=np.zeros_like(own), where=own > 0)
-    G, free = (residual + (shapes * D) @ shapes.conj().T).real, (direct + shapes @ (D * push)).real
-    A, stuck = with_springs(G, free, *held)
-    return np.ascontiguousarray(A), stuck.astype(complex), np.ascontiguousarray(G)
-
-
-def _one_for_all(fixed: Sequence[np.ndarray], dofs: int) -> tuple[np.ndarray, np.ndarray]:
-    """R (m, m) and U (m, M) of `flex`; without rows where it takes its other form."""
-    R, U = fixed[:2]
-    if dofs < WIDE or len(U) != 1 or np.iscomplexobj(R) or np.any(U.imag):
-        return np.zeros((0, 0)), np.zeros((0, 0))
-    return np.ascontiguousarray(R[0]), np.ascontiguousarray(U[0].real)
-
-
-def _pushed(fixed: Sequence[np.ndarray], springs: np.ndarray, push: np.ndarray,
-            direct: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """(H+1, m) what a direct push at the contact moves beside the modes in full stick, (H+1, M) what pushes these."""
-    R, _, UH, _ = fixed
-    if not len(R):
-        return np.zeros((0, 0), dtype=complex), np.zeros((0, 0), dtype=complex)
-    at = np.minimum(np.arange(len(push)), len(R) - 1)
-    sprung = (springs * direct)[:, :, None]
-    return (direct - (R[at] @ sprung)[:, :, 0]).astype(complex), (push - (UH[at] @ sprung)[:, :, 0]).astype(complex)
-
-
-def _reversed(body: Stack) -> Stack:
-    return Stack(body.omega, body.viscous, body.hysteretic, None, -body.shapes, body.residual, body.contact, body.load,
-                 body.probe)
-
-
-def _joined(bodies: list[Stack], name: str, rows: Callable[[Stack], slice] = lambda _: slice(None)) -> np.ndarray:
-    """Modes of several bodies side by side, on the harmonics of the one that has most."""
-    most = max(len(body.omega) for body in bodies)
-    parts = [getattr(body, name) if name != "shapes" else body.shapes[:, rows(body)] for body in bodies]
-    return np.concatenate([np.broadcast_to(part, (most, *part.shape[1:])) for part in parts], axis=-1)
+    bodies = prepared_bodies(model, H)
+    return None if bodies is None else (bodies, model.springs.ravel(), contact_table(model, H, samples))
 
 
 @njit(cache=True, error_model="numpy")
-def _measure(omega, body, held, springs, linear, w, d, F, preload, residual, shares):
+def _measure(omega, bodies, springs, linear, w, d, F, preload, residual, shares):
     """Forces (n, d, K), probe (H+1, p), numbers of states (4,); residuals, drift and works (7,)."""
     m, K = w.shape
     f, load, out = np.empty((m // d, d, K)), np.empty((m, K)), np.zeros(7)
@@ -221,22 +135,23 @@ def _measure(omega, body, held, springs, linear, w, d, F, preload, residual, sha
             load[i, k] = f[i // d, i % d, k] - (preload[i] if k == 0 else 0.0)
             out[0] = max(out[0], abs(residual[i, k]))
             out[1] = max(out[1], springs[i] * abs(residual[i, k]))
-    out[2] = _drift(held, load)
-    modal, probe = _motion(body, held, linear, load, w, springs)
-    _works(omega, body, modal, load, w, d, out[3:])
+    out[2] = _drift(bodies.B, bodies.g, load)
+    modal, probe = _motion(bodies, linear, load, w, springs)
+    _works(omega, bodies, modal, load, w, d, out[3:])
     return f, probe, _counts(shares), out
 
 
 @njit(cache=True, error_model="numpy")
-def _motion(body, held, linear, load, w, springs):
+def _motion(bodies, linear, load, w, springs):
     """Modal amplitudes (H+1, M) and probes (H+1, p) under the excitation and the contact load (m, K)."""
     flexible, free = linear
-    mean = body[15][2]
-    contact, probes, across, push, direct = body[3], body[5], body[6], body[7], body[9]
+    contact, probes, across, push, straight = (bodies.contact, bodies.probe, bodies.across, bodies.push,
+                                               bodies.straight)
+    mean, still = bodies.mean_G, bodies.still
     m, H, M = load.shape[0], flexible.shape[0] - 1, flexible.shape[1]
-    B, r = held[0], held[0].shape[1]
-    modal, probe = np.empty((H + 1, M), np.complex128), np.empty(direct.shape, np.complex128)
-    rigid = np.zeros(held[3].size)
+    B, r = bodies.B, bodies.B.shape[1]
+    modal, probe = np.empty((H + 1, M), np.complex128), np.empty(straight.shape, np.complex128)
+    rigid = np.zeros(still.size)
     for a in range(r):
         along = 0.0
         for i in range(m):
@@ -245,7 +160,7 @@ def _motion(body, held, linear, load, w, springs):
                 gap += mean[i, j] * load[j, 0]
             along += B[i, a] * springs[i] * gap
         for k in range(rigid.size):
-            rigid[k] += held[2][k, a] * along
+            rigid[k] += bodies.rigid[k, a] * along
     for h in range(H + 1):
         s = min(h, contact.shape[0] - 1)
         for k in range(M):
@@ -254,14 +169,14 @@ def _motion(body, held, linear, load, w, springs):
                 modal[h, k] -= contact[s, i, k].conjugate() * _amplitude(load, i, h)
             modal[h, k] *= flexible[h, k]
         for a in range(probe.shape[1]):
-            probe[h, a] = direct[h, a]
+            probe[h, a] = straight[h, a]
             for k in range(M):
                 probe[h, a] += probes[min(h, probes.shape[0] - 1), a, k] * modal[h, k]
             for i in range(m):
                 probe[h, a] -= across[min(h, across.shape[0] - 1), a, i] * _amplitude(load, i, h)
     for a in range(probe.shape[1]):
         for k in range(rigid.size):
-            probe[0, a] += probes[0, a, held[3][k]] * rigid[k]
+            probe[0, a] += probes[0, a, still[k]] * rigid[k]
     return modal, probe
 
 
@@ -271,9 +186,10 @@ def _amplitude(x, i, h):
 
 
 @njit(cache=True, error_model="numpy")
-def _works(omega, body, modal, load, w, d, out):
+def _works(omega, bodies, modal, load, w, d, out):
     """out (4,): work of the excitation, lost in the bodies, of the balanced friction forces, dissipated in contacts."""
-    own, viscous, hysteretic, push, direct = body[0], body[1], body[2], body[7], body[8]
+    own, viscous, hysteretic = bodies.own, bodies.viscous, bodies.hysteretic
+    push, direct = bodies.push, bodies.direct
     for h in range(1, modal.shape[0]):
         s = min(h, own.shape[0] - 1)
         for k in range(modal.shape[1]):
@@ -290,9 +206,8 @@ def _works(omega, body, modal, load, w, d, out):
 
 
 @njit(cache=True, error_model="numpy")
-def _drift(held, load):
+def _drift(B, g, load):
     """Load on the holding springs over what the contacts could carry, both on the motions without stiffness."""
-    B, g = held[0], held[1]
     up, down = 0.0, 0.0
     for a in range(B.shape[1]):
         push, most = -g[a], 0.0

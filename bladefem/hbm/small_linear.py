@@ -10,43 +10,35 @@ from __future__ import annotations
 import numpy as np
 from numba import njit
 
-from .compiled import norm
+from .compiled import Condensed, norm
 from .flex import by_harmonic
 
 __all__ = ["linear_part"]
 
 
 @njit(cache=True, error_model="numpy")
-def linear_part(omega, body, springs, H):
-    """Modal flexibilities D (H+1, M), what the compiled Newton needs, free (H+1, m).
-
-    Args:
-        body: what `small` has prepared.
-    """
-    contact, residual, push, direct, m = body[3], body[4], body[7], body[8], springs.size
-    D, free, stuck = _modal(omega, body, H), np.empty((H + 1, m), np.complex128), np.empty((H + 1, m), np.complex128)
+def linear_part(omega, bodies, springs, H):
+    """Modal flexibilities D (H+1, M), the `Condensed` bodies, free (H+1, m)."""
+    contact, residual, m = bodies.contact, bodies.residual, springs.size
+    Z = _impedances(omega, H, bodies.own, bodies.viscous, bodies.hysteretic)
+    D = _inverted(Z, bodies.own)
+    free, stuck = np.empty((H + 1, m), np.complex128), np.empty((H + 1, m), np.complex128)
     for h in range(H + 1):
-        s = min(h, contact.shape[0] - 1)
-        for i in range(m):
-            free[h, i] = direct[h, i]
-            for k in range(D.shape[1]):
-                free[h, i] += contact[s, i, k] * D[h, k] * push[h, k]
-    mean, stuck[0] = body[15][0], body[15][1]
-    few, one = body[10].shape[0] > 0, body[16][0].shape[0] > 0
+        free[h] = bodies.direct[h] + np.dot(contact[min(h, contact.shape[0] - 1)], D[h] * bodies.push[h])
+    stuck[0], few = bodies.mean_stuck, bodies.A.shape[0] > 0
     G = np.zeros((1 if few else H + 1, m, m), np.complex128)
-    if one:
+    if bodies.R.shape[0]:
         T = np.zeros((H + 1, D.shape[1], D.shape[1]), np.complex128)
         for h in range(1, H + 1):
-            T[h] = np.linalg.inv(_loaded(omega, h, body))
-        R, U = body[16]
-        flex = (np.empty((0, 0, 0), np.complex128), mean, R, U, T)
-        _stick_by_modes(T, body, stuck)
+            T[h] = np.linalg.inv(_loaded(Z[h], bodies.N[0]))
+        flex = (np.empty((0, 0, 0), np.complex128), bodies.mean_A, bodies.R, bodies.shared, T)
+        _stick_by_modes(T, bodies.shared, bodies.stuck, bodies.sprung, stuck)
     else:
         A = np.empty((H + 1, m, m), np.complex128)
-        A[0] = mean
+        A[0] = bodies.mean_A
         for h in range(1, H + 1):
             if few:
-                _spring_by_modes(omega, h, body, A[h], stuck[h])
+                _spring_by_modes(Z[h], h, bodies, A[h], stuck[h])
                 continue
             shapes = contact[min(h, contact.shape[0] - 1)]
             G[h] = residual[min(h, residual.shape[0] - 1)] + np.dot(shapes * D[h], shapes.conj().T)
@@ -54,40 +46,43 @@ def linear_part(omega, body, springs, H):
         flex = by_harmonic(A)
     still, motion = _coefficients(free), _coefficients(stuck)
     scale = max(max(norm(still), norm(motion)), 1e-300)
-    return D, (flex, G, motion, springs, scale, contact, residual, D, body[14]), free
+    return D, Condensed(flex, G, motion, springs, scale, contact, residual, D, bodies.motions), free
 
 
 @njit(cache=True, error_model="numpy")
-def _impedance(omega, h, k, body):
-    """Impedance of mode k at harmonic h [1/s^2]."""
-    s, w = min(h, body[0].shape[0] - 1), h * omega
-    return complex(body[0][s, k]**2 - w**2, w * body[1][s, k] + (body[2][s, k] if h else 0.0))
-
-
-@njit(cache=True, error_model="numpy")
-def _modal(omega, body, H):
-    """(H+1, M) flexibilities of the modes; 0 for rigid ones in the mean."""
-    D = np.zeros((H + 1, body[0].shape[1]), np.complex128)
+def _impedances(omega, H, own, viscous, hysteretic):
+    """(H+1, M) impedances of the modes [1/s^2]."""
+    Z = np.empty((H + 1, own.shape[1]), np.complex128)
     for h in range(H + 1):
-        for k in range(D.shape[1]):
-            if h > 0 or body[0][0, k] > 0.0:
-                D[h, k] = 1.0 / _impedance(omega, h, k, body)
+        s, w = min(h, own.shape[0] - 1), h * omega
+        for k in range(Z.shape[1]):
+            Z[h, k] = complex(own[s, k]**2 - w**2, w * viscous[s, k] + (hysteretic[s, k] if h else 0.0))
+    return Z
+
+
+@njit(cache=True, error_model="numpy")
+def _inverted(Z, own):
+    """(H+1, M) flexibilities of the modes; 0 for rigid ones in the mean."""
+    D = np.zeros(Z.shape, np.complex128)
+    for h in range(Z.shape[0]):
+        for k in range(Z.shape[1]):
+            if h > 0 or own[0, k] > 0.0:
+                D[h, k] = 1.0 / Z[h, k]
     return D
 
 
 @njit(cache=True, error_model="numpy")
-def _loaded(omega, h, body):
-    """(M, M) impedances of the modes with the contact springs: the inverse of `woodbury`'s T."""
-    system = body[13][min(h, body[13].shape[0] - 1)].copy()
-    for k in range(system.shape[0]):
-        system[k, k] += _impedance(omega, h, k, body)
+def _loaded(Z, N):
+    """(M, M) impedances (M,) of the modes with the contact springs: the inverse of `woodbury`'s T."""
+    system = N.copy()
+    for k in range(Z.size):
+        system[k, k] += Z[k]
     return system
 
 
 @njit(cache=True, error_model="numpy")
-def _stick_by_modes(T, body, stuck):
+def _stick_by_modes(T, U, still, push, stuck):
     """Fill stuck (H+1, m) but for the mean from T (H+1, M, M)."""
-    U, still, push = body[11][0], body[17], body[18]
     for h in range(1, T.shape[0]):
         modal = np.dot(T[h], push[h])
         for i in range(U.shape[0]):
@@ -97,16 +92,16 @@ def _stick_by_modes(T, body, stuck):
 
 
 @njit(cache=True, error_model="numpy")
-def _spring_by_modes(omega, h, body, A, stuck):
-    """Fill A (m, m) and stuck (m,) of harmonic h, from the parts of `woodbury.staying` in body."""
-    s = min(h, body[10].shape[0] - 1)
-    fixed, U, UH = body[10][s], body[11][s], body[12][s]
+def _spring_by_modes(Z, h, bodies, A, stuck):
+    """Fill A (m, m) and stuck (m,) of harmonic h, from impedances (M,) and the parts of `woodbury.staying`."""
+    s = min(h, bodies.A.shape[0] - 1)
+    fixed, U, UH = bodies.A[s], bodies.U[s], bodies.UH[s]
     m, M = U.shape
     right = np.empty((M, m + 1), np.complex128)
-    right[:, :m], right[:, m] = UH, body[18][h]
-    solved = np.dot(U, np.linalg.solve(_loaded(omega, h, body), right))
+    right[:, :m], right[:, m] = UH, bodies.sprung[h]
+    solved = np.dot(U, np.linalg.solve(_loaded(Z, bodies.N[s]), right))
     A[:] = fixed + solved[:, :m]
-    stuck[:] = body[17][h] + solved[:, m]
+    stuck[:] = bodies.stuck[h] + solved[:, m]
 
 
 @njit(cache=True, error_model="numpy")

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from bladefem.hbm import small
+from bladefem.hbm import small_bodies
 from bladefem.hbm.api import solve, sticking
 from bladefem.hbm.coarse import no_level, second_level
 from bladefem.hbm.compiled import _jacobian
@@ -92,9 +92,9 @@ def test_a_model_that_all_harmonics_share_is_solved_by_its_modes(monkeypatch):
     """As with a matrix for each harmonic; 32 contacts, from full stick to full slip."""
     found = []
     for wide in (1, 1000):
-        monkeypatch.setattr(small, "WIDE", wide)
+        monkeypatch.setattr(small_bodies, "WIDE", wide)
         model = reference_model(2e6, 0.06, 8.0, points=16, modes=10)
-        assert (len(small._prepared(model, 7, 256)[0][16][0]) > 0) == (wide == 1)
+        assert (len(small_bodies.prepared_bodies(model, 7).R) > 0) == (wide == 1)
         found.append(list(response(model, np.linspace(4800, 6200, 30), 7, 256)))
     assert len({point.states["slip"] for point in found[0]}) > 3
     for one, other in zip(*found, strict=True):

@@ -1,0 +1,133 @@
+"""The bodies of a small model in arrays for its compiled points: all that does not depend on the frequency.
+
+Both bodies are one: the damper's modes, rigid ones with frequency zero, stand beside the blades' with the shapes that
+they give the relative displacement.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import NamedTuple
+
+import numpy as np
+
+from ..data import RigidBody
+from .bodies import Stack, rigid_stack
+from .coarse import common_motions
+from .linear import rigid_motions, with_springs
+from .model import ReducedModel
+from .newton import COMPILED
+from .woodbury import staying
+
+__all__ = ["Bodies", "prepared_bodies"]
+
+SMALL = 200         # contact freedoms up to which points are compiled as a whole
+FEW = 2             # contact freedoms for each mode from which the springs are added by the modes
+WIDE = 64           # contact freedoms from which a flexibility that serves all harmonics is not formed
+
+
+class Bodies(NamedTuple):
+    """m contact freedoms, M modes, p probes; S = H+1, or 1 where one serves all harmonics. Complex where not said."""
+
+    own: np.ndarray             # (S, M) frequencies [rad/s], real
+    viscous: np.ndarray         # (S, M) [1/s], real
+    hysteretic: np.ndarray      # (S, M) [1/s^2], real
+    contact: np.ndarray         # (S, m, M) shapes, the damper's reversed
+    residual: np.ndarray        # (S, m, m)
+    probe: np.ndarray           # (S, p, M) shapes
+    across: np.ndarray          # (S, p, m) residual flexibility between probe and contact
+    push: np.ndarray            # (H+1, M) excitation of the modes
+    direct: np.ndarray          # (H+1, m) displacement of the contact by the excitation beside the modes
+    straight: np.ndarray        # (H+1, p) the same of the probes
+    A: np.ndarray               # (S, m, m), U (S, m, M), UH (S, M, m), N (S, M, M) of `woodbury.staying`; empty where
+    U: np.ndarray               # there are too many modes for it
+    UH: np.ndarray
+    N: np.ndarray
+    stuck: np.ndarray           # (H+1, m) what the excitation moves beside the modes in full stick, empty as these
+    sprung: np.ndarray          # (H+1, M) what pushes the modes then
+    R: np.ndarray               # (m, m) and shared (m, M) of the second form of `flex`, real; empty in the first
+    shared: np.ndarray
+    motions: np.ndarray         # (m, q) common motions of `coarse`, real
+    mean_A: np.ndarray          # (m, m) of the mean, real, and as its stuck (m,) and G (m, m) whatever the frequency
+    mean_stuck: np.ndarray
+    mean_G: np.ndarray
+    B: np.ndarray               # (m, r) motions without stiffness and g (r,) their loads, see `linear`; real
+    g: np.ndarray
+    rigid: np.ndarray           # (r0, r) the same in the blades' rigid modes, whose numbers are `still` (r0,)
+    still: np.ndarray
+
+
+def prepared_bodies(model: ReducedModel, H: int) -> Bodies | None:
+    """Made once; None where points are not compiled as a whole."""
+    return model.once(("small", H), lambda: _prepared(model, H))
+
+
+def _prepared(model: ReducedModel, H: int) -> Bodies | None:
+    dofs = model.springs.size
+    if model.elements.tangents > 1 or dofs > SMALL or dofs * (2 * H + 1) > COMPILED or not model.coupled:
+        return None
+    bodies = [model.blades(H)]
+    if isinstance(model.damper, tuple):
+        bodies.append(model.elastic_damper(H))
+    if any(b.coupled is not None for b in bodies):
+        return None
+    blades, loads, springs = bodies[0], model.loads(H), model.springs.ravel()
+    if isinstance(model.damper, RigidBody):
+        bodies.append(rigid_stack(model.damper.mass, model.damper.B[model.rows]))
+    own, viscous, hysteretic = (_joined(bodies, name) for name in ("omega", "viscous", "hysteretic"))
+    contact = _joined([blades, *(_reversed(b) for b in bodies[1:])], "shapes", lambda b: b.contact)
+    spare = ((0, 0), (0, 0), (0, contact.shape[2] - blades.shapes.shape[2]))
+    load, probe = (np.pad(blades.shapes[:, rows], spare) for rows in (blades.load, blades.probe))
+    residual = sum(b.residual[:, b.contact, b.contact] for b in bodies)
+    direct, straight = ((blades.residual[:, rows, blades.load] @ loads[:, :, None])[:, :, 0]
+                        for rows in (blades.contact, blades.probe))
+    push = (loads[:, None] @ load.conj())[:, 0]
+    fixed = staying(residual, contact, springs) if FEW * contact.shape[2] <= dofs else [np.zeros((0, 0, 0))] * 4
+    parts = [contact, residual, probe, blades.residual[:, blades.probe, blades.contact], push, direct, straight, *fixed,
+             *_pushed(fixed, springs, push, direct)]
+    B, g, rigid = model.once("rigid", lambda: rigid_motions(model, springs))
+    still = np.flatnonzero(blades.omega[0] == 0)
+    mean = _mean((own[0], contact[0], residual[0]), (push[0], direct[0]), (springs, B, g, model.hold))
+    return Bodies(own, viscous, hysteretic, *(np.ascontiguousarray(part, dtype=complex) for part in parts),
+                  *_one_for_all(fixed, dofs), common_motions(model, H), *mean, np.ascontiguousarray(B), g,
+                  np.ascontiguousarray(rigid[:len(still)]), still)
+
+
+def _mean(body: tuple[np.ndarray, ...], pushed: tuple[np.ndarray, np.ndarray], held: tuple) -> tuple[np.ndarray, ...]:
+    """A (m, m), stuck (m,) and G (m, m) of the mean, as in `linear`."""
+    (own, shapes, residual), (push, direct) = body, pushed
+    D = np.divide(1.0, own**2, out=np.zeros_like(own), where=own > 0)
+    G, free = (residual + (shapes * D) @ shapes.conj().T).real, (direct + shapes @ (D * push)).real
+    A, stuck = with_springs(G, free, *held)
+    return np.ascontiguousarray(A), stuck.astype(complex), np.ascontiguousarray(G)
+
+
+def _one_for_all(fixed: tuple[np.ndarray, ...], dofs: int) -> tuple[np.ndarray, np.ndarray]:
+    """R (m, m) and U (m, M) of `flex`; empty where it takes its first form."""
+    A, U = fixed[:2]
+    if dofs < WIDE or len(U) != 1 or np.iscomplexobj(A) or np.any(U.imag):
+        return np.zeros((0, 0)), np.zeros((0, 0))
+    return np.ascontiguousarray(A[0]), np.ascontiguousarray(U[0].real)
+
+
+def _pushed(fixed: tuple[np.ndarray, ...], springs: np.ndarray, push: np.ndarray,
+            direct: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """(H+1, m) what the excitation moves beside the modes in full stick, (H+1, M) what pushes the modes then."""
+    A, _, UH, _ = fixed
+    if not len(A):
+        return np.zeros((0, 0)), np.zeros((0, 0))
+    at = np.minimum(np.arange(len(push)), len(A) - 1)
+    sprung = (springs * direct)[:, :, None]
+    return direct - (A[at] @ sprung)[:, :, 0], push - (UH[at] @ sprung)[:, :, 0]
+
+
+def _reversed(body: Stack) -> Stack:
+    return Stack(body.omega, body.viscous, body.hysteretic, None, -body.shapes, body.residual, body.contact, body.load,
+                 body.probe)
+
+
+def _joined(bodies: list[Stack], name: str, rows: Callable[[Stack], slice] = lambda _: slice(None)) -> np.ndarray:
+    """Modes of several bodies side by side, on the harmonics of the one that has most."""
+    most = max(len(body.omega) for body in bodies)
+    parts = [getattr(body, name) if name != "shapes" else body.shapes[:, rows(body)] for body in bodies]
+    return np.concatenate([np.broadcast_to(part, (most, *part.shape[1:])) for part in parts], axis=-1)
