@@ -18,7 +18,7 @@ from .choice import KEPT, Checked, following, likely, sufficient
 from .family import Family, carried, member
 from .indicators import Indicators, indicate, judge
 from .settings import Settings, enriched
-from .watched import hidden, peak_of, watched
+from .watched import heights_of, hidden, watched
 
 __all__ = ["along"]
 
@@ -37,6 +37,7 @@ class _Curve:
     options: Options
     accuracy: float
     points: list[Solution]
+    heights: np.ndarray             # of each point, see `heights_of`
     used: list[Settings]            # of each point
     moved: np.ndarray               # of each point what `hidden` gives
     errors: dict[float, float]      # circular frequency of the judged points to the estimated relative error
@@ -45,7 +46,7 @@ class _Curve:
     @property
     def limit(self) -> float:
         """Tolerated error [m], with the other half in hand."""
-        return self.accuracy * size(peak_of(self.points)) / 2
+        return self.accuracy * float(self.heights.max()) / 2
 
 
 def along(family: Family, omegas: Sequence[float], settings: Settings, accuracy: float) -> Checked:
@@ -75,16 +76,17 @@ def along(family: Family, omegas: Sequence[float], settings: Settings, accuracy:
         raise NotSolvedError(f"none of {len(points)} frequencies was solved; the first stopped because: "
                              f"{points[0].reason}")
     used = [settings] * len(points)
-    curve, final = _Curve(family, options, accuracy, points, used, hidden(family, used, points), {}, set()), set()
+    curve = _Curve(family, options, accuracy, points, heights_of(points), used, hidden(family, used, points), {}, set())
+    final: set[int] = set()
     known: dict[str, float] = {}
     for _ in range(PASSES):
         limit = curve.limit
-        wrong = next((i for i in _judged(curve) if curve.errors[points[i].omega] * size(points[i]) > limit
+        wrong = next((i for i in _judged(curve) if curve.errors[points[i].omega] * curve.heights[i] > limit
                       and i not in final), None)
         if wrong is None:
             break
         found = indicate(family, curve.used[wrong], points[wrong], known)
-        better = following(curve.used[wrong], found, 2 * limit / size(points[wrong]))
+        better = following(curve.used[wrong], found, 2 * limit / curve.heights[wrong])
         if better is not None:
             _raise(curve, wrong, better, found)
         if curve.used[wrong] != better:     # there is none, or it was not solved
@@ -110,7 +112,7 @@ def _first(family: Family, settings: Settings, accuracy: float) -> Settings:
 def _judged(curve: _Curve) -> Iterator[int]:
     """Numbers of the points whose error is told: those that are watched, the peak first, then others that tell it."""
     places = {p.omega: i for i, p in enumerate(curve.points)}
-    for point in watched(curve.points, curve.moved, curve.accuracy):
+    for point in watched(curve.points, curve.heights, curve.moved, curve.accuracy):
         i = places[point.omega]
         if point.omega not in curve.errors:
             curve.errors[point.omega] = judge(curve.family, curve.used[i], point).total
@@ -129,7 +131,7 @@ def _confirm(curve: _Curve, i: int) -> None:
     """
     point = curve.points[i]
     told = curve.errors[point.omega]
-    if point.omega not in curve.foretold or told * size(point) <= curve.limit:
+    if point.omega not in curve.foretold or told * curve.heights[i] <= curve.limit:
         return
     true = judge(curve.family, curve.used[i], point).total
     for j, other in enumerate(curve.points):
@@ -177,7 +179,7 @@ def _foretell(curve: _Curve, settings: tuple[Settings, Settings], changed: dict[
     samples = found.errors["samples"] * (max(old.samples, 1) / max(new.samples, 1)) ** 2
     by_harmonics = found.errors["harmonics"] / (found.errors["harmonics"] + found.errors["samples"] - samples)
     rest = found.total - found.errors["harmonics"] - found.errors["samples"] + samples
-    most = by_harmonics * max(changed[i] / size(curve.points[i]) / max(before[i], TINY) for i in places)
+    most = by_harmonics * max(changed[i] / curve.heights[i] / max(before[i], TINY) for i in places)
     for i in places:
         curve.errors[curve.points[i].omega] = float(rest + most * curve.moved[i])
         curve.foretold.add(curve.points[i].omega)
@@ -202,6 +204,7 @@ def _change(curve: _Curve, i: int, better: Settings, gained: list[tuple[float, n
         return np.inf
     gained.append((new.omega, new.w - carried_over))
     curve.points[i], curve.used[i] = new, better
+    curve.heights[i] = size(new) if new.converged else 0.0
     curve.errors.pop(old.omega, None)
     curve.foretold.discard(old.omega)
     return float(abs(new.probe[1, 0] - old.probe[1, 0])) if old.converged else np.inf

@@ -17,7 +17,7 @@ from ..hbm.sweep import size, sweep
 from .family import Family, member
 from .indicators import Indicators, indicate, judge, moved
 from .settings import Settings, enriched
-from .watched import hidden, peak_of, watched
+from .watched import heights_of, hidden, peak_of, watched
 
 __all__ = ["Checked", "adapted", "checked", "choose", "covered", "default_band", "estimated", "following", "likely",
            "response_points", "sufficient"]
@@ -126,7 +126,8 @@ def adapted(family: Family, settings: Settings, band: tuple[float, float] | None
             points = _replaced(points, response_points(model, settings, inner, accuracy))
         top, used, errors = peak_of(points), settings, {}
         whole = all(p.converged for p in points)
-        for point in watched(points, hidden(family, [settings] * len(points), points), accuracy):
+        moved = hidden(family, [settings] * len(points), points)
+        for point in watched(points, heights_of(points), moved, accuracy):
             tolerated = accuracy * size(top) / size(point)
             if last or not (whole or point is top):
                 found = judge(family, settings, point)

@@ -14,14 +14,14 @@ from .family import Family, member
 from .indicators import richer
 from .settings import Settings
 
-__all__ = ["hidden", "peak_of", "watched"]
+__all__ = ["heights_of", "hidden", "peak_of", "watched"]
 
 SHARES = (0.7, 0.25)    # of the peak's height: where a curve is checked on each side beside the peak itself
 LOUDEST = 3             # points that are checked because left-out harmonics move much there,
 QUIET = 0.1             # from this share of the accuracy on
 
 
-def watched(points: Sequence[Solution], moved: np.ndarray, accuracy: float) -> list[Solution]:
+def watched(points: Sequence[Solution], heights: np.ndarray, moved: np.ndarray, accuracy: float) -> list[Solution]:
     """The points that a curve is checked at.
 
     The peak, one on each flank for each of SHARES of its height, the highest of the others at which contacts begin to
@@ -30,12 +30,12 @@ def watched(points: Sequence[Solution], moved: np.ndarray, accuracy: float) -> l
     higher harmonics keep to no height.
 
     Args:
+        heights: (points,) what `heights_of` gives.
         moved: (points,) what `hidden` gives.
         accuracy: relative, of the peak.
     """
     places = [i for i, p in enumerate(points) if p.converged]
-    good, loud = [points[i] for i in places], moved[places]
-    heights = np.array([size(p) for p in good])
+    good, loud, heights = [points[i] for i in places], moved[places], heights[places]
     top = int(heights.argmax())
     chosen = [top]
     for share in SHARES:
@@ -69,6 +69,11 @@ def hidden(family: Family, used: Sequence[Settings], points: Sequence[Solution])
             model = member(family, replace(more, modes=max(settings.modes, family.modes))).model
             moved[found] = overtones(model, [points[i] for i in found], more.harmonics)
     return moved
+
+
+def heights_of(points: Sequence[Solution]) -> np.ndarray:
+    """(points,) what a peak is measured by [m]; 0 at points that were not solved."""
+    return np.array([size(p) if p.converged else 0.0 for p in points])
 
 
 def peak_of(points: Sequence[Solution]) -> Solution:
