@@ -26,6 +26,7 @@ PASSES = 16         # of richer settings, each round one point
 COARSE = 0.02       # accuracy that the first sweep is made for where contacts may lift off
 TINY = float(np.finfo(float).tiny)
 NEAR, LEAST = 3, 0.25       # neighbours for which a point that is less wrong than foretold speaks, and how much at most
+ONE_STEP = 4        # times the tolerated error that two steps of harmonics change, where one of them leaves half of it
 QUIET = 2           # neighbours that richer settings do not change, beyond which the others are left as they are
 
 
@@ -143,22 +144,37 @@ def _confirm(curve: _Curve, i: int) -> None:
 
 
 def _raise(curve: _Curve, at: int, better: Settings, found: Indicators) -> None:
-    """Solve a point with better settings, and its neighbours of the same settings as far as that changes them."""
-    old, limit = curve.used[at], curve.limit
+    """Solve a point with better settings, and its neighbours of the same settings as far as that changes them.
+
+    Where two steps of the harmonics at once are a matter of few points, one does beside them.
+    """
+    old, limit, between = curve.used[at], curve.limit, _between(curve.used[at], better)
     first: list[tuple[float, np.ndarray]] = []
     changed = {at: _change(curve, at, better, first)}
     for side in (range(at + 1, len(curve.points)), range(at - 1, -1, -1)):
-        quiet, gained = 0, first.copy()
+        quiet, gained, settings = 0, first.copy(), better
         for i in side:
             if curve.used[i] != old or quiet == QUIET:
                 break
-            changed[i] = _change(curve, i, better, gained)
+            changed[i] = _change(curve, i, settings, gained)
             quiet = quiet + 1 if changed[i] <= limit else 0
-    raised = sorted(i for i in changed if curve.used[i] == better)
+            if between and settings == better and changed[i] <= ONE_STEP * limit:
+                settings, gained = between, []
+    raised = sorted(i for i in changed if curve.used[i] != old)
     before = curve.moved.copy()
-    curve.moved[raised] = hidden(curve.family, [better] * len(raised), [curve.points[i] for i in raised])
+    curve.moved[raised] = hidden(curve.family, [curve.used[i] for i in raised], [curve.points[i] for i in raised])
     if _alike(old, better):
-        _foretell(curve, (old, better), {i: changed[i] for i in raised if changed[i] < np.inf}, before, found)
+        solved = {i: changed[i] for i in raised if changed[i] < np.inf and curve.used[i] == better}
+        _foretell(curve, (old, better), solved, before, found)
+
+
+def _between(old: Settings, better: Settings) -> Settings | None:
+    """With one step of the harmonics in place of two."""
+    H = 2 * old.harmonics + 1
+    if better.harmonics <= H:
+        return None
+    samples = better.samples * (H + 1) // (better.harmonics + 1)
+    return replace(better, harmonics=H, samples=max(old.samples, samples))
 
 
 def _foretell(curve: _Curve, settings: tuple[Settings, Settings], changed: dict[int, float], before: np.ndarray,
