@@ -65,7 +65,7 @@ from bladefem.hbm.sweep import response, size
 from bladefem.hbm.warm import compile_kernels
 from bladefem.scene_file import load_scene
 from bladefem.study.along import along
-from bladefem.study.choice import default_band
+from bladefem.study.choice import covered
 from bladefem.study.family import Family, family_of, member
 from bladefem.study.pipeline import family_of_case, load_cases, reduced_sector, run
 from bladefem.study.settings import Settings, first_for, restarted
@@ -131,8 +131,9 @@ def between(case: Case, points: int = 100) -> np.ndarray:
 
 
 def around(model: ReducedModel, mode: int, points: int = 100) -> np.ndarray:
-    """Circular frequencies of the band that a study would take [rad/s]."""
-    return 2 * np.pi * np.linspace(*default_band(model, mode), points)
+    """Circular frequencies of the band that a study would take, which is as wide as its peak needs [rad/s]."""
+    rough = covered(model, first_for(len(model.sides[0].omega)), None, mode, 1.0)
+    return np.linspace(rough[0].omega, rough[-1].omega, points)
 
 
 def fixed(swept: Swept, settings: tuple[int, int], every: int = 1) -> list[Solution]:

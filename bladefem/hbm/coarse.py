@@ -21,8 +21,9 @@ from .woodbury import bodies_of
 
 __all__ = ["MANY", "common_motions", "no_level", "prepared", "second_level"]
 
-MANY = 1000         # unknowns from which a second level pays
+MANY = 300          # unknowns from which a second level pays
 MOST = 12           # common motions of two rigid seats in space; more cost more than they save
+EACH = 4            # contact freedoms for each of them at least
 FAINT = 1e-2        # motions whose compliance is below the square of this, over the largest one, are left out
 SAME = 1e-3         # part of a motion that has to be left beside the others where some contacts stick
 
@@ -44,7 +45,7 @@ def _common(model: ReducedModel, harmonics: int) -> np.ndarray:
     soft = np.concatenate([part for mode in modes for part in (mode.real, mode.imag)], axis=1)
     compliances, motions = np.linalg.eigh(soft @ soft.T)
     kept = compliances >= FAINT**2 * compliances[-1]
-    return np.ascontiguousarray(motions[:, kept][:, :-MOST - 1:-1])
+    return np.ascontiguousarray(motions[:, kept][:, :-min(MOST, len(soft) // EACH) - 1:-1])
 
 
 @njit(cache=True, error_model="numpy")

@@ -105,7 +105,7 @@ def linearise(balance: Balance, state: State, memory: Memory | None = None) -> I
     A = _among(balance.linear.A, dofs)
     if memory is not None and memory.nodes != active.tobytes():
         memory.nodes, memory.blocks, memory.slow = active.tobytes(), None, memory.slow or memory.blocks is not None
-    inverse = _inverse(A, change, memory)
+    inverse = _inverse(A, change, memory, common_motions(balance.model, K // 2)[dofs])
 
     def solve(residual: np.ndarray, accuracy: float = ACCURACY) -> np.ndarray:
         step = residual.copy()
@@ -164,11 +164,12 @@ def _among(A: np.ndarray, dofs: np.ndarray) -> np.ndarray:
     return A if len(dofs) == A.shape[1] else A[np.ix_(np.arange(len(A)), dofs, dofs)]
 
 
-def _inverse(A: np.ndarray, change: np.ndarray, memory: Memory | None = None) -> Inverse:
+def _inverse(A: np.ndarray, change: np.ndarray, memory: Memory | None = None,
+             motions: np.ndarray | None = None) -> Inverse:
     unknowns = A.shape[1] * (2 * len(A) - 1)
     if unknowns <= DENSE:
         return _dense_inverse(A, change)
-    iterative = iterative_inverse(A, change, memory)
+    iterative = iterative_inverse(A, change, memory, motions)
     return iterative if unknowns > LARGEST else _with_factors_at_need(iterative, A, change)
 
 

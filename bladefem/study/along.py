@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 
 import numpy as np
 
@@ -149,7 +150,7 @@ def _raise(curve: _Curve, at: int, better: Settings, found: Indicators) -> None:
     Where two steps of the harmonics at once are a matter of few points, one does beside them.
     """
     old, limit, between = curve.used[at], curve.limit, _between(curve.used[at], better)
-    first: list[tuple[float, np.ndarray]] = []
+    first: list[tuple[Solution, np.ndarray]] = []
     changed = {at: _change(curve, at, better, first)}
     for side in (range(at + 1, len(curve.points)), range(at - 1, -1, -1)):
         quiet, gained, settings = 0, first.copy(), better
@@ -201,11 +202,11 @@ def _foretell(curve: _Curve, settings: tuple[Settings, Settings], changed: dict[
         curve.foretold.add(curve.points[i].omega)
 
 
-def _change(curve: _Curve, i: int, better: Settings, gained: list[tuple[float, np.ndarray]]) -> float:
+def _change(curve: _Curve, i: int, better: Settings, gained: list[tuple[Solution, np.ndarray]]) -> float:
     """Put the point of better settings in place of the present one; the distance of their first harmonics [m].
 
     Args:
-        gained: frequencies of the neighbours that were changed before, and what that added to their displacements: its
+        gained: the neighbours that were changed before, and what that added to their displacements: its
             curve is added to the start, but for harmonics where contacts lift off; and this point to the list.
     """
     old, settings = curve.points[i], curve.used[i]
@@ -215,10 +216,13 @@ def _change(curve: _Curve, i: int, better: Settings, gained: list[tuple[float, n
     carried_over = carried(old.w, poor, rich, better.harmonics)
     smooth = gained and not (old.states["lift"] and _alike(settings, better))
     start = replace(old, w=carried_over + _expected(gained, old.omega) if smooth else carried_over)
-    new = solve(rich.model, old.omega, better.harmonics, better.samples, start=start, options=curve.options)
+    solved = partial(solve, rich.model, old.omega, better.harmonics, better.samples)
+    simply = replace(curve.options, fallbacks=False)    # fallbacks take a hundred times as long
+    tries = (solved(start=s, options=simply) for s in [start, *(neighbour for neighbour, _ in gained[-1:])])
+    new = next((p for p in tries if p.converged), None) or solved(start=start, options=curve.options)
     if old.converged and not new.converged:
         return np.inf
-    gained.append((new.omega, new.w - carried_over))
+    gained.append((new, new.w - carried_over))
     curve.points[i], curve.used[i] = new, better
     curve.heights[i] = size(new) if new.converged else 0.0
     curve.errors.pop(old.omega, None)
@@ -226,9 +230,9 @@ def _change(curve: _Curve, i: int, better: Settings, gained: list[tuple[float, n
     return float(abs(new.probe[1, 0] - old.probe[1, 0])) if old.converged else np.inf
 
 
-def _expected(gained: list[tuple[float, np.ndarray]], omega: float) -> np.ndarray:
+def _expected(gained: list[tuple[Solution, np.ndarray]], omega: float) -> np.ndarray:
     """The curve through the last of them."""
-    at, known = np.array([w for w, _ in gained[-AHEAD:]]), np.array([w for _, w in gained[-AHEAD:]])
+    at, known = np.array([p.omega for p, _ in gained[-AHEAD:]]), np.array([w for _, w in gained[-AHEAD:]])
     result = np.empty(known.shape[1:])
     flat = (len(known), -1, known.shape[-1])
     ahead(omega, known.reshape(flat), at, len(known), result.reshape(flat[1:]))
