@@ -1,4 +1,4 @@
-"""The bodies of a small model in arrays for its compiled points: all that does not depend on the frequency.
+"""The bodies of a small model as one tuple of arrays, which numba takes: all that does not depend on the frequency.
 
 Both bodies are one: the damper's modes, rigid ones with frequency zero, stand beside the blades' with the shapes that
 they give the relative displacement.

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import replace
 from functools import cache, partial
-from itertools import chain
+from itertools import chain, islice
 
 import numpy as np
 
@@ -21,7 +21,7 @@ from .sensitivity import sensitivities
 from .small import solve_along
 from .solution import Solution
 
-__all__ = ["first_look", "local_maxima", "response", "size", "sweep"]
+__all__ = ["first_look", "local_maxima", "response", "size", "solve_from", "sweep"]
 
 Keep = Callable[[float, Callable[[], Solution]], Solution]
 Slope = Callable[[float], float]     # of the height with the frequency, at a solved one
@@ -106,10 +106,23 @@ def sweep(model: ReducedModel, band: tuple[float, float], H: int = 3, samples: i
         wanted = _wanted(solved, slope, (peak, curve), options.probe)
         if wanted is None:
             return
-        near = sorted((s for s in solved.values() if s.converged), key=lambda s: abs(s.omega - wanted))[:1]
-        solution = _solve(model, wanted, H, samples, near[0] if near else None, options)
+        near = sorted((s for s in solved.values() if s.converged), key=lambda s: abs(s.omega - wanted))
+        beyond = (s for s in near if (s.omega > wanted) != (near[0].omega > wanted))
+        solution = solve_from(model, wanted, H, samples, [*near[:1], *islice(beyond, 1)], options)
         solved[wanted] = solution
         yield solution
+
+
+def solve_from(model: ReducedModel, omega: float, H: int, samples: int, starts: Sequence[Solution],
+               options: Options = DEFAULTS) -> Solution:
+    """The point from the first of several neighbours that leads to it, before fallbacks, which take far longer.
+
+    Beside a fold of the curve only the neighbour on its other side does.
+    """
+    simply = replace(options, fallbacks=False)
+    tries = (_solve(model, omega, H, samples, start, simply) for start in starts) if len(starts) > 1 else ()
+    return (next((point for point in tries if point.converged), None)
+            or _solve(model, omega, H, samples, starts[0] if starts else None, options))
 
 
 def _solve(model: ReducedModel, omega: float, H: int, samples: int, start: Solution | None,

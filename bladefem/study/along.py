@@ -4,17 +4,15 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
-from functools import partial
 
 import numpy as np
 
 from ..errors import InputError, NotSolvedError
 from ..hbm.ahead import AHEAD, ahead
-from ..hbm.api import solve
 from ..hbm.newton import Options
 from ..hbm.solution import Solution
 from ..hbm.sticking import grips
-from ..hbm.sweep import response, size
+from ..hbm.sweep import response, size, solve_from
 from .choice import KEPT, Checked, following, likely, sufficient
 from .family import Family, carried, member
 from .indicators import Indicators, indicate, judge
@@ -216,10 +214,8 @@ def _change(curve: _Curve, i: int, better: Settings, gained: list[tuple[Solution
     carried_over = carried(old.w, poor, rich, better.harmonics)
     smooth = gained and not (old.states["lift"] and _alike(settings, better))
     start = replace(old, w=carried_over + _expected(gained, old.omega) if smooth else carried_over)
-    solved = partial(solve, rich.model, old.omega, better.harmonics, better.samples)
-    simply = replace(curve.options, fallbacks=False)    # fallbacks take a hundred times as long
-    tries = (solved(start=s, options=simply) for s in [start, *(neighbour for neighbour, _ in gained[-1:])])
-    new = next((p for p in tries if p.converged), None) or solved(start=start, options=curve.options)
+    new = solve_from(rich.model, old.omega, better.harmonics, better.samples,
+                     [start, *(neighbour for neighbour, _ in gained[-1:])], curve.options)
     if old.converged and not new.converged:
         return np.inf
     gained.append((new, new.w - carried_over))
