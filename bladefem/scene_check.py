@@ -161,6 +161,8 @@ def _numerics(scene: Scene) -> Iterator[str]:
     mesh, model = scene.mesh, scene.model
     if mesh.size is not None and mesh.contact_size is not None:
         yield from _at_most("mesh.contact_size", mesh.contact_size, mesh.size, "mesh.size")
+    if mesh.seat_elements is not None and scene.kind != "wedge sector":
+        yield f"mesh.seat_elements = {mesh.seat_elements}: only the seats of kind 'wedge sector' are meshed in a grid"
     if model.samples == 0 and scene.kind in ("wedge sector", "z mass"):
         yield ("model.samples = 0: changes of contact state are located exactly in plane models only, expected at "
                "least 16")

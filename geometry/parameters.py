@@ -133,6 +133,9 @@ class MeshSize:
 
     size: float | None = quantity(None, "m", 1e-5, 1.0, "target element size; from the thinnest part when left out")
     contact_size: float | None = quantity(None, "m", 1e-6, 1.0, "element size on contact faces")
+    seat_elements: int | None = quantity(None, "1", 2, 64, "elements across the width of a wedge's seats, which are "
+                                         "then a grid with contact_size, or a sixth of the length, along them; free "
+                                         "triangles when left out")
     order: int = quantity(2, "1", 1, 2, "order of the elements; 1 is only for comparison")
     algorithm: str = quantity("hxt", choices=("hxt", "delaunay"),
                               help="how gmsh fills volumes; the other one is tried when it fails or leaves flat cells")

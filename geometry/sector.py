@@ -18,10 +18,11 @@ from .section import outline
 from .sector_check import check_sector
 from .sector_names import edge_curves, link, mark_tip, motions, moved, name_faces, seat, sector
 from .session import attempt, gmsh_session
-from .sizing import sector_sizes, set_sizes
+from .sizing import sector_sizes, set_grids, set_sizes
 
 __all__ = ["disc_segment", "wedge_sector"]
 
+SEATS = ("seat_left", "seat_right", "damper_left", "damper_right")
 LIFT = 15 * DEG     # a fillet meets the platform at this angle, since tangent faces are hard on Boolean unions
 
 
@@ -49,10 +50,12 @@ def wedge_sector(aerofoil: Aerofoil, platform: Platform, shank: Shank, disc: Dis
         groups = mark_tip(gmsh, groups, aerofoil, shape)
         link(gmsh, groups, shape)
         set_sizes(gmsh, shape, wedge, sizes, edge_curves(gmsh, groups))
+        if size.seat_elements:
+            set_grids(gmsh, [groups.faces[name][0] for name in SEATS], wedge, size)
         with attempt("mesh.size", "mesh this geometry"):
             mesh = mesh_model(gmsh, groups, 3, size)
     mesh = complete(mesh, motions(shape), sizes.base, sector(disc.sectors),
-                    flat=("seat_left", "seat_right", "damper_left", "damper_right"))
+                    flat=SEATS)
     return moved(mesh, wedge, shape) if wedge.clearance else mesh
 
 

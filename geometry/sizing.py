@@ -6,14 +6,17 @@ from dataclasses import dataclass
 from math import pi
 from types import ModuleType
 
+from bladefem.errors import InputError
+
 from .parameters import Aerofoil, Disc, MeshSize, Platform, Shank, Wedge
 from .profile import Profile
 from .section import BLUNT
 
-__all__ = ["Sizes", "sector_sizes", "set_sizes"]
+__all__ = ["Sizes", "sector_sizes", "set_grids", "set_sizes"]
 
 
 NOSE = 0.6          # element along the leading edge over those of the aerofoil
+ALONG = 6           # elements along a seat at least
 SOME = 40_000        # cells above the rim at the finest, when the size is left open
 
 
@@ -35,7 +38,7 @@ def sector_sizes(aerofoil: Aerofoil, platform: Platform, shank: Shank, disc: Dis
     tip, root = aerofoil.thickness_tip * aerofoil.chord_tip, aerofoil.thickness_root * aerofoil.chord_root
     thin = 0.6 * min((tip + root) / 2, platform.thickness, shank.width / 2)
     base = size.size or max(thin, _affordable(aerofoil, platform, shank, disc))
-    contact = size.contact_size or min(base, platform.seat_width, wedge.length / 6)
+    contact = size.contact_size or min(base, platform.seat_width, wedge.length / ALONG)
     return Sizes(base, contact, max(base, min(3 * base, (disc.rim_radius - disc.bore_radius) / 3)),
                  NOSE * base, min(base, 6 * BLUNT * tip), base / 3)
 
@@ -73,6 +76,28 @@ def set_sizes(gmsh: ModuleType, profile: Profile, wedge: Wedge, sizes: Sizes,
     gmsh.option.setNumber("Mesh.MeshSizeFromCurvature", 8)
     gmsh.option.setNumber("Mesh.MeshSizeMin", min(sizes.least, sizes.contact))
     gmsh.option.setNumber("Mesh.MeshSizeMax", sizes.disc)
+
+
+def set_grids(gmsh: ModuleType, seats: list[int], wedge: Wedge, size: MeshSize) -> None:
+    """Mesh rectangular seats in a grid, much finer across them than along.
+
+    A wedge that rolls on its seats presses a strip of their width only: a few nodes there decide who slips and lifts.
+
+    Raises:
+        InputError: a seat is no rectangle with one edge on each side.
+    """
+    along = max(2, round(wedge.length / (size.scale * (size.contact_size or wedge.length / ALONG))))
+    across = max(2, round(size.seat_elements / size.scale))
+    for seat in seats:
+        edges = {abs(tag) for _, tag in gmsh.model.getBoundary([(2, seat)], oriented=False)}
+        if len(edges) != 4:
+            raise InputError(f"mesh.seat_elements = {size.seat_elements}: a seat has {len(edges)} edges, expected 4; "
+                             "leave it out for free triangles")
+        for edge in edges:
+            _, _, low, _, _, high = gmsh.model.getBoundingBox(1, edge)
+            count = along if high - low > wedge.length / 2 else across
+            gmsh.model.mesh.setTransfiniteCurve(edge, count + 1)
+        gmsh.model.mesh.setTransfiniteSurface(seat, "AlternateLeft")
 
 
 def _box(field: object, inside: float, outside: float, thickness: float, limits: list[float]) -> int:

@@ -14,6 +14,7 @@ import pandas as pd
 
 from geometry.mesh import Mesh
 from geometry.parameters import MeshSize
+from geometry.sizing import ALONG
 
 from ..contact.seat import solve as seat
 from ..errors import InputError, NotSolvedError
@@ -82,7 +83,11 @@ def mesh_variants(scene: Scene, sizes: Sequence[float], drawn: Mesh) -> list[Mes
                         ratio == 1.0 and (mesh, order) == (own, own.order))
             for order in (1, 2) for name, ratio, mesh in listed]
     if not sizes:
-        halved = replace(own, order=2, contact_size=_seat_size(drawn) / (2 * own.scale))
+        if own.seat_elements:
+            along = own.contact_size or scene.damper.length / ALONG
+            halved = replace(own, order=2, seat_elements=2 * own.seat_elements, contact_size=along / 2)
+        else:
+            halved = replace(own, order=2, contact_size=_seat_size(drawn) / (2 * own.scale))
         made.append(MeshVariant("own size, seats halved", halved, 2, 2.0 ** (power - 1), False))
     return made
 

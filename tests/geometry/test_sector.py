@@ -119,6 +119,27 @@ def test_middle_nodes_of_the_seats_are_exactly_in_the_middle(coarse_sector):
         np.testing.assert_allclose(x[:, 3:], (x[:, [0, 1, 2]] + x[:, [1, 2, 0]]) / 2, atol=1e-16)
 
 
+@pytest.mark.parametrize(("given", "across", "along"), [
+    ({"seat_elements": 8}, 8, 6), ({"seat_elements": 5, "contact_size": 5e-3}, 5, 8),
+    ({"seat_elements": 8, "scale": 2.0}, 4, 3)])
+def test_seats_in_a_grid_have_equal_elements_across_and_along(given, across, along):
+    """Corner nodes of both sides stand where they should; volumes stay what they are but for curved faces."""
+    mesh, length, width = build(replace(COARSE, **given)), Wedge().length, Platform().seat_width
+    whole = build()
+    for body in ("blade", "damper"):
+        expected = volume(whole.points, whole.bodies[body])
+        assert volume(mesh.points, mesh.bodies[body]) == pytest.approx(expected, rel=1e-3)
+    for name in ("seat_left", "seat_right", "damper_left", "damper_right"):
+        corners = mesh.points[np.unique(mesh.faces[name][:, :3])]
+        slope = corners - corners[np.argmin(corners[:, 0])]
+        places = np.column_stack([slope[:, 2] - slope[:, 2].min(), np.linalg.norm(slope[:, :2], axis=1)])
+        grid = np.stack(np.meshgrid(np.linspace(0, length, along + 1), np.linspace(0, width, across + 1),
+                                    indexing="ij"), axis=-1).reshape(-1, 2)
+        assert len(places) == len(grid)
+        np.testing.assert_allclose(sorted(map(tuple, np.round(places, 9))), grid, atol=2e-9)
+    assert mesh.pairs["this"].nodes.shape == mesh.pairs["next"].nodes.shape
+
+
 def test_tip_nodes_stand_on_the_section_whatever_the_mesh(coarse_sector):
     x = {name: coarse_sector.points[nodes[0]] for name, nodes in coarse_sector.nodes.items()}
     top = profile(*[PARTS[k] for k in ("platform", "shank", "disc", "wedge")]).top

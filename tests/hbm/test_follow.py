@@ -9,6 +9,7 @@ from models import block, single_mass
 
 from bladefem.data import Elements
 from bladefem.errors import InputError
+from bladefem.hbm import sweep as sweep_module
 from bladefem.hbm.api import solve
 from bladefem.hbm.follow import follow
 from bladefem.hbm.linear import condense
@@ -60,6 +61,26 @@ def test_folds_lie_where_sweeps_up_and_down_jump():
             heights.append(size(last))
         jump = omegas[int(np.argmax(abs(np.diff(heights))))]
         assert jump == pytest.approx(fold, abs=6e-4)
+
+
+def test_the_neighbour_beyond_a_fold_is_tried_before_the_fallbacks(monkeypatch):
+    """One that leads nowhere costs no fallbacks where another leads to the point; they are the last resort."""
+    model, plain, asked = stop(), sweep_module._solve, []
+    near, beyond = (solve(model, omega, 5, 0) for omega in (1.0, 1.3))
+
+    def counted(*arguments):
+        *_, start, options = arguments
+        asked.append((start, options.fallbacks))
+        point = plain(*arguments)
+        return replace(point, converged=point.converged and any(start is s for s in leading))
+
+    monkeypatch.setattr(sweep_module, "_solve", counted)
+    for leading, tried in (([near], [(near, False)]), ([beyond], [(near, False), (beyond, False)]),
+                           ([], [(near, False), (beyond, False), (near, True)])):
+        asked.clear()
+        point = sweep_module.solve_from(model, 1.1, 5, 0, [near, beyond])
+        assert point.converged == bool(leading) and [f for _, f in asked] == [f for _, f in tried]
+        assert all(one is other for (one, _), (other, _) in zip(asked, tried, strict=True))
 
 
 def twins(coupling):

@@ -70,6 +70,7 @@ TOGETHER = [
     ({"kind": "z mass", "z_mass": {"bar": "31 mm"}}, "z_mass.bar"),
     ({"kind": "hertz", "hertz": {"contact_radius": "20 mm"}}, "hertz.contact_radius"),
     ({"kind": "hertz", "mesh": {"contact_size": "5 mm"}}, "mesh.contact_size"),
+    ({"kind": "plane blades", "mesh": {"seat_elements": 8}}, "mesh.seat_elements"),
     ({"kind": "punch", "punch": {"radius": "30 mm"}}, "punch.radius"),
     ({"kind": "punch", "study": {"loads": [0]}}, "study.loads = 0 N: nothing presses the two bodies together"),
     ({"kind": "hertz", "operation": {"speed": 1}}, "does not use this table"),
