@@ -32,8 +32,8 @@ together. It is missed
   models (a millisecond each) and checks;
 - at 0.1 % where higher harmonics are in resonance (16 contacts): seven harmonics alone take a quarter, and parts of the
   curve need 15;
-- at 0.1 % on plane blades, whose contacts lift off at all frequencies: round the peak, where a rich point takes longest,
-  they need all contact points and 15 harmonics, which is what the rich model has.
+- at 0.1 % on plane blades, whose contacts lift off at all frequencies: round the peak, where a rich point takes
+  longest, they need all contact points and 15 harmonics, which is what the rich model has.
 
 The band of the plane blades is the one that a study takes, widened until the peak lies inside. Where contacts lift off
 several solutions can coexist, on the plane blades at 1018 Hz two that lie 0.45 % of the peak apart; there the true
