@@ -54,8 +54,7 @@ def wedge_sector(aerofoil: Aerofoil, platform: Platform, shank: Shank, disc: Dis
             set_grids(gmsh, [groups.faces[name][0] for name in SEATS], wedge, size)
         with attempt("mesh.size", "mesh this geometry"):
             mesh = mesh_model(gmsh, groups, 3, size)
-    mesh = complete(mesh, motions(shape), sizes.base, sector(disc.sectors),
-                    flat=SEATS)
+    mesh = complete(mesh, motions(shape), sizes.base, sector(disc.sectors), flat=SEATS)
     return moved(mesh, wedge, shape) if wedge.clearance else mesh
 
 
