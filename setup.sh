@@ -92,7 +92,7 @@ import dolfinx, petsc4py, slepc4py  # noqa
 assert not numpy.__file__.startswith(sys.prefix + "/"), "pip installed a second numpy: " + numpy.__file__
 PYTHON
 say "compiling kernels, once"
-"$V/bin/python" -m bladefem.hbm.warm >"$LOG" 2>&1 || { show_log; say "they will be compiled when they are used"; }
+"$V/bin/python" -m bladefem.hbm.precompile >"$LOG" 2>&1 || { show_log; say "they will be compiled when they are used"; }
 key >"$STAMP.new"
 mv "$STAMP.new" "$STAMP"
 say "ready"

@@ -1,12 +1,14 @@
-"""Is another method ever faster than the sampled balance by Newton, where it is as accurate? On the 68 choice cases.
+"""Is another method ever faster than the sampled balance by Newton, where it is as accurate? On the
+68 choice cases.
 
     python benchmarks/choice_methods.py [every]
 
-Each method takes each case with rising harmonics or steps until the first harmonic at the probe is right to 2 %, 0.1 %
-and 0.001 %; the CPU time of the cheapest that is enough, over that of the cheapest sampled balance that is enough.
-The truth is H 63 with 16384 samples. Starts are cold.
+Each method takes each case with rising harmonics or steps until the first harmonic at the probe is
+right to 2 %, 0.1 % and 0.001 %; the CPU time of the cheapest that is enough, over that of the
+cheapest sampled balance that is enough. The truth is H 63 with 16384 samples. Starts are cold.
 
-Measured, over the cheapest sampled balance (median in brackets), and how many cases have the accuracy at all:
+Measured, over the cheapest sampled balance (median in brackets), and how many cases have the
+accuracy at all:
 
     method                  2 %                     0.1 %                   0.001 %
     exact events            1.0 to 2   (1.3) 60/60  1.0 to 5   (1.3) 60/60  1.0 to 12 (1.3) 60/60
@@ -15,8 +17,9 @@ Measured, over the cheapest sampled balance (median in brackets), and how many c
     Newmark                 15 to 205  (51)  30/30  26 to 296  (140) 20/30  -               0/30
     explicit steps          1.3 to 52  (1.8) 30/30  1.3 to 42  (1.8) 27/30  1.3 to 19 (1.7) 21/30
 
-None is ever faster. Small factors belong to cases that stick, where every method has nothing to do. The bodies with
-3-D contacts and lift-off are taken by the balance alone. What integrates in time takes blades in phase only.
+None is ever faster. Small factors belong to cases that stick, where every method has nothing to do.
+The bodies with 3-D contacts and lift-off are taken by the balance alone. What integrates in time
+takes blades in phase only.
 """
 
 from __future__ import annotations
@@ -28,8 +31,16 @@ from collections.abc import Callable, Iterator
 import numpy as np
 from choice_cases import Case, beam_cases, random_cases
 
-from bladefem.hbm.api import solve
-from bladefem.study.methods import Point, applicable, balance, integrated, paper, shooting, tangential
+from bladefem.hbm.solve import solve
+from bladefem.study.chart.methods import (
+    Point,
+    applicable,
+    balance,
+    integrated,
+    paper,
+    shooting,
+    tangential,
+)
 
 WANTED = (0.02, 1e-3, 1e-5)
 HARMONICS, SAMPLES = (1, 3, 7, 15, 31), (64, 128, 256, 512, 1024, 4096)
@@ -42,9 +53,12 @@ def ways(case: Case) -> dict[str, list[Run]]:
         return {}
     found = {"exact events": [balance(H, 0) for H in HARMONICS]}
     if not applicable(case.model):
-        found |= {"the paper's iteration": [paper(H, averaged=True) for H in (1, 3)], "shooting": [shooting],
-                  "Newmark": [integrated(steps, explicit=False) for steps in (64, 256)],
-                  "explicit steps": [integrated(steps, explicit=True) for steps in (512, 2048)]}
+        found |= {
+            "the paper's iteration": [paper(H, averaged=True) for H in (1, 3)],
+            "shooting": [shooting],
+            "Newmark": [integrated(steps, explicit=False) for steps in (64, 256)],
+            "explicit steps": [integrated(steps, explicit=True) for steps in (512, 2048)],
+        }
     return found
 
 
@@ -61,7 +75,10 @@ def spent(case: Case, run: Run, truth: complex) -> tuple[float, float]:
 def cheapest(trials: Iterator[tuple[float, float]]) -> dict[float, float]:
     """Seconds for each wanted accuracy; infinite where no trial has it."""
     trials = list(trials)
-    return {wanted: min((s for s, error in trials if error <= wanted), default=np.inf) for wanted in WANTED}
+    return {
+        wanted: min((s for s, error in trials if error <= wanted), default=np.inf)
+        for wanted in WANTED
+    }
 
 
 def main(every: int = 1) -> None:
@@ -74,22 +91,33 @@ def main(every: int = 1) -> None:
             alone += 1
             continue
         truth = complex(solve(case.model, case.omega, 63, 16384).probe[1, 0])
-        sampled = [balance(H, samples) for H in HARMONICS for samples in SAMPLES if samples >= 8 * H + 8]
+        sampled = [
+            balance(H, samples) for H in HARMONICS for samples in SAMPLES if samples >= 8 * H + 8
+        ]
         if k == 0:
-            spent(case, sampled[0], truth)      # compile
+            spent(case, sampled[0], truth)  # compile
             spent(case, others["exact events"][0], truth)
         base = cheapest(spent(case, run, truth) for run in sampled)
         for name, runs in others.items():
             own = cheapest(spent(case, run, truth) for run in runs)
             for wanted in WANTED:
-                ratios.setdefault(name, {}).setdefault(wanted, []).append(own[wanted] / base[wanted])
+                ratios.setdefault(name, {}).setdefault(wanted, []).append(
+                    own[wanted] / base[wanted]
+                )
     print(f"{alone} cases that no other method takes")
     for name, found in ratios.items():
         for wanted, values in found.items():
             good = np.array([v for v in values if np.isfinite(v)])
-            print(f"{name:22s} {wanted:7g}: enough in {len(good)} of {len(values)}"
-                  + (f", times the balance {good.min():.2f} to {good.max():.0f}, median {np.median(good):.1f}"
-                     if len(good) else ""), flush=True)
+            print(
+                f"{name:22s} {wanted:7g}: enough in {len(good)} of {len(values)}"
+                + (
+                    f", times the balance {good.min():.2f} to {good.max():.0f}, median "
+                    f"{np.median(good):.1f}"
+                    if len(good)
+                    else ""
+                ),
+                flush=True,
+            )
 
 
 if __name__ == "__main__":

@@ -1,9 +1,11 @@
-"""Contact in 3-D on gmsh's meshes: Hertz spheres, rigid flat punch, partial slip of Cattaneo and Mindlin.
+"""Contact in 3-D on gmsh's meshes: Hertz spheres, rigid flat punch, partial slip of Cattaneo and
+Mindlin.
 
-    PYTHONPATH=. python benchmarks/contact_pairs.py            (about a minute and a half on one core)
+    PYTHONPATH=. python benchmarks/contact_pairs.py            (about a minute and a half on one
+    core)
 
-Bodies are blocks of ten contact radii (cylinders: 60, plane stress), clamped on the far side; a quarter is meshed.
-Recorded results, relative errors:
+Bodies are blocks of ten contact radii (cylinders: 60, plane stress), clamped on the far side; a
+quarter is meshed. Recorded results, relative errors:
 
                                                      peak         L2     radius
     cylinder, steel, h = a/4                       0.19 %     1.23 %     0.32 %
@@ -46,7 +48,7 @@ sys.path.insert(0, str(Path(__file__).parents[1] / "tests" / "contact"))
 
 from pairs import indent, loops, press
 
-from bladefem.scene import Material
+from bladefem.scene.tables import Material
 
 STEEL, ALUMINIUM = Material(), Material(E=7e10, nu=0.33, rho=2700.0)
 SIZES = (4, 6, 8, 10)
@@ -57,16 +59,23 @@ def line(name: str, *errors: float) -> None:
 
 
 def main() -> None:
-    wide = {"contact_radius": 5e-4, "half_width": 0.03}     # in the plane a block of ten radii is too small
-    for name, materials, dimension, more in (("cylinder, steel", (STEEL, STEEL), 2, wide),
-                                             ("sphere, steel", (STEEL, STEEL), 3, {}),
-                                             ("sphere, steel on aluminium", (STEEL, ALUMINIUM), 3, {})):
+    wide = {
+        "contact_radius": 5e-4,
+        "half_width": 0.03,
+    }  # in the plane a block of ten radii is too small
+    for name, materials, dimension, more in (
+        ("cylinder, steel", (STEEL, STEEL), 2, wide),
+        ("sphere, steel", (STEEL, STEEL), 3, {}),
+        ("sphere, steel on aluminium", (STEEL, ALUMINIUM), 3, {}),
+    ):
         print(f"    {'':42s}       peak         L2     radius")
         found = []
         for n in SIZES:
             found.append(press(n, materials, dimension, **more))
             line(f"{name}, h = a/{n}", *(found[-1][k] for k in ("peak", "L2", "radius")))
-        orders = [-np.polyfit(np.log(SIZES), np.log([e[k] for e in found]), 1)[0] for k in ("peak", "L2")]
+        orders = [
+            -np.polyfit(np.log(SIZES), np.log([e[k] for e in found]), 1)[0] for k in ("peak", "L2")
+        ]
         print(f"    {name}: observed order of the peak {orders[0]:.1f}, of L2 {orders[1]:.1f}")
         if materials == (STEEL, STEEL) and dimension == 3:
             ratios = (0.6, 0.75, 0.9)

@@ -1,25 +1,29 @@
-"""Cyclic sectors against CalculiX (apt install calculix-ccx): frequencies, processor time and memory in one run.
+"""Cyclic sectors against CalculiX (apt install calculix-ccx): frequencies, processor time and
+memory in one run.
 
-    python benchmarks/fem_ccx.py [dofs ...]        (45000 when left out; one process, one thread each)
-    python benchmarks/fem_ccx.py --golden          writes tests/fem/ccx_sector.json
+    python benchmarks/fem_ccx.py [dofs ...]        (45000 when left out; one process, one thread
+    each) python benchmarks/fem_ccx.py --golden          writes tests/fem/ccx_sector.json
 
-The mesh is the default wedge sector with 24 blades. Facts about ccx: nodes of the slave face stay off *BOUNDARY,
-middle nodes 9 and 10 are swapped against gmsh, numbers have at most 20 characters, every frequency is printed
-twice. ccx integrates the mass of C3D10 with degree 2; ``quadrature="ccx"`` copies that.
+The mesh is the default wedge sector with 24 blades. Facts about ccx: nodes of the slave face stay
+off *BOUNDARY, middle nodes 9 and 10 are swapped against gmsh, numbers have at most 20 characters,
+every frequency is printed twice. ccx integrates the mass of C3D10 with degree 2;
+``quadrature="ccx"`` copies that.
 
-Recorded with ccx 2.20 on two shared cores, ten modes each, processor time of ccx over that of bladefem, peak memory of
-bladefem over that of ccx, largest relative difference of a frequency:
+Recorded with ccx 2.20 on two shared cores, ten modes each, processor time of ccx over that of
+bladefem, peak memory of bladefem over that of ccx, largest relative difference of a frequency:
 
-    dofs     nodal diameters  elements  ccx [s]  bladefem [s]  ratio  memory [GB]  ratio  ccx's mass  exact mass
-    45 549   5                curved       21.9           3.3    6.7         0.57   1.50     1.8e-07     6.6e-05
-    45 549   0                curved       18.3           3.0    6.0         0.55   1.45     3.1e-07     6.8e-05
-    45 549   0 to 12          curved      298.3          10.0   29.8         0.83   1.92     3.4e-07     7.1e-05
-    45 549   5                straight     18.8           3.1    6.0         0.57   1.51     3.3e-07     7.1e-06
-    151 047  5                curved      156.9          13.8   11.4         2.09   1.18     1.4e-07     1.3e-05
+    dofs     nodal diameters  elements  ccx [s]  bladefem [s]  ratio  memory [GB]  ratio  ccx's mass
+    exact mass 45 549   5                curved       21.9           3.3    6.7         0.57   1.50
+    1.8e-07     6.6e-05 45 549   0                curved       18.3           3.0    6.0
+    0.55   1.45     3.1e-07     6.8e-05 45 549   0 to 12          curved      298.3          10.0
+    29.8         0.83   1.92     3.4e-07     7.1e-05 45 549   5                straight     18.8
+    3.1    6.0         0.57   1.51     3.3e-07     7.1e-06 151 047  5                curved
+    156.9          13.8   11.4         2.09   1.18     1.4e-07     1.3e-05
 
-The first and third rows, both sides in one run, are from a machine whose other core was busy, the others from a quiet
-one. There ccx had taken 19.0 and 240.8 s; bladefem's best of three for all diameters is 9.0 s of processor time (ratio
-26.6 against those 240.8 s) where its Lanczos iteration without waiting directions took 11.1 s, run by turns.
+The first and third rows, both sides in one run, are from a machine whose other core was busy, the
+others from a quiet one. There ccx had taken 19.0 and 240.8 s; bladefem's best of three for all
+diameters is 9.0 s of processor time (ratio 26.6 against those 240.8 s) where its Lanczos iteration
+without waiting directions took 11.1 s, run by turns.
 """
 
 from __future__ import annotations
@@ -36,11 +40,11 @@ from pathlib import Path
 
 import numpy as np
 
-from bladefem.scene import Scene
+from bladefem.scene.tables import Scene
 from geometry.mesh import Mesh
 
 COUNT, SECTORS = 10, 24
-MANY = 60e3      # degrees of freedom from which one nodal diameter is enough waiting
+MANY = 60e3  # degrees of freedom from which one nodal diameter is enough waiting
 HERE = Path(__file__).resolve()
 GOLDEN = HERE.parent.parent / "tests" / "fem" / "ccx_sector.json"
 OURS = """
@@ -64,20 +68,41 @@ def ccx_input(mesh: Mesh, diameters: list[int], count: int, path: Path, extra: s
     low, high = mesh.pairs["cyclic"].nodes
     sets = {"CLAMP": np.setdiff1d(np.unique(mesh.faces["clamp"]), high), "LOW": low, "HIGH": high}
     lines = ["*NODE, NSET=ALL"]
-    lines += [f"{i + 1},{x:.12e},{y:.12e},{z:.12e}" for i, (x, y, z) in
-              ((i, mesh.points[i]) for i in np.unique(cells))]
+    lines += [
+        f"{i + 1},{x:.12e},{y:.12e},{z:.12e}"
+        for i, (x, y, z) in ((i, mesh.points[i]) for i in np.unique(cells))
+    ]
     lines += ["*ELEMENT, TYPE=C3D10, ELSET=E"]
-    lines += [",".join(map(str, [e + 1, *nodes])) for e, nodes in
-              enumerate((cells[:, [0, 1, 2, 3, 4, 5, 6, 7, 9, 8]] + 1).tolist())]
+    lines += [
+        ",".join(map(str, [e + 1, *nodes]))
+        for e, nodes in enumerate((cells[:, [0, 1, 2, 3, 4, 5, 6, 7, 9, 8]] + 1).tolist())
+    ]
     for name, nodes in sets.items():
         lines += [f"*NSET, NSET={name}", *[str(i + 1) for i in nodes]]
-    lines += ["*MATERIAL, NAME=STEEL", "*ELASTIC", "2.1e11, 0.3", "*DENSITY", "7850.",
-              "*SOLID SECTION, ELSET=E, MATERIAL=STEEL", "*BOUNDARY", "CLAMP, 1, 3",
-              "*SURFACE, NAME=SLAVE, TYPE=NODE", "HIGH", "*SURFACE, NAME=MASTER, TYPE=NODE", "LOW",
-              "*TIE, NAME=CUT, CYCLIC SYMMETRY", "SLAVE, MASTER",
-              f"*CYCLIC SYMMETRY MODEL, N={mesh.sector.count}, NGRAPH=1, TIE=CUT", "0, 0, 0, 0, 0, 1", extra,
-              "*STEP", "*FREQUENCY", str(count),
-              f"*SELECT CYCLIC SYMMETRY MODES, NMIN={diameters[0]}, NMAX={diameters[-1]}", "*END STEP"]
+    lines += [
+        "*MATERIAL, NAME=STEEL",
+        "*ELASTIC",
+        "2.1e11, 0.3",
+        "*DENSITY",
+        "7850.",
+        "*SOLID SECTION, ELSET=E, MATERIAL=STEEL",
+        "*BOUNDARY",
+        "CLAMP, 1, 3",
+        "*SURFACE, NAME=SLAVE, TYPE=NODE",
+        "HIGH",
+        "*SURFACE, NAME=MASTER, TYPE=NODE",
+        "LOW",
+        "*TIE, NAME=CUT, CYCLIC SYMMETRY",
+        "SLAVE, MASTER",
+        f"*CYCLIC SYMMETRY MODEL, N={mesh.sector.count}, NGRAPH=1, TIE=CUT",
+        "0, 0, 0, 0, 0, 1",
+        extra,
+        "*STEP",
+        "*FREQUENCY",
+        str(count),
+        f"*SELECT CYCLIC SYMMETRY MODES, NMIN={diameters[0]}, NMAX={diameters[-1]}",
+        "*END STEP",
+    ]
     path.write_text("\n".join(line for line in lines if line) + "\n")
 
 
@@ -86,7 +111,9 @@ def ccx_frequencies(text: str) -> dict[int, np.ndarray]:
     found: dict[int, list[float]] = {}
     for line in text.splitlines():
         words = line.split()
-        if len(words) == 6 and words[0].isdigit():      # diameter, number, eigenvalue, rad/s, Hz, imaginary part
+        if (
+            len(words) == 6 and words[0].isdigit()
+        ):  # diameter, number, eigenvalue, rad/s, Hz, imaginary part
             found.setdefault(int(words[0]), []).append(float(words[4]))
     return {n: np.array(f[::2]) for n, f in found.items()}
 
@@ -94,29 +121,41 @@ def ccx_frequencies(text: str) -> dict[int, np.ndarray]:
 def measured(command: list[str], folder: Path) -> tuple[str, float, float]:
     """Output, processor seconds and peak memory [GB] of a child on one thread."""
     pid_file = folder / "usage.json"
-    wrapper = ("import json, resource, subprocess, sys\n"
-               "out = subprocess.run(sys.argv[2:], capture_output=True, text=True)\n"
-               "u = resource.getrusage(resource.RUSAGE_CHILDREN)\n"
-               "json.dump([out.stdout, out.stderr, out.returncode, u.ru_utime + u.ru_stime, u.ru_maxrss / 1e6], "
-               "open(sys.argv[1], 'w'))")
-    subprocess.run([sys.executable, "-c", wrapper, str(pid_file), *command], check=True, cwd=folder,
-                   env={**os.environ, "OMP_NUM_THREADS": "1", "PYTHONPATH": str(HERE.parent.parent)})
+    wrapper = (
+        "import json, resource, subprocess, sys\n"
+        "out = subprocess.run(sys.argv[2:], capture_output=True, text=True)\n"
+        "u = resource.getrusage(resource.RUSAGE_CHILDREN)\n"
+        "json.dump([out.stdout, out.stderr, out.returncode, u.ru_utime + u.ru_stime, u.ru_maxrss "
+        "/ 1e6], "
+        "open(sys.argv[1], 'w'))"
+    )
+    subprocess.run(
+        [sys.executable, "-c", wrapper, str(pid_file), *command],
+        check=True,
+        cwd=folder,
+        env={**os.environ, "OMP_NUM_THREADS": "1", "PYTHONPATH": str(HERE.parent.parent)},
+    )
     out, err, code, cpu, memory = json.loads(pid_file.read_text())
     if code:
         raise SystemExit(f"{command[0]} failed: {out[-500:]} {err[-2000:]}")
     return out, cpu, memory
 
 
-def run_ccx(mesh: Mesh, diameters: list[int], folder: Path) -> tuple[dict[int, np.ndarray], float, float]:
+def run_ccx(
+    mesh: Mesh, diameters: list[int], folder: Path
+) -> tuple[dict[int, np.ndarray], float, float]:
     """CalculiX; it counts every mode twice."""
     ccx_input(mesh, diameters, 2 * COUNT, folder / "job.inp")
     _, cpu, memory = measured(["ccx", "-i", "job"], folder)
     return ccx_frequencies((folder / "job.dat").read_text()), cpu, memory
 
 
-def run_ours(mesh: Mesh, diameters: list[int], folder: Path,
-             quadrature: str) -> tuple[dict[int, np.ndarray], float, float]:
-    """bladefem, from the mesh to frequencies; the interpreter's start and imports are counted too."""
+def run_ours(
+    mesh: Mesh, diameters: list[int], folder: Path, quadrature: str
+) -> tuple[dict[int, np.ndarray], float, float]:
+    """bladefem, from the mesh to frequencies; the interpreter's start and imports are counted
+    too.
+    """
     (folder / "mesh.pkl").write_bytes(pickle.dumps((mesh, diameters, quadrature)))
     out, cpu, memory = measured([sys.executable, "-c", OURS, "mesh.pkl"], folder)
     lists = json.loads(out.strip().splitlines()[-1])
@@ -125,7 +164,8 @@ def run_ours(mesh: Mesh, diameters: list[int], folder: Path,
 
 def sector_mesh(dofs: float, curved: bool = True) -> Mesh:
     """The default sector with 24 blades and about this many degrees of freedom in the blade."""
-    from geometry.dispatch import build
+    from geometry.builders import build
+
     scene = Scene()
     scene = replace(scene, disc=replace(scene.disc, sectors=SECTORS))
     size = 0.0036
@@ -142,26 +182,36 @@ def compare(mesh: Mesh, diameters: list[int], folder: Path) -> None:
     """One line: agreement with both quadratures, ratio of processor time and of memory."""
     theirs, cpu, memory = run_ccx(mesh, diameters, folder)
     errors, mine, mine_memory = {}, np.inf, 0.0
-    for quadrature in ("exact", "ccx"):     # the same work twice: the better time, the worse memory
+    for quadrature in ("exact", "ccx"):  # the same work twice: the better time, the worse memory
         ours, seconds, memory_now = run_ours(mesh, diameters, folder, quadrature)
         mine, mine_memory = min(mine, seconds), max(mine_memory, memory_now)
-        errors[quadrature] = max(abs(ours[n][:COUNT] / theirs[n][:COUNT] - 1).max() for n in diameters)
+        errors[quadrature] = max(
+            abs(ours[n][:COUNT] / theirs[n][:COUNT] - 1).max() for n in diameters
+        )
     dofs = 3 * len(np.unique(mesh.bodies["blade"]))
-    print(f"{dofs:7d} dofs, nodal diameters {diameters[0]}-{diameters[-1]}: ccx {cpu:.1f} s, bladefem {mine:.1f} s, "
-          f"ratio {cpu / mine:.1f}; memory {memory:.2f} and {mine_memory:.2f} GB, ratio {mine_memory / memory:.2f}; "
-          f"frequencies differ by {errors['ccx']:.1e} with ccx's mass, {errors['exact']:.1e} with the exact one",
-          flush=True)
+    print(
+        f"{dofs:7d} dofs, nodal diameters {diameters[0]}-{diameters[-1]}: ccx {cpu:.1f} s, "
+        f"bladefem {mine:.1f} s, "
+        f"ratio {cpu / mine:.1f}; memory {memory:.2f} and {mine_memory:.2f} GB, ratio "
+        f"{mine_memory / memory:.2f}; "
+        f"frequencies differ by {errors['ccx']:.1e} with ccx's mass, {errors['exact']:.1e} with "
+        "the exact one",
+        flush=True,
+    )
 
 
 def golden(folder: Path) -> None:
     """Frequencies of a small sector for the tests."""
     sys.path.insert(0, str(GOLDEN.parent))
     from structured import sector
+
     out = {}
     for straight in (False, True):
         mesh = sector(12, (4, 3, 1), bump=0.2, straight=straight)
         theirs = run_ccx(mesh, list(range(7)), folder)[0]
-        out["straight" if straight else "curved"] = {n: f[:COUNT].tolist() for n, f in theirs.items()}
+        out["straight" if straight else "curved"] = {
+            n: f[:COUNT].tolist() for n, f in theirs.items()
+        }
     GOLDEN.write_text(json.dumps(out, indent=1) + "\n")
 
 

@@ -1,17 +1,21 @@
-"""Cost of the modes of one complex nodal diameter against degrees of freedom, 10^4 to 4*10^5, and a model fitted to it.
+"""Cost of the modes of one complex nodal diameter against degrees of freedom, 10^4 to 4*10^5, and a
+model fitted to it.
 
-    PYTHONPATH=. python benchmarks/fem_cost.py      (4 minutes; writes docs/figures/fem_cost.png and .csv)
+    PYTHONPATH=. python benchmarks/fem_cost.py      (4 minutes; writes docs/figures/fem_cost.png and
+    .csv)
 
-Wedge sector with 24 blades, ten modes of nodal diameter 5 from the mesh on, one process, one thread, all in core. The
-largest run also solves nodal diameter 0 with the same factors. Recorded on two shared cores:
+Wedge sector with 24 blades, ten modes of nodal diameter 5 from the mesh on, one process, one
+thread, all in core. The largest run also solves nodal diameter 0 with the same factors. Recorded on
+two shared cores:
 
-    dofs            12 530  19 990  45 550  87 190  151 000  240 300  395 100
-    cpu [s]           1.2     1.5     3.0     7.0     14.2     32.0     61.5   (395 100: 71.4 with diameter 0)
-    memory [GB]      0.22    0.28    0.56    1.09     2.05     3.68     6.66
-    entries [1e6]     1.7     3.6    13.8    35.7     79.3      155      316
+    dofs            12 530  19 990  45 550  87 190  151 000  240 300  395 100 cpu [s]           1.2
+    1.5     3.0     7.0     14.2     32.0     61.5   (395 100: 71.4 with diameter 0) memory [GB]
+    0.22    0.28    0.56    1.09     2.05     3.68     6.66 entries [1e6]     1.7     3.6    13.8
+    35.7     79.3      155      316
 
-Memory follows 0.12 GB + 3290 B n + 180.5 B n^(4/3), which bladefem.fem.memory warns with; processor time grows with
-n^1.46 over the four largest. By that model a million dofs take 21.5 GB and about 4 minutes.
+Memory follows 0.12 GB + 3290 B n + 180.5 B n^(4/3), which bladefem.fem.memory warns with; processor
+time grows with n^1.46 over the four largest. By that model a million dofs take 21.5 GB and about 4
+minutes.
 """
 
 from __future__ import annotations
@@ -56,7 +60,12 @@ def point(dofs: float, folder: Path) -> dict[str, float]:
     found = 3 * len(np.unique(mesh.bodies["blade"]))
     (folder / "mesh.pkl").write_bytes(pickle.dumps((mesh, [5, 0] if found > LARGE else [5])))
     out, cpu, memory = measured([sys.executable, "-c", RUN, "mesh.pkl"], folder)
-    row = {"dofs": found, **json.loads(out.strip().splitlines()[-1]), "cpu": cpu, "memory_GB": memory}
+    row = {
+        "dofs": found,
+        **json.loads(out.strip().splitlines()[-1]),
+        "cpu": cpu,
+        "memory_GB": memory,
+    }
     print({name: float(f"{value:.4g}") for name, value in row.items()}, flush=True)
     return row
 
@@ -71,15 +80,22 @@ def fitted(table: pd.DataFrame) -> tuple[float, float]:
 def draw(table: pd.DataFrame, model: tuple[float, float], file: Path) -> None:
     """Memory and processor time on logarithmic axes, with the fits."""
     import matplotlib.pyplot as plt
+
     fig, axes = plt.subplots(1, 2, figsize=(9, 3.6), layout="constrained")
     n = np.geomspace(9e3, 1e6)
     axes[0].loglog(table["dofs"], table["memory_GB"], "o", label="measured peak")
-    axes[0].loglog(n, (1.2e8 + model[0] * n + model[1] * n ** (4 / 3)) / 1e9, "-",
-                   label=f"0.12 GB + {model[0]:.3g} B n + {model[1]:.3g} B n$^{{4/3}}$")
+    axes[0].loglog(
+        n,
+        (1.2e8 + model[0] * n + model[1] * n ** (4 / 3)) / 1e9,
+        "-",
+        label=f"0.12 GB + {model[0]:.3g} B n + {model[1]:.3g} B n$^{{4/3}}$",
+    )
     slope, level = np.polyfit(np.log(table["dofs"][-4:]), np.log(table["cpu_5"][-4:]), 1)
     axes[1].loglog(table["dofs"], table["cpu_5"], "o", label="mesh to modes")
     axes[1].loglog(table["dofs"], table["cpu_factors"], "s", label="mesh to factors")
-    axes[1].loglog(n, np.exp(level) * n ** slope, "-", label=f"n$^{{{slope:.2f}}}$ through the four largest")
+    axes[1].loglog(
+        n, np.exp(level) * n**slope, "-", label=f"n$^{{{slope:.2f}}}$ through the four largest"
+    )
     for ax, label in zip(axes, ("peak memory [GB]", "processor time [s]"), strict=True):
         ax.set(xlabel="degrees of freedom n", ylabel=label)
         ax.grid(alpha=0.3, which="both")

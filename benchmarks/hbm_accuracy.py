@@ -2,10 +2,11 @@
 
     python benchmarks/hbm_accuracy.py [names of problems]
 
-1-D elements: shooting on the exact flow between located events, residual of the period 1e-10. The 3-D patch: modes
-advanced exactly over a step, contact forces linear in it, the 2-D slip law integrated along each step by its closed
-form, marched from the balance's own state for a number of periods and extrapolated in the step. Errors are those of the
-first harmonic at the probe, relative, the worst of the frequencies.
+1-D elements: shooting on the exact flow between located events, residual of the period 1e-10. The
+3-D patch: modes advanced exactly over a step, contact forces linear in it, the 2-D slip law
+integrated along each step by its closed form, marched from the balance's own state for a number of
+periods and extrapolated in the step. Errors are those of the first harmonic at the probe, relative,
+the worst of the frequencies.
 
 Measured (exact: transitions located; the patch has 2048 samples at H 31, 1024 at 15, 256 at 5):
     H                          5/7       15        31        63
@@ -13,11 +14,12 @@ Measured (exact: transitions located; the patch has 2048 samples at H 31, 1024 a
     beam, 20 elements      1.8e-05   2.5e-06   8.3e-08   9.6e-10
     chain with lift-off    5.1e-05   3.4e-06   7.3e-08   7.4e-09
     3-D patch, 100 nodes   6.2e-04   3.5e-06   8.3e-07
-Two contacts of the chain stick all the time and could carry any mean force: left to the shooting it moves by 8e-6, and
-with it the reference by 6e-8, which is more than the error of the balance with 63 harmonics.
+Two contacts of the chain stick all the time and could carry any mean force: left to the shooting it
+moves by 8e-6, and with it the reference by 6e-8, which is more than the error of the balance with
+63 harmonics.
 
-The marched patch differs by 1.3e-6 between 1024 and 2048 steps before it is extrapolated, so that 8e-7 is the limit of
-the reference as much as of the balance.
+The marched patch differs by 1.3e-6 between 1024 and 2048 steps before it is extrapolated, so that
+8e-7 is the limit of the reference as much as of the balance.
 """
 
 from __future__ import annotations
@@ -32,29 +34,40 @@ from hbm_models import PROBLEMS, Problem
 from numba import njit
 from scipy import linalg
 
-from bladefem.hbm.api import solve
-from bladefem.hbm.flow import State
-from bladefem.hbm.in_time import time_system
-from bladefem.hbm.shooting import harmonics, periodic
 from bladefem.hbm.solution import Solution
+from bladefem.hbm.solve import solve
+from bladefem.hbm.time_model import time_system
+from bladefem.time.event_integrator import State
+from bladefem.time.shooting import harmonics, periodic
 
-FREQUENCIES = {"single mass": (0.8, 1.1, 1.4), "beam": (7800.0, 8300.0), "chain with lift-off": (0.9, 1.1),
-               "3-D patch": (0.8,)}
+FREQUENCIES = {
+    "single mass": (0.8, 1.1, 1.4),
+    "beam": (7800.0, 8300.0),
+    "chain with lift-off": (0.9, 1.1),
+    "3-D patch": (0.8,),
+}
 LEVELS = {"3-D patch": ((5, 256), (15, 1024), (31, 2048))}
-EXACT = ((7, 0), (15, 0), (31, 0), (63, 0))     # harmonics, samples
+EXACT = ((7, 0), (15, 0), (31, 0), (63, 0))  # harmonics, samples
 
 
 def shooting(problem: Problem, omega: float, near: Solution) -> complex:
     """First harmonic at the probe by shooting from the balance's state at t = 0.
 
-    A contact that sticks all the time may carry any mean force, and Newton's steps move it a little: it is set to that
-    of the balance until both agree.
+    A contact that sticks all the time may carry any mean force, and Newton's steps move it a
+    little: it is set to that of the balance until both agree.
     """
     system = time_system(problem.model, 1)
     lam, V = linalg.eigh(problem.K, problem.M)
-    state = _modal_state(problem, near, lam, np.einsum("ik,ij,jk->k", V, problem.C, V), problem.contact @ V,
-                         V[problem.load], omega)
-    side = problem.model.side(1)        # the same modes up to their signs
+    state = _modal_state(
+        problem,
+        near,
+        lam,
+        np.einsum("ik,ij,jk->k", V, problem.C, V),
+        problem.contact @ V,
+        V[problem.load],
+        omega,
+    )
+    side = problem.model.side(1)  # the same modes up to their signs
     signs = np.sign(np.sum(side.shapes[side.ports["contact"]] * (problem.contact @ V), axis=0))
     w, f = (_complex(x).sum(axis=2).real[:, -1] for x in (near.w, near.f))
     start = State(signs * state[:, 0], signs * state[:, 1], w - f / problem.elements.kt)
@@ -72,7 +85,9 @@ def shooting(problem: Problem, omega: float, near: Solution) -> complex:
 
 
 def marching(problem: Problem, omega: float, near: Solution, periods: int = 30) -> complex:
-    """First harmonic at the probe by time integration from the balance's state, with 1024 and 2048 steps a period."""
+    """First harmonic at the probe by time integration from the balance's state, with 1024 and 2048
+    steps a period.
+    """
     coarse, fine = (_march(problem, omega, near, steps, periods) for steps in (1024, 2048))
     print(f"    steps 1024 and 2048 differ by {abs(fine - coarse) / abs(fine):.1e}", flush=True)
     return fine + (fine - coarse) / 3
@@ -91,7 +106,19 @@ def _march(problem: Problem, omega: float, near: Solution, steps: int, periods: 
     table = np.column_stack([e.kt, e.kn, e.mu, e.n0])
     S = np.ascontiguousarray((C * g1[:, 0]) @ C.T)
     trace = np.zeros(steps)
-    _run(state, np.ascontiguousarray(C), load, (E, g0, g1), S, excitation, f.copy(), table, periods, trace, load.copy())
+    _run(
+        state,
+        np.ascontiguousarray(C),
+        load,
+        (E, g0, g1),
+        S,
+        excitation,
+        f.copy(),
+        table,
+        periods,
+        trace,
+        load.copy(),
+    )
     return 2 * np.mean(trace * np.exp(-2j * np.pi * np.arange(steps) / steps))
 
 
@@ -99,25 +126,36 @@ def _complex(x: np.ndarray) -> np.ndarray:
     return np.concatenate([x[..., :1].astype(complex), x[..., 1::2] - 1j * x[..., 2::2]], axis=-1)
 
 
-def _modal_state(problem: Problem, near: Solution, lam: np.ndarray, D: np.ndarray, C: np.ndarray, load: np.ndarray,
-                 omega: float) -> np.ndarray:
+def _modal_state(
+    problem: Problem,
+    near: Solution,
+    lam: np.ndarray,
+    D: np.ndarray,
+    C: np.ndarray,
+    load: np.ndarray,
+    omega: float,
+) -> np.ndarray:
     """(modes, 2) displacement and velocity at t = 0 of the balance's solution."""
     force = _complex(near.f).reshape(-1, near.harmonics + 1)
     if problem.model.directions > problem.elements.tangents:
-        force[::problem.model.directions, 0] -= problem.elements.n0
+        force[:: problem.model.directions, 0] -= problem.elements.n0
     state = np.zeros((len(lam), 2))
     for k in range(near.harmonics + 1):
         push = -C.T @ force[:, k] + (problem.force * load if k == 1 else 0.0)
-        q = push / (lam - (k * omega)**2 + 1j * k * omega * D)
+        q = push / (lam - (k * omega) ** 2 + 1j * k * omega * D)
         state += np.column_stack([q.real, (1j * k * omega * q).real])
     return state
 
 
-def _propagators(lam: np.ndarray, D: np.ndarray, h: float) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """(modes, 2, 2) free motion over a step, (modes, 2) effects of the forces at its begin and end."""
+def _propagators(
+    lam: np.ndarray, D: np.ndarray, h: float
+) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """(modes, 2, 2) free motion over a step, (modes, 2) effects of the forces at its begin and
+    end.
+    """
     E, g0, g1 = np.empty((len(lam), 2, 2)), np.empty((len(lam), 2)), np.empty((len(lam), 2))
     for k in range(len(lam)):
-        A = np.zeros((4, 4))        # q, v, force, its slope
+        A = np.zeros((4, 4))  # q, v, force, its slope
         A[0, 1], A[1, 0], A[1, 1], A[1, 2], A[2, 3] = 1.0, -lam[k], -D[k], 1.0, 1.0
         X = linalg.expm(A * h)
         E[k], g1[k] = X[:2, :2], X[:2, 3] / h
@@ -127,7 +165,9 @@ def _propagators(lam: np.ndarray, D: np.ndarray, h: float) -> tuple[np.ndarray, 
 
 @njit(cache=True)
 def _slide(fx, fy, dx, dy, R0, R1):
-    """Tangential force after the springs' ends moved by (dx, dy) [N] while the limit went from R0 to R1."""
+    """Tangential force after the springs' ends moved by (dx, dy) [N] while the limit went from R0
+    to R1.
+    """
     if R1 <= 0.0:
         return 0.0, 0.0
     ex, ey = fx + dx, fy + dy
@@ -159,8 +199,13 @@ def _contact(w, last, f, table, out):
     for i in range(len(table)):
         kt, kn, mu, n0 = table[i]
         out[i, 0] = max(n0 + kn * w[i, 0], 0.0)
-        dx, dy, R0, R1 = kt * (w[i, 1] - last[i, 1]), kt * (w[i, 2] - last[i, 2]), mu * f[i, 0], mu * out[i, 0]
-        if R0 == 0.0 and R1 > 0.0:      # closes within the step: the spring begins where it closed
+        dx, dy, R0, R1 = (
+            kt * (w[i, 1] - last[i, 1]),
+            kt * (w[i, 2] - last[i, 2]),
+            mu * f[i, 0],
+            mu * out[i, 0],
+        )
+        if R0 == 0.0 and R1 > 0.0:  # closes within the step: the spring begins where it closed
             before = n0 + kn * last[i, 0]
             share = out[i, 0] / (out[i, 0] - before)
             dx, dy = share * dx, share * dy
@@ -179,10 +224,18 @@ def _run(state, C, load, propagators, S, excitation, f, table, periods, trace, p
             for i in range(3 * n):
                 beyond[i] = f[i // 3, i % 3] - (table[i // 3, 3] if i % 3 == 0 else 0.0)
             push = load * excitation[step] - C.T @ beyond
-            q = E[:, 0, 0] * state[:, 0] + E[:, 0, 1] * state[:, 1] + g0[:, 0] * push + g1[:, 0] * load * excitation[
-                step + 1]
-            v = E[:, 1, 0] * state[:, 0] + E[:, 1, 1] * state[:, 1] + g0[:, 1] * push + g1[:, 1] * load * excitation[
-                step + 1]
+            q = (
+                E[:, 0, 0] * state[:, 0]
+                + E[:, 0, 1] * state[:, 1]
+                + g0[:, 0] * push
+                + g1[:, 0] * load * excitation[step + 1]
+            )
+            v = (
+                E[:, 1, 0] * state[:, 0]
+                + E[:, 1, 1] * state[:, 1]
+                + g0[:, 1] * push
+                + g1[:, 1] * load * excitation[step + 1]
+            )
             free = C @ q
             for _again in range(4):
                 for i in range(3 * n):
@@ -210,12 +263,22 @@ def main(*names: str) -> None:
                 start = solve(problem.model, omega, *level, start=start)
                 spent[level] = time.process_time() - begin
                 solved[omega, level] = start
-        exact = {omega: reference(problem, omega, solved[omega, levels[-1]]) for omega in FREQUENCIES[name]}
+        exact = {
+            omega: reference(problem, omega, solved[omega, levels[-1]])
+            for omega in FREQUENCIES[name]
+        }
         for level in levels:
-            errors = [abs(solved[w, level].probe[1, 0] - exact[w]) / abs(exact[w]) for w in FREQUENCIES[name]]
+            errors = [
+                abs(solved[w, level].probe[1, 0] - exact[w]) / abs(exact[w])
+                for w in FREQUENCIES[name]
+            ]
             good = all(solved[w, level].converged for w in FREQUENCIES[name])
-            print(f"{name:22s} {level[0]:3d} {level[1] or 'exact':>7} {max(errors):8.1e} {spent[level]:6.1f}"
-                  f"{'' if good else '  not converged'}", flush=True)
+            print(
+                f"{name:22s} {level[0]:3d} {level[1] or 'exact':>7} {max(errors):8.1e} "
+                f"{spent[level]:6.1f}"
+                f"{'' if good else '  not converged'}",
+                flush=True,
+            )
 
 
 if __name__ == "__main__":

@@ -1,6 +1,8 @@
-"""The four problems on which harmonic balance codes are compared, as plain matrices and as reduced models.
+"""The four problems on which harmonic balance codes are compared, as plain matrices and as reduced
+models.
 
-Every problem is (M, C, K, load dof, force, contacts): what pyHarm, an integrator and bladefem all understand.
+Every problem is (M, C, K, load dof, force, contacts): what pyHarm, an integrator and bladefem all
+understand.
 """
 
 from __future__ import annotations
@@ -18,7 +20,9 @@ from bladefem.reduction.matrices import port_model_from_matrices
 
 @dataclass(frozen=True)
 class Problem:
-    """M x'' + C x' + K x = F cos(omega t) e_load - contact forces; contacts against the ground or between dofs."""
+    """M x'' + C x' + K x = F cos(omega t) e_load - contact forces; contacts against the ground or
+    between dofs.
+    """
 
     name: str
     M: np.ndarray
@@ -26,15 +30,19 @@ class Problem:
     K: np.ndarray
     load: int
     force: float
-    contact: np.ndarray         # (contact dofs, dofs) relative displacements, node-major (normal, t1[, t2])
+    contact: (
+        np.ndarray
+    )  # (contact dofs, dofs) relative displacements, node-major (normal, t1[, t2])
     elements: Elements
-    band: tuple[float, float]   # [rad/s]
+    band: tuple[float, float]  # [rad/s]
 
     @property
     def model(self) -> ReducedModel:
         """The same for bladefem."""
         tip = np.array([self.load])
-        side = port_model_from_matrices(self.M, self.K, {"contact": self.contact, "load": tip, "probe": tip}, C=self.C)
+        side = port_model_from_matrices(
+            self.M, self.K, {"contact": self.contact, "load": tip, "probe": tip}, C=self.C
+        )
         return ReducedModel((side,), self.elements, {1: np.array([self.force])})
 
 
@@ -46,35 +54,62 @@ def single_mass(kt: float = 1.0, limit: float = 0.5) -> Problem:
 
 
 def beam(limit: float = 1.4) -> Problem:
-    """The reference blade of 20 elements with one Jenkins element from its platform to the ground."""
+    """The reference blade of 20 elements with one Jenkins element from its platform to the
+    ground.
+    """
     K, M = beam_matrices()
     M[10, 10] += 0.05
     elements = Elements(np.array([1e6]), np.zeros(1), np.ones(1), np.array([limit]), tangents=1)
     contact = np.zeros((1, len(K)))
     contact[0, 10] = 1.0
-    return Problem("beam", M, 1.0 * M + 5e-7 * K, K, len(K) - 2, 1.0, contact, elements,
-                   (2 * np.pi * 1150, 2 * np.pi * 1600))
+    return Problem(
+        "beam",
+        M,
+        1.0 * M + 5e-7 * K,
+        K,
+        len(K) - 2,
+        1.0,
+        contact,
+        elements,
+        (2 * np.pi * 1150, 2 * np.pi * 1600),
+    )
 
 
 def chain(n0: float = 0.6, masses: int = 24) -> Problem:
     """Masses that move along and across: 2 x 24 dofs, springs between neighbours and to the ground.
 
-    Every mass presses on the ground with n0 + kn w and rubs with kt; at n0 0.6 most of them lift off, at 4 none does.
+    Every mass presses on the ground with n0 + kn w and rubs with kt; at n0 0.6 most of them lift
+    off, at 4 none does.
     """
     link = 2 * np.eye(masses) - np.eye(masses, k=1) - np.eye(masses, k=-1)
-    K = np.kron(link, np.diag([2.0, 3.0])) + np.kron(np.eye(masses), np.array([[1.0, 0.3], [0.3, 0.6]]))
+    K = np.kron(link, np.diag([2.0, 3.0])) + np.kron(
+        np.eye(masses), np.array([[1.0, 0.3], [0.3, 0.6]])
+    )
     kt, kn, mu, load = (np.full(masses, value) for value in (0.5, 0.8, 0.4, n0))
     elements = Elements(kt, kn, mu, load, tangents=1)
     dofs = 2 * masses
-    return Problem("chain", np.eye(dofs), 0.01 * np.eye(dofs) + 0.01 * K, K, 2 * (masses // 3) + 1, 4.0,
-                   np.eye(dofs), elements, (0.6, 1.6))
+    return Problem(
+        "chain",
+        np.eye(dofs),
+        0.01 * np.eye(dofs) + 0.01 * K,
+        K,
+        2 * (masses // 3) + 1,
+        4.0,
+        np.eye(dofs),
+        elements,
+        (0.6, 1.6),
+    )
 
 
 def patch(side: int = 10, inner: int = 34, n0: float = 1.0, seed: int = 3) -> Problem:
-    """A square patch of side x side 3-D contacts on an elastic layer over `inner` heavy nodes; 402 dofs by default."""
+    """A square patch of side x side 3-D contacts on an elastic layer over `inner` heavy nodes; 402
+    dofs by default.
+    """
     rng = np.random.default_rng(seed)
     nodes = side**2 + inner
-    links = [(i, i + 1) for i in range(side**2) if (i + 1) % side] + [(i, i + side) for i in range(side**2 - side)]
+    links = [(i, i + 1) for i in range(side**2) if (i + 1) % side] + [
+        (i, i + side) for i in range(side**2 - side)
+    ]
     links += [(i, side**2 + i * inner // side**2) for i in range(side**2)]
     links += [(side**2 + i, side**2 + i + 1) for i in range(inner - 1)]
     L = np.zeros((nodes, nodes))
@@ -87,12 +122,30 @@ def patch(side: int = 10, inner: int = 34, n0: float = 1.0, seed: int = 3) -> Pr
     K = np.kron(L, skew)
     M = np.kron(np.diag(np.concatenate([np.full(side**2, 0.2), np.full(inner, 2.0)])), np.eye(3))
     contact = np.zeros((3 * side**2, 3 * nodes))
-    contact[:, :3 * side**2] = np.eye(3 * side**2)
-    elements = Elements(np.full(side**2, 0.3), np.full(side**2, 0.5), np.full(side**2, 0.4),
-                        n0 * rng.uniform(0.3, 1.0, side**2))
-    return Problem("3-D patch", M, 0.02 * M + 0.01 * K, K, 3 * (side**2 + inner // 2) + 1, 40.0, contact, elements,
-                   (0.3, 1.5))
+    contact[:, : 3 * side**2] = np.eye(3 * side**2)
+    elements = Elements(
+        np.full(side**2, 0.3),
+        np.full(side**2, 0.5),
+        np.full(side**2, 0.4),
+        n0 * rng.uniform(0.3, 1.0, side**2),
+    )
+    return Problem(
+        "3-D patch",
+        M,
+        0.02 * M + 0.01 * K,
+        K,
+        3 * (side**2 + inner // 2) + 1,
+        40.0,
+        contact,
+        elements,
+        (0.3, 1.5),
+    )
 
 
-PROBLEMS = {"single mass": single_mass, "beam": beam, "chain": partial(chain, 4.0),
-            "chain with lift-off": chain, "3-D patch": patch}
+PROBLEMS = {
+    "single mass": single_mass,
+    "beam": beam,
+    "chain": partial(chain, 4.0),
+    "chain with lift-off": chain,
+    "3-D patch": patch,
+}

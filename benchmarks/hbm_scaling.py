@@ -1,9 +1,11 @@
-"""Cost of one converged point against contact nodes and harmonics, with the floating-point limit of each part.
+"""Cost of one converged point against contact nodes and harmonics, with the floating-point limit of
+each part.
 
-    python benchmarks/hbm_scaling.py [docs/figures/hbm_scaling]        table, and cost as .png and .csv
-Square 3-D patches of `hbm_models.patch`. Limits: condensation 8/3 + 8 complex m^3 a harmonic (LU and m right-hand
-sides, m = 3 n), or 8 m k (m + k) with k modes, at the rate at which this machine multiplies matrices; a dense Jacobian
-would take 2/3 (m (2H+1))^3 a Newton step.
+    python benchmarks/hbm_scaling.py [docs/figures/hbm_scaling]        table, and cost as .png and
+    .csv
+Square 3-D patches of `hbm_models.patch`. Limits: condensation 8/3 + 8 complex m^3 a harmonic (LU
+and m right-hand sides, m = 3 n), or 8 m k (m + k) with k modes, at the rate at which this machine
+multiplies matrices; a dense Jacobian would take 2/3 (m (2H+1))^3 a Newton step.
 
 Memory is the peak of the arrays made for a point.
 
@@ -21,10 +23,11 @@ Measured (CPU seconds, one thread, 48 GFlop/s in matrix products; H = 3):
       196   0.26      0.041    0.0054   0.011                    122                           6
       400   2.8       0.23     0.021    0.045                    493                           9
      1024   130       4.1      0.078    0.29                    3094                           8
-Forces grow linearly. With all modes the condensation grows with the cube, 2.3 to 3.6 times above its limit; with few it
-grows with the square. At 1000 nodes three quarters and more go into the Newton steps, that is into products with the
-flexibilities of the nodes that slip and into copies of them, which traffic limits: a whole point then costs as much as
-one dense Newton step at the limit. 25 nodes: H 1 to 31 takes 0.010 to 0.22 s and 2 to 37 MiB a point.
+Forces grow linearly. With all modes the condensation grows with the cube, 2.3 to 3.6 times above
+its limit; with few it grows with the square. At 1000 nodes three quarters and more go into the
+Newton steps, that is into products with the flexibilities of the nodes that slip and into copies of
+them, which traffic limits: a whole point then costs as much as one dense Newton step at the limit.
+25 nodes: H 1 to 31 takes 0.010 to 0.22 s and 2 to 37 MiB a point.
 """
 
 from __future__ import annotations
@@ -41,11 +44,11 @@ from pathlib import Path
 import numpy as np
 from hbm_models import patch
 
-from bladefem.hbm.api import solve
-from bladefem.hbm.linear import condense
+from bladefem.hbm.linear.condensation import condense
 from bladefem.hbm.model import ReducedModel
-from bladefem.hbm.residual import Balance, evaluate_balance, start_in_stick
 from bladefem.hbm.solution import Solution
+from bladefem.hbm.solve import solve
+from bladefem.hbm.solver.residual import Balance, evaluate_balance, start_in_stick
 from bladefem.reduction.truncate import truncated
 
 SIDES, HARMONICS, MODES = (3, 5, 7, 10, 14, 20, 32), (1, 3, 7, 15, 31), 60
@@ -64,7 +67,9 @@ def seconds(work: Callable[[], object]) -> float:
 
 
 def models(side: int) -> dict[str, ReducedModel]:
-    """The patch with all its modes, and with the lowest few and the residual flexibility of the others."""
+    """The patch with all its modes, and with the lowest few and the residual flexibility of the
+    others.
+    """
     whole = patch(side, max(side**2 // 3, 3)).model
     return {"all": whole, str(MODES): replace(whole, sides=(truncated(whole.sides[0], MODES),))}
 
@@ -77,28 +82,40 @@ def measure(model: ReducedModel, modes: str, H: int, speed: float) -> dict[str, 
     point = seconds(lambda: found.append(solve(model, omega, H, samples)))
     memory = tracemalloc.get_traced_memory()[1] / 2**20
     tracemalloc.stop()
-    if point < 2:       # what the tracer takes is seen in short ones
+    if point < 2:  # what the tracer takes is seen in short ones
         point = seconds(lambda: solve(model, omega, H, samples))
     balance = Balance(model, condense(model, omega, H), samples)
     m, k = 3 * nodes, len(model.sides[0].omega)
     products = (8 / 3 + 8) * m**3 if modes == "all" else 8 * m * k * (m + k)
-    return {"nodes": nodes, "H": H, "modes": k, "point": point,
-            "condense": seconds(lambda: condense(model, omega, H)),
-            "forces": seconds(lambda: evaluate_balance(balance, start_in_stick(balance))),
-            "limit": products * H / speed, "dense": 2 / 3 * (m * (2 * H + 1))**3 / speed, "memory": memory,
-            "dense memory": 8 * (m * (2 * H + 1))**2 / 2**20, "iterations": found[0].iterations,
-            "solved": found[0].converged}
+    return {
+        "nodes": nodes,
+        "H": H,
+        "modes": k,
+        "point": point,
+        "condense": seconds(lambda: condense(model, omega, H)),
+        "forces": seconds(lambda: evaluate_balance(balance, start_in_stick(balance))),
+        "limit": products * H / speed,
+        "dense": 2 / 3 * (m * (2 * H + 1)) ** 3 / speed,
+        "memory": memory,
+        "dense memory": 8 * (m * (2 * H + 1)) ** 2 / 2**20,
+        "iterations": found[0].iterations,
+        "solved": found[0].converged,
+    }
 
 
 def main(target: str | None = None) -> None:
     speed = rate()
     print(f"matrix products: {speed / 1e9:.1f} GFlop/s")
     small, rows = models(5), []
-    for model in small.values():        # kernels read from their cache
+    for model in small.values():  # kernels read from their cache
         solve(model, 0.9, 1, 64)
     along = ((small["all"], "all", H) for H in HARMONICS)
-    across = ((model, modes, 3) for side in SIDES for modes, model in models(side).items()
-              if modes == "all" or side > 5)
+    across = (
+        (model, modes, 3)
+        for side in SIDES
+        for modes, model in models(side).items()
+        if modes == "all" or side > 5
+    )
     for part in chain(along, across):
         rows.append(measure(*part, speed))
         if len(rows) == 1:
@@ -118,28 +135,47 @@ def write(rows: list[dict[str, float]], target: Path) -> None:
 
 def draw(rows: list[dict[str, float]], file: Path) -> None:
     import matplotlib
+
     matplotlib.use("Agg")
     from matplotlib import pyplot
+
     figure, axes = pyplot.subplots(2, 2, figsize=(10, 7), sharey="row", sharex="col")
-    curves = {"point": ("o-", "one point"), "condense": ("s-", "flexibilities"), "forces": ("^-", "contact forces"),
-              "limit": ("--", "floating-point limit"), "memory": ("o-", "one point"),
-              "dense": (":", "one dense Newton step, at the limit"), "dense memory": (":", "its matrix")}
-    by_nodes = rows[len(HARMONICS):]
+    curves = {
+        "point": ("o-", "one point"),
+        "condense": ("s-", "flexibilities"),
+        "forces": ("^-", "contact forces"),
+        "limit": ("--", "floating-point limit"),
+        "memory": ("o-", "one point"),
+        "dense": (":", "one dense Newton step, at the limit"),
+        "dense memory": (":", "its matrix"),
+    }
+    by_nodes = rows[len(HARMONICS) :]
     whole = [row for row in by_nodes if row["modes"] != MODES]
     few = [row for row in by_nodes if row["modes"] == MODES]
-    for column, along, part, title, colour in ((0, "nodes", whole, "all modes", "C0"),
-                                               (0, "nodes", few, f"{MODES} modes", "C1"),
-                                               (1, "H", rows[:len(HARMONICS)], "all modes", "C0")):
+    for column, along, part, title, colour in (
+        (0, "nodes", whole, "all modes", "C0"),
+        (0, "nodes", few, f"{MODES} modes", "C1"),
+        (1, "H", rows[: len(HARMONICS)], "all modes", "C0"),
+    ):
         for name, (style, label) in curves.items():
             if not name.startswith("dense") or part is not few:
                 axis = axes[int("memory" in name), column]
                 titled = label if name.startswith("dense") else f"{label}, {title}"
-                axis.loglog([r[along] for r in part], [r[name] for r in part], style, label=titled,
-                            color="grey" if name.startswith("dense") else colour)
-        axes[1, column].set_xlabel({"nodes": "contact nodes, H = 3", "H": "harmonics, 25 nodes"}[along])
+                axis.loglog(
+                    [r[along] for r in part],
+                    [r[name] for r in part],
+                    style,
+                    label=titled,
+                    color="grey" if name.startswith("dense") else colour,
+                )
+        axes[1, column].set_xlabel(
+            {"nodes": "contact nodes, H = 3", "H": "harmonics, 25 nodes"}[along]
+        )
     axes[0, 0].set_ylabel("CPU time [s]")
     axes[1, 0].set_ylabel("memory [MiB]")
-    figure.legend(*axes[0, 0].get_legend_handles_labels(), fontsize="small", loc="lower center", ncol=3)
+    figure.legend(
+        *axes[0, 0].get_legend_handles_labels(), fontsize="small", loc="lower center", ncol=3
+    )
     figure.tight_layout(rect=(0, 0.1, 1, 1))
     figure.savefig(file, dpi=120)
     pyplot.close(figure)

@@ -1,9 +1,10 @@
-"""How long a user waits before the first response, with kernels from their cache; and memory along a curve.
+"""How long a user waits before the first response, with kernels from their cache; and memory along
+a curve.
 
-    python -m bladefem.hbm.warm && python benchmarks/hbm_start.py
+    python -m bladefem.hbm.precompile && python benchmarks/hbm_start.py
 
-Seconds are the least of five new processes, by the clock and of CPU; memory is the peak of the whole process, with
-Python and its libraries.
+Seconds are the least of five new processes, by the clock and of CPU; memory is the peak of the
+whole process, with Python and its libraries.
 
 Measured (seconds of CPU):
     import bladefem.hbm                                    0.001 s
@@ -22,7 +23,9 @@ import sys
 from pathlib import Path
 
 IMPORT = "import bladefem.hbm"
-SOLVER = "import bladefem.hbm.api, bladefem.hbm.sweep, bladefem.hbm.peak, bladefem.hbm.follow"
+SOLVER = (
+    "import bladefem.hbm.solve, bladefem.hbm.sweep, bladefem.hbm.peak, bladefem.hbm.continuation"
+)
 FIRST = """
 from bladefem.hbm.reference import reference_model
 from bladefem.hbm.api import solve
@@ -50,33 +53,56 @@ for count in ({1}, {2}):
         pass
     print(resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024)
 """
-CURVES = {"single mass": (100, 4000, 7, 256), "beam": (100, 4000, 7, 256), "chain": (50, 1000, 7, 256),
-          "3-D patch": (6, 60, 5, 128)}        # points of the short and the long curve, harmonics, samples
+CURVES = {
+    "single mass": (100, 4000, 7, 256),
+    "beam": (100, 4000, 7, 256),
+    "chain": (50, 1000, 7, 256),
+    "3-D patch": (6, 60, 5, 128),
+}  # points of the short and the long curve, harmonics, samples
 
 
 def memory(name: str, *sizes: int) -> list[float]:
     """Peak memory after a short curve and a long one [MiB]."""
-    run = subprocess.run([sys.executable, "-c", CURVE.format(name, *sizes)], cwd=Path(__file__).parent,
-                         capture_output=True, text=True, check=True)
+    run = subprocess.run(
+        [sys.executable, "-c", CURVE.format(name, *sizes)],
+        cwd=Path(__file__).parent,
+        capture_output=True,
+        text=True,
+        check=True,
+    )
     return [float(line) for line in run.stdout.split()]
 
 
 def waited(code: str, rounds: int = 5) -> tuple[float, float]:
     """Least seconds by the clock and of CPU that the code takes in a new process."""
-    runs = [subprocess.run([sys.executable, "-c", TIMED.format(code)], cwd=Path(__file__).parent, capture_output=True,
-                           text=True, check=True)
-            for _ in range(rounds)]
+    runs = [
+        subprocess.run(
+            [sys.executable, "-c", TIMED.format(code)],
+            cwd=Path(__file__).parent,
+            capture_output=True,
+            text=True,
+            check=True,
+        )
+        for _ in range(rounds)
+    ]
     clocks, cpus = zip(*(map(float, run.stdout.split()) for run in runs), strict=True)
     return min(clocks), min(cpus)
 
 
 def main() -> None:
-    for name, code in {"import bladefem.hbm": IMPORT, "import of what solves": SOLVER,
-                       "and first point, 1-D": FIRST, "and first point, 3-D": SPACE}.items():
+    for name, code in {
+        "import bladefem.hbm": IMPORT,
+        "import of what solves": SOLVER,
+        "and first point, 1-D": FIRST,
+        "and first point, 3-D": SPACE,
+    }.items():
         print("{:24s} {:6.2f} s {:6.2f} s of CPU".format(name, *waited(code)))
     for name, sizes in CURVES.items():
-        print("{:24s} {:6.1f} MiB after {} points, {:.1f} after {} more".format(
-            name, *[x for pair in zip(memory(name, *sizes), sizes, strict=False) for x in pair]))
+        print(
+            "{:24s} {:6.1f} MiB after {} points, {:.1f} after {} more".format(
+                name, *[x for pair in zip(memory(name, *sizes), sizes, strict=False) for x in pair]
+            )
+        )
 
 
 if __name__ == "__main__":

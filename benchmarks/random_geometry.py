@@ -1,12 +1,15 @@
-"""Two hundred random wedge sectors: each gives a valid mesh or one sentence that names the parameter to change.
+"""Two hundred random wedge sectors: each gives a valid mesh or one sentence that names the
+parameter to change.
 
-A quarter is drawn anywhere in the documented ranges, the rest within a factor exp(+-0.25) of the defaults (there the
-shank is cut to the length of disc and platform, else half of the sets would fall to this one rule). The meshes are
-coarse, and made as users' are: in a process of their own, whose crash becomes a sentence.
+A quarter is drawn anywhere in the documented ranges, the rest within a factor exp(+-0.25) of the
+defaults (there the shank is cut to the length of disc and platform, else half of the sets would
+fall to this one rule). The meshes are coarse, and made as users' are: in a process of their own,
+whose crash becomes a sentence.
 
     python benchmarks/random_geometry.py [count] [seed]
 
-Measured (gmsh 4.15.2, two shared cores), 200 sets of two seeds; nothing crashed, every refusal named a field:
+Measured (gmsh 4.15.2, two shared cores), 200 sets of two seeds; nothing crashed, every refusal
+named a field:
 
                                                         seed 1      seed 2
     meshes, round the defaults / anywhere               87 / 0      100 / 1
@@ -17,10 +20,10 @@ Measured (gmsh 4.15.2, two shared cores), 200 sets of two seeds; nothing crashed
     smallest scaled Jacobian                            0.100       0.101
     seconds, median / most                              1.4 / 4.6   2.4 / 8.2
 
-Shape quality is the ratio of inscribed to circumscribed radius, 1 at best; below 0.02 a mesh is refused. Before the
-shank's end had to be flush with the disc's or 2 % short of it, the worst cells were strips of 9e-6 to 3e-3 there.
-Nearly all sets from the whole ranges break a rule of proportion: a root chord longer than the platform, a bore larger
-than the rim.
+Shape quality is the ratio of inscribed to circumscribed radius, 1 at best; below 0.02 a mesh is
+refused. Before the shank's end had to be flush with the disc's or 2 % short of it, the worst cells
+were strips of 9e-6 to 3e-3 there. Nearly all sets from the whole ranges break a rule of proportion:
+a root chord longer than the platform, a bore larger than the rim.
 """
 
 import sys
@@ -37,7 +40,7 @@ from geometry.parameters import Aerofoil, Disc, MeshSize, Platform, Shank, Wedge
 from geometry.sampling import anywhere, around
 
 TABLES = {"aerofoil": Aerofoil, "platform": Platform, "shank": Shank, "disc": Disc, "damper": Wedge}
-BINS = (0, 0.02, 0.05, 0.1, 0.15, 0.2, 1)      # of the worst shape quality of a mesh
+BINS = (0, 0.02, 0.05, 0.1, 0.15, 0.2, 1)  # of the worst shape quality of a mesh
 WORST = 8
 
 
@@ -55,7 +58,9 @@ def attempt(number, seed):
     """The report of the mesh, or the reason of the refusal; and seconds."""
     parts = parameters(number, seed)
     blade = parts["aerofoil"]
-    thin = min(blade.thickness_tip * blade.chord_tip, parts["platform"].thickness, parts["shank"].width)
+    thin = min(
+        blade.thickness_tip * blade.chord_tip, parts["platform"].thickness, parts["shank"].width
+    )
     size = MeshSize(size=max(1.5 * thin, blade.span / 40))
     start = time.perf_counter()
     try:
@@ -66,15 +71,25 @@ def attempt(number, seed):
 
 
 def main(count=200, seed=1):
-    """Run all; print the counts, the worst meshes, and every reason that came from gmsh and not from a rule."""
+    """Run all; print the counts, the worst meshes, and every reason that came from gmsh and not
+    from a rule.
+    """
     kinds, reasons, meshes = Counter(), Counter(), []
     for number in range(count):
         outcome, seconds = attempt(number, seed)
         said = isinstance(outcome, str)
         kinds["anywhere" if number % 4 == 0 else "around", "reason" if said else "mesh"] += 1
         if not said:
-            meshes.append((outcome["worst quality"], outcome["min scaled jacobian"], outcome["mean quality"],
-                           outcome["cells"], seconds, number))
+            meshes.append(
+                (
+                    outcome["worst quality"],
+                    outcome["min scaled jacobian"],
+                    outcome["mean quality"],
+                    outcome["cells"],
+                    seconds,
+                    number,
+                )
+            )
             continue
         reasons[outcome.split(" ")[0].rstrip(":")] += 1
         if outcome.startswith("mesh") or "gmsh" in outcome or "\n" in outcome:
@@ -87,10 +102,17 @@ def main(count=200, seed=1):
 def table(meshes):
     """How good the meshes are."""
     counts, _ = np.histogram(meshes[:, 0], BINS)
-    print("worst shape quality:", ", ".join(f"{low} to {high}: {n}" for low, high, n in
-                                            zip(BINS, BINS[1:], counts, strict=False)))
-    print(f"smallest scaled Jacobian {meshes[:, 1].min():.3f}; seconds: median {np.median(meshes[:, 4]):.1f}, "
-          f"most {meshes[:, 4].max():.1f}")
+    print(
+        "worst shape quality:",
+        ", ".join(
+            f"{low} to {high}: {n}" for low, high, n in zip(BINS, BINS[1:], counts, strict=False)
+        ),
+    )
+    print(
+        f"smallest scaled Jacobian {meshes[:, 1].min():.3f}; seconds: median "
+        f"{np.median(meshes[:, 4]):.1f}, "
+        f"most {meshes[:, 4].max():.1f}"
+    )
     print("worst meshes:\n  set  shape  Jacobian  mean shape  cells")
     for shape, jacobian, mean, cells, _, number in meshes[:WORST]:
         print(f"{number:5.0f}  {shape:.3f}  {jacobian:8.3f}  {mean:10.3f}  {cells:5.0f}")

@@ -1,27 +1,28 @@
 """bladefem: friction-damped turbine blades, from geometry to design chart.
 
-The names below are all that a script needs; :mod:`bladefem.balance` has those of the balance alone, for matrices of
-one's own. Each is loaded when it is first used, so that importing bladefem is cheap.
+The names below are all that a script needs; :mod:`bladefem.balance` has those of the balance alone,
+for matrices of one's own. Each is loaded when it is first used, so that importing bladefem is
+cheap.
 """
 
 from __future__ import annotations
 
-from .lazy import loader
+from .util.lazy import loader
 
 __version__ = "0.1.0"
 
 _WHERE = {
-    "Bodies": ".study.stages",
+    "Bodies": ".study.pipeline.stages",
     "InputError": ".errors",
     "NotSolvedError": ".errors",
-    "Scene": ".scene",
-    "build_mesh": ".study.stages",
-    "find_modes": ".study.stages",
-    "load_scene": ".scene_file",
-    "reduce_sector": ".study.stages",
+    "Scene": ".scene.tables",
+    "build_mesh": ".study.pipeline.stages",
+    "find_modes": ".study.pipeline.stages",
+    "load_scene": ".scene.toml",
+    "reduce_sector": ".study.pipeline.stages",
     "run": ".report.run",
-    "seat_damper": ".study.stages",
-    "study_loads": ".study.loads",
+    "seat_damper": ".study.pipeline.stages",
+    "study_loads": ".study.pipeline.loads",
 }
 __all__ = sorted(_WHERE)
 __getattr__ = loader(__name__, _WHERE)

@@ -1,10 +1,11 @@
 """The nouns that pass between the layers: frozen, plain arrays, each with its shape and unit.
 
-Conventions. Harmonic motion is Re(q e^{j h Omega t}), h = 0..H; harmonic h of a tuned wheel excited by engine order EO
-moves in nodal diameter n = h EO mod N, where the next blade carries the factor e^{j n 2 pi / N}.
-Contact pairs: w = displacement of the blade minus displacement of the damper, in the pair's frame (normal, t1, t2);
-the normal points out of the blade into the damper, so that w_normal > 0 presses the two together. f is the contact
-force that the damper feels from the blade, +f on the damper and -f on the blade, in the same frame.
+Conventions. Harmonic motion is Re(q e^{j h Omega t}), h = 0..H; harmonic h of a tuned wheel excited
+by engine order EO moves in nodal diameter n = h EO mod N, where the next blade carries the factor
+e^{j n 2 pi / N}. Contact pairs: w = displacement of the blade minus displacement of the damper, in
+the pair's frame (normal, t1, t2); the normal points out of the blade into the damper, so that
+w_normal > 0 presses the two together. f is the contact force that the damper feels from the blade,
++f on the damper and -f on the blade, in the same frame.
 """
 
 from __future__ import annotations
@@ -22,56 +23,89 @@ __all__ = ["Elements", "ModeSet", "Patch", "PortModel", "PressureMap", "RigidBod
 class ModeSet:
     """Normal modes of a body or of a cyclic sector in one nodal diameter, mass-normalised."""
 
-    frequencies: np.ndarray         # (m,) [Hz]
-    shapes: np.ndarray              # (m, n_points, 3) [kg^-1/2], complex where 0 < nodal_diameter < N/2
-    nodal_diameter: int | None      # None for a body without cyclic symmetry
-    residuals: np.ndarray           # (m,) |K x - w^2 M x| / |K x|, the certificate
+    # (m,) [Hz]
+    frequencies: np.ndarray
+    # (m, n_points, 3) [kg^-1/2], complex where 0 < nodal_diameter < N/2
+    shapes: np.ndarray
+    # None for a body without cyclic symmetry
+    nodal_diameter: int | None
+    # (m,) |K x - w^2 M x| / |K x|, the certificate
+    residuals: np.ndarray
 
 
 @dataclass(frozen=True)
 class PortModel:
     """A linear body seen from its ports (contact, load and probe freedoms) in one nodal diameter.
 
-    Receptance at circular frequency w:  shapes diag(1/(omega^2 - w^2 + damping)) shapes^H + residual  [m/N].
+    Receptance at circular frequency w:  shapes diag(1/(omega^2 - w^2 + damping)) shapes^H +
+    residual  [m/N].
 
     Raises:
-        InputError: arrays that do not fit each other, numbers that are not finite, or a negative frequency or damping.
+        InputError: arrays that do not fit each other, numbers that are not finite, or a negative
+            frequency or damping.
     """
 
-    omega: np.ndarray               # (m,) [rad/s], ascending; 0 for rigid modes
-    shapes: np.ndarray              # (p, m) mode values at the ports [kg^-1/2]
-    residual: np.ndarray            # (p, p) residual flexibility [m/N], Hermitian
-    ports: dict[str, slice]         # "contact" (node-major: normal, t1, t2), "load", "probe"
+    # (m,) [rad/s], ascending; 0 for rigid modes
+    omega: np.ndarray
+    # (p, m) mode values at the ports [kg^-1/2]
+    shapes: np.ndarray
+    # (p, p) residual flexibility [m/N], Hermitian
+    residual: np.ndarray
+    # "contact" (node-major: normal, t1, t2), "load", "probe"
+    ports: dict[str, slice]
     nodal_diameter: int | None = None
-    static_offset: np.ndarray | None = None     # (p,) displacement under the static loads (n = 0 only) [m]
-    damping: np.ndarray | None = None           # (m,) or coupled (m, m) viscous modal damping, beside the model's [1/s]
+    # (p,) displacement under the static loads (n = 0 only) [m]
+    static_offset: np.ndarray | None = None
+    # (m,) or coupled (m, m) viscous modal damping, beside the model's [1/s]
+    damping: np.ndarray | None = None
 
     def __post_init__(self) -> None:
-        p, m = len(self.residual), len(self.omega)
-        wanted = {"omega": [(m,)], "shapes": [(p, m)], "residual": [(p, p)], "damping": [(m,), (m, m)]}
+        p = len(self.residual)
+        m = len(self.omega)
+        wanted = {
+            "omega": [(m,)],
+            "shapes": [(p, m)],
+            "residual": [(p, p)],
+            "damping": [(m,), (m, m)],
+        }
         for name, shapes in wanted.items():
             value = getattr(self, name)
             if value is None and name == "damping":
                 continue
             if np.shape(value) not in shapes or not np.isfinite(value).all():
-                raise InputError(f"PortModel.{name} of shape {np.shape(value)}: expected finite numbers of shape "
-                                 f"{' or '.join(map(str, shapes))}")
+                raise InputError(
+                    f"PortModel.{name} of shape {np.shape(value)}: expected finite numbers of "
+                    "shape "
+                    f"{' or '.join(map(str, shapes))}"
+                )
             if (name == "omega" or np.ndim(value) == 1) and np.any(value < 0):
-                raise InputError(f"PortModel.{name} from {np.min(value):.4g}: expected no negative number")
+                raise InputError(
+                    f"PortModel.{name} from {np.min(value):.4g}: expected no negative number"
+                )
 
 
 @dataclass(frozen=True)
 class Patch:
-    """Matched contact nodes of one face pair: the carrier of pressure maps and friction elements."""
+    """Matched contact nodes of one face pair: the carrier of pressure maps and friction
+    elements.
+    """
 
-    name: str                       # "this" or "next"
-    points: np.ndarray              # (n, 3) on the blade side [m]
-    area: np.ndarray                # (n,) share of the face [m^2]
-    frame: np.ndarray               # (n, 3, 3) rows: normal (out of the blade), t1, t2
-    faces: np.ndarray               # (nf, k) corner numbers into points, for pictures
-    blade_nodes: np.ndarray         # (n,) node numbers in the mesh
-    damper_nodes: np.ndarray        # (n,) node numbers in the mesh
-    places: np.ndarray | None = None    # (n, 3) where their forces act: mean places of what they stand for [m]
+    # "this" or "next"
+    name: str
+    # (n, 3) on the blade side [m]
+    points: np.ndarray
+    # (n,) share of the face [m^2]
+    area: np.ndarray
+    # (n, 3, 3) rows: normal (out of the blade), t1, t2
+    frame: np.ndarray
+    # (nf, k) corner numbers into points, for pictures
+    faces: np.ndarray
+    # (n,) node numbers in the mesh
+    blade_nodes: np.ndarray
+    # (n,) node numbers in the mesh
+    damper_nodes: np.ndarray
+    # (n, 3) where their forces act: mean places of what they stand for [m]
+    places: np.ndarray | None = None
 
 
 @dataclass(frozen=True)
@@ -79,9 +113,12 @@ class PressureMap:
     """Quasi-static contact of one patch."""
 
     patch: Patch
-    force: np.ndarray               # (n,) normal force, pressing > 0 [N]
-    gap: np.ndarray                 # (n,) remaining opening, >= 0 [m]
-    complementarity: float          # max |force gap| over (max force, max gap): the proof of optimality
+    # (n,) normal force, pressing > 0 [N]
+    force: np.ndarray
+    # (n,) remaining opening, >= 0 [m]
+    gap: np.ndarray
+    # max |force gap| over (max force, max gap): the proof of optimality
+    complementarity: float
 
     @property
     def pressure(self) -> np.ndarray:
@@ -93,17 +130,27 @@ class PressureMap:
 class Elements:
     """Node-to-node friction elements, one a contact node."""
 
-    kt: np.ndarray                  # (n,) tangential stiffness [N/m]
-    kn: np.ndarray                  # (n,) normal stiffness [N/m]; 0: the normal load is prescribed, N(t) = n0
-    mu: np.ndarray                  # (n,) friction coefficient [1]
-    n0: np.ndarray                  # (n,) static normal force [N]; negative means an initial gap of -n0/kn
-    tangents: int = 2               # tangential directions: 1 (plane models) or 2
+    # (n,) tangential stiffness [N/m]
+    kt: np.ndarray
+    # (n,) normal stiffness [N/m]; 0: the normal load is prescribed, N(t) = n0
+    kn: np.ndarray
+    # (n,) friction coefficient [1]
+    mu: np.ndarray
+    # (n,) static normal force [N]; negative means an initial gap of -n0/kn
+    n0: np.ndarray
+    # tangential directions: 1 (plane models) or 2
+    tangents: int = 2
 
 
 @dataclass(frozen=True)
 class RigidBody:
-    """A damper without deformation: q (d,) generalised displacements, contact displacement = B q."""
+    """A damper without deformation: q (d,) generalised displacements, contact displacement = B
+    q.
+    """
 
-    mass: np.ndarray                # (d, d) [kg, kg m, kg m^2]
-    B: np.ndarray                   # (contact dofs, d) from q to displacements in the pairs' frames
-    load: np.ndarray = field(default_factory=lambda: np.zeros(0))   # (d,) static load [N, N m]
+    # (d, d) [kg, kg m, kg m^2]
+    mass: np.ndarray
+    # (contact dofs, d) from q to displacements in the pairs' frames
+    B: np.ndarray
+    # (d,) static load [N, N m]
+    load: np.ndarray = field(default_factory=lambda: np.zeros(0))

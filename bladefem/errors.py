@@ -1,4 +1,6 @@
-"""What can go wrong, in two kinds: the input is wrong (exit code 2), or no solution was found (exit code 1)."""
+"""What can go wrong, in two kinds: the input is wrong (exit code 2), or no solution was found (exit
+code 1).
+"""
 
 from __future__ import annotations
 
@@ -13,11 +15,15 @@ class InputError(ValueError):
 
 
 class NotSolvedError(RuntimeError):
-    """The input was right and no acceptable solution was found. The message says which loop stopped and why."""
+    """The input was right and no acceptable solution was found. The message says which loop stopped
+    and why.
+    """
 
 
 def suggestion(word: str, known: Iterable[str]) -> str:
-    """The tail of an error message: "; did you mean 'twist'?", or the known words when none is close."""
+    """The tail of an error message: "; did you mean 'twist'?", or the known words when none is
+    close.
+    """
     known = sorted(known)
     close = difflib.get_close_matches(word, known, n=1, cutoff=0.6)
     return f"; did you mean '{close[0]}'?" if close else f"; known are {', '.join(known)}"

@@ -18,7 +18,7 @@ from mpi4py import MPI
 import bladefem
 from bladefem.fem.constraint import constrain
 from bladefem.fem.modes import modes
-from bladefem.study.modal import family_table
+from bladefem.study.modes.comparison import family_table
 
 coarse = "BLADEFEM_COARSE" in os.environ
 scene = bladefem.load_scene("scenes/wedge.toml", ["mesh.size=10 mm"] if coarse else [])
@@ -41,6 +41,7 @@ if comm.rank == 0:
     print(family_table(found, mesh).to_string(index=False))
     if not coarse:
         from bladefem.view.modes import draw_mode_sheet, save_modes_vtu
+
         os.makedirs("runs/demos", exist_ok=True)
         draw_mode_sheet(mesh, found, "runs/demos/blade_modes.png")
         save_modes_vtu(mesh, found, "runs/demos/blade_modes.vtu")

@@ -13,7 +13,9 @@ from mpi4py import MPI
 import bladefem
 
 coarse = "BLADEFEM_COARSE" in os.environ
-base = bladefem.load_scene("scenes/wedge.toml", ["mesh.size=10 mm"] if coarse else ["mesh.size=6 mm"])
+base = bladefem.load_scene(
+    "scenes/wedge.toml", ["mesh.size=10 mm"] if coarse else ["mesh.size=6 mm"]
+)
 comm = MPI.COMM_WORLD
 frequencies = {}
 for width in ("8 mm", "10 mm", "12 mm"):

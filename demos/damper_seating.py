@@ -18,8 +18,8 @@ import numpy as np
 from mpi4py import MPI
 
 import bladefem
-from bladefem.contact.seat import solve
-from bladefem.study.stages import contact_patches
+from bladefem.contact.seating import solve
+from bladefem.study.pipeline.stages import contact_patches
 
 coarse = "BLADEFEM_COARSE" in os.environ
 scene = bladefem.load_scene("scenes/wedge.toml", ["mesh.size=10 mm"] if coarse else [])
@@ -39,10 +39,14 @@ expected = pull / (2 * math.sin(scene.damper.angle))
 # %%
 if comm.rank == 0:
     for seat in maps:
-        print(f"seat '{seat.patch.name}': {seat.force.sum():.4f} N, {np.count_nonzero(seat.force)} of "
-              f"{len(seat.force)} nodes press, peak {seat.pressure.max() / 1e6:.2f} MPa")
+        print(
+            f"seat '{seat.patch.name}': {seat.force.sum():.4f} N, {np.count_nonzero(seat.force)} "
+            "of "
+            f"{len(seat.force)} nodes press, peak {seat.pressure.max() / 1e6:.2f} MPa"
+        )
     if not coarse:
         from bladefem.view.contact import draw_pressure
+
         os.makedirs("runs/demos", exist_ok=True)
         draw_pressure(maps, "runs/demos/pressure.png")
     print(f"normal force over F / (2 sin alpha): {maps[0].force.sum() / expected:.10f}")

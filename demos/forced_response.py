@@ -16,12 +16,21 @@ import os
 from mpi4py import MPI
 
 import bladefem
-from bladefem.study.pipeline import run
+from bladefem.study.pipeline.pipeline import run
 
 coarse = "BLADEFEM_COARSE" in os.environ
-small = ["mesh.size=10 mm", "contact.points=6", "study.loads=90 N, 200 N", "study.own_load=false",
-         "model.nodal_diameters=0, 9", "model.modes=10", "model.harmonics=1", "model.samples=64", "model.damper=rigid",
-         "accuracy=5 %"]
+small = [
+    "mesh.size=10 mm",
+    "contact.points=6",
+    "study.loads=90 N, 200 N",
+    "study.own_load=false",
+    "model.nodal_diameters=0, 9",
+    "model.modes=10",
+    "model.harmonics=1",
+    "model.samples=64",
+    "model.damper=rigid",
+    "accuracy=5 %",
+]
 scene = bladefem.load_scene("scenes/wedge.toml", small if coarse else [])
 comm = MPI.COMM_WORLD
 result = run(scene, None if coarse else "runs/demos/forced_response", comm=comm)
@@ -34,8 +43,10 @@ frequency, undamped = result.response.free_peak
 if comm.rank == 0:
     print(f"no damper: {frequency:9.3f} Hz {1e6 * undamped:9.2f} um")
     for c in result.response.curves:
-        print(f"{c.load:6.0f} N: {c.peak_frequency:12.3f} Hz {1e6 * c.peak_amplitude:9.2f} um, "
-              f"{len(c.frequency)} points, {int((~c.converged).sum())} not converged, "
-              f"estimated error {100 * c.settings.error:.2g} %")
+        print(
+            f"{c.load:6.0f} N: {c.peak_frequency:12.3f} Hz {1e6 * c.peak_amplitude:9.2f} um, "
+            f"{len(c.frequency)} points, {int((~c.converged).sum())} not converged, "
+            f"estimated error {100 * c.settings.error:.2g} %"
+        )
     best = min(result.response.curves, key=lambda c: c.peak_amplitude)
     print(f"resonance amplitude at the best load [um]: {1e6 * best.peak_amplitude:.8f}")

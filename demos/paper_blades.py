@@ -24,8 +24,8 @@ import bladefem
 from bladefem.damper.accelerate import METHODS, Rules, iterate
 from bladefem.damper.blades import judge, load_curve, optimum, peak, seat_loop
 from bladefem.damper.paper import platform
-from bladefem.hbm.api import solve
-from bladefem.hbm.resonance import free_resonances, stuck_resonances
+from bladefem.hbm.linear_resonances import free_resonances, stuck_resonances
+from bladefem.hbm.solve import solve
 from bladefem.hbm.sweep import size, sweep
 from bladefem.study.row import paper_model, row_of_blades, whole_model
 from bladefem.view.paper import draw_friction_loops, draw_peaks, draw_tip_responses
@@ -33,21 +33,25 @@ from bladefem.view.paper import draw_friction_loops, draw_peaks, draw_tip_respon
 coarse = "BLADEFEM_COARSE" in os.environ
 folder, comm = Path("runs/demos/paper_blades"), MPI.COMM_WORLD
 H, samples = (3, 128) if coarse else (7, 512)
-band = (1050.0, 1300.0)                        # Hz, mode 2
+band = (1050.0, 1300.0)  # Hz, mode 2
 
 # %% [markdown]
 # Finite elements give the modes of the blade and, by a quasi-static contact solve, how each normal load is spread over
 # the seats: the damper bends, and presses near the edges of the platforms only.
 
 # %%
-scenes = {kt: bladefem.load_scene("scenes/plane.toml", [f"contact.kt={kt} N/m"]) for kt in (1e6, 1.44e7)}
+scenes = {
+    kt: bladefem.load_scene("scenes/plane.toml", [f"contact.kt={kt} N/m"]) for kt in (1e6, 1.44e7)
+}
 rows = {kt: row_of_blades(scene, comm=comm) for kt, scene in scenes.items()}
-if comm.rank:                                  # what follows is small: rank 0 does it, the others wait at the end
+if comm.rank:  # what follows is small: rank 0 does it, the others wait at the end
     raise SystemExit
 
 
 def model_of(load, mass=0.06, kt=1e6):
-    """The paper's model: normal load of a seat [N], mass of a damper [kg], stiffness of a seat [N/m]."""
+    """The paper's model: normal load of a seat [N], mass of a damper [kg], stiffness of a seat
+    [N/m].
+    """
     return paper_model(scenes[kt], rows[kt], load, mass)
 
 
@@ -58,25 +62,36 @@ def model_of(load, mass=0.06, kt=1e6):
 # %%
 for kt in scenes:
     model = model_of(30.0, kt=kt)
-    print(f"k_t {kt:.2e} N/m: free {free_resonances(model)[1] / 2 / np.pi:.1f} Hz, "
-          f"stuck {[round(f, 1) for f in stuck_resonances(model)[:3] / 2 / np.pi]} Hz, "
-          f"{np.count_nonzero(model.elements.n0)} of {len(model.elements.n0)} points press")
+    print(
+        f"k_t {kt:.2e} N/m: free {free_resonances(model)[1] / 2 / np.pi:.1f} Hz, "
+        f"stuck {[round(f, 1) for f in stuck_resonances(model)[:3] / 2 / np.pi]} Hz, "
+        f"{np.count_nonzero(model.elements.n0)} of {len(model.elements.n0)} points press"
+    )
 
 # %% [markdown]
 # ## Frequency responses for eight loads (Fig. 15)
 
 # %%
-loads = (1.0, 2.0, 4.0, 6.0, 10.0, 20.0, 50.0, 200.0)    # normal load of a seat, N
+loads = (1.0, 2.0, 4.0, 6.0, 10.0, 20.0, 50.0, 200.0)  # normal load of a seat, N
 curves, loops, peaks = {}, {}, {}
 for load in loads[::3] if coarse else loads:
-    points = list(sweep(model_of(load), (2 * np.pi * band[0], 2 * np.pi * band[1]), H, samples,
-                        curve=0.1 if coarse else 0.01))
+    points = list(
+        sweep(
+            model_of(load),
+            (2 * np.pi * band[0], 2 * np.pi * band[1]),
+            H,
+            samples,
+            curve=0.1 if coarse else 0.01,
+        )
+    )
     points.sort(key=lambda s: s.omega)
     top = max((s for s in points if s.converged), key=size)
     curves[load] = np.array([(s.frequency, size(s)) for s in points if s.converged]).T
     loops[load], peaks[load] = seat_loop(top), top
-    print(f"{load:5.1f} N: {top.frequency:8.2f} Hz {1e6 * size(top):7.3f} um, {len(points)} points, "
-          f"{sum(not s.converged for s in points)} not solved")
+    print(
+        f"{load:5.1f} N: {top.frequency:8.2f} Hz {1e6 * size(top):7.3f} um, {len(points)} points, "
+        f"{sum(not s.converged for s in points)} not solved"
+    )
 
 # %% [markdown]
 # The paper's first claim holds here: frequency rises steadily with the load, the amplitude falls and rises again. The
@@ -85,7 +100,9 @@ for load in loads[::3] if coarse else loads:
 
 # %%
 if not coarse:
-    draw_tip_responses(curves, folder / "fig_15.png", "mode 2, damper of 60 g", load="normal load of a seat [N]")
+    draw_tip_responses(
+        curves, folder / "fig_15.png", "mode 2, damper of 60 g", load="normal load of a seat [N]"
+    )
     draw_friction_loops(loops, folder / "fig_16.png", "normal load of a seat [N]")
 
 # %% [markdown]
@@ -103,12 +120,18 @@ for load in (6.0,) if coarse else (1.0, 6.0, 50.0):
     truth = judge(model, top.frequency)[1][1]
     full = solve(model, top.omega, H, samples)
     worst = max(worst, abs(full.probe[1, 0] / truth - 1))
-    print(f"{load} N, {top.frequency:.1f} Hz: full balance (H {H}) off by {abs(full.probe[1, 0] / truth - 1):.1e}")
+    print(
+        f"{load} N, {top.frequency:.1f} Hz: full balance (H {H}) off by "
+        f"{abs(full.probe[1, 0] / truth - 1):.1e}"
+    )
     side = platform(model, top.omega, 1)
     for method in ("picard", "amplitude") if coarse else METHODS:
         r = iterate(side, method, Rules())
-        print(f"    {method:10s} {'accepted' if r.converged else 'gave up '} after {r.iterations:2d}, residual "
-              f"{r.residual:.1e}, error {abs(r.probe[1, 0] / truth - 1):.1e}")
+        print(
+            f"    {method:10s} {'accepted' if r.converged else 'gave up '} after "
+            f"{r.iterations:2d}, residual "
+            f"{r.residual:.1e}, error {abs(r.probe[1, 0] / truth - 1):.1e}"
+        )
 
 # %% [markdown]
 # Integrating the damper from rest, as the paper does, adds a failure of its own. A stuck damper has no damping: its
@@ -122,9 +145,13 @@ for load in (200.0,) if coarse else (20.0, 200.0):
     for how in ("march", "shooting"):
         started = time.process_time()
         r = iterate(platform(model, top.omega, 1), "amplitude", Rules(damper=how))
-        print(f"{load:5.1f} N, damper by {how:8s}: {'accepted' if r.converged else 'gave up '}, error "
-              f"{abs(r.probe[1, 0] / truth - 1):8.1e}, residual {r.residual:.1e}, {r.periods} periods, "
-              f"{time.process_time() - started:.2f} s")
+        print(
+            f"{load:5.1f} N, damper by {how:8s}: {'accepted' if r.converged else 'gave up '}, "
+            "error "
+            f"{abs(r.probe[1, 0] / truth - 1):8.1e}, residual {r.residual:.1e}, {r.periods} "
+            "periods, "
+            f"{time.process_time() - started:.2f} s"
+        )
 
 # %% [markdown]
 # ## Does the damper's normal motion matter?
@@ -132,33 +159,47 @@ for load in (200.0,) if coarse else (20.0, 200.0):
 # The paper leaves it out (Fig. 13). With springs along the normal and three freedoms of the rigid damper:
 
 # %%
-for kt, scene in list(scenes.items())[:1 if coarse else 2]:
+for kt, scene in list(scenes.items())[: 1 if coarse else 2]:
     for load in (20.0,) if coarse else (4.0, 20.0, 100.0):
         span = (850.0, 1300.0)
-        plain, with_it = (peak(m, span, 3, 128) for m in (model_of(load, kt=kt), whole_model(scene, rows[kt], load)))
-        print(f"k_t {kt:.2e} N/m, {load:5.1f} N: {1e6 * plain.amplitude:6.2f} um, with normal motion "
-              f"{1e6 * with_it.amplitude:6.2f} um at {with_it.frequency:.1f} Hz")
+        plain, with_it = (
+            peak(m, span, 3, 128)
+            for m in (model_of(load, kt=kt), whole_model(scene, rows[kt], load))
+        )
+        print(
+            f"k_t {kt:.2e} N/m, {load:5.1f} N: {1e6 * plain.amplitude:6.2f} um, with normal motion "
+            f"{1e6 * with_it.amplitude:6.2f} um at {with_it.frequency:.1f} Hz"
+        )
 
 # %% [markdown]
 # ## Resonance over the load for four dampers (Fig. 17)
 
 # %%
-masses = (0.06,) if coarse else (0.03, 0.06, 0.09, 0.12)      # kg
+masses = (0.06,) if coarse else (0.03, 0.06, 0.09, 0.12)  # kg
 smallest = {}
-cases = {(1e6, 2): (950.0, 1500.0), (1.44e7, 2): (850.0, 1250.0), (1e6, 1): (205.0, 230.0)}     # Hz
-for (kt, mode), span in list(cases.items())[:1 if coarse else 3]:
+cases = {(1e6, 2): (950.0, 1500.0), (1.44e7, 2): (850.0, 1250.0), (1e6, 1): (205.0, 230.0)}  # Hz
+for (kt, mode), span in list(cases.items())[: 1 if coarse else 3]:
     table = {}
     for mass in masses:
         wanted = np.geomspace(0.5, 500, 3 if coarse else 16)
         found = load_curve(((x, model_of(x, mass, kt)) for x in wanted), span, 3, 128)
         table[mass] = np.array([(x, p.frequency, p.amplitude) for x, p in found])
-        best, p = optimum(lambda x, mass=mass, kt=kt: model_of(x, mass, kt), (2.0, 20.0), span, 3, 128)
+        best, p = optimum(
+            lambda x, mass=mass, kt=kt: model_of(x, mass, kt), (2.0, 20.0), span, 3, 128
+        )
         smallest[kt, mode, mass] = p.amplitude
-        print(f"k_t {kt:.2e} N/m, mode {mode}, {1e3 * mass:3.0f} g: least {1e6 * p.amplitude:.2f} um at {best:.2f} N, "
-              f"{p.frequency:.1f} Hz")
+        print(
+            f"k_t {kt:.2e} N/m, mode {mode}, {1e3 * mass:3.0f} g: least {1e6 * p.amplitude:.2f} "
+            f"um at {best:.2f} N, "
+            f"{p.frequency:.1f} Hz"
+        )
     if not coarse:
-        draw_peaks(table, folder / f"fig_17_{kt:.0e}_{mode}.png", f"mode {mode}, {kt:.2g} N/m a seat",
-                   "normal load of a seat [N]")
+        draw_peaks(
+            table,
+            folder / f"fig_17_{kt:.0e}_{mode}.png",
+            f"mode {mode}, {kt:.2g} N/m a seat",
+            "normal load of a seat [N]",
+        )
 
 # %% [markdown]
 # What holds and what does not:

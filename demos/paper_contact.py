@@ -13,12 +13,18 @@ import numpy as np
 from mpi4py import MPI
 
 import bladefem
-from bladefem.study.punch import indent, johnson_approach, johnson_pressure, ring_stiffness, spring_tilt
+from bladefem.study.kinds.punch import (
+    indent,
+    johnson_approach,
+    johnson_pressure,
+    ring_stiffness,
+    spring_tilt,
+)
 from bladefem.view.paper_contact import draw_punch
 
 coarse, comm = "BLADEFEM_COARSE" in os.environ, MPI.COMM_WORLD
 scene = bladefem.load_scene("scenes/punch.toml", ["mesh.contact_size=0.4 mm"] if coarse else [])
-found = indent(scene, comm)                    # finite elements on all ranks, a quarter of block and punch
+found = indent(scene, comm)  # finite elements on all ranks, a quarter of block and punch
 if comm.rank:
     raise SystemExit
 
@@ -28,8 +34,11 @@ inner = found.radius < 0.8 * a
 area, exact = found.patch.area[inner], johnson_pressure(found.radius[inner], a, found.total)
 error = np.sqrt(area @ (found.pressure[inner] - exact) ** 2 / (area @ exact**2))
 approach = found.approach / johnson_approach(a, found.total, block.E, block.nu)
-print(f"{len(found.force)} nodes; pressure off by {error:.4f} (L2, r < 0.8 a), approach by {approach - 1:+.4f}; a "
-      f"block of {scene.punch.half_width / a:.0f} radii is stiffer than a half space")
+print(
+    f"{len(found.force)} nodes; pressure off by {error:.4f} (L2, r < 0.8 a), approach by "
+    f"{approach - 1:+.4f}; a "
+    f"block of {scene.punch.half_width / a:.0f} radii is stiffer than a half space"
+)
 
 # %% [markdown]
 # Eq. 25 gives springs $k_n(x)$ whose sum over the radius is $2 a E / (1 - \nu^2)$: it is the stiffness of a ring. Such
@@ -40,15 +49,25 @@ print(f"{len(found.force)} nodes; pressure off by {error:.4f} (L2, r < 0.8 a), a
 edges = np.linspace(0, 1, 11)
 springs = ring_stiffness(edges * a, a, block.E, block.nu)
 true = 4 / 3 * a**3 * block.E / (1 - block.nu**2)
-print(f"load of the springs at this approach: {springs.sum() * found.approach / found.total:.4f} of the punch's")
+print(
+    f"load of the springs at this approach: {springs.sum() * found.approach / found.total:.4f} of "
+    "the punch's"
+)
 tilt = spring_tilt(edges * a, a, block.E, block.nu)
-print(f"resistance to tilting over that of a half space: springs {tilt / true:.4f}, finite elements "
-      f"{found.tilt_stiffness / true:.4f}")
+print(
+    f"resistance to tilting over that of a half space: springs {tilt / true:.4f}, finite elements "
+    f"{found.tilt_stiffness / true:.4f}"
+)
 if not coarse:
     r = np.linspace(0, 0.995, 200)
-    draw_punch(found.radius / a, found.pressure / (found.total / np.pi / a**2), 4 * found.force / found.approach,
-               (r, johnson_pressure(r * a, a, 1.0) * np.pi * a**2), (edges, springs),
-               "runs/demos/paper_contact/fig_5.png")
+    draw_punch(
+        found.radius / a,
+        found.pressure / (found.total / np.pi / a**2),
+        4 * found.force / found.approach,
+        (r, johnson_pressure(r * a, a, 1.0) * np.pi * a**2),
+        (edges, springs),
+        "runs/demos/paper_contact/fig_5.png",
+    )
 
 # %%
 print(f"approach over that of a half space: {approach:.8f}")

@@ -21,7 +21,7 @@ from bladefem.friction.closed_form import circular_orbit_work, jenkins
 from bladefem.friction.printed import per_axis
 from bladefem.view.paper import draw_coupled_loops, draw_fit
 
-if MPI.COMM_WORLD.rank:                        # small enough for one rank; the others wait at the end
+if MPI.COMM_WORLD.rank:  # small enough for one rank; the others wait at the end
     raise SystemExit
 coarse = "BLADEFEM_COARSE" in os.environ
 folder = Path("runs/demos/paper_element")
@@ -31,7 +31,7 @@ samples = 2048 if coarse else 16384
 # Stiffness 1e6 N/m, friction limit 10 N, amplitude 30 µm: the node slips over two thirds of its way.
 
 # %%
-kt, limit, amplitude = 1e6, 10.0, 30e-6        # N/m, N, m
+kt, limit, amplitude = 1e6, 10.0, 30e-6  # N/m, N, m
 loop = two_slope_loop(kt, limit, amplitude, samples)
 fit, linear = linear_fit(loop)
 closed = jenkins(amplitude, kt, limit)
@@ -45,8 +45,10 @@ if not coarse:
 # $u$ and $\dot u$ are orthogonal over a period.
 
 # %%
-print(f"work {work(loop):.6e} J, of the linear force {trapezoid(linear, loop.motion):.6e} J, "
-      f"closed form {closed.energy:.6e} J")
+print(
+    f"work {work(loop):.6e} J, of the linear force {trapezoid(linear, loop.motion):.6e} J, "
+    f"closed form {closed.energy:.6e} J"
+)
 
 # %% [markdown]
 # ## Normal load that varies (Fig. 4)
@@ -57,16 +59,29 @@ print(f"work {work(loop):.6e} J, of the linear force {trapezoid(linear, loop.mot
 # $f \leftarrow \mathrm{clamp}(f + k_t\,\Delta g,\pm\mu N)$ has neither fault.
 
 # %%
-cases = {"constant load": (0, 1), "load at half the frequency": (1, 2), "at a quarter": (1, 4), "at twice": (2, 1)}
+cases = {
+    "constant load": (0, 1),
+    "load at half the frequency": (1, 2),
+    "at a quarter": (1, 4),
+    "at twice": (2, 1),
+}
 pictures, ratios = {}, {}
 for title, orders in cases.items():
     load = (20.0, 12.0 if orders[0] else 0.0)  # N
     right = coupled_loop(kt, 0.5, load, amplitude, orders, samples)
-    frozen, sliding = (printed_loop(kt, 0.5, load, amplitude, orders, samples, zero) for zero in (0, 1))
+    frozen, sliding = (
+        printed_loop(kt, 0.5, load, amplitude, orders, samples, zero) for zero in (0, 1)
+    )
     ratios[title] = work(sliding) / work(right)
-    print(f"{title:28s} work over the right one: H(0) = 0 {work(frozen) / work(right):6.3f}, "
-          f"H(0) = 1 {ratios[title]:6.3f}; largest force error {np.abs(sliding.force - right.force).max():5.2f} N")
-    pictures[title] = [("corrected", right.motion, right.force), ("printed, H(0) = 1", sliding.motion, sliding.force)]
+    print(
+        f"{title:28s} work over the right one: H(0) = 0 {work(frozen) / work(right):6.3f}, "
+        f"H(0) = 1 {ratios[title]:6.3f}; largest force error "
+        f"{np.abs(sliding.force - right.force).max():5.2f} N"
+    )
+    pictures[title] = [
+        ("corrected", right.motion, right.force),
+        ("printed, H(0) = 1", sliding.motion, sliding.force),
+    ]
 if not coarse:
     draw_coupled_loops(pictures, folder / "fig_4.png")
 
@@ -75,11 +90,15 @@ if not coarse:
 # negative, flips the sign of the force at every step.
 
 # %%
-right, printed = (law(kt, 0.5, (10.0, 20.0), amplitude, (1, 1), samples) for law in (coupled_loop, printed_loop))
+right, printed = (
+    law(kt, 0.5, (10.0, 20.0), amplitude, (1, 1), samples) for law in (coupled_loop, printed_loop)
+)
 apart = right.load < 0
 flips = np.count_nonzero(np.diff(np.sign(printed.force[apart])) != 0) / np.count_nonzero(apart)
-print(f"open contact: force {np.abs(right.force[apart]).max():.1f} N; printed law "
-      f"{np.abs(printed.force[apart]).max():.1f} N, changing sign in {100 * flips:.0f} % of the steps")
+print(
+    f"open contact: force {np.abs(right.force[apart]).max():.1f} N; printed law "
+    f"{np.abs(printed.force[apart]).max():.1f} N, changing sign in {100 * flips:.0f} % of the steps"
+)
 
 # %% [markdown]
 # ## Two directions (Eq. 29)
@@ -90,10 +109,19 @@ print(f"open contact: force {np.abs(right.force[apart]).max():.1f} N; printed la
 
 # %%
 angle = 2 * np.pi * np.arange(4 * samples + 1) / samples
-orbit, steady = amplitude * np.column_stack([np.cos(angle), np.sin(angle)]), slice(3 * samples, None)
+orbit, steady = (
+    amplitude * np.column_stack([np.cos(angle), np.sin(angle)]),
+    slice(3 * samples, None),
+)
 force = per_axis(orbit, np.full(len(orbit), limit), kt, 1.0)[steady]
 lost = np.sum((force[1:] + force[:-1]) / 2 * np.diff(orbit[steady], axis=0))
-print(f"circular orbit: limits for each axis do {lost / circular_orbit_work(amplitude, kt, limit):.3f} of the work")
+print(
+    "circular orbit: limits for each axis do "
+    f"{lost / circular_orbit_work(amplitude, kt, limit):.3f} of the work"
+)
 
 # %%
-print(f"work lost by the printed law at half the frequency [1]: {1 - ratios['load at half the frequency']:.6f}")
+print(
+    "work lost by the printed law at half the frequency [1]: "
+    f"{1 - ratios['load at half the frequency']:.6f}"
+)

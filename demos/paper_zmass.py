@@ -20,12 +20,12 @@ from mpi4py import MPI
 import bladefem
 from bladefem.damper.loops import Drive, ratio_table, spectrum, steady
 from bladefem.report.zmass import draw_motions
-from bladefem.study.zmass import mass_on_foundation, motions, press
+from bladefem.study.kinds.zmass import mass_on_foundation, motions, press
 from bladefem.view.paper import draw_footprint
 
 coarse = "BLADEFEM_COARSE" in os.environ
 folder, comm = Path("runs/demos/paper_zmass"), MPI.COMM_WORLD
-steps = 500 if coarse else 4000                # time steps a cycle of the foundation
+steps = 500 if coarse else 4000  # time steps a cycle of the foundation
 scene = bladefem.load_scene("scenes/zmass.toml", ["mesh.size=7 mm"] if coarse else [])
 
 # %% [markdown]
@@ -37,14 +37,19 @@ scene = bladefem.load_scene("scenes/zmass.toml", ["mesh.size=7 mm"] if coarse el
 
 # %%
 seat = press(scene, comm=comm).seat
-skewed = scene.vary(foundation__skew=(0.5, 0.3), foundation__amplitude=(0.005, 0.003), foundation__ratios=(0.5,))
+skewed = scene.vary(
+    foundation__skew=(0.5, 0.3), foundation__amplitude=(0.005, 0.003), foundation__ratios=(0.5,)
+)
 skew = press(skewed, comm=comm).seat
-if comm.rank:                                  # the rest is small: rank 0 does it, the others wait at the end
+if comm.rank:  # the rest is small: rank 0 does it, the others wait at the end
     raise SystemExit
 body = mass_on_foundation(scene, seat)
 mean = seat.force.sum() / seat.patch.area.sum()
-print(f"{1e3 * body.mass:.2f} g, {1e6 * body.inertia:.3f}e-6 kg m^2; pressure {seat.pressure.min() / mean:.3f} to "
-      f"{seat.pressure.max() / mean:.3f} of its mean at {len(seat.force)} nodes")
+print(
+    f"{1e3 * body.mass:.2f} g, {1e6 * body.inertia:.3f}e-6 kg m^2; pressure "
+    f"{seat.pressure.min() / mean:.3f} to "
+    f"{seat.pressure.max() / mean:.3f} of its mean at {len(seat.force)} nodes"
+)
 if not coarse:
     draw_footprint(seat, body.footprint, folder / "fig_8.png")
 
@@ -61,8 +66,10 @@ results = {f"{float(d.ratio) * d.frequency:g} Hz": result for d, result in found
 for name, result in results.items():
     frequency, lines = spectrum(result)
     main = lines[np.argmin(abs(frequency - 100)), 0]
-    print(f"load at {name:6s}: {result.loops} loops, drift {result.drift[0]:+.5f} m/s, "
-          f"{1e3 * main:.4f} mm at 100 Hz, {result.reason}")
+    print(
+        f"load at {name:6s}: {result.loops} loops, drift {result.drift[0]:+.5f} m/s, "
+        f"{1e3 * main:.4f} mm at 100 Hz, {result.reason}"
+    )
 
 # %%
 if not coarse:
@@ -74,18 +81,25 @@ if not coarse:
 # The paper concludes that the number of open loops equals the denominator of $f_p/f_b$ in lowest terms.
 
 # %%
-ratios = [Fraction(r) for r in "0 1/5 1/4 1/3 2/5 1/2 3/5 2/3 3/4 4/5 1 6/5 4/3 3/2 2 5/2 3 4 5 6".split()]
+ratios = [
+    Fraction(r) for r in "0 1/5 1/4 1/3 2/5 1/2 3/5 2/3 3/4 4/5 1 6/5 4/3 3/2 2 5/2 3 4 5 6".split()
+]
 rows = ratio_table(body, ratios, steps // 2)
-print(f"holds for {sum(row['rule'] for row in rows)} of {len(rows)} ratios at Table 1, where "
-      f"m x_0 w^2 / (mu P_0) = {0.035 * 0.005 * (200 * np.pi) ** 2 / 15:.1f}")
+print(
+    f"holds for {sum(row['rule'] for row in rows)} of {len(rows)} ratios at Table 1, where "
+    f"m x_0 w^2 / (mu P_0) = {0.035 * 0.005 * (200 * np.pi) ** 2 / 15:.1f}"
+)
 
 # %% [markdown]
 # It is a rule for gross slip. With a smaller stroke the mass sticks for a part of the common period, slips only while
 # the load is low, and the loops merge.
 
 # %%
-for stroke in (2e-3, 1.2e-3, 0.8e-3):          # m
-    found = {r: steady(body, Drive(r, amplitude=(stroke, 0.0)), steps // 2, most=60) for r in ratios[1:16]}
+for stroke in (2e-3, 1.2e-3, 0.8e-3):  # m
+    found = {
+        r: steady(body, Drive(r, amplitude=(stroke, 0.0)), steps // 2, most=60)
+        for r in ratios[1:16]
+    }
     broken = {str(r): s.loops for r, s in found.items() if s.loops != r.denominator}
     print(f"stroke {1e3 * stroke:.1f} mm: {len(broken)} of {len(found)} exceptions {broken}")
 
@@ -97,8 +111,10 @@ for stroke in (2e-3, 1.2e-3, 0.8e-3):          # m
 
 # %%
 _, result = next(motions(skewed, mass_on_foundation(skewed, skew), steps // 2))
-print(f"skewed: drift {result.drift[0]:+.4f}, {result.drift[1]:+.4f} m/s, turning up to "
-      f"{np.abs(result.motion.velocity[:, 2]).max():.2f} rad/s, {result.loops} loops")
+print(
+    f"skewed: drift {result.drift[0]:+.4f}, {result.drift[1]:+.4f} m/s, turning up to "
+    f"{np.abs(result.motion.velocity[:, 2]).max():.2f} rad/s, {result.loops} loops"
+)
 
 # %%
 print(f"drift at 50 Hz [m/s]: {results['50 Hz'].drift[0]:.6f}")

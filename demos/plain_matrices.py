@@ -11,18 +11,26 @@ import numpy as np
 
 from bladefem import balance as bf
 
-M = np.diag([1.0, 1.0])                                                     # [kg]
-K = np.array([[1.5e6, -0.5e6], [-0.5e6, 1.5e6]])                            # [N/m]
-ports = {"contact": [0], "load": [0, 1], "probe": [0, 1]}                   # numbers of freedoms
+M = np.diag([1.0, 1.0])  # [kg]
+K = np.array([[1.5e6, -0.5e6], [-0.5e6, 1.5e6]])  # [N/m]
+ports = {"contact": [0], "load": [0, 1], "probe": [0, 1]}  # numbers of freedoms
 body = bf.body_from_matrices(M, K, ports, C=4e-6 * K)
 element = bf.Elements(kt=[1e6], kn=[0.0], mu=[0.4], n0=[10.0], tangents=1)
-force = {1: np.array([1.0, 0.5j]), 3: np.array([0.0, 0.2])}                 # amplitude and phase of each harmonic [N]
+force = {
+    1: np.array([1.0, 0.5j]),
+    3: np.array([0.0, 0.2]),
+}  # amplitude and phase of each harmonic [N]
 model = bf.ReducedModel((body,), element, force)
 solution = bf.solve(model, omega=1125.0, H=7, samples=256)
-print(f"{solution.frequency:.1f} Hz: {solution.method}, {solution.iterations} iterations, "
-      f"residual {solution.residual_force:.1e} N, nodes {solution.states}")
-print(f"work in {solution.work.input:.4e} J, out by damping {solution.work.damping:.4e} J and friction "
-      f"{solution.work.friction:.4e} J")
+print(
+    f"{solution.frequency:.1f} Hz: {solution.method}, {solution.iterations} iterations, "
+    f"residual {solution.residual_force:.1e} N, nodes {solution.states}"
+)
+print(
+    f"work in {solution.work.input:.4e} J, out by damping {solution.work.damping:.4e} J and "
+    "friction "
+    f"{solution.work.friction:.4e} J"
+)
 assert solution.converged, solution.reason
 
 # %% [markdown]
@@ -47,5 +55,8 @@ for name, change in bf.sensitivities(model, highest, ["mu", "kt", "damping", "fo
 
 # %%
 best = bf.optimum(model, band=(800.0, 1600.0), bounds=(0.01, 10.0), H=7, samples=256)
-print(f"best load {10 * best.value:.3f} N, {best.points} points solved, peak at {best.peak.omega:.2f} rad/s")
+print(
+    f"best load {10 * best.value:.3f} N, {best.points} points solved, peak at "
+    f"{best.peak.omega:.2f} rad/s"
+)
 print(f"lowest highest peak [um]: {1e6 * best.peak.height:.8f}")

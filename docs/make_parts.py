@@ -2,8 +2,8 @@
 
 from pathlib import Path
 
-from bladefem.scene import Scene
-from bladefem.units import show
+from bladefem.scene.tables import Scene
+from bladefem.scene.units import show
 from bladefem.view.parts import PARTS
 from geometry import parameters
 from geometry.quantity import describe

@@ -1,5 +1,7 @@
-"""Parametric shapes of friction-damped blades, drawn and meshed by gmsh; `build` makes the mesh of a scene."""
+"""Parametric shapes of friction-damped blades, drawn and meshed by gmsh; `build` makes the mesh of
+a scene.
+"""
 
-from .dispatch import build
+from .builders import build
 
 __all__ = ["build"]

@@ -1,9 +1,10 @@
 """Two bodies that touch in a known way: a sphere or cylinder on a block, a flat punch on a block.
 
-The block is the "blade" (below), the indenter the "damper" (above). In 3-D they face each other at z = 0 round the z
-axis and only the quarter x, y > 0 is meshed; in 2-D they face at y = 0 and the half x > 0 is meshed. Faces:
-"seat_right" (block) and "damper_left" (indenter) carry the pair "this"; "clamp" is the far face of the block, "load"
-that of the indenter; "symmetry_x" is x = 0 (of both bodies), "symmetry_y" is y = 0 in 3-D.
+The block is the "blade" (below), the indenter the "damper" (above). In 3-D they face each other at
+z = 0 round the z axis and only the quarter x, y > 0 is meshed; in 2-D they face at y = 0 and the
+half x > 0 is meshed. Faces: "seat_right" (block) and "damper_left" (indenter) carry the pair
+"this"; "clamp" is the far face of the block, "load" that of the indenter; "symmetry_x" is x = 0 (of
+both bodies), "symmetry_y" is y = 0 in 3-D.
 """
 
 from __future__ import annotations
@@ -16,8 +17,8 @@ import numpy as np
 from bladefem.errors import InputError
 
 from .draw import centres, imprint, polygon, prism, set_background, tie
-from .extract import Groups
-from .finish import complete, mesh_model
+from .extract_arrays import Groups
+from .finalise_mesh import complete, mesh_model
 from .mesh import Mesh
 from .parameters import HertzPair, MeshSize, Punch
 from .quality import report
@@ -25,24 +26,38 @@ from .session import attempt, gmsh_session
 
 __all__ = ["hertz_pair", "punch"]
 
-WIDER = 2.0         # seat of the Hertz pair over the expected contact radius
+# seat of the Hertz pair over the expected contact radius
+WIDER = 2.0
 
 
 def hertz_pair(hertz: HertzPair, size: MeshSize) -> Mesh:
-    """Sphere (3-D) or cylinder (2-D) on a block; contact is possible within twice the expected radius.
+    """Sphere (3-D) or cylinder (2-D) on a block; contact is possible within twice the expected
+    radius.
 
-    Both bodies are meshed as blocks with the same nodes on the seat; the upper one is then bent to its curvature, so
-    that facing nodes have the same x (and y): the initial gap is their distance along the last axis.
+    Both bodies are meshed as blocks with the same nodes on the seat; the upper one is then bent to
+    its curvature, so that facing nodes have the same x (and y): the initial gap is their distance
+    along the last axis.
 
     Raises:
         InputError: a parameter has to change; the message names it.
     """
-    _inside("hertz.contact_radius", hertz.contact_radius, hertz.half_width / 2.5, "hertz.half_width / 2.5")
+    _inside(
+        "hertz.contact_radius",
+        hertz.contact_radius,
+        hertz.half_width / 2.5,
+        "hertz.half_width / 2.5",
+    )
     _inside("hertz.half_width", hertz.half_width, 0.7 * hertz.radius, "70 % of hertz.radius")
     fine = size.contact_size or hertz.contact_radius / 10
     _inside("mesh.contact_size", fine, hertz.contact_radius, "hertz.contact_radius")
-    mesh = _facing(hertz.dimension, hertz.half_width, WIDER * hertz.contact_radius, hertz.half_width,
-                   (fine, 1.2 * hertz.contact_radius), size)
+    mesh = _facing(
+        hertz.dimension,
+        hertz.half_width,
+        WIDER * hertz.contact_radius,
+        hertz.half_width,
+        (fine, 1.2 * hertz.contact_radius),
+        size,
+    )
     points = _bend(mesh, hertz.radius, hertz.half_width)
     bent = replace(mesh, points=points)
     return replace(bent, report=report(bent, mesh.report["straightened"], mesh.report["size"]))
@@ -57,7 +72,9 @@ def punch(block: Punch, size: MeshSize) -> Mesh:
     _inside("punch.radius", block.radius, block.half_width / 2, "half of punch.half_width")
     fine = size.contact_size or block.radius / 10
     _inside("mesh.contact_size", fine, block.radius, "punch.radius")
-    return _facing(block.dimension, block.half_width, block.radius, None, (fine, 1.1 * block.radius), size)
+    return _facing(
+        block.dimension, block.half_width, block.radius, None, (fine, 1.1 * block.radius), size
+    )
 
 
 def _inside(name: str, value: float, limit: float, meaning: str) -> None:
@@ -66,8 +83,11 @@ def _inside(name: str, value: float, limit: float, meaning: str) -> None:
 
 
 def _bend(mesh: Mesh, radius: float, height: float) -> np.ndarray:
-    """Points [m] with the indenter's lower side on its sphere or cylinder, its far face still plane."""
-    points, nodes = mesh.points.copy(), np.unique(mesh.bodies["damper"])
+    """Points [m] with the indenter's lower side on its sphere or cylinder, its far face still
+    plane.
+    """
+    points = mesh.points.copy()
+    nodes = np.unique(mesh.bodies["damper"])
     up = mesh.dimension - 1
     away = np.square(points[nodes, :up]).sum(axis=1)
     sag = away / (radius + np.sqrt(radius**2 - away))
@@ -75,8 +95,14 @@ def _bend(mesh: Mesh, radius: float, height: float) -> np.ndarray:
     return points
 
 
-def _facing(dimension: int, width: float, seat: float, upper: float | None, fine: tuple[float, float],
-            size: MeshSize) -> Mesh:
+def _facing(
+    dimension: int,
+    width: float,
+    seat: float,
+    upper: float | None,
+    fine: tuple[float, float],
+    size: MeshSize,
+) -> Mesh:
     """Mesh of the two bodies.
 
     Args:
@@ -90,14 +116,28 @@ def _facing(dimension: int, width: float, seat: float, upper: float | None, fine
         draw = _solids if dimension == 3 else _plates
         blade, damper = draw(gmsh, width, seat, upper)
         groups = _names(gmsh, dimension, blade, damper, (width, upper or seat), seat)
-        tie(gmsh, dimension - 1, groups.faces["seat_right"], groups.faces["damper_left"], np.eye(3), np.zeros(3))
+        tie(
+            gmsh,
+            dimension - 1,
+            groups.faces["seat_right"],
+            groups.faces["damper_left"],
+            np.eye(3),
+            np.zeros(3),
+        )
         distance = "Sqrt(x*x + y*y + z*z)"
-        set_background(gmsh, fine[0] / 2, MathEval=[
-            {"F": f"Min({far}, {fine[0]} + 0.3 * Max(0, {distance} - {fine[1]}))"}])
+        set_background(
+            gmsh,
+            fine[0] / 2,
+            MathEval=[{"F": f"Min({far}, {fine[0]} + 0.3 * Max(0, {distance} - {fine[1]}))"}],
+        )
         with attempt("mesh.contact_size", "mesh this geometry"):
             mesh = mesh_model(gmsh, groups, dimension, size)
-    return complete(mesh, {"this": ("seat_right", "damper_left", np.eye(3), np.zeros(3))}, far,
-                    flat=("seat_right", "damper_left"))
+    return complete(
+        mesh,
+        {"this": ("seat_right", "damper_left", np.eye(3), np.zeros(3))},
+        far,
+        flat=("seat_right", "damper_left"),
+    )
 
 
 def _square(width: float) -> np.ndarray:
@@ -106,19 +146,25 @@ def _square(width: float) -> np.ndarray:
 
 def _solids(gmsh: ModuleType, width: float, seat: float, upper: float | None) -> tuple[int, int]:
     """Quarter blocks with the seat imprinted, or a quarter round punch above."""
-    blade = imprint(gmsh, prism(gmsh, _square(width), -width, 0.0), [(2, _quarter_disc(gmsh, seat))])
+    blade = imprint(
+        gmsh, prism(gmsh, _square(width), -width, 0.0), [(2, _quarter_disc(gmsh, seat))]
+    )
     if upper is None:
         solid = gmsh.model.occ.extrude([(2, _quarter_disc(gmsh, seat))], 0, 0, seat)
         damper = next(tag for dim, tag in solid if dim == 3)
     else:
-        damper = imprint(gmsh, prism(gmsh, _square(upper), 0.0, upper), [(2, _quarter_disc(gmsh, seat))])
+        damper = imprint(
+            gmsh, prism(gmsh, _square(upper), 0.0, upper), [(2, _quarter_disc(gmsh, seat))]
+        )
     gmsh.model.occ.synchronize()
     return blade, damper
 
 
 def _quarter_disc(gmsh: ModuleType, radius: float) -> int:
     occ = gmsh.model.occ
-    centre, a, b = occ.addPoint(0, 0, 0), occ.addPoint(radius, 0, 0), occ.addPoint(0, radius, 0)
+    centre = occ.addPoint(0, 0, 0)
+    a = occ.addPoint(radius, 0, 0)
+    b = occ.addPoint(0, radius, 0)
     loop = [occ.addLine(centre, a), occ.addCircleArc(a, centre, b), occ.addLine(b, centre)]
     return occ.addPlaneSurface([occ.addCurveLoop(loop)])
 
@@ -126,17 +172,29 @@ def _quarter_disc(gmsh: ModuleType, radius: float) -> int:
 def _plates(gmsh: ModuleType, width: float, seat: float, upper: float | None) -> tuple[int, int]:
     """Half plates; the end of the seat is a corner of each."""
     low = np.array([[0, 0], [0, -width], [width, -width], [width, 0], [seat, 0]])
-    high = [[0, 0], [seat, 0], [upper, 0], [upper, upper], [0, upper]] if upper else \
-        [[0, 0], [seat, 0], [seat, seat], [0, seat]]
+    high = (
+        [[0, 0], [seat, 0], [upper, 0], [upper, upper], [0, upper]]
+        if upper
+        else [[0, 0], [seat, 0], [seat, seat], [0, seat]]
+    )
     blade, damper = (polygon(gmsh, np.array(corners, dtype=float))[0] for corners in (low, high))
     gmsh.model.occ.synchronize()
     return blade, damper
 
 
-def _names(gmsh: ModuleType, dimension: int, blade: int, damper: int, sizes: tuple[float, float],
-           seat: float) -> Groups:
-    """Faces by where their centres are; the seat is the contact face whose centre is nearest to the axis."""
-    up, faces = dimension - 1, {}
+def _names(
+    gmsh: ModuleType,
+    dimension: int,
+    blade: int,
+    damper: int,
+    sizes: tuple[float, float],
+    seat: float,
+) -> Groups:
+    """Faces by where their centres are; the seat is the contact face whose centre is nearest to the
+    axis.
+    """
+    up = dimension - 1
+    faces = {}
     ends = ((blade, -sizes[0], "seat_right", "clamp"), (damper, sizes[1], "damper_left", "load"))
     for body, end, contact, far in ends:
         found = centres(gmsh, body, dimension)
@@ -144,5 +202,7 @@ def _names(gmsh: ModuleType, dimension: int, blade: int, damper: int, sizes: tup
         faces[contact] = [min(level, key=lambda t, c=found: np.linalg.norm(c[t]))]
         faces[far] = [tag for tag, c in found.items() if abs(c[up] - end) < 1e-6 * seat]
         for axis, name in enumerate(("symmetry_x", "symmetry_y")[:up]):
-            faces.setdefault(name, []).extend(tag for tag, c in found.items() if abs(c[axis]) < 1e-6 * seat)
+            faces.setdefault(name, []).extend(
+                tag for tag, c in found.items() if abs(c[axis]) < 1e-6 * seat
+            )
     return Groups({"blade": [blade], "damper": [damper]}, faces)

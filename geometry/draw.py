@@ -1,4 +1,6 @@
-"""Small OpenCASCADE drawings that several builders share: polygons, prisms, imprints, faces found by their centre."""
+"""Small OpenCASCADE drawings that several builders share: polygons, prisms, imprints, faces found
+by their centre.
+"""
 
 from __future__ import annotations
 
@@ -6,11 +8,22 @@ from types import ModuleType
 
 import numpy as np
 
-__all__ = ["centres", "clear_leftovers", "face_at", "imprint", "polygon", "prism", "set_background", "tie"]
+__all__ = [
+    "centres",
+    "clear_leftovers",
+    "face_at",
+    "imprint",
+    "polygon",
+    "prism",
+    "set_background",
+    "tie",
+]
 
 
 def polygon(gmsh: ModuleType, corners: np.ndarray) -> tuple[int, list[int], list[int]]:
-    """Surface, lines and points of a plane polygon (n, 2 or 3) [m]; line i runs from corner i to i + 1."""
+    """Surface, lines and points of a plane polygon (n, 2 or 3) [m]; line i runs from corner i to i
+    + 1.
+    """
     occ = gmsh.model.occ
     points = [occ.addPoint(*corner, *[0.0] * (3 - len(corner))) for corner in corners]
     lines = [occ.addLine(a, b) for a, b in zip(points, points[1:] + points[:1], strict=True)]
@@ -20,7 +33,9 @@ def polygon(gmsh: ModuleType, corners: np.ndarray) -> tuple[int, list[int], list
 def prism(gmsh: ModuleType, corners: np.ndarray, low: float, high: float) -> int:
     """Volume over a polygon (n, 2) [m] from z = low to z = high."""
     face, _, _ = polygon(gmsh, np.column_stack([corners, np.full(len(corners), low)]))
-    return next(tag for dim, tag in gmsh.model.occ.extrude([(2, face)], 0, 0, high - low) if dim == 3)
+    return next(
+        tag for dim, tag in gmsh.model.occ.extrude([(2, face)], 0, 0, high - low) if dim == 3
+    )
 
 
 def imprint(gmsh: ModuleType, volume: int, marks: list[tuple[int, int]]) -> int:
@@ -30,9 +45,12 @@ def imprint(gmsh: ModuleType, volume: int, marks: list[tuple[int, int]]) -> int:
 
 
 def clear_leftovers(gmsh: ModuleType) -> None:
-    """Delete the construction surfaces, curves and points that bound no volume; they would be meshed, too."""
+    """Delete the construction surfaces, curves and points that bound no volume; they would be
+    meshed, too.
+    """
     for dimension in (2, 1, 0):
-        gmsh.model.occ.remove(gmsh.model.occ.getEntities(dimension))        # leaves what bounds something else
+        # leaves what bounds something else
+        gmsh.model.occ.remove(gmsh.model.occ.getEntities(dimension))
 
 
 def centres(gmsh: ModuleType, body: int, dimension: int = 3) -> dict[int, np.ndarray]:
@@ -41,7 +59,9 @@ def centres(gmsh: ModuleType, body: int, dimension: int = 3) -> dict[int, np.nda
     return {tag: np.array(gmsh.model.occ.getCenterOfMass(dim, tag)) for dim, tag in faces}
 
 
-def face_at(found: dict[int, np.ndarray], where: np.ndarray, tolerance: float, name: str) -> list[int]:
+def face_at(
+    found: dict[int, np.ndarray], where: np.ndarray, tolerance: float, name: str
+) -> list[int]:
     """The one entity with its centre there.
 
     Raises:
@@ -53,17 +73,29 @@ def face_at(found: dict[int, np.ndarray], where: np.ndarray, tolerance: float, n
     return tags
 
 
-def tie(gmsh: ModuleType, dimension: int, master: list[int], slave: list[int], rotation: np.ndarray,
-        shift: np.ndarray) -> None:
-    """Have gmsh copy the mesh of the master's curves or surfaces onto the slave's under a rigid motion."""
+def tie(
+    gmsh: ModuleType,
+    dimension: int,
+    master: list[int],
+    slave: list[int],
+    rotation: np.ndarray,
+    shift: np.ndarray,
+) -> None:
+    """Have gmsh copy the mesh of the master's curves or surfaces onto the slave's under a rigid
+    motion.
+    """
     affine = np.eye(4)
-    affine[:3, :3], affine[:3, 3] = rotation, shift
+    affine[:3, :3] = rotation
+    affine[:3, 3] = shift
     gmsh.model.mesh.setPeriodic(dimension, slave, master, affine.ravel().tolist())
 
 
 def set_background(gmsh: ModuleType, least: float, **parameters: dict[str, object]) -> None:
-    """Use the smallest of some size fields, given as kind=[{option: value}, ...]; no element below ``least`` [m]."""
-    field, tags = gmsh.model.mesh.field, []
+    """Use the smallest of some size fields, given as kind=[{option: value}, ...]; no element below
+    ``least`` [m].
+    """
+    field = gmsh.model.mesh.field
+    tags = []
     for kind, settings in parameters.items():
         for setting in settings:
             tags.append(field.add(kind))

@@ -17,7 +17,8 @@ NUMBER = {word: number for number, word in GMSH_TYPES.items()}
 
 
 def write_msh(mesh: Mesh, file: str | Path, version: float = 4.1, binary: bool = False) -> None:
-    """Write bodies, faces and node sets under their names; `geometry.imported.read_mesh` reads them back.
+    """Write bodies, faces and node sets under their names; `geometry.imported.read_mesh` reads them
+    back.
 
     Args:
         version: 4.1, or 2.2 for older programs.
@@ -31,8 +32,14 @@ def write_msh(mesh: Mesh, file: str | Path, version: float = 4.1, binary: bool =
         for name, cells in mesh.bodies.items():
             _add(gmsh, dimension, entities[name], name, mesh.cell_type, cells)
         for name, faces in mesh.faces.items():
-            _add(gmsh, dimension - 1, gmsh.model.addDiscreteEntity(dimension - 1), name,
-                 face_word(faces.shape[1], dimension), faces)
+            _add(
+                gmsh,
+                dimension - 1,
+                gmsh.model.addDiscreteEntity(dimension - 1),
+                name,
+                face_word(faces.shape[1], dimension),
+                faces,
+            )
         for name, nodes in mesh.nodes.items():
             _add(gmsh, 0, gmsh.model.addDiscreteEntity(0), name, "vertex", nodes[:, None])
         gmsh.option.setNumber("Mesh.MshFileVersion", version)
@@ -40,6 +47,8 @@ def write_msh(mesh: Mesh, file: str | Path, version: float = 4.1, binary: bool =
         gmsh.write(str(file))
 
 
-def _add(gmsh: ModuleType, dimension: int, entity: int, name: str, word: str, cells: np.ndarray) -> None:
+def _add(
+    gmsh: ModuleType, dimension: int, entity: int, name: str, word: str, cells: np.ndarray
+) -> None:
     gmsh.model.mesh.addElementsByType(entity, NUMBER[word], [], (cells + 1).ravel())
     gmsh.model.setPhysicalName(dimension, gmsh.model.addPhysicalGroup(dimension, [entity]), name)

@@ -1,12 +1,13 @@
 """A user's own mesh or STEP file as a Mesh: names, axes, pairs.
 
-Names are read without regard to case, blanks count as underscores. Volumes: every cell outside "damper" belongs to the
-body "blade", whatever its volume is called; the names are kept as its parts, which may have materials of their own.
-Faces, edges and node sets: the names of geometry.mesh.Mesh;
-others are kept. A node set becomes a face too when it holds all corners of outer facets (Abaqus NSET, Ansys
-components). The model is turned so that the engine axis is z and +x is midway between the cyclic faces. Pairs are
-matched, not made: the mesh must be periodic from cyclic_low to cyclic_high (either sense). Seats and flanks of a wheel
-may have nodes of their own, which leaves their pair without matched nodes; those of other models must match.
+Names are read without regard to case, blanks count as underscores. Volumes: every cell outside
+"damper" belongs to the body "blade", whatever its volume is called; the names are kept as its
+parts, which may have materials of their own. Faces, edges and node sets: the names of
+geometry.mesh.Mesh; others are kept. A node set becomes a face too when it holds all corners of
+outer facets (Abaqus NSET, Ansys components). The model is turned so that the engine axis is z and
++x is midway between the cyclic faces. Pairs are matched, not made: the mesh must be periodic from
+cyclic_low to cyclic_high (either sense). Seats and flanks of a wheel may have nodes of their own,
+which leaves their pair without matched nodes; those of other models must match.
 """
 
 from __future__ import annotations
@@ -21,7 +22,7 @@ from scipy.spatial import cKDTree
 
 from bladefem.errors import InputError, suggestion
 
-from .finish import Motion
+from .finalise_mesh import Motion
 from .jacobian import straight_jacobian
 from .matching import match, snap
 from .mesh import Mesh, Pair, Sector
@@ -34,11 +35,19 @@ from .topology import DIMENSION, FAMILY, boundary, outward
 
 __all__ = ["mesh_of_raw", "read_geometry", "read_mesh"]
 
-LOOSE = 1e-4        # files carry few digits; a match within this share of the face is a match, and is then snapped
-OPPOSITE = -0.98    # cosine between outward normals of two faces that look at each other
-SMALLEST, LARGEST = 1e-4, 20.0      # of a model [m]: beyond these its unit was taken for another
-FLIPPED = {"tetra": [0, 2, 1, 3], "tetra10": [0, 2, 1, 3, 6, 5, 4, 7, 9, 8], "triangle": [0, 2, 1],
-           "triangle6": [0, 2, 1, 5, 4, 3]}
+# files carry few digits; a match within this share of the face is a match, and is then snapped
+LOOSE = 1e-4
+# cosine between outward normals of two faces that look at each other
+OPPOSITE = -0.98
+# of a model [m]: beyond these its unit was taken for another
+SMALLEST = 1e-4
+LARGEST = 20.0
+FLIPPED = {
+    "tetra": [0, 2, 1, 3],
+    "tetra10": [0, 2, 1, 3, 6, 5, 4, 7, 9, 8],
+    "triangle": [0, 2, 1],
+    "triangle6": [0, 2, 1, 5, 4, 3],
+}
 
 
 def read_geometry(imported: Any, size: MeshSize) -> Mesh:
@@ -54,12 +63,19 @@ def read_geometry(imported: Any, size: MeshSize) -> Mesh:
     if Path(imported.file).suffix.lower() in (".step", ".stp"):
         from .step_file import read_step
 
-        return read_step(imported.file, size, imported.scale, imported.sectors, axis, imported.names or ())
+        return read_step(
+            imported.file, size, imported.scale, imported.sectors, axis, imported.names or ()
+        )
     return read_mesh(imported.file, imported.scale, imported.sectors, axis, imported.names or ())
 
 
-def read_mesh(file: str | Path, scale: float = 1.0, sectors: int = 0,
-              axis: np.ndarray | tuple[float, float, float] = (0.0, 0.0, 1.0), names: Iterable[str] = ()) -> Mesh:
+def read_mesh(
+    file: str | Path,
+    scale: float = 1.0,
+    sectors: int = 0,
+    axis: np.ndarray | tuple[float, float, float] = (0.0, 0.0, 1.0),
+    names: Iterable[str] = (),
+) -> Mesh:
     """Mesh from .msh, .med, .unv, .inp, .bdf, .nas, .vtu or .cdb.
 
     Args:
@@ -71,26 +87,37 @@ def read_mesh(file: str | Path, scale: float = 1.0, sectors: int = 0,
     Raises:
         InputError: as `read_geometry`.
     """
-    raw, wanted = read_raw(Path(file)), read_names(names)
+    raw = read_raw(Path(file))
+    wanted = read_names(names)
     if wanted:
         raw = replace(raw, groups=renamed(raw.groups, wanted))
     return mesh_of_raw(raw, scale, sectors, axis, str(file))
 
 
-def mesh_of_raw(raw: RawMesh, scale: float, sectors: int, axis: np.ndarray | tuple[float, float, float],
-                source: str) -> Mesh:
+def mesh_of_raw(
+    raw: RawMesh,
+    scale: float,
+    sectors: int,
+    axis: np.ndarray | tuple[float, float, float],
+    source: str,
+) -> Mesh:
     """Names, axes, directions and pairs on what a file holds."""
     mesh = _bodies(raw, source)
     mesh = replace(mesh, points=_axes(mesh, scale, np.asarray(axis, dtype=float)))
     across = float(np.ptp(mesh.points, axis=0).max())
     if not SMALLEST < across < LARGEST:
-        raise InputError(f"imported.scale = {scale:g}: the model would be {across:.3g} m across, expected the factor "
-                         "from the file's unit to metres (0.001 for millimetres)")
+        raise InputError(
+            f"imported.scale = {scale:g}: the model would be {across:.3g} m across, expected the "
+            "factor "
+            "from the file's unit to metres (0.001 for millimetres)"
+        )
     mesh = _with_faces(mesh, raw)
     mesh = _paired(mesh, sectors, source)
     points, straightened = straighten(replace(mesh, points=snap(mesh.points, mesh.pairs)))
     mesh = replace(mesh, points=points)
-    return replace(mesh, report={**report(mesh, straightened, _edge_length(mesh)), "source": source})
+    return replace(
+        mesh, report={**report(mesh, straightened, _edge_length(mesh)), "source": source}
+    )
 
 
 def _word(name: str) -> str:
@@ -103,21 +130,36 @@ def _bodies(raw: RawMesh, source: str) -> Mesh:
     solid = [i for i, (word, _) in enumerate(raw.blocks) if DIMENSION[FAMILY[word]] == top]
     kinds = sorted({raw.blocks[i][0] for i in solid})
     if top < 2 or len(kinds) != 1 or not kinds[0].startswith(("tetra", "hexa", "triangle", "quad")):
-        raise InputError(f"imported.file = '{source}': cells are {', '.join(kinds) or 'missing'}, "
-                         "expected one kind of tetrahedra, hexahedra, triangles or quadrilaterals")
+        raise InputError(
+            f"imported.file = '{source}': cells are {', '.join(kinds) or 'missing'}, "
+            "expected one kind of tetrahedra, hexahedra, triangles or quadrilaterals"
+        )
     every = np.vstack([raw.blocks[i][1] for i in solid])
     start = dict(zip(solid, np.cumsum([0] + [len(raw.blocks[i][1]) for i in solid]), strict=False))
-    rows = {_word(name): np.concatenate([rows + start[b] for b, rows in parts])
-            for name, parts in raw.groups.items() if parts and all(b in start for b, _ in parts)}
+    rows = {
+        _word(name): np.concatenate([rows + start[b] for b, rows in parts])
+        for name, parts in raw.groups.items()
+        if parts and all(b in start for b, _ in parts)
+    }
     damper = np.unique(rows.get("damper", np.empty(0, dtype=int)))
     blade = np.setdiff1d(np.arange(len(every)), damper)
     if "blade" in rows and np.intersect1d(rows["blade"], damper).size:
-        raise InputError(f"imported.file = '{source}': groups blade and damper share cells, expected separate bodies")
+        raise InputError(
+            f"imported.file = '{source}': groups blade and damper share cells, expected separate "
+            "bodies"
+        )
     bodies = {"blade": every[blade]} | ({"damper": every[damper]} if damper.size else {})
-    parts = {name: np.searchsorted(blade, np.unique(some)) for name, some in rows.items()
-             if some.size and not np.isin(some, damper).any()}
-    return Mesh(raw.points, kinds[0], {n: _positive(raw.points, c, kinds[0], source) for n, c in bodies.items()},
-                parts=parts)
+    parts = {
+        name: np.searchsorted(blade, np.unique(some))
+        for name, some in rows.items()
+        if some.size and not np.isin(some, damper).any()
+    }
+    return Mesh(
+        raw.points,
+        kinds[0],
+        {n: _positive(raw.points, c, kinds[0], source) for n, c in bodies.items()},
+        parts=parts,
+    )
 
 
 def _positive(points: np.ndarray, cells: np.ndarray, word: str, source: str) -> np.ndarray:
@@ -126,7 +168,9 @@ def _positive(points: np.ndarray, cells: np.ndarray, word: str, source: str) -> 
     if not negative.any():
         return cells
     if word not in FLIPPED:
-        raise InputError(f"imported.file = '{source}': {negative.sum()} cells of type {word} are inside out")
+        raise InputError(
+            f"imported.file = '{source}': {negative.sum()} cells of type {word} are inside out"
+        )
     result = cells.copy()
     result[negative] = cells[negative][:, FLIPPED[word]]
     return result
@@ -147,21 +191,33 @@ def _with_faces(mesh: Mesh, raw: RawMesh) -> Mesh:
     used = np.unique(cells)
     number = np.full(len(mesh.points), -1)
     number[used] = np.arange(len(used))
-    points, cells = mesh.points[used], number[cells]
-    faces = {_word(name): np.vstack([number[raw.blocks[b][1][rows]] for b, rows in parts])
-             for name, parts in raw.groups.items()
-             if parts and all(DIMENSION[FAMILY[raw.blocks[b][0]]] == mesh.dimension - 1 for b, _ in parts)}
+    points = mesh.points[used]
+    cells = number[cells]
+    faces = {
+        _word(name): np.vstack([number[raw.blocks[b][1][rows]] for b, rows in parts])
+        for name, parts in raw.groups.items()
+        if parts
+        and all(DIMENSION[FAMILY[raw.blocks[b][0]]] == mesh.dimension - 1 for b, _ in parts)
+    }
     sets = {_word(name): number[nodes][number[nodes] >= 0] for name, nodes in raw.node_sets.items()}
     skin = boundary(cells, mesh.cell_type) if sets else None
     for name, nodes in sets.items():
-        inside = np.isin(skin, nodes)[:, :2 + (mesh.dimension == 3)].all(axis=1)
+        inside = np.isin(skin, nodes)[:, : 2 + (mesh.dimension == 3)].all(axis=1)
         if name not in faces and inside.any():
             faces[name] = skin[inside]
     bad = [name for name, f in faces.items() if (f < 0).any()]
     if bad:
-        raise InputError(f"imported.file: face {bad[0]} has nodes that no cell uses, expected faces on the bodies")
-    return replace(mesh, points=points, bodies={n: number[c] for n, c in mesh.bodies.items()}, nodes=sets,
-                   faces={n: outward(points, cells, mesh.cell_type, f) for n, f in faces.items()})
+        raise InputError(
+            f"imported.file: face {bad[0]} has nodes that no cell uses, expected faces on the "
+            "bodies"
+        )
+    return replace(
+        mesh,
+        points=points,
+        bodies={n: number[c] for n, c in mesh.bodies.items()},
+        nodes=sets,
+        faces={n: outward(points, cells, mesh.cell_type, f) for n, f in faces.items()},
+    )
 
 
 def _paired(mesh: Mesh, sectors: int, source: str) -> Mesh:
@@ -171,13 +227,18 @@ def _paired(mesh: Mesh, sectors: int, source: str) -> Mesh:
     if sectors:
         for name in ("cyclic_low", "cyclic_high"):
             if name not in mesh.faces:
-                raise InputError(f"imported.file = '{source}': no face group '{name}', needed with imported.sectors = "
-                                 f"{sectors}{suggestion(name, mesh.faces)}")
+                raise InputError(
+                    f"imported.file = '{source}': no face group '{name}', needed with "
+                    "imported.sectors = "
+                    f"{sectors}{suggestion(name, mesh.faces)}"
+                )
         mesh, pairs["cyclic"] = _cyclic(mesh, on)
         mesh = replace(mesh, points=_centred(mesh))
     shift = _pitch(mesh) if not sectors else np.zeros(3)
-    motions: dict[str, Motion] = {"this": ("seat_right", "damper_left", np.eye(3), np.zeros(3)),
-                                  "next": ("seat_left", "damper_right", on, shift)}
+    motions: dict[str, Motion] = {
+        "this": ("seat_right", "damper_left", np.eye(3), np.zeros(3)),
+        "next": ("seat_left", "damper_right", on, shift),
+    }
     for name, (master, slave, rotation, way) in motions.items():
         if master in mesh.faces and slave in mesh.faces:
             pairs[name] = _matched(mesh, (master, slave), rotation, way, sectors)
@@ -185,8 +246,11 @@ def _paired(mesh: Mesh, sectors: int, source: str) -> Mesh:
     return replace(mesh, pairs=pairs, sector=row)
 
 
-def _matched(mesh: Mesh, names: tuple[str, str], rotation: np.ndarray, shift: np.ndarray, sectors: int) -> Pair:
-    """A contact pair; without matched nodes where those of a wheel's seat and flank differ but lie on each other.
+def _matched(
+    mesh: Mesh, names: tuple[str, str], rotation: np.ndarray, shift: np.ndarray, sectors: int
+) -> Pair:
+    """A contact pair; without matched nodes where those of a wheel's seat and flank differ but lie
+    on each other.
 
     Raises:
         InputError: neither; with a hint when the number of sectors was left out.
@@ -201,7 +265,9 @@ def _matched(mesh: Mesh, names: tuple[str, str], rotation: np.ndarray, shift: np
 
 
 def _facing(mesh: Mesh, names: tuple[str, str], rotation: np.ndarray, shift: np.ndarray) -> bool:
-    """Two faces look at each other, and half of the smaller one's nodes are within an edge of the other's."""
+    """Two faces look at each other, and half of the smaller one's nodes are within an edge of the
+    other's.
+    """
     master, slave = (mesh.points[np.unique(mesh.faces[name])] for name in names)
     edges, normals = zip(*(_measured(mesh, name) for name in names), strict=True)
     apart = cKDTree(master).query((slave - shift) @ rotation)[0]
@@ -212,15 +278,18 @@ def _facing(mesh: Mesh, names: tuple[str, str], rotation: np.ndarray, shift: np.
 
 def _measured(mesh: Mesh, name: str) -> tuple[float, np.ndarray]:
     """Longest edge [m] and mean outward normal (3,) of a face group, from its elements' corners."""
-    x = mesh.points[mesh.faces[name][:, :mesh.dimension]]
-    first, last = x[:, 1] - x[:, 0], x[:, -1] - x[:, 0]
+    x = mesh.points[mesh.faces[name][:, : mesh.dimension]]
+    first = x[:, 1] - x[:, 0]
+    last = x[:, -1] - x[:, 0]
     normal = np.cross(first, last if mesh.dimension == 3 else [0.0, 0.0, 1.0]).sum(axis=0)
     edge = max(np.linalg.norm(first, axis=1).max(), np.linalg.norm(last, axis=1).max())
     return float(edge), normal / np.linalg.norm(normal)
 
 
 def _pitch(mesh: Mesh) -> np.ndarray:
-    """Shift [m] from seat_left to damper_right: a straight row of blades; zero when the faces are not there."""
+    """Shift [m] from seat_left to damper_right: a straight row of blades; zero when the faces are
+    not there.
+    """
     if not {"seat_left", "damper_right"} <= set(mesh.faces):
         return np.zeros(3)
     low, high = (np.unique(mesh.faces[name]) for name in ("seat_left", "damper_right"))
@@ -233,16 +302,24 @@ def _cyclic(mesh: Mesh, on: np.ndarray) -> tuple[Mesh, Pair]:
     try:
         return mesh, match(mesh.points, mesh.faces, names, mesh.dimension, on, None, LOOSE)
     except InputError as first:
-        swapped = replace(mesh, faces={**mesh.faces, names[0]: mesh.faces[names[1]], names[1]: mesh.faces[names[0]]})
+        swapped = replace(
+            mesh,
+            faces={**mesh.faces, names[0]: mesh.faces[names[1]], names[1]: mesh.faces[names[0]]},
+        )
         try:
-            return swapped, match(mesh.points, swapped.faces, names, mesh.dimension, on, None, LOOSE)
+            return swapped, match(
+                mesh.points, swapped.faces, names, mesh.dimension, on, None, LOOSE
+            )
         except InputError:
             raise first from None
 
 
 def _centred(mesh: Mesh) -> np.ndarray:
     """Points [m] turned about z so that +x is midway between the cyclic faces."""
-    low, high = (mesh.points[np.unique(mesh.faces[name])].mean(axis=0)[:2] for name in ("cyclic_low", "cyclic_high"))
+    low, high = (
+        mesh.points[np.unique(mesh.faces[name])].mean(axis=0)[:2]
+        for name in ("cyclic_low", "cyclic_high")
+    )
     middle = low / np.linalg.norm(low) + high / np.linalg.norm(high)
     angle = np.arctan2(middle[1], middle[0])
     return mesh.points if abs(angle) < 1e-9 else mesh.points @ turn(-angle).T

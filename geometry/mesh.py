@@ -13,44 +13,64 @@ __all__ = ["Mesh", "Pair", "Sector"]
 class Sector:
     """How the next blade is reached: x_next = rotation @ x + shift."""
 
-    count: int                      # number of blades on the wheel; 0 when the row has no end (plane blades)
-    rotation: np.ndarray            # (3, 3)
-    shift: np.ndarray               # (3,) [m]
+    # number of blades on the wheel; 0 when the row has no end (plane blades)
+    count: int
+    # (3, 3)
+    rotation: np.ndarray
+    # (3,) [m]
+    shift: np.ndarray
 
 
 @dataclass(frozen=True)
 class Pair:
-    """Two faces whose nodes match one to one under a rigid motion: x_slave = rotation @ x_master + shift."""
+    """Two faces whose nodes match one to one under a rigid motion: x_slave = rotation @ x_master +
+    shift.
+    """
 
-    master: str                     # name of a face
-    slave: str                      # name of a face
-    nodes: np.ndarray               # (2, m) node numbers, row 0 on the master, row 1 on the slave
-    rotation: np.ndarray            # (3, 3)
-    shift: np.ndarray               # (3,) [m]
+    # name of a face
+    master: str
+    # name of a face
+    slave: str
+    # (2, m) node numbers, row 0 on the master, row 1 on the slave
+    nodes: np.ndarray
+    # (3, 3)
+    rotation: np.ndarray
+    # (3,) [m]
+    shift: np.ndarray
 
 
 @dataclass(frozen=True)
 class Mesh:
-    """A mesh with named bodies, faces, node sets and matched pairs. Node order inside an element is gmsh's.
+    """A mesh with named bodies, faces, node sets and matched pairs. Node order inside an element is
+    gmsh's.
 
-    Names that the finite elements look for (each optional unless the task needs it):
-    bodies "blade", "damper"; faces "clamp", "cyclic_low", "cyclic_high", "seat_left", "seat_right" (platform undersides
-    towards -y and +y), "damper_left" (flank on this blade's seat_right), "damper_right" (flank on the next blade's
-    seat_left), "pressure_side", "suction_side", "tip"; node sets "tip_leading", "tip_trailing", "tip_mid";
-    pairs "cyclic" (cyclic_low -> cyclic_high), "this" (seat_right -> damper_left, identity), "next" (seat_left ->
-    damper_right, the motion to the next sector).
+    Names that the finite elements look for (each optional unless the task needs it): bodies
+    "blade", "damper"; faces "clamp", "cyclic_low", "cyclic_high", "seat_left", "seat_right"
+    (platform undersides towards -y and +y), "damper_left" (flank on this blade's seat_right),
+    "damper_right" (flank on the next blade's seat_left), "pressure_side", "suction_side", "tip";
+    node sets "tip_leading", "tip_trailing", "tip_mid"; pairs "cyclic" (cyclic_low -> cyclic_high),
+    "this" (seat_right -> damper_left, identity), "next" (seat_left -> damper_right, the motion to
+    the next sector).
     """
 
-    points: np.ndarray              # (n, 3) [m]
-    cell_type: str                  # meshio's word: "tetra", "tetra10", "triangle", "triangle6", "hexahedron", ...
-    bodies: dict[str, np.ndarray]   # name -> (nc, k) node numbers of its cells
-    faces: dict[str, np.ndarray] = field(default_factory=dict)   # name -> (nf, kf) node numbers (edges in 2-D)
-    nodes: dict[str, np.ndarray] = field(default_factory=dict)   # name -> (k,) node numbers
+    # (n, 3) [m]
+    points: np.ndarray
+    # meshio's word: "tetra", "tetra10", "triangle", "triangle6", "hexahedron", ...
+    cell_type: str
+    # name -> (nc, k) node numbers of its cells
+    bodies: dict[str, np.ndarray]
+    # name -> (nf, kf) node numbers (edges in 2-D)
+    faces: dict[str, np.ndarray] = field(default_factory=dict)
+    # name -> (k,) node numbers
+    nodes: dict[str, np.ndarray] = field(default_factory=dict)
     pairs: dict[str, Pair] = field(default_factory=dict)
     sector: Sector | None = None
-    depth: float = 1.0              # out-of-plane thickness of a plane mesh [m]
-    report: dict[str, object] = field(default_factory=dict)      # quality: cells, worst Jacobian, straightened, ...
-    parts: dict[str, np.ndarray] = field(default_factory=dict)   # named volumes of the blade -> rows of bodies["blade"]
+    # out-of-plane thickness of a plane mesh [m]
+    depth: float = 1.0
+    # quality: cells, worst Jacobian, straightened, ...
+    report: dict[str, object] = field(default_factory=dict)
+    # named volumes of the blade -> rows of bodies["blade"]
+    parts: dict[str, np.ndarray] = field(default_factory=dict)
 
     @property
     def dimension(self) -> int:

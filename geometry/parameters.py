@@ -1,9 +1,9 @@
 """The parameters of every shape that bladefem can draw. SI units, radians; no gmsh here.
 
-Axes, everywhere: z is the engine axis, the middle of a blade stands along +x (radial), y is circumferential.
-A sector spans the angles -pi/N .. +pi/N about z; the next blade is the sector turned by +2 pi/N.
-Plane models lie in x (radial), y (circumferential); z is their out-of-plane thickness; the next blade is at
-+pitch in y.
+Axes, everywhere: z is the engine axis, the middle of a blade stands along +x (radial), y is
+circumferential. A sector spans the angles -pi/N .. +pi/N about z; the next blade is the sector
+turned by +2 pi/N. Plane models lie in x (radial), y (circumferential); z is their out-of-plane
+thickness; the next blade is at +pitch in y.
 """
 
 from __future__ import annotations
@@ -13,7 +13,18 @@ from math import pi
 
 from .quantity import quantity
 
-__all__ = ["Aerofoil", "Disc", "HertzPair", "MeshSize", "Plane", "Platform", "Punch", "Shank", "Wedge", "ZMass"]
+__all__ = [
+    "Aerofoil",
+    "Disc",
+    "HertzPair",
+    "MeshSize",
+    "Plane",
+    "Platform",
+    "Punch",
+    "Shank",
+    "Wedge",
+    "ZMass",
+]
 
 DEG = pi / 180
 
@@ -29,21 +40,35 @@ class Aerofoil:
     thickness_tip: float = quantity(0.08, "1", 0.03, 0.4, "largest thickness over chord, tip")
     camber: float = quantity(0.08, "1", 0.0, 0.25, "camber over chord")
     section: str = quantity("naca", choices=("naca", "biconvex"), help="section family")
-    stagger: float = quantity(25 * DEG, "rad", -70 * DEG, 70 * DEG, "angle of the root chord to the engine axis")
-    twist: float = quantity(20 * DEG, "rad", -60 * DEG, 60 * DEG, "turn of the tip section against the root section")
-    lean: float = quantity(0.0, "rad", -20 * DEG, 20 * DEG, "tilt of the stacking line, circumferential")
+    stagger: float = quantity(
+        25 * DEG, "rad", -70 * DEG, 70 * DEG, "angle of the root chord to the engine axis"
+    )
+    twist: float = quantity(
+        20 * DEG, "rad", -60 * DEG, 60 * DEG, "turn of the tip section against the root section"
+    )
+    lean: float = quantity(
+        0.0, "rad", -20 * DEG, 20 * DEG, "tilt of the stacking line, circumferential"
+    )
     sweep: float = quantity(0.0, "rad", -20 * DEG, 20 * DEG, "tilt of the stacking line, axial")
-    fillet: float = quantity(0.0, "m", 0.0, 0.01, "radius between aerofoil and platform, 0 for a sharp edge")
+    fillet: float = quantity(
+        0.0, "m", 0.0, 0.01, "radius between aerofoil and platform, 0 for a sharp edge"
+    )
 
 
 @dataclass(frozen=True)
 class Platform:
-    """The plate that the aerofoil stands on; its two inclined undersides are the seats of the dampers."""
+    """The plate that the aerofoil stands on; its two inclined undersides are the seats of the
+    dampers.
+    """
 
     length: float = quantity(0.06, "m", 0.01, 0.5, "axial length")
     thickness: float = quantity(0.006, "m", 0.002, 0.05, "thickness at the rim of the plate")
-    gap: float = quantity(0.001, "m", 1e-4, 0.02, "circumferential gap between neighbouring platforms")
-    seat_width: float = quantity(0.006, "m", 0.002, 0.05, "width of the inclined seat, along the slope")
+    gap: float = quantity(
+        0.001, "m", 1e-4, 0.02, "circumferential gap between neighbouring platforms"
+    )
+    seat_width: float = quantity(
+        0.006, "m", 0.002, 0.05, "width of the inclined seat, along the slope"
+    )
 
 
 @dataclass(frozen=True)
@@ -67,20 +92,37 @@ class Disc:
 
 @dataclass(frozen=True)
 class Wedge:
-    """The underplatform damper: a prism of triangular section, blunted at top and bottom, pressed outwards."""
+    """The underplatform damper: a prism of triangular section, blunted at top and bottom, pressed
+    outwards.
+    """
 
-    angle: float = quantity(40 * DEG, "rad", 15 * DEG, 75 * DEG,
-                            "alpha: each flank against the radial plane between two blades")
+    angle: float = quantity(
+        40 * DEG,
+        "rad",
+        15 * DEG,
+        75 * DEG,
+        "alpha: each flank against the radial plane between two blades",
+    )
     length: float = quantity(0.04, "m", 0.005, 0.5, "axial length")
-    base: float = quantity(0.002, "m", 2e-4, 0.05, "height of the straight part below the flanks (the blunted bottom)")
+    base: float = quantity(
+        0.002, "m", 2e-4, 0.05, "height of the straight part below the flanks (the blunted bottom)"
+    )
     mass: float | None = quantity(None, "kg", 1e-4, 5.0, "mass; sets the density when given")
-    clearance: float = quantity(0.0, "m", -5e-4, 0.002, "normal gap between flank and seat before seating; negative: "
-                                "an interference, which the damper takes up as it travels inwards")
+    clearance: float = quantity(
+        0.0,
+        "m",
+        -5e-4,
+        0.002,
+        "normal gap between flank and seat before seating; negative: "
+        "an interference, which the damper takes up as it travels inwards",
+    )
 
 
 @dataclass(frozen=True)
 class Plane:
-    """Plane blades with flat dampers (the paper's Fig. 12): clamped at x = 0, platforms at a height."""
+    """Plane blades with flat dampers (the paper's Fig. 12): clamped at x = 0, platforms at a
+    height.
+    """
 
     length: float = quantity(0.15, "m", 0.02, 1.0, "blade length from root to tip")
     thickness: float = quantity(0.006, "m", 0.001, 0.1, "blade thickness, circumferential")
@@ -89,14 +131,18 @@ class Plane:
     platform_width: float = quantity(0.05, "m", 0.005, 0.5, "circumferential width of the platform")
     platform_thickness: float = quantity(0.008, "m", 0.001, 0.1, "radial thickness of the platform")
     pitch: float = quantity(0.054, "m", 0.006, 0.6, "distance between two blades")
-    seat_width: float = quantity(0.012, "m", 0.002, 0.2, "contact width on each platform, from its edge")
+    seat_width: float = quantity(
+        0.012, "m", 0.002, 0.2, "contact width on each platform, from its edge"
+    )
     damper_mass: float = quantity(0.06, "kg", 1e-4, 5.0, "mass of a flat damper")
     damper_height: float = quantity(0.006, "m", 0.001, 0.1, "radial height of the flat damper")
 
 
 @dataclass(frozen=True)
 class ZMass:
-    """The Z-shaped mass on a vibrating foundation (the paper's Sect. 4), three bars of one plate."""
+    """The Z-shaped mass on a vibrating foundation (the paper's Sect. 4), three bars of one
+    plate.
+    """
 
     width: float = quantity(0.06, "m", 0.01, 0.5, "along x")
     height: float = quantity(0.06, "m", 0.01, 0.5, "along y")
@@ -106,14 +152,24 @@ class ZMass:
 
 @dataclass(frozen=True)
 class HertzPair:
-    """A sphere (3-D) or cylinder (plane strain) cap against a block, symmetric halves; for verification."""
+    """A sphere (3-D) or cylinder (plane strain) cap against a block, symmetric halves; for
+    verification.
+    """
 
     radius: float = quantity(0.05, "m", 0.001, 1.0, "radius of curvature of the indenter")
     half_width: float = quantity(0.01, "m", 1e-4, 1.0, "half width of the meshed blocks")
     contact_radius: float = quantity(1e-3, "m", 1e-5, 0.1, "expected contact radius, meshed finely")
-    dimension: int = quantity(3, "1", 2, 3, "3 for a sphere, 2 for a cylinder in plane strain, loads on a metre of it")
-    interference: float | None = quantity(None, "m", 1e-9, 0.01, "how far the far faces are held closer than where the "
-                                          "bodies touch, in place of study.loads")
+    dimension: int = quantity(
+        3, "1", 2, 3, "3 for a sphere, 2 for a cylinder in plane strain, loads on a metre of it"
+    )
+    interference: float | None = quantity(
+        None,
+        "m",
+        1e-9,
+        0.01,
+        "how far the far faces are held closer than where the "
+        "bodies touch, in place of study.loads",
+    )
 
 
 @dataclass(frozen=True)
@@ -122,22 +178,44 @@ class Punch:
 
     radius: float = quantity(2e-3, "m", 1e-5, 0.1, "radius (3-D) or half width (2-D) of the punch")
     half_width: float = quantity(0.02, "m", 1e-4, 1.0, "half width of the block")
-    dimension: int = quantity(3, "1", 2, 3, "3 for a round punch, 2 for plane strain, loads on a metre of depth")
-    interference: float | None = quantity(None, "m", 1e-9, 0.01, "how far the punch is held inside of the block's "
-                                          "face, in place of study.loads")
+    dimension: int = quantity(
+        3, "1", 2, 3, "3 for a round punch, 2 for plane strain, loads on a metre of depth"
+    )
+    interference: float | None = quantity(
+        None,
+        "m",
+        1e-9,
+        0.01,
+        "how far the punch is held inside of the block's face, in place of study.loads",
+    )
 
 
 @dataclass(frozen=True)
 class MeshSize:
     """How finely a shape is meshed."""
 
-    size: float | None = quantity(None, "m", 1e-5, 1.0, "target element size; from the thinnest part when left out")
+    size: float | None = quantity(
+        None, "m", 1e-5, 1.0, "target element size; from the thinnest part when left out"
+    )
     contact_size: float | None = quantity(None, "m", 1e-6, 1.0, "element size on contact faces")
-    seat_elements: int | None = quantity(None, "1", 2, 64, "elements across the width of a wedge's seats, which are "
-                                         "then a grid with contact_size, or a sixth of the length, along them; free "
-                                         "triangles when left out")
+    seat_elements: int | None = quantity(
+        None,
+        "1",
+        2,
+        64,
+        "elements across the width of a wedge's seats, which are "
+        "then a grid with contact_size, or a sixth of the length, along them; free "
+        "triangles when left out",
+    )
     order: int = quantity(2, "1", 1, 2, "order of the elements; 1 is only for comparison")
-    algorithm: str = quantity("hxt", choices=("hxt", "delaunay"),
-                              help="how gmsh fills volumes; the other one is tried when it fails or leaves flat cells")
-    scale: float = quantity(1.0, "1", 0.02, 50.0, "factor on all element sizes, also those that are left open")
-    curved: bool = quantity(True, help="second-order elements follow curved faces (invalid ones are straightened)")
+    algorithm: str = quantity(
+        "hxt",
+        choices=("hxt", "delaunay"),
+        help="how gmsh fills volumes; the other one is tried when it fails or leaves flat cells",
+    )
+    scale: float = quantity(
+        1.0, "1", 0.02, 50.0, "factor on all element sizes, also those that are left open"
+    )
+    curved: bool = quantity(
+        True, help="second-order elements follow curved faces (invalid ones are straightened)"
+    )

@@ -1,4 +1,6 @@
-"""Plane blades with flat dampers under their platforms, in the plane x (radial), y (circumferential)."""
+"""Plane blades with flat dampers under their platforms, in the plane x (radial), y
+(circumferential).
+"""
 
 from __future__ import annotations
 
@@ -10,28 +12,32 @@ import numpy as np
 from bladefem.errors import InputError
 
 from .draw import polygon, tie
-from .extract import Groups
-from .finish import Motion, complete, mesh_model
+from .extract_arrays import Groups
+from .finalise_mesh import Motion, complete, mesh_model
 from .mesh import Mesh, Sector
 from .parameters import MeshSize, Plane
 from .session import attempt, gmsh_session
 
-SEAT_ELEMENTS = 40      # on each seat: half of it lifts off, and with 10 a resonance between stick and slip is 30 % low
+# on each seat: half of it lifts off, and with 10 a resonance between stick and slip is 30 % low
+SEAT_ELEMENTS = 40
 
 __all__ = ["blade_corners", "check_plane", "damper_corners", "plane_blades"]
 
 
 def plane_blades(plane: Plane, size: MeshSize) -> Mesh:
-    """Bodies "blade" and "damper" of triangles; the damper bridges this blade's right and the next one's left platform.
+    """Bodies "blade" and "damper" of triangles; the damper bridges this blade's right and the next
+    one's left platform.
 
-    Faces (edges): clamp, tip, seat_left, seat_right, damper_left, damper_right, pressure_side (y < 0), suction_side.
-    Node sets: tip_leading (y < 0), tip_mid, tip_trailing (y > 0).
+    Faces (edges): clamp, tip, seat_left, seat_right, damper_left, damper_right, pressure_side (y <
+    0), suction_side. Node sets: tip_leading (y < 0), tip_mid, tip_trailing (y > 0).
 
     Raises:
         InputError: a parameter has to change; the message names it.
     """
     check_plane(plane)
-    base = size.size or min(plane.thickness / 2, plane.platform_thickness / 3, plane.damper_height / 2)
+    base = size.size or min(
+        plane.thickness / 2, plane.platform_thickness / 3, plane.damper_height / 2
+    )
     contact = size.contact_size or min(base, plane.seat_width / SEAT_ELEMENTS)
     motions = plane_motions(plane)
     with gmsh_session() as gmsh:
@@ -51,43 +57,78 @@ def check_plane(plane: Plane) -> None:
     Raises:
         InputError: the first rule that is broken.
     """
-    rules = [("platform_width", plane.platform_width, "pitch", plane.pitch, "smaller than"),
-             ("thickness", plane.thickness, "platform_width", plane.platform_width, "smaller than"),
-             ("damper_height", plane.damper_height, "platform_height", plane.platform_height, "smaller than")]
+    rules = [
+        ("platform_width", plane.platform_width, "pitch", plane.pitch, "smaller than"),
+        ("thickness", plane.thickness, "platform_width", plane.platform_width, "smaller than"),
+        (
+            "damper_height",
+            plane.damper_height,
+            "platform_height",
+            plane.platform_height,
+            "smaller than",
+        ),
+    ]
     for name, value, other, limit, words in rules:
         if not value < limit:
-            raise InputError(f"plane.{name} = {value:.4g} m: expected {words} plane.{other} = {limit:.4g} m")
+            raise InputError(
+                f"plane.{name} = {value:.4g} m: expected {words} plane.{other} = {limit:.4g} m"
+            )
     top = plane.platform_height + plane.platform_thickness
     if not top < plane.length:
-        raise InputError(f"plane.platform_height = {plane.platform_height:.4g} m: the platform's top at {top:.4g} m is "
-                         f"not below the tip, expected less than plane.length = {plane.length:.4g} m")
+        raise InputError(
+            f"plane.platform_height = {plane.platform_height:.4g} m: the platform's top at "
+            f"{top:.4g} m is "
+            f"not below the tip, expected less than plane.length = {plane.length:.4g} m"
+        )
     room = 0.98 * (plane.platform_width - plane.thickness) / 2
     if not plane.seat_width <= room:
-        raise InputError(f"plane.seat_width = {plane.seat_width:.4g} m: expected at most {room:.4g} m "
-                         "(98 % of the platform's overhang beside the blade)")
+        raise InputError(
+            f"plane.seat_width = {plane.seat_width:.4g} m: expected at most {room:.4g} m "
+            "(98 % of the platform's overhang beside the blade)"
+        )
 
 
 def plane_motions(plane: Plane) -> dict[str, Motion]:
     """Edges that match, with the motion from master to slave."""
-    still, pitch = np.zeros(3), np.array([0.0, plane.pitch, 0.0])
-    return {"this": ("seat_right", "damper_left", np.eye(3), still),
-            "next": ("seat_left", "damper_right", np.eye(3), pitch)}
+    still = np.zeros(3)
+    pitch = np.array([0.0, plane.pitch, 0.0])
+    return {
+        "this": ("seat_right", "damper_left", np.eye(3), still),
+        "next": ("seat_left", "damper_right", np.eye(3), pitch),
+    }
 
 
 def blade_corners(plane: Plane) -> np.ndarray:
-    """Corners (15, 2) [m] of blade and platform, anticlockwise from the root at y < 0, with the ends of both seats."""
-    half, wide, low = plane.thickness / 2, plane.platform_width / 2, plane.platform_height
-    high, seat = low + plane.platform_thickness, wide - plane.seat_width
-    left = [[0, -half], [low, -half], [low, -seat], [low, -wide], [high, -wide], [high, -half], [plane.length, -half]]
+    """Corners (15, 2) [m] of blade and platform, anticlockwise from the root at y < 0, with the
+    ends of both seats.
+    """
+    half = plane.thickness / 2
+    wide = plane.platform_width / 2
+    low = plane.platform_height
+    high = low + plane.platform_thickness
+    seat = wide - plane.seat_width
+    left = [
+        [0, -half],
+        [low, -half],
+        [low, -seat],
+        [low, -wide],
+        [high, -wide],
+        [high, -half],
+        [plane.length, -half],
+    ]
     right = [[x, -y] for x, y in reversed(left)]
     return np.array([*left, [plane.length, 0], *right])
 
 
 def damper_corners(plane: Plane) -> np.ndarray:
     """Corners (6, 2) [m] of the flat damper, anticlockwise: top from this seat to the next last."""
-    top, low = plane.platform_height, plane.platform_height - plane.damper_height
+    top = plane.platform_height
+    low = plane.platform_height - plane.damper_height
     wide = plane.platform_width / 2
-    a, b, c, d = wide - plane.seat_width, wide, plane.pitch - wide, plane.pitch - wide + plane.seat_width
+    a = wide - plane.seat_width
+    b = wide
+    c = plane.pitch - wide
+    d = plane.pitch - wide + plane.seat_width
     return np.array([[low, a], [top, a], [top, b], [top, c], [top, d], [low, d]])
 
 
@@ -95,20 +136,34 @@ def _draw(gmsh: ModuleType, plane: Plane) -> Groups:
     blade, b, p = polygon(gmsh, blade_corners(plane))
     damper, d, _ = polygon(gmsh, damper_corners(plane))
     gmsh.model.occ.synchronize()
-    faces = {"clamp": [b[14]], "tip": [b[6], b[7]], "seat_left": [b[2]], "seat_right": [b[11]],
-             "pressure_side": [b[5]], "suction_side": [b[8]], "damper_left": [d[1]], "damper_right": [d[3]]}
+    faces = {
+        "clamp": [b[14]],
+        "tip": [b[6], b[7]],
+        "seat_left": [b[2]],
+        "seat_right": [b[11]],
+        "pressure_side": [b[5]],
+        "suction_side": [b[8]],
+        "damper_left": [d[1]],
+        "damper_right": [d[3]],
+    }
     points = {"tip_leading": [p[6]], "tip_mid": [p[7]], "tip_trailing": [p[8]]}
     return Groups({"blade": [blade], "damper": [damper]}, faces, points)
 
 
 def _sizes(gmsh: ModuleType, groups: Groups, base: float, contact: float) -> None:
     field = gmsh.model.mesh.field
-    distance, threshold = field.add("Distance"), field.add("Threshold")
+    distance = field.add("Distance")
+    threshold = field.add("Threshold")
     names = ("seat_left", "seat_right", "damper_left", "damper_right")
     field.setNumbers(distance, "CurvesList", [c for name in names for c in groups.faces[name]])
     field.setNumber(distance, "Sampling", 100)
-    for name, value in (("InField", distance), ("SizeMin", contact), ("SizeMax", base), ("DistMin", contact),
-                        ("DistMax", 5 * base)):
+    for name, value in (
+        ("InField", distance),
+        ("SizeMin", contact),
+        ("SizeMax", base),
+        ("DistMin", contact),
+        ("DistMax", 5 * base),
+    ):
         field.setNumber(threshold, name, value)
     field.setAsBackgroundMesh(threshold)
     gmsh.option.setNumber("Mesh.MeshSizeMin", contact / 2)

@@ -1,4 +1,6 @@
-"""Is the mesh fit to compute on: Jacobians, shape quality, straightening of bad second-order cells, a table."""
+"""Is the mesh fit to compute on: Jacobians, shape quality, straightening of bad second-order cells,
+a table.
+"""
 
 from __future__ import annotations
 
@@ -12,28 +14,38 @@ from .topology import EDGES, FAMILY, corner_count
 
 __all__ = ["edge_of_middle", "quality_table", "report", "shape_quality", "straighten"]
 
-SAFE = 0.1          # smallest accepted ratio of a curved cell's Jacobian to the straight cell's
+# smallest accepted ratio of a curved cell's Jacobian to the straight cell's
+SAFE = 0.1
 
 
 def shape_quality(points: np.ndarray, cells: np.ndarray, cell_type: str) -> np.ndarray:
-    """Ratio (nc,) of inscribed to circumscribed radius, 1 for the regular simplex; of the corners only.
+    """Ratio (nc,) of inscribed to circumscribed radius, 1 for the regular simplex; of the corners
+    only.
 
     For quads and hexes: the smallest corner Jacobian over the product of its edges.
     """
-    x = points[cells[:, :corner_count(cell_type)]]
-    side = lambda a, b: np.linalg.norm(x[:, a] - x[:, b], axis=1)       # noqa: E731
+    x = points[cells[:, : corner_count(cell_type)]]
+    side = lambda a, b: np.linalg.norm(x[:, a] - x[:, b], axis=1)  # noqa: E731
     if cell_type.startswith("triangle"):
-        a, b, c = side(1, 2), side(2, 0), side(0, 1)
+        a = side(1, 2)
+        b = side(2, 0)
+        c = side(0, 1)
         return (b + c - a) * (c + a - b) * (a + b - c) / (a * b * c)
     if cell_type.startswith("tetra"):
         volume = np.abs(straight_jacobian(points, cells, cell_type)) / 6
-        area = sum(np.linalg.norm(np.cross(x[:, j] - x[:, i], x[:, k] - x[:, i]), axis=1) / 2
-                   for i, j, k in [(0, 1, 2), (0, 1, 3), (0, 2, 3), (1, 2, 3)])
-        a, b, c = side(0, 1) * side(2, 3), side(0, 2) * side(1, 3), side(0, 3) * side(1, 2)
+        area = sum(
+            np.linalg.norm(np.cross(x[:, j] - x[:, i], x[:, k] - x[:, i]), axis=1) / 2
+            for i, j, k in [(0, 1, 2), (0, 1, 3), (0, 2, 3), (1, 2, 3)]
+        )
+        a = side(0, 1) * side(2, 3)
+        b = side(0, 2) * side(1, 3)
+        c = side(0, 3) * side(1, 2)
         heron = np.sqrt(np.maximum((a + b + c) * (a + b - c) * (a - b + c) * (b + c - a), 0))
         return 216 * volume**2 / (area * np.maximum(heron, 1e-300))
     edges = np.array([side(a, b) for a, b in EDGES[FAMILY[cell_type]]])
-    return straight_jacobian(points, cells, cell_type) / edges.max(axis=0) ** (3 if cell_type[0] == "h" else 2)
+    return straight_jacobian(points, cells, cell_type) / edges.max(axis=0) ** (
+        3 if cell_type[0] == "h" else 2
+    )
 
 
 def edge_of_middle(mesh: Mesh) -> np.ndarray:
@@ -43,34 +55,43 @@ def edge_of_middle(mesh: Mesh) -> np.ndarray:
     ends = np.full((len(mesh.points), 2), -1)
     for cells in mesh.bodies.values():
         if cells.shape[1] >= k + len(edges):
-            ends[cells[:, k:k + len(edges)]] = cells[:, edges]
+            ends[cells[:, k : k + len(edges)]] = cells[:, edges]
     return ends
 
 
 def straighten(mesh: Mesh, safe: float = SAFE) -> tuple[np.ndarray, int]:
-    """Points (n, 3) [m] where no second-order cell has a doubtful Jacobian, and how many cells were touched.
+    """Points (n, 3) [m] where no second-order cell has a doubtful Jacobian, and how many cells were
+    touched.
 
-    The edges of a doubtful cell lose half of their curvature, then another half, then all of it. Only second-order
-    triangles and tetrahedra are touched. Paired nodes move together.
+    The edges of a doubtful cell lose half of their curvature, then another half, then all of it.
+    Only second-order triangles and tetrahedra are touched. Paired nodes move together.
 
-    gmsh's own optimisers were measured and are not used: on sectors of 3400 to 12 300 cells with 15 to 56 inverted
-    ones, HighOrderElastic left most of them inverted, and HighOrder, which cures them, moves corners too and left
-    cells of shape quality 1e-6 in two cases of six.
+    gmsh's own optimisers were measured and are not used: on sectors of 3400 to 12 300 cells with 15
+    to 56 inverted ones, HighOrderElastic left most of them inverted, and HighOrder, which cures
+    them, moves corners too and left cells of shape quality 1e-6 in two cases of six.
     """
-    points, ends = mesh.points.copy(), edge_of_middle(mesh)
+    points = mesh.points.copy()
+    ends = edge_of_middle(mesh)
     if mesh.cell_type not in ("tetra10", "triangle6"):
         return points, 0
-    cells, k = np.vstack(list(mesh.bodies.values())), corner_count(mesh.cell_type)
-    bad, rounds = np.zeros(len(cells), dtype=bool), np.zeros(len(points), dtype=int)
-    while True:                         # ends: an edge is touched three times at most, then it is straight
+    cells = np.vstack(list(mesh.bodies.values()))
+    k = corner_count(mesh.cell_type)
+    bad = np.zeros(len(cells), dtype=bool)
+    rounds = np.zeros(len(points), dtype=int)
+    # ends: an edge is touched three times at most, then it is straight
+    while True:
         doubtful = scaled_jacobian(points, cells, mesh.cell_type) < safe
-        todo = _with_partners(np.unique(cells[doubtful][:, k:]), mesh.pairs, len(points)) & (rounds < 3)
+        todo = _with_partners(np.unique(cells[doubtful][:, k:]), mesh.pairs, len(points)) & (
+            rounds < 3
+        )
         if not todo.any():
             return points, int(bad.sum())
         bad |= doubtful
         rounds[todo] += 1
         straight = points[ends[todo]].mean(axis=1)
-        points[todo] = straight + np.where(rounds[todo] < 3, 0.5, 0.0)[:, None] * (points[todo] - straight)
+        points[todo] = straight + np.where(rounds[todo] < 3, 0.5, 0.0)[:, None] * (
+            points[todo] - straight
+        )
 
 
 def _with_partners(nodes: np.ndarray, pairs: dict[str, Pair], count: int) -> np.ndarray:
@@ -84,8 +105,8 @@ def _with_partners(nodes: np.ndarray, pairs: dict[str, Pair], count: int) -> np.
 
 
 def report(mesh: Mesh, straightened: int, size: float) -> dict[str, object]:
-    """What Mesh.report holds: counts, worst Jacobian and shape, cells straightened, element size wanted [m] and
-    mean edge length [m].
+    """What Mesh.report holds: counts, worst Jacobian and shape, cells straightened, element size
+    wanted [m] and mean edge length [m].
 
     Raises:
         InputError: a cell has a Jacobian that is not positive.
@@ -95,47 +116,85 @@ def report(mesh: Mesh, straightened: int, size: float) -> dict[str, object]:
     worst = min(j.min() for j in jacobian.values())
     if not worst > 0:
         count = sum(np.count_nonzero(~(j > 0)) for j in jacobian.values())
-        raise InputError(f"mesh: {count} cells are turned inside out (smallest scaled Jacobian {worst:.3g}), "
-                         "expected a smaller mesh.size or less extreme proportions")
+        raise InputError(
+            f"mesh: {count} cells are turned inside out (smallest scaled Jacobian {worst:.3g}), "
+            "expected a smaller mesh.size or less extreme proportions"
+        )
     every = np.concatenate(list(shape.values()))
-    return {"cells": len(every), "nodes": len(mesh.points), "cell type": mesh.cell_type, "size": size,
-            "edge": _mean_edge(mesh),
-            "min scaled jacobian": float(worst), "worst quality": float(every.min()),
-            "mean quality": float(every.mean()), "straightened": straightened,
-            "pairs": {name: pair.nodes.shape[1] for name, pair in mesh.pairs.items()}}
+    return {
+        "cells": len(every),
+        "nodes": len(mesh.points),
+        "cell type": mesh.cell_type,
+        "size": size,
+        "edge": _mean_edge(mesh),
+        "min scaled jacobian": float(worst),
+        "worst quality": float(every.min()),
+        "mean quality": float(every.mean()),
+        "straightened": straightened,
+        "pairs": {name: pair.nodes.shape[1] for name, pair in mesh.pairs.items()},
+    }
 
 
 def _mean_edge(mesh: Mesh) -> float:
     """Mean length [m] of the straight edges."""
-    edges = np.unique(np.sort(np.vstack([cells[:, edge] for cells in mesh.bodies.values()
-                                         for edge in EDGES[FAMILY[mesh.cell_type]]]), axis=1), axis=0)
+    edges = np.unique(
+        np.sort(
+            np.vstack(
+                [
+                    cells[:, edge]
+                    for cells in mesh.bodies.values()
+                    for edge in EDGES[FAMILY[mesh.cell_type]]
+                ]
+            ),
+            axis=1,
+        ),
+        axis=0,
+    )
     return float(np.linalg.norm(mesh.points[edges[:, 0]] - mesh.points[edges[:, 1]], axis=1).mean())
 
 
-WORDS = {"size": "element size, wanted [mm]", "edge": "mean edge length [mm]", "cells": "elements",
-         "min scaled jacobian": "smallest scaled Jacobian (straight: 1)",
-         "worst quality": "worst shape (regular: 1)", "mean quality": "mean shape",
-         "straightened": "elements straightened", "pairs": "matched nodes of pair"}
+WORDS = {
+    "size": "element size, wanted [mm]",
+    "edge": "mean edge length [mm]",
+    "cells": "elements",
+    "min scaled jacobian": "smallest scaled Jacobian (straight: 1)",
+    "worst quality": "worst shape (regular: 1)",
+    "mean quality": "mean shape",
+    "straightened": "elements straightened",
+    "pairs": "matched nodes of pair",
+}
 
 
 def quality_rows(mesh: Mesh) -> list[tuple[str, str]]:
     """Mesh.report for the eye: what, and its value as text."""
     rows = []
     for name, value in mesh.report.items():
-        words, value = WORDS.get(name, name), 1e3 * value if name in ("size", "edge") else value
-        for part, number in (value.items() if isinstance(value, dict) else (("", value),)):
+        words = WORDS.get(name, name)
+        value = 1e3 * value if name in ("size", "edge") else value
+        for part, number in value.items() if isinstance(value, dict) else (("", value),):
             text = f"{number:.4g}" if isinstance(number, float) else str(number)
             rows.append((f"{words} {part}".strip(), text))
     return rows
 
 
 def quality_table(mesh: Mesh) -> list[dict[str, object]]:
-    """One row a body: cells, nodes, volume [m^3] of the straight cells, worst and mean shape, worst Jacobian."""
+    """One row a body: cells, nodes, volume [m^3] of the straight cells, worst and mean shape, worst
+    Jacobian.
+    """
     rows = []
     for name, cells in mesh.bodies.items():
         shape = shape_quality(mesh.points, cells, mesh.cell_type)
-        rows.append({"body": name, "cells": len(cells), "nodes": len(np.unique(cells)),
-                     "worst quality": float(shape.min()), "mean quality": float(shape.mean()),
-                     "cells below 0.1": int(np.count_nonzero(shape < 0.1)),
-                     "min scaled jacobian": float(scaled_jacobian(mesh.points, cells, mesh.cell_type).min())})
+        rows.append(
+            {
+                "body": name,
+                "cells": len(cells),
+                "nodes": len(np.unique(cells)),
+                "worst quality": float(shape.min()),
+                "mean quality": float(shape.mean()),
+                "cells below 0.1": int(np.count_nonzero(shape < 0.1)),
+                "min scaled jacobian": float(
+                    scaled_jacobian(mesh.points, cells, mesh.cell_type).min()
+                ),
+            }
+        )
     return rows

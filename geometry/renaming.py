@@ -23,12 +23,17 @@ def read_names(texts: Iterable[str]) -> dict[str, list[str]]:
         new, equals, olds = (part.strip() for part in text.partition("="))
         parts = [old.strip() for old in olds.split("+")]
         if not (new and equals and all(parts)):
-            raise InputError(f"imported.names = {text!r}: expected \"new = old\", such as \"clamp = face_3 + face_4\"")
+            raise InputError(
+                f'imported.names = {text!r}: expected "new = old", such as "clamp = face_3 + '
+                'face_4"'
+            )
         wanted[new] = parts
     return wanted
 
 
-def renamed(groups: Mapping[str, list[Part]], wanted: Mapping[str, list[str]]) -> dict[str, list[Part]]:
+def renamed(
+    groups: Mapping[str, list[Part]], wanted: Mapping[str, list[str]]
+) -> dict[str, list[Part]]:
     """Groups under their new names, several joined to one; the others keep theirs.
 
     Raises:
@@ -38,7 +43,12 @@ def renamed(groups: Mapping[str, list[Part]], wanted: Mapping[str, list[str]]) -
     for olds in wanted.values():
         for old in olds:
             if old.lower() not in known:
-                raise InputError(f"imported.names: the file has no group '{old}'{suggestion(old, groups)}")
+                raise InputError(
+                    f"imported.names: the file has no group '{old}'{suggestion(old, groups)}"
+                )
     taken = {known[old.lower()] for olds in wanted.values() for old in olds}
-    joined = {new: [part for old in olds for part in groups[known[old.lower()]]] for new, olds in wanted.items()}
+    joined = {
+        new: [part for old in olds for part in groups[known[old.lower()]]]
+        for new, olds in wanted.items()
+    }
     return {name: list(parts) for name, parts in groups.items() if name not in taken} | joined

@@ -1,4 +1,6 @@
-"""Random parameter tables: anywhere in the documented ranges, or round the defaults. For tests and design studies."""
+"""Random parameter tables: anywhere in the documented ranges, or round the defaults. For tests and
+design studies.
+"""
 
 from __future__ import annotations
 
@@ -13,17 +15,24 @@ Table = TypeVar("Table")
 
 
 def anywhere(table: type[Table], rng: np.random.Generator) -> Table:
-    """Every number anywhere in its range (evenly in its logarithm where the range is positive), words at random."""
+    """Every number anywhere in its range (evenly in its logarithm where the range is positive),
+    words at random.
+    """
     return table(**{f.name: _draw(f, rng) for f in dataclasses.fields(table)})
 
 
 def around(table: Table, rng: np.random.Generator, spread: float) -> Table:
     """Every number within a factor exp(+-spread) of the table's own, inside its range.
 
-    A number that is zero moves by the share ``spread`` of the way to a random place in its range, half of the time.
+    A number that is zero moves by the share ``spread`` of the way to a random place in its range,
+    half of the time.
     """
-    return dataclasses.replace(table, **{f.name: _near(getattr(table, f.name), f, rng, spread)
-                                         for f in dataclasses.fields(table)})
+    return dataclasses.replace(
+        table,
+        **{
+            f.name: _near(getattr(table, f.name), f, rng, spread) for f in dataclasses.fields(table)
+        },
+    )
 
 
 def _draw(field: Any, rng: np.random.Generator) -> Any:

@@ -1,4 +1,6 @@
-"""A bladed sector with its underplatform wedge damper, drawn with OpenCASCADE and meshed so that all pairs match."""
+"""A bladed sector with its underplatform wedge damper, drawn with OpenCASCADE and meshed so that
+all pairs match.
+"""
 
 from __future__ import annotations
 
@@ -10,7 +12,7 @@ import numpy as np
 from bladefem.errors import InputError
 
 from .draw import clear_leftovers, imprint, polygon, prism
-from .finish import complete, mesh_model
+from .finalise_mesh import complete, mesh_model
 from .mesh import Mesh
 from .parameters import DEG, Aerofoil, Disc, MeshSize, Platform, Shank, Wedge
 from .profile import Profile, profile
@@ -23,12 +25,15 @@ from .sizing import sector_sizes, set_grids, set_sizes
 __all__ = ["disc_segment", "wedge_sector"]
 
 SEATS = ("seat_left", "seat_right", "damper_left", "damper_right")
-LIFT = 15 * DEG     # a fillet meets the platform at this angle, since tangent faces are hard on Boolean unions
+# a fillet meets the platform at this angle, since tangent faces are hard on Boolean unions
+LIFT = 15 * DEG
 
 
-def wedge_sector(aerofoil: Aerofoil, platform: Platform, shank: Shank, disc: Disc, wedge: Wedge,
-                 size: MeshSize) -> Mesh:
-    """Blade, platform, shank and disc segment as body "blade", the wedge towards the next blade as "damper".
+def wedge_sector(
+    aerofoil: Aerofoil, platform: Platform, shank: Shank, disc: Disc, wedge: Wedge, size: MeshSize
+) -> Mesh:
+    """Blade, platform, shank and disc segment as body "blade", the wedge towards the next blade as
+    "damper".
 
     The wedge is meshed in contact; a clearance c then moves it inwards by c / sin(alpha).
 
@@ -63,8 +68,10 @@ def disc_segment(gmsh: ModuleType, disc: Disc, theta: float) -> int:
     occ = gmsh.model.occ
     z = -disc.width / 2
     centre = occ.addPoint(0, 0, z)
-    ends = [[occ.addPoint(r * np.cos(a), r * np.sin(a), z) for a in (-theta, theta)]
-            for r in (disc.bore_radius, disc.rim_radius)]
+    ends = [
+        [occ.addPoint(r * np.cos(a), r * np.sin(a), z) for a in (-theta, theta)]
+        for r in (disc.bore_radius, disc.rim_radius)
+    ]
     arcs = [occ.addCircleArc(a, centre, b) for a, b in ends]
     sides = [occ.addLine(inner, outer) for inner, outer in zip(*ends, strict=True)]
     face = occ.addPlaneSurface([occ.addCurveLoop([sides[0], arcs[1], -sides[1], -arcs[0]])])
@@ -73,52 +80,86 @@ def disc_segment(gmsh: ModuleType, disc: Disc, theta: float) -> int:
 
 
 def _aerofoil(gmsh: ModuleType, blade: Aerofoil, top: float) -> int:
-    """Solid lofted from platform to tip; with a fillet, two lofts sewn at a common ring: flared foot and blade.
+    """Solid lofted from platform to tip; with a fillet, two lofts sewn at a common ring: flared
+    foot and blade.
 
-    One loft through all rings oscillates, and a Boolean union of two tangent lofts takes 10 s instead of 0.1 s.
+    One loft through all rings oscillates, and a Boolean union of two tangent lofts takes 10 s
+    instead of 0.1 s.
     """
-    occ, foot = gmsh.model.occ, blade.fillet / blade.span
+    occ = gmsh.model.occ
+    foot = blade.fillet / blade.span
     stations = np.linspace(foot, 1, 3 + int(np.ceil(abs(blade.twist) / (12 * pi / 180))))
     with attempt("aerofoil.twist", "loft the sections of the aerofoil"):
         rings = [_ring(gmsh, outline(blade, top, t)) for t in stations]
         if not foot:
             return next(tag for dim, tag in occ.addThruSections(rings, makeSolid=True) if dim == 3)
     with attempt("aerofoil.fillet", "round the root of the aerofoil"):
-        arc = np.linspace(LIFT, pi / 2, 6)[:-1]         # from the platform's plane to the blade's skin
-        flare = [_ring(gmsh, outline(blade, top, t, grow)) for t, grow in
-                 zip(foot * (1 - np.cos(arc) / np.cos(LIFT)), blade.fillet * (1 - np.sin(arc)), strict=True)]
-        skin = [tag for wires in ([*flare, rings[0]], rings) for _, tag in occ.addThruSections(wires, makeSolid=False)]
+        # from the platform's plane to the blade's skin
+        arc = np.linspace(LIFT, pi / 2, 6)[:-1]
+        flare = [
+            _ring(gmsh, outline(blade, top, t, grow))
+            for t, grow in zip(
+                foot * (1 - np.cos(arc) / np.cos(LIFT)),
+                blade.fillet * (1 - np.sin(arc)),
+                strict=True,
+            )
+        ]
+        skin = [
+            tag
+            for wires in ([*flare, rings[0]], rings)
+            for _, tag in occ.addThruSections(wires, makeSolid=False)
+        ]
         ends = [occ.addPlaneSurface([ring]) for ring in (flare[0], rings[-1])]
         return occ.addVolume([occ.addSurfaceLoop(skin + ends, sewing=True)])
 
 
 def _ring(gmsh: ModuleType, points: np.ndarray) -> int:
-    """Closed wire through points (n, 3): a spline each for suction and pressure side, and the blunt trailing edge.
+    """Closed wire through points (n, 3): a spline each for suction and pressure side, and the blunt
+    trailing edge.
 
-    The splines meet at the leading edge, so that mesh nodes lie on it; a skin without a curve there is meshed with
-    notches. Their ends are free: they meet within a degree, and end tangents, as OpenCASCADE scales them, make a
-    flared ring bulge by 0.3 mm.
+    The splines meet at the leading edge, so that mesh nodes lie on it; a skin without a curve there
+    is meshed with notches. Their ends are free: they meet within a degree, and end tangents, as
+    OpenCASCADE scales them, make a flared ring bulge by 0.3 mm.
     """
-    occ, middle = gmsh.model.occ, len(points) // 2
+    occ = gmsh.model.occ
+    middle = len(points) // 2
     tags = [occ.addPoint(*p) for p in points]
-    sides = [occ.addSpline(tags[:middle + 1]), occ.addSpline(tags[middle:])]
+    sides = [occ.addSpline(tags[: middle + 1]), occ.addSpline(tags[middle:])]
     return occ.addWire([*sides, occ.addLine(tags[-1], tags[0])])
 
 
-def _blade(gmsh: ModuleType, aerofoil: Aerofoil, platform: Platform, shank: Shank, disc: Disc, shape: Profile) -> int:
+def _blade(
+    gmsh: ModuleType,
+    aerofoil: Aerofoil,
+    platform: Platform,
+    shank: Shank,
+    disc: Disc,
+    shape: Profile,
+) -> int:
     """One solid of disc segment, shank, platform and aerofoil."""
     occ = gmsh.model.occ
     half = shank.width / 2
     foot = np.sqrt(disc.rim_radius**2 - half**2) - 0.2 * (disc.rim_radius - disc.bore_radius)
     plate = np.array([shape.inner, shape.outer, shape.corner])
-    neck = np.array([[foot, -half], [shape.underside, -half], [shape.underside, half], [foot, half]])
-    parts = [prism(gmsh, neck, -shank.length / 2, shank.length / 2),
-             prism(gmsh, np.vstack([plate, plate[::-1] * [1, -1]]), -platform.length / 2, platform.length / 2),
-             _aerofoil(gmsh, aerofoil, shape.top)]
+    neck = np.array(
+        [[foot, -half], [shape.underside, -half], [shape.underside, half], [foot, half]]
+    )
+    parts = [
+        prism(gmsh, neck, -shank.length / 2, shank.length / 2),
+        prism(
+            gmsh,
+            np.vstack([plate, plate[::-1] * [1, -1]]),
+            -platform.length / 2,
+            platform.length / 2,
+        ),
+        _aerofoil(gmsh, aerofoil, shape.top),
+    ]
     with attempt("aerofoil", "join aerofoil, platform, shank and disc"):
         solid, _ = occ.fuse([(3, disc_segment(gmsh, disc, shape.theta))], [(3, p) for p in parts])
     volumes = [tag for dim, tag in solid if dim == 3]
     if len(volumes) != 1:
-        raise InputError(f"aerofoil: joined with the platform it gives {len(volumes)} solids, expected one; "
-                         "change aerofoil.stagger or platform.length")
+        raise InputError(
+            f"aerofoil: joined with the platform it gives {len(volumes)} solids, expected one; "
+            "change aerofoil.stagger or platform.length"
+        )
     return volumes[0]

@@ -1,4 +1,6 @@
-"""Can this wedge sector be drawn? Checked with arithmetic, before any CAD: one sentence with the field to change."""
+"""Can this wedge sector be drawn? Checked with arithmetic, before any CAD: one sentence with the
+field to change.
+"""
 
 from __future__ import annotations
 
@@ -14,10 +16,13 @@ from .section import outline, shape
 
 __all__ = ["check_sector"]
 
-STRIP = 0.02        # of a length: a strip of this width keeps the shape quality of its elements above 0.05
+# of a length: a strip of this width keeps the shape quality of its elements above 0.05
+STRIP = 0.02
 
 
-def check_sector(aerofoil: Aerofoil, platform: Platform, shank: Shank, disc: Disc, wedge: Wedge) -> None:
+def check_sector(
+    aerofoil: Aerofoil, platform: Platform, shank: Shank, disc: Disc, wedge: Wedge
+) -> None:
     """Refuse proportions that overlap or leave the sector.
 
     Raises:
@@ -25,7 +30,13 @@ def check_sector(aerofoil: Aerofoil, platform: Platform, shank: Shank, disc: Dis
     """
     check_disc(disc, shank, platform)
     theta = pi / disc.sectors
-    _at_most("damper.angle", wedge.angle, radians(85) - theta, "85 deg minus half the sector angle", "rad")
+    _at_most(
+        "damper.angle",
+        wedge.angle,
+        radians(85) - theta,
+        "85 deg minus half the sector angle",
+        "rad",
+    )
     section = profile(platform, shank, disc, wedge)
     check_platform(section, platform, shank, wedge)
     check_pocket(section, shank, disc, wedge)
@@ -34,22 +45,35 @@ def check_sector(aerofoil: Aerofoil, platform: Platform, shank: Shank, disc: Dis
 
 def _at_most(name: str, value: float, limit: float, meaning: str, unit: str = "m") -> None:
     if not value <= limit:
-        raise InputError(f"{name} = {value:.4g} {unit} is too large: expected at most {limit:.4g} {unit} ({meaning})")
+        raise InputError(
+            f"{name} = {value:.4g} {unit} is too large: expected at most {limit:.4g} {unit} "
+            f"({meaning})"
+        )
 
 
 def _no_strip(name: str, value: float, other: str, limit: float) -> None:
     """Two ends that nearly coincide leave a strip that no good element fits into."""
     _at_most(name, value, limit, other)
     if 0 < limit - value < STRIP * limit:
-        raise InputError(f"{name} = {value:.6g} m ends {limit - value:.2g} m before {other}, expected the same length "
-                         f"or at most {(1 - STRIP) * limit:.4g} m")
+        raise InputError(
+            f"{name} = {value:.6g} m ends {limit - value:.2g} m before {other}, expected the same "
+            "length "
+            f"or at most {(1 - STRIP) * limit:.4g} m"
+        )
 
 
 def check_disc(disc: Disc, shank: Shank, platform: Platform) -> None:
     """Ring and neck."""
     theta = pi / disc.sectors
-    _at_most("disc.bore_radius", disc.bore_radius, 0.95 * disc.rim_radius, "95 % of disc.rim_radius")
-    _at_most("shank.width", shank.width, 1.9 * disc.rim_radius * sin(theta), "95 % of the sector's width at the rim")
+    _at_most(
+        "disc.bore_radius", disc.bore_radius, 0.95 * disc.rim_radius, "95 % of disc.rim_radius"
+    )
+    _at_most(
+        "shank.width",
+        shank.width,
+        1.9 * disc.rim_radius * sin(theta),
+        "95 % of the sector's width at the rim",
+    )
     _no_strip("shank.length", shank.length, "platform.length", platform.length)
     _no_strip("shank.length", shank.length, "disc.width", disc.width)
 
@@ -60,8 +84,12 @@ def check_platform(section: Profile, platform: Platform, shank: Shank, wedge: We
     _at_most("platform.gap", platform.gap, half, "half the pitch at the platform")
     room = section.outer[1] - shank.width / 2
     needed = platform.seat_width * sin(wedge.angle + section.theta)
-    _at_most("platform.seat_width", platform.seat_width, max(0.98 * room / needed, 0) * platform.seat_width,
-             "the platform's overhang beside the shank; or choose a smaller shank.width or damper.angle")
+    _at_most(
+        "platform.seat_width",
+        platform.seat_width,
+        max(0.98 * room / needed, 0) * platform.seat_width,
+        "the platform's overhang beside the shank; or choose a smaller shank.width or damper.angle",
+    )
     _no_strip("damper.length", wedge.length, "platform.length", platform.length)
 
 
@@ -72,41 +100,62 @@ def check_pocket(section: Profile, shank: Shank, disc: Disc, wedge: Wedge) -> No
     foot = section.wedge[0] - drop * np.array([np.cos(section.theta), np.sin(section.theta)])
     foot += wedge.base * np.array([np.cos(section.theta), np.sin(section.theta)])
     if foot[1] < shank.width / 2:
-        raise InputError(f"damper.base = {wedge.base:.4g} m: the wedge does not fit between shank and platform "
-                         f"(it enters the shank by {shank.width / 2 - foot[1]:.3g} m); "
-                         "choose a smaller damper.base, shank.width or platform.seat_width")
+        raise InputError(
+            f"damper.base = {wedge.base:.4g} m: the wedge does not fit between shank and platform "
+            f"(it enters the shank by {shank.width / 2 - foot[1]:.3g} m); "
+            "choose a smaller damper.base, shank.width or platform.seat_width"
+        )
     if np.hypot(*foot) < disc.rim_radius:
-        raise InputError(f"damper.base = {wedge.base:.4g} m: the wedge enters the rim of the disc; "
-                         "choose a smaller damper.base or a larger shank.height")
+        raise InputError(
+            f"damper.base = {wedge.base:.4g} m: the wedge enters the rim of the disc; "
+            "choose a smaller damper.base or a larger shank.height"
+        )
 
 
 def check_aerofoil(blade: Aerofoil, platform: Platform, section: Profile) -> None:
     """Sections that do not cross themselves, and a root that stands on the platform."""
     for t, name in ((0.0, "thickness_root"), (1.0, "thickness_tip")):
         if crosses_itself(shape(blade, t)):
-            raise InputError(f"aerofoil.{name}: the section crosses itself, expected less thickness or less "
-                             "aerofoil.camber")
+            raise InputError(
+                f"aerofoil.{name}: the section crosses itself, expected less thickness or less "
+                "aerofoil.camber"
+            )
     root = outline(blade, section.top, 0.0, blade.fillet)
-    edge = 0.1 * platform.thickness                     # less leaves a sliver between the aerofoil and the edge
+    # less leaves a sliver between the aerofoil and the edge
+    edge = 0.1 * platform.thickness
     smaller = "aerofoil.chord_root or aerofoil.fillet" if blade.fillet else "aerofoil.chord_root"
-    rules = ((2, platform.length / 2, "axially", f"{smaller} or a larger platform.length"),
-             (1, section.corner[1], "circumferentially", f"{smaller} or aerofoil.stagger, or fewer disc.sectors"))
+    rules = (
+        (2, platform.length / 2, "axially", f"{smaller} or a larger platform.length"),
+        (
+            1,
+            section.corner[1],
+            "circumferentially",
+            f"{smaller} or aerofoil.stagger, or fewer disc.sectors",
+        ),
+    )
     for axis, limit, what, cure in rules:
         excess = np.abs(root[:, axis]).max() + edge - limit
         if excess > 0:
-            raise InputError(f"aerofoil.chord_root = {blade.chord_root:.4g} m: the root section overhangs the platform "
-                             f"{what} by {excess:.3g} m; choose a smaller {cure}")
+            raise InputError(
+                f"aerofoil.chord_root = {blade.chord_root:.4g} m: the root section overhangs the "
+                "platform "
+                f"{what} by {excess:.3g} m; choose a smaller {cure}"
+            )
     thinnest = blade.thickness_root * blade.chord_root
     _at_most("aerofoil.fillet", blade.fillet, thinnest, "the thickness of the root section")
 
 
 def crosses_itself(polygon: np.ndarray) -> bool:
     """Do two edges of the closed polygon (n, 2) cross?"""
-    a, b = polygon, np.roll(polygon, -1, axis=0)
-    side = lambda p, q, r: ((q[..., 0] - p[..., 0]) * (r[..., 1] - p[..., 1])                   # noqa: E731
-                            - (q[..., 1] - p[..., 1]) * (r[..., 0] - p[..., 0]))
-    ai, bi, aj, bj = a[:, None], b[:, None], a[None], b[None]
+    a = polygon
+    b = np.roll(polygon, -1, axis=0)
+    side = lambda p, q, r: (
+        (q[..., 0] - p[..., 0]) * (r[..., 1] - p[..., 1])  # noqa: E731
+        - (q[..., 1] - p[..., 1]) * (r[..., 0] - p[..., 0])
+    )
+    ai = a[:, None]
+    bi = b[:, None]
+    aj = a[None]
+    bj = b[None]
     crossing = (side(ai, bi, aj) * side(ai, bi, bj) < 0) & (side(aj, bj, ai) * side(aj, bj, bi) < 0)
     return bool(crossing.any())
-
-

@@ -11,8 +11,8 @@ import numpy as np
 from bladefem.errors import InputError
 
 from .draw import centres, face_at, tie
-from .extract import Groups
-from .finish import Motion
+from .extract_arrays import Groups
+from .finalise_mesh import Motion
 from .mesh import Mesh, Sector
 from .parameters import Aerofoil, Disc, Wedge
 from .profile import Profile, turn
@@ -24,48 +24,81 @@ __all__ = ["edge_curves", "link", "mark_tip", "motions", "moved", "name_faces", 
 def seat(profile: Profile, length: float, side: int) -> np.ndarray:
     """Corners (4, 3) [m] of the contact face on this blade, side +1 towards +y."""
     (xi, yi), (xo, yo), z = profile.inner, profile.outer, length / 2
-    return np.array([[xi, side * yi, -z], [xo, side * yo, -z], [xo, side * yo, z], [xi, side * yi, z]])
+    return np.array(
+        [[xi, side * yi, -z], [xo, side * yo, -z], [xo, side * yo, z], [xi, side * yi, z]]
+    )
 
 
-def name_faces(gmsh: ModuleType, blade: int, damper: int, aerofoil: Aerofoil, disc: Disc, wedge: Wedge,
-               profile: Profile) -> Groups:
+def name_faces(
+    gmsh: ModuleType,
+    blade: int,
+    damper: int,
+    aerofoil: Aerofoil,
+    disc: Disc,
+    wedge: Wedge,
+    profile: Profile,
+) -> Groups:
     """Find every named face by where its centre must be."""
-    theta, tolerance = profile.theta, 1e-6 * profile.top
+    theta = profile.theta
+    tolerance = 1e-6 * profile.top
     middle = (disc.bore_radius + disc.rim_radius) / 2
     cut = np.array([middle * np.cos(theta), middle * np.sin(theta), 0])
     low, high = (seat(profile, wedge.length, side).mean(axis=0) for side in (-1, 1))
     on_blade = centres(gmsh, blade)
-    faces = {name: face_at(on_blade, where, tolerance, name) for name, where in {
-        "cyclic_low": cut * [1, -1, 1], "cyclic_high": cut, "seat_left": low, "seat_right": high,
-        "clamp": np.array([disc.bore_radius * sin(theta) / theta, 0, 0])}.items()}
+    faces = {
+        name: face_at(on_blade, where, tolerance, name)
+        for name, where in {
+            "cyclic_low": cut * [1, -1, 1],
+            "cyclic_high": cut,
+            "seat_left": low,
+            "seat_right": high,
+            "clamp": np.array([disc.bore_radius * sin(theta) / theta, 0, 0]),
+        }.items()
+    }
     on_damper = centres(gmsh, damper)
     faces["damper_left"] = face_at(on_damper, high, tolerance, "damper_left")
     faces["damper_right"] = face_at(on_damper, turn(2 * theta) @ low, tolerance, "damper_right")
-    faces["tip"] = [t for t, c in on_blade.items() if abs(c[0] - profile.top - aerofoil.span) < tolerance]
+    faces["tip"] = [
+        t for t, c in on_blade.items() if abs(c[0] - profile.top - aerofoil.span) < tolerance
+    ]
     above = {t: c[0] - profile.top for t, c in on_blade.items() if c[0] > profile.top + tolerance}
     if aerofoil.fillet:
         faces["fillet"] = [t for t, height in above.items() if height < aerofoil.fillet]
-    sides = [t for t, height in above.items() if height > aerofoil.fillet + tolerance and t not in faces["tip"]]
+    sides = [
+        t
+        for t, height in above.items()
+        if height > aerofoil.fillet + tolerance and t not in faces["tip"]
+    ]
     faces |= _skin(gmsh, sides, aerofoil)
     return Groups({"blade": [blade], "damper": [damper]}, faces)
 
 
 def _skin(gmsh: ModuleType, sides: list[int], aerofoil: Aerofoil) -> dict[str, list[int]]:
-    """The three faces of the skin: the smallest is the trailing edge, the suction side lies across the chord."""
+    """The three faces of the skin: the smallest is the trailing edge, the suction side lies across
+    the chord.
+    """
     if len(sides) != 3:
-        raise InputError(f"aerofoil: joined with the platform its skin has {len(sides)} faces, expected 3; "
-                         "change aerofoil.lean, aerofoil.sweep or aerofoil.fillet")
+        raise InputError(
+            f"aerofoil: joined with the platform its skin has {len(sides)} faces, expected 3; "
+            "change aerofoil.lean, aerofoil.sweep or aerofoil.fillet"
+        )
     trailing, *both = sorted(sides, key=lambda tag: gmsh.model.occ.getMass(2, tag))
     across = placement(aerofoil, 0.0, 0.5)[2]
-    pressure, suction = sorted(both, key=lambda tag: across @ np.array(gmsh.model.occ.getCenterOfMass(2, tag)))
+    pressure, suction = sorted(
+        both, key=lambda tag: across @ np.array(gmsh.model.occ.getCenterOfMass(2, tag))
+    )
     return {"trailing_edge": [trailing], "suction_side": [suction], "pressure_side": [pressure]}
 
 
 def edge_curves(gmsh: ModuleType, groups: Groups) -> tuple[list[int], list[int]]:
     """Curves along the leading edge, and round the blunt trailing edge."""
     trailing, suction, pressure = (
-        {abs(tag) for _, tag in gmsh.model.getBoundary([(2, groups.faces[name][0])], oriented=False)}
-        for name in ("trailing_edge", "suction_side", "pressure_side"))
+        {
+            abs(tag)
+            for _, tag in gmsh.model.getBoundary([(2, groups.faces[name][0])], oriented=False)
+        }
+        for name in ("trailing_edge", "suction_side", "pressure_side")
+    )
     return sorted(suction & pressure), sorted(trailing)
 
 
@@ -76,10 +109,14 @@ def sector(count: int) -> Sector:
 
 def motions(profile: Profile) -> dict[str, Motion]:
     """Faces that match, with the motion from master to slave."""
-    on, stay, still = turn(2 * profile.theta), np.eye(3), np.zeros(3)
-    return {"cyclic": ("cyclic_low", "cyclic_high", on, still),
-            "this": ("seat_right", "damper_left", stay, still),
-            "next": ("seat_left", "damper_right", on, still)}
+    on = turn(2 * profile.theta)
+    stay = np.eye(3)
+    still = np.zeros(3)
+    return {
+        "cyclic": ("cyclic_low", "cyclic_high", on, still),
+        "this": ("seat_right", "damper_left", stay, still),
+        "next": ("seat_left", "damper_right", on, still),
+    }
 
 
 def link(gmsh: ModuleType, groups: Groups, profile: Profile) -> None:
@@ -91,25 +128,41 @@ def link(gmsh: ModuleType, groups: Groups, profile: Profile) -> None:
 def mark_tip(gmsh: ModuleType, groups: Groups, aerofoil: Aerofoil, profile: Profile) -> Groups:
     """Groups with three points of the tip that are nodes of any mesh.
 
-    tip_leading is the end of the leading edge; tip_trailing is the corner of the blunt edge on the suction side;
-    tip_mid (on the camber line at half chord) is embedded.
+    tip_leading is the end of the leading edge; tip_trailing is the corner of the blunt edge on the
+    suction side; tip_mid (on the camber line at half chord) is embedded.
     """
     tip = groups.faces["tip"][0]
-    corners = {tag: np.array(gmsh.model.getValue(0, tag, []))
-               for _, tag in gmsh.model.getBoundary([(2, tip)], oriented=False, recursive=True)}
+    corners = {
+        tag: np.array(gmsh.model.getValue(0, tag, []))
+        for _, tag in gmsh.model.getBoundary([(2, tip)], oriented=False, recursive=True)
+    }
     edge = outline(aerofoil, profile.top, 1)
-    leading, trailing = (min(corners, key=lambda tag, p=p: np.linalg.norm(corners[tag] - p))
-                         for p in (edge[len(edge) // 2], edge[0]))
-    middle = gmsh.model.occ.addPoint(*place(aerofoil, profile.top, 1, np.array([[0.5, aerofoil.camber]]))[0])
+    leading, trailing = (
+        min(corners, key=lambda tag, p=p: np.linalg.norm(corners[tag] - p))
+        for p in (edge[len(edge) // 2], edge[0])
+    )
+    middle = gmsh.model.occ.addPoint(
+        *place(aerofoil, profile.top, 1, np.array([[0.5, aerofoil.camber]]))[0]
+    )
     gmsh.model.occ.synchronize()
     gmsh.model.mesh.embed(0, [middle], 2, tip)
-    return replace(groups, points={"tip_leading": [leading], "tip_mid": [middle], "tip_trailing": [trailing]})
+    return replace(
+        groups, points={"tip_leading": [leading], "tip_mid": [middle], "tip_trailing": [trailing]}
+    )
 
 
 def moved(mesh: Mesh, wedge: Wedge, profile: Profile) -> Mesh:
-    """The mesh with the damper moved inwards so that both flanks clear their seats by wedge.clearance."""
-    shift = -wedge.clearance / sin(wedge.angle) * np.array([np.cos(profile.theta), np.sin(profile.theta), 0])
+    """The mesh with the damper moved inwards so that both flanks clear their seats by
+    wedge.clearance.
+    """
+    shift = (
+        -wedge.clearance
+        / sin(wedge.angle)
+        * np.array([np.cos(profile.theta), np.sin(profile.theta), 0])
+    )
     points = mesh.points.copy()
     points[np.unique(mesh.bodies["damper"])] += shift
-    pairs = {n: replace(p, shift=p.shift + shift) if n != "cyclic" else p for n, p in mesh.pairs.items()}
+    pairs = {
+        n: replace(p, shift=p.shift + shift) if n != "cyclic" else p for n, p in mesh.pairs.items()
+    }
     return replace(mesh, points=points, pairs=pairs)

@@ -1,4 +1,6 @@
-"""One gmsh session a build: opened, always closed, never nested, and set so that a mesh can be made twice the same."""
+"""One gmsh session a build: opened, always closed, never nested, and set so that a mesh can be made
+twice the same.
+"""
 
 from __future__ import annotations
 
@@ -12,17 +14,21 @@ __all__ = ["attempt", "gmsh_session"]
 
 OPTIONS = {
     "General.Terminal": 0,
-    "General.NumThreads": 1,            # more threads change the mesh from run to run
+    # more threads change the mesh from run to run
+    "General.NumThreads": 1,
     "Mesh.RandomSeed": 1,
     "Mesh.RandomFactor": 1e-9,
     "Mesh.RandomFactor3D": 1e-12,
-    "Mesh.Algorithm": 6,                # frontal-Delaunay
+    # frontal-Delaunay
+    "Mesh.Algorithm": 6,
     "Mesh.MeshSizeExtendFromBoundary": 0,
     "Mesh.MeshSizeFromPoints": 0,
-    "Mesh.Renumber": 0,                 # node tags survive the change of order
+    # node tags survive the change of order
+    "Mesh.Renumber": 0,
     "Mesh.Optimize": 1,
     "Mesh.OptimizeThreshold": 0.35,
-    "Mesh.SecondOrderLinear": 1,        # curving.py moves the mid-side nodes
+    # curving.py moves the mid-side nodes
+    "Mesh.SecondOrderLinear": 1,
 }
 
 
@@ -57,7 +63,10 @@ def attempt(parameter: str, action: str) -> Iterator[None]:
     try:
         yield
     except Exception as error:
-        if type(error) is not Exception:    # gmsh raises the bare class; anything else is our own mistake
+        # gmsh raises the bare class; anything else is our own mistake
+        if type(error) is not Exception:
             raise
         reason = " ".join(str(error).split()) or "no reason given"
-        raise InputError(f"{parameter}: gmsh could not {action} ({reason}); change this parameter") from error
+        raise InputError(
+            f"{parameter}: gmsh could not {action} ({reason}); change this parameter"
+        ) from error

@@ -1,4 +1,6 @@
-"""Element sizes of a wedge sector: fine at the seats and round the edges of the aerofoil, coarser in the disc."""
+"""Element sizes of a wedge sector: fine at the seats and round the edges of the aerofoil, coarser
+in the disc.
+"""
 
 from __future__ import annotations
 
@@ -15,32 +17,51 @@ from .section import BLUNT
 __all__ = ["Sizes", "sector_sizes", "set_grids", "set_sizes"]
 
 
-NOSE = 0.6          # element along the leading edge over those of the aerofoil
-ALONG = 6           # elements along a seat at least
-SOME = 40_000        # cells above the rim at the finest, when the size is left open
+# element along the leading edge over those of the aerofoil
+NOSE = 0.6
+# elements along a seat at least
+ALONG = 6
+# cells above the rim at the finest, when the size is left open
+SOME = 40_000
 
 
 @dataclass(frozen=True)
 class Sizes:
     """Target element sizes [m]."""
 
-    base: float         # aerofoil, platform and shank
-    contact: float      # seats and wedge
-    disc: float         # far from the platform
-    nose: float         # along the leading edge
-    edge: float         # along the trailing edge
-    least: float        # where the surface curves most
+    # aerofoil, platform and shank
+    base: float
+    # seats and wedge
+    contact: float
+    # far from the platform
+    disc: float
+    # along the leading edge
+    nose: float
+    # along the trailing edge
+    edge: float
+    # where the surface curves most
+    least: float
 
 
-def sector_sizes(aerofoil: Aerofoil, platform: Platform, shank: Shank, disc: Disc, wedge: Wedge,
-                 size: MeshSize) -> Sizes:
-    """Sizes from the thinnest part of the sector where the user leaves them open, in bounds of SOME cells."""
-    tip, root = aerofoil.thickness_tip * aerofoil.chord_tip, aerofoil.thickness_root * aerofoil.chord_root
+def sector_sizes(
+    aerofoil: Aerofoil, platform: Platform, shank: Shank, disc: Disc, wedge: Wedge, size: MeshSize
+) -> Sizes:
+    """Sizes from the thinnest part of the sector where the user leaves them open, in bounds of SOME
+    cells.
+    """
+    tip = aerofoil.thickness_tip * aerofoil.chord_tip
+    root = aerofoil.thickness_root * aerofoil.chord_root
     thin = 0.6 * min((tip + root) / 2, platform.thickness, shank.width / 2)
     base = size.size or max(thin, _affordable(aerofoil, platform, shank, disc))
     contact = size.contact_size or min(base, platform.seat_width, wedge.length / ALONG)
-    return Sizes(base, contact, max(base, min(3 * base, (disc.rim_radius - disc.bore_radius) / 3)),
-                 NOSE * base, min(base, 6 * BLUNT * tip), base / 3)
+    return Sizes(
+        base,
+        contact,
+        max(base, min(3 * base, (disc.rim_radius - disc.bore_radius) / 3)),
+        NOSE * base,
+        min(base, 6 * BLUNT * tip),
+        base / 3,
+    )
 
 
 def _affordable(aerofoil: Aerofoil, platform: Platform, shank: Shank, disc: Disc) -> float:
@@ -48,13 +69,21 @@ def _affordable(aerofoil: Aerofoil, platform: Platform, shank: Shank, disc: Disc
     chord = (aerofoil.chord_root + aerofoil.chord_tip) / 2
     thickness = (aerofoil.thickness_root + aerofoil.thickness_tip) / 2
     pitch = 2 * pi / disc.sectors * (disc.rim_radius + shank.height)
-    solid = (0.7 * thickness * chord**2 * aerofoil.span + shank.height * shank.width * shank.length
-             + pitch * platform.length * (platform.thickness + platform.seat_width / 2))
+    solid = (
+        0.7 * thickness * chord**2 * aerofoil.span
+        + shank.height * shank.width * shank.length
+        + pitch * platform.length * (platform.thickness + platform.seat_width / 2)
+    )
     return (solid / (0.12 * SOME)) ** (1 / 3)
 
 
-def set_sizes(gmsh: ModuleType, profile: Profile, wedge: Wedge, sizes: Sizes,
-              edges: tuple[list[int], list[int]]) -> None:
+def set_sizes(
+    gmsh: ModuleType,
+    profile: Profile,
+    wedge: Wedge,
+    sizes: Sizes,
+    edges: tuple[list[int], list[int]],
+) -> None:
     """Boxes round both seats, one for all above the rim, and elements that follow the curvature.
 
     Args:
@@ -64,12 +93,25 @@ def set_sizes(gmsh: ModuleType, profile: Profile, wedge: Wedge, sizes: Sizes,
     reach = 4 * sizes.base
     z = wedge.length / 2
     (x_in, y_in), x_out = profile.inner, profile.outer[0]
-    boxes = [_box(field, sizes.base, sizes.disc, 5 * sizes.base, [profile.underside, 10, -10, 10, -10, 10])]
+    boxes = [
+        _box(
+            field, sizes.base, sizes.disc, 5 * sizes.base, [profile.underside, 10, -10, 10, -10, 10]
+        )
+    ]
     for low, high in ((y_in, 2 * y_in), (-2 * y_in, -y_in)):
-        boxes.append(_box(field, sizes.contact, sizes.disc, reach,
-                          [min(x_in, x_out) - wedge.base, max(x_in, x_out), low, high, -z, z]))
-    boxes += [_near(field, curves, size, sizes.base)
-              for curves, size in zip(edges, (sizes.nose, sizes.edge), strict=True)]
+        boxes.append(
+            _box(
+                field,
+                sizes.contact,
+                sizes.disc,
+                reach,
+                [min(x_in, x_out) - wedge.base, max(x_in, x_out), low, high, -z, z],
+            )
+        )
+    boxes += [
+        _near(field, curves, size, sizes.base)
+        for curves, size in zip(edges, (sizes.nose, sizes.edge), strict=True)
+    ]
     least = field.add("Min")
     field.setNumbers(least, "FieldsList", boxes)
     field.setAsBackgroundMesh(least)
@@ -81,7 +123,8 @@ def set_sizes(gmsh: ModuleType, profile: Profile, wedge: Wedge, sizes: Sizes,
 def set_grids(gmsh: ModuleType, seats: list[int], wedge: Wedge, size: MeshSize) -> None:
     """Mesh rectangular seats in a grid, much finer across them than along.
 
-    A wedge that rolls on its seats presses a strip of their width only: a few nodes there decide who slips and lifts.
+    A wedge that rolls on its seats presses a strip of their width only: a few nodes there decide
+    who slips and lifts.
 
     Raises:
         InputError: a seat is no rectangle with one edge on each side.
@@ -91,8 +134,11 @@ def set_grids(gmsh: ModuleType, seats: list[int], wedge: Wedge, size: MeshSize) 
     for seat in seats:
         edges = {abs(tag) for _, tag in gmsh.model.getBoundary([(2, seat)], oriented=False)}
         if len(edges) != 4:
-            raise InputError(f"mesh.seat_elements = {size.seat_elements}: a seat has {len(edges)} edges, expected 4; "
-                             "leave it out for free triangles")
+            raise InputError(
+                f"mesh.seat_elements = {size.seat_elements}: a seat has {len(edges)} edges, "
+                "expected 4; "
+                "leave it out for free triangles"
+            )
         for edge in edges:
             _, _, low, _, _, high = gmsh.model.getBoundingBox(1, edge)
             count = along if high - low > wedge.length / 2 else across
@@ -100,7 +146,9 @@ def set_grids(gmsh: ModuleType, seats: list[int], wedge: Wedge, size: MeshSize) 
         gmsh.model.mesh.setTransfiniteSurface(seat, "AlternateLeft")
 
 
-def _box(field: object, inside: float, outside: float, thickness: float, limits: list[float]) -> int:
+def _box(
+    field: object, inside: float, outside: float, thickness: float, limits: list[float]
+) -> int:
     tag = field.add("Box")
     for name, value in zip(("XMin", "XMax", "YMin", "YMax", "ZMin", "ZMax"), limits, strict=True):
         field.setNumber(tag, name, value)
@@ -111,10 +159,16 @@ def _box(field: object, inside: float, outside: float, thickness: float, limits:
 
 
 def _near(field: object, curves: list[int], size: float, far: float) -> int:
-    distance, threshold = field.add("Distance"), field.add("Threshold")
+    distance = field.add("Distance")
+    threshold = field.add("Threshold")
     field.setNumbers(distance, "CurvesList", curves)
     field.setNumber(distance, "Sampling", 60)
-    for name, value in (("InField", distance), ("SizeMin", size), ("SizeMax", 10 * far), ("DistMin", size / 2),
-                        ("DistMax", 20 * far)):
+    for name, value in (
+        ("InField", distance),
+        ("SizeMin", size),
+        ("SizeMax", 10 * far),
+        ("DistMin", size / 2),
+        ("DistMax", 20 * far),
+    ):
         field.setNumber(threshold, name, value)
     return threshold

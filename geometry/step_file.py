@@ -1,10 +1,12 @@
-"""STEP files through OpenCASCADE: import, names, periodic meshing, and then the same road as any imported mesh.
+"""STEP files through OpenCASCADE: import, names, periodic meshing, and then the same road as any
+imported mesh.
 
-Names come from the file: the solids' (MANIFOLD_SOLID_BREP, else the product's name) and the faces' (ADVANCED_FACE).
-What has no name is called body_1, body_2, ... and face_1, face_2, ... in gmsh's numbering, the order of the file.
-When no face is called cyclic_low, cyclic_high or clamp, they are looked for: two faces that the rotation to the next
-sector carries onto each other; the blade's face nearest to the engine axis. The user may name what the file does not.
-Solids are meshed separately: bodies that touch are not glued.
+Names come from the file: the solids' (MANIFOLD_SOLID_BREP, else the product's name) and the faces'
+(ADVANCED_FACE). What has no name is called body_1, body_2, ... and face_1, face_2, ... in gmsh's
+numbering, the order of the file. When no face is called cyclic_low, cyclic_high or clamp, they are
+looked for: two faces that the rotation to the next sector carries onto each other; the blade's face
+nearest to the engine axis. The user may name what the file does not. Solids are meshed separately:
+bodies that touch are not glued.
 """
 
 from __future__ import annotations
@@ -20,7 +22,7 @@ from bladefem.errors import InputError
 
 from .curving import second_order
 from .draw import centres, tie
-from .finish import check_count
+from .finalise_mesh import check_count
 from .imported import mesh_of_raw
 from .mesh import Mesh
 from .parameters import MeshSize
@@ -30,17 +32,25 @@ from .session import attempt, gmsh_session
 
 __all__ = ["read_step"]
 
-Named = dict[tuple[int, str], list[int]]       # (dimension, name) to entities
+# (dimension, name) to entities
+Named = dict[tuple[int, str], list[int]]
 CONTACT = ("seat_left", "seat_right", "damper_left", "damper_right")
 PREFIX = {"": 1.0, ".MILLI.": 1e-3, ".CENTI.": 1e-2, ".DECI.": 0.1, ".MICRO.": 1e-6, ".KILO.": 1e3}
 
 
-def read_step(file: str | Path, size: MeshSize, scale: float = 1.0, sectors: int = 0,
-              axis: np.ndarray | tuple[float, float, float] = (0.0, 0.0, 1.0), names: Iterable[str] = ()) -> Mesh:
+def read_step(
+    file: str | Path,
+    size: MeshSize,
+    scale: float = 1.0,
+    sectors: int = 0,
+    axis: np.ndarray | tuple[float, float, float] = (0.0, 0.0, 1.0),
+    names: Iterable[str] = (),
+) -> Mesh:
     """Mesh of a STEP file with second-order tetrahedra.
 
     Args:
-        scale: factor from the file's numbers to metres; 1 leaves it to the unit that the file states.
+        scale: factor from the file's numbers to metres; 1 leaves it to the unit that the file
+            states.
         sectors: blades on the wheel, 0 for a single body.
         axis: engine axis through the origin.
         names: "new = old" for faces and solids that the file calls otherwise, see renaming.py.
@@ -60,17 +70,29 @@ def read_step(file: str | Path, size: MeshSize, scale: float = 1.0, sectors: int
         named |= _found(gmsh, named, sectors, axis)
         _periodic(gmsh, named, sectors, axis)
         with attempt("mesh.size", f"mesh '{file}'"):
-            _generate(gmsh, size, [tag for (dim, name), tags in named.items() if dim == 2 and name.lower() in CONTACT
-                                   for tag in tags])
+            _generate(
+                gmsh,
+                size,
+                [
+                    tag
+                    for (dim, name), tags in named.items()
+                    if dim == 2 and name.lower() in CONTACT
+                    for tag in tags
+                ],
+            )
         for (dimension, name), tags in named.items():
-            gmsh.model.setPhysicalName(dimension, gmsh.model.addPhysicalGroup(dimension, tags), name)
+            gmsh.model.setPhysicalName(
+                dimension, gmsh.model.addPhysicalGroup(dimension, tags), name
+            )
         raw = from_gmsh_model(gmsh)
     return mesh_of_raw(raw, 1.0, sectors, axis, str(file))
 
 
 def file_unit(text: str) -> float:
     """Length unit [m] that a STEP file states; millimetre when it states none."""
-    found = re.search(r"LENGTH_UNIT\(\).{0,80}?SI_UNIT\(\s*(\$|\.\w+\.)\s*,\s*\.METRE\.", text, re.S)
+    found = re.search(
+        r"LENGTH_UNIT\(\).{0,80}?SI_UNIT\(\s*(\$|\.\w+\.)\s*,\s*\.METRE\.", text, re.S
+    )
     if found:
         return PREFIX.get(found[1].replace("$", ""), 1e-3)
     return 0.0254 if re.search(r"CONVERSION_BASED_UNIT\(\s*'INCH'", text, re.I) else 1e-3
@@ -105,24 +127,34 @@ def _names(gmsh: ModuleType, text: str) -> Named:
 
 
 def _renamed(named: Named, wanted: dict[str, list[str]]) -> Named:
-    """The user's names for solids and faces; a new name belongs to the dimension of its first old one."""
+    """The user's names for solids and faces; a new name belongs to the dimension of its first old
+    one.
+    """
     solids = {name.lower() for dim, name in named if dim == 3}
     result = {}
     for dim in (3, 2):
         groups = {name: tags for (d, name), tags in named.items() if d == dim}
-        here = {new: olds for new, olds in wanted.items() if (olds[0].lower() in solids) == (dim == 3)}
+        here = {
+            new: olds for new, olds in wanted.items() if (olds[0].lower() in solids) == (dim == 3)
+        }
         result |= {(dim, name): tags for name, tags in renamed(groups, here).items()}
     return result
 
 
 def _written(text: str) -> list[tuple[str, list[str]]]:
     """Name of each solid and of its faces, in the order of the file."""
-    record = {int(n): body for n, body in re.findall(r"#(\d+)\s*=\s*(.*?);\s*(?=#|ENDSEC)", text, re.S)}
+    record = {
+        int(n): body for n, body in re.findall(r"#(\d+)\s*=\s*(.*?);\s*(?=#|ENDSEC)", text, re.S)
+    }
     solids = []
     for body in (record[n] for n in sorted(record) if record[n].startswith("MANIFOLD_SOLID_BREP")):
-        name, shell = re.match(r"MANIFOLD_SOLID_BREP\s*\(\s*'(.*?)'\s*,\s*#(\d+)", body, re.S).groups()
+        name, shell = re.match(
+            r"MANIFOLD_SOLID_BREP\s*\(\s*'(.*?)'\s*,\s*#(\d+)", body, re.S
+        ).groups()
         faces = re.findall(r"#(\d+)", record.get(int(shell), ""))
-        words = [re.match(r"\w+\s*\(\s*'(.*?)'", record.get(int(face), "X('')"), re.S) for face in faces]
+        words = [
+            re.match(r"\w+\s*\(\s*'(.*?)'", record.get(int(face), "X('')"), re.S) for face in faces
+        ]
         solids.append((_plain(name), [_plain(word[1]) if word else "" for word in words]))
     return solids
 
@@ -132,29 +164,46 @@ def _plain(name: str) -> str:
     return "" if name.strip().upper() in ("", "NONE", "$") else name.strip()
 
 
-def _found(gmsh: ModuleType, named: dict[tuple[int, str], list[int]], sectors: int,
-           axis: np.ndarray) -> dict[tuple[int, str], list[int]]:
+def _found(
+    gmsh: ModuleType, named: dict[tuple[int, str], list[int]], sectors: int, axis: np.ndarray
+) -> dict[tuple[int, str], list[int]]:
     """Cyclic faces and clamp by where they are, when no face has these names."""
     words = {name.lower() for dim, name in named if dim == 2}
-    body = [tag for (dim, name), tags in named.items() if dim == 3 and name.lower() != "damper" for tag in tags]
+    body = [
+        tag
+        for (dim, name), tags in named.items()
+        if dim == 3 and name.lower() != "damper"
+        for tag in tags
+    ]
     middle = {tag: c for volume in body for tag, c in centres(gmsh, volume).items()}
     found: dict[tuple[int, str], list[int]] = {}
     if sectors and not {"cyclic_low", "cyclic_high"} & words:
         low, high = _turned(gmsh, middle, rotation(axis, 2 * np.pi / sectors))
         found |= {(2, "cyclic_low"): low, (2, "cyclic_high"): high} if low else {}
     if sectors and "clamp" not in words:
-        radius = {tag: np.linalg.norm(c - (c @ axis) * axis) for tag, c in middle.items()
-                  if not any(tag in tags for tags in found.values())}
+        radius = {
+            tag: np.linalg.norm(c - (c @ axis) * axis)
+            for tag, c in middle.items()
+            if not any(tag in tags for tags in found.values())
+        }
         found[2, "clamp"] = [min(radius, key=radius.get)]
     return found
 
 
-def _turned(gmsh: ModuleType, middle: dict[int, np.ndarray], on: np.ndarray) -> tuple[list[int], list[int]]:
+def _turned(
+    gmsh: ModuleType, middle: dict[int, np.ndarray], on: np.ndarray
+) -> tuple[list[int], list[int]]:
     """Faces that the rotation carries onto each other: same area, centre turned."""
     scale = max(np.linalg.norm(c) for c in middle.values())
     area = {tag: gmsh.model.occ.getMass(2, tag) for tag in middle}
-    pairs = [(a, b) for a, p in middle.items() for b, q in middle.items()
-             if a != b and np.linalg.norm(on @ p - q) < 1e-6 * scale and abs(area[a] / area[b] - 1) < 1e-6]
+    pairs = [
+        (a, b)
+        for a, p in middle.items()
+        for b, q in middle.items()
+        if a != b
+        and np.linalg.norm(on @ p - q) < 1e-6 * scale
+        and abs(area[a] / area[b] - 1) < 1e-6
+    ]
     return [a for a, _ in pairs], [b for _, b in pairs]
 
 
@@ -164,16 +213,23 @@ def rotation(axis: np.ndarray, angle: float) -> np.ndarray:
     return np.eye(3) + np.sin(angle) * cross + (1 - np.cos(angle)) * cross @ cross
 
 
-def _periodic(gmsh: ModuleType, named: dict[tuple[int, str], list[int]], sectors: int, axis: np.ndarray) -> None:
+def _periodic(
+    gmsh: ModuleType, named: dict[tuple[int, str], list[int]], sectors: int, axis: np.ndarray
+) -> None:
     """Tie cyclic faces and contact faces where both sides are named and the motion fits."""
     tags = {name.lower(): t for (dim, name), t in named.items() if dim == 2}
     on = rotation(axis, 2 * np.pi / sectors) if sectors else np.eye(3)
-    for master, slave, motions in (("cyclic_low", "cyclic_high", (on, on.T)),
-                                   ("seat_right", "damper_left", (np.eye(3),)),
-                                   ("seat_left", "damper_right", (on, on.T))):
+    for master, slave, motions in (
+        ("cyclic_low", "cyclic_high", (on, on.T)),
+        ("seat_right", "damper_left", (np.eye(3),)),
+        ("seat_left", "damper_right", (on, on.T)),
+    ):
         if master not in tags or slave not in tags or len(tags[master]) != len(tags[slave]):
             continue
-        start, end = (np.mean([gmsh.model.occ.getCenterOfMass(2, t) for t in tags[n]], axis=0) for n in (master, slave))
+        start, end = (
+            np.mean([gmsh.model.occ.getCenterOfMass(2, t) for t in tags[n]], axis=0)
+            for n in (master, slave)
+        )
         best = min(motions, key=lambda r, a=start, b=end: np.linalg.norm(r @ a - b))
         with attempt("imported.file", f"match the faces {master} and {slave}"):
             tie(gmsh, 2, tags[master], tags[slave], best, np.zeros(3))
@@ -182,17 +238,25 @@ def _periodic(gmsh: ModuleType, named: dict[tuple[int, str], list[int]], sectors
 def _refined(gmsh: ModuleType, faces: list[int], fine: float, base: float) -> None:
     """Size ``fine`` on some faces [m], growing to ``base`` within five of its elements."""
     field = gmsh.model.mesh.field
-    distance, threshold = field.add("Distance"), field.add("Threshold")
+    distance = field.add("Distance")
+    threshold = field.add("Threshold")
     field.setNumbers(distance, "SurfacesList", faces)
     field.setNumber(distance, "Sampling", 60)
-    for name, value in (("InField", distance), ("SizeMin", fine), ("SizeMax", base), ("DistMin", fine),
-                        ("DistMax", 5 * base)):
+    for name, value in (
+        ("InField", distance),
+        ("SizeMin", fine),
+        ("SizeMax", base),
+        ("DistMin", fine),
+        ("DistMax", 5 * base),
+    ):
         field.setNumber(threshold, name, value)
     field.setAsBackgroundMesh(threshold)
 
 
 def _generate(gmsh: ModuleType, size: MeshSize, contact: list[int]) -> None:
-    """Elements that follow the curvature, of ``size.contact_size`` on the contact faces and coarser away from them."""
+    """Elements that follow the curvature, of ``size.contact_size`` on the contact faces and coarser
+    away from them.
+    """
     low, high = np.array(gmsh.model.getBoundingBox(-1, -1)).reshape(2, 3)
     base = size.size or np.linalg.norm(high - low) / 40
     gmsh.option.setNumber("Mesh.MeshSizeMax", base)

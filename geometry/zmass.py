@@ -1,4 +1,5 @@
-"""The Z-shaped mass: two bars along x and a diagonal between them, one plate standing on a block or on the plane z = 0.
+"""The Z-shaped mass: two bars along x and a diagonal between them, one plate standing on a block or
+on the plane z = 0.
 """
 
 from __future__ import annotations
@@ -10,20 +11,25 @@ import numpy as np
 from bladefem.errors import InputError
 
 from .draw import centres, imprint, polygon, prism, set_background, tie
-from .extract import Groups
-from .finish import complete, mesh_model
+from .extract_arrays import Groups
+from .finalise_mesh import complete, mesh_model
 from .mesh import Mesh
 from .parameters import MeshSize, ZMass
 from .session import attempt, gmsh_session
 
 __all__ = ["z_corners", "z_mass", "z_section"]
 
-WIDER = 2.0         # side of the foundation block over the larger side of the Z
+# side of the foundation block over the larger side of the Z
+WIDER = 2.0
 
 
 def z_corners(z: ZMass) -> np.ndarray:
-    """Corners (10, 2) [m] of the Z round its centre, anticlockwise; the diagonal is ``bar`` wide along x."""
-    w, h, b = z.width / 2, z.height / 2, z.bar
+    """Corners (10, 2) [m] of the Z round its centre, anticlockwise; the diagonal is ``bar`` wide
+    along x.
+    """
+    w = z.width / 2
+    h = z.height / 2
+    b = z.bar
     half = np.array([[-w, -h], [w, -h], [w, b - h], [b - w, b - h], [w, h - b]])
     return np.vstack([half, -half])
 
@@ -33,23 +39,27 @@ def z_section(z: ZMass) -> tuple[float, float]:
     here = z_corners(z)
     there = np.roll(here, -1, axis=0)
     cross = here[:, 0] * there[:, 1] - there[:, 0] * here[:, 1]
-    return float(cross.sum() / 2), float(cross @ (here**2 + here * there + there**2).sum(axis=1) / 12)
+    return float(cross.sum() / 2), float(
+        cross @ (here**2 + here * there + there**2).sum(axis=1) / 12
+    )
 
 
 def z_mass(z: ZMass, size: MeshSize, depth: float = 0.0) -> Mesh:
     """Body "damper" with the faces "footprint" (z = 0) and "top".
 
     Args:
-        depth: of an elastic block under it [m]: body "blade" with the faces "seat" (below the Z, its nodes matched with
-            the footprint's: pair "this") and "clamp"; 0 for none.
+        depth: of an elastic block under it [m]: body "blade" with the faces "seat" (below the Z,
+            its nodes matched with the footprint's: pair "this") and "clamp"; 0 for none.
 
     Raises:
         InputError: a parameter has to change; the message names it.
     """
     limit = 0.95 * min(z.height / 2, z.width)
     if not z.bar <= limit:
-        raise InputError(f"z_mass.bar = {z.bar:.4g} m: expected at most {limit:.4g} m "
-                         "(95 % of z_mass.width and of half of z_mass.height)")
+        raise InputError(
+            f"z_mass.bar = {z.bar:.4g} m: expected at most {limit:.4g} m "
+            "(95 % of z_mass.width and of half of z_mass.height)"
+        )
     base = size.size or min(z.thickness / 2, z.bar / 3)
     contact = size.contact_size or base
     with gmsh_session() as gmsh:
@@ -59,8 +69,13 @@ def z_mass(z: ZMass, size: MeshSize, depth: float = 0.0) -> Mesh:
         groups = _names(gmsh, z, depth, body, block)
         if block is not None:
             tie(gmsh, 2, groups.faces["seat"], groups.faces["footprint"], np.eye(3), np.zeros(3))
-        set_background(gmsh, min(base, contact) / 2,
-                       MathEval=[{"F": f"{contact} + {base - contact} * Max(0, z) / {z.thickness} - 0.6 * Min(0, z)"}])
+        set_background(
+            gmsh,
+            min(base, contact) / 2,
+            MathEval=[
+                {"F": f"{contact} + {base - contact} * Max(0, z) / {z.thickness} - 0.6 * Min(0, z)"}
+            ],
+        )
         with attempt("mesh.size", "mesh this geometry"):
             mesh = mesh_model(gmsh, groups, 3, size)
     pairs = {"this": ("seat", "footprint", np.eye(3), np.zeros(3))} if depth else {}
@@ -76,7 +91,9 @@ def _block(gmsh: ModuleType, z: ZMass, depth: float) -> int:
 
 
 def _names(gmsh: ModuleType, z: ZMass, depth: float, body: int, block: int | None) -> Groups:
-    """Faces by the heights of their centres; the seat is the inner one of the two faces on top of the block."""
+    """Faces by the heights of their centres; the seat is the inner one of the two faces on top of
+    the block.
+    """
     found = {tag: centre[2] for tag, centre in centres(gmsh, body).items()}
     faces = {"footprint": [min(found, key=found.get)], "top": [max(found, key=found.get)]}
     if block is None:

@@ -1,4 +1,6 @@
-"""What holds for every test: a skip is a failure, and on several ranks each failure says which rank it was on."""
+"""What holds for every test: a skip is a failure, and on several ranks each failure says which rank
+it was on.
+"""
 
 from __future__ import annotations
 
@@ -28,7 +30,10 @@ def pytest_runtest_logreport(report: pytest.TestReport) -> None:
 def _refuse_skip(report: pytest.TestReport | pytest.CollectReport) -> None:
     if report.skipped and not hasattr(report, "wasxfail"):
         report.outcome = "failed"
-        report.longrepr = f"{report.longrepr}\nA skipped test counts as failed: what it needs is part of the set-up."
+        report.longrepr = (
+            f"{report.longrepr}\nA skipped test counts as failed: what it needs is "
+            "part of the set-up."
+        )
 
 
 @pytest.hookimpl(hookwrapper=True)
@@ -52,4 +57,5 @@ def _collect_together():
     if SIZE > 1:
         gc.collect()
         from mpi4py import MPI
+
         MPI.COMM_WORLD.Barrier()

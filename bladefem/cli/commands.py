@@ -10,18 +10,32 @@ from pathlib import Path
 from typing import Any
 
 from ..errors import InputError
-from ..scene import Scene
+from ..scene.tables import Scene
 from . import tables
 
-__all__ = ["chart", "check", "contact", "default_folder", "info", "mesh", "modes", "prepared", "reduce", "report",
-           "response", "tell", "until"]
+__all__ = [
+    "chart",
+    "check",
+    "contact",
+    "default_folder",
+    "info",
+    "mesh",
+    "modes",
+    "prepared",
+    "reduce",
+    "report",
+    "response",
+    "tell",
+    "until",
+]
 
 
 def check(options: argparse.Namespace, comm: Any) -> None:
     """Print the resolved scene, and what in it is improbable."""
-    from ..scene_doubts import doubts
-    from ..scene_file import given_keys, read_tables, resolved, scene_of
-    from ..store import on_root
+    from ..io.stage_cache import on_root
+    from ..scene.toml import given_keys, read_tables, resolved, scene_of
+    from ..scene.warnings import doubts
+
     file = scene_path(options.scene)
 
     def table() -> str:
@@ -41,7 +55,9 @@ PICTURES = (".png", ".pdf", ".svg", ".jpg")
 def mesh(options: argparse.Namespace, comm: Any) -> None:
     """Mesh, quality table, picture."""
     if options.view and Path(options.view).suffix.lower() not in PICTURES:
-        raise InputError(f"--view {options.view}: expected a file name that ends with {' or '.join(PICTURES)}")
+        raise InputError(
+            f"--view {options.view}: expected a file name that ends with {' or '.join(PICTURES)}"
+        )
     run = until("mesh", options, comm)
     if options.view and (comm is None or comm.rank == 0):
         draw(run.mesh, options.view)
@@ -49,8 +65,11 @@ def mesh(options: argparse.Namespace, comm: Any) -> None:
 
 
 def modes(options: argparse.Namespace, comm: Any) -> None:
-    """Natural frequencies and shapes of all nodal diameters; Campbell diagram, mesh refinement, comparison."""
+    """Natural frequencies and shapes of all nodal diameters; Campbell diagram, mesh refinement,
+    comparison.
+    """
     from ..report import modes as report
+
     scene, folder, bars = prepared(options, comm)
     found = report.run(scene, folder, modes_wanted(options), options.pictures, comm, bars)
     tell(options, comm, lambda: tables.survey(found), found.run)
@@ -58,9 +77,10 @@ def modes(options: argparse.Namespace, comm: Any) -> None:
 
 def modes_wanted(options: argparse.Namespace) -> Any:
     """What the options of ``modes`` ask for."""
-    from ..study.answer import read_damping, read_loads
-    from ..study.campbell import read_speeds
-    from ..study.survey import Wanted
+    from ..study.modes.campbell import read_speeds
+    from ..study.modes.linear_response_report import read_damping, read_loads
+    from ..study.modes.survey import Wanted
+
     if options.pictures < 0:
         raise InputError(f"--pictures {options.pictures}: expected a number of modes, 0 for none")
     sizes = _sizes(options.converge, "converge")
@@ -68,29 +88,41 @@ def modes_wanted(options: argparse.Namespace) -> Any:
     loads = None if options.forced is None else read_loads(options.forced)
     if loads is None and options.damping:
         raise InputError("--damping: expected together with --forced")
-    return Wanted(speeds, sizes, Path(options.compare) if options.compare else None, options.direct, loads,
-                  read_damping(options.damping) if options.damping else None)
+    return Wanted(
+        speeds,
+        sizes,
+        Path(options.compare) if options.compare else None,
+        options.direct,
+        loads,
+        read_damping(options.damping) if options.damping else None,
+    )
 
 
 def _sizes(text: str | None, option: str) -> list[float] | None:
     """Element sizes [m] as given to an option; empty where they are to be chosen."""
-    from ..scene_fields import convert, field_at, split_values
+    from ..scene.fields import convert, field_at, split_values
+
     size = field_at("mesh.size")._replace(name=option)
     return None if text is None else [convert(item, size) for item in split_values(text)]
 
 
 def contact(options: argparse.Namespace, comm: Any) -> None:
-    """Seat the damper: force and pressure of each face under each load, with tables, picture and ParaView file."""
+    """Seat the damper: force and pressure of each face under each load, with tables, picture and
+    ParaView file.
+    """
     scene, folder, bars = prepared(options, comm)
     if scene.kind in WITHOUT_BLADE:
         return without_blade(scene, folder, options, comm)
     from ..report import pressure
+
     run = pressure.run(scene, folder, comm, bars)
     tell(options, comm, lambda: tables.pressures(run.contact.maps), run)
 
 
 def reduce(options: argparse.Namespace, comm: Any) -> None:
-    """Blade and damper reduced to their contact, load and probe points; a later response starts from there."""
+    """Blade and damper reduced to their contact, load and probe points; a later response starts
+    from there.
+    """
     run = until("reduction", options, comm, responds=True)
     tell(options, comm, lambda: tables.reduction(run.reduced), run)
 
@@ -107,6 +139,7 @@ def report(options: argparse.Namespace, comm: Any) -> None:
     if scene.kind in WITHOUT_BLADE:
         return without_blade(scene, folder, options, comm)
     from ..report.run import run as whole
+
     run = whole(scene, folder, comm, bars)
     tell(options, comm, lambda: tables.responses(run.response), run)
 
@@ -117,55 +150,75 @@ WITHOUT_BLADE = ("z mass", "hertz", "punch")
 def without_blade(scene: Scene, folder: Path, options: argparse.Namespace, comm: Any) -> None:
     """All that there is to such a scene: its contact, and the motion of the mass."""
     from ..report.tables import readable
+
     if scene.kind == "z mass":
         from ..report import zmass
+
         found = zmass.run(scene, folder, comm)
-        return tell(options, comm, lambda: tables.frame(readable(zmass.motion_table(found.motions))), found)
+        return tell(
+            options, comm, lambda: tables.frame(readable(zmass.motion_table(found.motions))), found
+        )
     from ..report import pair
+
     result = pair.run(scene, folder, comm)
-    return tell(options, comm, lambda: tables.frame(readable(pair.pair_summary(result.states))), result)
+    return tell(
+        options, comm, lambda: tables.frame(readable(pair.pair_summary(result.states))), result
+    )
 
 
 def chart(options: argparse.Namespace, comm: Any) -> None:
     """Speed against accuracy of methods and models: tables and picture."""
+    from ..io.stage_cache import on_root
     from ..report.chart import write_chart
-    from ..store import on_root
-    from ..study.chart import check_budget
-    from ..study.chart_scene import reference_chart, scene_chart
+    from ..study.chart.chart import check_budget
+    from ..study.chart.scene import reference_chart, scene_chart
+
     check_budget(options.budget)
     if options.reference:
-        folder, accuracy, title = Path(options.output or "runs/reference"), 0.02, "reference blade"
+        folder = Path(options.output or "runs/reference")
+        accuracy = 0.02
+        title = "reference blade"
         made = on_root(comm, lambda: reference_chart(accuracy, options.budget))
     elif options.scene is None:
         raise InputError("chart: expected a scene file, or --reference")
     else:
         sizes = _sizes(options.mesh, "mesh")
         scene, folder, _ = prepared(options, comm, responds=True)
-        made, accuracy, title = scene_chart(scene, folder, options.budget, comm, sizes), scene.accuracy, scene.title
+        made = scene_chart(scene, folder, options.budget, comm, sizes)
+        accuracy = scene.accuracy
+        title = scene.title
     files = on_root(comm, lambda: write_chart(made, folder, accuracy, title))
-    tell(options, comm, lambda: "\n".join([*made.remarks, "written: " + ", ".join(map(str, files))]))
+    tell(
+        options, comm, lambda: "\n".join([*made.remarks, "written: " + ", ".join(map(str, files))])
+    )
 
 
 def info(options: argparse.Namespace, comm: Any) -> None:
     """Versions and threads."""
     from .info import facts
+
     rows = facts()
     if comm is None or comm.rank == 0:
         print(tables.plain(rows))
 
 
-def prepared(options: argparse.Namespace, comm: Any, responds: bool = False) -> tuple[Scene, Path, Any]:
-    """The scene, the run folder with a copy of it, kept for this command, and progress bars; collective.
+def prepared(
+    options: argparse.Namespace, comm: Any, responds: bool = False
+) -> tuple[Scene, Path, Any]:
+    """The scene, the run folder with a copy of it, kept for this command, and progress bars;
+    collective.
 
     Args:
         responds: a forced response is to come.
     """
-    from ..progress import wanted, watch
-    from ..store import on_root
+    from ..io.stage_cache import on_root
+    from ..util.progress import wanted, watch
+
     folder = Path(options.output or default_folder(options.scene))
 
     def prepare() -> Scene:
-        from ..run_folder import locked, take_folder
+        from ..io.run_folder import locked, take_folder
+
         scene = given_scene(options, responds)
         options.held.enter_context(locked(folder))
         moved = take_folder(folder, scene)
@@ -180,8 +233,9 @@ def prepared(options: argparse.Namespace, comm: Any, responds: bool = False) -> 
 
 def given_scene(options: argparse.Namespace, responds: bool) -> Scene:
     """The scene of the file and the options, checked."""
-    from ..scene_check import refuse_response
-    from ..scene_file import load_scene
+    from ..scene.toml import load_scene
+    from ..scene.validate import refuse_response
+
     scene = load_scene(scene_path(options.scene), options.overrides)
     if responds:
         refuse_response(scene)
@@ -191,7 +245,8 @@ def given_scene(options: argparse.Namespace, responds: bool) -> Scene:
 def until(stage: str, options: argparse.Namespace, comm: Any, responds: bool = False) -> Any:
     """The pipeline up to a stage, with progress bars; collective."""
     scene, folder, bars = prepared(options, comm, responds)
-    from ..study import pipeline
+    from ..study.pipeline import pipeline
+
     return pipeline.run(scene, folder, until=stage, comm=comm, progress=bars)
 
 
@@ -218,7 +273,8 @@ def default_folder(given: str) -> Path:
 
 def draw(mesh_made: Any, file: str) -> None:
     """The picture of the mesh."""
-    from ..store import open_folder
+    from ..io.stage_cache import open_folder
     from ..view.mesh import draw_mesh
+
     open_folder(Path(file).parent)
     draw_mesh(mesh_made, file)

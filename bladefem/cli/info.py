@@ -11,11 +11,15 @@ __all__ = ["facts"]
 
 def facts() -> list[tuple[str, str]]:
     """Rows of name and value: versions, solvers, BLAS, MPI, threads."""
-    from ..store import versions
+    from ..io.stage_cache import versions
+
     rows = [("python", platform.python_version()), ("system", _system()), *versions().items()]
     rows += _solvers()
-    rows += [("BLAS", ", ".join(_loaded("openblas", "blis", "mkl", "refblas", "libblas")) or "unknown"),
-             ("cores", str(os.cpu_count())), ("OMP_NUM_THREADS", os.environ.get("OMP_NUM_THREADS", "not set"))]
+    rows += [
+        ("BLAS", ", ".join(_loaded("openblas", "blis", "mkl", "refblas", "libblas")) or "unknown"),
+        ("cores", str(os.cpu_count())),
+        ("OMP_NUM_THREADS", os.environ.get("OMP_NUM_THREADS", "not set")),
+    ]
     return rows
 
 
@@ -33,10 +37,12 @@ def _solvers() -> list[tuple[str, str]]:
     except ImportError as error:
         return [("PETSc", f"absent ({error})")]
     implementation, version = MPI.get_vendor()
-    return [("PETSc", ".".join(map(str, PETSc.Sys.getVersion()))),
-            ("PETSc scalars", str(PETSc.ScalarType.__name__)),
-            ("MUMPS", _mumps(PETSc)),
-            ("MPI", f"{implementation} {'.'.join(map(str, version))}")]
+    return [
+        ("PETSc", ".".join(map(str, PETSc.Sys.getVersion()))),
+        ("PETSc scalars", str(PETSc.ScalarType.__name__)),
+        ("MUMPS", _mumps(PETSc)),
+        ("MPI", f"{implementation} {'.'.join(map(str, version))}"),
+    ]
 
 
 def _mumps(PETSc: object) -> str:
@@ -54,7 +60,8 @@ def _mumps(PETSc: object) -> str:
         solver.setFactorSolverType("mumps")
         solver.setUp()
         ordering = solver.getFactorMatrix().getMumpsInfog(7)
-    except Exception as error:          # PETSc raises its own error classes for a missing solver
+    except Exception as error:
+        # PETSc raises its own error classes for a missing solver
         return f"absent ({str(error).splitlines()[-1]})"
     names = {0: "AMD", 2: "AMF", 3: "SCOTCH", 4: "PORD", 5: "METIS", 6: "QAMD"}
     return f"present (ordering {names.get(ordering, ordering)})"

@@ -26,87 +26,208 @@ exit codes: 0 done, 1 not solved, 2 bad input, 130 interrupted, 143 ended by SIG
 
 # command: (what it does, example, function)
 _COMMANDS = {
-    "check": ("print the resolved scene, defaults marked, and what is wrong with it",
-              "bladefem check scenes/wedge.toml --set aerofoil.twist='25 deg'", commands.check),
-    "mesh": ("draw and mesh the geometry, print the quality table",
-             "bladefem mesh scenes/wedge.toml --view mesh.png", commands.mesh),
-    "modes": ("natural frequencies and mode shapes, for each nodal diameter of a wheel, with tables and pictures",
-              "bladefem modes scenes/wedge.toml --set model.nodal_diameters=0,1,6\n"
-              "  bladefem modes scenes/wedge.toml --campbell '0, 2000, ..., 12000 rpm'\n"
-              "  bladefem modes scenes/wedge.toml --forced 'pressure_side=500 Pa' --damping 'structural=0.2 %'\n"
-              "  bladefem modes scenes/plane.toml --converge '6, 4, 2.8 mm'\n"
-              "  bladefem modes scenes/wedge.toml -o runs/b --set aerofoil.twist='25 deg' --compare runs/wedge",
-              commands.modes),
-    "contact": ("seat the damper: pressure on each face",
-                "bladefem contact scenes/wedge.toml", commands.contact),
-    "reduce": ("reduce blade and damper to their contact points, ready for responses on many ranks",
-               "bladefem reduce scenes/wedge.toml", commands.reduce),
-    "response": ("forced response with friction for each load",
-                 "bladefem response scenes/wedge.toml --set study.loads='20, 50, 100 N'", commands.response),
-    "study": ("the same for several values of one parameter, side by side",
-              "bladefem study scenes/wedge.toml --vary damper.angle='30, 40, 50 deg'", study.study),
-    "chart": ("time against error of methods and models, with the automatic choice",
-              "bladefem chart scenes/plane.toml --budget 60", commands.chart),
-    "report": ("figures, tables and report of a run",
-               "bladefem report runs/wedge", commands.report),
-    "run": ("everything, from mesh to report", "bladefem run scenes/wedge.toml -o runs/wedge", commands.report),
+    "check": (
+        "print the resolved scene, defaults marked, and what is wrong with it",
+        "bladefem check scenes/wedge.toml --set aerofoil.twist='25 deg'",
+        commands.check,
+    ),
+    "mesh": (
+        "draw and mesh the geometry, print the quality table",
+        "bladefem mesh scenes/wedge.toml --view mesh.png",
+        commands.mesh,
+    ),
+    "modes": (
+        "natural frequencies and mode shapes, for each nodal diameter of a wheel, with tables and "
+        "pictures",
+        "bladefem modes scenes/wedge.toml --set model.nodal_diameters=0,1,6\n"
+        "  bladefem modes scenes/wedge.toml --campbell '0, 2000, ..., 12000 rpm'\n"
+        "  bladefem modes scenes/wedge.toml --forced 'pressure_side=500 Pa' --damping "
+        "'structural=0.2 %'\n"
+        "  bladefem modes scenes/plane.toml --converge '6, 4, 2.8 mm'\n"
+        "  bladefem modes scenes/wedge.toml -o runs/b --set aerofoil.twist='25 deg' --compare "
+        "runs/wedge",
+        commands.modes,
+    ),
+    "contact": (
+        "seat the damper: pressure on each face",
+        "bladefem contact scenes/wedge.toml",
+        commands.contact,
+    ),
+    "reduce": (
+        "reduce blade and damper to their contact points, ready for responses on many ranks",
+        "bladefem reduce scenes/wedge.toml",
+        commands.reduce,
+    ),
+    "response": (
+        "forced response with friction for each load",
+        "bladefem response scenes/wedge.toml --set study.loads='20, 50, 100 N'",
+        commands.response,
+    ),
+    "study": (
+        "the same for several values of one parameter, side by side",
+        "bladefem study scenes/wedge.toml --vary damper.angle='30, 40, 50 deg'",
+        study.study,
+    ),
+    "chart": (
+        "time against error of methods and models, with the automatic choice",
+        "bladefem chart scenes/plane.toml --budget 60",
+        commands.chart,
+    ),
+    "report": (
+        "figures, tables and report of a run",
+        "bladefem report runs/wedge",
+        commands.report,
+    ),
+    "run": (
+        "everything, from mesh to report",
+        "bladefem run scenes/wedge.toml -o runs/wedge",
+        commands.report,
+    ),
 }
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run one command and return its exit code; messages go to the error stream of rank 0."""
-    os.environ.setdefault("OMP_NUM_THREADS", "1")       # more BLAS threads only get in each other's way
+    # more BLAS threads only get in each other's way
+    os.environ.setdefault("OMP_NUM_THREADS", "1")
     options = parser().parse_args(arguments)
-    with ExitStack() as options.held:                   # run folders, kept for this command
+    # run folders, kept for this command
+    with ExitStack() as options.held:
         return ranks.guarded(lambda comm: options.function(options, comm), options)
 
 
 def parser() -> argparse.ArgumentParser:
     """All commands with their arguments."""
-    top = argparse.ArgumentParser("bladefem", epilog=_EXAMPLES, formatter_class=argparse.RawDescriptionHelpFormatter,
-                                  description="Friction-damped turbine blades, from geometry to design chart.")
+    top = argparse.ArgumentParser(
+        "bladefem",
+        epilog=_EXAMPLES,
+        formatter_class=argparse.RawDescriptionHelpFormatter,
+        description="Friction-damped turbine blades, from geometry to design chart.",
+    )
     subs = top.add_subparsers(dest="command", required=True, metavar="command")
     for name, (what, example, function) in _COMMANDS.items():
         sub = _command(subs, name, what, example, function)
-        sub.add_argument("scene", nargs="?" if name == "chart" else None,
-                         help="scene file (TOML), or the folder of an earlier run")
-        sub.add_argument("--set", action="append", default=[], metavar="KEY=VALUE", dest="overrides",
-                         help="another value for one field, such as aerofoil.twist='25 deg'; may be repeated")
+        sub.add_argument(
+            "scene",
+            nargs="?" if name == "chart" else None,
+            help="scene file (TOML), or the folder of an earlier run",
+        )
+        sub.add_argument(
+            "--set",
+            action="append",
+            default=[],
+            metavar="KEY=VALUE",
+            dest="overrides",
+            help="another value for one field, such as aerofoil.twist='25 deg'; may be repeated",
+        )
         if name != "check":
-            sub.add_argument("-o", "--output", metavar="FOLDER", help="run folder (default: runs/<name of the scene>)")
-            sub.add_argument("-q", "--quiet", action="store_true", help="no progress bars and no summary")
-    subs.choices["mesh"].add_argument("--view", metavar="PNG", help="also draw the mesh into this file")
+            sub.add_argument(
+                "-o",
+                "--output",
+                metavar="FOLDER",
+                help="run folder (default: runs/<name of the scene>)",
+            )
+            sub.add_argument(
+                "-q", "--quiet", action="store_true", help="no progress bars and no summary"
+            )
+    subs.choices["mesh"].add_argument(
+        "--view", metavar="PNG", help="also draw the mesh into this file"
+    )
     _modes_arguments(subs.choices["modes"])
-    subs.choices["study"].add_argument("--vary", required=True, metavar="KEY=VALUES",
-                                       help="field and its values, such as damper.angle='30, 40, 50 deg'")
-    subs.choices["chart"].add_argument("--budget", type=float, default=120.0, metavar="SECONDS",
-                                       help="CPU time for the variants; what would exceed it is left out and named")
-    subs.choices["chart"].add_argument("--reference", action="store_true", help="the built-in reference blade instead")
-    subs.choices["chart"].add_argument("--mesh", metavar="SIZES", nargs="?", const="", help="also compare meshes of "
-                                       "first and second order with these element sizes, such as '10, 7, 5 mm'")
-    info = _command(subs, "info", "versions and threads of what bladefem runs on", "bladefem info", commands.info)
+    subs.choices["study"].add_argument(
+        "--vary",
+        required=True,
+        metavar="KEY=VALUES",
+        help="field and its values, such as damper.angle='30, 40, 50 deg'",
+    )
+    subs.choices["chart"].add_argument(
+        "--budget",
+        type=float,
+        default=120.0,
+        metavar="SECONDS",
+        help="CPU time for the variants; what would exceed it is left out and named",
+    )
+    subs.choices["chart"].add_argument(
+        "--reference", action="store_true", help="the built-in reference blade instead"
+    )
+    subs.choices["chart"].add_argument(
+        "--mesh",
+        metavar="SIZES",
+        nargs="?",
+        const="",
+        help="also compare meshes of "
+        "first and second order with these element sizes, such as '10, 7, 5 mm'",
+    )
+    info = _command(
+        subs,
+        "info",
+        "versions and threads of what bladefem runs on",
+        "bladefem info",
+        commands.info,
+    )
     info.set_defaults(scene=None)
     return top
 
 
 def _modes_arguments(sub: argparse.ArgumentParser) -> None:
-    sub.add_argument("--campbell", metavar="SPEEDS", help="Campbell and interference diagrams, at speeds such as "
-                     "'0, 2000, 4000 rpm' or '0, 1000, ..., 12000 rpm'")
-    sub.add_argument("--converge", metavar="SIZES", nargs="?", const="", help="refine the mesh: frequencies at three "
-                     "or more element sizes such as '6, 4, 2.8 mm' (chosen when left out), estimated limit and order")
-    sub.add_argument("--compare", metavar="FOLDER", help="MAC of the mode shapes against those of an earlier run")
-    sub.add_argument("--forced", metavar="LOADS", nargs="?", const="", help="linear response to the engine order, "
-                     "of the scene's excitation or of loads such as 'excitation, pressure_side=500 Pa'")
-    sub.add_argument("--damping", metavar="KINDS", help="for --forced instead of the scene's: 'ratio=0.1 %%', "
-                     "'structural=0.2 %%', 'mass=20 1/s, stiffness=1e-7 s'")
-    sub.add_argument("--direct", action="store_true", help="solve every nodal diameter from scratch")
-    sub.add_argument("--pictures", metavar="N", type=int, default=4, help="modes that are drawn (4); 0: tables only")
+    sub.add_argument(
+        "--campbell",
+        metavar="SPEEDS",
+        help="Campbell and interference diagrams, at speeds such as "
+        "'0, 2000, 4000 rpm' or '0, 1000, ..., 12000 rpm'",
+    )
+    sub.add_argument(
+        "--converge",
+        metavar="SIZES",
+        nargs="?",
+        const="",
+        help="refine the mesh: frequencies at three "
+        "or more element sizes such as '6, 4, 2.8 mm' (chosen when left out), estimated limit and "
+        "order",
+    )
+    sub.add_argument(
+        "--compare", metavar="FOLDER", help="MAC of the mode shapes against those of an earlier run"
+    )
+    sub.add_argument(
+        "--forced",
+        metavar="LOADS",
+        nargs="?",
+        const="",
+        help="linear response to the engine order, "
+        "of the scene's excitation or of loads such as 'excitation, pressure_side=500 Pa'",
+    )
+    sub.add_argument(
+        "--damping",
+        metavar="KINDS",
+        help="for --forced instead of the scene's: 'ratio=0.1 %%', "
+        "'structural=0.2 %%', 'mass=20 1/s, stiffness=1e-7 s'",
+    )
+    sub.add_argument(
+        "--direct", action="store_true", help="solve every nodal diameter from scratch"
+    )
+    sub.add_argument(
+        "--pictures",
+        metavar="N",
+        type=int,
+        default=4,
+        help="modes that are drawn (4); 0: tables only",
+    )
 
 
-def _command(subs: argparse._SubParsersAction, name: str, what: str, example: str, function: object,
-             ) -> argparse.ArgumentParser:
-    sub = subs.add_parser(name, help=what, description=f"{what[0].upper()}{what[1:]}.", epilog=f"example:\n  {example}",
-                          formatter_class=argparse.RawDescriptionHelpFormatter)
+def _command(
+    subs: argparse._SubParsersAction,
+    name: str,
+    what: str,
+    example: str,
+    function: object,
+) -> argparse.ArgumentParser:
+    sub = subs.add_parser(
+        name,
+        help=what,
+        description=f"{what[0].upper()}{what[1:]}.",
+        epilog=f"example:\n  {example}",
+        formatter_class=argparse.RawDescriptionHelpFormatter,
+    )
     sub.set_defaults(function=function, output=None, quiet=False)
     return sub
 

@@ -1,4 +1,6 @@
-"""What goes wrong becomes one sentence and an exit code, on one rank or on many; no rank waits for ever."""
+"""What goes wrong becomes one sentence and an exit code, on one rank or on many; no rank waits for
+ever.
+"""
 
 from __future__ import annotations
 
@@ -16,7 +18,8 @@ from ..errors import InputError, NotSolvedError
 
 __all__ = ["communicator", "guarded"]
 
-PATIENCE = 10.0     # [s] that a failed rank waits for the others to fail as well
+# [s] that a failed rank waits for the others to fail as well
+PATIENCE = 10.0
 
 
 def communicator() -> Any:
@@ -52,7 +55,8 @@ def _guarded(action: Callable[[Any], None], stopped: list[int]) -> int:
     except KeyboardInterrupt:
         return _stopped(comm, stopped)
     except Exception as error:
-        if stopped:         # a library made an error of its own out of the interrupt
+        # a library made an error of its own out of the interrupt
+        if stopped:
             return _stopped(comm, stopped)
         code, text = _sentence(error)
         if comm is None:
@@ -67,32 +71,60 @@ def _guarded(action: Callable[[Any], None], stopped: list[int]) -> int:
 
 
 def _sentence(error: Exception) -> tuple[int, str]:
-    """Exit code and text: one sentence for what a user can mend, the whole traceback for our own mistakes."""
+    """Exit code and text: one sentence for what a user can mend, the whole traceback for our own
+    mistakes.
+    """
     if isinstance(error, InputError):
         return 2, str(error)
     if isinstance(error, NotSolvedError):
         return 1, f"not solved: {error}"
     if isinstance(error, MemoryError):
         return 1, f"not solved: out of memory ({error}); a coarser mesh.size needs less"
-    if isinstance(error, ModuleNotFoundError) and (error.name or "").partition(".")[0] in _INSTALLED:
+    if (
+        isinstance(error, ModuleNotFoundError)
+        and (error.name or "").partition(".")[0] in _INSTALLED
+    ):
         return 2, f"{error.name} is not installed; run ./setup.sh"
-    return 1, "this is a mistake in the program, please report it:\n" + "".join(traceback.format_exception(error))
+    return 1, "this is a mistake in the program, please report it:\n" + "".join(
+        traceback.format_exception(error)
+    )
 
 
-_INSTALLED = {"dolfinx", "petsc4py", "slepc4py", "mpi4py", "gmsh", "pyvista", "matplotlib", "numba", "xarray", "h5py",
-              "h5netcdf", "pandas", "tqdm", "meshio", "jinja2", "scipy", "numpy"}
+_INSTALLED = {
+    "dolfinx",
+    "petsc4py",
+    "slepc4py",
+    "mpi4py",
+    "gmsh",
+    "pyvista",
+    "matplotlib",
+    "numba",
+    "xarray",
+    "h5py",
+    "h5netcdf",
+    "pandas",
+    "tqdm",
+    "meshio",
+    "jinja2",
+    "scipy",
+    "numpy",
+}
 
 
 @contextmanager
 def _interruptible() -> Iterator[list[int]]:
-    """The signals that came; a batch system's SIGTERM cleans up like Ctrl-C, to which background jobs stay deaf."""
-    stopped, before = [], {}
+    """The signals that came; a batch system's SIGTERM cleans up like Ctrl-C, to which background
+    jobs stay deaf.
+    """
+    stopped = []
+    before = {}
 
     def stop(number: int, _: Any) -> None:
         stopped.append(number)
         raise KeyboardInterrupt
 
-    with suppress(ValueError):      # only a main thread may
+    # only a main thread may
+    with suppress(ValueError):
         for number in (signal.SIGTERM, signal.SIGINT):
             if number == signal.SIGTERM or signal.getsignal(number) is signal.default_int_handler:
                 before[number] = signal.signal(number, stop)
@@ -104,10 +136,17 @@ def _interruptible() -> Iterator[list[int]]:
 
 
 def _stopped(comm: Any, signals: list[int]) -> int:
-    """Ctrl-C, or the end that a batch system asks for: 128 plus the signal's number, as shells have it."""
+    """Ctrl-C, or the end that a batch system asks for: 128 plus the signal's number, as shells have
+    it.
+    """
     ended = signal.SIGTERM in signals
-    return _tell(comm, f"{'ended by SIGTERM' if ended else 'interrupted'}; finished stages are kept, the same command "
-                       "goes on after them", 143 if ended else 130)
+    return _tell(
+        comm,
+        f"{'ended by SIGTERM' if ended else 'interrupted'}; finished stages are kept, the same "
+        "command "
+        "goes on after them",
+        143 if ended else 130,
+    )
 
 
 def _tell(comm: Any, text: str, code: int) -> int:
@@ -117,8 +156,11 @@ def _tell(comm: Any, text: str, code: int) -> int:
 
 
 def _all_arrive(meeting: Any) -> bool:
-    """Whether every rank failed as well; else one of them waits in a collective call that will never come."""
-    request, deadline = meeting.Ibarrier(), time.monotonic() + PATIENCE
+    """Whether every rank failed as well; else one of them waits in a collective call that will
+    never come.
+    """
+    request = meeting.Ibarrier()
+    deadline = time.monotonic() + PATIENCE
     while not request.Test():
         if time.monotonic() > deadline:
             return False

@@ -8,10 +8,22 @@ from typing import Any
 
 from geometry.quality import quality_rows
 
-from ..units import show
+from ..scene.units import show
 
-__all__ = ["frame", "frequencies", "mesh_quality", "plain", "pressures", "reduction", "resolved_scene", "responses",
-           "side_by_side", "summary", "survey", "table"]
+__all__ = [
+    "frame",
+    "frequencies",
+    "mesh_quality",
+    "plain",
+    "pressures",
+    "reduction",
+    "resolved_scene",
+    "responses",
+    "side_by_side",
+    "summary",
+    "survey",
+    "table",
+]
 
 
 def plain(rows: Sequence[Sequence[object]], head: Sequence[str] = ()) -> str:
@@ -20,9 +32,13 @@ def plain(rows: Sequence[Sequence[object]], head: Sequence[str] = ()) -> str:
     if not cells:
         return ""
     widths = [max(len(row[i]) for row in cells) for i in range(len(cells[0]))]
-    right = [all(_is_number(row[i]) for row in cells[bool(head):]) for i in range(len(widths))]
-    lines = ["  ".join(c.rjust(w) if r else c.ljust(w) for c, w, r in zip(row, widths, right, strict=True)).rstrip()
-             for row in cells]
+    right = [all(_is_number(row[i]) for row in cells[bool(head) :]) for i in range(len(widths))]
+    lines = [
+        "  ".join(
+            c.rjust(w) if r else c.ljust(w) for c, w, r in zip(row, widths, right, strict=True)
+        ).rstrip()
+        for row in cells
+    ]
     if head:
         lines.insert(1, "-" * max(map(len, lines)))
     return "\n".join(lines)
@@ -62,30 +78,54 @@ def frequencies(sets: Sequence[Any]) -> str:
 
 
 def reduction(reduced: Any) -> str:
-    """Size of the reduced bodies: a row for each nodal diameter of the blade, one for the damper."""
+    """Size of the reduced bodies: a row for each nodal diameter of the blade, one for the
+    damper.
+    """
+
     def row(name: str, body: Any) -> list[object]:
         return [name, len(body.omega), f"{body.omega.max() / (2 * pi):.1f}", body.shapes.shape[0]]
 
-    rows = [row(f"sector, nodal diameter {n}" if reduced.sectors else "blade", body)
-            for n, body in reduced.sector.items()]
-    return plain([*rows, row("damper", reduced.damper)], ["body", "modes", "highest [Hz]", "port freedoms"])
+    rows = [
+        row(f"sector, nodal diameter {n}" if reduced.sectors else "blade", body)
+        for n, body in reduced.sector.items()
+    ]
+    return plain(
+        [*rows, row("damper", reduced.damper)], ["body", "modes", "highest [Hz]", "port freedoms"]
+    )
 
 
 def survey(found: Any) -> str:
     """Frequencies, and the short tables of what was asked for beside them."""
     parts = [frequencies(found.run.modes)]
     if found.campbell is not None:
-        rows = [[row.engine_order, row.mode, f"{row.frequency:.2f}", f"{30 * row.speed / pi:.1f}"]
-                for row in found.campbell.crossings.itertuples()]
-        parts.append(plain(rows, ["engine order", "mode", "crossing [Hz]", "speed [rpm]"]) if rows
-                     else "no engine order crosses a mode in this range of speeds")
+        rows = [
+            [row.engine_order, row.mode, f"{row.frequency:.2f}", f"{30 * row.speed / pi:.1f}"]
+            for row in found.campbell.crossings.itertuples()
+        ]
+        parts.append(
+            plain(rows, ["engine order", "mode", "crossing [Hz]", "speed [rpm]"])
+            if rows
+            else "no engine order crosses a mode in this range of speeds"
+        )
     if found.convergence is not None:
-        rows = [[row.mode, f"{row.frequency:.2f}", "" if row.reason else f"{row.limit:.2f}",
-                 "" if row.reason else f"{row.order:.2f}", f"{100 * row.error:.3f}", row.reason]
-                for row in found.convergence.summary.itertuples()]
-        parts.append(plain(rows, ["mode", "finest [Hz]", "limit [Hz]", "order", "error [%]", "why no limit"]))
+        rows = [
+            [
+                row.mode,
+                f"{row.frequency:.2f}",
+                "" if row.reason else f"{row.limit:.2f}",
+                "" if row.reason else f"{row.order:.2f}",
+                f"{100 * row.error:.3f}",
+                row.reason,
+            ]
+            for row in found.convergence.summary.itertuples()
+        ]
+        parts.append(
+            plain(rows, ["mode", "finest [Hz]", "limit [Hz]", "order", "error [%]", "why no limit"])
+        )
     if found.answer is not None:
-        parts.append(table(found.answer.resonances[["mode", "frequency", "amplitude", "phase", "largest"]]))
+        parts.append(
+            table(found.answer.resonances[["mode", "frequency", "amplitude", "phase", "largest"]])
+        )
     if found.mac is not None:
         rows = [[i + 1, row.argmax() + 1, f"{row.max():.4f}"] for i, row in enumerate(found.mac)]
         parts.append(plain(rows, ["mode", "mode of the other run", "MAC"]))
@@ -98,25 +138,50 @@ def pressures(maps: Mapping[float, Sequence[Any]]) -> str:
     for load, seats in maps.items():
         for seat in seats:
             share = seat.patch.area[seat.force > 0].sum() / seat.patch.area.sum()
-            rows.append([show(load, "N"), seat.patch.name, len(seat.force), f"{seat.force.sum():.6g}",
-                         f"{seat.pressure.max() / 1e6:.4g}", f"{100 * share:.1f}", f"{seat.complementarity:.1e}"])
-    return plain(rows, ["load", "face", "nodes", "force [N]", "peak [MPa]", "pressed [%]", "complementarity"])
+            rows.append(
+                [
+                    show(load, "N"),
+                    seat.patch.name,
+                    len(seat.force),
+                    f"{seat.force.sum():.6g}",
+                    f"{seat.pressure.max() / 1e6:.4g}",
+                    f"{100 * share:.1f}",
+                    f"{seat.complementarity:.1e}",
+                ]
+            )
+    return plain(
+        rows, ["load", "face", "nodes", "force [N]", "peak [MPa]", "pressed [%]", "complementarity"]
+    )
 
 
 def responses(response: Any) -> str:
-    """Resonance against load, and what damping is gained over no damper; in the units of the report."""
+    """Resonance against load, and what damping is gained over no damper; in the units of the
+    report.
+    """
     import pandas as pd
 
-    from ..study.loads import summary
-    undamped, curves = response.free_peak[1], response.curves
+    from ..study.pipeline.loads import summary
+
+    undamped = response.free_peak[1]
+    curves = response.curves
     rows = pd.DataFrame(summary(curves, response.limits))[list(SHOWN)]
     rows.insert(0, "seat load", ["no damper", *map(_case, curves), "full stick"])
     best = min(curves, key=lambda c: c.peak_amplitude)
-    return (f"{table(rows)}\nbest of these loads: {_case(best)}, amplitude divided by "
-            f"{undamped / best.peak_amplitude:.3g}")
+    return (
+        f"{table(rows)}\nbest of these loads: {_case(best)}, amplitude divided by "
+        f"{undamped / best.peak_amplitude:.3g}"
+    )
 
 
-SHOWN = ("peak_frequency", "peak_amplitude", "reduction", "dissipated", "error", "points", "unconverged")
+SHOWN = (
+    "peak_frequency",
+    "peak_amplitude",
+    "reduction",
+    "dissipated",
+    "error",
+    "points",
+    "unconverged",
+)
 
 
 def _case(curve: Any) -> str:
@@ -126,20 +191,29 @@ def _case(curve: Any) -> str:
 
 def side_by_side(name: str, best: Any) -> str:
     """The best load of each value of a field; the files hold more columns."""
-    columns = ["value", "free_frequency", "load", *(c for c in SHOWN if c not in ("dissipated", "points"))]
+    columns = [
+        "value",
+        "free_frequency",
+        "load",
+        *(c for c in SHOWN if c not in ("dissipated", "points")),
+    ]
     return table(best[columns].rename(columns={"value": name}))
 
 
 def table(rows: Any) -> str:
     """A pandas table of SI columns, in the units of the report."""
     from ..report.tables import readable
+
     return frame(readable(rows))
 
 
 def summary(run: Any) -> str:
     """Messages of the run, where the time went and where the results are."""
     total = sum(run.timings.values())
-    rows = [[name, f"{t:.2f}", f"{100 * t / total if total else 0:.0f}"] for name, t in run.timings.items()]
+    rows = [
+        [name, f"{t:.2f}", f"{100 * t / total if total else 0:.0f}"]
+        for name, t in run.timings.items()
+    ]
     table = plain([*rows, ["total", f"{total:.2f}", "100"]], ["stage", "time [s]", "share [%]"])
     return "\n".join([*run.messages, table, f"results: {run.folder}"])
 

@@ -1,6 +1,7 @@
 """Hertz' theory of smooth bodies pressed on each other: how wide they touch.
 
-Johnson, Contact Mechanics (1985), Sect. 4.2; R is the relative radius of curvature, P the whole force:
+Johnson, Contact Mechanics (1985), Sect. 4.2; R is the relative radius of curvature, P the whole
+force:
 
     1 / E* = (1 - nu_1^2) / E_1 + (1 - nu_2^2) / E_2
     point:  a^3 = 3 P R / (4 E*)
@@ -11,11 +12,13 @@ from __future__ import annotations
 
 import numpy as np
 
-from ..scene import Material
+from ..scene.tables import Material
 
 __all__ = ["FINEST", "contact_modulus", "line_width", "point_radius"]
 
-FINEST = 2.0    # width over element size, at least: wherever the nodes lie the peak is within 2 % (1: 28 %, 4: 0.4 %)
+# width over element size, at least: wherever the nodes lie the peak is within 2 % (1: 28 %, 4: 0.4
+# %)
+FINEST = 2.0
 
 
 def contact_modulus(one: Material, other: Material) -> float:

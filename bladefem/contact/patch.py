@@ -1,17 +1,20 @@
-"""Contact patches: the corner nodes of matched faces, their areas, frames, and the port vectors of the two bodies.
+"""Contact patches: the corner nodes of matched faces, their areas, frames, and the port vectors of
+the two bodies.
 
-The traction of a patch is p = sum f_i / A_i chi_i over its corner nodes, A_i the integral of chi_i, turned into
-consistent loads of the elements' own shape functions; the displacement that belongs to f_i is the chi_i-weighted mean.
-One matrix P serves both (u_port = P^T u, nodal forces = P f), so the element stiffness is left alone.
+The traction of a patch is p = sum f_i / A_i chi_i over its corner nodes, A_i the integral of chi_i,
+turned into consistent loads of the elements' own shape functions; the displacement that belongs to
+f_i is the chi_i-weighted mean. One matrix P serves both (u_port = P^T u, nodal forces = P f), so
+the element stiffness is left alone.
 
-The choice of chi was measured, relative errors on quadratic tetrahedra with element size a/10 (Hertz sphere) and
-a/20 (plane flat punch, r < 0.8 a); benchmarks/contact_hertz.py makes the table again:
+The choice of chi was measured, relative errors on quadratic tetrahedra with element size a/10
+(Hertz sphere) and a/20 (plane flat punch, r < 0.8 a); benchmarks/contact_hertz.py makes the table
+again:
 
-    chi                              sphere: peak   pressure L2     edge    punch: L2
-    hat functions                          0.2 %         6.8 %     3.4 %        1.3 %  (wiggles at the edge)
-    their dual functions                   0.2 %         4.8 %     4.2 %        0.4 %
-    a third hat, two thirds dual (used)    0.0 %         3.0 %     1.8 %        0.4 %
-    mid-side nodes tied to corners         0.8 %         4.7 %     4.2 %    (needs a constrained stiffness)
+    chi                              sphere: peak   pressure L2     edge    punch: L2 hat functions
+    0.2 %         6.8 %     3.4 %        1.3 %  (wiggles at the edge) their dual functions
+    0.2 %         4.8 %     4.2 %        0.4 % a third hat, two thirds dual (used)    0.0 %
+    3.0 %     1.8 %        0.4 % mid-side nodes tied to corners         0.8 %         4.7 %     4.2
+    %    (needs a constrained stiffness)
 """
 
 from __future__ import annotations
@@ -26,31 +29,44 @@ from geometry.mesh import Mesh
 
 from ..data import Patch
 from ..errors import InputError
+from .face_elements import corner_count, face_quadrature, shape
 from .mortar import mortar_faces, mortar_patch
-from .shape import corner_count, face_quadrature, shape
 from .surface import FaceRule, frames, outward, surface
 
-__all__ = ["initial_gap", "make_patch", "normal_ports", "patch_faces", "patch_means", "port_matrix", "rigid_ports"]
+__all__ = [
+    "initial_gap",
+    "make_patch",
+    "normal_ports",
+    "patch_faces",
+    "patch_means",
+    "port_matrix",
+    "rigid_ports",
+]
 
 
 def make_patch(mesh: Mesh, pair: str) -> Patch:
     """The contact patch of a matched pair of faces, seen from the blade.
 
     Args:
-        mesh: with the pair of that name; its master is the blade's face. A pair without matched nodes (m = 0) is
-            taken as non-matching: both sides are then integrated over the faces' overlap (mortar.py).
+        mesh: with the pair of that name; its master is the blade's face. A pair without matched
+            nodes (m = 0) is taken as non-matching: both sides are then integrated over the faces'
+            overlap (mortar.py).
         pair: "this", "next", or another name in mesh.pairs; it becomes the patch's name.
 
     Returns:
-        Patch. Frames: the normal points out of the master body; t2 is the engine axis z laid into the face (for
-        plane meshes exactly z); t1 = normal x t2, which on an underplatform seat runs towards +y: up the slope on
-        seat_right. Where the normal is within 25 degrees of z, t2 is the y axis laid into the face instead.
+        Patch. Frames: the normal points out of the master body; t2 is the engine axis z laid into
+        the face (for plane meshes exactly z); t1 = normal x t2, which on an underplatform seat runs
+        towards +y: up the slope on seat_right. Where the normal is within 25 degrees of z, t2 is
+        the y axis laid into the face instead.
 
     Raises:
         InputError: unknown pair, or a patch without matched faces.
     """
     if pair not in mesh.pairs:
-        raise InputError(f"contact pair '{pair}' is not in the mesh; it has {', '.join(sorted(mesh.pairs)) or 'none'}")
+        raise InputError(
+            f"contact pair '{pair}' is not in the mesh; it has "
+            f"{', '.join(sorted(mesh.pairs)) or 'none'}"
+        )
     patch = _matched(mesh, pair) if mesh.pairs[pair].nodes.size else mortar_patch(mesh, pair)
     return replace(patch, places=patch_means(patch, mesh).T @ mesh.points)
 
@@ -66,21 +82,35 @@ def _matched(mesh: Mesh, pair: str) -> Patch:
     numbers = numbers.reshape(-1, corners)
     sign = outward(mesh, faces, weighted.sum(axis=1))
     for k in range(corners):
-        np.add.at(normals, numbers[:, k], np.einsum("fqi,q->fi", weighted, hats[:, k]) * sign[:, None])
+        np.add.at(
+            normals, numbers[:, k], np.einsum("fqi,q->fi", weighted, hats[:, k]) * sign[:, None]
+        )
         np.add.at(area, numbers[:, k], np.linalg.norm(weighted, axis=2) @ hats[:, k])
     normals /= np.linalg.norm(normals, axis=1, keepdims=True)
-    return Patch(pair, mesh.points[nodes], area, frames(normals, mesh.dimension), numbers, nodes, slave[nodes])
+    return Patch(
+        pair,
+        mesh.points[nodes],
+        area,
+        frames(normals, mesh.dimension),
+        numbers,
+        nodes,
+        slave[nodes],
+    )
 
 
 def patch_faces(mesh: Mesh, pair: str) -> tuple[np.ndarray, np.ndarray]:
-    """The master's faces (nf, k) whose nodes are all matched, and a table (n_points,) from master to slave nodes."""
+    """The master's faces (nf, k) whose nodes are all matched, and a table (n_points,) from master
+    to slave nodes.
+    """
     p = mesh.pairs[pair]
     slave = np.full(len(mesh.points), -1)
     slave[p.nodes[0]] = p.nodes[1]
     faces = mesh.faces[p.master]
     faces = faces[(slave[faces] >= 0).all(axis=1)]
     if len(faces) == 0:
-        raise InputError(f"contact pair '{pair}' has no matched faces between '{p.master}' and '{p.slave}'")
+        raise InputError(
+            f"contact pair '{pair}' has no matched faces between '{p.master}' and '{p.slave}'"
+        )
     return faces, slave
 
 
@@ -98,9 +128,10 @@ def port_matrix(patches: Sequence[Patch], mesh: Mesh, side: str = "blade") -> sp
         side: "blade" (masters) or "damper" (slaves; the frames turned by the pair's rotation).
 
     Returns:
-        P (dimension * n_points, ports): nodal forces = P f with f in N, u_port = P^T u; ports are node-major
-        (normal, t1, t2), or (normal, t1) in a plane mesh. Uniform pressure f_i = p A_i gives the elements'
-        consistent loads, and a linear displacement is measured at the centre of each chi.
+        P (dimension * n_points, ports): nodal forces = P f with f in N, u_port = P^T u; ports are
+        node-major (normal, t1, t2), or (normal, t1) in a plane mesh. Uniform pressure f_i = p A_i
+        gives the elements' consistent loads, and a linear displacement is measured at the centre of
+        each chi.
     """
     return sp.hstack([_ports(patch, mesh, side) for patch in patches], format="csc")
 
@@ -108,29 +139,39 @@ def port_matrix(patches: Sequence[Patch], mesh: Mesh, side: str = "blade") -> sp
 def patch_means(patch: Patch, mesh: Mesh, side: str = "blade") -> sp.csr_matrix:
     """W (n_points, n): W^T v are the chi-weighted means of a field v given at the mesh's nodes.
 
-    Initial gaps must be averaged by it too: at a corner or edge of the patch the mean is not the value at the node.
+    Initial gaps must be averaged by it too: at a corner or edge of the patch the mean is not the
+    value at the node.
     """
     rule = _rule(patch, mesh, side)
     blocks = np.einsum("fqk,fqm->fmk", rule.traction, rule.shape)
     rows = np.repeat(rule.nodes[:, :, None], blocks.shape[2], axis=2)
     columns = np.repeat(rule.columns[:, None, :], blocks.shape[1], axis=1)
-    W = sp.coo_matrix((blocks.ravel(), (rows.ravel(), columns.ravel())), shape=(len(mesh.points), len(patch.area)))
+    W = sp.coo_matrix(
+        (blocks.ravel(), (rows.ravel(), columns.ravel())), shape=(len(mesh.points), len(patch.area))
+    )
     return W.tocsr() @ sp.diags(1 / patch.area)
 
 
 def initial_gap(patch: Patch, mesh: Mesh) -> np.ndarray:
-    """(n,) normal distance of the two faces as meshed [m], chi-weighted means: crowned and rounded faces included."""
-    pair, d = mesh.pairs[patch.name], mesh.dimension
-    blade, damper = (_ports(patch, mesh, side)[:, ::d].T @ place[:, :d].ravel()
-                     for side, place in (("blade", mesh.points), ("damper", mesh.points - pair.shift)))
+    """(n,) normal distance of the two faces as meshed [m], chi-weighted means: crowned and rounded
+    faces included.
+    """
+    pair = mesh.pairs[patch.name]
+    d = mesh.dimension
+    blade, damper = (
+        _ports(patch, mesh, side)[:, ::d].T @ place[:, :d].ravel()
+        for side, place in (("blade", mesh.points), ("damper", mesh.points - pair.shift))
+    )
     return damper - blade
 
 
 def rigid_ports(patches: Sequence[Patch], mesh: Mesh, origin: np.ndarray) -> np.ndarray:
-    """B (ports, d): displacement at the damper-side ports for unit rigid motions about `origin` (3,) [m].
+    """B (ports, d): displacement at the damper-side ports for unit rigid motions about `origin`
+    (3,) [m].
 
-    d = 6 (x, y, z, rotations about x, y, z) for solids, 3 (x, y, rotation about z) in the plane. Moments taken with B^T
-    balance those of the elastic body exactly, which r x f with the nodes' own places would not at the patch's edge.
+    d = 6 (x, y, z, rotations about x, y, z) for solids, 3 (x, y, rotation about z) in the plane.
+    Moments taken with B^T balance those of the elastic body exactly, which r x f with the nodes'
+    own places would not at the patch's edge.
     """
     d = mesh.dimension
     r = mesh.points - np.asarray(origin)
@@ -141,8 +182,11 @@ def rigid_ports(patches: Sequence[Patch], mesh: Mesh, origin: np.ndarray) -> np.
 
 
 def _ports(patch: Patch, mesh: Mesh, side: str) -> sp.csc_matrix:
-    """Port vectors of one patch (dimension * n_points, dimension * n), with the master's own frame at each point."""
-    d, rule = mesh.dimension, _rule(patch, mesh, side)
+    """Port vectors of one patch (dimension * n_points, dimension * n), with the master's own frame
+    at each point.
+    """
+    d = mesh.dimension
+    rule = _rule(patch, mesh, side)
     frame = frames(rule.normal.reshape(-1, 3), d, patch.frame[:, 0])
     if side != "blade":
         frame = frame @ mesh.pairs[patch.name].rotation.T
@@ -151,8 +195,16 @@ def _ports(patch: Patch, mesh: Mesh, side: str) -> sp.csc_matrix:
     rows = (rule.nodes[:, :, None] * d + np.arange(d)).reshape(len(blocks), -1)
     columns = (rule.columns[:, :, None] * d + np.arange(d)).reshape(len(blocks), -1)
     size = (d * len(mesh.points), d * len(patch.area))
-    P = sp.coo_matrix((blocks.ravel(), (np.repeat(rows, columns.shape[1], axis=1).ravel(),
-                                        np.tile(columns, (1, rows.shape[1])).ravel())), shape=size)
+    P = sp.coo_matrix(
+        (
+            blocks.ravel(),
+            (
+                np.repeat(rows, columns.shape[1], axis=1).ravel(),
+                np.tile(columns, (1, rows.shape[1])).ravel(),
+            ),
+        ),
+        shape=size,
+    )
     return (P.tocsr() @ sp.diags(np.repeat(1 / patch.area, d))).tocsc()
 
 
@@ -162,9 +214,14 @@ def _rule(patch: Patch, mesh: Mesh, side: str) -> FaceRule:
         return mortar_faces(patch, mesh, side)
     faces, slave = patch_faces(mesh, patch.name)
     weighted, chi = surface(mesh, faces)
-    corners, size = chi.shape[1], np.linalg.norm(weighted, axis=2)
+    corners = chi.shape[1]
+    size = np.linalg.norm(weighted, axis=2)
     N, _ = shape(faces.shape[1], corners, face_quadrature(corners)[0])
     sign = outward(mesh, faces, weighted.sum(axis=1))
-    return FaceRule(faces if side == "blade" else slave[faces], patch.faces,
-                    np.broadcast_to(N, (len(faces), *N.shape)), size[:, :, None] * chi,
-                    weighted * (sign[:, None] / size)[:, :, None])
+    return FaceRule(
+        faces if side == "blade" else slave[faces],
+        patch.faces,
+        np.broadcast_to(N, (len(faces), *N.shape)),
+        size[:, :, None] * chi,
+        weighted * (sign[:, None] / size)[:, :, None],
+    )

@@ -1,4 +1,6 @@
-"""Geometry of contact faces: quadrature over them, which way is out, and the frames of their nodes."""
+"""Geometry of contact faces: quadrature over them, which way is out, and the frames of their
+nodes.
+"""
 
 from __future__ import annotations
 
@@ -10,7 +12,7 @@ import numpy as np
 from geometry.mesh import Mesh
 
 from ..errors import InputError
-from .shape import corner_count, face_quadrature, shape, traction_shape
+from .face_elements import corner_count, face_quadrature, shape, traction_shape
 
 __all__ = ["FaceRule", "frames", "outward", "surface"]
 
@@ -21,15 +23,22 @@ BODY_CORNERS = {"triangle": 3, "quad": 4, "tetra": 4, "hexahedron": 8, "wedge": 
 class FaceRule:
     """Quadrature over the faces (or pieces of faces) of a patch, seen from one of its bodies."""
 
-    nodes: np.ndarray               # (f, m) nodes of the body
-    columns: np.ndarray             # (f, k) nodes of the patch that carry the traction
-    shape: np.ndarray               # (f, q, m) the body's shape functions
-    traction: np.ndarray            # (f, q, k) traction functions times weights [m^2]
-    normal: np.ndarray              # (f, q, 3) unit vectors out of the master
+    # (f, m) nodes of the body
+    nodes: np.ndarray
+    # (f, k) nodes of the patch that carry the traction
+    columns: np.ndarray
+    # (f, q, m) the body's shape functions
+    shape: np.ndarray
+    # (f, q, k) traction functions times weights [m^2]
+    traction: np.ndarray
+    # (f, q, 3) unit vectors out of the master
+    normal: np.ndarray
 
 
 def surface(mesh: Mesh, faces: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Normal vectors times quadrature weight and depth (nf, q, 3) [m^2], and traction functions (q, corners)."""
+    """Normal vectors times quadrature weight and depth (nf, q, 3) [m^2], and traction functions (q,
+    corners).
+    """
     corners = corner_count(mesh.dimension, faces.shape[1])
     points, weights = face_quadrature(corners)
     _, dN = shape(faces.shape[1], corners, points)
@@ -46,7 +55,10 @@ def outward(mesh: Mesh, faces: np.ndarray, normals: np.ndarray) -> np.ndarray:
     k = corner_count(mesh.dimension, faces.shape[1])
     kind = next((v for name, v in BODY_CORNERS.items() if mesh.cell_type.startswith(name)), None)
     if kind is None:
-        raise InputError(f"cell type '{mesh.cell_type}' has no contact faces; known are {', '.join(BODY_CORNERS)}")
+        raise InputError(
+            f"cell type '{mesh.cell_type}' has no contact faces; known are "
+            f"{', '.join(BODY_CORNERS)}"
+        )
     on_face = np.zeros(len(mesh.points), dtype=bool)
     on_face[faces[:, :k]] = True
     inside = {}
@@ -59,14 +71,19 @@ def outward(mesh: Mesh, faces: np.ndarray, normals: np.ndarray) -> np.ndarray:
     for i, face in enumerate(faces[:, :k]):
         owner = inside.get(frozenset(face.tolist()))
         if owner is None:
-            raise InputError(f"contact face with nodes {face.tolist()} does not belong to any body of the mesh")
+            raise InputError(
+                f"contact face with nodes {face.tolist()} does not belong to any body of the mesh"
+            )
         sign[i] = np.sign(normals[i] @ (mesh.points[face].mean(axis=0) - owner))
     return sign
 
 
 def frames(normals: np.ndarray, dimension: int, like: np.ndarray | None = None) -> np.ndarray:
-    """Frames (n, 3, 3) with rows normal, t1, t2; ``like`` are the normals (k, 3) that decide which axis gives t2."""
-    axis, like = np.zeros_like(normals), normals if like is None else like
+    """Frames (n, 3, 3) with rows normal, t1, t2; ``like`` are the normals (k, 3) that decide which
+    axis gives t2.
+    """
+    axis = np.zeros_like(normals)
+    like = normals if like is None else like
     axis[:, 2] = 1.0
     if dimension == 3 and np.abs(like[:, 2]).max() > np.cos(np.radians(25)):
         axis[:] = [0.0, 1.0, 0.0]

@@ -1,10 +1,12 @@
-"""Iterations on the platform motion: Picard, the paper's discrete Newton (Eq. 34) in three readings, and better ones.
+"""Iterations on the platform motion: Picard, the paper's discrete Newton (Eq. 34) in three
+readings, and better ones.
 
-Eq. 34 does not say what a division of vectors is. Read by amplitude of each component (phases from the map), as a
-complex secant, or on real and imaginary parts apart, it behaves differently; none converges everywhere. Its stopping
-rule, Eq. 35, measures a step, and a small step is no equilibrium: accept on the residual (criterion="residual").
-Anderson mixing works on the same map. ``describing`` is Newton on the additive equation, with the derivative of the
-damper's describing function by differences: no quotient, no spurious fixed point.
+Eq. 34 does not say what a division of vectors is. Read by amplitude of each component (phases from
+the map), as a complex secant, or on real and imaginary parts apart, it behaves differently; none
+converges everywhere. Its stopping rule, Eq. 35, measures a step, and a small step is no
+equilibrium: accept on the residual (criterion="residual"). Anderson mixing works on the same map.
+``describing`` is Newton on the additive equation, with the derivative of the damper's describing
+function by differences: no quotient, no spurious fixed point.
 """
 
 from __future__ import annotations
@@ -21,24 +23,36 @@ from .paper import DamperResponse, Platform, balance, damper_response, equivalen
 
 __all__ = ["METHODS", "Iterated", "Rules", "iterate"]
 
-HUGE = 1e4      # growth over the free motion at which an iteration is given up
+# growth over the free motion at which an iteration is given up
+HUGE = 1e4
 
 
 @dataclass(frozen=True)
 class Rules:
     """How the loop runs and when it stops."""
 
-    averaged: bool = True           # one K_ad, C_ad for all harmonics, or one pair for each
-    criterion: str = "step"         # "step" (Eq. 35) or "residual" of the equilibrium
-    tolerance: float = 0.02         # of the criterion, relative [1]; the paper's 2 %
-    most: int = 60                  # evaluations of the map
-    damper: str = "shooting"        # how the damper is solved: "march" from rest (the paper's) or "shooting"
-    steps: int = 512                # time steps a period of the march
+    # one K_ad, C_ad for all harmonics, or one pair for each
+    averaged: bool = True
+    # "step" (Eq. 35) or "residual" of the equilibrium
+    criterion: str = "step"
+    # of the criterion, relative [1]; the paper's 2 %
+    tolerance: float = 0.02
+    # evaluations of the map
+    most: int = 60
+    # how the damper is solved: "march" from rest (the paper's) or "shooting"
+    damper: str = "shooting"
+    # time steps a period of the march
+    steps: int = 512
 
     def __post_init__(self) -> None:
-        for name, choices in (("criterion", ("step", "residual")), ("damper", ("march", "shooting"))):
+        for name, choices in (
+            ("criterion", ("step", "residual")),
+            ("damper", ("march", "shooting")),
+        ):
             if getattr(self, name) not in choices:
-                raise InputError(f"{name} = '{getattr(self, name)}': expected one of {', '.join(choices)}")
+                raise InputError(
+                    f"{name} = '{getattr(self, name)}': expected one of {', '.join(choices)}"
+                )
 
 
 @dataclass(frozen=True)
@@ -46,18 +60,27 @@ class Iterated:
     """What an iteration returns, converged or not."""
 
     method: str
-    u: np.ndarray                   # (H, n) platform motion [m]
-    probe: np.ndarray               # (H + 1, probes) response of the blade [m]
-    converged: bool                 # by its own criterion
-    residual: float                 # equilibrium |u - u_free + G f(u)| / |u| with the periodic damper motion [1]
-    iterations: int                 # evaluations of the damper
-    periods: int                    # periods of the damper that were integrated
+    # (H, n) platform motion [m]
+    u: np.ndarray
+    # (H + 1, probes) response of the blade [m]
+    probe: np.ndarray
+    # by its own criterion
+    converged: bool
+    # equilibrium |u - u_free + G f(u)| / |u| with the periodic damper motion [1]
+    residual: float
+    # evaluations of the damper
+    iterations: int
+    # periods of the damper that were integrated
+    periods: int
     reason: str
-    steps: tuple[float, ...] = ()   # left side of Eq. 35 over the motion, turn by turn [1]
+    # left side of Eq. 35 over the motion, turn by turn [1]
+    steps: tuple[float, ...] = ()
 
     @property
     def false(self) -> bool:
-        """Said to have converged, though the equilibrium is violated by more than five times 2 %."""
+        """Said to have converged, though the equilibrium is violated by more than five times 2
+        %.
+        """
         return self.converged and not self.residual < 0.1
 
 
@@ -65,7 +88,10 @@ class _Map:
     """g(u) in the independent platform motions c, packed as a real vector; counts its work."""
 
     def __init__(self, side: Platform, rules: Rules):
-        self.side, self.rules, self.calls, self.periods = side, rules, 0, 0
+        self.side = side
+        self.rules = rules
+        self.calls = 0
+        self.periods = 0
         self.last: DamperResponse | None = None
         self.steps: list[float] = []
         self.shape = (len(side.free), len(side.rows))
@@ -88,12 +114,17 @@ class _Map:
         return float(np.linalg.norm(residual(self.side, u, self.force(u))) / np.linalg.norm(u))
 
 
-def iterate(side: Platform, method: str = "amplitude", rules: Rules | None = None,
-            start: np.ndarray | None = None) -> Iterated:
+def iterate(
+    side: Platform,
+    method: str = "amplitude",
+    rules: Rules | None = None,
+    start: np.ndarray | None = None,
+) -> Iterated:
     """Look for the equilibrium of blade and damper.
 
     Args:
-        method: one of METHODS: "picard", "amplitude", "complex", "parts" (Eq. 34 three ways), "anderson", "describing".
+        method: one of METHODS: "picard", "amplitude", "complex", "parts" (Eq. 34 three ways),
+            "anderson", "describing".
         start: (H, n) first platform motion; without damper when left out, as in Fig. 14.
     Raises:
         InputError: unknown method.
@@ -109,29 +140,40 @@ def iterate(side: Platform, method: str = "amplitude", rules: Rules | None = Non
 
 
 def _finish(method: str, g: _Map, c: np.ndarray, converged: bool, reason: str) -> Iterated:
-    side, u = g.side, g.spread(c)
-    force, error = np.full_like(u, np.nan), np.inf
+    side = g.side
+    u = g.spread(c)
+    force = np.full_like(u, np.nan)
+    error = np.inf
     if np.isfinite(u).all() and np.abs(u).max() > 0:
         exact = damper_response(side, u, "shooting")
         force = exact.force
         error = float(np.linalg.norm(residual(side, u, force)) / np.linalg.norm(u))
     forces = np.concatenate([np.zeros((1, u.shape[1])), force])
     probe = probe_motion(side.model, side.omega, forces, np.zeros(1))
-    return Iterated(method, u, probe, converged, error, g.calls, g.periods, reason,
-                    tuple(g.steps))
+    return Iterated(method, u, probe, converged, error, g.calls, g.periods, reason, tuple(g.steps))
 
 
-def _loop(g: _Map, c: np.ndarray, propose: Callable[[list, list], np.ndarray]) -> tuple[np.ndarray, bool, str]:
-    """The shell of all fixed-point methods: ``propose`` makes the next motion from the lists of motions and images."""
-    rules, size = g.rules, np.linalg.norm(c)
-    motions, images = [c], [g(c)]
+def _loop(
+    g: _Map, c: np.ndarray, propose: Callable[[list, list], np.ndarray]
+) -> tuple[np.ndarray, bool, str]:
+    """The shell of all fixed-point methods: ``propose`` makes the next motion from the lists of
+    motions and images.
+    """
+    rules = g.rules
+    size = np.linalg.norm(c)
+    motions = [c]
+    images = [g(c)]
     while g.calls < rules.most:
         new = images[0] if len(images) == 1 else propose(motions, images)
         step = np.linalg.norm(new - motions[-1]) / np.linalg.norm(new)
         g.steps.append(float(step))
         if not np.isfinite(step) or np.linalg.norm(new) > HUGE * size:
             solved = g.last.reason == "periodic" or rules.damper == "march"
-            return motions[-1], False, "diverged" if solved else f"damper not solved: {g.last.reason}"
+            return (
+                motions[-1],
+                False,
+                "diverged" if solved else f"damper not solved: {g.last.reason}",
+            )
         if rules.criterion == "step" and step < rules.tolerance:
             return new, True, f"step {step:.1e} below {rules.tolerance:.1e}"
         motions.append(new)
@@ -158,31 +200,38 @@ def _amplitude(g: _Map, c: np.ndarray) -> tuple[np.ndarray, bool, str]:
     def propose(motions: list, images: list) -> np.ndarray:
         size = _secant(*(np.abs(x) for x in (motions[-1], motions[-2], images[-1], images[-2])))
         return np.abs(size) * np.exp(1j * np.angle(images[-1]))
+
     return _loop(g, c, propose)
 
 
 def _complex(g: _Map, c: np.ndarray) -> tuple[np.ndarray, bool, str]:
-    return _loop(g, c, lambda motions, images: _secant(motions[-1], motions[-2], images[-1], images[-2]))
+    return _loop(
+        g, c, lambda motions, images: _secant(motions[-1], motions[-2], images[-1], images[-2])
+    )
 
 
 def _parts(g: _Map, c: np.ndarray) -> tuple[np.ndarray, bool, str]:
     def propose(motions: list, images: list) -> np.ndarray:
         four = (motions[-1], motions[-2], images[-1], images[-2])
         return _secant(*(x.real for x in four)) + 1j * _secant(*(x.imag for x in four))
+
     return _loop(g, c, propose)
 
 
 def _anderson(g: _Map, c: np.ndarray, depth: int = 5) -> tuple[np.ndarray, bool, str]:
     def propose(motions: list, images: list) -> np.ndarray:
-        x, y = (np.array([_real(v) for v in values[-depth - 1:]]) for values in (motions, images))
+        x, y = (np.array([_real(v) for v in values[-depth - 1 :]]) for values in (motions, images))
         f = y - x
         weights = np.linalg.lstsq((f[1:] - f[:-1]).T, f[-1], rcond=1e-10)[0]
         return _packed(y[-1] - weights @ (y[1:] - y[:-1]), c.shape)
+
     return _loop(g, c, propose)
 
 
 def _describing(g: _Map, c: np.ndarray) -> tuple[np.ndarray, bool, str]:
-    """Newton on the additive residual, first from full stick, then from the motion without damper."""
+    """Newton on the additive residual, first from full stick, then from the motion without
+    damper.
+    """
     side = g.side
     stuck = balance(side, np.full_like(side.free, 1.0) * side.model.elements.kt)[:, side.rows]
     found, converged, reason = _newton(g, stuck)
@@ -191,7 +240,9 @@ def _describing(g: _Map, c: np.ndarray) -> tuple[np.ndarray, bool, str]:
 
 def _newton(g: _Map, c: np.ndarray) -> tuple[np.ndarray, bool, str]:
     """Step halving; Jacobian by differences in 2 H r directions."""
-    side, goal, most = g.side, min(g.rules.tolerance, 1e-2), g.calls + g.rules.most
+    side = g.side
+    goal = min(g.rules.tolerance, 1e-2)
+    most = g.calls + g.rules.most
 
     def r(x: np.ndarray) -> np.ndarray:
         u = g.spread(_packed(x, c.shape))
@@ -214,7 +265,8 @@ def _newton(g: _Map, c: np.ndarray) -> tuple[np.ndarray, bool, str]:
                 break
         else:
             return _packed(x, c.shape), False, "line search stalled"
-        x, value = trial, new
+        x = trial
+        value = new
     return _packed(x, c.shape), False, f"no convergence in {g.rules.most} evaluations"
 
 
@@ -227,5 +279,11 @@ def _packed(x: np.ndarray, shape: tuple[int, ...]) -> np.ndarray:
     return (x[:half] + 1j * x[half:]).reshape(shape)
 
 
-METHODS = {"picard": _picard, "amplitude": _amplitude, "complex": _complex, "parts": _parts, "anderson": _anderson,
-           "describing": _describing}
+METHODS = {
+    "picard": _picard,
+    "amplitude": _amplitude,
+    "complex": _complex,
+    "parts": _parts,
+    "anderson": _anderson,
+    "describing": _describing,
+}

@@ -1,8 +1,10 @@
-"""Stability along a path of periodic solutions: the balance follows the path, Floquet multipliers judge each point.
+"""Stability along a path of periodic solutions: the balance follows the path, Floquet multipliers
+judge each point.
 
-With prescribed normal loads and damping the periodic motion is unique (friction with a given limit is monotone in the
-displacement), and its multipliers stay within the unit circle. Where the normal load follows the motion and the contact
-can open, the stuck and the rocking motion coexist between two folds, with an unstable one between them.
+With prescribed normal loads and damping the periodic motion is unique (friction with a given limit
+is monotone in the displacement), and its multipliers stay within the unit circle. Where the normal
+load follows the motion and the contact can open, the stuck and the rocking motion coexist between
+two folds, with an unstable one between them.
 """
 
 from __future__ import annotations
@@ -13,35 +15,43 @@ from dataclasses import dataclass
 import numpy as np
 
 from bladefem.data import Elements, PortModel
-from bladefem.friction.harmonics import synthesis, to_complex
-from bladefem.hbm.api import solve
-from bladefem.hbm.follow import follow
+from bladefem.friction.fourier import synthesis, to_complex
+from bladefem.hbm.continuation import follow
 from bladefem.hbm.model import Damping, ReducedModel
 from bladefem.hbm.solution import Solution
+from bladefem.hbm.solve import solve
 
-from ..hbm.flow import State
-from ..hbm.shooting import Periodic, harmonics, multipliers, periodic
-from ..hbm.system import System
+from ..time.event_integrator import State
+from ..time.shooting import Periodic, harmonics, multipliers, periodic
+from ..time.system import System
 
 __all__ = ["BranchPoint", "branch", "inclined_contact", "state_of"]
 
-NEAR = 0.02         # relative distance beyond which shooting has left the solution of the balance
+# relative distance beyond which shooting has left the solution of the balance
+NEAR = 0.02
 
 
 @dataclass(frozen=True)
 class BranchPoint:
     """A point of the path."""
 
-    frequency: float        # [Hz]
-    amplitude: float        # of the first harmonic at the probe, by shooting [m]
-    balance: float          # the same by the balance of harmonics [m]
-    multiplier: float       # largest modulus [1]; 1 for a contact that sticks all the time (neutral slider)
-    fold: bool              # the path turned back before this point
-    reason: str             # "periodic", or why shooting did not confirm the point
+    # [Hz]
+    frequency: float
+    # of the first harmonic at the probe, by shooting [m]
+    amplitude: float
+    # the same by the balance of harmonics [m]
+    balance: float
+    # largest modulus [1]; 1 for a contact that sticks all the time (neutral slider)
+    multiplier: float
+    # the path turned back before this point
+    fold: bool
+    # "periodic", or why shooting did not confirm the point
+    reason: str
 
 
 def inclined_contact(load: float = 10.0, force: float = 2.0) -> tuple[ReducedModel, System]:
-    """One mass, 100 Hz, 0.5 % damping, on an inclined contact whose normal load follows it and can open.
+    """One mass, 100 Hz, 0.5 % damping, on an inclined contact whose normal load follows it and can
+    open.
 
     Args:
         load: static normal force [N].
@@ -50,22 +60,41 @@ def inclined_contact(load: float = 10.0, force: float = 2.0) -> tuple[ReducedMod
     Returns:
         The same system for the balance and for integration in time.
     """
-    omega, angle, kn, kt = 200 * np.pi, 1.2, 8e5, 1e5
+    omega = 200 * np.pi
+    angle = 1.2
+    kn = 8e5
+    kt = 1e5
     shapes = np.array([[np.sin(angle)], [np.cos(angle)], [1.0], [1.0]])
-    body = PortModel(np.array([omega]), shapes, np.zeros((4, 4)),
-                     {"contact": slice(0, 2), "load": slice(2, 3), "probe": slice(3, 4)})
+    body = PortModel(
+        np.array([omega]),
+        shapes,
+        np.zeros((4, 4)),
+        {"contact": slice(0, 2), "load": slice(2, 3), "probe": slice(3, 4)},
+    )
     elements = Elements(np.array([kt]), np.array([kn]), np.array([0.3]), np.array([load]), 1)
     model = ReducedModel((body,), elements, {1: np.array([force], complex)}, Damping(ratio=0.005))
     R = shapes[:1]
-    system = System(np.array([omega**2]), np.array([[0.01 * omega]]), shapes[1:2], elements.kt, elements.mu,
-                    np.array([[0.0, force, 0.0]]), np.zeros((1, 3)), np.array([[load, 0.0, 0.0]]), kn * R,
-                    np.ones((1, 1)), R)
+    system = System(
+        np.array([omega**2]),
+        np.array([[0.01 * omega]]),
+        shapes[1:2],
+        elements.kt,
+        elements.mu,
+        np.array([[0.0, force, 0.0]]),
+        np.zeros((1, 3)),
+        np.array([[load, 0.0, 0.0]]),
+        kn * R,
+        np.ones((1, 1)),
+        R,
+    )
     return model, system
 
 
-def branch(model: ReducedModel, system: System, band: tuple[float, float], H: int = 15,
-           samples: int = 512) -> Iterator[BranchPoint]:
-    """The path in frequency that starts at the upper end of a band [Hz] and runs down, round its folds.
+def branch(
+    model: ReducedModel, system: System, band: tuple[float, float], H: int = 15, samples: int = 512
+) -> Iterator[BranchPoint]:
+    """The path in frequency that starts at the upper end of a band [Hz] and runs down, round its
+    folds.
 
     Raises:
         NotSolvedError: the path could not be followed to an end of the band.
@@ -76,8 +105,14 @@ def branch(model: ReducedModel, system: System, band: tuple[float, float], H: in
         shot = periodic(system, point.solution.omega, state_of(point.solution, system))
         amplitude = float(abs(harmonics(shot, system, 1)[0, 1]))
         wanted = float(abs(point.solution.probe[1, 0]))
-        yield BranchPoint(point.solution.frequency, amplitude, wanted, float(np.abs(multipliers(shot)[0])), point.fold,
-                          _verdict(shot, amplitude, wanted))
+        yield BranchPoint(
+            point.solution.frequency,
+            amplitude,
+            wanted,
+            float(np.abs(multipliers(shot)[0])),
+            point.fold,
+            _verdict(shot, amplitude, wanted),
+        )
 
 
 def _verdict(shot: Periodic, amplitude: float, wanted: float) -> str:
@@ -90,25 +125,31 @@ def state_of(solution: Solution, system: System) -> State:
     """State at t = 0 of a solution of the balance.
 
     Args:
-        system: the solution's model in time, without residual flexibility (`bladefem.hbm.in_time.time_system`).
+        system: the solution's model in time, without residual flexibility
+            (`bladefem.hbm.time_model.time_system`).
     """
-    omega, orders = solution.omega, np.arange(solution.harmonics + 1)
+    omega = solution.omega
+    orders = np.arange(solution.harmonics + 1)
     f = to_complex(solution.f.reshape(-1, solution.f.shape[2])).reshape(*solution.f.shape[:2], -1)
-    load, inputs = -system.W.T @ f[:, -1], to_complex(system.force)
-    load[:, :inputs.shape[1]] += inputs[:, :len(orders)]
+    load = -system.W.T @ f[:, -1]
+    inputs = to_complex(system.force)
+    load[:, : inputs.shape[1]] += inputs[:, : len(orders)]
     if solution.f.shape[1] == 2:
         normal = f[:, 0].copy()
         normal[:, 0] -= system.normal[:, 0]
         load -= system.R.T @ normal
     q = np.zeros_like(load)
     for h in orders[1:]:
-        q[:, h] = np.linalg.solve(np.diag(system.stiffness - (h * omega) ** 2) + 1j * h * omega * system.damping,
-                                  load[:, h])
+        q[:, h] = np.linalg.solve(
+            np.diag(system.stiffness - (h * omega) ** 2) + 1j * h * omega * system.damping,
+            load[:, h],
+        )
     held = system.stiffness > 0
     q[held, 0] = load[held, 0] / system.stiffness[held]
-    readings = np.concatenate([system.R, system.W][-solution.w.shape[1]:])
+    readings = np.concatenate([system.R, system.W][-solution.w.shape[1] :])
     rest = np.concatenate(solution.w[:, :, 0].T) - (readings[:, held] @ q[held, 0]).real
-    q[~held, 0] = np.linalg.lstsq(readings[:, ~held], rest, rcond=None)[0]      # rigid motions close the mean
+    # rigid motions close the mean
+    q[~held, 0] = np.linalg.lstsq(readings[:, ~held], rest, rcond=None)[0]
     first = synthesis(solution.harmonics, solution.samples)[0]
     slider = solution.w[:, -1] @ first - solution.f[:, -1] @ first / system.kt
     return State(q.sum(axis=1).real, (q @ (1j * orders * omega)).real, slider)

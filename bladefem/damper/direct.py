@@ -1,10 +1,12 @@
-"""Direct time integration of the complete coupled system by Newmark's rule of average acceleration: the judge.
+"""Direct time integration of the complete coupled system by Newmark's rule of average acceleration:
+the judge.
 
-A step is a small contact problem: w = w_free - G f with the friction law on w, G positive. It is solved by a Newton
-that starts from the stick predictor; started from slip, plain Newton on the displacements can jump between the two
-slip directions for ever (2-cycle at k h^2 / 4 m > 1). Where Newton repeats a set of states, Gauss-Seidel sweeps, which
-converge for every positive G with prescribed normal loads, take over. Second order in the step; for the error-free
-reference use the exact flow in ``events``.
+A step is a small contact problem: w = w_free - G f with the friction law on w, G positive. It is
+solved by a Newton that starts from the stick predictor; started from slip, plain Newton on the
+displacements can jump between the two slip directions for ever (2-cycle at k h^2 / 4 m > 1). Where
+Newton repeats a set of states, Gauss-Seidel sweeps, which converge for every positive G with
+prescribed normal loads, take over. Second order in the step; for the error-free reference use the
+exact flow in ``events``.
 """
 
 from __future__ import annotations
@@ -14,15 +16,22 @@ from numba import njit
 
 from bladefem.errors import InputError, NotSolvedError
 
-from ..hbm.flow import State, rest
-from ..hbm.system import System
+from ..time.event_integrator import State, rest
+from ..time.system import System
 from .explicit import Cycle, March, check_steps, explicit_march, sampled, settle
 
 __all__ = ["contact_step", "direct", "newmark_march"]
 
 
-def direct(system: System, omega: float, steps: int = 512, start: State | None = None, most: int = 2000,
-           tolerance: float = 1e-6, explicit: bool = False) -> Cycle:
+def direct(
+    system: System,
+    omega: float,
+    steps: int = 512,
+    start: State | None = None,
+    most: int = 2000,
+    tolerance: float = 1e-6,
+    explicit: bool = False,
+) -> Cycle:
     """Integrate the coupled system until motion and friction forces repeat over one period.
 
     Args:
@@ -32,7 +41,8 @@ def direct(system: System, omega: float, steps: int = 512, start: State | None =
         explicit: leapfrog instead of Newmark.
     Raises:
         InputError: an explicit step beyond the stability limit.
-        NotSolvedError: a time step has no solution (possible only where the normal load follows the motion).
+        NotSolvedError: a time step has no solution (possible only where the normal load follows the
+            motion).
     """
     if explicit:
         check_steps(system, omega, steps)
@@ -44,25 +54,40 @@ def newmark_march(system: System, omega: float, steps: int) -> March:
     """A function that marches one period from t = 0, as ``explicit_march`` does.
 
     Raises:
-        InputError: normal forces react on the motion; only the exact flow and the explicit march do that.
+        InputError: normal forces react on the motion; only the exact flow and the explicit march do
+            that.
         NotSolvedError: by the function, when a time step has no solution.
     """
     if np.any(system.R):
-        raise InputError("System.R: expected zeros for Newmark's rule; use the exact flow or the explicit march")
-    d, h = len(system.stiffness), 2 * np.pi / omega / steps
+        raise InputError(
+            "System.R: expected zeros for Newmark's rule; use the exact flow or the explicit march"
+        )
+    d = len(system.stiffness)
+    h = 2 * np.pi / omega / steps
     S = np.linalg.inv(np.eye(d) + h / 2 * system.damping + h**2 / 4 * np.diag(system.stiffness))
     lag = h**2 / 4 * S @ system.W.T
-    arrays = (system.stiffness, system.damping, system.W, system.V, system.kt, system.mu, S, system.W @ lag,
-              system.V @ lag)
+    arrays = (
+        system.stiffness,
+        system.damping,
+        system.W,
+        system.V,
+        system.kt,
+        system.mu,
+        S,
+        system.W @ lag,
+        system.V @ lag,
+    )
     inputs = tuple(sampled(a, steps) for a in (system.force, system.drive, system.normal))
 
     def march(state: State) -> tuple[State, np.ndarray, np.ndarray, np.ndarray]:
         y = np.r_[state.q, state.v, state.z]
         q, w, force, code = _newmark(arrays, y, inputs, h)
         if code:
-            raise NotSolvedError(f"Newmark step {code - 1} of {steps}: neither Newton nor Gauss-Seidel found the "
-                                 f"contact forces")
-        return State(y[:d].copy(), y[d:2 * d].copy(), y[2 * d:].copy()), q, w, force
+            raise NotSolvedError(
+                f"Newmark step {code - 1} of {steps}: neither Newton nor Gauss-Seidel found the "
+                f"contact forces"
+            )
+        return State(y[:d].copy(), y[d : 2 * d].copy(), y[2 * d :].copy()), q, w, force
 
     return march
 
@@ -74,17 +99,20 @@ def _law(elastic, bound):
 
 @njit(cache=True)
 def contact_step(trial, load, kG, H, mu, f):
-    """Forces f (n,) with f = clip(trial - kG f, mu (load - H f)), written into ``f``; True when found.
+    """Forces f (n,) with f = clip(trial - kG f, mu (load - H f)), written into ``f``; True when
+    found.
 
     Args:
-        trial, load: (n,) elastic and normal forces that the step would give without contact forces [N].
+        trial, load: (n,) elastic and normal forces that the step would give without contact forces
+            [N].
         kG, H: (n, n) how contact forces lower them [1].
     """
     n = len(trial)
     slip = np.zeros(n)
     size = np.abs(trial).max() + np.abs(mu * load).max() + 1e-300
     for _ in range(30):
-        A, b = np.eye(n), np.zeros(n)
+        A = np.eye(n)
+        b = np.zeros(n)
         for i in range(n):
             if slip[i] == 0.0:
                 A[i] += kG[i]
@@ -95,7 +123,8 @@ def contact_step(trial, load, kG, H, mu, f):
         f[:] = np.linalg.solve(A, b)
         changed = False
         for i in range(n):
-            N, e = load[i], trial[i]
+            N = load[i]
+            e = trial[i]
             for k in range(n):
                 N -= H[i, k] * f[k]
                 e -= kG[i, k] * f[k]
@@ -107,7 +136,8 @@ def contact_step(trial, load, kG, H, mu, f):
     for _ in range(20000):
         worst = 0.0
         for i in range(n):
-            N, e = load[i], trial[i]
+            N = load[i]
+            e = trial[i]
             for k in range(n):
                 if k != i:
                     N -= H[i, k] * f[k]
@@ -126,29 +156,40 @@ def _newmark(arrays, y, inputs, h):
     L, D, W, V, kt, mu, S, G, H = arrays
     n, d = W.shape
     steps = p.shape[0] - 1
-    Q, R, F = np.empty((steps, d)), np.empty((steps, n)), np.empty((steps, n))
-    q, v, z = y[:d].copy(), y[d:2 * d].copy(), y[2 * d:]
+    Q = np.empty((steps, d))
+    R = np.empty((steps, n))
+    F = np.empty((steps, n))
+    q = y[:d].copy()
+    v = y[d : 2 * d].copy()
+    z = y[2 * d :]
     kG = np.empty((n, n))
     for i in range(n):
         kG[i] = kt[i] * G[i]
     f = np.empty(n)
-    w, N = g[0] + W @ q, n0[0] + V @ q
+    w = g[0] + W @ q
+    N = n0[0] + V @ q
     for i in range(n):
         f[i] = _law(kt[i] * (w[i] - z[i]), mu[i] * max(N[i], 0.0))
         z[i] = w[i] - f[i] / kt[i]
     a = p[0] - L * q - D @ v - W.T @ f
     for m in range(1, steps + 1):
-        q0, v0 = q + h * v + h * h / 4 * a, v + h / 2 * a
+        q0 = q + h * v + h * h / 4 * a
+        v0 = v + h / 2 * a
         free = S @ (p[m] - L * q0 - D @ v0)
         qf = q0 + h * h / 4 * free
-        wf, Nf = g[m] + W @ qf, n0[m] + V @ qf
+        wf = g[m] + W @ qf
+        Nf = n0[m] + V @ qf
         if not contact_step(kt * (wf - z), Nf, kG, H, mu, f):
             return Q, R, F, m + 1
         a = free - S @ (W.T @ f)
-        q, v = q0 + h * h / 4 * a, v0 + h / 2 * a
+        q = q0 + h * h / 4 * a
+        v = v0 + h / 2 * a
         w = g[m] + W @ q
         z[:] = w - f / kt
         row = m % steps
-        Q[row], R[row], F[row] = q, w, f
-    y[:d], y[d:2 * d] = q, v
+        Q[row] = q
+        R[row] = w
+        F[row] = f
+    y[:d] = q
+    y[d : 2 * d] = v
     return Q, R, F, 0

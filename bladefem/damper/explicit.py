@@ -1,8 +1,10 @@
-"""Explicit time integration: leapfrog with the return map, the paper's way to the motion of the damper (Sect. 5.1).
+"""Explicit time integration: leapfrog with the return map, the paper's way to the motion of the
+damper (Sect. 5.1).
 
-Cheap, second order, and treacherous in two ways. Beyond dt = 2 / omega_max the friction saturates and the run stays
-finite and wrong: such a step is refused. And a damper that sticks has no damping, so from rest it never settles: the
-cycle then comes back with its residual of periodicity and the reason "not periodic".
+Cheap, second order, and treacherous in two ways. Beyond dt = 2 / omega_max the friction saturates
+and the run stays finite and wrong: such a step is refused. And a damper that sticks has no damping,
+so from rest it never settles: the cycle then comes back with its residual of periodicity and the
+reason "not periodic".
 """
 
 from __future__ import annotations
@@ -15,9 +17,9 @@ from numba import njit
 
 from bladefem.errors import InputError
 
-from ..friction.march import stable_step, step_1d
-from ..hbm.flow import State, rest
-from ..hbm.system import System
+from ..friction.time_step import stable_step, step_1d
+from ..time.event_integrator import State, rest
+from ..time.system import System
 
 __all__ = ["Cycle", "check_steps", "damper_cycle", "explicit_march", "settle", "stable_steps"]
 
@@ -28,13 +30,20 @@ March = Callable[[State], tuple[State, np.ndarray, np.ndarray, np.ndarray]]
 class Cycle:
     """The last period of a march in time."""
 
-    q: np.ndarray                   # (s, d) at equal instants from the end of the period on [m kg^1/2]
-    force: np.ndarray               # (s, n) friction force on the damper side [N]
-    w: np.ndarray                   # (s, n) relative displacement [m]
-    state: State                    # at the end
-    residual: float                 # change of motion and force over the last period, relative [1]
-    periods: int                    # marched
-    reason: str                     # "periodic", or why the march stopped
+    # (s, d) at equal instants from the end of the period on [m kg^1/2]
+    q: np.ndarray
+    # (s, n) friction force on the damper side [N]
+    force: np.ndarray
+    # (s, n) relative displacement [m]
+    w: np.ndarray
+    # at the end
+    state: State
+    # change of motion and force over the last period, relative [1]
+    residual: float
+    # marched
+    periods: int
+    # "periodic", or why the march stopped
+    reason: str
 
 
 def stable_steps(system: System, omega: float) -> int:
@@ -46,12 +55,20 @@ def check_steps(system: System, omega: float, steps: int) -> None:
     """Raise InputError when there are fewer steps a period than ``stable_steps``."""
     least = stable_steps(system, omega)
     if steps < least:
-        raise InputError(f"steps = {steps} a period: expected at least {least}, the stability limit of explicit "
-                         "integration (omega_max dt < 2)")
+        raise InputError(
+            f"steps = {steps} a period: expected at least {least}, the stability limit of explicit "
+            "integration (omega_max dt < 2)"
+        )
 
 
-def damper_cycle(system: System, omega: float, steps: int, start: State | None = None, most: int = 300,
-                 tolerance: float = 1e-6) -> Cycle:
+def damper_cycle(
+    system: System,
+    omega: float,
+    steps: int,
+    start: State | None = None,
+    most: int = 300,
+    tolerance: float = 1e-6,
+) -> Cycle:
     """March explicitly until motion and friction forces repeat over one period.
 
     Args:
@@ -68,7 +85,10 @@ def damper_cycle(system: System, omega: float, steps: int, start: State | None =
 
 def settle(march: March, start: State, most: int, tolerance: float) -> Cycle:
     """March period by period, from state to (state, q, w, force), until motion and force repeat."""
-    state, last, residual, period = start, None, np.inf, 0
+    state = start
+    last = None
+    residual = np.inf
+    period = 0
     while residual >= tolerance and period < most:
         period += 1
         state, q, w, force = march(state)
@@ -77,15 +97,20 @@ def settle(march: March, start: State, most: int, tolerance: float) -> Cycle:
         last = (q, force)
         if not np.isfinite(q[-1]).all():
             return Cycle(q, force, w, state, np.inf, period, "the motion grew beyond all bounds")
-    reason = "periodic" if residual < tolerance else f"not periodic after {most} periods, change {residual:.1e}"
+    reason = (
+        "periodic"
+        if residual < tolerance
+        else f"not periodic after {most} periods, change {residual:.1e}"
+    )
     return Cycle(q, force, w, state, residual, period, reason)
 
 
 def explicit_march(system: System, omega: float, steps: int) -> March:
-    """A function that marches one period from t = 0: state to (state, q (s, d), w (s, n), friction force (s, n)).
+    """A function that marches one period from t = 0: state to (state, q (s, d), w (s, n), friction
+    force (s, n)).
 
-    Row m of the histories is at t = m dt; row 0 is the end of the period, so that a settled cycle starts at t = 0.
-    The step is not checked here.
+    Row m of the histories is at t = m dt; row 0 is the end of the period, so that a settled cycle
+    starts at t = 0. The step is not checked here.
 
     Raises:
         InputError: coupled damping; the leapfrog needs a diagonal one.
@@ -94,26 +119,49 @@ def explicit_march(system: System, omega: float, steps: int) -> March:
         raise InputError("System.damping: expected a diagonal matrix for explicit integration")
     d = len(system.stiffness)
     inputs = tuple(sampled(a, steps) for a in (system.force, system.drive, system.normal))
-    arrays = tuple(np.ascontiguousarray(a) for a in (system.stiffness, np.diag(system.damping), system.W, system.V,
-                                                     system.kt, system.mu, system.R, system.normal[:, 0]))
+    arrays = tuple(
+        np.ascontiguousarray(a)
+        for a in (
+            system.stiffness,
+            np.diag(system.damping),
+            system.W,
+            system.V,
+            system.kt,
+            system.mu,
+            system.R,
+            system.normal[:, 0],
+        )
+    )
 
     def march(state: State) -> tuple[State, np.ndarray, np.ndarray, np.ndarray]:
         y = np.r_[state.q, state.v, state.z]
         q, w, force = _leapfrog(arrays, y, inputs, 2 * np.pi / omega / steps)
-        return State(y[:d].copy(), y[d:2 * d].copy(), y[2 * d:].copy()), q, w, force
+        return State(y[:d].copy(), y[d : 2 * d].copy(), y[2 * d :].copy()), q, w, force
 
     return march
 
 
 def sampled(coefficients: np.ndarray, steps: int) -> np.ndarray:
-    """Values (steps + 1, rows) of Fourier coefficients (rows, 2H+1) at steps + 1 instants of one period."""
-    angle = 2 * np.pi * np.outer(np.arange(steps + 1) / steps, np.arange(1, coefficients.shape[1] // 2 + 1))
-    return coefficients[:, 0] + np.cos(angle) @ coefficients[:, 1::2].T + np.sin(angle) @ coefficients[:, 2::2].T
+    """Values (steps + 1, rows) of Fourier coefficients (rows, 2H+1) at steps + 1 instants of one
+    period.
+    """
+    angle = (
+        2
+        * np.pi
+        * np.outer(np.arange(steps + 1) / steps, np.arange(1, coefficients.shape[1] // 2 + 1))
+    )
+    return (
+        coefficients[:, 0]
+        + np.cos(angle) @ coefficients[:, 1::2].T
+        + np.sin(angle) @ coefficients[:, 2::2].T
+    )
 
 
 def _change(now: np.ndarray, then: np.ndarray) -> float:
     swing = np.abs(now - now.mean(axis=0)).max()
-    return float(np.abs((now - now.mean(axis=0)) - (then - then.mean(axis=0))).max() / max(swing, 1e-300))
+    return float(
+        np.abs((now - now.mean(axis=0)) - (then - then.mean(axis=0))).max() / max(swing, 1e-300)
+    )
 
 
 @njit(cache=True)
@@ -122,14 +170,21 @@ def _leapfrog(arrays, y, inputs, dt):
     p, g, n0 = inputs
     n, d = W.shape
     steps = p.shape[0] - 1
-    Q, R, F = np.empty((steps, d)), np.empty((steps, n)), np.empty((steps, n))
-    q, v, z, a, before = y[:d], y[d:2 * d], y[2 * d:], np.empty(d), np.empty(n)
+    Q = np.empty((steps, d))
+    R = np.empty((steps, n))
+    F = np.empty((steps, n))
+    q = y[:d]
+    v = y[d : 2 * d]
+    z = y[2 * d :]
+    a = np.empty(d)
+    before = np.empty(n)
     for m in range(steps + 1):
         row = m % steps
         for k in range(d):
             a[k] = p[m, k] - L[k] * q[k]
         for i in range(n):
-            w, N = g[m, i], n0[m, i]
+            w = g[m, i]
+            N = n0[m, i]
             for k in range(d):
                 w += W[i, k] * q[k]
                 N += V[i, k] * q[k]
@@ -138,7 +193,8 @@ def _leapfrog(arrays, y, inputs, dt):
             lift = max(N, 0.0) - rest_load[i]
             for k in range(d):
                 a[k] -= f * W[i, k] + lift * react[i, k]
-            R[row, i], F[row, i] = w, f
+            R[row, i] = w
+            F[row, i] = f
         for k in range(d):
             Q[row, k] = q[k]
             if m > 0:

@@ -1,17 +1,19 @@
-"""Steady motion of the mass on its foundation: loops, loop count, drift, spectrum (the paper's Fig. 10 and 11).
+"""Steady motion of the mass on its foundation: loops, loop count, drift, spectrum (the paper's Fig.
+10 and 11).
 
-The displacement of the mass need not be periodic: only velocity and friction force are, and the mass drifts at a steady
-speed unless the numerator of the reduced frequency ratio is even (Table 1: 0.1057 m/s at 50 Hz, 1.03e-3 m/s at 25 Hz;
-0.1010 to 0.1057 m/s at 50 Hz by how stiffness and load are shared out). Periodicity is therefore tested on (velocity,
-force), the drift is reported, and loops are counted as reversals of the slip, halved, in the smallest period of
-(velocity, force).
+The displacement of the mass need not be periodic: only velocity and friction force are, and the
+mass drifts at a steady speed unless the numerator of the reduced frequency ratio is even (Table 1:
+0.1057 m/s at 50 Hz, 1.03e-3 m/s at 25 Hz; 0.1010 to 0.1057 m/s at 50 Hz by how stiffness and load
+are shared out). Periodicity is therefore tested on (velocity, force), the drift is reported, and
+loops are counted as reversals of the slip, halved, in the smallest period of (velocity, force).
 
-The paper's rule "number of open loops = denominator of the reduced frequency ratio" holds for all of 26 ratios from
-0 to 10 at Table 1, where the inertia of the stroke is 4.6 times the friction limit. It fails when the mass sticks for
-part of the common period, and by how the load is spread. Of the 19 ratios of the paper's page five break it at a stroke
-of 1.2 mm: 1/5, 1/4, 1/3, 2/5, 5 give 3, 2, 2, 3, 2 loops under equal loads of the points, and 1/4 gives 3 under the
-pressure of the finite elements. At 0.8 mm ten break it under equal loads, eight under that pressure, which keeps 1/2
-and 3/2. With P1 > P0 (lift-off) 1/4 gives 3 at the full stroke.
+The paper's rule "number of open loops = denominator of the reduced frequency ratio" holds for all
+of 26 ratios from 0 to 10 at Table 1, where the inertia of the stroke is 4.6 times the friction
+limit. It fails when the mass sticks for part of the common period, and by how the load is spread.
+Of the 19 ratios of the paper's page five break it at a stroke of 1.2 mm: 1/5, 1/4, 1/3, 2/5, 5 give
+3, 2, 2, 3, 2 loops under equal loads of the points, and 1/4 gives 3 under the pressure of the
+finite elements. At 0.8 mm ten break it under equal loads, eight under that pressure, which keeps
+1/2 and 3/2. With P1 > P0 (lift-off) 1/4 gives 3 at the full stroke.
 """
 
 from __future__ import annotations
@@ -31,30 +33,48 @@ __all__ = ["Drive", "Steady", "count_loops", "ratio_table", "spectrum", "steady"
 class Drive:
     """Foundation motion and normal load of Eq. 30, with an optional second direction."""
 
-    ratio: Fraction                 # load frequency over foundation frequency, fp / fb
-    frequency: float = 100.0        # of the foundation, fb [Hz]
-    amplitude: tuple[float, float] = (0.005, 0.0)   # of the foundation [m]
-    phase: float = np.pi / 2        # of the y motion against the x motion [rad]
-    load: float = 50.0              # mean P0 [N]
-    pulsation: float = 30.0         # amplitude P1 [N]; not used when the ratio is zero
-    pull: tuple[float, float] = (0.0, 0.0)      # steady force on the mass [N]
-    lag: float = 0.0                # phase of the load behind the foundation, in cycles of the load [1]
+    # load frequency over foundation frequency, fp / fb
+    ratio: Fraction
+    # of the foundation, fb [Hz]
+    frequency: float = 100.0
+    # of the foundation [m]
+    amplitude: tuple[float, float] = (0.005, 0.0)
+    # of the y motion against the x motion [rad]
+    phase: float = np.pi / 2
+    # mean P0 [N]
+    load: float = 50.0
+    # amplitude P1 [N]; not used when the ratio is zero
+    pulsation: float = 30.0
+    # steady force on the mass [N]
+    pull: tuple[float, float] = (0.0, 0.0)
+    # phase of the load behind the foundation, in cycles of the load [1]
+    lag: float = 0.0
 
 
 @dataclass(frozen=True)
 class Steady:
     """One steady period of (velocity, force)."""
 
-    motion: Motion                  # over one common period of foundation and load
-    time: np.ndarray                # (s,) [s]
-    base: np.ndarray                # (s, 2) foundation displacement [m]
-    load: np.ndarray                # (s,) normal load [N]
-    cycles: int                     # foundation cycles in the smallest period of (velocity, force)
-    loops: int                      # reversals of the slip along x, halved, in that period
-    drift: np.ndarray               # (3,) mean velocity [m/s, m/s, rad/s]
-    residual: float                 # change of (velocity, force) over the last period, relative
-    periods: int                    # common periods marched
-    reason: str                     # "periodic" or why the march stopped
+    # over one common period of foundation and load
+    motion: Motion
+    # (s,) [s]
+    time: np.ndarray
+    # (s, 2) foundation displacement [m]
+    base: np.ndarray
+    # (s,) normal load [N]
+    load: np.ndarray
+    # foundation cycles in the smallest period of (velocity, force)
+    cycles: int
+    # reversals of the slip along x, halved, in that period
+    loops: int
+    # (3,) mean velocity [m/s, m/s, rad/s]
+    drift: np.ndarray
+    # change of (velocity, force) over the last period, relative
+    residual: float
+    # common periods marched
+    periods: int
+    # "periodic" or why the march stopped
+    reason: str
 
     @property
     def relative(self) -> np.ndarray:
@@ -62,7 +82,13 @@ class Steady:
         return self.base - self.motion.position[:, :2]
 
 
-def steady(body: MassOnFoundation, drive: Drive, steps: int = 2000, most: int = 200, tolerance: float = 1e-7) -> Steady:
+def steady(
+    body: MassOnFoundation,
+    drive: Drive,
+    steps: int = 2000,
+    most: int = 200,
+    tolerance: float = 1e-7,
+) -> Steady:
     """March until velocity and force repeat over the common period of foundation and load.
 
     Args:
@@ -77,21 +103,32 @@ def steady(body: MassOnFoundation, drive: Drive, steps: int = 2000, most: int = 
     pulsation = drive.pulsation if drive.ratio else 0.0
     beat = float(drive.ratio) * drive.frequency
     load = pulsating_load(drive.load, pulsation, beat, time - drive.lag / beat if beat else time)
-    start, last, residual, period = None, None, np.inf, 0
+    start = None
+    last = None
+    residual = np.inf
+    period = 0
     while residual >= tolerance and period < most:
         period += 1
         motion = march(body, base, load, dt, start, drive.pull)
         residual = _change(motion, last)
-        start, last = (motion.position[-1], motion.velocity[-1], motion.springs), motion
-    reason = "periodic" if residual < tolerance else f"not periodic after {most} periods, change {residual:.1e}"
+        start = (motion.position[-1], motion.velocity[-1], motion.springs)
+        last = motion
+    reason = (
+        "periodic"
+        if residual < tolerance
+        else f"not periodic after {most} periods, change {residual:.1e}"
+    )
     cycles = _smallest_period(motion, steps, q)
     drift = motion.velocity.mean(axis=0)
-    loops = count_loops(motion.slip[:cycles * steps, 0])
-    return Steady(motion, time[1:], base[1:], load[1:], cycles, loops, drift, residual, period, reason)
+    loops = count_loops(motion.slip[: cycles * steps, 0])
+    return Steady(
+        motion, time[1:], base[1:], load[1:], cycles, loops, drift, residual, period, reason
+    )
 
 
 def count_loops(slip: np.ndarray) -> int:
-    """Open loops of one period: changes of direction of the slip, halved, cyclic; sticking in between does not count.
+    """Open loops of one period: changes of direction of the slip, halved, cyclic; sticking in
+    between does not count.
 
     Args:
         slip: (s,) signed slip in each step [m].
@@ -102,7 +139,8 @@ def count_loops(slip: np.ndarray) -> int:
 
 
 def spectrum(result: Steady) -> tuple[np.ndarray, np.ndarray]:
-    """Lines of the displacement without its drift: frequency (l,) [Hz] and amplitude (l, 3) [m, m, rad].
+    """Lines of the displacement without its drift: frequency (l,) [Hz] and amplitude (l, 3) [m, m,
+    rad].
 
     From the velocity, which is periodic: amplitude = |v| / (2 pi f).
     """
@@ -111,14 +149,26 @@ def spectrum(result: Steady) -> tuple[np.ndarray, np.ndarray]:
     return frequency, np.abs(lines) / (2 * np.pi * frequency[:, None])
 
 
-def ratio_table(body: MassOnFoundation, ratios: Iterable[Fraction], steps: int = 1000) -> list[dict[str, float | str]]:
-    """The paper's rule on many frequency ratios: one row each, with loops, denominator, drift and whether it holds."""
+def ratio_table(
+    body: MassOnFoundation, ratios: Iterable[Fraction], steps: int = 1000
+) -> list[dict[str, float | str]]:
+    """The paper's rule on many frequency ratios: one row each, with loops, denominator, drift and
+    whether it holds.
+    """
     rows = []
     for ratio in ratios:
         result = steady(body, Drive(Fraction(ratio)), steps)
-        rows.append({"ratio": str(ratio), "denominator": ratio.denominator, "cycles": result.cycles,
-                     "loops": result.loops, "drift": float(result.drift[0]), "rule": result.loops == ratio.denominator,
-                     "reason": result.reason})
+        rows.append(
+            {
+                "ratio": str(ratio),
+                "denominator": ratio.denominator,
+                "cycles": result.cycles,
+                "loops": result.loops,
+                "drift": float(result.drift[0]),
+                "rule": result.loops == ratio.denominator,
+                "reason": result.reason,
+            }
+        )
     return rows
 
 
@@ -128,14 +178,26 @@ def _change(motion: Motion, last: Motion | None) -> float:
         return np.inf
     pairs = ((motion.velocity, last.velocity), (motion.force, last.force))
     scale = [np.abs(now[:, :2]).max() + 1e-300 for now, _ in pairs]
-    return max(np.abs(now - then)[:, :2].max() / size for (now, then), size in zip(pairs, scale, strict=True))
+    return max(
+        np.abs(now - then)[:, :2].max() / size
+        for (now, then), size in zip(pairs, scale, strict=True)
+    )
 
 
 def _smallest_period(motion: Motion, steps: int, q: int, tolerance: float = 1e-5) -> int:
-    """Foundation cycles after which (velocity, force) repeat: the smallest divisor of q that fits."""
-    signal = np.hstack([motion.velocity[:, :2] / np.abs(motion.velocity).max(),
-                        motion.force[:, :2] / np.abs(motion.force).max()])
+    """Foundation cycles after which (velocity, force) repeat: the smallest divisor of q that
+    fits.
+    """
+    signal = np.hstack(
+        [
+            motion.velocity[:, :2] / np.abs(motion.velocity).max(),
+            motion.force[:, :2] / np.abs(motion.force).max(),
+        ]
+    )
     for cycles in range(1, q):
-        if q % cycles == 0 and np.abs(signal - np.roll(signal, -cycles * steps, axis=0)).max() < tolerance:
+        if (
+            q % cycles == 0
+            and np.abs(signal - np.roll(signal, -cycles * steps, axis=0)).max() < tolerance
+        ):
             return cycles
     return q

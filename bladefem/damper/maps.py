@@ -1,8 +1,9 @@
 """Where methods fail: every method on every point of a grid, each outcome with its reason.
 
-Outcomes: "converged", "false" (accepted by its own criterion, but more than 10 % off the equilibrium it was meant to
-find), "diverged", "no convergence". The error of the paper's iterations is measured against the equilibrium of the same
-one-harmonic equations, not against the full balance, so that a wrong stop is not confused with a coarse model.
+Outcomes: "converged", "false" (accepted by its own criterion, but more than 10 % off the
+equilibrium it was meant to find), "diverged", "no convergence". The error of the paper's iterations
+is measured against the equilibrium of the same one-harmonic equations, not against the full
+balance, so that a wrong stop is not confused with a coarse model.
 """
 
 from __future__ import annotations
@@ -22,30 +23,51 @@ __all__ = ["COLUMNS", "VARIANTS", "count_outcomes", "method_map", "write_rows"]
 
 VARIANTS = {
     "paper": ("amplitude", Rules(damper="march")),
-    **{method: (method, Rules()) for method in ("picard", "amplitude", "complex", "parts", "anderson")},
+    **{
+        method: (method, Rules())
+        for method in ("picard", "amplitude", "complex", "parts", "anderson")
+    },
     "anderson, residual": ("anderson", Rules(criterion="residual", tolerance=1e-3)),
     "describing": ("describing", Rules(tolerance=1e-3, most=200)),
 }
-COLUMNS = ("load", "stiffness", "frequency", "method", "outcome", "iterations", "residual", "error", "reason")
-FALSE = 0.1         # relative error of the platform motion beyond which an accepted point is false
+COLUMNS = (
+    "load",
+    "stiffness",
+    "frequency",
+    "method",
+    "outcome",
+    "iterations",
+    "residual",
+    "error",
+    "reason",
+)
+# relative error of the platform motion beyond which an accepted point is false
+FALSE = 0.1
 Solver = Callable[[ReducedModel, float], tuple[bool, int, float, str]]
 
 
-def method_map(points: Iterable[tuple[float, float, float]], model: Callable[[float, float], ReducedModel],
-               solvers: Mapping[str, Solver],
-               variants: Mapping[str, tuple[str, Rules]] = VARIANTS) -> Iterator[dict[str, float | str]]:
+def method_map(
+    points: Iterable[tuple[float, float, float]],
+    model: Callable[[float, float], ReducedModel],
+    solvers: Mapping[str, Solver],
+    variants: Mapping[str, tuple[str, Rules]] = VARIANTS,
+) -> Iterator[dict[str, float | str]]:
     """One row a point and method.
 
-    The damper is solved exactly, so that the outer iteration alone is judged; "paper" also integrates it from rest.
+    The damper is solved exactly, so that the outer iteration alone is judged; "paper" also
+    integrates it from rest.
 
     Args:
-        points: (friction limit of a seat [N], tangential stiffness of a seat [N/m], frequency [Hz]).
+        points: (friction limit of a seat [N], tangential stiffness of a seat [N/m], frequency
+            [Hz]).
         model: from limit and stiffness.
-        solvers: full balances by name, from (model, circular frequency) to converged, iterations, residual, reason.
+        solvers: full balances by name, from (model, circular frequency) to converged, iterations,
+            residual, reason.
         variants: name to method and rules of the iterations on the platform motion.
     """
     for load, stiffness, frequency in points:
-        body, omega = model(load, stiffness), 2 * np.pi * frequency
+        body = model(load, stiffness)
+        omega = 2 * np.pi * frequency
         key = {"load": load, "stiffness": stiffness, "frequency": frequency}
         side = platform(body, omega, 1)
         true = _equilibrium(side)
@@ -53,8 +75,14 @@ def method_map(points: Iterable[tuple[float, float, float]], model: Callable[[fl
             yield key | {"method": name} | _judge(iterate(side, method, rules), true)
         for name, solver in solvers.items():
             converged, iterations, error, reason = solver(body, omega)
-            yield key | {"method": name, "outcome": "converged" if converged else "no convergence",
-                         "iterations": iterations, "residual": error, "error": np.nan, "reason": reason}
+            yield key | {
+                "method": name,
+                "outcome": "converged" if converged else "no convergence",
+                "iterations": iterations,
+                "residual": error,
+                "error": np.nan,
+                "reason": reason,
+            }
 
 
 def count_outcomes(rows: Iterable[Mapping[str, float | str]]) -> dict[str, dict[str, int]]:
@@ -92,5 +120,10 @@ def _judge(found: Iterated, true: np.ndarray | None) -> dict[str, float | str]:
         outcome = "false" if wrong else "converged"
     else:
         outcome = "diverged" if found.reason == "diverged" else "no convergence"
-    return {"outcome": outcome, "iterations": found.iterations, "residual": found.residual,
-            "error": error, "reason": found.reason}
+    return {
+        "outcome": outcome,
+        "iterations": found.iterations,
+        "residual": found.residual,
+        "error": error,
+        "reason": found.reason,
+    }

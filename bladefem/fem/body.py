@@ -1,4 +1,6 @@
-"""An elastic body on a distributed mesh: stiffness and mass as PETSc matrices, nodes known by the mesh's numbers."""
+"""An elastic body on a distributed mesh: stiffness and mass as PETSc matrices, nodes known by the
+mesh's numbers.
+"""
 
 from __future__ import annotations
 
@@ -10,14 +12,36 @@ import numpy as np
 from geometry.mesh import Mesh
 
 from ..errors import InputError, suggestion
-from ..scene import Material
-from . import shape
-from .compat import CELLS, MPI, PETSc, assemble_matrix, build_mesh, cell_dofs, dolfinx, scalar_space, ufl, vector_space
+from ..scene.tables import Material
+from . import shape_functions as shape
+from .compat import (
+    CELLS,
+    MPI,
+    PETSc,
+    assemble_matrix,
+    build_mesh,
+    cell_dofs,
+    dolfinx,
+    scalar_space,
+    ufl,
+    vector_space,
+)
 from .loads import centrifugal, mass, surface_load, volume
 from .memory import check
 
-__all__ = ["Body", "assemble", "cells_of", "centrifugal", "degrees", "lame", "mass", "properties", "rigid_modes",
-           "surface_load", "volume"]
+__all__ = [
+    "Body",
+    "assemble",
+    "cells_of",
+    "centrifugal",
+    "degrees",
+    "lame",
+    "mass",
+    "properties",
+    "rigid_modes",
+    "surface_load",
+    "volume",
+]
 
 
 @dataclass(frozen=True)
@@ -25,14 +49,22 @@ class Body:
     """A body assembled; the matrices know no constraint yet."""
 
     mesh: Mesh
-    name: str                       # bodies of the mesh, joined by " + "
-    material: dict[str, Material]   # one a body
-    dim: int                        # displacement components of a node
-    K: PETSc.Mat                    # (dim*n, dim*n) [N/m], n nodes of this body, distributed, block size dim
-    M: PETSc.Mat                    # (dim*n, dim*n) [kg]
-    rows: np.ndarray                # (n_points,) PETSc block row of each mesh node, -1 outside; same on every rank
-    space: Any                      # dolfinx function space of the displacements
-    plane: str                      # "stress" or "strain", for plane meshes
+    # bodies of the mesh, joined by " + "
+    name: str
+    # one a body
+    material: dict[str, Material]
+    # displacement components of a node
+    dim: int
+    # (dim*n, dim*n) [N/m], n nodes of this body, distributed, block size dim
+    K: PETSc.Mat
+    # (dim*n, dim*n) [kg]
+    M: PETSc.Mat
+    # (n_points,) PETSc block row of each mesh node, -1 outside; same on every rank
+    rows: np.ndarray
+    # dolfinx function space of the displacements
+    space: Any
+    # "stress" or "strain", for plane meshes
+    plane: str
     comm: MPI.Comm
 
     @property
@@ -42,8 +74,14 @@ class Body:
         return np.where(self.rows[:, None] < 0, -1, rows).ravel()
 
 
-def assemble(mesh: Mesh, name: str | tuple[str, ...], material: Material | dict[str, Material],
-             comm: MPI.Comm | None = None, plane: str = "stress", quadrature: str = "exact") -> Body:
+def assemble(
+    mesh: Mesh,
+    name: str | tuple[str, ...],
+    material: Material | dict[str, Material],
+    comm: MPI.Comm | None = None,
+    plane: str = "stress",
+    quadrature: str = "exact",
+) -> Body:
     """Stiffness and mass of one body, or of several that share nodes.
 
     Args:
@@ -51,11 +89,12 @@ def assemble(mesh: Mesh, name: str | tuple[str, ...], material: Material | dict[
         material: one for all, or one a body.
         comm: ranks that share the mesh; all of them when left out.
         plane: "stress" or "strain" (plane meshes only); the mesh's depth multiplies both matrices.
-        quadrature: "exact" (up to the curvature of elements), or "ccx": degree 2 for both matrices, as CalculiX
-            integrates C3D10.
+        quadrature: "exact" (up to the curvature of elements), or "ccx": degree 2 for both matrices,
+            as CalculiX integrates C3D10.
 
     Raises:
-        InputError: unknown body, unknown element type, turned-over elements, more than memory can hold.
+        InputError: unknown body, unknown element type, turned-over elements, more than memory can
+            hold.
     """
     names = (name,) if isinstance(name, str) else tuple(name)
     materials = material if isinstance(material, dict) else dict.fromkeys(names, material)
@@ -67,17 +106,36 @@ def assemble(mesh: Mesh, name: str | tuple[str, ...], material: Material | dict[
     space = vector_space(domain, CELLS[mesh.cell_type][1])
     lam, mu, rho, depth = properties(mesh, {n: materials[n] for n in names}, domain, plane)
     stiff, mass = degrees(mesh, cells, quadrature)
-    u, v = ufl.TrialFunction(space), ufl.TestFunction(space)
-    e_u, e_v = ufl.sym(ufl.grad(u)), ufl.sym(ufl.grad(v))
+    u = ufl.TrialFunction(space)
+    v = ufl.TestFunction(space)
+    e_u = ufl.sym(ufl.grad(u))
+    e_v = ufl.sym(ufl.grad(v))
     energy = depth * (lam * ufl.tr(e_u) * ufl.tr(e_v) + 2 * mu * ufl.inner(e_u, e_v))
     K = assemble_matrix(energy * ufl.dx(metadata={"quadrature_degree": stiff}))
-    M = assemble_matrix(depth * rho * ufl.inner(u, v) * ufl.dx(metadata={"quadrature_degree": mass}))
+    M = assemble_matrix(
+        depth * rho * ufl.inner(u, v) * ufl.dx(metadata={"quadrature_degree": mass})
+    )
     rows = _rows(mesh, space, used[local], origin, comm)
-    return Body(mesh, " + ".join(names), {n: materials[n] for n in names}, dim, K, M, rows, space, plane, comm)
+    return Body(
+        mesh,
+        " + ".join(names),
+        {n: materials[n] for n in names},
+        dim,
+        K,
+        M,
+        rows,
+        space,
+        plane,
+        comm,
+    )
 
 
-def properties(mesh: Mesh, materials: dict[str, Material], domain: Any, plane: str) -> tuple[Any, Any, Any, Any]:
-    """Lame's constants [Pa] and density [kg/m^3], one value a cell of this rank, and the depth [m], for forms."""
+def properties(
+    mesh: Mesh, materials: dict[str, Material], domain: Any, plane: str
+) -> tuple[Any, Any, Any, Any]:
+    """Lame's constants [Pa] and density [kg/m^3], one value a cell of this rank, and the depth [m],
+    for forms.
+    """
     owner = np.repeat(np.arange(len(materials)), [len(mesh.bodies[n]) for n in materials])
     owner = owner[np.asarray(domain.topology.original_cell_index)]
     dim = mesh.dimension
@@ -87,8 +145,11 @@ def properties(mesh: Mesh, materials: dict[str, Material], domain: Any, plane: s
 
 
 def lame(material: Material, dim: int, plane: str) -> tuple[float, float, float]:
-    """Lame's lambda [Pa] (its plane-stress substitute where asked), shear modulus [Pa] and density [kg/m^3]."""
-    E, nu = material.E, material.nu
+    """Lame's lambda [Pa] (its plane-stress substitute where asked), shear modulus [Pa] and density
+    [kg/m^3].
+    """
+    E = material.E
+    nu = material.nu
     mu = E / (2 * (1 + nu))
     lam = E * nu / ((1 + nu) * (1 - 2 * nu))
     if dim == 2 and plane == "stress":
@@ -102,9 +163,13 @@ def cells_of(body: Body) -> np.ndarray:
 
 
 def rigid_modes(body: Body) -> np.ndarray:
-    """(n_points, dim, d) translations and rotations about the body's centre; zero on other nodes. d is 3 or 6."""
+    """(n_points, dim, d) translations and rotations about the body's centre; zero on other nodes. d
+    is 3 or 6.
+    """
     inside = body.rows >= 0
-    x = np.where(inside[:, None], body.mesh.points - body.mesh.points[inside].mean(0), 0.0)[:, :body.dim]
+    x = np.where(inside[:, None], body.mesh.points - body.mesh.points[inside].mean(0), 0.0)[
+        :, : body.dim
+    ]
     moves = [np.where(inside[:, None], np.eye(body.dim)[i], 0.0) for i in range(body.dim)]
     planes = [(0, 1)] if body.dim == 2 else [(1, 2), (2, 0), (0, 1)]
     for a, b in planes:
@@ -114,16 +179,22 @@ def rigid_modes(body: Body) -> np.ndarray:
     return np.stack(moves, axis=2)
 
 
-def _checked(mesh: Mesh, names: tuple[str, ...],
-             materials: dict[str, Material]) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Cells, their node numbers without gaps, and the cells in these; everything that can be wrong is found here."""
+def _checked(
+    mesh: Mesh, names: tuple[str, ...], materials: dict[str, Material]
+) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Cells, their node numbers without gaps, and the cells in these; everything that can be wrong
+    is found here.
+    """
     for n in names:
         if n not in mesh.bodies:
             raise InputError(f"the mesh has no body '{n}'{suggestion(n, mesh.bodies)}")
         if n not in materials:
             raise InputError(f"body '{n}' has no material{suggestion(n, materials)}")
     if mesh.cell_type not in CELLS:
-        raise InputError(f"elements of type '{mesh.cell_type}' are not supported{suggestion(mesh.cell_type, CELLS)}")
+        raise InputError(
+            f"elements of type '{mesh.cell_type}' are not "
+            f"supported{suggestion(mesh.cell_type, CELLS)}"
+        )
     cells = np.concatenate([mesh.bodies[n] for n in names])
     if not np.isfinite(mesh.points[cells]).all():
         raise InputError("the mesh has nodes whose coordinates are not finite numbers")
@@ -143,8 +214,10 @@ def _check_jacobians(mesh: Mesh, cells: np.ndarray) -> None:
     bad = np.concatenate(bad)
     if len(bad):
         at = np.array2string(mesh.points[cells[bad[0]]].mean(0), precision=4)
-        raise InputError(f"{len(bad)} of {len(cells)} elements are turned over (the first near {at} m), "
-                         "expected positive Jacobians; straighten their edges or refine the mesh there")
+        raise InputError(
+            f"{len(bad)} of {len(cells)} elements are turned over (the first near {at} m), "
+            "expected positive Jacobians; straighten their edges or refine the mesh there"
+        )
 
 
 def _piecewise(domain: Any, values: np.ndarray) -> Any:
@@ -165,7 +238,11 @@ def degrees(mesh: Mesh, cells: np.ndarray, quadrature: str) -> tuple[int, int]:
     if not simplex:
         return 2 * degree, 2 * degree + 2
     straight = degree == 1 or _straight(mesh, cells)
-    return (2 * degree - 2, 2 * degree) if straight else (4, 2 * degree + mesh.dimension * (degree - 1))
+    return (
+        (2 * degree - 2, 2 * degree)
+        if straight
+        else (4, 2 * degree + mesh.dimension * (degree - 1))
+    )
 
 
 def _straight(mesh: Mesh, cells: np.ndarray) -> bool:
@@ -173,14 +250,25 @@ def _straight(mesh: Mesh, cells: np.ndarray) -> bool:
     k = shape.corners(mesh.cell_type)
     linear, _ = shape.tabulate(mesh.cell_type.rstrip("0123456789"), shape.nodes(mesh.cell_type))
     x = mesh.points[cells]
-    return bool(abs(x - np.einsum("qk,ckg->cqg", linear, x[:, :k])).max() < 1e-10 * np.ptp(mesh.points, axis=0).max())
+    return bool(
+        abs(x - np.einsum("qk,ckg->cqg", linear, x[:, :k])).max()
+        < 1e-10 * np.ptp(mesh.points, axis=0).max()
+    )
 
 
-def _rows(mesh: Mesh, space: Any, cells: np.ndarray, origin: np.ndarray, comm: MPI.Comm) -> np.ndarray:
-    """PETSc block row of each mesh node, found through the cells: dofmap and input list the same nodes."""
-    permutation = dolfinx.cpp.io.perm_gmsh(dolfinx.cpp.mesh.to_type(CELLS[mesh.cell_type][0]), cells.shape[1])
+def _rows(
+    mesh: Mesh, space: Any, cells: np.ndarray, origin: np.ndarray, comm: MPI.Comm
+) -> np.ndarray:
+    """PETSc block row of each mesh node, found through the cells: dofmap and input list the same
+    nodes.
+    """
+    permutation = dolfinx.cpp.io.perm_gmsh(
+        dolfinx.cpp.mesh.to_type(CELLS[mesh.cell_type][0]), cells.shape[1]
+    )
     blocks = cell_dofs(space).astype(np.int32)
     rows = np.full(len(mesh.points), -1, np.int64)
-    rows[cells[origin][:, permutation].ravel()] = space.dofmap.index_map.local_to_global(blocks.ravel())
+    rows[cells[origin][:, permutation].ravel()] = space.dofmap.index_map.local_to_global(
+        blocks.ravel()
+    )
     comm.Allreduce(MPI.IN_PLACE, rows, MPI.MAX)
     return rows

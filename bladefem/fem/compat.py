@@ -1,7 +1,9 @@
-"""The one door to dolfinx, PETSc and SLEPc: versions 0.5 to 0.11 behind names that say what is wanted.
+"""The one door to dolfinx, PETSc and SLEPc: versions 0.5 to 0.11 behind names that say what is
+wanted.
 
-Debian 12's dolfinx (0.5) switches ``sys.setdlopenflags`` to RTLD_GLOBAL on import and leaves it so, after which other
-wheels (h5py, vtk) resolve their symbols against the wrong libraries; it is kept from doing so here.
+Debian 12's dolfinx (0.5) switches ``sys.setdlopenflags`` to RTLD_GLOBAL on import and leaves it so,
+after which other wheels (h5py, vtk) resolve their symbols against the wrong libraries; it is kept
+from doing so here.
 """
 
 from __future__ import annotations
@@ -17,14 +19,17 @@ from typing import Any
 import numpy as np
 
 from ..errors import NotSolvedError
-from ..store import bind_h5py
+from ..io.stage_cache import bind_h5py
 
-bind_h5py()     # before dolfinx, so that users may import h5py after it
+# before dolfinx, so that users may import h5py after it
+bind_h5py()
 _setdlopenflags = sys.setdlopenflags
-sys.setdlopenflags = lambda flags: None     # not even during the import: HDF5's symbols would stay global
+# not even during the import: HDF5's symbols would stay global
+sys.setdlopenflags = lambda flags: None
 import petsc4py  # noqa: E402
 
-petsc4py.init(["bladefem", "-no_signal_handler"])   # else a reader that closes the pipe (| head) aborts MPI
+# else a reader that closes the pipe (| head) aborts MPI
+petsc4py.init(["bladefem", "-no_signal_handler"])
 import dolfinx  # noqa: E402
 import dolfinx.fem.petsc  # noqa: E402
 import ufl  # noqa: E402
@@ -34,13 +39,34 @@ from slepc4py import SLEPc  # noqa: E402
 
 sys.setdlopenflags = _setdlopenflags
 
-__all__ = ["CELLS", "MPI", "PETSc", "SLEPc", "assemble_matrix", "assemble_vector", "build_mesh", "cell_dofs",
-           "compile_form", "dolfinx", "no_error_messages", "scalar_space", "ufl", "vector_space"]
+__all__ = [
+    "CELLS",
+    "MPI",
+    "PETSc",
+    "SLEPc",
+    "assemble_matrix",
+    "assemble_vector",
+    "build_mesh",
+    "cell_dofs",
+    "compile_form",
+    "dolfinx",
+    "no_error_messages",
+    "scalar_space",
+    "ufl",
+    "vector_space",
+]
 
 # meshio's word: dolfinx's cell, degree
-CELLS = {"triangle": ("triangle", 1), "triangle6": ("triangle", 2), "quad": ("quadrilateral", 1),
-         "quad9": ("quadrilateral", 2), "tetra": ("tetrahedron", 1), "tetra10": ("tetrahedron", 2),
-         "hexahedron": ("hexahedron", 1), "hexahedron27": ("hexahedron", 2)}
+CELLS = {
+    "triangle": ("triangle", 1),
+    "triangle6": ("triangle", 2),
+    "quad": ("quadrilateral", 1),
+    "quad9": ("quadrilateral", 2),
+    "tetra": ("tetrahedron", 1),
+    "tetra10": ("tetrahedron", 2),
+    "hexahedron": ("hexahedron", 1),
+    "hexahedron27": ("hexahedron", 2),
+}
 
 
 @contextmanager
@@ -56,8 +82,11 @@ def no_error_messages() -> Iterator[None]:
         PETSc.Sys.popErrorHandler()
 
 
-def build_mesh(comm: MPI.Comm, cell_type: str, cells: np.ndarray, points: np.ndarray) -> tuple[Any, np.ndarray]:
-    """A distributed dolfinx mesh, and for each cell of this rank the row of ``cells`` that it came from.
+def build_mesh(
+    comm: MPI.Comm, cell_type: str, cells: np.ndarray, points: np.ndarray
+) -> tuple[Any, np.ndarray]:
+    """A distributed dolfinx mesh, and for each cell of this rank the row of ``cells`` that it came
+    from.
 
     Args:
         cells: (nc, k) numbers into points, gmsh's order in the element, the same on every rank.
@@ -69,10 +98,13 @@ def build_mesh(comm: MPI.Comm, cell_type: str, cells: np.ndarray, points: np.nda
     x = np.array_split(points, comm.size)[comm.rank]
     gdim = points.shape[1]
     if hasattr(ufl, "VectorElement"):
-        domain = ufl.Mesh(ufl.VectorElement("Lagrange", ufl.Cell(shape, geometric_dimension=gdim), degree))
+        domain = ufl.Mesh(
+            ufl.VectorElement("Lagrange", ufl.Cell(shape, geometric_dimension=gdim), degree)
+        )
         mesh = dolfinx.mesh.create_mesh(comm, mine, x, domain)
     else:
         import basix.ufl
+
         domain = ufl.Mesh(basix.ufl.element("Lagrange", shape, degree, shape=(gdim,)))
         mesh = dolfinx.mesh.create_mesh(comm, cells=mine, x=np.ascontiguousarray(x), e=domain)
     return mesh, np.asarray(mesh.topology.original_cell_index)
@@ -121,23 +153,31 @@ def _patiently(build: Callable[[], Any], patience: int = 12) -> Any:
             if not _unfinished(120.0):
                 break
     stale = ", ".join(map(str, _unfinished(np.inf))) or "none found"
-    raise NotSolvedError("the form compiler's cache holds a build that never finished; "
-                         f"delete these files and start again: {stale}")
+    raise NotSolvedError(
+        "the form compiler's cache holds a build that never finished; "
+        f"delete these files and start again: {stale}"
+    )
 
 
 def _unfinished(age: float) -> list[Path]:
     """C files without the mark of a finished build, not older than ``age`` seconds."""
     options = getattr(dolfinx.jit, "get_parameters", None) or dolfinx.jit.get_options
     folder = Path(options()["cache_dir"])
-    return [c for c in folder.glob("*.c")
-            if not c.with_suffix(".c.cached").exists() and time.time() - c.stat().st_mtime <= age]
+    return [
+        c
+        for c in folder.glob("*.c")
+        if not c.with_suffix(".c.cached").exists() and time.time() - c.stat().st_mtime <= age
+    ]
 
 
 @contextmanager
 def _quiet() -> Iterator[None]:
-    """ffcx and its compiler write to the root logger (and lower its level) in dolfinx 0.5; it warns of many points."""
+    """ffcx and its compiler write to the root logger (and lower its level) in dolfinx 0.5; it warns
+    of many points.
+    """
     root = logging.getLogger()
-    level, handlers = root.level, list(root.handlers)
+    level = root.level
+    handlers = list(root.handlers)
     logging.disable(logging.WARNING)
     try:
         yield

@@ -1,13 +1,13 @@
 """Clamps, ties and cyclic symmetry by an explicit transformation of the unknowns.
 
-u = T(n) q with T(n) = T0 + e^{j n theta} T1: free nodes keep their displacements, nodes of the high cut face repeat
-those of the low one, turned and shifted in phase by n theta. Then
+u = T(n) q with T(n) = T0 + e^{j n theta} T1: free nodes keep their displacements, nodes of the high
+cut face repeat those of the low one, turned and shifted in phase by n theta. Then
 
     K(n) = T(n)^H K T(n) = K0 + cos(n theta) Kc + j sin(n theta) Ks
 
-with three real sparse matrices that serve every nodal diameter n. A plane face named "symmetry_x", "symmetry_y" or
-"symmetry_z" slides in its plane: the displacement along that axis is zero there. On a plane "antisymmetry_x", ... the
-two others are zero: the deformed body turns over in the mirror.
+with three real sparse matrices that serve every nodal diameter n. A plane face named "symmetry_x",
+"symmetry_y" or "symmetry_z" slides in its plane: the displacement along that axis is zero there. On
+a plane "antisymmetry_x", ... the two others are zero: the deformed body turns over in the mirror.
 """
 
 from __future__ import annotations
@@ -20,25 +20,43 @@ import scipy.sparse as sp
 from geometry.mesh import Pair
 
 from ..errors import InputError, suggestion
-from . import core
+from . import cyclic_schur as core
 from .body import Body
 from .compat import PETSc
 from .linalg import Doubled, Folded, Matrix, combined
 from .ordering import interior_first
 
-__all__ = ["Constrained", "Opened", "Transformation", "at_diameter", "clamped_nodes", "constrain", "expand", "in_step",
-           "restrict", "transformation", "unknowns"]
+__all__ = [
+    "Constrained",
+    "Opened",
+    "Transformation",
+    "at_diameter",
+    "clamped_nodes",
+    "constrain",
+    "expand",
+    "in_step",
+    "restrict",
+    "transformation",
+    "unknowns",
+]
 
 
 @dataclass(frozen=True)
 class Opened:
-    """An open sector on one rank: its cut faces are free of each other, one factorisation serves all diameters."""
+    """An open sector on one rank: its cut faces are free of each other, one factorisation serves
+    all diameters.
+    """
 
-    T: sp.csr_matrix                # (n_points*dim, n_open) mesh displacements from open unknowns
-    places: np.ndarray              # (n_open,) the displacement in mesh numbering that each open unknown is
-    K: sp.csr_matrix                # (n_open, n_open) [N/m]
-    M: sp.csr_matrix                # [kg]
-    core: core.Core                 # K with its interior eliminated
+    # (n_points*dim, n_open) mesh displacements from open unknowns
+    T: sp.csr_matrix
+    # (n_open,) the displacement in mesh numbering that each open unknown is
+    places: np.ndarray
+    # (n_open, n_open) [N/m]
+    K: sp.csr_matrix
+    # [kg]
+    M: sp.csr_matrix
+    # K with its interior eliminated
+    core: core.Core
 
 
 @dataclass(frozen=True)
@@ -46,13 +64,19 @@ class Transformation:
     """What serves every nodal diameter: the two parts of T and the projected matrices."""
 
     body: Body
-    low: sp.csr_matrix              # T0 (n_points*dim, n_free) in mesh numbering, the same on every rank
-    high: sp.csr_matrix | None      # T1, None without cyclic symmetry
-    start: np.ndarray               # (ranks+1,) first unknown of each rank
-    K: tuple[PETSc.Mat, ...]        # (K0,), or (K0, Kc, Ks); empty when opened
+    # T0 (n_points*dim, n_free) in mesh numbering, the same on every rank
+    low: sp.csr_matrix
+    # T1, None without cyclic symmetry
+    high: sp.csr_matrix | None
+    # (ranks+1,) first unknown of each rank
+    start: np.ndarray
+    # (K0,), or (K0, Kc, Ks); empty when opened
+    K: tuple[PETSc.Mat, ...]
     M: tuple[PETSc.Mat, ...]
-    opened: Opened | None           # wheels on one rank
-    sectors: int                    # 0 without cyclic symmetry
+    # wheels on one rank
+    opened: Opened | None
+    # 0 without cyclic symmetry
+    sectors: int
 
 
 @dataclass(frozen=True)
@@ -60,10 +84,14 @@ class Constrained:
     """A body with its constraints in one nodal diameter."""
 
     body: Body
-    T: sp.csr_matrix                # (n_points*dim, n_free) real or complex, the same on every rank
-    own: slice                      # unknowns of this rank
-    K: Matrix                       # (n_free, n_free) [N/m]
-    M: Matrix                       # [kg]
+    # (n_points*dim, n_free) real or complex, the same on every rank
+    T: sp.csr_matrix
+    # unknowns of this rank
+    own: slice
+    # (n_free, n_free) [N/m]
+    K: Matrix
+    # [kg]
+    M: Matrix
     nodal_diameter: int | None
 
     @property
@@ -72,42 +100,59 @@ class Constrained:
         return complex if np.iscomplexobj(self.T) else float
 
 
-def constrain(body: Body, clamp: str | None = "clamp", nodal_diameter: int | None = None,
-              ties: np.ndarray | None = None) -> Constrained:
-    """A body with its constraints and symmetry planes, for one nodal diameter (None: no cyclic symmetry).
+def constrain(
+    body: Body,
+    clamp: str | None = "clamp",
+    nodal_diameter: int | None = None,
+    ties: np.ndarray | None = None,
+) -> Constrained:
+    """A body with its constraints and symmetry planes, for one nodal diameter (None: no cyclic
+    symmetry).
 
     Args:
         clamp: face or node set held fast; None for a floating body.
         ties: (k, 3) node numbers, the first constrained to the mean of the two others.
 
     Raises:
-        InputError: no such face, cut faces that do not match, a symmetry plane that is not plane, a nodal diameter
-            that the wheel does not have.
+        InputError: no such face, cut faces that do not match, a symmetry plane that is not plane, a
+            nodal diameter that the wheel does not have.
     """
-    return at_diameter(transformation(body, clamp, nodal_diameter is not None, ties), nodal_diameter)
+    return at_diameter(
+        transformation(body, clamp, nodal_diameter is not None, ties), nodal_diameter
+    )
 
 
-def transformation(body: Body, clamp: str | None = "clamp", cyclic: bool = False, ties: np.ndarray | None = None,
-                   one_core: bool | None = None) -> Transformation:
+def transformation(
+    body: Body,
+    clamp: str | None = "clamp",
+    cyclic: bool = False,
+    ties: np.ndarray | None = None,
+    one_core: bool | None = None,
+) -> Transformation:
     """The part of ``constrain`` that serves all nodal diameters.
 
     Args:
-        one_core: eliminate the interior once (one rank only, and the default there) instead of factorising the doubled
-            pencil of each nodal diameter.
+        one_core: eliminate the interior once (one rank only, and the default there) instead of
+            factorising the doubled pencil of each nodal diameter.
     """
     pair = _cyclic_pair(body) if cyclic else None
     clamped = _with_partners(clamped_nodes(body, clamp), pair)
     low, high, start = _numbered(body, *_parts(body, clamped, pair, ties))
     if high is None:
         T0 = _to_petsc(body, low, start)
-        return Transformation(body, low, None, start, (body.K.ptap(T0),), (body.M.ptap(T0),), None, 0)
+        return Transformation(
+            body, low, None, start, (body.K.ptap(T0),), (body.M.ptap(T0),), None, 0
+        )
     sectors = body.mesh.sector.count
     if body.comm.size == 1 and one_core is not False:
         opened = _opened(body, _numbered(body, *_parts(body, clamped, None, ties))[0], low, high)
         if opened is not None:
             return Transformation(body, low, high, start, (), (), opened, sectors)
-    T0, T1 = _to_petsc(body, low, start), _to_petsc(body, high, start)
-    return Transformation(body, low, high, start, _three(body.K, T0, T1), _three(body.M, T0, T1), None, sectors)
+    T0 = _to_petsc(body, low, start)
+    T1 = _to_petsc(body, high, start)
+    return Transformation(
+        body, low, high, start, _three(body.K, T0, T1), _three(body.M, T0, T1), None, sectors
+    )
 
 
 def at_diameter(t: Transformation, nodal_diameter: int | None) -> Constrained:
@@ -125,16 +170,21 @@ def at_diameter(t: Transformation, nodal_diameter: int | None) -> Constrained:
     T = (t.low + phase * t.high).tocsr()
     if t.opened is not None:
         C = T[t.opened.places]
-        return Constrained(t.body, T, own, Folded(t.opened.K, C, t.opened.core), Folded(t.opened.M, C, None), n)
+        return Constrained(
+            t.body, T, own, Folded(t.opened.K, C, t.opened.core), Folded(t.opened.M, C, None), n
+        )
     if real:
         K, M = (combined(A[0], phase, A[1]) for A in (t.K, t.M))
     else:
-        K, M = (_doubled(combined(A[0], np.cos(angle), A[1]), A[2], np.sin(angle)) for A in (t.K, t.M))
+        K, M = (
+            _doubled(combined(A[0], np.cos(angle), A[1]), A[2], np.sin(angle)) for A in (t.K, t.M)
+        )
     return Constrained(t.body, T, own, K, M, n)
 
 
 def in_step(body: Body, clamp: str | None = "clamp") -> Constrained:
-    """All sectors move alike (nodal diameter 0), or no cyclic symmetry: for static states, nothing kept for others.
+    """All sectors move alike (nodal diameter 0), or no cyclic symmetry: for static states, nothing
+    kept for others.
 
     Raises:
         InputError: see :func:`constrain`.
@@ -142,9 +192,16 @@ def in_step(body: Body, clamp: str | None = "clamp") -> Constrained:
     pair = _cyclic_pair(body) if "cyclic" in body.mesh.pairs else None
     low, high = _parts(body, _with_partners(clamped_nodes(body, clamp), pair), pair, None)
     T, _, start = _numbered(body, low if high is None else (low + high).tocsr(), None)
-    T0, rank = _to_petsc(body, T, start), body.comm.rank
-    return Constrained(body, T, slice(int(start[rank]), int(start[rank + 1])), body.K.ptap(T0), body.M.ptap(T0),
-                       None if pair is None else 0)
+    T0 = _to_petsc(body, T, start)
+    rank = body.comm.rank
+    return Constrained(
+        body,
+        T,
+        slice(int(start[rank]), int(start[rank + 1])),
+        body.K.ptap(T0),
+        body.M.ptap(T0),
+        None if pair is None else 0,
+    )
 
 
 def clamped_nodes(body: Body, clamp: str | None) -> np.ndarray:
@@ -157,14 +214,20 @@ def clamped_nodes(body: Body, clamp: str | None) -> np.ndarray:
     found = np.unique(known[clamp])
     found = found[body.rows[found] >= 0]
     if not len(found):
-        raise InputError(f"'{clamp}' touches no node of body '{body.name}', expected nodes to hold it by")
+        raise InputError(
+            f"'{clamp}' touches no node of body '{body.name}', expected nodes to hold it by"
+        )
     return found
 
 
 def restrict(con: Constrained, load: np.ndarray | sp.spmatrix) -> np.ndarray:
-    """T^H load: this rank's rows (n_own, k) of loads or port vectors (n_points*dim, k) in mesh numbering."""
+    """T^H load: this rank's rows (n_own, k) of loads or port vectors (n_points*dim, k) in mesh
+    numbering.
+    """
     product = con.T.conj().T @ load
-    return (product.tocsr()[con.own].toarray() if sp.issparse(product) else np.asarray(product)[con.own])
+    return (
+        product.tocsr()[con.own].toarray() if sp.issparse(product) else np.asarray(product)[con.own]
+    )
 
 
 def unknowns(con: Constrained, x: np.ndarray) -> np.ndarray:
@@ -174,7 +237,9 @@ def unknowns(con: Constrained, x: np.ndarray) -> np.ndarray:
 
 
 def expand(con: Constrained, x: np.ndarray) -> np.ndarray:
-    """Displacements (n_points, dim, k) in mesh numbering on every rank from this rank's unknowns (n_own, k)."""
+    """Displacements (n_points, dim, k) in mesh numbering on every rank from this rank's unknowns
+    (n_own, k).
+    """
     return (con.T @ unknowns(con, x)).reshape(len(con.body.mesh.points), con.body.dim, -1)
 
 
@@ -192,36 +257,47 @@ def _cyclic_pair(body: Body) -> Pair:
     if "cyclic" not in mesh.pairs:
         raise InputError(f"the mesh has no pair 'cyclic'{suggestion('cyclic', mesh.pairs)}")
     if mesh.sector is None or mesh.sector.count < 2:
-        raise InputError("the mesh has no number of sectors, expected at least 2 for cyclic symmetry")
+        raise InputError(
+            "the mesh has no number of sectors, expected at least 2 for cyclic symmetry"
+        )
     pair = mesh.pairs["cyclic"]
     low, high = pair.nodes[:, body.rows[pair.nodes[0]] >= 0]
     for side, nodes in ((pair.master, low), (pair.slave, high)):
         face = np.unique(mesh.faces.get(side, nodes))
         missing = np.setdiff1d(face[body.rows[face] >= 0], nodes)
         if len(missing):
-            raise InputError(f"face '{side}' has {len(missing)} nodes without a partner, the first at "
-                             f"{mesh.points[missing[0]].round(6)} m; mesh the cut faces periodically")
+            raise InputError(
+                f"face '{side}' has {len(missing)} nodes without a partner, the first at "
+                f"{mesh.points[missing[0]].round(6)} m; mesh the cut faces periodically"
+            )
     _check_match(mesh.points, low, high, pair)
     return Pair(pair.master, pair.slave, np.stack([low, high]), pair.rotation, pair.shift)
 
 
 def _check_match(points: np.ndarray, low: np.ndarray, high: np.ndarray, pair: Pair) -> None:
-    """Partners must coincide under the motion, to a tolerance that scales with the distance between nodes."""
+    """Partners must coincide under the motion, to a tolerance that scales with the distance between
+    nodes.
+    """
     error = np.linalg.norm(points[low] @ pair.rotation.T + pair.shift - points[high], axis=1)
     tolerance = 1e-6 * np.ptp(points[low], axis=0).max() / max(np.sqrt(len(low)), 1)
     worst = int(error.argmax())
     if error[worst] > tolerance:
-        raise InputError(f"faces '{pair.master}' and '{pair.slave}' do not match: nodes {low[worst]} at "
-                         f"{points[low[worst]].round(6)} m and {high[worst]} at {points[high[worst]].round(6)} m are "
-                         f"{error[worst]:.2e} m apart after the rotation, expected at most {tolerance:.1e} m")
+        raise InputError(
+            f"faces '{pair.master}' and '{pair.slave}' do not match: nodes {low[worst]} at "
+            f"{points[low[worst]].round(6)} m and {high[worst]} at {points[high[worst]].round(6)} "
+            "m are "
+            f"{error[worst]:.2e} m apart after the rotation, expected at most {tolerance:.1e} m"
+        )
     if np.intersect1d(low, high).size:
         raise InputError("the cut faces share nodes (a solid hub on the axis), expected a bore")
 
 
-def _parts(body: Body, clamped: np.ndarray, pair: Pair | None,
-           ties: np.ndarray | None) -> tuple[sp.csr_matrix, sp.csr_matrix | None]:
+def _parts(
+    body: Body, clamped: np.ndarray, pair: Pair | None, ties: np.ndarray | None
+) -> tuple[sp.csr_matrix, sp.csr_matrix | None]:
     """T0 and T1 on all nodes' displacements; columns of dependent nodes stay empty."""
-    n, d = len(body.mesh.points), body.dim
+    n = len(body.mesh.points)
+    d = body.dim
     free = body.rows >= 0
     free[clamped] = False
     slaves = np.empty(0, int) if pair is None else pair.nodes[1]
@@ -231,7 +307,8 @@ def _parts(body: Body, clamped: np.ndarray, pair: Pair | None,
     high = None
     if pair is not None:
         alive = free[slaves]
-        rows, cols = pair.nodes[1][alive], pair.nodes[0][alive]
+        rows = pair.nodes[1][alive]
+        cols = pair.nodes[0][alive]
         block = sp.coo_matrix((np.ones(len(rows)), (rows, cols)), shape=(n, n))
         moving = sp.diags((~_slid(body, pair)).astype(float))
         high = (moving @ sp.kron(block, pair.rotation[:d, :d])).tocsr()
@@ -245,9 +322,12 @@ def _parts(body: Body, clamped: np.ndarray, pair: Pair | None,
 def _slid(body: Body, pair: Pair | None) -> np.ndarray:
     """(n_points*dim,) true where a plane of symmetry or antisymmetry holds a displacement."""
     held = np.zeros((len(body.mesh.points), body.dim), bool)
-    for axis, letter in enumerate("xyz"[:body.dim]):
+    for axis, letter in enumerate("xyz"[: body.dim]):
         across = np.arange(body.dim) == axis
-        for name, directions in ((f"symmetry_{letter}", across), (f"antisymmetry_{letter}", ~across)):
+        for name, directions in (
+            (f"symmetry_{letter}", across),
+            (f"antisymmetry_{letter}", ~across),
+        ):
             held[np.ix_(_plane(body, name, axis, pair), directions)] = True
     return held.ravel()
 
@@ -260,11 +340,16 @@ def _plane(body: Body, name: str, axis: int, pair: Pair | None) -> np.ndarray:
     if not len(nodes):
         return nodes
     if np.ptp(points[nodes, axis]) > 1e-6 * np.ptp(points, axis=0).max():
-        raise InputError(f"face '{name}' extends from {points[nodes, axis].min():.6g} to "
-                         f"{points[nodes, axis].max():.6g} m along {name[-1]}, expected a plane across that axis")
+        raise InputError(
+            f"face '{name}' extends from {points[nodes, axis].min():.6g} to "
+            f"{points[nodes, axis].max():.6g} m along {name[-1]}, expected a plane across that axis"
+        )
     if pair is not None and abs(pair.rotation[axis, axis] - 1) > 1e-12:
-        raise InputError(f"face '{name}' is not across the axis of the wheel, expected cyclic faces or a symmetry "
-                         "plane, not both")
+        raise InputError(
+            f"face '{name}' is not across the axis of the wheel, expected cyclic faces or a "
+            "symmetry "
+            "plane, not both"
+        )
     return nodes
 
 
@@ -280,19 +365,27 @@ def _tied(n: int, d: int, ties: np.ndarray) -> sp.csr_matrix:
     """Identity, but tied nodes are the mean of two others."""
     keep = np.ones(n)
     keep[ties[:, 0]] = 0
-    half = sp.coo_matrix((np.full(2 * len(ties), 0.5), (np.repeat(ties[:, 0], 2), ties[:, 1:].ravel())), shape=(n, n))
+    half = sp.coo_matrix(
+        (np.full(2 * len(ties), 0.5), (np.repeat(ties[:, 0], 2), ties[:, 1:].ravel())), shape=(n, n)
+    )
     return sp.kron(sp.diags(keep) + half, sp.identity(d)).tocsr()
 
 
-def _numbered(body: Body, low: sp.csr_matrix, high: sp.csr_matrix | None
-              ) -> tuple[sp.csr_matrix, sp.csr_matrix | None, np.ndarray]:
-    """Drop empty columns; number the others by their PETSc row, so that an unknown lives where its node lives."""
+def _numbered(
+    body: Body, low: sp.csr_matrix, high: sp.csr_matrix | None
+) -> tuple[sp.csr_matrix, sp.csr_matrix | None, np.ndarray]:
+    """Drop empty columns; number the others by their PETSc row, so that an unknown lives where its
+    node lives.
+    """
     used = abs(low).sum(0) if high is None else abs(low).sum(0) + abs(high).sum(0)
     columns = np.flatnonzero(np.asarray(used).ravel())
     rows = body.scalar_rows[columns]
     order = np.argsort(rows)
-    columns, rows = columns[order], rows[order]
-    start = np.searchsorted(rows, body.K.owner_ranges if body.comm.size > 1 else [0, body.K.size[0]])
+    columns = columns[order]
+    rows = rows[order]
+    start = np.searchsorted(
+        rows, body.K.owner_ranges if body.comm.size > 1 else [0, body.K.size[0]]
+    )
     if not len(columns):
         raise InputError(f"body '{body.name}' has no free node left, expected a smaller clamp")
     cut = (A if A is None else A[:, columns].tocsr() for A in (low, high))
@@ -304,19 +397,24 @@ def _to_petsc(body: Body, T: sp.csr_matrix, start: np.ndarray) -> PETSc.Mat:
     first, last = body.K.owner_range
     rank = body.comm.rank
     nodes = np.argsort(body.scalar_rows, kind="stable")
-    nodes = nodes[np.count_nonzero(body.scalar_rows < 0):][first:last]
+    nodes = nodes[np.count_nonzero(body.scalar_rows < 0) :][first:last]
     mine = T[nodes]
     mine.sum_duplicates()
     size = ((last - first, body.K.size[0]), (int(start[rank + 1] - start[rank]), T.shape[1]))
-    matrix = PETSc.Mat().createAIJ(size, csr=(mine.indptr.astype(PETSc.IntType), mine.indices.astype(PETSc.IntType),
-                                              mine.data), comm=body.comm)
+    matrix = PETSc.Mat().createAIJ(
+        size,
+        csr=(mine.indptr.astype(PETSc.IntType), mine.indices.astype(PETSc.IntType), mine.data),
+        comm=body.comm,
+    )
     matrix.assemble()
     return matrix
 
 
 def _opened(body: Body, T: sp.csr_matrix, low: sp.csr_matrix, high: sp.csr_matrix) -> Opened | None:
-    """Matrices of the open sector, None where it is all cut face; zeros between directions of the mass are dropped."""
-    to_open = T[np.argsort(body.scalar_rows)[np.count_nonzero(body.scalar_rows < 0):]]
+    """Matrices of the open sector, None where it is all cut face; zeros between directions of the
+    mass are dropped.
+    """
+    to_open = T[np.argsort(body.scalar_rows)[np.count_nonzero(body.scalar_rows < 0) :]]
     K, M = (_projected(_csr(A), to_open) for A in (body.K, body.M))
     M.eliminate_zeros()
     rows = T.tocoo()
@@ -326,7 +424,9 @@ def _opened(body: Body, T: sp.csr_matrix, low: sp.csr_matrix, high: sp.csr_matri
     rim = core.rim_of((abs(low) + abs(high))[places].tocsr())
     if len(rim) == len(places):
         return None
-    return Opened(T, places, K, M, core.eliminate(K, rim, order=interior_first(K, rim, places // body.dim)))
+    return Opened(
+        T, places, K, M, core.eliminate(K, rim, order=interior_first(K, rim, places // body.dim))
+    )
 
 
 def _projected(A: sp.csr_matrix, T: sp.csr_matrix) -> sp.csr_matrix:
@@ -344,16 +444,27 @@ def _three(A: PETSc.Mat, T0: PETSc.Mat, T1: PETSc.Mat) -> tuple[PETSc.Mat, PETSc
     cross = T0.transposeMatMult(A.matMult(T1))
     turned = cross.duplicate(copy=True)
     turned.transpose()
-    return combined(A.ptap(T0), 1.0, A.ptap(T1)), combined(cross, 1.0, turned), combined(cross, -1.0, turned)
+    return (
+        combined(A.ptap(T0), 1.0, A.ptap(T1)),
+        combined(cross, 1.0, turned),
+        combined(cross, -1.0, turned),
+    )
 
 
 def _doubled(A: PETSc.Mat, B: PETSc.Mat, factor: float) -> Doubled:
-    """The real twin of A + j factor B, parts interleaved: kron(A, I) + kron(factor B, [0 -1; 1 0])."""
-    twin = sp.kron(_csr(A), np.eye(2), "csr") + factor * sp.kron(_csr(B), np.array([[0.0, -1.0], [1.0, 0.0]]), "csr")
+    """The real twin of A + j factor B, parts interleaved: kron(A, I) + kron(factor B, [0 -1; 1
+    0]).
+    """
+    twin = sp.kron(_csr(A), np.eye(2), "csr") + factor * sp.kron(
+        _csr(B), np.array([[0.0, -1.0], [1.0, 0.0]]), "csr"
+    )
     twin.sum_duplicates()
     (n, N), _ = A.sizes
-    out = PETSc.Mat().createAIJ(((2 * n, 2 * N), (2 * n, 2 * N)), comm=A.comm, csr=(
-        twin.indptr.astype(PETSc.IntType), twin.indices.astype(PETSc.IntType), twin.data))
+    out = PETSc.Mat().createAIJ(
+        ((2 * n, 2 * N), (2 * n, 2 * N)),
+        comm=A.comm,
+        csr=(twin.indptr.astype(PETSc.IntType), twin.indices.astype(PETSc.IntType), twin.data),
+    )
     out.assemble()
     return Doubled(out)
 

@@ -1,8 +1,9 @@
 """The static flexibility K^+ of a constrained body, also where the body can still move rigidly.
 
-Rigid motions R (M-orthonormal) are found exactly from geometry. A floating body is propped by springs at as many
-freedoms as it has rigid motions: loads without a resultant leave such a statically determinate support without force,
-so for them (K + C)^-1 is exact whatever the stiffness of the springs.
+Rigid motions R (M-orthonormal) are found exactly from geometry. A floating body is propped by
+springs at as many freedoms as it has rigid motions: loads without a resultant leave such a
+statically determinate support without force, so for them (K + C)^-1 is exact whatever the stiffness
+of the springs.
 """
 
 from __future__ import annotations
@@ -24,16 +25,20 @@ class Flexibility:
     """K^+ of a constrained body as one factorisation."""
 
     con: Constrained
-    factor: Factor                  # of K, or of K with props
-    R: np.ndarray                   # (n_own, r) rigid motions, M-orthonormal
-    MR: np.ndarray                  # (n_own, r)
+    # of K, or of K with props
+    factor: Factor
+    # (n_own, r) rigid motions, M-orthonormal
+    R: np.ndarray
+    # (n_own, r)
+    MR: np.ndarray
 
 
 def flexible(con: Constrained, prop: float = 1.0) -> Flexibility:
     """Factorise K for modes, reduction and contact alike.
 
     Args:
-        prop: stiffness of the props over the mean diagonal of K; floating bodies only, without influence.
+        prop: stiffness of the props over the mean diagonal of K; floating bodies only, without
+            influence.
 
     Raises:
         NotSolvedError: from MUMPS.
@@ -54,10 +59,12 @@ def compliance(flex: Flexibility, B: np.ndarray) -> np.ndarray:
 
 
 def rigid_basis(con: Constrained) -> np.ndarray:
-    """(n_own, r) M-orthonormal rigid motions that clamp and cyclic symmetry allow; r = 0 for a held body.
+    """(n_own, r) M-orthonormal rigid motions that clamp and cyclic symmetry allow; r = 0 for a held
+    body.
 
-    A combination R c is allowed when it is T times its own values at the unknowns: c is in the null space of
-    R - T R_unknowns. Of a wheel, translations and rotations are waves of nodal diameter 0 and 1 only.
+    A combination R c is allowed when it is T times its own values at the unknowns: c is in the null
+    space of R - T R_unknowns. Of a wheel, translations and rotations are waves of nodal diameter 0
+    and 1 only.
     """
     body = con.body
     if (con.nodal_diameter or 0) > 1:
@@ -91,7 +98,7 @@ def _props(con: Constrained, R: np.ndarray, prop: float) -> np.ndarray:
     """(n_own,) springs at the freedoms that hold the rigid motions best (pivoted QR)."""
     everywhere = unknowns(con, R)
     allowed = dense_rows(con.K, len(everywhere))
-    places = allowed[qr(everywhere[allowed].conj().T, mode="r", pivoting=True)[1][:R.shape[1]]]
+    places = allowed[qr(everywhere[allowed].conj().T, mode="r", pivoting=True)[1][: R.shape[1]]]
     springs = np.zeros(len(everywhere))
     springs[places] = prop * scale(con.K)
     return springs[con.own]

@@ -1,4 +1,6 @@
-"""Ranks split into groups that share out nodal diameters; the mesh is distributed within each group."""
+"""Ranks split into groups that share out nodal diameters; the mesh is distributed within each
+group.
+"""
 
 from __future__ import annotations
 
@@ -13,11 +15,13 @@ from .memory import available, needed
 __all__ = ["group_size", "shared_out"]
 
 Result = TypeVar("Result")
-SPARE = 0.8     # share of the free memory that groups may fill
+# share of the free memory that groups may fill
+SPARE = 0.8
 
 
 def group_size(comm: MPI.Comm, dofs: int, free: float | None = None) -> int:
-    """Ranks in a group: as few as memory allows, for a wheel is solved fastest by one rank; divides the ranks.
+    """Ranks in a group: as few as memory allows, for a wheel is solved fastest by one rank; divides
+    the ranks.
 
     Args:
         dofs: degrees of freedom of one sector.
@@ -33,13 +37,18 @@ def group_size(comm: MPI.Comm, dofs: int, free: float | None = None) -> int:
     return comm.size
 
 
-def shared_out(comm: MPI.Comm, tasks: Sequence[int], size: int,
-               work: Callable[[MPI.Comm, list[int]], list[Result]]) -> list[Result]:
+def shared_out(
+    comm: MPI.Comm,
+    tasks: Sequence[int],
+    size: int,
+    work: Callable[[MPI.Comm, list[int]], list[Result]],
+) -> list[Result]:
     """Results of all tasks, in their order and on every rank; collective.
 
     Args:
         size: ranks in a group.
-        work: results of some tasks, neighbours in number, by the ranks of one group, the same on each of them.
+        work: results of some tasks, neighbours in number, by the ranks of one group, the same on
+            each of them.
 
     Raises:
         whatever a group raised.
@@ -52,7 +61,8 @@ def shared_out(comm: MPI.Comm, tasks: Sequence[int], size: int,
     error = None
     try:
         found = dict(zip(mine, work(part, mine), strict=True))
-    except Exception as problem:        # the other groups must not wait for ever
+    except Exception as problem:
+        # the other groups must not wait for ever
         error = problem
     first = part.rank == 0
     part.Free()

@@ -1,12 +1,14 @@
-"""Coriolis forces in the rotating frame: one mode of the body at rest becomes a forward and a backward wave.
+"""Coriolis forces in the rotating frame: one mode of the body at rest becomes a forward and a
+backward wave.
 
-M q'' + Omega G q' + K(Omega) q = 0, G skew: 2 rho v . (a x u) over the body, a the axis. On the modes of one nodal
-diameter, mass-normalised, with g = Phi^H G Phi and the eigenvalues lambda of K(Omega), a motion z e^{j w t} obeys
+M q'' + Omega G q' + K(Omega) q = 0, G skew: 2 rho v . (a x u) over the body, a the axis. On the
+modes of one nodal diameter, mass-normalised, with g = Phi^H G Phi and the eigenvalues lambda of
+K(Omega), a motion z e^{j w t} obeys
 
     (lambda - w^2 + j w Omega g) z = 0,
 
-Hermitian, so that every w is real (Meirovitch, AIAA J. 12 (1974), doi:10.2514/3.49486). Sector k carries the factor
-e^{j k n theta}: w > 0 travels against the count of the sectors, w < 0 with it.
+Hermitian, so that every w is real (Meirovitch, AIAA J. 12 (1974), doi:10.2514/3.49486). Sector k
+carries the factor e^{j k n theta}: w > 0 travels against the count of the sectors, w < 0 with it.
 """
 
 from __future__ import annotations
@@ -27,18 +29,27 @@ __all__ = ["Waves", "coriolis", "coupling", "own_rows", "waves"]
 
 @dataclass(frozen=True)
 class Waves:
-    """Travelling waves of one nodal diameter in the rotating frame; a standing mode has the same frequency in both."""
+    """Travelling waves of one nodal diameter in the rotating frame; a standing mode has the same
+    frequency in both.
+    """
 
     nodal_diameter: int | None
-    speed: float                    # [rad/s]
-    forward: np.ndarray             # (m,) [Hz], waves that run round faster than the wheel, ascending
-    backward: np.ndarray            # (m,) [Hz], ascending
-    forward_shapes: np.ndarray      # (modes, m) each wave as a sum of the modes that were coupled
-    backward_shapes: np.ndarray     # (modes, m)
+    # [rad/s]
+    speed: float
+    # (m,) [Hz], waves that run round faster than the wheel, ascending
+    forward: np.ndarray
+    # (m,) [Hz], ascending
+    backward: np.ndarray
+    # (modes, m) each wave as a sum of the modes that were coupled
+    forward_shapes: np.ndarray
+    # (modes, m)
+    backward_shapes: np.ndarray
 
     @property
     def stationary(self) -> tuple[np.ndarray, np.ndarray]:
-        """Frequencies (forward, backward) seen by an observer who does not turn [Hz]; negative: carried forward."""
+        """Frequencies (forward, backward) seen by an observer who does not turn [Hz]; negative:
+        carried forward.
+        """
         shift = (self.nodal_diameter or 0) * self.speed / (2 * np.pi)
         return self.forward + shift, self.backward - shift
 
@@ -47,8 +58,9 @@ def coriolis(body: Body, axis: tuple[float, float, float] = AXIS) -> PETSc.Mat:
     """G [kg]: times the speed [rad/s] it multiplies velocities in the rotating frame; skew."""
     _, _, rho, depth = properties(body.mesh, body.material, body.space.mesh, body.plane)
     a = np.asarray(axis, float) / np.linalg.norm(axis)
-    turn = np.array([[0, -a[2], a[1]], [a[2], 0, -a[0]], [-a[1], a[0], 0]])[:body.dim, :body.dim]
-    v, u = ufl.TestFunction(body.space), ufl.TrialFunction(body.space)
+    turn = np.array([[0, -a[2], a[1]], [a[2], 0, -a[0]], [-a[1], a[0], 0]])[: body.dim, : body.dim]
+    v = ufl.TestFunction(body.space)
+    u = ufl.TrialFunction(body.space)
     _, degree = degrees(body.mesh, cells_of(body), "exact")
     # a constant, since a matrix of zeros (a plane that holds the axis) would leave no form
     cross = dolfinx.fem.Constant(body.space.mesh, np.ascontiguousarray(turn))
@@ -56,8 +68,9 @@ def coriolis(body: Body, axis: tuple[float, float, float] = AXIS) -> PETSc.Mat:
     return assemble_matrix(form * ufl.dx(metadata={"quadrature_degree": degree}))
 
 
-def coupling(body: Body, modes: ModeSet, G: PETSc.Mat | None = None,
-             axis: tuple[float, float, float] = AXIS) -> np.ndarray:
+def coupling(
+    body: Body, modes: ModeSet, G: PETSc.Mat | None = None, axis: tuple[float, float, float] = AXIS
+) -> np.ndarray:
     """(m, m) skew-Hermitian g = Phi^H G Phi [1], real where the modes are.
 
     Args:
@@ -70,13 +83,16 @@ def coupling(body: Body, modes: ModeSet, G: PETSc.Mat | None = None,
 
 
 def own_rows(body: Body, shapes: np.ndarray) -> np.ndarray:
-    """(rows of this rank, m) of fields (m, n_points, 2 or 3) in mesh numbering, for products with the body's matrices.
+    """(rows of this rank, m) of fields (m, n_points, 2 or 3) in mesh numbering, for products with
+    the body's matrices.
 
     Sums over the rows of one sector are sums over its body, both cut faces included.
     """
     first, last = body.K.owner_range
-    order = np.argsort(body.scalar_rows, kind="stable")[np.count_nonzero(body.scalar_rows < 0):][first:last]
-    return np.asfortranarray(shapes[:, :, :body.dim].reshape(len(shapes), -1)[:, order].T)
+    order = np.argsort(body.scalar_rows, kind="stable")[np.count_nonzero(body.scalar_rows < 0) :][
+        first:last
+    ]
+    return np.asfortranarray(shapes[:, :, : body.dim].reshape(len(shapes), -1)[:, order].T)
 
 
 def waves(modes: ModeSet, g: np.ndarray, speed: float, sense: int = 1) -> Waves:

@@ -1,8 +1,9 @@
 """Shift-inverted block Lanczos iteration on real or complex vectors, with full reorthogonalisation.
 
-Parlett, The Symmetric Eigenvalue Problem (1998), chapter 13; blocks catch multiple eigenvalues, and complex arithmetic
-leaves no doubled eigenvalues to sort out. Directions of the residual that matter to no wanted pair wait instead of
-being solved with: with good first guesses most do. They stay part of the residual, so its norm remains exact.
+Parlett, The Symmetric Eigenvalue Problem (1998), chapter 13; blocks catch multiple eigenvalues, and
+complex arithmetic leaves no doubled eigenvalues to sort out. Directions of the residual that matter
+to no wanted pair wait instead of being solved with: with good first guesses most do. They stay part
+of the residual, so its norm remains exact.
 """
 
 from __future__ import annotations
@@ -20,25 +21,38 @@ from .linalg import apply, dot, minus, mix
 __all__ = ["lowest", "orthonormal"]
 
 STEPS = 200
-CLEAN = 1e-8    # share of old directions in a new one below which its image under M is corrected, not computed again
-EVEN = 1e-6     # least square of a column, of the largest, up to which one normalisation is enough
-FAINT = 0.1     # share of the tolerance below which a direction of the residual waits
+# share of old directions in a new one below which its image under M is corrected, not computed
+# again
+CLEAN = 1e-8
+# least square of a column, of the largest, up to which one normalisation is enough
+EVEN = 1e-6
+# share of the tolerance below which a direction of the residual waits
+FAINT = 0.1
 
 
 @dataclass
 class _Space:
-    """K^-1 M V = V H + P C, with V and P M-orthonormal; V and P are lists of blocks, with their products by M."""
+    """K^-1 M V = V H + P C, with V and P M-orthonormal; V and P are lists of blocks, with their
+    products by M.
+    """
 
     V: list[np.ndarray] = field(default_factory=list)
     MV: list[np.ndarray] = field(default_factory=list)
     H: np.ndarray = field(default_factory=lambda: np.zeros((0, 0)))
-    P: list[np.ndarray] = field(default_factory=list)       # at most two blocks: those that waited, the new ones
+    # at most two blocks: those that waited, the new ones
+    P: list[np.ndarray] = field(default_factory=list)
     MP: list[np.ndarray] = field(default_factory=list)
     C: np.ndarray = field(default_factory=lambda: np.zeros((0, 0)))
 
 
-def lowest(con: Constrained, inverse: Callable[[np.ndarray], np.ndarray], start: np.ndarray, count: int,
-           tolerance: float, guard: int = 0) -> tuple[np.ndarray, np.ndarray]:
+def lowest(
+    con: Constrained,
+    inverse: Callable[[np.ndarray], np.ndarray],
+    start: np.ndarray,
+    count: int,
+    tolerance: float,
+    guard: int = 0,
+) -> tuple[np.ndarray, np.ndarray]:
     """The lowest eigenpairs of K x = lambda M x.
 
     Args:
@@ -47,11 +61,12 @@ def lowest(con: Constrained, inverse: Callable[[np.ndarray], np.ndarray], start:
         tolerance: largest |K^-1 M x - x / lambda| lambda in the M-norm: the direction's error times a gap.
         guard: pairs returned beyond count as far as they have come.
 
-    The vectors returned are K^-1 M x lambda, one free step of inverse iteration beyond the Ritz vectors x: it wipes out
-    what rounding and the iteration leave in stiff directions.
+    The vectors returned are K^-1 M x lambda, one free step of inverse iteration beyond the Ritz
+    vectors x: it wipes out what rounding and the iteration leave in stiff directions.
 
     Returns:
-        lam (count + guard,) [rad^2/s^2] and this rank's (n_own, count + guard) M-orthonormal vectors.
+        lam (count + guard,) [rad^2/s^2] and this rank's (n_own, count + guard) M-orthonormal
+        vectors.
 
     Raises:
         NotSolvedError: fewer than ``count`` pairs exist, or the iteration does not converge.
@@ -61,7 +76,8 @@ def lowest(con: Constrained, inverse: Callable[[np.ndarray], np.ndarray], start:
     for _ in range(STEPS):
         _extend(con, space, block, Mblock, inverse(Mblock))
         theta, S = eigh(space.H)
-        theta, S = theta[::-1], S[:, ::-1]
+        theta = theta[::-1]
+        S = S[:, ::-1]
         k = min(count + guard, len(theta))
         rest = space.C @ S[:, :k] / theta[:k]
         error = np.linalg.norm(rest[:, :count], axis=0).max(initial=0.0)
@@ -70,21 +86,26 @@ def lowest(con: Constrained, inverse: Callable[[np.ndarray], np.ndarray], start:
         if (k >= count and error < tolerance) or not len(rest):
             return 1 / theta[:k], mix([*space.V, *space.P], np.concatenate([S[:, :k], rest]))
         block, Mblock = _next(space, rest[:, :count], FAINT * tolerance if k >= count else 0.0)
-    raise NotSolvedError(f"the modes did not converge in {STEPS} steps (error {error:.1e}, expected {tolerance:.1e})")
+    raise NotSolvedError(
+        f"the modes did not converge in {STEPS} steps (error {error:.1e}, expected {tolerance:.1e})"
+    )
 
 
-def orthonormal(con: Constrained, V: list[np.ndarray], MV: list[np.ndarray], W: np.ndarray,
-                size: float = 0.0) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """W made M-orthonormal and, once more, M-orthogonal to V: basis Q, M Q, and R with W = V (...) + Q R.
+def orthonormal(
+    con: Constrained, V: list[np.ndarray], MV: list[np.ndarray], W: np.ndarray, size: float = 0.0
+) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """W made M-orthonormal and, once more, M-orthogonal to V: basis Q, M Q, and R with W = V (...)
+    + Q R.
 
     Args:
-        size: M-norm of what W was taken from. Directions that are rounding beside it are dropped, so that Q may have
-            fewer columns than W.
+        size: M-norm of what W was taken from. Directions that are rounding beside it are dropped,
+            so that Q may have fewer columns than W.
     """
     comm = con.body.comm
-    W, MW, R, spread = _scaled(comm, W, apply(con.M, W), 1e-26, size ** 2)
+    W, MW, R, spread = _scaled(comm, W, apply(con.M, W), 1e-26, size**2)
     left = dot(comm, MV, W)
-    W, clean = minus(W, V, left), abs(left).max(initial=0.0) < CLEAN
+    W = minus(W, V, left)
+    clean = abs(left).max(initial=0.0) < CLEAN
     MW = minus(MW, MV, left) if clean else apply(con.M, W)
     if clean and spread > EVEN:
         return W, MW, R
@@ -92,12 +113,18 @@ def orthonormal(con: Constrained, V: list[np.ndarray], MV: list[np.ndarray], W: 
     return W, MW, S @ R
 
 
-def _extend(con: Constrained, space: _Space, block: np.ndarray, Mblock: np.ndarray, W: np.ndarray) -> None:
-    """One more block of V, with its image W = K^-1 M block; what is left of that becomes a block of P."""
-    comm, old = con.body.comm, len(space.H)
+def _extend(
+    con: Constrained, space: _Space, block: np.ndarray, Mblock: np.ndarray, W: np.ndarray
+) -> None:
+    """One more block of V, with its image W = K^-1 M block; what is left of that becomes a block of
+    P.
+    """
+    comm = con.body.comm
+    old = len(space.H)
     space.V.append(block)
     space.MV.append(Mblock)
-    known, Mknown = [*space.V, *space.P], [*space.MV, *space.MP]
+    known = [*space.V, *space.P]
+    Mknown = [*space.MV, *space.MP]
     column = dot(comm, Mknown, W)
     Q, MQ, tail = orthonormal(con, known, Mknown, minus(W, known, column), np.linalg.norm(column))
     total = old + block.shape[1]
@@ -109,17 +136,26 @@ def _extend(con: Constrained, space: _Space, block: np.ndarray, Mblock: np.ndarr
 
 
 def _next(space: _Space, rest: np.ndarray, faint: float) -> tuple[np.ndarray, np.ndarray]:
-    """The next block and its product by M, taken out of P: the directions that carry the residuals ``rest``."""
+    """The next block and its product by M, taken out of P: the directions that carry the residuals
+    ``rest``.
+    """
     U, s, _ = np.linalg.svd(rest)
     strong = np.count_nonzero(s > faint) if faint else len(U)
-    P, MP, weak = space.P, space.MP, U[:, strong:]
+    P = space.P
+    MP = space.MP
+    weak = U[:, strong:]
     space.P, space.MP = ([mix(P, weak)], [mix(MP, weak)]) if weak.size else ([], [])
     space.C = weak.conj().T @ space.C
-    return (P[0], MP[0]) if len(P) == 1 and not weak.size else (mix(P, U[:, :strong]), mix(MP, U[:, :strong]))
+    return (
+        (P[0], MP[0])
+        if len(P) == 1 and not weak.size
+        else (mix(P, U[:, :strong]), mix(MP, U[:, :strong]))
+    )
 
 
-def _scaled(comm: object, W: np.ndarray, MW: np.ndarray, least: float,
-            largest: float = np.finfo(float).tiny) -> tuple[np.ndarray, np.ndarray, np.ndarray, float]:
+def _scaled(
+    comm: object, W: np.ndarray, MW: np.ndarray, least: float, largest: float = np.finfo(float).tiny
+) -> tuple[np.ndarray, np.ndarray, np.ndarray, float]:
     """W Z, M W Z and R with W = (W Z) R, and the least square of a column, of the largest one's.
 
     Directions whose square is below ``least`` of the largest, and of a given one, are dropped.
@@ -127,6 +163,7 @@ def _scaled(comm: object, W: np.ndarray, MW: np.ndarray, least: float,
     gram = dot(comm, W, MW)
     size, Z = np.linalg.eigh((gram + gram.conj().T) / 2)
     good = size > least * max(size[-1], largest) if len(size) else size > 0
-    root, Z = np.sqrt(size[good]), Z[:, good]
+    root = np.sqrt(size[good])
+    Z = Z[:, good]
     W, MW = (mix(A, Z / root) for A in (W, MW))
     return W, MW, (Z * root).conj().T, float((root[0] / root[-1]) ** 2) if len(root) else 1.0

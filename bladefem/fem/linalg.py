@@ -1,10 +1,11 @@
-"""Sparse matrices of constrained bodies in three forms, their products and factorisations (MUMPS through PETSc).
+"""Sparse matrices of constrained bodies in three forms, their products and factorisations (MUMPS
+through PETSc).
 
 - a PETSc matrix: real, distributed;
-- ``Doubled``: the real twin of a complex Hermitian matrix, distributed; real and imaginary part of an unknown stand
-  side by side, so that the memory of a complex vector is that of the doubled one;
-- ``Folded``: C^H A C with the real matrix A of an open sector, for one rank; all nodal diameters share one
-  factorisation of A's interior (``core``).
+- ``Doubled``: the real twin of a complex Hermitian matrix, distributed; real and imaginary part of
+  an unknown stand side by side, so that the memory of a complex vector is that of the doubled one;
+- ``Folded``: C^H A C with the real matrix A of an open sector, for one rank; all nodal diameters
+  share one factorisation of A's interior (``core``).
 
 A block of vectors is a NumPy array (n_own, k), this rank's rows, columns contiguous.
 """
@@ -18,12 +19,25 @@ import numpy as np
 import scipy.sparse as sp
 from scipy.linalg import blas
 
-from . import core as interior
+from . import cyclic_schur as interior
 from .compat import PETSc
 from .mumps import Factorised, dense, factorise_matrix, solve_matrix, values
 
-__all__ = ["Doubled", "Factor", "Folded", "apply", "combined", "dense_rows", "dot", "factorise", "inertia", "minus",
-           "mix", "scale", "solve"]
+__all__ = [
+    "Doubled",
+    "Factor",
+    "Folded",
+    "apply",
+    "combined",
+    "dense_rows",
+    "dot",
+    "factorise",
+    "inertia",
+    "minus",
+    "mix",
+    "scale",
+    "solve",
+]
 
 
 @dataclass(frozen=True)
@@ -37,9 +51,12 @@ class Doubled:
 class Folded:
     """C^H A C: an open sector's matrix seen from the unknowns of one nodal diameter."""
 
-    A: sp.csr_matrix                # (n_open, n_open) real, symmetric
-    C: sp.csr_matrix                # (n_open, n_free) real or complex
-    core: interior.Core | None      # A with its interior eliminated, shared by all nodal diameters
+    # (n_open, n_open) real, symmetric
+    A: sp.csr_matrix
+    # (n_open, n_free) real or complex
+    C: sp.csr_matrix
+    # A with its interior eliminated, shared by all nodal diameters
+    core: interior.Core | None
 
 
 Matrix = PETSc.Mat | Doubled | Folded
@@ -55,7 +72,9 @@ class Factor:
 
     @property
     def negative(self) -> int:
-        """Number of negative eigenvalues (of the complex matrix where doubled); indefinite factorisations only."""
+        """Number of negative eigenvalues (of the complex matrix where doubled); indefinite
+        factorisations only.
+        """
         return self.parts.negative // 2 if self.doubled else self.parts.negative
 
     @property
@@ -72,7 +91,8 @@ def factorise(A: Matrix, definite: bool = True, springs: np.ndarray | None = Non
         springs: (n_own,) added to the diagonal first; of a folded matrix on the cut face only.
 
     Raises:
-        NotSolvedError: the matrix is singular or not definite, or memory ran out; the message holds MUMPS's INFOG.
+        NotSolvedError: the matrix is singular or not definite, or memory ran out; the message holds
+            MUMPS's INFOG.
     """
     if isinstance(A, Folded):
         core = A.core or interior.eliminate(A.A, interior.rim_of(A.C), definite)
@@ -143,7 +163,9 @@ def dot(comm: object, X: Block, Y: np.ndarray) -> np.ndarray:
 
 
 def minus(W: np.ndarray, V: list[np.ndarray], C: np.ndarray) -> np.ndarray:
-    """W - V C, in W's own memory where its columns are contiguous; V is a list of blocks side by side."""
+    """W - V C, in W's own memory where its columns are contiguous; V is a list of blocks side by
+    side.
+    """
     gemm = blas.zgemm if np.iscomplexobj(W) else blas.dgemm
     for block, part in _paired(V, C):
         W = gemm(-1.0, block, part, 1.0, W, overwrite_c=1)
@@ -156,8 +178,14 @@ def mix(V: Block, C: np.ndarray) -> np.ndarray:
     gemm = blas.zgemm if np.iscomplexobj(blocks[0]) else blas.dgemm
     out = None
     for block, part in _paired(blocks, C):
-        out = gemm(1.0, block, part) if out is None else gemm(1.0, block, part, 1.0, out, overwrite_c=1)
-    return np.zeros((len(blocks[0]), C.shape[1]), blocks[0].dtype, order="F") if out is None else out
+        out = (
+            gemm(1.0, block, part)
+            if out is None
+            else gemm(1.0, block, part, 1.0, out, overwrite_c=1)
+        )
+    return (
+        np.zeros((len(blocks[0]), C.shape[1]), blocks[0].dtype, order="F") if out is None else out
+    )
 
 
 def inertia(A: Matrix) -> int:
@@ -186,7 +214,8 @@ def _times(A: PETSc.Mat, X: np.ndarray) -> np.ndarray:
     right = dense(A, np.asfortranarray(X, dtype=float))
     product = A.matMult(right)
     out = values(product)
-    for matrix in (right, product):         # petsc4py keeps what is not destroyed for a later garbage collection
+    # petsc4py keeps what is not destroyed for a later garbage collection
+    for matrix in (right, product):
         matrix.destroy()
     return out
 

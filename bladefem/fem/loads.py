@@ -10,7 +10,7 @@ import scipy.sparse as sp
 from geometry.mesh import Mesh
 
 from ..errors import InputError, suggestion
-from . import shape
+from . import shape_functions as shape
 
 if TYPE_CHECKING:
     from .body import Body
@@ -35,8 +35,12 @@ def mass(body: Body) -> float:
     return sum(material.rho * volume(body.mesh, name) for name, material in body.material.items())
 
 
-def centrifugal(body: Body, speed: float, axis: tuple[float, float, float] = (0.0, 0.0, 1.0),
-                centre: tuple[float, float, float] = (0.0, 0.0, 0.0)) -> np.ndarray:
+def centrifugal(
+    body: Body,
+    speed: float,
+    axis: tuple[float, float, float] = (0.0, 0.0, 1.0),
+    centre: tuple[float, float, float] = (0.0, 0.0, 0.0),
+) -> np.ndarray:
     """(n_points*dim,) consistent nodal forces [N] of a steady rotation.
 
     Args:
@@ -49,13 +53,17 @@ def centrifugal(body: Body, speed: float, axis: tuple[float, float, float] = (0.
     for name, material in body.material.items():
         cells = body.mesh.bodies[name]
         values, weight, x = _measure(body.mesh, cells, 8)
-        field = ((x - centre) @ across)[:, :, :body.dim] * (material.rho * speed ** 2)
+        field = ((x - centre) @ across)[:, :, : body.dim] * (material.rho * speed**2)
         np.add.at(force, cells, np.einsum("qk,cq,cqd->ckd", values, weight, field))
     return force.ravel()
 
 
-def surface_load(body: Body, face: str, traction: tuple[float, ...] | np.ndarray | None = None,
-                 pressure: float | None = None) -> np.ndarray:
+def surface_load(
+    body: Body,
+    face: str,
+    traction: tuple[float, ...] | np.ndarray | None = None,
+    pressure: float | None = None,
+) -> np.ndarray:
     """(n_points*dim,) consistent nodal forces [N] on a named face.
 
     Args:
@@ -88,7 +96,9 @@ def face_areas(body: Body, face: str) -> np.ndarray:
     return surface_load(body, face, traction=traction).reshape(-1, body.dim)[:, 0]
 
 
-def _measure(mesh: Mesh, cells: np.ndarray, degree: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+def _measure(
+    mesh: Mesh, cells: np.ndarray, degree: int
+) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Shape values (q, k), volumes (nc, q) and places (nc, q, 3) of the quadrature points."""
     d = mesh.dimension
     values, tangents, w = shape.geometry(mesh.cell_type, mesh.points[cells][:, :, :d], degree)
@@ -116,9 +126,10 @@ def _normals(tangents: np.ndarray) -> np.ndarray:
 
 def _outward(body: Body, facets: np.ndarray, normal: np.ndarray) -> np.ndarray:
     """Normals pointed away from the cell behind each facet."""
-    mesh, d = body.mesh, body.dim
+    mesh = body.mesh
+    d = body.dim
     cells = np.concatenate([mesh.bodies[n] for n in body.material])
-    corner = facets[:, :shape.corners(shape.FACET_OF[mesh.cell_type])]
+    corner = facets[:, : shape.corners(shape.FACET_OF[mesh.cell_type])]
     shared = _incidence(corner, len(mesh.points)) @ _incidence(cells, len(mesh.points)).T
     behind = np.asarray(shared.argmax(axis=1)).ravel()
     inward = mesh.points[cells[behind]].mean(1) - mesh.points[corner].mean(1)

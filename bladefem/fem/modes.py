@@ -1,9 +1,10 @@
 """Normal modes by a shift-inverted block Lanczos iteration on complex vectors.
 
-The doubled pencil of a complex nodal diameter holds each eigenvalue twice and a Krylov method may return one of a pair
-only; here the iteration itself runs in complex arithmetic (the memory of a complex vector is that of the doubled one),
-so there is nothing to sort out. Blocks catch multiple eigenvalues, full reorthogonalisation keeps ghosts away, and the
-inertia of K - s M proves the count on demand. The tests compare with SLEPc on the doubled pencil.
+The doubled pencil of a complex nodal diameter holds each eigenvalue twice and a Krylov method may
+return one of a pair only; here the iteration itself runs in complex arithmetic (the memory of a
+complex vector is that of the doubled one), so there is nothing to sort out. Blocks catch multiple
+eigenvalues, full reorthogonalisation keeps ghosts away, and the inertia of K - s M proves the count
+on demand. The tests compare with SLEPc on the doubled pencil.
 """
 
 from __future__ import annotations
@@ -21,12 +22,19 @@ from .linalg import apply, combined, dot, inertia, scale
 
 __all__ = ["canonical", "certificate", "count_below", "elastic_pairs", "mode_set", "modes", "pairs"]
 
-TOLERANCE = 1e-8    # error of a vector's direction; that of a frequency is its square
-SHOWN = 1e-6        # the same where modes are looked at, not reduced with
+# error of a vector's direction; that of a frequency is its square
+TOLERANCE = 1e-8
+# the same where modes are looked at, not reduced with
+SHOWN = 1e-6
 
 
-def modes(con: Constrained, count: int, flex: Flexibility | None = None, tolerance: float = SHOWN,
-          prove: bool = False) -> ModeSet:
+def modes(
+    con: Constrained,
+    count: int,
+    flex: Flexibility | None = None,
+    tolerance: float = SHOWN,
+    prove: bool = False,
+) -> ModeSet:
     """The lowest modes, rigid ones included, mass-normalised over the body (one sector of a wheel).
 
     Args:
@@ -47,9 +55,15 @@ def modes(con: Constrained, count: int, flex: Flexibility | None = None, toleran
     return mode_set(con, lam, X)
 
 
-def pairs(flex: Flexibility, count: int, tolerance: float = TOLERANCE,
-          start: np.ndarray | None = None, guard: int = 0) -> tuple[np.ndarray, np.ndarray]:
-    """(m,) eigenvalues [rad^2/s^2] and this rank's (n_own, m) M-orthonormal vectors, rigid motions first.
+def pairs(
+    flex: Flexibility,
+    count: int,
+    tolerance: float = TOLERANCE,
+    start: np.ndarray | None = None,
+    guard: int = 0,
+) -> tuple[np.ndarray, np.ndarray]:
+    """(m,) eigenvalues [rad^2/s^2] and this rank's (n_own, m) M-orthonormal vectors, rigid motions
+    first.
 
     Args:
         start: (n_own, k) good guesses of the vectors.
@@ -63,11 +77,14 @@ def pairs(flex: Flexibility, count: int, tolerance: float = TOLERANCE,
 
 
 def mode_set(con: Constrained, lam: np.ndarray, X: np.ndarray) -> ModeSet:
-    """Modes with a certificate, in mesh numbering, in a basis and phase that do not depend on the ranks."""
+    """Modes with a certificate, in mesh numbering, in a basis and phase that do not depend on the
+    ranks.
+    """
     shapes = expand(con, X)
     images = shapes.reshape(-1, shapes.shape[2]).conj().T @ _probe(con, len(lam))
     turn = _rotation(lam, images)
-    residuals, shapes = certificate(con, lam, X @ turn), (shapes @ turn).transpose(2, 0, 1)
+    residuals = certificate(con, lam, X @ turn)
+    shapes = (shapes @ turn).transpose(2, 0, 1)
     if con.body.dim == 2:
         shapes = np.concatenate([shapes, np.zeros_like(shapes[:, :, :1])], axis=2)
     return ModeSet(np.sqrt(np.maximum(lam, 0)) / (2 * np.pi), shapes, con.nodal_diameter, residuals)
@@ -77,7 +94,8 @@ def certificate(con: Constrained, lam: np.ndarray, X: np.ndarray) -> np.ndarray:
     """(m,) |K x - lambda M x| / |K x|; for rigid motions |K x| over the largest |K x| of the set."""
     if not X.shape[1]:
         return np.zeros(0)
-    KX, comm = apply(con.K, X), con.body.comm
+    KX = apply(con.K, X)
+    comm = con.body.comm
     size = _norms(comm, KX)
     scale = size.max() if (lam > 0).any() else _stiffness(con, X)
     KX -= apply(con.M, X) * lam
@@ -89,14 +107,20 @@ def _stiffness(con: Constrained, X: np.ndarray) -> float:
     return scale(con.K) * _norms(con.body.comm, X).max()
 
 
-def elastic_pairs(flex: Flexibility, count: int, tolerance: float = TOLERANCE,
-                  inverse: Callable[[np.ndarray], np.ndarray] | None = None,
-                  start: np.ndarray | None = None, guard: int = 0) -> tuple[np.ndarray, np.ndarray]:
+def elastic_pairs(
+    flex: Flexibility,
+    count: int,
+    tolerance: float = TOLERANCE,
+    inverse: Callable[[np.ndarray], np.ndarray] | None = None,
+    start: np.ndarray | None = None,
+    guard: int = 0,
+) -> tuple[np.ndarray, np.ndarray]:
     """The lowest elastic eigenpairs of K x = lambda M x.
 
     Args:
         inverse: what stands for K^+ (fixed interfaces).
-        start: (n_own, k) good guesses; random loads, the same for any number of ranks, when left out.
+        start: (n_own, k) good guesses; random loads, the same for any number of ranks, when left
+            out.
         guard: pairs beyond count, as far as they have come.
 
     Raises:
@@ -116,16 +140,20 @@ def _probe(con: Constrained, width: int) -> np.ndarray:
 
 
 def canonical(con: Constrained, lam: np.ndarray, X: np.ndarray) -> np.ndarray:
-    """Bases of (nearly) multiple eigenvalues and phases of single ones, fixed by projecting given vectors."""
+    """Bases of (nearly) multiple eigenvalues and phases of single ones, fixed by projecting given
+    vectors.
+    """
     return X @ _rotation(lam, dot(con.body.comm, X, restrict(con, _probe(con, len(lam)))))
 
 
 def _rotation(lam: np.ndarray, images: np.ndarray) -> np.ndarray:
-    """(m, m) the same as a rotation of the given basis, from its products X^H W (m, m) with given vectors."""
+    """(m, m) the same as a rotation of the given basis, from its products X^H W (m, m) with given
+    vectors.
+    """
     out = np.zeros(images.shape, images.dtype)
     breaks = np.flatnonzero(np.diff(lam) > 1e-7 * lam[1:]) + 1
     for group in np.split(np.arange(len(lam)), breaks) if len(lam) else []:
-        Q, R = np.linalg.qr(images[group, :len(group)])
+        Q, R = np.linalg.qr(images[group, : len(group)])
         out[np.ix_(group, group)] = Q * (R.diagonal() / np.abs(R.diagonal()))
     return out
 
@@ -136,19 +164,25 @@ def count_below(con: Constrained, lam: float) -> int:
 
 
 def _prove(con: Constrained, lam: np.ndarray) -> None:
-    """Compare the number of modes with the inertia at a shift in the widest gap of the upper half."""
+    """Compare the number of modes with the inertia at a shift in the widest gap of the upper
+    half.
+    """
     if len(lam) < 2:
-        upper, expected = lam[-1] * 1.0001, len(lam)
+        upper = lam[-1] * 1.0001
+        expected = len(lam)
     else:
         half = max(len(lam) // 2, 1)
-        gap = half + int(np.argmax(np.diff(lam[half - 1:]) / lam[half:]))
-        upper, expected = (lam[gap - 1] + lam[gap]) / 2, gap
+        gap = half + int(np.argmax(np.diff(lam[half - 1 :]) / lam[half:]))
+        upper = (lam[gap - 1] + lam[gap]) / 2
+        expected = gap
     found = count_below(con, upper)
     if found != expected:
-        raise NotSolvedError(f"{expected} modes were found below {np.sqrt(upper) / (2 * np.pi):.6g} Hz, "
-                             f"the inertia counts {found}")
+        raise NotSolvedError(
+            f"{expected} modes were found below {np.sqrt(upper) / (2 * np.pi):.6g} Hz, "
+            f"the inertia counts {found}"
+        )
 
 
 def _norms(comm: object, X: np.ndarray) -> np.ndarray:
-    squares = (X.real ** 2 + X.imag ** 2).sum(0) if np.iscomplexobj(X) else (X ** 2).sum(0)
+    squares = (X.real**2 + X.imag**2).sum(0) if np.iscomplexobj(X) else (X**2).sum(0)
     return np.sqrt(comm.allreduce(squares) if comm.size > 1 else squares)

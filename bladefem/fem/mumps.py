@@ -1,8 +1,9 @@
-"""MUMPS through PETSc: Cholesky and L D L^T, blocks of right-hand sides, Schur complements, reasons in words.
+"""MUMPS through PETSc: Cholesky and L D L^T, blocks of right-hand sides, Schur complements, reasons
+in words.
 
-Two details that its interfaces hide. Debian 12's PETSc knows the PORD ordering only and falls back to it in silence, so
-the ordering used is kept (INFOG(7)). petsc4py does not wrap all that is needed: some of PETSc's C functions are called
-by name.
+Two details that its interfaces hide. Debian 12's PETSc knows the PORD ordering only and falls back
+to it in silence, so the ordering used is kept (INFOG(7)). petsc4py does not wrap all that is
+needed: some of PETSc's C functions are called by name.
 """
 
 from __future__ import annotations
@@ -16,38 +17,63 @@ import numpy as np
 from ..errors import NotSolvedError
 from .compat import PETSc, no_error_messages
 
-__all__ = ["Factorised", "dense", "factorise_matrix", "petsc_call", "set_operation", "solve_matrix", "values"]
+__all__ = [
+    "Factorised",
+    "dense",
+    "factorise_matrix",
+    "petsc_call",
+    "set_operation",
+    "solve_matrix",
+    "values",
+]
 
-BATCH = 128     # columns a solve: MUMPS works on them by matrix products, 256 are no faster
-ROOM = 40       # per cent of memory beyond MUMPS's own estimate
-ANALYSIS = 25   # MATOP_LUFACTOR_SYMBOLIC
-SPARSE = 0.2    # share of non-zero rows below which a right-hand side counts as sparse
+# columns a solve: MUMPS works on them by matrix products, 256 are no faster
+BATCH = 128
+# per cent of memory beyond MUMPS's own estimate
+ROOM = 40
+# MATOP_LUFACTOR_SYMBOLIC
+ANALYSIS = 25
+# share of non-zero rows below which a right-hand side counts as sparse
+SPARSE = 0.2
 
 
 @dataclass(frozen=True)
 class Factorised:
     """A real matrix factorised by MUMPS."""
 
-    matrix: PETSc.Mat               # the factor
-    entries: int                    # in the factors
-    flops: float                    # of the factorisation
-    bytes: float                    # memory of all ranks
-    ordering: int                   # INFOG(7): 4 PORD, 5 METIS, ...
-    negative: int                   # negative pivots
+    # the factor
+    matrix: PETSc.Mat
+    # in the factors
+    entries: int
+    # of the factorisation
+    flops: float
+    # memory of all ranks
+    bytes: float
+    # INFOG(7): 4 PORD, 5 METIS, ...
+    ordering: int
+    # negative pivots
+    negative: int
 
 
-def factorise_matrix(A: PETSc.Mat, definite: bool, schur: np.ndarray | None = None,
-                     order: np.ndarray | None = None, keep: bool = True) -> Factorised:
+def factorise_matrix(
+    A: PETSc.Mat,
+    definite: bool,
+    schur: np.ndarray | None = None,
+    order: np.ndarray | None = None,
+    keep: bool = True,
+) -> Factorised:
     """Factorise a symmetric matrix.
 
     Args:
         definite: Cholesky; else L D L^T with the count of negative pivots.
         schur: rows left out of the factorisation, see ``schur`` (one rank only).
-        order: (n,) place of each row in the elimination (one rank only); MUMPS chooses when left out.
+        order: (n,) place of each row in the elimination (one rank only); MUMPS chooses when left
+            out.
         keep: keep the factors; without them only the count and the Schur complement are left.
 
     Raises:
-        NotSolvedError: the matrix is singular or not definite, or memory ran out; the message holds MUMPS's INFOG.
+        NotSolvedError: the matrix is singular or not definite, or memory ran out; the message holds
+            MUMPS's INFOG.
     """
     A.setOption(PETSc.Mat.Option.SYMMETRIC, True)
     A.setOption(PETSc.Mat.Option.SPD, definite)
@@ -55,31 +81,45 @@ def factorise_matrix(A: PETSc.Mat, definite: bool, schur: np.ndarray | None = No
     F = pc.getFactorMatrix()
     F.setMumpsIcntl(14, ROOM)
     if not definite:
-        F.setMumpsIcntl(13, 1)      # the last block is counted too
+        # the last block is counted too
+        F.setMumpsIcntl(13, 1)
         F.setMumpsIcntl(24, 1)
     if not keep:
         F.setMumpsIcntl(31, 1)
-        F.setMumpsIcntl(8, 0)       # scaling costs as much as a fifth of the elimination, and changes no sign
+        # scaling costs as much as a fifth of the elimination, and changes no sign
+        F.setMumpsIcntl(8, 0)
     if schur is not None:
         index = PETSc.IS().createGeneral(schur.astype(PETSc.IntType), comm=F.comm)
         petsc_call("MatFactorSetSchurIS", F.handle, index.handle)
     _numeric(F, A.size[0], pc.setUp if order is None else lambda: _in_order(F, A, order))
-    pc.destroy()                    # and with it PETSc's hold on A
+    # and with it PETSc's hold on A
+    pc.destroy()
     negative = F.getMumpsInfog(12)
-    if definite and negative:       # MUMPS goes on in silence
-        raise NotSolvedError(f"the matrix of {A.size[0]} unknowns is not positive definite, MUMPS met {negative} "
-                             "negative pivots: a part floats, nothing joins it to the rest, or the state has buckled")
-    return Factorised(F, _large(F.getMumpsInfog(29)), F.getMumpsRinfog(3), 1e6 * F.getMumpsInfog(22),
-                      F.getMumpsInfog(7), negative)
+    # MUMPS goes on in silence
+    if definite and negative:
+        raise NotSolvedError(
+            f"the matrix of {A.size[0]} unknowns is not positive definite, MUMPS met {negative} "
+            "negative pivots: a part floats, nothing joins it to the rest, or the state has buckled"
+        )
+    return Factorised(
+        F,
+        _large(F.getMumpsInfog(29)),
+        F.getMumpsRinfog(3),
+        1e6 * F.getMumpsInfog(22),
+        F.getMumpsInfog(7),
+        negative,
+    )
 
 
 def solve_matrix(factor: Factorised, B: np.ndarray, whole: bool = False) -> np.ndarray:
-    """A^-1 B (n_own, k), in batches; with rows left out, A is the matrix without them and these rows of B are 0.
+    """A^-1 B (n_own, k), in batches; with rows left out, A is the matrix without them and these
+    rows of B are 0.
 
     Args:
         whole: solve for the rows left out too (see ``schur``), all columns in one batch.
 
-    On one rank a block with few non-zero rows is handed over sparse: MUMPS then prunes the first sweep.
+    On one rank a block with few non-zero rows is handed over sparse: MUMPS then prunes the first
+    sweep.
     """
     F = factor.matrix
     out = np.empty(B.shape, order="F")
@@ -89,10 +129,15 @@ def solve_matrix(factor: Factorised, B: np.ndarray, whole: bool = False) -> np.n
     for first in range(0, B.shape[1], batch):
         part = slice(first, min(first + batch, B.shape[1]))
         sparse = 0 < len(rows) < SPARSE * len(B)
-        right = _sparse(F, rows, B[rows, part]) if sparse else dense(F, np.asfortranarray(B[:, part], dtype=float))
+        right = (
+            _sparse(F, rows, B[rows, part])
+            if sparse
+            else dense(F, np.asfortranarray(B[:, part], dtype=float))
+        )
         left = dense(F, out[:, part])
         F.matSolve(right, left)
-        for matrix in (right, left):        # petsc4py keeps what is not destroyed for a later garbage collection
+        # petsc4py keeps what is not destroyed for a later garbage collection
+        for matrix in (right, left):
             matrix.destroy()
     return out
 
@@ -101,14 +146,17 @@ def dense(A: PETSc.Mat, X: np.ndarray) -> PETSc.Mat:
     """A dense PETSc matrix on the memory of X (n_own, k), columns contiguous."""
     if X.size and not X.flags.f_contiguous:
         raise ValueError("columns are not contiguous")
-    out = PETSc.Mat().createDense((A.sizes[1], (None, X.shape[1])), array=X.T.reshape(-1), comm=A.comm)
+    out = PETSc.Mat().createDense(
+        (A.sizes[1], (None, X.shape[1])), array=X.T.reshape(-1), comm=A.comm
+    )
     out.assemble()
     return out
 
 
 def values(D: PETSc.Mat) -> np.ndarray:
     """(n_own, k) copy of a dense PETSc matrix."""
-    rows, columns = D.sizes[0][0], D.size[1]
+    rows = D.sizes[0][0]
+    columns = D.size[1]
     if not rows * columns:
         return np.zeros((rows, columns), order="F")
     data = ctypes.POINTER(ctypes.c_double)()
@@ -122,11 +170,15 @@ def _sparse(F: PETSc.Mat, rows: np.ndarray, values: np.ndarray) -> PETSc.Mat:
     """The block as the transpose of a sparse matrix, the form that PETSc hands on to MUMPS."""
     k = values.shape[1]
     starts = np.arange(k + 1, dtype=PETSc.IntType) * len(rows)
-    turned = PETSc.Mat().createAIJ((k, F.size[0]), comm=F.comm, csr=(
-        starts, np.tile(rows.astype(PETSc.IntType), k), values.T.ravel()))
+    turned = PETSc.Mat().createAIJ(
+        (k, F.size[0]),
+        comm=F.comm,
+        csr=(starts, np.tile(rows.astype(PETSc.IntType), k), values.T.ravel()),
+    )
     turned.assemble()
     out = PETSc.Mat().createTranspose(turned)
-    turned.destroy()                        # out holds it
+    # out holds it
+    turned.destroy()
     return out
 
 
@@ -138,7 +190,9 @@ def set_operation(handle: int, place: int, function: object) -> None:
 def petsc_call(name: str, *arguments: object) -> None:
     """Call one of PETSc's C functions; large whole numbers are handles of its objects."""
     function = getattr(ctypes.CDLL(PETSc.__file__), name)
-    code = function(*[ctypes.c_void_p(a) if isinstance(a, int) and a > 0xFFFF else a for a in arguments])
+    code = function(
+        *[ctypes.c_void_p(a) if isinstance(a, int) and a > 0xFFFF else a for a in arguments]
+    )
     if code:
         raise NotSolvedError(f"PETSc's {name} failed with error {code}")
 
@@ -152,20 +206,28 @@ def _prepared(A: PETSc.Mat, kind: str) -> PETSc.PC:
         pc.setFactorSolverType("mumps")
         pc.setFactorSetUpSolverType()
     except PETSc.Error as error:
-        raise NotSolvedError("PETSc was built without MUMPS, expected one with it (apt python3-petsc4py-real)") \
-            from error
+        raise NotSolvedError(
+            "PETSc was built without MUMPS, expected one with it (apt python3-petsc4py-real)"
+        ) from error
     return pc
 
 
 def _in_order(F: PETSc.Mat, A: PETSc.Mat, order: np.ndarray) -> None:
-    """Factorise with a given ordering, which PETSc hands on to MUMPS in its analysis for LU only: that one is borrowed,
-    it does the same but for the ordering."""
-    unsymmetric, analysis = _prepared(A, PETSc.PC.Type.LU), ctypes.c_void_p()
-    petsc_call("MatGetOperation", unsymmetric.getFactorMatrix().handle, ANALYSIS, ctypes.byref(analysis))
+    """Factorise with a given ordering, which PETSc hands on to MUMPS in its analysis for LU only:
+    that one is borrowed, it does the same but for the ordering.
+    """
+    unsymmetric = _prepared(A, PETSc.PC.Type.LU)
+    analysis = ctypes.c_void_p()
+    petsc_call(
+        "MatGetOperation", unsymmetric.getFactorMatrix().handle, ANALYSIS, ctypes.byref(analysis)
+    )
     set_operation(F.handle, ANALYSIS, analysis)
     places = PETSc.IS().createGeneral(order.astype(PETSc.IntType), comm=F.comm)
-    info = (ctypes.c_double * 16)()             # MatFactorInfo, all defaults
-    petsc_call("MatLUFactorSymbolic", F.handle, A.handle, places.handle, places.handle, ctypes.byref(info))
+    # MatFactorInfo, all defaults
+    info = (ctypes.c_double * 16)()
+    petsc_call(
+        "MatLUFactorSymbolic", F.handle, A.handle, places.handle, places.handle, ctypes.byref(info)
+    )
     petsc_call("MatLUFactorNumeric", F.handle, A.handle, ctypes.byref(info))
     for made in (unsymmetric, places):
         made.destroy()
@@ -189,9 +251,10 @@ def _reason(code: int, detail: int, size: int) -> str:
     if code in (-5, -7, -8, -9, -11, -13, -19, -20):
         what = "memory ran out; use more ranks on more memory, or fewer unknowns"
     else:
-        what = {-10: "the matrix is singular: a part floats, or nothing joins it to the rest",
-                -40: "the matrix is not positive definite: a part floats, or the state has buckled",
-                }.get(code, "the factorisation failed")
+        what = {
+            -10: "the matrix is singular: a part floats, or nothing joins it to the rest",
+            -40: "the matrix is not positive definite: a part floats, or the state has buckled",
+        }.get(code, "the factorisation failed")
     return f"MUMPS stopped on {size} unknowns: {what} (INFOG(1) = {code}, INFOG(2) = {detail})"
 
 

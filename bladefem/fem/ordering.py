@@ -1,6 +1,8 @@
-"""Nested dissection for factorisations with rows left out: with a Schur complement MUMPS of Debian knows AMD only.
+"""Nested dissection for factorisations with rows left out: with a Schur complement MUMPS of Debian
+knows AMD only.
 
-METIS is there already, as a library that PETSc's own libraries load. Factors of a sector's interior, AMD and METIS:
+METIS is there already, as a library that PETSc's own libraries load. Factors of a sector's
+interior, AMD and METIS:
 
     dofs             45 600          151 000
     entries [1e6]    13, 13.5        98, 79
@@ -17,12 +19,14 @@ import scipy.sparse as sp
 
 __all__ = ["interior_first"]
 
-WORTHWHILE = 60_000     # unknowns from which METIS beats AMD
+# unknowns from which METIS beats AMD
+WORTHWHILE = 60_000
 NAMES = ("libmetis.so.5", "libmetis.so", "libmetis.dylib")
 
 
 def interior_first(A: sp.csr_matrix, last: np.ndarray, groups: np.ndarray) -> np.ndarray | None:
-    """(n,) place of each unknown in the elimination: interior by nested dissection, then the rows ``last``.
+    """(n,) place of each unknown in the elimination: interior by nested dissection, then the rows
+    ``last``.
 
     Args:
         A: symmetric pattern.
@@ -54,15 +58,27 @@ def interior_first(A: sp.csr_matrix, last: np.ndarray, groups: np.ndarray) -> np
 def _dissected(library: ctypes.CDLL, graph: sp.csr_matrix) -> np.ndarray | None:
     """(n,) place of each node (METIS_NodeND)."""
     n = ctypes.c_int32(graph.shape[0])
-    starts, neighbours = graph.indptr.astype(np.int32), graph.indices.astype(np.int32)
-    order, place = np.empty(n.value, np.int32), np.empty(n.value, np.int32)
-    failed = library.METIS_NodeND(ctypes.byref(n), *map(_pointer, (starts, neighbours)), None, None,
-                                  *map(_pointer, (order, place))) != 1
+    starts = graph.indptr.astype(np.int32)
+    neighbours = graph.indices.astype(np.int32)
+    order = np.empty(n.value, np.int32)
+    place = np.empty(n.value, np.int32)
+    failed = (
+        library.METIS_NodeND(
+            ctypes.byref(n),
+            *map(_pointer, (starts, neighbours)),
+            None,
+            None,
+            *map(_pointer, (order, place)),
+        )
+        != 1
+    )
     return None if failed else place.astype(np.int64)
 
 
 def _metis() -> ctypes.CDLL | None:
-    """The library, if it is there and counts in 32 bits: two nodes without edges are the same input for both widths."""
+    """The library, if it is there and counts in 32 bits: two nodes without edges are the same input
+    for both widths.
+    """
     for name in (*NAMES, find_library("metis") or ""):
         try:
             library = ctypes.CDLL(name) if name else None
@@ -70,10 +86,19 @@ def _metis() -> ctypes.CDLL | None:
             continue
         if library is None or not hasattr(library, "METIS_NodeND"):
             continue
-        n, nothing = ctypes.c_int64(2), np.zeros(6, np.int64)
-        order, place = np.full(4, -1, np.int64), np.full(4, -1, np.int64)
-        library.METIS_NodeND(ctypes.byref(n), _pointer(nothing), _pointer(nothing), None, None, _pointer(order),
-                             _pointer(place))
+        n = ctypes.c_int64(2)
+        nothing = np.zeros(6, np.int64)
+        order = np.full(4, -1, np.int64)
+        place = np.full(4, -1, np.int64)
+        library.METIS_NodeND(
+            ctypes.byref(n),
+            _pointer(nothing),
+            _pointer(nothing),
+            None,
+            None,
+            _pointer(order),
+            _pointer(place),
+        )
         return library if place[0] != -1 and place[1] == -1 else None
     return None
 

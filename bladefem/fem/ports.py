@@ -13,22 +13,29 @@ from scipy.linalg import eigh
 
 from ..data import PortModel
 from ..errors import InputError, suggestion
+from .all_diameters import eigenpairs
 from .constraint import Constrained, Opened, Transformation, restrict
-from .core import Rim, face_solve, inner_solve
+from .cyclic_schur import Rim, face_solve, inner_solve
 from .flexibility import Flexibility, compliance, flexible
 from .linalg import apply, dot
 from .modes import TOLERANCE, canonical, elastic_pairs, pairs
-from .wheel import eigenpairs
 
 __all__ = ["flexibility", "port_model", "port_models"]
 
-BATCH = 64      # ports in one sweep
+# ports in one sweep
+BATCH = 64
 KINDS = ("rubin", "craig-bampton")
 
 
-def port_model(con: Constrained, P: sp.spmatrix, names: dict[str, slice], count: int,
-               static_load: np.ndarray | None = None, kind: str = "rubin",
-               flex: Flexibility | None = None) -> PortModel:
+def port_model(
+    con: Constrained,
+    P: sp.spmatrix,
+    names: dict[str, slice],
+    count: int,
+    static_load: np.ndarray | None = None,
+    kind: str = "rubin",
+    flex: Flexibility | None = None,
+) -> PortModel:
     """Reduce a constrained body to its ports.
 
     Args:
@@ -47,20 +54,33 @@ def port_model(con: Constrained, P: sp.spmatrix, names: dict[str, slice], count:
         raise InputError(f"reduction is '{kind}'{suggestion(kind, KINDS)}")
     F = _restricted(con, P)
     flex = flex or flexible(con)
-    columns = F if static_load is None else np.concatenate([F, restrict(con, static_load.reshape(-1, 1))], axis=1)
+    columns = (
+        F
+        if static_load is None
+        else np.concatenate([F, restrict(con, static_load.reshape(-1, 1))], axis=1)
+    )
     X = compliance(flex, columns)
-    offset = None if static_load is None else dot(con.body.comm, F, X[:, F.shape[1]:])[:, 0].real
-    X = X[:, :F.shape[1]]
+    offset = None if static_load is None else dot(con.body.comm, F, X[:, F.shape[1] :])[:, 0].real
+    X = X[:, : F.shape[1]]
     reduce = _rubin if kind == "rubin" else _craig_bampton
     omega, shapes, residual = reduce(flex, F, X, count)
     return PortModel(omega, shapes, residual, names, con.nodal_diameter, offset)
 
 
-def port_models(t: Transformation, P: sp.spmatrix, names: dict[str, slice], count: int, diameters: Sequence[int],
-                static_load: np.ndarray | None = None, kind: str = "rubin") -> Iterator[tuple[int, PortModel]]:
-    """``port_model`` in several nodal diameters, as they are solved, with all work shared that does not depend on them.
+def port_models(
+    t: Transformation,
+    P: sp.spmatrix,
+    names: dict[str, slice],
+    count: int,
+    diameters: Sequence[int],
+    static_load: np.ndarray | None = None,
+    kind: str = "rubin",
+) -> Iterator[tuple[int, PortModel]]:
+    """``port_model`` in several nodal diameters, as they are solved, with all work shared that does
+    not depend on them.
 
-    Where one rank holds the wheel, the static flexibility of all diameters takes one sweep over the ports.
+    Where one rank holds the wheel, the static flexibility of all diameters takes one sweep over the
+    ports.
 
     Args:
         static_load: (n_points*dim,) [N], of nodal diameter 0.
@@ -76,28 +96,46 @@ def port_models(t: Transformation, P: sp.spmatrix, names: dict[str, slice], coun
         lam = p.lam[:count]
         shapes = dot(t.body.comm, _restricted(p.con, P), canonical(p.con, lam, p.X[:, :count]))
         ports = P.shape[1]
-        yield n, PortModel(np.sqrt(lam), shapes, _residual(G[:ports, :ports], lam, shapes), names, n,
-                           None if load is None else offset)
+        yield (
+            n,
+            PortModel(
+                np.sqrt(lam),
+                shapes,
+                _residual(G[:ports, :ports], lam, shapes),
+                names,
+                n,
+                None if load is None else offset,
+            ),
+        )
 
 
 def flexibility(con: Constrained, P: sp.spmatrix, flex: Flexibility | None = None) -> np.ndarray:
-    """(p, p) static flexibility P^T T K^+ T^H P [m/N], Hermitian; without rigid motions where the body floats."""
+    """(p, p) static flexibility P^T T K^+ T^H P [m/N], Hermitian; without rigid motions where the
+    body floats.
+    """
     F = _restricted(con, P)
     return _hermitian(dot(con.body.comm, F, compliance(flex or flexible(con), F)))
 
 
 def _restricted(con: Constrained, P: sp.spmatrix) -> np.ndarray:
     if P.shape[0] != con.T.shape[0]:
-        raise InputError(f"port vectors have {P.shape[0]} rows, expected {con.T.shape[0]} (nodes times components)")
+        raise InputError(
+            f"port vectors have {P.shape[0]} rows, expected {con.T.shape[0]} (nodes times "
+            "components)"
+        )
     return restrict(con, sp.csc_matrix(P)).astype(con.dtype)
 
 
-def _sweep(opened: Opened, P: sp.spmatrix, load: np.ndarray | None) -> tuple[np.ndarray, np.ndarray]:
-    """What the interior of an open sector gives: its flexibility at the ports (p, p), and the ports' loads as the rim
-    feels them (nb, p); a static load is the last column."""
+def _sweep(
+    opened: Opened, P: sp.spmatrix, load: np.ndarray | None
+) -> tuple[np.ndarray, np.ndarray]:
+    """What the interior of an open sector gives: its flexibility at the ports (p, p), and the
+    ports' loads as the rim feels them (nb, p); a static load is the last column.
+    """
     columns = [P] if load is None else [P, sp.csc_matrix(load.reshape(-1, 1))]
     F = sp.csc_matrix(opened.T.T @ sp.hstack(columns))
-    inside, rim = F[opened.core.inner], F[opened.core.rim].toarray()
+    inside = F[opened.core.inner]
+    rim = F[opened.core.rim].toarray()
     G = np.empty((F.shape[1], F.shape[1]))
     for first in range(0, F.shape[1], BATCH):
         part = slice(first, first + BATCH)
@@ -114,8 +152,12 @@ def _closed(shared: tuple[np.ndarray, np.ndarray], rim: Rim) -> tuple[np.ndarray
     return G, G[:-1, -1].real
 
 
-def _rubin(flex: Flexibility, F: np.ndarray, X: np.ndarray, count: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Free modes, and what the modes left out give to the static flexibility (Rubin 1975, doi:10.2514/3.60497)."""
+def _rubin(
+    flex: Flexibility, F: np.ndarray, X: np.ndarray, count: int
+) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Free modes, and what the modes left out give to the static flexibility (Rubin 1975,
+    doi:10.2514/3.60497).
+    """
     comm = flex.con.body.comm
     lam, V = pairs(flex, count)
     shapes = dot(comm, F, canonical(flex.con, lam, V))
@@ -128,10 +170,13 @@ def _residual(G: np.ndarray, lam: np.ndarray, shapes: np.ndarray) -> np.ndarray:
     return _hermitian(G - shapes[:, elastic] / lam[elastic] @ shapes[:, elastic].conj().T)
 
 
-def _craig_bampton(flex: Flexibility, F: np.ndarray, X: np.ndarray,
-                   count: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Constraint modes and fixed-interface modes (Craig and Bampton 1968, doi:10.2514/3.4741), then the eigenvectors
-    of the small matrices, which are free modes in form: nothing is left for a residual."""
+def _craig_bampton(
+    flex: Flexibility, F: np.ndarray, X: np.ndarray, count: int
+) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Constraint modes and fixed-interface modes (Craig and Bampton 1968, doi:10.2514/3.4741), then
+    the eigenvectors of the small matrices, which are free modes in form: nothing is left for a
+    residual.
+    """
     comm = flex.con.body.comm
     fixed = _fixed_inverse(flex, F, X)
     _, inner = elastic_pairs(flex, count, inverse=fixed)
@@ -140,26 +185,37 @@ def _craig_bampton(flex: Flexibility, F: np.ndarray, X: np.ndarray,
     mass = _hermitian(dot(comm, V, apply(flex.con.M, V)))
     stiff = _hermitian(dot(comm, V, apply(flex.con.K, V)))
     size, Q = np.linalg.eigh(mass)
-    keep = size > 1e-12 * size[-1]                      # ports that repeat each other
+    # ports that repeat each other
+    keep = size > 1e-12 * size[-1]
     W = Q[:, keep] / np.sqrt(size[keep])
     lam, Z = eigh(_hermitian(W.conj().T @ stiff @ W))
-    lam[:flex.R.shape[1]] = 0.0
-    return np.sqrt(np.maximum(lam, 0)), dot(comm, F, V) @ W @ Z, np.zeros((F.shape[1],) * 2, F.dtype)
+    lam[: flex.R.shape[1]] = 0.0
+    return (
+        np.sqrt(np.maximum(lam, 0)),
+        dot(comm, F, V) @ W @ Z,
+        np.zeros((F.shape[1],) * 2, F.dtype),
+    )
 
 
 def _fixed_inverse(flex: Flexibility, F: np.ndarray, X: np.ndarray) -> object:
-    """K^-1 with the ports held: the reactions f make F^H u zero, and leave no rigid load on a floating body.
+    """K^-1 with the ports held: the reactions f make F^H u zero, and leave no rigid load on a
+    floating body.
 
     u = K^+ (b - F f) + R c with [G, -F^H R; R^H F, 0] (f, c) = (F^H K^+ b, R^H b), G = F^H K^+ F.
     """
-    comm, R = flex.con.body.comm, flex.R
-    G, FR = _hermitian(dot(comm, F, X)), dot(comm, F, R)
-    saddle = np.linalg.pinv(np.block([[G, -FR], [FR.conj().T, np.zeros((R.shape[1],) * 2)]]), rcond=1e-11)
+    comm = flex.con.body.comm
+    R = flex.R
+    G = _hermitian(dot(comm, F, X))
+    FR = dot(comm, F, R)
+    saddle = np.linalg.pinv(
+        np.block([[G, -FR], [FR.conj().T, np.zeros((R.shape[1],) * 2)]]), rcond=1e-11
+    )
 
     def inverse(B: np.ndarray) -> np.ndarray:
         U = compliance(flex, B)
         both = saddle @ np.concatenate([dot(comm, F, U), dot(comm, R, B)])
-        return U - X @ both[:F.shape[1]] + R @ both[F.shape[1]:]
+        return U - X @ both[: F.shape[1]] + R @ both[F.shape[1] :]
+
     return inverse
 
 

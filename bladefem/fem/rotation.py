@@ -4,8 +4,8 @@ In the rotating frame a Saint Venant-Kirchhoff body has the potential
 
     integral of  E : C : E / 2  -  rho Omega^2 |P (X + u)|^2 / 2,      E = (F^T F - 1) / 2,  F = 1 + grad u,
 
-P the projection across the axis. Its first derivative is the balance of the preload, its second the stiffness of small
-vibrations about it: stress stiffening and spin softening in one matrix.
+P the projection across the axis. Its first derivative is the balance of the preload, its second the
+stiffness of small vibrations about it: stress stiffening and spin softening in one matrix.
 
 The linear preload, which other codes call a perturbation step, takes u0 from the linear balance K u0 = f and puts
 K_L(u0) + K_geo(u0) - Omega^2 M_P in the place of the second derivative: material stiffness on the moved body, and the
@@ -21,7 +21,7 @@ from typing import Any
 import numpy as np
 
 from ..errors import InputError, NotSolvedError
-from . import shape
+from . import shape_functions as shape
 from .body import Body, cells_of, degrees, properties
 from .compat import PETSc, assemble_matrix, assemble_vector, compile_form, dolfinx, ufl
 from .constraint import Constrained, expand, in_step, restrict
@@ -31,57 +31,79 @@ from .loads import centrifugal
 __all__ = ["AXIS", "Preload", "linear_tangent", "preload", "spinning", "swell", "tangent"]
 
 AXIS = (0.0, 0.0, 1.0)
-NEWTON = 25         # iterations of one load step
-HALVINGS = 8        # of the load step before giving up
-ROUNDED = 1e3       # times the tolerance: an error that falls no further below this is rounding
+# iterations of one load step
+NEWTON = 25
+# of the load step before giving up
+HALVINGS = 8
+# times the tolerance: an error that falls no further below this is rounding
+ROUNDED = 1e3
 
 
 @dataclass(frozen=True)
 class Preload:
     """The static state under rotation."""
 
-    displacement: np.ndarray    # (n_points, dim) [m], the same on every rank
-    speed: float                # [rad/s]
-    iterations: int             # Newton steps of all load steps
-    steps: int                  # load steps
-    residual: float             # |unbalanced force| over |centrifugal force|
+    # (n_points, dim) [m], the same on every rank
+    displacement: np.ndarray
+    # [rad/s]
+    speed: float
+    # Newton steps of all load steps
+    iterations: int
+    # load steps
+    steps: int
+    # |unbalanced force| over |centrifugal force|
+    residual: float
 
 
 @dataclass(frozen=True)
 class _Forms:
-    """The potential's derivatives, compiled, with the displacement and the squared speed to be set."""
+    """The potential's derivatives, compiled, with the displacement and the squared speed to be
+    set.
+    """
 
     u: Any
     speed2: Any
     force: Any
     stiffness: Any
-    node_of: np.ndarray         # (local blocks,) mesh node of each block of this rank, ghosts included
+    # (local blocks,) mesh node of each block of this rank, ghosts included
+    node_of: np.ndarray
 
 
 def swell(flex: Flexibility, axis: tuple[float, float, float] = AXIS) -> np.ndarray:
-    """(n_points, dim) linear displacement [m s^2] for unit rotation; times the speed squared it is the preload.
+    """(n_points, dim) linear displacement [m s^2] for unit rotation; times the speed squared it is
+    the preload.
 
     Args:
         flex: the factorised body in nodal diameter 0 or without cyclic symmetry.
     """
     con = flex.con
     if con.nodal_diameter not in (None, 0):
-        raise InputError(f"nodal_diameter is {con.nodal_diameter}, expected 0: a rotation loads all sectors alike")
+        raise InputError(
+            f"nodal_diameter is {con.nodal_diameter}, expected 0: a rotation loads all sectors "
+            "alike"
+        )
     load = centrifugal(con.body, 1.0, axis).reshape(-1, 1)
     return expand(con, compliance(flex, restrict(con, load)))[:, :, 0].real
 
 
-def linear_tangent(body: Body, u0: np.ndarray, speed: float, axis: tuple[float, float, float] = AXIS,
-                   quadrature: str = "exact") -> PETSc.Mat:
+def linear_tangent(
+    body: Body,
+    u0: np.ndarray,
+    speed: float,
+    axis: tuple[float, float, float] = AXIS,
+    quadrature: str = "exact",
+) -> PETSc.Mat:
     """Stiffness of small vibrations about a linear preload, spin softening included [N/m].
 
     Args:
         u0: (n_points, dim) linear displacement [m], see :func:`swell`.
         quadrature: "exact" or "ccx", as in :func:`bladefem.fem.body.assemble`.
     """
-    v, w = ufl.TestFunction(body.space), ufl.TrialFunction(body.space)
+    v = ufl.TestFunction(body.space)
+    w = ufl.TrialFunction(body.space)
     lam, mu, rho, depth = properties(body.mesh, body.material, body.space.mesh, body.plane)
-    speed2, across = dolfinx.fem.Constant(body.space.mesh, float(speed) ** 2), _across(body, axis)
+    speed2 = dolfinx.fem.Constant(body.space.mesh, float(speed) ** 2)
+    across = _across(body, axis)
     gradient = ufl.grad(_function(body, u0))
     F = ufl.Identity(body.dim) + gradient
 
@@ -91,13 +113,22 @@ def linear_tangent(body: Body, u0: np.ndarray, speed: float, axis: tuple[float, 
     moved = ufl.inner(stress(ufl.sym(F.T * ufl.grad(v))), ufl.sym(F.T * ufl.grad(w)))
     geometric = ufl.inner(ufl.grad(v) * stress(ufl.sym(gradient)), ufl.grad(w))
     elastic, inertial = _measures(body, quadrature)
-    return assemble_matrix(depth * (moved + geometric) * elastic
-                           - depth * rho * speed2 * ufl.inner(across * v, w) * inertial)
+    return assemble_matrix(
+        depth * (moved + geometric) * elastic
+        - depth * rho * speed2 * ufl.inner(across * v, w) * inertial
+    )
 
 
-def preload(body: Body, speed: float, clamp: str | None = "clamp", axis: tuple[float, float, float] = AXIS,
-            tolerance: float = 1e-10, quadrature: str = "exact") -> Preload:
-    """The nonlinear static state under a steady rotation, by Newton's method with load steps that halve when it fails.
+def preload(
+    body: Body,
+    speed: float,
+    clamp: str | None = "clamp",
+    axis: tuple[float, float, float] = AXIS,
+    tolerance: float = 1e-10,
+    quadrature: str = "exact",
+) -> Preload:
+    """The nonlinear static state under a steady rotation, by Newton's method with load steps that
+    halve when it fails.
 
     A body with the pair "cyclic" moves alike in all sectors (nodal diameter 0).
 
@@ -109,38 +140,57 @@ def preload(body: Body, speed: float, clamp: str | None = "clamp", axis: tuple[f
 
     Raises:
         InputError: speed is negative or not finite, no such face.
-        NotSolvedError: the state buckles or tears before the speed is reached; the message says where.
+        NotSolvedError: the state buckles or tears before the speed is reached; the message says
+            where.
     """
     _check_speed(speed)
     u = np.zeros((len(body.mesh.points), body.dim))
     if speed == 0:
         return Preload(u, speed, 0, 0, 0.0)
-    forms, con, load = _forms(body, axis, quadrature), in_step(body, clamp), centrifugal(body, speed, axis)
+    forms = _forms(body, axis, quadrature)
+    con = in_step(body, clamp)
+    load = centrifugal(body, speed, axis)
     size = _length(con, restrict(con, load.reshape(-1, 1)))
-    done, part, iterations, steps, halvings = 0.0, 1.0, 0, 0, 0
+    done = 0.0
+    part = 1.0
+    iterations = 0
+    steps = 0
+    halvings = 0
     while done < 1.0:
         target = min(done + part, 1.0)
-        trial, used, error = _newton(con, clamp, forms, u, target * speed ** 2, tolerance * size)
+        trial, used, error = _newton(con, clamp, forms, u, target * speed**2, tolerance * size)
         iterations += used
         if isinstance(error, str):
-            halvings, part = halvings + 1, part / 2
+            halvings = halvings + 1
+            part = part / 2
             if halvings > HALVINGS:
-                raise NotSolvedError(f"the preload at {speed:.6g} rad/s was not found: beyond {np.sqrt(done):.0%} of "
-                                     f"the speed {error}")
+                raise NotSolvedError(
+                    f"the preload at {speed:.6g} rad/s was not found: beyond {np.sqrt(done):.0%} "
+                    "of "
+                    f"the speed {error}"
+                )
             continue
-        u, done, steps = trial, target, steps + 1
+        u = trial
+        done = target
+        steps = steps + 1
     return Preload(u, speed, iterations, steps, error / size)
 
 
-def tangent(body: Body, state: Preload, axis: tuple[float, float, float] = AXIS,
-            quadrature: str = "exact") -> PETSc.Mat:
+def tangent(
+    body: Body, state: Preload, axis: tuple[float, float, float] = AXIS, quadrature: str = "exact"
+) -> PETSc.Mat:
     """Stiffness of small vibrations about a nonlinear preload, spin softening included [N/m]."""
     forms = _forms(body, axis, quadrature)
-    return _tangent(forms, state.displacement, state.speed ** 2)
+    return _tangent(forms, state.displacement, state.speed**2)
 
 
-def spinning(body: Body, speed: float, clamp: str | None = "clamp", axis: tuple[float, float, float] = AXIS,
-             linear: bool = False) -> Body:
+def spinning(
+    body: Body,
+    speed: float,
+    clamp: str | None = "clamp",
+    axis: tuple[float, float, float] = AXIS,
+    linear: bool = False,
+) -> Body:
     """The body with the stiffness that it has under a steady rotation; mass and nodes stay.
 
     Args:
@@ -156,7 +206,7 @@ def spinning(body: Body, speed: float, clamp: str | None = "clamp", axis: tuple[
         return body
     if not linear:
         return replace(body, K=tangent(body, preload(body, speed, clamp, axis), axis))
-    u0 = speed ** 2 * swell(flexible(in_step(body, clamp)), axis)
+    u0 = speed**2 * swell(flexible(in_step(body, clamp)), axis)
     return replace(body, K=linear_tangent(body, u0, speed, axis))
 
 
@@ -165,13 +215,17 @@ def _check_speed(speed: float) -> None:
         raise InputError(f"speed is {speed} rad/s, expected a number not below 0")
 
 
-def _newton(con: Constrained, clamp: str | None, forms: _Forms, u: np.ndarray, speed2: float,
-            limit: float) -> tuple[np.ndarray, int, float | str]:
-    """Newton's method from ``u``: the state, the steps taken, and the error left or the reason of a failure."""
+def _newton(
+    con: Constrained, clamp: str | None, forms: _Forms, u: np.ndarray, speed2: float, limit: float
+) -> tuple[np.ndarray, int, float | str]:
+    """Newton's method from ``u``: the state, the steps taken, and the error left or the reason of a
+    failure.
+    """
     error = np.inf
     for k in range(NEWTON):
         r = restrict(con, _force(con.body, forms, u, speed2))
-        before, error = error, _length(con, r)
+        before = error
+        error = _length(con, r)
         if error <= limit or (error < ROUNDED * limit and error > before / 2):
             return u, k, "elements turn over" if _turned_over(con.body, u) else error
         if not np.isfinite(error):
@@ -180,7 +234,11 @@ def _newton(con: Constrained, clamp: str | None, forms: _Forms, u: np.ndarray, s
         try:
             step = compliance(flexible(held), -r)
         except NotSolvedError:
-            return u, k, "the stiffness is no longer positive definite (buckling, or spin softening)"
+            return (
+                u,
+                k,
+                "the stiffness is no longer positive definite (buckling, or spin softening)",
+            )
         u = u + expand(held, step)[:, :, 0].real
     return u, NEWTON, f"Newton's method has not converged in {NEWTON} iterations"
 
@@ -188,8 +246,10 @@ def _newton(con: Constrained, clamp: str | None, forms: _Forms, u: np.ndarray, s
 def _turned_over(body: Body, u: np.ndarray) -> bool:
     """Whether a state that balances has gone through itself."""
     cells = cells_of(body)
-    before, after = (np.linalg.det(shape.geometry(body.mesh.cell_type, x[cells], 2)[1])
-                     for x in (body.mesh.points[:, :body.dim], body.mesh.points[:, :body.dim] + u))
+    before, after = (
+        np.linalg.det(shape.geometry(body.mesh.cell_type, x[cells], 2)[1])
+        for x in (body.mesh.points[:, : body.dim], body.mesh.points[:, : body.dim] + u)
+    )
     return bool((before * after <= 0).any())
 
 
@@ -198,32 +258,43 @@ def _length(con: Constrained, r: np.ndarray) -> float:
 
 
 def _measures(body: Body, quadrature: str) -> tuple[Any, Any]:
-    """Measures for the elastic and the inertial integrals; the elastic one is of fourth power in grad u."""
+    """Measures for the elastic and the inertial integrals; the elastic one is of fourth power in
+    grad u.
+    """
     stiff, mass = degrees(body.mesh, cells_of(body), quadrature)
     if quadrature == "exact" and stiff < 4:
         stiff *= 2
-    return tuple(ufl.Measure("dx", body.space.mesh, metadata={"quadrature_degree": d}) for d in (stiff, mass))
+    return tuple(
+        ufl.Measure("dx", body.space.mesh, metadata={"quadrature_degree": d}) for d in (stiff, mass)
+    )
 
 
 def _across(body: Body, axis: tuple[float, float, float]) -> Any:
     """(dim, dim) projection across the axis."""
     unit = np.asarray(axis, float) / np.linalg.norm(axis)
-    return ufl.as_matrix((np.eye(3) - np.outer(unit, unit))[:body.dim, :body.dim].tolist())
+    return ufl.as_matrix((np.eye(3) - np.outer(unit, unit))[: body.dim, : body.dim].tolist())
 
 
 def _forms(body: Body, axis: tuple[float, float, float], quadrature: str) -> _Forms:
     """First and second derivative of the potential."""
     domain = body.space.mesh
-    u, speed2 = dolfinx.fem.Function(body.space), dolfinx.fem.Constant(domain, 0.0)
-    v, w = ufl.TestFunction(body.space), ufl.TrialFunction(body.space)
+    u = dolfinx.fem.Function(body.space)
+    speed2 = dolfinx.fem.Constant(domain, 0.0)
+    v = ufl.TestFunction(body.space)
+    w = ufl.TrialFunction(body.space)
     lam, mu, rho, depth = properties(body.mesh, body.material, domain, body.plane)
-    E = ufl.sym(ufl.grad(u)) + ufl.grad(u).T * ufl.grad(u) / 2      # F^T F - 1 would cancel small strains
+    # F^T F - 1 would cancel small strains
+    E = ufl.sym(ufl.grad(u)) + ufl.grad(u).T * ufl.grad(u) / 2
     place = _across(body, axis) * (ufl.SpatialCoordinate(domain) + u)
     elastic, inertial = _measures(body, quadrature)
-    potential = (depth * (lam / 2 * ufl.tr(E) ** 2 + mu * ufl.inner(E, E)) * elastic
-                 - depth * rho * speed2 / 2 * ufl.inner(place, place) * inertial)
+    potential = (
+        depth * (lam / 2 * ufl.tr(E) ** 2 + mu * ufl.inner(E, E)) * elastic
+        - depth * rho * speed2 / 2 * ufl.inner(place, place) * inertial
+    )
     force = ufl.derivative(potential, u, v)
-    return _Forms(u, speed2, compile_form(force), compile_form(ufl.derivative(force, u, w)), _nodes(body))
+    return _Forms(
+        u, speed2, compile_form(force), compile_form(ufl.derivative(force, u, w)), _nodes(body)
+    )
 
 
 def _force(body: Body, forms: _Forms, u: np.ndarray, speed2: float) -> np.ndarray:
@@ -260,4 +331,8 @@ def _nodes(body: Body) -> np.ndarray:
     node_of = np.empty(index_map.size_global, np.int64)
     inside = np.flatnonzero(body.rows >= 0)
     node_of[body.rows[inside]] = inside
-    return node_of[index_map.local_to_global(np.arange(index_map.size_local + index_map.num_ghosts, dtype=np.int32))]
+    return node_of[
+        index_map.local_to_global(
+            np.arange(index_map.size_local + index_map.num_ghosts, dtype=np.int32)
+        )
+    ]

@@ -1,9 +1,11 @@
-"""MUMPS with rows left out: their Schur complement, and solves whose reduced system the caller answers.
+"""MUMPS with rows left out: their Schur complement, and solves whose reduced system the caller
+answers.
 
-PETSc sweeps down over the factors, solves with its own dense factors of the Schur complement S and sweeps up again. The
-nodal diameters of a wheel want another answer in between, C (C^H S C)^-1 C^H, so the dense solve of S is replaced by a
-call back into Python: two sweeps a solve instead of the four that A_ii^-1 before and after would take. Where PETSc does
-not call back (the place of the dense solve in its table of operations moved once), ``bridge`` says so.
+PETSc sweeps down over the factors, solves with its own dense factors of the Schur complement S and
+sweeps up again. The nodal diameters of a wheel want another answer in between, C (C^H S C)^-1 C^H,
+so the dense solve of S is replaced by a call back into Python: two sweeps a solve instead of the
+four that A_ii^-1 before and after would take. Where PETSc does not call back (the place of the
+dense solve in its table of operations moved once), ``bridge`` says so.
 """
 
 from __future__ import annotations
@@ -21,7 +23,8 @@ from .mumps import Factorised, petsc_call, set_operation, solve_matrix
 
 __all__ = ["Bridge", "bridge", "schur_complement", "through"]
 
-MATSOLVE = (109, 100)           # MATOP_MAT_SOLVE: PETSc 3.1 to 3.19, later
+# MATOP_MAT_SOLVE: PETSc 3.1 to 3.19, later
+MATSOLVE = (109, 100)
 CALLBACK = ctypes.CFUNCTYPE(ctypes.c_int, ctypes.c_void_p, ctypes.c_void_p, ctypes.c_void_p)
 Answer = Callable[[np.ndarray], np.ndarray]
 
@@ -31,16 +34,22 @@ class Bridge:
     """The way from MUMPS's reduced system to whoever answers it."""
 
     factor: Factorised
-    rows: int                   # of the Schur complement
-    answers: list[Answer]       # the one in use; empty between solves
-    raised: list[BaseException]     # an exception, Ctrl-C too, cannot pass through C: it waits here
-    callback: object            # keeps the C function alive
+    # of the Schur complement
+    rows: int
+    # the one in use; empty between solves
+    answers: list[Answer]
+    # an exception, Ctrl-C too, cannot pass through C: it waits here
+    raised: list[BaseException]
+    # keeps the C function alive
+    callback: object
 
 
 def schur_complement(factor: Factorised, n: int) -> np.ndarray:
     """(n, n) A_bb - A_bi A_ii^-1 A_ib of the rows left out."""
     S = _borrowed(factor, lambda handle: _array(handle, (n, n)).copy())
-    lower, upper = np.tril(S, -1), np.triu(S, 1)        # a symmetric factorisation fills one triangle
+    # a symmetric factorisation fills one triangle
+    lower = np.tril(S, -1)
+    upper = np.triu(S, 1)
     half = lower if abs(lower).max(initial=0) >= abs(upper).max(initial=0) else upper
     return half + half.T + np.diag(S.diagonal())
 
@@ -55,7 +64,8 @@ def bridge(factor: Factorised, n: int) -> Bridge | None:
 
     def answer(_: int, right: int, left: int) -> int:
         try:
-            rows, columns = ctypes.c_int(), ctypes.c_int()
+            rows = ctypes.c_int()
+            columns = ctypes.c_int()
             petsc_call("MatGetSize", left, ctypes.byref(rows), ctypes.byref(columns))
             r = _array(left, (columns.value, rows.value)).T
             r[:] = answers[-1](r)
@@ -64,7 +74,8 @@ def bridge(factor: Factorised, n: int) -> Bridge | None:
         return 0
 
     def ones(handle: int) -> None:
-        _array(handle, (n, n))[:] = np.eye(n)           # of floating bodies S is singular; PETSc must factorise it
+        # of floating bodies S is singular; PETSc must factorise it
+        _array(handle, (n, n))[:] = np.eye(n)
 
     callback = CALLBACK(answer)
     _borrowed(factor, ones)
@@ -77,7 +88,9 @@ def bridge(factor: Factorised, n: int) -> Bridge | None:
 
 
 def through(made: Bridge, B: np.ndarray, answer: Answer) -> np.ndarray:
-    """Solutions (n, k) for B (n, k), zero on the rows left out, where there x_b = answer(-A_bi A_ii^-1 b_i) (nb, k)."""
+    """Solutions (n, k) for B (n, k), zero on the rows left out, where there x_b = answer(-A_bi
+    A_ii^-1 b_i) (nb, k).
+    """
     made.answers.append(answer)
     try:
         with _signals_wait():
@@ -93,12 +106,13 @@ def through(made: Bridge, B: np.ndarray, answer: Answer) -> np.ndarray:
 def _signals_wait() -> Iterator[None]:
     """Ctrl-C and SIGTERM wait for the end of the block.
 
-    What their handlers raise at the entry of a function that C calls is dropped by ctypes, and PETSc gets a random
-    error code.
+    What their handlers raise at the entry of a function that C calls is dropped by ctypes, and
+    PETSc gets a random error code.
     """
     came: list[int] = []
     before = {}
-    if threading.current_thread() is threading.main_thread():       # no other one runs handlers
+    # no other one runs handlers
+    if threading.current_thread() is threading.main_thread():
         for number in (signal.SIGINT, signal.SIGTERM):
             if signal.getsignal(number) not in (None, signal.SIG_IGN):
                 before[number] = signal.signal(number, lambda number, _: came.append(number))
@@ -113,10 +127,18 @@ def _signals_wait() -> Iterator[None]:
 
 def _borrowed(factor: Factorised, use: Callable[[int], object]) -> object:
     """Do something with PETSc's Schur complement."""
-    matrix, status = ctypes.c_void_p(), ctypes.c_int()
-    petsc_call("MatFactorGetSchurComplement", factor.matrix.handle, ctypes.byref(matrix), ctypes.byref(status))
+    matrix = ctypes.c_void_p()
+    status = ctypes.c_int()
+    petsc_call(
+        "MatFactorGetSchurComplement",
+        factor.matrix.handle,
+        ctypes.byref(matrix),
+        ctypes.byref(status),
+    )
     out = use(matrix.value)
-    petsc_call("MatFactorRestoreSchurComplement", factor.matrix.handle, ctypes.byref(matrix), status)
+    petsc_call(
+        "MatFactorRestoreSchurComplement", factor.matrix.handle, ctypes.byref(matrix), status
+    )
     return out
 
 
@@ -125,5 +147,6 @@ def _array(handle: int, shape: tuple[int, int]) -> np.ndarray:
     data = ctypes.POINTER(ctypes.c_double)()
     petsc_call("MatDenseGetArray", handle, ctypes.byref(data))
     out = np.ctypeslib.as_array(data, shape)
-    petsc_call("MatDenseRestoreArray", handle, ctypes.byref(data))      # forgets the pointer, not the memory
+    # forgets the pointer, not the memory
+    petsc_call("MatDenseRestoreArray", handle, ctypes.byref(data))
     return out

@@ -1,7 +1,7 @@
 """Stresses of a displacement field (static, mode or forced response), in NumPy and mesh numbering.
 
-Voigt order xx, yy, zz, xy, yz, zx, always six components: plane stress has zz = 0, plane strain lambda tr(e).
-Amplitudes of harmonic motion are complex, s(t) = Re(s e^{j w t}).
+Voigt order xx, yy, zz, xy, yz, zx, always six components: plane stress has zz = 0, plane strain
+lambda tr(e). Amplitudes of harmonic motion are complex, s(t) = Re(s e^{j w t}).
 """
 
 from __future__ import annotations
@@ -12,53 +12,65 @@ from functools import cache
 import numpy as np
 
 from ..errors import InputError
-from . import shape
+from . import shape_functions as shape
 from .body import Body, lame
 
 __all__ = ["GaussStress", "gauss_stress", "nodal_stress", "principal", "von_mises"]
 
 PAIRS = ((0, 0), (1, 1), (2, 2), (0, 1), (1, 2), (2, 0))
-BLOCK = 20000       # cells at a time
-PHASES = 64         # of a period, for principal stresses of complex fields
+# cells at a time
+BLOCK = 20000
+# of a period, for principal stresses of complex fields
+PHASES = 64
 
 
 @dataclass(frozen=True)
 class GaussStress:
     """Stresses at the Gauss points of reduced integration, where they are best."""
 
-    points: np.ndarray      # (nc, q, 3) [m]
-    volume: np.ndarray      # (nc, q) [m^3]
-    stress: np.ndarray      # (nc, q, 6) [Pa], real or complex
+    # (nc, q, 3) [m]
+    points: np.ndarray
+    # (nc, q) [m^3]
+    volume: np.ndarray
+    # (nc, q, 6) [Pa], real or complex
+    stress: np.ndarray
 
 
 def gauss_stress(body: Body, u: np.ndarray, large: bool = False) -> GaussStress:
     """Stresses in the cells, ordered as ``cells_of(body)``.
 
     Args:
-        u: (n_points, 2 or 3) displacement [m], real or complex; mode shapes give stress per modal amplitude.
-        large: Cauchy stress of a Saint Venant-Kirchhoff body after large displacements (nonlinear preload).
+        u: (n_points, 2 or 3) displacement [m], real or complex; mode shapes give stress per modal
+            amplitude.
+        large: Cauchy stress of a Saint Venant-Kirchhoff body after large displacements (nonlinear
+            preload).
 
     Raises:
         InputError: the field does not fit the mesh, or a complex one with large displacements.
     """
     mesh = body.mesh
     if np.shape(u)[0] != len(mesh.points) or np.shape(u)[1] < body.dim:
-        raise InputError(f"displacement of shape {np.shape(u)}, expected ({len(mesh.points)}, {body.dim})")
+        raise InputError(
+            f"displacement of shape {np.shape(u)}, expected ({len(mesh.points)}, {body.dim})"
+        )
     if large and np.iscomplexobj(u):
         raise InputError("displacement is complex, expected a real one for large displacements")
     if not np.isfinite(u).all():
         raise InputError("displacement has values that are not finite")
-    parts = [_of_cells(body, np.asarray(u)[:, :body.dim], name, block, large)
-             for name in body.material
-             for block in np.array_split(mesh.bodies[name], len(mesh.bodies[name]) // BLOCK + 1)]
+    parts = [
+        _of_cells(body, np.asarray(u)[:, : body.dim], name, block, large)
+        for name in body.material
+        for block in np.array_split(mesh.bodies[name], len(mesh.bodies[name]) // BLOCK + 1)
+    ]
     return GaussStress(*(np.concatenate(column) for column in zip(*parts, strict=True)))
 
 
 def nodal_stress(body: Body, u: np.ndarray, large: bool = False) -> np.ndarray:
-    """(n_points, 6) stresses at the nodes [Pa]: each cell's Gauss points continued to its nodes, then the mean over
-    the cells of one material, weighted by volume; 0 outside the body.
+    """(n_points, 6) stresses at the nodes [Pa]: each cell's Gauss points continued to its nodes,
+    then the mean over the cells of one material, weighted by volume; 0 outside the body.
 
-    A node between two materials takes the mean of the material with the larger von Mises stress there.
+    A node between two materials takes the mean of the material with the larger von Mises stress
+    there.
     """
     found = gauss_stress(body, u, large)
     out = np.zeros((len(body.mesh.points), 6), found.stress.dtype)
@@ -77,22 +89,27 @@ def nodal_stress(body: Body, u: np.ndarray, large: bool = False) -> np.ndarray:
 
 
 def von_mises(stress: np.ndarray) -> np.ndarray:
-    """(...) von Mises stress of (..., 6) [Pa]; of complex amplitudes the largest in a period, in closed form.
+    """(...) von Mises stress of (..., 6) [Pa]; of complex amplitudes the largest in a period, in
+    closed form.
 
     The square is a quadratic form Q of s(t): Q = (Q(s, s*) + Re(Q(s, s) e^{2 j w t})) / 2.
     """
     if not np.iscomplexobj(stress):
         return np.sqrt(np.maximum(_form(stress, stress), 0.0))
-    mean, swing = _form(stress, stress.conj()).real, np.abs(_form(stress, stress))
+    mean = _form(stress, stress.conj()).real
+    swing = np.abs(_form(stress, stress))
     return np.sqrt(np.maximum(mean + swing, 0.0) / 2)
 
 
 def principal(stress: np.ndarray) -> np.ndarray:
-    """(..., 3) principal stresses, descending [Pa]; of complex amplitudes the largest of each in a period."""
+    """(..., 3) principal stresses, descending [Pa]; of complex amplitudes the largest of each in a
+    period.
+    """
     if not np.iscomplexobj(stress):
         return np.linalg.eigvalsh(_tensor(stress))[..., ::-1]
     best = np.full((*stress.shape[:-1], 3), -np.inf)
-    for turn in np.exp(2j * np.pi * np.arange(PHASES // 2) / PHASES):       # half a period later the sign is the other
+    # half a period later the sign is the other
+    for turn in np.exp(2j * np.pi * np.arange(PHASES // 2) / PHASES):
         now = _roots((stress * turn).real)
         best = np.maximum(best, np.maximum(now, -now[..., ::-1]))
     return best
@@ -100,20 +117,26 @@ def principal(stress: np.ndarray) -> np.ndarray:
 
 def _roots(s: np.ndarray) -> np.ndarray:
     """(..., 3) principal stresses of real (..., 6), descending, by the cosine formula (Smith 1961,
-    doi:10.1145/355578.366316); double ones to eight digits, many times faster than an eigenvalue solver."""
+    doi:10.1145/355578.366316); double ones to eight digits, many times faster than an eigenvalue
+    solver.
+    """
     mean = s[..., :3].mean(-1)
     a, b, c = (s[..., i] - mean for i in range(3))
-    xy, yz, zx = s[..., 3], s[..., 4], s[..., 5]
+    xy = s[..., 3]
+    yz = s[..., 4]
+    zx = s[..., 5]
     radius = np.sqrt((a * a + b * b + c * c + 2 * (xy * xy + yz * yz + zx * zx)) / 6)
     det = a * (b * c - yz * yz) - xy * (xy * c - yz * zx) + zx * (xy * yz - b * zx)
-    angle = np.arccos(np.clip(det / np.maximum(2 * radius ** 3, 1e-300), -1, 1)) / 3
-    first, last = 2 * radius * np.cos(angle), 2 * radius * np.cos(angle + 2 * np.pi / 3)
+    angle = np.arccos(np.clip(det / np.maximum(2 * radius**3, 1e-300), -1, 1)) / 3
+    first = 2 * radius * np.cos(angle)
+    last = 2 * radius * np.cos(angle + 2 * np.pi / 3)
     return mean[..., None] + np.stack([first, -first - last, last], axis=-1)
 
 
 def _form(a: np.ndarray, b: np.ndarray) -> np.ndarray:
     """The bilinear form whose square root is the von Mises stress."""
-    mean_a, mean_b = a[..., :3].mean(-1, keepdims=True), b[..., :3].mean(-1, keepdims=True)
+    mean_a = a[..., :3].mean(-1, keepdims=True)
+    mean_b = b[..., :3].mean(-1, keepdims=True)
     normal = ((a[..., :3] - mean_a) * (b[..., :3] - mean_b)).sum(-1)
     return 1.5 * normal + 3 * (a[..., 3:] * b[..., 3:]).sum(-1)
 
@@ -125,15 +148,19 @@ def _tensor(stress: np.ndarray) -> np.ndarray:
     return out
 
 
-def _of_cells(body: Body, u: np.ndarray, name: str, cells: np.ndarray,
-              large: bool) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+def _of_cells(
+    body: Body, u: np.ndarray, name: str, cells: np.ndarray, large: bool
+) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Places, volumes and stresses at the Gauss points of some cells of one material."""
-    mesh, d = body.mesh, body.dim
+    mesh = body.mesh
+    d = body.dim
     at, w = _best_points(mesh.cell_type)
     values, gradients = shape.tabulate(mesh.cell_type, at)
     tangents = np.einsum("ckg,qkd->cqgd", mesh.points[cells][:, :, :d], gradients)
     volume = np.abs(np.linalg.det(tangents)) * w * (mesh.depth if d == 2 else 1.0)
-    slope = np.einsum("cki,qkd,cqdj->cqij", u[cells], gradients, np.linalg.inv(tangents), optimize=True)
+    slope = np.einsum(
+        "cki,qkd,cqdj->cqij", u[cells], gradients, np.linalg.inv(tangents), optimize=True
+    )
     strain = (slope + slope.swapaxes(2, 3)) / 2
     if large:
         strain = strain + slope.swapaxes(2, 3) @ slope / 2
@@ -162,15 +189,21 @@ def _voigt(stress: np.ndarray, across: np.ndarray | None) -> np.ndarray:
 
 @cache
 def _best_points(cell_type: str) -> tuple[np.ndarray, np.ndarray]:
-    """Gauss points of degree 2 (p - 1): one for first-order simplices, four in a tetra10, eight in a hexahedron27."""
+    """Gauss points of degree 2 (p - 1): one for first-order simplices, four in a tetra10, eight in
+    a hexahedron27.
+    """
     kind, degree = shape.SHAPES[cell_type]
     if kind in ("tetra", "triangle") and degree == 2:
         return _four_points(len(shape.nodes(kind)))
-    return shape.quadrature(kind, 2 * (degree - 1) if kind in ("tetra", "triangle") else 2 * degree - 1)
+    return shape.quadrature(
+        kind, 2 * (degree - 1) if kind in ("tetra", "triangle") else 2 * degree - 1
+    )
 
 
 def _four_points(corners: int) -> tuple[np.ndarray, np.ndarray]:
-    """The symmetric rule of degree 2 with a point for each corner of a simplex (Hammer and Stroud 1956)."""
+    """The symmetric rule of degree 2 with a point for each corner of a simplex (Hammer and Stroud
+    1956).
+    """
     d = corners - 1
     near = (1 + d / np.sqrt(d + 2)) / (d + 1)
     away = (1 - near) / d

@@ -1,4 +1,5 @@
-"""Contact forces of all elements for periodic relative motion: harmonics, Jacobian, states and dissipated energy.
+"""Contact forces of all elements for periodic relative motion: harmonics, Jacobian, states and
+dissipated energy.
 
 Signs (data.py): w is blade minus damper in (normal, t1, t2); the blade feels -f. The normal force is
 max(0, n0 + kn w_n), the tangential one a return map of kt w onto |f| <= mu times it.
@@ -12,43 +13,75 @@ import numpy as np
 
 from bladefem.data import Elements
 from bladefem.errors import InputError
-from bladefem.friction.disc_batch import disc_batch
-from bladefem.friction.harmonics import harmonics_of
-from bladefem.friction.jenkins import jenkins_batch
-from bladefem.friction.tables import patterns, tables
+from bladefem.friction.fourier import harmonics_of
+from bladefem.friction.kernel_1d import jenkins_batch
+from bladefem.friction.simd.kernel_2d import disc_batch
+from bladefem.friction.trigonometric_tables import patterns, tables
 
-__all__ = ["GROSS_SLIP", "PARTIAL_SLIP", "PERIODIC", "SEPARATED", "STICK", "Forces", "checked", "dissipated",
-           "evaluate", "finite_load", "states", "verdict"]
+__all__ = [
+    "GROSS_SLIP",
+    "PARTIAL_SLIP",
+    "PERIODIC",
+    "SEPARATED",
+    "STICK",
+    "Forces",
+    "checked",
+    "dissipated",
+    "evaluate",
+    "finite_load",
+    "states",
+    "verdict",
+]
 
-SEPARATED, STICK, PARTIAL_SLIP, GROSS_SLIP = 0, 1, 2, 3
+SEPARATED = 0
+STICK = 1
+PARTIAL_SLIP = 2
+GROSS_SLIP = 3
 PRECISIONS = {"double": np.float64, "single": np.float32}
 PERIODIC = "periodic"
 
 
 @dataclass(frozen=True)
 class Forces:
-    """Contact forces of n nodes with d = 1 + tangents directions; K = 2H+1 coefficients [mean, cos 1, sin 1, ...]."""
+    """Contact forces of n nodes with d = 1 + tangents directions; K = 2H+1 coefficients [mean, cos
+    1, sin 1, ...].
+    """
 
-    f: np.ndarray               # (n, d, K) [N]
-    dfdw: np.ndarray | None     # (n, d, K, d, K) [N/m]
-    state: np.ndarray           # (n,) SEPARATED, STICK, PARTIAL_SLIP (at most half of the contact time) or GROSS_SLIP
-    shares: np.ndarray          # (n, 3) share of the cycle in stick, slip and separation [1]
-    dissipated: np.ndarray      # (n,) energy a cycle [J]
-    cycles: np.ndarray          # (n,) periods marched until the force was periodic
+    # (n, d, K) [N]
+    f: np.ndarray
+    # (n, d, K, d, K) [N/m]
+    dfdw: np.ndarray | None
+    # (n,) SEPARATED, STICK, PARTIAL_SLIP (at most half of the contact time) or GROSS_SLIP
+    state: np.ndarray
+    # (n, 3) share of the cycle in stick, slip and separation [1]
+    shares: np.ndarray
+    # (n,) energy a cycle [J]
+    dissipated: np.ndarray
+    # (n,) periods marched until the force was periodic
+    cycles: np.ndarray
     converged: bool
     reason: str
 
 
-def evaluate(elements: Elements, w: np.ndarray, samples: int, jacobian: bool = True, *,
-             load: np.ndarray | None = None, cycles: int = 4000, precision: str = "double") -> Forces:
-    """Harmonics of the contact forces for relative motion w (n, d, 2H+1) [m], sampled at ``samples`` instants.
+def evaluate(
+    elements: Elements,
+    w: np.ndarray,
+    samples: int,
+    jacobian: bool = True,
+    *,
+    load: np.ndarray | None = None,
+    cycles: int = 4000,
+    precision: str = "double",
+) -> Forces:
+    """Harmonics of the contact forces for relative motion w (n, d, 2H+1) [m], sampled at
+    ``samples`` instants.
 
-    load (n, samples) [N], where given, is the prescribed part of the normal load N(t) in place of the constant n0.
-    precision is that in which the derivative of 2-D elements is summed: "single" is faster and leaves about 1e-7 of it
-    in error, which is enough for Newton; forces are the same.
-    The error falls as samples^-2. Forces.converged is False, with the reason, when a 2-D element was not periodic
-    after ``cycles`` periods or the motion is not finite. Raises InputError for shapes that do not fit or too few
-    samples (at least 4H+4).
+    load (n, samples) [N], where given, is the prescribed part of the normal load N(t) in place of
+    the constant n0. precision is that in which the derivative of 2-D elements is summed: "single"
+    is faster and leaves about 1e-7 of it in error, which is enough for Newton; forces are the same.
+    The error falls as samples^-2. Forces.converged is False, with the reason, when a 2-D element
+    was not periodic after ``cycles`` periods or the motion is not finite. Raises InputError for
+    shapes that do not fit or too few samples (at least 4H+4).
     """
     w, nodes = checked(elements, w)
     if precision not in PRECISIONS:
@@ -56,17 +89,37 @@ def evaluate(elements: Elements, w: np.ndarray, samples: int, jacobian: bool = T
     n, d, K = w.shape
     load = _series(load, n, samples)
     tab = tables(harmonics_of(w), samples)
-    F, shares, used = np.empty((n, d, K)), np.empty((n, 3)), np.full(n, 2)
+    F = np.empty((n, d, K))
+    shares = np.empty((n, 3))
+    used = np.full(n, 2)
     if d == 2:
         J = np.empty((n, d, K, d, K))
         jenkins_batch(w, load, nodes, tab, F, J, shares)
     else:
         J = np.empty((n, d, K, d * K) if jacobian else (n, 0, 0, 0))
-        disc_batch(w, load, nodes, tab, patterns(harmonics_of(w), samples, PRECISIONS[precision]), cycles, F, J, shares,
-                   used)
+        disc_batch(
+            w,
+            load,
+            nodes,
+            tab,
+            patterns(harmonics_of(w), samples, PRECISIONS[precision]),
+            cycles,
+            F,
+            J,
+            shares,
+            used,
+        )
     reason = verdict(F, used, f"were not periodic after {cycles} cycles")
-    return Forces(F, J.reshape(n, d, K, d, K) if jacobian else None, states(shares), shares, dissipated(F, w),
-                  np.abs(used), reason == PERIODIC, reason)
+    return Forces(
+        F,
+        J.reshape(n, d, K, d, K) if jacobian else None,
+        states(shares),
+        shares,
+        dissipated(F, w),
+        np.abs(used),
+        reason == PERIODIC,
+        reason,
+    )
 
 
 def verdict(f: np.ndarray, used: np.ndarray, failure: str) -> str:
@@ -74,35 +127,53 @@ def verdict(f: np.ndarray, used: np.ndarray, failure: str) -> str:
     failed = int(np.count_nonzero(used < 0))
     if failed:
         return f"{failed} of {len(used)} elements {failure}"
-    return PERIODIC if np.isfinite(f).all() else "the motion or the force of an element is not finite"
+    return (
+        PERIODIC if np.isfinite(f).all() else "the motion or the force of an element is not finite"
+    )
 
 
 def dissipated(f: np.ndarray, w: np.ndarray) -> np.ndarray:
-    """(n,) work of the tangential forces f (n, d, K) on w (n, d, K) in one cycle [J], exact for these harmonics."""
+    """(n,) work of the tangential forces f (n, d, K) on w (n, d, K) in one cycle [J], exact for
+    these harmonics.
+    """
     h = np.arange(1, f.shape[2] // 2 + 1)
-    c, s = f[:, 1:, 1::2], f[:, 1:, 2::2]
+    c = f[:, 1:, 1::2]
+    s = f[:, 1:, 2::2]
     return np.pi * np.einsum("ndh,h->n", c * w[:, 1:, 2::2] - s * w[:, 1:, 1::2], h)
 
 
 def states(shares: np.ndarray) -> np.ndarray:
     """(n,) state codes from the shares (n, 3) of stick, slip and separation."""
-    stick, slip = shares[:, 0], shares[:, 1]
-    code = np.where(slip > 0.5 * (stick + slip), GROSS_SLIP, np.where(slip > 0, PARTIAL_SLIP, STICK))
+    stick = shares[:, 0]
+    slip = shares[:, 1]
+    code = np.where(
+        slip > 0.5 * (stick + slip), GROSS_SLIP, np.where(slip > 0, PARTIAL_SLIP, STICK)
+    )
     return np.where(stick + slip > 1e-12, code, SEPARATED)
 
 
 def checked(elements: Elements, w: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """w (n, d, K) and the table (n, 4) of kt, kn, mu, n0, which fit each other; raises InputError where they do not."""
+    """w (n, d, K) and the table (n, 4) of kt, kn, mu, n0, which fit each other; raises InputError
+    where they do not.
+    """
     w = np.ascontiguousarray(w, dtype=float)
-    columns = [np.asarray(getattr(elements, name), dtype=float) for name in ("kt", "kn", "mu", "n0")]
-    n, d = columns[0].size, 1 + elements.tangents
+    columns = [
+        np.asarray(getattr(elements, name), dtype=float) for name in ("kt", "kn", "mu", "n0")
+    ]
+    n = columns[0].size
+    d = 1 + elements.tangents
     if d not in (2, 3):
         raise InputError(f"elements: tangents is {elements.tangents}, expected 1 or 2")
     if w.ndim != 3 or w.shape[:2] != (n, d):
-        raise InputError(f"w: shape {w.shape} does not fit {n} elements of {d} directions, expected ({n}, {d}, 2H+1)")
+        raise InputError(
+            f"w: shape {w.shape} does not fit {n} elements of {d} directions, expected ({n}, {d}, "
+            "2H+1)"
+        )
     nodes = np.stack(np.broadcast_arrays(*columns), axis=1)
     if (nodes[:, :3] < 0).any() or not np.isfinite(nodes).all():
-        raise InputError("elements: kt, kn and mu must be finite and not negative, n0 must be finite")
+        raise InputError(
+            "elements: kt, kn and mu must be finite and not negative, n0 must be finite"
+        )
     return w, np.ascontiguousarray(nodes)
 
 
@@ -111,7 +182,9 @@ def _series(load: np.ndarray | None, n: int, samples: int) -> np.ndarray:
     if load is None:
         return np.zeros((n, 0))
     if np.shape(load) != (n, samples):
-        raise InputError(f"load: shape {np.shape(load)}, expected ({n}, {samples}), one row an element")
+        raise InputError(
+            f"load: shape {np.shape(load)}, expected ({n}, {samples}), one row an element"
+        )
     return finite_load(load)
 
 

@@ -1,7 +1,8 @@
-"""Closed forms for one Jenkins element at constant normal load, one harmonic: the standards that the kernels must meet.
+"""Closed forms for one Jenkins element at constant normal load, one harmonic: the standards that
+the kernels must meet.
 
-With A the amplitude, k the stiffness and F = mu N, the element slips when r = F / (k A) < 1; it then slides from each
-reversal plus theta* = acos(1 - 2 r) on (Griffin 1980, doi:10.1115/1.3230256).
+With A the amplitude, k the stiffness and F = mu N, the element slips when r = F / (k A) < 1; it
+then slides from each reversal plus theta* = acos(1 - 2 r) on (Griffin 1980, doi:10.1115/1.3230256).
 """
 
 from __future__ import annotations
@@ -12,16 +13,26 @@ import numpy as np
 
 from bladefem.errors import InputError
 
-__all__ = ["Linearised", "circular_orbit_work", "iwan_force", "iwan_limits", "jenkins", "jenkins_coefficients"]
+__all__ = [
+    "Linearised",
+    "circular_orbit_work",
+    "iwan_force",
+    "iwan_limits",
+    "jenkins",
+    "jenkins_coefficients",
+]
 
 
 @dataclass(frozen=True)
 class Linearised:
     """f ~ stiffness w + damping dw/dtau for w = A cos tau, and the energy of one cycle."""
 
-    stiffness: np.ndarray       # k_eq [N/m]
-    damping: np.ndarray         # omega c_eq [N/m]
-    energy: np.ndarray          # [J]
+    # k_eq [N/m]
+    stiffness: np.ndarray
+    # omega c_eq [N/m]
+    damping: np.ndarray
+    # [J]
+    energy: np.ndarray
 
 
 def jenkins(amplitude: np.ndarray, kt: float, limit: float) -> Linearised:
@@ -31,19 +42,25 @@ def jenkins(amplitude: np.ndarray, kt: float, limit: float) -> Linearised:
     """
     A = np.abs(np.asarray(amplitude, dtype=float))
     if kt < 0 or limit < 0:
-        raise InputError(f"jenkins: stiffness {kt} N/m and limit {limit} N, expected both not negative")
+        raise InputError(
+            f"jenkins: stiffness {kt} N/m and limit {limit} N, expected both not negative"
+        )
     slips = kt * A > limit
     r = np.divide(limit, kt * A, out=np.ones_like(A), where=slips)
     theta = np.where(slips, np.arccos(1 - 2 * r), np.pi)
-    stiffness, damping = kt / np.pi * (theta - 0.5 * np.sin(2 * theta)), kt / np.pi * np.sin(theta) ** 2
-    return Linearised(stiffness, np.where(slips, damping, 0.0), np.where(slips, 4 * limit * A * (1 - r), 0.0))
+    stiffness = kt / np.pi * (theta - 0.5 * np.sin(2 * theta))
+    damping = kt / np.pi * np.sin(theta) ** 2
+    return Linearised(
+        stiffness, np.where(slips, damping, 0.0), np.where(slips, 4 * limit * A * (1 - r), 0.0)
+    )
 
 
 def jenkins_coefficients(amplitude: float, kt: float, limit: float, H: int) -> np.ndarray:
-    """(2H+1,) force coefficients [mean, cos 1, sin 1, ...] for w = A cos tau, integrated by hand [N].
+    """(2H+1,) force coefficients [mean, cos 1, sin 1, ...] for w = A cos tau, integrated by hand
+    [N].
 
-    After the reversal at tau = 0, f = F - k A (1 - cos tau) up to theta*, then f = -F up to tau = pi; the second half
-    is the negative of the first, so that even harmonics vanish.
+    After the reversal at tau = 0, f = F - k A (1 - cos tau) up to theta*, then f = -F up to tau =
+    pi; the second half is the negative of the first, so that even harmonics vanish.
     """
     c = np.zeros(2 * H + 1)
     if kt * amplitude <= limit:
@@ -53,9 +70,14 @@ def jenkins_coefficients(amplitude: float, kt: float, limit: float, H: int) -> n
     offset = limit - kt * amplitude
     for h in range(1, H + 1, 2):
         both = kt * amplitude * 0.5
-        up, down = h + 1, h - 1
-        cos_part = offset * np.sin(h * theta) / h + both * (np.sin(up * theta) / up + _sin_over(down, theta))
-        sin_part = offset * (1 - np.cos(h * theta)) / h + both * ((1 - np.cos(up * theta)) / up + _versine(down, theta))
+        up = h + 1
+        down = h - 1
+        cos_part = offset * np.sin(h * theta) / h + both * (
+            np.sin(up * theta) / up + _sin_over(down, theta)
+        )
+        sin_part = offset * (1 - np.cos(h * theta)) / h + both * (
+            (1 - np.cos(up * theta)) / up + _versine(down, theta)
+        )
         cos_part += limit * np.sin(h * theta) / h
         sin_part -= limit * (np.cos(h * theta) - np.cos(h * np.pi)) / h
         c[2 * h - 1], c[2 * h] = 2 / np.pi * cos_part, 2 / np.pi * sin_part
@@ -73,31 +95,40 @@ def _versine(p: int, theta: float) -> float:
 
 
 def circular_orbit_work(radius: float, kt: float, limit: float) -> float:
-    """Energy [J] of one circular orbit of a 2-D element, W = 2 pi F sqrt(A^2 - (F/k)^2), 0 in full stick."""
-    inside = radius ** 2 - (limit / kt) ** 2
+    """Energy [J] of one circular orbit of a 2-D element, W = 2 pi F sqrt(A^2 - (F/k)^2), 0 in full
+    stick.
+    """
+    inside = radius**2 - (limit / kt) ** 2
     return 2 * np.pi * limit * np.sqrt(inside) if inside > 0 else 0.0
 
 
 def iwan_limits(kt: float, limit: float, n: int) -> tuple[np.ndarray, np.ndarray]:
-    """Stiffness (n,) [N/m] and limits (n,) [N] of parallel elements that make Mindlin's partial slip of a sphere.
+    """Stiffness (n,) [N/m] and limits (n,) [N] of parallel elements that make Mindlin's partial
+    slip of a sphere.
 
-    Cattaneo-Mindlin: Q = F (1 - (1 - k w / (1.5 F))^{3/2}) with initial stiffness k and limit F = mu P in total
-    (Mindlin & Deresiewicz 1953, doi:10.1115/1.4010702). In an Iwan array the stiffness that still sticks at the
-    displacement w is dQ/dw, so that limits F_i = k_i w_i with w_i uniform over 0..w_max need k_i ~ -d2Q/dw2. Each
-    element carries the exact moments of its interval: stiffness and sum of limits agree with the closed form.
+    Cattaneo-Mindlin: Q = F (1 - (1 - k w / (1.5 F))^{3/2}) with initial stiffness k and limit F =
+    mu P in total (Mindlin & Deresiewicz 1953, doi:10.1115/1.4010702). In an Iwan array the
+    stiffness that still sticks at the displacement w is dQ/dw, so that limits F_i = k_i w_i with
+    w_i uniform over 0..w_max need k_i ~ -d2Q/dw2. Each element carries the exact moments of its
+    interval: stiffness and sum of limits agree with the closed form.
     """
     if n < 1:
         raise InputError(f"n: {n} elements, expected at least 1")
-    edge = 1 - np.linspace(0, 1, n + 1)                 # 1 - w / w_max
-    slope = kt * np.sqrt(edge)                          # dQ/dw
-    force = limit * (1 - edge ** 1.5)
+    # 1 - w / w_max
+    edge = 1 - np.linspace(0, 1, n + 1)
+    # dQ/dw
+    slope = kt * np.sqrt(edge)
+    force = limit * (1 - edge**1.5)
     most = 1.5 * limit / kt
     k = slope[:-1] - slope[1:]
-    moment = np.diff(force - slope * most * (1 - edge))     # integral of w (-Q'') dw over the interval
+    # integral of w (-Q'') dw over the interval
+    moment = np.diff(force - slope * most * (1 - edge))
     return k, moment
 
 
 def iwan_force(w: np.ndarray, kt: float, limit: float) -> np.ndarray:
-    """Force [N] of first loading to w [m] by Cattaneo and Mindlin; reversals follow Masing, Q = 2 Q(w/2)."""
+    """Force [N] of first loading to w [m] by Cattaneo and Mindlin; reversals follow Masing, Q = 2
+    Q(w/2).
+    """
     edge = np.clip(1 - np.abs(w) * kt / (1.5 * limit), 0, 1)
-    return np.sign(w) * limit * (1 - edge ** 1.5)
+    return np.sign(w) * limit * (1 - edge**1.5)

@@ -5,13 +5,14 @@ from __future__ import annotations
 import numpy as np
 
 from bladefem.data import Elements
-from bladefem.friction.harmonics import harmonics_of, synthesis
+from bladefem.friction.fourier import harmonics_of, synthesis
 
 __all__ = ["free_static_force"]
 
 
 def free_static_force(elements: Elements, w: np.ndarray, samples: int = 512) -> np.ndarray:
-    """(n,) size up to which any static friction force is in equilibrium with the vibration w [N]; 0 where it slips.
+    """(n,) size up to which any static friction force is in equilibrium with the vibration w [N]; 0
+    where it slips.
 
     A stuck node may carry any mean force within [-r, r], r = min over the period of mu N - k_t |w_t - its mean|
     (mu N - k_t A where N is constant): its history decides, and vibration does not tell. Sampled.

@@ -1,19 +1,23 @@
-"""Friction laws as the paper prints them, kept for comparison only, and the corrected differential form.
+"""Friction laws as the paper prints them, kept for comparison only, and the corrected differential
+form.
 
-Each takes a sampled motion and returns the force in our sign (the printed one acts on the structure). The errors were
-measured with g = sin x, N = 1, mu = 0.5, k = 5 unless said otherwise; tests/stability/test_friction_failures.py repeats
-them. Work ratio: work of one period over that of the corrected law.
+Each takes a sampled motion and returns the force in our sign (the printed one acts on the
+structure). The errors were measured with g = sin x, N = 1, mu = 0.5, k = 5 unless said otherwise;
+tests/stability/test_friction_failures.py repeats them. Work ratio: work of one period over that of
+the corrected law.
 
 - ``differential``, H(0) = 0 (Eq. 19-21 to the letter): after the first clip |f| = mu N exactly and neither branch is
   active; the force freezes for ever. Work ratio 0, force error 2 mu N.
-- ``differential`` with falling N, H(0) = 0 or 1: cannot stick again while N decreases. g = sin 2x, N = 1 + 0.6 sin x:
-  work ratio 0.519 to 0.495 for 1e3 to 1e5 steps a period, force error 2.48 mu N; g = sin 4x 0.548 to 0.498.
+- ``differential`` with falling N, H(0) = 0 or 1: cannot stick again while N decreases. g = sin 2x,
+  N = 1 + 0.6 sin x: work ratio 0.519 to 0.495 for 1e3 to 1e5 steps a period, force error 2.48 mu N;
+  g = sin 4x 0.548 to 0.498.
 - ``differential`` with N < 0: f flips its sign at every step with amplitude mu |N| (0.25 for N = 0.5 + sin x).
-- ``per_axis`` (Eq. 29, kindly read): a square instead of Coulomb's circle. Work ratios 0.498, 0.449, 0.856 on ellipses
-  1:1, 1:0.5, 1:0.1; force errors 1.34, 1.38, 0.60 mu N.
-- ``per_axis_printed`` (Eq. 28-29): freezes, or runs into the root of a negative number. Work ratio 0 or nan.
-- ``corrected_rate``: the right rate, Runge-Kutta without events: first order (9.2e-2 of the work at 200 steps a period,
-  6e-3 at 3200), where ``corrected``, the return map, has 9e-4 and 4e-6.
+- ``per_axis`` (Eq. 29, kindly read): a square instead of Coulomb's circle. Work ratios 0.498,
+  0.449, 0.856 on ellipses 1:1, 1:0.5, 1:0.1; force errors 1.34, 1.38, 0.60 mu N.
+- ``per_axis_printed`` (Eq. 28-29): freezes, or runs into the root of a negative number. Work ratio
+0 or nan.
+- ``corrected_rate``: the right rate, Runge-Kutta without events: first order (9.2e-2 of the work at
+  200 steps a period, 6e-3 at 3200), where ``corrected``, the return map, has 9e-4 and 4e-6.
 """
 
 from __future__ import annotations
@@ -23,19 +27,23 @@ from collections.abc import Callable
 
 import numpy as np
 
-from .march import step_1d
+from .time_step import step_1d
 
 Motion = Callable[[float], tuple[float, float]]
 
 __all__ = ["corrected", "corrected_rate", "differential", "per_axis", "per_axis_printed"]
 
 
-def differential(g: np.ndarray, N: np.ndarray, kt: float, mu: float, heaviside_at_zero: int = 0) -> np.ndarray:
-    """Force (samples,) [N] by Eq. 21 as printed, explicit steps from f = 0; g (samples,) [m], N [N].
+def differential(
+    g: np.ndarray, N: np.ndarray, kt: float, mu: float, heaviside_at_zero: int = 0
+) -> np.ndarray:
+    """Force (samples,) [N] by Eq. 21 as printed, explicit steps from f = 0; g (samples,) [m], N
+    [N].
 
     The second branch, with its factor 1/dt, takes the excess off within one step.
     """
-    f, forces = 0.0, [0.0]
+    f = 0.0
+    forces = [0.0]
     for dg, load in zip(np.diff(g).tolist(), N[:-1].tolist(), strict=True):
         room = mu * load - abs(f)
         sticks = room > 0 or (room == 0 and heaviside_at_zero == 1)
@@ -53,12 +61,16 @@ def corrected(g: np.ndarray, N: np.ndarray, kt: float, mu: float, f0: float = 0.
     return np.array(forces)
 
 
-def corrected_rate(motion: Motion, load: Motion, kt: float, mu: float, times: np.ndarray) -> np.ndarray:
-    """Force (samples,) [N] of the corrected rate form by classical Runge-Kutta without events, from f = 0: first order.
+def corrected_rate(
+    motion: Motion, load: Motion, kt: float, mu: float, times: np.ndarray
+) -> np.ndarray:
+    """Force (samples,) [N] of the corrected rate form by classical Runge-Kutta without events, from
+    f = 0: first order.
 
     df/dt = kt dg/dt, but s mu dN/dt where |f| >= mu N with sign s and s kt dg/dt > mu dN/dt; f = 0 where N <= 0.
     motion and load give value and rate at a time.
     """
+
     def rate(t: float, f: float) -> float:
         (_, dg), (N, dN) = motion(t), load(t)
         s = np.sign(f)
@@ -67,7 +79,9 @@ def corrected_rate(motion: Motion, load: Motion, kt: float, mu: float, times: np
 
     f = np.zeros(times.size)
     for i in range(1, times.size):
-        t, h, old = times[i - 1], times[i] - times[i - 1], f[i - 1]
+        t = times[i - 1]
+        h = times[i] - times[i - 1]
+        old = f[i - 1]
         k1 = rate(t, old)
         k2 = rate(t + h / 2, old + h / 2 * k1)
         k3 = rate(t + h / 2, old + h / 2 * k2)
@@ -77,7 +91,9 @@ def corrected_rate(motion: Motion, load: Motion, kt: float, mu: float, times: np
 
 
 def per_axis(g: np.ndarray, N: np.ndarray, kt: float, mu: float) -> np.ndarray:
-    """Force (samples, 2) [N] with the limits of Eq. 29, kindly read: clip on both sides, no negative roots."""
+    """Force (samples, 2) [N] with the limits of Eq. 29, kindly read: clip on both sides, no
+    negative roots.
+    """
     f = np.zeros((g.shape[0], 2))
     for i in range(1, g.shape[0]):
         trial = f[i - 1] + kt * (g[i] - g[i - 1])
@@ -87,7 +103,9 @@ def per_axis(g: np.ndarray, N: np.ndarray, kt: float, mu: float) -> np.ndarray:
 
 
 def per_axis_printed(g: np.ndarray, N: np.ndarray, kt: float, mu: float) -> np.ndarray:
-    """Force (samples, 2) [N] of Eq. 28-29 as printed: H(f - f_max) without the modulus, negative roots nan."""
+    """Force (samples, 2) [N] of Eq. 28-29 as printed: H(f - f_max) without the modulus, negative
+    roots nan.
+    """
     f = np.zeros((g.shape[0], 2))
     for i in range(1, g.shape[0]):
         old = f[i - 1]

@@ -1,6 +1,7 @@
 """First upward crossing of zero by a trigonometric polynomial within a bracket: safeguarded Newton.
 
-No root is lost where a bracket holds at most one maximum, which is found from its slope, or one and a minimum.
+No root is lost where a bracket holds at most one maximum, which is found from its slope, or one and
+a minimum.
 """
 
 from __future__ import annotations
@@ -11,18 +12,24 @@ from numba import njit
 
 __all__ = ["rise", "value"]
 
-NEVER = 1e300       # time of an event that does not happen
+# time of an event that does not happen
+NEVER = 1e300
 
 
 @njit(cache=True, error_model="numpy")
 def value(c, tau):
     """(value, slope, curvature) at tau of the motion with coefficients c (K,)."""
-    q, d, e = c[0], 0.0, 0.0
-    c1, s1 = cos(tau), sin(tau)
-    ch, sh = 1.0, 0.0
+    q = c[0]
+    d = 0.0
+    e = 0.0
+    c1 = cos(tau)
+    s1 = sin(tau)
+    ch = 1.0
+    sh = 0.0
     for h in range(1, (c.size + 1) // 2):
         ch, sh = ch * c1 - sh * s1, sh * c1 + ch * s1
-        a, b = c[2 * h - 1], c[2 * h]
+        a = c[2 * h - 1]
+        b = c[2 * h]
         now = a * ch + b * sh
         q += now
         d += h * (b * ch - a * sh)
@@ -32,8 +39,11 @@ def value(c, tau):
 
 @njit(cache=True, error_model="numpy")
 def _root(c, level, a, b, order):
-    """Zero in [a, b] of c - level (order 0), negative at a and positive at b, or of its slope falling through zero."""
-    x, sign = 0.5 * (a + b), 1.0 if order == 0 else -1.0
+    """Zero in [a, b] of c - level (order 0), negative at a and positive at b, or of its slope
+    falling through zero.
+    """
+    x = 0.5 * (a + b)
+    sign = 1.0 if order == 0 else -1.0
     for _ in range(80):
         q, d, e = value(c, x)
         f, slope = (q - level, d) if order == 0 else (sign * d, sign * e)
@@ -65,7 +75,8 @@ def _inflection(c, a, b, bend):
 
 @njit(cache=True, error_model="numpy")
 def rise(c, level, a, b, small):
-    """Time in [a, b] at which the motion with coefficients c first exceeds ``level``, NEVER if it does not.
+    """Time in [a, b] at which the motion with coefficients c first exceeds ``level``, NEVER if it
+    does not.
 
     ``small`` is the rounding error of values: a touch that is no higher does not count.
     """
@@ -75,13 +86,17 @@ def rise(c, level, a, b, small):
         return a
     if qb - level > small:
         return _root(c, level, a, b, 0)
-    low, high = a, b
-    if da * ea < 0.0 and db * eb > 0.0 and ea * eb < 0.0:       # the slope may change its sign twice
+    low = a
+    high = b
+    # the slope may change its sign twice
+    if da * ea < 0.0 and db * eb > 0.0 and ea * eb < 0.0:
         middle = _inflection(c, a, b, ea)
         if da < 0.0:
-            low, da = middle, value(c, middle)[1]
+            low = middle
+            da = value(c, middle)[1]
         else:
-            high, db = middle, value(c, middle)[1]
+            high = middle
+            db = value(c, middle)[1]
     if da > 0.0 and db < 0.0:
         peak = _root(c, level, low, high, 1)
         if value(c, peak)[0] - level > small:

@@ -1,1 +1,3 @@
-"""Multi-harmonic balance of friction-damped bodies: from numbers and frequencies to certain responses."""
+"""Multi-harmonic balance of friction-damped bodies: from numbers and frequencies to certain
+responses.
+"""

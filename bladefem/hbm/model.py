@@ -1,4 +1,6 @@
-"""What the balance knows: linear sides seen from their ports, friction elements between them, forces on them."""
+"""What the balance knows: linear sides seen from their ports, friction elements between them,
+forces on them.
+"""
 
 from __future__ import annotations
 
@@ -11,9 +13,9 @@ import numpy as np
 
 from ..data import Elements, PortModel, RigidBody
 from ..errors import InputError
-from ..friction.harmonics import synthesis, to_real
-from .bodies import Damping, Stack, stacked
-from .check import check_model, port_size
+from ..friction.fourier import synthesis, to_real
+from .linear.bodies import Damping, Stack, stacked
+from .validate_model import check_model, port_size
 
 __all__ = ["Damping", "ReducedModel"]
 
@@ -22,12 +24,13 @@ __all__ = ["Damping", "ReducedModel"]
 class ReducedModel:
     """Blades and damper reduced to the contact, in the pair coordinates of `bladefem.data`.
 
-    Harmonic 0 is counted from the preload state, in which node i carries the normal force max(n0_i, 0) and no
-    tangential force; static offsets of the sides are part of that state, not of this model. From plain matrices:
+    Harmonic 0 is counted from the preload state, in which node i carries the normal force max(n0_i,
+    0) and no tangential force; static offsets of the sides are part of that state, not of this
+    model. From plain matrices:
 
     >>> import numpy as np
     >>> from bladefem.data import Elements
-    >>> from bladefem.hbm.api import solve
+    >>> from bladefem.hbm.solve import solve
     >>> from bladefem.hbm.model import ReducedModel
     >>> from bladefem.reduction.matrices import port_model_from_matrices
     >>> M, K = np.eye(2), np.array([[2.0, -1.0], [-1.0, 1.0]])
@@ -39,28 +42,41 @@ class ReducedModel:
     True
 
     Raises:
-        InputError: contact dofs, elements, loads and bodies do not fit each other, or are no numbers.
+        InputError: contact dofs, elements, loads and bodies do not fit each other, or are no
+            numbers.
     """
 
-    sides: tuple[PortModel, ...]            # blade side of harmonic h = 0, 1, ...; one alone serves all harmonics
+    # blade side of harmonic h = 0, 1, ...; one alone serves all harmonics
+    sides: tuple[PortModel, ...]
     elements: Elements
-    excitation: Mapping[int, np.ndarray]    # harmonic to complex amplitudes on the load port [N]; 0: a static load
+    # harmonic to complex amplitudes on the load port [N]; 0: a static load
+    excitation: Mapping[int, np.ndarray]
     damping: Damping = field(default_factory=Damping)
-    damper: RigidBody | tuple[PortModel, ...] | None = None     # None: the other side of each contact is fixed
+    # None: the other side of each contact is fixed
+    damper: RigidBody | tuple[PortModel, ...] | None = None
     damper_damping: Damping = field(default_factory=Damping)
-    # A damper whose contacts all slip has an indifferent mean position, and drifts where friction pushes it: springs of
-    # this share of the contact stiffness hold the mean. What they carry is reported as Solution.drift.
+    # A damper whose contacts all slip has an indifferent mean position, and drifts where friction
+    # pushes it: springs of this share of the contact stiffness hold the mean. What they carry is
+    # reported as Solution.drift.
     hold: float = 1e-3
-    # Whether the mean displacements take part in the balance. Uncoupled, the contacts vibrate about the preload state,
-    # whose static solution is left as it is; mean forces that friction raises are reported and do not act back.
+    # Whether the mean displacements take part in the balance. Uncoupled, the contacts vibrate about
+    # the preload state, whose static solution is left as it is; mean forces that friction raises
+    # are reported and do not act back.
     coupled: bool = True
-    # Prescribed part of the normal load beside n0 and kn w_n: harmonic >= 1 to complex amplitudes of the nodes [N].
+    # Prescribed part of the normal load beside n0 and kn w_n: harmonic >= 1 to complex amplitudes
+    # of the nodes [N].
     normal: Mapping[int, np.ndarray] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
-        parts = {name: np.asarray(getattr(self.elements, name), dtype=float) for name in ("kt", "kn", "mu", "n0")}
+        parts = {
+            name: np.asarray(getattr(self.elements, name), dtype=float)
+            for name in ("kt", "kn", "mu", "n0")
+        }
         if any(value.ndim != 1 for value in parts.values()):
-            raise InputError("elements: expected kt, kn, mu and n0 as arrays with one number for each contact node")
+            raise InputError(
+                "elements: expected kt, kn, mu and n0 as arrays with one number for each contact "
+                "node"
+            )
         if any(value is not getattr(self.elements, name) for name, value in parts.items()):
             object.__setattr__(self, "elements", replace(self.elements, **parts))
         check_model(self)
@@ -74,8 +90,9 @@ class ReducedModel:
     def damped(self) -> bool:
         """The blades lose work by themselves."""
         own = self.damping
-        return (any(np.any(x) for x in (own.ratio, own.structural, own.mass, own.stiffness))
-                or any(side.damping is not None for side in self.sides))
+        return any(np.any(x) for x in (own.ratio, own.structural, own.mass, own.stiffness)) or any(
+            side.damping is not None for side in self.sides
+        )
 
     @cached_property
     def directions(self) -> int:
@@ -86,13 +103,17 @@ class ReducedModel:
     def rows(self) -> np.ndarray:
         """(nodes directions,) rows of the contact port that enter the balance."""
         rows = np.arange(port_size(self.sides[0], "contact")).reshape(len(self.elements.kt), -1)
-        return rows[:, rows.shape[1] - self.directions:].ravel()
+        return rows[:, rows.shape[1] - self.directions :].ravel()
 
     @cached_property
     def springs(self) -> np.ndarray:
         """(nodes, directions) stiffness of the contact in full stick [N/m]."""
         tangents = np.repeat(self.elements.kt[:, None], self.elements.tangents, axis=1)
-        return tangents if self.directions == self.elements.tangents else np.column_stack([self.elements.kn, tangents])
+        return (
+            tangents
+            if self.directions == self.elements.tangents
+            else np.column_stack([self.elements.kn, tangents])
+        )
 
     @cached_property
     def preload(self) -> np.ndarray:
@@ -106,7 +127,9 @@ class ReducedModel:
     def compression(self) -> float:
         """Size of what the preload presses the contact springs together [m]; above zero."""
         springs = self.springs.ravel()
-        pressed = np.divide(self.preload, springs, out=np.zeros_like(self.preload), where=springs > 0)
+        pressed = np.divide(
+            self.preload, springs, out=np.zeros_like(self.preload), where=springs > 0
+        )
         return float(max(np.linalg.norm(pressed), np.finfo(float).tiny))
 
     @cached_property
@@ -125,7 +148,9 @@ class ReducedModel:
         return to_real(load)
 
     def normal_series(self, samples: int) -> np.ndarray:
-        """(nodes, samples) the same at the samples; (nodes, 0) where it is constant or samples is 0."""
+        """(nodes, samples) the same at the samples; (nodes, 0) where it is constant or samples is
+        0.
+        """
         if not self.normal or not samples:
             return np.zeros((len(self.elements.n0), 0))
         H = max(self.normal)
@@ -141,7 +166,11 @@ class ReducedModel:
 
     def elastic_damper(self, H: int) -> Stack | None:
         """The damper of harmonics 0..H, where it is elastic."""
-        return self._stack("damper", H, self.damper_damping) if isinstance(self.damper, tuple) else None
+        return (
+            self._stack("damper", H, self.damper_damping)
+            if isinstance(self.damper, tuple)
+            else None
+        )
 
     def loads(self, H: int) -> np.ndarray:
         """(H+1, loads) excitation [N]."""
@@ -157,12 +186,18 @@ class ReducedModel:
 
     def _made(self, name: str, bodies: tuple[PortModel, ...], damping: Damping) -> Stack:
         """The stack, which is the beginning of a larger one where that is there already."""
-        larger = (stack for key, stack in self._kept.items() if key[:2] == ("stack", name) and key[2] > len(bodies))
+        larger = (
+            stack
+            for key, stack in self._kept.items()
+            if key[:2] == ("stack", name) and key[2] > len(bodies)
+        )
         found = next(larger, None)
         return stacked(bodies, damping, self.rows) if found is None else found.first(len(bodies))
 
     def once(self, key: Hashable, make: Callable[[], Any]) -> Any:
-        """What `make` returns, kept with this model: what does not depend on the frequency is made once."""
+        """What `make` returns, kept with this model: what does not depend on the frequency is made
+        once.
+        """
         if key not in self._kept:
             self._kept[key] = make()
         return self._kept[key]
@@ -176,6 +211,8 @@ def _first(models: tuple[PortModel, ...], H: int, name: str) -> tuple[PortModel,
     if len(models) == 1:
         return models
     if H >= len(models):
-        raise InputError(f"{name}: {len(models)} models given, expected one for harmonic {H}, or one for all harmonics")
-    return models[:H + 1]
-
+        raise InputError(
+            f"{name}: {len(models)} models given, expected one for harmonic {H}, or one for all "
+            "harmonics"
+        )
+    return models[: H + 1]

@@ -1,8 +1,10 @@
-"""The parameter that makes the highest peak of a band lowest, by following peaks along their exact derivatives.
+"""The parameter that makes the highest peak of a band lowest, by following peaks along their exact
+derivatives.
 
-The height of a peak changes with the parameter as at a fixed frequency, since its slope with the frequency is zero: one
-linear solve gives the derivative. A bracket between falling and rising heights closes in by the minimum of the cubic
-through heights and slopes, or where the tangents meet, which is exact when two peaks exchange their order.
+The height of a peak changes with the parameter as at a fixed frequency, since its slope with the
+frequency is zero: one linear solve gives the derivative. A bracket between falling and rising
+heights closes in by the minimum of the cubic through heights and slopes, or where the tangents
+meet, which is exact when two peaks exchange their order.
 """
 
 from __future__ import annotations
@@ -12,19 +14,24 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..errors import InputError, NotSolvedError
+from .linear_resonances import free_resonances, stuck_resonances
 from .model import ReducedModel
+from .parameters import check_parameter, inner, outer, vary
 from .peak import Peak, cubic_minimum, find_peak, with_slope
-from .resonance import free_resonances, stuck_resonances
 from .sweep import first_look, local_maxima, response, size
-from .vary import check_parameter, inner, outer, vary
 
 __all__ = ["Optimum", "optimum"]
 
-LEVELS = 30             # values of the parameter tried before giving up
-WORTH = 0.7             # share of the highest peak below which the others are not solved again
-FIRST = 0.1             # first step, as a share of the range (of a factor: of its logarithm)
-NEARLY = 0.9            # share of the highest peak from which a point of the coarse look is climbed
-SAME = 0.02             # dip of the height between two peaks, or distance where it is unknown: below it they are one
+# values of the parameter tried before giving up
+LEVELS = 30
+# share of the highest peak below which the others are not solved again
+WORTH = 0.7
+# first step, as a share of the range (of a factor: of its logarithm)
+FIRST = 0.1
+# share of the highest peak from which a point of the coarse look is climbed
+NEARLY = 0.9
+# dip of the height between two peaks, or distance where it is unknown: below it they are one
+SAME = 0.02
 
 
 @dataclass(frozen=True)
@@ -33,8 +40,10 @@ class Optimum:
 
     value: float
     peak: Peak
-    tried: tuple[Peak, ...]     # highest peak at every value on the way
-    points: int                 # solved altogether
+    # highest peak at every value on the way
+    tried: tuple[Peak, ...]
+    # solved altogether
+    points: int
 
 
 @dataclass(frozen=True)
@@ -50,7 +59,9 @@ class _Search:
     tolerance: float
 
     def width(self, low: float, high: float) -> float:
-        """Between two values of the parameter, in its own coordinate: the logarithm of a factor, the gap itself."""
+        """Between two values of the parameter, in its own coordinate: the logarithm of a factor,
+        the gap itself.
+        """
         return inner(self.name, high) - inner(self.name, low)
 
     def moved(self, value: float, by: float) -> float:
@@ -67,16 +78,27 @@ class _Search:
         return self.tolerance * (self.width(*self.bounds) if self.name == "gap" else 1.0)
 
 
-def optimum(model: ReducedModel, band: tuple[float, float], bounds: tuple[float, float], H: int = 3,
-            samples: int = 128, *, name: str = "load", tolerance: float = 1e-3) -> Optimum:
-    """The value of a parameter, between two bounds, that makes the highest peak in a band [rad/s] lowest.
+def optimum(
+    model: ReducedModel,
+    band: tuple[float, float],
+    bounds: tuple[float, float],
+    H: int = 3,
+    samples: int = 128,
+    *,
+    name: str = "load",
+    tolerance: float = 1e-3,
+) -> Optimum:
+    """The value of a parameter, between two bounds, that makes the highest peak in a band [rad/s]
+    lowest.
 
-    Of several minima it is the one downhill from the middle of the bounds; others are found with narrower bounds. Peaks
-    are sought uphill of the resonances of both linear limits, or of the middle of the band; at the end a coarse look
-    over the whole band must find nothing higher, or the search goes on with what it found.
+    Of several minima it is the one downhill from the middle of the bounds; others are found with
+    narrower bounds. Peaks are sought uphill of the resonances of both linear limits, or of the
+    middle of the band; at the end a coarse look over the whole band must find nothing higher, or
+    the search goes on with what it found.
 
     Args:
-        bounds: of a parameter of `bladefem.hbm.vary`: factors above zero, or for "gap" added openings [m].
+        bounds: of a parameter of `bladefem.hbm.parameters`: factors above zero, or for "gap" added
+            openings [m].
         tolerance: of the height, relative.
 
     Raises:
@@ -84,7 +106,10 @@ def optimum(model: ReducedModel, band: tuple[float, float], bounds: tuple[float,
         NotSolvedError: a peak could not be solved, or the band has none.
     """
     check_parameter(name)
-    for what, (low, high), least in (("band", band, 0.0), ("bounds", bounds, -np.inf if name == "gap" else 0.0)):
+    for what, (low, high), least in (
+        ("band", band, 0.0),
+        ("bounds", bounds, -np.inf if name == "gap" else 0.0),
+    ):
         if not least < low < high < np.inf:
             raise InputError(f"{what} ({low}, {high}): expected {least:g} < low < high")
     search = _Search(model, band, H, samples, name, bounds, tolerance)
@@ -101,13 +126,20 @@ def optimum(model: ReducedModel, band: tuple[float, float], bounds: tuple[float,
             return Optimum(best.value, best, tuple(tried), points)
         levels, count = _reconsidered(search, levels, missed)
         points += count
-    raise NotSolvedError(f"optimum of {name} between {bounds}: every look over the band found a higher peak")
+    raise NotSolvedError(
+        f"optimum of {name} between {bounds}: every look over the band found a higher peak"
+    )
 
 
 def _first(search: _Search, value: float) -> tuple[list[Peak], int]:
     """Peaks uphill of the resonances of both limits at the first value, and the points spent."""
-    model, known, points, reason = vary(search.model, search.name, value), [], 0, "the climb leaves it"
-    seeds = np.concatenate([resonances(model) for resonances in (stuck_resonances, free_resonances)])
+    model = vary(search.model, search.name, value)
+    known = []
+    points = 0
+    reason = "the climb leaves it"
+    seeds = np.concatenate(
+        [resonances(model) for resonances in (stuck_resonances, free_resonances)]
+    )
     seeds = seeds[(seeds > search.band[0]) & (seeds < search.band[1])]
     for omega in seeds if seeds.size else [float(np.sqrt(search.band[0] * search.band[1]))]:
         try:
@@ -119,31 +151,42 @@ def _first(search: _Search, value: float) -> tuple[list[Peak], int]:
         if search.inside(peak):
             known = _with(search, with_slope(model, peak, search.name, value), known)
     if not known:
-        raise NotSolvedError(f"no peak in the band {search.band} with {search.name} at {value:.4g}: {reason}")
+        raise NotSolvedError(
+            f"no peak in the band {search.band} with {search.name} at {value:.4g}: {reason}"
+        )
     return known, points
 
 
 def _with(search: _Search, peak: Peak, known: list[Peak]) -> list[Peak]:
     """The known peaks and this one; of those without a dip between them the highest."""
-    same = [other for other in known if other.value == peak.value and _same(peak, other) and _same(other, peak)]
+    same = [
+        other
+        for other in known
+        if other.value == peak.value and _same(peak, other) and _same(other, peak)
+    ]
     if any(other.height >= peak.height for other in same):
         return known
     return [*(other for other in known if not any(other is one for one in same)), peak]
 
 
 def _same(peak: Peak, other: Peak) -> bool:
-    """No dip before the other: the parabola of the peak loses less than SAME of its height on the way."""
+    """No dip before the other: the parabola of the peak loses less than SAME of its height on the
+    way.
+    """
     if peak.bend == 0:
         return abs(peak.omega - other.omega) < SAME * peak.omega
-    return peak.bend * peak.height**2 / 4 * (peak.omega - other.omega)**2 < SAME
+    return peak.bend * peak.height**2 / 4 * (peak.omega - other.omega) ** 2 < SAME
 
 
 def _close_in(search: _Search, levels: dict[float, list[Peak]]) -> int:
-    """Go downhill from the lowest level until the minimum is enclosed to the tolerance, or a bound is reached.
+    """Go downhill from the lowest level until the minimum is enclosed to the tolerance, or a bound
+    is reached.
 
     Adds to the levels; returns the points spent.
     """
-    step, narrow, points = FIRST * search.width(*search.bounds), False, 0
+    step = FIRST * search.width(*search.bounds)
+    narrow = False
+    points = 0
     for _ in range(LEVELS):
         low, high = _bracket(_tops(levels))
         if low is None or high is None:
@@ -159,30 +202,44 @@ def _close_in(search: _Search, levels: dict[float, list[Peak]]) -> int:
             narrow = not narrow
         levels[value], count = _level(search, value, _nearby(levels, value))
         points += count
-    raise NotSolvedError(f"optimum of {search.name} not closed in with {LEVELS} values, last at {value:.4g}")
+    raise NotSolvedError(
+        f"optimum of {search.name} not closed in with {LEVELS} values, last at {value:.4g}"
+    )
 
 
 def _tops(levels: dict[float, list[Peak]]) -> list[Peak]:
     """The highest peak of each level."""
-    return [max((peak for peak in peaks if peak.value == value), key=lambda peak: peak.height)
-            for value, peaks in levels.items()]
+    return [
+        max((peak for peak in peaks if peak.value == value), key=lambda peak: peak.height)
+        for value, peaks in levels.items()
+    ]
 
 
 def _nearby(levels: dict[float, list[Peak]], value: float) -> list[Peak]:
-    """The peaks of the next levels below and above a value, without those of one that stand where the other's do."""
+    """The peaks of the next levels below and above a value, without those of one that stand where
+    the other's do.
+    """
     below, above = (levels.get(near, []) for near in _neighbours(levels, value))
-    return below + [p for p in above if not any(_same(p, other) or _same(other, p) for other in below)]
+    return below + [
+        p for p in above if not any(_same(p, other) or _same(other, p) for other in below)
+    ]
 
 
 def _neighbours(levels: dict[float, list[Peak]], value: float) -> tuple[float | None, float | None]:
     """The next values below and above."""
-    return max((v for v in levels if v < value), default=None), min((v for v in levels if v > value), default=None)
+    return max((v for v in levels if v < value), default=None), min(
+        (v for v in levels if v > value), default=None
+    )
 
 
-def _reconsidered(search: _Search, levels: dict[float, list[Peak]],
-                  missed: Peak) -> tuple[dict[float, list[Peak]], int]:
-    """The level where a peak was missed and its neighbours, with that peak; and the points spent."""
-    kept, points = {missed.value: _with(search, missed, levels[missed.value])}, 0
+def _reconsidered(
+    search: _Search, levels: dict[float, list[Peak]], missed: Peak
+) -> tuple[dict[float, list[Peak]], int]:
+    """The level where a peak was missed and its neighbours, with that peak; and the points
+    spent.
+    """
+    kept = {missed.value: _with(search, missed, levels[missed.value])}
+    points = 0
     for value in _neighbours(levels, missed.value):
         if value is not None:
             found, count = _level(search, value, [missed])
@@ -191,50 +248,75 @@ def _reconsidered(search: _Search, levels: dict[float, list[Peak]],
 
 
 def _bracket(tried: list[Peak]) -> tuple[Peak | None, Peak | None]:
-    """The lowest height tried and its neighbour downhill, which is no lower: a minimum lies between; None at an end."""
+    """The lowest height tried and its neighbour downhill, which is no lower: a minimum lies
+    between; None at an end.
+    """
     best = min(tried, key=lambda peak: peak.height)
     if best.slope < 0:
-        return best, min((p for p in tried if p.value > best.value), key=lambda p: p.value, default=None)
-    return max((p for p in tried if p.value < best.value), key=lambda p: p.value, default=None), best
+        return best, min(
+            (p for p in tried if p.value > best.value), key=lambda p: p.value, default=None
+        )
+    return max(
+        (p for p in tried if p.value < best.value), key=lambda p: p.value, default=None
+    ), best
 
 
 def _between(search: _Search, low: Peak, high: Peak, tangents: bool) -> tuple[float, float]:
-    """The next value inside a bracket, and the most that could still be gained, relative to its lower end.
+    """The next value inside a bracket, and the most that could still be gained, relative to its
+    lower end.
 
-    The cubic sees smooth minima, the tangents corners, where two peaks exchange their order; of two minima in a bracket
-    neither can be trusted, and it is halved.
+    The cubic sees smooth minima, the tangents corners, where two peaks exchange their order; of two
+    minima in a bracket neither can be trusted, and it is halved.
     """
     width = search.width(low.value, high.value)
-    down, up, rise = low.slope * width, high.slope * width, high.height - low.height
+    down = low.slope * width
+    up = high.slope * width
+    rise = high.height - low.height
     if not down < 0 <= up:
         return search.moved(low.value, width / 2), np.inf
-    meet, smooth = (rise - up) / (down - up), cubic_minimum(down, up, rise)
-    floor = low.height + smooth * (down + smooth * (3 * rise - 2 * down - up + smooth * (down + up - 2 * rise)))
+    meet = (rise - up) / (down - up)
+    smooth = cubic_minimum(down, up, rise)
+    floor = low.height + smooth * (
+        down + smooth * (3 * rise - 2 * down - up + smooth * (down + up - 2 * rise))
+    )
     if 0 < meet < 1:
         floor = min(floor, low.height + meet * down)
     share = meet if tangents and 0 < meet < 1 else smooth
-    return (search.moved(low.value, float(np.clip(share, 0.05, 0.95)) * width),
-            float(1 - floor / min(low.height, high.height)))
+    return (
+        search.moved(low.value, float(np.clip(share, 0.05, 0.95)) * width),
+        float(1 - floor / min(low.height, high.height)),
+    )
 
 
 def _level(search: _Search, value: float, known: list[Peak]) -> tuple[list[Peak], int]:
-    """The known peaks at another value: solved where they may be the highest, estimated where they cannot."""
-    model, found, points = vary(search.model, search.name, value), [], 0
+    """The known peaks at another value: solved where they may be the highest, estimated where they
+    cannot.
+    """
+    model = vary(search.model, search.name, value)
+    found = []
+    points = 0
     for old in sorted(known, key=lambda peak: -_estimate(search, peak, value)):
-        if found and _estimate(search, old, value) < WORTH * max(peak.height for peak in found if peak.value == value):
+        if found and _estimate(search, old, value) < WORTH * max(
+            peak.height for peak in found if peak.value == value
+        ):
             found.append(old)
             continue
         if any(peak.value == value and _same(peak, old) for peak in found):
             continue
-        peak = find_peak(model, old.omega, search.H, search.samples, near=old, tolerance=search.tolerance)
+        peak = find_peak(
+            model, old.omega, search.H, search.samples, near=old, tolerance=search.tolerance
+        )
         points += peak.points
         if search.inside(peak):
             found = _with(search, with_slope(model, peak, search.name, value), found)
     if any(peak.value == value for peak in found):
         return found, points
-    met, count = _look(search, value)       # the known peaks left the band, or became one with another
+    # the known peaks left the band, or became one with another
+    met, count = _look(search, value)
     if met is None:
-        raise NotSolvedError(f"the peaks leave the band {search.band} with {search.name} at {value:.4g}")
+        raise NotSolvedError(
+            f"the peaks leave the band {search.band} with {search.name} at {value:.4g}"
+        )
     return [met], points + count
 
 
@@ -243,16 +325,23 @@ def _estimate(search: _Search, peak: Peak, value: float) -> float:
 
 
 def _look(search: _Search, value: float, best: Peak | None = None) -> tuple[Peak | None, int]:
-    """The highest peak that a coarse look over the band meets, if it is higher than the best; points spent."""
-    model, met = vary(search.model, search.name, value), best
+    """The highest peak that a coarse look over the band meets, if it is higher than the best;
+    points spent.
+    """
+    model = vary(search.model, search.name, value)
+    met = best
     found = response(model, first_look(model, search.band), search.H, search.samples)
     points = [point for point in found if point.converged]
     spent = len(points)
     for top in sorted(local_maxima(points), key=lambda point: -size(point))[:2]:
         if met and (size(top) < NEARLY * met.height or abs(top.omega / met.omega - 1) < SAME):
             continue
-        peak = find_peak(model, top.omega, search.H, search.samples, near=top, tolerance=search.tolerance)
+        peak = find_peak(
+            model, top.omega, search.H, search.samples, near=top, tolerance=search.tolerance
+        )
         spent += peak.points
-        if search.inside(peak) and (met is None or peak.height > met.height * (1 + search.tolerance)):
+        if search.inside(peak) and (
+            met is None or peak.height > met.height * (1 + search.tolerance)
+        ):
             met = peak
     return (None if met is best else with_slope(model, met, search.name, value)), spent

@@ -1,7 +1,8 @@
 """The resonance peak itself: found by the slope of the response, followed against a parameter.
 
-The slope with the frequency is exact (`bladefem.hbm.sensitivity`). For one mode 1/size^2 is a parabola in omega, so its
-derivative is a straight line, and the secant finds its zero in a few points.
+The slope with the frequency is exact (`bladefem.hbm.sensitivity`). For one mode 1/size^2 is a
+parabola in omega, so its derivative is a straight line, and the secant finds its zero in a few
+points.
 """
 
 from __future__ import annotations
@@ -12,21 +13,25 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from ..errors import NotSolvedError
-from .api import solve
-from .check import check_probe
 from .model import ReducedModel
-from .newton import DEFAULTS, Options
+from .parameters import vary
 from .sensitivity import sensitivities
 from .solution import Solution
+from .solve import solve
+from .solver.newton import DEFAULTS, Options
 from .sweep import size
-from .vary import vary
+from .validate_model import check_probe
 
 __all__ = ["Peak", "cubic_minimum", "find_peak", "track_peak", "with_slope"]
 
-STEPS = 40              # points spent on one peak before giving up
-FIRST_STEP = 1e-3       # first step, as a share of the frequency
-AHEAD = 1.3             # share of a predicted step that is taken, so that the maximum is soon enclosed
-FARTHEST = 0.05         # longest step, as a share of the frequency
+# points spent on one peak before giving up
+STEPS = 40
+# first step, as a share of the frequency
+FIRST_STEP = 1e-3
+# share of a predicted step that is taken, so that the maximum is soon enclosed
+AHEAD = 1.3
+# longest step, as a share of the frequency
+FARTHEST = 0.05
 
 
 @dataclass(frozen=True)
@@ -34,11 +39,17 @@ class Peak:
     """A local maximum of the response."""
 
     solution: Solution
-    height: float           # root of the sum of squares of the moving harmonics at the probe [m]
-    points: int             # solved on the way
-    value: float = 1.0      # of the parameter that is followed
-    slope: float = 0.0      # of the height with the parameter, at this peak [m per unit of `bladefem.hbm.rates`]
-    bend: float = 0.0       # second derivative of 1/height^2 with the frequency [1/(m^2 (rad/s)^2)]; 0: unknown
+    # root of the sum of squares of the moving harmonics at the probe [m]
+    height: float
+    # solved on the way
+    points: int
+    # of the parameter that is followed
+    value: float = 1.0
+    # of the height with the parameter, at this peak [m per unit of
+    # `bladefem.hbm.parameter_derivatives`]
+    slope: float = 0.0
+    # second derivative of 1/height^2 with the frequency [1/(m^2 (rad/s)^2)]; 0: unknown
+    bend: float = 0.0
 
     @property
     def omega(self) -> float:
@@ -46,8 +57,16 @@ class Peak:
         return self.solution.omega
 
 
-def find_peak(model: ReducedModel, omega: float, H: int = 3, samples: int = 128, *, near: Peak | Solution | None = None,
-              tolerance: float = 1e-4, options: Options = DEFAULTS) -> Peak:
+def find_peak(
+    model: ReducedModel,
+    omega: float,
+    H: int = 3,
+    samples: int = 128,
+    *,
+    near: Peak | Solution | None = None,
+    tolerance: float = 1e-4,
+    options: Options = DEFAULTS,
+) -> Peak:
     """The local maximum uphill of omega [rad/s].
 
     Args:
@@ -67,9 +86,14 @@ def find_peak(model: ReducedModel, omega: float, H: int = 3, samples: int = 128,
         if not start.converged:
             raise NotSolvedError(f"peak search stopped at {start.frequency:.6g} Hz: {start.reason}")
         if size(start, options.probe) == 0:
-            raise NotSolvedError(f"peak search at {start.frequency:.6g} Hz: probe {options.probe} does not move")
-        now = _Look(start, size(start, options.probe),
-                    float(sensitivities(model, start, ["omega"])["omega"].size[options.probe]))
+            raise NotSolvedError(
+                f"peak search at {start.frequency:.6g} Hz: probe {options.probe} does not move"
+            )
+        now = _Look(
+            start,
+            size(start, options.probe),
+            float(sensitivities(model, start, ["omega"])["omega"].size[options.probe]),
+        )
         low, high = (now, high) if now.slope > 0 else (low, now)
         if last is not None:
             bend = (now.line - last.line) / (omega - last.solution.omega)
@@ -77,13 +101,18 @@ def find_peak(model: ReducedModel, omega: float, H: int = 3, samples: int = 128,
             best = max(low, high, key=lambda look: look.height)
             target, gain = _between(low, high, corner=count % 2 == 1)
         else:
-            best, step = now, -now.line / bend if bend > 0 else np.sign(now.slope) * reach
+            best = now
+            step = -now.line / bend if bend > 0 else np.sign(now.slope) * reach
             gain = abs(now.slope * step) / now.height if bend > 0 and count > 1 else np.inf
-            target, reach = omega + float(np.clip(AHEAD * step, -FARTHEST * omega, FARTHEST * omega)), 2 * reach
+            target = omega + float(np.clip(AHEAD * step, -FARTHEST * omega, FARTHEST * omega))
+            reach = 2 * reach
         if gain < tolerance / 4:
             return Peak(best.solution, best.height, count, bend=float(max(bend, 0.0)))
-        last, omega = now, target
-    raise NotSolvedError(f"peak search found no maximum in {STEPS} points, last at {start.frequency:.6g} Hz")
+        last = now
+        omega = target
+    raise NotSolvedError(
+        f"peak search found no maximum in {STEPS} points, last at {start.frequency:.6g} Hz"
+    )
 
 
 @dataclass(frozen=True)
@@ -101,30 +130,48 @@ class _Look:
 
 
 def _between(low: _Look, high: _Look, corner: bool) -> tuple[float, float]:
-    """Where 1/height^2 is lowest between a rising and a falling point, and the relative gain of height there.
+    """Where 1/height^2 is lowest between a rising and a falling point, and the relative gain of
+    height there.
 
-    By the cubic through values and slopes; for a corner, where a contact begins to slip, where the tangents meet.
+    By the cubic through values and slopes; for a corner, where a contact begins to slip, where the
+    tangents meet.
     """
     width = high.solution.omega - low.solution.omega
-    down, up, rise = low.line * width, high.line * width, high.height**-2 - low.height**-2
+    down = low.line * width
+    up = high.line * width
+    rise = high.height**-2 - low.height**-2
     share = (rise - up) / (down - up) if corner else cubic_minimum(down, up, rise)
-    a, b = down + up - 2 * rise, 3 * rise - 2 * down - up
+    a = down + up - 2 * rise
+    b = 3 * rise - 2 * down - up
     bottom = low.height**-2 + share * (down + (0.0 if corner else share * (b + share * a)))
-    gain = max(low.height, high.height)**-2 / bottom - 1 if bottom > 0 else np.inf
+    gain = max(low.height, high.height) ** -2 / bottom - 1 if bottom > 0 else np.inf
     target = low.solution.omega + float(np.clip(share, 0.02, 0.98)) * width
     return target, float(gain) if width > 1e-9 * target else 0.0
 
 
 def cubic_minimum(down: float, up: float, rise: float) -> float:
-    """Place in [0, 1] of the minimum of the cubic with slopes down < 0 <= up at the ends and this rise between them."""
-    a, b = down + up - 2 * rise, 3 * rise - 2 * down - up       # down x + b x^2 + a x^3
+    """Place in [0, 1] of the minimum of the cubic with slopes down < 0 <= up at the ends and this
+    rise between them.
+    """
+    # down x + b x^2 + a x^3
+    a = down + up - 2 * rise
+    b = 3 * rise - 2 * down - up
     root = np.sqrt(max(b**2 - 3 * a * down, 0.0))
     return float(np.clip(-down / (b + root), 0.0, 1.0)) if b + root > 0 else 0.5
 
 
-def track_peak(model: ReducedModel, name: str, values: Iterable[float], omega: float, H: int = 3, samples: int = 128, *,
-               options: Options = DEFAULTS) -> Iterator[Peak]:
-    """Follow one peak while a parameter of `bladefem.hbm.vary` takes the given values: no frequency sweeps.
+def track_peak(
+    model: ReducedModel,
+    name: str,
+    values: Iterable[float],
+    omega: float,
+    H: int = 3,
+    samples: int = 128,
+    *,
+    options: Options = DEFAULTS,
+) -> Iterator[Peak]:
+    """Follow one peak while a parameter of `bladefem.hbm.parameters` takes the given values: no
+    frequency sweeps.
 
     Args:
         omega: where to look for the first peak [rad/s].
@@ -136,9 +183,13 @@ def track_peak(model: ReducedModel, name: str, values: Iterable[float], omega: f
             guess = path[-1].omega
         if len(path) > 1 and path[-1].value != path[-2].value:
             ahead = (value - path[-1].value) / (path[-1].value - path[-2].value)
-            guess += float(np.clip(ahead * (guess - path[-2].omega), -FARTHEST * guess, FARTHEST * guess))
+            guess += float(
+                np.clip(ahead * (guess - path[-2].omega), -FARTHEST * guess, FARTHEST * guess)
+            )
         changed = vary(model, name, value)
-        peak = find_peak(changed, guess, H, samples, near=path[-1] if path else None, options=options)
+        peak = find_peak(
+            changed, guess, H, samples, near=path[-1] if path else None, options=options
+        )
         path = [*path[-1:], with_slope(changed, peak, name, value, options.probe)]
         yield path[-1]
 

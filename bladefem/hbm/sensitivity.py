@@ -1,4 +1,6 @@
-"""Exact derivatives of a solved response with its parameters: one more solve with the Jacobian for each of them."""
+"""Exact derivatives of a solved response with its parameters: one more solve with the Jacobian for
+each of them.
+"""
 
 from __future__ import annotations
 
@@ -8,40 +10,50 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from ..errors import InputError
-from .linear import condense
+from .linear.condensation import condense
 from .model import ReducedModel
-from .rates import BODIES, body_rate, contact_load, contact_rate, rate
-from .residual import Balance, Inverse, State, as_amplitudes, evaluate_balance, linearise
+from .parameter_derivatives import BODIES, body_rate, contact_load, contact_rate, rate
 from .solution import Solution, probe_motion
+from .solver.residual import Balance, Inverse, State, as_amplitudes, evaluate_balance, linearise
 
 __all__ = ["Sensitivity", "sensitivities"]
 
 
 @dataclass(frozen=True)
 class Sensitivity:
-    """Derivatives with one parameter, in the units of `bladefem.hbm.rates`."""
+    """Derivatives with one parameter, in the units of `bladefem.hbm.parameter_derivatives`."""
 
-    w: np.ndarray           # (n, d, K) of the relative displacements
-    probe: np.ndarray       # (H+1, probes) of the complex amplitudes at the probes
-    size: np.ndarray        # (probes,) of the root of the sum of squares of the moving harmonics
+    # (n, d, K) of the relative displacements
+    w: np.ndarray
+    # (H+1, probes) of the complex amplitudes at the probes
+    probe: np.ndarray
+    # (probes,) of the root of the sum of squares of the moving harmonics
+    size: np.ndarray
 
 
-def sensitivities(model: ReducedModel, solution: Solution, names: Iterable[str]) -> dict[str, Sensitivity]:
+def sensitivities(
+    model: ReducedModel, solution: Solution, names: Iterable[str]
+) -> dict[str, Sensitivity]:
     """Derivatives of a converged solution with the named parameters.
 
     Raises:
         InputError: the solution is not converged, or a parameter is unknown or absent in the model.
     """
     if not solution.converged:
-        raise InputError(f"solution at {solution.frequency:.6g} Hz is not converged: expected a solved point")
+        raise InputError(
+            f"solution at {solution.frequency:.6g} Hz is not converged: expected a solved point"
+        )
     balance = Balance(model, condense(model, solution.omega, solution.harmonics), solution.samples)
     state = evaluate_balance(balance, solution.w)
     inverse = linearise(balance, state)
     return {name: _sensitivity(balance, state, inverse, solution, name) for name in names}
 
 
-def _sensitivity(balance: Balance, state: State, inverse: Inverse, solution: Solution, name: str) -> Sensitivity:
-    model, linear = balance.model, balance.linear
+def _sensitivity(
+    balance: Balance, state: State, inverse: Inverse, solution: Solution, name: str
+) -> Sensitivity:
+    model = balance.model
+    linear = balance.linear
     n, d, K = state.w.shape
     dw = -inverse(rate(balance, state, name), 1e-9)
     df = (state.forces.dfdw.reshape(n, d * K, d * K) @ dw.reshape(n, d * K, 1)).reshape(n, d, K)
@@ -59,5 +71,7 @@ def _sensitivity(balance: Balance, state: State, inverse: Inverse, solution: Sol
         rigid = linear.rigid @ (linear.B.T @ (linear.springs * gap.real))
     probe = probe + probe_motion(replace(model, excitation={}), linear.omega, force, rigid)
     size = np.linalg.norm(solution.probe[1:], axis=0)
-    slope = np.sum((solution.probe[1:].conj() * probe[1:]).real, axis=0) / np.maximum(size, np.finfo(float).tiny)
+    slope = np.sum((solution.probe[1:].conj() * probe[1:]).real, axis=0) / np.maximum(
+        size, np.finfo(float).tiny
+    )
     return Sensitivity(dw, probe, slope)

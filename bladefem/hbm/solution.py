@@ -6,8 +6,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..friction.harmonics import to_complex
-from .bodies import Stack, amplitudes, flexibility, lost, motion
+from ..friction.fourier import to_complex
+from .linear.bodies import Stack, amplitudes, flexibility, lost, motion
 from .model import ReducedModel
 
 __all__ = ["Solution", "Work", "at_probes", "blade_motion", "probe_motion", "works", "works_of"]
@@ -15,38 +15,59 @@ __all__ = ["Solution", "Work", "at_probes", "blade_motion", "probe_motion", "wor
 
 @dataclass(frozen=True)
 class Work:
-    """Work in one period [J]; in a solved balance  input = damping + friction  for the harmonics that are kept."""
+    """Work in one period [J]; in a solved balance  input = damping + friction  for the harmonics
+    that are kept.
+    """
 
-    input: float            # of the excitation on the blades
-    damping: float          # lost in the linear bodies
-    friction: float         # of the balanced force harmonics on the relative motion
-    dissipated: float       # in the contacts, from the sampled motion with all its harmonics
+    # of the excitation on the blades
+    input: float
+    # lost in the linear bodies
+    damping: float
+    # of the balanced force harmonics on the relative motion
+    friction: float
+    # in the contacts, from the sampled motion with all its harmonics
+    dissipated: float
 
     @property
     def imbalance(self) -> float:
         """|input - damping - friction| over the input work."""
-        return abs(self.input - self.damping - self.friction) / max(abs(self.input), np.finfo(float).tiny)
+        return abs(self.input - self.damping - self.friction) / max(
+            abs(self.input), np.finfo(float).tiny
+        )
 
 
 @dataclass(frozen=True)
 class Solution:
     """A point of a response: converged, or the best that was found, with the reason."""
 
-    omega: float                    # [rad/s]
-    harmonics: int                  # H
-    samples: int                    # a period
-    w: np.ndarray                   # (n, d, 2H+1) relative displacements: mean, cos 1, sin 1, ... [m]
-    f: np.ndarray                   # (n, d, 2H+1) contact forces, with the preload in the mean of the normal ones [N]
-    probe: np.ndarray               # (H+1, probes) complex amplitudes, Re(q e^{i h omega t}) [m]
+    # [rad/s]
+    omega: float
+    # H
+    harmonics: int
+    # a period
+    samples: int
+    # (n, d, 2H+1) relative displacements: mean, cos 1, sin 1, ... [m]
+    w: np.ndarray
+    # (n, d, 2H+1) contact forces, with the preload in the mean of the normal ones [N]
+    f: np.ndarray
+    # (H+1, probes) complex amplitudes, Re(q e^{i h omega t}) [m]
+    probe: np.ndarray
     converged: bool
     reason: str
-    method: str                     # "newton" or the fallback that reached the point
-    iterations: int                 # Newton steps, of all attempts
-    residual: float                 # over the size of the motion [1]
-    residual_displacement: float    # largest entry of the residual [m]
-    residual_force: float           # the same times the contact stiffness [N]
-    drift: float                    # mean load on the springs that hold the damper, over the contacts' load [1]
-    states: dict[str, int]          # number of nodes that stick, slip, lift off, are open
+    # "newton" or the fallback that reached the point
+    method: str
+    # Newton steps, of all attempts
+    iterations: int
+    # over the size of the motion [1]
+    residual: float
+    # largest entry of the residual [m]
+    residual_displacement: float
+    # the same times the contact stiffness [N]
+    residual_force: float
+    # mean load on the springs that hold the damper, over the contacts' load [1]
+    drift: float
+    # number of nodes that stick, slip, lift off, are open
+    states: dict[str, int]
     work: Work
 
     @property
@@ -60,8 +81,12 @@ class Solution:
         return self.omega / (2 * np.pi)
 
 
-def probe_motion(model: ReducedModel, omega: float, force: np.ndarray, rigid: np.ndarray) -> np.ndarray:
-    """(H+1, probes) amplitudes at the probes by the excitation and contact forces (H+1, m) beyond the preload."""
+def probe_motion(
+    model: ReducedModel, omega: float, force: np.ndarray, rigid: np.ndarray
+) -> np.ndarray:
+    """(H+1, probes) amplitudes at the probes by the excitation and contact forces (H+1, m) beyond
+    the preload.
+    """
     return at_probes(blade_motion(model, omega, force), rigid)
 
 
@@ -69,12 +94,16 @@ def at_probes(blade: tuple[Stack, np.ndarray, np.ndarray], rigid: np.ndarray) ->
     """(H+1, probes) from the blades' motion, with the mean rigid motion added."""
     blades, ports, modal = blade
     modal = modal.copy()
-    modal[0, blades.omega[0] == 0] += rigid[:np.count_nonzero(blades.omega[0] == 0)]
+    modal[0, blades.omega[0] == 0] += rigid[: np.count_nonzero(blades.omega[0] == 0)]
     return motion(blades, modal, ports, blades.probe)
 
 
-def blade_motion(model: ReducedModel, omega: float, force: np.ndarray) -> tuple[Stack, np.ndarray, np.ndarray]:
-    """Blades under the excitation and contact forces (H+1, m): stack, forces at all ports (H+1, P), modes (H+1, m)."""
+def blade_motion(
+    model: ReducedModel, omega: float, force: np.ndarray
+) -> tuple[Stack, np.ndarray, np.ndarray]:
+    """Blades under the excitation and contact forces (H+1, m): stack, forces at all ports (H+1, P),
+    modes (H+1, m).
+    """
     H = len(force) - 1
     blades = model.blades(H)
     ports = np.zeros((H + 1, blades.shapes.shape[1]), dtype=complex)
@@ -82,15 +111,29 @@ def blade_motion(model: ReducedModel, omega: float, force: np.ndarray) -> tuple[
     return blades, ports, amplitudes(blades, flexibility(blades, omega * np.arange(H + 1)), ports)
 
 
-def works(model: ReducedModel, omega: float, w: np.ndarray, f: np.ndarray, dissipated: float) -> Work:
+def works(
+    model: ReducedModel, omega: float, w: np.ndarray, f: np.ndarray, dissipated: float
+) -> Work:
     """Work of each kind in a period, for displacements and forces (n, d, K)."""
     force = to_complex(f.reshape(-1, f.shape[2])).T
-    return works_of(model, omega, to_complex(w.reshape(-1, w.shape[2])).T, force, blade_motion(model, omega, force),
-                    dissipated)
+    return works_of(
+        model,
+        omega,
+        to_complex(w.reshape(-1, w.shape[2])).T,
+        force,
+        blade_motion(model, omega, force),
+        dissipated,
+    )
 
 
-def works_of(model: ReducedModel, omega: float, relative: np.ndarray, force: np.ndarray,
-             blade: tuple[Stack, np.ndarray, np.ndarray], dissipated: float) -> Work:
+def works_of(
+    model: ReducedModel,
+    omega: float,
+    relative: np.ndarray,
+    force: np.ndarray,
+    blade: tuple[Stack, np.ndarray, np.ndarray],
+    dissipated: float,
+) -> Work:
     """The same from complex amplitudes (H+1, m), and from the blades' motion under them."""
     orders, (blades, ports, modal) = np.arange(len(force)), blade
     lost_work = orders @ lost(blades, omega * orders, modal)
@@ -101,8 +144,12 @@ def works_of(model: ReducedModel, omega: float, relative: np.ndarray, force: np.
         moved = amplitudes(damper, flexibility(damper, omega * orders), at_ports)
         lost_work += orders @ lost(damper, omega * orders, moved)
     loaded = motion(blades, modal, ports, blades.load)
-    return Work(_work(orders, ports[:, blades.load], loaded), float(lost_work), _work(orders, force, relative),
-                dissipated)
+    return Work(
+        _work(orders, ports[:, blades.load], loaded),
+        float(lost_work),
+        _work(orders, force, relative),
+        dissipated,
+    )
 
 
 def _work(orders: np.ndarray, force: np.ndarray, moved: np.ndarray) -> float:

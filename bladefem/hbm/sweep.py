@@ -1,4 +1,6 @@
-"""Frequency responses: a given list of frequencies, or a band with the points put where the curve needs them."""
+"""Frequency responses: a given list of frequencies, or a band with the points put where the curve
+needs them.
+"""
 
 from __future__ import annotations
 
@@ -10,61 +12,94 @@ from itertools import chain, islice
 import numpy as np
 
 from ..errors import InputError, NotSolvedError
-from .ahead import AHEAD, ahead
-from .api import solve, sticking
-from .check import check_point, check_probe
-from .fallback import match_harmonics
+from .linear_resonances import free_resonances, stuck_resonances
 from .model import ReducedModel
-from .newton import DEFAULTS, Options
-from .resonance import free_resonances, stuck_resonances
+from .predictor import AHEAD, ahead
 from .sensitivity import sensitivities
-from .small import solve_along
 from .solution import Solution
+from .solve import solve, sticking
+from .solver.fallback import match_harmonics
+from .solver.newton import DEFAULTS, Options
+from .solver.point_compiled import solve_along
+from .validate_model import check_point, check_probe
 
 __all__ = ["first_look", "local_maxima", "response", "size", "solve_from", "sweep"]
 
 Keep = Callable[[float, Callable[[], Solution]], Solution]
-Slope = Callable[[float], float]     # of the height with the frequency, at a solved one
-BESIDE = 1e-7   # of a frequency: how far beside a resonance without damping a sweep solves, where it hits it exactly
-SHY = 1e-5      # the same for the first look at a model without damping, whose flexibility stuck is all rounding there
-COARSE = 12     # intervals of the first look at a band
-BLOCK = 16      # points that are solved at once
-BAND_LIMIT = 400    # points after which a sweep gives up refining
+# of the height with the frequency, at a solved one
+Slope = Callable[[float], float]
+# of a frequency: how far beside a resonance without damping a sweep solves, where it hits it
+# exactly
+BESIDE = 1e-7
+# the same for the first look at a model without damping, whose flexibility stuck is all rounding
+# there
+SHY = 1e-5
+# intervals of the first look at a band
+COARSE = 12
+# points that are solved at once
+BLOCK = 16
+# points after which a sweep gives up refining
+BAND_LIMIT = 400
 
 
 def size(solution: Solution, probe: int = 0) -> float:
-    """Root of the sum of squares of the moving harmonics' amplitudes at a probe: what a peak is measured by [m]."""
+    """Root of the sum of squares of the moving harmonics' amplitudes at a probe: what a peak is
+    measured by [m].
+    """
     moving = solution.probe[1:, probe]
     return float(np.sqrt(np.vdot(moving, moving).real))
 
 
-def response(model: ReducedModel, omegas: Iterable[float], H: int = 3, samples: int = 128, *,
-             options: Options = DEFAULTS, keep: Keep = lambda omega, compute: compute()) -> Iterator[Solution]:
+def response(
+    model: ReducedModel,
+    omegas: Iterable[float],
+    H: int = 3,
+    samples: int = 128,
+    *,
+    options: Options = DEFAULTS,
+    keep: Keep = lambda omega, compute: compute(),
+) -> Iterator[Solution]:
     """Solve one point after the other, each started from the curve through the last ones.
 
-    Where a resonance without damping is hit exactly, the point 1e-7 beside it is solved, as its `omega` says.
+    Where a resonance without damping is hit exactly, the point 1e-7 beside it is solved, as its
+    `omega` says.
 
     Args:
-        keep: is given each frequency and what solves it; see `bladefem.hbm.record`.
+        keep: is given each frequency and what solves it; see `bladefem.hbm.checkpoint`.
     """
-    omegas, last, ready = list(omegas), [], {}
+    omegas = list(omegas)
+    last = []
+    ready = {}
 
     def compute(i: int) -> Solution:
         if i not in ready:
             ready.clear()
-            ready.update(enumerate(_at_once(model, omegas[i:i + BLOCK], H, samples, last, options), i))
-        return ready[i] if i in ready else _solve(model, omegas[i], H, samples, _ahead(last, omegas[i], H), options)
+            ready.update(
+                enumerate(_at_once(model, omegas[i : i + BLOCK], H, samples, last, options), i)
+            )
+        return (
+            ready[i]
+            if i in ready
+            else _solve(model, omegas[i], H, samples, _ahead(last, omegas[i], H), options)
+        )
 
     for i, omega in enumerate(omegas):
         solution = keep(omega, partial(compute, i))
         yield solution
         if solution.converged:
-            last = [*last[1 - AHEAD:], solution]
+            last = [*last[1 - AHEAD :], solution]
 
 
-def _at_once(model: ReducedModel, omegas: Sequence[float], H: int, samples: int, last: list[Solution],
-             options: Options) -> list[Solution]:
-    """The first of some frequencies that one call solves: those where all contacts stick, or points of a small model.
+def _at_once(
+    model: ReducedModel,
+    omegas: Sequence[float],
+    H: int,
+    samples: int,
+    last: list[Solution],
+    options: Options,
+) -> list[Solution]:
+    """The first of some frequencies that one call solves: those where all contacts stick, or points
+    of a small model.
 
     Both end where the other way is better, or where Newton needs more than a good start.
     """
@@ -75,17 +110,28 @@ def _at_once(model: ReducedModel, omegas: Sequence[float], H: int, samples: int,
     return found or solve_along(model, np.array(omegas), H, samples, last, options)
 
 
-def sweep(model: ReducedModel, band: tuple[float, float], H: int = 3, samples: int = 128, *, peak: float = 1e-3,
-          curve: float = 0.02, options: Options = DEFAULTS) -> Iterator[Solution]:
-    """Solve a band of circular frequencies [rad/s]; points come in the order of need, to be sorted by `omega`.
+def sweep(
+    model: ReducedModel,
+    band: tuple[float, float],
+    H: int = 3,
+    samples: int = 128,
+    *,
+    peak: float = 1e-3,
+    curve: float = 0.02,
+    options: Options = DEFAULTS,
+) -> Iterator[Solution]:
+    """Solve a band of circular frequencies [rad/s]; points come in the order of need, to be sorted
+    by `omega`.
 
-    A first look takes even steps and the resonances of both linear limits. Then every local maximum is closed in: the
-    slope of its highest point is exact, and 1/amplitude^2 a parabola in omega^2, as it is for one mode, that has this
-    slope and meets a neighbour; its vertex is solved next, until it is no higher than the tolerance allows.
+    A first look takes even steps and the resonances of both linear limits. Then every local maximum
+    is closed in: the slope of its highest point is exact, and 1/amplitude^2 a parabola in omega^2,
+    as it is for one mode, that has this slope and meets a neighbour; its vertex is solved next,
+    until it is no higher than the tolerance allows.
 
     Args:
         peak: relative accuracy of each maximum.
-        curve: how far, as a share of the highest maximum, a point may lie off the line through its neighbours.
+        curve: how far, as a share of the highest maximum, a point may lie off the line through its
+            neighbours.
 
     Raises:
         InputError: the band is empty or not positive.
@@ -106,27 +152,47 @@ def sweep(model: ReducedModel, band: tuple[float, float], H: int = 3, samples: i
         wanted = _wanted(solved, slope, (peak, curve), options.probe)
         if wanted is None:
             return
-        near = sorted((s for s in solved.values() if s.converged), key=lambda s: abs(s.omega - wanted))
+        near = sorted(
+            (s for s in solved.values() if s.converged), key=lambda s: abs(s.omega - wanted)
+        )
         beyond = (s for s in near if (s.omega > wanted) != (near[0].omega > wanted))
         solution = solve_from(model, wanted, H, samples, [*near[:1], *islice(beyond, 1)], options)
         solved[wanted] = solution
         yield solution
 
 
-def solve_from(model: ReducedModel, omega: float, H: int, samples: int, starts: Sequence[Solution],
-               options: Options = DEFAULTS) -> Solution:
-    """The point from the first of several neighbours that leads to it, before fallbacks, which take far longer.
+def solve_from(
+    model: ReducedModel,
+    omega: float,
+    H: int,
+    samples: int,
+    starts: Sequence[Solution],
+    options: Options = DEFAULTS,
+) -> Solution:
+    """The point from the first of several neighbours that leads to it, before fallbacks, which take
+    far longer.
 
     Beside a fold of the curve only the neighbour on its other side does.
     """
     simply = replace(options, fallbacks=False)
-    tries = (_solve(model, omega, H, samples, start, simply) for start in starts) if len(starts) > 1 else ()
-    return (next((point for point in tries if point.converged), None)
-            or _solve(model, omega, H, samples, starts[0] if starts else None, options))
+    tries = (
+        (_solve(model, omega, H, samples, start, simply) for start in starts)
+        if len(starts) > 1
+        else ()
+    )
+    return next((point for point in tries if point.converged), None) or _solve(
+        model, omega, H, samples, starts[0] if starts else None, options
+    )
 
 
-def _solve(model: ReducedModel, omega: float, H: int, samples: int, start: Solution | None,
-           options: Options) -> Solution:
+def _solve(
+    model: ReducedModel,
+    omega: float,
+    H: int,
+    samples: int,
+    start: Solution | None,
+    options: Options,
+) -> Solution:
     """The point, or the one a hair beside it."""
     try:
         return solve(model, omega, H, samples, start=start, options=options)
@@ -137,13 +203,25 @@ def _solve(model: ReducedModel, omega: float, H: int, samples: int, start: Solut
 def local_maxima(points: list[Solution], probe: int = 0) -> list[Solution]:
     """Those of the points, sorted by frequency, that stand above both neighbours."""
     heights = [size(point, probe) for point in points]
-    return [points[i] for i in range(1, len(points) - 1) if heights[i] >= max(heights[i - 1], heights[i + 1])]
+    return [
+        points[i]
+        for i in range(1, len(points) - 1)
+        if heights[i] >= max(heights[i - 1], heights[i + 1])
+    ]
 
 
 def first_look(model: ReducedModel, band: tuple[float, float]) -> np.ndarray:
-    """Circular frequencies of a coarse look at a band: even steps and the resonances of both linear limits [rad/s]."""
-    seeds = np.concatenate([resonances(model, h) for resonances in (free_resonances, stuck_resonances)
-                            for h in model.excitation if h > 0])
+    """Circular frequencies of a coarse look at a band: even steps and the resonances of both linear
+    limits [rad/s].
+    """
+    seeds = np.concatenate(
+        [
+            resonances(model, h)
+            for resonances in (free_resonances, stuck_resonances)
+            for h in model.excitation
+            if h > 0
+        ]
+    )
     inside = seeds[(seeds > band[0]) & (seeds < band[1])]
     if not model.damped:
         inside = inside * (1 + SHY)
@@ -152,61 +230,89 @@ def first_look(model: ReducedModel, band: tuple[float, float]) -> np.ndarray:
     return np.unique(np.concatenate([grid[[0, -1]], keep, inside]))
 
 
-def _wanted(solved: dict[float, Solution], slope: Slope, accuracy: tuple[float, float], probe: int) -> float | None:
-    """The next frequency to solve: a maximum that is not closed in yet, else the worst corner; None when done."""
-    tried, curve = np.array(sorted(solved)), accuracy[1]
+def _wanted(
+    solved: dict[float, Solution], slope: Slope, accuracy: tuple[float, float], probe: int
+) -> float | None:
+    """The next frequency to solve: a maximum that is not closed in yet, else the worst corner; None
+    when done.
+    """
+    tried = np.array(sorted(solved))
+    curve = accuracy[1]
     omegas = np.array([w for w in tried if solved[w].converged])
     if len(omegas) < 3:
         return None
     finest = 1e-7 * (tried[-1] - tried[0])
     heights = np.array([size(solved[w], probe) for w in omegas])
-    for target in chain(_peak_targets(omegas, heights, slope, accuracy), _corner_targets(omegas, heights, curve)):
+    for target in chain(
+        _peak_targets(omegas, heights, slope, accuracy), _corner_targets(omegas, heights, curve)
+    ):
         if abs(tried - target).min() > finest:
             return float(target)
     return None
 
 
-def _peak_targets(omegas: np.ndarray, heights: np.ndarray, slope: Slope,
-                  accuracy: tuple[float, float]) -> Iterator[float]:
+def _peak_targets(
+    omegas: np.ndarray, heights: np.ndarray, slope: Slope, accuracy: tuple[float, float]
+) -> Iterator[float]:
     peak, curve = accuracy
     for i in range(1, len(omegas) - 1):
         if heights[i] >= max(heights[i - 1], heights[i + 1]) and heights[i] > curve * heights.max():
-            target = _next_to_peak(omegas[i - 1:i + 2], heights[i - 1:i + 2], slope(float(omegas[i])), peak)
+            target = _next_to_peak(
+                omegas[i - 1 : i + 2], heights[i - 1 : i + 2], slope(float(omegas[i])), peak
+            )
             if target is not None:
                 yield target
 
 
-def _next_to_peak(omegas: np.ndarray, heights: np.ndarray, slope: float, tolerance: float) -> float | None:
-    """Where to look next for the maximum enclosed by three points, the middle one with its slope; None when known."""
-    (left, _, right), (up, _, down) = abs(omegas**2 - omegas[1]**2), (heights[1] / heights)**2 - 1
-    exact = -slope / heights[1] / omegas[1]         # of 1/height^2 over that of the middle, with omega^2
+def _next_to_peak(
+    omegas: np.ndarray, heights: np.ndarray, slope: float, tolerance: float
+) -> float | None:
+    """Where to look next for the maximum enclosed by three points, the middle one with its slope;
+    None when known.
+    """
+    (left, _, right), (up, _, down) = (
+        abs(omegas**2 - omegas[1] ** 2),
+        (heights[1] / heights) ** 2 - 1,
+    )
+    # of 1/height^2 over that of the middle, with omega^2
+    exact = -slope / heights[1] / omegas[1]
     through = (down * left**2 - up * right**2) / (left * right * (left + right))
-    for tilt in (exact, through):                   # sampled friction ripples: the three heights are asked as well
+    # sampled friction ripples: the three heights are asked as well
+    for tilt in (exact, through):
         bends = (up + tilt * left) / left**2, (down - tilt * right) / right**2
-        uphill = bends[int(tilt < 0)]               # not negative; the flatter parabola promises the larger gain
+        # not negative; the flatter parabola promises the larger gain
+        uphill = bends[int(tilt < 0)]
         if uphill > 0 and tilt**2 / 4 >= tolerance * min(b for b in bends if b > 0):
-            return float(np.sqrt(omegas[1]**2 - tilt / (2 * uphill)))
+            return float(np.sqrt(omegas[1] ** 2 - tilt / (2 * uphill)))
     return None
 
 
 def _corner_targets(omegas: np.ndarray, heights: np.ndarray, curve: float) -> Iterator[float]:
-    """Middles of the wider neighbours of points that lie off the line through their neighbours, worst first."""
-    line = heights[:-2] + (heights[2:] - heights[:-2]) * (omegas[1:-1] - omegas[:-2]) / (omegas[2:] - omegas[:-2])
+    """Middles of the wider neighbours of points that lie off the line through their neighbours,
+    worst first.
+    """
+    line = heights[:-2] + (heights[2:] - heights[:-2]) * (omegas[1:-1] - omegas[:-2]) / (
+        omegas[2:] - omegas[:-2]
+    )
     off = abs(heights[1:-1] - line) / heights.max()
     for i in np.argsort(-off):
         if off[i] <= curve:
             return
-        left, right = omegas[i + 1] - omegas[i], omegas[i + 2] - omegas[i + 1]
+        left = omegas[i + 1] - omegas[i]
+        right = omegas[i + 2] - omegas[i + 1]
         if max(left, right) > 1e-5 * (omegas[-1] - omegas[0]):
             yield omegas[i + 1] + (right / 2 if right > left else -left / 2)
 
 
 def _ahead(last: list[Solution], omega: float, H: int) -> Solution | None:
-    """A start on the curve through the last solutions; None, which is full stick, where the last one sticks."""
+    """A start on the curve through the last solutions; None, which is full stick, where the last
+    one sticks.
+    """
     if not last or _sticks(last[-1]):
         return None
     known = np.array([match_harmonics(p.w, H) for p in last])
-    w, at = np.empty(known.shape[1:]), np.array([p.omega for p in last])
+    w = np.empty(known.shape[1:])
+    at = np.array([p.omega for p in last])
     ahead(omega, known.reshape(len(last), -1, 2 * H + 1), at, len(last), w.reshape(-1, 2 * H + 1))
     return replace(last[-1], w=w)
 

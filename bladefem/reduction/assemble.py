@@ -1,4 +1,6 @@
-"""From one sector to the pair coordinates of a damper: harmonic h of engine order EO in nodal diameter h EO mod N."""
+"""From one sector to the pair coordinates of a damper: harmonic h of engine order EO in nodal
+diameter h EO mod N.
+"""
 
 from __future__ import annotations
 
@@ -16,13 +18,16 @@ __all__ = ["folded_diameter", "join", "pair_model", "pair_models", "recombine", 
 
 
 def folded_diameter(harmonic: int, engine_order: int, sectors: int) -> tuple[int, bool]:
-    """Nodal diameter 0..N/2 in which a harmonic moves, and whether the conjugate of that diameter's modes is meant."""
+    """Nodal diameter 0..N/2 in which a harmonic moves, and whether the conjugate of that diameter's
+    modes is meant.
+    """
     n = harmonic * engine_order % sectors
     return (sectors - n, True) if 2 * n > sectors else (n, False)
 
 
 def pair_model(body: PortModel, following: slice | np.ndarray, phase: float) -> PortModel:
-    """The body whose contact rows `following` belong to the next blade, which moves e^{j phase} times as this one.
+    """The body whose contact rows `following` belong to the next blade, which moves e^{j phase}
+    times as this one.
 
     Args:
         following: rows of the contact port (counted from its start) on the patch "next".
@@ -30,20 +35,36 @@ def pair_model(body: PortModel, following: slice | np.ndarray, phase: float) -> 
     """
     factor = np.ones(len(body.residual), dtype=complex)
     factor[np.arange(len(factor))[body.ports["contact"]][following]] = np.exp(1j * phase)
-    if abs(factor.imag).max() < 1e-14:      # in phase or in antiphase: stay real, half the work
+    # in phase or in antiphase: stay real, half the work
+    if abs(factor.imag).max() < 1e-14:
         factor = factor.real.round()
     offset = None if body.static_offset is None else (factor * body.static_offset).real
-    return replace(body, shapes=factor[:, None] * body.shapes, static_offset=offset,
-                   residual=factor[:, None] * body.residual * factor.conj())
+    return replace(
+        body,
+        shapes=factor[:, None] * body.shapes,
+        static_offset=offset,
+        residual=factor[:, None] * body.residual * factor.conj(),
+    )
 
 
-def pair_models(body: PortModel, following: slice | np.ndarray, phase: float, harmonics: int) -> tuple[PortModel, ...]:
-    """One model a harmonic 0..`harmonics` for blades clamped at their roots, one for all where they move in step."""
-    return tuple(pair_model(body, following, h * phase) for h in range(harmonics + 1 if phase else 1))
+def pair_models(
+    body: PortModel, following: slice | np.ndarray, phase: float, harmonics: int
+) -> tuple[PortModel, ...]:
+    """One model a harmonic 0..`harmonics` for blades clamped at their roots, one for all where they
+    move in step.
+    """
+    return tuple(
+        pair_model(body, following, h * phase) for h in range(harmonics + 1 if phase else 1)
+    )
 
 
-def wheel_models(sector: Mapping[int, PortModel], following: slice | np.ndarray, engine_order: int, sectors: int,
-                 harmonics: int) -> tuple[PortModel, ...]:
+def wheel_models(
+    sector: Mapping[int, PortModel],
+    following: slice | np.ndarray,
+    engine_order: int,
+    sectors: int,
+    harmonics: int,
+) -> tuple[PortModel, ...]:
     """One model a harmonic 0..`harmonics` for a tuned wheel.
 
     Args:
@@ -56,29 +77,44 @@ def wheel_models(sector: Mapping[int, PortModel], following: slice | np.ndarray,
     for h in range(harmonics + 1):
         n, mirrored = folded_diameter(h, engine_order, sectors)
         if n not in sector:
-            raise InputError(f"harmonic {h} of engine order {engine_order} needs the modes of nodal diameter {n}")
+            raise InputError(
+                f"harmonic {h} of engine order {engine_order} needs the modes of nodal diameter {n}"
+            )
         body = _mirror(sector[n]) if mirrored else sector[n]
         models.append(pair_model(body, following, 2 * pi * h * engine_order / sectors))
     return tuple(models)
 
 
 def join(bodies: tuple[PortModel, ...]) -> PortModel:
-    """Several bodies side by side as one: ports of the same name follow each other in the order of the bodies."""
+    """Several bodies side by side as one: ports of the same name follow each other in the order of
+    the bodies.
+    """
     starts = np.cumsum([0] + [len(body.residual) for body in bodies])
-    order, ports, start = [], {}, 0
+    order = []
+    ports = {}
+    start = 0
     for name in dict.fromkeys(name for body in bodies for name in body.ports):
-        rows = np.concatenate([begin + np.arange(len(body.residual))[body.ports[name]]
-                               for begin, body in zip(starts, bodies, strict=False) if name in body.ports])
+        rows = np.concatenate(
+            [
+                begin + np.arange(len(body.residual))[body.ports[name]]
+                for begin, body in zip(starts, bodies, strict=False)
+                if name in body.ports
+            ]
+        )
         order.append(rows)
         ports[name] = slice(start, start := start + len(rows))
     order = np.concatenate(order)
     damping = None
     if any(body.damping is not None for body in bodies):
         damping = block_diag(*map(_damping_matrix, bodies))
-    return PortModel(np.concatenate([body.omega for body in bodies]),
-                     block_diag(*(body.shapes for body in bodies))[order],
-                     block_diag(*(body.residual for body in bodies))[np.ix_(order, order)],
-                     ports, bodies[0].nodal_diameter, damping=damping)
+    return PortModel(
+        np.concatenate([body.omega for body in bodies]),
+        block_diag(*(body.shapes for body in bodies))[order],
+        block_diag(*(body.residual for body in bodies))[np.ix_(order, order)],
+        ports,
+        bodies[0].nodal_diameter,
+        damping=damping,
+    )
 
 
 def recombine(body: PortModel, selection: np.ndarray) -> PortModel:
@@ -87,14 +123,25 @@ def recombine(body: PortModel, selection: np.ndarray) -> PortModel:
     With two blades joined as one body a row (1, -1) makes their relative displacement a contact.
     """
     rows = np.arange(len(body.residual))
-    ports, start, blocks = {}, 0, []
+    ports = {}
+    start = 0
+    blocks = []
     for name, part in body.ports.items():
-        blocks.append(selection @ np.eye(len(rows))[rows[part]] if name == "contact" else np.eye(len(rows))[rows[part]])
+        blocks.append(
+            selection @ np.eye(len(rows))[rows[part]]
+            if name == "contact"
+            else np.eye(len(rows))[rows[part]]
+        )
         ports[name] = slice(start, start := start + len(blocks[-1]))
     T = np.vstack(blocks)
     offset = None if body.static_offset is None else T @ body.static_offset
-    return replace(body, shapes=T @ body.shapes, residual=T @ body.residual @ T.conj().T, ports=ports,
-                   static_offset=offset)
+    return replace(
+        body,
+        shapes=T @ body.shapes,
+        residual=T @ body.residual @ T.conj().T,
+        ports=ports,
+        static_offset=offset,
+    )
 
 
 def _damping_matrix(body: PortModel) -> np.ndarray:
@@ -105,5 +152,9 @@ def _damping_matrix(body: PortModel) -> np.ndarray:
 
 def _mirror(body: PortModel) -> PortModel:
     """The body in nodal diameter -n: everything conjugate."""
-    return replace(body, shapes=body.shapes.conj(), residual=body.residual.conj(),
-                   damping=None if body.damping is None else body.damping.conj())
+    return replace(
+        body,
+        shapes=body.shapes.conj(),
+        residual=body.residual.conj(),
+        damping=None if body.damping is None else body.damping.conj(),
+    )

@@ -1,4 +1,6 @@
-"""Reduced matrices of other codes: Nastran DMIG entries by a small reader, Ansys by its own library."""
+"""Reduced matrices of other codes: Nastran DMIG entries by a small reader, Ansys by its own
+library.
+"""
 
 from __future__ import annotations
 
@@ -12,8 +14,10 @@ from ..errors import InputError
 
 __all__ = ["read_ansys", "read_dmig"]
 
-SYMMETRIC = 6           # form of a DMIG matrix of which one triangle is given
-COMPLEX = (3, 4)        # types of complex matrices, single and double
+# form of a DMIG matrix of which one triangle is given
+SYMMETRIC = 6
+# types of complex matrices, single and double
+COMPLEX = (3, 4)
 
 
 def read_dmig(path: str | Path) -> dict[str, np.ndarray]:
@@ -22,7 +26,8 @@ def read_dmig(path: str | Path) -> dict[str, np.ndarray]:
     Short, long and comma-separated fields are read; symmetric matrices come back whole.
 
     Returns:
-        name to matrix (n, n), and "dofs" (n, 2): point and component of each row, in ascending order.
+        name to matrix (n, n), and "dofs" (n, 2): point and component of each row, in ascending
+        order.
 
     Raises:
         InputError: no DMIG entry, an entry that cannot be read, or rectangular matrices.
@@ -31,25 +36,33 @@ def read_dmig(path: str | Path) -> dict[str, np.ndarray]:
     entries: list[tuple[str, tuple[int, int], tuple[int, int], complex]] = []
     for number, fields in _entries(Path(path)):
         try:
-            name, point = fields[1].upper(), int(fields[2])
+            name = fields[1].upper()
+            point = int(fields[2])
             if point == 0:
                 forms[name] = int(fields[3]), int(fields[4])
             else:
                 column = point, int(fields[3] or 0)
                 entries += [(name, column, *term) for term in _terms(fields[5:])]
         except (ValueError, IndexError) as error:
-            raise InputError(f"file {path}, line {number}: cannot read the DMIG entry {' '.join(fields)}") from error
+            raise InputError(
+                f"file {path}, line {number}: cannot read the DMIG entry {' '.join(fields)}"
+            ) from error
     if not entries or {name for name, *_ in entries} - set(forms):
         raise InputError(f"file {path}: expected DMIG matrices, each with its header")
     wide = [name for name, (form, _) in forms.items() if form not in (1, SYMMETRIC)]
     if wide:
-        raise InputError(f"file {path}: {', '.join(wide)} is rectangular, expected square matrices (form 1 or 6)")
+        raise InputError(
+            f"file {path}: {', '.join(wide)} is rectangular, expected square matrices (form 1 or 6)"
+        )
     dofs = sorted({dof for _, column, row, _ in entries for dof in (column, row)})
     place = {dof: i for i, dof in enumerate(dofs)}
-    matrices = {name: np.zeros((len(dofs),) * 2, complex if kind in COMPLEX else float)
-                for name, (_, kind) in forms.items()}
+    matrices = {
+        name: np.zeros((len(dofs),) * 2, complex if kind in COMPLEX else float)
+        for name, (_, kind) in forms.items()
+    }
     for name, column, row, value in entries:
-        i, j = place[row], place[column]
+        i = place[row]
+        j = place[column]
         matrices[name][i, j] = value if forms[name][1] in COMPLEX else value.real
         if forms[name][0] == SYMMETRIC:
             matrices[name][j, i] = matrices[name][i, j]
@@ -57,11 +70,12 @@ def read_dmig(path: str | Path) -> dict[str, np.ndarray]:
 
 
 def read_ansys(path: str | Path) -> dict[str, np.ndarray]:
-    """K and M of an Ansys ``.full`` file, dense, and "dofs" (n, 2): node and degree of freedom of each row.
+    """K and M of an Ansys ``.full`` file, dense, and "dofs" (n, 2): node and degree of freedom of
+    each row.
 
-    Constrained freedoms, whose rows are empty, are left out. Ansys' own library reads the file (pip install
-    ansys-mapdl-reader); it has no reader for ``.sub``: write the generation pass as ``.full``, or as DMIG or Matrix
-    Market.
+    Constrained freedoms, whose rows are empty, are left out. Ansys' own library reads the file (pip
+    install ansys-mapdl-reader); it has no reader for ``.sub``: write the generation pass as
+    ``.full``, or as DMIG or Matrix Market.
 
     Raises:
         InputError: the library is not installed.
@@ -69,7 +83,9 @@ def read_ansys(path: str | Path) -> dict[str, np.ndarray]:
     try:
         from ansys.mapdl import reader
     except ImportError as error:
-        raise InputError(f"file {path}: needs the package ansys-mapdl-reader, which is not installed") from error
+        raise InputError(
+            f"file {path}: needs the package ansys-mapdl-reader, which is not installed"
+        ) from error
     dofs, K, M = reader.read_binary(str(path)).load_km(as_sparse=False, sort=True)
     whole = [upper + upper.T - np.diag(np.diag(upper)) for upper in (np.triu(K), np.triu(M))]
     free = np.flatnonzero(np.any(whole[0], axis=0) | np.any(whole[1], axis=0))
@@ -78,18 +94,22 @@ def read_ansys(path: str | Path) -> dict[str, np.ndarray]:
 
 
 def _entries(path: Path) -> Iterator[tuple[int, list[str]]]:
-    """Line number and fields of each DMIG entry with its continuations: [DMIG, name, gj, cj, -, g1, c1, a1, b1, ...].
+    """Line number and fields of each DMIG entry with its continuations: [DMIG, name, gj, cj, -, g1,
+    c1, a1, b1, ...].
 
-    A short line has eight data fields, a long one four and a second half; continuations begin with * + or blanks.
+    A short line has eight data fields, a long one four and a second half; continuations begin with
+    * + or blanks.
     """
-    number, fields = 0, []
+    number = 0
+    fields = []
     for count, line in enumerate(path.read_text().splitlines(), 1):
         line = line.split("$")[0].rstrip()
         first, data = _fields(line)
         if first.upper().rstrip("*") == "DMIG":
             if fields:
                 yield number, fields
-            number, fields = count, ["DMIG", *data]
+            number = count
+            fields = ["DMIG", *data]
         elif fields and line and first[:1] in ("", "*", "+"):
             fields += data
         elif line:
@@ -109,13 +129,13 @@ def _fields(line: str) -> tuple[str, list[str]]:
     first = line[:8].strip()
     width, count = (16, 4) if first.endswith("*") or first.startswith("*") else (8, 8)
     padded = line.ljust(8 + width * count)
-    return first, [padded[8 + i * width:8 + (i + 1) * width].strip() for i in range(count)]
+    return first, [padded[8 + i * width : 8 + (i + 1) * width].strip() for i in range(count)]
 
 
 def _terms(fields: list[str]) -> Iterator[tuple[tuple[int, int], complex]]:
     """Row and value of each term: point, component, real and imaginary part."""
     for start in range(0, len(fields), 4):
-        point, component, real, imaginary = (fields[start:start + 4] + [""] * 4)[:4]
+        point, component, real, imaginary = (fields[start : start + 4] + [""] * 4)[:4]
         if point:
             yield (int(point), int(component or 0)), complex(_number(real), _number(imaginary))
 

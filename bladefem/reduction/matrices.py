@@ -1,4 +1,6 @@
-"""Linear bodies from plain matrices: for users without a finite-element model here, and for tests."""
+"""Linear bodies from plain matrices: for users without a finite-element model here, and for
+tests.
+"""
 
 from __future__ import annotations
 
@@ -14,24 +16,35 @@ from .exchange import read_ansys, read_dmig
 
 __all__ = ["port_model_from_matrices", "read_matrices"]
 
-RIGID = 1e-10      # eigenvalues below this share of the largest one are rigid modes: omega = 0
+# eigenvalues below this share of the largest one are rigid modes: omega = 0
+RIGID = 1e-10
 
 
-def port_model_from_matrices(M: np.ndarray, K: np.ndarray, ports: Mapping[str, np.ndarray], *,
-                             count: int | None = None, C: np.ndarray | None = None,
-                             nodal_diameter: int | None = None) -> PortModel:
-    """The body M, C, K seen from its ports, by normal modes and the residual flexibility of the modes left out.
+def port_model_from_matrices(
+    M: np.ndarray,
+    K: np.ndarray,
+    ports: Mapping[str, np.ndarray],
+    *,
+    count: int | None = None,
+    C: np.ndarray | None = None,
+    nodal_diameter: int | None = None,
+) -> PortModel:
+    """The body M, C, K seen from its ports, by normal modes and the residual flexibility of the
+    modes left out.
 
     Args:
-        M, K: (dofs, dofs) mass [kg] and stiffness [N/m], dense or sparse, real symmetric or Hermitian.
-        ports: name ("contact", "load", "probe") to dof numbers (k,), or to a matrix (k, dofs) of displacement readings.
+        M, K: (dofs, dofs) mass [kg] and stiffness [N/m], dense or sparse, real symmetric or
+            Hermitian.
+        ports: name ("contact", "load", "probe") to dof numbers (k,), or to a matrix (k, dofs) of
+            displacement readings.
         count: modes kept; all when left out.
         C: (dofs, dofs) viscous damping [N s/m]; modes that it couples stay coupled.
 
     Raises:
         InputError: shapes do not fit, a matrix is not Hermitian or M is not positive definite.
     """
-    M, K = _hermitian(M, "M"), _hermitian(K, "K")
+    M = _hermitian(M, "M")
+    K = _hermitian(K, "K")
     if M.shape != K.shape:
         raise InputError(f"M {M.shape} and K {K.shape}: expected the same shape")
     if C is not None:
@@ -42,37 +55,60 @@ def port_model_from_matrices(M: np.ndarray, K: np.ndarray, ports: Mapping[str, n
     try:
         values, vectors = linalg.eigh(K, M)
     except linalg.LinAlgError as error:
-        raise InputError("M is not positive definite: expected a mass matrix without massless dofs") from error
+        raise InputError(
+            "M is not positive definite: expected a mass matrix without massless dofs"
+        ) from error
     if values[0] < -RIGID * values[-1]:
-        raise InputError(f"K has the eigenvalue {values[0]:.3g}: expected a positive semidefinite stiffness")
+        raise InputError(
+            f"K has the eigenvalue {values[0]:.3g}: expected a positive semidefinite stiffness"
+        )
     values[values < RIGID * values[-1]] = 0.0
     count = len(values) if count is None else count
     if not np.count_nonzero(values == 0) <= count <= len(values):
-        raise InputError(f"count {count}: expected at least the rigid modes and at most {len(values)} modes")
+        raise InputError(
+            f"count {count}: expected at least the rigid modes and at most {len(values)} modes"
+        )
     shapes = P @ vectors
     rest = shapes[:, count:] / np.sqrt(values[count:])
     kept = vectors[:, :count]
     damping = None if C is None else _modal_damping(kept.conj().T @ C @ kept)
-    if damping is not None and np.min(lowest := damping if damping.ndim == 1 else np.diag(damping).real) < 0:
-        raise InputError(f"C damps a mode by {np.min(lowest):.3g} 1/s: expected no negative damping")
-    return PortModel(np.sqrt(values[:count]), shapes[:, :count], rest @ rest.conj().T, slices, nodal_diameter,
-                     damping=damping)
+    if (
+        damping is not None
+        and np.min(lowest := damping if damping.ndim == 1 else np.diag(damping).real) < 0
+    ):
+        raise InputError(
+            f"C damps a mode by {np.min(lowest):.3g} 1/s: expected no negative damping"
+        )
+    return PortModel(
+        np.sqrt(values[:count]),
+        shapes[:, :count],
+        rest @ rest.conj().T,
+        slices,
+        nodal_diameter,
+        damping=damping,
+    )
 
 
 def read_matrices(path: str | Path) -> dict[str, np.ndarray]:
     """Named arrays of a reduced model exported by another code.
 
-    Reads NumPy ``.npz``, Matlab ``.mat`` (version 7 and older), one Matrix Market ``.mtx`` file, whose matrix is named
-    after the file, Nastran DMIG (``.bdf``, ``.dat``, ``.pch``, ``.dmig``), and Ansys ``.full`` where its library is
-    installed. Sparse matrices come back dense; the last two add "dofs" (n, 2), point and component of each row.
+    Reads NumPy ``.npz``, Matlab ``.mat`` (version 7 and older), one Matrix Market ``.mtx`` file,
+    whose matrix is named after the file, Nastran DMIG (``.bdf``, ``.dat``, ``.pch``, ``.dmig``),
+    and Ansys ``.full`` where its library is installed. Sparse matrices come back dense; the last
+    two add "dofs" (n, 2), point and component of each row.
 
     Raises:
         InputError: the file is missing, of another kind, or cannot be read.
     """
     path = Path(path)
     suffix = path.suffix.lower()
-    readers = {".npz": _read_npz, ".mat": _read_mat, ".mtx": _read_market, ".full": read_ansys,
-               **dict.fromkeys((".bdf", ".dat", ".pch", ".dmig"), read_dmig)}
+    readers = {
+        ".npz": _read_npz,
+        ".mat": _read_mat,
+        ".mtx": _read_market,
+        ".full": read_ansys,
+        **dict.fromkeys((".bdf", ".dat", ".pch", ".dmig"), read_dmig),
+    }
     if suffix not in readers:
         raise InputError(f"file {path.name}: expected one of {', '.join(readers)}")
     if not path.is_file():
@@ -81,7 +117,8 @@ def read_matrices(path: str | Path) -> dict[str, np.ndarray]:
         return readers[suffix](path)
     except InputError:
         raise
-    except Exception as error:      # of the many kinds that NumPy's and SciPy's readers raise
+    except Exception as error:
+        # of the many kinds that NumPy's and SciPy's readers raise
         raise InputError(f"file {path}: cannot be read as {suffix}, {error}") from error
 
 
@@ -91,7 +128,9 @@ def _read_npz(path: Path) -> dict[str, np.ndarray]:
 
 
 def _read_mat(path: Path) -> dict[str, np.ndarray]:
-    return {name: _dense(value) for name, value in io.loadmat(path).items() if not name.startswith("__")}
+    return {
+        name: _dense(value) for name, value in io.loadmat(path).items() if not name.startswith("__")
+    }
 
 
 def _read_market(path: Path) -> dict[str, np.ndarray]:
@@ -105,31 +144,50 @@ def _dense(matrix: np.ndarray) -> np.ndarray:
 def _hermitian(matrix: np.ndarray, name: str) -> np.ndarray:
     matrix = np.atleast_2d(_dense(matrix))
     if matrix.ndim != 2 or matrix.shape[0] != matrix.shape[1] or not np.isfinite(matrix).all():
-        raise InputError(f"{name} of shape {matrix.shape}: expected a square matrix of finite numbers")
+        raise InputError(
+            f"{name} of shape {matrix.shape}: expected a square matrix of finite numbers"
+        )
     error = abs(matrix - matrix.conj().T).max()
     if error > 1e-8 * abs(matrix).max():
-        raise InputError(f"{name} differs from its transposed conjugate by {error:.3g}: expected a Hermitian matrix")
+        raise InputError(
+            f"{name} differs from its transposed conjugate by {error:.3g}: expected a Hermitian "
+            "matrix"
+        )
     return (matrix + matrix.conj().T) / 2
 
 
 def _modal_damping(matrix: np.ndarray) -> np.ndarray:
     """The diagonal (m,) where the damping does not couple the modes, else the matrix (m, m)."""
     diagonal = np.diag(matrix).real.copy()
-    return diagonal if abs(matrix - np.diag(diagonal)).max() <= 1e-9 * abs(diagonal).max() else matrix
+    return (
+        diagonal if abs(matrix - np.diag(diagonal)).max() <= 1e-9 * abs(diagonal).max() else matrix
+    )
 
 
 def _selection(ports: Mapping[str, np.ndarray], dofs: int) -> tuple[np.ndarray, dict[str, slice]]:
     if not isinstance(ports, Mapping) or not ports:
-        raise InputError(f"ports of type {type(ports).__name__}: expected a dict of names to dof numbers, not empty")
-    rows, slices, start = [], {}, 0
+        raise InputError(
+            f"ports of type {type(ports).__name__}: expected a dict of names to dof numbers, not "
+            "empty"
+        )
+    rows = []
+    slices = {}
+    start = 0
     for name, value in ports.items():
         value = np.asarray(value)
         if value.ndim == 1:
-            if value.size and not (np.all(value == value.astype(int)) and 0 <= value.min() and value.max() < dofs):
-                raise InputError(f"ports['{name}']: expected whole dof numbers from 0 to {dofs - 1}")
+            if value.size and not (
+                np.all(value == value.astype(int)) and 0 <= value.min() and value.max() < dofs
+            ):
+                raise InputError(
+                    f"ports['{name}']: expected whole dof numbers from 0 to {dofs - 1}"
+                )
             value = np.eye(dofs)[value.astype(int)]
         if value.ndim != 2 or value.shape[1] != dofs or not np.isfinite(value).all():
-            raise InputError(f"ports['{name}'] of shape {value.shape}: expected (k,) dofs or a (k, {dofs}) matrix")
+            raise InputError(
+                f"ports['{name}'] of shape {value.shape}: expected (k,) dofs or a (k, {dofs}) "
+                "matrix"
+            )
         rows.append(value)
         slices[name] = slice(start, start + len(value))
         start += len(value)

@@ -1,4 +1,6 @@
-"""Fewer modes without a new reduction: what a mode left out gives statically goes into the residual flexibility."""
+"""Fewer modes without a new reduction: what a mode left out gives statically goes into the residual
+flexibility.
+"""
 
 from __future__ import annotations
 
@@ -10,12 +12,20 @@ __all__ = ["truncated"]
 
 
 def truncated(body: PortModel, count: int) -> PortModel:
-    """The same body with its lowest `count` modes; exactly what a Rubin reduction with `count` modes would give."""
+    """The same body with its lowest `count` modes; exactly what a Rubin reduction with `count`
+    modes would give.
+    """
     if count >= len(body.omega):
         return body
     left_out = slice(max(count, int((body.omega == 0).sum())), None)
-    high, omega = body.shapes[:, left_out], body.omega[left_out]
+    high = body.shapes[:, left_out]
+    omega = body.omega[left_out]
     kept = slice(left_out.start)
     damping = None if body.damping is None else body.damping[(kept,) * body.damping.ndim]
-    return replace(body, omega=body.omega[kept], shapes=body.shapes[:, kept],
-                   residual=body.residual + (high / omega**2) @ high.conj().T, damping=damping)
+    return replace(
+        body,
+        omega=body.omega[kept],
+        shapes=body.shapes[:, kept],
+        residual=body.residual + (high / omega**2) @ high.conj().T,
+        damping=damping,
+    )

@@ -13,17 +13,25 @@ __all__ = ["Chapter", "Claim", "verdict"]
 class Claim:
     """One row of the page."""
 
-    where: str              # figure or equation of the paper
-    claim: str              # what the paper says
-    ours: str               # what is found here
-    verdict: str            # "holds", "holds in part", "fails"
-    pictures: tuple[str, ...] = ()      # files beside the page
-    caption: str = ""       # of the pictures
+    # figure or equation of the paper
+    where: str
+    # what the paper says
+    claim: str
+    # what is found here
+    ours: str
+    # "holds", "holds in part", "fails"
+    verdict: str
+    # files beside the page
+    pictures: tuple[str, ...] = ()
+    # of the pictures
+    caption: str = ""
 
 
 @dataclass(frozen=True)
 class Chapter:
-    """Claims that belong together; they are computed, and pictures drawn into a folder, when asked for."""
+    """Claims that belong together; they are computed, and pictures drawn into a folder, when asked
+    for.
+    """
 
     title: str
     text: str

@@ -13,77 +13,153 @@ from .tables import units_of
 
 __all__ = ["contact_arrays", "datasets", "mode_shapes", "resultants", "table_dataset"]
 
-MEANING = {"force": "contact force on the damper", "moment": "its moment about the engine's origin",
-           "centre": "force-weighted middle of the contact", "forces": "sum of the normal forces",
-           "areas": "whole face"}
+MEANING = {
+    "force": "contact force on the damper",
+    "moment": "its moment about the engine's origin",
+    "centre": "force-weighted middle of the contact",
+    "forces": "sum of the normal forces",
+    "areas": "whole face",
+}
 
 
 def datasets(result: Any, tables: dict[str, pd.DataFrame]) -> dict[str, Any]:
-    """Groups "modes", "contact", "resultants", "points", "summary" of a finished run (study.pipeline.Run)."""
-    return {"modes": mode_shapes(result), "contact": contact_arrays(result.contact.maps),
-            "resultants": resultants(tables["contact/pressure"]),
-            "points": table_dataset(tables["response/points"], "point"),
-            "summary": table_dataset(tables["response/summary"], "case")}
+    """Groups "modes", "contact", "resultants", "points", "summary" of a finished run
+    (study.pipeline.Run).
+    """
+    return {
+        "modes": mode_shapes(result),
+        "contact": contact_arrays(result.contact.maps),
+        "resultants": resultants(tables["contact/pressure"]),
+        "points": table_dataset(tables["response/points"], "point"),
+        "summary": table_dataset(tables["response/summary"], "case"),
+    }
 
 
 def mode_shapes(result: Any) -> Any:
     """Frequencies, shapes and node positions of all nodal diameters."""
     import xarray as xr
+
     sets = result.modes
     diameters = [-1 if s.nodal_diameter is None else s.nodal_diameter for s in sets]
     count = min(len(s.frequencies) for s in sets)
     shapes = np.stack([s.shapes[:count].astype(complex) for s in sets]).astype(np.complex64)
     return xr.Dataset(
-        {"frequency": (("nodal_diameter", "mode"), [s.frequencies[:count] for s in sets], {"units": "Hz"}),
-         "residual": (("nodal_diameter", "mode"), [s.residuals[:count] for s in sets], {"units": "1"}),
-         "shape": (("nodal_diameter", "mode", "node", "direction"), shapes, {"units": "kg^-1/2"}),
-         "position": (("node", "direction"), result.mesh.points, {"units": "m"})},
-        {"nodal_diameter": ("nodal_diameter", diameters, {"long_name": "nodal diameter, -1 without cyclic symmetry"}),
-         "mode": np.arange(1, count + 1), "direction": ["x", "y", "z"]})
+        {
+            "frequency": (
+                ("nodal_diameter", "mode"),
+                [s.frequencies[:count] for s in sets],
+                {"units": "Hz"},
+            ),
+            "residual": (
+                ("nodal_diameter", "mode"),
+                [s.residuals[:count] for s in sets],
+                {"units": "1"},
+            ),
+            "shape": (
+                ("nodal_diameter", "mode", "node", "direction"),
+                shapes,
+                {"units": "kg^-1/2"},
+            ),
+            "position": (("node", "direction"), result.mesh.points, {"units": "m"}),
+        },
+        {
+            "nodal_diameter": (
+                "nodal_diameter",
+                diameters,
+                {"long_name": "nodal diameter, -1 without cyclic symmetry"},
+            ),
+            "mode": np.arange(1, count + 1),
+            "direction": ["x", "y", "z"],
+        },
+    )
 
 
 def contact_arrays(maps: Mapping[float, Sequence[PressureMap]]) -> Any:
-    """Force, gap and pressure of each contact node under each load [N], with its place and patch."""
+    """Force, gap and pressure of each contact node under each load [N], with its place and
+    patch.
+    """
     import xarray as xr
+
     patches = next(iter(maps.values()))
     force = np.array([np.concatenate([m.force for m in seats]) for seats in maps.values()])
     gap = np.array([np.concatenate([m.gap for m in seats]) for seats in maps.values()])
     area = np.concatenate([m.patch.area for m in patches])
     return xr.Dataset(
-        {"force": (("load", "contact"), force, {"units": "N"}), "gap": (("load", "contact"), gap, {"units": "m"}),
-         "pressure": (("load", "contact"), force / area, {"units": "Pa"}), "area": ("contact", area, {"units": "m^2"}),
-         "position": (("contact", "direction"), np.concatenate([m.patch.points for m in patches]), {"units": "m"}),
-         "patch": ("contact", np.repeat([m.patch.name for m in patches], [len(m.force) for m in patches]))},
-        {"load": ("load", list(maps), {"units": "N"}), "direction": ["x", "y", "z"]})
+        {
+            "force": (("load", "contact"), force, {"units": "N"}),
+            "gap": (("load", "contact"), gap, {"units": "m"}),
+            "pressure": (("load", "contact"), force / area, {"units": "Pa"}),
+            "area": ("contact", area, {"units": "m^2"}),
+            "position": (
+                ("contact", "direction"),
+                np.concatenate([m.patch.points for m in patches]),
+                {"units": "m"},
+            ),
+            "patch": (
+                "contact",
+                np.repeat([m.patch.name for m in patches], [len(m.force) for m in patches]),
+            ),
+        },
+        {"load": ("load", list(maps), {"units": "N"}), "direction": ["x", "y", "z"]},
+    )
 
 
 def resultants(table: pd.DataFrame) -> Any:
-    """Force, moment, centre, area and peak pressure of each face under each load: the table's rows by (load, seat).
+    """Force, moment, centre, area and peak pressure of each face under each load: the table's rows
+    by (load, seat).
 
     Args:
         table: ``view.contact.pressure_summary`` with the load in front, one row a load and seat.
     """
     import xarray as xr
-    loads, seats = table["load"].unique(), table["patch"].unique()
-    units, data = units_of(table), {}
+
+    loads = table["load"].unique()
+    seats = table["patch"].unique()
+    units = units_of(table)
+    data = {}
     vectors = {name: [f"{name}_{axis}" for axis in "xyz"] for name in ("force", "moment", "centre")}
     for name, columns in vectors.items():
         values = table[columns].to_numpy().reshape(len(loads), len(seats), 3)
-        data[name] = (("load", "seat", "direction"), values, {"units": units[columns[0]], "long_name": MEANING[name]})
-    for name in table.columns.drop(["load", "patch", *(column for some in vectors.values() for column in some)]):
+        data[name] = (
+            ("load", "seat", "direction"),
+            values,
+            {"units": units[columns[0]], "long_name": MEANING[name]},
+        )
+    for name in table.columns.drop(
+        ["load", "patch", *(column for some in vectors.values() for column in some)]
+    ):
         data["normal_force" if name == "force" else name] = (
-            ("load", "seat"), table[name].to_numpy().reshape(len(loads), len(seats)),
-            {"units": units.get(name, "1"), "long_name": MEANING.get(f"{name}s", name.replace("_", " "))})
-    return xr.Dataset(data, {"load": ("load", loads, {"units": "N"}), "seat": list(seats),
-                             "direction": ["x", "y", "z"]})
+            ("load", "seat"),
+            table[name].to_numpy().reshape(len(loads), len(seats)),
+            {
+                "units": units.get(name, "1"),
+                "long_name": MEANING.get(f"{name}s", name.replace("_", " ")),
+            },
+        )
+    return xr.Dataset(
+        data,
+        {
+            "load": ("load", loads, {"units": "N"}),
+            "seat": list(seats),
+            "direction": ["x", "y", "z"],
+        },
+    )
 
 
 def table_dataset(table: pd.DataFrame, rows: str) -> Any:
-    """The columns of a table as variables with units along one dimension; "drift x [m/s]" becomes drift_x in m/s."""
+    """The columns of a table as variables with units along one dimension; "drift x [m/s]" becomes
+    drift_x in m/s.
+    """
     import xarray as xr
-    units, data = units_of(table), {}
+
+    units = units_of(table)
+    data = {}
     for name, column in table.items():
         plain, _, unit = str(name).rstrip("]").partition(" [")
         values = column.to_numpy(dtype=str) if column.dtype == object else column.to_numpy()
-        data["_".join(plain.replace(",", "").split())] = (rows, values, {"units": unit or units.get(name, "1")})
+        data["_".join(plain.replace(",", "").split())] = (
+            rows,
+            values,
+            {"units": unit or units.get(name, "1")},
+        )
     return xr.Dataset(data)

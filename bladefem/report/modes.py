@@ -1,4 +1,6 @@
-"""What ``bladefem modes`` leaves in its folder: tables, pictures, an animated wave, ParaView and netCDF files."""
+"""What ``bladefem modes`` leaves in its folder: tables, pictures, an animated wave, ParaView and
+netCDF files.
+"""
 
 from __future__ import annotations
 
@@ -12,12 +14,12 @@ import numpy as np
 import pandas as pd
 
 from ..data import ModeSet
-from ..progress import Progress, unwatched
-from ..scene import Scene
-from ..store import on_root, write_results
-from ..study.answer import stress_states, stress_table
-from ..study.modal import family_table
-from ..study.survey import Survey, Wanted, excited_set, survey
+from ..io.stage_cache import on_root, write_results
+from ..scene.tables import Scene
+from ..study.modes.comparison import family_table
+from ..study.modes.linear_response_report import stress_states, stress_table
+from ..study.modes.survey import Survey, Wanted, excited_set, survey
+from ..util.progress import Progress, unwatched
 from ..view import convergence, forced, mesh, modes, speed
 from .datasets import mode_shapes
 from .run import mode_table
@@ -25,21 +27,29 @@ from .tables import write_tables
 
 __all__ = ["PICTURES", "run", "tables_of"]
 
-PICTURES = 4        # modes that are drawn
+# modes that are drawn
+PICTURES = 4
 
 
-def run(scene: Scene, folder: str | Path, wanted: Wanted, pictures: int = PICTURES, comm: Any = None,
-        progress: Progress = unwatched) -> Survey:
+def run(
+    scene: Scene,
+    folder: str | Path,
+    wanted: Wanted,
+    pictures: int = PICTURES,
+    comm: Any = None,
+    progress: Progress = unwatched,
+) -> Survey:
     """Survey the modes and write the folder.
 
     Args:
         pictures: number of modes drawn on the sector and on the wheel; 0 for tables only.
 
     Raises:
-        InputError, NotSolvedError: see :func:`bladefem.study.survey.survey`.
+        InputError, NotSolvedError: see :func:`bladefem.study.modes.survey.survey`.
     """
     result = survey(scene, folder, wanted, comm, progress)
-    start, stresses = time.perf_counter(), _stresses(result)
+    start = time.perf_counter()
+    stresses = _stresses(result)
     on_root(comm, lambda: _write(result, pictures, *stresses, progress))
     timings = {**result.run.timings, "tables and pictures": time.perf_counter() - start}
     return replace(result, run=replace(result.run, timings=timings))
@@ -49,17 +59,26 @@ def tables_of(result: Survey) -> dict[str, pd.DataFrame]:
     """All tables by file name, SI columns."""
     run = result.run
     excited = excited_set(run)
-    out = {"frequencies": mode_table(run.modes, run.mesh, result.clamped),
-           "excited_modes": family_table(excited, run.mesh, result.clamped),
-           "effective_masses": result.masses}
+    out = {
+        "frequencies": mode_table(run.modes, run.mesh, result.clamped),
+        "excited_modes": family_table(excited, run.mesh, result.clamped),
+        "effective_masses": result.masses,
+    }
     if excited.nodal_diameter is None:
         out["frequencies"] = out["frequencies"].drop(columns="nodal_diameter")
     if result.campbell is not None:
         found = result.campbell
-        out |= {"campbell": found.table, "crossings": found.crossings, "interference": found.interference,
-                "margins": found.margins}
+        out |= {
+            "campbell": found.table,
+            "crossings": found.crossings,
+            "interference": found.interference,
+            "margins": found.margins,
+        }
     if result.convergence is not None:
-        out |= {"convergence": result.convergence.summary, "convergence_points": result.convergence.points}
+        out |= {
+            "convergence": result.convergence.summary,
+            "convergence_points": result.convergence.points,
+        }
     if result.answer is not None:
         out |= {"forced_response": result.answer.points, "resonances": result.answer.resonances}
     if result.mac is not None:
@@ -68,16 +87,32 @@ def tables_of(result: Survey) -> dict[str, pd.DataFrame]:
 
 
 def mac_table(match: np.ndarray, mine: ModeSet, theirs: ModeSet) -> pd.DataFrame:
-    """One row a mode: its partner in the other run, both frequencies, and the whole row of the MAC matrix."""
+    """One row a mode: its partner in the other run, both frequencies, and the whole row of the MAC
+    matrix.
+    """
     best = match.argmax(axis=1)
-    table = pd.DataFrame({"mode": np.arange(1, len(match) + 1), "frequency": mine.frequencies, "partner": best + 1,
-                          "frequency_of_partner": theirs.frequencies[best], "mac": match.max(axis=1)})
+    table = pd.DataFrame(
+        {
+            "mode": np.arange(1, len(match) + 1),
+            "frequency": mine.frequencies,
+            "partner": best + 1,
+            "frequency_of_partner": theirs.frequencies[best],
+            "mac": match.max(axis=1),
+        }
+    )
     return table.assign(**{f"MAC {j + 1}": match[:, j] for j in range(match.shape[1])})
 
 
-def _write(result: Survey, pictures: int, stresses: pd.DataFrame, fields: dict[str, np.ndarray],
-           inside: dict[str, np.ndarray], progress: Progress) -> None:
-    run, folder = result.run, Path(result.run.folder)
+def _write(
+    result: Survey,
+    pictures: int,
+    stresses: pd.DataFrame,
+    fields: dict[str, np.ndarray],
+    inside: dict[str, np.ndarray],
+    progress: Progress,
+) -> None:
+    run = result.run
+    folder = Path(result.run.folder)
     tables = tables_of(result) | {"stresses": stresses}
     for name, table in tables.items():
         write_tables(table, folder / name, name.replace("_", " "))
@@ -86,19 +121,29 @@ def _write(result: Survey, pictures: int, stresses: pd.DataFrame, fields: dict[s
         return
     excited = excited_set(run)
     modes.save_modes_vtu(run.mesh, excited, folder / "modes.vtu")
-    shapes = {f"mode {i + 1}, {f:.6g} Hz": excited.shapes[i] for i, f in enumerate(excited.frequencies[:pictures])}
+    shapes = {
+        f"mode {i + 1}, {f:.6g} Hz": excited.shapes[i]
+        for i, f in enumerate(excited.frequencies[:pictures])
+    }
     mesh.save_vtu(run.mesh, folder / "stress.vtu", {**shapes, **fields}, inside)
     for name, draw in progress(list(_drawings(result, tables, pictures).items()), "pictures"):
         draw(folder / name)
 
 
 def _stresses(result: Survey) -> tuple[pd.DataFrame, dict[str, np.ndarray], dict[str, np.ndarray]]:
-    """Table of extremes and fields at nodes or in cells: displacement and stress under the rotation, of the first modes
-    and of the resonances; collective."""
+    """Table of extremes and fields at nodes or in cells: displacement and stress under the
+    rotation, of the first modes and of the resonances; collective.
+    """
     states = stress_states(result.bodies, excited_set(result.run), PICTURES, result.answer)
     table, nodes, cells = stress_table(result.bodies, states)
-    fields, inside = ({f"{name}, {kind} [Pa]": field for name, values in each.items() for kind, field in values.items()}
-                      for each in (nodes, cells))
+    fields, inside = (
+        {
+            f"{name}, {kind} [Pa]": field
+            for name, values in each.items()
+            for kind, field in values.items()
+        }
+        for each in (nodes, cells)
+    )
     for name in nodes:
         if not name.startswith("mode"):
             fields |= _vectors(f"{name}, displacement", states[name])
@@ -107,45 +152,71 @@ def _stresses(result: Survey) -> tuple[pd.DataFrame, dict[str, np.ndarray], dict
 
 def _vectors(name: str, u: np.ndarray) -> dict[str, np.ndarray]:
     """A displacement as one field, or as real and imaginary part."""
-    return {f"{name}, real [m]": u.real, f"{name}, imaginary [m]": u.imag} if np.iscomplexobj(u) else {f"{name} [m]": u}
+    return (
+        {f"{name}, real [m]": u.real, f"{name}, imaginary [m]": u.imag}
+        if np.iscomplexobj(u)
+        else {f"{name} [m]": u}
+    )
 
 
-def _drawings(result: Survey, tables: dict[str, pd.DataFrame],
-              pictures: int) -> dict[str, Callable[[Path], object]]:
+def _drawings(
+    result: Survey, tables: dict[str, pd.DataFrame], pictures: int
+) -> dict[str, Callable[[Path], object]]:
     """File name to a function that draws it."""
-    run, excited, wheel = result.run, excited_set(result.run), len(result.run.modes) > 1
+    run = result.run
+    excited = excited_set(result.run)
+    wheel = len(result.run.modes) > 1
     names = list(tables["excited_modes"]["family"])
     shown = range(min(pictures, len(excited.frequencies)))
     out: dict[str, Callable[[Path], object]] = {
-        "modes.png": lambda file: modes.draw_mode_sheet(run.mesh, excited, file, families=names)}
+        "modes.png": lambda file: modes.draw_mode_sheet(run.mesh, excited, file, families=names)
+    }
     for i in shown:
-        out[f"mode_{i + 1}.png"] = lambda file, i=i: modes.draw_mode(run.mesh, excited, i, file, family=names[i])
+        out[f"mode_{i + 1}.png"] = lambda file, i=i: modes.draw_mode(
+            run.mesh, excited, i, file, family=names[i]
+        )
         if wheel:
-            out[f"mode_{i + 1}_wheel.png"] = lambda file, i=i: modes.draw_wheel_mode(run.mesh, excited, i, file,
-                                                                                     family=names[i])
+            out[f"mode_{i + 1}_wheel.png"] = lambda file, i=i: modes.draw_wheel_mode(
+                run.mesh, excited, i, file, family=names[i]
+            )
     turning = min(run.scene.excitation.mode, len(excited.frequencies)) - 1
-    out["wave.gif"] = lambda file: modes.animate_wave(run.mesh, excited, turning, file, family=names[turning])
+    out["wave.gif"] = lambda file: modes.animate_wave(
+        run.mesh, excited, turning, file, family=names[turning]
+    )
     if wheel:
-        out["nodal_diameters.png"] = lambda file: speed.draw_nodal_diameters(tables["frequencies"], file)
+        out["nodal_diameters.png"] = lambda file: speed.draw_nodal_diameters(
+            tables["frequencies"], file
+        )
     if result.answer is not None:
         out["forced_response.png"] = lambda file: forced.draw_forced(
-            tables["forced_response"], tables["resonances"], file,
-            title=f"linear response to engine order {run.scene.excitation.engine_order}")
+            tables["forced_response"],
+            tables["resonances"],
+            file,
+            title=f"linear response to engine order {run.scene.excitation.engine_order}",
+        )
     if result.convergence is not None:
         out["convergence.png"] = lambda file: convergence.draw_convergence(
-            tables["convergence_points"], tables["convergence"], file)
+            tables["convergence_points"], tables["convergence"], file
+        )
     return out | _speed_drawings(result, tables)
 
 
-def _speed_drawings(result: Survey, tables: dict[str, pd.DataFrame]) -> dict[str, Callable[[Path], object]]:
+def _speed_drawings(
+    result: Survey, tables: dict[str, pd.DataFrame]
+) -> dict[str, Callable[[Path], object]]:
     """Campbell and SAFE diagrams."""
     if result.campbell is None:
         return {}
-    found, scene = result.campbell, result.run.scene
+    found = result.campbell
+    scene = result.run.scene
     orders = sorted({scene.excitation.engine_order, *found.crossings["engine_order"]})
-    out: dict[str, Callable[[Path], object]] = {"campbell.png": lambda file: speed.draw_campbell(
-        found.table, orders, file, crossings=found.crossings, operating=found.speed)}
+    out: dict[str, Callable[[Path], object]] = {
+        "campbell.png": lambda file: speed.draw_campbell(
+            found.table, orders, file, crossings=found.crossings, operating=found.speed
+        )
+    }
     if len(result.run.modes) > 1 and found.speed > 0:
         out["interference.png"] = lambda file: speed.draw_interference(
-            tables["frequencies"], result.run.mesh.sector.count, found.speed, file, orders=orders)
+            tables["frequencies"], result.run.mesh.sector.count, found.speed, file, orders=orders
+        )
     return out

@@ -1,4 +1,6 @@
-"""What the contact nodes do at each resonance, for the run's folder: CSV, netCDF, ParaView, picture."""
+"""What the contact nodes do at each resonance, for the run's folder: CSV, netCDF, ParaView,
+picture.
+"""
 
 from __future__ import annotations
 
@@ -9,27 +11,44 @@ import numpy as np
 import pandas as pd
 
 from ..data import Patch
-from ..study.cycle import ContactCycle, contact_cycle
-from ..study.pipeline import Run, load_cases
+from ..study.pipeline.contact_cycle import ContactCycle, contact_cycle
+from ..study.pipeline.pipeline import Run, load_cases
 from ..view.contact import save_faces_vtu
 from ..view.response import draw_seat_loops
 from ..view.wear import draw_work
 from .linear import linear_columns
 
-__all__ = ["cycles_of", "draw_hysteresis", "draw_wear", "loop_table", "node_table", "save_cycles_vtu",
-           "wear_sentence", "wear_table"]
+__all__ = [
+    "cycles_of",
+    "draw_hysteresis",
+    "draw_wear",
+    "loop_table",
+    "node_table",
+    "save_cycles_vtu",
+    "wear_sentence",
+    "wear_table",
+]
 
 
 def cycles_of(result: Run) -> list[ContactCycle]:
     """The period at the resonance of each curve of a finished run."""
-    patches, points = list(result.contact.problem.patches), result.scene.contact.points
-    cases = {(case.load, case.mass): case for case in load_cases(result.scene, result.mesh, result.contact)}
-    return [contact_cycle(cases[curve.load, curve.mass], curve, patches, points) for curve in result.response.curves]
+    patches = list(result.contact.problem.patches)
+    points = result.scene.contact.points
+    cases = {
+        (case.load, case.mass): case
+        for case in load_cases(result.scene, result.mesh, result.contact)
+    }
+    return [
+        contact_cycle(cases[curve.load, curve.mass], curve, patches, points)
+        for curve in result.response.curves
+    ]
 
 
-def node_table(patches: Sequence[Patch], cycles: Sequence[ContactCycle],
-               coefficient: float | None = None) -> pd.DataFrame:
-    """One row a contact node and resonance: place, element, shares of the period, state, work a period and area (SI).
+def node_table(
+    patches: Sequence[Patch], cycles: Sequence[ContactCycle], coefficient: float | None = None
+) -> pd.DataFrame:
+    """One row a contact node and resonance: place, element, shares of the period, state, work a
+    period and area (SI).
 
     A wear coefficient [m^3/J] adds the depth worn off in an hour.
     """
@@ -40,52 +59,110 @@ def node_table(patches: Sequence[Patch], cycles: Sequence[ContactCycle],
     for c in cycles:
         mass = {} if c.mass is None else {"mass": c.mass}
         wear = {} if coefficient is None else {"wear_per_hour": c.wear(coefficient)}
-        frames.append(pd.DataFrame({
-            "load": c.load, **mass, "patch": names, "x": place[:, 0], "y": place[:, 1], "z": place[:, 2], "area": area,
-            **{name: getattr(c.elements, name) for name in ("mu", "kt", "kn", "n0")},
-            "stick": c.shares[:, 0], "slip": c.shares[:, 1], "separated": c.shares[:, 2], "state": c.state,
-            "work": c.work, "free_static_force": c.spare, **linear_columns(c), **wear}))
+        frames.append(
+            pd.DataFrame(
+                {
+                    "load": c.load,
+                    **mass,
+                    "patch": names,
+                    "x": place[:, 0],
+                    "y": place[:, 1],
+                    "z": place[:, 2],
+                    "area": area,
+                    **{name: getattr(c.elements, name) for name in ("mu", "kt", "kn", "n0")},
+                    "stick": c.shares[:, 0],
+                    "slip": c.shares[:, 1],
+                    "separated": c.shares[:, 2],
+                    "state": c.state,
+                    "work": c.work,
+                    "free_static_force": c.spare,
+                    **linear_columns(c),
+                    **wear,
+                }
+            )
+        )
     return pd.concat(frames, ignore_index=True)
 
 
 def loop_table(cycles: Sequence[ContactCycle]) -> pd.DataFrame:
-    """Friction force and relative displacement of each patch in one period at each resonance (SI)."""
-    return pd.concat([pd.DataFrame({
-        "load": c.load, **({} if c.mass is None else {"mass": c.mass}), "patch": name,
-        "phase": 2 * np.pi * np.arange(len(loop.force)) / len(loop.force), "displacement": loop.displacement,
-        "force": loop.force}) for c in cycles for name, loop in c.loops.items()], ignore_index=True)
+    """Friction force and relative displacement of each patch in one period at each resonance
+    (SI).
+    """
+    return pd.concat(
+        [
+            pd.DataFrame(
+                {
+                    "load": c.load,
+                    **({} if c.mass is None else {"mass": c.mass}),
+                    "patch": name,
+                    "phase": 2 * np.pi * np.arange(len(loop.force)) / len(loop.force),
+                    "displacement": loop.displacement,
+                    "force": loop.force,
+                }
+            )
+            for c in cycles
+            for name, loop in c.loops.items()
+        ],
+        ignore_index=True,
+    )
 
 
-def wear_table(patches: Sequence[Patch], cycles: Sequence[ContactCycle], coefficient: float) -> pd.DataFrame:
-    """One row a resonance and face: friction work, and the mean and largest depth worn off in an hour (SI)."""
+def wear_table(
+    patches: Sequence[Patch], cycles: Sequence[ContactCycle], coefficient: float
+) -> pd.DataFrame:
+    """One row a resonance and face: friction work, and the mean and largest depth worn off in an
+    hour (SI).
+    """
     cuts = np.cumsum([len(p.area) for p in patches])[:-1]
     rows = []
     for c in cycles:
-        for patch, work, depth in zip(patches, np.split(c.work, cuts), np.split(c.wear(coefficient), cuts),
-                                      strict=True):
-            rows.append({"load": c.load, **({} if c.mass is None else {"mass": c.mass}), "patch": patch.name,
-                         "frequency": c.frequency, "dissipated": float(work @ patch.area),
-                         "wear_volume": float(depth @ patch.area),
-                         "mean_wear": float(depth @ patch.area / patch.area.sum()), "largest_wear": float(depth.max())})
+        for patch, work, depth in zip(
+            patches, np.split(c.work, cuts), np.split(c.wear(coefficient), cuts), strict=True
+        ):
+            rows.append(
+                {
+                    "load": c.load,
+                    **({} if c.mass is None else {"mass": c.mass}),
+                    "patch": patch.name,
+                    "frequency": c.frequency,
+                    "dissipated": float(work @ patch.area),
+                    "wear_volume": float(depth @ patch.area),
+                    "mean_wear": float(depth @ patch.area / patch.area.sum()),
+                    "largest_wear": float(depth.max()),
+                }
+            )
     return pd.DataFrame(rows)
 
 
 def wear_sentence(cycles: Sequence[ContactCycle], coefficient: float) -> str:
     """For the report: what the worst resonance wears off, and by which law."""
     worst = max(cycles, key=lambda c: float(c.wear(coefficient).max()))
-    return (f"wear: up to {1e6 * worst.wear(coefficient).max():.3g} µm in an hour of steady vibration at the resonance "
-            f"under {worst.load:g} N, both faces together; depth = {coefficient:.3g} m³/J times the friction work an "
-            "area, while pressure and motion stay as they are")
+    return (
+        f"wear: up to {1e6 * worst.wear(coefficient).max():.3g} µm in an hour of steady vibration "
+        "at the resonance "
+        f"under {worst.load:g} N, both faces together; depth = {coefficient:.3g} m³/J times the "
+        "friction work an "
+        "area, while pressure and motion stay as they are"
+    )
 
 
-def save_cycles_vtu(patches: Sequence[Patch], cycles: Sequence[ContactCycle], file: Path,
-                    coefficient: float | None = None) -> Path:
-    """Work and shares of all loads on the faces, and with a wear coefficient [m^3/J] the depth worn off in an hour."""
+def save_cycles_vtu(
+    patches: Sequence[Patch],
+    cycles: Sequence[ContactCycle],
+    file: Path,
+    coefficient: float | None = None,
+) -> Path:
+    """Work and shares of all loads on the faces, and with a wear coefficient [m^3/J] the depth worn
+    off in an hour.
+    """
     fields: dict[str, np.ndarray] = {}
     for c in cycles:
         at = f"at {c.load:.6g} N" + ("" if c.mass is None else f", {1e3 * c.mass:.6g} g")
         fields |= {f"friction work [J/m2] {at}": c.work, f"state {at}": c.state}
-        fields |= {f"share of {name} {at}": c.shares[:, k] for k, name in enumerate(("stick", "slip", "separation"))}
+        fields |= {
+            f"share of {name} {at}": c.shares[:, k]
+            for k, name in enumerate(("stick", "slip", "separation"))
+        }
         if coefficient is not None:
             fields[f"wear in an hour [m] {at}"] = c.wear(coefficient)
     return save_faces_vtu(patches, fields, file)
@@ -93,12 +170,21 @@ def save_cycles_vtu(patches: Sequence[Patch], cycles: Sequence[ContactCycle], fi
 
 def draw_wear(patches: Sequence[Patch], cycle: ContactCycle, file: Path) -> object:
     """Where a period at the resonance of one load wears the faces."""
-    return draw_work(patches, cycle.work, cycle.state, file,
-                     title=f"friction work of a period at the resonance, {cycle.load:g} N per seat")
+    return draw_work(
+        patches,
+        cycle.work,
+        cycle.state,
+        file,
+        title=f"friction work of a period at the resonance, {cycle.load:g} N per seat",
+    )
 
 
 def draw_hysteresis(cycles: Sequence[ContactCycle], file: Path) -> object:
     """Hysteresis of both seats at the resonance of each load."""
-    cases = {f"{c.load:.4g} N" + ("" if c.mass is None else f", {1e3 * c.mass:.4g} g"):
-             {f'"{name}"': (loop.displacement, loop.force) for name, loop in c.loops.items()} for c in cycles}
+    cases = {
+        f"{c.load:.4g} N" + ("" if c.mass is None else f", {1e3 * c.mass:.4g} g"): {
+            f'"{name}"': (loop.displacement, loop.force) for name, loop in c.loops.items()
+        }
+        for c in cycles
+    }
     return draw_seat_loops(cases, file)

@@ -1,4 +1,6 @@
-"""The run folder of a verification pair, kinds "hertz" and "punch": pressures beside their closed forms."""
+"""The run folder of a verification pair, kinds "hertz" and "punch": pressures beside their closed
+forms.
+"""
 
 from __future__ import annotations
 
@@ -10,12 +12,12 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
-from bladefem.scene import Scene
-from bladefem.scene_file import dump
-from bladefem.store import on_root, write_results
-from bladefem.study.hertz import hertz_pressure
-from bladefem.study.pairs import INNER, PairState, radii, solve_pair
-from bladefem.study.punch import johnson_pressure
+from bladefem.io.stage_cache import on_root, write_results
+from bladefem.scene.tables import Scene
+from bladefem.scene.toml import dump
+from bladefem.study.kinds.contact_pairs import INNER, PairState, radii, solve_pair
+from bladefem.study.kinds.hertz import hertz_pressure
+from bladefem.study.kinds.punch import johnson_pressure
 from bladefem.view import contact, indentation, mesh
 from geometry.mesh import Mesh
 from geometry.quality import quality_rows
@@ -34,7 +36,8 @@ class PairRun:
     folder: Path
     mesh: Mesh
     states: list[PairState]
-    timings: dict[str, float]       # stage to seconds
+    # stage to seconds
+    timings: dict[str, float]
     messages: list[str]
 
 
@@ -55,17 +58,28 @@ def run(scene: Scene, folder: str | Path, comm: Any = None) -> PairRun:
 
 
 def pair_summary(states: list[PairState]) -> pd.DataFrame:
-    """One row a load: contact radius, pressure in the middle and approach, computed and closed form; error."""
+    """One row a load: contact radius, pressure in the middle and approach, computed and closed
+    form; error.
+    """
     rows = []
     for state in states:
         middle = int(np.argmin(np.linalg.norm(state.seat.patch.points, axis=1)))
-        rows.append({"load": state.load, "middle_pressure": state.seat.pressure[middle],
-                     "middle_pressure_exact": state.exact[middle], "contact_radius": state.radius[0],
-                     "contact_radius_exact": state.radius[1], "approach": state.approach[0],
-                     "approach_exact": np.nan if state.approach[1] is None else state.approach[1],
-                     "pressure_error": state.error, "complementarity": state.seat.complementarity})
+        rows.append(
+            {
+                "load": state.load,
+                "middle_pressure": state.seat.pressure[middle],
+                "middle_pressure_exact": state.exact[middle],
+                "contact_radius": state.radius[0],
+                "contact_radius_exact": state.radius[1],
+                "approach": state.approach[0],
+                "approach_exact": np.nan if state.approach[1] is None else state.approach[1],
+                "pressure_error": state.error,
+                "complementarity": state.seat.complementarity,
+            }
+        )
     table = pd.DataFrame(rows)
-    if all(state.radius[0] == state.radius[1] for state in states):        # a punch has its own
+    # a punch has its own
+    if all(state.radius[0] == state.radius[1] for state in states):
         table = table.drop(columns=["contact_radius", "contact_radius_exact"])
     return table.drop(columns="approach_exact") if table["approach_exact"].isna().all() else table
 
@@ -74,51 +88,89 @@ def _messages(scene: Scene, states: list[PairState]) -> list[str]:
     where = f" within {INNER:g} of the punch's radius" if scene.kind == "punch" else ""
     worst = max(state.error for state in states)
     solid = scene.hertz.dimension == 3 if scene.kind == "hertz" else scene.punch.dimension == 3
-    known = "the closed form is that of half spaces, the blocks are held at their far faces" if solid else \
-        "plane strain; loads act on a metre of depth, and the approach, which has no closed form, on the blocks' size"
-    return [f"pressure within {100 * worst:.2g} % (L2{where}) of the closed form",
-            f"approach: {known}" if solid else known]
+    known = (
+        "the closed form is that of half spaces, the blocks are held at their far faces"
+        if solid
+        else "plane strain; loads act on a metre of depth, and the approach, which has no closed "
+        "form, on the blocks' size"
+    )
+    return [
+        f"pressure within {100 * worst:.2g} % (L2{where}) of the closed form",
+        f"approach: {known}" if solid else known,
+    ]
 
 
 def _points(result: PairRun) -> pd.DataFrame:
     """One row a contact node of each load."""
-    return pd.concat([pd.DataFrame({
-        "load": s.load, "radius": radii(s.seat, result.mesh.dimension), "area": s.seat.patch.area,
-        "pressure": s.seat.pressure, "pressure_exact": s.exact, "gap": s.seat.gap}) for s in result.states],
-        ignore_index=True)
+    return pd.concat(
+        [
+            pd.DataFrame(
+                {
+                    "load": s.load,
+                    "radius": radii(s.seat, result.mesh.dimension),
+                    "area": s.seat.patch.area,
+                    "pressure": s.seat.pressure,
+                    "pressure_exact": s.exact,
+                    "gap": s.seat.gap,
+                }
+            )
+            for s in result.states
+        ],
+        ignore_index=True,
+    )
 
 
 def _resultants(states: list[PairState]) -> pd.DataFrame:
-    """One row a load: force, moment, centre, area and peak of the meshed quarter, or half in the plane."""
+    """One row a load: force, moment, centre, area and peak of the meshed quarter, or half in the
+    plane.
+    """
     table = contact.pressure_summary([s.seat for s in states])
     table.insert(0, "load", [s.load for s in states])
     return table
 
 
 def _write(scene: Scene, result: PairRun) -> None:
-    folder, states = result.folder, result.states
-    tables = {"mesh/quality": pd.DataFrame(quality_rows(result.mesh), columns=["what", "value"]),
-              "contact/summary": pair_summary(states), "contact/points": _points(result),
-              "contact/resultants_of_the_meshed_part": _resultants(states)}
+    folder = result.folder
+    states = result.states
+    tables = {
+        "mesh/quality": pd.DataFrame(quality_rows(result.mesh), columns=["what", "value"]),
+        "contact/summary": pair_summary(states),
+        "contact/points": _points(result),
+        "contact/resultants_of_the_meshed_part": _resultants(states),
+    }
     for name, table in tables.items():
         write_tables(table, folder / name.split("/")[1], name.split("/")[1])
-    write_results(folder / "results.nc", {
-        "summary": table_dataset(tables["contact/summary"], "load_case"),
-        "resultants": resultants(tables["contact/resultants_of_the_meshed_part"]),
-        "points": table_dataset(tables["contact/points"], "point")}, dump(scene))
-    figures = {name: folder / f"{name.split('/')[1]}.png" for name in ("mesh/mesh", "contact/pressure")}
+    write_results(
+        folder / "results.nc",
+        {
+            "summary": table_dataset(tables["contact/summary"], "load_case"),
+            "resultants": resultants(tables["contact/resultants_of_the_meshed_part"]),
+            "points": table_dataset(tables["contact/points"], "point"),
+        },
+        dump(scene),
+    )
+    figures = {
+        name: folder / f"{name.split('/')[1]}.png" for name in ("mesh/mesh", "contact/pressure")
+    }
     mesh.draw_mesh(result.mesh, figures["mesh/mesh"], title=scene.title)
     _draw(scene, result, figures["contact/pressure"])
     mesh.save_vtu(result.mesh, folder / "mesh.vtu")
     contact.save_pressure_vtu({s.load: [s.seat] for s in states}, folder / "pressure.vtu")
-    write_report(folder, scene, {k: v for k, v in tables.items() if k != "contact/points"}, figures, result.messages,
-                 result.timings)
+    write_report(
+        folder,
+        scene,
+        {k: v for k, v in tables.items() if k != "contact/points"},
+        figures,
+        result.messages,
+        result.timings,
+    )
 
 
 def _draw(scene: Scene, result: PairRun, file: Path) -> None:
     """Pressure over the radius, with the closed form drawn as a curve of its own."""
     largest = max(result.states, key=lambda s: s.load)
-    edge, solid = largest.radius[1], result.mesh.dimension == 3
+    edge = largest.radius[1]
+    solid = result.mesh.dimension == 3
     radius = radii(largest.seat, result.mesh.dimension)
 
     def exact(load: float) -> tuple[np.ndarray, np.ndarray]:
@@ -128,5 +180,6 @@ def _draw(scene: Scene, result: PairRun, file: Path) -> None:
         r = np.linspace(0, 0.999 * edge, 400)
         return r, johnson_pressure(r, edge, load, not solid)
 
-    indentation.draw_indentation({s.load: s.seat for s in result.states}, radius, exact, edge, file,
-                                 title=scene.title)
+    indentation.draw_indentation(
+        {s.load: s.seat for s in result.states}, radius, exact, edge, file, title=scene.title
+    )

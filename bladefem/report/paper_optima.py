@@ -1,4 +1,6 @@
-"""Claims about Fig. 17: resonance frequency and amplitude over the normal load, for four dampers."""
+"""Claims about Fig. 17: resonance frequency and amplitude over the normal load, for four
+dampers.
+"""
 
 from __future__ import annotations
 
@@ -19,28 +21,42 @@ from .paper_response import slip_share
 
 __all__ = ["optima"]
 
-WANTED = np.geomspace(0.5, 500, 16)     # normal load of a seat [N]
-OWN = 0.06                              # mass of the scene's damper [kg]
+# normal load of a seat [N]
+WANTED = np.geomspace(0.5, 500, 16)
+# mass of the scene's damper [kg]
+OWN = 0.06
 MICRO = 1e6
-Key = tuple[str, int, float]            # contact, mode, mass of the damper [kg]
+# contact, mode, mass of the damper [kg]
+Key = tuple[str, int, float]
 
 
 def optima(folder: Path) -> Iterator[Claim]:
     """Fig. 17: both modes, four masses, two contact stiffnesses."""
-    tables: dict[Key, np.ndarray] = {}  # load [N], frequency [Hz], amplitude [m], share of slip [1]
-    least: dict[Key, tuple[float, float]] = {}      # optimum load [N] and amplitude there [m]
+    # load [N], frequency [Hz], amplitude [m], share of slip [1]
+    tables: dict[Key, np.ndarray] = {}
+    # optimum load [N] and amplitude there [m]
+    least: dict[Key, tuple[float, float]] = {}
     for contact, mode in BANDS:
         for mass in MASSES:
             key = contact, mode, mass
             made = _maker(contact, mass)
             found = list(load_curve(((x, made(x)) for x in WANTED), BANDS[contact, mode], 3, 128))
-            tables[key] = np.array([(x, p.frequency, p.amplitude, slip_share(p.solution, made(x).elements))
-                                    for x, p in found])
+            tables[key] = np.array(
+                [
+                    (x, p.frequency, p.amplitude, slip_share(p.solution, made(x).elements))
+                    for x, p in found
+                ]
+            )
             least[key] = _finest(made, BANDS[contact, mode], tables[key])
         loop = _loop_tops() if (contact, mode) == ("soft", 2) else None
-        draw_peaks({m: tables[contact, mode, m] for m in MASSES}, folder / f"fig_17_{contact}_{mode}.png",
-                   f"mode {mode}, {contact} contact", "normal load of a seat [N]",
-                   {m: least[contact, mode, m] for m in MASSES}, loop)
+        draw_peaks(
+            {m: tables[contact, mode, m] for m in MASSES},
+            folder / f"fig_17_{contact}_{mode}.png",
+            f"mode {mode}, {contact} contact",
+            "normal load of a seat [N]",
+            {m: least[contact, mode, m] for m in MASSES},
+            loop,
+        )
     for contact, mode in BANDS:
         yield _masses(contact, mode, [least[contact, mode, m] for m in MASSES])
     yield _always(tables, least)
@@ -49,16 +65,23 @@ def optima(folder: Path) -> Iterator[Claim]:
     for contact in SCENES:
         one, two = (least[contact, mode, OWN][0] for mode in (1, 2))
         far = tables[contact, 1, OWN][0, 2] / tables[contact, 2, OWN][0, 2]
-        yield Claim("Sect. 5.2", f"the optimum load of mode 1 is much smaller than that of mode 2 ({contact} contact)",
-                    f"60 g: {one:.2f} N in mode 1, {two:.2f} N in mode 2; under {WANTED[0]:g} N the same force moves "
-                    f"the tip {far:.0f} times as far in mode 1", verdict(one < two / 2, one < two))
+        yield Claim(
+            "Sect. 5.2",
+            f"the optimum load of mode 1 is much smaller than that of mode 2 ({contact} contact)",
+            f"60 g: {one:.2f} N in mode 1, {two:.2f} N in mode 2; under {WANTED[0]:g} N the same "
+            "force moves "
+            f"the tip {far:.0f} times as far in mode 1",
+            verdict(one < two / 2, one < two),
+        )
 
 
 def _maker(contact: str, mass: float) -> Callable[[float], ReducedModel]:
     return lambda load: model_of(contact, load, mass)
 
 
-def _finest(made: Callable[[float], ReducedModel], band: tuple[float, float], table: np.ndarray) -> tuple[float, float]:
+def _finest(
+    made: Callable[[float], ReducedModel], band: tuple[float, float], table: np.ndarray
+) -> tuple[float, float]:
     """Optimum load [N] and least amplitude [m] near the lowest point of a table."""
     best = int(np.argmin(table[:, 2]))
     span = table[max(best - 1, 0), 0], table[min(best + 1, len(table) - 1), 0]
@@ -67,47 +90,75 @@ def _finest(made: Callable[[float], ReducedModel], band: tuple[float, float], ta
 
 
 def _loop_tops() -> np.ndarray:
-    """(loads, 3) load [N], frequency [Hz] and amplitude [m] of the highest point that the paper's loop accepts."""
+    """(loads, 3) load [N], frequency [Hz] and amplitude [m] of the highest point that the paper's
+    loop accepts.
+    """
     found = ((load, loop_points(load, "march")) for load in LOADS)
-    return np.array([(load, *points[:, np.argmax(points[1])]) for load, points in found if points.size])
+    return np.array(
+        [(load, *points[:, np.argmax(points[1])]) for load, points in found if points.size]
+    )
 
 
 def _masses(contact: str, mode: int, found: list[tuple[float, float]]) -> Claim:
     smaller = all(a[1] > b[1] for a, b in pairwise(found))
     larger = all(a[0] < b[0] for a, b in pairwise(found))
-    return Claim(f"Fig. 17{'b' if mode == 1 else 'd'}", "a heavier damper has a larger optimum load and a smaller "
-                 f"least amplitude (mode {mode}, {contact} contact)",
-                 "; ".join(f"{1e3 * m:.0f} g {MICRO * h:.4g} µm at {x:.3g} N"
-                           for m, (x, h) in zip(MASSES, found, strict=True)),
-                 verdict(smaller and larger, smaller or larger), (f"fig_17_{contact}_{mode}.png",),
-                 f"Resonance of mode {mode} over the normal load, {contact} contact. Stars: optimum loads."
-                 + (" Crosses: the paper's loop, 60 g, the highest of its points of Fig. 15."
-                    if (contact, mode) == ("soft", 2) else ""))
+    return Claim(
+        f"Fig. 17{'b' if mode == 1 else 'd'}",
+        "a heavier damper has a larger optimum load and a smaller "
+        f"least amplitude (mode {mode}, {contact} contact)",
+        "; ".join(
+            f"{1e3 * m:.0f} g {MICRO * h:.4g} µm at {x:.3g} N"
+            for m, (x, h) in zip(MASSES, found, strict=True)
+        ),
+        verdict(smaller and larger, smaller or larger),
+        (f"fig_17_{contact}_{mode}.png",),
+        f"Resonance of mode {mode} over the normal load, {contact} contact. Stars: optimum loads."
+        + (
+            " Crosses: the paper's loop, 60 g, the highest of its points of Fig. 15."
+            if (contact, mode) == ("soft", 2)
+            else ""
+        ),
+    )
 
 
 def _always(tables: Mapping[Key, np.ndarray], least: Mapping[Key, tuple[float, float]]) -> Claim:
     ends = {key: table[[0, -1], 2] / least[key][1] for key, table in tables.items()}
-    inside = sum(WANTED[0] < x < WANTED[-1] and ends[key].min() > 1.05 for key, (x, _) in least.items())
+    inside = sum(
+        WANTED[0] < x < WANTED[-1] and ends[key].min() > 1.05 for key, (x, _) in least.items()
+    )
     single = sum(dips(list(table[:, 2])) for table in tables.values())
     depth = [1 / e.min() for e in ends.values()]
-    return Claim("Fig. 17b, d", "there is always an optimum load",
-                 f"in {inside} of {len(least)} cases (modes, masses, stiffnesses); it leaves {min(depth):.2f} to "
-                 f"{max(depth):.2f} of the lower of the amplitudes at {WANTED[0]:g} and {WANTED[-1]:g} N; the curve "
-                 f"has no second dip in {single} cases", verdict(inside == len(least), inside > 0))
+    return Claim(
+        "Fig. 17b, d",
+        "there is always an optimum load",
+        f"in {inside} of {len(least)} cases (modes, masses, stiffnesses); it leaves "
+        f"{min(depth):.2f} to "
+        f"{max(depth):.2f} of the lower of the amplitudes at {WANTED[0]:g} and {WANTED[-1]:g} N; "
+        "the curve "
+        f"has no second dip in {single} cases",
+        verdict(inside == len(least), inside > 0),
+    )
 
 
 def _narrow(tables: Mapping[Key, np.ndarray]) -> Iterator[Claim]:
-    """The last paragraph of Sect. 5.2: how many times the load grows from mostly slip to mostly stick."""
+    """The last paragraph of Sect. 5.2: how many times the load grows from mostly slip to mostly
+    stick.
+    """
     for contact in SCENES:
         wide = {(mode, m): _range(tables[contact, mode, m]) for mode in (1, 2) for m in MASSES}
         light = [all(wide[mode, a] < wide[mode, b] for a, b in pairwise(MASSES)) for mode in (1, 2)]
         slow = [wide[1, m] < wide[2, m] for m in MASSES]
-        told = "; ".join(f"mode {mode} " + ", ".join(f"{wide[mode, m]:.1f}" for m in MASSES) for mode in (1, 2))
-        yield Claim("Sect. 5.2", "the less inertia (low frequency, light damper), the narrower the range of loads from "
-                    f"slip to stick ({contact} contact)",
-                    "load at which the points slip a quarter of the time over that with three quarters, "
-                    f"{', '.join(f'{1e3 * m:.0f}' for m in MASSES)} g: {told}",
-                    verdict(all(light) and all(slow), all(light) or all(slow)))
+        told = "; ".join(
+            f"mode {mode} " + ", ".join(f"{wide[mode, m]:.1f}" for m in MASSES) for mode in (1, 2)
+        )
+        yield Claim(
+            "Sect. 5.2",
+            "the less inertia (low frequency, light damper), the narrower the range of loads from "
+            f"slip to stick ({contact} contact)",
+            "load at which the points slip a quarter of the time over that with three quarters, "
+            f"{', '.join(f'{1e3 * m:.0f}' for m in MASSES)} g: {told}",
+            verdict(all(light) and all(slow), all(light) or all(slow)),
+        )
 
 
 def _range(table: np.ndarray) -> float:
@@ -120,8 +171,13 @@ def _range(table: np.ndarray) -> float:
 def _jump(table: np.ndarray, best: float) -> Claim:
     steps = np.abs(np.diff(table[:, 1]))
     jump = int(np.argmax(steps))
-    (a, f), (b, g) = table[jump:jump + 2, :2]
-    return Claim("Fig. 17a, c", "the resonance frequency jumps near the optimum load",
-                 f"stiff contact, 60 g: from {f:.0f} Hz at {a:.1f} N to {g:.0f} Hz at {b:.1f} N, {best:.1f} N being "
-                 "the optimum; no state jumps: the response has a sharp and a broad peak, and the higher one changes",
-                 verdict(False, steps[jump] > 0.5 * np.ptp(table[:, 1]) and a / 1.5 < best < 1.5 * b))
+    (a, f), (b, g) = table[jump : jump + 2, :2]
+    return Claim(
+        "Fig. 17a, c",
+        "the resonance frequency jumps near the optimum load",
+        f"stiff contact, 60 g: from {f:.0f} Hz at {a:.1f} N to {g:.0f} Hz at {b:.1f} N, "
+        f"{best:.1f} N being "
+        "the optimum; no state jumps: the response has a sharp and a broad peak, and the higher "
+        "one changes",
+        verdict(False, steps[jump] > 0.5 * np.ptp(table[:, 1]) and a / 1.5 < best < 1.5 * b),
+    )

@@ -1,4 +1,6 @@
-"""Claims about the blades, judged by integration in time of the complete coupled system: blades, damper, contacts."""
+"""Claims about the blades, judged by integration in time of the complete coupled system: blades,
+damper, contacts.
+"""
 
 from __future__ import annotations
 
@@ -11,15 +13,15 @@ from bladefem.damper.blades import judge, peak
 from bladefem.damper.branch import state_of
 from bladefem.damper.direct import direct
 from bladefem.damper.explicit import Cycle, explicit_march
-from bladefem.hbm.api import solve
-from bladefem.hbm.in_time import time_system
 from bladefem.hbm.model import ReducedModel
-from bladefem.hbm.shooting import harmonics, multipliers, periodic
 from bladefem.hbm.solution import Solution
+from bladefem.hbm.solve import solve
 from bladefem.hbm.sweep import response, size
-from bladefem.hbm.system import System
+from bladefem.hbm.time_model import time_system
+from bladefem.study.pipeline.stability import in_one_body, stability_of
 from bladefem.study.row import whole_model
-from bladefem.study.stability import in_one_body, stability_of
+from bladefem.time.shooting import harmonics, multipliers, periodic
+from bladefem.time.system import System
 from bladefem.view.paper_contact import draw_sweeps
 
 from .claim import Claim, verdict
@@ -27,13 +29,20 @@ from .paper_blades import BANDS, LOADS, MASSES, model_of, row_and_scene
 
 __all__ = ["following", "in_time", "two_motions"]
 
-STEPS, TOLERANCE = 1024, 1e-6       # of the explicit march
-UNSTABLE = 1.001                    # largest multiplier; 1 where a contact sticks all the time
+# of the explicit march
+STEPS = 1024
+TOLERANCE = 1e-6
+# largest multiplier; 1 where a contact sticks all the time
+UNSTABLE = 1.001
 
 
 def in_time(_: Path) -> Iterator[Claim]:
-    """Fig. 15 and 17 at resonance: both modes, all masses, all loads; then with normal loads that follow the motion."""
-    errors, periods, lost = [], [], []
+    """Fig. 15 and 17 at resonance: both modes, all masses, all loads; then with normal loads that
+    follow the motion.
+    """
+    errors = []
+    periods = []
+    lost = []
     for mode in (1, 2):
         for mass in MASSES:
             for load in LOADS:
@@ -47,19 +56,28 @@ def in_time(_: Path) -> Iterator[Claim]:
                 else:
                     lost.append(f"mode {mode}, {1e3 * mass:g} g, {load:g} N")
     count = 2 * len(MASSES) * len(LOADS)
-    yield Claim("Fig. 15, 17", "the harmonic balance gives the response of the coupled system",
-                f"{len(errors)} of {count} resonances (modes 1 and 2, {len(MASSES)} masses, {len(LOADS)} loads) closed "
-                f"in time, after {int(np.median(periods))} periods in the middle; 7 harmonics are {max(errors):.0e} "
-                f"off at worst, {np.median(errors):.0e} in the middle" + (f"; not closed: {'; '.join(lost)}" if lost
-                                                                         else ""),
-                verdict(not lost and max(errors) < 0.02, len(errors) > 0.9 * count))
+    yield Claim(
+        "Fig. 15, 17",
+        "the harmonic balance gives the response of the coupled system",
+        f"{len(errors)} of {count} resonances (modes 1 and 2, {len(MASSES)} masses, {len(LOADS)} "
+        "loads) closed "
+        f"in time, after {int(np.median(periods))} periods in the middle; 7 harmonics are "
+        f"{max(errors):.0e} "
+        f"off at worst, {np.median(errors):.0e} in the middle"
+        + (f"; not closed: {'; '.join(lost)}" if lost else ""),
+        verdict(not lost and max(errors) < 0.02, len(errors) > 0.9 * count),
+    )
     yield from following()
 
 
 def following(loads: tuple[float, ...] = (4.0, 20.0, 100.0)) -> Iterator[Claim]:
-    """The rigid damper with its three freedoms, on contacts whose normal load follows and that may open."""
+    """The rigid damper with its three freedoms, on contacts whose normal load follows and that may
+    open.
+    """
     row, scene = row_and_scene("soft")
-    told, worst, largest = [], 0.0, 0.0
+    told = []
+    worst = 0.0
+    largest = 0.0
     for load in loads:
         model = in_one_body(whole_model(scene, row, load))
         top = peak(model, BANDS["soft", 2], 5).solution
@@ -69,59 +87,104 @@ def following(loads: tuple[float, ...] = (4.0, 20.0, 100.0)) -> Iterator[Claim]:
         exact = periodic(system, top.omega, begin, samples=512)
         error = abs(found.probe[1, 0] / harmonics(exact, system, 1)[0, 1] - 1)
         multiplier = np.abs(multipliers(exact)).max()
-        cycle = direct(system, top.omega, STEPS, begin if multiplier > UNSTABLE else None, 4000, TOLERANCE, True)
+        cycle = direct(
+            system,
+            top.omega,
+            STEPS,
+            begin if multiplier > UNSTABLE else None,
+            4000,
+            TOLERANCE,
+            True,
+        )
         marched = 2 * np.fft.rfft(cycle.q @ system.probe[0])[1] / len(cycle.q)
-        worst, largest = max(worst, error), max(largest, multiplier)
+        worst = max(worst, error)
+        largest = max(largest, multiplier)
         settled = f"{cycle.periods} periods" if cycle.reason == "periodic" else cycle.reason
         off = f"{abs(found.probe[1, 0] / marched - 1):.0e} from explicit steps from rest, {settled}"
         end = _afterwards(system, cycle, found) if multiplier > UNSTABLE else off
         closed = "" if exact.converged else f" (closed to {exact.residual:.0e} only)"
-        told.append(f"{load:g} N at {top.frequency:.1f} Hz {error:.0e} from the exact flow{closed}, largest multiplier "
-                    f"{multiplier:.4f}, {end}")
-    yield Claim("Fig. 13, 14", "the same where the damper moves in its plane and the normal load follows",
-                "balance with 9 harmonics: " + "; ".join(told) + ". Points that always stick may carry any mean force "
-                "that they can hold, so that not all digits need to agree",
-                "fails" if worst > 0.01 else "holds in part" if largest > UNSTABLE else "holds")
+        told.append(
+            f"{load:g} N at {top.frequency:.1f} Hz {error:.0e} from the exact flow{closed}, "
+            "largest multiplier "
+            f"{multiplier:.4f}, {end}"
+        )
+    yield Claim(
+        "Fig. 13, 14",
+        "the same where the damper moves in its plane and the normal load follows",
+        "balance with 9 harmonics: "
+        + "; ".join(told)
+        + ". Points that always stick may carry any mean force "
+        "that they can hold, so that not all digits need to agree",
+        "fails" if worst > 0.01 else "holds in part" if largest > UNSTABLE else "holds",
+    )
 
 
 def _afterwards(system: System, cycle: Cycle, found: Solution, periods: int = 100) -> str:
-    """Where the motion goes that an unstable solution is left for: the last periods of a march that did not settle."""
-    march, state, tip = explicit_march(system, found.omega, STEPS), cycle.state, []
+    """Where the motion goes that an unstable solution is left for: the last periods of a march that
+    did not settle.
+    """
+    march = explicit_march(system, found.omega, STEPS)
+    state = cycle.state
+    tip = []
     for _ in range(periods):
         state, q, _, _ = march(state)
         tip.append(q @ system.probe[0])
     tip = np.concatenate(tip) - np.mean(tip)
-    swing = 1e6 * np.array([np.sqrt(np.mean(tip**2)), np.abs(tip).max(), size(found) / np.sqrt(2), size(found)])
-    return (f"unstable: explicit steps leave it, {cycle.reason}; over {periods} more periods the tip then swings by "
-            f"{swing[0]:.1f} µm rms, {swing[1]:.1f} µm at most, where the periodic motion has {swing[2]:.1f} and about "
-            f"{swing[3]:.1f} µm")
+    swing = 1e6 * np.array(
+        [np.sqrt(np.mean(tip**2)), np.abs(tip).max(), size(found) / np.sqrt(2), size(found)]
+    )
+    return (
+        f"unstable: explicit steps leave it, {cycle.reason}; over {periods} more periods the tip "
+        "then swings by "
+        f"{swing[0]:.1f} µm rms, {swing[1]:.1f} µm at most, where the periodic motion has "
+        f"{swing[2]:.1f} and about "
+        f"{swing[3]:.1f} µm"
+    )
 
 
 def two_motions(folder: Path) -> Iterator[Claim]:
     """Sweeps up and down where the normal load follows the motion, and where it does not."""
     row, scene = row_and_scene("soft")
-    model, frequency = in_one_body(whole_model(scene, row, 4.0)), np.linspace(1125, 1150, 26)
-    ways, told = {}, []
+    model = in_one_body(whole_model(scene, row, 4.0))
+    frequency = np.linspace(1125, 1150, 26)
+    ways = {}
+    told = []
     for name, points in _both_ways(model, frequency).items():
-        heights, largest = np.array([size(s) for s in points]), stability_of(model, points).multiplier
+        heights = np.array([size(s) for s in points])
+        largest = stability_of(model, points).multiplier
         ways[name] = heights, largest
-        told.append(f"{name} it reaches {1e6 * heights.max():.1f} µm, {int((largest > UNSTABLE).sum())} of "
-                    f"{len(points)} points unstable, {int(np.isnan(largest).sum())} not closed in time, largest "
-                    f"multiplier {np.nanmax(largest):.3f}")
+        told.append(
+            f"{name} it reaches {1e6 * heights.max():.1f} µm, {int((largest > UNSTABLE).sum())} of "
+            f"{len(points)} points unstable, {int(np.isnan(largest).sum())} not closed in time, "
+            "largest "
+            f"multiplier {np.nanmax(largest):.3f}"
+        )
     draw_sweeps(frequency, ways, folder / "stability_blades.png")
     up, down = (amplitude for amplitude, _ in ways.values())
     apart = frequency[np.abs(up / down - 1) > 0.01]
-    plain = [np.array([size(s) for s in way]) for way in _both_ways(model_of("soft", 4.0), frequency).values()]
+    plain = [
+        np.array([size(s) for s in way])
+        for way in _both_ways(model_of("soft", 4.0), frequency).values()
+    ]
     where = f"part from {apart.min():.1f} to {apart.max():.1f} Hz" if len(apart) else "agree"
-    yield Claim("Fig. 15", "one response for a frequency",
-                f"plane blades, 4 N, rigid damper whose normal load follows: sweeps up and down {where}; "
-                + "; ".join(told) + "; with the paper's constant loads they agree to "
-                f"{np.abs(plain[0] / plain[1] - 1).max():.0e}", verdict(not len(apart)), ("stability_blades.png",),
-                "The same blade and damper swept up and down: two motions at one frequency where seats lift off. Left: "
-                "circles stable, squares unstable. Right: the multipliers of both.")
+    yield Claim(
+        "Fig. 15",
+        "one response for a frequency",
+        f"plane blades, 4 N, rigid damper whose normal load follows: sweeps up and down {where}; "
+        + "; ".join(told)
+        + "; with the paper's constant loads they agree to "
+        f"{np.abs(plain[0] / plain[1] - 1).max():.0e}",
+        verdict(not len(apart)),
+        ("stability_blades.png",),
+        "The same blade and damper swept up and down: two motions at one frequency where seats "
+        "lift off. Left: "
+        "circles stable, squares unstable. Right: the multipliers of both.",
+    )
 
 
 def _both_ways(model: ReducedModel, frequency: np.ndarray) -> dict[str, list[Solution]]:
     """Points of a sweep up and of one down, ascending in frequency."""
-    return {"upwards": list(response(model, 2 * np.pi * frequency, 3, 256)),
-            "downwards": list(response(model, 2 * np.pi * frequency[::-1], 3, 256))[::-1]}
+    return {
+        "upwards": list(response(model, 2 * np.pi * frequency, 3, 256)),
+        "downwards": list(response(model, 2 * np.pi * frequency[::-1], 3, 256))[::-1],
+    }

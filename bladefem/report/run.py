@@ -1,4 +1,6 @@
-"""All that a run leaves in its folder: tables, one netCDF file, ParaView files, pictures and the report."""
+"""All that a run leaves in its folder: tables, one netCDF file, ParaView files, pictures and the
+report.
+"""
 
 from __future__ import annotations
 
@@ -15,22 +17,22 @@ import pandas as pd
 from geometry.mesh import Mesh
 from geometry.quality import quality_rows
 
-from ..contact.states import quasi_static
+from ..contact.state_table import quasi_static
 from ..data import ModeSet
-from ..progress import Progress, unwatched
-from ..run_folder import take_folder
-from ..scene import Scene
-from ..scene_file import dump
-from ..store import on_root, write_results, write_table
-from ..study import pipeline
-from ..study.limits import Limit
-from ..study.loads import summary
-from ..study.modal import family_table
-from ..study.stability import UNIQUE
-from ..study.state_check import state_sentence
-from ..study.strength import Strength
-from ..study.survey import excited_set
-from ..units import show
+from ..io.run_folder import take_folder
+from ..io.stage_cache import on_root, write_results, write_table
+from ..scene.tables import Scene
+from ..scene.toml import dump
+from ..scene.units import show
+from ..study.modes.comparison import family_table
+from ..study.modes.stress import Strength
+from ..study.modes.survey import excited_set
+from ..study.pipeline import pipeline
+from ..study.pipeline.linear_limits import Limit
+from ..study.pipeline.loads import summary
+from ..study.pipeline.stability import UNIQUE
+from ..study.pipeline.state_check import state_sentence
+from ..util.progress import Progress, unwatched
 from ..view import mesh, modes, response, speed
 from .datasets import datasets, table_dataset
 from .linear import harmonic_table, linear_sentence
@@ -50,11 +52,16 @@ from .write import write_report
 
 __all__ = ["run", "write_run"]
 
-MESH = ("the estimated errors are those of modes, harmonics, samples, contact points and damper model; the mesh's part "
-        "is shown by 'bladefem modes --converge' (frequencies) and 'bladefem chart --mesh' (resonance)")
+MESH = (
+    "the estimated errors are those of modes, harmonics, samples, contact points and damper "
+    "model; the mesh's part "
+    "is shown by 'bladefem modes --converge' (frequencies) and 'bladefem chart --mesh' (resonance)"
+)
 
 
-def run(scene: Scene, folder: str | Path, comm: Any = None, progress: Progress = unwatched) -> pipeline.Run:
+def run(
+    scene: Scene, folder: str | Path, comm: Any = None, progress: Progress = unwatched
+) -> pipeline.Run:
     """Everything: mesh, modes, contact, responses, and the folder with pictures and report.
 
     Raises:
@@ -64,32 +71,46 @@ def run(scene: Scene, folder: str | Path, comm: Any = None, progress: Progress =
     return write_run(result, comm, progress)
 
 
-def write_run(result: pipeline.Run, comm: Any = None, progress: Progress = unwatched) -> pipeline.Run:
+def write_run(
+    result: pipeline.Run, comm: Any = None, progress: Progress = unwatched
+) -> pipeline.Run:
     """Write the folder of a finished run, on rank 0; returns the run with the time that it took."""
     start = time.perf_counter()
     on_root(comm, lambda: _write(result, progress))
-    return replace(result, timings={**result.timings, "pictures and report": time.perf_counter() - start})
+    return replace(
+        result, timings={**result.timings, "pictures and report": time.perf_counter() - start}
+    )
 
 
 def _write(result: pipeline.Run, progress: Progress) -> None:
     folder = result.folder
     moved = take_folder(folder, result.scene)
-    patches, cycles = list(result.contact.problem.patches), cycles_of(result)
+    patches = list(result.contact.problem.patches)
+    cycles = cycles_of(result)
     coefficient = result.scene.contact.wear_coefficient
     worn = coefficient is not None
-    tables = {**_tables(result), **({"contact/wear": wear_table(patches, cycles, coefficient)} if worn else {})}
+    tables = {
+        **_tables(result),
+        **({"contact/wear": wear_table(patches, cycles, coefficient)} if worn else {}),
+    }
     for name, table in tables.items():
         write_tables(table, folder / name.split("/")[1], name.split("/")[1])
-    nodes, loops = node_table(patches, cycles, coefficient), loop_table(cycles)
+    nodes = node_table(patches, cycles, coefficient)
+    loops = loop_table(cycles)
     write_table(folder / "nodes.csv", nodes, units_of(nodes))
     loops.to_csv(folder / "hysteresis.csv", index=False)
-    groups = {**datasets(result, tables), "nodes": table_dataset(nodes, "row"),
-              "approximation": table_dataset(harmonic_table(patches, cycles), "row"),
-              "hysteresis": table_dataset(loops, "row")}
+    groups = {
+        **datasets(result, tables),
+        "nodes": table_dataset(nodes, "row"),
+        "approximation": table_dataset(harmonic_table(patches, cycles), "row"),
+        "hysteresis": table_dataset(loops, "row"),
+    }
     write_results(folder / "results.nc", groups, dump(result.scene))
-    drawings = {**_drawings(result, tables),
-                "response/hysteresis": lambda file: draw_hysteresis(cycles, file),
-                "contact/friction_work": lambda file: draw_wear(patches, cycles[_best(result)], file)}
+    drawings = {
+        **_drawings(result, tables),
+        "response/hysteresis": lambda file: draw_hysteresis(cycles, file),
+        "contact/friction_work": lambda file: draw_wear(patches, cycles[_best(result)], file),
+    }
     figures = {}
     for name, draw in progress(list(drawings.items()), "pictures"):
         figures[name] = folder / f"{name.split('/')[1]}.png"
@@ -98,45 +119,76 @@ def _write(result: pipeline.Run, progress: Progress) -> None:
     modes.save_modes_vtu(result.mesh, excited_set(result), folder / "modes.vtu")
     write_points(folder, result.contact.maps)
     save_cycles_vtu(patches, cycles, folder / "friction_work.vtu", coefficient)
-    messages = [*filter(None, [moved]), *result.messages, MESH, _static_contact(result), _states(result),
-                linear_sentence(cycles), *_beyond_stick(result),
-                *([wear_sentence(cycles, coefficient)] if worn else [])]
+    messages = [
+        *filter(None, [moved]),
+        *result.messages,
+        MESH,
+        _static_contact(result),
+        _states(result),
+        linear_sentence(cycles),
+        *_beyond_stick(result),
+        *([wear_sentence(cycles, coefficient)] if worn else []),
+    ]
     write_report(folder, result.scene, tables, figures, messages, result.timings)
 
 
 def _static_contact(result: pipeline.Run) -> str:
-    """Whether the contact may be taken as quasi-static up to the last harmonic kept of the highest frequency."""
+    """Whether the contact may be taken as quasi-static up to the last harmonic kept of the highest
+    frequency.
+    """
     patch = next(iter(result.contact.maps.values()))[0].patch
-    highest = max(curve.settings.harmonics * float(np.max(curve.frequency)) for curve in result.response.curves)
+    highest = max(
+        curve.settings.harmonics * float(np.max(curve.frequency))
+        for curve in result.response.curves
+    )
     return quasi_static(patch, result.scene.material.blade, highest).sentence
 
 
 def _states(result: pipeline.Run) -> str:
-    """Whether the paper's table of states would do for the loads of the run and the normal motion at its resonances."""
-    motions = [c.peak.w[:, 0, 1:] for c in result.response.curves if c.peak.w.shape[1] == result.mesh.dimension]
+    """Whether the paper's table of states would do for the loads of the run and the normal motion
+    at its resonances.
+    """
+    motions = [
+        c.peak.w[:, 0, 1:]
+        for c in result.response.curves
+        if c.peak.w.shape[1] == result.mesh.dimension
+    ]
     travel = max((float(np.abs(w).max()) for w in motions), default=0.0)
-    return state_sentence(result.scene, result.contact.problem, list(result.contact.maps), travel or 1e-6)
+    return state_sentence(
+        result.scene, result.contact.problem, list(result.contact.maps), travel or 1e-6
+    )
 
 
 def _beyond_stick(result: pipeline.Run) -> list[str]:
     """Why a resonance may lie above that of full stick."""
     stuck = result.response.limits[1].peak_frequency
     above = [curve for curve in result.response.curves if curve.peak_frequency > stuck]
-    return ["resonances above that of full stick: contact points that the static load leaves open close in vibration, "
-            "and count as open in full stick"] if above else []
+    return (
+        [
+            "resonances above that of full stick: contact points that the static load leaves open "
+            "close in vibration, "
+            "and count as open in full stick"
+        ]
+        if above
+        else []
+    )
 
 
 def _tables(result: pipeline.Run) -> dict[str, pd.DataFrame]:
     """Tables of the report, "section/name", SI columns."""
     curves = result.response.curves
-    return {"mesh/quality": pd.DataFrame(quality_rows(result.mesh), columns=["what", "value"]),
-            "modes/modes": family_table(excited_set(result), result.mesh, result.clamped),
-            "modes/nodal_diameters": mode_table(result.modes, result.mesh, result.clamped),
-            "modes/stresses": _stresses(result.strength),
-            "contact/pressure": pressure_table(result.contact.maps),
-            **_own_load(result),
-            "response/summary": _summary(result),
-            "response/points": _joined([*map(points_of, curves), *map(linear_points, result.response.limits)])}
+    return {
+        "mesh/quality": pd.DataFrame(quality_rows(result.mesh), columns=["what", "value"]),
+        "modes/modes": family_table(excited_set(result), result.mesh, result.clamped),
+        "modes/nodal_diameters": mode_table(result.modes, result.mesh, result.clamped),
+        "modes/stresses": _stresses(result.strength),
+        "contact/pressure": pressure_table(result.contact.maps),
+        **_own_load(result),
+        "response/summary": _summary(result),
+        "response/points": _joined(
+            [*map(points_of, curves), *map(linear_points, result.response.limits)]
+        ),
+    }
 
 
 def _joined(parts: list[pd.DataFrame]) -> pd.DataFrame:
@@ -148,62 +200,130 @@ def _joined(parts: list[pd.DataFrame]) -> pd.DataFrame:
 def _summary(result: pipeline.Run) -> pd.DataFrame:
     """The design table, with the alternating stress of the mode studied."""
     table = pd.DataFrame(summary(result.response.curves, result.response.limits))
-    table.insert(table.columns.get_loc("reduction") + 1, "alternating_stress",
-                 result.strength.alternating * table["peak_amplitude"])
+    table.insert(
+        table.columns.get_loc("reduction") + 1,
+        "alternating_stress",
+        result.strength.alternating * table["peak_amplitude"],
+    )
     return table
 
 
 def _stresses(found: Strength) -> pd.DataFrame:
     """Where the blade is stressed most, by rotation and by the mode studied."""
-    rows = [("rotation", found.steady, found.steady_at),
-            (f"mode {found.mode}, 1 mm at the probe", 1e-3 * found.alternating, found.alternating_at)]
-    return pd.DataFrame([{"state": name, "von_mises_gauss": size, **dict(zip("xyz", place, strict=True))}
-                         for name, size, place in rows if size > 0])
+    rows = [
+        ("rotation", found.steady, found.steady_at),
+        (f"mode {found.mode}, 1 mm at the probe", 1e-3 * found.alternating, found.alternating_at),
+    ]
+    return pd.DataFrame(
+        [
+            {"state": name, "von_mises_gauss": size, **dict(zip("xyz", place, strict=True))}
+            for name, size, place in rows
+            if size > 0
+        ]
+    )
 
 
 def _own_load(result: pipeline.Run) -> dict[str, pd.DataFrame]:
     """The load that the damper's own mass makes at the operating speed, where it makes any."""
     own = result.contact.own
-    return {} if own is None else {"contact/own_load": pd.DataFrame({
-        "mass": [result.contact.problem.mass], "speed": [result.scene.operation.speed], "load": [own]})}
+    return (
+        {}
+        if own is None
+        else {
+            "contact/own_load": pd.DataFrame(
+                {
+                    "mass": [result.contact.problem.mass],
+                    "speed": [result.scene.operation.speed],
+                    "load": [own],
+                }
+            )
+        }
+    )
 
 
 def _by_mass(points: pd.DataFrame) -> list[tuple[str, pd.DataFrame]]:
-    """Name of the picture and response points of each damper mass, the linear limits with all of them."""
+    """Name of the picture and response points of each damper mass, the linear limits with all of
+    them.
+    """
     if "mass" not in points:
         return [("response/forced_response", points)]
-    return [(f"response/forced_response_{1e3 * mass:g}g", points[(points["mass"] == mass) | points["mass"].isna()])
-            for mass in points["mass"].dropna().unique()]
+    return [
+        (
+            f"response/forced_response_{1e3 * mass:g}g",
+            points[(points["mass"] == mass) | points["mass"].isna()],
+        )
+        for mass in points["mass"].dropna().unique()
+    ]
 
 
 def mode_table(sets: list[ModeSet], geometry: Mesh, clamped: ModeSet | None = None) -> pd.DataFrame:
-    """One row a mode of each nodal diameter, named after the clamped blade's modes where these are given."""
-    rows = [pd.DataFrame({"nodal_diameter": 0 if s.nodal_diameter is None else s.nodal_diameter,
-                          "mode": np.arange(1, len(s.frequencies) + 1), "frequency": s.frequencies,
-                          "family": family_table(s, geometry, clamped)["family"],
-                          "residual": s.residuals}) for s in sets]
+    """One row a mode of each nodal diameter, named after the clamped blade's modes where these are
+    given.
+    """
+    rows = [
+        pd.DataFrame(
+            {
+                "nodal_diameter": 0 if s.nodal_diameter is None else s.nodal_diameter,
+                "mode": np.arange(1, len(s.frequencies) + 1),
+                "frequency": s.frequencies,
+                "family": family_table(s, geometry, clamped)["family"],
+                "residual": s.residuals,
+            }
+        )
+        for s in sets
+    ]
     return pd.concat(rows, ignore_index=True)
 
 
 def points_of(curve: Any) -> pd.DataFrame:
     """One row a response point."""
     mass = {} if curve.mass is None else {"mass": curve.mass}
-    return pd.DataFrame({"load": curve.load, **mass, "frequency": curve.frequency, "amplitude": curve.amplitude,
-                         "phase": np.angle(curve.first), "converged": curve.converged, "method": curve.method,
-                         "residual": curve.residual, "iterations": curve.iterations, "slipping": curve.slipping,
-                         "dissipated": curve.dissipated, "imbalance": curve.imbalance,
-                         "estimated_error": curve.estimated, "tolerated_error": curve.tolerated,
-                         "error_checked": curve.checked,
-                         **({"stability": curve.stability, "multiplier": curve.multiplier} if any(curve.stability)
-                            else {})})
+    return pd.DataFrame(
+        {
+            "load": curve.load,
+            **mass,
+            "frequency": curve.frequency,
+            "amplitude": curve.amplitude,
+            "phase": np.angle(curve.first),
+            "converged": curve.converged,
+            "method": curve.method,
+            "residual": curve.residual,
+            "iterations": curve.iterations,
+            "slipping": curve.slipping,
+            "dissipated": curve.dissipated,
+            "imbalance": curve.imbalance,
+            "estimated_error": curve.estimated,
+            "tolerated_error": curve.tolerated,
+            "error_checked": curve.checked,
+            **(
+                {"stability": curve.stability, "multiplier": curve.multiplier}
+                if any(curve.stability)
+                else {}
+            ),
+        }
+    )
 
 
 def linear_points(limit: Limit) -> pd.DataFrame:
     """One row a point of a linear limit, with the columns of :func:`points_of`."""
-    return pd.DataFrame({"load": limit.load, "frequency": limit.frequency, "amplitude": abs(limit.first),
-                         "phase": np.angle(limit.first), "converged": True, "method": "linear", "residual": 0.0,
-                         "iterations": 0, "slipping": 0, "dissipated": 0.0, "imbalance": 0.0,
-                         "estimated_error": 0.0, "tolerated_error": 0.0, "error_checked": False})
+    return pd.DataFrame(
+        {
+            "load": limit.load,
+            "frequency": limit.frequency,
+            "amplitude": abs(limit.first),
+            "phase": np.angle(limit.first),
+            "converged": True,
+            "method": "linear",
+            "residual": 0.0,
+            "iterations": 0,
+            "slipping": 0,
+            "dissipated": 0.0,
+            "imbalance": 0.0,
+            "estimated_error": 0.0,
+            "tolerated_error": 0.0,
+            "error_checked": False,
+        }
+    )
 
 
 def _best(result: pipeline.Run) -> int:
@@ -213,26 +333,44 @@ def _best(result: pipeline.Run) -> int:
 
 def _title(scene: Scene) -> str:
     """What shakes the blade, and where it is seen."""
-    excitation, speed = scene.excitation, scene.operation.speed
-    order = f", engine order {excitation.engine_order} at {show(speed, 'rad/s')}" if speed > 0 else ""
+    excitation = scene.excitation
+    speed = scene.operation.speed
+    order = (
+        f", engine order {excitation.engine_order} at {show(speed, 'rad/s')}" if speed > 0 else ""
+    )
     return f"motion of {excitation.at} under {show(excitation.force, 'N')}{order}"
 
 
-def _drawings(result: pipeline.Run, tables: dict[str, pd.DataFrame]) -> dict[str, Callable[[Path], object]]:
+def _drawings(
+    result: pipeline.Run, tables: dict[str, pd.DataFrame]
+) -> dict[str, Callable[[Path], object]]:
     """What to draw: "section/name" to a function of the file."""
-    geometry, excited, best = result.mesh, excited_set(result), result.response.curves[_best(result)].load
+    geometry = result.mesh
+    excited = excited_set(result)
+    best = result.response.curves[_best(result)].load
     drawings = {
         "mesh/mesh": lambda file: mesh.draw_mesh(geometry, file, title=result.scene.title),
         "modes/first_modes": lambda file: modes.draw_mode_sheet(
-            geometry, excited, file, families=list(tables["modes/modes"]["family"])),
+            geometry, excited, file, families=list(tables["modes/modes"]["family"])
+        ),
         f"contact/{PICTURE}": lambda file: draw_seats(result.contact.maps, best, file),
-        **{name: partial(response.draw_responses, points, title=_title(result.scene))
-           for name, points in _by_mass(tables["response/points"])},
+        **{
+            name: partial(response.draw_responses, points, title=_title(result.scene))
+            for name, points in _by_mass(tables["response/points"])
+        },
         "response/optimum": lambda file: response.draw_optimum(
-            tables["response/summary"], file, points=tables["response/points"], own=result.contact.own)}
+            tables["response/summary"],
+            file,
+            points=tables["response/points"],
+            own=result.contact.own,
+        ),
+    }
     if len(result.modes) > 1:
         number = result.scene.excitation.mode - 1
-        drawings["modes/mode_on_the_wheel"] = lambda file: modes.draw_wheel_mode(geometry, excited, number, file)
+        drawings["modes/mode_on_the_wheel"] = lambda file: modes.draw_wheel_mode(
+            geometry, excited, number, file
+        )
         drawings["modes/frequencies_by_nodal_diameter"] = lambda file: speed.draw_nodal_diameters(
-            tables["modes/nodal_diameters"], file)
+            tables["modes/nodal_diameters"], file
+        )
     return drawings

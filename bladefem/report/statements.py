@@ -7,29 +7,38 @@ from typing import NamedTuple
 import numpy as np
 import pandas as pd
 
-from bladefem.scene import Scene
+from bladefem.scene.tables import Scene
 
 __all__ = ["Answer", "answer", "trust", "wrong_speed"]
 
-APART = 0.1     # of the resonance frequency: farther off, an engine order does not drive it
+# of the resonance frequency: farther off, an engine order does not drive it
+APART = 0.1
 
 
 class Answer(NamedTuple):
     """What the engineer asked for."""
 
-    numbers: list[tuple[str, str, str]]     # what, value, remark
+    # what, value, remark
+    numbers: list[tuple[str, str, str]]
     cautions: list[str]
 
 
-def answer(summary: pd.DataFrame | None, points: pd.DataFrame | None = None, own: pd.DataFrame | None = None) -> Answer:
-    """The best load and what it brings, from a summary table; cautions where that answer stands on weak ground.
+def answer(
+    summary: pd.DataFrame | None,
+    points: pd.DataFrame | None = None,
+    own: pd.DataFrame | None = None,
+) -> Answer:
+    """The best load and what it brings, from a summary table; cautions where that answer stands on
+    weak ground.
 
     Args:
-        summary: one row a load: load [N] (0: free blade, inf: full stick), peak_frequency [Hz], peak_amplitude [m],
-            optionally mass [kg], dissipated or dissipated_energy [J], friction_damping [1], reduction (free over
-            damped amplitude), unconverged (number of points).
+        summary: one row a load: load [N] (0: free blade, inf: full stick), peak_frequency [Hz],
+            peak_amplitude [m], optionally mass [kg], dissipated or dissipated_energy [J],
+            friction_damping [1], reduction (free over damped amplitude), unconverged (number of
+            points).
         points: response table, for the check that the peak lies inside the band.
-        own: one row: mass [kg] of the damper, its speed [rad/s], the load [N] of a seat by that mass alone.
+        own: one row: mass [kg] of the damper, its speed [rad/s], the load [N] of a seat by that
+            mass alone.
     """
     if summary is None or summary.empty:
         return Answer([], [])
@@ -37,26 +46,51 @@ def answer(summary: pd.DataFrame | None, points: pd.DataFrame | None = None, own
     if finite.empty:
         return Answer([], ["No damper load was studied."])
     best = finite.loc[finite["peak_amplitude"].idxmin()]
-    numbers = [("optimum normal load per seat", f"{best['load']:.4g} N", mass_of(best) or among(finite, best)),
-               ("resonance amplitude there", f"{1e6 * best['peak_amplitude']:.4g} µm", reduction(summary, best)),
-               ("resonance frequency there", f"{best['peak_frequency']:.5g} Hz", shift(summary, best))]
+    numbers = [
+        (
+            "optimum normal load per seat",
+            f"{best['load']:.4g} N",
+            mass_of(best) or among(finite, best),
+        ),
+        (
+            "resonance amplitude there",
+            f"{1e6 * best['peak_amplitude']:.4g} µm",
+            reduction(summary, best),
+        ),
+        ("resonance frequency there", f"{best['peak_frequency']:.5g} Hz", shift(summary, best)),
+    ]
     if np.isfinite(best.get("friction_damping", np.nan)):
-        numbers.append(("friction damping ratio there", f"{100 * best['friction_damping']:.3g} %", energy(best)))
+        numbers.append(
+            (
+                "friction damping ratio there",
+                f"{100 * best['friction_damping']:.3g} %",
+                energy(best),
+            )
+        )
     elif energy(best):
         numbers.append(("friction work per cycle there", energy(best).split(" of ")[0], ""))
-    return Answer([*numbers, *stress(summary, best), *own_mass(finite, best, own)], cautions(finite, best, points))
+    return Answer(
+        [*numbers, *stress(summary, best), *own_mass(finite, best, own)],
+        cautions(finite, best, points),
+    )
 
 
 def among(finite: pd.DataFrame, best: pd.Series) -> str:
-    """How close the loads beside the best one are, and where a parabola through the three has its lowest point."""
+    """How close the loads beside the best one are, and where a parabola through the three has its
+    lowest point.
+    """
     table = finite.sort_values("load", ignore_index=True)
     i = int(np.flatnonzero(table["load"] == best["load"])[0])
     if not 0 < i < len(table) - 1:
         return f"best of {len(table)}"
-    x, y = (np.log(table[name].iloc[i - 1:i + 2].to_numpy()) for name in ("load", "peak_amplitude"))
+    x, y = (
+        np.log(table[name].iloc[i - 1 : i + 2].to_numpy()) for name in ("load", "peak_amplitude")
+    )
     a, b, _ = np.polyfit(x - x[1], y, 2)
-    return f"best of {len(table)}; a parabola through it and its neighbours has its lowest point at " \
-           f"{best['load'] * np.exp(-b / (2 * a)):.3g} N"
+    return (
+        f"best of {len(table)}; a parabola through it and its neighbours has its lowest point at "
+        f"{best['load'] * np.exp(-b / (2 * a)):.3g} N"
+    )
 
 
 def stress(summary: pd.DataFrame, best: pd.Series) -> list[tuple[str, str, str]]:
@@ -65,12 +99,21 @@ def stress(summary: pd.DataFrame, best: pd.Series) -> list[tuple[str, str, str]]
         return []
     free = summary.loc[summary["load"] == 0, "alternating_stress"]
     beside = f"; {1e-6 * free.iloc[0]:.3g} MPa without damper" if len(free) else ""
-    return [("alternating stress there", f"{1e-6 * best['alternating_stress']:.3g} MPa",
-             f"largest von Mises amplitude of the mode alone{beside}")]
+    return [
+        (
+            "alternating stress there",
+            f"{1e-6 * best['alternating_stress']:.3g} MPa",
+            f"largest von Mises amplitude of the mode alone{beside}",
+        )
+    ]
 
 
-def own_mass(finite: pd.DataFrame, best: pd.Series, own: pd.DataFrame | None) -> list[tuple[str, str, str]]:
-    """What the damper does as it is, pressed by its own mass, and which mass would press it best."""
+def own_mass(
+    finite: pd.DataFrame, best: pd.Series, own: pd.DataFrame | None
+) -> list[tuple[str, str, str]]:
+    """What the damper does as it is, pressed by its own mass, and which mass would press it
+    best.
+    """
     if own is None or "mass" in finite or len(finite) < 2:
         return []
     mass, speed, load = own[["mass", "speed", "load"]].iloc[0]
@@ -78,14 +121,27 @@ def own_mass(finite: pd.DataFrame, best: pd.Series, own: pd.DataFrame | None) ->
     there = "outside the loads studied"
     if table["load"].iloc[0] <= load <= table["load"].iloc[-1]:
         between = np.interp(np.log(load), np.log(table["load"]), np.log(table["peak_amplitude"]))
-        there = f"resonance amplitude about {1e6 * np.exp(between):.3g} µm, between the loads studied"
-    return [("load of a seat by the damper's own mass", f"{load:.4g} N",
-             f"{1e3 * mass:.3g} g at {speed * 30 / np.pi:.5g} rpm; {there}"),
-            ("mass that makes the optimum load", f"{1e3 * mass * best['load'] / load:.3g} g", "at the same speed")]
+        there = (
+            f"resonance amplitude about {1e6 * np.exp(between):.3g} µm, between the loads studied"
+        )
+    return [
+        (
+            "load of a seat by the damper's own mass",
+            f"{load:.4g} N",
+            f"{1e3 * mass:.3g} g at {speed * 30 / np.pi:.5g} rpm; {there}",
+        ),
+        (
+            "mass that makes the optimum load",
+            f"{1e3 * mass * best['load'] / load:.3g} g",
+            "at the same speed",
+        ),
+    ]
 
 
 def wrong_speed(scene: Scene, summary: pd.DataFrame | None) -> list[str]:
-    """A caution where the engine order, at the scene's speed, excites far from the resonances that were studied."""
+    """A caution where the engine order, at the scene's speed, excites far from the resonances that
+    were studied.
+    """
     if summary is None or scene.kind == "plane blades" or not scene.operation.speed > 0:
         return []
     excited = scene.excitation.engine_order * scene.operation.speed / (2 * np.pi)
@@ -93,14 +149,18 @@ def wrong_speed(scene: Scene, summary: pd.DataFrame | None) -> list[str]:
     if (1 - APART) * peaks.min() <= excited <= (1 + APART) * peaks.max():
         return []
     rpm = scene.operation.speed * 30 / np.pi
-    return [f"At {rpm:.5g} rpm engine order {scene.excitation.engine_order} excites at {excited:.5g} Hz and does not "
-            f"meet these resonances: with the stiffness of this speed they belong to "
-            f"{rpm * peaks.min() / excited:.4g} to {rpm * peaks.max() / excited:.4g} rpm. 'bladefem modes --campbell' "
-            "shows where they cross."]
+    return [
+        f"At {rpm:.5g} rpm engine order {scene.excitation.engine_order} excites at {excited:.5g} "
+        "Hz and does not "
+        f"meet these resonances: with the stiffness of this speed they belong to "
+        f"{rpm * peaks.min() / excited:.4g} to {rpm * peaks.max() / excited:.4g} rpm. 'bladefem "
+        "modes --campbell' "
+        "shows where they cross."
+    ]
 
 
 def mass_of(best: pd.Series) -> str:
-    """"with a damper of 12.5 g"."""
+    """ "with a damper of 12.5 g"."""
     return f"with a damper of {1e3 * best['mass']:.4g} g" if "mass" in best else ""
 
 
@@ -119,7 +179,9 @@ def shift(summary: pd.DataFrame, best: pd.Series) -> str:
     """Where the resonance lies between the free and the stuck blade."""
     ends = [summary.loc[summary["load"] == load, "peak_frequency"] for load in (0.0, np.inf)]
     words = ("free", "in full stick")
-    return ", ".join(f"{end.iloc[0]:.5g} Hz {word}" for end, word in zip(ends, words, strict=True) if len(end))
+    return ", ".join(
+        f"{end.iloc[0]:.5g} Hz {word}" for end, word in zip(ends, words, strict=True) if len(end)
+    )
 
 
 def energy(best: pd.Series) -> str:
@@ -132,17 +194,28 @@ def cautions(finite: pd.DataFrame, best: pd.Series, points: pd.DataFrame | None)
     """Why the answer may not be the optimum."""
     found = []
     if len(finite) == 1:
-        found.append("Only one load was studied: whether it is the optimum is not known; give more study.loads.")
+        found.append(
+            "Only one load was studied: whether it is the optimum is not known; give more "
+            "study.loads."
+        )
     if len(finite) > 1 and best["load"] in (finite["load"].min(), finite["load"].max()):
         end = "smallest" if best["load"] == finite["load"].min() else "largest"
-        found.append(f"The best load is the {end} one studied: the true optimum may lie beyond it; widen study.loads.")
+        found.append(
+            f"The best load is the {end} one studied: the true optimum may lie beyond it; widen "
+            "study.loads."
+        )
     if best.get("unconverged", 0) > 0:
-        found.append("The curve of the best load has points that did not converge: its peak may be missed.")
+        found.append(
+            "The curve of the best load has points that did not converge: its peak may be missed."
+        )
     cut = cut_peaks(finite, points)
     if cut:
         named = ", ".join(f"{load:.4g} N" for load in cut)
-        found.append(f"For {len(cut)} of {len(finite)} loads ({named}) the highest point lies at the end of the "
-                     "frequency band, so that no resonance was seen; widen study.band.")
+        found.append(
+            f"For {len(cut)} of {len(finite)} loads ({named}) the highest point lies at the end "
+            "of the "
+            "frequency band, so that no resonance was seen; widen study.band."
+        )
     return found
 
 
@@ -151,15 +224,20 @@ def cut_peaks(finite: pd.DataFrame, points: pd.DataFrame | None) -> list[float]:
     if points is None or points.empty:
         return []
     ends = points.groupby("load")["frequency"].agg(["min", "max"])
-    return [row["load"] for _, row in finite.iterrows() if row["load"] in ends.index
-            and row["peak_frequency"] in ends.loc[row["load"]].to_numpy()]
+    return [
+        row["load"]
+        for _, row in finite.iterrows()
+        if row["load"] in ends.index and row["peak_frequency"] in ends.loc[row["load"]].to_numpy()
+    ]
 
 
 def trust(points: pd.DataFrame | None) -> tuple[list[str], pd.DataFrame]:
-    """Sentences on convergence, and a row for each load with points that failed or needed a fallback.
+    """Sentences on convergence, and a row for each load with points that failed or needed a
+    fallback.
 
     Args:
-        points: response table: load [N], frequency [Hz], converged, method, residual, iterations, optionally reason.
+        points: response table: load [N], frequency [Hz], converged, method, residual, iterations,
+            optionally reason.
     """
     points = points if points is None else points[points["method"] != "linear"]
     if points is None or points.empty:
@@ -169,14 +247,23 @@ def trust(points: pd.DataFrame | None) -> tuple[list[str], pd.DataFrame]:
     usual = usual.iloc[0] if len(usual) else ""
     fallback = good & (points["method"] != usual)
     worst = points.loc[good, "residual"].max() if good.any() else np.nan
-    text = [f"{int(good.sum())} of {len(points)} points converged; the largest accepted residual is {worst:.1e}."]
+    text = [
+        f"{int(good.sum())} of {len(points)} points converged; the largest accepted residual is "
+        f"{worst:.1e}."
+    ]
     if (~good).any():
-        text.append(f"{int((~good).sum())} points did NOT converge. They are marked by crosses in the charts and "
-                    "take no part in any peak or optimum.")
+        text.append(
+            f"{int((~good).sum())} points did NOT converge. They are marked by crosses in the "
+            "charts and "
+            "take no part in any peak or optimum."
+        )
     if fallback.any():
         used = points.loc[fallback, "method"].value_counts()
-        text.append(f"{int(fallback.sum())} points were not reached by {usual} and needed a fallback: "
-                    + ", ".join(f"{name} ({count})" for name, count in used.items()) + ".")
+        text.append(
+            f"{int(fallback.sum())} points were not reached by {usual} and needed a fallback: "
+            + ", ".join(f"{name} ({count})" for name, count in used.items())
+            + "."
+        )
     return text, doubtful_loads(points, good, fallback)
 
 
@@ -187,9 +274,19 @@ def doubtful_loads(points: pd.DataFrame, good: pd.Series, fallback: pd.Series) -
         bad = part[~good[part.index]]
         if bad.empty and not fallback[part.index].any():
             continue
-        where = f"{bad['frequency'].min():.5g} to {bad['frequency'].max():.5g} Hz" if len(bad) else ""
+        where = (
+            f"{bad['frequency'].min():.5g} to {bad['frequency'].max():.5g} Hz" if len(bad) else ""
+        )
         reasons = "; ".join(map(str, bad["reason"].unique())) if "reason" in bad else ""
-        rows.append({"load": load, "points": len(part), "not converged": len(bad), "where": where,
-                     "by fallback": int(fallback[part.index].sum()), "worst residual": part["residual"].max(),
-                     **({"reason": reasons} if reasons else {})})
+        rows.append(
+            {
+                "load": load,
+                "points": len(part),
+                "not converged": len(bad),
+                "where": where,
+                "by fallback": int(fallback[part.index].sum()),
+                "worst residual": part["residual"].max(),
+                **({"reason": reasons} if reasons else {}),
+            }
+        )
     return pd.DataFrame(rows)

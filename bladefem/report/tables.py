@@ -9,7 +9,7 @@ from typing import Any, NamedTuple
 import numpy as np
 import pandas as pd
 
-from bladefem.store import write_table, write_text
+from bladefem.io.stage_cache import write_table, write_text
 
 __all__ = ["COLUMNS", "Column", "readable", "to_latex", "to_markdown", "units_of", "write_tables"]
 
@@ -18,55 +18,89 @@ class Column(NamedTuple):
     """How a column of SI numbers is shown."""
 
     title: str
-    unit: str = ""          # SI, as stored; "" for words and plain numbers
-    shown: str = ""         # unit in the table, the SI unit when empty
-    factor: float = 1.0     # from SI to the shown unit
+    # SI, as stored; "" for words and plain numbers
+    unit: str = ""
+    # unit in the table, the SI unit when empty
+    shown: str = ""
+    # from SI to the shown unit
+    factor: float = 1.0
     digits: int = 5
 
 
 RPM = 60 / (2 * np.pi)
 COLUMNS = {
-    "load": Column("normal load", "N"), "frequency": Column("frequency", "Hz"), "engine_order": Column("engine order"),
-    "amplitude": Column("amplitude", "m", "µm", 1e6), "mass": Column("damper mass", "kg", "g", 1e3),
-    "peak_frequency": Column("resonance", "Hz"), "peak_amplitude": Column("resonance amplitude", "m", "µm", 1e6),
+    "load": Column("normal load", "N"),
+    "frequency": Column("frequency", "Hz"),
+    "engine_order": Column("engine order"),
+    "amplitude": Column("amplitude", "m", "µm", 1e6),
+    "mass": Column("damper mass", "kg", "g", 1e3),
+    "peak_frequency": Column("resonance", "Hz"),
+    "peak_amplitude": Column("resonance amplitude", "m", "µm", 1e6),
     "dissipated_energy": Column("friction work per cycle", "J", "mJ", 1e3, 4),
     "dissipated": Column("friction work per cycle", "J", "mJ", 1e3, 4),
     "friction_damping": Column("friction damping", "1", "%", 100.0, 3),
-    "reduction": Column("free over damped", "1", digits=4), "residual": Column("residual", "1", digits=2),
-    "phase": Column("phase", "rad", "deg", 180 / np.pi, 4), "imbalance": Column("energy imbalance", "1", digits=2),
-    "slipping": Column("slipping elements"), "points": Column("points"), "unconverged": Column("not converged"),
-    "nodal_diameter": Column("nodal diameter"), "mode": Column("mode"), "family": Column("family"),
-    "mac": Column("MAC", "1", digits=3), "aerofoil_share": Column("aerofoil's share", "1", "%", 100.0, 3),
+    "reduction": Column("free over damped", "1", digits=4),
+    "residual": Column("residual", "1", digits=2),
+    "phase": Column("phase", "rad", "deg", 180 / np.pi, 4),
+    "imbalance": Column("energy imbalance", "1", digits=2),
+    "slipping": Column("slipping elements"),
+    "points": Column("points"),
+    "unconverged": Column("not converged"),
+    "nodal_diameter": Column("nodal diameter"),
+    "mode": Column("mode"),
+    "family": Column("family"),
+    "mac": Column("MAC", "1", digits=3),
+    "aerofoil_share": Column("aerofoil's share", "1", "%", 100.0, 3),
     "speed": Column("speed", "rad/s", "rpm", RPM),
     "speed_at_resonance": Column("speed at resonance", "rad/s", "rpm", RPM),
     **{name: Column(name, "Hz") for name in ("forward", "backward", "limit", "natural")},
-    "peaked": Column("a maximum"), "largest": Column("largest displacement", "m", "µm", 1e6),
+    "peaked": Column("a maximum"),
+    "largest": Column("largest displacement", "m", "µm", 1e6),
     "alternating_stress": Column("alternating stress", "Pa", "MPa", 1e-6, 4),
     "von_mises": Column("von Mises", "Pa", "MPa", 1e-6, 4),
     "von_mises_gauss": Column("von Mises at Gauss points", "Pa", "MPa", 1e-6, 4),
     "principal": Column("largest principal", "Pa", "MPa", 1e-6, 4),
     "pressing": Column("smallest principal", "Pa", "MPa", 1e-6, 4),
-    "frequency_of_partner": Column("frequency of partner", "Hz"), "size": Column("element size", "m", "mm", 1e3, 4),
+    "frequency_of_partner": Column("frequency of partner", "Hz"),
+    "size": Column("element size", "m", "mm", 1e3, 4),
     "scatter": Column("scatter of meshes", "1", "%", 100.0, 2),
-    "order": Column("observed order", "1", digits=3), "sum": Column("sum of shares", "1", "%", 100.0, 4),
-    "excitation": Column("excitation", "Hz"), "margin": Column("margin", "1", "%", 100.0, 3),
-    "patch": Column("seat"), "force": Column("normal force", "N"), "area": Column("area", "m^2", "mm²", 1e6),
+    "order": Column("observed order", "1", digits=3),
+    "sum": Column("sum of shares", "1", "%", 100.0, 4),
+    "excitation": Column("excitation", "Hz"),
+    "margin": Column("margin", "1", "%", 100.0, 3),
+    "patch": Column("seat"),
+    "force": Column("normal force", "N"),
+    "area": Column("area", "m^2", "mm²", 1e6),
     "pressure": Column("pressure", "Pa", "MPa", 1e-6, 4),
     "peak_pressure": Column("peak pressure", "Pa", "MPa", 1e-6, 4),
     "mean_pressure": Column("mean pressure", "Pa", "MPa", 1e-6, 4),
     "middle_pressure": Column("pressure in the middle", "Pa", "MPa", 1e-6),
     "middle_pressure_exact": Column("closed form", "Pa", "MPa", 1e-6),
     "pressure_exact": Column("closed form", "Pa", "MPa", 1e-6),
-    "contact_radius": Column("contact radius", "m", "mm", 1e3), "radius": Column("radius", "m", "mm", 1e3),
+    "contact_radius": Column("contact radius", "m", "mm", 1e3),
+    "radius": Column("radius", "m", "mm", 1e3),
     "contact_radius_exact": Column("closed form", "m", "mm", 1e3),
-    "approach": Column("approach", "m", "µm", 1e6), "approach_exact": Column("of half spaces", "m", "µm", 1e6),
+    "approach": Column("approach", "m", "µm", 1e6),
+    "approach_exact": Column("of half spaces", "m", "µm", 1e6),
     "pressure_error": Column("pressure's L2 error", "1", "%", 100.0, 2),
-    "contact_share": Column("share pressed", "1", "%", 100.0, 3), "gap": Column("gap", "m", "µm", 1e6, 3),
-    **{name: Column(name, "m", "mm", 1e3) for name in "xyz"}, "work": Column("friction work an area", "J/m^2"),
-    "mu": Column("friction coefficient"), "kt": Column("k_t", "N/m"), "kn": Column("k_n", "N/m"),
-    "n0": Column("static normal force", "N"), "free_static_force": Column("free static friction", "N", digits=4),
-    **{f"{name}{t}": Column(f"{title}{t.replace('_', ' ')}", unit, digits=4) for t in ("", "_t1", "_t2")
-       for name, title, unit in (("k_ad", "K_ad", "N/m"), ("c_ad", "C_ad", "N s/m"), ("f_c0", "F_c0", "N"))},
+    "contact_share": Column("share pressed", "1", "%", 100.0, 3),
+    "gap": Column("gap", "m", "µm", 1e6, 3),
+    **{name: Column(name, "m", "mm", 1e3) for name in "xyz"},
+    "work": Column("friction work an area", "J/m^2"),
+    "mu": Column("friction coefficient"),
+    "kt": Column("k_t", "N/m"),
+    "kn": Column("k_n", "N/m"),
+    "n0": Column("static normal force", "N"),
+    "free_static_force": Column("free static friction", "N", digits=4),
+    **{
+        f"{name}{t}": Column(f"{title}{t.replace('_', ' ')}", unit, digits=4)
+        for t in ("", "_t1", "_t2")
+        for name, title, unit in (
+            ("k_ad", "K_ad", "N/m"),
+            ("c_ad", "C_ad", "N s/m"),
+            ("f_c0", "F_c0", "N"),
+        )
+    },
     "wear_per_hour": Column("wear in an hour", "m", "µm", 1e6, 4),
     "wear_volume": Column("worn in an hour", "m^3", "mm³", 1e9, 4),
     "mean_wear": Column("mean depth in an hour", "m", "µm", 1e6, 4),
@@ -75,29 +109,43 @@ COLUMNS = {
     **{f"centre_{name}": Column(f"centre {name}", "m", "mm", 1e3) for name in "xyz"},
     **{f"force_{name}": Column(f"force {name}", "N") for name in "xyz"},
     **{f"moment_{name}": Column(f"moment {name}", "N m", digits=4) for name in "xyz"},
-    "complementarity": Column("complementarity", "1", digits=2), "time": Column("time", "s", digits=3),
+    "complementarity": Column("complementarity", "1", digits=2),
+    "time": Column("time", "s", digits=3),
     "error": Column("estimated error", "1", "%", 100.0, 2),
     "free_frequency": Column("without damper", "Hz"),
     "free_amplitude": Column("amplitude without damper", "m", "µm", 1e6),
     "halved": Column("change with half the contact points", "1", "%", 100.0, 2),
     "estimated_error": Column("estimated error", "1", "%", 100.0, 2),
-    "tolerated_error": Column("tolerated error", "1", "%", 100.0, 3), "error_checked": Column("error checked here"),
-    "stability": Column("stability"), "multiplier": Column("largest Floquet multiplier", "1", digits=6),
+    "tolerated_error": Column("tolerated error", "1", "%", 100.0, 3),
+    "error_checked": Column("error checked here"),
+    "stability": Column("stability"),
+    "multiplier": Column("largest Floquet multiplier", "1", digits=6),
     "effective_mass": Column("effective mass", "kg", digits=4),
-    "share": Column("share", "1", "%", 100.0, 3), "factor": Column("participation", "kg^1/2", digits=4),
+    "share": Column("share", "1", "%", 100.0, 3),
+    "factor": Column("participation", "kg^1/2", digits=4),
 }
 
 
 def units_of(table: pd.DataFrame) -> dict[str, str]:
     """SI units of the known columns, for CSV heads."""
-    return {name: COLUMNS[name].unit for name in table if name in COLUMNS and COLUMNS[name].unit not in ("", "1")}
+    return {
+        name: COLUMNS[name].unit
+        for name in table
+        if name in COLUMNS and COLUMNS[name].unit not in ("", "1")
+    }
 
 
 def readable(table: pd.DataFrame) -> pd.DataFrame:
-    """The same table as text: titles with units in the head, numbers rounded and in the unit that people use."""
+    """The same table as text: titles with units in the head, numbers rounded and in the unit that
+    people use.
+    """
     columns = {name: COLUMNS.get(name, Column(_words(str(name)))) for name in table}
-    return pd.DataFrame({head(column): [cell(value, column) for value in table[name]]
-                         for name, column in columns.items()})
+    return pd.DataFrame(
+        {
+            head(column): [cell(value, column) for value in table[name]]
+            for name, column in columns.items()
+        }
+    )
 
 
 def _words(name: str) -> str:
@@ -106,7 +154,7 @@ def _words(name: str) -> str:
 
 
 def head(column: Column) -> str:
-    """"resonance amplitude [µm]"."""
+    """ "resonance amplitude [µm]"."""
     unit = column.shown or column.unit
     return f"{column.title} [{unit}]" if unit and unit != "1" else column.title
 
@@ -141,8 +189,17 @@ def numeric(table: pd.DataFrame) -> list[bool]:
 def to_markdown(table: pd.DataFrame) -> str:
     """A GitHub table with units in the head; numbers to the right."""
     text = readable(table)
-    lines = [text.columns, ["---:" if n else "---" for n in numeric(text)], *text.itertuples(index=False)]
-    return "\n".join("| " + " | ".join(str(c).replace("|", "\\|") for c in line) + " |" for line in lines) + "\n"
+    lines = [
+        text.columns,
+        ["---:" if n else "---" for n in numeric(text)],
+        *text.itertuples(index=False),
+    ]
+    return (
+        "\n".join(
+            "| " + " | ".join(str(c).replace("|", "\\|") for c in line) + " |" for line in lines
+        )
+        + "\n"
+    )
 
 
 def to_latex(table: pd.DataFrame, caption: str = "") -> str:
@@ -150,16 +207,38 @@ def to_latex(table: pd.DataFrame, caption: str = "") -> str:
     text = readable(table)
     rows = [" & ".join(map(escape, row)) + r" \\" for row in text.itertuples(index=False)]
     align = "".join("r" if n else "l" for n in numeric(text))
-    lines = [r"\begin{table}", r"  \centering", *([rf"  \caption{{{escape(caption)}}}"] if caption else []),
-             rf"  \begin{{tabular}}{{{align}}}", r"    \toprule",
-             "    " + " & ".join(map(escape, text.columns)) + r" \\", r"    \midrule",
-             *("    " + row for row in rows), r"    \bottomrule", r"  \end{tabular}", r"\end{table}"]
+    lines = [
+        r"\begin{table}",
+        r"  \centering",
+        *([rf"  \caption{{{escape(caption)}}}"] if caption else []),
+        rf"  \begin{{tabular}}{{{align}}}",
+        r"    \toprule",
+        "    " + " & ".join(map(escape, text.columns)) + r" \\",
+        r"    \midrule",
+        *("    " + row for row in rows),
+        r"    \bottomrule",
+        r"  \end{tabular}",
+        r"\end{table}",
+    ]
     return "\n".join(lines) + "\n"
 
 
-LATEX = {"\\": r"\textbackslash{}", "%": r"\%", "&": r"\&", "_": r"\_", "#": r"\#", "$": r"\$", "{": r"\{", "}": r"\}",
-         "^": r"\textasciicircum{}", "~": r"\textasciitilde{}", "∞": r"$\infty$", "µ": r"\textmu{}", "²": r"$^2$",
-         "³": r"$^3$"}
+LATEX = {
+    "\\": r"\textbackslash{}",
+    "%": r"\%",
+    "&": r"\&",
+    "_": r"\_",
+    "#": r"\#",
+    "$": r"\$",
+    "{": r"\{",
+    "}": r"\}",
+    "^": r"\textasciicircum{}",
+    "~": r"\textasciitilde{}",
+    "∞": r"$\infty$",
+    "µ": r"\textmu{}",
+    "²": r"$^2$",
+    "³": r"$^3$",
+}
 
 
 def escape(text: object) -> str:
@@ -167,11 +246,17 @@ def escape(text: object) -> str:
     return "".join(LATEX.get(letter, letter) for letter in str(text))
 
 
-def write_tables(table: pd.DataFrame, stem: str | Path, caption: str = "",
-                 formats: Iterable[str] = ("csv", "md", "tex")) -> list[Path]:
+def write_tables(
+    table: pd.DataFrame,
+    stem: str | Path,
+    caption: str = "",
+    formats: Iterable[str] = ("csv", "md", "tex"),
+) -> list[Path]:
     """Write ``stem``.csv (SI, full digits), .md and .tex (readable units); returns the files."""
-    writers = {"csv": lambda file: write_table(file, table, units_of(table)),
-               "md": lambda file: write_text(file, to_markdown(table)),
-               "tex": lambda file: write_text(file, to_latex(table, caption))}
+    writers = {
+        "csv": lambda file: write_table(file, table, units_of(table)),
+        "md": lambda file: write_text(file, to_markdown(table)),
+        "tex": lambda file: write_text(file, to_latex(table, caption)),
+    }
     Path(stem).parent.mkdir(parents=True, exist_ok=True)
     return [writers[kind](Path(stem).with_name(f"{Path(stem).name}.{kind}")) for kind in formats]

@@ -1,4 +1,6 @@
-"""The run folder of a scene of kind "z mass": pressure, loops, drift and spectra for each frequency ratio."""
+"""The run folder of a scene of kind "z mass": pressure, loops, drift and spectra for each frequency
+ratio.
+"""
 
 from __future__ import annotations
 
@@ -13,10 +15,10 @@ import pandas as pd
 
 from bladefem.damper.loops import Drive, Steady, spectrum
 from bladefem.damper.zmass import MassOnFoundation
-from bladefem.scene import Scene
-from bladefem.scene_file import dump
-from bladefem.store import on_root, write_results, write_table
-from bladefem.study.zmass import Pressed, mass_on_foundation, mean_load, motions, press
+from bladefem.io.stage_cache import on_root, write_results, write_table
+from bladefem.scene.tables import Scene
+from bladefem.scene.toml import dump
+from bladefem.study.kinds.zmass import Pressed, mass_on_foundation, mean_load, motions, press
 from bladefem.view import contact, mesh, paper
 
 from .datasets import resultants, table_dataset
@@ -34,7 +36,8 @@ class MassRun:
     pressed: Pressed
     body: MassOnFoundation
     motions: list[tuple[Drive, Steady]]
-    timings: dict[str, float]       # stage to seconds
+    # stage to seconds
+    timings: dict[str, float]
     messages: list[str]
 
 
@@ -46,7 +49,8 @@ def run(scene: Scene, folder: str | Path, comm: Any = None) -> MassRun:
     """
     start = perf_counter()
     pressed = press(scene, folder, comm)
-    body, pressure = mass_on_foundation(scene, pressed.seat), perf_counter()
+    body = mass_on_foundation(scene, pressed.seat)
+    pressure = perf_counter()
     found = on_root(comm, lambda: list(motions(scene, body)))
     timings = {"pressure": pressure - start, "motion": perf_counter() - pressure}
     messages = [f"ratio {d.ratio}: {s.reason}" for d, s in found if s.reason != "periodic"]
@@ -56,17 +60,27 @@ def run(scene: Scene, folder: str | Path, comm: Any = None) -> MassRun:
 
 
 def motion_table(found: list[tuple[Drive, Steady]]) -> pd.DataFrame:
-    """One row a frequency ratio: loops, drift [m/s], turning speed [rad/s], amplitude at the foundation's frequency."""
+    """One row a frequency ratio: loops, drift [m/s], turning speed [rad/s], amplitude at the
+    foundation's frequency.
+    """
     rows = []
     for drive, result in found:
         frequency, lines = spectrum(result)
         main = lines[np.argmin(abs(frequency - drive.frequency)), 0]
-        rows.append({"ratio": str(drive.ratio), "load frequency [Hz]": float(drive.ratio) * drive.frequency,
-                     "loops": result.loops, "denominator": drive.ratio.denominator,
-                     "drift x [m/s]": result.drift[0], "drift y [m/s]": result.drift[1],
-                     "turning, mean [rad/s]": result.drift[2],
-                     "turning, largest [rad/s]": float(np.abs(result.motion.velocity[:, 2]).max()),
-                     "amplitude": main, "periodic": result.reason == "periodic"})
+        rows.append(
+            {
+                "ratio": str(drive.ratio),
+                "load frequency [Hz]": float(drive.ratio) * drive.frequency,
+                "loops": result.loops,
+                "denominator": drive.ratio.denominator,
+                "drift x [m/s]": result.drift[0],
+                "drift y [m/s]": result.drift[1],
+                "turning, mean [rad/s]": result.drift[2],
+                "turning, largest [rad/s]": float(np.abs(result.motion.velocity[:, 2]).max()),
+                "amplitude": main,
+                "periodic": result.reason == "periodic",
+            }
+        )
     return pd.DataFrame(rows)
 
 
@@ -85,16 +99,26 @@ def draw_motions(found: list[tuple[Drive, Steady]], loops: Path, spectra: Path) 
 
 
 def _write(scene: Scene, result: MassRun) -> None:
-    folder, seat = result.folder, result.pressed.seat
-    tables: Mapping[str, pd.DataFrame] = {"contact/pressure": contact.pressure_summary([seat]),
-                                          "response/motion": motion_table(result.motions)}
+    folder = result.folder
+    seat = result.pressed.seat
+    tables: Mapping[str, pd.DataFrame] = {
+        "contact/pressure": contact.pressure_summary([seat]),
+        "response/motion": motion_table(result.motions),
+    }
     for name, table in tables.items():
         write_tables(table, folder / name.split("/")[1], name.split("/")[1])
-    points, load = contact.pressure_points([seat]), mean_load(scene)
+    points = contact.pressure_points([seat])
+    load = mean_load(scene)
     write_table(folder / "pressure_points.csv", points, units_of(points))
-    write_results(folder / "results.nc", {
-        "resultants": resultants(tables["contact/pressure"].assign(load=load)), "nodes": table_dataset(points, "node"),
-        "motion": table_dataset(tables["response/motion"], "case")}, dump(scene))
+    write_results(
+        folder / "results.nc",
+        {
+            "resultants": resultants(tables["contact/pressure"].assign(load=load)),
+            "nodes": table_dataset(points, "node"),
+            "motion": table_dataset(tables["response/motion"], "case"),
+        },
+        dump(scene),
+    )
     contact.save_pressure_vtu({load: [seat]}, folder / "pressure.vtu")
     names = ("mesh/mesh", "contact/pressure_on_the_footprint", "response/loops", "response/spectra")
     figures = {name: folder / f"{name.split('/')[1]}.png" for name in names}

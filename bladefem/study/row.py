@@ -1,9 +1,11 @@
-"""The row of plane blades with flat dampers as the paper computes it (Sect. 5), from 2-D finite elements.
+"""The row of plane blades with flat dampers as the paper computes it (Sect. 5), from 2-D finite
+elements.
 
-Blade in plane stress, clamped at its root, by its modes; damper rigid and free along the row only; the normal load of
-each contact point from the quasi-static contact solve, constant in time. The residual flexibility of the modes left
-out is dropped, so that the balance, the paper's loop and time integration solve the very same equations; ``whole``
-keeps it, and the damper's other two freedoms with the normal load that follows them, to see what that leaves out.
+Blade in plane stress, clamped at its root, by its modes; damper rigid and free along the row only;
+the normal load of each contact point from the quasi-static contact solve, constant in time. The
+residual flexibility of the modes left out is dropped, so that the balance, the paper's loop and
+time integration solve the very same equations; ``whole`` keeps it, and the damper's other two
+freedoms with the normal load that follows them, to see what that leaves out.
 """
 
 from __future__ import annotations
@@ -13,17 +15,24 @@ from typing import Any
 
 import numpy as np
 
-from ..contact.seat import ContactProblem, solve
-from ..contact.stiffness import friction_elements, pair_ratio
+from ..contact.interface_elements import friction_elements, pair_ratio
+from ..contact.seating import ContactProblem, solve
 from ..data import RigidBody
 from ..errors import InputError
 from ..hbm.model import ReducedModel
+from ..io.stage_cache import stage
 from ..reduction.assemble import recombine
-from ..scene import Scene
-from ..store import stage
-from .joint import LoadCase, joint_model
-from .keys import contact_key
-from .stages import Bodies, Reduced, build_mesh, contact_patches, reduce_sector, seat_damper
+from ..scene.tables import Scene
+from .pipeline.assemble_model import LoadCase, joint_model
+from .pipeline.keys import contact_key
+from .pipeline.stages import (
+    Bodies,
+    Reduced,
+    build_mesh,
+    contact_patches,
+    reduce_sector,
+    seat_damper,
+)
 
 __all__ = ["Row", "paper_model", "row_of_blades", "whole_model"]
 
@@ -51,14 +60,18 @@ def row_of_blades(scene: Scene, modes: int = 8, folder: Any = None, comm: Any = 
 
     def compute() -> Row:
         mesh = build_mesh(scene, comm)
-        bodies, patches = Bodies(scene, mesh, comm), contact_patches(mesh)
+        bodies = Bodies(scene, mesh, comm)
+        patches = contact_patches(mesh)
         return Row(seat_damper(bodies, patches), reduce_sector(bodies, patches, [0], modes), mesh)
 
     return stage(folder, "row", contact_key(scene) + f"-{modes}", compute, comm)[0]
 
 
-def paper_model(scene: Scene, row: Row, load: float, mass: float | None = None, harmonics: int = 31) -> ReducedModel:
-    """The paper's model: tangential freedoms only, prescribed normal loads, a damper that moves along the row.
+def paper_model(
+    scene: Scene, row: Row, load: float, mass: float | None = None, harmonics: int = 31
+) -> ReducedModel:
+    """The paper's model: tangential freedoms only, prescribed normal loads, a damper that moves
+    along the row.
 
     Args:
         load: normal load of a seat [N].
@@ -67,17 +80,26 @@ def paper_model(scene: Scene, row: Row, load: float, mass: float | None = None, 
     model = _joint(scene.vary(contact__normal="prescribed"), row, load, "mass", harmonics)
     nodes = len(model.elements.kt)
     tangents = np.kron(np.eye(nodes), [[0.0, 1.0]])
-    sides = tuple(replace(side, residual=0 * side.residual) for side in (recombine(s, tangents) for s in model.sides))
+    sides = tuple(
+        replace(side, residual=0 * side.residual)
+        for side in (recombine(s, tangents) for s in model.sides)
+    )
     mass = row.reduced.mass if mass is None else mass
-    return replace(model, sides=sides, damper=RigidBody(mass * np.eye(1), tangents @ model.damper.B))
+    return replace(
+        model, sides=sides, damper=RigidBody(mass * np.eye(1), tangents @ model.damper.B)
+    )
 
 
-def whole_model(scene: Scene, row: Row, load: float, damper: str = "rigid", harmonics: int = 31) -> ReducedModel:
-    """The same blades without the paper's simplifications: residual flexibility, and normal loads that follow.
+def whole_model(
+    scene: Scene, row: Row, load: float, damper: str = "rigid", harmonics: int = 31
+) -> ReducedModel:
+    """The same blades without the paper's simplifications: residual flexibility, and normal loads
+    that follow.
 
     Args:
         load: static normal load of a seat [N].
-        damper: "mass" (residual flexibility only), "rigid" (three freedoms, normal springs) or "elastic".
+        damper: "mass" (residual flexibility only), "rigid" (three freedoms, normal springs) or
+            "elastic".
     """
     return _joint(scene, row, load, damper, harmonics)
 
@@ -85,6 +107,10 @@ def whole_model(scene: Scene, row: Row, load: float, damper: str = "rigid", harm
 def _joint(scene: Scene, row: Row, load: float, damper: str, harmonics: int) -> ReducedModel:
     maps = solve(row.problem, 0.0, normal=load, bedded=scene.contact.bedded)
     ratio = pair_ratio(scene.material.blade, scene.material.damper)
-    elements, selection = friction_elements(row.problem, maps, scene.contact, ratio, row.mesh.dimension - 1)
+    elements, selection = friction_elements(
+        row.problem, maps, scene.contact, ratio, row.mesh.dimension - 1
+    )
     case = LoadCase(load, elements, selection)
-    return joint_model(scene, row.mesh, row.reduced, list(row.problem.patches), case, harmonics, damper)
+    return joint_model(
+        scene, row.mesh, row.reduced, list(row.problem.patches), case, harmonics, damper
+    )

@@ -15,33 +15,56 @@ from .style import canvas, log_axis
 
 __all__ = ["draw_chart", "draw_errors"]
 
-ERRORS = {"error": "resonance amplitude", "error_frequency": "resonance frequency",
-          "error_phasor": "worst phasor over the highest one"}
+ERRORS = {
+    "error": "resonance amplitude",
+    "error_frequency": "resonance frequency",
+    "error_phasor": "worst phasor over the highest one",
+}
 
 
-def draw_chart(tables: Mapping[str, pd.DataFrame], file: str | Path | None = None, *,
-               tolerance: float | None = None, title: str = "") -> object:
+def draw_chart(
+    tables: Mapping[str, pd.DataFrame],
+    file: str | Path | None = None,
+    *,
+    tolerance: float | None = None,
+    title: str = "",
+) -> object:
     """Error of the resonance amplitude over time, one panel a table; returns the figure.
 
     Args:
-        tables: name to table of ``bladefem.study.chart.Chart``, "methods" and "models" timed by frequency, "meshes"
-            from drawing to resonance; rows that were left out are not drawn, errors below the reference's own (grey)
-            are drawn at it.
+        tables: name to table of ``bladefem.study.chart.chart.Chart``, "methods" and "models" timed
+            by frequency, "meshes" from drawing to resonance; rows that were left out are not drawn,
+            errors below the reference's own (grey) are drawn at it.
         file: PNG to write.
         tolerance: wanted relative accuracy.
         title: headline.
     """
-    with canvas(file, None, (9.5, 4.3 * len(tables) + 0.4), (len(tables), 1), squeeze=False) as axes:
+    with canvas(
+        file, None, (9.5, 4.3 * len(tables) + 0.4), (len(tables), 1), squeeze=False
+    ) as axes:
         for ax, (what, table) in zip(axes[:, 0], tables.items(), strict=True):
             floor = max(np.nan_to_num(table["reference_error"].iloc[0]), 1e-12)
-            error = table["error"] if what != "meshes" else table[["error", "error_frequency"]].max(axis=1)
+            error = (
+                table["error"]
+                if what != "meshes"
+                else table[["error", "error_frequency"]].max(axis=1)
+            )
             shown = table.assign(error=error.clip(lower=floor))[~table["left_out"]]
-            draw_accuracy(shown, ax=ax, tolerance=tolerance, title=f"{title}: {what}" if title else what)
+            draw_accuracy(
+                shown, ax=ax, tolerance=tolerance, title=f"{title}: {what}" if title else what
+            )
             top = ax.get_ylim()[1]
             margin = max(1.3, (top / floor) ** 0.08)
             bottom = floor / margin
             ax.set_ylim(bottom, top * margin)
-            ax.axhspan(bottom, floor, color="#bbbbbb", alpha=0.5, zorder=0, label="below the reference's own error")
+            ax.axhspan(
+                bottom,
+                floor,
+                color="#bbbbbb",
+                alpha=0.5,
+                zorder=0,
+                label="below the reference's own error",
+            )
             ax.legend(loc="center left", bbox_to_anchor=(1.0, 0.5))
             _name_star(ax, what)
             _name_time(ax, what)
@@ -51,12 +74,18 @@ def draw_chart(tables: Mapping[str, pd.DataFrame], file: str | Path | None = Non
         return axes[0, 0].figure
 
 
-def draw_errors(tables: Mapping[str, pd.DataFrame], file: str | Path | None = None, *,
-                tolerance: float | None = None, title: str = "") -> object:
+def draw_errors(
+    tables: Mapping[str, pd.DataFrame],
+    file: str | Path | None = None,
+    *,
+    tolerance: float | None = None,
+    title: str = "",
+) -> object:
     """The three errors of the tables side by side over time, a row a table; returns the figure.
 
     Args:
-        tables, file, tolerance, title: as for ``draw_chart``; what a table does not know leaves its place empty.
+        tables, file, tolerance, title: as for ``draw_chart``; what a table does not know leaves its
+            place empty.
     """
     size = (5.2 * len(ERRORS) + 1.6, 4.0 * len(tables) + 0.4)
     with canvas(file, None, size, (len(tables), len(ERRORS)), squeeze=False) as axes:
@@ -67,7 +96,12 @@ def draw_errors(tables: Mapping[str, pd.DataFrame], file: str | Path | None = No
                     continue
                 least = table.loc[table[column] > 0, column].min()
                 kept = table.assign(error=table[column].clip(lower=least))[~table["left_out"]]
-                draw_accuracy(kept, ax=ax, tolerance=tolerance if column != "error_frequency" else None, title=of)
+                draw_accuracy(
+                    kept,
+                    ax=ax,
+                    tolerance=tolerance if column != "error_frequency" else None,
+                    title=of,
+                )
                 _name_star(ax, what)
                 _name_time(ax, what)
                 ax.set(ylabel=f"{what}: error [%]")
@@ -78,13 +112,19 @@ def draw_errors(tables: Mapping[str, pd.DataFrame], file: str | Path | None = No
 
 
 def _one_legend(row: Sequence[Axes]) -> None:
-    """At the right of the row, or in the place that it leaves empty: a legend between two charts pushes them apart."""
+    """At the right of the row, or in the place that it leaves empty: a legend between two charts
+    pushes them apart.
+    """
     shown = [ax for ax in row if ax.axison]
     for ax in shown[:-1]:
         ax.get_legend().remove()
     if shown and shown[-1] is not row[-1]:
         legend = shown[-1].get_legend()
-        row[-1].legend(legend.legend_handles, [text.get_text() for text in legend.get_texts()], loc="center left")
+        row[-1].legend(
+            legend.legend_handles,
+            [text.get_text() for text in legend.get_texts()],
+            loc="center left",
+        )
         legend.remove()
 
 

@@ -1,4 +1,6 @@
-"""Mesh refinement: frequencies against the size of the elements, with the fit that gives limit and order."""
+"""Mesh refinement: frequencies against the size of the elements, with the fit that gives limit and
+order.
+"""
 
 from __future__ import annotations
 
@@ -13,11 +15,18 @@ from .style import COLOURS, canvas
 __all__ = ["draw_convergence"]
 
 
-def draw_convergence(points: pd.DataFrame, summary: pd.DataFrame, file: str | Path | None = None, *, ax: Any = None,
-                     title: str = "") -> object:
+def draw_convergence(
+    points: pd.DataFrame,
+    summary: pd.DataFrame,
+    file: str | Path | None = None,
+    *,
+    ax: Any = None,
+    title: str = "",
+) -> object:
     """Each mode's frequency against its finest one over element size; returns the figure.
 
-    A mode whose order is believed has its fit drawn down to the limit at size 0; the others are joined by dots.
+    A mode whose order is believed has its fit drawn down to the limit at size 0; the others are
+    joined by dots.
 
     Args:
         points: columns size [m], mode, frequency [Hz], optionally nodal_diameter.
@@ -32,22 +41,37 @@ def draw_convergence(points: pd.DataFrame, summary: pd.DataFrame, file: str | Pa
             line = points[np.logical_and.reduce([points[key] == getattr(row, key) for key in keys])]
             _draw_mode(ax, line.sort_values("size"), row, COLOURS[i % len(COLOURS)])
         ax.axhline(0.0, color="#999999", lw=0.8, zorder=1)
-        ax.set(xlabel="mean size of the elements [mm]", ylabel="frequency over that of the finest mesh, less 1 [%]",
-               xlim=(0, None), title=title or "mesh refinement")
+        ax.set(
+            xlabel="mean size of the elements [mm]",
+            ylabel="frequency over that of the finest mesh, less 1 [%]",
+            xlim=(0, None),
+            title=title or "mesh refinement",
+        )
         ax.legend(loc="center left", bbox_to_anchor=(1.0, 0.5))
         return ax.figure
 
 
 def _draw_mode(ax: Any, line: pd.DataFrame, row: Any, colour: str) -> None:
     """Points, and the fit or dots."""
-    h, change = 1e3 * line["size"].to_numpy(), 100 * (line["frequency"].to_numpy() / row.frequency - 1)
-    name = f"mode {row.mode}" + (f", n = {row.nodal_diameter}" if hasattr(row, "nodal_diameter") else "")
+    h = 1e3 * line["size"].to_numpy()
+    change = 100 * (line["frequency"].to_numpy() / row.frequency - 1)
+    name = f"mode {row.mode}" + (
+        f", n = {row.nodal_diameter}" if hasattr(row, "nodal_diameter") else ""
+    )
     if row.reason:
         ax.plot(h, change, "o:", ms=4.5, color=colour, lw=0.9, label=f"{name}: no order")
         return
-    limit, t = 100 * (row.limit / row.frequency - 1), np.linspace(0.0, h.max(), 80)
-    shape = h ** row.order
+    limit = 100 * (row.limit / row.frequency - 1)
+    t = np.linspace(0.0, h.max(), 80)
+    shape = h**row.order
     slope = shape @ (change - limit) / (shape @ shape)
-    ax.plot(t, limit + slope * t ** row.order, "-", color=colour, lw=1.2)
-    ax.plot(h, change, "o", ms=4.5, color=colour, label=f"{name}: order {row.order:.1f}, limit {row.limit:.5g} Hz")
+    ax.plot(t, limit + slope * t**row.order, "-", color=colour, lw=1.2)
+    ax.plot(
+        h,
+        change,
+        "o",
+        ms=4.5,
+        color=colour,
+        label=f"{name}: order {row.order:.1f}, limit {row.limit:.5g} Hz",
+    )
     ax.plot(0.0, limit, "D", ms=6, mfc="white", mec=colour, clip_on=False, zorder=5)

@@ -17,37 +17,77 @@ Point = Sequence[float]
 
 def shape(ax: Any, corners: np.ndarray, colour: str = "#d5dbe1", **style: Any) -> None:
     """A filled outline, (n, 2) corners."""
-    ax.fill(*np.asarray(corners).T, **{"facecolor": colour, "edgecolor": "#333333", "lw": 1.2, "zorder": 2, **style})
+    ax.fill(
+        *np.asarray(corners).T,
+        **{"facecolor": colour, "edgecolor": "#333333", "lw": 1.2, "zorder": 2, **style},
+    )
 
 
-def length(ax: Any, start: Point, end: Point, text: str, away: float = 0.0, beside: float = 0.0) -> None:
-    """A dimension line from ``start`` to ``end``, moved to its left by ``away``, with the text on its outer side.
+def length(
+    ax: Any, start: Point, end: Point, text: str, away: float = 0.0, beside: float = 0.0
+) -> None:
+    """A dimension line from ``start`` to ``end``, moved to its left by ``away``, with the text on
+    its outer side.
 
     Args:
         ax: axes of equal aspect.
         start, end: measured points.
         text: label.
-        away: distance of the line from the measured points, to the left of the way from start to end.
+        away: distance of the line from the measured points, to the left of the way from start to
+            end.
         beside: further distance of the text; 0 writes it close to the line.
     """
-    start, end = np.asarray(start, float), np.asarray(end, float)
+    start = np.asarray(start, float)
+    end = np.asarray(end, float)
     way = (end - start) / np.linalg.norm(end - start)
     left = np.array([-way[1], way[0]])
     side = np.sign(away) or 1.0
-    a, b = start + away * left, end + away * left
+    a = start + away * left
+    b = end + away * left
     for point, moved in ((start, a), (end, b)):
-        ax.plot(*np.stack([point, moved + 0.08 * (moved - point)]).T, color=DIMENSION, lw=0.6, alpha=0.7, zorder=3)
-    ax.annotate("", a, b, arrowprops={"arrowstyle": "<|-|>", "color": DIMENSION, "lw": 0.9, "shrinkA": 0,
-                                      "shrinkB": 0, "mutation_scale": 8}, zorder=4)
+        ax.plot(
+            *np.stack([point, moved + 0.08 * (moved - point)]).T,
+            color=DIMENSION,
+            lw=0.6,
+            alpha=0.7,
+            zorder=3,
+        )
+    ax.annotate(
+        "",
+        a,
+        b,
+        arrowprops={
+            "arrowstyle": "<|-|>",
+            "color": DIMENSION,
+            "lw": 0.9,
+            "shrinkA": 0,
+            "shrinkB": 0,
+            "mutation_scale": 8,
+        },
+        zorder=4,
+    )
     turn = np.degrees(np.arctan2(way[1], way[0]))
     turn = turn - 180 if turn > 90 else turn + 180 if turn <= -90 else turn
     place = (a + b) / 2 + side * beside * left
-    ax.annotate(text, place, 7 * side * left, textcoords="offset points", rotation=turn, rotation_mode="anchor",
-                ha="center", va="center", color=DIMENSION, fontsize=8, zorder=5,
-                bbox={"boxstyle": "square,pad=0.1", "fc": "white", "ec": "none", "alpha": 0.75})
+    ax.annotate(
+        text,
+        place,
+        7 * side * left,
+        textcoords="offset points",
+        rotation=turn,
+        rotation_mode="anchor",
+        ha="center",
+        va="center",
+        color=DIMENSION,
+        fontsize=8,
+        zorder=5,
+        bbox={"boxstyle": "square,pad=0.1", "fc": "white", "ec": "none", "alpha": 0.75},
+    )
 
 
-def angle(ax: Any, centre: Point, start: float, end: float, radius: float, text: str, rays: bool = True) -> None:
+def angle(
+    ax: Any, centre: Point, start: float, end: float, radius: float, text: str, rays: bool = True
+) -> None:
     """An arc between two directions [rad] with a label outside of its middle."""
     turn = np.linspace(start, end, 40)
     centre = np.asarray(centre, float)
@@ -55,17 +95,39 @@ def angle(ax: Any, centre: Point, start: float, end: float, radius: float, text:
     ax.plot(*arc.T, color=DIMENSION, lw=1.0, zorder=4)
     if rays:
         for end_point in (arc[0], arc[-1]):
-            ax.plot(*np.stack([centre, centre + 1.15 * (end_point - centre)]).T, color=DIMENSION, lw=0.7, ls="--",
-                    zorder=3)
+            ax.plot(
+                *np.stack([centre, centre + 1.15 * (end_point - centre)]).T,
+                color=DIMENSION,
+                lw=0.7,
+                ls="--",
+                zorder=3,
+            )
     middle = 0.5 * (start + end)
-    ax.annotate(text, arc[len(arc) // 2], (10 * np.cos(middle), 10 * np.sin(middle)), textcoords="offset points",
-                color=DIMENSION, fontsize=8, ha="left" if np.cos(middle) > 0.3 else "right" if np.cos(middle) < -0.3
-                else "center", va="center", zorder=5,
-                bbox={"boxstyle": "square,pad=0.1", "fc": "white", "ec": "none", "alpha": 0.75})
+    ax.annotate(
+        text,
+        arc[len(arc) // 2],
+        (10 * np.cos(middle), 10 * np.sin(middle)),
+        textcoords="offset points",
+        color=DIMENSION,
+        fontsize=8,
+        ha="left" if np.cos(middle) > 0.3 else "right" if np.cos(middle) < -0.3 else "center",
+        va="center",
+        zorder=5,
+        bbox={"boxstyle": "square,pad=0.1", "fc": "white", "ec": "none", "alpha": 0.75},
+    )
 
 
 def note(ax: Any, point: Point, text: str, offset: tuple[float, float]) -> None:
     """A label with a thin pointer to a point; the offset is in points."""
-    ax.annotate(text, point, offset, textcoords="offset points", fontsize=8, color="#333333",
-                ha="left" if offset[0] > 0 else "right" if offset[0] < 0 else "center", va="center",
-                arrowprops={"arrowstyle": "-", "color": "#777777", "lw": 0.7}, zorder=6)
+    ax.annotate(
+        text,
+        point,
+        offset,
+        textcoords="offset points",
+        fontsize=8,
+        color="#333333",
+        ha="left" if offset[0] > 0 else "right" if offset[0] < 0 else "center",
+        va="center",
+        arrowprops={"arrowstyle": "-", "color": "#777777", "lw": 0.7},
+        zorder=6,
+    )

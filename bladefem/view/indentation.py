@@ -1,4 +1,6 @@
-"""Pressure between a verification pair: seen from above, and over the radius beside its closed form."""
+"""Pressure between a verification pair: seen from above, and over the radius beside its closed
+form.
+"""
 
 from __future__ import annotations
 
@@ -18,15 +20,25 @@ from .style import COLOURS, canvas, headline
 
 __all__ = ["draw_indentation"]
 
-Curve = tuple[np.ndarray, np.ndarray]       # radius [m], pressure [Pa]
+# radius [m], pressure [Pa]
+Curve = tuple[np.ndarray, np.ndarray]
 
 
-def draw_indentation(seats: dict[float, PressureMap], radius: np.ndarray, exact: Callable[[float], Curve],
-                     edge: float, file: str | Path | None = None, *, title: str = "") -> object:
-    """The pressure of the largest load on the meshed part of the contact, and that of all loads over the radius.
+def draw_indentation(
+    seats: dict[float, PressureMap],
+    radius: np.ndarray,
+    exact: Callable[[float], Curve],
+    edge: float,
+    file: str | Path | None = None,
+    *,
+    title: str = "",
+) -> object:
+    """The pressure of the largest load on the meshed part of the contact, and that of all loads
+    over the radius.
 
     Args:
-        seats: load [N] to the pressure of the meshed quarter, or half in the plane (then without the map).
+        seats: load [N] to the pressure of the meshed quarter, or half in the plane (then without
+            the map).
         radius: (n,) of the nodes [m].
         exact: the closed form under a load.
         edge: closed-form contact radius under the largest load [m].
@@ -35,12 +47,20 @@ def draw_indentation(seats: dict[float, PressureMap], radius: np.ndarray, exact:
     """
     largest = max(seats)
     flat = seats[largest].patch.faces.shape[1] == 2
-    with canvas(file, None, (5.6, 4.0) if flat else (9.6, 4.0), (1, 1 if flat else 2), squeeze=False) as axes:
+    with canvas(
+        file, None, (5.6, 4.0) if flat else (9.6, 4.0), (1, 1 if flat else 2), squeeze=False
+    ) as axes:
         if not flat:
-            _from_above(axes[0, 0], seats[largest], edge, 1.5 * _inner(seats[largest], radius, edge))
-            axes[0, 0].set_title(f"load {largest:.5g} N, meshed quarter", fontsize=9, fontweight="normal")
+            _from_above(
+                axes[0, 0], seats[largest], edge, 1.5 * _inner(seats[largest], radius, edge)
+            )
+            axes[0, 0].set_title(
+                f"load {largest:.5g} N, meshed quarter", fontsize=9, fontweight="normal"
+            )
         _over_radius(axes[0, -1], seats, radius, exact, edge)
-        axes[0, -1].set_xlabel("distance from the middle [mm]" if flat else "distance from the axis [mm]")
+        axes[0, -1].set_xlabel(
+            "distance from the middle [mm]" if flat else "distance from the axis [mm]"
+        )
         axes[0, 0].figure.get_layout_engine().set(wspace=0.06)
         headline(axes[0, 0].figure, title or "contact pressure")
         return axes[0, 0].figure
@@ -57,23 +77,48 @@ def _from_above(ax: Any, seat: PressureMap, edge: float, most: float) -> None:
     opened = colour_pressure(ax, 1e3 * seat.patch.points[:, :2], seat, norm)
     handles: list[Any] = [Patch(color=OPEN, label="open")] if opened else []
     turn = np.linspace(0, np.pi / 2, 60)
-    handles += ax.plot(1e3 * edge * np.cos(turn), 1e3 * edge * np.sin(turn), "--", color=COLOURS[5],
-                       label="edge, closed form")
-    ax.figure.colorbar(ScalarMappable(norm, PRESSURE_COLOURS), ax=ax, label="contact pressure [MPa]", aspect=25,
-                       extend="max" if peak > most else "neither")
+    handles += ax.plot(
+        1e3 * edge * np.cos(turn),
+        1e3 * edge * np.sin(turn),
+        "--",
+        color=COLOURS[5],
+        label="edge, closed form",
+    )
+    ax.figure.colorbar(
+        ScalarMappable(norm, PRESSURE_COLOURS),
+        ax=ax,
+        label="contact pressure [MPa]",
+        aspect=25,
+        extend="max" if peak > most else "neither",
+    )
     ax.set(xlabel="x [mm]", ylabel="y [mm]", aspect="equal")
     ax.grid(False)
     ax.legend(handles=handles, loc="upper right")
 
 
-def _over_radius(ax: Any, seats: dict[float, PressureMap], radius: np.ndarray, exact: Callable[[float], Curve],
-                 edge: float) -> None:
+def _over_radius(
+    ax: Any,
+    seats: dict[float, PressureMap],
+    radius: np.ndarray,
+    exact: Callable[[float], Curve],
+    edge: float,
+) -> None:
     order: Sequence[int] = np.argsort(radius)
     for i, (load, seat) in enumerate(seats.items()):
         r, p = exact(load)
-        ax.plot(1e3 * r, p / 1e6, "-", color="black", lw=1, zorder=1, label="" if i else "closed form")
-        ax.plot(1e3 * radius[order], seat.pressure[order] / 1e6, "o", ms=2.5, color=COLOURS[i % len(COLOURS)],
-                label=f"finite elements, {load:.5g} N")
+        ax.plot(
+            1e3 * r, p / 1e6, "-", color="black", lw=1, zorder=1, label="" if i else "closed form"
+        )
+        ax.plot(
+            1e3 * radius[order],
+            seat.pressure[order] / 1e6,
+            "o",
+            ms=2.5,
+            color=COLOURS[i % len(COLOURS)],
+            label=f"finite elements, {load:.5g} N",
+        )
     inner = max(_inner(seat, radius, edge) for seat in seats.values())
-    ax.set(ylabel="contact pressure [MPa]", xlim=(0, 1e3 * radius.max()), ylim=(0, 1.5 * inner / 1e6))
+    ax.set(
+        ylabel="contact pressure [MPa]", xlim=(0, 1e3 * radius.max()), ylim=(0, 1.5 * inner / 1e6)
+    )
     ax.legend()

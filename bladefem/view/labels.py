@@ -9,12 +9,23 @@ from matplotlib.transforms import Bbox
 
 __all__ = ["names_apart"]
 
-PLACES = ((6, 7, "left"), (6, -13, "left"), (-6, 7, "right"), (-6, -13, "right"), (9, 11, "left"), (9, -17, "left"),
-          (-9, 11, "right"), (-9, -17, "right"), (11, -3, "left"))     # offsets [points] and which end is held
+PLACES = (
+    (6, 7, "left"),
+    (6, -13, "left"),
+    (-6, 7, "right"),
+    (-6, -13, "right"),
+    (9, 11, "left"),
+    (9, -17, "left"),
+    # offsets [points] and which end is held
+    (-9, 11, "right"),
+    (-9, -17, "right"),
+    (11, -3, "left"),
+)
 
 
 def names_apart(*axes: Any) -> None:
-    """Give each annotation of finished axes a free place beside its point, first come first served; drop the others.
+    """Give each annotation of finished axes a free place beside its point, first come first served;
+    drop the others.
 
     Args:
         axes: of one figure; it is laid out once for all of them, which is what takes time.
@@ -25,14 +36,24 @@ def names_apart(*axes: Any) -> None:
 
 
 def _apart(ax: Any) -> None:
-    taken = [box for line in ax.lines if line.get_marker() not in ("None", "", None) for box in _markers(line)]
+    taken = [
+        box
+        for line in ax.lines
+        if line.get_marker() not in ("None", "", None)
+        for box in _markers(line)
+    ]
     inside = ax.get_window_extent()
     for text in list(ax.texts):
         for x, y, side in PLACES:
             text.xyann = (x, y)
             text.set_ha(side)
             box = text.get_window_extent()
-            fits = inside.x0 <= box.x0 and box.x1 <= inside.x1 and inside.y0 <= box.y0 and box.y1 <= inside.y1 + 2
+            fits = (
+                inside.x0 <= box.x0
+                and box.x1 <= inside.x1
+                and inside.y0 <= box.y0
+                and box.y1 <= inside.y1 + 2
+            )
             if fits and not box.count_overlaps(taken):
                 taken.append(box)
                 break

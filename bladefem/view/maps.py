@@ -1,4 +1,6 @@
-"""Heat maps over two parameters: which method solved a point, how many iterations it took, how large the answer is."""
+"""Heat maps over two parameters: which method solved a point, how many iterations it took, how
+large the answer is.
+"""
 
 from __future__ import annotations
 
@@ -16,9 +18,18 @@ from .style import COLOURS, FAILED, SEQUENTIAL, canvas
 __all__ = ["draw_map"]
 
 
-def draw_map(table: pd.DataFrame, x: str, y: str, value: str, file: str | Path | None = None, *,
-             labels: tuple[str, str, str] | None = None, title: str = "") -> object:
-    """A rectangle a point, coloured by a number or by a word; unconverged points are crossed; returns the figure.
+def draw_map(
+    table: pd.DataFrame,
+    x: str,
+    y: str,
+    value: str,
+    file: str | Path | None = None,
+    *,
+    labels: tuple[str, str, str] | None = None,
+    title: str = "",
+) -> object:
+    """A rectangle a point, coloured by a number or by a word; unconverged points are crossed;
+    returns the figure.
 
     Args:
         table: one row a point of a grid, columns ``x``, ``y``, ``value``, optionally ``converged``.
@@ -30,13 +41,34 @@ def draw_map(table: pd.DataFrame, x: str, y: str, value: str, file: str | Path |
     """
     labels = labels or (x, y, value)
     words = not pd.api.types.is_numeric_dtype(table[value])
-    codes, names = pd.factorize(table[value], sort=True) if words else (table[value].to_numpy(float), ())
-    cells = table.assign(_code=codes).pivot_table(index=y, columns=x, values="_code", aggfunc="last")
-    columns, rows = np.arange(len(cells.columns)), np.arange(len(cells.index))
+    codes, names = (
+        pd.factorize(table[value], sort=True) if words else (table[value].to_numpy(float), ())
+    )
+    cells = table.assign(_code=codes).pivot_table(
+        index=y, columns=x, values="_code", aggfunc="last"
+    )
+    columns = np.arange(len(cells.columns))
+    rows = np.arange(len(cells.index))
     with canvas(file, None, (7.2, 4.6)) as ax:
-        colours = ListedColormap(word_colours(codes, len(names))) if words else matplotlib.colormaps[SEQUENTIAL]
-        norm = BoundaryNorm(np.arange(len(names) + 1) - 0.5, max(len(names), 1)) if words and len(names) > 1 else None
-        image = ax.pcolormesh(columns, rows, cells.to_numpy(float), cmap=colours, norm=norm, edgecolors="white", lw=0.3)
+        colours = (
+            ListedColormap(word_colours(codes, len(names)))
+            if words
+            else matplotlib.colormaps[SEQUENTIAL]
+        )
+        norm = (
+            BoundaryNorm(np.arange(len(names) + 1) - 0.5, max(len(names), 1))
+            if words and len(names) > 1
+            else None
+        )
+        image = ax.pcolormesh(
+            columns,
+            rows,
+            cells.to_numpy(float),
+            cmap=colours,
+            norm=norm,
+            edgecolors="white",
+            lw=0.3,
+        )
         ax.grid(False)
         handles = [Swatch(color=colours(i), label=str(name)) for i, name in enumerate(names)]
         handles += cross_failed(ax, table, cells, x, y)

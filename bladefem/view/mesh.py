@@ -20,31 +20,89 @@ if TYPE_CHECKING:
 
 __all__ = ["draw_mesh", "draw_wheel", "grid", "polydata", "save_vtu", "save_wheel_vtu"]
 
-VTK_NUMBERS = {"triangle": 5, "triangle6": 22, "quad": 9, "quad8": 23, "quad9": 28, "tetra": 10, "tetra10": 24,
-               "hexahedron": 12, "hexahedron20": 25, "hexahedron27": 29}
+VTK_NUMBERS = {
+    "triangle": 5,
+    "triangle6": 22,
+    "quad": 9,
+    "quad8": 23,
+    "quad9": 28,
+    "tetra": 10,
+    "tetra10": 24,
+    "hexahedron": 12,
+    "hexahedron20": 25,
+    "hexahedron27": 29,
+}
 # gmsh's node order to VTK's, where they differ.
 VTK_ORDER = {
     "tetra10": (0, 1, 2, 3, 4, 5, 6, 7, 9, 8),
     "hexahedron20": (0, 1, 2, 3, 4, 5, 6, 7, 8, 11, 13, 9, 16, 18, 19, 17, 10, 12, 14, 15),
-    "hexahedron27": (0, 1, 2, 3, 4, 5, 6, 7, 8, 11, 13, 9, 16, 18, 19, 17, 10, 12, 14, 15, 22, 23, 21, 24, 20, 25, 26),
+    "hexahedron27": (
+        0,
+        1,
+        2,
+        3,
+        4,
+        5,
+        6,
+        7,
+        8,
+        11,
+        13,
+        9,
+        16,
+        18,
+        19,
+        17,
+        10,
+        12,
+        14,
+        15,
+        22,
+        23,
+        21,
+        24,
+        20,
+        25,
+        26,
+    ),
 }
 BODY_COLOURS = ("#c9d1d9", "#e3cfa4", "#b7cfc0", "#d5c3d8")
-FACE_COLOURS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9", "#7a5195", "#b5bd00", "#8c564b",
-                "#17a2a2", "#c23b5a")
+FACE_COLOURS = (
+    "#0072B2",
+    "#D55E00",
+    "#009E73",
+    "#CC79A7",
+    "#E69F00",
+    "#56B4E9",
+    "#7a5195",
+    "#b5bd00",
+    "#8c564b",
+    "#17a2a2",
+    "#c23b5a",
+)
 # The large faces of a blade in pale shades, so that the small ones that matter stand out.
-PALE = {"pressure_side": "#a9d3cf", "suction_side": "#c4bedd", "trailing_edge": "#8d9aa5", "tip": "#e8d66c"}
+PALE = {
+    "pressure_side": "#a9d3cf",
+    "suction_side": "#c4bedd",
+    "trailing_edge": "#8d9aa5",
+    "tip": "#e8d66c",
+}
 FRONT = (0.35, -0.85, 0.62)
 BELOW = (-0.45, 0.8, 0.65)
 RADIAL = (1.0, 0.0, 0.0)
 
 
-def grid(mesh: Mesh, fields: dict[str, np.ndarray] | None = None,
-         inside: dict[str, np.ndarray] | None = None) -> UnstructuredGrid:
+def grid(
+    mesh: Mesh,
+    fields: dict[str, np.ndarray] | None = None,
+    inside: dict[str, np.ndarray] | None = None,
+) -> UnstructuredGrid:
     """The whole mesh for pyvista, nodes in VTK's order, with the body's number on each cell.
 
     Args:
         mesh: plane or solid.
-        fields: name with unit -> (n_points, ...) values at the nodes; complex ones become two fields.
+        fields: name with unit -> (n_points, ...) values at the nodes; complex ones become two
+            fields.
         inside: name with unit -> (nc, ...) values in the cells of all bodies, in their order.
     """
     import pyvista
@@ -53,7 +111,9 @@ def grid(mesh: Mesh, fields: dict[str, np.ndarray] | None = None,
     kinds = np.full(len(cells), VTK_NUMBERS[mesh.cell_type], dtype=np.uint8)
     table = np.insert(cells, 0, cells.shape[1], axis=1).ravel()
     result = pyvista.UnstructuredGrid(table, kinds, np.asarray(mesh.points, dtype=float))
-    result.cell_data["body"] = np.repeat(np.arange(len(mesh.bodies)), [len(c) for c in mesh.bodies.values()])
+    result.cell_data["body"] = np.repeat(
+        np.arange(len(mesh.bodies)), [len(c) for c in mesh.bodies.values()]
+    )
     for name, values in split_complex(fields or {}).items():
         result.point_data[name] = values
     for name, values in (inside or {}).items():
@@ -78,16 +138,25 @@ def split_complex(fields: dict[str, np.ndarray]) -> dict[str, np.ndarray]:
     return parts
 
 
-def save_vtu(mesh: Mesh, file: str | Path, fields: dict[str, np.ndarray] | None = None,
-             inside: dict[str, np.ndarray] | None = None) -> Path:
+def save_vtu(
+    mesh: Mesh,
+    file: str | Path,
+    fields: dict[str, np.ndarray] | None = None,
+    inside: dict[str, np.ndarray] | None = None,
+) -> Path:
     """Write the mesh and its fields, see ``grid``, as a compressed VTU file."""
     Path(file).parent.mkdir(parents=True, exist_ok=True)
     grid(mesh, fields, inside).save(str(file))
     return Path(file)
 
 
-def save_wheel_vtu(mesh: Mesh, file: str | Path, fields: dict[str, np.ndarray], nodal_diameter: int = 0,
-                   volume: bool = False) -> Path:
+def save_wheel_vtu(
+    mesh: Mesh,
+    file: str | Path,
+    fields: dict[str, np.ndarray],
+    nodal_diameter: int = 0,
+    volume: bool = False,
+) -> Path:
     """Write the full wheel with vector fields carried round by e^{j n theta} R.
 
     Args:
@@ -95,7 +164,8 @@ def save_wheel_vtu(mesh: Mesh, file: str | Path, fields: dict[str, np.ndarray], 
         file: to write, ``.vtu``.
         fields: name -> (n_points, 3) real or complex, or (n_points,).
         nodal_diameter: n of the fields.
-        volume: all cells, without mid-side nodes; otherwise the outer triangles only, a much smaller file.
+        volume: all cells, without mid-side nodes; otherwise the outer triangles only, a much
+            smaller file.
     """
     import pyvista
 
@@ -106,12 +176,16 @@ def save_wheel_vtu(mesh: Mesh, file: str | Path, fields: dict[str, np.ndarray], 
     else:
         wheel = wheel_skin(mesh)
         result = polydata(wheel).cast_to_unstructured_grid()
-        nodes = wheel.nodes[:len(wheel.nodes) // count]
-    around = {name: carry_round(mesh, values[nodes], nodal_diameter) for name, values in fields.items()}
+        nodes = wheel.nodes[: len(wheel.nodes) // count]
+    around = {
+        name: carry_round(mesh, values[nodes], nodal_diameter) for name, values in fields.items()
+    }
     for name, values in split_complex(around).items():
         result.point_data[name] = values.astype(np.float32)
     Path(file).parent.mkdir(parents=True, exist_ok=True)
-    pyvista.UnstructuredGrid(result).clean(tolerance=0.0).save(str(file)) if volume else result.save(str(file))
+    pyvista.UnstructuredGrid(result).clean(tolerance=0.0).save(
+        str(file)
+    ) if volume else result.save(str(file))
     return Path(file)
 
 
@@ -120,12 +194,16 @@ def volume_wheel(mesh: Mesh, count: int) -> UnstructuredGrid:
     import pyvista
 
     shape = family(mesh.cell_type)
-    cells = np.concatenate(list(mesh.bodies.values()))[:, :CORNERS[shape]]
-    cells = (cells + (np.arange(count) * len(mesh.points))[:, None, None]).reshape(-1, CORNERS[shape])
+    cells = np.concatenate(list(mesh.bodies.values()))[:, : CORNERS[shape]]
+    cells = (cells + (np.arange(count) * len(mesh.points))[:, None, None]).reshape(
+        -1, CORNERS[shape]
+    )
     motions = [sector_motion(mesh, k) for k in range(count)]
     points = np.concatenate([mesh.points @ rotation.T + shift for rotation, shift in motions])
     kinds = np.full(len(cells), VTK_NUMBERS[shape], dtype=np.uint8)
-    return pyvista.UnstructuredGrid(np.insert(cells, 0, cells.shape[1], axis=1).ravel(), kinds, points)
+    return pyvista.UnstructuredGrid(
+        np.insert(cells, 0, cells.shape[1], axis=1).ravel(), kinds, points
+    )
 
 
 def carry_round(mesh: Mesh, values: np.ndarray, nodal_diameter: int) -> np.ndarray:
@@ -148,17 +226,24 @@ def polydata(surface: Skin, points: np.ndarray | None = None, label: int | None 
     import pyvista
 
     triangles = surface.triangles if label is None else surface.triangles[surface.labels == label]
-    return pyvista.PolyData(surface.points if points is None else points,
-                            np.insert(triangles, 0, 3, axis=1).ravel())
+    return pyvista.PolyData(
+        surface.points if points is None else points, np.insert(triangles, 0, 3, axis=1).ravel()
+    )
 
 
-def edge_lines(surface: Skin, points: np.ndarray, direction: tuple[float, float, float]) -> PolyData:
-    """Element edges, drawn a hair nearer to the eye than the faces so that they are not swallowed."""
+def edge_lines(
+    surface: Skin, points: np.ndarray, direction: tuple[float, float, float]
+) -> PolyData:
+    """Element edges, drawn a hair nearer to the eye than the faces so that they are not
+    swallowed.
+    """
     import pyvista
 
     eye = np.asarray(direction) / np.linalg.norm(direction)
     lift = 1.5e-3 * np.linalg.norm(np.ptp(points, axis=0))
-    return pyvista.PolyData(points + lift * eye, lines=np.insert(surface.edges, 0, 2, axis=1).ravel())
+    return pyvista.PolyData(
+        points + lift * eye, lines=np.insert(surface.edges, 0, 2, axis=1).ravel()
+    )
 
 
 def boundary_lines(mesh: Mesh, face: np.ndarray) -> PolyData:
@@ -177,7 +262,9 @@ def label_colours(mesh: Mesh) -> list[str]:
     return bodies + [PALE[name] if name in PALE else next(strong) for name in mesh.faces]
 
 
-def view_of(mesh: Mesh, direction: tuple[float, float, float] = FRONT) -> tuple[float, float, float]:
+def view_of(
+    mesh: Mesh, direction: tuple[float, float, float] = FRONT
+) -> tuple[float, float, float]:
     """Plane meshes are seen along their normal (x upwards, y to the left as the wheel turns)."""
     return (0.0, 0.0, 1.0) if mesh.dimension == 2 else direction
 
@@ -185,19 +272,40 @@ def view_of(mesh: Mesh, direction: tuple[float, float, float] = FRONT) -> tuple[
 def photograph_mesh(mesh: Mesh, direction: tuple[float, float, float], edges: bool) -> np.ndarray:
     """One view of the skin, a colour a body and a named face."""
     surface = skin(mesh)
-    parts = [{"mesh": polydata(surface, label=i), "color": colour} for i, colour in enumerate(label_colours(mesh))
-             if np.any(surface.labels == i)]
+    parts = [
+        {"mesh": polydata(surface, label=i), "color": colour}
+        for i, colour in enumerate(label_colours(mesh))
+        if np.any(surface.labels == i)
+    ]
     if mesh.dimension == 2:
-        parts += [{"mesh": boundary_lines(mesh, face), "color": colour, "line_width": 6, "lighting": False}
-                  for face, colour in zip(mesh.faces.values(), label_colours(mesh)[len(mesh.bodies):], strict=True)]
+        parts += [
+            {
+                "mesh": boundary_lines(mesh, face),
+                "color": colour,
+                "line_width": 6,
+                "lighting": False,
+            }
+            for face, colour in zip(
+                mesh.faces.values(), label_colours(mesh)[len(mesh.bodies) :], strict=True
+            )
+        ]
     if edges:
-        parts.append({"mesh": edge_lines(surface, surface.points, direction), "color": "#30363d", "line_width": 0.6,
-                      "lighting": False, "opacity": 0.6})
+        parts.append(
+            {
+                "mesh": edge_lines(surface, surface.points, direction),
+                "color": "#30363d",
+                "line_width": 0.6,
+                "lighting": False,
+                "opacity": 0.6,
+            }
+        )
     return photograph(parts, direction, RADIAL)
 
 
 def pulled(mesh: Mesh, share: float = 0.07) -> Mesh:
-    """The same mesh with the damper moved inwards by a share of the height, so that the contact faces can be seen."""
+    """The same mesh with the damper moved inwards by a share of the height, so that the contact
+    faces can be seen.
+    """
     nodes = [cells.ravel() for name, cells in mesh.bodies.items() if name.startswith("damper")]
     points = np.array(mesh.points, dtype=float)
     if nodes:
@@ -205,17 +313,30 @@ def pulled(mesh: Mesh, share: float = 0.07) -> Mesh:
     return replace(mesh, points=points)
 
 
-def draw_mesh(mesh: Mesh, file: str | Path | None = None, *, title: str = "", edges: bool = True) -> object:
-    """Bodies and named faces in colour, as they stand and with the damper pulled away; returns the figure."""
+def draw_mesh(
+    mesh: Mesh, file: str | Path | None = None, *, title: str = "", edges: bool = True
+) -> object:
+    """Bodies and named faces in colour, as they stand and with the damper pulled away; returns the
+    figure.
+    """
     views = (view_of(mesh),) if mesh.dimension == 2 else (FRONT, BELOW)
     apart = pulled(mesh)
     shown = (apart,) if mesh.dimension == 2 else (mesh, apart)
-    with canvas(file, size=(2.4 + 3.4 * len(views), 5.6), grid=(1, len(views) + 1),
-                width_ratios=[1] * len(views) + [0.6]) as axes:
+    with canvas(
+        file,
+        size=(2.4 + 3.4 * len(views), 5.6),
+        grid=(1, len(views) + 1),
+        width_ratios=[1] * len(views) + [0.6],
+    ) as axes:
         for ax, one, direction in zip(axes, shown, views, strict=False):
             show_photograph(ax, photograph_mesh(one, direction, edges), direction, RADIAL)
             if one is apart and "damper" in mesh.bodies:
-                ax.set_title("damper drawn away from its seats", fontsize=8.5, fontweight="normal", loc="center")
+                ax.set_title(
+                    "damper drawn away from its seats",
+                    fontsize=8.5,
+                    fontweight="normal",
+                    loc="center",
+                )
         headline(axes[0].figure, title or f"mesh of {' and '.join(mesh.bodies)}")
         draw_legend(axes[-1], mesh)
         return axes[0].figure
@@ -226,13 +347,27 @@ def draw_legend(ax: object, mesh: Mesh) -> None:
     colours = label_colours(mesh)
     counts = [len(c) for c in (*mesh.bodies.values(), *mesh.faces.values())]
     names = (*mesh.bodies, *mesh.faces)
-    swatches = [Swatch(facecolor=c, edgecolor="#555555", lw=0.5, label=f"{name} ({count})")
-                for c, name, count in zip(colours, names, counts, strict=True)]
-    ax.legend(handles=swatches, loc="center left", bbox_to_anchor=(0.0, 0.55), title="body or face (elements)",
-              alignment="left", borderaxespad=0.0)
+    swatches = [
+        Swatch(facecolor=c, edgecolor="#555555", lw=0.5, label=f"{name} ({count})")
+        for c, name, count in zip(colours, names, counts, strict=True)
+    ]
+    ax.legend(
+        handles=swatches,
+        loc="center left",
+        bbox_to_anchor=(0.0, 0.55),
+        title="body or face (elements)",
+        alignment="left",
+        borderaxespad=0.0,
+    )
     cells = sum(len(c) for c in mesh.bodies.values())
-    ax.text(0.02, 0.02, f"{cells} {mesh.cell_type} cells\n{len(mesh.points)} nodes\n"
-            f"{mesh.dimension * len(mesh.points)} degrees of freedom", transform=ax.transAxes, fontsize=8.5)
+    ax.text(
+        0.02,
+        0.02,
+        f"{cells} {mesh.cell_type} cells\n{len(mesh.points)} nodes\n"
+        f"{mesh.dimension * len(mesh.points)} degrees of freedom",
+        transform=ax.transAxes,
+        fontsize=8.5,
+    )
     ax.set_axis_off()
 
 
@@ -246,12 +381,17 @@ def draw_wheel(mesh: Mesh, file: str | Path | None = None, *, title: str = "") -
     surface.cell_data["part"] = colours
     palette = [BODY_COLOURS[0], "#c9a24a", COLOURS[5], COLOURS[4]]
     direction = view_of(mesh, (0.35, -0.35, 1.0))
-    image = photograph([{"mesh": surface, "scalars": "part", "cmap": palette, "clim": (-0.5, 3.5)}], direction,
-                       (0.0, 1.0, 0.0) if mesh.dimension == 3 else RADIAL)
+    image = photograph(
+        [{"mesh": surface, "scalars": "part", "cmap": palette, "clim": (-0.5, 3.5)}],
+        direction,
+        (0.0, 1.0, 0.0) if mesh.dimension == 3 else RADIAL,
+    )
     what = "full wheel" if mesh.sector and mesh.sector.count else "part of the row"
     with canvas(file, size=size_for(image, 5.8)) as ax:
         show_photograph(ax, image)
-        headline(ax.figure, title or f"{what}, {wheel_count(mesh)} sectors (the meshed one in colour)")
+        headline(
+            ax.figure, title or f"{what}, {wheel_count(mesh)} sectors (the meshed one in colour)"
+        )
         return ax.figure
 
 

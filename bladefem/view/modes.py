@@ -1,4 +1,6 @@
-"""Mode shapes: one sector, the full wheel with its nodal lines, contact sheets, travelling waves."""
+"""Mode shapes: one sector, the full wheel with its nodal lines, contact sheets, travelling
+waves.
+"""
 
 from __future__ import annotations
 
@@ -29,13 +31,22 @@ from .style import (
     size_for,
 )
 
-__all__ = ["animate_wave", "best_phase", "draw_mode", "draw_mode_sheet", "draw_wheel_mode", "mode_title",
-           "save_modes_vtu"]
+__all__ = [
+    "animate_wave",
+    "best_phase",
+    "draw_mode",
+    "draw_mode_sheet",
+    "draw_wheel_mode",
+    "mode_title",
+    "save_modes_vtu",
+]
 
 WHEEL_VIEW = (0.0, -0.55, 1.0)
 COMPONENTS = ("radial", "circumferential", "axial")
-STILL = 1e-5            # share of the largest displacement below which a sign means nothing
-EXAGGERATION = 0.1      # largest drawn displacement over the sector's height
+# share of the largest displacement below which a sign means nothing
+STILL = 1e-5
+# largest drawn displacement over the sector's height
+EXAGGERATION = 0.1
 
 
 def best_phase(shape: np.ndarray) -> complex:
@@ -45,9 +56,12 @@ def best_phase(shape: np.ndarray) -> complex:
 
 
 def mode_title(modes: ModeSet, number: int, family: str = "") -> str:
-    """"mode 1, first flap: 812.4 Hz, nodal diameter 6" (number counts from 0)."""
+    """ "mode 1, first flap: 812.4 Hz, nodal diameter 6" (number counts from 0)."""
     diameter = "" if modes.nodal_diameter is None else f", nodal diameter {modes.nodal_diameter}"
-    return f"mode {number + 1}{', ' + family if family else ''}: {modes.frequencies[number]:.5g} Hz{diameter}"
+    return (
+        f"mode {number + 1}{', ' + family if family else ''}: {modes.frequencies[number]:.5g} "
+        f"Hz{diameter}"
+    )
 
 
 def moving(mesh: Mesh, shape: np.ndarray) -> Mesh:
@@ -57,14 +71,19 @@ def moving(mesh: Mesh, shape: np.ndarray) -> Mesh:
 
 
 def scale_of(mesh: Mesh, shape: np.ndarray) -> float:
-    """Factor that draws the largest displacement of a shape as a tenth of the sector's radial height."""
+    """Factor that draws the largest displacement of a shape as a tenth of the sector's radial
+    height.
+    """
     largest = np.max(np.linalg.norm(shape, axis=-1), initial=0.0)
     height = np.ptp(mesh.points[:, 0])
     return EXAGGERATION * height / largest if largest > 0 else 0.0
 
 
-def draw_mode(mesh: Mesh, modes: ModeSet, number: int, file: str | Path | None = None, *, family: str = "") -> object:
-    """A mode on its sector: deformed, coloured by magnitude, the undeformed edges behind; returns the figure.
+def draw_mode(
+    mesh: Mesh, modes: ModeSet, number: int, file: str | Path | None = None, *, family: str = ""
+) -> object:
+    """A mode on its sector: deformed, coloured by magnitude, the undeformed edges behind; returns
+    the figure.
 
     Args:
         mesh: the sector or body.
@@ -92,9 +111,11 @@ def say_exaggeration(ax: Any, mesh: Mesh, modes: ModeSet) -> None:
 
 
 def exaggeration(mesh: Mesh) -> str:
-    """"largest displacement drawn as 12 mm (10 % of the height)"."""
-    return (f"largest displacement drawn as {1e3 * EXAGGERATION * np.ptp(mesh.points[:, 0]):.3g} mm "
-            f"({100 * EXAGGERATION:.0f} % of the height)")
+    """ "largest displacement drawn as 12 mm (10 % of the height)"."""
+    return (
+        f"largest displacement drawn as {1e3 * EXAGGERATION * np.ptp(mesh.points[:, 0]):.3g} mm "
+        f"({100 * EXAGGERATION:.0f} % of the height)"
+    )
 
 
 def add_colour_bar(ax: Any, norm: Normalize, colours: str, label: str) -> None:
@@ -105,73 +126,129 @@ def add_colour_bar(ax: Any, norm: Normalize, colours: str, label: str) -> None:
     bar.outline.set_linewidth(0.5)
 
 
-def photograph_shape(mesh: Mesh, shape: np.ndarray, factor: float, direction: tuple[float, float, float],
-                     size: tuple[int, int] = (1100, 1200)) -> np.ndarray:
-    """Rendering of a deformed sector coloured by relative magnitude, with the undeformed edges in grey."""
+def photograph_shape(
+    mesh: Mesh,
+    shape: np.ndarray,
+    factor: float,
+    direction: tuple[float, float, float],
+    size: tuple[int, int] = (1100, 1200),
+) -> np.ndarray:
+    """Rendering of a deformed sector coloured by relative magnitude, with the undeformed edges in
+    grey.
+    """
     surface = skin(moving(mesh, shape))
     moved = surface.points + factor * shape[surface.nodes]
     magnitude = np.linalg.norm(shape, axis=1)
     body = polydata(surface, moved)
     body.point_data["magnitude"] = magnitude[surface.nodes] / max(magnitude.max(), 1e-300)
-    parts = [{"mesh": body, "scalars": "magnitude", "cmap": SEQUENTIAL, "clim": (0, 1)},
-             {"mesh": edge_lines(surface, moved, direction), "color": "black", "line_width": 0.5, "opacity": 0.25,
-              "lighting": False}]
-    outline = polydata(surface).extract_feature_edges(30.0, boundary_edges=True, non_manifold_edges=False,
-                                                      manifold_edges=False)
+    parts = [
+        {"mesh": body, "scalars": "magnitude", "cmap": SEQUENTIAL, "clim": (0, 1)},
+        {
+            "mesh": edge_lines(surface, moved, direction),
+            "color": "black",
+            "line_width": 0.5,
+            "opacity": 0.25,
+            "lighting": False,
+        },
+    ]
+    outline = polydata(surface).extract_feature_edges(
+        30.0, boundary_edges=True, non_manifold_edges=False, manifold_edges=False
+    )
     if outline.n_points:
         parts.append({"mesh": outline, "color": "#888888", "line_width": 1.2, "lighting": False})
     return photograph(parts, direction, RADIAL, size)
 
 
-def draw_mode_sheet(mesh: Mesh, modes: ModeSet, file: str | Path | None = None, *, count: int = 8,
-                    families: Sequence[str] = ()) -> object:
+def draw_mode_sheet(
+    mesh: Mesh,
+    modes: ModeSet,
+    file: str | Path | None = None,
+    *,
+    count: int = 8,
+    families: Sequence[str] = (),
+) -> object:
     """The first modes of a sector side by side; returns the figure."""
     count = min(count, len(modes.frequencies))
     columns = min(count, 4)
     rows = -(-count // columns)
     direction = view_of(mesh)
-    with canvas(file, size=(2.45 * columns, 3.0 * rows + 0.5), grid=(rows, columns), squeeze=False) as axes:
+    with canvas(
+        file, size=(2.45 * columns, 3.0 * rows + 0.5), grid=(rows, columns), squeeze=False
+    ) as axes:
         for ax in axes.flat:
             ax.set_axis_off()
         for number, ax in zip(range(count), axes.flat, strict=False):
             shape = np.real(modes.shapes[number] * best_phase(modes.shapes[number]))
-            show_photograph(ax, photograph_shape(mesh, shape, scale_of(mesh, shape), direction, (560, 640)))
+            show_photograph(
+                ax, photograph_shape(mesh, shape, scale_of(mesh, shape), direction, (560, 640))
+            )
             name = families[number] if number < len(families) else ""
             ax.set_title(f"{number + 1}  {modes.frequencies[number]:.5g} Hz\n{name}", fontsize=9)
-        diameter = "" if modes.nodal_diameter is None else f", nodal diameter {modes.nodal_diameter}"
+        diameter = (
+            "" if modes.nodal_diameter is None else f", nodal diameter {modes.nodal_diameter}"
+        )
         headline(axes[0, 0].figure, f"first modes{diameter}")
-        axes[0, 0].figure.supxlabel("colour: displacement over its largest value, drawn as "
-                                    f"{100 * EXAGGERATION:.0f} % of the height", fontsize=7.5, color="#555555")
+        axes[0, 0].figure.supxlabel(
+            "colour: displacement over its largest value, drawn as "
+            f"{100 * EXAGGERATION:.0f} % of the height",
+            fontsize=7.5,
+            color="#555555",
+        )
         return axes[0, 0].figure
 
 
 def wheel_motion(mesh: Mesh, shape: np.ndarray, nodal_diameter: int) -> tuple[Skin, np.ndarray]:
     """The skin of the wheel and the complex displacement (n, 3) of its points."""
     wheel = wheel_skin(moving(mesh, shape))
-    one = wheel.nodes[:len(wheel.nodes) // wheel_count(mesh)]
-    return wheel, np.asarray(carry_round(mesh, shape[one] * best_phase(shape), nodal_diameter), dtype=complex)
+    one = wheel.nodes[: len(wheel.nodes) // wheel_count(mesh)]
+    return wheel, np.asarray(
+        carry_round(mesh, shape[one] * best_phase(shape), nodal_diameter), dtype=complex
+    )
 
 
 def components(wheel: Skin, motion: np.ndarray, flat: bool = False) -> np.ndarray:
-    """(n, 3) radial, circumferential and axial parts about the z axis; x, y and z for a flat row."""
+    """(n, 3) radial, circumferential and axial parts about the z axis; x, y and z for a flat
+    row.
+    """
     if flat:
         return motion
     angle = np.arctan2(wheel.points[:, 1], wheel.points[:, 0])
-    cos, sin = np.cos(angle), np.sin(angle)
-    return np.stack([motion[:, 0] * cos + motion[:, 1] * sin, motion[:, 1] * cos - motion[:, 0] * sin, motion[:, 2]],
-                    axis=1)
+    cos = np.cos(angle)
+    sin = np.sin(angle)
+    return np.stack(
+        [
+            motion[:, 0] * cos + motion[:, 1] * sin,
+            motion[:, 1] * cos - motion[:, 0] * sin,
+            motion[:, 2],
+        ],
+        axis=1,
+    )
 
 
-def wheel_component(mesh: Mesh, wheel: Skin, motion: np.ndarray, component: str | None) -> tuple[str, np.ndarray]:
+def wheel_component(
+    mesh: Mesh, wheel: Skin, motion: np.ndarray, component: str | None
+) -> tuple[str, np.ndarray]:
     """The wanted component of the motion, or the strongest one; scaled to a largest value of 1."""
     parts = components(wheel, motion, flat=mesh.sector is not None and mesh.sector.count == 0)
-    which = COMPONENTS.index(component) if component else int(np.argmax(np.sum(np.abs(parts) ** 2, axis=0)))
+    which = (
+        COMPONENTS.index(component)
+        if component
+        else int(np.argmax(np.sum(np.abs(parts) ** 2, axis=0)))
+    )
     return COMPONENTS[which], parts[:, which] / max(np.abs(parts[:, which]).max(), 1e-300)
 
 
-def draw_wheel_mode(mesh: Mesh, modes: ModeSet, number: int, file: str | Path | None = None, *, family: str = "",
-                    component: str | None = None) -> object:
-    """A mode on the full wheel: one signed component in colour, its nodal lines in black; returns the figure.
+def draw_wheel_mode(
+    mesh: Mesh,
+    modes: ModeSet,
+    number: int,
+    file: str | Path | None = None,
+    *,
+    family: str = "",
+    component: str | None = None,
+) -> object:
+    """A mode on the full wheel: one signed component in colour, its nodal lines in black; returns
+    the figure.
 
     Args:
         mesh: one sector.
@@ -186,7 +263,9 @@ def draw_wheel_mode(mesh: Mesh, modes: ModeSet, number: int, file: str | Path | 
     moved = wheel.points + scale_of(mesh, modes.shapes[number]) * motion.real
     surface = polydata(wheel, moved)
     surface.point_data["signed"] = signed.real
-    parts: list[dict[str, Any]] = [{"mesh": surface, "scalars": "signed", "cmap": DIVERGING, "clim": (-1, 1)}]
+    parts: list[dict[str, Any]] = [
+        {"mesh": surface, "scalars": "signed", "cmap": DIVERGING, "clim": (-1, 1)}
+    ]
     surface.point_data["envelope"] = np.abs(signed)
     # Where nothing moves (the clamp) the sign is noise, not a nodal line.
     lines = surface.contour([0.0], scalars="signed").threshold(STILL, scalars="envelope")
@@ -198,7 +277,9 @@ def draw_wheel_mode(mesh: Mesh, modes: ModeSet, number: int, file: str | Path | 
     with canvas(file, size=size_for(image, 5.2, beside=1.0)) as ax:
         show_photograph(ax, image)
         headline(ax.figure, mode_title(modes, number, family))
-        add_colour_bar(ax, Normalize(-1, 1), DIVERGING, f"{name} displacement over its largest value [1]")
+        add_colour_bar(
+            ax, Normalize(-1, 1), DIVERGING, f"{name} displacement over its largest value [1]"
+        )
         say_exaggeration(ax, mesh, modes)
         return ax.figure
 
@@ -208,9 +289,18 @@ def wheel_camera(mesh: Mesh) -> tuple[tuple[float, float, float], tuple[float, f
     return (WHEEL_VIEW, (0.0, 1.0, 0.0)) if mesh.dimension == 3 else (view_of(mesh, FRONT), RADIAL)
 
 
-def animate_wave(mesh: Mesh, modes: ModeSet, number: int, file: str | Path, *, family: str = "", frames: int = 24,
-                 pixels: int = 480) -> Path:
-    """Write an endless GIF of one period: a travelling wave for complex modes, a standing one for real modes.
+def animate_wave(
+    mesh: Mesh,
+    modes: ModeSet,
+    number: int,
+    file: str | Path,
+    *,
+    family: str = "",
+    frames: int = 24,
+    pixels: int = 480,
+) -> Path:
+    """Write an endless GIF of one period: a travelling wave for complex modes, a standing one for
+    real modes.
 
     Args:
         mesh: one sector.
@@ -229,11 +319,22 @@ def animate_wave(mesh: Mesh, modes: ModeSet, number: int, file: str | Path, *, f
     pictures = []
     for image in wave_frames(mesh, modes, number, frames, pixels):
         picture = Image.fromarray(image)
-        ImageDraw.Draw(picture).text((10, 8), mode_title(modes, number, family), fill="black", font=font)
-        ImageDraw.Draw(picture).text((10, pixels - 2 * font.size), exaggeration(mesh), fill="#555555", font=small)
+        ImageDraw.Draw(picture).text(
+            (10, 8), mode_title(modes, number, family), fill="black", font=font
+        )
+        ImageDraw.Draw(picture).text(
+            (10, pixels - 2 * font.size), exaggeration(mesh), fill="#555555", font=small
+        )
         pictures.append(picture.quantize(96))
     Path(file).parent.mkdir(parents=True, exist_ok=True)
-    pictures[0].save(file, save_all=True, append_images=pictures[1:], duration=1600 // frames, loop=0, optimize=True)
+    pictures[0].save(
+        file,
+        save_all=True,
+        append_images=pictures[1:],
+        duration=1600 // frames,
+        loop=0,
+        optimize=True,
+    )
     return Path(file)
 
 

@@ -21,7 +21,9 @@ DAMPER = "#e3cfa4"
 
 def draw_hertz(hertz: HertzPair, file: str | Path | None = None) -> object:
     """Sphere or cylinder on a block, half of it; returns the figure."""
-    wide, radius, contact = MM * hertz.half_width, MM * hertz.radius, MM * hertz.contact_radius
+    wide = MM * hertz.half_width
+    radius = MM * hertz.radius
+    contact = MM * hertz.contact_radius
     x = np.linspace(0, wide, 60)
     cap = np.column_stack([x, radius - np.sqrt(radius**2 - x**2)])
     with canvas(file, size=(7.2, 6.4)) as ax:
@@ -40,7 +42,8 @@ def draw_hertz(hertz: HertzPair, file: str | Path | None = None) -> object:
 
 def draw_punch(punch: Punch, file: str | Path | None = None) -> object:
     """Flat punch on a block, half of it; returns the figure."""
-    wide, radius = MM * punch.half_width, MM * punch.radius
+    wide = MM * punch.half_width
+    radius = MM * punch.radius
     with canvas(file, size=(7.2, 5.2)) as ax:
         _block(ax, wide)
         shape(ax, np.array([[0, 0], [radius, 0], [radius, radius], [0, radius]]), DAMPER)
@@ -62,7 +65,11 @@ def _block(ax: Any, wide: float) -> None:
 def _axes(ax: Any, wide: float, dimension: int, title: str) -> None:
     """The axis and what stands on it."""
     ax.axvline(0, color="#555555", lw=0.8, ls="-.", zorder=3)
-    faces = "symmetry_x (x = 0)\nsymmetry_y (y = 0,\nthe drawing's plane)" if dimension == 3 else "symmetry_x (x = 0)"
+    faces = (
+        "symmetry_x (x = 0)\nsymmetry_y (y = 0,\nthe drawing's plane)"
+        if dimension == 3
+        else "symmetry_x (x = 0)"
+    )
     note(ax, (0, -0.5 * wide), faces, (-16, 0))
     ax.set(aspect="equal", xlabel="x [mm]", ylabel=f"{'z' if dimension == 3 else 'y'}, up [mm]")
     ax.set_title(title, fontsize=9.5)

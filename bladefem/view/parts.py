@@ -1,4 +1,6 @@
-"""Labelled drawings of every part of a geometry, from its parameters: what the documentation shows."""
+"""Labelled drawings of every part of a geometry, from its parameters: what the documentation
+shows.
+"""
 
 from __future__ import annotations
 
@@ -8,8 +10,8 @@ from typing import Any
 
 import numpy as np
 
-from bladefem.scene import Scene
-from bladefem.units import show
+from bladefem.scene.tables import Scene
+from bladefem.scene.units import show
 from geometry.parameters import Aerofoil, Disc, Plane, Platform, Shank, Wedge, ZMass
 from geometry.plane import blade_corners, damper_corners
 from geometry.profile import profile
@@ -29,7 +31,7 @@ NEXT = "#eceff2"
 
 
 def said(table: Any, name: str) -> str:
-    """"span 120 mm", from a parameter table."""
+    """ "span 120 mm", from a parameter table."""
     field = type(table).__dataclass_fields__[name]
     return f"{name} {show(getattr(table, name), field.metadata['unit'] or '1')}"
 
@@ -43,7 +45,9 @@ def bare(ax: Any, title: str, horizontal: str, vertical: str) -> None:
 
 
 def draw_aerofoil(aerofoil: Aerofoil, file: str | Path | None = None) -> object:
-    """Section over chord, root and tip sections as stacked, and the side view; returns the figure."""
+    """Section over chord, root and tip sections as stacked, and the side view; returns the
+    figure.
+    """
     with canvas(file, size=(11.4, 4.6), grid=(1, 3), width_ratios=[1.2, 1.2, 1.0]) as axes:
         draw_section(axes[0], aerofoil)
         draw_stacking(axes[1], aerofoil)
@@ -58,7 +62,8 @@ def draw_section(ax: Any, blade: Aerofoil) -> None:
     points = chord * section_shape(blade, 0.0)
     shape(ax, points)
     half = len(points) // 2
-    upper, lower = points[:half + 1][::-1], points[half:]
+    upper = points[: half + 1][::-1]
+    lower = points[half:]
     middle = 0.5 * (upper + lower)
     ax.plot(*middle.T, color=COLOURS[1], lw=1, ls="-.", zorder=3)
     ax.plot([0, chord], [0, 0], color="#555555", lw=0.8, ls="--", zorder=3)
@@ -66,14 +71,21 @@ def draw_section(ax: Any, blade: Aerofoil) -> None:
     length(ax, lower[thick], upper[thick], "", 0.0)
     note(ax, upper[thick], f"{said(blade, 'thickness_root')} of the chord", (0, 26))
     high = np.argmax(middle[:, 1])
-    note(ax, middle[high] + [0.25 * chord, -0.2 * middle[high][1]], f"mean line, {said(blade, 'camber')}", (20, 30))
+    note(
+        ax,
+        middle[high] + [0.25 * chord, -0.2 * middle[high][1]],
+        f"mean line, {said(blade, 'camber')}",
+        (20, 30),
+    )
     length(ax, (0, 0), (chord, 0), said(blade, "chord_root"), -0.22 * chord)
     bare(ax, f'root section, "{blade.section}"', "along the chord", "across it")
     ax.set(xlim=(-0.15 * chord, 1.35 * chord), ylim=(-0.4 * chord, 0.45 * chord))
 
 
 def plane_section(blade: Aerofoil, t: float) -> tuple[np.ndarray, np.ndarray]:
-    """Section (n, 2) and chord line (2, 2) as (axial, circumferential) [mm], seen from the tip towards the axis."""
+    """Section (n, 2) and chord line (2, 2) as (axial, circumferential) [mm], seen from the tip
+    towards the axis.
+    """
     origin, along, across, chord = placement(blade, 0.0, t)
     flat = section_shape(blade, t)
     local = chord * (np.vstack([flat, [[0, 0], [1, 0]]]) - centroid(flat))
@@ -91,7 +103,9 @@ def draw_stacking(ax: Any, blade: Aerofoil) -> None:
     reach = MM * blade.chord_root
     ax.plot([0, 0.8 * reach], [0, 0], color="#333333", lw=0.8, ls="-.", zorder=1)
     angle(ax, (0, 0), 0.0, blade.stagger, 0.62 * reach, said(blade, "stagger"))
-    angle(ax, (0, 0), blade.stagger, blade.stagger + blade.twist, 0.74 * reach, said(blade, "twist"))
+    angle(
+        ax, (0, 0), blade.stagger, blade.stagger + blade.twist, 0.74 * reach, said(blade, "twist")
+    )
     bare(ax, "root and tip, seen along the span", "z, engine axis", "y, circumferential")
     ax.set(xlim=(-0.6 * reach, 1.25 * reach), ylim=(-0.6 * reach, 0.75 * reach))
 
@@ -101,30 +115,50 @@ def draw_side(ax: Any, blade: Aerofoil) -> None:
     shares = np.linspace(0, 1, 21)
     extents = [plane_section(blade, t)[0][:, 0] for t in shares]
     height = MM * blade.span * shares
-    low, high = np.array([e.min() for e in extents]), np.array([e.max() for e in extents])
+    low = np.array([e.min() for e in extents])
+    high = np.array([e.max() for e in extents])
     shape(ax, np.concatenate([np.stack([low, height], 1), np.stack([high, height], 1)[::-1]]))
     tip = MM * blade.chord_tip
     length(ax, (low.min(), 0), (low.min(), height[-1]), said(blade, "span"), 0.25 * tip)
-    note(ax, (high[-1], height[-1]), f"{said(blade, 'chord_tip')}\n{said(blade, 'thickness_tip')}\n(turned)", (14, -14))
+    note(
+        ax,
+        (high[-1], height[-1]),
+        f"{said(blade, 'chord_tip')}\n{said(blade, 'thickness_tip')}\n(turned)",
+        (14, -14),
+    )
     axis = MM * np.array([placement(blade, 0.0, t)[0][2] for t in (0.0, 1.0)])
     ax.plot(axis, [0, height[-1]], color=COLOURS[1], lw=1, ls="-.", zorder=3)
-    note(ax, (np.mean(axis), 0.5 * height[-1]), f"stacking line\n{said(blade, 'lean')}\n{said(blade, 'sweep')}",
-         (44, 0))
+    note(
+        ax,
+        (np.mean(axis), 0.5 * height[-1]),
+        f"stacking line\n{said(blade, 'lean')}\n{said(blade, 'sweep')}",
+        (44, 0),
+    )
     note(ax, (high[0], 0), said(blade, "fillet"), (12, 16))
     bare(ax, "side view", "z, engine axis", "x above the platform")
     ax.set_xlim(low.min() - 0.6 * tip, high.max() + 1.1 * tip)
 
 
 def turned(points: np.ndarray, theta: float) -> np.ndarray:
-    """(n, 2) x, y to (across, radial) [mm] about the radial plane between this blade and the next."""
-    c, s = np.cos(theta), np.sin(theta)
-    return MM * np.stack([points[:, 1] * c - points[:, 0] * s, points[:, 0] * c + points[:, 1] * s], axis=1)
+    """(n, 2) x, y to (across, radial) [mm] about the radial plane between this blade and the
+    next.
+    """
+    c = np.cos(theta)
+    s = np.sin(theta)
+    return MM * np.stack(
+        [points[:, 1] * c - points[:, 0] * s, points[:, 0] * c + points[:, 1] * s], axis=1
+    )
 
 
-def draw_platform(platform: Platform, shank: Shank, disc: Disc, wedge: Wedge, file: str | Path | None = None) -> object:
-    """Two neighbouring platforms and the wedge between them, seen along the engine axis; returns the figure."""
+def draw_platform(
+    platform: Platform, shank: Shank, disc: Disc, wedge: Wedge, file: str | Path | None = None
+) -> object:
+    """Two neighbouring platforms and the wedge between them, seen along the engine axis; returns
+    the figure.
+    """
     cut = profile(platform, shank, disc, wedge)
-    blade, damper = turned(cut.blade, cut.theta), turned(cut.wedge, cut.theta)
+    blade = turned(cut.blade, cut.theta)
+    damper = turned(cut.wedge, cut.theta)
     foot, inner, outer = damper[:3]
     corner = turned(cut.corner[None], cut.theta)[0]
     with canvas(file, size=(8.4, 5.6)) as ax:
@@ -136,13 +170,22 @@ def draw_platform(platform: Platform, shank: Shank, disc: Disc, wedge: Wedge, fi
             ax.plot(*(np.stack([inner, outer]) * [side, 1]).T, color=COLOURS[1], lw=3, zorder=4)
         label_platform(ax, platform, shank, wedge, np.stack([foot, inner, outer, corner]))
         span = max(2.6 * abs(inner[0]), 4 * MM * platform.thickness)
-        bare(ax, "platforms and wedge, seen along the engine axis", "circumferential, from the gap", "radial")
+        bare(
+            ax,
+            "platforms and wedge, seen along the engine axis",
+            "circumferential, from the gap",
+            "radial",
+        )
         ax.set(xlim=(-span, span), ylim=(foot[1] - 8, corner[1] + 8))
         return ax.figure
 
 
-def label_platform(ax: Any, platform: Platform, shank: Shank, wedge: Wedge, corners: np.ndarray) -> None:
-    """Dimensions of platform and wedge; corners are the flank's foot, inner and outer end and the plate's corner."""
+def label_platform(
+    ax: Any, platform: Platform, shank: Shank, wedge: Wedge, corners: np.ndarray
+) -> None:
+    """Dimensions of platform and wedge; corners are the flank's foot, inner and outer end and the
+    plate's corner.
+    """
     foot, inner, outer, corner = corners
     mirror = np.array([-1, 1])
     length(ax, corner, corner * mirror, said(platform, "gap"), 3.0)
@@ -150,23 +193,51 @@ def label_platform(ax: Any, platform: Platform, shank: Shank, wedge: Wedge, corn
     length(ax, corner * mirror, outer * mirror, said(platform, "thickness"), 2.5)
     length(ax, foot * mirror, inner * mirror, said(wedge, "base"), -2.5)
     apex = np.array([0.0, inner[1] - inner[0] / np.tan(wedge.angle)])
-    angle(ax, apex, -np.pi / 2, wedge.angle - np.pi / 2, 0.75 * (apex[1] - inner[1]), said(wedge, "angle"))
-    note(ax, 0.3 * (inner * mirror) + 0.7 * (outer * mirror), "seat_left of the next blade\non damper_right", (60, -10))
+    angle(
+        ax,
+        apex,
+        -np.pi / 2,
+        wedge.angle - np.pi / 2,
+        0.75 * (apex[1] - inner[1]),
+        said(wedge, "angle"),
+    )
+    note(
+        ax,
+        0.3 * (inner * mirror) + 0.7 * (outer * mirror),
+        "seat_left of the next blade\non damper_right",
+        (60, -10),
+    )
     note(ax, 0.3 * inner + 0.7 * outer, "seat_right of this blade\non damper_left", (-70, 28))
     low = foot * [-0.3, 1] + [0, 0.6]
     note(ax, low, f"wedge damper\n{said(wedge, 'length')}, {said(wedge, 'clearance')}", (20, -44))
-    note(ax, inner * [4, 1] - [0, 4], f"shank\n{said(shank, 'width')}\n{said(shank, 'height')}", (-20, -24))
+    note(
+        ax,
+        inner * [4, 1] - [0, 4],
+        f"shank\n{said(shank, 'width')}\n{said(shank, 'height')}",
+        (-20, -24),
+    )
 
 
 def ring(inner: float, outer: float, theta: float) -> np.ndarray:
-    """Corners (n, 2) as (circumferential, radial) [mm] of a ring segment between -theta and theta."""
+    """Corners (n, 2) as (circumferential, radial) [mm] of a ring segment between -theta and
+    theta.
+    """
     turn = np.linspace(-theta, theta, 31)
-    arcs = [r * np.stack([np.sin(t), np.cos(t)], axis=1) for r, t in ((inner, turn), (outer, turn[::-1]))]
+    arcs = [
+        r * np.stack([np.sin(t), np.cos(t)], axis=1)
+        for r, t in ((inner, turn), (outer, turn[::-1]))
+    ]
     return MM * np.concatenate(arcs)
 
 
-def draw_disc(aerofoil: Aerofoil, platform: Platform, shank: Shank, disc: Disc, wedge: Wedge,
-              file: str | Path | None = None) -> object:
+def draw_disc(
+    aerofoil: Aerofoil,
+    platform: Platform,
+    shank: Shank,
+    disc: Disc,
+    wedge: Wedge,
+    file: str | Path | None = None,
+) -> object:
     """The sector from bore to tip, along the engine axis and from the side; returns the figure."""
     cut = profile(platform, shank, disc, wedge)
     with canvas(file, size=(7.4, 6.8), grid=(1, 2), sharey=True) as axes:
@@ -182,13 +253,21 @@ def draw_front(ax: Any, cut: Any, aerofoil: Aerofoil, disc: Disc) -> None:
     shape(ax, MM * cut.blade[:, ::-1])
     shape(ax, MM * cut.wedge[:, ::-1], DAMPER)
     width = [np.ptp(plane_section(aerofoil, t)[0][:, 1]) / 2 for t in (0.0, 1.0)]
-    top, tip = MM * cut.top, MM * (cut.top + aerofoil.span)
+    top = MM * cut.top
+    tip = MM * (cut.top + aerofoil.span)
     shape(ax, np.array([[-width[0], top], [width[0], top], [width[1], tip], [-width[1], tip]]))
     corner = ring(disc.bore_radius, disc.rim_radius, cut.theta)
     for side in (-1, 1):
         ax.plot([0, side * corner[0, 0]], [0, corner[0, 1]], color="#999999", lw=0.7, ls="--")
-    angle(ax, (0, 0), np.pi / 2 - cut.theta, np.pi / 2 + cut.theta, 0.55 * MM * disc.bore_radius,
-          "360° / sectors", rays=False)
+    angle(
+        ax,
+        (0, 0),
+        np.pi / 2 - cut.theta,
+        np.pi / 2 + cut.theta,
+        0.55 * MM * disc.bore_radius,
+        "360° / sectors",
+        rays=False,
+    )
     note(ax, corner[20], f"clamp\n{said(disc, 'bore_radius')}", (30, -14))
     note(ax, 0.5 * (corner[0] + corner[-1]), "cyclic_low", (-14, -10))
     note(ax, 0.5 * (corner[30] + corner[31]), "cyclic_high", (14, 0))
@@ -196,23 +275,49 @@ def draw_front(ax: Any, cut: Any, aerofoil: Aerofoil, disc: Disc) -> None:
     ax.set(xlim=(-0.28 * tip, 0.28 * tip), ylim=(-0.05 * tip, 1.06 * tip))
 
 
-def draw_meridian(ax: Any, cut: Any, aerofoil: Aerofoil, platform: Platform, shank: Shank, disc: Disc) -> None:
+def draw_meridian(
+    ax: Any, cut: Any, aerofoil: Aerofoil, platform: Platform, shank: Shank, disc: Disc
+) -> None:
     """From the side: axial widths and radii."""
     levels = [disc.bore_radius, disc.rim_radius, cut.underside, cut.top, cut.top + aerofoil.span]
-    for low, high, width in zip(levels[:3], levels[1:4], (disc.width, shank.length, platform.length), strict=True):
-        shape(ax, MM * np.array([[-width / 2, low], [width / 2, low], [width / 2, high], [-width / 2, high]]))
+    for low, high, width in zip(
+        levels[:3], levels[1:4], (disc.width, shank.length, platform.length), strict=True
+    ):
+        shape(
+            ax,
+            MM
+            * np.array(
+                [[-width / 2, low], [width / 2, low], [width / 2, high], [-width / 2, high]]
+            ),
+        )
     shares = np.linspace(0, 1, 21)
     extents = [plane_section(aerofoil, t)[0][:, 0] for t in shares]
     height = MM * (cut.top + aerofoil.span * shares)
-    low, high = np.array([e.min() for e in extents]), np.array([e.max() for e in extents])
+    low = np.array([e.min() for e in extents])
+    high = np.array([e.max() for e in extents])
     shape(ax, np.concatenate([np.stack([low, height], 1), np.stack([high, height], 1)[::-1]]))
     left = -MM * max(disc.width, platform.length) / 2
-    length(ax, (-MM * disc.width / 2, MM * levels[0]), (MM * disc.width / 2, MM * levels[0]), said(disc, "width"), -9)
+    length(
+        ax,
+        (-MM * disc.width / 2, MM * levels[0]),
+        (MM * disc.width / 2, MM * levels[0]),
+        said(disc, "width"),
+        -9,
+    )
     length(ax, (left, 0), (left, MM * levels[1]), said(disc, "rim_radius"), 22)
     length(ax, (left, MM * levels[1]), (left, MM * levels[2]), said(shank, "height"), 9)
-    note(ax, (MM * shank.length / 2, MM * 0.5 * (levels[1] + levels[2])), f"shank\n{said(shank, 'length')}", (16, -16))
-    note(ax, (MM * platform.length / 2, MM * 0.5 * (levels[2] + levels[3])), f"platform\n{said(platform, 'length')}",
-         (10, 6))
+    note(
+        ax,
+        (MM * shank.length / 2, MM * 0.5 * (levels[1] + levels[2])),
+        f"shank\n{said(shank, 'length')}",
+        (16, -16),
+    )
+    note(
+        ax,
+        (MM * platform.length / 2, MM * 0.5 * (levels[2] + levels[3])),
+        f"platform\n{said(platform, 'length')}",
+        (10, 6),
+    )
     right = MM * platform.length / 2
     length(ax, (right, MM * levels[3]), (right, MM * levels[4]), said(aerofoil, "span"), -26)
     ax.axhline(0, color="#333333", lw=1, ls="-.")
@@ -223,10 +328,14 @@ def draw_meridian(ax: Any, cut: Any, aerofoil: Aerofoil, platform: Platform, sha
 
 def draw_plane(plane: Plane, file: str | Path | None = None) -> object:
     """Two plane blades with the flat damper between them; returns the figure."""
-    blade, damper = MM * blade_corners(plane)[:, ::-1], MM * damper_corners(plane)[:, ::-1]
-    pitch, long = MM * plane.pitch, MM * plane.length
-    half, wide = MM * plane.thickness / 2, MM * plane.platform_width / 2
-    low, thick = MM * plane.platform_height, MM * plane.platform_thickness
+    blade = MM * blade_corners(plane)[:, ::-1]
+    damper = MM * damper_corners(plane)[:, ::-1]
+    pitch = MM * plane.pitch
+    long = MM * plane.length
+    half = MM * plane.thickness / 2
+    wide = MM * plane.platform_width / 2
+    low = MM * plane.platform_height
+    thick = MM * plane.platform_thickness
     seat = MM * plane.seat_width
     with canvas(file, size=(6.6, 6.8)) as ax:
         shape(ax, blade)
@@ -234,7 +343,9 @@ def draw_plane(plane: Plane, file: str | Path | None = None) -> object:
         shape(ax, damper, DAMPER)
         for start in (wide - seat, pitch - wide):
             ax.plot([start, start + seat], [low, low], color=COLOURS[1], lw=3.5, zorder=4)
-        ax.fill_between([-3 * half, pitch + 3 * half], -4, 0, hatch="////", fc="none", ec="#777777", lw=0)
+        ax.fill_between(
+            [-3 * half, pitch + 3 * half], -4, 0, hatch="////", fc="none", ec="#777777", lw=0
+        )
         length(ax, (-wide, 0), (-wide, long), said(plane, "length"), 14)
         length(ax, (-wide, 0), (-wide, low), said(plane, "platform_height"), 5)
         length(ax, (-half, long), (half, long), said(plane, "thickness"), 5)
@@ -242,7 +353,12 @@ def draw_plane(plane: Plane, file: str | Path | None = None) -> object:
         length(ax, (0, 0.75 * long), (pitch, 0.75 * long), said(plane, "pitch"))
         length(ax, (wide - seat, low), (wide, low), said(plane, "seat_width"), -16)
         note(ax, (pitch + wide, low + thick / 2), said(plane, "platform_thickness"), (-24, 60))
-        note(ax, damper.mean(axis=0) * [1.2, 1], f"flat damper\n{said(plane, 'damper_height')}", (60, -34))
+        note(
+            ax,
+            damper.mean(axis=0) * [1.2, 1],
+            f"flat damper\n{said(plane, 'damper_height')}",
+            (60, -34),
+        )
         note(ax, (0, 2), f"clamp; {said(plane, 'depth')}", (16, 14))
         bare(ax, "plane blades with flat dampers", "y, circumferential", "x, radial")
         ax.margins(0.06)
@@ -252,7 +368,9 @@ def draw_plane(plane: Plane, file: str | Path | None = None) -> object:
 def draw_z_mass(z: ZMass, file: str | Path | None = None) -> object:
     """The plate seen from above; returns the figure."""
     corners = MM * z_corners(z)
-    wide, high, bar = MM * z.width / 2, MM * z.height / 2, MM * z.bar
+    wide = MM * z.width / 2
+    high = MM * z.height / 2
+    bar = MM * z.bar
     with canvas(file, size=(6.0, 5.4)) as ax:
         shape(ax, corners, DAMPER)
         length(ax, (-wide, -high), (wide, -high), said(z, "width"), -6)
@@ -269,7 +387,10 @@ PARTS: dict[str, dict[str, Callable[[Scene, str | Path | None], object]]] = {
     "wedge sector": {
         "aerofoil": lambda s, file=None: draw_aerofoil(s.aerofoil, file),
         "platform": lambda s, file=None: draw_platform(s.platform, s.shank, s.disc, s.damper, file),
-        "sector": lambda s, file=None: draw_disc(s.aerofoil, s.platform, s.shank, s.disc, s.damper, file)},
+        "sector": lambda s, file=None: draw_disc(
+            s.aerofoil, s.platform, s.shank, s.disc, s.damper, file
+        ),
+    },
     "plane blades": {"plane": lambda s, file=None: draw_plane(s.plane, file)},
     "z mass": {"z_mass": lambda s, file=None: draw_z_mass(s.z_mass, file)},
     "hertz": {"hertz": lambda s, file=None: draw_hertz(s.hertz, file)},

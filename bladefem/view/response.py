@@ -1,8 +1,10 @@
-"""Forced responses with friction: curves for several loads, the optimum, hysteresis loops, speed against accuracy.
+"""Forced responses with friction: curves for several loads, the optimum, hysteresis loops, speed
+against accuracy.
 
-Response tables have one row a point, in SI units: load [N], frequency [Hz], amplitude [m], converged, method,
-residual, iterations. Summary tables have one row a load: load, peak_frequency, peak_amplitude, dissipated_energy [J],
-friction_damping [1], reduction (free over damped amplitude). Load 0 means no damper, load inf full stick.
+Response tables have one row a point, in SI units: load [N], frequency [Hz], amplitude [m],
+converged, method, residual, iterations. Summary tables have one row a load: load, peak_frequency,
+peak_amplitude, dissipated_energy [J], friction_damping [1], reduction (free over damped amplitude).
+Load 0 means no damper, load inf full stick.
 """
 
 from __future__ import annotations
@@ -19,15 +21,29 @@ from scipy.interpolate import PchipInterpolator
 from .labels import names_apart
 from .style import COLOURS, FAILED, canvas, log_axis
 
-__all__ = ["draw_accuracy", "draw_loops", "draw_optimum", "draw_responses", "draw_seat_loops", "loop_energy",
-           "pareto_front"]
+__all__ = [
+    "draw_accuracy",
+    "draw_loops",
+    "draw_optimum",
+    "draw_responses",
+    "draw_seat_loops",
+    "loop_energy",
+    "pareto_front",
+]
 
 MICRO = 1e6
 
 
-def draw_responses(points: pd.DataFrame, file: str | Path | None = None, *, ax: Any = None, title: str = "",
-                   logarithmic: bool = True) -> object:
-    """Amplitude over frequency, a curve a load; points without convergence are crosses in a gap; returns the figure.
+def draw_responses(
+    points: pd.DataFrame,
+    file: str | Path | None = None,
+    *,
+    ax: Any = None,
+    title: str = "",
+    logarithmic: bool = True,
+) -> object:
+    """Amplitude over frequency, a curve a load; points without convergence are crosses in a gap;
+    returns the figure.
 
     Args:
         points: response table (see the head of this file).
@@ -40,20 +56,42 @@ def draw_responses(points: pd.DataFrame, file: str | Path | None = None, *, ax: 
         loads = np.sort(points["load"].unique())
         colours = load_colours(loads)
         for load in loads:
-            draw_curve(ax, points[points["load"] == load].sort_values("frequency", kind="stable"), load, colours[load])
+            draw_curve(
+                ax,
+                points[points["load"] == load].sort_values("frequency", kind="stable"),
+                load,
+                colours[load],
+            )
         failed = points[~points["converged"].astype(bool)]
         if len(failed):
             draw_failed(ax, failed)
         if "stability" in points and (points["stability"] == "unstable").any():
             unstable = points[points["stability"] == "unstable"]
-            ax.plot(unstable["frequency"], MICRO * unstable["amplitude"], "s", mfc="white", mec=FAILED, ms=4.5, mew=1.2,
-                    zorder=5, label=f"unstable ({len(unstable)})")
-        ax.set(xlabel="excitation frequency [Hz]", ylabel="vibration amplitude [µm]",
-               title=title or "forced response")
+            ax.plot(
+                unstable["frequency"],
+                MICRO * unstable["amplitude"],
+                "s",
+                mfc="white",
+                mec=FAILED,
+                ms=4.5,
+                mew=1.2,
+                zorder=5,
+                label=f"unstable ({len(unstable)})",
+            )
+        ax.set(
+            xlabel="excitation frequency [Hz]",
+            ylabel="vibration amplitude [µm]",
+            title=title or "forced response",
+        )
         ax.margins(x=0.01)
         if logarithmic:
             log_axis(ax, "y")
-        ax.legend(title="normal load per seat", alignment="left", loc="center left", bbox_to_anchor=(1.0, 0.5))
+        ax.legend(
+            title="normal load per seat",
+            alignment="left",
+            loc="center left",
+            bbox_to_anchor=(1.0, 0.5),
+        )
         return ax.figure
 
 
@@ -65,58 +103,108 @@ def load_colours(loads: np.ndarray) -> dict[float, Any]:
 
 
 def load_name(load: float) -> str:
-    """"250 N", or the name of the limit."""
+    """ "250 N", or the name of the limit."""
     return {0.0: "0 (no damper)", np.inf: "∞ (full stick)"}.get(load, f"{load:.4g} N")
 
 
 def draw_curve(ax: Any, curve: pd.DataFrame, load: float, colour: Any) -> None:
-    """One load: dots are points that were solved, the line between them keeps their slopes; broken where one failed."""
+    """One load: dots are points that were solved, the line between them keeps their slopes; broken
+    where one failed.
+    """
     good = curve["converged"].to_numpy(bool)
-    frequency, amplitude = curve["frequency"].to_numpy(float), np.where(good, MICRO * curve["amplitude"], np.nan)
+    frequency = curve["frequency"].to_numpy(float)
+    amplitude = np.where(good, MICRO * curve["amplitude"], np.nan)
     style = {0.0: "--", np.inf: ":"}.get(load, "-")
     ax.plot(*between(frequency, amplitude), style, color=colour, label=load_name(load))
     if 0 < load < np.inf:
         ax.plot(frequency, amplitude, ".", color=colour, ms=2.5)
     if good.any():
         top = np.nanargmax(amplitude)
-        ax.plot(curve["frequency"].iloc[top], amplitude[top], "o", color=colour, ms=4.5, mec="white", mew=0.6, zorder=4)
+        ax.plot(
+            curve["frequency"].iloc[top],
+            amplitude[top],
+            "o",
+            color=colour,
+            ms=4.5,
+            mec="white",
+            mew=0.6,
+            zorder=4,
+        )
 
 
 def between(x: np.ndarray, y: np.ndarray, steps: int = 8) -> tuple[np.ndarray, np.ndarray]:
-    """A curve through positive points without overshoot (monotone cubics of log y), NaN where a point is missing."""
+    """A curve through positive points without overshoot (monotone cubics of log y), NaN where a
+    point is missing.
+    """
     runs = np.split(np.arange(len(x)), np.flatnonzero(~np.isfinite(y)))
-    xs, ys = [], []
+    xs = []
+    ys = []
     for run in runs:
         run = run[np.isfinite(y[run]) & (y[run] > 0)]
         run = run[np.unique(x[run], return_index=True)[1]]
         if len(run) > 1:
-            fine = np.interp(np.arange(steps * (len(run) - 1) + 1) / steps, np.arange(len(run)), x[run])
+            fine = np.interp(
+                np.arange(steps * (len(run) - 1) + 1) / steps, np.arange(len(run)), x[run]
+            )
             xs.append(fine)
             ys.append(np.exp(PchipInterpolator(x[run], np.log(y[run]))(fine)))
     gap = [np.nan]
-    return tuple(np.concatenate([gap, *(part for piece in pieces for part in (piece, gap))]) for pieces in (xs, ys))
+    return tuple(
+        np.concatenate([gap, *(part for piece in pieces for part in (piece, gap))])
+        for pieces in (xs, ys)
+    )
 
 
 def draw_failed(ax: Any, failed: pd.DataFrame) -> None:
-    """Points without a solution: crosses at their last amplitude, or on the lower edge when there is none."""
+    """Points without a solution: crosses at their last amplitude, or on the lower edge when there
+    is none.
+    """
     amplitude = MICRO * failed["amplitude"].to_numpy(float)
     known = np.isfinite(amplitude) & (amplitude > 0)
     label = f"not converged ({len(failed)})"
-    ax.plot(failed["frequency"][known], amplitude[known], "x", color=FAILED, ms=7, mew=1.8, zorder=5, label=label)
+    ax.plot(
+        failed["frequency"][known],
+        amplitude[known],
+        "x",
+        color=FAILED,
+        ms=7,
+        mew=1.8,
+        zorder=5,
+        label=label,
+    )
     if not known.all():
-        ax.plot(failed["frequency"][~known], np.full(int((~known).sum()), 0.01), "x", color=FAILED, ms=7, mew=1.8,
-                transform=ax.get_xaxis_transform(), clip_on=False, label=None if known.any() else label)
+        ax.plot(
+            failed["frequency"][~known],
+            np.full(int((~known).sum()), 0.01),
+            "x",
+            color=FAILED,
+            ms=7,
+            mew=1.8,
+            transform=ax.get_xaxis_transform(),
+            clip_on=False,
+            label=None if known.any() else label,
+        )
 
 
-def draw_optimum(summary: pd.DataFrame, file: str | Path | None = None, *, points: pd.DataFrame | None = None,
-                 own: float | None = None, ax: Any = None, title: str = "") -> object:
-    """Resonance amplitude and frequency over load, the optimum marked; a curve a mass if there is such a column.
+def draw_optimum(
+    summary: pd.DataFrame,
+    file: str | Path | None = None,
+    *,
+    points: pd.DataFrame | None = None,
+    own: float | None = None,
+    ax: Any = None,
+    title: str = "",
+) -> object:
+    """Resonance amplitude and frequency over load, the optimum marked; a curve a mass if there is
+    such a column.
 
     Args:
-        summary: summary table (see the head of this file); an optional column "mass" [kg] makes several curves, an
-            optional column "unconverged" (number of points) marks doubtful peaks.
+        summary: summary table (see the head of this file); an optional column "mass" [kg] makes
+            several curves, an optional column "unconverged" (number of points) marks doubtful
+            peaks.
         file: PNG to write.
-        points: response table; peaks at the end of the frequency band, which are none, are then drawn hollow.
+        points: response table; peaks at the end of the frequency band, which are none, are then
+            drawn hollow.
         own: load that the damper's mass gives at the operating speed [N].
         ax: two axes to draw into, amplitude and frequency.
         title: headline.
@@ -124,13 +212,20 @@ def draw_optimum(summary: pd.DataFrame, file: str | Path | None = None, *, point
     with canvas(file, ax, (7.2, 5.8), (2, 1), sharex=True, height_ratios=[1.6, 1]) as axes:
         groups = summary.groupby("mass") if "mass" in summary else [(None, summary)]
         for (mass, table), colour in zip(groups, COLOURS * 9, strict=False):
-            draw_optimum_curve(axes, table, colour, None if mass is None else f"damper of {1e3 * mass:.4g} g")
+            draw_optimum_curve(
+                axes, table, colour, None if mass is None else f"damper of {1e3 * mass:.4g} g"
+            )
         draw_limits(axes, summary)
         draw_cut(axes, summary, points)
         if own is not None:
             for axis in axes:
-                axis.axvline(own, color="#555555", lw=1.2, ls=(0, (1, 1)),
-                             label=f"the damper's own load, {own:.4g} N" if axis is axes[0] else None)
+                axis.axvline(
+                    own,
+                    color="#555555",
+                    lw=1.2,
+                    ls=(0, (1, 1)),
+                    label=f"the damper's own load, {own:.4g} N" if axis is axes[0] else None,
+                )
         axes[0].set(ylabel="resonance amplitude [µm]", title=title or "optimum load")
         axes[1].set(ylabel="resonance frequency [Hz]", xlabel="normal load per seat [N]")
         log_axis(axes[0], "y")
@@ -146,10 +241,21 @@ def draw_optimum_curve(axes: Any, table: pd.DataFrame, colour: str, label: str |
     amplitude = MICRO * finite["peak_amplitude"]
     axes[0].plot(finite["load"], amplitude, "o-", color=colour, label=label)
     axes[1].plot(finite["load"], finite["peak_frequency"], "o-", color=colour)
-    doubtful = finite["unconverged"] > 0 if "unconverged" in finite else pd.Series(False, index=finite.index)
+    doubtful = (
+        finite["unconverged"] > 0
+        if "unconverged" in finite
+        else pd.Series(False, index=finite.index)
+    )
     if doubtful.any():
-        axes[0].plot(finite["load"][doubtful], amplitude[doubtful], "x", color=FAILED, ms=9, mew=2,
-                     label="curve with unconverged points")
+        axes[0].plot(
+            finite["load"][doubtful],
+            amplitude[doubtful],
+            "x",
+            color=FAILED,
+            ms=9,
+            mew=2,
+            label="curve with unconverged points",
+        )
     best = finite.loc[finite["peak_amplitude"].idxmin()]
     text = f"optimum {best['load']:.4g} N: {MICRO * best['peak_amplitude']:.4g} µm"
     free = table.loc[table["load"] == 0, "peak_amplitude"]
@@ -161,20 +267,51 @@ def draw_optimum_curve(axes: Any, table: pd.DataFrame, colour: str, label: str |
         axis.plot(best["load"], y, "*", color=colour, ms=14, mec="black", mew=0.7, zorder=5)
         axis.axvline(best["load"], color=colour, lw=0.8, ls=":", alpha=0.8)
     axes[0].plot([], [], "*", color=colour, ms=11, mec="black", mew=0.7, label=text)
-    axes[1].annotate(f"{best['peak_frequency']:.5g} Hz", (best["load"], best["peak_frequency"]), (8, -4),
-                     textcoords="offset points", fontsize=8.5, va="top")
+    axes[1].annotate(
+        f"{best['peak_frequency']:.5g} Hz",
+        (best["load"], best["peak_frequency"]),
+        (8, -4),
+        textcoords="offset points",
+        fontsize=8.5,
+        va="top",
+    )
 
 
 def draw_cut(axes: Any, summary: pd.DataFrame, points: pd.DataFrame | None) -> None:
     """Hollow marks on peaks that are only the end of the frequency band."""
     if points is None or points.empty:
         return
-    ends = summary["load"].map(points.groupby("load")["frequency"].agg(lambda f: (f.min(), f.max())))
-    cut = summary[[isinstance(end, tuple) and f in end for f, end in zip(summary["peak_frequency"], ends, strict=True)]]
+    ends = summary["load"].map(
+        points.groupby("load")["frequency"].agg(lambda f: (f.min(), f.max()))
+    )
+    cut = summary[
+        [
+            isinstance(end, tuple) and f in end
+            for f, end in zip(summary["peak_frequency"], ends, strict=True)
+        ]
+    ]
     if len(cut):
-        axes[0].plot(cut["load"], MICRO * cut["peak_amplitude"], "o", mfc="white", mec=FAILED, ms=8, mew=1.5, zorder=6,
-                     label="no peak: end of the frequency band")
-        axes[1].plot(cut["load"], cut["peak_frequency"], "o", mfc="white", mec=FAILED, ms=8, mew=1.5, zorder=6)
+        axes[0].plot(
+            cut["load"],
+            MICRO * cut["peak_amplitude"],
+            "o",
+            mfc="white",
+            mec=FAILED,
+            ms=8,
+            mew=1.5,
+            zorder=6,
+            label="no peak: end of the frequency band",
+        )
+        axes[1].plot(
+            cut["load"],
+            cut["peak_frequency"],
+            "o",
+            mfc="white",
+            mec=FAILED,
+            ms=8,
+            mew=1.5,
+            zorder=6,
+        )
 
 
 def draw_limits(axes: Any, summary: pd.DataFrame) -> None:
@@ -182,19 +319,34 @@ def draw_limits(axes: Any, summary: pd.DataFrame) -> None:
     for load, style in ((0.0, "--"), (np.inf, "-.")):
         row = summary[summary["load"] == load]
         if len(row):
-            axes[0].axhline(MICRO * row["peak_amplitude"].iloc[0], color="#555555", ls=style, lw=1,
-                            label=load_name(load))
+            axes[0].axhline(
+                MICRO * row["peak_amplitude"].iloc[0],
+                color="#555555",
+                ls=style,
+                lw=1,
+                label=load_name(load),
+            )
             axes[1].axhline(row["peak_frequency"].iloc[0], color="#555555", ls=style, lw=1)
 
 
 def loop_energy(displacement: np.ndarray, force: np.ndarray) -> float:
-    """Energy dissipated in one closed loop [J], the area enclosed by (displacement [m], force [N])."""
-    return float(abs(0.5 * np.sum(displacement * np.roll(force, -1) - np.roll(displacement, -1) * force)))
+    """Energy dissipated in one closed loop [J], the area enclosed by (displacement [m], force
+    [N]).
+    """
+    return float(
+        abs(0.5 * np.sum(displacement * np.roll(force, -1) - np.roll(displacement, -1) * force))
+    )
 
 
-def draw_loops(loops: Mapping[str, tuple[np.ndarray, np.ndarray]], file: str | Path | None = None, *, ax: Any = None,
-               title: str = "") -> object:
-    """Friction force over relative displacement, one closed loop a name, with its energy; returns the figure.
+def draw_loops(
+    loops: Mapping[str, tuple[np.ndarray, np.ndarray]],
+    file: str | Path | None = None,
+    *,
+    ax: Any = None,
+    title: str = "",
+) -> object:
+    """Friction force over relative displacement, one closed loop a name, with its energy; returns
+    the figure.
 
     Args:
         loops: name -> (displacement (k,) [m], force (k,) [N]) over one period.
@@ -210,16 +362,27 @@ def draw_loops(loops: Mapping[str, tuple[np.ndarray, np.ndarray]], file: str | P
         for (name, (x, force)), colour in zip(loops.items(), colours, strict=False):
             closed = np.append(np.arange(len(x)), 0)
             energy = 1e3 * loop_energy(x, force)
-            energy *= energy > 1e-9 * np.ptp(x) * np.ptp(force)     # a stuck node's loop is a line
-            ax.plot(MICRO * np.asarray(x)[closed], np.asarray(force)[closed], color=colour,
-                    label=f"{name}: {energy:.3g} mJ a cycle")
-        ax.set(xlabel="relative displacement [µm]", ylabel="friction force [N]", title=title or "hysteresis loops")
+            # a stuck node's loop is a line
+            energy *= energy > 1e-9 * np.ptp(x) * np.ptp(force)
+            ax.plot(
+                MICRO * np.asarray(x)[closed],
+                np.asarray(force)[closed],
+                color=colour,
+                label=f"{name}: {energy:.3g} mJ a cycle",
+            )
+        ax.set(
+            xlabel="relative displacement [µm]",
+            ylabel="friction force [N]",
+            title=title or "hysteresis loops",
+        )
         ax.legend(**place)
         return ax.figure
 
 
-def draw_seat_loops(cases: Mapping[str, Mapping[str, tuple[np.ndarray, np.ndarray]]], file: str | Path | None = None,
-                    ) -> object:
+def draw_seat_loops(
+    cases: Mapping[str, Mapping[str, tuple[np.ndarray, np.ndarray]]],
+    file: str | Path | None = None,
+) -> object:
     """``draw_loops`` of all seats, a panel a load, each on its own scale; returns the figure.
 
     Args:
@@ -227,14 +390,17 @@ def draw_seat_loops(cases: Mapping[str, Mapping[str, tuple[np.ndarray, np.ndarra
     """
     across = min(len(cases), 4)
     down = -(-len(cases) // across)
-    with canvas(file, None, (3.3 * across + 0.6, 2.9 * down + 0.3), (down, across), squeeze=False) as axes:
+    with canvas(
+        file, None, (3.3 * across + 0.6, 2.9 * down + 0.3), (down, across), squeeze=False
+    ) as axes:
         for ax, (name, seats) in zip(axes.flat, cases.items(), strict=False):
             draw_loops(seats, ax=ax, title=name)
             ax.label_outer()
             ax.tick_params(labelbottom=True, labelleft=True)
             low, high = ax.get_ylim()
-            ax.set_ylim(low - 0.2 * (high - low), high)     # room for the legend
-        for ax in axes.flat[len(cases):]:
+            # room for the legend
+            ax.set_ylim(low - 0.2 * (high - low), high)
+        for ax in axes.flat[len(cases) :]:
             ax.set_axis_off()
         return axes[0, 0].figure
 
@@ -246,13 +412,20 @@ def pareto_front(time: np.ndarray, error: np.ndarray) -> np.ndarray:
     return order[error[order] < best]
 
 
-def draw_accuracy(table: pd.DataFrame, file: str | Path | None = None, *, ax: Any = None,
-                  tolerance: float | None = None, title: str = "") -> object:
-    """Error over time of each setting, the Pareto front, and a star on the automatic choice; returns the figure.
+def draw_accuracy(
+    table: pd.DataFrame,
+    file: str | Path | None = None,
+    *,
+    ax: Any = None,
+    tolerance: float | None = None,
+    title: str = "",
+) -> object:
+    """Error over time of each setting, the Pareto front, and a star on the automatic choice;
+    returns the figure.
 
     Args:
-        table: one row a setting: name, time [s], error [1]; optional bool columns "chosen" and "converged", optional
-            text column "family" for the colour.
+        table: one row a setting: name, time [s], error [1]; optional bool columns "chosen" and
+            "converged", optional text column "family" for the colour.
         file: PNG to write.
         ax: axes to draw into; names are to be moved apart (names_apart) when its limits are set.
         tolerance: wanted relative accuracy, drawn as a line.
@@ -260,9 +433,17 @@ def draw_accuracy(table: pd.DataFrame, file: str | Path | None = None, *, ax: An
     """
     alone = ax is None
     with canvas(file, ax, (7.2, 4.6)) as ax:
-        good = table["converged"].astype(bool) if "converged" in table else pd.Series(True, index=table.index)
+        good = (
+            table["converged"].astype(bool)
+            if "converged" in table
+            else pd.Series(True, index=table.index)
+        )
         families = table["family"] if "family" in table else pd.Series("setting", index=table.index)
-        marked = table["chosen"].astype(bool) if "chosen" in table else pd.Series(False, index=table.index)
+        marked = (
+            table["chosen"].astype(bool)
+            if "chosen" in table
+            else pd.Series(False, index=table.index)
+        )
         for name, colour in zip(families.unique(), COLOURS * 9, strict=False):
             part = table[(families == name) & good & ~marked]
             if part.empty:
@@ -270,14 +451,35 @@ def draw_accuracy(table: pd.DataFrame, file: str | Path | None = None, *, ax: An
             ax.plot(part["time"], part["error"], "o", color=colour, ms=5, alpha=0.8, label=name)
         failed = table[~good]
         if len(failed):
-            ax.plot(failed["time"], np.full(len(failed), 0.98), "x", color=FAILED, ms=7, mew=1.8,
-                    transform=ax.get_xaxis_transform(), label=f"not converged ({len(failed)})")
+            ax.plot(
+                failed["time"],
+                np.full(len(failed), 0.98),
+                "x",
+                color=FAILED,
+                ms=7,
+                mew=1.8,
+                transform=ax.get_xaxis_transform(),
+                label=f"not converged ({len(failed)})",
+            )
             for _, row in failed[failed["time"].notna()].iterrows():
-                ax.annotate(str(row["name"]), (row["time"], 0.98), (6, -13), xycoords=ax.get_xaxis_transform(),
-                            textcoords="offset points", fontsize=7.5, color=FAILED)
+                ax.annotate(
+                    str(row["name"]),
+                    (row["time"], 0.98),
+                    (6, -13),
+                    xycoords=ax.get_xaxis_transform(),
+                    textcoords="offset points",
+                    fontsize=7.5,
+                    color=FAILED,
+                )
         draw_front(ax, table[good])
         if tolerance is not None:
-            ax.axhline(tolerance, color="#555555", ls="--", lw=1, label=f"wanted accuracy {100 * tolerance:.3g} %")
+            ax.axhline(
+                tolerance,
+                color="#555555",
+                ls="--",
+                lw=1,
+                label=f"wanted accuracy {100 * tolerance:.3g} %",
+            )
         ax.set(xlabel="time [s]", ylabel="error [%]", title=title or "speed against accuracy")
         log_axis(ax, "x")
         log_axis(ax, "y", 100.0)
@@ -290,10 +492,35 @@ def draw_accuracy(table: pd.DataFrame, file: str | Path | None = None, *, ax: An
 def draw_front(ax: Any, table: pd.DataFrame) -> None:
     """The Pareto front as stairs, with names where there is room, and the chosen setting."""
     front = table.iloc[pareto_front(table["time"].to_numpy(float), table["error"].to_numpy(float))]
-    ax.step(front["time"], front["error"], where="post", color="#888888", lw=1, zorder=1, label="Pareto front")
-    for _, row in (front.sort_values("chosen", ascending=False) if "chosen" in front else front).iterrows():
-        ax.annotate(str(row["name"]), (row["time"], row["error"]), (6, 8), textcoords="offset points", fontsize=7.5)
+    ax.step(
+        front["time"],
+        front["error"],
+        where="post",
+        color="#888888",
+        lw=1,
+        zorder=1,
+        label="Pareto front",
+    )
+    for _, row in (
+        front.sort_values("chosen", ascending=False) if "chosen" in front else front
+    ).iterrows():
+        ax.annotate(
+            str(row["name"]),
+            (row["time"], row["error"]),
+            (6, 8),
+            textcoords="offset points",
+            fontsize=7.5,
+        )
     if "chosen" in table and table["chosen"].any():
         chosen = table[table["chosen"].astype(bool)]
-        ax.plot(chosen["time"], chosen["error"], "*", color=COLOURS[4], mec="black", ms=15, mew=0.8, zorder=5,
-                label="automatic choice")
+        ax.plot(
+            chosen["time"],
+            chosen["error"],
+            "*",
+            color=COLOURS[4],
+            mec="black",
+            ms=15,
+            mew=0.8,
+            zorder=5,
+            label="automatic choice",
+        )

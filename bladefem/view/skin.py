@@ -1,4 +1,6 @@
-"""The outside of a mesh as plane triangles, with the body and the named face that each belongs to: plain numpy."""
+"""The outside of a mesh as plane triangles, with the body and the named face that each belongs to:
+plain numpy.
+"""
 
 from __future__ import annotations
 
@@ -16,11 +18,31 @@ EDGES = {
     "triangle": ((0, 1), (1, 2), (2, 0)),
     "quad": ((0, 1), (1, 2), (2, 3), (3, 0)),
     "tetra": ((0, 1), (1, 2), (2, 0), (3, 0), (2, 3), (1, 3)),
-    "hexahedron": ((0, 1), (0, 3), (0, 4), (1, 2), (1, 5), (2, 3), (2, 6), (3, 7), (4, 5), (4, 7), (5, 6), (6, 7)),
+    "hexahedron": (
+        (0, 1),
+        (0, 3),
+        (0, 4),
+        (1, 2),
+        (1, 5),
+        (2, 3),
+        (2, 6),
+        (3, 7),
+        (4, 5),
+        (4, 7),
+        (5, 6),
+        (6, 7),
+    ),
 }
 SIDES = {
     "tetra": ((0, 2, 1), (0, 1, 3), (0, 3, 2), (1, 2, 3)),
-    "hexahedron": ((0, 3, 2, 1), (0, 1, 5, 4), (1, 2, 6, 5), (2, 3, 7, 6), (3, 0, 4, 7), (4, 5, 6, 7)),
+    "hexahedron": (
+        (0, 3, 2, 1),
+        (0, 1, 5, 4),
+        (1, 2, 6, 5),
+        (2, 3, 7, 6),
+        (3, 0, 4, 7),
+        (4, 5, 6, 7),
+    ),
 }
 CORNERS = {"line": 2, "triangle": 3, "quad": 4, "tetra": 4, "hexahedron": 8}
 
@@ -29,12 +51,18 @@ CORNERS = {"line": 2, "triangle": 3, "quad": 4, "tetra": 4, "hexahedron": 8}
 class Skin:
     """Triangles on the outside of a mesh, for drawing."""
 
-    nodes: np.ndarray               # (n,) node numbers in the mesh
-    points: np.ndarray              # (n, 3) [m]
-    triangles: np.ndarray           # (t, 3) rows of points
-    labels: np.ndarray              # (t,) numbers of names
-    names: tuple[str, ...]          # bodies first, then named faces
-    edges: np.ndarray               # (e, 2) rows of points: the element edges
+    # (n,) node numbers in the mesh
+    nodes: np.ndarray
+    # (n, 3) [m]
+    points: np.ndarray
+    # (t, 3) rows of points
+    triangles: np.ndarray
+    # (t,) numbers of names
+    labels: np.ndarray
+    # bodies first, then named faces
+    names: tuple[str, ...]
+    # (e, 2) rows of points: the element edges
+    edges: np.ndarray
 
 
 def family(cell_type: str) -> str:
@@ -43,7 +71,8 @@ def family(cell_type: str) -> str:
 
 
 def outer_faces(cells: np.ndarray, cell_type: str) -> np.ndarray:
-    """(nf, k) faces that belong to one cell only; corners in a loop, then the mid-side nodes. Plane cells: themselves.
+    """(nf, k) faces that belong to one cell only; corners in a loop, then the mid-side nodes. Plane
+    cells: themselves.
 
     Args:
         cells: (nc, nodes of a cell) in gmsh's order.
@@ -51,19 +80,25 @@ def outer_faces(cells: np.ndarray, cell_type: str) -> np.ndarray:
     """
     shape = family(cell_type)
     if shape not in SIDES:
-        return cells[:, :2 * CORNERS[shape]]
+        return cells[:, : 2 * CORNERS[shape]]
     quadratic = cells.shape[1] > CORNERS[shape]
     middle = {frozenset(edge): CORNERS[shape] + i for i, edge in enumerate(EDGES[shape])}
-    loops = [side + tuple(middle[frozenset(e)] for e in zip(side, side[1:] + side[:1], strict=True)) * quadratic
-             for side in SIDES[shape]]
+    loops = [
+        side
+        + tuple(middle[frozenset(e)] for e in zip(side, side[1:] + side[:1], strict=True))
+        * quadratic
+        for side in SIDES[shape]
+    ]
     faces = cells[:, loops].reshape(-1, len(loops[0]))
-    corners = np.sort(faces[:, :len(SIDES[shape][0])], axis=1)
+    corners = np.sort(faces[:, : len(SIDES[shape][0])], axis=1)
     _, first, count = np.unique(corners, axis=0, return_index=True, return_counts=True)
     return faces[np.sort(first[count == 1])]
 
 
 def split_faces(faces: np.ndarray, corners: int, coarse: bool = False) -> np.ndarray:
-    """(nf, m, 3) plane triangles of faces given as a corner loop and, for quadratic faces, a loop of mid-side nodes."""
+    """(nf, m, 3) plane triangles of faces given as a corner loop and, for quadratic faces, a loop
+    of mid-side nodes.
+    """
     if coarse or faces.shape[1] < 2 * corners:
         pattern = [(0, i, i + 1) for i in range(1, corners - 1)]
     else:
@@ -80,7 +115,9 @@ def face_corners(mesh: Mesh) -> int:
     """
     shape = family(mesh.cell_type)
     if shape not in EDGES:
-        raise InputError(f"cells of type '{mesh.cell_type}' cannot be drawn, expected {', '.join(EDGES)}")
+        raise InputError(
+            f"cells of type '{mesh.cell_type}' cannot be drawn, expected {', '.join(EDGES)}"
+        )
     return len(SIDES[shape][0]) if shape in SIDES else CORNERS[shape]
 
 
@@ -100,11 +137,19 @@ def skin(mesh: Mesh, coarse: bool = False, without: tuple[str, ...] = ()) -> Ski
     if mesh.dimension == 3:
         labels = label_faces(faces[:, :corners], labels, mesh, corners)
     keep = ~np.isin(labels, [i for i, name in enumerate(names) if name in without])
-    faces, labels = faces[keep], labels[keep]
+    faces = faces[keep]
+    labels = labels[keep]
     triangles = split_faces(faces, corners, coarse)
     nodes, local = np.unique(triangles, return_inverse=True)
     edges = np.searchsorted(nodes, face_edges(faces, corners, coarse))
-    return Skin(nodes, mesh.points[nodes], local.reshape(-1, 3), np.repeat(labels, triangles.shape[1]), names, edges)
+    return Skin(
+        nodes,
+        mesh.points[nodes],
+        local.reshape(-1, 3),
+        np.repeat(labels, triangles.shape[1]),
+        names,
+        edges,
+    )
 
 
 def label_faces(faces: np.ndarray, labels: np.ndarray, mesh: Mesh, corners: int) -> np.ndarray:
@@ -119,20 +164,25 @@ def label_faces(faces: np.ndarray, labels: np.ndarray, mesh: Mesh, corners: int)
 
 
 def face_edges(faces: np.ndarray, corners: int, coarse: bool) -> np.ndarray:
-    """(e, 2) straight pieces of the faces' edges, each once; through the mid-side nodes when there are any."""
+    """(e, 2) straight pieces of the faces' edges, each once; through the mid-side nodes when there
+    are any.
+    """
     start = faces[:, :corners]
     end = np.roll(start, -1, axis=1)
     if coarse or faces.shape[1] < 2 * corners:
         pieces = np.stack([start, end], axis=2).reshape(-1, 2)
     else:
-        middle = faces[:, corners:2 * corners]
-        pieces = np.concatenate([np.stack([start, middle], axis=2), np.stack([middle, end], axis=2)]).reshape(-1, 2)
+        middle = faces[:, corners : 2 * corners]
+        pieces = np.concatenate(
+            [np.stack([start, middle], axis=2), np.stack([middle, end], axis=2)]
+        ).reshape(-1, 2)
     return np.unique(np.sort(pieces, axis=1), axis=0)
 
 
 def sector_motion(mesh: Mesh, k: int) -> tuple[np.ndarray, np.ndarray]:
     """Rotation (3, 3) and shift (3,) [m] from the meshed sector to the k-th next one."""
-    rotation, shift = np.eye(3), np.zeros(3)
+    rotation = np.eye(3)
+    shift = np.zeros(3)
     for _ in range(k):
         shift = mesh.sector.rotation @ shift + mesh.sector.shift
         rotation = mesh.sector.rotation @ rotation
@@ -147,11 +197,20 @@ def wheel_count(mesh: Mesh, shown: int = 5) -> int:
 
 
 def wheel_skin(mesh: Mesh, coarse: bool = True) -> Skin:
-    """The skin of the full wheel, copies of one sector in order; ``nodes`` repeats the sector's node numbers."""
+    """The skin of the full wheel, copies of one sector in order; ``nodes`` repeats the sector's
+    node numbers.
+    """
     one = skin(mesh, coarse, without=("cyclic_low", "cyclic_high"))
-    count, n = wheel_count(mesh), len(one.points)
+    count = wheel_count(mesh)
+    n = len(one.points)
     motions = [sector_motion(mesh, k) for k in range(count)]
     points = np.concatenate([one.points @ rotation.T + shift for rotation, shift in motions])
     offsets = (np.arange(count) * n)[:, None, None]
-    return replace(one, nodes=np.tile(one.nodes, count), points=points, labels=np.tile(one.labels, count),
-                   triangles=(one.triangles + offsets).reshape(-1, 3), edges=(one.edges + offsets).reshape(-1, 2))
+    return replace(
+        one,
+        nodes=np.tile(one.nodes, count),
+        points=points,
+        labels=np.tile(one.labels, count),
+        triangles=(one.triangles + offsets).reshape(-1, 3),
+        edges=(one.edges + offsets).reshape(-1, 2),
+    )

@@ -1,4 +1,6 @@
-"""A study of one field: the best load of each value, and amplitude against load for each of them."""
+"""A study of one field: the best load of each value, and amplitude against load for each of
+them.
+"""
 
 from __future__ import annotations
 
@@ -13,13 +15,20 @@ __all__ = ["draw_study"]
 MICRO = 1e6
 
 
-def draw_study(table: pd.DataFrame, loads: pd.DataFrame, file: str | Path | None = None, *, label: str = "value",
-               title: str = "") -> object:
-    """Resonance amplitude and frequency at the best load over the value, and beside it all loads; returns the figure.
+def draw_study(
+    table: pd.DataFrame,
+    loads: pd.DataFrame,
+    file: str | Path | None = None,
+    *,
+    label: str = "value",
+    title: str = "",
+) -> object:
+    """Resonance amplitude and frequency at the best load over the value, and beside it all loads;
+    returns the figure.
 
     Args:
-        table: one row a value: axis (number or text), value (text), peak_amplitude [m], peak_frequency [Hz],
-            free_amplitude [m], free_frequency [Hz], load [N].
+        table: one row a value: axis (number or text), value (text), peak_amplitude [m],
+            peak_frequency [Hz], free_amplitude [m], free_frequency [Hz], load [N].
         loads: one row a load of each value: value, load [N], peak_amplitude [m].
         file: PNG to write.
         label: of the axis of values.
@@ -27,9 +36,24 @@ def draw_study(table: pd.DataFrame, loads: pd.DataFrame, file: str | Path | None
     """
     with canvas(file, None, (10.4, 5.6), (2, 2)) as axes:
         table = table if table["axis"].dtype == object else table.sort_values("axis")
-        for axis, column, scale in ((axes[0, 0], "amplitude", MICRO), (axes[1, 0], "frequency", 1.0)):
-            axis.plot(table["axis"], scale * table[f"free_{column}"], "--", color="#777777", label="no damper")
-            axis.plot(table["axis"], scale * table[f"peak_{column}"], "o-", color=COLOURS[0], label="best load")
+        for axis, column, scale in (
+            (axes[0, 0], "amplitude", MICRO),
+            (axes[1, 0], "frequency", 1.0),
+        ):
+            axis.plot(
+                table["axis"],
+                scale * table[f"free_{column}"],
+                "--",
+                color="#777777",
+                label="no damper",
+            )
+            axis.plot(
+                table["axis"],
+                scale * table[f"peak_{column}"],
+                "o-",
+                color=COLOURS[0],
+                label="best load",
+            )
         axes[0, 0].set(ylabel="resonance amplitude [µm]", title=title)
         axes[1, 0].set(ylabel="resonance frequency [Hz]", xlabel=label)
         log_axis(axes[0, 0], "y")
@@ -44,10 +68,14 @@ def draw_study(table: pd.DataFrame, loads: pd.DataFrame, file: str | Path | None
 def _draw_loads(axis: object, loads: pd.DataFrame) -> None:
     """Amplitude against load, a line a value."""
     damped = loads[(loads["load"] > 0) & (loads["load"] < float("inf"))]
-    for (value, part), colour in zip(damped.groupby("value", sort=False), COLOURS * 9, strict=False):
+    for (value, part), colour in zip(
+        damped.groupby("value", sort=False), COLOURS * 9, strict=False
+    ):
         part = part.sort_values("load")
         axis.plot(part["load"], MICRO * part["peak_amplitude"], "o-", color=colour, label=value)
-    axis.set(xlabel="normal load per seat [N]", ylabel="resonance amplitude [µm]", title="all loads")
+    axis.set(
+        xlabel="normal load per seat [N]", ylabel="resonance amplitude [µm]", title="all loads"
+    )
     log_axis(axis, "x")
     log_axis(axis, "y")
     axis.legend()

@@ -1,4 +1,6 @@
-"""One look for every picture: a matplotlib style, a colour-blind safe palette, and renderings without a window."""
+"""One look for every picture: a matplotlib style, a colour-blind safe palette, and renderings
+without a window.
+"""
 
 from __future__ import annotations
 
@@ -13,8 +15,19 @@ import numpy as np
 from matplotlib.figure import Figure
 from matplotlib.ticker import FuncFormatter, LogLocator, NullFormatter
 
-__all__ = ["COLOURS", "DIVERGING", "FAILED", "SEQUENTIAL", "STYLE", "canvas", "headline", "log_axis", "photograph",
-           "show_photograph", "size_for"]
+__all__ = [
+    "COLOURS",
+    "DIVERGING",
+    "FAILED",
+    "SEQUENTIAL",
+    "STYLE",
+    "canvas",
+    "headline",
+    "log_axis",
+    "photograph",
+    "show_photograph",
+    "size_for",
+]
 
 # Okabe and Ito, Color Universal Design (2008); yellow last because it is weak on white.
 COLOURS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9", "#000000", "#F0E442")
@@ -25,20 +38,46 @@ FAILED = "#d62728"
 LIGHT = {"show_scalar_bar": False, "ambient": 0.42, "diffuse": 0.62, "specular": 0.05}
 
 STYLE: dict[str, Any] = {
-    "font.family": "DejaVu Sans", "font.size": 9.5, "axes.titlesize": 11, "axes.titleweight": "bold",
-    "axes.titlelocation": "left", "axes.labelsize": 10, "axes.edgecolor": "#555555", "axes.linewidth": 0.8,
-    "axes.labelcolor": INK, "text.color": INK, "xtick.color": "#444444", "ytick.color": "#444444",
-    "axes.spines.top": False, "axes.spines.right": False, "axes.grid": True, "axes.axisbelow": True,
-    "grid.color": "#dddddd", "grid.linewidth": 0.6, "lines.linewidth": 1.7, "lines.markersize": 5,
-    "legend.frameon": False, "legend.fontsize": 8.5, "figure.dpi": 160, "savefig.dpi": 160,
-    "savefig.facecolor": "white", "axes.prop_cycle": matplotlib.cycler(color=COLOURS), "image.cmap": SEQUENTIAL,
-    "axes.formatter.useoffset": False, "mathtext.default": "regular",
+    "font.family": "DejaVu Sans",
+    "font.size": 9.5,
+    "axes.titlesize": 11,
+    "axes.titleweight": "bold",
+    "axes.titlelocation": "left",
+    "axes.labelsize": 10,
+    "axes.edgecolor": "#555555",
+    "axes.linewidth": 0.8,
+    "axes.labelcolor": INK,
+    "text.color": INK,
+    "xtick.color": "#444444",
+    "ytick.color": "#444444",
+    "axes.spines.top": False,
+    "axes.spines.right": False,
+    "axes.grid": True,
+    "axes.axisbelow": True,
+    "grid.color": "#dddddd",
+    "grid.linewidth": 0.6,
+    "lines.linewidth": 1.7,
+    "lines.markersize": 5,
+    "legend.frameon": False,
+    "legend.fontsize": 8.5,
+    "figure.dpi": 160,
+    "savefig.dpi": 160,
+    "savefig.facecolor": "white",
+    "axes.prop_cycle": matplotlib.cycler(color=COLOURS),
+    "image.cmap": SEQUENTIAL,
+    "axes.formatter.useoffset": False,
+    "mathtext.default": "regular",
 }
 
 
 @contextmanager
-def canvas(file: str | Path | None = None, ax: Any = None, size: tuple[float, float] = (7.2, 4.4),
-           grid: tuple[int, int] = (1, 1), **subplots: Any) -> Iterator[Any]:
+def canvas(
+    file: str | Path | None = None,
+    ax: Any = None,
+    size: tuple[float, float] = (7.2, 4.4),
+    grid: tuple[int, int] = (1, 1),
+    **subplots: Any,
+) -> Iterator[Any]:
     """Axes in the common style: the caller's ``ax``, or a new figure saved to ``file`` at the end.
 
     Args:
@@ -58,7 +97,9 @@ def canvas(file: str | Path | None = None, ax: Any = None, size: tuple[float, fl
 
 
 def log_axis(ax: Any, which: str, factor: float = 1.0) -> None:
-    """A logarithmic "x" or "y" axis with plain numbers, times a factor, also at 2 and 5 when there are few decades."""
+    """A logarithmic "x" or "y" axis with plain numbers, times a factor, also at 2 and 5 when there
+    are few decades.
+    """
     axis = ax.xaxis if which == "x" else ax.yaxis
     (ax.set_xscale if which == "x" else ax.set_yscale)("log")
     low, high = axis.get_view_interval()
@@ -68,9 +109,15 @@ def log_axis(ax: Any, which: str, factor: float = 1.0) -> None:
     axis.set_minor_formatter(NullFormatter())
 
 
-def photograph(parts: list[dict[str, Any]], direction: tuple[float, float, float], up: tuple[float, float, float],
-               size: tuple[int, int] = (1400, 1100), crop: bool = True) -> np.ndarray:
-    """Render pyvista meshes without a window, in parallel projection, and cut away the white border.
+def photograph(
+    parts: list[dict[str, Any]],
+    direction: tuple[float, float, float],
+    up: tuple[float, float, float],
+    size: tuple[int, int] = (1400, 1100),
+    crop: bool = True,
+) -> np.ndarray:
+    """Render pyvista meshes without a window, in parallel projection, and cut away the white
+    border.
 
     Args:
         parts: keyword arguments of ``Plotter.add_mesh``, one dict a mesh.
@@ -93,19 +140,24 @@ def photograph(parts: list[dict[str, Any]], direction: tuple[float, float, float
 
 def open_plotter(size: tuple[int, int]) -> Any:
     """A pyvista plotter on an off-screen EGL surface with the common theme."""
-    # VTK reads this when it makes its first window: say EGL before, or it complains about a missing X display.
+    # VTK reads this when it makes its first window: say EGL before, or it complains about a missing
+    # X display.
     os.environ.setdefault("VTK_DEFAULT_OPENGL_WINDOW", "vtkEGLRenderWindow")
     import pyvista
 
     theme = pyvista.themes.DocumentTheme()
     theme.background = "white"
     theme.font.color = "black"
-    plotter = pyvista.Plotter(off_screen=True, window_size=list(size), theme=theme, lighting="light kit")
+    plotter = pyvista.Plotter(
+        off_screen=True, window_size=list(size), theme=theme, lighting="light kit"
+    )
     plotter.enable_anti_aliasing("msaa", multi_samples=8)
     return plotter
 
 
-def screen_axes(direction: tuple[float, float, float], up: tuple[float, float, float]) -> np.ndarray:
+def screen_axes(
+    direction: tuple[float, float, float], up: tuple[float, float, float]
+) -> np.ndarray:
     """(3, 3) rows: rightwards and upwards in the picture, and towards the eye."""
     eye = np.asarray(direction, float) / np.linalg.norm(direction)
     right = np.cross(up, eye)
@@ -113,47 +165,72 @@ def screen_axes(direction: tuple[float, float, float], up: tuple[float, float, f
     return np.stack([right, np.cross(eye, right), eye])
 
 
-def aim(plotter: Any, direction: tuple[float, float, float], up: tuple[float, float, float], points: np.ndarray,
-        border: float = 1.04) -> None:
-    """Look at ``points`` from ``direction`` in parallel projection, as large as the window allows."""
+def aim(
+    plotter: Any,
+    direction: tuple[float, float, float],
+    up: tuple[float, float, float],
+    points: np.ndarray,
+    border: float = 1.04,
+) -> None:
+    """Look at ``points`` from ``direction`` in parallel projection, as large as the window
+    allows.
+    """
     axes = screen_axes(direction, up)
-    low, high = (points @ axes.T).min(axis=0), (points @ axes.T).max(axis=0)
+    low = (points @ axes.T).min(axis=0)
+    high = (points @ axes.T).max(axis=0)
     width, height, depth = high - low
     centre = axes.T @ (0.5 * (low + high))
     plotter.camera_position = [centre + (depth + max(width, height)) * axes[2], centre, axes[1]]
     plotter.enable_parallel_projection()
-    plotter.camera.parallel_scale = 0.5 * border * max(height, width * plotter.window_size[1] / plotter.window_size[0])
+    plotter.camera.parallel_scale = (
+        0.5 * border * max(height, width * plotter.window_size[1] / plotter.window_size[0])
+    )
     plotter.renderer.ResetCameraClippingRange()
 
 
 def trim(image: np.ndarray, margin: int = 12) -> np.ndarray:
     """Cut the white border off a picture."""
     inked = np.any(image < 250, axis=2)
-    rows, columns = np.flatnonzero(inked.any(axis=1)), np.flatnonzero(inked.any(axis=0))
+    rows = np.flatnonzero(inked.any(axis=1))
+    columns = np.flatnonzero(inked.any(axis=0))
     if len(rows) == 0:
         return image
-    top, left = max(rows[0] - margin, 0), max(columns[0] - margin, 0)
-    return image[top:rows[-1] + margin + 1, left:columns[-1] + margin + 1]
+    top = max(rows[0] - margin, 0)
+    left = max(columns[0] - margin, 0)
+    return image[top : rows[-1] + margin + 1, left : columns[-1] + margin + 1]
 
 
-def show_photograph(ax: Any, image: np.ndarray, direction: tuple[float, float, float] | None = None,
-                    up: tuple[float, float, float] = (1.0, 0.0, 0.0)) -> None:
-    """Put a rendering on axes, with a small triad (x radial, y circumferential, z axial) when a direction is given."""
+def show_photograph(
+    ax: Any,
+    image: np.ndarray,
+    direction: tuple[float, float, float] | None = None,
+    up: tuple[float, float, float] = (1.0, 0.0, 0.0),
+) -> None:
+    """Put a rendering on axes, with a small triad (x radial, y circumferential, z axial) when a
+    direction is given.
+    """
     ax.imshow(image, interpolation="lanczos")
     ax.set_axis_off()
     if direction is not None:
-        figure, place = ax.figure, ax.get_subplotspec()
-        width, height = 0.75 / figure.get_figwidth(), 0.75 / figure.get_figheight()
+        figure = ax.figure
+        place = ax.get_subplotspec()
+        width = 0.75 / figure.get_figwidth()
+        height = 0.75 / figure.get_figheight()
         left = place.colspan.start / place.get_gridspec().ncols
         draw_triad(figure.add_axes((left, 0.0, width, height)), direction, up)
 
 
-def size_for(image: np.ndarray, height: float, beside: float = 0.3, widest: float = 9.0) -> tuple[float, float]:
-    """Figure size [inch] for a rendering about ``height`` tall, with room beside it and a line above and below."""
+def size_for(
+    image: np.ndarray, height: float, beside: float = 0.3, widest: float = 9.0
+) -> tuple[float, float]:
+    """Figure size [inch] for a rendering about ``height`` tall, with room beside it and a line
+    above and below.
+    """
     rows, columns = image.shape[:2]
     width = height * columns / rows
     if width > widest:
-        width, height = widest, widest * rows / columns
+        width = widest
+        height = widest * rows / columns
     return max(width + beside, 4.4), height + 0.8
 
 
@@ -162,14 +239,18 @@ def headline(figure: Any, text: str) -> None:
     figure.suptitle(text, x=0.01, ha="left", fontsize=10.5, fontweight="bold")
 
 
-def draw_triad(ax: Any, direction: tuple[float, float, float], up: tuple[float, float, float]) -> None:
+def draw_triad(
+    ax: Any, direction: tuple[float, float, float], up: tuple[float, float, float]
+) -> None:
     """The three axes as the camera sees them."""
     screen = screen_axes(direction, up)[:2]
     for axis, colour in zip(range(3), (COLOURS[1], COLOURS[2], COLOURS[0]), strict=True):
         tip = screen[:, axis]
         if np.linalg.norm(tip) < 0.15:
             continue
-        ax.annotate("", xy=tip, xytext=(0, 0), arrowprops={"arrowstyle": "-|>", "color": colour, "lw": 1.4})
+        ax.annotate(
+            "", xy=tip, xytext=(0, 0), arrowprops={"arrowstyle": "-|>", "color": colour, "lw": 1.4}
+        )
         ax.text(*(1.25 * tip), "xyz"[axis], color=colour, ha="center", va="center", fontsize=8)
     ax.set(xlim=(-1.4, 1.4), ylim=(-1.4, 1.4), aspect="equal")
     ax.patch.set_alpha(0.0)

@@ -1,4 +1,6 @@
-"""Friction work on the contact faces: where a period at the resonance wears them, and which nodes stick."""
+"""Friction work on the contact faces: where a period at the resonance wears them, and which nodes
+stick.
+"""
 
 from __future__ import annotations
 
@@ -20,13 +22,24 @@ from .style import COLOURS, canvas, headline
 __all__ = ["draw_work"]
 
 WORK_COLOURS = "inferno_r"
-MARKS = {0: ("o", "separated"), 1: ("s", "stuck"), 2: ("^", "slips up to half of its contact time"),
-         3: ("D", "slips longer")}
+MARKS = {
+    0: ("o", "separated"),
+    1: ("s", "stuck"),
+    2: ("^", "slips up to half of its contact time"),
+    3: ("D", "slips longer"),
+}
 
 
-def draw_work(patches: Sequence[Patch], work: np.ndarray, state: np.ndarray, file: str | Path | None = None, *,
-              title: str = "") -> object:
-    """Friction work a period and area on each face, unfolded, with the state of its nodes; returns the figure.
+def draw_work(
+    patches: Sequence[Patch],
+    work: np.ndarray,
+    state: np.ndarray,
+    file: str | Path | None = None,
+    *,
+    title: str = "",
+) -> object:
+    """Friction work a period and area on each face, unfolded, with the state of its nodes; returns
+    the figure.
 
     Args:
         work: (nodes,) of all patches, one after the other [J/m^2].
@@ -35,21 +48,32 @@ def draw_work(patches: Sequence[Patch], work: np.ndarray, state: np.ndarray, fil
     """
     cuts = np.cumsum([len(p.area) for p in patches])[:-1]
     parts = list(zip(patches, np.split(work, cuts), np.split(state, cuts), strict=True))
-    line, most = patches[0].faces.shape[1] == 2, max(float(work.max(initial=0.0)), 1e-300)
+    line = patches[0].faces.shape[1] == 2
+    most = max(float(work.max(initial=0.0)), 1e-300)
     shape, size = arrangement(patches)
     stacked = shape[0] > 1
     with canvas(file, size=size, grid=shape, squeeze=False, sharex=stacked, sharey=True) as axes:
         for ax, (patch, w, s) in zip(axes.flat, parts, strict=True):
             (_line if line else _face)(ax, patch, w, s, most)
             total = 1e3 * float(w @ patch.area)
-            ax.set_title(f"{seat_name(patch)}: {total:.3g} mJ a period", fontsize=9, fontweight="normal")
+            ax.set_title(
+                f"{seat_name(patch)}: {total:.3g} mJ a period", fontsize=9, fontweight="normal"
+            )
         figure = axes[0, 0].figure
         if not line:
-            figure.colorbar(ScalarMappable(Normalize(0, most), WORK_COLOURS), ax=list(axes.flat), aspect=25,
-                            pad=0.02, label="friction work [J/m²]")
+            figure.colorbar(
+                ScalarMappable(Normalize(0, most), WORK_COLOURS),
+                ax=list(axes.flat),
+                aspect=25,
+                pad=0.02,
+                label="friction work [J/m²]",
+            )
         label_outer(axes, line)
-        named = {label: handle for ax in axes.flat for handle, label in zip(*ax.get_legend_handles_labels(),
-                                                                           strict=True)}
+        named = {
+            label: handle
+            for ax in axes.flat
+            for handle, label in zip(*ax.get_legend_handles_labels(), strict=True)
+        }
         figure.legend(named.values(), named.keys(), loc="outside lower center", ncols=2)
         headline(figure, title or "friction work of a period")
         return figure
@@ -58,12 +82,28 @@ def draw_work(patches: Sequence[Patch], work: np.ndarray, state: np.ndarray, fil
 def _face(ax: Any, patch: Patch, work: np.ndarray, state: np.ndarray, most: float) -> None:
     xy = 1e3 * unfold(patch)
     triangles = split_faces(patch.faces, patch.faces.shape[1]).reshape(-1, 3)
-    ax.tripcolor(Triangulation(xy[:, 0], xy[:, 1], triangles), work, shading="gouraud", cmap=WORK_COLOURS, vmin=0,
-                 vmax=most, rasterized=True)
+    ax.tripcolor(
+        Triangulation(xy[:, 0], xy[:, 1], triangles),
+        work,
+        shading="gouraud",
+        cmap=WORK_COLOURS,
+        vmin=0,
+        vmax=most,
+        rasterized=True,
+    )
     for code, (mark, label) in MARKS.items():
         if (state == code).any():
-            ax.plot(*xy[state == code].T, mark, mfc="white", mec=COLOURS[code], ms=4, mew=1, ls="", label=label,
-                    clip_on=False)
+            ax.plot(
+                *xy[state == code].T,
+                mark,
+                mfc="white",
+                mec=COLOURS[code],
+                ms=4,
+                mew=1,
+                ls="",
+                label=label,
+                clip_on=False,
+            )
     ax.set(ylabel="outwards [mm]", aspect="equal")
     ax.grid(False)
 
@@ -75,6 +115,13 @@ def _line(ax: Any, patch: Patch, work: np.ndarray, state: np.ndarray, most: floa
     ax.plot(place[order], work[order], "-", color="#999999", lw=1)
     for code, (mark, label) in MARKS.items():
         if (state == code).any():
-            ax.plot(place[state == code], work[state == code], mark, color=COLOURS[code], ms=5, ls="", label=label)
+            ax.plot(
+                place[state == code],
+                work[state == code],
+                mark,
+                color=COLOURS[code],
+                ms=5,
+                ls="",
+                label=label,
+            )
     ax.set(ylabel="friction work [J/m²]", ylim=(-0.03 * most, 1.08 * most))
-

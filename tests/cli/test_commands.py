@@ -18,8 +18,8 @@ import bladefem.study
 from bladefem.cli.main import main, parser
 from bladefem.data import ModeSet, Patch, PressureMap
 from bladefem.errors import InputError, NotSolvedError
-from bladefem.run_folder import locked
-from bladefem.scene_file import load_scene
+from bladefem.io.run_folder import locked
+from bladefem.scene.toml import load_scene
 from geometry.mesh import Mesh
 
 WEDGE = "scenes/wedge.toml"
@@ -27,29 +27,64 @@ WEDGE = "scenes/wedge.toml"
 
 def fake_curve(load, amplitude):
     peak = SimpleNamespace(work=SimpleNamespace(dissipated=2e-3), states={"slip": 3, "lift": 0})
-    return SimpleNamespace(load=load, mass=None, peak=peak, settings=SimpleNamespace(error=0.013, harmonics=3),
-                           halved=np.nan,
-                           peak_frequency=830.0, peak_amplitude=amplitude, frequency=np.arange(5.0),
-                           converged=np.array([True, True, False, True, True]))
+    return SimpleNamespace(
+        load=load,
+        mass=None,
+        peak=peak,
+        settings=SimpleNamespace(error=0.013, harmonics=3),
+        halved=np.nan,
+        peak_frequency=830.0,
+        peak_amplitude=amplitude,
+        frequency=np.arange(5.0),
+        converged=np.array([True, True, False, True, True]),
+    )
 
 
 def fake_limit(load, frequency):
-    return SimpleNamespace(load=load, peak_frequency=frequency, peak_amplitude=8e-5, frequency=np.arange(3.0))
+    return SimpleNamespace(
+        load=load, peak_frequency=frequency, peak_amplitude=8e-5, frequency=np.arange(3.0)
+    )
 
 
 def fake_run(folder):
-    mesh = Mesh(np.zeros((4, 3)), "tetra", {"blade": np.array([[0, 1, 2, 3]])}, report={"worst Jacobian": 0.31})
-    modes = [ModeSet(np.array([812.4, 2000.0]), np.zeros((2, 4, 3)), n, np.array([1e-12, 2e-12])) for n in (0, 1)]
-    patch = Patch("this", np.zeros((2, 3)), np.array([1e-5, 3e-5]), np.zeros((2, 3, 3)), np.zeros((1, 2)), None, None)
+    mesh = Mesh(
+        np.zeros((4, 3)),
+        "tetra",
+        {"blade": np.array([[0, 1, 2, 3]])},
+        report={"worst Jacobian": 0.31},
+    )
+    modes = [
+        ModeSet(np.array([812.4, 2000.0]), np.zeros((2, 4, 3)), n, np.array([1e-12, 2e-12]))
+        for n in (0, 1)
+    ]
+    patch = Patch(
+        "this",
+        np.zeros((2, 3)),
+        np.array([1e-5, 3e-5]),
+        np.zeros((2, 3, 3)),
+        np.zeros((1, 2)),
+        None,
+        None,
+    )
     seat = PressureMap(patch, np.array([40.0, 0.0]), np.array([0.0, 1e-6]), 1e-14)
     limits = fake_limit(0.0, 812.4), fake_limit(np.inf, 850.0)
-    response = SimpleNamespace(limits=limits, free_peak=(812.4, 8e-5),
-                               curves=[fake_curve(20.0, 4e-5), fake_curve(50.0, 2e-5)])
+    response = SimpleNamespace(
+        limits=limits,
+        free_peak=(812.4, 8e-5),
+        curves=[fake_curve(20.0, 4e-5), fake_curve(50.0, 2e-5)],
+    )
     body = SimpleNamespace(omega=np.array([500.0, 1000.0]), shapes=np.zeros((6, 2)))
     reduced = SimpleNamespace(sectors=24, sector={9: body}, damper=body)
-    return SimpleNamespace(mesh=mesh, modes=modes, contact=SimpleNamespace(maps={40.0: [seat]}), response=response,
-                           reduced=reduced,
-                           timings={"mesh": 1.5, "modes": 4.5}, messages=["mesh: found"], folder=folder)
+    return SimpleNamespace(
+        mesh=mesh,
+        modes=modes,
+        contact=SimpleNamespace(maps={40.0: [seat]}),
+        response=response,
+        reduced=reduced,
+        timings={"mesh": 1.5, "modes": 4.5},
+        messages=["mesh: found"],
+        folder=folder,
+    )
 
 
 @pytest.fixture
@@ -71,7 +106,9 @@ def pipeline(monkeypatch):
     def modes(scene, folder, wanted, pictures, comm, progress):
         found = run(scene, folder, "modes", comm, progress)
         state.wanted, state.pictures = wanted, pictures
-        return SimpleNamespace(run=found, campbell=None, convergence=None, answer=None, mac=np.eye(2))
+        return SimpleNamespace(
+            run=found, campbell=None, convergence=None, answer=None, mac=np.eye(2)
+        )
 
     replace_module(monkeypatch, bladefem.report, "modes", modes)
     replace_module(monkeypatch, bladefem.report, "pressure", contact)
@@ -91,44 +128,103 @@ def test_check_prints_every_field_and_marks_what_was_given(capsys):
     assert main(["check", WEDGE, "--set", "aerofoil.lean=3 deg"]) == 0
     rows = {line.split()[0]: line for line in capsys.readouterr().out.splitlines()}
     assert "3 deg" in rows["aerofoil.lean"] and " * " in rows["aerofoil.lean"]
-    assert " * " not in rows["aerofoil.sweep"] and "largest thickness" in rows["aerofoil.thickness_tip"]
+    assert (
+        " * " not in rows["aerofoil.sweep"]
+        and "largest thickness" in rows["aerofoil.thickness_tip"]
+    )
 
 
-@pytest.mark.parametrize(("command", "until"), [("mesh", "mesh"), ("modes", "modes"), ("contact", "contact"),
-                                                ("reduce", "reduction"), ("response", "response"),
-                                                ("report", "report"), ("run", "report")])
+@pytest.mark.parametrize(
+    ("command", "until"),
+    [
+        ("mesh", "mesh"),
+        ("modes", "modes"),
+        ("contact", "contact"),
+        ("reduce", "reduction"),
+        ("response", "response"),
+        ("report", "report"),
+        ("run", "report"),
+    ],
+)
 def test_commands_run_the_pipeline_as_far_as_needed(command, until, pipeline, tmp_path, capsys):
     folder = tmp_path / "run"
     assert main([command, WEDGE, "-o", str(folder), "--set", "contact.mu=0.2"]) == 0
-    (scene, where, last), = pipeline.calls
+    ((scene, where, last),) = pipeline.calls
     assert (where, last, scene.contact.mu) == (folder, until, 0.2)
     assert load_scene(folder / "scene.toml") == scene
     out = capsys.readouterr().out
-    assert "mesh: found" in out and "total" in out and "75" in out and out.endswith(f"results: {folder}\n")
+    assert (
+        "mesh: found" in out
+        and "total" in out
+        and "75" in out
+        and out.endswith(f"results: {folder}\n")
+    )
     assert all(word in out for word in SHOWN[command])
 
 
 SHOWN = {
-    "mesh": ["worst Jacobian", "0.31", "body blade, cells"], "modes": ["812.40", "2000.00", "2.0e-12"],
+    "mesh": ["worst Jacobian", "0.31", "body blade, cells"],
+    "modes": ["812.40", "2000.00", "2.0e-12"],
     "contact": ["40 N", "this", "4 ", "25.0", "1.0e-14"],
-    "reduce": ["sector, nodal diameter 9", "159.2", "damper", "port freedoms"], "report": ["best of these loads: 50 N"],
-    "response": ["no damper", "resonance amplitude [µm]", "estimated error [%]", " 40  ", " 1.3  ",
-                 "best of these loads: 50 N, amplitude divided by 4"],
+    "reduce": ["sector, nodal diameter 9", "159.2", "damper", "port freedoms"],
+    "report": ["best of these loads: 50 N"],
+    "response": [
+        "no damper",
+        "resonance amplitude [µm]",
+        "estimated error [%]",
+        " 40  ",
+        " 1.3  ",
+        "best of these loads: 50 N, amplitude divided by 4",
+    ],
     "run": ["best of these loads: 50 N"],
 }
 
 
 def test_options_of_modes(pipeline, tmp_path, capsys):
-    assert main(["modes", WEDGE, "-o", str(tmp_path), "--campbell", "0, 10, ..., 30 rad/s", "--converge", "6, 4, 2 mm",
-                 "--compare", "runs/other", "--direct", "--pictures", "0"]) == 0
+    assert (
+        main(
+            [
+                "modes",
+                WEDGE,
+                "-o",
+                str(tmp_path),
+                "--campbell",
+                "0, 10, ..., 30 rad/s",
+                "--converge",
+                "6, 4, 2 mm",
+                "--compare",
+                "runs/other",
+                "--direct",
+                "--pictures",
+                "0",
+            ]
+        )
+        == 0
+    )
     wanted = pipeline.state.wanted
-    assert np.allclose(wanted.speeds, [0, 10, 20, 30]) and np.allclose(wanted.sizes, [6e-3, 4e-3, 2e-3])
+    assert np.allclose(wanted.speeds, [0, 10, 20, 30]) and np.allclose(
+        wanted.sizes, [6e-3, 4e-3, 2e-3]
+    )
     assert str(wanted.other) == "runs/other" and wanted.direct and pipeline.state.pictures == 0
     assert main(["modes", WEDGE, "-o", str(tmp_path), "--converge"]) == 0
     wanted = pipeline.state.wanted
     assert (wanted.speeds, wanted.sizes, wanted.other, wanted.direct) == (None, [], None, False)
     assert wanted.loads is None and wanted.damping is None
-    assert main(["modes", WEDGE, "-o", str(tmp_path), "--forced", "tip=2 kPa", "--damping", "structural=0.2 %"]) == 0
+    assert (
+        main(
+            [
+                "modes",
+                WEDGE,
+                "-o",
+                str(tmp_path),
+                "--forced",
+                "tip=2 kPa",
+                "--damping",
+                "structural=0.2 %",
+            ]
+        )
+        == 0
+    )
     wanted = pipeline.state.wanted
     assert wanted.loads == [("tip", 2000.0)] and wanted.damping.structural == pytest.approx(0.002)
     assert main(["modes", WEDGE, "-o", str(tmp_path), "--damping", "ratio=1 %"]) == 2
@@ -155,19 +251,28 @@ def test_study_runs_each_value_in_its_own_folder(pipeline, tmp_path, capsys):
     assert [round(np.degrees(scene.damper.angle)) for scene, *_ in pipeline.calls] == [30, 45]
     assert len({folder for _, folder, _ in pipeline.calls}) == 2
     out = capsys.readouterr().out
-    assert out.startswith("\ndamper.angle = 30 deg (1 of 2)\n") and "damper.angle = 45 deg (2 of 2)\n" in out
+    assert (
+        out.startswith("\ndamper.angle = 30 deg (1 of 2)\n")
+        and "damper.angle = 45 deg (2 of 2)\n" in out
+    )
     assert "resonance amplitude [µm]" in out and "study.csv" in out.splitlines()[-1]
     table, loads = (pd.read_csv(tmp_path / f"{name}.csv") for name in ("study", "study_loads"))
     assert list(table["value"]) == ["30 deg", "45 deg"]
     np.testing.assert_allclose(table["damper.angle [rad]"], np.radians([30, 45]))
-    assert set(table["load [N]"]) == {50.0} and set(table["peak_amplitude [m]"]) == {2e-5} and len(loads) == 8
-    assert {f"study.{kind}" for kind in ("csv", "md", "tex", "png")} <= {p.name for p in tmp_path.iterdir()}
+    assert (
+        set(table["load [N]"]) == {50.0}
+        and set(table["peak_amplitude [m]"]) == {2e-5}
+        and len(loads) == 8
+    )
+    assert {f"study.{kind}" for kind in ("csv", "md", "tex", "png")} <= {
+        p.name for p in tmp_path.iterdir()
+    }
     assert "| 30 deg | 0.5236 | 812.4 | 80 | 50 | 830 | 20 |" in (tmp_path / "study.md").read_text()
 
 
 def test_a_study_that_breaks_off_leaves_what_is_done(pipeline, tmp_path):
     def behaviour(folder):
-        if "45" in Path(folder).name:        # not anywhere in the path: pytest numbers its folders
+        if "45" in Path(folder).name:  # not anywhere in the path: pytest numbers its folders
             raise NotSolvedError("balance at 812 Hz: 40 steps")
         return fake_run(folder)
 
@@ -176,9 +281,18 @@ def test_a_study_that_breaks_off_leaves_what_is_done(pipeline, tmp_path):
     assert list(pd.read_csv(tmp_path / "study.csv")["value"]) == ["30 deg"]
 
 
-@pytest.mark.parametrize("vary", ["damper.angle", "damper.angel=1", "damper.angle=30, 80 deg",
-                                  "excitation.force=1, 0 N", "aerofoil.twist=10, 20", "mesh.size=",
-                                  "kind=wedge sector, punch"])
+@pytest.mark.parametrize(
+    "vary",
+    [
+        "damper.angle",
+        "damper.angel=1",
+        "damper.angle=30, 80 deg",
+        "excitation.force=1, 0 N",
+        "aerofoil.twist=10, 20",
+        "mesh.size=",
+        "kind=wedge sector, punch",
+    ],
+)
 def test_study_checks_all_values_before_the_first_run(vary, pipeline, tmp_path, capsys):
     assert main(["study", WEDGE, "-o", str(tmp_path), "--vary", vary]) == 2
     assert capsys.readouterr().err.count("\n") == 1 and pipeline.calls == []
@@ -221,8 +335,15 @@ def test_results_of_another_scene_are_put_away(pipeline, tmp_path, capsys):
     assert main(mesh) == 0 and capsys.readouterr().err == ""
     assert main([*mesh, "--set", "contact.mu=0.2"]) == 0
     said = capsys.readouterr().err
-    assert said == f"bladefem: {tmp_path} holds results of another scene: 2 files moved to {tmp_path / 'earlier'}\n"
-    assert {p.name for p in (tmp_path / "earlier").iterdir()} == {"report.html", "first.png", "scene.toml"}
+    assert (
+        said == f"bladefem: {tmp_path} holds results of another scene: 2 files moved to "
+        f"{tmp_path / 'earlier'}\n"
+    )
+    assert {p.name for p in (tmp_path / "earlier").iterdir()} == {
+        "report.html",
+        "first.png",
+        "scene.toml",
+    }
     (tmp_path / "second.png").write_text("second")
     assert main([*mesh, "--quiet"]) == 0 and capsys.readouterr().err == ""
     assert {p.name for p in (tmp_path / "earlier").iterdir()} == {"second.png", "scene.toml"}
@@ -240,16 +361,37 @@ def test_one_command_at_a_time_in_a_folder(pipeline, tmp_path, capsys):
 def raiser(error):
     def behaviour(_):
         raise error
+
     return behaviour
 
 
-@pytest.mark.parametrize(("error", "code", "message"), [
-    (InputError("study.loads = 0: expected more"), 2, "bladefem: study.loads = 0: expected more"),
-    (NotSolvedError("balance at 812 Hz: 40 steps"), 1, "bladefem: not solved: balance at 812 Hz: 40 steps"),
-    (MemoryError("12 GB"), 1, "out of memory"), (KeyboardInterrupt(), 130, "finished stages are kept"),
-    (ModuleNotFoundError("x", name="dolfinx.mesh"), 2, "dolfinx.mesh is not installed; run ./setup.sh"),
-    (ZeroDivisionError("our fault"), 1, "mistake in the program"), (BrokenPipeError(), 0, "")])
-def test_what_goes_wrong_has_an_exit_code_and_a_sentence(error, code, message, pipeline, tmp_path, capsys):
+@pytest.mark.parametrize(
+    ("error", "code", "message"),
+    [
+        (
+            InputError("study.loads = 0: expected more"),
+            2,
+            "bladefem: study.loads = 0: expected more",
+        ),
+        (
+            NotSolvedError("balance at 812 Hz: 40 steps"),
+            1,
+            "bladefem: not solved: balance at 812 Hz: 40 steps",
+        ),
+        (MemoryError("12 GB"), 1, "out of memory"),
+        (KeyboardInterrupt(), 130, "finished stages are kept"),
+        (
+            ModuleNotFoundError("x", name="dolfinx.mesh"),
+            2,
+            "dolfinx.mesh is not installed; run ./setup.sh",
+        ),
+        (ZeroDivisionError("our fault"), 1, "mistake in the program"),
+        (BrokenPipeError(), 0, ""),
+    ],
+)
+def test_what_goes_wrong_has_an_exit_code_and_a_sentence(
+    error, code, message, pipeline, tmp_path, capsys
+):
     pipeline.state.behaviour = raiser(error)
     assert main(["response", WEDGE, "-o", str(tmp_path)]) == code
     text = capsys.readouterr().err
@@ -257,27 +399,42 @@ def test_what_goes_wrong_has_an_exit_code_and_a_sentence(error, code, message, p
     assert code != 2 or text.count("\n") == 1
 
 
-@pytest.mark.parametrize("arguments", [
-    ["check", "scenes/wegde.toml"], ["mesh", WEDGE, "--set", "aerofoil.twits=1"], ["mesh", "scenes"],
-    ["modes", WEDGE, "-o", "/proc/run"], ["modes", WEDGE, "-o", WEDGE], ["mesh", WEDGE, "--view", "mesh.xyz"]])
+@pytest.mark.parametrize(
+    "arguments",
+    [
+        ["check", "scenes/wegde.toml"],
+        ["mesh", WEDGE, "--set", "aerofoil.twits=1"],
+        ["mesh", "scenes"],
+        ["modes", WEDGE, "-o", "/proc/run"],
+        ["modes", WEDGE, "-o", WEDGE],
+        ["mesh", WEDGE, "--view", "mesh.xyz"],
+    ],
+)
 def test_bad_input_stops_before_any_work(arguments, pipeline, capsys):
     assert main(arguments) == 2
     assert capsys.readouterr().err.count("\n") == 1 and pipeline.calls == []
 
 
-@pytest.mark.parametrize("arguments", [[], ["mehs", WEDGE], ["mesh"], ["study", WEDGE], ["check", WEDGE, "--nonsense"]])
+@pytest.mark.parametrize(
+    "arguments", [[], ["mehs", WEDGE], ["mesh"], ["study", WEDGE], ["check", WEDGE, "--nonsense"]]
+)
 def test_wrong_arguments_exit_with_2(arguments, capsys):
     with pytest.raises(SystemExit) as stop:
         main(arguments)
     assert stop.value.code == 2 and "usage" in capsys.readouterr().err
 
 
-@pytest.mark.parametrize("command", ["check", "mesh", "modes", "contact", "reduce", "response", "study", "report",
-                                     "run", "info"])
+@pytest.mark.parametrize(
+    "command",
+    ["check", "mesh", "modes", "contact", "reduce", "response", "study", "report", "run", "info"],
+)
 def test_help_has_an_example(command, capsys):
     with pytest.raises(SystemExit) as stop:
         parser().parse_args([command, "--help"])
-    assert stop.value.code == 0 and f"bladefem {command}" in capsys.readouterr().out.split("example:")[1]
+    assert (
+        stop.value.code == 0
+        and f"bladefem {command}" in capsys.readouterr().out.split("example:")[1]
+    )
 
 
 def test_info_names_versions_and_solvers(capsys):
@@ -298,7 +455,9 @@ def test_no_mpi_is_bad_input(monkeypatch, capsys):
 def test_a_reader_that_closes_the_pipe_is_no_error(arguments):
     """Also where PETSc is loaded, which would answer the signal by aborting MPI."""
     env = clean_environment()
-    command = f"'{sys.executable}' -m bladefem.cli.main {arguments} | head -n 1; exit ${{PIPESTATUS[0]}}"
+    command = (
+        f"'{sys.executable}' -m bladefem.cli.main {arguments} | head -n 1; exit ${{PIPESTATUS[0]}}"
+    )
     done = subprocess.run(["bash", "-c", command], capture_output=True, text=True, env=env)
     assert done.returncode == 0 and done.stderr == "" and done.stdout.count("\n") == 1
 
@@ -319,7 +478,7 @@ def run(scene, folder, until, comm=None, progress=None):
     from bladefem.store import stage
     stage(folder, "mesh", "key", lambda: 1.5)
     stage(folder, "modes", "key", lambda: print("started", flush=True) or time.sleep(60))
-bladefem.study.pipeline = SimpleNamespace(run=run)
+bladefem.study.pipeline.pipeline = SimpleNamespace(run=run)
 from bladefem.cli.main import main
 sys.exit(main(["modes", "scenes/wedge.toml", "-o", sys.argv[1]]))
 """
@@ -327,9 +486,16 @@ sys.exit(main(["modes", "scenes/wedge.toml", "-o", sys.argv[1]]))
 
 @pytest.mark.parametrize(("sent", "code"), [(signal.SIGINT, 130), (signal.SIGTERM, 143)])
 def test_an_interrupt_keeps_the_finished_stages(sent, code, tmp_path):
-    old = signal.signal(signal.SIGINT, signal.default_int_handler)  # shells start jobs in the background deaf to it
-    job = subprocess.Popen([sys.executable, "-c", INTERRUPTED, tmp_path], stdout=subprocess.PIPE,
-                           stderr=subprocess.PIPE, text=True, env=clean_environment())
+    old = signal.signal(
+        signal.SIGINT, signal.default_int_handler
+    )  # shells start jobs in the background deaf to it
+    job = subprocess.Popen(
+        [sys.executable, "-c", INTERRUPTED, tmp_path],
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+        text=True,
+        env=clean_environment(),
+    )
     signal.signal(signal.SIGINT, old)
     assert job.stdout.readline() == "started\n"
     job.send_signal(sent)
@@ -340,7 +506,9 @@ def test_an_interrupt_keeps_the_finished_stages(sent, code, tmp_path):
 
 
 @pytest.mark.parametrize("raised", [KeyboardInterrupt, RuntimeError])
-def test_a_signal_that_a_library_turns_into_an_error_is_still_an_interrupt(raised, pipeline, tmp_path, capsys):
+def test_a_signal_that_a_library_turns_into_an_error_is_still_an_interrupt(
+    raised, pipeline, tmp_path, capsys
+):
     def behaviour(_):
         try:
             signal.raise_signal(signal.SIGTERM)
@@ -350,7 +518,10 @@ def test_a_signal_that_a_library_turns_into_an_error_is_still_an_interrupt(raise
     pipeline.state.behaviour, before = behaviour, signal.getsignal(signal.SIGTERM)
     assert main(["response", WEDGE, "-o", str(tmp_path)]) == 143
     said = capsys.readouterr().err
-    assert said.startswith("bladefem: ended by SIGTERM; finished stages are kept") and said.count("\n") == 1
+    assert (
+        said.startswith("bladefem: ended by SIGTERM; finished stages are kept")
+        and said.count("\n") == 1
+    )
     assert signal.getsignal(signal.SIGTERM) is before
 
 
@@ -369,12 +540,28 @@ sys.exit(ranks.guarded(action, SimpleNamespace()))
 """
 
 
-@pytest.mark.parametrize(("all_ranks", "message"), [(True, "bladefem: field = 1: expected 2\n"),
-                                                    (False, "bladefem: rank 1 alone: field = 1: expected 2\n")])
+@pytest.mark.parametrize(
+    ("all_ranks", "message"),
+    [
+        (True, "bladefem: field = 1: expected 2\n"),
+        (False, "bladefem: rank 1 alone: field = 1: expected 2\n"),
+    ],
+)
 def test_no_rank_waits_for_ever(all_ranks, message):
-    command = ["mpirun", "--oversubscribe", "--bind-to", "none", "-n", "2", sys.executable, "-c",
-               ONE_RANK_FAILS.format(all=all_ranks)]
-    done = subprocess.run(command, capture_output=True, text=True, env=clean_environment(), timeout=60)
+    command = [
+        "mpirun",
+        "--oversubscribe",
+        "--bind-to",
+        "none",
+        "-n",
+        "2",
+        sys.executable,
+        "-c",
+        ONE_RANK_FAILS.format(all=all_ranks),
+    ]
+    done = subprocess.run(
+        command, capture_output=True, text=True, env=clean_environment(), timeout=60
+    )
     assert done.returncode == 2 and done.stderr.count(message) == 1, done.stderr
 
 
@@ -382,6 +569,7 @@ def test_no_rank_waits_for_ever(all_ranks, message):
 @pytest.mark.parametrize("arguments", [["check", WEDGE], ["mesh", WEDGE]])
 def test_all_ranks_stop_on_a_scene_that_is_wrong(arguments, capsys):
     from mpi4py import MPI
+
     assert main([*arguments, "--set", "contact.mu=-1"]) == 2
     said = capsys.readouterr().err
     assert ("contact.mu" in said) == (MPI.COMM_WORLD.rank == 0)
@@ -390,6 +578,7 @@ def test_all_ranks_stop_on_a_scene_that_is_wrong(arguments, capsys):
 @pytest.mark.mpi
 def test_all_ranks_stop_where_another_command_works(tmp_path, capsys):
     from mpi4py import MPI
+
     with locked(tmp_path):
         assert main(["mesh", WEDGE, "-o", str(tmp_path)]) == 2
     assert ("another command" in capsys.readouterr().err) == (MPI.COMM_WORLD.rank == 0)

@@ -12,7 +12,7 @@ import subprocess
 import sys
 import termios
 
-from bladefem.progress import wanted, watch
+from bladefem.util.progress import wanted, watch
 
 
 class Terminal(io.StringIO):

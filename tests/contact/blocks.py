@@ -1,7 +1,9 @@
-"""Two elastic blocks facing each other at z = 0 (y = 0 in the plane), meshed and solved without bladefem.fem.
+"""Two elastic blocks facing each other at z = 0 (y = 0 in the plane), meshed and solved without
+bladefem.fem.
 
-The lower block is the "blade" (its normal points up into the other), the upper one the "damper". Elements are straight
-quadratic simplices on a graded grid; x = 0 and y = 0 are symmetry planes when asked.
+The lower block is the "blade" (its normal points up into the other), the upper one the "damper".
+Elements are straight quadratic simplices on a graded grid; x = 0 and y = 0 are symmetry planes when
+asked.
 """
 
 from itertools import permutations
@@ -27,7 +29,9 @@ def graded(h, fine, end, growth=1.4):
 
 
 def simplices(*axes):
-    """Points (n, d) and simplices (m, d + 1) of a grid, each cell cut along its main diagonal (Kuhn)."""
+    """Points (n, d) and simplices (m, d + 1) of a grid, each cell cut along its main diagonal
+    (Kuhn).
+    """
     shape = [len(a) for a in axes]
     points = np.stack(np.meshgrid(*axes, indexing="ij"), -1).reshape(-1, len(axes))
     number = np.arange(len(points)).reshape(shape)
@@ -38,7 +42,11 @@ def simplices(*axes):
         for k in (None, *order):
             if k is not None:
                 corner[k] = 1
-            nodes.append(number[tuple(slice(c, n - 1 + c) for c, n in zip(corner, shape, strict=True))].ravel())
+            nodes.append(
+                number[
+                    tuple(slice(c, n - 1 + c) for c, n in zip(corner, shape, strict=True))
+                ].ravel()
+            )
         cells.append(np.stack(nodes, 1))
     cells = np.concatenate(cells)
     edges = points[cells[:, 1:]] - points[cells[:, :1]]
@@ -53,7 +61,9 @@ def quadratic(points, cells):
     edges = np.sort(np.stack([cells[:, p] for p in pairs], 1).reshape(-1, 2), axis=1)
     unique, inverse = np.unique(edges, axis=0, return_inverse=True)
     mids = points[unique].mean(axis=1)
-    return np.vstack([points, mids]), np.hstack([cells, len(points) + inverse.reshape(len(cells), -1)])
+    return np.vstack([points, mids]), np.hstack(
+        [cells, len(points) + inverse.reshape(len(cells), -1)]
+    )
 
 
 def surface(points, cells, corners, axis, value):
@@ -78,15 +88,20 @@ def stiffness(points, cells, E, nu):
     lam, mu = E * nu / (1 + nu) / (1 - 2 * nu), E / 2 / (1 + nu)
     edge = points[cells[:, 1:corners]] - points[cells[:, :1]]
     volume = np.abs(np.linalg.det(edge)) / np.prod(np.arange(1, d + 1))
-    grad = np.concatenate([-np.linalg.inv(edge).sum(2)[:, None, :], np.linalg.inv(edge).transpose(0, 2, 1)], 1)
+    grad = np.concatenate(
+        [-np.linalg.inv(edge).sum(2)[:, None, :], np.linalg.inv(edge).transpose(0, 2, 1)], 1
+    )
     a, b = ((5 - np.sqrt(5)) / 20, (5 + 3 * np.sqrt(5)) / 20) if d == 3 else (1 / 6, 2 / 3)
     k = cells.shape[1]
     K = np.zeros((len(cells), k, d, k, d))
     for q in range(corners):
         L = np.full(corners, a)
         L[q] = b
-        G = np.concatenate([(4 * L[:, None] - 1) * grad]
-                           + [4 * (L[i] * grad[:, j] + L[j] * grad[:, i])[:, None] for i, j in EDGES[corners]], 1)
+        G = np.concatenate(
+            [(4 * L[:, None] - 1) * grad]
+            + [4 * (L[i] * grad[:, j] + L[j] * grad[:, i])[:, None] for i, j in EDGES[corners]],
+            1,
+        )
         dot = np.einsum("cai,cbi->cab", G, G)
         block = lam * np.einsum("cai,cbj->caibj", G, G) + mu * np.einsum("caj,cbi->caibj", G, G)
         for i in range(d):
@@ -103,8 +118,9 @@ def flexibility(K, fixed, P):
     free = np.setdiff1d(np.arange(K.shape[0]), fixed)
     A, B = K[free][:, free].tocsr(), P.tocsr()[free].toarray()
     A.sum_duplicates()
-    mat = PETSc.Mat().createAIJ(A.shape, csr=(A.indptr.astype("i4"), A.indices.astype("i4"), A.data),
-                                comm=PETSc.COMM_SELF)
+    mat = PETSc.Mat().createAIJ(
+        A.shape, csr=(A.indptr.astype("i4"), A.indices.astype("i4"), A.data), comm=PETSc.COMM_SELF
+    )
     mat.setOption(PETSc.Mat.Option.SPD, True)
     pc = PETSc.PC().create(PETSc.COMM_SELF)
     pc.setOperators(mat)
@@ -113,24 +129,29 @@ def flexibility(K, fixed, P):
     pc.setUp()
     X = PETSc.Mat().createDense(B.shape, comm=PETSc.COMM_SELF)
     X.setUp()
-    pc.getFactorMatrix().matSolve(PETSc.Mat().createDense(B.shape, array=B.copy(order="F"), comm=PETSc.COMM_SELF), X)
+    pc.getFactorMatrix().matSolve(
+        PETSc.Mat().createDense(B.shape, array=B.copy(order="F"), comm=PETSc.COMM_SELF), X
+    )
     return B.T @ X.getDenseArray()
 
 
 def block(x, depth, y=None, sign=1):
-    """Points (n, 3), quadratic cells and the faces at depth 0 of a block over the grid x (and y)."""
+    """Points (n, 3), quadratic cells and the faces at depth 0 of a block over the grid x (and
+    y).
+    """
     axes = [x] if y is None else [x, y]
     flat, cells = quadratic(*simplices(*axes, depth))
     corners = flat.shape[1] + 1
     faces = surface(flat, cells, corners, corners - 2, 0.0)
     points = np.zeros((len(flat), 3))
-    points[:, :flat.shape[1]] = flat
+    points[:, : flat.shape[1]] = flat
     points[:, flat.shape[1] - 1] *= sign
     return points, cells, faces
 
 
 def facing_blocks(x, depth, y=None, upper=None):
-    """Mesh of two blocks over the grid x (and y), `depth` the grid of distances from the contact plane.
+    """Mesh of two blocks over the grid x (and y), `depth` the grid of distances from the contact
+    plane.
 
     upper: another (x, depth, y) for the upper block, which then does not match.
     """
@@ -138,13 +159,18 @@ def facing_blocks(x, depth, y=None, upper=None):
     high, over, bottom = block(*(upper or (x, depth, y)))
     n, matched = len(low), np.unique(top)
     nodes = np.zeros((2, 0), int) if upper else np.stack([matched, matched + n])
-    return Mesh(points=np.vstack([low, high]), cell_type="triangle6" if y is None else "tetra10",
-                bodies={"blade": cells, "damper": over + n}, faces={"seat_right": top, "damper_left": bottom + n},
-                pairs={"this": Pair("seat_right", "damper_left", nodes, np.eye(3), np.zeros(3))})
+    return Mesh(
+        points=np.vstack([low, high]),
+        cell_type="triangle6" if y is None else "tetra10",
+        bodies={"blade": cells, "damper": over + n},
+        faces={"seat_right": top, "damper_left": bottom + n},
+        pairs={"this": Pair("seat_right", "damper_left", nodes, np.eye(3), np.zeros(3))},
+    )
 
 
 def compliances(mesh, patch, E, nu, hold, nodes=slice(None), tangential=False):
-    """Flexibilities (blade, damper) at the normal (or t1) ports of some nodes; hold(points) gives the held freedoms.
+    """Flexibilities (blade, damper) at the normal (or t1) ports of some nodes; hold(points) gives
+    the held freedoms.
 
     Freedoms are numbered within each body; an E of None is a rigid body without flexibility.
     """
@@ -164,11 +190,17 @@ def compliances(mesh, patch, E, nu, hold, nodes=slice(None), tangential=False):
 
 
 def rollers(points):
-    """Normal displacement held on the far side and on the planes x = 0 (and y = 0): uniform compression is free."""
+    """Normal displacement held on the far side and on the planes x = 0 (and y = 0): uniform
+    compression is free.
+    """
     d = points.shape[1]
     far = np.abs(points[:, d - 1]).max()
     out = [np.flatnonzero(np.isclose(np.abs(points[:, d - 1]), far)) * d + d - 1]
-    return np.unique(np.concatenate(out + [np.flatnonzero(np.isclose(points[:, k], 0)) * d + k for k in range(d - 1)]))
+    return np.unique(
+        np.concatenate(
+            out + [np.flatnonzero(np.isclose(points[:, k], 0)) * d + k for k in range(d - 1)]
+        )
+    )
 
 
 def clamped(points):
@@ -177,14 +209,18 @@ def clamped(points):
 
 
 def clamped_odd(points):
-    """All held on the far side; antisymmetry at x = 0 of a plane block: only the normal displacement is held there."""
+    """All held on the far side; antisymmetry at x = 0 of a plane block: only the normal
+    displacement is held there.
+    """
     far = np.flatnonzero(np.isclose(np.abs(points[:, 1]), np.abs(points[:, 1]).max()))
     middle = np.flatnonzero(np.isclose(points[:, 0], 0.0))
     return np.unique(np.concatenate([2 * far, 2 * far + 1, 2 * middle + 1]))
 
 
 def held(points, depth):
-    """Freedoms (d n numbering) held by symmetry at x = 0 (and y = 0) and by the far side, z = +-depth."""
+    """Freedoms (d n numbering) held by symmetry at x = 0 (and y = 0) and by the far side, z =
+    +-depth.
+    """
     d = points.shape[1]
     out = [np.flatnonzero(np.isclose(np.abs(points[:, d - 1]), depth)) * d + k for k in range(d)]
     out += [np.flatnonzero(np.isclose(points[:, k], 0.0)) * d + k for k in range(d - 1)]

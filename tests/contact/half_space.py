@@ -1,10 +1,13 @@
-"""Elastic half-space under pressure that is constant on rectangles: an independent source of contact flexibilities."""
+"""Elastic half-space under pressure that is constant on rectangles: an independent source of
+contact flexibilities.
+"""
 
 import numpy as np
 
 
 def rectangle_flexibility(x, y, hx, hy, modulus):
-    """(n, n) normal displacement of node i under a unit force spread over the rectangle of node j [m/N].
+    """(n, n) normal displacement of node i under a unit force spread over the rectangle of node j
+    [m/N].
 
     x, y (n,) centres [m]; hx, hy sides [m]; modulus E* = E / (1 - nu^2) [Pa].
     Source: Love 1929 as in Johnson, Contact Mechanics (1985), Eq. 3.25.

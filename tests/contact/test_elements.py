@@ -8,15 +8,21 @@ from test_seat import ALPHA, SPEED, condensed
 from wedge import wedge_mesh
 
 import bladefem
+from bladefem.contact.interface_elements import (
+    aggregation,
+    friction_elements,
+    mindlin_ratio,
+    normal_stiffness,
+    pair_ratio,
+)
 from bladefem.contact.patch import patch_means
-from bladefem.contact.seat import solve
-from bladefem.contact.states import interpolate, quasi_static, state_table
-from bladefem.contact.stiffness import aggregation, friction_elements, mindlin_ratio, normal_stiffness, pair_ratio
-from bladefem.contact.summary import resultant
+from bladefem.contact.resultants import resultant
+from bladefem.contact.seating import solve
+from bladefem.contact.state_table import interpolate, quasi_static, state_table
 from bladefem.data import PressureMap
 from bladefem.errors import InputError
-from bladefem.scene import Contact, Material, Seat
-from bladefem.study.state_check import check_states, platform_tilt, state_sentence
+from bladefem.scene.tables import Contact, Material, Seat
+from bladefem.study.pipeline.state_check import check_states, platform_tilt, state_sentence
 
 
 @pytest.fixture(scope="module")
@@ -33,7 +39,9 @@ def test_mindlin_ratio():
     steel = Material()
     assert mindlin_ratio(0.3) == pytest.approx(1.4 / 1.7, rel=1e-15)
     assert pair_ratio(steel, steel) == pytest.approx(mindlin_ratio(0.3), rel=1e-14)
-    stiff = replace(steel, E=1e13)          # a rigid partner: the ratio of one body alone is the same for equal nu
+    stiff = replace(
+        steel, E=1e13
+    )  # a rigid partner: the ratio of one body alone is the same for equal nu
     assert pair_ratio(steel, stiff) == pytest.approx(mindlin_ratio(0.3), rel=1e-14)
 
 
@@ -48,11 +56,13 @@ def test_totals_do_not_depend_on_the_number_of_elements(maps, points):
     assert S.shape == (3 * sum(len(m.force) for m in maps), 3 * len(e.kt))
     if points and points < 10:
         assert len(e.kt) == 2 * points
-        assert e.kt.max() / e.kt.min() < 3          # halving by area keeps the elements alike
+        assert e.kt.max() / e.kt.min() < 3  # halving by area keeps the elements alike
 
 
 def test_aggregation_keeps_uniform_motion_and_total_force(maps):
-    """S^T of a uniform displacement is uniform; S spreads an element's force over its nodes without loss."""
+    """S^T of a uniform displacement is uniform; S spreads an element's force over its nodes without
+    loss.
+    """
     _, S = friction_elements(None, maps, Contact(points=5), 1.0)
     motion = np.tile([1.0, 2.0, 3.0], S.shape[0] // 3)
     assert np.allclose(S.T @ motion, np.tile([1.0, 2.0, 3.0], 10), rtol=1e-13)
@@ -62,17 +72,27 @@ def test_aggregation_keeps_uniform_motion_and_total_force(maps):
 def test_total_stiffness_wins_over_areal(maps):
     e, _ = friction_elements(None, maps, Contact(kt=1e6, kn_area=1e10), 1.0)
     whole, _ = friction_elements(None, maps, Contact(kn=2e6, kn_area=1e10), 0.5)
-    assert whole.kn.sum() == pytest.approx(4e6, rel=1e-13) and whole.kt.sum() == pytest.approx(2e6, rel=1e-13)
+    assert whole.kn.sum() == pytest.approx(4e6, rel=1e-13) and whole.kt.sum() == pytest.approx(
+        2e6, rel=1e-13
+    )
     n = len(maps[0].force)
-    assert e.kt[:n].sum() == pytest.approx(1e6, rel=1e-13) and e.kt[n:].sum() == pytest.approx(1e6, rel=1e-13)
+    assert e.kt[:n].sum() == pytest.approx(1e6, rel=1e-13) and e.kt[n:].sum() == pytest.approx(
+        1e6, rel=1e-13
+    )
     assert e.kn == pytest.approx(1e10 * np.concatenate([m.patch.area for m in maps]), rel=1e-13)
 
 
 def test_tangential_stiffness_by_mindlin_from_the_normal_one(maps):
     """Given kn alone; a measured kt wins; the usual value where neither is given."""
     ratio, area = mindlin_ratio(0.3), np.concatenate([m.patch.area for m in maps])
-    found = {name: friction_elements(None, maps, contact, ratio)[0] for name, contact in
-             {"kn": Contact(kn_area=3e10), "both": Contact(kn_area=3e10, kt_area=1e10), "none": Contact()}.items()}
+    found = {
+        name: friction_elements(None, maps, contact, ratio)[0]
+        for name, contact in {
+            "kn": Contact(kn_area=3e10),
+            "both": Contact(kn_area=3e10, kt_area=1e10),
+            "none": Contact(),
+        }.items()
+    }
     np.testing.assert_allclose(found["kn"].kt, ratio * found["kn"].kn, rtol=1e-14)
     np.testing.assert_allclose(found["kn"].kn, 3e10 * area, rtol=1e-14)
     np.testing.assert_allclose(found["both"].kt, 1e10 * area, rtol=1e-14)
@@ -80,10 +100,12 @@ def test_tangential_stiffness_by_mindlin_from_the_normal_one(maps):
 
 
 def test_seats_have_values_of_their_own(maps):
-    """mu, k_t and k_n of the left and right seat; a total of a seat wins over the areal value of both."""
+    """mu, k_t and k_n of the left and right seat; a total of a seat wins over the areal value of
+    both.
+    """
     contact = Contact(mu=0.3, kt_area=4e10, left=Seat(mu=0.1, kt=2e6), right=Seat(kn_area=1e10))
     e, _ = friction_elements(None, maps, contact, 0.8)
-    right, left = np.split(np.arange(len(e.kt)), 2)         # "this" is the right seat, "next" the left one
+    right, left = np.split(np.arange(len(e.kt)), 2)  # "this" is the right seat, "next" the left one
     areas = [m.patch.area for m in maps]
     np.testing.assert_allclose(e.mu, np.repeat([0.3, 0.1], len(right)))
     np.testing.assert_allclose(e.kt[right], 4e10 * areas[0], rtol=1e-14)
@@ -94,20 +116,26 @@ def test_seats_have_values_of_their_own(maps):
 
 @pytest.mark.parametrize("points", [None, 3])
 def test_stiffness_from_the_map(problem, maps, points):
-    """k_n of the pressed nodes is Eq. 23, k_t follows by Mindlin or is given; open nodes have their patch's mean."""
+    """k_n of the pressed nodes is Eq. 23, k_t follows by Mindlin or is given; open nodes have their
+    patch's mean.
+    """
     ratio = mindlin_ratio(0.3)
     e, _ = friction_elements(problem, maps, Contact(stiffness="map", points=points), ratio)
     np.testing.assert_allclose(e.kt, ratio * e.kn, rtol=1e-14)
     force, eq23 = np.concatenate([m.force for m in maps]), normal_stiffness(problem, maps)
     if points is None:
-        np.testing.assert_allclose(e.kn[force > 0] * (problem.flexibility @ force)[force > 0], force[force > 0])
+        np.testing.assert_allclose(
+            e.kn[force > 0] * (problem.flexibility @ force)[force > 0], force[force > 0]
+        )
         assert (force == 0).any() and (e.kn > 0).all()
     for side in np.split(np.arange(len(force)), 2):
         area, pressed = maps[0].patch.area, eq23[side] > 0
         whole = eq23[side].sum() * area.sum() / area[pressed].sum()
         part = np.split(e.kn, 2)[int(side[0] > 0)]
         assert part.sum() == pytest.approx(whole, rel=1e-12)
-    given, _ = friction_elements(problem, maps, Contact(stiffness="map", kt=1e6, points=points), ratio)
+    given, _ = friction_elements(
+        problem, maps, Contact(stiffness="map", kt=1e6, points=points), ratio
+    )
     np.testing.assert_array_equal(given.kn, e.kn)
     assert given.kt.sum() == pytest.approx(2e6, rel=1e-13)
 
@@ -130,7 +158,7 @@ def test_elements_of_a_patch_are_connected_halves(maps):
     patch = maps[0].patch
     G = aggregation(patch, 2)
     label = np.asarray(G.argmax(axis=1)).ravel()
-    z = patch.points[:, 2]                  # the longer side of this seat is axial
+    z = patch.points[:, 2]  # the longer side of this seat is axial
     assert z[label == 0].max() <= z[label == 1].min() + 1e-12
 
 
@@ -139,12 +167,16 @@ def test_normal_stiffness_of_eq_23(problem, maps):
     force = np.concatenate([m.force for m in maps])
     assert (k[force > 0] > 0).all() and (k[force == 0] == 0).all()
     pressed = force > 0
-    assert force[pressed] / k[pressed] == pytest.approx((problem.flexibility @ force)[pressed], rel=1e-12)
+    assert force[pressed] / k[pressed] == pytest.approx(
+        (problem.flexibility @ force)[pressed], rel=1e-12
+    )
 
 
 def test_resultants_balance_the_pull(problem, maps):
-    """Next blade's seat turned back into this sector's frame: both forces and the pull, which is radial, add up to
-    zero, and so do their moments; with forces at the nodes' own places these would miss by 2e-4 here."""
+    """Next blade's seat turned back into this sector's frame: both forces and the pull, which is
+    radial, add up to zero, and so do their moments; with forces at the nodes' own places these
+    would miss by 2e-4 here.
+    """
     turn = wedge_mesh(ALPHA).sector.rotation
     this, following = (resultant(m) for m in maps)
     total = this.force + turn @ following.force + SPEED**2 * problem.load[:3]
@@ -159,13 +191,18 @@ def tilted(problem):
     lean = platform_tilt(problem)
 
     def direct(load, tilt):
-        return np.concatenate([m.force for m in solve(problem, SPEED, normal=load, approach=tilt * lean)])
+        return np.concatenate(
+            [m.force for m in solve(problem, SPEED, normal=load, approach=tilt * lean)]
+        )
+
     return direct
 
 
 @pytest.mark.parametrize("dimension", [2, 3])
 def test_a_tilt_of_one_platform_is_linear_in_place(dimension):
-    """As port means: the chi-weighted means of the place along the slope, scaled to -1 and 1; nothing on the other."""
+    """As port means: the chi-weighted means of the place along the slope, scaled to -1 and 1;
+    nothing on the other.
+    """
     mesh = wedge_mesh(ALPHA, dimension=dimension)
     problem = condensed(mesh)
     patch, tilt = problem.patches[0], platform_tilt(problem)
@@ -177,16 +214,27 @@ def test_a_tilt_of_one_platform_is_linear_in_place(dimension):
 
 
 def test_what_the_floating_damper_follows_moves_no_force(problem):
-    """Both platforms lifted, shifted and tilted alike along the axis; a tilt of one alone does move the pressure."""
+    """Both platforms lifted, shifted and tilted alike along the axis; a tilt of one alone does move
+    the pressure.
+    """
     before, mesh = direct_force(problem, np.zeros(50)), wedge_mesh(ALPHA)
     z = np.concatenate([patch_means(p, mesh).T @ mesh.points[:, 2] for p in problem.patches])
-    for common in (z / np.abs(z).max(), np.ones(len(z)), *(problem.rigid.T / np.abs(problem.rigid).max())):
+    for common in (
+        z / np.abs(z).max(),
+        np.ones(len(z)),
+        *(problem.rigid.T / np.abs(problem.rigid).max()),
+    ):
         assert np.abs(direct_force(problem, 9e-6 * common) - before).max() < 1e-10 * before.max()
-    assert np.abs(direct_force(problem, 1e-6 * platform_tilt(problem)) - before).max() > 0.01 * before.max()
+    assert (
+        np.abs(direct_force(problem, 1e-6 * platform_tilt(problem)) - before).max()
+        > 0.01 * before.max()
+    )
 
 
 def direct_force(problem, approach):
-    return np.concatenate([m.force for m in solve(problem, SPEED, normal=80.0, approach=approach, bedded=True)])
+    return np.concatenate(
+        [m.force for m in solve(problem, SPEED, normal=80.0, approach=approach, bedded=True)]
+    )
 
 
 def test_a_seat_that_faces_the_axis_and_one_without_extent(problem):
@@ -206,23 +254,33 @@ def test_a_table_of_open_states_has_no_error():
 
 
 def test_table_of_states_and_its_indicator(problem):
-    """Halving the steps divides the error by two or more (kinks), and the indicator lies above the true error."""
+    """Halving the steps divides the error by two or more (kinks), and the indicator lies above the
+    true error.
+    """
     direct = tilted(problem)
     points = [(120.0, 0.4e-6), (170.0, -0.3e-6), (199.0, 0.9e-6), (133.0, 0.1e-6)]
     errors, indicators = [], []
     for steps in (2, 4, 8, 16):
-        table = state_table(direct, [np.linspace(100, 200, steps + 1), np.linspace(-1e-6, 1e-6, steps + 1)])
+        table = state_table(
+            direct, [np.linspace(100, 200, steps + 1), np.linspace(-1e-6, 1e-6, steps + 1)]
+        )
         found = [interpolate(table, p) for p in points]
-        errors.append(max(np.abs(f - direct(*p)).max() for (f, _), p in zip(found, points, strict=True))
-                      / table.force.max())
+        errors.append(
+            max(np.abs(f - direct(*p)).max() for (f, _), p in zip(found, points, strict=True))
+            / table.force.max()
+        )
         indicators.append(max(i for _, i in found))
     errors, indicators = np.array(errors), np.array(indicators)
     assert errors[-1] < errors[0] / 10
-    assert (indicators > errors).all() and (indicators < 6 * errors).all()      # measured 2.0 to 3.4 times
+    assert (indicators > errors).all() and (
+        indicators < 6 * errors
+    ).all()  # measured 2.0 to 3.4 times
 
 
 def test_the_user_is_told_whether_the_table_is_enough(problem):
-    """A narrow range of loads without tilt is linear to 1 %; micrometres of tilt move the contact area."""
+    """A narrow range of loads without tilt is linear to 1 %; micrometres of tilt move the contact
+    area.
+    """
     scene = bladefem.load_scene("scenes/wedge.toml", ["contact.bedded=true"])
     narrow = check_states(scene, problem, [100.0, 110.0], 1e-10)
     wide = check_states(scene, problem, [20.0, 200.0], 5e-6)

@@ -1,10 +1,12 @@
-"""Hertz, flat punch and Cattaneo-Mindlin in 3-D on gmsh's meshes; finer ones are in benchmarks/contact_pairs.py."""
+"""Hertz, flat punch and Cattaneo-Mindlin in 3-D on gmsh's meshes; finer ones are in
+benchmarks/contact_pairs.py.
+"""
 
 import numpy as np
 import pytest
 from pairs import indent, loops, press
 
-from bladefem.scene import Material
+from bladefem.scene.tables import Material
 
 STEEL, ALUMINIUM = Material(), Material(E=7e10, nu=0.33, rho=2700.0)
 
@@ -29,13 +31,17 @@ def test_rigid_flat_punch(dimension):
 
 
 def test_partial_slip_of_a_sphere():
-    """h = a/6, Q = 0.6 mu P between equal bodies: measured stick radius 0.1 %, energy of the loop 0.7 %."""
+    """h = a/6, Q = 0.6 mu P between equal bodies: measured stick radius 0.1 %, energy of the loop
+    0.7 %.
+    """
     radius, energy = loops(press(6, (STEEL, STEEL)), STEEL, [0.6])[0]
     assert abs(radius) < 0.03 and abs(energy) < 0.03
 
 
 def test_the_pressed_area_of_unequal_bodies_is_one():
-    """Pressures of one map: what the blade feels is what the damper feels, resultants equal to rounding."""
+    """Pressures of one map: what the blade feels is what the damper feels, resultants equal to
+    rounding.
+    """
     e = press(4, (STEEL, ALUMINIUM))
     assert e["force"].sum() == pytest.approx(e["total"], rel=1e-12)
     assert (np.asarray(e["force"]) >= 0).all()

@@ -1,13 +1,15 @@
-"""The same pressure for any number of ranks. The reference is each rank's own solve on its own communicator."""
+"""The same pressure for any number of ranks. The reference is each rank's own solve on its own
+communicator.
+"""
 
 import numpy as np
 import pytest
 from test_seat import ALPHA, SPEED
 from wedge import wedge_mesh
 
-from bladefem.contact.seat import seat
+from bladefem.contact.seating import seat
 from bladefem.fem.compat import MPI
-from bladefem.scene import Materials
+from bladefem.scene.tables import Materials
 
 pytestmark = pytest.mark.mpi
 
@@ -15,7 +17,9 @@ pytestmark = pytest.mark.mpi
 @pytest.mark.parametrize("dimension", [2, 3])
 def test_pressure_does_not_depend_on_ranks(dimension):
     mesh = wedge_mesh(ALPHA, dimension=dimension)
-    together, alone = (seat(mesh, Materials(), SPEED, comm=comm) for comm in (MPI.COMM_WORLD, MPI.COMM_SELF))
+    together, alone = (
+        seat(mesh, Materials(), SPEED, comm=comm) for comm in (MPI.COMM_WORLD, MPI.COMM_SELF)
+    )
     for a, b in zip(together, alone, strict=True):
         assert np.abs(a.force - b.force).max() < 1e-9 * b.force.max()
         everywhere = MPI.COMM_WORLD.allgather(a.force)

@@ -1,4 +1,6 @@
-"""A damper seated between its two platforms: statics must hold to round-off, whatever the meshes and the props."""
+"""A damper seated between its two platforms: statics must hold to round-off, whatever the meshes
+and the props.
+"""
 
 from dataclasses import replace
 
@@ -8,23 +10,25 @@ from wedge import wedge_mesh
 
 import bladefem
 from bladefem.contact.patch import make_patch
-from bladefem.contact.seat import contact_problem, seat, solve
+from bladefem.contact.seating import contact_problem, seat, solve
 from bladefem.errors import InputError, NotSolvedError
 from bladefem.fem.body import assemble
 from bladefem.fem.constraint import constrain
 from bladefem.fem.flexibility import flexible
-from bladefem.scene import Material, Materials
-from bladefem.study.stages import contact_patches
+from bladefem.scene.tables import Material, Materials
+from bladefem.study.pipeline.stages import contact_patches
 
 ALPHA = np.radians(40)
-SPEED = 800.0           # rad/s
+SPEED = 800.0  # rad/s
 
 
 def condensed(mesh, rigid=False, prop=1.0, clearance=0.0):
     patches = [make_patch(mesh, name) for name in ("this", "next")]
     blade = flexible(constrain(assemble(mesh, "blade", Material()), "clamp"))
     body = assemble(mesh, "damper", Material())
-    return contact_problem(mesh, patches, blade, body if rigid else flexible(constrain(body, None), prop), clearance)
+    return contact_problem(
+        mesh, patches, blade, body if rigid else flexible(constrain(body, None), prop), clearance
+    )
 
 
 @pytest.fixture(scope="module")
@@ -52,28 +56,37 @@ def test_force_on_damper_is_radial_and_through_its_centre(solid):
 
 
 def test_props_of_the_floating_damper_have_no_influence():
-    """The support of the floating damper carries nothing: six decades of its stiffness change nothing."""
+    """The support of the floating damper carries nothing: six decades of its stiffness change
+    nothing.
+    """
     mesh = wedge_mesh(ALPHA)
-    soft, hard = (np.concatenate([m.force for m in solve(condensed(mesh, prop=p), SPEED)]) for p in (1e-3, 1e3))
+    soft, hard = (
+        np.concatenate([m.force for m in solve(condensed(mesh, prop=p), SPEED)])
+        for p in (1e-3, 1e3)
+    )
     assert np.abs(soft - hard).max() < 1e-9 * soft.max()
 
 
 def test_receding_contact_of_a_drawn_sector_is_linear_in_the_load():
-    """The shipped wedge drawn by gmsh, coarse: at twice the speed the same nodes press, each four times as hard."""
+    """The shipped wedge drawn by gmsh, coarse: at twice the speed the same nodes press, each four
+    times as hard.
+    """
     scene = bladefem.load_scene("scenes/wedge.toml", ["mesh.size=16 mm", "mesh.contact_size=3 mm"])
     mesh = bladefem.build_mesh(scene)
     problem = bladefem.seat_damper(bladefem.Bodies(scene, mesh), contact_patches(mesh))
     for one, two in zip(solve(problem, SPEED), solve(problem, 2 * SPEED), strict=True):
-        assert 0.5 < (one.force == 0).mean() < 0.9                                  # measured 33 and 32 of 48
+        assert 0.5 < (one.force == 0).mean() < 0.9  # measured 33 and 32 of 48
         assert np.array_equal(one.force > 0, two.force > 0)
-        assert np.abs(4 * one.force - two.force).max() < 1e-8 * two.force.max()     # measured 4e-10
+        assert np.abs(4 * one.force - two.force).max() < 1e-8 * two.force.max()  # measured 4e-10
 
 
 def test_wanted_normal_load_and_damper_mass(solid):
     for seat_map in solve(solid, SPEED, normal=123.0):
         assert seat_map.force.sum() == pytest.approx(123.0, rel=1e-8)
     single = solve(solid, SPEED)[0].force.sum()
-    assert solve(solid, SPEED, damper_mass=2 * solid.mass)[0].force.sum() == pytest.approx(2 * single, rel=1e-8)
+    assert solve(solid, SPEED, damper_mass=2 * solid.mass)[0].force.sum() == pytest.approx(
+        2 * single, rel=1e-8
+    )
 
 
 def test_clearance_is_taken_up_by_rigid_motion(solid):
@@ -84,25 +97,36 @@ def test_clearance_is_taken_up_by_rigid_motion(solid):
 
 
 def test_a_wide_even_clearance_under_a_tiny_load(solid):
-    """2 mm are 1e10 times what 1 mN bends, and known to 4e-19 m: the travel that closes them is taken out first."""
+    """2 mm are 1e10 times what 1 mN bends, and known to 4e-19 m: the travel that closes them is
+    taken out first.
+    """
     wide = condensed(wedge_mesh(ALPHA), clearance=2e-3)
     for a, b in zip(solve(solid, 0.0, normal=1e-3), solve(wide, 0.0, normal=1e-3), strict=True):
-        assert np.abs(a.force - b.force).max() < 1e-3 * a.force.max()       # measured 1.3e-4
+        assert np.abs(a.force - b.force).max() < 1e-3 * a.force.max()  # measured 1.3e-4
         assert b.complementarity < 1e-9
 
 
 def test_a_load_too_light_for_uneven_gaps_is_told(solid):
-    """Faces that miss each other by 20 um need a load that bends them; this one leaves the damper on single points."""
+    """Faces that miss each other by 20 um need a load that bends them; this one leaves the damper
+    on single points.
+    """
     rough = replace(solid, clearance=2e-5 * np.random.default_rng(3).random(len(solid.clearance)))
     assert sum(m.force.sum() for m in solve(rough, 0.0, normal=100.0)) == pytest.approx(200.0)
-    with pytest.raises(NotSolvedError, match=r"load 1e-09 N .*hardly touches; expected a larger study\.loads"):
+    with pytest.raises(
+        NotSolvedError, match=r"load 1e-09 N .*hardly touches; expected a larger study\.loads"
+    ):
         solve(rough, 0.0, normal=1e-9)
 
 
 def test_bedded_faces_forget_gaps_and_rotation(solid):
     """Worn faces: only the load's direction and size are left of the rotation."""
     slow = solve(solid, SPEED, normal=50.0, bedded=True)
-    fast = solve(condensed(wedge_mesh(ALPHA), clearance=np.linspace(0, 1e-5, 50)), 3 * SPEED, normal=50.0, bedded=True)
+    fast = solve(
+        condensed(wedge_mesh(ALPHA), clearance=np.linspace(0, 1e-5, 50)),
+        3 * SPEED,
+        normal=50.0,
+        bedded=True,
+    )
     for a, b in zip(slow, fast, strict=True):
         assert np.abs(a.force - b.force).max() < 1e-9 * a.force.max()
 
@@ -132,12 +156,19 @@ def test_a_load_that_slides_sideways_is_refused(solid):
         solve(replace(solid, load=axial), SPEED)
 
 
-@pytest.mark.parametrize(("speed", "given", "word"), [
-    (0.0, {}, "speed is 0.0 rad/s"), (np.nan, {}, "speed is nan"), (SPEED, {"normal": -1.0}, "normal load is -1"),
-    (SPEED, {"normal": np.inf}, "normal load is inf"), (SPEED, {"damper_mass": np.inf}, "damper_mass is inf"),
-    (SPEED, {"damper_mass": -1.0}, "damper_mass is -1"),
-    (SPEED, {"approach": np.full(50, np.nan)}, r"approach\[0\] is nan"),
-    (SPEED, {"approach": np.zeros(49)}, r"approach has shape \(49,\), expected \(50\)")])
+@pytest.mark.parametrize(
+    ("speed", "given", "word"),
+    [
+        (0.0, {}, "speed is 0.0 rad/s"),
+        (np.nan, {}, "speed is nan"),
+        (SPEED, {"normal": -1.0}, "normal load is -1"),
+        (SPEED, {"normal": np.inf}, "normal load is inf"),
+        (SPEED, {"damper_mass": np.inf}, "damper_mass is inf"),
+        (SPEED, {"damper_mass": -1.0}, "damper_mass is -1"),
+        (SPEED, {"approach": np.full(50, np.nan)}, r"approach\[0\] is nan"),
+        (SPEED, {"approach": np.zeros(49)}, r"approach has shape \(49,\), expected \(50\)"),
+    ],
+)
 def test_no_load_is_bad_input(solid, speed, given, word):
     with pytest.raises(InputError, match=word):
         solve(solid, speed, **given)

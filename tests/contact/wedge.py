@@ -1,4 +1,6 @@
-"""A wedge damper between two stubby blades, meshed by NumPy: small, exact flanks, matched nodes on both seats."""
+"""A wedge damper between two stubby blades, meshed by NumPy: small, exact flanks, matched nodes on
+both seats.
+"""
 
 import numpy as np
 from blocks import quadratic, simplices, surface
@@ -6,7 +8,16 @@ from blocks import quadratic, simplices, surface
 from geometry.mesh import Mesh, Pair, Sector
 
 
-def wedge_mesh(alpha, sectors=36, divisions=(4, 3, 4), dimension=3, radius=0.2, height=0.01, foot=0.012, length=0.03):
+def wedge_mesh(
+    alpha,
+    sectors=36,
+    divisions=(4, 3, 4),
+    dimension=3,
+    radius=0.2,
+    height=0.01,
+    foot=0.012,
+    length=0.03,
+):
     """Blade and damper of one sector.
 
     alpha: angle of each flank to the radial plane [rad]; divisions along (flank, across, axis);
@@ -31,12 +42,26 @@ def wedge_mesh(alpha, sectors=36, divisions=(4, 3, 4), dimension=3, radius=0.2, 
     if dimension == 3:
         points[:, 2] = np.tile(grid[:, 2], 2)
     plus, minus = surface(grid, cells, corners, 1, 1.0), surface(grid, cells, corners, 1, -1.0)
-    faces = {"clamp": surface(grid, cells, corners, 0, 0.0), "seat_right": plus, "seat_left": minus,
-             "damper_left": minus + n, "damper_right": plus + n}
-    pairs = {"this": _pair(points, faces, "seat_right", "damper_left", np.eye(3)),
-             "next": _pair(points, faces, "seat_left", "damper_right", turn)}
-    return Mesh(points, "triangle6" if dimension == 2 else "tetra10", {"blade": cells, "damper": cells + n}, faces,
-                pairs=pairs, sector=Sector(sectors, turn, np.zeros(3)), depth=0.03 if dimension == 2 else 1.0)
+    faces = {
+        "clamp": surface(grid, cells, corners, 0, 0.0),
+        "seat_right": plus,
+        "seat_left": minus,
+        "damper_left": minus + n,
+        "damper_right": plus + n,
+    }
+    pairs = {
+        "this": _pair(points, faces, "seat_right", "damper_left", np.eye(3)),
+        "next": _pair(points, faces, "seat_left", "damper_right", turn),
+    }
+    return Mesh(
+        points,
+        "triangle6" if dimension == 2 else "tetra10",
+        {"blade": cells, "damper": cells + n},
+        faces,
+        pairs=pairs,
+        sector=Sector(sectors, turn, np.zeros(3)),
+        depth=0.03 if dimension == 2 else 1.0,
+    )
 
 
 def _pair(points, faces, master, slave, rotation):

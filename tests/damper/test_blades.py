@@ -4,24 +4,40 @@ import numpy as np
 import pytest
 
 from bladefem.damper.blades import judge, optimum, paper_blade, peak, seat_loop
-from bladefem.hbm.api import solve
+from bladefem.hbm.solve import solve
 
 
-@pytest.mark.parametrize(("kt", "mass", "load", "phase", "band", "frequency"), [
-    (1e6, 0.06, 1000.0, 0.0, (1300, 1450), 1386.0),     # raised by the springs
-    (2e7, 0.06, 1000.0, 0.0, (1000, 1250), 1086.0),     # lowered by the mass
-    (2e7, 0.06, 30.0, np.pi, (1900, 2200), 2046.0),     # neighbours in antiphase: the damper stands still
-])
+@pytest.mark.parametrize(
+    ("kt", "mass", "load", "phase", "band", "frequency"),
+    [
+        (1e6, 0.06, 1000.0, 0.0, (1300, 1450), 1386.0),  # raised by the springs
+        (2e7, 0.06, 1000.0, 0.0, (1000, 1250), 1086.0),  # lowered by the mass
+        (
+            2e7,
+            0.06,
+            30.0,
+            np.pi,
+            (1900, 2200),
+            2046.0,
+        ),  # neighbours in antiphase: the damper stands still
+    ],
+)
 def test_stuck_resonances(kt, mass, load, phase, band, frequency):
     found = peak(paper_blade(kt, mass, load, phase=phase), band)
     assert found.unsolved == 0
-    assert found.frequency == pytest.approx(frequency, rel=0.005)          # 0.4 % in antiphase, where the ends slip
+    assert found.frequency == pytest.approx(
+        frequency, rel=0.005
+    )  # 0.4 % in antiphase, where the ends slip
 
 
 @pytest.mark.parametrize(("mass", "amplitude"), [(0.03, 1.32e-6), (0.06, 3.07e-6), (0.12, 4.21e-6)])
 def test_larger_mass_does_not_make_the_minimum_smaller(mass, amplitude):
-    """1.3, 3.1, 4.2 um in mode 2, against the paper's claim (Sect. 5.2); 1 % by the search for the optimum."""
-    _, best = optimum(lambda load: paper_blade(mass=mass, load=load), (0.5, 4.0), (1100, 1600), samples=128)
+    """1.3, 3.1, 4.2 um in mode 2, against the paper's claim (Sect. 5.2); 1 % by the search for the
+    optimum.
+    """
+    _, best = optimum(
+        lambda load: paper_blade(mass=mass, load=load), (0.5, 4.0), (1100, 1600), samples=128
+    )
     assert best.amplitude == pytest.approx(amplitude, rel=0.01)
 
 
@@ -39,4 +55,6 @@ def test_loop_of_a_seat_has_the_dissipated_work():
     solution = solve(paper_blade(load=1.4), 2 * np.pi * 1315.5, 15, 1024)
     motion, force = seat_loop(solution)
     area = np.sum(force * (np.roll(motion, -1) - np.roll(motion, 1)) / 2)
-    assert 2 * area == pytest.approx(solution.work.friction, rel=1e-4)      # two equal seats; differences of 512 points
+    assert 2 * area == pytest.approx(
+        solution.work.friction, rel=1e-4
+    )  # two equal seats; differences of 512 points

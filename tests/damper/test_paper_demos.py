@@ -1,4 +1,6 @@
-"""The paper's demos in their coarse setting end in their number. Remake: BLADEFEM_COARSE=1 ./run demos/paper_NAME.py"""
+"""The paper's demos in their coarse setting end in their number. Remake: BLADEFEM_COARSE=1 ./run
+demos/paper_NAME.py
+"""
 
 import os
 import subprocess
@@ -14,13 +16,23 @@ PINNED = {"element": 0.542996, "contact": 0.97322916, "zmass": 0.105900, "blades
 
 def output(name: str, ranks: int = 1) -> list[str]:
     """Lines that a demo prints in its coarse setting."""
-    clean = {k: v for k, v in os.environ.items() if not k.startswith(("OMPI_", "PMIX_", "PRTE_", "ORTE_"))
-             or k.startswith(("OMPI_ALLOW", "OMPI_MCA"))}
+    clean = {
+        k: v
+        for k, v in os.environ.items()
+        if not k.startswith(("OMPI_", "PMIX_", "PRTE_", "ORTE_"))
+        or k.startswith(("OMPI_ALLOW", "OMPI_MCA"))
+    }
     command = [sys.executable, f"demos/paper_{name}.py"]
     if ranks > 1:
         command = ["mpirun", "--oversubscribe", "--bind-to", "none", "-n", str(ranks), *command]
-    done = subprocess.run(command, cwd=HERE, env={**clean, "BLADEFEM_COARSE": "1", "PYTHONPATH": str(HERE)},
-                          capture_output=True, text=True, timeout=600)
+    done = subprocess.run(
+        command,
+        cwd=HERE,
+        env={**clean, "BLADEFEM_COARSE": "1", "PYTHONPATH": str(HERE)},
+        capture_output=True,
+        text=True,
+        timeout=600,
+    )
     assert done.returncode == 0, done.stderr[-3000:]
     return done.stdout.strip().splitlines()
 
@@ -34,4 +46,6 @@ def test_demo_on_two_ranks_speaks_once_and_ends_in_the_same_number():
     """So do zmass and blades on 2 and 4 ranks, which is not repeated here."""
     alone, together = output("contact"), output("contact", 2)
     assert len(together) == len(alone)
-    assert float(together[-1].split(":")[-1]) == pytest.approx(float(alone[-1].split(":")[-1]), rel=1e-8)
+    assert float(together[-1].split(":")[-1]) == pytest.approx(
+        float(alone[-1].split(":")[-1]), rel=1e-8
+    )

@@ -31,7 +31,9 @@ def test_html_escapes_what_claims_say():
 
 
 def test_one_chapter_is_remade_and_the_others_kept(tmp_path, monkeypatch):
-    chapters = tuple(Chapter(t, "", (lambda _, t=t: iter([Claim("Eq. 1", "x", t, "holds")]),)) for t in "ab")
+    chapters = tuple(
+        Chapter(t, "", (lambda _, t=t: iter([Claim("Eq. 1", "x", t, "holds")]),)) for t in "ab"
+    )
     monkeypatch.setattr("bladefem.report.claims.CHAPTERS", chapters)
     main(tmp_path)
     first = (tmp_path / "paper.md").read_text(encoding="utf-8")
@@ -44,10 +46,14 @@ def test_one_chapter_is_remade_and_the_others_kept(tmp_path, monkeypatch):
 def test_committed_page_has_every_chapter_and_its_pictures():
     page = (MAP.parents[1] / "paper.md").read_text(encoding="utf-8")
     assert all(f"## {chapter.title}" in page for chapter in CHAPTERS)
-    pictures = [line.split("(")[1].rstrip(")") for line in page.splitlines() if line.startswith("![")]
+    pictures = [
+        line.split("(")[1].rstrip(")") for line in page.splitlines() if line.startswith("![")
+    ]
     assert len(pictures) >= 22
     assert all((MAP.parents[1] / picture).is_file() for picture in pictures)
-    assert page.count("**holds") + page.count("**fails**") == 2 * int(page.split(" claims: ")[0].split()[-1])
+    assert page.count("**holds") + page.count("**fails**") == 2 * int(
+        page.split(" claims: ")[0].split()[-1]
+    )
 
 
 def test_method_map_covers_every_method_on_at_least_250_points():
@@ -62,7 +68,11 @@ def test_method_map_covers_every_method_on_at_least_250_points():
 
 
 def test_rows_go_to_csv_and_back(tmp_path):
-    row = dict.fromkeys(COLUMNS, 1.0) | {"method": "picard", "outcome": "false", "reason": "step 1e-2, small"}
+    row = dict.fromkeys(COLUMNS, 1.0) | {
+        "method": "picard",
+        "outcome": "false",
+        "reason": "step 1e-2, small",
+    }
     write_rows([row], tmp_path / "map.csv")
     with open(tmp_path / "map.csv", encoding="utf-8") as file:
         assert next(csv.DictReader(file))["reason"] == "step 1e-2, small"

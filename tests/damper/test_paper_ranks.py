@@ -1,19 +1,23 @@
-"""The paper's finite elements on any number of ranks: the same as each rank by itself (the punch: test_paper_demos)."""
+"""The paper's finite elements on any number of ranks: the same as each rank by itself (the punch:
+test_paper_demos).
+"""
 
 import numpy as np
 import pytest
 
 from bladefem.fem.compat import MPI
-from bladefem.scene_file import load_scene
+from bladefem.scene.toml import load_scene
+from bladefem.study.kinds.zmass import press
 from bladefem.study.row import paper_model, row_of_blades
-from bladefem.study.zmass import press
 
 pytestmark = pytest.mark.mpi
 RANKS = (MPI.COMM_WORLD, MPI.COMM_SELF)
 
 
 def test_pressure_of_the_mass():
-    together, alone = (press(load_scene("scenes/zmass.toml", ["mesh.size=9 mm"]), comm=comm).seat for comm in RANKS)
+    together, alone = (
+        press(load_scene("scenes/zmass.toml", ["mesh.size=9 mm"]), comm=comm).seat for comm in RANKS
+    )
     np.testing.assert_allclose(together.force, alone.force, rtol=1e-9)
 
 

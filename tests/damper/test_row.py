@@ -1,7 +1,8 @@
-"""Plane blades from finite elements, as the paper computes them: limits, methods against each other, pinned figures.
+"""Plane blades from finite elements, as the paper computes them: limits, methods against each
+other, pinned figures.
 
-Figures are those of the default mesh, 41 nodes a seat; with 81 the resonances of these tests move by 0.02 % and their
-amplitudes by at most 0.6 % (63 N: 32.4 to 32.6 um; least amplitudes: 0.15 %).
+Figures are those of the default mesh, 41 nodes a seat; with 81 the resonances of these tests move
+by 0.02 % and their amplitudes by at most 0.6 % (63 N: 32.4 to 32.6 um; least amplitudes: 0.15 %).
 """
 
 import numpy as np
@@ -12,14 +13,14 @@ from bladefem.damper.blades import judge, optimum, peak
 from bladefem.damper.branch import state_of
 from bladefem.damper.paper import platform
 from bladefem.errors import InputError
-from bladefem.hbm.api import solve
-from bladefem.hbm.in_time import time_system
-from bladefem.hbm.resonance import free_resonances
-from bladefem.hbm.shooting import harmonics, multipliers, periodic
+from bladefem.hbm.linear_resonances import free_resonances
+from bladefem.hbm.solve import solve
 from bladefem.hbm.sweep import response, size
-from bladefem.scene_file import load_scene
+from bladefem.hbm.time_model import time_system
+from bladefem.scene.toml import load_scene
+from bladefem.study.pipeline.stability import in_one_body
 from bladefem.study.row import paper_model, row_of_blades, whole_model
-from bladefem.study.stability import in_one_body
+from bladefem.time.shooting import harmonics, multipliers, periodic
 
 SOFT = load_scene("scenes/plane.toml", ["contact.kt=1e6 N/m"])
 
@@ -32,13 +33,15 @@ def row():
 def test_resonances_and_loads_of_the_scene(row):
     model = paper_model(SOFT, row, 30.0)
     assert free_resonances(model)[:2] / 2 / np.pi == pytest.approx([220.535, 1123.31], rel=1e-4)
-    assert model.elements.n0.sum() == pytest.approx(60.0)                    # both seats
+    assert model.elements.n0.sum() == pytest.approx(60.0)  # both seats
     assert model.elements.kt[:41].sum() == pytest.approx(1e6)
-    assert np.ptp(model.damper.B) == 0                                      # it moves along the row only
+    assert np.ptp(model.damper.B) == 0  # it moves along the row only
 
 
 def test_a_static_part_held_lets_no_mean_displacement_in(row):
-    """model.static = "uncoupled": mean forces that friction raises are reported, the mean stays where it was."""
+    """model.static = "uncoupled": mean forces that friction raises are reported, the mean stays
+    where it was.
+    """
     held = whole_model(SOFT.vary(model__static="uncoupled"), row, 6.0, harmonics=3)
     free = whole_model(SOFT, row, 6.0, harmonics=3)
     assert free.coupled and not held.coupled
@@ -56,7 +59,9 @@ def test_normal_loads_are_proportional(row):
 
 
 def test_the_contact_mesh_is_fine_enough(row):
-    """63 N, between stick and slip: 32.39 um with 41 nodes a seat, 32.57 um with 81; 11 nodes give 23.4 um (F27)."""
+    """63 N, between stick and slip: 32.39 um with 41 nodes a seat, 32.57 um with 81; 11 nodes give
+    23.4 um (F27).
+    """
     finer = row_of_blades(SOFT.vary(mesh__contact_size=SOFT.plane.seat_width / 80))
     default, half = (peak(paper_model(SOFT, r, 63.0), (1050, 1300), 3, 128) for r in (row, finer))
     assert default.amplitude == pytest.approx(half.amplitude, rel=0.02)
@@ -65,11 +70,16 @@ def test_the_contact_mesh_is_fine_enough(row):
 
 def test_frequency_rises_on_soft_contacts_and_falls_on_stiff_ones(row):
     """Fig. 15 and its exception: 1123.6 to 1176 Hz, and 1123.3 to 1008 Hz."""
-    soft = [peak(paper_model(SOFT, row, load), (1050, 1300), 3, 128).frequency for load in (1.0, 6.0, 200.0)]
+    soft = [
+        peak(paper_model(SOFT, row, load), (1050, 1300), 3, 128).frequency
+        for load in (1.0, 6.0, 200.0)
+    ]
     assert soft == sorted(soft)
     assert soft[-1] == pytest.approx(1176.0, rel=1e-3)
     scene = load_scene("scenes/plane.toml", ["contact.kt=1.44e7 N/m"])
-    assert peak(paper_model(scene, row_of_blades(scene), 200.0), (850, 1250), 3, 128).frequency < 1015
+    assert (
+        peak(paper_model(scene, row_of_blades(scene), 200.0), (850, 1250), 3, 128).frequency < 1015
+    )
 
 
 def test_full_balance_and_the_loop_against_exact_integration(row):
@@ -94,33 +104,52 @@ def test_marching_the_damper_from_rest_is_accepted_and_wrong(row):
 
 @pytest.mark.parametrize(("mass", "amplitude"), [(0.03, 6.62e-6), (0.12, 12.49e-6)])
 def test_least_amplitude_grows_with_the_mass_on_soft_contacts(row, mass, amplitude):
-    _, best = optimum(lambda load: paper_model(SOFT, row, load, mass), (3.0, 12.0), (950, 1500), 3, 128)
+    _, best = optimum(
+        lambda load: paper_model(SOFT, row, load, mass), (3.0, 12.0), (950, 1500), 3, 128
+    )
     assert best.amplitude == pytest.approx(amplitude, rel=0.01)
 
 
 def test_normal_motion_matters_near_the_optimum(row):
-    """4 N: 11.9 um in the paper's model, 26 um when the load follows the motion; 20 N: within 5 %."""
-    light, heavy = ([peak(m, (1050, 1300), 3, 128).amplitude for m in
-                     (paper_model(SOFT, row, load), whole_model(SOFT, row, load))] for load in (4.0, 20.0))
+    """4 N: 11.9 um in the paper's model, 26 um when the load follows the motion; 20 N: within 5
+    %.
+    """
+    light, heavy = (
+        [
+            peak(m, (1050, 1300), 3, 128).amplitude
+            for m in (paper_model(SOFT, row, load), whole_model(SOFT, row, load))
+        ]
+        for load in (4.0, 20.0)
+    )
     assert light[1] > 2 * light[0]
     assert heavy[1] == pytest.approx(heavy[0], rel=0.05)
 
 
 def test_two_motions_where_the_normal_load_follows(row):
-    """4 N, 1145 Hz: sweeps from below and from above end on different motions; under a constant load on one."""
+    """4 N, 1145 Hz: sweeps from below and from above end on different motions; under a constant
+    load on one.
+    """
     ends = {}
-    for name, model in (("follows", whole_model(SOFT, row, 4.0)), ("constant", paper_model(SOFT, row, 4.0))):
-        ways = [list(response(model, 2 * np.pi * np.linspace(start, 1145.0, 21), 3, 256)) for start in (1125.0, 1165.0)]
+    for name, model in (
+        ("follows", whole_model(SOFT, row, 4.0)),
+        ("constant", paper_model(SOFT, row, 4.0)),
+    ):
+        ways = [
+            list(response(model, 2 * np.pi * np.linspace(start, 1145.0, 21), 3, 256))
+            for start in (1125.0, 1165.0)
+        ]
         assert all(s.converged for way in ways for s in way)
         ends[name] = [size(way[-1]) for way in ways]
     assert ends["constant"][1] == pytest.approx(ends["constant"][0], rel=1e-6)
-    assert max(ends["follows"]) > 4 * min(ends["follows"])                # 24.9 and 4.5 um
+    assert max(ends["follows"]) > 4 * min(ends["follows"])  # 24.9 and 4.5 um
 
 
 def test_the_whole_plane_model_against_integration_in_time(row):
-    """Three freedoms of the damper, normal loads that follow and may open: 6e-4 at resonance under 20 N.
+    """Three freedoms of the damper, normal loads that follow and may open: 6e-4 at resonance under
+    20 N.
 
-    Points that always stick may carry any mean force, so that the two need not agree to the last digit.
+    Points that always stick may carry any mean force, so that the two need not agree to the last
+    digit.
     """
     model = in_one_body(whole_model(SOFT, row, 20.0))
     omega = 2 * np.pi * 1181.5
@@ -132,7 +161,9 @@ def test_the_whole_plane_model_against_integration_in_time(row):
 
 
 def test_the_rocking_motion_of_the_plane_model_is_unstable_in_time(row):
-    """4 N, 1148 Hz, all contacts lift off: a solution of the exact flow too (0.1 %), largest multiplier 1.09."""
+    """4 N, 1148 Hz, all contacts lift off: a solution of the exact flow too (0.1 %), largest
+    multiplier 1.09.
+    """
     model = in_one_body(whole_model(SOFT, row, 4.0))
     start = solve(model, 2 * np.pi * 1150.0, 5, 256)
     found, system = solve(model, 2 * np.pi * 1148.0, 9, 512, start=start), time_system(model, 1)

@@ -1,4 +1,6 @@
-"""The mass on a vibrating foundation: the paper's Table 1, an independent twin, and limits known in closed form."""
+"""The mass on a vibrating foundation: the paper's Table 1, an independent twin, and limits known in
+closed form.
+"""
 
 from dataclasses import replace
 from fractions import Fraction
@@ -22,7 +24,9 @@ PAPER = MassOnFoundation()
 
 
 def turn(f, d, before, after, parts=400):
-    """Friction force after the elastic force ``d``: plain radial return in many small parts (complex plane)."""
+    """Friction force after the elastic force ``d``: plain radial return in many small parts
+    (complex plane).
+    """
     for n in range(parts):
         f = f + d / parts
         bound = before + (after - before) * (n + 1) / parts
@@ -54,30 +58,37 @@ def test_march_agrees_with_the_plain_twin():
     corners = Footprint(z_footprint().points[::8], np.array([0.3, 0.1, 0.25, 0.15, 0.2]))
     body = replace(PAPER, kt=1e5, footprint=corners)
     time = np.linspace(0, 0.02, 201)
-    base, load = ellipse((2e-3, 1e-3), 1.0, 100, time), pulsating_load(40, 60, 50, time)   # lifts off once
+    base, load = (
+        ellipse((2e-3, 1e-3), 1.0, 100, time),
+        pulsating_load(40, 60, 50, time),
+    )  # lifts off once
     motion = march(body, base, load, time[1])
     ours = np.hstack([motion.position, motion.velocity, motion.force])
     plain = twin(body, base, load, time[1])
     assert load.min() < 0
     error = np.abs(ours - plain).max(axis=0) / np.abs(plain).max(axis=0)
-    assert error.max() < 5e-3                                              # the 400 parts of the twin, first order
+    assert error.max() < 5e-3  # the 400 parts of the twin, first order
 
 
 @pytest.mark.parametrize(("ratio", "loops"), [("0", 1), ("1/4", 4), ("1/2", 2), ("2", 1)])
 def test_loops_of_the_paper(ratio, loops):
-    assert steady(PAPER, Drive(Fraction(ratio)), 1000).loops == loops      # Fig. 10: fp = 0, 25, 50, 200 Hz
+    assert (
+        steady(PAPER, Drive(Fraction(ratio)), 1000).loops == loops
+    )  # Fig. 10: fp = 0, 25, 50, 200 Hz
 
 
 def test_drift_at_50_hz():
     result = steady(PAPER, Drive(Fraction(1, 2)), 2000)
-    assert result.drift[0] == pytest.approx(0.105, rel=0.01)               # 0.10574 m/s
+    assert result.drift[0] == pytest.approx(0.105, rel=0.01)  # 0.10574 m/s
     assert result.reason == "periodic"
 
 
 @pytest.mark.parametrize(("ratio", "drift"), [("1/2", 0.10509), ("1", -0.6307), ("2", 0.0)])
 def test_drift_of_an_independent_prototype(ratio, drift):
     """F16; 1 %: the prototype shared stiffness and load out differently."""
-    assert steady(PAPER, Drive(Fraction(ratio)), 2000).drift[0] == pytest.approx(drift, rel=0.01, abs=1e-6)
+    assert steady(PAPER, Drive(Fraction(ratio)), 2000).drift[0] == pytest.approx(
+        drift, rel=0.01, abs=1e-6
+    )
 
 
 def test_drift_at_25_hz_needs_fine_steps():
@@ -88,7 +99,7 @@ def test_drift_at_25_hz_needs_fine_steps():
 def test_amplitude_under_constant_load():
     frequency, lines = spectrum(steady(PAPER, Drive(Fraction(0)), 1000))
     assert frequency[0] == pytest.approx(100)
-    assert lines[0, 0] == pytest.approx(1.382e-3, rel=1e-3)                # F02
+    assert lines[0, 0] == pytest.approx(1.382e-3, rel=1e-3)  # F02
 
 
 def test_no_drift_only_for_even_numerators():
@@ -98,23 +109,34 @@ def test_no_drift_only_for_even_numerators():
 
 
 def test_rule_of_the_denominator_in_gross_slip():
-    """17 ratios: one open loop for each unit of the denominator, when inertia is 4.6 times the friction limit."""
-    ratios = [Fraction(r) for r in "0 1/5 1/4 1/3 2/5 1/2 3/5 2/3 3/4 1 4/3 3/2 2 5/2 3 4 5".split()]
+    """17 ratios: one open loop for each unit of the denominator, when inertia is 4.6 times the
+    friction limit.
+    """
+    ratios = [
+        Fraction(r) for r in "0 1/5 1/4 1/3 2/5 1/2 3/5 2/3 3/4 1 4/3 3/2 2 5/2 3 4 5".split()
+    ]
     assert all(row["rule"] for row in ratio_table(PAPER, ratios, 500))
 
 
 def test_rule_of_the_denominator_fails_near_sticking():
-    """At a quarter of the stroke the mass slips only while the load is low: 2 loops of 4, 2 of 3, 3 of 5."""
-    found = {r: steady(PAPER, Drive(Fraction(r), amplitude=(1.2e-3, 0.0)), 1000).loops for r in ("1/4", "1/3", "2/5")}
+    """At a quarter of the stroke the mass slips only while the load is low: 2 loops of 4, 2 of 3, 3
+    of 5.
+    """
+    found = {
+        r: steady(PAPER, Drive(Fraction(r), amplitude=(1.2e-3, 0.0)), 1000).loops
+        for r in ("1/4", "1/3", "2/5")
+    }
     assert found == {"1/4": 2, "1/3": 2, "2/5": 3}
 
 
 def test_symmetric_pressure_does_not_turn_the_mass_and_skewed_pressure_does():
     drive = Drive(Fraction(0), amplitude=(0.005, 0.003))
     even = steady(PAPER, drive, 500, most=20).motion
-    skew = steady(replace(PAPER, footprint=skewed(z_footprint(), (0.5, 0.3))), drive, 500, most=20).motion
+    skew = steady(
+        replace(PAPER, footprint=skewed(z_footprint(), (0.5, 0.3))), drive, 500, most=20
+    ).motion
     assert np.abs(even.position[:, 2]).max() < 1e-12
-    assert np.abs(skew.velocity[:, 2]).max() > 1.0                         # rad/s
+    assert np.abs(skew.velocity[:, 2]).max() > 1.0  # rad/s
 
 
 def test_stuck_mass_follows_the_closed_form():
@@ -132,12 +154,16 @@ def test_stuck_mass_follows_the_closed_form():
         motion = march(body, ellipse((1e-6, 0), 0, 100, time), np.full(steps + 1, 50.0), time[1])
         errors.append(np.abs(motion.position[:, 0] - exact(time[1:])).max())
     assert errors[0] < 2e-9
-    assert np.log2(errors[0] / errors[1]) == pytest.approx(2, abs=0.1)     # second order
+    assert np.log2(errors[0] / errors[1]) == pytest.approx(2, abs=0.1)  # second order
 
 
 def test_circular_motion_dissipates_as_coulomb_friction():
-    """A heavy mass under a circular foundation orbit: work per cycle 2 pi F sqrt(A^2 - (F/k)^2), 1e-4 by the step."""
-    body = MassOnFoundation(mass=1e6, inertia=1e6, footprint=Footprint(np.zeros((1, 2)), np.ones(1)))
+    """A heavy mass under a circular foundation orbit: work per cycle 2 pi F sqrt(A^2 - (F/k)^2),
+    1e-4 by the step.
+    """
+    body = MassOnFoundation(
+        mass=1e6, inertia=1e6, footprint=Footprint(np.zeros((1, 2)), np.ones(1))
+    )
     time = np.linspace(0, 0.04, 8001)
     base = ellipse((1e-4, 1e-4), np.pi / 2, 100, time)
     motion = march(body, base, np.full(8001, 100.0), time[1])
@@ -148,11 +174,13 @@ def test_circular_motion_dissipates_as_coulomb_friction():
 
 def test_unstable_step_is_refused():
     with pytest.raises(InputError, match="stability limit"):
-        march(PAPER, np.zeros((3, 2)), np.full(3, 50.0), 1e-3)             # F13
+        march(PAPER, np.zeros((3, 2)), np.full(3, 50.0), 1e-3)  # F13
 
 
 def test_undamped_sticking_mass_is_reported_not_periodic():
-    """F08: below the slip limit nothing damps the start; the march says so instead of returning a cycle."""
+    """F08: below the slip limit nothing damps the start; the march says so instead of returning a
+    cycle.
+    """
     result = steady(PAPER, Drive(Fraction(0), amplitude=(5e-4, 0.0)), 500, most=30)
     assert result.reason.startswith("not periodic after 30 periods")
     assert result.residual > 1e-3

@@ -1,4 +1,6 @@
-"""The Z-shaped mass from its scene: finite-element pressure, then motion. Sizes of the shipped scene, coarser mesh."""
+"""The Z-shaped mass from its scene: finite-element pressure, then motion. Sizes of the shipped
+scene, coarser mesh.
+"""
 
 from fractions import Fraction
 from pathlib import Path
@@ -10,9 +12,9 @@ from bladefem.cli.main import main
 from bladefem.damper.loops import Drive, steady
 from bladefem.damper.zmass import Footprint, MassOnFoundation
 from bladefem.errors import InputError
-from bladefem.scene_file import load_scene
-from bladefem.store import read_results
-from bladefem.study.zmass import clusters, drives, mass_on_foundation, motions, press
+from bladefem.io.stage_cache import read_results
+from bladefem.scene.toml import load_scene
+from bladefem.study.kinds.zmass import clusters, drives, mass_on_foundation, motions, press
 
 SCENE = load_scene("scenes/zmass.toml", ["mesh.size=7 mm"])
 
@@ -32,9 +34,11 @@ def test_pressure_is_balanced_symmetric_and_highest_at_the_edge(pressed):
     seat = pressed.seat
     share = seat.force / seat.force.sum()
     assert seat.force.sum() == pytest.approx(50, rel=1e-10)
-    assert np.abs(share @ seat.patch.points[:, :2]).max() < 1e-6           # [m]; exact for the weights, not the nodes
+    assert (
+        np.abs(share @ seat.patch.points[:, :2]).max() < 1e-6
+    )  # [m]; exact for the weights, not the nodes
     assert seat.complementarity < 1e-9
-    inside = np.abs(seat.patch.points[:, 1] - 0.0173) < 0.003              # middle of the upper bar
+    inside = np.abs(seat.patch.points[:, 1] - 0.0173) < 0.003  # middle of the upper bar
     assert seat.pressure.max() > 1.1 * seat.pressure[inside].mean()
 
 
@@ -45,32 +49,42 @@ def test_pressure_is_linear_in_the_load(pressed):
 
 
 def test_rigid_foundation_passes_the_patch_test():
-    """Uniform pressure on top of a prism on a rigid plane is uniform below; here 48 times as stiff as the mass."""
+    """Uniform pressure on top of a prism on a rigid plane is uniform below; here 48 times as stiff
+    as the mass.
+    """
     pressure = press(SCENE.vary(material__blade__E=1e13)).seat.pressure
     assert np.ptp(pressure) / pressure.mean() < 0.03
 
 
 def test_loops_and_drift_of_the_paper(pressed):
     found = list(motions(SCENE, mass_on_foundation(SCENE, pressed.seat), 1000))
-    assert [result.loops for _, result in found] == [1, 4, 2, 1]           # Fig. 10
-    assert found[2][1].drift[0] == pytest.approx(0.105, rel=0.01)          # 0.1057 m/s at 50 Hz
+    assert [result.loops for _, result in found] == [1, 4, 2, 1]  # Fig. 10
+    assert found[2][1].drift[0] == pytest.approx(0.105, rel=0.01)  # 0.1057 m/s at 50 Hz
     assert abs(found[0][1].drift[0]) < 1e-6
 
 
 def test_skewed_top_pressure_moves_the_resultant_and_turns_the_mass():
-    """The moment of the load: share . x = skew x I / (A reach), here for x and y; 2 % by the faceted pressure."""
-    scene = SCENE.vary(foundation__skew=(0.5, 0.3), foundation__amplitude=(0.005, 0.003), foundation__ratios=(0.5,))
+    """The moment of the load: share . x = skew x I / (A reach), here for x and y; 2 % by the
+    faceted pressure.
+    """
+    scene = SCENE.vary(
+        foundation__skew=(0.5, 0.3), foundation__amplitude=(0.005, 0.003), foundation__ratios=(0.5,)
+    )
     body = mass_on_foundation(scene.vary(contact__points=None), press(scene).seat)
     even = mass_on_foundation(SCENE.vary(contact__points=None), press(SCENE).seat)
-    square = np.einsum("n,ni,nj->ij", even.footprint.stiffness, even.footprint.points, even.footprint.points)
+    square = np.einsum(
+        "n,ni,nj->ij", even.footprint.stiffness, even.footprint.points, even.footprint.points
+    )
     wanted = square @ np.array(scene.foundation.skew) / (scene.z_mass.width / 2)
     assert body.footprint.share @ body.footprint.points == pytest.approx(wanted, rel=0.05)
     _, result = next(motions(scene, mass_on_foundation(scene, press(scene).seat), 500))
-    assert np.abs(result.motion.velocity[:, 2]).max() > 1.0                # rad/s
+    assert np.abs(result.motion.velocity[:, 2]).max() > 1.0  # rad/s
 
 
 def test_pull_balances_mean_friction_while_the_mass_slips():
-    """A steady force is balanced by the mean friction force of the steady motion; the mass drifts along it."""
+    """A steady force is balanced by the mean friction force of the steady motion; the mass drifts
+    along it.
+    """
     body = MassOnFoundation(footprint=Footprint(np.zeros((1, 2)), np.ones(1)))
     result = steady(body, Drive(Fraction(0), pull=(2.0, 0.0)), 1000)
     assert result.reason == "periodic"
@@ -81,10 +95,15 @@ def test_pull_balances_mean_friction_while_the_mass_slips():
 def test_clusters_stay_on_the_solid(pressed):
     patch = pressed.seat.patch
     label = clusters(patch.points[:, :2], patch.area, 20)
-    centres = [np.bincount(label, patch.area * x) / np.bincount(label, patch.area) for x in patch.points[:, :2].T]
-    near = np.linalg.norm(patch.points[None, :, :2] - np.column_stack(centres)[:, None], axis=2).min(axis=1)
+    centres = [
+        np.bincount(label, patch.area * x) / np.bincount(label, patch.area)
+        for x in patch.points[:, :2].T
+    ]
+    near = np.linalg.norm(
+        patch.points[None, :, :2] - np.column_stack(centres)[:, None], axis=2
+    ).min(axis=1)
     assert label.max() == 19
-    assert near.max() < 0.005                                               # within an element of a node
+    assert near.max() < 0.005  # within an element of a node
 
 
 def test_refusals():
@@ -96,8 +115,17 @@ def test_refusals():
 
 def test_scene_drives_the_motion(tmp_path, monkeypatch):
     """``bladefem run``, without the slow picture of the mesh."""
-    monkeypatch.setattr("bladefem.view.mesh.draw_mesh", lambda _, file, title: Path(file).write_bytes(b""))
-    options = ["--set", "mesh.size=8 mm", "--set", "foundation.ratios=0.5, 1", "--set", "contact.points=10"]
+    monkeypatch.setattr(
+        "bladefem.view.mesh.draw_mesh", lambda _, file, title: Path(file).write_bytes(b"")
+    )
+    options = [
+        "--set",
+        "mesh.size=8 mm",
+        "--set",
+        "foundation.ratios=0.5, 1",
+        "--set",
+        "contact.points=10",
+    ]
     assert drives(SCENE)[1].ratio == Fraction(1, 4)
     assert main(["run", "scenes/zmass.toml", "-o", str(tmp_path), "-q", *options]) == 0
     text = (tmp_path / "motion.csv").read_text()
@@ -105,5 +133,8 @@ def test_scene_drives_the_motion(tmp_path, monkeypatch):
     assert (tmp_path / "report.html").stat().st_size > 100_000
     assert (tmp_path / "pressure.vtu").stat().st_size > 3_000
     face = read_results(tmp_path / "results.nc", "resultants").sel(load=50.0, seat="this")
-    assert float(face["normal_force"]) == pytest.approx(50.0, rel=1e-6) and face["normal_force"].attrs["units"] == "N"
+    assert (
+        float(face["normal_force"]) == pytest.approx(50.0, rel=1e-6)
+        and face["normal_force"].attrs["units"] == "N"
+    )
     assert read_results(tmp_path / "results.nc", "motion")["drift_x"].attrs["units"] == "m/s"

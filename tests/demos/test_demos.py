@@ -1,7 +1,7 @@
 """Each demo runs in its coarse setting, alone and on 2 and 4 ranks, and ends in the same number.
 
-The pinned numbers stand on gmsh 4.15.2; another mesher may move them a little, hence 0.5 % against the pin and 1e-8
-between rank counts. Remake them with: BLADEFEM_COARSE=1 ./run demos/NAME.py
+The pinned numbers stand on gmsh 4.15.2; another mesher may move them a little, hence 0.5 % against
+the pin and 1e-8 between rank counts. Remake them with: BLADEFEM_COARSE=1 ./run demos/NAME.py
 """
 
 from __future__ import annotations
@@ -26,13 +26,23 @@ PINNED = {
 
 def final_number(name: str, ranks: int) -> float:
     """The last number that a demo prints."""
-    clean = {k: v for k, v in os.environ.items() if not k.startswith(("OMPI_", "PMIX_", "PRTE_", "ORTE_"))
-             or k.startswith(("OMPI_ALLOW", "OMPI_MCA"))}
+    clean = {
+        k: v
+        for k, v in os.environ.items()
+        if not k.startswith(("OMPI_", "PMIX_", "PRTE_", "ORTE_"))
+        or k.startswith(("OMPI_ALLOW", "OMPI_MCA"))
+    }
     command = [sys.executable, f"demos/{name}.py"]
     if ranks > 1:
         command = ["mpirun", "--oversubscribe", "--bind-to", "none", "-n", str(ranks), *command]
-    done = subprocess.run(command, cwd=HERE, env={**clean, "BLADEFEM_COARSE": "1"}, capture_output=True, text=True,
-                          timeout=900)
+    done = subprocess.run(
+        command,
+        cwd=HERE,
+        env={**clean, "BLADEFEM_COARSE": "1"},
+        capture_output=True,
+        text=True,
+        timeout=900,
+    )
     assert done.returncode == 0, done.stdout[-2000:] + done.stderr[-3000:]
     return float(done.stdout.strip().splitlines()[-1].split(":")[-1])
 

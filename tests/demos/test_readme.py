@@ -14,7 +14,10 @@ CHAIN, MATRICES = re.findall(r"```python\n(.*?)```", README, re.S)
 def test_matrices_of_your_own(capsys):
     """One peak of the band; the element slips there."""
     exec(compile(MATRICES, "README.md", "exec"), {})
-    assert capsys.readouterr().out == "178.90 Hz 5.443 um, {'stick': 0, 'slip': 1, 'lift': 0, 'open': 0}\n"
+    assert (
+        capsys.readouterr().out
+        == "178.90 Hz 5.443 um, {'stick': 0, 'slip': 1, 'lift': 0, 'open': 0}\n"
+    )
     assert MATRICES.count("\n") <= 12
 
 

@@ -1,10 +1,12 @@
-"""Small structured meshes as plain arrays: boxes, ring sectors and whole rings, any element type, no mesher."""
+"""Small structured meshes as plain arrays: boxes, ring sectors and whole rings, any element type,
+no mesher.
+"""
 
 from itertools import product
 
 import numpy as np
 
-from bladefem.fem import shape
+from bladefem.fem import shape_functions as shape
 from geometry.mesh import Mesh, Pair, Sector
 
 # six tetrahedra of a cube along one diagonal; corners in gmsh's order
@@ -13,7 +15,9 @@ TWO = [(0, 1, 2), (0, 2, 3)]
 
 
 def box(divisions, size, cell_type="tetra10", body="blade", origin=None, map=None, depth=1.0):
-    """A rectangle or box [0, size] with faces x0, x1, y0, ...; ``map`` bends the corner and middle nodes (x -> x)."""
+    """A rectangle or box [0, size] with faces x0, x1, y0, ...; ``map`` bends the corner and middle
+    nodes (x -> x).
+    """
     d = len(divisions)
     cube = "hexahedron" if d == 3 else "quad"
     corner = shape.nodes(cube).astype(int)
@@ -24,14 +28,19 @@ def box(divisions, size, cell_type="tetra10", body="blade", origin=None, map=Non
     grid = []
     for cell in product(*[range(n) for n in divisions]):
         for part in parts:
-            grid.append(linear @ (corner[list(part)] + np.array(cell)))        # node places in grid units
+            grid.append(linear @ (corner[list(part)] + np.array(cell)))  # node places in grid units
     key = np.rint(2 * np.array(grid)).astype(int).reshape(-1, d)
     unique, inverse = np.unique(key, axis=0, return_inverse=True)
     cells = inverse.reshape(len(grid), len(lattice))
     points = np.zeros((len(unique), 3))
-    points[:, :d] = unique / 2 / np.array(divisions) * np.array(size) + (0 if origin is None else np.array(origin))
-    faces = {f"{'xyz'[i]}{side}": _face(cells, unique, cell_type, i, 2 * side * divisions[i])
-             for i in range(d) for side in (0, 1)}
+    points[:, :d] = unique / 2 / np.array(divisions) * np.array(size) + (
+        0 if origin is None else np.array(origin)
+    )
+    faces = {
+        f"{'xyz'[i]}{side}": _face(cells, unique, cell_type, i, 2 * side * divisions[i])
+        for i in range(d)
+        for side in (0, 1)
+    }
     points = points if map is None else map(points)
     return Mesh(points, cell_type, {body: cells}, {**faces, "clamp": faces["x0"]}, depth=depth)
 
@@ -51,10 +60,19 @@ def _face(cells, key, cell_type, axis, value):
 
 
 def _facets(cell_type):
-    return {"triangle": [(0, 1), (1, 2), (2, 0)], "quad": [(0, 1), (1, 2), (2, 3), (3, 0)],
-            "tetra": [(0, 2, 1), (0, 1, 3), (0, 3, 2), (1, 2, 3)],
-            "hexahedron": [(0, 3, 2, 1), (0, 1, 5, 4), (0, 4, 7, 3), (1, 2, 6, 5), (2, 3, 7, 6), (4, 5, 6, 7)],
-            }[shape.SHAPES[cell_type][0]]
+    return {
+        "triangle": [(0, 1), (1, 2), (2, 0)],
+        "quad": [(0, 1), (1, 2), (2, 3), (3, 0)],
+        "tetra": [(0, 2, 1), (0, 1, 3), (0, 3, 2), (1, 2, 3)],
+        "hexahedron": [
+            (0, 3, 2, 1),
+            (0, 1, 5, 4),
+            (0, 4, 7, 3),
+            (1, 2, 6, 5),
+            (2, 3, 7, 6),
+            (4, 5, 6, 7),
+        ],
+    }[shape.SHAPES[cell_type][0]]
 
 
 def turn(angle, axis=2):
@@ -74,25 +92,50 @@ def pair(mesh, master, slave, rotation, shift=(0.0, 0.0, 0.0)):
     return Pair(master, slave, np.stack([low, high[near]]), rotation, np.array(shift, float))
 
 
-def sector(count, divisions=(3, 2, 1), cell_type="tetra10", inner=0.1, outer=0.25, width=0.03, axis=2, sense=1,
-           bump=0.0, straight=False):
-    """One of ``count`` equal parts of a ring about an axis; ``bump`` makes the sector asymmetric."""
+def sector(
+    count,
+    divisions=(3, 2, 1),
+    cell_type="tetra10",
+    inner=0.1,
+    outer=0.25,
+    width=0.03,
+    axis=2,
+    sense=1,
+    bump=0.0,
+    straight=False,
+):
+    """One of ``count`` equal parts of a ring about an axis; ``bump`` makes the sector
+    asymmetric.
+    """
     theta = 2 * np.pi / count * sense
 
     def bend(x):
         r, a, z = x[:, 0], x[:, 1] * theta, x[:, 2]
         z = z * (1 + bump * np.sin(7 * r / outer) * (0.3 + np.sin(np.pi * x[:, 1]) ** 2 * x[:, 1]))
         return np.roll(np.stack([r * np.cos(a), r * np.sin(a), z], 1), axis - 2, axis=1)
+
     d = len(divisions)
-    mesh = box(divisions, (outer - inner, 1.0, width)[:d], cell_type, origin=(inner, 0.0, 0.0)[:d], map=bend)
+    mesh = box(
+        divisions,
+        (outer - inner, 1.0, width)[:d],
+        cell_type,
+        origin=(inner, 0.0, 0.0)[:d],
+        map=bend,
+    )
     if straight:
         mesh = straightened(mesh)
     faces = {**mesh.faces, "cyclic_low": mesh.faces["y0"], "cyclic_high": mesh.faces["y1"]}
     mesh = Mesh(mesh.points, cell_type, mesh.bodies, faces)
     rotation = turn(theta, axis)
     cyclic = pair(mesh, "cyclic_low", "cyclic_high", rotation)
-    return Mesh(mesh.points, cell_type, mesh.bodies, faces, pairs={"cyclic": cyclic},
-                sector=Sector(count, rotation, np.zeros(3)))
+    return Mesh(
+        mesh.points,
+        cell_type,
+        mesh.bodies,
+        faces,
+        pairs={"cyclic": cyclic},
+        sector=Sector(count, rotation, np.zeros(3)),
+    )
 
 
 def straightened(mesh):
@@ -100,17 +143,30 @@ def straightened(mesh):
     points = mesh.points.copy()
     linear, _ = shape.tabulate(shape.SHAPES[mesh.cell_type][0], shape.nodes(mesh.cell_type))
     for cells in mesh.bodies.values():
-        points[cells] = np.einsum("qk,ckg->cqg", linear, points[cells[:, :linear.shape[1]]])
-    return Mesh(points, mesh.cell_type, mesh.bodies, mesh.faces, mesh.nodes, mesh.pairs, mesh.sector, mesh.depth)
+        points[cells] = np.einsum("qk,ckg->cqg", linear, points[cells[:, : linear.shape[1]]])
+    return Mesh(
+        points,
+        mesh.cell_type,
+        mesh.bodies,
+        mesh.faces,
+        mesh.nodes,
+        mesh.pairs,
+        mesh.sector,
+        mesh.depth,
+    )
 
 
 def wheel(mesh):
-    """All sectors of a mesh joined: the full 360 degrees, and (sectors, n_points) numbers of the copies."""
+    """All sectors of a mesh joined: the full 360 degrees, and (sectors, n_points) numbers of the
+    copies.
+    """
     count, pairs = mesh.sector.count, mesh.pairs["cyclic"].nodes
     n = len(mesh.points)
     number = np.arange(count * n).reshape(count, n)
     for s in range(count):
-        number[(s + 1) % count, pairs[0]] = number[s, pairs[1]]         # the next sector's low face is my high face
+        number[(s + 1) % count, pairs[0]] = number[
+            s, pairs[1]
+        ]  # the next sector's low face is my high face
     number[0, pairs[0]] = number[count - 1, pairs[1]]
     used, dense = np.unique(number, return_inverse=True)
     dense = dense.reshape(number.shape)
@@ -118,7 +174,13 @@ def wheel(mesh):
     x = mesh.points
     for s in range(count):
         points[dense[s]] = x @ np.linalg.matrix_power(mesh.sector.rotation, s).T
-    bodies = {name: np.concatenate([dense[s][cells] for s in range(count)]) for name, cells in mesh.bodies.items()}
-    faces = {name: np.concatenate([dense[s][face] for s in range(count)]) for name, face in mesh.faces.items()
-             if not name.startswith("cyclic")}
+    bodies = {
+        name: np.concatenate([dense[s][cells] for s in range(count)])
+        for name, cells in mesh.bodies.items()
+    }
+    faces = {
+        name: np.concatenate([dense[s][face] for s in range(count)])
+        for name, face in mesh.faces.items()
+        if not name.startswith("cyclic")
+    }
     return Mesh(points, mesh.cell_type, bodies, faces), dense

@@ -9,7 +9,7 @@ from structured import box, sector
 from bladefem.fem.body import assemble
 from bladefem.fem.constraint import constrain
 from bladefem.fem.modes import modes
-from bladefem.scene import Material
+from bladefem.scene.tables import Material
 
 STEEL = Material()
 
@@ -25,22 +25,25 @@ def euler(length, height, material=STEEL):
 
 
 def timoshenko(length, height, material=STEEL):
-    """First bending frequencies of a Timoshenko cantilever [Hz], shear coefficient 10 (1 + nu) / (12 + 11 nu) (Cowper
-    1966); the characteristic determinant is scanned for roots."""
+    """First bending frequencies of a Timoshenko cantilever [Hz], shear coefficient 10 (1 + nu) /
+    (12 + 11 nu) (Cowper 1966); the characteristic determinant is scanned for roots.
+    """
     E, nu, rho = material.E, material.nu, material.rho
-    area, inertia = height, height ** 3 / 12
+    area, inertia = height, height**3 / 12
     shear = 10 * (1 + nu) / (12 + 11 * nu) * E / (2 * (1 + nu)) * area
 
     def determinant(w):
-        # (W, Theta) e^{s x}: shear (s^2 W - s Theta) + rho A w^2 W = 0 gives Theta / W, the moment balance s
-        a, b = shear * E * inertia, shear * rho * inertia * w ** 2 + E * inertia * rho * area * w ** 2
-        c = rho * area * w ** 2 * (rho * inertia * w ** 2 - shear)
+        # (W, Theta) e^{s x}: shear (s^2 W - s Theta) + rho A w^2 W = 0 gives Theta / W, the moment
+        # balance s
+        a, b = shear * E * inertia, shear * rho * inertia * w**2 + E * inertia * rho * area * w**2
+        c = rho * area * w**2 * (rho * inertia * w**2 - shear)
         s = np.sqrt(np.roots([a, b, c]).astype(complex))
         s = np.r_[s, -s]
-        theta = (shear * s ** 2 + rho * area * w ** 2) / (shear * s)
+        theta = (shear * s**2 + rho * area * w**2) / (shear * s)
         tip = np.exp(s * length)
         value = np.linalg.det(np.array([np.ones(4), theta, s * theta * tip, (s - theta) * tip]))
-        return value.real + value.imag              # one of the two is zero
+        return value.real + value.imag  # one of the two is zero
+
     out = []
     for w0 in 2 * np.pi * euler(length, height, material)[:2]:
         w = np.linspace(0.7 * w0, 1.02 * w0, 60)
@@ -55,7 +58,9 @@ def test_slender_beam_tends_to_euler():
     slender = []
     for ratio in (10, 20, 40, 80):
         mesh = box((ratio, 1), (1.0, 1.0 / ratio), "quad9", depth=0.1)
-        slender.append(abs(lowest(mesh, material=Material(nu=0.0))[0] / euler(1.0, 1.0 / ratio)[0] - 1))
+        slender.append(
+            abs(lowest(mesh, material=Material(nu=0.0))[0] / euler(1.0, 1.0 / ratio)[0] - 1)
+        )
     assert slender[-1] < 3e-4
     orders = np.log2(np.array(slender[:-1]) / slender[1:])
     assert (orders[:2] > 1.7).all()
@@ -63,16 +68,22 @@ def test_slender_beam_tends_to_euler():
 
 
 def test_stocky_beam_is_timoshenko():
-    """h/L = 1/10, nu = 0 (no Poisson effect at the clamp): two bending modes to 2e-3, the theory's own error."""
+    """h/L = 1/10, nu = 0 (no Poisson effect at the clamp): two bending modes to 2e-3, the theory's
+    own error.
+    """
     material = Material(nu=0.0)
     mesh = box((24, 3), (1.0, 0.1), "quad9")
     f = lowest(mesh, 3, material=material)
     np.testing.assert_allclose(f[:2], timoshenko(1.0, 0.1, material), rtol=2e-3)
 
 
-@pytest.mark.parametrize("cell_type, order", [("triangle", 2), ("triangle6", 4), ("quad", 2), ("quad9", 4)])
+@pytest.mark.parametrize(
+    "cell_type, order", [("triangle", 2), ("triangle6", 4), ("quad", 2), ("quad9", 4)]
+)
 def test_order_of_convergence(cell_type, order):
-    """Extension of a bar between y-rollers has the exact wave speed sqrt(E/rho) at nu = 0: error ~ h^2p."""
+    """Extension of a bar between y-rollers has the exact wave speed sqrt(E/rho) at nu = 0: error ~
+    h^2p.
+    """
     material = Material(nu=0.0)
     exact = np.sqrt(material.E / material.rho) / 4
     errors = []
@@ -85,17 +96,28 @@ def test_order_of_convergence(cell_type, order):
 
 
 def circumferential(inner, outer, material=STEEL):
-    """First frequency [Hz] of a disc turning about its axis against a clamped bore: u = J1(kr) + B Y1(kr), free rim."""
+    """First frequency [Hz] of a disc turning about its axis against a clamped bore: u = J1(kr) + B
+    Y1(kr), free rim.
+    """
+
     def rim(k):
         ratio = -jv(1, k * inner) / yv(1, k * inner)
         slope = k * (jvp(1, k * outer) + ratio * yvp(1, k * outer))
         return slope - (jv(1, k * outer) + ratio * yv(1, k * outer)) / outer
+
     k = brentq(rim, 0.3 / (outer - inner), 2.5 / (outer - inner))
     return k * np.sqrt(material.E / (2 * (1 + material.nu)) / material.rho) / (2 * np.pi)
 
 
-@pytest.mark.parametrize("cell_type, straight, order", [
-    ("triangle6", False, 4), ("triangle6", True, 2), ("triangle", False, 2), ("tetra10", False, 4)])
+@pytest.mark.parametrize(
+    "cell_type, straight, order",
+    [
+        ("triangle6", False, 4),
+        ("triangle6", True, 2),
+        ("triangle", False, 2),
+        ("tetra10", False, 4),
+    ],
+)
 def test_curved_elements_keep_their_order(cell_type, straight, order):
     """P2 on curved sides converges with h^4, on straight sides with the facets' h^2 only."""
     exact, errors = circumferential(0.1, 0.3), []

@@ -22,8 +22,12 @@ h5py.File("x", "w", driver="core", backing_store=False)["a"] = [1.0]
 def test_import_leaves_the_loader_alone():
     """dolfinx 0.5 sets RTLD_GLOBAL for good, after which h5py finds the wrong HDF5."""
     import os
-    clean = {k: v for k, v in os.environ.items() if not k.startswith(("OMPI_", "PMIX_", "PRTE_", "ORTE_"))
-             or k.startswith("OMPI_ALLOW")}
+
+    clean = {
+        k: v
+        for k, v in os.environ.items()
+        if not k.startswith(("OMPI_", "PMIX_", "PRTE_", "ORTE_")) or k.startswith("OMPI_ALLOW")
+    }
     done = subprocess.run([sys.executable, "-c", CHILD], capture_output=True, text=True, env=clean)
     assert done.returncode == 0, done.stderr
 
@@ -37,13 +41,17 @@ def test_a_dead_build_is_named(monkeypatch, tmp_path):
 
     def build():
         raise TimeoutError("JIT compilation timed out, probably due to a failed previous compile.")
-    with pytest.raises(NotSolvedError, match=r"never finished; .* libffcx|never finished; delete .*forms_1\.c$"):
+
+    with pytest.raises(
+        NotSolvedError, match=r"never finished; .* libffcx|never finished; delete .*forms_1\.c$"
+    ):
         compat._patiently(build, patience=2)
 
 
 def test_other_errors_pass():
     def build():
         raise RuntimeError("something else")
+
     with pytest.raises(RuntimeError, match="something else"):
         compat._patiently(build)
 
@@ -56,6 +64,7 @@ def test_compiling_is_silent_and_leaves_logging_alone(caplog):
         logging.getLogger().info("building 'libffcx'")
         logging.getLogger().setLevel(logging.DEBUG)
         return 1
+
     assert compat._patiently(build) == 1
     assert (root.level, list(root.handlers)) == before
     assert not caplog.records

@@ -1,4 +1,6 @@
-"""Ties, several bodies, quadrature choices: what the transformation does besides cyclic symmetry."""
+"""Ties, several bodies, quadrature choices: what the transformation does besides cyclic
+symmetry.
+"""
 
 from dataclasses import replace
 
@@ -12,7 +14,7 @@ from bladefem.fem.constraint import constrain
 from bladefem.fem.flexibility import flexible
 from bladefem.fem.linalg import factorise
 from bladefem.fem.modes import modes
-from bladefem.scene import Material
+from bladefem.scene.tables import Material
 
 STEEL = Material()
 
@@ -20,7 +22,9 @@ STEEL = Material()
 def middle_nodes(mesh, face):
     """(k, 3) middle node and its two corners of each edge of a face of tetra10."""
     triangles = mesh.faces[face]
-    edges = np.concatenate([triangles[:, [3, 0, 1]], triangles[:, [4, 1, 2]], triangles[:, [5, 2, 0]]])
+    edges = np.concatenate(
+        [triangles[:, [3, 0, 1]], triangles[:, [4, 1, 2]], triangles[:, [5, 2, 0]]]
+    )
     return edges[np.unique(edges[:, 0], return_index=True)[1]]
 
 
@@ -33,7 +37,9 @@ def test_ties_hold_and_stiffen(n):
     body = assemble(mesh, "blade", STEEL)
     tied, free = (modes(constrain(body, "clamp", n, t), 6) for t in (ties, None))
     u = tied.shapes
-    np.testing.assert_allclose(u[:, ties[:, 0]], (u[:, ties[:, 1]] + u[:, ties[:, 2]]) / 2, atol=1e-12 * abs(u).max())
+    np.testing.assert_allclose(
+        u[:, ties[:, 0]], (u[:, ties[:, 1]] + u[:, ties[:, 2]]) / 2, atol=1e-12 * abs(u).max()
+    )
     assert (tied.frequencies > free.frequencies * (1 - 1e-9)).all()
     if n is not None:
         low, high = mesh.pairs["cyclic"].nodes
@@ -50,7 +56,7 @@ def test_two_bodies_of_different_material():
     soft, hard = Material(E=1e11, nu=0.0, rho=4000.0), Material(E=2e11, nu=0.0, rho=8000.0)
     body = assemble(mesh, ("root", "tip"), {"root": hard, "tip": soft})
     f = modes(constrain(body), 12).frequencies
-    speed, ratio = 5000.0, 2.0          # same wave speed, impedances 4e7 and 2e7
+    speed, ratio = 5000.0, 2.0  # same wave speed, impedances 4e7 and 2e7
     exact = np.arctan(np.sqrt(ratio)) * speed / 0.5 / (2 * np.pi)
     assert abs(f / exact - 1).min() < 1e-5
     assert mass(body) == pytest.approx(0.05 * 0.5 * 12000)
@@ -98,7 +104,9 @@ def test_an_indefinite_matrix_says_so():
     con = constrain(assemble(box((2, 1, 1), (1.0, 1.0, 1.0)), "blade", STEEL))
     negative = con.K.duplicate(copy=True)
     negative.scale(-1.0)
-    with pytest.raises(NotSolvedError, match=r"not positive definite, MUMPS met .* negative pivots"):
+    with pytest.raises(
+        NotSolvedError, match=r"not positive definite, MUMPS met .* negative pivots"
+    ):
         factorise(negative)
 
 
@@ -111,26 +119,50 @@ def test_a_floating_sector_without_props_says_so():
 
 @pytest.mark.mpi
 def test_symmetry_planes_leave_the_symmetric_modes():
-    """Half and quarter of a bar, sliding in the cut planes, vibrate as the whole one does in its symmetric modes."""
+    """Half and quarter of a bar, sliding in the cut planes, vibrate as the whole one does in its
+    symmetric modes.
+    """
     whole = box((4, 4, 4), (1.0, 0.3, 0.2), origin=(0.0, -0.15, -0.1), cell_type="hexahedron27")
     half = box((4, 4, 2), (1.0, 0.3, 0.1), cell_type="hexahedron27", origin=(0.0, -0.15, 0.0))
     quarter = box((4, 2, 2), (1.0, 0.15, 0.1), cell_type="hexahedron27")
     half = replace(half, faces={**half.faces, "symmetry_z": half.faces["z0"]})
-    quarter = replace(quarter, faces={**quarter.faces, "symmetry_z": quarter.faces["z0"],
-                                      "symmetry_y": quarter.faces["y0"]})
-    every, plane, both = (modes(constrain(assemble(m, "blade", STEEL)), k) for m, k in
-                          ((whole, 16), (half, 6), (quarter, 2)))
-    assert abs(every.frequencies - plane.frequencies[:, None]).min(1).max() < 1e-9 * every.frequencies[-1]
-    assert abs(plane.frequencies - both.frequencies[:, None]).min(1).max() < 1e-9 * every.frequencies[-1]
+    quarter = replace(
+        quarter,
+        faces={
+            **quarter.faces,
+            "symmetry_z": quarter.faces["z0"],
+            "symmetry_y": quarter.faces["y0"],
+        },
+    )
+    every, plane, both = (
+        modes(constrain(assemble(m, "blade", STEEL)), k)
+        for m, k in ((whole, 16), (half, 6), (quarter, 2))
+    )
+    assert (
+        abs(every.frequencies - plane.frequencies[:, None]).min(1).max()
+        < 1e-9 * every.frequencies[-1]
+    )
+    assert (
+        abs(plane.frequencies - both.frequencies[:, None]).min(1).max()
+        < 1e-9 * every.frequencies[-1]
+    )
     assert abs(plane.shapes[:, np.unique(half.faces["z0"]), 2]).max() == 0
-    assert constrain(assemble(quarter, "blade", STEEL), None).T.shape[1] == both.shapes[0].size - 2 * 45
+    assert (
+        constrain(assemble(quarter, "blade", STEEL), None).T.shape[1]
+        == both.shapes[0].size - 2 * 45
+    )
 
 
 def test_an_antisymmetry_plane_leaves_the_other_modes():
     whole = box((4, 4, 4), (1.0, 0.3, 0.2), origin=(0.0, -0.15, -0.1), cell_type="hexahedron27")
     half = box((4, 4, 2), (1.0, 0.3, 0.1), cell_type="hexahedron27", origin=(0.0, -0.15, 0.0))
-    sides = [replace(half, faces={**half.faces, name: half.faces["z0"]}) for name in ("symmetry_z", "antisymmetry_z")]
-    every, even, odd = (modes(constrain(assemble(m, "blade", STEEL)), 8).frequencies for m in (whole, *sides))
+    sides = [
+        replace(half, faces={**half.faces, name: half.faces["z0"]})
+        for name in ("symmetry_z", "antisymmetry_z")
+    ]
+    every, even, odd = (
+        modes(constrain(assemble(m, "blade", STEEL)), 8).frequencies for m in (whole, *sides)
+    )
     np.testing.assert_allclose(np.sort(np.r_[even, odd])[:8], every, rtol=1e-9)
 
 
@@ -144,17 +176,28 @@ def test_a_floating_half_keeps_the_rigid_motions_in_its_plane():
 def test_symmetry_planes_that_are_none_are_refused():
     mesh = box((2, 1, 1), (1.0, 1.0, 1.0))
     with pytest.raises(InputError, match=r"symmetry_y.*extends from 0 to 1 m"):
-        constrain(assemble(replace(mesh, faces={**mesh.faces, "symmetry_y": mesh.faces["x0"]}), "blade", STEEL))
+        constrain(
+            assemble(
+                replace(mesh, faces={**mesh.faces, "symmetry_y": mesh.faces["x0"]}), "blade", STEEL
+            )
+        )
     wheel = sector(6, (2, 2, 1))
-    held = replace(wheel, faces={**wheel.faces, "symmetry_x": np.array([[wheel.points[:, 0].argmax()]])})
+    held = replace(
+        wheel, faces={**wheel.faces, "symmetry_x": np.array([[wheel.points[:, 0].argmax()]])}
+    )
     with pytest.raises(InputError, match="not across the axis"):
         constrain(assemble(held, "blade", STEEL), "clamp", 1)
 
 
 @pytest.mark.parametrize("n", [0, 1])
 def test_half_the_thickness_of_a_wheel(n):
-    whole, half = sector(6, (3, 2, 2), "hexahedron27", width=0.04), sector(6, (3, 2, 1), "hexahedron27", width=0.02)
+    whole, half = (
+        sector(6, (3, 2, 2), "hexahedron27", width=0.04),
+        sector(6, (3, 2, 1), "hexahedron27", width=0.02),
+    )
     half = replace(half, faces={**half.faces, "symmetry_z": half.faces["z0"]})
-    every, plane = (modes(constrain(assemble(m, "blade", STEEL), "clamp", n), k).frequencies
-                    for m, k in ((whole, 12), (half, 3)))
+    every, plane = (
+        modes(constrain(assemble(m, "blade", STEEL), "clamp", n), k).frequencies
+        for m, k in ((whole, 12), (half, 3))
+    )
     assert (abs(every / plane[:, None] - 1).min(1) < 1e-9).all()

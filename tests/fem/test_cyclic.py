@@ -1,4 +1,6 @@
-"""A sector in every nodal diameter against the full wheel made of its copies, and how wrong input is refused."""
+"""A sector in every nodal diameter against the full wheel made of its copies, and how wrong input
+is refused.
+"""
 
 from dataclasses import replace
 
@@ -10,7 +12,7 @@ from bladefem.errors import InputError
 from bladefem.fem.body import assemble
 from bladefem.fem.constraint import constrain, transformation
 from bladefem.fem.modes import modes
-from bladefem.scene import Material
+from bladefem.scene.tables import Material
 from geometry.mesh import Pair
 
 STEEL = Material()
@@ -30,7 +32,9 @@ def sector_frequencies(mesh, count, clamp="clamp"):
 @pytest.mark.parametrize("axis, sense", [(2, 1), (0, -1)])
 @pytest.mark.parametrize("count", [6, 7])
 def test_sector_equals_full_wheel(cell_type, axis, sense, count):
-    """64 modes, even and odd sector counts, both senses of the cut faces: same mesh, same arithmetic up to rounding."""
+    """64 modes, even and odd sector counts, both senses of the cut faces: same mesh, same
+    arithmetic up to rounding.
+    """
     mesh = sector(count, (3, 2, 1), cell_type, axis=axis, sense=sense, bump=0.2)
     whole = modes(constrain(assemble(wheel(mesh)[0], "blade", STEEL)), 64, prove=True).frequencies
     parts = sector_frequencies(mesh, 20)[:64]
@@ -66,7 +70,9 @@ def test_unmatched_faces_name_the_worst_pair():
     points = mesh.points.copy()
     points[high[3]] += [0, 0, 1e-3]
     body = assemble(replace(mesh, points=points), "blade", STEEL)
-    with pytest.raises(InputError, match=rf"nodes {low[3]} at .* and {high[3]} at .* 1.00e-03 m apart"):
+    with pytest.raises(
+        InputError, match=rf"nodes {low[3]} at .* and {high[3]} at .* 1.00e-03 m apart"
+    ):
         transformation(body, "clamp", True)
 
 
@@ -78,11 +84,14 @@ def test_missing_partner_is_refused():
         constrain(assemble(replace(mesh, pairs={"cyclic": short}), "blade", STEEL), "clamp", 1)
 
 
-@pytest.mark.parametrize("change, message", [
-    ({"clamp": "bore"}, "no face or node set 'bore'"),
-    ({"nodal_diameter": 4}, "nodal_diameter is 4, expected a whole number from 0 to 3"),
-    ({"nodal_diameter": 1.5}, "expected a whole number"),
-])
+@pytest.mark.parametrize(
+    "change, message",
+    [
+        ({"clamp": "bore"}, "no face or node set 'bore'"),
+        ({"nodal_diameter": 4}, "nodal_diameter is 4, expected a whole number from 0 to 3"),
+        ({"nodal_diameter": 1.5}, "expected a whole number"),
+    ],
+)
 def test_wrong_words_are_refused(change, message):
     body = assemble(sector(6), "blade", STEEL)
     with pytest.raises(InputError, match=message):

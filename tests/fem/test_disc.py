@@ -1,4 +1,6 @@
-"""Annular disc, clamped at the bore and free at the rim: Kirchhoff's plate, Leissa's table, order of convergence."""
+"""Annular disc, clamped at the bore and free at the rim: Kirchhoff's plate, Leissa's table, order
+of convergence.
+"""
 
 import numpy as np
 import pytest
@@ -9,19 +11,21 @@ from structured import sector
 from bladefem.fem.body import assemble
 from bladefem.fem.constraint import constrain
 from bladefem.fem.modes import modes
-from bladefem.scene import Material
+from bladefem.scene.tables import Material
 
-BORE, NU = 0.5, 0.3     # bore over the outer radius, Poisson's number
+BORE, NU = 0.5, 0.3  # bore over the outer radius, Poisson's number
 
 
 def plate(k, n, nu):
-    """Determinant of the edge conditions; k^2 = omega a^2 sqrt(rho h / D) (Leissa, NASA SP-160, 1969, eq. 2.1)."""
+    """Determinant of the edge conditions; k^2 = omega a^2 sqrt(rho h / D) (Leissa, NASA SP-160,
+    1969, eq. 2.1).
+    """
     columns = []
     for function, sign in ((jvp, -1), (yvp, -1), (ivp, 1), (kvp, 1)):
-        w = [k ** d * function(n, k, d) for d in range(3)]
-        moment = w[2] + nu * (w[1] - n ** 2 * w[0])
-        shear = sign * k ** 2 * w[1] - (1 - nu) * n ** 2 * (w[1] - w[0])
-        at_bore = [k ** d * function(n, k * BORE, d) for d in range(2)]
+        w = [k**d * function(n, k, d) for d in range(3)]
+        moment = w[2] + nu * (w[1] - n**2 * w[0])
+        shear = sign * k**2 * w[1] - (1 - nu) * n**2 * (w[1] - w[0])
+        at_bore = [k**d * function(n, k * BORE, d) for d in range(2)]
         columns.append(np.array([*at_bore, moment, shear]) / max(map(abs, (moment, shear))))
     return np.linalg.det(np.array(columns).T)
 
@@ -39,14 +43,15 @@ def solid(n, divisions, thickness=0.02, nu=NU):
     steel = Material(nu=nu)
     mesh = sector(12, (*divisions, 1), "hexahedron27", inner=BORE, outer=1.0, width=thickness)
     f = modes(constrain(assemble(mesh, "blade", steel), "clamp", n), 1).frequencies[0]
-    bending = steel.E * thickness ** 3 / (12 * (1 - nu ** 2))
+    bending = steel.E * thickness**3 / (12 * (1 - nu**2))
     return 2 * np.pi * f * np.sqrt(steel.rho * thickness / bending)
 
 
 @pytest.mark.parametrize("n, table", [(0, 13.02), (1, 13.29), (2, 14.70), (3, 18.56)])
 def test_solid_disc_is_leissas_plate(n, table):
-    """The closed form is the table's (Vogel and Skinner 1965, quoted there); the solid, 2 % as thick as its radius, is
-    within 2.1e-3: mesh above, shear and rotary inertia below."""
+    """The closed form is the table's (Vogel and Skinner 1965, quoted there); the solid, 2 % as
+    thick as its radius, is within 2.1e-3: mesh above, shear and rotary inertia below.
+    """
     thin = exact(n, NU)
     assert thin == pytest.approx(table, abs=0.005)
     assert solid(n, (16, 4)) == pytest.approx(thin, rel=3e-3)

@@ -8,8 +8,8 @@ from bladefem.errors import InputError
 from bladefem.fem.compat import MPI
 from bladefem.fem.groups import group_size, shared_out
 from bladefem.fem.memory import needed
-from bladefem.scene import Scene
-from bladefem.study.stages import Bodies, wheel_modes
+from bladefem.scene.tables import Scene
+from bladefem.study.pipeline.stages import Bodies, wheel_modes
 
 pytestmark = pytest.mark.mpi
 
@@ -22,7 +22,9 @@ def test_frequencies_do_not_depend_on_groups():
         assert [s.nodal_diameter for s in found] == [4, 0, 1, 3]
         for a, b in zip(found, alone, strict=True):
             np.testing.assert_allclose(a.frequencies, b.frequencies, rtol=1e-10)
-            np.testing.assert_allclose(a.shapes, b.shapes, atol=1e-4 * abs(b.shapes).max())     # see test_wheel
+            np.testing.assert_allclose(
+                a.shapes, b.shapes, atol=1e-4 * abs(b.shapes).max()
+            )  # see test_wheel
 
 
 def test_an_error_in_one_group_reaches_all():
@@ -30,9 +32,14 @@ def test_an_error_in_one_group_reaches_all():
         if 0 in some:
             raise InputError("the first group fails")
         return some
+
     with pytest.raises(InputError, match="the first group fails"):
         shared_out(MPI.COMM_WORLD, [0, 1, 2], 1, work)
-    assert shared_out(MPI.COMM_WORLD, [2, 0, 1], 1, lambda part, some: [10 * n for n in some]) == [20, 0, 10]
+    assert shared_out(MPI.COMM_WORLD, [2, 0, 1], 1, lambda part, some: [10 * n for n in some]) == [
+        20,
+        0,
+        10,
+    ]
 
 
 def test_groups_grow_where_memory_is_short():

@@ -11,7 +11,7 @@ from bladefem.fem.constraint import constrain
 from bladefem.fem.gyroscopic import coupling, waves
 from bladefem.fem.modes import modes
 from bladefem.fem.rotation import spinning
-from bladefem.scene import Material
+from bladefem.scene.tables import Material
 from geometry.mesh import Mesh, Sector
 
 RING = Material(E=2e11, nu=0.0, rho=8000.0)
@@ -24,12 +24,19 @@ def plane_ring(count, thickness=0.01, radius=1.0):
     def bend(x):
         r, a = x[:, 0], x[:, 1] * theta
         return np.stack([r * np.cos(a), r * np.sin(a), 0 * r], 1)
+
     mesh = box((1, 8), (thickness, 1.0), "quad9", origin=(radius - thickness / 2, 0.0), map=bend)
     faces = {"cyclic_low": mesh.faces["y0"], "cyclic_high": mesh.faces["y1"]}
     mesh = Mesh(mesh.points, "quad9", mesh.bodies, faces)
     cyclic = pair(mesh, "cyclic_low", "cyclic_high", turn(theta))
-    return Mesh(mesh.points, "quad9", mesh.bodies, faces, pairs={"cyclic": cyclic},
-                sector=Sector(count, turn(theta), np.zeros(3)))
+    return Mesh(
+        mesh.points,
+        "quad9",
+        mesh.bodies,
+        faces,
+        pairs={"cyclic": cyclic},
+        sector=Sector(count, turn(theta), np.zeros(3)),
+    )
 
 
 def first_elastic(body, n):
@@ -40,9 +47,11 @@ def first_elastic(body, n):
 @pytest.mark.parametrize("linear", [False, True])
 @pytest.mark.parametrize("n", [2, 3, 4])
 def test_waves_of_a_rotating_ring(n, linear):
-    """w = -+2 n Omega / (n^2 + 1) + sqrt(w0^2 + Omega^2 n^2 (n^2 - 1)^2 / (n^2 + 1)^2), Bryan 1890, inextensible.
+    """w = -+2 n Omega / (n^2 + 1) + sqrt(w0^2 + Omega^2 n^2 (n^2 - 1)^2 / (n^2 + 1)^2), Bryan 1890,
+    inextensible.
 
-    w0 is the ring's own at rest, so that only the rotation is compared; wall over radius is 1 %, measured 9e-5 or less.
+    w0 is the ring's own at rest, so that only the rotation is compared; wall over radius is 1 %,
+    measured 9e-5 or less.
     """
     body = assemble(plane_ring(12), "blade", RING, MPI.COMM_SELF)
     at_rest = 2 * np.pi * first_elastic(body, n).frequencies[0]
@@ -50,14 +59,16 @@ def test_waves_of_a_rotating_ring(n, linear):
     moving = spinning(body, speed, None, linear=linear)
     found = first_elastic(moving, n)
     split = waves(found, coupling(moving, found), speed)
-    mean = np.sqrt(at_rest ** 2 + (speed * n * (n ** 2 - 1) / (n ** 2 + 1)) ** 2)
-    shift = 2 * n * speed / (n ** 2 + 1)
+    mean = np.sqrt(at_rest**2 + (speed * n * (n**2 - 1) / (n**2 + 1)) ** 2)
+    shift = 2 * n * speed / (n**2 + 1)
     assert 2 * np.pi * split.forward[0] == pytest.approx(mean - shift, rel=2e-4)
     assert 2 * np.pi * split.backward[0] == pytest.approx(mean + shift, rel=2e-4)
 
 
 def test_sense_of_counting_and_standing_modes():
-    """A mirrored count of the sectors gives the same physical waves; nodal diameters 0 and N/2 do not split."""
+    """A mirrored count of the sectors gives the same physical waves; nodal diameters 0 and N/2 do
+    not split.
+    """
     found = []
     for sense in (1, -1):
         body = assemble(sector(6, (3, 2, 1), sense=sense), "blade", Material(), MPI.COMM_SELF)

@@ -1,4 +1,6 @@
-"""The iteration itself: against a dense solver, with directions that wait, and down to the last mode of a body."""
+"""The iteration itself: against a dense solver, with directions that wait, and down to the last
+mode of a body.
+"""
 
 import numpy as np
 import pytest
@@ -11,7 +13,7 @@ from bladefem.fem.constraint import constrain
 from bladefem.fem.flexibility import compliance, flexible
 from bladefem.fem.lanczos import lowest
 from bladefem.fem.linalg import apply
-from bladefem.scene import Material
+from bladefem.scene.tables import Material
 
 
 def pencil(n):
@@ -22,23 +24,35 @@ def pencil(n):
 
 @pytest.mark.parametrize("n", [0, 2])
 def test_what_is_known_already_is_not_solved_for(n):
-    """Six of ten first guesses are right to 1e-9, four to 1e-2: from the second step on blocks are narrow."""
+    """Six of ten first guesses are right to 1e-9, four to 1e-2: from the second step on blocks are
+    narrow.
+    """
     con, lam, X = pencil(n)
     wrong = np.where(np.arange(10) % 5 < 3, 1e-9, 1e-2)
-    start = np.asfortranarray(X[:, :10] + X[:, 10:60] @ np.random.default_rng(1).standard_normal((50, 10)) * wrong)
+    start = np.asfortranarray(
+        X[:, :10] + X[:, 10:60] @ np.random.default_rng(1).standard_normal((50, 10)) * wrong
+    )
     flex, widths = flexible(con), []
-    found, Y = lowest(con, lambda B: widths.append(B.shape[1]) or compliance(flex, B), start, 10, 1e-6)
+    found, Y = lowest(
+        con, lambda B: widths.append(B.shape[1]) or compliance(flex, B), start, 10, 1e-6
+    )
     np.testing.assert_allclose(found, lam[:10], rtol=1e-11)
-    np.testing.assert_allclose(abs(np.einsum("ij,ij->j", X[:, :10].conj(), apply(con.M, Y))), 1, atol=1e-10)
+    np.testing.assert_allclose(
+        abs(np.einsum("ij,ij->j", X[:, :10].conj(), apply(con.M, Y))), 1, atol=1e-10
+    )
     assert widths[0] == 10 and max(widths[1:]) <= 4
 
 
 def test_all_modes_of_a_small_body():
-    """The space is exhausted on the way: what is left then is rounding and must not come in as a direction."""
+    """The space is exhausted on the way: what is left then is rounding and must not come in as a
+    direction.
+    """
     con, lam, _ = pencil(0)
     flex = flexible(con)
     start = np.random.default_rng(2).standard_normal((len(lam), 8))
     found, _ = lowest(con, lambda B: compliance(flex, B), start, len(lam), 1e-6)
     np.testing.assert_allclose(found, lam, rtol=1e-9)
-    with pytest.raises(NotSolvedError, match=f"{len(lam) + 1} modes were asked of a body that has {len(lam)}"):
+    with pytest.raises(
+        NotSolvedError, match=f"{len(lam) + 1} modes were asked of a body that has {len(lam)}"
+    ):
         lowest(con, lambda B: compliance(flex, B), start, len(lam) + 1, 1e-6)

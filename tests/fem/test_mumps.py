@@ -9,30 +9,46 @@ from bladefem.fem.body import assemble
 from bladefem.fem.compat import MPI, PETSc
 from bladefem.fem.constraint import constrain
 from bladefem.fem.flexibility import flexible
-from bladefem.scene import Material
+from bladefem.scene.tables import Material
 
 
 @pytest.fixture(scope="module")
 def bar():
-    return constrain(assemble(box((6, 2, 2), (0.1, 0.02, 0.02)), "blade", Material(), MPI.COMM_SELF))
+    return constrain(
+        assemble(box((6, 2, 2), (0.1, 0.02, 0.02)), "blade", Material(), MPI.COMM_SELF)
+    )
 
 
 def test_out_of_memory(bar, monkeypatch):
-    """A workspace below MUMPS's own estimate: the code of a real machine without memory is among the same."""
+    """A workspace below MUMPS's own estimate: the code of a real machine without memory is among
+    the same.
+    """
     monkeypatch.setattr(mumps, "ROOM", -95)
-    with pytest.raises(NotSolvedError, match=r"memory ran out.* fewer unknowns \(INFOG\(1\) = -\d+"):
+    with pytest.raises(
+        NotSolvedError, match=r"memory ran out.* fewer unknowns \(INFOG\(1\) = -\d+"
+    ):
         flexible(bar)
 
 
-@pytest.mark.parametrize("code, words", [(-9, "memory ran out"), (-13, "memory ran out"), (-10, "singular"),
-                                         (-40, "not positive definite"), (-99, "the factorisation failed")])
+@pytest.mark.parametrize(
+    "code, words",
+    [
+        (-9, "memory ran out"),
+        (-13, "memory ran out"),
+        (-10, "singular"),
+        (-40, "not positive definite"),
+        (-99, "the factorisation failed"),
+    ],
+)
 def test_codes_in_words(code, words):
-    assert words in mumps._reason(code, 7, 1000) and f"INFOG(1) = {code}" in mumps._reason(code, 7, 1000)
+    assert words in mumps._reason(code, 7, 1000) and f"INFOG(1) = {code}" in mumps._reason(
+        code, 7, 1000
+    )
 
 
 def test_petsc_without_mumps(bar, monkeypatch):
     class Without(PETSc.PC):
-        def setFactorSetUpSolverType(self):     # what PETSc answers when the package is not there
+        def setFactorSetUpSolverType(self):  # what PETSc answers when the package is not there
             raise PETSc.Error(92)
 
     monkeypatch.setattr(mumps.PETSc, "PC", Without)

@@ -12,10 +12,16 @@ from bladefem.fem.flexibility import flexible
 from bladefem.fem.linalg import combined, dot, factorise, solve
 from bladefem.fem.modes import modes
 from bladefem.fem.ports import flexibility, port_model, port_models
-from bladefem.scene import Material
+from bladefem.scene.tables import Material
 
-CASES = [("sector", 0, "clamp"), ("sector", 1, "clamp"), ("sector", 1, None), ("sector", 0, None), ("box", None, None),
-         ("box", None, "clamp")]
+CASES = [
+    ("sector", 0, "clamp"),
+    ("sector", 1, "clamp"),
+    ("sector", 1, None),
+    ("sector", 0, None),
+    ("box", None, None),
+    ("box", None, "clamp"),
+]
 
 
 def model(kind, n, clamp):
@@ -25,18 +31,22 @@ def model(kind, n, clamp):
     nodes = np.unique(mesh.faces["x1"])[[0, 2, 5]]
     P = sp.lil_matrix((3 * len(mesh.points), 9))
     for i, node in enumerate(nodes):
-        P[3 * node:3 * node + 3, 3 * i:3 * i + 3] = np.linalg.qr(np.random.default_rng(i).normal(size=(3, 3)))[0]
+        P[3 * node : 3 * node + 3, 3 * i : 3 * i + 3] = np.linalg.qr(
+            np.random.default_rng(i).normal(size=(3, 3))
+        )[0]
     return con, P.tocsr(), {"contact": slice(0, 6), "probe": slice(6, 9)}
 
 
 def full_receptance(con, P, w):
     """P^T (K - w^2 M)^-1 P by a direct solve."""
     F = restrict(con, P).astype(con.dtype)
-    return dot(con.body.comm, F, solve(factorise(combined(con.K, -w ** 2, con.M), definite=False), F))
+    return dot(
+        con.body.comm, F, solve(factorise(combined(con.K, -(w**2), con.M), definite=False), F)
+    )
 
 
 def receptance(ports, w):
-    return (ports.shapes / (ports.omega ** 2 - w ** 2)) @ ports.shapes.conj().T + ports.residual
+    return (ports.shapes / (ports.omega**2 - w**2)) @ ports.shapes.conj().T + ports.residual
 
 
 @pytest.mark.parametrize("kind, n, clamp", CASES)
@@ -52,7 +62,9 @@ def test_all_modes_are_the_full_model(kind, n, clamp):
 def test_rubin_is_statically_exact_with_few_modes(kind, n, clamp):
     con, P, names = model(kind, n, clamp)
     ports = port_model(con, P, names, 12)
-    low = 0.001 * 2 * np.pi * modes(con, 8).frequencies[7]         # leaves (w / omega_13)^2 of the residual part
+    low = (
+        0.001 * 2 * np.pi * modes(con, 8).frequencies[7]
+    )  # leaves (w / omega_13)^2 of the residual part
     exact = full_receptance(con, P, low)
     np.testing.assert_allclose(receptance(ports, low), exact, atol=1e-8 * abs(exact).max())
     np.testing.assert_array_equal(ports.residual, ports.residual.conj().T)
@@ -64,7 +76,9 @@ def test_craig_bampton_is_statically_exact_and_complete(kind, n, clamp):
     con, P, names = model(kind, n, clamp)
     f = modes(con, 8).frequencies
     low, within = (2 * np.pi * f[7] * factor for factor in (0.001, 0.37))
-    few, all_ = (port_model(con, P, names, count, kind="craig-bampton") for count in (6, con.T.shape[1] - 9))
+    few, all_ = (
+        port_model(con, P, names, count, kind="craig-bampton") for count in (6, con.T.shape[1] - 9)
+    )
     exact = full_receptance(con, P, low)
     np.testing.assert_allclose(receptance(few, low), exact, atol=1e-7 * abs(exact).max())
     exact = full_receptance(con, P, within)
@@ -80,31 +94,45 @@ def test_static_flexibility_and_offset():
 
 
 @pytest.mark.mpi
-@pytest.mark.parametrize("kind, clamp", [("rubin", "clamp"), ("rubin", None), ("craig-bampton", "clamp")])
+@pytest.mark.parametrize(
+    "kind, clamp", [("rubin", "clamp"), ("rubin", None), ("craig-bampton", "clamp")]
+)
 def test_shared_sweep_equals_each_alone(kind, clamp):
     """Ports inside and on the cut faces, five diameters at once and one by one."""
     mesh = sector(9, (3, 2, 1), bump=0.2)
     t = transformation(assemble(mesh, "blade", Material()), clamp, True)
-    nodes = [*np.unique(mesh.faces["x1"])[[0, 3]], mesh.pairs["cyclic"].nodes[0, -1], mesh.pairs["cyclic"].nodes[1, -2]]
+    nodes = [
+        *np.unique(mesh.faces["x1"])[[0, 3]],
+        mesh.pairs["cyclic"].nodes[0, -1],
+        mesh.pairs["cyclic"].nodes[1, -2],
+    ]
     places = (3 * np.array(nodes)[:, None] + np.arange(3)).ravel()
     P = sp.csr_matrix((np.ones(12), (places, np.arange(12))), shape=(3 * len(mesh.points), 12))
     load = np.random.default_rng(1).normal(size=P.shape[0])
     together = dict(port_models(t, P, {"contact": slice(0, 12)}, 8, [0, 1, 2, 3, 4], load, kind))
     for n, a in together.items():
-        b = port_model(at_diameter(t, n), P, {"contact": slice(0, 12)}, 8, load if n == 0 else None, kind)
-        # the upper Craig-Bampton values belong to nearly dependent columns, and MUMPS on several ranks does not round
-        # alike twice (5e-10 to 2e-9 seen there): of these the eight that were asked for count, the rest by what follows
+        b = port_model(
+            at_diameter(t, n), P, {"contact": slice(0, 12)}, 8, load if n == 0 else None, kind
+        )
+        # the upper Craig-Bampton values belong to nearly dependent columns, and MUMPS on several
+        # ranks does not round alike twice (5e-10 to 2e-9 seen there): of these the eight that were
+        # asked for count, the rest by what follows
         np.testing.assert_allclose(a.omega[:8], b.omega[:8], rtol=1e-9, atol=1e-6)
-        np.testing.assert_allclose(a.residual, b.residual, atol=1e-8 * max(abs(b.residual).max(), 1e-12))
+        np.testing.assert_allclose(
+            a.residual, b.residual, atol=1e-8 * max(abs(b.residual).max(), 1e-12)
+        )
         if kind == "rubin":
             np.testing.assert_allclose(a.shapes, b.shapes, atol=1e-6 * abs(b.shapes).max())
-        else:       # eigenvectors of the small matrices have no sign or phase of their own: what they give together has
+        else:  # eigenvectors of the small matrices have no sign or phase of their own: what they give together has
             w2 = (0.3 * b.omega[0]) ** 2
             one, other = ((m.shapes / (m.omega**2 - w2)) @ m.shapes.conj().T for m in (a, b))
             np.testing.assert_allclose(one, other, atol=1e-8 * abs(other).max())
         assert (a.static_offset is None) == (n != 0)
-    np.testing.assert_allclose(together[0].static_offset, port_model(
-        at_diameter(t, 0), P, {}, 2, load).static_offset, rtol=1e-8)
+    np.testing.assert_allclose(
+        together[0].static_offset,
+        port_model(at_diameter(t, 0), P, {}, 2, load).static_offset,
+        rtol=1e-8,
+    )
 
 
 def test_props_of_a_floating_body_leave_no_trace():

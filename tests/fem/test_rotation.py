@@ -1,4 +1,6 @@
-"""Rotation against closed forms and tables: rotating cantilever (Wright 1982), ring, sector against full wheel."""
+"""Rotation against closed forms and tables: rotating cantilever (Wright 1982), ring, sector against
+full wheel.
+"""
 
 from dataclasses import replace
 
@@ -14,23 +16,43 @@ from bladefem.fem.constraint import constrain, in_step
 from bladefem.fem.flexibility import flexible
 from bladefem.fem.modes import modes
 from bladefem.fem.rotation import linear_tangent, preload, spinning, swell, tangent
-from bladefem.scene import Material
+from bladefem.scene.tables import Material
 
-# First flap of a cantilever on the axis, mu = omega sqrt(rho A L^4 / E I) over eta = Omega sqrt(rho A L^4 / E I):
-# Wright, Smith, Thresher and Wang, J. Appl. Mech. 49 (1982), doi:10.1115/1.3161966.
-WRIGHT = {0: 3.5160, 1: 3.6816, 2: 4.1373, 3: 4.7973, 4: 5.5850, 5: 6.4495, 6: 7.3604, 8: 9.2568, 10: 11.2023,
-          12: 13.1702}
+# First flap of a cantilever on the axis, mu = omega sqrt(rho A L^4 / E I) over eta = Omega sqrt(rho
+# A L^4 / E I): Wright, Smith, Thresher and Wang, J. Appl. Mech. 49 (1982), doi:10.1115/1.3161966.
+WRIGHT = {
+    0: 3.5160,
+    1: 3.6816,
+    2: 4.1373,
+    3: 4.7973,
+    4: 5.5850,
+    5: 6.4495,
+    6: 7.3604,
+    8: 9.2568,
+    10: 11.2023,
+    12: 13.1702,
+}
 BEAM = Material(E=2.1e11, nu=0.0, rho=7850.0)
-SLENDER = 0.004     # thickness over length: shear, rotary inertia and stretch stay below 3e-5 up to eta = 12
-UNIT = np.sqrt(BEAM.E * SLENDER ** 2 / 12 / BEAM.rho)      # [rad/s] of mu and eta for a length of 1 m
-# CalculiX 2.20 on the twisted blade at 300 rad/s, seven digits (benchmarks/fem_ccx_rotation.py) [Hz]
-CCX = {"linear": [153.4875, 662.0591, 1109.722, 1440.447, 2719.943, 4646.438],
-       "NLGEOM": [153.5018, 661.0102, 1107.281, 1443.117, 2718.222, 4636.246]}
+SLENDER = (
+    0.004  # thickness over length: shear, rotary inertia and stretch stay below 3e-5 up to eta = 12
+)
+UNIT = np.sqrt(BEAM.E * SLENDER**2 / 12 / BEAM.rho)  # [rad/s] of mu and eta for a length of 1 m
+# CalculiX 2.20 on the twisted blade at 300 rad/s, seven digits (benchmarks/fem_ccx_rotation.py)
+# [Hz]
+CCX = {
+    "linear": [153.4875, 662.0591, 1109.722, 1440.447, 2719.943, 4646.438],
+    "NLGEOM": [153.5018, 661.0102, 1107.281, 1443.117, 2718.222, 4636.246],
+}
 
 
 @pytest.fixture(scope="module")
 def cantilever():
-    return assemble(box((200, 1), (1.0, SLENDER), "quad9", origin=(0.0, -SLENDER / 2)), "blade", BEAM, MPI.COMM_SELF)
+    return assemble(
+        box((200, 1), (1.0, SLENDER), "quad9", origin=(0.0, -SLENDER / 2)),
+        "blade",
+        BEAM,
+        MPI.COMM_SELF,
+    )
 
 
 def first(body, **keys):
@@ -46,27 +68,39 @@ def test_flap_of_a_rotating_cantilever(cantilever, eta, linear):
 
 
 def test_lead_lag_is_softer_by_the_speed(cantilever):
-    """Motion in the plane of rotation: omega^2 = omega_flap^2 - Omega^2, but for the thickness (measured 4e-6)."""
-    flap, lag = (first(spinning(cantilever, 4 * UNIT, axis=axis)) for axis in ((0, 1, 0), (0, 0, 1)))
-    assert lag ** 2 == pytest.approx(flap ** 2 - 16, rel=2e-5)
+    """Motion in the plane of rotation: omega^2 = omega_flap^2 - Omega^2, but for the thickness
+    (measured 4e-6).
+    """
+    flap, lag = (
+        first(spinning(cantilever, 4 * UNIT, axis=axis)) for axis in ((0, 1, 0), (0, 0, 1))
+    )
+    assert lag**2 == pytest.approx(flap**2 - 16, rel=2e-5)
 
 
 @pytest.mark.parametrize("linear", [False, True])
 def test_sector_equals_full_wheel_under_rotation(linear):
-    """Same mesh, same arithmetic up to rounding and Newton's tolerance, at a speed that changes frequencies by 3 %."""
+    """Same mesh, same arithmetic up to rounding and Newton's tolerance, at a speed that changes
+    frequencies by 3 %.
+    """
     mesh = sector(5, (3, 2, 1), bump=0.2)
     part = spinning(assemble(mesh, "blade", Material()), 3000.0, linear=linear)
     whole = spinning(assemble(wheel(mesh)[0], "blade", Material()), 3000.0, linear=linear)
     every = modes(constrain(whole), 20).frequencies
-    found = np.sort(np.concatenate([np.repeat(modes(constrain(part, "clamp", n), 10).frequencies, 1 if n == 0 else 2)
-                                    for n in range(3)]))[:20]
+    found = np.sort(
+        np.concatenate(
+            [
+                np.repeat(modes(constrain(part, "clamp", n), 10).frequencies, 1 if n == 0 else 2)
+                for n in range(3)
+            ]
+        )
+    )[:20]
     np.testing.assert_allclose(found, every, rtol=1e-8)
 
 
 def test_twisted_blade_agrees_with_calculix():
     """Measured 3.6e-7 and 2.4e-6; the two kinds of preload differ by up to 2.2e-3."""
     body = assemble(twisted(), "blade", Material(), MPI.COMM_SELF, quadrature="ccx")
-    u0 = 300.0 ** 2 * swell(flexible(in_step(body)))
+    u0 = 300.0**2 * swell(flexible(in_step(body)))
     linear = replace(body, K=linear_tangent(body, u0, 300.0, quadrature="ccx"))
     np.testing.assert_allclose(modes(constrain(linear), 6).frequencies, CCX["linear"], rtol=1e-6)
     exact = replace(body, K=tangent(body, preload(body, 300.0, quadrature="ccx"), quadrature="ccx"))
@@ -76,8 +110,10 @@ def test_twisted_blade_agrees_with_calculix():
 def test_linear_preload_is_close_to_the_nonlinear_one():
     """They agree on what the speed adds within 3 % on a straight sector (measured 0.9 %)."""
     body = assemble(sector(6, (3, 2, 1), bump=0.2), "blade", Material())
-    still, exact, linear = (modes(constrain(b, "clamp", 2), 1).frequencies[0]
-                            for b in (body, spinning(body, 3000.0), spinning(body, 3000.0, linear=True)))
+    still, exact, linear = (
+        modes(constrain(b, "clamp", 2), 1).frequencies[0]
+        for b in (body, spinning(body, 3000.0), spinning(body, 3000.0, linear=True))
+    )
     assert linear - still == pytest.approx(exact - still, rel=0.03)
 
 
@@ -95,9 +131,13 @@ def test_swell_of_a_thin_ring():
     radial = np.einsum("ni,ni->n", u1[:, :2], mesh.points[:, :2]) / np.hypot(*mesh.points[:, :2].T)
     assert radial.mean() == pytest.approx(ring.rho / ring.E, rel=1e-4)
     large = preload(body, 1000.0, None).displacement
-    strain = ring.rho * 1e6 / ring.E        # Saint Venant-Kirchhoff ring: e (1 + e/2) (1 + e) = strain (1 + e)
+    strain = (
+        ring.rho * 1e6 / ring.E
+    )  # Saint Venant-Kirchhoff ring: e (1 + e/2) (1 + e) = strain (1 + e)
     stretch = np.sqrt(1 + 2 * strain) - 1
-    radial = np.einsum("ni,ni->n", large[:, :2], mesh.points[:, :2]) / np.hypot(*mesh.points[:, :2].T)
+    radial = np.einsum("ni,ni->n", large[:, :2], mesh.points[:, :2]) / np.hypot(
+        *mesh.points[:, :2].T
+    )
     assert radial.mean() == pytest.approx(stretch, rel=2e-4)
 
 
@@ -107,7 +147,7 @@ def test_wrong_speeds_and_states_without_equilibrium():
         preload(body, -1.0)
     with pytest.raises(InputError, match="speed is nan"):
         spinning(body, np.nan)
-    for speed in (20.0, 100.0):         # pushed towards its clamp until it collapses, or turns inside out
+    for speed in (20.0, 100.0):  # pushed towards its clamp until it collapses, or turns inside out
         with pytest.raises(NotSolvedError, match="of the speed"):
             preload(body, speed, "x1")
     assert spinning(body, 0.0) is body

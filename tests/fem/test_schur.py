@@ -6,17 +6,20 @@ import numpy as np
 import pytest
 from structured import sector
 
-from bladefem.fem import core, ordering
+from bladefem.fem import cyclic_schur as core
+from bladefem.fem import ordering
 from bladefem.fem.body import assemble
 from bladefem.fem.constraint import at_diameter, transformation
 from bladefem.fem.flexibility import flexible
 from bladefem.fem.modes import modes
 from bladefem.fem.schur import through
-from bladefem.scene import Material
+from bladefem.scene.tables import Material
 
 
 def opened(divisions=(4, 3, 1)):
-    return transformation(assemble(sector(8, divisions, bump=0.2), "blade", Material()), "clamp", True)
+    return transformation(
+        assemble(sector(8, divisions, bump=0.2), "blade", Material()), "clamp", True
+    )
 
 
 @pytest.mark.parametrize("n", [0, 1, 4])
@@ -38,6 +41,7 @@ def test_what_the_answer_raises_comes_through(error):
 
     def fails(r):
         raise error("on purpose")
+
     B = np.ones((made.factor.matrix.size[0], 1))
     with pytest.raises(error, match="on purpose"):
         through(made, B, fails)
@@ -45,12 +49,15 @@ def test_what_the_answer_raises_comes_through(error):
 
 
 def test_a_signal_waits_for_the_end_of_the_sweep():
-    """Its handler must not raise at the entry of the call back, where nothing can catch it; here it would at once."""
+    """Its handler must not raise at the entry of the call back, where nothing can catch it; here it
+    would at once.
+    """
     made = opened().opened.core.bridge
     B, done = np.ones((made.factor.matrix.size[0], 1)), []
 
     def stop(*_):
         raise KeyboardInterrupt
+
     before = signal.signal(signal.SIGTERM, stop)
     try:
         with pytest.raises(KeyboardInterrupt):
@@ -62,7 +69,9 @@ def test_a_signal_waits_for_the_end_of_the_sweep():
 
 
 def test_given_order_gives_the_same_modes(monkeypatch):
-    """Nested dissection puts the interior first, is taken by MUMPS (ordering 1), and changes nothing else."""
+    """Nested dissection puts the interior first, is taken by MUMPS (ordering 1), and changes
+    nothing else.
+    """
     own = opened()
     monkeypatch.setattr(ordering, "WORTHWHILE", 0)
     given = opened()

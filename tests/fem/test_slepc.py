@@ -9,7 +9,7 @@ from bladefem.fem.compat import SLEPc
 from bladefem.fem.constraint import at_diameter, transformation
 from bladefem.fem.linalg import Doubled
 from bladefem.fem.modes import modes
-from bladefem.scene import Material
+from bladefem.scene.tables import Material
 
 
 def slepc_frequencies(con, count):
@@ -29,14 +29,18 @@ def slepc_frequencies(con, count):
     solver.getPC().setType("cholesky")
     solver.getPC().setFactorSolverType("mumps")
     eps.solve()
-    return np.sqrt(np.sort([eps.getEigenvalue(i).real for i in range(eps.getConverged())])) / (2 * np.pi)
+    return np.sqrt(np.sort([eps.getEigenvalue(i).real for i in range(eps.getConverged())])) / (
+        2 * np.pi
+    )
 
 
 @pytest.mark.mpi
 @pytest.mark.parametrize("n", [0, 1, 3])
 def test_same_frequencies(n):
     """Each frequency of the doubled pencil comes once or twice; as a set they are ours."""
-    t = transformation(assemble(sector(6, (3, 2, 1), bump=0.2), "blade", Material()), "clamp", True, one_core=False)
+    t = transformation(
+        assemble(sector(6, (3, 2, 1), bump=0.2), "blade", Material()), "clamp", True, one_core=False
+    )
     con = at_diameter(t, n)
     ours, theirs = modes(con, 10).frequencies, slepc_frequencies(con, 24)
     for f in ours:

@@ -5,12 +5,12 @@ import pytest
 from structured import sector
 
 from bladefem.errors import InputError, NotSolvedError
-from bladefem.fem import wheel
+from bladefem.fem import all_diameters as wheel
+from bladefem.fem.all_diameters import all_diameters, eigenpairs
 from bladefem.fem.body import assemble
 from bladefem.fem.constraint import transformation
 from bladefem.fem.modes import count_below
-from bladefem.fem.wheel import all_diameters, eigenpairs
-from bladefem.scene import Material
+from bladefem.scene.tables import Material
 
 
 @pytest.mark.mpi
@@ -23,7 +23,9 @@ def test_warm_start_equals_direct(count, clamp):
     assert [m.nodal_diameter for m in warm] == list(range(count // 2 + 1))
     for a, b in zip(warm, cold, strict=True):
         np.testing.assert_allclose(a.frequencies, b.frequencies, rtol=1e-10)
-        np.testing.assert_allclose(a.shapes, b.shapes, atol=1e-4 * abs(b.shapes).max())     # 5e-6 over relative gaps
+        np.testing.assert_allclose(
+            a.shapes, b.shapes, atol=1e-4 * abs(b.shapes).max()
+        )  # 5e-6 over relative gaps
         assert max(a.residuals.max(), b.residuals.max()) < 5e-5
 
 
@@ -31,7 +33,10 @@ def test_warm_start_equals_direct(count, clamp):
 def test_one_core_equals_three_matrices():
     """The interior eliminated once, and the doubled pencil of each diameter."""
     body = assemble(sector(9, (3, 2, 1), bump=0.2), "blade", Material())
-    one, three = (all_diameters(transformation(body, "clamp", True, one_core=flag), 7) for flag in (None, False))
+    one, three = (
+        all_diameters(transformation(body, "clamp", True, one_core=flag), 7)
+        for flag in (None, False)
+    )
     for a, b in zip(one, three, strict=True):
         np.testing.assert_allclose(a.frequencies, b.frequencies, rtol=1e-10)
 

@@ -1,4 +1,6 @@
-"""Random elements and periodic motions, finite differences, and slow independent twins of the kernels."""
+"""Random elements and periodic motions, finite differences, and slow independent twins of the
+kernels.
+"""
 
 from __future__ import annotations
 
@@ -13,16 +15,25 @@ def decay(H: int) -> np.ndarray:
     return 1 / np.r_[1, np.repeat(np.arange(1, H + 1), 2)]
 
 
-def random_case(seed: int, n: int, H: int, tangents: int, kn: float = 1.0) -> tuple[Elements, np.ndarray]:
+def random_case(
+    seed: int, n: int, H: int, tangents: int, kn: float = 1.0
+) -> tuple[Elements, np.ndarray]:
     """n elements with stick, slip, lift-off and initial gaps among them."""
     rng = np.random.default_rng(seed)
     w = rng.normal(size=(n, 1 + tangents, 2 * H + 1)) * decay(H)
-    elements = Elements(kt=rng.uniform(0.5, 3, n), kn=kn * rng.uniform(0.5, 2, n), mu=rng.uniform(0.1, 0.8, n),
-                        n0=rng.uniform(-1, 4, n), tangents=tangents)
+    elements = Elements(
+        kt=rng.uniform(0.5, 3, n),
+        kn=kn * rng.uniform(0.5, 2, n),
+        mu=rng.uniform(0.1, 0.8, n),
+        n0=rng.uniform(-1, 4, n),
+        tangents=tangents,
+    )
     return elements, w
 
 
-def single(kt: float = 1.0, kn: float = 0.0, mu: float = 1.0, n0: float = 1.0, tangents: int = 1) -> Elements:
+def single(
+    kt: float = 1.0, kn: float = 0.0, mu: float = 1.0, n0: float = 1.0, tangents: int = 1
+) -> Elements:
     """One element."""
     return Elements(*(np.array([float(x)]) for x in (kt, kn, mu, n0)), tangents=tangents)
 
@@ -51,15 +62,21 @@ def coefficients(f: np.ndarray, H: int) -> np.ndarray:
     """(..., 2H+1) harmonics of samples (..., S) by the fast transform."""
     F = np.fft.rfft(f) / f.shape[-1]
     c = np.empty((*f.shape[:-1], 2 * H + 1))
-    c[..., 0], c[..., 1::2], c[..., 2::2] = F[..., 0].real, 2 * F[..., 1:H + 1].real, -2 * F[..., 1:H + 1].imag
+    c[..., 0], c[..., 1::2], c[..., 2::2] = (
+        F[..., 0].real,
+        2 * F[..., 1 : H + 1].real,
+        -2 * F[..., 1 : H + 1].imag,
+    )
     return c
 
 
 def plain_jenkins(kt, kn, mu, n0, w: np.ndarray, samples: int, periods: int = 3) -> np.ndarray:
-    """(2, K) twin of the sampled 1-D element: the return map, sample after sample, for several periods."""
+    """(2, K) twin of the sampled 1-D element: the return map, sample after sample, for several
+    periods.
+    """
     tau = 2 * np.pi * np.arange(samples) / samples
     g, N = kt * motion(w[1], tau), n0 + kn * motion(w[0], tau)
-    clamp = lambda x, limit: min(max(x, -limit), limit)     # noqa: E731
+    clamp = lambda x, limit: min(max(x, -limit), limit)  # noqa: E731
     f = clamp(g[-1], mu * max(N[-1], 0))
     out = np.empty(samples)
     for _ in range(periods):
@@ -71,9 +88,14 @@ def plain_jenkins(kt, kn, mu, n0, w: np.ndarray, samples: int, periods: int = 3)
 
 
 def radial_return(kt, mu, N: np.ndarray, w: np.ndarray, periods: int = 3) -> np.ndarray:
-    """Force (2, S) of the last period by plain radial return, w (2, S) [m], N (S,) [N]: first order in the step."""
+    """Force (2, S) of the last period by plain radial return, w (2, S) [m], N (S,) [N]: first order
+    in the step.
+    """
     S = w.shape[1]
-    f, out = kt * w[:, -1] * min(1, mu * N[-1] / max(np.hypot(*(kt * w[:, -1])), 1e-300)), np.empty((2, S))
+    f, out = (
+        kt * w[:, -1] * min(1, mu * N[-1] / max(np.hypot(*(kt * w[:, -1])), 1e-300)),
+        np.empty((2, S)),
+    )
     dw = kt * (w - np.roll(w, 1, axis=1))
     fx, fy = f
     for _ in range(periods):
@@ -87,7 +109,9 @@ def radial_return(kt, mu, N: np.ndarray, w: np.ndarray, periods: int = 3) -> np.
 
 
 def event_driven(kt, kn, mu, n0, w: np.ndarray) -> np.ndarray:
-    """(2, K) harmonics of a 1-D element by events bracketed on a fine grid, Brent's roots and Gauss quadrature."""
+    """(2, K) harmonics of a 1-D element by events bracketed on a fine grid, Brent's roots and Gauss
+    quadrature.
+    """
     H = len(w[0]) // 2
     g, N = (lambda t: kt * motion(w[1], t)), (lambda t: n0 + kn * motion(w[0], t))
     ramp = _derivative(w[1]) * kt, _derivative(w[0]) * kn
@@ -96,12 +120,16 @@ def event_driven(kt, kn, mu, n0, w: np.ndarray) -> np.ndarray:
     state, offset = ("gap", 0.0) if N(0.0) <= 0 else ("stick", 0.0)
     if state == "stick" and abs(g(0.0)) > mu * N(0.0):
         s = np.sign(g(0.0))
-        state, offset = (("slip", s) if s * dg(0.0) > mu * dN(0.0) else ("stick", g(0.0) - s * mu * N(0.0)))
+        state, offset = (
+            ("slip", s) if s * dg(0.0) > mu * dN(0.0) else ("stick", g(0.0) - s * mu * N(0.0))
+        )
     for _ in range(2):
         pieces, a = [], 0.0
         while a < 2 * np.pi:
             exits = _exits(state, offset, g, N, dg, dN, mu)
-            b, hit = min(((_first(e, a, grid), i) for i, e in enumerate(exits)), default=(np.inf, 0))
+            b, hit = min(
+                ((_first(e, a, grid), i) for i, e in enumerate(exits)), default=(np.inf, 0)
+            )
             pieces.append((a, min(b, 2 * np.pi), state, offset))
             if b >= 2 * np.pi:
                 break
@@ -117,7 +145,9 @@ def event_driven(kt, kn, mu, n0, w: np.ndarray) -> np.ndarray:
             f = g(t) - x if kind == "stick" else x * mu * N(t)
             for k in range(2 * H + 1):
                 h = (k + 1) // 2
-                basis = np.full_like(t, 0.5) if k == 0 else np.cos(h * t) if k % 2 else np.sin(h * t)
+                basis = (
+                    np.full_like(t, 0.5) if k == 0 else np.cos(h * t) if k % 2 else np.sin(h * t)
+                )
                 out[0, k] += 0.5 * (v - u) / np.pi * (weights * N(t) * basis).sum()
                 out[1, k] += 0.5 * (v - u) / np.pi * (weights * f * basis).sum()
     return out
@@ -131,7 +161,9 @@ def _derivative(c: np.ndarray) -> np.ndarray:
 
 
 def _exits(state, x, g, N, dg, dN, mu):
-    """Functions that rise through zero where the state ends; the first is always separation, save in a gap."""
+    """Functions that rise through zero where the state ends; the first is always separation, save
+    in a gap.
+    """
     if state == "gap":
         return [N]
     if state == "slip":

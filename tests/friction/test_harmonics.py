@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 from bladefem.errors import InputError
-from bladefem.friction.harmonics import analysis, derivative, synthesis, times, to_complex, to_real
-from bladefem.friction.tables import empty_gram, gram, tables, weighted
+from bladefem.friction.fourier import analysis, derivative, synthesis, times, to_complex, to_real
+from bladefem.friction.trigonometric_tables import empty_gram, gram, tables, weighted
 
 
 def test_complex_amplitudes_and_back():
@@ -47,7 +47,9 @@ def test_gram_of_a_set_is_analysis_of_synthesis_on_it():
 
 def test_knots_have_the_samples_in_the_middle_of_their_edges():
     tab = tables(3, 20)
-    np.testing.assert_allclose(0.5 * (tab.knots + np.roll(tab.knots, -1, axis=0)), tab.at, atol=1e-15)
+    np.testing.assert_allclose(
+        0.5 * (tab.knots + np.roll(tab.knots, -1, axis=0)), tab.at, atol=1e-15
+    )
 
 
 def test_too_few_samples_and_odd_shapes_are_refused():

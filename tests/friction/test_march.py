@@ -1,4 +1,6 @@
-"""The integrators' steps against the periodic kernels, on bodies too heavy to move, and the limit of explicit steps."""
+"""The integrators' steps against the periodic kernels, on bodies too heavy to move, and the limit
+of explicit steps.
+"""
 
 from __future__ import annotations
 
@@ -13,23 +15,25 @@ from bladefem.damper.zmass import Footprint, MassOnFoundation, march
 from bladefem.data import Elements
 from bladefem.errors import InputError
 from bladefem.friction.aft import evaluate
-from bladefem.friction.events import evaluate_exact
-from bladefem.friction.harmonics import synthesis
-from bladefem.friction.march import stable_step, step_1d, step_2d
-from bladefem.hbm.flow import rest
-from bladefem.hbm.system import damper_on_platforms
+from bladefem.friction.fourier import synthesis
+from bladefem.friction.kernel_1d_exact import evaluate_exact
+from bladefem.friction.time_step import stable_step, step_1d, step_2d
+from bladefem.time.event_integrator import rest
+from bladefem.time.system import damper_on_platforms
 
 HEAVY = 1e12
 
 
 def test_explicit_march_reaches_the_exact_harmonics():
-    """Sixty elements under their own motions and loads, with stick, slip, gaps and lift-off; second order."""
+    """Sixty elements under their own motions and loads, with stick, slip, gaps and lift-off; second
+    order.
+    """
     elements, w = random_case(0, 60, 2, 1)
     system = damper_on_platforms(np.zeros((60, 3)), elements, HEAVY)
     load = elements.kn[:, None] * w[:, 0]
     load[:, 0] += elements.n0
     system, exact = replace(system, drive=w[:, 1], normal=load), evaluate_exact(elements, w)
-    slips = exact.shares[:, 1] > 0.05           # what sticks keeps the static force of its start
+    slips = exact.shares[:, 1] > 0.05  # what sticks keeps the static force of its start
     assert (exact.shares[slips, 2] > 0).sum() > 10
     errors = []
     for steps in (256, 1024):
@@ -40,14 +44,21 @@ def test_explicit_march_reaches_the_exact_harmonics():
     assert np.log2(errors[0] / errors[1]) / 2 > 1.5
 
 
-def heavy_mass(elements: Elements, w: np.ndarray, e: int, samples: int, periods: int = 4) -> np.ndarray:
+def heavy_mass(
+    elements: Elements, w: np.ndarray, e: int, samples: int, periods: int = 4
+) -> np.ndarray:
     """(2, 2H+1) friction harmonics of element e as the only foot of a mass that stands still."""
     T = synthesis(w.shape[2] // 2, samples)
-    body = MassOnFoundation(HEAVY, HEAVY, elements.mu[e], elements.kt[e], Footprint(np.zeros((1, 2)), np.ones(1)))
+    body = MassOnFoundation(
+        HEAVY, HEAVY, elements.mu[e], elements.kt[e], Footprint(np.zeros((1, 2)), np.ones(1))
+    )
     instants = np.arange(periods * samples + 1) % samples
-    base, load = (w[e, 1:] @ T.T).T[instants], (elements.n0[e] + elements.kn[e] * (T @ w[e, 0]))[instants]
+    base, load = (
+        (w[e, 1:] @ T.T).T[instants],
+        (elements.n0[e] + elements.kn[e] * (T @ w[e, 0]))[instants],
+    )
     force = march(body, base, load, 1.0).force[-samples:, :2]
-    return coefficients(np.roll(force, 1, axis=0).T, w.shape[2] // 2)       # the last row is at tau = 0
+    return coefficients(np.roll(force, 1, axis=0).T, w.shape[2] // 2)  # the last row is at tau = 0
 
 
 def test_mass_on_its_foundation_reaches_the_periodic_harmonics():
@@ -64,17 +75,19 @@ def test_a_node_that_closes_within_the_step_is_stretched_from_the_contact_on():
     assert step_2d(0.0, 0.0, 0.8, 0.4, -1.0, 3.0, 1.0)[:2] == pytest.approx((0.6, 0.3))
     assert step_1d(8.0, -1.0, 3.0, 0.5) == pytest.approx(1.5)
     assert step_1d(8.0, 1.0, 0.0, 0.5) == 0.0
-    assert step_2d(0.0, 0.0, 8.0, 0.0, 1.0, 1.0, 0.0) == (0.0, 0.0, 0.0)     # no friction
+    assert step_2d(0.0, 0.0, 8.0, 0.0, 1.0, 1.0, 0.0) == (0.0, 0.0, 0.0)  # no friction
 
 
 def test_the_longest_explicit_step():
-    """Central differences of m x'' + 2 k x = 0 stay bounded just below 2 / sqrt(2 k / m) and blow up just above."""
+    """Central differences of m x'' + 2 k x = 0 stay bounded just below 2 / sqrt(2 k / m) and blow
+    up just above.
+    """
     m, k = 0.005, 1e8
     for factor, grows in ((0.999, False), (1.001, True)):
         dt = factor * stable_step(np.sqrt(2 * k / m))
         x = [1.0, 1.0]
         for _ in range(2000):
-            x.append(2 * x[-1] - x[-2] - dt ** 2 * 2 * k / m * x[-1])
+            x.append(2 * x[-1] - x[-2] - dt**2 * 2 * k / m * x[-1])
         assert (np.abs(x).max() > 1e6) == grows
     assert stable_step(0.0) == np.inf
     with pytest.raises(InputError, match="not negative"):

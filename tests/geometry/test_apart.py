@@ -1,4 +1,6 @@
-"""Builds in a process of their own: the same mesh, the same words, and no crash, no ranks, no silence."""
+"""Builds in a process of their own: the same mesh, the same words, and no crash, no ranks, no
+silence.
+"""
 
 import os
 from types import SimpleNamespace
@@ -7,9 +9,10 @@ import numpy as np
 import pytest
 
 from bladefem.errors import InputError
-from geometry import apart, build
-from geometry.dispatch import build_here
-from geometry.finish import refuse_flat
+from geometry import build
+from geometry import isolated_process as apart
+from geometry.builders import build_here
+from geometry.finalise_mesh import refuse_flat
 from geometry.mesh import Mesh
 from geometry.parameters import MeshSize, Punch
 
@@ -44,7 +47,9 @@ def test_a_refusal_keeps_its_words():
 
 
 def test_a_crash_is_tried_again_and_then_becomes_a_sentence():
-    with pytest.raises(InputError, match=r"mesh\.size: gmsh crashed \(signal 6\).*change mesh\.size") as caught:
+    with pytest.raises(
+        InputError, match=r"mesh\.size: gmsh crashed \(signal 6\).*change mesh\.size"
+    ) as caught:
         build(SimpleNamespace(**vars(SCENE) | {"punch": Abort()}))
     assert "\n" not in str(caught.value)
 
@@ -58,7 +63,10 @@ def test_the_second_try_takes_the_other_algorithm_and_smaller_elements(monkeypat
 
     monkeypatch.setattr(apart, "_ask", ask)
     assert isinstance(apart.build_apart(SCENE), Mesh)
-    assert [(m.algorithm, m.size) for m in asked] == [("hxt", 6e-3), ("delaunay", pytest.approx(5.4e-3))]
+    assert [(m.algorithm, m.size) for m in asked] == [
+        ("hxt", 6e-3),
+        ("delaunay", pytest.approx(5.4e-3)),
+    ]
 
 
 def test_a_mistake_in_the_child_is_not_hidden():

@@ -1,4 +1,6 @@
-"""Users' own files: the same mesh back from every format, and clear words when something is missing."""
+"""Users' own files: the same mesh back from every format, and clear words when something is
+missing.
+"""
 
 from dataclasses import replace
 
@@ -8,11 +10,11 @@ import pytest
 from structured import box, sector
 from writers import write_cdb, write_inp, write_step
 
-from bladefem.contact.seat import seat
-from bladefem.contact.summary import resultant
+from bladefem.contact.resultants import resultant
+from bladefem.contact.seating import seat
 from bladefem.errors import InputError
 from bladefem.fem.loads import volume
-from bladefem.scene import Materials
+from bladefem.scene.tables import Materials
 from geometry.export import write_msh
 from geometry.imported import read_mesh
 from geometry.parameters import Disc, MeshSize, Plane
@@ -28,10 +30,14 @@ def same(found, mesh, tolerance=1e-12):
     for name, pair in mesh.pairs.items():
         assert found.pairs[name].nodes.shape == pair.nodes.shape
         np.testing.assert_allclose(found.pairs[name].rotation, pair.rotation, atol=1e-12)
-    assert {n: c.shape for n, c in found.bodies.items()} == {n: c.shape for n, c in mesh.bodies.items()}
+    assert {n: c.shape for n, c in found.bodies.items()} == {
+        n: c.shape for n, c in mesh.bodies.items()
+    }
     order, other = (np.lexsort(np.round(m.points, 9).T) for m in (found, mesh))
     np.testing.assert_allclose(found.points[order], mesh.points[other], atol=tolerance)
-    assert found.report["min scaled jacobian"] == pytest.approx(mesh.report["min scaled jacobian"], rel=1e-6)
+    assert found.report["min scaled jacobian"] == pytest.approx(
+        mesh.report["min scaled jacobian"], rel=1e-6
+    )
 
 
 @pytest.mark.parametrize("version, binary", [(2.2, False), (4.1, False), (4.1, True)])
@@ -39,9 +45,13 @@ def test_msh(coarse_sector, tmp_path, version, binary):
     write_msh(coarse_sector, tmp_path / "a.msh", version, binary)
     found = read_mesh(tmp_path / "a.msh", sectors=36)
     same(found, coarse_sector)
-    assert {n: f.shape for n, f in found.faces.items()} == {n: f.shape for n, f in coarse_sector.faces.items()}
+    assert {n: f.shape for n, f in found.faces.items()} == {
+        n: f.shape for n, f in coarse_sector.faces.items()
+    }
     for name, nodes in coarse_sector.nodes.items():
-        np.testing.assert_allclose(found.points[found.nodes[name]], coarse_sector.points[nodes], atol=1e-12)
+        np.testing.assert_allclose(
+            found.points[found.nodes[name]], coarse_sector.points[nodes], atol=1e-12
+        )
 
 
 @pytest.mark.parametrize("suffix, write", [("inp", write_inp), ("cdb", write_cdb)])
@@ -52,22 +62,30 @@ def test_abaqus_and_ansys(coarse_sector, tmp_path, suffix, write):
 
 def test_unit_axis_and_sense(coarse_sector, tmp_path):
     """A file in millimetres, engine axis along x, cyclic names the other way round."""
-    swapped = {**coarse_sector.faces, "cyclic_low": coarse_sector.faces["cyclic_high"],
-               "cyclic_high": coarse_sector.faces["cyclic_low"]}
+    swapped = {
+        **coarse_sector.faces,
+        "cyclic_low": coarse_sector.faces["cyclic_high"],
+        "cyclic_high": coarse_sector.faces["cyclic_low"],
+    }
     turned = 1e3 * coarse_sector.points[:, [2, 0, 1]]
     write_msh(replace(coarse_sector, points=turned, faces=swapped), tmp_path / "a.msh")
     found = read_mesh(tmp_path / "a.msh", 1e-3, 36, (1, 0, 0))
     pair = found.pairs["cyclic"]
-    np.testing.assert_allclose(found.points[pair.nodes[1]], found.points[pair.nodes[0]] @ pair.rotation.T, atol=1e-14)
+    np.testing.assert_allclose(
+        found.points[pair.nodes[1]], found.points[pair.nodes[0]] @ pair.rotation.T, atol=1e-14
+    )
     middle = found.points[np.unique(found.bodies["blade"])].mean(axis=0)
     assert middle[0] > 0.2 and abs(middle[1]) < 0.01
 
 
 def test_missing_group_is_named(coarse_sector, tmp_path):
     faces = {n: f for n, f in coarse_sector.faces.items() if n != "cyclic_high"} | {
-        "cyclic_hihg": coarse_sector.faces["cyclic_high"]}
+        "cyclic_hihg": coarse_sector.faces["cyclic_high"]
+    }
     write_msh(replace(coarse_sector, faces=faces), tmp_path / "a.msh")
-    with pytest.raises(InputError, match=r"no face group 'cyclic_high'.*did you mean 'cyclic_hihg'"):
+    with pytest.raises(
+        InputError, match=r"no face group 'cyclic_high'.*did you mean 'cyclic_hihg'"
+    ):
         read_mesh(tmp_path / "a.msh", sectors=36)
 
 
@@ -78,11 +96,15 @@ def test_contact_faces_of_a_wheel_need_the_number_of_sectors(coarse_sector, tmp_
 
 
 def test_seats_with_other_nodes_than_the_damper(coarse_sector, tmp_path):
-    """A damper meshed on its own: the pairs have no matched nodes, the seating by mortar carries the same loads."""
+    """A damper meshed on its own: the pairs have no matched nodes, the seating by mortar carries
+    the same loads.
+    """
     body = np.unique(coarse_sector.bodies["damper"])
     points, z = coarse_sector.points.copy(), coarse_sector.points[body, 2]
     half = np.ptp(z) / 2
-    points[body, 2] += 0.08 * half * np.sin(np.pi * (z - z.mean()) / half)     # along the flanks, ends in place
+    points[body, 2] += (
+        0.08 * half * np.sin(np.pi * (z - z.mean()) / half)
+    )  # along the flanks, ends in place
     write_msh(replace(coarse_sector, points=points), tmp_path / "a.msh")
     found = read_mesh(tmp_path / "a.msh", sectors=36)
     assert all(found.pairs[name].nodes.shape == (2, 0) for name in ("this", "next"))
@@ -90,7 +112,9 @@ def test_seats_with_other_nodes_than_the_damper(coarse_sector, tmp_path):
     ours, theirs = (seat(mesh, Materials(), 838.0, normal=100.0) for mesh in (found, coarse_sector))
     for a, b in zip(ours, theirs, strict=True):
         assert a.force.sum() == pytest.approx(100.0, rel=1e-9) and a.complementarity < 1e-9
-        assert a.patch.area.sum() == pytest.approx(b.patch.area.sum(), rel=1e-4)    # slivers of the overlap
+        assert a.patch.area.sum() == pytest.approx(
+            b.patch.area.sum(), rel=1e-4
+        )  # slivers of the overlap
         for one, other in zip(resultant(a).force, resultant(b).force, strict=True):
             assert one == pytest.approx(other, abs=0.02)
 
@@ -109,13 +133,22 @@ def test_unmatched_cyclic_faces_are_refused(coarse_sector, tmp_path):
         read_mesh(tmp_path / "a.msh", sectors=35)
 
 
-@pytest.mark.parametrize("name, text, words", [("a.msh", "no mesh", "a.msh"), ("a.xyz", "", "unknown kind"),
-                                               ("a.inp", "*NODE\n1, 0, 0, 0\n", "cells are missing"),
-                                               ("a.cdb", "/PREP7\n", "NBLOCK"), ("a.step", "ISO-10303-21;", "a.step")])
+@pytest.mark.parametrize(
+    "name, text, words",
+    [
+        ("a.msh", "no mesh", "a.msh"),
+        ("a.xyz", "", "unknown kind"),
+        ("a.inp", "*NODE\n1, 0, 0, 0\n", "cells are missing"),
+        ("a.cdb", "/PREP7\n", "NBLOCK"),
+        ("a.step", "ISO-10303-21;", "a.step"),
+    ],
+)
 def test_unusable_files(tmp_path, name, text, words):
     (tmp_path / name).write_text(text)
     with pytest.raises(InputError, match=words) as caught:
-        read_step(tmp_path / name, MeshSize()) if name.endswith("step") else read_mesh(tmp_path / name)
+        read_step(tmp_path / name, MeshSize()) if name.endswith("step") else read_mesh(
+            tmp_path / name
+        )
     assert "\n" not in str(caught.value)
 
 
@@ -142,19 +175,23 @@ def test_step_block_in_millimetres_with_named_faces(tmp_path):
 
 
 def test_groups_get_the_users_names(coarse_sector, tmp_path):
-    """STEP faces without a name, two to one; groups of a mesh file; old names that are not there."""
+    """STEP faces without a name, two to one; groups of a mesh file; old names that are not
+    there.
+    """
     write_step(tmp_path / "a.step", "block", {})
     size = MeshSize(size=0.01)
     plain = read_step(tmp_path / "a.step", size).faces
     mesh = read_step(tmp_path / "a.step", size, names=["clamp = face_1", "sides = face_3 + FACE_4"])
     assert len(mesh.faces["clamp"]) == len(plain["face_1"]) and "face_1" not in mesh.faces
     assert len(mesh.faces["sides"]) == len(plain["face_3"]) + len(plain["face_4"])
-    write_msh(replace(coarse_sector, faces={**coarse_sector.faces, "bore": coarse_sector.faces["clamp"]}),
-              tmp_path / "a.msh")
+    write_msh(
+        replace(coarse_sector, faces={**coarse_sector.faces, "bore": coarse_sector.faces["clamp"]}),
+        tmp_path / "a.msh",
+    )
     assert "foot" in read_mesh(tmp_path / "a.msh", sectors=36, names=["foot=bore"]).faces
     with pytest.raises(InputError, match=r"imported\.names: the file has no group 'face_9'"):
         read_step(tmp_path / "a.step", size, names=["clamp = face_9"])
-    with pytest.raises(InputError, match="expected \"new = old\""):
+    with pytest.raises(InputError, match='expected "new = old"'):
         read_mesh(tmp_path / "a.msh", sectors=36, names=["foot"])
 
 
@@ -165,10 +202,15 @@ def test_a_file_in_millimetres_is_not_taken_for_metres(coarse_sector, tmp_path):
 
 
 def test_step_is_finer_on_contact_faces(tmp_path):
-    """mesh.contact_size holds on a face that is called after a seat; far from it the elements are as large as ever."""
+    """mesh.contact_size holds on a face that is called after a seat; far from it the elements are
+    as large as ever.
+    """
     write_step(tmp_path / "a.step", "block", {"blade": ["clamp", "seat_left"]})
     size = MeshSize(size=0.01, contact_size=0.003)
-    mesh, plain = read_step(tmp_path / "a.step", size), read_step(tmp_path / "a.step", MeshSize(size=0.01))
+    mesh, plain = (
+        read_step(tmp_path / "a.step", size),
+        read_step(tmp_path / "a.step", MeshSize(size=0.01)),
+    )
     fine, coarse = (len(found.faces["seat_left"]) for found in (mesh, plain))
     assert fine > 6 * coarse
     clamp = [len(found.faces["clamp"]) for found in (mesh, plain)]
@@ -188,7 +230,9 @@ def test_step_sector_finds_its_cyclic_faces_and_its_bore(tmp_path):
     write_step(tmp_path / "a.step", "disc", {})
     mesh = read_step(tmp_path / "a.step", MeshSize(size=0.012), sectors=disc.sectors)
     pair = mesh.pairs["cyclic"]
-    np.testing.assert_allclose(mesh.points[pair.nodes[1]], mesh.points[pair.nodes[0]] @ pair.rotation.T, atol=1e-14)
+    np.testing.assert_allclose(
+        mesh.points[pair.nodes[1]], mesh.points[pair.nodes[0]] @ pair.rotation.T, atol=1e-14
+    )
     radius = np.hypot(*mesh.points[np.unique(mesh.faces["clamp"])].T[:2])
     np.testing.assert_allclose(radius, disc.bore_radius, rtol=1e-6)
 
@@ -196,7 +240,9 @@ def test_step_sector_finds_its_cyclic_faces_and_its_bore(tmp_path):
 @pytest.mark.parametrize("kind", ["hexahedron20", "hexahedron27", "hexahedron", "tetra", "tetra10"])
 @pytest.mark.parametrize("suffix", ["msh", "med"])
 def test_every_kind_of_cell_gives_the_same_mesh_back(kind, suffix, tmp_path):
-    """Hexahedra of 20 nodes get those in the middle of faces and cells, where a mesh of 27 has them on flat faces."""
+    """Hexahedra of 20 nodes get those in the middle of faces and cells, where a mesh of 27 has them
+    on flat faces.
+    """
     whole = sector(6, (3, 2, 1), kind.replace("20", "27"), inner=0.1, outer=0.3, straight=True)
     written = without_centres(whole) if kind.endswith("20") else whole
     write_msh(written, tmp_path / "a.msh")
@@ -205,7 +251,10 @@ def test_every_kind_of_cell_gives_the_same_mesh_back(kind, suffix, tmp_path):
             gmsh.merge(str(tmp_path / "a.msh"))
             gmsh.write(str(tmp_path / "a.med"))
     found = read_mesh(tmp_path / f"a.{suffix}", sectors=6)
-    assert found.cell_type == whole.cell_type and found.pairs["cyclic"].nodes.shape == whole.pairs["cyclic"].nodes.shape
+    assert (
+        found.cell_type == whole.cell_type
+        and found.pairs["cyclic"].nodes.shape == whole.pairs["cyclic"].nodes.shape
+    )
     assert found.faces["clamp"].shape == whole.faces["clamp"].shape
     order, other = (np.lexsort(np.round(x, 9).T) for x in (found.points, turned_home(whole)))
     np.testing.assert_allclose(found.points[order], turned_home(whole)[other], atol=1e-12)
@@ -214,23 +263,42 @@ def test_every_kind_of_cell_gives_the_same_mesh_back(kind, suffix, tmp_path):
 
 def without_centres(mesh):
     """The same mesh with the 20- and 8-node cells that older programs have."""
-    return replace(mesh, cell_type="hexahedron20", bodies={n: c[:, :20] for n, c in mesh.bodies.items()},
-                   faces={n: f[:, :8] for n, f in mesh.faces.items()})
+    return replace(
+        mesh,
+        cell_type="hexahedron20",
+        bodies={n: c[:, :20] for n, c in mesh.bodies.items()},
+        faces={n: f[:, :8] for n, f in mesh.faces.items()},
+    )
 
 
 def turned_home(mesh):
     """Points turned as the reader turns them, +x midway between the cyclic faces."""
-    low, high = (mesh.points[np.unique(mesh.faces[f"cyclic_{name}"])].mean(axis=0)[:2] for name in ("low", "high"))
-    return mesh.points @ turn(-np.arctan2(*(low / np.linalg.norm(low) + high / np.linalg.norm(high))[::-1])).T
+    low, high = (
+        mesh.points[np.unique(mesh.faces[f"cyclic_{name}"])].mean(axis=0)[:2]
+        for name in ("low", "high")
+    )
+    return (
+        mesh.points
+        @ turn(-np.arctan2(*(low / np.linalg.norm(low) + high / np.linalg.norm(high))[::-1])).T
+    )
 
 
 def test_nastran_with_faces_as_shells(tmp_path):
     """Bulk data of 10-node tetrahedra; shells of the property 7 are the clamped face."""
     block = box((4, 2, 2), (0.1, 0.02, 0.03), "tetra10")
     cells = block.bodies["blade"][:, [0, 1, 2, 3, 4, 5, 6, 7, 9, 8]]
-    meshio.write(tmp_path / "a.bdf", meshio.Mesh(
-        block.points, [("tetra10", cells), ("triangle6", block.faces["clamp"])],
-        cell_data={"nastran:ref": [np.ones(len(cells), int), np.full(len(block.faces["clamp"]), 7)]}))
+    meshio.write(
+        tmp_path / "a.bdf",
+        meshio.Mesh(
+            block.points,
+            [("tetra10", cells), ("triangle6", block.faces["clamp"])],
+            cell_data={
+                "nastran:ref": [np.ones(len(cells), int), np.full(len(block.faces["clamp"]), 7)]
+            },
+        ),
+    )
     found = read_mesh(tmp_path / "a.bdf")
-    assert set(found.parts) == {"pid_1"} and found.faces["pid_7"].shape == block.faces["clamp"].shape
+    assert (
+        set(found.parts) == {"pid_1"} and found.faces["pid_7"].shape == block.faces["clamp"].shape
+    )
     assert volume(found, "blade") == pytest.approx(0.1 * 0.02 * 0.03, rel=1e-6)

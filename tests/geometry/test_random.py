@@ -1,4 +1,6 @@
-"""Random parameter sets give a valid mesh or one line that names a field; benchmarks/random_geometry.py does 200."""
+"""Random parameter sets give a valid mesh or one line that names a field;
+benchmarks/random_geometry.py does 200.
+"""
 
 import re
 from dataclasses import replace
@@ -26,7 +28,9 @@ def valid_or_named(build):
     assert mesh.report["min scaled jacobian"] > 0
     for pair in mesh.pairs.values():
         image = mesh.points[pair.nodes[0]] @ pair.rotation.T + pair.shift
-        np.testing.assert_allclose(mesh.points[pair.nodes[1]], image, atol=1e-12 * np.abs(mesh.points).max())
+        np.testing.assert_allclose(
+            mesh.points[pair.nodes[1]], image, atol=1e-12 * np.abs(mesh.points).max()
+        )
     return True
 
 
@@ -35,7 +39,9 @@ def test_sectors_round_the_defaults(number):
     rng = np.random.default_rng((7, number))
     aerofoil, platform, shank, disc, wedge = (around(t(), rng, 0.1) for t in TABLES)
     shank = replace(shank, length=min(shank.length, disc.width, platform.length))
-    valid_or_named(lambda: wedge_sector(aerofoil, platform, shank, disc, wedge, MeshSize(size=8e-3)))
+    valid_or_named(
+        lambda: wedge_sector(aerofoil, platform, shank, disc, wedge, MeshSize(size=8e-3))
+    )
 
 
 @pytest.mark.parametrize("number", range(6))
@@ -46,4 +52,9 @@ def test_sectors_anywhere_in_the_ranges(number):
 
 def test_plane_blades():
     rng = np.random.default_rng(9)
-    assert any([valid_or_named(lambda: plane_blades(around(Plane(), rng, 0.2), MeshSize())) for _ in range(12)])
+    assert any(
+        [
+            valid_or_named(lambda: plane_blades(around(Plane(), rng, 0.2), MeshSize()))
+            for _ in range(12)
+        ]
+    )

@@ -1,4 +1,6 @@
-"""The wedge sector: volumes, pairs, directions, the angle of the wedge, element orders, determinism, refusals."""
+"""The wedge sector: volumes, pairs, directions, the angle of the wedge, element orders,
+determinism, refusals.
+"""
 
 from dataclasses import replace
 from math import cos, pi, sin, tan
@@ -16,7 +18,13 @@ from geometry.section import shape as section
 from geometry.sector import wedge_sector
 from geometry.topology import EDGES, normals
 
-PARTS = {"aerofoil": Aerofoil(), "platform": Platform(), "shank": Shank(), "disc": Disc(), "wedge": Wedge()}
+PARTS = {
+    "aerofoil": Aerofoil(),
+    "platform": Platform(),
+    "shank": Shank(),
+    "disc": Disc(),
+    "wedge": Wedge(),
+}
 COARSE = MeshSize(size=7e-3)
 
 
@@ -40,13 +48,15 @@ def test_volume_of_the_wedge_is_that_of_its_prism(coarse_sector):
 
 
 def test_volume_of_the_blade_is_the_sum_of_its_parts(coarse_sector):
-    """Disc segment, shank, platform exactly; the aerofoil by its sections. 1e-3: second-order arcs, splined skin."""
+    """Disc segment, shank, platform exactly; the aerofoil by its sections. 1e-3: second-order arcs,
+    splined skin.
+    """
     d, s, p, a = Disc(), Shank(), Platform(), Aerofoil()
     shape = profile(p, s, d, Wedge())
     ring = pi / d.sectors * (d.rim_radius**2 - d.bore_radius**2) * d.width
     half = s.width / 2
     sag = d.rim_radius**2 * np.arcsin(half / d.rim_radius)
-    under = sag + half * np.sqrt(d.rim_radius**2 - half**2)         # of the shank's width, below the rim
+    under = sag + half * np.sqrt(d.rim_radius**2 - half**2)  # of the shank's width, below the rim
     neck = ((d.rim_radius + s.height) * s.width - under) * s.length
     plate = np.array([shape.inner, shape.outer, shape.corner])
     slab = abs(shoelace(np.vstack([plate, plate[::-1] * [1, -1]]))) * p.length
@@ -54,30 +64,44 @@ def test_volume_of_the_blade_is_the_sum_of_its_parts(coarse_sector):
     chords = (1 - stations) * a.chord_root + stations * a.chord_tip
     areas = [c**2 * abs(shoelace(section(a, t))) for t, c in zip(stations, chords, strict=True)]
     expected = ring + neck + slab + simpson(areas, x=stations * a.span)
-    assert volume(coarse_sector.points, coarse_sector.bodies["blade"]) == pytest.approx(expected, rel=1e-3)
+    assert volume(coarse_sector.points, coarse_sector.bodies["blade"]) == pytest.approx(
+        expected, rel=1e-3
+    )
 
 
 def test_seats_stand_at_the_angle_of_the_wedge(coarse_sector):
-    """Normals of the blade's seats point into the damper, at alpha against the radial plane between two blades."""
+    """Normals of the blade's seats point into the damper, at alpha against the radial plane between
+    two blades.
+    """
     alpha, theta = Wedge().angle, pi / Disc().sectors
     radial, across = np.array([cos(theta), sin(theta), 0]), np.array([-sin(theta), cos(theta), 0])
     seat = normals(coarse_sector.points, coarse_sector.faces["seat_right"], 3)
     unit = seat / np.linalg.norm(seat, axis=1)[:, None]
-    np.testing.assert_allclose(unit, np.tile(-sin(alpha) * radial + cos(alpha) * across, (len(unit), 1)), atol=1e-12)
-    flanks = sum(normals(coarse_sector.points, coarse_sector.faces[f], 3).sum(axis=0)
-                 for f in ("damper_left", "damper_right"))
+    np.testing.assert_allclose(
+        unit, np.tile(-sin(alpha) * radial + cos(alpha) * across, (len(unit), 1)), atol=1e-12
+    )
+    flanks = sum(
+        normals(coarse_sector.points, coarse_sector.faces[f], 3).sum(axis=0)
+        for f in ("damper_left", "damper_right")
+    )
     area = Platform().seat_width * Wedge().length
-    np.testing.assert_allclose(flanks, 2 * sin(alpha) * area * radial, atol=1e-12)      # N = F / (2 sin alpha)
+    np.testing.assert_allclose(
+        flanks, 2 * sin(alpha) * area * radial, atol=1e-12
+    )  # N = F / (2 sin alpha)
     low = normals(coarse_sector.points, coarse_sector.faces["cyclic_low"], 3).sum(axis=0)
     assert low[1] < 0
 
 
-@pytest.mark.parametrize("name, angle", [("cyclic", 2 * pi / 36), ("this", 0.0), ("next", 2 * pi / 36)])
+@pytest.mark.parametrize(
+    "name, angle", [("cyclic", 2 * pi / 36), ("this", 0.0), ("next", 2 * pi / 36)]
+)
 def test_pairs_match_to_rounding_with_their_middle_nodes(coarse_sector, name, angle):
     motion = turn(angle)
     pair, x = coarse_sector.pairs[name], coarse_sector.points
     np.testing.assert_allclose(pair.rotation, motion, atol=1e-15)
-    np.testing.assert_allclose(x[pair.nodes[1]], x[pair.nodes[0]] @ motion.T, rtol=0, atol=1e-12 * 0.2)
+    np.testing.assert_allclose(
+        x[pair.nodes[1]], x[pair.nodes[0]] @ motion.T, rtol=0, atol=1e-12 * 0.2
+    )
     assert set(pair.nodes[0]) == set(np.unique(coarse_sector.faces[pair.master]))
     assert set(pair.nodes[1]) == set(np.unique(coarse_sector.faces[pair.slave]))
 
@@ -85,7 +109,9 @@ def test_pairs_match_to_rounding_with_their_middle_nodes(coarse_sector, name, an
 def test_cut_faces_belong_to_the_disc_only(coarse_sector):
     x = coarse_sector.points[np.unique(coarse_sector.faces["cyclic_high"])]
     radius = np.hypot(x[:, 0], x[:, 1])
-    assert radius.max() == pytest.approx(Disc().rim_radius) and radius.min() == pytest.approx(Disc().bore_radius)
+    assert radius.max() == pytest.approx(Disc().rim_radius) and radius.min() == pytest.approx(
+        Disc().bore_radius
+    )
     np.testing.assert_allclose(np.arctan2(x[:, 1], x[:, 0]), pi / 36, atol=1e-12)
     on_blade = coarse_sector.points[np.unique(coarse_sector.bodies["blade"])]
     assert np.abs(np.arctan2(on_blade[:, 1], on_blade[:, 0])).max() <= pi / 36 + 1e-12
@@ -103,14 +129,23 @@ def test_every_cell_is_positive_inside_and_its_middle_nodes_are_near_the_middle(
 
 
 def test_the_leading_edge_is_a_line_of_nodes_on_a_smooth_nose(coarse_sector):
-    """Both sides share nodes at the nose of every section, 0.6 of the element size apart, so nothing is notched."""
-    blade, top = Aerofoil(), profile(*[PARTS[k] for k in ("platform", "shank", "disc", "wedge")]).top
-    shared = np.intersect1d(coarse_sector.faces["suction_side"], coarse_sector.faces["pressure_side"])
+    """Both sides share nodes at the nose of every section, 0.6 of the element size apart, so
+    nothing is notched.
+    """
+    blade, top = (
+        Aerofoil(),
+        profile(*[PARTS[k] for k in ("platform", "shank", "disc", "wedge")]).top,
+    )
+    shared = np.intersect1d(
+        coarse_sector.faces["suction_side"], coarse_sector.faces["pressure_side"]
+    )
     edge = coarse_sector.points[shared[np.argsort(coarse_sector.points[shared, 0])]]
     noses = np.array([outline(blade, top, (x - top) / blade.span)[POINTS - 1] for x in edge[:, 0]])
-    np.testing.assert_allclose(edge, noses, atol=2e-5)              # the loft is a spline through 5 sections
+    np.testing.assert_allclose(edge, noses, atol=2e-5)  # the loft is a spline through 5 sections
     assert edge[0, 0] == pytest.approx(top) and edge[-1, 0] == pytest.approx(top + blade.span)
-    assert np.linalg.norm(np.diff(edge, axis=0), axis=1).max() < 0.6 * COARSE.size      # middle nodes halve the edges
+    assert (
+        np.linalg.norm(np.diff(edge, axis=0), axis=1).max() < 0.6 * COARSE.size
+    )  # middle nodes halve the edges
 
 
 def test_middle_nodes_of_the_seats_are_exactly_in_the_middle(coarse_sector):
@@ -119,11 +154,18 @@ def test_middle_nodes_of_the_seats_are_exactly_in_the_middle(coarse_sector):
         np.testing.assert_allclose(x[:, 3:], (x[:, [0, 1, 2]] + x[:, [1, 2, 0]]) / 2, atol=1e-16)
 
 
-@pytest.mark.parametrize(("given", "across", "along"), [
-    ({"seat_elements": 8}, 8, 6), ({"seat_elements": 5, "contact_size": 5e-3}, 5, 8),
-    ({"seat_elements": 8, "scale": 2.0}, 4, 3)])
+@pytest.mark.parametrize(
+    ("given", "across", "along"),
+    [
+        ({"seat_elements": 8}, 8, 6),
+        ({"seat_elements": 5, "contact_size": 5e-3}, 5, 8),
+        ({"seat_elements": 8, "scale": 2.0}, 4, 3),
+    ],
+)
 def test_seats_in_a_grid_have_equal_elements_across_and_along(given, across, along):
-    """Corner nodes of both sides stand where they should; volumes stay what they are but for curved faces."""
+    """Corner nodes of both sides stand where they should; volumes stay what they are but for curved
+    faces.
+    """
     mesh, length, width = build(replace(COARSE, **given)), Wedge().length, Platform().seat_width
     whole = build()
     for body in ("blade", "damper"):
@@ -132,9 +174,15 @@ def test_seats_in_a_grid_have_equal_elements_across_and_along(given, across, alo
     for name in ("seat_left", "seat_right", "damper_left", "damper_right"):
         corners = mesh.points[np.unique(mesh.faces[name][:, :3])]
         slope = corners - corners[np.argmin(corners[:, 0])]
-        places = np.column_stack([slope[:, 2] - slope[:, 2].min(), np.linalg.norm(slope[:, :2], axis=1)])
-        grid = np.stack(np.meshgrid(np.linspace(0, length, along + 1), np.linspace(0, width, across + 1),
-                                    indexing="ij"), axis=-1).reshape(-1, 2)
+        places = np.column_stack(
+            [slope[:, 2] - slope[:, 2].min(), np.linalg.norm(slope[:, :2], axis=1)]
+        )
+        grid = np.stack(
+            np.meshgrid(
+                np.linspace(0, length, along + 1), np.linspace(0, width, across + 1), indexing="ij"
+            ),
+            axis=-1,
+        ).reshape(-1, 2)
         assert len(places) == len(grid)
         np.testing.assert_allclose(sorted(map(tuple, np.round(places, 9))), grid, atol=2e-9)
     assert mesh.pairs["this"].nodes.shape == mesh.pairs["next"].nodes.shape
@@ -145,11 +193,16 @@ def test_tip_nodes_stand_on_the_section_whatever_the_mesh(coarse_sector):
     top = profile(*[PARTS[k] for k in ("platform", "shank", "disc", "wedge")]).top
     section_points = outline(Aerofoil(), top, 1)
     np.testing.assert_allclose(x["tip_trailing"], section_points[0], atol=1e-9)
-    np.testing.assert_allclose(x["tip_leading"], section_points[len(section_points) // 2], atol=1e-9)
+    np.testing.assert_allclose(
+        x["tip_leading"], section_points[len(section_points) // 2], atol=1e-9
+    )
     middle = (section_points[0] + section_points[-1]) / 2
-    assert np.linalg.norm(x["tip_leading"] - middle) == pytest.approx(Aerofoil().chord_tip, rel=1e-9)
+    assert np.linalg.norm(x["tip_leading"] - middle) == pytest.approx(
+        Aerofoil().chord_tip, rel=1e-9
+    )
     assert np.linalg.norm(x["tip_mid"] - (x["tip_leading"] + middle) / 2) == pytest.approx(
-        Aerofoil().camber * Aerofoil().chord_tip, rel=1e-9)
+        Aerofoil().camber * Aerofoil().chord_tip, rel=1e-9
+    )
     assert all(len(nodes) == 1 for nodes in coarse_sector.nodes.values())
 
 
@@ -176,14 +229,26 @@ def test_clearance_moves_the_wedge_inwards():
         pair = mesh.pairs[name]
         normal = normals(mesh.points, mesh.faces[seat], 3).sum(axis=0)
         normal = pair.rotation @ normal / np.linalg.norm(normal)
-        opening = (mesh.points[pair.nodes[1]] - mesh.points[pair.nodes[0]] @ pair.rotation.T) @ normal
+        opening = (
+            mesh.points[pair.nodes[1]] - mesh.points[pair.nodes[0]] @ pair.rotation.T
+        ) @ normal
         np.testing.assert_allclose(opening, gap, atol=1e-15)
-        np.testing.assert_allclose(mesh.points[pair.nodes[1]],
-                                   mesh.points[pair.nodes[0]] @ pair.rotation.T + pair.shift, atol=1e-14)
+        np.testing.assert_allclose(
+            mesh.points[pair.nodes[1]],
+            mesh.points[pair.nodes[0]] @ pair.rotation.T + pair.shift,
+            atol=1e-14,
+        )
 
 
-@pytest.mark.parametrize("changes", [{"wedge": {"length": 0.06}}, {"aerofoil": {"section": "biconvex"}},
-                                     {"aerofoil": {"lean": 0.15, "sweep": -0.2}}, {"disc": {"sectors": 30}}])
+@pytest.mark.parametrize(
+    "changes",
+    [
+        {"wedge": {"length": 0.06}},
+        {"aerofoil": {"section": "biconvex"}},
+        {"aerofoil": {"lean": 0.15, "sweep": -0.2}},
+        {"disc": {"sectors": 30}},
+    ],
+)
 def test_variants_are_meshed(changes):
     mesh = build(**changes)
     assert mesh.report["min scaled jacobian"] > 0
@@ -191,7 +256,9 @@ def test_variants_are_meshed(changes):
 
 
 def test_fillet_is_a_quarter_groove_round_the_root():
-    """Its nodes lie on the outline moved outwards by the arc; a spline between its points is off it by 3.9 %."""
+    """Its nodes lie on the outline moved outwards by the arc; a spline between its points is off it
+    by 3.9 %.
+    """
     radius, blade = 2e-3, Aerofoil()
     mesh = build(MeshSize(size=5e-3), aerofoil={"fillet": radius})
     top = profile(*[PARTS[k] for k in ("platform", "shank", "disc", "wedge")]).top
@@ -199,19 +266,30 @@ def test_fillet_is_a_quarter_groove_round_the_root():
         height = (point[0] - top) * cos(pi / 12)
         out = radius * (1 - np.sqrt(max(0.0, 1 - (cos(pi / 12) - height / radius) ** 2)))
         ring = outline(blade, top, (point[0] - top) / blade.span, out)
-        fine = np.vstack([np.linspace(a, b, 60) for a, b in zip(ring, np.roll(ring, -1, axis=0), strict=True)])
+        fine = np.vstack(
+            [np.linspace(a, b, 60) for a, b in zip(ring, np.roll(ring, -1, axis=0), strict=True)]
+        )
         assert np.linalg.norm(fine - point, axis=1).min() < 0.045 * radius
     assert mesh.report["min scaled jacobian"] > 0.1
 
 
-@pytest.mark.parametrize("changes, field", [
-    ({"disc": {"bore_radius": 0.2}}, "disc.bore_radius"), ({"shank": {"width": 0.04}}, "shank.width"),
-    ({"shank": {"length": 0.05}}, "shank.length"),
-    ({"shank": {"length": 0.0448}}, "shank.length.*before disc.width"), ({"platform": {"gap": 0.03}}, "platform.gap"),
-    ({"platform": {"seat_width": 0.02}}, "platform.seat_width"), ({"wedge": {"length": 0.061}}, "damper.length"),
-    ({"wedge": {"base": 0.029}}, "damper.base"), ({"aerofoil": {"chord_root": 0.09}}, "aerofoil.chord_root"),
-    ({"aerofoil": {"stagger": 1.2}}, "aerofoil.stagger"), ({"disc": {"sectors": 60}}, "platform|shank"),
-    ({"aerofoil": {"fillet": 0.009}}, "aerofoil.fillet|overhangs")])
+@pytest.mark.parametrize(
+    "changes, field",
+    [
+        ({"disc": {"bore_radius": 0.2}}, "disc.bore_radius"),
+        ({"shank": {"width": 0.04}}, "shank.width"),
+        ({"shank": {"length": 0.05}}, "shank.length"),
+        ({"shank": {"length": 0.0448}}, "shank.length.*before disc.width"),
+        ({"platform": {"gap": 0.03}}, "platform.gap"),
+        ({"platform": {"seat_width": 0.02}}, "platform.seat_width"),
+        ({"wedge": {"length": 0.061}}, "damper.length"),
+        ({"wedge": {"base": 0.029}}, "damper.base"),
+        ({"aerofoil": {"chord_root": 0.09}}, "aerofoil.chord_root"),
+        ({"aerofoil": {"stagger": 1.2}}, "aerofoil.stagger"),
+        ({"disc": {"sectors": 60}}, "platform|shank"),
+        ({"aerofoil": {"fillet": 0.009}}, "aerofoil.fillet|overhangs"),
+    ],
+)
 def test_impossible_proportions_name_the_field(changes, field):
     with pytest.raises(InputError, match=field) as caught:
         build(**changes)
@@ -219,7 +297,9 @@ def test_impossible_proportions_name_the_field(changes, field):
 
 
 def test_slope_of_the_platform_at_the_midplane():
-    """The corner points of the profile: edge at half the gap from the radial plane between the blades."""
+    """The corner points of the profile: edge at half the gap from the radial plane between the
+    blades.
+    """
     shape = profile(*[PARTS[k] for k in ("platform", "shank", "disc", "wedge")])
     for x, y in (shape.outer, shape.corner):
         assert (x * tan(shape.theta) - y) * cos(shape.theta) == pytest.approx(Platform().gap / 2)

@@ -1,4 +1,6 @@
-"""Small writers of foreign files, so that the readers are tested on text that another program would write."""
+"""Small writers of foreign files, so that the readers are tested on text that another program would
+write.
+"""
 
 import os
 import subprocess
@@ -23,15 +25,20 @@ def write_inp(mesh, file):
     for name, faces in mesh.faces.items():
         lines.append(f"*NSET, NSET={name.upper()}")
         nodes = np.unique(faces) + 1
-        lines += [", ".join(map(str, nodes[i:i + 10])) for i in range(0, len(nodes), 10)]
+        lines += [", ".join(map(str, nodes[i : i + 10])) for i in range(0, len(nodes), 10)]
     file.write_text("\n".join(lines) + "\n")
 
 
 def write_cdb(mesh, file):
-    """Ansys archive with SOLID187, element components for the bodies, node components for the faces."""
+    """Ansys archive with SOLID187, element components for the bodies, node components for the
+    faces.
+    """
     n, count = len(mesh.points), sum(len(c) for c in mesh.bodies.values())
     lines = ["/PREP7", f"NBLOCK,6,SOLID,{n},{n}", "(3i9,6e21.13e3)"]
-    lines += [f"{i + 1:9d}{0:9d}{0:9d}" + "".join(f"{v:21.13e}" for v in x) for i, x in enumerate(mesh.points)]
+    lines += [
+        f"{i + 1:9d}{0:9d}{0:9d}" + "".join(f"{v:21.13e}" for v in x)
+        for i, x in enumerate(mesh.points)
+    ]
     lines += ["N,R5.3,LOC,       -1,", f"EBLOCK,19,SOLID,{count},{count}", "(19i9)"]
     number, members = 0, {}
     for name, cells in mesh.bodies.items():
@@ -43,22 +50,33 @@ def write_cdb(mesh, file):
             lines.append("".join(f"{v:9d}" for v in cell[8:]))
     lines.append(f"{-1:9d}")
     for name, (low, high) in members.items():
-        lines += [f"CMBLOCK,{name.upper():8s},ELEM,{2:8d}  ! element component", "(8i10)", f"{low:10d}{-high:10d}"]
+        lines += [
+            f"CMBLOCK,{name.upper():8s},ELEM,{2:8d}  ! element component",
+            "(8i10)",
+            f"{low:10d}{-high:10d}",
+        ]
     for name, faces in mesh.faces.items():
         nodes = np.unique(faces) + 1
         lines += [f"CMBLOCK,{name.upper()},NODE,{len(nodes):8d}", "(8i10)"]
-        lines += ["".join(f"{v:10d}" for v in nodes[i:i + 8]) for i in range(0, len(nodes), 8)]
+        lines += ["".join(f"{v:10d}" for v in nodes[i : i + 8]) for i in range(0, len(nodes), 8)]
     file.write_text("\n".join([*lines, "FINISH"]) + "\n")
 
 
 def write_step(file, kind, names):
-    """STEP file in millimetres of a "block" or a "disc" segment; names[solid] lists that solid's faces, in order.
+    """STEP file in millimetres of a "block" or a "disc" segment; names[solid] lists that solid's
+    faces, in order.
 
-    In a process of its own: reading a STEP file changes the unit in which OpenCASCADE writes the next one.
+    In a process of its own: reading a STEP file changes the unit in which OpenCASCADE writes the
+    next one.
     """
     root = Path(__file__).parents[2]
-    subprocess.run([sys.executable, __file__, str(file), kind], check=True, cwd=root, stdout=subprocess.DEVNULL,
-                   env={**os.environ, "PYTHONPATH": str(root)})
+    subprocess.run(
+        [sys.executable, __file__, str(file), kind],
+        check=True,
+        cwd=root,
+        stdout=subprocess.DEVNULL,
+        env={**os.environ, "PYTHONPATH": str(root)},
+    )
     text = file.read_text()
     for solid, faces in names.items():
         text = text.replace("MANIFOLD_SOLID_BREP('',", f"MANIFOLD_SOLID_BREP('{solid}',", 1)

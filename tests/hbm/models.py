@@ -16,13 +16,27 @@ def single_mass(kt=1.0, limit=0.5, zeta=0.01, force=1.0):
 
 
 def block(nodes=4, *, kn=2.0, n0=1.0, mu=0.4, seed=0, damper=False, dofs=30, force=1.0):
-    """A random elastic body with 3-D contacts against the ground or a rigid damper of six freedoms."""
+    """A random elastic body with 3-D contacts against the ground or a rigid damper of six
+    freedoms.
+    """
     rng = np.random.default_rng(seed)
     half = rng.normal(size=(dofs, dofs)) / np.sqrt(dofs)
     K = half @ half.T + 0.5 * np.eye(dofs)
-    ports = {"contact": np.arange(3 * nodes), "load": np.array([dofs - 1]), "probe": np.array([dofs - 1, dofs - 2])}
+    ports = {
+        "contact": np.arange(3 * nodes),
+        "load": np.array([dofs - 1]),
+        "probe": np.array([dofs - 1, dofs - 2]),
+    }
     body = port_model_from_matrices(np.eye(dofs), K, ports)
-    elements = Elements(rng.uniform(0.5, 1.5, nodes), kn * rng.uniform(0.5, 1.5, nodes), np.full(nodes, mu),
-                        n0 * rng.uniform(0.5, 1.5, nodes))
-    other = RigidBody(np.diag(rng.uniform(2.0, 4.0, 6)), rng.normal(size=(3 * nodes, 6))) if damper else None
+    elements = Elements(
+        rng.uniform(0.5, 1.5, nodes),
+        kn * rng.uniform(0.5, 1.5, nodes),
+        np.full(nodes, mu),
+        n0 * rng.uniform(0.5, 1.5, nodes),
+    )
+    other = (
+        RigidBody(np.diag(rng.uniform(2.0, 4.0, 6)), rng.normal(size=(3 * nodes, 6)))
+        if damper
+        else None
+    )
     return ReducedModel((body,), elements, {1: np.array([force])}, Damping(ratio=0.01), other)

@@ -1,4 +1,6 @@
-"""Plain slow twins: the friction march by the textbook, sample after sample, with its derivative carried along."""
+"""Plain slow twins: the friction march by the textbook, sample after sample, with its derivative
+carried along.
+"""
 
 from dataclasses import dataclass
 
@@ -14,11 +16,15 @@ class PlainForces:
 
 def waves(H, samples):
     t = 2 * np.pi * np.arange(samples) / samples
-    return np.column_stack([np.ones(samples)] + [g(h * t) for h in range(1, H + 1) for g in (np.cos, np.sin)])
+    return np.column_stack(
+        [np.ones(samples)] + [g(h * t) for h in range(1, H + 1) for g in (np.cos, np.sin)]
+    )
 
 
 def plain_forces(elements, w, samples, jacobian=True, laps=200):
-    """Forces (n, d, 2H+1) of the elements for relative displacements w (n, d, 2H+1), d = [normal +] tangents."""
+    """Forces (n, d, 2H+1) of the elements for relative displacements w (n, d, 2H+1), d = [normal +]
+    tangents.
+    """
     n, d, K = w.shape
     f, J, work = np.zeros((n, d, K)), np.zeros((n, d, K, d, K)), np.zeros(n)
     T = waves(K // 2, samples)
@@ -30,22 +36,36 @@ def plain_forces(elements, w, samples, jacobian=True, laps=200):
         for a in range(d):
             basis[a, :, a] = T
         if d == elements.tangents:
-            N, dN, tangent, dtangent = np.full(samples, n0), np.zeros((samples, d, K)), motion, basis
+            N, dN, tangent, dtangent = (
+                np.full(samples, n0),
+                np.zeros((samples, d, K)),
+                motion,
+                basis,
+            )
         else:
             N, dN, tangent, dtangent = n0 + kn * motion[0], kn * basis[0], motion[1:], basis[1:]
         N, dN = np.maximum(N, 0), np.where((N > 0)[:, None, None], dN, 0)
         force, dforce, last = kt * tangent[:, 0], kt * dtangent[:, 0], None
         for _ in range(laps):
-            fs, dfs, work[i] = np.zeros((len(tangent), samples)), np.zeros((len(tangent), samples, d, K)), 0
+            fs, dfs, work[i] = (
+                np.zeros((len(tangent), samples)),
+                np.zeros((len(tangent), samples, d, K)),
+                0,
+            )
             for s in range(samples):
                 step = tangent[:, s] - tangent[:, s - 1]
-                trial, dtrial = force + kt * step, dforce + kt * (dtangent[:, s] - dtangent[:, s - 1])
+                trial, dtrial = (
+                    force + kt * step,
+                    dforce + kt * (dtangent[:, s] - dtangent[:, s - 1]),
+                )
                 size, limit = np.linalg.norm(trial), mu * N[s]
                 if size > limit:
                     along = trial / size
                     dsize = np.einsum("a,abk->bk", along, dtrial)
                     new = limit * along
-                    dnew = mu * along[:, None, None] * dN[s] + limit / size * (dtrial - along[:, None, None] * dsize)
+                    dnew = mu * along[:, None, None] * dN[s] + limit / size * (
+                        dtrial - along[:, None, None] * dsize
+                    )
                 else:
                     new, dnew = trial, dtrial
                 work[i] += (new + force) / 2 @ step
@@ -54,8 +74,8 @@ def plain_forces(elements, w, samples, jacobian=True, laps=200):
             if last is not None and abs(fs - last).max() <= 1e-13 * abs(fs).max():
                 break
             last = fs
-        f[i, d - len(fs):] = fs @ P.T
-        J[i, d - len(fs):] = np.einsum("asbk,cs->acbk", dfs, P)
+        f[i, d - len(fs) :] = fs @ P.T
+        J[i, d - len(fs) :] = np.einsum("asbk,cs->acbk", dfs, P)
         if d > elements.tangents:
             f[i, 0], J[i, 0] = P @ N, np.einsum("sbk,cs->cbk", dN, P)
     return PlainForces(f, J, work)

@@ -3,7 +3,7 @@
 import numpy as np
 from hbm_models import chain
 
-from bladefem.hbm.api import solve
+from bladefem.hbm.solve import solve
 from bladefem.hbm.sweep import response
 
 

@@ -1,4 +1,6 @@
-"""One sector with the phase between the blades against the whole ring; and blades that are not alike."""
+"""One sector with the phase between the blades against the whole ring; and blades that are not
+alike.
+"""
 
 from dataclasses import replace
 
@@ -7,17 +9,23 @@ import pytest
 from scipy.linalg import block_diag
 
 from bladefem.data import Elements, RigidBody
-from bladefem.hbm.api import solve
 from bladefem.hbm.model import Damping, ReducedModel
+from bladefem.hbm.solve import solve
 from bladefem.reduction.assemble import join, recombine, wheel_models
 from bladefem.reduction.beam import reference_blade
 from bladefem.reduction.matrices import port_model_from_matrices
 
-N, EO, H = 6, 2, 3                  # harmonics 1, 2, 3 move in nodal diameters 2, 2 backwards, 0
-OWN = np.array([[6.0, 0.4, -2.0], [0.4, 8.0, -1.0], [-2.0, -1.0, 9.0]])     # blade along, blade across, disc
-LINK = np.array([[0.0, 0.0, 0.0], [0.0, 0.0, 0.3], [0.0, 0.0, -1.5]])       # of a sector with the next one
+N, EO, H = 6, 2, 3  # harmonics 1, 2, 3 move in nodal diameters 2, 2 backwards, 0
+OWN = np.array(
+    [[6.0, 0.4, -2.0], [0.4, 8.0, -1.0], [-2.0, -1.0, 9.0]]
+)  # blade along, blade across, disc
+LINK = np.array(
+    [[0.0, 0.0, 0.0], [0.0, 0.0, 0.3], [0.0, 0.0, -1.5]]
+)  # of a sector with the next one
 MASS = np.diag([1.0, 1.0, 2.0])
-FACES = np.array([[0.8, 0.6, 0.0], [-0.6, 0.8, 0.0], [0.7, -0.5, 0.1], [0.5, 0.7, 0.0]])    # this damper, that before
+FACES = np.array(
+    [[0.8, 0.6, 0.0], [-0.6, 0.8, 0.0], [0.7, -0.5, 0.1], [0.5, 0.7, 0.0]]
+)  # this damper, that before
 TURN = np.exp(2j * np.pi * EO / N * np.arange(N))
 LOAD, PROBE = np.array([[0.3, 1.0, 0.0]]), np.array([[0.0, 1.0, 0.0]])
 RIGID = RigidBody(np.diag([0.3, 0.4]), np.array([[0.9, 0.1], [-0.2, 0.8], [0.7, -0.3], [0.2, 0.9]]))
@@ -28,61 +36,99 @@ def sector_models():
     for n in range(N // 2 + 1):
         K = OWN + np.exp(2j * np.pi * n / N) * LINK + np.exp(-2j * np.pi * n / N) * LINK.T
         ports = {"contact": FACES, "load": LOAD, "probe": PROBE}
-        sectors[n] = port_model_from_matrices(MASS, K.real if 2 * n % N == 0 else K, ports, nodal_diameter=n)
+        sectors[n] = port_model_from_matrices(
+            MASS, K.real if 2 * n % N == 0 else K, ports, nodal_diameter=n
+        )
     return wheel_models(sectors, slice(2, 4), EO, N, H)
 
 
 def ring():
     """All sectors; contact rows of damper b: on blade b, then on blade b + 1."""
-    following = np.roll(np.eye(N), 1, axis=1)           # picks the next sector
+    following = np.roll(np.eye(N), 1, axis=1)  # picks the next sector
     K = np.kron(np.eye(N), OWN) + np.kron(following, LINK) + np.kron(following.T, LINK.T)
-    contact = np.concatenate([np.kron(np.eye(N)[[b]], FACES[:2]) if here else np.kron(following[[b]], FACES[2:])
-                              for b in range(N) for here in (True, False)])
-    ports = {"contact": contact, "load": np.kron(np.eye(N), LOAD), "probe": np.kron(np.eye(N), PROBE)}
+    contact = np.concatenate(
+        [
+            np.kron(np.eye(N)[[b]], FACES[:2]) if here else np.kron(following[[b]], FACES[2:])
+            for b in range(N)
+            for here in (True, False)
+        ]
+    )
+    ports = {
+        "contact": contact,
+        "load": np.kron(np.eye(N), LOAD),
+        "probe": np.kron(np.eye(N), PROBE),
+    }
     return port_model_from_matrices(np.kron(np.eye(N), MASS), K, ports)
 
 
 def elements(count, n0):
-    return Elements(np.tile([2.0, 1.5], count)[:count], np.tile([1.8, 2.2], count)[:count], np.full(count, 0.4),
-                    np.full(count, n0), tangents=1)
+    return Elements(
+        np.tile([2.0, 1.5], count)[:count],
+        np.tile([1.8, 2.2], count)[:count],
+        np.full(count, 0.4),
+        np.full(count, n0),
+        tangents=1,
+    )
 
 
 def tiled(e):
-    return Elements(*(np.tile(getattr(e, name), N) for name in ("kt", "kn", "mu", "n0")), tangents=1)
+    return Elements(
+        *(np.tile(getattr(e, name), N) for name in ("kt", "kn", "mu", "n0")), tangents=1
+    )
 
 
-@pytest.mark.parametrize("damper", [RIGID, None], ids=["dampers between blades", "blades on each other"])
+@pytest.mark.parametrize(
+    "damper", [RIGID, None], ids=["dampers between blades", "blades on each other"]
+)
 def test_a_sector_moves_as_the_whole_ring(damper):
     one, whole = sector_models(), ring()
-    if damper is None:          # the contact is between the blades themselves
+    if damper is None:  # the contact is between the blades themselves
         pick = np.hstack([np.eye(2), -np.eye(2)])
-        one, whole = tuple(recombine(body, pick) for body in one), recombine(whole, np.kron(np.eye(N), pick))
+        one, whole = (
+            tuple(recombine(body, pick) for body in one),
+            recombine(whole, np.kron(np.eye(N), pick)),
+        )
     e, force = elements(1 if damper is None else 2, 0.5), {1: np.array([2.0]), 2: np.array([0.3j])}
     sector = ReducedModel(one, e, force, Damping(ratio=0.02), damper)
-    everything = None if damper is None else RigidBody(block_diag(*[damper.mass] * N), block_diag(*[damper.B] * N))
-    wheel = ReducedModel((whole,), tiled(e), {h: amplitude * TURN**h for h, amplitude in force.items()},
-                         Damping(ratio=0.02), everything)
+    everything = (
+        None
+        if damper is None
+        else RigidBody(block_diag(*[damper.mass] * N), block_diag(*[damper.B] * N))
+    )
+    wheel = ReducedModel(
+        (whole,),
+        tiled(e),
+        {h: amplitude * TURN**h for h, amplitude in force.items()},
+        Damping(ratio=0.02),
+        everything,
+    )
     for omega in (1.6, 2.3):
         a, b = solve(sector, omega, H, 96), solve(wheel, omega, H, 96)
         assert a.converged and b.converged and a.states["slip"] + a.states["lift"] > 0
         size = abs(a.probe).max()
         for h in range(H + 1):
-            np.testing.assert_allclose(b.probe[h], a.probe[h, 0] * TURN**h, rtol=0, atol=1e-8 * size)
+            np.testing.assert_allclose(
+                b.probe[h], a.probe[h, 0] * TURN**h, rtol=0, atol=1e-8 * size
+            )
         assert b.work.friction == pytest.approx(N * a.work.friction, rel=1e-8)
         assert a.work.imbalance < 1e-9
 
 
 def test_two_unlike_blades_with_a_damper_between_them():
-    """Joined bodies and a rigid damper against one body in which the damper is a mode of frequency zero."""
+    """Joined bodies and a rigid damper against one body in which the damper is a mode of frequency
+    zero.
+    """
     light, heavy = (reference_blade(1, platform=mass) for mass in (0.05, 0.06))
     both = recombine(join((light, heavy)), np.array([[1.0, 0, 0, 0], [0, 0, 1.0, 0]]))
     e = Elements(np.full(2, 1e6), np.zeros(2), np.ones(2), np.array([1.4, 1.0]), tangents=1)
     force = {1: np.array([1.0, 0.5j])}
-    joined = ReducedModel((both,), e, force, Damping(ratio=0.002), RigidBody(np.array([[0.03]]), np.ones((2, 1))))
+    joined = ReducedModel(
+        (both,), e, force, Damping(ratio=0.002), RigidBody(np.array([[0.03]]), np.ones((2, 1)))
+    )
     omega = np.concatenate([both.omega, [0.0]])
     order = np.argsort(omega)
     shapes = np.pad(both.shapes, ((0, 0), (0, 1)))
-    shapes[:2, -1] = -0.03**-0.5
+    shapes[:2, -1] = -(0.03**-0.5)
     damped = 0.004 * omega[order]
     side = replace(both, omega=omega[order], shapes=shapes[:, order], damping=damped)
     single = ReducedModel((side,), e, force)

@@ -1,4 +1,6 @@
-"""Paths against points solved one by one, a fold against the ends of its hysteresis, branch points by symmetry."""
+"""Paths against points solved one by one, a fold against the ends of its hysteresis, branch points
+by symmetry.
+"""
 
 from dataclasses import replace
 from itertools import pairwise
@@ -10,13 +12,13 @@ from models import block, single_mass
 from bladefem.data import Elements
 from bladefem.errors import InputError
 from bladefem.hbm import sweep as sweep_module
-from bladefem.hbm.api import solve
-from bladefem.hbm.follow import follow
-from bladefem.hbm.linear import condense
+from bladefem.hbm.continuation import follow
+from bladefem.hbm.linear.condensation import condense
 from bladefem.hbm.model import Damping, ReducedModel
-from bladefem.hbm.residual import Balance, evaluate_balance
+from bladefem.hbm.parameters import vary
+from bladefem.hbm.solve import solve
+from bladefem.hbm.solver.residual import Balance, evaluate_balance
 from bladefem.hbm.sweep import size
-from bladefem.hbm.vary import vary
 from bladefem.reduction.matrices import port_model_from_matrices
 
 
@@ -24,16 +26,26 @@ def stop(gap=1.0):
     """A mass that meets a one-sided elastic stop: it hardens, and its resonance leans over."""
     ports = {"contact": np.array([0, 1]), "load": np.array([0]), "probe": np.array([0])}
     body = port_model_from_matrices(np.eye(2), np.diag([1.0, 50.0]), ports)
-    elements = Elements(np.array([1e-3]), np.array([1.0]), np.zeros(1), np.array([-gap]), tangents=1)
+    elements = Elements(
+        np.array([1e-3]), np.array([1.0]), np.zeros(1), np.array([-gap]), tangents=1
+    )
     return ReducedModel((body,), elements, {1: np.array([0.1])}, Damping(ratio=0.02))
 
 
-@pytest.mark.parametrize(("model", "name", "bounds", "omega"), [
-    (single_mass(), "omega", (0.6, 1.8), 0.6), (single_mass(), "load", (0.2, 4.0), 1.1),
-    (block(force=1.0), "mu", (0.5, 2.0), 0.9), (block(force=1.0), "force", (0.8, 2.0), 0.9),
-    (block(force=1.0), "gap", (0.0, 0.3), 0.9), (block(force=1.0), "kt", (0.5, 2.0), 0.9),
-    (block(force=1.0), "kn", (0.5, 2.0), 0.9), (block(damper=True), "mass", (0.7, 1.5), 1.3),
-    (block(damper=True), "damping", (0.5, 2.0), 1.3)])
+@pytest.mark.parametrize(
+    ("model", "name", "bounds", "omega"),
+    [
+        (single_mass(), "omega", (0.6, 1.8), 0.6),
+        (single_mass(), "load", (0.2, 4.0), 1.1),
+        (block(force=1.0), "mu", (0.5, 2.0), 0.9),
+        (block(force=1.0), "force", (0.8, 2.0), 0.9),
+        (block(force=1.0), "gap", (0.0, 0.3), 0.9),
+        (block(force=1.0), "kt", (0.5, 2.0), 0.9),
+        (block(force=1.0), "kn", (0.5, 2.0), 0.9),
+        (block(damper=True), "mass", (0.7, 1.5), 1.3),
+        (block(damper=True), "damping", (0.5, 2.0), 1.3),
+    ],
+)
 def test_every_point_of_a_path_is_a_solution(model, name, bounds, omega):
     start = solve(model, omega, 3, 128)
     points = list(follow(model, name, start, bounds))
@@ -41,19 +53,30 @@ def test_every_point_of_a_path_is_a_solution(model, name, bounds, omega):
     for p in points[1::4]:
         changed = model if name == "omega" else vary(model, name, p.value)
         again = solve(changed, p.value if name == "omega" else omega, 3, 128, start=p.solution)
-        np.testing.assert_allclose(p.solution.probe, again.probe, rtol=0, atol=1e-8 * abs(again.probe).max())
+        np.testing.assert_allclose(
+            p.solution.probe, again.probe, rtol=0, atol=1e-8 * abs(again.probe).max()
+        )
 
 
 def test_folds_lie_where_sweeps_up_and_down_jump():
-    """A leaning resonance: the path turns back twice; fine sweeps up and down jump at the same two frequencies."""
+    """A leaning resonance: the path turns back twice; fine sweeps up and down jump at the same two
+    frequencies.
+    """
     model, H, samples = stop(), 5, 0
-    points = list(follow(model, "omega", solve(model, 0.8, H, samples), (0.8, 1.6), steps=(0.02, 0.02)))
-    folds = [max(a.value, b.value) if a.forward else min(a.value, b.value)
-             for a, b in pairwise(points) if b.fold]
+    points = list(
+        follow(model, "omega", solve(model, 0.8, H, samples), (0.8, 1.6), steps=(0.02, 0.02))
+    )
+    folds = [
+        max(a.value, b.value) if a.forward else min(a.value, b.value)
+        for a, b in pairwise(points)
+        if b.fold
+    ]
     assert len(folds) == 2 and folds[0] > folds[1]
-    for sign, fold in zip((1, -1), folds, strict=True):     # sweep across the fold in steps of 2e-4
+    for sign, fold in zip((1, -1), folds, strict=True):  # sweep across the fold in steps of 2e-4
         omegas = fold + sign * np.arange(-0.01, 0.01, 2e-4)
-        branch = [p.solution for p in points[1:] if p.forward and (size(p.solution) > 1.02) == (sign > 0)]
+        branch = [
+            p.solution for p in points[1:] if p.forward and (size(p.solution) > 1.02) == (sign > 0)
+        ]
         last = min(branch, key=lambda s: abs(s.omega - omegas[0]))
         heights = []
         for omega in omegas:
@@ -64,7 +87,9 @@ def test_folds_lie_where_sweeps_up_and_down_jump():
 
 
 def test_the_neighbour_beyond_a_fold_is_tried_before_the_fallbacks(monkeypatch):
-    """One that leads nowhere costs no fallbacks where another leads to the point; they are the last resort."""
+    """One that leads nowhere costs no fallbacks where another leads to the point; they are the last
+    resort.
+    """
     model, plain, asked = stop(), sweep_module._solve, []
     near, beyond = (solve(model, omega, 5, 0) for omega in (1.0, 1.3))
 
@@ -75,8 +100,11 @@ def test_the_neighbour_beyond_a_fold_is_tried_before_the_fallbacks(monkeypatch):
         return replace(point, converged=point.converged and any(start is s for s in leading))
 
     monkeypatch.setattr(sweep_module, "_solve", counted)
-    for leading, tried in (([near], [(near, False)]), ([beyond], [(near, False), (beyond, False)]),
-                           ([], [(near, False), (beyond, False), (near, True)])):
+    for leading, tried in (
+        ([near], [(near, False)]),
+        ([beyond], [(near, False), (beyond, False)]),
+        ([], [(near, False), (beyond, False), (near, True)]),
+    ):
         asked.clear()
         point = sweep_module.solve_from(model, 1.1, 5, 0, [near, beyond])
         assert point.converged == bool(leading) and [f for _, f in asked] == [f for _, f in tried]
@@ -84,33 +112,57 @@ def test_the_neighbour_beyond_a_fold_is_tried_before_the_fallbacks(monkeypatch):
 
 
 def twins(coupling):
-    """Two of these masses, coupled by a weak spring and driven alike: the motion in step loses its symmetry."""
+    """Two of these masses, coupled by a weak spring and driven alike: the motion in step loses its
+    symmetry.
+    """
     link = 1.0 + coupling * np.array([[1.0, -1.0], [-1.0, 1.0]]) - (1.0 - np.eye(2))
     K = np.kron(link, np.diag([1.0, 0.0])) + np.kron(np.eye(2), np.diag([0.0, 50.0]))
     ports = {"contact": np.arange(4), "load": np.array([0, 2]), "probe": np.array([0, 2])}
     elements = Elements(np.full(2, 1e-3), np.ones(2), np.zeros(2), np.full(2, -1.0), tangents=1)
-    return ReducedModel((port_model_from_matrices(np.eye(4), K, ports),), elements, {1: np.array([0.1, 0.1])},
-                        Damping(ratio=0.02))
+    return ReducedModel(
+        (port_model_from_matrices(np.eye(4), K, ports),),
+        elements,
+        {1: np.array([0.1, 0.1])},
+        Damping(ratio=0.02),
+    )
 
 
 def test_branch_points_of_two_equal_masses():
-    """In step both masses are the single one; the derivative against each other is that of a mass on 1 + 2 coupling.
+    """In step both masses are the single one; the derivative against each other is that of a mass
+    on 1 + 2 coupling.
 
-    It turns singular between two points of the path where the path in step does not turn: there unequal motions begin.
+    It turns singular between two points of the path where the path in step does not turn: there
+    unequal motions begin.
     """
     coupling, H = 0.03, 5
-    points = list(follow(twins(coupling), "omega", solve(twins(coupling), 0.8, H, 0), (0.8, 1.6), steps=(0.03, 0.03)))
+    points = list(
+        follow(
+            twins(coupling),
+            "omega",
+            solve(twins(coupling), 0.8, H, 0),
+            (0.8, 1.6),
+            steps=(0.03, 0.03),
+        )
+    )
     assert all(abs(p.solution.probe[1, 0] - p.solution.probe[1, 1]) < 1e-9 for p in points)
     assert [p.fold for p in points].count(True) == 2
-    body = port_model_from_matrices(np.eye(2), np.diag([1.0 + 2 * coupling, 50.0]), {
-        "contact": np.array([0, 1]), "load": np.array([0]), "probe": np.array([0])})
+    body = port_model_from_matrices(
+        np.eye(2),
+        np.diag([1.0 + 2 * coupling, 50.0]),
+        {"contact": np.array([0, 1]), "load": np.array([0]), "probe": np.array([0])},
+    )
     apart = replace(stop(), sides=(body,), damping=Damping(ratio=0.02 / np.sqrt(1 + 2 * coupling)))
     signs = []
     for p in points:
         balance, w = Balance(apart, condense(apart, p.value, H), 0), p.solution.w[:1]
         steps = 1e-7 * abs(w).max() * np.eye(w.size).reshape(-1, *w.shape)
-        J = [(evaluate_balance(balance, w + e).residual - evaluate_balance(balance, w - e).residual).ravel()
-             for e in steps]
+        J = [
+            (
+                evaluate_balance(balance, w + e).residual
+                - evaluate_balance(balance, w - e).residual
+            ).ravel()
+            for e in steps
+        ]
         signs.append(np.linalg.slogdet(np.array(J))[0])
     turns = [i for i in range(1, len(signs)) if signs[i] != signs[i - 1]]
     found = [i for i, p in enumerate(points) if p.branch]
@@ -118,7 +170,7 @@ def test_branch_points_of_two_equal_masses():
     assert len(turns) == len(found) == 2 and max(abs(np.subtract(turns, found))) <= 1
     first = next(p for p in points if p.branch)
     model, unequal = twins(coupling), []
-    for push in np.linspace(0.05, 0.5, 10):     # beside the path, just after the crossing
+    for push in np.linspace(0.05, 0.5, 10):  # beside the path, just after the crossing
         near = first.solution.w * np.array([1 + push, 1 - push])[:, None, None]
         end = solve(model, first.value - 0.002, H, 0, start=replace(first.solution, w=near))
         unequal.append(end.converged and abs(end.probe[1, 0] - end.probe[1, 1]) > 0.02)

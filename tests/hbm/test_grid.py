@@ -4,9 +4,9 @@ import numpy as np
 import pytest
 from hbm_grid import grid
 
-from bladefem.hbm.api import solve, stuck
-from bladefem.hbm.reference import reference_model
-from bladefem.hbm.resonance import free_resonances, stuck_resonances
+from bladefem.hbm.linear_resonances import free_resonances, stuck_resonances
+from bladefem.hbm.reference_blade import reference_model
+from bladefem.hbm.solve import solve, stuck
 from bladefem.hbm.sweep import local_maxima, response, size, sweep
 
 HZ = 2 * np.pi
@@ -19,13 +19,17 @@ def test_every_fifth_point_of_the_grid():
     assert max(s.work.imbalance for s in found) < 1e-9
 
 
-@pytest.mark.parametrize(("kt", "phase", "expected"), [(1e6, 0.0, 1386.0), (2e7, 0.0, 1086.0), (2e7, np.pi, 2046.0)])
+@pytest.mark.parametrize(
+    ("kt", "phase", "expected"), [(1e6, 0.0, 1386.0), (2e7, 0.0, 1086.0), (2e7, np.pi, 2046.0)]
+)
 def test_stuck_resonance_is_the_peak_of_the_stuck_response(kt, phase, expected):
-    """Design values of the blade with 60 g: added stiffness, added mass, and no damper motion at all."""
+    """Design values of the blade with 60 g: added stiffness, added mass, and no damper motion at
+    all.
+    """
     model = reference_model(kt, 0.06, 30.0, phase=phase, harmonics=1)
     resonances = stuck_resonances(model)
     omega = resonances[np.argmin(abs(resonances - HZ * expected))]
-    assert omega / HZ == pytest.approx(expected, rel=1e-2)     # some slip lowers the last one
+    assert omega / HZ == pytest.approx(expected, rel=1e-2)  # some slip lowers the last one
     heights = [abs(stuck(model, omega * f)[1, 0]) for f in (0.999, 1.0, 1.001)]
     assert heights[1] == max(heights)
 
@@ -60,9 +64,13 @@ def test_sweep_meets_the_peak_of_a_fine_sweep():
 
 @pytest.mark.parametrize("load", [0.6, 1.4, 5.0])
 def test_a_sweep_for_peaks_alone_keeps_its_tolerance_with_few_points(load):
-    """Brute force: 161 frequencies round the peak. Even steps over the band take 68 to 95 points to come as near."""
+    """Brute force: 161 frequencies round the peak. Even steps over the band take 68 to 95 points to
+    come as near.
+    """
     model = reference_model(1e6, 0.06, load, points=3, harmonics=3)
-    points = sorted(sweep(model, (HZ * 1150, HZ * 1450), 3, 0, peak=1e-4, curve=0.5), key=lambda s: s.omega)
+    points = sorted(
+        sweep(model, (HZ * 1150, HZ * 1450), 3, 0, peak=1e-4, curve=0.5), key=lambda s: s.omega
+    )
     top = max(local_maxima(points), key=size)
     fine = max(size(p) for p in response(model, top.omega + HZ * np.linspace(-4, 4, 161), 3, 0))
     assert len(points) <= 22 and size(top) == pytest.approx(fine, rel=1e-4)

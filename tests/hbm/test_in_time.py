@@ -1,4 +1,6 @@
-"""The model in time against the balance with many harmonics, and shooting as the last way to a point."""
+"""The model in time against the balance with many harmonics, and shooting as the last way to a
+point.
+"""
 
 from dataclasses import replace
 
@@ -9,28 +11,35 @@ from models import block, single_mass
 
 from bladefem.data import RigidBody
 from bladefem.errors import InputError
-from bladefem.hbm import fallback
-from bladefem.hbm.api import solve
-from bladefem.hbm.in_time import shooting_start, time_system
-from bladefem.hbm.linear import condense
-from bladefem.hbm.newton import newton
-from bladefem.hbm.residual import Balance
-from bladefem.hbm.shooting import harmonics, periodic
+from bladefem.hbm.linear.condensation import condense
+from bladefem.hbm.solve import solve
+from bladefem.hbm.solver import fallback
+from bladefem.hbm.solver.newton import newton
+from bladefem.hbm.solver.residual import Balance
+from bladefem.hbm.time_model import shooting_start, time_system
+from bladefem.time.shooting import harmonics, periodic
 
 DAMPER = RigidBody(np.array([[0.5]]), np.ones((1, 1)))
 SWELLING = replace(single_mass(), normal={1: np.array([0.3]), 2: np.array([0.1 - 0.2j])})
 
 
-@pytest.mark.parametrize(("model", "omega", "H"), [
-    (single_mass(), 1.1, 31), (SWELLING, 1.1, 31), (beam().model, 8300.0, 15), (chain(masses=4).model, 1.1, 31),
-    (replace(single_mass(), damper=DAMPER), 1.3, 31)])
+@pytest.mark.parametrize(
+    ("model", "omega", "H"),
+    [
+        (single_mass(), 1.1, 31),
+        (SWELLING, 1.1, 31),
+        (beam().model, 8300.0, 15),
+        (chain(masses=4).model, 1.1, 31),
+        (replace(single_mass(), damper=DAMPER), 1.3, 31),
+    ],
+)
 def test_shooting_and_balance_meet(model, omega, H):
     system = time_system(model, H)
     exact = harmonics(periodic(system, omega, samples=4096), system, 1)[0, 1]
     found = solve(model, omega, H, 0)
     assert found.converged and found.states["slip"] + found.states["lift"]
     # what H harmonics leave out falls with about H^-3
-    assert abs(found.probe[1, 0] - exact) < 2e-6 * abs(exact) * (31 / H)**3
+    assert abs(found.probe[1, 0] - exact) < 2e-6 * abs(exact) * (31 / H) ** 3
 
 
 def test_shooting_reaches_a_point_by_itself():
@@ -43,22 +52,29 @@ def test_shooting_reaches_a_point_by_itself():
 
 
 def test_shooting_is_the_last_link(monkeypatch):
-    """With every other way closed the point is still solved, and says how; without a form in time it says why not."""
+    """With every other way closed the point is still solved, and says how; without a form in time
+    it says why not.
+    """
+
     def closed(balance, *_):
         return fallback._back(balance, fallback.Newton(None, 0, False, ""), 0, "closed")
+
     def back(balance, end, iterations, reason):
         w = fallback.start_in_stick(balance)
         return fallback.Newton(fallback.evaluate_balance(balance, w), iterations, False, reason)
+
     monkeypatch.setattr(fallback, "_back", back)
     for way in ("_more_harmonics", "_from_high_load", "_along_excitation"):
         monkeypatch.setattr(fallback, way, closed)
     whole = fallback.newton
     calls = []
+
     def newton_once_closed(balance, *arguments):
         calls.append(1)
         return whole(balance, *arguments) if len(calls) > 2 else closed(balance)
+
     monkeypatch.setattr(fallback, "newton", newton_once_closed)
-    monkeypatch.setattr("bladefem.hbm.api.solve_small", lambda *_: None)
+    monkeypatch.setattr("bladefem.hbm.solve.solve_small", lambda *_: None)
     solution = solve(single_mass(), 1.1, 7, 256)
     assert solution.converged and solution.method == "shooting"
     monkeypatch.setattr(fallback, "newton", lambda balance, *_: closed(balance))

@@ -4,9 +4,9 @@ import numpy as np
 import pytest
 from models import block, single_mass
 
-from bladefem.hbm.linear import condense
-from bladefem.hbm.reference import reference_model
-from bladefem.hbm.residual import Balance, evaluate_balance, linearise, start_in_stick
+from bladefem.hbm.linear.condensation import condense
+from bladefem.hbm.reference_blade import reference_model
+from bladefem.hbm.solver.residual import Balance, evaluate_balance, linearise, start_in_stick
 
 
 def differences(balance, w, step):
@@ -18,9 +18,16 @@ def differences(balance, w, step):
     return np.array(columns).reshape(w.size, w.size).T
 
 
-@pytest.mark.parametrize(("model", "omega", "scale"), [
-    (single_mass(), 0.9, 1.5), (block(), 0.9, 3.0), (block(kn=0.0), 0.9, 3.0), (block(nodes=6, force=4.0), 1.1, 1.0),
-    (reference_model(points=2, load=0.3, phase=0.5, harmonics=3), 8000.0, 0.8)])
+@pytest.mark.parametrize(
+    ("model", "omega", "scale"),
+    [
+        (single_mass(), 0.9, 1.5),
+        (block(), 0.9, 3.0),
+        (block(kn=0.0), 0.9, 3.0),
+        (block(nodes=6, force=4.0), 1.1, 1.0),
+        (reference_model(points=2, load=0.3, phase=0.5, harmonics=3), 8000.0, 0.8),
+    ],
+)
 def test_the_inverse_derivative_undoes_the_differences(model, omega, scale):
     balance = Balance(model, condense(model, omega, 3), 128)
     rng = np.random.default_rng(2)

@@ -1,17 +1,26 @@
-"""The compiled iterations against a dense solution, and many points at once against one after the other."""
+"""The compiled iterations against a dense solution, and many points at once against one after the
+other.
+"""
 
 import numpy as np
 import pytest
 
-from bladefem.hbm import small_bodies
-from bladefem.hbm.api import solve, sticking
-from bladefem.hbm.coarse import no_level, second_level
-from bladefem.hbm.compiled import _jacobian
-from bladefem.hbm.flex import among, apply, by_harmonic, flexed, formed, seen_by
-from bladefem.hbm.krylov import conjugate_residuals
-from bladefem.hbm.newton import Options
-from bladefem.hbm.reference import reference_model
-from bladefem.hbm.resonance import stuck_resonances
+from bladefem.hbm.linear import packed_bodies as small_bodies
+from bladefem.hbm.linear.contact_flexibility import (
+    among,
+    apply,
+    by_harmonic,
+    flexed,
+    formed,
+    seen_by,
+)
+from bladefem.hbm.linear_resonances import stuck_resonances
+from bladefem.hbm.reference_blade import reference_model
+from bladefem.hbm.solve import solve, sticking
+from bladefem.hbm.solver.deflation import no_level, second_level
+from bladefem.hbm.solver.krylov import conjugate_residuals
+from bladefem.hbm.solver.newton import Options
+from bladefem.hbm.solver.newton_compiled import _jacobian
 from bladefem.hbm.sweep import response
 
 
@@ -28,7 +37,7 @@ def test_the_jacobian_is_what_the_product_applies():
     A, C = system(1.0)
     J, K, size = _jacobian(A, C), 2 * len(A) - 1, C.shape[1]
     x = np.random.default_rng(4).normal(size=len(J))
-    forces = np.concatenate([block @ x[i * size:(i + 1) * size] for i, block in enumerate(C)])
+    forces = np.concatenate([block @ x[i * size : (i + 1) * size] for i, block in enumerate(C)])
     out = x.reshape(-1, K).copy()
     apply(A, forces.reshape(-1, K), out)
     np.testing.assert_allclose(J @ x, out.ravel(), atol=1e-13)
@@ -42,7 +51,9 @@ def test_conjugate_residuals_reach_the_accuracy_or_say_no(accuracy):
     assert conjugate_residuals(by_harmonic(A), C, r, accuracy, no_level(), x)
     assert np.linalg.norm(J @ x - r) <= 1.01 * accuracy * np.linalg.norm(r)
     A, C = system(100.0)
-    assert not conjugate_residuals(by_harmonic(A), C, r, accuracy, no_level(), x)   # no 60 directions are enough there
+    assert not conjugate_residuals(
+        by_harmonic(A), C, r, accuracy, no_level(), x
+    )  # no 60 directions are enough there
 
 
 def by_modes(nodes=6, d=2, H=4, M=3):
@@ -68,12 +79,16 @@ def test_both_forms_of_a_flexibility_are_the_same():
     some = np.array([1, 4])
     rows = np.array([2, 3, 8, 9])
     for form in (flex, by_harmonic(A)):
-        np.testing.assert_allclose(formed(among(form, some, 2)), A[:, rows[:, None], rows], atol=1e-12)
+        np.testing.assert_allclose(
+            formed(among(form, some, 2)), A[:, rows[:, None], rows], atol=1e-12
+        )
         assert among(form, np.arange(6), 2)[0] is not None
 
 
 def test_a_second_level_needs_fewer_directions_for_the_same_step():
-    """The modes of the flexibility are the motions that contacts have in common: they alone take iterations long."""
+    """The modes of the flexibility are the motions that contacts have in common: they alone take
+    iterations long.
+    """
     flex, (_, C) = by_modes(), system(3.0)
     Q, _ = np.linalg.qr(flex[3])
     J, x = _jacobian(formed(flex), C), np.empty(C.shape[0] * C.shape[1])
@@ -104,7 +119,9 @@ def test_a_model_that_all_harmonics_share_is_solved_by_its_modes(monkeypatch):
 
 
 def test_points_that_stick_are_the_same_at_once_and_one_by_one():
-    """Up to the first frequency that slips; a sweep goes on from there, and comes to the same points."""
+    """Up to the first frequency that slips; a sweep goes on from there, and comes to the same
+    points.
+    """
     model = reference_model(1e6, 0.06, 8.0, points=2, harmonics=7)
     omegas = stuck_resonances(model)[1] * np.linspace(0.9, 1.1, 60)
     frugal = Options(frugal=True)

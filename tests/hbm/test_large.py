@@ -1,4 +1,6 @@
-"""The path of large patches: GMRES steps are those of the dense Jacobian, and no dense Jacobian is made."""
+"""The path of large patches: GMRES steps are those of the dense Jacobian, and no dense Jacobian is
+made.
+"""
 
 from dataclasses import replace
 
@@ -6,11 +8,11 @@ import numpy as np
 import pytest
 from hbm_models import patch
 
-from bladefem.hbm import residual as residual_module
-from bladefem.hbm.api import solve
-from bladefem.hbm.iterative import iterative_inverse
-from bladefem.hbm.linear import condense
-from bladefem.hbm.residual import Balance, evaluate_balance, linearise, start_in_stick
+from bladefem.hbm.linear.condensation import condense
+from bladefem.hbm.solve import solve
+from bladefem.hbm.solver import residual as residual_module
+from bladefem.hbm.solver.newton_krylov import iterative_inverse
+from bladefem.hbm.solver.residual import Balance, evaluate_balance, linearise, start_in_stick
 
 
 def test_iterative_and_dense_steps_agree(monkeypatch):
@@ -26,7 +28,8 @@ def test_iterative_and_dense_steps_agree(monkeypatch):
 
 
 def test_the_preconditioner_takes_over_where_plain_gmres_is_too_slow(monkeypatch):
-    from bladefem.hbm import iterative
+    from bladefem.hbm.solver import newton_krylov as iterative
+
     monkeypatch.setattr(iterative, "conjugate_residuals", lambda *_: False)
     model = patch(side=4, inner=6).model
     balance = Balance(model, condense(model, 0.8, 3), 64)
@@ -42,7 +45,9 @@ def test_the_preconditioner_takes_over_where_plain_gmres_is_too_slow(monkeypatch
 
 
 def nearly_singular() -> tuple[np.ndarray, np.ndarray]:
-    """A and change of 12 nodes, 3 directions, 3 harmonics, where 1 + A change has an eigenvalue of 1e-5."""
+    """A and change of 12 nodes, 3 directions, 3 harmonics, where 1 + A change has an eigenvalue of
+    1e-5.
+    """
     random = np.random.default_rng(7)
     half = random.standard_normal((4, 36, 36)) + 1j * random.standard_normal((4, 36, 36))
     A = half @ half.conj().swapaxes(1, 2) / 36
@@ -55,8 +60,11 @@ def nearly_singular() -> tuple[np.ndarray, np.ndarray]:
 
 @pytest.mark.parametrize("directions", [True, False])
 def test_steps_next_to_a_singular_derivative_reach_their_accuracy(monkeypatch, directions):
-    """The step is 10^4 times the residual there: products in single precision leave some percent of it behind."""
-    from bladefem.hbm import iterative
+    """The step is 10^4 times the residual there: products in single precision leave some percent of
+    it behind.
+    """
+    from bladefem.hbm.solver import newton_krylov as iterative
+
     if not directions:
         monkeypatch.setattr(iterative, "conjugate_residuals", lambda *_: False)
     A, change = nearly_singular()
@@ -68,7 +76,8 @@ def test_steps_next_to_a_singular_derivative_reach_their_accuracy(monkeypatch, d
 
 
 def test_dense_factors_are_the_last_resort(monkeypatch):
-    from bladefem.hbm import iterative
+    from bladefem.hbm.solver import newton_krylov as iterative
+
     A, change = nearly_singular()
     right = np.random.default_rng(1).standard_normal((36, 7))
     monkeypatch.setattr(residual_module, "DENSE", 0)
@@ -84,18 +93,25 @@ def test_a_patch_with_lift_off_is_solved_and_balances_its_work():
     for omega in (0.5, 0.9, 1.3):
         solution = solve(model, omega, 3, 64)
         assert solution.converged and solution.work.imbalance < 1e-8
-        lighter = solve(replace(model, excitation={1: 0.5 * model.excitation[1]}), omega, 3, 64, start=solution)
+        lighter = solve(
+            replace(model, excitation={1: 0.5 * model.excitation[1]}), omega, 3, 64, start=solution
+        )
         assert lighter.converged
 
 
 def test_blocks_serve_a_whole_newton_run(monkeypatch):
-    """A patch of which all nodes lift off: blocks are made once and then again only where nodes change their state."""
-    from bladefem.hbm import iterative
+    """A patch of which all nodes lift off: blocks are made once and then again only where nodes
+    change their state.
+    """
+    from bladefem.hbm.solver import newton_krylov as iterative
+
     monkeypatch.setattr(iterative, "conjugate_residuals", lambda *_: False)
     made, model = [], patch(side=6, inner=12, n0=0.1).model
     plain = iterative._harmonic_blocks
     monkeypatch.setattr(iterative, "_harmonic_blocks", lambda *a: made.append(1) or plain(*a))
-    monkeypatch.setattr(iterative, "SLOW", 40)      # where fewer contacts make products cheap, blocks seldom pay
+    monkeypatch.setattr(
+        iterative, "SLOW", 40
+    )  # where fewer contacts make products cheap, blocks seldom pay
     solution = solve(model, 0.5, 5, 128)
     assert solution.converged and solution.work.imbalance < 1e-8 and solution.states["lift"] == 36
     assert 0 < len(made) < solution.iterations / 2

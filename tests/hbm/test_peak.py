@@ -7,13 +7,13 @@ import pytest
 from models import block
 
 from bladefem.data import Elements
-from bladefem.hbm.api import solve
 from bladefem.hbm.model import Damping, ReducedModel
 from bladefem.hbm.optimum import optimum
+from bladefem.hbm.parameters import vary
 from bladefem.hbm.peak import find_peak, track_peak
-from bladefem.hbm.reference import reference_model
+from bladefem.hbm.reference_blade import reference_model
+from bladefem.hbm.solve import solve
 from bladefem.hbm.sweep import response, size
-from bladefem.hbm.vary import vary
 from bladefem.reduction.matrices import port_model_from_matrices
 
 HZ = 2 * np.pi
@@ -37,9 +37,14 @@ def test_a_tracked_peak_is_the_peak_at_each_load():
         fine = np.linspace(peak.omega * 0.998, peak.omega * 1.002, 41)
         highest = max(size(solve(vary(model, "load", peak.value), omega, 3, 0)) for omega in fine)
         assert peak.height == pytest.approx(highest, rel=1e-3)
-    # the derivative of the peak's height is that at a fixed frequency, since the slope with frequency is zero
-    near = [find_peak(vary(model, "load", path[5].value * f), path[5].omega, 3, 0, tolerance=1e-7).height
-            for f in (0.999, 1.001)]
+    # the derivative of the peak's height is that at a fixed frequency, since the slope with
+    # frequency is zero
+    near = [
+        find_peak(
+            vary(model, "load", path[5].value * f), path[5].omega, 3, 0, tolerance=1e-7
+        ).height
+        for f in (0.999, 1.001)
+    ]
     assert path[5].slope == pytest.approx((near[1] - near[0]) / np.log(1.001 / 0.999), rel=0.02)
 
 
@@ -50,22 +55,35 @@ def test_optimum_load_against_a_scan():
     frequencies = np.arange(1200.0, 1400.0, 4.0)
     scan = {}
     for factor in np.geomspace(1.0, 1.9, 7):
-        scan[factor] = max(size(solve(vary(model, "load", factor), HZ * f, 3, 128)) for f in frequencies)
+        scan[factor] = max(
+            size(solve(vary(model, "load", factor), HZ * f, 3, 128)) for f in frequencies
+        )
     assert best.points < 60
     assert best.peak.height <= min(scan.values()) * 1.002
     assert best.peak.height == pytest.approx(min(scan.values()), rel=0.02)
     assert 1.0 < best.value < 1.9
 
 
-@pytest.mark.parametrize(("kt", "mass", "band", "height"), [
-    (1e6, 0.03, (1150, 2000), 1.0903e-6), (1e6, 0.12, (1150, 1650), 3.8691e-6), (2e7, 0.01, (900, 1400), 9.9683e-6),
-    (2e7, 0.06, (900, 1400), 2.1029e-6), (1e6, 0.06, (190, 260), 5.6735e-4)])
+@pytest.mark.parametrize(
+    ("kt", "mass", "band", "height"),
+    [
+        (1e6, 0.03, (1150, 2000), 1.0903e-6),
+        (1e6, 0.12, (1150, 1650), 3.8691e-6),
+        (2e7, 0.01, (900, 1400), 9.9683e-6),
+        (2e7, 0.06, (900, 1400), 2.1029e-6),
+        (1e6, 0.06, (190, 260), 5.6735e-4),
+    ],
+)
 def test_optima_of_light_and_heavy_dampers(kt, mass, band, height):
-    """Heights: lowest of nine loads near the optimum, 600 frequencies each; two peaks exchange their order in some."""
+    """Heights: lowest of nine loads near the optimum, 600 frequencies each; two peaks exchange
+    their order in some.
+    """
     model = reference_model(kt, mass, 1.0, harmonics=3)
     best = optimum(model, (HZ * band[0], HZ * band[1]), (0.1, 20.0), 3, 128)
-    assert best.points < 130        # where two peaks exchange their order both are climbed at each load
-    assert best.peak.height == pytest.approx(height, rel=0.015)     # two peaks less than 2 % apart count as one
+    assert best.points < 130  # where two peaks exchange their order both are climbed at each load
+    assert best.peak.height == pytest.approx(
+        height, rel=0.015
+    )  # two peaks less than 2 % apart count as one
 
 
 def highest(model, band, count=101):
@@ -78,15 +96,25 @@ def highest(model, band, count=101):
 
 
 def test_the_optimum_sees_the_higher_of_two_maxima_of_one_hump():
-    """Two dofs, forces of two harmonics: 3.8433 um at the best load, by 1600 frequencies at ten loads. Its height was
-    once taken from the lower maximum, 1.4 % below what the band holds."""
-    body = port_model_from_matrices(np.eye(2), np.array([[1.5e6, -0.5e6], [-0.5e6, 1.5e6]]),
-                                    {"contact": [0], "load": [0, 1], "probe": [0, 1]},
-                                    C=4e-6 * np.array([[1.5e6, -0.5e6], [-0.5e6, 1.5e6]]))
+    """Two dofs, forces of two harmonics: 3.8433 um at the best load, by 1600 frequencies at ten
+    loads. Its height was once taken from the lower maximum, 1.4 % below what the band holds.
+    """
+    body = port_model_from_matrices(
+        np.eye(2),
+        np.array([[1.5e6, -0.5e6], [-0.5e6, 1.5e6]]),
+        {"contact": [0], "load": [0, 1], "probe": [0, 1]},
+        C=4e-6 * np.array([[1.5e6, -0.5e6], [-0.5e6, 1.5e6]]),
+    )
     force = {1: np.array([1.0, 0.5j]), 3: np.array([0.0, 0.2])}
-    model, band = ReducedModel((body,), Elements([1e6], [0.0], [0.4], [10.0], 1), force), (800.0, 1600.0)
+    model, band = (
+        ReducedModel((body,), Elements([1e6], [0.0], [0.4], [10.0], 1), force),
+        (800.0, 1600.0),
+    )
     best = optimum(model, band, (0.01, 10.0), 7, 256)
-    there = max(size(p) for p in response(vary(model, "load", best.value), np.linspace(1050, 1130, 81), 7, 256))
+    there = max(
+        size(p)
+        for p in response(vary(model, "load", best.value), np.linspace(1050, 1130, 81), 7, 256)
+    )
     assert best.peak.height == pytest.approx(3.8433e-6, rel=1e-3)
     assert best.peak.height == pytest.approx(there, rel=1e-3)
 
@@ -96,39 +124,71 @@ def light_block(damper=False):
     return replace(block(nodes=2, dofs=8, seed=5, force=0.3, damper=damper), damping=Damping(0.03))
 
 
-@pytest.mark.parametrize(("name", "values", "damper"), [
-    ("load", (1.0, 0.8, 0.6), False), ("force", (1.0, 1.3, 1.7), False), ("mu", (1.0, 0.8, 0.6), False),
-    ("kt", (1.0, 1.3, 1.7), False), ("kn", (1.0, 0.8, 0.6), False), ("gap", (0.0, 0.1, 0.2), False),
-    ("mass", (1.0, 1.3, 1.7), True), ("damping", (1.0, 0.8, 0.6), False)])
+@pytest.mark.parametrize(
+    ("name", "values", "damper"),
+    [
+        ("load", (1.0, 0.8, 0.6), False),
+        ("force", (1.0, 1.3, 1.7), False),
+        ("mu", (1.0, 0.8, 0.6), False),
+        ("kt", (1.0, 1.3, 1.7), False),
+        ("kn", (1.0, 0.8, 0.6), False),
+        ("gap", (0.0, 0.1, 0.2), False),
+        ("mass", (1.0, 1.3, 1.7), True),
+        ("damping", (1.0, 0.8, 0.6), False),
+    ],
+)
 def test_a_peak_is_followed_in_every_parameter(name, values, damper):
-    """Each peak against a fine sweep round it, its derivative against peaks at neighbouring values."""
+    """Each peak against a fine sweep round it, its derivative against peaks at neighbouring
+    values.
+    """
     model, omega = light_block(damper), 1.45 if damper else 1.03
     for peak in list(track_peak(model, name, values, omega, 3, 512))[2:]:
         around = np.linspace(0.99, 1.01, 41) * peak.omega
-        heights = [size(solve(vary(model, name, peak.value), w, 3, 512, start=peak.solution)) for w in around]
+        heights = [
+            size(solve(vary(model, name, peak.value), w, 3, 512, start=peak.solution))
+            for w in around
+        ]
         assert max(heights) * 0.9999 < peak.height < max(heights) * 1.001
         step = 1e-3
-        ends = [peak.value + by if name == "gap" else peak.value * np.exp(by) for by in (-step, step)]
-        low, high = (find_peak(vary(model, name, v), peak.omega, 3, 512, near=peak, tolerance=1e-9) for v in ends)
-        # a peak known to 1e-4 of its height lies a hundredth of its width beside the top, where the slope differs a bit
-        assert peak.slope == pytest.approx((high.height - low.height) / (2 * step), rel=0.02, abs=5e-3 * peak.height)
+        ends = [
+            peak.value + by if name == "gap" else peak.value * np.exp(by) for by in (-step, step)
+        ]
+        low, high = (
+            find_peak(vary(model, name, v), peak.omega, 3, 512, near=peak, tolerance=1e-9)
+            for v in ends
+        )
+        # a peak known to 1e-4 of its height lies a hundredth of its width beside the top, where the
+        # slope differs a bit
+        assert peak.slope == pytest.approx(
+            (high.height - low.height) / (2 * step), rel=0.02, abs=5e-3 * peak.height
+        )
 
 
 def test_the_best_gap_takes_as_much_load_away_as_the_best_load():
     """Normal and tangential motion uncoupled: a gap is nothing but a smaller load, n0 - kn gap."""
     ports = {"contact": [0, 1], "load": [1], "probe": [1]}
     body = port_model_from_matrices(np.eye(2), np.diag([5.0, 1.0]), ports)
-    model = ReducedModel((body,), Elements([1.0], [2.0], [0.5], [3.0], 1), {1: [1.0]}, Damping(0.01))
+    model = ReducedModel(
+        (body,), Elements([1.0], [2.0], [0.5], [3.0], 1), {1: [1.0]}, Damping(0.01)
+    )
     load = optimum(model, (0.8, 1.6), (0.05, 1.5), 5, 0, name="load", tolerance=1e-6)
     gap = optimum(model, (0.8, 1.6), (-0.5, 1.4), 5, 0, name="gap", tolerance=1e-6)
     assert gap.peak.height == pytest.approx(load.peak.height, rel=1e-5)
     assert 3.0 - 2.0 * gap.value == pytest.approx(3.0 * load.value, rel=3e-3)
 
 
-@pytest.mark.parametrize(("name", "bounds", "near"), [
-    ("gap", (-0.5, 0.6), (0.326, 0.386)), ("mu", (0.2, 3.0), (0.30, 0.33)), ("kn", (0.2, 2.0), (0.84, 0.92))])
+@pytest.mark.parametrize(
+    ("name", "bounds", "near"),
+    [
+        ("gap", (-0.5, 0.6), (0.326, 0.386)),
+        ("mu", (0.2, 3.0), (0.30, 0.33)),
+        ("kn", (0.2, 2.0), (0.84, 0.92)),
+    ],
+)
 def test_optima_of_contacts_that_lift_off(name, bounds, near):
-    """The minimum is one: not lower on either side, and the height is that of the whole band's highest peak."""
+    """The minimum is one: not lower on either side, and the height is that of the whole band's
+    highest peak.
+    """
     model, band = light_block(), (0.5, 1.3)
     best = optimum(model, band, bounds, 3, 64, name=name)
     assert best.peak.height == pytest.approx(highest(vary(model, name, best.value), band), rel=3e-3)

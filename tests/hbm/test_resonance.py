@@ -3,17 +3,25 @@
 import numpy as np
 import pytest
 
-from bladefem.hbm.reference import reference_model
-from bladefem.hbm.resonance import free_resonances, stuck_partners, stuck_resonances
-from bladefem.study.choice import default_band
+from bladefem.hbm.linear_resonances import free_resonances, stuck_partners, stuck_resonances
+from bladefem.hbm.reference_blade import reference_model
+from bladefem.study.adaptive.choice import default_band
 
 HZ = 2 * np.pi
 
 
-@pytest.mark.parametrize(("kt", "mass", "number", "frequency"), [
-    (1e6, 0.06, 2, 1385.7), (1e6, 0.03, 2, 1519.8), (3e6, 0.12, 2, 1633.9), (2e7, 0.06, 1, 1087.7)])
+@pytest.mark.parametrize(
+    ("kt", "mass", "number", "frequency"),
+    [
+        (1e6, 0.06, 2, 1385.7),
+        (1e6, 0.03, 2, 1519.8),
+        (3e6, 0.12, 2, 1633.9),
+        (2e7, 0.06, 1, 1087.7),
+    ],
+)
 def test_stuck_mode_of_a_blade_is_not_the_dampers_own(kt, mass, number, frequency):
-    """On soft contacts the stuck mode next above the blade's first is the damper's, bouncing on its springs.
+    """On soft contacts the stuck mode next above the blade's first is the damper's, bouncing on its
+    springs.
 
     1385.7 and 1087.7 Hz are the beam theory's. Overlaps of the modes: 0.81, 0.74, 0.80, 0.75.
     """

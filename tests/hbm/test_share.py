@@ -7,50 +7,67 @@ from models import block, single_mass
 from bladefem.errors import NotSolvedError
 from bladefem.hbm import sweep
 from bladefem.hbm.optimum import optimum
-from bladefem.hbm.share import shared, shared_response
+from bladefem.hbm.parallel import shared, shared_response
+from bladefem.hbm.parameters import vary
 from bladefem.hbm.sweep import response, size
-from bladefem.hbm.vary import vary
 
 OMEGAS = np.linspace(0.6, 1.8, 39)
 
 
 def test_blocks_meet_the_response_of_one_run():
     model = single_mass()
-    for one, other in zip(shared_response(model, OMEGAS, 5, 128), response(model, OMEGAS, 5, 128), strict=True):
+    for one, other in zip(
+        shared_response(model, OMEGAS, 5, 128), response(model, OMEGAS, 5, 128), strict=True
+    ):
         assert one.converged and one.omega == other.omega
-        np.testing.assert_allclose(one.probe, other.probe, rtol=0, atol=1e-9 * abs(other.probe).max())
+        np.testing.assert_allclose(
+            one.probe, other.probe, rtol=0, atol=1e-9 * abs(other.probe).max()
+        )
 
 
 @pytest.mark.mpi
-@pytest.mark.parametrize(("model", "omegas"), [(single_mass(), OMEGAS), (block(), np.linspace(0.9, 1.2, 18))])
+@pytest.mark.parametrize(
+    ("model", "omegas"), [(single_mass(), OMEGAS), (block(), np.linspace(0.9, 1.2, 18))]
+)
 def test_any_number_of_ranks_gives_the_same_numbers(model, omegas, tmp_path):
     from mpi4py import MPI
+
     comm = MPI.COMM_WORLD
     folder = comm.bcast(tmp_path)
     alone = shared_response(model, omegas, 3, 64)
-    for together in (shared_response(model, omegas, 3, 64, comm=comm),
-                     shared_response(model, omegas, 3, 64, comm=comm, folder=folder),
-                     shared_response(model, omegas, 3, 64, comm=comm, folder=folder)):
+    for together in (
+        shared_response(model, omegas, 3, 64, comm=comm),
+        shared_response(model, omegas, 3, 64, comm=comm, folder=folder),
+        shared_response(model, omegas, 3, 64, comm=comm, folder=folder),
+    ):
         assert len(together) == len(omegas)
         for one, other in zip(together, alone, strict=True):
-            assert np.array_equal(one.w, other.w) and one.iterations == other.iterations and one.work == other.work
+            assert (
+                np.array_equal(one.w, other.w)
+                and one.iterations == other.iterations
+                and one.work == other.work
+            )
     comm.Barrier()
 
 
 @pytest.mark.mpi
 def test_a_killed_run_goes_on_with_any_number_of_ranks(tmp_path, monkeypatch):
-    """Killed on one rank in its second block; only the points that were not written are solved again."""
+    """Killed on one rank in its second block; only the points that were not written are solved
+    again.
+    """
     from mpi4py import MPI
+
     comm, model, plain, solved = MPI.COMM_WORLD, single_mass(), sweep.solve_along, []
     folder = comm.bcast(tmp_path)
     alone = shared_response(model, OMEGAS, 3, 64)
 
     def until(most):
-        def work(model, omegas, *args):     # one of them at a time
+        def work(model, omegas, *args):  # one of them at a time
             if len(solved) == most:
                 raise KeyboardInterrupt
             solved.append(omegas[0])
             return plain(model, omegas[:1], *args)
+
         return work
 
     if comm.rank == 0:
@@ -69,17 +86,26 @@ def test_a_killed_run_goes_on_with_any_number_of_ranks(tmp_path, monkeypatch):
 @pytest.mark.mpi
 def test_a_study_over_loads_is_shared():
     from mpi4py import MPI
+
     model, loads = single_mass(), np.geomspace(0.3, 3.0, 6)
-    study = [shared(lambda load: max(size(p) for p in response(vary(model, "load", load), OMEGAS[::4])), loads, comm)
-             for comm in (MPI.COMM_WORLD, None)]
+    study = [
+        shared(
+            lambda load: max(size(p) for p in response(vary(model, "load", load), OMEGAS[::4])),
+            loads,
+            comm,
+        )
+        for comm in (MPI.COMM_WORLD, None)
+    ]
     assert study[0] == study[1] and len(study[0]) == 6
 
 
 @pytest.mark.mpi
 def test_an_error_on_one_rank_is_raised_on_all():
     from mpi4py import MPI
+
     def work(i):
         if i:
-            optimum(single_mass(), (5.0, 6.0), (0.5, 2.0))      # a band without a peak
+            optimum(single_mass(), (5.0, 6.0), (0.5, 2.0))  # a band without a peak
+
     with pytest.raises(NotSolvedError, match="no peak"):
         shared(work, range(4), MPI.COMM_WORLD)

@@ -29,16 +29,24 @@ def test_short_fields(tmp_path):
     found = read_matrices(tmp_path / "a.bdf")
     assert found["dofs"].tolist() == [[4, 0], [27, 1], [28, 1]]
     np.testing.assert_array_equal(found["STIF"][1:, 1:], [[3e5, -2.5e5], [-2.5e5, 2.5e5]])
-    assert found["GYRO"][2, 1] == 1e-3 and found["GYRO"][0, 1] == -1.0 and found["GYRO"][1, 2] == 0.0
+    assert (
+        found["GYRO"][2, 1] == 1e-3 and found["GYRO"][0, 1] == -1.0 and found["GYRO"][1, 2] == 0.0
+    )
 
 
 @pytest.mark.parametrize("free", [False, True])
 def test_a_body_through_a_punch_file(tmp_path, free):
-    """The beam in long fields, as Nastran punches them, and separated by commas: the same frequencies."""
+    """The beam in long fields, as Nastran punches them, and separated by commas: the same
+    frequencies.
+    """
     K, M = beam_matrices(elements=3)
     lines = []
     for name, matrix in (("KAAX", K), ("MAAX", M)):
-        lines.append(f"DMIG,{name},0,6,2" if free else f"DMIG    {name:8s}{0:8d}{6:8d}{2:8d}{0:8d}{'':8s}{len(K):8d}")
+        lines.append(
+            f"DMIG,{name},0,6,2"
+            if free
+            else f"DMIG    {name:8s}{0:8d}{6:8d}{2:8d}{0:8d}{'':8s}{len(K):8d}"
+        )
         for j in range(len(K)):
             head = (1 + j // 2, 3 + 2 * (j % 2))
             if free:
@@ -48,7 +56,10 @@ def test_a_body_through_a_punch_file(tmp_path, free):
             for i in range(j, len(K)):
                 value = f"{matrix[i, j]:.9E}".replace("E", "D")
                 row = (1 + i // 2, 3 + 2 * (i % 2))
-                term = f"*,{row[0]},{row[1]},{value}", f"*       {row[0]:16d}{row[1]:16d}{value:>16s}"
+                term = (
+                    f"*,{row[0]},{row[1]},{value}",
+                    f"*       {row[0]:16d}{row[1]:16d}{value:>16s}",
+                )
                 lines.append(term[0] if free else term[1])
     (tmp_path / "beam.pch").write_text("\n".join(lines))
     found = read_matrices(tmp_path / "beam.pch")
@@ -58,9 +69,15 @@ def test_a_body_through_a_punch_file(tmp_path, free):
     np.testing.assert_allclose(omega, port_model_from_matrices(M, K, ports).omega, rtol=1e-7)
 
 
-@pytest.mark.parametrize(("text", "word"), [
-    ("GRID,1", "expected DMIG"), ("DMIG,K,0,9,1,,,3\nDMIG,K,1,1,,2,1,1.0", "rectangular"),
-    ("DMIG,K,0,6,1\nDMIG,K,1,1,,two,1,1.0", "line 2"), ("DMIG,K,1,1,,2,1,1.0", "header")])
+@pytest.mark.parametrize(
+    ("text", "word"),
+    [
+        ("GRID,1", "expected DMIG"),
+        ("DMIG,K,0,9,1,,,3\nDMIG,K,1,1,,2,1,1.0", "rectangular"),
+        ("DMIG,K,0,6,1\nDMIG,K,1,1,,two,1,1.0", "line 2"),
+        ("DMIG,K,1,1,,2,1,1.0", "header"),
+    ],
+)
 def test_bad_dmig(tmp_path, text, word):
     (tmp_path / "a.dmig").write_text(text)
     with pytest.raises(InputError, match=word):
@@ -74,10 +91,11 @@ def test_ansys_needs_its_library(tmp_path):
 
 
 def test_a_full_file_comes_without_its_constrained_freedoms(tmp_path, monkeypatch):
-    """The library gives upper triangles with empty rows where a freedom is constrained; here it is played.
+    """The library gives upper triangles with empty rows where a freedom is constrained; here it is
+    played.
 
-    With the library itself its cylinder (963 freedoms, 63 constrained) has its published frequencies: 1283.200,
-    1283.200, 5781.975, 6919.399 Hz.
+    With the library itself its cylinder (963 freedoms, 63 constrained) has its published
+    frequencies: 1283.200, 1283.200, 5781.975, 6919.399 Hz.
     """
     K, M = beam_matrices(elements=2)
     triangles = [np.pad(np.triu(matrix), ((1, 0), (1, 0))) for matrix in (K, M)]
@@ -92,9 +110,17 @@ def test_a_full_file_comes_without_its_constrained_freedoms(tmp_path, monkeypatc
     assert np.array_equal(found["dofs"], dofs[1:])
 
 
-@pytest.mark.parametrize(("name", "word"), [
-    ("a.npz", "cannot be read as .npz"), ("a.mat", "cannot be read as .mat"), ("a.MTX", "cannot be read as .mtx"),
-    ("a.bdf", "cannot be read as .bdf"), ("a.sub", "expected one of"), ("b.npz", "not found")])
+@pytest.mark.parametrize(
+    ("name", "word"),
+    [
+        ("a.npz", "cannot be read as .npz"),
+        ("a.mat", "cannot be read as .mat"),
+        ("a.MTX", "cannot be read as .mtx"),
+        ("a.bdf", "cannot be read as .bdf"),
+        ("a.sub", "expected one of"),
+        ("b.npz", "not found"),
+    ],
+)
 def test_broken_files_are_told_in_one_sentence(tmp_path, name, word):
     if name != "b.npz":
         (tmp_path / name).write_bytes(b"\xff\xfe rubbish")

@@ -13,14 +13,20 @@ from bladefem.reduction.truncate import truncated
 
 def receptance(body, w):
     damping = np.zeros(1) if body.damping is None else body.damping
-    Z = np.diag(body.omega**2 - w**2) + 1j * w * (np.diag(damping) if damping.ndim == 1 else damping)
+    Z = np.diag(body.omega**2 - w**2) + 1j * w * (
+        np.diag(damping) if damping.ndim == 1 else damping
+    )
     return body.shapes @ np.linalg.solve(Z, body.shapes.conj().T) + body.residual
 
 
 def test_cantilever_frequencies():
     """Uniform beam: (1.875104, 4.694091, 7.854757)^2 sqrt(EI / (rho A)) / L^2 (Blevins 1979)."""
     K, M = beam_matrices(elements=40)
-    exact = np.array([1.87510407, 4.69409113, 7.85475744])**2 * np.sqrt(2.1e11 * 0.006**2 / 12 / 7850) / 0.15**2
+    exact = (
+        np.array([1.87510407, 4.69409113, 7.85475744]) ** 2
+        * np.sqrt(2.1e11 * 0.006**2 / 12 / 7850)
+        / 0.15**2
+    )
     np.testing.assert_allclose(np.sqrt(linalg.eigvalsh(K, M)[:3]), exact, rtol=2e-6)
 
 
@@ -42,7 +48,9 @@ def test_receptance_of_all_modes_is_exact_and_residual_flexibility_makes_truncat
     np.testing.assert_allclose(receptance(few, 0.0), P @ np.linalg.solve(K, P.T), rtol=1e-8)
 
 
-@pytest.mark.parametrize("C", [None, 1e-5, np.diag(np.arange(40.0))], ids=["none", "proportional", "coupling modes"])
+@pytest.mark.parametrize(
+    "C", [None, 1e-5, np.diag(np.arange(40.0))], ids=["none", "proportional", "coupling modes"]
+)
 def test_modes_left_out_later_are_those_left_out_at_once(C):
     K, M = beam_matrices()
     ports = {"contact": np.array([10, 12]), "probe": np.array([38])}
@@ -73,9 +81,15 @@ def test_files(tmp_path):
         np.testing.assert_allclose(read_matrices(tmp_path / name)["K"], K, rtol=1e-14)
 
 
-@pytest.mark.parametrize(("change", "word"), [
-    ({"count": 99}, "count"), ({"M": -np.eye(4)}, "M"),
-    ({"K": np.ones((4, 3))}, "K"), ({"ports": {"load": np.array([9])}}, "load")])
+@pytest.mark.parametrize(
+    ("change", "word"),
+    [
+        ({"count": 99}, "count"),
+        ({"M": -np.eye(4)}, "M"),
+        ({"K": np.ones((4, 3))}, "K"),
+        ({"ports": {"load": np.array([9])}}, "load"),
+    ],
+)
 def test_bad_matrices(change, word):
     K, M = beam_matrices(elements=2)
     with pytest.raises(InputError, match=word):
@@ -83,32 +97,47 @@ def test_bad_matrices(change, word):
 
 
 def test_nodal_diameters():
-    assert [folded_diameter(h, 5, 12) for h in range(4)] == [(0, False), (5, False), (2, True), (3, False)]
+    assert [folded_diameter(h, 5, 12) for h in range(4)] == [
+        (0, False),
+        (5, False),
+        (2, True),
+        (3, False),
+    ]
 
 
 def test_the_wheel_sees_the_next_blade_turned():
-    """Against the ring of N blades coupled by springs written out in full: exact in every nodal diameter."""
+    """Against the ring of N blades coupled by springs written out in full: exact in every nodal
+    diameter.
+    """
     N, EO, k = 6, 2, 3e5
     body = reference_blade(1, modes=4)
     pair = wheel_models({n: body for n in range(4)}, slice(1, 2), EO, N, 3)[1]
     w = 2 * np.pi * 300
     R = receptance(body, w)
     contact, load = R[:1, :1], R[:1, 2:3]
-    wheel_R, B = np.kron(np.eye(N), contact), np.roll(np.eye(N), -1, axis=0)    # B x: the next blade's x
+    wheel_R, B = (
+        np.kron(np.eye(N), contact),
+        np.roll(np.eye(N), -1, axis=0),
+    )  # B x: the next blade's x
     spring = (np.eye(N) - B).T @ (np.eye(N) - B) * k
     force = np.exp(2j * np.pi * EO / N * np.arange(N))
     free = np.kron(np.eye(N), load) @ force
     wheel = np.linalg.solve(np.eye(N) + wheel_R @ spring, free)
     P = receptance(pair, w)
-    relative = np.array([[1.0, -1.0]]) @ P[:2]                                 # a spring between this and the next
-    relative = np.linalg.solve(1 + k * relative[:, :2] @ np.array([[1.0], [-1.0]]), relative[:, 2:3])
+    relative = np.array([[1.0, -1.0]]) @ P[:2]  # a spring between this and the next
+    relative = np.linalg.solve(
+        1 + k * relative[:, :2] @ np.array([[1.0], [-1.0]]), relative[:, 2:3]
+    )
     np.testing.assert_allclose(relative[0, 0], (wheel[0] - wheel[1]), rtol=1e-10)
 
 
 def test_in_antiphase_and_in_phase_models_stay_real():
     models = pair_models(reference_blade(2), slice(2, 4), np.pi, 3)
     assert all(np.isrealobj(m.shapes) for m in models)
-    assert models[1].shapes[2, 0] == -models[1].shapes[0, 0] and models[2].shapes[2, 0] == models[2].shapes[0, 0]
+    assert (
+        models[1].shapes[2, 0] == -models[1].shapes[0, 0]
+        and models[2].shapes[2, 0] == models[2].shapes[0, 0]
+    )
 
 
 def test_two_bodies_as_one_with_relative_contact():

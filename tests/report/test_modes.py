@@ -8,8 +8,8 @@ import pytest
 
 from bladefem.cli.main import main
 from bladefem.data import ModeSet
+from bladefem.io.stage_cache import read_results
 from bladefem.report.modes import mac_table
-from bladefem.store import read_results
 
 PLANE = ["modes", "scenes/plane.toml", "--set", "mesh.size=5 mm"]
 
@@ -18,29 +18,73 @@ PLANE = ["modes", "scenes/plane.toml", "--set", "mesh.size=5 mm"]
 def folder(tmp_path_factory):
     """A plane blade with everything but the refinement study, one mode drawn."""
     place = tmp_path_factory.mktemp("plane")
-    assert main([*PLANE, "-o", str(place), "--campbell", "0, 3000, 6000 rpm", "--pictures", "1", "--forced",
-                 "excitation, pressure_side=100 Pa"]) == 0
+    assert (
+        main(
+            [
+                *PLANE,
+                "-o",
+                str(place),
+                "--campbell",
+                "0, 3000, 6000 rpm",
+                "--pictures",
+                "1",
+                "--forced",
+                "excitation, pressure_side=100 Pa",
+            ]
+        )
+        == 0
+    )
     return place
 
 
 def test_folder_holds_tables_pictures_and_shapes(folder):
     names = {file.name for file in folder.iterdir()}
-    for table in ("frequencies", "excited_modes", "effective_masses", "campbell", "crossings", "interference",
-                  "margins", "forced_response", "resonances", "stresses"):
+    for table in (
+        "frequencies",
+        "excited_modes",
+        "effective_masses",
+        "campbell",
+        "crossings",
+        "interference",
+        "margins",
+        "forced_response",
+        "resonances",
+        "stresses",
+    ):
         assert {f"{table}.{kind}" for kind in ("csv", "md", "tex")} <= names
-    assert {"modes.png", "mode_1.png", "wave.gif", "campbell.png", "forced_response.png", "modes.vtu",
-            "stress.vtu"} <= names
+    assert {
+        "modes.png",
+        "mode_1.png",
+        "wave.gif",
+        "campbell.png",
+        "forced_response.png",
+        "modes.vtu",
+        "stress.vtu",
+    } <= names
     shapes = read_results(folder / "modes.nc", "modes")
     table = pd.read_csv(folder / "frequencies.csv")
-    np.testing.assert_allclose(shapes["frequency"].values.ravel(), table["frequency [Hz]"], rtol=1e-8)
+    np.testing.assert_allclose(
+        shapes["frequency"].values.ravel(), table["frequency [Hz]"], rtol=1e-8
+    )
     assert table["family"].iloc[0] == "first flap"
 
 
 def test_a_run_equals_itself_and_another_mesh_is_recognised(folder, tmp_path, capsys):
-    other = [*PLANE[:-1], "mesh.size=7 mm", "-o", str(tmp_path), "--pictures", "0", "--compare", str(folder)]
+    other = [
+        *PLANE[:-1],
+        "mesh.size=7 mm",
+        "-o",
+        str(tmp_path),
+        "--pictures",
+        "0",
+        "--compare",
+        str(folder),
+    ]
     assert main(other) == 0
     table = pd.read_csv(tmp_path / "mac.csv")
-    assert (table["mac"].iloc[:4] > 0.99).all() and (table["partner"].iloc[:4] == table["mode"].iloc[:4]).all()
+    assert (table["mac"].iloc[:4] > 0.99).all() and (
+        table["partner"].iloc[:4] == table["mode"].iloc[:4]
+    ).all()
     assert "mode of the other run" in capsys.readouterr().out
     assert main([*PLANE, "-o", str(folder), "--pictures", "0", "--compare", str(folder)]) == 0
     assert (pd.read_csv(folder / "mac.csv")["mac"] > 1 - 1e-9).all()
@@ -52,6 +96,12 @@ def test_a_folder_without_modes_is_refused(tmp_path, capsys):
 
 
 def test_partners_are_the_best_matches():
-    sets = [ModeSet(np.array(f), np.zeros((2, 1, 3)), None, np.zeros(2)) for f in ([10.0, 20.0], [19.0, 11.0])]
+    sets = [
+        ModeSet(np.array(f), np.zeros((2, 1, 3)), None, np.zeros(2))
+        for f in ([10.0, 20.0], [19.0, 11.0])
+    ]
     table = mac_table(np.array([[0.1, 0.9], [0.8, 0.2]]), *sets)
-    assert table["partner"].tolist() == [2, 1] and table["frequency_of_partner"].tolist() == [11.0, 19.0]
+    assert table["partner"].tolist() == [2, 1] and table["frequency_of_partner"].tolist() == [
+        11.0,
+        19.0,
+    ]

@@ -14,12 +14,14 @@ from bladefem.errors import InputError
 from bladefem.report.statements import answer, trust, wrong_speed
 from bladefem.report.tables import readable, to_latex, to_markdown, write_tables
 from bladefem.report.write import write_report
-from bladefem.scene import Excitation, Operation, Scene
+from bladefem.scene.tables import Excitation, Operation, Scene
 
 sys.path.insert(0, str(Path(__file__).parents[1] / "view"))
 import synthetic
 
-PIXEL = base64.b64decode("iVBORw0KGgoAAAANSUhEUgAAAAEAAAABCAQAAAC1HAwCAAAAC0lEQVR42mNkYAAAAAYAAjCB0C8AAAAASUVORK5CYII=")
+PIXEL = base64.b64decode(
+    "iVBORw0KGgoAAAANSUhEUgAAAAEAAAABCAQAAAC1HAwCAAAAC0lEQVR42mNkYAAAAAYAAjCB0C8AAAAASUVORK5CYII="
+)
 
 
 class Balanced(HTMLParser):
@@ -43,15 +45,32 @@ def report(tmp_path):
     picture = tmp_path / "figures" / "optimum.png"
     picture.parent.mkdir()
     picture.write_bytes(PIXEL)
-    tables = {"response/summary": synthetic.summary(), "response/points": synthetic.points(),
-              "modes/frequencies": synthetic.wheel_frequencies(40)}
-    return write_report(tmp_path, Scene(title="A <wedge> & its damper"), tables, {"response/optimum": picture},
-                        ["3 elements were straightened"], {"mesh": 1.0, "modes": 3.0})
+    tables = {
+        "response/summary": synthetic.summary(),
+        "response/points": synthetic.points(),
+        "modes/frequencies": synthetic.wheel_frequencies(40),
+    }
+    return write_report(
+        tmp_path,
+        Scene(title="A <wedge> & its damper"),
+        tables,
+        {"response/optimum": picture},
+        ["3 elements were straightened"],
+        {"mesh": 1.0, "modes": 3.0},
+    )
 
 
 def test_readable_units():
-    text = readable(pd.DataFrame({"load": [0.0, np.inf], "peak_amplitude": [5e-4, 3.70371e-5], "family": ["a", "b"],
-                                  "points": [3, np.nan]}))
+    text = readable(
+        pd.DataFrame(
+            {
+                "load": [0.0, np.inf],
+                "peak_amplitude": [5e-4, 3.70371e-5],
+                "family": ["a", "b"],
+                "points": [3, np.nan],
+            }
+        )
+    )
     assert list(text.columns) == ["normal load [N]", "resonance amplitude [µm]", "family", "points"]
     assert text.to_numpy().tolist() == [["0", "500", "a", "3"], ["∞", "37.037", "b", ""]]
 
@@ -61,7 +80,11 @@ def test_markdown_and_latex_align_numbers_and_escape():
     assert to_markdown(table).splitlines()[1] == "| --- | ---: |"
     assert r"a_1 \| 50 %" in to_markdown(table)
     latex = to_latex(table, "Modes & more")
-    assert r"a\_1 | 50 \% & 812.4 \\" in latex and r"\caption{Modes \& more}" in latex and "{lr}" in latex
+    assert (
+        r"a\_1 | 50 \% & 812.4 \\" in latex
+        and r"\caption{Modes \& more}" in latex
+        and "{lr}" in latex
+    )
 
 
 def test_written_csv_is_si_with_units(tmp_path):
@@ -81,23 +104,43 @@ def test_answer_names_the_optimum():
 
 
 def test_answer_says_which_mass_would_press_best():
-    """Loads 100, 200, 400 N with amplitudes 4, 1, 4 in logarithms: the lowest point of the parabola is the middle."""
-    summary = pd.DataFrame({"load": [100.0, 200.0, 400.0], "peak_amplitude": [4e-5, 1e-5, 4e-5],
-                            "peak_frequency": [880.0, 890.0, 900.0]})
+    """Loads 100, 200, 400 N with amplitudes 4, 1, 4 in logarithms: the lowest point of the parabola
+    is the middle.
+    """
+    summary = pd.DataFrame(
+        {
+            "load": [100.0, 200.0, 400.0],
+            "peak_amplitude": [4e-5, 1e-5, 4e-5],
+            "peak_frequency": [880.0, 890.0, 900.0],
+        }
+    )
     own = pd.DataFrame({"mass": [0.012], "speed": [800.0], "load": [np.sqrt(2) * 200.0]})
     found = answer(summary, None, own).numbers
-    assert found[0][2] == "best of 3; a parabola through it and its neighbours has its lowest point at 200 N"
-    assert found[-2][1:] == ("282.8 N",
-                             "12 g at 7639.4 rpm; resonance amplitude about 20 µm, between the loads studied")
+    assert (
+        found[0][2]
+        == "best of 3; a parabola through it and its neighbours has its lowest point at 200 N"
+    )
+    assert found[-2][1:] == (
+        "282.8 N",
+        "12 g at 7639.4 rpm; resonance amplitude about 20 µm, between the loads studied",
+    )
     assert found[-1][1] == "8.49 g"
 
 
 def test_a_speed_that_does_not_drive_the_resonance_is_named():
     """Engine order 9 needs 60 f / 9 rpm."""
-    summary = pd.DataFrame({"load": [0.0, 90.0], "peak_frequency": [420.0, 450.0], "peak_amplitude": [1e-3, 1e-4]})
-    fast, right = (Scene(excitation=Excitation(engine_order=9), operation=Operation(speed=rpm * np.pi / 30))
-                   for rpm in (8000.0, 2900.0))
-    assert wrong_speed(right, summary) == [] == wrong_speed(Scene(operation=Operation(speed=0.0)), summary)
+    summary = pd.DataFrame(
+        {"load": [0.0, 90.0], "peak_frequency": [420.0, 450.0], "peak_amplitude": [1e-3, 1e-4]}
+    )
+    fast, right = (
+        Scene(excitation=Excitation(engine_order=9), operation=Operation(speed=rpm * np.pi / 30))
+        for rpm in (8000.0, 2900.0)
+    )
+    assert (
+        wrong_speed(right, summary)
+        == []
+        == wrong_speed(Scene(operation=Operation(speed=0.0)), summary)
+    )
     assert "excites at 1200 Hz" in wrong_speed(fast, summary)[0]
     assert "2800 to 3000 rpm" in wrong_speed(fast, summary)[0]
 
@@ -109,14 +152,19 @@ def test_answer_warns_at_the_edge_of_loads_band_and_convergence():
     assert any("smallest" in text for text in answer(more).cautions)
     assert any("did not converge" in text for text in answer(few).cautions)
     points = synthetic.points().query("load == 200 and frequency <= 892")
-    assert any("end of the frequency band" in text for text in answer(synthetic.summary(), points).cautions)
+    assert any(
+        "end of the frequency band" in text for text in answer(synthetic.summary(), points).cautions
+    )
     assert answer(None).numbers == []
 
 
 def test_failed_points_and_fallbacks_are_counted():
     points = synthetic.points()
     text, doubtful = trust(points)
-    failed, fallback = (~points["converged"]).sum(), ((points["method"] == "homotopy") & points["converged"]).sum()
+    failed, fallback = (
+        (~points["converged"]).sum(),
+        ((points["method"] == "homotopy") & points["converged"]).sum(),
+    )
     assert f"{len(points) - failed} of {len(points)} points converged" in text[0]
     assert "3 points did NOT converge" in text[1]
     assert f"homotopy ({fallback})" in text[2]
@@ -130,12 +178,14 @@ def test_page_is_whole_and_self_contained(report):
     assert parser.open == []
     assert not re.search(r'(?:src|href)="(?!data:|#)', page)
     assert "A &lt;wedge&gt; &amp; its damper" in page
-    order = [page.index(f'<h2 id="{key}"') for key in ("answer", "inputs", "modes", "response", "accuracy", "timings",
-                                                       "versions")]
+    order = [
+        page.index(f'<h2 id="{key}"')
+        for key in ("answer", "inputs", "modes", "response", "accuracy", "timings", "versions")
+    ]
     assert order == sorted(order)
-    assert '<h2 id="contact"' not in page      # nothing to say about it
+    assert '<h2 id="contact"' not in page  # nothing to say about it
     assert "did NOT converge" in page and "3 elements were straightened" in page
-    assert "23 more rows are in the CSV file" in page      # 63 modes, 40 shown
+    assert "23 more rows are in the CSV file" in page  # 63 modes, 40 shown
 
 
 def test_markdown_page_links_the_figures(report):

@@ -8,33 +8,59 @@ import numpy as np
 import pytest
 
 from bladefem.report.study import Variant, study_tables, write_study
-from bladefem.scene import Scene
+from bladefem.scene.tables import Scene
 
 
 def curve(load, amplitude):
     peak = SimpleNamespace(work=SimpleNamespace(dissipated=1e-3), states={"slip": 2, "lift": 0})
-    return SimpleNamespace(load=load, mass=None, peak=peak, peak_frequency=830.0, peak_amplitude=amplitude,
-                           settings=SimpleNamespace(error=0.01, harmonics=3), halved=np.nan,
-                           frequency=np.arange(4.0),
-                           converged=np.ones(4, bool))
+    return SimpleNamespace(
+        load=load,
+        mass=None,
+        peak=peak,
+        peak_frequency=830.0,
+        peak_amplitude=amplitude,
+        settings=SimpleNamespace(error=0.01, harmonics=3),
+        halved=np.nan,
+        frequency=np.arange(4.0),
+        converged=np.ones(4, bool),
+    )
 
 
 def response(*amplitudes):
-    limits = [SimpleNamespace(load=load, peak_frequency=800.0, peak_amplitude=1e-4, frequency=np.arange(3.0))
-              for load in (0.0, np.inf)]
-    return SimpleNamespace(limits=limits, curves=[curve(20.0 * (i + 1), a) for i, a in enumerate(amplitudes)])
+    limits = [
+        SimpleNamespace(
+            load=load, peak_frequency=800.0, peak_amplitude=1e-4, frequency=np.arange(3.0)
+        )
+        for load in (0.0, np.inf)
+    ]
+    return SimpleNamespace(
+        limits=limits, curves=[curve(20.0 * (i + 1), a) for i, a in enumerate(amplitudes)]
+    )
 
 
-@pytest.mark.parametrize(("field", "texts", "number"), [("damper.angle", ("30 deg", "45 deg"), "damper.angle [rad]"),
-                                                        ("contact.normal", ("coupled", "prescribed"), None)])
+@pytest.mark.parametrize(
+    ("field", "texts", "number"),
+    [
+        ("damper.angle", ("30 deg", "45 deg"), "damper.angle [rad]"),
+        ("contact.normal", ("coupled", "prescribed"), None),
+    ],
+)
 def test_best_load_of_each_value(field, texts, number, tmp_path):
-    variants = [Variant(text, Scene().vary(field, text), response(*amplitudes))
-                for text, amplitudes in zip(texts, ((5e-5, 3e-5), (2e-5, 4e-5)), strict=True)]
+    variants = [
+        Variant(text, Scene().vary(field, text), response(*amplitudes))
+        for text, amplitudes in zip(texts, ((5e-5, 3e-5), (2e-5, 4e-5)), strict=True)
+    ]
     table, loads = study_tables(field, variants)
     assert list(table["value"]) == list(texts) and list(table["load"]) == [40.0, 20.0]
-    assert list(table["peak_amplitude"]) == [3e-5, 2e-5] and list(table["reduction"]) == pytest.approx([10 / 3, 5.0])
-    assert len(loads) == 8 and [name for name in table if "[" in name] == ([number] if number else [])
+    assert list(table["peak_amplitude"]) == [3e-5, 2e-5] and list(
+        table["reduction"]
+    ) == pytest.approx([10 / 3, 5.0])
+    assert len(loads) == 8 and [name for name in table if "[" in name] == (
+        [number] if number else []
+    )
     _, files = write_study(field, variants, tmp_path)
-    assert [f.name for f in files] == [*(f"{stem}.{kind}" for stem in ("study", "study_loads")
-                                         for kind in ("csv", "md", "tex")), "study.png"]
+    assert [f.name for f in files] == [
+        *(f"{stem}.{kind}" for stem in ("study", "study_loads") for kind in ("csv", "md", "tex")),
+        "study.png",
+    ]
     assert all(f.stat().st_size > 100 for f in files)

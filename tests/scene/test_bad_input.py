@@ -7,10 +7,10 @@ from pathlib import Path
 import pytest
 
 from bladefem.errors import InputError
-from bladefem.scene import Contact, Scene
-from bladefem.scene_check import validate
-from bladefem.scene_fields import convert, field_at
-from bladefem.scene_file import load_scene, scene_of
+from bladefem.scene.fields import convert, field_at
+from bladefem.scene.tables import Contact, Scene
+from bladefem.scene.toml import load_scene, scene_of
+from bladefem.scene.validate import validate
 
 WEDGE = Path(__file__).with_name("wedge.toml")
 
@@ -19,35 +19,53 @@ REFUSED = [
     ("aerofoil.twits=3 deg", "unknown key 'aerofoil.twits'; did you mean 'aerofoil.twist'?"),
     ("blade.twist=3 deg", "unknown key 'blade.twist'; did you mean 'aerofoil.twist'?"),
     ("matrial.blade.E=3", "unknown key 'matrial.blade.E'; did you mean 'material.blade.E'?"),
-    ("nonsense=3", "unknown key 'nonsense'; known are"), ("aerofoil=3", "aerofoil: expected a field of this table"),
-    ("aerofoil", "expected key=value"), ("=3", "expected key=value"),
+    ("nonsense=3", "unknown key 'nonsense'; known are"),
+    ("aerofoil=3", "aerofoil: expected a field of this table"),
+    ("aerofoil", "expected key=value"),
+    ("=3", "expected key=value"),
     # units, types, ranges
     ("damper.angle=20 mm", "'mm' is not a unit of this field, expected deg or rad"),
-    ("operation.speed=133 Hz", "expected rpm or rad/s"), ("damper.angle=90 deg", "expected 15 deg to 75 deg"),
-    ("contact.mu=nan", "finite"), ("aerofoil.span=inf", "finite"), ("contact.mu=-0.1", "expected 0 to 2"),
+    ("operation.speed=133 Hz", "expected rpm or rad/s"),
+    ("damper.angle=90 deg", "expected 15 deg to 75 deg"),
+    ("contact.mu=nan", "finite"),
+    ("aerofoil.span=inf", "finite"),
+    ("contact.mu=-0.1", "expected 0 to 2"),
     ("excitation.engine_order=6.5", "excitation.engine_order = 6.5: expected a whole number"),
-    ("excitation.engine_order=six", "expected a number"), ("disc.sectors=36 mm", "expected a plain number"),
-    ("operation.stiffening=maybe", "expected true or false"), ("contact.normal=couple", "did you mean 'coupled'?"),
+    ("excitation.engine_order=six", "expected a number"),
+    ("disc.sectors=36 mm", "expected a plain number"),
+    ("operation.stiffening=maybe", "expected true or false"),
+    ("contact.normal=couple", "did you mean 'coupled'?"),
     ("model.damper=stiff", "expected one of mass, rigid, elastic"),
     ("kind=wedge secter", "did you mean 'wedge sector'?"),
-    ("excitation.direction=1, 0", "expected 3 values"), ("study.band=100 Hz", "expected 2 values"),
+    ("excitation.direction=1, 0", "expected 3 values"),
+    ("study.band=100 Hz", "expected 2 values"),
     ("study.loads=", "expected at least one value"),
     ("study.loads=-20 N", "expected 0 N to 100 MN"),
     ("study.loads=0, 20 N", "lifts off"),
-    ("study.loads=20, nan N", "finite"), ("material.blade.nu=0.5", "material.blade.nu = 0.5"),
+    ("study.loads=20, nan N", "finite"),
+    ("material.blade.nu=0.5", "material.blade.nu = 0.5"),
     ("aerofoil.span=auto", "expected a number"),
     # a unit forgotten
     ("damper.angle=65", "expected 15 deg to 75 deg; did you mean '65 deg'?"),
-    ("aerofoil.twist=10", "did you mean '10 deg'?"), ("mesh.size=8", "did you mean '8 mm'?"),
-    ("material.blade.E=210", "did you mean '210 GPa'?"), ("damper.mass=20", "did you mean '20 g'?"),
+    ("aerofoil.twist=10", "did you mean '10 deg'?"),
+    ("mesh.size=8", "did you mean '8 mm'?"),
+    ("material.blade.E=210", "did you mean '210 GPa'?"),
+    ("damper.mass=20", "did you mean '20 g'?"),
     # between fields
-    ("disc.bore_radius=250 mm", "disc.bore_radius = 250 mm: expected less than 200 mm, disc.rim_radius"),
-    ("shank.width=60 mm", "the pitch at disc.rim_radius"), ("shank.length=50 mm", "disc.width"),
-    ("disc.sectors=90", "shank.width"), ("platform.seat_width=30 mm", "platform.seat_width"),
-    ("damper.length=70 mm", "platform.length"), ("platform.length=45 mm", "aerofoil.chord_root"),
+    (
+        "disc.bore_radius=250 mm",
+        "disc.bore_radius = 250 mm: expected less than 200 mm, disc.rim_radius",
+    ),
+    ("shank.width=60 mm", "the pitch at disc.rim_radius"),
+    ("shank.length=50 mm", "disc.width"),
+    ("disc.sectors=90", "shank.width"),
+    ("platform.seat_width=30 mm", "platform.seat_width"),
+    ("damper.length=70 mm", "platform.length"),
+    ("platform.length=45 mm", "aerofoil.chord_root"),
     ("aerofoil.chord_root=90 mm", "platform.length"),
     ("model.nodal_diameters=0, 19", "expected 0 to 18, half the number of sectors"),
-    ("study.band=200, 100 Hz", "lower frequency first"), ("excitation.direction=0, 0, 0", "expected a direction"),
+    ("study.band=200, 100 Hz", "lower frequency first"),
+    ("excitation.direction=0, 0, 0", "expected a direction"),
     ("plane.length=100 mm", "[plane]: a scene of kind 'wedge sector' does not use this table"),
 ]
 
@@ -62,7 +80,10 @@ def test_wedge_scene_refuses(override, message):
 
 TOGETHER = [
     ({"model": {"harmonics": 20, "samples": 32}}, "model.samples = 32: expected more than 40"),
-    ({"model": {"modes": 3}, "excitation": {"mode": 5}}, "excitation.mode = 5: expected at most model.modes = 3"),
+    (
+        {"model": {"modes": 3}, "excitation": {"mode": 5}},
+        "excitation.mode = 5: expected at most model.modes = 3",
+    ),
     ({"mesh": {"size": 0.001, "contact_size": 0.002}}, "mesh.contact_size"),
     ({"kind": "plane blades", "plane": {"pitch": "40 mm"}}, "plane.platform_width"),
     ({"kind": "plane blades", "plane": {"seat_width": "30 mm"}}, "plane.seat_width"),
@@ -72,20 +93,39 @@ TOGETHER = [
     ({"kind": "hertz", "mesh": {"contact_size": "5 mm"}}, "mesh.contact_size"),
     ({"kind": "plane blades", "mesh": {"seat_elements": 8}}, "mesh.seat_elements"),
     ({"kind": "punch", "punch": {"radius": "30 mm"}}, "punch.radius"),
-    ({"kind": "punch", "study": {"loads": [0]}}, "study.loads = 0 N: nothing presses the two bodies together"),
+    (
+        {"kind": "punch", "study": {"loads": [0]}},
+        "study.loads = 0 N: nothing presses the two bodies together",
+    ),
     ({"kind": "hertz", "operation": {"speed": 1}}, "does not use this table"),
     ({"kind": "imported"}, "needs this table with file"),
     ({"kind": "imported", "imported": {"file": "nowhere.msh"}}, "there is no such file"),
-    ({"kind": "imported", "imported": {"file": "nowhere.msh", "axis": [0, 0, 0]}}, "there is no such file"),
+    (
+        {"kind": "imported", "imported": {"file": "nowhere.msh", "axis": [0, 0, 0]}},
+        "there is no such file",
+    ),
     ({"kind": "imported", "imported": {"file": __file__, "axis": [0, 0, 0]}}, "imported.axis"),
     ({"kind": "imported", "imported": {"file": __file__, "sectors": 2}}, "imported.sectors"),
-    ({"kind": "imported", "imported": {"file": __file__, "sectors": 8}, "model": {"nodal_diameters": [5]}}, "0 to 4"),
+    (
+        {
+            "kind": "imported",
+            "imported": {"file": __file__, "sectors": 8},
+            "model": {"nodal_diameters": [5]},
+        },
+        "0 to 4",
+    ),
     ({"aerofoil": 3}, "aerofoil = 3: expected a table [aerofoil]"),
-    ({"title": {"a": 1}}, "[title]: expected a single value"), ({"title": 3}, "expected text"),
+    ({"title": {"a": 1}}, "[title]: expected a single value"),
+    ({"title": 3}, "expected text"),
     ({"aerofol": {"twist": 1}}, "unknown table [aerofol]; did you mean 'aerofoil'?"),
-    ({"material": {"blad": {"E": 1}}}, "unknown table [material.blad]; did you mean 'material.blade'?"),
-    ({"study": {"loads": []}}, "expected at least one value"), ({"study": {"loads": [[1]]}}, "expected a number"),
-    ({"contact": {"mu": True}}, "expected a number"), ({"operation": {"stiffening": 1}}, "expected true or false"),
+    (
+        {"material": {"blad": {"E": 1}}},
+        "unknown table [material.blad]; did you mean 'material.blade'?",
+    ),
+    ({"study": {"loads": []}}, "expected at least one value"),
+    ({"study": {"loads": [[1]]}}, "expected a number"),
+    ({"contact": {"mu": True}}, "expected a number"),
+    ({"operation": {"stiffening": 1}}, "expected true or false"),
 ]
 
 
@@ -101,8 +141,10 @@ def test_scene_made_in_python_is_checked_as_well():
         validate(Scene(contact=Contact(mu=float("nan"))))
 
 
-@pytest.mark.parametrize("limit", ["mesh.size=10 um", "disc.sectors=200", "damper.angle=75 deg",
-                                   "contact.kt_area=1e6 N/mm^3"])
+@pytest.mark.parametrize(
+    "limit",
+    ["mesh.size=10 um", "disc.sectors=200", "damper.angle=75 deg", "contact.kt_area=1e6 N/mm^3"],
+)
 def test_limits_themselves_are_allowed(limit):
     """As text too: 10 um is 9.999999999999999e-06 m."""
     name, _, text = limit.partition("=")
@@ -113,9 +155,13 @@ def test_files_that_are_no_scenes(tmp_path):
     (tmp_path / "wedge.toml").write_text("kind = \n")
     (tmp_path / "binary.toml").write_bytes(b"\xff\xfe\x00")
     (tmp_path / "pyproject.toml").write_text("[project]\n")
-    for name, message in (("wedge.toml", "not valid TOML: .*line 1"), ("binary.toml", "cannot be read"),
-                          (".", "cannot be read"),
-                          ("nowhere/x.toml", "no such scene file$"), ("project.toml", "no such scene file$")):
+    for name, message in (
+        ("wedge.toml", "not valid TOML: .*line 1"),
+        ("binary.toml", "cannot be read"),
+        (".", "cannot be read"),
+        ("nowhere/x.toml", "no such scene file$"),
+        ("project.toml", "no such scene file$"),
+    ):
         with pytest.raises(InputError, match=message):
             load_scene(tmp_path / name)
 
@@ -126,8 +172,10 @@ def test_scenes_of_a_similar_name_are_offered(tmp_path):
     (tmp_path / "pyproject.toml").write_text("[project]\n")
     for name in ("rim.toml", "scenes/wedge.toml"):
         (tmp_path / name).write_text('kind = "punch"\n')
-    for name, message in (("wegde.toml", f"did you mean '{tmp_path}/scenes/wedge.toml'?"),
-                          ("nope.toml", f"known are {tmp_path}/rim.toml, {tmp_path}/scenes/wedge.toml")):
+    for name, message in (
+        ("wegde.toml", f"did you mean '{tmp_path}/scenes/wedge.toml'?"),
+        ("nope.toml", f"known are {tmp_path}/rim.toml, {tmp_path}/scenes/wedge.toml"),
+    ):
         with pytest.raises(InputError) as refused:
             load_scene(tmp_path / name)
         assert str(refused.value).endswith(message)

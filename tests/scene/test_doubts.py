@@ -6,31 +6,53 @@ from pathlib import Path
 
 import pytest
 
-from bladefem.scene_doubts import doubts
-from bladefem.scene_file import load_scene
+from bladefem.scene.toml import load_scene
+from bladefem.scene.warnings import doubts
 
 ROOT = Path(__file__).parents[2]
 
 
-@pytest.mark.parametrize("file", sorted((ROOT / "scenes").glob("*.toml")), ids=lambda file: file.stem)
+@pytest.mark.parametrize(
+    "file", sorted((ROOT / "scenes").glob("*.toml")), ids=lambda file: file.stem
+)
 def test_shipped_scenes_raise_none(file):
     assert doubts(load_scene(file)) == []
 
 
-@pytest.mark.parametrize(("override", "sentence"), [
-    ("material.blade.E=210 MPa", "material.blade.E = 210 MPa: solids for machines have 1 to 1000 GPa"),
-    ("material.damper.rho=7.85 kg/m^3", "material.damper.rho = 7.85 kg/m^3: solids for machines have 500 to 25000"),
-    ("operation.speed=8000 rad/s", "the rim at 200 mm moves with 1600 m/s"),
-    ("operation.speed=30000 rpm", "the tip at 365 mm moves with 1147 m/s"),
-    ("operation.damping=0", "operation.damping = 0: enough for modes, responses need more than 0"),
-    ("mesh.size=8 mm", "mesh.size = 8 mm: larger than the thinnest part, the aerofoil halfway up with 5.18 mm"),
-    ("mesh.size=1 m", "mesh.size = 1 m: larger than"),
-])
+@pytest.mark.parametrize(
+    ("override", "sentence"),
+    [
+        (
+            "material.blade.E=210 MPa",
+            "material.blade.E = 210 MPa: solids for machines have 1 to 1000 GPa",
+        ),
+        (
+            "material.damper.rho=7.85 kg/m^3",
+            "material.damper.rho = 7.85 kg/m^3: solids for machines have 500 to 25000",
+        ),
+        ("operation.speed=8000 rad/s", "the rim at 200 mm moves with 1600 m/s"),
+        ("operation.speed=30000 rpm", "the tip at 365 mm moves with 1147 m/s"),
+        (
+            "operation.damping=0",
+            "operation.damping = 0: enough for modes, responses need more than 0",
+        ),
+        (
+            "mesh.size=8 mm",
+            "mesh.size = 8 mm: larger than the thinnest part, the aerofoil halfway up with 5.18 mm",
+        ),
+        ("mesh.size=1 m", "mesh.size = 1 m: larger than"),
+    ],
+)
 def test_of_the_wedge(override, sentence):
-    said, = doubts(load_scene(ROOT / "scenes" / "wedge.toml", [override]))
+    (said,) = doubts(load_scene(ROOT / "scenes" / "wedge.toml", [override]))
     assert sentence in said
 
 
 def test_limits_themselves_raise_none():
-    text = ["material.blade.E=1 GPa", "material.damper.E=1000 GPa", "material.blade.rho=500 kg/m^3", "mesh.size=5 mm"]
+    text = [
+        "material.blade.E=1 GPa",
+        "material.damper.E=1000 GPa",
+        "material.blade.rho=500 kg/m^3",
+        "mesh.size=5 mm",
+    ]
     assert doubts(load_scene(ROOT / "scenes" / "wedge.toml", text)) == []

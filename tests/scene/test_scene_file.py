@@ -9,12 +9,12 @@ from pathlib import Path
 import pytest
 
 from bladefem.errors import InputError
-from bladefem.scene import KINDS, Material, Scene
-from bladefem.scene_fields import TABLES, each_field
-from bladefem.scene_file import dump, given_keys, load_scene, read_tables, resolved, scene_of, vary
+from bladefem.scene.fields import TABLES, each_field
+from bladefem.scene.tables import KINDS, Material, Scene
+from bladefem.scene.toml import dump, given_keys, load_scene, read_tables, resolved, scene_of, vary
 
 SCENES = sorted(Path("scenes").glob("*.toml"))
-WEDGE = Path(__file__).with_name("wedge.toml")     # does not follow the shipped one
+WEDGE = Path(__file__).with_name("wedge.toml")  # does not follow the shipped one
 
 
 @pytest.mark.parametrize("path", SCENES, ids=lambda p: p.stem)
@@ -38,9 +38,17 @@ def test_wedge_scene_says_what_it_means():
 
 
 def test_overrides_win_over_the_file():
-    scene = load_scene(WEDGE, [
-        "aerofoil.twist=25 deg", "study.loads=20, 30 kN", "operation.stiffening=no", "damper.mass='12 g'",
-        "material.blade.E=70 GPa", "excitation.direction=1,0,0"])
+    scene = load_scene(
+        WEDGE,
+        [
+            "aerofoil.twist=25 deg",
+            "study.loads=20, 30 kN",
+            "operation.stiffening=no",
+            "damper.mass='12 g'",
+            "material.blade.E=70 GPa",
+            "excitation.direction=1,0,0",
+        ],
+    )
     assert scene.aerofoil.twist == pytest.approx(25 * pi / 180)
     assert scene.study.loads == (2e4, 3e4) and scene.operation.stiffening is False
     assert scene.damper.mass == pytest.approx(0.012) and scene.material.blade.E == 7e10
@@ -51,12 +59,18 @@ def test_overrides_win_over_the_file():
 def test_vary_makes_a_checked_copy():
     scene = Scene()
     assert scene.vary(aerofoil__twist="25 deg").aerofoil.twist == pytest.approx(25 * pi / 180)
-    assert scene.vary("aerofoil.twist", "25 deg", "contact.mu", 0.2) == \
-        vary(scene, aerofoil__twist="25 deg", contact__mu="20 %")
+    assert scene.vary("aerofoil.twist", "25 deg", "contact.mu", 0.2) == vary(
+        scene, aerofoil__twist="25 deg", contact__mu="20 %"
+    )
     assert scene.vary(material__blade=Material(E=7e10)).material.blade.E == 7e10
     assert scene.vary(damper__mass=0.02).vary(damper__mass=None) == scene
     assert scene == Scene()
-    for wrong in ({"aerofoil__twits": 1}, {"contact__mu": -1}, {"plane__length": 0.1}, {"disc__bore_radius": 0.5}):
+    for wrong in (
+        {"aerofoil__twits": 1},
+        {"contact__mu": -1},
+        {"plane__length": 0.1},
+        {"disc__bore_radius": 0.5},
+    ):
         with pytest.raises(InputError):
             scene.vary(**wrong)
     with pytest.raises(InputError, match="name and value in turn"):

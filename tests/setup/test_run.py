@@ -1,4 +1,6 @@
-"""``./run`` finds the environment, passes arguments and exit codes on, and lets no failure through."""
+"""``./run`` finds the environment, passes arguments and exit codes on, and lets no failure
+through.
+"""
 
 from __future__ import annotations
 
@@ -29,8 +31,11 @@ def place(tmp_path):
     for name in ("run", ".ci"):
         source = ROOT / name
         (shutil.copytree if source.is_dir() else shutil.copy)(source, tmp_path / name)
-    for name, text in (("setup.sh", "#!/bin/sh\nexit ${SETUP_CODE:-0}\n"), (".venv/bin/python", PYTHON),
-                       (".venv/bin/mpirun", MPIRUN)):
+    for name, text in (
+        ("setup.sh", "#!/bin/sh\nexit ${SETUP_CODE:-0}\n"),
+        (".venv/bin/python", PYTHON),
+        (".venv/bin/mpirun", MPIRUN),
+    ):
         path = tmp_path / name
         path.parent.mkdir(parents=True, exist_ok=True)
         path.write_text(text)
@@ -39,15 +44,20 @@ def place(tmp_path):
 
 
 def run(place: Path, *arguments: str, **more: str) -> subprocess.CompletedProcess:
-    return subprocess.run([place / "run", *arguments], capture_output=True, text=True, env={**os.environ, **more})
+    return subprocess.run(
+        [place / "run", *arguments], capture_output=True, text=True, env={**os.environ, **more}
+    )
 
 
 def test_alone_it_runs_the_main_job(place):
-    assert (run(place, BLADEFEM_RANKS="1").stdout
-            == "python -m bladefem.cli.main run scenes/wedge.toml -o runs/wedge\n")
+    assert (
+        run(place, BLADEFEM_RANKS="1").stdout
+        == "python -m bladefem.cli.main run scenes/wedge.toml -o runs/wedge\n"
+    )
     assert run(place, BLADEFEM_RANKS="3").stdout == (
         "python -m bladefem.cli.main reduce scenes/wedge.toml -o runs/wedge\n"
-        "ranks 3\npython -m bladefem.cli.main run runs/wedge on 3\n")
+        "ranks 3\npython -m bladefem.cli.main run runs/wedge on 3\n"
+    )
 
 
 def test_the_main_job_stops_where_its_first_half_fails(place):
@@ -55,16 +65,26 @@ def test_the_main_job_stops_where_its_first_half_fails(place):
     assert done.returncode == 2 and "ranks" not in done.stdout
 
 
-@pytest.mark.parametrize(("arguments", "said"), [
-    (["bladefem", "check", "my scene.toml"], "python -m bladefem.cli.main check my scene.toml\n"),
-    (["python", "-c", "1"], "python -c 1\n"), (["demos/x.py", "a"], "python demos/x.py a\n"),
-    (["mpirun", "3", "demos/x.py", "a"], "ranks 3\npython demos/x.py a on 3\n")])
+@pytest.mark.parametrize(
+    ("arguments", "said"),
+    [
+        (
+            ["bladefem", "check", "my scene.toml"],
+            "python -m bladefem.cli.main check my scene.toml\n",
+        ),
+        (["python", "-c", "1"], "python -c 1\n"),
+        (["demos/x.py", "a"], "python demos/x.py a\n"),
+        (["mpirun", "3", "demos/x.py", "a"], "ranks 3\npython demos/x.py a on 3\n"),
+    ],
+)
 def test_arguments_are_passed_on(arguments, said, place):
     assert run(place, *arguments).stdout == said
 
 
-@pytest.mark.parametrize(("arguments", "code"), [(["nonsense"], 2), (["mpirun"], 2), (["mpirun", "x.py"], 2),
-                                                 (["--help"], 0)])
+@pytest.mark.parametrize(
+    ("arguments", "code"),
+    [(["nonsense"], 2), (["mpirun"], 2), (["mpirun", "x.py"], 2), (["--help"], 0)],
+)
 def test_wrong_words_are_refused(arguments, code, place):
     assert run(place, *arguments).returncode == code
 
@@ -94,7 +114,11 @@ def test_all_tests_run_on_one_two_and_four_ranks(place):
     done = run(place, "test")
     assert done.returncode == 0
     lines = [line for line in done.stdout.splitlines() if line.startswith("python")]
-    assert ["on 2" in x for x in lines] == [True, False, False] and "on 4" in lines[1] and "-n 2" in lines[2]
+    assert (
+        ["on 2" in x for x in lines] == [True, False, False]
+        and "on 4" in lines[1]
+        and "-n 2" in lines[2]
+    )
     assert all("-m mpi" in x for x in lines[:2])
 
 
@@ -104,7 +128,7 @@ def test_a_failure_in_any_pass_fails_the_whole(failing, place):
         env = {**os.environ, "FAIL": failing, "CODE": "1"}
         done = subprocess.run(command, capture_output=True, text=True, env=env)
         assert done.returncode == 1
-        assert done.stdout.count("python") == 3     # the other passes still run
+        assert done.stdout.count("python") == 3  # the other passes still run
 
 
 def test_a_pass_without_tests_is_a_failure_unless_tests_were_selected(place):

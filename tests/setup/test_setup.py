@@ -1,6 +1,7 @@
 """The set-up tells what failed with its exit code, and does nothing when everything is there.
 
-Python, pip, apt and dpkg are stand-ins here, so that every branch runs in milliseconds on any system.
+Python, pip, apt and dpkg are stand-ins here, so that every branch runs in milliseconds on any
+system.
 """
 
 from __future__ import annotations
@@ -14,7 +15,20 @@ from pathlib import Path
 import pytest
 
 ROOT = Path(__file__).parents[2]
-TOOLS = ["sh", "cat", "cksum", "mktemp", "dirname", "rm", "mv", "cp", "mkdir", "tail", "env", "flock"]
+TOOLS = [
+    "sh",
+    "cat",
+    "cksum",
+    "mktemp",
+    "dirname",
+    "rm",
+    "mv",
+    "cp",
+    "mkdir",
+    "tail",
+    "env",
+    "flock",
+]
 
 PYTHON = """#!/bin/sh
 case "$*" in
@@ -35,7 +49,9 @@ def script(path: Path, text: str) -> None:
 
 @pytest.fixture
 def place(tmp_path):
-    """A copy of the set-up with a stand-in conda environment and only the plain tools on its path."""
+    """A copy of the set-up with a stand-in conda environment and only the plain tools on its
+    path.
+    """
     for name in ("setup.sh", "pyproject.toml", "constraints"):
         source = ROOT / name
         (shutil.copytree if source.is_dir() else shutil.copy)(source, tmp_path / name)
@@ -47,8 +63,13 @@ def place(tmp_path):
 
 
 def set_up(place: Path, **more: str) -> subprocess.CompletedProcess:
-    env = {"PATH": str(place / "tools"), "CONDA_PREFIX": str(place / "conda"), "STEPS": str(place / "log"), "HOME": "/",
-           **more}
+    env = {
+        "PATH": str(place / "tools"),
+        "CONDA_PREFIX": str(place / "conda"),
+        "STEPS": str(place / "log"),
+        "HOME": "/",
+        **more,
+    }
     return subprocess.run([place / "setup.sh"], capture_output=True, text=True, env=env)
 
 
@@ -70,7 +91,11 @@ def test_second_call_does_nothing(place):
 def test_pip_keeps_what_the_system_gave(place):
     set_up(place)
     arguments = (place / "log").read_text()
-    assert "-c .venv/system.txt" in arguments and "-c constraints/" in arguments and "-e .[run,test]" in arguments
+    assert (
+        "-c .venv/system.txt" in arguments
+        and "-c constraints/" in arguments
+        and "-e .[run,test]" in arguments
+    )
     assert (place / ".venv" / "system.txt").read_text() == "numpy==1.24.2\n"
 
 
@@ -83,7 +108,9 @@ def test_changed_requirements_are_installed_without_a_new_environment(place):
 
 
 def test_a_new_numpy_of_the_system_makes_a_new_environment(place):
-    """The stamp holds the system's versions of dolfinx and numpy: here dpkg speaks of another one."""
+    """The stamp holds the system's versions of dolfinx and numpy: here dpkg speaks of another
+    one.
+    """
     dpkg = '#!/bin/sh\necho "python3-numpy %s install ok installed"\n'
     script(place / "tools" / "dpkg-query", dpkg % "1.24.2")
     set_up(place)
@@ -93,8 +120,10 @@ def test_a_new_numpy_of_the_system_makes_a_new_environment(place):
     assert set_up(place, NUMPY="2.2.4").returncode == 0 and steps(place) == ["venv", "pip"]
 
 
-@pytest.mark.parametrize(("trouble", "said"), [
-    ({"PIP_CODE": "9"}, "pip speaks"), ({"IMPORT_CODE": "1"}, "does not import")])
+@pytest.mark.parametrize(
+    ("trouble", "said"),
+    [({"PIP_CODE": "9"}, "pip speaks"), ({"IMPORT_CODE": "1"}, "does not import")],
+)
 def test_a_failed_installation_is_told_and_tried_again(place, trouble, said):
     failed = set_up(place, **trouble)
     assert failed.returncode == 7 and said in failed.stderr
@@ -128,17 +157,31 @@ def test_apt_that_fails_is_told(place):
 
 
 def test_two_calls_at_once_set_up_once(place):
-    slow = (place / "conda" / "bin" / "python").read_text().replace('"-m pip"*) ', '"-m pip"*) /bin/sleep 0.5 ; ')
+    slow = (
+        (place / "conda" / "bin" / "python")
+        .read_text()
+        .replace('"-m pip"*) ', '"-m pip"*) /bin/sleep 0.5 ; ')
+    )
     script(place / "conda" / "bin" / "python", slow)
-    env = {"PATH": str(place / "tools"), "CONDA_PREFIX": str(place / "conda"), "STEPS": str(place / "log"), "HOME": "/"}
-    both = [subprocess.Popen([place / "setup.sh"], env=env, stderr=subprocess.DEVNULL) for _ in range(2)]
+    env = {
+        "PATH": str(place / "tools"),
+        "CONDA_PREFIX": str(place / "conda"),
+        "STEPS": str(place / "log"),
+        "HOME": "/",
+    }
+    both = [
+        subprocess.Popen([place / "setup.sh"], env=env, stderr=subprocess.DEVNULL) for _ in range(2)
+    ]
     assert [p.wait(timeout=30) for p in both] == [0, 0]
     assert steps(place) == ["venv", "pip"]
 
 
 def test_environment_file_names_what_the_project_needs():
     import tomllib
-    extras = tomllib.loads((ROOT / "pyproject.toml").read_text())["project"]["optional-dependencies"]
+
+    extras = tomllib.loads((ROOT / "pyproject.toml").read_text())["project"][
+        "optional-dependencies"
+    ]
     wanted = {name.split(">")[0].split("=")[0] for name in extras["run"] + extras["test"]}
     text = (ROOT / "environment.yml").read_text()
     assert all(f"- {name}" in text for name in wanted - {"gmsh"}) and "- python-gmsh" in text

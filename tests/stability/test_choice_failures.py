@@ -1,4 +1,6 @@
-"""Where error indicators and sweeps are blind (F19 to F26, F28), and what the automatic choice does there."""
+"""Where error indicators and sweeps are blind (F19 to F26, F28), and what the automatic choice does
+there.
+"""
 
 from __future__ import annotations
 
@@ -9,37 +11,46 @@ import pytest
 from choice_cases import random_body
 
 from bladefem.data import Elements, PortModel
-from bladefem.hbm.api import as_solution, solve
-from bladefem.hbm.fallback import Attempt, match_harmonics
-from bladefem.hbm.linear import condense
+from bladefem.hbm.full_stick import grips
+from bladefem.hbm.linear.condensation import condense
+from bladefem.hbm.linear_resonances import free_resonances, stuck_resonances
 from bladefem.hbm.model import Damping, ReducedModel
-from bladefem.hbm.newton import Options, newton
-from bladefem.hbm.reference import reference_model
-from bladefem.hbm.residual import Balance
-from bladefem.hbm.resonance import free_resonances, stuck_resonances
+from bladefem.hbm.reference_blade import reference_model
 from bladefem.hbm.solution import Solution
-from bladefem.hbm.sticking import grips
+from bladefem.hbm.solve import as_solution, solve
+from bladefem.hbm.solver.fallback import Attempt, match_harmonics
+from bladefem.hbm.solver.newton import Options, newton
+from bladefem.hbm.solver.residual import Balance
 from bladefem.hbm.sweep import response, size, sweep
-from bladefem.study import indicators, watched
-from bladefem.study.along import along
-from bladefem.study.choice import Checked, adapted, choose, covered, estimated
-from bladefem.study.family import family_of, member
-from bladefem.study.indicators import indicate, richer
-from bladefem.study.settings import DIRECTIONS, Settings, first_for
-from bladefem.study.watched import peak_of
+from bladefem.study.adaptive import check_points as watched
+from bladefem.study.adaptive import indicators
+from bladefem.study.adaptive.check_points import peak_of
+from bladefem.study.adaptive.choice import Checked, adapted, choose, covered, estimated
+from bladefem.study.adaptive.family import family_of, member
+from bladefem.study.adaptive.frequency_list import along
+from bladefem.study.adaptive.indicators import indicate, richer
+from bladefem.study.adaptive.settings import DIRECTIONS, Settings, first_for
 
 HZ = 2 * np.pi
-STIFFNESS = 0.3 * (100 * HZ) ** 2       # of the contact, beside a modal stiffness of (100 Hz)^2
+STIFFNESS = 0.3 * (100 * HZ) ** 2  # of the contact, beside a modal stiffness of (100 Hz)^2
 
 
 def oscillator(limit: float, second: float = 1e4, phase: float = 0.0) -> ReducedModel:
     """Two modes, 100 Hz and `second` [Hz]; the second is moved by the contact alone."""
     ports = {name: slice(k, k + 1) for k, name in enumerate(("contact", "load", "probe"))}
-    body = PortModel(HZ * np.array([100.0, second]), np.array([[1.0, 1.0], [1.0, 0.0], [1.0, 0.0]]), np.zeros((3, 3)),
-                     ports)
+    body = PortModel(
+        HZ * np.array([100.0, second]),
+        np.array([[1.0, 1.0], [1.0, 0.0], [1.0, 0.0]]),
+        np.zeros((3, 3)),
+        ports,
+    )
     one = np.ones(1)
-    return ReducedModel((body,), Elements(STIFFNESS * one, 0 * one, one, limit * one, 1),
-                        {1: np.exp(1j * phase) * one}, Damping(ratio=1e-3))
+    return ReducedModel(
+        (body,),
+        Elements(STIFFNESS * one, 0 * one, one, limit * one, 1),
+        {1: np.exp(1j * phase) * one},
+        Damping(ratio=1e-3),
+    )
 
 
 def chosen(model: ReducedModel, omega: float, first: Settings, accuracy: float):
@@ -49,10 +60,17 @@ def chosen(model: ReducedModel, omega: float, first: Settings, accuracy: float):
 
 
 def test_F19_points_are_compared_with_the_finest():
-    """Single steps of 3 to 2 points see nothing where the edges of the patch slip; the finest patch does."""
-    model, omega = reference_model(1e6, 0.06, 12.0, points=80, modes=5, harmonics=63), HZ * 1385.7 * 1.01
+    """Single steps of 3 to 2 points see nothing where the edges of the patch slip; the finest patch
+    does.
+    """
+    model, omega = (
+        reference_model(1e6, 0.06, 12.0, points=80, modes=5, harmonics=63),
+        HZ * 1385.7 * 1.01,
+    )
     first = replace(first_for(5), points=3)
-    told = indicate(family_of(model), first, solve(member(family_of(model), first).model, omega, 1, 64))
+    told = indicate(
+        family_of(model), first, solve(member(family_of(model), first).model, omega, 1, 64)
+    )
     assert told.errors["points"] > 0.4
     _, point, found = chosen(model, omega, first, 0.02)
     assert found.total < 0.01
@@ -60,7 +78,9 @@ def test_F19_points_are_compared_with_the_finest():
 
 
 def test_F20_an_internal_resonance_that_2H1_harmonics_do_not_reach():
-    """Five times 105 Hz is the second mode: 1 and 3 harmonics agree to 5e-4, and both are 6 % off."""
+    """Five times 105 Hz is the second mode: 1 and 3 harmonics agree to 5e-4, and both are 6 %
+    off.
+    """
     model, omega = oscillator(0.3, 525.0), HZ * 105
     first = {H: solve(model, omega, H, 1024).probe[1, 0] for H in (1, 3, 31)}
     assert abs(first[1] / first[3] - 1) < 1e-3
@@ -72,7 +92,9 @@ def test_F20_an_internal_resonance_that_2H1_harmonics_do_not_reach():
 
 
 def test_F21_slip_between_two_samples():
-    """The force passes its limit by 1e-3 between two of 64 samples: they see stick, and miss the friction work."""
+    """The force passes its limit by 1e-3 between two of 64 samples: they see stick, and miss the
+    friction work.
+    """
     omega = HZ * 100 * np.sqrt(1.3)
     stuck = solve(oscillator(1e9), omega, 1, 64)
     pull = STIFFNESS * np.hypot(*stuck.w[0, 0, 1:3])
@@ -88,15 +110,18 @@ def test_F21_slip_between_two_samples():
 
 
 def test_F22_an_indicator_beside_the_peak():
-    """Settings chosen a little beside the peak are good there, and over 2 % off at the peak that they lead to.
+    """Settings chosen a little beside the peak are good there, and over 2 % off at the peak that
+    they lead to.
 
     Eleven times the true resonance is the second mode; the point of choice lies 0.3 % higher.
     """
     model, band, first = oscillator(1.0, 1129.079), (98.0, 116.0), first_for(2)
     family = family_of(model)
-    beside = solve(member(family, first).model, 1.003 * HZ * 1129.079 / 11, first.harmonics, first.samples)
+    beside = solve(
+        member(family, first).model, 1.003 * HZ * 1129.079 / 11, first.harmonics, first.samples
+    )
     there, _, found = choose(family, first, beside, 0.02)
-    assert found.total <= 0.01                                  # told 0.1 %
+    assert found.total <= 0.01  # told 0.1 %
     top = peak_of(covered(member(family, there).model, there, band, 1, 0.02))
     assert off(model, top) > 0.02
     curve = adapted(family, first, band, 1, 0.02)
@@ -111,7 +136,9 @@ def off(model: ReducedModel, point: Solution) -> float:
 
 
 def test_F23_one_newton_step_as_an_indicator():
-    """3-D contacts on a floating wedge: the step towards 7 harmonics tells 28 % for 0.07 %; a solved point is right."""
+    """3-D contacts on a floating wedge: the step towards 7 harmonics tells 28 % for 0.07 %; a
+    solved point is right.
+    """
     model = random_body(3, 3, modes=8)
     family, settings = family_of(model, (3, 3)), replace(first_for(8), harmonics=3)
     omega = 0.6 * free_resonances(model)[0] + 0.4 * stuck_resonances(model)[0]
@@ -129,7 +156,9 @@ def test_F23_one_newton_step_as_an_indicator():
 
 
 def test_F24_a_point_that_is_not_solved_asks_for_nothing(monkeypatch):
-    """An infinite error used to be taken for a need: harmonics and samples rose where nothing converges."""
+    """An infinite error used to be taken for a need: harmonics and samples rose where nothing
+    converges.
+    """
     model = reference_model(1e6, 0.06, 1.0, points=4, modes=10, harmonics=63)
     family, first = family_of(model), first_for(10)
     point = solve(member(family, first).model, HZ * 1240, 1, 64)
@@ -144,12 +173,13 @@ def test_F24_a_point_that_is_not_solved_asks_for_nothing(monkeypatch):
     def never(model, omega, H, samples, **how):
         solved.append(H)
         return replace(solve(model, omega, H, samples, **how), converged=H == 1)
-    monkeypatch.setattr(indicators, "solve", never)     # richer harmonics are never found
+
+    monkeypatch.setattr(indicators, "solve", never)  # richer harmonics are never found
     settings, point, found = choose(family, first, point, 0.001)
     assert point.converged
     assert settings.harmonics == 1
     assert "harmonics" in found.unknown and settings.error == np.inf
-    assert len(solved) < 25                             # each respect is tried once a round, what failed never again
+    assert len(solved) < 25  # each respect is tried once a round, what failed never again
     assert sum(H > 1 for H in solved) <= 8
 
 
@@ -161,7 +191,9 @@ def test_F24_the_curve_says_where_nothing_is_known():
 
 
 def test_F25_a_sweep_that_follows_one_of_two_peaks():
-    """An internal resonance splits the peak: a sweep of coarse corners takes the lower one, 24 % off."""
+    """An internal resonance splits the peak: a sweep of coarse corners takes the lower one, 24 %
+    off.
+    """
     model, band = oscillator(0.8, 502.99), (98.0, 116.0)
     dense = max(response(model, HZ * np.linspace(99.5, 102.5, 301), 7, 256), key=size)
     circular = (HZ * band[0], HZ * band[1])
@@ -173,27 +205,35 @@ def test_F25_a_sweep_that_follows_one_of_two_peaks():
 
 
 def test_F26_a_curve_checked_by_height_alone(monkeypatch):
-    """0.1 %: at one height a stretch of slip passes over an internal resonance that 7 harmonics miss by 1.2 %."""
+    """0.1 %: at one height a stretch of slip passes over an internal resonance that 7 harmonics
+    miss by 1.2 %.
+    """
     model = reference_model(1e6, 0.06, 8.0, points=1, harmonics=63)
     low, high = sorted((free_resonances(model)[0], stuck_resonances(model)[0]))
     omegas = np.linspace(1.1 * low - 0.1 * high, 1.1 * high - 0.1 * low, 100)
     truth = list(response(model, omegas[::6], 31, 2048))
 
     def worst(accuracy: float = 1e-3) -> tuple[float, float]:
-        curve = along(family_of(model, (1, 1)), omegas, first_for(len(model.side(1).omega)), accuracy)
+        curve = along(
+            family_of(model, (1, 1)), omegas, first_for(len(model.side(1).omega)), accuracy
+        )
         top = max(size(p) for p in curve.points)
-        told = max(curve.errors[p.omega] * size(p) / top for p in curve.points if p.omega in curve.errors)
+        told = max(
+            curve.errors[p.omega] * size(p) / top for p in curve.points if p.omega in curve.errors
+        )
         pairs = zip(curve.points[::6], truth, strict=True)
         return told, max(abs(p.probe[1, 0] - q.probe[1, 0]) / top for p, q in pairs)
 
-    assert worst()[1] < 1e-3                        # measured 2e-4, with 15 harmonics
+    assert worst()[1] < 1e-3  # measured 2e-4, with 15 harmonics
     monkeypatch.setattr(watched, "LOUDEST", 0)
     told, true = worst()
     assert told < 5e-4 and true > 1e-2
 
 
 def test_F28_internal_resonances_between_the_checks(monkeypatch):
-    """0.1 %: two of them, 20 Hz wide in a band of 1000 Hz, 0.5 and 0.6 % off where evenly placed checks see nothing."""
+    """0.1 %: two of them, 20 Hz wide in a band of 1000 Hz, 0.5 and 0.6 % off where evenly placed
+    checks see nothing.
+    """
     model = reference_model(2e7, 0.06, 1.0, phase=np.pi, points=8, harmonics=63)
     low, high = sorted((free_resonances(model)[1], stuck_resonances(model)[1]))
     omegas = np.linspace(1.1 * low - 0.1 * high, 1.1 * high - 0.1 * low, 100)
@@ -203,8 +243,11 @@ def test_F28_internal_resonances_between_the_checks(monkeypatch):
     def worst() -> float:
         curve = along(family_of(model, (8, 8)), omegas, first_for(len(model.side(1).omega)), 1e-3)
         top = max(size(p) for p in curve.points)
-        return max(abs(curve.points[i].probe[1, 0] - p.probe[1, 0]) / top for i, p in zip(spikes, truth, strict=True))
+        return max(
+            abs(curve.points[i].probe[1, 0] - p.probe[1, 0]) / top
+            for i, p in zip(spikes, truth, strict=True)
+        )
 
-    assert worst() < 1e-3                           # measured 8e-5 in the spikes, 7e-4 elsewhere
+    assert worst() < 1e-3  # measured 8e-5 in the spikes, 7e-4 elsewhere
     monkeypatch.setattr(watched, "LOUDEST", 0)
     assert worst() > 4e-3

@@ -1,4 +1,5 @@
-"""Where friction laws fail (F01-F04, F12, F13, F15-F18): each fragile form fails as recorded, ours is right.
+"""Where friction laws fail (F01-F04, F12, F13, F15-F18): each fragile form fails as recorded, ours
+is right.
 
 W is the work of the last period; the numbers are those of the failure catalogue.
 """
@@ -16,14 +17,20 @@ from bladefem.damper.zmass import MassOnFoundation, march
 from bladefem.data import Elements
 from bladefem.errors import InputError
 from bladefem.friction.aft import STICK, evaluate
-from bladefem.friction.approximation import from_series
 from bladefem.friction.closed_form import circular_orbit_work, jenkins
 from bladefem.friction.energy import free_static_force
-from bladefem.friction.events import evaluate_exact
-from bladefem.friction.march import stable_step, step_2d
-from bladefem.friction.printed import corrected, corrected_rate, differential, per_axis, per_axis_printed
-from bladefem.hbm.flow import stuck_start
-from bladefem.hbm.system import damper_on_platforms
+from bladefem.friction.equivalent_linear import from_series
+from bladefem.friction.kernel_1d_exact import evaluate_exact
+from bladefem.friction.printed import (
+    corrected,
+    corrected_rate,
+    differential,
+    per_axis,
+    per_axis_printed,
+)
+from bladefem.friction.time_step import stable_step, step_2d
+from bladefem.time.event_integrator import stuck_start
+from bladefem.time.system import damper_on_platforms
 
 MU, KT = 0.5, 5.0
 
@@ -42,7 +49,9 @@ def element(kt=KT, kn=0.0, mu=MU, n0=1.0, tangents=1) -> Elements:
 
 
 def moved(H: int, d: int = 2, **coefficients: float) -> np.ndarray:
-    """(1, d, 2H+1) from names such as t_c1 (first tangent, cosine 1), u_s1 (second), n_s2 (normal), t_m (mean)."""
+    """(1, d, 2H+1) from names such as t_c1 (first tangent, cosine 1), u_s1 (second), n_s2 (normal),
+    t_m (mean).
+    """
     w = np.zeros((1, d, 2 * H + 1))
     for name, value in coefficients.items():
         direction, part = name.split("_")
@@ -63,14 +72,22 @@ def test_F01_the_printed_law_freezes_at_its_limit(steps):
     assert work(right[last], g[last]) == pytest.approx(ours, rel=1e-4)
 
 
-@pytest.mark.parametrize(("motion", "load", "ratio", "force_error"),
-                         [(2, 1, 0.495, 2.48), (4, 1, 0.50, 2.99), (1, 2, 0.886, 0.95)])
-def test_F02_the_printed_law_cannot_stick_again_while_the_load_falls(motion, load, ratio, force_error):
-    """Work ratio 0.50 at fp/fb = 1/2 and 1/4 with either H(0), 0.886 at 2; it does not improve with the step."""
+@pytest.mark.parametrize(
+    ("motion", "load", "ratio", "force_error"),
+    [(2, 1, 0.495, 2.48), (4, 1, 0.50, 2.99), (1, 2, 0.886, 0.95)],
+)
+def test_F02_the_printed_law_cannot_stick_again_while_the_load_falls(
+    motion, load, ratio, force_error
+):
+    """Work ratio 0.50 at fp/fb = 1/2 and 1/4 with either H(0), 0.886 at 2; it does not improve with
+    the step.
+    """
     steps = 20000
     x = clock(steps)
     g, N, last = np.sin(motion * x), 1 + 0.6 * np.sin(load * x), slice(2 * steps, None)
-    exact = evaluate_exact(element(kn=1.0), moved(4, **{f"t_s{motion}": 1.0, f"n_s{load}": 0.6})).dissipated[0]
+    exact = evaluate_exact(
+        element(kn=1.0), moved(4, **{f"t_s{motion}": 1.0, f"n_s{load}": 0.6})
+    ).dissipated[0]
     right = corrected(g, N, KT, MU)
     for at_zero in (0, 1):
         printed = differential(g, N, KT, MU, at_zero)
@@ -88,21 +105,29 @@ def test_F03_the_printed_law_flips_its_sign_in_separation():
     assert (np.sign(printed[1:]) != np.sign(printed[:-1])).mean() > 0.98
     assert (corrected(g, N, KT, MU)[open_] == 0).all()
     forces = evaluate_exact(element(kn=1.0, n0=0.5), moved(3, t_s1=1.0, n_s1=1.0))
-    assert forces.shares[0, 2] == pytest.approx(1 / 3, abs=1e-12)      # sin x < -1/2
+    assert forces.shares[0, 2] == pytest.approx(1 / 3, abs=1e-12)  # sin x < -1/2
 
 
-@pytest.mark.parametrize(("minor", "ratio", "force_error"), [(1, 0.498, 1.34), (0.5, 0.449, 1.38), (0.1, 0.856, 0.60)])
+@pytest.mark.parametrize(
+    ("minor", "ratio", "force_error"), [(1, 0.498, 1.34), (0.5, 0.449, 1.38), (0.1, 0.856, 0.60)]
+)
 def test_F04_limits_for_each_axis_are_not_coulomb(minor, ratio, force_error):
     steps = 2000
     x = clock(steps, 4)
-    g, N, last = np.stack([np.cos(x), minor * np.sin(x)], axis=1), np.ones_like(x), slice(3 * steps, None)
+    g, N, last = (
+        np.stack([np.cos(x), minor * np.sin(x)], axis=1),
+        np.ones_like(x),
+        slice(3 * steps, None),
+    )
     right = np.zeros_like(g)
     for i in range(1, len(x)):
         right[i] = step_2d(*right[i - 1], *(KT * (g[i] - g[i - 1])), 1.0, 1.0, MU)[:2]
     forces = evaluate(element(tangents=2), moved(3, 3, t_c1=1.0, u_s1=minor), 2048)
     kind, printed = per_axis(g, N, KT, MU), per_axis_printed(g, N, KT, MU)
     assert work(kind[last], g[last]) / forces.dissipated[0] == pytest.approx(ratio, abs=0.003)
-    assert np.linalg.norm(kind - right, axis=1)[last].max() / MU == pytest.approx(force_error, abs=0.02)
+    assert np.linalg.norm(kind - right, axis=1)[last].max() / MU == pytest.approx(
+        force_error, abs=0.02
+    )
     assert np.isnan(printed[-1]).all() or abs(work(printed[last], g[last])) < 1e-12
     assert work(right[last], g[last]) == pytest.approx(forces.dissipated[0], rel=2e-3)
     if minor == 1:
@@ -110,27 +135,41 @@ def test_F04_limits_for_each_axis_are_not_coulomb(minor, ratio, force_error):
 
 
 def sampling_error(amplitude: float, samples: int) -> float:
-    """Relative error of the sampled harmonics against exact events, the worst of eight phases of the samples."""
+    """Relative error of the sampled harmonics against exact events, the worst of eight phases of
+    the samples.
+    """
     worst = 0.0
     for phase in np.arange(8) / 8 * 2 * np.pi / samples:
         w = moved(1, t_c1=amplitude * np.cos(phase), t_s1=amplitude * np.sin(phase))
         exact = evaluate_exact(element(1.0, mu=1.0), w).f[0, 1]
-        worst = max(worst, np.linalg.norm(evaluate(element(1.0, mu=1.0), w, samples).f[0, 1] - exact)
-                    / np.linalg.norm(exact))
+        worst = max(
+            worst,
+            np.linalg.norm(evaluate(element(1.0, mu=1.0), w, samples).f[0, 1] - exact)
+            / np.linalg.norm(exact),
+        )
     return worst
 
 
 def test_F12_too_few_samples_and_exact_events():
-    """A/x_cr = 1e4: 64 samples are 8.5 % off, 512 0.2 %; A/x_cr = 100: 128 samples 0.39 %. Events need none."""
+    """A/x_cr = 1e4: 64 samples are 8.5 % off, 512 0.2 %; A/x_cr = 100: 128 samples 0.39 %. Events
+    need none.
+    """
     assert sampling_error(1e4, 64) == pytest.approx(8.5e-2, rel=0.05)
     assert sampling_error(1e4, 512) == pytest.approx(2e-3, rel=0.05)
     assert sampling_error(100.0, 128) == pytest.approx(3.9e-3, rel=0.05)
-    closed, f = jenkins(1e4, 1.0, 1.0), evaluate_exact(element(1.0, mu=1.0), moved(1, t_c1=1e4)).f[0, 1]
-    np.testing.assert_allclose(f[1:], 1e4 * np.array([closed.stiffness, -closed.damping]), rtol=0, atol=1e-11)
+    closed, f = (
+        jenkins(1e4, 1.0, 1.0),
+        evaluate_exact(element(1.0, mu=1.0), moved(1, t_c1=1e4)).f[0, 1],
+    )
+    np.testing.assert_allclose(
+        f[1:], 1e4 * np.array([closed.stiffness, -closed.damping]), rtol=0, atol=1e-11
+    )
 
 
 def explicit_damper(steps: int) -> tuple[float, float]:
-    """K_ad and omega C_ad of a stuck damper, in units of m omega^2, by the explicit march, step unchecked."""
+    """K_ad and omega C_ad of a stuck damper, in units of m omega^2, by the explicit march, step
+    unchecked.
+    """
     system, omega = two_seats()
     march_, state = explicit_march(system, omega, steps), stuck_start(system, omega)
     for _ in range(40):
@@ -164,34 +203,55 @@ def test_F13_an_explicit_step_beyond_the_limit_is_refused():
 
 
 def test_F15_the_static_force_of_a_stuck_element_is_that_of_its_mean_displacement():
-    """F = 1, kA = 0.6: any mean force in [-0.4, 0.4] is an equilibrium; the mean displacement decides, then clips."""
+    """F = 1, kA = 0.6: any mean force in [-0.4, 0.4] is an equilibrium; the mean displacement
+    decides, then clips.
+    """
     for mean, expected in ((0.0, 0.0), (0.25, 0.25), (-0.4, -0.4), (0.9, 0.4), (-7.0, -0.4)):
-        for forces in (evaluate(element(1.0, mu=1.0), moved(3, t_c1=0.6, t_m=mean), 64),
-                       evaluate_exact(element(1.0, mu=1.0), moved(3, t_c1=0.6, t_m=mean))):
+        for forces in (
+            evaluate(element(1.0, mu=1.0), moved(3, t_c1=0.6, t_m=mean), 64),
+            evaluate_exact(element(1.0, mu=1.0), moved(3, t_c1=0.6, t_m=mean)),
+        ):
             assert forces.f[0, 1, 0] == pytest.approx(expected, abs=1e-12)
             np.testing.assert_allclose(forces.f[0, 1, 1:], 0.6 * np.eye(6)[0], atol=1e-12)
             assert forces.state[0] == STICK
-    for kind, motion in ((element(1.0, mu=1.0), moved(3, t_c1=0.6, t_m=9.0)),
-                         (element(1.0, mu=1.0, tangents=2), moved(3, 3, t_c1=0.6, u_s1=0.3, t_m=9.0))):
-        assert free_static_force(kind, motion)[0] == pytest.approx(0.4, abs=1e-12)      # the interval is [-0.4, 0.4]
-    assert free_static_force(element(1.0, 1.0, 1.0), moved(3, t_c1=0.2, n_c1=0.5))[0] == pytest.approx(0.3)
+    for kind, motion in (
+        (element(1.0, mu=1.0), moved(3, t_c1=0.6, t_m=9.0)),
+        (element(1.0, mu=1.0, tangents=2), moved(3, 3, t_c1=0.6, u_s1=0.3, t_m=9.0)),
+    ):
+        assert free_static_force(kind, motion)[0] == pytest.approx(
+            0.4, abs=1e-12
+        )  # the interval is [-0.4, 0.4]
+    assert free_static_force(element(1.0, 1.0, 1.0), moved(3, t_c1=0.2, n_c1=0.5))[
+        0
+    ] == pytest.approx(0.3)
     assert free_static_force(element(1.0, mu=1.0), moved(3, t_c1=1.2))[0] == 0
-    naive = corrected(0.6 * np.cos(clock(64, 2)), np.ones(129), 1.0, 1.0)       # the same march, started from f = 0
-    assert naive[64:128].mean() == pytest.approx(-0.4, abs=1e-12)               # a false static force
+    naive = corrected(
+        0.6 * np.cos(clock(64, 2)), np.ones(129), 1.0, 1.0
+    )  # the same march, started from f = 0
+    assert naive[64:128].mean() == pytest.approx(-0.4, abs=1e-12)  # a false static force
 
 
 def test_F16_velocity_and_force_repeat_where_the_displacement_drifts():
-    """Mass dragged by a vibrating floor under pulsating load at fp / fb = 1: drift, yet (v, f) is periodic."""
+    """Mass dragged by a vibrating floor under pulsating load at fp / fb = 1: drift, yet (v, f) is
+    periodic.
+    """
     body, found = MassOnFoundation(), steady(MassOnFoundation(), Drive(Fraction(1)), 2000)
     assert found.reason == "periodic"
     assert found.drift[0] == pytest.approx(-0.6307, rel=0.01)
     last = found.motion
-    again = march(body, np.r_[found.base[-1:], found.base], np.r_[found.load[-1:], found.load], last.dt,
-                  (last.position[-1], last.velocity[-1], last.springs.copy()))
+    again = march(
+        body,
+        np.r_[found.base[-1:], found.base],
+        np.r_[found.load[-1:], found.load],
+        last.dt,
+        (last.position[-1], last.velocity[-1], last.springs.copy()),
+    )
     for name in ("velocity", "force"):
         now, before = getattr(again, name), getattr(last, name)
         np.testing.assert_allclose(now, before, rtol=0, atol=1e-6 * np.abs(before).max())
-    moved_on = again.position[-1, 0] - last.position[-1, 0]         # a test of the displacement would never end
+    moved_on = (
+        again.position[-1, 0] - last.position[-1, 0]
+    )  # a test of the displacement would never end
     assert moved_on == pytest.approx(found.drift[0] / 100, rel=1e-6)
     assert abs(moved_on) > 1e-3
 
@@ -220,9 +280,16 @@ def test_F18_the_rate_form_without_events_is_first_order():
     for steps in (200, 3200):
         x = clock(steps, 2)
         g, last = np.sin(2 * x), slice(steps, None)
-        forms = (corrected_rate(lambda t: (np.sin(2 * t), 2 * np.cos(2 * t)),
-                                lambda t: (1 + 0.6 * np.sin(t), 0.6 * np.cos(t)), KT, MU, x),
-                 corrected(g, 1 + 0.6 * np.sin(x), KT, MU))
+        forms = (
+            corrected_rate(
+                lambda t: (np.sin(2 * t), 2 * np.cos(2 * t)),
+                lambda t: (1 + 0.6 * np.sin(t), 0.6 * np.cos(t)),
+                KT,
+                MU,
+                x,
+            ),
+            corrected(g, 1 + 0.6 * np.sin(x), KT, MU),
+        )
         errors[steps] = [abs(work(f[last], g[last]) / exact - 1) for f in forms]
     assert errors[200][0] == pytest.approx(9.6e-2, rel=0.1)
     assert np.log2(errors[200][0] / errors[3200][0]) / 4 == pytest.approx(1, abs=0.15)

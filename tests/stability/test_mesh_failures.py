@@ -5,13 +5,20 @@ from __future__ import annotations
 import numpy as np
 
 from bladefem.damper.blades import peak
-from bladefem.scene_file import load_scene
-from bladefem.study import pipeline
-from bladefem.study.contact_mesh import FEW
+from bladefem.scene.toml import load_scene
+from bladefem.study.adaptive.contact_mesh import FEW
+from bladefem.study.pipeline import pipeline
 from bladefem.study.row import paper_model, row_of_blades
 
-SCENE = load_scene("scenes/plane.toml", ["contact.kt=1e6 N/m", "contact.normal=prescribed", "study.loads=63 N",
-                                         "study.band=1150 Hz, 1200 Hz"])
+SCENE = load_scene(
+    "scenes/plane.toml",
+    [
+        "contact.kt=1e6 N/m",
+        "contact.normal=prescribed",
+        "study.loads=63 N",
+        "study.band=1150 Hz, 1200 Hz",
+    ],
+)
 TENTH = SCENE.vary(mesh__contact_size=SCENE.plane.seat_width / 10)
 
 
@@ -22,7 +29,8 @@ def run(scene):
 
 
 def test_F27_the_finest_patch_is_itself_too_coarse():
-    """63 N, ten elements on each seat: 0.15 % told, 30 % off, since 6 nodes press; with forty 21 press, and 0.7 %.
+    """63 N, ten elements on each seat: 0.15 % told, 30 % off, since 6 nodes press; with forty 21
+    press, and 0.7 %.
 
     Half as many contact points change the amplitude by 9.8 and 2.9 %.
     """
@@ -37,7 +45,9 @@ def test_F27_the_finest_patch_is_itself_too_coarse():
 
 
 def test_F27_few_pressed_nodes_are_what_matters():
-    """Between stick and slip (100 N) the error falls with the number that press: 37 % at 6, 14 % at 11, 1.3 % at 21."""
+    """Between stick and slip (100 N) the error falls with the number that press: 37 % at 6, 14 % at
+    11, 1.3 % at 21.
+    """
     amplitude, pressed = [], []
     for parts in (10, 20, 40, 80):
         scene = SCENE.vary(mesh__contact_size=SCENE.plane.seat_width / parts)

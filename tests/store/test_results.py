@@ -7,20 +7,28 @@ import pytest
 import xarray as xr
 
 from bladefem.errors import InputError
-from bladefem.scene_file import dump, load_scene
-from bladefem.store import read_results, versions, write_results, write_table, write_text
+from bladefem.io.stage_cache import read_results, versions, write_results, write_table, write_text
+from bladefem.scene.toml import dump, load_scene
 
 
 def curve() -> xr.Dataset:
-    return xr.Dataset({"amplitude": (("load", "frequency"), np.ones((2, 3)) * (1 + 2j), {"units": "m"}),
-                       "residual": (("load", "frequency"), np.zeros((2, 3)), {"units": "1"})},
-                      {"load": ("load", [20.0, 50.0], {"units": "N"}),
-                       "frequency": ("frequency", [1.0, 2.0, 3.0], {"units": "Hz"})})
+    return xr.Dataset(
+        {
+            "amplitude": (("load", "frequency"), np.ones((2, 3)) * (1 + 2j), {"units": "m"}),
+            "residual": (("load", "frequency"), np.zeros((2, 3)), {"units": "1"}),
+        },
+        {
+            "load": ("load", [20.0, 50.0], {"units": "N"}),
+            "frequency": ("frequency", [1.0, 2.0, 3.0], {"units": "Hz"}),
+        },
+    )
 
 
 def test_groups_units_complex_numbers_and_origin_come_back(tmp_path):
     scene = dump(load_scene("scenes/wedge.toml"))
-    path = write_results(tmp_path / "results.nc", {"response": curve(), "modes": curve()[["residual"]]}, scene)
+    path = write_results(
+        tmp_path / "results.nc", {"response": curve(), "modes": curve()[["residual"]]}, scene
+    )
     back = read_results(path, "response")
     xr.testing.assert_identical(back, curve()[["residual", "amplitude"]])
     assert back.amplitude.attrs["units"] == "m" and back["load"].attrs["units"] == "N"
@@ -45,8 +53,11 @@ def test_table_head_has_units(tmp_path):
 
 
 def test_folder_that_vanished_is_an_input_error(tmp_path):
-    for write in (lambda p: write_text(p, "x"), lambda p: write_table(p, {"a": [1]}),
-                  lambda p: write_results(p, {"a": curve()})):
+    for write in (
+        lambda p: write_text(p, "x"),
+        lambda p: write_table(p, {"a": [1]}),
+        lambda p: write_results(p, {"a": curve()}),
+    ):
         with pytest.raises(InputError, match="cannot be written"):
             write(tmp_path / "gone" / "x.nc")
 

@@ -8,9 +8,9 @@ import sys
 import pytest
 
 from bladefem.errors import InputError
-from bladefem.run_folder import locked, take_folder
-from bladefem.scene import Scene
-from bladefem.scene_file import load_scene
+from bladefem.io.run_folder import locked, take_folder
+from bladefem.scene.tables import Scene
+from bladefem.scene.toml import load_scene
 
 OTHER = Scene().vary(contact__mu=0.2)
 
@@ -21,15 +21,33 @@ def results(folder):
 
 def test_results_go_with_their_scene_and_stages_stay(tmp_path):
     assert take_folder(tmp_path, Scene()) == ""
-    for name in ("stages/mesh.npz", "report.md", "results.nc", "mu=0.2/scene.toml", "mu=0.2/report.md", "own.msh"):
+    for name in (
+        "stages/mesh.npz",
+        "report.md",
+        "results.nc",
+        "mu=0.2/scene.toml",
+        "mu=0.2/report.md",
+        "own.msh",
+    ):
         (tmp_path / name).parent.mkdir(exist_ok=True)
         (tmp_path / name).write_text("first")
     assert take_folder(tmp_path, Scene()) == ""
     assert "2 files moved" in take_folder(tmp_path, OTHER)
-    assert results(tmp_path) == {"stages/mesh.npz", "mu=0.2/scene.toml", "mu=0.2/report.md", "own.msh", "scene.toml",
-                                 "earlier/report.md", "earlier/results.nc", "earlier/scene.toml"}
-    assert load_scene(tmp_path / "scene.toml") == OTHER and load_scene(tmp_path / "earlier" / "scene.toml") == Scene()
-    assert take_folder(tmp_path, Scene()) == ""             # nothing to put away: what is there stays
+    assert results(tmp_path) == {
+        "stages/mesh.npz",
+        "mu=0.2/scene.toml",
+        "mu=0.2/report.md",
+        "own.msh",
+        "scene.toml",
+        "earlier/report.md",
+        "earlier/results.nc",
+        "earlier/scene.toml",
+    }
+    assert (
+        load_scene(tmp_path / "scene.toml") == OTHER
+        and load_scene(tmp_path / "earlier" / "scene.toml") == Scene()
+    )
+    assert take_folder(tmp_path, Scene()) == ""  # nothing to put away: what is there stays
     assert (tmp_path / "earlier" / "report.md").read_text() == "first"
 
 
@@ -50,7 +68,9 @@ with locked(sys.argv[1]):
 
 
 def test_another_process_is_kept_out_and_a_dead_one_is_not(tmp_path):
-    holder = subprocess.Popen([sys.executable, "-c", HOLDER, tmp_path], stdin=subprocess.PIPE, stdout=subprocess.PIPE)
+    holder = subprocess.Popen(
+        [sys.executable, "-c", HOLDER, tmp_path], stdin=subprocess.PIPE, stdout=subprocess.PIPE
+    )
     assert holder.stdout.readline() == b"held\n"
     with pytest.raises(InputError, match="another command works in it"), locked(tmp_path):
         pass

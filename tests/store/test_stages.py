@@ -12,10 +12,10 @@ import pytest
 import scipy.sparse
 
 from bladefem.data import Elements, ModeSet, Patch, PortModel, PressureMap, RigidBody
-from bladefem.encode import read_npz, write_npz
 from bladefem.errors import InputError
-from bladefem.scene import Scene
-from bladefem.store import code_of, key_of, open_folder, stage, writing
+from bladefem.io.array_codec import read_npz, write_npz
+from bladefem.io.stage_cache import code_of, key_of, open_folder, stage, writing
+from bladefem.scene.tables import Scene
 from geometry.mesh import Mesh, Pair, Sector
 
 RNG = np.random.default_rng(1)
@@ -24,21 +24,39 @@ RNG = np.random.default_rng(1)
 def small_mesh() -> Mesh:
     nodes = np.array([[0, 1], [2, 3]])
     pair = Pair("cyclic_low", "cyclic_high", nodes, np.eye(3), np.zeros(3))
-    return Mesh(RNG.random((4, 3)), "tetra", {"blade": np.array([[0, 1, 2, 3]])}, {"clamp": np.array([[0, 1, 2]])},
-                {"tip_mid": np.array([3])}, {"cyclic": pair}, Sector(36, np.eye(3), np.zeros(3)),
-                report={"cells": 1, "worst": 0.1, "words": ["a", "b"], "none": None})
+    return Mesh(
+        RNG.random((4, 3)),
+        "tetra",
+        {"blade": np.array([[0, 1, 2, 3]])},
+        {"clamp": np.array([[0, 1, 2]])},
+        {"tip_mid": np.array([3])},
+        {"cyclic": pair},
+        Sector(36, np.eye(3), np.zeros(3)),
+        report={"cells": 1, "worst": 0.1, "words": ["a", "b"], "none": None},
+    )
 
 
 def small_patch() -> Patch:
-    return Patch("this", RNG.random((3, 3)), RNG.random(3), RNG.random((3, 3, 3)), np.array([[0, 1, 2]]),
-                 np.arange(3), np.arange(3) + 7)
+    return Patch(
+        "this",
+        RNG.random((3, 3)),
+        RNG.random(3),
+        RNG.random((3, 3, 3)),
+        np.array([[0, 1, 2]]),
+        np.arange(3),
+        np.arange(3) + 7,
+    )
 
 
 NOUNS = [
     small_mesh(),
     ModeSet(np.array([220.9]), RNG.random((1, 5, 3)) + 1j, 3, np.array([1e-12])),
-    PortModel(np.array([0.0, 3.0]), RNG.random((4, 2)), RNG.random((4, 4)),
-              {"contact": slice(0, 3), "load": slice(3, 4)}),
+    PortModel(
+        np.array([0.0, 3.0]),
+        RNG.random((4, 2)),
+        RNG.random((4, 4)),
+        {"contact": slice(0, 3), "load": slice(3, 4)},
+    ),
     small_patch(),
     PressureMap(small_patch(), RNG.random(3), np.zeros(3), 1e-15),
     Elements(np.ones(2), np.zeros(2), np.full(2, 0.3), np.array([5.0, -np.inf])),
@@ -89,8 +107,22 @@ def test_what_has_no_encoding_is_refused(value, tmp_path):
 
 def test_equal_content_has_an_equal_key():
     assert key_of(Scene(), np.arange(3), 0.1) == key_of(Scene(), np.arange(3), 0.1)
-    keys = {key_of(x) for x in (1, 1.0, "1", None, np.arange(3), np.arange(3.0), np.arange(3).reshape(3, 1),
-                                Scene(), Scene(title="other"), [1, 2], (1, 2))}
+    keys = {
+        key_of(x)
+        for x in (
+            1,
+            1.0,
+            "1",
+            None,
+            np.arange(3),
+            np.arange(3.0),
+            np.arange(3).reshape(3, 1),
+            Scene(),
+            Scene(title="other"),
+            [1, 2],
+            (1, 2),
+        )
+    }
     assert len(keys) == 11
 
 
@@ -151,6 +183,7 @@ def test_folder_that_cannot_be_written_is_refused(tmp_path):
 @pytest.mark.mpi
 def test_every_rank_gets_the_stage_and_its_error(tmp_path_factory):
     from mpi4py import MPI
+
     comm = MPI.COMM_WORLD
     folder = comm.bcast(tmp_path_factory.mktemp("run"))
     assert stage(folder, "x", "k", lambda: np.arange(4), comm)[1] is None
@@ -166,15 +199,23 @@ from bladefem.store import write_results, read_results
 write_results({path!r}, {{"a": xr.Dataset({{"x": ("t", np.arange(3.0))}})}})
 assert read_results({path!r}, "a").x.values.tolist() == [0, 1, 2]
 """
-ORDERS = {"dolfinx first": "import dolfinx", "fem first": "import bladefem.fem.compat",
-          "h5py first": "import h5py, dolfinx",
-          "store first": "import bladefem.store, dolfinx", "gmsh between": "import gmsh, dolfinx"}
+ORDERS = {
+    "dolfinx first": "import dolfinx",
+    "fem first": "import bladefem.fem.compat",
+    "h5py first": "import h5py, dolfinx",
+    "store first": "import bladefem.io.stage_cache, dolfinx",
+    "gmsh between": "import gmsh, dolfinx",
+}
 
 
 @pytest.mark.parametrize("first", ORDERS.values(), ids=ORDERS)
 def test_results_are_written_in_any_order_of_imports(first, tmp_path):
     """dolfinx 0.5 shows its HDF5 to all; a later h5py must not fall for it."""
     code = first + WRITE.format(path=str(tmp_path / "r.nc"))
-    env = {k: v for k, v in os.environ.items() if not k.startswith(("PMIX_", "OMPI_COMM", "OMPI_UNIVERSE", "ORTE_"))}
+    env = {
+        k: v
+        for k, v in os.environ.items()
+        if not k.startswith(("PMIX_", "OMPI_COMM", "OMPI_UNIVERSE", "ORTE_"))
+    }
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, env=env)
     assert done.returncode == 0, done.stderr

@@ -8,7 +8,7 @@ from bladefem.errors import InputError
 from bladefem.fem.constraint import constrain
 from bladefem.fem.gyroscopic import coupling, waves
 from bladefem.fem.modes import modes
-from bladefem.study.campbell import campbell, campbell_table, read_speeds
+from bladefem.study.modes.campbell import campbell, campbell_table, read_speeds
 
 
 @pytest.fixture(scope="module")
@@ -17,7 +17,9 @@ def wheel():
 
 
 def test_lines_equal_solves_at_each_speed(wheel):
-    """Measured 2e-9 without and 3e-5 with Coriolis forces, of frequencies that the rotation moves by some per cent."""
+    """Measured 2e-9 without and 3e-5 with Coriolis forces, of frequencies that the rotation moves
+    by some per cent.
+    """
     speeds = [0.0, 900.0, 2500.0, 3000.0]
     table = campbell_table(wheel, speeds, [0, 2], 4)
     assert (table["error"] < 1e-3).all()
@@ -33,28 +35,40 @@ def test_lines_equal_solves_at_each_speed(wheel):
 
 
 def test_orders_cross_the_wave_that_they_excite(wheel):
-    """Of 6 blades EO 2 meets the backward wave, EO 4 the forward wave of nodal diameter 2, EO 3 a standing one."""
+    """Of 6 blades EO 2 meets the backward wave, EO 4 the forward wave of nodal diameter 2, EO 3 a
+    standing one.
+    """
     found = campbell(wheel, np.linspace(0, 12000, 7), [2, 3, 4], count=2)
     assert set(found.table["nodal_diameter"]) == {2, 3}
     assert 2500.0 in set(found.table["speed"])
     for order, column in ((2, "backward"), (4, "forward")):
         for _, row in found.crossings[found.crossings["engine_order"] == order].iterrows():
             assert row["frequency"] == pytest.approx(order * row["speed"] / (2 * np.pi))
-            line = found.table[(found.table["nodal_diameter"] == 2) & (found.table["mode"] == row["mode"])]
+            line = found.table[
+                (found.table["nodal_diameter"] == 2) & (found.table["mode"] == row["mode"])
+            ]
             squares = np.interp(row["speed"] ** 2, line["speed"] ** 2, line[column] ** 2)
             assert row["frequency"] == pytest.approx(np.sqrt(squares), rel=1e-9)
     assert len(found.crossings) and list(found.margins["engine_order"]) == [2, 3, 4]
     assert len(found.interference) == 6
 
 
-@pytest.mark.parametrize(("text", "rpm"), [
-    ("0, 2000, 4000 rpm", [0, 2000, 4000]), ("0, 500, ..., 2000 rpm", [0, 500, 1000, 1500, 2000]),
-    ("0, 1000, ..., 1500 rpm", [0, 1000, 1500]), ("100 rad/s, 3000 rpm", [100 * 30 / np.pi, 3000])])
+@pytest.mark.parametrize(
+    ("text", "rpm"),
+    [
+        ("0, 2000, 4000 rpm", [0, 2000, 4000]),
+        ("0, 500, ..., 2000 rpm", [0, 500, 1000, 1500, 2000]),
+        ("0, 1000, ..., 1500 rpm", [0, 1000, 1500]),
+        ("100 rad/s, 3000 rpm", [100 * 30 / np.pi, 3000]),
+    ],
+)
 def test_speeds_are_read(text, rpm):
     np.testing.assert_allclose(np.array(read_speeds(text)) * 30 / np.pi, rpm)
 
 
-@pytest.mark.parametrize("text", ["0, ..., 2000 rpm", "0, 500, ...", "..., 3 rpm", "fast", "0, 3 Hz m"])
+@pytest.mark.parametrize(
+    "text", ["0, ..., 2000 rpm", "0, 500, ...", "..., 3 rpm", "fast", "0, 3 Hz m"]
+)
 def test_wrong_speeds_are_refused(text):
     with pytest.raises(InputError, match="campbell"):
         read_speeds(text)
@@ -74,6 +88,9 @@ def test_too_few_speeds(wheel):
 @pytest.mark.mpi
 def test_campbell_does_not_depend_on_ranks():
     from mpi4py import MPI
-    a, b = (campbell_table(bodies(comm=comm), [0.0, 1500.0, 3000.0], [1], 3)
-            for comm in (MPI.COMM_WORLD, MPI.COMM_SELF))
+
+    a, b = (
+        campbell_table(bodies(comm=comm), [0.0, 1500.0, 3000.0], [1], 3)
+        for comm in (MPI.COMM_WORLD, MPI.COMM_SELF)
+    )
     np.testing.assert_allclose(a.drop(columns="error"), b.drop(columns="error"), rtol=1e-8)

@@ -11,21 +11,22 @@ import pandas as pd
 import pytest
 from numba import njit
 
-from bladefem.hbm.api import solve
-from bladefem.hbm.reference import reference_model
+from bladefem.hbm.reference_blade import reference_model
+from bladefem.hbm.solve import solve
 from bladefem.report.chart import write_chart
-from bladefem.scene_file import load_scene
-from bladefem.study.chart import chart
-from bladefem.study.chart_mesh import mesh_table, mesh_variants
-from bladefem.study.chart_rows import Bench, Job, resonance, rows
-from bladefem.study.clock import running
-from bladefem.study.family import family_of
-from bladefem.study.methods import Point, applicable, exact, shooting, tangential
-from bladefem.study.settings import Settings, first_for
-from bladefem.study.stages import build_mesh
+from bladefem.scene.toml import load_scene
+from bladefem.study.adaptive.family import family_of
+from bladefem.study.adaptive.settings import Settings, first_for
+from bladefem.study.chart.chart import chart
+from bladefem.study.chart.cpu_clock import running
+from bladefem.study.chart.meshes import mesh_table, mesh_variants
+from bladefem.study.chart.methods import Point, applicable, exact, shooting, tangential
+from bladefem.study.chart.rows import Bench, Job, resonance, rows
+from bladefem.study.pipeline.stages import build_mesh
 from bladefem.view.chart import draw_errors
 
 PLANE = Path(__file__).parents[2] / "scenes" / "plane.toml"
+
 
 @pytest.fixture(scope="module")
 def made():
@@ -35,6 +36,7 @@ def made():
 
 class FalseClock:
     """Runs only where it is told to."""
+
     time = 0.0
 
     def now(self):
@@ -44,8 +46,11 @@ class FalseClock:
 def _bench(run):
     """Nine frequencies round a resonance at 1 rad/s, its reference by the same function."""
     omegas = np.linspace(0.96, 1.04, 9)
-    return Bench(omegas, resonance(omegas, np.array([run(None, omega, None).first for omega in omegas])),
-                 {"error": 0.0})
+    return Bench(
+        omegas,
+        resonance(omegas, np.array([run(None, omega, None).first for omega in omegas])),
+        {"error": 0.0},
+    )
 
 
 def test_balance_converges_with_harmonics(made):
@@ -63,7 +68,7 @@ def test_automatic_choice_is_marked_and_right(made):
 
 def test_poor_models_are_seen(made):
     models = made.models.set_index("name")
-    assert models.loc["1 mode", "error"] > 0.1          # mode 2 is studied
+    assert models.loc["1 mode", "error"] > 0.1  # mode 2 is studied
     assert any("1 mode: its resonance lies outside" in remark for remark in made.remarks)
     assert any("changed by" in remark for remark in made.remarks)
 
@@ -72,12 +77,24 @@ def test_every_kind_of_method_is_solved(made):
     """Compiled for the first time or not, and whatever was tried before it."""
     table = made.methods[made.methods["converged"]]
     assert {f"H {H}" for H in (1, 3, 5, 7, 9, 15, 31)} <= set(table["name"])
-    assert set(made.methods["family"]) == set(table["family"]) >= {
-        "paper's iteration", "integration, Newmark", "integration, explicit", "shooting", "balance, exact events"}
+    assert (
+        set(made.methods["family"])
+        == set(table["family"])
+        >= {
+            "paper's iteration",
+            "integration, Newmark",
+            "integration, explicit",
+            "shooting",
+            "balance, exact events",
+        }
+    )
 
 
 def test_compilation_is_nobodys_time():
-    """A kernel that takes seconds to compile and nothing to run, with a budget of less than the former."""
+    """A kernel that takes seconds to compile and nothing to run, with a budget of less than the
+    former.
+    """
+
     @njit
     def kernel(x):
         return np.sort(np.full(3, x)).sum() + x
@@ -88,25 +105,37 @@ def test_compilation_is_nobodys_time():
     bench = _bench(lambda model, omega, start: Point(1 / (0.02j + omega - 1), True, ""))
     begun = time.process_time()
     with running() as clock:
-        row, = rows([Job("slow to compile", "new", None, run, bench)], clock.now() + 0.1, clock)
+        (row,) = rows([Job("slow to compile", "new", None, run, bench)], clock.now() + 0.1, clock)
     spent = time.process_time() - begun
     assert row["converged"] and row["error"] < 1e-12
     assert clock.compiled > 0.9 * spent > 10 * row["time"]
 
 
 def test_the_budget_is_used_and_cheap_ones_go_first():
-    """By a false clock: of a dear family only what fits, though it comes first; a cheap one's failure bars nobody."""
+    """By a false clock: of a dear family only what fits, though it comes first; a cheap one's
+    failure bars nobody.
+    """
     clock = FalseClock()
 
     def costing(seconds, converged=True):
         def run(model, omega, start):
             clock.time += seconds
             return Point(1 / (0.02j + omega - 1), converged, "" if converged else "lost")
+
         return run
 
-    costs = {"dear 1": 1.0, "dear 2": 2.0, "dear 3": 8.0, "cheap 1": 0.01, "lost 1": 0.1, "lost 2": 0.2}
-    jobs = [Job(name, name[:-2], None, costing(s, name != "lost 1"), _bench(costing(s)), ordered=True)
-            for name, s in costs.items()]
+    costs = {
+        "dear 1": 1.0,
+        "dear 2": 2.0,
+        "dear 3": 8.0,
+        "cheap 1": 0.01,
+        "lost 1": 0.1,
+        "lost 2": 0.2,
+    }
+    jobs = [
+        Job(name, name[:-2], None, costing(s, name != "lost 1"), _bench(costing(s)), ordered=True)
+        for name, s in costs.items()
+    ]
     clock.time = 0.0
     table = pd.DataFrame(rows(jobs, 50.0, clock)).set_index("name")
     assert list(table.index) == list(costs)
@@ -123,7 +152,10 @@ def test_files_are_written(made, tmp_path):
 
 def test_names_of_axes_fit_and_each_row_has_one_legend(made):
     """A table without phasors leaves its third place to the legend."""
-    figure = draw_errors({"methods": made.methods, "meshes": made.models.drop(columns="error_phasor")}, title="x" * 60)
+    figure = draw_errors(
+        {"methods": made.methods, "meshes": made.models.drop(columns="error_phasor")},
+        title="x" * 60,
+    )
     figure.draw_without_rendering()
     assert sum(ax.get_legend() is not None for ax in figure.axes) == 2
     assert figure.axes[5].get_legend() is not None
@@ -135,7 +167,9 @@ def test_names_of_axes_fit_and_each_row_has_one_legend(made):
 
 
 def test_exact_events_and_shooting_agree_with_the_balance():
-    """Shooting has no truncation, the balance of 15 harmonics 2e-6 of it; stiff modes are quasi-static to 1e-3."""
+    """Shooting has no truncation, the balance of 15 harmonics 2e-6 of it; stiff modes are
+    quasi-static to 1e-3.
+    """
     model = tangential(reference_model(load=3.0, points=1, modes=8, harmonics=15))
     omega = 2 * np.pi * 1340.0
     balance = solve(model, omega, 15, 4096).probe[1, 0]
@@ -158,12 +192,16 @@ def test_resonance_of_one_mode_is_exact():
 
 
 def test_meshes_of_second_order_agree_and_those_of_first_do_not():
-    """Plane blade in bending: 12 and 8 mm differ by 1 % of the frequency, linear triangles are far too stiff."""
+    """Plane blade in bending: 12 and 8 mm differ by 1 % of the frequency, linear triangles are far
+    too stiff.
+    """
     scene, remarks = load_scene(PLANE, ["mesh.contact_size=1.2 mm", "mesh.size=8 mm"]), []
     variants = mesh_variants(scene, [0.012, 0.008], build_mesh(scene))
     table = mesh_table(scene, Settings(10, 1, 64, "rigid", 4), 40.0, variants, 300.0, remarks)
     rows = table.set_index(["family", "name"])
-    assert list(rows.index) == [(order, size) for order in ("order 1", "order 2") for size in ("12 mm", "8 mm")]
+    assert list(rows.index) == [
+        (order, size) for order in ("order 1", "order 2") for size in ("12 mm", "8 mm")
+    ]
     assert rows.loc[("order 2", "8 mm"), "error_frequency"] == 0.0
     assert rows.loc[("order 2", "12 mm"), "error_frequency"] < 0.02
     assert rows.loc["order 1", "error_frequency"].min() > 0.05
@@ -178,24 +216,43 @@ def test_a_mesh_that_would_take_too_long_is_left_out_and_named():
     assert sum("0.1 mm: left out" in remark for remark in remarks) == 2
 
 
-@pytest.mark.parametrize("given", [[], ["mesh.size=4 mm", "mesh.contact_size=1.2 mm", "mesh.scale=0.6"]])
+@pytest.mark.parametrize(
+    "given", [[], ["mesh.size=4 mm", "mesh.contact_size=1.2 mm", "mesh.scale=0.6"]]
+)
 def test_seats_are_refined_with_the_mesh_and_at_last_alone(given):
     """Edges on the seats shrink as much as those of the body, also where a size is left open."""
     scene = load_scene(PLANE, given)
     drawn = build_mesh(scene)
-    counts = [len(build_mesh(v.of(scene)).faces["seat_right"]) for v in mesh_variants(scene, [], drawn) if v.order == 2]
+    counts = [
+        len(build_mesh(v.of(scene)).faces["seat_right"])
+        for v in mesh_variants(scene, [], drawn)
+        if v.order == 2
+    ]
     own = len(drawn.faces["seat_right"])
     assert counts[2:] == [own, 2 * own]
     assert counts[:2] == pytest.approx([own / 1.7, own / 1.3], abs=1.0)
-    coarse, fine = (len(build_mesh(v.of(scene)).faces["seat_right"])
-                    for v in mesh_variants(scene, [0.008, 0.004], drawn) if v.order == 2)
+    coarse, fine = (
+        len(build_mesh(v.of(scene)).faces["seat_right"])
+        for v in mesh_variants(scene, [0.008, 0.004], drawn)
+        if v.order == 2
+    )
     assert fine == pytest.approx(2 * coarse, abs=1)
 
 
 def test_the_halved_seats_show_what_the_contact_mesh_is_wrong():
-    """Soft contacts, partly lifted off: with ten elements on a seat the amplitude is 25 to 30 % low."""
-    scene = load_scene(PLANE, ["contact.kt=1e6 N/m", "contact.normal=prescribed", "study.band=1100 Hz, 1260 Hz",
-                               "mesh.size=4 mm", "mesh.contact_size=1.2 mm"])
+    """Soft contacts, partly lifted off: with ten elements on a seat the amplitude is 25 to 30 %
+    low.
+    """
+    scene = load_scene(
+        PLANE,
+        [
+            "contact.kt=1e6 N/m",
+            "contact.normal=prescribed",
+            "study.band=1100 Hz, 1260 Hz",
+            "mesh.size=4 mm",
+            "mesh.contact_size=1.2 mm",
+        ],
+    )
     drawn, remarks = build_mesh(scene), []
     variants = [v for v in mesh_variants(scene, [], drawn) if v.order == 2][2:]
     table = mesh_table(scene, Settings(10, 1, 64, "rigid"), 63.0, variants, 300.0, remarks)

@@ -1,4 +1,6 @@
-"""The automatic choice on eight blades: never wrong; contact points that single steps are blind to; estimates."""
+"""The automatic choice on eight blades: never wrong; contact points that single steps are blind to;
+estimates.
+"""
 
 from __future__ import annotations
 
@@ -7,25 +9,34 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from bladefem.hbm.api import solve
-from bladefem.hbm.reference import reference_model
-from bladefem.hbm.resonance import free_resonances, stuck_resonances
+from bladefem.hbm.linear_resonances import free_resonances, stuck_resonances
+from bladefem.hbm.reference_blade import reference_model
+from bladefem.hbm.solve import solve
 from bladefem.hbm.sweep import size
-from bladefem.scene_file import load_scene
-from bladefem.study.choice import adapted, checked, choose, estimated
-from bladefem.study.family import carried, coarsened, family_of, member
-from bladefem.study.indicators import indicate, richer
-from bladefem.study.joint import LoadCase
-from bladefem.study.loads import curve_of
-from bladefem.study.settings import Settings, enriched, first_for
-from bladefem.study.watched import peak_of
+from bladefem.scene.toml import load_scene
+from bladefem.study.adaptive.check_points import peak_of
+from bladefem.study.adaptive.choice import adapted, checked, choose, estimated
+from bladefem.study.adaptive.family import carried, coarsened, family_of, member
+from bladefem.study.adaptive.indicators import indicate, richer
+from bladefem.study.adaptive.settings import Settings, enriched, first_for
+from bladefem.study.pipeline.assemble_model import LoadCase
+from bladefem.study.pipeline.loads import curve_of
 
 
 @pytest.mark.parametrize("accuracy", [0.02, 0.001])
-@pytest.mark.parametrize(("kt", "mass", "phase", "points", "load", "share"), [
-    (1e6, 0.06, 0.0, 1, 1.0, 0.1), (1e6, 0.03, 1.0, 4, 1.0, 0.9), (1e6, 0.03, 1.0, 4, 8.0, 1.1),
-    (2e7, 0.06, np.pi, 8, 1.0, -0.1), (2e7, 0.06, np.pi, 8, 8.0, 0.5), (3e6, 0.12, 0.5, 8, 1.0, 0.1),
-    (3e6, 0.12, 0.5, 8, 8.0, 0.9), (1e6, 0.06, 0.0, 6, 3.0, 0.7)])
+@pytest.mark.parametrize(
+    ("kt", "mass", "phase", "points", "load", "share"),
+    [
+        (1e6, 0.06, 0.0, 1, 1.0, 0.1),
+        (1e6, 0.03, 1.0, 4, 1.0, 0.9),
+        (1e6, 0.03, 1.0, 4, 8.0, 1.1),
+        (2e7, 0.06, np.pi, 8, 1.0, -0.1),
+        (2e7, 0.06, np.pi, 8, 8.0, 0.5),
+        (3e6, 0.12, 0.5, 8, 1.0, 0.1),
+        (3e6, 0.12, 0.5, 8, 8.0, 0.9),
+        (1e6, 0.06, 0.0, 6, 3.0, 0.7),
+    ],
+)
 def test_accepted_settings_keep_the_accuracy(kt, mass, phase, points, load, share, accuracy):
     model = reference_model(kt, mass, load, phase=phase, points=points, modes=20, harmonics=63)
     omega = free_resonances(model)[1] * (1 - share) + stuck_resonances(model)[1] * share
@@ -42,8 +53,11 @@ def test_a_curve_tells_its_error_at_every_point():
     model = reference_model(load=3.0, points=4, modes=20, harmonics=63)
     curve = adapted(family_of(model), first_for(20), (1150.0, 1600.0), 2, 0.02)
     told, top = estimated(curve), size(peak_of(curve.points))
-    true = [abs(p.probe[1, 0] / solve(model, p.omega, 31, 2048).probe[1, 0] - 1) * size(p) / top for p in curve.points]
-    assert max(true) < 0.02         # at every point, of the peak: measured 0.19 %
+    true = [
+        abs(p.probe[1, 0] / solve(model, p.omega, 31, 2048).probe[1, 0] - 1) * size(p) / top
+        for p in curve.points
+    ]
+    assert max(true) < 0.02  # at every point, of the peak: measured 0.19 %
     assert len(told) == len(curve.points) and np.isfinite(told).all()
     assert 3 <= checked(curve).sum() <= 8
     assert curve.settings.error <= 0.01
@@ -55,13 +69,18 @@ def test_joined_contact_points_keep_stiffness_and_load():
     assert few.elements.kt.sum() == pytest.approx(model.elements.kt.sum())
     assert few.elements.n0.sum() == pytest.approx(8.0)
     omega = 2 * np.pi * 1300
-    stuck = [solve(m, omega, 1, 64).probe[1, 0] for m in (coarsened(heavy(model), np.repeat(np.arange(4), 3)),
-                                                          heavy(model))]
-    assert stuck[0] == pytest.approx(stuck[1], rel=1e-9)     # all points see one platform: in stick nothing is lost
+    stuck = [
+        solve(m, omega, 1, 64).probe[1, 0]
+        for m in (coarsened(heavy(model), np.repeat(np.arange(4), 3)), heavy(model))
+    ]
+    assert stuck[0] == pytest.approx(
+        stuck[1], rel=1e-9
+    )  # all points see one platform: in stick nothing is lost
 
 
 def heavy(model):
-    from bladefem.hbm.vary import vary
+    from bladefem.hbm.parameters import vary
+
     return vary(model, "load", 1e6)
 
 

@@ -1,4 +1,6 @@
-"""Richardson's estimate on made-up and real sequences; effective masses that add up to the wheel's mass."""
+"""Richardson's estimate on made-up and real sequences; effective masses that add up to the wheel's
+mass.
+"""
 
 from dataclasses import replace
 
@@ -13,9 +15,10 @@ from bladefem.fem.body import assemble
 from bladefem.fem.constraint import constrain
 from bladefem.fem.loads import mass
 from bladefem.fem.modes import modes
-from bladefem.scene import Material
-from bladefem.scene_file import load_scene
-from bladefem.study.converge import (
+from bladefem.scene.tables import Material
+from bladefem.scene.toml import load_scene
+from bladefem.study.modes.effective_mass import effective_masses
+from bladefem.study.modes.mesh_convergence import (
     BELIEVED,
     RATIOS,
     _summary,
@@ -26,15 +29,14 @@ from bladefem.study.converge import (
     paired,
     richardson,
 )
-from bladefem.study.effective import effective_masses
-from bladefem.study.stages import Bodies, build_mesh, find_modes
+from bladefem.study.pipeline.stages import Bodies, build_mesh, find_modes
 
 
 @pytest.mark.parametrize("order", [1.0, 2.0, 4.0, 5.7])
 @pytest.mark.parametrize("sizes", [(4, 2, 1), (1.7, 1.31, 1.0)])
 def test_a_power_law_is_found(order, sizes):
     h = np.array(sizes)
-    limit, found = richardson(h, 100 + 3 * h ** order)
+    limit, found = richardson(h, 100 + 3 * h**order)
     assert limit == pytest.approx(100, rel=1e-9) and found == pytest.approx(order, rel=1e-6)
 
 
@@ -46,7 +48,7 @@ def test_values_out_of_line_have_no_order(f):
 
 def test_more_meshes_are_fitted_and_their_scatter_told():
     h = np.array([2.0, 1.7, 1.4, 1.2, 1.0])
-    exact = 100 + 3 * h ** 3
+    exact = 100 + 3 * h**3
     assert fitted(h, exact) == pytest.approx((100, 3, 0), abs=1e-4)
     noise = 0.3 * np.array([1, -1, 1, -1, 1])
     limit, order, scatter = fitted(h, exact + noise)
@@ -54,10 +56,14 @@ def test_more_meshes_are_fitted_and_their_scatter_told():
     assert np.isnan(fitted(h, 100 + noise)[1])
 
 
-@pytest.mark.parametrize("cell_type, order", [("triangle", 2), ("quad", 2), ("triangle6", 4), ("quad9", 4)])
+@pytest.mark.parametrize(
+    "cell_type, order", [("triangle", 2), ("quad", 2), ("triangle6", 4), ("quad9", 4)]
+)
 @pytest.mark.parametrize("divisions", [(6, 9, 12), (6, 7, 8, 10, 12)])
 def test_cantilever_has_the_order_of_its_elements(cell_type, order, divisions):
-    """Extension of a clamped bar at nu = 0 is f = (2k - 1) c / 4L: order 2 and 4, and a limit far nearer to it."""
+    """Extension of a clamped bar at nu = 0 is f = (2k - 1) c / 4L: order 2 and 4, and a limit far
+    nearer to it.
+    """
     material = Material(nu=0.0)
     exact = np.sqrt(material.E / material.rho) / 4
     runs = []
@@ -72,20 +78,30 @@ def test_cantilever_has_the_order_of_its_elements(cell_type, order, divisions):
 
 
 def test_sizes_scale_the_whole_mesh():
-    """Every size is scaled alike, also those that the scene does not name: cells grow with the square of the ratio."""
+    """Every size is scaled alike, also those that the scene does not name: cells grow with the
+    square of the ratio.
+    """
     scene = load_scene("scenes/plane.toml")
-    meshes = [build_mesh(replace(scene, mesh=replace(scene.mesh, scale=s))) for s in (1.0, 0.5, 0.25)]
+    meshes = [
+        build_mesh(replace(scene, mesh=replace(scene.mesh, scale=s))) for s in (1.0, 0.5, 0.25)
+    ]
     cells = [len(mesh.bodies["blade"]) for mesh in meshes]
     assert np.log2(cells[1] / cells[0]) == pytest.approx(2, abs=0.35)
     assert np.log2(cells[2] / cells[1]) == pytest.approx(2, abs=0.35)
 
 
 def test_plane_blade_converges():
-    """Frequencies fall as the mesh is refined, and the estimate lies below the finest by about what it says."""
+    """Frequencies fall as the mesh is refined, and the estimate lies below the finest by about what
+    it says.
+    """
     scene = load_scene("scenes/plane.toml")
     found = converge(scene, [6e-3, 4e-3, 2.8e-3], count=3)
     assert len(found.points) == 9 and len(found.summary) == 3
-    finer = converge(scene, [2.8e-3, 2e-3, 1.4e-3], count=3).points.query("dofs == dofs.max()")["frequency"].to_numpy()
+    finer = (
+        converge(scene, [2.8e-3, 2e-3, 1.4e-3], count=3)
+        .points.query("dofs == dofs.max()")["frequency"]
+        .to_numpy()
+    )
     assert (finer < found.summary["frequency"].to_numpy()).all()
     left = found.summary["frequency"].to_numpy() / finer - 1
     assert (left < 5 * found.summary["error"] + 1e-5).all()
@@ -96,17 +112,27 @@ def test_plane_blade_converges():
 def test_modes_that_cross_keep_their_names():
     """The first two modes of the coarser mesh change places: their shapes tell which is which."""
     scene = load_scene("scenes/plane.toml")
-    meshes = [build_mesh(replace(scene, mesh=replace(scene.mesh, size=size))) for size in (6e-3, 4e-3)]
+    meshes = [
+        build_mesh(replace(scene, mesh=replace(scene.mesh, size=size))) for size in (6e-3, 4e-3)
+    ]
     coarse, fine = (find_modes(Bodies(scene, mesh), None, 4)[0] for mesh in meshes)
-    turned = replace(coarse, frequencies=coarse.frequencies[[1, 0, 2, 3]], shapes=coarse.shapes[[1, 0, 2, 3]])
+    turned = replace(
+        coarse, frequencies=coarse.frequencies[[1, 0, 2, 3]], shapes=coarse.shapes[[1, 0, 2, 3]]
+    )
     numbers, match = paired(meshes[0], turned, meshes[1], fine, 3)
     assert list(numbers) == [1, 0, 2] and match.min() > 0.99
 
 
 def test_an_order_that_no_element_has_is_not_believed():
-    points = pd.DataFrame({"size": [2.0, 1.4, 1.0], "mode": 1, "frequency": [130.0, 103.0, 100.0], "mac": 1.0})
+    points = pd.DataFrame(
+        {"size": [2.0, 1.4, 1.0], "mode": 1, "frequency": [130.0, 103.0, 100.0], "mac": 1.0}
+    )
     row = _summary(points).iloc[0]
-    assert "order 6.1 is none" in row["reason"] and row["limit"] == 100 and row["error"] == pytest.approx(0.09)
+    assert (
+        "order 6.1 is none" in row["reason"]
+        and row["limit"] == 100
+        and row["error"] == pytest.approx(0.09)
+    )
     assert "MAC 0.50" in _summary(points.assign(mac=0.5)).iloc[0]["reason"]
 
 
@@ -123,7 +149,9 @@ def test_wrong_sizes():
 
 
 def test_effective_masses_add_up():
-    """All modes of a nodal diameter together move the whole rigid wheel, but for what is held at the clamp."""
+    """All modes of a nodal diameter together move the whole rigid wheel, but for what is held at
+    the clamp.
+    """
     one = bodies(count=5, divisions=(3, 1, 1))
     body = one.still_blade
     free = 3 * (len(np.unique(one.mesh.bodies["blade"])) - len(np.unique(one.mesh.faces["clamp"])))

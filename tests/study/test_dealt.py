@@ -2,7 +2,7 @@
 
 import pytest
 
-from bladefem.study.loads import dealt
+from bladefem.study.pipeline.loads import dealt
 
 
 def test_dealt_to_and_fro():

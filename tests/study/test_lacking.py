@@ -7,15 +7,18 @@ from wheels import ring
 
 from bladefem.errors import InputError
 from bladefem.hbm.model import Damping
-from bladefem.scene import Excitation, Operation, Scene
-from bladefem.study import pipeline, survey
-from bladefem.study.lacking import found_patches, refuse_loads
+from bladefem.scene.tables import Excitation, Operation, Scene
+from bladefem.study.modes import survey
+from bladefem.study.pipeline import pipeline
+from bladefem.study.pipeline.validate_mesh import found_patches, refuse_loads
 
 NOSE = Scene(excitation=Excitation(at="nose"))
 
 
 def test_node_set_and_pair_are_missed_together():
-    with pytest.raises(InputError, match=r"no node set or face 'nose'.*; and the mesh has no contact pair 'this'"):
+    with pytest.raises(
+        InputError, match=r"no node set or face 'nose'.*; and the mesh has no contact pair 'this'"
+    ):
         found_patches(NOSE, ring(), excited=True)
     with pytest.raises(InputError, match=r"^the mesh has no contact pair 'this'"):
         found_patches(NOSE, ring(), excited=False)
@@ -25,7 +28,9 @@ def test_faces_of_loads():
     refuse_loads(Scene(), ring(), [("excitation", 0.0), ("tip", 5.0)], None)
     with pytest.raises(InputError, match=r"^forced, tpi: .*did you mean 'tip'\?$"):
         refuse_loads(Scene(), ring(), [("tpi", 5.0)], None)
-    with pytest.raises(InputError, match=r"excitation\.at.*; and forced, nose: the mesh has no such face"):
+    with pytest.raises(
+        InputError, match=r"excitation\.at.*; and forced, nose: the mesh has no such face"
+    ):
         refuse_loads(NOSE, ring(), [("nose", 5.0)], None)
     still = Scene(operation=Operation(damping=0.0))
     with pytest.raises(InputError, match=r"operation\.damping = 0"):
@@ -40,6 +45,7 @@ def no_work(monkeypatch):
 
     def never(*_):
         raise AssertionError("long work")
+
     for module, name in ((pipeline, "find_modes"), (survey, "_all_modes")):
         monkeypatch.setattr(module, name, never)
 
@@ -51,7 +57,9 @@ def test_names_are_checked_before_the_modes(no_work):
         pipeline.run(NOSE, None)
 
 
-@pytest.mark.parametrize("scene", [Scene(operation=Operation(damping=0.0)), Scene(excitation=Excitation(force=0.0))])
+@pytest.mark.parametrize(
+    "scene", [Scene(operation=Operation(damping=0.0)), Scene(excitation=Excitation(force=0.0))]
+)
 def test_a_response_without_damping_or_force_is_refused_before_the_mesh(scene, monkeypatch):
     monkeypatch.setattr(pipeline, "build_mesh", lambda *_: pytest.fail("long work"))
     for until in ("reduction", "response"):

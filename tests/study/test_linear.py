@@ -1,4 +1,6 @@
-"""Forced response of one sector against a direct solve of the whole wheel, with each kind of damping."""
+"""Forced response of one sector against a direct solve of the whole wheel, with each kind of
+damping.
+"""
 
 from dataclasses import replace
 
@@ -10,9 +12,8 @@ from bladefem.errors import InputError
 from bladefem.fem.body import assemble
 from bladefem.fem.stress import nodal_stress, von_mises
 from bladefem.hbm.model import Damping
-from bladefem.scene import Material
-from bladefem.study.answer import answer, read_damping, read_loads, stress_states, stress_table
-from bladefem.study.linear import (
+from bladefem.scene.tables import Material
+from bladefem.study.modes.linear_response import (
     displacement,
     excitation_load,
     forced,
@@ -22,14 +23,23 @@ from bladefem.study.linear import (
     probe,
     static_offset,
 )
-from bladefem.study.stages import Bodies, wheel_modes
+from bladefem.study.modes.linear_response_report import (
+    answer,
+    read_damping,
+    read_loads,
+    stress_states,
+    stress_table,
+)
+from bladefem.study.pipeline.stages import Bodies, wheel_modes
 from geometry.mesh import Mesh
 
 COUNT, SMALL = 5, (2, 1, 1)
 
 
 def wheel_matrices(mesh):
-    """Dense K and M of the full wheel, free rows, and the (sectors, n) numbers of each sector's nodes."""
+    """Dense K and M of the full wheel, free rows, and the (sectors, n) numbers of each sector's
+    nodes.
+    """
     count, pairs, n = mesh.sector.count, mesh.pairs["cyclic"].nodes, len(mesh.points)
     number = np.arange(count * n).reshape(count, n)
     for s in range(count):
@@ -41,10 +51,14 @@ def wheel_matrices(mesh):
     for s in range(count):
         points[dense[s]] = mesh.points @ np.linalg.matrix_power(mesh.sector.rotation, s).T
     clamp = np.concatenate([dense[s][mesh.faces["clamp"]] for s in range(count)])
-    whole = Mesh(points, mesh.cell_type, {"blade": np.concatenate([d[mesh.bodies["blade"]] for d in dense])})
+    whole = Mesh(
+        points, mesh.cell_type, {"blade": np.concatenate([d[mesh.bodies["blade"]] for d in dense])}
+    )
     body = assemble(whole, "blade", Material())
     rows = body.scalar_rows
-    free = np.setdiff1d(np.arange(3 * len(points)), (3 * np.unique(clamp)[:, None] + np.arange(3)).ravel())
+    free = np.setdiff1d(
+        np.arange(3 * len(points)), (3 * np.unique(clamp)[:, None] + np.arange(3)).ravel()
+    )
     K, M = (A[:, :][np.ix_(rows, rows)] for A in (body.K, body.M))
     return K, M, free, dense
 
@@ -56,9 +70,17 @@ def whole_wheel(one, load, order, frequency, damping):
     force = np.zeros((len(K) // 3, 3), complex)
     for s in range(mesh.sector.count):
         R = np.linalg.matrix_power(mesh.sector.rotation, s)
-        np.add.at(force, dense[s], np.exp(2j * np.pi * order * s / mesh.sector.count) * load.reshape(-1, 3) @ R.T)
+        np.add.at(
+            force,
+            dense[s],
+            np.exp(2j * np.pi * order * s / mesh.sector.count) * load.reshape(-1, 3) @ R.T,
+        )
     w = 2 * np.pi * frequency
-    Z = K * (1 + 1j * damping.structural) - w ** 2 * M + 1j * w * (damping.mass * M + damping.stiffness * K)
+    Z = (
+        K * (1 + 1j * damping.structural)
+        - w**2 * M
+        + 1j * w * (damping.mass * M + damping.stiffness * K)
+    )
     u = np.zeros(len(K), complex)
     u[free] = np.linalg.solve(Z[np.ix_(free, free)], force.ravel()[free])
     return u.reshape(-1, 3)[dense[0]]
@@ -67,24 +89,34 @@ def whole_wheel(one, load, order, frequency, damping):
 @pytest.mark.parametrize("order", [0, 1, 3, 4, 7])
 @pytest.mark.parametrize("damping", [Damping(structural=0.01), Damping(mass=20.0, stiffness=1e-7)])
 def test_sector_answers_as_the_whole_wheel(order, damping):
-    """Every kind of wave: standing, with and against the count. The modes left out answer statically: 1e-4."""
+    """Every kind of wave: standing, with and against the count. The modes left out answer
+    statically: 1e-4.
+    """
     one = bodies(order=order, count=COUNT, divisions=SMALL)
     load = excitation_load(one).astype(complex) + pressure_load(one, "tip", 50.0 + 20.0j)
     response = forced(one, load, damping, modes=25)
     for frequency in (0.0, 0.97 * response.omega[0] / (2 * np.pi)):
         exact = whole_wheel(one, load, order, frequency, damping)
         if frequency == 0.0 and damping.structural:
-            continue        # a loss factor means nothing at rest
-        np.testing.assert_allclose(displacement(response, frequency), exact, atol=1e-4 * abs(exact).max())
+            continue  # a loss factor means nothing at rest
+        np.testing.assert_allclose(
+            displacement(response, frequency), exact, atol=1e-4 * abs(exact).max()
+        )
 
 
 def test_resonance_of_a_single_mode():
-    """phi^2 F / (2 zeta omega^2) with the modal damping of the scene; the phase turns by a quarter."""
+    """phi^2 F / (2 zeta omega^2) with the modal damping of the scene; the phase turns by a
+    quarter.
+    """
     one = bodies(order=2)
     response = forced(one)
     vector = excitation_load(one) / one.scene.excitation.force
     f, amplitude = peak(response, vector)
-    alone = abs(response.modal_load[0]) ** 2 / one.scene.excitation.force / (2 * 0.002 * response.omega[0] ** 2)
+    alone = (
+        abs(response.modal_load[0]) ** 2
+        / one.scene.excitation.force
+        / (2 * 0.002 * response.omega[0] ** 2)
+    )
     assert amplitude == pytest.approx(alone, rel=0.01)
     assert f == pytest.approx(response.omega[0] / (2 * np.pi), rel=1e-4)
     at = probe(response, vector, np.array([f, 0.5 * f]))
@@ -95,7 +127,9 @@ def test_resonance_of_a_single_mode():
 
 
 def test_pressure_reaches_the_whole_face():
-    """The resultant of a uniform pressure on the rim points inwards and has the size of pressure times chord area."""
+    """The resultant of a uniform pressure on the rim points inwards and has the size of pressure
+    times chord area.
+    """
     one = bodies(bump=0.0)
     load = pressure_load(one, "tip", 1e5).reshape(-1, 3).sum(0)
     area = 2 * 0.25 * np.sin(np.pi / 6) * 0.03
@@ -108,7 +142,9 @@ def test_static_offset_of_rotation_and_pressure():
     alone, both = static_offset(one), static_offset(one, pressure_load(one, "tip", 1e6))
     tip = np.unique(one.mesh.faces["tip"])
     assert (np.linalg.norm(one.mesh.points[tip, :2] + alone[tip, :2], axis=1) > 0.25).all()
-    assert np.einsum("ni,ni->n", both[tip] - alone[tip], one.mesh.points[tip] * [1, 1, 0]).mean() < 0
+    assert (
+        np.einsum("ni,ni->n", both[tip] - alone[tip], one.mesh.points[tip] * [1, 1, 0]).mean() < 0
+    )
 
 
 def test_wrong_loads_and_modes():
@@ -134,7 +170,9 @@ def test_preload_is_chosen_by_the_scene():
 
 
 def test_curve_holds_every_resonance_and_its_half_power_points():
-    """Peaks of the curve are the resonances; across each the amplitude falls to 1/sqrt 2 at the modal damping ratio."""
+    """Peaks of the curve are the resonances; across each the amplitude falls to 1/sqrt 2 at the
+    modal damping ratio.
+    """
     one = bodies(order=2)
     found = answer(one, [("excitation", 0.0)], Damping(structural=0.004), count=2)
     assert half_widths(found.response) == pytest.approx(0.002)
@@ -146,16 +184,27 @@ def test_curve_holds_every_resonance_and_its_half_power_points():
     assert sides / row["amplitude"] == pytest.approx(np.sqrt(0.5), rel=0.01)
     assert np.linalg.norm(found.shapes[0], axis=1).max() == pytest.approx(row["largest"])
     assert row["peaked"]
-    doubled = answer(one, [("excitation", 0.0), ("excitation", 0.0)], Damping(structural=0.004), count=2)
-    assert doubled.points["amplitude"].to_numpy() == pytest.approx(2 * points["amplitude"].to_numpy())
+    doubled = answer(
+        one, [("excitation", 0.0), ("excitation", 0.0)], Damping(structural=0.004), count=2
+    )
+    assert doubled.points["amplitude"].to_numpy() == pytest.approx(
+        2 * points["amplitude"].to_numpy()
+    )
 
 
 def test_words_for_loads_and_damping():
-    assert read_loads("") == [] and read_loads("excitation, tip=2 kPa") == [("excitation", 0.0), ("tip", 2000.0)]
+    assert read_loads("") == [] and read_loads("excitation, tip=2 kPa") == [
+        ("excitation", 0.0),
+        ("tip", 2000.0),
+    ]
     assert read_damping("ratio=0.1 %, structural=0.002") == Damping(ratio=0.001, structural=0.002)
     assert read_damping("mass=20 1/s, stiffness=1e-7 s") == Damping(mass=20.0, stiffness=1e-7)
-    for read, text, words in ((read_loads, "tip", "face=pressure"), (read_loads, "tip=2 N", "Pa"),
-                              (read_damping, "viscous=1", "'viscous' is unknown"), (read_damping, "mass=1 kg", "1/s")):
+    for read, text, words in (
+        (read_loads, "tip", "face=pressure"),
+        (read_loads, "tip=2 N", "Pa"),
+        (read_damping, "viscous=1", "'viscous' is unknown"),
+        (read_damping, "mass=1 kg", "1/s"),
+    ):
         with pytest.raises(InputError, match=words):
             read(text)
     one = bodies(count=COUNT, divisions=SMALL)
@@ -166,7 +215,9 @@ def test_words_for_loads_and_damping():
 
 
 def test_table_of_stresses_has_the_extremes_of_every_state():
-    """Stress is linear in the state, so a scaled mode and a resonance of it have the same place and ratio."""
+    """Stress is linear in the state, so a scaled mode and a resonance of it have the same place and
+    ratio.
+    """
     one = bodies(speed=1000.0)
     modes = wheel_modes(one, 2, [2])[0]
     states = stress_states(one, modes, 2)
@@ -177,13 +228,18 @@ def test_table_of_stresses_has_the_extremes_of_every_state():
     assert first["largest"] == pytest.approx(1e-3)
     assert half["von_mises"] == pytest.approx(first["von_mises"] / 2)
     assert (half["x"], half["y"]) == (first["x"], first["y"])
-    assert first["pressing"] == pytest.approx(-first["principal"])      # every motion comes back with the other sign
+    assert first["pressing"] == pytest.approx(
+        -first["principal"]
+    )  # every motion comes back with the other sign
     turning = fields["rotation"]
     assert table.loc["rotation", "von_mises"] == pytest.approx(turning["von Mises"].max())
     assert table.loc["rotation", "von_mises_gauss"] == pytest.approx(
-        cells["rotation"]["von Mises at Gauss points"].max())
-    assert all(len(values["von Mises at Gauss points"]) == sum(map(len, one.mesh.bodies.values()))
-               for values in cells.values())
+        cells["rotation"]["von Mises at Gauss points"].max()
+    )
+    assert all(
+        len(values["von Mises at Gauss points"]) == sum(map(len, one.mesh.bodies.values()))
+        for values in cells.values()
+    )
     assert (turning["smallest principal"] <= turning["largest principal"]).all()
     assert "smallest principal" not in fields["half"]
     assert (table["von_mises_gauss"] > 0.3 * table["von_mises"]).all()

@@ -1,9 +1,17 @@
-"""A damper of another mass: scaled from the reduced one as if it had been meshed with that density."""
+"""A damper of another mass: scaled from the reduced one as if it had been meshed with that
+density.
+"""
 
 import numpy as np
 
-from bladefem.scene_file import load_scene
-from bladefem.study.stages import Bodies, build_mesh, contact_patches, reduce_sector, weighted
+from bladefem.scene.toml import load_scene
+from bladefem.study.pipeline.stages import (
+    Bodies,
+    build_mesh,
+    contact_patches,
+    reduce_sector,
+    weighted,
+)
 
 
 def receptance(model, omega):

@@ -1,28 +1,57 @@
-"""MAC, mode names and effective masses of a beam-like blade with closed-form modes; transfer between meshes."""
+"""MAC, mode names and effective masses of a beam-like blade with closed-form modes; transfer
+between meshes.
+"""
 
 import numpy as np
 import pytest
 
 from bladefem.data import ModeSet
-from bladefem.scene_file import load_scene
-from bladefem.study.modal import blade_root, family_table, mac, mac_of, participation, pure_shapes
-from bladefem.study.stages import Bodies, build_mesh, find_modes
-from bladefem.study.survey import clamped_blade
-from bladefem.study.transfer import MIDDLES, nodal_volumes, simplices, transfer
+from bladefem.scene.toml import load_scene
+from bladefem.study.modes.comparison import (
+    blade_root,
+    family_table,
+    mac,
+    mac_of,
+    participation,
+    pure_shapes,
+)
+from bladefem.study.modes.mesh_transfer import MIDDLES, nodal_volumes, simplices, transfer
+from bladefem.study.modes.survey import clamped_blade
+from bladefem.study.pipeline.stages import Bodies, build_mesh, find_modes
 from geometry.mesh import Mesh
 
 
 def prism(shape, span=0.12, twist=0.0, chord=0.04, thickness=0.004):
     """A twisted rectangular blade above x = 0.2: hexahedra, nodes of a regular grid."""
-    axes = [np.linspace(a, b, n + 1) for (a, b), n in zip(((0, 1), (-0.5, 0.5), (-0.5, 0.5)), shape, strict=True)]
+    axes = [
+        np.linspace(a, b, n + 1)
+        for (a, b), n in zip(((0, 1), (-0.5, 0.5), (-0.5, 0.5)), shape, strict=True)
+    ]
     unit = np.stack(np.meshgrid(*axes, indexing="ij"), -1).reshape(-1, 3)
     angle = twist * unit[:, 0]
     y, z = thickness * unit[:, 1], chord * unit[:, 2]
-    points = np.stack([0.2 + span * unit[:, 0], y * np.cos(angle) - z * np.sin(angle),
-                       y * np.sin(angle) + z * np.cos(angle)], 1)
+    points = np.stack(
+        [
+            0.2 + span * unit[:, 0],
+            y * np.cos(angle) - z * np.sin(angle),
+            y * np.sin(angle) + z * np.cos(angle),
+        ],
+        1,
+    )
     number = np.arange(len(points)).reshape([n + 1 for n in shape])
-    corner = [number[a:a + shape[0], b:b + shape[1], c:c + shape[2]].ravel()
-              for a, b, c in ((0, 0, 0), (1, 0, 0), (1, 1, 0), (0, 1, 0), (0, 0, 1), (1, 0, 1), (1, 1, 1), (0, 1, 1))]
+    corner = [
+        number[a : a + shape[0], b : b + shape[1], c : c + shape[2]].ravel()
+        for a, b, c in (
+            (0, 0, 0),
+            (1, 0, 0),
+            (1, 1, 0),
+            (0, 1, 0),
+            (0, 0, 1),
+            (1, 0, 1),
+            (1, 1, 1),
+            (0, 1, 1),
+        )
+    ]
     return Mesh(points, "hexahedron", {"blade": np.stack(corner, 1)})
 
 
@@ -32,13 +61,19 @@ def second_order(mesh):
     pairs = np.sort(cells[:, list(MIDDLES["tetra10"])].reshape(-1, 2), axis=1)
     unique, inverse = np.unique(pairs, axis=0, return_inverse=True)
     points = np.concatenate([mesh.points, mesh.points[unique].mean(axis=1)])
-    return Mesh(points, "tetra10", {"blade": np.hstack([cells, len(mesh.points) + inverse.reshape(-1, 6)])})
+    return Mesh(
+        points, "tetra10", {"blade": np.hstack([cells, len(mesh.points) + inverse.reshape(-1, 6)])}
+    )
 
 
 def test_mac_of_a_phase_and_of_orthogonal_shapes():
     rng = np.random.default_rng(1)
     shapes = rng.normal(size=(3, 50, 3)) + 1j * rng.normal(size=(3, 50, 3))
-    turned = shapes * np.exp(1j * rng.uniform(0, 6, 3))[:, None, None] * np.array([1, -3, 0.1])[:, None, None]
+    turned = (
+        shapes
+        * np.exp(1j * rng.uniform(0, 6, 3))[:, None, None]
+        * np.array([1, -3, 0.1])[:, None, None]
+    )
     a, b = (ModeSet(np.ones(3), s, 2, np.zeros(3)) for s in (shapes, turned))
     match = mac(a, b)
     assert np.allclose(np.diag(match), 1.0)
@@ -50,14 +85,22 @@ def test_mac_of_a_phase_and_of_orthogonal_shapes():
 
 @pytest.mark.parametrize("twist", [0.0, 0.6])
 def test_pure_motions_are_named(twist):
-    """Cantilever shapes in the turning axes of a twisted blade carry their own name with MAC above 0.97."""
+    """Cantilever shapes in the turning axes of a twisted blade carry their own name with MAC above
+    0.97.
+    """
     mesh = prism((24, 2, 8), twist=twist)
     shapes = pure_shapes(mesh, np.arange(len(mesh.points)), 0.2)
     s = (mesh.points[:, 0] - 0.2) / 0.12
     thin = np.stack([0 * s, np.cos(twist * s), np.sin(twist * s)], 1)
-    first_flap = (s**2 * (6 - 4 * s + s**2))[:, None] * thin        # static shape under a uniform load
-    modes = ModeSet(np.arange(1.0, 5), np.stack([first_flap, shapes["second flap"], shapes["first edge"],
-                                                 shapes["first torsion"]]), None, np.zeros(4))
+    first_flap = (s**2 * (6 - 4 * s + s**2))[:, None] * thin  # static shape under a uniform load
+    modes = ModeSet(
+        np.arange(1.0, 5),
+        np.stack(
+            [first_flap, shapes["second flap"], shapes["first edge"], shapes["first torsion"]]
+        ),
+        None,
+        np.zeros(4),
+    )
     table = family_table(modes, mesh)
     assert table["family"].tolist() == ["first flap", "second flap", "first edge", "first torsion"]
     assert table["mac"].min() > 0.97
@@ -78,14 +121,25 @@ def test_clamped_blade_as_reference_and_disc_modes():
 
 
 def test_modes_that_the_clamp_mixes_are_named_after_the_closer_reference():
-    """A torsion that the clamped blade only has mixed with flap keeps its name, and so does the mixture."""
+    """A torsion that the clamped blade only has mixed with flap keeps its name, and so does the
+    mixture.
+    """
     mesh = prism((24, 2, 8))
     pure = pure_shapes(mesh, np.arange(len(mesh.points)), 0.2)
-    flap, turn = (pure[name] / np.linalg.norm(pure[name]) for name in ("second flap", "first torsion"))
-    clamped = ModeSet(np.array([500.0, 510.0]), np.stack([flap + 0.9 * turn, turn - 0.9 * flap]), None, np.zeros(2))
+    flap, turn = (
+        pure[name] / np.linalg.norm(pure[name]) for name in ("second flap", "first torsion")
+    )
+    clamped = ModeSet(
+        np.array([500.0, 510.0]),
+        np.stack([flap + 0.9 * turn, turn - 0.9 * flap]),
+        None,
+        np.zeros(2),
+    )
     modes = ModeSet(np.array([490.0, 495.0]), np.stack([turn, flap + 0.8 * turn]), 3, np.zeros(2))
     table = family_table(modes, mesh, clamped, root=0.2)
-    assert table["family"].tolist() == ["first torsion", "second flap"] and table["mac"].min() > 0.99
+    assert (
+        table["family"].tolist() == ["first torsion", "second flap"] and table["mac"].min() > 0.99
+    )
 
 
 def test_second_best_modes_are_called_coupled_and_weak_ones_mixed():
@@ -105,11 +159,15 @@ def test_transfer_is_exact_for_quadratics_on_second_order_cells():
     cells = block.bodies["blade"][rng.integers(len(block.bodies["blade"]), size=200), :4]
     inside = np.einsum("kc,kci->ki", rng.dirichlet(np.ones(4), 200), block.points[cells])
     x, y, z = inside.T
-    assert np.allclose(transfer(block, field, inside)[0], np.stack([x * y, y**2 - z, 1 + x * z], 1), atol=1e-12)
+    assert np.allclose(
+        transfer(block, field, inside)[0], np.stack([x * y, y**2 - z, 1 + x * z], 1), atol=1e-12
+    )
 
 
 def test_mac_between_two_meshes():
-    """The same smooth shapes sampled on two hexahedral meshes: diagonal above 0.999 with linear interpolation."""
+    """The same smooth shapes sampled on two hexahedral meshes: diagonal above 0.999 with linear
+    interpolation.
+    """
     fine, coarse = prism((40, 2, 10), twist=0.3), prism((24, 2, 6), twist=0.3)
     sets = []
     for mesh in (fine, coarse):
@@ -126,7 +184,9 @@ def test_nodal_volumes_add_up():
 
 
 def test_effective_masses_of_a_chain_add_up_to_its_mass():
-    """All modes of a clamped chain of masses: sum of effective masses = total mass, in every direction."""
+    """All modes of a clamped chain of masses: sum of effective masses = total mass, in every
+    direction.
+    """
     n = 6
     rng = np.random.default_rng(3)
     mass = np.diag(np.repeat(rng.uniform(1, 2, n), 3))
@@ -136,26 +196,34 @@ def test_effective_masses_of_a_chain_add_up_to_its_mass():
     values, vectors = np.linalg.eigh(stiffness / np.outer(root, root))
     shapes = (vectors / root[:, None]).T.reshape(-1, n, 3)
     points = rng.normal(size=(n, 3))
-    table = participation(ModeSet(np.sqrt(values), shapes, None, values * 0), mass, points, ("x", "z", "rx"))
+    table = participation(
+        ModeSet(np.sqrt(values), shapes, None, values * 0), mass, points, ("x", "z", "rx")
+    )
     assert np.allclose(table.groupby("direction")["share"].sum(), 1.0)
     total = np.diag(mass)[::3].sum()
     assert np.isclose(table[table["direction"] == "x"]["effective_mass"].sum(), total)
 
 
 def test_first_bending_mode_carries_0_613_of_a_beams_mass():
-    """Clamped-free beam: effective mass ratio of the first mode 0.6131 (Blevins), lumped on 400 nodes."""
-    from bladefem.study.modal import beam_function
+    """Clamped-free beam: effective mass ratio of the first mode 0.6131 (Blevins), lumped on 400
+    nodes.
+    """
+    from bladefem.study.modes.comparison import beam_function
 
     s = (np.arange(400) + 0.5) / 400
     shape = np.zeros((1, 400, 3))
     shape[0, :, 1] = beam_function(0, s)
     points = np.stack([s, 0 * s, 0 * s], 1)
-    table = participation(ModeSet(np.ones(1), shape, None, np.zeros(1)), np.eye(1200) / 400, points, ("y",))
+    table = participation(
+        ModeSet(np.ones(1), shape, None, np.zeros(1)), np.eye(1200) / 400, points, ("y",)
+    )
     assert np.isclose(table["share"].iloc[0], 0.6131, atol=2e-4)
 
 
 def test_wheel_modes_are_called_after_the_clamped_aerofoil():
-    """The disc shifts and mixes the modes; beyond the lowest the clamped aerofoil is much closer than a beam is."""
+    """The disc shifts and mixes the modes; beyond the lowest the clamped aerofoil is much closer
+    than a beam is.
+    """
     scene = load_scene("scenes/wedge.toml", ["mesh.size=24 mm"])
     whole = Bodies(scene, build_mesh(scene))
     held = clamped_blade(whole)

@@ -3,8 +3,8 @@
 import pytest
 
 from bladefem.errors import InputError
-from bladefem.scene import Operation, Scene, Study
-from bladefem.study.pipeline import studied_loads
+from bladefem.scene.tables import Operation, Scene, Study
+from bladefem.study.pipeline.pipeline import studied_loads
 
 
 def test_own_load_takes_its_place_among_the_others():
@@ -15,5 +15,7 @@ def test_own_load_takes_its_place_among_the_others():
 
 
 def test_own_load_at_rest_is_refused():
-    with pytest.raises(InputError, match=r"study.own_load = true: nothing presses .* operation.speed = 0"):
+    with pytest.raises(
+        InputError, match=r"study.own_load = true: nothing presses .* operation.speed = 0"
+    ):
         studied_loads(Scene(operation=Operation(speed=0.0), study=Study(own_load=True)), None)

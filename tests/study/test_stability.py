@@ -1,4 +1,6 @@
-"""Stability of the points of a curve: where the load follows the motion, where not, and where no verdict is had."""
+"""Stability of the points of a curve: where the load follows the motion, where not, and where no
+verdict is had.
+"""
 
 from dataclasses import replace
 
@@ -8,12 +10,12 @@ import pytest
 
 from bladefem.damper.branch import inclined_contact
 from bladefem.errors import InputError
-from bladefem.hbm.api import solve
-from bladefem.hbm.follow import follow
-from bladefem.hbm.reference import reference_model
+from bladefem.hbm.continuation import follow
+from bladefem.hbm.reference_blade import reference_model
+from bladefem.hbm.solve import solve
 from bladefem.hbm.sweep import response
 from bladefem.report.tables import readable, units_of
-from bladefem.study.stability import in_one_body, stability_of, stability_sentence
+from bladefem.study.pipeline.stability import in_one_body, stability_of, stability_sentence
 from bladefem.view.response import draw_responses
 
 HZ = 2 * np.pi
@@ -23,12 +25,28 @@ HZ = 2 * np.pi
 def near():
     """The three motions of the inclined contact nearest to 150 Hz: rocking, between, stuck."""
     model, _ = inclined_contact()
-    path = [p.solution for p in follow(model, "omega", solve(model, HZ * 200, 15, 512), (HZ * 110, HZ * 200),
-                                       forward=False, steps=(0.005, 0.02))]
+    path = [
+        p.solution
+        for p in follow(
+            model,
+            "omega",
+            solve(model, HZ * 200, 15, 512),
+            (HZ * 110, HZ * 200),
+            forward=False,
+            steps=(0.005, 0.02),
+        )
+    ]
     size = [abs(p.probe[1, 0]) for p in path]
-    wanted = (40.15e-6, 23.16e-6, 9.316e-6)         # see tests/damper/test_branch.py
-    return model, [path[min((i for i in range(len(path)) if abs(path[i].frequency - 150) < 1.5),
-                            key=lambda i, a=a: abs(size[i] - a))] for a in wanted]
+    wanted = (40.15e-6, 23.16e-6, 9.316e-6)  # see tests/damper/test_branch.py
+    return model, [
+        path[
+            min(
+                (i for i in range(len(path)) if abs(path[i].frequency - 150) < 1.5),
+                key=lambda i, a=a: abs(size[i] - a),
+            )
+        ]
+        for a in wanted
+    ]
 
 
 def test_the_middle_one_of_three_motions_is_unstable(near):
@@ -36,7 +54,9 @@ def test_the_middle_one_of_three_motions_is_unstable(near):
     found = stability_of(model, points)
     assert list(found.verdict) == ["stable", "unstable", "stable"]
     assert found.multiplier[1] > 1.02
-    assert found.multiplier[2] == pytest.approx(1.0, abs=1e-9)              # the slider of a contact that sticks
+    assert found.multiplier[2] == pytest.approx(
+        1.0, abs=1e-9
+    )  # the slider of a contact that sticks
 
 
 def test_prescribed_loads_need_no_computing():
@@ -60,9 +80,16 @@ def test_no_verdict_without_a_form_in_time(near):
 
 
 def test_tables_and_pictures_show_it():
-    points = pd.DataFrame({"load": 20.0, "frequency": [100.0, 101.0, 102.0], "amplitude": [1e-6, 2e-6, 1e-6],
-                           "converged": True, "stability": ["stable", "unstable", "unknown"],
-                           "multiplier": [1.0, 1.2, np.nan]})
+    points = pd.DataFrame(
+        {
+            "load": 20.0,
+            "frequency": [100.0, 101.0, 102.0],
+            "amplitude": [1e-6, 2e-6, 1e-6],
+            "converged": True,
+            "stability": ["stable", "unstable", "unknown"],
+            "multiplier": [1.0, 1.2, np.nan],
+        }
+    )
     assert "largest Floquet multiplier" in " ".join(readable(points).columns)
     assert "multiplier" not in units_of(points)
     axes = draw_responses(points).axes[0]

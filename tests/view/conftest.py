@@ -1,4 +1,6 @@
-"""A small bladed sector made by hand: boxes in polar coordinates, split into P2 tetrahedra, with known modes."""
+"""A small bladed sector made by hand: boxes in polar coordinates, split into P2 tetrahedra, with
+known modes.
+"""
 
 from itertools import permutations
 
@@ -17,7 +19,12 @@ def box(lower, upper, shape):
     points = np.stack(np.meshgrid(*axes, indexing="ij"), axis=-1).reshape(-1, 3)
     number = np.arange(len(points)).reshape([n + 1 for n in shape])
     i, j, k = np.meshgrid(*(np.arange(n) for n in shape), indexing="ij")
-    corner = {(a, b, c): number[i + a, j + b, k + c].ravel() for a in (0, 1) for b in (0, 1) for c in (0, 1)}
+    corner = {
+        (a, b, c): number[i + a, j + b, k + c].ravel()
+        for a in (0, 1)
+        for b in (0, 1)
+        for c in (0, 1)
+    }
     return points, corner
 
 
@@ -54,7 +61,9 @@ def merge(parts):
     points = np.concatenate([p for p, _ in parts])
     offsets = np.cumsum([0] + [len(p) for p, _ in parts[:-1]])
     cells = np.concatenate([c + o for (_, c), o in zip(parts, offsets, strict=True)])
-    _, first, inverse = np.unique(np.round(points, 9), axis=0, return_index=True, return_inverse=True)
+    _, first, inverse = np.unique(
+        np.round(points, 9), axis=0, return_index=True, return_inverse=True
+    )
     return points[first], inverse.reshape(-1)[cells]
 
 
@@ -79,11 +88,23 @@ def sector():
     cells = [cells, tetrahedra(block[1]) + len(points)]
     points = np.concatenate([points, polar(block[0])])
     points, all_cells = second_order(points, np.concatenate(cells))
-    bodies = {"blade": all_cells[:len(cells[0])], "damper": all_cells[len(cells[0]):]}
-    faces = {name: boundary_where(points, bodies["blade"], test) for name, test in {
-        "clamp": lambda r, a, z: r < 0.1 + 1e-9, "cyclic_low": lambda r, a, z: a < -half + 1e-9,
-        "cyclic_high": lambda r, a, z: a > half - 1e-9, "tip": lambda r, a, z: r > 0.28 * 0.995}.items()}
-    turn = np.array([[np.cos(2 * half), -np.sin(2 * half), 0], [np.sin(2 * half), np.cos(2 * half), 0], [0, 0, 1]])
+    bodies = {"blade": all_cells[: len(cells[0])], "damper": all_cells[len(cells[0]) :]}
+    faces = {
+        name: boundary_where(points, bodies["blade"], test)
+        for name, test in {
+            "clamp": lambda r, a, z: r < 0.1 + 1e-9,
+            "cyclic_low": lambda r, a, z: a < -half + 1e-9,
+            "cyclic_high": lambda r, a, z: a > half - 1e-9,
+            "tip": lambda r, a, z: r > 0.28 * 0.995,
+        }.items()
+    }
+    turn = np.array(
+        [
+            [np.cos(2 * half), -np.sin(2 * half), 0],
+            [np.sin(2 * half), np.cos(2 * half), 0],
+            [0, 0, 1],
+        ]
+    )
     return Mesh(points, "tetra10", bodies, faces, sector=Sector(SECTORS, turn, np.zeros(3)))
 
 
@@ -92,20 +113,34 @@ def plane_row():
     """Two triangles per square of a plane strip: a row of blades without end."""
     points, corner = box((0.0, 0.0, 0.0), (0.15, 0.01, 1.0), (10, 2, 1))
     squares = [corner[a, b, 0] for a, b in ((0, 0), (1, 0), (1, 1), (0, 1))]
-    cells = np.concatenate([np.stack([squares[0], squares[1], squares[2]], 1),
-                            np.stack([squares[0], squares[2], squares[3]], 1)])
+    cells = np.concatenate(
+        [
+            np.stack([squares[0], squares[1], squares[2]], 1),
+            np.stack([squares[0], squares[2], squares[3]], 1),
+        ]
+    )
     used, inverse = np.unique(cells, return_inverse=True)
     cells = inverse.reshape(-1, 3)
     points = points[used]
     clamp = np.array([[0, 1], [1, 2]])
-    return Mesh(points, "triangle", {"blade": cells}, {"clamp": clamp},
-                sector=Sector(0, np.eye(3), np.array([0.0, 0.03, 0.0])))
+    return Mesh(
+        points,
+        "triangle",
+        {"blade": cells},
+        {"clamp": clamp},
+        sector=Sector(0, np.eye(3), np.array([0.0, 0.03, 0.0])),
+    )
 
 
 @pytest.fixture(scope="session")
 def wave(sector):
-    """Two modes of nodal diameter 3: axial bending with 0 and 1 nodal circles, e^{3 j angle} round the wheel."""
-    r, angle = np.hypot(sector.points[:, 0], sector.points[:, 1]), np.arctan2(sector.points[:, 1], sector.points[:, 0])
+    """Two modes of nodal diameter 3: axial bending with 0 and 1 nodal circles, e^{3 j angle} round
+    the wheel.
+    """
+    r, angle = (
+        np.hypot(sector.points[:, 0], sector.points[:, 1]),
+        np.arctan2(sector.points[:, 1], sector.points[:, 0]),
+    )
     shapes = np.zeros((2, len(r), 3), complex)
     shapes[0, :, 2] = (r - 0.1) ** 2 * np.exp(3j * angle)
     shapes[1, :, 2] = (r - 0.1) * (r - 0.2) * np.exp(3j * angle)

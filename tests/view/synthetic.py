@@ -17,11 +17,19 @@ def seat(name, side, n, m):
     z, s = np.meshgrid(np.linspace(-0.02, 0.02, n), np.linspace(0, 0.006, m), indexing="ij")
     normal = np.array([-np.sin(0.7), side * np.cos(0.7), 0.0])
     slope = np.array([np.cos(0.7), side * np.sin(0.7), 0.0])
-    points = 0.25 * np.array([1.0, 0, 0]) + s.reshape(-1, 1) * slope + z.reshape(-1, 1) * np.array([0.0, 0, 1])
+    points = (
+        0.25 * np.array([1.0, 0, 0])
+        + s.reshape(-1, 1) * slope
+        + z.reshape(-1, 1) * np.array([0.0, 0, 1])
+    )
     number = np.arange(n * m).reshape(n, m)
-    faces = np.stack([number[:-1, :-1], number[1:, :-1], number[1:, 1:], number[:-1, 1:]], -1).reshape(-1, 4)
+    faces = np.stack(
+        [number[:-1, :-1], number[1:, :-1], number[1:, 1:], number[:-1, 1:]], -1
+    ).reshape(-1, 4)
     area = np.outer(hat(n) * 0.04 / (n - 1), hat(m) * 0.006 / (m - 1)).ravel()
-    pressure = np.maximum(0.0, 1 - ((z - 0.004) / 0.02) ** 2).ravel() * (1 + 40 * s.ravel()) * (side + 2)
+    pressure = (
+        np.maximum(0.0, 1 - ((z - 0.004) / 0.02) ** 2).ravel() * (1 + 40 * s.ravel()) * (side + 2)
+    )
     pressure *= 120.0 / (pressure @ area)
     frame = np.tile(np.stack([normal, np.array([0.0, 0, 1]), slope]), (n * m, 1, 1))
     patch = Patch(name, points, area, frame, faces, np.arange(n * m), np.arange(n * m))
@@ -65,10 +73,19 @@ def points(count=161):
         if load == 400.0:
             converged[60:63] = False
             amplitude[62] = np.nan
-        frames.append(pd.DataFrame({"load": load, "frequency": frequency, "amplitude": amplitude,
-                                    "converged": converged,
-                                    "method": np.where(np.arange(len(r)) % 40 == 7, "homotopy", "newton"),
-                                    "residual": np.where(converged, 1e-12, 1e-3), "iterations": 6}))
+        frames.append(
+            pd.DataFrame(
+                {
+                    "load": load,
+                    "frequency": frequency,
+                    "amplitude": amplitude,
+                    "converged": converged,
+                    "method": np.where(np.arange(len(r)) % 40 == 7, "homotopy", "newton"),
+                    "residual": np.where(converged, 1e-12, 1e-3),
+                    "iterations": 6,
+                }
+            )
+        )
     return pd.concat(frames, ignore_index=True)
 
 
@@ -77,9 +94,16 @@ def summary():
     rows = []
     for load in LOADS:
         resonance, damping = state(load)
-        rows.append({"load": load, "peak_frequency": resonance, "peak_amplitude": 1e-6 / (2 * damping),
-                     "dissipated_energy": 1e-3 * damping, "friction_damping": damping - 0.001,
-                     "unconverged": 3 if load == 400.0 else 0})
+        rows.append(
+            {
+                "load": load,
+                "peak_frequency": resonance,
+                "peak_amplitude": 1e-6 / (2 * damping),
+                "dissipated_energy": 1e-3 * damping,
+                "friction_damping": damping - 0.001,
+                "unconverged": 3 if load == 400.0 else 0,
+            }
+        )
     return pd.DataFrame(rows)
 
 
@@ -102,9 +126,19 @@ def loops():
 def accuracy():
     """Settings of one method: error falls as time rises, with some dominated ones and a failure."""
     h = np.array([1, 3, 5, 7, 9, 15])
-    table = pd.DataFrame({"name": [f"H {k}" for k in h], "time": 0.02 * h**1.5, "error": 0.05 * h**-2.5,
-                          "chosen": h == 3, "converged": True, "family": "adaptive"})
-    worse = table.assign(time=3 * table["time"], error=2 * table["error"], chosen=False, family="fixed")
+    table = pd.DataFrame(
+        {
+            "name": [f"H {k}" for k in h],
+            "time": 0.02 * h**1.5,
+            "error": 0.05 * h**-2.5,
+            "chosen": h == 3,
+            "converged": True,
+            "family": "adaptive",
+        }
+    )
+    worse = table.assign(
+        time=3 * table["time"], error=2 * table["error"], chosen=False, family="fixed"
+    )
     worse.loc[2, "converged"] = False
     return pd.concat([table, worse], ignore_index=True)
 
@@ -112,9 +146,17 @@ def accuracy():
 def wheel_frequencies(sectors=24):
     """Two blade families that rise with the nodal diameter, crossing one disc family."""
     n = np.arange(sectors // 2 + 1)
-    families = {"first flap": 800 - 200 / (1 + n), "disc": 300 + 60 * n**1.3, "first torsion": 2100 - 150 / (1 + n)}
-    table = pd.concat([pd.DataFrame({"nodal_diameter": n, "family": name, "frequency": f})
-                       for name, f in families.items()])
+    families = {
+        "first flap": 800 - 200 / (1 + n),
+        "disc": 300 + 60 * n**1.3,
+        "first torsion": 2100 - 150 / (1 + n),
+    }
+    table = pd.concat(
+        [
+            pd.DataFrame({"nodal_diameter": n, "family": name, "frequency": f})
+            for name, f in families.items()
+        ]
+    )
     table = table.sort_values(["nodal_diameter", "frequency"])
     return table.assign(mode=table.groupby("nodal_diameter").cumcount() + 1).reset_index(drop=True)
 
@@ -122,10 +164,22 @@ def wheel_frequencies(sectors=24):
 def campbell():
     """Three lines of one nodal diameter, f^2 = f0^2 + B (speed / 2 pi)^2."""
     speed = np.linspace(0, 1200, 7)
-    return pd.concat([pd.DataFrame({"speed": speed, "mode": i + 1, "family": name,
-                                    "frequency": np.sqrt(f**2 + b * (speed / 2 / np.pi) ** 2)})
-                      for i, (name, f, b) in enumerate([("first flap", 600, 2.0), ("first edge", 1150, 1.1),
-                                                        ("first torsion", 1500, 0.6)])], ignore_index=True)
+    return pd.concat(
+        [
+            pd.DataFrame(
+                {
+                    "speed": speed,
+                    "mode": i + 1,
+                    "family": name,
+                    "frequency": np.sqrt(f**2 + b * (speed / 2 / np.pi) ** 2),
+                }
+            )
+            for i, (name, f, b) in enumerate(
+                [("first flap", 600, 2.0), ("first edge", 1150, 1.1), ("first torsion", 1500, 0.6)]
+            )
+        ],
+        ignore_index=True,
+    )
 
 
 def method_map():
@@ -133,6 +187,12 @@ def method_map():
     load, frequency = np.meshgrid([20, 50, 100, 200, 400, 800], np.linspace(780, 1000, 23))
     method = np.where(abs(frequency - 800 - load / 5) < 15, "homotopy", "newton")
     method = np.where(abs(frequency - 800 - load / 5) < 5, "shooting", method)
-    return pd.DataFrame({"load": load.ravel(), "frequency": frequency.ravel(), "method": method.ravel(),
-                         "iterations": np.where(method == "newton", 6, 25).ravel(),
-                         "converged": (np.arange(load.size) % 37 != 5)})
+    return pd.DataFrame(
+        {
+            "load": load.ravel(),
+            "frequency": frequency.ravel(),
+            "method": method.ravel(),
+            "iterations": np.where(method == "newton", 6, 25).ravel(),
+            "converged": (np.arange(load.size) % 37 != 5),
+        }
+    )

@@ -6,24 +6,41 @@ import pytest
 import synthetic
 from test_pictures import ink
 
-from bladefem.scene import Scene
-from bladefem.study.crossings import campbell_crossings, fold
+from bladefem.scene.tables import Scene
+from bladefem.study.modes.crossings import campbell_crossings, fold
 from bladefem.view.convergence import draw_convergence
 from bladefem.view.maps import draw_map
 from bladefem.view.parts import PARTS
-from bladefem.view.speed import draw_campbell, draw_interference, draw_nodal_diameters, folded, spread
+from bladefem.view.speed import (
+    draw_campbell,
+    draw_interference,
+    draw_nodal_diameters,
+    folded,
+    spread,
+)
 
 
 def texts(figure):
     """All words of a figure's axes."""
-    return " ".join(t.get_text() for ax in figure.axes for t in [*ax.texts, ax.title, ax.xaxis.label, ax.yaxis.label,
-                                                                 *(ax.get_legend().texts if ax.get_legend() else [])])
+    return " ".join(
+        t.get_text()
+        for ax in figure.axes
+        for t in [
+            *ax.texts,
+            ax.title,
+            ax.xaxis.label,
+            ax.yaxis.label,
+            *(ax.get_legend().texts if ax.get_legend() else []),
+        ]
+    )
 
 
 def test_campbell_marks_every_crossing(folder):
     table = synthetic.campbell()
     crossings = campbell_crossings(table, range(1, 11))
-    figure = draw_campbell(table, range(1, 11), folder / "campbell.png", crossings=crossings, operating=838.0)
+    figure = draw_campbell(
+        table, range(1, 11), folder / "campbell.png", crossings=crossings, operating=838.0
+    )
     rings = next(line for line in figure.axes[0].lines if line.get_label() == "crossing")
     assert len(rings.get_xdata()) == len(crossings) == 14
     assert all(f"EO {k}" in texts(figure) for k in range(1, 11))
@@ -32,7 +49,9 @@ def test_campbell_marks_every_crossing(folder):
 
 def test_interference_rings_what_is_too_close(folder):
     table = synthetic.wheel_frequencies()
-    figure = draw_interference(table, 24, 2 * np.pi * 771.0 / 6, folder / "safe.png", orders=[6, 12])
+    figure = draw_interference(
+        table, 24, 2 * np.pi * 771.0 / 6, folder / "safe.png", orders=[6, 12]
+    )
     rings = next(line for line in figure.axes[0].lines if "closer" in str(line.get_label()))
     assert rings.get_xydata()[0].tolist() == pytest.approx([6, 771.43], abs=0.01)
     assert len(rings.get_xydata()) == 1
@@ -49,17 +68,26 @@ def test_folding_is_that_of_the_tables():
 def test_maps_name_methods_and_cross_failures(folder):
     table = synthetic.method_map()
     figure = draw_map(table, "frequency", "load", "method", folder / "methods.png")
-    assert all(word in texts(figure) for word in ("newton", "homotopy", "shooting", "not converged (4)"))
+    assert all(
+        word in texts(figure) for word in ("newton", "homotopy", "shooting", "not converged (4)")
+    )
     draw_map(table, "frequency", "load", "iterations", folder / "iterations.png")
     assert min(ink(folder / f"{n}.png") for n in ("methods", "iterations")) > 0.3
 
 
-@pytest.mark.parametrize("kind, part, table, skipped", [
-    ("wedge sector", "aerofoil", "aerofoil", {"section"}),
-    ("wedge sector", "platform", "platform", {"length"}), ("wedge sector", "platform", "damper", {"mass"}),
-    ("wedge sector", "sector", "disc", set()), ("plane blades", "plane", "plane", {"damper_mass"}),
-    ("z mass", "z_mass", "z_mass", set()), ("hertz", "hertz", "hertz", {"dimension", "interference"}),
-    ("punch", "punch", "punch", {"dimension", "interference"})])
+@pytest.mark.parametrize(
+    "kind, part, table, skipped",
+    [
+        ("wedge sector", "aerofoil", "aerofoil", {"section"}),
+        ("wedge sector", "platform", "platform", {"length"}),
+        ("wedge sector", "platform", "damper", {"mass"}),
+        ("wedge sector", "sector", "disc", set()),
+        ("plane blades", "plane", "plane", {"damper_mass"}),
+        ("z mass", "z_mass", "z_mass", set()),
+        ("hertz", "hertz", "hertz", {"dimension", "interference"}),
+        ("punch", "punch", "punch", {"dimension", "interference"}),
+    ],
+)
 def test_drawings_label_every_parameter(kind, part, table, skipped, folder):
     scene = Scene(kind=kind)
     figure = PARTS[kind][part](scene, folder / f"{part}.png")
@@ -72,21 +100,36 @@ def test_drawings_label_every_parameter(kind, part, table, skipped, folder):
 def test_refinement_shows_the_limit_and_doubts(folder):
     """Believed orders are drawn down to their limit, the others are named."""
     h = np.array([4e-3, 3e-3, 2e-3])
-    points = pd.DataFrame({"size": np.tile(h, 2), "mode": np.repeat([1, 2], 3),
-                           "frequency": [*(100 + 1e5 * h ** 2), 50.0, 51.0, 50.5]})
-    summary = pd.DataFrame({"mode": [1, 2], "frequency": [100.4, 50.5], "limit": [100.0, 50.5],
-                            "order": [2.0, np.nan], "reason": ["", "the frequencies do not fall into line"]})
+    points = pd.DataFrame(
+        {
+            "size": np.tile(h, 2),
+            "mode": np.repeat([1, 2], 3),
+            "frequency": [*(100 + 1e5 * h**2), 50.0, 51.0, 50.5],
+        }
+    )
+    summary = pd.DataFrame(
+        {
+            "mode": [1, 2],
+            "frequency": [100.4, 50.5],
+            "limit": [100.0, 50.5],
+            "order": [2.0, np.nan],
+            "reason": ["", "the frequencies do not fall into line"],
+        }
+    )
     figure = draw_convergence(points, summary, folder / "convergence.png")
     labels = [text.get_text() for text in figure.axes[0].get_legend().get_texts()]
     assert set(labels) == {"mode 1: order 2.0, limit 100 Hz", "mode 2: no order"}
     fit = next(line for line in figure.axes[0].lines if len(line.get_xdata()) == 80)
-    assert fit.get_ydata()[0] == pytest.approx(100 * (100 / 100.4 - 1)) and fit.get_ydata()[-1] == pytest.approx(
-        100 * (101.6 / 100.4 - 1))
+    assert fit.get_ydata()[0] == pytest.approx(100 * (100 / 100.4 - 1)) and fit.get_ydata()[
+        -1
+    ] == pytest.approx(100 * (101.6 / 100.4 - 1))
     assert (folder / "convergence.png").stat().st_size > 5000
 
 
 def test_names_beside_lines_stay_apart():
-    """Two that collide part about their mean, and push no third that is far; a chain of them stays in order."""
+    """Two that collide part about their mean, and push no third that is far; a chain of them stays
+    in order.
+    """
     np.testing.assert_allclose(spread(np.array([1.0, 1.1, 5.0]), 0.5), [0.8, 1.3, 5.0])
     moved = spread(np.array([0.0, 0.4, 0.5, 0.6, 1.2, 3.0]), 0.5)
     assert (np.diff(moved) > 0.5 - 1e-12).all() and moved[-1] == 3.0

@@ -1,4 +1,6 @@
-"""Names in a crowd of points: none covers another or a point, and those without room are dropped."""
+"""Names in a crowd of points: none covers another or a point, and those without room are
+dropped.
+"""
 
 from __future__ import annotations
 
@@ -14,16 +16,28 @@ from bladefem.view.response import draw_accuracy
 def test_names_cover_nothing(crowded):
     k = np.arange(12)
     place = k // 6 + 0.002 * k if crowded else k / 4
-    table = pd.DataFrame({"name": [f"variant {i}" for i in k], "time": 10.0**place,
-                          "error": 10.0**-place, "chosen": k == 5, "converged": k != 11})
+    table = pd.DataFrame(
+        {
+            "name": [f"variant {i}" for i in k],
+            "time": 10.0**place,
+            "error": 10.0**-place,
+            "chosen": k == 5,
+            "converged": k != 11,
+        }
+    )
     ax = draw_accuracy(table).axes[0]
     boxes = [text.get_window_extent() for text in ax.texts]
     assert 1 <= len(boxes) < 12 if crowded else len(boxes) == 12
-    assert "variant 5" in [text.get_text() for text in ax.texts]            # the chosen one comes first
+    assert "variant 5" in [text.get_text() for text in ax.texts]  # the chosen one comes first
     for i, box in enumerate(boxes):
-        assert not box.count_overlaps(boxes[:i] + boxes[i + 1:])
-    points = np.concatenate([line.get_transform().transform(line.get_xydata()) for line in ax.lines
-                             if line.get_marker() in ("o", "*", "x")])
+        assert not box.count_overlaps(boxes[:i] + boxes[i + 1 :])
+    points = np.concatenate(
+        [
+            line.get_transform().transform(line.get_xydata())
+            for line in ax.lines
+            if line.get_marker() in ("o", "*", "x")
+        ]
+    )
     assert not any(box.contains(*p) for box in boxes for p in points)
 
 

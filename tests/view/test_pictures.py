@@ -1,11 +1,13 @@
-"""Pictures exist, are not blank, and show what they should; skins and VTU files against known geometry."""
+"""Pictures exist, are not blank, and show what they should; skins and VTU files against known
+geometry.
+"""
 
 import numpy as np
 import pytest
 import synthetic
 from matplotlib.image import imread
 
-from bladefem.contact.summary import resultant
+from bladefem.contact.resultants import resultant
 from bladefem.view.contact import (
     draw_pressure,
     pressure_points,
@@ -47,7 +49,9 @@ def area(surface):
 
 
 def test_grid_volume_is_the_sectors_volume(sector):
-    """VTK integrates the straight-sided cells: chords of the polar grid, exact formula for each prism ring."""
+    """VTK integrates the straight-sided cells: chords of the polar grid, exact formula for each
+    prism ring.
+    """
     cells = grid(sector).compute_cell_sizes(length=False, area=False)
     disc = 0.04 * 8 * 0.5 * np.sin(2 * np.pi / 12 / 8) * (0.16**2 - 0.1**2)
     blade = 0.04 * 2 * 0.5 * np.sin(2 * np.pi / 12 / 8) * (0.28**2 - 0.16**2)
@@ -72,15 +76,23 @@ def test_coarse_skin_has_the_same_flat_area(sector):
 
 @pytest.mark.parametrize("count", [8, 20, 27])
 def test_hexahedra_and_vtk_order(count):
-    """A cube of one cell: the volume that VTK integrates is 1, misplaced nodes would fold it; the skin's area is 6."""
+    """A cube of one cell: the volume that VTK integrates is 1, misplaced nodes would fold it; the
+    skin's area is 6.
+    """
     from bladefem.view.skin import EDGES
     from geometry.mesh import Mesh
 
-    corners = np.array([[0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0], [0, 0, 1], [1, 0, 1], [1, 1, 1], [0, 1, 1.0]])
+    corners = np.array(
+        [[0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0], [0, 0, 1], [1, 0, 1], [1, 1, 1], [0, 1, 1.0]]
+    )
     middle = np.array([corners[list(edge)].mean(axis=0) for edge in EDGES["hexahedron"]])
-    faces = np.array([[0.5, 0.5, 0], [0.5, 0, 0.5], [0, 0.5, 0.5], [1, 0.5, 0.5], [0.5, 1, 0.5], [0.5, 0.5, 1]])
+    faces = np.array(
+        [[0.5, 0.5, 0], [0.5, 0, 0.5], [0, 0.5, 0.5], [1, 0.5, 0.5], [0.5, 1, 0.5], [0.5, 0.5, 1]]
+    )
     points = np.concatenate([corners, middle, faces, [[0.5, 0.5, 0.5]]])[:count]
-    cube = Mesh(points, "hexahedron" + (str(count) if count > 8 else ""), {"blade": np.arange(count)[None]})
+    cube = Mesh(
+        points, "hexahedron" + (str(count) if count > 8 else ""), {"blade": np.arange(count)[None]}
+    )
     assert np.isclose(area(skin(cube)).sum(), 6.0)
     assert np.isclose(grid(cube).compute_cell_sizes()["Volume"][0], 1.0)
 
@@ -94,7 +106,9 @@ def test_unknown_cells_are_refused():
 
 
 def test_wheel_has_no_cut_faces_and_closes(sector):
-    """The wheel's triangles enclose the disc and blades: Gauss' theorem gives N times the sector's volume."""
+    """The wheel's triangles enclose the disc and blades: Gauss' theorem gives N times the sector's
+    volume.
+    """
     wheel = wheel_skin(sector)
     a, b, c = (wheel.points[wheel.triangles[:, i]] for i in range(3))
     volume = np.einsum("ij,ij->", a, np.cross(b, c)) / 6
@@ -105,7 +119,9 @@ def test_wheel_has_no_cut_faces_and_closes(sector):
 def test_carrying_round_repeats_the_wave(sector, wave):
     """u = (r - r0)^2 e^{3 j angle} e_z on the whole wheel is what the sector's field becomes."""
     around = carry_round(sector, wave.shapes[0], 3)
-    points = np.concatenate([sector.points @ np.linalg.matrix_power(sector.sector.rotation, k).T for k in range(12)])
+    points = np.concatenate(
+        [sector.points @ np.linalg.matrix_power(sector.sector.rotation, k).T for k in range(12)]
+    )
     r, angle = np.hypot(points[:, 0], points[:, 1]), np.arctan2(points[:, 1], points[:, 0])
     # arctan2 jumps at pi, where e^{3 j angle} does not.
     assert np.allclose(around[:, 2], (r - 0.1) ** 2 * np.exp(3j * angle), atol=1e-12)
@@ -133,7 +149,9 @@ def test_mode_pictures(sector, wave, folder):
 
 
 def test_wheel_picture_shows_six_nodal_radii(sector, wave, folder):
-    """The signed colour changes sign 2 n times round the rim; the picture's titled component is the axial one."""
+    """The signed colour changes sign 2 n times round the rim; the picture's titled component is the
+    axial one.
+    """
     figure = draw_wheel_mode(sector, wave, 0)
     assert any("axial" in ax.get_ylabel() for ax in figure.axes)
     assert "nodal diameter 3" in figure.get_suptitle()
@@ -168,7 +186,8 @@ def test_pressure_numbers_and_picture(folder):
     table = pressure_summary(seats)
     assert np.allclose(table["force"], 120.0)
     assert np.allclose(table["area"], 0.04 * 0.006)
-    # Centre of the parabola 1 - ((z - 4) / 20)^2 on -16..20 mm is 2.98 mm; sampled at 11 points 3.55.
+    # Centre of the parabola 1 - ((z - 4) / 20)^2 on -16..20 mm is 2.98 mm; sampled at 11 points
+    # 3.55.
     assert np.allclose(resultant(seats[0]).centre[2], 3.5509e-3, atol=1e-6)
     assert len(pressure_points(seats)) == 2 * 77
     draw_pressure(seats, folder / "pressure.png")
@@ -184,14 +203,18 @@ def test_pressure_for_paraview(folder):
         assert grid.n_cells == sum(len(s.patch.faces) for s in seats)
         pressure = np.concatenate([s.pressure for s in seats])
         np.testing.assert_allclose(grid["pressure [Pa] at 80 N"], pressure)
-        np.testing.assert_allclose(grid["area [m2]"] @ grid["pressure [Pa] at 40 N"], sum(s.force.sum() for s in seats))
+        np.testing.assert_allclose(
+            grid["area [m2]"] @ grid["pressure [Pa] at 40 N"], sum(s.force.sum() for s in seats)
+        )
 
 
 def test_unfolding_keeps_lengths():
     patch = synthetic.seats()[1].patch
     flat = unfold(patch)
     for i, j in ((0, 76), (3, 40), (10, 11)):
-        assert np.isclose(np.linalg.norm(flat[i] - flat[j]), np.linalg.norm(patch.points[i] - patch.points[j]))
+        assert np.isclose(
+            np.linalg.norm(flat[i] - flat[j]), np.linalg.norm(patch.points[i] - patch.points[j])
+        )
 
 
 def test_response_charts(folder):
@@ -204,7 +227,10 @@ def test_response_charts(folder):
     draw_accuracy(synthetic.accuracy(), folder / "accuracy.png", tolerance=0.02)
     draw_loops(synthetic.loops(), folder / "loops.png")
     draw_seat_loops({f"{n} N": synthetic.loops() for n in range(5)}, folder / "seats.png")
-    assert min(ink(folder / f"{n}.png") for n in ("response", "optimum", "accuracy", "loops", "seats")) > 0.02
+    assert (
+        min(ink(folder / f"{n}.png") for n in ("response", "optimum", "accuracy", "loops", "seats"))
+        > 0.02
+    )
 
 
 def test_a_curve_between_its_points_stays_between_them():
@@ -219,7 +245,8 @@ def test_a_curve_between_its_points_stays_between_them():
 def test_peaks_at_the_end_of_the_band_are_hollow():
     points = synthetic.points().query("frequency <= 900")
     summary = points.loc[points.dropna().groupby("load")["amplitude"].idxmax()].rename(
-        columns={"frequency": "peak_frequency", "amplitude": "peak_amplitude"})
+        columns={"frequency": "peak_frequency", "amplitude": "peak_amplitude"}
+    )
     figure = draw_optimum(summary, points=points)
     hollow = next(line for line in figure.axes[0].lines if "no peak" in str(line.get_label()))
     assert hollow.get_xdata().tolist() == [400.0, 800.0, 1600.0, np.inf]

@@ -1,0 +1,217 @@
+"""From pressure maps to friction elements: contact stiffnesses, static normal forces, and fewer
+elements than nodes.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+import scipy.sparse as sp
+
+from ..data import Elements, Patch, PressureMap
+from ..errors import InputError
+from ..scene.tables import Contact, Material, Seat
+from .seating import ContactProblem
+
+__all__ = [
+    "aggregation",
+    "friction_elements",
+    "mapped_stiffness",
+    "mindlin_ratio",
+    "normal_stiffness",
+    "pair_ratio",
+    "seat_contact",
+    "stiffnesses",
+]
+
+# tangential stiffness for each unit of area where the scene tells none [N/m^3]
+USUAL = 4e10
+
+
+def mindlin_ratio(nu: float) -> float:
+    """k_t / k_n of two bodies of one material: 2 (1 - nu) / (2 - nu) (Mindlin 1949)."""
+    return 2 * (1 - nu) / (2 - nu)
+
+
+def pair_ratio(a: Material, b: Material) -> float:
+    """k_t / k_n of two bodies of different materials, from 1 / k_n ~ 1 / E* and 1 / k_t ~ 1 / (4
+    G*).
+
+    Source: Johnson, Contact Mechanics (1985), Eq. 4.24 and 7.44: k_n = 2 a E*, k_t = 8 a G*,
+    1 / G* = sum (2 - nu) / G; equals ``mindlin_ratio`` for equal bodies.
+    """
+    normal = sum((1 - m.nu**2) / m.E for m in (a, b))
+    tangential = sum((2 - m.nu) * 2 * (1 + m.nu) / m.E for m in (a, b)) / 4
+    return normal / tangential
+
+
+def seat_contact(contact: Contact, patch: str) -> Contact:
+    """The values of one seat: "this" is the blade's right one, "next" the next blade's left one.
+
+    A stiffness of the seat itself, total or areal, wins over both of [contact].
+    """
+    own = {"this": contact.right, "next": contact.left}.get(patch, Seat())
+    changes: dict[str, float | None] = {} if own.mu is None else {"mu": own.mu}
+    for total, areal in (("kt", "kt_area"), ("kn", "kn_area")):
+        if getattr(own, total) is not None or getattr(own, areal) is not None:
+            changes |= {total: getattr(own, total), areal: getattr(own, areal)}
+    return replace(contact, **changes)
+
+
+def stiffnesses(
+    contact: Contact, ratio: float, area: np.ndarray, mapped: np.ndarray | None = None
+) -> tuple[np.ndarray, np.ndarray]:
+    """k_t and k_n (n,) [N/m] of the points of a patch.
+
+    Each is as given, else follows from the other by ``ratio`` = k_t / k_n; without either k_t has a
+    usual value.
+
+    Args:
+        area: (n,) what each point stands for [m^2]; totals are shared by it.
+        mapped: (n,) k_n from the pressure map, in place of a given one.
+    """
+    kt = _shared(contact.kt, contact.kt_area, area)
+    kn = _shared(contact.kn, contact.kn_area, area)
+    kn = kn if mapped is None else mapped
+    if kt is None:
+        kt = USUAL * area if kn is None else ratio * kn
+    return kt, kt / ratio if kn is None else kn
+
+
+def _shared(total: float | None, areal: float | None, area: np.ndarray) -> np.ndarray | None:
+    if total is not None:
+        return total * area / area.sum()
+    return None if areal is None else areal * area
+
+
+def friction_elements(
+    problem: ContactProblem | None,
+    maps: Sequence[PressureMap],
+    contact: Contact,
+    ratio: float,
+    tangents: int = 2,
+) -> tuple[Elements, sp.csr_matrix]:
+    """Node-to-node elements of all patches, one after the other.
+
+    Args:
+        problem: that the maps solve; only read for a normal stiffness from the map.
+        maps: static pressure of each patch.
+        contact: mu, stiffnesses (totals of a patch win over areal ones), points, and how the normal
+            load behaves.
+        ratio: k_t / k_n, used where only one of the two is given (``pair_ratio``).
+        tangents: 2 for solids, 1 for plane models.
+
+    Returns:
+        The elements, and S (ports, element ports): element displacements = S^T port displacements,
+        port forces = S element forces, node-major like the ports. S is the identity when every node
+        is an element.
+
+    Raises:
+        InputError: a normal load that follows the motion needs a normal stiffness.
+    """
+    G = [aggregation(m.patch, contact.points) for m in maps]
+    members = _members(G)
+    seats = [seat_contact(contact, m.patch.name) for m in maps]
+    area = [a.T @ m.patch.area for a, m in zip(members, maps, strict=True)]
+    mapped: list[np.ndarray | None] = [None] * len(maps)
+    if contact.stiffness == "map":
+        mapped = [a.T @ k for a, k in zip(members, mapped_stiffness(problem, maps), strict=True)]
+    kt, kn = map(
+        np.concatenate,
+        zip(
+            *(stiffnesses(c, ratio, a, k) for c, a, k in zip(seats, area, mapped, strict=True)),
+            strict=True,
+        ),
+    )
+    if contact.normal == "coupled" and not (kn > 0).all():
+        raise InputError(
+            "contact: a normal stiffness (kn, kn_area, or by Mindlin from kt, kt_area) is 0, "
+            "expected a "
+            "positive value where contact.normal is 'coupled'"
+        )
+    force = np.concatenate([a.T @ m.force for a, m in zip(members, maps, strict=True)])
+    gap = np.concatenate([g.T @ m.gap for g, m in zip(G, maps, strict=True)])
+    if contact.normal == "prescribed":
+        kn = np.zeros_like(kn)
+        n0 = force
+    else:
+        n0 = np.where(force > 0, force, -kn * gap)
+    S = sp.kron(sp.block_diag(G), sp.identity(1 + tangents), format="csr")
+    return Elements(
+        kt, kn, np.repeat([c.mu for c in seats], [len(a) for a in area]), n0, tangents
+    ), S
+
+
+def normal_stiffness(problem: ContactProblem, maps: Sequence[PressureMap]) -> np.ndarray:
+    """k_n = P_i / u_zi (n,) [N/m] of each pressed node, the paper's Eq. 23; zero where nothing
+    presses.
+
+    u_z is the elastic approach of the two bodies at the node, C f. It holds the bodies' own
+    flexibility, which the port models have already: use it to compare with measured contact
+    stiffnesses, or for otherwise rigid bodies.
+    """
+    force = np.concatenate([m.force for m in maps])
+    approach = problem.flexibility @ force
+    return np.divide(force, approach, out=np.zeros_like(force), where=(force > 0) & (approach > 0))
+
+
+def mapped_stiffness(problem: ContactProblem, maps: Sequence[PressureMap]) -> list[np.ndarray]:
+    """``normal_stiffness`` of each patch; nodes that nothing presses take their patch's mean for
+    their area.
+
+    So they can close when they vibrate, which a stiffness of zero would never let them.
+    """
+    cuts = np.cumsum([len(m.force) for m in maps])[:-1]
+    found = []
+    for k, m in zip(np.split(normal_stiffness(problem, maps), cuts), maps, strict=True):
+        mean = k.sum() / m.patch.area[k > 0].sum() if (k > 0).any() else 0.0
+        found.append(np.where(k > 0, k, mean * m.patch.area))
+    return found
+
+
+def aggregation(patch: Patch, points: int | None) -> sp.csr_matrix:
+    """G (n, m): share of each node in its element by area; the columns sum to 1. The identity when
+    points is None.
+
+    Nodes are grouped by halving the patch again and again across its longer side into parts of
+    equal area.
+    """
+    n = len(patch.area)
+    if points is None or points >= n:
+        return sp.identity(n, format="csr")
+    frame = patch.frame.mean(axis=0)
+    label = np.zeros(n, dtype=int)
+    _halve(
+        (patch.points - patch.points.mean(axis=0)) @ frame[1:].T,
+        patch.area,
+        np.arange(n),
+        points,
+        0,
+        label,
+    )
+    share = patch.area / np.bincount(label, patch.area)[label]
+    return sp.csr_matrix((share, (np.arange(n), label)), shape=(n, points))
+
+
+def _members(G: Sequence[sp.csr_matrix]) -> list[sp.csr_matrix]:
+    """The same groups with ones instead of shares: sums instead of means."""
+    return [sp.csr_matrix((np.ones_like(g.data), g.indices, g.indptr), shape=g.shape) for g in G]
+
+
+def _halve(
+    x: np.ndarray, area: np.ndarray, nodes: np.ndarray, parts: int, first: int, label: np.ndarray
+) -> None:
+    """Label some nodes first .. first + parts - 1."""
+    if parts == 1:
+        label[nodes] = first
+        return
+    axis = int(np.argmax(np.ptp(x[nodes], axis=0)))
+    nodes = nodes[np.lexsort((x[nodes, 1 - axis], x[nodes, axis].round(9)))]
+    low = parts // 2
+    below = np.cumsum(area[nodes]) - area[nodes] / 2
+    cut = int(np.searchsorted(below, area[nodes].sum() * low / parts))
+    cut = min(max(cut, low), len(nodes) - (parts - low))
+    _halve(x, area, nodes[:cut], low, first, label)
+    _halve(x, area, nodes[cut:], parts - low, first + low, label)

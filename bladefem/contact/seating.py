@@ -1,0 +1,317 @@
+"""Seating a damper: quasi-static, frictionless contact between two platforms and the damper that
+floats between them.
+
+The wheel is at rest in the rotating frame and all blades move alike (nodal diameter 0), so the next
+blade's seat_left is this blade's seat_left in its own axes. With f >= 0 the pressing forces at the
+normal ports of both seats,
+
+    gap = clearance - u_blade + u_damper = g0 + (C_blade + C_damper) f + B q,    B^T f + load = 0,
+
+where q is the damper's rigid motion, found from equilibrium: no spring holds it. Directions that
+frictionless seats can't hold (the engine axis for a wedge, the circumference for a flat damper)
+drop out of both.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+import scipy.sparse as sp
+from scipy.optimize import nnls
+
+from geometry.mesh import Mesh
+
+from ..data import Patch, PressureMap
+from ..errors import InputError, NotSolvedError
+from ..fem.body import Body, assemble
+from ..fem.constraint import constrain, restrict
+from ..fem.flexibility import Flexibility, compliance, flexible
+from ..fem.linalg import dot
+from ..fem.loads import centrifugal, mass
+from ..scene.tables import Materials
+from .as_array import given
+from .complementarity import LCPSolution, held_directions, solve_lcp
+from .patch import initial_gap, make_patch, normal_ports, port_matrix, rigid_ports
+
+__all__ = ["ContactProblem", "contact_problem", "seat", "solve", "spin_axis"]
+
+# gaps over elastic displacements beyond which a load is too light to be solved for
+HOVERING = 1e4
+# accepted part of the load along directions that frictionless seats can't hold
+SIDEWAYS = 0.01
+
+
+@dataclass(frozen=True)
+class ContactProblem:
+    """All that a new load state needs: dense matrices over the n normal ports of the patches, one
+    after the other.
+
+    "For unit rotation" means for a speed of 1 rad/s; multiply by the speed squared.
+    """
+
+    patches: tuple[Patch, ...]
+    # (n, n) blade and damper, elastic [m/N]
+    flexibility: np.ndarray
+    # (n,) gap before anything moves [m]
+    clearance: np.ndarray
+    # (n,) gap opened by the blade's centrifugal displacement, for unit rotation
+    blade_swell: np.ndarray
+    # (n,) gap opened by the damper's deformation under its load, for unit rotation
+    damper_swell: np.ndarray
+    # (n, d) gap opened by unit rigid motions of the damper; rotations per length
+    rigid: np.ndarray
+    # (d,) centrifugal load on the damper, for unit rotation
+    load: np.ndarray
+    # of the damper as meshed [kg]
+    mass: float
+
+
+def contact_problem(
+    mesh: Mesh,
+    patches: Sequence[Patch],
+    blade: Flexibility,
+    damper: Flexibility | Body,
+    clearance: float | np.ndarray = 0.0,
+    pull: np.ndarray | None = None,
+) -> ContactProblem:
+    """Condense two bodies onto the normal ports of their patches.
+
+    Args:
+        blade: the factorised blade or cyclic sector in nodal diameter 0.
+        damper: the factorised floating damper, or its Body for a damper that does not deform.
+        clearance: gap before seating [m] on top of the one that the mesh has
+            (``patch.initial_gap``), one number or (n,) values (means over the ports' weights, see
+            ``patch.patch_means``); negative for an interference.
+        pull: (n_points*dim,) load on the damper [N] instead of its centrifugal load; ``solve`` it
+            with ``normal``.
+
+    Raises:
+        InputError: the blade is not in nodal diameter 0, or the clearance does not fit the ports.
+    """
+    if blade.con.nodal_diameter not in (None, 0):
+        raise InputError(
+            f"nodal_diameter is {blade.con.nodal_diameter}, expected 0: a static load moves all "
+            "alike"
+        )
+    ports = normal_ports(patches, mesh)
+    body = damper if isinstance(damper, Body) else damper.con.body
+    pull = centrifugal(body, 1.0, spin_axis(mesh)) if pull is None else pull
+    C, blade_swell = _condense(
+        blade,
+        port_matrix(patches, mesh)[:, ports],
+        centrifugal(blade.con.body, 1.0, spin_axis(mesh)),
+    )
+    damper_swell = np.zeros(len(ports))
+    if not isinstance(damper, Body):
+        C_damper, damper_swell = _condense(
+            damper, port_matrix(patches, mesh, "damper")[:, ports], pull
+        )
+        C = C + C_damper
+    rigid, load = _rigid(mesh, patches, body, pull)
+    gap = np.concatenate([initial_gap(p, mesh) for p in patches])
+    gap = gap + given("clearance", clearance, gap.shape if np.ndim(clearance) else ())
+    return ContactProblem(
+        tuple(patches), C, gap, -blade_swell, damper_swell, rigid[ports], load, mass(body)
+    )
+
+
+def solve(
+    problem: ContactProblem,
+    speed: float,
+    normal: float | None = None,
+    damper_mass: float | None = None,
+    start: Sequence[PressureMap] | None = None,
+    approach: np.ndarray | None = None,
+    bedded: bool = False,
+) -> list[PressureMap]:
+    """Pressure maps of one load state.
+
+    Args:
+        speed: rotational speed [rad/s]; moves the blade, and loads the damper unless `normal` is
+            given.
+        normal: wanted mean normal load of a seat [N]; the damper's load is scaled to give it.
+        damper_mass: mass of the damper [kg] instead of the meshed one.
+        start: maps of a neighbouring state, for a warm start.
+        approach: (n,) further displacement of the blades at the normal ports, pressing > 0 [m]:
+            means over the ports' weights (``patch.patch_means``), as the clearance, not values at
+            the nodes.
+        bedded: the faces have worn until they fit at this speed: gaps, and displacements by the
+            rotation, open nothing.
+
+    Raises:
+        InputError: no load at all, a negative one, or one that is not finite; an approach of
+            another shape.
+        NotSolvedError: the load lifts the damper off, slides it out sideways, or the iteration
+            stopped.
+    """
+    _check_load(speed, normal, damper_mass)
+    active = None if start is None else np.concatenate([m.force > 0 for m in start])
+    problem = _fitted(problem) if bedded else problem
+    moved = 0.0 if approach is None else given("approach", approach, problem.clearance.shape)
+    g0 = problem.clearance + speed**2 * problem.blade_swell - moved
+    if normal is None:
+        scale = speed**2 * (1.0 if damper_mass is None else damper_mass / problem.mass)
+        return _maps(problem, _state(problem, g0, scale, active))
+    try:
+        return _maps(problem, _wanted(problem, g0, normal, active))
+    except NotSolvedError as error:
+        raise NotSolvedError(f"normal load {normal:g} N on each seat: {error}") from error
+
+
+def _check_load(speed: float, normal: float | None, damper_mass: float | None) -> None:
+    """A finite load that presses."""
+    if not np.isfinite(speed):
+        raise InputError(f"speed is {speed} rad/s, expected a finite number")
+    if normal is not None and not 0 < normal < np.inf:
+        raise InputError(f"normal load is {normal} N, expected a positive, finite one")
+    if normal is None and not speed**2 > 0:
+        raise InputError(
+            f"speed is {speed} rad/s, expected a positive one, or a normal load, to seat the damper"
+        )
+    if damper_mass is not None and not 0 < damper_mass < np.inf:
+        raise InputError(f"damper_mass is {damper_mass} kg, expected a positive, finite one")
+
+
+def seat(
+    mesh: Mesh,
+    material: Materials,
+    speed: float,
+    clearance: float = 0.0,
+    normal: float | None = None,
+    comm: object = None,
+) -> list[PressureMap]:
+    """Everything from the mesh to the pressure maps of "this" and "next" in one call (``solve``
+    tells the arguments).
+
+    Assembles and factorises both bodies; keep the ContactProblem of ``contact_problem`` where more
+    states follow.
+    """
+    patches = [make_patch(mesh, name) for name in ("this", "next")]
+    diameter = 0 if "cyclic" in mesh.pairs else None
+    blade = flexible(constrain(assemble(mesh, "blade", material.blade, comm), "clamp", diameter))
+    damper = flexible(constrain(assemble(mesh, "damper", material.damper, comm), None))
+    return solve(contact_problem(mesh, patches, blade, damper, clearance), speed, normal)
+
+
+def spin_axis(mesh: Mesh) -> tuple[float, float, float]:
+    """The engine axis z; for an endless row of plane blades the y axis, so that the pull is along x
+    only.
+    """
+    endless = mesh.sector is not None and mesh.sector.count == 0
+    return (
+        (0.0, 1.0, 0.0)
+        if endless or (mesh.dimension == 2 and mesh.sector is None)
+        else (0.0, 0.0, 1.0)
+    )
+
+
+def _fitted(problem: ContactProblem) -> ContactProblem:
+    """The same bodies with faces that fit each other whatever the rotation."""
+    none = np.zeros_like(problem.clearance)
+    return replace(problem, clearance=none, blade_swell=none, damper_swell=none)
+
+
+def _condense(flex: Flexibility, P: sp.spmatrix, load: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Flexibility (n, n) at the ports, and their displacement (n,) under a load in mesh
+    numbering.
+    """
+    columns = restrict(flex.con, sp.hstack([P, sp.csc_matrix(load[:, None])], format="csc"))
+    G = dot(flex.con.body.comm, columns[:, :-1], compliance(flex, columns)).real
+    return (G[:, :-1] + G[:, :-1].T) / 2, G[:, -1]
+
+
+def _rigid(
+    mesh: Mesh, patches: Sequence[Patch], body: Body, pull: np.ndarray
+) -> tuple[np.ndarray, np.ndarray]:
+    """Rigid motions at all damper ports (ports, d) and the load that goes with them (d,), rotations
+    times a length.
+    """
+    inside = np.unique(np.concatenate([mesh.bodies[name].ravel() for name in body.material]))
+    origin = mesh.points[inside].mean(axis=0)
+    length = np.linalg.norm(mesh.points[inside] - origin, axis=1).max()
+    d = mesh.dimension
+    scale = np.r_[np.ones(d), np.full(1 if d == 2 else 3, 1 / length)]
+    force = pull.reshape(-1, d)
+    arm = mesh.points - origin
+    full = np.zeros((len(force), 3))
+    full[:, :d] = force
+    moment = np.cross(arm, full).sum(axis=0)
+    load = np.r_[force.sum(axis=0), moment[2:] if d == 2 else moment]
+    return rigid_ports(patches, mesh, origin) * scale, load * scale
+
+
+def _state(
+    problem: ContactProblem, g0: np.ndarray, scale: float, active: np.ndarray | None
+) -> LCPSolution:
+    """One contact solve with `scale` times the unit load on the damper."""
+    _, _, held = held_directions(problem.rigid)
+    load = held @ (held.T @ problem.load)
+    sideways = np.linalg.norm(problem.load - load) / np.linalg.norm(problem.load)
+    if sideways > SIDEWAYS:
+        raise NotSolvedError(
+            f"{sideways:.1%} of the damper's load is along a direction in which frictionless seats "
+            f"can't hold it, expected below {SIDEWAYS:.0%}"
+        )
+    solution = solve_lcp(
+        problem.flexibility, g0 + scale * problem.damper_swell, problem.rigid, -scale * load, active
+    )
+    if solution.reason:
+        raise NotSolvedError(
+            f"the damper could not be seated{_too_light(problem, g0, scale, load)}: "
+            f"{solution.reason}"
+        )
+    return solution
+
+
+def _too_light(problem: ContactProblem, g0: np.ndarray, scale: float, load: np.ndarray) -> str:
+    """Empty, or that the load cannot bring faces together that the damper's travel alone leaves
+    apart.
+    """
+    U, S, held = held_directions(problem.rigid)
+    misfit = float(np.ptp(g0 - U @ (U.T @ g0)))
+    bent = float(problem.flexibility.diagonal().max() * np.linalg.norm(scale * (held.T @ load) / S))
+    if misfit <= HOVERING * bent:
+        return ""
+    return (
+        f" and rests on single points: the load bends the bodies by some {1e6 * bent:.1g} um, "
+        "while the gaps of "
+        f"the seats differ by {1e6 * misfit:.3g} um, so it hardly touches; expected a larger "
+        "study.loads, faces "
+        "that fit, or contact.bedded = true"
+    )
+
+
+def _wanted(
+    problem: ContactProblem, g0: np.ndarray, normal: float, active: np.ndarray | None
+) -> LCPSolution:
+    """Scale the damper's load until the mean normal load of a seat is `normal`; one step where
+    seats are flat.
+    """
+    total = normal * len(problem.patches)
+    _, _, held = held_directions(problem.rigid)
+    guess, _ = nnls((problem.rigid @ held).T, -held.T @ problem.load)
+    scale = total / guess.sum() if guess.sum() > 0 else 1.0
+    for _ in range(30):
+        solution = _state(problem, g0, scale, active)
+        error = solution.force.sum() / total - 1
+        if abs(error) < 1e-12:
+            return solution
+        scale = scale / (1 + error)
+        active = solution.active
+        if abs(error) < 1e-10:
+            return _state(problem, g0, scale, active)
+    raise NotSolvedError(
+        f"no damper load was found that presses with {normal:g} N on each seat, {error:.1e} is left"
+    )
+
+
+def _maps(problem: ContactProblem, solution: LCPSolution) -> list[PressureMap]:
+    """Cut the solution into one map a patch."""
+    cuts = np.cumsum([len(p.area) for p in problem.patches])[:-1]
+    gaps = np.split(solution.gap.clip(min=0.0), cuts)
+    return [
+        PressureMap(p, f, g, solution.residual)
+        for p, f, g in zip(problem.patches, np.split(solution.force, cuts), gaps, strict=True)
+    ]

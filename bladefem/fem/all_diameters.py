@@ -1,0 +1,315 @@
+"""All nodal diameters of a wheel: a few solved from scratch, the others from the space that these
+span.
+
+The vectors of a few nodal diameters, real and imaginary parts apart, nearly span those of all
+others. Projected onto them the three matrices of K(n) are small; what comes out starts a block
+Lanczos iteration, which stops only at the same tolerance as a solve from scratch. The inertia of
+K(n) - s M(n), one more factorisation for all n, proves the count.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from scipy.linalg import eigh
+
+from ..data import ModeSet
+from ..errors import InputError, NotSolvedError
+from ..util.progress import Progress, unwatched
+from . import cyclic_schur as core
+from .body import Body
+from .constraint import Constrained, Transformation, at_diameter, transformation
+from .flexibility import Flexibility, flexible
+from .linalg import apply, combined, dot, inertia, minus, mix
+from .memory import give_back
+from .modes import mode_set, pairs
+
+__all__ = ["Eigenpairs", "all_diameters", "eigenpairs"]
+
+# modes beyond those asked for, carried along
+GUARD = 2
+# rough ones beyond, from which other diameters are guessed
+MORE = 12
+# places of the diameters solved first: shapes change fastest at low ones
+FIRST = (0, 1, 1 / 3, 1 / 6, 2 / 3)
+# numbers of solved diameters from which the others are guessed
+LEVELS = (3, 4, 5)
+# columns of a sparse product at a time, to spare memory
+CHUNK = 32
+# error of a vector's direction; that of a frequency is its square
+CLOSE = 5e-6
+
+
+@dataclass(frozen=True)
+class _Space:
+    """What the vectors of some nodal diameters span."""
+
+    # (n_own, m) nearly orthonormal, real
+    W: np.ndarray
+    # (m, m) projections of K0, Kc, Ks
+    K: list[np.ndarray]
+    M: list[np.ndarray]
+
+
+@dataclass(frozen=True)
+class Eigenpairs:
+    """Modes of one nodal diameter as this rank's unknowns, with the factorisation that they came
+    from.
+    """
+
+    flex: Flexibility
+    # (m,) [rad^2/s^2], ascending
+    lam: np.ndarray
+    # (n_own, m) M-orthonormal
+    X: np.ndarray
+
+    @property
+    def con(self) -> Constrained:
+        """The pencil."""
+        return self.flex.con
+
+
+def all_diameters(
+    body: Body | Transformation,
+    count: int,
+    diameters: Sequence[int] | None = None,
+    direct: bool = False,
+    prove: bool = True,
+    clamp: str | None = "clamp",
+    progress: Progress = unwatched,
+) -> list[ModeSet]:
+    """The lowest modes in each nodal diameter.
+
+    Args:
+        body: a body with cut faces (held at ``clamp``), or its transformation.
+        diameters: 0 to N/2 when left out.
+        direct: solve every nodal diameter from scratch.
+        prove: count the eigenvalues below the highest common gap by inertia.
+        progress: shows which nodal diameter is at work.
+
+    Raises:
+        InputError: a nodal diameter that the wheel does not have, count not positive.
+        NotSolvedError: from a factorisation, no convergence, or a mode that is lost even in a solve
+            from scratch.
+    """
+    if count < 1:
+        raise InputError(f"count is {count}, expected at least 1 mode")
+    t = transformation(body, clamp, True) if isinstance(body, Body) else body
+    wanted = list(range(t.sectors // 2 + 1)) if diameters is None else list(diameters)
+    steps = progress(eigenpairs(t, count, wanted, direct), "nodal diameters", len(wanted))
+    found = {p.con.nodal_diameter: p for p in steps}
+    if prove:
+        found = _proved(t, found, count)
+    sets = {}
+    # vectors go as shapes come: both at once would be the peak of memory
+    for n in sorted(found):
+        p = found.pop(n)
+        sets[n] = mode_set(p.con, p.lam[:count], p.X[:, :count])
+    return [sets[n] for n in wanted]
+
+
+def eigenpairs(
+    t: Transformation,
+    count: int,
+    diameters: Sequence[int],
+    direct: bool = False,
+    tolerance: float = CLOSE,
+) -> Iterator[Eigenpairs]:
+    """``count`` pairs and some guards in each nodal diameter, in the order in which they are
+    solved.
+    """
+    cons = {n: at_diameter(t, n) for n in diameters}
+    blocks: list[np.ndarray] = []
+    space = None
+    for i, n in enumerate(_sampled(sorted(cons))):
+        if i in LEVELS and not direct:
+            give_back()
+            space = _space(t, blocks, space)
+            blocks = []
+        helps = len(cons) > LEVELS[0] and i < LEVELS[-1] and not direct
+        # the last ones need a step or two: guards would not pay
+        guess = count + (GUARD if helps else 0)
+        start = None if space is None else _guess(space, cons[n], 2 * np.pi * n / t.sectors, guess)
+        found = _pairs(flexible(cons[n]), count, start, tolerance, MORE if helps else GUARD)
+        if helps:
+            blocks.append(found.X)
+        few = slice(0, count + GUARD)
+        yield replace(
+            found, lam=found.lam[few], X=found.X[:, few].copy(order="F") if helps else found.X
+        )
+
+
+def _sampled(order: list[int]) -> list[int]:
+    """Those that guess well between them, then the others."""
+    first = [round(part * (len(order) - 1)) for part in FIRST] if order else []
+    return [order[i] for i in dict.fromkeys([*first, *range(len(order))])]
+
+
+def _pairs(
+    flex: Flexibility,
+    count: int,
+    start: np.ndarray | None,
+    tolerance: float = CLOSE,
+    guard: int = GUARD,
+) -> Eigenpairs:
+    guard = min(guard, flex.con.T.shape[1] - count)
+    return Eigenpairs(flex, *pairs(flex, count, tolerance, start, guard))
+
+
+def _space(t: Transformation, blocks: list[np.ndarray], known: _Space | None) -> _Space:
+    """The parts of more vectors added to a space; what it has already is projected once."""
+    new = _span(blocks, t, known)
+    old = 0 if known is None else known.W.shape[1]
+    W = (
+        new
+        if known is None
+        else np.concatenate(
+            [known.W, new], axis=1, out=np.empty((len(new), old + new.shape[1]), order="F")
+        )
+    )
+    columns = _projected(t, W, slice(old, W.shape[1]))
+    if known is None:
+        return _Space(W, *columns)
+    return _Space(
+        W,
+        *(
+            [_grown(*each) for each in zip(A, B, (1, 1, -1), strict=True)]
+            for A, B in zip((known.K, known.M), columns, strict=True)
+        ),
+    )
+
+
+def _grown(A: np.ndarray, columns: np.ndarray, sign: int) -> np.ndarray:
+    """A symmetric (sign 1) or skew (-1) matrix with more columns, and the rows that they imply."""
+    old = len(A)
+    return np.block([[A, columns[:old]], [sign * columns[:old].T, columns[old:]]])
+
+
+def _guess(space: _Space, con: Constrained, angle: float, count: int) -> np.ndarray:
+    """(n_own, count) lowest vectors of the projected pencil."""
+    Z = _small(space.K, space.M, angle, count)
+    if con.dtype is not complex:
+        return mix(space.W, Z.real)
+    out = np.empty((len(space.W), count), complex, order="F")
+    out.real, out.imag = mix(space.W, Z.real), mix(space.W, Z.imag)
+    return out
+
+
+def _span(blocks: list[np.ndarray], t: Transformation, known: _Space | None) -> np.ndarray:
+    """(n_own, m) nearly orthonormal real basis of what all parts of the vectors add to the space
+    known.
+    """
+    parts = [part for X in blocks for part in ((X.real, X.imag) if np.iscomplexobj(X) else (X,))]
+    W = np.empty((len(parts[0]), sum(part.shape[1] for part in parts)), order="F")
+    np.concatenate(parts, axis=1, out=W)
+    gram = dot(t.body.comm, W, W)
+    length = np.sqrt(gram.diagonal())
+    if known is not None:
+        W = minus(W, [known.W], dot(t.body.comm, known.W, W))
+        gram = dot(t.body.comm, W, W)
+    size, Z = np.linalg.eigh(gram / np.outer(length, length))
+    good = size > 1e-13
+    return mix(W, Z[:, good] / np.sqrt(size[good]) / length[:, None])
+
+
+def _projected(
+    t: Transformation, W: np.ndarray, new: slice
+) -> tuple[list[np.ndarray], list[np.ndarray]]:
+    """(m, new) columns of the projections of K0, Kc, Ks and of M0, Mc, Ms."""
+    if t.opened is None:
+        return tuple(
+            [dot(t.body.comm, W, apply(A, W[:, new])) for A in three] for three in (t.K, t.M)
+        )
+    T1 = t.high[t.opened.places]
+    faces = np.flatnonzero(np.diff(T1.indptr))
+    low = t.low[t.opened.places] @ W
+    high = T1[faces] @ W
+    out = []
+    for A, (LL, HL) in zip(
+        (t.opened.K, t.opened.M), _inside(t, low, high, faces, new), strict=True
+    ):
+        beside = A[faces].T.tocsr()
+        near = np.flatnonzero(np.diff(beside.indptr))
+        LH = low[near].T @ (beside[near] @ high[:, new])
+        out.append([LL + high.T @ (A[faces][:, faces] @ high[:, new]), LH + HL, LH - HL])
+    return tuple(out)
+
+
+def _inside(
+    t: Transformation, low: np.ndarray, high: np.ndarray, faces: np.ndarray, new: slice
+) -> list[tuple[np.ndarray, np.ndarray]]:
+    """low^T A low and high^T A low of some columns, a few at a time, for K and for M."""
+    pieces: list[list] = [[], []]
+    for first in range(new.start, low.shape[1], CHUNK):
+        moved = np.ascontiguousarray(low[:, first : first + CHUNK])
+        for piece, A in zip(pieces, (t.opened.K, t.opened.M), strict=True):
+            image = A @ moved
+            piece.append((low.T @ image, high.T @ image[faces]))
+    return [
+        tuple(np.concatenate(part, axis=1) for part in zip(*piece, strict=True)) for piece in pieces
+    ]
+
+
+def _small(K: list[np.ndarray], M: list[np.ndarray], angle: float, count: int) -> np.ndarray:
+    """(m, count) lowest eigenvectors of the projected pencil."""
+    sine = 1j * np.sin(angle) if abs(np.sin(angle)) > 1e-12 else 0.0
+    pencil = [A[0] + np.cos(angle) * A[1] + sine * A[2] for A in (K, M)]
+    return eigh(*[(A + A.conj().T) / 2 for A in pencil])[1][:, :count]
+
+
+def _proved(t: Transformation, found: dict[int, Eigenpairs], count: int) -> dict[int, Eigenpairs]:
+    """Compare counts with inertia at one shift; a diameter that lost a mode is solved from
+    scratch.
+    """
+    give_back()
+    shift = _gap([p.lam[:count] for p in found.values()])
+    shared = _shifted(t, shift)
+    for n, p in found.items():
+        exact = _count_below(p.con, shift, shared)
+        if exact != np.count_nonzero(p.lam < shift):
+            found[n] = p = _pairs(p.flex, max(count, exact + 1), None)
+        if exact != np.count_nonzero(p.lam < shift):
+            raise NotSolvedError(
+                f"nodal diameter {n}: {np.count_nonzero(p.lam < shift)} modes were found below "
+                f"{np.sqrt(shift) / (2 * np.pi):.6g} Hz, the inertia counts {exact}"
+            )
+    del shared
+    give_back()
+    return found
+
+
+def _shifted(t: Transformation, shift: float) -> core.Core | None:
+    """K - shift M of the open sector with its interior eliminated, for all nodal diameters."""
+    if t.opened is None:
+        return None
+    return core.eliminate(
+        (t.opened.K - shift * t.opened.M).tocsr(),
+        t.opened.core.rim,
+        definite=False,
+        order=t.opened.core.order,
+        keep=False,
+    )
+
+
+def _count_below(con: Constrained, shift: float, shared: core.Core | None) -> int:
+    return (
+        inertia(combined(con.K, -shift, con.M))
+        if shared is None
+        else core.negative(shared, con.K.C)
+    )
+
+
+def _gap(lists: list[np.ndarray]) -> float:
+    """A shift in the widest relative gap of all eigenvalues, in the upper half of what every
+    diameter covers.
+    """
+    top = min(lam[-1] for lam in lists)
+    below = np.unique(np.concatenate([lam[lam <= top] for lam in lists]))
+    below = below[below > 0]
+    if len(below) < 2:
+        return float(top) * (1 - 1e-6)
+    upper = below[len(below) // 2 - 1 :]
+    i = int(np.argmax(np.diff(upper) / upper[1:]))
+    return float(upper[i] + upper[i + 1]) / 2

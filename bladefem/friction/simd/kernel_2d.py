@@ -1,0 +1,295 @@
+"""Sampled 2-D elements: harmonics of the periodic force and the exact Jacobian of the periodic
+state.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numba import njit
+
+from bladefem.friction.simd.codegen import zeros
+from bladefem.friction.simd.derivative_rows import (
+    add_period,
+    close,
+    empty_rows,
+    start_rows,
+    to_carry,
+    unit_rows,
+)
+from bladefem.friction.simd.periodic_state import (
+    TOLERANCE,
+    empty_trail,
+    follow,
+    forces_along,
+    periodic,
+    start,
+)
+from bladefem.friction.simd.time_kernels import find_edges
+from bladefem.friction.trigonometric_tables import Node, empty_gram, gram
+
+__all__ = ["disc_batch"]
+
+# whose motion and harmonics are one matrix product
+NODES = 8
+# of the largest limit: longest step by which a linearised period is finished,
+EXACT = 1e-11
+SHORT_EXACT = 1e-8
+#                     whose square the force takes, and the step itself the derivative, in 8 and in 4 bytes
+
+
+@njit(cache=True, error_model="numpy")
+def _paths(w, load, nodes, tab, path):
+    """path (n, 3, width) = (kt w_1, kt w_2, N) at the knots [N]."""
+    n = w.shape[0]
+    S = tab.at.shape[0]
+    K = w.shape[2]
+    scaled = np.empty((n, 3, K))
+    for e in range(n):
+        for k in range(K):
+            scaled[e, 0, k], scaled[e, 1, k] = nodes[e, 0] * w[e, 1, k], nodes[e, 0] * w[e, 2, k]
+            scaled[e, 2, k] = nodes[e, 1] * w[e, 0, k]
+        scaled[e, 2, 0] += 0.0 if load.shape[1] else nodes[e, 3]
+    np.dot(
+        scaled.reshape((3 * n, K)),
+        tab.along,
+        path.reshape((3 * path.shape[0], path.shape[2]))[: 3 * n],
+    )
+    if load.shape[1]:
+        for e in range(n):
+            for i in range(path.shape[2]):
+                path[e, 2, i] += 0.5 * (load[e, i % S] + load[e, i % S - 1])
+
+
+@njit(_nrt=False, cache=True, error_model="numpy")
+def _load(N, load, i):
+    """Normal load at sample i from those at the knots N (width,) [N], where prescribed not the mean
+    over both knots.
+    """
+    if load.size == 0:
+        return 0.5 * (N[i] + N[i + 1])
+    after = load[i + 1 if i + 1 < load.size else 0]
+    return 0.5 * (N[i] + N[i + 1]) + 0.25 * (2.0 * load[i] - load[i - 1] - after)
+
+
+@njit(_nrt=False, cache=True, error_model="numpy")
+def _contact(N, load, tab, mean):
+    """Basis means (4H+1,) of the samples in contact."""
+    S = tab.at.shape[0]
+    a = 0
+    mean[:] = 0.0
+    while a < S:
+        b = a
+        closed = _load(N, load, a) > 0.0
+        while b < S and (_load(N, load, b) > 0.0) == closed:
+            b += 1
+        if closed:
+            for p in range(mean.size):
+                mean[p] += tab.sums[b, p] - tab.sums[a, p]
+        a = b
+
+
+@njit(_nrt=False, cache=True, error_model="numpy")
+def _normal(w, load, el, N, least, tab, spare, F, J):
+    """Normal force F (K,) and its Jacobian J[0], J (3, K, 3K) or (0, 0, 0); returns the share in
+    contact.
+
+    N (width,) is the load at the knots, at least ``least`` [N]; spare is scratch: mean (4H+1,),
+    block (K, K), around.
+    """
+    K = F.size
+    for k in range(J.shape[1]):
+        for l in range(J.shape[2]):
+            J[0, k, l] = 0.0
+    if load.size == 0 and least > 0.0:
+        for k in range(K):
+            F[k] = el.kn * w[k]
+        F[0] += el.n0
+        for k in range(J.shape[1]):
+            J[0, k, k] = el.kn
+        return 1.0
+    mean, block, around = spare
+    _contact(N, load, tab, mean)
+    gram(mean, around, block)
+    for k in range(K):
+        F[k] = 0.0 if load.size else el.n0 * block[k, 0]
+        for l in range(K):
+            F[k] += el.kn * block[k, l] * w[l]
+    for k in range(J.shape[1]):
+        for l in range(K):
+            J[0, k, l] = el.kn * block[k, l]
+    for i in range(load.size):
+        if _load(N, load, i) > 0.0:
+            for k in range(K):
+                F[k] += load[i] * tab.analysis[i, k]
+    return mean[0]
+
+
+@njit(_nrt=False, cache=True, error_model="numpy", fastmath=True)
+def _range(x):
+    """Least and largest of x."""
+    least = x[0]
+    largest = x[0]
+    for i in range(x.size):
+        least = x[i] if x[i] < least else least
+        largest = x[i] if x[i] > largest else largest
+    return least, largest
+
+
+@njit(_nrt=False, cache=True, error_model="numpy")
+def _within(path, mu):
+    """Whether kt w stays within the limit at all knots; if the load lasts all the time, then f = kt
+    w.
+    """
+    beyond = 0
+    for i in range(path.shape[1]):
+        R = mu * path[2, i]
+        beyond += path[0, i] * path[0, i] + path[1, i] * path[1, i] > R * R
+    return beyond == 0
+
+
+@njit(_nrt=False, cache=True, error_model="numpy", forceinline=True)
+def _forces(w, load, el, path, tab, near, limit, trail, phi, spare, trace, F, J, shares):
+    """Normal force of one node, and its last period as periodic returns it; 0 cycles where it
+    sticks or stays open.
+
+    There F (3, K) and J (3, K, 3K) are complete; elsewhere F lacks the harmonics of trace (2,
+    width), J the tangents.
+    """
+    linear = J.shape[0] > 0
+    found, (least, largest) = (True, 0.0, 0.0, 0.0, 0.0, 0, 0, 0), _range(path[2])
+    closed = _normal(w[0], load, el, path[2], least, tab, spare, F[0], J)
+    if largest > 0.0 and not (least > 0.0 and _within(path, el.mu)):
+        find_edges(path, path.shape[1], el.mu, trail.form)
+        found = periodic(path, el.mu, largest, near, limit, trail, phi)
+        if not linear:
+            forces_along(path, el.mu, found[6], trail, trace)
+    else:
+        _stuck(w, el.kt if largest > 0.0 else 0.0, F, J)
+    shares[1] = found[5] / tab.at.shape[0]
+    shares[2] = 1.0 - closed
+    shares[0] = 1.0 - shares[1] - shares[2]
+    return found
+
+
+@njit(_nrt=False, cache=True, error_model="numpy", forceinline=True)
+def _stuck(w, kt, F, J):
+    """Tangential forces of springs kt."""
+    K, J[1:] = F.shape[1], 0.0
+    for c in range(1, 3):
+        for k in range(K):
+            F[c, k] = kt * w[c, k]
+            if J.shape[0]:
+                J[c, k, c * K + k] = kt
+
+
+@njit(_nrt=False, cache=True, error_model="numpy")
+def _rows(path, found, el, tab, trail, scratch, trace, phi, F, J):
+    """Rows J (2, K, 3K) of the tangential forces in the state that was found.
+
+    F (3, K) takes what trace (2, width), zero on entry, lacks of the periodic force.
+    """
+    unique, fx, fy, gx, gy, _, pieces, cycles = found
+    if unique:
+        unit_rows(el.kt, tab, scratch.C)
+        add_period(path, gx, gy, pieces, el, tab, trail, scratch, trace, unique)
+    else:
+        gx, gy = fx, fy = start(path[0, 0], path[1, 0], path[2, 0], el.mu)
+        start_rows(path[0, 0], path[1, 0], path[2, 0], el, tab, scratch.C)
+        for cycle in range(cycles):
+            if cycle > 0:
+                to_carry(scratch.C, 0, el.kt, tab)
+            fx = gx
+            fy = gy
+            gx, gy, _, _, _, pieces = follow(path, el.mu, fx, fy, trail, phi)
+            add_period(path, gx, gy, pieces, el, tab, trail, scratch, trace, cycle + 1 == cycles)
+    close(gx - fx, gy - fy, el.kt, tab, scratch, F, J)
+
+
+@njit(_nrt=False, cache=True, error_model="numpy")
+def _lot(
+    w, load, nodes, path, tab, near, limit, trail, scratch, phi, spare, trace, F, J, shares, cycles
+):
+    """disc_batch for some nodes but for the harmonics of trace (n, 2, width); returns whether any
+    moves.
+    """
+    moving = False
+    for e in range(w.shape[0]):
+        el = Node(nodes[e, 0], nodes[e, 1], nodes[e, 2], nodes[e, 3])
+        found = _forces(
+            w[e],
+            load[e],
+            el,
+            path[e],
+            tab,
+            near,
+            limit,
+            trail,
+            phi,
+            spare,
+            trace[e],
+            F[e],
+            J[e],
+            shares[e],
+        )
+        if found[7] and J.shape[1]:
+            _rows(path[e], found, el, tab, trail, scratch, trace[e], phi, F[e], J[e, 1:])
+        cycles[e], moving = found[7] or 1, moving or found[7] != 0
+    return moving
+
+
+@njit(cache=True, error_model="numpy")
+def _harmonics(trace, tab, F):
+    """Add the harmonics of trace (n, 2, width) to F (n, 3, K)."""
+    n = F.shape[0]
+    width = trace.shape[2]
+    forces = np.dot(trace.reshape((2 * trace.shape[0], width))[: 2 * n], tab.analysis)
+    for e in range(n):
+        for k in range(F.shape[2]):
+            F[e, 1, k] += forces[2 * e, k]
+            F[e, 2, k] += forces[2 * e + 1, k]
+
+
+@njit(cache=True, error_model="numpy")
+def disc_batch(w, load, nodes, tab, patterns, limit, F, J, shares, cycles):
+    """Forces F (n, 3, K), Jacobian J (n, 3, K, 3K), shares (n, 3) of stick, slip and separation,
+    cycles (n,).
+
+    w (n, 3, K) [m]; load (n, S) [N] in place of n0, or (n, 0); nodes (n, 4): kt, kn, mu, n0;
+    patterns in the precision in which the derivative is summed. If J is (n, 0, 0, 0), no derivative
+    is made. Cycles are negative where the force was not periodic after ``limit``.
+    """
+    n = w.shape[0]
+    width = tab.along.shape[1]
+    path = zeros(3 * NODES * width, np.float64).reshape((NODES, 3, width))
+    trace = zeros(2 * NODES * width, np.float64).reshape((NODES, 2, width))
+    phi = np.empty((2, 2))
+    spare = (
+        np.empty(tab.sums.shape[1]),
+        np.empty((w.shape[2], w.shape[2])),
+        empty_gram(w.shape[2] // 2),
+    )
+    near = (EXACT if patterns.at.itemsize == 8 else SHORT_EXACT) if J.shape[1] else TOLERANCE
+    trail, scratch, F[:] = empty_trail(tab.at.shape[0], width), empty_rows(tab, patterns), 0.0
+    for first in range(0, n, NODES):
+        last = min(first + NODES, n)
+        _paths(w[first:last], load[first:last], nodes[first:last], tab, path)
+        trace[:] = 0.0
+        if _lot(
+            w[first:last],
+            load[first:last],
+            nodes[first:last],
+            path,
+            tab,
+            near,
+            limit,
+            trail,
+            scratch,
+            phi,
+            spare,
+            trace,
+            F[first:last],
+            J[first:last],
+            shares[first:last],
+            cycles[first:last],
+        ):
+            _harmonics(trace, tab, F[first:last])

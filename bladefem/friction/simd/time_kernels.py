@@ -1,0 +1,244 @@
+"""Kernels of 2-D elements in vectors, along time: edges, stick, slip and how it turns the rows of
+the derivative.
+
+The arrays of one node along time have rows of ``width`` numbers, samples filled up to a multiple of
+eight and eight more.
+"""
+
+from __future__ import annotations
+
+from bladefem.friction.simd.codegen import LANES, Code, kernel
+
+__all__ = [
+    "ACROSS",
+    "AHEAD",
+    "AWAY",
+    "EDGE_ROWS",
+    "FALL",
+    "LIMIT_AHEAD",
+    "LIMIT_AWAY",
+    "PAIR_AHEAD",
+    "PAIR_AWAY",
+    "PAIR_TO_P",
+    "PAIR_TO_Q",
+    "TURNS",
+    "TWICE_Y",
+    "find_edges",
+    "find_forces",
+    "find_turns",
+    "stuck_until",
+]
+
+(
+    DIRECTION_X,
+    DIRECTION_Y,
+    INVERSE_LENGTH,
+    HALF,
+    SLOPE,
+    INVERSE_LIMIT,
+    AHEAD,
+    ACROSS,
+    AWAY,
+    FALL,
+    LIMIT_AHEAD,
+    TWICE_Y,
+    LIMIT_AWAY,
+    PAIR_AHEAD,
+    PAIR_TO_P,
+    PAIR_TO_Q,
+    PAIR_AWAY,
+    EDGE_ROWS,
+) = range(18)
+# m (3), a, t (3) of find_turns
+TURNS = 7
+# of the limit: the shortest edge
+FAINT = 1e-12
+# [N]: the least limit
+LEAST = 1e-60
+
+
+@kernel
+def find_edges(code: Code, path, width, mu, out):
+    """Fill out (17, width) from path (3, width), which is (kt w_1, kt w_2, N) at the knots [N].
+
+    Rows: direction u (2), 1/length, decay over half an edge, x dln(decay)/dx, 1/limit; of the map
+    of the half-angle vector (P, Q) its elements 11, 12 = 21, 22 and determinant; of the form in P
+    and Q whose sign tells whether slip goes on its factors of P^2, P Q and -Q^2; of the map of this
+    edge and the next its elements 11, 12, 21, 22. Lengths and limits are forces [N].
+    """
+    mu = code.spread(mu)
+    with code.loop(0, code.place(width, -LANES), LANES) as i:
+        dx, dy, dN = (
+            code.load(path, (row, width), i, 1) - code.load(path, (row, width), i)
+            for row in range(3)
+        )
+        limit = mu * (code.load(path, (2, width), i) + 0.5 * dN)
+        limit = limit.above(LEAST, limit, limit * 0.0 + LEAST)
+        twice = 2.0 * limit
+        square = dx * dx + dy * dy
+        least = FAINT * limit
+        square = square.above(least * least, square, least * least)
+        # root = 2 limit sqrt(1 + x^2/4)
+        length = square.sqrt()
+        root = (square + twice * twice).sqrt()
+        both = length * limit
+        roots = root * (root + length)
+        # one division for four
+        product = 1.0 / (both * roots)
+        by_both = roots * product
+        by_roots = both * product
+        inverse = limit * by_both
+        inverse_limit = length * by_both
+        ux = dx * inverse
+        uy = dy * inverse
+        slope = -1.0 * length * (root + length) * by_roots
+        half = twice * root * by_roots
+        fall = half * half
+        a = 0.5 + 0.5 * fall
+        b = 0.5 - 0.5 * fall
+        growth = mu * dN * inverse
+        # opens: no slip goes on
+        growth = (code.load(path, (2, width), i, 1)).above(0.0, growth, growth * 0.0 + 2.0)
+        for row, values in enumerate(
+            (
+                ux,
+                uy,
+                inverse,
+                half,
+                slope,
+                inverse_limit,
+                a + b * ux,
+                b * uy,
+                a - b * ux,
+                fall,
+                ux - growth,
+                2.0 * uy,
+                ux + growth,
+            )
+        ):
+            code.store(values, out, (row, width), i)
+    with code.loop(0, code.place(width, -LANES), LANES) as i:
+        a, b, d = (code.load(out, (row, width), i) for row in (AHEAD, ACROSS, AWAY))
+        A, B, D = (code.load(out, (row, width), i, 1) for row in (AHEAD, ACROSS, AWAY))
+        for row, values in (
+            (PAIR_AHEAD, A * a + B * b),
+            (PAIR_TO_P, A * b + B * d),
+            (PAIR_TO_Q, B * a + D * b),
+            (PAIR_AWAY, B * b + D * d),
+        ):
+            code.store(values, out, (row, width), i)
+
+
+@kernel
+def stuck_until(code: Code, path, width, begin, end, cx, cy, mu) -> int:
+    """First edge i of begin <= i < end at whose end knot the force c + kt w is beyond the limit or
+    the load is gone.
+
+    It is end if there is none; path (3, width) as find_edges has it.
+    """
+    cx = code.spread(cx)
+    cy = code.spread(cy)
+    mu = code.spread(mu)
+
+    def beyond(i):
+        fx, fy, N = (code.load(path, (row, width), i, 1) for row in range(3))
+        fx = cx + fx
+        fy = cy + fy
+        limit = mu * N
+        return (fx * fx + fy * fy).over(N.above(0.0, limit * limit, N * 0.0 - 1.0))
+
+    return code.search(begin, end, beyond)
+
+
+@kernel
+def find_turns(
+    code: Code, begin, end, path, form, knots, slips, width, kt, kn, mu, turns, g, normal, trace
+):
+    """How the row of the angle turns along the edges begin <= i < end in slip, from half-angle
+    vectors knots.
+
+    With the pattern's rows p_q (normal, first, second tangent) the row of the angle in the middle
+    of an edge is b (row + sum m_q p_q), at its end a row + sum t_q p_q: turns (7, width) takes m,
+    a, t. The force there has the rows g (row + ..) + n p_0: g, normal (2, width), zero where slips
+    (width,) is; trace (2, width) takes the force.
+    """
+    kt = code.spread(kt)
+    mu = code.spread(mu)
+    mukn = mu * code.spread(kn)
+    with code.loop(code.builder.and_(begin, code.whole(-LANES)), end, LANES) as i:
+        form_at = lambda row: code.load(form, (row, width), i)  # noqa: E731
+        ux, uy, h, slope = map(form_at, (DIRECTION_X, DIRECTION_Y, HALF, SLOPE))
+        P = code.load(knots, i)
+        Q = code.load(knots, width, i)
+        slip = code.load(slips, i)
+        N = 0.5 * (code.load(path, (2, width), i) + code.load(path, (2, width), i, 1))
+        # twice the parts along and across the direction's half angle, of which the second falls by
+        # the decay
+        ax = (1.0 + ux) * P + uy * Q
+        ay = uy * P + (1.0 - ux) * Q
+        bx = (1.0 - ux) * P - uy * Q
+        by = (1.0 + ux) * Q - uy * P
+        Pm = ax + h * bx
+        Qm = ay + h * by
+        P1 = ax + h * h * bx
+        Q1 = ay + h * h * by
+        size = 4.0 * (P * P + Q * Q)
+        middle = Pm * Pm + Qm * Qm
+        last = P1 * P1 + Q1 * Q1
+        # shrunk: size after half the edge
+        inverse = 1.0 / (h * size * middle * last)
+        shrunk = h * size
+        inverse_middle = shrunk * last * inverse
+        inverse_last = shrunk * middle * inverse
+        ex = (Pm * Pm - Qm * Qm) * inverse_middle
+        ey = 2.0 * Pm * Qm * inverse_middle
+        b = shrunk * inverse_middle
+        a = h * shrunk * inverse_last
+        ym = slope * (ux * ey - uy * ex)
+        y1 = 2.0 * slope * (2.0 * ux * P1 * Q1 - uy * (P1 * P1 - Q1 * Q1)) * inverse_last
+        kl = kt * form_at(INVERSE_LENGTH)
+        by_load = mukn * form_at(INVERSE_LIMIT)
+        kx = kl * ux
+        ky = kl * uy
+        over = middle * (middle * last * inverse)
+        m = (-1.0 * ym * by_load, ym * kx - (1.0 - b) * ky, ym * ky + (1.0 - b) * kx)
+        t = (-1.0 * y1 * by_load, y1 * kx - (1.0 - a) * ky, y1 * ky + (1.0 - a) * kx)
+        for row, values in enumerate((*(over * x for x in m), a, *t)):
+            code.store(values, turns, (row, width), i)
+        R = slip * mu * N
+        none = slip * 0.0
+        for row, across, along in ((0, -1.0 * ey, ex), (1, ex, ey)):
+            code.store(slip.above(0.5, R * b * across, none), g, (row, width), i)
+            code.store(slip.above(0.5, mukn * along, none), normal, (row, width), i)
+            code.store(
+                slip.above(0.5, R * along, code.load(trace, (row, width), i)),
+                trace,
+                (row, width),
+                i,
+            )
+
+
+@kernel
+def find_forces(code: Code, path, form, knots, slips, width, mu, trace):
+    """Forces trace (2, width) in the middle of edges in slip [N], from their half-angle vectors
+    knots (2, width).
+    """
+    mu = code.spread(mu)
+    with code.loop(0, code.place(width, -LANES), LANES) as i:
+        ux, uy, h = (code.load(form, (row, width), i) for row in (DIRECTION_X, DIRECTION_Y, HALF))
+        P = code.load(knots, i)
+        Q = code.load(knots, width, i)
+        slip = code.load(slips, i)
+        R = 0.5 * mu * (code.load(path, (2, width), i) + code.load(path, (2, width), i, 1))
+        P, Q = (
+            (1.0 + ux) * P + uy * Q + h * ((1.0 - ux) * P - uy * Q),
+            uy * P + (1.0 - ux) * Q + h * ((1.0 + ux) * Q - uy * P),
+        )
+        R = R / (P * P + Q * Q)
+        for row, along in enumerate((P * P - Q * Q, 2.0 * P * Q)):
+            code.store(
+                slip.above(0.5, R * along, code.load(trace, (row, width), i)),
+                trace,
+                (row, width),
+                i,
+            )

@@ -1,0 +1,283 @@
+"""Linear bodies at all harmonics of one frequency: modal flexibilities, receptances, motions under
+forces at the ports.
+
+The ports that the balance uses stand in the order contact, load, probe. Arrays carry the harmonic
+on their first axis, of length 1 where one body serves all harmonics.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from ...data import PortModel
+from ...errors import InputError, NotSolvedError
+
+__all__ = [
+    "Damping",
+    "Stack",
+    "amplitudes",
+    "block",
+    "damping_rate",
+    "flexibility",
+    "impedance_rate",
+    "lost",
+    "motion",
+    "receptance",
+    "rigid_stack",
+    "stacked",
+]
+
+# frequency of the modes that fill up a harmonic which has fewer [rad/s]: nothing moves them
+SPARE = 1e100
+
+
+@dataclass(frozen=True)
+class Damping:
+    """Damping of the modes of a body, all contributions added: the term i w c of each mode's
+    receptance.
+
+    Raises:
+        InputError: a negative number, or none.
+    """
+
+    # share of critical damping of each mode [1]
+    ratio: float | np.ndarray = 0.0
+    # loss factor: i eta omega_r^2, not for the mean [1]
+    structural: float | np.ndarray = 0.0
+    # Rayleigh, proportional to the mass [1/s]
+    mass: float = 0.0
+    # Rayleigh, proportional to the stiffness [s]
+    stiffness: float = 0.0
+
+    def __post_init__(self) -> None:
+        for name in ("ratio", "structural", "mass", "stiffness"):
+            value = np.asarray(getattr(self, name))
+            if not (np.isfinite(value).all() and np.all(value >= 0)):
+                raise InputError(
+                    f"damping.{name} {value}: expected finite numbers, none of them negative"
+                )
+
+    def viscous(self, omega: np.ndarray) -> np.ndarray:
+        """(m,) viscous part: 2 zeta omega_r + alpha + beta omega_r^2 [1/s]."""
+        return 2 * self.ratio * omega + self.mass + self.stiffness * omega**2
+
+
+@dataclass(frozen=True)
+class Stack:
+    """One body in the nodal diameters of harmonics 0..H; S = 1 for all of them, else H+1. m modes,
+    P ports.
+    """
+
+    # (S, m) [rad/s]; filled up with SPARE where a harmonic has fewer modes
+    omega: np.ndarray
+    # (S, m) modal damping [1/s]
+    viscous: np.ndarray
+    # (S, m) loss factor times omega^2 [1/s^2]
+    hysteretic: np.ndarray
+    # (S, m, m) viscous damping that couples modes [1/s]
+    coupled: np.ndarray | None
+    # (S, P, m) [kg^-1/2]
+    shapes: np.ndarray
+    # (S, P, P) [m/N]
+    residual: np.ndarray
+    contact: slice
+    load: slice
+    probe: slice
+
+    def first(self, count: int) -> Stack:
+        """The body in the first nodal diameters."""
+        names = ("omega", "viscous", "hysteretic", "coupled", "shapes", "residual")
+        return replace(
+            self,
+            **{name: part[:count] for name in names if (part := getattr(self, name)) is not None},
+        )
+
+
+def stacked(bodies: tuple[PortModel, ...], damping: Damping, rows: np.ndarray) -> Stack:
+    """The bodies of the harmonics as one; `rows` of the contact port enter the balance."""
+    first = _ports(bodies[0], rows)
+    ports = [first if body.ports == bodies[0].ports else _ports(body, rows) for body in bodies]
+    if len({tuple(map(len, parts)) for parts in ports}) > 1:
+        raise InputError(
+            "sides: the bodies of the harmonics have ports of different sizes, expected the same"
+        )
+    most = max(len(body.omega) for body in bodies)
+    order = [np.concatenate(parts) for parts in ports]
+    omega = np.array([_fill(body.omega, most, SPARE) for body in bodies])
+    own = [
+        np.zeros(len(body.omega))
+        if body.damping is None or body.damping.ndim == 2
+        else body.damping
+        for body in bodies
+    ]
+    viscous = np.array(
+        [_fill(damping.viscous(body.omega) + c, most) for body, c in zip(bodies, own, strict=True)]
+    )
+    hysteretic = np.array([_fill(damping.structural * body.omega**2, most) for body in bodies])
+    coupled = None
+    if any(body.damping is not None and body.damping.ndim == 2 for body in bodies):
+        coupled = np.array([_square(body, most) for body in bodies])
+    shapes = np.array(
+        [_widened(body.shapes[p], most) for body, p in zip(bodies, order, strict=True)]
+    )
+    residual = np.array(
+        [body.residual[p[:, None], p] for body, p in zip(bodies, order, strict=True)]
+    )
+    a, b, c = np.cumsum([len(part) for part in ports[0]])
+    return Stack(
+        omega, viscous, hysteretic, coupled, shapes, residual, slice(0, a), slice(a, b), slice(b, c)
+    )
+
+
+def rigid_stack(mass: np.ndarray, B: np.ndarray) -> Stack:
+    """A rigid body with contact displacements B q (m, r) by modes of frequency zero."""
+    shapes = np.linalg.solve(np.linalg.cholesky(mass), B.T).T[None]
+    none = np.zeros((1, shapes.shape[2]))
+    m = shapes.shape[1]
+    return Stack(
+        none, none, none, None, shapes, np.zeros((1, m, m)), slice(0, m), slice(m, m), slice(m, m)
+    )
+
+
+def flexibility(stack: Stack, w: np.ndarray) -> np.ndarray:
+    """(k, m), or (k, m, m) for coupled damping: inverse modal impedances at the circular
+    frequencies w (k,) [s^2].
+
+    Rigid modes count as immovable at w = 0.
+
+    Raises:
+        NotSolvedError: a resonance without damping is hit exactly.
+    """
+    w = w[:, None]
+    Z = stack.omega**2 - w**2 + 1j * (w * stack.viscous + np.sign(w) * stack.hysteretic)
+    still = (w == 0) & (stack.omega == 0)
+    if stack.coupled is None:
+        hit = np.any((Z == 0) & ~still, axis=1)
+        if hit.any():
+            raise NotSolvedError(
+                f"a resonance without damping is hit exactly, at {w[hit][0, 0]:.10g} rad/s: "
+                "expected "
+                "some damping, or another frequency"
+            )
+        return np.divide(1.0, Z, out=np.zeros_like(Z), where=~still)
+    full = 1j * w[:, :, None] * stack.coupled
+    modes = np.arange(Z.shape[1])
+    full[:, modes, modes] += np.where(still, 1.0, Z)
+    flexible = np.linalg.inv(full)
+    flexible[:, modes, modes] *= ~still
+    return flexible
+
+
+def block(stack: Stack, flexible: np.ndarray, rows: slice, columns: slice) -> np.ndarray:
+    """(k, rows, columns) receptances [m/N]."""
+    left = stack.shapes[:, rows]
+    right = stack.shapes[:, columns].conj().swapaxes(1, 2)
+    residual = stack.residual[:, rows, columns]
+    if flexible.ndim == 3:
+        return left @ flexible @ right + residual
+    # two real products in one, half the work of a complex one
+    if len(left) == 1 and np.isrealobj(left):
+        parts = np.concatenate([flexible.real, flexible.imag])[:, None, :] * left
+        parts = (parts.reshape(-1, left.shape[2]) @ right[0]).reshape(
+            2, len(flexible), left.shape[1], right.shape[2]
+        )
+        result = np.empty(parts.shape[1:], dtype=complex)
+        np.add(parts[0], residual, out=result.real)
+        result.imag = parts[1]
+        return result
+    return (left * flexible[:, None, :]) @ right + residual
+
+
+def amplitudes(stack: Stack, flexible: np.ndarray, forces: np.ndarray) -> np.ndarray:
+    """(k, m) modal amplitudes under forces (k, P) at the ports."""
+    push = (forces[:, None, :] @ stack.shapes.conj())[:, 0]
+    return flexible * push if flexible.ndim == 2 else (flexible @ push[:, :, None])[:, :, 0]
+
+
+def motion(stack: Stack, modal: np.ndarray, forces: np.ndarray, rows: slice) -> np.ndarray:
+    """(k, rows) displacements by modal amplitudes (k, m) and by forces (k, P) on the residual
+    flexibility [m].
+    """
+    return (
+        stack.shapes[:, rows] @ modal[:, :, None] + stack.residual[:, rows] @ forces[:, :, None]
+    )[:, :, 0]
+
+
+def impedance_rate(stack: Stack, w: np.ndarray, modal: np.ndarray) -> np.ndarray:
+    """(k, m) derivative with w of the modal impedances, times modal amplitudes (k, m)."""
+    rate = (-2 * w[:, None] + 1j * stack.viscous) * modal
+    return (
+        rate if stack.coupled is None else rate + 1j * (stack.coupled @ modal[:, :, None])[:, :, 0]
+    )
+
+
+def damping_rate(stack: Stack, w: np.ndarray, modal: np.ndarray) -> np.ndarray:
+    """(k, m) the damping's part of the modal impedances, times modal amplitudes (k, m)."""
+    w = w[:, None]
+    rate = 1j * (w * stack.viscous + np.sign(w) * stack.hysteretic) * modal
+    return (
+        rate
+        if stack.coupled is None
+        else rate + 1j * w * (stack.coupled @ modal[:, :, None])[:, :, 0]
+    )
+
+
+def lost(stack: Stack, w: np.ndarray, modal: np.ndarray) -> np.ndarray:
+    """(k,) work lost in the modes in one cycle of each circular frequency [J]."""
+    w = w[:, None]
+    loss = np.sum((w * stack.viscous + np.sign(w) * stack.hysteretic) * abs(modal) ** 2, axis=1)
+    if stack.coupled is not None:
+        loss = (
+            loss
+            + w[:, 0]
+            * np.sum(modal.conj() * (stack.coupled @ modal[:, :, None])[:, :, 0], axis=1).real
+        )
+    return np.pi * loss
+
+
+def receptance(
+    body: PortModel,
+    damping: Damping,
+    w: float,
+    rows: np.ndarray | slice,
+    columns: np.ndarray | slice,
+) -> np.ndarray:
+    """(rows, columns) displacement [m] of one body by unit harmonic forces [N]; at w = 0 without
+    the rigid modes.
+    """
+    both = [np.arange(len(body.residual))[part] for part in (rows, columns)]
+    ports = {"contact": np.concatenate(both)}
+    stack = stacked(
+        (PortModel(body.omega, body.shapes, body.residual, ports, damping=body.damping),),
+        damping,
+        np.arange(len(ports["contact"])),
+    )
+    split = len(both[0])
+    return block(stack, flexibility(stack, np.array([w])), slice(0, split), slice(split, None))[0]
+
+
+def _ports(body: PortModel, rows: np.ndarray) -> list[np.ndarray]:
+    everything = np.arange(len(body.residual))
+    return [everything[body.ports["contact"]][rows]] + [
+        everything[body.ports.get(name, slice(0, 0))] for name in ("load", "probe")
+    ]
+
+
+def _widened(shapes: np.ndarray, count: int) -> np.ndarray:
+    """Shapes (P, m) filled up with zeros to (P, count)."""
+    spare = count - shapes.shape[1]
+    return np.pad(shapes, ((0, 0), (0, spare))) if spare else shapes
+
+
+def _fill(values: np.ndarray, count: int, value: float = 0.0) -> np.ndarray:
+    spare = count - len(values)
+    return np.concatenate([values, np.full(spare, value)]) if spare else values
+
+
+def _square(body: PortModel, count: int) -> np.ndarray:
+    pad = count - len(body.omega)
+    if body.damping is None or body.damping.ndim == 1:
+        return np.zeros((count, count))
+    return np.pad(body.damping, ((0, pad), (0, pad)))

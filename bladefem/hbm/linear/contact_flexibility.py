@@ -1,0 +1,174 @@
+"""The flexibility of the contact in compiled loops: a matrix for each harmonic, or what modes add
+to one for all.
+
+With harmonics 0..H, m contact freedoms and M modes it is a tuple (A, mean, R, U, T) in one of two
+forms:
+
+- A (H+1, m, m) complex, the others empty;
+- A empty, A_0 = mean (m, m), A_h = R + U T_h U^T from R (m, m) and U (m, M), real, and T (H+1, M,
+  M): see `woodbury`. Neither does a point of many contacts form its matrices, nor do iterations
+  read them.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numba import njit
+
+__all__ = ["among", "apply", "apply_modes", "by_harmonic", "flexed", "formed", "seen_by"]
+
+
+@njit(cache=True, error_model="numpy")
+def by_harmonic(A):
+    """The first form."""
+    none = np.empty((0, 0))
+    return A, none, none, none, np.empty((0, 0, 0), np.complex128)
+
+
+@njit(cache=True, error_model="numpy", fastmath={"contract", "reassoc"})
+def apply(A, x, out):
+    """out (m, K) += A (H+1, m, m) times x (m, K), both as real coefficients."""
+    m = x.shape[0]
+    along = np.ascontiguousarray(x.T)
+    for h in range(A.shape[0]):
+        c = max(2 * h - 1, 0)
+        s = 2 * h
+        turn = 1.0 if h else 0.0
+        by_cos = along[c]
+        by_sin = along[s]
+        for i in range(m):
+            row = A[h, i]
+            cos = 0.0
+            sin = 0.0
+            for j in range(m):
+                re = row[j].real
+                im = turn * row[j].imag
+                cos += re * by_cos[j] + im * by_sin[j]
+                sin += re * by_sin[j] - im * by_cos[j]
+            out[i, c] += cos
+            if h:
+                out[i, s] += sin
+
+
+@njit(cache=True, error_model="numpy")
+def flexed(flex, x, out):
+    """out (m, K) += A x, for either form."""
+    A, mean, R, U, T = flex
+    if A.shape[0]:
+        apply(A, x, out)
+        return
+    moved = np.dot(R, x)
+    moved[:, 0] = np.dot(mean, np.ascontiguousarray(x[:, 0]))
+    out += moved
+    out += np.dot(U, _turned(T, np.dot(U.T, x)))
+
+
+@njit(cache=True, error_model="numpy")
+def _turned(T, q):
+    """T (H+1, M, M) times q (M, K) but for the mean, which becomes 0."""
+    out = np.zeros(q.shape)
+    M = q.shape[0]
+    along = np.ascontiguousarray(q.T)
+    for h in range(1, T.shape[0]):
+        by_cos = along[2 * h - 1]
+        by_sin = along[2 * h]
+        for i in range(M):
+            cos = 0.0
+            sin = 0.0
+            for j in range(M):
+                re = T[h, i, j].real
+                im = T[h, i, j].imag
+                cos += re * by_cos[j] + im * by_sin[j]
+                sin += re * by_sin[j] - im * by_cos[j]
+            out[i, 2 * h - 1] = cos
+            out[i, 2 * h] = sin
+    return out
+
+
+@njit(cache=True, error_model="numpy")
+def among(flex, active, d):
+    """The flexibility among the freedoms of some nodes, d of each."""
+    A, mean, R, U, T = flex
+    if active.size * d == max(A.shape[1], U.shape[0]):
+        return flex
+    rows = np.empty(active.size * d, np.int64)
+    for i in range(rows.size):
+        rows[i] = active[i // d] * d + i % d
+    part = np.empty((A.shape[0], rows.size, rows.size), A.dtype)
+    for h in range(A.shape[0]):
+        for i in range(rows.size):
+            for j in range(rows.size):
+                part[h, i, j] = A[h, rows[i], rows[j]]
+    if A.shape[0]:
+        return part, mean, R, U, T
+    some = np.empty((rows.size, rows.size))
+    rest = np.empty((rows.size, rows.size))
+    for i in range(rows.size):
+        for j in range(rows.size):
+            some[i, j], rest[i, j] = mean[rows[i], rows[j]], R[rows[i], rows[j]]
+    return A, some, rest, U[rows], T
+
+
+@njit(cache=True, error_model="numpy")
+def formed(flex):
+    """The first form of either: (H+1, m, m)."""
+    A, mean, R, U, T = flex
+    if A.shape[0]:
+        return A
+    out = np.empty((T.shape[0], *R.shape), np.complex128)
+    shapes = U.astype(np.complex128)
+    out[0] = mean
+    for h in range(1, T.shape[0]):
+        out[h] = R + np.dot(np.dot(shapes, T[h]), shapes.T)
+    return out
+
+
+@njit(cache=True, error_model="numpy")
+def seen_by(flex, Z):
+    """(H+1, q, m) Z^T A for real motions Z (m, q)."""
+    A, mean, R, U, T = flex
+    harmonics = max(A.shape[0], T.shape[0])
+    turned = np.ascontiguousarray(Z.T)
+    out = np.empty((harmonics, Z.shape[1], Z.shape[0]), np.complex128)
+    if A.shape[0]:
+        motions = turned.astype(np.complex128)
+        for h in range(harmonics):
+            out[h] = np.dot(motions, A[h])
+        return out
+    fixed = np.dot(turned, R)
+    push = np.dot(turned, U).astype(np.complex128)
+    shapes = U.T.astype(np.complex128)
+    out[0] = np.dot(turned, mean)
+    for h in range(1, harmonics):
+        out[h] = fixed + np.dot(np.dot(push, T[h]), shapes)
+    return out
+
+
+@njit(cache=True, error_model="numpy", fastmath={"contract", "reassoc"})
+def apply_modes(C, R, D, x, out):
+    """out (m, K) += (R + C D C^H) x for x (m, K) but for the mean, from C (S, m, M), R (S', m, m)
+    and D (H+1, M).
+    """
+    m = x.shape[0]
+    M = C.shape[2]
+    along = np.ascontiguousarray(x.T)
+    q = np.empty(M, np.complex128)
+    for h in range(1, D.shape[0]):
+        shapes = C[min(h, C.shape[0] - 1)]
+        rest = R[min(h, R.shape[0] - 1)]
+        c = 2 * h - 1
+        s = 2 * h
+        q[:] = 0.0
+        for i in range(m):
+            force = complex(along[c, i], -along[s, i])
+            for k in range(M):
+                q[k] += shapes[i, k].conjugate() * force
+        q *= D[h]
+        for i in range(m):
+            moved = 0.0j
+            for k in range(M):
+                moved += shapes[i, k] * q[k]
+            for j in range(m):
+                moved += rest[i, j] * complex(along[c, j], -along[s, j])
+            out[i, c] += moved.real
+            out[i, s] -= moved.imag

@@ -1,0 +1,216 @@
+"""The bodies of a small model as one tuple of arrays, which numba takes: all that does not depend
+on the frequency.
+
+Both bodies are one: the damper's modes, rigid ones with frequency zero, stand beside the blades'
+with the shapes that they give the relative displacement.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import NamedTuple
+
+import numpy as np
+
+from ...data import RigidBody
+from ..model import ReducedModel
+from ..solver.deflation import common_motions
+from ..solver.newton import COMPILED
+from .bodies import Stack, rigid_stack
+from .condensation import rigid_motions, with_springs
+from .woodbury import staying
+
+__all__ = ["Bodies", "prepared_bodies"]
+
+# contact freedoms up to which points are compiled as a whole
+SMALL = 200
+# contact freedoms for each mode from which the springs are added by the modes
+FEW = 2
+# contact freedoms from which a flexibility that serves all harmonics is not formed
+WIDE = 64
+
+
+class Bodies(NamedTuple):
+    """m contact freedoms, M modes, p probes; S = H+1, or 1 where one serves all harmonics. Complex
+    where not said.
+    """
+
+    # (S, M) frequencies [rad/s], real
+    own: np.ndarray
+    # (S, M) [1/s], real
+    viscous: np.ndarray
+    # (S, M) [1/s^2], real
+    hysteretic: np.ndarray
+    # (S, m, M) shapes, the damper's reversed
+    contact: np.ndarray
+    # (S, m, m)
+    residual: np.ndarray
+    # (S, p, M) shapes
+    probe: np.ndarray
+    # (S, p, m) residual flexibility between probe and contact
+    across: np.ndarray
+    # (H+1, M) excitation of the modes
+    push: np.ndarray
+    # (H+1, m) displacement of the contact by the excitation beside the modes
+    direct: np.ndarray
+    # (H+1, p) the same of the probes
+    straight: np.ndarray
+    # (S, m, m), U (S, m, M), UH (S, M, m), N (S, M, M) of `woodbury.staying`; empty where
+    A: np.ndarray
+    # there are too many modes for it
+    U: np.ndarray
+    UH: np.ndarray
+    N: np.ndarray
+    # (H+1, m) what the excitation moves beside the modes in full stick, empty as these
+    stuck: np.ndarray
+    # (H+1, M) what pushes the modes then
+    sprung: np.ndarray
+    # (m, m) and shared (m, M) of the second form of `flex`, real; empty in the first
+    R: np.ndarray
+    shared: np.ndarray
+    # (m, q) common motions of `coarse`, real
+    motions: np.ndarray
+    # (m, m) of the mean, real, and as its stuck (m,) and G (m, m) whatever the frequency
+    mean_A: np.ndarray
+    mean_stuck: np.ndarray
+    mean_G: np.ndarray
+    # (m, r) motions without stiffness and g (r,) their loads, see `linear`; real
+    B: np.ndarray
+    g: np.ndarray
+    # (r0, r) the same in the blades' rigid modes, whose numbers are `still` (r0,)
+    rigid: np.ndarray
+    still: np.ndarray
+
+
+def prepared_bodies(model: ReducedModel, H: int) -> Bodies | None:
+    """Made once; None where points are not compiled as a whole."""
+    return model.once(("small", H), lambda: _prepared(model, H))
+
+
+def _prepared(model: ReducedModel, H: int) -> Bodies | None:
+    dofs = model.springs.size
+    if (
+        model.elements.tangents > 1
+        or dofs > SMALL
+        or dofs * (2 * H + 1) > COMPILED
+        or not model.coupled
+    ):
+        return None
+    bodies = [model.blades(H)]
+    if isinstance(model.damper, tuple):
+        bodies.append(model.elastic_damper(H))
+    if any(b.coupled is not None for b in bodies):
+        return None
+    blades = bodies[0]
+    loads = model.loads(H)
+    springs = model.springs.ravel()
+    if isinstance(model.damper, RigidBody):
+        bodies.append(rigid_stack(model.damper.mass, model.damper.B[model.rows]))
+    own, viscous, hysteretic = (
+        _joined(bodies, name) for name in ("omega", "viscous", "hysteretic")
+    )
+    contact = _joined([blades, *(_reversed(b) for b in bodies[1:])], "shapes", lambda b: b.contact)
+    spare = ((0, 0), (0, 0), (0, contact.shape[2] - blades.shapes.shape[2]))
+    load, probe = (np.pad(blades.shapes[:, rows], spare) for rows in (blades.load, blades.probe))
+    residual = sum(b.residual[:, b.contact, b.contact] for b in bodies)
+    direct, straight = (
+        (blades.residual[:, rows, blades.load] @ loads[:, :, None])[:, :, 0]
+        for rows in (blades.contact, blades.probe)
+    )
+    push = (loads[:, None] @ load.conj())[:, 0]
+    fixed = (
+        staying(residual, contact, springs)
+        if FEW * contact.shape[2] <= dofs
+        else [np.zeros((0, 0, 0))] * 4
+    )
+    parts = [
+        contact,
+        residual,
+        probe,
+        blades.residual[:, blades.probe, blades.contact],
+        push,
+        direct,
+        straight,
+        *fixed,
+        *_pushed(fixed, springs, push, direct),
+    ]
+    B, g, rigid = model.once("rigid", lambda: rigid_motions(model, springs))
+    still = np.flatnonzero(blades.omega[0] == 0)
+    mean = _mean(
+        (own[0], contact[0], residual[0]), (push[0], direct[0]), (springs, B, g, model.hold)
+    )
+    return Bodies(
+        own,
+        viscous,
+        hysteretic,
+        *(np.ascontiguousarray(part, dtype=complex) for part in parts),
+        *_one_for_all(fixed, dofs),
+        common_motions(model, H),
+        *mean,
+        np.ascontiguousarray(B),
+        g,
+        np.ascontiguousarray(rigid[: len(still)]),
+        still,
+    )
+
+
+def _mean(
+    body: tuple[np.ndarray, ...], pushed: tuple[np.ndarray, np.ndarray], held: tuple
+) -> tuple[np.ndarray, ...]:
+    """A (m, m), stuck (m,) and G (m, m) of the mean, as in `linear`."""
+    (own, shapes, residual) = body
+    (push, direct) = pushed
+    D = np.divide(1.0, own**2, out=np.zeros_like(own), where=own > 0)
+    G = (residual + (shapes * D) @ shapes.conj().T).real
+    free = (direct + shapes @ (D * push)).real
+    A, stuck = with_springs(G, free, *held)
+    return np.ascontiguousarray(A), stuck.astype(complex), np.ascontiguousarray(G)
+
+
+def _one_for_all(fixed: tuple[np.ndarray, ...], dofs: int) -> tuple[np.ndarray, np.ndarray]:
+    """R (m, m) and U (m, M) of `flex`; empty where it takes its first form."""
+    A, U = fixed[:2]
+    if dofs < WIDE or len(U) != 1 or np.iscomplexobj(A) or np.any(U.imag):
+        return np.zeros((0, 0)), np.zeros((0, 0))
+    return np.ascontiguousarray(A[0]), np.ascontiguousarray(U[0].real)
+
+
+def _pushed(
+    fixed: tuple[np.ndarray, ...], springs: np.ndarray, push: np.ndarray, direct: np.ndarray
+) -> tuple[np.ndarray, np.ndarray]:
+    """(H+1, m) what the excitation moves beside the modes in full stick, (H+1, M) what pushes the
+    modes then.
+    """
+    A, _, UH, _ = fixed
+    if not len(A):
+        return np.zeros((0, 0)), np.zeros((0, 0))
+    at = np.minimum(np.arange(len(push)), len(A) - 1)
+    sprung = (springs * direct)[:, :, None]
+    return direct - (A[at] @ sprung)[:, :, 0], push - (UH[at] @ sprung)[:, :, 0]
+
+
+def _reversed(body: Stack) -> Stack:
+    return Stack(
+        body.omega,
+        body.viscous,
+        body.hysteretic,
+        None,
+        -body.shapes,
+        body.residual,
+        body.contact,
+        body.load,
+        body.probe,
+    )
+
+
+def _joined(
+    bodies: list[Stack], name: str, rows: Callable[[Stack], slice] = lambda _: slice(None)
+) -> np.ndarray:
+    """Modes of several bodies side by side, on the harmonics of the one that has most."""
+    most = max(len(body.omega) for body in bodies)
+    parts = [
+        getattr(body, name) if name != "shapes" else body.shapes[:, rows(body)] for body in bodies
+    ]
+    return np.concatenate(
+        [np.broadcast_to(part, (most, *part.shape[1:])) for part in parts], axis=-1
+    )

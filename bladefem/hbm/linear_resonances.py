@@ -1,0 +1,71 @@
+"""Natural frequencies of the two linear limits: where a frequency sweep has to look."""
+
+from __future__ import annotations
+
+import numpy as np
+from scipy import linalg
+
+from ..data import RigidBody
+from .model import ReducedModel
+
+__all__ = ["free_resonances", "stuck_partners", "stuck_resonances"]
+
+
+def free_resonances(model: ReducedModel, h: int = 1) -> np.ndarray:
+    """(m,) circular frequencies omega at which harmonic h meets a mode of the blades without
+    contact [rad/s].
+    """
+    omega = model.side(h).omega
+    return omega[omega > 0] / h
+
+
+def stuck_resonances(model: ReducedModel, h: int = 1) -> np.ndarray:
+    """(m,) circular frequencies omega at which harmonic h meets a mode with all contacts sticking
+    [rad/s].
+    """
+    return _stuck(model, h)[0]
+
+
+def stuck_partners(model: ReducedModel) -> np.ndarray:
+    """(m,) circular frequency of the stuck mode that has most of each free mode in it, by kinetic
+    energy [rad/s].
+
+    It need not be the one of the same number: on soft contacts a damper has modes of its own below
+    the blade's.
+    """
+    omega, shapes = _stuck(model, 1)
+    blade = model.side(1).omega
+    return omega[np.argmax(np.abs(shapes[: len(blade)][blade > 0]), axis=1)]
+
+
+def _stuck(model: ReducedModel, h: int) -> tuple[np.ndarray, np.ndarray]:
+    """Frequencies (m,) [rad/s] and shapes (n, m) of mass 1, the blade's modes first, with all
+    contacts sticking.
+
+    The springs stand in series with the residual flexibility, so that the modes see (K^-1 + R)^-1.
+    """
+    side = model.side(h)
+    rows = np.arange(len(side.residual))[side.ports["contact"]][model.rows]
+    shapes = [side.shapes[rows]]
+    stiffness = [side.omega**2]
+    flexibility = side.residual[np.ix_(rows, rows)]
+    masses = [np.eye(len(side.omega))]
+    if isinstance(model.damper, RigidBody):
+        shapes.append(-model.damper.B[model.rows])
+        stiffness.append(np.zeros(len(model.damper.mass)))
+        masses.append(model.damper.mass)
+    elif model.damper is not None:
+        damper = model.damper[h if len(model.damper) > 1 else 0]
+        rows = np.arange(len(damper.residual))[damper.ports["contact"]][model.rows]
+        shapes.append(-damper.shapes[rows])
+        stiffness.append(damper.omega**2)
+        masses.append(np.eye(len(damper.omega)))
+        flexibility = flexibility + damper.residual[np.ix_(rows, rows)]
+    springs = model.springs.ravel()
+    closed = np.flatnonzero(springs > 0)
+    contact = np.linalg.inv(np.diag(1 / springs[closed]) + flexibility[np.ix_(closed, closed)])
+    relative = np.column_stack(shapes)[closed]
+    K = np.diag(np.concatenate(stiffness)) + relative.conj().T @ contact @ relative
+    values, shapes = linalg.eigh((K + K.conj().T) / 2, linalg.block_diag(*masses))
+    elastic = values > 1e-9 * values[-1]
+    return np.sqrt(values[elastic]) / h, shapes[:, elastic]

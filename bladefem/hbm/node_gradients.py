@@ -1,0 +1,89 @@
+"""Which node matters: the gradient of the response by the parameters of every contact node, from
+one adjoint solve.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+
+import numpy as np
+
+from ..errors import InputError
+from .linear.bodies import block, flexibility
+from .linear.condensation import condense
+from .model import ReducedModel
+from .parameter_derivatives import BODIES, by_imbalance, contact_rate, hold_rate
+from .parameters import check_parameter
+from .solution import Solution
+from .solver.residual import Balance, adjoint, as_amplitudes, as_coefficients, evaluate_balance
+
+__all__ = ["node_gradients"]
+
+
+def node_gradients(
+    model: ReducedModel, solution: Solution, names: Iterable[str], probe: int = 0
+) -> dict[str, np.ndarray]:
+    """(n,) derivatives of the response's size at a probe by the contact parameters of each node:
+    maps for a designer.
+
+    With s the size, y = ds/df and J the derivative of the balance,  ds/dp = (y - A^T J^-T (df/dw)^T
+    y) . df/dp  holds for every parameter p; df/dp of one node is its own part of that of all nodes.
+    The sum over the nodes is the derivative that `bladefem.hbm.sensitivity` gives.
+
+    Args:
+        names: of "load", "mu", "kt", "kn", "gap", in the units of
+            `bladefem.hbm.parameter_derivatives`.
+
+    Raises:
+        InputError: the solution is not converged, or a parameter does not belong to nodes.
+    """
+    if not solution.converged:
+        raise InputError(
+            f"solution at {solution.frequency:.6g} Hz is not converged: expected a solved point"
+        )
+    names = [check_parameter(name) for name in names]
+    if set(names) & set(BODIES):
+        raise InputError(
+            f"parameters {names}: expected contact parameters, not {', '.join(BODIES)}"
+        )
+    balance = Balance(model, condense(model, solution.omega, solution.harmonics), solution.samples)
+    state = evaluate_balance(balance, solution.w)
+    n, d, K = state.w.shape
+    by_force = _by_force(model, solution, probe)
+    by_motion = state.forces.dfdw.reshape(n, d * K, d * K).swapaxes(1, 2) @ by_force.reshape(
+        n, d * K, 1
+    )
+    back = adjoint(balance, state)(by_motion.reshape(n, d, K), 1e-9)
+    weight = by_force - _transposed(balance.linear.A, back)
+    held = _by_hold(balance, back)
+    return {
+        name: np.sum(weight * contact_rate(model, state, name), axis=(1, 2))
+        - (np.sum(held * hold_rate(balance, state, name), axis=1) if name in ("kt", "kn") else 0.0)
+        for name in names
+    }
+
+
+def _by_hold(balance: Balance, back: np.ndarray) -> np.ndarray:
+    """(n, d) weights of what the springs that hold a body take at each node, from the adjoint
+    solution.
+    """
+    B = balance.linear.B
+    return (B @ (by_imbalance(balance.linear).T @ back[:, :, 0].ravel())).reshape(back.shape[:2])
+
+
+def _by_force(model: ReducedModel, solution: Solution, probe: int) -> np.ndarray:
+    """(n, d, K) derivative of the size by the coefficients of the contact forces [m/N]."""
+    blades = model.blades(solution.harmonics)
+    flexible = flexibility(blades, solution.omega * np.arange(solution.harmonics + 1))
+    rows = slice(blades.probe.start + probe, blades.probe.start + probe + 1)
+    across = block(blades, flexible, rows, blades.contact)[:, 0]
+    share = solution.probe[:, probe] / np.linalg.norm(solution.probe[1:, probe])
+    share[0] = 0.0
+    return as_coefficients(-across.conj() * share[:, None], solution.w.shape)
+
+
+def _transposed(A: np.ndarray, x: np.ndarray) -> np.ndarray:
+    """A^T x in real coefficients (n, d, K)."""
+    return as_coefficients(
+        (A.conj().swapaxes(1, 2) @ as_amplitudes(x)[:, :, None])[:, :, 0], x.shape
+    )

@@ -1,0 +1,81 @@
+"""Sweeps and parameter studies shared over MPI ranks: the same numbers for any number of ranks, one
+included.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from pathlib import Path
+from typing import Any, TypeVar
+
+from .checkpoint import recorded
+from .model import ReducedModel
+from .solution import Solution
+from .solver.newton import DEFAULTS, Options
+from .sweep import response
+
+__all__ = ["shared", "shared_response"]
+
+Item = TypeVar("Item")
+Result = TypeVar("Result")
+# frequencies that follow each other on one rank; the same for any number of ranks
+BLOCK = 16
+
+
+def shared(work: Callable[[Item], Result], items: Sequence[Item], comm: Any = None) -> list[Result]:
+    """Results of work on each item, dealt out to the ranks of an mpi4py communicator; every rank
+    returns all of them.
+
+    Raises:
+        Exception: on every rank, what the first item that failed on any of them raised.
+    """
+    if comm is None or comm.size == 1:
+        return [work(item) for item in items]
+    done: dict[int, Result] = {}
+    failed: tuple[int, Exception] | None = None
+    for i in range(comm.rank, len(items), comm.size):
+        try:
+            done[i] = work(items[i])
+        except Exception as error:
+            # whatever it is, the other ranks must not wait for ever
+            failed = i, error
+            break
+    parts = comm.allgather((done, failed))
+    failures = [failure for _, failure in parts if failure is not None]
+    if failures:
+        raise min(failures, key=lambda failure: failure[0])[1]
+    results = {i: result for part, _ in parts for i, result in part.items()}
+    return [results[i] for i in range(len(items))]
+
+
+def shared_response(
+    model: ReducedModel,
+    omegas: Sequence[float],
+    H: int = 3,
+    samples: int = 128,
+    *,
+    comm: Any = None,
+    folder: str | Path | None = None,
+    options: Options = DEFAULTS,
+) -> list[Solution]:
+    """The points of `bladefem.hbm.sweep.response`, in blocks of neighbours that the ranks share
+    out.
+
+    The first point of each block starts from full stick, so that no number depends on which rank
+    solved it.
+
+    Args:
+        folder: keeps each point on disk as soon as it is solved; a run that was killed goes on
+            there.
+    """
+
+    def solved(block: int) -> list[Solution]:
+        part = omegas[block : block + BLOCK]
+        if folder is None:
+            return list(response(model, part, H, samples, options=options))
+        return list(
+            recorded(Path(folder) / f"block-{block:06d}", model, part, H, samples, options=options)
+        )
+
+    blocks = shared(solved, range(0, len(omegas), BLOCK), comm)
+    return [point for block in blocks for point in block]

@@ -1,0 +1,194 @@
+"""How the balance changes with a parameter while the displacements stand still: exact, without
+differences.
+
+The friction law scales: f is homogeneous of degree one in (kt, kn, n0), and a function of kt w_t,
+kn w_n + n0 and mu N. Euler's relation therefore gives every derivative with a contact parameter
+from f and df/dw.
+
+Parameters and their units: "omega" [rad/s]; "gap" is an opening [m]; all others are logarithms of
+factors [1].
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from ..data import RigidBody
+from ..errors import InputError
+from .linear.bodies import Stack, amplitudes, damping_rate, flexibility, impedance_rate, motion
+from .linear.condensation import Linear
+from .model import ReducedModel
+from .parameters import check_parameter
+from .solution import blade_motion
+from .solver.residual import Balance, State, as_amplitudes, as_coefficients
+
+# parameters that the contact law does not see
+BODIES = ("omega", "force", "mass", "damping")
+
+__all__ = [
+    "BODIES",
+    "body_rate",
+    "by_imbalance",
+    "contact_load",
+    "contact_rate",
+    "hold_rate",
+    "rate",
+]
+
+
+def rate(balance: Balance, state: State, name: str) -> np.ndarray:
+    """(n, d, K) derivative of the residual with a parameter at fixed displacements, at a solved
+    state [m].
+    """
+    linear = balance.linear
+    check_parameter(name, also=("omega",))
+    if name in BODIES:
+        moved, _ = body_rate(
+            balance.model, linear.omega, as_amplitudes(contact_load(balance.model, state)), name
+        )
+        moved[1:] -= (linear.A[1:] @ (linear.springs * moved[1:])[:, :, None])[:, :, 0]
+        moved[0] -= linear.A[0] @ (linear.springs * moved[0])
+        if name == "force" and np.any(linear.g):
+            moved[0] += by_imbalance(linear) @ linear.g / balance.model.hold
+        return -as_coefficients(moved, state.w.shape)
+    force = as_amplitudes(contact_rate(balance.model, state, name))
+    moved = (linear.A @ force[:, :, None])[:, :, 0]
+    if name in ("kt", "kn") and linear.B.shape[1]:
+        moved[0] += by_imbalance(linear) @ (linear.B.T @ hold_rate(balance, state, name).ravel())
+    return as_coefficients(moved, state.w.shape)
+
+
+def by_imbalance(linear: Linear) -> np.ndarray:
+    """(m, r) mean displacements by a unit of imbalance on each motion without stiffness, times the
+    hold [m].
+    """
+    return linear.B - linear.A[0].real @ (linear.springs[:, None] * linear.B)
+
+
+def hold_rate(balance: Balance, state: State, name: str) -> np.ndarray:
+    """(n, d) springs of a contact parameter times the mean motion without stiffness at their nodes
+    [N].
+
+    The springs that hold this motion are a share of the contact stiffness and change with kt and kn
+    as it does.
+    """
+    model = balance.model
+    linear = balance.linear
+    force = as_amplitudes(contact_load(model, state))[0]
+    still = (as_amplitudes(state.w)[0] - linear.free[0] + linear.G[0] @ force).real.reshape(
+        model.springs.shape
+    )
+    normal = np.arange(model.directions) < model.directions - model.elements.tangents
+    return model.springs * still * (normal == (name == "kn"))
+
+
+def contact_load(model: ReducedModel, state: State) -> np.ndarray:
+    """(n, d, K) contact forces beyond the preload [N]."""
+    load = state.forces.f.copy()
+    load[:, :, 0] -= model.preload.reshape(load.shape[:2])
+    return load
+
+
+def contact_rate(model: ReducedModel, state: State, name: str) -> np.ndarray:
+    """(n, d, K) derivative of the contact forces beyond the preload with a contact parameter [N,
+    N/m].
+    """
+    f = state.forces.f
+    D = state.forces.dfdw
+    w = state.w
+    elements = model.elements
+    # where the tangents begin
+    first = model.directions - elements.tangents
+    by_tangents = np.einsum("nakbl,nbl->nak", D[:, :, :, first:], w[:, first:])
+    by_normal = np.einsum("nakl,nl->nak", D[:, :, :, 0], w[:, 0]) if first else np.zeros_like(f)
+    if name == "kt":
+        return by_tangents
+    if name == "kn":
+        return by_normal
+    if name == "mu":
+        rate = f - by_tangents
+        rate[:, :first] = 0.0
+        return rate
+    if name == "load":
+        rate = f - by_tangents - by_normal
+        if first:
+            rate[:, 0, 0] -= np.maximum(elements.n0, 0.0)
+        return rate
+    if not first:
+        raise InputError("gap: a prescribed normal load has no gap, expected elements.kn > 0")
+    # an opening is a mean normal displacement the other way
+    rate = -D[:, :, :, 0, 0].copy()
+    rate[:, 0, 0] += elements.kn * (elements.n0 > 0)
+    return rate
+
+
+def body_rate(
+    model: ReducedModel, omega: float, force: np.ndarray, name: str
+) -> tuple[np.ndarray, np.ndarray]:
+    """Derivatives of the bodies' motion under constant contact forces (H+1, m), with a parameter of
+    BODIES.
+
+    Returns:
+        (H+1, m) of the relative contact displacements and (H+1, probes) of the probes.
+    """
+    blades, ports, modal = blade_motion(model, omega, force)
+    if name in ("omega", "damping"):
+        modal = _modal_rate(blades, omega, modal, name)
+        ports = np.zeros_like(ports)
+    elif name == "force":
+        blades, ports, modal = blade_motion(model, omega, np.zeros_like(force))
+    else:
+        modal = np.zeros_like(modal)
+        ports = np.zeros_like(ports)
+    contact = motion(blades, modal, ports, blades.contact) - _damper_rate(model, omega, force, name)
+    return contact, motion(blades, modal, ports, blades.probe)
+
+
+def _modal_rate(body: Stack, omega: float, modal: np.ndarray, name: str) -> np.ndarray:
+    """(H+1, m) derivative of modal amplitudes under constant forces."""
+    orders = np.arange(len(modal))
+    if name == "omega":
+        push = impedance_rate(body, omega * orders, modal) * orders[:, None]
+    else:
+        push = damping_rate(body, omega * orders, modal)
+    return _pushed(body, omega * orders, push)
+
+
+def _damper_rate(model: ReducedModel, omega: float, force: np.ndarray, name: str) -> np.ndarray:
+    """(H+1, m) derivative of the damper's contact displacements under constant forces."""
+    if name == "mass" and model.damper is None:
+        raise InputError("mass: expected a model with a damper")
+    if model.damper is None or name == "force":
+        return np.zeros_like(force)
+    w = omega * np.arange(len(force))
+    if isinstance(model.damper, RigidBody):
+        B = model.damper.B[model.rows]
+        moved = np.zeros_like(force)
+        moved[1:] = (
+            -(B @ np.linalg.solve(model.damper.mass, B.T @ force[1:].T)).T / w[1:, None] ** 2
+        )
+        return moved * {"omega": -2 / omega, "mass": -1.0, "damping": 0.0}[name]
+    damper = model.elastic_damper(len(force) - 1)
+    ports = np.zeros((len(force), damper.shapes.shape[1]), dtype=complex)
+    ports[:, damper.contact] = force
+    modal = amplitudes(damper, flexibility(damper, w), ports)
+    if name == "mass":
+        # with the mass: omega^2 m, half of 2 zeta sqrt(k m), and alpha m
+        own = model.damper_damping
+        push = (
+            -(w[:, None] ** 2) + 1j * w[:, None] * (own.ratio * damper.omega + own.mass)
+        ) * modal
+        rate = _pushed(damper, w, push)
+    else:
+        rate = _modal_rate(damper, omega, modal, name)
+    return motion(damper, rate, np.zeros_like(ports), damper.contact)
+
+
+def _pushed(body: Stack, w: np.ndarray, push: np.ndarray) -> np.ndarray:
+    """(H+1, m) derivative of modal amplitudes from that of the impedance times the amplitudes; none
+    of the mean.
+    """
+    flexible = flexibility(body, w)
+    rate = -(flexible * push if flexible.ndim == 2 else (flexible @ push[:, :, None])[:, :, 0])
+    rate[0] = 0.0
+    return rate

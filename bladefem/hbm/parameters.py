@@ -1,0 +1,126 @@
+"""One model turned into another by one parameter: what continuation, peak tracking and
+sensitivities speak about.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import replace
+
+import numpy as np
+
+from ..data import Elements, PortModel, RigidBody
+from ..errors import InputError, suggestion
+from .model import Damping, ReducedModel
+
+__all__ = ["PARAMETERS", "check_parameter", "inner", "outer", "vary"]
+
+
+def _elements(
+    change: Callable[[Elements, float], Elements],
+) -> Callable[[ReducedModel, float], ReducedModel]:
+    return lambda model, value: replace(model, elements=change(model.elements, value))
+
+
+def _force(model: ReducedModel, factor: float) -> ReducedModel:
+    return replace(
+        model, excitation={h: factor * np.asarray(force) for h, force in model.excitation.items()}
+    )
+
+
+def _mass(model: ReducedModel, factor: float) -> ReducedModel:
+    if model.damper is None:
+        raise InputError("mass: expected a model with a damper")
+    if isinstance(model.damper, RigidBody):
+        return replace(model, damper=replace(model.damper, mass=factor * model.damper.mass))
+    return replace(model, damper=tuple(_heavier(body, factor) for body in model.damper))
+
+
+def _heavier(body: PortModel, factor: float) -> PortModel:
+    """The elastic body with another density: modes keep their form, and the viscous matrix its
+    values.
+    """
+    root = float(np.sqrt(factor))
+    damping = None if body.damping is None else body.damping / factor
+    return replace(body, omega=body.omega / root, shapes=body.shapes / root, damping=damping)
+
+
+def _load(model: ReducedModel, factor: float) -> ReducedModel:
+    normal = {h: factor * np.asarray(force) for h, force in model.normal.items()}
+    return replace(
+        model, elements=replace(model.elements, n0=factor * model.elements.n0), normal=normal
+    )
+
+
+def _damping(model: ReducedModel, factor: float) -> ReducedModel:
+    def scaled(body: PortModel) -> PortModel:
+        return body if body.damping is None else replace(body, damping=factor * body.damping)
+
+    ours, theirs = (
+        Damping(factor * d.ratio, factor * d.structural, factor * d.mass, factor * d.stiffness)
+        for d in (model.damping, model.damper_damping)
+    )
+    damper = tuple(map(scaled, model.damper)) if isinstance(model.damper, tuple) else model.damper
+    return replace(
+        model,
+        sides=tuple(map(scaled, model.sides)),
+        damping=ours,
+        damper=damper,
+        damper_damping=theirs,
+    )
+
+
+PARAMETERS: dict[str, Callable[[ReducedModel, float], ReducedModel]] = {
+    # factor of all excitations
+    "force": _force,
+    # factor of all normal loads
+    "load": _load,
+    # factor
+    "mu": _elements(lambda e, factor: replace(e, mu=factor * e.mu)),
+    # factor
+    "kt": _elements(lambda e, factor: replace(e, kt=factor * e.kt)),
+    # factor
+    "kn": _elements(lambda e, factor: replace(e, kn=factor * e.kn)),
+    # added opening [m]
+    "gap": _elements(lambda e, gap: replace(e, n0=e.n0 - e.kn * gap)),
+    # factor of the damper's mass
+    "mass": _mass,
+    # factor of the bodies' damping
+    "damping": _damping,
+}
+
+
+# parameters that are no factors
+ADDED = ("omega", "gap")
+
+
+def vary(model: ReducedModel, name: str, value: float) -> ReducedModel:
+    """The model with one parameter changed: a factor on its present value, or for "gap" an added
+    opening [m].
+
+    Raises:
+        InputError: unknown name, a parameter that the model does not have, or a negative factor.
+    """
+    if name not in ADDED and not 0 <= value < np.inf:
+        raise InputError(f"{name} {value}: expected a finite factor, not negative")
+    return PARAMETERS[check_parameter(name)](model, value)
+
+
+def check_parameter(name: str, also: tuple[str, ...] = ()) -> str:
+    """The name, if it is known."""
+    known = (*PARAMETERS, *also)
+    if name not in known:
+        raise InputError(f"parameter '{name}' is unknown{suggestion(name, known)}")
+    return name
+
+
+def inner(name: str, value: float) -> float:
+    """The coordinate in which a parameter is followed and derived: omega and the gap themselves,
+    else a logarithm.
+    """
+    return value if name in ADDED else float(np.log(value))
+
+
+def outer(name: str, x: float) -> float:
+    """The value of a parameter at such a coordinate."""
+    return x if name in ADDED else float(np.exp(x))

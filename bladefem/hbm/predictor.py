@@ -1,0 +1,49 @@
+"""Where Newton starts along a sweep: on the curve through the points solved last."""
+
+from __future__ import annotations
+
+from numba import njit
+
+__all__ = ["AHEAD", "ahead", "shifted"]
+
+# points that a start is extrapolated from
+AHEAD = 3
+
+
+@njit(cache=True, error_model="numpy")
+def ahead(omega, known, at, count, w):
+    """Fill w (m, K), a start at omega, from the first `count` of the points known (3, m, K) at
+    (3,), the last one last.
+
+    It is the last one moved along the line through the last two, or the parabola through three; as
+    it is where the step is more than twice the last one, or two of them are one.
+    """
+    last = count - 1
+    w[:] = known[last]
+    if (
+        count == 1
+        or abs(omega - at[last]) > 2.0 * abs(at[last] - at[last - 1])
+        or at[0] == at[last]
+    ):
+        return
+    w[:] = 0.0
+    for a in range(count):
+        share = 1.0
+        for b in range(count):
+            if b != a:
+                share *= (omega - at[b]) / (at[a] - at[b])
+        w += share * known[a]
+
+
+@njit(cache=True, error_model="numpy")
+def shifted(omega, w, known, at, count):
+    """Put a point at the end of the known ones, in place of the first if they are full; their
+    number then.
+    """
+    if count == at.size:
+        for a in range(count - 1):
+            known[a], at[a] = known[a + 1], at[a + 1]
+        count -= 1
+    known[count] = w
+    at[count] = omega
+    return count + 1

@@ -1,0 +1,192 @@
+"""Solve one point, a list of points or a band of frequencies; and the two linear limits."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from ..errors import InputError
+from ..friction.fourier import to_complex
+from .full_stick import INSTANTS, gripping, grips
+from .linear.condensation import Linear, condense
+from .model import ReducedModel
+from .solution import Solution, at_probes, blade_motion, probe_motion, works_of
+from .solver.fallback import Attempt, match_harmonics, solve_balance
+from .solver.newton import DEFAULTS, Options
+from .solver.point_compiled import small, solve_each, solve_small
+from .solver.residual import Balance
+from .validate_model import check_point
+
+__all__ = ["as_solution", "free", "solve", "sticking", "stuck"]
+
+# contact springs over the bodies' stiffness from which a failure is put down to it
+STIFF = 1e5
+STUCK = Options(iterations=1, fallbacks=False)
+
+
+def solve(
+    model: ReducedModel,
+    omega: float,
+    H: int = 3,
+    samples: int = 128,
+    *,
+    start: Solution | None = None,
+    options: Options = DEFAULTS,
+) -> Solution:
+    """The periodic response at circular frequency omega [rad/s] with harmonics 0..H.
+
+    Args:
+        samples: time samples a period for the friction forces; 0 locates the transitions of 1-D
+            elements exactly.
+        start: a solved neighbour; full stick when left out.
+
+    Returns:
+        a Solution whose `converged` and `reason` must be read; it is never a silent guess.
+
+    Raises:
+        InputError: the frequency, H or samples are out of range, or the start belongs to another
+            model.
+        NotSolvedError: a resonance without damping is hit exactly.
+    """
+    check_point(model, omega, H, samples)
+    if start is not None and (
+        not isinstance(start, Solution) or start.w.shape[:2] != model.springs.shape
+    ):
+        raise InputError("start: expected a Solution of a model with the same contact nodes")
+    lean = _stuck_throughout(model, omega, H, start) if options.frugal else None
+    if lean is not None:
+        return lean
+    first = solve_small(model, omega, H, samples, None if start is None else start.w, options)
+    if first is not None:
+        return first
+    balance = Balance(model, condense(model, omega, H), samples)
+    attempts = solve_balance(
+        balance, None if start is None else match_harmonics(start.w, H), options
+    )
+    best = min(attempts, key=lambda a: (not a.end.converged, a.end.state.error))
+    reason = best.end.reason if best.end.converged else _reasons(balance, attempts)
+    balance = replace(balance, samples=best.samples or samples)
+    return as_solution(balance, best, sum(a.end.iterations for a in attempts), reason)
+
+
+def free(model: ReducedModel, omega: float, H: int = 1) -> np.ndarray:
+    """(H+1, probes) amplitudes at the probes without contact forces [m]."""
+    linear = condense(model, omega, H)
+    return probe_motion(model, omega, np.zeros_like(linear.free), np.zeros(len(linear.rigid)))
+
+
+def stuck(model: ReducedModel, omega: float, H: int = 1) -> np.ndarray:
+    """(H+1, probes) amplitudes at the probes with all contacts closed and sticking [m]."""
+    linear = condense(model, omega, H)
+    force = linear.springs * linear.stuck
+    return probe_motion(model, omega, force, _rigid(linear, linear.stuck[0], force[0]))
+
+
+def as_solution(balance: Balance, attempt: Attempt, iterations: int, reason: str) -> Solution:
+    """The record of a finished attempt."""
+    model = balance.model
+    linear = balance.linear
+    state = attempt.end.state
+    load = state.forces.f.copy()
+    load[:, :, 0] -= model.preload.reshape(load.shape[:2])
+    force = to_complex(load.reshape(-1, load.shape[2])).T
+    relative = to_complex(state.w.reshape(-1, load.shape[2])).T
+    blade = blade_motion(model, linear.omega, force)
+    stiffness = model.springs[:, :, None]
+    return Solution(
+        omega=linear.omega,
+        harmonics=state.w.shape[2] // 2,
+        samples=balance.samples,
+        w=state.w,
+        f=state.forces.f,
+        probe=at_probes(blade, _rigid(linear, relative[0], force[0])),
+        converged=attempt.end.converged,
+        reason=reason,
+        method=attempt.method,
+        iterations=iterations,
+        residual=state.error,
+        residual_displacement=float(abs(state.residual).max()),
+        residual_force=float(abs(stiffness * state.residual).max()),
+        drift=_drift(linear, load),
+        states=_states(state.forces.shares),
+        work=works_of(
+            model, linear.omega, relative, force, blade, float(np.sum(state.forces.dissipated))
+        ),
+    )
+
+
+def sticking(model: ReducedModel, omegas: Sequence[float], H: int) -> list[Solution]:
+    """The first frequencies [rad/s], as long as all contacts stick, with the excited harmonics
+    alone; small models.
+
+    A point is accepted with a little of the friction limit in hand, and with the tolerance of
+    rounding: it is linear.
+    """
+    low = max((1, *model.excitation, *model.normal))
+    found = solve_each(model, np.array(omegas), low, INSTANTS * low, STUCK) if low < H else []
+    return gripping(model, found)
+
+
+def _stuck_throughout(
+    model: ReducedModel, omega: float, H: int, start: Solution | None
+) -> Solution | None:
+    """The same for one point of any model; looked for only where the start sticks."""
+    low = max((1, *model.excitation, *model.normal))
+    if low >= H or not (start is None or start.states["stick"] == len(model.elements.kt)):
+        return None
+    if small(model, low):
+        return next(iter(sticking(model, [omega], H)), None)
+    found = solve(model, omega, low, INSTANTS * low, options=STUCK)
+    return found if found.converged and grips(model, found) else None
+
+
+def _reasons(balance: Balance, attempts: list[Attempt]) -> str:
+    """Why every attempt failed, and what may help."""
+    linear = balance.linear
+    ratio = float(np.median(linear.springs * abs(np.diagonal(linear.G[1]))))
+    stiff = (
+        [
+            f"contacts {ratio:.1g} times as stiff as the bodies: expected less than {STIFF:.0e} "
+            "where they slip or "
+            "lift off"
+        ]
+        if ratio > STIFF
+        else []
+    )
+    return "; ".join([f"{a.method}: {a.end.reason}" for a in attempts] + stiff)
+
+
+def _drift(linear: Linear, load: np.ndarray) -> float:
+    """Load on the holding springs over what the contacts could carry, both on the motions without
+    stiffness.
+    """
+    if linear.B.shape[1] == 0:
+        return 0.0
+    held = np.linalg.norm(linear.B.T @ load[:, :, 0].ravel() - linear.g)
+    carried = np.linalg.norm(abs(linear.B).T @ np.linalg.norm(load, axis=2).ravel())
+    return float(held / max(carried, np.finfo(float).tiny))
+
+
+def _states(shares: np.ndarray) -> dict[str, int]:
+    """Number of nodes by what they do in a period, from the shares (n, 3) of stick, slip and
+    separation.
+    """
+    slips = shares[:, 1] > 0
+    apart = shares[:, 2] > 1e-12
+    closed = shares[:, :2].sum(axis=1) > 1e-12
+    return {
+        "stick": int((~slips & ~apart).sum()),
+        "slip": int((slips & ~apart).sum()),
+        "lift": int((apart & closed).sum()),
+        "open": int((~closed).sum()),
+    }
+
+
+def _rigid(linear: Linear, mean: np.ndarray, force: np.ndarray) -> np.ndarray:
+    """(r,) motions without stiffness that close  w_0 = free_0 - G_0 f_0 + B q."""
+    if linear.B.shape[1] == 0:
+        return np.zeros(len(linear.rigid))
+    gap = mean - linear.free[0] + linear.G[0] @ force
+    return linear.rigid @ (linear.B.T @ (linear.springs * gap.real))

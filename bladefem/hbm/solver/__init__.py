@@ -1,0 +1,1 @@
+"""Solving one point: residual, Newton, iterations, fallbacks, arc length."""

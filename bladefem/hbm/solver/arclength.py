@@ -1,0 +1,161 @@
+"""Pseudo-arc-length steps along solutions of the balance: round folds, never onto another branch.
+
+The displacements are measured by their own size and the parameter by the width of its range, so
+that a step means the same in metres and in rad/s. A corrected point that lies farther from its
+prediction than half a step, or whose tangent turns too far, is refused and the step halved: the
+follower does not jump to another branch. At the limit of stick the mean of a contact, and sampled
+2-D friction, jump a little: such gaps are leapt when they are small, and marked. Exact derivatives
+with the parameter come from `bladefem.hbm.parameter_derivatives`. (Keller 1977; Krack and Gross,
+Harmonic Balance for Nonlinear Vibration Problems, 2019, Sect. 4.)
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+
+from ...errors import NotSolvedError
+from ..parameter_derivatives import rate
+from .newton import Options, newton
+from .newton_krylov import Memory
+from .residual import Balance, State, evaluate_balance, linearise, orientation
+
+__all__ = ["Spot", "Task", "advance", "spot_at"]
+
+# Newton steps of one corrector
+CORRECTIONS = 12
+# arc-length step, as a share of the range, below which only a leap can help
+SMALLEST = 1e-5
+# shares of the range that are leapt
+LEAPS = (1e-4, 1e-3, 5e-3)
+# scaled distance up to which a leap has found the same branch
+CLOSE = 0.05
+# cosine between successive tangents below which a step is halved
+STRAIGHT = 0.7
+# distance from prediction to solution, in steps, above which it is halved
+GUARD = 0.5
+
+
+@dataclass(frozen=True)
+class Task:
+    """What does not change along a path in x, the parameter `name` in the units of
+    `bladefem.hbm.parameter_derivatives`.
+    """
+
+    balance: Callable[[float], Balance]
+    name: str
+    # of the range of x: its scale
+    width: float
+    # of the displacements at the start: their least scale [m]
+    size: float
+    options: Options
+    memory: Memory = field(default_factory=Memory)
+
+
+@dataclass(frozen=True)
+class Spot:
+    """A solved point and the direction of the path there."""
+
+    x: float
+    balance: Balance
+    state: State
+    iterations: int
+    # (n, d, K) dw/dx
+    slope: np.ndarray
+    # of dx along the path
+    sign: float
+    # sign of the determinant of dr/dw; 0 where it is not known
+    orientation: float
+    leapt: bool = False
+
+    def branches(self, before: Spot) -> bool:
+        """Another path crosses this one since the spot before.
+
+        The determinant of the balance bordered by the tangent has the sign of det dr/dw times that
+        of dx: at a fold both change, at a crossing one of them (Keller 1977).
+        """
+        return (
+            not self.leapt and self.orientation * self.sign * before.orientation * before.sign < 0
+        )
+
+    def tangent(self, task: Task, size: float) -> tuple[np.ndarray, float]:
+        """Unit tangent in displacements over their size and the parameter over its width."""
+        dw = self.slope * task.width / size
+        length = self.sign / np.sqrt(np.sum(dw**2) + 1.0)
+        return dw * length, float(length)
+
+
+def advance(task: Task, spot: Spot, step: float, longest: float) -> tuple[Spot, float, bool]:
+    """The next point, the next step, and whether the parameter turned back in between.
+
+    Raises:
+        NotSolvedError: neither small steps nor leaps find the path.
+    """
+    reason = ""
+    while step >= SMALLEST:
+        found, reason = _correct(task, spot, step)
+        if found is not None:
+            easy = found.iterations <= 4
+            return found, min(1.5 * step, longest) if easy else step, found.sign != spot.sign
+        step /= 2
+    for share in LEAPS:
+        found = _leap(task, spot, share)
+        if found is not None:
+            return found, share, False
+    raise NotSolvedError(f"path in {task.name} stopped at x = {spot.x:.6g}: {reason}")
+
+
+def _correct(task: Task, spot: Spot, step: float) -> tuple[Spot | None, str]:
+    """Newton back to the path on the plane across the tangent."""
+    size = max(task.size, float(np.linalg.norm(spot.state.w)))
+    dw, dx = spot.tangent(task, size)
+    guess = spot.state.w + step * size * dw, spot.x + step * task.width * dx
+    w, x = guess
+    for iteration in range(CORRECTIONS + 1):
+        balance = task.balance(x)
+        state = evaluate_balance(balance, w)
+        if state.error <= task.options.tolerance:
+            break
+        if iteration == CORRECTIONS or not np.isfinite(state.error):
+            return None, f"corrector left a residual of {state.error:.1e}"
+        try:
+            inverse = linearise(balance, state, task.memory)
+            back = inverse(state.residual)
+            along = inverse(rate(balance, state, task.name))
+        except np.linalg.LinAlgError as error:
+            return None, str(error)
+        off = np.sum(dw * (w - guess[0])) / size + dx * (x - guess[1]) / task.width
+        change = (np.sum(dw * back) / size - off) / (dx / task.width - np.sum(dw * along) / size)
+        w = w - back - change * along
+        x = x + change
+    if np.hypot(np.linalg.norm(w - guess[0]) / size, (x - guess[1]) / task.width) > GUARD * step:
+        return None, "the corrector jumps"
+    found = spot_at(task, x, balance, state, iteration, spot.sign)
+    new_dw, new_dx = found.tangent(task, size)
+    turn = np.sum(dw * new_dw) + dx * new_dx
+    if abs(turn) < STRAIGHT:
+        return None, "the path turns too sharply"
+    return (found if turn > 0 else replace(found, sign=-found.sign)), ""
+
+
+def _leap(task: Task, spot: Spot, share: float) -> Spot | None:
+    """A solution across a small gap, if it lies where the path was heading."""
+    x = spot.x + spot.sign * share * task.width
+    balance = task.balance(x)
+    end = newton(balance, spot.state.w, task.options)
+    size = max(task.size, float(np.linalg.norm(spot.state.w)))
+    if not end.converged or np.linalg.norm(end.state.w - spot.state.w) > CLOSE * size:
+        return None
+    return replace(spot_at(task, x, balance, end.state, end.iterations, spot.sign), leapt=True)
+
+
+def spot_at(
+    task: Task, x: float, balance: Balance, state: State, iterations: int, sign: float
+) -> Spot:
+    """A solved state with the direction of its path, x rising along it for sign 1 and falling for
+    -1.
+    """
+    slope = -linearise(balance, state, task.memory)(rate(balance, state, task.name))
+    return Spot(x, balance, state, iterations, slope, sign, orientation(balance, state))

@@ -1,0 +1,158 @@
+"""A second level for the iterations of large patches: the motions in which the contacts of a seat
+move together.
+
+What takes iterations many steps is not how contacts differ but what they do in common, because the
+bodies are soft there. With Q these motions and Z the same for every coefficient, the preconditioner
+
+    M^-1 = 1 + Z (E^-1 - 1) Z^T,    E = Z^T (1 + A C) Z
+
+solves for them at once (Nicolaides, SIAM J. Numer. Anal. 24 (1987), doi:10.1137/0724027). On plane
+blades with 82 nodes that lift off, 15 harmonics, it takes 5 steps in place of 46.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numba import njit
+
+from ..linear.contact_flexibility import seen_by
+from ..linear.woodbury import bodies_of
+from ..model import ReducedModel
+from .dense_lu import back_substitute, factorise_large
+
+__all__ = ["MANY", "common_motions", "no_level", "prepared", "second_level"]
+
+# unknowns from which a second level pays
+MANY = 300
+# common motions of two rigid seats in space; more cost more than they save
+MOST = 12
+# contact freedoms for each of them at least
+EACH = 4
+# motions whose compliance is below the square of this, over the largest one, are left out
+FAINT = 1e-2
+# part of a motion that has to be left beside the others where some contacts stick
+SAME = 1e-3
+
+
+def common_motions(model: ReducedModel, harmonics: int) -> np.ndarray:
+    """(m, q) orthonormal motions of the contact that the modes have in common; (m, 0) where there
+    are few unknowns.
+    """
+    m = model.springs.size
+    if m * (2 * harmonics + 1) < MANY:
+        return np.zeros((m, 0))
+    return model.once(("common motions", harmonics), lambda: _common(model, harmonics))
+
+
+def _common(model: ReducedModel, harmonics: int) -> np.ndarray:
+    """Those that the modes give way to most under static loads, rigid bodies as much as the softest
+    mode.
+    """
+    bodies = bodies_of(model, harmonics)
+    softest = min(
+        (body.omega[body.omega > 0].min() for body in bodies if np.any(body.omega > 0)), default=1.0
+    )
+    modes = [
+        shapes / np.maximum(omega, softest)
+        for body in bodies
+        for shapes, omega in zip(body.shapes[:, body.contact], body.omega, strict=True)
+    ]
+    soft = np.concatenate([part for mode in modes for part in (mode.real, mode.imag)], axis=1)
+    compliances, motions = np.linalg.eigh(soft @ soft.T)
+    kept = compliances >= FAINT**2 * compliances[-1]
+    return np.ascontiguousarray(motions[:, kept][:, : -min(MOST, len(soft) // EACH) - 1 : -1])
+
+
+@njit(cache=True, error_model="numpy")
+def no_level():
+    """In place of the second level where there is none."""
+    return np.empty((0, 0)), np.empty((0, 0)), np.empty(0, np.int64)
+
+
+@njit(cache=True, error_model="numpy")
+def second_level(flex, C, Q, active, d):
+    """Motions Z (a, q) of the active nodes, LU factors of E and their pivots; nothing where E is
+    singular.
+
+    Args:
+        flex: flexibility among the active nodes, see `flex`.
+        C: (nodes, dK, dK) their derivatives.
+        Q: (m, q) common motions of all nodes.
+        active: (nodes,) their numbers.
+    """
+    Z = _orthonormal(Q, active, d)
+    E = _galerkin(seen_by(flex, Z), C, Z)
+    pivots = np.empty(E.shape[0], np.int64)
+    return (Z, E, pivots) if factorise_large(E, pivots) else no_level()
+
+
+@njit(cache=True, error_model="numpy")
+def _orthonormal(Q, active, d):
+    """The rows of the active nodes, their columns made orthonormal; dependent ones are left out."""
+    Z = np.empty((Q.shape[1], active.size * d))
+    count = 0
+    for j in range(Q.shape[1]):
+        z = Z[count]
+        for y in range(active.size):
+            z[y * d : (y + 1) * d] = Q[active[y] * d : (active[y] + 1) * d, j]
+        before = np.sqrt(np.dot(z, z))
+        for _ in range(2):
+            for i in range(count):
+                z -= np.dot(Z[i], z) * Z[i]
+        left = np.sqrt(np.dot(z, z))
+        if left > SAME * before:
+            z /= left
+            count += 1
+    return np.ascontiguousarray(Z[:count].T)
+
+
+@njit(cache=True, error_model="numpy", fastmath={"contract", "reassoc"})
+def _galerkin(along, C, Z):
+    """E (qK, qK) = Z^T (1 + A C) Z from Z^T A (H+1, q, a)."""
+    q = Z.shape[1]
+    K = 2 * along.shape[0] - 1
+    size = C.shape[1]
+    d = size // K
+    E = np.eye(q * K)
+    forces = np.empty((size, q * K))
+    for node in range(C.shape[0]):
+        forces[:] = 0.0
+        for row in range(size):
+            for j in range(q):
+                for e in range(d):
+                    moved = Z[node * d + e, j]
+                    for l in range(K):
+                        forces[row, j * K + l] += moved * C[node, row, e * K + l]
+        for b in range(d):
+            for h in range(along.shape[0]):
+                c = max(2 * h - 1, 0)
+                s = 2 * h
+                by_cos = forces[b * K + c]
+                by_sin = forces[b * K + s]
+                for i in range(q):
+                    re = along[h, i, node * d + b].real
+                    im = along[h, i, node * d + b].imag
+                    if h == 0:
+                        E[i * K] += re * by_cos
+                        continue
+                    cos = E[i * K + c]
+                    sin = E[i * K + s]
+                    for l in range(q * K):
+                        cos[l] += re * by_cos[l] + im * by_sin[l]
+                        sin[l] += re * by_sin[l] - im * by_cos[l]
+    return E
+
+
+@njit(cache=True, error_model="numpy")
+def prepared(level, y, out):
+    """out (a K,) becomes M^-1 y."""
+    out[:] = y
+    Z, E, pivots = level
+    if pivots.size == 0:
+        return
+    rest = y.reshape(Z.shape[0], y.size // Z.shape[0])
+    moved = out.reshape(Z.shape[0], y.size // Z.shape[0])
+    common = np.dot(Z.T, rest)
+    solved = common.copy().reshape(common.size)
+    back_substitute(E, pivots, solved)
+    moved += np.dot(Z, solved.reshape(common.shape) - common)

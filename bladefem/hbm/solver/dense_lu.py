@@ -1,0 +1,81 @@
+"""LU factors for compiled loops, small and large; LAPACK's calls take longer than a tiny matrix."""
+
+from __future__ import annotations
+
+import numpy as np
+from numba import njit
+
+__all__ = ["back_substitute", "factorise", "factorise_large"]
+
+# columns of a block
+BLOCK = 32
+
+
+@njit(cache=True, error_model="numpy")
+def factorise(M, pivots):
+    """LU factors in place with partial pivoting; False where a pivot is zero."""
+    return _eliminated(M, pivots, 0, M.shape[0])
+
+
+@njit(cache=True, error_model="numpy")
+def _eliminated(M, pivots, low, high):
+    """Columns low to high of such factors, rows exchanged as a whole; False where a pivot is
+    zero.
+    """
+    size = M.shape[0]
+    for k in range(low, high):
+        best = k
+        for i in range(k + 1, size):
+            if abs(M[i, k]) > abs(M[best, k]):
+                best = i
+        pivots[k] = best
+        if not abs(M[best, k]) > 0.0:
+            return False
+        if best != k:
+            for j in range(size):
+                M[k, j], M[best, j] = M[best, j], M[k, j]
+        for i in range(k + 1, size):
+            factor = M[i, k] / M[k, k]
+            M[i, k] = factor
+            if factor != 0.0:
+                for j in range(k + 1, high):
+                    M[i, j] -= factor * M[k, j]
+    return True
+
+
+@njit(cache=True, error_model="numpy")
+def factorise_large(M, pivots):
+    """The same for a contiguous real matrix, in blocks of columns: most of the work is one matrix
+    product a block.
+    """
+    size = M.shape[0]
+    for low in range(0, size, BLOCK):
+        high = min(low + BLOCK, size)
+        if not _eliminated(M, pivots, low, high):
+            return False
+        for k in range(low, high if high < size else low):
+            for i in range(k + 1, high):
+                factor = M[i, k]
+                for j in range(high, size):
+                    M[i, j] -= factor * M[k, j]
+        if high < size:
+            left = np.ascontiguousarray(M[high:, low:high])
+            right = np.ascontiguousarray(M[low:high, high:])
+            M[high:, high:] -= np.dot(left, right)
+    return True
+
+
+@njit(cache=True, error_model="numpy")
+def back_substitute(M, pivots, x):
+    """x becomes M^-1 x."""
+    size = M.shape[0]
+    for k in range(size):
+        if pivots[k] != k:
+            x[k], x[pivots[k]] = x[pivots[k]], x[k]
+    for i in range(size):
+        for j in range(i):
+            x[i] -= M[i, j] * x[j]
+    for i in range(size - 1, -1, -1):
+        for j in range(i + 1, size):
+            x[i] -= M[i, j] * x[j]
+        x[i] /= M[i, i]

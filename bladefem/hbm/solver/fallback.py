@@ -1,0 +1,256 @@
+"""What is tried, in order, when Newton does not reach a point; every attempt leaves its reason.
+
+1. Newton from the given start, then from full stick, its line search on the step and on the
+   residual. Small models of 1-D elements, which have a compiled loop for it, begin with the step;
+   elsewhere the residual is cheaper, and on 3-D patches that lift off it arrives where the step
+   stalls (wedge of 96 nodes at 60 and 90 N: half the time);
+2. twice and four times the samples where Newton came close: sampled 2-D friction jumps a little at
+   the limit of stick, and there may be no exact zero; the solution then says how many samples it
+   has;
+3. harmonics in sequence, 3, 7, 15, ... up to H, each started from the one before;
+4. homotopy in the normal load, from a load under which everything sticks down to the true one;
+5. the same by path following in the excitation, which goes round the folds that contacts with
+lift-off have;
+6. shooting in time, where the model has a form in time, and Newton from its harmonics;
+7. the path in the excitation again with twice the samples, which coarse ones can interrupt at
+lift-off.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from ...errors import InputError, NotSolvedError
+from ..linear.condensation import Linear
+from ..parameters import vary
+from ..time_model import shooting_start
+from .arclength import Task, advance, spot_at
+from .newton import Newton, Options, fits, newton
+from .residual import Balance, evaluate_balance, start_in_stick
+
+__all__ = ["Attempt", "match_harmonics", "solve_balance"]
+
+METHODS = (("newton", "step"), ("newton on the residual", "residual"))
+# multiples of the normal load where a homotopy starts
+FIRST_LOAD = 100.0
+LARGEST_LOAD = 1e8
+# residual from which more samples are tried
+CLOSE = 1e-3
+# points of a path in the excitation
+LONGEST_PATH = 400
+# logarithm of the smallest part of the excitation that its path may visit
+FARTHEST = 30.0
+# step in the logarithm of the load below which a homotopy gives up
+SMALLEST_STEP = 1e-3
+
+
+@dataclass(frozen=True)
+class Attempt:
+    """The end of one way to solve a point."""
+
+    method: str
+    end: Newton
+    # where they differ from those asked for
+    samples: int | None = None
+
+
+def solve_balance(balance: Balance, start: np.ndarray | None, options: Options) -> list[Attempt]:
+    """The attempts made, the last one converged unless every way failed."""
+    attempts = []
+    for attempt in _ways(balance, start, options):
+        attempts.append(attempt)
+        if attempt.end.converged:
+            break
+    return attempts
+
+
+def match_harmonics(w: np.ndarray, H: int) -> np.ndarray:
+    """Coefficients (n, d, *) cut or filled with zeros to 2H+1."""
+    matched = np.zeros((*w.shape[:2], 2 * H + 1))
+    kept = min(w.shape[2], 2 * H + 1)
+    matched[:, :, :kept] = w[:, :, :kept]
+    return matched
+
+
+def _ways(balance: Balance, start: np.ndarray | None, options: Options) -> Iterator[Attempt]:
+    stick = start_in_stick(balance)
+    near = None
+    for w in ([] if start is None else [start]) + [stick]:
+        for method, merit in METHODS if fits(balance) else reversed(METHODS):
+            end = newton(balance, w, options, merit)
+            yield Attempt(method, end)
+            near = end if near is None or end.state.error < near.state.error else near
+    if not options.fallbacks:
+        return
+    for factor in (2, 4) if near.state.error < CLOSE else ():
+        denser = replace(balance, samples=factor * balance.samples)
+        yield Attempt("more samples", newton(denser, near.state.w, options), denser.samples)
+    if balance.linear.A.shape[0] > 4:
+        yield Attempt("harmonics in sequence", _more_harmonics(balance, options))
+    yield Attempt("load homotopy", _from_high_load(balance, options))
+    path = _along_excitation(balance, options)
+    yield Attempt("path in the excitation", path)
+    yield Attempt("shooting", _from_shooting(balance, near, options))
+    # it was interrupted, and did not get lost
+    if balance.samples and path.iterations < LONGEST_PATH:
+        denser = replace(balance, samples=2 * balance.samples)
+        yield Attempt(
+            "path in the excitation, more samples",
+            _along_excitation(denser, options),
+            denser.samples,
+        )
+
+
+def _more_harmonics(balance: Balance, options: Options) -> Newton:
+    """Solve with 3, 7, 15, ... harmonics, each from the one before."""
+    highest = balance.linear.A.shape[0] - 1
+    iterations = 0
+    w = None
+    sequence = [H for H in (3, 7, 15, 31, 63) if H < highest] + [highest]
+    for H in sequence:
+        less = replace(balance, linear=_truncate(balance.linear, H))
+        end = newton(less, start_in_stick(less) if w is None else match_harmonics(w, H), options)
+        if not end.converged and w is None:
+            second = newton(less, start_in_stick(less), options, "residual")
+            end = replace(second, iterations=end.iterations + second.iterations)
+        iterations += end.iterations
+        if not end.converged:
+            return _back(balance, end, iterations, f"with {H} harmonics: {end.reason}")
+        w = end.state.w
+    return replace(end, iterations=iterations)
+
+
+def _from_high_load(balance: Balance, options: Options) -> Newton:
+    """Follow the solution from a multiple of the normal load where it sticks, or is easy, down to
+    the load itself.
+    """
+    level = np.log(FIRST_LOAD)
+    iterations = 0
+    while True:
+        end = newton(_loaded(balance, level), start_in_stick(balance), options)
+        iterations += end.iterations
+        if end.converged:
+            break
+        level += np.log(100.0)
+        if level > np.log(LARGEST_LOAD):
+            return _back(
+                balance,
+                end,
+                iterations,
+                f"no solution under {LARGEST_LOAD:.0e} times the load: {end.reason}",
+            )
+    path = [(level, end.state.w)]
+    step = min(level, 1.0)
+    while level > 0:
+        target = max(level - step, 0.0)
+        end = newton(
+            _loaded(balance, target), _ahead(path, target), replace(options, iterations=15)
+        )
+        iterations += end.iterations
+        if end.converged:
+            level = target
+            path = [*path[-1:], (target, end.state.w)]
+            step *= 2 if end.iterations <= 4 else 1
+        else:
+            step = (level - target) / 3
+            if step < SMALLEST_STEP:
+                return _back(
+                    balance,
+                    end,
+                    iterations,
+                    f"stopped at {np.exp(level):.3g} times the load: {end.reason}",
+                )
+    return replace(end, iterations=iterations)
+
+
+def _along_excitation(balance: Balance, options: Options) -> Newton:
+    """Follow the solution round folds from a part of the excitation that is easily solved up to all
+    of it.
+
+    The friction law is homogeneous: this is the path in the normal load, seen from the other side.
+    """
+
+    def part(x: float) -> Balance:
+        if not -FARTHEST <= x <= 1.0:
+            raise NotSolvedError(
+                f"the path left the excitations up to the wanted one, for exp({x:.3g}) times it"
+            )
+        model = vary(balance.model, "force", float(np.exp(x)))
+        factor = float(np.exp(x))
+        linear = replace(
+            balance.linear,
+            free=factor * balance.linear.free,
+            stuck=factor * balance.linear.stuck,
+            g=factor * balance.linear.g,
+        )
+        return replace(balance, model=model, linear=linear)
+
+    iterations = 0
+    for factor in (0.7, 0.5, 0.25, 0.1, 0.01, 1e-4):
+        x = float(np.log(factor))
+        end = newton(part(x), start_in_stick(part(x)), options)
+        iterations += end.iterations
+        if end.converged:
+            break
+    else:
+        return _back(
+            balance, end, iterations, f"no solution for any part of the excitation: {end.reason}"
+        )
+    task = Task(part, "force", -x, float(np.linalg.norm(end.state.w)), options)
+    reached = end.state
+    try:
+        spot = spot_at(task, x, part(x), end.state, 0, 1.0)
+        step = 0.05
+        for _ in range(LONGEST_PATH):
+            spot, step, _ = advance(task, spot, step, 0.2)
+            iterations = iterations + spot.iterations
+            reached = spot.state
+            if spot.x >= 0:
+                end = newton(balance, spot.state.w, options)
+                return replace(end, iterations=iterations + end.iterations)
+    except (NotSolvedError, np.linalg.LinAlgError) as error:
+        return _back(balance, replace(end, state=reached), iterations, str(error))
+    return _back(
+        balance, replace(end, state=reached), iterations, f"not there after {LONGEST_PATH} points"
+    )
+
+
+def _from_shooting(balance: Balance, near: Newton, options: Options) -> Newton:
+    """Newton from the harmonics of a periodic solution in time."""
+    try:
+        return newton(balance, shooting_start(balance), options)
+    except (InputError, NotSolvedError) as error:
+        return Newton(near.state, 0, False, str(error))
+
+
+def _loaded(balance: Balance, level: float) -> Balance:
+    """The balance under exp(level) times the normal load; elements with an initial gap are pressed
+    shut.
+    """
+    elements = balance.model.elements
+    unit = np.where(elements.n0 > 0, elements.n0, abs(elements.n0).max())
+    raised = replace(elements, n0=elements.n0 + np.expm1(level) * unit)
+    return replace(balance, model=replace(balance.model, elements=raised))
+
+
+def _ahead(path: list[tuple[float, np.ndarray]], target: float) -> np.ndarray:
+    """The line through the last two points of the path, at the target."""
+    if len(path) == 1:
+        return path[0][1]
+    (old, before), (new, now) = path
+    return now + (target - new) / (new - old) * (now - before)
+
+
+def _truncate(linear: Linear, H: int) -> Linear:
+    return replace(
+        linear, **{name: getattr(linear, name)[: H + 1] for name in ("G", "free", "A", "stuck")}
+    )
+
+
+def _back(balance: Balance, end: Newton, iterations: int, reason: str) -> Newton:
+    """A failed attempt as a state of the true balance."""
+    w = match_harmonics(end.state.w, balance.linear.A.shape[0] - 1)
+    return Newton(evaluate_balance(balance, w), iterations, False, reason)

@@ -1,0 +1,61 @@
+"""Generalised conjugate residuals on  x + A C x = r: A couples contacts harmonic by harmonic, C
+harmonics node by node.
+
+Eisenstat, Elman and Schultz, SIAM J. Numer. Anal. 20 (1983), doi:10.1137/0720023. The springs of
+full stick inside A are the preconditioner already: where contacts move alike, a few directions are
+enough; what many of them do in common a second level solves for, see `coarse`.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numba import njit
+
+from ..linear.contact_flexibility import flexed
+from .deflation import prepared
+
+__all__ = ["conjugate_residuals"]
+
+# after which it is given up
+DIRECTIONS = 60
+
+
+@njit(cache=True, error_model="numpy")
+def conjugate_residuals(flex, C, r, accuracy, level, x):
+    """Fill x (N,) with the solution for r (N,), to a relative residual; False where it is not
+    found.
+
+    A as `flex` gives it, C (nodes, N/nodes, N/nodes) real; level as `coarse` gives it.
+    """
+    N = r.size
+    block = C.shape[1]
+    m = max(flex[0].shape[1], flex[3].shape[0])
+    P = np.empty((DIRECTIONS, N))
+    Q = np.empty((DIRECTIONS, N))
+    forces = np.empty(N)
+    rest = r.copy()
+    goal = accuracy * np.sqrt(np.dot(r, r))
+    x[:] = 0.0
+    for k in range(DIRECTIONS):
+        if np.sqrt(np.dot(rest, rest)) <= goal:
+            return True
+        prepared(level, rest, P[k])
+        Q[k] = P[k]
+        for i in range(0, N, block):
+            np.dot(C[i // block], P[k, i : i + block], forces[i : i + block])
+        flexed(flex, forces.reshape(m, N // m), Q[k].reshape(m, N // m))
+        for i in range(k):
+            share = np.dot(Q[i], Q[k])
+            for j in range(N):
+                P[k, j] -= share * P[i, j]
+                Q[k, j] -= share * Q[i, j]
+        length = np.sqrt(np.dot(Q[k], Q[k]))
+        if not length > 0.0:
+            return False
+        step = np.dot(Q[k], rest) / length**2
+        for j in range(N):
+            x[j] += step * P[k, j]
+            rest[j] -= step * Q[k, j]
+            P[k, j] /= length
+            Q[k, j] /= length
+    return False

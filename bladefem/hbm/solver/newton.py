@@ -1,0 +1,167 @@
+"""Newton with a line search on the balance; it always says why it stopped."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from numbers import Integral
+
+import numpy as np
+
+from ...errors import InputError
+from ...friction.aft import Forces, dissipated, states
+from .newton_compiled import CONVERGED, EXHAUSTED, INFINITE, SINGULAR, STALLED, compiled_newton
+from .newton_krylov import Memory
+from .residual import (
+    STICKS,
+    Balance,
+    Inverse,
+    State,
+    condensed,
+    contact_table,
+    evaluate_balance,
+    linearise,
+)
+
+__all__ = ["DEFAULTS", "Newton", "Options", "fits", "newton"]
+
+# unknowns of 1-D elements up to which the loop is compiled
+COMPILED = 20000
+# step share below which the search direction is given up
+SHORTEST = 2.0**-8
+
+
+@dataclass(frozen=True)
+class Options:
+    """When a point is accepted and when it is given up.
+
+    Raises:
+        InputError: a value is out of range.
+    """
+
+    # residual of the balance over the size of the motion [1]
+    tolerance: float = 1e-10
+    # Newton steps of one attempt
+    iterations: int = 60
+    # whose height sweeps and peaks measure
+    probe: int = 0
+    # whether more is tried where Newton fails
+    fallbacks: bool = True
+    # whether harmonics that are not excited are left out where all contacts stick
+    frugal: bool = False
+
+    def __post_init__(self) -> None:
+        if not 1e-14 <= self.tolerance <= 1e-2:
+            raise InputError(f"tolerance {self.tolerance}: expected 1e-14 to 1e-2")
+        if not isinstance(self.iterations, Integral) or self.iterations < 1:
+            raise InputError(f"iterations {self.iterations}: expected a whole number, at least 1")
+
+
+DEFAULTS = Options()
+
+
+@dataclass(frozen=True)
+class Newton:
+    """Where Newton ended."""
+
+    state: State
+    iterations: int
+    converged: bool
+    reason: str
+
+
+def newton(
+    balance: Balance, w: np.ndarray, options: Options = DEFAULTS, merit: str = "step"
+) -> Newton:
+    """Solve the balance from the displacements w (n, d, K).
+
+    Args:
+        merit: what the line search lowers: "step", the Newton step that the last derivative would
+            take next, which does not depend on how the equations are scaled (Deuflhard, Newton
+            Methods for Nonlinear Problems, 2004, Sect. 3.3), or "residual".
+    """
+    if merit == "step" and fits(balance):
+        return _fast(balance, w, options)
+    state = evaluate_balance(balance, w, "single")
+    memory = Memory()
+    for iteration in range(options.iterations + 1):
+        if state.error <= options.tolerance:
+            return Newton(state, iteration, True, "residual within tolerance")
+        if not np.isfinite(state.error):
+            return Newton(state, iteration, False, "residual is not finite")
+        if iteration == options.iterations:
+            break
+        try:
+            inverse = linearise(balance, state, memory)
+        except np.linalg.LinAlgError:
+            return Newton(state, iteration, False, "singular Jacobian")
+        try:
+            better = _search(balance, state, inverse, merit)
+        except np.linalg.LinAlgError as error:
+            return Newton(state, iteration + 1, False, str(error))
+        if better is None:
+            return Newton(
+                state, iteration + 1, False, f"line search stalled at residual {state.error:.1e}"
+            )
+        state = better
+    return Newton(
+        state,
+        options.iterations,
+        False,
+        f"residual {state.error:.1e} after {options.iterations} iterations",
+    )
+
+
+def fits(balance: Balance) -> bool:
+    """Few enough unknowns of 1-D elements for the compiled loop."""
+    harmonics, m = balance.linear.stuck.shape
+    return balance.model.elements.tangents == 1 and m * (2 * harmonics - 1) <= COMPILED
+
+
+def _fast(balance: Balance, w: np.ndarray, options: Options) -> Newton:
+    end = np.ascontiguousarray(w.reshape(-1, w.shape[2]), dtype=float).copy()
+    d = balance.model.directions
+    shape = w.shape
+    contact = contact_table(balance.model, shape[2] // 2, balance.samples)
+    steps, code, error, f, dfdw, shares, residual, p = compiled_newton(
+        end, d, condensed(balance), contact, STICKS, options.tolerance, options.iterations, SHORTEST
+    )
+    reasons = {
+        CONVERGED: "residual within tolerance",
+        EXHAUSTED: f"residual {error:.1e} after {steps} iterations",
+        STALLED: f"line search stalled at residual {error:.1e}",
+        SINGULAR: "singular Jacobian",
+        INFINITE: "residual is not finite",
+    }
+    if code != CONVERGED:
+        return Newton(evaluate_balance(balance, end.reshape(shape)), steps, False, reasons[code])
+    full = np.zeros_like(f)
+    full[:, 2 - d :] = end.reshape(shape)
+    forces = Forces(
+        f[:, 2 - d :],
+        dfdw[:, 2 - d :, :, 2 - d :],
+        states(shares),
+        shares,
+        dissipated(f, full),
+        np.full(len(f), 2),
+        True,
+        "periodic",
+    )
+    state = State(end.reshape(shape), forces, p.reshape(shape), residual.reshape(shape), error)
+    return Newton(state, steps, True, reasons[code])
+
+
+def _search(balance: Balance, state: State, inverse: Inverse, merit: str) -> State | None:
+    """The first halving of the step that lowers the merit, or None."""
+    step = inverse(state.residual, float(np.clip(0.1 * state.error, 1e-5, 1e-2)))
+    if not np.isfinite(step).all():
+        return None
+    demand = 0.25 if merit == "step" else 1e-4
+    before = np.linalg.norm(step if merit == "step" else state.residual)
+    share = 1.0
+    while share >= SHORTEST:
+        trial = evaluate_balance(balance, state.w - share * step, "single")
+        after = inverse(trial.residual, 0.1) if merit == "step" else trial.residual
+        if np.linalg.norm(after) <= (1 - demand * share) * before:
+            return trial
+        share /= 2
+    return None

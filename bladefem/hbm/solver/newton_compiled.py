@@ -1,0 +1,327 @@
+"""Newton on small balances of 1-D elements, compiled: the loop of `bladefem.hbm.solver.newton`
+without its overhead.
+
+It takes the same steps, with the line search on the step, and ends for the same reasons; a test
+holds the two together.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+from numba import njit
+
+from ...friction.kernel_1d import jenkins_batch
+from ...friction.kernel_1d_exact import _batch as exact_batch
+from ..linear.contact_flexibility import among, apply, apply_modes, flexed, formed
+from .deflation import MANY, no_level, second_level
+from .dense_lu import back_substitute, factorise, factorise_large
+from .krylov import conjugate_residuals
+
+__all__ = [
+    "CONVERGED",
+    "EXHAUSTED",
+    "INFINITE",
+    "SINGULAR",
+    "STALLED",
+    "Condensed",
+    "compiled_newton",
+    "norm",
+]
+
+CONVERGED = 0
+EXHAUSTED = 1
+STALLED = 2
+SINGULAR = 3
+INFINITE = 4
+SEARCHING = 5
+# unknowns from which blocks pay, and iterations where they arrive
+LARGE = 64
+# unknowns up to which dense factors are the last resort: 200 MB, some seconds
+DENSE = 5000
+# accuracy of a step by iterations, relative,
+FINEST = 1e-6
+COARSEST = 1e-4
+# where no more is needed to arrive,
+CLOSE = 1e-2
+# and of the one that the line search looks at; coarser ones mislead it
+ROUGH = 1e-3
+
+
+class Condensed(NamedTuple):
+    """The bodies at one frequency, seen from the m contact freedoms."""
+
+    # flexibility with contact springs, see `flex`
+    flex: tuple
+    # (H+1, m, m) the same without springs, but for the mean; (1, m, m) where `modal` tells it
+    G: np.ndarray
+    # (m, K) displacement in full stick [m]
+    stuck: np.ndarray
+    # (m,) [N/m]
+    springs: np.ndarray
+    # size of the linear motion [m]
+    scale: float
+    # (S, m, M), residual (S, m, m) and modal (H+1, M): these give G by `apply_modes`; or empty
+    shapes: np.ndarray
+    residual: np.ndarray
+    modal: np.ndarray
+    # (m, q) that the contacts have in common, see `coarse`
+    motions: np.ndarray
+
+
+@njit(cache=True, error_model="numpy")
+def norm(x):
+    """Root of the sum of squares."""
+    total = 0.0
+    for i in range(x.shape[0]):
+        for k in range(x.shape[1]):
+            total += x[i, k] * x[i, k]
+    return np.sqrt(total)
+
+
+@njit(cache=True, error_model="numpy")
+def _move(w, share, step, out):
+    """out becomes  w - share step."""
+    for i in range(w.shape[0]):
+        for k in range(w.shape[1]):
+            out[i, k] = w[i, k] - share * step[i, k] if share else w[i, k]
+
+
+@njit(cache=True, error_model="numpy")
+def _evaluate(w, d, linear, contact, work):
+    """Forces and residual at w (m, K); fills work and returns the error of
+    `bladefem.hbm.solver.residual`.
+    """
+    G = linear.G
+    stuck = linear.stuck
+    springs = linear.springs
+    load, base, nodes, tab, brackets, preload = contact
+    full, F, J, shares, p, r = work
+    n = nodes.shape[0]
+    K = w.shape[1]
+    for i in range(w.shape[0]):
+        for k in range(K):
+            full[i // d, 2 - d + i % d, k] = w[i, k]
+    if brackets:
+        F[:] = 0.0
+        J[:] = 0.0
+        counts = np.empty(n, np.int64)
+        exact_batch(full, base, nodes, brackets, F, J, shares, counts)
+    else:
+        jenkins_batch(full, load, nodes, tab, F, J, shares)
+    for i in range(w.shape[0]):
+        for k in range(K):
+            p[i, k] = (
+                F[i // d, 2 - d + i % d, k] - springs[i] * w[i, k] - (preload[i] if k == 0 else 0.0)
+            )
+            r[i, k] = w[i, k] - stuck[i, k]
+    flexed(linear.flex, p, r)
+    sprung = np.empty(r.shape)
+    bare = np.empty(r.shape)
+    for i in range(w.shape[0]):
+        for k in range(K):
+            sprung[i, k] = springs[i] * r[i, k] if k else 0.0
+            bare[i, k] = r[i, k]
+    if 2 * G.shape[0] - 1 == K:
+        apply(G, sprung, bare)
+    else:
+        apply_modes(linear.shapes, linear.residual, linear.modal, sprung, bare)
+    return max(norm(r) / max(norm(w), 1e-300), norm(bare) / linear.scale)
+
+
+@njit(cache=True, error_model="numpy")
+def _jacobian(A, C):
+    """(a K, a K) the matrix 1 + A C for A (H+1, a, a) and one block of C (nodes, dK, dK) a node."""
+    a = A.shape[1]
+    K = 2 * A.shape[0] - 1
+    size = C.shape[1]
+    d = size // K
+    out = np.eye(a * K)
+    for i in range(a):
+        for j in range(a):
+            block = C[j // d]
+            left = j // d * size
+            b = j % d * K
+            for h in range(A.shape[0]):
+                re = A[h, i, j].real
+                im = A[h, i, j].imag
+                cos = max(2 * h - 1, 0)
+                sin = 2 * h
+                for column in range(size):
+                    out[i * K + cos, left + column] += re * block[b + cos, column]
+                    if h:
+                        out[i * K + cos, left + column] += im * block[b + sin, column]
+                        out[i * K + sin, left + column] += (
+                            re * block[b + sin, column] - im * block[b + cos, column]
+                        )
+    return out
+
+
+@njit(cache=True, error_model="numpy")
+def _factors(flex, C):
+    """LU factors and pivots of 1 + A C; without pivots where it is singular."""
+    M = _jacobian(formed(flex), C)
+    pivots = np.empty(M.shape[0], np.int64)
+    regular = factorise_large(M, pivots) if pivots.size > LARGE else factorise(M, pivots)
+    return M, pivots if regular else pivots[:0]
+
+
+@njit(cache=True, error_model="numpy")
+def _inverse(r, accuracy, flex, C, factors, level):
+    """(a K,) the solution of (1 + A C) x = r, and the factors where they were needed."""
+    x = np.empty(r.size)
+    if (
+        r.size > LARGE
+        and factors[1].size == 0
+        and conjugate_residuals(flex, C, r, accuracy, level, x)
+    ):
+        return x, factors
+    if factors[1].size == 0 and r.size <= DENSE:
+        factors = _factors(flex, C)
+    x[:] = r
+    if factors[1].size:
+        back_substitute(factors[0], factors[1], x)
+    else:
+        x[:] = np.nan
+    return x, factors
+
+
+@njit(cache=True, error_model="numpy")
+def _spread(x, r, d, active, C, flex, step):
+    """Fill step (m, K) with x at the active nodes; the others follow from their residual and the
+    active forces.
+    """
+    m, K = r.shape
+    p = np.zeros((m, K))
+    shift = np.zeros((m, K))
+    size = d * K
+    if 0 < active.size < m // d:
+        for y in range(active.size):
+            p[active[y] * d : (active[y] + 1) * d] = np.dot(
+                C[y], x[y * size : (y + 1) * size]
+            ).reshape(d, K)
+        flexed(flex, p, shift)
+    for i in range(m):
+        for k in range(K):
+            step[i, k] = r[i, k] - shift[i, k]
+    for y in range(active.size):
+        step[active[y] * d : (active[y] + 1) * d] = x[y * size : (y + 1) * size].reshape(d, K)
+
+
+@njit(cache=True, error_model="numpy")
+def _moving(J, springs, d, sticks):
+    """Numbers of the nodes whose forces do not follow the springs of full stick, and dp/dw there
+    (nodes, dK, dK).
+    """
+    n = J.shape[0]
+    K = J.shape[2]
+    C = np.empty((n, d * K, d * K))
+    found = np.empty(n, np.int64)
+    count = 0
+    for node in range(n):
+        block = C[count]
+        stiffest = 0.0
+        largest = 0.0
+        for b in range(d):
+            stiffest = max(stiffest, springs[node * d + b])
+            for k in range(K):
+                for e in range(d):
+                    for l in range(K):
+                        value = J[node, 2 - d + b, k, 2 - d + e, l]
+                        if b == e and k == l:
+                            value -= springs[node * d + b]
+                        block[b * K + k, e * K + l] = value
+                        largest = max(largest, abs(value))
+        if largest > sticks * stiffest:
+            found[count] = node
+            count += 1
+    return found[:count], C[:count]
+
+
+@njit(cache=True, error_model="numpy")
+def compiled_newton(w, d, linear, contact, sticks, tolerance, iterations, shortest):
+    """Newton from w (m, K), changed in place to the end.
+
+    Args:
+        d: directions a node, 1 (tangent) or 2 (normal, tangent).
+        linear: the `Condensed` bodies.
+        contact: prescribed loads (n, S) or (n, 0), their coefficients (n, K), nodes (n, 4), tables,
+            brackets (0: sampled), preload (m,).
+
+    Returns:
+        steps taken, how it ended, error at w; of the last evaluation, which is at w if converged:
+        forces (n, 2, K), their derivative, shares (n, 3), residual (m, K), p (m, K).
+    """
+    m, K = w.shape
+    n = m // d
+    work = (
+        np.zeros((n, 2, K)),
+        np.zeros((n, 2, K)),
+        np.zeros((n, 2, K, 2, K)),
+        np.zeros((n, 3)),
+        np.zeros((m, K)),
+        np.zeros((m, K)),
+    )
+    flex = linear.flex
+    springs = linear.springs
+    motions = linear.motions
+    J = work[2]
+    r = work[5]
+    step = np.empty((m, K))
+    after = np.empty((m, K))
+    trial = w.copy()
+    active, C = _moving(J, springs, d, np.inf)
+    few = flex
+    factors = (np.empty((0, 0)), np.empty(0, np.int64))
+    level = no_level()
+    code = SEARCHING
+    steps = -1
+    share = 1.0
+    before = np.inf
+    error = np.inf
+    while code == SEARCHING:
+        fresh = _evaluate(trial, d, linear, contact, work)
+        if steps >= 0 and not fresh <= tolerance:
+            factors = _step(r, ROUGH, d, active, C, flex, few, factors, level, after)
+            if not norm(after) <= (1 - 0.25 * share) * before:
+                share /= 2
+                if share < shortest:
+                    code = STALLED
+                _move(w, share, step, trial)
+                continue
+        error = fresh
+        steps = steps + 1
+        _move(trial, 0.0, step, w)
+        if error <= tolerance or not np.isfinite(error) or steps == iterations:
+            code = (
+                CONVERGED if error <= tolerance else (EXHAUSTED if np.isfinite(error) else INFINITE)
+            )
+            break
+        active, C = _moving(J, springs, d, sticks)
+        few = among(flex, active, d)
+        factors = (factors[0][:0, :0], factors[1][:0])
+        wide = motions.size > 0 and active.size * d * K >= MANY
+        level = second_level(few, C, motions, active, d) if wide else no_level()
+        needed = max(FINEST, min(0.1 * error, COARSEST), min(0.1 * tolerance / error, CLOSE))
+        factors = _step(r, needed, d, active, C, flex, few, factors, level, step)
+        before = norm(step)
+        share = 1.0
+        if not np.isfinite(before):
+            code = SINGULAR
+        _move(w, share, step, trial)
+    return steps, code, error, work[1], J, work[3], r, work[4]
+
+
+@njit(cache=True, error_model="numpy")
+def _step(r, accuracy, d, active, C, flex, few, factors, level, step):
+    """Fill step (m, K) with the inverse derivative times r (m, K); returns the factors where they
+    were needed.
+    """
+    K = r.shape[1]
+    among = np.empty((active.size * d, K))
+    for y in range(active.size):
+        among[y * d : (y + 1) * d] = r[active[y] * d : (active[y] + 1) * d]
+    x, factors = _inverse(among.reshape(among.size), accuracy, few, C, factors, level)
+    _spread(x, r, d, active, C, flex, step)
+    return factors

@@ -1,0 +1,196 @@
+"""Newton steps of large patches without a dense Jacobian: iterations on  x + A (dp/dw) x = r.
+
+The springs of full stick inside A already are the preconditioner, with a second level for what the
+contacts move in common (`coarse`): compiled conjugate residuals mostly arrive in a few directions.
+Where they do not, GMRES does, at last with one complex block a harmonic that is factorised, with
+the part of dp/dw that keeps to its harmonic.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from functools import cached_property, partial
+
+import numpy as np
+from scipy.sparse.linalg import LinearOperator, gmres
+
+from ...friction.fourier import to_complex, to_real
+from ..linear.contact_flexibility import by_harmonic
+from .deflation import no_level, second_level
+from .krylov import conjugate_residuals
+
+__all__ = ["Memory", "iterative_inverse"]
+
+# vectors kept by GMRES
+BASIS = 80
+# of GMRES, each on what the last one left
+PASSES = 6
+# reduction by one pass from which the next one runs in double precision
+POOR = 0.1
+# reduction of the residual by one pass in single precision that can be trusted
+SINGLE = 1e-3
+# products of one solve from which new harmonic blocks pay: they cost about as many
+SLOW = 80
+
+
+@dataclass
+class Memory:
+    """Harmonic blocks of an earlier derivative, which serve the next ones of the same Newton run as
+    well.
+    """
+
+    # the active nodes that the blocks belong to
+    nodes: bytes = b""
+    # (H+1, a, a)
+    blocks: np.ndarray | None = None
+    # the last system took long: blocks are worth their time
+    slow: bool = False
+
+
+# A (H+1, a, a) and change (nodes, dK, dK), in one precision
+Parts = tuple[np.ndarray, np.ndarray]
+
+
+def iterative_inverse(
+    A: np.ndarray,
+    change: np.ndarray,
+    memory: Memory | None = None,
+    motions: np.ndarray | None = None,
+) -> Callable[[np.ndarray, float], np.ndarray]:
+    """The inverse of 1 + A change, applied to residuals (a, K) to a relative accuracy, for a =
+    nodes * d dofs.
+
+    The products of GMRES run in single precision, which halves the traffic; what they leave is
+    measured in double precision and solved for again, since next to a singular derivative the step
+    is far longer than the residual.
+
+    Args:
+        A: (H+1, a, a) flexibility with contact springs [m/N].
+        change: (nodes, dK, dK) derivative of the forces beyond the springs [N/m].
+        memory: of the Newton run; changed in place.
+        motions: (a, q) that the contacts have in common, see `coarse`; none when left out.
+    """
+    return partial(_solve, _System((A, change), memory or Memory(), motions))
+
+
+@dataclass
+class _System:
+    """1 + A change, its preconditioners, and how often GMRES applied it in the present solve."""
+
+    double: Parts
+    memory: Memory
+    motions: np.ndarray | None
+    count: int = 0
+
+    @cached_property
+    def single(self) -> Parts:
+        """The same in single precision."""
+        A, change = self.double
+        return A.astype(np.complex64), change.astype(np.float32)
+
+    @cached_property
+    def level(self) -> tuple[np.ndarray, ...]:
+        """The second level."""
+        A, change = self.double
+        if self.motions is None or self.motions.size == 0:
+            return no_level()
+        d = A.shape[1] // len(change)
+        return second_level(by_harmonic(A), change, self.motions, np.arange(len(change)), d)
+
+    def directions(self, residual: np.ndarray, accuracy: float) -> np.ndarray | None:
+        """The solution by conjugate residuals, or None where they do not find it."""
+        A, change = self.double
+        x = np.empty(residual.size)
+        found = conjugate_residuals(
+            by_harmonic(A), change, residual.ravel(), accuracy, self.level, x
+        )
+        return x.reshape(residual.shape) if found else None
+
+    def product(self, x: np.ndarray, parts: Parts) -> np.ndarray:
+        """The system times x, flat."""
+        self.count += 1
+        A, change = parts
+        forces = change @ x.reshape(len(change), -1, 1).astype(change.dtype)
+        return x + _flex(A, forces.reshape(A.shape[1], -1)).ravel()
+
+    def prepared(self, x: np.ndarray) -> np.ndarray:
+        """The preconditioner times x, flat."""
+        blocks = self.memory.blocks
+        return x if blocks is None else _flex(blocks, x.reshape(blocks.shape[1], -1)).ravel()
+
+    def krylov(self, rest: np.ndarray, target: float, parts: Parts) -> tuple[np.ndarray, int]:
+        """What one pass of GMRES finds, and whether it stopped before the target."""
+        y, failed = _gmres(lambda y: self.product(self.prepared(y), parts), rest, target)
+        return self.prepared(y), failed
+
+    def renew(self) -> None:
+        """New harmonic blocks."""
+        self.memory.blocks, self.memory.slow = _harmonic_blocks(*self.double), False
+
+
+def _solve(system: _System, residual: np.ndarray, accuracy: float) -> np.ndarray:
+    memory = system.memory
+    target = accuracy * float(np.linalg.norm(residual))
+    fresh = system.memory.slow
+    if target == 0.0:
+        return np.zeros_like(residual)
+    found = system.directions(residual, accuracy)
+    if found is not None:
+        return found
+    if fresh:
+        system.renew()
+    system.count, parts = 0, system.single
+    x = np.zeros(residual.size)
+    rest = residual.ravel()
+    for _ in range(PASSES):
+        left = float(np.linalg.norm(rest))
+        part, failed = system.krylov(rest, max(target, SINGLE * left), parts)
+        after = rest - system.product(part, system.double)
+        gain = np.linalg.norm(after) / left
+        if gain < 1:
+            x = x + part
+            rest = after
+        if np.linalg.norm(rest) <= 2 * target:
+            memory.slow = memory.slow or system.count > SLOW
+            return x.reshape(residual.shape)
+        if failed and not fresh:
+            fresh = True
+            system.renew()
+        elif gain > POOR:
+            parts = system.double
+    raise np.linalg.LinAlgError("GMRES did not solve for the Newton step")
+
+
+def _gmres(
+    product: Callable[[np.ndarray], np.ndarray], residual: np.ndarray, target: float
+) -> tuple[np.ndarray, int]:
+    operator = LinearOperator((residual.size, residual.size), matvec=product, dtype=float)
+    # the relative tolerance has two names in the versions of SciPy: left at its default, atol rules
+    # where it is larger
+    return gmres(operator, residual, atol=target, restart=BASIS, maxiter=1)
+
+
+def _harmonic_blocks(A: np.ndarray, change: np.ndarray) -> np.ndarray:
+    """(H+1, a, a) inverses of  1 + A_h D_h  in single precision, D_h what of `change` maps harmonic
+    h to h.
+    """
+    nodes, (count, a) = len(change), A.shape[:2]
+    d = a // nodes
+    split = change.reshape(nodes, d, 2 * count - 1, d, 2 * count - 1)
+    inverse = np.empty(A.shape, dtype=np.complex64)
+    for h in range(count):
+        c, s = (0, 0) if h == 0 else (2 * h - 1, 2 * h)
+        D = (split[:, :, c, :, c] + split[:, :, s, :, s]) / 2
+        if h:
+            D = D + 0.5j * (split[:, :, c, :, s] - split[:, :, s, :, c])
+        product = (
+            (A[h].reshape(a, nodes, d).transpose(1, 0, 2) @ D).transpose(1, 0, 2).reshape(a, a)
+        )
+        inverse[h] = np.linalg.inv((np.eye(a) + product).astype(np.complex64))
+    return inverse
+
+
+def _flex(A: np.ndarray, forces: np.ndarray) -> np.ndarray:
+    """(a, K) real coefficients of A times the forces (a, K)."""
+    return to_real((A @ to_complex(forces).T[:, :, None].astype(A.dtype))[:, :, 0].T)

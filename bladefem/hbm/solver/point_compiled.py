@@ -1,0 +1,340 @@
+"""A whole point of a small model of 1-D elements in one compiled call: flexibilities, Newton, works
+and states.
+
+The plain way through `bladefem.hbm.linear.condensation`, `newton` and `api` does the same in fifty
+NumPy calls, which is most of its time where there are few contacts. A point that does not end well
+is left to the fallback chain; a test holds the two ways together.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+from numba import njit
+
+from ..linear.condensation_compiled import linear_part
+from ..linear.packed_bodies import prepared_bodies
+from ..model import ReducedModel
+from ..predictor import AHEAD, ahead, shifted
+from ..solution import Solution, Work
+from .newton import SHORTEST, Options
+from .newton_compiled import CONVERGED, compiled_newton, norm
+from .residual import STICKS, contact_table
+
+__all__ = ["small", "solve_along", "solve_each", "solve_small"]
+
+STATES = ("stick", "slip", "lift", "open")
+
+
+def solve_small(
+    model: ReducedModel,
+    omega: float,
+    H: int,
+    samples: int,
+    start: np.ndarray | None,
+    options: Options,
+) -> Solution | None:
+    """The converged solution from displacements (n, d, *), else from full stick; None where this
+    way is not open.
+    """
+    for known in ([] if start is None else [(omega, start)], []):
+        found = _solved(model, np.array([omega]), H, samples, known, options)
+        if found or start is None:
+            return found[0] if found else None
+    return None
+
+
+def solve_each(
+    model: ReducedModel, omegas: np.ndarray, H: int, samples: int, options: Options
+) -> list[Solution]:
+    """The first frequencies from full stick, as long as they converge; none where this way is not
+    open.
+    """
+    return _solved(model, omegas, H, samples, [], options)
+
+
+def solve_along(
+    model: ReducedModel,
+    omegas: np.ndarray,
+    H: int,
+    samples: int,
+    last: Sequence[Solution],
+    options: Options,
+) -> list[Solution]:
+    """The first frequencies, each from the curve through the last ones, as long as they converge;
+    see `ahead`.
+
+    None where this way is not open.
+
+    Args:
+        last: solved points before them; full stick where there is none, or where the last one
+            sticks.
+        options: frugal ones end with the first at which all contacts stick.
+    """
+    stuck = not last or last[-1].states["stick"] == len(last[-1].w)
+    known = [(p.omega, p.w) for p in ([] if stuck else last[-AHEAD:])]
+    return _solved(model, omegas, H, samples, known, options, 2 if options.frugal else 1)
+
+
+def _solved(
+    model: ReducedModel,
+    omegas: np.ndarray,
+    H: int,
+    samples: int,
+    known: Sequence[tuple[float, np.ndarray]],
+    options: Options,
+    chained: int = 0,
+) -> list[Solution]:
+    """The first frequencies, as long as they converge; `known` and `chained` as `_points` takes
+    them.
+    """
+    prepared = _prepared(model, H, samples)
+    if prepared is None:
+        return []
+    bodies, springs, contact = prepared
+    (n, d), K = model.springs.shape, 2 * H + 1
+    at = np.zeros(AHEAD)
+    begin = np.zeros((AHEAD, n * d, K))
+    for i, (omega, w) in enumerate(known):
+        kept = min(K, w.shape[2])
+        at[i], begin[i, :, :kept] = omega, w[:, :, :kept].reshape(n * d, kept)
+    try:
+        w, ends, f, probe, counts, measures = _points(
+            omegas,
+            bodies,
+            springs,
+            contact,
+            d,
+            H,
+            begin,
+            at,
+            len(known),
+            chained,
+            options.tolerance,
+            options.iterations,
+        )
+    except (ZeroDivisionError, np.linalg.LinAlgError):
+        # a resonance without damping: the plain way tells which
+        return []
+    parts = zip(
+        omegas.tolist(),
+        w.reshape(len(w), n, d, K),
+        f,
+        probe,
+        ends.tolist(),
+        counts.tolist(),
+        measures.tolist(),
+        strict=False,
+    )
+    return [
+        Solution(
+            omega,
+            H,
+            samples,
+            *fields,
+            True,
+            "residual within tolerance",
+            "newton",
+            int(steps),
+            error,
+            moved,
+            pushed,
+            drift,
+            dict(zip(STATES, states, strict=True)),
+            Work(*works),
+        )
+        for omega, *fields, (steps, error), states, (moved, pushed, drift, *works) in parts
+    ]
+
+
+@njit(cache=True, error_model="numpy")
+def _points(
+    omegas, bodies, springs, contact, d, H, known, at, count, chained, tolerance, iterations
+):
+    """Displacements (p, m, K), steps and error (p, 2), and what `_measure` gives, of the first
+    frequencies.
+
+    They start from the curve through `count` of known (3, m, K) at the frequencies at (3,), which
+    are changed here; from full stick where count is 0. Ends before the first that does not
+    converge. If chained is 0 all have the same start; else the known are those solved last, and
+    none where all contacts stick; 2 ends with such a point.
+    """
+    p = omegas.size
+    m = springs.size
+    K = 2 * H + 1
+    w = np.empty((p, m, K))
+    f = np.empty((p, m // d, d, K))
+    ends = np.empty((p, 2))
+    counts = np.empty((p, 4), np.int64)
+    measures = np.empty((p, 7))
+    probe = np.empty((p, *bodies.straight.shape), np.complex128)
+    done = 0
+    for i in range(p):
+        flexible, linear, free = linear_part(omegas[i], bodies, springs, H)
+        if count:
+            ahead(omegas[i], known, at, count, w[i])
+        else:
+            w[i] = linear.stuck
+        steps, code, error, F, _, shares, residual, _ = compiled_newton(
+            w[i], d, linear, contact, STICKS, tolerance, iterations, SHORTEST
+        )
+        if code != CONVERGED:
+            break
+        done, ends[i, 0], ends[i, 1] = i + 1, steps, error
+        f[i], probe[i], counts[i], measures[i] = _measure(
+            omegas[i], bodies, springs, (flexible, free), w[i], d, F, contact[5], residual, shares
+        )
+        if chained:
+            sticks = counts[i, 0] == m // d
+            count = 0 if sticks else shifted(omegas[i], w[i], known, at, count)
+            if chained == 2 and sticks:
+                break
+    return w[:done], ends[:done], f[:done], probe[:done], counts[:done], measures[:done]
+
+
+def small(model: ReducedModel, H: int) -> bool:
+    """Whether this way is open."""
+    return prepared_bodies(model, H) is not None
+
+
+def _prepared(model: ReducedModel, H: int, samples: int) -> tuple | None:
+    """What a point needs beside its frequency; made once."""
+    bodies = prepared_bodies(model, H)
+    return (
+        None
+        if bodies is None
+        else (bodies, model.springs.ravel(), contact_table(model, H, samples))
+    )
+
+
+@njit(cache=True, error_model="numpy")
+def _measure(omega, bodies, springs, linear, w, d, F, preload, residual, shares):
+    """Forces (n, d, K), probe (H+1, p), numbers of states (4,); residuals, drift and works (7,)."""
+    m, K = w.shape
+    f = np.empty((m // d, d, K))
+    load = np.empty((m, K))
+    out = np.zeros(7)
+    for i in range(m):
+        for k in range(K):
+            f[i // d, i % d, k] = F[i // d, 2 - d + i % d, k]
+            load[i, k] = f[i // d, i % d, k] - (preload[i] if k == 0 else 0.0)
+            out[0] = max(out[0], abs(residual[i, k]))
+            out[1] = max(out[1], springs[i] * abs(residual[i, k]))
+    out[2] = _drift(bodies.B, bodies.g, load)
+    modal, probe = _motion(bodies, linear, load, w, springs)
+    _works(omega, bodies, modal, load, w, d, out[3:])
+    return f, probe, _counts(shares), out
+
+
+@njit(cache=True, error_model="numpy")
+def _motion(bodies, linear, load, w, springs):
+    """Modal amplitudes (H+1, M) and probes (H+1, p) under the excitation and the contact load (m,
+    K).
+    """
+    flexible, free = linear
+    contact = bodies.contact
+    probes = bodies.probe
+    across = bodies.across
+    push = bodies.push
+    straight = bodies.straight
+    mean = bodies.mean_G
+    still = bodies.still
+    m = load.shape[0]
+    H = flexible.shape[0] - 1
+    M = flexible.shape[1]
+    B = bodies.B
+    r = bodies.B.shape[1]
+    modal = np.empty((H + 1, M), np.complex128)
+    probe = np.empty(straight.shape, np.complex128)
+    rigid = np.zeros(still.size)
+    for a in range(r):
+        along = 0.0
+        for i in range(m):
+            gap = w[i, 0] - free[0, i].real
+            for j in range(m):
+                gap += mean[i, j] * load[j, 0]
+            along += B[i, a] * springs[i] * gap
+        for k in range(rigid.size):
+            rigid[k] += bodies.rigid[k, a] * along
+    for h in range(H + 1):
+        s = min(h, contact.shape[0] - 1)
+        for k in range(M):
+            modal[h, k] = push[h, k]
+            for i in range(m):
+                modal[h, k] -= contact[s, i, k].conjugate() * _amplitude(load, i, h)
+            modal[h, k] *= flexible[h, k]
+        for a in range(probe.shape[1]):
+            probe[h, a] = straight[h, a]
+            for k in range(M):
+                probe[h, a] += probes[min(h, probes.shape[0] - 1), a, k] * modal[h, k]
+            for i in range(m):
+                probe[h, a] -= across[min(h, across.shape[0] - 1), a, i] * _amplitude(load, i, h)
+    for a in range(probe.shape[1]):
+        for k in range(rigid.size):
+            probe[0, a] += probes[0, a, still[k]] * rigid[k]
+    return modal, probe
+
+
+@njit(cache=True, error_model="numpy", inline="always")
+def _amplitude(x, i, h):
+    return complex(x[i, 2 * h - 1], -x[i, 2 * h]) if h else complex(x[i, 0], 0.0)
+
+
+@njit(cache=True, error_model="numpy")
+def _works(omega, bodies, modal, load, w, d, out):
+    """out (4,): work of the excitation, lost in the bodies, of the balanced friction forces,
+    dissipated in contacts.
+    """
+    own = bodies.own
+    viscous = bodies.viscous
+    hysteretic = bodies.hysteretic
+    push = bodies.push
+    direct = bodies.direct
+    for h in range(1, modal.shape[0]):
+        s = min(h, own.shape[0] - 1)
+        for k in range(modal.shape[1]):
+            q = modal[h, k]
+            out[0] -= np.pi * h * (push[h, k].conjugate() * q).imag
+            loss = h * omega * viscous[s, k] + hysteretic[s, k]
+            out[1] += np.pi * h * loss * (q.real**2 + q.imag**2)
+        for i in range(load.shape[0]):
+            force = _amplitude(load, i, h)
+            out[0] += np.pi * h * (direct[h, i].conjugate() * force).imag
+            friction = np.pi * h * (force * _amplitude(w, i, h).conjugate()).imag
+            out[2] += friction
+            out[3] += friction if i % d == d - 1 else 0.0
+
+
+@njit(cache=True, error_model="numpy")
+def _drift(B, g, load):
+    """Load on the holding springs over what the contacts could carry, both on the motions without
+    stiffness.
+    """
+    up = 0.0
+    down = 0.0
+    for a in range(B.shape[1]):
+        push = -g[a]
+        most = 0.0
+        for i in range(B.shape[0]):
+            push += B[i, a] * load[i, 0]
+            most += abs(B[i, a]) * norm(load[i : i + 1])
+        up = up + push**2
+        down = down + most**2
+    return np.sqrt(up) / max(np.sqrt(down), 1e-300)
+
+
+@njit(cache=True, error_model="numpy")
+def _counts(shares):
+    """(4,) nodes that stick, slip, lift off, are open, from the shares (n, 3) of stick, slip and
+    separation.
+    """
+    counts = np.zeros(4, np.int64)
+    for stick, slip, apart in shares:
+        if stick + slip <= 1e-12:
+            counts[3] += 1
+        elif apart > 1e-12:
+            counts[2] += 1
+        else:
+            counts[1 if slip > 0.0 else 0] += 1
+    return counts

@@ -1,0 +1,106 @@
+"""Taking a run folder into use: one command at a time, and no results of another scene beside the
+new ones.
+"""
+
+from __future__ import annotations
+
+import fcntl
+import os
+import shutil
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+
+from ..errors import InputError
+from ..scene.tables import Scene
+from ..scene.toml import dump, load_scene
+from .stage_cache import open_folder, write_text
+
+__all__ = ["EARLIER", "locked", "take_folder"]
+
+EARLIER = "earlier"
+RESULTS = (".csv", ".gif", ".html", ".json", ".md", ".nc", ".png", ".svg", ".tex", ".txt", ".vtu")
+
+
+@contextmanager
+def locked(folder: str | Path) -> Iterator[None]:
+    """Keep a run folder for this process; the system gives it back when the process ends, however
+    it ends.
+
+    Raises:
+        InputError: another process holds it, or the folder cannot be written.
+    """
+    path = open_folder(folder) / ".lock"
+    try:
+        file = os.open(path, os.O_RDWR | os.O_CREAT, 0o666)
+    except OSError as error:
+        raise InputError(f"folder {folder}: cannot be locked ({error.strerror or error})") from None
+    try:
+        try:
+            fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
+        except BlockingIOError:
+            raise InputError(
+                f"folder {folder}: another command works in it, expected one at a time; wait for "
+                "it, or "
+                "name another folder with -o"
+            ) from None
+        except OSError:
+            # a file system without locks
+            pass
+        yield
+    finally:
+        os.close(file)
+
+
+def take_folder(folder: str | Path, scene: Scene) -> str:
+    """Write the scene into a run folder; results of another scene are put away into its folder
+    "earlier".
+
+    Stages stay: each knows by its hash whether it belongs to the scene. Folders inside with a scene
+    of their own stay as well.
+
+    Returns:
+        a sentence about what was put away, or "".
+
+    Raises:
+        InputError: the folder cannot be written.
+    """
+    folder = open_folder(folder)
+    file = folder / "scene.toml"
+    said = _put_away(folder) if file.is_file() and not _holds(file, scene) else ""
+    write_text(file, dump(scene))
+    return said
+
+
+def _holds(file: Path, scene: Scene) -> bool:
+    """Whether a file is this very scene; one that an older program wrote may not be readable."""
+    try:
+        return load_scene(file) == scene
+    except InputError:
+        return False
+
+
+def _put_away(folder: Path) -> str:
+    """Move results, with the scene that they belong to."""
+    results = [
+        p
+        for p in folder.iterdir()
+        if p.suffix in RESULTS and not p.name.startswith(".") and p.is_file()
+    ]
+    if not results:
+        return ""
+    earlier = folder / EARLIER
+    try:
+        shutil.rmtree(earlier, ignore_errors=True)
+        earlier.mkdir()
+        for path in [*results, folder / "scene.toml"]:
+            path.rename(earlier / path.name)
+    except OSError as error:
+        raise InputError(
+            f"folder {earlier}: results of another scene cannot be moved there "
+            f"({error.strerror or error})"
+        ) from None
+    return (
+        f"{folder} holds results of another scene: {len(results)} "
+        f"file{'s'[: len(results) > 1]} moved to {earlier}"
+    )

@@ -1,0 +1,1 @@
+"""Scenes: what an engineer decides, as typed tables, read from TOML and validated."""

@@ -1,0 +1,227 @@
+"""One field of a scene: what a user wrote becomes a checked SI value of the field's own type."""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Iterator
+from types import NoneType
+from typing import Any, NamedTuple, get_args, get_origin, get_type_hints
+
+from ..errors import InputError, suggestion
+from .tables import Scene
+from .units import is_plain, parse, readable_units, show
+
+__all__ = [
+    "TABLES",
+    "Field",
+    "convert",
+    "each_field",
+    "field_at",
+    "split_values",
+    "used_tables",
+    "value_at",
+]
+
+_COMMON = ("mesh", "material", "contact", "study", "model")
+_ENGINE = (*_COMMON, "operation", "excitation")
+
+# Which tables each kind of scene reads; the others must not be given.
+TABLES = {
+    "wedge sector": ("aerofoil", "platform", "shank", "disc", "damper", *_ENGINE),
+    "plane blades": ("plane", *_ENGINE),
+    "z mass": ("z_mass", "foundation", *_COMMON),
+    "hertz": ("hertz", *_COMMON),
+    "punch": ("punch", *_COMMON),
+    "imported": ("imported", "damper", *_ENGINE),
+}
+
+
+QUESTION = "did you mean '"
+
+
+class Field(NamedTuple):
+    """A leaf of the scene."""
+
+    # dotted, "aerofoil.twist"
+    name: str
+    # type hint: float, int | None, tuple[float, ...], ...
+    kind: Any
+    # unit, low, high, help, choices
+    meta: dict
+    default: Any
+
+
+def used_tables(kind: str) -> tuple[str, ...]:
+    """Names of the tables that this kind of scene reads."""
+    if kind not in TABLES:
+        raise InputError(
+            f"kind = {kind!r}: expected one of {', '.join(TABLES)}{_near(kind, TABLES)}"
+        )
+    return TABLES[kind]
+
+
+def each_field(table: type = Scene, path: str = "") -> Iterator[Field]:
+    """All leaves of a (nested) dataclass, in the order in which they are written."""
+    hints = get_type_hints(table)
+    for f in dataclasses.fields(table):
+        name = f"{path}.{f.name}" if path else f.name
+        if dataclasses.is_dataclass(hints[f.name]):
+            yield from each_field(hints[f.name], name)
+        else:
+            yield Field(name, hints[f.name], dict(f.metadata), f.default)
+
+
+def field_at(name: str) -> Field:
+    """The leaf of that dotted name, or an error that names the nearest one."""
+    known = {f.name: f for f in each_field()}
+    if name in known:
+        return known[name]
+    last = name.rsplit(".", 1)[-1]
+    same = [k for k in known if k.rsplit(".", 1)[-1] == last]
+    tables = sorted({_head(k) for k in known if "." in k})
+    if name in tables:
+        raise InputError(
+            f"{name}: expected a field of this table, such as "
+            f"{next(k for k in known if k.startswith(name + '.'))}"
+        )
+    if same:
+        raise InputError(f"unknown key '{name}'; did you mean '{same[0]}'?")
+    head = _head(name)
+    if head in tables:
+        inside = [k.rpartition(".")[2] for k in known if _head(k) == head]
+        near = suggestion(last, inside)
+        raise InputError(f"unknown key '{name}'{near.replace(QUESTION, f'{QUESTION}{head}.')}")
+    outside = [*tables, *(k for k in known if not _head(k))]
+    raise InputError(f"unknown key '{name}'{_near(name, known) or suggestion(name, outside)}")
+
+
+def _head(name: str) -> str:
+    return name.rpartition(".")[0]
+
+
+def value_at(scene: Scene, name: str) -> Any:
+    """The value of a dotted field."""
+    value: Any = scene
+    for part in name.split("."):
+        value = getattr(value, part)
+    return value
+
+
+def convert(value: object, field: Field) -> Any:
+    """The SI value of a field from what was written, of the field's own type and within its range.
+
+    ``None`` and "auto" leave an optional field to the program.
+
+    Raises:
+        InputError: wrong type, wrong unit, out of range, not finite, or not one of the choices.
+    """
+    kind = field.kind
+    if NoneType in get_args(kind):
+        if value is None or value == "auto":
+            return None
+        kind = next(k for k in get_args(kind) if k is not NoneType)
+    if get_origin(kind) is tuple:
+        return _tuple(value, get_args(kind), field)
+    return _SCALARS[kind](value, field)
+
+
+def _float(value: object, field: Field) -> float:
+    return _in_range(parse(value, field.meta.get("unit") or "1", field.name), field, value)
+
+
+def _int(value: object, field: Field) -> int:
+    number = parse(value, "1", field.name)
+    if number != int(number):
+        raise InputError(f"{field.name} = {value}: expected a whole number")
+    return _in_range(int(number), field)
+
+
+def _bool(value: object, field: Field) -> bool:
+    words = {"true": True, "yes": True, "on": True, "false": False, "no": False, "off": False}
+    if isinstance(value, str) and value.lower() in words:
+        return words[value.lower()]
+    if not isinstance(value, bool):
+        raise InputError(f"{field.name} = {value!r}: expected true or false")
+    return value
+
+
+def _str(value: object, field: Field) -> str:
+    if not isinstance(value, str):
+        raise InputError(f"{field.name} = {value!r}: expected text")
+    choices = field.meta.get("choices") or ()
+    if choices and value not in choices:
+        raise InputError(
+            f"{field.name} = {value!r}: expected one of {', '.join(choices)}{_near(value, choices)}"
+        )
+    return value
+
+
+_SCALARS = {float: _float, int: _int, bool: _bool, str: _str}
+
+
+def _tuple(value: object, kinds: tuple, field: Field) -> tuple:
+    items = _items(value)
+    length = None if kinds[-1] is Ellipsis else len(kinds)
+    if length is not None and len(items) != length:
+        raise InputError(f"{field.name} = {value}: expected {length} values")
+    if not items:
+        raise InputError(f"{field.name} = {value}: expected at least one value")
+    return tuple(_SCALARS[kinds[0]](item, field) for item in items)
+
+
+def split_values(text: str) -> list[str]:
+    """Single values of a text like "20, 50, 100 N", where the last unit holds for those without
+    one.
+    """
+    items = [item.strip(" '\"") for item in text.strip("[]() ").split(",") if item.strip()]
+    last = items[-1] if items else ""
+    unit = last.lstrip("+-.0123456789eE_ ") if last[:1] in tuple("+-.0123456789") else ""
+    return [f"{item} {unit}" if unit and item[-1] in "0123456789." else item for item in items]
+
+
+def _items(value: object) -> list:
+    if isinstance(value, str):
+        return split_values(value)
+    return list(value) if hasattr(value, "__iter__") else [value]
+
+
+def _in_range(number: Any, field: Field, written: object = "") -> Any:
+    low = field.meta.get("low")
+    high = field.meta.get("high")
+    unit = field.meta.get("unit") or "1"
+    if _between(number, low, high):
+        return number
+    if low is None or high is None:
+        limit = f"at most {show(high, unit)}" if low is None else f"at least {show(low, unit)}"
+    else:
+        limit = f"{show(low, unit)} to {show(high, unit)}"
+    raise InputError(
+        f"{field.name} = {show(number, unit)}: expected {limit}{_forgotten_unit(written, field)}"
+    )
+
+
+def _between(number: float, low: float | None, high: float | None) -> bool:
+    """Within a range, round-off apart: "10 um" is 9.999...e-06."""
+    return (low is None or number >= low - 1e-12 * abs(low)) and (
+        high is None or number <= high + 1e-12 * abs(high)
+    )
+
+
+def _forgotten_unit(written: object, field: Field) -> str:
+    """The tail of a message where a plain number would do in the unit that people use: 65 was meant
+    as 65 deg.
+    """
+    number = str(written).strip()
+    meta = field.meta
+    unit = meta.get("unit") or "1"
+    for name in readable_units(unit) if is_plain(number) else ():
+        if name != unit and _between(
+            parse(f"{number} {name}", unit), meta.get("low"), meta.get("high")
+        ):
+            return f"; did you mean '{number} {name}'?"
+    return ""
+
+
+def _near(word: str, known: Any) -> str:
+    near = suggestion(word, known)
+    return near if "did you mean" in near else ""

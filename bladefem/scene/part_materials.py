@@ -1,0 +1,49 @@
+"""Materials of the named volumes of a user's mesh, from texts such as "disc: E=114 GPa; nu=0.34;
+rho=4430 kg/m^3".
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+from ..errors import InputError, suggestion
+from .fields import convert, field_at
+from .tables import Material, Scene
+
+__all__ = ["part_materials"]
+
+
+def part_materials(scene: Scene) -> dict[str, Material]:
+    """Material of each volume that ``imported.materials`` names; what a text leaves out is as in
+    [material.blade].
+
+    Raises:
+        InputError: not a name and values, an unknown property, one out of range, a volume named
+            twice.
+    """
+    found: dict[str, Material] = {}
+    for text in scene.imported.materials or ():
+        name, colon, values = text.partition(":")
+        name = "_".join(name.lower().split())
+        if not colon or not name or not values.strip() or name in found:
+            raise InputError(
+                f"imported.materials = {text!r}: expected one text for each volume, such as "
+                "'disc: E=114 GPa; nu=0.34; rho=4430 kg/m^3'"
+            )
+        found[name] = replace(
+            scene.material.blade, **dict(_value(item, text) for item in values.split(";"))
+        )
+    return found
+
+
+def _value(item: str, text: str) -> tuple[str, float]:
+    """One property."""
+    name, _, value = (part.strip() for part in item.partition("="))
+    if name not in ("E", "nu", "rho"):
+        raise InputError(
+            f"imported.materials = {text!r}: '{name}' is no property"
+            f"{suggestion(name, ('E', 'nu', 'rho'))}"
+        )
+    return name, convert(
+        value, field_at(f"material.blade.{name}")._replace(name=f"imported.materials, {name}")
+    )

@@ -1,0 +1,332 @@
+"""A scene: everything that an engineer decides, as frozen dataclasses in SI units. Reading TOML is
+in scene_file.py.
+
+Numerical settings that are ``None`` are chosen by error indicators from ``accuracy``.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from math import pi
+
+from geometry.parameters import (
+    Aerofoil,
+    Disc,
+    HertzPair,
+    MeshSize,
+    Plane,
+    Platform,
+    Punch,
+    Shank,
+    Wedge,
+    ZMass,
+)
+from geometry.quantity import quantity
+
+__all__ = [
+    "KINDS",
+    "Contact",
+    "Excitation",
+    "Foundation",
+    "Imported",
+    "Material",
+    "Materials",
+    "Model",
+    "Operation",
+    "Scene",
+    "Seat",
+    "Study",
+]
+
+KINDS = ("wedge sector", "plane blades", "z mass", "hertz", "punch", "imported")
+
+
+@dataclass(frozen=True)
+class Material:
+    """Linear elastic, isotropic. The default is a steel."""
+
+    E: float = quantity(2.1e11, "Pa", 1e6, 1e13, "Young's modulus")
+    nu: float = quantity(0.3, "1", -0.99, 0.499, "Poisson's ratio")
+    rho: float = quantity(7850.0, "kg/m^3", 1.0, 3e4, "density")
+
+
+@dataclass(frozen=True)
+class Materials:
+    """One material a body."""
+
+    blade: Material = field(default_factory=Material)
+    damper: Material = field(default_factory=Material)
+
+
+@dataclass(frozen=True)
+class Seat:
+    """One seat's own values, where the two differ; what is left out is as in [contact]."""
+
+    mu: float | None = quantity(
+        None, "1", 0.0, 2.0, "friction coefficient of this seat; contact.mu when left out"
+    )
+    kt_area: float | None = quantity(
+        None, "N/m^3", 0.0, 1e15, "its tangential stiffness for each unit of area"
+    )
+    kt: float | None = quantity(None, "N/m", 0.0, 1e12, "its whole tangential stiffness")
+    kn_area: float | None = quantity(
+        None, "N/m^3", 0.0, 1e15, "its normal stiffness for each unit of area"
+    )
+    kn: float | None = quantity(None, "N/m", 0.0, 1e12, "its whole normal stiffness")
+
+
+@dataclass(frozen=True)
+class Contact:
+    """Friction, contact stiffness, shape and wear of the seats. Areal stiffnesses spread over the
+    patch; totals win.
+    """
+
+    mu: float = quantity(0.3, "1", 0.0, 2.0, "friction coefficient")
+    kt_area: float | None = quantity(
+        None,
+        "N/m^3",
+        0.0,
+        1e15,
+        "tangential contact stiffness for each unit of area; by Mindlin from the normal "
+        "one, 40 N/mm^3 without either",
+    )
+    kt: float | None = quantity(None, "N/m", 0.0, 1e12, "tangential stiffness of one whole patch")
+    kn_area: float | None = quantity(
+        None,
+        "N/m^3",
+        0.0,
+        1e15,
+        "normal contact stiffness for each unit of area; by Mindlin from the tangential",
+    )
+    kn: float | None = quantity(None, "N/m", 0.0, 1e12, "normal stiffness of one whole patch")
+    stiffness: str = quantity(
+        "given",
+        choices=("given", "map"),
+        help="normal stiffness: as given above, or of each node from the pressure map, its "
+        "static force over the approach of the bodies there (the paper's Eq. 23)",
+    )
+    points: int | None = quantity(
+        None, "1", 1, 5000, "friction elements on each patch; all mesh nodes when left out"
+    )
+    bedded: bool = quantity(
+        True, help="seats have worn until they fit at the operating speed; false: as drawn"
+    )
+    normal: str = quantity(
+        "coupled",
+        choices=("coupled", "prescribed"),
+        help="normal load follows the motion, or stays at its static value",
+    )
+    crown: float | None = quantity(
+        None, "m", 1e-3, 1e4, "radius of crowned seats along the engine axis; flat when left out"
+    )
+    crown_across: float | None = quantity(
+        None, "m", 1e-3, 1e4, "radius of crowned seats along the slope; flat when left out"
+    )
+    edge_radius: float | None = quantity(
+        None, "m", 1e-3, 1e4, "radius of the seats' edges, eased; sharp when left out"
+    )
+    edge_width: float | None = quantity(
+        None, "m", 1e-5, 0.1, "width of the eased strip along the edges"
+    )
+    wear_coefficient: float | None = quantity(
+        None,
+        "m^3/J",
+        0.0,
+        1e-6,
+        "worn volume for each joule of friction work (m^3/J is m^2/N); Archard's "
+        "coefficient over mu",
+    )
+    left: Seat = field(default_factory=Seat)
+    right: Seat = field(default_factory=Seat)
+
+
+@dataclass(frozen=True)
+class Operation:
+    """Where the engine runs."""
+
+    speed: float = quantity(8000 * 2 * pi / 60, "rad/s", 0.0, 1e5, "rotational speed")
+    stiffening: bool = quantity(
+        True, help="centrifugal stress stiffening and spin softening in the modes"
+    )
+    preload: str = quantity(
+        "linear",
+        choices=("linear", "nonlinear"),
+        help="state that the modes vibrate about: first-order, or with large displacements",
+    )
+    damping: float = quantity(
+        0.001, "1", 0.0, 0.5, "modal damping ratio of all modes without friction"
+    )
+
+
+@dataclass(frozen=True)
+class Excitation:
+    """A force pattern of one engine order, turning round the wheel."""
+
+    engine_order: int = quantity(6, "1", 0, 1000, "cycles of the pattern in one revolution")
+    force: float = quantity(1.0, "N", 0.0, 1e6, "amplitude on each blade")
+    at: str = quantity("tip_mid", help="named node set or face that carries the force")
+    direction: tuple[float, float, float] = quantity(
+        (0.0, 1.0, 0.0),
+        "1",
+        help="direction in the blade's own axes (radial, circumferential, axial)",
+    )
+    phase: float = quantity(
+        0.0,
+        "rad",
+        -pi,
+        pi,
+        "inter-blade phase of plane blades; on a wheel it follows from the engine order",
+    )
+    mode: int = quantity(1, "1", 1, 50, "mode whose resonance is studied, 1 = lowest")
+
+
+@dataclass(frozen=True)
+class Study:
+    """What is varied. Loads are the static normal force between damper and one seat."""
+
+    loads: tuple[float, ...] | None = quantity(
+        None, "N", 0.0, 1e8, "normal loads per seat; eight round the optimum when left out"
+    )
+    own_load: bool = quantity(
+        False, help="also the load that the damper's own mass makes at the operating speed"
+    )
+    masses: tuple[float, ...] | None = quantity(
+        None, "kg", 1e-5, 10.0, "damper masses; the scene's own when left out"
+    )
+    band: tuple[float, float] | None = quantity(
+        None, "Hz", 0.0, 1e6, "frequency band; from the free to the stuck resonance when left out"
+    )
+    stability: bool = quantity(
+        False,
+        help="also Floquet multipliers of the points of each curve, where normal loads "
+        "follow the motion",
+    )
+
+
+@dataclass(frozen=True)
+class Model:
+    """Numerical settings. None: chosen by error indicators so that the answer keeps the scene's
+    accuracy.
+    """
+
+    modes: int | None = quantity(None, "1", 1, 500, "modes kept in each nodal diameter")
+    harmonics: int | None = quantity(None, "1", 1, 99, "harmonics of the balance")
+    samples: int | None = quantity(
+        None,
+        "1",
+        0,
+        65536,
+        "time samples a period; 0: changes of contact state are located exactly (plane blades)",
+    )
+    damper: str | None = quantity(None, choices=("mass", "rigid", "elastic"), help="damper model")
+    static: str = quantity(
+        "coupled",
+        choices=("coupled", "uncoupled"),
+        help="the mean displacements take part in the balance, or stay as the static contact "
+        "solution left them",
+    )
+    reduction: str = quantity("rubin", choices=("rubin", "craig-bampton"), help="reduction basis")
+    nodal_diameters: tuple[int, ...] | None = quantity(
+        None,
+        "1",
+        0,
+        1000,
+        "nodal diameters of the mode tables; when left out those "
+        "that the engine order excites ('bladefem modes': all)",
+    )
+
+
+@dataclass(frozen=True)
+class Foundation:
+    """What the Z-shaped mass stands on, how that moves, and what presses and pulls (the paper's Eq.
+    30, Table 1).
+    """
+
+    depth: float = quantity(
+        0.06, "m", 0.002, 1.0, "of the elastic block below, clamped at its bottom"
+    )
+    frequency: float = quantity(100.0, "Hz", 1e-2, 1e5, "of its motion")
+    amplitude: tuple[float, float] = quantity(
+        (0.005, 0.0), "m", 0.0, 0.1, "of its motion along x and y"
+    )
+    phase: float = quantity(pi / 2, "rad", -pi, pi, "of the motion along y against that along x")
+    ratios: tuple[float, ...] = quantity(
+        (0.0, 0.25, 0.5, 2.0),
+        "1",
+        0.0,
+        20.0,
+        "frequencies of the normal load over that of the motion",
+    )
+    pulsation: float = quantity(
+        30.0, "N", 0.0, 1e6, "amplitude of the normal load about study.loads"
+    )
+    skew: tuple[float, float] = quantity(
+        (0.0, 0.0),
+        "1",
+        -1.0,
+        1.0,
+        "growth of the pressure on the top from the centre to the ends, along x and y",
+    )
+    pull: tuple[float, float] = quantity(
+        (0.0, 0.0), "N", -1e5, 1e5, "steady force on the mass along x and y"
+    )
+
+
+@dataclass(frozen=True)
+class Imported:
+    """A user's own mesh (.msh with named groups, and what meshio reads) or STEP file."""
+
+    file: str = quantity("", help="path, relative to the scene file")
+    scale: float = quantity(1.0, "1", 1e-9, 1e9, "factor from the file's length unit to metres")
+    sectors: int = quantity(
+        0, "1", 0, 1000, "number of sectors; 0 for a single body without cyclic faces"
+    )
+    axis: tuple[float, float, float] = quantity(
+        (0.0, 0.0, 1.0), "1", help="engine axis through the origin"
+    )
+    materials: tuple[str, ...] | None = quantity(
+        None,
+        help="materials of named volumes, as texts like 'disc: E=114 GPa; nu=0.34; rho=4430 kg/m^3'",
+    )
+    names: tuple[str, ...] | None = quantity(
+        None,
+        help="names for groups of the file that has others, such as "
+        "'clamp = face_3 + face_4', 'tip = face_1'",
+    )
+
+
+@dataclass(frozen=True)
+class Scene:
+    """All of it. Tables that a kind does not use must not be given."""
+
+    title: str = quantity("untitled", help="shown on pictures and in the report")
+    kind: str = quantity("wedge sector", choices=KINDS, help="which geometry")
+    accuracy: float = quantity(
+        0.02, "1", 1e-6, 0.5, "wanted relative accuracy of the resonance amplitude"
+    )
+    aerofoil: Aerofoil = field(default_factory=Aerofoil)
+    platform: Platform = field(default_factory=Platform)
+    shank: Shank = field(default_factory=Shank)
+    disc: Disc = field(default_factory=Disc)
+    damper: Wedge = field(default_factory=Wedge)
+    plane: Plane = field(default_factory=Plane)
+    z_mass: ZMass = field(default_factory=ZMass)
+    foundation: Foundation = field(default_factory=Foundation)
+    hertz: HertzPair = field(default_factory=HertzPair)
+    punch: Punch = field(default_factory=Punch)
+    imported: Imported = field(default_factory=Imported)
+    mesh: MeshSize = field(default_factory=MeshSize)
+    material: Materials = field(default_factory=Materials)
+    contact: Contact = field(default_factory=Contact)
+    operation: Operation = field(default_factory=Operation)
+    excitation: Excitation = field(default_factory=Excitation)
+    study: Study = field(default_factory=Study)
+    model: Model = field(default_factory=Model)
+
+    def vary(self, *pair: object, **changes: object) -> Scene:
+        """A checked copy with other values, ``vary(aerofoil__twist="25 deg")`` or
+        ``vary("aerofoil.twist", 0.4)``.
+        """
+        from .toml import vary
+
+        return vary(self, *pair, **changes)

@@ -1,0 +1,247 @@
+"""Scenes as TOML: nested tables of numbers (SI) or texts with units, read, varied, listed and
+written back.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+import difflib
+import json
+import tomllib
+from collections.abc import Iterable
+from pathlib import Path
+from typing import Any, NamedTuple, get_type_hints
+
+from ..errors import InputError, suggestion
+from .fields import TABLES, Field, convert, each_field, field_at, used_tables, value_at
+from .tables import Scene
+from .units import exact, show
+from .validate import validate
+
+__all__ = ["Row", "dump", "given_keys", "load_scene", "read_tables", "resolved", "scene_of", "vary"]
+
+
+class Row(NamedTuple):
+    """One line of the resolved table."""
+
+    # dotted
+    name: str
+    # readable, with its unit
+    value: str
+    is_default: bool
+    help: str
+
+
+def load_scene(path: str | Path, overrides: Iterable[str] = ()) -> Scene:
+    """The checked scene of a TOML file.
+
+    Args:
+        path: scene file.
+        overrides: texts like "aerofoil.twist=25 deg", which win over the file.
+
+    Raises:
+        InputError: anything wrong with the file or its content, in one sentence.
+    """
+    return scene_of(read_tables(path, overrides), Path(path).resolve().parent)
+
+
+def read_tables(path: str | Path, overrides: Iterable[str] = ()) -> dict[str, Any]:
+    """The nested tables of a scene file as written, with the overrides put in."""
+    path = Path(path)
+    try:
+        tables = tomllib.loads(path.read_text(encoding="utf-8"))
+    except FileNotFoundError:
+        raise InputError(f"{path}: there is no such scene file{_neighbours(path)}") from None
+    except (OSError, UnicodeDecodeError) as error:
+        raise InputError(f"{path}: cannot be read as a scene file ({error})") from None
+    except tomllib.TOMLDecodeError as error:
+        raise InputError(f"{path}: not valid TOML: {error}") from None
+    for override in overrides:
+        name, value = _split(override)
+        _put(tables, name, value)
+    return tables
+
+
+def scene_of(tables: dict[str, Any], folder: str | Path = ".") -> Scene:
+    """A checked scene from nested tables; relative file names in it start at ``folder``."""
+    scene = _build(Scene, tables, "")
+    unused = [t for t in tables if isinstance(tables[t], dict) and t not in used_tables(scene.kind)]
+    if unused:
+        raise InputError(
+            f"[{unused[0]}]: a scene of kind '{scene.kind}' does not use this table, expected only "
+            f"{', '.join(used_tables(scene.kind))}"
+        )
+    if scene.kind == "imported" and scene.imported.file:
+        file = str((Path(folder) / scene.imported.file).resolve())
+        scene = dataclasses.replace(scene, imported=dataclasses.replace(scene.imported, file=file))
+    validate(scene)
+    return scene
+
+
+def vary(scene: Scene, *pair: Any, **changes: Any) -> Scene:
+    """A checked copy with other values: ``vary(scene, aerofoil__twist="25 deg")`` or
+    ``vary(scene, "aerofoil.twist", "25 deg")``. Numbers are SI.
+
+    Raises:
+        InputError: as in :func:`load_scene`.
+    """
+    if len(pair) % 2:
+        raise InputError(f"vary: expected name and value in turn, got {len(pair)} arguments")
+    named = {name.replace("__", "."): value for name, value in changes.items()}
+    for name, value in [*zip(pair[::2], pair[1::2], strict=True), *named.items()]:
+        scene = _replace(scene, name.split("."), value, name)
+    for name in (*pair[::2], *named):
+        if "." in name and name.split(".")[0] not in used_tables(scene.kind):
+            raise InputError(f"{name}: a scene of kind '{scene.kind}' does not use this table")
+    validate(scene)
+    return scene
+
+
+def given_keys(tables: dict[str, Any], path: str = "") -> set[str]:
+    """Dotted names of what nested tables give."""
+    names: set[str] = set()
+    for key, value in tables.items():
+        name = f"{path}.{key}" if path else key
+        names |= given_keys(value, name) if isinstance(value, dict) else {name}
+    return names
+
+
+def resolved(scene: Scene, given: Iterable[str] | None = None) -> list[Row]:
+    """All values that this kind of scene uses; without ``given``, what differs from the default
+    counts as given.
+    """
+    given = None if given is None else set(given)
+    rows = []
+    for field in _used_fields(scene):
+        value = value_at(scene, field.name)
+        default = value == field.default if given is None else field.name not in given
+        rows.append(Row(field.name, _shown(value, field), default, field.meta.get("help", "")))
+    return rows
+
+
+def dump(scene: Scene) -> str:
+    """TOML text that :func:`load_scene` turns back into the very same scene, defaults written
+    out.
+    """
+    lines = []
+    table = ""
+    for field in _used_fields(scene):
+        value = value_at(scene, field.name)
+        head, _, key = field.name.rpartition(".")
+        if head != table:
+            lines += ["", f"[{head}]"]
+            table = head
+        text = f"# {key} = auto" if value is None else f"{key} = {_toml(value, field)}"
+        lines.append(f"{text:<40s}  # {field.meta['help']}" if field.meta.get("help") else text)
+    return "\n".join(lines) + "\n"
+
+
+def _build(table: type, data: dict[str, Any], path: str) -> Any:
+    hints = get_type_hints(table)
+    leaves = {f.name: f for f in each_field(table, path)}
+    values = {}
+    for key, value in data.items():
+        name = f"{path}.{key}" if path else key
+        if key not in hints:
+            _refuse(name, value)
+        if dataclasses.is_dataclass(hints[key]):
+            if not isinstance(value, dict):
+                raise InputError(f"{name} = {value!r}: expected a table [{name}]")
+            values[key] = _build(hints[key], value, name)
+        elif isinstance(value, dict):
+            raise InputError(f"[{name}]: expected a single value, not a table")
+        else:
+            values[key] = convert(value, leaves[name])
+    return table(**values)
+
+
+def _refuse(name: str, value: object) -> None:
+    """An unknown table is told apart from an unknown key."""
+    if isinstance(value, dict):
+        tables = {f.name.rsplit(".", 1)[0] for f in each_field() if "." in f.name}
+        raise InputError(f"unknown table [{name}]{suggestion(name, {*tables, 'material'})}")
+    field_at(name)
+
+
+def _split(override: str) -> tuple[str, str]:
+    name, equals, value = override.partition("=")
+    if not equals or not name.strip():
+        raise InputError(f"--set {override}: expected key=value, such as aerofoil.twist='25 deg'")
+    return name.strip(), value.strip().strip("'\"")
+
+
+def _put(tables: dict[str, Any], name: str, value: str) -> None:
+    field_at(name)
+    *heads, last = name.split(".")
+    for head in heads:
+        tables = tables.setdefault(head, {})
+        if not isinstance(tables, dict):
+            raise InputError(f"{head} = {tables!r}: expected a table [{head}]")
+    tables[last] = value
+
+
+def _replace(table: Any, path: list[str], value: object, name: str) -> Any:
+    head, *rest = path
+    hints = get_type_hints(type(table))
+    if head not in hints:
+        field_at(name)
+    if rest and dataclasses.is_dataclass(hints[head]):
+        return dataclasses.replace(
+            table, **{head: _replace(getattr(table, head), rest, value, name)}
+        )
+    if (
+        not rest
+        and isinstance(value, hints[head] if isinstance(hints[head], type) else ())
+        and dataclasses.is_dataclass(value)
+    ):
+        return dataclasses.replace(table, **{head: value})
+    return dataclasses.replace(table, **{head: convert(value, field_at(name))})
+
+
+def _used_fields(scene: Scene) -> Iterable[Field]:
+    tables = used_tables(scene.kind)
+    return (f for f in each_field() if "." not in f.name or f.name.split(".")[0] in tables)
+
+
+def _shown(value: Any, field: Field) -> str:
+    if value is None:
+        return "auto"
+    if isinstance(value, tuple):
+        return ", ".join(_shown(v, field) for v in value)
+    if isinstance(value, float):
+        return show(value, field.meta.get("unit") or "1")
+    return str(value).lower() if isinstance(value, bool) else str(value)
+
+
+def _toml(value: Any, field: Field) -> str:
+    if isinstance(value, tuple):
+        return "[" + ", ".join(_toml(v, field) for v in value) + "]"
+    if isinstance(value, bool):
+        return str(value).lower()
+    if isinstance(value, int):
+        return str(value)
+    unit = field.meta.get("unit") or "1"
+    if isinstance(value, float):
+        return repr(float(value)) if unit == "1" else json.dumps(exact(value, unit))
+    return json.dumps(value, ensure_ascii=False)
+
+
+def _neighbours(path: Path) -> str:
+    """The scene of a name like that, in its folder or among the examples beside it; else the scenes
+    that there are.
+    """
+    folders = [folder for folder in (path.parent, path.parent / "scenes") if folder.is_dir()]
+    others = {
+        str(p): p.stem for folder in folders for p in sorted(folder.glob("*.toml")) if _is_scene(p)
+    }
+    near = difflib.get_close_matches(path.stem, others.values(), n=1, cutoff=0.6)
+    best = [name for name, stem in others.items() if stem in near]
+    return suggestion(best[0], best) if best else suggestion("", others) if others else ""
+
+
+def _is_scene(path: Path) -> bool:
+    """A TOML file with a kind of scene in it."""
+    try:
+        return tomllib.loads(path.read_text(encoding="utf-8")).get("kind") in TABLES
+    except (OSError, ValueError):
+        return False

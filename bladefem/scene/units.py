@@ -1,0 +1,213 @@
+"""Units at the border: text with a unit becomes an SI number and back. Nothing inside bladefem
+knows units.
+
+A unit is a product of powers, "N/mm^3", "kg m^2", "rad/s"; everything after one "/" stands below
+the line until the next "/" or the end. Angles are a dimension of their own, so that a frequency in
+Hz and a speed in rad/s cannot be mistaken for each other.
+"""
+
+from __future__ import annotations
+
+import re
+from fractions import Fraction
+from math import isfinite, pi
+from numbers import Real
+
+from ..errors import InputError
+
+__all__ = ["exact", "is_plain", "parse", "readable_units", "show"]
+
+# unit: (factor to SI, exponents of kg, m, s, rad)
+_UNITS = {
+    "m": (1.0, (0, 1, 0, 0)),
+    "mm": (1e-3, (0, 1, 0, 0)),
+    "cm": (1e-2, (0, 1, 0, 0)),
+    "km": (1e3, (0, 1, 0, 0)),
+    "um": (1e-6, (0, 1, 0, 0)),
+    "nm": (1e-9, (0, 1, 0, 0)),
+    "in": (0.0254, (0, 1, 0, 0)),
+    "kg": (1.0, (1, 0, 0, 0)),
+    "g": (1e-3, (1, 0, 0, 0)),
+    "mg": (1e-6, (1, 0, 0, 0)),
+    "t": (1e3, (1, 0, 0, 0)),
+    "s": (1.0, (0, 0, 1, 0)),
+    "ms": (1e-3, (0, 0, 1, 0)),
+    "us": (1e-6, (0, 0, 1, 0)),
+    "min": (60.0, (0, 0, 1, 0)),
+    "h": (3600.0, (0, 0, 1, 0)),
+    "N": (1.0, (1, 1, -2, 0)),
+    "mN": (1e-3, (1, 1, -2, 0)),
+    "kN": (1e3, (1, 1, -2, 0)),
+    "MN": (1e6, (1, 1, -2, 0)),
+    "Pa": (1.0, (1, -1, -2, 0)),
+    "kPa": (1e3, (1, -1, -2, 0)),
+    "MPa": (1e6, (1, -1, -2, 0)),
+    "GPa": (1e9, (1, -1, -2, 0)),
+    "bar": (1e5, (1, -1, -2, 0)),
+    "J": (1.0, (1, 2, -2, 0)),
+    "mJ": (1e-3, (1, 2, -2, 0)),
+    "W": (1.0, (1, 2, -3, 0)),
+    "Hz": (1.0, (0, 0, -1, 0)),
+    "kHz": (1e3, (0, 0, -1, 0)),
+    "rad": (1.0, (0, 0, 0, 1)),
+    "mrad": (1e-3, (0, 0, 0, 1)),
+    "deg": (pi / 180, (0, 0, 0, 1)),
+    "rev": (2 * pi, (0, 0, 0, 1)),
+    "rpm": (2 * pi / 60, (0, 0, -1, 1)),
+    "%": (1e-2, (0, 0, 0, 0)),
+    "1": (1.0, (0, 0, 0, 0)),
+}
+_SPELLINGS = {
+    "µm": "um",
+    "μm": "um",
+    "°": "deg",
+    "degree": "deg",
+    "degrees": "deg",
+    "percent": "%",
+    '"': "in",
+}
+
+# SI unit: what an engineer reads, in the order of falling size.
+_READABLE = {
+    "m": ("m", "mm", "um"),
+    "kg": ("kg", "g", "mg"),
+    "Pa": ("GPa", "MPa", "kPa", "Pa"),
+    "N": ("MN", "kN", "N"),
+    "rad": ("deg",),
+    "rad/s": ("rpm",),
+    "Hz": ("Hz",),
+    "kg/m^3": ("kg/m^3",),
+    "s": ("s", "ms", "us"),
+    "N/m^3": ("N/mm^3",),
+    "N/m": ("N/m",),
+    "J": ("J", "mJ"),
+}
+_NUMBER = re.compile(
+    r"\s*([+-]?(?:\d[\d_]*\.?\d*|\.\d+)(?:[eE][+-]?\d+)?|[+-]?(?:nan|inf(?:inity)?)\b)\s*"
+    r"((?:1/|[^\d\s,.+-]).*?)?\s*",
+    re.IGNORECASE,
+)
+_POWER = re.compile(r"(.+?)\^?(-?\d+)?")
+
+
+def parse(value: object, unit: str = "1", name: str = "value") -> float:
+    """The SI number of "140 mm" or of a plain number, which is SI already.
+
+    Args:
+        value: number, or text of a number and a unit.
+        unit: SI unit that is expected; "" or "1" for a plain number.
+        name: field name for the error message.
+
+    Raises:
+        InputError: no number, an unknown unit, the wrong kind of unit, or not finite.
+    """
+    unit = unit or "1"
+    number, written = _split(value, unit, name)
+    if not isfinite(number):
+        raise InputError(f"{name} = {value}: expected a finite number{_in(unit)}")
+    if not written:
+        return number
+    factor, dimension = _dimension(written, f"{name} = {value}")
+    _, wanted = _dimension(unit, name)
+    if dimension != wanted:
+        raise InputError(
+            f"{name} = {value}: '{written}' is not a unit of this field, expected {_examples(unit)}"
+        )
+    result = number * factor
+    if not isfinite(result):
+        raise InputError(f"{name} = {value}: expected a finite number{_in(unit)}")
+    return result
+
+
+def is_plain(text: str) -> bool:
+    """Whether a text is a number without a unit."""
+    match = _NUMBER.fullmatch(text)
+    return bool(match) and not match[2]
+
+
+def readable_units(unit: str) -> tuple[str, ...]:
+    """Units in which people read a quantity that has this SI unit, the largest first."""
+    return _READABLE.get(unit, (unit,))
+
+
+def show(value: float, unit: str = "1") -> str:
+    """Six digits in the unit that an engineer would write: 0.14 m is "140 mm"."""
+    number, written = _scaled(value, unit or "1")
+    return f"{number:.6g} {written}".rstrip()
+
+
+def exact(value: float, unit: str = "1") -> str:
+    """Like :func:`show`, but with as many digits as bring the very same number back through
+    :func:`parse`.
+    """
+    number, written = _scaled(value, unit or "1")
+    for digits in (6, 12, 15, 16, 17):
+        text = f"{number:.{digits}g} {written}".rstrip()
+        if parse(text, unit) == value:
+            return text
+    return f"{float(value)!r} {'' if unit in ('', '1') else unit}".rstrip()
+
+
+def _split(value: object, unit: str, name: str) -> tuple[float, str]:
+    if isinstance(value, Real) and not isinstance(value, bool):
+        return float(value), ""
+    if not isinstance(value, str):
+        raise InputError(f"{name} = {value!r}: expected a number{_in(unit)}")
+    match = _NUMBER.fullmatch(value)
+    if not match:
+        raise InputError(
+            f"{name} = {value!r}: expected a number with a unit such as {_examples(unit)}"
+        )
+    return float(match[1]), match[2] or ""
+
+
+def _dimension(text: str, where: str) -> tuple[float, tuple[int, ...]]:
+    """Factor to SI and exponents of a product of powers."""
+    # exact: 7.85 g/cm^3 is 7850, not 7849.999...
+    factor = Fraction(1)
+    exponents = [0, 0, 0, 0]
+    for place, part in enumerate(text.replace("**", "^").split("/")):
+        for word in filter(None, re.split(r"[ *·]+", part)):
+            size, dimension, power = _one(word, where)
+            power = power if place == 0 else -power
+            factor *= Fraction(str(size)) ** power
+            exponents = [e + power * d for e, d in zip(exponents, dimension, strict=True)]
+    return float(factor), tuple(exponents)
+
+
+def _one(word: str, where: str) -> tuple[float, tuple[int, ...], int]:
+    word = word.replace("²", "^2").replace("³", "^3")
+    for candidate, power in ((word, 1), *_powers(word)):
+        candidate = _SPELLINGS.get(candidate, candidate)
+        if candidate in _UNITS:
+            return *_UNITS[candidate], power
+    raise InputError(f"{where}: unknown unit '{word}'")
+
+
+def _powers(word: str) -> list[tuple[str, int]]:
+    match = _POWER.fullmatch(word)
+    return [(match[1], int(match[2]))] if match and match[2] else []
+
+
+def _scaled(value: float, unit: str) -> tuple[float, str]:
+    """The number and the readable unit in which its size is at least one."""
+    names = _READABLE.get(unit, (unit,))
+    for name in names:
+        number = value / _dimension(name, unit)[0]
+        if abs(number) >= 1 and value != 0:
+            break
+    if value == 0:
+        number = 0.0
+        name = unit if unit in names else names[-1]
+    return number, "" if name == "1" else name
+
+
+def _in(unit: str) -> str:
+    return "" if unit == "1" else f" in {unit}"
+
+
+def _examples(unit: str) -> str:
+    if unit == "1":
+        return "a plain number or %"
+    known = [*_READABLE.get(unit, ()), unit]
+    return " or ".join(dict.fromkeys(known))

@@ -1,0 +1,103 @@
+"""What is allowed in a scene and yet improbable: a slip of the pen, most often of a unit."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+from .fields import used_tables
+from .part_materials import part_materials
+from .tables import Material, Scene
+from .units import show
+
+__all__ = ["doubts"]
+
+# Young's modulus [Pa]: plastics to diamond
+STIFF = (1e9, 1e12)
+# density [kg/m^3]: foam to osmium
+DENSE = (500.0, 25000.0)
+# [m/s] beyond which no disc holds
+FASTEST = 900.0
+
+
+def doubts(scene: Scene) -> list[str]:
+    """One sentence for each value that is unlikely to be meant."""
+    said = [*_materials(scene), *_mesh(scene)]
+    if "operation" in used_tables(scene.kind):
+        said += [*_speed(scene), *_damping(scene)]
+    return said
+
+
+def _materials(scene: Scene) -> Iterator[str]:
+    named = {"material.blade": scene.material.blade, "material.damper": scene.material.damper}
+    if scene.kind == "imported":
+        named |= {f"imported.materials, {name}": one for name, one in part_materials(scene).items()}
+    for name, material in named.items():
+        yield from _material(name, material)
+
+
+def _material(name: str, material: Material) -> Iterator[str]:
+    if not STIFF[0] <= material.E <= STIFF[1]:
+        yield f"{name}.E = {show(material.E, 'Pa')}: solids for machines have 1 to 1000 GPa"
+    if not DENSE[0] <= material.rho <= DENSE[1]:
+        yield (
+            f"{name}.rho = {show(material.rho, 'kg/m^3')}: solids for machines have 500 to "
+            "25000 kg/m^3"
+        )
+
+
+def _speed(scene: Scene) -> Iterator[str]:
+    if scene.kind != "wedge sector":
+        return
+    rim = scene.disc.rim_radius
+    for name, radius in (("rim", rim), ("tip", rim + scene.shank.height + scene.aerofoil.span)):
+        speed = scene.operation.speed * radius
+        if speed > FASTEST:
+            yield (
+                f"operation.speed = {show(scene.operation.speed, 'rad/s')}: the {name} at "
+                f"{show(radius, 'm')} moves "
+                f"with {speed:.0f} m/s, more than the {FASTEST:.0f} m/s that wheels stand"
+            )
+            return
+
+
+def _damping(scene: Scene) -> Iterator[str]:
+    if scene.operation.damping == 0:
+        yield "operation.damping = 0: enough for modes, responses need more than 0"
+
+
+def _mesh(scene: Scene) -> Iterator[str]:
+    parts = _PARTS.get(scene.kind)
+    if parts is None or scene.mesh.size is None:
+        return
+    size = scene.mesh.size * scene.mesh.scale
+    name, thinnest = min(parts(scene).items(), key=lambda part: part[1])
+    if size > thinnest:
+        yield (
+            f"mesh.size = {show(size, 'm')}: larger than the thinnest part, {name} with "
+            f"{show(thinnest, 'm')}"
+        )
+
+
+def _wedge_sector(scene: Scene) -> dict[str, float]:
+    blade = scene.aerofoil
+    halfway = (blade.thickness_root * blade.chord_root + blade.thickness_tip * blade.chord_tip) / 2
+    return {
+        "the aerofoil halfway up": halfway,
+        "platform.thickness": scene.platform.thickness,
+        "shank.width": scene.shank.width,
+        "disc.width": scene.disc.width,
+    }
+
+
+_PARTS = {
+    "wedge sector": _wedge_sector,
+    "plane blades": lambda scene: {
+        f"plane.{name}": getattr(scene.plane, name)
+        for name in ("thickness", "platform_thickness", "damper_height")
+    },
+    "z mass": lambda scene: {
+        f"z_mass.{name}": getattr(scene.z_mass, name) for name in ("bar", "thickness")
+    },
+    "hertz": lambda scene: {"hertz.half_width": scene.hertz.half_width},
+    "punch": lambda scene: {"punch.half_width": scene.punch.half_width},
+}

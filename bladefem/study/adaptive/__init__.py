@@ -1,0 +1,1 @@
+"""Settings of the balance chosen by error indicators."""

@@ -1,0 +1,99 @@
+"""Which points of a curve are checked: where experience says that it may be wrong, and where a
+cheap look does.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from ...hbm.solution import Solution
+from ...hbm.sweep import size
+from ...hbm.truncation_indicator import overtones
+from .family import Family, member
+from .indicators import richer
+from .settings import Settings
+
+__all__ = ["heights_of", "hidden", "peak_of", "watched"]
+
+# of the peak's height: where a curve is checked on each side beside the peak itself
+SHARES = (0.7, 0.25)
+# points that are checked because left-out harmonics move much there,
+LOUDEST = 3
+# from this share of the accuracy on
+QUIET = 0.1
+
+
+def watched(
+    points: Sequence[Solution], heights: np.ndarray, moved: np.ndarray, accuracy: float
+) -> list[Solution]:
+    """The points that a curve is checked at.
+
+    The peak, one on each flank for each of SHARES of its height, the highest of the others at which
+    contacts begin to slip or to lift, since a short slip needs more samples than a long one, the
+    highest at which more of them do, where the curve has a kink, and the LOUDEST maxima of the
+    motion by harmonics that were left out: internal resonances of higher harmonics keep to no
+    height.
+
+    Args:
+        heights: (points,) what `heights_of` gives.
+        moved: (points,) what `hidden` gives.
+        accuracy: relative, of the peak.
+    """
+    places = [i for i, p in enumerate(points) if p.converged]
+    good = [points[i] for i in places]
+    loud = moved[places]
+    heights = heights[places]
+    top = int(heights.argmax())
+    chosen = [top]
+    for share in SHARES:
+        for side in (range(top), range(top + 1, len(good))):
+            if len(side):
+                chosen.append(min(side, key=lambda i: abs(heights[i] - share * heights[top])))
+    kinds = [(p.states["lift"] + p.states["open"], p.states["slip"]) for p in good]
+    for part in ([(a > 0, b > 0) for a, b in kinds], kinds):
+        begin = {
+            max(i, i + 1, key=part.__getitem__)
+            for i in range(len(good) - 1)
+            if part[i] != part[i + 1]
+        }
+        chosen += sorted(begin - set(chosen), key=heights.__getitem__)[-1:]
+    loud = loud * heights / heights[top]
+    beside = np.concatenate([[0.0], loud, [0.0]])
+    maxima = np.flatnonzero(
+        (loud > QUIET * accuracy) & (loud >= beside[:-2]) & (loud >= beside[2:])
+    )
+    chosen += sorted(maxima, key=lambda i: -loud[i])[:LOUDEST]
+    return [good[i] for i in dict.fromkeys(chosen)]
+
+
+def hidden(family: Family, used: Sequence[Settings], points: Sequence[Solution]) -> np.ndarray:
+    """(points,) motion of the contacts by harmonics that were left out, over the first one; 0 where
+    all of them stick.
+
+    Args:
+        used: settings of each point.
+    """
+    moved = np.zeros(len(points))
+    groups = {}
+    for i, (settings, point) in enumerate(zip(used, points, strict=True)):
+        if point.converged and point.states["stick"] < len(point.w):
+            groups.setdefault((settings, point.harmonics), []).append(i)
+    for (settings, harmonics), found in groups.items():
+        more = richer(family, settings, "harmonics")
+        if more.harmonics > harmonics:
+            model = member(family, replace(more, modes=max(settings.modes, family.modes))).model
+            moved[found] = overtones(model, [points[i] for i in found], more.harmonics)
+    return moved
+
+
+def heights_of(points: Sequence[Solution]) -> np.ndarray:
+    """(points,) what a peak is measured by [m]; 0 at points that were not solved."""
+    return np.array([size(p) if p.converged else 0.0 for p in points])
+
+
+def peak_of(points: Sequence[Solution]) -> Solution:
+    """The highest converged point."""
+    return max((p for p in points if p.converged), key=size)

@@ -1,0 +1,342 @@
+"""Model no more than the scene needs: enrich what the indicators find too wrong until half the
+tolerance is met.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from ...errors import NotSolvedError
+from ...hbm.full_stick import grips
+from ...hbm.linear_resonances import free_resonances, stuck_partners
+from ...hbm.model import ReducedModel
+from ...hbm.solution import Solution
+from ...hbm.solver.newton import Options
+from ...hbm.sweep import size, sweep
+from .check_points import heights_of, hidden, peak_of, watched
+from .family import Family, member
+from .indicators import Indicators, indicate, judge, moved
+from .settings import Settings, enriched
+
+__all__ = [
+    "Checked",
+    "adapted",
+    "checked",
+    "choose",
+    "covered",
+    "default_band",
+    "estimated",
+    "following",
+    "likely",
+    "response_points",
+    "sufficient",
+]
+
+ROUNDS = 12
+# whose indicators, where they are small, outlast a change of the others
+KEPT = ("modes", "damper")
+# accuracy from which, where contacts slip
+LIKELY = (
+    (0.003, {"harmonics": 7, "samples": 256, "points": 16}),
+    (0.03, {"harmonics": 3, "samples": 64, "points": 16}),
+)
+# sweeps of one curve with ever richer settings
+PASSES = 3
+WIDENINGS = 4
+
+
+@dataclass(frozen=True)
+class Checked:
+    """A curve whose settings were checked at some of its points."""
+
+    # with the error estimated at the resonance
+    settings: Settings
+    # sorted by frequency
+    points: list[Solution]
+    # circular frequency of the checked points to the estimated relative error
+    errors: dict[float, float]
+
+
+def choose(
+    family: Family,
+    settings: Settings,
+    point: Solution,
+    accuracy: float,
+    fixed: tuple[str, ...] = (),
+    apart: bool = False,
+) -> tuple[Settings, Solution, Indicators]:
+    """Settings whose estimated error at one point is below half the accuracy, or the best that may
+    be chosen.
+
+    Nothing is refined because something was not solved: where a richer model of the point is not,
+    its respect is left as it is, and the error is unknown (infinite).
+
+    Args:
+        point: solved with `settings`; its frequency is kept.
+        fixed: names that may not be changed here although they are not the user's.
+        apart: the error is wanted by its sources.
+    """
+    known: dict[str, float] = {}
+    if (
+        settings.error is None
+        and point.converged
+        and not grips(member(family, settings).model, point)
+    ):
+        usual = likely(family, settings, accuracy, fixed)
+        further = moved(family, settings, point, usual) if usual != settings else point
+        settings, point = (usual, further) if further.converged else (settings, point)
+    for _ in range(ROUNDS):
+        found = judge(family, settings, point) if not apart else None
+        if found is None or found.total > accuracy / 2:
+            found = indicate(family, settings, point, known)
+        settings = replace(settings, error=found.total)
+        better = (
+            None if found.total <= accuracy / 2 else following(settings, found, accuracy, fixed)
+        )
+        further = None if better is None else _solved(family, settings, point, better, found)
+        if further is None or not further.converged:
+            break
+        known = {
+            name: error
+            for name in KEPT
+            if (error := found.errors[name]) <= accuracy / 20
+            and getattr(better, name) == getattr(settings, name)
+        } | dict.fromkeys(found.unknown, np.inf)
+        point = further
+        settings = better
+    return settings, point, found
+
+
+def likely(
+    family: Family, settings: Settings, accuracy: float, fixed: tuple[str, ...] = ()
+) -> Settings:
+    """Where a search had better begin than at its first settings: with what most points need whose
+    contacts slip.
+    """
+    usual = next((usual for finest, usual in LIKELY if accuracy <= finest), {})
+    most = {"harmonics": min(settings.most, family.harmonics)}
+    raised = {
+        name: max(getattr(settings, name), min(value, most.get(name, value)))
+        for name, value in usual.items()
+        if name in settings.chosen and name not in fixed and getattr(settings, name) is not None
+    }
+    return replace(settings, **raised)
+
+
+def _solved(
+    family: Family, settings: Settings, point: Solution, better: Settings, found: Indicators
+) -> Solution:
+    """The point solved with better settings, from the solution with more harmonics where there is
+    one.
+    """
+    ahead = found.better.get("harmonics")
+    return moved(
+        family, settings, ahead if ahead is not None and ahead.converged else point, better
+    )
+
+
+def following(
+    settings: Settings, found: Indicators, accuracy: float, fixed: tuple[str, ...] = ()
+) -> Settings | None:
+    """Enriched in each open respect that takes more than its share, the worst at least; None when
+    nothing helps.
+    """
+    names = [
+        name
+        for name in settings.chosen
+        if name not in fixed
+        and name not in found.unknown
+        and found.errors.get(name, 0.0) > accuracy / 20
+    ]
+    names.sort(key=lambda name: -found.errors[name])
+    share = accuracy / 2 / max(len(settings.chosen), 1)
+    better = settings
+    for name in names:
+        if name == names[0] or found.errors[name] > share:
+            better = enriched(better, name, found.errors[name] / share) or better
+    return None if better == settings else better
+
+
+def adapted(
+    family: Family,
+    settings: Settings,
+    band: tuple[float, float] | None,
+    mode: int,
+    accuracy: float,
+    fixed: tuple[str, ...] = (),
+) -> Checked:
+    """A swept curve with settings that hold at its peak and on its flanks; swept again where they
+    did not.
+
+    The tolerated error of a point is the accuracy times the height of the peak over the height of
+    the point. Where points were not solved, richer settings are asked for by the peak only, and
+    used only between the nearest of them: each would cost all fallbacks again.
+
+    Args:
+        band: [Hz]; round the resonances when None.
+
+    Raises:
+        NotSolvedError: no point converged.
+    """
+    widen = band is None
+    if settings.chosen:
+        rough = covered(member(family, settings).model, settings, band, mode, 1.0)
+        settings, _, _ = choose(family, settings, peak_of(rough), accuracy, fixed)
+        band = band or (rough[0].frequency, rough[-1].frequency)
+    points: list[Solution] = []
+    for last in [False] * (PASSES - 1) + [True]:
+        model = member(family, settings).model
+        inner = _solvable(points)
+        if inner is None:
+            points = covered(model, settings, band, mode, accuracy, widen)
+        else:
+            points = _replaced(points, response_points(model, settings, inner, accuracy))
+        top = peak_of(points)
+        used = settings
+        errors = {}
+        whole = all(p.converged for p in points)
+        moved = hidden(family, [settings] * len(points), points)
+        for point in watched(points, heights_of(points), moved, accuracy):
+            tolerated = accuracy * size(top) / size(point)
+            if last or not (whole or point is top):
+                found = judge(family, settings, point)
+            else:
+                used, _, found = choose(family, settings, point, tolerated, fixed)
+                used = replace(used, error=settings.error)
+            errors[point.omega] = found.total
+            if used != settings:
+                break
+        if used == settings:
+            return Checked(replace(settings, error=errors[top.omega]), points, errors)
+        settings = used
+    return Checked(replace(settings, error=errors[top.omega]), points, errors)
+
+
+def _solvable(points: Sequence[Solution]) -> tuple[float, float] | None:
+    """Frequencies [Hz] round the peak, a little inside the nearest unsolved points; None where all
+    were solved.
+    """
+    lost = np.array([p.frequency for p in points if not p.converged])
+    if not len(lost):
+        return None
+    top = peak_of(points).frequency
+    low = max((0.9 * f + 0.1 * top for f in lost if f < top), default=points[0].frequency)
+    high = min((0.9 * f + 0.1 * top for f in lost if f > top), default=points[-1].frequency)
+    return low, high
+
+
+def _replaced(old: Sequence[Solution], new: Sequence[Solution]) -> list[Solution]:
+    """Points sorted by frequency, the new ones in place of the old ones in their band."""
+    return sorted(
+        [*new, *(p for p in old if not new[0].omega <= p.omega <= new[-1].omega)],
+        key=lambda p: p.omega,
+    )
+
+
+def sufficient(accuracy: float) -> Options:
+    """When a point is accepted whose model may be wrong by the accuracy anyway."""
+    return Options(tolerance=float(np.clip(1e-3 * accuracy, 1e-10, 1e-6)), frugal=True)
+
+
+def checked(curve: Checked) -> np.ndarray:
+    """(k,) bool: which points were checked themselves."""
+    return np.array([p.omega in curve.errors for p in curve.points])
+
+
+def estimated(curve: Checked) -> np.ndarray:
+    """(k,) estimated relative error of each point: linear in frequency between the checked ones,
+    held beyond them.
+
+    Unknown (infinite) at points that were not solved, and where the nearest checked one tells
+    nothing.
+    """
+    at = np.array(sorted(curve.errors))
+    told = np.array([curve.errors[w] for w in at])
+    omegas = np.array([p.omega for p in curve.points])
+    if not np.isfinite(told).any():
+        return np.full(len(omegas), np.inf)
+    blind = ~np.isfinite(told[abs(omegas[:, None] - at).argmin(axis=1)])
+    between = np.interp(omegas, at[np.isfinite(told)], told[np.isfinite(told)])
+    return np.where(blind | [not p.converged for p in curve.points], np.inf, between)
+
+
+def covered(
+    model: ReducedModel,
+    settings: Settings,
+    band: tuple[float, float] | None,
+    mode: int,
+    accuracy: float,
+    widen: bool = False,
+) -> list[Solution]:
+    """A sweep of a band [Hz], or of one round the resonances; that one is widened until its highest
+    point lies inside.
+
+    Args:
+        widen: a given band may be widened as well.
+
+    Raises:
+        NotSolvedError: no point converged.
+    """
+    (low, high), limits = band or default_band(model, mode), _halfway(model, mode)
+    for _ in range(1 if band and not widen else WIDENINGS):
+        points = response_points(model, settings, (low, high), accuracy)
+        good = [p.omega for p in points if p.converged]
+        top = peak_of(points).omega
+        if good[0] < top < good[-1]:
+            break
+        low, high = (low - (high - low), high) if top == good[0] else (low, high + (high - low))
+        low = max(low, limits[0])
+        high = min(high, limits[1])
+    return points
+
+
+def _halfway(model: ReducedModel, mode: int) -> tuple[float, float]:
+    """Frequencies [Hz] half way to the neighbouring modes: beyond them the flank of another
+    resonance may be higher.
+    """
+    ends = np.sort([free_resonances(model), stuck_partners(model)], axis=0) / (2 * np.pi)
+    low = 0.1 * ends[0, 0] if mode == 1 else (ends[1, mode - 2] + ends[0, mode - 1]) / 2
+    high = 3 * ends[1, -1] if mode == ends.shape[1] else (ends[1, mode - 1] + ends[0, mode]) / 2
+    return min(low, 0.99 * ends[0, mode - 1]), max(high, 1.01 * ends[1, mode - 1])
+
+
+def response_points(
+    model: ReducedModel, settings: Settings, band: tuple[float, float], accuracy: float
+) -> list[Solution]:
+    """A sweep of a band [Hz], sorted by frequency; an accuracy of 1 asks for no more than the place
+    of the peak.
+
+    Raises:
+        NotSolvedError: no point converged.
+    """
+    circular = (2 * np.pi * band[0], 2 * np.pi * band[1])
+    swept = sweep(
+        model,
+        circular,
+        settings.harmonics,
+        settings.samples,
+        peak=min(accuracy / 10, 1e-2),
+        curve=0.2 if accuracy >= 1 else 0.02,
+        options=sufficient(accuracy),
+    )
+    points = sorted(swept, key=lambda s: s.omega)
+    if not any(p.converged for p in points):
+        raise NotSolvedError(
+            f"no point between {band[0]:.5g} and {band[1]:.5g} Hz was solved; "
+            f"the first stopped because: {points[0].reason}"
+        )
+    return points
+
+
+def default_band(model: ReducedModel, mode: int) -> tuple[float, float]:
+    """From a little below to a little above the resonances [Hz] of a mode with free and with
+    sticking contacts.
+    """
+    pair = np.array([free_resonances(model)[mode - 1], stuck_partners(model)[mode - 1]]) / (
+        2 * np.pi
+    )
+    margin = max(0.01 * pair.mean(), 0.15 * np.ptp(pair))
+    return pair.min() - margin, pair.max() + margin

@@ -1,0 +1,195 @@
+"""The models of one load case, from poor to rich: what the choice picks from.
+
+A family turns settings into a model, and knows which contact nodes of the finest model each of its
+elements stands for, so that the displacements of one member start the next. ``family_of`` makes one
+from a rich model alone, by leaving out modes and by joining contact nodes; scenes make theirs in
+``pipeline``.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+from functools import cache, lru_cache
+
+import numpy as np
+
+from ...data import Elements, PortModel, RigidBody
+from ...hbm.model import ReducedModel
+from ...reduction.assemble import recombine
+from ...reduction.truncate import truncated
+from .settings import Settings
+
+__all__ = [
+    "Family",
+    "Member",
+    "carried",
+    "coarsened",
+    "family_of",
+    "joined",
+    "member",
+    "shared_harmonics",
+]
+
+SHARED = (1, 7, 15, 31, 63)
+
+
+@dataclass(frozen=True)
+class Member:
+    """A model, and how its contact points relate to the finest ones."""
+
+    model: ReducedModel
+    # (finest nodes,) number of the element that stands for each node of the finest model
+    groups: np.ndarray
+
+
+@dataclass(frozen=True)
+class Family:
+    """Settings to models."""
+
+    build: Callable[[Settings], Member]
+    # most modes that can be had without a new reduction
+    modes: int
+    # most harmonics that the sides are known for
+    harmonics: int = 99
+    # damper models that can be had
+    dampers: tuple[str, ...] = ()
+
+
+def member(family: Family, settings: Settings) -> Member:
+    """The model of some settings; what does not change the model (samples, errors) is not looked
+    at.
+    """
+    return family.build(replace(settings, error=None, chosen=(), samples=0))
+
+
+def carried(w: np.ndarray, old: Member, new: Member, H: int) -> np.ndarray:
+    """Displacements (n, d, K) of one member as a start (m, d', 2H+1) for another.
+
+    Each new element takes the mean over the finest nodes that it stands for; a normal direction
+    that the old model did not have starts at zero.
+    """
+    fine = w[old.groups]
+    size = np.bincount(new.groups)
+    mean = np.zeros((len(size), *w.shape[1:]))
+    np.add.at(mean, new.groups, fine / size[new.groups][:, None, None])
+    d = new.model.directions
+    kept = min(w.shape[2], 2 * H + 1)
+    result = np.zeros((len(size), d, 2 * H + 1))
+    both = min(d, w.shape[1])
+    result[:, d - both :, :kept] = mean[:, w.shape[1] - both :, :kept]
+    return result
+
+
+def coarsened(model: ReducedModel, groups: np.ndarray) -> ReducedModel:
+    """The model with contact nodes joined into elements that see the mean motion, weighted by
+    stiffness.
+
+    Stiffnesses add up; the normal force is the sum over the pressed nodes, or the gap that the mean
+    must close.
+
+    Args:
+        groups: (n,) number of the element of each node, 0 .. m-1.
+    """
+    m = int(groups.max()) + 1
+    if m == len(groups):
+        return model
+    elements = joined(model.elements, groups)
+    pick = _means(model.elements, groups)
+    dofs = np.kron(pick, np.eye(elements.tangents + (not model.tangential)))
+    damper: RigidBody | tuple[PortModel, ...] | None = model.damper
+    if isinstance(damper, RigidBody):
+        damper = replace(damper, B=dofs @ damper.B)
+    elif damper is not None:
+        damper = tuple(recombine(body, dofs) for body in damper)
+    normal = {
+        h: np.bincount(groups, f.real, m) + 1j * np.bincount(groups, f.imag, m)
+        for h, f in model.normal.items()
+    }
+    return replace(
+        model,
+        sides=tuple(recombine(body, dofs) for body in model.sides),
+        elements=elements,
+        damper=damper,
+        normal=normal,
+    )
+
+
+def joined(e: Elements, groups: np.ndarray) -> Elements:
+    """The elements of ``coarsened``."""
+    m = int(groups.max()) + 1
+    if m == len(groups):
+        return e
+
+    def total(x: np.ndarray) -> np.ndarray:
+        return np.bincount(groups, x, m)
+
+    pressed = total(np.maximum(e.n0, 0.0))
+    limit = total(e.mu * np.maximum(e.n0, 0.0))
+    return replace(
+        e,
+        kt=total(e.kt),
+        kn=total(e.kn),
+        n0=np.where(pressed > 0, pressed, total(e.n0)),
+        mu=np.where(
+            pressed > 0, limit / np.where(pressed > 0, pressed, 1.0), _means(e, groups) @ e.mu
+        ),
+    )
+
+
+def _means(e: Elements, groups: np.ndarray) -> np.ndarray:
+    """(m, n) from the nodes' motion to the elements', weighted by stiffness."""
+    weight = np.where(np.bincount(groups, e.kt)[groups] > 0, e.kt, 1.0)
+    pick = np.zeros((int(groups.max()) + 1, len(groups)))
+    pick[groups, np.arange(len(groups))] = weight / np.bincount(groups, weight)[groups]
+    return pick
+
+
+def family_of(rich: ReducedModel, patches: Sequence[int] | None = None) -> Family:
+    """The family below a rich model: fewer modes, and contact nodes joined in their order on each
+    patch.
+
+    Args:
+        patches: number of contact nodes of each patch, in order; two equal halves when left out.
+    """
+    n = len(rich.elements.kt)
+    sizes = list(patches or (n // 2, n - n // 2))
+
+    @cache
+    def side(h: int, modes: int) -> PortModel:
+        return truncated(rich.sides[h], min(modes, len(rich.sides[h].omega)))
+
+    @lru_cache(maxsize=8)
+    def thinned(modes: int, points: int | None, harmonics: int) -> Member:
+        groups = _runs(sizes, points)
+        few = replace(
+            rich, sides=tuple(side(h, modes) for h in range(min(harmonics + 1, len(rich.sides))))
+        )
+        return Member(coarsened(few, groups), groups)
+
+    def build(settings: Settings) -> Member:
+        return thinned(settings.modes, settings.points, shared_harmonics(settings.harmonics))
+
+    return Family(
+        build,
+        max(len(s.omega) for s in rich.sides),
+        len(rich.sides) - 1 if len(rich.sides) > 1 else 99,
+    )
+
+
+def shared_harmonics(harmonics: int) -> int:
+    """Harmonics of the model that serves several numbers of them: what a model keeps for itself is
+    made once.
+    """
+    return next((most for most in SHARED if harmonics <= most), harmonics)
+
+
+def _runs(sizes: Sequence[int], points: int | None) -> np.ndarray:
+    """Groups of neighbours, as equal as can be, at most `points` on each patch."""
+    groups = []
+    start = 0
+    for size in sizes:
+        count = size if points is None else min(points, size)
+        groups.append(start + np.arange(size) * count // size)
+        start += count
+    return np.concatenate(groups)

@@ -1,0 +1,167 @@
+"""Numerical settings of the balance: the user's where given, else chosen by the indicators."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from math import ceil, inf, log2, sqrt
+
+from ...scene.tables import Scene
+
+__all__ = [
+    "DAMPERS",
+    "DIRECTIONS",
+    "Settings",
+    "enriched",
+    "first_for",
+    "first_settings",
+    "restarted",
+]
+
+# from poor to rich
+DAMPERS = ("mass", "rigid", "elastic")
+# in which a model is enriched
+DIRECTIONS = ("harmonics", "samples", "modes", "points", "damper")
+RICHEST = {"modes": 160, "harmonics": 31, "samples": 4096, "points": 4096}
+# how many times smaller an error has to be for two steps of the first harmonics at once
+STEEP = 40.0
+FIRST = {"modes": 10, "harmonics": 1, "samples": 64, "points": 4, "damper": "rigid"}
+
+
+@dataclass(frozen=True)
+class Settings:
+    """What the balance runs with, and how sure it is."""
+
+    # in each nodal diameter
+    modes: int
+    harmonics: int
+    # a period
+    samples: int
+    # one of DAMPERS
+    damper: str
+    # friction elements on each patch; None: all that there are
+    points: int | None = None
+    # harmonics beyond which the choice does not go
+    most: int = 31
+    # relative, of the resonance amplitude; None before the check, inf: unknown
+    error: float | None = None
+    # names that are chosen here and not by the user
+    chosen: tuple[str, ...] = ()
+
+    @property
+    def method(self) -> str:
+        """How a point is solved, and why so; measured by benchmarks/choice_methods.py."""
+        kind = "balance of harmonics"
+        if self.harmonics == 1:
+            kind = (
+                "equivalent linearisation, which is the balance of one harmonic and whose "
+                "error the next ones tell,"
+            )
+        if self.samples == 0:
+            return (
+                f"method: {kind} by Newton, slip and lift-off located exactly, as the scene "
+                "asks for"
+            )
+        return (
+            f"method: {kind} by Newton with friction sampled, because no other method is faster "
+            "where it is as "
+            "accurate"
+        )
+
+    def sentence(self, nodes: int | None = None) -> str:
+        """The settings in words; ``nodes`` are those that a seat has, where known."""
+        error = (
+            "not estimated" if self.error is None else f"estimated error {100 * self.error:.2g} %"
+        )
+        if self.error == inf:
+            error = "error unknown: richer models were not solved"
+        kind = "chosen: " + ", ".join(self.chosen) if self.chosen else "all given by the scene"
+        points = (
+            "all contact points"
+            if self.points is None
+            else f"up to {self.points} contact points on each seat"
+        )
+        if nodes is not None:
+            some = self.points is not None and self.points < nodes
+            points = (
+                f"{self.points} of {nodes} contact points on each seat"
+                if some
+                else f"all {nodes} contact points of each seat"
+            )
+        return (
+            f"model: {self.modes} modes, {self.harmonics} harmonics, {self.samples} samples, "
+            f"{points}, "
+            f"{self.damper} damper ({error}; {kind})"
+        )
+
+
+def first_for(modes: int, dampers: bool = False) -> Settings:
+    """Where the choice starts for a model without a scene: everything open.
+
+    Args:
+        modes: most that there are.
+        dampers: whether there are several damper models.
+    """
+    names = tuple(name for name in DIRECTIONS if dampers or name != "damper")
+    return Settings(**(FIRST | {"modes": min(FIRST["modes"], modes)}), chosen=names)
+
+
+def first_settings(scene: Scene) -> Settings:
+    """Where the choice starts: the smallest model that the indicators can judge."""
+    given = {name: getattr(scene.model, name) for name in FIRST if name != "points"}
+    guess = FIRST | {"modes": max(FIRST["modes"], scene.excitation.mode + 6)}
+    settings = Settings(
+        **{name: guess[name] if value is None else value for name, value in given.items()},
+        points=FIRST["points"] if scene.contact.points is None else None,
+        chosen=tuple(
+            name
+            for name, value in (given | {"points": scene.contact.points}).items()
+            if value is None
+        ),
+    )
+    return _enough_samples(settings)
+
+
+def enriched(settings: Settings, name: str, need: float = 4.0) -> Settings | None:
+    """The next richer settings in one respect; None where there is none.
+
+    Args:
+        need: how many times smaller the error should become; a step of the harmonics (1, 3, 7, ...)
+            gives a factor of eight or so, a doubling of samples and points four, so that a large
+            need takes several at once.
+    """
+    value = getattr(settings, name)
+    if name == "damper":
+        place = DAMPERS.index(value) + 1
+        return replace(settings, damper=DAMPERS[place]) if place < len(DAMPERS) else None
+    if value is None:
+        return None
+    if name == "harmonics":
+        more = 4 * value + 3 if value < 7 and need > STEEP else 2 * value + 1
+    elif name == "modes":
+        more = 2 * value
+    else:
+        more = value * 2 ** min(
+            max(ceil(log2(sqrt(max(need, 1.0)))), 1), 2 if name == "points" else 3
+        )
+    more = min(more, RICHEST[name], settings.most if name == "harmonics" else more)
+    return _enough_samples(replace(settings, **{name: more})) if more > value else None
+
+
+def restarted(settings: Settings) -> Settings:
+    """Back to the start in what is cheap to choose again; modes and damper model are kept for the
+    next load case.
+    """
+    names = [name for name in ("harmonics", "samples", "points") if name in settings.chosen]
+    return _enough_samples(replace(settings, **{name: FIRST[name] for name in names}, error=None))
+
+
+def _enough_samples(settings: Settings) -> Settings:
+    """At least eight samples in the period of the highest harmonic, where the user left them
+    open.
+    """
+    least = 8 * (settings.harmonics + 1)
+    return (
+        replace(settings, samples=least)
+        if "samples" in settings.chosen and settings.samples < least
+        else settings
+    )

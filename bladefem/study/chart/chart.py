@@ -1,0 +1,293 @@
+"""Speed against accuracy: methods and models of one scene, timed on the same frequencies round its
+resonance.
+
+Every variant solves the same frequencies. Its resonance is the vertex of a parabola in 1 /
+amplitude^2 over frequency^2 through the highest three, so that errors of resonance amplitude and
+frequency do not hang on the grid. The reference climbs a ladder of harmonics and samples as far as
+the time allows; the change of its last rung is its own error, below which no other error means
+anything.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Iterator, Mapping
+from dataclasses import dataclass, replace
+
+import numpy as np
+import pandas as pd
+
+from ...errors import InputError, NotSolvedError
+from ...hbm.model import ReducedModel
+from ...hbm.sweep import size
+from ..adaptive.choice import adapted, covered
+from ..adaptive.family import Family, member
+from ..adaptive.settings import DAMPERS, Settings
+from .cpu_clock import Clock, running
+from .methods import applicable, balance, methods, tangential
+from .rows import Bench, Job, errors, resonance, rows, timed
+
+__all__ = ["Chart", "chart", "check_budget"]
+
+# frequencies, in half widths of the resonance
+WIDTHS = (-6, -3, -1.5, -0.75, -0.3, 0, 0.3, 0.75, 1.5, 3, 6)
+# harmonics and samples of the reference
+LADDER = ((3, 128), (7, 512), (15, 1024), (31, 4096))
+# on each seat where all methods are compared: the flow's time grows with the square of them
+POINTS = 4
+# seconds of compilation worth a remark
+COMPILED = 0.5
+
+
+@dataclass(frozen=True)
+class Chart:
+    """Tables (name, family, time, errors, chosen, ...) and what a reader has to know."""
+
+    # all on the same model
+    methods: pd.DataFrame
+    # all by the full balance
+    models: pd.DataFrame
+    remarks: list[str]
+    # the automatic choice
+    settings: Settings
+    # all with the settings of the automatic choice; time is that of everything
+    meshes: pd.DataFrame | None = None
+
+
+def chart(
+    family: Family,
+    settings: Settings,
+    mode: int,
+    accuracy: float,
+    budget: float = 120.0,
+    band: tuple[float, float] | None = None,
+    poorer: Mapping[str, Family] | None = None,
+) -> Chart:
+    """The chart of one load case.
+
+    Args:
+        settings: where the automatic choice starts; its damper model is the poorest that is looked
+            at but "mass".
+        mode: whose resonance is studied, 1 = lowest.
+        accuracy: wanted of the resonance amplitude.
+        budget: CPU seconds for references and variants, the cheap ones first; what does not fit is
+            left out and named. The automatic choice comes on top, and so does what numba compiles
+            on first use.
+        band: [Hz] where the resonance is sought.
+        poorer: names of other families that are compared with the first one by their richest
+            member.
+
+    Raises:
+        InputError: the budget is no time.
+        NotSolvedError: not even the poorest reference converged.
+    """
+    check_budget(budget)
+    with running() as clock:
+        begun = clock.now()
+        curve = adapted(family, settings, band, mode, accuracy)
+        chosen = curve.settings
+        found = clock.now()
+        remarks = [f"automatic choice: {chosen.sentence()}, found in {found - begun:.2g} s"]
+        omegas = frequencies([(p.omega, size(p)) for p in curve.points if p.converged])
+        course = _Course(family, chosen, omegas, found + budget, clock, remarks)
+        models = list(_models(course, poorer or {}))
+        jobs = [*models, *_methods(course, mode, models[0].bench)]
+        table = pd.DataFrame(rows(jobs, course.end, clock))
+    remarks += [f"{row['name']}: {row['reason']}" for _, row in table.iterrows() if row["reason"]]
+    if clock.compiled > COMPILED:
+        remarks.append(
+            f"{clock.compiled:.2g} s were spent on compilation, once; they are not part of any "
+            "time above"
+        )
+    return Chart(table[len(models) :].reset_index(drop=True), table[: len(models)], remarks, chosen)
+
+
+def check_budget(seconds: float) -> None:
+    """Raises:
+    InputError: not a positive finite time.
+    """
+    if not 0 < seconds < np.inf:
+        raise InputError(f"budget = {seconds:g} s: expected a positive, finite number of seconds")
+
+
+@dataclass(frozen=True)
+class _Course:
+    """What models and methods share."""
+
+    family: Family
+    chosen: Settings
+    # (k,) [rad/s]
+    omegas: np.ndarray
+    # of the time, by the clock [s]
+    end: float
+    clock: Clock
+    remarks: list[str]
+
+    @property
+    def richest(self) -> Settings:
+        """Everything that was reduced."""
+        dampers = self.family.dampers
+        return replace(
+            self.chosen,
+            modes=self.family.modes,
+            points=None,
+            damper=dampers[-1] if dampers else "rigid",
+        )
+
+
+def frequencies(curve: Iterable[tuple[float, float]]) -> np.ndarray:
+    """(k,) circular frequencies on both sides of the highest point of (omega, height), spaced by
+    its half width.
+    """
+    omega, height = np.array(sorted(curve)).T
+    top = int(height.argmax())
+    high = omega[height > height[top] / np.sqrt(2)]
+    half = max((high[-1] - high[0]) / 2, 1e-4 * omega[top])
+    return np.array([w for w in omega[top] + half * np.array(WIDTHS) if w > 0])
+
+
+def _bench(
+    course: _Course, model: Callable[[int], ReducedModel], omegas: np.ndarray, name: str
+) -> Bench:
+    """Climb the ladder past the chosen harmonics, and on while the next rung fits into a quarter of
+    the time.
+    """
+    clock = course.clock
+    start = course.clock.now()
+    budget = (course.end - start) / 4
+    used = 0.0
+    best = None
+    before = None
+    least = 2 + next(
+        (k for k, (H, _) in enumerate(LADDER) if H >= course.chosen.harmonics), len(LADDER)
+    )
+    for rung, (H, samples) in enumerate(LADDER):
+        if rung >= least and used * 6 > budget - (clock.now() - start):
+            break
+        begun = clock.now()
+        points = timed(
+            model(H), balance(H, samples), omegas, (np.inf if rung < least else budget,) * 2, clock
+        ).points
+        used = clock.now() - begun
+        if len(points) < len(omegas) or not all(p.converged for p in points):
+            break
+        before = best
+        best = (rung, resonance(omegas, np.array([p.first for p in points])))
+    if best is None:
+        raise NotSolvedError(f"the reference of the {name} did not converge: {points[-1].reason}")
+    rung, truth = best
+    doubt = (
+        errors(before[1], truth)
+        if before
+        else {f"error{end}": np.nan for end in ("", "_frequency", "_phasor")}
+    )
+    course.remarks.append(
+        f"reference of the {name}: H {LADDER[rung][0]}, {LADDER[rung][1]} samples, resonance "
+        f"{truth.frequency:.6g} Hz, {truth.amplitude:.6g} m, changed by {doubt['error']:.1e} on "
+        "its last rung"
+    )
+    return Bench(omegas, truth, doubt)
+
+
+def _methods(course: _Course, mode: int, shared: Bench) -> Iterator[Job]:
+    """All methods that apply, on one model."""
+    chosen, (model, bench, reason) = course.chosen, _simplified(course, mode, shared)
+    for m in methods(not reason):
+        yield Job(m.name, m.family, model, m.run, bench, ordered=True)
+    yield Job(
+        f"automatic: H {chosen.harmonics}, {chosen.samples} samples",
+        "automatic choice",
+        model,
+        balance(chosen.harmonics, chosen.samples),
+        bench,
+        needed=True,
+        chosen=True,
+    )
+
+
+def _simplified(course: _Course, mode: int, shared: Bench) -> tuple[ReducedModel, Bench, str]:
+    """A tangential model that all methods take, with its reference; the richest and why where there
+    is none such.
+    """
+    family = course.family
+    most = replace(course.richest, harmonics=LADDER[-1][0])
+    few = replace(most, points=POINTS)
+    model = member(family, replace(few, damper="mass") if "mass" in family.dampers else few).model
+    reason = applicable(model) if model.directions != 1 else applicable(tangential(model))
+    if reason:
+        course.remarks.append(
+            "paper's iteration, exact events, direct integration and shooting do not apply: "
+            + reason
+        )
+        return member(family, most).model, shared, reason
+    model = tangential(model)
+    omegas = course.omegas
+    if family.dampers:
+        course.remarks.append(
+            "methods are compared on the scene's tangential model: prescribed normal load, "
+            "damper a "
+            f"mass, up to {POINTS} contact points on each seat; what that model itself costs in "
+            "accuracy stands among the models"
+        )
+        omegas = _own_frequencies(model, omegas, mode)
+    return model, _bench(course, lambda H: model, omegas, "methods"), ""
+
+
+def _models(course: _Course, poorer: Mapping[str, Family]) -> Iterator[Job]:
+    """All models by the full balance, one choice poorer at a time."""
+    family = course.family
+    chosen = course.chosen
+    richest = course.richest
+    bench = _bench(
+        course,
+        lambda H: member(family, replace(richest, harmonics=H)).model,
+        course.omegas,
+        "models",
+    )
+    rich = replace(richest, harmonics=max(chosen.harmonics, 3), samples=max(chosen.samples, 256))
+    for whose, name, kind, s in [
+        *((family, *variant) for variant in _variants(family, rich)),
+        *((other, name, "nodal diameters", rich) for name, other in poorer.items()),
+    ]:
+        yield Job(
+            name,
+            kind,
+            member(whose, s).model,
+            balance(s.harmonics, s.samples),
+            bench,
+            needed=kind == "rich model",
+        )
+    yield Job(
+        "automatic",
+        "automatic choice",
+        member(family, chosen).model,
+        balance(chosen.harmonics, chosen.samples),
+        bench,
+        needed=True,
+        chosen=True,
+    )
+
+
+def _variants(family: Family, rich: Settings) -> Iterator[tuple[str, str, Settings]]:
+    """One choice poorer at a time."""
+    yield "all of it", "rich model", rich
+    for modes in (1, 2, 3, 5, 10, 20, 40, 80):
+        if modes < family.modes:
+            yield _counted(modes, "mode"), "modes", replace(rich, modes=modes)
+    nodes = len(member(family, rich).groups) // 2
+    for points in (1, 2, 4, 8, 16, 32, 64):
+        if points < nodes:
+            yield _counted(points, "point"), "contact points", replace(rich, points=points)
+    for damper in DAMPERS:
+        if damper in family.dampers and damper != rich.damper:
+            yield f"{damper} damper", "damper model", replace(rich, damper=damper)
+
+
+def _counted(count: int, what: str) -> str:
+    return f"{count} {what}" + ("" if count == 1 else "s")
+
+
+def _own_frequencies(model: ReducedModel, omegas: np.ndarray, mode: int) -> np.ndarray:
+    """Frequencies round the resonance of the tangential model, which may lie elsewhere."""
+    swept = covered(model, Settings(1, 3, 128, "mass"), None, mode, 0.05)
+    good = [(p.omega, size(p)) for p in swept if p.converged]
+    return frequencies(good) if good else omegas

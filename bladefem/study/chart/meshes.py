@@ -1,0 +1,266 @@
+"""The mesh's share in speed against accuracy: one resonance on several meshes, drawn, reduced and
+solved anew.
+"""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, replace
+from functools import partial
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pandas as pd
+
+from geometry.mesh import Mesh
+from geometry.parameters import MeshSize
+from geometry.sizing import ALONG
+
+from ...contact.seating import solve as seat
+from ...errors import InputError, NotSolvedError
+from ...hbm.sweep import size as height
+from ...io.stage_cache import on_root
+from ...scene.tables import Scene
+from ..adaptive.check_points import peak_of
+from ..adaptive.choice import covered
+from ..adaptive.family import member
+from ..adaptive.settings import Settings
+from ..pipeline.pipeline import EXACT_HARMONICS, Seating, family_of_case, load_cases
+from ..pipeline.stages import (
+    Bodies,
+    build_mesh,
+    contact_patches,
+    harmonic_diameters,
+    reduce_sector,
+    seat_damper,
+)
+from .cpu_clock import running
+
+__all__ = ["MeshVariant", "Resonance", "mesh_table", "mesh_variants", "on_mesh"]
+
+# of the scene's own element sizes, when none are given
+RATIOS = (1.7, 1.3, 1.0)
+# at the most: what more of them change does not hang on the mesh
+HARMONICS = 3
+# accuracy at which the sweep looks for the peak: it is found to a tenth of it
+PEAK = 0.01
+
+
+@dataclass(frozen=True)
+class Resonance:
+    """What one mesh tells."""
+
+    # [Hz]
+    frequency: float
+    # [m]
+    amplitude: float
+    # of blade and damper
+    dofs: int
+    # of CPU: drawing, seating, reduction and response
+    seconds: float
+
+
+@dataclass(frozen=True)
+class MeshVariant:
+    """Element sizes everywhere, those on the seats included."""
+
+    name: str
+    mesh: MeshSize
+    order: int
+    # about how many, over those of another variant
+    cells: float
+    # the mesh of the scene
+    own: bool
+
+    def of(self, scene: Scene) -> Scene:
+        """The scene with this mesh."""
+        return replace(scene, mesh=self.mesh)
+
+
+def mesh_variants(scene: Scene, sizes: Sequence[float], drawn: Mesh) -> list[MeshVariant]:
+    """Meshes of first and then of second order, from coarse to fine; seats are refined as
+    everything else is.
+
+    Args:
+        sizes: element sizes [m]; where the scene leaves its own open the seats of the finest are as
+            fine as they would be by default. When empty the scene's own sizes are scaled, and last
+            its seats alone are halved.
+        drawn: the mesh of the scene.
+
+    Raises:
+        InputError: a scene whose mesh is given.
+    """
+    if scene.kind == "imported" and Path(scene.imported.file).suffix.lower() not in (
+        ".step",
+        ".stp",
+    ):
+        raise InputError("kind 'imported': its mesh is given, expected a scene that is meshed here")
+    power = drawn.dimension
+    own = scene.mesh
+    base = own.size or min(sizes, default=None)
+    listed = [
+        (f"{1e3 * size:.3g} mm", size / base, replace(own, size=base))
+        for size in sorted(sizes, reverse=True)
+    ]
+    if not sizes:
+        listed = [
+            (f"{1e3 * base * ratio:.3g} mm" if base else f"own size x {ratio:g}", ratio, own)
+            for ratio in RATIOS
+        ]
+    made = [
+        MeshVariant(
+            name,
+            replace(mesh, order=order, scale=own.scale * ratio),
+            order,
+            ratio**-power,
+            ratio == 1.0 and (mesh, order) == (own, own.order),
+        )
+        for order in (1, 2)
+        for name, ratio, mesh in listed
+    ]
+    if not sizes:
+        if own.seat_elements:
+            along = own.contact_size or scene.damper.length / ALONG
+            halved = replace(
+                own, order=2, seat_elements=2 * own.seat_elements, contact_size=along / 2
+            )
+        else:
+            halved = replace(own, order=2, contact_size=_seat_size(drawn) / (2 * own.scale))
+        made.append(MeshVariant("own size, seats halved", halved, 2, 2.0 ** (power - 1), False))
+    return made
+
+
+def _seat_size(mesh: Mesh) -> float:
+    """Usual length of an edge on the seats [m]."""
+    facets = np.concatenate([mesh.faces[name] for name in ("seat_left", "seat_right")])
+    return float(
+        np.median(np.linalg.norm(mesh.points[facets[:, 1]] - mesh.points[facets[:, 0]], axis=1))
+    )
+
+
+def on_mesh(scene: Scene, settings: Settings, load: float, comm: Any = None) -> Resonance:
+    """The resonance under one load on the scene's own mesh, with given settings of the balance.
+
+    Raises:
+        InputError: the scene cannot be meshed; NotSolvedError: no point was solved.
+    """
+    with running() as clock:
+        start = clock.now()
+        found = _resonance(scene, settings, load, comm)
+        return replace(found, seconds=clock.now() - start)
+
+
+def _resonance(scene: Scene, settings: Settings, load: float, comm: Any) -> Resonance:
+    """On one mesh, its time left open."""
+    mesh = build_mesh(scene, comm)
+    bodies = Bodies(scene, mesh, comm)
+    patches = contact_patches(mesh)
+    problem = seat_damper(bodies, patches)
+    maps = seat(problem, scene.operation.speed, normal=load, bedded=scene.contact.bedded)
+    case = load_cases(scene, mesh, Seating(problem, {load: maps}))[0]
+    diameters = harmonic_diameters(scene, mesh, EXACT_HARMONICS)
+    reduced = reduce_sector(bodies, patches, diameters, settings.modes)
+    model = member(family_of_case(scene, mesh, reduced, patches, case), settings).model
+    points = covered(model, settings, scene.study.band, scene.excitation.mode, PEAK)
+    top = peak_of(points)
+    return Resonance(top.frequency, height(top), mesh.dimension * len(mesh.points), np.nan)
+
+
+def mesh_table(
+    scene: Scene,
+    settings: Settings,
+    load: float,
+    variants: Sequence[MeshVariant],
+    budget: float,
+    remarks: list[str],
+    comm: Any = None,
+) -> pd.DataFrame:
+    """One row a mesh: name, family, CPU time [s], dofs, errors against the richest one.
+
+    The richest is the last of second order that was solved; its own error is its change from the
+    one before.
+
+    Args:
+        settings: of the balance; HARMONICS at the most are used, and all contact points.
+        budget: CPU seconds; meshes that are expected to take more than what is left are named and
+            left out.
+        remarks: what a reader has to know is added here.
+    """
+    few = replace(settings, harmonics=min(settings.harmonics, HARMONICS), points=None)
+    rows = list(_rows(scene, few, load, variants, budget, comm))
+    rich = [row for row in rows if row["found"] is not None and row["order"] == 2]
+    if not rich:
+        remarks += [f"mesh {row['name']}: {row['reason']}" for row in rows]
+        return pd.DataFrame()
+    truth = rich[-1]["found"]
+    before = rich[-2]["found"] if len(rich) > 1 else None
+    doubt = abs(before.amplitude / truth.amplitude - 1) if before else np.nan
+    remarks.append(
+        f"reference of the meshes: {rich[-1]['name']} of second order, resonance "
+        f"{truth.frequency:.6g} Hz, "
+        f"{truth.amplitude:.6g} m, changed by {doubt:.1e} from the mesh before, its frequency by "
+        f"{abs(before.frequency / truth.frequency - 1) if before else np.nan:.1e}"
+    )
+    remarks += [f"mesh {row['name']}: {row['reason']}" for row in rows if row["reason"]]
+    return pd.DataFrame([_told(row, truth, doubt) for row in rows])
+
+
+def _rows(
+    scene: Scene,
+    settings: Settings,
+    load: float,
+    variants: Sequence[MeshVariant],
+    budget: float,
+    comm: Any,
+) -> Iterator[dict[str, Any]]:
+    end = time.process_time() + budget
+    last = None
+    for variant in variants:
+        last = last if last and last[0].order == variant.order else None
+        row = {
+            "name": variant.name,
+            "order": variant.order,
+            "found": None,
+            "reason": "",
+            "chosen": variant.own,
+        }
+        expected = 0.0 if last is None else last[1] * variant.cells / last[0].cells
+        left, expected = on_root(comm, partial(_left_and, end, expected))
+        if expected > left:
+            row["reason"] = f"left out: {expected:.2g} s expected, {max(left, 0.0):.2g} s left"
+        else:
+            row |= _tried(variant.of(scene), settings, load, comm)
+        if row["found"] is not None:
+            last = variant, row["found"].seconds
+        yield row
+
+
+def _left_and(end: float, expected: float) -> tuple[float, float]:
+    """Seconds that are left and that are expected, for all ranks to decide by."""
+    return end - time.process_time(), expected
+
+
+def _tried(scene: Scene, settings: Settings, load: float, comm: Any) -> dict[str, Any]:
+    try:
+        return {"found": on_mesh(scene, settings, load, comm)}
+    except NotSolvedError as error:
+        return {"reason": str(error)}
+
+
+def _told(row: dict[str, Any], truth: Resonance, doubt: float) -> dict[str, object]:
+    found = row["found"]
+    return {
+        "name": row["name"],
+        "family": f"order {row['order']}",
+        "time": np.nan if found is None else found.seconds,
+        "dofs": 0 if found is None else found.dofs,
+        "chosen": row["chosen"],
+        "left_out": row["reason"].startswith("left out"),
+        "error": np.nan if found is None else abs(found.amplitude / truth.amplitude - 1),
+        "error_frequency": np.nan if found is None else abs(found.frequency / truth.frequency - 1),
+        "converged": found is not None,
+        "reference_error": doubt,
+        "reason": row["reason"],
+    }

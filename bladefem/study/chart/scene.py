@@ -1,0 +1,107 @@
+"""Charts of a whole scene and of the built-in reference blade: from geometry to
+:func:`bladefem.study.chart.chart.chart`.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+from ...hbm.reference_blade import reference_model
+from ...io.stage_cache import on_root, stage
+from ...reduction.assemble import folded_diameter
+from ...scene.tables import Scene
+from ..adaptive.family import Family, family_of
+from ..adaptive.settings import first_for, restarted
+from ..pipeline.pipeline import family_of_case, load_cases, reduced_sector, run
+from ..pipeline.stages import Bodies, Reduced
+from .chart import Chart, chart, check_budget
+from .meshes import mesh_table, mesh_variants
+
+__all__ = ["reference_chart", "scene_chart"]
+
+REFERENCE_LOAD = 3.0
+REFERENCE_BAND = (1150.0, 1600.0)
+REFERENCE_POINTS = 4
+
+
+def scene_chart(
+    scene: Scene,
+    folder: str | Path,
+    budget: float = 120.0,
+    comm: Any = None,
+    sizes: Sequence[float] | None = None,
+) -> Chart:
+    """The chart of a scene under the middle one of its loads; finished stages are picked up from
+    the folder.
+
+    Args:
+        budget: CPU seconds for the chart, and as much again for the meshes; contact, reduction and
+            the automatic choice come on top.
+        sizes: element sizes of a comparison of meshes [m], chosen when empty; none when left out.
+    """
+    check_budget(budget)
+    done = run(scene, folder, until="contact", comm=comm)
+    variants = [] if sizes is None else mesh_variants(scene, sizes, done.mesh)
+    bodies = Bodies(scene, done.mesh, comm)
+    patches = list(done.contact.problem.patches)
+    cases = load_cases(scene, done.mesh, done.contact)
+    case = cases[len(cases) // 2]
+    settings, reduced = reduced_sector(
+        scene,
+        bodies,
+        case,
+        patches,
+        lambda name, key, make: stage(folder, name, key, make, comm)[0],
+    )
+
+    def family(known: Reduced) -> Family:
+        return family_of_case(scene, done.mesh, known, patches, case)
+
+    made = on_root(
+        comm,
+        lambda: chart(
+            family(reduced),
+            restarted(settings),
+            scene.excitation.mode,
+            scene.accuracy,
+            budget,
+            scene.study.band,
+            {
+                name: family(fewer)
+                for name, fewer in _fewer_diameters(reduced, scene.excitation.engine_order)
+            },
+        ),
+    )
+    made.remarks.insert(0, f"normal load {case.load:g} N on each seat")
+    if sizes is None:
+        return made
+    return replace(
+        made,
+        meshes=mesh_table(scene, made.settings, case.load, variants, budget, made.remarks, comm),
+    )
+
+
+def _fewer_diameters(reduced: Reduced, order: int) -> Iterator[tuple[str, Reduced]]:
+    """The sector with the nodal diameters of the first harmonics only; the others borrow the
+    nearest of them.
+    """
+    if reduced.sectors:
+        met = dict.fromkeys(
+            folded_diameter(h, order, reduced.sectors)[0]
+            for h in (1, 0, *range(2, reduced.sectors))
+        )
+        known = [n for n in met if n in reduced.sector]
+        for count in range(1, len(known)):
+            name = f"{count} of {len(known)} diameters"
+            yield name, replace(reduced, sector={n: reduced.sector[n] for n in known[:count]})
+
+
+def reference_chart(accuracy: float = 0.02, budget: float = 120.0) -> Chart:
+    """The chart of mode 2 of the reference blade: 60 g damper, 1e6 N/m and 3 N friction limit a
+    side, in phase.
+    """
+    family = family_of(reference_model(load=REFERENCE_LOAD, points=REFERENCE_POINTS, harmonics=63))
+    return chart(family, first_for(family.modes), 2, accuracy, budget, REFERENCE_BAND)

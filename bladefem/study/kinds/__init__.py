@@ -1,0 +1,1 @@
+"""The stages of the verification kinds: Hertz, punch, Z-mass."""

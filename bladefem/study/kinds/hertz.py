@@ -1,0 +1,159 @@
+"""A sphere or a cylinder pressed on a block, from its scene, and Hertz' closed form beside it.
+
+Johnson, Contact Mechanics (1985), Sect. 4.2; P is the whole force, in the plane that on a metre of
+cylinder, and a the radius or half width of the contact (contact/hertz.py):
+
+    sphere:     p = p0 sqrt(1 - (r/a)^2),   p0 = 3 P / (2 pi a^2)
+    cylinder:   p = p0 sqrt(1 - (x/a)^2),   p0 = 2 P / (pi a)
+
+The two blocks are held at their far faces; they are no half spaces, which moves their approach but
+hardly the pressure.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from geometry.contact_pairs import WIDER
+from geometry.mesh import Mesh
+
+from ...contact.complementarity import solve_lcp
+from ...contact.hertz import FINEST, contact_modulus, line_width, point_radius
+from ...contact.patch import initial_gap, make_patch, normal_ports, port_matrix
+from ...data import PressureMap
+from ...errors import InputError, NotSolvedError
+from ...scene.tables import Scene
+from ...scene.units import show
+from ..pipeline.stages import build_mesh
+from .punch import flexibility
+
+__all__ = [
+    "Pressed",
+    "hertz_load",
+    "hertz_pressure",
+    "hertz_radius",
+    "press_pair",
+    "second_moment_radius",
+]
+
+# contact radius over the expected one, at most
+WIDEST = 0.9 * WIDER
+
+
+@dataclass(frozen=True)
+class Pressed:
+    """A quarter (half, in the plane) of the contact under each whole load [N]; the same on every
+    rank.
+    """
+
+    mesh: Mesh
+    maps: dict[float, PressureMap]
+    # of the far faces [m]
+    approach: dict[float, float]
+
+
+def press_pair(scene: Scene, comm: Any = None) -> Pressed:
+    """Press the pair of a scene of kind "hertz" with each of its loads.
+
+    Raises:
+        InputError: another kind of scene, or a load whose contact does not fit the mesh.
+            NotSolvedError: the contact iteration stopped.
+    """
+    from ...fem.body import assemble
+
+    if scene.kind != "hertz":
+        raise InputError(f"kind = '{scene.kind}': expected 'hertz'")
+    given = scene.hertz.interference
+    loads = _loads(scene) if given is None else ()
+    mesh = build_mesh(scene, comm)
+    patch = make_patch(mesh, "this")
+    ports = normal_ports([patch], mesh)
+    C = 0.0
+    for name, material, held in (
+        ("blade", scene.material.blade, "clamp"),
+        ("damper", scene.material.damper, "load"),
+    ):
+        body = assemble(mesh, name, material, comm, plane="strain")
+        C = C + flexibility(body, port_matrix([patch], mesh, name)[:, ports], held)
+    gap = initial_gap(patch, mesh)
+    part = 4 if mesh.dimension == 3 else 2
+    maps = {}
+    approach = {}
+    for wanted in loads if given is None else (None,):
+        found = (
+            solve_lcp(C, gap - given)
+            if wanted is None
+            else solve_lcp(C, gap, -np.ones((len(C), 1)), [-wanted / part])
+        )
+        if found.reason:
+            raise NotSolvedError(f"{_said(scene, wanted)}: {found.reason}")
+        load = part * float(found.force.sum()) if wanted is None else wanted
+        _check_load(scene, load)
+        maps[load] = PressureMap(patch, found.force, found.gap, found.residual)
+        approach[load] = given if wanted is None else float(found.rigid[0])
+    return Pressed(mesh, maps, approach)
+
+
+def hertz_radius(scene: Scene, load: float) -> float:
+    """Contact radius or half width [m] under a whole load [N], in the plane [N/m]."""
+    width = point_radius if scene.hertz.dimension == 3 else line_width
+    return width(
+        load, scene.hertz.radius, contact_modulus(scene.material.blade, scene.material.damper)
+    )
+
+
+def hertz_load(scene: Scene, a: float) -> float:
+    """The whole load [N], in the plane [N/m], that gives a contact radius [m]."""
+    R = scene.hertz.radius
+    E = contact_modulus(scene.material.blade, scene.material.damper)
+    return 4 * E * a**3 / (3 * R) if scene.hertz.dimension == 3 else np.pi * E * a**2 / (4 * R)
+
+
+def hertz_pressure(scene: Scene, load: float, r: np.ndarray) -> np.ndarray:
+    """Pressure [Pa] at the radii r [m], zero outside of the contact."""
+    a = hertz_radius(scene, load)
+    peak = 1.5 * load / (np.pi * a**2) if scene.hertz.dimension == 3 else 2 * load / (np.pi * a)
+    return peak * np.sqrt(np.clip(1 - (np.asarray(r) / a) ** 2, 0.0, None))
+
+
+def second_moment_radius(scene: Scene, seat: PressureMap) -> float:
+    """Contact radius [m] from the second moment of the pressure: the pressed area itself jumps from
+    node to node.
+    """
+    dimension = scene.hertz.dimension
+    r = np.linalg.norm(seat.patch.points[:, : dimension - 1], axis=1)
+    return float(np.sqrt((2.5 if dimension == 3 else 4.0) * (seat.force @ r**2) / seat.force.sum()))
+
+
+def _loads(scene: Scene) -> tuple[float, ...]:
+    """The loads of the study, or the one that gives the expected contact radius."""
+    loads = scene.study.loads or (hertz_load(scene, scene.hertz.contact_radius),)
+    for load in loads:
+        _check_load(scene, load)
+    return loads
+
+
+def _check_load(scene: Scene, load: float) -> None:
+    """Its contact must fit the mesh."""
+    expected = scene.hertz.contact_radius
+    fine = scene.mesh.contact_size or expected / 10
+    low, high = (hertz_load(scene, a) for a in (FINEST * fine, WIDEST * expected))
+    if not low <= load <= high:
+        raise InputError(
+            f"{_said(scene, load)}: the contact radius would be "
+            f"{show(hertz_radius(scene, load), 'm')}, hertz.contact_radius and mesh.contact_size "
+            f"are made for {show(low, 'N')} to {show(high, 'N')}"
+        )
+
+
+def _said(scene: Scene, load: float | None) -> str:
+    """What was given, and the load that it means."""
+    given = scene.hertz.interference
+    if given is None:
+        return f"study.loads = {show(load, 'N')}"
+    return f"hertz.interference = {show(given, 'm')}" + (
+        "" if load is None else f" (a load of {show(load, 'N')})"
+    )

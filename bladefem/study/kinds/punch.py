@@ -1,0 +1,160 @@
+"""A rigid flat punch on an elastic block from its scene: the paper's Fig. 5 and 6 by finite
+elements.
+
+Johnson, Contact Mechanics (1985), Sect. 3.8 and 2.8, the paper's Eq. 24 corrected: in terms of the
+whole force P
+
+    round:  p = P / (2 pi a sqrt(a^2 - r^2)),   u = P (1 - nu^2) / (2 a E) plane:  p = P / (pi
+    sqrt(a^2 - x^2)) for a force P a unit of depth, in plane strain; u grows with the logarithm of
+            how far the body reaches, by 2 P (1 - nu^2) / (pi E) each time that it reaches e times
+            as far.
+
+Eq. 25 is the stiffness of a ring: the force on it over u, so that the rings together carry 2 a E /
+(1 - nu^2). Such springs give back the pressure and the approach of the load that they were made
+for, and nothing else: tilted, they resist with half the moment of the half space, 2/3 a^3 E / (1 -
+nu^2) a radian instead of 4/3.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+
+from geometry.mesh import Mesh
+
+from ...contact.complementarity import solve_lcp
+from ...contact.patch import make_patch, normal_ports, patch_means, port_matrix
+from ...data import Patch
+from ...errors import InputError, NotSolvedError
+from ...scene.tables import Scene
+from ..pipeline.stages import build_mesh
+
+__all__ = [
+    "Indented",
+    "flexibility",
+    "indent",
+    "johnson_approach",
+    "johnson_pressure",
+    "ring_stiffness",
+    "spring_tilt",
+]
+
+
+@dataclass(frozen=True)
+class Indented:
+    """The quarter (half, in the plane) under the punch, and what it took to solve it; the same on
+    every rank.
+    """
+
+    mesh: Mesh
+    patch: Patch
+    # (n,) distance of the nodes from the axis [m]
+    radius: np.ndarray
+    # (n,) on the nodes of the meshed part [N]
+    force: np.ndarray
+    # of the punch [m]
+    approach: float
+    # force on the whole punch [N]
+    total: float
+    # (n, n) of the nodes of the meshed part, symmetric motion [m/N]
+    flexibility: np.ndarray
+    # (n, n) of the same under loads odd in x; None in the plane
+    tilted: np.ndarray | None
+    # (n,) mean of x over what each node stands for [m]
+    arm: np.ndarray
+    # the proof of optimality, see PressureMap
+    complementarity: float
+
+    @property
+    def pressure(self) -> np.ndarray:
+        """(n,) [Pa]"""
+        return self.force / self.patch.area
+
+    @property
+    def tilt_stiffness(self) -> float:
+        """Moment a radian of the punch glued to the block [N m]."""
+        return 4 * float(self.arm @ np.linalg.solve(self.tilted, self.arm))
+
+
+def indent(scene: Scene, comm: Any = None) -> Indented:
+    """Press the punch of a scene of kind "punch" with its first load.
+
+    Raises:
+        InputError: another kind of scene. NotSolvedError: the contact iteration stopped.
+    """
+    from ...fem.body import assemble
+
+    if scene.kind != "punch":
+        raise InputError(f"kind = '{scene.kind}': expected 'punch'")
+    total = 1000.0 if scene.study.loads is None else scene.study.loads[0]
+    mesh = build_mesh(scene, comm)
+    body = assemble(mesh, "blade", scene.material.blade, comm, plane="strain")
+    patch = make_patch(mesh, "this")
+    ports = port_matrix([patch], mesh)[:, normal_ports([patch], mesh)]
+    solid = mesh.dimension == 3
+    even = flexibility(body, ports)
+    part = 4 if solid else 2
+    found = solve_lcp(even, np.zeros(len(even)), -np.ones((len(even), 1)), [-total / part])
+    if found.reason:
+        raise NotSolvedError(f"the punch: {found.reason}")
+    radius = np.linalg.norm(patch.points[:, : mesh.dimension - 1], axis=1)
+    return Indented(
+        mesh,
+        patch,
+        radius,
+        found.force,
+        float(found.rigid[0]),
+        total,
+        even,
+        flexibility(_odd(body), ports) if solid else None,
+        patch_means(patch, mesh).T @ mesh.points[:, 0],
+        found.residual,
+    )
+
+
+def johnson_pressure(r: np.ndarray, a: float, force: float, plane: bool = False) -> np.ndarray:
+    """Pressure [Pa] at r < a under a force [N], or [N/m] in the plane."""
+    return force / (np.pi * np.sqrt(a**2 - r**2)) / (1.0 if plane else 2 * a)
+
+
+def johnson_approach(a: float, force: float, E: float, nu: float) -> float:
+    """Approach of a round punch and a half space [m]."""
+    return force * (1 - nu**2) / (2 * a * E)
+
+
+def ring_stiffness(edges: np.ndarray, a: float, E: float, nu: float) -> np.ndarray:
+    """Normal stiffness [N/m] of the rings between radii (k + 1,) [m]: Eq. 25 integrated over
+    each.
+    """
+    return -np.diff(2 * E / (1 - nu**2) * np.sqrt(np.maximum(a**2 - edges**2, 0.0)))
+
+
+def spring_tilt(edges: np.ndarray, a: float, E: float, nu: float) -> float:
+    """Moment a radian that those springs resist a tilt with [N m]: half of the ring's stiffness
+    times r^2.
+    """
+    s = np.sqrt(np.maximum(a**2 - edges**2, 0.0))
+    return float(np.diff(E / (1 - nu**2) * (s**3 / 3 - a**2 * s)).sum())
+
+
+def flexibility(body: Any, ports: Any, held: str = "clamp") -> np.ndarray:
+    """(n, n) displacements at the ports for unit forces there [m/N]; the body is held at a face.
+    Collective.
+    """
+    from ...fem.constraint import constrain, restrict
+    from ...fem.flexibility import compliance, flexible
+    from ...fem.linalg import dot
+
+    flex = flexible(constrain(body, held))
+    columns = restrict(flex.con, ports)
+    C = dot(body.comm, columns, compliance(flex, columns))
+    return (C + C.T) / 2
+
+
+def _odd(body: Any) -> Any:
+    """The same body for motions that turn over in the mirror x = 0."""
+    faces = dict(body.mesh.faces)
+    faces["antisymmetry_x"] = faces.pop("symmetry_x")
+    return replace(body, mesh=replace(body.mesh, faces=faces))

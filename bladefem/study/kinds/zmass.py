@@ -1,0 +1,147 @@
+"""The Z-shaped mass from its scene: contact pressure by finite elements, then its motion on the
+vibrating foundation.
+
+The pressure is solved once: the contact is a receding one, its pressure keeps its shape and follows
+the load in proportion (the paper's Eq. 27). The friction limits of the contact points come from it;
+their stiffnesses share ``contact.kt`` by area. On a rigid foundation the pressure is that of the
+top, everywhere: an elastic one presses back harder at the edges.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from fractions import Fraction
+from typing import Any
+
+import numpy as np
+from scipy.spatial import cKDTree
+
+from geometry.mesh import Mesh
+from geometry.zmass import z_section
+
+from ...contact.interface_elements import pair_ratio, stiffnesses
+from ...contact.patch import make_patch
+from ...contact.seating import contact_problem, solve
+from ...damper.loops import Drive, Steady, steady
+from ...damper.zmass import Footprint, MassOnFoundation
+from ...data import PressureMap
+from ...errors import InputError
+from ...io.stage_cache import stage
+from ...scene.tables import Scene
+from ..pipeline.keys import zmass_key
+from ..pipeline.stages import build_mesh
+
+__all__ = ["Pressed", "drives", "mass_on_foundation", "mean_load", "motions", "press"]
+
+# largest of a frequency ratio
+DENOMINATOR = 1000
+
+
+@dataclass(frozen=True)
+class Pressed:
+    """The mass on its foundation and the pressure between them under the mean load."""
+
+    mesh: Mesh
+    seat: PressureMap
+
+
+def press(scene: Scene, folder: Any = None, comm: Any = None) -> Pressed:
+    """Mesh and contact pressure of a scene of kind "z mass", on all ranks of a communicator.
+
+    Raises:
+        InputError: another kind of scene. NotSolvedError: the load tips the mass over.
+    """
+    if scene.kind != "z mass":
+        raise InputError(f"kind = '{scene.kind}': expected 'z mass'")
+    return stage(folder, "pressure", zmass_key(scene), lambda: _press(scene, comm), comm)[0]
+
+
+def mass_on_foundation(scene: Scene, seat: PressureMap) -> MassOnFoundation:
+    """The solid's own mass and moment of inertia, its contact points (``contact.points``) and their
+    shares.
+    """
+    area, polar = z_section(scene.z_mass)
+    line = scene.material.damper.rho * scene.z_mass.thickness
+    label = clusters(seat.patch.points[:, :2], seat.patch.area, scene.contact.points)
+    size = np.bincount(label, seat.patch.area)
+    share = np.bincount(label, seat.force) / seat.force.sum()
+    kt = float(
+        stiffnesses(scene.contact, pair_ratio(scene.material.blade, scene.material.damper), size)[
+            0
+        ].sum()
+    )
+    points = [np.bincount(label, seat.patch.area * x) / size for x in seat.patch.points[:, :2].T]
+    return MassOnFoundation(
+        line * area,
+        line * polar,
+        scene.contact.mu,
+        kt,
+        Footprint(np.column_stack(points), share, size / size.sum()),
+    )
+
+
+def clusters(points: np.ndarray, area: np.ndarray, count: int | None) -> np.ndarray:
+    """(n,) number of the contact point that each node belongs to: nearest centres, moved to their
+    means (Lloyd).
+
+    Unlike halving a rectangle it keeps the points of a Z on the Z. Starts from nodes as far apart
+    as can be.
+    """
+    if count is None or count >= len(points):
+        return np.arange(len(points))
+    chosen = [int(np.argmax(np.linalg.norm(points - points.mean(axis=0), axis=1)))]
+    for _ in range(count - 1):
+        chosen.append(int(np.argmax(cKDTree(points[chosen]).query(points)[0])))
+    centres = points[chosen]
+    for _ in range(30):
+        label = cKDTree(centres).query(points)[1]
+        size = np.bincount(label, area, count)
+        centres = np.column_stack([np.bincount(label, area * x, count) / size for x in points.T])
+    return label
+
+
+def drives(scene: Scene) -> list[Drive]:
+    """One for each frequency ratio of the scene."""
+    base = scene.foundation
+    load = mean_load(scene)
+    ratios = [Fraction(r).limit_denominator(DENOMINATOR) for r in base.ratios]
+    return [
+        Drive(r, base.frequency, base.amplitude, base.phase, load, base.pulsation, base.pull)
+        for r in ratios
+    ]
+
+
+def motions(
+    scene: Scene, body: MassOnFoundation, steps: int = 2000
+) -> Iterator[tuple[Drive, Steady]]:
+    """The steady motion for each frequency ratio of the scene, to 1e-6: an odd footprint keeps
+    turning slowly.
+
+    Args:
+        steps: time steps in one cycle of the foundation.
+    """
+    for drive in drives(scene):
+        yield drive, steady(body, drive, steps, tolerance=1e-6)
+
+
+def mean_load(scene: Scene) -> float:
+    """The mean normal load [N]: the first of study.loads, 50 N when left out."""
+    return 50.0 if scene.study.loads is None else scene.study.loads[0]
+
+
+def _press(scene: Scene, comm: Any) -> Pressed:
+    from ...fem.body import assemble
+    from ...fem.constraint import constrain
+    from ...fem.flexibility import flexible
+    from ...fem.loads import surface_load
+
+    mesh = build_mesh(scene, comm)
+    mass = assemble(mesh, "damper", scene.material.damper, comm)
+    load = surface_load(mass, "top", pressure=1.0).reshape(-1, 3)
+    reach = np.array([scene.z_mass.width, scene.z_mass.height]) / 2
+    load = (load * (1 + mesh.points[:, :2] @ (scene.foundation.skew / reach))[:, None]).ravel()
+    block = flexible(constrain(assemble(mesh, "blade", scene.material.blade, comm), "clamp"))
+    patch = make_patch(mesh, "this")
+    problem = contact_problem(mesh, [patch], block, flexible(constrain(mass, None)), pull=load)
+    return Pressed(mesh, solve(problem, 0.0, normal=mean_load(scene))[0])

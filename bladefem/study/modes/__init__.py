@@ -1,0 +1,1 @@
+"""Studies of the modes: surveys, Campbell, convergence, stresses, linear responses."""

@@ -1,0 +1,155 @@
+"""Where engine orders meet natural frequencies: Campbell and interference (SAFE) crossings,
+margins.
+
+Frequency tables have one row a mode: nodal_diameter, mode, frequency [Hz], and for a Campbell
+diagram speed [rad/s]. Frequencies are in the rotating frame, where engine order EO excites at EO
+speed / (2 pi), in the nodal diameter that EO folds to.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+
+import numpy as np
+import pandas as pd
+
+__all__ = ["campbell_crossings", "fold", "interference_table", "margins"]
+
+
+def fold(order: int, sectors: int) -> int:
+    """The nodal diameter, 0..N/2, that an engine order excites on a wheel of N sectors."""
+    rest = order % sectors
+    return min(rest, sectors - rest)
+
+
+def wave(order: int, sectors: int) -> str:
+    """Sense of the excited wave relative to the engine order's own turning."""
+    rest = order % sectors
+    if rest in (0, sectors / 2):
+        return "standing"
+    return "with" if rest < sectors / 2 else "against"
+
+
+def campbell_crossings(
+    table: pd.DataFrame, orders: Iterable[int], sectors: int | None = None
+) -> pd.DataFrame:
+    """Speeds at which an engine-order line crosses a frequency line, one row a crossing.
+
+    Between two speeds f^2 is linear in speed^2 (Southwell), which makes each crossing a closed
+    form.
+
+    Args:
+        table: columns speed [rad/s], mode, frequency [Hz], and optionally nodal_diameter.
+        orders: engine orders.
+        sectors: number of blades; given, an order crosses only lines of the nodal diameter that it
+            folds to.
+
+    Returns:
+        columns mode, nodal_diameter (if there), engine_order, speed [rad/s], frequency [Hz].
+    """
+    keys = [key for key in ("nodal_diameter", "mode") if key in table]
+    rows = []
+    for key, line in table.groupby(keys):
+        named = dict(zip(keys, key, strict=True))
+        for order in orders:
+            if (
+                sectors
+                and "nodal_diameter" in named
+                and fold(order, sectors) != named["nodal_diameter"]
+            ):
+                continue
+            rows += [
+                {
+                    **named,
+                    "engine_order": order,
+                    "speed": speed,
+                    "frequency": order * speed / (2 * np.pi),
+                }
+                for speed in line_crossings(line.sort_values("speed"), order)
+            ]
+    columns = [*keys, "engine_order", "speed", "frequency"]
+    return pd.DataFrame(rows, columns=columns).sort_values("speed", ignore_index=True)
+
+
+def line_crossings(line: pd.DataFrame, order: int) -> list[float]:
+    """Speeds [rad/s] where one frequency line meets one engine order; a crossing on a given speed
+    counts once.
+    """
+    speed2 = line["speed"].to_numpy(float) ** 2
+    f2 = line["frequency"].to_numpy(float) ** 2
+    over = f2 - (order / (2 * np.pi)) ** 2 * speed2
+    found = []
+    for k in np.flatnonzero((over[:-1] * over[1:] < 0) | (over[1:] == 0)):
+        part = over[k] / (over[k] - over[k + 1])
+        found.append(float(np.sqrt(speed2[k] + part * (speed2[k + 1] - speed2[k]))))
+    return found
+
+
+def interference_table(
+    table: pd.DataFrame, sectors: int, speed: float, orders: Iterable[int]
+) -> pd.DataFrame:
+    """Every engine order against the modes of the nodal diameter that it excites, at one speed
+    (SAFE diagram).
+
+    Args:
+        table: columns nodal_diameter, mode, frequency [Hz] (and optionally family).
+        sectors: number of blades.
+        speed: [rad/s].
+        orders: engine orders.
+
+    Returns:
+        columns engine_order, nodal_diameter, wave, mode, frequency [Hz], excitation [Hz], margin
+        [1] = natural over excitation frequency - 1, speed_at_resonance [rad/s] (at constant natural
+        frequency).
+    """
+    extra = [c for c in ("family",) if c in table]
+    rows = []
+    for order in orders:
+        excitation = order * speed / (2 * np.pi)
+        for _, mode in table[table["nodal_diameter"] == fold(order, sectors)].iterrows():
+            rows.append(
+                {
+                    "engine_order": order,
+                    "nodal_diameter": int(mode["nodal_diameter"]),
+                    "wave": wave(order, sectors),
+                    "mode": mode["mode"],
+                    **{c: mode[c] for c in extra},
+                    "frequency": mode["frequency"],
+                    "excitation": excitation,
+                    "margin": mode["frequency"] / excitation - 1 if excitation > 0 else np.inf,
+                    "speed_at_resonance": 2 * np.pi * mode["frequency"] / order
+                    if order
+                    else np.inf,
+                }
+            )
+    columns = [
+        "engine_order",
+        "nodal_diameter",
+        "wave",
+        "mode",
+        *extra,
+        "frequency",
+        "excitation",
+        "margin",
+        "speed_at_resonance",
+    ]
+    return pd.DataFrame(rows, columns=columns)
+
+
+def margins(
+    table: pd.DataFrame,
+    sectors: int,
+    speed: float,
+    orders: Iterable[int],
+    least: float = 0.05,
+) -> pd.DataFrame:
+    """The closest mode to each engine order, with a verdict: "ok" when at least ``least`` apart,
+    else "close".
+    """
+    rows = interference_table(table, sectors, speed, orders)
+    if rows.empty:
+        return rows.assign(verdict=[])
+    closest = rows.loc[rows.groupby("engine_order")["margin"].apply(lambda m: m.abs().idxmin())]
+    return closest.assign(
+        verdict=np.where(closest["margin"].abs() >= least, "ok", "close")
+    ).reset_index(drop=True)

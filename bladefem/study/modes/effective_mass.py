@@ -1,0 +1,89 @@
+"""Effective masses of the whole wheel from the modes of one sector.
+
+A translation along the axis and a rotation about it move all sectors alike (nodal diameter 0); a
+translation across the axis is the sum of two waves of nodal diameter 1, e_x = (r + r*) / 2 with r =
+e_x + j e_y, which R turns into e^{-j theta} r. Other nodal diameters carry no rigid motion (Clough
+and Penzien, Dynamics of Structures, sect. 26).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+import pandas as pd
+
+from ...data import ModeSet
+from .campbell import sense_of
+from .comparison import rigid_motion
+
+__all__ = ["effective_masses"]
+
+
+def effective_masses(sets: Sequence[ModeSet], body: Any) -> pd.DataFrame:
+    """One row a mode and direction that it can follow.
+
+    Args:
+        sets: modes of a body, or of nodal diameters of a wheel; those beyond 1 have no row.
+        body: fem.body.Body, for its mass; collective on its ranks.
+
+    Returns:
+        nodal_diameter (wheels), mode, frequency [Hz], direction, factor [kg^1/2 or kg^1/2 m] of
+        participation with mass-normalised modes of the whole wheel (both waves of a pair together),
+        effective_mass [kg or kg m^2] its square, share [1] of the rigid mass, sum [1] of the shares
+        up to this mode.
+    """
+    frames = [
+        _rows(modes, body, direction, factor)
+        for modes in sets
+        for direction, factor in _directions(modes, body)
+    ]
+    columns = ["mode", "frequency", "direction", "factor", "effective_mass", "share", "sum"]
+    return pd.concat(frames, ignore_index=True) if frames else pd.DataFrame(columns=columns)
+
+
+def _directions(modes: ModeSet, body: Any) -> list[tuple[str, float]]:
+    """Directions of one set, with the factor from a sector to the wheel."""
+    n = modes.nodal_diameter
+    plane = body.dim == 2
+    if n is None:
+        return [
+            (name, 1.0) for name in (("x", "y") if plane else ("x", "y", "z", "rx", "ry", "rz"))
+        ]
+    count = float(body.mesh.sector.count)
+    return {
+        0: [("rz", count)] if plane else [("z", count), ("rz", count)],
+        1: [("x, y", count / 2)],
+    }.get(n, [])
+
+
+def _rows(modes: ModeSet, body: Any, direction: str, factor: float) -> pd.DataFrame:
+    from ...fem.gyroscopic import own_rows
+    from ...fem.linalg import apply, dot
+
+    points = body.mesh.points
+    if direction == "x, y":
+        rigid = rigid_motion(points, "x") + 1j * sense_of(body.mesh) * rigid_motion(points, "y")
+    else:
+        rigid = rigid_motion(points, direction)
+    inside = (body.rows >= 0)[:, None]
+    r = own_rows(body, np.where(inside, rigid, 0.0)[None])
+    moved = apply(body.M, r)
+    total = dot(body.comm, r, moved)[0, 0].real
+    coupling = dot(body.comm, own_rows(body, modes.shapes), moved)[:, 0]
+    share = np.abs(coupling) ** 2 / total
+    table = pd.DataFrame(
+        {
+            "mode": np.arange(1, len(share) + 1),
+            "frequency": modes.frequencies,
+            "direction": direction,
+            "factor": np.sqrt(factor * total * share),
+            "effective_mass": factor * share * total,
+            "share": share,
+            "sum": np.cumsum(share),
+        }
+    )
+    if modes.nodal_diameter is not None:
+        table.insert(0, "nodal_diameter", modes.nodal_diameter)
+    return table

@@ -1,0 +1,267 @@
+"""Mesh refinement: frequencies on finer and finer meshes, observed order, Richardson's estimate of
+the limit.
+
+Every element size of the finest mesh is scaled, so that the meshes are as similar as unstructured
+ones can be. With three of them f(h) = f + C h^p goes through all (Roache, J. Fluids Eng. 116
+(1994), doi:10.1115/1.2910291); with more it is fitted by least squares, and what is left is the
+scatter of the meshes (Eca and Hoekstra, J. Comput. Phys. 262 (2014),
+doi:10.1016/j.jcp.2014.01.006). h is the size that the elements really have. Modes are paired with
+those of the finest mesh by their shapes (MAC), so two that cross while the mesh is refined keep
+their names. Where the values do not fall into line, or the order is none that the elements can
+have, ``reason`` says so and the error is three times the last change (Roache's safety factor for
+two meshes), of more than three meshes the largest between the last three.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from itertools import pairwise
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pandas as pd
+from scipy.optimize import brentq, linear_sum_assignment, minimize_scalar
+
+from geometry.mesh import Mesh
+
+from ...data import ModeSet
+from ...errors import InputError
+from ...scene.tables import Scene
+from ...util.progress import Progress, unwatched
+from ..pipeline.stages import Bodies, build_mesh, find_modes
+from .comparison import mac_of
+from .mesh_transfer import nodal_volumes, transfer
+
+__all__ = [
+    "RATIOS",
+    "Convergence",
+    "converge",
+    "default_sizes",
+    "element_size",
+    "fitted",
+    "of_meshes",
+    "richardson",
+]
+
+# of the scene's own element sizes
+RATIOS = (2.0, 1.7, 1.4, 1.2, 1.0)
+# order that is looked for
+HIGHEST = 12.0
+# orders that frequencies can have: from sharp re-entrant edges to 4 for P2, and some luck
+BELIEVED = (1.0, 6.0)
+# error over change where no order is believed
+SAFETY = 3.0
+# scatter over trend from which there is no trend
+LOUD = 0.5
+# MAC of the same mode on two meshes
+ALIKE = 0.8
+# modes beyond those asked for, candidates for pairs
+SPARE = 3
+# nodes that shapes are compared at
+POINTS = 4000
+
+
+@dataclass(frozen=True)
+class Convergence:
+    """SI columns."""
+
+    # size [m], cells, dofs, nodal_diameter, mode, frequency [Hz], mac: one row a mesh
+    # and mode
+    points: pd.DataFrame
+    # nodal_diameter, mode, frequency, limit [Hz], order [1], error [1] of the finest mesh,
+    # scatter [1] about the fit, reason: why the order is not believed, empty when it is
+    summary: pd.DataFrame
+
+
+def converge(
+    scene: Scene,
+    sizes: Sequence[float],
+    diameters: Sequence[int] | None = None,
+    count: int = 5,
+    comm: Any = None,
+    progress: Progress = unwatched,
+) -> Convergence:
+    """The same scene on several meshes.
+
+    Args:
+        sizes: target element sizes [m], at least three, from coarse to fine; where the scene leaves
+            its size open and these are :data:`RATIOS`, they are factors on its automatic sizes.
+        diameters: nodal diameters of a wheel.
+        count: modes of each.
+
+    Raises:
+        InputError: too few sizes, or not from coarse to fine; a scene whose mesh is given.
+    """
+    if scene.kind == "imported" and Path(scene.imported.file).suffix.lower() not in (
+        ".step",
+        ".stp",
+    ):
+        raise InputError("kind 'imported': its mesh is given, expected a scene that is meshed here")
+    if len(sizes) < 3 or not all(a > b > 0 for a, b in pairwise(sizes)):
+        raise InputError(
+            f"converge = {list(sizes)} m: expected at least three element sizes, from coarse to "
+            "fine"
+        )
+    finest = None if tuple(sizes) == RATIOS else sizes[-1]
+    runs = []
+    for size in progress(list(sizes), "meshes"):
+        scale = scene.mesh.scale * size / sizes[-1]
+        refined = replace(
+            scene, mesh=replace(scene.mesh, size=finest or scene.mesh.size, scale=scale)
+        )
+        mesh = build_mesh(refined, comm)
+        runs.append((mesh, find_modes(Bodies(refined, mesh, comm), diameters, count + SPARE)))
+    return of_meshes(runs, count)
+
+
+def of_meshes(runs: Sequence[tuple[Mesh, Sequence[ModeSet]]], count: int) -> Convergence:
+    """The study from meshes and their modes, coarse to fine.
+
+    Args:
+        count: modes of each set; the sets should hold some more, as partners.
+    """
+    finest = runs[-1]
+    points = pd.concat(
+        [
+            _rows(mesh, found, finest[0], reference, count)
+            for mesh, sets in runs
+            for found, reference in zip(sets, finest[1], strict=True)
+        ],
+        ignore_index=True,
+    )
+    return Convergence(points, _summary(points))
+
+
+def paired(
+    mesh: Mesh, modes: ModeSet, finest: Mesh, reference: ModeSet, count: int
+) -> tuple[np.ndarray, np.ndarray]:
+    """(count,) numbers in ``modes`` of the modes most like the first of ``reference``, and their
+    MAC.
+    """
+    nodes = np.unique(finest.bodies["blade"])
+    nodes = nodes[:: max(len(nodes) // POINTS, 1)]
+    blade = replace(mesh, bodies={"blade": mesh.bodies["blade"]})
+    theirs = (
+        modes.shapes[:, nodes]
+        if mesh is finest
+        else transfer(blade, modes.shapes, finest.points[nodes])
+    )
+    match = mac_of(reference.shapes[:count, nodes], theirs, nodal_volumes(finest)[nodes])
+    rows, columns = linear_sum_assignment(-match)
+    return columns, match[rows, columns]
+
+
+def _rows(mesh: Mesh, modes: ModeSet, finest: Mesh, reference: ModeSet, count: int) -> pd.DataFrame:
+    """One mesh and nodal diameter."""
+    numbers, match = paired(mesh, modes, finest, reference, count)
+    diameter = {} if modes.nodal_diameter is None else {"nodal_diameter": modes.nodal_diameter}
+    return pd.DataFrame(
+        {
+            "size": element_size(mesh, "blade"),
+            "cells": len(mesh.bodies["blade"]),
+            "dofs": mesh.dimension * len(np.unique(mesh.bodies["blade"])),
+            **diameter,
+            "mode": np.arange(1, len(numbers) + 1),
+            "frequency": modes.frequencies[numbers],
+            "mac": match,
+        }
+    )
+
+
+def default_sizes(scene: Scene) -> list[float]:
+    """Element sizes [m] down to the scene's own; where that is open, :data:`RATIOS` themselves."""
+    return [ratio * (scene.mesh.size or 1.0) for ratio in RATIOS]
+
+
+def element_size(mesh: Mesh, body: str) -> float:
+    """Side of a cube (square) as large as the mean cell [m]."""
+    from ...fem.loads import volume
+
+    d = mesh.dimension
+    size = volume(mesh, body) / (mesh.depth if d == 2 else 1.0)
+    return float((size / len(mesh.bodies[body])) ** (1 / d))
+
+
+def richardson(h: np.ndarray, f: np.ndarray) -> tuple[float, float]:
+    """Limit and order from three meshes, coarse to fine.
+
+    Returns:
+        the limit, and the order; where the values do not fall into line the finest value and NaN.
+    """
+    first = f[0] - f[1]
+    second = f[1] - f[2]
+    if first * second <= 0:
+        return float(f[2]), np.nan
+    wanted = first / second
+
+    def miss(p: float) -> float:
+        return (h[0] ** p - h[1] ** p) / (h[1] ** p - h[2] ** p) - wanted
+
+    if miss(0.05) * miss(HIGHEST) >= 0:
+        return float(f[2]), np.nan
+    p = brentq(miss, 0.05, HIGHEST)
+    return float(f[2] - second * h[2] ** p / (h[1] ** p - h[2] ** p)), float(p)
+
+
+def fitted(h: np.ndarray, f: np.ndarray) -> tuple[float, float, float]:
+    """Limit, order and scatter (standard deviation) of f + C h^p by least squares.
+
+    Returns:
+        the finest value and NaN where the values have no trend, or three of them do not fall into
+        line.
+    """
+    if len(f) == 3:
+        return *richardson(h, f), 0.0
+
+    def fit(p: float) -> tuple[np.ndarray, float]:
+        A = np.stack([np.ones(len(h)), h**p], axis=1)
+        x = np.linalg.lstsq(A, f, rcond=None)[0]
+        return x, float(np.sum((A @ x - f) ** 2))
+
+    coarse = np.linspace(0.25, HIGHEST, 48)
+    start = coarse[np.argmin([fit(p)[1] for p in coarse])]
+    p = minimize_scalar(
+        lambda p: fit(p)[1], bounds=(max(start - 0.5, 0.05), start + 0.5), method="bounded"
+    ).x
+    (limit, slope), left = fit(p)
+    scatter = float(np.sqrt(left / (len(f) - 3)))
+    if scatter > LOUD * abs(slope) * (h.max() ** p - h.min() ** p):
+        return float(f[-1]), np.nan, scatter
+    return float(limit), float(p), scatter
+
+
+def _summary(points: pd.DataFrame) -> pd.DataFrame:
+    keys = [key for key in ("nodal_diameter", "mode") if key in points]
+    rows = []
+    for _, line in points.groupby(keys):
+        line = line.sort_values("size", ascending=False)
+        f = line["frequency"].to_numpy()
+        limit, order, scatter = fitted(line["size"].to_numpy() / line["size"].iloc[-1], f)
+        reason = _doubt(order, line["mac"].min())
+        change = np.ptp(f[-2:] if len(f) == 3 else f[-3:])
+        error = SAFETY * change / f[-1] if reason else abs(f[-1] / limit - 1) + scatter / f[-1]
+        rows.append(
+            {
+                **{name: int(line[name].iloc[0]) for name in keys},
+                "frequency": f[-1],
+                "limit": f[-1] if reason else limit,
+                "order": order,
+                "error": error,
+                "scatter": scatter / f[-1],
+                "reason": reason,
+            }
+        )
+    return pd.DataFrame(rows)
+
+
+def _doubt(order: float, mac: float) -> str:
+    """Why an order is not believed."""
+    if mac < ALIKE:
+        return f"the shapes of two meshes differ, MAC {mac:.2f}"
+    if np.isnan(order):
+        return "the frequencies do not fall into line"
+    if not BELIEVED[0] <= order <= BELIEVED[1]:
+        return f"order {order:.1f} is none that the elements can have"
+    return ""

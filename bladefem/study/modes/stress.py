@@ -1,0 +1,65 @@
+"""What the amplitude means for the blade's life: stress of the mode studied, beside that of
+rotation.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from ...data import ModeSet
+from ..pipeline.ports import blade_ports
+from ..pipeline.stages import Bodies
+from .linear_response import static_offset
+
+__all__ = ["Strength", "strength"]
+
+
+@dataclass(frozen=True)
+class Strength:
+    """Largest von Mises stresses at the Gauss points of the blade; at sharp edges they grow with a
+    finer mesh.
+    """
+
+    # 1 = lowest
+    mode: int
+    # amplitude in that mode, for each metre of motion at the probe [Pa/m]
+    alternating: float
+    # (3,) where [m]
+    alternating_at: np.ndarray
+    # of rotation [Pa]; 0 at rest
+    steady: float
+    # (3,)
+    steady_at: np.ndarray
+
+
+def strength(bodies: Bodies, modes: ModeSet) -> Strength:
+    """Stresses of the mode that the scene studies; the other modes and the damper's forces are left
+    out.
+
+    Args:
+        modes: of the nodal diameter that the engine order excites.
+    """
+    excitation = bodies.scene.excitation
+    ports = blade_ports(bodies.mesh, [], excitation)
+    shape = modes.shapes[min(excitation.mode, len(modes.shapes)) - 1].astype(complex)
+    seen = abs(ports.matrix[:, ports.names["probe"]].T @ shape[:, : bodies.mesh.dimension].ravel())[
+        0
+    ]
+    alternating, there = _worst(bodies, shape / max(seen, 1e-300))
+    rest = 0.0, np.full(3, np.nan)
+    steady, place = (
+        _worst(bodies, static_offset(bodies)) if bodies.scene.operation.speed > 0 else rest
+    )
+    return Strength(excitation.mode, alternating, there, steady, place)
+
+
+def _worst(bodies: Bodies, u: np.ndarray) -> tuple[float, np.ndarray]:
+    """Largest von Mises stress [Pa] of displacements (n_points, d) and its place (3,) [m]."""
+    from ...fem.stress import gauss_stress, von_mises
+
+    found = gauss_stress(bodies.still_blade, u)
+    size = von_mises(found.stress)
+    worst = np.unravel_index(size.argmax(), size.shape)
+    return float(size[worst]), found.points[worst]

@@ -1,0 +1,207 @@
+"""A survey of the modes: all nodal diameters, and what was asked for beside them."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Sequence
+from dataclasses import dataclass, field, replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pandas as pd
+
+from geometry.mesh import Mesh
+
+from ...data import ModeSet
+from ...errors import InputError
+from ...hbm.model import Damping
+from ...io.array_codec import read_npz
+from ...io.stage_cache import code_of, found_remark, key_of, on_root, stage
+from ...scene.tables import Scene
+from ...util.progress import Progress, unwatched
+from ..pipeline import pipeline
+from ..pipeline.keys import modes_key
+from ..pipeline.stages import MODES_SHOWN, Bodies, excited_modes, is_wheel, wheel_modes
+from ..pipeline.validate_mesh import refuse_loads
+from .campbell import Campbell, campbell
+from .clamped_aerofoil import clamped_blade
+from .comparison import mac
+from .effective_mass import effective_masses
+from .linear_response_report import Answer, answer
+from .mesh_convergence import Convergence, converge, default_sizes
+
+__all__ = ["Survey", "Wanted", "excited_set", "survey"]
+
+# engine orders above and below the scene's own, in Campbell and SAFE diagrams
+ORDERS = 3
+
+
+@dataclass(frozen=True)
+class Wanted:
+    """What to find beside the modes."""
+
+    # [rad/s] of a Campbell diagram
+    speeds: Sequence[float] | None = None
+    # [m] of a refinement study; empty: chosen
+    sizes: Sequence[float] | None = None
+    # folder of a run to compare with
+    other: Path | None = None
+    # every nodal diameter from scratch
+    direct: bool = False
+    # of a linear forced response; empty: the scene's excitation
+    loads: Sequence[tuple[str, float]] | None = None
+    # of that response; the scene's modal damping when left out
+    damping: Damping | None = None
+
+
+@dataclass(frozen=True)
+class Survey:
+    """What was found; the run's modes are those of all nodal diameters."""
+
+    run: pipeline.Run
+    bodies: Bodies
+    # effective masses
+    masses: pd.DataFrame
+    campbell: Campbell | None = None
+    convergence: Convergence | None = None
+    # linear forced response
+    answer: Answer | None = None
+    # (modes, modes of the other run) in the excited nodal diameter
+    mac: np.ndarray | None = None
+    # the other run's
+    compared: ModeSet | None = field(default=None, repr=False)
+    # of the aerofoil clamped at its root, at rest
+    clamped: ModeSet | None = field(default=None, repr=False)
+
+
+def survey(
+    scene: Scene,
+    folder: str | Path,
+    wanted: Wanted,
+    comm: Any = None,
+    progress: Progress = unwatched,
+) -> Survey:
+    """Modes of every nodal diameter, and what is wanted beside them; collective.
+
+    Raises:
+        InputError, NotSolvedError: from the stages.
+    """
+    other = None if wanted.other is None else on_root(comm, lambda: _other(wanted.other))
+    start = pipeline.run(scene, folder, until="mesh", comm=comm, progress=progress)
+    pipeline.check_blade(scene, start.mesh)
+    if wanted.loads is not None:
+        refuse_loads(scene, start.mesh, wanted.loads, wanted.damping)
+    bodies = Bodies(scene, start.mesh, comm, progress)
+    clock = time.perf_counter()
+    key = key_of(modes_key(scene), "survey", wanted.direct, code_of("bladefem.study"))
+    sets, before = stage(folder, "survey", key, lambda: _all_modes(bodies, wanted.direct), comm)
+    messages = [*start.messages, *([] if before is None else [found_remark("modes", before)])]
+    run = replace(start, modes=sets, messages=messages)
+    clock = _timed(run, "modes", clock)
+    result = Survey(
+        run, bodies, effective_masses(sets, bodies.still_blade), clamped=clamped_blade(bodies)
+    )
+    clock = _timed(run, "effective masses, clamped blade", clock)
+    if wanted.speeds is not None:
+        result = replace(result, campbell=campbell(bodies, wanted.speeds, _orders(scene)))
+        clock = _timed(run, "campbell", clock)
+    if wanted.sizes is not None:
+        sizes = list(wanted.sizes) or default_sizes(scene)
+        n = excited_set(run).nodal_diameter
+        result = replace(
+            result,
+            convergence=converge(
+                scene, sizes, None if n is None else [n], comm=comm, progress=progress
+            ),
+        )
+        clock = _timed(run, "mesh refinement", clock)
+    if wanted.loads is not None:
+        result = replace(result, answer=answer(bodies, wanted.loads, wanted.damping))
+        clock = _timed(run, "forced response", clock)
+    return result if other is None else _compared(result, *other)
+
+
+def excited_set(run: pipeline.Run) -> ModeSet:
+    """The modes of the nodal diameter that the engine order excites, or the nearest one that is
+    there.
+    """
+    return excited_modes(run.scene, run.mesh, run.modes)
+
+
+def _all_modes(bodies: Bodies, direct: bool) -> list[ModeSet]:
+    from ...fem.modes import modes
+
+    if not is_wheel(bodies.mesh):
+        flex = bodies.factorised(0)
+        return [modes(flex.con, MODES_SHOWN, flex)]
+    return wheel_modes(bodies, MODES_SHOWN, bodies.scene.model.nodal_diameters, direct)
+
+
+def _orders(scene: Scene) -> list[int]:
+    order = scene.excitation.engine_order
+    return list(range(max(order - ORDERS, 1), order + ORDERS + 1))
+
+
+def _timed(run: pipeline.Run, name: str, since: float) -> float:
+    now = time.perf_counter()
+    run.timings[name] = now - since
+    return now
+
+
+def _other(folder: Path) -> tuple[Mesh, list[ModeSet]]:
+    """Mesh and modes of another run.
+
+    Raises:
+        InputError: the folder holds none.
+    """
+    mesh = _kept(folder, "mesh")
+    sets = _kept(folder, "survey") or _kept(folder, "modes")
+    if mesh is None or sets is None:
+        raise InputError(
+            f"compare = {folder}: expected the folder of an earlier run of 'bladefem modes'"
+        )
+    return mesh, sets
+
+
+def _kept(folder: Path, name: str) -> Any:
+    """A stage of another run, whatever it was made from."""
+    path = Path(folder) / "stages" / f"{name}.npz"
+    try:
+        with np.load(path, allow_pickle=False) as file:
+            key = str(file["key"])
+        return read_npz(path, key)[0]
+    except (OSError, KeyError, ValueError):
+        return None
+
+
+def _compared(result: Survey, mesh: Mesh, sets: list[ModeSet]) -> Survey:
+    """MAC against the same nodal diameter of another run; its shapes are interpolated where the
+    mesh is another one.
+    """
+    mine = excited_set(result.run)
+    theirs = [s for s in sets if s.nodal_diameter == mine.nodal_diameter]
+    if not theirs:
+        raise InputError(
+            f"compare: the other run has no modes of nodal diameter {mine.nodal_diameter}"
+        )
+    own = result.run.mesh
+    same = mesh.points.shape == own.points.shape and np.array_equal(mesh.points, own.points)
+    match = mac(
+        _of_blade(own, mine),
+        _of_blade(mesh, theirs[0]) if same else theirs[0],
+        _blade(own),
+        None if same else _blade(mesh),
+    )
+    return replace(result, mac=match, compared=theirs[0])
+
+
+def _blade(mesh: Mesh) -> Mesh:
+    """The blade alone: the damper is not part of the modes."""
+    return replace(mesh, bodies={"blade": mesh.bodies["blade"]})
+
+
+def _of_blade(mesh: Mesh, modes: ModeSet) -> ModeSet:
+    """The same modes, at rest away from the blade."""
+    inside = np.isin(np.arange(len(mesh.points)), mesh.bodies["blade"])
+    return replace(modes, shapes=np.where(inside[:, None], modes.shapes, 0.0))

@@ -1,0 +1,1 @@
+"""From a scene to forced responses, stage by stage."""

@@ -1,0 +1,115 @@
+"""Blade, damper and friction elements joined for an engine order: the model that the balance
+solves.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from math import pi
+
+import numpy as np
+import scipy.sparse as sp
+
+from geometry.mesh import Mesh
+
+from ...data import Elements, Patch, PortModel, RigidBody
+from ...hbm.model import Damping, ReducedModel
+from ...reduction.assemble import pair_models, recombine, wheel_models
+from ...scene.tables import Scene
+from .stages import Reduced
+
+__all__ = ["LoadCase", "joint_model", "mass_damper", "rigid_damper"]
+
+
+@dataclass(frozen=True)
+class LoadCase:
+    """One static load of the damper and the friction elements that it gives."""
+
+    # mean normal force on each seat [N]
+    load: float
+    elements: Elements
+    # (contact dofs of the mesh's nodes, contact dofs of the elements), see friction_elements
+    selection: sp.spmatrix
+    # of the damper [kg]; as meshed when None
+    mass: float | None = None
+
+
+def joint_model(
+    scene: Scene,
+    mesh: Mesh,
+    reduced: Reduced,
+    patches: list[Patch],
+    case: LoadCase,
+    harmonics: int,
+    damper: str,
+) -> ReducedModel:
+    """The balance's model of one load case.
+
+    A harmonic whose nodal diameter was not reduced borrows the nearest one that was: far above the
+    modes that matter it moves quasi-statically, and the indicator of the harmonics sees what
+    remains.
+
+    Args:
+        damper: "mass" (the paper's: tangential motion only, prescribed normal load), "rigid" or
+            "elastic".
+    """
+    pick = case.selection.T.toarray()
+    whole = pick.shape[0] == pick.shape[1]
+    sides = _sides(scene, reduced, harmonics)
+    elements = case.elements
+    if not whole:
+        sides = tuple(recombine(side, pick) for side in sides)
+    if damper == "mass" or scene.contact.normal == "prescribed":
+        elements = replace(elements, kn=np.zeros_like(elements.kn))
+    other: RigidBody | tuple[PortModel, ...]
+    if damper == "mass":
+        other = mass_damper(mesh, patches, reduced.mass)
+    elif damper == "rigid":
+        other = rigid_damper(reduced)
+    else:
+        other = (reduced.damper if whole else recombine(reduced.damper, pick),)
+    if isinstance(other, RigidBody) and not whole:
+        other = replace(other, B=pick @ other.B)
+    return ReducedModel(
+        sides,
+        elements,
+        {1: np.array([scene.excitation.force], dtype=complex)},
+        Damping(ratio=scene.operation.damping),
+        other,
+        Damping(ratio=scene.operation.damping),
+        coupled=scene.model.static == "coupled",
+    )
+
+
+def rigid_damper(reduced: Reduced) -> RigidBody:
+    """Six freedoms (three in a plane), in mass-normalised coordinates."""
+    rigid = reduced.damper.omega == 0
+    return RigidBody(
+        np.eye(int(rigid.sum())), reduced.damper.shapes[reduced.damper.ports["contact"]][:, rigid]
+    )
+
+
+def mass_damper(mesh: Mesh, patches: list[Patch], mass: float) -> RigidBody:
+    """The paper's damper: a mass that moves circumferentially (and axially in 3-D), never up or
+    down the slope.
+    """
+    dim = mesh.dimension
+    angle = pi / mesh.sector.count if mesh.sector.count else 0.0
+    moves = np.array([[-np.sin(angle), np.cos(angle), 0.0], [0.0, 0.0, 1.0]])[: dim - 1]
+    rows = []
+    for patch in patches:
+        # into the axes in which the frame is given
+        turned = moves @ mesh.pairs[patch.name].rotation
+        rows.append((patch.frame[:, :dim] @ turned.T).reshape(-1, dim - 1))
+    return RigidBody(mass * np.eye(dim - 1), np.concatenate(rows))
+
+
+def _sides(scene: Scene, reduced: Reduced, harmonics: int) -> tuple[PortModel, ...]:
+    order = scene.excitation.engine_order
+    if reduced.sectors:
+        nearest = {
+            n: reduced.sector[min(reduced.sector, key=lambda known: abs(known - n))]
+            for n in range(reduced.sectors // 2 + 1)
+        }
+        return wheel_models(nearest, reduced.following, order, reduced.sectors, harmonics)
+    return pair_models(reduced.sector[0], reduced.following, scene.excitation.phase, harmonics)

@@ -1,0 +1,71 @@
+"""Why a light load has no response: the blade moves its seats further than the load presses the
+damper onto them.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from contextlib import contextmanager
+
+import numpy as np
+
+from ...errors import NotSolvedError
+from ...hbm.linear_resonances import free_resonances
+from ...hbm.model import ReducedModel
+from ...scene.units import show
+from .assemble_model import LoadCase
+
+__all__ = ["named", "seat_travel"]
+
+# travel of the seats over the compression by the load, beyond which the damper is said to lift off
+FAR = 10.0
+
+
+@contextmanager
+def named(case: LoadCase, model: ReducedModel, mode: int, excitation: float) -> Iterator[None]:
+    """A failure inside tells the load that it belongs to, and whether the damper lifts off under
+    it.
+    """
+    try:
+        yield
+    except NotSolvedError as error:
+        travel = seat_travel(model, mode, excitation)
+        pressed = _compression(case)
+        lifts = (
+            ""
+            if travel <= FAR * pressed
+            else (
+                f"the damper lifts off, since the seats move by up to {1e6 * travel:.3g} um "
+                "normal to themselves at the "
+                "resonance without damper, and this load presses them together by "
+                f"{1e6 * pressed:.3g} um only; "
+                "expected a larger load, or contact.normal = 'prescribed': "
+            )
+        )
+        raise NotSolvedError(f"study.loads = {show(case.load, 'N')}: {lifts}{error}") from error
+
+
+def seat_travel(model: ReducedModel, mode: int, excitation: float) -> float:
+    """Largest normal amplitude [m] of a contact point at a resonance without damper; 0 where it
+    plays no part.
+
+    Args:
+        mode: number of the resonance, 1 = lowest.
+        excitation: amplitude of the force on each blade [N].
+    """
+    if model.directions == model.elements.tangents:
+        return 0.0
+    side = model.side(1)
+    omega = free_resonances(model)[mode - 1]
+    load = side.shapes[side.ports["load"]].conj().T @ np.full(
+        side.shapes[side.ports["load"]].shape[0], excitation
+    )
+    normal = side.shapes[side.ports["contact"]][:: model.directions]
+    loss = 2j * model.damping.ratio * side.omega * omega
+    return float(np.abs(normal @ (load / (side.omega**2 - omega**2 + loss))).max())
+
+
+def _compression(case: LoadCase) -> float:
+    """Of the contact springs of one seat under the load [m]."""
+    stiffness = float(case.elements.kn.sum()) / 2
+    return case.load / stiffness if stiffness > 0 else np.inf

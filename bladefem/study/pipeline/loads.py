@@ -1,0 +1,240 @@
+"""Forced responses for a list of damper loads, and the design curve: resonance amplitude against
+load.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from functools import partial
+from typing import Any
+
+import numpy as np
+
+from ...contact.interface_elements import seat_contact
+from ...hbm.solution import Solution
+from ...hbm.sweep import size
+from ...scene.tables import Scene
+from ...util.progress import Progress, unwatched
+from ..adaptive.check_points import peak_of
+from ..adaptive.choice import adapted, checked, estimated
+from ..adaptive.contact_mesh import halved_change
+from ..adaptive.family import Family, member
+from ..adaptive.settings import Settings, restarted
+from .assemble_model import LoadCase
+from .liftoff import named
+from .linear_limits import Limit
+from .stability import Stability, stability_of
+
+Keep = Callable[[LoadCase, Callable[[], Any]], Any]
+
+__all__ = ["Curve", "curve_of", "default_loads", "forgotten", "study_loads", "summary"]
+
+
+def forgotten(case: LoadCase, compute: Callable[[], Any]) -> Any:
+    """The keeper that keeps nothing."""
+    return compute()
+
+
+@dataclass(frozen=True)
+class Curve:
+    """A frequency response; points in ascending frequency, unconverged ones included and marked."""
+
+    # [N]
+    load: float
+    # of the damper [kg]; as meshed when None
+    mass: float | None
+    # with the estimated error at the resonance
+    settings: Settings
+    # (k,) [Hz]
+    frequency: np.ndarray
+    # (k,) root of the sum of squares of the harmonics at the probe [m]
+    amplitude: np.ndarray
+    # (k,) complex first harmonic at the probe [m]
+    first: np.ndarray
+    # (k,) bool
+    converged: np.ndarray
+    # (k,) text
+    method: np.ndarray
+    # (k,) relative residual of the balance
+    residual: np.ndarray
+    # (k,)
+    iterations: np.ndarray
+    # (k,) number of elements that slip or lift off in a period
+    slipping: np.ndarray
+    # (k,) friction work a period [J]
+    dissipated: np.ndarray
+    # (k,) |work put in - work lost| over work put in
+    imbalance: np.ndarray
+    # (k,) estimated relative error of the first harmonic
+    estimated: np.ndarray
+    # (k,) the same as wanted: the scene's accuracy times peak over amplitude
+    tolerated: np.ndarray
+    # (k,) bool: estimated at this very point; else between its neighbours
+    checked: np.ndarray
+    # (k,) "unique", "stable", "unstable", "unknown", or "" where it was not asked for
+    stability: np.ndarray
+    # (k,) largest modulus of the Floquet multipliers; NaN where not computed
+    multiplier: np.ndarray
+    # relative change of the peak's height with half as many contact points; NaN: unknown
+    halved: float
+    # the highest converged point
+    peak: Solution
+
+    @property
+    def peak_frequency(self) -> float:
+        """[Hz]"""
+        return self.peak.frequency
+
+    @property
+    def peak_amplitude(self) -> float:
+        """[m]"""
+        return size(self.peak)
+
+
+def study_loads(
+    scene: Scene,
+    cases: list[LoadCase],
+    family: Callable[[LoadCase], Family],
+    settings: Settings,
+    comm: Any = None,
+    progress: Progress = unwatched,
+    keep: Keep = forgotten,
+) -> list[Curve]:
+    """One response curve a load case, shared over the ranks; every rank returns all of them.
+
+    Light loads come first and take longest, since their contacts slip and lift most.
+
+    Args:
+        family: of a load case, its models.
+        settings: modes and damper model to keep; each case then takes the rest from what its own
+            curve needs.
+        progress: wraps the list of cases of this rank, as tqdm does; the second argument is a
+            label.
+        keep: keep(case, compute) gives the curve of a load, found from an earlier run or computed
+            and kept.
+    """
+    rank, ranks = (comm.rank, comm.size) if comm is not None else (0, 1)
+    curves = {
+        i: keep(cases[i], partial(curve_of, scene, cases[i], family, settings))
+        for i in progress(dealt(len(cases), rank, ranks), "forced responses", delay=0.0)
+    }
+    for part in comm.allgather(curves) if ranks > 1 else []:
+        curves.update(part)
+    return [curves[i] for i in range(len(cases))]
+
+
+def dealt(count: int, rank: int, ranks: int) -> list[int]:
+    """What a rank gets of a list whose items get cheaper: dealt to and fro, 0 3 4 7 .. and 1 2 5 6
+    .. for two ranks.
+    """
+    return [
+        i
+        for i in range(count)
+        if (i % ranks if i // ranks % 2 == 0 else ranks - 1 - i % ranks) == rank
+    ]
+
+
+def curve_of(
+    scene: Scene, case: LoadCase, family: Callable[[LoadCase], Family], settings: Settings
+) -> Curve:
+    """Sweep a band with points where the curve needs them, with settings that hold at its peak and
+    on its flanks.
+
+    Raises:
+        NotSolvedError: no point converged.
+    """
+    models = family(case)
+    mode = scene.excitation.mode
+    with named(case, member(models, settings).model, mode, scene.excitation.force):
+        curve = adapted(
+            models, restarted(settings), scene.study.band, mode, scene.accuracy, fixed=("modes",)
+        )
+    top = peak_of(curve.points)
+    heights = np.array([size(p) for p in curve.points])
+    tolerated = scene.accuracy * size(top) / np.maximum(heights, 1e-6 * size(top))
+    columns = (np.array(c) for c in zip(*map(_record, curve.points), strict=True))
+    marks = Stability(np.full(len(heights), ""), np.full(len(heights), np.nan))
+    if scene.study.stability:
+        marks = stability_of(member(models, curve.settings).model, curve.points)
+    halved = np.nan if scene.contact.points else halved_change(models, curve.settings, top)
+    return Curve(
+        case.load,
+        case.mass,
+        curve.settings,
+        *columns,
+        estimated(curve),
+        tolerated,
+        checked(curve),
+        marks.verdict,
+        marks.multiplier,
+        halved,
+        top,
+    )
+
+
+def _record(p: Solution) -> tuple[object, ...]:
+    return (
+        p.frequency,
+        size(p),
+        p.probe[1, 0],
+        p.converged,
+        p.method,
+        p.residual,
+        p.iterations,
+        p.states["slip"] + p.states["lift"],
+        p.work.dissipated,
+        p.work.imbalance,
+    )
+
+
+def summary(curves: list[Curve], limits: tuple[Limit, Limit]) -> dict[str, np.ndarray]:
+    """The design table: one row a load, from no damper (load 0) to full stick (load inf)."""
+    free, stuck = (_linear_row(limit) for limit in limits)
+    rows = [free, *map(_row, curves), stuck]
+    table = {name: np.array([row[name] for row in rows]) for name in free}
+    if any(c.mass is not None for c in curves):
+        table["mass"] = np.array([np.nan, *(c.mass for c in curves), np.nan])
+    table["reduction"] = free["peak_amplitude"] / table["peak_amplitude"]
+    return table
+
+
+def _row(c: Curve) -> dict[str, float]:
+    return {
+        "load": c.load,
+        "peak_frequency": c.peak_frequency,
+        "peak_amplitude": c.peak_amplitude,
+        "reduction": 1.0,
+        "dissipated": c.peak.work.dissipated,
+        "slipping": c.peak.states["slip"] + c.peak.states["lift"],
+        "error": np.nan if c.settings.error is None else c.settings.error,
+        "halved": c.halved,
+        "harmonics": c.settings.harmonics,
+        "points": len(c.frequency),
+        "unconverged": int((~c.converged).sum()),
+    }
+
+
+def _linear_row(limit: Limit) -> dict[str, float]:
+    return {
+        "load": limit.load,
+        "peak_frequency": limit.peak_frequency,
+        "peak_amplitude": limit.peak_amplitude,
+        "reduction": 1.0,
+        "dissipated": 0.0,
+        "slipping": 0,
+        "error": 0.0,
+        "halved": 0.0,
+        "harmonics": 1,
+        "points": len(limit.frequency),
+        "unconverged": 0,
+    }
+
+
+def default_loads(scene: Scene, count: int = 8) -> tuple[float, ...]:
+    """Loads when none are given: three decades round the force at which friction can hold the
+    excitation.
+    """
+    mu = np.mean([seat_contact(scene.contact, patch).mu for patch in ("this", "next")])
+    held = scene.excitation.force / max(mu, 1e-3)
+    return tuple(float(f"{x:.2g}") for x in np.geomspace(held, 300 * held, count))

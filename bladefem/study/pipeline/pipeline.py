@@ -1,0 +1,463 @@
+"""From a scene to forced responses, stage by stage; each is kept in the run folder and found there
+by the next run.
+"""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable
+from contextlib import contextmanager
+from dataclasses import dataclass, field, replace
+from functools import lru_cache, partial
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from geometry.mesh import Mesh
+
+from ...contact.interface_elements import friction_elements, pair_ratio
+from ...contact.peak_pressure import peak_remarks
+from ...contact.seating import ContactProblem
+from ...contact.seating import solve as seat
+from ...data import ModeSet, Patch, PressureMap
+from ...errors import InputError, NotSolvedError
+from ...io.stage_cache import found_remark, stage
+from ...reduction.truncate import truncated
+from ...scene.tables import Scene
+from ...scene.units import show
+from ...scene.validate import refuse_response
+from ...scene.warnings import doubts
+from ...util.progress import Progress, unwatched
+from ..adaptive.check_points import peak_of
+from ..adaptive.choice import choose, covered
+from ..adaptive.contact_mesh import coarse_sentence, halved_sentence
+from ..adaptive.family import Family, Member, coarsened, member, shared_harmonics
+from ..adaptive.settings import DAMPERS, Settings, enriched, first_settings
+from ..modes.clamped_aerofoil import clamped_blade
+from ..modes.stress import Strength, strength
+from .assemble_model import LoadCase, joint_model
+from .contact_cycle import labels
+from .keys import contact_key, mesh_key, modes_key, reduction_key, response_key, strength_key
+from .liftoff import named
+from .linear_limits import Limit, linear_limits
+from .loads import Curve, default_loads, study_loads
+from .stability import stability_sentence
+from .stages import (
+    Bodies,
+    Reduced,
+    build_mesh,
+    excited_modes,
+    find_modes,
+    harmonic_diameters,
+    reduce_sector,
+    seat_damper,
+    weighted,
+)
+from .validate_mesh import found_patches
+
+__all__ = [
+    "STAGES",
+    "Response",
+    "Run",
+    "Seating",
+    "family_of_case",
+    "load_cases",
+    "reduced_sector",
+    "run",
+    "studied_loads",
+]
+
+# higher ones borrow the nodal diameter next to their own
+EXACT_HARMONICS = 3
+# of the largest balance that the automatic choice solves; model.harmonics may ask for more
+UNKNOWNS = 6000
+STAGES = ("mesh", "modes", "contact", "reduction", "response")
+
+
+@dataclass(frozen=True)
+class Seating:
+    """The seated damper: the condensed problem, and the pressure of each load."""
+
+    problem: ContactProblem
+    # mean normal load of a seat [N] to the map of each patch
+    maps: dict[float, list[PressureMap]]
+    # that load by the damper's own mass at the operating speed [N]
+    own: float | None = None
+
+
+@dataclass(frozen=True)
+class Response:
+    """Forced responses and what they were made with."""
+
+    settings: Settings
+    curves: list[Curve]
+    # no damper, full stick
+    limits: tuple[Limit, Limit]
+
+    @property
+    def free_peak(self) -> tuple[float, float]:
+        """Resonance without damper: [Hz], [m]."""
+        return self.limits[0].peak_frequency, self.limits[0].peak_amplitude
+
+
+@dataclass(frozen=True)
+class Run:
+    """What a run has so far; stages after ``until`` are None."""
+
+    scene: Scene
+    folder: Path | None
+    mesh: Mesh
+    modes: list[ModeSet] | None = None
+    # of the aerofoil held at its root, at rest; None where the blade is that itself
+    clamped: ModeSet | None = None
+    contact: Seating | None = None
+    strength: Strength | None = None
+    reduced: Reduced | None = None
+    response: Response | None = None
+    # stage to seconds
+    timings: dict[str, float] = field(default_factory=dict)
+    messages: list[str] = field(default_factory=list)
+
+
+def run(
+    scene: Scene,
+    folder: str | Path,
+    until: str = "response",
+    comm: Any = None,
+    progress: Progress = unwatched,
+) -> Run:
+    """Run a scene as far as a stage, on all ranks of a communicator.
+
+    Args:
+        folder: the run folder; finished stages are picked up from it.
+        until: one of STAGES.
+        progress: wraps long loops, as tqdm does: progress(items, label).
+
+    Raises:
+        InputError: the scene cannot be run as it is; NotSolvedError: a stage found no solution.
+    """
+    if until in STAGES[3:]:
+        refuse_response(scene)
+    clock = Clock({}, doubts(scene), progress)
+    keep = _Keeper(folder, comm, clock)
+    with clock("mesh"):
+        mesh = keep("mesh", mesh_key(scene), lambda: build_mesh(scene, comm))
+    result = Run(
+        scene,
+        None if folder is None else Path(folder),
+        mesh,
+        timings=clock.seconds,
+        messages=clock.messages,
+    )
+    if until == "mesh":
+        return result
+    check_blade(scene, mesh)
+    patches = [] if until == "modes" else found_patches(scene, mesh, excited=until in STAGES[3:])
+    bodies = Bodies(scene, mesh, comm, progress)
+    with clock("modes"):
+        result = replace(
+            result,
+            modes=keep("modes", modes_key(scene), lambda: find_modes(bodies)),
+            clamped=keep("clamped", modes_key(scene), lambda: clamped_blade(bodies)),
+        )
+    if until == "modes":
+        return result
+    with clock("contact"):
+        problem = keep("contact", contact_key(scene), lambda: seat_damper(bodies, patches))
+        own = _own_load(scene, problem, clock.messages)
+        maps = {
+            load: seat(problem, scene.operation.speed, normal=load, bedded=scene.contact.bedded)
+            for load in studied_loads(scene, own)
+        }
+        if mesh.dimension == 2:
+            clock.messages.extend(
+                filter(None, [coarse_sentence(m for pair in maps.values() for m in pair)])
+            )
+        clock.messages.extend(peak_remarks(maps, scene, mesh.depth))
+        result = replace(result, contact=Seating(problem, maps, own))
+    if until == "contact":
+        return result
+    with clock("stresses"):
+        excited = excited_modes(scene, mesh, result.modes)
+        result = replace(
+            result,
+            strength=keep("strength", strength_key(scene), lambda: strength(bodies, excited)),
+        )
+    cases = load_cases(scene, mesh, result.contact)
+    with clock("reduction"):
+        settings, reduced = reduced_sector(
+            scene, bodies, cases[len(cases) // 2], list(patches), keep
+        )
+    result = replace(result, reduced=reduced)
+    if until == "reduction":
+        return result
+    family = partial(family_of_case, scene, mesh, reduced, list(patches))
+    return replace(
+        result, response=_response(scene, cases, family, settings, keep, clock, progress)
+    )
+
+
+@dataclass(frozen=True)
+class Clock:
+    """Seconds a stage, and what was worth saying; shows the stage at work."""
+
+    seconds: dict[str, float]
+    messages: list[str]
+    progress: Progress = unwatched
+
+    @contextmanager
+    def __call__(self, name: str) -> Any:
+        start = time.perf_counter()
+        try:
+            for _ in self.progress([name], name, delay=0.0, bar_format="{desc} ..."):
+                yield
+        finally:
+            self.seconds[name] = self.seconds.get(name, 0.0) + time.perf_counter() - start
+
+
+@dataclass(frozen=True)
+class _Keeper:
+    """Compute a stage or find it in the folder, and say so."""
+
+    folder: str | Path
+    comm: Any
+    clock: Clock
+
+    def __call__(self, name: str, key: str, compute: Callable[[], Any]) -> Any:
+        return self._said(name, *stage(self.folder, name, key, compute, self.comm))
+
+    def alone(self, name: str, key: str, compute: Callable[[], Any]) -> Any:
+        """The same for what one rank does without the others."""
+        return self._said(name, *stage(self.folder, name, key, compute))
+
+    def _said(self, name: str, result: Any, seconds: float | None) -> Any:
+        if seconds is not None:
+            self.clock.messages.append(found_remark(name, seconds))
+        return result
+
+
+def _response(
+    scene: Scene,
+    cases: list[LoadCase],
+    family: Callable[[LoadCase], Family],
+    settings: Settings,
+    keep: _Keeper,
+    clock: Clock,
+    progress: Progress,
+) -> Response:
+    with clock("response"):
+        curves = study_loads(
+            scene,
+            cases,
+            family,
+            settings,
+            keep.comm,
+            progress,
+            lambda case, make: keep.alone(
+                f"response_{_name(case)}", response_key(scene, settings, case), make
+            ),
+        )
+        band = min(c.frequency[0] for c in curves), max(c.frequency[-1] for c in curves)
+        rich = member(family(cases[-1]), settings).model
+        limits = linear_limits(rich, scene.excitation.mode, band)
+    clock.messages.extend(_remarks(scene, settings, curves, -(-len(cases[0].elements.kt) // 2)))
+    return Response(settings, curves, limits)
+
+
+def _name(case: LoadCase) -> str:
+    """ "90N" or "90N_30g"."""
+    return f"{case.load:g}N" + ("" if case.mass is None else f"_{1e3 * case.mass:g}g")
+
+
+def _own_load(scene: Scene, problem: ContactProblem, messages: list[str]) -> float | None:
+    """Mean normal load of a seat [N] by the damper's mass at the operating speed; None when nothing
+    presses it.
+    """
+    if not scene.operation.speed > 0:
+        return None
+    try:
+        maps = seat(problem, scene.operation.speed, bedded=scene.contact.bedded)
+    except NotSolvedError as error:
+        messages.append(f"the damper's own centrifugal load does not seat it: {error}")
+        return None
+    own = float(np.mean([m.force.sum() for m in maps]))
+    messages.append(
+        f"own load: the damper's {1e3 * problem.mass:.3g} g press each seat with {own:.4g} N at "
+        f"{show(scene.operation.speed, 'rad/s')}"
+    )
+    return own
+
+
+def studied_loads(scene: Scene, own: float | None) -> list[float]:
+    """Mean normal loads of a seat to study [N], ascending with the damper's own one where that is
+    wanted.
+    """
+    given = scene.study.loads or default_loads(scene)
+    if not scene.study.own_load:
+        return list(given)
+    if own is None:
+        raise InputError(
+            "study.own_load = true: nothing presses the damper on its seats at operation.speed = "
+            f"{show(scene.operation.speed, 'rad/s')}, expected a speed that does, or study.loads "
+            "alone"
+        )
+    return sorted({*given, float(f"{own:.4g}")})
+
+
+def load_cases(scene: Scene, mesh: Mesh, contact: Seating) -> list[LoadCase]:
+    """The friction elements of each load, for each mass of the damper."""
+    return [
+        _load_case(scene, mesh, contact, load, mass)
+        for mass in scene.study.masses or (None,)
+        for load in contact.maps
+    ]
+
+
+def family_of_case(
+    scene: Scene, mesh: Mesh, reduced: Reduced, patches: list[Patch], case: LoadCase
+) -> Family:
+    """All models of a load case that the reduced sector allows."""
+    nodes = len(case.elements.kt)
+    reduced = weighted(reduced, case.mass)
+    most = _affordable(case)
+
+    def shared(settings: Settings) -> Member:
+        harmonics = max(settings.harmonics, min(shared_harmonics(settings.harmonics), most))
+        return build(replace(settings, harmonics=harmonics))
+
+    # a point's own model and those of its five indicators
+    @lru_cache(maxsize=6)
+    def build(settings: Settings) -> Member:
+        few = {n: truncated(body, settings.modes) for n, body in reduced.sector.items()}
+        model = joint_model(
+            scene,
+            mesh,
+            replace(reduced, sector=few),
+            patches,
+            case,
+            settings.harmonics,
+            settings.damper,
+        )
+        groups = np.arange(nodes) if settings.points is None else labels(patches, settings.points)
+        return Member(coarsened(model, groups), groups)
+
+    return Family(
+        shared, max(len(body.omega) for body in reduced.sector.values()), 2 * most + 1, DAMPERS
+    )
+
+
+def _affordable(case: LoadCase) -> int:
+    """Harmonics that UNKNOWNS allow with all contact points; twice as many judge them, at single
+    points.
+    """
+    dofs = case.selection.shape[1]
+    return max((h for h in (3, 7, 15, 31) if dofs * (2 * h + 1) <= UNKNOWNS), default=3)
+
+
+def reduced_sector(
+    scene: Scene,
+    bodies: Bodies,
+    case: LoadCase,
+    patches: list[Patch],
+    keep: Callable[[str, str, Callable[[], Any]], Any],
+) -> tuple[Settings, Reduced]:
+    """The sector with as many modes as the resonance of one load needs, and settings to start the
+    others from.
+
+    Where the number of modes is open, twice as many are reduced as the balance takes: they judge
+    it.
+    """
+    settings = replace(first_settings(scene), most=_affordable(case))
+    spare = 1 if scene.model.modes else 2
+    diameters = harmonic_diameters(scene, bodies.mesh, EXACT_HARMONICS)
+    while True:
+        count = spare * settings.modes
+        key = reduction_key(scene, diameters, count)
+        reduced = keep("reduction", key, partial(reduce_sector, bodies, patches, diameters, count))
+        if not settings.chosen:
+            return settings, reduced
+        family = family_of_case(scene, bodies.mesh, reduced, patches, case)
+        model = member(family, settings).model
+        mode = scene.excitation.mode
+        with named(case, model, mode, scene.excitation.force):
+            rough = covered(model, settings, scene.study.band, mode, 1.0)
+        settings, _, found = choose(
+            family, settings, peak_of(rough), scene.accuracy, fixed=("modes",), apart=True
+        )
+        more = enriched(settings, "modes")
+        known = "modes" in settings.chosen and "modes" not in found.unknown
+        if not known or found.errors["modes"] <= scene.accuracy / 10 or more is None:
+            return settings, reduced
+        settings = more
+
+
+def _remarks(scene: Scene, settings: Settings, curves: list[Curve], nodes: int) -> list[str]:
+    """What a reader of the results has to know; ``nodes`` are the contact points of a seat."""
+    remarks = [settings.sentence(nodes), settings.method]
+    if scene.model.static == "uncoupled":
+        remarks.append(
+            "mean displacements held as the static contact solution left them (model.static)"
+        )
+    if scene.study.stability:
+        remarks.append(stability_sentence([(c.stability, c.multiplier) for c in curves]))
+    halved = halved_sentence([c.load for c in curves], [c.halved for c in curves], scene.accuracy)
+    if halved:
+        remarks.append(halved)
+    lost = sum(int((~c.converged).sum()) for c in curves)
+    if lost:
+        remarks.append(
+            f"{lost} of {sum(len(c.frequency) for c in curves)} response points did not converge; "
+            "they are "
+            "marked in tables and pictures"
+        )
+    for c in curves:
+        near = np.flatnonzero(c.frequency == c.peak_frequency)[0] + np.array([-1, 1])
+        if not c.converged[near[(near >= 0) & (near < len(c.frequency))]].all():
+            remarks.append(
+                f"load {c.load:g} N: the highest point that was solved stands beside one that was "
+                "not; the "
+                "resonance may be higher"
+            )
+        if c.settings.error == np.inf:
+            remarks.append(
+                f"load {c.load:g} N: the error of the resonance amplitude is unknown, since "
+                "richer models "
+                "of it were not solved; nothing was refined because of that"
+            )
+        elif c.settings.error is not None and c.settings.error > scene.accuracy:
+            remarks.append(
+                f"load {c.load:g} N: estimated error {100 * c.settings.error:.2g} % of the "
+                "resonance "
+                f"amplitude, above the wanted {100 * scene.accuracy:.2g} %"
+            )
+    return remarks
+
+
+def _load_case(
+    scene: Scene, mesh: Mesh, contact: Seating, load: float, mass: float | None
+) -> LoadCase:
+    ratio = pair_ratio(scene.material.blade, scene.material.damper)
+    elements, selection = friction_elements(
+        contact.problem, contact.maps[load], scene.contact, ratio, mesh.dimension - 1
+    )
+    return LoadCase(load, elements, selection, mass)
+
+
+def check_blade(scene: Scene, mesh: Mesh) -> None:
+    """Modes and responses need a blade, and a blade needs its clamp."""
+    found = {
+        "z mass": "pressure and motion",
+        "hertz": "contact pressure",
+        "punch": "contact pressure",
+    }
+    if scene.kind in found:
+        raise InputError(
+            f"kind '{scene.kind}' has no blade to vibrate: 'bladefem run' computes its "
+            f"{found[scene.kind]}, 'bladefem mesh' draws it"
+        )
+    if "clamp" not in mesh.faces:
+        raise InputError(
+            "the mesh has no face 'clamp' to hold the blade; it has "
+            f"{', '.join(sorted(mesh.faces))}"
+        )

@@ -1,0 +1,373 @@
+"""The stages from a scene to what the balance needs: mesh, modes, seated damper, reduced sector."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+
+from geometry.mesh import Mesh
+
+from ...contact.patch import make_patch
+from ...contact.seating import spin_axis
+from ...data import ModeSet, Patch, PortModel
+from ...errors import InputError, suggestion
+from ...io.stage_cache import on_root
+from ...reduction.assemble import folded_diameter
+from ...scene.part_materials import part_materials
+from ...scene.tables import Material, Scene
+from ...util.progress import Progress, unwatched
+from .ports import blade_ports, damper_ports
+
+__all__ = [
+    "Bodies",
+    "Reduced",
+    "blade_parts",
+    "build_mesh",
+    "contact_patches",
+    "excited_modes",
+    "find_modes",
+    "harmonic_diameters",
+    "is_wheel",
+    "reduce_sector",
+    "seat_damper",
+    "wheel_modes",
+]
+
+# of each nodal diameter, in tables and pictures
+MODES_SHOWN = 10
+# of the elastic damper, its six rigid ones included
+DAMPER_MODES = 16
+
+
+@dataclass(frozen=True)
+class Bodies:
+    """Blade and damper as finite elements, assembled and factorised when first asked for, then
+    kept.
+
+    Vibrations use the stiffness under rotation (stress stiffening, spin softening) about the linear
+    preload, or about the nonlinear one where ``operation.preload`` says so. Seating the damper uses
+    the elastic stiffness at rest, under the whole centrifugal load: both are first-order theory, in
+    which displacements grow with the square of the speed, and the stiffness under rotation would
+    count the rotation twice. For static displacements the difference is of the order of the strain.
+    """
+
+    scene: Scene
+    mesh: Mesh
+    comm: Any = None
+    progress: Progress = unwatched
+
+    @cached_property
+    def still_blade(self) -> Any:
+        """fem.body.Body of the blade at rest."""
+        from ...fem.body import assemble
+
+        mesh, materials = blade_parts(self.scene, self.mesh)
+        return assemble(mesh, tuple(materials), materials, self.comm)
+
+    @cached_property
+    def blade(self) -> Any:
+        """fem.body.Body of the blade, with the stiffness that it has under rotation."""
+        return self.blade_at(self.scene.operation.speed if self.scene.operation.stiffening else 0.0)
+
+    def blade_at(self, speed: float) -> Any:
+        """fem.body.Body of the blade with its stiffness at a speed [rad/s]."""
+        from ...fem.rotation import linear_tangent, spinning
+
+        if speed == 0:
+            return self.still_blade
+        if self.scene.operation.preload == "nonlinear":
+            return spinning(self.still_blade, speed, "clamp", spin_axis(self.mesh))
+        u0 = speed**2 * self.swell
+        return replace(
+            self.still_blade, K=linear_tangent(self.still_blade, u0, speed, spin_axis(self.mesh))
+        )
+
+    @cached_property
+    def swell(self) -> Any:
+        """(n_points, dim) linear displacement of the blade for unit rotation [m s^2]."""
+        from ...fem.rotation import swell
+
+        return swell(self.still, spin_axis(self.mesh))
+
+    @cached_property
+    def damper(self) -> Any:
+        """fem.flexibility.Flexibility of the floating damper."""
+        from ...fem.body import assemble
+        from ...fem.constraint import constrain
+        from ...fem.flexibility import flexible
+
+        return flexible(
+            constrain(
+                assemble(self.mesh, "damper", _damper_material(self.scene, self.mesh), self.comm),
+                clamp=None,
+            )
+        )
+
+    @cached_property
+    def frame(self) -> Any:
+        """fem.constraint.Transformation that serves every nodal diameter."""
+        from ...fem.constraint import transformation
+
+        return transformation(self.blade, "clamp", is_wheel(self.mesh))
+
+    @cached_property
+    def still(self) -> Any:
+        """fem.flexibility.Flexibility of the blade at rest under loads that are the same on all
+        blades.
+        """
+        from ...fem.constraint import in_step
+        from ...fem.flexibility import flexible
+
+        return flexible(in_step(self.still_blade))
+
+    def factorised(self, diameter: int) -> Any:
+        """fem.flexibility.Flexibility of the blade in one nodal diameter, or clamped at its root;
+        under rotation.
+        """
+        from ...fem.constraint import at_diameter
+        from ...fem.flexibility import flexible
+
+        if diameter == 0 and self.blade is self.still_blade:
+            return self.still
+        return flexible(at_diameter(self.frame, diameter if is_wheel(self.mesh) else None))
+
+
+@dataclass(frozen=True)
+class Reduced:
+    """Blade and damper seen from their ports, before they are joined for an engine order."""
+
+    # nodal diameter to the blade's side; key 0 alone for blades clamped at the root
+    sector: dict[int, PortModel]
+    # floating: rigid modes have omega = 0
+    damper: PortModel
+    # contact rows of the patch "next"
+    following: slice
+    # 0 for a row of blades without a wheel
+    sectors: int
+    # of the damper [kg]
+    mass: float
+
+
+def weighted(reduced: Reduced, mass: float | None) -> Reduced:
+    """The same with a damper of another density: its mass [kg] scales, its flexibility stays."""
+    if mass is None:
+        return reduced
+    root = (mass / reduced.mass) ** 0.5
+    damper = replace(
+        reduced.damper, omega=reduced.damper.omega / root, shapes=reduced.damper.shapes / root
+    )
+    return replace(reduced, damper=damper, mass=mass)
+
+
+def build_mesh(scene: Scene, comm: Any = None) -> Mesh:
+    """The scene's mesh, drawn on rank 0 and the same on every rank.
+
+    Raises:
+        InputError: a parameter has to change; the message names it.
+    """
+
+    def draw() -> Mesh:
+        from geometry import build
+
+        return build(scene)
+
+    return on_root(comm, draw)
+
+
+def is_wheel(mesh: Mesh) -> bool:
+    """The blade is a sector of a wheel with elastic disc: it has cut faces."""
+    return "cyclic" in mesh.pairs
+
+
+def contact_patches(mesh: Mesh) -> list[Patch]:
+    """The patches of the damper: "this" on this blade's seat, "next" on the next blade's.
+
+    Raises:
+        InputError: the mesh has no such pairs of faces.
+    """
+    missing = [name for name in ("this", "next") if name not in mesh.pairs]
+    if missing:
+        raise InputError(
+            f"the mesh has no contact pair '{missing[0]}': faces seat_right and damper_left "
+            "(this), "
+            "seat_left and damper_right (next) with matching nodes were expected"
+        )
+    return [make_patch(mesh, name) for name in ("this", "next")]
+
+
+def find_modes(
+    bodies: Bodies, diameters: Sequence[int] | None = None, count: int = MODES_SHOWN
+) -> list[ModeSet]:
+    """Normal modes without damper: of the clamped blade, or of the sector in each nodal diameter.
+
+    Args:
+        diameters: nodal diameters; ``scene.model.nodal_diameters``, or all that the first harmonics
+            of the engine order fall into, when left out.
+        count: modes of each nodal diameter.
+    """
+    from ...fem.modes import modes
+
+    if not is_wheel(bodies.mesh):
+        flex = bodies.factorised(0)
+        return [modes(flex.con, count, flex)]
+    wanted = (
+        diameters
+        or bodies.scene.model.nodal_diameters
+        or harmonic_diameters(bodies.scene, bodies.mesh, 3)
+    )
+    return wheel_modes(bodies, count, wanted)
+
+
+def excited_modes(scene: Scene, mesh: Mesh, modes: Sequence[ModeSet]) -> ModeSet:
+    """The modes of the nodal diameter that the engine order excites, or of the nearest one that is
+    there.
+    """
+    if modes[0].nodal_diameter is None or mesh.sector is None:
+        return modes[0]
+    wanted, _ = folded_diameter(1, scene.excitation.engine_order, mesh.sector.count)
+    return min(modes, key=lambda m: abs(m.nodal_diameter - wanted))
+
+
+def wheel_modes(
+    bodies: Bodies,
+    count: int,
+    diameters: Sequence[int] | None = None,
+    direct: bool = False,
+    group: int | None = None,
+) -> list[ModeSet]:
+    """Normal modes of a wheel in several nodal diameters, which groups of ranks share out.
+
+    Args:
+        diameters: 0 to N/2 when left out.
+        direct: solve every nodal diameter from scratch.
+        group: ranks in a group; as few as memory allows when left out.
+    """
+    from ...fem.all_diameters import all_diameters
+    from ...fem.compat import MPI
+    from ...fem.groups import group_size, shared_out
+
+    comm = bodies.comm or MPI.COMM_WORLD
+    mesh = bodies.mesh
+    wanted = list(range(mesh.sector.count // 2 + 1)) if diameters is None else list(diameters)
+    if comm.size == 1 or len(wanted) == 1:
+        return all_diameters(bodies.frame, count, wanted, direct, progress=bodies.progress)
+    size = group or group_size(comm, mesh.dimension * len(np.unique(mesh.bodies["blade"])))
+    return shared_out(
+        comm,
+        wanted,
+        size,
+        lambda part, some: all_diameters(
+            Bodies(bodies.scene, mesh, part).frame, count, some, direct, progress=bodies.progress
+        ),
+    )
+
+
+def seat_damper(bodies: Bodies, patches: list[Patch]) -> Any:
+    """The contact problem of the damper between two platforms: after it, each load state costs
+    milliseconds.
+
+    Returns:
+        contact.seat.ContactProblem, for :func:`bladefem.contact.seating.solve`.
+    """
+    from ...contact.face_profile import seat_gap
+    from ...contact.seating import contact_problem
+
+    scene = bodies.scene
+    gap = np.concatenate([seat_gap(patch, bodies.mesh, scene.contact) for patch in patches])
+    # a wedge that was drawn here has its clearance in the mesh
+    if scene.kind == "imported":
+        gap = gap + scene.damper.clearance
+    return contact_problem(bodies.mesh, patches, bodies.still, bodies.damper, gap)
+
+
+def harmonic_diameters(scene: Scene, mesh: Mesh, harmonics: int) -> list[int]:
+    """Nodal diameters that harmonics 0..H of the engine order fall into, sorted; [0] for blades
+    without a wheel.
+    """
+    if not is_wheel(mesh):
+        return [0]
+    order = scene.excitation.engine_order
+    count = mesh.sector.count
+    return sorted({folded_diameter(h, order, count)[0] for h in range(harmonics + 1)})
+
+
+def reduce_sector(
+    bodies: Bodies, patches: list[Patch], diameters: Sequence[int], modes: int
+) -> Reduced:
+    """Blade side in each nodal diameter and damper side, at the contact, load and probe ports.
+
+    Args:
+        patches: "this" and "next".
+        modes: modes kept in each nodal diameter.
+    """
+    from ...fem.loads import mass
+    from ...fem.ports import port_model, port_models
+
+    scene = bodies.scene
+    mesh = bodies.mesh
+    ports = blade_ports(mesh, patches, scene.excitation)
+    other = damper_ports(mesh, patches)
+    kind = scene.model.reduction
+    if is_wheel(mesh):
+        solved = port_models(bodies.frame, ports.matrix, ports.names, modes, diameters, kind=kind)
+        sector = dict(bodies.progress(solved, "nodal diameters", len(diameters)))
+    else:
+        flex = bodies.factorised(0)
+        sector = {0: port_model(flex.con, ports.matrix, ports.names, modes, kind=kind, flex=flex)}
+    floating = port_model(
+        bodies.damper.con, other.matrix, other.names, DAMPER_MODES, flex=bodies.damper
+    )
+    first = len(patches[0].area) * mesh.dimension
+    return Reduced(
+        sector,
+        floating,
+        slice(first, first + len(patches[1].area) * mesh.dimension),
+        mesh.sector.count if is_wheel(mesh) else 0,
+        mass(bodies.damper.con.body),
+    )
+
+
+def blade_parts(scene: Scene, mesh: Mesh) -> tuple[Mesh, dict[str, Material]]:
+    """The mesh with the volumes of other materials as bodies beside the rest of the blade, and the
+    material of each.
+
+    Raises:
+        InputError: a volume with a material that the mesh does not have, or that shares cells with
+            another one.
+    """
+    given = part_materials(scene) if scene.kind == "imported" else {}
+    if not given:
+        return mesh, {"blade": scene.material.blade}
+    cells = mesh.bodies["blade"]
+    owner = np.zeros(len(mesh.bodies["blade"]), int)
+    for i, name in enumerate(given, 1):
+        if name not in mesh.parts:
+            raise InputError(
+                f"imported.materials: the mesh has no volume '{name}'{suggestion(name, mesh.parts)}"
+            )
+        if owner[mesh.parts[name]].any():
+            raise InputError(
+                f"imported.materials: volume '{name}' shares cells with another one, "
+                "expected separate ones"
+            )
+        owner[mesh.parts[name]] = i
+    names = [("blade", scene.material.blade), *given.items()]
+    some = [(i, name) for i, (name, _) in enumerate(names) if (owner == i).any()]
+    bodies = {f"blade, {name}": cells[owner == i] for i, name in some}
+    return replace(mesh, bodies={**mesh.bodies, **bodies}), {
+        f"blade, {name}": names[i][1] for i, name in some
+    }
+
+
+def _damper_material(scene: Scene, mesh: Mesh) -> Material:
+    """The damper's material, its density set by the given mass where there is one."""
+    from ...fem.loads import volume
+
+    given = scene.plane.damper_mass if scene.kind == "plane blades" else scene.damper.mass
+    if given is None:
+        return scene.material.damper
+    return replace(scene.material.damper, rho=given / volume(mesh, "damper"))

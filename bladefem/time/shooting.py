@@ -1,0 +1,165 @@
+"""Periodic solutions by shooting on the exact flow, with their Floquet multipliers.
+
+Unknown is the state (q, v, z) at the start of a period, the residual is its change over the period,
+the Jacobian is the monodromy matrix minus one, exact across events. Sliders that never move have a
+multiplier of exactly one: their value is free (the mean force of a stuck contact is not determined
+by the periodic motion) and the step of least norm leaves them where the preload put them. Undamped
+stuck dampers, which time integration from rest never brings to a cycle, are no special case here.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from .event_integrator import Flow, State, flow, stuck_start
+from .system import System
+
+__all__ = ["Periodic", "harmonics", "multipliers", "periodic", "work"]
+
+
+@dataclass(frozen=True)
+class Periodic:
+    """A periodic solution, or the last attempt with the reason."""
+
+    # base circular frequency [rad/s]
+    omega: float
+    # one period from the solution, with its tangent
+    flow: Flow
+    # state at t = 0
+    start: State
+    # change over the period over the size of the motion [1]
+    residual: float
+    # Newton steps, those after marching included
+    iterations: int
+    # periods integrated altogether
+    periods: int
+    # "periodic", or why it stopped
+    reason: str
+
+    @property
+    def converged(self) -> bool:
+        return self.reason == "periodic"
+
+
+def periodic(
+    system: System,
+    omega: float,
+    start: State | None = None,
+    tolerance: float = 1e-10,
+    most: int = 40,
+    samples: int = 256,
+) -> Periodic:
+    """A periodic solution near ``start`` (the stuck motion when left out).
+
+    Newton with step halving; where Newton makes no headway some periods are marched instead, since
+    the flow of a dissipative system leads towards its attractor.
+
+    Args:
+        tolerance: accepted change over one period, relative to the size of the motion.
+        most: largest number of Newton steps.
+        samples: equal instants a period in the returned flow.
+    """
+    state = start or stuck_start(system, omega)
+    scale = _scale(system, omega, state)
+    now = flow(system, omega, state, samples, tangent=True)
+    residual = _residual(now, state, scale)
+    periods = 1
+    for iteration in range(most):
+        if now.reason != "done":
+            return Periodic(omega, now, state, residual, iteration, periods, now.reason)
+        if residual < tolerance:
+            return Periodic(omega, now, state, residual, iteration, periods, "periodic")
+        move = _newton(now, state, scale)
+        for halving in range(4):
+            trial = _shift(state, move * 0.5**halving)
+            attempt = flow(system, omega, trial, samples, tangent=True)
+            periods += 1
+            if _residual(attempt, trial, scale) < 0.9 * residual:
+                break
+        else:
+            trial = flow(system, omega, now.state, samples, 8).state
+            attempt = flow(system, omega, trial, samples, tangent=True)
+            periods += 9
+        state = trial
+        now = attempt
+        scale = _scale(system, omega, trial)
+        residual = _residual(now, state, scale)
+    reason = (
+        "periodic"
+        if residual < tolerance
+        else f"change {residual:.1e} over a period after {most} Newton steps"
+    )
+    return Periodic(omega, now, state, residual, most, periods, reason)
+
+
+def multipliers(solution: Periodic) -> np.ndarray:
+    """Floquet multipliers (2d + n,), largest modulus first; stable when none exceeds one.
+
+    One multiplier equals one for each element that sticks through the whole period: a neutral shift
+    of its slider.
+    """
+    values = np.linalg.eigvals(solution.flow.tangent)
+    return values[np.argsort(-np.abs(values))]
+
+
+def harmonics(solution: Periodic, system: System, highest: int) -> np.ndarray:
+    """Complex harmonics 0..highest of the probe (k, highest + 1) [m], Re(c e^{j h w t})."""
+    return _fourier(solution.flow.q @ system.probe.T, highest)
+
+
+def work(solution: Periodic, system: System) -> tuple[float, float]:
+    """Work of the excitation and of friction and damping in one period [J]; equal in a periodic
+    motion.
+
+    By the trapezoidal rule on the samples, which is spectrally accurate for smooth parts and second
+    order for kinks.
+    """
+    path = solution.flow
+    t = np.arange(len(path.q)) / len(path.q)
+    angles = 2 * np.pi * np.outer(np.arange(1, system.coefficients // 2 + 1), t)
+    basis = np.ones((system.coefficients, len(t)))
+    basis[1::2], basis[2::2] = np.cos(angles), np.sin(angles)
+    step = 2 * np.pi / solution.omega / len(t)
+    rate = path.v @ system.W.T
+    spent = np.sum(path.force * rate) + np.sum(path.v * (path.v @ system.damping.T))
+    return step * float(np.sum((system.force @ basis).T * path.v)), step * float(spent)
+
+
+def _fourier(signal: np.ndarray, highest: int) -> np.ndarray:
+    lines = np.fft.rfft(signal, axis=0)[: highest + 1].T / len(signal)
+    lines[:, 1:] *= 2
+    return lines
+
+
+def _scale(system: System, omega: float, state: State) -> np.ndarray:
+    """Sizes of (q, v, z): one length for q and z each, the velocity by the base frequency."""
+    d = len(state.q)
+    n = len(state.z)
+    q = max(np.abs(state.q).max(), np.abs(state.v).max() / omega, 1e-12)
+    z = max(q * np.abs(system.W).max(), np.abs(system.drive).max(), 1e-12)
+    return np.r_[np.full(d, q), np.full(d, q * omega), np.full(n, z)]
+
+
+def _pack(state: State) -> np.ndarray:
+    return np.r_[state.q, state.v, state.z]
+
+
+def _residual(now: Flow, state: State, scale: np.ndarray) -> float:
+    return (
+        float(np.abs((_pack(now.state) - _pack(state)) / scale).max())
+        if now.reason == "done"
+        else np.inf
+    )
+
+
+def _newton(now: Flow, state: State, scale: np.ndarray) -> np.ndarray:
+    """Least-norm step in the scaled unknowns, back in their units."""
+    J = (now.tangent - np.eye(len(scale))) * (scale / scale[:, None])
+    return scale * np.linalg.lstsq(J, (_pack(state) - _pack(now.state)) / scale, rcond=1e-11)[0]
+
+
+def _shift(state: State, move: np.ndarray) -> State:
+    d = len(state.q)
+    return State(state.q + move[:d], state.v + move[d : 2 * d], state.z + move[2 * d :])

@@ -1,0 +1,216 @@
+"""The complete coupled system in time: modes, dampers and one-dimensional friction elements with a
+normal load.
+
+    q'' + D q' + L q = p(t) - W^T f - R^T (max(N, 0) - n0),    w = W q + g(t),    N = n(t) + V q
+
+q are mass-normalised coordinates (modes of the blades, sqrt(mass) times the motion of rigid
+dampers), w the tangential displacement of blade minus damper, N the normal force and f the friction
+force that the damper feels: stick f = k_t (w - z), slip f = +-mu N, separation f = 0 where N <= 0.
+With contact springs k_n that follow the motion, R reads the normal displacement and V = k_n R; n0
+is the mean of n, carried by the preload state.
+
+All periodic inputs are real Fourier coefficients [mean, cos, sin, cos 2, sin 2, ...] of one base
+frequency.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from bladefem.data import Elements, PortModel
+from bladefem.errors import InputError
+
+__all__ = ["System", "damper_on_platforms", "oscillator", "ring"]
+
+
+@dataclass(frozen=True)
+class System:
+    """Matrices of the equations above; d coordinates, n elements, H harmonics of the inputs."""
+
+    # (d,) L, squared circular frequencies [1/s^2]
+    stiffness: np.ndarray
+    # (d, d) D [1/s]
+    damping: np.ndarray
+    # (n, d) tangential readings [kg^-1/2]
+    W: np.ndarray
+    # (n,) [N/m]
+    kt: np.ndarray
+    # (n,) [1]
+    mu: np.ndarray
+    # (d, 2H+1) p [N kg^-1/2]
+    force: np.ndarray
+    # (n, 2H+1) g, prescribed part of w [m]
+    drive: np.ndarray
+    # (n, 2H+1) n, prescribed part of N [N]
+    normal: np.ndarray
+    # (n, d) normal force for each coordinate [N kg^-1/2 / m]; zero when prescribed
+    V: np.ndarray
+    # (k, d) readings of interest [kg^-1/2]
+    probe: np.ndarray
+    # (n, d) normal readings, where normal forces react on q [kg^-1/2]; none: zeros
+    R: np.ndarray | None = None
+
+    def __post_init__(self) -> None:
+        n, d = self.W.shape
+        shapes = {
+            "stiffness": (d,),
+            "damping": (d, d),
+            "kt": (n,),
+            "mu": (n,),
+            "V": (n, d),
+            "force": (d, self.coefficients),
+            "drive": (n, self.coefficients),
+            "normal": (n, self.coefficients),
+        }
+        if self.R is None:
+            object.__setattr__(self, "R", np.zeros((n, d)))
+        for name, shape in (shapes | {"R": (n, d)}).items():
+            value = getattr(self, name)
+            if value.shape != shape or not np.isfinite(value).all():
+                raise InputError(
+                    f"System.{name} of shape {value.shape}: expected {shape} finite numbers"
+                )
+        if np.any(self.kt <= 0) or np.any(self.mu < 0):
+            raise InputError(
+                "System.kt, System.mu: expected stiffnesses above zero and no negative friction"
+            )
+
+    @property
+    def coefficients(self) -> int:
+        """2H+1"""
+        return self.force.shape[1]
+
+    @property
+    def fastest(self) -> float:
+        """Highest circular frequency, all elements stuck [rad/s]."""
+        K = np.diag(self.stiffness) + (self.W.T * self.kt) @ self.W + self.R.T @ self.V
+        return float(np.sqrt(np.linalg.eigvalsh((K + K.T) / 2).max()))
+
+
+def ring(
+    body: PortModel,
+    ratio: float,
+    elements: Elements,
+    mass: float,
+    excitation: complex,
+    blades: int = 1,
+    waves: int = 0,
+) -> System:
+    """Blades in a ring with a rigid tangential damper between each two, under a travelling force.
+
+    The contact port of ``body`` holds the elements on its own damper first, then those on the
+    damper of the blade before, half and half; the force on blade b is Re(excitation e^{j (t + 2 pi
+    waves b / blades)}) on the load port.
+
+    Args:
+        ratio: modal damping ratio [1].
+        elements: for one blade, tangents = 1, both halves (n,).
+        mass: of one damper [kg].
+    Raises:
+        InputError: the residual flexibility is not zero (keep all modes, or leave it out
+            knowingly), or an odd port.
+    """
+    if np.abs(body.residual).max() > 0:
+        raise InputError(
+            "body.residual: a massless flexibility has no place in time integration; keep all "
+            "modes, or "
+            "replace it by zeros"
+        )
+    m = len(body.omega)
+    n = len(elements.kt)
+    contact = body.shapes[body.ports["contact"]]
+    if contact.shape[0] != n or n % 2 or np.iscomplexobj(contact):
+        raise InputError(
+            f"contact port of {contact.shape[0]} dofs for {n} elements: expected two equal "
+            "halves, real"
+        )
+    size = m + 1
+    half = n // 2
+    W = np.zeros((blades * n, blades * size))
+    force = np.zeros((blades * size, 3))
+    for b in range(blades):
+        before = (b - 1) % blades
+        rows = slice(b * n, (b + 1) * n)
+        W[rows, b * size : b * size + m] = contact
+        W[b * n : b * n + half, b * size + m] -= mass**-0.5
+        W[b * n + half : (b + 1) * n, before * size + m] -= mass**-0.5
+        amplitude = (
+            excitation
+            * np.exp(2j * np.pi * waves * b / blades)
+            * body.shapes[body.ports["load"]][0]
+        )
+        force[b * size : b * size + m, 1], force[b * size : b * size + m, 2] = (
+            amplitude.real,
+            -amplitude.imag,
+        )
+    probe = np.zeros((1, blades * size))
+    probe[0, :m] = body.shapes[body.ports["probe"]][0]
+    omega = np.tile(np.r_[body.omega, 0.0], blades)
+    extra = np.zeros((m, m)) if body.damping is None else body.damping
+    one = np.pad(np.diag(2 * ratio * body.omega) + extra, (0, 1))
+    return System(
+        omega**2,
+        np.kron(np.eye(blades), one),
+        W,
+        np.tile(elements.kt, blades),
+        np.tile(elements.mu, blades),
+        force,
+        np.zeros((blades * n, 3)),
+        np.tile(elements.n0[:, None] * [1.0, 0.0, 0.0], (blades, 1)),
+        np.zeros_like(W),
+        probe,
+    )
+
+
+def damper_on_platforms(motion: np.ndarray, elements: Elements, mass: float) -> System:
+    """A rigid damper with one freedom on platforms whose motion is prescribed (the paper's Fig.
+    13).
+
+    Args:
+        motion: (n, H+1) complex harmonics 0..H of the platform at each element [m].
+        mass: of the damper [kg].
+    """
+    n = len(elements.kt)
+    coefficients = 2 * motion.shape[1] - 1
+    drive = np.zeros((n, coefficients))
+    drive[:, 0], drive[:, 1::2], drive[:, 2::2] = (
+        motion[:, 0].real,
+        motion[:, 1:].real,
+        -motion[:, 1:].imag,
+    )
+    normal = np.zeros((n, coefficients))
+    normal[:, 0] = elements.n0
+    W = np.full((n, 1), -(mass**-0.5))
+    return System(
+        np.zeros(1),
+        np.zeros((1, 1)),
+        W,
+        elements.kt,
+        elements.mu,
+        np.zeros((1, coefficients)),
+        drive,
+        normal,
+        np.zeros((n, 1)),
+        np.full((1, 1), mass**-0.5),
+    )
+
+
+def oscillator(omega: float, ratio: float, kt: float, limit: float, force: complex) -> System:
+    """One unit mass on a spring, with one friction element to the ground: the smallest system of
+    its kind.
+    """
+    zero = np.zeros((1, 3))
+    return System(
+        np.array([omega**2]),
+        np.array([[2 * ratio * omega]]),
+        np.ones((1, 1)),
+        np.array([kt]),
+        np.ones(1),
+        np.array([[0.0, force.real, -force.imag]]),
+        zero,
+        np.array([[limit, 0, 0]]),
+        np.zeros((1, 1)),
+        np.ones((1, 1)),
+    )

@@ -1,0 +1,1 @@
+"""Progress bars and names that load on first use."""

@@ -1,0 +1,166 @@
+"""The last steps of every build: raise the order, extract, pair, snap, check and straighten,
+report.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from types import ModuleType
+
+import numpy as np
+
+from bladefem.errors import InputError
+
+from .curving import second_order
+from .extract_arrays import Groups, extract
+from .matching import match, snap
+from .mesh import Mesh, Sector
+from .parameters import MeshSize
+from .quality import edge_of_middle, report, shape_quality, straighten
+
+__all__ = ["Motion", "check_count", "complete", "mesh_model"]
+
+# cells; far beyond what one machine solves
+MANY = 3e6
+# shape quality that asks for a second round of optimisation
+POOR = 0.1
+# shape quality of a tetrahedron that is refused
+FLAT = 0.02
+ALGORITHMS = {"hxt": 10, "delaunay": 1}
+# master, slave, rotation (3, 3), shift (3,) [m]
+Motion = tuple[str, str, np.ndarray, np.ndarray]
+
+
+def mesh_model(gmsh: ModuleType, groups: Groups, dimension: int, size: MeshSize) -> Mesh:
+    """Generate the mesh of the current model, raise its order, and extract it.
+
+    Raises:
+        InputError: the elements are far too many, or flat ones are left whatever is tried.
+    """
+    if size.size:
+        check_count(gmsh, dimension, size.scale * size.size)
+    gmsh.option.setNumber("Mesh.MeshSizeFactor", size.scale)
+    gmsh.model.mesh.generate(2)
+    if dimension == 3:
+        fill(gmsh, groups, size.algorithm)
+    refuse_flat(_corners(gmsh, groups, dimension))
+    if size.order == 2:
+        second_order(gmsh, size.curved)
+    return extract(gmsh, groups, dimension)
+
+
+def fill(gmsh: ModuleType, groups: Groups, first: str) -> None:
+    """Fill the volumes with tetrahedra by one algorithm, then by the other when the first fails or
+    leaves flat cells.
+
+    Raises:
+        Exception: gmsh's own, when the last algorithm fails.
+    """
+    for algorithm in sorted(ALGORITHMS, key=lambda name: name != first):
+        gmsh.option.setNumber("Mesh.Algorithm3D", ALGORITHMS[algorithm])
+        try:
+            gmsh.model.mesh.generate(3)
+            if improve(gmsh, groups) > FLAT:
+                return
+        except Exception:
+            # gmsh raises the bare class
+            if algorithm != first:
+                raise
+
+
+def refuse_flat(mesh: Mesh) -> None:
+    """Refuse a mesh with flat cells, and say where they are.
+
+    Raises:
+        InputError: a cell's shape quality is not above FLAT.
+    """
+    cells = np.vstack(list(mesh.bodies.values()))
+    shape = shape_quality(mesh.points, cells, mesh.cell_type)
+    if shape.min() > FLAT:
+        return
+    x, y, z = 1e3 * mesh.points[cells[shape.argmin()]].mean(axis=0)
+    raise InputError(
+        f"mesh.size: {np.count_nonzero(shape <= FLAT)} flat cells are left (the worst has shape "
+        "quality "
+        f"{shape.min():.1g} at x, y, z = {x:.4g}, {y:.4g}, {z:.4g} mm, expected above {FLAT}); "
+        "choose a "
+        "smaller mesh.size, or change the parts that nearly coincide there"
+    )
+
+
+def check_count(gmsh: ModuleType, dimension: int, size: float, name: str = "mesh.size") -> None:
+    """Refuse a mesh that would never end.
+
+    Raises:
+        InputError: elements of this size [m] in all bodies would be more than MANY.
+    """
+    low, high = np.array(gmsh.model.getBoundingBox(-1, -1)).reshape(2, 3)
+    mass = sum(gmsh.model.occ.getMass(d, tag) for d, tag in gmsh.model.getEntities(dimension))
+    count = min(mass, np.prod((high - low)[:dimension])) / (
+        0.12 * size**3 if dimension == 3 else 0.43 * size**2
+    )
+    if count > MANY:
+        raise InputError(
+            f"{name} = {size:.4g} m gives about {count:.1g} cells, expected at most {MANY:.0e}; "
+            "choose larger elements, or check the length unit"
+        )
+
+
+def improve(gmsh: ModuleType, groups: Groups) -> float:
+    """Let Netgen and then gmsh rework the tetrahedra when some are poor; the worst shape quality
+    that is left.
+
+    Either alone leaves more of them.
+    """
+    for method in ("Netgen", ""):
+        if (worst := _worst_shape(_corners(gmsh, groups, 3))) > POOR:
+            return worst
+        gmsh.model.mesh.optimize(method, True)
+    return _worst_shape(_corners(gmsh, groups, 3))
+
+
+def _corners(gmsh: ModuleType, groups: Groups, dimension: int) -> Mesh:
+    """The first-order mesh as it stands, without its faces."""
+    return extract(gmsh, Groups(groups.bodies, {}), dimension)
+
+
+def _worst_shape(mesh: Mesh) -> float:
+    return min(
+        shape_quality(mesh.points, cells, mesh.cell_type).min() for cells in mesh.bodies.values()
+    )
+
+
+def complete(
+    mesh: Mesh,
+    motions: dict[str, Motion],
+    size: float,
+    sector: Sector | None = None,
+    flat: tuple[str, ...] = (),
+) -> Mesh:
+    """Pair the faces, make the pairs exact, straighten doubtful cells, and write the report.
+
+    Args:
+        motions: pair name -> (master, slave, rotation, shift).
+        size: element size [m], for the report.
+        flat: plane faces, whose mid-side nodes go to the middle of their edges exactly (contact
+            needs it).
+    """
+    mesh = replace(mesh, points=_flatten(mesh, flat))
+    pairs = {
+        name: match(mesh.points, mesh.faces, (m, s), mesh.dimension, r, t)
+        for name, (m, s, r, t) in motions.items()
+    }
+    mesh = replace(mesh, points=snap(mesh.points, pairs), pairs=pairs, sector=sector)
+    points, straightened = straighten(mesh)
+    mesh = replace(mesh, points=snap(points, pairs))
+    return replace(mesh, report=report(mesh, straightened, size))
+
+
+def _flatten(mesh: Mesh, names: tuple[str, ...]) -> np.ndarray:
+    points = mesh.points.copy()
+    ends = edge_of_middle(mesh)
+    for name in names:
+        nodes = np.unique(mesh.faces[name])
+        middle = nodes[ends[nodes, 0] >= 0]
+        points[middle] = points[ends[middle]].mean(axis=1)
+    return points

@@ -1,0 +1,115 @@
+"""A build in a process of its own: gmsh may crash there without taking the session, or the other
+ranks, with it.
+
+    python -m geometry.isolated_process JOB ANSWER
+
+reads a pickled scene from the file JOB, and writes a Mesh or the reason of a refusal to the file
+ANSWER.
+"""
+
+from __future__ import annotations
+
+import os
+import pickle
+import subprocess
+import sys
+import tempfile
+from dataclasses import replace
+from pathlib import Path
+from types import SimpleNamespace
+from typing import Any
+
+from bladefem.errors import InputError
+
+from .mesh import Mesh
+
+__all__ = ["build_apart"]
+
+# seconds; the largest meshes that are accepted take a tenth of it
+LIMIT = 900
+# element size of the second try
+SMALLER = 0.9
+ROOT = Path(__file__).parents[1]
+# a child that saw these would join the ranks
+MPI = ("OMPI_", "PMIX_", "PMI_", "PRTE_", "ORTE_", "HYDRA_", "MPI_")
+
+
+def build_apart(scene: Any) -> Mesh:
+    """The mesh of a scene, made in a child process; after a crash with the other algorithm and
+    smaller elements.
+
+    Raises:
+        InputError: a parameter has to change; also when every try crashed or took longer than
+            LIMIT.
+        RuntimeError: the child failed in another way; the message holds its last words.
+    """
+    for size in _tries(scene.mesh):
+        answer = _ask(SimpleNamespace(**vars(scene) | {"mesh": size}))
+        if isinstance(answer, Mesh):
+            return answer
+        if isinstance(answer, Exception):
+            raise answer
+    raise InputError(
+        f"mesh.size: gmsh {answer} on this {scene.kind} with both algorithms, expected a geometry "
+        "that it "
+        "can mesh; change mesh.size, or the parameter that was changed last"
+    )
+
+
+def _tries(size: Any) -> list[Any]:
+    """Mesh settings to try one after the other."""
+    other = "delaunay" if size.algorithm == "hxt" else "hxt"
+    smaller = {"size": SMALLER * size.size} if size.size else {}
+    return [size, replace(size, algorithm=other, **smaller)]
+
+
+def _ask(scene: SimpleNamespace) -> Mesh | Exception | str:
+    """The child's answer; a word when it died or did not end."""
+    with tempfile.TemporaryDirectory(prefix="bladefem-") as folder:
+        job = Path(folder, "job")
+        answer = Path(folder, "answer")
+        job.write_bytes(pickle.dumps(scene))
+        try:
+            done = subprocess.run(
+                [sys.executable, "-m", "geometry.isolated_process", job, answer],
+                env=_environment(),
+                stdin=subprocess.DEVNULL,
+                capture_output=True,
+                text=True,
+                timeout=LIMIT,
+            )
+        except subprocess.TimeoutExpired:
+            return f"did not end in {LIMIT} s"
+        if done.returncode < 0:
+            return f"crashed (signal {-done.returncode})"
+        if done.returncode:
+            raise RuntimeError(
+                f"the process that builds the mesh failed: {done.stderr.strip()[-1000:]}"
+            )
+        return pickle.loads(answer.read_bytes())
+
+
+def _environment() -> dict[str, str]:
+    """This process's environment without what belongs to MPI, the project's folder first on the
+    path.
+    """
+    clean = {name: value for name, value in os.environ.items() if not name.startswith(MPI)}
+    path = [str(ROOT), *filter(None, [clean.get("PYTHONPATH")])]
+    return clean | {"PYTHONPATH": os.pathsep.join(path)}
+
+
+def main(job: str, answer: str) -> None:
+    """The child."""
+    from .builders import build_here
+
+    scene = pickle.loads(Path(job).read_bytes())
+    try:
+        result: Mesh | InputError = build_here(scene)
+    except InputError as error:
+        # without its cause, which need not be picklable
+        result = InputError(str(error))
+    Path(answer).write_bytes(pickle.dumps(result, protocol=pickle.HIGHEST_PROTOCOL))
+
+
+if __name__ == "__main__":
+    main(*sys.argv[1:])
