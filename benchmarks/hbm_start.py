@@ -28,12 +28,12 @@ SOLVER = (
 )
 FIRST = """
 from bladefem.hbm.reference import reference_model
-from bladefem.hbm.api import solve
+from bladefem.hbm.solve import solve
 assert solve(reference_model(load=1.4), 8300.0, 3, 128).converged
 """
 SPACE = """
 from hbm_models import patch
-from bladefem.hbm.api import solve
+from bladefem.hbm.solve import solve
 assert solve(patch(4, 6).model, 0.9, 3, 128).converged
 """
 TIMED = """

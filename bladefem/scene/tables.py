@@ -1,5 +1,5 @@
 """A scene: everything that an engineer decides, as frozen dataclasses in SI units. Reading TOML is
-in scene_file.py.
+in toml.py.
 
 Numerical settings that are ``None`` are chosen by error indicators from ``accuracy``.
 """
