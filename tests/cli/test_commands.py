@@ -14,7 +14,7 @@ import pandas as pd
 import pytest
 
 import bladefem.report
-import bladefem.study
+import bladefem.study.pipeline
 from bladefem.cli.main import main, parser
 from bladefem.data import ModeSet, Patch, PressureMap
 from bladefem.errors import InputError, NotSolvedError
@@ -112,7 +112,7 @@ def pipeline(monkeypatch):
 
     replace_module(monkeypatch, bladefem.report, "modes", modes)
     replace_module(monkeypatch, bladefem.report, "pressure", contact)
-    replace_module(monkeypatch, bladefem.study, "pipeline", run)
+    replace_module(monkeypatch, bladefem.study.pipeline, "pipeline", run)
     replace_module(monkeypatch, bladefem.report, "run", report)
     return SimpleNamespace(calls=calls, state=state)
 
@@ -473,7 +473,7 @@ INTERRUPTED = """
 import sys, time
 from pathlib import Path
 from types import SimpleNamespace
-import bladefem.study
+import bladefem.study.pipeline
 def run(scene, folder, until, comm=None, progress=None):
     from bladefem.store import stage
     stage(folder, "mesh", "key", lambda: 1.5)
