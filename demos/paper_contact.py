@@ -20,7 +20,7 @@ from bladefem.study.kinds.punch import (
     ring_stiffness,
     spring_tilt,
 )
-from bladefem.view.paper_contact import draw_punch
+from verification.paper.view_contact import draw_punch
 
 coarse, comm = "BLADEFEM_COARSE" in os.environ, MPI.COMM_WORLD
 scene = bladefem.load_scene("scenes/punch.toml", ["mesh.contact_size=0.4 mm"] if coarse else [])

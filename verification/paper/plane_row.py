@@ -15,17 +15,17 @@ from typing import Any
 
 import numpy as np
 
-from ..contact.interface_elements import friction_elements, pair_ratio
-from ..contact.seating import ContactProblem, solve
-from ..data import RigidBody
-from ..errors import InputError
-from ..hbm.model import ReducedModel
-from ..io.stage_cache import stage
-from ..reduction.assemble import recombine
-from ..scene.tables import Scene
-from .pipeline.assemble_model import LoadCase, joint_model
-from .pipeline.keys import contact_key
-from .pipeline.stages import (
+from bladefem.contact.interface_elements import friction_elements, pair_ratio
+from bladefem.contact.seating import ContactProblem, solve
+from bladefem.data import RigidBody
+from bladefem.errors import InputError
+from bladefem.hbm.model import ReducedModel
+from bladefem.io.stage_cache import stage
+from bladefem.reduction.assemble import recombine
+from bladefem.scene.tables import Scene
+from bladefem.study.pipeline.assemble_model import LoadCase, joint_model
+from bladefem.study.pipeline.keys import contact_key
+from bladefem.study.pipeline.stages import (
     Bodies,
     Reduced,
     build_mesh,
