@@ -35,12 +35,14 @@ def check(options: argparse.Namespace, comm: Any) -> None:
     from ..io.stage_cache import on_root
     from ..scene.toml import given_keys, read_tables, resolved, scene_of
     from ..scene.warnings import doubts
+    from ..study.pipeline.preflight import refuse_run
 
     file = scene_path(options.scene)
 
     def table() -> str:
         written = read_tables(file, options.overrides)
         scene = scene_of(written, file.resolve().parent)
+        refuse_run(scene)
         rows = tables.resolved_scene(resolved(scene, given_keys(written)))
         return "\n".join([rows, *(f"note: {doubt}" for doubt in doubts(scene))])
 
@@ -239,6 +241,10 @@ def given_scene(options: argparse.Namespace, responds: bool) -> Scene:
     scene = load_scene(scene_path(options.scene), options.overrides)
     if responds:
         refuse_response(scene)
+    if responds or options.command == "contact":
+        from ..study.pipeline.preflight import refuse_run
+
+        refuse_run(scene)
     return scene
 
 

@@ -15,7 +15,7 @@ from typing import Any, NamedTuple, get_type_hints
 from ..errors import InputError, suggestion
 from .fields import TABLES, Field, convert, each_field, field_at, used_tables, value_at
 from .tables import Scene
-from .units import exact, show
+from .units import exact, shortened, show
 from .validate import validate
 
 __all__ = ["Row", "dump", "given_keys", "load_scene", "read_tables", "resolved", "scene_of", "vary"]
@@ -49,16 +49,25 @@ def read_tables(path: str | Path, overrides: Iterable[str] = ()) -> dict[str, An
     """The nested tables of a scene file as written, with the overrides put in."""
     path = Path(path)
     try:
-        tables = tomllib.loads(path.read_text(encoding="utf-8"))
+        # editors on Windows put a byte order mark before the text
+        tables = tomllib.loads(path.read_text(encoding="utf-8-sig"))
     except FileNotFoundError:
         raise InputError(f"{path}: there is no such scene file{_neighbours(path)}") from None
     except (OSError, UnicodeDecodeError) as error:
         raise InputError(f"{path}: cannot be read as a scene file ({error})") from None
-    except tomllib.TOMLDecodeError as error:
+    except RecursionError:
+        raise InputError(f"{path}: not a scene, its lists or tables are nested too deep") from None
+    except ValueError as error:
+        # TOMLDecodeError, and integers of more digits than Python converts
         raise InputError(f"{path}: not valid TOML: {error}") from None
     for override in overrides:
         name, value = _split(override)
         _put(tables, name, value)
+    if "kind" not in tables:
+        raise InputError(
+            f"{path}: not a scene without its kind, expected kind = one of "
+            f"{', '.join(repr(kind) for kind in TABLES)}"
+        )
     return tables
 
 
@@ -146,7 +155,7 @@ def _build(table: type, data: dict[str, Any], path: str) -> Any:
             _refuse(name, value)
         if dataclasses.is_dataclass(hints[key]):
             if not isinstance(value, dict):
-                raise InputError(f"{name} = {value!r}: expected a table [{name}]")
+                raise InputError(f"{name} = {shortened(value)}: expected a table [{name}]")
             values[key] = _build(hints[key], value, name)
         elif isinstance(value, dict):
             raise InputError(f"[{name}]: expected a single value, not a table")
@@ -176,7 +185,7 @@ def _put(tables: dict[str, Any], name: str, value: str) -> None:
     for head in heads:
         tables = tables.setdefault(head, {})
         if not isinstance(tables, dict):
-            raise InputError(f"{head} = {tables!r}: expected a table [{head}]")
+            raise InputError(f"{head} = {shortened(tables)}: expected a table [{head}]")
     tables[last] = value
 
 

@@ -11,6 +11,8 @@ from collections.abc import Iterator
 from math import cos, pi, sin, tan
 from pathlib import Path
 
+from geometry.check_parameters import check_names, check_parameters
+
 from ..errors import InputError
 from .fields import convert, each_field, used_tables, value_at
 from .part_materials import part_materials
@@ -40,8 +42,10 @@ def validate(scene: Scene) -> None:
         problems += _study(scene)
     if "excitation" in tables:
         problems += _excitation(scene)
+        check_names(scene)
     if problems:
         raise InputError(problems[0])
+    check_parameters(scene)
 
 
 def refuse_response(scene: Scene) -> None:
