@@ -169,9 +169,7 @@ def _tuple(value: object, kinds: tuple, field: Field) -> tuple:
     if not items:
         raise InputError(f"{field.name} = {shortened(value)}: expected at least one value")
     if len(items) > MOST_VALUES:
-        raise InputError(
-            f"{field.name}: {len(items)} values given, expected at most {MOST_VALUES}"
-        )
+        raise InputError(f"{field.name}: {len(items)} values given, expected at most {MOST_VALUES}")
     return tuple(_SCALARS[kinds[0]](item, field) for item in items)
 
 
