@@ -29,9 +29,10 @@ from bladefem.study.pipeline.stages import (
     Bodies,
     Reduced,
     build_mesh,
+    condense_contact,
     contact_patches,
+    on_layer,
     reduce_sector,
-    seat_damper,
 )
 
 __all__ = ["Row", "paper_model", "row_of_blades", "whole_model"]
@@ -41,6 +42,7 @@ __all__ = ["Row", "paper_model", "row_of_blades", "whole_model"]
 class Row:
     """What the finite elements leave: the same on every rank."""
 
+    # of rigid faces, as in the paper
     problem: ContactProblem
     reduced: Reduced
     mesh: Any
@@ -62,7 +64,7 @@ def row_of_blades(scene: Scene, modes: int = 8, folder: Any = None, comm: Any = 
         mesh = build_mesh(scene, comm)
         bodies = Bodies(scene, mesh, comm)
         patches = contact_patches(mesh)
-        return Row(seat_damper(bodies, patches), reduce_sector(bodies, patches, [0], modes), mesh)
+        return Row(condense_contact(bodies, patches), reduce_sector(bodies, patches, [0], modes), mesh)
 
     return stage(folder, "row", contact_key(scene) + f"-{modes}", compute, comm)[0]
 
@@ -70,14 +72,16 @@ def row_of_blades(scene: Scene, modes: int = 8, folder: Any = None, comm: Any = 
 def paper_model(
     scene: Scene, row: Row, load: float, mass: float | None = None, harmonics: int = 31
 ) -> ReducedModel:
-    """The paper's model: tangential freedoms only, prescribed normal loads, a damper that moves
-    along the row.
+    """The paper's model: tangential freedoms only, prescribed normal loads from rigid faces, a
+    damper that moves along the row.
 
     Args:
         load: normal load of a seat [N].
         mass: of the damper [kg]; the scene's own when left out.
     """
-    model = _joint(scene.vary(contact__normal="prescribed"), row, load, "mass", harmonics)
+    model = _joint(
+        scene.vary(contact__normal="prescribed"), row.problem, row, load, "mass", harmonics
+    )
     nodes = len(model.elements.kt)
     tangents = np.kron(np.eye(nodes), [[0.0, 1.0]])
     sides = tuple(
@@ -101,14 +105,16 @@ def whole_model(
         damper: "mass" (residual flexibility only), "rigid" (three freedoms, normal springs) or
             "elastic".
     """
-    return _joint(scene, row, load, damper, harmonics)
+    return _joint(scene, on_layer(scene, row.problem), row, load, damper, harmonics)
 
 
-def _joint(scene: Scene, row: Row, load: float, damper: str, harmonics: int) -> ReducedModel:
-    maps = solve(row.problem, 0.0, normal=load, bedded=scene.contact.bedded)
+def _joint(
+    scene: Scene, problem: ContactProblem, row: Row, load: float, damper: str, harmonics: int
+) -> ReducedModel:
+    maps = solve(problem, 0.0, normal=load, bedded=scene.contact.bedded)
     ratio = pair_ratio(scene.material.blade, scene.material.damper)
     elements, selection = friction_elements(
-        row.problem, maps, scene.contact, ratio, row.mesh.dimension - 1
+        problem, maps, scene.contact, ratio, row.mesh.dimension - 1
     )
     case = LoadCase(load, elements, selection)
     return joint_model(

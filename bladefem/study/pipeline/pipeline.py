@@ -47,11 +47,12 @@ from .stages import (
     Bodies,
     Reduced,
     build_mesh,
+    condense_contact,
     excited_modes,
     find_modes,
     harmonic_diameters,
+    on_layer,
     reduce_sector,
-    seat_damper,
     weighted,
 )
 from .validate_mesh import found_patches
@@ -164,7 +165,8 @@ def run(
     if until == "modes":
         return result
     with clock("contact"):
-        problem = keep("contact", contact_key(scene), lambda: seat_damper(bodies, patches))
+        bare = keep("contact", contact_key(scene), lambda: condense_contact(bodies, patches))
+        problem = on_layer(scene, bare)
         own = _own_load(scene, problem, clock.messages)
         maps = {
             load: seat(problem, scene.operation.speed, normal=load, bedded=scene.contact.bedded)

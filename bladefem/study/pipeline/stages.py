@@ -11,6 +11,7 @@ import numpy as np
 
 from geometry.mesh import Mesh
 
+from ...contact.interface_elements import layered, pair_ratio
 from ...contact.patch import make_patch
 from ...contact.seating import spin_axis
 from ...data import ModeSet, Patch, PortModel
@@ -27,11 +28,13 @@ __all__ = [
     "Reduced",
     "blade_parts",
     "build_mesh",
+    "condense_contact",
     "contact_patches",
     "excited_modes",
     "find_modes",
     "harmonic_diameters",
     "is_wheel",
+    "on_layer",
     "reduce_sector",
     "seat_damper",
     "wheel_modes",
@@ -267,12 +270,23 @@ def wheel_modes(
 
 
 def seat_damper(bodies: Bodies, patches: list[Patch]) -> Any:
-    """The contact problem of the damper between two platforms: after it, each load state costs
-    milliseconds.
+    """The contact problem of the damper between two platforms, with the scene's interface layer:
+    after it, each load state costs milliseconds.
 
     Returns:
-        contact.seat.ContactProblem, for :func:`bladefem.contact.seating.solve`.
+        contact.seating.ContactProblem, for :func:`bladefem.contact.seating.solve`.
     """
+    return on_layer(bodies.scene, condense_contact(bodies, patches))
+
+
+def on_layer(scene: Scene, problem: Any) -> Any:
+    """A contact problem with the scene's interface layer between its faces."""
+    ratio = pair_ratio(scene.material.blade, scene.material.damper)
+    return layered(problem, scene.contact, ratio)
+
+
+def condense_contact(bodies: Bodies, patches: list[Patch]) -> Any:
+    """The contact problem of rigid faces: all that takes finite elements."""
     from ...contact.face_profile import seat_gap
     from ...contact.seating import contact_problem
 
