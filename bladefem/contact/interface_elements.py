@@ -95,9 +95,7 @@ def interface_law(patches: Sequence[Patch], contact: Contact, ratio: float) -> I
     area = np.concatenate([patch.area for patch in patches])
     if contact.stiffness == "map":
         return rigid_faces(len(area))
-    kn = [
-        stiffnesses(seat_contact(contact, patch.name), ratio, patch.area)[1] for patch in patches
-    ]
+    kn = [stiffnesses(seat_contact(contact, patch.name), ratio, patch.area)[1] for patch in patches]
     doubling = np.inf if contact.stiffening is None else contact.stiffening
     return InterfaceLaw(np.concatenate(kn), doubling * area)
 

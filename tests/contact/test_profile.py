@@ -119,7 +119,9 @@ def test_crowns_too_narrow_for_the_mesh_are_told(dimension):
         return f"{float(f'{1e6 * width:.2g}'):g} um"
 
     def said(**contact):
-        return narrow_sentence(maps, Scene(contact=Contact(bedded=False, kn_area=1e16, **contact)), depth)
+        return narrow_sentence(
+            maps, Scene(contact=Contact(bedded=False, kn_area=1e16, **contact)), depth
+        )
 
     a = line_width(80 / 0.03, 0.5, contact_modulus(Material(), Material()))
     assert a == pytest.approx(np.sqrt(4 * 80 / 0.03 * 0.5 * 2 * 0.91 / (np.pi * 2.1e11)), rel=1e-12)

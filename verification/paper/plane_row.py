@@ -64,7 +64,9 @@ def row_of_blades(scene: Scene, modes: int = 8, folder: Any = None, comm: Any = 
         mesh = build_mesh(scene, comm)
         bodies = Bodies(scene, mesh, comm)
         patches = contact_patches(mesh)
-        return Row(condense_contact(bodies, patches), reduce_sector(bodies, patches, [0], modes), mesh)
+        return Row(
+            condense_contact(bodies, patches), reduce_sector(bodies, patches, [0], modes), mesh
+        )
 
     return stage(folder, "row", contact_key(scene) + f"-{modes}", compute, comm)[0]
 
