@@ -11,6 +11,8 @@ from collections.abc import Iterator
 from math import cos, pi, sin, tan
 from pathlib import Path
 
+from geometry.joined_files import split_entry
+
 from ..errors import InputError
 from .fields import convert, each_field, used_tables, value_at
 from .part_materials import part_materials
@@ -202,6 +204,15 @@ def _imported(scene: Scene) -> Iterator[str]:
         )
     elif not Path(file).is_file():
         yield f"imported.file = {file!r}: there is no such file"
+    for entry in scene.imported.more or ():
+        other = split_entry(entry)[1]
+        if not Path(other).is_file():
+            yield f"imported.more = {entry!r}: there is no file '{other}'"
+    if scene.mesh.order == 1 and Path(file).suffix.lower() not in (".step", ".stp"):
+        yield (
+            "mesh.order = 1: a mesh file keeps the order of its elements, expected mesh.order = 2; "
+            "imported.linear says what becomes of first-order ones"
+        )
     if not any(scene.imported.axis):
         yield "imported.axis = 0, 0, 0: expected a direction"
     if scene.imported.sectors in (1, 2):

@@ -8,6 +8,8 @@ from pathlib import Path
 
 import numpy as np
 
+from geometry.joined_files import split_entry
+
 from ...io.stage_cache import code_of, key_of
 from ...scene.tables import Scene
 from ..adaptive.settings import Settings
@@ -44,10 +46,13 @@ def mesh_key(scene: Scene) -> str:
     return key_of(scene.kind, *shapes, code_of("geometry"), _stamp(scene))
 
 
-def _stamp(scene: Scene) -> float:
-    """An imported file counts by its time of change too."""
-    file = Path(scene.imported.file)
-    return file.stat().st_mtime if scene.kind == "imported" and file.exists() else 0.0
+def _stamp(scene: Scene) -> list[float]:
+    """Imported files count by their times of change too."""
+    if scene.kind != "imported":
+        return []
+    entries = [split_entry(entry)[1] for entry in scene.imported.more or ()]
+    files = [Path(name) for name in (scene.imported.file, *entries)]
+    return [file.stat().st_mtime if file.exists() else 0.0 for file in files]
 
 
 def modes_key(scene: Scene) -> str:
