@@ -16,7 +16,7 @@ from bladefem.errors import InputError
 from .raw_mesh import RawMesh
 from .second_order_cells import completed_cells
 from .split_cells import split_cells, vertex_order
-from .topology import CORNERS, DIMENSION, FAMILY, NODES
+from .topology import CORNERS, DIMENSION, EDGES, FAMILY, NODES
 
 __all__ = ["LINEAR", "SolidCells", "solid_cells"]
 
@@ -80,10 +80,13 @@ def solid_cells(raw: RawMesh, source: str, linear: str, axis: np.ndarray) -> Sol
         blocks = [("tetra", cells) for cells, _ in parts]
         owner = [some[rows] for some, (_, rows) in zip(owner, parts, strict=True)]
         row = [rows for _, rows in parts]
+    word = words.pop()
+    cells = np.vstack([cells for _, cells in blocks])
+    _check_middles(points, word, cells, source)
     return SolidCells(
         points,
-        words.pop(),
-        np.vstack([cells for _, cells in blocks]),
+        word,
+        cells,
         np.concatenate(owner),
         np.concatenate(row),
         notes,
@@ -115,6 +118,29 @@ def _of_wanted_order(
     if first_order:
         notes = (f"{_counted(first_order)} were promoted to second order, edges straight",)
     return *completed_cells(points, blocks), notes
+
+
+def _check_middles(points: np.ndarray, word: str, cells: np.ndarray, source: str) -> None:
+    """Refuse two nodes in the middle of one edge: dolfinx crashes on them.
+
+    They come from cells that share corners but not mid-side nodes, or from a quadrilateral that
+    faces two triangles.
+    """
+    family = FAMILY[word]
+    k = CORNERS[family]
+    if NODES[word] == k:
+        return
+    ends = np.sort(cells[:, np.array(EDGES[family])].reshape(-1, 2), axis=1)
+    middle = cells[:, k : k + len(EDGES[family])].ravel()
+    _, first, number = np.unique(ends, axis=0, return_index=True, return_inverse=True)
+    bad = np.flatnonzero(middle != middle[first[number.ravel()]])
+    if len(bad):
+        x, y, z = points[ends[bad[0]]].mean(axis=0)
+        raise InputError(
+            f"imported.file = '{source}': cells meet near {x:.6g}, {y:.6g}, {z:.6g} that do not "
+            "fit (their edge has two nodes in its middle, or a quadrilateral faces two "
+            "triangles), expected a conforming mesh with merged nodes"
+        )
 
 
 def _counted(blocks: list[tuple[str, np.ndarray]]) -> str:

@@ -143,6 +143,8 @@ def run(
     keep = _Keeper(folder, comm, clock)
     with clock("mesh"):
         mesh = keep("mesh", mesh_key(scene), lambda: build_mesh(scene, comm))
+    # what was done to a user's own elements
+    clock.messages.extend(mesh.report.get("notes", ()))
     result = Run(
         scene,
         None if folder is None else Path(folder),
