@@ -30,6 +30,7 @@ LAYERS = [
     "hbm",
     "balance",
     "damper",
+    "wheel",
     "study",
     "view",
     "report",
