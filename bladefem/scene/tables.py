@@ -24,7 +24,6 @@ from geometry.parameters import (
 from geometry.quantity import quantity
 
 __all__ = [
-    "KINDS",
     "Contact",
     "Excitation",
     "Foundation",
@@ -37,8 +36,6 @@ __all__ = [
     "Seat",
     "Study",
 ]
-
-KINDS = ("wedge sector", "plane blades", "z mass", "hertz", "punch", "imported")
 
 
 @dataclass(frozen=True)
@@ -309,7 +306,7 @@ class Scene:
     """All of it. Tables that a kind does not use must not be given."""
 
     title: str = quantity("untitled", help="shown on pictures and in the report")
-    kind: str = quantity("wedge sector", choices=KINDS, help="which geometry")
+    kind: str = quantity("wedge sector", help="which geometry, see scene.kinds")
     accuracy: float = quantity(
         0.02, "1", 1e-6, 0.5, "wanted relative accuracy of the resonance amplitude"
     )

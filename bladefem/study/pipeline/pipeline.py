@@ -24,6 +24,7 @@ from ...data import ModeSet, Patch, PressureMap
 from ...errors import InputError, NotSolvedError
 from ...io.stage_cache import found_remark, stage
 from ...reduction.truncate import truncated
+from ...scene.kinds import kind_named
 from ...scene.tables import Scene
 from ...scene.units import show
 from ...scene.validate import refuse_response
@@ -448,15 +449,11 @@ def _load_case(
 
 def check_blade(scene: Scene, mesh: Mesh) -> None:
     """Modes and responses need a blade, and a blade needs its clamp."""
-    found = {
-        "z mass": "pressure and motion",
-        "hertz": "contact pressure",
-        "punch": "contact pressure",
-    }
-    if scene.kind in found:
+    kind = kind_named(scene.kind)
+    if not kind.has_blade:
         raise InputError(
             f"kind '{scene.kind}' has no blade to vibrate: 'bladefem run' computes its "
-            f"{found[scene.kind]}, 'bladefem mesh' draws it"
+            f"{kind.result}, 'bladefem mesh' draws it"
         )
     if "clamp" not in mesh.faces:
         raise InputError(
