@@ -7,14 +7,16 @@
 
 # %%
 import os
+from pathlib import Path
 
 from mpi4py import MPI
 
 import bladefem
 
 coarse = "BLADEFEM_COARSE" in os.environ
+scenes = Path(__file__).resolve().parents[1] / "scenes"
 base = bladefem.load_scene(
-    "scenes/wedge.toml", ["mesh.size=10 mm"] if coarse else ["mesh.size=6 mm"]
+    scenes / "wedge.toml", ["mesh.size=10 mm"] if coarse else ["mesh.size=6 mm"]
 )
 comm = MPI.COMM_WORLD
 frequencies = {}

@@ -24,9 +24,10 @@ from bladefem.study.kinds.zmass import mass_on_foundation, motions, press
 from bladefem.view.paper import draw_footprint
 
 coarse = "BLADEFEM_COARSE" in os.environ
+scenes = Path(__file__).resolve().parents[1] / "scenes"
 folder, comm = Path("runs/demos/paper_zmass"), MPI.COMM_WORLD
 steps = 500 if coarse else 4000  # time steps a cycle of the foundation
-scene = bladefem.load_scene("scenes/zmass.toml", ["mesh.size=7 mm"] if coarse else [])
+scene = bladefem.load_scene(scenes / "zmass.toml", ["mesh.size=7 mm"] if coarse else [])
 
 # %% [markdown]
 # ## The pressure on the footprint (Fig. 8)

@@ -9,7 +9,6 @@ import numpy as np
 import pytest
 
 from bladefem.damper.accelerate import Rules, iterate
-from bladefem.damper.blades import judge, optimum, peak
 from bladefem.damper.branch import state_of
 from bladefem.damper.paper import platform
 from bladefem.errors import InputError
@@ -19,8 +18,9 @@ from bladefem.hbm.sweep import response, size
 from bladefem.hbm.time_model import time_system
 from bladefem.scene.toml import load_scene
 from bladefem.study.pipeline.stability import in_one_body
-from bladefem.study.row import paper_model, row_of_blades, whole_model
 from bladefem.time.shooting import harmonics, multipliers, periodic
+from verification.paper.blades import judge, optimum, peak
+from verification.paper.plane_row import paper_model, row_of_blades, whole_model
 
 SOFT = load_scene("scenes/plane.toml", ["contact.kt=1e6 N/m"])
 

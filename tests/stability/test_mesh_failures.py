@@ -4,11 +4,11 @@ from __future__ import annotations
 
 import numpy as np
 
-from bladefem.damper.blades import peak
 from bladefem.scene.toml import load_scene
 from bladefem.study.adaptive.contact_mesh import FEW
 from bladefem.study.pipeline import pipeline
-from bladefem.study.row import paper_model, row_of_blades
+from verification.paper.blades import peak
+from verification.paper.plane_row import paper_model, row_of_blades
 
 SCENE = load_scene(
     "scenes/plane.toml",

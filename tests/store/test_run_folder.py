@@ -60,7 +60,7 @@ def test_a_scene_that_cannot_be_read_counts_as_another(tmp_path):
 
 HOLDER = """
 import sys
-from bladefem.run_folder import locked
+from bladefem.io.run_folder import locked
 with locked(sys.argv[1]):
     print("held", flush=True)
     sys.stdin.readline()

@@ -24,6 +24,7 @@ from ...data import ModeSet, Patch, PressureMap
 from ...errors import InputError, NotSolvedError
 from ...io.stage_cache import found_remark, stage
 from ...reduction.truncate import truncated
+from ...scene.kinds import kind_named
 from ...scene.tables import Scene
 from ...scene.units import show
 from ...scene.validate import refuse_response
@@ -47,11 +48,12 @@ from .stages import (
     Bodies,
     Reduced,
     build_mesh,
+    condense_contact,
     excited_modes,
     find_modes,
     harmonic_diameters,
+    on_layer,
     reduce_sector,
-    seat_damper,
     weighted,
 )
 from .validate_mesh import found_patches
@@ -164,7 +166,8 @@ def run(
     if until == "modes":
         return result
     with clock("contact"):
-        problem = keep("contact", contact_key(scene), lambda: seat_damper(bodies, patches))
+        bare = keep("contact", contact_key(scene), lambda: condense_contact(bodies, patches))
+        problem = on_layer(scene, bare)
         own = _own_load(scene, problem, clock.messages)
         maps = {
             load: seat(problem, scene.operation.speed, normal=load, bedded=scene.contact.bedded)
@@ -446,15 +449,11 @@ def _load_case(
 
 def check_blade(scene: Scene, mesh: Mesh) -> None:
     """Modes and responses need a blade, and a blade needs its clamp."""
-    found = {
-        "z mass": "pressure and motion",
-        "hertz": "contact pressure",
-        "punch": "contact pressure",
-    }
-    if scene.kind in found:
+    kind = kind_named(scene.kind)
+    if not kind.has_blade:
         raise InputError(
             f"kind '{scene.kind}' has no blade to vibrate: 'bladefem run' computes its "
-            f"{found[scene.kind]}, 'bladefem mesh' draws it"
+            f"{kind.result}, 'bladefem mesh' draws it"
         )
     if "clamp" not in mesh.faces:
         raise InputError(

@@ -12,6 +12,7 @@ from bladefem.damper.loops import Drive, Steady, ratio_table, spectrum, steady
 from bladefem.damper.zmass import MassOnFoundation
 from bladefem.data import PressureMap
 from bladefem.friction.equivalent_linear import force_of, from_series
+from bladefem.report.zmass import draw_motions
 from bladefem.scene.tables import Scene
 from bladefem.scene.toml import load_scene
 from bladefem.study.kinds.zmass import mass_on_foundation, motions, press
@@ -19,7 +20,6 @@ from bladefem.view.mesh import draw_mesh
 from bladefem.view.paper import draw_footprint
 
 from .claim import Claim, verdict
-from .zmass import draw_motions
 
 __all__ = ["RATIOS", "mass"]
 

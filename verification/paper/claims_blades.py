@@ -14,18 +14,18 @@ from pathlib import Path
 import numpy as np
 
 from bladefem.contact.seating import solve as seat
-from bladefem.damper.blades import Peak, peak
 from bladefem.friction.fourier import synthesis
 from bladefem.hbm.model import ReducedModel
 from bladefem.hbm.sweep import size, sweep
 from bladefem.scene.tables import Scene
 from bladefem.scene.toml import load_scene
 from bladefem.study.pipeline.stages import Bodies, find_modes
-from bladefem.study.row import Row, paper_model, row_of_blades, whole_model
 from bladefem.view.contact import draw_pressure
 from bladefem.view.mesh import draw_mesh
 from bladefem.view.modes import draw_mode_sheet
 from bladefem.view.paper import draw_tip_responses
+from verification.paper.blades import Peak, peak
+from verification.paper.plane_row import Row, paper_model, row_of_blades, whole_model
 
 from .claim import Claim, verdict
 
