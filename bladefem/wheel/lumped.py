@@ -54,9 +54,7 @@ def lumped_matrices(blades: LumpedBlades) -> tuple[np.ndarray, np.ndarray, np.nd
     return M, K, to_next
 
 
-def lumped_wheel(
-    blades: LumpedBlades, order: int, force: float, kt: float, limit: float
-) -> Wheel:
+def lumped_wheel(blades: LumpedBlades, order: int, force: float, kt: float, limit: float) -> Wheel:
     """The wheel under an engine order on the tips, with elements of stiffness kt [N/m] and friction
     limit [N]; the stretches of aerofoil and shank are the readings of the port "blade".
     """

@@ -163,9 +163,7 @@ class _Steps:
         size = state.residual.size
         operator = LinearOperator((size, size), matvec=product, dtype=float)
         # SciPy's versions name the relative tolerance differently: atol rules where it is larger
-        y, failed = gmres(
-            operator, residual.ravel(), atol=goal, restart=BASIS, maxiter=RESTARTS
-        )
+        y, failed = gmres(operator, residual.ravel(), atol=goal, restart=BASIS, maxiter=RESTARTS)
         return prepare(y.reshape(flat)).reshape(shape), failed != 0
 
 

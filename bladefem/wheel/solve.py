@@ -123,16 +123,12 @@ def sweep_wheel(
     """Points at circular frequencies [rad/s], each from the one before."""
     last = None
     for omega in omegas:
-        point = solve_wheel(
-            wheel, omega, H, samples, pattern=pattern, start=last, options=options
-        )
+        point = solve_wheel(wheel, omega, H, samples, pattern=pattern, start=last, options=options)
         yield point
         last = point if point.converged else None
 
 
-def stuck_wheel(
-    wheel: Wheel, omega: float, H: int = 1, pattern: Pattern = TUNED
-) -> np.ndarray:
+def stuck_wheel(wheel: Wheel, omega: float, H: int = 1, pattern: Pattern = TUNED) -> np.ndarray:
     """(N, H+1, probes) amplitudes with all contacts closed and sticking [m]."""
     _check_point(wheel, omega, H, 1, pattern)
     flex = wheel_flexibility(wheel, omega, H, pattern)
@@ -195,9 +191,7 @@ def _homotopy(balance: WheelBalance, options: Options) -> WheelNewton:
     return replace(end, iterations=iterations, products=products)
 
 
-def _predicted(
-    path: list[tuple[float, np.ndarray]], share: float, stuck: np.ndarray
-) -> np.ndarray:
+def _predicted(path: list[tuple[float, np.ndarray]], share: float, stuck: np.ndarray) -> np.ndarray:
     """Displacements on the secant of the path; proportional or stuck where it has no two points."""
     if not path:
         return stuck

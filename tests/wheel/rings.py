@@ -102,5 +102,7 @@ def elastic_damper():
     """A floating damper of two masses with all its modes."""
     K = np.array([[1.5, -1.5], [-1.5, 1.5]])
     return port_model_from_matrices(
-        np.diag([0.3, 0.2]), K, {"contact": np.array([[1.0, 0.1], [-0.3, 0.9], [0.8, 0.3], [0.2, -1.0]])}
+        np.diag([0.3, 0.2]),
+        K,
+        {"contact": np.array([[1.0, 0.1], [-0.3, 0.9], [0.8, 0.3], [0.2, -1.0]])},
     )

@@ -34,9 +34,7 @@ def test_free_wheel_is_the_dense_ring():
             w = h * omega
             F = np.kron(np.eye(N), LOAD.T) @ engine_order(N, h * EO, np.array([force]))[:, 0]
             expected = np.kron(np.eye(N), PROBE) @ np.linalg.solve(K - w**2 * M + 1j * w * C, F)
-            np.testing.assert_allclose(
-                found[:, h, 0], expected, atol=1e-12 * abs(expected).max()
-            )
+            np.testing.assert_allclose(found[:, h, 0], expected, atol=1e-12 * abs(expected).max())
 
 
 def test_frequency_deviations_move_blade_alone_frequencies():
