@@ -6,15 +6,14 @@ from rings import (
     DAMPING,
     EO,
     MASS,
-    N,
     RIGID,
+    N,
     dense_ring,
     elastic_damper,
     elements,
     forces,
     ring_wheel,
     sector_bodies,
-    tiled,
 )
 
 from bladefem.hbm.model import Damping, ReducedModel
@@ -22,7 +21,7 @@ from bladefem.hbm.solve import solve
 from bladefem.hbm.solver.newton import Options
 from bladefem.reduction.assemble import wheel_models
 from bladefem.wheel.model import Pattern
-from bladefem.wheel.solve import free_wheel, solve_wheel, stuck_wheel
+from bladefem.wheel.solve import solve_wheel
 
 TIGHT = Options(tolerance=1e-12)
 TURN = np.exp(2j * np.pi * EO / N * np.arange(N))

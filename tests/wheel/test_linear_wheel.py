@@ -2,8 +2,8 @@
 
 import numpy as np
 import pytest
+from rings import BLADE, EO, LINK, LOAD, MASS, OWN, PROBE, N, elements, forces, ring_wheel
 from scipy import linalg
-from rings import BLADE, EO, LINK, LOAD, MASS, N, OWN, PROBE, elements, forces, ring_wheel
 
 from bladefem.errors import InputError
 from bladefem.hbm.model import Damping
