@@ -328,11 +328,3 @@ class Scene:
     excitation: Excitation = field(default_factory=Excitation)
     study: Study = field(default_factory=Study)
     model: Model = field(default_factory=Model)
-
-    def vary(self, *pair: object, **changes: object) -> Scene:
-        """A checked copy with other values, ``vary(aerofoil__twist="25 deg")`` or
-        ``vary("aerofoil.twist", 0.4)``.
-        """
-        from .toml import vary
-
-        return vary(self, *pair, **changes)
