@@ -52,8 +52,8 @@ import pickle, sys, json
 from bladefem.fem.body import assemble
 from bladefem.fem.constraint import constrain
 from bladefem.fem.modes import modes
-from bladefem.fem.wheel import all_diameters
-from bladefem.scene import Material
+from bladefem.fem.all_diameters import all_diameters
+from bladefem.scene.tables import Material
 mesh, diameters, quadrature = pickle.load(open(sys.argv[1], "rb"))
 body = assemble(mesh, "blade", Material(), quadrature=quadrature)
 sets = ([modes(constrain(body, "clamp", diameters[0]), 10)] if len(diameters) == 1
@@ -164,7 +164,7 @@ def run_ours(
 
 def sector_mesh(dofs: float, curved: bool = True) -> Mesh:
     """The default sector with 24 blades and about this many degrees of freedom in the blade."""
-    from geometry.builders import build
+    from geometry.isolated_process import build
 
     scene = Scene()
     scene = replace(scene, disc=replace(scene.disc, sectors=SECTORS))

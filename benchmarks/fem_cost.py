@@ -40,7 +40,7 @@ from bladefem.fem.body import assemble
 from bladefem.fem.constraint import at_diameter, transformation
 from bladefem.fem.flexibility import flexible
 from bladefem.fem.modes import modes
-from bladefem.scene import Material
+from bladefem.scene.tables import Material
 mesh, diameters = pickle.load(open(sys.argv[1], "rb"))
 frame = transformation(assemble(mesh, "blade", Material()), "clamp", True)
 core = frame.opened.core

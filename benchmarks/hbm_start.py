@@ -27,7 +27,7 @@ SOLVER = (
     "import bladefem.hbm.solve, bladefem.hbm.sweep, bladefem.hbm.peak, bladefem.hbm.continuation"
 )
 FIRST = """
-from bladefem.hbm.reference import reference_model
+from bladefem.hbm.reference_blade import reference_model
 from bladefem.hbm.solve import solve
 assert solve(reference_model(load=1.4), 8300.0, 3, 128).converged
 """

@@ -18,13 +18,13 @@ from pathlib import Path
 import numpy as np
 import pandas as pd
 
-from bladefem.damper.maps import count_outcomes, method_map, write_rows
 from bladefem.hbm.linear.condensation import condense
 from bladefem.hbm.reference_blade import reference_model
 from bladefem.hbm.solve import solve
 from bladefem.hbm.solver.newton import newton
 from bladefem.hbm.solver.residual import Balance, start_in_stick
-from bladefem.view.outcomes import draw_outcomes
+from verification.paper.method_maps import count_outcomes, method_map, write_rows
+from verification.paper.view_outcomes import draw_outcomes
 
 COARSE = os.environ.get("BLADEFEM_COARSE") == "1"
 H, SAMPLES = 5, 256

@@ -17,11 +17,11 @@ from collections.abc import Callable
 import numpy as np
 
 from bladefem.damper.accelerate import Rules, iterate
-from bladefem.damper.blades import judge, paper_blade
 from bladefem.damper.direct import direct
 from bladefem.damper.paper import platform
 from bladefem.hbm.solve import solve
 from bladefem.time.event_integrator import stuck_start
+from verification.paper.blades import judge, paper_blade
 
 MODEL, FREQUENCY = paper_blade(load=1.4), 1315.5
 OMEGA = 2 * np.pi * FREQUENCY

@@ -115,7 +115,8 @@ class PressureMap:
     patch: Patch
     # (n,) normal force, pressing > 0 [N]
     force: np.ndarray
-    # (n,) remaining opening, >= 0 [m]
+    # (n,) opening between the unpressed surfaces of the faces [m]; 0 where they press: how far the
+    # interface layer is closed there follows from the force (contact.interface_law)
     gap: np.ndarray
     # max |force gap| over (max force, max gap): the proof of optimality
     complementarity: float

@@ -8,6 +8,7 @@
 
 # %%
 import os
+from pathlib import Path
 
 import numpy as np
 from mpi4py import MPI
@@ -20,10 +21,11 @@ from bladefem.study.kinds.punch import (
     ring_stiffness,
     spring_tilt,
 )
-from bladefem.view.paper_contact import draw_punch
+from verification.paper.view_contact import draw_punch
 
 coarse, comm = "BLADEFEM_COARSE" in os.environ, MPI.COMM_WORLD
-scene = bladefem.load_scene("scenes/punch.toml", ["mesh.contact_size=0.4 mm"] if coarse else [])
+scenes = Path(__file__).resolve().parents[1] / "scenes"
+scene = bladefem.load_scene(scenes / "punch.toml", ["mesh.contact_size=0.4 mm"] if coarse else [])
 found = indent(scene, comm)  # finite elements on all ranks, a quarter of block and punch
 if comm.rank:
     raise SystemExit

@@ -16,10 +16,10 @@ import numpy as np
 from mpi4py import MPI
 from scipy.integrate import trapezoid
 
-from bladefem.damper.element import coupled_loop, linear_fit, printed_loop, two_slope_loop, work
 from bladefem.friction.closed_form import circular_orbit_work, jenkins
-from bladefem.friction.printed import per_axis
 from bladefem.view.paper import draw_coupled_loops, draw_fit
+from verification.paper.element import coupled_loop, linear_fit, printed_loop, two_slope_loop, work
+from verification.paper.printed_laws import per_axis
 
 if MPI.COMM_WORLD.rank:  # small enough for one rank; the others wait at the end
     raise SystemExit

@@ -10,6 +10,7 @@ from pathlib import Path
 from typing import Any
 
 from ..errors import InputError
+from ..scene.kinds import kind_named, load_function
 from ..scene.tables import Scene
 from . import tables
 
@@ -35,12 +36,14 @@ def check(options: argparse.Namespace, comm: Any) -> None:
     from ..io.stage_cache import on_root
     from ..scene.toml import given_keys, read_tables, resolved, scene_of
     from ..scene.warnings import doubts
+    from ..study.pipeline.preflight import refuse_run
 
     file = scene_path(options.scene)
 
     def table() -> str:
         written = read_tables(file, options.overrides)
         scene = scene_of(written, file.resolve().parent)
+        refuse_run(scene)
         rows = tables.resolved_scene(resolved(scene, given_keys(written)))
         return "\n".join([rows, *(f"note: {doubt}" for doubt in doubts(scene))])
 
@@ -111,8 +114,8 @@ def contact(options: argparse.Namespace, comm: Any) -> None:
     ParaView file.
     """
     scene, folder, bars = prepared(options, comm)
-    if scene.kind in WITHOUT_BLADE:
-        return without_blade(scene, folder, options, comm)
+    if not kind_named(scene.kind).has_blade:
+        return run_kind(scene, folder, options, comm, bars)
     from ..report import pressure
 
     run = pressure.run(scene, folder, comm, bars)
@@ -136,34 +139,16 @@ def response(options: argparse.Namespace, comm: Any) -> None:
 def report(options: argparse.Namespace, comm: Any) -> None:
     """Everything, with figures and report."""
     scene, folder, bars = prepared(options, comm, responds=True)
-    if scene.kind in WITHOUT_BLADE:
-        return without_blade(scene, folder, options, comm)
-    from ..report.run import run as whole
-
-    run = whole(scene, folder, comm, bars)
-    tell(options, comm, lambda: tables.responses(run.response), run)
+    run_kind(scene, folder, options, comm, bars)
 
 
-WITHOUT_BLADE = ("z mass", "hertz", "punch")
-
-
-def without_blade(scene: Scene, folder: Path, options: argparse.Namespace, comm: Any) -> None:
-    """All that there is to such a scene: its contact, and the motion of the mass."""
-    from ..report.tables import readable
-
-    if scene.kind == "z mass":
-        from ..report import zmass
-
-        found = zmass.run(scene, folder, comm)
-        return tell(
-            options, comm, lambda: tables.frame(readable(zmass.motion_table(found.motions))), found
-        )
-    from ..report import pair
-
-    result = pair.run(scene, folder, comm)
-    return tell(
-        options, comm, lambda: tables.frame(readable(pair.pair_summary(result.states))), result
-    )
+def run_kind(
+    scene: Scene, folder: Path, options: argparse.Namespace, comm: Any, progress: Any
+) -> None:
+    """All that `bladefem run` does for a scene, by the record of its kind, and its table."""
+    kind = kind_named(scene.kind)
+    found = load_function(kind.runner)(scene, folder, comm, progress)
+    tell(options, comm, lambda: load_function(kind.table)(found), found)
 
 
 def chart(options: argparse.Namespace, comm: Any) -> None:
@@ -239,6 +224,10 @@ def given_scene(options: argparse.Namespace, responds: bool) -> Scene:
     scene = load_scene(scene_path(options.scene), options.overrides)
     if responds:
         refuse_response(scene)
+    if responds or options.command == "contact":
+        from ..study.pipeline.preflight import refuse_run
+
+        refuse_run(scene)
     return scene
 
 

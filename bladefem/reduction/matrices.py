@@ -18,6 +18,10 @@ __all__ = ["port_model_from_matrices", "read_matrices"]
 
 # eigenvalues below this share of the largest one are rigid modes: omega = 0
 RIGID = 1e-10
+# eigenvalues of M below this share of the largest one belong to massless motions
+MASSLESS = 1e-13
+# negative damping below this share of the largest one is rounding
+ROUNDING = 1e-9
 
 
 def port_model_from_matrices(
@@ -38,26 +42,31 @@ def port_model_from_matrices(
         ports: name ("contact", "load", "probe") to dof numbers (k,), or to a matrix (k, dofs) of
             displacement readings.
         count: modes kept; all when left out.
-        C: (dofs, dofs) viscous damping [N s/m]; modes that it couples stay coupled.
+        C: (dofs, dofs) viscous damping and gyroscopic matrix [N s/m], which need not be symmetric;
+            modes that it couples stay coupled.
+
+    Degrees of freedom without mass follow the others statically, and leave their flexibility as a
+    residual one; the damping of that flexibility is left out.
 
     Raises:
-        InputError: shapes do not fit, a matrix is not Hermitian or M is not positive definite.
+        InputError: shapes do not fit, M or K is not Hermitian, M is not positive semidefinite, or a
+            motion has neither mass nor stiffness.
     """
     M = _hermitian(M, "M")
     K = _hermitian(K, "K")
     if M.shape != K.shape:
         raise InputError(f"M {M.shape} and K {K.shape}: expected the same shape")
     if C is not None:
-        C = _hermitian(C, "C")
+        C = _square(C, "C")
         if C.shape != M.shape:
             raise InputError(f"C {C.shape} and M {M.shape}: expected the same shape")
     P, slices = _selection(ports, M.shape[0])
+    massless = np.zeros((len(P), len(P)))
     try:
         values, vectors = linalg.eigh(K, M)
-    except linalg.LinAlgError as error:
-        raise InputError(
-            "M is not positive definite: expected a mass matrix without massless dofs"
-        ) from error
+    except linalg.LinAlgError:
+        M, K, C, P, massless = _without_massless(M, K, C, P)
+        values, vectors = linalg.eigh(K, M)
     if values[0] < -RIGID * values[-1]:
         raise InputError(
             f"K has the eigenvalue {values[0]:.3g}: expected a positive semidefinite stiffness"
@@ -72,17 +81,10 @@ def port_model_from_matrices(
     rest = shapes[:, count:] / np.sqrt(values[count:])
     kept = vectors[:, :count]
     damping = None if C is None else _modal_damping(kept.conj().T @ C @ kept)
-    if (
-        damping is not None
-        and np.min(lowest := damping if damping.ndim == 1 else np.diag(damping).real) < 0
-    ):
-        raise InputError(
-            f"C damps a mode by {np.min(lowest):.3g} 1/s: expected no negative damping"
-        )
     return PortModel(
         np.sqrt(values[:count]),
         shapes[:, :count],
-        rest @ rest.conj().T,
+        massless + rest @ rest.conj().T,
         slices,
         nodal_diameter,
         damping=damping,
@@ -141,12 +143,49 @@ def _dense(matrix: np.ndarray) -> np.ndarray:
     return matrix.toarray() if sparse.issparse(matrix) else np.asarray(matrix)
 
 
-def _hermitian(matrix: np.ndarray, name: str) -> np.ndarray:
+def _without_massless(
+    M: np.ndarray, K: np.ndarray, C: np.ndarray | None, P: np.ndarray
+) -> tuple[np.ndarray, np.ndarray, np.ndarray | None, np.ndarray, np.ndarray]:
+    """M, K, C and port readings P (p, dofs) on the motions with mass, the others following
+    statically, and the flexibility (p, p) of the others.
+    """
+    masses, motions = linalg.eigh(M)
+    if masses[0] < -MASSLESS * masses[-1]:
+        raise InputError(
+            f"M has the eigenvalue {masses[0]:.3g}: expected a positive semidefinite mass matrix"
+        )
+    still = masses <= MASSLESS * masses[-1]
+    if still.all():
+        raise InputError("M is zero: expected a mass matrix with some mass")
+    light = motions[:, still]
+    heavy = motions[:, ~still]
+    own = light.conj().T @ K @ light
+    if linalg.eigvalsh(own)[0] <= RIGID * abs(K).max():
+        raise InputError(
+            "M and K: a motion has neither mass nor stiffness, expected one of them in each"
+        )
+    follow = heavy - light @ linalg.solve(own, light.conj().T @ K @ heavy, assume_a="pos")
+    read = P @ light
+    return (
+        heavy.conj().T @ M @ heavy,
+        follow.conj().T @ K @ follow,
+        None if C is None else follow.conj().T @ C @ follow,
+        P @ follow,
+        read @ linalg.solve(own, read.conj().T, assume_a="pos"),
+    )
+
+
+def _square(matrix: np.ndarray, name: str) -> np.ndarray:
     matrix = np.atleast_2d(_dense(matrix))
     if matrix.ndim != 2 or matrix.shape[0] != matrix.shape[1] or not np.isfinite(matrix).all():
         raise InputError(
             f"{name} of shape {matrix.shape}: expected a square matrix of finite numbers"
         )
+    return matrix
+
+
+def _hermitian(matrix: np.ndarray, name: str) -> np.ndarray:
+    matrix = _square(matrix, name)
     error = abs(matrix - matrix.conj().T).max()
     if error > 1e-8 * abs(matrix).max():
         raise InputError(
@@ -157,11 +196,18 @@ def _hermitian(matrix: np.ndarray, name: str) -> np.ndarray:
 
 
 def _modal_damping(matrix: np.ndarray) -> np.ndarray:
-    """The diagonal (m,) where the damping does not couple the modes, else the matrix (m, m)."""
-    diagonal = np.diag(matrix).real.copy()
-    return (
-        diagonal if abs(matrix - np.diag(diagonal)).max() <= 1e-9 * abs(diagonal).max() else matrix
-    )
+    """The diagonal (m,) where the damping does not couple the modes, else the matrix (m, m).
+
+    Raises:
+        InputError: a motion gains work by it, beyond rounding.
+    """
+    # the part that does work; what is left of a gyroscopic matrix does none
+    lowest = linalg.eigvalsh((matrix + matrix.conj().T) / 2)[0]
+    rounding = ROUNDING * abs(matrix).max()
+    if lowest < -rounding:
+        raise InputError(f"C damps a motion by {lowest:.3g} 1/s: expected no negative damping")
+    diagonal = np.maximum(np.diag(matrix).real, 0.0)
+    return diagonal if abs(matrix - np.diag(diagonal)).max() <= rounding else matrix
 
 
 def _selection(ports: Mapping[str, np.ndarray], dofs: int) -> tuple[np.ndarray, dict[str, slice]]:

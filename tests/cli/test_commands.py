@@ -475,7 +475,7 @@ from pathlib import Path
 from types import SimpleNamespace
 import bladefem.study.pipeline
 def run(scene, folder, until, comm=None, progress=None):
-    from bladefem.store import stage
+    from bladefem.io.stage_cache import stage
     stage(folder, "mesh", "key", lambda: 1.5)
     stage(folder, "modes", "key", lambda: print("started", flush=True) or time.sleep(60))
 bladefem.study.pipeline.pipeline = SimpleNamespace(run=run)

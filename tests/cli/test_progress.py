@@ -46,7 +46,7 @@ def test_a_long_loop_shows_its_label(monkeypatch):
 
 
 SIZELESS = """
-from bladefem.progress import watch
+from bladefem.util.progress import watch
 for _ in watch(range(3), "loads", delay=0.0):
     pass
 """

@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
-from bladefem.damper.blades import judge, optimum, paper_blade, peak, seat_loop
 from bladefem.hbm.solve import solve
+from verification.paper.blades import judge, optimum, paper_blade, peak, seat_loop
 
 
 @pytest.mark.parametrize(

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from scipy.integrate import trapezoid
 
-from bladefem.damper.element import coupled_loop, linear_fit, two_slope_loop, work
+from verification.paper.element import coupled_loop, linear_fit, two_slope_loop, work
 
 
 def test_fit_of_the_two_slope_loop_has_the_closed_form():

@@ -6,14 +6,14 @@ import numpy as np
 import pytest
 
 from bladefem.damper.accelerate import Rules, iterate
-from bladefem.damper.blades import paper_blade
 from bladefem.damper.loops import Drive, steady
 from bladefem.damper.paper import platform
 from bladefem.damper.zmass import MassOnFoundation
 from bladefem.data import Elements
-from bladefem.report.claim import verdict
-from bladefem.report.paper_blades import dips
-from bladefem.report.paper_response import slip_share
+from verification.paper.blades import paper_blade
+from verification.paper.claim import verdict
+from verification.paper.claims_blades import dips
+from verification.paper.claims_response import slip_share
 
 
 def test_verdict_words():

@@ -5,11 +5,11 @@ from pathlib import Path
 
 import pytest
 
-from bladefem.damper.maps import COLUMNS, count_outcomes, write_rows
 from bladefem.errors import InputError
-from bladefem.report.claim import Chapter, Claim
-from bladefem.report.claims import CHAPTERS, element
-from bladefem.report.paper import as_html, as_markdown, main
+from verification.paper.claim import Chapter, Claim
+from verification.paper.claims import CHAPTERS, element
+from verification.paper.method_maps import COLUMNS, count_outcomes, write_rows
+from verification.paper.page import as_html, as_markdown, main
 
 MAP = Path(__file__).resolve().parents[2] / "docs/paper/method_map.csv"
 
@@ -34,7 +34,7 @@ def test_one_chapter_is_remade_and_the_others_kept(tmp_path, monkeypatch):
     chapters = tuple(
         Chapter(t, "", (lambda _, t=t: iter([Claim("Eq. 1", "x", t, "holds")]),)) for t in "ab"
     )
-    monkeypatch.setattr("bladefem.report.claims.CHAPTERS", chapters)
+    monkeypatch.setattr("verification.paper.claims.CHAPTERS", chapters)
     main(tmp_path)
     first = (tmp_path / "paper.md").read_text(encoding="utf-8")
     main(tmp_path, ["b"])

@@ -8,7 +8,7 @@ import pytest
 from bladefem.fem.compat import MPI
 from bladefem.scene.toml import load_scene
 from bladefem.study.kinds.zmass import press
-from bladefem.study.row import paper_model, row_of_blades
+from verification.paper.plane_row import paper_model, row_of_blades
 
 pytestmark = pytest.mark.mpi
 RANKS = (MPI.COMM_WORLD, MPI.COMM_SELF)

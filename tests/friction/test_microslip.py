@@ -9,7 +9,7 @@ from bladefem.data import Elements
 from bladefem.friction.aft import evaluate
 from bladefem.friction.closed_form import iwan_force, iwan_limits
 from bladefem.friction.kernel_1d_exact import evaluate_exact
-from bladefem.friction.printed import corrected
+from verification.paper.printed_laws import corrected
 
 KT, LIMIT = 3.0, 2.0
 GROSS = 1.5 * LIMIT / KT  # displacement at which the whole sphere slips [m]

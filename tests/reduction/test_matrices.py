@@ -147,3 +147,48 @@ def test_two_bodies_as_one_with_relative_contact():
     assert both.ports == {"contact": slice(0, 1), "load": slice(1, 3), "probe": slice(3, 5)}
     np.testing.assert_allclose(S[0, 0], 2 * R[0, 0], rtol=1e-12)
     np.testing.assert_allclose(S[0, 1:3], [R[0, 2], -R[0, 2]], rtol=1e-12)
+
+
+def chain(dofs=5, ground=0.0):
+    """Unit masses on unit springs, held at the first one by a spring to the ground."""
+    K = 2 * np.eye(dofs) - np.eye(dofs, k=1) - np.eye(dofs, k=-1)
+    K[0, 0] = 1.0 + ground
+    K[-1, -1] = 1.0
+    return K
+
+
+def test_stiffness_proportional_damping_leaves_the_rigid_motion_of_a_free_body_undamped():
+    """Its modal damping is rounding of either sign, which was refused as negative."""
+    rng = np.random.default_rng(3)
+    for _ in range(10):
+        M = np.diag(rng.uniform(0.1, 3.0, 5))
+        K = 1e6 * rng.uniform(0.5, 2.0) * chain()
+        body = port_model_from_matrices(M, K, {"contact": [0], "probe": [4]}, C=1e-6 * K)
+        assert body.omega[0] == 0.0
+        assert body.damping.ndim == 1
+        assert 0.0 <= body.damping[0] < 1e-12 * body.damping[-1]
+
+
+def test_a_gyroscopic_matrix_is_part_of_the_receptance():
+    rng = np.random.default_rng(4)
+    K = chain(ground=1.0)
+    turn = rng.normal(size=K.shape)
+    C = 0.02 * K + 0.3 * (turn - turn.T)
+    body = port_model_from_matrices(np.eye(5), K, {"contact": [0, 2], "probe": [4]}, C=C)
+    P = np.eye(5)[[0, 2, 4]]
+    for w in (0.5, 1.3):
+        exact = P @ np.linalg.solve(K - w**2 * np.eye(5) + 1j * w * C, P.T)
+        assert abs(exact - exact.T).max() > 0.05 * abs(exact).max()
+        np.testing.assert_allclose(receptance(body, w), exact, rtol=0, atol=1e-11)
+
+
+def test_motions_without_mass_follow_statically():
+    """The receptance is that of all degrees of freedom, the massless ones with a port included."""
+    K = chain(ground=1.0)
+    M = np.diag([1.0, 0.0, 2.0, 1.0, 0.0])
+    body = port_model_from_matrices(M, K, {"contact": [0, 1], "probe": [4]}, C=0.0 * K)
+    P = np.eye(5)[[0, 1, 4]]
+    assert len(body.omega) == 3
+    for w in (0.0, 0.4, 1.7):
+        exact = P @ np.linalg.solve(K - w**2 * M, P.T)
+        np.testing.assert_allclose(receptance(body, w), exact, rtol=0, atol=1e-11)

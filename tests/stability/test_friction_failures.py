@@ -21,16 +21,16 @@ from bladefem.friction.closed_form import circular_orbit_work, jenkins
 from bladefem.friction.energy import free_static_force
 from bladefem.friction.equivalent_linear import from_series
 from bladefem.friction.kernel_1d_exact import evaluate_exact
-from bladefem.friction.printed import (
+from bladefem.friction.time_step import stable_step, step_2d
+from bladefem.time.event_integrator import stuck_start
+from bladefem.time.system import damper_on_platforms
+from verification.paper.printed_laws import (
     corrected,
     corrected_rate,
     differential,
     per_axis,
     per_axis_printed,
 )
-from bladefem.friction.time_step import stable_step, step_2d
-from bladefem.time.event_integrator import stuck_start
-from bladefem.time.system import damper_on_platforms
 
 MU, KT = 0.5, 5.0
 

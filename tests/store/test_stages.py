@@ -195,7 +195,7 @@ def test_every_rank_gets_the_stage_and_its_error(tmp_path_factory):
 
 WRITE = """
 import numpy as np, xarray as xr
-from bladefem.store import write_results, read_results
+from bladefem.io.stage_cache import write_results, read_results
 write_results({path!r}, {{"a": xr.Dataset({{"x": ("t", np.arange(3.0))}})}})
 assert read_results({path!r}, "a").x.values.tolist() == [0, 1, 2]
 """

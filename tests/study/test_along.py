@@ -3,12 +3,15 @@
 import numpy as np
 import pytest
 
+from bladefem.data import Elements
 from bladefem.errors import InputError
 from bladefem.hbm.linear_resonances import free_resonances, stuck_resonances
+from bladefem.hbm.model import ReducedModel
 from bladefem.hbm.reference_blade import reference_model
 from bladefem.hbm.solve import solve
 from bladefem.hbm.solver.newton import Options
 from bladefem.hbm.sweep import response, size
+from bladefem.reduction.matrices import port_model_from_matrices
 from bladefem.study.adaptive.check_points import heights_of, peak_of, watched
 from bladefem.study.adaptive.family import family_of
 from bladefem.study.adaptive.frequency_list import along
@@ -105,3 +108,32 @@ def test_points_that_stick_take_the_excited_harmonic_alone(blade, omegas):
 def test_bad_input_is_named(blade, omegas, accuracy, named):
     with pytest.raises(InputError, match=named):
         along(family_of(blade, (1, 1)), omegas, first_for(len(blade.side(1).omega)), accuracy)
+
+
+def two_masses(n0, excitation):
+    """The example of the README, its first mass rubbing on the ground."""
+    K = np.array([[1.5e6, -0.5e6], [-0.5e6, 1.5e6]])
+    ports = {"contact": [0], "load": [0, 1], "probe": [0, 1]}
+    body = port_model_from_matrices(np.eye(2), K, ports, C=4e-6 * K)
+    element = Elements(
+        kt=np.array([1e6]), kn=np.zeros(1), mu=np.array([0.4]), n0=np.array([n0]), tangents=1
+    )
+    return ReducedModel((body,), element, excitation)
+
+
+@pytest.mark.parametrize("n0", [3.0, 100.0])
+@pytest.mark.parametrize(
+    "excitation", [{1: np.array([1.0, 0.5j])}, {1: np.array([1.0, 0.0]), 3: np.array([0.5, 0.2j])}]
+)
+def test_points_that_stick_with_fewer_harmonics_are_compared_and_all_excited_ones_are_taken(
+    n0, excitation
+):
+    """A stuck point is solved with the excited harmonics alone, of which there may be several."""
+    model = two_masses(n0, excitation)
+    omegas = np.linspace(800, 1600, 40)
+    curve = along(family_of(model, (1,)), omegas, first_for(2), 0.01)
+    truth = list(response(model, omegas, 31, 2048))
+    top = max(size(p) for p in truth)
+    for p, q in zip(curve.points, truth, strict=True):
+        assert p.converged
+        assert abs(size(p) - size(q)) < 0.01 * top

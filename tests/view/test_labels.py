@@ -8,8 +8,8 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from bladefem.view.outcomes import _round_ticks
 from bladefem.view.response import draw_accuracy
+from verification.paper.view_outcomes import _round_ticks
 
 
 @pytest.mark.parametrize("crowded", [False, True])

@@ -17,7 +17,7 @@ from ...hbm.solution import Solution
 from ...hbm.solver.newton import Options
 from ...hbm.sweep import size, sweep
 from .check_points import heights_of, hidden, peak_of, watched
-from .family import Family, member
+from .family import Family, member, with_excited_harmonics
 from .indicators import Indicators, indicate, judge, moved
 from .settings import Settings, enriched
 
@@ -182,6 +182,7 @@ def adapted(
         NotSolvedError: no point converged.
     """
     widen = band is None
+    settings = with_excited_harmonics(family, settings)
     if settings.chosen:
         rough = covered(member(family, settings).model, settings, band, mode, 1.0)
         settings, _, _ = choose(family, settings, peak_of(rough), accuracy, fixed)

@@ -27,8 +27,10 @@ __all__ = [
     "coarsened",
     "family_of",
     "joined",
+    "lowest_harmonics",
     "member",
     "shared_harmonics",
+    "with_excited_harmonics",
 ]
 
 SHARED = (1, 7, 15, 31, 63)
@@ -61,6 +63,26 @@ def member(family: Family, settings: Settings) -> Member:
     at.
     """
     return family.build(replace(settings, error=None, chosen=(), samples=0))
+
+
+def lowest_harmonics(family: Family, settings: Settings) -> int:
+    """Highest harmonic of the excitation and of prescribed normal loads: no balance has fewer."""
+    model = member(family, settings).model
+    return max((1, *model.excitation, *model.normal))
+
+
+def with_excited_harmonics(family: Family, settings: Settings) -> Settings:
+    """The settings with all harmonics that are excited, where the choice may take more.
+
+    Samples follow where they are open: at least eight in the period of the highest harmonic.
+    """
+    lowest = lowest_harmonics(family, settings)
+    if lowest <= settings.harmonics or "harmonics" not in settings.chosen:
+        return settings
+    samples = settings.samples
+    if "samples" in settings.chosen:
+        samples = max(samples, 8 * (lowest + 1))
+    return replace(settings, harmonics=lowest, samples=samples)
 
 
 def carried(w: np.ndarray, old: Member, new: Member, H: int) -> np.ndarray:

@@ -13,12 +13,13 @@ from ...errors import InputError, NotSolvedError
 from ...hbm.full_stick import grips
 from ...hbm.predictor import AHEAD, ahead
 from ...hbm.solution import Solution
+from ...hbm.solver.fallback import match_harmonics
 from ...hbm.solver.newton import Options
 from ...hbm.sweep import response, size, solve_from
 from .check_points import heights_of, hidden, watched
 from .choice import KEPT, Checked, following, likely, sufficient
-from .family import Family, carried, member
-from .indicators import Indicators, indicate, judge
+from .family import Family, carried, member, with_excited_harmonics
+from .indicators import Indicators, indicate, judge, judged_orders
 from .settings import Settings, enriched
 
 __all__ = ["along"]
@@ -88,7 +89,7 @@ def along(family: Family, omegas: Sequence[float], settings: Settings, accuracy:
             f"accuracy {accuracy}: expected a relative error above 0 and below 1, such as 0.02"
         )
     options = sufficient(accuracy)
-    settings = _first(family, settings, accuracy)
+    settings = _first(family, with_excited_harmonics(family, settings), accuracy)
     points = list(
         response(
             member(family, settings).model,
@@ -300,13 +301,17 @@ def _change(
     )
     if old.converged and not new.converged:
         return np.inf
-    gained.append((new, new.w - carried_over))
+    # a point that sticks throughout is solved with the excited harmonics alone
+    gained.append((new, match_harmonics(new.w, better.harmonics) - carried_over))
     curve.points[i] = new
     curve.used[i] = better
     curve.heights[i] = size(new) if new.converged else 0.0
     curve.errors.pop(old.omega, None)
     curve.foretold.discard(old.omega)
-    return float(abs(new.probe[1, 0] - old.probe[1, 0])) if old.converged else np.inf
+    if not old.converged:
+        return np.inf
+    orders = judged_orders(rich.model)
+    return float(np.linalg.norm(new.probe[orders, 0] - old.probe[orders, 0]))
 
 
 def _expected(gained: list[tuple[Solution, np.ndarray]], omega: float) -> np.ndarray:

@@ -28,13 +28,14 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from ...hbm.full_stick import grips
+from ...hbm.model import ReducedModel
 from ...hbm.solution import Solution
 from ...hbm.solve import solve
 from ...hbm.solver.newton import DEFAULTS, Options
-from .family import Family, carried, member
+from .family import Family, carried, lowest_harmonics, member
 from .settings import DAMPERS, DIRECTIONS, Settings
 
-__all__ = ["Indicators", "indicate", "judge", "moved", "richer"]
+__all__ = ["Indicators", "indicate", "judge", "judged_orders", "moved", "richer"]
 
 # for a point that only tells how wrong another one is
 ENOUGH = Options(1e-5, 30, fallbacks=False, frugal=True)
@@ -86,7 +87,7 @@ def indicate(
         other = None if name in errors else richer(family, settings, name)
         if other is not None:
             better[name] = moved(family, settings, solution, other, ENOUGH)
-            errors[name] = _change(solution, better[name])
+            errors[name] = _change(family, settings, solution, better[name])
     return Indicators({name: errors.get(name, 0.0) for name in DIRECTIONS}, better)
 
 
@@ -108,13 +109,14 @@ def judge(family: Family, settings: Settings, solution: Solution) -> Indicators:
         if other is None:
             continue
         if _poorer(settings, other, name):
-            errors[name] = _change(solution, moved(family, settings, solution, other, ENOUGH))
+            point = moved(family, settings, solution, other, ENOUGH)
+            errors[name] = _change(family, settings, solution, point)
         else:
             rich = replace(rich, **{name: getattr(other, name)})
             rich = replace(rich, samples=max(rich.samples, other.samples))
     if rich != settings:
         better["together"] = moved(family, settings, solution, rich, ENOUGH)
-        errors["together"] = _change(solution, better["together"])
+        errors["together"] = _change(family, settings, solution, better["together"])
     return Indicators(errors, better)
 
 
@@ -132,7 +134,7 @@ def richer(family: Family, settings: Settings, name: str) -> Settings | None:
         more = min(4 * H + 3 if H < 7 else 2 * H + 1, family.harmonics)
         # as with the modes
         if more <= H:
-            return replace(settings, harmonics=max(1, H // 2))
+            return replace(settings, harmonics=max(lowest_harmonics(family, settings), H // 2))
         return replace(
             settings,
             harmonics=more,
@@ -174,9 +176,17 @@ def moved(
     )
 
 
-def _change(solution: Solution, better: Solution) -> float:
+def judged_orders(model: ReducedModel) -> np.ndarray:
+    """Harmonics whose motion at the probe is judged: those that are excited, the first where there
+    is none.
+    """
+    return np.array(sorted(h for h in model.excitation if h > 0) or [1])
+
+
+def _change(family: Family, settings: Settings, solution: Solution, better: Solution) -> float:
     if not better.converged:
         return np.inf
-    old = solution.probe[1, 0]
-    new = better.probe[1, 0]
-    return float(abs(new - old) / max(abs(new), np.finfo(float).tiny))
+    orders = judged_orders(member(family, settings).model)
+    old = solution.probe[orders, 0]
+    new = better.probe[orders, 0]
+    return float(np.linalg.norm(new - old) / max(np.linalg.norm(new), np.finfo(float).tiny))

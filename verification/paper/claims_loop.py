@@ -12,16 +12,16 @@ from pathlib import Path
 import numpy as np
 
 from bladefem.damper.accelerate import Iterated, Rules, iterate
-from bladefem.damper.blades import judge, loop_response
 from bladefem.damper.direct import direct
 from bladefem.damper.paper import platform
 from bladefem.hbm.model import ReducedModel
 from bladefem.hbm.solution import Solution
 from bladefem.hbm.solve import solve
 from bladefem.view.paper import draw_histories
+from verification.paper.blades import judge, loop_response
 
 from .claim import Claim, verdict
-from .paper_blades import LOADS, model_of, top_of
+from .claims_blades import LOADS, model_of, top_of
 
 __all__ = ["accuracy", "loop_points"]
 

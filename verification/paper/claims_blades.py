@@ -14,18 +14,18 @@ from pathlib import Path
 import numpy as np
 
 from bladefem.contact.seating import solve as seat
-from bladefem.damper.blades import Peak, peak
 from bladefem.friction.fourier import synthesis
 from bladefem.hbm.model import ReducedModel
 from bladefem.hbm.sweep import size, sweep
 from bladefem.scene.tables import Scene
-from bladefem.scene.toml import load_scene
+from bladefem.scene.toml import load_scene, vary
 from bladefem.study.pipeline.stages import Bodies, find_modes
-from bladefem.study.row import Row, paper_model, row_of_blades, whole_model
 from bladefem.view.contact import draw_pressure
 from bladefem.view.mesh import draw_mesh
 from bladefem.view.modes import draw_mode_sheet
 from bladefem.view.paper import draw_tip_responses
+from verification.paper.blades import Peak, peak
+from verification.paper.plane_row import Row, paper_model, row_of_blades, whole_model
 
 from .claim import Claim, verdict
 
@@ -137,7 +137,7 @@ def phases() -> Claim:
     told = []
     heights = []
     for phase, name in ((0.0, "0"), (np.pi / 2, "90°"), (np.pi, "180°")):
-        turned = scene.vary(excitation__phase=phase)
+        turned = vary(scene, excitation__phase=phase)
         found = [peak(paper_model(turned, row, load), BANDS["soft", 2]) for load in (6.0, 200.0)]
         heights.append([p.amplitude for p in found])
         told.append(

@@ -27,7 +27,7 @@ from collections.abc import Callable
 
 import numpy as np
 
-from .time_step import step_1d
+from bladefem.friction.time_step import step_1d
 
 Motion = Callable[[float], tuple[float, float]]
 

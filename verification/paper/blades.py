@@ -25,6 +25,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 from scipy.optimize import minimize_scalar
 
+from bladefem.damper.accelerate import Iterated, Rules, iterate
+from bladefem.damper.paper import platform
 from bladefem.data import RigidBody
 from bladefem.errors import NotSolvedError
 from bladefem.friction.fourier import synthesis
@@ -32,11 +34,8 @@ from bladefem.hbm.model import ReducedModel
 from bladefem.hbm.reference_blade import reference_model
 from bladefem.hbm.solution import Solution
 from bladefem.hbm.sweep import size, sweep
-
-from ..time.shooting import Periodic, harmonics, periodic
-from ..time.system import System, ring
-from .accelerate import Iterated, Rules, iterate
-from .paper import platform
+from bladefem.time.shooting import Periodic, harmonics, periodic
+from bladefem.time.system import System, ring
 
 __all__ = [
     "Peak",

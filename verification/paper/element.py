@@ -13,8 +13,9 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.integrate import trapezoid
 
-from ..friction.equivalent_linear import Approximation, force_of, from_series
-from ..friction.printed import corrected, differential
+from bladefem.friction.equivalent_linear import Approximation, force_of, from_series
+
+from .printed_laws import corrected, differential
 
 __all__ = ["Loop", "coupled_loop", "linear_fit", "printed_loop", "two_slope_loop", "work"]
 

@@ -1,4 +1,4 @@
-"""The page "The paper, claim by claim":  python -m bladefem.report.paper [folder]  writes paper.md
+"""The page "The paper, claim by claim":  python -m verification.paper.page [folder]  writes paper.md
 and paper.html.
 
 Pictures, claims (claims.json) and the method map live in the folder ``paper`` beside the page.
@@ -34,7 +34,7 @@ INTRODUCTION = (
     "Table 1. Errors are "
     "against the exact integration of the coupled system unless said otherwise."
 )
-REMAKE = "python -m bladefem.report.paper docs"
+REMAKE = "python -m verification.paper.page docs"
 STYLE = (
     "body{font-family:sans-serif;max-width:64em;margin:2em auto;padding:0 "
     "1em}table{border-collapse:collapse}"

@@ -14,10 +14,9 @@ from pathlib import Path
 
 import numpy as np
 
+from bladefem.damper.accelerate import Iterated, Rules, iterate
+from bladefem.damper.paper import Platform, platform
 from bladefem.hbm.model import ReducedModel
-
-from .accelerate import Iterated, Rules, iterate
-from .paper import Platform, platform
 
 __all__ = ["COLUMNS", "VARIANTS", "count_outcomes", "method_map", "write_rows"]
 

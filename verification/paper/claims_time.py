@@ -9,7 +9,6 @@ from pathlib import Path
 
 import numpy as np
 
-from bladefem.damper.blades import judge, peak
 from bladefem.damper.branch import state_of
 from bladefem.damper.direct import direct
 from bladefem.damper.explicit import Cycle, explicit_march
@@ -19,13 +18,14 @@ from bladefem.hbm.solve import solve
 from bladefem.hbm.sweep import response, size
 from bladefem.hbm.time_model import time_system
 from bladefem.study.pipeline.stability import in_one_body, stability_of
-from bladefem.study.row import whole_model
 from bladefem.time.shooting import harmonics, multipliers, periodic
 from bladefem.time.system import System
-from bladefem.view.paper_contact import draw_sweeps
+from verification.paper.blades import judge, peak
+from verification.paper.plane_row import whole_model
+from verification.paper.view_contact import draw_sweeps
 
 from .claim import Claim, verdict
-from .paper_blades import BANDS, LOADS, MASSES, model_of, row_and_scene
+from .claims_blades import BANDS, LOADS, MASSES, model_of, row_and_scene
 
 __all__ = ["following", "in_time", "two_motions"]
 

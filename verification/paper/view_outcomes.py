@@ -14,7 +14,7 @@ from matplotlib.colors import LogNorm
 from matplotlib.patches import Patch as Swatch
 from matplotlib.ticker import MaxNLocator
 
-from .style import canvas
+from bladefem.view.style import canvas
 
 __all__ = ["draw_outcomes"]
 
@@ -35,7 +35,7 @@ def draw_outcomes(
 
     Args:
         table: one row a point and method: load, stiffness, frequency, method, outcome, iterations,
-            residual, as ``bladefem.damper.maps.method_map`` gives them, with a column "plane".
+            residual, as ``verification.paper.method_maps.method_map`` gives them, with a column "plane".
         planes: name of a plane to the column on its vertical axis, its label and the factor to its
             unit.
         file: PNG to write.

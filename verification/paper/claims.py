@@ -14,11 +14,8 @@ from pathlib import Path
 import numpy as np
 import pandas as pd
 
-from bladefem.damper.blades import judge, optimum, paper_blade, peak
 from bladefem.damper.branch import branch, inclined_contact
-from bladefem.damper.element import coupled_loop, linear_fit, printed_loop, two_slope_loop, work
 from bladefem.damper.loops import count_loops
-from bladefem.damper.maps import count_outcomes
 from bladefem.hbm.solve import solve
 from bladefem.scene.toml import load_scene
 from bladefem.study.kinds.punch import (
@@ -30,14 +27,20 @@ from bladefem.study.kinds.punch import (
 )
 from bladefem.time.event_integrator import State
 from bladefem.time.shooting import harmonics, multipliers, periodic
-from bladefem.view.outcomes import draw_outcomes
 from bladefem.view.paper import draw_coupled_loops, draw_fit
-from bladefem.view.paper_contact import draw_branches, draw_punch
+from verification.paper.blades import judge, optimum, paper_blade, peak
+from verification.paper.element import coupled_loop, linear_fit, printed_loop, two_slope_loop, work
+from verification.paper.method_maps import count_outcomes
+from verification.paper.view_contact import draw_branches, draw_punch
+from verification.paper.view_outcomes import draw_outcomes
 
-from . import paper_blades as blades
-from . import paper_loop, paper_optima, paper_response, paper_time
+from . import claims_blades as blades
+from . import claims_loop as paper_loop
+from . import claims_optima as paper_optima
+from . import claims_response as paper_response
+from . import claims_time as paper_time
 from .claim import Chapter, Claim, verdict
-from .paper_mass import mass
+from .claims_mass import mass
 
 __all__ = ["CHAPTERS"]
 

@@ -9,7 +9,7 @@ from pathlib import Path
 
 import numpy as np
 
-from .style import COLOURS, canvas, log_axis
+from bladefem.view.style import COLOURS, canvas, log_axis
 
 __all__ = ["draw_branches", "draw_punch", "draw_sweeps"]
 

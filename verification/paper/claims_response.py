@@ -9,16 +9,16 @@ from pathlib import Path
 
 import numpy as np
 
-from bladefem.damper.blades import peak, seat_loop
 from bladefem.data import Elements
 from bladefem.friction.fourier import synthesis
 from bladefem.hbm.solution import Solution
 from bladefem.hbm.sweep import size, sweep
 from bladefem.view.paper import draw_friction_loops, draw_tip_responses
+from verification.paper.blades import peak, seat_loop
 
 from .claim import Claim, verdict
-from .paper_blades import BANDS, LOADS, STIFF, dips, model_of
-from .paper_loop import loop_points
+from .claims_blades import BANDS, LOADS, STIFF, dips, model_of
+from .claims_loop import loop_points
 
 __all__ = ["responses", "slip_share"]
 

@@ -10,14 +10,14 @@ from pathlib import Path
 
 import numpy as np
 
-from bladefem.damper.blades import load_curve, optimum
 from bladefem.hbm.model import ReducedModel
 from bladefem.view.paper import draw_peaks
+from verification.paper.blades import load_curve, optimum
 
 from .claim import Claim, verdict
-from .paper_blades import BANDS, LOADS, MASSES, SCENES, dips, model_of
-from .paper_loop import loop_points
-from .paper_response import slip_share
+from .claims_blades import BANDS, LOADS, MASSES, SCENES, dips, model_of
+from .claims_loop import loop_points
+from .claims_response import slip_share
 
 __all__ = ["optima"]
 

@@ -1,0 +1,1 @@
+"""What judges bladefem: the paper claim by claim. It imports bladefem, never the other way round."""
