@@ -60,9 +60,7 @@ def wedge_between_masses(force=10.0, at=0, damping=20.0, excited=True):
     K = np.array([[1e6, -1e5], [-1e5, 4e5]])
     masses = port_model_from_matrices(10.0 * np.eye(2), K, ports, C=damping * np.eye(2))
     ports = {"contact": np.vstack([first, second])}
-    wedge = port_model_from_matrices(
-        0.1 * np.eye(2), 1e6 * np.eye(2), ports, C=damping * np.eye(2)
-    )
+    wedge = port_model_from_matrices(0.1 * np.eye(2), 1e6 * np.eye(2), ports, C=damping * np.eye(2))
     n0 = np.full(2, 240.0 / (2 * np.sin(a)))
     elements = Elements(np.full(2, 3e5), np.full(2, 3e5), np.full(2, 0.3), n0, tangents=1)
     loads = {1: np.array([force])} if excited else {}
