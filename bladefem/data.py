@@ -141,6 +141,15 @@ class Elements:
     n0: np.ndarray
     # tangential directions: 1 (plane models) or 2
     tangents: int = 2
+    # (n, tangents) static friction force of the preload state [N]; none when None
+    t0: np.ndarray | None = None
+
+    @property
+    def traction(self) -> np.ndarray:
+        """(n, tangents) static friction force of the preload state [N]."""
+        if self.t0 is None:
+            return np.zeros((np.size(self.kt), self.tangents))
+        return np.asarray(self.t0, dtype=float)
 
 
 @dataclass(frozen=True)
