@@ -145,6 +145,15 @@ class Elements:
     # friction law of all nodes, or a tuple with one a node; None: Coulomb's, see
     # `bladefem.friction.law`
     law: Any = None
+    # (n, tangents) static friction force of the preload state [N]; none when None
+    t0: np.ndarray | None = None
+
+    @property
+    def traction(self) -> np.ndarray:
+        """(n, tangents) static friction force of the preload state [N]."""
+        if self.t0 is None:
+            return np.zeros((np.size(self.kt), self.tangents))
+        return np.asarray(self.t0, dtype=float)
 
 
 @dataclass(frozen=True)

@@ -248,7 +248,8 @@ def select_elements(elements: Elements, rows: np.ndarray) -> Elements:
     if isinstance(law, tuple | list):
         law = tuple(law[i] for i in rows)
     parts = {name: np.asarray(getattr(elements, name))[rows] for name in ("kt", "kn", "mu", "n0")}
-    return replace(elements, **parts, law=law)
+    t0 = None if elements.t0 is None else np.asarray(elements.t0)[rows]
+    return replace(elements, **parts, law=law, t0=t0)
 
 
 def merged_laws(elements: Elements, groups: np.ndarray) -> Any:

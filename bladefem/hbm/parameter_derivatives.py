@@ -111,13 +111,14 @@ def contact_rate(model: ReducedModel, state: State, name: str, samples: int) -> 
     if name == "kn":
         return by_normal
     if name == "mu":
-        rate = f - by_tangents
+        # f is of degree one in (kt w + start, mu): the start of the march counts as a displacement
+        offset = model.offset.reshape(w.shape[:2])[:, first:]
+        rate = f - by_tangents - np.einsum("nakb,nb->nak", D[:, :, :, first:, 0], offset)
         rate[:, :first] = 0.0
         return rate
     if name == "load":
         rate = f - by_tangents - by_normal
-        if first:
-            rate[:, 0, 0] -= np.maximum(elements.n0, 0.0)
+        rate[:, :, 0] -= model.preload.reshape(rate.shape[:2])
         return rate
     if not first:
         raise InputError("gap: a prescribed normal load has no gap, expected elements.kn > 0")

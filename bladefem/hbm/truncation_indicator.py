@@ -75,7 +75,8 @@ def _harmonics(model: ReducedModel, w: np.ndarray, most: int) -> np.ndarray:
     )
     if d > tangents:
         N += e.kn[:, None] * u[:, :, 0]
-    g = e.kt[:, None, None] * u[:, :, d - tangents :]
+    offset = model.offset.reshape(n, d)[:, d - tangents :, None]
+    g = e.kt[:, None, None] * (u[:, :, d - tangents :] + offset)
     f = np.empty((p * n, tangents, S))
     second_period(g.reshape(p * n, tangents, S), N.reshape(p * n, S), np.tile(e.mu, p), f)
     f = f.reshape(p, n, tangents, S)

@@ -24,7 +24,6 @@ from geometry.parameters import (
 from geometry.quantity import quantity
 
 __all__ = [
-    "KINDS",
     "Contact",
     "Excitation",
     "Foundation",
@@ -37,8 +36,6 @@ __all__ = [
     "Seat",
     "Study",
 ]
-
-KINDS = ("wedge sector", "plane blades", "z mass", "hertz", "punch", "imported")
 
 
 @dataclass(frozen=True)
@@ -299,8 +296,20 @@ class Imported:
     )
     names: tuple[str, ...] | None = quantity(
         None,
-        help="names for groups of the file that has others, such as "
+        help="names for groups, node sets and surfaces of the file that has others, such as "
         "'clamp = face_3 + face_4', 'tip = face_1'",
+    )
+    linear: str = quantity(
+        "refuse",
+        choices=("refuse", "promote", "keep"),
+        help="first-order solids: refused, promoted to second order (nodes in the middle of "
+        "straight edges), or solved as they are, far too stiff",
+    )
+    tolerance: float = quantity(
+        1e-4, "1", 1e-9, 0.05, "largest distance of matched nodes, as a share of the face's size"
+    )
+    more: tuple[str, ...] | None = quantity(
+        None, help="other files of the same model, such as 'damper = damper.inp'"
     )
 
 
@@ -309,7 +318,7 @@ class Scene:
     """All of it. Tables that a kind does not use must not be given."""
 
     title: str = quantity("untitled", help="shown on pictures and in the report")
-    kind: str = quantity("wedge sector", choices=KINDS, help="which geometry")
+    kind: str = quantity("wedge sector", help="which geometry, see scene.kinds")
     accuracy: float = quantity(
         0.02, "1", 1e-6, 0.5, "wanted relative accuracy of the resonance amplitude"
     )
@@ -331,11 +340,3 @@ class Scene:
     excitation: Excitation = field(default_factory=Excitation)
     study: Study = field(default_factory=Study)
     model: Model = field(default_factory=Model)
-
-    def vary(self, *pair: object, **changes: object) -> Scene:
-        """A checked copy with other values, ``vary(aerofoil__twist="25 deg")`` or
-        ``vary("aerofoil.twist", 0.4)``.
-        """
-        from .toml import vary
-
-        return vary(self, *pair, **changes)

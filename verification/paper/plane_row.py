@@ -14,6 +14,7 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
+from bladefem.study.pipeline.keys import contact_key
 
 from bladefem.contact.interface_elements import friction_elements, pair_ratio
 from bladefem.contact.seating import ContactProblem, solve
@@ -23,8 +24,8 @@ from bladefem.hbm.model import ReducedModel
 from bladefem.io.stage_cache import stage
 from bladefem.reduction.assemble import recombine
 from bladefem.scene.tables import Scene
+from bladefem.scene.toml import vary
 from bladefem.study.pipeline.assemble_model import LoadCase, joint_model
-from bladefem.study.pipeline.keys import contact_key
 from bladefem.study.pipeline.stages import (
     Bodies,
     Reduced,
@@ -82,7 +83,7 @@ def paper_model(
         mass: of the damper [kg]; the scene's own when left out.
     """
     model = _joint(
-        scene.vary(contact__normal="prescribed"), row.problem, row, load, "mass", harmonics
+        vary(scene, contact__normal="prescribed"), row.problem, row, load, "mass", harmonics
     )
     nodes = len(model.elements.kt)
     tangents = np.kron(np.eye(nodes), [[0.0, 1.0]])

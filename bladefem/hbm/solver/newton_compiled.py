@@ -98,13 +98,14 @@ def _evaluate(w, d, linear, contact, work):
     G = linear.G
     stuck = linear.stuck
     springs = linear.springs
-    load, base, nodes, tab, brackets, preload = contact
+    load, base, nodes, tab, brackets, preload, offset = contact
     full, F, J, shares, p, r = work
     n = nodes.shape[0]
     K = w.shape[1]
     for i in range(w.shape[0]):
         for k in range(K):
             full[i // d, 2 - d + i % d, k] = w[i, k]
+        full[i // d, 2 - d + i % d, 0] += offset[i]
     if brackets:
         F[:] = 0.0
         J[:] = 0.0
@@ -251,7 +252,8 @@ def compiled_newton(w, d, linear, contact, sticks, tolerance, iterations, shorte
         d: directions a node, 1 (tangent) or 2 (normal, tangent).
         linear: the `Condensed` bodies.
         contact: prescribed loads (n, S) or (n, 0), their coefficients (n, K), nodes (n, 4), tables,
-            brackets (0: sampled), preload (m,).
+            brackets (0: sampled), preload (m,), offset (m,) of the mean displacements that the
+            friction law is given.
 
     Returns:
         steps taken, how it ended, error at w; of the last evaluation, which is at w if converged:

@@ -109,6 +109,8 @@ def contact_forces(
     """Friction forces in the directions (n, d, K) of the balance; displacements left out of it stay
     zero.
     """
+    w = w.copy()
+    w[:, :, 0] += model.offset.reshape(w.shape[:2])
     missing = 1 + model.elements.tangents - model.directions
     if missing:
         w = np.concatenate([np.zeros((len(w), missing, w.shape[2])), w], axis=1)
@@ -288,6 +290,7 @@ def contact_table(model: ReducedModel, H: int, samples: int) -> tuple:
             tables(H, samples or 4 * H + 4),
             0 if samples else 12 * (H + 1),
             model.preload,
+            model.offset,
         ),
     )
 

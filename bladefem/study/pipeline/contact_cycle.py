@@ -128,7 +128,8 @@ def contact_cycle(
 def _dealt_elements(elements: Elements, groups: np.ndarray, part: np.ndarray) -> Elements:
     """The elements of all nodes, each with its part of that of its group."""
     each = select_elements(elements, groups)
-    return replace(each, kt=each.kt * part, kn=each.kn * part, n0=each.n0 * part)
+    t0 = None if each.t0 is None else each.t0 * part[:, None]
+    return replace(each, kt=each.kt * part, kn=each.kn * part, n0=each.n0 * part, t0=t0)
 
 
 def _linear(

@@ -18,6 +18,8 @@ from ...data import ModeSet, Patch, PortModel
 from ...errors import InputError, suggestion
 from ...io.stage_cache import on_root
 from ...reduction.assemble import folded_diameter
+from ...scene.fields import value_at
+from ...scene.kinds import kind_named
 from ...scene.part_materials import part_materials
 from ...scene.tables import Material, Scene
 from ...util.progress import Progress, unwatched
@@ -174,7 +176,7 @@ def build_mesh(scene: Scene, comm: Any = None) -> Mesh:
     """
 
     def draw() -> Mesh:
-        from geometry import build
+        from geometry.isolated_process import build
 
         return build(scene)
 
@@ -353,7 +355,7 @@ def blade_parts(scene: Scene, mesh: Mesh) -> tuple[Mesh, dict[str, Material]]:
         InputError: a volume with a material that the mesh does not have, or that shares cells with
             another one.
     """
-    given = part_materials(scene) if scene.kind == "imported" else {}
+    given = part_materials(scene)
     if not given:
         return mesh, {"blade": scene.material.blade}
     cells = mesh.bodies["blade"]
@@ -381,7 +383,7 @@ def _damper_material(scene: Scene, mesh: Mesh) -> Material:
     """The damper's material, its density set by the given mass where there is one."""
     from ...fem.loads import volume
 
-    given = scene.plane.damper_mass if scene.kind == "plane blades" else scene.damper.mass
+    given = value_at(scene, kind_named(scene.kind).damper_mass)
     if given is None:
         return scene.material.damper
     return replace(scene.material.damper, rho=given / volume(mesh, "damper"))
