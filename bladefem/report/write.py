@@ -28,6 +28,7 @@ SECTIONS = {
     "modes": "Modes",
     "contact": "Contact",
     "response": "Forced response",
+    "wheel": "Mistuned wheel",
     "accuracy": "Accuracy and convergence",
     "timings": "Where the time went",
     "versions": "Versions",

@@ -117,6 +117,8 @@ class Run:
     strength: Strength | None = None
     reduced: Reduced | None = None
     response: Response | None = None
+    # study.mistuning.pattern_response.PatternResponse of each load; None where all blades are alike
+    wheel: list[Any] | None = None
     # stage to seconds
     timings: dict[str, float] = field(default_factory=dict)
     messages: list[str] = field(default_factory=list)
