@@ -32,6 +32,7 @@ from ..study.pipeline.linear_limits import Limit
 from ..study.pipeline.loads import summary
 from ..study.pipeline.stability import UNIQUE
 from ..study.pipeline.state_check import state_sentence
+from ..util.message import method, warning
 from ..util.progress import Progress, unwatched
 from ..view import mesh, modes, response, speed
 from .datasets import datasets, table_dataset
@@ -122,10 +123,10 @@ def _write(result: pipeline.Run, progress: Progress) -> None:
     messages = [
         *filter(None, [moved]),
         *result.messages,
-        MESH,
+        method(MESH),
         _static_contact(result),
-        _states(result),
-        linear_sentence(cycles),
+        method(_states(result)),
+        method(linear_sentence(cycles)),
         *_beyond_stick(result),
         *([wear_sentence(cycles, coefficient)] if worn else []),
     ]
@@ -141,7 +142,8 @@ def _static_contact(result: pipeline.Run) -> str:
         curve.settings.harmonics * float(np.max(curve.frequency))
         for curve in result.response.curves
     )
-    return quasi_static(patch, result.scene.material.blade, highest).sentence
+    found = quasi_static(patch, result.scene.material.blade, highest)
+    return method(found.sentence) if found.holds else warning(found.sentence)
 
 
 def _states(result: pipeline.Run) -> str:

@@ -28,6 +28,7 @@ from ...scene.tables import Scene
 from ...scene.units import show
 from ...scene.validate import refuse_response
 from ...scene.warnings import doubts
+from ...util.message import method, warning
 from ...util.progress import Progress, unwatched
 from ..adaptive.check_points import peak_of
 from ..adaptive.choice import choose, covered
@@ -139,7 +140,7 @@ def run(
     """
     if until in STAGES[3:]:
         refuse_response(scene)
-    clock = Clock({}, doubts(scene), progress)
+    clock = Clock({}, [*map(warning, doubts(scene))], progress)
     keep = _Keeper(folder, comm, clock)
     with clock("mesh"):
         mesh = keep("mesh", mesh_key(scene), lambda: build_mesh(scene, comm))
@@ -172,9 +173,9 @@ def run(
         }
         if mesh.dimension == 2:
             clock.messages.extend(
-                filter(None, [coarse_sentence(m for pair in maps.values() for m in pair)])
+                map(warning, filter(None, [coarse_sentence(m for pair in maps.values() for m in pair)]))
             )
-        clock.messages.extend(peak_remarks(maps, scene, mesh.depth))
+        clock.messages.extend(map(warning, peak_remarks(maps, scene, mesh.depth)))
         result = replace(result, contact=Seating(problem, maps, own))
     if until == "contact":
         return result
@@ -279,7 +280,7 @@ def _own_load(scene: Scene, problem: ContactProblem, messages: list[str]) -> flo
     try:
         maps = seat(problem, scene.operation.speed, bedded=scene.contact.bedded)
     except NotSolvedError as error:
-        messages.append(f"the damper's own centrifugal load does not seat it: {error}")
+        messages.append(warning(f"the damper's own centrifugal load does not seat it: {error}"))
         return None
     own = float(np.mean([m.force.sum() for m in maps]))
     messages.append(
@@ -394,42 +395,50 @@ def reduced_sector(
 
 def _remarks(scene: Scene, settings: Settings, curves: list[Curve], nodes: int) -> list[str]:
     """What a reader of the results has to know; ``nodes`` are the contact points of a seat."""
-    remarks = [settings.sentence(nodes), settings.method]
+    remarks: list[str] = [method(settings.sentence(nodes)), method(settings.method)]
     if scene.model.static == "uncoupled":
         remarks.append(
-            "mean displacements held as the static contact solution left them (model.static)"
+            method("mean displacements held as the static contact solution left them (model.static)")
         )
     if scene.study.stability:
-        remarks.append(stability_sentence([(c.stability, c.multiplier) for c in curves]))
+        remarks.append(method(stability_sentence([(c.stability, c.multiplier) for c in curves])))
     halved = halved_sentence([c.load for c in curves], [c.halved for c in curves], scene.accuracy)
     if halved:
-        remarks.append(halved)
+        remarks.append(warning(halved))
     lost = sum(int((~c.converged).sum()) for c in curves)
     if lost:
         remarks.append(
-            f"{lost} of {sum(len(c.frequency) for c in curves)} response points did not converge; "
-            "they are "
-            "marked in tables and pictures"
+            warning(
+                f"{lost} of {sum(len(c.frequency) for c in curves)} response points did not converge; "
+                "they are "
+                "marked in tables and pictures"
+            )
         )
     for c in curves:
         near = np.flatnonzero(c.frequency == c.peak_frequency)[0] + np.array([-1, 1])
         if not c.converged[near[(near >= 0) & (near < len(c.frequency))]].all():
             remarks.append(
-                f"load {c.load:g} N: the highest point that was solved stands beside one that was "
-                "not; the "
-                "resonance may be higher"
+                warning(
+                    f"load {c.load:g} N: the highest point that was solved stands beside one that was "
+                    "not; the "
+                    "resonance may be higher"
+                )
             )
         if c.settings.error == np.inf:
             remarks.append(
-                f"load {c.load:g} N: the error of the resonance amplitude is unknown, since "
-                "richer models "
-                "of it were not solved; nothing was refined because of that"
+                warning(
+                    f"load {c.load:g} N: the error of the resonance amplitude is unknown, since "
+                    "richer models "
+                    "of it were not solved; nothing was refined because of that"
+                )
             )
         elif c.settings.error is not None and c.settings.error > scene.accuracy:
             remarks.append(
-                f"load {c.load:g} N: estimated error {100 * c.settings.error:.2g} % of the "
-                "resonance "
-                f"amplitude, above the wanted {100 * scene.accuracy:.2g} %"
+                warning(
+                    f"load {c.load:g} N: estimated error {100 * c.settings.error:.2g} % of the "
+                    "resonance "
+                    f"amplitude, above the wanted {100 * scene.accuracy:.2g} %"
+                )
             )
     return remarks
 
