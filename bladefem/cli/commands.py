@@ -137,13 +137,34 @@ def response(options: argparse.Namespace, comm: Any) -> None:
 
 def report(options: argparse.Namespace, comm: Any) -> None:
     """Everything, with figures and report."""
+    refuse_pdf(options)
     scene, folder, bars = prepared(options, comm, responds=True)
     if scene.kind in WITHOUT_BLADE:
-        return without_blade(scene, folder, options, comm)
+        without_blade(scene, folder, options, comm)
+        return print_report(options, comm, folder / "report.html")
     from ..report.run import run as whole
 
     run = whole(scene, folder, comm, bars)
     tell(options, comm, lambda: tables.responses(run.response), run)
+    print_report(options, comm, folder / "report.html")
+
+
+def refuse_pdf(options: argparse.Namespace) -> None:
+    """A missing browser is told before long work."""
+    from ..report.pdf import require_browser
+
+    if options.pdf:
+        require_browser()
+
+
+def print_report(options: argparse.Namespace, comm: Any, page: Path) -> None:
+    """The report as PDF, where that is wanted."""
+    from ..io.stage_cache import on_root
+    from ..report.pdf import print_pdf
+
+    if options.pdf:
+        file = on_root(comm, lambda: print_pdf(page))
+        tell(options, comm, lambda: f"written: {file}")
 
 
 WITHOUT_BLADE = ("z mass", "hertz", "punch")
@@ -219,11 +240,13 @@ def prepared(
     folder = Path(options.output or default_folder(options.scene))
 
     def prepare() -> Scene:
-        from ..io.run_folder import locked, take_folder
+        from ..io.run_folder import keep_given, locked, take_folder
 
         scene = given_scene(options, responds)
+        given = _given(options)
         options.held.enter_context(locked(folder))
         moved = take_folder(folder, scene)
+        keep_given(folder, given)
         if moved and not options.quiet:
             print(f"bladefem: {moved}", file=sys.stderr, flush=True)
         return scene
@@ -231,6 +254,19 @@ def prepared(
     scene = on_root(comm, prepare)
     rank = 0 if comm is None else comm.rank
     return scene, folder, partial(watch, shown=wanted(options.quiet, rank))
+
+
+def _given(options: argparse.Namespace) -> set[str]:
+    """Dotted names of the fields that the user gave; a run folder remembers its own."""
+    from ..io.run_folder import given_fields
+    from ..scene.toml import given_keys, read_tables
+
+    path = Path(options.scene)
+    changed = {override.partition("=")[0].strip() for override in options.overrides}
+    known = given_fields(path) if path.is_dir() else None
+    if known is not None:
+        return {*known, *changed}
+    return given_keys(read_tables(scene_path(options.scene), options.overrides))
 
 
 def given_scene(options: argparse.Namespace, responds: bool) -> Scene:

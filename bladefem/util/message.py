@@ -7,7 +7,7 @@ from collections.abc import Iterable
 __all__ = ["LEVELS", "Message", "by_level", "method", "warning"]
 
 # in the order in which a report prints them
-LEVELS = ("warning", "information", "method")
+LEVELS = ("warning", "information", "method", "timing")
 
 
 class Message(str):
@@ -43,7 +43,7 @@ def by_level(messages: Iterable[str]) -> dict[str, list[str]]:
     """Sentences by level, without repetitions; plain texts are information.
 
     >>> by_level(["a", warning("b"), "a"])
-    {'warning': ['b'], 'information': ['a'], 'method': []}
+    {'warning': ['b'], 'information': ['a'], 'method': [], 'timing': []}
     """
     found: dict[str, list[str]] = {level: [] for level in LEVELS}
     for message in dict.fromkeys(messages):
