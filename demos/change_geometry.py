@@ -21,7 +21,7 @@ base = bladefem.load_scene(
 comm = MPI.COMM_WORLD
 frequencies = {}
 for width in ("8 mm", "10 mm", "12 mm"):
-    scene = base.vary("shank.width", width)
+    scene = bladefem.vary(base, "shank.width", width)
     bodies = bladefem.Bodies(scene, bladefem.build_mesh(scene, comm), comm)
     frequencies[width] = bladefem.find_modes(bodies, [9], count=1)[0].frequencies[0]
 

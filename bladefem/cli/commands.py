@@ -10,6 +10,7 @@ from pathlib import Path
 from typing import Any
 
 from ..errors import InputError
+from ..scene.kinds import kind_named, load_function
 from ..scene.tables import Scene
 from . import tables
 
@@ -113,8 +114,8 @@ def contact(options: argparse.Namespace, comm: Any) -> None:
     ParaView file.
     """
     scene, folder, bars = prepared(options, comm)
-    if scene.kind in WITHOUT_BLADE:
-        return without_blade(scene, folder, options, comm)
+    if not kind_named(scene.kind).has_blade:
+        return run_kind(scene, folder, options, comm, bars)
     from ..report import pressure
 
     run = pressure.run(scene, folder, comm, bars)
@@ -139,13 +140,7 @@ def report(options: argparse.Namespace, comm: Any) -> None:
     """Everything, with figures and report."""
     refuse_pdf(options)
     scene, folder, bars = prepared(options, comm, responds=True)
-    if scene.kind in WITHOUT_BLADE:
-        without_blade(scene, folder, options, comm)
-        return print_report(options, comm, folder / "report.html")
-    from ..report.run import run as whole
-
-    run = whole(scene, folder, comm, bars)
-    tell(options, comm, lambda: tables.responses(run.response), run)
+    run_kind(scene, folder, options, comm, bars)
     print_report(options, comm, folder / "report.html")
 
 
@@ -167,26 +162,13 @@ def print_report(options: argparse.Namespace, comm: Any, page: Path) -> None:
         tell(options, comm, lambda: f"written: {file}")
 
 
-WITHOUT_BLADE = ("z mass", "hertz", "punch")
-
-
-def without_blade(scene: Scene, folder: Path, options: argparse.Namespace, comm: Any) -> None:
-    """All that there is to such a scene: its contact, and the motion of the mass."""
-    from ..report.tables import readable
-
-    if scene.kind == "z mass":
-        from ..report import zmass
-
-        found = zmass.run(scene, folder, comm)
-        return tell(
-            options, comm, lambda: tables.frame(readable(zmass.motion_table(found.motions))), found
-        )
-    from ..report import pair
-
-    result = pair.run(scene, folder, comm)
-    return tell(
-        options, comm, lambda: tables.frame(readable(pair.pair_summary(result.states))), result
-    )
+def run_kind(
+    scene: Scene, folder: Path, options: argparse.Namespace, comm: Any, progress: Any
+) -> None:
+    """All that `bladefem run` does for a scene, by the record of its kind, and its table."""
+    kind = kind_named(scene.kind)
+    found = load_function(kind.runner)(scene, folder, comm, progress)
+    tell(options, comm, lambda: load_function(kind.table)(found), found)
 
 
 def chart(options: argparse.Namespace, comm: Any) -> None:

@@ -69,6 +69,8 @@ class Solution:
     # number of nodes that stick, slip, lift off, are open
     states: dict[str, int]
     work: Work
+    # the way of `bladefem.hbm.policy` that ran: loop, linear solvers
+    route: str = ""
 
     @property
     def amplitude(self) -> np.ndarray:

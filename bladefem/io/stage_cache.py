@@ -44,7 +44,7 @@ __all__ = [
 
 # Raised when the meaning or the layout of stored stages changes: older files are then computed
 # again.
-FORMAT = 3
+FORMAT = 4
 
 
 def open_folder(path: str | Path) -> Path:

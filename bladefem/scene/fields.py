@@ -12,29 +12,13 @@ from .tables import Scene
 from .units import is_plain, parse, readable_units, shortened, show
 
 __all__ = [
-    "TABLES",
     "Field",
     "convert",
     "each_field",
     "field_at",
     "split_values",
-    "used_tables",
     "value_at",
 ]
-
-_COMMON = ("mesh", "material", "contact", "study", "model")
-_ENGINE = (*_COMMON, "operation", "excitation")
-
-# Which tables each kind of scene reads; the others must not be given.
-TABLES = {
-    "wedge sector": ("aerofoil", "platform", "shank", "disc", "damper", *_ENGINE),
-    "plane blades": ("plane", *_ENGINE),
-    "z mass": ("z_mass", "foundation", *_COMMON),
-    "hertz": ("hertz", *_COMMON),
-    "punch": ("punch", *_COMMON),
-    "imported": ("imported", "damper", *_ENGINE),
-}
-
 
 # of one field: every load is a sweep of its own
 MOST_VALUES = 1000
@@ -51,15 +35,6 @@ class Field(NamedTuple):
     # unit, low, high, help, choices
     meta: dict
     default: Any
-
-
-def used_tables(kind: str) -> tuple[str, ...]:
-    """Names of the tables that this kind of scene reads."""
-    if kind not in TABLES:
-        raise InputError(
-            f"kind = {shortened(repr(kind))}: expected one of {', '.join(TABLES)}{_near(kind, TABLES)}"
-        )
-    return TABLES[kind]
 
 
 def each_field(table: type = Scene, path: str = "") -> Iterator[Field]:

@@ -24,6 +24,7 @@ from ...data import ModeSet, Patch, PressureMap
 from ...errors import InputError, NotSolvedError
 from ...io.stage_cache import found_remark, stage
 from ...reduction.truncate import truncated
+from ...scene.kinds import kind_named
 from ...scene.tables import Scene
 from ...scene.units import show
 from ...scene.validate import refuse_response
@@ -39,20 +40,21 @@ from ..modes.clamped_aerofoil import clamped_blade
 from ..modes.stress import Strength, strength
 from .assemble_model import LoadCase, joint_model
 from .contact_cycle import labels
-from .keys import contact_key, mesh_key, modes_key, reduction_key, response_key, strength_key
 from .liftoff import named
 from .linear_limits import Limit, linear_limits
 from .loads import Curve, default_loads, study_loads
 from .stability import stability_sentence
+from .stage_inputs import stage_key
 from .stages import (
     Bodies,
     Reduced,
     build_mesh,
+    condense_contact,
     excited_modes,
     find_modes,
     harmonic_diameters,
+    on_layer,
     reduce_sector,
-    seat_damper,
     weighted,
 )
 from .validate_mesh import found_patches
@@ -143,7 +145,9 @@ def run(
     clock = Clock({}, [*map(warning, doubts(scene))], progress)
     keep = _Keeper(folder, comm, clock)
     with clock("mesh"):
-        mesh = keep("mesh", mesh_key(scene), lambda: build_mesh(scene, comm))
+        mesh = keep("mesh", stage_key("mesh", scene), lambda: build_mesh(scene, comm))
+    # what was done to a user's own elements
+    clock.messages.extend(mesh.report.get("notes", ()))
     result = Run(
         scene,
         None if folder is None else Path(folder),
@@ -159,13 +163,16 @@ def run(
     with clock("modes"):
         result = replace(
             result,
-            modes=keep("modes", modes_key(scene), lambda: find_modes(bodies)),
-            clamped=keep("clamped", modes_key(scene), lambda: clamped_blade(bodies)),
+            modes=keep("modes", stage_key("modes", scene), lambda: find_modes(bodies)),
+            clamped=keep("clamped", stage_key("modes", scene), lambda: clamped_blade(bodies)),
         )
     if until == "modes":
         return result
     with clock("contact"):
-        problem = keep("contact", contact_key(scene), lambda: seat_damper(bodies, patches))
+        bare = keep(
+            "contact", stage_key("contact", scene), lambda: condense_contact(bodies, patches)
+        )
+        problem = on_layer(scene, bare)
         own = _own_load(scene, problem, clock.messages)
         maps = {
             load: seat(problem, scene.operation.speed, normal=load, bedded=scene.contact.bedded)
@@ -183,7 +190,9 @@ def run(
         excited = excited_modes(scene, mesh, result.modes)
         result = replace(
             result,
-            strength=keep("strength", strength_key(scene), lambda: strength(bodies, excited)),
+            strength=keep(
+                "strength", stage_key("stress", scene), lambda: strength(bodies, excited)
+            ),
         )
     cases = load_cases(scene, mesh, result.contact)
     with clock("reduction"):
@@ -256,7 +265,9 @@ def _response(
             keep.comm,
             progress,
             lambda case, make: keep.alone(
-                f"response_{_name(case)}", response_key(scene, settings, case), make
+                f"response_{_name(case)}",
+                stage_key("response", scene, case.load, case.mass, replace(settings, error=None)),
+                make,
             ),
         )
         band = min(c.frequency[0] for c in curves), max(c.frequency[-1] for c in curves)
@@ -374,7 +385,7 @@ def reduced_sector(
     diameters = harmonic_diameters(scene, bodies.mesh, EXACT_HARMONICS)
     while True:
         count = spare * settings.modes
-        key = reduction_key(scene, diameters, count)
+        key = stage_key("reduction", scene, np.array(diameters), count)
         reduced = keep("reduction", key, partial(reduce_sector, bodies, patches, diameters, count))
         if not settings.chosen:
             return settings, reduced
@@ -455,15 +466,11 @@ def _load_case(
 
 def check_blade(scene: Scene, mesh: Mesh) -> None:
     """Modes and responses need a blade, and a blade needs its clamp."""
-    found = {
-        "z mass": "pressure and motion",
-        "hertz": "contact pressure",
-        "punch": "contact pressure",
-    }
-    if scene.kind in found:
+    kind = kind_named(scene.kind)
+    if not kind.has_blade:
         raise InputError(
             f"kind '{scene.kind}' has no blade to vibrate: 'bladefem run' computes its "
-            f"{found[scene.kind]}, 'bladefem mesh' draws it"
+            f"{kind.result}, 'bladefem mesh' draws it"
         )
     if "clamp" not in mesh.faces:
         raise InputError(

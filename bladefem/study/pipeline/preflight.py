@@ -6,9 +6,9 @@ import numpy as np
 
 from ...contact.interface_elements import seat_contact, stiffnesses
 from ...errors import InputError
+from ...scene.kinds import kind_named
 from ...scene.tables import Scene
 from ...scene.units import show
-from ...scene.validate_contact import SEATED
 from ..kinds.hertz import check_loads
 
 __all__ = ["refuse_run"]
@@ -22,7 +22,7 @@ def refuse_run(scene: Scene) -> None:
     """
     if scene.kind == "hertz" and scene.hertz.interference is None:
         check_loads(scene)
-    if scene.kind in SEATED:
+    if kind_named(scene.kind).has_seats:
         _refuse_own_load(scene)
         _refuse_soft_seats(scene)
 
