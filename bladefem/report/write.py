@@ -219,7 +219,9 @@ def _sections(
     """Sections that have something to say, with numbered figures and tables."""
     table_numbers = count(1)
     extra = {
-        "answer": any(parts[key] for key in ("numbers", "lead", "steps", "warnings", "information")),
+        "answer": any(
+            parts[key] for key in ("numbers", "lead", "steps", "warnings", "information")
+        ),
         "inputs": parts["inputs"],
         "accuracy": parts["statements"] or parts["methods"],
         "timings": parts["timings"],

@@ -219,7 +219,9 @@ def test_levels_stay_apart(tmp_path):
     said = ["plain", warning("sharp edge"), method("balance"), Message("mesh: found", "timing")]
     page, _ = write_report(tmp_path, Scene(), {}, {}, said, {"mesh": 1.0})
     text = page.read_text()
-    box = text[text.index('<div class="warnings">') : text.index("</div>", text.index('"warnings"'))]
+    box = text[
+        text.index('<div class="warnings">') : text.index("</div>", text.index('"warnings"'))
+    ]
     assert "sharp edge" in box
     assert not any(word in box for word in ("plain", "balance", "found"))
     assert text.index("plain") < text.index('<section id="accuracy"') < text.index("balance")

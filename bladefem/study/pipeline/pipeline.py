@@ -180,7 +180,10 @@ def run(
         }
         if mesh.dimension == 2:
             clock.messages.extend(
-                map(warning, filter(None, [coarse_sentence(m for pair in maps.values() for m in pair)]))
+                map(
+                    warning,
+                    filter(None, [coarse_sentence(m for pair in maps.values() for m in pair)]),
+                )
             )
         clock.messages.extend(map(warning, peak_remarks(maps, scene, mesh.depth)))
         result = replace(result, contact=Seating(problem, maps, own))
@@ -409,7 +412,9 @@ def _remarks(scene: Scene, settings: Settings, curves: list[Curve], nodes: int) 
     remarks: list[str] = [method(settings.sentence(nodes)), method(settings.method)]
     if scene.model.static == "uncoupled":
         remarks.append(
-            method("mean displacements held as the static contact solution left them (model.static)")
+            method(
+                "mean displacements held as the static contact solution left them (model.static)"
+            )
         )
     if scene.study.stability:
         remarks.append(method(stability_sentence([(c.stability, c.multiplier) for c in curves])))
