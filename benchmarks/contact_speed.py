@@ -47,7 +47,7 @@ from bladefem.fem.body import assemble  # noqa: E402
 from bladefem.fem.constraint import constrain, restrict  # noqa: E402
 from bladefem.fem.flexibility import compliance, flexible  # noqa: E402
 from bladefem.scene.tables import Material, Scene  # noqa: E402
-from geometry import build  # noqa: E402
+from geometry.isolated_process import build  # noqa: E402
 
 
 def best(call, repeats=5):

@@ -164,7 +164,7 @@ def run_ours(
 
 def sector_mesh(dofs: float, curved: bool = True) -> Mesh:
     """The default sector with 24 blades and about this many degrees of freedom in the blade."""
-    from geometry.builders import build
+    from geometry.isolated_process import build
 
     scene = Scene()
     scene = replace(scene, disc=replace(scene.disc, sectors=SECTORS))

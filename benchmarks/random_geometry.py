@@ -35,7 +35,7 @@ from types import SimpleNamespace
 import numpy as np
 
 from bladefem.errors import InputError
-from geometry import build
+from geometry.isolated_process import build
 from geometry.parameters import Aerofoil, Disc, MeshSize, Platform, Shank, Wedge
 from geometry.sampling import anywhere, around
 

@@ -23,6 +23,7 @@ _WHERE = {
     "run": ".report.run",
     "seat_damper": ".study.pipeline.stages",
     "study_loads": ".study.pipeline.loads",
+    "vary": ".scene.toml",
 }
 __all__ = sorted(_WHERE)
 __getattr__ = loader(__name__, _WHERE)

@@ -11,6 +11,7 @@ w_normal > 0 presses the two together. f is the contact force that the damper fe
 from __future__ import annotations
 
 from dataclasses import dataclass, field
+from typing import Any
 
 import numpy as np
 
@@ -115,7 +116,8 @@ class PressureMap:
     patch: Patch
     # (n,) normal force, pressing > 0 [N]
     force: np.ndarray
-    # (n,) remaining opening, >= 0 [m]
+    # (n,) opening between the unpressed surfaces of the faces [m]; 0 where they press: how far the
+    # interface layer is closed there follows from the force (contact.interface_law)
     gap: np.ndarray
     # max |force gap| over (max force, max gap): the proof of optimality
     complementarity: float
@@ -140,6 +142,18 @@ class Elements:
     n0: np.ndarray
     # tangential directions: 1 (plane models) or 2
     tangents: int = 2
+    # friction law of all nodes, or a tuple with one a node; None: Coulomb's, see
+    # `bladefem.friction.law`
+    law: Any = None
+    # (n, tangents) static friction force of the preload state [N]; none when None
+    t0: np.ndarray | None = None
+
+    @property
+    def traction(self) -> np.ndarray:
+        """(n, tangents) static friction force of the preload state [N]."""
+        if self.t0 is None:
+            return np.zeros((np.size(self.kt), self.tangents))
+        return np.asarray(self.t0, dtype=float)
 
 
 @dataclass(frozen=True)

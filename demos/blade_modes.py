@@ -12,6 +12,7 @@
 
 # %%
 import os
+from pathlib import Path
 
 from mpi4py import MPI
 
@@ -21,7 +22,8 @@ from bladefem.fem.modes import modes
 from bladefem.study.modes.comparison import family_table
 
 coarse = "BLADEFEM_COARSE" in os.environ
-scene = bladefem.load_scene("scenes/wedge.toml", ["mesh.size=10 mm"] if coarse else [])
+scenes = Path(__file__).resolve().parents[1] / "scenes"
+scene = bladefem.load_scene(scenes / "wedge.toml", ["mesh.size=10 mm"] if coarse else [])
 comm = MPI.COMM_WORLD
 mesh = bladefem.build_mesh(scene, comm)
 

@@ -7,19 +7,21 @@
 
 # %%
 import os
+from pathlib import Path
 
 from mpi4py import MPI
 
 import bladefem
 
 coarse = "BLADEFEM_COARSE" in os.environ
+scenes = Path(__file__).resolve().parents[1] / "scenes"
 base = bladefem.load_scene(
-    "scenes/wedge.toml", ["mesh.size=10 mm"] if coarse else ["mesh.size=6 mm"]
+    scenes / "wedge.toml", ["mesh.size=10 mm"] if coarse else ["mesh.size=6 mm"]
 )
 comm = MPI.COMM_WORLD
 frequencies = {}
 for width in ("8 mm", "10 mm", "12 mm"):
-    scene = base.vary("shank.width", width)
+    scene = bladefem.vary(base, "shank.width", width)
     bodies = bladefem.Bodies(scene, bladefem.build_mesh(scene, comm), comm)
     frequencies[width] = bladefem.find_modes(bodies, [9], count=1)[0].frequencies[0]
 

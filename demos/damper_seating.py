@@ -13,6 +13,7 @@
 # %%
 import math
 import os
+from pathlib import Path
 
 import numpy as np
 from mpi4py import MPI
@@ -22,7 +23,8 @@ from bladefem.contact.seating import solve
 from bladefem.study.pipeline.stages import contact_patches
 
 coarse = "BLADEFEM_COARSE" in os.environ
-scene = bladefem.load_scene("scenes/wedge.toml", ["mesh.size=10 mm"] if coarse else [])
+scenes = Path(__file__).resolve().parents[1] / "scenes"
+scene = bladefem.load_scene(scenes / "wedge.toml", ["mesh.size=10 mm"] if coarse else [])
 comm = MPI.COMM_WORLD
 mesh = bladefem.build_mesh(scene, comm)
 problem = bladefem.seat_damper(bladefem.Bodies(scene, mesh, comm), contact_patches(mesh))

@@ -12,6 +12,7 @@
 
 # %%
 import os
+from pathlib import Path
 
 from mpi4py import MPI
 
@@ -19,6 +20,7 @@ import bladefem
 from bladefem.study.pipeline.pipeline import run
 
 coarse = "BLADEFEM_COARSE" in os.environ
+scenes = Path(__file__).resolve().parents[1] / "scenes"
 small = [
     "mesh.size=10 mm",
     "contact.points=6",
@@ -31,7 +33,7 @@ small = [
     "model.damper=rigid",
     "accuracy=5 %",
 ]
-scene = bladefem.load_scene("scenes/wedge.toml", small if coarse else [])
+scene = bladefem.load_scene(scenes / "wedge.toml", small if coarse else [])
 comm = MPI.COMM_WORLD
 result = run(scene, None if coarse else "runs/demos/forced_response", comm=comm)
 

@@ -31,6 +31,7 @@ from verification.paper.blades import judge, load_curve, optimum, peak, seat_loo
 from verification.paper.plane_row import paper_model, row_of_blades, whole_model
 
 coarse = "BLADEFEM_COARSE" in os.environ
+scenes = Path(__file__).resolve().parents[1] / "scenes"
 folder, comm = Path("runs/demos/paper_blades"), MPI.COMM_WORLD
 H, samples = (3, 128) if coarse else (7, 512)
 band = (1050.0, 1300.0)  # Hz, mode 2
@@ -41,7 +42,7 @@ band = (1050.0, 1300.0)  # Hz, mode 2
 
 # %%
 scenes = {
-    kt: bladefem.load_scene("scenes/plane.toml", [f"contact.kt={kt} N/m"]) for kt in (1e6, 1.44e7)
+    kt: bladefem.load_scene(scenes / "plane.toml", [f"contact.kt={kt} N/m"]) for kt in (1e6, 1.44e7)
 }
 rows = {kt: row_of_blades(scene, comm=comm) for kt, scene in scenes.items()}
 if comm.rank:  # what follows is small: rank 0 does it, the others wait at the end

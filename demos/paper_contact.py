@@ -8,6 +8,7 @@
 
 # %%
 import os
+from pathlib import Path
 
 import numpy as np
 from mpi4py import MPI
@@ -23,7 +24,8 @@ from bladefem.study.kinds.punch import (
 from verification.paper.view_contact import draw_punch
 
 coarse, comm = "BLADEFEM_COARSE" in os.environ, MPI.COMM_WORLD
-scene = bladefem.load_scene("scenes/punch.toml", ["mesh.contact_size=0.4 mm"] if coarse else [])
+scenes = Path(__file__).resolve().parents[1] / "scenes"
+scene = bladefem.load_scene(scenes / "punch.toml", ["mesh.contact_size=0.4 mm"] if coarse else [])
 found = indent(scene, comm)  # finite elements on all ranks, a quarter of block and punch
 if comm.rank:
     raise SystemExit

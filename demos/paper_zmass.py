@@ -20,13 +20,15 @@ from mpi4py import MPI
 import bladefem
 from bladefem.damper.loops import Drive, ratio_table, spectrum, steady
 from bladefem.report.zmass import draw_motions
+from bladefem.scene.toml import vary
 from bladefem.study.kinds.zmass import mass_on_foundation, motions, press
 from bladefem.view.paper import draw_footprint
 
 coarse = "BLADEFEM_COARSE" in os.environ
+scenes = Path(__file__).resolve().parents[1] / "scenes"
 folder, comm = Path("runs/demos/paper_zmass"), MPI.COMM_WORLD
 steps = 500 if coarse else 4000  # time steps a cycle of the foundation
-scene = bladefem.load_scene("scenes/zmass.toml", ["mesh.size=7 mm"] if coarse else [])
+scene = bladefem.load_scene(scenes / "zmass.toml", ["mesh.size=7 mm"] if coarse else [])
 
 # %% [markdown]
 # ## The pressure on the footprint (Fig. 8)
@@ -37,8 +39,11 @@ scene = bladefem.load_scene("scenes/zmass.toml", ["mesh.size=7 mm"] if coarse el
 
 # %%
 seat = press(scene, comm=comm).seat
-skewed = scene.vary(
-    foundation__skew=(0.5, 0.3), foundation__amplitude=(0.005, 0.003), foundation__ratios=(0.5,)
+skewed = vary(
+    scene,
+    foundation__skew=(0.5, 0.3),
+    foundation__amplitude=(0.005, 0.003),
+    foundation__ratios=(0.5,),
 )
 skew = press(skewed, comm=comm).seat
 if comm.rank:  # the rest is small: rank 0 does it, the others wait at the end

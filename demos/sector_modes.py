@@ -14,13 +14,15 @@
 
 # %%
 import os
+from pathlib import Path
 
 from mpi4py import MPI
 
 import bladefem
 
 coarse = "BLADEFEM_COARSE" in os.environ
-scene = bladefem.load_scene("scenes/wedge.toml", ["mesh.size=10 mm"] if coarse else [])
+scenes = Path(__file__).resolve().parents[1] / "scenes"
+scene = bladefem.load_scene(scenes / "wedge.toml", ["mesh.size=10 mm"] if coarse else [])
 comm = MPI.COMM_WORLD
 mesh = bladefem.build_mesh(scene, comm)
 bodies = bladefem.Bodies(scene, mesh, comm)

@@ -1,7 +1,4 @@
-"""Parametric shapes of friction-damped blades, drawn and meshed by gmsh; `build` makes the mesh of
-a scene.
+"""Parametric shapes of friction-damped blades, drawn and meshed by gmsh.
+
+`geometry.isolated_process.build` makes the mesh of a scene.
 """
-
-from .builders import build
-
-__all__ = ["build"]

@@ -24,7 +24,7 @@ from .parameters import HertzPair, MeshSize, Punch
 from .quality import report
 from .session import attempt, gmsh_session
 
-__all__ = ["hertz_pair", "punch"]
+__all__ = ["check_hertz", "check_punch", "hertz_pair", "punch"]
 
 # seat of the Hertz pair over the expected contact radius
 WIDER = 2.0
@@ -41,15 +41,8 @@ def hertz_pair(hertz: HertzPair, size: MeshSize) -> Mesh:
     Raises:
         InputError: a parameter has to change; the message names it.
     """
-    _inside(
-        "hertz.contact_radius",
-        hertz.contact_radius,
-        hertz.half_width / 2.5,
-        "hertz.half_width / 2.5",
-    )
-    _inside("hertz.half_width", hertz.half_width, 0.7 * hertz.radius, "70 % of hertz.radius")
+    check_hertz(hertz, size)
     fine = size.contact_size or hertz.contact_radius / 10
-    _inside("mesh.contact_size", fine, hertz.contact_radius, "hertz.contact_radius")
     mesh = _facing(
         hertz.dimension,
         hertz.half_width,
@@ -69,12 +62,39 @@ def punch(block: Punch, size: MeshSize) -> Mesh:
     Raises:
         InputError: a parameter has to change; the message names it.
     """
-    _inside("punch.radius", block.radius, block.half_width / 2, "half of punch.half_width")
+    check_punch(block, size)
     fine = size.contact_size or block.radius / 10
-    _inside("mesh.contact_size", fine, block.radius, "punch.radius")
     return _facing(
         block.dimension, block.half_width, block.radius, None, (fine, 1.1 * block.radius), size
     )
+
+
+def check_hertz(hertz: HertzPair, size: MeshSize) -> None:
+    """Refuse a contact that is too wide for its bodies, or smaller than an element.
+
+    Raises:
+        InputError: the first rule that is broken.
+    """
+    _inside(
+        "hertz.contact_radius",
+        hertz.contact_radius,
+        hertz.half_width / 2.5,
+        "hertz.half_width / 2.5",
+    )
+    _inside("hertz.half_width", hertz.half_width, 0.7 * hertz.radius, "70 % of hertz.radius")
+    fine = size.contact_size or hertz.contact_radius / 10
+    _inside("mesh.contact_size", fine, hertz.contact_radius, "hertz.contact_radius")
+
+
+def check_punch(block: Punch, size: MeshSize) -> None:
+    """Refuse a punch that is too wide for its block, or smaller than an element.
+
+    Raises:
+        InputError: the first rule that is broken.
+    """
+    _inside("punch.radius", block.radius, block.half_width / 2, "half of punch.half_width")
+    fine = size.contact_size or block.radius / 10
+    _inside("mesh.contact_size", fine, block.radius, "punch.radius")
 
 
 def _inside(name: str, value: float, limit: float, meaning: str) -> None:

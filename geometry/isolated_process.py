@@ -20,10 +20,12 @@ from types import SimpleNamespace
 from typing import Any
 
 from bladefem.errors import InputError
+from bladefem.scene.kinds import kind_named
 
+from .builders import build_here
 from .mesh import Mesh
 
-__all__ = ["build_apart"]
+__all__ = ["build"]
 
 # seconds; the largest meshes that are accepted take a tenth of it
 LIMIT = 900
@@ -34,7 +36,7 @@ ROOT = Path(__file__).parents[1]
 MPI = ("OMPI_", "PMIX_", "PMI_", "PRTE_", "ORTE_", "HYDRA_", "MPI_")
 
 
-def build_apart(scene: Any) -> Mesh:
+def build(scene: Any) -> Mesh:
     """The mesh of a scene, made in a child process; after a crash with the other algorithm and
     smaller elements.
 
@@ -43,6 +45,7 @@ def build_apart(scene: Any) -> Mesh:
             LIMIT.
         RuntimeError: the child failed in another way; the message holds its last words.
     """
+    kind_named(scene.kind)
     for size in _tries(scene.mesh):
         answer = _ask(SimpleNamespace(**vars(scene) | {"mesh": size}))
         if isinstance(answer, Mesh):
@@ -100,8 +103,6 @@ def _environment() -> dict[str, str]:
 
 def main(job: str, answer: str) -> None:
     """The child."""
-    from .builders import build_here
-
     scene = pickle.loads(Path(job).read_bytes())
     try:
         result: Mesh | InputError = build_here(scene)

@@ -14,7 +14,7 @@ from .parameters import Aerofoil, Disc, MeshSize, Platform, Shank, Wedge
 from .profile import Profile
 from .section import BLUNT
 
-__all__ = ["Sizes", "sector_sizes", "set_grids", "set_sizes"]
+__all__ = ["Sizes", "blade_volume", "sector_sizes", "set_grids", "set_sizes"]
 
 
 # element along the leading edge over those of the aerofoil
@@ -64,17 +64,21 @@ def sector_sizes(
     )
 
 
-def _affordable(aerofoil: Aerofoil, platform: Platform, shank: Shank, disc: Disc) -> float:
-    """Element size [m] that fills everything above the rim with SOME tetrahedra."""
+def blade_volume(aerofoil: Aerofoil, platform: Platform, shank: Shank, disc: Disc) -> float:
+    """About the volume of everything above the rim [m^3]."""
     chord = (aerofoil.chord_root + aerofoil.chord_tip) / 2
     thickness = (aerofoil.thickness_root + aerofoil.thickness_tip) / 2
     pitch = 2 * pi / disc.sectors * (disc.rim_radius + shank.height)
-    solid = (
+    return (
         0.7 * thickness * chord**2 * aerofoil.span
         + shank.height * shank.width * shank.length
         + pitch * platform.length * (platform.thickness + platform.seat_width / 2)
     )
-    return (solid / (0.12 * SOME)) ** (1 / 3)
+
+
+def _affordable(aerofoil: Aerofoil, platform: Platform, shank: Shank, disc: Disc) -> float:
+    """Element size [m] that fills everything above the rim with SOME tetrahedra."""
+    return (blade_volume(aerofoil, platform, shank, disc) / (0.12 * SOME)) ** (1 / 3)
 
 
 def set_sizes(

@@ -17,7 +17,7 @@ from .mesh import Mesh
 from .parameters import MeshSize, ZMass
 from .session import attempt, gmsh_session
 
-__all__ = ["z_corners", "z_mass", "z_section"]
+__all__ = ["check_z_mass", "z_corners", "z_mass", "z_section"]
 
 # side of the foundation block over the larger side of the Z
 WIDER = 2.0
@@ -54,12 +54,7 @@ def z_mass(z: ZMass, size: MeshSize, depth: float = 0.0) -> Mesh:
     Raises:
         InputError: a parameter has to change; the message names it.
     """
-    limit = 0.95 * min(z.height / 2, z.width)
-    if not z.bar <= limit:
-        raise InputError(
-            f"z_mass.bar = {z.bar:.4g} m: expected at most {limit:.4g} m "
-            "(95 % of z_mass.width and of half of z_mass.height)"
-        )
+    check_z_mass(z)
     base = size.size or min(z.thickness / 2, z.bar / 3)
     contact = size.contact_size or base
     with gmsh_session() as gmsh:
@@ -80,6 +75,20 @@ def z_mass(z: ZMass, size: MeshSize, depth: float = 0.0) -> Mesh:
             mesh = mesh_model(gmsh, groups, 3, size)
     pairs = {"this": ("seat", "footprint", np.eye(3), np.zeros(3))} if depth else {}
     return complete(mesh, pairs, base, flat=("seat", "footprint") if depth else ())
+
+
+def check_z_mass(z: ZMass) -> None:
+    """Refuse bars that leave no room between them.
+
+    Raises:
+        InputError: the bar is too wide.
+    """
+    limit = 0.95 * min(z.height / 2, z.width)
+    if not z.bar <= limit:
+        raise InputError(
+            f"z_mass.bar = {z.bar:.4g} m: expected at most {limit:.4g} m "
+            "(95 % of z_mass.width and of half of z_mass.height)"
+        )
 
 
 def _block(gmsh: ModuleType, z: ZMass, depth: float) -> int:

@@ -10,6 +10,7 @@ from pathlib import Path
 from typing import Any
 
 from ..errors import InputError
+from ..scene.kinds import kind_named, load_function
 from ..scene.tables import Scene
 from . import tables
 
@@ -35,12 +36,14 @@ def check(options: argparse.Namespace, comm: Any) -> None:
     from ..io.stage_cache import on_root
     from ..scene.toml import given_keys, read_tables, resolved, scene_of
     from ..scene.warnings import doubts
+    from ..study.pipeline.preflight import refuse_run
 
     file = scene_path(options.scene)
 
     def table() -> str:
         written = read_tables(file, options.overrides)
         scene = scene_of(written, file.resolve().parent)
+        refuse_run(scene)
         rows = tables.resolved_scene(resolved(scene, given_keys(written)))
         return "\n".join([rows, *(f"note: {doubt}" for doubt in doubts(scene))])
 
@@ -111,8 +114,8 @@ def contact(options: argparse.Namespace, comm: Any) -> None:
     ParaView file.
     """
     scene, folder, bars = prepared(options, comm)
-    if scene.kind in WITHOUT_BLADE:
-        return without_blade(scene, folder, options, comm)
+    if not kind_named(scene.kind).has_blade:
+        return run_kind(scene, folder, options, comm, bars)
     from ..report import pressure
 
     run = pressure.run(scene, folder, comm, bars)
@@ -135,35 +138,37 @@ def response(options: argparse.Namespace, comm: Any) -> None:
 
 def report(options: argparse.Namespace, comm: Any) -> None:
     """Everything, with figures and report."""
+    refuse_pdf(options)
     scene, folder, bars = prepared(options, comm, responds=True)
-    if scene.kind in WITHOUT_BLADE:
-        return without_blade(scene, folder, options, comm)
-    from ..report.run import run as whole
-
-    run = whole(scene, folder, comm, bars)
-    tell(options, comm, lambda: tables.responses(run.response), run)
+    run_kind(scene, folder, options, comm, bars)
+    print_report(options, comm, folder / "report.html")
 
 
-WITHOUT_BLADE = ("z mass", "hertz", "punch")
+def refuse_pdf(options: argparse.Namespace) -> None:
+    """A missing browser is told before long work."""
+    from ..report.pdf import require_browser
+
+    if options.pdf:
+        require_browser()
 
 
-def without_blade(scene: Scene, folder: Path, options: argparse.Namespace, comm: Any) -> None:
-    """All that there is to such a scene: its contact, and the motion of the mass."""
-    from ..report.tables import readable
+def print_report(options: argparse.Namespace, comm: Any, page: Path) -> None:
+    """The report as PDF, where that is wanted."""
+    from ..io.stage_cache import on_root
+    from ..report.pdf import print_pdf
 
-    if scene.kind == "z mass":
-        from ..report import zmass
+    if options.pdf:
+        file = on_root(comm, lambda: print_pdf(page))
+        tell(options, comm, lambda: f"written: {file}")
 
-        found = zmass.run(scene, folder, comm)
-        return tell(
-            options, comm, lambda: tables.frame(readable(zmass.motion_table(found.motions))), found
-        )
-    from ..report import pair
 
-    result = pair.run(scene, folder, comm)
-    return tell(
-        options, comm, lambda: tables.frame(readable(pair.pair_summary(result.states))), result
-    )
+def run_kind(
+    scene: Scene, folder: Path, options: argparse.Namespace, comm: Any, progress: Any
+) -> None:
+    """All that `bladefem run` does for a scene, by the record of its kind, and its table."""
+    kind = kind_named(scene.kind)
+    found = load_function(kind.runner)(scene, folder, comm, progress)
+    tell(options, comm, lambda: load_function(kind.table)(found), found)
 
 
 def chart(options: argparse.Namespace, comm: Any) -> None:
@@ -217,11 +222,13 @@ def prepared(
     folder = Path(options.output or default_folder(options.scene))
 
     def prepare() -> Scene:
-        from ..io.run_folder import locked, take_folder
+        from ..io.run_folder import keep_given, locked, take_folder
 
         scene = given_scene(options, responds)
+        given = _given(options)
         options.held.enter_context(locked(folder))
         moved = take_folder(folder, scene)
+        keep_given(folder, given)
         if moved and not options.quiet:
             print(f"bladefem: {moved}", file=sys.stderr, flush=True)
         return scene
@@ -229,6 +236,19 @@ def prepared(
     scene = on_root(comm, prepare)
     rank = 0 if comm is None else comm.rank
     return scene, folder, partial(watch, shown=wanted(options.quiet, rank))
+
+
+def _given(options: argparse.Namespace) -> set[str]:
+    """Dotted names of the fields that the user gave; a run folder remembers its own."""
+    from ..io.run_folder import given_fields
+    from ..scene.toml import given_keys, read_tables
+
+    path = Path(options.scene)
+    changed = {override.partition("=")[0].strip() for override in options.overrides}
+    known = given_fields(path) if path.is_dir() else None
+    if known is not None:
+        return {*known, *changed}
+    return given_keys(read_tables(scene_path(options.scene), options.overrides))
 
 
 def given_scene(options: argparse.Namespace, responds: bool) -> Scene:
@@ -239,6 +259,10 @@ def given_scene(options: argparse.Namespace, responds: bool) -> Scene:
     scene = load_scene(scene_path(options.scene), options.overrides)
     if responds:
         refuse_response(scene)
+    if responds or options.command == "contact":
+        from ..study.pipeline.preflight import refuse_run
+
+        refuse_run(scene)
     return scene
 
 

@@ -224,3 +224,24 @@ def _is_number(text: str) -> bool:
     except ValueError:
         return text == ""
     return True
+
+
+def run_table(run: Any) -> str:
+    """What a run of a blade with its damper ends with."""
+    return responses(run.response)
+
+
+def mass_table(run: Any) -> str:
+    """What a run of a mass on its foundation ends with."""
+    from ..report.tables import readable
+    from ..report.zmass import motion_table
+
+    return frame(readable(motion_table(run.motions)))
+
+
+def pair_table(run: Any) -> str:
+    """What a run of a verification pair ends with."""
+    from ..report.pair import pair_summary
+    from ..report.tables import readable
+
+    return frame(readable(pair_summary(run.states)))

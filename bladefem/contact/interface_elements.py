@@ -13,11 +13,14 @@ import scipy.sparse as sp
 from ..data import Elements, Patch, PressureMap
 from ..errors import InputError
 from ..scene.tables import Contact, Material, Seat
+from .interface_law import InterfaceLaw, rigid_faces, stiffness_at
 from .seating import ContactProblem
 
 __all__ = [
     "aggregation",
     "friction_elements",
+    "interface_law",
+    "layered",
     "mapped_stiffness",
     "mindlin_ratio",
     "normal_stiffness",
@@ -80,6 +83,28 @@ def stiffnesses(
     return kt, kt / ratio if kn is None else kn
 
 
+def interface_law(patches: Sequence[Patch], contact: Contact, ratio: float) -> InterfaceLaw:
+    """The interface law of all nodes of some patches, one patch after the other.
+
+    Rigid faces where ``contact.stiffness`` is "map": the paper's Eq. 23 takes the stiffness of the
+    elements from the pressure between rigid faces, after the seating.
+
+    Args:
+        ratio: k_t / k_n, used where only one of the two is given (``pair_ratio``).
+    """
+    area = np.concatenate([patch.area for patch in patches])
+    if contact.stiffness == "map":
+        return rigid_faces(len(area))
+    kn = [stiffnesses(seat_contact(contact, patch.name), ratio, patch.area)[1] for patch in patches]
+    doubling = np.inf if contact.stiffening is None else contact.stiffening
+    return InterfaceLaw(np.concatenate(kn), doubling * area)
+
+
+def layered(problem: ContactProblem, contact: Contact, ratio: float) -> ContactProblem:
+    """The contact problem with the interface law of [contact] between its faces."""
+    return replace(problem, layer=interface_law(problem.patches, contact, ratio))
+
+
 def _shared(total: float | None, areal: float | None, area: np.ndarray) -> np.ndarray | None:
     if total is not None:
         return total * area / area.sum()
@@ -94,6 +119,10 @@ def friction_elements(
     tangents: int = 2,
 ) -> tuple[Elements, sp.csr_matrix]:
     """Node-to-node elements of all patches, one after the other.
+
+    They rest in the seated state: a pressed node carries its static force, which is kn times the
+    closure of its layer, and an open one keeps its gap. A layer that stiffens with pressure is
+    linearised about the seated state, in both directions.
 
     Args:
         problem: that the maps solve; only read for a normal stiffness from the map.
@@ -125,13 +154,13 @@ def friction_elements(
             strict=True,
         ),
     )
-    if contact.normal == "coupled" and not (kn > 0).all():
-        raise InputError(
-            "contact: a normal stiffness (kn, kn_area, or by Mindlin from kt, kt_area) is 0, "
-            "expected a "
-            "positive value where contact.normal is 'coupled'"
-        )
+    _require_stiffness(kt, kn)
     force = np.concatenate([a.T @ m.force for a, m in zip(members, maps, strict=True)])
+    if contact.stiffening is not None:
+        law = InterfaceLaw(kn, contact.stiffening * np.concatenate(area))
+        growth = stiffness_at(law, force) / kn
+        kt = kt * growth
+        kn = kn * growth
     gap = np.concatenate([g.T @ m.gap for g, m in zip(G, maps, strict=True)])
     if contact.normal == "prescribed":
         kn = np.zeros_like(kn)
@@ -142,6 +171,16 @@ def friction_elements(
     return Elements(
         kt, kn, np.repeat([c.mu for c in seats], [len(a) for a in area]), n0, tangents
     ), S
+
+
+def _require_stiffness(kt: np.ndarray, kn: np.ndarray) -> None:
+    """Both stiffnesses of the layer are above zero; also refuses NaN."""
+    for name, value in (("tangential", kt), ("normal", kn)):
+        if not (value > 0).all():
+            raise InputError(
+                f"contact: a {name} stiffness is {value[~(value > 0)][0]:g} N/m, expected a "
+                "positive value"
+            )
 
 
 def normal_stiffness(problem: ContactProblem, maps: Sequence[PressureMap]) -> np.ndarray:

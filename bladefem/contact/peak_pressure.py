@@ -1,10 +1,11 @@
 """Can the largest pressure of a map be believed? Not where its place is narrower than the elements,
-or a sharp edge.
+or where stiff faces end in a sharp edge.
 
-Forces and mean pressures are those of the whole seat and far less sensitive. On the shipped wedge,
-bedded and under 80 N, the peak stands at the inner edge and grows from 0.88 over 1.07, 1.31, 1.49
-to 1.76 MPa as the elements shrink from 3 over 2, 1.5, 1 to 0.75 mm, like the pressure under the
-edge of a flat punch; the pressed share of the seat is 76, 64, 67, 64, 63 %.
+Forces and mean pressures are those of the whole seat and far less sensitive. Between rigid faces
+the pressure of the shipped wedge, bedded and under 80 N, grows at the inner edge from 0.88 over
+1.07, 1.31, 1.49 to 1.76 MPa as the elements shrink from 3 over 2, 1.5, 1 to 0.75 mm, like the
+pressure under the edge of a flat punch. An interface layer bounds it: pressure then varies over the
+length E* / kn, which elements resolve or not.
 """
 
 from __future__ import annotations
@@ -18,11 +19,14 @@ from ..scene.tables import Contact, Scene
 from ..scene.units import show
 from .face_profile import element_size
 from .hertz import FINEST, contact_modulus, line_width, point_radius
+from .interface_elements import interface_law, pair_ratio
 
 __all__ = ["at_edge", "edge_sentence", "narrow_sentence", "peak_remarks"]
 
 # half width of a crown's contact over the element size that is advised
 WANTED = 4.0
+# elements in the length E* / kn from which the pressure at a sharp edge is resolved
+EDGE_ELEMENTS = 4.0
 
 # mean normal load of a seat [N] to the maps of its patches
 Maps = Mapping[float, Sequence[PressureMap]]
@@ -36,16 +40,26 @@ def peak_remarks(maps: Maps, scene: Scene, depth: float = 1.0) -> list[str]:
     """
     return [
         said
-        for said in (narrow_sentence(maps, scene, depth), edge_sentence(maps, scene.contact))
+        for said in (narrow_sentence(maps, scene, depth), edge_sentence(maps, scene, depth))
         if said
     ]
 
 
-def edge_sentence(maps: Maps, contact: Contact) -> str:
-    """A warning where the peak stands at a sharp edge of a seat, or ""."""
+def edge_sentence(maps: Maps, scene: Scene, depth: float = 1.0) -> str:
+    """A warning where the peak is at a sharp edge of a seat and its layer too stiff for the mesh,
+    or "".
+    """
+    contact = scene.contact
     sharp = contact.bedded or contact.edge_radius is None
     there = [load for load, seats in maps.items() if any(at_edge(m) for m in seats)]
     if not sharp or not there:
+        return ""
+    modulus = contact_modulus(scene.material.blade, scene.material.damper)
+    if all(
+        modulus / areal_stiffness(m.patch, scene) >= EDGE_ELEMENTS * element_size(m.patch, depth)
+        for seats in maps.values()
+        for m in seats
+    ):
         return ""
     return (
         f"peak pressure: under {len(there)} of {len(maps)} loads it stands at a sharp edge of a "
@@ -54,6 +68,12 @@ def edge_sentence(maps: Maps, contact: Contact) -> str:
         "edges "
         "(contact.edge_radius)"
     )
+
+
+def areal_stiffness(patch: Patch, scene: Scene) -> float:
+    """Normal stiffness of the interface layer at first touch [N/m^3]; infinite for rigid faces."""
+    ratio = pair_ratio(scene.material.blade, scene.material.damper)
+    return float((interface_law([patch], scene.contact, ratio).stiffness / patch.area).max())
 
 
 def at_edge(pressure: PressureMap) -> bool:
@@ -89,7 +109,13 @@ def narrow_sentence(maps: Maps, scene: Scene, depth: float = 1.0) -> str:
     load = min(maps)
     worst, size = min(
         (
-            (_half_width(m, contact, modulus, depth), element_size(m.patch, depth))
+            (
+                max(
+                    _half_width(m, contact, modulus, depth),
+                    _layer_half_width(m, contact, areal_stiffness(m.patch, scene), depth),
+                ),
+                element_size(m.patch, depth),
+            )
             for m in maps[load]
         ),
         key=lambda found: found[0] / found[1],
@@ -104,6 +130,31 @@ def narrow_sentence(maps: Maps, scene: Scene, depth: float = 1.0) -> str:
         f"{show(float(f'{size:.2g}'), 'm')}; expected "
         f"mesh.contact_size <= {show(wanted, 'm')}, or a larger crown radius"
     )
+
+
+def _layer_half_width(
+    pressure: PressureMap, contact: Contact, stiffness: float, depth: float
+) -> float:
+    """Smallest half width [m] of the contact of crowned rigid faces on the interface layer alone.
+
+    Pressure kn (approach - x^2 / 2 R), whose integral is the load: of a line P / L = 2 kn a^3 /
+    (3 R), of an ellipse P = pi kn approach^2 sqrt(R1 R2).
+
+    Args:
+        stiffness: of the layer [N/m^3].
+    """
+    load = float(pressure.force.sum())
+    plane = pressure.patch.faces.shape[1] == 2
+    radii = [r for r in (contact.crown_across, None if plane else contact.crown) if r is not None]
+    if len(radii) == 2:
+        approach = (load / (np.pi * stiffness * np.prod(radii) ** 0.5)) ** 0.5
+        return float((2.0 * min(radii) * approach) ** 0.5)
+    if not radii:
+        return np.inf
+    axes = pressure.patch.frame.mean(axis=0)[1 : 2 if plane else 3]
+    lengths = [*np.ptp(pressure.patch.points @ axes.T, axis=0), *([depth] if plane else [])]
+    length = lengths[1] if contact.crown_across is not None else lengths[0]
+    return float((1.5 * load / length * radii[0] / stiffness) ** (1 / 3))
 
 
 def _half_width(pressure: PressureMap, contact: Contact, modulus: float, depth: float) -> float:

@@ -5,11 +5,16 @@ The wheel is at rest in the rotating frame and all blades move alike (nodal diam
 blade's seat_left is this blade's seat_left in its own axes. With f >= 0 the pressing forces at the
 normal ports of both seats,
 
-    gap = clearance - u_blade + u_damper = g0 + (C_blade + C_damper) f + B q,    B^T f + load = 0,
+    opening = clearance - u_blade + u_damper = g0 + (C_blade + C_damper) f + B q,   B^T f + load = 0,
 
 where q is the damper's rigid motion, found from equilibrium: no spring holds it. Directions that
 frictionless seats can't hold (the engine axis for a wedge, the circumference for a flat damper)
-drop out of both.
+drop out of both. Where opening < 0 the interface layer is closed by c = -opening and carries f(c)
+(``interface_law``), so that the complementarity holds between f and
+
+    gap = opening + c(f) >= 0,
+
+whose flexibility is that of the bodies and of the layer in series.
 """
 
 from __future__ import annotations
@@ -33,6 +38,7 @@ from ..fem.loads import centrifugal, mass
 from ..scene.tables import Materials
 from .as_array import given
 from .complementarity import LCPSolution, held_directions, solve_lcp
+from .interface_law import InterfaceLaw, closure_of, compliance_at, rigid_faces
 from .patch import initial_gap, make_patch, normal_ports, port_matrix, rigid_ports
 
 __all__ = ["ContactProblem", "contact_problem", "seat", "solve", "spin_axis"]
@@ -41,6 +47,9 @@ __all__ = ["ContactProblem", "contact_problem", "seat", "solve", "spin_axis"]
 HOVERING = 1e4
 # accepted part of the load along directions that frictionless seats can't hold
 SIDEWAYS = 0.01
+# steps of Newton's method on a layer that stiffens, and the relative change of force that ends them
+LAYER_STEPS = 50
+LAYER_SETTLED = 1e-12
 
 
 @dataclass(frozen=True)
@@ -66,6 +75,13 @@ class ContactProblem:
     load: np.ndarray
     # of the damper as meshed [kg]
     mass: float
+    # (n,) of the interface layer; rigid faces when None
+    layer: InterfaceLaw | None = None
+
+    @property
+    def law(self) -> InterfaceLaw:
+        """The interface law of all ports."""
+        return rigid_faces(len(self.clearance)) if self.layer is None else self.layer
 
 
 def contact_problem(
@@ -254,9 +270,7 @@ def _state(
             f"{sideways:.1%} of the damper's load is along a direction in which frictionless seats "
             f"can't hold it, expected below {SIDEWAYS:.0%}"
         )
-    solution = solve_lcp(
-        problem.flexibility, g0 + scale * problem.damper_swell, problem.rigid, -scale * load, active
-    )
+    solution = _on_layer(problem, g0 + scale * problem.damper_swell, -scale * load, active)
     if solution.reason:
         raise NotSolvedError(
             f"the damper could not be seated{_too_light(problem, g0, scale, load)}: "
@@ -265,17 +279,45 @@ def _state(
     return solution
 
 
+def _on_layer(
+    problem: ContactProblem, g0: np.ndarray, load: np.ndarray, active: np.ndarray | None
+) -> LCPSolution:
+    """The complementarity problem with the layer in series; Newton's method where it stiffens."""
+    law = problem.law
+    force = np.zeros(len(g0))
+    for _ in range(LAYER_STEPS):
+        slope = compliance_at(law, force)
+        solution = solve_lcp(
+            problem.flexibility + np.diag(slope),
+            g0 + closure_of(law, force) - slope * force,
+            problem.rigid,
+            load,
+            active,
+        )
+        change = np.abs(solution.force - force).max()
+        force = solution.force
+        active = solution.active
+        settled = change <= LAYER_SETTLED * np.abs(force).max()
+        if solution.reason or settled or not np.isfinite(law.doubling).any():
+            return solution
+    return replace(
+        solution,
+        reason=f"the stiffening interface layer changed by {change:.1e} N in its last step",
+    )
+
+
 def _too_light(problem: ContactProblem, g0: np.ndarray, scale: float, load: np.ndarray) -> str:
     """Empty, or that the load cannot bring faces together that the damper's travel alone leaves
     apart.
     """
     U, S, held = held_directions(problem.rigid)
     misfit = float(np.ptp(g0 - U @ (U.T @ g0)))
-    bent = float(problem.flexibility.diagonal().max() * np.linalg.norm(scale * (held.T @ load) / S))
+    yielding = problem.flexibility.diagonal() + compliance_at(problem.law, np.zeros(len(g0)))
+    bent = float(yielding.max() * np.linalg.norm(scale * (held.T @ load) / S))
     if misfit <= HOVERING * bent:
         return ""
     return (
-        f" and rests on single points: the load bends the bodies by some {1e6 * bent:.1g} um, "
+        f" and rests on single points: the load presses bodies and layer together by some {1e6 * bent:.1g} um, "
         "while the gaps of "
         f"the seats differ by {1e6 * misfit:.3g} um, so it hardly touches; expected a larger "
         "study.loads, faces "

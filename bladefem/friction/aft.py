@@ -7,7 +7,7 @@ max(0, n0 + kn w_n), the tangential one a return map of kt w onto |f| <= mu time
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -15,6 +15,8 @@ from bladefem.data import Elements
 from bladefem.errors import InputError
 from bladefem.friction.fourier import harmonics_of
 from bladefem.friction.kernel_1d import jenkins_batch
+from bladefem.friction.law import groups_by_law, select_elements
+from bladefem.friction.periodic_law import periodic_forces
 from bladefem.friction.simd.kernel_2d import disc_batch
 from bladefem.friction.trigonometric_tables import patterns, tables
 
@@ -88,6 +90,8 @@ def evaluate(
         raise InputError(f"precision {precision!r}: expected one of {', '.join(PRECISIONS)}")
     n, d, K = w.shape
     load = _series(load, n, samples)
+    if elements.law is not None:
+        return _evaluate_laws(elements, w, samples, jacobian, load, cycles, precision)
     tab = tables(harmonics_of(w), samples)
     F = np.empty((n, d, K))
     shares = np.empty((n, 3))
@@ -119,6 +123,52 @@ def evaluate(
         np.abs(used),
         reason == PERIODIC,
         reason,
+    )
+
+
+def _evaluate_laws(
+    elements: Elements,
+    w: np.ndarray,
+    samples: int,
+    jacobian: bool,
+    load: np.ndarray,
+    cycles: int,
+    precision: str,
+) -> Forces:
+    """The same for elements of several laws, law after law; Coulomb's with its kernels."""
+    n, d, K = w.shape
+    # raises where the samples are too few
+    tables(harmonics_of(w), samples)
+    F = np.empty((n, d, K))
+    J = np.empty((n, d, K, d, K)) if jacobian else None
+    shares = np.empty((n, 3))
+    used = np.full(n, 2)
+    for law, rows in groups_by_law(elements):
+        some = replace(select_elements(elements, rows), law=None)
+        prescribed = load[rows] if load.shape[1] else None
+        if law is None:
+            part = evaluate(
+                some,
+                w[rows],
+                samples,
+                jacobian,
+                load=prescribed,
+                cycles=cycles,
+                precision=precision,
+            )
+            used[rows] = part.cycles if part.converged else -part.cycles
+        else:
+            part = periodic_forces(
+                law, some, w[rows], samples, load=prescribed, jacobian=jacobian, cycles=cycles
+            )
+            used[rows] = part.cycles
+        F[rows] = part.f
+        shares[rows] = part.shares
+        if J is not None:
+            J[rows] = part.dfdw
+    reason = verdict(F, used, f"were not periodic after {cycles} cycles")
+    return Forces(
+        F, J, states(shares), shares, dissipated(F, w), np.abs(used), reason == PERIODIC, reason
     )
 
 

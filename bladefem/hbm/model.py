@@ -25,8 +25,10 @@ class ReducedModel:
     """Blades and damper reduced to the contact, in the pair coordinates of `bladefem.data`.
 
     Harmonic 0 is counted from the preload state, in which node i carries the normal force max(n0_i,
-    0) and no tangential force; static offsets of the sides are part of that state, not of this
-    model. From plain matrices:
+    0) and the friction force t0_i (elements.t0, none by default); static offsets of the sides are
+    part of that state, not of this model. A node that never slips carries the friction force
+    kt w + t0, or kt w + start where its history left another one; nodes that slip within the period
+    forget it. From plain matrices:
 
     >>> import numpy as np
     >>> from bladefem.data import Elements
@@ -66,6 +68,9 @@ class ReducedModel:
     # Prescribed part of the normal load beside n0 and kn w_n: harmonic >= 1 to complex amplitudes
     # of the nodes [N].
     normal: Mapping[int, np.ndarray] = field(default_factory=dict)
+    # (nodes, tangents) friction force at zero displacement from which the friction law starts [N]:
+    # what the loading history left in nodes that never slip; elements.t0 when None
+    start: np.ndarray | None = None
 
     def __post_init__(self) -> None:
         parts = {
@@ -119,9 +124,26 @@ class ReducedModel:
     def preload(self) -> np.ndarray:
         """(nodes directions,) contact forces in the preload state [N]."""
         force = np.zeros((len(self.elements.kt), self.directions))
-        if self.directions > self.elements.tangents:
+        first = self.directions - self.elements.tangents
+        if first:
             force[:, 0] = np.maximum(self.elements.n0, 0.0)
+        force[:, first:] = self.elements.traction
         return force.ravel()
+
+    @cached_property
+    def offset(self) -> np.ndarray:
+        """(nodes directions,) mean displacement that is added before the friction law is evaluated
+        [m].
+
+        The law starts its march from kt w, so kt (w + start / kt) makes it start from start + kt w.
+        The slider moves along with it: nodes that slip carry the same force with and without it.
+        """
+        start = self.elements.traction if self.start is None else self.start
+        kt = np.asarray(self.elements.kt, dtype=float)[:, None]
+        moved = np.zeros((len(kt), self.directions))
+        first = self.directions - self.elements.tangents
+        moved[:, first:] = np.divide(start, kt, out=np.zeros_like(start), where=kt > 0)
+        return moved.ravel()
 
     @cached_property
     def compression(self) -> float:

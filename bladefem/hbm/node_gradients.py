@@ -17,7 +17,7 @@ from .parameters import check_parameter
 from .solution import Solution
 from .solver.residual import Balance, adjoint, as_amplitudes, as_coefficients, evaluate_balance
 
-__all__ = ["node_gradients"]
+__all__ = ["node_gradients", "size_by_force", "transposed_flexibility"]
 
 
 def node_gradients(
@@ -49,15 +49,15 @@ def node_gradients(
     balance = Balance(model, condense(model, solution.omega, solution.harmonics), solution.samples)
     state = evaluate_balance(balance, solution.w)
     n, d, K = state.w.shape
-    by_force = _by_force(model, solution, probe)
+    by_force = size_by_force(model, solution, probe)
     by_motion = state.forces.dfdw.reshape(n, d * K, d * K).swapaxes(1, 2) @ by_force.reshape(
         n, d * K, 1
     )
     back = adjoint(balance, state)(by_motion.reshape(n, d, K), 1e-9)
-    weight = by_force - _transposed(balance.linear.A, back)
+    weight = by_force - transposed_flexibility(balance.linear.A, back)
     held = _by_hold(balance, back)
     return {
-        name: np.sum(weight * contact_rate(model, state, name), axis=(1, 2))
+        name: np.sum(weight * contact_rate(model, state, name, solution.samples), axis=(1, 2))
         - (np.sum(held * hold_rate(balance, state, name), axis=1) if name in ("kt", "kn") else 0.0)
         for name in names
     }
@@ -71,7 +71,7 @@ def _by_hold(balance: Balance, back: np.ndarray) -> np.ndarray:
     return (B @ (by_imbalance(balance.linear).T @ back[:, :, 0].ravel())).reshape(back.shape[:2])
 
 
-def _by_force(model: ReducedModel, solution: Solution, probe: int) -> np.ndarray:
+def size_by_force(model: ReducedModel, solution: Solution, probe: int) -> np.ndarray:
     """(n, d, K) derivative of the size by the coefficients of the contact forces [m/N]."""
     blades = model.blades(solution.harmonics)
     flexible = flexibility(blades, solution.omega * np.arange(solution.harmonics + 1))
@@ -82,7 +82,7 @@ def _by_force(model: ReducedModel, solution: Solution, probe: int) -> np.ndarray
     return as_coefficients(-across.conj() * share[:, None], solution.w.shape)
 
 
-def _transposed(A: np.ndarray, x: np.ndarray) -> np.ndarray:
+def transposed_flexibility(A: np.ndarray, x: np.ndarray) -> np.ndarray:
     """A^T x in real coefficients (n, d, K)."""
     return as_coefficients(
         (A.conj().swapaxes(1, 2) @ as_amplitudes(x)[:, :, None])[:, :, 0], x.shape

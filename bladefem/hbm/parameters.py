@@ -47,9 +47,11 @@ def _heavier(body: PortModel, factor: float) -> PortModel:
 
 def _load(model: ReducedModel, factor: float) -> ReducedModel:
     normal = {h: factor * np.asarray(force) for h, force in model.normal.items()}
-    return replace(
-        model, elements=replace(model.elements, n0=factor * model.elements.n0), normal=normal
-    )
+    elements = replace(model.elements, n0=factor * model.elements.n0)
+    if elements.t0 is not None:
+        elements = replace(elements, t0=factor * elements.t0)
+    start = None if model.start is None else factor * model.start
+    return replace(model, elements=elements, normal=normal, start=start)
 
 
 def _damping(model: ReducedModel, factor: float) -> ReducedModel:

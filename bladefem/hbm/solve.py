@@ -114,6 +114,7 @@ def as_solution(balance: Balance, attempt: Attempt, iterations: int, reason: str
         work=works_of(
             model, linear.omega, relative, force, blade, float(np.sum(state.forces.dissipated))
         ),
+        route=attempt.end.route,
     )
 
 

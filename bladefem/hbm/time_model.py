@@ -12,16 +12,16 @@ import numpy as np
 from ..data import RigidBody
 from ..errors import InputError, NotSolvedError
 from ..friction.fourier import to_real
+from ..friction.law import require_coulomb
 from ..time.shooting import periodic
 from ..time.system import System
 from .linear.bodies import Stack, rigid_stack
 from .model import ReducedModel
+from .policy import SHOOTING_SIZE
 from .solver.residual import Balance
 
 __all__ = ["shooting_start", "time_system"]
 
-# coordinates and elements up to which shooting is tried
-LARGEST = 200
 # highest frequency over the excitation's up to which shooting is tried: 1 s an iteration
 FASTEST = 1e4
 # residual flexibility, over that of the contact springs, that is left out
@@ -86,10 +86,10 @@ def shooting_start(balance: Balance) -> np.ndarray:
     model = balance.model
     H = len(balance.linear.stuck) - 1
     system = time_system(model, H)
-    if sum(system.W.shape) > LARGEST:
+    if sum(system.W.shape) > SHOOTING_SIZE:
         raise InputError(
             f"{sum(system.W.shape)} coordinates and elements are too many, expected at most "
-            f"{LARGEST}"
+            f"{SHOOTING_SIZE}"
         )
     ratio = system.fastest / balance.linear.omega
     if ratio > FASTEST:
@@ -109,6 +109,7 @@ def shooting_start(balance: Balance) -> np.ndarray:
 
 def _bodies(model: ReducedModel) -> list[Stack]:
     """Blades and damper as single real bodies with all their inertia."""
+    require_coulomb(model.elements, "the model in time")
     if model.elements.tangents != 1:
         raise InputError("elements with two tangents, expected tangents = 1")
     if len(model.sides) > 1 or (isinstance(model.damper, tuple) and len(model.damper) > 1):

@@ -12,6 +12,7 @@ import numpy as np
 
 from ..data import Elements, PortModel, RigidBody
 from ..errors import InputError
+from ..friction.law import laws_of_nodes, require_coulomb
 
 if TYPE_CHECKING:
     from .model import ReducedModel
@@ -28,6 +29,7 @@ def check_model(model: ReducedModel) -> None:
         raise InputError(
             f"hold {model.hold}: expected a share of the contact stiffness, above 0 and at most 1"
         )
+    _check_traction("start", model.start, model.elements)
     _check_amplitudes("excitation", model.excitation, port_size(model.sides[0], "load"), 0)
     if not model.coupled and 0 in model.excitation:
         raise InputError(
@@ -66,6 +68,8 @@ def check_point(model: ReducedModel, omega: float, H: int, samples: int) -> None
             "expected "
             "samples above 0 with two"
         )
+    if samples == 0:
+        require_coulomb(model.elements, "samples = 0, which locates transitions exactly,")
     highest = max((*model.excitation, *model.normal), default=0)
     if highest > H:
         raise InputError(
@@ -128,10 +132,28 @@ def _check_elements(elements: Elements, dofs: int) -> None:
                 f"elements.{name} {wrong}: expected {nodes} finite numbers"
                 f"{'' if name == 'n0' else ', none of them negative'}"
             )
+    laws_of_nodes(elements)
+    _check_traction("elements.t0", elements.t0, elements)
+    if elements.t0 is not None:
+        require_coulomb(elements, "a static friction force (elements.t0)")
     if dofs == nodes * elements.tangents and np.any(elements.kn > 0):
         raise InputError(
             "elements.kn > 0 with tangential contact dofs only: expected normal dofs in the port"
         )
+
+
+def _check_traction(name: str, traction: Any, elements: Elements) -> None:
+    """Friction forces that the tangential springs can carry."""
+    if traction is None:
+        return
+    wanted = (len(elements.kt), elements.tangents)
+    if np.shape(traction) != wanted or not np.isfinite(traction).all():
+        raise InputError(
+            f"{name} of shape {np.shape(traction)}: expected {wanted} finite numbers, the friction "
+            "force of each node and tangent"
+        )
+    if np.any(np.asarray(traction)[elements.kt == 0]):
+        raise InputError(f"{name}: a node of kt = 0 carries no friction force, expected 0 N there")
 
 
 def _check_amplitudes(name: str, loads: Any, count: int, lowest: int) -> None:

@@ -18,6 +18,7 @@ from bladefem.scene.toml import dump
 from bladefem.study.kinds.contact_pairs import INNER, PairState, radii, solve_pair
 from bladefem.study.kinds.hertz import hertz_pressure
 from bladefem.study.kinds.punch import johnson_pressure
+from bladefem.util.progress import Progress, unwatched
 from bladefem.view import contact, indentation, mesh
 from geometry.mesh import Mesh
 from geometry.quality import quality_rows
@@ -41,11 +42,13 @@ class PairRun:
     messages: list[str]
 
 
-def run(scene: Scene, folder: str | Path, comm: Any = None) -> PairRun:
+def run(
+    scene: Scene, folder: str | Path, comm: Any = None, progress: Progress = unwatched
+) -> PairRun:
     """Mesh and pressures on all ranks, the folder on rank 0.
 
     Raises:
-        InputError, NotSolvedError: see ``study.pairs.solve_pair``.
+        InputError, NotSolvedError: see ``study.kinds.contact_pairs.solve_pair``.
     """
     start = perf_counter()
     found, states = solve_pair(scene, folder, comm)

@@ -19,6 +19,7 @@ from bladefem.io.stage_cache import on_root, write_results, write_table
 from bladefem.scene.tables import Scene
 from bladefem.scene.toml import dump
 from bladefem.study.kinds.zmass import Pressed, mass_on_foundation, mean_load, motions, press
+from bladefem.util.progress import Progress, unwatched
 from bladefem.view import contact, mesh, paper
 
 from .datasets import resultants, table_dataset
@@ -41,11 +42,13 @@ class MassRun:
     messages: list[str]
 
 
-def run(scene: Scene, folder: str | Path, comm: Any = None) -> MassRun:
+def run(
+    scene: Scene, folder: str | Path, comm: Any = None, progress: Progress = unwatched
+) -> MassRun:
     """Pressure on all ranks, motions and folder on rank 0.
 
     Raises:
-        InputError, NotSolvedError: see ``study.zmass.press``.
+        InputError, NotSolvedError: see ``study.kinds.zmass.press``.
     """
     start = perf_counter()
     pressed = press(scene, folder, comm)

@@ -9,33 +9,19 @@ from typing import Any, NamedTuple, get_args, get_origin, get_type_hints
 
 from ..errors import InputError, suggestion
 from .tables import Scene
-from .units import is_plain, parse, readable_units, show
+from .units import is_plain, parse, readable_units, shortened, show
 
 __all__ = [
-    "TABLES",
     "Field",
     "convert",
     "each_field",
     "field_at",
     "split_values",
-    "used_tables",
     "value_at",
 ]
 
-_COMMON = ("mesh", "material", "contact", "study", "model")
-_ENGINE = (*_COMMON, "operation", "excitation")
-
-# Which tables each kind of scene reads; the others must not be given.
-TABLES = {
-    "wedge sector": ("aerofoil", "platform", "shank", "disc", "damper", *_ENGINE),
-    "plane blades": ("plane", *_ENGINE),
-    "z mass": ("z_mass", "foundation", *_COMMON),
-    "hertz": ("hertz", *_COMMON),
-    "punch": ("punch", *_COMMON),
-    "imported": ("imported", "damper", *_ENGINE),
-}
-
-
+# of one field: every load is a sweep of its own
+MOST_VALUES = 1000
 QUESTION = "did you mean '"
 
 
@@ -49,15 +35,6 @@ class Field(NamedTuple):
     # unit, low, high, help, choices
     meta: dict
     default: Any
-
-
-def used_tables(kind: str) -> tuple[str, ...]:
-    """Names of the tables that this kind of scene reads."""
-    if kind not in TABLES:
-        raise InputError(
-            f"kind = {kind!r}: expected one of {', '.join(TABLES)}{_near(kind, TABLES)}"
-        )
-    return TABLES[kind]
 
 
 def each_field(table: type = Scene, path: str = "") -> Iterator[Field]:
@@ -141,17 +118,17 @@ def _bool(value: object, field: Field) -> bool:
     if isinstance(value, str) and value.lower() in words:
         return words[value.lower()]
     if not isinstance(value, bool):
-        raise InputError(f"{field.name} = {value!r}: expected true or false")
+        raise InputError(f"{field.name} = {shortened(value)}: expected true or false")
     return value
 
 
 def _str(value: object, field: Field) -> str:
     if not isinstance(value, str):
-        raise InputError(f"{field.name} = {value!r}: expected text")
+        raise InputError(f"{field.name} = {shortened(value)}: expected text")
     choices = field.meta.get("choices") or ()
     if choices and value not in choices:
         raise InputError(
-            f"{field.name} = {value!r}: expected one of {', '.join(choices)}{_near(value, choices)}"
+            f"{field.name} = {shortened(repr(value))}: expected one of {', '.join(choices)}{_near(value, choices)}"
         )
     return value
 
@@ -163,9 +140,11 @@ def _tuple(value: object, kinds: tuple, field: Field) -> tuple:
     items = _items(value)
     length = None if kinds[-1] is Ellipsis else len(kinds)
     if length is not None and len(items) != length:
-        raise InputError(f"{field.name} = {value}: expected {length} values")
+        raise InputError(f"{field.name} = {shortened(value)}: expected {length} values")
     if not items:
-        raise InputError(f"{field.name} = {value}: expected at least one value")
+        raise InputError(f"{field.name} = {shortened(value)}: expected at least one value")
+    if len(items) > MOST_VALUES:
+        raise InputError(f"{field.name}: {len(items)} values given, expected at most {MOST_VALUES}")
     return tuple(_SCALARS[kinds[0]](item, field) for item in items)
 
 

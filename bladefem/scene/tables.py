@@ -24,7 +24,6 @@ from geometry.parameters import (
 from geometry.quantity import quantity
 
 __all__ = [
-    "KINDS",
     "Contact",
     "Excitation",
     "Foundation",
@@ -37,8 +36,6 @@ __all__ = [
     "Seat",
     "Study",
 ]
-
-KINDS = ("wedge sector", "plane blades", "z mass", "hertz", "punch", "imported")
 
 
 @dataclass(frozen=True)
@@ -66,13 +63,13 @@ class Seat:
         None, "1", 0.0, 2.0, "friction coefficient of this seat; contact.mu when left out"
     )
     kt_area: float | None = quantity(
-        None, "N/m^3", 0.0, 1e15, "its tangential stiffness for each unit of area"
+        None, "N/m^3", 1.0, 1e15, "its tangential stiffness for each unit of area"
     )
-    kt: float | None = quantity(None, "N/m", 0.0, 1e12, "its whole tangential stiffness")
+    kt: float | None = quantity(None, "N/m", 1.0, 1e12, "its whole tangential stiffness")
     kn_area: float | None = quantity(
-        None, "N/m^3", 0.0, 1e15, "its normal stiffness for each unit of area"
+        None, "N/m^3", 1.0, 1e15, "its normal stiffness for each unit of area"
     )
-    kn: float | None = quantity(None, "N/m", 0.0, 1e12, "its whole normal stiffness")
+    kn: float | None = quantity(None, "N/m", 1.0, 1e12, "its whole normal stiffness")
 
 
 @dataclass(frozen=True)
@@ -85,25 +82,34 @@ class Contact:
     kt_area: float | None = quantity(
         None,
         "N/m^3",
-        0.0,
+        1.0,
         1e15,
         "tangential contact stiffness for each unit of area; by Mindlin from the normal "
         "one, 40 N/mm^3 without either",
     )
-    kt: float | None = quantity(None, "N/m", 0.0, 1e12, "tangential stiffness of one whole patch")
+    kt: float | None = quantity(None, "N/m", 1.0, 1e12, "tangential stiffness of one whole patch")
     kn_area: float | None = quantity(
         None,
         "N/m^3",
-        0.0,
+        1.0,
         1e15,
         "normal contact stiffness for each unit of area; by Mindlin from the tangential",
     )
-    kn: float | None = quantity(None, "N/m", 0.0, 1e12, "normal stiffness of one whole patch")
+    kn: float | None = quantity(None, "N/m", 1.0, 1e12, "normal stiffness of one whole patch")
     stiffness: str = quantity(
         "given",
         choices=("given", "map"),
-        help="normal stiffness: as given above, or of each node from the pressure map, its "
-        "static force over the approach of the bodies there (the paper's Eq. 23)",
+        help="normal stiffness: of one interface layer for seating and vibration, as given above; "
+        "or of each node from the pressure map between rigid faces, its static force over the "
+        "approach of the bodies there (the paper's Eq. 23)",
+    )
+    stiffening: float | None = quantity(
+        None,
+        "Pa",
+        1.0,
+        1e12,
+        "pressure at which the layer is twice as stiff as at first touch; a linear layer when left "
+        "out",
     )
     points: int | None = quantity(
         None, "1", 1, 5000, "friction elements on each patch; all mesh nodes when left out"
@@ -290,8 +296,20 @@ class Imported:
     )
     names: tuple[str, ...] | None = quantity(
         None,
-        help="names for groups of the file that has others, such as "
+        help="names for groups, node sets and surfaces of the file that has others, such as "
         "'clamp = face_3 + face_4', 'tip = face_1'",
+    )
+    linear: str = quantity(
+        "refuse",
+        choices=("refuse", "promote", "keep"),
+        help="first-order solids: refused, promoted to second order (nodes in the middle of "
+        "straight edges), or solved as they are, far too stiff",
+    )
+    tolerance: float = quantity(
+        1e-4, "1", 1e-9, 0.05, "largest distance of matched nodes, as a share of the face's size"
+    )
+    more: tuple[str, ...] | None = quantity(
+        None, help="other files of the same model, such as 'damper = damper.inp'"
     )
 
 
@@ -300,7 +318,7 @@ class Scene:
     """All of it. Tables that a kind does not use must not be given."""
 
     title: str = quantity("untitled", help="shown on pictures and in the report")
-    kind: str = quantity("wedge sector", choices=KINDS, help="which geometry")
+    kind: str = quantity("wedge sector", help="which geometry, see scene.kinds")
     accuracy: float = quantity(
         0.02, "1", 1e-6, 0.5, "wanted relative accuracy of the resonance amplitude"
     )
@@ -322,11 +340,3 @@ class Scene:
     excitation: Excitation = field(default_factory=Excitation)
     study: Study = field(default_factory=Study)
     model: Model = field(default_factory=Model)
-
-    def vary(self, *pair: object, **changes: object) -> Scene:
-        """A checked copy with other values, ``vary(aerofoil__twist="25 deg")`` or
-        ``vary("aerofoil.twist", 0.4)``.
-        """
-        from .toml import vary
-
-        return vary(self, *pair, **changes)

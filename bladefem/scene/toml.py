@@ -12,10 +12,13 @@ from collections.abc import Iterable
 from pathlib import Path
 from typing import Any, NamedTuple, get_type_hints
 
+from geometry.joined_files import split_entry
+
 from ..errors import InputError, suggestion
-from .fields import TABLES, Field, convert, each_field, field_at, used_tables, value_at
-from .tables import Scene
-from .units import exact, show
+from .fields import Field, convert, each_field, field_at, value_at
+from .kinds import KINDS, kind_named
+from .tables import Imported, Scene
+from .units import exact, shortened, show
 from .validate import validate
 
 __all__ = ["Row", "dump", "given_keys", "load_scene", "read_tables", "resolved", "scene_of", "vary"]
@@ -49,33 +52,54 @@ def read_tables(path: str | Path, overrides: Iterable[str] = ()) -> dict[str, An
     """The nested tables of a scene file as written, with the overrides put in."""
     path = Path(path)
     try:
-        tables = tomllib.loads(path.read_text(encoding="utf-8"))
+        # editors on Windows put a byte order mark before the text
+        tables = tomllib.loads(path.read_text(encoding="utf-8-sig"))
     except FileNotFoundError:
         raise InputError(f"{path}: there is no such scene file{_neighbours(path)}") from None
     except (OSError, UnicodeDecodeError) as error:
         raise InputError(f"{path}: cannot be read as a scene file ({error})") from None
-    except tomllib.TOMLDecodeError as error:
+    except RecursionError:
+        raise InputError(f"{path}: not a scene, its lists or tables are nested too deep") from None
+    except ValueError as error:
+        # TOMLDecodeError, and integers of more digits than Python converts
         raise InputError(f"{path}: not valid TOML: {error}") from None
     for override in overrides:
         name, value = _split(override)
         _put(tables, name, value)
+    if "kind" not in tables:
+        raise InputError(
+            f"{path}: not a scene without its kind, expected kind = one of "
+            f"{', '.join(repr(kind) for kind in KINDS)}"
+        )
     return tables
 
 
 def scene_of(tables: dict[str, Any], folder: str | Path = ".") -> Scene:
     """A checked scene from nested tables; relative file names in it start at ``folder``."""
     scene = _build(Scene, tables, "")
-    unused = [t for t in tables if isinstance(tables[t], dict) and t not in used_tables(scene.kind)]
+    unused = [
+        t for t in tables if isinstance(tables[t], dict) and t not in kind_named(scene.kind).tables
+    ]
     if unused:
         raise InputError(
             f"[{unused[0]}]: a scene of kind '{scene.kind}' does not use this table, expected only "
-            f"{', '.join(used_tables(scene.kind))}"
+            f"{', '.join(kind_named(scene.kind).tables)}"
         )
     if scene.kind == "imported" and scene.imported.file:
-        file = str((Path(folder) / scene.imported.file).resolve())
-        scene = dataclasses.replace(scene, imported=dataclasses.replace(scene.imported, file=file))
+        scene = dataclasses.replace(scene, imported=_with_paths(scene.imported, Path(folder)))
     validate(scene)
     return scene
+
+
+def _with_paths(imported: Imported, folder: Path) -> Imported:
+    """Files with their whole paths."""
+    more = []
+    for entry in imported.more or ():
+        body, path = split_entry(entry)
+        whole = str((folder / path).resolve())
+        more.append(f"{body} = {whole}" if body else whole)
+    file = str((folder / imported.file).resolve())
+    return dataclasses.replace(imported, file=file, more=tuple(more) or None)
 
 
 def vary(scene: Scene, *pair: Any, **changes: Any) -> Scene:
@@ -91,7 +115,7 @@ def vary(scene: Scene, *pair: Any, **changes: Any) -> Scene:
     for name, value in [*zip(pair[::2], pair[1::2], strict=True), *named.items()]:
         scene = _replace(scene, name.split("."), value, name)
     for name in (*pair[::2], *named):
-        if "." in name and name.split(".")[0] not in used_tables(scene.kind):
+        if "." in name and name.split(".")[0] not in kind_named(scene.kind).tables:
             raise InputError(f"{name}: a scene of kind '{scene.kind}' does not use this table")
     validate(scene)
     return scene
@@ -146,7 +170,7 @@ def _build(table: type, data: dict[str, Any], path: str) -> Any:
             _refuse(name, value)
         if dataclasses.is_dataclass(hints[key]):
             if not isinstance(value, dict):
-                raise InputError(f"{name} = {value!r}: expected a table [{name}]")
+                raise InputError(f"{name} = {shortened(value)}: expected a table [{name}]")
             values[key] = _build(hints[key], value, name)
         elif isinstance(value, dict):
             raise InputError(f"[{name}]: expected a single value, not a table")
@@ -176,7 +200,7 @@ def _put(tables: dict[str, Any], name: str, value: str) -> None:
     for head in heads:
         tables = tables.setdefault(head, {})
         if not isinstance(tables, dict):
-            raise InputError(f"{head} = {tables!r}: expected a table [{head}]")
+            raise InputError(f"{head} = {shortened(tables)}: expected a table [{head}]")
     tables[last] = value
 
 
@@ -199,7 +223,7 @@ def _replace(table: Any, path: list[str], value: object, name: str) -> Any:
 
 
 def _used_fields(scene: Scene) -> Iterable[Field]:
-    tables = used_tables(scene.kind)
+    tables = kind_named(scene.kind).tables
     return (f for f in each_field() if "." not in f.name or f.name.split(".")[0] in tables)
 
 
@@ -242,6 +266,6 @@ def _neighbours(path: Path) -> str:
 def _is_scene(path: Path) -> bool:
     """A TOML file with a kind of scene in it."""
     try:
-        return tomllib.loads(path.read_text(encoding="utf-8")).get("kind") in TABLES
+        return tomllib.loads(path.read_text(encoding="utf-8")).get("kind") in KINDS
     except (OSError, ValueError):
         return False

@@ -15,7 +15,7 @@ from numbers import Real
 
 from ..errors import InputError
 
-__all__ = ["exact", "is_plain", "parse", "readable_units", "show"]
+__all__ = ["exact", "is_plain", "parse", "readable_units", "shortened", "show"]
 
 # unit: (factor to SI, exponents of kg, m, s, rad)
 _UNITS = {
@@ -87,7 +87,10 @@ _NUMBER = re.compile(
     r"((?:1/|[^\d\s,.+-]).*?)?\s*",
     re.IGNORECASE,
 )
-_POWER = re.compile(r"(.+?)\^?(-?\d+)?")
+# one digit: no quantity has a higher power, and exact powers of millions of digits never end
+_POWER = re.compile(r"(.+?)\^?(-?\d)?")
+# letters of a unit text: longer ones are no units
+LONGEST_UNIT = 60
 
 
 def parse(value: object, unit: str = "1", name: str = "value") -> float:
@@ -104,19 +107,32 @@ def parse(value: object, unit: str = "1", name: str = "value") -> float:
     unit = unit or "1"
     number, written = _split(value, unit, name)
     if not isfinite(number):
-        raise InputError(f"{name} = {value}: expected a finite number{_in(unit)}")
+        raise InputError(f"{name} = {shortened(value)}: expected a finite number{_in(unit)}")
     if not written:
         return number
-    factor, dimension = _dimension(written, f"{name} = {value}")
+    factor, dimension = _dimension(written, f"{name} = {shortened(value)}")
     _, wanted = _dimension(unit, name)
     if dimension != wanted:
         raise InputError(
-            f"{name} = {value}: '{written}' is not a unit of this field, expected {_examples(unit)}"
+            f"{name} = {shortened(value)}: '{written}' is not a unit of this field, expected "
+            f"{_examples(unit)}"
         )
     result = number * factor
     if not isfinite(result):
-        raise InputError(f"{name} = {value}: expected a finite number{_in(unit)}")
+        raise InputError(f"{name} = {shortened(value)}: expected a finite number{_in(unit)}")
     return result
+
+
+def shortened(value: object, length: int = 60) -> str:
+    """The text of a value for a message, cut where it is longer than a line should hold."""
+    try:
+        text = value if isinstance(value, str) else repr(value)
+    except RecursionError:
+        return "(deeply nested lists)"
+    except ValueError:
+        # Python refuses to print integers of more than 4300 digits
+        return "(a number of thousands of digits)"
+    return text if len(text) <= length else f"{text[:length]}..."
 
 
 def is_plain(text: str) -> bool:
@@ -150,19 +166,27 @@ def exact(value: float, unit: str = "1") -> str:
 
 def _split(value: object, unit: str, name: str) -> tuple[float, str]:
     if isinstance(value, Real) and not isinstance(value, bool):
-        return float(value), ""
+        try:
+            return float(value), ""
+        except OverflowError:
+            raise InputError(
+                f"{name} = {shortened(value)}: expected a finite number{_in(unit)}"
+            ) from None
     if not isinstance(value, str):
-        raise InputError(f"{name} = {value!r}: expected a number{_in(unit)}")
+        raise InputError(f"{name} = {shortened(value)}: expected a number{_in(unit)}")
     match = _NUMBER.fullmatch(value)
     if not match:
         raise InputError(
-            f"{name} = {value!r}: expected a number with a unit such as {_examples(unit)}"
+            f"{name} = {shortened(repr(value))}: expected a number with a unit such as "
+            f"{_examples(unit)}"
         )
     return float(match[1]), match[2] or ""
 
 
 def _dimension(text: str, where: str) -> tuple[float, tuple[int, ...]]:
     """Factor to SI and exponents of a product of powers."""
+    if len(text) > LONGEST_UNIT:
+        raise InputError(f"{where}: unknown unit '{shortened(text, 20)}'")
     # exact: 7.85 g/cm^3 is 7850, not 7849.999...
     factor = Fraction(1)
     exponents = [0, 0, 0, 0]
@@ -172,7 +196,10 @@ def _dimension(text: str, where: str) -> tuple[float, tuple[int, ...]]:
             power = power if place == 0 else -power
             factor *= Fraction(str(size)) ** power
             exponents = [e + power * d for e, d in zip(exponents, dimension, strict=True)]
-    return float(factor), tuple(exponents)
+    try:
+        return float(factor), tuple(exponents)
+    except OverflowError:
+        raise InputError(f"{where}: expected a unit of this world, not {text}") from None
 
 
 def _one(word: str, where: str) -> tuple[float, tuple[int, ...], int]:
@@ -181,7 +208,7 @@ def _one(word: str, where: str) -> tuple[float, tuple[int, ...], int]:
         candidate = _SPELLINGS.get(candidate, candidate)
         if candidate in _UNITS:
             return *_UNITS[candidate], power
-    raise InputError(f"{where}: unknown unit '{word}'")
+    raise InputError(f"{where}: unknown unit '{shortened(word, 20)}'")
 
 
 def _powers(word: str) -> list[tuple[str, int]]:

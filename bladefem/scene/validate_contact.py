@@ -4,13 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
+from .kinds import kind_named
 from .tables import Scene, Seat
 from .units import show
 
 __all__ = ["contact_problems"]
 
-# kinds with a damper on two seats
-SEATED = ("wedge sector", "plane blades", "imported")
 SHAPE = ("crown", "crown_across", "edge_radius", "edge_width")
 
 
@@ -18,7 +17,7 @@ def contact_problems(scene: Scene) -> Iterator[str]:
     """One sentence for each thing that is wrong."""
     contact = scene.contact
     sides = {"contact.left": contact.left, "contact.right": contact.right}
-    if scene.kind not in SEATED:
+    if not kind_named(scene.kind).has_seats:
         yield from _seats_only(scene)
     if contact.stiffness == "map":
         for name, side in {"contact": contact, **sides}.items():

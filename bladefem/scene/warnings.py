@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
-from .fields import used_tables
+from .kinds import kind_named
 from .part_materials import part_materials
 from .tables import Material, Scene
 from .units import show
@@ -22,15 +22,14 @@ FASTEST = 900.0
 def doubts(scene: Scene) -> list[str]:
     """One sentence for each value that is unlikely to be meant."""
     said = [*_materials(scene), *_mesh(scene)]
-    if "operation" in used_tables(scene.kind):
+    if "operation" in kind_named(scene.kind).tables:
         said += [*_speed(scene), *_damping(scene)]
     return said
 
 
 def _materials(scene: Scene) -> Iterator[str]:
     named = {"material.blade": scene.material.blade, "material.damper": scene.material.damper}
-    if scene.kind == "imported":
-        named |= {f"imported.materials, {name}": one for name, one in part_materials(scene).items()}
+    named |= {f"imported.materials, {name}": one for name, one in part_materials(scene).items()}
     for name, material in named.items():
         yield from _material(name, material)
 
@@ -46,10 +45,8 @@ def _material(name: str, material: Material) -> Iterator[str]:
 
 
 def _speed(scene: Scene) -> Iterator[str]:
-    if scene.kind != "wedge sector":
-        return
-    rim = scene.disc.rim_radius
-    for name, radius in (("rim", rim), ("tip", rim + scene.shank.height + scene.aerofoil.span)):
+    radii = kind_named(scene.kind).radii
+    for name, radius in radii(scene).items() if radii is not None else ():
         speed = scene.operation.speed * radius
         if speed > FASTEST:
             yield (
@@ -66,7 +63,7 @@ def _damping(scene: Scene) -> Iterator[str]:
 
 
 def _mesh(scene: Scene) -> Iterator[str]:
-    parts = _PARTS.get(scene.kind)
+    parts = kind_named(scene.kind).thin_parts
     if parts is None or scene.mesh.size is None:
         return
     size = scene.mesh.size * scene.mesh.scale
@@ -76,28 +73,3 @@ def _mesh(scene: Scene) -> Iterator[str]:
             f"mesh.size = {show(size, 'm')}: larger than the thinnest part, {name} with "
             f"{show(thinnest, 'm')}"
         )
-
-
-def _wedge_sector(scene: Scene) -> dict[str, float]:
-    blade = scene.aerofoil
-    halfway = (blade.thickness_root * blade.chord_root + blade.thickness_tip * blade.chord_tip) / 2
-    return {
-        "the aerofoil halfway up": halfway,
-        "platform.thickness": scene.platform.thickness,
-        "shank.width": scene.shank.width,
-        "disc.width": scene.disc.width,
-    }
-
-
-_PARTS = {
-    "wedge sector": _wedge_sector,
-    "plane blades": lambda scene: {
-        f"plane.{name}": getattr(scene.plane, name)
-        for name in ("thickness", "platform_thickness", "damper_height")
-    },
-    "z mass": lambda scene: {
-        f"z_mass.{name}": getattr(scene.z_mass, name) for name in ("bar", "thickness")
-    },
-    "hertz": lambda scene: {"hertz.half_width": scene.hertz.half_width},
-    "punch": lambda scene: {"punch.half_width": scene.punch.half_width},
-}

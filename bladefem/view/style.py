@@ -66,7 +66,8 @@ STYLE: dict[str, Any] = {
     "axes.prop_cycle": matplotlib.cycler(color=COLOURS),
     "image.cmap": SEQUENTIAL,
     "axes.formatter.useoffset": False,
-    "mathtext.default": "regular",
+    # titles are the user's own words: a dollar sign in one is a dollar sign
+    "text.parse_math": False,
 }
 
 

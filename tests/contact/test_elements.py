@@ -149,9 +149,13 @@ def test_open_nodes_keep_their_gap(maps):
     assert (e.kn == 0).all() and (e.n0 >= 0).all()
 
 
-def test_coupled_normal_load_needs_a_stiffness(maps):
-    with pytest.raises(InputError, match=r"a normal stiffness .* is 0"):
-        friction_elements(None, maps, Contact(kn_area=0.0), 1.0)
+@pytest.mark.parametrize("value", [0.0, -1.0, np.nan])
+@pytest.mark.parametrize("name", ["kn_area", "kt_area"])
+def test_a_layer_without_stiffness_is_refused(maps, name, value):
+    """Also where the normal load is prescribed: the seating needs the layer."""
+    contact = Contact(**{name: value}, normal="prescribed")
+    with pytest.raises(InputError, match=r"stiffness is .* N/m, expected a positive"):
+        friction_elements(None, maps, contact, 1.0)
 
 
 def test_elements_of_a_patch_are_connected_halves(maps):

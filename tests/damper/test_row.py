@@ -16,7 +16,7 @@ from bladefem.hbm.linear_resonances import free_resonances
 from bladefem.hbm.solve import solve
 from bladefem.hbm.sweep import response, size
 from bladefem.hbm.time_model import time_system
-from bladefem.scene.toml import load_scene
+from bladefem.scene.toml import load_scene, vary
 from bladefem.study.pipeline.stability import in_one_body
 from bladefem.time.shooting import harmonics, multipliers, periodic
 from verification.paper.blades import judge, optimum, peak
@@ -42,7 +42,7 @@ def test_a_static_part_held_lets_no_mean_displacement_in(row):
     """model.static = "uncoupled": mean forces that friction raises are reported, the mean stays
     where it was.
     """
-    held = whole_model(SOFT.vary(model__static="uncoupled"), row, 6.0, harmonics=3)
+    held = whole_model(vary(SOFT, model__static="uncoupled"), row, 6.0, harmonics=3)
     free = whole_model(SOFT, row, 6.0, harmonics=3)
     assert free.coupled and not held.coupled
     one, other = (solve(model, 2 * np.pi * 1148.7, 3, 128) for model in (free, held))
@@ -62,7 +62,7 @@ def test_the_contact_mesh_is_fine_enough(row):
     """63 N, between stick and slip: 32.39 um with 41 nodes a seat, 32.57 um with 81; 11 nodes give
     23.4 um (F27).
     """
-    finer = row_of_blades(SOFT.vary(mesh__contact_size=SOFT.plane.seat_width / 80))
+    finer = row_of_blades(vary(SOFT, mesh__contact_size=SOFT.plane.seat_width / 80))
     default, half = (peak(paper_model(SOFT, r, 63.0), (1050, 1300), 3, 128) for r in (row, finer))
     assert default.amplitude == pytest.approx(half.amplitude, rel=0.02)
     assert default.frequency == pytest.approx(half.frequency, rel=5e-4)

@@ -13,7 +13,7 @@ from bladefem.damper.loops import Drive, steady
 from bladefem.damper.zmass import Footprint, MassOnFoundation
 from bladefem.errors import InputError
 from bladefem.io.stage_cache import read_results
-from bladefem.scene.toml import load_scene
+from bladefem.scene.toml import load_scene, vary
 from bladefem.study.kinds.zmass import clusters, drives, mass_on_foundation, motions, press
 
 SCENE = load_scene("scenes/zmass.toml", ["mesh.size=7 mm"])
@@ -44,7 +44,7 @@ def test_pressure_is_balanced_symmetric_and_highest_at_the_edge(pressed):
 
 def test_pressure_is_linear_in_the_load(pressed):
     """The paper's Eq. 27, to rounding: the contact is a receding one."""
-    more = press(SCENE.vary(study__loads=(80.0,))).seat
+    more = press(vary(SCENE, study__loads=(80.0,))).seat
     np.testing.assert_allclose(more.force / 80, pressed.seat.force / 50, rtol=1e-8)
 
 
@@ -52,7 +52,7 @@ def test_rigid_foundation_passes_the_patch_test():
     """Uniform pressure on top of a prism on a rigid plane is uniform below; here 48 times as stiff
     as the mass.
     """
-    pressure = press(SCENE.vary(material__blade__E=1e13)).seat.pressure
+    pressure = press(vary(SCENE, material__blade__E=1e13)).seat.pressure
     assert np.ptp(pressure) / pressure.mean() < 0.03
 
 
@@ -67,11 +67,14 @@ def test_skewed_top_pressure_moves_the_resultant_and_turns_the_mass():
     """The moment of the load: share . x = skew x I / (A reach), here for x and y; 2 % by the
     faceted pressure.
     """
-    scene = SCENE.vary(
-        foundation__skew=(0.5, 0.3), foundation__amplitude=(0.005, 0.003), foundation__ratios=(0.5,)
+    scene = vary(
+        SCENE,
+        foundation__skew=(0.5, 0.3),
+        foundation__amplitude=(0.005, 0.003),
+        foundation__ratios=(0.5,),
     )
-    body = mass_on_foundation(scene.vary(contact__points=None), press(scene).seat)
-    even = mass_on_foundation(SCENE.vary(contact__points=None), press(SCENE).seat)
+    body = mass_on_foundation(vary(scene, contact__points=None), press(scene).seat)
+    even = mass_on_foundation(vary(SCENE, contact__points=None), press(SCENE).seat)
     square = np.einsum(
         "n,ni,nj->ij", even.footprint.stiffness, even.footprint.points, even.footprint.points
     )
@@ -108,7 +111,7 @@ def test_clusters_stay_on_the_solid(pressed):
 
 def test_refusals():
     with pytest.raises(InputError, match=r"foundation\.skew.*at most 1"):
-        SCENE.vary(foundation__skew=(0.8, 0.5))
+        vary(SCENE, foundation__skew=(0.8, 0.5))
     with pytest.raises(InputError, match="expected 'z mass'"):
         press(load_scene("scenes/punch.toml"))
 

@@ -9,10 +9,10 @@ import numpy as np
 import pytest
 
 from bladefem.errors import InputError
-from geometry import build
 from geometry import isolated_process as apart
 from geometry.builders import build_here
 from geometry.finalise_mesh import refuse_flat
+from geometry.isolated_process import build
 from geometry.mesh import Mesh
 from geometry.parameters import MeshSize, Punch
 
@@ -62,7 +62,7 @@ def test_the_second_try_takes_the_other_algorithm_and_smaller_elements(monkeypat
         return "crashed (signal 11)" if len(asked) == 1 else build_here(scene)
 
     monkeypatch.setattr(apart, "_ask", ask)
-    assert isinstance(apart.build_apart(SCENE), Mesh)
+    assert isinstance(build(SCENE), Mesh)
     assert [(m.algorithm, m.size) for m in asked] == [
         ("hxt", 6e-3),
         ("delaunay", pytest.approx(5.4e-3)),

@@ -40,3 +40,28 @@ def block(nodes=4, *, kn=2.0, n0=1.0, mu=0.4, seed=0, damper=False, dofs=30, for
         else None
     )
     return ReducedModel((body,), elements, {1: np.array([force])}, Damping(ratio=0.01), other)
+
+
+def wedge_between_masses(force=10.0, at=0, damping=20.0, excited=True):
+    """A wedge of 0.1 kg between two unequal masses of 10 kg, pressed outwards (along x) by 240 N.
+
+    The flanks stand at +-40 deg to x, so that without friction each carries 240 / (2 sin 40 deg) N.
+    The masses move along y, on springs of 9e5 and 3e5 N/m to the ground and coupled by 1e5 N/m; the
+    wedge hangs on springs of its own. Free modes at 31.2 and 50.7 Hz.
+    """
+    a = np.radians(40.0)
+    # rows: normal out of the mass into the wedge, tangent; columns: x, y. Masses at y < 0, y > 0.
+    first = np.array([[-np.sin(a), np.cos(a)], [np.cos(a), np.sin(a)]])
+    second = np.array([[-np.sin(a), -np.cos(a)], [np.cos(a), -np.sin(a)]])
+    flanks = np.zeros((4, 2))
+    flanks[:2, 0] = first[:, 1]
+    flanks[2:, 1] = second[:, 1]
+    ports = {"contact": flanks, "load": np.array([at]), "probe": np.array([at])}
+    K = np.array([[1e6, -1e5], [-1e5, 4e5]])
+    masses = port_model_from_matrices(10.0 * np.eye(2), K, ports, C=damping * np.eye(2))
+    ports = {"contact": np.vstack([first, second])}
+    wedge = port_model_from_matrices(0.1 * np.eye(2), 1e6 * np.eye(2), ports, C=damping * np.eye(2))
+    n0 = np.full(2, 240.0 / (2 * np.sin(a)))
+    elements = Elements(np.full(2, 3e5), np.full(2, 3e5), np.full(2, 0.3), n0, tangents=1)
+    loads = {1: np.array([force])} if excited else {}
+    return ReducedModel((masses,), elements, loads, damper=(wedge,))

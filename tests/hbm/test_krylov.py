@@ -5,6 +5,7 @@ other.
 import numpy as np
 import pytest
 
+from bladefem.hbm import policy
 from bladefem.hbm.linear import packed_bodies as small_bodies
 from bladefem.hbm.linear.contact_flexibility import (
     among,
@@ -107,7 +108,7 @@ def test_a_model_that_all_harmonics_share_is_solved_by_its_modes(monkeypatch):
     """As with a matrix for each harmonic; 32 contacts, from full stick to full slip."""
     found = []
     for wide in (1, 1000):
-        monkeypatch.setattr(small_bodies, "WIDE", wide)
+        monkeypatch.setattr(policy, "SHARED_FLEXIBILITY_DOFS", wide)
         model = reference_model(2e6, 0.06, 8.0, points=16, modes=10)
         assert (len(small_bodies.prepared_bodies(model, 7).R) > 0) == (wide == 1)
         found.append(list(response(model, np.linspace(4800, 6200, 30), 7, 256)))

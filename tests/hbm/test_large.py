@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 from hbm_models import patch
 
+from bladefem.hbm import policy
 from bladefem.hbm.linear.condensation import condense
 from bladefem.hbm.solve import solve
 from bladefem.hbm.solver import residual as residual_module
@@ -21,7 +22,7 @@ def test_iterative_and_dense_steps_agree(monkeypatch):
     state = evaluate_balance(balance, 1.2 * start_in_stick(balance))
     assert (state.forces.shares[:, 1] > 0).any() and (state.forces.shares[:, 2] > 0).any()
     dense = linearise(balance, state)(state.residual)
-    monkeypatch.setattr(residual_module, "DENSE", 0)
+    monkeypatch.setattr(policy, "DENSE_UNKNOWNS", 0)
     for accuracy in (1e-2, 1e-5):
         step = linearise(balance, state)(state.residual, accuracy)
         assert np.linalg.norm(step - dense) < 20 * accuracy * np.linalg.norm(dense)
@@ -80,7 +81,7 @@ def test_dense_factors_are_the_last_resort(monkeypatch):
 
     A, change = nearly_singular()
     right = np.random.default_rng(1).standard_normal((36, 7))
-    monkeypatch.setattr(residual_module, "DENSE", 0)
+    monkeypatch.setattr(policy, "DENSE_UNKNOWNS", 0)
     monkeypatch.setattr(iterative, "PASSES", 0)
     monkeypatch.setattr(iterative, "conjugate_residuals", lambda *_: False)
     step = residual_module._inverse(A, change)(right, 1e-5)

@@ -9,6 +9,7 @@ import pytest
 
 from bladefem.report.study import Variant, study_tables, write_study
 from bladefem.scene.tables import Scene
+from bladefem.scene.toml import vary
 
 
 def curve(load, amplitude):
@@ -47,7 +48,7 @@ def response(*amplitudes):
 )
 def test_best_load_of_each_value(field, texts, number, tmp_path):
     variants = [
-        Variant(text, Scene().vary(field, text), response(*amplitudes))
+        Variant(text, vary(Scene(), field, text), response(*amplitudes))
         for text, amplitudes in zip(texts, ((5e-5, 3e-5), (2e-5, 4e-5)), strict=True)
     ]
     table, loads = study_tables(field, variants)

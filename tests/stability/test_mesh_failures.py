@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from bladefem.scene.toml import load_scene
+from bladefem.scene.toml import load_scene, vary
 from bladefem.study.adaptive.contact_mesh import FEW
 from bladefem.study.pipeline import pipeline
 from verification.paper.blades import peak
@@ -19,7 +19,7 @@ SCENE = load_scene(
         "study.band=1150 Hz, 1200 Hz",
     ],
 )
-TENTH = SCENE.vary(mesh__contact_size=SCENE.plane.seat_width / 10)
+TENTH = vary(SCENE, mesh__contact_size=SCENE.plane.seat_width / 10)
 
 
 def run(scene):
@@ -35,7 +35,7 @@ def test_F27_the_finest_patch_is_itself_too_coarse():
     Half as many contact points change the amplitude by 9.8 and 2.9 %.
     """
     (coarse, warned), (default, silent) = run(TENTH), run(SCENE)
-    true = run(SCENE.vary(mesh__contact_size=SCENE.plane.seat_width / 80))[0].peak_amplitude
+    true = run(vary(SCENE, mesh__contact_size=SCENE.plane.seat_width / 80))[0].peak_amplitude
     assert coarse.settings.error < 0.02
     assert coarse.peak_amplitude < 0.72 * true
     assert "only 6 of 11 nodes" in warned[0] and "half as many contact points change" in warned[1]
@@ -50,7 +50,7 @@ def test_F27_few_pressed_nodes_are_what_matters():
     """
     amplitude, pressed = [], []
     for parts in (10, 20, 40, 80):
-        scene = SCENE.vary(mesh__contact_size=SCENE.plane.seat_width / parts)
+        scene = vary(SCENE, mesh__contact_size=SCENE.plane.seat_width / parts)
         model = paper_model(scene, row_of_blades(scene), 100.0)
         amplitude.append(peak(model, (1150, 1200), 3, 128).amplitude)
         pressed.append(np.count_nonzero(model.elements.n0) // 2)

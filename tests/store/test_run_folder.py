@@ -10,9 +10,9 @@ import pytest
 from bladefem.errors import InputError
 from bladefem.io.run_folder import locked, take_folder
 from bladefem.scene.tables import Scene
-from bladefem.scene.toml import load_scene
+from bladefem.scene.toml import load_scene, vary
 
-OTHER = Scene().vary(contact__mu=0.2)
+OTHER = vary(Scene(), contact__mu=0.2)
 
 
 def results(folder):

@@ -7,7 +7,7 @@ import pytest
 from bladefem.cli.main import main
 from bladefem.errors import InputError
 from bladefem.io.stage_cache import read_results
-from bladefem.scene.toml import load_scene
+from bladefem.scene.toml import load_scene, vary
 from bladefem.study.kinds.contact_pairs import solve_pair
 from bladefem.study.kinds.hertz import hertz_load, hertz_radius
 
@@ -21,7 +21,7 @@ def test_sphere():
     """h = a/5: pressure 3.3 % (L2), in the middle 0.5 %, radius 0.3 %; blocks of ten radii only:
     -5.5 % approach.
     """
-    _, (state,) = solve_pair(HERTZ.vary(mesh__contact_size=2e-4))
+    _, (state,) = solve_pair(vary(HERTZ, mesh__contact_size=2e-4))
     middle = np.argmin(np.linalg.norm(state.seat.patch.points, axis=1))
     assert state.error < 0.04 and state.seat.complementarity < 1e-9
     assert state.seat.pressure[middle] == pytest.approx(state.exact[middle], rel=0.01)
@@ -43,7 +43,7 @@ def test_cylinder_is_in_plane_strain():
 
 @pytest.mark.parametrize("dimension", [2, 3])
 def test_load_and_radius_belong_together(dimension):
-    scene = HERTZ.vary(hertz__dimension=dimension)
+    scene = vary(HERTZ, hertz__dimension=dimension)
     assert hertz_radius(scene, hertz_load(scene, 3e-4)) == pytest.approx(3e-4)
 
 
@@ -52,7 +52,7 @@ def test_loads_that_the_mesh_cannot_show_are_refused():
         with pytest.raises(
             InputError, match=r"study\.loads = .*made for 24\.6\d* N to 17\.9\d* kN"
         ):
-            solve_pair(HERTZ.vary(study__loads=(load,)))
+            solve_pair(vary(HERTZ, study__loads=(load,)))
     with pytest.raises(InputError, match="expected hertz or punch"):
         solve_pair(load_scene("scenes/plane.toml"))
 

@@ -18,7 +18,7 @@ from bladefem.friction.fourier import synthesis
 from bladefem.hbm.model import ReducedModel
 from bladefem.hbm.sweep import size, sweep
 from bladefem.scene.tables import Scene
-from bladefem.scene.toml import load_scene
+from bladefem.scene.toml import load_scene, vary
 from bladefem.study.pipeline.stages import Bodies, find_modes
 from bladefem.view.contact import draw_pressure
 from bladefem.view.mesh import draw_mesh
@@ -137,7 +137,7 @@ def phases() -> Claim:
     told = []
     heights = []
     for phase, name in ((0.0, "0"), (np.pi / 2, "90°"), (np.pi, "180°")):
-        turned = scene.vary(excitation__phase=phase)
+        turned = vary(scene, excitation__phase=phase)
         found = [peak(paper_model(turned, row, load), BANDS["soft", 2]) for load in (6.0, 200.0)]
         heights.append([p.amplitude for p in found])
         told.append(

@@ -14,7 +14,7 @@ from bladefem.data import PressureMap
 from bladefem.friction.equivalent_linear import force_of, from_series
 from bladefem.report.zmass import draw_motions
 from bladefem.scene.tables import Scene
-from bladefem.scene.toml import load_scene
+from bladefem.scene.toml import load_scene, vary
 from bladefem.study.kinds.zmass import mass_on_foundation, motions, press
 from bladefem.view.mesh import draw_mesh
 from bladefem.view.paper import draw_footprint
@@ -93,7 +93,7 @@ def _table_1(scene: Scene, body: MassOnFoundation) -> Claim:
 
 
 def _proportional(scene: Scene, seat: PressureMap) -> Claim:
-    more = press(scene.vary(study__loads=(80.0,))).seat
+    more = press(vary(scene, study__loads=(80.0,))).seat
     mean = seat.force.sum() / seat.patch.area.sum()
     change = np.abs(more.force / 80 - seat.force / 50).max() * len(seat.force)
     return Claim(
@@ -235,7 +235,7 @@ def _beside_ellipse(result: Steady) -> float:
 
 def _drift(scene: Scene, seat: PressureMap, results: Mapping[str, Steady]) -> Claim:
     every = steady(
-        mass_on_foundation(scene.vary(contact__points=None), seat), Drive(Fraction(1, 2)), 2000
+        mass_on_foundation(vary(scene, contact__points=None), seat), Drive(Fraction(1, 2)), 2000
     )
     repeats = all(result.reason == "periodic" for result in results.values())
     still = [name for name, result in results.items() if abs(result.drift[0]) < 1e-6]
@@ -250,7 +250,8 @@ def _drift(scene: Scene, seat: PressureMap, results: Mapping[str, Steady]) -> Cl
 
 
 def _coupled(scene: Scene) -> Claim:
-    bent = scene.vary(
+    bent = vary(
+        scene,
         foundation__skew=(0.5, 0.3),
         foundation__amplitude=(0.005, 0.003),
         foundation__ratios=(0.0, 0.5),

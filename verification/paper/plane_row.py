@@ -14,6 +14,7 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
+from bladefem.study.pipeline.keys import contact_key
 
 from bladefem.contact.interface_elements import friction_elements, pair_ratio
 from bladefem.contact.seating import ContactProblem, solve
@@ -23,15 +24,16 @@ from bladefem.hbm.model import ReducedModel
 from bladefem.io.stage_cache import stage
 from bladefem.reduction.assemble import recombine
 from bladefem.scene.tables import Scene
+from bladefem.scene.toml import vary
 from bladefem.study.pipeline.assemble_model import LoadCase, joint_model
-from bladefem.study.pipeline.keys import contact_key
 from bladefem.study.pipeline.stages import (
     Bodies,
     Reduced,
     build_mesh,
+    condense_contact,
     contact_patches,
+    on_layer,
     reduce_sector,
-    seat_damper,
 )
 
 __all__ = ["Row", "paper_model", "row_of_blades", "whole_model"]
@@ -41,6 +43,7 @@ __all__ = ["Row", "paper_model", "row_of_blades", "whole_model"]
 class Row:
     """What the finite elements leave: the same on every rank."""
 
+    # of rigid faces, as in the paper
     problem: ContactProblem
     reduced: Reduced
     mesh: Any
@@ -62,7 +65,9 @@ def row_of_blades(scene: Scene, modes: int = 8, folder: Any = None, comm: Any = 
         mesh = build_mesh(scene, comm)
         bodies = Bodies(scene, mesh, comm)
         patches = contact_patches(mesh)
-        return Row(seat_damper(bodies, patches), reduce_sector(bodies, patches, [0], modes), mesh)
+        return Row(
+            condense_contact(bodies, patches), reduce_sector(bodies, patches, [0], modes), mesh
+        )
 
     return stage(folder, "row", contact_key(scene) + f"-{modes}", compute, comm)[0]
 
@@ -70,14 +75,16 @@ def row_of_blades(scene: Scene, modes: int = 8, folder: Any = None, comm: Any = 
 def paper_model(
     scene: Scene, row: Row, load: float, mass: float | None = None, harmonics: int = 31
 ) -> ReducedModel:
-    """The paper's model: tangential freedoms only, prescribed normal loads, a damper that moves
-    along the row.
+    """The paper's model: tangential freedoms only, prescribed normal loads from rigid faces, a
+    damper that moves along the row.
 
     Args:
         load: normal load of a seat [N].
         mass: of the damper [kg]; the scene's own when left out.
     """
-    model = _joint(scene.vary(contact__normal="prescribed"), row, load, "mass", harmonics)
+    model = _joint(
+        vary(scene, contact__normal="prescribed"), row.problem, row, load, "mass", harmonics
+    )
     nodes = len(model.elements.kt)
     tangents = np.kron(np.eye(nodes), [[0.0, 1.0]])
     sides = tuple(
@@ -101,14 +108,16 @@ def whole_model(
         damper: "mass" (residual flexibility only), "rigid" (three freedoms, normal springs) or
             "elastic".
     """
-    return _joint(scene, row, load, damper, harmonics)
+    return _joint(scene, on_layer(scene, row.problem), row, load, damper, harmonics)
 
 
-def _joint(scene: Scene, row: Row, load: float, damper: str, harmonics: int) -> ReducedModel:
-    maps = solve(row.problem, 0.0, normal=load, bedded=scene.contact.bedded)
+def _joint(
+    scene: Scene, problem: ContactProblem, row: Row, load: float, damper: str, harmonics: int
+) -> ReducedModel:
+    maps = solve(problem, 0.0, normal=load, bedded=scene.contact.bedded)
     ratio = pair_ratio(scene.material.blade, scene.material.damper)
     elements, selection = friction_elements(
-        row.problem, maps, scene.contact, ratio, row.mesh.dimension - 1
+        problem, maps, scene.contact, ratio, row.mesh.dimension - 1
     )
     case = LoadCase(load, elements, selection)
     return joint_model(

@@ -17,13 +17,12 @@ from scipy.linalg import lapack
 from ...data import RigidBody
 from ...errors import NotSolvedError
 from ..model import ReducedModel
+from ..policy import BATCHED_SOLVE_DOFS
 from .bodies import amplitudes, block, flexibility, motion, receptance
 from .woodbury import low_rank, updated
 
-__all__ = ["SMALL", "Linear", "condense", "receptance", "rigid_motions", "with_springs"]
+__all__ = ["Linear", "condense", "receptance", "rigid_motions", "with_springs"]
 
-# contact dofs below which all harmonics are solved in one call
-SMALL = 64
 # motions that the contact springs resist less than this, relatively, are left out
 UNSEEN = 1e-12
 
@@ -66,7 +65,7 @@ def condense(model: ReducedModel, omega: float, harmonics: int) -> Linear:
     _add_damper(model, orders, G)
     B, g, rigid = model.once("rigid motions", lambda: rigid_motions(model, springs))
     first = 1 if B.shape[1] else 0
-    fixed = low_rank(model, harmonics) if len(springs) >= SMALL else None
+    fixed = low_rank(model, harmonics)
     if fixed is None:
         A, stuck = _sprung(G, free, springs, first)
     else:
@@ -103,7 +102,7 @@ def _sprung(
 ) -> tuple[np.ndarray, np.ndarray]:
     """(1 + G K)^-1 times G and times free, from harmonic `first` on."""
     m = len(springs)
-    if m < SMALL:
+    if m < BATCHED_SOLVE_DOFS:
         system = G[first:] * springs + np.eye(m)
         solved = np.zeros((len(G), m, m + 1), dtype=complex)
         solved[first:] = np.linalg.solve(

@@ -13,21 +13,14 @@ from typing import NamedTuple
 import numpy as np
 
 from ...data import RigidBody
+from .. import policy
 from ..model import ReducedModel
 from ..solver.deflation import common_motions
-from ..solver.newton import COMPILED
 from .bodies import Stack, rigid_stack
 from .condensation import rigid_motions, with_springs
 from .woodbury import staying
 
 __all__ = ["Bodies", "prepared_bodies"]
-
-# contact freedoms up to which points are compiled as a whole
-SMALL = 200
-# contact freedoms for each mode from which the springs are added by the modes
-FEW = 2
-# contact freedoms from which a flexibility that serves all harmonics is not formed
-WIDE = 64
 
 
 class Bodies(NamedTuple):
@@ -89,18 +82,11 @@ def prepared_bodies(model: ReducedModel, H: int) -> Bodies | None:
 
 def _prepared(model: ReducedModel, H: int) -> Bodies | None:
     dofs = model.springs.size
-    if (
-        model.elements.tangents > 1
-        or dofs > SMALL
-        or dofs * (2 * H + 1) > COMPILED
-        or not model.coupled
-    ):
+    if not policy.uses_compiled_point(model, H):
         return None
     bodies = [model.blades(H)]
     if isinstance(model.damper, tuple):
         bodies.append(model.elastic_damper(H))
-    if any(b.coupled is not None for b in bodies):
-        return None
     blades = bodies[0]
     loads = model.loads(H)
     springs = model.springs.ravel()
@@ -120,7 +106,7 @@ def _prepared(model: ReducedModel, H: int) -> Bodies | None:
     push = (loads[:, None] @ load.conj())[:, 0]
     fixed = (
         staying(residual, contact, springs)
-        if FEW * contact.shape[2] <= dofs
+        if policy.updates_by_modes(dofs, contact.shape[2])
         else [np.zeros((0, 0, 0))] * 4
     )
     parts = [
@@ -170,7 +156,7 @@ def _mean(
 def _one_for_all(fixed: tuple[np.ndarray, ...], dofs: int) -> tuple[np.ndarray, np.ndarray]:
     """R (m, m) and U (m, M) of `flex`; empty where it takes its first form."""
     A, U = fixed[:2]
-    if dofs < WIDE or len(U) != 1 or np.iscomplexobj(A) or np.any(U.imag):
+    if dofs < policy.SHARED_FLEXIBILITY_DOFS or len(U) != 1 or np.iscomplexobj(A) or np.any(U.imag):
         return np.zeros((0, 0)), np.zeros((0, 0))
     return np.ascontiguousarray(A[0]), np.ascontiguousarray(U[0].real)
 

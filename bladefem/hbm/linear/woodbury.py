@@ -21,12 +21,10 @@ import numpy as np
 from ...data import RigidBody
 from ...errors import NotSolvedError
 from ..model import ReducedModel
+from ..policy import uses_low_rank
 from .bodies import Stack, flexibility, rigid_stack
 
 __all__ = ["LowRank", "bodies_of", "low_rank", "staying", "updated"]
-
-# contact freedoms for each mode below which the update is not worth it
-FEW = 3
 
 
 @dataclass(frozen=True)
@@ -51,7 +49,7 @@ def low_rank(model: ReducedModel, harmonics: int) -> LowRank | None:
     bodies = bodies_of(model, harmonics)
     m = model.springs.size
     k = sum(body.omega.shape[1] for body in bodies)
-    if any(body.coupled is not None for body in bodies) or FEW * k > m:
+    if any(body.coupled is not None for body in bodies) or not uses_low_rank(m, k):
         return None
     return model.once(("low rank", harmonics), lambda: _fixed(bodies, model.springs.ravel()))
 

@@ -18,12 +18,11 @@ from numba import njit
 from ..linear.contact_flexibility import seen_by
 from ..linear.woodbury import bodies_of
 from ..model import ReducedModel
+from ..policy import DEFLATION_UNKNOWNS
 from .dense_lu import back_substitute, factorise_large
 
-__all__ = ["MANY", "common_motions", "no_level", "prepared", "second_level"]
+__all__ = ["common_motions", "no_level", "prepared", "second_level"]
 
-# unknowns from which a second level pays
-MANY = 300
 # common motions of two rigid seats in space; more cost more than they save
 MOST = 12
 # contact freedoms for each of them at least
@@ -39,7 +38,7 @@ def common_motions(model: ReducedModel, harmonics: int) -> np.ndarray:
     are few unknowns.
     """
     m = model.springs.size
-    if m * (2 * harmonics + 1) < MANY:
+    if m * (2 * harmonics + 1) < DEFLATION_UNKNOWNS:
         return np.zeros((m, 0))
     return model.once(("common motions", harmonics), lambda: _common(model, harmonics))
 

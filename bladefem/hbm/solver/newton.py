@@ -2,14 +2,31 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Collection
+from dataclasses import dataclass, replace
 from numbers import Integral
 
 import numpy as np
 
 from ...errors import InputError
 from ...friction.aft import Forces, dissipated, states
-from .newton_compiled import CONVERGED, EXHAUSTED, INFINITE, SINGULAR, STALLED, compiled_newton
+from ..policy import (
+    COMPILED_NEWTON,
+    DENSE_LU,
+    ITERATIONS,
+    NUMPY_NEWTON,
+    uses_compiled_newton,
+)
+from .newton_compiled import (
+    BY_ITERATIONS,
+    BY_LU,
+    CONVERGED,
+    EXHAUSTED,
+    INFINITE,
+    SINGULAR,
+    STALLED,
+    compiled_newton,
+)
 from .newton_krylov import Memory
 from .residual import (
     STICKS,
@@ -22,10 +39,8 @@ from .residual import (
     linearise,
 )
 
-__all__ = ["DEFAULTS", "Newton", "Options", "fits", "newton"]
+__all__ = ["DEFAULTS", "Newton", "Options", "fits", "newton", "route_of", "solvers_of"]
 
-# unknowns of 1-D elements up to which the loop is compiled
-COMPILED = 20000
 # step share below which the search direction is given up
 SHORTEST = 2.0**-8
 
@@ -67,6 +82,24 @@ class Newton:
     iterations: int
     converged: bool
     reason: str
+    # loop and linear solvers of `bladefem.hbm.policy` that ran
+    route: str = ""
+
+
+def solvers_of(code: int) -> tuple[str, ...]:
+    """Linear solvers by the code that `compiled_newton` returns."""
+    return (ITERATIONS,) * bool(code & BY_ITERATIONS) + (DENSE_LU,) * bool(code & BY_LU)
+
+
+def route_of(loop: str, solvers: Collection[str]) -> str:
+    """The way that ran in words: the loop, then its linear solvers; none where every contact
+    sticks.
+    """
+    return ", ".join(
+        [loop, " then ".join(s for s in (ITERATIONS, DENSE_LU) if s in solvers)][
+            : 1 + bool(solvers)
+        ]
+    )
 
 
 def newton(
@@ -81,8 +114,16 @@ def newton(
     """
     if merit == "step" and fits(balance):
         return _fast(balance, w, options)
-    state = evaluate_balance(balance, w, "single")
     memory = Memory()
+    end = _newton_loop(balance, w, options, merit, memory)
+    return replace(end, route=route_of(NUMPY_NEWTON, memory.solvers))
+
+
+def _newton_loop(
+    balance: Balance, w: np.ndarray, options: Options, merit: str, memory: Memory
+) -> Newton:
+    """Newton with NumPy; memory takes what the linear solvers know."""
+    state = evaluate_balance(balance, w, "single")
     for iteration in range(options.iterations + 1):
         if state.error <= options.tolerance:
             return Newton(state, iteration, True, "residual within tolerance")
@@ -112,9 +153,9 @@ def newton(
 
 
 def fits(balance: Balance) -> bool:
-    """Few enough unknowns of 1-D elements for the compiled loop."""
+    """True if Newton's loop is compiled for this balance."""
     harmonics, m = balance.linear.stuck.shape
-    return balance.model.elements.tangents == 1 and m * (2 * harmonics - 1) <= COMPILED
+    return uses_compiled_newton(balance.model, m * (2 * harmonics - 1))
 
 
 def _fast(balance: Balance, w: np.ndarray, options: Options) -> Newton:
@@ -122,7 +163,7 @@ def _fast(balance: Balance, w: np.ndarray, options: Options) -> Newton:
     d = balance.model.directions
     shape = w.shape
     contact = contact_table(balance.model, shape[2] // 2, balance.samples)
-    steps, code, error, f, dfdw, shares, residual, p = compiled_newton(
+    steps, code, error, f, dfdw, shares, residual, p, solver = compiled_newton(
         end, d, condensed(balance), contact, STICKS, options.tolerance, options.iterations, SHORTEST
     )
     reasons = {
@@ -132,8 +173,10 @@ def _fast(balance: Balance, w: np.ndarray, options: Options) -> Newton:
         SINGULAR: "singular Jacobian",
         INFINITE: "residual is not finite",
     }
+    route = route_of(COMPILED_NEWTON, solvers_of(solver))
     if code != CONVERGED:
-        return Newton(evaluate_balance(balance, end.reshape(shape)), steps, False, reasons[code])
+        state = evaluate_balance(balance, end.reshape(shape))
+        return Newton(state, steps, False, reasons[code], route)
     full = np.zeros_like(f)
     full[:, 2 - d :] = end.reshape(shape)
     forces = Forces(
@@ -147,7 +190,7 @@ def _fast(balance: Balance, w: np.ndarray, options: Options) -> Newton:
         "periodic",
     )
     state = State(end.reshape(shape), forces, p.reshape(shape), residual.reshape(shape), error)
-    return Newton(state, steps, True, reasons[code])
+    return Newton(state, steps, True, reasons[code], route)
 
 
 def _search(balance: Balance, state: State, inverse: Inverse, merit: str) -> State | None:

@@ -15,11 +15,14 @@ from numba import njit
 from ...friction.kernel_1d import jenkins_batch
 from ...friction.kernel_1d_exact import _batch as exact_batch
 from ..linear.contact_flexibility import among, apply, apply_modes, flexed, formed
-from .deflation import MANY, no_level, second_level
+from ..policy import BLOCKED_LU_UNKNOWNS, DEFLATION_UNKNOWNS, DENSE_FALLBACK_UNKNOWNS
+from .deflation import no_level, second_level
 from .dense_lu import back_substitute, factorise, factorise_large
 from .krylov import conjugate_residuals
 
 __all__ = [
+    "BY_ITERATIONS",
+    "BY_LU",
     "CONVERGED",
     "EXHAUSTED",
     "INFINITE",
@@ -36,10 +39,9 @@ STALLED = 2
 SINGULAR = 3
 INFINITE = 4
 SEARCHING = 5
-# unknowns from which blocks pay, and iterations where they arrive
-LARGE = 64
-# unknowns up to which dense factors are the last resort: 200 MB, some seconds
-DENSE = 5000
+# how steps were solved for: bits of the code that compiled_newton returns
+BY_LU = 1
+BY_ITERATIONS = 2
 # accuracy of a step by iterations, relative,
 FINEST = 1e-6
 COARSEST = 1e-4
@@ -96,13 +98,14 @@ def _evaluate(w, d, linear, contact, work):
     G = linear.G
     stuck = linear.stuck
     springs = linear.springs
-    load, base, nodes, tab, brackets, preload = contact
+    load, base, nodes, tab, brackets, preload, offset = contact
     full, F, J, shares, p, r = work
     n = nodes.shape[0]
     K = w.shape[1]
     for i in range(w.shape[0]):
         for k in range(K):
             full[i // d, 2 - d + i % d, k] = w[i, k]
+        full[i // d, 2 - d + i % d, 0] += offset[i]
     if brackets:
         F[:] = 0.0
         J[:] = 0.0
@@ -163,8 +166,10 @@ def _factors(flex, C):
     """LU factors and pivots of 1 + A C; without pivots where it is singular."""
     M = _jacobian(formed(flex), C)
     pivots = np.empty(M.shape[0], np.int64)
-    regular = factorise_large(M, pivots) if pivots.size > LARGE else factorise(M, pivots)
-    return M, pivots if regular else pivots[:0]
+    regular = (
+        factorise_large(M, pivots) if pivots.size > BLOCKED_LU_UNKNOWNS else factorise(M, pivots)
+    )
+    return M, pivots if regular else np.empty(0, np.int64)
 
 
 @njit(cache=True, error_model="numpy")
@@ -172,12 +177,12 @@ def _inverse(r, accuracy, flex, C, factors, level):
     """(a K,) the solution of (1 + A C) x = r, and the factors where they were needed."""
     x = np.empty(r.size)
     if (
-        r.size > LARGE
+        r.size > BLOCKED_LU_UNKNOWNS
         and factors[1].size == 0
         and conjugate_residuals(flex, C, r, accuracy, level, x)
     ):
         return x, factors
-    if factors[1].size == 0 and r.size <= DENSE:
+    if factors[1].size == 0 and r.size <= DENSE_FALLBACK_UNKNOWNS:
         factors = _factors(flex, C)
     x[:] = r
     if factors[1].size:
@@ -247,11 +252,13 @@ def compiled_newton(w, d, linear, contact, sticks, tolerance, iterations, shorte
         d: directions a node, 1 (tangent) or 2 (normal, tangent).
         linear: the `Condensed` bodies.
         contact: prescribed loads (n, S) or (n, 0), their coefficients (n, K), nodes (n, 4), tables,
-            brackets (0: sampled), preload (m,).
+            brackets (0: sampled), preload (m,), offset (m,) of the mean displacements that the
+            friction law is given.
 
     Returns:
         steps taken, how it ended, error at w; of the last evaluation, which is at w if converged:
-        forces (n, 2, K), their derivative, shares (n, 3), residual (m, K), p (m, K).
+        forces (n, 2, K), their derivative, shares (n, 3), residual (m, K), p (m, K); and how steps
+        were solved for: the sum of BY_LU and BY_ITERATIONS, 0 where every contact sticks.
     """
     m, K = w.shape
     n = m // d
@@ -276,6 +283,7 @@ def compiled_newton(w, d, linear, contact, sticks, tolerance, iterations, shorte
     factors = (np.empty((0, 0)), np.empty(0, np.int64))
     level = no_level()
     code = SEARCHING
+    solver = 0
     steps = -1
     share = 1.0
     before = np.inf
@@ -300,17 +308,22 @@ def compiled_newton(w, d, linear, contact, sticks, tolerance, iterations, shorte
             break
         active, C = _moving(J, springs, d, sticks)
         few = among(flex, active, d)
-        factors = (factors[0][:0, :0], factors[1][:0])
-        wide = motions.size > 0 and active.size * d * K >= MANY
+        # new arrays: slices would have another memory layout, and compile everything twice
+        factors = (np.empty((0, 0)), np.empty(0, np.int64))
+        wide = motions.size > 0 and active.size * d * K >= DEFLATION_UNKNOWNS
         level = second_level(few, C, motions, active, d) if wide else no_level()
         needed = max(FINEST, min(0.1 * error, COARSEST), min(0.1 * tolerance / error, CLOSE))
         factors = _step(r, needed, d, active, C, flex, few, factors, level, step)
         before = norm(step)
+        if active.size * d * K > BLOCKED_LU_UNKNOWNS:
+            solver |= BY_ITERATIONS
+        if factors[1].size:
+            solver |= BY_LU
         share = 1.0
         if not np.isfinite(before):
             code = SINGULAR
         _move(w, share, step, trial)
-    return steps, code, error, work[1], J, work[3], r, work[4]
+    return steps, code, error, work[1], J, work[3], r, work[4], solver
 
 
 @njit(cache=True, error_model="numpy")

@@ -9,7 +9,7 @@ the part of dp/dw that keeps to its harmonic.
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import cached_property, partial
 
 import numpy as np
@@ -46,6 +46,8 @@ class Memory:
     blocks: np.ndarray | None = None
     # the last system took long: blocks are worth their time
     slow: bool = False
+    # linear solvers of the policy that ran so far
+    solvers: set[str] = field(default_factory=set)
 
 
 # A (H+1, a, a) and change (nodes, dK, dK), in one precision

@@ -16,9 +16,10 @@ from numba import njit
 from ..linear.condensation_compiled import linear_part
 from ..linear.packed_bodies import prepared_bodies
 from ..model import ReducedModel
+from ..policy import COMPILED_POINT
 from ..predictor import AHEAD, ahead, shifted
 from ..solution import Solution, Work
-from .newton import SHORTEST, Options
+from .newton import SHORTEST, Options, route_of, solvers_of
 from .newton_compiled import CONVERGED, compiled_newton, norm
 from .residual import STICKS, contact_table
 
@@ -143,8 +144,9 @@ def _solved(
             drift,
             dict(zip(STATES, states, strict=True)),
             Work(*works),
+            route_of(COMPILED_POINT, solvers_of(int(solver))),
         )
-        for omega, *fields, (steps, error), states, (moved, pushed, drift, *works) in parts
+        for omega, *fields, (steps, error, solver), states, (moved, pushed, drift, *works) in parts
     ]
 
 
@@ -152,7 +154,7 @@ def _solved(
 def _points(
     omegas, bodies, springs, contact, d, H, known, at, count, chained, tolerance, iterations
 ):
-    """Displacements (p, m, K), steps and error (p, 2), and what `_measure` gives, of the first
+    """Displacements (p, m, K), steps, error and solver (p, 3), and what `_measure` gives, of the first
     frequencies.
 
     They start from the curve through `count` of known (3, m, K) at the frequencies at (3,), which
@@ -165,7 +167,7 @@ def _points(
     K = 2 * H + 1
     w = np.empty((p, m, K))
     f = np.empty((p, m // d, d, K))
-    ends = np.empty((p, 2))
+    ends = np.empty((p, 3))
     counts = np.empty((p, 4), np.int64)
     measures = np.empty((p, 7))
     probe = np.empty((p, *bodies.straight.shape), np.complex128)
@@ -176,12 +178,15 @@ def _points(
             ahead(omegas[i], known, at, count, w[i])
         else:
             w[i] = linear.stuck
-        steps, code, error, F, _, shares, residual, _ = compiled_newton(
+        steps, code, error, F, _, shares, residual, _, solver = compiled_newton(
             w[i], d, linear, contact, STICKS, tolerance, iterations, SHORTEST
         )
         if code != CONVERGED:
             break
-        done, ends[i, 0], ends[i, 1] = i + 1, steps, error
+        done = i + 1
+        ends[i, 0] = steps
+        ends[i, 1] = error
+        ends[i, 2] = solver
         f[i], probe[i], counts[i], measures[i] = _measure(
             omegas[i], bodies, springs, (flexible, free), w[i], d, F, contact[5], residual, shares
         )

@@ -22,6 +22,7 @@ from ...friction.trigonometric_tables import tables
 from ..linear.condensation import Linear
 from ..linear.contact_flexibility import by_harmonic
 from ..model import ReducedModel
+from ..policy import DENSE_LU, DETERMINANT_UNKNOWNS, ITERATIONS, linear_solver
 from .deflation import common_motions
 from .newton_compiled import Condensed
 from .newton_krylov import Memory, iterative_inverse
@@ -42,12 +43,6 @@ __all__ = [
     "start_in_stick",
 ]
 
-# unknowns up to which a dense factorisation is faster than GMRES
-DENSE = 300
-# unknowns up to which it is the last resort where GMRES does not arrive: 200 MB, some seconds
-LARGEST = 5000
-# unknowns up to which the sign of a determinant is worth its time
-WATCHED = 600
 # of a step by GMRES, relative
 ACCURACY = 1e-5
 # of the preload's compression: smaller motions drown in its rounding,
@@ -114,6 +109,8 @@ def contact_forces(
     """Friction forces in the directions (n, d, K) of the balance; displacements left out of it stay
     zero.
     """
+    w = w.copy()
+    w[:, :, 0] += model.offset.reshape(w.shape[:2])
     missing = 1 + model.elements.tangents - model.directions
     if missing:
         w = np.concatenate([np.zeros((len(w), missing, w.shape[2])), w], axis=1)
@@ -191,7 +188,7 @@ def orientation(balance: Balance, state: State) -> float:
     ask.
     """
     change, active, dofs = _active(balance, state)
-    if len(dofs) * state.w.shape[2] > WATCHED:
+    if len(dofs) * state.w.shape[2] > DETERMINANT_UNKNOWNS:
         return 0.0
     # everything sticks: the derivative is the identity
     if not len(dofs):
@@ -222,15 +219,21 @@ def _inverse(
     memory: Memory | None = None,
     motions: np.ndarray | None = None,
 ) -> Inverse:
-    unknowns = A.shape[1] * (2 * len(A) - 1)
-    if unknowns <= DENSE:
+    solver = linear_solver(A.shape[1] * (2 * len(A) - 1))
+    memory = Memory() if memory is None else memory
+    memory.solvers.add(DENSE_LU if solver == DENSE_LU else ITERATIONS)
+    if solver == DENSE_LU:
         return _dense_inverse(A, change)
     iterative = iterative_inverse(A, change, memory, motions)
-    return iterative if unknowns > LARGEST else _with_factors_at_need(iterative, A, change)
+    if solver == ITERATIONS:
+        return iterative
+    return _with_factors_at_need(iterative, A, change, memory)
 
 
-def _with_factors_at_need(iterative: Inverse, A: np.ndarray, change: np.ndarray) -> Inverse:
-    """GMRES, and the dense factors from the first time on that it does not arrive."""
+def _with_factors_at_need(
+    iterative: Inverse, A: np.ndarray, change: np.ndarray, memory: Memory
+) -> Inverse:
+    """GMRES; switches to dense LU after the first failure to converge."""
     dense: Inverse | None = None
 
     def solve(residual: np.ndarray, accuracy: float) -> np.ndarray:
@@ -239,6 +242,7 @@ def _with_factors_at_need(iterative: Inverse, A: np.ndarray, change: np.ndarray)
             try:
                 return iterative(residual, accuracy)
             except np.linalg.LinAlgError:
+                memory.solvers.add(DENSE_LU)
                 dense = _dense_inverse(A, change)
         return dense(residual, accuracy)
 
@@ -286,6 +290,7 @@ def contact_table(model: ReducedModel, H: int, samples: int) -> tuple:
             tables(H, samples or 4 * H + 4),
             0 if samples else 12 * (H + 1),
             model.preload,
+            model.offset,
         ),
     )
 

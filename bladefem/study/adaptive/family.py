@@ -15,6 +15,7 @@ from functools import cache, lru_cache
 import numpy as np
 
 from ...data import Elements, PortModel, RigidBody
+from ...friction.law import merged_laws
 from ...hbm.model import ReducedModel
 from ...reduction.assemble import recombine
 from ...reduction.truncate import truncated
@@ -134,6 +135,7 @@ def coarsened(model: ReducedModel, groups: np.ndarray) -> ReducedModel:
         elements=elements,
         damper=damper,
         normal=normal,
+        start=None if model.start is None else _totals(model.start, groups),
     )
 
 
@@ -152,11 +154,18 @@ def joined(e: Elements, groups: np.ndarray) -> Elements:
         e,
         kt=total(e.kt),
         kn=total(e.kn),
+        t0=None if e.t0 is None else _totals(e.t0, groups),
         n0=np.where(pressed > 0, pressed, total(e.n0)),
         mu=np.where(
             pressed > 0, limit / np.where(pressed > 0, pressed, 1.0), _means(e, groups) @ e.mu
         ),
+        law=merged_laws(e, groups),
     )
+
+
+def _totals(traction: np.ndarray, groups: np.ndarray) -> np.ndarray:
+    """(m, tangents) friction forces of the elements from those (n, tangents) of their nodes."""
+    return np.column_stack([np.bincount(groups, column) for column in traction.T])
 
 
 def _means(e: Elements, groups: np.ndarray) -> np.ndarray:

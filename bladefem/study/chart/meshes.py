@@ -8,7 +8,6 @@ import time
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -19,10 +18,11 @@ from geometry.parameters import MeshSize
 from geometry.sizing import ALONG
 
 from ...contact.seating import solve as seat
-from ...errors import InputError, NotSolvedError
+from ...errors import NotSolvedError
 from ...hbm.sweep import size as height
 from ...io.stage_cache import on_root
 from ...scene.tables import Scene
+from ...scene.validate import refuse_given_mesh
 from ..adaptive.check_points import peak_of
 from ..adaptive.choice import covered
 from ..adaptive.family import member
@@ -92,11 +92,7 @@ def mesh_variants(scene: Scene, sizes: Sequence[float], drawn: Mesh) -> list[Mes
     Raises:
         InputError: a scene whose mesh is given.
     """
-    if scene.kind == "imported" and Path(scene.imported.file).suffix.lower() not in (
-        ".step",
-        ".stp",
-    ):
-        raise InputError("kind 'imported': its mesh is given, expected a scene that is meshed here")
+    refuse_given_mesh(scene)
     power = drawn.dimension
     own = scene.mesh
     base = own.size or min(sizes, default=None)

@@ -17,7 +17,7 @@ from ...data import PressureMap
 from ...errors import InputError
 from ...io.stage_cache import stage
 from ...scene.tables import Scene
-from ..pipeline.keys import pair_key
+from ..pipeline.stage_inputs import stage_key
 from .hertz import hertz_pressure, hertz_radius, press_pair, second_moment_radius
 from .punch import Indented, indent, johnson_approach, johnson_pressure
 
@@ -60,9 +60,13 @@ def solve_pair(
     }
     if scene.kind not in kinds:
         raise InputError(f"kind = '{scene.kind}': expected {' or '.join(kinds)}")
-    return stage(folder, "pressure", pair_key(scene), lambda: kinds[scene.kind](scene, comm), comm)[
-        0
-    ]
+    return stage(
+        folder,
+        "pressure",
+        stage_key("pair pressure", scene),
+        lambda: kinds[scene.kind](scene, comm),
+        comm,
+    )[0]
 
 
 def radii(seat: PressureMap, dimension: int) -> np.ndarray:

@@ -32,6 +32,7 @@ from .punch import flexibility
 
 __all__ = [
     "Pressed",
+    "check_loads",
     "hertz_load",
     "hertz_pressure",
     "hertz_radius",
@@ -67,7 +68,7 @@ def press_pair(scene: Scene, comm: Any = None) -> Pressed:
     if scene.kind != "hertz":
         raise InputError(f"kind = '{scene.kind}': expected 'hertz'")
     given = scene.hertz.interference
-    loads = _loads(scene) if given is None else ()
+    loads = check_loads(scene) if given is None else ()
     mesh = build_mesh(scene, comm)
     patch = make_patch(mesh, "this")
     ports = normal_ports([patch], mesh)
@@ -128,8 +129,12 @@ def second_moment_radius(scene: Scene, seat: PressureMap) -> float:
     return float(np.sqrt((2.5 if dimension == 3 else 4.0) * (seat.force @ r**2) / seat.force.sum()))
 
 
-def _loads(scene: Scene) -> tuple[float, ...]:
-    """The loads of the study, or the one that gives the expected contact radius."""
+def check_loads(scene: Scene) -> tuple[float, ...]:
+    """The loads of the study, or the one that gives the expected contact radius.
+
+    Raises:
+        InputError: a load whose contact does not fit the mesh.
+    """
     loads = scene.study.loads or (hertz_load(scene, scene.hertz.contact_radius),)
     for load in loads:
         _check_load(scene, load)

@@ -29,7 +29,7 @@ from ...data import PressureMap
 from ...errors import InputError
 from ...io.stage_cache import stage
 from ...scene.tables import Scene
-from ..pipeline.keys import zmass_key
+from ..pipeline.stage_inputs import stage_key
 from ..pipeline.stages import build_mesh
 
 __all__ = ["Pressed", "drives", "mass_on_foundation", "mean_load", "motions", "press"]
@@ -54,7 +54,9 @@ def press(scene: Scene, folder: Any = None, comm: Any = None) -> Pressed:
     """
     if scene.kind != "z mass":
         raise InputError(f"kind = '{scene.kind}': expected 'z mass'")
-    return stage(folder, "pressure", zmass_key(scene), lambda: _press(scene, comm), comm)[0]
+    return stage(
+        folder, "pressure", stage_key("mass pressure", scene), lambda: _press(scene, comm), comm
+    )[0]
 
 
 def mass_on_foundation(scene: Scene, seat: PressureMap) -> MassOnFoundation:

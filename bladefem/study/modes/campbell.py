@@ -27,6 +27,8 @@ __all__ = ["Campbell", "campbell", "campbell_table", "read_speeds", "sense_of"]
 
 # modes beyond those asked for: Coriolis forces mix neighbours
 GUARD = 6
+# of one diagram: more cannot be told apart in a picture
+MOST_SPEEDS = 2000
 
 
 @dataclass(frozen=True)
@@ -140,6 +142,11 @@ def read_speeds(text: str) -> list[float]:
                 "after it"
             )
         step = out[-1] - out[-2]
+        if (numbers[i + 1] - out[-1]) / step > MOST_SPEEDS:
+            raise InputError(
+                f"campbell = {text}: {(numbers[i + 1] - out[-1]) / step:.3g} speeds, expected at "
+                f"most {MOST_SPEEDS}"
+            )
         out += list(np.arange(out[-1] + step, numbers[i + 1] - step / 2, step))
     return out
 

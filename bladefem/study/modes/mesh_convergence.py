@@ -17,7 +17,6 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from itertools import pairwise
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -29,6 +28,7 @@ from geometry.mesh import Mesh
 from ...data import ModeSet
 from ...errors import InputError
 from ...scene.tables import Scene
+from ...scene.validate import refuse_given_mesh
 from ...util.progress import Progress, unwatched
 from ..pipeline.stages import Bodies, build_mesh, find_modes
 from .comparison import mac_of
@@ -94,11 +94,7 @@ def converge(
     Raises:
         InputError: too few sizes, or not from coarse to fine; a scene whose mesh is given.
     """
-    if scene.kind == "imported" and Path(scene.imported.file).suffix.lower() not in (
-        ".step",
-        ".stp",
-    ):
-        raise InputError("kind 'imported': its mesh is given, expected a scene that is meshed here")
+    refuse_given_mesh(scene)
     if len(sizes) < 3 or not all(a > b > 0 for a, b in pairwise(sizes)):
         raise InputError(
             f"converge = {list(sizes)} m: expected at least three element sizes, from coarse to "

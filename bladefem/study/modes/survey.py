@@ -17,11 +17,11 @@ from ...data import ModeSet
 from ...errors import InputError
 from ...hbm.model import Damping
 from ...io.array_codec import read_npz
-from ...io.stage_cache import code_of, found_remark, key_of, on_root, stage
+from ...io.stage_cache import found_remark, on_root, stage
 from ...scene.tables import Scene
 from ...util.progress import Progress, unwatched
 from ..pipeline import pipeline
-from ..pipeline.keys import modes_key
+from ..pipeline.stage_inputs import stage_key
 from ..pipeline.stages import MODES_SHOWN, Bodies, excited_modes, is_wheel, wheel_modes
 from ..pipeline.validate_mesh import refuse_loads
 from .campbell import Campbell, campbell
@@ -94,7 +94,7 @@ def survey(
         refuse_loads(scene, start.mesh, wanted.loads, wanted.damping)
     bodies = Bodies(scene, start.mesh, comm, progress)
     clock = time.perf_counter()
-    key = key_of(modes_key(scene), "survey", wanted.direct, code_of("bladefem.study"))
+    key = stage_key("survey", scene, wanted.direct)
     sets, before = stage(folder, "survey", key, lambda: _all_modes(bodies, wanted.direct), comm)
     messages = [*start.messages, *([] if before is None else [found_remark("modes", before)])]
     run = replace(start, modes=sets, messages=messages)

@@ -56,6 +56,8 @@ class Curve:
     converged: np.ndarray
     # (k,) text
     method: np.ndarray
+    # (k,) text: the way of `bladefem.hbm.policy` that ran
+    route: np.ndarray
     # (k,) relative residual of the balance
     residual: np.ndarray
     # (k,)
@@ -180,6 +182,7 @@ def _record(p: Solution) -> tuple[object, ...]:
         p.probe[1, 0],
         p.converged,
         p.method,
+        p.route,
         p.residual,
         p.iterations,
         p.states["slip"] + p.states["lift"],

@@ -24,10 +24,12 @@ from ...data import ModeSet, Patch, PressureMap
 from ...errors import InputError, NotSolvedError
 from ...io.stage_cache import found_remark, stage
 from ...reduction.truncate import truncated
+from ...scene.kinds import kind_named
 from ...scene.tables import Scene
 from ...scene.units import show
 from ...scene.validate import refuse_response
 from ...scene.warnings import doubts
+from ...util.message import method, warning
 from ...util.progress import Progress, unwatched
 from ..adaptive.check_points import peak_of
 from ..adaptive.choice import choose, covered
@@ -38,20 +40,21 @@ from ..modes.clamped_aerofoil import clamped_blade
 from ..modes.stress import Strength, strength
 from .assemble_model import LoadCase, joint_model
 from .contact_cycle import labels
-from .keys import contact_key, mesh_key, modes_key, reduction_key, response_key, strength_key
 from .liftoff import named
 from .linear_limits import Limit, linear_limits
 from .loads import Curve, default_loads, study_loads
 from .stability import stability_sentence
+from .stage_inputs import stage_key
 from .stages import (
     Bodies,
     Reduced,
     build_mesh,
+    condense_contact,
     excited_modes,
     find_modes,
     harmonic_diameters,
+    on_layer,
     reduce_sector,
-    seat_damper,
     weighted,
 )
 from .validate_mesh import found_patches
@@ -139,10 +142,12 @@ def run(
     """
     if until in STAGES[3:]:
         refuse_response(scene)
-    clock = Clock({}, doubts(scene), progress)
+    clock = Clock({}, [*map(warning, doubts(scene))], progress)
     keep = _Keeper(folder, comm, clock)
     with clock("mesh"):
-        mesh = keep("mesh", mesh_key(scene), lambda: build_mesh(scene, comm))
+        mesh = keep("mesh", stage_key("mesh", scene), lambda: build_mesh(scene, comm))
+    # what was done to a user's own elements
+    clock.messages.extend(mesh.report.get("notes", ()))
     result = Run(
         scene,
         None if folder is None else Path(folder),
@@ -158,13 +163,16 @@ def run(
     with clock("modes"):
         result = replace(
             result,
-            modes=keep("modes", modes_key(scene), lambda: find_modes(bodies)),
-            clamped=keep("clamped", modes_key(scene), lambda: clamped_blade(bodies)),
+            modes=keep("modes", stage_key("modes", scene), lambda: find_modes(bodies)),
+            clamped=keep("clamped", stage_key("modes", scene), lambda: clamped_blade(bodies)),
         )
     if until == "modes":
         return result
     with clock("contact"):
-        problem = keep("contact", contact_key(scene), lambda: seat_damper(bodies, patches))
+        bare = keep(
+            "contact", stage_key("contact", scene), lambda: condense_contact(bodies, patches)
+        )
+        problem = on_layer(scene, bare)
         own = _own_load(scene, problem, clock.messages)
         maps = {
             load: seat(problem, scene.operation.speed, normal=load, bedded=scene.contact.bedded)
@@ -172,9 +180,12 @@ def run(
         }
         if mesh.dimension == 2:
             clock.messages.extend(
-                filter(None, [coarse_sentence(m for pair in maps.values() for m in pair)])
+                map(
+                    warning,
+                    filter(None, [coarse_sentence(m for pair in maps.values() for m in pair)]),
+                )
             )
-        clock.messages.extend(peak_remarks(maps, scene, mesh.depth))
+        clock.messages.extend(map(warning, peak_remarks(maps, scene, mesh.depth)))
         result = replace(result, contact=Seating(problem, maps, own))
     if until == "contact":
         return result
@@ -182,7 +193,9 @@ def run(
         excited = excited_modes(scene, mesh, result.modes)
         result = replace(
             result,
-            strength=keep("strength", strength_key(scene), lambda: strength(bodies, excited)),
+            strength=keep(
+                "strength", stage_key("stress", scene), lambda: strength(bodies, excited)
+            ),
         )
     cases = load_cases(scene, mesh, result.contact)
     with clock("reduction"):
@@ -255,7 +268,9 @@ def _response(
             keep.comm,
             progress,
             lambda case, make: keep.alone(
-                f"response_{_name(case)}", response_key(scene, settings, case), make
+                f"response_{_name(case)}",
+                stage_key("response", scene, case.load, case.mass, replace(settings, error=None)),
+                make,
             ),
         )
         band = min(c.frequency[0] for c in curves), max(c.frequency[-1] for c in curves)
@@ -279,7 +294,7 @@ def _own_load(scene: Scene, problem: ContactProblem, messages: list[str]) -> flo
     try:
         maps = seat(problem, scene.operation.speed, bedded=scene.contact.bedded)
     except NotSolvedError as error:
-        messages.append(f"the damper's own centrifugal load does not seat it: {error}")
+        messages.append(warning(f"the damper's own centrifugal load does not seat it: {error}"))
         return None
     own = float(np.mean([m.force.sum() for m in maps]))
     messages.append(
@@ -373,7 +388,7 @@ def reduced_sector(
     diameters = harmonic_diameters(scene, bodies.mesh, EXACT_HARMONICS)
     while True:
         count = spare * settings.modes
-        key = reduction_key(scene, diameters, count)
+        key = stage_key("reduction", scene, np.array(diameters), count)
         reduced = keep("reduction", key, partial(reduce_sector, bodies, patches, diameters, count))
         if not settings.chosen:
             return settings, reduced
@@ -394,42 +409,52 @@ def reduced_sector(
 
 def _remarks(scene: Scene, settings: Settings, curves: list[Curve], nodes: int) -> list[str]:
     """What a reader of the results has to know; ``nodes`` are the contact points of a seat."""
-    remarks = [settings.sentence(nodes), settings.method]
+    remarks: list[str] = [method(settings.sentence(nodes)), method(settings.method)]
     if scene.model.static == "uncoupled":
         remarks.append(
-            "mean displacements held as the static contact solution left them (model.static)"
+            method(
+                "mean displacements held as the static contact solution left them (model.static)"
+            )
         )
     if scene.study.stability:
-        remarks.append(stability_sentence([(c.stability, c.multiplier) for c in curves]))
+        remarks.append(method(stability_sentence([(c.stability, c.multiplier) for c in curves])))
     halved = halved_sentence([c.load for c in curves], [c.halved for c in curves], scene.accuracy)
     if halved:
-        remarks.append(halved)
+        remarks.append(warning(halved))
     lost = sum(int((~c.converged).sum()) for c in curves)
     if lost:
         remarks.append(
-            f"{lost} of {sum(len(c.frequency) for c in curves)} response points did not converge; "
-            "they are "
-            "marked in tables and pictures"
+            warning(
+                f"{lost} of {sum(len(c.frequency) for c in curves)} response points did not converge; "
+                "they are "
+                "marked in tables and pictures"
+            )
         )
     for c in curves:
         near = np.flatnonzero(c.frequency == c.peak_frequency)[0] + np.array([-1, 1])
         if not c.converged[near[(near >= 0) & (near < len(c.frequency))]].all():
             remarks.append(
-                f"load {c.load:g} N: the highest point that was solved stands beside one that was "
-                "not; the "
-                "resonance may be higher"
+                warning(
+                    f"load {c.load:g} N: the highest point that was solved stands beside one that was "
+                    "not; the "
+                    "resonance may be higher"
+                )
             )
         if c.settings.error == np.inf:
             remarks.append(
-                f"load {c.load:g} N: the error of the resonance amplitude is unknown, since "
-                "richer models "
-                "of it were not solved; nothing was refined because of that"
+                warning(
+                    f"load {c.load:g} N: the error of the resonance amplitude is unknown, since "
+                    "richer models "
+                    "of it were not solved; nothing was refined because of that"
+                )
             )
         elif c.settings.error is not None and c.settings.error > scene.accuracy:
             remarks.append(
-                f"load {c.load:g} N: estimated error {100 * c.settings.error:.2g} % of the "
-                "resonance "
-                f"amplitude, above the wanted {100 * scene.accuracy:.2g} %"
+                warning(
+                    f"load {c.load:g} N: estimated error {100 * c.settings.error:.2g} % of the "
+                    "resonance "
+                    f"amplitude, above the wanted {100 * scene.accuracy:.2g} %"
+                )
             )
     return remarks
 
@@ -446,15 +471,11 @@ def _load_case(
 
 def check_blade(scene: Scene, mesh: Mesh) -> None:
     """Modes and responses need a blade, and a blade needs its clamp."""
-    found = {
-        "z mass": "pressure and motion",
-        "hertz": "contact pressure",
-        "punch": "contact pressure",
-    }
-    if scene.kind in found:
+    kind = kind_named(scene.kind)
+    if not kind.has_blade:
         raise InputError(
             f"kind '{scene.kind}' has no blade to vibrate: 'bladefem run' computes its "
-            f"{found[scene.kind]}, 'bladefem mesh' draws it"
+            f"{kind.result}, 'bladefem mesh' draws it"
         )
     if "clamp" not in mesh.faces:
         raise InputError(

@@ -11,12 +11,15 @@ import numpy as np
 
 from geometry.mesh import Mesh
 
+from ...contact.interface_elements import layered, pair_ratio
 from ...contact.patch import make_patch
 from ...contact.seating import spin_axis
 from ...data import ModeSet, Patch, PortModel
 from ...errors import InputError, suggestion
 from ...io.stage_cache import on_root
 from ...reduction.assemble import folded_diameter
+from ...scene.fields import value_at
+from ...scene.kinds import kind_named
 from ...scene.part_materials import part_materials
 from ...scene.tables import Material, Scene
 from ...util.progress import Progress, unwatched
@@ -27,11 +30,13 @@ __all__ = [
     "Reduced",
     "blade_parts",
     "build_mesh",
+    "condense_contact",
     "contact_patches",
     "excited_modes",
     "find_modes",
     "harmonic_diameters",
     "is_wheel",
+    "on_layer",
     "reduce_sector",
     "seat_damper",
     "wheel_modes",
@@ -171,7 +176,7 @@ def build_mesh(scene: Scene, comm: Any = None) -> Mesh:
     """
 
     def draw() -> Mesh:
-        from geometry import build
+        from geometry.isolated_process import build
 
         return build(scene)
 
@@ -267,12 +272,23 @@ def wheel_modes(
 
 
 def seat_damper(bodies: Bodies, patches: list[Patch]) -> Any:
-    """The contact problem of the damper between two platforms: after it, each load state costs
-    milliseconds.
+    """The contact problem of the damper between two platforms, with the scene's interface layer:
+    after it, each load state costs milliseconds.
 
     Returns:
-        contact.seat.ContactProblem, for :func:`bladefem.contact.seating.solve`.
+        contact.seating.ContactProblem, for :func:`bladefem.contact.seating.solve`.
     """
+    return on_layer(bodies.scene, condense_contact(bodies, patches))
+
+
+def on_layer(scene: Scene, problem: Any) -> Any:
+    """A contact problem with the scene's interface layer between its faces."""
+    ratio = pair_ratio(scene.material.blade, scene.material.damper)
+    return layered(problem, scene.contact, ratio)
+
+
+def condense_contact(bodies: Bodies, patches: list[Patch]) -> Any:
+    """The contact problem of rigid faces: all that takes finite elements."""
     from ...contact.face_profile import seat_gap
     from ...contact.seating import contact_problem
 
@@ -339,7 +355,7 @@ def blade_parts(scene: Scene, mesh: Mesh) -> tuple[Mesh, dict[str, Material]]:
         InputError: a volume with a material that the mesh does not have, or that shares cells with
             another one.
     """
-    given = part_materials(scene) if scene.kind == "imported" else {}
+    given = part_materials(scene)
     if not given:
         return mesh, {"blade": scene.material.blade}
     cells = mesh.bodies["blade"]
@@ -367,7 +383,7 @@ def _damper_material(scene: Scene, mesh: Mesh) -> Material:
     """The damper's material, its density set by the given mass where there is one."""
     from ...fem.loads import volume
 
-    given = scene.plane.damper_mass if scene.kind == "plane blades" else scene.damper.mass
+    given = value_at(scene, kind_named(scene.kind).damper_mass)
     if given is None:
         return scene.material.damper
     return replace(scene.material.damper, rho=given / volume(mesh, "damper"))

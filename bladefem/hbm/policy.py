@@ -1,0 +1,124 @@
+"""The way a point is solved: every size at which one method takes over from another, and the choice.
+
+Four ways lead to the same solution, the cheapest that applies is taken:
+
+1. compiled point: linear part, Newton and works of a small model in one compiled call;
+2. compiled Newton: the loop alone is compiled, the linear part is condensed with NumPy;
+3. NumPy Newton with a dense LU of the Jacobian (2-D elements and other friction laws, few unknowns);
+4. NumPy Newton with iterations (conjugate residuals, then GMRES), dense LU where they fail.
+
+`Solution.route` says which one ran. Sizes count contact degrees of freedom (nodes times directions)
+or unknowns (these times 2H+1). Each was measured on one thread as the size where both methods take
+the same time, and is flat around it: a factor of two costs some per cent. Compiled code takes the
+sizes of this file when it is compiled; after a change delete Numba's cache.
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+from ..friction.law import groups_by_law
+
+if TYPE_CHECKING:
+    from .model import ReducedModel
+
+__all__ = [
+    "BATCHED_SOLVE_DOFS",
+    "BLOCKED_LU_UNKNOWNS",
+    "COMPILED_NEWTON_UNKNOWNS",
+    "COMPILED_POINT_DOFS",
+    "DEFLATION_UNKNOWNS",
+    "DENSE_FALLBACK_UNKNOWNS",
+    "DENSE_UNKNOWNS",
+    "DETERMINANT_UNKNOWNS",
+    "ROUTES",
+    "SHARED_FLEXIBILITY_DOFS",
+    "SHOOTING_SIZE",
+    "linear_solver",
+    "updates_by_modes",
+    "uses_compiled_newton",
+    "uses_compiled_point",
+    "uses_coulomb_kernels",
+    "uses_low_rank",
+]
+
+COMPILED_POINT = "compiled point"
+COMPILED_NEWTON = "compiled Newton"
+NUMPY_NEWTON = "NumPy Newton"
+DENSE_LU = "dense LU"
+ITERATIONS = "iterations"
+ITERATIONS_THEN_LU = "iterations, then dense LU"
+ROUTES = (COMPILED_POINT, COMPILED_NEWTON, NUMPY_NEWTON)
+
+# Contact degrees of freedom up to which a point is one compiled call. NumPy's overhead, 0.4 ms a
+# point, is 90 % of a point with one contact and 22 % at 48 degrees of freedom; beyond 200 it is lost
+# in the dense products, and BLAS on whole arrays is faster.
+COMPILED_POINT_DOFS = 200
+# Unknowns of 1-D elements up to which Newton is compiled: 3.3 times as fast as NumPy with one
+# contact, 1.2 times at some thousand unknowns; beyond 20000 a Jacobian no longer fits into memory.
+COMPILED_NEWTON_UNKNOWNS = 20000
+# Unknowns up to which NumPy's dense LU is faster than iterations.
+DENSE_UNKNOWNS = 300
+# Unknowns up to which the dense LU is the last resort where iterations fail: 200 MB, some seconds.
+DENSE_FALLBACK_UNKNOWNS = 5000
+# Unknowns above which compiled Newton iterates, and above which its LU works on blocks.
+BLOCKED_LU_UNKNOWNS = 64
+# Unknowns from which the second level of the iterations pays: 5 steps in place of 46 at 2500.
+DEFLATION_UNKNOWNS = 300
+# Unknowns up to which the sign of the Jacobian's determinant is worth its time.
+DETERMINANT_UNKNOWNS = 600
+# Contact degrees of freedom below which all harmonics are condensed in one batched call; above, one
+# LAPACK call a harmonic without copies, or the low-rank update.
+BATCHED_SOLVE_DOFS = 64
+# Contact degrees of freedom for each mode from which contact springs are added by the modes
+# (Woodbury): with NumPy, and in compiled points.
+LOW_RANK_RATIO = 3
+LOW_RANK_RATIO_COMPILED = 2
+# Contact degrees of freedom from which one flexibility serves all harmonics without being formed.
+SHARED_FLEXIBILITY_DOFS = 64
+# Coordinates and elements up to which shooting is tried.
+SHOOTING_SIZE = 200
+
+
+def uses_coulomb_kernels(model: ReducedModel) -> bool:
+    """True if every element follows Coulomb's law, for which the compiled loops are written."""
+    return all(law is None for law, _ in groups_by_law(model.elements))
+
+
+def uses_compiled_point(model: ReducedModel, harmonics: int) -> bool:
+    """True if a whole point is one compiled call: few 1-D Coulomb elements, the mean in the balance,
+    modes that damping does not couple.
+    """
+    dofs = model.springs.size
+    if dofs > COMPILED_POINT_DOFS or not model.coupled:
+        return False
+    if not uses_compiled_newton(model, dofs * (2 * harmonics + 1)):
+        return False
+    bodies = (model.blades(harmonics), model.elastic_damper(harmonics))
+    return all(body is None or body.coupled is None for body in bodies)
+
+
+def uses_compiled_newton(model: ReducedModel, unknowns: int) -> bool:
+    """True if Newton's loop is compiled: 1-D Coulomb elements with few enough unknowns."""
+    return (
+        model.elements.tangents == 1
+        and unknowns <= COMPILED_NEWTON_UNKNOWNS
+        and uses_coulomb_kernels(model)
+    )
+
+
+def linear_solver(unknowns: int) -> str:
+    """How NumPy Newton solves for a step, by the unknowns of the nodes that slip or lift off."""
+    if unknowns <= DENSE_UNKNOWNS:
+        return DENSE_LU
+    return ITERATIONS_THEN_LU if unknowns <= DENSE_FALLBACK_UNKNOWNS else ITERATIONS
+
+
+def uses_low_rank(dofs: int, modes: int) -> bool:
+    """True if NumPy adds the contact springs by the modes."""
+    return dofs >= BATCHED_SOLVE_DOFS and LOW_RANK_RATIO * modes <= dofs
+
+
+def updates_by_modes(dofs: int, modes: int) -> bool:
+    """True if a compiled point adds the contact springs by the modes."""
+    return LOW_RANK_RATIO_COMPILED * modes <= dofs

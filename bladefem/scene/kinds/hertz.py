@@ -1,0 +1,46 @@
+"""A sphere or a cylinder pressed on a block."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+from ..tables import Scene
+from .conditions import at_most, below, one_of
+from .record import COMMON_TABLES, Kind
+
+
+def conditions(scene: Scene) -> Iterator[str]:
+    hertz = scene.hertz
+    yield from one_of("hertz.interference", hertz.interference, scene)
+    yield from below(
+        "hertz.contact_radius", hertz.contact_radius, hertz.half_width, "hertz.half_width"
+    )
+    yield from at_most("hertz.half_width", hertz.half_width, hertz.radius, "hertz.radius")
+    if scene.mesh.contact_size is not None:
+        yield from below(
+            "mesh.contact_size",
+            scene.mesh.contact_size,
+            hertz.contact_radius,
+            "hertz.contact_radius",
+        )
+
+
+def thin_parts(scene: Scene) -> dict[str, float]:
+    """Lengths that an element has to fit into [m]."""
+    return {"hertz.half_width": scene.hertz.half_width}
+
+
+KIND = Kind(
+    name="hertz",
+    tables=("hertz", *COMMON_TABLES),
+    builder="geometry.contact_pairs:hertz_pair",
+    shape=("hertz", "mesh"),
+    runner="bladefem.report.pair:run",
+    table="bladefem.cli.tables:pair_table",
+    result="contact pressure",
+    has_blade=False,
+    has_seats=False,
+    has_one_tangent=True,
+    conditions=conditions,
+    thin_parts=thin_parts,
+)

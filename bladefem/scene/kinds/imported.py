@@ -1,0 +1,62 @@
+"""A mesh or a STEP file of the user's own."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from pathlib import Path
+
+from geometry.joined_files import split_entry
+
+from ..part_materials import part_materials
+from ..tables import Scene
+from .conditions import known_diameters
+from .record import ENGINE_TABLES, Kind
+
+
+def conditions(scene: Scene) -> Iterator[str]:
+    file = scene.imported.file
+    part_materials(scene)
+    if not file:
+        yield (
+            "[imported]: a scene of kind 'imported' needs this table with file = \"path to a "
+            'mesh or STEP file"'
+        )
+    elif not Path(file).is_file():
+        yield f"imported.file = {file!r}: there is no such file"
+    for entry in scene.imported.more or ():
+        other = split_entry(entry)[1]
+        if not Path(other).is_file():
+            yield f"imported.more = {entry!r}: there is no file '{other}'"
+    if scene.mesh.order == 1 and not is_drawing(scene):
+        yield (
+            "mesh.order = 1: a mesh file keeps the order of its elements, expected mesh.order = 2; "
+            "imported.linear says what becomes of first-order ones"
+        )
+    if not any(scene.imported.axis):
+        yield "imported.axis = 0, 0, 0: expected a direction"
+    if scene.imported.sectors in (1, 2):
+        yield (
+            f"imported.sectors = {scene.imported.sectors}: expected 0 for a single body, or at "
+            "least 3"
+        )
+    elif scene.imported.sectors:
+        yield from known_diameters(scene, scene.imported.sectors)
+
+
+def is_drawing(scene: Scene) -> bool:
+    """A STEP file is meshed here, a mesh is given."""
+    return Path(scene.imported.file).suffix.lower() in (".step", ".stp")
+
+
+KIND = Kind(
+    name="imported",
+    tables=("imported", "damper", *ENGINE_TABLES),
+    builder="geometry.imported:read_geometry",
+    shape=("imported", "mesh"),
+    runner="bladefem.report.run:run",
+    table="bladefem.cli.tables:run_table",
+    result="forced responses",
+    has_one_tangent=True,
+    meshed_here=is_drawing,
+    conditions=conditions,
+)

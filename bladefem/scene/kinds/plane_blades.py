@@ -1,0 +1,55 @@
+"""A row of plane blades with flat dampers under their platforms, in two dimensions."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+from ..tables import Scene
+from .conditions import at_most, below
+from .record import ENGINE_TABLES, Kind
+
+
+def conditions(scene: Scene) -> Iterator[str]:
+    plane = scene.plane
+    yield from below("plane.platform_width", plane.platform_width, plane.pitch, "plane.pitch")
+    yield from below(
+        "plane.thickness", plane.thickness, plane.platform_width, "plane.platform_width"
+    )
+    yield from at_most(
+        "plane.seat_width",
+        plane.seat_width,
+        (plane.platform_width - plane.thickness) / 2,
+        "the overhang of the platform beside the blade",
+    )
+    yield from below(
+        "plane.platform_height",
+        plane.platform_height,
+        plane.length - plane.platform_thickness,
+        "plane.length minus plane.platform_thickness",
+    )
+    yield from below(
+        "plane.damper_height", plane.damper_height, plane.platform_height, "plane.platform_height"
+    )
+
+
+def thin_parts(scene: Scene) -> dict[str, float]:
+    """Lengths that an element has to fit into [m]."""
+    return {
+        f"plane.{name}": getattr(scene.plane, name)
+        for name in ("thickness", "platform_thickness", "damper_height")
+    }
+
+
+KIND = Kind(
+    name="plane blades",
+    tables=("plane", *ENGINE_TABLES),
+    builder="geometry.plane:plane_blades",
+    shape=("plane", "mesh"),
+    runner="bladefem.report.run:run",
+    table="bladefem.cli.tables:run_table",
+    result="forced responses",
+    has_one_tangent=True,
+    damper_mass="plane.damper_mass",
+    conditions=conditions,
+    thin_parts=thin_parts,
+)

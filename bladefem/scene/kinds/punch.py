@@ -1,0 +1,39 @@
+"""A flat punch pressed on a block."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+from ..tables import Scene
+from .conditions import below, one_of
+from .record import COMMON_TABLES, Kind
+
+
+def conditions(scene: Scene) -> Iterator[str]:
+    yield from one_of("punch.interference", scene.punch.interference, scene)
+    yield from below("punch.radius", scene.punch.radius, scene.punch.half_width, "punch.half_width")
+    if scene.mesh.contact_size is not None:
+        yield from below(
+            "mesh.contact_size", scene.mesh.contact_size, scene.punch.radius, "punch.radius"
+        )
+
+
+def thin_parts(scene: Scene) -> dict[str, float]:
+    """Lengths that an element has to fit into [m]."""
+    return {"punch.half_width": scene.punch.half_width}
+
+
+KIND = Kind(
+    name="punch",
+    tables=("punch", *COMMON_TABLES),
+    builder="geometry.contact_pairs:punch",
+    shape=("punch", "mesh"),
+    runner="bladefem.report.pair:run",
+    table="bladefem.cli.tables:pair_table",
+    result="contact pressure",
+    has_blade=False,
+    has_seats=False,
+    has_one_tangent=True,
+    conditions=conditions,
+    thin_parts=thin_parts,
+)

@@ -1,0 +1,92 @@
+"""A bladed sector of a wheel with its wedge damper, drawn by parameters."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from math import cos, pi, sin, tan
+
+from ..tables import Scene
+from ..units import show
+from .conditions import at_most, below, known_diameters
+from .record import ENGINE_TABLES, Kind
+
+
+def conditions(scene: Scene) -> Iterator[str]:
+    disc = scene.disc
+    shank = scene.shank
+    platform = scene.platform
+    damper = scene.damper
+    aerofoil = scene.aerofoil
+    half = pi / disc.sectors
+    yield from below("disc.bore_radius", disc.bore_radius, disc.rim_radius, "disc.rim_radius")
+    yield from below(
+        "shank.width", shank.width, 2 * disc.rim_radius * tan(half), "the pitch at disc.rim_radius"
+    )
+    yield from at_most("shank.length", shank.length, disc.width, "disc.width, on which it stands")
+    yield from at_most(
+        "shank.length", shank.length, platform.length, "platform.length, which it carries"
+    )
+    reach = (disc.rim_radius + shank.height) * tan(half) - platform.gap / 2
+    overhang = reach - shank.width / 2
+    yield from below(
+        "platform.gap",
+        platform.gap,
+        2 * (disc.rim_radius + shank.height) * tan(half),
+        "the pitch at the platform",
+    )
+    if overhang <= 0:
+        yield (
+            f"shank.width = {show(shank.width, 'm')}: expected less than {show(2 * reach, 'm')}, "
+            "the width of the platform"
+        )
+    yield from at_most(
+        "platform.seat_width",
+        platform.seat_width,
+        max(overhang, 0) / sin(damper.angle),
+        "what the overhang of the platform beside the shank leaves at damper.angle",
+    )
+    yield from at_most(
+        "damper.length", damper.length, platform.length, "platform.length, under which it sits"
+    )
+    yield from at_most(
+        "aerofoil.chord_root",
+        aerofoil.chord_root,
+        platform.length / cos(aerofoil.stagger),
+        "what fits platform.length at aerofoil.stagger",
+    )
+    yield from at_most(
+        "aerofoil.fillet", aerofoil.fillet, aerofoil.span / 4, "a quarter of aerofoil.span"
+    )
+    yield from known_diameters(scene, disc.sectors)
+
+
+def thin_parts(scene: Scene) -> dict[str, float]:
+    blade = scene.aerofoil
+    halfway = (blade.thickness_root * blade.chord_root + blade.thickness_tip * blade.chord_tip) / 2
+    return {
+        "the aerofoil halfway up": halfway,
+        "platform.thickness": scene.platform.thickness,
+        "shank.width": scene.shank.width,
+        "disc.width": scene.disc.width,
+    }
+
+
+def outer_radii(scene: Scene) -> dict[str, float]:
+    """Rim and tip [m]."""
+    rim = scene.disc.rim_radius
+    return {"rim": rim, "tip": rim + scene.shank.height + scene.aerofoil.span}
+
+
+KIND = Kind(
+    name="wedge sector",
+    tables=("aerofoil", "platform", "shank", "disc", "damper", *ENGINE_TABLES),
+    builder="geometry.sector:wedge_sector",
+    shape=("aerofoil", "platform", "shank", "disc", "damper", "mesh"),
+    runner="bladefem.report.run:run",
+    table="bladefem.cli.tables:run_table",
+    result="forced responses",
+    has_seat_grid=True,
+    conditions=conditions,
+    thin_parts=thin_parts,
+    radii=outer_radii,
+)

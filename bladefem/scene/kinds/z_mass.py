@@ -1,0 +1,38 @@
+"""A Z-shaped mass held by friction on a vibrating foundation."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+from ..tables import Scene
+from .conditions import below
+from .record import COMMON_TABLES, Kind
+
+
+def conditions(scene: Scene) -> Iterator[str]:
+    z = scene.z_mass
+    yield from below("z_mass.bar", z.bar, z.height / 2, "half of z_mass.height")
+    yield from below("z_mass.bar", z.bar, z.width, "z_mass.width")
+    skew = scene.foundation.skew
+    if abs(skew[0]) + abs(skew[1]) > 1:
+        yield f"foundation.skew = {skew[0]:g}, {skew[1]:g}: expected a sum of sizes of at most 1"
+
+
+def thin_parts(scene: Scene) -> dict[str, float]:
+    """Lengths that an element has to fit into [m]."""
+    return {f"z_mass.{name}": getattr(scene.z_mass, name) for name in ("bar", "thickness")}
+
+
+KIND = Kind(
+    name="z mass",
+    tables=("z_mass", "foundation", *COMMON_TABLES),
+    builder="geometry.zmass:z_mass",
+    shape=("z_mass", "mesh", "foundation.depth"),
+    runner="bladefem.report.zmass:run",
+    table="bladefem.cli.tables:mass_table",
+    result="pressure and motion",
+    has_blade=False,
+    has_seats=False,
+    conditions=conditions,
+    thin_parts=thin_parts,
+)

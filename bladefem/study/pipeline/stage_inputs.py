@@ -1,0 +1,150 @@
+"""What each stage depends on, declared once: the key of a stored stage follows from it.
+
+A changed friction coefficient does not redo the mesh. A stage may read no other field of the scene
+than those that it declares; `tests/store/test_stage_inputs.py` watches what each one reads.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass, is_dataclass, replace
+from pathlib import Path
+from typing import Any
+
+from geometry.joined_files import split_entry
+
+from ...io.stage_cache import code_of, key_of
+from ...scene.fields import value_at
+from ...scene.kinds import kind_named
+from ...scene.tables import Scene
+
+__all__ = ["STAGE_INPUTS", "StageInputs", "declared_fields", "stage_key"]
+
+
+@dataclass(frozen=True)
+class StageInputs:
+    """What the result of one stage depends on."""
+
+    # stages whose results it takes
+    after: tuple[str, ...] = ()
+    # fields of the scene, or whole tables
+    fields: tuple[str, ...] = ()
+    # fields of those tables that it does not read
+    without: tuple[str, ...] = ()
+    # packages whose program makes it
+    code: tuple[str, ...] = ()
+
+
+STAGE_INPUTS = {
+    # its fields are those of the kind, see `declared_fields`
+    "mesh": StageInputs(without=("damper.mass",), code=("geometry",)),
+    "modes": StageInputs(
+        after=("mesh",),
+        fields=(
+            "imported.materials",
+            "material.blade",
+            "operation.speed",
+            "operation.stiffening",
+            "operation.preload",
+            "excitation.engine_order",
+            "model.nodal_diameters",
+        ),
+        code=("bladefem.fem",),
+    ),
+    "survey": StageInputs(after=("modes",), code=("bladefem.study",)),
+    "stress": StageInputs(
+        after=("modes",), fields=("operation.speed", "excitation"), code=("bladefem.study",)
+    ),
+    # blade, damper and their patches, whatever the shape of the seats
+    "bodies": StageInputs(
+        after=("mesh",),
+        fields=(
+            "kind",
+            "imported.materials",
+            "material",
+            "operation.speed",
+            "operation.stiffening",
+            "operation.preload",
+            "damper.mass",
+            "plane.damper_mass",
+        ),
+        code=("bladefem.fem", "bladefem.contact"),
+    ),
+    "contact": StageInputs(
+        after=("bodies",),
+        fields=(
+            "contact.crown",
+            "contact.crown_across",
+            "contact.edge_radius",
+            "contact.edge_width",
+            "damper.clearance",
+        ),
+    ),
+    "reduction": StageInputs(
+        after=("bodies",),
+        fields=("excitation.at", "excitation.direction", "model.reduction"),
+        code=("bladefem.fem",),
+    ),
+    "response": StageInputs(
+        after=("contact", "reduction"),
+        fields=(
+            "accuracy",
+            "contact",
+            "operation",
+            "excitation",
+            "study",
+            "model",
+        ),
+        # each load is a stage of its own
+        without=("study.loads", "study.masses", "study.own_load"),
+        code=("bladefem.hbm", "bladefem.friction", "bladefem.reduction", "bladefem.study"),
+    ),
+    "mass pressure": StageInputs(
+        after=("mesh",),
+        fields=("material", "foundation.skew", "study.loads"),
+        code=("bladefem.fem", "bladefem.contact"),
+    ),
+    "pair pressure": StageInputs(
+        after=("mesh",),
+        fields=("material", "study.loads"),
+        code=("bladefem.fem", "bladefem.contact", "bladefem.study"),
+    ),
+}
+
+
+def stage_key(name: str, scene: Scene, *more: Any) -> str:
+    """The key of a stage's result.
+
+    Args:
+        more: what it depends on beside the scene, such as one load of many.
+    """
+    values = [_without(scene, field, STAGE_INPUTS[name]) for field in declared_fields(name, scene)]
+    keys = [stage_key(earlier, scene) for earlier in STAGE_INPUTS[name].after]
+    stamp = _file_stamp(scene) if name == "mesh" else []
+    return key_of(name, keys, values, code_of(*STAGE_INPUTS[name].code), stamp, *more)
+
+
+def declared_fields(name: str, scene: Scene) -> Iterator[str]:
+    """The fields and tables that a stage itself declares; those of the mesh hang on the kind."""
+    if name == "mesh":
+        yield "kind"
+        yield from kind_named(scene.kind).shape
+    yield from STAGE_INPUTS[name].fields
+
+
+def _without(scene: Scene, field: str, inputs: StageInputs) -> Any:
+    """The value of a field; of a table without what the stage does not read."""
+    value = value_at(scene, field)
+    left_out = [name for name in inputs.without if name.startswith(f"{field}.")]
+    if not left_out or not is_dataclass(value):
+        return value
+    return replace(value, **{name.rpartition(".")[2]: None for name in left_out})
+
+
+def _file_stamp(scene: Scene) -> list[float]:
+    """Imported files count by their times of change too."""
+    if not scene.imported.file:
+        return []
+    entries = [split_entry(entry)[1] for entry in scene.imported.more or ()]
+    files = [Path(name) for name in (scene.imported.file, *entries)]
+    return [file.stat().st_mtime if file.exists() else 0.0 for file in files]

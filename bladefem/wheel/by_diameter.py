@@ -1,0 +1,263 @@
+"""Flexibility of the tuned wheel, contacts closed, by nodal diameters.
+
+In nodal diameter d the sector with its damper has, for forces F on its ports,
+
+    x = (A_d + U_d T_dh U_d^H) F,    A = (1 + R K)^-1 R,    U = (1 + R K)^-1 L,    T = (Z + N)^-1,
+
+R the residual flexibilities of both bodies, L their modes, Z(h omega) modal impedances, K the
+springs of full stick, N = L^H K U (Sherman, Morrison and Woodbury). Only T depends on the
+frequency and the harmonic; d > N/2 are the conjugates of N - d. Sums over sectors are FFTs.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from ..data import PortModel, RigidBody
+from ..errors import NotSolvedError
+from ..hbm.linear.bodies import Damping
+from ..hbm.linear.woodbury import staying
+from .model import Wheel
+
+__all__ = [
+    "DiameterParts",
+    "diameter_parts",
+    "modal_flexibility",
+    "modal_impedance",
+    "residual_product",
+    "ring_product",
+    "tuned_product",
+]
+
+# rigid motions that the contact springs resist less than this, relatively, are left out
+UNSEEN = 1e-12
+
+
+@dataclass(frozen=True)
+class DiameterParts:
+    """What stays at all frequencies; D = N/2 + 1 nodal diameters, P ports, k modes of both bodies.
+
+    Ports stand in the order contact, blade, load, probe.
+    """
+
+    # (D, P, P) residual flexibility with contact springs [m/N]
+    A: np.ndarray
+    # (N, P, k) modes with contact springs [kg^-1/2]
+    U: np.ndarray
+    # (N, k, k) stiffness of the contact springs in the modes [1/s^2]
+    N: np.ndarray
+    # (N, k) squared circular frequencies [1/s^2]
+    stiffness: np.ndarray
+    # (N, k, k) viscous damping [1/s]
+    viscous: np.ndarray
+    # (N, k) loss factor times squared frequency [1/s^2]
+    hysteretic: np.ndarray
+    # (N, k) aerodynamic stiffness, not for the mean [1/s^2]
+    influence: np.ndarray
+    # (N, k, k) T of the mean [s^2]
+    mean: np.ndarray
+    contact: slice
+    blade: slice
+    load: slice
+    probe: slice
+
+
+def diameter_parts(wheel: Wheel) -> DiameterParts:
+    """The parts of a wheel, made once."""
+    if "parts" not in wheel.kept:
+        wheel.kept["parts"] = _made_parts(wheel)
+    return wheel.kept["parts"]
+
+
+def _made_parts(wheel: Wheel) -> DiameterParts:
+    diameters = [wheel.sectors[d] for d in range(wheel.count // 2 + 1)]
+    most = max(len(body.omega) for body in diameters)
+    sizes = _port_sizes(wheel)
+    ends = np.cumsum(sizes)
+    R, L = _residual_and_modes(wheel, diameters, most, int(ends[-1]))
+    springs = np.zeros(ends[-1])
+    springs[: ends[0]] = wheel.springs.ravel()
+    A, U, _, N = staying(R, L, springs)
+    stiffness, viscous, hysteretic = _modal_terms(wheel, diameters, most)
+    mean = np.array(
+        [
+            _mean_flexibility(stiffness[d], L[d, : sizes[0]], springs[: sizes[0]], N[d], wheel.hold)
+            for d in range(len(diameters))
+        ]
+    )
+    count = wheel.count
+    slices = [slice(int(e - s), int(e)) for s, e in zip(sizes, ends, strict=True)]
+    influence = np.zeros((count, L.shape[2]), dtype=complex)
+    if wheel.influence is not None:
+        influence[:, :most] = wheel.influence
+    return DiameterParts(
+        A,
+        _all_diameters(U, count),
+        _all_diameters(N, count),
+        _all_diameters(stiffness, count),
+        _all_diameters(viscous, count),
+        _all_diameters(hysteretic, count),
+        influence,
+        _all_diameters(mean, count) * wheel.coupled,
+        *slices,
+    )
+
+
+def _port_sizes(wheel: Wheel) -> list[int]:
+    body = wheel.sectors[0]
+    everything = np.arange(len(body.residual))
+    others = [len(everything[body.ports.get(n, slice(0, 0))]) for n in ("blade", "load", "probe")]
+    return [len(wheel.rows), *others]
+
+
+def _residual_and_modes(
+    wheel: Wheel, diameters: list[PortModel], most: int, ports: int
+) -> tuple[np.ndarray, np.ndarray]:
+    """R (D, P, P) and L (D, P, k) of the blades and the damper, which moves against them."""
+    damper = wheel.damper
+    contact = np.arange(len(wheel.rows))
+    if isinstance(damper, RigidBody):
+        half = np.linalg.cholesky(damper.mass)
+        other = np.linalg.solve(half, damper.B[wheel.rows].T).T
+        flexibility = np.zeros((len(contact), len(contact)))
+    elif damper is not None:
+        rows = np.arange(len(damper.residual))[damper.ports["contact"]][wheel.rows]
+        other = damper.shapes[rows]
+        flexibility = damper.residual[np.ix_(rows, rows)]
+    else:
+        other = np.zeros((len(contact), 0))
+        flexibility = np.zeros((len(contact), len(contact)))
+    R = np.zeros((len(diameters), ports, ports), dtype=complex)
+    L = np.zeros((len(diameters), ports, most + other.shape[1]), dtype=complex)
+    for d, body in enumerate(diameters):
+        order = _port_order(wheel, body)
+        R[d] = body.residual[np.ix_(order, order)]
+        R[d][np.ix_(contact, contact)] += flexibility
+        L[d, :, : len(body.omega)] = body.shapes[order]
+        L[d, contact, most:] = -other
+    return R, L
+
+
+def _port_order(wheel: Wheel, body: PortModel) -> np.ndarray:
+    everything = np.arange(len(body.residual))
+    parts = [everything[body.ports["contact"]][wheel.rows]]
+    parts += [everything[body.ports.get(name, slice(0, 0))] for name in ("blade", "load", "probe")]
+    return np.concatenate(parts)
+
+
+def _modal_terms(
+    wheel: Wheel, diameters: list[PortModel], most: int
+) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Squared frequencies (D, k), viscous damping (D, k, k) and loss terms (D, k)."""
+    damper = wheel.damper
+    if isinstance(damper, RigidBody):
+        extra = (np.zeros(len(damper.mass)), None)
+    elif damper is not None:
+        extra = (damper.omega, damper.damping)
+    else:
+        extra = (np.zeros(0), None)
+    k = most + len(extra[0])
+    stiffness = np.zeros((len(diameters), k))
+    viscous = np.zeros((len(diameters), k, k), dtype=complex)
+    hysteretic = np.zeros((len(diameters), k))
+    for d, body in enumerate(diameters):
+        for start, omega, own, law in (
+            (0, body.omega, body.damping, wheel.damping),
+            (most, *extra, wheel.damper_damping),
+        ):
+            part = slice(start, start + len(omega))
+            stiffness[d, part] = omega**2
+            viscous[d, part, part] = _damping_matrix(omega, own, law)
+            hysteretic[d, part] = law.structural * omega**2
+        # diameters with fewer modes: nothing moves these
+        stiffness[d, len(body.omega) : most] = 1e200
+    return stiffness, viscous, hysteretic
+
+
+def _damping_matrix(omega: np.ndarray, own: np.ndarray | None, law: Damping) -> np.ndarray:
+    viscous = np.diag(np.broadcast_to(law.viscous(omega), omega.shape))
+    if own is None:
+        return viscous
+    return viscous + (np.diag(own) if own.ndim == 1 else own)
+
+
+def _mean_flexibility(
+    stiffness: np.ndarray, L: np.ndarray, springs: np.ndarray, N: np.ndarray, hold: float
+) -> np.ndarray:
+    """(k, k) T of the mean in one nodal diameter: rigid motions are held by a share of what the
+    contact springs do, and left out where these do not resist them.
+    """
+    k = len(stiffness)
+    rigid = np.flatnonzero(stiffness == 0)
+    B = L[:, rigid]
+    stiff = B.conj().T @ (springs[:, None] * B)
+    Z = np.diag(stiffness).astype(complex)
+    Z[np.ix_(rigid, rigid)] = hold * stiff
+    size = np.sqrt(np.where(np.diag(stiff).real > 0, np.diag(stiff).real, 1.0))
+    values, vectors = np.linalg.eigh(stiff / np.outer(size, size))
+    seen = np.zeros((k, int((values > UNSEEN).sum())), dtype=complex)
+    seen[rigid] = (vectors / size[:, None])[:, values > UNSEEN]
+    V = np.column_stack([np.eye(k)[:, stiffness > 0], seen])
+    return V @ np.linalg.inv(V.conj().T @ (Z + N) @ V) @ V.conj().T
+
+
+def _all_diameters(half: np.ndarray, count: int) -> np.ndarray:
+    """Nodal diameters 0..N-1 from 0..N/2."""
+    return np.concatenate([half, half[count - len(half) : 0 : -1].conj()])
+
+
+def modal_impedance(parts: DiameterParts, omega: float, harmonics: int) -> np.ndarray:
+    """(N, H+1, k, k) modal impedance Z of the free bodies at the harmonics of omega [1/s^2]."""
+    count, k = parts.stiffness.shape
+    w = omega * np.arange(harmonics + 1)
+    Z = 1j * w[None, :, None, None] * parts.viscous[:, None]
+    diagonal = parts.stiffness[:, None, :] - (w**2)[None, :, None]
+    diagonal = diagonal + 1j * np.sign(w)[None, :, None] * parts.hysteretic[:, None, :]
+    diagonal[:, 1:] += parts.influence[:, None, :]
+    modes = np.arange(k)
+    Z[:, :, modes, modes] += diagonal
+    return Z
+
+
+def modal_flexibility(parts: DiameterParts, Z: np.ndarray) -> np.ndarray:
+    """(N, H+1, k, k) T = (Z + N)^-1, of the mean as `DiameterParts` has it.
+
+    Raises:
+        NotSolvedError: a resonance without damping is hit exactly.
+    """
+    T = np.zeros_like(Z)
+    T[:, 0] = parts.mean
+    try:
+        T[:, 1:] = np.linalg.inv(Z[:, 1:] + parts.N[:, None])
+    except np.linalg.LinAlgError:
+        raise NotSolvedError(
+            "flexibility of the wheel is singular: a resonance without damping is hit exactly"
+        ) from None
+    return T
+
+
+def ring_product(blocks: np.ndarray, x: np.ndarray) -> np.ndarray:
+    """(N, k, H+1) products of blocks (N, H+1, k, k) with amplitudes x (N, k, H+1)."""
+    return (blocks @ x.swapaxes(1, 2)[..., None])[..., 0].swapaxes(1, 2)
+
+
+def residual_product(A: np.ndarray, f: np.ndarray) -> np.ndarray:
+    """(N, P, K) A_d f_d of all nodal diameters from A (D, P, P) of 0..N/2."""
+    half = len(A)
+    out = np.empty((len(f), A.shape[1], f.shape[2]), dtype=complex)
+    np.matmul(A, f[:half], out=out[:half])
+    mirrored = A[len(f) - half : 0 : -1]
+    out[half:] = (mirrored @ f[half:].conj()).conj()
+    return out
+
+
+def tuned_product(
+    parts: DiameterParts, T: np.ndarray, f: np.ndarray, rows: slice, columns: slice
+) -> np.ndarray:
+    """(N, rows, H+1) motions of the tuned wheel by forces f (N, columns, H+1), both by diameters."""
+    push = parts.U[:, columns].conj().swapaxes(1, 2) @ f
+    out = parts.U[:, rows] @ ring_product(T, push)
+    out += residual_product(parts.A[:, rows, columns], f)
+    return out

@@ -1,0 +1,72 @@
+"""Friction forces of all dampers of a wheel in one batch."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from ..data import Elements
+from ..friction.aft import evaluate
+from ..friction.kernel_1d_exact import evaluate_exact
+from .model import Wheel
+
+__all__ = ["ContactForces", "contact_forces"]
+
+
+@dataclass(frozen=True)
+class ContactForces:
+    """Forces of all contacts in the directions of the balance; N dampers of n nodes, K = 2H+1."""
+
+    # (N, n, d, K) contact forces [N]
+    f: np.ndarray
+    # (N, n, d, K) forces beyond preload and springs of full stick [N]
+    p: np.ndarray
+    # (N n, dK, dK) derivative of p [N/m]
+    change: np.ndarray | None
+    # (N, n, 3) shares of stick, slip, separation
+    shares: np.ndarray
+    # (N, n) energy a period [J]
+    dissipated: np.ndarray
+    # False: a two-dimensional element found no periodic state
+    converged: bool
+    reason: str
+
+
+def contact_forces(
+    wheel: Wheel, elements: Elements, w: np.ndarray, samples: int, jacobian: bool = True
+) -> ContactForces:
+    """Forces for relative displacements w (N, n, d, K) [m].
+
+    Args:
+        elements: of all dampers.
+        samples: a period; 0 locates transitions exactly, for elements of one tangent.
+    """
+    count, n, d, K = w.shape
+    missing = 1 + elements.tangents - d
+    flat = w.reshape(count * n, d, K)
+    if missing:
+        flat = np.concatenate([np.zeros((count * n, missing, K)), flat], axis=1)
+    if samples:
+        found = evaluate(elements, flat, samples, jacobian, precision="single")
+    else:
+        found = evaluate_exact(elements, flat)
+    f = found.f[:, missing:].reshape(w.shape)
+    p = f - wheel.springs[:, :, None] * w
+    if missing == 0:
+        p[:, :, 0, 0] -= np.maximum(elements.n0, 0.0).reshape(count, n)
+    change = None
+    if jacobian:
+        change = found.dfdw[:, missing:, :, missing:].reshape(count, n, d * K, d * K).copy()
+        diagonal = np.arange(d * K)
+        change[:, :, diagonal, diagonal] -= np.repeat(wheel.springs, K, axis=1)
+        change = change.reshape(count * n, d * K, d * K)
+    return ContactForces(
+        f,
+        p,
+        change,
+        found.shares.reshape(count, n, 3),
+        found.dissipated.reshape(count, n),
+        found.converged,
+        found.reason,
+    )

@@ -1,0 +1,190 @@
+"""Newton's method with GMRES on the balance of a whole wheel; it always says why it stopped.
+
+Residual  r = w - stuck + A p(w)  in real Fourier coefficients of all relative displacements, A the
+mistuned wheel with closed contacts, p what the contact forces differ from full stick. p and its
+derivative vanish at contacts that stick.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.sparse.linalg import LinearOperator, gmres
+
+from ..data import Elements
+from ..friction.fourier import to_complex, to_real
+from ..hbm.solver.newton import Options
+from .contact_forces import ContactForces, contact_forces
+from .flexibility import WheelFlexibility
+from .model import Wheel
+from .preconditioner import Preconditioner, make_preconditioner
+
+__all__ = ["WheelBalance", "WheelNewton", "WheelState", "evaluate_wheel", "newton_wheel"]
+
+# vectors kept by GMRES, and restarts
+BASIS = 60
+RESTARTS = 4
+# relative accuracy of a step: loose far from the solution, tight near it
+LOOSE = 1e-2
+TIGHT = 1e-6
+# relative accuracy of the step that only measures a trial
+ROUGH = 0.1
+# reduction of the residual by one step that needs no further test
+QUADRATIC = 1e-2
+# step share below which the search direction is given up
+SHORTEST = 2.0**-8
+# products of one solve from which a new preconditioner pays
+SLOW = 12
+
+
+@dataclass(frozen=True)
+class WheelBalance:
+    """The equations of one frequency."""
+
+    wheel: Wheel
+    flex: WheelFlexibility
+    # of all dampers
+    elements: Elements
+    # (N, n, d, K) displacements of full stick [m]
+    stuck: np.ndarray
+    # a period, 0: transitions located exactly
+    samples: int
+
+
+@dataclass(frozen=True)
+class WheelState:
+    """The balance at one guess."""
+
+    # (N, n, d, K) relative displacements [m]
+    w: np.ndarray
+    forces: ContactForces
+    # (N, n, d, K) [m]
+    residual: np.ndarray
+    # over the size of the motion [1]
+    error: float
+
+
+@dataclass(frozen=True)
+class WheelNewton:
+    """Where Newton ended."""
+
+    state: WheelState
+    iterations: int
+    # flexibility products of all GMRES solves
+    products: int
+    converged: bool
+    reason: str
+
+
+def evaluate_wheel(balance: WheelBalance, w: np.ndarray, jacobian: bool = True) -> WheelState:
+    """Forces and residual at w (N, n, d, K)."""
+    forces = contact_forces(balance.wheel, balance.elements, w, balance.samples, jacobian)
+    residual = w - balance.stuck + flexed(balance.flex, forces.p)
+    size = max(np.linalg.norm(w), np.linalg.norm(balance.stuck), np.finfo(float).tiny)
+    return WheelState(w, forces, residual, float(np.linalg.norm(residual) / size))
+
+
+def flexed(flex: WheelFlexibility, p: np.ndarray) -> np.ndarray:
+    """(N, n, d, K) motions by contact forces of the same shape."""
+    count, _, _, K = p.shape
+    moved = flex.contact_motion(to_complex(p.reshape(count, -1, K)))
+    return to_real(moved).reshape(p.shape)
+
+
+def newton_wheel(balance: WheelBalance, w: np.ndarray, options: Options) -> WheelNewton:
+    """Solve the balance from the displacements w (N, n, d, K)."""
+    state = evaluate_wheel(balance, w)
+    step = _Steps(balance)
+    for iteration in range(options.iterations + 1):
+        if not (np.isfinite(state.error) and state.forces.converged):
+            reason = state.forces.reason if np.isfinite(state.error) else "residual is not finite"
+            return WheelNewton(state, iteration, step.products, False, reason)
+        if state.error <= options.tolerance:
+            reason = "residual within tolerance"
+            return WheelNewton(state, iteration, step.products, True, reason)
+        if iteration == options.iterations:
+            break
+        better, failure = _search(balance, state, step)
+        if better is None:
+            reason = f"{failure} at residual {state.error:.1e}"
+            return WheelNewton(state, iteration + 1, step.products, False, reason)
+        state = better
+    reason = f"residual {state.error:.1e} after {options.iterations} iterations"
+    return WheelNewton(state, options.iterations, step.products, False, reason)
+
+
+class _Steps:
+    """Newton steps of one run; the preconditioner is renewed where GMRES takes long."""
+
+    def __init__(self, balance: WheelBalance) -> None:
+        self.balance = balance
+        self.preconditioner: Preconditioner | None = None
+        self.stale = True
+        self.products = 0
+
+    def step(self, state: WheelState) -> tuple[np.ndarray, bool]:
+        """The step (N, n, d, K), and whether GMRES reached its accuracy."""
+        accuracy = float(np.clip(0.1 * state.error, TIGHT, LOOSE))
+        goal = accuracy * np.linalg.norm(state.residual)
+        if self.stale:
+            self._renew(state)
+        before = self.products
+        found, failed = self._solve(state, state.residual, goal)
+        if failed:
+            self._renew(state)
+            found, failed = self._solve(state, state.residual, goal)
+        self.stale = self.products - before > SLOW
+        return found, not failed
+
+    def next_length(self, state: WheelState, residual: np.ndarray) -> float:
+        """Length of the step that the derivative at `state` would take from another residual."""
+        found, _ = self._solve(state, residual, ROUGH * np.linalg.norm(residual))
+        return float(np.linalg.norm(found))
+
+    def _renew(self, state: WheelState) -> None:
+        self.preconditioner = make_preconditioner(self.balance.flex, state.forces.change)
+        self.stale = False
+
+    def _solve(
+        self, state: WheelState, residual: np.ndarray, goal: float
+    ) -> tuple[np.ndarray, bool]:
+        shape = state.residual.shape
+        flat = (shape[0], -1, shape[3])
+        change = state.forces.change
+        prepare = self.preconditioner.apply
+
+        def product(y: np.ndarray) -> np.ndarray:
+            self.products += 1
+            x = prepare(y.reshape(flat))
+            forces = (change @ x.reshape(len(change), -1, 1)).reshape(shape)
+            return (x.reshape(shape) + flexed(self.balance.flex, forces)).ravel()
+
+        size = state.residual.size
+        operator = LinearOperator((size, size), matvec=product, dtype=float)
+        # SciPy's versions name the relative tolerance differently: atol rules where it is larger
+        y, failed = gmres(operator, residual.ravel(), atol=goal, restart=BASIS, maxiter=RESTARTS)
+        return prepare(y.reshape(flat)).reshape(shape), failed != 0
+
+
+def _search(
+    balance: WheelBalance, state: WheelState, steps: _Steps
+) -> tuple[WheelState | None, str]:
+    """The first halving of the step after which the next one is shorter, or None and why.
+
+    That test does not depend on how the equations are scaled (Deuflhard, Newton Methods for
+    Nonlinear Problems, 2004, Sect. 3.3).
+    """
+    step, solved = steps.step(state)
+    if not np.isfinite(step).all():
+        return None, "the Newton step is not finite"
+    before = np.linalg.norm(step)
+    share = 1.0
+    while share >= SHORTEST:
+        trial = evaluate_wheel(balance, state.w - share * step)
+        if trial.error <= QUADRATIC * state.error:
+            return trial, ""
+        if steps.next_length(state, trial.residual) <= (1 - 0.25 * share) * before:
+            return trial, ""
+        share /= 2
+    return None, "line search stalled" if solved else "GMRES did not converge"

@@ -1,0 +1,272 @@
+"""One frequency, a sweep and the resonance peak of a mistuned wheel with its dampers."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from ..data import Elements
+from ..errors import InputError
+from ..friction.fourier import to_complex, to_real
+from ..hbm.solver.newton import DEFAULTS, Options
+from .flexibility import WheelFlexibility, wheel_flexibility
+from .model import Pattern, Wheel, pattern_elements
+from .newton import WheelBalance, WheelNewton, evaluate_wheel, newton_wheel
+
+__all__ = ["TUNED", "WheelSolution", "free_wheel", "solve_wheel", "stuck_wheel", "sweep_wheel"]
+
+TUNED = Pattern()
+# of the load homotopy: first share of the excitation, first and last factor to the next one, and
+# points before it is given up
+GENTLE = 0.02
+FACTOR = 2.0
+LEAST_FACTOR = 1.01
+HOMOTOPY_POINTS = 60
+
+
+@dataclass(frozen=True)
+class WheelSolution:
+    """A point of the wheel's response: converged, or the best that was found, with the reason."""
+
+    # [rad/s]
+    omega: float
+    samples: int
+    # (N, n, d, K) relative displacements: mean, cos 1, sin 1, ... [m]
+    w: np.ndarray
+    # (N, n, d, K) contact forces, with the preload in the mean of the normal ones [N]
+    f: np.ndarray
+    # (N, H+1, probes) complex amplitudes, Re(q e^{i h omega t}) [m]
+    probe: np.ndarray
+    converged: bool
+    reason: str
+    # "newton", or what reached the point
+    method: str
+    iterations: int
+    products: int
+    # over the size of the motion [1]
+    residual: float
+    # (N, n, 3) shares of stick, slip and separation in a period
+    shares: np.ndarray
+    # (N,) friction work of each damper in a period [J]
+    dissipated: np.ndarray
+
+    @property
+    def frequency(self) -> float:
+        """[Hz]"""
+        return self.omega / (2 * np.pi)
+
+    def size(self, probe: int = 0) -> np.ndarray:
+        """(N,) root of the sum of squares of the moving harmonics of each blade [m]."""
+        return np.linalg.norm(self.probe[:, 1:, probe], axis=1)
+
+
+def solve_wheel(
+    wheel: Wheel,
+    omega: float,
+    H: int = 3,
+    samples: int = 128,
+    *,
+    pattern: Pattern = TUNED,
+    start: WheelSolution | None = None,
+    options: Options = DEFAULTS,
+) -> WheelSolution:
+    """The periodic response of all blades at circular frequency omega [rad/s].
+
+    Args:
+        samples: time samples a period; 0 locates the transitions of 1-D elements exactly.
+        pattern: what differs from blade to blade.
+        start: a solved neighbour; full stick when left out.
+
+    Returns:
+        a WheelSolution whose `converged` and `reason` must be read.
+
+    Raises:
+        InputError: frequency, harmonics, pattern or start do not fit.
+        NotSolvedError: a resonance without damping is hit exactly.
+    """
+    _check_point(wheel, omega, H, samples, pattern)
+    flex = wheel_flexibility(wheel, omega, H, pattern)
+    elements = pattern_elements(wheel, pattern)
+    stuck = _shaped(wheel, linear_motion(wheel, flex, "contact"))
+    balance = WheelBalance(wheel, flex, elements, stuck, samples)
+    method = "newton"
+    begin = stuck if start is None else _fitted(start.w, wheel, H)
+    end = newton_wheel(balance, begin, options)
+    iterations = end.iterations
+    products = end.products
+    if not end.converged and start is not None:
+        end = newton_wheel(balance, stuck, options)
+        method = "newton from full stick"
+        iterations += end.iterations
+        products += end.products
+    if not end.converged and options.fallbacks:
+        eased = _homotopy(balance, options)
+        iterations += eased.iterations
+        products += eased.products
+        if eased.converged or eased.state.error < end.state.error:
+            end = eased
+            method = "load homotopy"
+    return _solution(balance, end, method, iterations, products)
+
+
+def sweep_wheel(
+    wheel: Wheel,
+    omegas: Iterable[float],
+    H: int = 3,
+    samples: int = 128,
+    *,
+    pattern: Pattern = TUNED,
+    options: Options = DEFAULTS,
+) -> Iterator[WheelSolution]:
+    """Points at circular frequencies [rad/s], each from the one before."""
+    last = None
+    for omega in omegas:
+        point = solve_wheel(wheel, omega, H, samples, pattern=pattern, start=last, options=options)
+        yield point
+        last = point if point.converged else None
+
+
+def stuck_wheel(wheel: Wheel, omega: float, H: int = 1, pattern: Pattern = TUNED) -> np.ndarray:
+    """(N, H+1, probes) amplitudes with all contacts closed and sticking [m]."""
+    _check_point(wheel, omega, H, 1, pattern)
+    flex = wheel_flexibility(wheel, omega, H, pattern)
+    return linear_motion(wheel, flex, "probe").swapaxes(1, 2)
+
+
+def free_wheel(wheel: Wheel, omega: float, H: int = 1, pattern: Pattern = TUNED) -> np.ndarray:
+    """(N, H+1, probes) amplitudes without contact forces [m]."""
+    return stuck_wheel(without_contact(wheel), omega, H, replace(pattern, elements=None))
+
+
+def without_contact(wheel: Wheel) -> Wheel:
+    """The same wheel with elements that carry nothing, and no damper; made once."""
+    if "free" not in wheel.kept:
+        e = wheel.elements
+        nothing = np.zeros(len(e.kt))
+        open_contacts = Elements(nothing, nothing, nothing, nothing, e.tangents)
+        wheel.kept["free"] = replace(wheel, elements=open_contacts, damper=None)
+    return wheel.kept["free"]
+
+
+def linear_motion(wheel: Wheel, flex: WheelFlexibility, port: str) -> np.ndarray:
+    """(N, rows, H+1) motion of a port by the excitation, all contacts sticking [m]."""
+    harmonics = flex.T.shape[1]
+    parts = flex.parts
+    force = np.zeros((wheel.count, parts.load.stop - parts.load.start, harmonics), dtype=complex)
+    for h, amplitudes in wheel.excitation.items():
+        if h < harmonics:
+            force[:, :, h] = amplitudes
+    return flex.motion(force, getattr(parts, port), parts.load)
+
+
+def _homotopy(balance: WheelBalance, options: Options) -> WheelNewton:
+    """The excitation raised step by step from nearly stuck to its own, on a secant."""
+    iterations = 0
+    products = 0
+    share = GENTLE
+    factor = FACTOR
+    path: list[tuple[float, np.ndarray]] = []
+    end = None
+    for _ in range(HOMOTOPY_POINTS):
+        part = replace(balance, stuck=share * balance.stuck)
+        end = newton_wheel(part, _predicted(path, share, part.stuck), options)
+        iterations += end.iterations
+        products += end.products
+        if end.converged:
+            if share == 1.0:
+                break
+            path = [*path[-1:], (share, end.state.w)]
+            factor = factor**1.5
+        else:
+            factor = factor**0.4
+        if factor < LEAST_FACTOR:
+            break
+        share = min(1.0, factor * (path[-1][0] if path else GENTLE / FACTOR))
+    if share < 1.0:
+        state = evaluate_wheel(balance, end.state.w)
+        reason = f"the load homotopy stopped at {share:.3g} of the excitation: {end.reason}"
+        end = replace(end, state=state, converged=False, reason=reason)
+    return replace(end, iterations=iterations, products=products)
+
+
+def _predicted(path: list[tuple[float, np.ndarray]], share: float, stuck: np.ndarray) -> np.ndarray:
+    """Displacements on the secant of the path; proportional or stuck where it has no two points."""
+    if not path:
+        return stuck
+    last, w = path[-1]
+    if len(path) == 1:
+        return share / last * w
+    before, v = path[0]
+    return w + (share - last) / (last - before) * (w - v)
+
+
+def _solution(
+    balance: WheelBalance, end: WheelNewton, method: str, iterations: int, products: int
+) -> WheelSolution:
+    wheel = balance.wheel
+    flex = balance.flex
+    state = end.state
+    p = state.forces.p
+    forces = to_complex(p.reshape(wheel.count, -1, p.shape[3]))
+    parts = flex.parts
+    probe = linear_motion(wheel, flex, "probe") - flex.motion(forces, parts.probe, parts.contact)
+    return WheelSolution(
+        flex.omega,
+        balance.samples,
+        state.w,
+        state.forces.f,
+        probe.swapaxes(1, 2),
+        end.converged,
+        end.reason,
+        method,
+        iterations,
+        products,
+        state.error,
+        state.forces.shares,
+        state.forces.dissipated.sum(axis=1),
+    )
+
+
+def _shaped(wheel: Wheel, q: np.ndarray) -> np.ndarray:
+    """(N, m, H+1) amplitudes as real coefficients (N, n, d, K)."""
+    return to_real(q).reshape(wheel.count, wheel.nodes, wheel.directions, -1)
+
+
+def _fitted(w: np.ndarray, wheel: Wheel, H: int) -> np.ndarray:
+    """Displacements with harmonics cut or filled up with zeros.
+
+    Raises:
+        InputError: they belong to another wheel.
+    """
+    if w.shape[:3] != (wheel.count, wheel.nodes, wheel.directions):
+        raise InputError("start: expected a solution of a wheel with the same contacts")
+    size = 2 * H + 1
+    out = np.zeros((*w.shape[:3], size))
+    common = min(size, w.shape[3])
+    out[..., :common] = w[..., :common]
+    return out
+
+
+def _check_point(wheel: Wheel, omega: float, H: int, samples: int, pattern: Pattern) -> None:
+    if not 0 < omega < np.inf:
+        raise InputError(f"omega {omega}: expected a positive circular frequency")
+    highest = max(wheel.excitation, default=1)
+    if max(highest, 1) > H:
+        raise InputError(f"H {H}: expected at least {highest}, the highest excited harmonic")
+    if samples == 0 and wheel.elements.tangents > 1:
+        raise InputError("samples 0: expected samples above 0 for elements with two tangents")
+    for name in ("stiffness", "mass"):
+        value = getattr(pattern, name)
+        if value is None:
+            continue
+        blade = wheel.sectors[0].ports.get("blade")
+        q = 0 if blade is None else len(range(*blade.indices(len(wheel.sectors[0].residual))))
+        if np.shape(value) != (wheel.count, q, q):
+            raise InputError(
+                f"pattern.{name} of shape {np.shape(value)}: expected ({wheel.count}, {q}, {q}), "
+                "one square matrix of the port 'blade' for each sector"
+            )
+        if not np.isfinite(value).all():
+            raise InputError(f"pattern.{name}: expected finite numbers")

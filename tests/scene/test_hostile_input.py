@@ -1,0 +1,185 @@
+"""Input that was made to break the program: each ends in one sentence, at once."""
+
+from __future__ import annotations
+
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+from bladefem.cli.main import main
+from bladefem.errors import InputError
+from bladefem.scene.toml import load_scene, read_tables, scene_of
+from bladefem.scene.units import parse
+from bladefem.study.modes.campbell import MOST_SPEEDS, read_speeds
+from bladefem.view.style import canvas
+from geometry.check_parameters import NAMES
+
+WEDGE = Path(__file__).with_name("wedge.toml")
+
+
+def refused(call, *arguments) -> str:
+    """The one sentence of a refusal."""
+    with pytest.raises(InputError) as caught:
+        call(*arguments)
+    text = str(caught.value)
+    assert "\n" not in text
+    assert len(text) < 400
+    return text
+
+
+@pytest.mark.parametrize(
+    ("text", "said"),
+    [
+        ("120 mm^99999999", "unknown unit 'mm^99999999'"),
+        ("120 mm^" + "9" * 5000, "unknown unit"),
+        ("120 " + "GPa^9 " * 8, "expected a unit of this world"),
+        ("120 " + "mm " * 100000, "unknown unit 'mm mm mm"),
+        ("9" * 400, "expected a finite number"),
+        ("1e400 mm", "expected a finite number"),
+        (10**400, "expected a finite number"),
+        ("x" * 100000, "expected a number with a unit"),
+    ],
+    ids=lambda value: str(value)[:20],
+)
+def test_units_end_at_once(text, said):
+    assert said in refused(parse, text, "m", "aerofoil.span")
+
+
+def test_powers_that_exist_are_still_read():
+    assert parse("1 mm^4", "m^4") == pytest.approx(1e-12)
+    assert parse("1 N/mm^3", "N/m^3") == pytest.approx(1e9)
+
+
+FILES = {
+    "nested lists": (b"kind = " + b"[" * 2000 + b"]" * 2000, "nested too deep"),
+    "nested tables": (b"kind = " + b"{a=" * 2000 + b"1" + b"}" * 2000, "nested too deep"),
+    "dotted tables": (b'kind = "hertz"\n[' + b"a." * 2000 + b"a]\n", "unknown table"),
+    "digits": (b'kind = "hertz"\naccuracy = ' + b"9" * 5000, "not valid TOML"),
+    "empty": (b"", "expected kind = one of 'wedge sector'"),
+    "a table alone": (b"[aerofoil]\ntwist = 0.2\n", "expected kind = one of"),
+    "utf-16": ('kind = "hertz"'.encode("utf-16"), "cannot be read as a scene file"),
+}
+
+
+@pytest.mark.parametrize("name", FILES)
+def test_files_are_refused(tmp_path, name):
+    content, said = FILES[name]
+    file = tmp_path / "scene.toml"
+    file.write_bytes(content)
+    assert said in refused(load_scene, file)
+
+
+def test_byte_order_mark_is_no_mistake(tmp_path):
+    file = tmp_path / "scene.toml"
+    file.write_bytes(b"\xef\xbb\xbf" + WEDGE.read_bytes())
+    assert load_scene(file) == load_scene(WEDGE)
+
+
+# what only the mesher, the seating or the balance refused before
+WITHOUT_A_MESH = [
+    ("mesh.scale=0.02", "mesh.scale = 0.02: gives about"),
+    ("mesh.size=0.1 mm", "mesh.size = 0.0001 m: gives about"),
+    ("mesh.contact_size=1 um", "mesh.contact_size = 1e-06 m: gives about"),
+    ("excitation.at=nowhere", "excitation.at = 'nowhere': a wedge sector has no face or node set"),
+    ("excitation.at=tip_midd", "did you mean 'tip_mid'?"),
+    ("excitation.at=fillet", "has no face or node set"),
+    ("disc.bore_radius=195 mm", "95 % of disc.rim_radius"),
+    ("shank.length=44.9 mm", "before disc.width, expected the same"),
+    ("damper.length=59.9 mm", "before platform.length, expected the same"),
+    ("damper.base=44 mm", "95 % of shank.height"),
+    ("aerofoil.camber=0.5", "aerofoil.camber"),
+    ("aerofoil.stagger=60 deg", "overhangs the platform circumferentially"),
+    ("study.loads=" + ", ".join(["1"] * 2000) + " N", "2000 values given, expected at most 1000"),
+]
+
+
+@pytest.mark.parametrize(("override", "said"), WITHOUT_A_MESH, ids=lambda v: str(v)[:40])
+def test_check_refuses_without_a_mesh(override, said):
+    assert said in refused(load_scene, WEDGE, [override])
+
+
+OTHER_KINDS = [
+    ({"kind": "plane blades", "plane": {"seat_width": "21.8 mm"}}, "98 % of the platform"),
+    ({"kind": "plane blades", "excitation": {"at": "trailing_edge"}}, "a plane blades has no"),
+    ({"kind": "plane blades", "mesh": {"scale": 0.02, "size": "0.1 mm"}}, "mesh.scale"),
+    ({"kind": "z mass", "z_mass": {"bar": "29 mm"}}, "z_mass.bar"),
+    ({"kind": "z mass", "mesh": {"scale": 0.02}}, "mesh.scale"),
+    ({"kind": "hertz", "hertz": {"contact_radius": "5 mm"}}, "hertz.half_width / 2.5"),
+    ({"kind": "hertz", "mesh": {"contact_size": "1 um"}}, "mesh.contact_size"),
+    ({"kind": "punch", "punch": {"radius": "15 mm"}}, "half of punch.half_width"),
+    ({"kind": "punch", "mesh": {"scale": 0.02, "contact_size": "0.1 mm"}}, "mesh.scale"),
+    ({"kind": "imported", "imported": {"file": __file__}}, "unknown kind of mesh"),
+]
+
+
+@pytest.mark.parametrize(("tables", "said"), OTHER_KINDS, ids=lambda v: str(v)[:50])
+def test_other_kinds_are_refused_without_a_mesh(tables, said):
+    assert said in refused(scene_of, tables)
+
+
+@pytest.mark.parametrize(
+    ("scene", "overrides", "said"),
+    [
+        ("wedge", ["study.own_load=true", "operation.speed=0 rpm"], "study.own_load = true"),
+        ("wedge", ["contact.kn=0 N/m"], "contact.kn_area: the normal stiffness of the right seat"),
+        ("wedge", ["contact.left.kn=0 N/m"], "of the left seat"),
+        ("hertz", ["study.loads=1 MN"], "the contact radius would be"),
+    ],
+)
+def test_check_refuses_what_a_run_would(scene, overrides, said, capsys):
+    file = Path(__file__).parents[2] / "scenes" / f"{scene}.toml"
+    words = [word for override in overrides for word in ("--set", override)]
+    assert main(["check", str(file), *words]) == 2
+    assert said in capsys.readouterr().err
+
+
+def test_campbell_range_has_a_limit():
+    said = refused(read_speeds, "0, 0.001, ..., 12000 rpm")
+    assert f"1.2e+07 speeds, expected at most {MOST_SPEEDS}" in said
+    assert len(read_speeds("0, 10, ..., 12000 rpm")) == 1201
+
+
+def test_dollar_signs_in_a_title_are_dollar_signs(tmp_path):
+    title = r"cost $\frac{1}{$ and $5"
+    with canvas(tmp_path / "title.png") as ax:
+        ax.set_title(title)
+        ax.set_xlabel(title)
+    assert (tmp_path / "title.png").stat().st_size > 1000
+
+
+def test_names_are_those_of_the_meshes(mesh_of):
+    """The table of names is what the builders make; the damper's own faces carry no force."""
+    for kind, names in NAMES.items():
+        mesh = mesh_of(kind)
+        made = {name for name in (*mesh.faces, *mesh.nodes) if not name.startswith("damper_")}
+        assert set(names) == made
+
+
+@pytest.fixture
+def mesh_of():
+    from geometry.builders import build_here
+
+    coarse = {"size": "20 mm", "order": 1}
+    return lambda kind: build_here(scene_of({"kind": kind, "mesh": coarse}))
+
+
+def test_demos_find_their_scenes_from_another_folder(tmp_path):
+    demos = Path(__file__).parents[2] / "demos"
+    for file in demos.glob("*.py"):
+        assert '"scenes/' not in file.read_text(encoding="utf-8"), file
+
+
+def test_check_of_a_hostile_file_is_a_sentence_and_exit_code_2(tmp_path):
+    file = tmp_path / "scene.toml"
+    file.write_text('kind = "wedge sector"\n[aerofoil]\nspan = "120 mm^99999999"\n')
+    command = [sys.executable, "-m", "bladefem.cli.main", "check", str(file)]
+    done = subprocess.run(command, capture_output=True, text=True, timeout=60, check=False)
+    assert done.returncode == 2
+    assert done.stderr.startswith("bladefem: aerofoil.span = 120 mm^99999999: unknown unit")
+    assert done.stderr.count("\n") == 1
+
+
+def test_tables_of_a_file_can_still_be_read():
+    assert read_tables(WEDGE)["kind"] == "wedge sector"

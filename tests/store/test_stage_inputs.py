@@ -1,0 +1,122 @@
+"""A stage reads no other field of the scene than those that its key is made of."""
+
+from __future__ import annotations
+
+from dataclasses import fields, is_dataclass
+from pathlib import Path
+from types import SimpleNamespace
+
+import pytest
+
+from bladefem.contact.patch import make_patch
+from bladefem.scene.kinds import kind_named
+from bladefem.scene.toml import load_scene
+from bladefem.study.modes.clamped_aerofoil import clamped_blade
+from bladefem.study.modes.stress import strength
+from bladefem.study.pipeline import stages
+from bladefem.study.pipeline.stage_inputs import STAGE_INPUTS, declared_fields, stage_key
+from geometry.builders import build_here
+
+SCENES = Path(__file__).parents[2] / "scenes"
+
+
+def watched(value, read, path=""):
+    """A stand-in for a scene or one of its tables that notes the fields read from it."""
+
+    class Watched(type(value)):
+        def __getattribute__(self, name):
+            found = object.__getattribute__(value, name)
+            if name not in {f.name for f in fields(value)}:
+                return found
+            dotted = f"{path}.{name}" if path else name
+            if is_dataclass(found):
+                return watched(found, read, dotted)
+            read.add(dotted)
+            return found
+
+    return object.__new__(Watched)
+
+
+def covered(field, declared):
+    """A declared name is the field itself or a table that holds it."""
+    return any(field == name or field.startswith(f"{name}.") for name in declared)
+
+
+def all_declared(stage, scene):
+    """Fields of a stage and of those before it."""
+    names = set(declared_fields(stage, scene))
+    for earlier in STAGE_INPUTS[stage].after:
+        names |= all_declared(earlier, scene)
+    return names
+
+
+@pytest.fixture(scope="module")
+def plane():
+    scene = load_scene(SCENES / "plane.toml", ["mesh.scale=3"])
+    mesh = build_here(scene)
+    bodies = stages.Bodies(scene, mesh)
+    patches = [make_patch(mesh, name) for name in ("this", "next")]
+    modes = stages.find_modes(bodies)
+    return SimpleNamespace(scene=scene, mesh=mesh, bodies=bodies, patches=patches, modes=modes)
+
+
+STAGES = {
+    "mesh": lambda scene, known: build_here(scene),
+    "modes": lambda scene, known: (
+        stages.find_modes(stages.Bodies(scene, known.mesh)),
+        clamped_blade(stages.Bodies(scene, known.mesh)),
+    ),
+    "stress": lambda scene, known: strength(
+        stages.Bodies(scene, known.mesh), stages.excited_modes(scene, known.mesh, known.modes)
+    ),
+    "contact": lambda scene, known: stages.condense_contact(
+        stages.Bodies(scene, known.mesh), known.patches
+    ),
+    "reduction": lambda scene, known: stages.reduce_sector(
+        stages.Bodies(scene, known.mesh), known.patches, [0], 5
+    ),
+}
+
+
+@pytest.mark.parametrize("stage", STAGES)
+def test_a_stage_reads_what_it_declares(stage, plane):
+    read = set()
+    STAGES[stage](watched(plane.scene, read), plane)
+    assert read, "nothing was read: the stand-in does not watch"
+    undeclared = [field for field in read if not covered(field, all_declared(stage, plane.scene))]
+    assert sorted(undeclared) == []
+
+
+@pytest.mark.parametrize(
+    ("stage", "change"),
+    [
+        ("modes", "excitation.engine_order=3"),
+        ("contact", "damper.mass=20 g"),
+        ("response", "contact.mu=0.11"),
+        ("mesh", "aerofoil.twist=7 deg"),
+    ],
+)
+def test_a_declared_field_changes_the_key(stage, change):
+    scene = load_scene(SCENES / "wedge.toml")
+    other = load_scene(SCENES / "wedge.toml", [change])
+    assert stage_key(stage, scene) != stage_key(stage, other)
+
+
+@pytest.mark.parametrize(
+    ("stage", "change"),
+    [
+        ("mesh", "contact.mu=0.11"),
+        ("mesh", "damper.mass=20 g"),
+        ("contact", "excitation.engine_order=3"),
+        ("response", "study.loads=90 N"),
+    ],
+)
+def test_another_field_does_not(stage, change):
+    scene = load_scene(SCENES / "wedge.toml")
+    other = load_scene(SCENES / "wedge.toml", [change])
+    assert stage_key(stage, scene) == stage_key(stage, other)
+
+
+def test_every_mesh_depends_on_its_own_tables():
+    scene = load_scene(SCENES / "wedge.toml")
+    assert set(kind_named(scene.kind).shape) < set(declared_fields("mesh", scene))
