@@ -71,7 +71,11 @@ def random_case(seed: int, lifts: bool | None = None) -> Case:
     readings = rng.normal(size=(n * rows, len(blade[0]))) / np.sqrt(len(blade[0]))
     orders = (1,) if rng.random() < 0.7 else tuple(sorted({1, int(rng.choice([2, 3, 5]))}))
     force = {h: (rng.normal(size=2) @ [1, 1j]) * _unit(rng, len(blade[0])) / h for h in orders}
-    ports = {"contact": readings, "load": np.eye(len(blade[0])), "probe": _unit(rng, len(blade[0]))[None]}
+    ports = {
+        "contact": readings,
+        "load": np.eye(len(blade[0])),
+        "probe": _unit(rng, len(blade[0]))[None],
+    }
     damper, joined = _damper(rng, kind, blade, readings)
     side = bf.body_from_matrices(*blade[:2], ports, C=blade[2])
     e = _loaded(rng, e, blade, readings, force, lifts)
@@ -135,14 +139,22 @@ def _damper(
     together = np.hstack([readings, -B])
     if kind == "rigid damper":
         still = np.zeros((size, size))
-        joined = (linalg.block_diag(M, np.diag(mass)), linalg.block_diag(K, still),
-                  linalg.block_diag(C, still), together)
+        joined = (
+            linalg.block_diag(M, np.diag(mass)),
+            linalg.block_diag(K, still),
+            linalg.block_diag(C, still),
+            together,
+        )
         return bf.RigidBody(np.diag(mass), B), joined
     own = np.median(np.diag(K)) * np.diag(rng.uniform(0.1, 3.0, size))
     loss = 1e-2 * np.sqrt(own * np.diag(mass))
     body = bf.body_from_matrices(np.diag(mass), own, {"contact": B}, C=loss)
-    return (body,), (linalg.block_diag(M, np.diag(mass)), linalg.block_diag(K, own),
-                     linalg.block_diag(C, loss), together)
+    return (body,), (
+        linalg.block_diag(M, np.diag(mass)),
+        linalg.block_diag(K, own),
+        linalg.block_diag(C, loss),
+        together,
+    )
 
 
 def _loaded(
@@ -241,8 +253,18 @@ def march(case: Case, omega: float, state: np.ndarray, periods: int) -> March:
     y = state.copy()
     history = np.empty((2, steps))
     _leapfrog(
-        y, omega, periods, steps, case.stiffness, case.damping, case.contact, case.table,
-        orders, force, case.probe, history,
+        y,
+        omega,
+        periods,
+        steps,
+        case.stiffness,
+        case.damping,
+        case.contact,
+        case.table,
+        orders,
+        force,
+        case.probe,
+        history,
     )
     lines = 2 / steps * np.fft.rfft(history[1])[1 : HARMONICS + 1]
     size = max(abs(history).max(), 1e-300)

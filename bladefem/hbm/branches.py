@@ -193,10 +193,14 @@ def _both_ways(
     if _closed(path.points, band):
         return path
     back = _followed(model, start, band, False, budget - len(path.points), notes, options)
-    turned = [
-        replace(late, forward=not late.forward, fold=early.fold)
-        for late, early in pairwise([*back.points[::-1], back.points[0]])
-    ] if back.points else []
+    turned = (
+        [
+            replace(late, forward=not late.forward, fold=early.fold)
+            for late, early in pairwise([*back.points[::-1], back.points[0]])
+        ]
+        if back.points
+        else []
+    )
     return _Path([*turned[:-1], *path.points], (back.ends[1], path.ends[1]))
 
 
@@ -253,9 +257,7 @@ def _close_in(
         drop = heights[i] - min(heights[i - 1], heights[i + 1])
         if drop < peak * heights[i]:
             continue
-        path.points[i - 1 : i + 2] = _finer(
-            model, path.points[i - 1 : i + 2], band, peak, options
-        )
+        path.points[i - 1 : i + 2] = _finer(model, path.points[i - 1 : i + 2], band, peak, options)
 
 
 def _finer(
@@ -319,8 +321,7 @@ def _sorted_out(paths: Sequence[_Path], probe: int, notes: list[str]) -> Branche
                 own = (n for n in range(first, len(pieces)) if any(p is point for p in pieces[n]))
                 maxima.append((point, next(own)))
     swept = {
-        way: _swept(pieces, ends.get(end), way)
-        for end, way in (("low", "up"), ("high", "down"))
+        way: _swept(pieces, ends.get(end), way) for end, way in (("low", "up"), ("high", "down"))
     }
     resonances = [
         Resonance(
@@ -382,9 +383,7 @@ def _distance(one: Solution, other: Solution) -> float:
     return float(np.linalg.norm(match_harmonics(one.w, H) - match_harmonics(other.w, H)))
 
 
-def _reached(
-    swept: Mapping[str, Sequence[tuple[int, float]]], point: Solution, number: int
-) -> str:
+def _reached(swept: Mapping[str, Sequence[tuple[int, float]]], point: Solution, number: int) -> str:
     """By which sweeps a motion of a piece is reached."""
     ways = [
         way

@@ -10,7 +10,16 @@ from ..friction.fourier import to_complex
 from .linear.bodies import Stack, amplitudes, flexibility, lost, motion
 from .model import ReducedModel
 
-__all__ = ["Solution", "Work", "at_probes", "blade_motion", "probe_motion", "size", "works", "works_of"]
+__all__ = [
+    "Solution",
+    "Work",
+    "at_probes",
+    "blade_motion",
+    "probe_motion",
+    "size",
+    "works",
+    "works_of",
+]
 
 
 @dataclass(frozen=True)

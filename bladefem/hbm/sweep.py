@@ -186,9 +186,7 @@ def _lifting(model: ReducedModel) -> bool:
     return model.directions > model.elements.tangents
 
 
-def _folds(
-    model: ReducedModel, solved: Mapping[float, Solution], H: int, probe: int
-) -> bool:
+def _folds(model: ReducedModel, solved: Mapping[float, Solution], H: int, probe: int) -> bool:
     """Whether the response has to be followed round folds: contacts lift off, or the sweep jumps."""
     if not _lifting(model):
         return False

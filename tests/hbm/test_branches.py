@@ -77,7 +77,9 @@ def test_a_sweep_finds_the_peak_that_folds_over_and_time_keeps_it(folding):
     start = state_of(folding, top)
     height, change = marched(*start, top.omega * 1.003, 60)
     assert change < 1e-3
-    assert height == pytest.approx(size(solve(folding, top.omega * 1.003, 15, 1024, start=top)), rel=0.01)
+    assert height == pytest.approx(
+        size(solve(folding, top.omega * 1.003, 15, 1024, start=top)), rel=0.01
+    )
 
 
 def test_resonances_say_how_they_are_reached(folding):
