@@ -14,7 +14,7 @@ from __future__ import annotations
 import numpy as np
 from numba import njit
 
-from bladefem.friction.coulomb_2d import CLOSING, SEPARATED, SLIP, STICK, edge, middle
+from bladefem.friction.coulomb_2d import CLOSING, SLIP, STICK, edge, middle
 
 __all__ = ["plain_batch"]
 
