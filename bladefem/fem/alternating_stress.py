@@ -9,7 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from .body import Body
-from .stress import patch_stress, nodal_stress, von_mises
+from .stress import nodal_stress, patch_stress, von_mises
 
 __all__ = ["AlternatingStress", "alternating_stress", "mesh_error"]
 

@@ -9,7 +9,6 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 from math import pi
-from typing import Any
 
 import numpy as np
 
@@ -24,7 +23,10 @@ from .contact_cycle import labels
 from .ports import blade_ports
 from .stages import Bodies, is_wheel
 
-__all__ = ["DampedMotion", "blade_loads", "damped_motion", "damped_stress"]
+__all__ = ["DampedMotion", "DampedStress", "blade_loads", "damped_motion", "damped_stress"]
+
+# highest harmonic's frequency over the highest mode's: beyond it the inertia series is too slow
+COVERED = 0.8
 
 
 @dataclass(frozen=True)
@@ -37,7 +39,28 @@ class DampedMotion:
     harmonics: np.ndarray
     # (H,) complex, the same at the probe [m]
     probe: np.ndarray
-    # |probe of the balance - probe| over the largest amplitude: what the reduction leaves out
+    # |probe of the balance - probe| over the largest amplitude: what the reduction leaves out,
+    # and harmonics beyond the modes, whose displacements are left at zero
+    mismatch: float
+
+
+@dataclass(frozen=True)
+class DampedStress:
+    """The stress at the resonance of one load, of all modes, harmonics and damper forces."""
+
+    # of the curve [N]
+    load: float
+    # of the damper [kg]; as meshed when None
+    mass: float | None
+    # largest von Mises stress in a period [Pa]
+    largest: float
+    # (3,) where [m]
+    place: np.ndarray
+    # (H,) of each harmonic alone at that place [Pa]
+    by_harmonic: np.ndarray
+    # estimated relative error by the mesh
+    mesh_error: float
+    # of the motion at the probe against the balance, relative
     mismatch: float
 
 
@@ -57,8 +80,6 @@ def damped_motion(
         case: the load of the solution.
         points: friction elements on each patch that the solution was made with; None for all.
 
-    Raises:
-        NotSolvedError: too few modes for the highest harmonic.
     """
     from ...fem.forced_motion import forced_motion
 
@@ -72,7 +93,12 @@ def damped_motion(
     fields = np.zeros((solution.harmonics, len(mesh.points), mesh.dimension), complex)
     for found in modes:
         # harmonics of the same nodal diameter are solved together
-        own = [h for h, (n, _) in enumerate(waves) if _nearest(modes, n) is found]
+        highest = COVERED * 2 * np.pi * found.frequencies[-1]
+        own = [
+            h
+            for h, (n, _) in enumerate(waves)
+            if _nearest(modes, n) is found and (h + 1) * solution.omega < highest
+        ]
         if not own:
             continue
         mirrored = np.array([waves[h][1] for h in own])
@@ -89,11 +115,28 @@ def damped_motion(
     return DampedMotion(solution.frequency, fields, probe, mismatch)
 
 
-def damped_stress(bodies: Bodies, motion: DampedMotion) -> Any:
-    """fem.alternating_stress.AlternatingStress of the motion: largest, place, error by the mesh."""
+def damped_stress(
+    bodies: Bodies,
+    patches: Sequence[Patch],
+    modes: Sequence[ModeSet],
+    case: LoadCase,
+    solution: Solution,
+    points: int | None = None,
+) -> DampedStress:
+    """The largest alternating stress of the motion of `damped_motion`, which has the arguments."""
     from ...fem.alternating_stress import alternating_stress
 
-    return alternating_stress(bodies.still_blade, motion.harmonics)
+    motion = damped_motion(bodies, patches, modes, case, solution, points)
+    found = alternating_stress(bodies.still_blade, motion.harmonics)
+    return DampedStress(
+        case.load,
+        case.mass,
+        found.largest,
+        found.place,
+        found.by_harmonic,
+        found.mesh_error,
+        motion.mismatch,
+    )
 
 
 def blade_loads(

@@ -5,7 +5,7 @@ by the next run.
 from __future__ import annotations
 
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, field, replace
 from functools import lru_cache, partial
@@ -40,6 +40,7 @@ from ..modes.clamped_aerofoil import clamped_blade
 from ..modes.stress import Strength, strength
 from .assemble_model import LoadCase, joint_model
 from .contact_cycle import labels
+from .damped_motion import DampedStress, damped_stress
 from .liftoff import named
 from .linear_limits import Limit, linear_limits
 from .loads import Curve, default_loads, study_loads
@@ -118,6 +119,8 @@ class Run:
     strength: Strength | None = None
     reduced: Reduced | None = None
     response: Response | None = None
+    # at the resonance of each curve, in their order
+    damped: list[DampedStress] | None = None
     # stage to seconds
     timings: dict[str, float] = field(default_factory=dict)
     messages: list[str] = field(default_factory=list)
@@ -206,8 +209,37 @@ def run(
     if until == "reduction":
         return result
     family = partial(family_of_case, scene, mesh, reduced, list(patches))
-    return replace(
-        result, response=_response(scene, cases, family, settings, keep, clock, progress)
+    response = _response(scene, cases, family, settings, keep, clock, progress)
+    result = replace(result, response=response)
+    with clock("stresses"):
+        stressed = keep(
+            "damped_stress",
+            stage_key("stress", scene, [(c.load, c.mass, c.peak.f) for c in response.curves]),
+            lambda: _stresses(bodies, patches, result, cases),
+        )
+        clock.messages.append(_stress_sentence(response.curves, stressed))
+    return replace(result, damped=stressed)
+
+
+def _stresses(
+    bodies: Bodies, patches: Sequence[Patch], result: Run, cases: list[LoadCase]
+) -> list[DampedStress]:
+    """The stress at the resonance of each curve."""
+    return [
+        damped_stress(bodies, patches, result.modes, case, curve.peak, curve.settings.points)
+        for case, curve in zip(cases, result.response.curves, strict=True)
+    ]
+
+
+def _stress_sentence(curves: list[Curve], stressed: list[DampedStress]) -> str:
+    """The stress of the lowest resonance, and how far it can be trusted."""
+    best = min(range(len(curves)), key=lambda k: curves[k].peak_amplitude)
+    found = stressed[best]
+    place = ", ".join(f"{1e3 * x:.1f}" for x in found.place)
+    return (
+        f"alternating stress at the best load, {found.load:.4g} N: {1e-6 * found.largest:.4g} MPa "
+        f"at ({place}) mm, of all modes, harmonics and damper forces; by its mesh "
+        f"{found.mesh_error:.1%} uncertain there"
     )
 
 
