@@ -19,6 +19,7 @@ _WHERE = {
     "body_from_matrices": ".reduction.matrices:port_model_from_matrices",
     "read_matrices": ".reduction.matrices",
     # one frequency, a curve, a peak, a branch
+    "find_branches": ".hbm.branches",
     "find_peak": ".hbm.peak",
     "follow": ".hbm.continuation",
     "free": ".hbm.solve",

@@ -11,6 +11,7 @@ w_normal > 0 presses the two together. f is the contact force that the damper fe
 from __future__ import annotations
 
 from dataclasses import dataclass, field
+from typing import Any
 
 import numpy as np
 
@@ -141,6 +142,9 @@ class Elements:
     n0: np.ndarray
     # tangential directions: 1 (plane models) or 2
     tangents: int = 2
+    # friction law of all nodes, or a tuple with one a node; None: Coulomb's, see
+    # `bladefem.friction.law`
+    law: Any = None
     # (n, tangents) static friction force of the preload state [N]; none when None
     t0: np.ndarray | None = None
 

@@ -1,152 +1,155 @@
-"""Reader of Ansys .cdb archives (CDWRITE, blocked): nodes, solid elements, node and element
-components.
+"""Reader of Ansys .cdb archives (CDWRITE, blocked) by mapdl-archive: nodes, solid elements, node
+and element components.
+
+Solids are told apart by their number of nodes and by repeated ones (element reference, SOLID185 and
+SOLID186: wedges, pyramids and tetrahedra are hexahedra with repeated nodes).
 """
 
 from __future__ import annotations
 
-import re
-from collections.abc import Iterator
-from itertools import pairwise
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
 from bladefem.errors import InputError
 
+from .raw_mesh import RawMesh, from_vtk_order
+
 __all__ = ["read_cdb"]
 
-# integers before the nodes of an element in EBLOCK, SOLID
-HEADER = 11
-WORDS = {4: "tetra", 10: "tetra10", 8: "hexahedron", 20: "hexahedron20"}
+# nodes of an element -> (shape, pairs of equal places, places of the nodes that are left in VTK's
+# order); the first that fits
+SHAPES: dict[int, list[tuple[str, list[tuple[int, int]], list[int]]]] = {
+    4: [("tetra", [], [0, 1, 2, 3])],
+    10: [("tetra10", [], list(range(10)))],
+    8: [
+        ("tetra", [(2, 3), (4, 5), (5, 6), (6, 7)], [0, 1, 2, 4]),
+        ("pyramid", [(4, 5), (5, 6), (6, 7)], [0, 1, 2, 3, 4]),
+        ("wedge", [(2, 3), (6, 7)], [0, 1, 2, 4, 5, 6]),
+        ("hexahedron", [], list(range(8))),
+    ],
+    20: [
+        ("tetra10", [(2, 3), (4, 5), (5, 6), (6, 7)], [0, 1, 2, 4, 8, 9, 11, 16, 17, 18]),
+        (
+            "pyramid13",
+            [(4, 5), (5, 6), (6, 7)],
+            [0, 1, 2, 3, 4, 8, 9, 10, 11, 16, 17, 18, 19],
+        ),
+        (
+            "wedge15",
+            [(2, 3), (6, 7)],
+            [0, 1, 2, 4, 5, 6, 8, 9, 11, 12, 13, 15, 16, 17, 18],
+        ),
+        ("hexahedron20", [], list(range(20))),
+    ],
+}
+# structural solids (MAPDL element library); an archive without ET holds what its node counts say
+SOLIDS = (45, 62, 64, 65, 72, 73, 92, 95, 185, 186, 187, 190, 285)
+# integers before the nodes of an element, and which of them are its type and number
+HEADER = 10
+TYPE = 1
+NUMBER = 8
 
 
-def read_cdb(file: Path) -> tuple[np.ndarray, list, dict, dict]:
-    """Points (n, 3), blocks (cell type, nodes in Ansys' order = VTK's), element groups and node
-    sets.
-
-    Elements are told apart by their number of nodes: 4 and 10 tetrahedra, 8 and 20 hexahedra; the
-    first also when written as a hexahedron with repeated nodes.
+def read_cdb(file: Path) -> RawMesh:
+    """Nodes, solid elements and components.
 
     Raises:
-        InputError: no NBLOCK or EBLOCK of solids, or an element shape that is not supported.
+        InputError: no NBLOCK or EBLOCK of solids, or elements with repeated or missing nodes.
     """
-    lines = iter(file.read_text(errors="replace").splitlines())
-    nodes = {}
-    elements = {}
-    components = {}
-    for line in lines:
-        key = line.split(",")[0].strip().upper()
-        if key == "NBLOCK":
-            nodes.update(_nblock(lines))
-        elif key == "EBLOCK" and "SOLID" in line.upper():
-            elements.update(_eblock(lines))
-        elif key == "CMBLOCK":
-            fields = [f.strip() for f in line.split("!")[0].split(",")]
-            components[fields[1]] = (fields[2].upper()[:4], _cmblock(lines, int(fields[3])))
-    if not nodes or not elements:
+    head = file.read_text(errors="replace").upper()
+    if "NBLOCK" not in head or "EBLOCK" not in head:
         raise InputError(
             f"imported.file = '{file}': no blocked nodes and solid elements, expected CDWRITE's "
-            ".cdb with "
-            "NBLOCK and EBLOCK,...,SOLID"
+            ".cdb with NBLOCK and EBLOCK,...,SOLID"
         )
-    return _arrays(nodes, elements, components)
+    from mapdl_archive import Archive
+
+    archive = Archive(str(file), parse_vtk=False)
+    rows, left_out = _solid_rows(archive)
+    blocks, tags = _blocks(rows, np.asarray(archive.nnum), file)
+    place = {int(tag): i for i, tag in enumerate(archive.nnum)}
+    where = {int(tag): (b, i) for b, some in enumerate(tags) for i, tag in enumerate(some)}
+    notes = (f"{left_out} elements that are no solids were left out",) if left_out else ()
+    return RawMesh(
+        np.asarray(archive.nodes, dtype=float)[:, :3],
+        blocks,
+        _element_components(archive, where),
+        _node_components(archive, place),
+        notes=notes,
+    )
 
 
-def _widths(line: str) -> list[int]:
-    """Column widths of a Fortran format such as (3i9,6e21.13e3)."""
-    return [
-        int(width)
-        for count, width in re.findall(r"(\d*)[iIeEfFgG](\d+)", line)
-        for _ in range(int(count or 1))
-    ]
+def _solid_rows(archive: Any) -> tuple[dict[int, np.ndarray], int]:
+    """Rows of the solid elements by their number of nodes, and how many others there are."""
+    keys = np.asarray(archive.ekey).reshape(-1, 2)
+    library = {int(number): int(kind) for number, kind in keys}
+    found: dict[int, list[np.ndarray]] = {}
+    left_out = 0
+    for row in archive.elem:
+        kind = library.get(int(row[TYPE]))
+        count = len(row) - HEADER
+        if (kind is None or kind in SOLIDS) and count in SHAPES:
+            found.setdefault(count, []).append(row)
+        else:
+            left_out += 1
+    return {count: np.array(rows) for count, rows in found.items()}, left_out
 
 
-def _cut(line: str, widths: list[int]) -> list[str]:
-    ends = np.cumsum(widths)
-    return [
-        line[end - width : end]
-        for end, width in zip(ends, widths, strict=True)
-        if line[end - width : end].strip()
-    ]
+def _blocks(
+    rows: dict[int, np.ndarray], numbers: np.ndarray, file: Path
+) -> tuple[list[tuple[str, np.ndarray]], list[np.ndarray]]:
+    """Cells of each shape in gmsh's node order, and their element numbers."""
+    blocks = []
+    tags = []
+    for count, table in rows.items():
+        nodes = table[:, HEADER:]
+        rest = np.ones(len(nodes), dtype=bool)
+        for word, equal, kept in SHAPES[count]:
+            fits = rest.copy()
+            for a, b in equal:
+                fits &= nodes[:, a] == nodes[:, b]
+            rest &= ~fits
+            if fits.any():
+                cells = nodes[fits][:, kept]
+                _check_nodes(cells, table[fits, NUMBER], numbers, file)
+                order = np.argsort(numbers)
+                place = order[np.searchsorted(numbers, cells, sorter=order)]
+                blocks.append((word, from_vtk_order(word, place)))
+                tags.append(table[fits, NUMBER])
+    return blocks, tags
 
 
-def _nblock(lines: Iterator[str]) -> Iterator[tuple[int, list[float]]]:
-    widths = _widths(next(lines))
-    integers = 3 if len(widths) > 7 else len(widths) - 6
-    for line in lines:
-        if line.strip().startswith(("N,", "-1")):
-            return
-        ends = np.cumsum(widths)[integers - 1 : integers + 3]
-        values = [line[a:b].strip() for a, b in pairwise(ends)]
-        yield int(line[: widths[0]]), [float(v or 0.0) for v in values]
-
-
-def _eblock(lines: Iterator[str]) -> Iterator[tuple[int, list[int]]]:
-    widths = _widths(next(lines))
-    for line in lines:
-        if line.strip().startswith("-1"):
-            return
-        values = [int(v) for v in _cut(line, widths)]
-        count = values[8]
-        while len(values) < HEADER + count:
-            values += [int(v) for v in _cut(next(lines), widths)]
-        yield values[10], values[HEADER : HEADER + count]
-
-
-def _cmblock(lines: Iterator[str], count: int) -> list[int]:
-    """Members; a negative number closes a range that the number before it opened."""
-    widths = _widths(next(lines))
-    values = []
-    while len(values) < count:
-        values += [int(v) for v in _cut(next(lines), widths)]
-    members: list[int] = []
-    for value in values:
-        members.extend([value] if value > 0 else range(members[-1] + 1, -value + 1))
-    return members
-
-
-def _arrays(
-    nodes: dict[int, list[float]],
-    elements: dict[int, list[int]],
-    components: dict[str, tuple[str, list[int]]],
-) -> tuple[np.ndarray, list, dict, dict]:
-    number = {tag: i for i, tag in enumerate(nodes)}
-    kinds: dict[str, list[list[int]]] = {}
-    where: dict[int, tuple[str, int]] = {}
-    for tag, connectivity in elements.items():
-        cell = _shape([number[n] for n in connectivity], tag)
-        rows = kinds.setdefault(WORDS[len(cell)], [])
-        where[tag] = (WORDS[len(cell)], len(rows))
-        rows.append(cell)
-    blocks = [(word, np.array(rows)) for word, rows in kinds.items()]
-    groups = {}
-    sets = {}
-    for name, (kind, members) in components.items():
-        if kind == "NODE":
-            sets[name] = np.array([number[n] for n in members if n in number], dtype=int)
-            continue
-        rows = [where[e] for e in members if e in where]
-        groups[name] = [
-            (b, np.array([i for w, i in rows if w == word], dtype=int))
-            for b, (word, _) in enumerate(blocks)
-        ]
-    return np.array(list(nodes.values())), blocks, groups, sets
-
-
-def _shape(cell: list[int], tag: int) -> list[int]:
-    """The nodes without repetition where the element is a tetrahedron in disguise.
-
-    Raises:
-        InputError: a prism, pyramid or other shape.
-    """
-    if len(cell) == 8 and cell[2] == cell[3] and len(set(cell[4:])) == 1:
-        return [cell[0], cell[1], cell[2], cell[4]]
-    if len(cell) == 20 and cell[2] == cell[3] and len(set(cell[4:8])) == 1:
-        return [cell[i] for i in (0, 1, 2, 4, 8, 9, 11, 16, 17, 18)]
-    if len(cell) not in WORDS or len(set(cell)) != len(cell):
+def _check_nodes(cells: np.ndarray, tags: np.ndarray, numbers: np.ndarray, file: Path) -> None:
+    """Refuse elements without some of their mid-side nodes (written as 0) or of unknown shape."""
+    ordered = np.sort(cells, axis=1)
+    bad = (ordered[:, 1:] == ordered[:, :-1]).any(axis=1) | ~np.isin(cells, numbers).all(axis=1)
+    if bad.any():
         raise InputError(
-            f"imported.file: element {tag} has {len(set(cell))} nodes, expected tetrahedra (4 or "
-            "10) "
-            "or hexahedra (8 or 20 nodes)"
+            f"imported.file = '{file}': element {int(tags[bad][0])} has missing or repeated nodes, "
+            "expected whole tetrahedra, hexahedra, wedges or pyramids"
         )
-    return cell
+
+
+def _element_components(
+    archive: Any, where: dict[int, tuple[int, int]]
+) -> dict[str, list[tuple[int, np.ndarray]]]:
+    groups = {}
+    for name, members in archive.element_components.items():
+        found: dict[int, list[int]] = {}
+        for tag in np.asarray(members).tolist():
+            if tag in where:
+                block, row = where[tag]
+                found.setdefault(block, []).append(row)
+        groups[str(name).strip()] = [(b, np.array(rows)) for b, rows in found.items()]
+    return groups
+
+
+def _node_components(archive: Any, place: dict[int, int]) -> dict[str, np.ndarray]:
+    return {
+        str(name).strip(): np.array(
+            [place[tag] for tag in np.asarray(members).tolist() if tag in place], dtype=int
+        )
+        for name, members in archive.node_components.items()
+    }

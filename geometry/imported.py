@@ -24,14 +24,17 @@ from bladefem.errors import InputError, suggestion
 
 from .finalise_mesh import Motion
 from .jacobian import straight_jacobian
+from .joined_files import joined_files
 from .matching import match, snap
 from .mesh import Mesh, Pair, Sector
+from .named_facets import named_facets
 from .parameters import MeshSize
 from .profile import turn
 from .quality import report, straighten
 from .raw_mesh import RawMesh, read_raw
-from .renaming import read_names, renamed
-from .topology import DIMENSION, FAMILY, boundary, outward
+from .renaming import read_names, renamed_raw
+from .solid_cells import SolidCells, solid_cells
+from .topology import CORNERS, DIMENSION, FACETS, FAMILY, boundary, outward
 
 __all__ = ["mesh_of_raw", "read_geometry", "read_mesh"]
 
@@ -48,13 +51,14 @@ FLIPPED = {
     "triangle": [0, 2, 1],
     "triangle6": [0, 2, 1, 5, 4, 3],
 }
+Axis = np.ndarray | tuple[float, float, float]
 
 
 def read_geometry(imported: Any, size: MeshSize) -> Mesh:
     """The mesh of a scene's [imported] table: STEP files are meshed, mesh files are read.
 
     Args:
-        imported: has file, scale, sectors and axis.
+        imported: has file, more, scale, sectors, axis, names, linear and tolerance.
 
     Raises:
         InputError: the file, its groups or its periodicity are not usable; one sentence.
@@ -66,15 +70,27 @@ def read_geometry(imported: Any, size: MeshSize) -> Mesh:
         return read_step(
             imported.file, size, imported.scale, imported.sectors, axis, imported.names or ()
         )
-    return read_mesh(imported.file, imported.scale, imported.sectors, axis, imported.names or ())
+    return read_mesh(
+        imported.file,
+        imported.scale,
+        imported.sectors,
+        axis,
+        imported.names or (),
+        imported.linear,
+        imported.tolerance,
+        imported.more or (),
+    )
 
 
 def read_mesh(
     file: str | Path,
     scale: float = 1.0,
     sectors: int = 0,
-    axis: np.ndarray | tuple[float, float, float] = (0.0, 0.0, 1.0),
+    axis: Axis = (0.0, 0.0, 1.0),
     names: Iterable[str] = (),
+    linear: str = "refuse",
+    tolerance: float = LOOSE,
+    more: Iterable[str] = (),
 ) -> Mesh:
     """Mesh from .msh, .med, .unv, .inp, .bdf, .nas, .vtu or .cdb.
 
@@ -82,82 +98,91 @@ def read_mesh(
         scale: factor from the file's unit to metres.
         sectors: blades on the wheel, 0 for a single body.
         axis: engine axis through the origin.
-        names: "new = old" for groups that the file calls otherwise, see renaming.py.
+        names: "new = old" for groups, node sets and surfaces that the file calls otherwise, see
+            renaming.py.
+        linear: what becomes of first-order solids, see solid_cells.py.
+        tolerance: largest distance of matched nodes, as a share of the face's size.
+        more: other files of the same model, "path" or "damper = path", see joined_files.py.
 
     Raises:
         InputError: as `read_geometry`.
     """
-    raw = read_raw(Path(file))
+    raw = joined_files(read_raw(Path(file)), more)
     wanted = read_names(names)
     if wanted:
-        raw = replace(raw, groups=renamed(raw.groups, wanted))
-    return mesh_of_raw(raw, scale, sectors, axis, str(file))
+        raw = renamed_raw(raw, wanted)
+    return mesh_of_raw(raw, scale, sectors, axis, str(file), linear, tolerance, frozenset(wanted))
 
 
 def mesh_of_raw(
     raw: RawMesh,
     scale: float,
     sectors: int,
-    axis: np.ndarray | tuple[float, float, float],
+    axis: Axis,
     source: str,
+    linear: str = "keep",
+    tolerance: float = LOOSE,
+    wanted: frozenset[str] = frozenset(),
 ) -> Mesh:
-    """Names, axes, directions and pairs on what a file holds."""
-    mesh = _bodies(raw, source)
+    """Names, axes, directions and pairs on what a file holds.
+
+    Args:
+        wanted: names given by the user; their faces join groups, surfaces and node sets.
+    """
+    solids = solid_cells(raw, source, linear, np.asarray(axis, dtype=float))
+    mesh = _bodies(raw, solids, source)
     mesh = replace(mesh, points=_axes(mesh, scale, np.asarray(axis, dtype=float)))
-    across = float(np.ptp(mesh.points, axis=0).max())
+    across = float(np.ptp(mesh.points[np.unique(solids.cells)], axis=0).max())
     if not SMALLEST < across < LARGEST:
         raise InputError(
             f"imported.scale = {scale:g}: the model would be {across:.3g} m across, expected the "
-            "factor "
-            "from the file's unit to metres (0.001 for millimetres)"
+            "factor from the file's unit to metres (0.001 for millimetres)"
         )
-    mesh = _with_faces(mesh, raw)
-    mesh = _paired(mesh, sectors, source)
+    mesh = _with_faces(mesh, raw, wanted)
+    mesh = _paired(mesh, sectors, source, tolerance)
     points, straightened = straighten(replace(mesh, points=snap(mesh.points, mesh.pairs)))
     mesh = replace(mesh, points=points)
-    return replace(
-        mesh, report={**report(mesh, straightened, _edge_length(mesh)), "source": source}
-    )
+    words = {"source": source, "notes": (*raw.notes, *solids.notes)}
+    return replace(mesh, report={**report(mesh, straightened, _edge_length(mesh)), **words})
 
 
 def _word(name: str) -> str:
     return "_".join(name.lower().split())
 
 
-def _bodies(raw: RawMesh, source: str) -> Mesh:
-    """Cells of the highest dimension, in bodies; only their nodes are kept, in file order."""
-    top = max((DIMENSION[FAMILY[word]] for word, _ in raw.blocks), default=0)
-    solid = [i for i, (word, _) in enumerate(raw.blocks) if DIMENSION[FAMILY[word]] == top]
-    kinds = sorted({raw.blocks[i][0] for i in solid})
-    if top < 2 or len(kinds) != 1 or not kinds[0].startswith(("tetra", "hexa", "triangle", "quad")):
-        raise InputError(
-            f"imported.file = '{source}': cells are {', '.join(kinds) or 'missing'}, "
-            "expected one kind of tetrahedra, hexahedra, triangles or quadrilaterals"
-        )
-    every = np.vstack([raw.blocks[i][1] for i in solid])
-    start = dict(zip(solid, np.cumsum([0] + [len(raw.blocks[i][1]) for i in solid]), strict=False))
+def _bodies(raw: RawMesh, solids: SolidCells, source: str) -> Mesh:
+    """Solid cells in bodies, in file order."""
+    used = set(np.unique(solids.block).tolist())
     rows = {
-        _word(name): np.concatenate([rows + start[b] for b, rows in parts])
+        _word(name): np.concatenate(
+            [np.flatnonzero((solids.block == b) & np.isin(solids.row, some)) for b, some in parts]
+        )
         for name, parts in raw.groups.items()
-        if parts and all(b in start for b, _ in parts)
+        if parts and all(b in used for b, _ in parts)
     }
     damper = np.unique(rows.get("damper", np.empty(0, dtype=int)))
-    blade = np.setdiff1d(np.arange(len(every)), damper)
+    blade = np.setdiff1d(np.arange(len(solids.cells)), damper)
     if "blade" in rows and np.intersect1d(rows["blade"], damper).size:
         raise InputError(
             f"imported.file = '{source}': groups blade and damper share cells, expected separate "
             "bodies"
         )
-    bodies = {"blade": every[blade]} | ({"damper": every[damper]} if damper.size else {})
+    if not blade.size:
+        raise InputError(
+            f"imported.file = '{source}': all cells belong to the group 'damper', expected a blade"
+        )
+    bodies = {"blade": solids.cells[blade]}
+    if damper.size:
+        bodies["damper"] = solids.cells[damper]
     parts = {
         name: np.searchsorted(blade, np.unique(some))
         for name, some in rows.items()
         if some.size and not np.isin(some, damper).any()
     }
     return Mesh(
-        raw.points,
-        kinds[0],
-        {n: _positive(raw.points, c, kinds[0], source) for n, c in bodies.items()},
+        solids.points,
+        solids.cell_type,
+        {n: _positive(solids.points, c, solids.cell_type, source) for n, c in bodies.items()},
         parts=parts,
     )
 
@@ -185,7 +210,7 @@ def _axes(mesh: Mesh, scale: float, axis: np.ndarray) -> np.ndarray:
     return mesh.points * scale @ np.array([radial, np.cross(z, radial), z]).T
 
 
-def _with_faces(mesh: Mesh, raw: RawMesh) -> Mesh:
+def _with_faces(mesh: Mesh, raw: RawMesh, wanted: frozenset[str]) -> Mesh:
     """Named faces and node sets; nodes that no body uses are dropped."""
     cells = np.vstack(list(mesh.bodies.values()))
     used = np.unique(cells)
@@ -193,24 +218,18 @@ def _with_faces(mesh: Mesh, raw: RawMesh) -> Mesh:
     number[used] = np.arange(len(used))
     points = mesh.points[used]
     cells = number[cells]
-    faces = {
-        _word(name): np.vstack([number[raw.blocks[b][1][rows]] for b, rows in parts])
-        for name, parts in raw.groups.items()
-        if parts
-        and all(DIMENSION[FAMILY[raw.blocks[b][0]]] == mesh.dimension - 1 for b, _ in parts)
-    }
     sets = {_word(name): number[nodes][number[nodes] >= 0] for name, nodes in raw.node_sets.items()}
+    faces = named_facets(cells, mesh.cell_type, _corners_of_faces(raw, mesh.dimension, number))
     skin = boundary(cells, mesh.cell_type) if sets else None
+    joined = {_word(name) for name in wanted}
     for name, nodes in sets.items():
-        inside = np.isin(skin, nodes)[:, : 2 + (mesh.dimension == 3)].all(axis=1)
-        if name not in faces and inside.any():
-            faces[name] = skin[inside]
-    bad = [name for name, f in faces.items() if (f < 0).any()]
-    if bad:
-        raise InputError(
-            f"imported.file: face {bad[0]} has nodes that no cell uses, expected faces on the "
-            "bodies"
-        )
+        inside = np.isin(skin, nodes)[:, : _facet_corners(mesh.cell_type)].all(axis=1)
+        if not inside.any() or name in faces and name not in joined:
+            continue
+        both = [faces[name], skin[inside]] if name in faces else [skin[inside]]
+        faces[name] = np.vstack(both)
+        # new nodes in the middle of edges and faces belong to the set too
+        sets[name] = np.union1d(nodes, faces[name])
     return replace(
         mesh,
         points=points,
@@ -220,7 +239,39 @@ def _with_faces(mesh: Mesh, raw: RawMesh) -> Mesh:
     )
 
 
-def _paired(mesh: Mesh, sectors: int, source: str) -> Mesh:
+def _facet_corners(cell_type: str) -> int:
+    return len(FACETS[FAMILY[cell_type]][0])
+
+
+def _corners_of_faces(
+    raw: RawMesh, dimension: int, number: np.ndarray
+) -> dict[str, list[np.ndarray]]:
+    """Corner nodes of all named facets: groups of cells of one dimension less, and surfaces.
+
+    Raises:
+        InputError: a face away from the bodies.
+    """
+    corners: dict[str, list[np.ndarray]] = {}
+    for name, parts in raw.groups.items():
+        words = [raw.blocks[b][0] for b, _ in parts]
+        if words and all(DIMENSION[FAMILY[word]] == dimension - 1 for word in words):
+            corners[_word(name)] = [
+                raw.blocks[b][1][rows][:, : CORNERS[FAMILY[raw.blocks[b][0]]]] for b, rows in parts
+            ]
+    for name, parts in raw.surfaces.items():
+        if parts:
+            corners.setdefault(_word(name), []).extend(parts)
+    for name, parts in corners.items():
+        corners[name] = [number[part] for part in parts]
+        if any((part < 0).any() for part in corners[name]):
+            raise InputError(
+                f"imported.file: face {name} has nodes that no cell uses, expected faces on the "
+                "bodies"
+            )
+    return corners
+
+
+def _paired(mesh: Mesh, sectors: int, source: str, tolerance: float) -> Mesh:
     """Cyclic and contact pairs, as far as the names are there."""
     on = turn(2 * np.pi / sectors) if sectors else np.eye(3)
     pairs: dict[str, Pair] = {}
@@ -232,7 +283,7 @@ def _paired(mesh: Mesh, sectors: int, source: str) -> Mesh:
                     "imported.sectors = "
                     f"{sectors}{suggestion(name, mesh.faces)}"
                 )
-        mesh, pairs["cyclic"] = _cyclic(mesh, on)
+        mesh, pairs["cyclic"] = _cyclic(mesh, on, tolerance)
         mesh = replace(mesh, points=_centred(mesh))
     shift = _pitch(mesh) if not sectors else np.zeros(3)
     motions: dict[str, Motion] = {
@@ -241,13 +292,18 @@ def _paired(mesh: Mesh, sectors: int, source: str) -> Mesh:
     }
     for name, (master, slave, rotation, way) in motions.items():
         if master in mesh.faces and slave in mesh.faces:
-            pairs[name] = _matched(mesh, (master, slave), rotation, way, sectors)
+            pairs[name] = _matched(mesh, (master, slave), rotation, way, sectors, tolerance)
     row = Sector(sectors, on, shift) if sectors or shift.any() else None
     return replace(mesh, pairs=pairs, sector=row)
 
 
 def _matched(
-    mesh: Mesh, names: tuple[str, str], rotation: np.ndarray, shift: np.ndarray, sectors: int
+    mesh: Mesh,
+    names: tuple[str, str],
+    rotation: np.ndarray,
+    shift: np.ndarray,
+    sectors: int,
+    tolerance: float,
 ) -> Pair:
     """A contact pair; without matched nodes where those of a wheel's seat and flank differ but lie
     on each other.
@@ -256,7 +312,7 @@ def _matched(
         InputError: neither; with a hint when the number of sectors was left out.
     """
     try:
-        return match(mesh.points, mesh.faces, names, mesh.dimension, rotation, shift, LOOSE)
+        return match(mesh.points, mesh.faces, names, mesh.dimension, rotation, shift, tolerance)
     except InputError as error:
         if sectors and _facing(mesh, names, rotation, shift):
             return Pair(*names, np.zeros((2, 0), dtype=int), rotation, shift)
@@ -296,11 +352,11 @@ def _pitch(mesh: Mesh) -> np.ndarray:
     return mesh.points[high].mean(axis=0) - mesh.points[low].mean(axis=0)
 
 
-def _cyclic(mesh: Mesh, on: np.ndarray) -> tuple[Mesh, Pair]:
+def _cyclic(mesh: Mesh, on: np.ndarray, tolerance: float) -> tuple[Mesh, Pair]:
     """The cyclic pair; the names are swapped when the file has them the other way round."""
     names = ("cyclic_low", "cyclic_high")
     try:
-        return mesh, match(mesh.points, mesh.faces, names, mesh.dimension, on, None, LOOSE)
+        return mesh, match(mesh.points, mesh.faces, names, mesh.dimension, on, None, tolerance)
     except InputError as first:
         swapped = replace(
             mesh,
@@ -308,7 +364,7 @@ def _cyclic(mesh: Mesh, on: np.ndarray) -> tuple[Mesh, Pair]:
         )
         try:
             return swapped, match(
-                mesh.points, swapped.faces, names, mesh.dimension, on, None, LOOSE
+                mesh.points, swapped.faces, names, mesh.dimension, on, None, tolerance
             )
         except InputError:
             raise first from None

@@ -162,6 +162,7 @@ WORDS = {
     "mean quality": "mean shape",
     "straightened": "elements straightened",
     "pairs": "matched nodes of pair",
+    "notes": "the file's elements",
 }
 
 
@@ -170,6 +171,9 @@ def quality_rows(mesh: Mesh) -> list[tuple[str, str]]:
     rows = []
     for name, value in mesh.report.items():
         words = WORDS.get(name, name)
+        if name == "notes":
+            rows += [(words, note) for note in value]
+            continue
         value = 1e3 * value if name in ("size", "edge") else value
         for part, number in value.items() if isinstance(value, dict) else (("", value),):
             text = f"{number:.4g}" if isinstance(number, float) else str(number)

@@ -1,12 +1,16 @@
 """Meshes as they stand in files: points, cells by name, faces by name, node sets by name, in gmsh's
 node order.
 
-Each reader only reads; what the names mean is decided in imported.py.
+Each reader only reads; what the names mean is decided in imported.py, what becomes of the cells in
+solid_cells.py.
 """
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+import contextlib
+import io
+from collections.abc import Callable
+from dataclasses import dataclass, field
 from pathlib import Path
 
 import numpy as np
@@ -14,29 +18,30 @@ import numpy as np
 from bladefem.errors import InputError
 
 from .session import gmsh_session
-from .topology import DIMENSION, FAMILY, GMSH_TYPES, NODES
+from .topology import CORNERS, DIMENSION, EDGES, FAMILY, GMSH_TYPES, NODES
 
-__all__ = ["RawMesh", "from_gmsh_model", "read_by_gmsh", "read_by_meshio", "read_raw"]
+__all__ = ["RawMesh", "from_gmsh_model", "from_vtk_order", "read_by_gmsh", "read_raw"]
 
-# Rows: gmsh's place <- VTK's (meshio's, Abaqus', Ansys', Nastran's) number, where they differ.
-FROM_VTK = {
-    "tetra10": [0, 1, 2, 3, 4, 5, 6, 7, 9, 8],
-    "hexahedron20": [0, 1, 2, 3, 4, 5, 6, 7, 8, 11, 16, 9, 17, 10, 18, 19, 12, 15, 13, 14],
+# corner pairs of the edges in the order of VTK, meshio, Abaqus, Ansys and Nastran
+VTK_EDGES = {
+    "tetra": [(0, 1), (1, 2), (2, 0), (0, 3), (1, 3), (2, 3)],
+    "hexahedron": [
+        (0, 1),
+        (1, 2),
+        (2, 3),
+        (3, 0),
+        (4, 5),
+        (5, 6),
+        (6, 7),
+        (7, 4),
+        (0, 4),
+        (1, 5),
+        (2, 6),
+        (3, 7),
+    ],
+    "wedge": [(0, 1), (1, 2), (2, 0), (3, 4), (4, 5), (5, 3), (0, 3), (1, 4), (2, 5)],
+    "pyramid": [(0, 1), (1, 2), (2, 3), (3, 0), (0, 4), (1, 4), (2, 4), (3, 4)],
 }
-# Element type -> corners of each face without a middle node, in the order in which gmsh numbers
-# these nodes -> the nodes in the middle of its edges.
-WITHOUT_CENTRE = {
-    "quad8": {(0, 1, 2, 3): (4, 5, 6, 7)},
-    "hexahedron20": {
-        (0, 3, 2, 1): (9, 13, 11, 8),
-        (0, 1, 5, 4): (8, 12, 16, 10),
-        (0, 4, 7, 3): (10, 17, 15, 9),
-        (1, 2, 6, 5): (11, 14, 18, 12),
-        (2, 3, 7, 6): (13, 15, 19, 14),
-        (4, 5, 6, 7): (16, 18, 19, 17),
-    },
-}
-COMPLETE = {"quad8": "quad9", "hexahedron20": "hexahedron27"}
 
 
 @dataclass(frozen=True)
@@ -51,6 +56,10 @@ class RawMesh:
     groups: dict[str, list[tuple[int, np.ndarray]]]
     # name -> node numbers
     node_sets: dict[str, np.ndarray]
+    # name -> corner nodes of facets, arrays (nf, 3) and (nf, 4)
+    surfaces: dict[str, list[np.ndarray]] = field(default_factory=dict)
+    # what the file holds and was left out, one sentence each
+    notes: tuple[str, ...] = ()
 
 
 def read_raw(file: Path) -> RawMesh:
@@ -67,16 +76,33 @@ def read_raw(file: Path) -> RawMesh:
             f"imported.file = '{file}': unknown kind of mesh; known are "
             f"{', '.join(sorted(READERS))}"
         )
+    said = io.StringIO()
     try:
-        return completed(READERS[suffix](file))
+        # readers of foreign files print and raise whatever they like, SystemExit too
+        with contextlib.redirect_stdout(said):
+            raw = READERS[suffix](file)
     except InputError:
         raise
-    except Exception as error:
-        # readers of foreign files raise whatever they like
-        reason = " ".join(str(error).split()) or type(error).__name__
+    except (Exception, SystemExit) as error:
+        words = " ".join([str(error), said.getvalue()]).split()
+        reason = " ".join(words[:60]) or type(error).__name__
         raise InputError(
             f"imported.file = '{file}': cannot be read as {suffix} ({reason})"
         ) from error
+    _check_nodes(raw, file)
+    return raw
+
+
+def _check_nodes(raw: RawMesh, file: Path) -> None:
+    """Refuse cells whose nodes are not there, and coordinates that are no numbers."""
+    for word, cells in raw.blocks:
+        if cells.size and not 0 <= cells.min() <= cells.max() < len(raw.points):
+            raise InputError(f"imported.file = '{file}': a cell of type {word} has unknown nodes")
+    bad = np.flatnonzero(~np.isfinite(raw.points).all(axis=1))
+    if len(bad):
+        raise InputError(
+            f"imported.file = '{file}': the coordinates of {len(bad)} nodes are not finite numbers"
+        )
 
 
 def read_by_gmsh(file: Path) -> RawMesh:
@@ -124,13 +150,11 @@ def from_gmsh_model(gmsh: object) -> RawMesh:
 
 
 def read_by_meshio(file: Path) -> RawMesh:
-    """.inp (ELSET and NSET), .bdf/.nas (property numbers as "pid_1"), .vtu: what meshio knows about
-    names.
-    """
+    """.bdf/.nas (property numbers as "pid_1"), .vtu: what meshio knows about names."""
     import meshio
 
     mesh = meshio.read(file)
-    blocks = [(block.type, _to_gmsh(block.type, block.data)) for block in mesh.cells]
+    blocks = [(block.type, from_vtk_order(block.type, block.data)) for block in mesh.cells]
     groups = {
         name: [
             (b, np.asarray(rows, dtype=int))
@@ -148,76 +172,56 @@ def read_by_meshio(file: Path) -> RawMesh:
     return RawMesh(points, blocks, groups, sets)
 
 
-def completed(raw: RawMesh) -> RawMesh:
-    """Hexahedra of 20 nodes and faces of 8 get the nodes in the middle of faces and cells that 27
-    and 9 have.
-
-    They lie where the serendipity shape functions put them (corners -1/4; middles of edges 1/2 on a
-    face, 1/4 in a cell), so the shape stays and the displacements get richer.
-    """
-    if not any(kind in WITHOUT_CENTRE for kind, _ in raw.blocks):
-        return raw
-    x = raw.points
-    corner = np.vstack(
-        [cells[:, face] for kind, cells in raw.blocks for face in WITHOUT_CENTRE.get(kind, {})]
-    )
-    middle = np.vstack(
-        [
-            cells[:, edges]
-            for kind, cells in raw.blocks
-            for edges in WITHOUT_CENTRE.get(kind, {}).values()
-        ]
-    )
-    _, first, number = np.unique(
-        np.sort(corner, axis=1), axis=0, return_index=True, return_inverse=True
-    )
-    points = [x, x[middle[first]].sum(1) / 2 - x[corner[first]].sum(1) / 4]
-    number = number.ravel() + len(x)
-    size = len(x) + len(first)
-    start = 0
-    blocks = []
-    for kind, cells in raw.blocks:
-        more = [cells]
-        for _ in WITHOUT_CENTRE.get(kind, {}):
-            more.append(number[start : start + len(cells)])
-            start += len(cells)
-        if kind == "hexahedron20":
-            points.append(x[cells[:, 8:]].sum(1) / 4 - x[cells[:, :8]].sum(1) / 4)
-            more.append(size + np.arange(len(cells)))
-            size += len(cells)
-        blocks.append((COMPLETE.get(kind, kind), np.column_stack(more)))
-    return RawMesh(np.vstack(points), blocks, raw.groups, raw.node_sets)
-
-
-def _to_gmsh(word: str, cells: np.ndarray) -> np.ndarray:
-    """Cells in gmsh's node order.
+def from_vtk_order(word: str, cells: np.ndarray) -> np.ndarray:
+    """Cells whose nodes are in VTK's order, in gmsh's.
 
     Raises:
         InputError: a cell type that has no use here.
     """
-    if word not in NODES and DIMENSION.get(FAMILY.get(word, word), 3) == 3:
-        raise InputError(
-            f"imported.file: cells of type {word} are not supported, expected tetrahedra or "
-            "hexahedra"
-        )
+    family = FAMILY.get(word, word.rstrip("0123456789"))
     cells = np.asarray(cells, dtype=int)
-    return cells[:, FROM_VTK[word]] if word in FROM_VTK else cells
+    if family not in VTK_EDGES:
+        if word not in NODES and DIMENSION.get(family, 3) == 3:
+            raise InputError(
+                f"imported.file: cells of type {word} are not supported, expected tetrahedra, "
+                "hexahedra, wedges or pyramids of first or second order"
+            )
+        return cells
+    k = CORNERS[family]
+    edges = len(EDGES[family])
+    if word not in NODES or NODES[word] > k + edges and family != "hexahedron":
+        raise InputError(
+            f"imported.file: cells of type {word} are not supported, expected one node on each "
+            "edge at most"
+        )
+    if NODES[word] == k:
+        return cells
+    row = {frozenset(pair): i for i, pair in enumerate(VTK_EDGES[family])}
+    middle = [k + row[frozenset(pair)] for pair in EDGES[family]]
+    # centres of faces: VTK lists -x +x -y +y -z +z, then the cell's
+    rest = [24, 22, 20, 21, 23, 25, 26] if NODES[word] == NODES["hexahedron27"] else []
+    return cells[:, [*range(k), *middle, *rest]]
 
 
-def _cdb(file: Path) -> RawMesh:
+def _ansys(file: Path) -> RawMesh:
     from .ansys_cdb import read_cdb
 
-    points, blocks, groups, sets = read_cdb(file)
-    return RawMesh(points, [(word, _to_gmsh(word, cells)) for word, cells in blocks], groups, sets)
+    return read_cdb(file)
 
 
-READERS = {
+def _abaqus(file: Path) -> RawMesh:
+    from .abaqus_inp import read_inp
+
+    return read_inp(file)
+
+
+READERS: dict[str, Callable[[Path], RawMesh]] = {
     ".msh": read_by_gmsh,
     ".med": read_by_gmsh,
     ".unv": read_by_gmsh,
-    ".inp": read_by_meshio,
+    ".inp": _abaqus,
     ".bdf": read_by_meshio,
     ".nas": read_by_meshio,
     ".vtu": read_by_meshio,
-    ".cdb": _cdb,
+    ".cdb": _ansys,
 }

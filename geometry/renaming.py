@@ -3,11 +3,16 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
+from dataclasses import replace
 from typing import TypeVar
+
+import numpy as np
 
 from bladefem.errors import InputError, suggestion
 
-__all__ = ["read_names", "renamed"]
+from .raw_mesh import RawMesh
+
+__all__ = ["read_names", "renamed", "renamed_raw"]
 
 Part = TypeVar("Part")
 
@@ -39,16 +44,46 @@ def renamed(
     Raises:
         InputError: an old name that is not there.
     """
-    known = {name.lower(): name for name in groups}
+    _check_names(wanted, groups)
+    return _joined(groups, wanted)
+
+
+def renamed_raw(raw: RawMesh, wanted: Mapping[str, list[str]]) -> RawMesh:
+    """The same for element groups, node sets and surfaces alike.
+
+    Raises:
+        InputError: an old name that is none of them.
+    """
+    _check_names(wanted, [*raw.groups, *raw.node_sets, *raw.surfaces])
+    sets = _joined({name: [nodes] for name, nodes in raw.node_sets.items()}, wanted)
+    return replace(
+        raw,
+        groups=_joined(raw.groups, wanted),
+        node_sets={name: np.unique(np.concatenate(parts)) for name, parts in sets.items()},
+        surfaces=_joined(raw.surfaces, wanted),
+    )
+
+
+def _check_names(wanted: Mapping[str, list[str]], known: Iterable[str]) -> None:
+    names = list(known)
+    there = {name.lower() for name in names}
     for olds in wanted.values():
         for old in olds:
-            if old.lower() not in known:
+            if old.lower() not in there:
                 raise InputError(
-                    f"imported.names: the file has no group '{old}'{suggestion(old, groups)}"
+                    f"imported.names: the file has no group '{old}'{suggestion(old, names)}"
                 )
-    taken = {known[old.lower()] for olds in wanted.values() for old in olds}
+
+
+def _joined(
+    groups: Mapping[str, list[Part]], wanted: Mapping[str, list[str]]
+) -> dict[str, list[Part]]:
+    """Parts of the old names under the new ones, as far as this kind of group has them."""
+    known = {name.lower(): name for name in groups}
+    taken = {known[old.lower()] for olds in wanted.values() for old in olds if old.lower() in known}
     joined = {
-        new: [part for old in olds for part in groups[known[old.lower()]]]
+        new: [part for old in olds if old.lower() in known for part in groups[known[old.lower()]]]
         for new, olds in wanted.items()
     }
-    return {name: list(parts) for name, parts in groups.items() if name not in taken} | joined
+    kept = {name: list(parts) for name, parts in groups.items() if name not in taken}
+    return kept | {new: parts for new, parts in joined.items() if parts}

@@ -10,8 +10,12 @@ __all__ = [
     "EDGES",
     "FACETS",
     "GMSH_TYPES",
+    "NODES",
+    "QUADS",
     "boundary",
     "corner_count",
+    "facet_nodes",
+    "facets_of",
     "outward",
     "owners",
 ]
@@ -101,6 +105,22 @@ EDGES = {
         (5, 6),
         (6, 7),
     ],
+    "wedge": [(0, 1), (0, 2), (0, 3), (1, 2), (1, 4), (2, 5), (3, 4), (3, 5), (4, 5)],
+    "pyramid": [(0, 1), (0, 3), (0, 4), (1, 2), (1, 4), (2, 3), (2, 4), (3, 4)],
+}
+# Corners of the quadrilateral faces; row i carries the centre node CORNERS + edges + i.
+QUADS = {
+    "quad": [(0, 1, 2, 3)],
+    "hexahedron": [
+        (0, 3, 2, 1),
+        (0, 1, 5, 4),
+        (0, 4, 7, 3),
+        (1, 2, 6, 5),
+        (2, 3, 7, 6),
+        (4, 5, 6, 7),
+    ],
+    "wedge": [(0, 1, 4, 3), (0, 3, 5, 2), (1, 2, 5, 4)],
+    "pyramid": [(0, 3, 2, 1)],
 }
 FACETS = {
     "triangle": EDGES["triangle"],
@@ -114,6 +134,8 @@ FACETS = {
         (3, 0, 4, 7),
         (4, 5, 6, 7),
     ],
+    "wedge": [(0, 2, 1), (3, 4, 5), (0, 1, 4, 3), (1, 2, 5, 4), (0, 3, 5, 2)],
+    "pyramid": [(0, 3, 2, 1), (0, 1, 4), (1, 2, 4), (2, 3, 4), (3, 0, 4)],
 }
 REVERSED = {
     "line": [1, 0],
@@ -189,21 +211,41 @@ def outward(points: np.ndarray, cells: np.ndarray, cell_type: str, faces: np.nda
     return result
 
 
-def boundary(cells: np.ndarray, cell_type: str) -> np.ndarray:
-    """Outer facets (nf, k) of the cells with their mid-side nodes: facets that one cell has for
-    itself.
+def facets_of(cells: np.ndarray, cell_type: str) -> np.ndarray:
+    """All facets (nc * facets, k) of the cells with every node that lies on them, cell by cell.
 
-    The node in the middle of a face (quad9) is left out: hexahedron27 gives facets of 8 nodes.
+    Cells whose facets all have the same shape only: no wedges, no pyramids.
+    """
+    table = np.array(facet_nodes(cell_type))
+    return cells[:, table].reshape(-1, table.shape[1])
+
+
+def facet_nodes(cell_type: str) -> list[list[int]]:
+    """Local numbers of the nodes on each facet: corners, mid-side nodes, the centre of a
+    quadrilateral.
     """
     family = FAMILY[cell_type]
-    edges = {frozenset(pair): i for i, pair in enumerate(EDGES[family])}
-    k = corner_count(cell_type)
-    second = cells.shape[1] > corner_count(cell_type)
+    k = CORNERS[family]
+    edges = {frozenset(pair): k + i for i, pair in enumerate(EDGES[family])}
+    first_centre = k + len(EDGES[family])
+    centres = {frozenset(quad): first_centre + i for i, quad in enumerate(QUADS.get(family, []))}
     table = []
     for facet in FACETS[family]:
-        ring = list(zip(facet, facet[1:] + facet[:1], strict=True)) if len(facet) > 2 else [facet]
-        table.append([*facet, *([k + edges[frozenset(pair)] for pair in ring] if second else [])])
-    facets = cells[:, np.array(table)].reshape(-1, len(table[0]))
-    key = np.sort(facets[:, : len(FACETS[family][0])], axis=1)
+        nodes = list(facet)
+        if NODES[cell_type] > k:
+            ring = zip(facet, facet[1:] + facet[:1], strict=True) if len(facet) > 2 else [facet]
+            nodes += [edges[frozenset(pair)] for pair in ring]
+        if NODES[cell_type] > first_centre and frozenset(facet) in centres:
+            nodes.append(centres[frozenset(facet)])
+        table.append(nodes)
+    return table
+
+
+def boundary(cells: np.ndarray, cell_type: str) -> np.ndarray:
+    """Outer facets (nf, k) of the cells with all their nodes: facets that one cell has for
+    itself.
+    """
+    facets = facets_of(cells, cell_type)
+    key = np.sort(facets[:, : len(FACETS[FAMILY[cell_type]][0])], axis=1)
     _, first, count = np.unique(key, axis=0, return_index=True, return_counts=True)
     return facets[first[count == 1]]

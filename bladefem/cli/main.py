@@ -133,6 +133,10 @@ def parser() -> argparse.ArgumentParser:
     subs.choices["mesh"].add_argument(
         "--view", metavar="PNG", help="also draw the mesh into this file"
     )
+    for name in ("report", "run", "modes"):
+        subs.choices[name].add_argument(
+            "--pdf", action="store_true", help="also print the report as PDF, by Chromium"
+        )
     _modes_arguments(subs.choices["modes"])
     subs.choices["study"].add_argument(
         "--vary",

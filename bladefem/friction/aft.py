@@ -7,14 +7,17 @@ max(0, n0 + kn w_n), the tangential one a return map of kt w onto |f| <= mu time
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from bladefem.data import Elements
 from bladefem.errors import InputError
+from bladefem.friction.coulomb_2d_plain import plain_batch
 from bladefem.friction.fourier import harmonics_of
 from bladefem.friction.kernel_1d import jenkins_batch
+from bladefem.friction.law import groups_by_law, select_elements
+from bladefem.friction.periodic_law import periodic_forces
 from bladefem.friction.simd.kernel_2d import disc_batch
 from bladefem.friction.trigonometric_tables import patterns, tables
 
@@ -39,6 +42,28 @@ PARTIAL_SLIP = 2
 GROSS_SLIP = 3
 PRECISIONS = {"double": np.float64, "single": np.float32}
 PERIODIC = "periodic"
+
+
+def _vector_kernel(w, load, nodes, samples, precision, cycles, jacobian, F, shares, used):
+    """Fill forces, shares and cycles of 2-D elements; returns their Jacobian (n, d, K, d K)."""
+    n, d, K = w.shape
+    H = harmonics_of(w)
+    J = np.empty((n, d, K, d * K) if jacobian else (n, 0, 0, 0))
+    rows = patterns(H, samples, PRECISIONS[precision])
+    disc_batch(w, load, nodes, tables(H, samples), rows, cycles, F, J, shares, used)
+    return J
+
+
+def _plain_kernel(w, load, nodes, samples, precision, cycles, jacobian, F, shares, used):
+    """The same by the plain kernel."""
+    n, d, K = w.shape
+    J = np.empty((n, d, K, d * K))
+    plain_batch(w, load, nodes, tables(harmonics_of(w), samples), cycles, F, J, shares, used)
+    return J
+
+
+# of 2-D elements
+KERNELS_2D = {"vector": _vector_kernel, "plain": _plain_kernel}
 
 
 @dataclass(frozen=True)
@@ -72,6 +97,7 @@ def evaluate(
     load: np.ndarray | None = None,
     cycles: int = 4000,
     precision: str = "double",
+    kernel: str = "vector",
 ) -> Forces:
     """Harmonics of the contact forces for relative motion w (n, d, 2H+1) [m], sampled at
     ``samples`` instants.
@@ -79,6 +105,8 @@ def evaluate(
     load (n, samples) [N], where given, is the prescribed part of the normal load N(t) in place of
     the constant n0. precision is that in which the derivative of 2-D elements is summed: "single"
     is faster and leaves about 1e-7 of it in error, which is enough for Newton; forces are the same.
+    kernel is that of 2-D elements: "vector", or "plain", the readable definition of it, some 50
+    times as slow and always in double precision.
     The error falls as samples^-2. Forces.converged is False, with the reason, when a 2-D element
     was not periodic after ``cycles`` periods or the motion is not finite. Raises InputError for
     shapes that do not fit or too few samples (at least 4H+4).
@@ -87,7 +115,11 @@ def evaluate(
     if precision not in PRECISIONS:
         raise InputError(f"precision {precision!r}: expected one of {', '.join(PRECISIONS)}")
     n, d, K = w.shape
+    if kernel not in KERNELS_2D:
+        raise InputError(f"kernel {kernel!r}: expected one of {', '.join(KERNELS_2D)}")
     load = _series(load, n, samples)
+    if elements.law is not None:
+        return _evaluate_laws(elements, w, samples, jacobian, load, cycles, precision)
     tab = tables(harmonics_of(w), samples)
     F = np.empty((n, d, K))
     shares = np.empty((n, 3))
@@ -96,18 +128,8 @@ def evaluate(
         J = np.empty((n, d, K, d, K))
         jenkins_batch(w, load, nodes, tab, F, J, shares)
     else:
-        J = np.empty((n, d, K, d * K) if jacobian else (n, 0, 0, 0))
-        disc_batch(
-            w,
-            load,
-            nodes,
-            tab,
-            patterns(harmonics_of(w), samples, PRECISIONS[precision]),
-            cycles,
-            F,
-            J,
-            shares,
-            used,
+        J = KERNELS_2D[kernel](
+            w, load, nodes, samples, precision, cycles, jacobian, F, shares, used
         )
     reason = verdict(F, used, f"were not periodic after {cycles} cycles")
     return Forces(
@@ -119,6 +141,52 @@ def evaluate(
         np.abs(used),
         reason == PERIODIC,
         reason,
+    )
+
+
+def _evaluate_laws(
+    elements: Elements,
+    w: np.ndarray,
+    samples: int,
+    jacobian: bool,
+    load: np.ndarray,
+    cycles: int,
+    precision: str,
+) -> Forces:
+    """The same for elements of several laws, law after law; Coulomb's with its kernels."""
+    n, d, K = w.shape
+    # raises where the samples are too few
+    tables(harmonics_of(w), samples)
+    F = np.empty((n, d, K))
+    J = np.empty((n, d, K, d, K)) if jacobian else None
+    shares = np.empty((n, 3))
+    used = np.full(n, 2)
+    for law, rows in groups_by_law(elements):
+        some = replace(select_elements(elements, rows), law=None)
+        prescribed = load[rows] if load.shape[1] else None
+        if law is None:
+            part = evaluate(
+                some,
+                w[rows],
+                samples,
+                jacobian,
+                load=prescribed,
+                cycles=cycles,
+                precision=precision,
+            )
+            used[rows] = part.cycles if part.converged else -part.cycles
+        else:
+            part = periodic_forces(
+                law, some, w[rows], samples, load=prescribed, jacobian=jacobian, cycles=cycles
+            )
+            used[rows] = part.cycles
+        F[rows] = part.f
+        shares[rows] = part.shares
+        if J is not None:
+            J[rows] = part.dfdw
+    reason = verdict(F, used, f"were not periodic after {cycles} cycles")
+    return Forces(
+        F, J, states(shares), shares, dissipated(F, w), np.abs(used), reason == PERIODIC, reason
     )
 
 

@@ -28,6 +28,7 @@ from bladefem.friction.aft import (
 )
 from bladefem.friction.fourier import harmonics_of
 from bladefem.friction.kernel_1d import SEPARATED, SLIP_DOWN, SLIP_UP, STICK, assemble
+from bladefem.friction.law import require_coulomb
 from bladefem.friction.roots import NEVER, rise, value
 from bladefem.friction.trigonometric_tables import Node, empty_gram, weighted
 
@@ -74,6 +75,7 @@ def evaluate_exact(
         raise InputError(
             "elements: events are located for one tangent, expected tangents = 1; use aft.evaluate"
         )
+    require_coulomb(elements, "the location of events")
     H = harmonics_of(w)
     base = np.zeros((n, K))
     base[:, 0] = nodes[:, 3]

@@ -11,6 +11,7 @@ import numpy as np
 
 from ..friction.fourier import synthesis
 from .model import ReducedModel
+from .policy import uses_coulomb_kernels
 from .solution import Solution
 
 __all__ = ["INSTANTS", "gripping", "grips"]
@@ -23,6 +24,8 @@ SPARE = 4e-3
 
 def grips(model: ReducedModel, solution: Solution) -> bool:
     """All contacts stick, with a little of the friction limit in hand at every instant."""
+    if not uses_coulomb_kernels(model):
+        return False
     return solution.states["stick"] == len(model.elements.kt) and bool(_within(model, solution.f))
 
 

@@ -57,7 +57,7 @@ def node_gradients(
     weight = by_force - transposed_flexibility(balance.linear.A, back)
     held = _by_hold(balance, back)
     return {
-        name: np.sum(weight * contact_rate(model, state, name), axis=(1, 2))
+        name: np.sum(weight * contact_rate(model, state, name, solution.samples), axis=(1, 2))
         - (np.sum(held * hold_rate(balance, state, name), axis=1) if name in ("kt", "kn") else 0.0)
         for name in names
     }

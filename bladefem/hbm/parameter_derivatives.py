@@ -18,12 +18,15 @@ from ..errors import InputError
 from .linear.bodies import Stack, amplitudes, damping_rate, flexibility, impedance_rate, motion
 from .linear.condensation import Linear
 from .model import ReducedModel
-from .parameters import check_parameter
+from .parameters import check_parameter, vary
+from .policy import uses_coulomb_kernels
 from .solution import blade_motion
-from .solver.residual import Balance, State, as_amplitudes, as_coefficients
+from .solver.residual import Balance, State, as_amplitudes, as_coefficients, contact_forces
 
 # parameters that the contact law does not see
 BODIES = ("omega", "force", "mass", "damping")
+# step in the logarithm of a parameter where a law is differentiated by differences
+DIFFERENCE = 1e-5
 
 __all__ = [
     "BODIES",
@@ -51,7 +54,7 @@ def rate(balance: Balance, state: State, name: str) -> np.ndarray:
         if name == "force" and np.any(linear.g):
             moved[0] += by_imbalance(linear) @ linear.g / balance.model.hold
         return -as_coefficients(moved, state.w.shape)
-    force = as_amplitudes(contact_rate(balance.model, state, name))
+    force = as_amplitudes(contact_rate(balance.model, state, name, balance.samples))
     moved = (linear.A @ force[:, :, None])[:, :, 0]
     if name in ("kt", "kn") and linear.B.shape[1]:
         moved[0] += by_imbalance(linear) @ (linear.B.T @ hold_rate(balance, state, name).ravel())
@@ -89,14 +92,16 @@ def contact_load(model: ReducedModel, state: State) -> np.ndarray:
     return load
 
 
-def contact_rate(model: ReducedModel, state: State, name: str) -> np.ndarray:
+def contact_rate(model: ReducedModel, state: State, name: str, samples: int) -> np.ndarray:
     """(n, d, K) derivative of the contact forces beyond the preload with a contact parameter [N,
     N/m].
     """
+    elements = model.elements
+    if not uses_coulomb_kernels(model):
+        return _rate_by_differences(model, state, name, samples)
     f = state.forces.f
     D = state.forces.dfdw
     w = state.w
-    elements = model.elements
     # where the tangents begin
     first = model.directions - elements.tangents
     by_tangents = np.einsum("nakbl,nbl->nak", D[:, :, :, first:], w[:, first:])
@@ -121,6 +126,21 @@ def contact_rate(model: ReducedModel, state: State, name: str) -> np.ndarray:
     rate = -D[:, :, :, 0, 0].copy()
     rate[:, 0, 0] += elements.kn * (elements.n0 > 0)
     return rate
+
+
+def _rate_by_differences(model: ReducedModel, state: State, name: str, samples: int) -> np.ndarray:
+    """The same for laws that need not be homogeneous: central differences of the forces."""
+    if name == "gap" and model.directions == model.elements.tangents:
+        raise InputError("gap: a prescribed normal load has no gap, expected elements.kn > 0")
+    step = DIFFERENCE * (model.compression if name == "gap" else 1.0)
+    ends = []
+    for sign in (1.0, -1.0):
+        value = sign * step if name == "gap" else float(np.exp(sign * step))
+        changed = vary(model, name, value)
+        force = contact_forces(changed, state.w, samples).f
+        force[:, :, 0] -= changed.preload.reshape(force.shape[:2])
+        ends.append(force)
+    return (ends[0] - ends[1]) / (2 * step)
 
 
 def body_rate(

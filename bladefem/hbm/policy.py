@@ -17,6 +17,8 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
+from ..friction.law import groups_by_law
+
 if TYPE_CHECKING:
     from .model import ReducedModel
 
@@ -80,7 +82,7 @@ SHOOTING_SIZE = 200
 
 def uses_coulomb_kernels(model: ReducedModel) -> bool:
     """True if every element follows Coulomb's law, for which the compiled loops are written."""
-    return True
+    return all(law is None for law, _ in groups_by_law(model.elements))
 
 
 def uses_compiled_point(model: ReducedModel, harmonics: int) -> bool:

@@ -62,7 +62,7 @@ def _sensitivity(
         load = as_amplitudes(contact_load(model, state))
         direct, probe = body_rate(model, linear.omega, load, name)
     else:
-        df = df + contact_rate(model, state, name)
+        df = df + contact_rate(model, state, name, balance.samples)
         direct = np.zeros_like(linear.free)
     force = as_amplitudes(df)
     rigid = np.zeros(len(linear.rigid))

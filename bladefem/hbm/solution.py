@@ -10,7 +10,16 @@ from ..friction.fourier import to_complex
 from .linear.bodies import Stack, amplitudes, flexibility, lost, motion
 from .model import ReducedModel
 
-__all__ = ["Solution", "Work", "at_probes", "blade_motion", "probe_motion", "works", "works_of"]
+__all__ = [
+    "Solution",
+    "Work",
+    "at_probes",
+    "blade_motion",
+    "probe_motion",
+    "size",
+    "works",
+    "works_of",
+]
 
 
 @dataclass(frozen=True)
@@ -69,6 +78,9 @@ class Solution:
     # number of nodes that stick, slip, lift off, are open
     states: dict[str, int]
     work: Work
+    # number of the piece of a response with several motions that the point lies on, from 1 on; 0
+    # where one motion was looked for
+    branch: int = 0
     # the way of `bladefem.hbm.policy` that ran: loop, linear solvers
     route: str = ""
 
@@ -81,6 +93,14 @@ class Solution:
     def frequency(self) -> float:
         """[Hz]"""
         return self.omega / (2 * np.pi)
+
+
+def size(solution: Solution, probe: int = 0) -> float:
+    """Root of the sum of squares of the moving harmonics' amplitudes at a probe: what a peak is
+    measured by [m].
+    """
+    moving = solution.probe[1:, probe]
+    return float(np.sqrt(np.vdot(moving, moving).real))
 
 
 def probe_motion(

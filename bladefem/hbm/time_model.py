@@ -12,6 +12,7 @@ import numpy as np
 from ..data import RigidBody
 from ..errors import InputError, NotSolvedError
 from ..friction.fourier import to_real
+from ..friction.law import require_coulomb
 from ..time.shooting import periodic
 from ..time.system import System
 from .linear.bodies import Stack, rigid_stack
@@ -108,6 +109,7 @@ def shooting_start(balance: Balance) -> np.ndarray:
 
 def _bodies(model: ReducedModel) -> list[Stack]:
     """Blades and damper as single real bodies with all their inertia."""
+    require_coulomb(model.elements, "the model in time")
     if model.elements.tangents != 1:
         raise InputError("elements with two tangents, expected tangents = 1")
     if len(model.sides) > 1 or (isinstance(model.damper, tuple) and len(model.damper) > 1):

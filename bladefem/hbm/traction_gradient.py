@@ -19,6 +19,7 @@ from scipy.optimize import linprog
 
 from ..errors import NotSolvedError
 from ..friction.fourier import synthesis
+from ..friction.law import require_coulomb
 from .linear.condensation import condense, with_springs
 from .model import ReducedModel
 from .node_gradients import size_by_force, transposed_flexibility
@@ -57,6 +58,7 @@ def tractions(model: ReducedModel, solution: Solution, probe: int = 0) -> Tracti
     """Admissible friction forces and the derivative of the response by them, from one adjoint
     solve.
     """
+    require_coulomb(model.elements, "the range of static friction forces")
     balance = Balance(model, condense(model, solution.omega, solution.harmonics), solution.samples)
     state = evaluate_balance(balance, solution.w)
     shares = state.forces.shares

@@ -16,12 +16,14 @@ from dataclasses import replace
 import numpy as np
 
 from ..errors import InputError
-from ..friction.fourier import synthesis
+from ..friction.fourier import synthesis, to_complex
 from ..friction.time_step import second_period
 from .linear.bodies import Stack, flexibility
 from .linear.woodbury import bodies_of
 from .model import ReducedModel
+from .policy import uses_coulomb_kernels
 from .solution import Solution
+from .solver.residual import contact_forces
 
 __all__ = ["overtones"]
 
@@ -61,7 +63,11 @@ def _harmonics(model: ReducedModel, w: np.ndarray, most: int) -> np.ndarray:
     """(most - H, p, m) complex harmonics H+1.. of the contact forces at displacements w (p, n, d,
     2H+1) [N].
     """
-    e, (p, n, d, K), S = model.elements, w.shape, INSTANTS * (most + 1)
+    if not uses_coulomb_kernels(model):
+        return _harmonics_by_law(model, w, most)
+    e = model.elements
+    p, n, d, K = w.shape
+    S = INSTANTS * (most + 1)
     tangents = e.tangents
     u = (w.reshape(-1, K) @ synthesis(K // 2, S).T).reshape(p, n, d, S)
     N = np.array(
@@ -78,6 +84,16 @@ def _harmonics(model: ReducedModel, w: np.ndarray, most: int) -> np.ndarray:
         f = np.concatenate([np.maximum(N, 0.0)[:, :, None], f], axis=2)
     high = (2 / S * synthesis(most, S)[:, K:]).T @ f.reshape(-1, S).T
     return (high[::2] - 1j * high[1::2]).reshape(most - K // 2, p, n * d)
+
+
+def _harmonics_by_law(model: ReducedModel, w: np.ndarray, most: int) -> np.ndarray:
+    """The same for any law, from its periodic state."""
+    p, n, d, K = w.shape
+    wide = np.zeros((p, n, d, 2 * most + 1))
+    wide[..., :K] = w
+    forces = [contact_forces(model, one, INSTANTS * (most + 1)).f for one in wide]
+    high = to_complex(np.array(forces))[..., K // 2 + 1 :]
+    return np.moveaxis(high, 3, 0).reshape(most - K // 2, p, n * d)
 
 
 def _motion(body: Stack, orders: np.ndarray, omegas: np.ndarray, forces: np.ndarray) -> np.ndarray:

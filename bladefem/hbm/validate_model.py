@@ -12,6 +12,7 @@ import numpy as np
 
 from ..data import Elements, PortModel, RigidBody
 from ..errors import InputError
+from ..friction.law import laws_of_nodes, require_coulomb
 
 if TYPE_CHECKING:
     from .model import ReducedModel
@@ -67,6 +68,8 @@ def check_point(model: ReducedModel, omega: float, H: int, samples: int) -> None
             "expected "
             "samples above 0 with two"
         )
+    if samples == 0:
+        require_coulomb(model.elements, "samples = 0, which locates transitions exactly,")
     highest = max((*model.excitation, *model.normal), default=0)
     if highest > H:
         raise InputError(
@@ -129,7 +132,10 @@ def _check_elements(elements: Elements, dofs: int) -> None:
                 f"elements.{name} {wrong}: expected {nodes} finite numbers"
                 f"{'' if name == 'n0' else ', none of them negative'}"
             )
+    laws_of_nodes(elements)
     _check_traction("elements.t0", elements.t0, elements)
+    if elements.t0 is not None:
+        require_coulomb(elements, "a static friction force (elements.t0)")
     if dofs == nodes * elements.tangents and np.any(elements.kn > 0):
         raise InputError(
             "elements.kn > 0 with tangential contact dofs only: expected normal dofs in the port"

@@ -296,8 +296,20 @@ class Imported:
     )
     names: tuple[str, ...] | None = quantity(
         None,
-        help="names for groups of the file that has others, such as "
+        help="names for groups, node sets and surfaces of the file that has others, such as "
         "'clamp = face_3 + face_4', 'tip = face_1'",
+    )
+    linear: str = quantity(
+        "refuse",
+        choices=("refuse", "promote", "keep"),
+        help="first-order solids: refused, promoted to second order (nodes in the middle of "
+        "straight edges), or solved as they are, far too stiff",
+    )
+    tolerance: float = quantity(
+        1e-4, "1", 1e-9, 0.05, "largest distance of matched nodes, as a share of the face's size"
+    )
+    more: tuple[str, ...] | None = quantity(
+        None, help="other files of the same model, such as 'damper = damper.inp'"
     )
 
 

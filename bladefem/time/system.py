@@ -21,6 +21,7 @@ import numpy as np
 
 from bladefem.data import Elements, PortModel
 from bladefem.errors import InputError
+from bladefem.friction.law import require_coulomb
 
 __all__ = ["System", "damper_on_platforms", "oscillator", "ring"]
 
@@ -112,6 +113,7 @@ def ring(
         InputError: the residual flexibility is not zero (keep all modes, or leave it out
             knowingly), or an odd port.
     """
+    require_coulomb(elements, "the ring of blades in time")
     if np.abs(body.residual).max() > 0:
         raise InputError(
             "body.residual: a massless flexibility has no place in time integration; keep all "
@@ -172,6 +174,7 @@ def damper_on_platforms(motion: np.ndarray, elements: Elements, mass: float) -> 
         motion: (n, H+1) complex harmonics 0..H of the platform at each element [m].
         mass: of the damper [kg].
     """
+    require_coulomb(elements, "the damper in time")
     n = len(elements.kt)
     coefficients = 2 * motion.shape[1] - 1
     drive = np.zeros((n, coefficients))

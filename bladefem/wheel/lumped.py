@@ -32,8 +32,8 @@ class LumpedBlades:
     # tip to platform, platform to disc, disc to the ground, disc to the next disc
     aerofoil: float = 1.0e6
     shank: float = 4.0e6
-    ground: float = 2.0e7
-    rim: float = 1.5e7
+    ground: float = 2.0e6
+    rim: float = 1.0e7
     # modal damping [1]
     damping: float = 1e-3
 

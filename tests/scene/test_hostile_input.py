@@ -123,8 +123,8 @@ def test_other_kinds_are_refused_without_a_mesh(tables, said):
     ("scene", "overrides", "said"),
     [
         ("wedge", ["study.own_load=true", "operation.speed=0 rpm"], "study.own_load = true"),
-        ("wedge", ["contact.kn=0 N/m"], "contact.kn_area: the normal stiffness of the right seat"),
-        ("wedge", ["contact.left.kn=0 N/m"], "of the left seat"),
+        ("wedge", ["contact.kn=0 N/m"], "contact.kn = 0 N/m: expected 1 N/m"),
+        ("wedge", ["contact.left.kn=0 N/m"], "contact.left.kn = 0 N/m"),
         ("hertz", ["study.loads=1 MN"], "the contact radius would be"),
     ],
 )

@@ -5,6 +5,8 @@ from __future__ import annotations
 from collections.abc import Iterator
 from pathlib import Path
 
+from geometry.joined_files import split_entry
+
 from ..part_materials import part_materials
 from ..tables import Scene
 from .conditions import known_diameters
@@ -21,6 +23,15 @@ def conditions(scene: Scene) -> Iterator[str]:
         )
     elif not Path(file).is_file():
         yield f"imported.file = {file!r}: there is no such file"
+    for entry in scene.imported.more or ():
+        other = split_entry(entry)[1]
+        if not Path(other).is_file():
+            yield f"imported.more = {entry!r}: there is no file '{other}'"
+    if scene.mesh.order == 1 and not is_drawing(scene):
+        yield (
+            "mesh.order = 1: a mesh file keeps the order of its elements, expected mesh.order = 2; "
+            "imported.linear says what becomes of first-order ones"
+        )
     if not any(scene.imported.axis):
         yield "imported.axis = 0, 0, 0: expected a direction"
     if scene.imported.sectors in (1, 2):

@@ -310,6 +310,9 @@ def response_points(
     """A sweep of a band [Hz], sorted by frequency; an accuracy of 1 asks for no more than the place
     of the peak.
 
+    Where several motions were followed, their points have a `branch`, and stand in place of those
+    that the sweep solved before.
+
     Raises:
         NotSolvedError: no point converged.
     """
@@ -324,6 +327,8 @@ def response_points(
         options=sufficient(accuracy),
     )
     points = sorted(swept, key=lambda s: s.omega)
+    if any(p.branch for p in points):
+        points = [p for p in points if p.branch or not p.converged]
     if not any(p.converged for p in points):
         raise NotSolvedError(
             f"no point between {band[0]:.5g} and {band[1]:.5g} Hz was solved; "

@@ -15,6 +15,7 @@ from functools import cache, lru_cache
 import numpy as np
 
 from ...data import Elements, PortModel, RigidBody
+from ...friction.law import merged_laws
 from ...hbm.model import ReducedModel
 from ...reduction.assemble import recombine
 from ...reduction.truncate import truncated
@@ -158,6 +159,7 @@ def joined(e: Elements, groups: np.ndarray) -> Elements:
         mu=np.where(
             pressed > 0, limit / np.where(pressed > 0, pressed, 1.0), _means(e, groups) @ e.mu
         ),
+        law=merged_laws(e, groups),
     )
 
 

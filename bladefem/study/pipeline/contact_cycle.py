@@ -19,6 +19,7 @@ from ...friction.aft import Forces, evaluate
 from ...friction.energy import free_static_force
 from ...friction.equivalent_linear import Approximation, by_harmonic, from_harmonics, work_of
 from ...friction.fourier import synthesis
+from ...friction.law import select_elements
 from ..adaptive.family import joined
 from .assemble_model import LoadCase
 from .loads import Curve
@@ -119,15 +120,16 @@ def contact_cycle(
         {patch.name: _loop(elements, w, some) for patch, some in zip(patches, rows, strict=True)},
         _dealt(averaged, groups, part),
         _dealt(each, groups, part),
-        Elements(
-            elements.kt[groups] * part,
-            elements.kn[groups] * part,
-            elements.mu[groups],
-            elements.n0[groups] * part,
-            elements.tangents,
-        ),
+        _dealt_elements(elements, groups, part),
         mismatch,
     )
+
+
+def _dealt_elements(elements: Elements, groups: np.ndarray, part: np.ndarray) -> Elements:
+    """The elements of all nodes, each with its part of that of its group."""
+    each = select_elements(elements, groups)
+    t0 = None if each.t0 is None else each.t0 * part[:, None]
+    return replace(each, kt=each.kt * part, kn=each.kn * part, n0=each.n0 * part, t0=t0)
 
 
 def _linear(

@@ -11,6 +11,8 @@ from dataclasses import dataclass, is_dataclass, replace
 from pathlib import Path
 from typing import Any
 
+from geometry.joined_files import split_entry
+
 from ...io.stage_cache import code_of, key_of
 from ...scene.fields import value_at
 from ...scene.kinds import kind_named
@@ -118,7 +120,7 @@ def stage_key(name: str, scene: Scene, *more: Any) -> str:
     """
     values = [_without(scene, field, STAGE_INPUTS[name]) for field in declared_fields(name, scene)]
     keys = [stage_key(earlier, scene) for earlier in STAGE_INPUTS[name].after]
-    stamp = _file_stamp(scene) if name == "mesh" else 0.0
+    stamp = _file_stamp(scene) if name == "mesh" else []
     return key_of(name, keys, values, code_of(*STAGE_INPUTS[name].code), stamp, *more)
 
 
@@ -139,7 +141,10 @@ def _without(scene: Scene, field: str, inputs: StageInputs) -> Any:
     return replace(value, **{name.rpartition(".")[2]: None for name in left_out})
 
 
-def _file_stamp(scene: Scene) -> float:
-    """An imported file counts by its time of change too."""
-    file = Path(scene.imported.file)
-    return file.stat().st_mtime if scene.imported.file and file.exists() else 0.0
+def _file_stamp(scene: Scene) -> list[float]:
+    """Imported files count by their times of change too."""
+    if not scene.imported.file:
+        return []
+    entries = [split_entry(entry)[1] for entry in scene.imported.more or ()]
+    files = [Path(name) for name in (scene.imported.file, *entries)]
+    return [file.stat().st_mtime if file.exists() else 0.0 for file in files]

@@ -1,0 +1,58 @@
+"""Reference frequencies of the decks in tests/fem/decks.py by CalculiX (apt install calculix-ccx).
+
+    python benchmarks/fem_decks.py          writes tests/fem/ccx_decks.json
+
+Modes of three nodal diameters of a ring sector, one of twelve: C3D20, C3D20R, C3D15 with C3D20,
+C3D10, and C3D4 promoted to C3D10.
+"""
+
+from __future__ import annotations
+
+import json
+import os
+import subprocess
+import sys
+import tempfile
+from pathlib import Path
+
+HERE = Path(__file__).resolve().parent
+TESTS = HERE.parent / "tests" / "fem"
+GOLDEN = TESTS / "ccx_decks.json"
+COUNT = 6
+DIAMETERS = (0, 1, 2, 3)
+
+
+def reference(kind: str, element_type: str | None, folder: Path) -> dict[str, list[float]]:
+    """Frequencies [Hz] of each nodal diameter."""
+    import decks
+    from fem_ccx import ccx_frequencies
+
+    mesh = decks.model("c3d10" if kind == "c3d4" else kind)
+    if kind == "c3d4":
+        mesh = decks.promoted(decks.model("c3d4"))
+    (folder / "job.inp").write_text(decks.ccx_job(mesh, DIAMETERS, COUNT, element_type))
+    environment = {**os.environ, "OMP_NUM_THREADS": "1"}
+    subprocess.run(
+        ["ccx", "-i", "job"], cwd=folder, check=True, capture_output=True, env=environment
+    )
+    found = ccx_frequencies((folder / "job.dat").read_text())
+    return {str(n): found[n][:COUNT].tolist() for n in DIAMETERS}
+
+
+def main() -> None:
+    """Write the reference file."""
+    sys.path[:0] = [str(TESTS), str(HERE), str(HERE.parent)]
+    cases = {
+        "c3d20": ("c3d20", None),
+        "c3d20r": ("c3d20", "C3D20R"),
+        "c3d15_c3d20": ("c3d15_c3d20", None),
+        "c3d10": ("c3d10", None),
+        "c3d4": ("c3d4", None),
+    }
+    with tempfile.TemporaryDirectory() as name:
+        out = {case: reference(*how, Path(name)) for case, how in cases.items()}
+    GOLDEN.write_text(json.dumps(out, indent=1) + "\n")
+
+
+if __name__ == "__main__":
+    main()

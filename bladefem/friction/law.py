@@ -1,0 +1,283 @@
+"""A friction law of one's own: what it has to say, and which element follows which law.
+
+Without a law of their own (`Elements.law` is None) elements follow Coulomb's, for which there are
+compiled kernels. Any other rate-independent law is an object with the method `step`, see
+`FrictionLaw`; `bladefem.friction.periodic_law` finds its periodic state, and every path of the
+balance, its derivatives and the sweeps then use it. `docs/extending.md` shows Dahl's and Bouc and
+Wen's.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+from numba import njit
+
+from bladefem.data import Elements
+from bladefem.errors import InputError
+
+__all__ = [
+    "FrictionLaw",
+    "NodeLaw",
+    "Slopes",
+    "groups_by_law",
+    "laws_of_nodes",
+    "merged_laws",
+    "require_coulomb",
+    "select_elements",
+    "slopes_of",
+]
+
+# Step of the differences over the size of the variable: rounding leaves 1e-10 of the derivative,
+# and an increment that is shorter than the step, where laws have a kink, 1e-6.
+DIFFERENCE = 1e-6
+
+
+@dataclass(frozen=True)
+class Slopes:
+    """Derivatives of the new state (n, s) of a step."""
+
+    # (n, s, s) with the state before
+    state: np.ndarray
+    # (n, s, t) with the increment of the displacement [1/m times the state]
+    increment: np.ndarray
+    # (n, s) with the normal load before [1/N times the state]
+    before: np.ndarray
+    # (n, s) with the normal load now [1/N times the state]
+    load: np.ndarray
+
+
+class FrictionLaw:
+    """A rate-independent law for n nodes of t tangents; inherit from it and write `step`.
+
+    The state of a node is s numbers, by default its tangential force [N], and starts from zero.
+    Where the contact is open the state is zero and `step` is not called; in a step in which it
+    closes, the increment is the part after the contact and the load before is zero.
+    """
+
+    # s; None: as many as tangents
+    variables: int | None = None
+
+    def step(
+        self,
+        state: np.ndarray,
+        increment: np.ndarray,
+        before: np.ndarray,
+        load: np.ndarray,
+        elements: Elements,
+    ) -> np.ndarray:
+        """The state (n, s) after a straight increment (n, t) [m] under loads (n,) before and now [N].
+
+        Args:
+            elements: the n elements of this law, with kt, mu, n0 as parameters.
+        """
+        raise NotImplementedError(f"{type(self).__name__}: expected a method step")
+
+    def force(
+        self, state: np.ndarray, motion: np.ndarray, load: np.ndarray, elements: Elements
+    ) -> np.ndarray:
+        """(n, t) tangential force [N] in a state at the displacement (n, t) [m] and load (n,)
+        [N].
+        """
+        return state[:, : motion.shape[1]]
+
+    def slopes(
+        self,
+        state: np.ndarray,
+        increment: np.ndarray,
+        before: np.ndarray,
+        load: np.ndarray,
+        elements: Elements,
+    ) -> Slopes | None:
+        """Derivatives of `step`; None: they are found by differences."""
+        return None
+
+    def slipping(
+        self, old: np.ndarray, state: np.ndarray, increment: np.ndarray, elements: Elements
+    ) -> np.ndarray:
+        """(n,) True where the step from the old state slipped; a law without a stick state always
+        does.
+        """
+        return np.ones(len(state), dtype=bool)
+
+
+@dataclass(frozen=True)
+class NodeLaw(FrictionLaw):
+    """A law from a function of one node, plain or compiled by numba.njit.
+
+    The function is called as function(state, increment, before, load, kt, mu, new) with arrays (s,)
+    and (t,), and fills new (s,). The derivative, where given, is called likewise and fills
+    (s, s + t + 2): by state, increment, load before, load now.
+    """
+
+    function: Callable[..., None]
+    derivative: Callable[..., None] | None = None
+    variables: int | None = None
+
+    def step(
+        self,
+        state: np.ndarray,
+        increment: np.ndarray,
+        before: np.ndarray,
+        load: np.ndarray,
+        elements: Elements,
+    ) -> np.ndarray:
+        """The function, node after node."""
+        new = np.empty_like(state)
+        loop = _loop_of(self.function)
+        loop(self.function, state, increment, before, load, elements.kt, elements.mu, new)
+        return new
+
+    def slopes(
+        self,
+        state: np.ndarray,
+        increment: np.ndarray,
+        before: np.ndarray,
+        load: np.ndarray,
+        elements: Elements,
+    ) -> Slopes | None:
+        """The derivative, node after node."""
+        if self.derivative is None:
+            return None
+        n, s = state.shape
+        t = increment.shape[1]
+        out = np.zeros((n, s, s + t + 2))
+        loop = _loop_of(self.derivative)
+        loop(self.derivative, state, increment, before, load, elements.kt, elements.mu, out)
+        return Slopes(out[:, :, :s], out[:, :, s : s + t], out[:, :, s + t], out[:, :, s + t + 1])
+
+
+def _each_node(function, state, increment, before, load, kt, mu, out):
+    """Call the function of one node for all of them."""
+    for i in range(state.shape[0]):
+        function(state[i], increment[i], before[i], load[i], kt[i], mu[i], out[i])
+
+
+_each_node_compiled = njit(_each_node)
+
+
+def _loop_of(function: Callable[..., None]) -> Callable[..., None]:
+    """The loop over nodes, compiled where the function is."""
+    return _each_node_compiled if hasattr(function, "py_func") else _each_node
+
+
+def slopes_of(
+    law: FrictionLaw,
+    state: np.ndarray,
+    increment: np.ndarray,
+    before: np.ndarray,
+    load: np.ndarray,
+    elements: Elements,
+    sizes: np.ndarray,
+) -> Slopes:
+    """The law's own derivatives, else central differences.
+
+    Args:
+        sizes: (n,) displacement [m] that the law resolves; states and loads follow from it and the
+            stiffness.
+    """
+    own = law.slopes(state, increment, before, load, elements)
+    if own is not None:
+        return own
+    n, s = state.shape
+    t = increment.shape[1]
+    move = DIFFERENCE * sizes
+    push = DIFFERENCE * np.maximum(abs(state).max(axis=1), elements.kt * sizes)
+    args = (state, increment, before, load)
+
+    def change(which: int, column: int | None, step: np.ndarray) -> np.ndarray:
+        """(n, s) derivative with one column of an argument."""
+        ends = []
+        for sign in (1.0, -1.0):
+            moved = [x.copy() for x in args]
+            part = moved[which] if column is None else moved[which][:, column]
+            part += sign * step
+            ends.append(law.step(*moved, elements))
+        return (ends[0] - ends[1]) / (2 * np.where(step > 0, step, 1.0))[:, None]
+
+    by_state = np.stack([change(0, c, push) for c in range(s)], axis=2)
+    by_increment = np.stack([change(1, c, move) for c in range(t)], axis=2)
+    return Slopes(
+        by_state,
+        by_increment,
+        change(2, None, DIFFERENCE * before),
+        change(3, None, DIFFERENCE * load),
+    )
+
+
+def laws_of_nodes(elements: Elements) -> tuple[FrictionLaw | None, ...]:
+    """(n,) the law of each node; None is Coulomb's.
+
+    Raises:
+        InputError: as many laws as nodes are expected, each an object with the method step.
+    """
+    law: Any = elements.law
+    n = len(elements.kt)
+    laws = tuple(law) if isinstance(law, tuple | list) else (law,) * n
+    if len(laws) != n:
+        raise InputError(f"elements.law: {len(laws)} laws for {n} elements, expected one a node")
+    for one in laws:
+        if one is not None and not (
+            callable(getattr(one, "step", None)) and not isinstance(one, type)
+        ):
+            raise InputError(
+                f"elements.law: {one!r}, expected an object made from FrictionLaw, or None for "
+                "Coulomb's law"
+            )
+    return laws
+
+
+def groups_by_law(elements: Elements) -> list[tuple[FrictionLaw | None, np.ndarray]]:
+    """Each law with the numbers of its nodes."""
+    if elements.law is None:
+        return [(None, np.arange(len(elements.kt)))]
+    laws = laws_of_nodes(elements)
+    different = {id(law): law for law in laws}
+    return [
+        (law, np.array([i for i, other in enumerate(laws) if other is law]))
+        for law in different.values()
+    ]
+
+
+def select_elements(elements: Elements, rows: np.ndarray) -> Elements:
+    """Some of the elements, or some of them more than once."""
+    law = elements.law
+    if isinstance(law, tuple | list):
+        law = tuple(law[i] for i in rows)
+    parts = {name: np.asarray(getattr(elements, name))[rows] for name in ("kt", "kn", "mu", "n0")}
+    t0 = None if elements.t0 is None else np.asarray(elements.t0)[rows]
+    return replace(elements, **parts, law=law, t0=t0)
+
+
+def merged_laws(elements: Elements, groups: np.ndarray) -> Any:
+    """The law of elements that are joined in groups (n,) numbered 0 .. m-1.
+
+    Raises:
+        InputError: nodes of different laws in one group.
+    """
+    if not isinstance(elements.law, tuple | list):
+        return elements.law
+    laws = laws_of_nodes(elements)
+    merged = [laws[int(np.argmax(groups == group))] for group in range(int(groups.max()) + 1)]
+    for node, group in enumerate(groups):
+        if laws[node] is not merged[group]:
+            raise InputError(
+                f"elements.law: nodes of different laws in element {group}, expected one law for "
+                "the nodes that are joined"
+            )
+    return tuple(merged)
+
+
+def require_coulomb(elements: Elements, what: str) -> None:
+    """Raise InputError, with what asks for it, where an element follows another law."""
+    if elements.law is None:
+        return
+    others = [type(law).__name__ for law in laws_of_nodes(elements) if law is not None]
+    if others:
+        raise InputError(
+            f"elements.law: {what} is written for Coulomb's law, {len(others)} elements follow "
+            f"{', '.join(sorted(set(others)))}"
+        )

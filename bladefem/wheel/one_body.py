@@ -1,0 +1,135 @@
+"""A small mistuned wheel as one body with its own normal modes, for the balance of `bladefem.hbm`:
+the compiled way where few contacts are solved at thousands of points.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from scipy import linalg
+
+from ..data import PortModel, RigidBody
+from ..errors import InputError
+from ..hbm.linear.bodies import Damping
+from ..hbm.model import ReducedModel
+from ..reduction.assemble import join
+from .model import Pattern, Wheel, pattern_elements
+
+__all__ = ["one_body_model"]
+
+# residual flexibility of the blade readings over that of their modes: no deviation acts on it
+NEGLIGIBLE = 1e-9
+PORTS = ("contact", "blade", "load", "probe")
+
+
+def one_body_model(wheel: Wheel, pattern: Pattern, coupled_damping: bool = False) -> ReducedModel:
+    """The balance's model of all sectors, blade after blade in every port.
+
+    Args:
+        coupled_damping: keep what couples the mistuned modes of the tuned modes' damping; small
+            next to the frequency differences for a small scatter, and expensive.
+
+    Raises:
+        InputError: deviations act on a residual flexibility, or the damping or the aerodynamic
+            influence has no such form.
+    """
+    if wheel.influence is not None or np.any(wheel.damping.structural):
+        raise InputError("influence, damping.structural: expected neither in a wheel as one body")
+    shapes, omega, viscous = _real_modes(wheel)
+    rows = _port_rows(wheel)
+    residual = _real_residual(wheel)
+    values, V = _mistuned(pattern, omega, shapes, residual, rows["blade"])
+    if values.min() < 0:
+        raise InputError("pattern: deviations make a blade unstable, expected smaller ones")
+    C = (V.T * viscous) @ V
+    order = np.concatenate([rows[name] for name in ("contact", "load", "probe")])
+    ends = np.cumsum([0] + [len(rows[name]) for name in ("contact", "load", "probe")])
+    ports = {
+        name: slice(int(a), int(b))
+        for name, a, b in zip(("contact", "load", "probe"), ends[:-1], ends[1:], strict=True)
+    }
+    body = PortModel(
+        np.sqrt(values),
+        shapes[order] @ V,
+        residual[np.ix_(order, order)],
+        ports,
+        damping=C if coupled_damping else np.diag(C).copy(),
+    )
+    return ReducedModel(
+        (body,),
+        pattern_elements(wheel, pattern),
+        {h: np.asarray(f).ravel() for h, f in wheel.excitation.items()},
+        Damping(),
+        _all_dampers(wheel),
+        wheel.damper_damping,
+        hold=wheel.hold,
+        coupled=wheel.coupled,
+    )
+
+
+def _all_dampers(wheel: Wheel) -> RigidBody | tuple[PortModel, ...] | None:
+    if isinstance(wheel.damper, RigidBody):
+        ones = np.eye(wheel.count)
+        return RigidBody(np.kron(ones, wheel.damper.mass), np.kron(ones, wheel.damper.B))
+    return None if wheel.damper is None else (join((wheel.damper,) * wheel.count),)
+
+
+def _port_rows(wheel: Wheel) -> dict[str, np.ndarray]:
+    """Rows of each port in arrays that hold all ports of sector 0, then of sector 1, ..."""
+    body = wheel.sectors[0]
+    size = len(body.residual)
+    sectors = size * np.arange(wheel.count)[:, None]
+    everything = np.arange(size)
+    return {
+        name: (sectors + everything[body.ports.get(name, slice(0, 0))]).ravel() for name in PORTS
+    }
+
+
+def _real_modes(wheel: Wheel) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Shapes (N P, N k), circular frequencies and damping (N k,) of the tuned wheel, real."""
+    count = wheel.count
+    columns = []
+    omega = []
+    viscous = []
+    for d, body in wheel.sectors.items():
+        turn = np.exp(2j * np.pi * d * np.arange(count) / count)
+        wave = (turn[:, None, None] * body.shapes).reshape(-1, len(body.omega)) / np.sqrt(count)
+        single = 2 * d % count == 0
+        parts = [wave.real] if single else [np.sqrt(2) * wave.real, np.sqrt(2) * wave.imag]
+        damping = wheel.damping.viscous(body.omega)
+        if body.damping is not None:
+            if body.damping.ndim == 2:
+                raise InputError("sectors: coupled modal damping, expected one number a mode")
+            damping = damping + body.damping
+        columns += parts
+        omega += [body.omega] * len(parts)
+        viscous += [damping] * len(parts)
+    return np.hstack(columns), np.concatenate(omega), np.concatenate(viscous)
+
+
+def _real_residual(wheel: Wheel) -> np.ndarray:
+    """(N P, N P) residual flexibility of all sectors."""
+    count = wheel.count
+    half = np.array([wheel.sectors[d].residual for d in range(count // 2 + 1)])
+    blocks = np.concatenate([half, half[count - len(half) : 0 : -1].conj()])
+    by_distance = np.fft.ifft(blocks, axis=0).real
+    sectors = np.arange(count)
+    full = by_distance[(sectors[:, None] - sectors) % count]
+    return full.transpose(0, 2, 1, 3).reshape(count * half.shape[1], -1)
+
+
+def _mistuned(
+    pattern: Pattern, omega: np.ndarray, shapes: np.ndarray, residual: np.ndarray, rows: np.ndarray
+) -> tuple[np.ndarray, np.ndarray]:
+    """Eigenvalues and vectors of the mistuned wheel in its tuned modes."""
+    K = np.diag(omega**2)
+    M = np.eye(len(omega))
+    if pattern.tuned:
+        return omega**2, M
+    readings = shapes[rows]
+    static = (readings[:, omega > 0] / omega[omega > 0] ** 2) @ readings[:, omega > 0].T
+    if abs(residual[np.ix_(rows, rows)]).max() > NEGLIGIBLE * abs(static).max():
+        raise InputError("pattern: expected all modes of the blade readings in a wheel as one body")
+    for matrix, change in ((K, pattern.stiffness), (M, pattern.mass)):
+        if change is not None:
+            matrix += readings.T @ linalg.block_diag(*change) @ readings
+    return linalg.eigh(K, M)

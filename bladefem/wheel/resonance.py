@@ -1,0 +1,118 @@
+"""The highest amplitude of any blade over a band of frequencies, closed in to a tolerance.
+
+Near a resonance 1/amplitude^2 is a parabola of the frequency: three points predict a maximum, which
+is then solved. The search ends when no blade is predicted to gain more than the tolerance.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+
+from ..errors import InputError
+
+__all__ = ["WheelPeak", "find_wheel_peak"]
+
+# points added to the first grid before the search is given up
+MOST = 40
+# points closer than this are not told apart, relative
+NEAR = 1e-7
+
+# amplitudes (N,) of the blades at a circular frequency, NaN where it was not solved
+Respond = Callable[[float], np.ndarray]
+
+
+@dataclass(frozen=True)
+class WheelPeak:
+    """The highest point of the response of all blades."""
+
+    # [rad/s]
+    omega: float
+    # [m]
+    height: float
+    # number of the blade
+    blade: int
+    # (N,) highest amplitude of each blade over the points that were solved [m]
+    by_blade: np.ndarray
+    # (k,) circular frequencies and (k, N) amplitudes of all points, ascending
+    omegas: np.ndarray
+    sizes: np.ndarray
+    # points that were not solved, which the peak leaves out
+    unsolved: int
+    # predicted gain of height that was not looked for
+    gain: float
+
+    @property
+    def closed_in(self) -> bool:
+        """The maximum lies inside the band."""
+        return self.omegas[0] < self.omega < self.omegas[-1]
+
+
+def find_wheel_peak(respond: Respond, grid: np.ndarray, tolerance: float = 5e-3) -> WheelPeak:
+    """The highest amplitude over a band.
+
+    Args:
+        grid: (k,) first circular frequencies, ascending, at least three.
+        tolerance: relative gain of height that is not looked for.
+
+    Raises:
+        InputError: too few frequencies.
+    """
+    if len(grid) < 3 or np.any(np.diff(grid) <= 0):
+        raise InputError(f"grid of {len(grid)} frequencies: expected at least 3, ascending")
+    omegas = [float(w) for w in grid]
+    sizes = [respond(w) for w in omegas]
+    gain = 0.0
+    for _ in range(MOST + 1):
+        order = np.argsort(omegas)
+        w = np.array(omegas)[order]
+        a = np.array(sizes)[order]
+        solved = np.isfinite(a).all(axis=1)
+        target, gain = _next_frequency(w[solved], a[solved])
+        if target is None or gain <= tolerance or len(omegas) >= len(grid) + MOST:
+            break
+        omegas.append(target)
+        sizes.append(respond(target))
+    heights = np.where(solved[:, None], a, -np.inf)
+    point, blade = np.unravel_index(int(np.argmax(heights)), heights.shape)
+    return WheelPeak(
+        float(w[point]),
+        float(heights[point, blade]),
+        int(blade),
+        heights.max(axis=0),
+        w,
+        a,
+        int((~solved).sum()),
+        float(gain),
+    )
+
+
+def _next_frequency(w: np.ndarray, a: np.ndarray) -> tuple[float | None, float]:
+    """Where the highest maximum of any blade is predicted, and its gain over the highest point."""
+    if len(w) < 3:
+        return None, 0.0
+    y = 1 / np.maximum(a, np.finfo(float).tiny) ** 2
+    middle = slice(1, -1)
+    is_peak = (a[middle] >= a[:-2]) & (a[middle] >= a[2:])
+    left = (w[middle] - w[:-2])[:, None]
+    right = (w[2:] - w[middle])[:, None]
+    down = (y[middle] - y[:-2]) / left
+    up = (y[2:] - y[middle]) / right
+    bend = (up - down) / (left + right)
+    slope = (down * right + up * left) / (left + right)
+    with np.errstate(divide="ignore", invalid="ignore"):
+        step = np.where(bend > 0, -slope / (2 * bend), 0.0)
+        # half-way at most: the parabola is the three points' only
+        step = np.clip(step, -0.5 * left, 0.5 * right)
+        bottom = y[middle] + slope * step + bend * step**2
+        predicted = np.where(is_peak & (bottom > 0), bottom, np.inf) ** -0.5
+    far = abs(step) > NEAR * w[middle, None]
+    predicted = np.where(far, predicted, 0.0)
+    i, blade = np.unravel_index(int(np.argmax(predicted)), predicted.shape)
+    gain = predicted[i, blade] / a.max() - 1
+    if not np.isfinite(gain):
+        # a parabola without positive bottom: look at it
+        gain = 1.0
+    return float(w[1 + i] + step[i, blade]), float(gain)

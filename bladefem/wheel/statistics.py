@@ -1,0 +1,218 @@
+"""What scatter does to a wheel with dampers: amplification of the highest blade over the tuned
+wheel, for each damper load, with intervals of confidence, and the load that is best for a share of
+all wheels.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from scipy import stats
+
+from ..errors import InputError
+from ..hbm.linear.bodies import flexibility
+from ..hbm.model import ReducedModel
+from ..hbm.solve import solve
+from ..hbm.solver.newton import DEFAULTS, Options
+from .model import Pattern, Wheel
+from .one_body import one_body_model
+from .resonance import Respond, WheelPeak, find_wheel_peak
+from .solve import TUNED, WheelSolution, solve_wheel
+
+__all__ = [
+    "Amplification",
+    "Quantile",
+    "best_load",
+    "free_respond",
+    "one_body_respond",
+    "peak_of_pattern",
+    "quantile",
+    "scatter_statistics",
+    "wheel_respond",
+]
+
+CONFIDENCE = 0.95
+
+
+@dataclass(frozen=True)
+class Quantile:
+    """A quantile of a sample with its interval of confidence."""
+
+    value: float
+    low: float
+    high: float
+
+
+@dataclass(frozen=True)
+class Amplification:
+    """Peaks of many wheels under several damper loads; L loads, W wheels."""
+
+    # (L,) [N]
+    loads: np.ndarray
+    # (L,) peak of the tuned wheel [m], and where [rad/s]
+    tuned: np.ndarray
+    tuned_omega: np.ndarray
+    # (L, W) peak of the highest blade [m], its number, and where [rad/s]
+    peak: np.ndarray
+    blade: np.ndarray
+    omega: np.ndarray
+    # (L, W) points that were not solved, and points altogether
+    unsolved: np.ndarray
+    points: np.ndarray
+
+    @property
+    def factor(self) -> np.ndarray:
+        """(L, W) amplification over the tuned wheel under the same load [1]."""
+        return self.peak / self.tuned[:, None]
+
+    def quantiles(self, share: float) -> list[Quantile]:
+        """Of the amplification under each load."""
+        return [quantile(row, share) for row in self.factor]
+
+
+def quantile(sample: np.ndarray, share: float, confidence: float = CONFIDENCE) -> Quantile:
+    """A quantile, with the distribution-free interval of order statistics.
+
+    Between order statistics i and j lies the quantile with the probability that a binomial count
+    falls between them (David and Nagaraja, Order Statistics, 2003, Sect. 7.1). Where the sample is
+    too small for the wanted confidence the interval ends are the extremes, or infinite.
+    """
+    ordered = np.sort(np.asarray(sample, dtype=float))
+    n = len(ordered)
+    tail = (1 - confidence) / 2
+    low = int(stats.binom.ppf(tail, n, share))
+    high = int(stats.binom.ppf(1 - tail, n, share)) + 1
+    value = float(np.quantile(ordered, share))
+    return Quantile(
+        value,
+        float(ordered[low - 1]) if low >= 1 else -np.inf,
+        float(ordered[high - 1]) if high <= n else np.inf,
+    )
+
+
+def scatter_statistics(
+    wheels: Mapping[float, Wheel],
+    patterns: Mapping[float, Sequence[Pattern]],
+    grid: Callable[[float], np.ndarray],
+    respond: Callable[[Wheel, Pattern], Respond],
+    comm: object = None,
+    tolerance: float = 5e-3,
+) -> Amplification:
+    """Peaks of all patterns under all loads; wheels are dealt out over the ranks.
+
+    Args:
+        wheels: damper load [N] to the tuned wheel under it.
+        patterns: damper load to the patterns, as many for each.
+        grid: damper load to the first circular frequencies of the search.
+        respond: what solves one pattern at one frequency.
+        tolerance: relative error of a peak's height by the search.
+    """
+    loads = list(wheels)
+    sizes = {len(patterns[load]) for load in loads}
+    if len(sizes) != 1 or not loads:
+        raise InputError(f"patterns: {sorted(sizes)} for the loads, expected the same number")
+    rank, ranks = (comm.rank, comm.size) if comm is not None else (0, 1)
+    shape = (len(loads), sizes.pop())
+    parts = [np.zeros(shape) for _ in range(5)]
+    tuned = np.zeros((2, len(loads)))
+    for i, load in enumerate(loads):
+        wheel = wheels[load]
+        mine = range(rank, shape[1], ranks)
+        reference = find_wheel_peak(respond(wheel, TUNED), grid(load), tolerance)
+        tuned[:, i] = reference.height, reference.omega
+        for j in mine:
+            peak = find_wheel_peak(respond(wheel, patterns[load][j]), grid(load), tolerance)
+            row = (peak.height, peak.blade, peak.omega, peak.unsolved, len(peak.omegas))
+            for part, value in zip(parts, row, strict=True):
+                part[i, j] = value
+    if comm is not None:
+        parts = [comm.allreduce(part) for part in parts]
+    peaks, blades, omegas, unsolved, points = parts
+    return Amplification(
+        np.array(loads),
+        tuned[0],
+        tuned[1],
+        peaks,
+        blades.astype(int),
+        omegas,
+        unsolved.astype(int),
+        points.astype(int),
+    )
+
+
+def best_load(loads: np.ndarray, heights: np.ndarray) -> tuple[float, float]:
+    """The load with the smallest height, between the loads by a parabola in the logarithms."""
+    i = int(np.argmin(heights))
+    if i in (0, len(loads) - 1):
+        return float(loads[i]), float(heights[i])
+    x = np.log(loads[i - 1 : i + 2])
+    y = np.log(heights[i - 1 : i + 2])
+    c = np.polyfit(x - x[1], y, 2)
+    if not c[0] > 0:
+        return float(loads[i]), float(heights[i])
+    step = float(np.clip(-c[1] / (2 * c[0]), x[0] - x[1], x[2] - x[1]))
+    return float(np.exp(x[1] + step)), float(np.exp(np.polyval(c, step)))
+
+
+def peak_of_pattern(
+    wheel: Wheel, pattern: Pattern, grid: np.ndarray, H: int, samples: int, tolerance: float = 5e-3
+) -> WheelPeak:
+    """The highest blade of one pattern, by the whole wheel's own balance."""
+    return find_wheel_peak(wheel_respond(wheel, pattern, H, samples), grid, tolerance)
+
+
+def wheel_respond(
+    wheel: Wheel, pattern: Pattern, H: int, samples: int, options: Options = DEFAULTS
+) -> Respond:
+    """Amplitudes by the matrix-free balance, each point from the nearest one solved."""
+    known: list[WheelSolution] = []
+
+    def respond(omega: float) -> np.ndarray:
+        start = min(known, key=lambda s: abs(s.omega - omega), default=None)
+        point = solve_wheel(wheel, omega, H, samples, pattern=pattern, start=start, options=options)
+        if not point.converged:
+            return np.full(wheel.count, np.nan)
+        known.append(point)
+        return point.size()
+
+    return respond
+
+
+def one_body_respond(
+    wheel: Wheel, pattern: Pattern, H: int, samples: int, options: Options = DEFAULTS
+) -> Respond:
+    """Amplitudes by the balance of `bladefem.hbm` on one body: small wheels, thousands of points."""
+    model = one_body_model(wheel, pattern)
+    known: list = []
+
+    def respond(omega: float) -> np.ndarray:
+        start = min(known, key=lambda s: abs(s.omega - omega), default=None)
+        point = solve(model, omega, H, samples, start=start, options=options)
+        if not point.converged:
+            return np.full(wheel.count, np.nan)
+        known.append(point)
+        return _blade_sizes(point.probe, wheel.count)
+
+    return respond
+
+
+def free_respond(wheel: Wheel, pattern: Pattern) -> Respond:
+    """Amplitudes without contact forces, by the modes of the mistuned wheel."""
+    model: ReducedModel = one_body_model(wheel, pattern)
+    H = max((1, *model.excitation))
+    blades = model.blades(H)
+    force = blades.shapes[0, blades.load].T @ model.loads(H).T
+
+    def respond(omega: float) -> np.ndarray:
+        modal = flexibility(blades, omega * np.arange(H + 1)).T * force
+        return _blade_sizes((blades.shapes[0, blades.probe] @ modal).T, wheel.count)
+
+    return respond
+
+
+def _blade_sizes(probe: np.ndarray, count: int) -> np.ndarray:
+    """(N,) sizes of the first probe of each blade from amplitudes (H+1, N probes)."""
+    moving = probe[1:].reshape(len(probe) - 1, count, -1)[:, :, 0]
+    return np.linalg.norm(moving, axis=0)

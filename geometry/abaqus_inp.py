@@ -1,0 +1,385 @@
+"""Reader of Abaqus and CalculiX decks (.inp): nodes, elements, sets and surfaces, flat or in parts
+and instances.
+
+Materials, sections, boundary conditions and steps are skipped: they belong to the scene. Elements
+without volume or area (springs, masses, beams, rigid bodies) are left out and counted.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from pathlib import Path
+
+import numpy as np
+
+from bladefem.errors import InputError
+
+from .abaqus_deck import Keyword, deck_error, keywords_of
+from .raw_mesh import RawMesh, from_vtk_order
+
+__all__ = ["read_inp"]
+
+# element type up to its first letter behind the number of nodes -> meshio's word
+SOLIDS = {
+    "C3D4": "tetra",
+    "C3D10": "tetra10",
+    "C3D8": "hexahedron",
+    "C3D20": "hexahedron20",
+    "C3D27": "hexahedron27",
+    "C3D6": "wedge",
+    "C3D15": "wedge15",
+    "C3D5": "pyramid",
+    "C3D13": "pyramid13",
+}
+# triangles and quadrilaterals: shells, membranes, surface elements, plane elements
+FLAT = {3: "triangle", 6: "triangle6", 4: "quad", 8: "quad8"}
+FLAT_PREFIXES = ("S", "SFM3D", "M3D", "CPS", "CPE", "CPEG", "CAX", "STRI", "R3D", "DS", "CPT")
+# corners of the faces S1, S2, ... of a cell
+FACES = {
+    "tetra": [(0, 1, 2), (0, 3, 1), (1, 3, 2), (2, 3, 0)],
+    "hexahedron": [
+        (0, 1, 2, 3),
+        (4, 7, 6, 5),
+        (0, 4, 5, 1),
+        (1, 5, 6, 2),
+        (2, 6, 7, 3),
+        (3, 7, 4, 0),
+    ],
+    "wedge": [(0, 1, 2), (3, 5, 4), (0, 3, 4, 1), (1, 4, 5, 2), (2, 5, 3, 0)],
+    "pyramid": [(0, 1, 2, 3), (0, 4, 1), (1, 4, 2), (2, 4, 3), (3, 4, 0)],
+}
+# a node or element: instance ("" outside instances), its number there
+Key = tuple[str, int]
+
+
+@dataclass
+class _Scope:
+    """A part, or the deck outside parts."""
+
+    nodes: dict[Key, list[float]] = field(default_factory=dict)
+    # meshio's word, node keys, where it is written
+    elements: dict[Key, tuple[str, list[Key]]] = field(default_factory=dict)
+    node_sets: dict[str, list[Key]] = field(default_factory=dict)
+    element_sets: dict[str, list[Key]] = field(default_factory=dict)
+    # (element set or number, face label) of each line
+    surfaces: dict[str, list[tuple[str, str]]] = field(default_factory=dict)
+    # type -> number of elements left out
+    left_out: dict[str, int] = field(default_factory=dict)
+    # surfaces made of nodes -> names of node sets
+    node_surfaces: dict[str, list[str]] = field(default_factory=dict)
+
+
+def read_inp(file: Path) -> RawMesh:
+    """Nodes, elements, sets and surfaces of a deck.
+
+    Raises:
+        InputError: a line that cannot be understood, with its file and number.
+    """
+    root = _Scope()
+    parts: dict[str, _Scope] = {}
+    scope = root
+    for keyword in keywords_of(file):
+        if keyword.name == "PART":
+            scope = parts.setdefault(keyword.options.get("NAME", "").upper(), _Scope())
+        elif keyword.name in ("END PART", "ASSEMBLY"):
+            scope = root
+        elif keyword.name == "INSTANCE":
+            _add_instance(root, parts, keyword)
+        elif keyword.name in READERS:
+            READERS[keyword.name](scope, keyword)
+    return _raw_mesh(root)
+
+
+def _read_nodes(scope: _Scope, keyword: Keyword) -> None:
+    name = keyword.options.get("NSET", "")
+    for line, fields in keyword.data:
+        try:
+            tag = int(fields[0])
+            place = [float(v.replace("D", "E").replace("d", "e") or 0) for v in fields[1:4]]
+        except ValueError:
+            raise deck_error(
+                keyword.file, line, f"'{', '.join(fields)}' is no node, expected number, x, y, z"
+            ) from None
+        scope.nodes["", tag] = [*place, 0.0, 0.0, 0.0][:3]
+        if name:
+            scope.node_sets.setdefault(name, []).append(("", tag))
+
+
+def _read_elements(scope: _Scope, keyword: Keyword) -> None:
+    kind = keyword.options.get("TYPE", "").upper()
+    word = _word_of(kind)
+    if word is None:
+        count = len(keyword.data)
+        scope.left_out[kind] = scope.left_out.get(kind, 0) + count
+        return
+    needed = int(NODE_COUNT[word])
+    name = keyword.options.get("ELSET", "")
+    values: list[int] = []
+    for line, fields in keyword.data:
+        try:
+            values += [int(v) for v in fields if v]
+        except ValueError:
+            raise deck_error(
+                keyword.file, line, f"'{', '.join(fields)}' is no element, expected whole numbers"
+            ) from None
+        if len(values) > needed + 1:
+            raise deck_error(
+                keyword.file,
+                line,
+                f"element {values[0]} has {len(values) - 1} nodes, expected {needed} of a {kind}",
+            )
+        if len(values) == needed + 1:
+            scope.elements["", values[0]] = (word, [("", v) for v in values[1:]])
+            if name:
+                scope.element_sets.setdefault(name, []).append(("", values[0]))
+            values = []
+    if values:
+        raise deck_error(
+            keyword.file,
+            keyword.data[-1][0],
+            f"element {values[0]} has {len(values) - 1} nodes, expected {needed} of a {kind}",
+        )
+
+
+NODE_COUNT = {
+    **{word: int(kind[3:]) for kind, word in SOLIDS.items()},
+    **{word: count for count, word in FLAT.items()},
+}
+
+
+def _word_of(kind: str) -> str | None:
+    """meshio's word of an element type, None for one without volume or area."""
+    letters = kind.rstrip("ABCDEFGHIJKLMNOPQRSTUVWXYZ")
+    if letters in SOLIDS:
+        return SOLIDS[letters]
+    digits = letters[len(letters.rstrip("0123456789")) :]
+    prefix = letters[: len(letters) - len(digits)]
+    if prefix in FLAT_PREFIXES and digits and int(digits) in FLAT:
+        return FLAT[int(digits)]
+    return None
+
+
+def _read_node_set(scope: _Scope, keyword: Keyword) -> None:
+    _read_set(scope.node_sets, keyword, "NSET", "node")
+
+
+def _read_element_set(scope: _Scope, keyword: Keyword) -> None:
+    _read_set(scope.element_sets, keyword, "ELSET", "element")
+
+
+def _read_set(sets: dict[str, list[Key]], keyword: Keyword, option: str, what: str) -> None:
+    name = keyword.options.get(option)
+    if not name:
+        raise deck_error(keyword.file, keyword.line, f"*{option} without a name")
+    instance = keyword.options.get("INSTANCE", "").upper()
+    known = {other.upper(): other for other in sets}
+    members = sets.setdefault(known.get(name.upper(), name), [])
+    for line, fields in keyword.data:
+        words = [v.strip("\"'") for v in fields if v]
+        if "GENERATE" in keyword.options:
+            members += [(instance, tag) for tag in _generated(words, keyword, line)]
+            continue
+        for word in words:
+            if word.lstrip("-").isdigit():
+                members.append((instance, int(word)))
+            elif word.upper() in known:
+                members += sets[known[word.upper()]]
+            else:
+                members.append(_dotted(word, keyword, line, what))
+
+
+def _generated(words: list[str], keyword: Keyword, line: int) -> range:
+    try:
+        low, high, step = [*map(int, words), 1][:3]
+        return range(low, high + 1, step)
+    except ValueError:
+        raise deck_error(
+            keyword.file, line, f"'{', '.join(words)}', expected first, last, step"
+        ) from None
+
+
+def _dotted(word: str, keyword: Keyword, line: int, what: str) -> Key:
+    """A member written as "instance.number"."""
+    instance, dot, tag = word.rpartition(".")
+    if not (dot and tag.isdigit()):
+        raise deck_error(
+            keyword.file, line, f"there is no {what} set '{word}', expected one defined before"
+        )
+    return instance.upper(), int(tag)
+
+
+def _read_surface(scope: _Scope, keyword: Keyword) -> None:
+    name = keyword.options.get("NAME")
+    if not name:
+        raise deck_error(keyword.file, keyword.line, "*SURFACE without a name")
+    kind = keyword.options.get("TYPE", "ELEMENT").upper()
+    for _, fields in keyword.data:
+        first = fields[0].strip("\"'")
+        if kind == "NODE":
+            scope.node_surfaces.setdefault(name, []).append(first)
+        elif kind == "ELEMENT":
+            label = fields[1].upper() if len(fields) > 1 else ""
+            scope.surfaces.setdefault(name, []).append((first, label))
+
+
+READERS = {
+    "NODE": _read_nodes,
+    "ELEMENT": _read_elements,
+    "NSET": _read_node_set,
+    "ELSET": _read_element_set,
+    "SURFACE": _read_surface,
+}
+
+
+def _add_instance(root: _Scope, parts: dict[str, _Scope], keyword: Keyword) -> None:
+    """Copy a part into the assembly, moved as the data lines say."""
+    name = keyword.options.get("NAME", "").upper()
+    part = parts.get(keyword.options.get("PART", "").upper())
+    if part is None:
+        raise deck_error(
+            keyword.file,
+            keyword.line,
+            f"*INSTANCE of the part '{keyword.options.get('PART', '')}' that is not there",
+        )
+    motion = _motion(keyword)
+    moved = lambda key: (name, key[1])  # noqa: E731
+    for key, place in part.nodes.items():
+        root.nodes[moved(key)] = motion[0] @ np.array(place) + motion[1]
+    for key, (word, nodes) in part.elements.items():
+        root.elements[moved(key)] = (word, [moved(node) for node in nodes])
+    for mine, theirs in (
+        (root.node_sets, part.node_sets),
+        (root.element_sets, part.element_sets),
+    ):
+        for label, members in theirs.items():
+            mine.setdefault(label, []).extend(moved(key) for key in members)
+    for label, lines in part.surfaces.items():
+        found = root.surfaces.setdefault(label, [])
+        found += [(f"{name}.{first}" if first.isdigit() else first, face) for first, face in lines]
+    for label, names in part.node_surfaces.items():
+        root.node_surfaces.setdefault(label, []).extend(names)
+    for kind, count in part.left_out.items():
+        root.left_out[kind] = root.left_out.get(kind, 0) + count
+
+
+def _motion(keyword: Keyword) -> tuple[np.ndarray, np.ndarray]:
+    """Rotation and shift of an instance: a translation, then a turn about an axis by two points."""
+    rotation = np.eye(3)
+    shift = np.zeros(3)
+    for line, fields in keyword.data:
+        try:
+            values = np.array([float(v) for v in fields if v])
+        except ValueError:
+            raise deck_error(keyword.file, line, "expected the numbers of a motion") from None
+        if len(values) == 3:
+            shift = values
+        elif len(values) == 7:
+            turn = _rotation(values[3:6] - values[:3], np.radians(values[6]))
+            rotation = turn
+            shift = turn @ (shift - values[:3]) + values[:3]
+    return rotation, shift
+
+
+def _rotation(axis: np.ndarray, angle: float) -> np.ndarray:
+    """Rotation (3, 3) about an axis (Rodrigues)."""
+    x, y, z = axis / np.linalg.norm(axis)
+    cross = np.array([[0, -z, y], [z, 0, -x], [-y, x, 0]])
+    return np.eye(3) + np.sin(angle) * cross + (1 - np.cos(angle)) * cross @ cross
+
+
+def _raw_mesh(root: _Scope) -> RawMesh:
+    place = {key: i for i, key in enumerate(root.nodes)}
+    kinds: dict[str, list[list[int]]] = {}
+    where: dict[Key, tuple[str, int]] = {}
+    for key, (word, nodes) in root.elements.items():
+        missing = [node for node in nodes if node not in place]
+        if missing:
+            inside = f" of the instance {key[0]}" if key[0] else ""
+            raise InputError(
+                f"imported.file: element {key[1]}{inside} has the node {missing[0][1]}, which is "
+                "not defined"
+            )
+        rows = kinds.setdefault(word, [])
+        where[key] = (word, len(rows))
+        rows.append([place[node] for node in nodes])
+    words = list(kinds)
+    groups = {}
+    for name, members in root.element_sets.items():
+        found: dict[str, list[int]] = {}
+        for key in members:
+            if key in where:
+                word, row = where[key]
+                found.setdefault(word, []).append(row)
+        groups[name] = [(words.index(word), np.array(rows)) for word, rows in found.items()]
+    sets = {
+        name: np.array([place[key] for key in members if key in place], dtype=int)
+        for name, members in root.node_sets.items()
+    }
+    notes = tuple(
+        f"{count} elements of type {kind or 'unknown'} were left out"
+        for kind, count in root.left_out.items()
+    )
+    return RawMesh(
+        np.array(list(root.nodes.values()), dtype=float).reshape(-1, 3),
+        [(word, from_vtk_order(word, np.array(rows))) for word, rows in kinds.items()],
+        groups,
+        sets | _node_surfaces(root, sets, place),
+        {name: _facets(root, lines, place) for name, lines in root.surfaces.items()},
+        notes,
+    )
+
+
+def _node_surfaces(
+    root: _Scope, sets: dict[str, np.ndarray], place: dict[Key, int]
+) -> dict[str, np.ndarray]:
+    """Surfaces of TYPE=NODE as node sets; a name that a node set has already stays with it."""
+    known = {name.upper(): nodes for name, nodes in sets.items()}
+    found = {}
+    for name, members in root.node_surfaces.items():
+        nodes = [np.empty(0, dtype=int)]
+        for word in members:
+            if word.upper() in known:
+                nodes.append(known[word.upper()])
+            elif word.isdigit() and ("", int(word)) in place:
+                nodes.append(np.array([place["", int(word)]]))
+        if name.upper() not in known:
+            found[name] = np.unique(np.concatenate(nodes))
+    return found
+
+
+def _facets(root: _Scope, lines: list[tuple[str, str]], place: dict[Key, int]) -> list[np.ndarray]:
+    """Corner nodes (nf, 3) and (nf, 4) of the facets of a surface."""
+    known = {name.upper(): members for name, members in root.element_sets.items()}
+    found: list[np.ndarray] = []
+    for first, label in lines:
+        instance, _, tag = first.rpartition(".")
+        alone = [(instance.upper(), int(tag))] if tag.isdigit() else []
+        corners: dict[int, list[list[int]]] = {3: [], 4: []}
+        for key in known.get(first.upper(), alone):
+            if key not in root.elements:
+                continue
+            word, nodes = root.elements[key]
+            for facet in _labelled(word, label):
+                corners[len(facet)].append([place[nodes[i]] for i in facet])
+        rows = [np.array(some) for some in corners.values() if some]
+        # without a label: the outside of the set
+        found += rows if label else [_once(some) for some in rows]
+    return found
+
+
+def _once(facets: np.ndarray) -> np.ndarray:
+    """Facets (nf, k) that no other one coincides with."""
+    key = np.sort(facets, axis=1)
+    _, first, count = np.unique(key, axis=0, return_index=True, return_counts=True)
+    return facets[first[count == 1]]
+
+
+def _labelled(word: str, label: str) -> list[tuple[int, ...]]:
+    """Local corners of the faces that a label stands for; all of them without a label."""
+    family = word.rstrip("0123456789")
+    if family in ("triangle", "quad"):
+        return [tuple(range(3 if family == "triangle" else 4))]
+    faces = FACES[family]
+    if label.startswith("S") and label[1:].isdigit() and 0 < int(label[1:]) <= len(faces):
+        return [faces[int(label[1:]) - 1]]
+    return faces if not label else []

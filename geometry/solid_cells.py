@@ -1,0 +1,153 @@
+"""The solid cells of a file as cells of one type that the finite elements know.
+
+Second order is the rule here: linear solids are far too stiff in bending (a blade of linear
+tetrahedra vibrates at more than twice its frequency). Serendipity cells get the nodes in the middle
+of their faces, mixed shapes become tetrahedra.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from bladefem.errors import InputError
+
+from .raw_mesh import RawMesh
+from .second_order_cells import completed_cells
+from .split_cells import split_cells, vertex_order
+from .topology import CORNERS, DIMENSION, EDGES, FAMILY, NODES
+
+__all__ = ["LINEAR", "SolidCells", "solid_cells"]
+
+# what becomes of linear solids
+LINEAR = ("refuse", "promote", "keep")
+
+
+@dataclass(frozen=True)
+class SolidCells:
+    """All solid cells of a file (plane cells of a plane model), of one type."""
+
+    # (n, 3) the file's points, new ones appended
+    points: np.ndarray
+    cell_type: str
+    # (nc, k)
+    cells: np.ndarray
+    # (nc,) block of the file, and row of it, that each cell comes from
+    block: np.ndarray
+    row: np.ndarray
+    # what was done to the cells, one sentence each
+    notes: tuple[str, ...]
+
+
+def solid_cells(raw: RawMesh, source: str, linear: str, axis: np.ndarray) -> SolidCells:
+    """The cells of the highest dimension.
+
+    Args:
+        linear: "refuse", "promote" to second order, or "keep".
+        axis: engine axis; cells that are split are split alike on both cut faces.
+
+    Raises:
+        InputError: no cells, linear ones that are to be refused, mixtures that cannot be kept.
+    """
+    top = max((DIMENSION[FAMILY[word]] for word, _ in raw.blocks if word in FAMILY), default=0)
+    chosen = [
+        b
+        for b, (word, cells) in enumerate(raw.blocks)
+        if word in FAMILY and DIMENSION[FAMILY[word]] == top and len(cells)
+    ]
+    blocks = [raw.blocks[b] for b in chosen]
+    if top < 2 or not blocks:
+        raise InputError(
+            f"imported.file = '{source}': cells are missing, expected tetrahedra, hexahedra, "
+            "wedges or pyramids (triangles or quadrilaterals in a plane)"
+        )
+    points, blocks, notes = _of_wanted_order(raw.points, blocks, linear, source)
+    words = {word for word, _ in blocks}
+    owner = [np.repeat(b, len(cells)) for b, (_, cells) in zip(chosen, blocks, strict=True)]
+    row = [np.arange(len(cells)) for _, cells in blocks]
+    if len(words) > 1 or top == 3 and not words <= {"tetra", "tetra10", *_HEXAHEDRA}:
+        if top == 2:
+            raise InputError(
+                f"imported.file = '{source}': cells are {' and '.join(sorted(words))}, expected "
+                "triangles or quadrilaterals, not both"
+            )
+        notes += (f"{_counted(blocks)} were split into tetrahedra: shapes are mixed",)
+        rank = vertex_order(points, axis)
+        parts = [split_cells(word, cells, rank, points) for word, cells in blocks]
+        quadratic = any(NODES[word] > CORNERS[FAMILY[word]] for word in words)
+        words = {"tetra10" if quadratic else "tetra"}
+        blocks = [("tetra", cells) for cells, _ in parts]
+        owner = [some[rows] for some, (_, rows) in zip(owner, parts, strict=True)]
+        row = [rows for _, rows in parts]
+    word = words.pop()
+    cells = np.vstack([cells for _, cells in blocks])
+    _check_middles(points, word, cells, source)
+    return SolidCells(
+        points,
+        word,
+        cells,
+        np.concatenate(owner),
+        np.concatenate(row),
+        notes,
+    )
+
+
+_HEXAHEDRA = ("hexahedron", "hexahedron27")
+
+
+def _of_wanted_order(
+    points: np.ndarray, blocks: list[tuple[str, np.ndarray]], linear: str, source: str
+) -> tuple[np.ndarray, list[tuple[str, np.ndarray]], tuple[str, ...]]:
+    """Points and blocks as they are to be solved with, and what was done."""
+    first_order = [(word, cells) for word, cells in blocks if NODES[word] == CORNERS[FAMILY[word]]]
+    if first_order and linear == "keep":
+        if len(first_order) < len(blocks):
+            raise InputError(
+                f"imported.linear = 'keep': '{source}' mixes first and second order, "
+                "expected 'promote'"
+            )
+        return points, blocks, (f"{_counted(first_order)} are solved as they are: far too stiff",)
+    if first_order and linear != "promote":
+        raise InputError(
+            f"imported.file = '{source}': {_counted(first_order)} of first order are far too stiff "
+            "in bending, expected second-order cells; imported.linear = 'promote' adds nodes in "
+            "the middle of their edges, 'keep' solves them as they are"
+        )
+    notes = ()
+    if first_order:
+        notes = (f"{_counted(first_order)} were promoted to second order, edges straight",)
+    return *completed_cells(points, blocks), notes
+
+
+def _check_middles(points: np.ndarray, word: str, cells: np.ndarray, source: str) -> None:
+    """Refuse two nodes in the middle of one edge: dolfinx crashes on them.
+
+    They come from cells that share corners but not mid-side nodes, or from a quadrilateral that
+    faces two triangles.
+    """
+    family = FAMILY[word]
+    k = CORNERS[family]
+    if NODES[word] == k:
+        return
+    ends = np.sort(cells[:, np.array(EDGES[family])].reshape(-1, 2), axis=1)
+    middle = cells[:, k : k + len(EDGES[family])].ravel()
+    _, first, number = np.unique(ends, axis=0, return_index=True, return_inverse=True)
+    bad = np.flatnonzero(middle != middle[first[number.ravel()]])
+    if len(bad):
+        x, y, z = points[ends[bad[0]]].mean(axis=0)
+        raise InputError(
+            f"imported.file = '{source}': cells meet near {x:.6g}, {y:.6g}, {z:.6g} that do not "
+            "fit (their edge has two nodes in its middle, or a quadrilateral faces two "
+            "triangles), expected a conforming mesh with merged nodes"
+        )
+
+
+def _counted(blocks: list[tuple[str, np.ndarray]]) -> str:
+    """Such as "120 hexahedra and 4 wedges"."""
+    count: dict[str, int] = {}
+    for word, cells in blocks:
+        family = FAMILY[word]
+        count[family] = count.get(family, 0) + len(cells)
+    plural = {"hexahedron": "hexahedra", "tetra": "tetrahedra", "quad": "quadrilaterals"}
+    return " and ".join(f"{n} {plural.get(name, name + 's')}" for name, n in count.items())

@@ -1,0 +1,188 @@
+"""Foreign decks written by hand, with the quirks of the programs that write them; the meshes behind
+them are solved by CalculiX too (``benchmarks/fem_decks.py``).
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+from structured import sector
+
+from geometry.topology import EDGES, FAMILY, facet_nodes
+
+SECTORS = 12
+ABAQUS = {
+    "tetra": "C3D4",
+    "tetra10": "C3D10",
+    "hexahedron": "C3D8",
+    "hexahedron20": "C3D20",
+    "wedge": "C3D6",
+    "wedge15": "C3D15",
+}
+# corner pairs of the mid-side nodes as Abaqus, Ansys and Nastran's hexahedra number them
+ABAQUS_EDGES = {
+    "tetra": [(0, 1), (1, 2), (2, 0), (0, 3), (1, 3), (2, 3)],
+    "hexahedron": [
+        *[(0, 1), (1, 2), (2, 3), (3, 0), (4, 5), (5, 6), (6, 7), (7, 4)],
+        *[(0, 4), (1, 5), (2, 6), (3, 7)],
+    ],
+    "wedge": [(0, 1), (1, 2), (2, 0), (3, 4), (4, 5), (5, 3), (0, 3), (1, 4), (2, 5)],
+}
+
+
+@dataclass(frozen=True)
+class Model:
+    """A sector as blocks of cells in gmsh's node order, with named node sets."""
+
+    points: np.ndarray
+    blocks: list
+    node_sets: dict
+    faces: dict
+
+
+def model(kind):
+    """ "c3d20", "c3d15_c3d20" (every second column of hexahedra cut in wedges), "c3d10" or "c3d4"."""
+    if kind in ("c3d10", "c3d4"):
+        mesh = sector(SECTORS, (4, 3, 2), "tetra10", bump=0.2, straight=kind == "c3d4")
+        cells = mesh.bodies["blade"]
+        if kind == "c3d4":
+            return _model(mesh, [("tetra", cells[:, :4])])
+        return _model(mesh, [("tetra10", cells)])
+    divisions = (5, 4, 2) if kind == "c3d20" else (9, 6, 4)
+    mesh = sector(SECTORS, divisions, "hexahedron27", bump=0.1)
+    cells = mesh.bodies["blade"]
+    if kind == "c3d20":
+        return _model(mesh, [("hexahedron20", cells[:, :20])])
+    # whole columns across the wheel's width: triangles never meet quadrilaterals
+    i, j, _ = np.unravel_index(np.arange(len(cells)), divisions)
+    cut = (i + j) % 2 == 0
+    wedges = np.vstack([_wedges(cells[cut], half) for half in ((0, 1, 2), (0, 2, 3))])
+    return _model(mesh, [("hexahedron20", cells[~cut][:, :20]), ("wedge15", wedges)])
+
+
+def promoted(m):
+    """Straight tetrahedra of 10 nodes from those of 4."""
+    (_, cells) = m.blocks[0]
+    ends = np.sort(cells[:, np.array(EDGES["tetra"])].reshape(-1, 2), axis=1)
+    edges, number = np.unique(ends, axis=0, return_inverse=True)
+    points = np.vstack([m.points, m.points[edges].mean(axis=1)])
+    middle = len(m.points) + number.reshape(len(cells), 6)
+    sets = {}
+    for name, nodes in m.node_sets.items():
+        on_edges = np.flatnonzero(np.isin(edges, nodes).all(axis=1))
+        sets[name] = np.concatenate([nodes, len(m.points) + on_edges])
+    return Model(points, [("tetra10", np.hstack([cells, middle]))], sets, m.faces)
+
+
+def _wedges(cells, half):
+    """One half (bottom corners a, b, c) of hexahedra of 27 nodes as wedges of 15."""
+    corners = [*half, *(i + 4 for i in half)]
+    row = {frozenset(pair): 8 + i for i, pair in enumerate(EDGES["hexahedron"])}
+    # the diagonals' nodes are the centres of the bottom and the top
+    row |= {frozenset((0, 2)): 20, frozenset((4, 6)): 25}
+    middle = [row[frozenset((corners[a], corners[b]))] for a, b in EDGES["wedge"]]
+    return cells[:, [*corners, *middle]]
+
+
+def _model(mesh, blocks):
+    """Only the nodes that the cells use."""
+    used = np.unique(np.concatenate([cells.ravel() for _, cells in blocks]))
+    number = np.full(len(mesh.points), -1)
+    number[used] = np.arange(len(used))
+    sets = {}
+    for name in ("clamp", "cyclic_low", "cyclic_high"):
+        nodes = number[np.unique(mesh.faces[name])]
+        sets[name] = nodes[nodes >= 0]
+    return Model(
+        mesh.points[used], [(word, number[cells]) for word, cells in blocks], sets, mesh.faces
+    )
+
+
+def abaqus_cells(word, cells):
+    """Cells in Abaqus' node order, numbered from 1."""
+    family = FAMILY[word]
+    k = {"tetra": 4, "hexahedron": 8, "wedge": 6}[family]
+    if cells.shape[1] == k:
+        return cells + 1
+    row = {frozenset(pair): i for i, pair in enumerate(EDGES[family])}
+    return cells[:, [*range(k), *(k + row[frozenset(p)] for p in ABAQUS_EDGES[family])]] + 1
+
+
+def node_lines(points, end=""):
+    return [f"{i:8d}, {x:.13e}, {y:.13e},{z:.13e}{end}" for i, (x, y, z) in enumerate(points, 1)]
+
+
+def element_lines(cells, first=1, wrap=16):
+    """Element lines of at most 16 numbers, as Abaqus reads them."""
+    lines = []
+    for number, cell in enumerate(cells.tolist(), first):
+        values = [number, *cell]
+        rows = [values[i : i + wrap] for i in range(0, len(values), wrap)]
+        lines += [", ".join(map(str, row)) + "," * (row is not rows[-1]) for row in rows]
+    return lines
+
+
+def set_lines(nodes):
+    values = (np.sort(nodes) + 1).tolist()
+    return [", ".join(map(str, values[i : i + 10])) for i in range(0, len(values), 10)]
+
+
+def flat_deck(m, names, element_type=None):
+    """Nodes, elements and node sets of a model; ``names`` are those of the sets in the file."""
+    lines = ["*HEADING", "a sector", "*NODE, NSET=NALL", *node_lines(m.points)]
+    first = 1
+    for word, cells in m.blocks:
+        kind = element_type or ABAQUS[word]
+        lines += [f"*ELEMENT, TYPE={kind}, ELSET=EALL"]
+        lines += element_lines(abaqus_cells(word, cells), first)
+        first += len(cells)
+    for name, nodes in m.node_sets.items():
+        lines += [f"*NSET,NSET={names.get(name, name)}", *set_lines(nodes)]
+    return lines
+
+
+def ccx_job(m, diameters, count, element_type=None):
+    """A deck that CalculiX solves: every frequency comes twice, the slave face is not clamped."""
+    m = Model(
+        m.points,
+        m.blocks,
+        m.node_sets | {"clamp": np.setdiff1d(m.node_sets["clamp"], m.node_sets["cyclic_high"])},
+        m.faces,
+    )
+    return "\n".join(
+        [
+            *flat_deck(m, {}, element_type),
+            *["*MATERIAL, NAME=STEEL", "*ELASTIC", "2.1e11, 0.3", "*DENSITY", "7850."],
+            *["*SOLID SECTION, ELSET=EALL, MATERIAL=STEEL", "*BOUNDARY", "clamp, 1, 3"],
+            *["*SURFACE, NAME=SLAVE, TYPE=NODE", "cyclic_high"],
+            *["*SURFACE, NAME=MASTER, TYPE=NODE", "cyclic_low"],
+            *["*TIE, NAME=CUT, CYCLIC SYMMETRY", "SLAVE, MASTER"],
+            f"*CYCLIC SYMMETRY MODEL, N={SECTORS}, NGRAPH=1, TIE=CUT",
+            *["0, 0, 0, 0, 0, 1", "*STEP", "*FREQUENCY", str(2 * count)],
+            f"*SELECT CYCLIC SYMMETRY MODES, NMIN={diameters[0]}, NMAX={diameters[-1]}",
+            "*END STEP\n",
+        ]
+    )
+
+
+def surface_lines(m, name):
+    """A surface made of labelled element faces, through internal element sets as CAE writes them."""
+    labels = {
+        "tetra": [(0, 1, 2), (0, 3, 1), (1, 3, 2), (2, 3, 0)],
+    }["tetra"]
+    (word, cells) = m.blocks[0]
+    inside = np.isin(cells[:, :4], m.node_sets[name])
+    lines = []
+    members = []
+    for i, corners in enumerate(labels, 1):
+        rows = np.flatnonzero(inside[:, corners].all(axis=1))
+        if len(rows):
+            lines += [f"*Elset, elset=_{name}_S{i}, internal", *set_lines(rows)]
+            members.append(f"_{name}_S{i}, S{i}")
+    return [*lines, f"*Surface, type=ELEMENT, name={name}", *members]
+
+
+def facets_on(m, nodes):
+    """Facets of the first block whose nodes are all in a set."""
+    word, cells = m.blocks[0]
+    every = cells[:, np.array(facet_nodes(word))].reshape(-1, len(facet_nodes(word)[0]))
+    return every[np.isin(every, nodes).all(axis=1)]

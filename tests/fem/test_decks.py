@@ -1,0 +1,240 @@
+"""Meshes as other programs write them, against CalculiX on the same mesh (ccx_decks.json,
+``python benchmarks/fem_decks.py``).
+
+Hexahedra of 20 nodes are solved with 27, which hold the displacements of the original cells and
+more: their frequencies lie at or below CalculiX's. Mixed shapes are solved as tetrahedra with the
+same nodes, which come near from either side as the mesh gets finer.
+"""
+
+import json
+from pathlib import Path
+
+import decks
+import meshio
+import numpy as np
+import pytest
+
+from bladefem.errors import InputError
+from bladefem.fem.body import assemble
+from bladefem.fem.constraint import at_diameter, transformation
+from bladefem.fem.modes import modes
+from bladefem.scene.tables import Material
+from geometry.imported import read_mesh
+from geometry.topology import facet_nodes
+
+GOLDEN = json.loads((Path(__file__).parent / "ccx_decks.json").read_text())
+CAE_NAMES = {"clamp": "Root Nodes", "cyclic_low": "LOW-SIDE", "cyclic_high": "HIGH-SIDE"}
+RENAMED = ["clamp = root nodes", "cyclic_low = Low-Side", "cyclic_high = HIGH-SIDE"]
+
+
+def agrees(file, case, higher, lower, **how):
+    """Frequencies between (1 - lower) and (1 + higher) times CalculiX's."""
+    mesh = read_mesh(file, sectors=decks.SECTORS, **how)
+    quadrature = "ccx" if case in ("c3d10", "c3d4") else "exact"
+    t = transformation(assemble(mesh, "blade", Material(), quadrature=quadrature), "clamp", True)
+    for n, theirs in GOLDEN[case].items():
+        ratio = modes(at_diameter(t, int(n)), 6).frequencies / theirs
+        assert ratio.max() < 1 + higher and ratio.min() > 1 - lower, (n, ratio - 1)
+    return mesh
+
+
+def test_c3d20_with_node_sets_only(tmp_path):
+    """CalculiX' own way: blanks in names, node sets for everything, two lines an element."""
+    deck = decks.flat_deck(decks.model("c3d20"), CAE_NAMES)
+    (tmp_path / "a.inp").write_text("\n".join(deck))
+    mesh = agrees(tmp_path / "a.inp", "c3d20", 1e-6, 1e-2, names=RENAMED)
+    assert mesh.cell_type == "hexahedron27" and mesh.faces["cyclic_low"].shape[1] == 9
+
+
+def test_c3d20r_is_near(tmp_path):
+    """Reduced integration is softer on a coarse mesh; elements here are integrated fully."""
+    deck = decks.flat_deck(decks.model("c3d20"), {}, "C3D20R")
+    (tmp_path / "a.inp").write_text("\n".join(deck))
+    agrees(tmp_path / "a.inp", "c3d20r", 1e-2, 1e-2)
+
+
+def test_wedges_and_hexahedra(tmp_path):
+    deck = decks.flat_deck(decks.model("c3d15_c3d20"), {})
+    (tmp_path / "a.inp").write_text("\n".join(deck))
+    mesh = agrees(tmp_path / "a.inp", "c3d15_c3d20", 6e-3, 1e-3)
+    assert mesh.cell_type == "tetra10" and "split into tetrahedra" in mesh.report["notes"][0]
+
+
+def test_c3d10_with_element_surfaces_and_includes(tmp_path):
+    """Byte order mark, CRLF, comments, continued keyword lines, *Include, faces as *Surface."""
+    m = decks.model("c3d10")
+    (tmp_path / "mesh").mkdir()
+    (tmp_path / "mesh" / "nodes.inc").write_text("\r\n".join(decks.node_lines(m.points, ",")))
+    lines = [
+        *[
+            "** exported",
+            "*Heading",
+            "",
+            " *NODE ,",
+            "  NSET=all",
+            "*Include, input=mesh/nodes.inc",
+        ],
+        "*Element,type=C3D10 ,ELSET = Solid",
+        *decks.element_lines(decks.abaqus_cells(*m.blocks[0]), wrap=8),
+        "",
+        *(line for name in m.node_sets for line in decks.surface_lines(m, name)),
+        *["*Boundary", "clamp, 1, 3", "*Step", "*Frequency", "10", "*End Step", ""],
+    ]
+    # nodes are data of the keyword before *Include
+    lines = [line for line in lines if line not in (" *NODE ,", "  NSET=all")]
+    text = (tmp_path / "mesh" / "nodes.inc").read_text()
+    (tmp_path / "mesh" / "nodes.inc").write_text(f"*Node, nset=all\r\n{text}")
+    (tmp_path / "a.inp").write_bytes(b"\xef\xbb\xbf" + "\r\n".join(lines).encode())
+    agrees(tmp_path / "a.inp", "c3d10", 1e-6, 1e-6)
+
+
+def test_linear_tetrahedra_on_request_only(tmp_path):
+    deck = decks.flat_deck(decks.model("c3d4"), {})
+    (tmp_path / "a.inp").write_text("\n".join(deck))
+    with pytest.raises(InputError, match=r"tetrahedra of first order .* imported\.linear"):
+        read_mesh(tmp_path / "a.inp", sectors=decks.SECTORS)
+    mesh = agrees(tmp_path / "a.inp", "c3d4", 1e-6, 1e-6, linear="promote")
+    assert "promoted to second order" in mesh.report["notes"][0]
+    kept = read_mesh(tmp_path / "a.inp", sectors=decks.SECTORS, linear="keep")
+    assert kept.cell_type == "tetra" and "far too stiff" in kept.report["notes"][0]
+
+
+def test_parts_and_instances_of_cae(tmp_path):
+    """An assembly: the part lies elsewhere and is moved, sets of the assembly name an instance,
+    springs and a reference point are left out.
+    """
+    m = decks.model("c3d10")
+    lines = ["*Heading", "** Job name: a", "*Part, name=Blade-Part"]
+    lines += ["*Node", *decks.node_lines(m.points - [0.0, 0.5, 0.0])]
+    lines += ["*Element, type=C3D10"]
+    lines += decks.element_lines(decks.abaqus_cells(*m.blocks[0]))
+    lines += ["*Elset, elset=SET-1, generate", f" 1, {len(m.blocks[0][1])}, 1"]
+    lines += ["*Solid Section, elset=SET-1, material=Steel", ",", "*End Part", "**"]
+    lines += ["*Assembly, name=Assembly", "*Instance, name=Blade-1, part=Blade-Part"]
+    lines += ["0., 0.5, 0.", "*End Instance", "*Node", "900001, 0., 0., 0."]
+    lines += ["*Element, type=SPRING1, elset=Ground", "900001, 900001"]
+    for name, nodes in m.node_sets.items():
+        lines += [f"*Nset, nset={name}, instance=Blade-1", *decks.set_lines(nodes)]
+    lines += ["*End Assembly", "*Material, name=Steel", "*Elastic", "2.1e+11, 0.3"]
+    (tmp_path / "a.inp").write_text("\n".join(lines))
+    mesh = agrees(tmp_path / "a.inp", "c3d10", 1e-6, 1e-6)
+    assert "1 elements of type SPRING1 were left out" in mesh.report["notes"]
+    assert set(mesh.parts) == {"set-1"}
+
+
+def test_sixteen_bit_text(tmp_path):
+    deck = decks.flat_deck(decks.model("c3d10"), {})
+    (tmp_path / "a.inp").write_bytes("\n".join(deck).encode("utf-16"))
+    agrees(tmp_path / "a.inp", "c3d10", 1e-6, 1e-6)
+
+
+def cdb_lines(m, names):
+    """CDWRITE of SOLID186: wedges are hexahedra with repeated nodes."""
+    lines = ["/PREP7", "ET,        1,186", f"NBLOCK,6,SOLID,{len(m.points)},{len(m.points)}"]
+    lines += ["(3i9,6e21.13e3)"]
+    for i, x in enumerate(m.points, 1):
+        lines.append(f"{i:9d}{0:9d}{0:9d}" + "".join(f"{v:21.13e}" for v in x))
+    count = sum(len(cells) for _, cells in m.blocks)
+    lines += ["N,R5.3,LOC,       -1,", f"EBLOCK,19,SOLID,{count},{count}", "(19i9)"]
+    wedge = [0, 1, 2, 2, 3, 4, 5, 5, 6, 7, 2, 8, 9, 10, 5, 11, 12, 13, 14, 14]
+    number = 0
+    for word, cells in m.blocks:
+        for cell in decks.abaqus_cells(word, cells):
+            number += 1
+            nodes = cell if word == "hexahedron20" else cell[wedge]
+            head = [1, 1, 1, 1, 0, 0, 0, 0, 20, 0, number]
+            lines.append("".join(f"{v:9d}" for v in [*head, *nodes[:8]]))
+            lines.append("".join(f"{v:9d}" for v in nodes[8:]))
+    lines.append(f"{-1:9d}")
+    for name, nodes in m.node_sets.items():
+        lines += [f"CMBLOCK,{names.get(name, name).upper()},NODE,{len(nodes):8d}", "(8i10)"]
+        tags = np.sort(nodes) + 1
+        lines += ["".join(f"{v:10d}" for v in tags[i : i + 8]) for i in range(0, len(tags), 8)]
+    return [*lines, "FINISH"]
+
+
+def test_ansys_hexahedra_and_wedges_with_node_components(tmp_path):
+    m = decks.model("c3d15_c3d20")
+    (tmp_path / "a.cdb").write_text("\n".join(cdb_lines(m, {"clamp": "N_BORE"})) + "\n")
+    agrees(tmp_path / "a.cdb", "c3d15_c3d20", 6e-3, 1e-3, names=["clamp = n_bore"])
+
+
+@pytest.mark.parametrize("suffix", ["bdf", "vtu"])
+def test_nastran_and_vtk(suffix, tmp_path):
+    """Faces as shells with properties; as cell blocks without names in .vtu, so only read there."""
+    m = decks.model("c3d10")
+    blocks = [(w, decks.abaqus_cells(w, c) - 1) for w, c in m.blocks]
+    marks = [np.ones(len(blocks[0][1]), int)]
+    for i, nodes in enumerate(m.node_sets.values(), 2):
+        face = decks.facets_on(m, nodes)
+        blocks.append(("triangle6", face))
+        marks.append(np.full(len(face), i))
+    data = {"nastran:ref": marks} if suffix == "bdf" else {}
+    meshio.write(tmp_path / f"a.{suffix}", meshio.Mesh(m.points, blocks, cell_data=data))
+    if suffix == "bdf":
+        names = [f"{name} = pid_{i}" for i, name in enumerate(m.node_sets, 2)]
+        # eight characters a number
+        agrees(tmp_path / "a.bdf", "c3d10", 1e-4, 1e-4, names=names)
+    else:
+        mesh = read_mesh(tmp_path / "a.vtu")
+        assert mesh.bodies["blade"].shape == m.blocks[0][1].shape
+
+
+def test_sector_and_damper_in_two_files(tmp_path):
+    """The damper of the second file is a body of its own and leaves the blade's modes alone."""
+    m = decks.model("c3d10")
+    (tmp_path / "a.inp").write_text("\n".join(decks.flat_deck(m, {})))
+    block = decks.flat_deck(decks.Model(m.points + [1.0, 0, 0], m.blocks, {}, {}), {})
+    (tmp_path / "b.inp").write_text("\n".join(block))
+    more = [f"damper = {tmp_path / 'b.inp'}"]
+    mesh = agrees(tmp_path / "a.inp", "c3d10", 1e-6, 1e-6, more=more)
+    assert mesh.bodies["damper"].shape == mesh.bodies["blade"].shape
+
+
+@pytest.mark.parametrize(
+    "lines, words",
+    [
+        (["*NODE", "1, 0, x, 0"], r"line 2: '1, 0, x, 0' is no node"),
+        (["*NODE", "1, 0, 0, 0", "*ELEMENT, TYPE=C3D4", "1, 1, 2, 3, 4"], "node 2, which is not"),
+        (["*ELEMENT, TYPE=C3D4", "1, 1, 2, 3"], r"line 2: element 1 has 3 nodes, expected 4"),
+        (["*INCLUDE, INPUT=none.inp"], r"line 1: \*INCLUDE, INPUT=none.inp: there is no such file"),
+        (["*INCLUDE, INPUT=a.inp"], "goes in circles"),
+        (["*NSET, NSET=a", "b"], r"line 2: there is no node set 'b'"),
+        (["*INSTANCE, NAME=a, PART=b"], "line 1: .*part 'b' that is not there"),
+        (["*NODE", "1, 0, 0, 0", "*ELEMENT, TYPE=B31", "1, 1, 1"], "cells are missing"),
+        (["*NODE", "1, 0, 0, nan", "*NSET, NSET=a, GENERATE", "1, x"], "line 4: '1, x'"),
+    ],
+)
+def test_what_cannot_be_used_is_one_sentence(lines, words, tmp_path):
+    (tmp_path / "a.inp").write_text("\n".join(lines))
+    with pytest.raises(InputError, match=words) as caught:
+        read_mesh(tmp_path / "a.inp")
+    assert "\n" not in str(caught.value)
+
+
+def test_a_reader_that_leaves_the_program(tmp_path, monkeypatch):
+    """meshio ends the process on some files; here that is a sentence like any other."""
+    (tmp_path / "a.vtu").write_text("<nothing>")
+    with pytest.raises(InputError, match=r"a\.vtu': cannot be read as \.vtu"):
+        read_mesh(tmp_path / "a.vtu")
+
+
+def test_cells_that_do_not_fit(tmp_path):
+    """Two tetrahedra that share an edge but not the node in its middle: dolfinx would crash."""
+    m = decks.model("c3d10")
+    cells = m.blocks[0][1].copy()
+    cells[5, 4] = len(m.points)
+    points = np.vstack([m.points, m.points[m.blocks[0][1][5, 4]]])
+    (tmp_path / "a.inp").write_text(
+        "\n".join(decks.flat_deck(decks.Model(points, [("tetra10", cells)], {}, {}), {}))
+    )
+    with pytest.raises(InputError, match="that do not fit"):
+        read_mesh(tmp_path / "a.inp")
+
+
+def test_quadratic_facets_are_whole():
+    """Facets of hexahedra of 27 nodes hold their centre, those of 10-node tetrahedra 6 nodes."""
+    assert {len(f) for f in facet_nodes("hexahedron27")} == {9}
+    assert {len(f) for f in facet_nodes("hexahedron")} == {4}
+    assert {len(f) for f in facet_nodes("wedge18")} == {6, 9}
+    assert {len(f) for f in facet_nodes("tetra10")} == {6}

@@ -1,0 +1,93 @@
+"""Twelve lumped blades, mistuned, with a friction element between neighbours: the balance against
+plain marching in time, which knows neither nodal diameters nor harmonics.
+"""
+
+import numpy as np
+import pytest
+from scipy import linalg
+
+from bladefem.wheel.lumped import (
+    PLATFORM,
+    TIP,
+    LumpedBlades,
+    lumped_matrices,
+    lumped_pattern,
+    lumped_wheel,
+)
+from bladefem.wheel.solve import solve_wheel
+
+COUNT = 12
+ORDER = 3
+BLADES = LumpedBlades(count=COUNT, damping=0.02)
+KT = 2e5
+STEPS = 800
+PERIODS = 75
+
+
+def ring_matrices(deviation):
+    """M (diagonal), C, K of all blades; damping belongs to the tuned modes."""
+    M, K, to_next = lumped_matrices(BLADES)
+    following = np.roll(np.eye(COUNT), 1, axis=1)
+    tuned = np.kron(np.eye(COUNT), K) + np.kron(following, to_next)
+    tuned += np.kron(following.T, to_next.T)
+    mass = np.kron(np.eye(COUNT), M)
+    values, modes = linalg.eigh(tuned, mass)
+    C = mass @ modes @ np.diag(2 * BLADES.damping * np.sqrt(values)) @ modes.T @ mass
+    stiffness = tuned.copy()
+    for b, share in enumerate(deviation):
+        i = 3 * b + np.arange(3)
+        for a, e, k in ((i[1], i[2], BLADES.aerofoil), (i[0], i[1], BLADES.shank)):
+            stiffness[[a, e], [a, e]] += share * k
+            stiffness[[a, e], [e, a]] -= share * k
+    return np.diag(mass), C, stiffness
+
+
+def march(omega, deviation, force, limit):
+    """First harmonic of all tips, and friction work of each element in the last period."""
+    mass, C, K = ring_matrices(deviation)
+    dt = 2 * np.pi / omega / STEPS
+    platform = 3 * np.arange(COUNT) + PLATFORM
+    tip = 3 * np.arange(COUNT) + TIP
+    phase = 2 * np.pi * ORDER * np.arange(COUNT) / COUNT
+    # (M / dt^2 + C / 2 dt) x_new = F - K x + 2 M x / dt^2 - (M / dt^2 - C / 2 dt) x_old
+    left = linalg.inv(np.diag(mass) / dt**2 + C / (2 * dt))
+    now_matrix = left @ (2 * np.diag(mass) / dt**2 - K)
+    old_matrix = -left @ (np.diag(mass) / dt**2 - C / (2 * dt))
+    x = np.zeros(3 * COUNT)
+    old = np.zeros(3 * COUNT)
+    slider = np.zeros(COUNT)
+    harmonic = np.zeros(COUNT, dtype=complex)
+    work = np.zeros(COUNT)
+    for step in range(STEPS * PERIODS):
+        w = x[platform] - x[np.roll(platform, -1)]
+        before = slider
+        slider = np.clip(slider, w - limit / KT, w + limit / KT)
+        f = KT * (w - slider)
+        angle = omega * step * dt
+        load = np.zeros(3 * COUNT)
+        load[tip] = force * np.cos(angle + phase)
+        load[platform] -= f
+        load[np.roll(platform, -1)] += f
+        if step >= STEPS * (PERIODS - 1):
+            harmonic += 2 / STEPS * x[tip] * np.exp(-1j * angle)
+            work += limit * abs(slider - before)
+        x, old = now_matrix @ x + old_matrix @ old + left @ load, x
+    return harmonic, work
+
+
+@pytest.mark.parametrize("limit", [3.0])
+def test_wheel_equals_marching_in_time(limit):
+    force = 10.0
+    rng = np.random.default_rng(1)
+    deviation = 0.02 * rng.normal(size=COUNT)
+    M, K, _ = lumped_matrices(BLADES)
+    omega = 1.01 * np.sqrt(linalg.eigh(K, M)[0][0])
+    tips, work = march(omega, deviation, force, limit)
+    wheel = lumped_wheel(BLADES, ORDER, force, KT, limit)
+    found = solve_wheel(wheel, omega, 15, 0, pattern=lumped_pattern(BLADES, deviation))
+    assert found.converged
+    # every damper slips, and blades differ by a fifth at least
+    assert (found.shares[..., 1] > 0.05).all()
+    assert np.ptp(abs(tips)) > 0.2 * abs(tips).mean()
+    np.testing.assert_allclose(found.probe[:, 1, 0], tips, atol=5e-4 * abs(tips).max())
+    np.testing.assert_allclose(found.dissipated, work, rtol=5e-3)

@@ -1,0 +1,131 @@
+"""Statistics of mistuned wheels: quantiles, the search for the highest blade, and the lumped wheel
+whose damped amplification exceeds the undamped one at the load that the tuned wheel recommends.
+"""
+
+import numpy as np
+import pytest
+from scipy import linalg, stats
+
+from bladefem.errors import InputError
+from bladefem.wheel.lumped import LumpedBlades, lumped_matrices, lumped_pattern, lumped_wheel
+from bladefem.wheel.resonance import find_wheel_peak
+from bladefem.wheel.scatter import Scatter, drawn_patterns, read_pattern
+from bladefem.wheel.statistics import (
+    best_load,
+    free_respond,
+    one_body_respond,
+    quantile,
+    scatter_statistics,
+    wheel_respond,
+)
+
+BLADES = LumpedBlades()
+ORDER = 9
+KT = 1e5
+M, K, _ = lumped_matrices(BLADES)
+# a quarter turn from blade to blade: the coupling of the discs cancels
+OWN = np.sqrt(linalg.eigh(K, M)[0][0])
+
+
+def wheel(limit):
+    return lumped_wheel(BLADES, ORDER, 1.0, KT, limit)
+
+
+def patterns(count, scatter=0.02, seed=0):
+    spread = Scatter(scatter, seed=seed)
+    return drawn_patterns(wheel(1.0), spread, count, lambda d: lumped_pattern(BLADES, d))
+
+
+def test_intervals_hold_what_they_promise():
+    """Of 400 samples of 200 normal numbers, the interval of the 90 % quantile holds it in 95 %."""
+    rng = np.random.default_rng(0)
+    true = stats.norm.ppf(0.9)
+    found = [quantile(rng.normal(size=200), 0.9) for _ in range(400)]
+    held = np.mean([q.low <= true <= q.high for q in found])
+    assert 0.93 < held <= 1.0
+    # too few for a 99 % quantile: the upper end is open, and says so
+    assert quantile(np.arange(20.0), 0.99).high == np.inf
+
+
+def test_peak_is_closed_in():
+    """Two blades with different resonances; the higher one lies between the points of the grid."""
+
+    def respond(w):
+        return np.array([1 / abs(1 - w**2 + 0.01j * w), 1.2 / abs(1.1 - w**2 + 0.01j * w)])
+
+    peak = find_wheel_peak(respond, np.linspace(0.9, 1.2, 9), 1e-4)
+    expected = max(respond(w)[1] for w in np.linspace(1.04, 1.06, 20001))
+    assert peak.blade == 1 and peak.closed_in
+    assert peak.height == pytest.approx(expected, rel=2e-4)
+    assert peak.by_blade[0] < peak.by_blade[1]
+
+
+def test_free_statistics_come_out_again():
+    """256 wheels of 36 blades with 2 % scatter of stiffness, no friction: p95 is 1.80 (0.05)."""
+    grid = {0.0: OWN * np.linspace(0.96, 1.04, 81)}
+    found = scatter_statistics(
+        {0.0: wheel(1.0)}, {0.0: patterns(256)}, grid.__getitem__, free_respond
+    )
+    (p95,) = found.quantiles(0.95)
+    assert abs(p95.value - 1.80) < 0.05
+    assert p95.low < 1.80 < p95.high
+    bound = (1 + np.sqrt(BLADES.count)) / 2
+    assert found.factor.max() < bound
+
+
+def test_damped_wheel_is_amplified_more_than_the_free_one():
+    """At the optimum of the tuned wheel, 3 N; the quick way against the matrix-free one."""
+    drawn = patterns(12)
+    grid = {3.0: OWN * np.linspace(0.97, 1.03, 61)}
+    found = scatter_statistics(
+        {3.0: wheel(3.0)},
+        {3.0: drawn},
+        grid.__getitem__,
+        lambda w, p: one_body_respond(w, p, 3, 64),
+    )
+    free = scatter_statistics({3.0: wheel(3.0)}, {3.0: drawn}, grid.__getitem__, free_respond)
+    assert not found.unsolved.any()
+    assert np.median(found.factor) > np.median(free.factor)
+    near = found.omega[0, 0]
+    whole = wheel_respond(wheel(3.0), drawn[0], 3, 64)(near)
+    assert whole.max() == pytest.approx(found.peak[0, 0], rel=3e-3)
+    assert int(np.argmax(whole)) == found.blade[0, 0]
+
+
+def test_best_load_is_found_between_loads():
+    loads = np.geomspace(1, 32, 6)
+    heights = np.exp((np.log(loads) - np.log(5.0)) ** 2)
+    best, height = best_load(loads, heights)
+    assert best == pytest.approx(5.0) and height == pytest.approx(1.0)
+    assert best_load(loads, loads)[0] == 1.0
+
+
+def test_draws_are_the_same_everywhere_and_cut_off():
+    first = patterns(8, seed=3)
+    again = patterns(8, seed=3)
+    np.testing.assert_array_equal(first[5].stiffness, again[5].stiffness)
+    values = np.array([p.stiffness[:, 0, 0] for p in patterns(512)]) / BLADES.aerofoil
+    assert abs(values).max() <= 0.06 and abs(values.std() - 0.02) < 5e-4
+    dampers = drawn_patterns(
+        wheel(2.0), Scatter(0.0, friction=0.1), 64, lambda d: lumped_pattern(BLADES, d)
+    )
+    mu = np.array([p.elements.mu for p in dampers])
+    assert abs(mu.std() - 0.1) < 0.01 and (dampers[0].elements.n0 == 2.0).all()
+
+
+def test_pattern_files(tmp_path):
+    file = tmp_path / "pattern.csv"
+    file.write_text("# measured at rest\nblade, 1F\n1, 0.01\n2, -0.02\n3, 0.0\n")
+    names, values = read_pattern(file, 3)
+    assert names == ["1F"]
+    np.testing.assert_array_equal(values[:, 0], [0.01, -0.02, 0.0])
+    with pytest.raises(InputError, match=r"pattern.csv: 3 blades, expected 36"):
+        read_pattern(file, 36)
+    file.write_text("1F\n0.1\nx\n0.2\n")
+    with pytest.raises(InputError, match="expected numbers"):
+        read_pattern(file, 3)
+    file.write_text("blade,1F\n1,0.1\n3,0.2\n")
+    with pytest.raises(InputError, match="blades in order"):
+        read_pattern(file, 2)
+    with pytest.raises(InputError, match=r"scatter.blades 0.5: expected .* from 0 to 0.33"):
+        Scatter(0.5)
