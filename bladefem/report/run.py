@@ -41,6 +41,7 @@ from ..view.live_shapes import live_shapes
 from .datasets import datasets, table_dataset
 from .linear import harmonic_table, linear_sentence
 from .nodes import (
+    SEATS,
     cycles_of,
     draw_hysteresis,
     draw_wear,
@@ -52,6 +53,7 @@ from .nodes import (
     wear_table,
 )
 from .pressure import PICTURE, draw_seats, pressure_table, write_points
+from .response_arrays import curve_arrays, loop_arrays, node_arrays, resonance_arrays
 from .tables import units_of, write_tables
 from .write import Page, write_report
 
@@ -109,6 +111,10 @@ def _write(result: pipeline.Run, progress: Progress) -> None:
         "nodes": table_dataset(nodes, "row"),
         "approximation": table_dataset(harmonic_table(patches, cycles), "row"),
         "hysteresis": table_dataset(loops, "row"),
+        "response": curve_arrays(tables["response/points"]),
+        "resonance": resonance_arrays(result.response.curves, result.response.limits),
+        "cycle": node_arrays(nodes),
+        "loops": loop_arrays(cycles, SEATS),
     }
     write_results(folder / "results.nc", groups, dump(result.scene))
     drawings = {
