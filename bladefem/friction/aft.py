@@ -1,8 +1,9 @@
 """Contact forces of all elements for periodic relative motion: harmonics, Jacobian, states and
 dissipated energy.
 
-Signs (data.py): w is blade minus damper in (normal, t1, t2); the blade feels -f. The normal force is
-max(0, n0 + kn w_n), the tangential one a return map of kt w onto |f| <= mu times it.
+Signs (data.py): w is blade minus damper in (normal, t1, t2); the blade feels -f. The normal force
+is max(0, n0 + kn w_n), the tangential one a return map of kt w onto |f| <= mu times it, or what a
+law of one's own says (`bladefem.friction.law`).
 """
 
 from __future__ import annotations

@@ -36,7 +36,8 @@ class Linearised:
 
 
 def jenkins(amplitude: np.ndarray, kt: float, limit: float) -> Linearised:
-    """First-harmonic stiffness, damping and energy of a Jenkins element with |f| <= limit [N] at an amplitude [m].
+    """First-harmonic stiffness, damping and energy of a Jenkins element with |f| <= limit [N] at an
+    amplitude [m].
 
     k_eq = (k/pi) (theta* - sin(2 theta*) / 2), omega c_eq = (k/pi) sin^2 theta*, W = 4 F (A - F/k).
     """

@@ -3,9 +3,9 @@
 The state is stepped along straight increments between the samples. What one period does to it is a
 map; its fixed point is found by marching two periods and then by Newton with the map's derivative,
 node by node. The derivative of the periodic force by the motion follows from the same fixed point:
-with x0 the state at the start, x0' = Phi x0' + q, where Phi is the map's derivative by the state and
-q by the motion. Where I - Phi is singular (a node that sticks remembers its start) the derivative of
-the first step from rest rules.
+with x0 the state at the start, x0' = Phi x0' + q, where Phi is the map's derivative by the state
+and q by the motion. Where I - Phi is singular (a node that sticks remembers its start) the
+derivative of the first step from rest rules.
 
 Only the march runs sample after sample, with all nodes at once; derivatives of the steps are asked
 of the law for all samples in one call. The arrays run over samples first: (S, n, ..).

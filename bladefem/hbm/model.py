@@ -38,7 +38,8 @@ class ReducedModel:
     >>> M, K = np.eye(2), np.array([[2.0, -1.0], [-1.0, 1.0]])
     >>> ports = {"contact": np.array([0]), "load": np.array([1]), "probe": np.array([1])}
     >>> side = port_model_from_matrices(M, K, ports, C=0.02 * K)
-    >>> damper = Elements(kt=np.ones(1), kn=np.zeros(1), mu=np.full(1, 0.5), n0=np.ones(1), tangents=1)
+    >>> one = np.ones(1)
+    >>> damper = Elements(kt=one, kn=0 * one, mu=0.5 * one, n0=one, tangents=1)
     >>> model = ReducedModel((side,), damper, {1: np.ones(1)})
     >>> solve(model, omega=0.7, H=7, samples=256).converged
     True

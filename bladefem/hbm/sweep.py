@@ -187,7 +187,9 @@ def _lifting(model: ReducedModel) -> bool:
 
 
 def _folds(model: ReducedModel, solved: Mapping[float, Solution], H: int, probe: int) -> bool:
-    """Whether the response has to be followed round folds: contacts lift off, or the sweep jumps."""
+    """Whether the response has to be followed round folds: contacts lift off, or the sweep
+    jumps.
+    """
     if not _lifting(model):
         return False
     points = [solved[omega] for omega in sorted(solved)]

@@ -35,7 +35,7 @@ def page():
     """What the code of the page defines."""
     names = {}
     for block in re.findall(r"```python\n(.*?)```", PAGE.read_text(), re.DOTALL):
-        exec(block, names)  # noqa: S102
+        exec(block, names)
     return names
 
 
@@ -123,7 +123,9 @@ def test_every_path_uses_the_law(page):
 
 
 def test_every_fallback_ends_on_the_law(page):
-    """With plain Newton from both starts closed, each later link gives the same point or says why."""
+    """With plain Newton from both starts closed, each later link gives the same point or says
+    why.
+    """
     model = mass_on_law(page["Dahl"]())
     balance = Balance(model, condense(model, 1.25, 5), 64)
     usual = solve(model, 1.25, 5, 64)
@@ -164,7 +166,7 @@ def test_the_indicator_of_left_out_harmonics(page):
 
 
 def test_what_is_written_for_coulomb_refuses(page):
-    with pytest.raises(InputError, match="samples = 0.*written for Coulomb's law"):
+    with pytest.raises(InputError, match=r"samples = 0.*written for Coulomb's law"):
         solve(mass_on_law(page["Dahl"]()), 1.0, 3, 0)
     with pytest.raises(InputError, match="expected an object made from FrictionLaw"):
         mass_on_law("Dahl")
