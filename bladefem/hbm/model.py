@@ -14,7 +14,7 @@ import numpy as np
 from ..data import Elements, PortModel, RigidBody
 from ..errors import InputError
 from ..friction.fourier import synthesis, to_real
-from .linear.bodies import Damping, Stack, stacked
+from .linear.bodies import Damping, Stack, stack_bodies
 from .validate_model import check_model, port_size
 
 __all__ = ["Damping", "ReducedModel"]
@@ -215,7 +215,9 @@ class ReducedModel:
             if key[:2] == ("stack", name) and key[2] > len(bodies)
         )
         found = next(larger, None)
-        return stacked(bodies, damping, self.rows) if found is None else found.first(len(bodies))
+        return (
+            stack_bodies(bodies, damping, self.rows) if found is None else found.first(len(bodies))
+        )
 
     def once(self, key: Hashable, make: Callable[[], Any]) -> Any:
         """What `make` returns, kept with this model: what does not depend on the frequency is made

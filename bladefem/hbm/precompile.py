@@ -25,7 +25,7 @@ from .solve import solve
 from .solver.newton import newton
 from .solver.residual import Balance, evaluate_balance, start_in_stick
 from .sweep import response
-from .truncation_indicator import overtones
+from .truncation_indicator import truncation_indicator
 
 __all__ = ["compile_in_parallel", "compile_kernels"]
 
@@ -46,7 +46,7 @@ def compile_in_parallel() -> int:
     return next((code for code in codes if code), 0)
 
 
-def _line() -> ReducedModel:
+def _line_model() -> ReducedModel:
     """A body of three degrees of freedom on one 1-D element with normal motion."""
     ports = {"contact": np.arange(2), "load": np.array([1]), "probe": np.array([1])}
     body = port_model_from_matrices(np.eye(3), np.diag([1.0, 1.2, 1.4]) + 0.1, ports)
@@ -56,19 +56,19 @@ def _line() -> ReducedModel:
 
 def _compile_1d() -> None:
     """Newton first: what goes before it in a compiled point is compiled by the other process."""
-    line = _line()
+    line = _line_model()
     for samples in (64, 0):
         balance = Balance(line, condense(line, 1.0, 2), samples)
         for merit in ("step", "residual"):
             newton(balance, start_in_stick(balance), merit=merit)
     point = solve(line, 1.0, 2, 64)
-    overtones(line, [point], 5)
+    truncation_indicator(line, [point], 5)
     list(response(line, [1.0, 1.1], 2, 64))
 
 
 def _compile_2d() -> None:
     """The linear part of compiled points, then the kernels of 2-D elements."""
-    line = _line()
+    line = _line_model()
     linear_part(1.0, prepared_bodies(line, 2), line.springs.ravel(), 2)
     ports = {"contact": np.arange(3), "load": np.array([1]), "probe": np.array([1])}
     body = port_model_from_matrices(np.eye(3), np.diag([1.0, 1.2, 1.4]) + 0.1, ports)

@@ -24,7 +24,7 @@ from bladefem.hbm.solver.fallback import solve_balance
 from bladefem.hbm.solver.newton import DEFAULTS, Options
 from bladefem.hbm.solver.residual import Balance
 from bladefem.hbm.sweep import response, size, sweep
-from bladefem.hbm.truncation_indicator import overtones
+from bladefem.hbm.truncation_indicator import truncation_indicator
 from bladefem.reduction.matrices import port_model_from_matrices
 
 PAGE = Path(__file__).parents[2] / "docs/extending.md"
@@ -162,7 +162,7 @@ def test_the_indicator_of_left_out_harmonics(page):
     """Its forces are those of the law, to the higher harmonics that a richer balance has."""
     model = mass_on_law(page["Dahl"]())
     point = solve(model, 0.9, 3, 64)
-    assert 0 < overtones(model, [point], 9)[0] < 0.1
+    assert 0 < truncation_indicator(model, [point], 9)[0] < 0.1
 
 
 def test_what_is_written_for_coulomb_refuses(page):
