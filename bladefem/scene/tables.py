@@ -34,6 +34,7 @@ __all__ = [
     "Operation",
     "Scene",
     "Seat",
+    "Solver",
     "Study",
 ]
 
@@ -243,6 +244,24 @@ class Model:
 
 
 @dataclass(frozen=True)
+class Solver:
+    """How eigenvalue problems are solved."""
+
+    eigensolver: str = quantity(
+        "slepc",
+        choices=("slepc", "lanczos"),
+        help="SLEPc's Krylov-Schur iteration, or the block Lanczos iteration that finishes guesses",
+    )
+    vectors: int | None = quantity(
+        None, "1", 3, 5000, "basis vectors of SLEPc; twice the modes and two when left out"
+    )
+    petsc: str = quantity(
+        "",
+        help="PETSc and SLEPc options, such as '-eps_monitor'; also after -- on the command line",
+    )
+
+
+@dataclass(frozen=True)
 class Foundation:
     """What the Z-shaped mass stands on, how that moves, and what presses and pulls (the paper's Eq.
     30, Table 1).
@@ -340,3 +359,4 @@ class Scene:
     excitation: Excitation = field(default_factory=Excitation)
     study: Study = field(default_factory=Study)
     model: Model = field(default_factory=Model)
+    solver: Solver = field(default_factory=Solver)
