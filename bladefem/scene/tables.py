@@ -203,6 +203,11 @@ class Study:
     band: tuple[float, float] | None = quantity(
         None, "Hz", 0.0, 1e6, "frequency band; from the free to the stuck resonance when left out"
     )
+    interval: bool = quantity(
+        False,
+        help="also the lowest and highest resonance over all friction forces that the loading "
+        "history may have left in contact points that never slip",
+    )
     stability: bool = quantity(
         False,
         help="also Floquet multipliers of the points of each curve, where normal loads "
