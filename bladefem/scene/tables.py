@@ -323,6 +323,18 @@ class Imported:
         help="names for groups, node sets and surfaces of the file that has others, such as "
         "'clamp = face_3 + face_4', 'tip = face_1'",
     )
+    seats: tuple[str, str] | None = quantity(
+        None,
+        help="plane platform faces of a STEP blade, towards the next blade and towards the "
+        "previous one, between which [damper] is drawn; seats are cut into them",
+    )
+    seat_width: float | None = quantity(
+        None,
+        "m",
+        1e-4,
+        0.1,
+        "width of these seats, from the platform's edge inwards; the whole face when left out",
+    )
     linear: str = quantity(
         "refuse",
         choices=("refuse", "promote", "keep"),
