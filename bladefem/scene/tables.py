@@ -41,11 +41,31 @@ __all__ = [
 
 @dataclass(frozen=True)
 class Material:
-    """Linear elastic, isotropic. The default is a steel."""
+    """Linear elastic: isotropic, cubic (with G) or orthotropic. The default is a steel."""
 
     E: float = quantity(2.1e11, "Pa", 1e6, 1e13, "Young's modulus")
     nu: float = quantity(0.3, "1", -0.99, 0.499, "Poisson's ratio")
     rho: float = quantity(7850.0, "kg/m^3", 1.0, 3e4, "density")
+    G: float | None = quantity(
+        None,
+        "Pa",
+        1e6,
+        1e13,
+        "shear modulus of a cubic crystal, with E along its edges; isotropic when left out",
+    )
+    orthotropic: tuple[float, ...] | None = quantity(
+        None,
+        "1",
+        help="E1, E2, E3 [Pa], nu12, nu13, nu23, G12, G13, G23 [Pa] of an orthotropic solid, in "
+        "place of E, nu and G",
+    )
+    angles: tuple[float, float, float] = quantity(
+        (0.0, 0.0, 0.0),
+        "rad",
+        -2 * pi,
+        2 * pi,
+        "of the crystal: about the blade's x (radial), the new y, the new z",
+    )
 
 
 @dataclass(frozen=True)
