@@ -237,7 +237,9 @@ def _fitted(problem: ContactProblem) -> ContactProblem:
     return replace(problem, clearance=none, blade_swell=none, damper_swell=none)
 
 
-def condense_body(flex: Flexibility, P: sp.spmatrix, load: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+def condense_body(
+    flex: Flexibility, P: sp.spmatrix, load: np.ndarray
+) -> tuple[np.ndarray, np.ndarray]:
     """Flexibility (n, n) at the ports, and their displacement (n,) under a load in mesh
     numbering.
     """
