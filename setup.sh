@@ -13,6 +13,9 @@ PKGS="python3-dolfinx-real python3-petsc4py-real python3-slepc4py-real python3-m
  python3-venv python3-dev gcc pkg-config openmpi-bin libopenblas0-pthread libgl1 libegl1 libegl-mesa0 libgl1-mesa-dri
  libglu1-mesa libxrender1 libxcursor1 libxfixes3 libxft2 libfontconfig1 libxinerama1"
 
+# The browser tests need Chromium, nothing else does: CI asks for it, users are spared 300 MB.
+if [ "${BLADEFEM_BROWSER:-}" = 1 ]; then PKGS="$PKGS chromium fonts-dejavu-core"; fi
+
 # What the environment was made from: these files, the system's versions, and where it stands.
 system_versions() {
   if command -v dpkg-query >/dev/null 2>&1; then
@@ -22,7 +25,8 @@ system_versions() {
   printf '%s\n' "${CONDA_PREFIX:-}"
 }
 key() { { cat setup.sh pyproject.toml constraints/*.txt; system_versions; pwd -P; } | cksum; }
-ready() { [ -x "$V/bin/python" ] && [ -r "$STAMP" ] && [ "$(cat "$STAMP")" = "$(key)" ]; }
+browser() { [ "${BLADEFEM_BROWSER:-}" != 1 ] || command -v chromium >/dev/null 2>&1; }
+ready() { browser && [ -x "$V/bin/python" ] && [ -r "$STAMP" ] && [ "$(cat "$STAMP")" = "$(key)" ]; }
 if ready; then exit 0; fi
 
 # Two calls at once: the second waits for the first, then finds everything ready.

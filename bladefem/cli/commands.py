@@ -73,9 +73,12 @@ def modes(options: argparse.Namespace, comm: Any) -> None:
     """
     from ..report import modes as report
 
+    refuse_pdf(options)
     scene, folder, bars = prepared(options, comm)
     found = report.run(scene, folder, modes_wanted(options), options.pictures, comm, bars)
     tell(options, comm, lambda: tables.survey(found), found.run)
+    if options.pictures:
+        print_report(options, comm, folder / "report_modes.html")
 
 
 def modes_wanted(options: argparse.Namespace) -> Any:
@@ -138,8 +141,28 @@ def response(options: argparse.Namespace, comm: Any) -> None:
 
 def report(options: argparse.Namespace, comm: Any) -> None:
     """Everything, with figures and report."""
+    refuse_pdf(options)
     scene, folder, bars = prepared(options, comm, responds=True)
     run_kind(scene, folder, options, comm, bars)
+    print_report(options, comm, folder / "report.html")
+
+
+def refuse_pdf(options: argparse.Namespace) -> None:
+    """A missing browser is told before long work."""
+    from ..report.pdf import require_browser
+
+    if options.pdf:
+        require_browser()
+
+
+def print_report(options: argparse.Namespace, comm: Any, page: Path) -> None:
+    """The report as PDF, where that is wanted."""
+    from ..io.stage_cache import on_root
+    from ..report.pdf import print_pdf
+
+    if options.pdf:
+        file = on_root(comm, lambda: print_pdf(page))
+        tell(options, comm, lambda: f"written: {file}")
 
 
 def run_kind(
@@ -161,6 +184,7 @@ def chart(options: argparse.Namespace, comm: Any) -> None:
     check_budget(options.budget)
     if options.reference:
         folder = Path(options.output or "runs/reference")
+        scene = None
         accuracy = 0.02
         title = "reference blade"
         made = on_root(comm, lambda: reference_chart(accuracy, options.budget))
@@ -172,7 +196,7 @@ def chart(options: argparse.Namespace, comm: Any) -> None:
         made = scene_chart(scene, folder, options.budget, comm, sizes)
         accuracy = scene.accuracy
         title = scene.title
-    files = on_root(comm, lambda: write_chart(made, folder, accuracy, title))
+    files = on_root(comm, lambda: write_chart(made, folder, accuracy, title, scene))
     tell(
         options, comm, lambda: "\n".join([*made.remarks, "written: " + ", ".join(map(str, files))])
     )
@@ -202,11 +226,13 @@ def prepared(
     folder = Path(options.output or default_folder(options.scene))
 
     def prepare() -> Scene:
-        from ..io.run_folder import locked, take_folder
+        from ..io.run_folder import keep_given, locked, take_folder
 
         scene = given_scene(options, responds)
+        given = _given(options)
         options.held.enter_context(locked(folder))
         moved = take_folder(folder, scene)
+        keep_given(folder, given)
         if moved and not options.quiet:
             print(f"bladefem: {moved}", file=sys.stderr, flush=True)
         return scene
@@ -214,6 +240,19 @@ def prepared(
     scene = on_root(comm, prepare)
     rank = 0 if comm is None else comm.rank
     return scene, folder, partial(watch, shown=wanted(options.quiet, rank))
+
+
+def _given(options: argparse.Namespace) -> set[str]:
+    """Dotted names of the fields that the user gave; a run folder remembers its own."""
+    from ..io.run_folder import given_fields
+    from ..scene.toml import given_keys, read_tables
+
+    path = Path(options.scene)
+    changed = {override.partition("=")[0].strip() for override in options.overrides}
+    known = given_fields(path) if path.is_dir() else None
+    if known is not None:
+        return {*known, *changed}
+    return given_keys(read_tables(scene_path(options.scene), options.overrides))
 
 
 def given_scene(options: argparse.Namespace, responds: bool) -> Scene:

@@ -1,8 +1,9 @@
 """Contact forces of all elements for periodic relative motion: harmonics, Jacobian, states and
 dissipated energy.
 
-Signs (data.py): w is blade minus damper in (normal, t1, t2); the blade feels -f. The normal force is
-max(0, n0 + kn w_n), the tangential one a return map of kt w onto |f| <= mu times it.
+Signs (data.py): w is blade minus damper in (normal, t1, t2); the blade feels -f. The normal force
+is max(0, n0 + kn w_n), the tangential one a return map of kt w onto |f| <= mu times it, or what a
+law of one's own says (`bladefem.friction.law`).
 """
 
 from __future__ import annotations
@@ -13,6 +14,7 @@ import numpy as np
 
 from bladefem.data import Elements
 from bladefem.errors import InputError
+from bladefem.friction.coulomb_2d_plain import plain_batch
 from bladefem.friction.fourier import harmonics_of
 from bladefem.friction.kernel_1d import jenkins_batch
 from bladefem.friction.law import groups_by_law, select_elements
@@ -27,12 +29,12 @@ __all__ = [
     "SEPARATED",
     "STICK",
     "Forces",
-    "checked",
-    "dissipated",
+    "check_motion",
+    "dissipated_energy",
     "evaluate",
     "finite_load",
-    "states",
-    "verdict",
+    "contact_states",
+    "convergence_reason",
 ]
 
 SEPARATED = 0
@@ -41,6 +43,28 @@ PARTIAL_SLIP = 2
 GROSS_SLIP = 3
 PRECISIONS = {"double": np.float64, "single": np.float32}
 PERIODIC = "periodic"
+
+
+def _vector_kernel(w, load, nodes, samples, precision, cycles, jacobian, F, shares, used):
+    """Fill forces, shares and cycles of 2-D elements; returns their Jacobian (n, d, K, d K)."""
+    n, d, K = w.shape
+    H = harmonics_of(w)
+    J = np.empty((n, d, K, d * K) if jacobian else (n, 0, 0, 0))
+    rows = patterns(H, samples, PRECISIONS[precision])
+    disc_batch(w, load, nodes, tables(H, samples), rows, cycles, F, J, shares, used)
+    return J
+
+
+def _plain_kernel(w, load, nodes, samples, precision, cycles, jacobian, F, shares, used):
+    """The same by the plain kernel."""
+    n, d, K = w.shape
+    J = np.empty((n, d, K, d * K))
+    plain_batch(w, load, nodes, tables(harmonics_of(w), samples), cycles, F, J, shares, used)
+    return J
+
+
+# of 2-D elements
+KERNELS_2D = {"vector": _vector_kernel, "plain": _plain_kernel}
 
 
 @dataclass(frozen=True)
@@ -74,6 +98,7 @@ def evaluate(
     load: np.ndarray | None = None,
     cycles: int = 4000,
     precision: str = "double",
+    kernel: str = "vector",
 ) -> Forces:
     """Harmonics of the contact forces for relative motion w (n, d, 2H+1) [m], sampled at
     ``samples`` instants.
@@ -81,15 +106,19 @@ def evaluate(
     load (n, samples) [N], where given, is the prescribed part of the normal load N(t) in place of
     the constant n0. precision is that in which the derivative of 2-D elements is summed: "single"
     is faster and leaves about 1e-7 of it in error, which is enough for Newton; forces are the same.
+    kernel is that of 2-D elements: "vector", or "plain", the readable definition of it, some 50
+    times as slow and always in double precision.
     The error falls as samples^-2. Forces.converged is False, with the reason, when a 2-D element
     was not periodic after ``cycles`` periods or the motion is not finite. Raises InputError for
     shapes that do not fit or too few samples (at least 4H+4).
     """
-    w, nodes = checked(elements, w)
+    w, nodes = check_motion(elements, w)
     if precision not in PRECISIONS:
         raise InputError(f"precision {precision!r}: expected one of {', '.join(PRECISIONS)}")
     n, d, K = w.shape
-    load = _series(load, n, samples)
+    if kernel not in KERNELS_2D:
+        raise InputError(f"kernel {kernel!r}: expected one of {', '.join(KERNELS_2D)}")
+    load = _prescribed_load(load, n, samples)
     if elements.law is not None:
         return _evaluate_laws(elements, w, samples, jacobian, load, cycles, precision)
     tab = tables(harmonics_of(w), samples)
@@ -100,26 +129,16 @@ def evaluate(
         J = np.empty((n, d, K, d, K))
         jenkins_batch(w, load, nodes, tab, F, J, shares)
     else:
-        J = np.empty((n, d, K, d * K) if jacobian else (n, 0, 0, 0))
-        disc_batch(
-            w,
-            load,
-            nodes,
-            tab,
-            patterns(harmonics_of(w), samples, PRECISIONS[precision]),
-            cycles,
-            F,
-            J,
-            shares,
-            used,
+        J = KERNELS_2D[kernel](
+            w, load, nodes, samples, precision, cycles, jacobian, F, shares, used
         )
-    reason = verdict(F, used, f"were not periodic after {cycles} cycles")
+    reason = convergence_reason(F, used, f"were not periodic after {cycles} cycles")
     return Forces(
         F,
         J.reshape(n, d, K, d, K) if jacobian else None,
-        states(shares),
+        contact_states(shares),
         shares,
-        dissipated(F, w),
+        dissipated_energy(F, w),
         np.abs(used),
         reason == PERIODIC,
         reason,
@@ -166,13 +185,20 @@ def _evaluate_laws(
         shares[rows] = part.shares
         if J is not None:
             J[rows] = part.dfdw
-    reason = verdict(F, used, f"were not periodic after {cycles} cycles")
+    reason = convergence_reason(F, used, f"were not periodic after {cycles} cycles")
     return Forces(
-        F, J, states(shares), shares, dissipated(F, w), np.abs(used), reason == PERIODIC, reason
+        F,
+        J,
+        contact_states(shares),
+        shares,
+        dissipated_energy(F, w),
+        np.abs(used),
+        reason == PERIODIC,
+        reason,
     )
 
 
-def verdict(f: np.ndarray, used: np.ndarray, failure: str) -> str:
+def convergence_reason(f: np.ndarray, used: np.ndarray, failure: str) -> str:
     """PERIODIC, or the failure of the elements with used < 0, or that forces f are not finite."""
     failed = int(np.count_nonzero(used < 0))
     if failed:
@@ -182,7 +208,7 @@ def verdict(f: np.ndarray, used: np.ndarray, failure: str) -> str:
     )
 
 
-def dissipated(f: np.ndarray, w: np.ndarray) -> np.ndarray:
+def dissipated_energy(f: np.ndarray, w: np.ndarray) -> np.ndarray:
     """(n,) work of the tangential forces f (n, d, K) on w (n, d, K) in one cycle [J], exact for
     these harmonics.
     """
@@ -192,7 +218,7 @@ def dissipated(f: np.ndarray, w: np.ndarray) -> np.ndarray:
     return np.pi * np.einsum("ndh,h->n", c * w[:, 1:, 2::2] - s * w[:, 1:, 1::2], h)
 
 
-def states(shares: np.ndarray) -> np.ndarray:
+def contact_states(shares: np.ndarray) -> np.ndarray:
     """(n,) state codes from the shares (n, 3) of stick, slip and separation."""
     stick = shares[:, 0]
     slip = shares[:, 1]
@@ -202,7 +228,7 @@ def states(shares: np.ndarray) -> np.ndarray:
     return np.where(stick + slip > 1e-12, code, SEPARATED)
 
 
-def checked(elements: Elements, w: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+def check_motion(elements: Elements, w: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """w (n, d, K) and the table (n, 4) of kt, kn, mu, n0, which fit each other; raises InputError
     where they do not.
     """
@@ -227,7 +253,7 @@ def checked(elements: Elements, w: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     return w, np.ascontiguousarray(nodes)
 
 
-def _series(load: np.ndarray | None, n: int, samples: int) -> np.ndarray:
+def _prescribed_load(load: np.ndarray | None, n: int, samples: int) -> np.ndarray:
     """(n, samples) prescribed loads, or (n, 0) for none."""
     if load is None:
         return np.zeros((n, 0))

@@ -5,18 +5,18 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from ..errors import InputError, NotSolvedError
 from .linear.condensation import condense
 from .model import ReducedModel
-from .parameters import check_parameter, inner, outer, vary
+from .parameters import check_parameter, parameter_value, path_coordinate, vary
 from .solution import Solution
 from .solve import as_solution, solve
-from .solver.arclength import Spot, Task, advance, spot_at
-from .solver.fallback import Attempt
+from .solver.arclength import Spot, Task, advance_path, spot_at
+from .solver.fallback import Attempt, solve_balance
 from .solver.newton import DEFAULTS, Newton, Options
 from .solver.residual import Balance, State, evaluate_balance
 
@@ -24,6 +24,10 @@ __all__ = ["PathPoint", "follow"]
 
 # points of a path
 LIMIT = 5000
+# shares of the range beyond a point where the path stops, at which it is begun again
+RESTARTS = (1e-3, 3e-3, 0.01, 0.03)
+# times that a path is begun again
+MOST_RESTARTS = 4
 
 
 @dataclass(frozen=True)
@@ -41,6 +45,9 @@ class PathPoint:
     leapt: bool = False
     # another path crosses between the point before and this one
     branch: bool = False
+    # why the path was begun again here, on the motion found next to where it stopped; it may be
+    # another branch. "" elsewhere
+    restarted: str = ""
 
 
 def follow(
@@ -56,6 +63,10 @@ def follow(
     """The path from a converged solution, with its harmonics and samples, until the parameter
     leaves its bounds.
 
+    Where the corrector fails, steps are halved, then leaps over a small gap and directions beyond
+    a corner are tried; where all of these fail the path is begun again a little further on, and
+    the point says so.
+
     Args:
         name: "omega", or a parameter of `bladefem.hbm.parameters`; the start belongs to its factor
             1, or gap 0.
@@ -66,23 +77,54 @@ def follow(
         InputError: unknown parameter, or a start outside the bounds.
         NotSolvedError: the path could not be followed further; the message says why.
     """
-    task, x, state = _prepare(model, name, start, bounds, options)
-    low, high = (inner(name, bound) for bound in bounds)
+    task, x, state = _prepare_path(model, name, start, bounds, options)
+    low, high = (path_coordinate(name, bound) for bound in bounds)
     spot = spot_at(task, x, task.balance(x), state, 0, 1.0 if forward else -1.0)
-    yield _point(task, spot)
+    yield _path_point(task, spot)
     step, longest = steps
+    restarts = 0
     for _ in range(LIMIT):
         before = spot
-        spot, step, fold = advance(task, spot, step, longest)
-        yield _point(task, spot, fold, spot.branches(before))
+        try:
+            spot, step, fold = advance_path(task, spot, step, longest)
+        except NotSolvedError as error:
+            restarts += 1
+            begun = _begun_again(task, spot, (low, high)) if restarts <= MOST_RESTARTS else None
+            if begun is None:
+                raise
+            spot, step = begun, steps[0]
+            yield replace(_path_point(task, spot), restarted=str(error))
+            continue
+        yield _path_point(task, spot, fold, spot.branches(before))
         if not low <= spot.x <= high:
             return
     raise NotSolvedError(
-        f"path in {name} stopped at {outer(name, spot.x):.6g} after {LIMIT} points"
+        f"path in {name} stopped at {parameter_value(name, spot.x):.6g} after {LIMIT} points"
     )
 
 
-def _prepare(
+def _begun_again(task: Task, spot: Spot, bounds: tuple[float, float]) -> Spot | None:
+    """A solution a little ahead in the parameter, by all fallbacks at the farthest; None where
+    there is none.
+    """
+    for share in RESTARTS:
+        x = spot.x + spot.sign * share * task.width
+        if not bounds[0] <= x <= bounds[1]:
+            return None
+        balance = task.balance(x)
+        fallbacks = task.options.fallbacks and share == RESTARTS[-1]
+        options = replace(task.options, fallbacks=fallbacks)
+        end = solve_balance(balance, spot.state.w, options)[-1].end
+        if not end.converged:
+            continue
+        try:
+            return spot_at(task, x, balance, end.state, end.iterations, spot.sign)
+        except np.linalg.LinAlgError:
+            continue
+    return None
+
+
+def _prepare_path(
     model: ReducedModel, name: str, start: Solution, bounds: tuple[float, float], options: Options
 ) -> tuple[Task, float, State]:
     check_parameter(name, also=("omega",))
@@ -100,22 +142,24 @@ def _prepare(
         raise NotSolvedError(f"path in {name}: the start is not solved, {near.reason}")
 
     def balance(x: float) -> Balance:
-        changed = model if name == "omega" else vary(model, name, outer(name, x))
+        changed = model if name == "omega" else vary(model, name, parameter_value(name, x))
         return Balance(
             changed,
             condense(changed, x if name == "omega" else start.omega, near.harmonics),
             near.samples,
         )
 
-    width = inner(name, bounds[1]) - inner(name, bounds[0])
-    x = inner(name, value)
+    width = path_coordinate(name, bounds[1]) - path_coordinate(name, bounds[0])
+    x = path_coordinate(name, value)
     task = Task(balance, name, width, float(np.linalg.norm(near.w)) or 1.0, options)
     return task, x, evaluate_balance(balance(x), near.w)
 
 
-def _point(task: Task, spot: Spot, fold: bool = False, branch: bool = False) -> PathPoint:
+def _path_point(task: Task, spot: Spot, fold: bool = False, branch: bool = False) -> PathPoint:
     end = Newton(spot.state, spot.iterations, True, "residual within tolerance")
     solution = as_solution(
         spot.balance, Attempt("path following", end), spot.iterations, end.reason
     )
-    return PathPoint(outer(task.name, spot.x), solution, spot.sign > 0, fold, spot.leapt, branch)
+    return PathPoint(
+        parameter_value(task.name, spot.x), solution, spot.sign > 0, fold, spot.leapt, branch
+    )

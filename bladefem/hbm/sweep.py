@@ -4,7 +4,7 @@ needs them.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import replace
 from functools import cache, partial
 from itertools import chain, islice
@@ -12,12 +12,13 @@ from itertools import chain, islice
 import numpy as np
 
 from ..errors import InputError, NotSolvedError
+from .branches import find_branches
 from .linear_resonances import free_resonances, stuck_resonances
 from .model import ReducedModel
 from .predictor import AHEAD, ahead
 from .sensitivity import sensitivities
-from .solution import Solution
-from .solve import solve, sticking
+from .solution import Solution, size
+from .solve import leading_stuck_solutions, solve
 from .solver.fallback import match_harmonics
 from .solver.newton import DEFAULTS, Options
 from .solver.point_compiled import solve_along
@@ -40,14 +41,12 @@ COARSE = 12
 BLOCK = 16
 # points after which a sweep gives up refining
 BAND_LIMIT = 400
-
-
-def size(solution: Solution, probe: int = 0) -> float:
-    """Root of the sum of squares of the moving harmonics' amplitudes at a probe: what a peak is
-    measured by [m].
-    """
-    moving = solution.probe[1:, probe]
-    return float(np.sqrt(np.vdot(moving, moving).real))
+# unknowns up to which paths are followed wherever contacts lift off; of larger models, where the
+# sweep shows a jump, too
+FOLLOWED = 600
+# a jump: a share of the highest point between neighbours that this share of the band separates
+JUMP = 0.05
+JUMP_WIDTH = 1e-4
 
 
 def response(
@@ -80,7 +79,9 @@ def response(
         return (
             ready[i]
             if i in ready
-            else _solve(model, omegas[i], H, samples, _ahead(last, omegas[i], H), options)
+            else _solve_off_resonance(
+                model, omegas[i], H, samples, _predicted_start(last, omegas[i], H), options
+            )
         )
 
     for i, omega in enumerate(omegas):
@@ -105,8 +106,8 @@ def _at_once(
     """
     for omega in omegas:
         check_point(model, omega, H, samples)
-    sticks = not last or _sticks(last[-1])
-    found = sticking(model, omegas, H) if options.frugal and sticks else []
+    sticks = not last or _all_stick(last[-1])
+    found = leading_stuck_solutions(model, omegas, H) if options.frugal and sticks else []
     return found or solve_along(model, np.array(omegas), H, samples, last, options)
 
 
@@ -119,6 +120,7 @@ def sweep(
     peak: float = 1e-3,
     curve: float = 0.02,
     options: Options = DEFAULTS,
+    notes: list[str] | None = None,
 ) -> Iterator[Solution]:
     """Solve a band of circular frequencies [rad/s]; points come in the order of need, to be sorted
     by `omega`.
@@ -128,10 +130,16 @@ def sweep(
     as it is for one mode, that has this slope and meets a neighbour; its vertex is solved next,
     until it is no higher than the tolerance allows.
 
+    Where contacts lift off there may be several motions at one frequency. Then the response is
+    followed round its folds instead (`bladefem.hbm.branches`), and the points that follow carry the
+    number of their piece in `branch`. Models of many unknowns are followed where the sweep jumps,
+    loses points or does not end.
+
     Args:
         peak: relative accuracy of each maximum.
         curve: how far, as a share of the highest maximum, a point may lie off the line through its
             neighbours.
+        notes: takes what the search could not do, in sentences.
 
     Raises:
         InputError: the band is empty or not positive.
@@ -145,13 +153,22 @@ def sweep(
     def slope(omega: float) -> float:
         return float(sensitivities(model, solved[omega], ["omega"])["omega"].size[options.probe])
 
+    notes = [] if notes is None else notes
     for solution in response(model, first_look(model, band), H, samples, options=options):
         solved[solution.omega] = solution
         yield solution
-    while len(solved) < BAND_LIMIT:
-        wanted = _wanted(solved, slope, (peak, curve), options.probe)
+    while not _needs_continuation(model, solved, H, options.probe):
+        wanted = _next_frequency(solved, slope, (peak, curve), options.probe)
         if wanted is None:
             return
+        if len(solved) >= BAND_LIMIT:
+            notes.append(
+                f"the sweep ended after {BAND_LIMIT} points: peaks may be higher by more than "
+                "the accuracy"
+            )
+            if not _normal_loads_follow(model):
+                return
+            break
         near = sorted(
             (s for s in solved.values() if s.converged), key=lambda s: abs(s.omega - wanted)
         )
@@ -159,6 +176,39 @@ def sweep(
         solution = solve_from(model, wanted, H, samples, [*near[:1], *islice(beyond, 1)], options)
         solved[wanted] = solution
         yield solution
+    found = find_branches(
+        model, band, list(solved.values()), H, samples, peak=peak, options=options
+    )
+    notes.extend(found.notes)
+    yield from found.points
+
+
+def _normal_loads_follow(model: ReducedModel) -> bool:
+    """Whether normal loads follow the motion, so that there may be several motions."""
+    return model.directions > model.elements.tangents
+
+
+def _needs_continuation(
+    model: ReducedModel, solved: Mapping[float, Solution], H: int, probe: int
+) -> bool:
+    """Whether the response has to be followed round folds: contacts lift off, or the sweep
+    jumps.
+    """
+    if not _normal_loads_follow(model):
+        return False
+    points = [solved[omega] for omega in sorted(solved)]
+    good = [p for p in points if p.converged]
+    if len(good) < 2:
+        return False
+    if model.springs.size * (2 * H + 1) <= FOLLOWED:
+        opened = {p.states["open"] for p in good}
+        return len(opened) > 1 or any(p.states["lift"] for p in good)
+    if len(good) < len(points):
+        return True
+    heights = np.array([size(p, probe) for p in good])
+    steps = np.diff([p.omega for p in good])
+    near = steps < JUMP_WIDTH * (good[-1].omega - good[0].omega)
+    return bool(np.any(near & (abs(np.diff(heights)) > JUMP * heights.max())))
 
 
 def solve_from(
@@ -176,16 +226,16 @@ def solve_from(
     """
     simply = replace(options, fallbacks=False)
     tries = (
-        (_solve(model, omega, H, samples, start, simply) for start in starts)
+        (_solve_off_resonance(model, omega, H, samples, start, simply) for start in starts)
         if len(starts) > 1
         else ()
     )
-    return next((point for point in tries if point.converged), None) or _solve(
+    return next((point for point in tries if point.converged), None) or _solve_off_resonance(
         model, omega, H, samples, starts[0] if starts else None, options
     )
 
 
-def _solve(
+def _solve_off_resonance(
     model: ReducedModel,
     omega: float,
     H: int,
@@ -230,7 +280,7 @@ def first_look(model: ReducedModel, band: tuple[float, float]) -> np.ndarray:
     return np.unique(np.concatenate([grid[[0, -1]], keep, inside]))
 
 
-def _wanted(
+def _next_frequency(
     solved: dict[float, Solution], slope: Slope, accuracy: tuple[float, float], probe: int
 ) -> float | None:
     """The next frequency to solve: a maximum that is not closed in yet, else the worst corner; None
@@ -304,11 +354,11 @@ def _corner_targets(omegas: np.ndarray, heights: np.ndarray, curve: float) -> It
             yield omegas[i + 1] + (right / 2 if right > left else -left / 2)
 
 
-def _ahead(last: list[Solution], omega: float, H: int) -> Solution | None:
+def _predicted_start(last: list[Solution], omega: float, H: int) -> Solution | None:
     """A start on the curve through the last solutions; None, which is full stick, where the last
     one sticks.
     """
-    if not last or _sticks(last[-1]):
+    if not last or _all_stick(last[-1]):
         return None
     known = np.array([match_harmonics(p.w, H) for p in last])
     w = np.empty(known.shape[1:])
@@ -317,5 +367,5 @@ def _ahead(last: list[Solution], omega: float, H: int) -> Solution | None:
     return replace(last[-1], w=w)
 
 
-def _sticks(solution: Solution) -> bool:
+def _all_stick(solution: Solution) -> bool:
     return solution.states["stick"] == len(solution.w)

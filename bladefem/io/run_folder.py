@@ -5,9 +5,10 @@ new ones.
 from __future__ import annotations
 
 import fcntl
+import json
 import os
 import shutil
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
 
@@ -16,9 +17,11 @@ from ..scene.tables import Scene
 from ..scene.toml import dump, load_scene
 from .stage_cache import open_folder, write_text
 
-__all__ = ["EARLIER", "locked", "take_folder"]
+__all__ = ["EARLIER", "given_fields", "keep_given", "locked", "take_folder"]
 
 EARLIER = "earlier"
+# names of the fields that the user gave, beside the scene with all its values
+GIVEN = "given.json"
 RESULTS = (".csv", ".gif", ".html", ".json", ".md", ".nc", ".png", ".svg", ".tex", ".txt", ".vtu")
 
 
@@ -70,6 +73,25 @@ def take_folder(folder: str | Path, scene: Scene) -> str:
     said = _put_away(folder) if file.is_file() and not _holds(file, scene) else ""
     write_text(file, dump(scene))
     return said
+
+
+def keep_given(folder: str | Path, names: Iterable[str]) -> None:
+    """Remember which fields of the folder's scene the user gave, for the report.
+
+    Args:
+        names: dotted, "aerofoil.span"; added to those already known where the scene came from the
+            folder itself.
+    """
+    write_text(Path(folder) / GIVEN, json.dumps(sorted(names), indent=1) + "\n")
+
+
+def given_fields(folder: str | Path) -> list[str] | None:
+    """Dotted names of the fields that the user gave; None where the folder does not know."""
+    try:
+        names = json.loads((Path(folder) / GIVEN).read_text(encoding="utf-8"))
+    except (OSError, ValueError):
+        return None
+    return [str(name) for name in names] if isinstance(names, list) else None
 
 
 def _holds(file: Path, scene: Scene) -> bool:

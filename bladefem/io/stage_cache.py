@@ -22,6 +22,7 @@ from typing import Any
 import numpy as np
 
 from ..errors import InputError
+from ..util.message import Message
 from .array_codec import read_npz, tree_of, write_npz
 
 __all__ = [
@@ -238,7 +239,7 @@ def _version(distribution: str) -> str:
 
 def found_remark(name: str, seconds: float) -> str:
     """That a stage was found, for the messages of a run."""
-    return f"{name}: found in the folder, where it was made in {seconds:.1f} s"
+    return Message(f"{name}: found in the folder, where it was made in {seconds:.1f} s", "timing")
 
 
 def _find(path: Path, key: str) -> tuple[Any, float] | None:

@@ -19,15 +19,21 @@ from ..view.wear import draw_work
 from .linear import linear_columns
 
 __all__ = [
+    "SEATS",
     "cycles_of",
     "draw_hysteresis",
     "draw_wear",
     "loop_table",
     "node_table",
     "save_cycles_vtu",
+    "seat_loops",
     "wear_sentence",
     "wear_table",
 ]
+
+
+# contact pairs in words, as the pictures of pressure have them
+SEATS = {"this": "right seat", "next": "left seat"}
 
 
 def cycles_of(result: Run) -> list[ContactCycle]:
@@ -181,10 +187,16 @@ def draw_wear(patches: Sequence[Patch], cycle: ContactCycle, file: Path) -> obje
 
 def draw_hysteresis(cycles: Sequence[ContactCycle], file: Path) -> object:
     """Hysteresis of both seats at the resonance of each load."""
-    cases = {
+    return draw_seat_loops(seat_loops(cycles), file)
+
+
+def seat_loops(
+    cycles: Sequence[ContactCycle],
+) -> dict[str, dict[str, tuple[np.ndarray, np.ndarray]]]:
+    """Name of the load -> name of the seat -> (displacement [m], force [N]) of one period."""
+    return {
         f"{c.load:.4g} N" + ("" if c.mass is None else f", {1e3 * c.mass:.4g} g"): {
-            f'"{name}"': (loop.displacement, loop.force) for name, loop in c.loops.items()
+            SEATS.get(name, name): (loop.displacement, loop.force) for name, loop in c.loops.items()
         }
         for c in cycles
     }
-    return draw_seat_loops(cases, file)

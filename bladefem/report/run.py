@@ -29,28 +29,35 @@ from ..study.modes.comparison import family_table
 from ..study.modes.stress import Strength
 from ..study.modes.survey import excited_set
 from ..study.pipeline import pipeline
+from ..study.pipeline.contact_cycle import ContactCycle
 from ..study.pipeline.linear_limits import Limit
 from ..study.pipeline.loads import summary
 from ..study.pipeline.stability import UNIQUE
 from ..study.pipeline.state_check import state_sentence
+from ..util.message import method, warning
 from ..util.progress import Progress, unwatched
 from ..view import mesh, modes, response, speed
+from ..view.live_curves import live_diameters, live_loops, live_optimum, live_responses
+from ..view.live_shapes import live_shapes
 from .datasets import datasets, table_dataset
 from .linear import harmonic_table, linear_sentence
 from .nodes import (
+    SEATS,
     cycles_of,
     draw_hysteresis,
     draw_wear,
     loop_table,
     node_table,
     save_cycles_vtu,
+    seat_loops,
     wear_sentence,
     wear_table,
 )
 from .pressure import PICTURE, draw_seats, pressure_table, write_points
+from .response_arrays import curve_arrays, loop_arrays, node_arrays, resonance_arrays
 from .tables import units_of, write_tables
 from .wheel import blade_table, pattern_drawings, pattern_sentences, pattern_table
-from .write import write_report
+from .write import Page, write_report
 
 __all__ = ["run", "write_run"]
 
@@ -110,6 +117,10 @@ def _write(result: pipeline.Run, progress: Progress) -> None:
         "nodes": table_dataset(nodes, "row"),
         "approximation": table_dataset(harmonic_table(patches, cycles), "row"),
         "hysteresis": table_dataset(loops, "row"),
+        "response": curve_arrays(tables["response/points"]),
+        "resonance": resonance_arrays(result.response.curves, result.response.limits),
+        "cycle": node_arrays(nodes),
+        "loops": loop_arrays(cycles, SEATS),
     }
     write_results(folder / "results.nc", groups, dump(result.scene))
     drawings = {
@@ -129,15 +140,44 @@ def _write(result: pipeline.Run, progress: Progress) -> None:
     messages = [
         *filter(None, [moved]),
         *result.messages,
-        MESH,
+        method(MESH),
         _static_contact(result),
-        _states(result),
-        linear_sentence(cycles),
+        method(_states(result)),
+        method(linear_sentence(cycles)),
         *_beyond_stick(result),
         *([wear_sentence(cycles, coefficient)] if worn else []),
         *([] if result.wheel is None else pattern_sentences(result.wheel)),
     ]
-    write_report(folder, result.scene, tables, figures, messages, result.timings)
+    write_report(
+        folder,
+        result.scene,
+        tables,
+        figures,
+        messages,
+        result.timings,
+        page=Page(_live(result, tables, cycles)),
+    )
+
+
+def _live(
+    result: pipeline.Run, tables: dict[str, pd.DataFrame], cycles: list[ContactCycle]
+) -> dict[str, dict[str, Any]]:
+    """Figures to hover over and rotate, by the names of the pictures that they replace."""
+    excited = excited_set(result)
+    shapes = live_shapes(
+        result.mesh, excited, [str(name) for name in tables["modes/modes"]["family"]]
+    )
+    curves = {
+        name: live_responses(points, _title(result.scene))
+        for name, points in _by_mass(tables["response/points"])
+    }
+    return {
+        **curves,
+        "response/optimum": live_optimum(tables["response/summary"], result.contact.own),
+        "response/hysteresis": live_loops(seat_loops(cycles)),
+        "modes/frequencies_by_nodal_diameter": live_diameters(tables["modes/nodal_diameters"]),
+        **({} if shapes is None else {"modes/first_modes": shapes}),
+    }
 
 
 def _wheel_tables(result: pipeline.Run) -> dict[str, pd.DataFrame]:
@@ -159,7 +199,8 @@ def _static_contact(result: pipeline.Run) -> str:
         curve.settings.harmonics * float(np.max(curve.frequency))
         for curve in result.response.curves
     )
-    return quasi_static(patch, result.scene.material.blade, highest).sentence
+    found = quasi_static(patch, result.scene.material.blade, highest)
+    return method(found.sentence) if found.holds else warning(found.sentence)
 
 
 def _states(result: pipeline.Run) -> str:
@@ -216,14 +257,24 @@ def _joined(parts: list[pd.DataFrame]) -> pd.DataFrame:
 
 
 def _summary(result: pipeline.Run) -> pd.DataFrame:
-    """The design table, with the alternating stress of the mode studied."""
+    """The design table, with the alternating stress at each resonance."""
     table = pd.DataFrame(summary(result.response.curves, result.response.limits))
     table.insert(
         table.columns.get_loc("reduction") + 1,
         "alternating_stress",
-        result.strength.alternating * table["peak_amplitude"],
+        _alternating(result, table["peak_amplitude"].to_numpy()),
     )
     return table
+
+
+def _alternating(result: pipeline.Run, amplitudes: np.ndarray) -> np.ndarray:
+    """(rows,) alternating stress [Pa] of the design table: of the whole motion at each load, of the
+    mode alone where all is linear, without damper and stuck.
+    """
+    stress = result.strength.alternating * amplitudes
+    if result.damped is not None:
+        stress[1:-1] = [one.largest for one in result.damped]
+    return stress
 
 
 def _stresses(found: Strength) -> pd.DataFrame:

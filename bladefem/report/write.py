@@ -1,40 +1,80 @@
-"""The report of a run: one self-contained HTML page and the same in Markdown, answer first."""
+"""The report of a command: one self-contained HTML page and the same in Markdown, answer first."""
 
 from __future__ import annotations
 
 import base64
+import hashlib
+import json
 import mimetypes
 import os
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from datetime import datetime
+from importlib import resources
+from itertools import count
 from pathlib import Path
 from typing import Any
 
 import pandas as pd
 
 from bladefem.errors import InputError
+from bladefem.io.run_folder import given_fields
 from bladefem.io.stage_cache import open_folder, versions, write_text
 from bladefem.scene.tables import Scene
-from bladefem.scene.toml import resolved
+from bladefem.scene.toml import dump, resolved
+from bladefem.util.message import by_level
 
+from .captions import caption_of
+from .headlines import Headline, headlines
+from .library import chart_library
+from .next_steps import next_steps
+from .page_tables import page_tables
 from .statements import answer, trust, wrong_speed
 from .tables import numeric, readable, to_markdown
 
-__all__ = ["SECTIONS", "write_report"]
+__all__ = ["SECTIONS", "Page", "inputs_hash", "write_report"]
 
 SECTIONS = {
     "answer": "Answer",
-    "inputs": "Inputs",
-    "mesh": "Mesh",
-    "modes": "Modes",
-    "contact": "Contact",
     "response": "Forced response",
     "wheel": "Mistuned wheel",
-    "accuracy": "Accuracy and convergence",
+    "contact": "Contact",
+    "modes": "Modes",
+    "mesh": "Mesh",
+    "accuracy": "Accuracy and method",
+    "inputs": "Inputs",
     "timings": "Where the time went",
-    "versions": "Versions",
+    "versions": "Origin",
 }
 # rows of a table on the page; the CSV files hold all
 LONGEST = 40
+# figures that answer most, the best first; the page begins with the first one there is
+LEADS = (
+    "response/forced_response",
+    "response/side_by_side",
+    "response/accuracy",
+    "response/loops",
+    "contact/pressure_on_both_seats",
+    "contact/pressure",
+    "modes/mode_shapes",
+    "modes/modes",
+)
+
+
+@dataclass(frozen=True)
+class Page:
+    """What a command adds to its report beside tables and pictures."""
+
+    # caption-less figures of plotly.js or shapes, by the name of the picture that they replace
+    live: Mapping[str, dict[str, Any]] | None = None
+    # first numbers where these do not follow from "response/summary"
+    numbers: Sequence[Headline] | None = None
+    # what to do next, in addition
+    steps: Sequence[str] = ()
+    # the file's name without ending
+    stem: str = "report"
+    # what the page is about; the scene's kind when left out
+    subject: str = ""
 
 
 def write_report(
@@ -45,19 +85,22 @@ def write_report(
     messages: Iterable[str] = (),
     timings: Mapping[str, float] | None = None,
     given: Iterable[str] | None = None,
+    page: Page | None = None,
 ) -> tuple[Path, Path]:
     """Write ``report.html`` (images embedded, printable) and ``report.md`` (images linked).
 
     Args:
         folder: run folder.
         scene: as resolved.
-        tables: "section/caption" -> table in SI columns; sections are the keys of ``SECTIONS``. Two
+        tables: "section/name" -> table in SI columns; sections are the keys of ``SECTIONS``. Two
             are also read for the answer and the statements on convergence: "response/summary" (one
             row a load) and "response/points" (one row a point; not printed itself).
-        figures: "section/caption" -> PNG or GIF file.
-        messages: warnings and fallbacks of the run, reported under accuracy.
+        figures: "section/name" -> PNG or GIF file.
+        messages: sentences of the run; those with a level (``util.message``) are kept apart.
         timings: stage -> seconds.
-        given: dotted names of the scene's fields that the user gave, when known.
+        given: dotted names of the scene's fields that the user gave; as the folder knows them when
+            left out.
+        page: interactive figures, numbers and name of the page.
 
     Returns:
         the two files.
@@ -67,20 +110,22 @@ def write_report(
     """
     import jinja2
 
+    page = page or Page()
     check(tables, figures)
-    page = contents(scene, tables, figures, list(messages), dict(timings or {}), given)
+    folder = open_folder(folder)
+    given = given_fields(folder) if given is None else given
+    found = contents(scene, tables, figures, list(messages), dict(timings or {}), given, page)
     loader = jinja2.PackageLoader("bladefem.report", "")
     html = jinja2.Environment(loader=loader, autoescape=True, trim_blocks=True, lstrip_blocks=True)
     html.filters["embed"] = embed
     plain = jinja2.Environment(
         loader=loader, autoescape=False, trim_blocks=True, lstrip_blocks=True
     )
-    folder = open_folder(folder)
     plain.filters["link"] = lambda file: os.path.relpath(file, folder)
     plain.filters["markdown"] = to_markdown
     return (
-        write_text(folder / "report.html", html.get_template("page.html").render(page)),
-        write_text(folder / "report.md", plain.get_template("page.md").render(page)),
+        write_text(folder / f"{page.stem}.html", html.get_template("page.html").render(found)),
+        write_text(folder / f"{page.stem}.md", plain.get_template("page.md").render(found)),
     )
 
 
@@ -104,75 +149,153 @@ def contents(
     messages: list[str],
     timings: dict[str, float],
     given: Iterable[str] | None,
+    page: Page,
 ) -> dict[str, Any]:
     """Everything that the two templates print."""
-    points = tables.get("response/points")
-    statements, doubtful = trust(points)
-    shown = {name: table for name, table in tables.items() if name != "response/points"}
-    if len(doubtful):
-        shown["accuracy/loads with doubtful points"] = doubtful
+    statements, shown = _shown_tables(tables)
+    said = by_level(messages)
     total = sum(timings.values())
-    summary = tables.get("response/summary")
-    found = answer(summary, points, tables.get("contact/own_load"))
-    found = found._replace(cautions=[*wrong_speed(scene, summary), *found.cautions])
-    return {
+    live = {name: spec for name, spec in (page.live or {}).items() if name in figures}
+    keys = {name: f"live-{number}" for number, name in enumerate(live, 1)}
+    lead = next((name for known in LEADS for name in figures if name.startswith(known)), None)
+    numbers = count(1)
+    parts = {
+        "lead": None if lead is None else _figure(lead, figures[lead], numbers, keys),
         "title": scene.title,
-        "kind": scene.kind,
-        "answer": found,
+        "subject": page.subject or scene.kind,
+        "date": datetime.now().astimezone().strftime("%Y-%m-%d %H:%M %Z"),
+        "inputs_hash": inputs_hash(scene),
         "inputs": resolved(scene, given),
         "mark": "changed" if given is None else "given",
         "statements": statements,
-        "messages": messages,
+        "warnings": said["warning"],
+        "information": said["information"],
+        "methods": said["method"],
+        "remarks": said["timing"],
         "versions": versions(),
         "timings": [(name, t, t / total if total else 0.0) for name, t in timings.items()],
         "total": total,
-        "sections": [section(key, title, shown, figures) for key, title in SECTIONS.items()],
+        "live_data": {keys[name]: _script_data(spec) for name, spec in live.items()},
+        "library": chart_library() if live else None,
+        "style": _resource("page.css"),
+        "script": _resource("page.js"),
+        **_answer(scene, tables, page),
     }
+    rest = {name: file for name, file in figures.items() if name != lead}
+    parts["sections"] = _sections(parts, shown, rest, numbers, keys)
+    return parts
 
 
-def section(
-    key: str,
-    title: str,
+def _shown_tables(
+    tables: Mapping[str, pd.DataFrame],
+) -> tuple[list[str], dict[str, pd.DataFrame]]:
+    """Statements on convergence, and the tables that are printed."""
+    statements, doubtful = trust(tables.get("response/points"))
+    shown = {name: table for name, table in tables.items() if name != "response/points"}
+    if len(doubtful):
+        shown["accuracy/loads_with_doubtful_points"] = doubtful
+    return statements, shown
+
+
+def _answer(scene: Scene, tables: Mapping[str, pd.DataFrame], page: Page) -> dict[str, Any]:
+    """First numbers, and what to do next."""
+    summary = tables.get("response/summary")
+    points = tables.get("response/points")
+    if page.numbers is not None or summary is None or "peak_amplitude" not in summary:
+        return {"numbers": list(page.numbers or ()), "steps": list(page.steps)}
+    own = tables.get("contact/own_load")
+    found = answer(summary, points, own)
+    cautions = [*wrong_speed(scene, summary), *found.cautions]
+    steps = next_steps(scene, cautions, summary, own)
+    return {"numbers": headlines(found, summary, points), "steps": [*steps, *page.steps]}
+
+
+def _sections(
+    parts: Mapping[str, Any],
     tables: Mapping[str, pd.DataFrame],
     figures: Mapping[str, str | Path],
+    numbers: Iterator[int],
+    keys: Mapping[str, str],
+) -> list[dict[str, Any]]:
+    """Sections that have something to say, with numbered figures and tables."""
+    table_numbers = count(1)
+    extra = {
+        "answer": any(
+            parts[key] for key in ("numbers", "lead", "steps", "warnings", "information")
+        ),
+        "inputs": parts["inputs"],
+        "accuracy": parts["statements"] or parts["methods"],
+        "timings": parts["timings"],
+        "versions": parts["versions"],
+    }
+    found = []
+    for key, title in SECTIONS.items():
+        section = {
+            "key": key,
+            "title": title,
+            "figures": [
+                _figure(name, file, numbers, keys)
+                for name, file in figures.items()
+                if name.split("/")[0] == key
+            ],
+            "tables": [
+                printed(part, piece, next(table_numbers))
+                for name, table in tables.items()
+                if name.split("/")[0] == key
+                for part, piece in page_tables(name, table)
+            ],
+        }
+        if section["figures"] or section["tables"] or extra.get(key):
+            found.append(section)
+    return found
+
+
+def _figure(
+    name: str, file: str | Path, numbers: Iterator[int], keys: Mapping[str, str]
 ) -> dict[str, Any]:
-    """One section with its tables and figures, in the order given."""
     return {
-        "key": key,
-        "title": title,
-        "figures": [
-            (caption(name), Path(file))
-            for name, file in figures.items()
-            if name.split("/")[0] == key
-        ],
-        "tables": [
-            printed(caption(name), table)
-            for name, table in tables.items()
-            if name.split("/")[0] == key
-        ],
+        "number": next(numbers),
+        "caption": caption_of(name),
+        "file": Path(file),
+        "live": keys.get(name),
     }
 
 
-def caption(name: str) -> str:
-    """ "response/optimum_curve" -> "Optimum curve"."""
-    text = name.partition("/")[2].replace("_", " ")
-    return text[:1].upper() + text[1:]
-
-
-def printed(title: str, table: pd.DataFrame) -> dict[str, Any]:
+def printed(name: str, table: pd.DataFrame, number: int) -> dict[str, Any]:
     """A table as text, cut to the longest that a page should hold."""
     text = readable(table.head(LONGEST))
     return {
-        "title": title,
+        "number": number,
+        "caption": caption_of(name),
         "frame": table.head(LONGEST),
         "head": list(text.columns),
         "right": numeric(text),
         "rows": text.to_numpy().tolist(),
         "left_out": max(len(table) - LONGEST, 0),
+        "columns_left_out": table.attrs.get("left_out", []),
     }
+
+
+def inputs_hash(scene: Scene) -> str:
+    """The first 16 hexadecimal digits of the SHA-256 sum of the resolved scene and of the file that
+    it reads.
+    """
+    digest = hashlib.sha256(dump(scene).encode())
+    if scene.kind == "imported" and Path(scene.imported.file).is_file():
+        digest.update(Path(scene.imported.file).read_bytes())
+    return digest.hexdigest()[:16]
 
 
 def embed(file: Path) -> str:
     """A file as a data URI."""
     kind = mimetypes.guess_type(file.name)[0] or "application/octet-stream"
     return f"data:{kind};base64,{base64.b64encode(file.read_bytes()).decode()}"
+
+
+def _script_data(spec: Mapping[str, Any]) -> str:
+    """JSON that cannot end the script element that holds it."""
+    return json.dumps(spec, separators=(",", ":"), allow_nan=False).replace("<", "\\u003c")
+
+
+def _resource(name: str) -> str:
+    return (resources.files("bladefem.report") / name).read_text(encoding="utf-8")

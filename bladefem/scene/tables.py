@@ -35,17 +35,38 @@ __all__ = [
     "Operation",
     "Scene",
     "Seat",
+    "Solver",
     "Study",
 ]
 
 
 @dataclass(frozen=True)
 class Material:
-    """Linear elastic, isotropic. The default is a steel."""
+    """Linear elastic: isotropic, cubic (with G) or orthotropic. The default is a steel."""
 
     E: float = quantity(2.1e11, "Pa", 1e6, 1e13, "Young's modulus")
     nu: float = quantity(0.3, "1", -0.99, 0.499, "Poisson's ratio")
     rho: float = quantity(7850.0, "kg/m^3", 1.0, 3e4, "density")
+    G: float | None = quantity(
+        None,
+        "Pa",
+        1e6,
+        1e13,
+        "shear modulus of a cubic crystal, with E along its edges; isotropic when left out",
+    )
+    orthotropic: tuple[float, ...] | None = quantity(
+        None,
+        "1",
+        help="E1, E2, E3 [Pa], nu12, nu13, nu23, G12, G13, G23 [Pa] of an orthotropic solid, in "
+        "place of E, nu and G",
+    )
+    angles: tuple[float, float, float] = quantity(
+        (0.0, 0.0, 0.0),
+        "rad",
+        -2 * pi,
+        2 * pi,
+        "of the crystal: about the blade's x (radial), the new y, the new z",
+    )
 
 
 @dataclass(frozen=True)
@@ -203,6 +224,11 @@ class Study:
     band: tuple[float, float] | None = quantity(
         None, "Hz", 0.0, 1e6, "frequency band; from the free to the stuck resonance when left out"
     )
+    interval: bool = quantity(
+        False,
+        help="also the lowest and highest resonance over all friction forces that the loading "
+        "history may have left in contact points that never slip",
+    )
     stability: bool = quantity(
         False,
         help="also Floquet multipliers of the points of each curve, where normal loads "
@@ -279,6 +305,24 @@ class Model:
 
 
 @dataclass(frozen=True)
+class Solver:
+    """How eigenvalue problems are solved."""
+
+    eigensolver: str = quantity(
+        "slepc",
+        choices=("slepc", "lanczos"),
+        help="SLEPc's Krylov-Schur iteration, or the block Lanczos iteration that finishes guesses",
+    )
+    vectors: int | None = quantity(
+        None, "1", 3, 5000, "basis vectors of SLEPc; twice the modes and two when left out"
+    )
+    petsc: str = quantity(
+        "",
+        help="PETSc and SLEPc options, such as '-eps_monitor'; also after -- on the command line",
+    )
+
+
+@dataclass(frozen=True)
 class Foundation:
     """What the Z-shaped mass stands on, how that moves, and what presses and pulls (the paper's Eq.
     30, Table 1).
@@ -335,6 +379,18 @@ class Imported:
         help="names for groups, node sets and surfaces of the file that has others, such as "
         "'clamp = face_3 + face_4', 'tip = face_1'",
     )
+    seats: tuple[str, str] | None = quantity(
+        None,
+        help="plane platform faces of a STEP blade, towards the next blade and towards the "
+        "previous one, between which [damper] is drawn; seats are cut into them",
+    )
+    seat_width: float | None = quantity(
+        None,
+        "m",
+        1e-4,
+        0.1,
+        "width of these seats, from the platform's edge inwards; the whole face when left out",
+    )
     linear: str = quantity(
         "refuse",
         choices=("refuse", "promote", "keep"),
@@ -377,3 +433,4 @@ class Scene:
     study: Study = field(default_factory=Study)
     mistuning: Mistuning = field(default_factory=Mistuning)
     model: Model = field(default_factory=Model)
+    solver: Solver = field(default_factory=Solver)

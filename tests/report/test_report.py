@@ -11,10 +11,16 @@ import pandas as pd
 import pytest
 
 from bladefem.errors import InputError
+from bladefem.io.run_folder import keep_given
+from bladefem.report.headlines import headlines
+from bladefem.report.next_steps import next_steps
+from bladefem.report.page_tables import page_tables, without_roundoff
 from bladefem.report.statements import answer, trust, wrong_speed
 from bladefem.report.tables import readable, to_latex, to_markdown, write_tables
-from bladefem.report.write import write_report
+from bladefem.report.write import inputs_hash, write_report
 from bladefem.scene.tables import Excitation, Operation, Scene
+from bladefem.scene.toml import vary
+from bladefem.util.message import Message, method, warning
 
 sys.path.insert(0, str(Path(__file__).parents[1] / "view"))
 import synthetic
@@ -179,18 +185,20 @@ def test_page_is_whole_and_self_contained(report):
     assert not re.search(r'(?:src|href)="(?!data:|#)', page)
     assert "A &lt;wedge&gt; &amp; its damper" in page
     order = [
-        page.index(f'<h2 id="{key}"')
-        for key in ("answer", "inputs", "modes", "response", "accuracy", "timings", "versions")
+        page.index(f'<section id="{key}"')
+        for key in ("answer", "response", "modes", "accuracy", "inputs", "timings", "versions")
     ]
     assert order == sorted(order)
-    assert '<h2 id="contact"' not in page  # nothing to say about it
-    assert "did NOT converge" in page and "3 elements were straightened" in page
+    assert '<section id="contact"' not in page  # nothing to say about it
+    assert "did NOT converge" in page
+    assert "3 elements were straightened" in page
     assert "23 more rows are in the CSV file" in page  # 63 modes, 40 shown
 
 
 def test_markdown_page_links_the_figures(report):
     text = report[1].read_text()
-    assert "![Optimum](<figures/optimum.png>)" in text
+    assert "](<figures/optimum.png>)" in text
+    assert "Figure 1. Amplitude and frequency of the resonance over the normal load" in text
     assert "| normal load [N] |" in text and "**200 N**" in text
     assert "\n\n\n\n" not in text
 
@@ -205,3 +213,81 @@ def test_bad_entries_are_refused(tmp_path):
 def test_report_of_nothing_but_a_scene(tmp_path):
     page, _ = write_report(tmp_path, Scene(kind="hertz"), {}, {})
     assert "hertz.radius" in page.read_text()
+
+
+def test_levels_stay_apart(tmp_path):
+    """Only warnings are boxed; method goes to the end, what was found to the timings."""
+    said = ["plain", warning("sharp edge"), method("balance"), Message("mesh: found", "timing")]
+    page, _ = write_report(tmp_path, Scene(), {}, {}, said, {"mesh": 1.0})
+    text = page.read_text()
+    box = text[
+        text.index('<div class="warnings">') : text.index("</div>", text.index('"warnings"'))
+    ]
+    assert "sharp edge" in box
+    assert not any(word in box for word in ("plain", "balance", "found"))
+    assert text.index("plain") < text.index('<section id="accuracy"') < text.index("balance")
+    assert text.index('<section id="timings"') < text.index("mesh: found")
+
+
+def test_every_headline_says_how_sure_it_is():
+    summary = synthetic.summary().assign(error=0.012)
+    found = headlines(answer(summary, synthetic.points()), summary, synthetic.points())
+    assert all(one.uncertainty for one in found)
+    sure = {one.what: one.uncertainty for one in found}
+    assert sure["optimum normal load per seat"] == "between 100 and 400 N"
+    assert sure["resonance amplitude there"].startswith("± 1.2 %")
+    assert re.fullmatch(r"± [\d.]+ Hz \(spacing of points\)", sure["resonance frequency there"])
+
+
+@pytest.mark.parametrize(
+    ("error", "said"), [(np.nan, "not estimated"), (np.inf, "error unknown"), (0.0, "± 0.01 %")]
+)
+def test_unknown_errors_are_said_to_be_unknown(error, said):
+    summary = synthetic.summary().assign(error=error)
+    found = headlines(answer(summary), summary, None)
+    assert said in found[1].uncertainty
+
+
+def test_roundoff_is_no_number_on_a_page():
+    table = pd.DataFrame(
+        {"centre_x": [0.25], "centre_y": [7.6e-18], "centre_z": [np.nan], "residual": [3e-16]}
+    )
+    clean = without_roundoff(table)
+    assert clean["centre_y"].iloc[0] == 0
+    assert clean["residual"].iloc[0] == 3e-16
+    assert np.isnan(clean["centre_z"].iloc[0])
+
+
+def test_wide_tables_are_split_and_name_what_is_left_out():
+    columns = ["load", "patch", "nodes", "force", "force_x", "force_y", "force_z", "mean_pressure"]
+    table = pd.DataFrame({name: [1.0] for name in columns})
+    parts = dict(page_tables("contact/pressure", table))
+    assert list(parts["contact/pressure"]) == ["load", "patch", "force", "mean_pressure"]
+    assert list(parts["contact/resultants"]) == ["load", "patch", "force_x", "force_y", "force_z"]
+    assert parts["contact/pressure"].attrs["left_out"] == ["nodes"]
+
+
+def test_given_fields_are_shown_and_others_folded(tmp_path):
+    """The span is given, though it is the default; the folder remembers that."""
+    keep_given(tmp_path, ["aerofoil.span"])
+    page, _ = write_report(tmp_path, Scene(), {}, {})
+    text = page.read_text()
+    assert text.index("<td>aerofoil.span</td>") < text.index("<details>")
+    assert text.index("<td>aerofoil.twist</td>") > text.index("<details>")
+
+
+def test_hash_of_inputs_changes_with_any_input():
+    base = Scene()
+    assert inputs_hash(base) == inputs_hash(Scene())
+    assert inputs_hash(base) != inputs_hash(vary(base, "contact.mu", 0.31))
+    assert re.fullmatch("[0-9a-f]{16}", inputs_hash(base))
+
+
+def test_next_steps_name_the_mass_to_try():
+    summary = synthetic.summary()
+    own = pd.DataFrame({"mass": [0.012], "speed": [800.0], "load": [100.0]})
+    steps = next_steps(Scene(), [], summary, own)
+    assert steps[0].startswith("Change the damper's mass from 12 g to about 24 g")
+    kept = next_steps(Scene(), [], summary, own.assign(load=200.0))
+    assert "keep its mass" in kept[0]
+    assert next_steps(Scene(), ["widen"], summary, own)[0] == "widen"

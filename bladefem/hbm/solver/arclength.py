@@ -17,12 +17,12 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from ...errors import NotSolvedError
-from ..parameter_derivatives import rate
+from ..parameter_derivatives import residual_rate
 from .newton import Options, newton
 from .newton_krylov import Memory
-from .residual import Balance, State, evaluate_balance, linearise, orientation
+from .residual import Balance, State, determinant_sign, evaluate_balance, linearise_balance
 
-__all__ = ["Spot", "Task", "advance", "spot_at"]
+__all__ = ["Spot", "Task", "advance_path", "spot_at"]
 
 # Newton steps of one corrector
 CORRECTIONS = 12
@@ -32,6 +32,13 @@ SMALLEST = 1e-5
 LEAPS = (1e-4, 1e-3, 5e-3)
 # scaled distance up to which a leap has found the same branch
 CLOSE = 0.05
+# arc lengths at which the direction beyond a corner is looked for
+CORNERS = (1e-4, 1e-3, 5e-3)
+# arc length up to which the path may turn more sharply than STRAIGHT: a corner, where contacts
+# change their state
+CORNER = 1e-3
+# distance from the way back, in steps, from which a direction leads on
+ONWARD = 0.3
 # cosine between successive tangents below which a step is halved
 STRAIGHT = 0.7
 # distance from prediction to solution, in steps, above which it is halved
@@ -87,30 +94,53 @@ class Spot:
         return dw * length, float(length)
 
 
-def advance(task: Task, spot: Spot, step: float, longest: float) -> tuple[Spot, float, bool]:
+def advance_path(task: Task, spot: Spot, step: float, longest: float) -> tuple[Spot, float, bool]:
     """The next point, the next step, and whether the parameter turned back in between.
 
     Raises:
-        NotSolvedError: neither small steps nor leaps find the path.
+        NotSolvedError: neither small steps, nor leaps, nor directions beyond a corner find the
+            path.
     """
     reason = ""
     while step >= SMALLEST:
-        found, reason = _correct(task, spot, step)
+        found, reason = _correct_point(task, spot, step, _path_direction(task, spot))
         if found is not None:
             easy = found.iterations <= 4
             return found, min(1.5 * step, longest) if easy else step, found.sign != spot.sign
         step /= 2
     for share in LEAPS:
-        found = _leap(task, spot, share)
+        found = _leap_gap(task, spot, share)
         if found is not None:
             return found, share, False
+    for share in CORNERS:
+        found = _around_corner(task, spot, share)
+        if found is not None:
+            return found, share, found.sign != spot.sign
     raise NotSolvedError(f"path in {task.name} stopped at x = {spot.x:.6g}: {reason}")
 
 
-def _correct(task: Task, spot: Spot, step: float) -> tuple[Spot | None, str]:
-    """Newton back to the path on the plane across the tangent."""
-    size = max(task.size, float(np.linalg.norm(spot.state.w)))
-    dw, dx = spot.tangent(task, size)
+# unit direction in displacements over their size, and in the parameter over its width
+Direction = tuple[np.ndarray, float]
+
+
+def _step_size(task: Task, spot: Spot) -> float:
+    return max(task.size, float(np.linalg.norm(spot.state.w)))
+
+
+def _path_direction(task: Task, spot: Spot) -> Direction:
+    return spot.tangent(task, _step_size(task, spot))
+
+
+def _correct_point(
+    task: Task, spot: Spot, step: float, direction: Direction, corner: bool = False
+) -> tuple[Spot | None, str]:
+    """Newton back to the path on the plane across a direction, a step ahead.
+
+    Args:
+        corner: the path may have turned by any angle but back.
+    """
+    size = _step_size(task, spot)
+    dw, dx = direction
     guess = spot.state.w + step * size * dw, spot.x + step * task.width * dx
     w, x = guess
     for iteration in range(CORRECTIONS + 1):
@@ -121,9 +151,9 @@ def _correct(task: Task, spot: Spot, step: float) -> tuple[Spot | None, str]:
         if iteration == CORRECTIONS or not np.isfinite(state.error):
             return None, f"corrector left a residual of {state.error:.1e}"
         try:
-            inverse = linearise(balance, state, task.memory)
+            inverse = linearise_balance(balance, state, task.memory)
             back = inverse(state.residual)
-            along = inverse(rate(balance, state, task.name))
+            along = inverse(residual_rate(balance, state, task.name))
         except np.linalg.LinAlgError as error:
             return None, str(error)
         off = np.sum(dw * (w - guess[0])) / size + dx * (x - guess[1]) / task.width
@@ -132,15 +162,48 @@ def _correct(task: Task, spot: Spot, step: float) -> tuple[Spot | None, str]:
         x = x + change
     if np.hypot(np.linalg.norm(w - guess[0]) / size, (x - guess[1]) / task.width) > GUARD * step:
         return None, "the corrector jumps"
-    found = spot_at(task, x, balance, state, iteration, spot.sign)
+    try:
+        found = spot_at(task, x, balance, state, iteration, spot.sign)
+    except np.linalg.LinAlgError as error:
+        return None, str(error)
     new_dw, new_dx = found.tangent(task, size)
     turn = np.sum(dw * new_dw) + dx * new_dx
-    if abs(turn) < STRAIGHT:
+    if abs(turn) < STRAIGHT and not corner and step > CORNER:
         return None, "the path turns too sharply"
     return (found if turn > 0 else replace(found, sign=-found.sign)), ""
 
 
-def _leap(task: Task, spot: Spot, share: float) -> Spot | None:
+def _around_corner(task: Task, spot: Spot, share: float) -> Spot | None:
+    """A solution beyond a corner of the path, where contacts change their state at once.
+
+    The direction there is that of the balance linearised a little ahead, on either side; it leads
+    on where its solution lies off the way back.
+    """
+    size = _step_size(task, spot)
+    dw, dx = _path_direction(task, spot)
+    for ahead in (1.0, -1.0):
+        x = spot.x + ahead * share * task.width * dx
+        balance = task.balance(x)
+        state = evaluate_balance(balance, spot.state.w + ahead * share * size * dw)
+        try:
+            inverse = linearise_balance(balance, state, task.memory)
+            slope = -inverse(residual_rate(balance, state, task.name)) * task.width / size
+        except np.linalg.LinAlgError:
+            continue
+        length = 1.0 / np.sqrt(np.sum(slope**2) + 1.0)
+        for sign in (1.0, -1.0):
+            direction = sign * length * slope, float(sign * length)
+            found, _ = _correct_point(task, spot, share, direction, corner=True)
+            if found is None:
+                continue
+            off_w = (found.state.w - spot.state.w) / size + share * dw
+            off_x = (found.x - spot.x) / task.width + share * dx
+            if np.hypot(np.linalg.norm(off_w), off_x) > ONWARD * share:
+                return found
+    return None
+
+
+def _leap_gap(task: Task, spot: Spot, share: float) -> Spot | None:
     """A solution across a small gap, if it lies where the path was heading."""
     x = spot.x + spot.sign * share * task.width
     balance = task.balance(x)
@@ -157,5 +220,7 @@ def spot_at(
     """A solved state with the direction of its path, x rising along it for sign 1 and falling for
     -1.
     """
-    slope = -linearise(balance, state, task.memory)(rate(balance, state, task.name))
-    return Spot(x, balance, state, iterations, slope, sign, orientation(balance, state))
+    slope = -linearise_balance(balance, state, task.memory)(
+        residual_rate(balance, state, task.name)
+    )
+    return Spot(x, balance, state, iterations, slope, sign, determinant_sign(balance, state))

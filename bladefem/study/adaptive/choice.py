@@ -10,7 +10,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from ...errors import NotSolvedError
-from ...hbm.full_stick import grips
+from ...hbm.full_stick import sticks_safely
 from ...hbm.linear_resonances import free_resonances, stuck_partners
 from ...hbm.model import ReducedModel
 from ...hbm.solution import Solution
@@ -83,7 +83,7 @@ def choose(
     if (
         settings.error is None
         and point.converged
-        and not grips(member(family, settings).model, point)
+        and not sticks_safely(member(family, settings).model, point)
     ):
         usual = likely(family, settings, accuracy, fixed)
         further = moved(family, settings, point, usual) if usual != settings else point
@@ -310,6 +310,9 @@ def response_points(
     """A sweep of a band [Hz], sorted by frequency; an accuracy of 1 asks for no more than the place
     of the peak.
 
+    Where several motions were followed, their points have a `branch`, and stand in place of those
+    that the sweep solved before.
+
     Raises:
         NotSolvedError: no point converged.
     """
@@ -324,6 +327,8 @@ def response_points(
         options=sufficient(accuracy),
     )
     points = sorted(swept, key=lambda s: s.omega)
+    if any(p.branch for p in points):
+        points = [p for p in points if p.branch or not p.converged]
     if not any(p.converged for p in points):
         raise NotSolvedError(
             f"no point between {band[0]:.5g} and {band[1]:.5g} Hz was solved; "

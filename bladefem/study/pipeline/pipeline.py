@@ -5,10 +5,11 @@ by the next run.
 from __future__ import annotations
 
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, field, replace
 from functools import lru_cache, partial
+from html import escape
 from pathlib import Path
 from typing import Any
 
@@ -29,6 +30,7 @@ from ...scene.tables import Scene
 from ...scene.units import show
 from ...scene.validate import refuse_response
 from ...scene.warnings import doubts
+from ...util.message import method, warning
 from ...util.progress import Progress, unwatched
 from ..adaptive.check_points import peak_of
 from ..adaptive.choice import choose, covered
@@ -39,8 +41,10 @@ from ..modes.clamped_aerofoil import clamped_blade
 from ..modes.stress import Strength, strength
 from .assemble_model import LoadCase, joint_model
 from .contact_cycle import labels
+from .damped_motion import DampedStress, damped_stress
 from .liftoff import named
 from .linear_limits import Limit, linear_limits
+from .load_interval import interval_sentence
 from .loads import Curve, default_loads, study_loads
 from .stability import stability_sentence
 from .stage_inputs import stage_key
@@ -88,7 +92,7 @@ class Seating:
     own: float | None = None
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, repr=False)
 class Response:
     """Forced responses and what they were made with."""
 
@@ -102,8 +106,15 @@ class Response:
         """Resonance without damper: [Hz], [m]."""
         return self.limits[0].peak_frequency, self.limits[0].peak_amplitude
 
+    def __repr__(self) -> str:
+        best = min(self.curves, key=lambda curve: curve.peak_amplitude)
+        return (
+            f"<bladefem response: {len(self.curves)} loads, smallest resonance "
+            f"{1e6 * best.peak_amplitude:.4g} µm under {best.load:g} N>"
+        )
 
-@dataclass(frozen=True)
+
+@dataclass(frozen=True, repr=False)
 class Run:
     """What a run has so far; stages after ``until`` are None."""
 
@@ -119,9 +130,32 @@ class Run:
     response: Response | None = None
     # study.mistuning.pattern_response.PatternResponse of each load; None where all blades are alike
     wheel: list[Any] | None = None
+    # at the resonance of each curve, in their order
+    damped: list[DampedStress] | None = None
     # stage to seconds
     timings: dict[str, float] = field(default_factory=dict)
     messages: list[str] = field(default_factory=list)
+
+    def __repr__(self) -> str:
+        stages = [
+            name
+            for name in ("mesh", "modes", "contact", "reduced", "response")
+            if getattr(self, name) is not None
+        ]
+        where = "in memory" if self.folder is None else f"in '{self.folder}'"
+        return f"<bladefem run of '{self.scene.title}' {where}: {', '.join(stages)}>"
+
+    def _repr_html_(self) -> str:
+        """What a notebook shows: the stages and what they found."""
+        rows = {"scene": self.scene.title, "folder": self.folder, "mesh": self.mesh}
+        if self.modes is not None:
+            rows["modes"] = self.modes
+        if self.response is not None:
+            rows["response"] = self.response
+        cells = "".join(
+            f"<tr><th>{name}</th><td>{escape(str(value))}</td></tr>" for name, value in rows.items()
+        )
+        return f"<table>{cells}</table>"
 
 
 def run(
@@ -143,7 +177,7 @@ def run(
     """
     if until in STAGES[3:]:
         refuse_response(scene)
-    clock = Clock({}, doubts(scene), progress)
+    clock = Clock({}, [*map(warning, doubts(scene))], progress)
     keep = _Keeper(folder, comm, clock)
     with clock("mesh"):
         mesh = keep("mesh", stage_key("mesh", scene), lambda: build_mesh(scene, comm))
@@ -181,9 +215,12 @@ def run(
         }
         if mesh.dimension == 2:
             clock.messages.extend(
-                filter(None, [coarse_sentence(m for pair in maps.values() for m in pair)])
+                map(
+                    warning,
+                    filter(None, [coarse_sentence(m for pair in maps.values() for m in pair)]),
+                )
             )
-        clock.messages.extend(peak_remarks(maps, scene, mesh.depth))
+        clock.messages.extend(map(warning, peak_remarks(maps, scene, mesh.depth)))
         result = replace(result, contact=Seating(problem, maps, own))
     if until == "contact":
         return result
@@ -204,8 +241,37 @@ def run(
     if until == "reduction":
         return result
     family = partial(family_of_case, scene, mesh, reduced, list(patches))
-    return replace(
-        result, response=_response(scene, cases, family, settings, keep, clock, progress)
+    response = _response(scene, cases, family, settings, keep, clock, progress)
+    result = replace(result, response=response)
+    with clock("stresses"):
+        stressed = keep(
+            "damped_stress",
+            stage_key("stress", scene, [(c.load, c.mass, c.peak.f) for c in response.curves]),
+            lambda: _stresses(bodies, patches, result, cases),
+        )
+        clock.messages.append(_stress_sentence(response.curves, stressed))
+    return replace(result, damped=stressed)
+
+
+def _stresses(
+    bodies: Bodies, patches: Sequence[Patch], result: Run, cases: list[LoadCase]
+) -> list[DampedStress]:
+    """The stress at the resonance of each curve."""
+    return [
+        damped_stress(bodies, patches, result.modes, case, curve.peak, curve.settings.points)
+        for case, curve in zip(cases, result.response.curves, strict=True)
+    ]
+
+
+def _stress_sentence(curves: list[Curve], stressed: list[DampedStress]) -> str:
+    """The stress of the lowest resonance, and how far it can be trusted."""
+    best = min(range(len(curves)), key=lambda k: curves[k].peak_amplitude)
+    found = stressed[best]
+    place = ", ".join(f"{1e3 * x:.1f}" for x in found.place)
+    return (
+        f"alternating stress at the best load, {found.load:.4g} N: {1e-6 * found.largest:.4g} MPa "
+        f"at ({place}) mm, of all modes, harmonics and damper forces; by its mesh "
+        f"{found.mesh_error:.1%} uncertain there"
     )
 
 
@@ -292,7 +358,7 @@ def _own_load(scene: Scene, problem: ContactProblem, messages: list[str]) -> flo
     try:
         maps = seat(problem, scene.operation.speed, bedded=scene.contact.bedded)
     except NotSolvedError as error:
-        messages.append(f"the damper's own centrifugal load does not seat it: {error}")
+        messages.append(warning(f"the damper's own centrifugal load does not seat it: {error}"))
         return None
     own = float(np.mean([m.force.sum() for m in maps]))
     messages.append(
@@ -407,42 +473,55 @@ def reduced_sector(
 
 def _remarks(scene: Scene, settings: Settings, curves: list[Curve], nodes: int) -> list[str]:
     """What a reader of the results has to know; ``nodes`` are the contact points of a seat."""
-    remarks = [settings.sentence(nodes), settings.method]
+    remarks: list[str] = [method(settings.sentence(nodes)), method(settings.method)]
     if scene.model.static == "uncoupled":
         remarks.append(
-            "mean displacements held as the static contact solution left them (model.static)"
+            method(
+                "mean displacements held as the static contact solution left them (model.static)"
+            )
         )
     if scene.study.stability:
-        remarks.append(stability_sentence([(c.stability, c.multiplier) for c in curves]))
+        remarks.append(method(stability_sentence([(c.stability, c.multiplier) for c in curves])))
+    intervals = [c.interval for c in curves if c.interval is not None]
+    if intervals:
+        remarks.append(interval_sentence([c.load for c in curves], intervals))
     halved = halved_sentence([c.load for c in curves], [c.halved for c in curves], scene.accuracy)
     if halved:
-        remarks.append(halved)
+        remarks.append(warning(halved))
     lost = sum(int((~c.converged).sum()) for c in curves)
     if lost:
         remarks.append(
-            f"{lost} of {sum(len(c.frequency) for c in curves)} response points did not converge; "
-            "they are "
-            "marked in tables and pictures"
+            warning(
+                f"{lost} of {sum(len(c.frequency) for c in curves)} response points did not converge; "
+                "they are "
+                "marked in tables and pictures"
+            )
         )
     for c in curves:
         near = np.flatnonzero(c.frequency == c.peak_frequency)[0] + np.array([-1, 1])
         if not c.converged[near[(near >= 0) & (near < len(c.frequency))]].all():
             remarks.append(
-                f"load {c.load:g} N: the highest point that was solved stands beside one that was "
-                "not; the "
-                "resonance may be higher"
+                warning(
+                    f"load {c.load:g} N: the highest point that was solved stands beside one that was "
+                    "not; the "
+                    "resonance may be higher"
+                )
             )
         if c.settings.error == np.inf:
             remarks.append(
-                f"load {c.load:g} N: the error of the resonance amplitude is unknown, since "
-                "richer models "
-                "of it were not solved; nothing was refined because of that"
+                warning(
+                    f"load {c.load:g} N: the error of the resonance amplitude is unknown, since "
+                    "richer models "
+                    "of it were not solved; nothing was refined because of that"
+                )
             )
         elif c.settings.error is not None and c.settings.error > scene.accuracy:
             remarks.append(
-                f"load {c.load:g} N: estimated error {100 * c.settings.error:.2g} % of the "
-                "resonance "
-                f"amplitude, above the wanted {100 * scene.accuracy:.2g} %"
+                warning(
+                    f"load {c.load:g} N: estimated error {100 * c.settings.error:.2g} % of the "
+                    "resonance "
+                    f"amplitude, above the wanted {100 * scene.accuracy:.2g} %"
+                )
             )
     return remarks
 

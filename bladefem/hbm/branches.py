@@ -1,0 +1,400 @@
+"""All motions of a band: paths round folds, their local maxima, and how each of them is reached.
+
+Where contacts lift off, several motions exist at one frequency, and a sweep sees one of them. Here
+the response is followed from both ends of the band, and from every known motion that lies on none
+of the paths so far. Each path is cut at its folds into pieces along which the frequency keeps its
+direction; a local maximum along a path is closed in on the path itself, so that it may lie right
+beside a fold. (Krack and Gross, Harmonic Balance for Nonlinear Vibration Problems, 2019, Sect. 4.)
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass, replace
+from itertools import chain, pairwise
+
+import numpy as np
+
+from ..errors import NotSolvedError
+from ..friction.fourier import to_real
+from .continuation import PathPoint, follow
+from .linear.condensation import condense
+from .model import ReducedModel
+from .solution import Solution, size
+from .solve import solve
+from .solver.fallback import match_harmonics
+from .solver.newton import DEFAULTS, Options
+
+__all__ = ["Branches", "Resonance", "find_branches"]
+
+# first and longest arc-length step, as shares of the band
+STEPS = (0.005, 0.05)
+# steps with which a local maximum is closed in
+FINE = 1e-4
+# points of all paths of a band
+LIMIT = 2000
+# paths of a band beside those from its ends
+MOST_PATHS = 6
+# relative distance of displacements up to which a motion lies on a path, between two of its points
+SAME = 0.03
+# frequencies of the band where motions off the paths are looked for
+PROBES = 7
+# refinements of one local maximum
+REFINEMENTS = 12
+
+
+@dataclass(frozen=True)
+class Resonance:
+    """A local maximum of the response along a path."""
+
+    solution: Solution
+    # root of the sum of squares of the moving harmonics' amplitudes at the probe [m]
+    height: float
+    # motions found at this frequency
+    multiplicity: int
+    # "up and down", "up", "down": by a sweep in that direction; "isolated": by neither
+    reached: str
+
+    @property
+    def frequency(self) -> float:
+        """[Hz]"""
+        return self.solution.frequency
+
+
+@dataclass(frozen=True)
+class Branches:
+    """The motions of a band."""
+
+    # each in the order along its path, the frequency monotone in it
+    pieces: tuple[tuple[Solution, ...], ...]
+    # by falling height
+    resonances: tuple[Resonance, ...]
+    # what the search could not do, in sentences
+    notes: tuple[str, ...] = ()
+
+    @property
+    def points(self) -> list[Solution]:
+        """All of them, with the number of their piece from 1 on."""
+        return [
+            replace(point, branch=number)
+            for number, piece in enumerate(self.pieces, 1)
+            for point in piece
+        ]
+
+
+@dataclass
+class _Path:
+    """A path under way: its points in order, and whether it starts at an end of the band."""
+
+    points: list[PathPoint]
+    # "low", "high" or "" of the first and the last point
+    ends: tuple[str, str]
+
+
+def find_branches(
+    model: ReducedModel,
+    band: tuple[float, float],
+    known: Sequence[Solution],
+    H: int,
+    samples: int,
+    *,
+    peak: float = 1e-3,
+    options: Options = DEFAULTS,
+) -> Branches:
+    """Paths through a band of circular frequencies [rad/s], from its ends and from known motions.
+
+    Args:
+        known: solutions in the band, such as those of a sweep.
+        peak: relative accuracy of each local maximum.
+    """
+    notes: list[str] = []
+    paths: list[_Path] = []
+    solved = sorted((p for p in known if p.converged), key=lambda p: p.omega)
+    if not solved:
+        return Branches((), (), ("no point of the band was solved",))
+    budget = LIMIT
+    further = _further(model, band, solved[0], H, samples, options)
+    for start in chain(solved[:1], solved[-1:], solved, further):
+        forward = start is not solved[-1]
+        at_end = start is solved[0] or start is solved[-1]
+        if budget <= 0 or (not at_end and len(paths) >= MOST_PATHS) or _on_paths(paths, start):
+            continue
+        path = _followed(model, start, band, forward, budget, notes, options)
+        if not at_end:
+            path = _both_ways(model, start, band, path, budget, notes, options)
+        budget -= len(path.points)
+        paths.append(path)
+    if budget <= 0:
+        notes.append(f"paths ended after {LIMIT} points: there may be further motions")
+    for path in paths:
+        _close_in(model, path, band, peak, options)
+    return _sorted_out(paths, options.probe, notes)
+
+
+def _further(
+    model: ReducedModel,
+    band: tuple[float, float],
+    like: Solution,
+    H: int,
+    samples: int,
+    options: Options,
+) -> Iterable[Solution]:
+    """Motions by Newton from open contacts and from full stick, at some frequencies of the band."""
+    simply = replace(options, fallbacks=False, frugal=False)
+    for omega in np.linspace(*band, PROBES + 2)[1:-1]:
+        open_contacts = to_real(condense(model, float(omega), H).free.T)
+        shape = (*model.springs.shape, 2 * H + 1)
+        for start in (replace(like, w=open_contacts.reshape(shape)), None):
+            point = solve(model, float(omega), H, samples, start=start, options=simply)
+            if point.converged:
+                yield point
+
+
+def _followed(
+    model: ReducedModel,
+    start: Solution,
+    band: tuple[float, float],
+    forward: bool,
+    budget: int,
+    notes: list[str],
+    options: Options,
+) -> _Path:
+    """The path from a solution until it leaves the band, closes on itself, or the budget ends."""
+    points: list[PathPoint] = []
+    options = replace(options, frugal=False)
+    bounds = min(band[0], start.omega), max(band[1], start.omega)
+    try:
+        for point in follow(
+            model, "omega", start, bounds, forward=forward, steps=STEPS, options=options
+        ):
+            points.append(point)
+            if point.restarted:
+                notes.append(
+                    f"a path was begun again at {point.solution.frequency:.6g} Hz: "
+                    f"{point.restarted}"
+                )
+            if len(points) >= budget or _closed(points, band):
+                break
+    except NotSolvedError as error:
+        notes.append(str(error))
+    return _Path(points, (_end(start.omega, band), _end(points[-1].value, band) if points else ""))
+
+
+def _both_ways(
+    model: ReducedModel,
+    start: Solution,
+    band: tuple[float, float],
+    path: _Path,
+    budget: int,
+    notes: list[str],
+    options: Options,
+) -> _Path:
+    """The path continued beyond its start in the other direction, unless it closed on itself."""
+    if _closed(path.points, band):
+        return path
+    back = _followed(model, start, band, False, budget - len(path.points), notes, options)
+    turned = (
+        [
+            replace(late, forward=not late.forward, fold=early.fold)
+            for late, early in pairwise([*back.points[::-1], back.points[0]])
+        ]
+        if back.points
+        else []
+    )
+    return _Path([*turned[:-1], *path.points], (back.ends[1], path.ends[1]))
+
+
+def _end(omega: float, band: tuple[float, float]) -> str:
+    """Which end of the band a frequency lies at or beyond."""
+    margin = 1e-6 * (band[1] - band[0])
+    if omega <= band[0] + margin:
+        return "low"
+    return "high" if omega >= band[1] - margin else ""
+
+
+def _closed(points: Sequence[PathPoint], band: tuple[float, float]) -> bool:
+    """The path has come round to its start in the same direction."""
+    if len(points) < 10 or points[0].forward != points[-1].forward:
+        return False
+    one, two, three = points[0], points[-2], points[-1]
+    if not min(two.value, three.value) <= one.value <= max(two.value, three.value):
+        return False
+    return _near(two.solution, three.solution, one.solution)
+
+
+def _near(left: Solution, right: Solution, point: Solution) -> bool:
+    """Whether a point lies on the chord between two others, in displacements."""
+    H = max(left.harmonics, point.harmonics)
+    a, b, c = (match_harmonics(p.w, H) for p in (left, right, point))
+    width = right.omega - left.omega
+    share = np.clip((point.omega - left.omega) / width, 0, 1) if width else 0.0
+    between = (1 - share) * a + share * b
+    # the chord of a curved path lies off it by a share of its own length
+    off = SAME * max(np.linalg.norm(a), np.linalg.norm(b)) + 0.1 * np.linalg.norm(b - a)
+    # a stuck contact may rest anywhere
+    return bool(np.linalg.norm((c - between)[:, :, 1:]) <= off)
+
+
+def _on_paths(paths: Sequence[_Path], point: Solution) -> bool:
+    for path in paths:
+        for left, right in pairwise(path.points):
+            low, high = sorted((left.value, right.value))
+            if low <= point.omega <= high and _near(left.solution, right.solution, point):
+                return True
+    return False
+
+
+def _close_in(
+    model: ReducedModel, path: _Path, band: tuple[float, float], peak: float, options: Options
+) -> None:
+    """Further points round each local maximum, put into the path where they belong."""
+    probe = options.probe
+    heights = [size(p.solution, probe) for p in path.points]
+    top = max(heights, default=0.0)
+    for i in range(len(heights) - 2, 0, -1):
+        if heights[i] < max(heights[i - 1], heights[i + 1]) or heights[i] < 0.02 * top:
+            continue
+        drop = heights[i] - min(heights[i - 1], heights[i + 1])
+        if drop < peak * heights[i]:
+            continue
+        path.points[i - 1 : i + 2] = _finer(model, path.points[i - 1 : i + 2], band, peak, options)
+
+
+def _finer(
+    model: ReducedModel,
+    three: Sequence[PathPoint],
+    band: tuple[float, float],
+    peak: float,
+    options: Options,
+) -> list[PathPoint]:
+    """Three points with a maximum inside, and what lies between them by shorter steps."""
+    probe = options.probe
+    first, _, last = three
+    length = abs(three[1].value - first.value) + abs(last.value - three[1].value)
+    step = max(length / (band[1] - band[0]) / 8, FINE)
+    options = replace(options, frugal=False)
+    found = [first]
+    try:
+        for point in follow(
+            model,
+            "omega",
+            first.solution,
+            (0.99 * band[0], 1.01 * band[1]),
+            forward=first.forward,
+            steps=(step, step),
+            options=options,
+        ):
+            if len(found) > 4 * REFINEMENTS:
+                break
+            if point.value != first.value:
+                found.append(point)
+            beyond = (point.value - last.value) * (1 if last.forward else -1) >= 0
+            falls = len(found) > 2 and size(point.solution, probe) < size(
+                found[-2].solution, probe
+            ) * (1 - peak)
+            if point.forward == last.forward and beyond and falls:
+                break
+    except NotSolvedError:
+        return list(three)
+    if max(size(p.solution, probe) for p in found) < size(three[1].solution, probe):
+        return list(three)
+    return [*found, last]
+
+
+def _sorted_out(paths: Sequence[_Path], probe: int, notes: list[str]) -> Branches:
+    """Pieces between folds, and the local maxima with what is known of them."""
+    pieces: list[list[Solution]] = []
+    maxima: list[tuple[Solution, int]] = []
+    ends: dict[str, int] = {}
+    for path in paths:
+        if len(path.points) < 2:
+            continue
+        first = len(pieces)
+        pieces.extend(_pieces(path.points))
+        for end, number in zip(path.ends, (first, len(pieces) - 1), strict=True):
+            if end:
+                ends.setdefault(end, number)
+        heights = np.array([size(p.solution, probe) for p in path.points])
+        for i in range(1, len(heights) - 1):
+            if heights[i] > heights[i - 1] and heights[i] >= heights[i + 1]:
+                point = path.points[i].solution
+                own = (n for n in range(first, len(pieces)) if any(p is point for p in pieces[n]))
+                maxima.append((point, next(own)))
+    swept = {
+        way: _swept(pieces, ends.get(end), way) for end, way in (("low", "up"), ("high", "down"))
+    }
+    resonances = [
+        Resonance(
+            point, size(point, probe), _count(pieces, point.omega), _reached(swept, point, number)
+        )
+        for point, number in maxima
+    ]
+    resonances.sort(key=lambda r: -r.height)
+    return Branches(tuple(map(tuple, pieces)), tuple(resonances), tuple(dict.fromkeys(notes)))
+
+
+def _pieces(points: Sequence[PathPoint]) -> list[list[Solution]]:
+    """The path cut where the frequency turns back."""
+    pieces = [[points[0].solution]]
+    rising = 0.0
+    for before, point in pairwise(points):
+        change = np.sign(point.value - before.value)
+        if rising and change and change != rising:
+            pieces.append([])
+        rising = change or rising
+        pieces[-1].append(point.solution)
+    return pieces
+
+
+def _swept(
+    pieces: Sequence[Sequence[Solution]], first: int | None, way: str
+) -> list[tuple[int, float]]:
+    """Pieces that a slow sweep visits, with the frequency at which it comes onto each.
+
+    At the end of a piece it jumps to the nearest motion, in displacements, that leads further; a
+    jump may in truth end elsewhere, which only a march in time tells.
+    """
+    if first is None:
+        return []
+    sign = 1.0 if way == "up" else -1.0
+    last = [max(piece, key=lambda p: sign * p.omega) for piece in pieces]
+    begin = [min(piece, key=lambda p: sign * p.omega) for piece in pieces]
+    visited = [(first, begin[first].omega)]
+    while True:
+        edge = last[visited[-1][0]]
+        onward = [
+            n
+            for n in range(len(pieces))
+            if sign * last[n].omega > sign * edge.omega + 1e-9 * edge.omega
+            and sign * begin[n].omega <= sign * edge.omega
+        ]
+        if not onward or len(visited) > len(pieces):
+            return visited
+        nearest = min(onward, key=lambda n: _distance(_nearest_in(pieces[n], edge.omega), edge))
+        visited.append((nearest, edge.omega))
+
+
+def _nearest_in(piece: Sequence[Solution], omega: float) -> Solution:
+    return min(piece, key=lambda p: abs(p.omega - omega))
+
+
+def _distance(one: Solution, other: Solution) -> float:
+    H = max(one.harmonics, other.harmonics)
+    return float(np.linalg.norm(match_harmonics(one.w, H) - match_harmonics(other.w, H)))
+
+
+def _reached(swept: Mapping[str, Sequence[tuple[int, float]]], point: Solution, number: int) -> str:
+    """By which sweeps a motion of a piece is reached."""
+    ways = [
+        way
+        for way, visited in swept.items()
+        for piece, entry in visited
+        if piece == number and (point.omega - entry) * (1 if way == "up" else -1) >= 0
+    ]
+    return " and ".join(dict.fromkeys(ways)) or "isolated"
+
+
+def _count(pieces: Sequence[Sequence[Solution]], omega: float) -> int:
+    """Pieces that cross a frequency."""
+    ends = ((min(p.omega for p in piece), max(p.omega for p in piece)) for piece in pieces)
+    return sum(low <= omega <= high for low, high in ends)

@@ -1,0 +1,127 @@
+"""Headline numbers of a response study, each with how sure it is.
+
+The errors that a run estimates are those of modes, harmonics, samples, contact points and damper
+model at the resonance; how finely the loads and frequencies were studied adds its own.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+import pandas as pd
+
+from .statements import Answer
+
+__all__ = ["Headline", "headlines"]
+
+
+class Headline(NamedTuple):
+    """One number on the first screen."""
+
+    what: str
+    value: str
+    # "± 0.4 %", "between 72 and 120 N", or why there is none
+    uncertainty: str
+    remark: str
+
+
+def headlines(
+    answer: Answer, summary: pd.DataFrame | None, points: pd.DataFrame | None
+) -> list[Headline]:
+    """The numbers of an answer with their uncertainties.
+
+    Args:
+        answer: what, value, remark.
+        summary: one row a load, SI columns; "error" is the estimated relative error of the
+            resonance amplitude (NaN: not estimated, inf: unknown).
+        points: one row a response point.
+    """
+    sure = {} if summary is None else _uncertainties(summary, points)
+    return [
+        Headline(what, value, sure.get(_quantity(what), "no estimate"), remark)
+        for what, value, remark in answer.numbers
+    ]
+
+
+def _quantity(what: str) -> str:
+    """Which uncertainty belongs to a headline, by the words in its title."""
+    words = {
+        "amplitude": "amplitude",
+        "stress": "amplitude",
+        "frequency": "frequency",
+        "work": "amplitude",
+        "damping ratio": "amplitude",
+        "own mass": "own load",
+        "mass that makes": "mass",
+        "optimum": "load",
+    }
+    return next((key for word, key in words.items() if word in what), "")
+
+
+def _uncertainties(summary: pd.DataFrame, points: pd.DataFrame | None) -> dict[str, str]:
+    """How sure each quantity is, in words."""
+    finite = summary[(summary["load"] > 0) & np.isfinite(summary["load"])]
+    if finite.empty:
+        return {}
+    best = finite.loc[finite["peak_amplitude"].idxmin()]
+    low, high = _bracket(finite, best)
+    return {
+        "amplitude": _error_text(best.get("error", np.nan)),
+        "frequency": _spacing_text(best, points),
+        "load": _between_text(low, high, "N"),
+        "own load": "by equilibrium, no model error",
+        "mass": _mass_text(low, high, best["load"]),
+    }
+
+
+def _error_text(error: float) -> str:
+    """The estimated model error of the resonance amplitude."""
+    if np.isnan(error):
+        return "not estimated"
+    if np.isinf(error):
+        return "error unknown: richer models were not solved"
+    return f"± {max(100 * error, 0.01):.2g} % (model; mesh apart)"
+
+
+def _bracket(finite: pd.DataFrame, best: pd.Series) -> tuple[float | None, float | None]:
+    """The studied loads on both sides of the best one [N], of the same damper; None at an end."""
+    if "mass" in finite and np.isfinite(best.get("mass", np.nan)):
+        finite = finite[finite["mass"] == best["mass"]]
+    lower = finite.loc[finite["load"] < best["load"], "load"]
+    upper = finite.loc[finite["load"] > best["load"], "load"]
+    low = float(lower.max()) if len(lower) else None
+    high = float(upper.min()) if len(upper) else None
+    return low, high
+
+
+def _between_text(low: float | None, high: float | None, unit: str, factor: float = 1.0) -> str:
+    if low is None and high is None:
+        return "only one load studied"
+    if low is None:
+        return f"below {factor * high:.4g} {unit}, no lower bound studied"
+    if high is None:
+        return f"above {factor * low:.4g} {unit}, no upper bound studied"
+    return f"between {factor * low:.4g} and {factor * high:.4g} {unit}"
+
+
+def _mass_text(low: float | None, high: float | None, load: float) -> str:
+    """Loads grow in proportion to the mass, and so does their bracket."""
+    if low is None or high is None:
+        return "open on one side, as the optimum load"
+    return f"{100 * (low / load - 1):+.0f} to {100 * (high / load - 1):+.0f} %, as the optimum load"
+
+
+def _spacing_text(best: pd.Series, points: pd.DataFrame | None) -> str:
+    """Half the distance of the points beside the highest one."""
+    if points is None or points.empty:
+        return "no estimate"
+    curve = points[points["load"] == best["load"]]
+    if "mass" in curve and np.isfinite(best.get("mass", np.nan)):
+        curve = curve[curve["mass"] == best["mass"]]
+    frequency = np.sort(curve["frequency"].unique())
+    here = int(np.argmin(abs(frequency - best["peak_frequency"])))
+    if not 0 < here < len(frequency) - 1:
+        return "at the end of the band: no resonance seen"
+    spacing = (frequency[here + 1] - frequency[here - 1]) / 2
+    return f"± {spacing:.2g} Hz (spacing of points)"

@@ -1,0 +1,74 @@
+"""What the reader of a report can do next, from what a run has shown and what it left open."""
+
+from __future__ import annotations
+
+import numpy as np
+import pandas as pd
+
+from bladefem.scene.tables import Scene
+
+__all__ = ["next_steps"]
+
+# of the damper's own load: nearer to the optimum, another mass changes little
+NEAR = 0.15
+
+
+def next_steps(
+    scene: Scene,
+    cautions: list[str],
+    summary: pd.DataFrame | None,
+    own: pd.DataFrame | None,
+) -> list[str]:
+    """Sentences in the order of their worth; none where nothing was answered.
+
+    Args:
+        cautions: why the answer may not be the optimum; each says what to change.
+        summary: one row a load, SI columns.
+        own: one row: mass [kg], speed [rad/s], load [N] of a seat by that mass alone.
+    """
+    steps = list(cautions)
+    if summary is None or summary.empty:
+        return steps
+    finite = summary[(summary["load"] > 0) & np.isfinite(summary["load"])]
+    if finite.empty:
+        return steps
+    best = finite.loc[finite["peak_amplitude"].idxmin()]
+    if not cautions:
+        steps += _mass_step(best, own, "mass" in finite)
+    steps += _mesh_step(best)
+    if scene.contact.normal == "coupled" and not scene.study.stability:
+        steps.append(
+            "Normal loads follow the motion, so that a point may be unstable: ask for stability "
+            "with study.stability = true."
+        )
+    return steps
+
+
+def _mass_step(best: pd.Series, own: pd.DataFrame | None, several: bool) -> list[str]:
+    """Another mass, where the damper's own load is far from the best one."""
+    if own is None or several:
+        return []
+    mass, load = own[["mass", "load"]].iloc[0]
+    if abs(best["load"] / load - 1) <= NEAR:
+        return [
+            f"The damper's own {1e3 * mass:.3g} g press it nearly at the optimum: keep its mass."
+        ]
+    wanted = mass * best["load"] / load
+    return [
+        f"Change the damper's mass from {1e3 * mass:.3g} g to about {1e3 * wanted:.3g} g, and "
+        f"confirm with damper.mass = '{1e3 * wanted:.3g} g' and study.own_load = true."
+    ]
+
+
+def _mesh_step(best: pd.Series) -> list[str]:
+    """The mesh's own error is in no estimate."""
+    halved = best.get("halved", np.nan)
+    tail = (
+        f" Half as many contact points change the amplitude by {100 * halved:.2g} %."
+        if np.isfinite(halved) and halved > 0
+        else ""
+    )
+    return [
+        "The mesh's part is in no estimate: compare meshes with 'bladefem chart SCENE --mesh' "
+        f"before numbers are frozen.{tail}"
+    ]

@@ -1,0 +1,309 @@
+"""Curves for a page with script: the same as the pictures, as data and layout of plotly.js."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+import matplotlib.colors
+import numpy as np
+import pandas as pd
+
+from .response import between, load_colours, load_name
+from .style import COLOURS, FAILED
+
+__all__ = ["live_diameters", "live_loops", "live_optimum", "live_responses"]
+
+MICRO = 1e6
+# significant digits of numbers on the page
+DIGITS = 7
+SYMBOLS = ("circle", "diamond", "triangle-up", "square")
+DASHES = {0.0: "dash", np.inf: "dot"}
+
+
+def live_responses(points: pd.DataFrame, title: str = "", per: str = "seat") -> dict[str, Any]:
+    """Amplitude over frequency, a curve a load, every solved point with its numbers.
+
+    Args:
+        points: response table, SI columns (see ``response.py``).
+        title: headline.
+        per: what carries the load.
+    """
+    loads = np.sort(points["load"].unique())
+    colours = load_colours(loads)
+    data: list[dict[str, Any]] = []
+    for load in loads:
+        curve = points[points["load"] == load].sort_values("frequency", kind="stable")
+        data += _curve(curve, float(load), matplotlib.colors.to_hex(colours[load]))
+    failed = points[~points["converged"].astype(bool) & (points["amplitude"] > 0)]
+    if len(failed):
+        data.append(
+            _marks(failed, f"not converged ({len(failed)})", {"symbol": "x", "color": FAILED})
+        )
+    if "stability" in points and (points["stability"] == "unstable").any():
+        unstable = points[points["stability"] == "unstable"]
+        style = {"symbol": "square-open", "color": FAILED, "size": 7}
+        data.append(_marks(unstable, f"unstable ({len(unstable)})", style))
+    layout = {
+        "title": _text(title),
+        "xaxis": {"title": {"text": "excitation frequency [Hz]"}},
+        "yaxis": {
+            "title": {"text": "vibration amplitude [µm]"},
+            **_log_axis(MICRO * points["amplitude"]),
+        },
+        "legend": {"title": {"text": f"normal load per {per}"}},
+        "hovermode": "closest",
+    }
+    return {"kind": "chart", "data": data, "layout": layout}
+
+
+def _curve(curve: pd.DataFrame, load: float, colour: str) -> list[dict[str, Any]]:
+    """A line that keeps the slopes, and the solved points to hover over."""
+    good = curve["converged"].to_numpy(bool)
+    frequency = curve["frequency"].to_numpy(float)
+    amplitude = np.where(good, MICRO * curve["amplitude"].to_numpy(float), np.nan)
+    x, y = between(frequency, amplitude)
+    name = load_name(load)
+    line = {
+        "type": "scatter",
+        "mode": "lines",
+        "name": name,
+        "legendgroup": name,
+        "x": numbers(x),
+        "y": numbers(y),
+        "line": {"color": colour, "dash": DASHES.get(load, "solid"), "width": 2},
+        "hoverinfo": "skip",
+    }
+    marks = _marks(curve[good], name, {"color": colour, "size": 5})
+    return [line, {**marks, "legendgroup": name, "showlegend": False}]
+
+
+def _marks(points: pd.DataFrame, name: str, style: dict[str, Any]) -> dict[str, Any]:
+    """Points with their numbers; names come from the scene and are plain text."""
+    told = ["load", "method", "estimated_error", "slipping"]
+    known = [column for column in told if column in points]
+    texts = [
+        "<br>".join(_said(column, row[column]) for column in known) for _, row in points.iterrows()
+    ]
+    return {
+        "type": "scatter",
+        "mode": "markers",
+        "name": name,
+        "x": numbers(points["frequency"]),
+        "y": numbers(MICRO * points["amplitude"]),
+        "marker": style,
+        "text": texts,
+        "hovertemplate": "%{x:.3f} Hz, %{y:.4g} µm<br>%{text}<extra></extra>",
+    }
+
+
+def _said(column: str, value: Any) -> str:
+    """One line of a hover text."""
+    if column == "load":
+        return f"load {load_name(float(value))}"
+    if column == "estimated_error":
+        return f"estimated error {100 * value:.2g} %" if np.isfinite(value) else "error unknown"
+    if column == "slipping":
+        return f"{value:g} elements slip or lift off"
+    return str(value)
+
+
+def live_optimum(
+    summary: pd.DataFrame, own: float | None = None, title: str = "optimum load"
+) -> dict[str, Any]:
+    """Resonance amplitude and frequency over load, a curve a damper mass.
+
+    Args:
+        summary: one row a load, SI columns.
+        own: load that the damper's mass gives at the operating speed [N].
+        title: headline.
+    """
+    data: list[dict[str, Any]] = []
+    groups = list(summary.groupby("mass")) if "mass" in summary else [(None, summary)]
+    for number, (mass, table) in enumerate(groups):
+        finite = table[(table["load"] > 0) & np.isfinite(table["load"])].sort_values("load")
+        name = "resonance" if mass is None else f"damper of {1e3 * mass:.4g} g"
+        data += _optimum_curve(finite, name, COLOURS[number % len(COLOURS)])
+    shapes = _level_lines(summary)
+    if own is not None:
+        shapes.append(_line("x", own, "dot", f"own load {own:.4g} N"))
+    finite = summary[np.isfinite(summary["load"]) & (summary["load"] > 0)]
+    loads = _log_axis(finite["load"])
+    layout = {
+        "title": _text(title),
+        "showlegend": len(groups) > 1,
+        "grid": {"rows": 2, "columns": 1, "pattern": "independent"},
+        "xaxis": {**loads, "domain": [0, 1], "anchor": "y"},
+        "xaxis2": {
+            **loads,
+            "matches": "x",
+            "anchor": "y2",
+            "title": {"text": "normal load per seat [N]"},
+        },
+        "yaxis": {
+            **_log_axis(MICRO * summary["peak_amplitude"]),
+            "domain": [0.42, 1],
+            "title": {"text": "resonance amplitude [µm]"},
+        },
+        "yaxis2": {"domain": [0, 0.34], "title": {"text": "frequency [Hz]"}},
+        "shapes": shapes,
+    }
+    return {"kind": "chart", "data": data, "layout": layout}
+
+
+def _optimum_curve(finite: pd.DataFrame, name: str, colour: str) -> list[dict[str, Any]]:
+    """Amplitude with its estimated error above, frequency below."""
+    amplitude = MICRO * finite["peak_amplitude"].to_numpy(float)
+    error = finite["error"].to_numpy(float) if "error" in finite else np.full(len(finite), np.nan)
+    common = {
+        "type": "scatter",
+        "mode": "lines+markers",
+        "name": name,
+        "legendgroup": name,
+        "x": numbers(finite["load"]),
+        "line": {"color": colour},
+    }
+    best = int(np.argmin(amplitude))
+    symbols = ["star" if i == best else "circle" for i in range(len(amplitude))]
+    sizes = [14 if i == best else 7 for i in range(len(amplitude))]
+    bars = np.where(np.isfinite(error), error * amplitude, 0.0)
+    upper = {
+        **common,
+        "y": numbers(amplitude),
+        "marker": {"symbol": symbols, "size": sizes},
+        "error_y": {"type": "data", "array": numbers(bars), "thickness": 1},
+        "hovertemplate": "%{x:.4g} N, %{y:.4g} µm<extra></extra>",
+    }
+    lower = {
+        **common,
+        "y": numbers(finite["peak_frequency"]),
+        "xaxis": "x2",
+        "yaxis": "y2",
+        "showlegend": False,
+        "hovertemplate": "%{x:.4g} N, %{y:.6g} Hz<extra></extra>",
+    }
+    return [upper, lower]
+
+
+def _level_lines(summary: pd.DataFrame) -> list[dict[str, Any]]:
+    """The blade without damper and in full stick."""
+    lines = []
+    for load, dash in DASHES.items():
+        row = summary[summary["load"] == load]
+        if len(row):
+            value = MICRO * float(row["peak_amplitude"].iloc[0])
+            lines.append(_line("y", value, dash, load_name(load)))
+    return lines
+
+
+def _line(axis: str, value: float, dash: str, label: str) -> dict[str, Any]:
+    """A line across the upper panel."""
+    other = "y" if axis == "x" else "x"
+    return {
+        "type": "line",
+        f"{axis}0": value,
+        f"{axis}1": value,
+        f"{axis}ref": axis,
+        f"{other}0": 0,
+        f"{other}1": 1,
+        f"{other}ref": f"{other} domain",
+        "line": {"color": "#555555", "dash": dash, "width": 1},
+        "label": {
+            "text": label,
+            "textposition": "start",
+            "textangle": 0,
+            "font": {"size": 10},
+        },
+    }
+
+
+def live_loops(
+    cases: Mapping[str, Mapping[str, tuple[np.ndarray, np.ndarray]]],
+) -> dict[str, Any]:
+    """Hysteresis of each seat, all loads in one chart; a click on a name hides a load.
+
+    Args:
+        cases: name of the load -> name of the seat -> (displacement (k,) [m], force (k,) [N]).
+    """
+    data = []
+    for number, (load, seats) in enumerate(cases.items()):
+        for dash, (seat, (x, force)) in zip(("solid", "dash"), seats.items(), strict=False):
+            closed = np.append(np.arange(len(x)), 0)
+            data.append(
+                {
+                    "type": "scatter",
+                    "mode": "lines",
+                    "name": f"{load}, {seat}",
+                    "legendgroup": load,
+                    "x": numbers(MICRO * np.asarray(x)[closed]),
+                    "y": numbers(np.asarray(force)[closed]),
+                    "line": {"color": COLOURS[number % len(COLOURS)], "dash": dash, "width": 1.6},
+                    "hovertemplate": "%{x:.4g} µm, %{y:.4g} N<extra>%{fullData.name}</extra>",
+                }
+            )
+    layout = {
+        "title": _text("hysteresis loops"),
+        "xaxis": {"title": {"text": "relative displacement [µm]"}},
+        "yaxis": {"title": {"text": "friction force [N]"}},
+        "hovermode": "closest",
+    }
+    return {"kind": "chart", "data": data, "layout": layout}
+
+
+def live_diameters(table: pd.DataFrame) -> dict[str, Any]:
+    """Natural frequencies over nodal diameter, by family.
+
+    Args:
+        table: columns nodal_diameter, mode, frequency [Hz], optionally family.
+    """
+    names = table["family"] if "family" in table else table["mode"].map("mode {}".format)
+    data = [
+        {
+            "type": "scatter",
+            "mode": "markers",
+            "name": str(name),
+            "x": numbers(table.loc[names == name, "nodal_diameter"]),
+            "y": numbers(table.loc[names == name, "frequency"]),
+            "marker": {
+                "color": COLOURS[i % len(COLOURS)],
+                "symbol": SYMBOLS[i // len(COLOURS) % len(SYMBOLS)],
+                "size": 8,
+            },
+            "hovertemplate": "nodal diameter %{x}, %{y:.6g} Hz<extra>%{fullData.name}</extra>",
+        }
+        for i, name in enumerate(dict.fromkeys(names))
+    ]
+    layout = {
+        "title": _text("natural frequencies of the wheel"),
+        "xaxis": {"title": {"text": "nodal diameter"}, "dtick": 1},
+        "yaxis": {"title": {"text": "frequency [Hz]"}, "rangemode": "tozero"},
+        "hovermode": "closest",
+    }
+    return {"kind": "chart", "data": data, "layout": layout}
+
+
+def _log_axis(values: Any) -> dict[str, Any]:
+    """A logarithmic axis with plain numbers at 1, 2 and 5 of each decade, or at 1 alone where
+    there are many.
+    """
+    array = np.asarray(values, dtype=float)
+    array = array[np.isfinite(array) & (array > 0)]
+    if not len(array):
+        return {"type": "log"}
+    low = int(np.floor(np.log10(array.min())))
+    high = int(np.ceil(np.log10(array.max())))
+    steps = (1, 2, 3, 4, 5, 6, 8) if high - low < 2 else (1, 2, 5) if high - low < 5 else (1,)
+    ticks = [step * 10.0**decade for decade in range(low, high + 1) for step in steps]
+    return {"type": "log", "tickvals": ticks, "ticktext": [f"{tick:g}" for tick in ticks]}
+
+
+def numbers(values: Any) -> list[float | None]:
+    """Plain numbers with the digits that a page needs; None where there is none."""
+    array = np.asarray(values, dtype=float)
+    return [float(f"{v:.{DIGITS}g}") if np.isfinite(v) else None for v in array]
+
+
+def _text(words: str) -> dict[str, Any]:
+    """A title; plotly.js takes markup, so that the user's own words are escaped."""
+    plain = words.replace("&", "&amp;").replace("<", "&lt;").replace(">", "&gt;")
+    return {"text": plain, "x": 0.0, "xref": "paper", "font": {"size": 14}}

@@ -1,0 +1,245 @@
+"""The report in a real browser: opened, hovered, rotated, sorted, printed, at two widths.
+
+Chromium without a window runs a script that is added to the page; what that found is read from the
+page's text. ``setup.sh`` installs Chromium where ``BLADEFEM_BROWSER=1``, as ``.ci/run`` does.
+"""
+
+from __future__ import annotations
+
+import base64
+import html
+import json
+import os
+import re
+import subprocess
+import sys
+from pathlib import Path
+
+import numpy as np
+import pandas as pd
+import pytest
+
+from bladefem.data import ModeSet
+from bladefem.report.pdf import browser_command, print_pdf
+from bladefem.report.write import Page, write_report
+from bladefem.scene.tables import Scene
+from bladefem.view.live_curves import live_optimum, live_responses
+from bladefem.view.live_shapes import live_shapes
+from geometry.mesh import Mesh
+
+sys.path.insert(0, str(Path(__file__).parents[1] / "view"))
+import synthetic
+
+COMMAND = browser_command()
+WANTED = os.environ.get("BLADEFEM_BROWSER") == "1"
+pytestmark = pytest.mark.skipif(
+    COMMAND is None and not WANTED,
+    reason="no Chromium: apt install chromium, or BLADEFEM_BROWSER=1 ./run test to install it",
+)
+
+PIXEL = base64.b64decode(
+    "iVBORw0KGgoAAAANSUhEUgAAAAEAAAABCAQAAAC1HAwCAAAAC0lEQVR42mNkYAAAAAYAAjCB0C8AAAAASUVORK5CYII="
+)
+# runs after the page's own script; what it finds is written into the page as JSON
+PROBE = """
+<script>
+const found = {errors: []};
+window.addEventListener("error", (event) => found.errors.push(event.message));
+window.addEventListener("unhandledrejection", (event) => found.errors.push(String(event.reason)));
+const plain = console.error;
+console.error = (...words) => { found.errors.push(words.join(" ")); plain(...words); };
+const pause = (time) => new Promise((done) => setTimeout(done, time));
+async function live(figure) {
+  figure.scrollIntoView();
+  for (let i = 0; i < 100 && !figure.classList.contains("is-live"); i++) await pause(100);
+  return figure.querySelector(".live");
+}
+async function probe() {
+  const figures = [...document.querySelectorAll("figure[data-live]")];
+  found.kinds = [];
+  for (const figure of figures) {
+    const place = await live(figure);
+    found.kinds.push({live: figure.classList.contains("is-live"), failed: figure.dataset.failed || "",
+      traces: place ? place.data.length : 0, width: place ? place.clientWidth : 0,
+      picture: getComputedStyle(figure.querySelector("img")).display});
+  }
+  const chart = figures[0].querySelector(".live");
+  let hovered = null;
+  chart.on("plotly_hover", (event) => { hovered = event.points[0]; });
+  const number = chart.data.findIndex((trace) => trace.mode === "markers");
+  chart.scrollIntoView();
+  await pause(300);
+  const place = chart.getBoundingClientRect();
+  const {xaxis, yaxis} = chart._fullLayout;
+  const x = place.left + xaxis._offset + xaxis.d2p(chart.data[number].x[3]);
+  const y = place.top + yaxis._offset + yaxis.d2p(chart.data[number].y[3]);
+  const layer = chart.querySelector(".nsewdrag");
+  for (const type of ["mouseover", "mouseenter", "mousemove"]) {
+    layer.dispatchEvent(new MouseEvent(type, {clientX: x, clientY: y, bubbles: true, view: window}));
+  }
+  await pause(500);
+  found.hover = hovered && [hovered.x, hovered.y, chart.querySelector(".hoverlayer").textContent];
+  const shape = figures.find((figure) => figure.querySelector("select"));
+  if (shape) {
+    const place = shape.querySelector(".live");
+    const before = Array.from(place.data[0].x);
+    const slider = shape.querySelector(".phase");
+    slider.value = 90;
+    slider.dispatchEvent(new Event("input"));
+    await pause(300);
+    found.moved = Math.max(...before.map((x, i) => Math.abs(x - place.data[0].x[i])));
+    const eye = place._fullLayout.scene.camera.eye.x;
+    await Plotly.relayout(place, {"scene.camera.eye.x": eye + 1});
+    found.turned = place._fullLayout.scene.camera.eye.x - eye;
+    found.modes = shape.querySelector("select").options.length;
+  }
+  const table = document.querySelector("table.sortable");
+  const column = () => [...table.tBodies[0].rows].map((row) => row.cells[2].textContent);
+  found.before = column();
+  table.tHead.rows[0].cells[2].click();
+  found.sorted = column();
+  table.tHead.rows[0].cells[2].click();
+  found.reversed = column();
+  found.wide = document.documentElement.scrollWidth - document.documentElement.clientWidth;
+}
+probe().catch((error) => found.errors.push("probe: " + error)).finally(() => {
+  const box = document.createElement("pre");
+  box.id = "found";
+  box.textContent = JSON.stringify(found);
+  document.body.append(box);
+});
+</script>
+"""
+
+
+@pytest.fixture(scope="module")
+def page(tmp_path_factory) -> Path:
+    """A report with curves, an optimum, a shape and a table, of made-up results."""
+    folder = tmp_path_factory.mktemp("page")
+    picture = folder / "picture.png"
+    picture.write_bytes(PIXEL)
+    points = synthetic.points()
+    summary = synthetic.summary().assign(error=0.01)
+    names = ("response/forced_response", "response/optimum", "modes/first_modes")
+    live = {
+        names[0]: live_responses(points, "a <title> & $\\frac{1}{$"),
+        names[1]: live_optimum(summary, 120.0),
+        names[2]: tetrahedron_shapes(),
+    }
+    tables = {"response/summary": summary, "response/points": points}
+    figures = {name: picture for name in names}
+    said = ["</script><script>broken", "plain"]
+    return write_report(folder, Scene(title="A report"), tables, figures, said, page=Page(live))[0]
+
+
+def tetrahedron_shapes() -> dict:
+    """Two modes of one element, the second a turning one."""
+    points = np.array([[0.0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1]])
+    mesh = Mesh(points, "tetra", {"blade": np.array([[0, 1, 2, 3]])}, {}, {}, {})
+    shapes = np.zeros((2, 4, 3), complex)
+    shapes[0, 1] = (1.0, 0.5, 0)
+    shapes[1, 1] = (1.0, 0.8j, 0)
+    modes = ModeSet(np.array([100.0, 200.0]), shapes, 1, np.zeros(2))
+    return live_shapes(mesh, modes, ["first flap", "first edge"])
+
+
+def look(page: Path, width: int) -> dict:
+    """What the probe finds in a window of that width."""
+    assert COMMAND is not None, "BLADEFEM_BROWSER=1, but there is no Chromium"
+    probed = page.with_name(f"probed_{width}.html")
+    text = page.read_text(encoding="utf-8")
+    probed.write_text(text.replace("</body>", PROBE + "</body>"), encoding="utf-8")
+    command = [
+        *(word for word in COMMAND if word != "--disable-gpu"),
+        # WebGL without a graphics card
+        "--use-angle=swiftshader",
+        "--enable-unsafe-swiftshader",
+        f"--user-data-dir={page.parent / f'profile_{width}'}",
+        f"--window-size={width},900",
+        "--virtual-time-budget=60000",
+        "--dump-dom",
+        probed.as_uri(),
+    ]
+    done = subprocess.run(command, capture_output=True, text=True, timeout=240, check=False)
+    match = re.search(r'<pre id="found">(.*?)</pre>', done.stdout, re.DOTALL)
+    assert match, done.stderr[-2000:]
+    return json.loads(html.unescape(match[1]))
+
+
+@pytest.fixture(scope="module")
+def wide(page):
+    return look(page, 1280)
+
+
+def test_no_error_and_all_figures_live(wide):
+    assert wide["errors"] == []
+    assert [kind["live"] for kind in wide["kinds"]] == [True, True, True]
+    assert all(kind["picture"] == "none" for kind in wide["kinds"])
+
+
+def test_a_hover_shows_the_numbers_of_a_point(wide):
+    frequency, amplitude, text = wide["hover"]
+    free = synthetic.points().query("load == 0").sort_values("frequency")
+    assert frequency == pytest.approx(free["frequency"].iloc[3], rel=1e-6)
+    assert amplitude == pytest.approx(1e6 * free["amplitude"].iloc[3], rel=1e-6)
+    assert "Hz" in text
+    assert "µm" in text
+
+
+def test_shapes_move_with_the_phase_and_turn(wide):
+    """A quarter period takes a real mode from its extreme to rest: as far as it is drawn."""
+    assert wide["modes"] == 2
+    assert wide["turned"] == pytest.approx(1.0)
+    drawn = 0.1 / np.hypot(1, 0.5)
+    assert wide["moved"] == pytest.approx(drawn, rel=1e-3)
+
+
+def test_tables_sort_both_ways(wide):
+    numbers = [float(text) for text in wide["before"]]
+    assert [float(text) for text in wide["sorted"]] == sorted(numbers)
+    assert [float(text) for text in wide["reversed"]] == sorted(numbers, reverse=True)
+
+
+def test_a_phone_sees_the_same_without_scrolling_sideways(page):
+    narrow = look(page, 500)
+    assert narrow["errors"] == []
+    assert all(kind["live"] for kind in narrow["kinds"])
+    assert narrow["wide"] <= 0
+
+
+def test_print_and_pages_without_script_show_pictures(page):
+    """The picture is there from the start; style sheets hide what a script draws in print."""
+    text = page.read_text(encoding="utf-8")
+    assert text.count("<figure") == text.count('<img src="data:image/png')
+    style = text[text.index("@media print") : text.index("</style>")]
+    assert "figure.is-live img { display: block; }" in style
+    assert re.search(r"\.live[^{]*\{ display: none !important; \}", style)
+
+
+def test_pdf_is_printed(page):
+    file = print_pdf(page)
+    content = file.read_bytes()
+    assert content.startswith(b"%PDF")
+    assert len(re.findall(rb"/Type\s*/Page\b", content)) >= 2
+
+
+def test_the_users_words_cannot_end_a_script(page):
+    assert "</script><script>broken" not in page.read_text(encoding="utf-8")
+
+
+def test_numbers_of_curves_are_those_of_the_table():
+    points = synthetic.points()
+    spec = live_responses(points)
+    marks = [trace for trace in spec["data"] if trace["mode"] == "markers"]
+    count = sum(len(trace["x"]) for trace in marks if "not converged" not in trace["name"])
+    assert count == int(points["converged"].sum())
+    assert json.loads(json.dumps(spec, allow_nan=False)) == spec
+
+
+def test_own_load_and_limits_are_lines_of_the_optimum():
+    spec = live_optimum(synthetic.summary(), 120.0)
+    labels = [shape["label"]["text"] for shape in spec["layout"]["shapes"]]
+    assert labels == ["0 (no damper)", "∞ (full stick)", "own load 120 N"]
+    best = spec["data"][0]["marker"]["symbol"].index("star")
+    assert spec["data"][0]["x"][best] == 200.0
+    assert isinstance(pd.Series(spec["data"][0]["y"]).min(), float)
