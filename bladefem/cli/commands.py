@@ -73,9 +73,12 @@ def modes(options: argparse.Namespace, comm: Any) -> None:
     """
     from ..report import modes as report
 
+    refuse_pdf(options)
     scene, folder, bars = prepared(options, comm)
     found = report.run(scene, folder, modes_wanted(options), options.pictures, comm, bars)
     tell(options, comm, lambda: tables.survey(found), found.run)
+    if options.pictures:
+        print_report(options, comm, folder / "report_modes.html")
 
 
 def modes_wanted(options: argparse.Namespace) -> Any:
@@ -181,6 +184,7 @@ def chart(options: argparse.Namespace, comm: Any) -> None:
     check_budget(options.budget)
     if options.reference:
         folder = Path(options.output or "runs/reference")
+        scene = None
         accuracy = 0.02
         title = "reference blade"
         made = on_root(comm, lambda: reference_chart(accuracy, options.budget))
@@ -192,7 +196,7 @@ def chart(options: argparse.Namespace, comm: Any) -> None:
         made = scene_chart(scene, folder, options.budget, comm, sizes)
         accuracy = scene.accuracy
         title = scene.title
-    files = on_root(comm, lambda: write_chart(made, folder, accuracy, title))
+    files = on_root(comm, lambda: write_chart(made, folder, accuracy, title, scene))
     tell(
         options, comm, lambda: "\n".join([*made.remarks, "written: " + ", ".join(map(str, files))])
     )

@@ -13,6 +13,7 @@ import numpy as np
 
 from bladefem.data import Elements
 from bladefem.errors import InputError
+from bladefem.friction.coulomb_2d_plain import plain_batch
 from bladefem.friction.fourier import harmonics_of
 from bladefem.friction.kernel_1d import jenkins_batch
 from bladefem.friction.law import groups_by_law, select_elements
@@ -41,6 +42,28 @@ PARTIAL_SLIP = 2
 GROSS_SLIP = 3
 PRECISIONS = {"double": np.float64, "single": np.float32}
 PERIODIC = "periodic"
+
+
+def _vector_kernel(w, load, nodes, samples, precision, cycles, jacobian, F, shares, used):
+    """Fill forces, shares and cycles of 2-D elements; returns their Jacobian (n, d, K, d K)."""
+    n, d, K = w.shape
+    H = harmonics_of(w)
+    J = np.empty((n, d, K, d * K) if jacobian else (n, 0, 0, 0))
+    rows = patterns(H, samples, PRECISIONS[precision])
+    disc_batch(w, load, nodes, tables(H, samples), rows, cycles, F, J, shares, used)
+    return J
+
+
+def _plain_kernel(w, load, nodes, samples, precision, cycles, jacobian, F, shares, used):
+    """The same by the plain kernel."""
+    n, d, K = w.shape
+    J = np.empty((n, d, K, d * K))
+    plain_batch(w, load, nodes, tables(harmonics_of(w), samples), cycles, F, J, shares, used)
+    return J
+
+
+# of 2-D elements
+KERNELS_2D = {"vector": _vector_kernel, "plain": _plain_kernel}
 
 
 @dataclass(frozen=True)
@@ -74,6 +97,7 @@ def evaluate(
     load: np.ndarray | None = None,
     cycles: int = 4000,
     precision: str = "double",
+    kernel: str = "vector",
 ) -> Forces:
     """Harmonics of the contact forces for relative motion w (n, d, 2H+1) [m], sampled at
     ``samples`` instants.
@@ -81,6 +105,8 @@ def evaluate(
     load (n, samples) [N], where given, is the prescribed part of the normal load N(t) in place of
     the constant n0. precision is that in which the derivative of 2-D elements is summed: "single"
     is faster and leaves about 1e-7 of it in error, which is enough for Newton; forces are the same.
+    kernel is that of 2-D elements: "vector", or "plain", the readable definition of it, some 50
+    times as slow and always in double precision.
     The error falls as samples^-2. Forces.converged is False, with the reason, when a 2-D element
     was not periodic after ``cycles`` periods or the motion is not finite. Raises InputError for
     shapes that do not fit or too few samples (at least 4H+4).
@@ -89,6 +115,8 @@ def evaluate(
     if precision not in PRECISIONS:
         raise InputError(f"precision {precision!r}: expected one of {', '.join(PRECISIONS)}")
     n, d, K = w.shape
+    if kernel not in KERNELS_2D:
+        raise InputError(f"kernel {kernel!r}: expected one of {', '.join(KERNELS_2D)}")
     load = _series(load, n, samples)
     if elements.law is not None:
         return _evaluate_laws(elements, w, samples, jacobian, load, cycles, precision)
@@ -100,18 +128,8 @@ def evaluate(
         J = np.empty((n, d, K, d, K))
         jenkins_batch(w, load, nodes, tab, F, J, shares)
     else:
-        J = np.empty((n, d, K, d * K) if jacobian else (n, 0, 0, 0))
-        disc_batch(
-            w,
-            load,
-            nodes,
-            tab,
-            patterns(harmonics_of(w), samples, PRECISIONS[precision]),
-            cycles,
-            F,
-            J,
-            shares,
-            used,
+        J = KERNELS_2D[kernel](
+            w, load, nodes, samples, precision, cycles, jacobian, F, shares, used
         )
     reason = verdict(F, used, f"were not periodic after {cycles} cycles")
     return Forces(

@@ -2,7 +2,11 @@
 
 from __future__ import annotations
 
+import re
+
 __all__ = ["caption_of"]
+
+MODE = re.compile(r"modes/mode_(?P<number>\d+)(?P<wheel>_wheel)?")
 
 CAPTIONS = {
     "mesh/mesh": "Mesh of blade and damper; coloured faces are those that have names.",
@@ -14,12 +18,36 @@ CAPTIONS = {
     "direction, with nodal lines in white.",
     "modes/frequencies_by_nodal_diameter": "Natural frequencies over nodal diameter, without "
     "damper; modes of one family are joined.",
-    "modes/modes": "Modes in the excited nodal diameter, named after those of the clamped blade.",
-    "modes/nodal_diameters": "Natural frequencies of all nodal diameters that were computed.",
+    "modes/modes": "Modes in the excited nodal diameter, named after those of the clamped blade. "
+    "On the screen: choose a mode, drag to rotate, move the phase through one period.",
+    "modes/excited_modes": "Modes in the excited nodal diameter, named after those of the clamped "
+    "blade.",
+    "modes/frequencies": "Natural frequencies of all nodal diameters, without damper.",
+    "modes/effective_masses": "Effective masses: the share of the moving mass that follows a "
+    "motion of the root along each axis.",
+    "modes/wave": "The excited mode as a wave that turns round the wheel.",
+    "modes/campbell": "Campbell diagram: natural frequencies over speed, engine orders as rays; "
+    "marked where an order meets the wave that it excites.",
+    "modes/crossings": "Speeds at which an engine order excites a mode.",
+    "modes/interference": "Interference diagram at the operating speed: engine orders against "
+    "nodal diameters.",
+    "modes/margins": "The mode closest to each engine order at the operating speed.",
+    "modes/mac": "Modal assurance criterion against the modes of the other run.",
+    "modes/nodal_diameters": "Natural frequencies over nodal diameter, without damper, by family.",
+    "response/resonances": "Linear resonances without damper.",
+    "mesh/convergence": "Frequencies on refined meshes, with the estimated limit and order.",
+    "response/side_by_side": "Resonance amplitude and frequency at the best load over the value, "
+    "and amplitude over load for each value.",
+    "response/accuracy_of_methods_and_models": "Error of the resonance amplitude over computing "
+    "time; the star is the automatic choice, the stairs are what no other setting beats.",
+    "response/errors_of_each": "Errors of resonance amplitude and frequency of each setting.",
+    "accuracy/methods": "Methods on the same model: time and errors.",
+    "accuracy/models": "Models by the full balance of harmonics: time and errors.",
+    "accuracy/meshes": "Meshes with the settings of the automatic choice: time and errors.",
     "modes/stresses": "Where the blade is stressed most: by rotation, and by the excited mode "
     "scaled to 1 mm at the probe (mesh values at Gauss points).",
-    "contact/pressure_on_both_seats": "Contact pressure on both seats under the best load, seen "
-    "along their normals.",
+    "contact/pressure_on_both_seats": "Contact pressure on both seats under the load in the "
+    "title, seen along their normals.",
     "contact/pressure": "Seats under each static load: normal force, pressed share and pressure.",
     "contact/resultants": "Resultant contact force on the damper and its moment about the "
     "engine's origin, under each load.",
@@ -47,9 +75,15 @@ def caption_of(name: str) -> str:
 
     >>> caption_of("modes/some_curve")
     'Some curve.'
+    >>> caption_of("modes/mode_2_wheel")
+    'Mode 2 on the whole wheel; displacement over its largest value.'
     """
     if name in CAPTIONS:
         return CAPTIONS[name]
+    mode = MODE.fullmatch(name)
+    if mode:
+        where = "on the whole wheel" if mode["wheel"] else "on the sector, at rest in grey lines"
+        return f"Mode {mode['number']} {where}; displacement over its largest value."
     head, _, tail = name.rpartition("_")
     if head in CAPTIONS and tail[:1].isdigit():
         # a picture for each damper mass, "response/forced_response_12g"

@@ -4,16 +4,28 @@ from __future__ import annotations
 
 from pathlib import Path
 
+import pandas as pd
+
 from ..io.stage_cache import write_table, write_text
+from ..scene.tables import Scene
 from ..study.chart.chart import Chart
+from ..util.message import method
 from ..view.chart import draw_chart, draw_errors
+from .headlines import Headline
+from .write import Page, write_report
 
 __all__ = ["write_chart"]
 
 
-def write_chart(chart: Chart, folder: str | Path, accuracy: float, title: str = "") -> list[Path]:
-    """Write chart.png, chart_errors.png, chart.txt and one CSV a table (methods, models, meshes);
-    returns the files.
+def write_chart(
+    chart: Chart,
+    folder: str | Path,
+    accuracy: float,
+    title: str = "",
+    scene: Scene | None = None,
+) -> list[Path]:
+    """Write chart.png, chart_errors.png, chart.txt, one CSV a table (methods, models, meshes) and,
+    for a scene, ``report_chart.html`` and ``.md``; returns the files.
     """
     folder = Path(folder)
     folder.mkdir(parents=True, exist_ok=True)
@@ -29,4 +41,41 @@ def write_chart(chart: Chart, folder: str | Path, accuracy: float, title: str = 
     pictures = [folder / "chart.png", folder / "chart_errors.png"]
     for picture, draw in zip(pictures, (draw_chart, draw_errors), strict=True):
         draw(tables, picture, tolerance=accuracy, title=title)
-    return [*files, *pictures, write_text(folder / "chart.txt", "\n".join(chart.remarks) + "\n")]
+    files += [*pictures, write_text(folder / "chart.txt", "\n".join(chart.remarks) + "\n")]
+    if scene is not None:
+        files += _report(chart, scene, tables, pictures, folder)
+    return files
+
+
+def _report(
+    chart: Chart,
+    scene: Scene,
+    tables: dict[str, pd.DataFrame],
+    pictures: list[Path],
+    folder: Path,
+) -> tuple[Path, Path]:
+    """The automatic choice first, then all methods and models."""
+    chosen = [table[table["chosen"].astype(bool)] for table in tables.values() if "chosen" in table]
+    rows = [row for table in chosen for _, row in table.iterrows()]
+    numbers = [
+        Headline(
+            "automatic choice",
+            f"{100 * row['error']:.2g} % error",
+            f"wanted {100 * scene.accuracy:.2g} %",
+            f"{row['name']}, {row['time']:.3g} s",
+        )
+        for row in rows[:1]
+    ]
+    names = ("response/accuracy_of_methods_and_models", "response/errors_of_each")
+    return write_report(
+        folder,
+        scene,
+        {f"accuracy/{name}": table for name, table in tables.items()},
+        dict(zip(names, pictures, strict=True)),
+        map(method, chart.remarks),
+        page=Page(
+            numbers=numbers,
+            stem="report_chart",
+            subject=f"{scene.kind}, speed against accuracy",
+        ),
+    )

@@ -5,7 +5,7 @@ netCDF files.
 from __future__ import annotations
 
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -21,14 +21,33 @@ from ..study.modes.linear_response_report import stress_states, stress_table
 from ..study.modes.survey import Survey, Wanted, excited_set, survey
 from ..util.progress import Progress, unwatched
 from ..view import convergence, forced, mesh, modes, speed
+from ..view.live_curves import live_diameters
+from ..view.live_shapes import live_shapes
 from .datasets import mode_shapes
+from .headlines import Headline
 from .run import mode_table
 from .tables import write_tables
+from .write import Page, write_report
 
 __all__ = ["PICTURES", "run", "tables_of"]
 
 # modes that are drawn
 PICTURES = 4
+# frequencies on the first screen
+HEADLINES = 6
+# sections of tables and pictures; the others are among the modes
+PLACES = {
+    "convergence": "mesh",
+    "convergence_points": "mesh",
+    "forced_response": "response",
+    "resonances": "response",
+}
+# long tables: in CSV files only
+UNPRINTED = ("forced_response", "campbell", "convergence_points")
+MESH_STEP = (
+    "How far the mesh is wrong is not known: ask for three meshes with 'bladefem modes SCENE "
+    "--converge' before frequencies are frozen."
+)
 
 
 def run(
@@ -126,8 +145,68 @@ def _write(
         for i, f in enumerate(excited.frequencies[:pictures])
     }
     mesh.save_vtu(run.mesh, folder / "stress.vtu", {**shapes, **fields}, inside)
-    for name, draw in progress(list(_drawings(result, tables, pictures).items()), "pictures"):
+    drawings = _drawings(result, tables, pictures)
+    for name, draw in progress(list(drawings.items()), "pictures"):
         draw(folder / name)
+    _report(result, tables, list(drawings))
+
+
+def _report(result: Survey, tables: dict[str, pd.DataFrame], pictures: Sequence[str]) -> None:
+    """``report_modes.html`` and ``.md``: frequencies first, shapes to rotate, everything else."""
+    run = result.run
+    folder = Path(run.folder)
+    excited = excited_set(run)
+    families = [str(name) for name in tables["excited_modes"]["family"]]
+    live = {}
+    if "nodal_diameter" in tables["frequencies"]:
+        live["modes/nodal_diameters"] = live_diameters(tables["frequencies"])
+    shapes = live_shapes(run.mesh, excited, families)
+    if shapes is not None:
+        live["modes/modes"] = shapes
+    figures = {_entry(name): folder / name for name in pictures}
+    write_report(
+        folder,
+        run.scene,
+        {_entry(name): table for name, table in tables.items() if name not in UNPRINTED},
+        figures,
+        run.messages,
+        run.timings,
+        page=Page(
+            live,
+            _numbers(excited, families, result),
+            [] if result.convergence is not None else [MESH_STEP],
+            "report_modes",
+            f"{run.scene.kind}, natural frequencies and mode shapes",
+        ),
+    )
+
+
+def _entry(name: str) -> str:
+    """Section and name of a table or picture on the page."""
+    stem = Path(name).stem
+    return f"{PLACES.get(stem, 'modes')}/{stem}"
+
+
+def _numbers(excited: ModeSet, families: Sequence[str], result: Survey) -> list[Headline]:
+    """The first frequencies with the error of the mesh, where that is known."""
+    errors = {}
+    if result.convergence is not None:
+        known = result.convergence.summary
+        errors = dict(zip(known["mode"], known["error"], strict=True))
+    diameter = (
+        "" if excited.nodal_diameter is None else f"nodal diameter {excited.nodal_diameter}; "
+    )
+    return [
+        Headline(
+            f"mode {i + 1}, {families[i]}",
+            f"{excited.frequencies[i]:.5g} Hz",
+            f"± {100 * errors[i + 1]:.2g} % (mesh)"
+            if i + 1 in errors
+            else "mesh error not studied",
+            f"{diameter}residual {excited.residuals[i]:.0e}",
+        )
+        for i in range(min(HEADLINES, len(excited.frequencies)))
+    ]
 
 
 def _stresses(result: Survey) -> tuple[pd.DataFrame, dict[str, np.ndarray], dict[str, np.ndarray]]:

@@ -21,11 +21,17 @@ from ..study.pipeline import pipeline
 from ..util.progress import Progress, unwatched
 from ..view import contact
 from .datasets import contact_arrays, resultants
+from .headlines import Headline
 from .tables import units_of, write_tables
+from .write import Page, write_report
 
 __all__ = ["PICTURE", "draw_seats", "pressure_table", "run", "write_points"]
 
 PICTURE = "pressure_on_both_seats"
+MESH_STEP = (
+    "Halve mesh.contact_size and compare the mean pressure and the pressed share before numbers "
+    "are frozen."
+)
 
 # mean normal load of a seat [N] to the maps of its patches
 Maps = Mapping[float, Sequence[PressureMap]]
@@ -74,13 +80,60 @@ def _write(result: pipeline.Run) -> None:
     table = pressure_table(maps)
     write_tables(table, folder / "pressure", "pressure")
     write_points(folder, maps)
-    draw_seats(maps, sorted(maps)[len(maps) // 2], folder / f"{PICTURE}.png")
+    shown = sorted(maps)[len(maps) // 2]
+    draw_seats(maps, shown, folder / f"{PICTURE}.png")
+    _report(result, table, shown)
     if not _has_responses(folder / "results.nc"):
         write_results(
             folder / "results.nc",
             {"contact": contact_arrays(maps), "resultants": resultants(table)},
             dump(result.scene),
         )
+
+
+def _report(result: pipeline.Run, table: pd.DataFrame, load: float) -> None:
+    """``report_contact.html`` and ``.md``: pressures of one load first, then all of them."""
+    folder = Path(result.folder)
+    rows = table[table["load"] == load]
+    worst = rows.loc[rows["peak_pressure"].idxmax()]
+    numbers = [
+        Headline(
+            "peak pressure",
+            f"{1e-6 * worst['peak_pressure']:.4g} MPa",
+            "mesh error not studied; see the warnings",
+            f"on seat {worst['patch']} under {load:.4g} N",
+        ),
+        Headline(
+            "mean pressure there",
+            f"{1e-6 * worst['mean_pressure']:.4g} MPa",
+            "by equilibrium over the pressed area",
+            f"{100 * worst['contact_share']:.3g} % of the seat pressed",
+        ),
+    ]
+    own = result.contact.own
+    if own is not None:
+        numbers.append(
+            Headline(
+                "load of a seat by the damper's own mass",
+                f"{own:.4g} N",
+                "by equilibrium, no model error",
+                f"{1e3 * result.contact.problem.mass:.3g} g",
+            )
+        )
+    write_report(
+        folder,
+        result.scene,
+        {"contact/pressure": table},
+        {f"contact/{PICTURE}": folder / f"{PICTURE}.png"},
+        result.messages,
+        result.timings,
+        page=Page(
+            numbers=numbers,
+            steps=[MESH_STEP],
+            stem="report_contact",
+            subject=f"{result.scene.kind}, contact pressure",
+        ),
+    )
 
 
 def _by_load(tables: Mapping[float, pd.DataFrame]) -> pd.DataFrame:

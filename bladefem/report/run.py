@@ -41,6 +41,7 @@ from ..view.live_shapes import live_shapes
 from .datasets import datasets, table_dataset
 from .linear import harmonic_table, linear_sentence
 from .nodes import (
+    SEATS,
     cycles_of,
     draw_hysteresis,
     draw_wear,
@@ -52,6 +53,7 @@ from .nodes import (
     wear_table,
 )
 from .pressure import PICTURE, draw_seats, pressure_table, write_points
+from .response_arrays import curve_arrays, loop_arrays, node_arrays, resonance_arrays
 from .tables import units_of, write_tables
 from .write import Page, write_report
 
@@ -109,6 +111,10 @@ def _write(result: pipeline.Run, progress: Progress) -> None:
         "nodes": table_dataset(nodes, "row"),
         "approximation": table_dataset(harmonic_table(patches, cycles), "row"),
         "hysteresis": table_dataset(loops, "row"),
+        "response": curve_arrays(tables["response/points"]),
+        "resonance": resonance_arrays(result.response.curves, result.response.limits),
+        "cycle": node_arrays(nodes),
+        "loops": loop_arrays(cycles, SEATS),
     }
     write_results(folder / "results.nc", groups, dump(result.scene))
     drawings = {
@@ -233,14 +239,24 @@ def _joined(parts: list[pd.DataFrame]) -> pd.DataFrame:
 
 
 def _summary(result: pipeline.Run) -> pd.DataFrame:
-    """The design table, with the alternating stress of the mode studied."""
+    """The design table, with the alternating stress at each resonance."""
     table = pd.DataFrame(summary(result.response.curves, result.response.limits))
     table.insert(
         table.columns.get_loc("reduction") + 1,
         "alternating_stress",
-        result.strength.alternating * table["peak_amplitude"],
+        _alternating(result, table["peak_amplitude"].to_numpy()),
     )
     return table
+
+
+def _alternating(result: pipeline.Run, amplitudes: np.ndarray) -> np.ndarray:
+    """(rows,) alternating stress [Pa] of the design table: of the whole motion at each load, of the
+    mode alone where all is linear, without damper and stuck.
+    """
+    stress = result.strength.alternating * amplitudes
+    if result.damped is not None:
+        stress[1:-1] = [one.largest for one in result.damped]
+    return stress
 
 
 def _stresses(found: Strength) -> pd.DataFrame:

@@ -14,7 +14,9 @@ from ..scene.tables import Scene
 from ..scene.units import parse, show
 from ..study.pipeline.loads import summary
 from ..view.study import draw_study
+from .headlines import Headline
 from .tables import write_tables
+from .write import Page, write_report
 
 __all__ = ["Variant", "study_tables", "write_study"]
 
@@ -46,7 +48,51 @@ def write_study(
     draw_study(
         table.assign(axis=axis), loads, folder / "study.png", label=label, title=f"study of {name}"
     )
-    return table, [*files, folder / "study.png"]
+    pages = _report(name, variants, table, loads, folder)
+    return table, [*files, folder / "study.png", *pages]
+
+
+def _report(
+    name: str,
+    variants: Sequence[Variant],
+    table: pd.DataFrame,
+    loads: pd.DataFrame,
+    folder: Path,
+) -> tuple[Path, Path]:
+    """``report_study.html`` and ``.md``: the best value first, all of them in one table."""
+    best = table.loc[table["peak_amplitude"].idxmin()]
+    error = best.get("error", float("nan"))
+    known = 0 <= error < float("inf")
+    numbers = [
+        Headline(
+            f"best {name}",
+            str(best["value"]),
+            f"of {len(table)} values studied",
+            f"with {best['load']:.4g} N on each seat",
+        ),
+        Headline(
+            "resonance amplitude there",
+            f"{1e6 * best['peak_amplitude']:.4g} µm",
+            f"± {100 * error:.2g} % (model; mesh apart)" if known else "error unknown",
+            f"{best['reduction']:.4g} times below the blade without damper",
+        ),
+        Headline(
+            "resonance frequency there",
+            f"{best['peak_frequency']:.5g} Hz",
+            "spacing of points, in the report of the value",
+            f"{best['free_frequency']:.5g} Hz without damper",
+        ),
+    ]
+    return write_report(
+        folder,
+        variants[0].scene,
+        {
+            "response/best_load_of_each_value": table.drop(columns=["halved", "harmonics"]),
+            "response/all_loads": loads.drop(columns=["halved", "harmonics"]),
+        },
+        {"response/side_by_side": folder / "study.png"},
+        page=Page(numbers=numbers, stem="report_study", subject=f"study of {name}"),
+    )
 
 
 def study_tables(name: str, variants: Sequence[Variant]) -> tuple[pd.DataFrame, pd.DataFrame]:

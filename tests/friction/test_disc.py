@@ -134,6 +134,32 @@ def test_jacobian_against_finite_differences(kn, precision):
     np.testing.assert_allclose(forces.dfdw / largest, numeric / largest, rtol=0, atol=1e-6)
 
 
+@pytest.mark.parametrize(("H", "samples", "kn"), [(3, 64, 1.0), (3, 64, 0.0), (5, 65, 1.0)])
+def test_the_vector_kernel_is_the_plain_one(H, samples, kn):
+    """Forces, derivatives and shares of 100 elements against the readable definition."""
+    elements, w = random_case(H, 100, H, 2, kn)
+    vector = evaluate(elements, w, samples)
+    plain = evaluate(elements, w, samples, kernel="plain")
+    assert vector.converged and plain.converged
+    np.testing.assert_allclose(vector.f, plain.f, rtol=0, atol=1e-10)
+    np.testing.assert_allclose(vector.dfdw, plain.dfdw, rtol=0, atol=1e-8)
+    np.testing.assert_allclose(vector.shares, plain.shares, rtol=0, atol=1e-12)
+
+
+def test_the_kernels_are_one_under_a_prescribed_load():
+    elements, w = random_case(11, 40, 3, 2)
+    load = elements.n0[:, None] + np.cos(2 * np.pi * np.arange(64) / 64 + np.arange(40)[:, None])
+    vector = evaluate(elements, w, 64, load=load)
+    plain = evaluate(elements, w, 64, load=load, kernel="plain")
+    np.testing.assert_allclose(vector.f, plain.f, rtol=0, atol=1e-10)
+    np.testing.assert_allclose(vector.dfdw, plain.dfdw, rtol=0, atol=1e-8)
+
+
+def test_an_unknown_kernel_is_refused():
+    with pytest.raises(InputError, match="expected one of vector, plain"):
+        evaluate(single(tangents=2), ellipse(1.0, 1.0), 64, kernel="fast")
+
+
 @pytest.mark.parametrize(("H", "samples"), [(1, 9), (2, 18), (5, 64), (7, 65), (9, 46)])
 def test_jacobian_for_any_number_of_harmonics_and_samples(H, samples):
     """Sums over time are folded and tiled: odd, even and fourfold numbers of samples; tiles up to 8

@@ -63,5 +63,7 @@ def test_best_load_of_each_value(field, texts, number, tmp_path):
     assert [f.name for f in files] == [
         *(f"{stem}.{kind}" for stem in ("study", "study_loads") for kind in ("csv", "md", "tex")),
         "study.png",
+        "report_study.html",
+        "report_study.md",
     ]
     assert all(f.stat().st_size > 100 for f in files)

@@ -5,10 +5,11 @@ by the next run.
 from __future__ import annotations
 
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, field, replace
 from functools import lru_cache, partial
+from html import escape
 from pathlib import Path
 from typing import Any
 
@@ -40,6 +41,7 @@ from ..modes.clamped_aerofoil import clamped_blade
 from ..modes.stress import Strength, strength
 from .assemble_model import LoadCase, joint_model
 from .contact_cycle import labels
+from .damped_motion import DampedStress, damped_stress
 from .liftoff import named
 from .linear_limits import Limit, linear_limits
 from .loads import Curve, default_loads, study_loads
@@ -89,7 +91,7 @@ class Seating:
     own: float | None = None
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, repr=False)
 class Response:
     """Forced responses and what they were made with."""
 
@@ -103,8 +105,15 @@ class Response:
         """Resonance without damper: [Hz], [m]."""
         return self.limits[0].peak_frequency, self.limits[0].peak_amplitude
 
+    def __repr__(self) -> str:
+        best = min(self.curves, key=lambda curve: curve.peak_amplitude)
+        return (
+            f"<bladefem response: {len(self.curves)} loads, smallest resonance "
+            f"{1e6 * best.peak_amplitude:.4g} µm under {best.load:g} N>"
+        )
 
-@dataclass(frozen=True)
+
+@dataclass(frozen=True, repr=False)
 class Run:
     """What a run has so far; stages after ``until`` are None."""
 
@@ -118,9 +127,32 @@ class Run:
     strength: Strength | None = None
     reduced: Reduced | None = None
     response: Response | None = None
+    # at the resonance of each curve, in their order
+    damped: list[DampedStress] | None = None
     # stage to seconds
     timings: dict[str, float] = field(default_factory=dict)
     messages: list[str] = field(default_factory=list)
+
+    def __repr__(self) -> str:
+        stages = [
+            name
+            for name in ("mesh", "modes", "contact", "reduced", "response")
+            if getattr(self, name) is not None
+        ]
+        where = "in memory" if self.folder is None else f"in '{self.folder}'"
+        return f"<bladefem run of '{self.scene.title}' {where}: {', '.join(stages)}>"
+
+    def _repr_html_(self) -> str:
+        """What a notebook shows: the stages and what they found."""
+        rows = {"scene": self.scene.title, "folder": self.folder, "mesh": self.mesh}
+        if self.modes is not None:
+            rows["modes"] = self.modes
+        if self.response is not None:
+            rows["response"] = self.response
+        cells = "".join(
+            f"<tr><th>{name}</th><td>{escape(str(value))}</td></tr>" for name, value in rows.items()
+        )
+        return f"<table>{cells}</table>"
 
 
 def run(
@@ -206,8 +238,37 @@ def run(
     if until == "reduction":
         return result
     family = partial(family_of_case, scene, mesh, reduced, list(patches))
-    return replace(
-        result, response=_response(scene, cases, family, settings, keep, clock, progress)
+    response = _response(scene, cases, family, settings, keep, clock, progress)
+    result = replace(result, response=response)
+    with clock("stresses"):
+        stressed = keep(
+            "damped_stress",
+            stage_key("stress", scene, [(c.load, c.mass, c.peak.f) for c in response.curves]),
+            lambda: _stresses(bodies, patches, result, cases),
+        )
+        clock.messages.append(_stress_sentence(response.curves, stressed))
+    return replace(result, damped=stressed)
+
+
+def _stresses(
+    bodies: Bodies, patches: Sequence[Patch], result: Run, cases: list[LoadCase]
+) -> list[DampedStress]:
+    """The stress at the resonance of each curve."""
+    return [
+        damped_stress(bodies, patches, result.modes, case, curve.peak, curve.settings.points)
+        for case, curve in zip(cases, result.response.curves, strict=True)
+    ]
+
+
+def _stress_sentence(curves: list[Curve], stressed: list[DampedStress]) -> str:
+    """The stress of the lowest resonance, and how far it can be trusted."""
+    best = min(range(len(curves)), key=lambda k: curves[k].peak_amplitude)
+    found = stressed[best]
+    place = ", ".join(f"{1e3 * x:.1f}" for x in found.place)
+    return (
+        f"alternating stress at the best load, {found.load:.4g} N: {1e-6 * found.largest:.4g} MPa "
+        f"at ({place}) mm, of all modes, harmonics and damper forces; by its mesh "
+        f"{found.mesh_error:.1%} uncertain there"
     )
 
 

@@ -2,9 +2,6 @@
 
 from __future__ import annotations
 
-import numpy as np
-
-from ...contact.interface_elements import seat_contact, stiffnesses
 from ...errors import InputError
 from ...scene.kinds import kind_named
 from ...scene.tables import Scene
@@ -24,7 +21,6 @@ def refuse_run(scene: Scene) -> None:
         check_loads(scene)
     if kind_named(scene.kind).has_seats:
         _refuse_own_load(scene)
-        _refuse_soft_seats(scene)
 
 
 def _refuse_own_load(scene: Scene) -> None:
@@ -35,18 +31,3 @@ def _refuse_own_load(scene: Scene) -> None:
             f"{show(scene.operation.speed, 'rad/s')}, expected a speed that does, or study.loads "
             "alone"
         )
-
-
-def _refuse_soft_seats(scene: Scene) -> None:
-    """A normal load that follows the motion needs a normal stiffness on each seat."""
-    if scene.contact.normal != "coupled" or scene.contact.stiffness == "map":
-        return
-    for patch, side in (("this", "right"), ("next", "left")):
-        # the ratio of the stiffnesses does not decide whether they are zero
-        _, normal = stiffnesses(seat_contact(scene.contact, patch), 1.0, np.ones(1))
-        if not normal[0] > 0:
-            raise InputError(
-                f"contact.kn_area: the normal stiffness of the {side} seat (kn, kn_area, or by "
-                "Mindlin from kt, kt_area) is 0, expected a positive value where contact.normal "
-                "is 'coupled'"
-            )
