@@ -25,7 +25,7 @@ from .solve import solve
 from .solver.fallback import match_harmonics
 from .solver.newton import DEFAULTS, Options
 
-__all__ = ["Branches", "Resonance", "find_branches"]
+__all__ = ["TOLERANCE", "Branches", "Resonance", "find_branches"]
 
 # first and longest arc-length step, as shares of the band
 STEPS = (0.005, 0.05)
@@ -37,6 +37,9 @@ LIMIT = 2000
 MOST_PATHS = 6
 # relative distance of displacements up to which a motion lies on a path, between two of its points
 SAME = 0.03
+# residual of points of a path, relative: a looser one lets a path go on beyond a fold, 17 % above
+# the peak at 2e-5
+TOLERANCE = 1e-9
 # frequencies of the band where motions off the paths are looked for
 PROBES = 7
 # refinements of one local maximum
@@ -107,9 +110,15 @@ def find_branches(
         known: solutions in the band, such as those of a sweep.
         peak: relative accuracy of each local maximum.
     """
+    options = replace(options, tolerance=min(options.tolerance, TOLERANCE))
     notes: list[str] = []
     paths: list[_Path] = []
-    solved = sorted((p for p in known if p.converged), key=lambda p: p.omega)
+    # points that stick may have been solved with fewer harmonics
+    solved = [
+        replace(p, harmonics=H, samples=samples, w=match_harmonics(p.w, H))
+        for p in sorted(known, key=lambda p: p.omega)
+        if p.converged
+    ]
     if not solved:
         return Branches((), (), ("no point of the band was solved",))
     budget = LIMIT

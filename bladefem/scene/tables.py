@@ -203,9 +203,9 @@ class Study:
         None, "Hz", 0.0, 1e6, "frequency band; from the free to the stuck resonance when left out"
     )
     stability: bool = quantity(
-        False,
-        help="also Floquet multipliers of the points of each curve, where normal loads "
-        "follow the motion",
+        True,
+        help="Floquet multipliers of the points of each curve, where normal loads follow the "
+        "motion: unstable ones are marked and are no resonance",
     )
 
 

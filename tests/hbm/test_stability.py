@@ -140,7 +140,7 @@ def test_a_wave_is_judged_on_the_blades_after_which_it_repeats():
         forces = (wave_of * force).ravel()
         moved = system.contact @ np.linalg.solve(Z, system.contact.T @ forces)
         shapes = sides[h].shapes[sides[h].ports["contact"]]
-        own = shapes / (sides[h].omega**2 - w**2 + 1j * w * sides[h].damping) @ shapes.conj().T
+        own = shapes / (sides[h].omega ** 2 - w**2 + 1j * w * sides[h].damping) @ shapes.conj().T
         np.testing.assert_allclose(moved, (wave_of * (own @ force)).ravel(), atol=1e-12)
     point = solve(wave, 1.3, 7, 256)
     assert point.converged

@@ -9,14 +9,16 @@ from dataclasses import replace
 
 import numpy as np
 
+from ...hbm.model import ReducedModel
 from ...hbm.solution import Solution
+from ...hbm.stability import UNSTABLE, stability_verdict
 from ...hbm.sweep import size
 from ...hbm.truncation_indicator import overtones
 from .family import Family, member
 from .indicators import richer
 from .settings import Settings
 
-__all__ = ["heights_of", "hidden", "peak_of", "watched"]
+__all__ = ["heights_of", "hidden", "lasting_peak", "peak_of", "watched"]
 
 # of the peak's height: where a curve is checked on each side beside the peak itself
 SHARES = (0.7, 0.25)
@@ -97,3 +99,13 @@ def heights_of(points: Sequence[Solution]) -> np.ndarray:
 def peak_of(points: Sequence[Solution]) -> Solution:
     """The highest converged point."""
     return max((p for p in points if p.converged), key=size)
+
+
+def lasting_peak(model: ReducedModel, points: Sequence[Solution]) -> Solution:
+    """The highest converged point that is not unstable; the highest of all where none is known to
+    be otherwise.
+    """
+    good = sorted((p for p in points if p.converged), key=size, reverse=True)
+    if model.directions == model.elements.tangents:
+        return good[0]
+    return next((p for p in good if stability_verdict(model, p).verdict != UNSTABLE), good[0])

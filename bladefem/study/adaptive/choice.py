@@ -16,7 +16,8 @@ from ...hbm.model import ReducedModel
 from ...hbm.solution import Solution
 from ...hbm.solver.newton import Options
 from ...hbm.sweep import size, sweep
-from .check_points import heights_of, hidden, peak_of, watched
+from .branch_choice import anchor_of, peak_error
+from .check_points import heights_of, hidden, lasting_peak, peak_of, watched
 from .family import Family, member, with_excited_harmonics
 from .indicators import Indicators, indicate, judge, moved
 from .settings import Settings, enriched
@@ -46,6 +47,8 @@ LIKELY = (
 # sweeps of one curve with ever richer settings
 PASSES = 3
 WIDENINGS = 4
+# factor by which the accuracy at a lower point is tightened at most, for a peak that is too wrong
+TIGHTER = 0.05
 
 
 @dataclass(frozen=True)
@@ -185,6 +188,8 @@ def adapted(
     settings = with_excited_harmonics(family, settings)
     if settings.chosen:
         rough = covered(member(family, settings).model, settings, band, mode, 1.0)
+        if any(p.branch for p in rough):
+            return _adapted_branches(family, settings, band, mode, accuracy, fixed, rough)
         settings, _, _ = choose(family, settings, peak_of(rough), accuracy, fixed)
         band = band or (rough[0].frequency, rough[-1].frequency)
     points: list[Solution] = []
@@ -214,6 +219,36 @@ def adapted(
             return Checked(replace(settings, error=errors[top.omega]), points, errors)
         settings = used
     return Checked(replace(settings, error=errors[top.omega]), points, errors)
+
+
+def _adapted_branches(
+    family: Family,
+    settings: Settings,
+    band: tuple[float, float] | None,
+    mode: int,
+    accuracy: float,
+    fixed: tuple[str, ...],
+    points: list[Solution],
+) -> Checked:
+    """The same where several motions were found: the error is that of the height of the highest
+    peak that is not unstable, wherever it lies.
+    """
+    widen = band is None
+    band = band or (points[0].frequency, points[-1].frequency)
+    demanded = accuracy
+    error = np.inf
+    for _ in range(PASSES):
+        top = lasting_peak(member(family, settings).model, points)
+        before = settings
+        settings, _, _ = choose(family, settings, anchor_of(points, top), demanded, fixed)
+        points = covered(member(family, settings).model, settings, band, mode, accuracy, widen)
+        top = lasting_peak(member(family, settings).model, points)
+        error = peak_error(family, settings, points, top)
+        alike = replace(settings, error=None) == replace(before, error=None)
+        if error <= accuracy / 2 or not np.isfinite(error) or (alike and demanded < accuracy):
+            break
+        demanded *= max(accuracy / 2 / error, TIGHTER)
+    return Checked(replace(settings, error=error), points, {top.omega: error})
 
 
 def _solvable(points: Sequence[Solution]) -> tuple[float, float] | None:

@@ -45,7 +45,7 @@ from .damped_motion import DampedStress, damped_stress
 from .liftoff import named
 from .linear_limits import Limit, linear_limits
 from .loads import Curve, default_loads, study_loads
-from .stability import stability_sentence
+from .stability import stability_sentence, unstable_sentence
 from .stage_inputs import stage_key
 from .stages import (
     Bodies,
@@ -479,6 +479,7 @@ def _remarks(scene: Scene, settings: Settings, curves: list[Curve], nodes: int) 
         )
     if scene.study.stability:
         remarks.append(method(stability_sentence([(c.stability, c.multiplier) for c in curves])))
+    remarks.extend(filter(None, map(unstable_sentence, curves)))
     halved = halved_sentence([c.load for c in curves], [c.halved for c in curves], scene.accuracy)
     if halved:
         remarks.append(warning(halved))

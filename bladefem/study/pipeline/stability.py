@@ -7,6 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
+from typing import Any
 
 import numpy as np
 
@@ -23,7 +24,15 @@ from ...hbm.stability import (
     stability_verdict,
 )
 
-__all__ = ["UNIQUE", "Stability", "in_one_body", "stability_of", "stability_sentence"]
+__all__ = [
+    "UNIQUE",
+    "UNSTABLE",
+    "Stability",
+    "in_one_body",
+    "stability_of",
+    "stability_sentence",
+    "unstable_sentence",
+]
 
 
 @dataclass(frozen=True)
@@ -112,3 +121,30 @@ def stability_sentence(parts: Sequence[tuple[np.ndarray, np.ndarray]]) -> str:
         f"stability: {counts[STABLE]} points stable, {counts[UNSTABLE]} unstable{worst}, "
         f"{counts[UNKNOWN]} not judged"
     )
+
+
+def unstable_sentence(curve: Any) -> str:
+    """What became of a resonance that is unstable, or "".
+
+    Args:
+        curve: a `bladefem.study.pipeline.loads.Curve`.
+    """
+    several = int(curve.branch.max(initial=0))
+    folded = (
+        f"load {curve.load:g} N: several motions at one frequency, the response has "
+        f"{several} pieces between folds"
+        if several > 1
+        else ""
+    )
+    top = curve.unstable_peak
+    if top is None:
+        return folded
+    at = int(np.flatnonzero(curve.frequency == top.frequency)[0])
+    named = f" ({curve.bifurcation[at]})" if curve.bifurcation[at] else ""
+    lost = (
+        f"load {curve.load:g} N: the highest motion, {1e6 * size(top):.4g} um at "
+        f"{top.frequency:.5g} Hz, is unstable{named}; the resonance given is the highest one that "
+        f"is not, {1e6 * curve.peak_amplitude:.4g} um at {curve.peak_frequency:.5g} Hz, and what "
+        "the blade does in between only a march in time tells"
+    )
+    return f"{folded}; {lost}" if folded else lost
