@@ -31,8 +31,10 @@ __all__ = ["TOLERANCE", "Branches", "Resonance", "find_branches"]
 STEPS = (0.005, 0.05)
 # steps with which a local maximum is closed in
 FINE = 1e-4
-# points of all paths of a band
-LIMIT = 2000
+# points of all paths of a band: so many times unknowns, within these bounds
+EFFORT = 3e5
+FEWEST = 300
+MOST = 1500
 # paths of a band beside those from its ends
 MOST_PATHS = 6
 # relative distance of displacements up to which a motion lies on a path, between two of its points
@@ -121,7 +123,8 @@ def find_branches(
     ]
     if not solved:
         return Branches((), (), ("no point of the band was solved",))
-    budget = LIMIT
+    limit = int(np.clip(EFFORT / (model.springs.size * (2 * H + 1)), FEWEST, MOST))
+    budget = limit
     further = _further(model, band, solved[0], H, samples, options)
     for start in chain(solved[:1], solved[-1:], solved, further):
         forward = start is not solved[-1]
@@ -134,7 +137,7 @@ def find_branches(
         budget -= len(path.points)
         paths.append(path)
     if budget <= 0:
-        notes.append(f"paths ended after {LIMIT} points: there may be further motions")
+        notes.append(f"paths ended after {limit} points: there may be further motions")
     for path in paths:
         _close_in(model, path, band, peak, options)
     return _sorted_out(paths, options.probe, notes)

@@ -29,6 +29,10 @@ STARTS = (0.9, 0.75, 0.5)
 STEPS = (0.003, 0.015)
 # points of that path
 LONGEST = 150
+# unknowns up to which the richer model's peak is followed; of larger ones points right below the
+# peak are compared
+FOLLOWED = 1200
+BELOW = (0.99, 0.95, 0.9, 0.75)
 # fall of the height by which its peak has been passed
 PASSED = 2e-3
 
@@ -44,6 +48,9 @@ def peak_error(
 ) -> float:
     """Relative error of a peak's height: against that of a model richer in every respect.
 
+    Large richer models are compared at the highest point below the peak at which they have the
+    same motion.
+
     Returns:
         infinite where the richer model's peak was not found.
     """
@@ -51,6 +58,8 @@ def peak_error(
     if rich == settings:
         return 0.0
     model = member(family, rich).model
+    if model.springs.size * (2 * rich.harmonics + 1) > FOLLOWED:
+        return _error_below(family, settings, points, top, rich)
     omegas = [p.omega for p in points]
     bounds = 0.9 * min(omegas), 1.1 * max(omegas)
     for share in STARTS:
@@ -77,4 +86,20 @@ def peak_error(
             continue
         if now < height:
             return float(abs(height - size(top)) / height)
+    return float(np.inf)
+
+
+def _error_below(
+    family: Family,
+    settings: Settings,
+    points: Sequence[Solution],
+    top: Solution,
+    rich: Settings,
+) -> float:
+    """Relative error of the height of a point right below the peak."""
+    for share in BELOW:
+        point = anchor_of(points, top, share)
+        better = moved(family, settings, point, rich, ENOUGH)
+        if better.converged:
+            return float(abs(size(better) - size(point)) / size(better))
     return float(np.inf)

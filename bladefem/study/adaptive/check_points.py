@@ -11,7 +11,7 @@ import numpy as np
 
 from ...hbm.model import ReducedModel
 from ...hbm.solution import Solution
-from ...hbm.stability import UNSTABLE, stability_verdict
+from ...hbm.stability import AFFORDABLE, UNSTABLE, stability_verdict
 from ...hbm.sweep import size
 from ...hbm.truncation_indicator import overtones
 from .family import Family, member
@@ -26,6 +26,8 @@ SHARES = (0.7, 0.25)
 LOUDEST = 3
 # from this share of the accuracy on
 QUIET = 0.1
+# highest points among which one that is not unstable is looked for
+JUDGED = 100
 
 
 def watched(
@@ -108,4 +110,7 @@ def lasting_peak(model: ReducedModel, points: Sequence[Solution]) -> Solution:
     good = sorted((p for p in points if p.converged), key=size, reverse=True)
     if model.directions == model.elements.tangents:
         return good[0]
-    return next((p for p in good if stability_verdict(model, p).verdict != UNSTABLE), good[0])
+    judged = (
+        p for p in good[:JUDGED] if stability_verdict(model, p, AFFORDABLE).verdict != UNSTABLE
+    )
+    return next(judged, good[0])

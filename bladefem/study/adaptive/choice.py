@@ -188,8 +188,6 @@ def adapted(
     settings = with_excited_harmonics(family, settings)
     if settings.chosen:
         rough = covered(member(family, settings).model, settings, band, mode, 1.0)
-        if any(p.branch for p in rough):
-            return _adapted_branches(family, settings, band, mode, accuracy, fixed, rough)
         settings, _, _ = choose(family, settings, peak_of(rough), accuracy, fixed)
         band = band or (rough[0].frequency, rough[-1].frequency)
     points: list[Solution] = []
@@ -200,6 +198,8 @@ def adapted(
             points = covered(model, settings, band, mode, accuracy, widen)
         else:
             points = _replaced(points, response_points(model, settings, inner, accuracy))
+        if settings.chosen and any(p.branch for p in points):
+            return _adapted_branches(family, settings, band, mode, accuracy, fixed, points)
         top = peak_of(points)
         used = settings
         errors = {}
@@ -236,18 +236,19 @@ def _adapted_branches(
     widen = band is None
     band = band or (points[0].frequency, points[-1].frequency)
     demanded = accuracy
-    error = np.inf
+    top = lasting_peak(member(family, settings).model, points)
+    error = peak_error(family, settings, points, top)
     for _ in range(PASSES):
-        top = lasting_peak(member(family, settings).model, points)
-        before = settings
+        if error <= accuracy / 2 or not np.isfinite(error):
+            break
+        demanded *= max(accuracy / 2 / error, TIGHTER)
+        before = replace(settings, error=None)
         settings, _, _ = choose(family, settings, anchor_of(points, top), demanded, fixed)
+        if replace(settings, error=None) == before:
+            continue
         points = covered(member(family, settings).model, settings, band, mode, accuracy, widen)
         top = lasting_peak(member(family, settings).model, points)
         error = peak_error(family, settings, points, top)
-        alike = replace(settings, error=None) == replace(before, error=None)
-        if error <= accuracy / 2 or not np.isfinite(error) or (alike and demanded < accuracy):
-            break
-        demanded *= max(accuracy / 2 / error, TIGHTER)
     return Checked(replace(settings, error=error), points, {top.omega: error})
 
 
@@ -360,6 +361,7 @@ def response_points(
         peak=min(accuracy / 10, 1e-2),
         curve=0.2 if accuracy >= 1 else 0.02,
         options=sufficient(accuracy),
+        paths=accuracy < 1,
     )
     points = sorted(swept, key=lambda s: s.omega)
     if any(p.branch for p in points):

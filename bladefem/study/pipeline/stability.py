@@ -35,6 +35,10 @@ __all__ = [
 ]
 
 
+# local maxima of a curve that are judged whatever that takes
+MAXIMA = 4
+
+
 @dataclass(frozen=True)
 class Stability:
     """Of each point of a curve."""
@@ -52,8 +56,7 @@ class Stability:
 def stability_of(model: ReducedModel, points: Sequence[Solution]) -> Stability:
     """Verdicts on solutions of the balance of one model, in the order of a curve."""
     found = [stability_verdict(model, point, AFFORDABLE) for point in points]
-    heights = np.array([size(p) if p.converged else 0.0 for p in points])
-    for i in _maxima(heights):
+    for i in _maxima(points):
         if found[i].verdict == UNKNOWN:
             found[i] = stability_verdict(model, points[i])
     reasons = [v.reason for v, p in zip(found, points, strict=True) if p.converged and v.reason]
@@ -65,11 +68,16 @@ def stability_of(model: ReducedModel, points: Sequence[Solution]) -> Stability:
     )
 
 
-def _maxima(heights: np.ndarray) -> list[int]:
-    """Numbers of the local maxima, the highest point among them."""
-    padded = np.concatenate([[0.0], heights, [0.0]])
-    inside = (heights > 0) & (heights >= padded[:-2]) & (heights >= padded[2:])
-    return [int(i) for i in np.flatnonzero(inside)]
+def _maxima(points: Sequence[Solution]) -> list[int]:
+    """Numbers of the local maxima along each piece of the curve, the highest MAXIMA of them."""
+    heights = np.array([size(p) if p.converged else 0.0 for p in points])
+    branch = np.array([p.branch for p in points])
+    found: list[int] = []
+    for number in np.unique(branch):
+        rows = np.flatnonzero((branch == number) & (heights > 0))
+        own = np.concatenate([[0.0], heights[rows], [0.0]])
+        found += rows[(own[1:-1] >= own[:-2]) & (own[1:-1] >= own[2:])].tolist()
+    return sorted(found, key=lambda i: -heights[i])[:MAXIMA]
 
 
 def in_one_body(model: ReducedModel) -> ReducedModel:
