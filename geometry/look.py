@@ -113,6 +113,7 @@ def look_at(file: str | Path) -> Look:
     outside = numbered_faces(raw)
     faces = tuple(_face(raw, outside, number) for number in range(outside.count))
     cut = _cut_faces(raw, outside, faces, float(np.ptp(box, axis=0).max()))
+    bore = None if cut is None else _bore(raw, outside, faces, cut)
     return Look(
         Path(file),
         raw,
@@ -124,8 +125,8 @@ def look_at(file: str | Path) -> Look:
         outside,
         faces,
         cut,
-        None if cut is None else _bore(raw, outside, faces, cut),
-        _missing(raw, cut),
+        bore,
+        _missing(raw, cut, bore),
     )
 
 
@@ -305,8 +306,10 @@ def _names_of(raw: RawMesh) -> set[str]:
     return {"_".join(name.lower().split()) for name in every}
 
 
-def _missing(raw: RawMesh, cut: CutFaces | None) -> tuple[str, ...]:
-    """Names of a run that no set of the file has."""
+def _missing(raw: RawMesh, cut: CutFaces | None, bore: str | None) -> tuple[str, ...]:
+    """What a run needs and neither a set of the file nor a guess provides."""
     there = _names_of(raw)
-    needed = {n: w for n, w in NEEDED.items() if n != "cyclic_low" or cut is not None}
-    return tuple(f"{name}: {words}" for name, words in needed.items() if name not in there)
+    if cut is not None:
+        there |= {"cyclic_low", "clamp"} if bore else {"cyclic_low"}
+    needed = [name for name in NEEDED if name not in there]
+    return tuple(f"{name}: {NEEDED[name]}" for name in needed)

@@ -12,6 +12,7 @@ from collections.abc import Sequence
 from contextlib import ExitStack
 
 from . import commands, ranks, study
+from .look import add_look, look
 
 __all__ = ["main", "parser"]
 
@@ -179,6 +180,15 @@ def parser() -> argparse.ArgumentParser:
         commands.info,
     )
     info.set_defaults(scene=None)
+    add_look(
+        _command(
+            subs,
+            "look",
+            "what a mesh file holds: bodies, sets, numbered faces, cut faces, a scene to start from",
+            "bladefem look sector.inp --view faces.png --scene sector.toml",
+            look,
+        )
+    )
     return top
 
 
