@@ -33,6 +33,20 @@ COLUMNS = {
     "frequency": Column("frequency", "Hz"),
     "engine_order": Column("engine order"),
     "amplitude": Column("amplitude", "m", "µm", 1e6),
+    "tuned_amplitude": Column("tuned wheel", "m", "µm", 1e6),
+    "highest_amplitude": Column("highest blade", "m", "µm", 1e6),
+    "highest_blade": Column("its number"),
+    "amplification": Column("over the tuned wheel", "1", digits=4),
+    "amplification_free": Column("the same without dampers", "1", digits=4),
+    "deviation": Column("deviation of frequency", "1", "%", 100.0, 3),
+    "blade": Column("blade"),
+    "wheels": Column("wheels"),
+    "worst": Column("worst wheel", "1", digits=4),
+    **{
+        f"p{share}{end}": Column(f"{share} %{title}", "1", digits=4)
+        for share in (50, 95, 99)
+        for end, title in (("", " of wheels below"), ("_low", " from"), ("_high", " to"))
+    },
     "mass": Column("damper mass", "kg", "g", 1e3),
     "peak_frequency": Column("resonance", "Hz"),
     "peak_amplitude": Column("resonance amplitude", "m", "µm", 1e6),

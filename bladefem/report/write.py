@@ -37,6 +37,7 @@ __all__ = ["SECTIONS", "Page", "inputs_hash", "write_report"]
 SECTIONS = {
     "answer": "Answer",
     "response": "Forced response",
+    "wheel": "Mistuned wheel",
     "contact": "Contact",
     "modes": "Modes",
     "mesh": "Mesh",

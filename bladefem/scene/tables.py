@@ -30,6 +30,7 @@ __all__ = [
     "Imported",
     "Material",
     "Materials",
+    "Mistuning",
     "Model",
     "Operation",
     "Scene",
@@ -236,6 +237,41 @@ class Study:
 
 
 @dataclass(frozen=True)
+class Mistuning:
+    """Blades that are not alike: a measured pattern, or a scatter; of wheels with all sectors."""
+
+    pattern: str | None = quantity(
+        None,
+        help="CSV file of relative deviations of blade-alone frequencies, one row a blade, one "
+        "column a family; relative to the scene file",
+    )
+    scatter: float | None = quantity(
+        None,
+        "1",
+        0.0,
+        0.3,
+        "relative standard deviation of the blade-alone frequencies; draws the pattern of a run "
+        "without a file, and those of 'bladefem scatter'",
+    )
+    friction: float = quantity(
+        0.0, "1", 0.0, 0.3, "relative standard deviation of the dampers' friction coefficients"
+    )
+    stiffness: float = quantity(
+        0.0, "1", 0.0, 0.3, "relative standard deviation of the dampers' contact stiffnesses"
+    )
+    load: float = quantity(
+        0.0, "1", 0.0, 0.3, "relative standard deviation of the dampers' normal loads"
+    )
+    seed: int = quantity(0, "1", 0, 1000000, "of the draws")
+    wheels: int = quantity(30, "1", 2, 100000, "drawn by 'bladefem scatter' for each load")
+    families: int = quantity(3, "1", 1, 10, "blade-alone modes that deviate")
+    orders: tuple[str, ...] | None = quantity(
+        None,
+        help="further engine orders, multiples of the first, as texts like '18: 0.3 N; 90 deg'",
+    )
+
+
+@dataclass(frozen=True)
 class Model:
     """Numerical settings. None: chosen by error indicators so that the answer keeps the scene's
     accuracy.
@@ -395,5 +431,6 @@ class Scene:
     operation: Operation = field(default_factory=Operation)
     excitation: Excitation = field(default_factory=Excitation)
     study: Study = field(default_factory=Study)
+    mistuning: Mistuning = field(default_factory=Mistuning)
     model: Model = field(default_factory=Model)
     solver: Solver = field(default_factory=Solver)

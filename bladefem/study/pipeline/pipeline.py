@@ -128,6 +128,8 @@ class Run:
     strength: Strength | None = None
     reduced: Reduced | None = None
     response: Response | None = None
+    # study.mistuning.pattern_response.PatternResponse of each load; None where all blades are alike
+    wheel: list[Any] | None = None
     # at the resonance of each curve, in their order
     damped: list[DampedStress] | None = None
     # stage to seconds

@@ -327,20 +327,25 @@ def harmonic_diameters(scene: Scene, mesh: Mesh, harmonics: int) -> list[int]:
 
 
 def reduce_sector(
-    bodies: Bodies, patches: list[Patch], diameters: Sequence[int], modes: int
+    bodies: Bodies,
+    patches: list[Patch],
+    diameters: Sequence[int],
+    modes: int,
+    readings: np.ndarray | None = None,
 ) -> Reduced:
     """Blade side in each nodal diameter and damper side, at the contact, load and probe ports.
 
     Args:
         patches: "this" and "next".
         modes: modes kept in each nodal diameter.
+        readings: (n_points*dim, q) columns of the port "blade", where blades are to be mistuned.
     """
     from ...fem.loads import mass
     from ...fem.ports import port_model
 
     scene = bodies.scene
     mesh = bodies.mesh
-    ports = blade_ports(mesh, patches, scene.excitation)
+    ports = blade_ports(mesh, patches, scene.excitation, readings)
     other = damper_ports(mesh, patches)
     solver = eigensolver(scene)
     if is_wheel(mesh):
