@@ -144,6 +144,15 @@ class Contact:
         choices=("coupled", "prescribed"),
         help="normal load follows the motion, or stays at its static value",
     )
+    history: str | tuple[float, ...] = quantity(
+        "frictionless",
+        "rad/s",
+        0.0,
+        1e5,
+        choices=("frictionless", "spin-up"),
+        help="how the damper came to its seats: without friction; by spinning up from rest with "
+        "it; or through a list of speeds from rest, at last operation.speed",
+    )
     crown: float | None = quantity(
         None, "m", 1e-3, 1e4, "radius of crowned seats along the engine axis; flat when left out"
     )
