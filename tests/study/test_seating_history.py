@@ -77,9 +77,7 @@ def test_flat_seats_are_loaded_alike_with_and_without_friction(seated):
 def test_elements_carry_what_the_seating_left_and_rest_there(seated):
     _, spun = seated
     maps = spun.contact.maps[50.0]
-    elements, _ = friction_elements(
-        spun.contact.problem, maps, spun.scene.contact, 0.8, tangents=1
-    )
+    elements, _ = friction_elements(spun.contact.problem, maps, spun.scene.contact, 0.8, tangents=1)
     assert elements.t0 == pytest.approx(np.vstack([m.traction for m in maps]))
     limit = elements.mu * np.maximum(elements.n0, 0.0)
     assert (np.abs(elements.t0[:, 0]) <= limit * (1 + 1e-7) + 1e-9).all()
