@@ -42,8 +42,8 @@ FINER = 4
 CLOSE = 0.003
 # operations of one verdict above which only those are made that are asked for, some 0.3 s
 AFFORDABLE = 2e9
-# and above which none are made, some 20 s
-LARGEST = 1e11
+# and above which none are made, some 10 s
+LARGEST = 3e10
 # angle of a multiplier to the real axis up to which it is real
 REAL = 1e-3
 

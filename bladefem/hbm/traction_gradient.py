@@ -24,7 +24,7 @@ from .linear.condensation import condense, with_springs
 from .model import ReducedModel
 from .node_gradients import size_by_force, transposed_flexibility
 from .solution import Solution
-from .solver.residual import Balance, adjoint, evaluate_balance
+from .solver.residual import Balance, adjoint_inverse, evaluate_balance
 
 __all__ = ["Tractions", "farthest", "tractions"]
 
@@ -183,6 +183,6 @@ def _gradient(
     state = replace(state, forces=replace(state.forces, dfdw=dfdw))
     by_force = size_by_force(model, solution, probe)
     by_motion = dfdw.reshape(n, d * K, d * K).swapaxes(1, 2) @ by_force.reshape(n, d * K, 1)
-    back = adjoint(balance, state)(by_motion.reshape(n, d, K), 1e-9)
+    back = adjoint_inverse(balance, state)(by_motion.reshape(n, d, K), 1e-9)
     weight = by_force - transposed_flexibility(balance.linear.A, back)
     return weight[:, first:, 0]

@@ -117,7 +117,8 @@ def draw_curve(ax: Any, curve: pd.DataFrame, load: float, colour: Any) -> None:
     amplitude = np.where(good, MICRO * curve["amplitude"], np.nan)
     style = {0.0: "--", np.inf: ":"}.get(load, "-")
     label = load_name(load)
-    for piece, unstable in pieces_of(curve):
+    # stable pieces first: the legend shows their line
+    for piece, unstable in sorted(pieces_of(curve), key=lambda part: part[1]):
         line = "--" if unstable else style
         ax.plot(*between(frequency[piece], amplitude[piece]), line, color=colour, label=label)
         label = "_nolegend_"
@@ -273,6 +274,26 @@ def draw_optimum_curve(axes: Any, table: pd.DataFrame, colour: str, label: str |
     finite = table[(table["load"] > 0) & np.isfinite(table["load"])].sort_values("load")
     amplitude = MICRO * finite["peak_amplitude"]
     axes[0].plot(finite["load"], amplitude, "o-", color=colour, label=label)
+    if "lowest" in finite and finite["lowest"].notna().any():
+        sure = finite["interval"] != "sampled"
+        axes[0].fill_between(
+            finite["load"],
+            MICRO * finite["lowest"],
+            MICRO * finite["highest"],
+            color=colour,
+            alpha=0.22,
+            lw=0,
+            label="range by loading history" + ("" if sure.all() else " (hollow: sampled)"),
+        )
+        for name in ("lowest", "highest"):
+            axes[0].plot(
+                finite["load"][~sure],
+                MICRO * finite[name][~sure],
+                "o",
+                mfc="none",
+                mec=colour,
+                ms=4,
+            )
     axes[1].plot(finite["load"], finite["peak_frequency"], "o-", color=colour)
     doubtful = (
         finite["unconverged"] > 0

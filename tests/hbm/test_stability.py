@@ -17,7 +17,7 @@ from bladefem.hbm.solve import solve
 from bladefem.hbm.stability import STABLE, UNIQUE, UNKNOWN, UNSTABLE, stability_verdict
 from bladefem.hbm.time_model import time_system
 from bladefem.reduction.matrices import port_model_from_matrices
-from bladefem.time.shooting import multipliers, periodic
+from bladefem.time.shooting import floquet_multipliers, periodic_solution
 
 HZ = 2 * np.pi
 
@@ -40,8 +40,8 @@ def test_multipliers_are_those_of_the_event_exact_flow():
         told.append(found.verdict)
         if point.states["stick"] == len(point.w):
             continue
-        shot = periodic(system, point.omega, state_of(point, system), most=8)
-        exact = float(abs(multipliers(shot)).max())
+        shot = periodic_solution(system, point.omega, state_of(point, system), most=8)
+        exact = float(abs(floquet_multipliers(shot)).max())
         # sliders that never move have exactly one, and are left out here
         if shot.residual < 1e-6 and abs(exact - 1) > 1e-6:
             errors.append(abs(found.multiplier - exact))

@@ -13,7 +13,7 @@ from ...hbm.model import ReducedModel
 from ...hbm.solution import Solution
 from ...hbm.stability import AFFORDABLE, UNSTABLE, stability_verdict
 from ...hbm.sweep import size
-from ...hbm.truncation_indicator import overtones
+from ...hbm.truncation_indicator import truncation_indicator
 from .family import Family, member
 from .indicators import richer
 from .settings import Settings
@@ -89,7 +89,7 @@ def hidden(family: Family, used: Sequence[Settings], points: Sequence[Solution])
         more = richer(family, settings, "harmonics")
         if more.harmonics > harmonics:
             model = member(family, replace(more, modes=max(settings.modes, family.modes))).model
-            moved[found] = overtones(model, [points[i] for i in found], more.harmonics)
+            moved[found] = truncation_indicator(model, [points[i] for i in found], more.harmonics)
     return moved
 
 

@@ -121,8 +121,8 @@ def stability_sentence(parts: Sequence[tuple[np.ndarray, np.ndarray]]) -> str:
         )
     if counts[UNKNOWN] == len(verdict):
         return (
-            "stability is unknown: no point could be judged (it takes Coulomb's law, and a wave "
-            "that repeats after few blades)"
+            "stability is unknown: no point could be judged (it takes Coulomb's law, a wave "
+            "that repeats after few blades, and not too many contact nodes that slip)"
         )
     worst = f" (largest Floquet multiplier {np.nanmax(largest):.4g})" if counts[UNSTABLE] else ""
     return (

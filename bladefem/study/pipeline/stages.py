@@ -38,6 +38,7 @@ __all__ = [
     "is_wheel",
     "on_layer",
     "reduce_sector",
+    "seat_clearance",
     "seat_damper",
     "wheel_modes",
 ]
@@ -218,13 +219,20 @@ def find_modes(
 
     if not is_wheel(bodies.mesh):
         flex = bodies.factorised(0)
-        return [modes(flex.con, count, flex)]
+        return [modes(flex.con, count, flex, solver=eigensolver(bodies.scene))]
     wanted = (
         diameters
         or bodies.scene.model.nodal_diameters
         or harmonic_diameters(bodies.scene, bodies.mesh, 3)
     )
     return wheel_modes(bodies, count, wanted)
+
+
+def eigensolver(scene: Scene) -> Any:
+    """fem.eigensolver.Eigensolver that the scene asks for."""
+    from ...fem.eigensolver import Eigensolver
+
+    return Eigensolver(scene.solver.eigensolver, scene.solver.vectors, scene.solver.petsc)
 
 
 def excited_modes(scene: Scene, mesh: Mesh, modes: Sequence[ModeSet]) -> ModeSet:
@@ -258,15 +266,23 @@ def wheel_modes(
     comm = bodies.comm or MPI.COMM_WORLD
     mesh = bodies.mesh
     wanted = list(range(mesh.sector.count // 2 + 1)) if diameters is None else list(diameters)
+    solver = eigensolver(bodies.scene)
     if comm.size == 1 or len(wanted) == 1:
-        return all_diameters(bodies.frame, count, wanted, direct, progress=bodies.progress)
+        return all_diameters(
+            bodies.frame, count, wanted, direct, progress=bodies.progress, solver=solver
+        )
     size = group or group_size(comm, mesh.dimension * len(np.unique(mesh.bodies["blade"])))
     return shared_out(
         comm,
         wanted,
         size,
         lambda part, some: all_diameters(
-            Bodies(bodies.scene, mesh, part).frame, count, some, direct, progress=bodies.progress
+            Bodies(bodies.scene, mesh, part).frame,
+            count,
+            some,
+            direct,
+            progress=bodies.progress,
+            solver=solver,
         ),
     )
 
@@ -289,15 +305,20 @@ def on_layer(scene: Scene, problem: Any) -> Any:
 
 def condense_contact(bodies: Bodies, patches: list[Patch]) -> Any:
     """The contact problem of rigid faces: all that takes finite elements."""
-    from ...contact.face_profile import seat_gap
     from ...contact.seating import contact_problem
+
+    gap = seat_clearance(bodies, patches)
+    return contact_problem(bodies.mesh, patches, bodies.still, bodies.damper, gap)
+
+
+def seat_clearance(bodies: Bodies, patches: list[Patch]) -> np.ndarray:
+    """(n,) gap of the seats beside that of the mesh: their shape, and the clearance [m]."""
+    from ...contact.face_profile import seat_gap
 
     scene = bodies.scene
     gap = np.concatenate([seat_gap(patch, bodies.mesh, scene.contact) for patch in patches])
     # a wedge that was drawn here has its clearance in the mesh
-    if scene.kind == "imported":
-        gap = gap + scene.damper.clearance
-    return contact_problem(bodies.mesh, patches, bodies.still, bodies.damper, gap)
+    return gap + scene.damper.clearance if scene.kind == "imported" else gap
 
 
 def harmonic_diameters(scene: Scene, mesh: Mesh, harmonics: int) -> list[int]:
@@ -312,30 +333,43 @@ def harmonic_diameters(scene: Scene, mesh: Mesh, harmonics: int) -> list[int]:
 
 
 def reduce_sector(
-    bodies: Bodies, patches: list[Patch], diameters: Sequence[int], modes: int
+    bodies: Bodies,
+    patches: list[Patch],
+    diameters: Sequence[int],
+    modes: int,
+    readings: np.ndarray | None = None,
 ) -> Reduced:
     """Blade side in each nodal diameter and damper side, at the contact, load and probe ports.
 
     Args:
         patches: "this" and "next".
         modes: modes kept in each nodal diameter.
+        readings: (n_points*dim, q) columns of the port "blade", where blades are to be mistuned.
     """
     from ...fem.loads import mass
-    from ...fem.ports import port_model, port_models
+    from ...fem.ports import port_model
 
     scene = bodies.scene
     mesh = bodies.mesh
-    ports = blade_ports(mesh, patches, scene.excitation)
+    ports = blade_ports(mesh, patches, scene.excitation, readings)
     other = damper_ports(mesh, patches)
-    kind = scene.model.reduction
+    solver = eigensolver(scene)
     if is_wheel(mesh):
-        solved = port_models(bodies.frame, ports.matrix, ports.names, modes, diameters, kind=kind)
-        sector = dict(bodies.progress(solved, "nodal diameters", len(diameters)))
+        sector = _reduced_diameters(bodies, ports, modes, diameters)
     else:
         flex = bodies.factorised(0)
-        sector = {0: port_model(flex.con, ports.matrix, ports.names, modes, kind=kind, flex=flex)}
+        kind = scene.model.reduction
+        model = port_model(
+            flex.con, ports.matrix, ports.names, modes, kind=kind, flex=flex, solver=solver
+        )
+        sector = {0: model}
     floating = port_model(
-        bodies.damper.con, other.matrix, other.names, DAMPER_MODES, flex=bodies.damper
+        bodies.damper.con,
+        other.matrix,
+        other.names,
+        DAMPER_MODES,
+        flex=bodies.damper,
+        solver=solver,
     )
     first = len(patches[0].area) * mesh.dimension
     return Reduced(
@@ -345,6 +379,42 @@ def reduce_sector(
         mesh.sector.count if is_wheel(mesh) else 0,
         mass(bodies.damper.con.body),
     )
+
+
+def _reduced_diameters(
+    bodies: Bodies, ports: Any, modes: int, diameters: Sequence[int]
+) -> dict[int, PortModel]:
+    """The blade side in each nodal diameter; groups of ranks share them out."""
+    from ...fem.compat import MPI
+    from ...fem.groups import group_size, shared_out
+    from ...fem.ports import port_models
+
+    scene = bodies.scene
+    solver = eigensolver(scene)
+    comm = bodies.comm or MPI.COMM_WORLD
+
+    def solved(some_bodies: Bodies, some: Sequence[int]) -> dict[int, PortModel]:
+        steps = port_models(
+            some_bodies.frame,
+            ports.matrix,
+            ports.names,
+            modes,
+            some,
+            kind=scene.model.reduction,
+            solver=solver,
+        )
+        return dict(bodies.progress(steps, "nodal diameters", len(some)))
+
+    wanted = sorted(set(diameters))
+    if comm.size == 1 or len(wanted) == 1:
+        return solved(bodies, wanted)
+
+    def of_group(part: Any, some: list[int]) -> list[PortModel]:
+        models = solved(Bodies(scene, bodies.mesh, part), some)
+        return [models[n] for n in some]
+
+    size = group_size(comm, bodies.mesh.dimension * len(np.unique(bodies.mesh.bodies["blade"])))
+    return dict(zip(wanted, shared_out(comm, wanted, size, of_group), strict=True))
 
 
 def blade_parts(scene: Scene, mesh: Mesh) -> tuple[Mesh, dict[str, Material]]:
