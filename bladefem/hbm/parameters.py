@@ -13,7 +13,7 @@ from ..data import Elements, PortModel, RigidBody
 from ..errors import InputError, suggestion
 from .model import Damping, ReducedModel
 
-__all__ = ["PARAMETERS", "check_parameter", "path_coordinate", "parameter_value", "vary"]
+__all__ = ["PARAMETERS", "check_parameter", "parameter_value", "path_coordinate", "vary"]
 
 
 def _changing_elements(

@@ -15,9 +15,9 @@ __all__ = [
     "Work",
     "at_probes",
     "blade_motion",
+    "period_works",
     "probe_motion",
     "size",
-    "period_works",
     "works_of",
 ]
 

@@ -19,7 +19,7 @@ from ...friction.aft import Forces, evaluate
 from ...friction.energy import free_static_force
 from ...friction.equivalent_linear import Approximation, by_harmonic, from_harmonics, work_of
 from ...friction.fourier import synthesis
-from ...friction.law import select_elements
+from ...friction.law_table import select_elements
 from ..adaptive.family import joined
 from .assemble_model import LoadCase
 from .loads import Curve
