@@ -29,6 +29,19 @@ def contact_problems(scene: Scene) -> Iterator[str]:
                         "map, expected only one of the two"
                     )
     yield from _interval(scene)
+    if contact.stiffness == "rigid":
+        for name, side in {"contact": contact, **sides}.items():
+            for key in ("kt_area", "kt", "kn_area", "kn"):
+                if getattr(side, key) is not None:
+                    yield (
+                        f"{name}.{key}: contact.stiffness = 'rigid' has no interface layer, "
+                        "expected only one of the two"
+                    )
+    if contact.stiffness != "given" and contact.stiffening is not None:
+        yield (
+            f"contact.stiffening: contact.stiffness = '{contact.stiffness}' has no layer that "
+            "could stiffen, expected contact.stiffness = 'given' beside it"
+        )
     shaped = [key for key in SHAPE if getattr(contact, key) is not None]
     if shaped and contact.bedded:
         yield (
