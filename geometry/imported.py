@@ -28,7 +28,8 @@ from .joined_files import joined_files
 from .matching import match, snap
 from .mesh import Mesh, Pair, Sector
 from .named_facets import named_facets
-from .parameters import MeshSize
+from .numbered_faces import face_corners, numbered_faces
+from .parameters import MeshSize, Wedge
 from .profile import turn
 from .quality import report, straighten
 from .raw_mesh import RawMesh, read_raw
@@ -54,21 +55,32 @@ FLIPPED = {
 Axis = np.ndarray | tuple[float, float, float]
 
 
-def read_geometry(imported: Any, size: MeshSize) -> Mesh:
+def read_geometry(imported: Any, size: MeshSize, wedge: Wedge) -> Mesh:
     """The mesh of a scene's [imported] table: STEP files are meshed, mesh files are read.
 
     Args:
-        imported: has file, more, scale, sectors, axis, names, linear and tolerance.
+        imported: has file, more, scale, sectors, axis, names, linear, tolerance, seats and
+            seat_width.
+        wedge: the damper to draw between the faces ``seats`` of a STEP file, where they are named.
 
     Raises:
         InputError: the file, its groups or its periodicity are not usable; one sentence.
     """
     axis = np.asarray(imported.axis, dtype=float)
     if Path(imported.file).suffix.lower() in (".step", ".stp"):
-        from .step_file import read_step
+        from .step_file import FittedDamper, read_step
 
+        fitted = None
+        if imported.seats is not None:
+            fitted = FittedDamper(imported.seats, wedge, imported.seat_width)
         return read_step(
-            imported.file, size, imported.scale, imported.sectors, axis, imported.names or ()
+            imported.file,
+            size,
+            imported.scale,
+            imported.sectors,
+            axis,
+            imported.names or (),
+            fitted,
         )
     return read_mesh(
         imported.file,
@@ -110,8 +122,22 @@ def read_mesh(
     raw = joined_files(read_raw(Path(file)), more)
     wanted = read_names(names)
     if wanted:
-        raw = renamed_raw(raw, wanted)
+        raw = renamed_raw(_with_numbered_faces(raw, wanted), wanted)
     return mesh_of_raw(raw, scale, sectors, axis, str(file), linear, tolerance, frozenset(wanted))
+
+
+def _with_numbered_faces(raw: RawMesh, wanted: dict[str, list[str]]) -> RawMesh:
+    """Faces that are named by their numbers, see numbered_faces.py, as surfaces of the file."""
+    there = {name.lower() for name in (*raw.groups, *raw.node_sets, *raw.surfaces)}
+    asked = {old.lower() for olds in wanted.values() for old in olds} - there
+    numbers = {int(old[5:]) for old in asked if old.startswith("face_") and old[5:].isdigit()}
+    if not numbers:
+        return raw
+    faces = numbered_faces(raw)
+    found = {
+        f"face_{n}": face_corners(faces, n - 1) for n in sorted(numbers) if 0 < n <= faces.count
+    }
+    return replace(raw, surfaces={**raw.surfaces, **found})
 
 
 def mesh_of_raw(
