@@ -121,6 +121,7 @@ def sweep(
     curve: float = 0.02,
     options: Options = DEFAULTS,
     notes: list[str] | None = None,
+    paths: bool = True,
 ) -> Iterator[Solution]:
     """Solve a band of circular frequencies [rad/s]; points come in the order of need, to be sorted
     by `omega`.
@@ -140,6 +141,7 @@ def sweep(
         curve: how far, as a share of the highest maximum, a point may lie off the line through its
             neighbours.
         notes: takes what the search could not do, in sentences.
+        paths: whether the response is followed round folds; otherwise one motion is looked for.
 
     Raises:
         InputError: the band is empty or not positive.
@@ -157,7 +159,7 @@ def sweep(
     for solution in response(model, first_look(model, band), H, samples, options=options):
         solved[solution.omega] = solution
         yield solution
-    while not _needs_continuation(model, solved, H, options.probe):
+    while not (paths and _needs_continuation(model, solved, H, options.probe)):
         wanted = _next_frequency(solved, slope, (peak, curve), options.probe)
         if wanted is None:
             return
@@ -166,7 +168,7 @@ def sweep(
                 f"the sweep ended after {BAND_LIMIT} points: peaks may be higher by more than "
                 "the accuracy"
             )
-            if not _normal_loads_follow(model):
+            if not (paths and _normal_loads_follow(model)):
                 return
             break
         near = sorted(

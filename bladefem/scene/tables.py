@@ -240,9 +240,9 @@ class Study:
         "history may have left in contact points that never slip",
     )
     stability: bool = quantity(
-        False,
-        help="also Floquet multipliers of the points of each curve, where normal loads "
-        "follow the motion",
+        True,
+        help="Floquet multipliers of the points of each curve, where normal loads follow the "
+        "motion: unstable ones are marked and are no resonance",
     )
 
 

@@ -58,7 +58,7 @@ from .liftoff import named
 from .linear_limits import Limit, linear_limits
 from .load_interval import interval_sentence
 from .loads import Curve, default_loads, study_loads
-from .stability import stability_sentence
+from .stability import stability_sentence, unstable_sentence
 from .stage_inputs import stage_key
 from .stages import (
     Bodies,
@@ -524,6 +524,7 @@ def _remarks(scene: Scene, settings: Settings, curves: list[Curve], nodes: int) 
         )
     if scene.study.stability:
         remarks.append(method(stability_sentence([(c.stability, c.multiplier) for c in curves])))
+    remarks.extend(warning(text) for text in map(unstable_sentence, curves) if text)
     intervals = [c.interval for c in curves if c.interval is not None]
     if intervals:
         remarks.append(interval_sentence([c.load for c in curves], intervals))
