@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from bladefem.contact.numerical_stiffness import physical_stiffness, split_stiffness
-from bladefem.data import Elements, Patch, PressureMap, RigidBody
+from bladefem.data import Elements, Patch, PressureMap
 from bladefem.hbm.model import ReducedModel, in_series
 from bladefem.hbm.parameters import vary
 from bladefem.hbm.sensitivity import sensitivities
