@@ -135,6 +135,7 @@ def coarsened(model: ReducedModel, groups: np.ndarray) -> ReducedModel:
         elements=elements,
         damper=damper,
         normal=normal,
+        series=None if model.series is None else pick**2 @ model.series,
         start=None if model.start is None else _totals(model.start, groups),
     )
 

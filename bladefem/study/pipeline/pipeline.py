@@ -19,6 +19,7 @@ from geometry.mesh import Mesh
 
 from ...contact.frictional_seating import FrictionalProblem, normal_part
 from ...contact.interface_elements import friction_elements, pair_ratio
+from ...contact.numerical_stiffness import numerical_stiffness, split_stiffness
 from ...contact.peak_pressure import peak_remarks
 from ...contact.seating import ContactProblem
 from ...contact.seating import solve as seat
@@ -575,7 +576,9 @@ def _load_case(
     elements, selection = friction_elements(
         contact.problem, contact.maps[load], scene.contact, ratio, mesh.dimension - 1
     )
-    return LoadCase(load, elements, selection, mass)
+    limit = numerical_stiffness(contact.problem)
+    elements, series = split_stiffness(elements, contact.maps[load], scene.contact, limit)
+    return LoadCase(load, elements, selection, mass, series)
 
 
 def check_blade(scene: Scene, mesh: Mesh) -> None:
