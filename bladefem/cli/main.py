@@ -12,6 +12,7 @@ from collections.abc import Sequence
 from contextlib import ExitStack
 
 from . import commands, ranks, scatter, study
+from .look import add_look, look
 
 __all__ = ["main", "parser"]
 
@@ -66,8 +67,11 @@ _COMMANDS = {
         commands.response,
     ),
     "study": (
-        "the same for several values of one parameter, side by side",
-        "bladefem study scenes/wedge.toml --vary damper.angle='30, 40, 50 deg'",
+        "the same for several values of one or two parameters, or for scattered ones",
+        "bladefem study scenes/wedge.toml --vary damper.angle='30, 40, 50 deg'\n"
+        "  bladefem study scenes/wedge.toml --vary damper.angle='50, 60 deg' --vary "
+        "contact.mu='0.2, 0.3'\n"
+        "  bladefem study scenes/wedge.toml --scatter contact.mu='0.2, 0.4' --samples 16",
         study.study,
     ),
     "scatter": (
@@ -152,12 +156,7 @@ def parser() -> argparse.ArgumentParser:
             "--pdf", action="store_true", help="also print the report as PDF, by Chromium"
         )
     _modes_arguments(subs.choices["modes"])
-    subs.choices["study"].add_argument(
-        "--vary",
-        required=True,
-        metavar="KEY=VALUES",
-        help="field and its values, such as damper.angle='30, 40, 50 deg'",
-    )
+    study.add_study(subs.choices["study"])
     subs.choices["chart"].add_argument(
         "--budget",
         type=float,
@@ -184,6 +183,15 @@ def parser() -> argparse.ArgumentParser:
         commands.info,
     )
     info.set_defaults(scene=None)
+    add_look(
+        _command(
+            subs,
+            "look",
+            "what a mesh file holds: bodies, sets, numbered faces, cut faces, a scene to start from",
+            "bladefem look sector.inp --view faces.png --scene sector.toml",
+            look,
+        )
+    )
     return top
 
 

@@ -28,12 +28,14 @@ from ..fem.flexibility import Flexibility
 from ..fem.loads import centrifugal, mass
 from .interface_law import InterfaceLaw, closure_of, compliance_at
 from .patch import initial_gap, port_matrix
-from .seating import condense_body, rigid_and_load, spin_axis
+from .seating import ContactProblem, condense_body, rigid_and_load, spin_axis
 
 __all__ = [
+    "STEPPED",
     "FrictionalProblem",
     "FrictionalSeating",
     "frictional_problem",
+    "normal_part",
     "seat_with_friction",
 ]
 
@@ -135,6 +137,21 @@ def frictional_problem(
     gap = np.concatenate([initial_gap(p, mesh) for p in patches]) + clearance
     return FrictionalProblem(
         tuple(patches), C + C_damper, gap, -blade_swell, damper_swell, rigid, load, mass(body)
+    )
+
+
+def normal_part(problem: FrictionalProblem) -> ContactProblem:
+    """The frictionless problem of the same bodies."""
+    d = len(problem.flexibility) // len(problem.clearance)
+    return ContactProblem(
+        problem.patches,
+        problem.flexibility[::d, ::d],
+        problem.clearance,
+        problem.blade_swell[::d],
+        problem.damper_swell[::d],
+        problem.rigid[::d],
+        problem.load,
+        problem.mass,
     )
 
 

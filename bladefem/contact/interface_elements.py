@@ -20,6 +20,7 @@ __all__ = [
     "aggregation",
     "friction_elements",
     "interface_law",
+    "layer_friction",
     "layered",
     "mapped_stiffness",
     "mindlin_ratio",
@@ -28,6 +29,10 @@ __all__ = [
     "seat_contact",
     "stiffnesses",
 ]
+
+# stiffness for each unit of area that stands for rigid faces in the elements [N/m^3]: a layer of
+# 1e-8 of the compliance of steel over a millimetre
+RIGID = 1e22
 
 # tangential stiffness for each unit of area where the scene tells none [N/m^3]
 USUAL = 4e10
@@ -75,6 +80,8 @@ def stiffnesses(
         area: (n,) what each point stands for [m^2]; totals are shared by it.
         mapped: (n,) k_n from the pressure map, in place of a given one.
     """
+    if contact.stiffness == "rigid":
+        return RIGID * area, RIGID * area
     kt = _shared(contact.kt, contact.kt_area, area)
     kn = _shared(contact.kn, contact.kn_area, area)
     kn = kn if mapped is None else mapped
@@ -86,18 +93,32 @@ def stiffnesses(
 def interface_law(patches: Sequence[Patch], contact: Contact, ratio: float) -> InterfaceLaw:
     """The interface law of all nodes of some patches, one patch after the other.
 
-    Rigid faces where ``contact.stiffness`` is "map": the paper's Eq. 23 takes the stiffness of the
-    elements from the pressure between rigid faces, after the seating.
+    Rigid faces where ``contact.stiffness`` is "rigid", and where it is "map": the paper's Eq. 23
+    takes the stiffness of the elements from the pressure between rigid faces, after the seating.
 
     Args:
         ratio: k_t / k_n, used where only one of the two is given (``pair_ratio``).
     """
     area = np.concatenate([patch.area for patch in patches])
-    if contact.stiffness == "map":
+    if contact.stiffness != "given":
         return rigid_faces(len(area))
     kn = [stiffnesses(seat_contact(contact, patch.name), ratio, patch.area)[1] for patch in patches]
     doubling = np.inf if contact.stiffening is None else contact.stiffening
     return InterfaceLaw(np.concatenate(kn), doubling * area)
+
+
+def layer_friction(
+    patches: Sequence[Patch], contact: Contact, ratio: float
+) -> tuple[np.ndarray, np.ndarray]:
+    """Tangential stiffness (n,) [N/m] and friction coefficient (n,) of the layer at all nodes of
+    some patches; of a layer that stiffens the stiffness at first touch.
+    """
+    seats = [seat_contact(contact, patch.name) for patch in patches]
+    kt = [
+        stiffnesses(seat, ratio, patch.area)[0] for seat, patch in zip(seats, patches, strict=True)
+    ]
+    mu = [np.full(len(p.area), seat.mu) for seat, p in zip(seats, patches, strict=True)]
+    return np.concatenate(kt), np.concatenate(mu)
 
 
 def layered(problem: ContactProblem, contact: Contact, ratio: float) -> ContactProblem:
@@ -167,10 +188,12 @@ def friction_elements(
         n0 = force
     else:
         n0 = np.where(force > 0, force, -kn * gap)
+    t0 = None
+    if maps[0].traction is not None:
+        t0 = np.vstack([a.T @ m.traction for a, m in zip(members, maps, strict=True)])
     S = sp.kron(sp.block_diag(G), sp.identity(1 + tangents), format="csr")
-    return Elements(
-        kt, kn, np.repeat([c.mu for c in seats], [len(a) for a in area]), n0, tangents
-    ), S
+    mu = np.repeat([c.mu for c in seats], [len(a) for a in area])
+    return Elements(kt, kn, mu, n0, tangents, t0=t0), S
 
 
 def _require_stiffness(kt: np.ndarray, kn: np.ndarray) -> None:

@@ -6,7 +6,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable
-from dataclasses import replace
+from dataclasses import asdict, replace
 from functools import partial
 from pathlib import Path
 from typing import Any
@@ -243,6 +243,7 @@ def _tables(result: pipeline.Run) -> dict[str, pd.DataFrame]:
         "modes/stresses": _stresses(result.strength),
         "contact/pressure": pressure_table(result.contact.maps),
         **_own_load(result),
+        **_damper_masses(result),
         "response/summary": _summary(result),
         "response/points": _joined(
             [*map(points_of, curves), *map(linear_points, result.response.limits)]
@@ -310,6 +311,12 @@ def _own_load(result: pipeline.Run) -> dict[str, pd.DataFrame]:
     )
 
 
+def _damper_masses(result: pipeline.Run) -> dict[str, pd.DataFrame]:
+    """The damper that makes each load, where friction takes part in the seating."""
+    masses = result.contact.masses
+    return {"contact/damper_mass": pd.DataFrame(map(asdict, masses))} if masses else {}
+
+
 def _by_mass(points: pd.DataFrame) -> list[tuple[str, pd.DataFrame]]:
     """Name of the picture and response points of each damper mass, the linear limits with all of
     them.
@@ -365,8 +372,13 @@ def points_of(curve: Any) -> pd.DataFrame:
             "estimated_error": curve.estimated,
             "tolerated_error": curve.tolerated,
             "error_checked": curve.checked,
+            **({"branch": curve.branch} if curve.branch.any() else {}),
             **(
-                {"stability": curve.stability, "multiplier": curve.multiplier}
+                {
+                    "stability": curve.stability,
+                    "multiplier": curve.multiplier,
+                    "bifurcation": curve.bifurcation,
+                }
                 if any(curve.stability)
                 else {}
             ),

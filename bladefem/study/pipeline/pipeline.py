@@ -17,7 +17,9 @@ import numpy as np
 
 from geometry.mesh import Mesh
 
+from ...contact.frictional_seating import FrictionalProblem, normal_part
 from ...contact.interface_elements import friction_elements, pair_ratio
+from ...contact.numerical_stiffness import numerical_stiffness, split_stiffness
 from ...contact.peak_pressure import peak_remarks
 from ...contact.seating import ContactProblem
 from ...contact.seating import solve as seat
@@ -42,11 +44,21 @@ from ..modes.stress import Strength, strength
 from .assemble_model import LoadCase, joint_model
 from .contact_cycle import labels
 from .damped_motion import DampedStress, damped_stress
+from .history import (
+    FRICTIONLESS,
+    DamperMass,
+    coarse_history,
+    condense_friction,
+    damper_masses,
+    history_sentence,
+    refuse_jamming,
+    seat_by_history,
+)
 from .liftoff import named
 from .linear_limits import Limit, linear_limits
 from .load_interval import interval_sentence
 from .loads import Curve, default_loads, study_loads
-from .stability import stability_sentence
+from .stability import stability_sentence, unstable_sentence
 from .stage_inputs import stage_key
 from .stages import (
     Bodies,
@@ -90,6 +102,8 @@ class Seating:
     maps: dict[float, list[PressureMap]]
     # that load by the damper's own mass at the operating speed [N]
     own: float | None = None
+    # the damper that makes each load, where friction takes part in the seating
+    masses: tuple[DamperMass, ...] = ()
 
 
 @dataclass(frozen=True, repr=False)
@@ -194,6 +208,8 @@ def run(
         return result
     check_blade(scene, mesh)
     patches = [] if until == "modes" else found_patches(scene, mesh, excited=until in STAGES[3:])
+    if patches:
+        refuse_jamming(scene, mesh, patches)
     bodies = Bodies(scene, mesh, comm, progress)
     with clock("modes"):
         result = replace(
@@ -204,15 +220,8 @@ def run(
     if until == "modes":
         return result
     with clock("contact"):
-        bare = keep(
-            "contact", stage_key("contact", scene), lambda: condense_contact(bodies, patches)
-        )
-        problem = on_layer(scene, bare)
-        own = _own_load(scene, problem, clock.messages)
-        maps = {
-            load: seat(problem, scene.operation.speed, normal=load, bedded=scene.contact.bedded)
-            for load in studied_loads(scene, own)
-        }
+        seating = _seated(scene, bodies, patches, keep, clock)
+        maps = seating.maps
         if mesh.dimension == 2:
             clock.messages.extend(
                 map(
@@ -221,7 +230,7 @@ def run(
                 )
             )
         clock.messages.extend(map(warning, peak_remarks(maps, scene, mesh.depth)))
-        result = replace(result, contact=Seating(problem, maps, own))
+        result = replace(result, contact=seating)
     if until == "contact":
         return result
     with clock("stresses"):
@@ -349,14 +358,47 @@ def _name(case: LoadCase) -> str:
     return f"{case.load:g}N" + ("" if case.mass is None else f"_{1e3 * case.mass:g}g")
 
 
-def _own_load(scene: Scene, problem: ContactProblem, messages: list[str]) -> float | None:
+def _seated(
+    scene: Scene, bodies: Bodies, patches: list[Patch], keep: _Keeper, clock: Clock
+) -> Seating:
+    """The damper on its seats under every load, without friction or after the scene's history."""
+    key = stage_key("contact", scene)
+    rough = None
+    if scene.contact.history == FRICTIONLESS:
+        bare = keep("contact", key, lambda: condense_contact(bodies, patches))
+    else:
+        rough = keep("contact_friction", key, lambda: condense_friction(bodies, patches))
+        bare = normal_part(rough)
+    problem = on_layer(scene, bare)
+    own = _own_load(scene, problem, rough, clock.messages)
+    loads = studied_loads(scene, own)
+    if rough is None:
+        speed = scene.operation.speed
+        bedded = scene.contact.bedded
+        maps = {load: seat(problem, speed, normal=load, bedded=bedded) for load in loads}
+        return Seating(problem, maps, own)
+    seated = {load: seat_by_history(scene, rough, load) for load in loads}
+    masses = damper_masses(scene, rough, seated)
+    clock.messages.append(history_sentence(masses))
+    clock.messages.extend(map(warning, coarse_history(seated)))
+    return Seating(
+        problem, {load: found.maps for load, found in seated.items()}, own, tuple(masses)
+    )
+
+
+def _own_load(
+    scene: Scene, problem: ContactProblem, rough: FrictionalProblem | None, messages: list[str]
+) -> float | None:
     """Mean normal load of a seat [N] by the damper's mass at the operating speed; None when nothing
     presses it.
     """
     if not scene.operation.speed > 0:
         return None
     try:
-        maps = seat(problem, scene.operation.speed, bedded=scene.contact.bedded)
+        if rough is None:
+            maps = seat(problem, scene.operation.speed, bedded=scene.contact.bedded)
+        else:
+            maps = seat_by_history(scene, rough, None).maps
     except NotSolvedError as error:
         messages.append(warning(f"the damper's own centrifugal load does not seat it: {error}"))
         return None
@@ -482,6 +524,7 @@ def _remarks(scene: Scene, settings: Settings, curves: list[Curve], nodes: int) 
         )
     if scene.study.stability:
         remarks.append(method(stability_sentence([(c.stability, c.multiplier) for c in curves])))
+    remarks.extend(warning(text) for text in map(unstable_sentence, curves) if text)
     intervals = [c.interval for c in curves if c.interval is not None]
     if intervals:
         remarks.append(interval_sentence([c.load for c in curves], intervals))
@@ -533,7 +576,9 @@ def _load_case(
     elements, selection = friction_elements(
         contact.problem, contact.maps[load], scene.contact, ratio, mesh.dimension - 1
     )
-    return LoadCase(load, elements, selection, mass)
+    limit = numerical_stiffness(contact.problem)
+    elements, series = split_stiffness(elements, contact.maps[load], scene.contact, limit)
+    return LoadCase(load, elements, selection, mass, series)
 
 
 def check_blade(scene: Scene, mesh: Mesh) -> None:
@@ -544,8 +589,9 @@ def check_blade(scene: Scene, mesh: Mesh) -> None:
             f"kind '{scene.kind}' has no blade to vibrate: 'bladefem run' computes its "
             f"{kind.result}, 'bladefem mesh' draws it"
         )
-    if "clamp" not in mesh.faces:
+    clamp = scene.support.clamp
+    if clamp and clamp not in (*mesh.faces, *mesh.nodes):
         raise InputError(
-            "the mesh has no face 'clamp' to hold the blade; it has "
-            f"{', '.join(sorted(mesh.faces))}"
+            f"the mesh has no face or node set '{clamp}' to hold the blade; it has "
+            f"{', '.join(sorted((*mesh.faces, *mesh.nodes)))}"
         )

@@ -21,6 +21,7 @@ from ...reduction.assemble import folded_diameter
 from ...scene.fields import value_at
 from ...scene.kinds import kind_named
 from ...scene.part_materials import part_materials
+from ...scene.support import area_springs, held_letters
 from ...scene.tables import Material, Scene
 from ...util.progress import Progress, unwatched
 from .ports import blade_ports, damper_ports
@@ -38,6 +39,7 @@ __all__ = [
     "is_wheel",
     "on_layer",
     "reduce_sector",
+    "seat_clearance",
     "seat_damper",
     "wheel_modes",
 ]
@@ -69,9 +71,13 @@ class Bodies:
     def still_blade(self) -> Any:
         """fem.body.Body of the blade at rest."""
         from ...fem.body import assemble
+        from ...fem.supports import AreaSpring, supported
 
         mesh, materials = blade_parts(self.scene, self.mesh)
-        return assemble(mesh, tuple(materials), materials, self.comm)
+        body = assemble(mesh, tuple(materials), materials, self.comm)
+        support = self.scene.support
+        springs = [AreaSpring(*spring) for spring in area_springs(support)]
+        return supported(body, support.clamp, springs, held_letters(support))
 
     @cached_property
     def blade(self) -> Any:
@@ -304,15 +310,20 @@ def on_layer(scene: Scene, problem: Any) -> Any:
 
 def condense_contact(bodies: Bodies, patches: list[Patch]) -> Any:
     """The contact problem of rigid faces: all that takes finite elements."""
-    from ...contact.face_profile import seat_gap
     from ...contact.seating import contact_problem
+
+    gap = seat_clearance(bodies, patches)
+    return contact_problem(bodies.mesh, patches, bodies.still, bodies.damper, gap)
+
+
+def seat_clearance(bodies: Bodies, patches: list[Patch]) -> np.ndarray:
+    """(n,) gap of the seats beside that of the mesh: their shape, and the clearance [m]."""
+    from ...contact.face_profile import seat_gap
 
     scene = bodies.scene
     gap = np.concatenate([seat_gap(patch, bodies.mesh, scene.contact) for patch in patches])
     # a wedge that was drawn here has its clearance in the mesh
-    if scene.kind == "imported":
-        gap = gap + scene.damper.clearance
-    return contact_problem(bodies.mesh, patches, bodies.still, bodies.damper, gap)
+    return gap + scene.damper.clearance if scene.kind == "imported" else gap
 
 
 def harmonic_diameters(scene: Scene, mesh: Mesh, harmonics: int) -> list[int]:
