@@ -126,9 +126,7 @@ def mesh_variants(scene: Scene, sizes: Sequence[float], drawn: Mesh) -> list[Mes
             across = ACROSS
         if across:
             along = own.contact_size or scene.damper.length / ALONG
-            halved = replace(
-                own, order=2, seat_elements=2 * across, contact_size=along / 2
-            )
+            halved = replace(own, order=2, seat_elements=2 * across, contact_size=along / 2)
         else:
             halved = replace(own, order=2, contact_size=_seat_size(drawn) / (2 * own.scale))
         made.append(MeshVariant("own size, seats halved", halved, 2, 2.0 ** (power - 1), False))
