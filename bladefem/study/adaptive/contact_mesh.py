@@ -1,9 +1,11 @@
-"""Is the contact mesh fine enough? Error indicators cannot tell: their finest patch is that mesh.
+"""Is the contact mesh fine enough? The indicators of the balance cannot tell: their finest patch is
+that mesh.
 
-What can be told from one mesh is how much its nodes matter: the resonance with half as many. On the
-shipped wedge, with 48, 73 and 105 nodes on a seat, amplitudes between stick and slip are 249, 253,
-250 um at 80 N and 363, 483, 453 um at 320 N; with 24 of the 48 they change by 9 % at either load.
-So a large change is a warning, not an estimate.
+What can be told from one mesh is how much its nodes matter: the resonance with half as many. With
+one interface law that change is an estimate of the mesh's own error and counts in the reported one:
+on the shipped wedge half the points change amplitudes by 0.2 to 0.7 %, and grids of 4 x 6, 8 x 6
+and 12 x 8 elements give 164.0, 163.4 and 162.0 um at 80 N. Between rigid faces it is not enough,
+since few nodes press: hence ``coarse_sentence``.
 """
 
 from __future__ import annotations
@@ -22,7 +24,7 @@ from ...hbm.sweep import size
 from .family import Family, carried, member
 from .settings import Settings
 
-__all__ = ["FEW", "coarse_sentence", "halved_change", "halved_sentence"]
+__all__ = ["FEW", "coarse_sentence", "halved_change"]
 
 # pressed nodes of a seat: 6 left an amplitude between stick and slip 37 % low, 11 19 %, 16 12 %, 21
 # 5 %
@@ -30,7 +32,7 @@ FEW = 16
 
 
 def coarse_sentence(maps: Iterable[PressureMap]) -> str:
-    """A warning where fewer than FEW nodes of a plane seat are pressed, else "".
+    """A warning where fewer than FEW nodes of a plane seat, and not all, are pressed, else "".
 
     Args:
         maps: of the seats of a plane scene, under any loads.
@@ -38,7 +40,8 @@ def coarse_sentence(maps: Iterable[PressureMap]) -> str:
     pressed, nodes = min(
         ((int(np.count_nonzero(m.force > 0)), len(m.force)) for m in maps), default=(FEW, FEW)
     )
-    if pressed >= FEW:
+    # a seat that presses everywhere has no narrow contact to resolve
+    if pressed >= FEW or pressed == nodes:
         return ""
     return (
         f"contact mesh: only {pressed} of {nodes} nodes of a seat are pressed; with fewer than "
@@ -77,22 +80,3 @@ def halved_change(family: Family, settings: Settings, top: Solution) -> float:
     except NotSolvedError:
         return np.nan
     return abs(peak.height / size(top) - 1)
-
-
-def halved_sentence(loads: Iterable[float], changes: Iterable[float], accuracy: float) -> str:
-    """A warning where half as many contact points change resonance amplitudes by more than the
-    accuracy, else "".
-    """
-    worst, load = max(
-        ((c, load) for load, c in zip(loads, changes, strict=True) if np.isfinite(c)),
-        default=(0.0, 0.0),
-    )
-    if worst <= accuracy:
-        return ""
-    return (
-        "contact mesh: half as many contact points change the resonance amplitude by up to "
-        f"{100 * worst:.2g} % "
-        f"({load:g} N); the estimated errors do not contain what the mesh itself is wrong, a "
-        "smaller "
-        "mesh.contact_size tells"
-    )

@@ -94,6 +94,15 @@ class Curve:
     interval: LoadInterval | None = None
 
     @property
+    def error(self) -> float | None:
+        """Estimated relative error of the resonance amplitude: that of the balance, and what half
+        as many contact points change (the contact mesh); None where it was not asked for.
+        """
+        if self.settings.error is None:
+            return None
+        return self.settings.error + (self.halved if np.isfinite(self.halved) else 0.0)
+
+    @property
     def peak_frequency(self) -> float:
         """[Hz]"""
         return self.peak.frequency
@@ -241,7 +250,7 @@ def _row(c: Curve) -> dict[str, float]:
         "reduction": 1.0,
         "dissipated": c.peak.work.dissipated,
         "slipping": c.peak.states["slip"] + c.peak.states["lift"],
-        "error": np.nan if c.settings.error is None else c.settings.error,
+        "error": np.nan if c.error is None else c.error,
         "halved": c.halved,
         "harmonics": c.settings.harmonics,
         "points": len(c.frequency),
