@@ -39,6 +39,7 @@ from ..view import mesh, modes, response, speed
 from ..view.live_curves import live_diameters, live_loops, live_optimum, live_responses
 from ..view.live_shapes import live_shapes
 from .datasets import datasets, table_dataset
+from .best_load import best_load_table
 from .linear import harmonic_table, linear_sentence
 from .nodes import (
     cycles_of,
@@ -219,6 +220,7 @@ def _tables(result: pipeline.Run) -> dict[str, pd.DataFrame]:
         "modes/stresses": _stresses(result.strength),
         "contact/pressure": pressure_table(result.contact.maps),
         **_own_load(result),
+        **_best_load(result),
         "response/summary": _summary(result),
         "response/points": _joined(
             [*map(points_of, curves), *map(linear_points, result.response.limits)]
@@ -274,6 +276,12 @@ def _own_load(result: pipeline.Run) -> dict[str, pd.DataFrame]:
             )
         }
     )
+
+
+def _best_load(result: pipeline.Run) -> dict[str, pd.DataFrame]:
+    """What the exact search for the best load found, where there was one."""
+    best = result.response.best
+    return {"response/best_load": best_load_table(best)} if best else {}
 
 
 def _by_mass(points: pd.DataFrame) -> list[tuple[str, pd.DataFrame]]:

@@ -21,8 +21,9 @@ from ...hbm.node_gradients import node_gradients
 from ...hbm.optimum import Optimum, Variation, lowest_peak
 from ...hbm.peak import Peak, with_slope
 from ...scene.tables import Scene
-from ..adaptive.choice import choose, default_band, sufficient
+from ..adaptive.choice import default_band, sufficient
 from ..adaptive.family import Family, joined, member
+from ..adaptive.resonance_choice import choose_at_peak
 from ..adaptive.settings import Settings
 from .assemble_model import LoadCase
 
@@ -100,8 +101,8 @@ def find_best_load(
             found = _search(scene, case_at, family_of, settings, bounds, start)
             points += found.points
             family = family_of(case_at(found.value))
-            richer, _, _ = choose(
-                family, settings, found.peak.solution, scene.accuracy, fixed=("modes",)
+            richer, _, _ = choose_at_peak(
+                family, settings, found.peak, scene.accuracy, fixed=("modes",)
             )
             enough = replace(richer, error=settings.error) == settings
             settings = richer
@@ -155,9 +156,7 @@ def load_variation(case_at: CaseAt, family_of: FamilyOf, settings: Settings) -> 
 
     def sloped(model: ReducedModel, peak: Peak, load: float) -> Peak:
         groups = member(family_of(case_at(load)), settings).groups
-        low, high = (
-            joined(case_at(load * (1 + sign * STEP)).elements, groups) for sign in (-1, 1)
-        )
+        low, high = (joined(case_at(load * (1 + sign * STEP)).elements, groups) for sign in (-1, 1))
         rates = {
             "load": _relative_rate(low.n0, high.n0),
             "kt": _relative_rate(low.kt, high.kt),
@@ -253,9 +252,6 @@ def chart_loads(bests: Sequence[BestLoad]) -> tuple[float, ...]:
     largest, each of them included.
     """
     loads = {
-        float(f"{factor * best.load:.2g}")
-        for best in bests
-        for factor in FACTORS
-        if factor != 1.0
+        float(f"{factor * best.load:.2g}") for best in bests for factor in FACTORS if factor != 1.0
     }
     return tuple(sorted(loads | {float(f"{best.load:.4g}") for best in bests}))

@@ -17,10 +17,11 @@ from ...hbm.sweep import size
 from ...scene.tables import Scene
 from ...util.progress import Progress, unwatched
 from ..adaptive.check_points import peak_of
-from ..adaptive.choice import adapted, checked, estimated
+from ..adaptive.choice import checked, estimated
 from ..adaptive.contact_mesh import halved_change
 from ..adaptive.family import Family, member
-from ..adaptive.settings import Settings, restarted
+from ..adaptive.resonance_curve import resonance_curve
+from ..adaptive.settings import Settings
 from .assemble_model import LoadCase
 from .liftoff import named
 from .linear_limits import Limit
@@ -149,9 +150,7 @@ def curve_of(
     models = family(case)
     mode = scene.excitation.mode
     with named(case, member(models, settings).model, mode, scene.excitation.force):
-        curve = adapted(
-            models, restarted(settings), scene.study.band, mode, scene.accuracy, fixed=("modes",)
-        )
+        curve = resonance_curve(models, settings, scene.study.band, mode, scene.accuracy)
     top = peak_of(curve.points)
     heights = np.array([size(p) for p in curve.points])
     tolerated = scene.accuracy * size(top) / np.maximum(heights, 1e-6 * size(top))

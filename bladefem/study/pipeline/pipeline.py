@@ -5,7 +5,7 @@ by the next run.
 from __future__ import annotations
 
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, field, replace
 from functools import lru_cache, partial
@@ -22,7 +22,7 @@ from ...contact.seating import ContactProblem
 from ...contact.seating import solve as seat
 from ...data import ModeSet, Patch, PressureMap
 from ...errors import InputError, NotSolvedError
-from ...io.stage_cache import found_remark, stage
+from ...io.stage_cache import found_remark, on_root, stage
 from ...reduction.truncate import truncated
 from ...scene.kinds import kind_named
 from ...scene.tables import Scene
@@ -32,13 +32,15 @@ from ...scene.warnings import doubts
 from ...util.message import method, warning
 from ...util.progress import Progress, unwatched
 from ..adaptive.check_points import peak_of
-from ..adaptive.choice import choose, covered
+from ..adaptive.choice import covered
 from ..adaptive.contact_mesh import coarse_sentence, halved_sentence
 from ..adaptive.family import Family, Member, coarsened, member, shared_harmonics
+from ..adaptive.resonance_choice import choose_at_peak, peak_from
 from ..adaptive.settings import DAMPERS, Settings, enriched, first_settings
 from ..modes.clamped_aerofoil import clamped_blade
 from ..modes.stress import Strength, strength
 from .assemble_model import LoadCase, joint_model
+from .best_load import BestLoad, chart_loads, find_best_load
 from .contact_cycle import labels
 from .liftoff import named
 from .linear_limits import Limit, linear_limits
@@ -97,6 +99,8 @@ class Response:
     curves: list[Curve]
     # no damper, full stick
     limits: tuple[Limit, Limit]
+    # of each mass of the damper; empty where a single load was asked for
+    best: tuple[BestLoad, ...] = ()
 
     @property
     def free_peak(self) -> tuple[float, float]:
@@ -174,10 +178,7 @@ def run(
         )
         problem = on_layer(scene, bare)
         own = _own_load(scene, problem, clock.messages)
-        maps = {
-            load: seat(problem, scene.operation.speed, normal=load, bedded=scene.contact.bedded)
-            for load in studied_loads(scene, own)
-        }
+        maps = seated_maps(scene, problem, studied_loads(scene, own))
         if mesh.dimension == 2:
             clock.messages.extend(
                 map(
@@ -206,9 +207,16 @@ def run(
     if until == "reduction":
         return result
     family = partial(family_of_case, scene, mesh, reduced, list(patches))
-    return replace(
-        result, response=_response(scene, cases, family, settings, keep, clock, progress)
-    )
+    with clock("best load"):
+        best = _best_loads(scene, mesh, result.contact, family, settings, keep)
+        clock.messages.extend(_best_remarks(scene, best))
+    if scene.study.loads is None and best and not any(b.reason for b in best):
+        maps = seated_maps(scene, problem, studied_loads(scene, own, chart_loads(best)))
+        result = replace(result, contact=replace(result.contact, maps=maps))
+        cases = load_cases(scene, mesh, result.contact)
+    carried = _carried(settings, best)
+    response = _response(scene, cases, family, carried, keep, clock, progress)
+    return replace(result, response=replace(response, best=best))
 
 
 @dataclass(frozen=True)
@@ -304,11 +312,78 @@ def _own_load(scene: Scene, problem: ContactProblem, messages: list[str]) -> flo
     return own
 
 
-def studied_loads(scene: Scene, own: float | None) -> list[float]:
+def seated_maps(
+    scene: Scene, problem: ContactProblem, loads: Iterable[float]
+) -> dict[float, list[PressureMap]]:
+    """The seated damper under each mean normal load of a seat [N]."""
+    return {
+        load: seat(problem, scene.operation.speed, normal=load, bedded=scene.contact.bedded)
+        for load in loads
+    }
+
+
+def _best_loads(
+    scene: Scene,
+    mesh: Mesh,
+    contact: Seating,
+    family: Callable[[LoadCase], Family],
+    settings: Settings,
+    keep: _Keeper,
+) -> tuple[BestLoad, ...]:
+    """The best load of each mass of the damper; none where a single load was asked for."""
+    if scene.study.loads is not None and len(scene.study.loads) == 1:
+        return ()
+
+    def search(mass: float | None) -> BestLoad:
+        def case_at(load: float) -> LoadCase:
+            seated = replace(contact, maps=seated_maps(scene, contact.problem, [load]))
+            return _load_case(scene, mesh, seated, load, mass)
+
+        return find_best_load(scene, case_at, family, settings, mass)
+
+    def compute() -> list[BestLoad]:
+        return on_root(keep.comm, lambda: [search(mass) for mass in scene.study.masses or (None,)])
+
+    key = stage_key(
+        "response", scene, "best load", scene.study.masses, replace(settings, error=None)
+    )
+    return tuple(keep("best_load", key, compute))
+
+
+def _carried(settings: Settings, best: tuple[BestLoad, ...]) -> Settings:
+    """Where the curves of all loads begin: with the settings that the best load needed."""
+    found = [b.settings for b in best if not b.reason]
+    return found[0] if found else settings
+
+
+def _best_remarks(scene: Scene, best: tuple[BestLoad, ...]) -> Iterator[str]:
+    """How the best load was found, or why it was not."""
+    for b in best:
+        damper = "" if b.mass is None else f" of a damper of {1e3 * b.mass:.4g} g"
+        if b.reason:
+            yield (
+                f"best load{damper}: not found between {b.searched[0]:.3g} and "
+                f"{b.searched[1]:.3g} N, since {b.reason}"
+            )
+            continue
+        yield (
+            f"best load{damper}: {b.load:.4g} N by exact search between {b.searched[0]:.3g} and "
+            f"{b.searched[1]:.3g} N, {len(b.tried)} loads and {b.points} points; no load near it "
+            f"lowers the amplitude by more than {100 * b.tolerance:.2g} %; "
+            f"{b.settings.sentence()}"
+        )
+
+
+def studied_loads(
+    scene: Scene, own: float | None, laid: Sequence[float] | None = None
+) -> list[float]:
     """Mean normal loads of a seat to study [N], ascending with the damper's own one where that is
     wanted.
+
+    Args:
+        laid: loads of the design chart where the scene gives none; rough ones when left out.
     """
-    given = scene.study.loads or default_loads(scene)
+    given = scene.study.loads or laid or default_loads(scene)
     if not scene.study.own_load:
         return list(given)
     if own is None:
@@ -397,12 +472,13 @@ def reduced_sector(
         mode = scene.excitation.mode
         with named(case, model, mode, scene.excitation.force):
             rough = covered(model, settings, scene.study.band, mode, 1.0)
-        settings, _, found = choose(
-            family, settings, peak_of(rough), scene.accuracy, fixed=("modes",), apart=True
+            peak = peak_from(family, settings, peak_of(rough), settings, scene.accuracy)
+        settings, _, found = choose_at_peak(
+            family, settings, peak, scene.accuracy, fixed=("modes",)
         )
         more = enriched(settings, "modes")
-        known = "modes" in settings.chosen and "modes" not in found.unknown
-        if not known or found.errors["modes"] <= scene.accuracy / 10 or more is None:
+        known = "modes" in settings.chosen and np.isfinite(found.height["modes"])
+        if not known or found.needs["modes"] <= scene.accuracy / 10 or more is None:
             return settings, reduced
         settings = more
 
