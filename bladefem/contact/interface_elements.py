@@ -6,6 +6,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 import scipy.sparse as sp
@@ -19,12 +20,14 @@ from .seating import ContactProblem
 __all__ = [
     "aggregation",
     "friction_elements",
+    "gives_stiffness",
     "interface_law",
     "layered",
     "mapped_stiffness",
     "mindlin_ratio",
     "normal_stiffness",
     "pair_ratio",
+    "scaled_contact",
     "seat_contact",
     "stiffnesses",
 ]
@@ -61,6 +64,46 @@ def seat_contact(contact: Contact, patch: str) -> Contact:
         if getattr(own, total) is not None or getattr(own, areal) is not None:
             changes |= {total: getattr(own, total), areal: getattr(own, areal)}
     return replace(contact, **changes)
+
+
+def gives_stiffness(contact: Contact) -> bool:
+    """The scene says how stiff the layer is, on both seats."""
+    both = all(_gives(seat, "kt") or _gives(seat, "kn") for seat in (contact.left, contact.right))
+    return both or contact.stiffness == "map" or _gives(contact, "kt") or _gives(contact, "kn")
+
+
+def _gives(table: Contact | Seat, name: str) -> bool:
+    """A stiffness is given, for the whole patch or each unit of area."""
+    return getattr(table, name) is not None or getattr(table, f"{name}_area") is not None
+
+
+def scaled_contact(contact: Contact, ratio: float, kt: float = 1.0, kn: float = 1.0) -> Contact:
+    """[contact] with the tangential and the normal stiffness of all seats times factors.
+
+    What follows from the other stiffness by ``ratio`` = k_t / k_n is written out first, so that
+    one changes without the other.
+    """
+    followed = {
+        "kt": (not _gives(contact, "kt"), "kn", ratio),
+        "kn": (not _gives(contact, "kn"), "kt", 1 / ratio),
+    }
+
+    def scaled(table: Any) -> Any:
+        changes: dict[str, float] = {}
+        for name, factor in (("kt", kt), ("kn", kn)):
+            follows, other, quotient = followed[name]
+            if follows and not _gives(table, name):
+                source, factor = other, factor * quotient
+            else:
+                source = name
+            for kind in ("", "_area"):
+                value = getattr(table, f"{source}{kind}")
+                if value is not None:
+                    changes[f"{name}{kind}"] = factor * value
+        return replace(table, **changes)
+
+    whole = contact if gives_stiffness(contact) else replace(contact, kt_area=USUAL)
+    return replace(scaled(whole), left=scaled(contact.left), right=scaled(contact.right))
 
 
 def stiffnesses(

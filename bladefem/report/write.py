@@ -203,10 +203,11 @@ def _answer(scene: Scene, tables: Mapping[str, pd.DataFrame], page: Page) -> dic
     if page.numbers is not None or summary is None or "peak_amplitude" not in summary:
         return {"numbers": list(page.numbers or ()), "steps": list(page.steps)}
     own = tables.get("contact/own_load")
-    found = answer(summary, points, own, tables.get("response/best_load"))
+    searched = tables.get("response/best_load")
+    found = answer(summary, points, own, searched)
     cautions = [*wrong_speed(scene, summary), *found.cautions]
     steps = next_steps(scene, cautions, summary, own)
-    return {"numbers": headlines(found, summary, points), "steps": [*steps, *page.steps]}
+    return {"numbers": headlines(found, summary, points, searched), "steps": [*steps, *page.steps]}
 
 
 def _sections(

@@ -7,7 +7,6 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from bladefem.data import Elements
 from bladefem.hbm.optimum import optimum
 from bladefem.hbm.peak import find_peak
 from bladefem.hbm.reference_blade import reference_model

@@ -18,17 +18,25 @@ from ...errors import NotSolvedError
 from ...hbm.full_stick import grips
 from ...hbm.peak import Peak, find_peak
 from ...hbm.solution import Solution
-from .choice import following, sufficient
+from .choice import sufficient
 from .family import Family, carried, member
-from .indicators import Indicators, richer
-from .settings import DIRECTIONS, Settings
+from .indicators import richer
+from .settings import DIRECTIONS, Settings, enriched
 
-__all__ = ["PeakErrors", "choose_at_peak", "peak_errors", "peak_from"]
+__all__ = ["PeakErrors", "choose_at_peak", "judge_settings", "peak_errors", "peak_from"]
 
 # enrichments of one peak before giving up
 ROUNDS = 8
 # of the accuracy: to which a peak that only tells an error is found
 SHARE = 0.05
+# of the accuracy: errors that are small enough together, and one that need not be lowered
+ENOUGH = 0.8
+LEAST = 0.05
+# unknowns of the largest balance that is chosen where contacts lift off: finer ones cost minutes a
+# curve there and lose points
+LIFTING = 3000
+# contact points of the model that judges, over those of the judged one
+MORE_POINTS = 4
 # weight of a relative shift of the frequency beside a relative change of the height: an accuracy
 # of 5 % holds the frequency to 0.5 %
 SHIFT_WEIGHT = 5.0
@@ -65,9 +73,17 @@ class PeakErrors:
 
 
 def peak_from(
-    family: Family, old: Settings, point: Solution, new: Settings, accuracy: float
+    family: Family,
+    old: Settings,
+    point: Solution,
+    new: Settings,
+    accuracy: float,
+    fallbacks: bool = True,
 ) -> Peak:
     """The peak of a model with other settings, uphill of a point solved with the old ones.
+
+    Args:
+        fallbacks: where Newton's method fails from that point.
 
     Raises:
         NotSolvedError: a point was not solved, or no maximum was closed in.
@@ -82,7 +98,7 @@ def peak_from(
         new.samples,
         near=start,
         tolerance=SHARE * accuracy,
-        options=sufficient(accuracy),
+        options=replace(sufficient(accuracy), fallbacks=fallbacks),
     )
 
 
@@ -94,11 +110,11 @@ def peak_errors(family: Family, settings: Settings, peak: Peak, accuracy: float)
     shifts = dict.fromkeys(DIRECTIONS, 0.0)
     better = {}
     for name in DIRECTIONS:
-        other = None if name in exact else richer(family, settings, name)
+        other = None if name in exact else judge_settings(family, settings, name)
         if other is None:
             continue
         try:
-            found = peak_from(family, settings, point, other, accuracy)
+            found = peak_from(family, settings, point, other, accuracy, fallbacks=False)
         except NotSolvedError:
             heights[name] = np.inf
             shifts[name] = np.inf
@@ -109,6 +125,22 @@ def peak_errors(family: Family, settings: Settings, peak: Peak, accuracy: float)
     return PeakErrors(heights, shifts, better)
 
 
+def judge_settings(family: Family, settings: Settings, name: str) -> Settings | None:
+    """The settings that one respect is judged by: those of ``indicators.richer``, but of contact
+    points only MORE_POINTS times as many.
+
+    Parts of a seat are halved again and again, so that the finer points are parts of the coarser
+    ones; all of them cost 20 times as much on the shipped wedge.
+    """
+    other = richer(family, settings, name)
+    if name != "points" or other is None:
+        return other
+    groups = member(family, settings).groups
+    more = MORE_POINTS * settings.points
+    # two seats
+    return replace(settings, points=more) if 2 * more < len(groups) else other
+
+
 def choose_at_peak(
     family: Family,
     settings: Settings,
@@ -116,8 +148,8 @@ def choose_at_peak(
     accuracy: float,
     fixed: tuple[str, ...] = (),
 ) -> tuple[Settings, Peak, PeakErrors]:
-    """Settings whose estimated errors of height and frequency are below half the accuracy, or the
-    best that may be chosen; the peak with them, and its errors.
+    """Settings whose estimated errors of height and frequency keep within ENOUGH of the accuracy,
+    or the best that may be chosen; the peak with them, and its errors.
 
     Nothing is refined in a respect in which the richer model was not solved: its error is unknown.
 
@@ -128,10 +160,7 @@ def choose_at_peak(
     for _ in range(ROUNDS):
         errors = peak_errors(family, settings, peak, accuracy)
         settings = replace(settings, error=errors.total)
-        found = Indicators(errors.needs)
-        if found.total <= accuracy / 2:
-            break
-        better = following(settings, found, accuracy, fixed)
+        better = _next_settings(family, settings, peak, errors, accuracy, fixed)
         if better is None:
             break
         try:
@@ -140,3 +169,33 @@ def choose_at_peak(
             break
         settings = better
     return settings, peak, errors
+
+
+def _next_settings(
+    family: Family,
+    settings: Settings,
+    peak: Peak,
+    errors: PeakErrors,
+    accuracy: float,
+    fixed: tuple[str, ...],
+) -> Settings | None:
+    """Richer in the respect that is worst; None where the errors are small enough or nothing
+    helps.
+    """
+    needs = {name: need for name, need in errors.needs.items() if np.isfinite(need)}
+    if sum(errors.needs.values()) <= ENOUGH * accuracy:
+        return None
+    for name in sorted(needs, key=lambda name: -needs[name]):
+        if name not in settings.chosen or name in fixed or needs[name] <= LEAST * accuracy:
+            continue
+        better = enriched(settings, name, needs[name] / (ENOUGH * accuracy))
+        if better is not None and not _too_large(family, better, peak):
+            return better
+    return None
+
+
+def _too_large(family: Family, settings: Settings, peak: Peak) -> bool:
+    """Contacts lift off, and the balance would have more unknowns than LIFTING."""
+    model = member(family, settings).model
+    unknowns = model.springs.size * (2 * settings.harmonics + 1)
+    return peak.solution.states["lift"] > 0 and unknowns > LIFTING

@@ -15,7 +15,7 @@ from .check_points import LOUDEST, QUIET, SHARES, heights_of, hidden, peak_of
 from .choice import Checked, covered, sufficient
 from .family import Family, member
 from .indicators import moved, richer
-from .resonance_choice import PeakErrors, choose_at_peak, peak_from
+from .resonance_choice import PeakErrors, choose_at_peak, judge_settings, peak_from
 from .settings import Settings, enriched
 
 __all__ = ["resonance_curve"]
@@ -104,7 +104,7 @@ def _checked_points(
     heights = heights_of(points)
     if errors is not None and errors.better:
         worst = max(errors.better, key=lambda name: errors.needs[name])
-        other = richer(family, settings, worst)
+        other = judge_settings(family, settings, worst)
         shift = errors.better[worst].omega / top.omega
         for point in _flanks(points, heights, top):
             found[point.omega] = _change(family, settings, point, other, shift)

@@ -82,7 +82,12 @@ class BestLoad:
 
 
 def find_best_load(
-    scene: Scene, case_at: CaseAt, family_of: FamilyOf, settings: Settings, mass: float | None
+    scene: Scene,
+    case_at: CaseAt,
+    family_of: FamilyOf,
+    settings: Settings,
+    mass: float | None,
+    start: float | None = None,
 ) -> BestLoad:
     """The load with the smallest resonance, and how sure it is.
 
@@ -90,16 +95,18 @@ def find_best_load(
         case_at: static load of a seat [N] -> the seated damper's friction elements.
         family_of: load case -> its models.
         settings: where to begin; what is open in them is enriched as the accuracy needs.
+        start: load to begin at [N].
     """
     case_at = lru_cache(maxsize=None)(case_at)
     searched = search_range(scene)
     bounds = searched
-    start = None
     points = 0
     try:
         for _ in range(SEARCHES):
             found = _search(scene, case_at, family_of, settings, bounds, start)
             points += found.points
+            if not settings.chosen and settings.error is not None:
+                break
             family = family_of(case_at(found.value))
             richer, _, _ = choose_at_peak(
                 family, settings, found.peak, scene.accuracy, fixed=("modes",)

@@ -37,10 +37,12 @@ from ..adaptive.contact_mesh import coarse_sentence, halved_sentence
 from ..adaptive.family import Family, Member, coarsened, member, shared_harmonics
 from ..adaptive.resonance_choice import choose_at_peak, peak_from
 from ..adaptive.settings import DAMPERS, Settings, enriched, first_settings
+from ..influences import Influence, influences, parameters_of
 from ..modes.clamped_aerofoil import clamped_blade
 from ..modes.stress import Strength, strength
 from .assemble_model import LoadCase, joint_model
 from .best_load import BestLoad, chart_loads, find_best_load
+from .changed_cases import cases_of, changed_cases
 from .contact_cycle import labels
 from .liftoff import named
 from .linear_limits import Limit, linear_limits
@@ -101,6 +103,8 @@ class Response:
     limits: tuple[Limit, Limit]
     # of each mass of the damper; empty where a single load was asked for
     best: tuple[BestLoad, ...] = ()
+    # what the lowest of them hangs on, the largest influence first
+    influences: tuple[Influence, ...] = ()
 
     @property
     def free_peak(self) -> tuple[float, float]:
@@ -216,7 +220,9 @@ def run(
         cases = load_cases(scene, mesh, result.contact)
     carried = _carried(settings, best)
     response = _response(scene, cases, family, carried, keep, clock, progress)
-    return replace(result, response=replace(response, best=best))
+    with clock("influences"):
+        hangs_on = _influences(scene, mesh, problem, family, best, keep)
+    return replace(result, response=replace(response, best=best, influences=hangs_on))
 
 
 @dataclass(frozen=True)
@@ -335,10 +341,7 @@ def _best_loads(
         return ()
 
     def search(mass: float | None) -> BestLoad:
-        def case_at(load: float) -> LoadCase:
-            seated = replace(contact, maps=seated_maps(scene, contact.problem, [load]))
-            return _load_case(scene, mesh, seated, load, mass)
-
+        case_at = cases_of(scene, contact.problem, mesh.dimension - 1, mass)
         return find_best_load(scene, case_at, family, settings, mass)
 
     def compute() -> list[BestLoad]:
@@ -348,6 +351,34 @@ def _best_loads(
         "response", scene, "best load", scene.study.masses, replace(settings, error=None)
     )
     return tuple(keep("best_load", key, compute))
+
+
+def _influences(
+    scene: Scene,
+    mesh: Mesh,
+    problem: ContactProblem,
+    family: Callable[[LoadCase], Family],
+    best: tuple[BestLoad, ...],
+    keep: _Keeper,
+) -> tuple[Influence, ...]:
+    """What the lowest of the best loads hangs on; none where it was not found or not asked for."""
+    found = [b for b in best if not b.reason]
+    if not found or not scene.study.influences:
+        return ()
+    lowest = min(found, key=lambda b: b.amplitude)
+    changed = changed_cases(scene, problem, mesh.dimension - 1, lowest.mass)
+    angle = scene.damper.angle if scene.kind == "wedge sector" else None
+    parameters = parameters_of(scene, angle)
+
+    def compute() -> list[Influence]:
+        return on_root(keep.comm, lambda: influences(scene, lowest, family, changed, parameters))
+
+    key = stage_key("response", scene, "influences", lowest)
+    try:
+        return tuple(keep("influences", key, compute))
+    except NotSolvedError as error:
+        keep.clock.messages.append(f"what the best load hangs on is not known: {error}")
+        return ()
 
 
 def _carried(settings: Settings, best: tuple[BestLoad, ...]) -> Settings:
