@@ -53,8 +53,10 @@ def resonance_curve(
         span = band or (points[0].frequency, points[-1].frequency)
         points = covered(member(family, used).model, used, span, mode, accuracy, widen)
         points = _with_peak(points, peak)
-        found = _checked_points(family, used, points, errors, accuracy)
-        richer_harmonics = _harmonics_missed(used, points, found, accuracy)
+        found = _checked_flanks(family, used, points, errors)
+        loud = _checked_loud(family, used, points, accuracy)
+        found = loud | found
+        richer_harmonics = _harmonics_missed(used, points, loud, accuracy)
         if richer_harmonics is not None:
             used = richer_harmonics
         elif size(peak_of(points)) <= (1 + accuracy / 2) * _height(peak, points):
@@ -86,35 +88,43 @@ def _with_peak(points: list[Solution], peak: Peak | None) -> list[Solution]:
     return sorted([*points, peak.solution], key=lambda p: p.omega)
 
 
-def _checked_points(
-    family: Family,
-    settings: Settings,
-    points: Sequence[Solution],
-    errors: PeakErrors | None,
-    accuracy: float,
+def _checked_flanks(
+    family: Family, settings: Settings, points: Sequence[Solution], errors: PeakErrors | None
 ) -> dict[float, float]:
-    """Circular frequency of the checked points -> estimated relative error.
+    """Circular frequency -> estimated relative error: of the peak, and of one point on each flank
+    for each of SHARES of its height.
 
-    The peak; one point on each flank for each of SHARES of its height, in the respect that is
-    worst at the peak and as far from the peak of the richer model as it stands from its own; and
-    the LOUDEST points where harmonics that were left out move the contacts.
+    A flank is judged in the respect that is worst at the peak, as far from the peak of the richer
+    model as it stands from its own.
     """
     top = peak_of(points)
     found = {top.omega: np.inf if settings.error is None else settings.error}
-    heights = heights_of(points)
-    if errors is not None and errors.better:
-        worst = max(errors.better, key=lambda name: errors.needs[name])
-        other = judge_settings(family, settings, worst)
-        shift = errors.better[worst].omega / top.omega
-        for point in _flanks(points, heights, top):
-            found[point.omega] = _change(family, settings, point, other, shift)
-    loud = hidden(family, [settings] * len(points), points) * heights / size(top)
-    order = np.argsort(-loud)[:LOUDEST]
-    for i in order[loud[order] > QUIET * accuracy]:
-        other = richer(family, settings, "harmonics")
-        if points[i].converged and points[i].omega not in found:
-            found[points[i].omega] = _change(family, settings, points[i], other, 1.0)
+    if errors is None or not errors.better:
+        return found
+    worst = max(errors.better, key=lambda name: errors.needs[name])
+    other = judge_settings(family, settings, worst)
+    if other is None:
+        return found
+    shift = errors.better[worst].omega / top.omega
+    for point in _flanks(points, heights_of(points), top):
+        found[point.omega] = _change(family, settings, point, other, shift)
     return found
+
+
+def _checked_loud(
+    family: Family, settings: Settings, points: Sequence[Solution], accuracy: float
+) -> dict[float, float]:
+    """Circular frequency -> estimated relative error by more harmonics, of the LOUDEST points
+    where harmonics that were left out move the contacts.
+    """
+    share = heights_of(points) / size(peak_of(points))
+    loud = hidden(family, [settings] * len(points), points) * share
+    order = np.argsort(-loud)[:LOUDEST]
+    chosen = [points[i] for i in order[loud[order] > QUIET * accuracy] if points[i].converged]
+    other = richer(family, settings, "harmonics")
+    if other is None:
+        return {}
+    return {p.omega: _change(family, settings, p, other, 1.0) for p in chosen}
 
 
 def _flanks(points: Sequence[Solution], heights: np.ndarray, top: Solution) -> list[Solution]:
@@ -140,15 +150,17 @@ def _change(
 
 
 def _harmonics_missed(
-    settings: Settings, points: Sequence[Solution], found: dict[float, float], accuracy: float
+    settings: Settings, points: Sequence[Solution], loud: dict[float, float], accuracy: float
 ) -> Settings | None:
-    """Settings with more harmonics where a checked point is wrong beyond its tolerance; None where
-    all hold, or harmonics are not to be chosen.
+    """Settings with more harmonics where a loud point away from the peak is wrong beyond its
+    tolerance; None where all hold, or harmonics are not to be chosen.
     """
     top = peak_of(points)
+    if "harmonics" not in settings.chosen:
+        return None
     for point in points:
-        error = found.get(point.omega, 0.0)
+        error = loud.get(point.omega, 0.0)
         tolerated = accuracy * size(top) / max(size(point), 1e-6 * size(top))
         if point is not top and np.isfinite(error) and error > tolerated:
-            return enriched(settings, "harmonics") if "harmonics" in settings.chosen else None
+            return enriched(settings, "harmonics")
     return None

@@ -21,7 +21,7 @@ from ..adaptive.choice import checked, estimated
 from ..adaptive.contact_mesh import halved_change
 from ..adaptive.family import Family, member
 from ..adaptive.resonance_curve import resonance_curve
-from ..adaptive.settings import Settings
+from ..adaptive.settings import Settings, restarted
 from .assemble_model import LoadCase
 from .liftoff import named
 from .linear_limits import Limit
@@ -150,7 +150,8 @@ def curve_of(
     models = family(case)
     mode = scene.excitation.mode
     with named(case, member(models, settings).model, mode, scene.excitation.force):
-        curve = resonance_curve(models, settings, scene.study.band, mode, scene.accuracy)
+        start = restarted(settings)
+        curve = resonance_curve(models, start, scene.study.band, mode, scene.accuracy)
     top = peak_of(curve.points)
     heights = np.array([size(p) for p in curve.points])
     tolerated = scene.accuracy * size(top) / np.maximum(heights, 1e-6 * size(top))

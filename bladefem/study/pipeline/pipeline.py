@@ -218,8 +218,7 @@ def run(
         maps = seated_maps(scene, problem, studied_loads(scene, own, chart_loads(best)))
         result = replace(result, contact=replace(result.contact, maps=maps))
         cases = load_cases(scene, mesh, result.contact)
-    carried = _carried(settings, best)
-    response = _response(scene, cases, family, carried, keep, clock, progress)
+    response = _response(scene, cases, family, settings, keep, clock, progress)
     with clock("influences"):
         hangs_on = _influences(scene, mesh, problem, family, best, keep)
     return replace(result, response=replace(response, best=best, influences=hangs_on))
@@ -379,12 +378,6 @@ def _influences(
     except NotSolvedError as error:
         keep.clock.messages.append(f"what the best load hangs on is not known: {error}")
         return ()
-
-
-def _carried(settings: Settings, best: tuple[BestLoad, ...]) -> Settings:
-    """Where the curves of all loads begin: with the settings that the best load needed."""
-    found = [b.settings for b in best if not b.reason]
-    return found[0] if found else settings
 
 
 def _best_remarks(scene: Scene, best: tuple[BestLoad, ...]) -> Iterator[str]:
