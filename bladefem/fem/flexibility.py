@@ -17,7 +17,7 @@ from .body import rigid_modes
 from .constraint import Constrained, unknowns
 from .linalg import Factor, apply, dense_rows, dot, factorise, scale, solve
 
-__all__ = ["Flexibility", "compliance", "flexible", "rigid_basis"]
+__all__ = ["Flexibility", "compliance", "flexible", "rigid_basis", "unknown_places"]
 
 
 @dataclass(frozen=True)
@@ -72,7 +72,7 @@ def rigid_basis(con: Constrained) -> np.ndarray:
     R = rigid_modes(body).reshape(con.T.shape[0], -1).astype(con.dtype)
     weight = np.asarray(abs(con.T).max(1).todense()).ravel() > 0
     inside = np.repeat(body.rows >= 0, body.dim)
-    columns = _columns(con)
+    columns = unknown_places(con)
     q = R[columns]
     misfit = np.linalg.qr((R - con.T @ q)[inside | weight], mode="r")
     _, s, vh = np.linalg.svd(misfit)
@@ -84,8 +84,8 @@ def rigid_basis(con: Constrained) -> np.ndarray:
     return basis @ np.linalg.inv(np.linalg.cholesky(gram)).conj().T
 
 
-def _columns(con: Constrained) -> np.ndarray:
-    """Mesh-numbered freedom that each unknown is the value of."""
+def unknown_places(con: Constrained) -> np.ndarray:
+    """(n_free,) degree of freedom in mesh numbering whose value each unknown is."""
     T = con.T.tocoo()
     single = np.flatnonzero(np.diff(con.T.indptr) == 1)
     unit = np.isin(T.row, single) & (T.data == 1)

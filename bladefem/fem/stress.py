@@ -15,7 +15,7 @@ from ..errors import InputError
 from . import shape_functions as shape
 from .body import Body, lame
 
-__all__ = ["GaussStress", "gauss_stress", "nodal_stress", "principal", "von_mises"]
+__all__ = ["GaussStress", "gauss_stress", "nodal_stress", "patch_stress", "principal", "von_mises"]
 
 PAIRS = ((0, 0), (1, 1), (2, 2), (0, 1), (1, 2), (2, 0))
 # cells at a time
@@ -86,6 +86,32 @@ def nodal_stress(body: Body, u: np.ndarray, large: bool = False) -> np.ndarray:
         better = size > largest
         out[better], largest[better] = mean[better], size[better]
     return out
+
+
+def patch_stress(body: Body, u: np.ndarray, node: int) -> tuple[np.ndarray, np.ndarray]:
+    """(6,) stress at a node continued from the Gauss points of the cells round it, by polynomials
+    of first and of second degree fitted to them; the cells share a node with those that touch it.
+    """
+    mesh = body.mesh
+    places = []
+    stresses = []
+    for name in body.material:
+        cells = mesh.bodies[name]
+        near = cells[(cells == node).any(axis=1)]
+        if not len(near):
+            continue
+        some = cells[np.isin(cells, near).any(axis=1)]
+        at, _, stress = _of_cells(body, np.asarray(u)[:, : body.dim], name, some, False)
+        places.append(at.reshape(-1, 3)[:, : body.dim])
+        stresses.append(stress.reshape(-1, 6))
+    x = np.concatenate(places) - mesh.points[node, : body.dim]
+    x = x / np.abs(x).max()
+    values = np.concatenate(stresses)
+    linear = np.column_stack([np.ones(len(x)), x])
+    squares = [x[:, i] * x[:, j] for i in range(body.dim) for j in range(i, body.dim)]
+    quadratic = np.column_stack([linear, *squares])
+    fits = [np.linalg.lstsq(basis, values, rcond=None)[0][0] for basis in (linear, quadratic)]
+    return fits[0], fits[1]
 
 
 def von_mises(stress: np.ndarray) -> np.ndarray:

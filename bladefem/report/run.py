@@ -238,14 +238,24 @@ def _joined(parts: list[pd.DataFrame]) -> pd.DataFrame:
 
 
 def _summary(result: pipeline.Run) -> pd.DataFrame:
-    """The design table, with the alternating stress of the mode studied."""
+    """The design table, with the alternating stress at each resonance."""
     table = pd.DataFrame(summary(result.response.curves, result.response.limits))
     table.insert(
         table.columns.get_loc("reduction") + 1,
         "alternating_stress",
-        result.strength.alternating * table["peak_amplitude"],
+        _alternating(result, table["peak_amplitude"].to_numpy()),
     )
     return table
+
+
+def _alternating(result: pipeline.Run, amplitudes: np.ndarray) -> np.ndarray:
+    """(rows,) alternating stress [Pa] of the design table: of the whole motion at each load, of the
+    mode alone where all is linear, without damper and stuck.
+    """
+    stress = result.strength.alternating * amplitudes
+    if result.damped is not None:
+        stress[1:-1] = [one.largest for one in result.damped]
+    return stress
 
 
 def _stresses(found: Strength) -> pd.DataFrame:

@@ -44,6 +44,7 @@ from .assemble_model import LoadCase, joint_model
 from .best_load import BestLoad, chart_loads, find_best_load
 from .changed_cases import cases_of, changed_cases
 from .contact_cycle import labels
+from .damped_motion import DampedStress, damped_stress
 from .liftoff import named
 from .linear_limits import Limit, linear_limits
 from .loads import Curve, default_loads, study_loads
@@ -126,6 +127,8 @@ class Run:
     strength: Strength | None = None
     reduced: Reduced | None = None
     response: Response | None = None
+    # at the resonance of each curve, in their order
+    damped: list[DampedStress] | None = None
     # stage to seconds
     timings: dict[str, float] = field(default_factory=dict)
     messages: list[str] = field(default_factory=list)
@@ -221,7 +224,37 @@ def run(
     response = _response(scene, cases, family, settings, keep, clock, progress)
     with clock("influences"):
         hangs_on = _influences(scene, mesh, problem, family, best, keep)
-    return replace(result, response=replace(response, best=best, influences=hangs_on))
+    result = replace(result, response=replace(response, best=best, influences=hangs_on))
+    with clock("stresses"):
+        stressed = keep(
+            "damped_stress",
+            stage_key("stress", scene, [(c.load, c.mass, c.peak.f) for c in response.curves]),
+            lambda: _stresses(bodies, patches, result, cases),
+        )
+        clock.messages.append(_stress_sentence(response.curves, stressed))
+    return replace(result, damped=stressed)
+
+
+def _stresses(
+    bodies: Bodies, patches: Sequence[Patch], result: Run, cases: list[LoadCase]
+) -> list[DampedStress]:
+    """The stress at the resonance of each curve."""
+    return [
+        damped_stress(bodies, patches, result.modes, case, curve.peak, curve.settings.points)
+        for case, curve in zip(cases, result.response.curves, strict=True)
+    ]
+
+
+def _stress_sentence(curves: list[Curve], stressed: list[DampedStress]) -> str:
+    """The stress of the lowest resonance, and how far it can be trusted."""
+    best = min(range(len(curves)), key=lambda k: curves[k].peak_amplitude)
+    found = stressed[best]
+    place = ", ".join(f"{1e3 * x:.1f}" for x in found.place)
+    return (
+        f"alternating stress at the best load, {found.load:.4g} N: {1e-6 * found.largest:.4g} MPa "
+        f"at ({place}) mm, of all modes, harmonics and damper forces; by its mesh "
+        f"{found.mesh_error:.1%} uncertain there"
+    )
 
 
 @dataclass(frozen=True)

@@ -1,0 +1,87 @@
+"""Stress of periodic motion: the largest von Mises stress of all harmonics together, where, and how
+much of it the mesh leaves open.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from .body import Body
+from .stress import nodal_stress, patch_stress, von_mises
+
+__all__ = ["AlternatingStress", "alternating_stress", "mesh_error"]
+
+# instants of a period for each harmonic, the highest one included
+INSTANTS = 16
+# nodes that are followed in time: those with the largest sum of the harmonics' own stresses
+FOLLOWED = 4000
+# harmonics below this share of the largest one's displacement are left out
+NEGLIGIBLE = 1e-5
+
+
+@dataclass(frozen=True)
+class AlternatingStress:
+    """The largest von Mises stress that the alternating motion reaches in a period."""
+
+    # [Pa], at a node
+    largest: float
+    # (3,) where [m]
+    place: np.ndarray
+    # (H,) of each harmonic alone at that place, harmonic 1 first [Pa]
+    by_harmonic: np.ndarray
+    # estimated relative error by the mesh, see `mesh_error`
+    mesh_error: float
+
+
+def alternating_stress(body: Body, harmonics: np.ndarray) -> AlternatingStress:
+    """Stress of the motion Re(sum over h of u_h e^{j h w t}), by the recovered nodal stresses.
+
+    Args:
+        harmonics: (H, n_points, dim) complex displacements of harmonics 1..H [m].
+    """
+    size = np.array([np.abs(u).max() for u in harmonics])
+    kept = [h for h in range(len(harmonics)) if size[h] > NEGLIGIBLE * size.max()]
+    found = np.array([nodal_stress(body, harmonics[h]) for h in kept])
+    own = von_mises(found)
+    # the sum of the harmonics' own maxima bounds what they reach together
+    bound = own.sum(axis=0)
+    count = min(FOLLOWED, bound.size)
+    nodes = np.argpartition(bound, -count)[-count:]
+    instants = INSTANTS * (kept[-1] + 1)
+    angle = 2 * np.pi * np.arange(instants) / instants
+    turns = np.exp(1j * np.outer(angle, np.array(kept) + 1))
+    in_time = [von_mises(np.einsum("h,hns->ns", turn, found[:, nodes]).real) for turn in turns]
+    largest = np.max(in_time, axis=0)
+    worst = int(largest.argmax())
+    node = int(nodes[worst])
+    by_harmonic = np.zeros(len(harmonics))
+    by_harmonic[kept] = own[:, node]
+    strongest = int(own[:, node].argmax())
+    return AlternatingStress(
+        float(largest[worst]),
+        body.mesh.points[node],
+        by_harmonic,
+        mesh_error(body, harmonics[kept[strongest]], found[strongest], node),
+    )
+
+
+def mesh_error(body: Body, u: np.ndarray, recovered: np.ndarray, node: int) -> float:
+    """Relative error of the recovered stress at a node.
+
+    Polynomials of first and of second degree through the stresses at the Gauss points of the cells
+    round the node (superconvergent patch recovery, Zienkiewicz and Zhu 1992,
+    doi:10.1002/nme.1620330702) are continued to the node. The spread between them and the recovered
+    stress, and the jumps between the cells, are the estimate: where the stress varies too fast for
+    the elements, as at a sharp corner, these disagree however fine the mesh is.
+
+    Args:
+        u: (n_points, dim) displacements, complex or real [m].
+        recovered: (n_points, 6) their recovered stress [Pa].
+    """
+    here = recovered[node]
+    size = max(float(von_mises(here)), np.finfo(float).tiny)
+    first, second = patch_stress(body, u, node)
+    spread = (von_mises(first - here), von_mises(second - here), von_mises(first - second))
+    return float(max(spread) / size)

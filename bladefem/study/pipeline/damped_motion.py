@@ -1,0 +1,209 @@
+"""The blade's whole motion at a damped resonance: all modes, damper forces and harmonics.
+
+The balance knows the forces of the contacts and the excitation; with these as loads the finite
+elements give the displacement of every node, harmonic by harmonic, and the stress that decides.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from math import pi
+
+import numpy as np
+
+from ...data import Elements, ModeSet, Patch
+from ...friction.fourier import to_complex
+from ...hbm.model import Damping
+from ...hbm.solution import Solution
+from ...reduction.assemble import folded_diameter
+from ..adaptive.family import joined
+from .assemble_model import LoadCase
+from .contact_cycle import labels
+from .ports import blade_ports
+from .stages import Bodies, is_wheel
+
+__all__ = ["DampedMotion", "DampedStress", "blade_loads", "damped_motion", "damped_stress"]
+
+# highest harmonic's frequency over the highest mode's: beyond it the inertia series is too slow
+COVERED = 0.8
+
+
+@dataclass(frozen=True)
+class DampedMotion:
+    """Displacements of this blade at one point of a response."""
+
+    # of harmonic 1 [Hz]
+    frequency: float
+    # (H, n_points, dim) complex displacements of harmonics 1..H [m]
+    harmonics: np.ndarray
+    # (H,) complex, the same at the probe [m]
+    probe: np.ndarray
+    # |probe of the balance - probe| over the largest amplitude: what the reduction leaves out,
+    # and harmonics beyond the modes, whose displacements are left at zero
+    mismatch: float
+
+
+@dataclass(frozen=True)
+class DampedStress:
+    """The stress at the resonance of one load, of all modes, harmonics and damper forces."""
+
+    # of the curve [N]
+    load: float
+    # of the damper [kg]; as meshed when None
+    mass: float | None
+    # largest von Mises stress in a period [Pa]
+    largest: float
+    # (3,) where [m]
+    place: np.ndarray
+    # (H,) of each harmonic alone at that place [Pa]
+    by_harmonic: np.ndarray
+    # estimated relative error by the mesh
+    mesh_error: float
+    # of the motion at the probe against the balance, relative
+    mismatch: float
+
+
+def damped_motion(
+    bodies: Bodies,
+    patches: Sequence[Patch],
+    modes: Sequence[ModeSet],
+    case: LoadCase,
+    solution: Solution,
+    points: int | None = None,
+) -> DampedMotion:
+    """The field of displacements that belongs to a solved point.
+
+    Args:
+        modes: of the nodal diameters that the harmonics excite; a harmonic whose diameter is not
+            among them borrows the nearest one, as in the balance.
+        case: the load of the solution.
+        points: friction elements on each patch that the solution was made with; None for all.
+
+    """
+    from ...fem.forced_motion import forced_motion
+
+    scene = bodies.scene
+    mesh = bodies.mesh
+    ports = blade_ports(mesh, list(patches), scene.excitation)
+    loads = blade_loads(bodies, patches, case, solution, points)
+    seen = ports.matrix[:, ports.names["probe"]].toarray()[:, 0]
+    damping = Damping(ratio=scene.operation.damping)
+    waves = [_diameter(bodies, h) for h in range(1, solution.harmonics + 1)]
+    fields = np.zeros((solution.harmonics, len(mesh.points), mesh.dimension), complex)
+    for found in modes:
+        # harmonics of the same nodal diameter are solved together
+        highest = COVERED * 2 * np.pi * found.frequencies[-1]
+        own = [
+            h
+            for h, (n, _) in enumerate(waves)
+            if _nearest(modes, n) is found and (h + 1) * solution.omega < highest
+        ]
+        if not own:
+            continue
+        mirrored = np.array([waves[h][1] for h in own])
+        flex = bodies.factorised(found.nodal_diameter or 0)
+        # a wave of diameter -n is the conjugate of one of diameter n at the negative frequency
+        omega = (np.array(own) + 1) * solution.omega * np.where(mirrored, -1.0, 1.0)
+        viscous = damping.viscous(2 * np.pi * found.frequencies)
+        seen_loads = np.where(mirrored, loads[own].conj().T, loads[own].T)
+        u = forced_motion(flex, found, seen_loads, omega, viscous).displacement
+        fields[own] = np.where(mirrored, u.conj(), u).transpose(2, 0, 1)
+    probe = np.array([seen @ u.reshape(-1) for u in fields])
+    known = solution.probe[1:, 0]
+    mismatch = float(abs(probe - known).max() / max(abs(known).max(), np.finfo(float).tiny))
+    return DampedMotion(solution.frequency, fields, probe, mismatch)
+
+
+def damped_stress(
+    bodies: Bodies,
+    patches: Sequence[Patch],
+    modes: Sequence[ModeSet],
+    case: LoadCase,
+    solution: Solution,
+    points: int | None = None,
+) -> DampedStress:
+    """The largest alternating stress of the motion of `damped_motion`, which has the arguments."""
+    from ...fem.alternating_stress import alternating_stress
+
+    motion = damped_motion(bodies, patches, modes, case, solution, points)
+    found = alternating_stress(bodies.still_blade, motion.harmonics)
+    return DampedStress(
+        case.load,
+        case.mass,
+        found.largest,
+        found.place,
+        found.by_harmonic,
+        found.mesh_error,
+        motion.mismatch,
+    )
+
+
+def blade_loads(
+    bodies: Bodies,
+    patches: Sequence[Patch],
+    case: LoadCase,
+    solution: Solution,
+    points: int | None = None,
+) -> np.ndarray:
+    """(H, n_points*dim) complex loads on one blade in harmonics 1..H [N]: excitation and contacts.
+
+    The damper on the other side of this blade does what the one on this side does to the next
+    blade, an interblade phase earlier.
+    """
+    scene = bodies.scene
+    ports = blade_ports(bodies.mesh, list(patches), scene.excitation)
+    contact = ports.matrix[:, ports.names["contact"]]
+    excitation = ports.matrix[:, ports.names["load"]].toarray()[:, 0] * scene.excitation.force
+    forces = _node_forces(case, patches, solution, points)
+    rows = len(forces[0]) if len(forces) else 0
+    dim = bodies.mesh.dimension
+    following = np.zeros(contact.shape[1], bool)
+    following[len(patches[0].area) * dim :] = True
+    result = np.zeros((solution.harmonics, contact.shape[0]), complex)
+    for h in range(1, solution.harmonics + 1):
+        on_ports = case.selection @ forces[h].reshape(rows * forces.shape[2])
+        turned = np.where(following, np.exp(-1j * h * _interblade_phase(bodies)), 1.0) * on_ports
+        result[h - 1] = -(contact @ turned)
+    result[0] += excitation
+    return result
+
+
+def _node_forces(
+    case: LoadCase, patches: Sequence[Patch], solution: Solution, points: int | None
+) -> np.ndarray:
+    """(H+1, elements, 1 + tangents) complex forces of the case's own elements [N]."""
+    elements = case.elements
+    f = solution.f
+    if len(f) != len(elements.kt):
+        f = _shared_forces(elements, f, labels(list(patches), points))
+    missing = 1 + elements.tangents - f.shape[1]
+    f = np.concatenate([np.zeros((len(f), missing, f.shape[2])), f], axis=1)
+    n, d, K = f.shape
+    return to_complex(f.reshape(n * d, K)).T.reshape(-1, n, d)
+
+
+def _shared_forces(elements: Elements, f: np.ndarray, groups: np.ndarray) -> np.ndarray:
+    """Forces of joined elements, shared by their nodes as the joined motion weighs them."""
+    whole = joined(elements, groups).kt[groups]
+    share = np.divide(elements.kt, whole, out=np.ones_like(whole), where=whole > 0)
+    return share[:, None, None] * f[groups]
+
+
+def _diameter(bodies: Bodies, harmonic: int) -> tuple[int, bool]:
+    """Nodal diameter of a harmonic, and whether the conjugate wave is meant."""
+    if not is_wheel(bodies.mesh):
+        return 0, False
+    return folded_diameter(harmonic, bodies.scene.excitation.engine_order, bodies.mesh.sector.count)
+
+
+def _nearest(modes: Sequence[ModeSet], diameter: int) -> ModeSet:
+    """The modes of a nodal diameter, or of the nearest one that is there."""
+    return min(modes, key=lambda one: abs((one.nodal_diameter or 0) - diameter))
+
+
+def _interblade_phase(bodies: Bodies) -> float:
+    """Phase from blade to blade of harmonic 1 [rad]."""
+    if not is_wheel(bodies.mesh):
+        return float(bodies.scene.excitation.phase)
+    return 2 * pi * bodies.scene.excitation.engine_order / bodies.mesh.sector.count

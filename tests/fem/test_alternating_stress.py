@@ -1,0 +1,43 @@
+"""The estimated error of a largest stress is a promise: not below half of the true one."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from structured import box
+
+from bladefem.fem.alternating_stress import alternating_stress
+from bladefem.fem.body import assemble
+from bladefem.fem.constraint import constrain, expand, restrict
+from bladefem.fem.flexibility import compliance, flexible
+from bladefem.scene.tables import Material
+
+LENGTH, HEIGHT = 0.1, 0.01
+
+
+def bent(cells):
+    """Largest stress of a short cantilever under a force at its tip, and its estimated error."""
+    mesh = box(cells, (LENGTH, HEIGHT), "triangle6")
+    body = assemble(mesh, "blade", Material(nu=0.0), None)
+    con = constrain(body, "x0")
+    tip = np.unique(mesh.faces["x1"])
+    load = np.zeros((len(mesh.points), 2))
+    load[tip, 1] = 1.0 / len(tip)
+    u = expand(con, compliance(flexible(con), restrict(con, load.reshape(-1, 1))))[:, :, 0]
+    return alternating_stress(body, np.array([u + 0j]))
+
+
+@pytest.fixture(scope="module")
+def exact():
+    """At the clamped corner, by a fine mesh."""
+    return bent((160, 16)).largest
+
+
+@pytest.mark.parametrize("cells", [(5, 1), (10, 1), (10, 2), (20, 2), (40, 4)])
+def test_estimated_error_is_not_below_half_of_the_true_one(cells, exact):
+    found = bent(cells)
+    assert found.mesh_error >= 0.5 * abs(found.largest / exact - 1)
+
+
+def test_estimated_error_falls_with_the_mesh():
+    assert bent((40, 4)).mesh_error < 0.5 * bent((5, 1)).mesh_error
