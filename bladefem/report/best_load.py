@@ -44,7 +44,8 @@ def found_best(searched: pd.DataFrame, summary: pd.DataFrame) -> pd.Series | Non
     row = good.loc[good["amplitude"].idxmin()]
     best = row.rename({"amplitude": "peak_amplitude", "frequency": "peak_frequency"})
     if "alternating_stress" in summary:
-        per_metre = (summary["alternating_stress"] / summary["peak_amplitude"]).iloc[0]
+        nearest = (summary["load"] / best["load"] - 1).abs().idxmin()
+        per_metre = (summary["alternating_stress"] / summary["peak_amplitude"])[nearest]
         best = pd.concat(
             [best, pd.Series({"alternating_stress": per_metre * best["peak_amplitude"]})]
         )

@@ -17,9 +17,10 @@ from bladefem.study.pipeline.assemble_model import LoadCase
 from bladefem.study.pipeline.best_load import find_best_load
 
 PLANE = Path(__file__).parents[2] / "scenes" / "plane.toml"
-MODEL = reference_model(1e6, 0.06, 1.0, harmonics=7)
-SETTINGS = Settings(len(MODEL.sides[0].omega), 3, 0, "mass")
-SMALL = 1.02
+MODEL = reference_model(1e6, 0.06, 1.0, harmonics=1)
+SETTINGS = Settings(len(MODEL.sides[0].omega), 1, 0, "mass")
+# half of the range over which the derivatives are compared with repeated searches
+SMALL = 1.04
 
 
 def changed(name, factor):
@@ -46,7 +47,7 @@ def family(case):
 
 @pytest.fixture(scope="module")
 def found():
-    scene = load_scene(PLANE, ["accuracy=0.1 %", "contact.mu=1", "excitation.force=0.05 N"])
+    scene = load_scene(PLANE, ["accuracy=0.2 %", "contact.mu=1", "excitation.force=0.05 N"])
     scene = replace(scene, study=replace(scene.study, band=(1150.0, 1450.0)))
     best = find_best_load(scene, changed("kt", 1.0), family, SETTINGS, None)
     names = ("kt", "mu", "damping", "seat friction")
@@ -62,7 +63,8 @@ def test_derivatives_are_those_of_repeated_searches(found):
     for one in solved:
         change = np.log(one.solved[1] / one.solved[0]) / (2 * np.log(SMALL))
         assert one.amplitude == pytest.approx(change[1], rel=0.02)
-        assert one.frequency == pytest.approx(change[2], rel=0.05, abs=2e-3)
+        # a frequency is found to the square root of the search's tolerance only
+        assert one.frequency == pytest.approx(change[2], rel=0.1, abs=5e-3)
         assert one.load == pytest.approx(change[0], rel=0.1, abs=0.05)
 
 
