@@ -32,8 +32,10 @@ __all__ = [
     "stiffnesses",
 ]
 
-# tangential stiffness for each unit of area where the scene tells none [N/m^3]
-USUAL = 4e10
+# tangential stiffness per unit area where the scene gives none [N/m^3]: k_n = p / (0.4 roughness) of
+# ground seats of 1 um under some 4 MPa, the middle of 1e12 to 1e14 for metal joints; docs/contact.md
+# lists the sources
+USUAL = 1e13
 
 
 def mindlin_ratio(nu: float) -> float:
@@ -111,8 +113,8 @@ def stiffnesses(
 ) -> tuple[np.ndarray, np.ndarray]:
     """k_t and k_n (n,) [N/m] of the points of a patch.
 
-    Each is as given, else follows from the other by ``ratio`` = k_t / k_n; without either k_t has a
-    usual value.
+    Each is as given, else follows from the other by ``ratio`` = k_t / k_n; without either k_t is
+    USUAL.
 
     Args:
         area: (n,) what each point stands for [m^2]; totals are shared by it.

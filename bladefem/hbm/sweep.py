@@ -24,7 +24,7 @@ from .solver.newton import DEFAULTS, Options
 from .solver.point_compiled import solve_along
 from .validate_model import check_point, check_probe
 
-__all__ = ["first_look", "local_maxima", "response", "size", "solve_from", "sweep"]
+__all__ = ["FOLLOWED", "first_look", "local_maxima", "response", "size", "solve_from", "sweep"]
 
 Keep = Callable[[float, Callable[[], Solution]], Solution]
 # of the height with the frequency, at a solved one
@@ -119,6 +119,7 @@ def sweep(
     curve: float = 0.02,
     options: Options = DEFAULTS,
     notes: list[str] | None = None,
+    folds: bool = True,
 ) -> Iterator[Solution]:
     """Solve a band of circular frequencies [rad/s]; points come in the order of need, to be sorted
     by `omega`.
@@ -138,6 +139,7 @@ def sweep(
         curve: how far, as a share of the highest maximum, a point may lie off the line through its
             neighbours.
         notes: takes what the search could not do, in sentences.
+        folds: whether the response is followed round folds; without, one motion a frequency.
 
     Raises:
         InputError: the band is empty or not positive.
@@ -155,7 +157,7 @@ def sweep(
     for solution in response(model, first_look(model, band), H, samples, options=options):
         solved[solution.omega] = solution
         yield solution
-    while not _folds(model, solved, H, options.probe):
+    while not (folds and _folds(model, solved, H, options.probe)):
         wanted = _wanted(solved, slope, (peak, curve), options.probe)
         if wanted is None:
             return
@@ -164,7 +166,7 @@ def sweep(
                 f"the sweep ended after {BAND_LIMIT} points: peaks may be higher by more than "
                 "the accuracy"
             )
-            if not _lifting(model):
+            if not (folds and _lifting(model)):
                 return
             break
         near = sorted(

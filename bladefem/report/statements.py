@@ -7,11 +7,13 @@ from typing import NamedTuple
 import numpy as np
 import pandas as pd
 
+from bladefem.contact.interface_elements import USUAL, gives_stiffness
 from bladefem.scene.tables import Scene
+from bladefem.scene.units import show
 
 from .best_load import certainty, flat_range, found_best, reasons_against
 
-__all__ = ["Answer", "answer", "trust", "wrong_speed"]
+__all__ = ["Answer", "answer", "assumed_stiffness", "trust", "wrong_speed"]
 
 # of the resonance frequency: farther off, an engine order does not drive it
 APART = 0.1
@@ -136,6 +138,17 @@ def own_mass(
             f"{1e3 * mass * best['load'] / load:.3g} g",
             "at the same speed",
         ),
+    ]
+
+
+def assumed_stiffness(scene: Scene) -> list[str]:
+    """A caution where the scene gives no contact stiffness."""
+    if gives_stiffness(scene.contact):
+        return []
+    return [
+        f"The scene gives no contact stiffness: {show(USUAL, 'N/m^3')} (tangential) is assumed, "
+        "while metal joints lie between 1000 and 100 000 N/mm^3. Give contact.kt_area; "
+        "docs/contact.md lists measurements."
     ]
 
 

@@ -29,7 +29,7 @@ from .headlines import Headline, headlines
 from .library import chart_library
 from .next_steps import next_steps
 from .page_tables import page_tables
-from .statements import answer, trust, wrong_speed
+from .statements import answer, assumed_stiffness, trust, wrong_speed
 from .tables import numeric, readable, to_markdown
 
 __all__ = ["SECTIONS", "Page", "inputs_hash", "write_report"]
@@ -205,7 +205,7 @@ def _answer(scene: Scene, tables: Mapping[str, pd.DataFrame], page: Page) -> dic
     own = tables.get("contact/own_load")
     searched = tables.get("response/best_load")
     found = answer(summary, points, own, searched)
-    cautions = [*wrong_speed(scene, summary), *found.cautions]
+    cautions = [*assumed_stiffness(scene), *wrong_speed(scene, summary), *found.cautions]
     steps = next_steps(scene, cautions, summary, own)
     return {"numbers": headlines(found, summary, points, searched), "steps": [*steps, *page.steps]}
 

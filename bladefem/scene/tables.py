@@ -85,7 +85,7 @@ class Contact:
         1.0,
         1e15,
         "tangential contact stiffness for each unit of area; by Mindlin from the normal "
-        "one, 40 N/mm^3 without either",
+        "one, 10 000 N/mm^3 without either",
     )
     kt: float | None = quantity(None, "N/m", 1.0, 1e12, "tangential stiffness of one whole patch")
     kn_area: float | None = quantity(

@@ -15,10 +15,10 @@ from bladefem.io.run_folder import keep_given
 from bladefem.report.headlines import headlines
 from bladefem.report.next_steps import next_steps
 from bladefem.report.page_tables import page_tables, without_roundoff
-from bladefem.report.statements import answer, trust, wrong_speed
+from bladefem.report.statements import answer, assumed_stiffness, trust, wrong_speed
 from bladefem.report.tables import readable, to_latex, to_markdown, write_tables
 from bladefem.report.write import inputs_hash, write_report
-from bladefem.scene.tables import Excitation, Operation, Scene
+from bladefem.scene.tables import Contact, Excitation, Operation, Scene, Seat
 from bladefem.scene.toml import vary
 from bladefem.util.message import Message, method, warning
 
@@ -286,3 +286,12 @@ def test_next_steps_name_the_mass_to_try():
     kept = next_steps(Scene(), [], summary, own.assign(load=200.0))
     assert "keep its mass" in kept[0]
     assert next_steps(Scene(), ["widen"], summary, own)[0] == "widen"
+
+
+def test_an_assumed_contact_stiffness_is_told():
+    """Whichever of the stiffnesses is given, for both seats or for each, nothing is assumed."""
+    assert "10000 N/mm^3" in assumed_stiffness(Scene())[0]
+    seats = Contact(left=Seat(kn=1e7), right=Seat(kt_area=1e12))
+    for given in (Contact(kt_area=4e10), Contact(kn=1e7), Contact(stiffness="map"), seats):
+        assert assumed_stiffness(Scene(contact=given)) == []
+    assert assumed_stiffness(Scene(contact=Contact(left=Seat(kn=1e7))))

@@ -34,7 +34,9 @@ ENOUGH = 0.8
 LEAST = 0.05
 # unknowns of the largest balance that is chosen where contacts lift off: finer ones cost minutes a
 # curve there and lose points
-LIFTING = 3000
+LIFTING = 1500
+# the same of a model that only tells an error there
+LIFTING_JUDGE = 3000
 # contact points of the model that judges, over those of the judged one
 MORE_POINTS = 4
 # weight of a relative shift of the frequency beside a relative change of the height: an accuracy
@@ -46,7 +48,8 @@ SHIFT_WEIGHT = 5.0
 class PeakErrors:
     """How a peak moves in richer models, by what was made richer (settings.DIRECTIONS)."""
 
-    # relative change of its height; infinite where the richer model was not solved
+    # relative change of its height; infinite where the richer model was not solved, or is too large
+    # to be
     height: Mapping[str, float]
     # relative change of its frequency
     frequency: Mapping[str, float]
@@ -112,6 +115,10 @@ def peak_errors(family: Family, settings: Settings, peak: Peak, accuracy: float)
     for name in DIRECTIONS:
         other = None if name in exact else judge_settings(family, settings, name)
         if other is None:
+            continue
+        if _too_large(family, other, peak, LIFTING_JUDGE):
+            heights[name] = np.inf
+            shifts[name] = np.inf
             continue
         try:
             found = peak_from(family, settings, point, other, accuracy, fallbacks=False)
@@ -189,13 +196,13 @@ def _next_settings(
         if name not in settings.chosen or name in fixed or needs[name] <= LEAST * accuracy:
             continue
         better = enriched(settings, name, needs[name] / (ENOUGH * accuracy))
-        if better is not None and not _too_large(family, better, peak):
+        if better is not None and not _too_large(family, better, peak, LIFTING):
             return better
     return None
 
 
-def _too_large(family: Family, settings: Settings, peak: Peak) -> bool:
-    """Contacts lift off, and the balance would have more unknowns than LIFTING."""
+def _too_large(family: Family, settings: Settings, peak: Peak, limit: int) -> bool:
+    """Contacts lift off, and the balance would have more unknowns than a limit."""
     model = member(family, settings).model
     unknowns = model.springs.size * (2 * settings.harmonics + 1)
-    return peak.solution.states["lift"] > 0 and unknowns > LIFTING
+    return peak.solution.states["lift"] > 0 and unknowns > limit

@@ -10,7 +10,7 @@ import numpy as np
 from ...errors import NotSolvedError
 from ...hbm.peak import Peak
 from ...hbm.solution import Solution
-from ...hbm.sweep import size
+from ...hbm.sweep import FOLLOWED, size
 from .check_points import LOUDEST, QUIET, SHARES, heights_of, hidden, peak_of
 from .choice import Checked, covered, sufficient
 from .family import Family, member
@@ -18,7 +18,7 @@ from .indicators import moved, richer
 from .resonance_choice import PeakErrors, choose_at_peak, judge_settings, peak_from
 from .settings import Settings, enriched
 
-__all__ = ["resonance_curve"]
+__all__ = ["resonance_curve", "unfollowed"]
 
 # sweeps of one curve with ever richer settings
 PASSES = 3
@@ -51,7 +51,8 @@ def resonance_curve(
     for _ in range(PASSES):
         used, peak, errors = _chosen(family, used, peak_of(points), accuracy)
         span = band or (points[0].frequency, points[-1].frequency)
-        points = covered(member(family, used).model, used, span, mode, accuracy, widen)
+        folds = not unfollowed(family, used)
+        points = covered(member(family, used).model, used, span, mode, accuracy, widen, folds)
         points = _with_peak(points, peak)
         found = _checked_flanks(family, used, points, errors)
         loud = _checked_loud(family, used, points, accuracy)
@@ -62,6 +63,13 @@ def resonance_curve(
         elif size(peak_of(points)) <= (1 + accuracy / 2) * _height(peak, points):
             break
     return Checked(used, points, found)
+
+
+def unfollowed(family: Family, settings: Settings) -> bool:
+    """The balance has too many unknowns for following its motions round folds in a curve of many
+    points.
+    """
+    return member(family, settings).model.springs.size * (2 * settings.harmonics + 1) > FOLLOWED
 
 
 def _chosen(

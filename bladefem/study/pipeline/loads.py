@@ -20,7 +20,7 @@ from ..adaptive.check_points import peak_of
 from ..adaptive.choice import checked, estimated
 from ..adaptive.contact_mesh import halved_change
 from ..adaptive.family import Family, member
-from ..adaptive.resonance_curve import resonance_curve
+from ..adaptive.resonance_curve import resonance_curve, unfollowed
 from ..adaptive.settings import Settings, restarted
 from .assemble_model import LoadCase
 from .liftoff import named
@@ -83,6 +83,9 @@ class Curve:
     halved: float
     # the highest converged point
     peak: Solution
+    # contacts lift off and the balance is too large for following its motions round folds: a
+    # higher motion may exist
+    unfollowed: bool = False
 
     @property
     def peak_frequency(self) -> float:
@@ -159,6 +162,7 @@ def curve_of(
     marks = Stability(np.full(len(heights), ""), np.full(len(heights), np.nan))
     if scene.study.stability:
         marks = stability_of(member(models, curve.settings).model, curve.points)
+    lifts = any(p.states["lift"] > 0 for p in curve.points if p.converged)
     halved = np.nan if scene.contact.points else halved_change(models, curve.settings, top)
     return Curve(
         case.load,
@@ -172,6 +176,7 @@ def curve_of(
         marks.multiplier,
         halved,
         top,
+        lifts and unfollowed(models, curve.settings),
     )
 
 

@@ -563,6 +563,14 @@ def _remarks(scene: Scene, settings: Settings, curves: list[Curve], nodes: int) 
                 "marked in tables and pictures"
             )
         )
+    single = [f"{c.load:g} N" for c in curves if c.unfollowed]
+    if single:
+        remarks.append(
+            warning(
+                f"under {', '.join(single)} contacts lift off, and the response was not followed "
+                "round folds: a sweep sees one motion a frequency, a higher one may exist"
+            )
+        )
     for c in curves:
         near = np.flatnonzero(c.frequency == c.peak_frequency)[0] + np.array([-1, 1])
         if not c.converged[near[(near >= 0) & (near < len(c.frequency))]].all():
