@@ -38,7 +38,7 @@ from bladefem.hbm.solution import Solution
 from bladefem.hbm.solve import solve
 from bladefem.hbm.time_model import time_system
 from bladefem.time.event_integrator import State
-from bladefem.time.shooting import harmonics, periodic
+from bladefem.time.shooting import periodic_solution, probe_harmonics
 
 FREQUENCIES = {
     "single mass": (0.8, 1.1, 1.4),
@@ -72,7 +72,7 @@ def shooting(problem: Problem, omega: float, near: Solution) -> complex:
     w, f = (_complex(x).sum(axis=2).real[:, -1] for x in (near.w, near.f))
     start = State(signs * state[:, 0], signs * state[:, 1], w - f / problem.elements.kt)
     for _ in range(8):
-        found = periodic(system, omega, start, samples=8192)
+        found = periodic_solution(system, omega, start, samples=8192)
         if not found.converged:
             raise RuntimeError(found.reason)
         path, kt = found.flow, problem.elements.kt
@@ -81,7 +81,7 @@ def shooting(problem: Problem, omega: float, near: Solution) -> complex:
         if abs(off).max() < 1e-10 * abs(path.force).max():
             break
         start = replace(found.start, z=found.start.z + off / kt)
-    return harmonics(found, system, 1)[0, 1]
+    return probe_harmonics(found, system, 1)[0, 1]
 
 
 def marching(problem: Problem, omega: float, near: Solution, periods: int = 30) -> complex:

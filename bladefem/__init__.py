@@ -19,13 +19,15 @@ _WHERE = {
     "build_mesh": ".study.pipeline.stages",
     "find_modes": ".study.pipeline.stages",
     "load_scene": ".scene.toml",
+    "open": ".report.opened:open_run",
     "reduce_sector": ".study.pipeline.stages",
     "run": ".report.run",
     "seat_damper": ".study.pipeline.stages",
     "study_loads": ".study.pipeline.loads",
     "vary": ".scene.toml",
 }
-__all__ = sorted(_WHERE)
+# a star import must not hide Python's own open
+__all__ = sorted(name for name in _WHERE if name != "open")
 __getattr__ = loader(__name__, _WHERE)
 
 

@@ -22,12 +22,12 @@ _WHERE = {
     "find_branches": ".hbm.branches",
     "find_peak": ".hbm.peak",
     "follow": ".hbm.continuation",
-    "free": ".hbm.solve",
+    "free": ".hbm.solve:free_response",
     "local_maxima": ".hbm.sweep",
     "response": ".hbm.sweep",
     "size": ".hbm.sweep",
     "solve": ".hbm.solve",
-    "stuck": ".hbm.solve",
+    "stuck": ".hbm.solve:stuck_response",
     "sweep": ".hbm.sweep",
     "track_peak": ".hbm.peak",
     # parameters
@@ -36,8 +36,8 @@ _WHERE = {
     "sensitivities": ".hbm.sensitivity",
     "vary": ".hbm.parameters",
     # on disk and over ranks
-    "recorded": ".hbm.checkpoint",
-    "shared": ".hbm.parallel",
+    "recorded": ".hbm.checkpoint:response_with_checkpoints",
+    "shared": ".hbm.parallel:share_work",
     "shared_response": ".hbm.parallel",
 }
 __all__ = sorted(_WHERE)

@@ -20,7 +20,7 @@ from .errors import InputError
 __all__ = ["Elements", "ModeSet", "Patch", "PortModel", "PressureMap", "RigidBody"]
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, repr=False)
 class ModeSet:
     """Normal modes of a body or of a cyclic sector in one nodal diameter, mass-normalised."""
 
@@ -32,6 +32,15 @@ class ModeSet:
     nodal_diameter: int | None
     # (m,) |K x - w^2 M x| / |K x|, the certificate
     residuals: np.ndarray
+
+    def __repr__(self) -> str:
+        """
+        >>> ModeSet(np.array([220.9, 1236.6]), np.zeros((2, 3, 3)), None, np.zeros(2))
+        <2 modes, 220.9 to 1236.6 Hz>
+        """
+        wave = "" if self.nodal_diameter is None else f", nodal diameter {self.nodal_diameter}"
+        low, high = self.frequencies.min(), self.frequencies.max()
+        return f"<{len(self.frequencies)} modes, {low:.6g} to {high:.6g} Hz{wave}>"
 
 
 @dataclass(frozen=True)

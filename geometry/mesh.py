@@ -39,7 +39,7 @@ class Pair:
     shift: np.ndarray
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, repr=False)
 class Mesh:
     """A mesh with named bodies, faces, node sets and matched pairs. Node order inside an element is
     gmsh's.
@@ -71,6 +71,13 @@ class Mesh:
     report: dict[str, object] = field(default_factory=dict)
     # named volumes of the blade -> rows of bodies["blade"]
     parts: dict[str, np.ndarray] = field(default_factory=dict)
+
+    def __repr__(self) -> str:
+        bodies = ", ".join(f"{name} {len(cells)} cells" for name, cells in self.bodies.items())
+        return (
+            f"<mesh of {self.cell_type}: {len(self.points)} points, {bodies}; "
+            f"{len(self.faces)} named faces>"
+        )
 
     @property
     def dimension(self) -> int:

@@ -136,10 +136,10 @@ def iterate(
     c = (side.free if start is None else start)[:, side.rows]
     with np.errstate(all="ignore"):
         c, converged, reason = METHODS[method](g, c)
-    return _finish(method, g, c, converged, reason)
+    return _finished_result(method, g, c, converged, reason)
 
 
-def _finish(method: str, g: _Map, c: np.ndarray, converged: bool, reason: str) -> Iterated:
+def _finished_result(method: str, g: _Map, c: np.ndarray, converged: bool, reason: str) -> Iterated:
     side = g.side
     u = g.spread(c)
     force = np.full_like(u, np.nan)
@@ -153,7 +153,7 @@ def _finish(method: str, g: _Map, c: np.ndarray, converged: bool, reason: str) -
     return Iterated(method, u, probe, converged, error, g.calls, g.periods, reason, tuple(g.steps))
 
 
-def _loop(
+def _fixed_point_loop(
     g: _Map, c: np.ndarray, propose: Callable[[list, list], np.ndarray]
 ) -> tuple[np.ndarray, bool, str]:
     """The shell of all fixed-point methods: ``propose`` makes the next motion from the lists of
@@ -186,77 +186,81 @@ def _loop(
     return motions[-1], False, f"no convergence in {rules.most} evaluations"
 
 
-def _picard(g: _Map, c: np.ndarray) -> tuple[np.ndarray, bool, str]:
-    return _loop(g, c, lambda motions, images: images[-1])
+def _picard_iteration(g: _Map, c: np.ndarray) -> tuple[np.ndarray, bool, str]:
+    return _fixed_point_loop(g, c, lambda motions, images: images[-1])
 
 
-def _secant(u1: np.ndarray, u0: np.ndarray, g1: np.ndarray, g0: np.ndarray) -> np.ndarray:
+def _secant_step(u1: np.ndarray, u0: np.ndarray, g1: np.ndarray, g0: np.ndarray) -> np.ndarray:
     """Eq. 34, component by component; the image where the denominator vanishes."""
     below = g1 - u1 - g0 + u0
     return np.where(below != 0, (g1 * u0 - g0 * u1) / np.where(below != 0, below, 1), g1)
 
 
-def _amplitude(g: _Map, c: np.ndarray) -> tuple[np.ndarray, bool, str]:
+def _amplitude_form(g: _Map, c: np.ndarray) -> tuple[np.ndarray, bool, str]:
     def propose(motions: list, images: list) -> np.ndarray:
-        size = _secant(*(np.abs(x) for x in (motions[-1], motions[-2], images[-1], images[-2])))
+        size = _secant_step(
+            *(np.abs(x) for x in (motions[-1], motions[-2], images[-1], images[-2]))
+        )
         return np.abs(size) * np.exp(1j * np.angle(images[-1]))
 
-    return _loop(g, c, propose)
+    return _fixed_point_loop(g, c, propose)
 
 
-def _complex(g: _Map, c: np.ndarray) -> tuple[np.ndarray, bool, str]:
-    return _loop(
-        g, c, lambda motions, images: _secant(motions[-1], motions[-2], images[-1], images[-2])
+def _as_complex(g: _Map, c: np.ndarray) -> tuple[np.ndarray, bool, str]:
+    return _fixed_point_loop(
+        g, c, lambda motions, images: _secant_step(motions[-1], motions[-2], images[-1], images[-2])
     )
 
 
-def _parts(g: _Map, c: np.ndarray) -> tuple[np.ndarray, bool, str]:
+def _real_parts(g: _Map, c: np.ndarray) -> tuple[np.ndarray, bool, str]:
     def propose(motions: list, images: list) -> np.ndarray:
         four = (motions[-1], motions[-2], images[-1], images[-2])
-        return _secant(*(x.real for x in four)) + 1j * _secant(*(x.imag for x in four))
+        return _secant_step(*(x.real for x in four)) + 1j * _secant_step(*(x.imag for x in four))
 
-    return _loop(g, c, propose)
+    return _fixed_point_loop(g, c, propose)
 
 
-def _anderson(g: _Map, c: np.ndarray, depth: int = 5) -> tuple[np.ndarray, bool, str]:
+def _anderson_mixing(g: _Map, c: np.ndarray, depth: int = 5) -> tuple[np.ndarray, bool, str]:
     def propose(motions: list, images: list) -> np.ndarray:
-        x, y = (np.array([_real(v) for v in values[-depth - 1 :]]) for values in (motions, images))
+        x, y = (
+            np.array([_as_real(v) for v in values[-depth - 1 :]]) for values in (motions, images)
+        )
         f = y - x
         weights = np.linalg.lstsq((f[1:] - f[:-1]).T, f[-1], rcond=1e-10)[0]
-        return _packed(y[-1] - weights @ (y[1:] - y[:-1]), c.shape)
+        return _packed_motion(y[-1] - weights @ (y[1:] - y[:-1]), c.shape)
 
-    return _loop(g, c, propose)
+    return _fixed_point_loop(g, c, propose)
 
 
-def _describing(g: _Map, c: np.ndarray) -> tuple[np.ndarray, bool, str]:
+def _describing_function(g: _Map, c: np.ndarray) -> tuple[np.ndarray, bool, str]:
     """Newton on the additive residual, first from full stick, then from the motion without
     damper.
     """
     side = g.side
     stuck = balance(side, np.full_like(side.free, 1.0) * side.model.elements.kt)[:, side.rows]
-    found, converged, reason = _newton(g, stuck)
-    return (found, True, reason) if converged else _newton(g, c)
+    found, converged, reason = _damped_newton(g, stuck)
+    return (found, True, reason) if converged else _damped_newton(g, c)
 
 
-def _newton(g: _Map, c: np.ndarray) -> tuple[np.ndarray, bool, str]:
+def _damped_newton(g: _Map, c: np.ndarray) -> tuple[np.ndarray, bool, str]:
     """Step halving; Jacobian by differences in 2 H r directions."""
     side = g.side
     goal = min(g.rules.tolerance, 1e-2)
     most = g.calls + g.rules.most
 
     def r(x: np.ndarray) -> np.ndarray:
-        u = g.spread(_packed(x, c.shape))
-        return _real(residual(side, u, g.force(u))[:, side.rows])
+        u = g.spread(_packed_motion(x, c.shape))
+        return _as_real(residual(side, u, g.force(u))[:, side.rows])
 
-    x = _real(c)
+    x = _as_real(c)
     value = r(x)
     while g.calls < most:
         if np.linalg.norm(value) < goal * np.linalg.norm(x):
-            return _packed(x, c.shape), True, f"residual below {goal:.1e}"
+            return _packed_motion(x, c.shape), True, f"residual below {goal:.1e}"
         delta = 1e-6 * np.linalg.norm(x)
         J = np.column_stack([(r(x + delta * e) - value) / delta for e in np.eye(len(x))])
         if not np.isfinite(J).all():
-            return _packed(x, c.shape), False, f"damper not solved: {g.last.reason}"
+            return _packed_motion(x, c.shape), False, f"damper not solved: {g.last.reason}"
         step = np.linalg.lstsq(J, -value, rcond=None)[0]
         for halving in range(8):
             trial = x + step * 0.5**halving
@@ -264,26 +268,26 @@ def _newton(g: _Map, c: np.ndarray) -> tuple[np.ndarray, bool, str]:
             if np.linalg.norm(new) < np.linalg.norm(value):
                 break
         else:
-            return _packed(x, c.shape), False, "line search stalled"
+            return _packed_motion(x, c.shape), False, "line search stalled"
         x = trial
         value = new
-    return _packed(x, c.shape), False, f"no convergence in {g.rules.most} evaluations"
+    return _packed_motion(x, c.shape), False, f"no convergence in {g.rules.most} evaluations"
 
 
-def _real(c: np.ndarray) -> np.ndarray:
+def _as_real(c: np.ndarray) -> np.ndarray:
     return np.concatenate([c.real.ravel(), c.imag.ravel()])
 
 
-def _packed(x: np.ndarray, shape: tuple[int, ...]) -> np.ndarray:
+def _packed_motion(x: np.ndarray, shape: tuple[int, ...]) -> np.ndarray:
     half = len(x) // 2
     return (x[:half] + 1j * x[half:]).reshape(shape)
 
 
 METHODS = {
-    "picard": _picard,
-    "amplitude": _amplitude,
-    "complex": _complex,
-    "parts": _parts,
-    "anderson": _anderson,
-    "describing": _describing,
+    "picard": _picard_iteration,
+    "amplitude": _amplitude_form,
+    "complex": _as_complex,
+    "parts": _real_parts,
+    "anderson": _anderson_mixing,
+    "describing": _describing_function,
 }

@@ -22,7 +22,7 @@ from bladefem.hbm.solution import Solution
 from bladefem.hbm.solve import solve
 
 from ..time.event_integrator import State
-from ..time.shooting import Periodic, harmonics, multipliers, periodic
+from ..time.shooting import Periodic, floquet_multipliers, periodic_solution, probe_harmonics
 from ..time.system import System
 
 __all__ = ["BranchPoint", "branch", "inclined_contact", "state_of"]
@@ -102,20 +102,20 @@ def branch(
     low, high = (2 * np.pi * f for f in band)
     start = solve(model, high, H, samples)
     for point in follow(model, "omega", start, (low, high), forward=False, steps=(0.005, 0.02)):
-        shot = periodic(system, point.solution.omega, state_of(point.solution, system))
-        amplitude = float(abs(harmonics(shot, system, 1)[0, 1]))
+        shot = periodic_solution(system, point.solution.omega, state_of(point.solution, system))
+        amplitude = float(abs(probe_harmonics(shot, system, 1)[0, 1]))
         wanted = float(abs(point.solution.probe[1, 0]))
         yield BranchPoint(
             point.solution.frequency,
             amplitude,
             wanted,
-            float(np.abs(multipliers(shot)[0])),
+            float(np.abs(floquet_multipliers(shot)[0])),
             point.fold,
-            _verdict(shot, amplitude, wanted),
+            _stability_verdict(shot, amplitude, wanted),
         )
 
 
-def _verdict(shot: Periodic, amplitude: float, wanted: float) -> str:
+def _stability_verdict(shot: Periodic, amplitude: float, wanted: float) -> str:
     if shot.converged and abs(amplitude / wanted - 1) > NEAR:
         return "shooting went to another solution"
     return shot.reason

@@ -81,7 +81,7 @@ def newmark_march(system: System, omega: float, steps: int) -> March:
 
     def march(state: State) -> tuple[State, np.ndarray, np.ndarray, np.ndarray]:
         y = np.r_[state.q, state.v, state.z]
-        q, w, force, code = _newmark(arrays, y, inputs, h)
+        q, w, force, code = _newmark_step(arrays, y, inputs, h)
         if code:
             raise NotSolvedError(
                 f"Newmark step {code - 1} of {steps}: neither Newton nor Gauss-Seidel found the "
@@ -93,7 +93,7 @@ def newmark_march(system: System, omega: float, steps: int) -> March:
 
 
 @njit(cache=True)
-def _law(elastic, bound):
+def _friction_law(elastic, bound):
     return min(max(elastic, -bound), bound)
 
 
@@ -142,7 +142,7 @@ def contact_step(trial, load, kG, H, mu, f):
                 if k != i:
                     N -= H[i, k] * f[k]
                     e -= kG[i, k] * f[k]
-            new = _law(e / (1 + kG[i, i]), mu[i] * max(N - H[i, i] * f[i], 0.0))
+            new = _friction_law(e / (1 + kG[i, i]), mu[i] * max(N - H[i, i] * f[i], 0.0))
             worst = max(worst, abs(new - f[i]))
             f[i] = new
         if worst <= 1e-13 * size:
@@ -151,7 +151,7 @@ def contact_step(trial, load, kG, H, mu, f):
 
 
 @njit(cache=True)
-def _newmark(arrays, y, inputs, h):
+def _newmark_step(arrays, y, inputs, h):
     p, g, n0 = inputs
     L, D, W, V, kt, mu, S, G, H = arrays
     n, d = W.shape
@@ -169,7 +169,7 @@ def _newmark(arrays, y, inputs, h):
     w = g[0] + W @ q
     N = n0[0] + V @ q
     for i in range(n):
-        f[i] = _law(kt[i] * (w[i] - z[i]), mu[i] * max(N[i], 0.0))
+        f[i] = _friction_law(kt[i] * (w[i] - z[i]), mu[i] * max(N[i], 0.0))
         z[i] = w[i] - f[i] / kt[i]
     a = p[0] - L * q - D @ v - W.T @ f
     for m in range(1, steps + 1):

@@ -93,7 +93,7 @@ def settle(march: March, start: State, most: int, tolerance: float) -> Cycle:
         period += 1
         state, q, w, force = march(state)
         if last is not None:
-            residual = max(_change(q, last[0]), _change(force, last[1]))
+            residual = max(_relative_change(q, last[0]), _relative_change(force, last[1]))
         last = (q, force)
         if not np.isfinite(q[-1]).all():
             return Cycle(q, force, w, state, np.inf, period, "the motion grew beyond all bounds")
@@ -135,7 +135,7 @@ def explicit_march(system: System, omega: float, steps: int) -> March:
 
     def march(state: State) -> tuple[State, np.ndarray, np.ndarray, np.ndarray]:
         y = np.r_[state.q, state.v, state.z]
-        q, w, force = _leapfrog(arrays, y, inputs, 2 * np.pi / omega / steps)
+        q, w, force = _leapfrog_period(arrays, y, inputs, 2 * np.pi / omega / steps)
         return State(y[:d].copy(), y[d : 2 * d].copy(), y[2 * d :].copy()), q, w, force
 
     return march
@@ -157,7 +157,7 @@ def sampled(coefficients: np.ndarray, steps: int) -> np.ndarray:
     )
 
 
-def _change(now: np.ndarray, then: np.ndarray) -> float:
+def _relative_change(now: np.ndarray, then: np.ndarray) -> float:
     swing = np.abs(now - now.mean(axis=0)).max()
     return float(
         np.abs((now - now.mean(axis=0)) - (then - then.mean(axis=0))).max() / max(swing, 1e-300)
@@ -165,7 +165,7 @@ def _change(now: np.ndarray, then: np.ndarray) -> float:
 
 
 @njit(cache=True)
-def _leapfrog(arrays, y, inputs, dt):
+def _leapfrog_period(arrays, y, inputs, dt):
     L, D, W, V, kt, mu, react, rest_load = arrays
     p, g, n0 = inputs
     n, d = W.shape

@@ -110,7 +110,7 @@ def steady(
     while residual >= tolerance and period < most:
         period += 1
         motion = march(body, base, load, dt, start, drive.pull)
-        residual = _change(motion, last)
+        residual = _relative_change(motion, last)
         start = (motion.position[-1], motion.velocity[-1], motion.springs)
         last = motion
     reason = (
@@ -172,7 +172,7 @@ def ratio_table(
     return rows
 
 
-def _change(motion: Motion, last: Motion | None) -> float:
+def _relative_change(motion: Motion, last: Motion | None) -> float:
     """Largest relative change of velocity or force against the period before."""
     if last is None:
         return np.inf

@@ -22,13 +22,13 @@ from scipy import linalg
 
 from bladefem.data import RigidBody
 from bladefem.errors import InputError
-from bladefem.hbm.linear.condensation import receptance
+from bladefem.hbm.linear.bodies import port_receptance
 from bladefem.hbm.model import ReducedModel
 
 from ..friction.equivalent_linear import by_harmonic, from_harmonics
 from ..friction.fourier import to_real
 from ..time.event_integrator import State
-from ..time.shooting import periodic
+from ..time.shooting import periodic_solution
 from ..time.system import damper_on_platforms
 from .explicit import damper_cycle, stable_steps
 
@@ -101,12 +101,14 @@ def platform(model: ReducedModel, omega: float, harmonics: int) -> Platform:
     for h in range(1, harmonics + 1):
         side = model.side(h)
         rows = np.arange(len(side.residual))[side.ports["contact"]]
-        G.append(receptance(side, model.damping, h * omega, rows, rows))
+        G.append(port_receptance(side, model.damping, h * omega, rows, rows))
         load = model.excitation.get(
             h, np.zeros(len(np.arange(len(side.residual))[side.ports["load"]]))
         )
-        free.append(receptance(side, model.damping, h * omega, rows, side.ports["load"]) @ load)
-    rows = _independent(np.column_stack([*G, *[f[:, None] for f in free]]))
+        free.append(
+            port_receptance(side, model.damping, h * omega, rows, side.ports["load"]) @ load
+        )
+    rows = _independent_rows(np.column_stack([*G, *[f[:, None] for f in free]]))
     G = np.array(G, complex)
     free = np.array(free, complex)
     T = np.array([np.linalg.lstsq(g[rows].T, g.T, rcond=1e-10)[0].T for g in G])
@@ -138,13 +140,17 @@ def damper_response(
         steps = max(steps, stable_steps(system, side.omega), 4 * H)
         cycle = damper_cycle(system, side.omega, steps, start, most)
         return DamperResponse(
-            _lines(cycle.force, H), cycle.state, cycle.residual, cycle.periods, cycle.reason
+            _harmonic_lines(cycle.force, H),
+            cycle.state,
+            cycle.residual,
+            cycle.periods,
+            cycle.reason,
         )
     if how != "shooting":
         raise InputError(f"how = '{how}': expected 'march' or 'shooting'")
-    solution = periodic(system, side.omega, start, samples=max(256, 16 * H))
+    solution = periodic_solution(system, side.omega, start, samples=max(256, 16 * H))
     return DamperResponse(
-        _lines(solution.flow.force, H),
+        _harmonic_lines(solution.flow.force, H),
         solution.start,
         solution.residual,
         solution.periods,
@@ -181,11 +187,11 @@ def residual(side: Platform, u: np.ndarray, force: np.ndarray) -> np.ndarray:
     return u - side.free + np.einsum("hij,hj->hi", side.G, force)
 
 
-def _lines(signal: np.ndarray, H: int) -> np.ndarray:
+def _harmonic_lines(signal: np.ndarray, H: int) -> np.ndarray:
     return 2 * np.fft.rfft(signal, axis=0)[1 : H + 1] / len(signal)
 
 
-def _independent(columns: np.ndarray) -> np.ndarray:
+def _independent_rows(columns: np.ndarray) -> np.ndarray:
     """Rows whose motion fixes that of all others: pivots of a rank-revealing factorisation."""
     _, R, pivots = linalg.qr(columns.conj().T, pivoting=True, mode="economic")
     size = np.abs(np.diag(R))

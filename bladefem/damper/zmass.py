@@ -148,7 +148,7 @@ def march(
         InputError: the step is beyond the stability limit of the explicit march (2 over the highest
             stuck frequency).
     """
-    limit = stable_step(_fastest(body))
+    limit = stable_step(_highest_frequency(body))
     if not 0 < dt < limit:
         raise InputError(
             f"dt = {dt:.3g} s, expected a positive step below {limit:.3g} s, the stability limit "
@@ -157,9 +157,11 @@ def march(
         )
     n = len(body.footprint.share)
     position, velocity, springs = start or (np.zeros(3), np.zeros(3), np.zeros((n, 2)))
-    nodes = np.column_stack([body.footprint.points, _springs(body), body.mu * body.footprint.share])
+    nodes = np.column_stack(
+        [body.footprint.points, _node_springs(body), body.mu * body.footprint.share]
+    )
     springs = np.array(springs, float)
-    history = _march(
+    history = _leapfrog_march(
         np.r_[position, velocity],
         springs,
         nodes,
@@ -171,9 +173,9 @@ def march(
     return Motion(dt, history[:, :3], history[:, 3:6], history[:, 6:9], history[:, 9:], springs)
 
 
-def _fastest(body: MassOnFoundation) -> float:
+def _highest_frequency(body: MassOnFoundation) -> float:
     """Highest circular frequency of the fully stuck mass [rad/s]."""
-    k = _springs(body)
+    k = _node_springs(body)
     points = body.footprint.points
     offset = np.linalg.norm(k @ points)
     stiffness = np.array([[body.kt, offset], [offset, k @ (points**2).sum(axis=1)]])
@@ -181,7 +183,7 @@ def _fastest(body: MassOnFoundation) -> float:
     return float(np.sqrt(np.linalg.eigvalsh(stiffness * np.outer(scale, scale)).max()))
 
 
-def _springs(body: MassOnFoundation) -> np.ndarray:
+def _node_springs(body: MassOnFoundation) -> np.ndarray:
     """(n,) tangential stiffness of the nodes [N/m]; those without load still get a spring, however
     soft.
     """
@@ -190,7 +192,7 @@ def _springs(body: MassOnFoundation) -> np.ndarray:
 
 
 @njit(cache=True)
-def _friction(springs, nodes, turn, step, loads, out):
+def _friction_step(springs, nodes, turn, step, loads, out):
     """Friction of all nodes over one step; ``out``: force x, y, moment, slip x, y. ``loads``: total
     before, after.
     """
@@ -223,7 +225,7 @@ def _friction(springs, nodes, turn, step, loads, out):
 
 
 @njit(cache=True)
-def _march(state, springs, nodes, inertia, base, load, dt):
+def _leapfrog_march(state, springs, nodes, inertia, base, load, dt):
     """Leapfrog with the return map; (s, 11): position 3, velocity 3, force and moment 3, slip 2.
 
     ``inertia``: mass, moment of inertia, steady force along x and y.
@@ -235,7 +237,7 @@ def _march(state, springs, nodes, inertia, base, load, dt):
     v = state[3:].copy()
     out = np.zeros(5)
     step = np.zeros(2)
-    _friction(springs, nodes, (q[2], q[2]), step, (load[0], load[0]), out)
+    _friction_step(springs, nodes, (q[2], q[2]), step, (load[0], load[0]), out)
     still = np.array([inertia[2], inertia[3], 0.0]) / mass
     a = out[:3] / mass + still
     for n in range(steps):
@@ -243,7 +245,7 @@ def _march(state, springs, nodes, inertia, base, load, dt):
         turned = q[2] + dt * v[2]
         step[0] = base[n + 1, 0] - base[n, 0] - dt * v[0]
         step[1] = base[n + 1, 1] - base[n, 1] - dt * v[1]
-        _friction(springs, nodes, (q[2], turned), step, (load[n], load[n + 1]), out)
+        _friction_step(springs, nodes, (q[2], turned), step, (load[n], load[n + 1]), out)
         q += dt * v
         a = out[:3] / mass + still
         v += 0.5 * dt * a

@@ -18,7 +18,7 @@ from typing import Any
 
 import numpy as np
 
-from ..errors import NotSolvedError
+from ..errors import InputError, NotSolvedError
 from ..io.stage_cache import bind_h5py
 
 # before dolfinx, so that users may import h5py after it
@@ -26,16 +26,27 @@ bind_h5py()
 _setdlopenflags = sys.setdlopenflags
 # not even during the import: HDF5's symbols would stay global
 sys.setdlopenflags = lambda flags: None
-import petsc4py  # noqa: E402
+try:
+    import petsc4py
 
-# else a reader that closes the pipe (| head) aborts MPI
-petsc4py.init(["bladefem", "-no_signal_handler"])
-import dolfinx  # noqa: E402
-import dolfinx.fem.petsc  # noqa: E402
-import ufl  # noqa: E402
-from mpi4py import MPI  # noqa: E402
-from petsc4py import PETSc  # noqa: E402
-from slepc4py import SLEPc  # noqa: E402
+    # else a reader that closes the pipe (| head) aborts MPI
+    petsc4py.init(["bladefem", "-no_signal_handler"])
+    import dolfinx
+    import dolfinx.fem.petsc
+    import ufl
+    from mpi4py import MPI
+    from petsc4py import PETSc
+    from slepc4py import SLEPc
+except ModuleNotFoundError:
+    raise
+except (ImportError, AttributeError, RuntimeError) as error:
+    # a compiled module beside a numpy that it was not compiled for
+    raise InputError(
+        f"dolfinx cannot be loaded beside numpy {np.__version__} "
+        f"({str(error).strip().splitlines()[0] if str(error).strip() else type(error).__name__}); "
+        "expected the numpy that it was compiled with, on Debian 12: pip install "
+        "'bladefem[run,debian12]'"
+    ) from error
 
 sys.setdlopenflags = _setdlopenflags
 

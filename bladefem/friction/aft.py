@@ -1,8 +1,9 @@
 """Contact forces of all elements for periodic relative motion: harmonics, Jacobian, states and
 dissipated energy.
 
-Signs (data.py): w is blade minus damper in (normal, t1, t2); the blade feels -f. The normal force is
-max(0, n0 + kn w_n), the tangential one a return map of kt w onto |f| <= mu times it.
+Signs (data.py): w is blade minus damper in (normal, t1, t2); the blade feels -f. The normal force
+is max(0, n0 + kn w_n), the tangential one a return map of kt w onto |f| <= mu times it, or what a
+law of one's own says (`bladefem.friction.law`).
 """
 
 from __future__ import annotations
@@ -28,12 +29,12 @@ __all__ = [
     "SEPARATED",
     "STICK",
     "Forces",
-    "checked",
-    "dissipated",
+    "check_motion",
+    "dissipated_energy",
     "evaluate",
     "finite_load",
-    "states",
-    "verdict",
+    "contact_states",
+    "convergence_reason",
 ]
 
 SEPARATED = 0
@@ -111,13 +112,13 @@ def evaluate(
     was not periodic after ``cycles`` periods or the motion is not finite. Raises InputError for
     shapes that do not fit or too few samples (at least 4H+4).
     """
-    w, nodes = checked(elements, w)
+    w, nodes = check_motion(elements, w)
     if precision not in PRECISIONS:
         raise InputError(f"precision {precision!r}: expected one of {', '.join(PRECISIONS)}")
     n, d, K = w.shape
     if kernel not in KERNELS_2D:
         raise InputError(f"kernel {kernel!r}: expected one of {', '.join(KERNELS_2D)}")
-    load = _series(load, n, samples)
+    load = _prescribed_load(load, n, samples)
     if elements.law is not None:
         return _evaluate_laws(elements, w, samples, jacobian, load, cycles, precision)
     tab = tables(harmonics_of(w), samples)
@@ -131,13 +132,13 @@ def evaluate(
         J = KERNELS_2D[kernel](
             w, load, nodes, samples, precision, cycles, jacobian, F, shares, used
         )
-    reason = verdict(F, used, f"were not periodic after {cycles} cycles")
+    reason = convergence_reason(F, used, f"were not periodic after {cycles} cycles")
     return Forces(
         F,
         J.reshape(n, d, K, d, K) if jacobian else None,
-        states(shares),
+        contact_states(shares),
         shares,
-        dissipated(F, w),
+        dissipated_energy(F, w),
         np.abs(used),
         reason == PERIODIC,
         reason,
@@ -184,13 +185,20 @@ def _evaluate_laws(
         shares[rows] = part.shares
         if J is not None:
             J[rows] = part.dfdw
-    reason = verdict(F, used, f"were not periodic after {cycles} cycles")
+    reason = convergence_reason(F, used, f"were not periodic after {cycles} cycles")
     return Forces(
-        F, J, states(shares), shares, dissipated(F, w), np.abs(used), reason == PERIODIC, reason
+        F,
+        J,
+        contact_states(shares),
+        shares,
+        dissipated_energy(F, w),
+        np.abs(used),
+        reason == PERIODIC,
+        reason,
     )
 
 
-def verdict(f: np.ndarray, used: np.ndarray, failure: str) -> str:
+def convergence_reason(f: np.ndarray, used: np.ndarray, failure: str) -> str:
     """PERIODIC, or the failure of the elements with used < 0, or that forces f are not finite."""
     failed = int(np.count_nonzero(used < 0))
     if failed:
@@ -200,7 +208,7 @@ def verdict(f: np.ndarray, used: np.ndarray, failure: str) -> str:
     )
 
 
-def dissipated(f: np.ndarray, w: np.ndarray) -> np.ndarray:
+def dissipated_energy(f: np.ndarray, w: np.ndarray) -> np.ndarray:
     """(n,) work of the tangential forces f (n, d, K) on w (n, d, K) in one cycle [J], exact for
     these harmonics.
     """
@@ -210,7 +218,7 @@ def dissipated(f: np.ndarray, w: np.ndarray) -> np.ndarray:
     return np.pi * np.einsum("ndh,h->n", c * w[:, 1:, 2::2] - s * w[:, 1:, 1::2], h)
 
 
-def states(shares: np.ndarray) -> np.ndarray:
+def contact_states(shares: np.ndarray) -> np.ndarray:
     """(n,) state codes from the shares (n, 3) of stick, slip and separation."""
     stick = shares[:, 0]
     slip = shares[:, 1]
@@ -220,7 +228,7 @@ def states(shares: np.ndarray) -> np.ndarray:
     return np.where(stick + slip > 1e-12, code, SEPARATED)
 
 
-def checked(elements: Elements, w: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+def check_motion(elements: Elements, w: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """w (n, d, K) and the table (n, 4) of kt, kn, mu, n0, which fit each other; raises InputError
     where they do not.
     """
@@ -245,7 +253,7 @@ def checked(elements: Elements, w: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     return w, np.ascontiguousarray(nodes)
 
 
-def _series(load: np.ndarray | None, n: int, samples: int) -> np.ndarray:
+def _prescribed_load(load: np.ndarray | None, n: int, samples: int) -> np.ndarray:
     """(n, samples) prescribed loads, or (n, 0) for none."""
     if load is None:
         return np.zeros((n, 0))

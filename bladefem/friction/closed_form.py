@@ -36,7 +36,8 @@ class Linearised:
 
 
 def jenkins(amplitude: np.ndarray, kt: float, limit: float) -> Linearised:
-    """First-harmonic stiffness, damping and energy of a Jenkins element with |f| <= limit [N] at an amplitude [m].
+    """First-harmonic stiffness, damping and energy of a Jenkins element with |f| <= limit [N] at an
+    amplitude [m].
 
     k_eq = (k/pi) (theta* - sin(2 theta*) / 2), omega c_eq = (k/pi) sin^2 theta*, W = 4 F (A - F/k).
     """
@@ -76,7 +77,7 @@ def jenkins_coefficients(amplitude: float, kt: float, limit: float, H: int) -> n
             np.sin(up * theta) / up + _sin_over(down, theta)
         )
         sin_part = offset * (1 - np.cos(h * theta)) / h + both * (
-            (1 - np.cos(up * theta)) / up + _versine(down, theta)
+            (1 - np.cos(up * theta)) / up + _integral_of_sine(down, theta)
         )
         cos_part += limit * np.sin(h * theta) / h
         sin_part -= limit * (np.cos(h * theta) - np.cos(h * np.pi)) / h
@@ -89,7 +90,7 @@ def _sin_over(p: int, theta: float) -> float:
     return theta if p == 0 else np.sin(p * theta) / p
 
 
-def _versine(p: int, theta: float) -> float:
+def _integral_of_sine(p: int, theta: float) -> float:
     """Integral of sin(p tau) from 0 to theta."""
     return 0.0 if p == 0 else (1 - np.cos(p * theta)) / p
 

@@ -1,10 +1,13 @@
-"""One edge of a 2-D Coulomb element: the force turns on the circle |f| = mu N along a straight motion.
+"""One edge of a 2-D Coulomb element: the force turns on the circle |f| = mu N along a straight
+motion.
 
-The path is a polygon whose edges touch the motion at the samples and whose knots lie half-way between them. Along an
-edge in slip the angle psi between force and motion obeys R psi' = -k |w'| sin psi, so that tan(psi/2) falls by a
-factor E (Krieg & Krieg 1977, doi:10.1115/1.3454568, for von Mises plasticity). With E = (sqrt(1 + x^2/4) - x/2)^2,
-x = k |dw| / R, in place of exp(-x), a circular orbit is exact at any number of samples (while its lag exceeds half a
-step), and the error is second order from soft to rigid Coulomb friction; plain radial return lags by half a step.
+The path is a polygon whose edges touch the motion at the samples and whose knots lie half-way
+between them. Along an edge in slip the angle psi between force and motion obeys
+R psi' = -k |w'| sin psi, so that tan(psi/2) falls by a factor E (Krieg & Krieg 1977,
+doi:10.1115/1.3454568, for von Mises plasticity). With E = (sqrt(1 + x^2/4) - x/2)^2,
+x = k |dw| / R, in place of exp(-x), a circular orbit is exact at any number of samples (while its
+lag exceeds half a step), and the error is second order from soft to rigid Coulomb friction; plain
+radial return lags by half a step.
 """
 
 from __future__ import annotations
@@ -34,7 +37,9 @@ def decay(x):
 
 @njit(cache=True, error_model="numpy", inline="always")
 def crossing(fx, fy, dx, dy, R0, dR):
-    """Share of the edge after which |f + s d| reaches R0 + s dR; 0 if it starts on the circle and leaves it."""
+    """Share of the edge after which |f + s d| reaches R0 + s dR; 0 if it starts on the circle and
+    leaves it.
+    """
     A = dx * dx + dy * dy - dR * dR
     B = fx * dx + fy * dy - R0 * dR
     C = min(fx * fx + fy * fy - R0 * R0, 0.0)

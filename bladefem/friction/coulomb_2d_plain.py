@@ -1,12 +1,12 @@
 """Sampled 2-D Coulomb elements, written plainly: the definition of what `bladefem.friction.simd`
 computes in vectors, its judge in the tests, and its fallback.
 
-The force is marched from edge to edge of the polygon round the motion (`coulomb_2d.edge`), the force
-at a sample is that in the middle of its edge (`coulomb_2d.middle`). Its derivative by the
+The force is marched from edge to edge of the polygon round the motion (`coulomb_2d.edge`), the
+force at a sample is that in the middle of its edge (`coulomb_2d.middle`). Its derivative by the
 coefficients is carried along as two rows, with two more columns by the force at the start. Marching
 ends when the force repeats itself; the derivative of the periodic force then follows from that of
-the period map, where it has one, else from the march itself. Some 35 to 70 times
-as slow as the vector kernel, as it carries the derivative through every period that it marches.
+the period map, where it has one, else from the march itself. Some 35 to 70 times as slow as the
+vector kernel, as it carries the derivative through every period that it marches.
 """
 
 from __future__ import annotations

@@ -15,8 +15,9 @@ def free_static_force(elements: Elements, w: np.ndarray, samples: int = 512) -> 
     """(n,) size up to which any static friction force is in equilibrium with the vibration w [N]; 0
     where it slips, and nan for laws other than Coulomb's.
 
-    A stuck node may carry any mean force within [-r, r], r = min over the period of mu N - k_t |w_t - its mean|
-    (mu N - k_t A where N is constant): its history decides, and vibration does not tell. Sampled.
+    A stuck node may carry any mean force within [-r, r], r = min over the period of
+    mu N - k_t |w_t - its mean| (mu N - k_t A where N is constant): its history decides, which
+    vibration does not determine. Sampled.
     """
     T = synthesis(harmonics_of(w), samples)
     load = np.asarray(elements.n0)[:, None] + np.asarray(elements.kn)[:, None] * (w[:, 0] @ T.T)

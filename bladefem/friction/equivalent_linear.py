@@ -43,7 +43,7 @@ def from_series(u: np.ndarray, f: np.ndarray, omega: float) -> Approximation:
     """
     u = np.asarray(u, dtype=float)
     f = np.asarray(f, dtype=float)
-    rate = _rate(u, omega)
+    rate = _time_derivative(u, omega)
     mean = u.mean(-1)
     moving = u - mean[..., None]
     moving[np.abs(moving).max(-1) == 0] = np.nan
@@ -99,7 +99,7 @@ def force_of(approximation: Approximation, u: np.ndarray, omega: float) -> np.nd
         np.asarray(x)[..., None]
         for x in (approximation.stiffness, approximation.damping, approximation.constant)
     )
-    return K * u + C * _rate(u, omega) + constant
+    return K * u + C * _time_derivative(u, omega) + constant
 
 
 def work_of(approximation: Approximation, u: np.ndarray, omega: float) -> np.ndarray:
@@ -111,7 +111,7 @@ def work_of(approximation: Approximation, u: np.ndarray, omega: float) -> np.nda
     )
 
 
-def _rate(u: np.ndarray, omega: float) -> np.ndarray:
+def _time_derivative(u: np.ndarray, omega: float) -> np.ndarray:
     """(..., samples) du/dt of the trigonometric interpolation."""
     S = u.shape[-1]
     spectrum = np.fft.rfft(u) * 1j * np.arange(S // 2 + 1)

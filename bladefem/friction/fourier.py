@@ -11,7 +11,15 @@ import numpy as np
 
 from bladefem.errors import InputError
 
-__all__ = ["analysis", "derivative", "harmonics_of", "synthesis", "times", "to_complex", "to_real"]
+__all__ = [
+    "analysis",
+    "derivative",
+    "harmonics_of",
+    "synthesis",
+    "sample_instants",
+    "to_complex",
+    "to_real",
+]
 
 
 def harmonics_of(coefficients: np.ndarray) -> int:
@@ -46,14 +54,14 @@ def to_real(amplitudes: np.ndarray) -> np.ndarray:
     return c
 
 
-def times(samples: int) -> np.ndarray:
+def sample_instants(samples: int) -> np.ndarray:
     """(samples,) instants tau = 2 pi i / samples of one period [rad]."""
     return 2 * np.pi / samples * np.arange(samples)
 
 
 def synthesis(H: int, samples: int, shift: float = 0.0) -> np.ndarray:
     """(samples, 2H+1) matrix from coefficients to values at tau = 2 pi (i + shift) / samples."""
-    phase = np.outer(times(samples) + 2 * np.pi * shift / samples, np.arange(1, H + 1))
+    phase = np.outer(sample_instants(samples) + 2 * np.pi * shift / samples, np.arange(1, H + 1))
     T = np.ones((samples, 2 * H + 1))
     T[:, 1::2] = np.cos(phase)
     T[:, 2::2] = np.sin(phase)

@@ -20,11 +20,11 @@ from bladefem.errors import InputError
 from bladefem.friction.aft import (
     PERIODIC,
     Forces,
-    checked,
-    dissipated,
+    check_motion,
+    contact_states,
+    convergence_reason,
+    dissipated_energy,
     finite_load,
-    states,
-    verdict,
 )
 from bladefem.friction.fourier import harmonics_of
 from bladefem.friction.kernel_1d import SEPARATED, SLIP_DOWN, SLIP_UP, STICK, assemble
@@ -69,7 +69,7 @@ def evaluate_exact(
     Forces.converged is False where a period has more than 512 transitions, a bracket more than 25,
     or the motion is not finite.
     """
-    w, nodes = checked(elements, w)
+    w, nodes = check_motion(elements, w)
     n, d, K = w.shape
     if d != 2:
         raise InputError(
@@ -93,15 +93,15 @@ def evaluate_exact(
     shares = np.empty((n, 3))
     counts = np.empty(n, dtype=np.int64)
     _batch(w, base, nodes, brackets, F, J, shares, counts)
-    reason = verdict(
+    reason = convergence_reason(
         F, counts, f"have more than {MOST} transitions a period, or {MOST_AT_ONCE} nearly at once"
     )
     return Forces(
         F,
         J if jacobian else None,
-        states(shares),
+        contact_states(shares),
         shares,
-        dissipated(F, w),
+        dissipated_energy(F, w),
         np.full(n, 2),
         reason == PERIODIC,
         reason,
@@ -114,7 +114,7 @@ def transitions(
     """Stretches (start, end, state) of the steady period of a single 1-D element, w (1, 2, 2H+1);
     for pictures.
     """
-    w, nodes = checked(elements, w)
+    w, nodes = check_motion(elements, w)
     K = w.shape[2]
     base = np.zeros(K)
     base[0] = nodes[0, 3]

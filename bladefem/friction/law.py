@@ -69,7 +69,8 @@ class FrictionLaw:
         load: np.ndarray,
         elements: Elements,
     ) -> np.ndarray:
-        """The state (n, s) after a straight increment (n, t) [m] under loads (n,) before and now [N].
+        """The state (n, s) after a straight increment (n, t) [m] under loads (n,) before and now
+        [N].
 
         Args:
             elements: the n elements of this law, with kt, mu, n0 as parameters.
@@ -182,7 +183,7 @@ def slopes_of(
     own = law.slopes(state, increment, before, load, elements)
     if own is not None:
         return own
-    n, s = state.shape
+    s = state.shape[1]
     t = increment.shape[1]
     move = DIFFERENCE * sizes
     push = DIFFERENCE * np.maximum(abs(state).max(axis=1), elements.kt * sizes)

@@ -3,9 +3,9 @@
 The state is stepped along straight increments between the samples. What one period does to it is a
 map; its fixed point is found by marching two periods and then by Newton with the map's derivative,
 node by node. The derivative of the periodic force by the motion follows from the same fixed point:
-with x0 the state at the start, x0' = Phi x0' + q, where Phi is the map's derivative by the state and
-q by the motion. Where I - Phi is singular (a node that sticks remembers its start) the derivative of
-the first step from rest rules.
+with x0 the state at the start, x0' = Phi x0' + q, where Phi is the map's derivative by the state
+and q by the motion. Where I - Phi is singular (a node that sticks remembers its start) the
+derivative of the first step from rest rules.
 
 Only the march runs sample after sample, with all nodes at once; derivatives of the steps are asked
 of the law for all samples in one call. The arrays run over samples first: (S, n, ..).
@@ -138,11 +138,11 @@ def periodic_forces(
     before = np.concatenate([start[None], states[:-1]])
     dfdw = None
     if jacobian:
-        dfdw = _derivative(period, first, before, states, u, (basis, weights))
-    return LawForces(f, dfdw, _shares(period, before, states), used)
+        dfdw = _force_derivative(period, first, before, states, u, (basis, weights))
+    return LawForces(f, dfdw, _state_shares(period, before, states), used)
 
 
-def _march(steps: _Steps, start: np.ndarray) -> np.ndarray:
+def _march_period(steps: _Steps, start: np.ndarray) -> np.ndarray:
     """(S, n, s) states at the samples of a period, which begins in the state (n, s)."""
     increments, before, load = steps.arguments
     states = np.empty((len(load), *start.shape))
@@ -155,7 +155,7 @@ def _march(steps: _Steps, start: np.ndarray) -> np.ndarray:
     return states
 
 
-def _slopes(steps: _Steps, before: np.ndarray) -> Slopes:
+def _step_slopes(steps: _Steps, before: np.ndarray) -> Slopes:
     """Derivatives of all steps from the states (S, n, s) before them, arrays (S, n, ..): by the
     state, the whole increment and both loads; zero where a step ends open.
     """
@@ -196,13 +196,13 @@ def _periodic_state(
     """
     _, n, t = period.increment.shape
     s = period.law.variables or t
-    start = _march(first, np.zeros((n, s)))[0]
+    start = _march_period(first, np.zeros((n, s)))[0]
     used = np.full(n, -limit)
     # the last state that marching alone led to, and the residual there
     safe = start
     last = np.full(n, np.inf)
     for cycle in range(1, limit + 1):
-        states = _march(period, start)
+        states = _march_period(period, start)
         end = states[-1]
         residual = np.linalg.norm(end - start, axis=1)
         largest = np.maximum(abs(states).max(axis=(0, 2)), np.finfo(float).tiny)
@@ -215,7 +215,7 @@ def _periodic_state(
         ahead = safe
         if cycle >= MARCHED_PERIODS:
             before = np.concatenate([start[None], states[:-1]])
-            left = _inverse_of_change(_product(_slopes(period, before).state))
+            left = _inverse_of_change(_ordered_product(_step_slopes(period, before).state))
             newton = start + (left @ (end - start)[:, :, None])[:, :, 0]
             ahead = np.where(better, newton, safe)
         last = np.where(better[:, 0], residual, np.inf)
@@ -224,7 +224,7 @@ def _periodic_state(
     return start, states, used
 
 
-def _product(factors: np.ndarray) -> np.ndarray:
+def _ordered_product(factors: np.ndarray) -> np.ndarray:
     """(n, s, s) product of (S, n, s, s), the last one on the left."""
     while len(factors) > 1:
         if len(factors) % 2:
@@ -242,7 +242,7 @@ def _inverse_of_change(phi: np.ndarray) -> np.ndarray:
     return np.swapaxes(vh, 1, 2) @ (inverse[:, :, None] * np.swapaxes(u, 1, 2))
 
 
-def _shares(period: _Steps, before: np.ndarray, states: np.ndarray) -> np.ndarray:
+def _state_shares(period: _Steps, before: np.ndarray, states: np.ndarray) -> np.ndarray:
     """(n, 3) share of the samples in stick, slip and separation."""
     S, n, s = states.shape
     slips = period.law.slipping(
@@ -258,7 +258,7 @@ def _shares(period: _Steps, before: np.ndarray, states: np.ndarray) -> np.ndarra
     return shares
 
 
-def _derivative(
+def _force_derivative(
     period: _Steps,
     first: _Steps,
     before: np.ndarray,
@@ -276,7 +276,7 @@ def _derivative(
     t = u.shape[2]
     K = basis.shape[1]
     kn = period.elements.kn
-    slopes = _slopes(period, before)
+    slopes = _step_slopes(period, before)
     by_state, by_motion, by_load = _force_slopes(period, states, u)
     earlier = np.roll(basis, 1, axis=0)
     by_start = np.zeros((n, K, t * s))
@@ -291,7 +291,7 @@ def _derivative(
         carried += weights[:, i, None] * (by_state[i] @ Q).reshape(n, 1, -1)
     rest = np.zeros((1, n, s))
     last = (basis[-1], basis[-1])
-    started = _by_coefficients(_slopes(first, rest), 0, kn, last, basis[-1])
+    started = _by_coefficients(_step_slopes(first, rest), 0, kn, last, basis[-1])
     x0 = started + _inverse_of_change(P) @ (Q + P @ started - started)
     J = np.zeros((n, 1 + t, K, (1 + t) * K))
     pressed = weights[:, :, None] * (period.closed * kn)[None]

@@ -13,10 +13,10 @@ from .solution import Solution
 from .solver.newton import DEFAULTS, Options
 from .sweep import response
 
-__all__ = ["recorded"]
+__all__ = ["response_with_checkpoints"]
 
 
-def recorded(
+def response_with_checkpoints(
     folder: str | Path,
     model: ReducedModel,
     omegas: Iterable[float],

@@ -12,10 +12,10 @@ import numpy as np
 from ..errors import InputError, NotSolvedError
 from .linear.condensation import condense
 from .model import ReducedModel
-from .parameters import check_parameter, inner, outer, vary
+from .parameters import check_parameter, parameter_value, path_coordinate, vary
 from .solution import Solution
 from .solve import as_solution, solve
-from .solver.arclength import Spot, Task, advance, spot_at
+from .solver.arclength import Spot, Task, advance_path, spot_at
 from .solver.fallback import Attempt, solve_balance
 from .solver.newton import DEFAULTS, Newton, Options
 from .solver.residual import Balance, State, evaluate_balance
@@ -77,29 +77,29 @@ def follow(
         InputError: unknown parameter, or a start outside the bounds.
         NotSolvedError: the path could not be followed further; the message says why.
     """
-    task, x, state = _prepare(model, name, start, bounds, options)
-    low, high = (inner(name, bound) for bound in bounds)
+    task, x, state = _prepare_path(model, name, start, bounds, options)
+    low, high = (path_coordinate(name, bound) for bound in bounds)
     spot = spot_at(task, x, task.balance(x), state, 0, 1.0 if forward else -1.0)
-    yield _point(task, spot)
+    yield _path_point(task, spot)
     step, longest = steps
     restarts = 0
     for _ in range(LIMIT):
         before = spot
         try:
-            spot, step, fold = advance(task, spot, step, longest)
+            spot, step, fold = advance_path(task, spot, step, longest)
         except NotSolvedError as error:
             restarts += 1
             begun = _begun_again(task, spot, (low, high)) if restarts <= MOST_RESTARTS else None
             if begun is None:
                 raise
             spot, step = begun, steps[0]
-            yield replace(_point(task, spot), restarted=str(error))
+            yield replace(_path_point(task, spot), restarted=str(error))
             continue
-        yield _point(task, spot, fold, spot.branches(before))
+        yield _path_point(task, spot, fold, spot.branches(before))
         if not low <= spot.x <= high:
             return
     raise NotSolvedError(
-        f"path in {name} stopped at {outer(name, spot.x):.6g} after {LIMIT} points"
+        f"path in {name} stopped at {parameter_value(name, spot.x):.6g} after {LIMIT} points"
     )
 
 
@@ -124,7 +124,7 @@ def _begun_again(task: Task, spot: Spot, bounds: tuple[float, float]) -> Spot | 
     return None
 
 
-def _prepare(
+def _prepare_path(
     model: ReducedModel, name: str, start: Solution, bounds: tuple[float, float], options: Options
 ) -> tuple[Task, float, State]:
     check_parameter(name, also=("omega",))
@@ -142,22 +142,24 @@ def _prepare(
         raise NotSolvedError(f"path in {name}: the start is not solved, {near.reason}")
 
     def balance(x: float) -> Balance:
-        changed = model if name == "omega" else vary(model, name, outer(name, x))
+        changed = model if name == "omega" else vary(model, name, parameter_value(name, x))
         return Balance(
             changed,
             condense(changed, x if name == "omega" else start.omega, near.harmonics),
             near.samples,
         )
 
-    width = inner(name, bounds[1]) - inner(name, bounds[0])
-    x = inner(name, value)
+    width = path_coordinate(name, bounds[1]) - path_coordinate(name, bounds[0])
+    x = path_coordinate(name, value)
     task = Task(balance, name, width, float(np.linalg.norm(near.w)) or 1.0, options)
     return task, x, evaluate_balance(balance(x), near.w)
 
 
-def _point(task: Task, spot: Spot, fold: bool = False, branch: bool = False) -> PathPoint:
+def _path_point(task: Task, spot: Spot, fold: bool = False, branch: bool = False) -> PathPoint:
     end = Newton(spot.state, spot.iterations, True, "residual within tolerance")
     solution = as_solution(
         spot.balance, Attempt("path following", end), spot.iterations, end.reason
     )
-    return PathPoint(outer(task.name, spot.x), solution, spot.sign > 0, fold, spot.leapt, branch)
+    return PathPoint(
+        parameter_value(task.name, spot.x), solution, spot.sign > 0, fold, spot.leapt, branch
+    )

@@ -14,7 +14,7 @@ from .model import ReducedModel
 from .policy import uses_coulomb_kernels
 from .solution import Solution
 
-__all__ = ["INSTANTS", "gripping", "grips"]
+__all__ = ["INSTANTS", "leading_stuck_points", "sticks_safely"]
 
 # a period of the highest harmonic at which full stick is confirmed
 INSTANTS = 64
@@ -22,22 +22,24 @@ INSTANTS = 64
 SPARE = 4e-3
 
 
-def grips(model: ReducedModel, solution: Solution) -> bool:
+def sticks_safely(model: ReducedModel, solution: Solution) -> bool:
     """All contacts stick, with a little of the friction limit in hand at every instant."""
     if not uses_coulomb_kernels(model):
         return False
-    return solution.states["stick"] == len(model.elements.kt) and bool(_within(model, solution.f))
+    return solution.states["stick"] == len(model.elements.kt) and bool(
+        _within_friction_limit(model, solution.f)
+    )
 
 
-def gripping(model: ReducedModel, points: Sequence[Solution | None]) -> list[Solution]:
+def leading_stuck_points(model: ReducedModel, points: Sequence[Solution | None]) -> list[Solution]:
     """The first of the points, which have the same harmonics, as long as they grip."""
     nodes = len(model.elements.kt)
     stuck = list(takewhile(lambda p: p is not None and p.states["stick"] == nodes, points))
-    holds = _within(model, np.array([p.f for p in stuck])) if stuck else []
+    holds = _within_friction_limit(model, np.array([p.f for p in stuck])) if stuck else []
     return [p for p, _ in takewhile(lambda pair: pair[1], zip(stuck, holds, strict=True))]
 
 
-def _within(model: ReducedModel, f: np.ndarray) -> np.ndarray:
+def _within_friction_limit(model: ReducedModel, f: np.ndarray) -> np.ndarray:
     """Whether contact forces (..., n, d, 2H+1) keep within the friction limit, and a little
     more.
     """

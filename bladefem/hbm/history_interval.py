@@ -1,12 +1,13 @@
 """The lowest and the highest resonance that the loading history can leave: extremes over all
 admissible friction forces of the nodes that never slip.
 
-From a resonance the derivative by these forces (`traction_gradient`) tells where to move within
-their convex set; the farthest admissible point is the next state, whose resonance is climbed from
-the last one (the conditional gradient method, Frank and Wolfe 1956, DOI 10.1002/nav.3800030109).
-Ends where no move promises more than the tolerance. Every state that is solved is admissible, so
-both ends are attained; whether nothing lies beyond them is certified only where the response is
-monotone.
+From a resonance the derivative by these forces (`traction_gradient`) tells where to push each node.
+The march of the friction law returns a force beyond the friction limit to it, so that every state
+that is solved is admissible, and both ends are attained; the next resonance is climbed from the
+last one. Where pushing gains no more, a linear programme tells what the best admissible change
+promises to first order (the conditional gradient method, Frank and Wolfe 1956, DOI
+10.1002/nav.3800030109). Whether nothing lies beyond the ends is certified only where that is
+nothing and the response is monotone.
 """
 
 from __future__ import annotations
@@ -28,10 +29,14 @@ __all__ = ["MONOTONE", "POINT", "SAMPLED", "HistoryInterval", "history_interval"
 POINT = "point"
 MONOTONE = "monotone"
 SAMPLED = "sampled"
-# moves towards one end, and halvings of a move that does not gain
-MOVES = 6
-HALVINGS = 2
-# start beyond the friction limit, over mu N: the march brings it back to the limit
+# moves towards one end
+MOVES = 15
+# longest and shortest push of a node, over its friction limit
+LONGEST = 2.0
+SHORTEST = 0.1
+# derivative below which a node is pushed less, over the mean of all nodes
+FAINT = 0.1
+# start of the extreme loads, over the friction limit
 BEYOND = 1.5
 
 
@@ -44,9 +49,10 @@ class HistoryInterval:
     # (n, tangents) `ReducedModel.start` that leads to them [N]
     lowest_start: np.ndarray
     highest_start: np.ndarray
-    # POINT: no admissible force changes the resonance; MONOTONE: at every state solved on the way
-    # the response grows along the way from the lowest to the highest state of each node, and no
-    # move at the ends promises more; SAMPLED: otherwise, the range of the states solved
+    # POINT: no admissible force changes the resonance; MONOTONE: at every state solved the response
+    # grows with the force of each node on its way from the lowest to the highest state, and no
+    # admissible change at these promises more to first order; SAMPLED: otherwise, the range of the
+    # states solved
     certificate: str
     # nodes that never slip at the resonance given
     sticking: int
@@ -61,8 +67,6 @@ class _Place:
     """A resonance of one history."""
 
     peak: Peak
-    # (n, tangents)
-    start: np.ndarray
     free: Tractions
 
 
@@ -97,7 +101,7 @@ class _Search:
             self.reasons.append(str(error))
             return None
         self.points += peak.points
-        place = _place(model, peak, start, self.options.probe)
+        place = _Place(peak, tractions(model, peak.solution, self.options.probe))
         self.places.append(place)
         return place
 
@@ -111,8 +115,7 @@ def history_interval(
         peak: of this model (`find_peak`); its harmonics and samples are kept.
         tolerance: of the height, relative.
     """
-    start = model.elements.traction if model.start is None else model.start
-    here = _place(model, peak, np.array(start, dtype=float), options.probe)
+    here = _Place(peak, tractions(model, peak.solution, options.probe))
     search = _Search(model, tolerance, options, [here], 0, [])
     if model.directions == model.elements.tangents or not model.coupled:
         # a prescribed normal load or fixed mean displacements: nothing acts back
@@ -121,14 +124,6 @@ def history_interval(
         search.solve(pattern, peak)
     ended = [_climb(search, sign) for sign in (-1.0, 1.0)]
     return _interval(search, here, all(ended))
-
-
-def _place(model: ReducedModel, peak: Peak, start: np.ndarray, probe: int) -> _Place:
-    """With the start put to where the friction forces of the sticking nodes have come to."""
-    free = tractions(model, peak.solution, probe)
-    start = start.copy()
-    start[free.nodes] = free.start
-    return _Place(peak, start, free)
 
 
 def _extreme_loads(model: ReducedModel, peak: Peak) -> Sequence[np.ndarray]:
@@ -153,35 +148,53 @@ def _extreme_loads(model: ReducedModel, peak: Peak) -> Sequence[np.ndarray]:
 
 
 def _climb(search: _Search, sign: float) -> bool:
-    """Move from the best place towards lower (-1) or higher (1) resonances; whether the end was
-    reached.
+    """Push from the best place towards lower (-1) or higher (1) resonances, until that gains less
+    than the tolerance; whether no admissible change promises more.
     """
     place = max(search.places, key=lambda one: sign * one.peak.height)
+    share = 1.0
     for _ in range(MOVES):
-        free = place.free
-        gradient = sign * free.gradient
-        move = farthest(free, gradient) - free.mean
-        promised = float(np.sum(gradient * move))
-        if promised < search.tolerance * place.peak.height:
+        better = None
+        while better is None and share >= SHORTEST:
+            better = _gaining(search, place, share * _push(search.model, place, sign), sign)
+            share = share / 2 if better is None else min(2 * share, LONGEST)
+        small = better is None or _gain(better, place, sign) < search.tolerance
+        place = place if better is None else better
+        if not small:
+            continue
+        gradient = sign * place.free.gradient[place.free.nodes]
+        move = farthest(search.model, place.free, gradient)
+        if float(np.sum(gradient * move)) < search.tolerance * place.peak.height:
             return True
-        better = _gaining(search, place, move, sign)
-        if better is None:
+        change = np.zeros_like(place.free.start)
+        change[place.free.nodes] = move
+        better = _gaining(search, place, change, sign)
+        if better is None or _gain(better, place, sign) < search.tolerance:
             return False
         place = better
+        share = 1.0
     return False
 
 
-def _gaining(search: _Search, place: _Place, move: np.ndarray, sign: float) -> _Place | None:
-    """The first of the shorter and shorter moves that gains."""
-    share = 1.0
-    for _ in range(1 + HALVINGS):
-        start = place.start.copy()
-        start[place.free.nodes] += share * move
-        reached = search.solve(start, place.peak)
-        if reached is not None and sign * (reached.peak.height - place.peak.height) > 0:
-            return reached
-        share /= 2
-    return None
+def _push(model: ReducedModel, place: _Place, sign: float) -> np.ndarray:
+    """(n, tangents) the friction limit of each node along its derivative [N]."""
+    elements = model.elements
+    gradient = place.free.gradient
+    length = np.linalg.norm(gradient, axis=1, keepdims=True)
+    least = max(FAINT * float(length.mean()), np.finfo(float).tiny)
+    limit = elements.mu * np.maximum(elements.n0, 0.0)
+    return sign * limit[:, None] * gradient / np.maximum(length, least)
+
+
+def _gain(better: _Place, place: _Place, sign: float) -> float:
+    """Of the height, relative."""
+    return sign * (better.peak.height / place.peak.height - 1)
+
+
+def _gaining(search: _Search, place: _Place, change: np.ndarray, sign: float) -> _Place | None:
+    """The place after a change of the start, if it gains."""
+    reached = search.solve(place.free.start + change, place.peak)
+    return reached if reached is not None and _gain(reached, place, sign) > 0 else None
 
 
 def _interval(search: _Search, here: _Place, ended: bool) -> HistoryInterval:
@@ -197,8 +210,8 @@ def _interval(search: _Search, here: _Place, ended: bool) -> HistoryInterval:
     return HistoryInterval(
         lowest.peak,
         highest.peak,
-        lowest.start,
-        highest.start,
+        lowest.free.start,
+        highest.free.start,
         certificate,
         len(here.free.nodes),
         search.points,
@@ -210,9 +223,10 @@ def _monotone(search: _Search, lowest: _Place, highest: _Place) -> bool:
     """No node whose derivative points back, at any state solved, on its way from the lowest to the
     highest state.
     """
-    way = highest.start - lowest.start
-    back = [
-        np.minimum(np.sum(place.free.gradient * way[place.free.nodes], axis=1), 0.0).sum()
-        for place in search.places
-    ]
+    way = highest.free.start - lowest.free.start
+    back = []
+    for place in search.places:
+        nodes = place.free.nodes
+        along = np.sum(place.free.gradient[nodes] * way[nodes], axis=1)
+        back.append(float(np.minimum(along, 0.0).sum()))
     return min(back) >= -search.tolerance * highest.peak.height

@@ -23,7 +23,7 @@ def stuck_resonances(model: ReducedModel, h: int = 1) -> np.ndarray:
     """(m,) circular frequencies omega at which harmonic h meets a mode with all contacts sticking
     [rad/s].
     """
-    return _stuck(model, h)[0]
+    return _stuck_modes(model, h)[0]
 
 
 def stuck_partners(model: ReducedModel) -> np.ndarray:
@@ -33,12 +33,12 @@ def stuck_partners(model: ReducedModel) -> np.ndarray:
     It need not be the one of the same number: on soft contacts a damper has modes of its own below
     the blade's.
     """
-    omega, shapes = _stuck(model, 1)
+    omega, shapes = _stuck_modes(model, 1)
     blade = model.side(1).omega
     return omega[np.argmax(np.abs(shapes[: len(blade)][blade > 0]), axis=1)]
 
 
-def _stuck(model: ReducedModel, h: int) -> tuple[np.ndarray, np.ndarray]:
+def _stuck_modes(model: ReducedModel, h: int) -> tuple[np.ndarray, np.ndarray]:
     """Frequencies (m,) [rad/s] and shapes (n, m) of mass 1, the blade's modes first, with all
     contacts sticking.
 

@@ -14,7 +14,7 @@ import numpy as np
 from ..data import Elements, PortModel, RigidBody
 from ..errors import InputError
 from ..friction.fourier import synthesis, to_real
-from .linear.bodies import Damping, Stack, stacked
+from .linear.bodies import Damping, Stack, stack_bodies
 from .validate_model import check_model, port_size
 
 __all__ = ["Damping", "ReducedModel"]
@@ -38,7 +38,8 @@ class ReducedModel:
     >>> M, K = np.eye(2), np.array([[2.0, -1.0], [-1.0, 1.0]])
     >>> ports = {"contact": np.array([0]), "load": np.array([1]), "probe": np.array([1])}
     >>> side = port_model_from_matrices(M, K, ports, C=0.02 * K)
-    >>> damper = Elements(kt=np.ones(1), kn=np.zeros(1), mu=np.full(1, 0.5), n0=np.ones(1), tangents=1)
+    >>> one = np.ones(1)
+    >>> damper = Elements(kt=one, kn=0 * one, mu=0.5 * one, n0=one, tangents=1)
     >>> model = ReducedModel((side,), damper, {1: np.ones(1)})
     >>> solve(model, omega=0.7, H=7, samples=256).converged
     True
@@ -214,7 +215,9 @@ class ReducedModel:
             if key[:2] == ("stack", name) and key[2] > len(bodies)
         )
         found = next(larger, None)
-        return stacked(bodies, damping, self.rows) if found is None else found.first(len(bodies))
+        return (
+            stack_bodies(bodies, damping, self.rows) if found is None else found.first(len(bodies))
+        )
 
     def once(self, key: Hashable, make: Callable[[], Any]) -> Any:
         """What `make` returns, kept with this model: what does not depend on the frequency is made

@@ -9,13 +9,19 @@ from collections.abc import Iterable
 import numpy as np
 
 from ..errors import InputError
-from .linear.bodies import block, flexibility
+from .linear.bodies import modal_flexibility, receptance_block
 from .linear.condensation import condense
 from .model import ReducedModel
 from .parameter_derivatives import BODIES, by_imbalance, contact_rate, hold_rate
 from .parameters import check_parameter
 from .solution import Solution
-from .solver.residual import Balance, adjoint, as_amplitudes, as_coefficients, evaluate_balance
+from .solver.residual import (
+    Balance,
+    adjoint_inverse,
+    as_amplitudes,
+    as_coefficients,
+    evaluate_balance,
+)
 
 __all__ = ["node_gradients", "size_by_force", "transposed_flexibility"]
 
@@ -53,7 +59,7 @@ def node_gradients(
     by_motion = state.forces.dfdw.reshape(n, d * K, d * K).swapaxes(1, 2) @ by_force.reshape(
         n, d * K, 1
     )
-    back = adjoint(balance, state)(by_motion.reshape(n, d, K), 1e-9)
+    back = adjoint_inverse(balance, state)(by_motion.reshape(n, d, K), 1e-9)
     weight = by_force - transposed_flexibility(balance.linear.A, back)
     held = _by_hold(balance, back)
     return {
@@ -74,9 +80,9 @@ def _by_hold(balance: Balance, back: np.ndarray) -> np.ndarray:
 def size_by_force(model: ReducedModel, solution: Solution, probe: int) -> np.ndarray:
     """(n, d, K) derivative of the size by the coefficients of the contact forces [m/N]."""
     blades = model.blades(solution.harmonics)
-    flexible = flexibility(blades, solution.omega * np.arange(solution.harmonics + 1))
+    flexible = modal_flexibility(blades, solution.omega * np.arange(solution.harmonics + 1))
     rows = slice(blades.probe.start + probe, blades.probe.start + probe + 1)
-    across = block(blades, flexible, rows, blades.contact)[:, 0]
+    across = receptance_block(blades, flexible, rows, blades.contact)[:, 0]
     share = solution.probe[:, probe] / np.linalg.norm(solution.probe[1:, probe])
     share[0] = 0.0
     return as_coefficients(-across.conj() * share[:, None], solution.w.shape)

@@ -17,7 +17,7 @@ import numpy as np
 from ..errors import InputError, NotSolvedError
 from .linear_resonances import free_resonances, stuck_resonances
 from .model import ReducedModel
-from .parameters import check_parameter, inner, outer, vary
+from .parameters import check_parameter, parameter_value, path_coordinate, vary
 from .peak import Peak, cubic_minimum, find_peak, with_slope
 from .solver.newton import DEFAULTS, Options
 from .sweep import first_look, local_maxima, response, size
@@ -94,11 +94,15 @@ class _Search:
         """Between two values of the parameter, in its own coordinate: the logarithm of a factor,
         the gap itself.
         """
-        return inner(self.name, high) - inner(self.name, low)
+        return path_coordinate(self.name, high) - path_coordinate(self.name, low)
 
     def moved(self, value: float, by: float) -> float:
         """The value farther along the coordinate, inside the bounds."""
-        return float(np.clip(outer(self.name, inner(self.name, value) + by), *self.bounds))
+        return float(
+            np.clip(
+                parameter_value(self.name, path_coordinate(self.name, value) + by), *self.bounds
+            )
+        )
 
     def inside(self, peak: Peak) -> bool:
         """Whether the peak lies in the band."""
@@ -175,27 +179,29 @@ def lowest_peak(
         if not least < low < high < np.inf:
             raise InputError(f"{what} ({low}, {high}): expected {least:g} < low < high")
     search = _Search(along, band, H, samples, bounds, tolerance, options)
-    middle = outer(name, (inner(name, bounds[0]) + inner(name, bounds[1])) / 2)
+    middle = parameter_value(
+        name, (path_coordinate(name, bounds[0]) + path_coordinate(name, bounds[1])) / 2
+    )
     if start is not None:
         middle = float(np.clip(start, *bounds))
-    first, points = _first(search, middle)
+    first, points = _first_level(search, middle)
     levels = {middle: first}
     for _ in range(LEVELS):
         points += _close_in(search, levels)
-        tried = _tops(levels)
+        tried = _highest_peaks(levels)
         best = min(tried, key=lambda peak: peak.height)
-        missed, count = _look(search, best.value, best)
+        missed, count = _look_over_band(search, best.value, best)
         points += count
         if missed is None:
             return Optimum(best.value, best, tuple(tried), points)
-        levels, count = _reconsidered(search, levels, missed)
+        levels, count = _add_missed_peak(search, levels, missed)
         points += count
     raise NotSolvedError(
         f"optimum of {name} between {bounds}: every look over the band found a higher peak"
     )
 
 
-def _first(search: _Search, value: float) -> tuple[list[Peak], int]:
+def _first_level(search: _Search, value: float) -> tuple[list[Peak], int]:
     """Peaks uphill of the resonances of both limits at the first value, and the points spent."""
     model = search.along.model_at(value)
     known = []
@@ -213,7 +219,7 @@ def _first(search: _Search, value: float) -> tuple[list[Peak], int]:
             continue
         points += peak.points
         if search.inside(peak):
-            known = _with(search, search.along.with_slope(model, peak, value), known)
+            known = _add_peak(search, search.along.with_slope(model, peak, value), known)
     if not known:
         raise NotSolvedError(
             f"no peak in the band {search.band} with {search.name} at {value:.4g}: {reason}"
@@ -221,19 +227,19 @@ def _first(search: _Search, value: float) -> tuple[list[Peak], int]:
     return known, points
 
 
-def _with(search: _Search, peak: Peak, known: list[Peak]) -> list[Peak]:
+def _add_peak(search: _Search, peak: Peak, known: list[Peak]) -> list[Peak]:
     """The known peaks and this one; of those without a dip between them the highest."""
     same = [
         other
         for other in known
-        if other.value == peak.value and _same(peak, other) and _same(other, peak)
+        if other.value == peak.value and _same_peak(peak, other) and _same_peak(other, peak)
     ]
     if any(other.height >= peak.height for other in same):
         return known
     return [*(other for other in known if not any(other is one for one in same)), peak]
 
 
-def _same(peak: Peak, other: Peak) -> bool:
+def _same_peak(peak: Peak, other: Peak) -> bool:
     """No dip before the other: the parabola of the peak loses less than SAME of its height on the
     way.
     """
@@ -252,7 +258,7 @@ def _close_in(search: _Search, levels: dict[float, list[Peak]]) -> int:
     narrow = False
     points = 0
     for _ in range(LEVELS):
-        low, high = _bracket(_tops(levels))
+        low, high = _bracket_minimum(_highest_peaks(levels))
         if low is None or high is None:
             end, sign = (low, 1.0) if high is None else (high, -1.0)
             value = search.moved(end.value, sign * step)
@@ -260,18 +266,18 @@ def _close_in(search: _Search, levels: dict[float, list[Peak]]) -> int:
                 return points
             step *= 2
         else:
-            value, gain = _between(search, low, high, narrow)
+            value, gain = _next_value(search, low, high, narrow)
             if gain < search.tolerance or search.width(low.value, high.value) < search.finest:
                 return points
             narrow = not narrow
-        levels[value], count = _level(search, value, _nearby(levels, value))
+        levels[value], count = _solve_level(search, value, _nearby_peaks(levels, value))
         points += count
     raise NotSolvedError(
         f"optimum of {search.name} not closed in with {LEVELS} values, last at {value:.4g}"
     )
 
 
-def _tops(levels: dict[float, list[Peak]]) -> list[Peak]:
+def _highest_peaks(levels: dict[float, list[Peak]]) -> list[Peak]:
     """The highest peak of each level."""
     return [
         max((peak for peak in peaks if peak.value == value), key=lambda peak: peak.height)
@@ -279,39 +285,41 @@ def _tops(levels: dict[float, list[Peak]]) -> list[Peak]:
     ]
 
 
-def _nearby(levels: dict[float, list[Peak]], value: float) -> list[Peak]:
+def _nearby_peaks(levels: dict[float, list[Peak]], value: float) -> list[Peak]:
     """The peaks of the next levels below and above a value, without those of one that stand where
     the other's do.
     """
-    below, above = (levels.get(near, []) for near in _neighbours(levels, value))
+    below, above = (levels.get(near, []) for near in _neighbour_values(levels, value))
     return below + [
-        p for p in above if not any(_same(p, other) or _same(other, p) for other in below)
+        p for p in above if not any(_same_peak(p, other) or _same_peak(other, p) for other in below)
     ]
 
 
-def _neighbours(levels: dict[float, list[Peak]], value: float) -> tuple[float | None, float | None]:
+def _neighbour_values(
+    levels: dict[float, list[Peak]], value: float
+) -> tuple[float | None, float | None]:
     """The next values below and above."""
     return max((v for v in levels if v < value), default=None), min(
         (v for v in levels if v > value), default=None
     )
 
 
-def _reconsidered(
+def _add_missed_peak(
     search: _Search, levels: dict[float, list[Peak]], missed: Peak
 ) -> tuple[dict[float, list[Peak]], int]:
     """The level where a peak was missed and its neighbours, with that peak; and the points
     spent.
     """
-    kept = {missed.value: _with(search, missed, levels[missed.value])}
+    kept = {missed.value: _add_peak(search, missed, levels[missed.value])}
     points = 0
-    for value in _neighbours(levels, missed.value):
+    for value in _neighbour_values(levels, missed.value):
         if value is not None:
-            found, count = _level(search, value, [missed])
-            kept[value], points = _with(search, found[0], levels[value]), points + count
+            found, count = _solve_level(search, value, [missed])
+            kept[value], points = _add_peak(search, found[0], levels[value]), points + count
     return kept, points
 
 
-def _bracket(tried: list[Peak]) -> tuple[Peak | None, Peak | None]:
+def _bracket_minimum(tried: list[Peak]) -> tuple[Peak | None, Peak | None]:
     """The lowest height tried and its neighbour downhill, which is no lower: a minimum lies
     between; None at an end.
     """
@@ -325,7 +333,7 @@ def _bracket(tried: list[Peak]) -> tuple[Peak | None, Peak | None]:
     ), best
 
 
-def _between(search: _Search, low: Peak, high: Peak, tangents: bool) -> tuple[float, float]:
+def _next_value(search: _Search, low: Peak, high: Peak, tangents: bool) -> tuple[float, float]:
     """The next value inside a bracket, and the most that could still be gained, relative to its
     lower end.
 
@@ -352,29 +360,29 @@ def _between(search: _Search, low: Peak, high: Peak, tangents: bool) -> tuple[fl
     )
 
 
-def _level(search: _Search, value: float, known: list[Peak]) -> tuple[list[Peak], int]:
+def _solve_level(search: _Search, value: float, known: list[Peak]) -> tuple[list[Peak], int]:
     """The known peaks at another value: solved where they may be the highest, estimated where they
     cannot.
     """
     model = search.along.model_at(value)
     found = []
     points = 0
-    for old in sorted(known, key=lambda peak: -_estimate(search, peak, value)):
-        if found and _estimate(search, old, value) < WORTH * max(
+    for old in sorted(known, key=lambda peak: -_estimated_height(search, peak, value)):
+        if found and _estimated_height(search, old, value) < WORTH * max(
             peak.height for peak in found if peak.value == value
         ):
             found.append(old)
             continue
-        if any(peak.value == value and _same(peak, old) for peak in found):
+        if any(peak.value == value and _same_peak(peak, old) for peak in found):
             continue
         peak = search.peak(model, old.omega, old)
         points += peak.points
         if search.inside(peak):
-            found = _with(search, search.along.with_slope(model, peak, value), found)
+            found = _add_peak(search, search.along.with_slope(model, peak, value), found)
     if any(peak.value == value for peak in found):
         return found, points
     # the known peaks left the band, or became one with another
-    met, count = _look(search, value)
+    met, count = _look_over_band(search, value)
     if met is None:
         raise NotSolvedError(
             f"the peaks leave the band {search.band} with {search.name} at {value:.4g}"
@@ -382,11 +390,13 @@ def _level(search: _Search, value: float, known: list[Peak]) -> tuple[list[Peak]
     return [met], points + count
 
 
-def _estimate(search: _Search, peak: Peak, value: float) -> float:
+def _estimated_height(search: _Search, peak: Peak, value: float) -> float:
     return peak.height * float(np.exp(peak.slope / peak.height * search.width(peak.value, value)))
 
 
-def _look(search: _Search, value: float, best: Peak | None = None) -> tuple[Peak | None, int]:
+def _look_over_band(
+    search: _Search, value: float, best: Peak | None = None
+) -> tuple[Peak | None, int]:
     """The highest peak that a coarse look over the band meets, if it is higher than the best;
     points spent.
     """

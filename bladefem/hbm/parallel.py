@@ -8,13 +8,13 @@ from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Any, TypeVar
 
-from .checkpoint import recorded
+from .checkpoint import response_with_checkpoints
 from .model import ReducedModel
 from .solution import Solution
 from .solver.newton import DEFAULTS, Options
 from .sweep import response
 
-__all__ = ["shared", "shared_response"]
+__all__ = ["share_work", "shared_response"]
 
 Item = TypeVar("Item")
 Result = TypeVar("Result")
@@ -22,7 +22,9 @@ Result = TypeVar("Result")
 BLOCK = 16
 
 
-def shared(work: Callable[[Item], Result], items: Sequence[Item], comm: Any = None) -> list[Result]:
+def share_work(
+    work: Callable[[Item], Result], items: Sequence[Item], comm: Any = None
+) -> list[Result]:
     """Results of work on each item, dealt out to the ranks of an mpi4py communicator; every rank
     returns all of them.
 
@@ -74,8 +76,10 @@ def shared_response(
         if folder is None:
             return list(response(model, part, H, samples, options=options))
         return list(
-            recorded(Path(folder) / f"block-{block:06d}", model, part, H, samples, options=options)
+            response_with_checkpoints(
+                Path(folder) / f"block-{block:06d}", model, part, H, samples, options=options
+            )
         )
 
-    blocks = shared(solved, range(0, len(omegas), BLOCK), comm)
+    blocks = share_work(solved, range(0, len(omegas), BLOCK), comm)
     return [point for block in blocks for point in block]

@@ -15,7 +15,14 @@ import numpy as np
 
 from ..data import RigidBody
 from ..errors import InputError
-from .linear.bodies import Stack, amplitudes, damping_rate, flexibility, impedance_rate, motion
+from .linear.bodies import (
+    Stack,
+    damping_rate,
+    impedance_rate,
+    modal_amplitudes,
+    modal_flexibility,
+    port_motion,
+)
 from .linear.condensation import Linear
 from .model import ReducedModel
 from .parameters import check_parameter, vary
@@ -35,11 +42,11 @@ __all__ = [
     "contact_load",
     "contact_rate",
     "hold_rate",
-    "rate",
+    "residual_rate",
 ]
 
 
-def rate(balance: Balance, state: State, name: str) -> np.ndarray:
+def residual_rate(balance: Balance, state: State, name: str) -> np.ndarray:
     """(n, d, K) derivative of the residual with a parameter at fixed displacements, at a solved
     state [m].
     """
@@ -161,8 +168,10 @@ def body_rate(
     else:
         modal = np.zeros_like(modal)
         ports = np.zeros_like(ports)
-    contact = motion(blades, modal, ports, blades.contact) - _damper_rate(model, omega, force, name)
-    return contact, motion(blades, modal, ports, blades.probe)
+    contact = port_motion(blades, modal, ports, blades.contact) - _damper_rate(
+        model, omega, force, name
+    )
+    return contact, port_motion(blades, modal, ports, blades.probe)
 
 
 def _modal_rate(body: Stack, omega: float, modal: np.ndarray, name: str) -> np.ndarray:
@@ -172,7 +181,7 @@ def _modal_rate(body: Stack, omega: float, modal: np.ndarray, name: str) -> np.n
         push = impedance_rate(body, omega * orders, modal) * orders[:, None]
     else:
         push = damping_rate(body, omega * orders, modal)
-    return _pushed(body, omega * orders, push)
+    return _pushed_modes(body, omega * orders, push)
 
 
 def _damper_rate(model: ReducedModel, omega: float, force: np.ndarray, name: str) -> np.ndarray:
@@ -192,24 +201,24 @@ def _damper_rate(model: ReducedModel, omega: float, force: np.ndarray, name: str
     damper = model.elastic_damper(len(force) - 1)
     ports = np.zeros((len(force), damper.shapes.shape[1]), dtype=complex)
     ports[:, damper.contact] = force
-    modal = amplitudes(damper, flexibility(damper, w), ports)
+    modal = modal_amplitudes(damper, modal_flexibility(damper, w), ports)
     if name == "mass":
         # with the mass: omega^2 m, half of 2 zeta sqrt(k m), and alpha m
         own = model.damper_damping
         push = (
             -(w[:, None] ** 2) + 1j * w[:, None] * (own.ratio * damper.omega + own.mass)
         ) * modal
-        rate = _pushed(damper, w, push)
+        rate = _pushed_modes(damper, w, push)
     else:
         rate = _modal_rate(damper, omega, modal, name)
-    return motion(damper, rate, np.zeros_like(ports), damper.contact)
+    return port_motion(damper, rate, np.zeros_like(ports), damper.contact)
 
 
-def _pushed(body: Stack, w: np.ndarray, push: np.ndarray) -> np.ndarray:
+def _pushed_modes(body: Stack, w: np.ndarray, push: np.ndarray) -> np.ndarray:
     """(H+1, m) derivative of modal amplitudes from that of the impedance times the amplitudes; none
     of the mean.
     """
-    flexible = flexibility(body, w)
+    flexible = modal_flexibility(body, w)
     rate = -(flexible * push if flexible.ndim == 2 else (flexible @ push[:, :, None])[:, :, 0])
     rate[0] = 0.0
     return rate

@@ -13,30 +13,30 @@ from ..data import Elements, PortModel, RigidBody
 from ..errors import InputError, suggestion
 from .model import Damping, ReducedModel
 
-__all__ = ["PARAMETERS", "check_parameter", "inner", "outer", "vary"]
+__all__ = ["PARAMETERS", "check_parameter", "path_coordinate", "parameter_value", "vary"]
 
 
-def _elements(
+def _changing_elements(
     change: Callable[[Elements, float], Elements],
 ) -> Callable[[ReducedModel, float], ReducedModel]:
     return lambda model, value: replace(model, elements=change(model.elements, value))
 
 
-def _force(model: ReducedModel, factor: float) -> ReducedModel:
+def _scale_force(model: ReducedModel, factor: float) -> ReducedModel:
     return replace(
         model, excitation={h: factor * np.asarray(force) for h, force in model.excitation.items()}
     )
 
 
-def _mass(model: ReducedModel, factor: float) -> ReducedModel:
+def _scale_mass(model: ReducedModel, factor: float) -> ReducedModel:
     if model.damper is None:
         raise InputError("mass: expected a model with a damper")
     if isinstance(model.damper, RigidBody):
         return replace(model, damper=replace(model.damper, mass=factor * model.damper.mass))
-    return replace(model, damper=tuple(_heavier(body, factor) for body in model.damper))
+    return replace(model, damper=tuple(_scale_density(body, factor) for body in model.damper))
 
 
-def _heavier(body: PortModel, factor: float) -> PortModel:
+def _scale_density(body: PortModel, factor: float) -> PortModel:
     """The elastic body with another density: modes keep their form, and the viscous matrix its
     values.
     """
@@ -45,7 +45,7 @@ def _heavier(body: PortModel, factor: float) -> PortModel:
     return replace(body, omega=body.omega / root, shapes=body.shapes / root, damping=damping)
 
 
-def _load(model: ReducedModel, factor: float) -> ReducedModel:
+def _scale_load(model: ReducedModel, factor: float) -> ReducedModel:
     normal = {h: factor * np.asarray(force) for h, force in model.normal.items()}
     elements = replace(model.elements, n0=factor * model.elements.n0)
     if elements.t0 is not None:
@@ -54,7 +54,7 @@ def _load(model: ReducedModel, factor: float) -> ReducedModel:
     return replace(model, elements=elements, normal=normal, start=start)
 
 
-def _damping(model: ReducedModel, factor: float) -> ReducedModel:
+def _scale_damping(model: ReducedModel, factor: float) -> ReducedModel:
     def scaled(body: PortModel) -> PortModel:
         return body if body.damping is None else replace(body, damping=factor * body.damping)
 
@@ -74,21 +74,21 @@ def _damping(model: ReducedModel, factor: float) -> ReducedModel:
 
 PARAMETERS: dict[str, Callable[[ReducedModel, float], ReducedModel]] = {
     # factor of all excitations
-    "force": _force,
+    "force": _scale_force,
     # factor of all normal loads
-    "load": _load,
+    "load": _scale_load,
     # factor
-    "mu": _elements(lambda e, factor: replace(e, mu=factor * e.mu)),
+    "mu": _changing_elements(lambda e, factor: replace(e, mu=factor * e.mu)),
     # factor
-    "kt": _elements(lambda e, factor: replace(e, kt=factor * e.kt)),
+    "kt": _changing_elements(lambda e, factor: replace(e, kt=factor * e.kt)),
     # factor
-    "kn": _elements(lambda e, factor: replace(e, kn=factor * e.kn)),
+    "kn": _changing_elements(lambda e, factor: replace(e, kn=factor * e.kn)),
     # added opening [m]
-    "gap": _elements(lambda e, gap: replace(e, n0=e.n0 - e.kn * gap)),
+    "gap": _changing_elements(lambda e, gap: replace(e, n0=e.n0 - e.kn * gap)),
     # factor of the damper's mass
-    "mass": _mass,
+    "mass": _scale_mass,
     # factor of the bodies' damping
-    "damping": _damping,
+    "damping": _scale_damping,
 }
 
 
@@ -116,13 +116,13 @@ def check_parameter(name: str, also: tuple[str, ...] = ()) -> str:
     return name
 
 
-def inner(name: str, value: float) -> float:
+def path_coordinate(name: str, value: float) -> float:
     """The coordinate in which a parameter is followed and derived: omega and the gap themselves,
     else a logarithm.
     """
     return value if name in ADDED else float(np.log(value))
 
 
-def outer(name: str, x: float) -> float:
+def parameter_value(name: str, x: float) -> float:
     """The value of a parameter at such a coordinate."""
     return x if name in ADDED else float(np.exp(x))

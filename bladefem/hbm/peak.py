@@ -95,7 +95,7 @@ def find_peak(
             bend = (now.line - last.line) / (omega - last.solution.omega)
         if low and high:
             best = max(low, high, key=lambda look: look.height)
-            target, gain = _between(low, high, corner=count % 2 == 1)
+            target, gain = _vertex_between(low, high, corner=count % 2 == 1)
         else:
             best = now
             step = -now.line / bend if bend > 0 else np.sign(now.slope) * reach
@@ -133,7 +133,7 @@ class _Look:
         return -2 * self.slope / self.height**3
 
 
-def _between(low: _Look, high: _Look, corner: bool) -> tuple[float, float]:
+def _vertex_between(low: _Look, high: _Look, corner: bool) -> tuple[float, float]:
     """Where 1/height^2 is lowest between a rising and a falling point, and the relative gain of
     height there.
 

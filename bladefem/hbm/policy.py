@@ -1,10 +1,12 @@
-"""The way a point is solved: every size at which one method takes over from another, and the choice.
+"""The way a point is solved: every size at which one method takes over from another, and the
+choice.
 
 Four ways lead to the same solution, the cheapest that applies is taken:
 
 1. compiled point: linear part, Newton and works of a small model in one compiled call;
 2. compiled Newton: the loop alone is compiled, the linear part is condensed with NumPy;
-3. NumPy Newton with a dense LU of the Jacobian (2-D elements and other friction laws, few unknowns);
+3. NumPy Newton with a dense LU of the Jacobian (2-D elements and other friction laws, few
+unknowns);
 4. NumPy Newton with iterations (conjugate residuals, then GMRES), dense LU where they fail.
 
 `Solution.route` says which one ran. Sizes count contact degrees of freedom (nodes times directions)
@@ -51,8 +53,8 @@ ITERATIONS_THEN_LU = "iterations, then dense LU"
 ROUTES = (COMPILED_POINT, COMPILED_NEWTON, NUMPY_NEWTON)
 
 # Contact degrees of freedom up to which a point is one compiled call. NumPy's overhead, 0.4 ms a
-# point, is 90 % of a point with one contact and 22 % at 48 degrees of freedom; beyond 200 it is lost
-# in the dense products, and BLAS on whole arrays is faster.
+# point, is 90 % of a point with one contact and 22 % at 48 degrees of freedom; beyond 200 it is
+# lost in the dense products, and BLAS on whole arrays is faster.
 COMPILED_POINT_DOFS = 200
 # Unknowns of 1-D elements up to which Newton is compiled: 3.3 times as fast as NumPy with one
 # contact, 1.2 times at some thousand unknowns; beyond 20000 a Jacobian no longer fits into memory.
@@ -86,8 +88,8 @@ def uses_coulomb_kernels(model: ReducedModel) -> bool:
 
 
 def uses_compiled_point(model: ReducedModel, harmonics: int) -> bool:
-    """True if a whole point is one compiled call: few 1-D Coulomb elements, the mean in the balance,
-    modes that damping does not couple.
+    """True if a whole point is one compiled call: few 1-D Coulomb elements, the mean in the
+    balance, modes that damping does not couple.
     """
     dofs = model.springs.size
     if dofs > COMPILED_POINT_DOFS or not model.coupled:

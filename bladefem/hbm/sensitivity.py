@@ -12,9 +12,16 @@ import numpy as np
 from ..errors import InputError
 from .linear.condensation import condense
 from .model import ReducedModel
-from .parameter_derivatives import BODIES, body_rate, contact_load, contact_rate, rate
+from .parameter_derivatives import BODIES, body_rate, contact_load, contact_rate, residual_rate
 from .solution import Solution, probe_motion
-from .solver.residual import Balance, Inverse, State, as_amplitudes, evaluate_balance, linearise
+from .solver.residual import (
+    Balance,
+    Inverse,
+    State,
+    as_amplitudes,
+    evaluate_balance,
+    linearise_balance,
+)
 
 __all__ = ["Sensitivity", "sensitivities"]
 
@@ -45,17 +52,17 @@ def sensitivities(
         )
     balance = Balance(model, condense(model, solution.omega, solution.harmonics), solution.samples)
     state = evaluate_balance(balance, solution.w)
-    inverse = linearise(balance, state)
-    return {name: _sensitivity(balance, state, inverse, solution, name) for name in names}
+    inverse = linearise_balance(balance, state)
+    return {name: _one_sensitivity(balance, state, inverse, solution, name) for name in names}
 
 
-def _sensitivity(
+def _one_sensitivity(
     balance: Balance, state: State, inverse: Inverse, solution: Solution, name: str
 ) -> Sensitivity:
     model = balance.model
     linear = balance.linear
     n, d, K = state.w.shape
-    dw = -inverse(rate(balance, state, name), 1e-9)
+    dw = -inverse(residual_rate(balance, state, name), 1e-9)
     df = (state.forces.dfdw.reshape(n, d * K, d * K) @ dw.reshape(n, d * K, 1)).reshape(n, d, K)
     probe = np.zeros_like(solution.probe)
     if name in BODIES:

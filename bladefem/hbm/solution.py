@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..friction.fourier import to_complex
-from .linear.bodies import Stack, amplitudes, flexibility, lost, motion
+from .linear.bodies import Stack, dissipated_work, modal_amplitudes, modal_flexibility, port_motion
 from .model import ReducedModel
 
 __all__ = [
@@ -17,7 +17,7 @@ __all__ = [
     "blade_motion",
     "probe_motion",
     "size",
-    "works",
+    "period_works",
     "works_of",
 ]
 
@@ -117,7 +117,7 @@ def at_probes(blade: tuple[Stack, np.ndarray, np.ndarray], rigid: np.ndarray) ->
     blades, ports, modal = blade
     modal = modal.copy()
     modal[0, blades.omega[0] == 0] += rigid[: np.count_nonzero(blades.omega[0] == 0)]
-    return motion(blades, modal, ports, blades.probe)
+    return port_motion(blades, modal, ports, blades.probe)
 
 
 def blade_motion(
@@ -130,10 +130,14 @@ def blade_motion(
     blades = model.blades(H)
     ports = np.zeros((H + 1, blades.shapes.shape[1]), dtype=complex)
     ports[:, blades.contact], ports[:, blades.load] = -force, model.loads(H)
-    return blades, ports, amplitudes(blades, flexibility(blades, omega * np.arange(H + 1)), ports)
+    return (
+        blades,
+        ports,
+        modal_amplitudes(blades, modal_flexibility(blades, omega * np.arange(H + 1)), ports),
+    )
 
 
-def works(
+def period_works(
     model: ReducedModel, omega: float, w: np.ndarray, f: np.ndarray, dissipated: float
 ) -> Work:
     """Work of each kind in a period, for displacements and forces (n, d, K)."""
@@ -158,22 +162,22 @@ def works_of(
 ) -> Work:
     """The same from complex amplitudes (H+1, m), and from the blades' motion under them."""
     orders, (blades, ports, modal) = np.arange(len(force)), blade
-    lost_work = orders @ lost(blades, omega * orders, modal)
+    lost_work = orders @ dissipated_work(blades, omega * orders, modal)
     damper = model.elastic_damper(len(force) - 1)
     if damper is not None:
         at_ports = np.zeros((len(force), damper.shapes.shape[1]), dtype=complex)
         at_ports[:, damper.contact] = force
-        moved = amplitudes(damper, flexibility(damper, omega * orders), at_ports)
-        lost_work += orders @ lost(damper, omega * orders, moved)
-    loaded = motion(blades, modal, ports, blades.load)
+        moved = modal_amplitudes(damper, modal_flexibility(damper, omega * orders), at_ports)
+        lost_work += orders @ dissipated_work(damper, omega * orders, moved)
+    loaded = port_motion(blades, modal, ports, blades.load)
     return Work(
-        _work(orders, ports[:, blades.load], loaded),
+        _harmonic_work(orders, ports[:, blades.load], loaded),
         float(lost_work),
-        _work(orders, force, relative),
+        _harmonic_work(orders, force, relative),
         dissipated,
     )
 
 
-def _work(orders: np.ndarray, force: np.ndarray, moved: np.ndarray) -> float:
+def _harmonic_work(orders: np.ndarray, force: np.ndarray, moved: np.ndarray) -> float:
     """Work of harmonic forces on harmonic displacements (H+1, *) in a period."""
     return float(np.pi * np.sum(orders[:, None] * (force * (1j * moved).conj()).real))

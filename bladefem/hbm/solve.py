@@ -9,7 +9,7 @@ import numpy as np
 
 from ..errors import InputError
 from ..friction.fourier import to_complex
-from .full_stick import INSTANTS, gripping, grips
+from .full_stick import INSTANTS, leading_stuck_points, sticks_safely
 from .linear.condensation import Linear, condense
 from .model import ReducedModel
 from .solution import Solution, at_probes, blade_motion, probe_motion, works_of
@@ -19,7 +19,7 @@ from .solver.point_compiled import small, solve_each, solve_small
 from .solver.residual import Balance
 from .validate_model import check_point
 
-__all__ = ["as_solution", "free", "solve", "sticking", "stuck"]
+__all__ = ["as_solution", "free_response", "solve", "leading_stuck_solutions", "stuck_response"]
 
 # contact springs over the bodies' stiffness from which a failure is put down to it
 STIFF = 1e5
@@ -66,22 +66,22 @@ def solve(
         balance, None if start is None else match_harmonics(start.w, H), options
     )
     best = min(attempts, key=lambda a: (not a.end.converged, a.end.state.error))
-    reason = best.end.reason if best.end.converged else _reasons(balance, attempts)
+    reason = best.end.reason if best.end.converged else _failure_reasons(balance, attempts)
     balance = replace(balance, samples=best.samples or samples)
     return as_solution(balance, best, sum(a.end.iterations for a in attempts), reason)
 
 
-def free(model: ReducedModel, omega: float, H: int = 1) -> np.ndarray:
+def free_response(model: ReducedModel, omega: float, H: int = 1) -> np.ndarray:
     """(H+1, probes) amplitudes at the probes without contact forces [m]."""
     linear = condense(model, omega, H)
     return probe_motion(model, omega, np.zeros_like(linear.free), np.zeros(len(linear.rigid)))
 
 
-def stuck(model: ReducedModel, omega: float, H: int = 1) -> np.ndarray:
+def stuck_response(model: ReducedModel, omega: float, H: int = 1) -> np.ndarray:
     """(H+1, probes) amplitudes at the probes with all contacts closed and sticking [m]."""
     linear = condense(model, omega, H)
     force = linear.springs * linear.stuck
-    return probe_motion(model, omega, force, _rigid(linear, linear.stuck[0], force[0]))
+    return probe_motion(model, omega, force, _rigid_motion(linear, linear.stuck[0], force[0]))
 
 
 def as_solution(balance: Balance, attempt: Attempt, iterations: int, reason: str) -> Solution:
@@ -101,7 +101,7 @@ def as_solution(balance: Balance, attempt: Attempt, iterations: int, reason: str
         samples=balance.samples,
         w=state.w,
         f=state.forces.f,
-        probe=at_probes(blade, _rigid(linear, relative[0], force[0])),
+        probe=at_probes(blade, _rigid_motion(linear, relative[0], force[0])),
         converged=attempt.end.converged,
         reason=reason,
         method=attempt.method,
@@ -109,8 +109,8 @@ def as_solution(balance: Balance, attempt: Attempt, iterations: int, reason: str
         residual=state.error,
         residual_displacement=float(abs(state.residual).max()),
         residual_force=float(abs(stiffness * state.residual).max()),
-        drift=_drift(linear, load),
-        states=_states(state.forces.shares),
+        drift=_holding_drift(linear, load),
+        states=_count_states(state.forces.shares),
         work=works_of(
             model, linear.omega, relative, force, blade, float(np.sum(state.forces.dissipated))
         ),
@@ -118,7 +118,7 @@ def as_solution(balance: Balance, attempt: Attempt, iterations: int, reason: str
     )
 
 
-def sticking(model: ReducedModel, omegas: Sequence[float], H: int) -> list[Solution]:
+def leading_stuck_solutions(model: ReducedModel, omegas: Sequence[float], H: int) -> list[Solution]:
     """The first frequencies [rad/s], as long as all contacts stick, with the excited harmonics
     alone; small models.
 
@@ -127,7 +127,7 @@ def sticking(model: ReducedModel, omegas: Sequence[float], H: int) -> list[Solut
     """
     low = max((1, *model.excitation, *model.normal))
     found = solve_each(model, np.array(omegas), low, INSTANTS * low, STUCK) if low < H else []
-    return gripping(model, found)
+    return leading_stuck_points(model, found)
 
 
 def _stuck_throughout(
@@ -138,12 +138,12 @@ def _stuck_throughout(
     if low >= H or not (start is None or start.states["stick"] == len(model.elements.kt)):
         return None
     if small(model, low):
-        return next(iter(sticking(model, [omega], H)), None)
+        return next(iter(leading_stuck_solutions(model, [omega], H)), None)
     found = solve(model, omega, low, INSTANTS * low, options=STUCK)
-    return found if found.converged and grips(model, found) else None
+    return found if found.converged and sticks_safely(model, found) else None
 
 
-def _reasons(balance: Balance, attempts: list[Attempt]) -> str:
+def _failure_reasons(balance: Balance, attempts: list[Attempt]) -> str:
     """Why every attempt failed, and what may help."""
     linear = balance.linear
     ratio = float(np.median(linear.springs * abs(np.diagonal(linear.G[1]))))
@@ -159,7 +159,7 @@ def _reasons(balance: Balance, attempts: list[Attempt]) -> str:
     return "; ".join([f"{a.method}: {a.end.reason}" for a in attempts] + stiff)
 
 
-def _drift(linear: Linear, load: np.ndarray) -> float:
+def _holding_drift(linear: Linear, load: np.ndarray) -> float:
     """Load on the holding springs over what the contacts could carry, both on the motions without
     stiffness.
     """
@@ -170,7 +170,7 @@ def _drift(linear: Linear, load: np.ndarray) -> float:
     return float(held / max(carried, np.finfo(float).tiny))
 
 
-def _states(shares: np.ndarray) -> dict[str, int]:
+def _count_states(shares: np.ndarray) -> dict[str, int]:
     """Number of nodes by what they do in a period, from the shares (n, 3) of stick, slip and
     separation.
     """
@@ -185,7 +185,7 @@ def _states(shares: np.ndarray) -> dict[str, int]:
     }
 
 
-def _rigid(linear: Linear, mean: np.ndarray, force: np.ndarray) -> np.ndarray:
+def _rigid_motion(linear: Linear, mean: np.ndarray, force: np.ndarray) -> np.ndarray:
     """(r,) motions without stiffness that close  w_0 = free_0 - G_0 f_0 + B q."""
     if linear.B.shape[1] == 0:
         return np.zeros(len(linear.rigid))

@@ -18,7 +18,7 @@ from .model import ReducedModel
 from .predictor import AHEAD, ahead
 from .sensitivity import sensitivities
 from .solution import Solution, size
-from .solve import solve, sticking
+from .solve import leading_stuck_solutions, solve
 from .solver.fallback import match_harmonics
 from .solver.newton import DEFAULTS, Options
 from .solver.point_compiled import solve_along
@@ -79,7 +79,9 @@ def response(
         return (
             ready[i]
             if i in ready
-            else _solve(model, omegas[i], H, samples, _ahead(last, omegas[i], H), options)
+            else _solve_off_resonance(
+                model, omegas[i], H, samples, _predicted_start(last, omegas[i], H), options
+            )
         )
 
     for i, omega in enumerate(omegas):
@@ -104,8 +106,8 @@ def _at_once(
     """
     for omega in omegas:
         check_point(model, omega, H, samples)
-    sticks = not last or _sticks(last[-1])
-    found = sticking(model, omegas, H) if options.frugal and sticks else []
+    sticks = not last or _all_stick(last[-1])
+    found = leading_stuck_solutions(model, omegas, H) if options.frugal and sticks else []
     return found or solve_along(model, np.array(omegas), H, samples, last, options)
 
 
@@ -157,8 +159,8 @@ def sweep(
     for solution in response(model, first_look(model, band), H, samples, options=options):
         solved[solution.omega] = solution
         yield solution
-    while not (folds and _folds(model, solved, H, options.probe)):
-        wanted = _wanted(solved, slope, (peak, curve), options.probe)
+    while not (folds and _needs_continuation(model, solved, H, options.probe)):
+        wanted = _next_frequency(solved, slope, (peak, curve), options.probe)
         if wanted is None:
             return
         if len(solved) >= BAND_LIMIT:
@@ -166,7 +168,7 @@ def sweep(
                 f"the sweep ended after {BAND_LIMIT} points: peaks may be higher by more than "
                 "the accuracy"
             )
-            if not (folds and _lifting(model)):
+            if not (folds and _normal_loads_follow(model)):
                 return
             break
         near = sorted(
@@ -183,14 +185,18 @@ def sweep(
     yield from found.points
 
 
-def _lifting(model: ReducedModel) -> bool:
+def _normal_loads_follow(model: ReducedModel) -> bool:
     """Whether normal loads follow the motion, so that there may be several motions."""
     return model.directions > model.elements.tangents
 
 
-def _folds(model: ReducedModel, solved: Mapping[float, Solution], H: int, probe: int) -> bool:
-    """Whether the response has to be followed round folds: contacts lift off, or the sweep jumps."""
-    if not _lifting(model):
+def _needs_continuation(
+    model: ReducedModel, solved: Mapping[float, Solution], H: int, probe: int
+) -> bool:
+    """Whether the response has to be followed round folds: contacts lift off, or the sweep
+    jumps.
+    """
+    if not _normal_loads_follow(model):
         return False
     points = [solved[omega] for omega in sorted(solved)]
     good = [p for p in points if p.converged]
@@ -222,16 +228,16 @@ def solve_from(
     """
     simply = replace(options, fallbacks=False)
     tries = (
-        (_solve(model, omega, H, samples, start, simply) for start in starts)
+        (_solve_off_resonance(model, omega, H, samples, start, simply) for start in starts)
         if len(starts) > 1
         else ()
     )
-    return next((point for point in tries if point.converged), None) or _solve(
+    return next((point for point in tries if point.converged), None) or _solve_off_resonance(
         model, omega, H, samples, starts[0] if starts else None, options
     )
 
 
-def _solve(
+def _solve_off_resonance(
     model: ReducedModel,
     omega: float,
     H: int,
@@ -276,7 +282,7 @@ def first_look(model: ReducedModel, band: tuple[float, float]) -> np.ndarray:
     return np.unique(np.concatenate([grid[[0, -1]], keep, inside]))
 
 
-def _wanted(
+def _next_frequency(
     solved: dict[float, Solution], slope: Slope, accuracy: tuple[float, float], probe: int
 ) -> float | None:
     """The next frequency to solve: a maximum that is not closed in yet, else the worst corner; None
@@ -350,11 +356,11 @@ def _corner_targets(omegas: np.ndarray, heights: np.ndarray, curve: float) -> It
             yield omegas[i + 1] + (right / 2 if right > left else -left / 2)
 
 
-def _ahead(last: list[Solution], omega: float, H: int) -> Solution | None:
+def _predicted_start(last: list[Solution], omega: float, H: int) -> Solution | None:
     """A start on the curve through the last solutions; None, which is full stick, where the last
     one sticks.
     """
-    if not last or _sticks(last[-1]):
+    if not last or _all_stick(last[-1]):
         return None
     known = np.array([match_harmonics(p.w, H) for p in last])
     w = np.empty(known.shape[1:])
@@ -363,5 +369,5 @@ def _ahead(last: list[Solution], omega: float, H: int) -> Solution | None:
     return replace(last[-1], w=w)
 
 
-def _sticks(solution: Solution) -> bool:
+def _all_stick(solution: Solution) -> bool:
     return solution.states["stick"] == len(solution.w)

@@ -13,7 +13,7 @@ from ..data import RigidBody
 from ..errors import InputError, NotSolvedError
 from ..friction.fourier import to_real
 from ..friction.law import require_coulomb
-from ..time.shooting import periodic
+from ..time.shooting import periodic_solution
 from ..time.system import System
 from .linear.bodies import Stack, rigid_stack
 from .model import ReducedModel
@@ -34,7 +34,7 @@ def time_system(model: ReducedModel, H: int) -> System:
     Raises:
         InputError: the model has no such form; the message says what stands against it.
     """
-    bodies = _bodies(model)
+    bodies = _bodies_in_time(model)
     blades = bodies[0]
     e = model.elements
     shapes = [
@@ -96,7 +96,7 @@ def shooting_start(balance: Balance) -> np.ndarray:
         raise InputError(
             f"motions {ratio:.1g} times as fast as the excitation, expected at most {FASTEST:.0e}"
         )
-    solution = periodic(system, balance.linear.omega, samples=max(256, 8 * H))
+    solution = periodic_solution(system, balance.linear.omega, samples=max(256, 8 * H))
     if not solution.converged:
         raise NotSolvedError(solution.reason)
     readings = np.stack([system.R, system.W], axis=1)[:, 2 - model.directions :]
@@ -107,7 +107,7 @@ def shooting_start(balance: Balance) -> np.ndarray:
     return to_real(lines.T).reshape(*model.springs.shape, 2 * H + 1)
 
 
-def _bodies(model: ReducedModel) -> list[Stack]:
+def _bodies_in_time(model: ReducedModel) -> list[Stack]:
     """Blades and damper as single real bodies with all their inertia."""
     require_coulomb(model.elements, "the model in time")
     if model.elements.tangents != 1:

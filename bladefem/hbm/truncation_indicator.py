@@ -18,14 +18,14 @@ import numpy as np
 from ..errors import InputError
 from ..friction.fourier import synthesis, to_complex
 from ..friction.time_step import second_period
-from .linear.bodies import Stack, flexibility
+from .linear.bodies import Stack, modal_flexibility
 from .linear.woodbury import bodies_of
 from .model import ReducedModel
 from .policy import uses_coulomb_kernels
 from .solution import Solution
 from .solver.residual import contact_forces
 
-__all__ = ["overtones"]
+__all__ = ["truncation_indicator"]
 
 # for each harmonic
 INSTANTS = 4
@@ -33,7 +33,7 @@ INSTANTS = 4
 BESIDE = 1e-7
 
 
-def overtones(model: ReducedModel, points: Sequence[Solution], most: int) -> np.ndarray:
+def truncation_indicator(model: ReducedModel, points: Sequence[Solution], most: int) -> np.ndarray:
     """(p,) motion of the contacts with harmonics above the solutions' own up to `most`, over that
     of the first one.
 
@@ -51,15 +51,15 @@ def overtones(model: ReducedModel, points: Sequence[Solution], most: int) -> np.
             f"points, below {most}"
         )
     w = np.array([p.w for p in points])
-    forces = _harmonics(model, w, most)
+    forces = _higher_force_harmonics(model, w, most)
     orders = np.arange(H + 1, most + 1)
     omegas = (1 + BESIDE) * np.array([p.omega for p in points])
-    motion = sum(_motion(body, orders, omegas, forces) for body in bodies_of(model, most))
+    motion = sum(_higher_motion(body, orders, omegas, forces) for body in bodies_of(model, most))
     first = np.sum(w[..., 1:3] ** 2, axis=(1, 2, 3))
     return np.sqrt(np.sum(abs(motion) ** 2, axis=(0, 2)) / np.maximum(first, np.finfo(float).tiny))
 
 
-def _harmonics(model: ReducedModel, w: np.ndarray, most: int) -> np.ndarray:
+def _higher_force_harmonics(model: ReducedModel, w: np.ndarray, most: int) -> np.ndarray:
     """(most - H, p, m) complex harmonics H+1.. of the contact forces at displacements w (p, n, d,
     2H+1) [N].
     """
@@ -96,7 +96,9 @@ def _harmonics_by_law(model: ReducedModel, w: np.ndarray, most: int) -> np.ndarr
     return np.moveaxis(high, 3, 0).reshape(most - K // 2, p, n * d)
 
 
-def _motion(body: Stack, orders: np.ndarray, omegas: np.ndarray, forces: np.ndarray) -> np.ndarray:
+def _higher_motion(
+    body: Stack, orders: np.ndarray, omegas: np.ndarray, forces: np.ndarray
+) -> np.ndarray:
     """(k, p, m) displacements of a body under contact forces (k, p, m) of the harmonics (k,), at
     (p,) [rad/s] [m].
     """
@@ -112,7 +114,7 @@ def _motion(body: Stack, orders: np.ndarray, omegas: np.ndarray, forces: np.ndar
         for name in names
         if (part := getattr(body, name)) is not None
     }
-    flexible = flexibility(replace(body, **each), np.outer(orders, omegas).ravel())
+    flexible = modal_flexibility(replace(body, **each), np.outer(orders, omegas).ravel())
     push = forces @ shapes.conj()
     if flexible.ndim == 2:
         modal = flexible.reshape(k, p, -1) * push

@@ -19,6 +19,7 @@ from ..view.wear import draw_work
 from .linear import linear_columns
 
 __all__ = [
+    "SEATS",
     "cycles_of",
     "draw_hysteresis",
     "draw_wear",

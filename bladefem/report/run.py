@@ -44,6 +44,7 @@ from .datasets import datasets, table_dataset
 from .influences import influence_sentence, influence_table
 from .linear import harmonic_table, linear_sentence
 from .nodes import (
+    SEATS,
     cycles_of,
     draw_hysteresis,
     draw_wear,
@@ -55,6 +56,7 @@ from .nodes import (
     wear_table,
 )
 from .pressure import PICTURE, draw_seats, pressure_table, write_points
+from .response_arrays import curve_arrays, loop_arrays, node_arrays, resonance_arrays
 from .tables import units_of, write_tables
 from .write import Page, write_report
 
@@ -112,6 +114,10 @@ def _write(result: pipeline.Run, progress: Progress) -> None:
         "nodes": table_dataset(nodes, "row"),
         "approximation": table_dataset(harmonic_table(patches, cycles), "row"),
         "hysteresis": table_dataset(loops, "row"),
+        "response": curve_arrays(tables["response/points"]),
+        "resonance": resonance_arrays(result.response.curves, result.response.limits),
+        "cycle": node_arrays(nodes),
+        "loops": loop_arrays(cycles, SEATS),
     }
     write_results(folder / "results.nc", groups, dump(result.scene))
     drawings = {

@@ -84,6 +84,7 @@ COLUMNS = {
     "approach_exact": Column("of half spaces", "m", "µm", 1e6),
     "pressure_error": Column("pressure's L2 error", "1", "%", 100.0, 2),
     "contact_share": Column("share pressed", "1", "%", 100.0, 3),
+    "displacement": Column("relative displacement", "m", "µm", 1e6),
     "gap": Column("gap", "m", "µm", 1e6, 3),
     **{name: Column(name, "m", "mm", 1e3) for name in "xyz"},
     "work": Column("friction work an area", "J/m^2"),

@@ -16,7 +16,7 @@ import numpy as np
 from .event_integrator import Flow, State, flow, stuck_start
 from .system import System
 
-__all__ = ["Periodic", "harmonics", "multipliers", "periodic", "work"]
+__all__ = ["Periodic", "probe_harmonics", "floquet_multipliers", "periodic_solution", "period_work"]
 
 
 @dataclass(frozen=True)
@@ -43,7 +43,7 @@ class Periodic:
         return self.reason == "periodic"
 
 
-def periodic(
+def periodic_solution(
     system: System,
     omega: float,
     start: State | None = None,
@@ -62,21 +62,21 @@ def periodic(
         samples: equal instants a period in the returned flow.
     """
     state = start or stuck_start(system, omega)
-    scale = _scale(system, omega, state)
+    scale = _unknown_scales(system, omega, state)
     now = flow(system, omega, state, samples, tangent=True)
-    residual = _residual(now, state, scale)
+    residual = _period_residual(now, state, scale)
     periods = 1
     for iteration in range(most):
         if now.reason != "done":
             return Periodic(omega, now, state, residual, iteration, periods, now.reason)
         if residual < tolerance:
             return Periodic(omega, now, state, residual, iteration, periods, "periodic")
-        move = _newton(now, state, scale)
+        move = _newton_step(now, state, scale)
         for halving in range(4):
-            trial = _shift(state, move * 0.5**halving)
+            trial = _shift_state(state, move * 0.5**halving)
             attempt = flow(system, omega, trial, samples, tangent=True)
             periods += 1
-            if _residual(attempt, trial, scale) < 0.9 * residual:
+            if _period_residual(attempt, trial, scale) < 0.9 * residual:
                 break
         else:
             trial = flow(system, omega, now.state, samples, 8).state
@@ -84,8 +84,8 @@ def periodic(
             periods += 9
         state = trial
         now = attempt
-        scale = _scale(system, omega, trial)
-        residual = _residual(now, state, scale)
+        scale = _unknown_scales(system, omega, trial)
+        residual = _period_residual(now, state, scale)
     reason = (
         "periodic"
         if residual < tolerance
@@ -94,7 +94,7 @@ def periodic(
     return Periodic(omega, now, state, residual, most, periods, reason)
 
 
-def multipliers(solution: Periodic) -> np.ndarray:
+def floquet_multipliers(solution: Periodic) -> np.ndarray:
     """Floquet multipliers (2d + n,), largest modulus first; stable when none exceeds one.
 
     One multiplier equals one for each element that sticks through the whole period: a neutral shift
@@ -104,12 +104,12 @@ def multipliers(solution: Periodic) -> np.ndarray:
     return values[np.argsort(-np.abs(values))]
 
 
-def harmonics(solution: Periodic, system: System, highest: int) -> np.ndarray:
+def probe_harmonics(solution: Periodic, system: System, highest: int) -> np.ndarray:
     """Complex harmonics 0..highest of the probe (k, highest + 1) [m], Re(c e^{j h w t})."""
-    return _fourier(solution.flow.q @ system.probe.T, highest)
+    return _fourier_rows(solution.flow.q @ system.probe.T, highest)
 
 
-def work(solution: Periodic, system: System) -> tuple[float, float]:
+def period_work(solution: Periodic, system: System) -> tuple[float, float]:
     """Work of the excitation and of friction and damping in one period [J]; equal in a periodic
     motion.
 
@@ -127,13 +127,13 @@ def work(solution: Periodic, system: System) -> tuple[float, float]:
     return step * float(np.sum((system.force @ basis).T * path.v)), step * float(spent)
 
 
-def _fourier(signal: np.ndarray, highest: int) -> np.ndarray:
+def _fourier_rows(signal: np.ndarray, highest: int) -> np.ndarray:
     lines = np.fft.rfft(signal, axis=0)[: highest + 1].T / len(signal)
     lines[:, 1:] *= 2
     return lines
 
 
-def _scale(system: System, omega: float, state: State) -> np.ndarray:
+def _unknown_scales(system: System, omega: float, state: State) -> np.ndarray:
     """Sizes of (q, v, z): one length for q and z each, the velocity by the base frequency."""
     d = len(state.q)
     n = len(state.z)
@@ -142,24 +142,27 @@ def _scale(system: System, omega: float, state: State) -> np.ndarray:
     return np.r_[np.full(d, q), np.full(d, q * omega), np.full(n, z)]
 
 
-def _pack(state: State) -> np.ndarray:
+def _pack_state(state: State) -> np.ndarray:
     return np.r_[state.q, state.v, state.z]
 
 
-def _residual(now: Flow, state: State, scale: np.ndarray) -> float:
+def _period_residual(now: Flow, state: State, scale: np.ndarray) -> float:
     return (
-        float(np.abs((_pack(now.state) - _pack(state)) / scale).max())
+        float(np.abs((_pack_state(now.state) - _pack_state(state)) / scale).max())
         if now.reason == "done"
         else np.inf
     )
 
 
-def _newton(now: Flow, state: State, scale: np.ndarray) -> np.ndarray:
+def _newton_step(now: Flow, state: State, scale: np.ndarray) -> np.ndarray:
     """Least-norm step in the scaled unknowns, back in their units."""
     J = (now.tangent - np.eye(len(scale))) * (scale / scale[:, None])
-    return scale * np.linalg.lstsq(J, (_pack(state) - _pack(now.state)) / scale, rcond=1e-11)[0]
+    return (
+        scale
+        * np.linalg.lstsq(J, (_pack_state(state) - _pack_state(now.state)) / scale, rcond=1e-11)[0]
+    )
 
 
-def _shift(state: State, move: np.ndarray) -> State:
+def _shift_state(state: State, move: np.ndarray) -> State:
     d = len(state.q)
     return State(state.q + move[:d], state.v + move[d : 2 * d], state.z + move[2 * d :])

@@ -23,7 +23,7 @@ from bladefem.data import Elements, PortModel
 from bladefem.errors import InputError
 from bladefem.friction.law import require_coulomb
 
-__all__ = ["System", "damper_on_platforms", "oscillator", "ring"]
+__all__ = ["System", "damper_on_platforms", "friction_oscillator", "blade_ring"]
 
 
 @dataclass(frozen=True)
@@ -90,7 +90,7 @@ class System:
         return float(np.sqrt(np.linalg.eigvalsh((K + K.T) / 2).max()))
 
 
-def ring(
+def blade_ring(
     body: PortModel,
     ratio: float,
     elements: Elements,
@@ -200,7 +200,9 @@ def damper_on_platforms(motion: np.ndarray, elements: Elements, mass: float) -> 
     )
 
 
-def oscillator(omega: float, ratio: float, kt: float, limit: float, force: complex) -> System:
+def friction_oscillator(
+    omega: float, ratio: float, kt: float, limit: float, force: complex
+) -> System:
     """One unit mass on a spring, with one friction element to the ground: the smallest system of
     its kind.
     """

@@ -13,6 +13,7 @@ from typing import Any
 import matplotlib
 import numpy as np
 from matplotlib.figure import Figure
+from matplotlib.text import Text
 from matplotlib.ticker import FuncFormatter, LogLocator, NullFormatter
 
 __all__ = [
@@ -66,8 +67,6 @@ STYLE: dict[str, Any] = {
     "axes.prop_cycle": matplotlib.cycler(color=COLOURS),
     "image.cmap": SEQUENTIAL,
     "axes.formatter.useoffset": False,
-    # titles are the user's own words: a dollar sign in one is a dollar sign
-    "text.parse_math": False,
 }
 
 
@@ -92,9 +91,28 @@ def canvas(
         if ax is None:
             ax = Figure(figsize=size, layout="constrained").subplots(*grid, **subplots)
         yield ax
+        figure = np.ravel(ax)[0].figure
+        take_words_as_they_are(figure)
         if file is not None:
             Path(file).parent.mkdir(parents=True, exist_ok=True)
-            np.ravel(ax)[0].figure.savefig(file)
+            figure.savefig(file)
+
+
+def take_words_as_they_are(figure: Any) -> None:
+    """Titles, labels and legends hold the user's own words: a dollar sign in one is no formula.
+
+    Numbers along logarithmic axes are formulas of matplotlib's own and stay so.
+    """
+    numbers = {
+        id(label)
+        for ax in figure.axes
+        for axis in (ax.xaxis, ax.yaxis)
+        for tick in (*axis.get_major_ticks(), *axis.get_minor_ticks())
+        for label in (tick.label1, tick.label2)
+    }
+    for text in figure.findobj(Text):
+        if id(text) not in numbers and "$" in text.get_text():
+            text.set_parse_math(False)
 
 
 def log_axis(ax: Any, which: str, factor: float = 1.0) -> None:

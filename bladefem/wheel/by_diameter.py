@@ -18,7 +18,7 @@ import numpy as np
 from ..data import PortModel, RigidBody
 from ..errors import NotSolvedError
 from ..hbm.linear.bodies import Damping
-from ..hbm.linear.woodbury import staying
+from ..hbm.linear.woodbury import frequency_independent_parts
 from .model import Wheel
 
 __all__ = [
@@ -79,7 +79,7 @@ def _made_parts(wheel: Wheel) -> DiameterParts:
     R, L = _residual_and_modes(wheel, diameters, most, int(ends[-1]))
     springs = np.zeros(ends[-1])
     springs[: ends[0]] = wheel.springs.ravel()
-    A, U, _, N = staying(R, L, springs)
+    A, U, _, N = frequency_independent_parts(R, L, springs)
     stiffness, viscous, hysteretic = _modal_terms(wheel, diameters, most)
     mean = np.array(
         [

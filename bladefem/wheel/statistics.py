@@ -12,7 +12,7 @@ import numpy as np
 from scipy import stats
 
 from ..errors import InputError
-from ..hbm.linear.bodies import flexibility
+from ..hbm.linear.bodies import modal_flexibility
 from ..hbm.model import ReducedModel
 from ..hbm.solve import solve
 from ..hbm.solver.newton import DEFAULTS, Options
@@ -206,7 +206,7 @@ def free_respond(wheel: Wheel, pattern: Pattern) -> Respond:
     force = blades.shapes[0, blades.load].T @ model.loads(H).T
 
     def respond(omega: float) -> np.ndarray:
-        modal = flexibility(blades, omega * np.arange(H + 1)).T * force
+        modal = modal_flexibility(blades, omega * np.arange(H + 1)).T * force
         return _blade_sizes((blades.shapes[0, blades.probe] @ modal).T, wheel.count)
 
     return respond

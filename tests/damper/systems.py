@@ -6,7 +6,7 @@ import numpy as np
 
 from bladefem.data import Elements
 from bladefem.reduction.beam import reference_blade
-from bladefem.time.system import System, ring
+from bladefem.time.system import System, blade_ring
 
 
 def seat(kt, load, nodes=5):
@@ -36,7 +36,7 @@ def blades(kt, load, mass, *, modes=5, nodes=5, count=1, waves=0):
     """A ring of reference blades; kt [N/m] and friction limit [N] of each seat, mass of a damper
     [kg].
     """
-    return ring(blade(modes, nodes), 0.002, seat(kt, load, nodes), mass, 1 + 0j, count, waves)
+    return blade_ring(blade(modes, nodes), 0.002, seat(kt, load, nodes), mass, 1 + 0j, count, waves)
 
 
 def rocking(load=10.0, force=2.0):

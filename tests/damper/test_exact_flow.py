@@ -12,8 +12,13 @@ from bladefem.damper.direct import direct
 from bladefem.damper.explicit import damper_cycle
 from bladefem.data import Elements
 from bladefem.time.event_integrator import State, flow, stuck_start
-from bladefem.time.shooting import harmonics, multipliers, periodic, work
-from bladefem.time.system import damper_on_platforms, oscillator
+from bladefem.time.shooting import (
+    floquet_multipliers,
+    period_work,
+    periodic_solution,
+    probe_harmonics,
+)
+from bladefem.time.system import damper_on_platforms, friction_oscillator
 
 OMEGA = 2 * np.pi * 1340
 
@@ -101,8 +106,8 @@ def test_load_that_lifts_off_agrees_with_the_return_map():
 
 def test_shooting_against_newmark_and_leapfrog():
     """Both schemes converge to the shooting solution with second order."""
-    system, omega = oscillator(200 * np.pi, 0.01, 2e5, 3.0, 5 + 0j), 2 * np.pi * 108
-    exact = harmonics(periodic(system, omega, samples=1024), system, 1)[0, 1]
+    system, omega = friction_oscillator(200 * np.pi, 0.01, 2e5, 3.0, 5 + 0j), 2 * np.pi * 108
+    exact = probe_harmonics(periodic_solution(system, omega, samples=1024), system, 1)[0, 1]
     for explicit in (False, True):
         error = [
             abs(
@@ -118,23 +123,23 @@ def test_shooting_against_newmark_and_leapfrog():
 
 def test_newmark_on_the_blade_with_ten_contacts():
     system = blades(1e6, 1.4, 0.06)
-    solution = periodic(system, OMEGA)
+    solution = periodic_solution(system, OMEGA)
     cycle = direct(system, OMEGA, 256, solution.start, most=300, tolerance=1e-6)
     probe = cycle.q @ system.probe[0]
     assert (
-        abs(fourier(probe) / harmonics(solution, system, 1)[0, 1] - 1) < 2e-3
+        abs(fourier(probe) / probe_harmonics(solution, system, 1)[0, 1] - 1) < 2e-3
     )  # 8.3e-4 after 1600 periods
 
 
 def test_work_of_excitation_is_dissipated():
     system = blades(1e6, 1.4, 0.06)
-    given, spent = work(periodic(system, OMEGA, samples=1024), system)
+    given, spent = period_work(periodic_solution(system, OMEGA, samples=1024), system)
     assert spent == pytest.approx(given, rel=2e-5)  # kinks of the force, samples^-2
 
 
 def test_multipliers_of_a_stuck_blade_are_the_linear_ones():
     system = blades(1e6, 1e3, 0.06)
-    solution = periodic(system, OMEGA)
+    solution = periodic_solution(system, OMEGA)
     d = len(system.stiffness)
     A = np.block(
         [
@@ -143,7 +148,7 @@ def test_multipliers_of_a_stuck_blade_are_the_linear_ones():
         ]
     )
     linear = np.exp(np.linalg.eigvals(A) * 2 * np.pi / OMEGA)
-    ours = multipliers(solution)
+    ours = floquet_multipliers(solution)
     assert np.abs(ours[:10] - 1).max() < 1e-10  # ten sliders, free to sit anywhere
     assert np.sort(np.abs(ours[10:])) == pytest.approx(np.sort(np.abs(linear)), rel=1e-9)
 
@@ -151,7 +156,7 @@ def test_multipliers_of_a_stuck_blade_are_the_linear_ones():
 def test_damper_on_moving_platforms_by_two_ways():
     motion = np.tile([0, 5e-6, 0, 1e-6j], (10, 1))
     system = damper_on_platforms(motion, seat(1e6, 5.0), 0.06)
-    exact, cycle = periodic(system, OMEGA), damper_cycle(system, OMEGA, 1024)
+    exact, cycle = periodic_solution(system, OMEGA), damper_cycle(system, OMEGA, 1024)
     assert cycle.reason == exact.reason == "periodic"
     assert fourier(cycle.force) == pytest.approx(fourier(exact.flow.force), rel=1e-4)
 
@@ -161,10 +166,10 @@ def test_three_solutions_where_the_normal_load_follows_the_motion():
     frequency.
     """
     system, omega = rocking(), 2 * np.pi * 150
-    stuck = periodic(system, omega)
+    stuck = periodic_solution(system, omega)
     state = None
     for frequency in np.arange(170, 149, -2.0):
-        rock = periodic(system, 2 * np.pi * frequency, state)
+        rock = periodic_solution(system, 2 * np.pi * frequency, state)
         state = rock.start
     mix = State(
         *(
@@ -176,10 +181,10 @@ def test_three_solutions_where_the_normal_load_follows_the_motion():
             )
         )
     )
-    saddle = periodic(system, omega, mix)
-    found = [abs(harmonics(s, system, 1)[0, 1]) for s in (stuck, saddle, rock)]
+    saddle = periodic_solution(system, omega, mix)
+    found = [abs(probe_harmonics(s, system, 1)[0, 1]) for s in (stuck, saddle, rock)]
     assert found == pytest.approx([9.316e-6, 23.16e-6, 40.15e-6], rel=1e-3)
-    sizes = [np.abs(multipliers(s)[0]) for s in (stuck, saddle, rock)]
+    sizes = [np.abs(floquet_multipliers(s)[0]) for s in (stuck, saddle, rock)]
     assert sizes == pytest.approx(
         [1.0, 1.540, 0.979], abs=2e-3
     )  # 1.0: the slider of the stuck contact
@@ -193,8 +198,8 @@ def test_solution_is_unique_when_the_load_is_prescribed():
         start = State(
             2e-6 * rng.normal(size=d), 2e-6 * OMEGA * rng.normal(size=d), 2e-6 * rng.normal(size=n)
         )
-        solution = periodic(system, OMEGA, start)
+        solution = periodic_solution(system, OMEGA, start)
         assert solution.converged
-        assert np.abs(multipliers(solution)).max() < 1 + 1e-9
-        first.append(harmonics(solution, system, 1)[0, 1])
+        assert np.abs(floquet_multipliers(solution)).max() < 1 + 1e-9
+        first.append(probe_harmonics(solution, system, 1)[0, 1])
     assert np.abs(np.array(first) / first[0] - 1).max() < 1e-6

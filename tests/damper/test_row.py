@@ -18,7 +18,7 @@ from bladefem.hbm.sweep import response, size
 from bladefem.hbm.time_model import time_system
 from bladefem.scene.toml import load_scene, vary
 from bladefem.study.pipeline.stability import in_one_body
-from bladefem.time.shooting import harmonics, multipliers, periodic
+from bladefem.time.shooting import floquet_multipliers, periodic_solution, probe_harmonics
 from verification.paper.blades import judge, optimum, peak
 from verification.paper.plane_row import paper_model, row_of_blades, whole_model
 
@@ -154,10 +154,10 @@ def test_the_whole_plane_model_against_integration_in_time(row):
     model = in_one_body(whole_model(SOFT, row, 20.0))
     omega = 2 * np.pi * 1181.5
     found, system = solve(model, omega, 5, 512), time_system(model, 1)
-    exact = periodic(system, omega, samples=256)
+    exact = periodic_solution(system, omega, samples=256)
     assert found.converged and exact.converged
     assert found.states["lift"] + found.states["slip"] > 0
-    assert abs(found.probe[1, 0] / harmonics(exact, system, 1)[0, 1] - 1) < 2e-3
+    assert abs(found.probe[1, 0] / probe_harmonics(exact, system, 1)[0, 1] - 1) < 2e-3
 
 
 def test_the_rocking_motion_of_the_plane_model_is_unstable_in_time(row):
@@ -168,6 +168,6 @@ def test_the_rocking_motion_of_the_plane_model_is_unstable_in_time(row):
     start = solve(model, 2 * np.pi * 1150.0, 5, 256)
     found, system = solve(model, 2 * np.pi * 1148.0, 9, 512, start=start), time_system(model, 1)
     assert found.converged and found.states["lift"] > 10
-    exact = periodic(system, found.omega, state_of(found, system), samples=256, most=12)
-    assert abs(found.probe[1, 0] / harmonics(exact, system, 1)[0, 1] - 1) < 5e-3
-    assert 1.05 < np.abs(multipliers(exact)).max() < 1.15
+    exact = periodic_solution(system, found.omega, state_of(found, system), samples=256, most=12)
+    assert abs(found.probe[1, 0] / probe_harmonics(exact, system, 1)[0, 1] - 1) < 5e-3
+    assert 1.05 < np.abs(floquet_multipliers(exact)).max() < 1.15

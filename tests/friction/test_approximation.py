@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from friction_cases import decay, random_case, single
 
-from bladefem.friction.aft import dissipated
+from bladefem.friction.aft import dissipated_energy
 from bladefem.friction.closed_form import jenkins
 from bladefem.friction.equivalent_linear import (
     by_harmonic,
@@ -25,7 +25,7 @@ OMEGA = 3.0
 
 def work(u: np.ndarray, f: np.ndarray) -> np.ndarray:
     """(n,) work of f (n, K) on u (n, K) in one period, as the kernels tell it (Eq. 12)."""
-    return dissipated(np.stack([0 * f, f], axis=1), np.stack([0 * u, u], axis=1))
+    return dissipated_energy(np.stack([0 * f, f], axis=1), np.stack([0 * u, u], axis=1))
 
 
 @pytest.fixture(scope="module")

@@ -6,7 +6,14 @@ import numpy as np
 import pytest
 
 from bladefem.errors import InputError
-from bladefem.friction.fourier import analysis, derivative, synthesis, times, to_complex, to_real
+from bladefem.friction.fourier import (
+    analysis,
+    derivative,
+    sample_instants,
+    synthesis,
+    to_complex,
+    to_real,
+)
 from bladefem.friction.trigonometric_tables import empty_gram, gram, tables, weighted
 
 
@@ -57,4 +64,4 @@ def test_too_few_samples_and_odd_shapes_are_refused():
         tables(5, 20)
     with pytest.raises(InputError, match="2H"):
         to_complex(np.zeros(4))
-    assert times(4)[1] == pytest.approx(np.pi / 2)
+    assert sample_instants(4)[1] == pytest.approx(np.pi / 2)

@@ -1,4 +1,6 @@
-"""Laws of one's own: their periodic forces against Coulomb's kernels, differences and a long march."""
+"""Laws of one's own: their periodic forces against Coulomb's kernels, differences and a long
+march.
+"""
 
 from __future__ import annotations
 

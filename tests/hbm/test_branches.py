@@ -96,7 +96,7 @@ def test_resonances_say_how_they_are_reached(folding):
 
 def test_a_sweep_that_does_not_end_says_so(folding, monkeypatch):
     monkeypatch.setattr(sweep_module, "BAND_LIMIT", 16)
-    monkeypatch.setattr(sweep_module, "_folds", lambda *arguments: False)
+    monkeypatch.setattr(sweep_module, "_needs_continuation", lambda *arguments: False)
     notes = []
     points = list(sweep(folding, BAND, 3, 128, notes=notes))
     assert "ended after 16 points" in notes[0]

@@ -12,7 +12,7 @@ from bladefem.hbm.model import Damping
 from bladefem.hbm.parameters import vary
 from bladefem.hbm.peak import find_peak
 from bladefem.hbm.sensitivity import sensitivities
-from bladefem.hbm.solve import free, solve, stuck
+from bladefem.hbm.solve import free_response, solve, stuck_response
 from bladefem.hbm.sweep import response, sweep
 
 MODELS = {
@@ -33,7 +33,7 @@ def test_without_friction_without_springs_and_far_apart(name):
     """
     model, omega = MODELS[name]
     none = np.zeros_like(model.elements.kt)
-    alone = free(model, omega, 3)
+    alone = free_response(model, omega, 3)
     for other in (changed(model, kt=none, kn=none), changed(model, n0=none - 1e9)):
         found = solve(other, omega, 3, 64)
         assert found.converged
@@ -41,7 +41,7 @@ def test_without_friction_without_springs_and_far_apart(name):
             found.probe[1:], alone[1:], rtol=0, atol=1e-10 * abs(alone).max()
         )
     smooth = solve(changed(model, mu=none), omega, 3, 64)
-    exact = stuck(changed(model, kt=none), omega, 3)
+    exact = stuck_response(changed(model, kt=none), omega, 3)
     assert smooth.converged
     np.testing.assert_allclose(smooth.probe[1:], exact[1:], rtol=0, atol=1e-10 * abs(exact).max())
 
@@ -69,7 +69,7 @@ def test_nothing_moves_without_excitation(name):
 def test_a_resonance_without_damping_is_named(name):
     model = replace(MODELS[name][0], damping=Damping())
     omega = float(model.side(1).omega[0])
-    for call in (solve, free):
+    for call in (solve, free_response):
         with pytest.raises(
             NotSolvedError, match=f"without damping is hit exactly, at {omega:.10g} rad/s"
         ):

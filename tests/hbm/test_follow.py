@@ -90,7 +90,7 @@ def test_the_neighbour_beyond_a_fold_is_tried_before_the_fallbacks(monkeypatch):
     """One that leads nowhere costs no fallbacks where another leads to the point; they are the last
     resort.
     """
-    model, plain, asked = stop(), sweep_module._solve, []
+    model, plain, asked = stop(), sweep_module._solve_off_resonance, []
     near, beyond = (solve(model, omega, 5, 0) for omega in (1.0, 1.3))
 
     def counted(*arguments):
@@ -99,7 +99,7 @@ def test_the_neighbour_beyond_a_fold_is_tried_before_the_fallbacks(monkeypatch):
         point = plain(*arguments)
         return replace(point, converged=point.converged and any(start is s for s in leading))
 
-    monkeypatch.setattr(sweep_module, "_solve", counted)
+    monkeypatch.setattr(sweep_module, "_solve_off_resonance", counted)
     for leading, tried in (
         ([near], [(near, False)]),
         ([beyond], [(near, False), (beyond, False)]),

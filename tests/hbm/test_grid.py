@@ -6,7 +6,7 @@ from hbm_grid import grid
 
 from bladefem.hbm.linear_resonances import free_resonances, stuck_resonances
 from bladefem.hbm.reference_blade import reference_model
-from bladefem.hbm.solve import solve, stuck
+from bladefem.hbm.solve import solve, stuck_response
 from bladefem.hbm.sweep import local_maxima, response, size, sweep
 
 HZ = 2 * np.pi
@@ -30,7 +30,7 @@ def test_stuck_resonance_is_the_peak_of_the_stuck_response(kt, phase, expected):
     resonances = stuck_resonances(model)
     omega = resonances[np.argmin(abs(resonances - HZ * expected))]
     assert omega / HZ == pytest.approx(expected, rel=1e-2)  # some slip lowers the last one
-    heights = [abs(stuck(model, omega * f)[1, 0]) for f in (0.999, 1.0, 1.001)]
+    heights = [abs(stuck_response(model, omega * f)[1, 0]) for f in (0.999, 1.0, 1.001)]
     assert heights[1] == max(heights)
 
 

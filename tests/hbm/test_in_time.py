@@ -17,7 +17,7 @@ from bladefem.hbm.solver import fallback
 from bladefem.hbm.solver.newton import newton
 from bladefem.hbm.solver.residual import Balance
 from bladefem.hbm.time_model import shooting_start, time_system
-from bladefem.time.shooting import harmonics, periodic
+from bladefem.time.shooting import periodic_solution, probe_harmonics
 
 DAMPER = RigidBody(np.array([[0.5]]), np.ones((1, 1)))
 SWELLING = replace(single_mass(), normal={1: np.array([0.3]), 2: np.array([0.1 - 0.2j])})
@@ -35,7 +35,7 @@ SWELLING = replace(single_mass(), normal={1: np.array([0.3]), 2: np.array([0.1 -
 )
 def test_shooting_and_balance_meet(model, omega, H):
     system = time_system(model, H)
-    exact = harmonics(periodic(system, omega, samples=4096), system, 1)[0, 1]
+    exact = probe_harmonics(periodic_solution(system, omega, samples=4096), system, 1)[0, 1]
     found = solve(model, omega, H, 0)
     assert found.converged and found.states["slip"] + found.states["lift"]
     # what H harmonics leave out falls with about H^-3
@@ -57,13 +57,13 @@ def test_shooting_is_the_last_link(monkeypatch):
     """
 
     def closed(balance, *_):
-        return fallback._back(balance, fallback.Newton(None, 0, False, ""), 0, "closed")
+        return fallback._failed_attempt(balance, fallback.Newton(None, 0, False, ""), 0, "closed")
 
     def back(balance, end, iterations, reason):
         w = fallback.start_in_stick(balance)
         return fallback.Newton(fallback.evaluate_balance(balance, w), iterations, False, reason)
 
-    monkeypatch.setattr(fallback, "_back", back)
+    monkeypatch.setattr(fallback, "_failed_attempt", back)
     for way in ("_more_harmonics", "_from_high_load", "_along_excitation"):
         monkeypatch.setattr(fallback, way, closed)
     whole = fallback.newton

@@ -6,7 +6,12 @@ from models import block, single_mass
 
 from bladefem.hbm.linear.condensation import condense
 from bladefem.hbm.reference_blade import reference_model
-from bladefem.hbm.solver.residual import Balance, evaluate_balance, linearise, start_in_stick
+from bladefem.hbm.solver.residual import (
+    Balance,
+    evaluate_balance,
+    linearise_balance,
+    start_in_stick,
+)
 
 
 def differences(balance, w, step):
@@ -36,6 +41,6 @@ def test_the_inverse_derivative_undoes_the_differences(model, omega, scale):
     state = evaluate_balance(balance, w)
     J = differences(balance, w, 1e-7 * abs(w).max())
     x = rng.normal(size=w.shape)
-    undone = linearise(balance, state)((J @ x.ravel()).reshape(w.shape))
+    undone = linearise_balance(balance, state)((J @ x.ravel()).reshape(w.shape))
     assert (state.forces.shares[:, 1] > 0).any()
     np.testing.assert_allclose(undone, x, rtol=0, atol=2e-6 * abs(x).max())

@@ -17,7 +17,7 @@ from bladefem.hbm.linear.contact_flexibility import (
 )
 from bladefem.hbm.linear_resonances import stuck_resonances
 from bladefem.hbm.reference_blade import reference_model
-from bladefem.hbm.solve import solve, sticking
+from bladefem.hbm.solve import leading_stuck_solutions, solve
 from bladefem.hbm.solver.deflation import no_level, second_level
 from bladefem.hbm.solver.krylov import conjugate_residuals
 from bladefem.hbm.solver.newton import Options
@@ -127,7 +127,7 @@ def test_points_that_stick_are_the_same_at_once_and_one_by_one():
     omegas = stuck_resonances(model)[1] * np.linspace(0.9, 1.1, 60)
     frugal = Options(frugal=True)
     alone = [solve(model, omega, 7, 256, options=frugal) for omega in omegas]
-    found = sticking(model, omegas, 7)
+    found = leading_stuck_solutions(model, omegas, 7)
     assert 5 < len(found) < 60 and len(found) == [p.harmonics for p in alone].index(7)
     for one, other in zip(found, alone, strict=False):
         np.testing.assert_allclose(one.probe, other.probe, rtol=1e-12)

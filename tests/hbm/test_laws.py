@@ -24,7 +24,7 @@ from bladefem.hbm.solver.fallback import solve_balance
 from bladefem.hbm.solver.newton import DEFAULTS, Options
 from bladefem.hbm.solver.residual import Balance
 from bladefem.hbm.sweep import response, size, sweep
-from bladefem.hbm.truncation_indicator import overtones
+from bladefem.hbm.truncation_indicator import truncation_indicator
 from bladefem.reduction.matrices import port_model_from_matrices
 
 PAGE = Path(__file__).parents[2] / "docs/extending.md"
@@ -35,7 +35,7 @@ def page():
     """What the code of the page defines."""
     names = {}
     for block in re.findall(r"```python\n(.*?)```", PAGE.read_text(), re.DOTALL):
-        exec(block, names)  # noqa: S102
+        exec(block, names)
     return names
 
 
@@ -123,7 +123,9 @@ def test_every_path_uses_the_law(page):
 
 
 def test_every_fallback_ends_on_the_law(page):
-    """With plain Newton from both starts closed, each later link gives the same point or says why."""
+    """With plain Newton from both starts closed, each later link gives the same point or says
+    why.
+    """
     model = mass_on_law(page["Dahl"]())
     balance = Balance(model, condense(model, 1.25, 5), 64)
     usual = solve(model, 1.25, 5, 64)
@@ -160,11 +162,11 @@ def test_the_indicator_of_left_out_harmonics(page):
     """Its forces are those of the law, to the higher harmonics that a richer balance has."""
     model = mass_on_law(page["Dahl"]())
     point = solve(model, 0.9, 3, 64)
-    assert 0 < overtones(model, [point], 9)[0] < 0.1
+    assert 0 < truncation_indicator(model, [point], 9)[0] < 0.1
 
 
 def test_what_is_written_for_coulomb_refuses(page):
-    with pytest.raises(InputError, match="samples = 0.*written for Coulomb's law"):
+    with pytest.raises(InputError, match=r"samples = 0.*written for Coulomb's law"):
         solve(mass_on_law(page["Dahl"]()), 1.0, 3, 0)
     with pytest.raises(InputError, match="expected an object made from FrictionLaw"):
         mass_on_law("Dahl")

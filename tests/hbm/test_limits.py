@@ -11,7 +11,7 @@ from models import block, single_mass
 from bladefem.friction.fourier import to_complex
 from bladefem.hbm.model import Damping
 from bladefem.hbm.reference_blade import reference_model
-from bladefem.hbm.solve import free, solve, stuck
+from bladefem.hbm.solve import free_response, solve, stuck_response
 from bladefem.reduction.beam import beam_matrices
 from bladefem.reduction.matrices import port_model_from_matrices
 
@@ -29,7 +29,7 @@ def test_huge_load_is_the_stuck_response(name):
     model, omega = MODELS[name], OMEGA.get(name, 0.9)
     heavy = replace(model, elements=replace(model.elements, n0=model.elements.n0 * 1e6))
     solution = solve(heavy, omega, 3, 64)
-    exact = stuck(model, omega, 3)
+    exact = stuck_response(model, omega, 3)
     assert solution.converged and solution.states["stick"] == len(model.elements.kt)
     np.testing.assert_allclose(solution.probe, exact, rtol=0, atol=1e-10 * abs(exact).max())
 
@@ -42,7 +42,7 @@ def test_no_load_is_the_free_response(name):
         elements.kn > 0, -1e6, 0.0
     )  # open contacts need a gap that the motion does not close
     solution = solve(replace(model, elements=replace(elements, n0=gap)), omega, 3, 64)
-    exact = free(model, omega, 3)
+    exact = free_response(model, omega, 3)
     assert solution.converged and solution.states["open"] == len(elements.kt)
     np.testing.assert_allclose(solution.probe[1:], exact[1:], rtol=0, atol=1e-10 * abs(exact).max())
 
@@ -65,14 +65,16 @@ def test_the_linear_limits_of_the_blade_are_those_of_its_matrices():
     force = np.zeros(len(Z))
     force[-3] = 1.0
     np.testing.assert_allclose(
-        free(model, omega)[1], np.linalg.solve(Z[:-1, :-1], force[:-1])[-2], rtol=1e-8
+        free_response(model, omega)[1], np.linalg.solve(Z[:-1, :-1], force[:-1])[-2], rtol=1e-8
     )
     Z[-1, -1] = -(omega**2) * mass
     for turn in (1.0, np.exp(1j * phase)):
         row = np.zeros(len(Z), dtype=complex)
         row[10], row[-1] = turn, -1.0
         Z += kt * np.outer(row.conj(), row)
-    np.testing.assert_allclose(stuck(model, omega)[1], np.linalg.solve(Z, force)[-3], rtol=1e-8)
+    np.testing.assert_allclose(
+        stuck_response(model, omega)[1], np.linalg.solve(Z, force)[-3], rtol=1e-8
+    )
 
 
 def test_all_modes_kept_equal_the_full_model():

@@ -8,7 +8,7 @@ import numpy as np
 from models import single_mass
 
 from bladefem.hbm import sweep
-from bladefem.hbm.checkpoint import recorded
+from bladefem.hbm.checkpoint import response_with_checkpoints
 from bladefem.hbm.sweep import response
 
 OMEGAS = np.linspace(0.8, 1.4, 9)
@@ -16,14 +16,14 @@ OMEGAS = np.linspace(0.8, 1.4, 9)
 
 def test_a_killed_response_goes_on(tmp_path, monkeypatch):
     model, whole = single_mass(), list(response(single_mass(), OMEGAS, 5, 128))
-    list(islice(recorded(tmp_path, model, OMEGAS, 5, 128), 4))
+    list(islice(response_with_checkpoints(tmp_path, model, OMEGAS, 5, 128), 4))
     (tmp_path / "stages" / "point-000004.npz").write_bytes(b"half a file")
     solved = []
     plain = sweep.solve_along
     monkeypatch.setattr(
         sweep, "solve_along", lambda m, omegas, *a: solved.extend(omegas) or plain(m, omegas, *a)
     )
-    again = list(recorded(tmp_path, model, OMEGAS, 5, 128))
+    again = list(response_with_checkpoints(tmp_path, model, OMEGAS, 5, 128))
     assert solved == list(OMEGAS[3:])
     for one, other in zip(again, whole, strict=True):
         assert (
@@ -32,7 +32,7 @@ def test_a_killed_response_goes_on(tmp_path, monkeypatch):
             and one.work == other.work
         )
     solved.clear()
-    list(recorded(tmp_path, single_mass(limit=0.6), OMEGAS, 5, 128))
+    list(response_with_checkpoints(tmp_path, single_mass(limit=0.6), OMEGAS, 5, 128))
     assert solved == list(OMEGAS)
 
 

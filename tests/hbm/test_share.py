@@ -7,7 +7,7 @@ from models import block, single_mass
 from bladefem.errors import NotSolvedError
 from bladefem.hbm import sweep
 from bladefem.hbm.optimum import optimum
-from bladefem.hbm.parallel import shared, shared_response
+from bladefem.hbm.parallel import share_work, shared_response
 from bladefem.hbm.parameters import vary
 from bladefem.hbm.sweep import response, size
 
@@ -89,7 +89,7 @@ def test_a_study_over_loads_is_shared():
 
     model, loads = single_mass(), np.geomspace(0.3, 3.0, 6)
     study = [
-        shared(
+        share_work(
             lambda load: max(size(p) for p in response(vary(model, "load", load), OMEGAS[::4])),
             loads,
             comm,
@@ -108,4 +108,4 @@ def test_an_error_on_one_rank_is_raised_on_all():
             optimum(single_mass(), (5.0, 6.0), (0.5, 2.0))  # a band without a peak
 
     with pytest.raises(NotSolvedError, match="no peak"):
-        shared(work, range(4), MPI.COMM_WORLD)
+        share_work(work, range(4), MPI.COMM_WORLD)

@@ -144,8 +144,15 @@ def test_campbell_range_has_a_limit():
 def test_dollar_signs_in_a_title_are_dollar_signs(tmp_path):
     title = r"cost $\frac{1}{$ and $5"
     with canvas(tmp_path / "title.png") as ax:
+        ax.semilogy([1, 2], [1e-5, 1e3], label=title)
         ax.set_title(title)
         ax.set_xlabel(title)
+        ax.legend()
+        ax.figure.suptitle(title)
+        figure = ax.figure
+    # the numbers along the axis are still set as powers
+    assert all(label.get_parse_math() for label in figure.axes[0].get_yticklabels())
+    assert not figure.axes[0].xaxis.label.get_parse_math()
     assert (tmp_path / "title.png").stat().st_size > 1000
 
 

@@ -20,8 +20,8 @@ from bladefem.study.adaptive.check_points import peak_of
 from bladefem.study.adaptive.choice import adapted
 from bladefem.study.adaptive.family import family_of
 from bladefem.study.adaptive.settings import first_for
-from bladefem.time.shooting import harmonics, periodic
-from bladefem.time.system import damper_on_platforms, oscillator, ring
+from bladefem.time.shooting import periodic_solution, probe_harmonics
+from bladefem.time.system import blade_ring, damper_on_platforms, friction_oscillator
 
 HZ = 2 * np.pi
 
@@ -38,10 +38,12 @@ def blade(kt, load, mass, phase=0.0):
 
 def judged(model, omega):
     """First harmonic at the tip by shooting on the exact flow of the coupled system (phase 0)."""
-    system = ring(model.side(0), 0.002, model.elements, float(model.damper.mass[0, 0]), 1 + 0j)
-    solution = periodic(system, omega)
+    system = blade_ring(
+        model.side(0), 0.002, model.elements, float(model.damper.mass[0, 0]), 1 + 0j
+    )
+    solution = periodic_solution(system, omega)
     assert solution.converged
-    return harmonics(solution, system, 1)[0, 1]
+    return probe_harmonics(solution, system, 1)[0, 1]
 
 
 def test_f05_picard_and_secants_near_the_stick_slip_transition():
@@ -203,10 +205,10 @@ def test_f11_travelling_wave_by_shooting_and_by_balance():
     )
     full = solve(model, omega, 31, 2048)
     assert full.converged
-    system = ring(model.side(0), 0.002, model.elements, 0.06, 1 + 0j, blades=6, waves=1)
-    ringed = periodic(system, omega, samples=128)
+    system = blade_ring(model.side(0), 0.002, model.elements, 0.06, 1 + 0j, blades=6, waves=1)
+    ringed = periodic_solution(system, omega, samples=128)
     assert ringed.converged
-    assert abs(full.probe[1, 0] / harmonics(ringed, system, 1)[0, 1] - 1) < 2e-4
+    assert abs(full.probe[1, 0] / probe_harmonics(ringed, system, 1)[0, 1] - 1) < 2e-4
     side = platform(model, omega, 1)
     assert not iterate(side, "picard", Rules(criterion="residual", tolerance=1e-6)).converged
 
@@ -234,8 +236,8 @@ def test_f14_newton_hops_between_slip_directions():
 
 
 def test_newmark_follows_a_damped_oscillator_through_stick_and_slip():
-    system, omega = oscillator(200 * np.pi, 0.02, 2e7, 3.0, 5 + 0j), 2 * np.pi * 100
+    system, omega = friction_oscillator(200 * np.pi, 0.02, 2e7, 3.0, 5 + 0j), 2 * np.pi * 100
     cycle = direct(system, omega, 200)  # k h^2 / 4 m = 12.5
     assert cycle.reason == "periodic"
-    exact = harmonics(periodic(system, omega), system, 1)[0, 1]
+    exact = probe_harmonics(periodic_solution(system, omega), system, 1)[0, 1]
     assert abs(2 * np.fft.rfft(cycle.q[:, 0])[1] / 200 / exact - 1) < 5e-3

@@ -34,8 +34,8 @@ from bladefem.hbm.model import ReducedModel
 from bladefem.hbm.reference_blade import reference_model
 from bladefem.hbm.solution import Solution
 from bladefem.hbm.sweep import size, sweep
-from bladefem.time.shooting import Periodic, harmonics, periodic
-from bladefem.time.system import System, ring
+from bladefem.time.shooting import Periodic, periodic_solution, probe_harmonics
+from bladefem.time.system import System, blade_ring
 
 __all__ = [
     "Peak",
@@ -194,7 +194,7 @@ def judge(
     """
     ratio = float(np.mean(model.damping.ratio))
     damper: RigidBody = model.damper
-    system = ring(
+    system = blade_ring(
         model.side(0),
         ratio,
         model.elements,
@@ -203,5 +203,5 @@ def judge(
         blades,
         waves,
     )
-    solution = periodic(system, 2 * np.pi * frequency)
-    return solution, harmonics(solution, system, highest)[0], system
+    solution = periodic_solution(system, 2 * np.pi * frequency)
+    return solution, probe_harmonics(solution, system, highest)[0], system

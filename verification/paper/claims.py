@@ -26,7 +26,7 @@ from bladefem.study.kinds.punch import (
     spring_tilt,
 )
 from bladefem.time.event_integrator import State
-from bladefem.time.shooting import harmonics, multipliers, periodic
+from bladefem.time.shooting import floquet_multipliers, periodic_solution, probe_harmonics
 from bladefem.view.paper import draw_coupled_loops, draw_fit
 from verification.paper.blades import judge, optimum, paper_blade, peak
 from verification.paper.element import coupled_loop, linear_fit, printed_loop, two_slope_loop, work
@@ -287,16 +287,16 @@ def stability(folder: Path) -> Iterator[Claim]:
     d = len(coupled.stiffness)
     n = len(coupled.kt)
     first = []
-    sizes = [np.abs(multipliers(solution)).max()]
+    sizes = [np.abs(floquet_multipliers(solution)).max()]
     for _ in range(3):
         start = State(
             1e-5 * rng.normal(size=d),
             1e-5 * solution.omega * rng.normal(size=d),
             1e-5 * rng.normal(size=n),
         )
-        other = periodic(coupled, solution.omega, start)
-        first.append(harmonics(other, coupled, 1)[0, 1])
-        sizes.append(np.abs(multipliers(other)).max())
+        other = periodic_solution(coupled, solution.omega, start)
+        first.append(probe_harmonics(other, coupled, 1)[0, 1])
+        sizes.append(np.abs(floquet_multipliers(other)).max())
     spread = np.abs(np.array(first) / first[0] - 1).max()
     yield Claim(
         "Sect. 5",

@@ -18,7 +18,7 @@ from bladefem.hbm.solve import solve
 from bladefem.hbm.sweep import response, size
 from bladefem.hbm.time_model import time_system
 from bladefem.study.pipeline.stability import in_one_body, stability_of
-from bladefem.time.shooting import harmonics, multipliers, periodic
+from bladefem.time.shooting import floquet_multipliers, periodic_solution, probe_harmonics
 from bladefem.time.system import System
 from verification.paper.blades import judge, peak
 from verification.paper.plane_row import whole_model
@@ -84,9 +84,9 @@ def following(loads: tuple[float, ...] = (4.0, 20.0, 100.0)) -> Iterator[Claim]:
         found = solve(model, top.omega, 9, 1024, start=top)
         system = time_system(model, 1)
         begin = state_of(found, system)
-        exact = periodic(system, top.omega, begin, samples=512)
-        error = abs(found.probe[1, 0] / harmonics(exact, system, 1)[0, 1] - 1)
-        multiplier = np.abs(multipliers(exact)).max()
+        exact = periodic_solution(system, top.omega, begin, samples=512)
+        error = abs(found.probe[1, 0] / probe_harmonics(exact, system, 1)[0, 1] - 1)
+        multiplier = np.abs(floquet_multipliers(exact)).max()
         cycle = direct(
             system,
             top.omega,

@@ -17,16 +17,16 @@ from ...errors import InputError, NotSolvedError
 __all__ = [
     "Damping",
     "Stack",
-    "amplitudes",
-    "block",
+    "modal_amplitudes",
+    "receptance_block",
     "damping_rate",
-    "flexibility",
+    "modal_flexibility",
     "impedance_rate",
-    "lost",
-    "motion",
-    "receptance",
+    "dissipated_work",
+    "port_motion",
+    "port_receptance",
     "rigid_stack",
-    "stacked",
+    "stack_bodies",
 ]
 
 # frequency of the modes that fill up a harmonic which has fewer [rad/s]: nothing moves them
@@ -95,17 +95,19 @@ class Stack:
         )
 
 
-def stacked(bodies: tuple[PortModel, ...], damping: Damping, rows: np.ndarray) -> Stack:
+def stack_bodies(bodies: tuple[PortModel, ...], damping: Damping, rows: np.ndarray) -> Stack:
     """The bodies of the harmonics as one; `rows` of the contact port enter the balance."""
-    first = _ports(bodies[0], rows)
-    ports = [first if body.ports == bodies[0].ports else _ports(body, rows) for body in bodies]
+    first = _port_slices(bodies[0], rows)
+    ports = [
+        first if body.ports == bodies[0].ports else _port_slices(body, rows) for body in bodies
+    ]
     if len({tuple(map(len, parts)) for parts in ports}) > 1:
         raise InputError(
             "sides: the bodies of the harmonics have ports of different sizes, expected the same"
         )
     most = max(len(body.omega) for body in bodies)
     order = [np.concatenate(parts) for parts in ports]
-    omega = np.array([_fill(body.omega, most, SPARE) for body in bodies])
+    omega = np.array([_fill_modes(body.omega, most, SPARE) for body in bodies])
     own = [
         np.zeros(len(body.omega))
         if body.damping is None or body.damping.ndim == 2
@@ -113,14 +115,19 @@ def stacked(bodies: tuple[PortModel, ...], damping: Damping, rows: np.ndarray) -
         for body in bodies
     ]
     viscous = np.array(
-        [_fill(damping.viscous(body.omega) + c, most) for body, c in zip(bodies, own, strict=True)]
+        [
+            _fill_modes(damping.viscous(body.omega) + c, most)
+            for body, c in zip(bodies, own, strict=True)
+        ]
     )
-    hysteretic = np.array([_fill(damping.structural * body.omega**2, most) for body in bodies])
+    hysteretic = np.array(
+        [_fill_modes(damping.structural * body.omega**2, most) for body in bodies]
+    )
     coupled = None
     if any(body.damping is not None and body.damping.ndim == 2 for body in bodies):
-        coupled = np.array([_square(body, most) for body in bodies])
+        coupled = np.array([_square_damping(body, most) for body in bodies])
     shapes = np.array(
-        [_widened(body.shapes[p], most) for body, p in zip(bodies, order, strict=True)]
+        [_padded_shapes(body.shapes[p], most) for body, p in zip(bodies, order, strict=True)]
     )
     residual = np.array(
         [body.residual[p[:, None], p] for body, p in zip(bodies, order, strict=True)]
@@ -141,7 +148,7 @@ def rigid_stack(mass: np.ndarray, B: np.ndarray) -> Stack:
     )
 
 
-def flexibility(stack: Stack, w: np.ndarray) -> np.ndarray:
+def modal_flexibility(stack: Stack, w: np.ndarray) -> np.ndarray:
     """(k, m), or (k, m, m) for coupled damping: inverse modal impedances at the circular
     frequencies w (k,) [s^2].
 
@@ -170,7 +177,7 @@ def flexibility(stack: Stack, w: np.ndarray) -> np.ndarray:
     return flexible
 
 
-def block(stack: Stack, flexible: np.ndarray, rows: slice, columns: slice) -> np.ndarray:
+def receptance_block(stack: Stack, flexible: np.ndarray, rows: slice, columns: slice) -> np.ndarray:
     """(k, rows, columns) receptances [m/N]."""
     left = stack.shapes[:, rows]
     right = stack.shapes[:, columns].conj().swapaxes(1, 2)
@@ -190,13 +197,13 @@ def block(stack: Stack, flexible: np.ndarray, rows: slice, columns: slice) -> np
     return (left * flexible[:, None, :]) @ right + residual
 
 
-def amplitudes(stack: Stack, flexible: np.ndarray, forces: np.ndarray) -> np.ndarray:
+def modal_amplitudes(stack: Stack, flexible: np.ndarray, forces: np.ndarray) -> np.ndarray:
     """(k, m) modal amplitudes under forces (k, P) at the ports."""
     push = (forces[:, None, :] @ stack.shapes.conj())[:, 0]
     return flexible * push if flexible.ndim == 2 else (flexible @ push[:, :, None])[:, :, 0]
 
 
-def motion(stack: Stack, modal: np.ndarray, forces: np.ndarray, rows: slice) -> np.ndarray:
+def port_motion(stack: Stack, modal: np.ndarray, forces: np.ndarray, rows: slice) -> np.ndarray:
     """(k, rows) displacements by modal amplitudes (k, m) and by forces (k, P) on the residual
     flexibility [m].
     """
@@ -224,7 +231,7 @@ def damping_rate(stack: Stack, w: np.ndarray, modal: np.ndarray) -> np.ndarray:
     )
 
 
-def lost(stack: Stack, w: np.ndarray, modal: np.ndarray) -> np.ndarray:
+def dissipated_work(stack: Stack, w: np.ndarray, modal: np.ndarray) -> np.ndarray:
     """(k,) work lost in the modes in one cycle of each circular frequency [J]."""
     w = w[:, None]
     loss = np.sum((w * stack.viscous + np.sign(w) * stack.hysteretic) * abs(modal) ** 2, axis=1)
@@ -237,7 +244,7 @@ def lost(stack: Stack, w: np.ndarray, modal: np.ndarray) -> np.ndarray:
     return np.pi * loss
 
 
-def receptance(
+def port_receptance(
     body: PortModel,
     damping: Damping,
     w: float,
@@ -249,34 +256,36 @@ def receptance(
     """
     both = [np.arange(len(body.residual))[part] for part in (rows, columns)]
     ports = {"contact": np.concatenate(both)}
-    stack = stacked(
+    stack = stack_bodies(
         (PortModel(body.omega, body.shapes, body.residual, ports, damping=body.damping),),
         damping,
         np.arange(len(ports["contact"])),
     )
     split = len(both[0])
-    return block(stack, flexibility(stack, np.array([w])), slice(0, split), slice(split, None))[0]
+    return receptance_block(
+        stack, modal_flexibility(stack, np.array([w])), slice(0, split), slice(split, None)
+    )[0]
 
 
-def _ports(body: PortModel, rows: np.ndarray) -> list[np.ndarray]:
+def _port_slices(body: PortModel, rows: np.ndarray) -> list[np.ndarray]:
     everything = np.arange(len(body.residual))
     return [everything[body.ports["contact"]][rows]] + [
         everything[body.ports.get(name, slice(0, 0))] for name in ("load", "probe")
     ]
 
 
-def _widened(shapes: np.ndarray, count: int) -> np.ndarray:
+def _padded_shapes(shapes: np.ndarray, count: int) -> np.ndarray:
     """Shapes (P, m) filled up with zeros to (P, count)."""
     spare = count - shapes.shape[1]
     return np.pad(shapes, ((0, 0), (0, spare))) if spare else shapes
 
 
-def _fill(values: np.ndarray, count: int, value: float = 0.0) -> np.ndarray:
+def _fill_modes(values: np.ndarray, count: int, value: float = 0.0) -> np.ndarray:
     spare = count - len(values)
     return np.concatenate([values, np.full(spare, value)]) if spare else values
 
 
-def _square(body: PortModel, count: int) -> np.ndarray:
+def _square_damping(body: PortModel, count: int) -> np.ndarray:
     pad = count - len(body.omega)
     if body.damping is None or body.damping.ndim == 1:
         return np.zeros((count, count))

@@ -18,10 +18,15 @@ from ...data import RigidBody
 from ...errors import NotSolvedError
 from ..model import ReducedModel
 from ..policy import BATCHED_SOLVE_DOFS
-from .bodies import amplitudes, block, flexibility, motion, receptance
-from .woodbury import low_rank, updated
+from .bodies import (
+    modal_amplitudes,
+    modal_flexibility,
+    port_motion,
+    receptance_block,
+)
+from .woodbury import low_rank, low_rank_update
 
-__all__ = ["Linear", "condense", "receptance", "rigid_motions", "with_springs"]
+__all__ = ["Linear", "condense", "rigid_motions", "with_springs"]
 
 # motions that the contact springs resist less than this, relatively, are left out
 UNSEEN = 1e-12
@@ -57,19 +62,19 @@ def condense(model: ReducedModel, omega: float, harmonics: int) -> Linear:
     springs = model.springs.ravel()
     orders = omega * np.arange(harmonics + 1)
     blades = model.blades(harmonics)
-    flexible = flexibility(blades, orders)
-    G = block(blades, flexible, blades.contact, blades.contact)
+    flexible = modal_flexibility(blades, orders)
+    G = receptance_block(blades, flexible, blades.contact, blades.contact)
     force = np.zeros((harmonics + 1, blades.shapes.shape[1]), dtype=complex)
     force[:, blades.load] = model.loads(harmonics)
-    free = motion(blades, amplitudes(blades, flexible, force), force, blades.contact)
+    free = port_motion(blades, modal_amplitudes(blades, flexible, force), force, blades.contact)
     _add_damper(model, orders, G)
     B, g, rigid = model.once("rigid motions", lambda: rigid_motions(model, springs))
     first = 1 if B.shape[1] else 0
     fixed = low_rank(model, harmonics)
     if fixed is None:
-        A, stuck = _sprung(G, free, springs, first)
+        A, stuck = _add_contact_springs(G, free, springs, first)
     else:
-        A = updated(fixed, orders, first)
+        A = low_rank_update(fixed, orders, first)
         stuck = free - (A @ (springs * free)[:, :, None])[:, :, 0]
     if B.shape[1]:
         A[0], stuck[0] = model.once(
@@ -94,10 +99,12 @@ def _add_damper(model: ReducedModel, orders: np.ndarray, G: np.ndarray) -> None:
         G[1:] -= (B @ np.linalg.solve(model.damper.mass, B.T)) / orders[1:, None, None] ** 2
     elif model.damper is not None:
         damper = model.elastic_damper(len(orders) - 1)
-        G += block(damper, flexibility(damper, orders), damper.contact, damper.contact)
+        G += receptance_block(
+            damper, modal_flexibility(damper, orders), damper.contact, damper.contact
+        )
 
 
-def _sprung(
+def _add_contact_springs(
     G: np.ndarray, free: np.ndarray, springs: np.ndarray, first: int
 ) -> tuple[np.ndarray, np.ndarray]:
     """(1 + G K)^-1 times G and times free, from harmonic `first` on."""

@@ -18,7 +18,7 @@ from ..model import ReducedModel
 from ..solver.deflation import common_motions
 from .bodies import Stack, rigid_stack
 from .condensation import rigid_motions, with_springs
-from .woodbury import staying
+from .woodbury import frequency_independent_parts
 
 __all__ = ["Bodies", "prepared_bodies"]
 
@@ -48,7 +48,7 @@ class Bodies(NamedTuple):
     direct: np.ndarray
     # (H+1, p) the same of the probes
     straight: np.ndarray
-    # (S, m, m), U (S, m, M), UH (S, M, m), N (S, M, M) of `woodbury.staying`; empty where
+    # (S, m, m), U (S, m, M), UH (S, M, m), N (S, M, M) of `woodbury.frequency_independent_parts`; empty where
     A: np.ndarray
     # there are too many modes for it
     U: np.ndarray
@@ -77,10 +77,10 @@ class Bodies(NamedTuple):
 
 def prepared_bodies(model: ReducedModel, H: int) -> Bodies | None:
     """Made once; None where points are not compiled as a whole."""
-    return model.once(("small", H), lambda: _prepared(model, H))
+    return model.once(("small", H), lambda: _pack_bodies(model, H))
 
 
-def _prepared(model: ReducedModel, H: int) -> Bodies | None:
+def _pack_bodies(model: ReducedModel, H: int) -> Bodies | None:
     dofs = model.springs.size
     if not policy.uses_compiled_point(model, H):
         return None
@@ -93,9 +93,11 @@ def _prepared(model: ReducedModel, H: int) -> Bodies | None:
     if isinstance(model.damper, RigidBody):
         bodies.append(rigid_stack(model.damper.mass, model.damper.B[model.rows]))
     own, viscous, hysteretic = (
-        _joined(bodies, name) for name in ("omega", "viscous", "hysteretic")
+        _joined_modes(bodies, name) for name in ("omega", "viscous", "hysteretic")
     )
-    contact = _joined([blades, *(_reversed(b) for b in bodies[1:])], "shapes", lambda b: b.contact)
+    contact = _joined_modes(
+        [blades, *(_with_reversed_shapes(b) for b in bodies[1:])], "shapes", lambda b: b.contact
+    )
     spare = ((0, 0), (0, 0), (0, contact.shape[2] - blades.shapes.shape[2]))
     load, probe = (np.pad(blades.shapes[:, rows], spare) for rows in (blades.load, blades.probe))
     residual = sum(b.residual[:, b.contact, b.contact] for b in bodies)
@@ -105,7 +107,7 @@ def _prepared(model: ReducedModel, H: int) -> Bodies | None:
     )
     push = (loads[:, None] @ load.conj())[:, 0]
     fixed = (
-        staying(residual, contact, springs)
+        frequency_independent_parts(residual, contact, springs)
         if policy.updates_by_modes(dofs, contact.shape[2])
         else [np.zeros((0, 0, 0))] * 4
     )
@@ -118,11 +120,11 @@ def _prepared(model: ReducedModel, H: int) -> Bodies | None:
         direct,
         straight,
         *fixed,
-        *_pushed(fixed, springs, push, direct),
+        *_excited_modes(fixed, springs, push, direct),
     ]
     B, g, rigid = model.once("rigid", lambda: rigid_motions(model, springs))
     still = np.flatnonzero(blades.omega[0] == 0)
-    mean = _mean(
+    mean = _mean_flexibility(
         (own[0], contact[0], residual[0]), (push[0], direct[0]), (springs, B, g, model.hold)
     )
     return Bodies(
@@ -140,7 +142,7 @@ def _prepared(model: ReducedModel, H: int) -> Bodies | None:
     )
 
 
-def _mean(
+def _mean_flexibility(
     body: tuple[np.ndarray, ...], pushed: tuple[np.ndarray, np.ndarray], held: tuple
 ) -> tuple[np.ndarray, ...]:
     """A (m, m), stuck (m,) and G (m, m) of the mean, as in `linear`."""
@@ -161,7 +163,7 @@ def _one_for_all(fixed: tuple[np.ndarray, ...], dofs: int) -> tuple[np.ndarray, 
     return np.ascontiguousarray(A[0]), np.ascontiguousarray(U[0].real)
 
 
-def _pushed(
+def _excited_modes(
     fixed: tuple[np.ndarray, ...], springs: np.ndarray, push: np.ndarray, direct: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray]:
     """(H+1, m) what the excitation moves beside the modes in full stick, (H+1, M) what pushes the
@@ -175,7 +177,7 @@ def _pushed(
     return direct - (A[at] @ sprung)[:, :, 0], push - (UH[at] @ sprung)[:, :, 0]
 
 
-def _reversed(body: Stack) -> Stack:
+def _with_reversed_shapes(body: Stack) -> Stack:
     return Stack(
         body.omega,
         body.viscous,
@@ -189,7 +191,7 @@ def _reversed(body: Stack) -> Stack:
     )
 
 
-def _joined(
+def _joined_modes(
     bodies: list[Stack], name: str, rows: Callable[[Stack], slice] = lambda _: slice(None)
 ) -> np.ndarray:
     """Modes of several bodies side by side, on the harmonics of the one that has most."""

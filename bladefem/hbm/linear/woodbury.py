@@ -22,9 +22,9 @@ from ...data import RigidBody
 from ...errors import NotSolvedError
 from ..model import ReducedModel
 from ..policy import uses_low_rank
-from .bodies import Stack, flexibility, rigid_stack
+from .bodies import Stack, modal_flexibility, rigid_stack
 
-__all__ = ["LowRank", "bodies_of", "low_rank", "staying", "updated"]
+__all__ = ["LowRank", "bodies_of", "low_rank", "frequency_independent_parts", "low_rank_update"]
 
 
 @dataclass(frozen=True)
@@ -51,17 +51,19 @@ def low_rank(model: ReducedModel, harmonics: int) -> LowRank | None:
     k = sum(body.omega.shape[1] for body in bodies)
     if any(body.coupled is not None for body in bodies) or not uses_low_rank(m, k):
         return None
-    return model.once(("low rank", harmonics), lambda: _fixed(bodies, model.springs.ravel()))
+    return model.once(
+        ("low rank", harmonics), lambda: _constant_parts(bodies, model.springs.ravel())
+    )
 
 
-def updated(fixed: LowRank, orders: np.ndarray, first: int) -> np.ndarray:
+def low_rank_update(fixed: LowRank, orders: np.ndarray, first: int) -> np.ndarray:
     """(H+1, m, m) flexibility with springs at the circular frequencies `orders`, from harmonic
     `first` on.
 
     Raises:
         NotSolvedError: a resonance without damping is hit exactly.
     """
-    D = np.concatenate([flexibility(body, orders) for body in fixed.bodies], axis=1)[first:]
+    D = np.concatenate([modal_flexibility(body, orders) for body in fixed.bodies], axis=1)[first:]
     N, U, UH, A = (
         part[first:] if len(part) > 1 else part for part in (fixed.N, fixed.U, fixed.UH, fixed.A)
     )
@@ -88,7 +90,7 @@ def bodies_of(model: ReducedModel, harmonics: int) -> tuple[Stack, ...]:
     return (blades,) if damper is None else (blades, damper)
 
 
-def _fixed(bodies: tuple[Stack, ...], springs: np.ndarray) -> LowRank:
+def _constant_parts(bodies: tuple[Stack, ...], springs: np.ndarray) -> LowRank:
     size = max(len(body.shapes) for body in bodies)
     R = sum(body.residual[:, body.contact, body.contact] for body in bodies)
     L = np.concatenate(
@@ -100,10 +102,12 @@ def _fixed(bodies: tuple[Stack, ...], springs: np.ndarray) -> LowRank:
         ],
         axis=2,
     )
-    return LowRank(bodies, *staying(R, L, springs))
+    return LowRank(bodies, *frequency_independent_parts(R, L, springs))
 
 
-def staying(R: np.ndarray, L: np.ndarray, springs: np.ndarray) -> tuple[np.ndarray, ...]:
+def frequency_independent_parts(
+    R: np.ndarray, L: np.ndarray, springs: np.ndarray
+) -> tuple[np.ndarray, ...]:
     """A (S, m, m), U (S, m, k), its conjugate transpose and N (S, k, k) from R (S or 1, m, m) and L
     (S, m, k).
     """

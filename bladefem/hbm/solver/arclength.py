@@ -17,12 +17,12 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from ...errors import NotSolvedError
-from ..parameter_derivatives import rate
+from ..parameter_derivatives import residual_rate
 from .newton import Options, newton
 from .newton_krylov import Memory
-from .residual import Balance, State, evaluate_balance, linearise, orientation
+from .residual import Balance, State, determinant_sign, evaluate_balance, linearise_balance
 
-__all__ = ["Spot", "Task", "advance", "spot_at"]
+__all__ = ["Spot", "Task", "advance_path", "spot_at"]
 
 # Newton steps of one corrector
 CORRECTIONS = 12
@@ -94,7 +94,7 @@ class Spot:
         return dw * length, float(length)
 
 
-def advance(task: Task, spot: Spot, step: float, longest: float) -> tuple[Spot, float, bool]:
+def advance_path(task: Task, spot: Spot, step: float, longest: float) -> tuple[Spot, float, bool]:
     """The next point, the next step, and whether the parameter turned back in between.
 
     Raises:
@@ -103,13 +103,13 @@ def advance(task: Task, spot: Spot, step: float, longest: float) -> tuple[Spot, 
     """
     reason = ""
     while step >= SMALLEST:
-        found, reason = _correct(task, spot, step, _direction(task, spot))
+        found, reason = _correct_point(task, spot, step, _path_direction(task, spot))
         if found is not None:
             easy = found.iterations <= 4
             return found, min(1.5 * step, longest) if easy else step, found.sign != spot.sign
         step /= 2
     for share in LEAPS:
-        found = _leap(task, spot, share)
+        found = _leap_gap(task, spot, share)
         if found is not None:
             return found, share, False
     for share in CORNERS:
@@ -123,15 +123,15 @@ def advance(task: Task, spot: Spot, step: float, longest: float) -> tuple[Spot, 
 Direction = tuple[np.ndarray, float]
 
 
-def _size(task: Task, spot: Spot) -> float:
+def _step_size(task: Task, spot: Spot) -> float:
     return max(task.size, float(np.linalg.norm(spot.state.w)))
 
 
-def _direction(task: Task, spot: Spot) -> Direction:
-    return spot.tangent(task, _size(task, spot))
+def _path_direction(task: Task, spot: Spot) -> Direction:
+    return spot.tangent(task, _step_size(task, spot))
 
 
-def _correct(
+def _correct_point(
     task: Task, spot: Spot, step: float, direction: Direction, corner: bool = False
 ) -> tuple[Spot | None, str]:
     """Newton back to the path on the plane across a direction, a step ahead.
@@ -139,7 +139,7 @@ def _correct(
     Args:
         corner: the path may have turned by any angle but back.
     """
-    size = _size(task, spot)
+    size = _step_size(task, spot)
     dw, dx = direction
     guess = spot.state.w + step * size * dw, spot.x + step * task.width * dx
     w, x = guess
@@ -151,9 +151,9 @@ def _correct(
         if iteration == CORRECTIONS or not np.isfinite(state.error):
             return None, f"corrector left a residual of {state.error:.1e}"
         try:
-            inverse = linearise(balance, state, task.memory)
+            inverse = linearise_balance(balance, state, task.memory)
             back = inverse(state.residual)
-            along = inverse(rate(balance, state, task.name))
+            along = inverse(residual_rate(balance, state, task.name))
         except np.linalg.LinAlgError as error:
             return None, str(error)
         off = np.sum(dw * (w - guess[0])) / size + dx * (x - guess[1]) / task.width
@@ -179,21 +179,21 @@ def _around_corner(task: Task, spot: Spot, share: float) -> Spot | None:
     The direction there is that of the balance linearised a little ahead, on either side; it leads
     on where its solution lies off the way back.
     """
-    size = _size(task, spot)
-    dw, dx = _direction(task, spot)
+    size = _step_size(task, spot)
+    dw, dx = _path_direction(task, spot)
     for ahead in (1.0, -1.0):
         x = spot.x + ahead * share * task.width * dx
         balance = task.balance(x)
         state = evaluate_balance(balance, spot.state.w + ahead * share * size * dw)
         try:
-            inverse = linearise(balance, state, task.memory)
-            slope = -inverse(rate(balance, state, task.name)) * task.width / size
+            inverse = linearise_balance(balance, state, task.memory)
+            slope = -inverse(residual_rate(balance, state, task.name)) * task.width / size
         except np.linalg.LinAlgError:
             continue
         length = 1.0 / np.sqrt(np.sum(slope**2) + 1.0)
         for sign in (1.0, -1.0):
             direction = sign * length * slope, float(sign * length)
-            found, _ = _correct(task, spot, share, direction, corner=True)
+            found, _ = _correct_point(task, spot, share, direction, corner=True)
             if found is None:
                 continue
             off_w = (found.state.w - spot.state.w) / size + share * dw
@@ -203,7 +203,7 @@ def _around_corner(task: Task, spot: Spot, share: float) -> Spot | None:
     return None
 
 
-def _leap(task: Task, spot: Spot, share: float) -> Spot | None:
+def _leap_gap(task: Task, spot: Spot, share: float) -> Spot | None:
     """A solution across a small gap, if it lies where the path was heading."""
     x = spot.x + spot.sign * share * task.width
     balance = task.balance(x)
@@ -220,5 +220,7 @@ def spot_at(
     """A solved state with the direction of its path, x rising along it for sign 1 and falling for
     -1.
     """
-    slope = -linearise(balance, state, task.memory)(rate(balance, state, task.name))
-    return Spot(x, balance, state, iterations, slope, sign, orientation(balance, state))
+    slope = -linearise_balance(balance, state, task.memory)(
+        residual_rate(balance, state, task.name)
+    )
+    return Spot(x, balance, state, iterations, slope, sign, determinant_sign(balance, state))

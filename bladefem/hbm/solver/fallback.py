@@ -27,8 +27,8 @@ from ...errors import InputError, NotSolvedError
 from ..linear.condensation import Linear
 from ..parameters import vary
 from ..time_model import shooting_start
-from .arclength import Task, advance, spot_at
-from .newton import Newton, Options, fits, newton
+from .arclength import Task, advance_path, spot_at
+from .newton import Newton, Options, newton, runs_compiled
 from .residual import Balance, evaluate_balance, start_in_stick
 
 __all__ = ["Attempt", "match_harmonics", "solve_balance"]
@@ -60,7 +60,7 @@ class Attempt:
 def solve_balance(balance: Balance, start: np.ndarray | None, options: Options) -> list[Attempt]:
     """The attempts made, the last one converged unless every way failed."""
     attempts = []
-    for attempt in _ways(balance, start, options):
+    for attempt in _attempts_in_order(balance, start, options):
         attempts.append(attempt)
         if attempt.end.converged:
             break
@@ -75,11 +75,13 @@ def match_harmonics(w: np.ndarray, H: int) -> np.ndarray:
     return matched
 
 
-def _ways(balance: Balance, start: np.ndarray | None, options: Options) -> Iterator[Attempt]:
+def _attempts_in_order(
+    balance: Balance, start: np.ndarray | None, options: Options
+) -> Iterator[Attempt]:
     stick = start_in_stick(balance)
     near = None
     for w in ([] if start is None else [start]) + [stick]:
-        for method, merit in METHODS if fits(balance) else reversed(METHODS):
+        for method, merit in METHODS if runs_compiled(balance) else reversed(METHODS):
             end = newton(balance, w, options, merit)
             yield Attempt(method, end)
             near = end if near is None or end.state.error < near.state.error else near
@@ -111,14 +113,14 @@ def _more_harmonics(balance: Balance, options: Options) -> Newton:
     w = None
     sequence = [H for H in (3, 7, 15, 31, 63) if H < highest] + [highest]
     for H in sequence:
-        less = replace(balance, linear=_truncate(balance.linear, H))
+        less = replace(balance, linear=_truncate_harmonics(balance.linear, H))
         end = newton(less, start_in_stick(less) if w is None else match_harmonics(w, H), options)
         if not end.converged and w is None:
             second = newton(less, start_in_stick(less), options, "residual")
             end = replace(second, iterations=end.iterations + second.iterations)
         iterations += end.iterations
         if not end.converged:
-            return _back(balance, end, iterations, f"with {H} harmonics: {end.reason}")
+            return _failed_attempt(balance, end, iterations, f"with {H} harmonics: {end.reason}")
         w = end.state.w
     return replace(end, iterations=iterations)
 
@@ -130,13 +132,13 @@ def _from_high_load(balance: Balance, options: Options) -> Newton:
     level = np.log(FIRST_LOAD)
     iterations = 0
     while True:
-        end = newton(_loaded(balance, level), start_in_stick(balance), options)
+        end = newton(_with_normal_load(balance, level), start_in_stick(balance), options)
         iterations += end.iterations
         if end.converged:
             break
         level += np.log(100.0)
         if level > np.log(LARGEST_LOAD):
-            return _back(
+            return _failed_attempt(
                 balance,
                 end,
                 iterations,
@@ -147,7 +149,9 @@ def _from_high_load(balance: Balance, options: Options) -> Newton:
     while level > 0:
         target = max(level - step, 0.0)
         end = newton(
-            _loaded(balance, target), _ahead(path, target), replace(options, iterations=15)
+            _with_normal_load(balance, target),
+            _extrapolated_start(path, target),
+            replace(options, iterations=15),
         )
         iterations += end.iterations
         if end.converged:
@@ -157,7 +161,7 @@ def _from_high_load(balance: Balance, options: Options) -> Newton:
         else:
             step = (level - target) / 3
             if step < SMALLEST_STEP:
-                return _back(
+                return _failed_attempt(
                     balance,
                     end,
                     iterations,
@@ -196,7 +200,7 @@ def _along_excitation(balance: Balance, options: Options) -> Newton:
         if end.converged:
             break
     else:
-        return _back(
+        return _failed_attempt(
             balance, end, iterations, f"no solution for any part of the excitation: {end.reason}"
         )
     task = Task(part, "force", -x, float(np.linalg.norm(end.state.w)), options)
@@ -205,15 +209,15 @@ def _along_excitation(balance: Balance, options: Options) -> Newton:
         spot = spot_at(task, x, part(x), end.state, 0, 1.0)
         step = 0.05
         for _ in range(LONGEST_PATH):
-            spot, step, _ = advance(task, spot, step, 0.2)
+            spot, step, _ = advance_path(task, spot, step, 0.2)
             iterations = iterations + spot.iterations
             reached = spot.state
             if spot.x >= 0:
                 end = newton(balance, spot.state.w, options)
                 return replace(end, iterations=iterations + end.iterations)
     except (NotSolvedError, np.linalg.LinAlgError) as error:
-        return _back(balance, replace(end, state=reached), iterations, str(error))
-    return _back(
+        return _failed_attempt(balance, replace(end, state=reached), iterations, str(error))
+    return _failed_attempt(
         balance, replace(end, state=reached), iterations, f"not there after {LONGEST_PATH} points"
     )
 
@@ -226,7 +230,7 @@ def _from_shooting(balance: Balance, near: Newton, options: Options) -> Newton:
         return Newton(near.state, 0, False, str(error))
 
 
-def _loaded(balance: Balance, level: float) -> Balance:
+def _with_normal_load(balance: Balance, level: float) -> Balance:
     """The balance under exp(level) times the normal load; elements with an initial gap are pressed
     shut.
     """
@@ -236,7 +240,7 @@ def _loaded(balance: Balance, level: float) -> Balance:
     return replace(balance, model=replace(balance.model, elements=raised))
 
 
-def _ahead(path: list[tuple[float, np.ndarray]], target: float) -> np.ndarray:
+def _extrapolated_start(path: list[tuple[float, np.ndarray]], target: float) -> np.ndarray:
     """The line through the last two points of the path, at the target."""
     if len(path) == 1:
         return path[0][1]
@@ -244,13 +248,13 @@ def _ahead(path: list[tuple[float, np.ndarray]], target: float) -> np.ndarray:
     return now + (target - new) / (new - old) * (now - before)
 
 
-def _truncate(linear: Linear, H: int) -> Linear:
+def _truncate_harmonics(linear: Linear, H: int) -> Linear:
     return replace(
         linear, **{name: getattr(linear, name)[: H + 1] for name in ("G", "free", "A", "stuck")}
     )
 
 
-def _back(balance: Balance, end: Newton, iterations: int, reason: str) -> Newton:
+def _failed_attempt(balance: Balance, end: Newton, iterations: int, reason: str) -> Newton:
     """A failed attempt as a state of the true balance."""
     w = match_harmonics(end.state.w, balance.linear.A.shape[0] - 1)
     return Newton(evaluate_balance(balance, w), iterations, False, reason)

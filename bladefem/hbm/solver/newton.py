@@ -9,7 +9,7 @@ from numbers import Integral
 import numpy as np
 
 from ...errors import InputError
-from ...friction.aft import Forces, dissipated, states
+from ...friction.aft import Forces, contact_states, dissipated_energy
 from ..policy import (
     COMPILED_NEWTON,
     DENSE_LU,
@@ -33,13 +33,13 @@ from .residual import (
     Balance,
     Inverse,
     State,
-    condensed,
+    compiled_arguments,
     contact_table,
     evaluate_balance,
-    linearise,
+    linearise_balance,
 )
 
-__all__ = ["DEFAULTS", "Newton", "Options", "fits", "newton", "route_of", "solvers_of"]
+__all__ = ["DEFAULTS", "Newton", "Options", "runs_compiled", "newton", "route_of", "solvers_of"]
 
 # step share below which the search direction is given up
 SHORTEST = 2.0**-8
@@ -112,8 +112,8 @@ def newton(
             take next, which does not depend on how the equations are scaled (Deuflhard, Newton
             Methods for Nonlinear Problems, 2004, Sect. 3.3), or "residual".
     """
-    if merit == "step" and fits(balance):
-        return _fast(balance, w, options)
+    if merit == "step" and runs_compiled(balance):
+        return _run_compiled(balance, w, options)
     memory = Memory()
     end = _newton_loop(balance, w, options, merit, memory)
     return replace(end, route=route_of(NUMPY_NEWTON, memory.solvers))
@@ -132,11 +132,11 @@ def _newton_loop(
         if iteration == options.iterations:
             break
         try:
-            inverse = linearise(balance, state, memory)
+            inverse = linearise_balance(balance, state, memory)
         except np.linalg.LinAlgError:
             return Newton(state, iteration, False, "singular Jacobian")
         try:
-            better = _search(balance, state, inverse, merit)
+            better = _line_search(balance, state, inverse, merit)
         except np.linalg.LinAlgError as error:
             return Newton(state, iteration + 1, False, str(error))
         if better is None:
@@ -152,19 +152,26 @@ def _newton_loop(
     )
 
 
-def fits(balance: Balance) -> bool:
+def runs_compiled(balance: Balance) -> bool:
     """True if Newton's loop is compiled for this balance."""
     harmonics, m = balance.linear.stuck.shape
     return uses_compiled_newton(balance.model, m * (2 * harmonics - 1))
 
 
-def _fast(balance: Balance, w: np.ndarray, options: Options) -> Newton:
+def _run_compiled(balance: Balance, w: np.ndarray, options: Options) -> Newton:
     end = np.ascontiguousarray(w.reshape(-1, w.shape[2]), dtype=float).copy()
     d = balance.model.directions
     shape = w.shape
     contact = contact_table(balance.model, shape[2] // 2, balance.samples)
     steps, code, error, f, dfdw, shares, residual, p, solver = compiled_newton(
-        end, d, condensed(balance), contact, STICKS, options.tolerance, options.iterations, SHORTEST
+        end,
+        d,
+        compiled_arguments(balance),
+        contact,
+        STICKS,
+        options.tolerance,
+        options.iterations,
+        SHORTEST,
     )
     reasons = {
         CONVERGED: "residual within tolerance",
@@ -182,9 +189,9 @@ def _fast(balance: Balance, w: np.ndarray, options: Options) -> Newton:
     forces = Forces(
         f[:, 2 - d :],
         dfdw[:, 2 - d :, :, 2 - d :],
-        states(shares),
+        contact_states(shares),
         shares,
-        dissipated(f, full),
+        dissipated_energy(f, full),
         np.full(len(f), 2),
         True,
         "periodic",
@@ -193,7 +200,7 @@ def _fast(balance: Balance, w: np.ndarray, options: Options) -> Newton:
     return Newton(state, steps, True, reasons[code], route)
 
 
-def _search(balance: Balance, state: State, inverse: Inverse, merit: str) -> State | None:
+def _line_search(balance: Balance, state: State, inverse: Inverse, merit: str) -> State | None:
     """The first halving of the step that lowers the merit, or None."""
     step = inverse(state.residual, float(np.clip(0.1 * state.error, 1e-5, 1e-2)))
     if not np.isfinite(step).all():

@@ -73,7 +73,7 @@ def iterative_inverse(
         memory: of the Newton run; changed in place.
         motions: (a, q) that the contacts have in common, see `coarse`; none when left out.
     """
-    return partial(_solve, _System((A, change), memory or Memory(), motions))
+    return partial(_solve_system, _System((A, change), memory or Memory(), motions))
 
 
 @dataclass
@@ -114,16 +114,20 @@ class _System:
         self.count += 1
         A, change = parts
         forces = change @ x.reshape(len(change), -1, 1).astype(change.dtype)
-        return x + _flex(A, forces.reshape(A.shape[1], -1)).ravel()
+        return x + _apply_flexibility(A, forces.reshape(A.shape[1], -1)).ravel()
 
     def prepared(self, x: np.ndarray) -> np.ndarray:
         """The preconditioner times x, flat."""
         blocks = self.memory.blocks
-        return x if blocks is None else _flex(blocks, x.reshape(blocks.shape[1], -1)).ravel()
+        return (
+            x
+            if blocks is None
+            else _apply_flexibility(blocks, x.reshape(blocks.shape[1], -1)).ravel()
+        )
 
     def krylov(self, rest: np.ndarray, target: float, parts: Parts) -> tuple[np.ndarray, int]:
         """What one pass of GMRES finds, and whether it stopped before the target."""
-        y, failed = _gmres(lambda y: self.product(self.prepared(y), parts), rest, target)
+        y, failed = _run_gmres(lambda y: self.product(self.prepared(y), parts), rest, target)
         return self.prepared(y), failed
 
     def renew(self) -> None:
@@ -131,7 +135,7 @@ class _System:
         self.memory.blocks, self.memory.slow = _harmonic_blocks(*self.double), False
 
 
-def _solve(system: _System, residual: np.ndarray, accuracy: float) -> np.ndarray:
+def _solve_system(system: _System, residual: np.ndarray, accuracy: float) -> np.ndarray:
     memory = system.memory
     target = accuracy * float(np.linalg.norm(residual))
     fresh = system.memory.slow
@@ -164,7 +168,7 @@ def _solve(system: _System, residual: np.ndarray, accuracy: float) -> np.ndarray
     raise np.linalg.LinAlgError("GMRES did not solve for the Newton step")
 
 
-def _gmres(
+def _run_gmres(
     product: Callable[[np.ndarray], np.ndarray], residual: np.ndarray, target: float
 ) -> tuple[np.ndarray, int]:
     operator = LinearOperator((residual.size, residual.size), matvec=product, dtype=float)
@@ -193,6 +197,6 @@ def _harmonic_blocks(A: np.ndarray, change: np.ndarray) -> np.ndarray:
     return inverse
 
 
-def _flex(A: np.ndarray, forces: np.ndarray) -> np.ndarray:
+def _apply_flexibility(A: np.ndarray, forces: np.ndarray) -> np.ndarray:
     """(a, K) real coefficients of A times the forces (a, K)."""
     return to_real((A @ to_complex(forces).T[:, :, None].astype(A.dtype))[:, :, 0].T)

@@ -31,15 +31,15 @@ __all__ = [
     "Balance",
     "Inverse",
     "State",
-    "adjoint",
+    "adjoint_inverse",
     "as_amplitudes",
     "as_coefficients",
-    "condensed",
+    "compiled_arguments",
     "contact_forces",
     "contact_table",
     "evaluate_balance",
-    "linearise",
-    "orientation",
+    "linearise_balance",
+    "determinant_sign",
     "start_in_stick",
 ]
 
@@ -88,7 +88,7 @@ class State:
 
 def start_in_stick(balance: Balance) -> np.ndarray:
     """(n, d, K) the displacements of full stick [m]."""
-    return _shaped(balance, balance.linear.stuck)
+    return _as_node_coefficients(balance, balance.linear.stuck)
 
 
 def evaluate_balance(balance: Balance, w: np.ndarray, precision: str = "double") -> State:
@@ -98,9 +98,9 @@ def evaluate_balance(balance: Balance, w: np.ndarray, precision: str = "double")
     forces = contact_forces(model, w, balance.samples, precision)
     p = forces.f - model.springs[:, :, None] * w
     p[:, :, 0] -= model.preload.reshape(p.shape[:2])
-    flexed = _shaped(balance, _apply(linear.A, as_amplitudes(p)))
-    residual = w - _shaped(balance, linear.stuck) + flexed
-    return State(w, forces, p, residual, _error(balance, w, residual))
+    flexed = _as_node_coefficients(balance, _apply_flexibility(linear.A, as_amplitudes(p)))
+    residual = w - _as_node_coefficients(balance, linear.stuck) + flexed
+    return State(w, forces, p, residual, _relative_error(balance, w, residual))
 
 
 def contact_forces(
@@ -126,7 +126,7 @@ def contact_forces(
     return replace(forces, f=forces.f[:, missing:], dfdw=forces.dfdw[:, missing:, :, missing:])
 
 
-def linearise(balance: Balance, state: State, memory: Memory | None = None) -> Inverse:
+def linearise_balance(balance: Balance, state: State, memory: Memory | None = None) -> Inverse:
     """The inverse of the balance's derivative: residual (n, d, K), accuracy [1] to displacement (n,
     d, K) [m].
 
@@ -135,19 +135,19 @@ def linearise(balance: Balance, state: State, memory: Memory | None = None) -> I
     numpy.linalg.LinAlgError where the derivative is singular.
     """
     n, d, K = state.w.shape
-    change, active, dofs = _active(balance, state)
+    change, active, dofs = _active_nodes(balance, state)
     if len(active) == 0:
         return lambda residual, accuracy=0.0: residual.copy()
     others = np.setdiff1d(np.arange(n), active)
     change = change[active]
-    A = _among(balance.linear.A, dofs)
+    A = _select_dofs(balance.linear.A, dofs)
     if memory is not None and memory.nodes != active.tobytes():
         memory.nodes, memory.blocks, memory.slow = (
             active.tobytes(),
             None,
             memory.slow or memory.blocks is not None,
         )
-    inverse = _inverse(A, change, memory, common_motions(balance.model, K // 2)[dofs])
+    inverse = _choose_inverse(A, change, memory, common_motions(balance.model, K // 2)[dofs])
 
     def solve(residual: np.ndarray, accuracy: float = ACCURACY) -> np.ndarray:
         step = residual.copy()
@@ -155,26 +155,30 @@ def linearise(balance: Balance, state: State, memory: Memory | None = None) -> I
         if len(others):
             p = np.zeros_like(step)
             p[active] = (change @ step[active].reshape(len(active), d * K, 1)).reshape(-1, d, K)
-            step[others] -= _shaped(balance, _apply(balance.linear.A, as_amplitudes(p)))[others]
+            step[others] -= _as_node_coefficients(
+                balance, _apply_flexibility(balance.linear.A, as_amplitudes(p))
+            )[others]
         return step
 
     return solve
 
 
-def adjoint(balance: Balance, state: State) -> Inverse:
+def adjoint_inverse(balance: Balance, state: State) -> Inverse:
     """The transposed inverse of the balance's derivative:  (1 + A C)^-T b = b - C^T (1 + A^T
     C^T)^-1 A^T b.
     """
     K = state.w.shape[2]
-    change, active, dofs = _active(balance, state)
+    change, active, dofs = _active_nodes(balance, state)
     if len(active) == 0:
         return lambda b, accuracy=0.0: b.copy()
     turned = np.ascontiguousarray(balance.linear.A.conj().swapaxes(1, 2))
     back = np.ascontiguousarray(change[active].swapaxes(1, 2))
-    inverse = _inverse(_among(turned, dofs), back)
+    inverse = _choose_inverse(_select_dofs(turned, dofs), back)
 
     def solve(b: np.ndarray, accuracy: float = ACCURACY) -> np.ndarray:
-        flexed = _shaped(balance, _apply(turned, as_amplitudes(b)))[active]
+        flexed = _as_node_coefficients(balance, _apply_flexibility(turned, as_amplitudes(b)))[
+            active
+        ]
         x = inverse(flexed.reshape(-1, K), accuracy)
         result = b.copy()
         result[active] -= (back @ x.reshape(len(active), -1, 1)).reshape(flexed.shape)
@@ -183,22 +187,22 @@ def adjoint(balance: Balance, state: State) -> Inverse:
     return solve
 
 
-def orientation(balance: Balance, state: State) -> float:
+def determinant_sign(balance: Balance, state: State) -> float:
     """Sign of the determinant of the balance's derivative; 0 where there are too many unknowns to
     ask.
     """
-    change, active, dofs = _active(balance, state)
+    change, active, dofs = _active_nodes(balance, state)
     if len(dofs) * state.w.shape[2] > DETERMINANT_UNKNOWNS:
         return 0.0
     # everything sticks: the derivative is the identity
     if not len(dofs):
         return 1.0
-    J = _jacobian(_among(balance.linear.A, dofs), change[active])
+    J = _dense_jacobian(_select_dofs(balance.linear.A, dofs), change[active])
     J[np.diag_indices_from(J)] += 1.0
     return float(np.linalg.slogdet(J)[0])
 
 
-def _active(balance: Balance, state: State) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+def _active_nodes(balance: Balance, state: State) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Derivative of p (n, dK, dK), the nodes where it does not vanish, and their dofs."""
     n, d, _ = state.w.shape
     change = _force_change(balance, state)
@@ -208,12 +212,12 @@ def _active(balance: Balance, state: State) -> tuple[np.ndarray, np.ndarray, np.
     return change, active, (active[:, None] * d + np.arange(d)).ravel()
 
 
-def _among(A: np.ndarray, dofs: np.ndarray) -> np.ndarray:
+def _select_dofs(A: np.ndarray, dofs: np.ndarray) -> np.ndarray:
     """(H+1, a, a) the flexibilities among some of the dofs, in one copy where one is needed."""
     return A if len(dofs) == A.shape[1] else A[np.ix_(np.arange(len(A)), dofs, dofs)]
 
 
-def _inverse(
+def _choose_inverse(
     A: np.ndarray,
     change: np.ndarray,
     memory: Memory | None = None,
@@ -250,7 +254,7 @@ def _with_factors_at_need(
 
 
 def _dense_inverse(A: np.ndarray, change: np.ndarray) -> Inverse:
-    J = _jacobian(A, change)
+    J = _dense_jacobian(A, change)
     J[np.diag_indices_from(J)] += 1.0
     factors = linalg.lu_factor(J, overwrite_a=True, check_finite=False)
     if not abs(np.diag(factors[0])).min() > 0:
@@ -260,7 +264,7 @@ def _dense_inverse(A: np.ndarray, change: np.ndarray) -> Inverse:
     ).reshape(residual.shape)
 
 
-def condensed(balance: Balance) -> Condensed:
+def compiled_arguments(balance: Balance) -> Condensed:
     """The linear part as the compiled loop takes it."""
     linear = balance.linear
     G = linear.G.copy()
@@ -271,7 +275,7 @@ def condensed(balance: Balance) -> Condensed:
         G,
         to_real(linear.stuck.T),
         linear.springs,
-        _scale(linear),
+        _motion_scale(linear),
         none,
         none,
         none.reshape(0, 0),
@@ -295,7 +299,7 @@ def contact_table(model: ReducedModel, H: int, samples: int) -> tuple:
     )
 
 
-def _scale(linear: Linear) -> float:
+def _motion_scale(linear: Linear) -> float:
     return float(
         max(np.linalg.norm(linear.free), np.linalg.norm(linear.stuck), np.finfo(float).tiny)
     )
@@ -309,7 +313,7 @@ def _force_change(balance: Balance, state: State) -> np.ndarray:
     return change
 
 
-def _jacobian(A: np.ndarray, change: np.ndarray) -> np.ndarray:
+def _dense_jacobian(A: np.ndarray, change: np.ndarray) -> np.ndarray:
     """(a K, a K) real matrix of  p -> A p  times `change` (nodes, dK, dK), for a = nodes * d
     dofs.
     """
@@ -331,21 +335,21 @@ def _jacobian(A: np.ndarray, change: np.ndarray) -> np.ndarray:
     return J.reshape(a * K, nodes * size)
 
 
-def _error(balance: Balance, w: np.ndarray, residual: np.ndarray) -> float:
+def _relative_error(balance: Balance, w: np.ndarray, residual: np.ndarray) -> float:
     linear = balance.linear
     r = as_amplitudes(residual)
     size = np.linalg.norm(as_amplitudes(w))
-    scale = _scale(linear)
+    scale = _motion_scale(linear)
     pressed = balance.model.compression
     if scale < QUIET * pressed:
         size = max(size, AT_REST * pressed)
         scale = max(scale, AT_REST * pressed)
     with_springs = np.linalg.norm(r) / max(size, np.finfo(float).tiny)
-    r[1:] += _apply(linear.G[1:], linear.springs * r[1:])
+    r[1:] += _apply_flexibility(linear.G[1:], linear.springs * r[1:])
     return float(max(with_springs, np.linalg.norm(r) / scale))
 
 
-def _apply(flexibility: np.ndarray, forces: np.ndarray) -> np.ndarray:
+def _apply_flexibility(flexibility: np.ndarray, forces: np.ndarray) -> np.ndarray:
     return (flexibility @ forces[:, :, None])[:, :, 0]
 
 
@@ -359,6 +363,6 @@ def as_coefficients(q: np.ndarray, shape: tuple[int, ...]) -> np.ndarray:
     return to_real(q.T).reshape(shape)
 
 
-def _shaped(balance: Balance, q: np.ndarray) -> np.ndarray:
+def _as_node_coefficients(balance: Balance, q: np.ndarray) -> np.ndarray:
     model = balance.model
     return as_coefficients(q, (len(model.springs), model.directions, 2 * len(q) - 1))

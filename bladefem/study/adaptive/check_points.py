@@ -11,7 +11,7 @@ import numpy as np
 
 from ...hbm.solution import Solution
 from ...hbm.sweep import size
-from ...hbm.truncation_indicator import overtones
+from ...hbm.truncation_indicator import truncation_indicator
 from .family import Family, member
 from .indicators import richer
 from .settings import Settings
@@ -85,7 +85,7 @@ def hidden(family: Family, used: Sequence[Settings], points: Sequence[Solution])
         more = richer(family, settings, "harmonics")
         if more.harmonics > harmonics:
             model = member(family, replace(more, modes=max(settings.modes, family.modes))).model
-            moved[found] = overtones(model, [points[i] for i in found], more.harmonics)
+            moved[found] = truncation_indicator(model, [points[i] for i in found], more.harmonics)
     return moved
 
 

@@ -10,7 +10,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from ...errors import NotSolvedError
-from ...hbm.full_stick import grips
+from ...hbm.full_stick import sticks_safely
 from ...hbm.linear_resonances import free_resonances, stuck_partners
 from ...hbm.model import ReducedModel
 from ...hbm.solution import Solution
@@ -83,7 +83,7 @@ def choose(
     if (
         settings.error is None
         and point.converged
-        and not grips(member(family, settings).model, point)
+        and not sticks_safely(member(family, settings).model, point)
     ):
         usual = likely(family, settings, accuracy, fixed)
         further = moved(family, settings, point, usual) if usual != settings else point

@@ -10,7 +10,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from ...errors import InputError, NotSolvedError
-from ...hbm.full_stick import grips
+from ...hbm.full_stick import sticks_safely
 from ...hbm.predictor import AHEAD, ahead
 from ...hbm.solution import Solution
 from ...hbm.solver.fallback import match_harmonics
@@ -286,7 +286,7 @@ def _change(
     settings = curve.used[i]
     poor = member(curve.family, settings)
     rich = member(curve.family, better)
-    if _alike(settings, better) and old.converged and grips(poor.model, old):
+    if _alike(settings, better) and old.converged and sticks_safely(poor.model, old):
         return 0.0
     carried_over = carried(old.w, poor, rich, better.harmonics)
     smooth = gained and not (old.states["lift"] and _alike(settings, better))

@@ -27,7 +27,7 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from ...hbm.full_stick import grips
+from ...hbm.full_stick import sticks_safely
 from ...hbm.model import ReducedModel
 from ...hbm.solution import Solution
 from ...hbm.solve import solve
@@ -81,7 +81,7 @@ def indicate(
         return Indicators({name: np.inf for name in DIRECTIONS})
     errors = dict(known or {})
     better = {}
-    if grips(member(family, settings).model, solution):
+    if sticks_safely(member(family, settings).model, solution):
         errors |= {"harmonics": 0.0, "samples": 0.0}
     for name in DIRECTIONS:
         other = None if name in errors else richer(family, settings, name)
@@ -100,7 +100,9 @@ def judge(family: Family, settings: Settings, solution: Solution) -> Indicators:
     """
     if not solution.converged:
         return indicate(family, settings, solution)
-    exact = ("harmonics", "samples") if grips(member(family, settings).model, solution) else ()
+    exact = (
+        ("harmonics", "samples") if sticks_safely(member(family, settings).model, solution) else ()
+    )
     rich = settings
     errors = {}
     better = {}

@@ -22,8 +22,8 @@ from ...hbm.model import ReducedModel
 from ...hbm.solve import solve
 from ...reduction.truncate import truncated
 from ...time.event_integrator import stuck_start
-from ...time.shooting import harmonics, periodic
-from ...time.system import System, ring
+from ...time.shooting import periodic_solution, probe_harmonics
+from ...time.system import System, blade_ring
 
 __all__ = ["Method", "Point", "applicable", "balance", "exact", "methods", "tangential"]
 
@@ -174,8 +174,10 @@ def integrated(steps: int, explicit: bool) -> Callable[[ReducedModel, float, obj
 def shooting(model: ReducedModel, omega: float, start: object) -> Point:
     """Periodic solution of the exact flow."""
     system = in_time(model, omega)
-    end = periodic(system, omega, _fitting(start, system), samples=512)
-    return Point(complex(harmonics(end, system, 1)[0, 1]), end.converged, end.reason, end.start)
+    end = periodic_solution(system, omega, _fitting(start, system), samples=512)
+    return Point(
+        complex(probe_harmonics(end, system, 1)[0, 1]), end.converged, end.reason, end.start
+    )
 
 
 def _fitting(start: object, system: System) -> object:
@@ -189,7 +191,7 @@ def in_time(model: ReducedModel, omega: float) -> System:
     """
     damping = model.damping
     damper = model.damper
-    return ring(
+    return blade_ring(
         _with_stiff_modes(model.side(1), STIFF * omega),
         float(np.mean(damping.ratio)),
         model.elements,

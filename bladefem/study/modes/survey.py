@@ -16,8 +16,8 @@ from geometry.mesh import Mesh
 from ...data import ModeSet
 from ...errors import InputError
 from ...hbm.model import Damping
-from ...io.array_codec import read_npz
 from ...io.stage_cache import found_remark, on_root, stage
+from ...io.stored_stage import stored_stage
 from ...scene.tables import Scene
 from ...util.progress import Progress, unwatched
 from ..pipeline import pipeline
@@ -165,13 +165,10 @@ def _other(folder: Path) -> tuple[Mesh, list[ModeSet]]:
 
 
 def _kept(folder: Path, name: str) -> Any:
-    """A stage of another run, whatever it was made from."""
-    path = Path(folder) / "stages" / f"{name}.npz"
+    """A stage of another run, whatever it was made from; None where it has none."""
     try:
-        with np.load(path, allow_pickle=False) as file:
-            key = str(file["key"])
-        return read_npz(path, key)[0]
-    except (OSError, KeyError, ValueError):
+        return stored_stage(folder, name)
+    except InputError:
         return None
 
 

@@ -13,7 +13,7 @@ from scipy.optimize import minimize_scalar
 from ...data import Elements
 from ...hbm.linear_resonances import free_resonances, stuck_partners
 from ...hbm.model import ReducedModel
-from ...hbm.solve import free, stuck
+from ...hbm.solve import free_response, stuck_response
 
 __all__ = ["Limit", "linear_limits"]
 
@@ -47,8 +47,8 @@ def linear_limits(model: ReducedModel, mode: int, band: tuple[float, float]) -> 
     """
     pressed = replace(model, elements=_pressed(model.elements))
     return (
-        _limit(0.0, model, free, free_resonances(model)[mode - 1], band),
-        _limit(np.inf, pressed, stuck, stuck_partners(pressed)[mode - 1], band),
+        _limit(0.0, model, free_response, free_resonances(model)[mode - 1], band),
+        _limit(np.inf, pressed, stuck_response, stuck_partners(pressed)[mode - 1], band),
     )
 
 

@@ -9,6 +9,7 @@ from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, field, replace
 from functools import lru_cache, partial
+from html import escape
 from pathlib import Path
 from typing import Any
 
@@ -94,7 +95,7 @@ class Seating:
     own: float | None = None
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, repr=False)
 class Response:
     """Forced responses and what they were made with."""
 
@@ -112,8 +113,15 @@ class Response:
         """Resonance without damper: [Hz], [m]."""
         return self.limits[0].peak_frequency, self.limits[0].peak_amplitude
 
+    def __repr__(self) -> str:
+        best = min(self.curves, key=lambda curve: curve.peak_amplitude)
+        return (
+            f"<bladefem response: {len(self.curves)} loads, smallest resonance "
+            f"{1e6 * best.peak_amplitude:.4g} µm under {best.load:g} N>"
+        )
 
-@dataclass(frozen=True)
+
+@dataclass(frozen=True, repr=False)
 class Run:
     """What a run has so far; stages after ``until`` are None."""
 
@@ -132,6 +140,27 @@ class Run:
     # stage to seconds
     timings: dict[str, float] = field(default_factory=dict)
     messages: list[str] = field(default_factory=list)
+
+    def __repr__(self) -> str:
+        stages = [
+            name
+            for name in ("mesh", "modes", "contact", "reduced", "response")
+            if getattr(self, name) is not None
+        ]
+        where = "in memory" if self.folder is None else f"in '{self.folder}'"
+        return f"<bladefem run of '{self.scene.title}' {where}: {', '.join(stages)}>"
+
+    def _repr_html_(self) -> str:
+        """What a notebook shows: the stages and what they found."""
+        rows = {"scene": self.scene.title, "folder": self.folder, "mesh": self.mesh}
+        if self.modes is not None:
+            rows["modes"] = self.modes
+        if self.response is not None:
+            rows["response"] = self.response
+        cells = "".join(
+            f"<tr><th>{name}</th><td>{escape(str(value))}</td></tr>" for name, value in rows.items()
+        )
+        return f"<table>{cells}</table>"
 
 
 def run(

@@ -22,7 +22,7 @@ from ...errors import InputError
 from ...hbm.model import ReducedModel
 from ...hbm.solution import Solution
 from ...hbm.time_model import time_system
-from ...time.shooting import harmonics, multipliers, periodic
+from ...time.shooting import floquet_multipliers, periodic_solution, probe_harmonics
 from ...time.system import System
 
 __all__ = ["UNIQUE", "Stability", "in_one_body", "stability_of", "stability_sentence"]
@@ -72,13 +72,13 @@ def stability_of(model: ReducedModel, points: Sequence[Solution]) -> Stability:
 
 def _largest(system: System, point: Solution) -> float:
     """Largest modulus of the multipliers; NaN where shooting does not confirm the point."""
-    shot = periodic(system, point.omega, state_of(point, system), most=STEPS)
+    shot = periodic_solution(system, point.omega, state_of(point, system), most=STEPS)
     if (
         not shot.residual < CLOSED
-        or abs(harmonics(shot, system, 1)[0, 1] / point.probe[1, 0] - 1) > NEAR
+        or abs(probe_harmonics(shot, system, 1)[0, 1] / point.probe[1, 0] - 1) > NEAR
     ):
         return np.nan
-    return float(np.abs(multipliers(shot)).max())
+    return float(np.abs(floquet_multipliers(shot)).max())
 
 
 def in_one_body(model: ReducedModel) -> ReducedModel:

@@ -1,0 +1,300 @@
+"""A run folder opened again: results as labelled arrays that plot themselves.
+
+``bladefem.open("runs/wedge")`` reads nothing but the scene; each result is read when it is first
+asked for.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from functools import cached_property
+from html import escape
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pandas as pd
+
+from ..data import ModeSet
+from ..errors import InputError
+from ..io.stage_cache import read_results
+from ..io.stored_stage import stored_stage
+from ..scene.tables import Scene
+from ..scene.toml import load_scene
+from ..view import contact, modes, response
+from .tables import COLUMNS
+
+__all__ = ["Arrays", "RunFolder", "open_run"]
+
+
+@dataclass(frozen=True, repr=False)
+class Arrays:
+    """Labelled arrays of one kind of result, and their picture.
+
+    ``sel`` and ``isel`` choose by label or number and keep the picture; ``data`` is the xarray
+    Dataset itself; ``["name"]`` is one of its arrays.
+    """
+
+    # "response", "modes", ...
+    name: str
+    # xarray Dataset
+    data: Any
+    # draws the data into a file or axes
+    draw: Callable[..., object]
+
+    def sel(self, **labels: Any) -> Arrays:
+        """The part with these labels, numbers to the nearest one within one in a thousand."""
+        return Arrays(self.name, _selected(self.data, labels), self.draw)
+
+    def isel(self, **numbers: Any) -> Arrays:
+        """The part with these numbers, which count from 0."""
+        kept = {key: [n] if np.ndim(n) == 0 else n for key, n in numbers.items()}
+        return Arrays(self.name, self.data.isel(kept), self.draw)
+
+    def __getitem__(self, name: str) -> Any:
+        return self.data[name]
+
+    def plot(self, file: str | Path | None = None, **options: Any) -> object:
+        """The picture, written to a file where one is named; returns the matplotlib figure."""
+        return self.draw(self.data, file, **options)
+
+    def __repr__(self) -> str:
+        sizes = ", ".join(f"{name} {size}" for name, size in self.data.sizes.items())
+        return f"<bladefem {self.name}: {', '.join(map(str, self.data.data_vars))} over {sizes}>"
+
+    def _repr_html_(self) -> str:
+        return f"<b>{escape(self.name)}</b>{self.data._repr_html_()}"
+
+
+def _selected(data: Any, labels: dict[str, Any]) -> Any:
+    """Dimensions stay, so that pictures and tables keep their form."""
+    for name, label in labels.items():
+        if name not in data.indexes:
+            raise InputError(f"sel: no dimension '{name}', expected one of {list(data.indexes)}")
+        index = data.indexes[name]
+        wanted = [label] if np.ndim(label) == 0 and not isinstance(label, slice) else label
+        if not isinstance(wanted, slice) and index.dtype.kind == "f":
+            wanted = [_nearest(name, index.to_numpy(), float(one)) for one in wanted]
+        try:
+            data = data.sel({name: wanted})
+        except KeyError:
+            raise InputError(
+                f"sel: {name} = {label!r} is not there, expected one of {list(index)}"
+            ) from None
+    return data
+
+
+def _nearest(name: str, known: np.ndarray, wanted: float) -> float:
+    """The label that is meant, round-off apart."""
+    same = known[np.isclose(known, wanted, rtol=1e-3, atol=0.0)]
+    if not len(same):
+        shown = ", ".join(f"{value:.6g}" for value in known[:20])
+        raise InputError(f"sel: {name} = {wanted:g} is not there, expected one of {shown}")
+    return float(same[np.argmin(abs(same - wanted))])
+
+
+@dataclass(frozen=True, repr=False)
+class RunFolder:
+    """The results of a run; see :func:`open_run`."""
+
+    folder: Path
+    scene: Scene
+
+    @cached_property
+    def response(self) -> Arrays:
+        """Amplitude and phase over (load, frequency); ``.plot()`` draws the curves."""
+        return Arrays("response", self.group("response"), _draw_response)
+
+    @cached_property
+    def resonance(self) -> Arrays:
+        """Harmonics of the motion at each resonance over (load, harmonic)."""
+        return Arrays("resonance", self.group("resonance"), _draw_resonance)
+
+    @cached_property
+    def contact(self) -> Arrays:
+        """Static pressure, force and gap over (load, contact); ``.plot()`` draws one load."""
+        maps = self.group("contact")
+        return Arrays("contact", maps, self._draw_contact)
+
+    @cached_property
+    def cycle(self) -> Arrays:
+        """Stick, slip, separation and friction work at each resonance over (load, node)."""
+        return Arrays("cycle", self.group("cycle"), _draw_cycle)
+
+    @cached_property
+    def loops(self) -> Arrays:
+        """Hysteresis at each resonance over (load, seat, phase)."""
+        return Arrays("loops", self.group("loops"), _draw_loops)
+
+    @cached_property
+    def modes(self) -> Arrays:
+        """Frequencies and shapes over (nodal_diameter, mode, node, direction)."""
+        return Arrays("modes", self.group("modes"), self._draw_modes)
+
+    @cached_property
+    def summary(self) -> pd.DataFrame:
+        """One row a load: resonance, amplitude, friction work, estimated error (SI)."""
+        return self.group("summary").to_dataframe().reset_index(drop=True)
+
+    @cached_property
+    def mesh(self) -> Any:
+        """The mesh (``geometry.mesh.Mesh``)."""
+        return stored_stage(self.folder, "mesh")
+
+    def group(self, name: str) -> Any:
+        """A group of ``results.nc`` as an xarray Dataset.
+
+        Raises:
+            InputError: the run has no such results.
+        """
+        file = self.folder / "results.nc"
+        if name == "modes" and not file.is_file():
+            file = self.folder / "modes.nc"
+        return read_results(file, name)
+
+    def __repr__(self) -> str:
+        return f"<bladefem run '{self.folder}': {self.scene.title} ({self.scene.kind})>"
+
+    def _repr_html_(self) -> str:
+        """The design table, where there is one."""
+        head = f"<b>{escape(self.scene.title)}</b> ({escape(self.scene.kind)})"
+        try:
+            table = self.summary
+        except InputError:
+            return f"{head}<br>{escape(str(self.folder))}: no responses"
+        shown = [name for name in SHOWN if name in table]
+        titles = {
+            name: f"{COLUMNS[name].title} [{COLUMNS[name].shown or COLUMNS[name].unit}]"
+            for name in shown
+        }
+        scaled = table[shown] * [COLUMNS[name].factor for name in shown]
+        return head + scaled.rename(columns=titles).to_html(index=False, float_format="%.5g")
+
+    def _draw_contact(self, data: Any, file: Any = None, load: float | None = None) -> object:
+        """Both seats under one load, the middle one when none is named."""
+        loads = data["load"].to_numpy()
+        chosen = loads[len(loads) // 2] if load is None else _nearest("load", loads, load)
+        part = data.sel(load=[chosen]).isel(load=0)
+        stored = _patches(self.folder)
+        maps, start = [], 0
+        for patch in stored:
+            rows = slice(start, start + len(patch.area))
+            start = rows.stop
+            force, gap = part["force"].to_numpy()[rows], part["gap"].to_numpy()[rows]
+            maps.append(contact.PressureMap(patch, force, gap, 0.0))
+        title = f"contact pressure under {chosen:g} N per seat"
+        return contact.draw_pressure(maps, file, title=title)
+
+    def _draw_modes(
+        self, data: Any, file: Any = None, mode: int = 1, nodal_diameter: int | None = None
+    ) -> object:
+        """One mode on the sector, of the excited nodal diameter when none is named."""
+        known = data["nodal_diameter"].to_numpy()
+        wanted = nodal_diameter
+        if wanted is None:
+            order = self.scene.excitation.engine_order
+            sectors = 0 if self.mesh.sector is None else self.mesh.sector.count
+            wanted = min(known, key=lambda n: abs(n - _folded(order, sectors)))
+        part = data.sel(nodal_diameter=wanted)
+        single = None if wanted < 0 else int(wanted)
+        shapes = ModeSet(
+            part["frequency"].to_numpy(),
+            part["shape"].to_numpy(),
+            single,
+            part["residual"].to_numpy(),
+        )
+        return modes.draw_mode(self.mesh, shapes, mode - 1, file)
+
+
+SHOWN = ("load", "mass", "peak_frequency", "peak_amplitude", "reduction", "dissipated", "error")
+
+
+def open_run(folder: str | Path) -> RunFolder:
+    """The results in the folder of an earlier run.
+
+    Raises:
+        InputError: the folder holds no run.
+
+    >>> run = open_run("runs/wedge")                      # doctest: +SKIP
+    >>> run.response.sel(load=80).plot("80N.png")         # doctest: +SKIP
+    >>> float(run.response.sel(load=80)["amplitude"].max())  # doctest: +SKIP
+    0.0001632
+    """
+    folder = Path(folder)
+    if not (folder / "scene.toml").is_file():
+        raise InputError(f"{folder}: no scene.toml in it, expected the folder of an earlier run")
+    return RunFolder(folder, load_scene(folder / "scene.toml"))
+
+
+def _folded(order: int, sectors: int) -> int:
+    """The nodal diameter that an engine order excites."""
+    if not sectors:
+        return order
+    rest = order % sectors
+    return min(rest, sectors - rest)
+
+
+def _patches(folder: Path) -> list[Any]:
+    """Contact patches of the stored seating."""
+    return list(stored_stage(folder, "contact").patches)
+
+
+def _draw_response(data: Any, file: Any = None, **options: Any) -> object:
+    """Curves of one damper mass, the first where there are several."""
+    if "mass" in data.dims:
+        data = data.isel(mass=0)
+    table = data.to_dataframe().reset_index()
+    table = table[table["converged"].notna()].copy()
+    table["converged"] = table["converged"].astype(bool)
+    return response.draw_responses(table, file, **options)
+
+
+def _draw_resonance(data: Any, file: Any = None, ax: Any = None) -> object:
+    """Amplitude of each harmonic, a line a load."""
+    with response.canvas(file, ax) as ax:
+        if "mass" in data.dims:
+            data = data.isel(mass=0)
+        for load in data["load"].to_numpy():
+            part = abs(data["motion"].sel(load=load)).dropna("harmonic")
+            label = response.load_name(float(load))
+            ax.semilogy(part["harmonic"], 1e6 * part, "o-", label=label)
+        response.log_axis(ax, "y")
+        ax.xaxis.get_major_locator().set_params(integer=True)
+        ax.set(xlabel="harmonic", ylabel="amplitude [µm]", title="harmonics at the resonance")
+        ax.legend()
+        return ax.figure
+
+
+def _draw_cycle(data: Any, file: Any = None, ax: Any = None) -> object:
+    """Mean shares of the period in stick, slip and separation over load, weighted by area."""
+    with response.canvas(file, ax) as ax:
+        if "mass" in data.dims:
+            data = data.isel(mass=0)
+        for name in ("stick", "slip", "separated"):
+            share = data[name].weighted(data["area"]).mean("node")
+            ax.plot(data["load"], 100 * share, "o-", label=name)
+        ax.set(
+            xlabel="normal load per seat [N]",
+            ylabel="share of period and area [%]",
+            title="what the seats do at the resonance",
+        )
+        ax.legend()
+        return ax.figure
+
+
+def _draw_loops(data: Any, file: Any = None) -> object:
+    """A panel a load."""
+    if "mass" in data.dims:
+        data = data.isel(mass=0)
+    cases = {}
+    for load in data["load"].to_numpy():
+        part = data.sel(load=load)
+        cases[f"{load:.4g} N"] = {
+            str(seat): (
+                part["displacement"].sel(seat=seat).to_numpy(),
+                part["force"].sel(seat=seat).to_numpy(),
+            )
+            for seat in data["seat"].to_numpy()
+        }
+    return response.draw_seat_loops(cases, file)

@@ -1,0 +1,156 @@
+"""Responses of a run as labelled arrays: over load, frequency, harmonic and contact node.
+
+Curves have their own frequencies; in a common array a point that a curve does not have is NaN, so
+that ``data.sel(load=80).dropna("frequency")`` is that curve again.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+import numpy as np
+import pandas as pd
+
+from ..study.pipeline.contact_cycle import ContactCycle
+from ..study.pipeline.linear_limits import Limit
+from ..study.pipeline.loads import Curve
+from .tables import units_of
+
+__all__ = ["curve_arrays", "loop_arrays", "node_arrays", "resonance_arrays"]
+
+LOAD = {"units": "N", "long_name": "static normal force on each seat; 0 no damper, inf full stick"}
+# of the response table: name to long name
+CURVES = {
+    "amplitude": "amplitude of the motion at the probe",
+    "phase": "phase of the first harmonic at the probe",
+    "converged": "whether the point was solved; NaN where the curve has no point",
+    "residual": "relative residual of the balance",
+    "dissipated": "friction work of a period",
+    "estimated_error": "estimated relative error of the first harmonic",
+    "slipping": "elements that slip or lift off",
+}
+
+
+def curve_arrays(points: pd.DataFrame) -> Any:
+    """Response points over (load, frequency), over (mass, load, frequency) with several masses.
+
+    Args:
+        points: one row a response point, SI columns; the linear limits have no mass.
+    """
+    columns = [name for name in CURVES if name in points]
+    if "mass" in points:
+        points = _for_each_mass(points)
+    keys = [name for name in ("mass", "load", "frequency") if name in points]
+    units = units_of(points)
+    table = points[keys + columns].drop_duplicates(keys).astype({"converged": float})
+    data = table.set_index(keys).to_xarray()
+    for name in columns:
+        data[name].attrs |= {"units": units.get(name, "1"), "long_name": CURVES[name]}
+    data["load"].attrs |= LOAD
+    data["frequency"].attrs |= {"units": "Hz", "long_name": "excitation frequency"}
+    return _with_mass_units(data)
+
+
+def _for_each_mass(points: pd.DataFrame) -> pd.DataFrame:
+    """The linear limits do not know the damper's mass: they are repeated for each."""
+    masses = points["mass"].dropna().unique()
+    limits = points[points["mass"].isna()]
+    return pd.concat(
+        [points[points["mass"].notna()], *(limits.assign(mass=mass) for mass in masses)],
+        ignore_index=True,
+    )
+
+
+def resonance_arrays(curves: Sequence[Curve], limits: Sequence[Limit] = ()) -> Any:
+    """Harmonics of the motion at the probe at each resonance, over (load, harmonic).
+
+    Harmonics beyond those of a curve's own balance are NaN; the linear limits have the first one.
+    """
+    import xarray as xr
+
+    most = max(curve.settings.harmonics for curve in curves)
+    parts = []
+    for curve in curves:
+        probe = np.full(most + 1, np.nan + 0j)
+        probe[: len(curve.peak.probe)] = curve.peak.probe[:, 0]
+        parts.append(_one_resonance(curve.load, curve.mass, curve.peak_frequency, probe))
+    masses = dict.fromkeys(curve.mass for curve in curves)
+    for limit in limits:
+        probe = np.full(most + 1, np.nan + 0j)
+        probe[1] = limit.first[np.argmax(abs(limit.first))]
+        parts += [_one_resonance(limit.load, m, limit.peak_frequency, probe) for m in masses]
+    data = xr.combine_by_coords(parts)
+    data["motion"].attrs |= {"units": "m", "long_name": "complex amplitude at the probe"}
+    data["frequency"].attrs |= {"units": "Hz", "long_name": "frequency of the resonance"}
+    data["load"].attrs |= LOAD
+    return _with_mass_units(data)
+
+
+def _one_resonance(load: float, mass: float | None, frequency: float, probe: np.ndarray) -> Any:
+    import xarray as xr
+
+    data = xr.Dataset(
+        {"motion": (("load", "harmonic"), probe[None]), "frequency": ("load", [frequency])},
+        {"load": [load], "harmonic": np.arange(len(probe))},
+    )
+    return data if mass is None else data.expand_dims(mass=[mass])
+
+
+def node_arrays(table: pd.DataFrame) -> Any:
+    """What each contact node does in a period at each resonance, over (load, node).
+
+    Args:
+        table: one row a node and resonance, nodes in the same order in each (``nodes.node_table``).
+    """
+    keys = [name for name in ("mass", "load") if name in table]
+    table = table.assign(node=table.groupby(keys, sort=False).cumcount())
+    fixed = [name for name in ("patch", "x", "y", "z", "area") if name in table]
+    units = units_of(table)
+    data = table.drop(columns=fixed).set_index([*keys, "node"]).to_xarray()
+    one = table.drop_duplicates("node")
+    for name in fixed:
+        values = one[name].to_numpy(dtype=str if name == "patch" else float)
+        data = data.assign_coords({name: ("node", values)})
+    for name in data.variables:
+        if name not in ("load", "patch", "node"):
+            data[name].attrs |= {"units": units.get(str(name), "1")}
+    data["load"].attrs |= LOAD
+    return _with_mass_units(data)
+
+
+def loop_arrays(cycles: Sequence[ContactCycle], names: Mapping[str, str] | None = None) -> Any:
+    """Hysteresis of each seat in a period at each resonance, over (load, seat, phase).
+
+    Args:
+        cycles: one for each load (and mass).
+        names: of the contact pairs, where they are called otherwise.
+    """
+    import xarray as xr
+
+    parts = []
+    for cycle in cycles:
+        seats = [(names or {}).get(name, name) for name in cycle.loops]
+        force = np.stack([loop.force for loop in cycle.loops.values()])
+        displacement = np.stack([loop.displacement for loop in cycle.loops.values()])
+        phase = 2 * np.pi * np.arange(force.shape[1]) / force.shape[1]
+        part = xr.Dataset(
+            {
+                "displacement": (("load", "seat", "phase"), displacement[None]),
+                "force": (("load", "seat", "phase"), force[None]),
+            },
+            {"load": [cycle.load], "seat": seats, "phase": phase},
+        )
+        parts.append(part if cycle.mass is None else part.expand_dims(mass=[cycle.mass]))
+    data = xr.combine_by_coords(parts)
+    data["displacement"].attrs |= {"units": "m", "long_name": "relative displacement of the seat"}
+    data["force"].attrs |= {"units": "N", "long_name": "friction force of the seat"}
+    data["phase"].attrs |= {"units": "rad", "long_name": "phase of the period"}
+    data["load"].attrs |= LOAD
+    return _with_mass_units(data)
+
+
+def _with_mass_units(data: Any) -> Any:
+    if "mass" in data.coords:
+        data["mass"].attrs |= {"units": "kg", "long_name": "mass of the damper"}
+    return data

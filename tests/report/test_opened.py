@@ -1,0 +1,195 @@
+"""A folder opened again: labels, units, pictures; exact against the tables of the run."""
+
+from __future__ import annotations
+
+import sys
+from pathlib import Path
+from types import SimpleNamespace
+
+import numpy as np
+import pandas as pd
+import pytest
+import xarray as xr
+
+import bladefem
+from bladefem.data import ModeSet
+from bladefem.errors import InputError
+from bladefem.io.stage_cache import write_results
+from bladefem.report.response_arrays import (
+    curve_arrays,
+    loop_arrays,
+    node_arrays,
+    resonance_arrays,
+)
+from bladefem.scene.tables import Scene
+from bladefem.scene.toml import dump
+from bladefem.study.pipeline.pipeline import Response, Run
+from geometry.mesh import Mesh
+
+sys.path.insert(0, str(Path(__file__).parents[1] / "view"))
+import synthetic
+
+LOADS = (20.0, 80.0)
+
+
+def points(mass: float | None = None) -> pd.DataFrame:
+    """Response table; each load has frequencies of its own."""
+    table = synthetic.points()
+    table = table[table["load"].isin([0.0, 50.0, 200.0, np.inf])].copy()
+    table["phase"] = 0.1
+    if mass is not None:
+        table["mass"] = np.where(np.isfinite(table["load"]) & (table["load"] > 0), mass, np.nan)
+    return table
+
+
+def cycles(mass: float | None = None) -> list:
+    angle = 2 * np.pi * np.arange(32) / 32
+    loop = {"this": SimpleNamespace(displacement=1e-6 * np.sin(angle), force=np.cos(angle))}
+    return [SimpleNamespace(load=load, mass=mass, loops=loop) for load in LOADS]
+
+
+def nodes() -> pd.DataFrame:
+    parts = [
+        pd.DataFrame(
+            {
+                "load": load,
+                "patch": ["this", "this", "next"],
+                "x": [0.1, 0.2, 0.3],
+                "area": 1e-6,
+                "stick": [1.0, 0.5, 0.0],
+                "slip": [0.0, 0.5, 0.5],
+                "separated": [0.0, 0.0, 0.5],
+                "work": load * np.arange(3.0),
+            }
+        )
+        for load in LOADS
+    ]
+    return pd.concat(parts, ignore_index=True)
+
+
+def curves() -> list:
+    """Balances of 1 and of 3 harmonics."""
+    return [
+        SimpleNamespace(
+            load=load,
+            mass=None,
+            settings=SimpleNamespace(harmonics=H),
+            peak_frequency=800.0 + load,
+            peak=SimpleNamespace(probe=(1 + 1j) * np.arange(H + 1)[:, None]),
+        )
+        for load, H in zip(LOADS, (1, 3), strict=True)
+    ]
+
+
+@pytest.fixture(scope="module")
+def run(tmp_path_factory):
+    folder = tmp_path_factory.mktemp("run")
+    scene = Scene(title="A <run>")
+    (folder / "scene.toml").write_text(dump(scene))
+    groups = {
+        "response": curve_arrays(points()),
+        "resonance": resonance_arrays(curves()),
+        "cycle": node_arrays(nodes()),
+        "loops": loop_arrays(cycles(), {"this": "right seat"}),
+        "summary": xr.Dataset.from_dataframe(synthetic.summary()),
+    }
+    write_results(folder / "results.nc", groups, dump(scene))
+    return bladefem.open(folder)
+
+
+def test_a_load_is_its_curve_again(run):
+    part = run.response.sel(load=200).data.isel(load=0).dropna("frequency")
+    table = points().query("load == 200").drop_duplicates("frequency").sort_values("frequency")
+    table = table[table["amplitude"].notna()]
+    assert np.array_equal(part["frequency"], table["frequency"])
+    assert np.array_equal(part["amplitude"], table["amplitude"])
+    assert set(part["converged"].to_numpy()) == {1.0}
+
+
+def test_every_number_has_a_unit(run):
+    for name in ("response", "resonance", "cycle", "loops"):
+        arrays = getattr(run, name)
+        for variable in (*arrays.data.data_vars.values(), arrays.data["load"]):
+            assert "units" in variable.attrs, (name, variable.name)
+    assert run.response["amplitude"].attrs["units"] == "m"
+    assert run.loops["displacement"].attrs["units"] == "m"
+    assert run.cycle["work"].attrs["units"] == "J/m^2"
+
+
+def test_harmonics_beyond_a_balance_are_not_numbers(run):
+    motion = run.resonance["motion"]
+    assert np.array_equal(motion.sel(load=80), (1 + 1j) * np.arange(4))
+    assert np.isnan(motion.sel(load=20)[2:]).all()
+    assert np.array_equal(motion.sel(load=20)[:2], (1 + 1j) * np.arange(2))
+
+
+def test_nodes_keep_their_place_and_patch(run):
+    assert list(run.cycle["patch"].to_numpy()) == ["this", "this", "next"]
+    assert run.cycle["work"].sel(load=80, node=2) == 160.0
+
+
+def test_masses_are_a_dimension_and_limits_belong_to_each():
+    data = curve_arrays(pd.concat([points(0.01), points(0.02)], ignore_index=True))
+    assert dict(data.sizes)["mass"] == 2
+    free = data["amplitude"].sel(load=0.0)
+    assert np.array_equal(free.sel(mass=0.01), free.sel(mass=0.02), equal_nan=True)
+    assert data["mass"].attrs["units"] == "kg"
+
+
+@pytest.mark.parametrize("name", ["response", "resonance", "cycle", "loops"])
+def test_results_draw_themselves(run, name, tmp_path):
+    arrays = getattr(run, name)
+    arrays.plot(tmp_path / "all.png")
+    arrays.isel(load=0).plot(tmp_path / "one.png")
+    assert all((tmp_path / file).stat().st_size > 5000 for file in ("all.png", "one.png"))
+
+
+def test_representations_are_short_and_safe(run):
+    assert len(repr(run)) < 200
+    assert len(repr(run.response)) < 300
+    page = run._repr_html_()
+    assert "A &lt;run&gt;" in page
+    assert "resonance amplitude [µm]" in page
+    assert "<b>response</b>" in run.response._repr_html_()
+
+
+@pytest.mark.parametrize(
+    ("labels", "said"),
+    [
+        ({"load": 79}, "load = 79 is not there, expected one of"),
+        ({"lod": 80}, "no dimension 'lod'"),
+    ],
+)
+def test_unknown_labels_are_named(run, labels, said):
+    with pytest.raises(InputError, match=said):
+        run.response.sel(**labels)
+
+
+def test_a_folder_without_a_run_is_refused(tmp_path):
+    with pytest.raises(InputError, match=r"no scene\.toml in it"):
+        bladefem.open(tmp_path)
+
+
+def test_results_that_are_not_there_are_named(run):
+    with pytest.raises(InputError, match="group 'modes' cannot be read"):
+        _ = run.modes
+
+
+def test_a_star_import_leaves_open_alone():
+    assert "open" not in bladefem.__all__
+    assert "open" in bladefem._WHERE
+
+
+def test_a_run_in_memory_is_short_too():
+    """The arrays of its stages stay out of it."""
+    cells = np.arange(4000).reshape(-1, 4)
+    mesh = Mesh(np.zeros((4000, 3)), "tetra", {"blade": cells})
+    modes = ModeSet(np.array([100.0, 300.0]), np.zeros((2, 4000, 3)), 9, np.zeros(2))
+    best = SimpleNamespace(load=80.0, peak_amplitude=2e-4)
+    run = Run(Scene(title="A <run>"), None, mesh, [modes], response=Response(None, [best], ()))
+    assert repr(run) == "<bladefem run of 'A <run>' in memory: mesh, modes, response>"
+    assert len(repr(mesh)) < 200
+    page = run._repr_html_()
+    assert "nodal diameter 9" in page
+    assert "200 µm under 80 N" in page
+    assert "A &lt;run&gt;" in page
