@@ -15,7 +15,7 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from ...errors import NotSolvedError
-from ...hbm.full_stick import grips
+from ...hbm.full_stick import sticks_safely
 from ...hbm.peak import Peak, find_peak
 from ...hbm.solution import Solution
 from .choice import sufficient
@@ -108,7 +108,7 @@ def peak_from(
 def peak_errors(family: Family, settings: Settings, peak: Peak, accuracy: float) -> PeakErrors:
     """The peak again in a model that is richer in one respect, for each of them."""
     point = peak.solution
-    exact = ("harmonics", "samples") if grips(member(family, settings).model, point) else ()
+    exact = ("harmonics", "samples") if sticks_safely(member(family, settings).model, point) else ()
     heights = dict.fromkeys(DIRECTIONS, 0.0)
     shifts = dict.fromkeys(DIRECTIONS, 0.0)
     better = {}
