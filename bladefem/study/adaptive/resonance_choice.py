@@ -23,7 +23,14 @@ from .family import Family, carried, member
 from .indicators import richer
 from .settings import DIRECTIONS, Settings, enriched
 
-__all__ = ["PeakErrors", "choose_at_peak", "judge_settings", "peak_errors", "peak_from"]
+__all__ = [
+    "PeakErrors",
+    "choose_at_peak",
+    "judge_settings",
+    "judge_too_large",
+    "peak_errors",
+    "peak_from",
+]
 
 # enrichments of one peak before giving up
 ROUNDS = 8
@@ -116,7 +123,7 @@ def peak_errors(family: Family, settings: Settings, peak: Peak, accuracy: float)
         other = None if name in exact else judge_settings(family, settings, name)
         if other is None:
             continue
-        if _too_large(family, other, peak, LIFTING_JUDGE):
+        if judge_too_large(family, other, point):
             heights[name] = np.inf
             shifts[name] = np.inf
             continue
@@ -196,13 +203,18 @@ def _next_settings(
         if name not in settings.chosen or name in fixed or needs[name] <= LEAST * accuracy:
             continue
         better = enriched(settings, name, needs[name] / (ENOUGH * accuracy))
-        if better is not None and not _too_large(family, better, peak, LIFTING):
+        if better is not None and not _too_large(family, better, peak.solution, LIFTING):
             return better
     return None
 
 
-def _too_large(family: Family, settings: Settings, peak: Peak, limit: int) -> bool:
+def judge_too_large(family: Family, other: Settings, point: Solution) -> bool:
+    """A model that only tells the error of a point where contacts lift off costs too much."""
+    return _too_large(family, other, point, LIFTING_JUDGE)
+
+
+def _too_large(family: Family, settings: Settings, point: Solution, limit: int) -> bool:
     """Contacts lift off, and the balance would have more unknowns than a limit."""
     model = member(family, settings).model
     unknowns = model.springs.size * (2 * settings.harmonics + 1)
-    return peak.solution.states["lift"] > 0 and unknowns > limit
+    return point.states["lift"] > 0 and unknowns > limit

@@ -15,7 +15,7 @@ from .check_points import LOUDEST, QUIET, SHARES, heights_of, hidden, peak_of
 from .choice import Checked, covered, sufficient
 from .family import Family, member
 from .indicators import moved, richer
-from .resonance_choice import PeakErrors, choose_at_peak, judge_settings, peak_from
+from .resonance_choice import PeakErrors, choose_at_peak, judge_settings, judge_too_large, peak_from
 from .settings import Settings, enriched
 
 __all__ = ["resonance_curve", "unfollowed"]
@@ -150,8 +150,10 @@ def _change(
     family: Family, settings: Settings, point: Solution, other: Settings, shift: float
 ) -> float:
     """Relative change of the amplitude in another model, at a frequency shifted by a factor;
-    infinite where that is not solved.
+    infinite where that is not solved, or too large to be.
     """
+    if judge_too_large(family, other, point):
+        return np.inf
     moved_point = replace(point, omega=point.omega * shift)
     better = moved(family, settings, moved_point, other, replace(sufficient(1e-2), fallbacks=False))
     return abs(size(point) / size(better) - 1) if better.converged else np.inf
