@@ -28,7 +28,7 @@ from .joined_files import joined_files
 from .matching import match, snap
 from .mesh import Mesh, Pair, Sector
 from .named_facets import named_facets
-from .parameters import MeshSize
+from .parameters import MeshSize, Wedge
 from .profile import turn
 from .quality import report, straighten
 from .raw_mesh import RawMesh, read_raw
@@ -54,21 +54,32 @@ FLIPPED = {
 Axis = np.ndarray | tuple[float, float, float]
 
 
-def read_geometry(imported: Any, size: MeshSize) -> Mesh:
+def read_geometry(imported: Any, size: MeshSize, wedge: Wedge) -> Mesh:
     """The mesh of a scene's [imported] table: STEP files are meshed, mesh files are read.
 
     Args:
-        imported: has file, more, scale, sectors, axis, names, linear and tolerance.
+        imported: has file, more, scale, sectors, axis, names, linear, tolerance, seats and
+            seat_width.
+        wedge: the damper to draw between the faces ``seats`` of a STEP file, where they are named.
 
     Raises:
         InputError: the file, its groups or its periodicity are not usable; one sentence.
     """
     axis = np.asarray(imported.axis, dtype=float)
     if Path(imported.file).suffix.lower() in (".step", ".stp"):
-        from .step_file import read_step
+        from .step_file import FittedDamper, read_step
 
+        fitted = None
+        if imported.seats is not None:
+            fitted = FittedDamper(imported.seats, wedge, imported.seat_width)
         return read_step(
-            imported.file, size, imported.scale, imported.sectors, axis, imported.names or ()
+            imported.file,
+            size,
+            imported.scale,
+            imported.sectors,
+            axis,
+            imported.names or (),
+            fitted,
         )
     return read_mesh(
         imported.file,

@@ -22,7 +22,7 @@ from .sector_names import edge_curves, link, mark_tip, motions, moved, name_face
 from .session import attempt, gmsh_session
 from .sizing import sector_sizes, set_grids, set_sizes
 
-__all__ = ["disc_segment", "wedge_sector"]
+__all__ = ["blade_solid", "disc_segment", "wedge_sector"]
 
 SEATS = ("seat_left", "seat_right", "damper_left", "damper_right")
 # a fillet meets the platform at this angle, since tangent faces are hard on Boolean unions
@@ -44,7 +44,7 @@ def wedge_sector(
     shape = profile(platform, shank, disc, wedge)
     sizes = sector_sizes(aerofoil, platform, shank, disc, wedge, size)
     with gmsh_session() as gmsh:
-        blade = _blade(gmsh, aerofoil, platform, shank, disc, shape)
+        blade = blade_solid(gmsh, aerofoil, platform, shank, disc, shape)
         marks = [(2, polygon(gmsh, seat(shape, wedge.length, side))[0]) for side in (-1, 1)]
         with attempt("damper.length", "imprint the seats on the platform"):
             blade = imprint(gmsh, blade, marks)
@@ -128,7 +128,7 @@ def _ring(gmsh: ModuleType, points: np.ndarray) -> int:
     return occ.addWire([*sides, occ.addLine(tags[-1], tags[0])])
 
 
-def _blade(
+def blade_solid(
     gmsh: ModuleType,
     aerofoil: Aerofoil,
     platform: Platform,

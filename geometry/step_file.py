@@ -13,6 +13,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterable
+from dataclasses import dataclass
 from pathlib import Path
 from types import ModuleType
 
@@ -23,19 +24,31 @@ from bladefem.errors import InputError
 from .curving import second_order
 from .draw import centres, tie
 from .finalise_mesh import check_count
+from .fitted_wedge import fit_wedge
 from .imported import mesh_of_raw
 from .mesh import Mesh
-from .parameters import MeshSize
+from .parameters import MeshSize, Wedge
 from .raw_mesh import from_gmsh_model
 from .renaming import read_names, renamed
 from .session import attempt, gmsh_session
 
-__all__ = ["read_step"]
+__all__ = ["FittedDamper", "read_step"]
 
 # (dimension, name) to entities
 Named = dict[tuple[int, str], list[int]]
 CONTACT = ("seat_left", "seat_right", "damper_left", "damper_right")
 PREFIX = {"": 1.0, ".MILLI.": 1e-3, ".CENTI.": 1e-2, ".DECI.": 0.1, ".MICRO.": 1e-6, ".KILO.": 1e3}
+
+
+@dataclass(frozen=True)
+class FittedDamper:
+    """A damper to draw between two platform faces of a blade; see fitted_wedge.py."""
+
+    # faces towards the next blade and towards the previous one
+    seats: tuple[str, str]
+    wedge: Wedge
+    # from the platform's edge inwards [m]; of the narrower face when None
+    seat_width: float | None = None
 
 
 def read_step(
@@ -45,6 +58,7 @@ def read_step(
     sectors: int = 0,
     axis: np.ndarray | tuple[float, float, float] = (0.0, 0.0, 1.0),
     names: Iterable[str] = (),
+    fitted: FittedDamper | None = None,
 ) -> Mesh:
     """Mesh of a STEP file with second-order tetrahedra.
 
@@ -54,6 +68,7 @@ def read_step(
         sectors: blades on the wheel, 0 for a single body.
         axis: engine axis through the origin.
         names: "new = old" for faces and solids that the file calls otherwise, see renaming.py.
+        fitted: a damper to draw between two platform faces of the blade.
 
     Raises:
         InputError: the file cannot be read or meshed, or groups are missing.
@@ -67,6 +82,9 @@ def read_step(
         with attempt("imported.file", f"import '{file}'"):
             _import(gmsh, path, 1.0 if scale == 1.0 else scale / file_unit(text))
         named = _renamed(_names(gmsh, text), read_names(names))
+        if fitted is not None:
+            on = rotation(axis, 2 * np.pi / sectors)
+            named = fit_wedge(gmsh, named, fitted.seats, fitted.wedge, fitted.seat_width, on, axis)
         named |= _found(gmsh, named, sectors, axis)
         _periodic(gmsh, named, sectors, axis)
         with attempt("mesh.size", f"mesh '{file}'"):

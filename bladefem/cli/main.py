@@ -22,6 +22,8 @@ _EXAMPLES = """examples:
   bladefem run scenes/wedge.toml -o runs/wedge              everything, with report and figures
   bladefem run runs/wedge --set contact.mu=0.2              again from a run folder: finished stages are kept
 
+  bladefem modes scenes/wedge.toml -- -eps_monitor          options of PETSc and SLEPc
+
 exit codes: 0 done, 1 not solved, 2 bad input, 130 interrupted, 143 ended by SIGTERM"""
 
 # command: (what it does, example, function)
@@ -90,7 +92,14 @@ def main(arguments: Sequence[str] | None = None) -> int:
     """Run one command and return its exit code; messages go to the error stream of rank 0."""
     # more BLAS threads only get in each other's way
     os.environ.setdefault("OMP_NUM_THREADS", "1")
-    options = parser().parse_args(arguments)
+    words = list(sys.argv[1:] if arguments is None else arguments)
+    # what follows -- is for PETSc, and part of the scene: stored stages know of it
+    cut = words.index("--") if "--" in words else len(words)
+    options = parser().parse_args(words[:cut])
+    if words[cut + 1 :]:
+        if not hasattr(options, "overrides"):
+            parser().error("options of PETSc (after --) need a command with a scene")
+        options.overrides.append(f"solver.petsc={' '.join(words[cut + 1 :])}")
     # run folders, kept for this command
     with ExitStack() as options.held:
         return ranks.guarded(lambda comm: options.function(options, comm), options)

@@ -164,7 +164,8 @@ def responses(response: Any) -> str:
 
     undamped = response.free_peak[1]
     curves = response.curves
-    rows = pd.DataFrame(summary(curves, response.limits))[list(SHOWN)]
+    rows = pd.DataFrame(summary(curves, response.limits))
+    rows = rows[[name for name in SHOWN if name in rows]]
     rows.insert(0, "seat load", ["no damper", *map(_case, curves), "full stick"])
     best = min(curves, key=lambda c: c.peak_amplitude)
     return (
@@ -176,6 +177,9 @@ def responses(response: Any) -> str:
 SHOWN = (
     "peak_frequency",
     "peak_amplitude",
+    "lowest",
+    "highest",
+    "interval",
     "reduction",
     "dissipated",
     "error",
@@ -195,7 +199,7 @@ def side_by_side(name: str, best: Any) -> str:
         "value",
         "free_frequency",
         "load",
-        *(c for c in SHOWN if c not in ("dissipated", "points")),
+        *(c for c in SHOWN if c in best and c not in ("dissipated", "points")),
     ]
     return table(best[columns].rename(columns={"value": name}))
 

@@ -1,10 +1,9 @@
-"""Normal modes by a shift-inverted block Lanczos iteration on complex vectors.
+"""Normal modes: SLEPc's Krylov-Schur iteration, or block Lanczos where there are good guesses.
 
-The doubled pencil of a complex nodal diameter holds each eigenvalue twice and a Krylov method may
-return one of a pair only; here the iteration itself runs in complex arithmetic (the memory of a
-complex vector is that of the doubled one), so there is nothing to sort out. Blocks catch multiple
-eigenvalues, full reorthogonalisation keeps ghosts away, and the inertia of K - s M proves the count
-on demand. The tests compare with SLEPc on the doubled pencil.
+SLEPc computes from scratch (eigensolver.py). Good guesses of many vectors at once, from other nodal
+diameters, are finished by a block Lanczos iteration (lanczos.py): Krylov-Schur starts from one
+vector only. An iteration from one vector may return one of a double eigenvalue, as a square beam
+has; so the inertia of K - s M counts the eigenvalues, and what was missed is found by blocks.
 """
 
 from __future__ import annotations
@@ -16,16 +15,31 @@ import numpy as np
 from ..data import ModeSet
 from ..errors import InputError, NotSolvedError
 from .constraint import Constrained, expand, restrict
+from .eigensolver import Eigensolver, basis_size, krylov_schur
 from .flexibility import Flexibility, compliance, flexible
 from .lanczos import lowest
 from .linalg import apply, combined, dot, inertia, scale
 
-__all__ = ["canonical", "certificate", "count_below", "elastic_pairs", "mode_set", "modes", "pairs"]
+__all__ = [
+    "canonical",
+    "certificate",
+    "count_below",
+    "elastic_pairs",
+    "mode_set",
+    "modes",
+    "pairs",
+    "proven_pairs",
+]
 
 # error of a vector's direction; that of a frequency is its square
 TOLERANCE = 1e-8
 # the same where modes are looked at, not reduced with
 SHOWN = 1e-6
+SLEPC = Eigensolver()
+BLOCKS = Eigensolver("lanczos")
+# bodies with fewer unknowns than this many times the basis are left to blocks, which end cleanly
+# when the space is exhausted
+FEW = 3
 
 
 def modes(
@@ -33,7 +47,8 @@ def modes(
     count: int,
     flex: Flexibility | None = None,
     tolerance: float = SHOWN,
-    prove: bool = False,
+    solver: Eigensolver = SLEPC,
+    prove: bool = True,
 ) -> ModeSet:
     """The lowest modes, rigid ones included, mass-normalised over the body (one sector of a wheel).
 
@@ -44,15 +59,39 @@ def modes(
 
     Raises:
         InputError: count is not positive.
-        NotSolvedError: no convergence; a lost mode (with ``prove``).
+        NotSolvedError: no convergence; a mode that stays lost.
     """
     if count < 1:
         raise InputError(f"count is {count}, expected at least 1 mode")
     flex = flex or flexible(con)
-    lam, X = pairs(flex, count, tolerance)
-    if prove:
-        _prove(con, lam)
-    return mode_set(con, lam, X)
+    found = proven_pairs if prove else pairs
+    return mode_set(con, *found(flex, count, tolerance, solver=solver))
+
+
+def proven_pairs(
+    flex: Flexibility, count: int, tolerance: float = TOLERANCE, solver: Eigensolver = SLEPC
+) -> tuple[np.ndarray, np.ndarray]:
+    """``pairs`` whose number the inertia confirms; those that were missed are found by blocks.
+
+    Raises:
+        NotSolvedError: the numbers differ even so.
+    """
+    lam, X = pairs(flex, count, tolerance, solver=solver)
+    if not lam[-1] > 0:
+        # rigid motions alone, which geometry counts
+        return lam, X
+    upper, expected = _gap(lam)
+    exact = count_below(flex.con, upper)
+    if exact == expected:
+        return lam, X
+    lam, X = pairs(flex, max(count, exact), tolerance, solver=BLOCKS)
+    found = np.count_nonzero(lam < upper)
+    if found != exact:
+        raise NotSolvedError(
+            f"{found} modes were found below {np.sqrt(upper) / (2 * np.pi):.6g} Hz, "
+            f"the inertia counts {exact}"
+        )
+    return lam[:count], X[:, :count]
 
 
 def pairs(
@@ -61,6 +100,7 @@ def pairs(
     tolerance: float = TOLERANCE,
     start: np.ndarray | None = None,
     guard: int = 0,
+    solver: Eigensolver = SLEPC,
 ) -> tuple[np.ndarray, np.ndarray]:
     """(m,) eigenvalues [rad^2/s^2] and this rank's (n_own, m) M-orthonormal vectors, rigid motions
     first.
@@ -72,7 +112,7 @@ def pairs(
     r = min(flex.R.shape[1], count)
     if r == count:
         return np.zeros(r), flex.R[:, :r]
-    lam, X = elastic_pairs(flex, count - r, tolerance, start=start, guard=guard)
+    lam, X = elastic_pairs(flex, count - r, tolerance, start=start, guard=guard, solver=solver)
     return np.concatenate([np.zeros(r), lam]), np.concatenate([flex.R[:, :r], X], axis=1)
 
 
@@ -114,19 +154,24 @@ def elastic_pairs(
     inverse: Callable[[np.ndarray], np.ndarray] | None = None,
     start: np.ndarray | None = None,
     guard: int = 0,
+    solver: Eigensolver = SLEPC,
 ) -> tuple[np.ndarray, np.ndarray]:
     """The lowest elastic eigenpairs of K x = lambda M x.
 
     Args:
         inverse: what stands for K^+ (fixed interfaces).
-        start: (n_own, k) good guesses; random loads, the same for any number of ranks, when left
-            out.
+        start: (n_own, k) good guesses, finished by blocks; random loads, the same for any number of
+            ranks, when left out.
         guard: pairs beyond count, as far as they have come.
 
     Raises:
         NotSolvedError: there are fewer, or no convergence.
     """
     inverse = inverse or (lambda B: compliance(flex, B))
+    few = flex.con.T.shape[1] < FEW * basis_size(count)
+    if start is None and solver.method == "slepc" and not few:
+        first = inverse(restrict(flex.con, _probe(flex.con, 1)))
+        return krylov_schur(flex.con, inverse, first, count, tolerance, guard, solver)
     if start is None:
         width = min(max(8 if flex.con.dtype is float else 6, count // 3), 16)
         start = inverse(restrict(flex.con, _probe(flex.con, width)))
@@ -163,24 +208,14 @@ def count_below(con: Constrained, lam: float) -> int:
     return inertia(combined(con.K, -lam, con.M))
 
 
-def _prove(con: Constrained, lam: np.ndarray) -> None:
-    """Compare the number of modes with the inertia at a shift in the widest gap of the upper
-    half.
-    """
+def _gap(lam: np.ndarray) -> tuple[float, int]:
+    """A shift [rad^2/s^2] in the widest gap of the upper half, and how many are below it."""
     if len(lam) < 2:
-        upper = lam[-1] * 1.0001
-        expected = len(lam)
-    else:
-        half = max(len(lam) // 2, 1)
-        gap = half + int(np.argmax(np.diff(lam[half - 1 :]) / lam[half:]))
-        upper = (lam[gap - 1] + lam[gap]) / 2
-        expected = gap
-    found = count_below(con, upper)
-    if found != expected:
-        raise NotSolvedError(
-            f"{expected} modes were found below {np.sqrt(upper) / (2 * np.pi):.6g} Hz, "
-            f"the inertia counts {found}"
-        )
+        return lam[-1] * 1.0001, len(lam)
+    half = max(len(lam) // 2, 1)
+    scale = np.maximum(lam[half:], np.finfo(float).tiny)
+    gap = half + int(np.argmax(np.diff(lam[half - 1 :]) / scale))
+    return (lam[gap - 1] + lam[gap]) / 2, gap
 
 
 def _norms(comm: object, X: np.ndarray) -> np.ndarray:

@@ -6,6 +6,7 @@ Both come from the one factorisation that also gives the modes.
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
 
 import numpy as np
 import scipy.sparse as sp
@@ -13,12 +14,13 @@ from scipy.linalg import eigh
 
 from ..data import PortModel
 from ..errors import InputError, suggestion
-from .all_diameters import eigenpairs
+from .all_diameters import Eigenpairs, eigenpairs, found_again, lost_modes
 from .constraint import Constrained, Opened, Transformation, restrict
 from .cyclic_schur import Rim, face_solve, inner_solve
+from .eigensolver import Eigensolver
 from .flexibility import Flexibility, compliance, flexible
 from .linalg import apply, dot
-from .modes import TOLERANCE, canonical, elastic_pairs, pairs
+from .modes import SLEPC, TOLERANCE, canonical, elastic_pairs, proven_pairs
 
 __all__ = ["flexibility", "port_model", "port_models"]
 
@@ -35,6 +37,7 @@ def port_model(
     static_load: np.ndarray | None = None,
     kind: str = "rubin",
     flex: Flexibility | None = None,
+    solver: Eigensolver = SLEPC,
 ) -> PortModel:
     """Reduce a constrained body to its ports.
 
@@ -63,7 +66,7 @@ def port_model(
     offset = None if static_load is None else dot(con.body.comm, F, X[:, F.shape[1] :])[:, 0].real
     X = X[:, : F.shape[1]]
     reduce = _rubin if kind == "rubin" else _craig_bampton
-    omega, shapes, residual = reduce(flex, F, X, count)
+    omega, shapes, residual = reduce(flex, F, X, count, solver)
     return PortModel(omega, shapes, residual, names, con.nodal_diameter, offset)
 
 
@@ -75,38 +78,66 @@ def port_models(
     diameters: Sequence[int],
     static_load: np.ndarray | None = None,
     kind: str = "rubin",
+    solver: Eigensolver = SLEPC,
 ) -> Iterator[tuple[int, PortModel]]:
     """``port_model`` in several nodal diameters, as they are solved, with all work shared that does
     not depend on them.
 
     Where one rank holds the wheel, the static flexibility of all diameters takes one sweep over the
-    ports.
+    ports. In the end the inertia counts the modes; a diameter that lost one comes once more, whole.
 
     Args:
         static_load: (n_points*dim,) [N], of nodal diameter 0.
     """
     shared = _sweep(t.opened, P, static_load) if t.opened is not None and kind == "rubin" else None
-    for p in eigenpairs(t, count, diameters, tolerance=TOLERANCE):
+    model = _Ports(P, names, count, static_load, kind, solver, shared)
+    cons = {}
+    lam = {}
+    for p in eigenpairs(t, count, diameters, tolerance=TOLERANCE, solver=solver):
         n = p.con.nodal_diameter
-        load = static_load if n == 0 else None
-        if shared is None or p.flex.R.shape[1]:
-            yield n, port_model(p.con, P, names, count, load, kind, p.flex)
-            continue
-        G, offset = _closed(shared, p.flex.factor.parts)
-        lam = p.lam[:count]
-        shapes = dot(t.body.comm, _restricted(p.con, P), canonical(p.con, lam, p.X[:, :count]))
-        ports = P.shape[1]
-        yield (
-            n,
-            PortModel(
-                np.sqrt(lam),
-                shapes,
-                _residual(G[:ports, :ports], lam, shapes),
-                names,
-                n,
-                None if load is None else offset,
-            ),
+        cons[n] = p.con
+        lam[n] = p.lam
+        yield n, _modelled(model, p)
+    for n, truth in lost_modes(t, cons, lam, count).items():
+        yield n, _modelled(model, found_again(flexible(cons[n]), count, truth, TOLERANCE))
+
+
+@dataclass(frozen=True)
+class _Ports:
+    """What all nodal diameters are reduced with."""
+
+    P: sp.spmatrix
+    names: dict[str, slice]
+    count: int
+    static_load: np.ndarray | None
+    kind: str
+    solver: Eigensolver
+    # see ``_sweep``
+    shared: tuple[np.ndarray, np.ndarray] | None
+
+
+def _modelled(model: _Ports, p: Eigenpairs) -> PortModel:
+    """The port model of one nodal diameter from its modes."""
+    n = p.con.nodal_diameter
+    load = model.static_load if n == 0 else None
+    P = model.P
+    if model.shared is None or p.flex.R.shape[1]:
+        return port_model(
+            p.con, P, model.names, model.count, load, model.kind, p.flex, model.solver
         )
+    G, offset = _closed(model.shared, p.flex.factor.parts)
+    lam = p.lam[: model.count]
+    vectors = canonical(p.con, lam, p.X[:, : model.count])
+    shapes = dot(p.con.body.comm, _restricted(p.con, P), vectors)
+    ports = P.shape[1]
+    return PortModel(
+        np.sqrt(lam),
+        shapes,
+        _residual(G[:ports, :ports], lam, shapes),
+        model.names,
+        n,
+        None if load is None else offset,
+    )
 
 
 def flexibility(con: Constrained, P: sp.spmatrix, flex: Flexibility | None = None) -> np.ndarray:
@@ -153,13 +184,13 @@ def _closed(shared: tuple[np.ndarray, np.ndarray], rim: Rim) -> tuple[np.ndarray
 
 
 def _rubin(
-    flex: Flexibility, F: np.ndarray, X: np.ndarray, count: int
+    flex: Flexibility, F: np.ndarray, X: np.ndarray, count: int, solver: Eigensolver
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Free modes, and what the modes left out give to the static flexibility (Rubin 1975,
     doi:10.2514/3.60497).
     """
     comm = flex.con.body.comm
-    lam, V = pairs(flex, count)
+    lam, V = proven_pairs(flex, count, solver=solver)
     shapes = dot(comm, F, canonical(flex.con, lam, V))
     return np.sqrt(lam), shapes, _residual(dot(comm, F, X), lam, shapes)
 
@@ -171,7 +202,7 @@ def _residual(G: np.ndarray, lam: np.ndarray, shapes: np.ndarray) -> np.ndarray:
 
 
 def _craig_bampton(
-    flex: Flexibility, F: np.ndarray, X: np.ndarray, count: int
+    flex: Flexibility, F: np.ndarray, X: np.ndarray, count: int, solver: Eigensolver
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Constraint modes and fixed-interface modes (Craig and Bampton 1968, doi:10.2514/3.4741), then
     the eigenvectors of the small matrices, which are free modes in form: nothing is left for a
@@ -179,7 +210,7 @@ def _craig_bampton(
     """
     comm = flex.con.body.comm
     fixed = _fixed_inverse(flex, F, X)
-    _, inner = elastic_pairs(flex, count, inverse=fixed)
+    _, inner = elastic_pairs(flex, count, inverse=fixed, solver=solver)
     V = np.concatenate([flex.R, X, inner], axis=1)
     V = V / np.sqrt(np.abs(dot(comm, V, apply(flex.con.M, V)).diagonal()))
     mass = _hermitian(dot(comm, V, apply(flex.con.M, V)))

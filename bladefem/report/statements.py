@@ -73,6 +73,7 @@ def answer(
             f"{1e6 * best['peak_amplitude']:.4g} µm",
             ", ".join(filter(None, [reduction(summary, best), certainty(best)])),
         ),
+        *history(best),
         ("resonance frequency there", f"{best['peak_frequency']:.5g} Hz", shift(summary, best)),
     ]
     if np.isfinite(best.get("friction_damping", np.nan)):
@@ -94,6 +95,24 @@ def answer(
 def among(finite: pd.DataFrame) -> str:
     """That the load is the best of those studied, which is not the optimum."""
     return f"best of {len(finite)} loads studied" if len(finite) > 1 else ""
+
+
+def history(best: pd.Series) -> list[tuple[str, str, str]]:
+    """How far the loading history may move the answer."""
+    if not np.isfinite(best.get("lowest", np.nan)):
+        return []
+    remark = {
+        "point": "it does not depend on it",
+        "monotone": "certified: the response is monotone in the friction forces left",
+        "sampled": "sampled: it may be wider",
+    }
+    return [
+        (
+            "range there by the loading history",
+            f"{1e6 * best['lowest']:.4g} to {1e6 * best['highest']:.4g} µm",
+            remark.get(best["interval"], best["interval"]),
+        )
+    ]
 
 
 def stress(summary: pd.DataFrame, best: pd.Series) -> list[tuple[str, str, str]]:

@@ -34,6 +34,7 @@ __all__ = [
     "Operation",
     "Scene",
     "Seat",
+    "Solver",
     "Study",
 ]
 
@@ -211,6 +212,11 @@ class Study:
         help="also what the best load hangs on: contact stiffness, friction, damping, and friction "
         "while seating, each over its range",
     )
+    interval: bool = quantity(
+        False,
+        help="also the lowest and highest resonance over all friction forces that the loading "
+        "history may have left in contact points that never slip",
+    )
     stability: bool = quantity(
         False,
         help="also Floquet multipliers of the points of each curve, where normal loads "
@@ -248,6 +254,24 @@ class Model:
         1000,
         "nodal diameters of the mode tables; when left out those "
         "that the engine order excites ('bladefem modes': all)",
+    )
+
+
+@dataclass(frozen=True)
+class Solver:
+    """How eigenvalue problems are solved."""
+
+    eigensolver: str = quantity(
+        "slepc",
+        choices=("slepc", "lanczos"),
+        help="SLEPc's Krylov-Schur iteration, or the block Lanczos iteration that finishes guesses",
+    )
+    vectors: int | None = quantity(
+        None, "1", 3, 5000, "basis vectors of SLEPc; twice the modes and two when left out"
+    )
+    petsc: str = quantity(
+        "",
+        help="PETSc and SLEPc options, such as '-eps_monitor'; also after -- on the command line",
     )
 
 
@@ -308,6 +332,18 @@ class Imported:
         help="names for groups, node sets and surfaces of the file that has others, such as "
         "'clamp = face_3 + face_4', 'tip = face_1'",
     )
+    seats: tuple[str, str] | None = quantity(
+        None,
+        help="plane platform faces of a STEP blade, towards the next blade and towards the "
+        "previous one, between which [damper] is drawn; seats are cut into them",
+    )
+    seat_width: float | None = quantity(
+        None,
+        "m",
+        1e-4,
+        0.1,
+        "width of these seats, from the platform's edge inwards; the whole face when left out",
+    )
     linear: str = quantity(
         "refuse",
         choices=("refuse", "promote", "keep"),
@@ -349,3 +385,4 @@ class Scene:
     excitation: Excitation = field(default_factory=Excitation)
     study: Study = field(default_factory=Study)
     model: Model = field(default_factory=Model)
+    solver: Solver = field(default_factory=Solver)

@@ -28,6 +28,7 @@ def contact_problems(scene: Scene) -> Iterator[str]:
                         "the pressure "
                         "map, expected only one of the two"
                     )
+    yield from _interval(scene)
     shaped = [key for key in SHAPE if getattr(contact, key) is not None]
     if shaped and contact.bedded:
         yield (
@@ -46,6 +47,29 @@ def contact_problems(scene: Scene) -> Iterator[str]:
             f"contact.{missing}: expected beside "
             f"contact.{'edge_radius' if missing == 'edge_width' else 'edge_width'}"
         )
+
+
+def _interval(scene: Scene) -> Iterator[str]:
+    """Models whose response no loading history changes."""
+    if not scene.study.interval:
+        return
+    if not kind_named(scene.kind).has_seats:
+        yield (
+            f"study.interval = true: a scene of kind '{scene.kind}' has no forced response, "
+            "expected it to be left out"
+        )
+        return
+    fixed = {
+        "contact.normal = 'prescribed'": scene.contact.normal == "prescribed",
+        "model.damper = 'mass'": scene.model.damper == "mass",
+        "model.static = 'uncoupled'": scene.model.static == "uncoupled",
+    }
+    for name, holds in fixed.items():
+        if holds:
+            yield (
+                f"study.interval = true: with {name} no loading history changes the response, so "
+                "that the interval is a point; expected study.interval = false"
+            )
 
 
 def _seats_only(scene: Scene) -> Iterator[str]:

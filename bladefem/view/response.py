@@ -240,6 +240,26 @@ def draw_optimum_curve(axes: Any, table: pd.DataFrame, colour: str, label: str |
     finite = table[(table["load"] > 0) & np.isfinite(table["load"])].sort_values("load")
     amplitude = MICRO * finite["peak_amplitude"]
     axes[0].plot(finite["load"], amplitude, "o-", color=colour, label=label)
+    if "lowest" in finite and finite["lowest"].notna().any():
+        sure = finite["interval"] != "sampled"
+        axes[0].fill_between(
+            finite["load"],
+            MICRO * finite["lowest"],
+            MICRO * finite["highest"],
+            color=colour,
+            alpha=0.22,
+            lw=0,
+            label="range by loading history" + ("" if sure.all() else " (hollow: sampled)"),
+        )
+        for name in ("lowest", "highest"):
+            axes[0].plot(
+                finite["load"][~sure],
+                MICRO * finite[name][~sure],
+                "o",
+                mfc="none",
+                mec=colour,
+                ms=4,
+            )
     axes[1].plot(finite["load"], finite["peak_frequency"], "o-", color=colour)
     doubtful = (
         finite["unconverged"] > 0

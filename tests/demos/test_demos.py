@@ -21,6 +21,7 @@ PINNED = {
     "forced_response": 171.68597325,
     "change_geometry": 1.2595481622,
     "plain_matrices": 3.84332830,
+    "own_blade": 12.99114303,
 }
 
 

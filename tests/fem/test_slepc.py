@@ -1,14 +1,17 @@
-"""SLEPc on the same pencils: an independent eigensolver with MUMPS behind it."""
+"""SLEPc: set up by hand on the doubled pencil with MUMPS behind it, and as the modes use it."""
 
 import numpy as np
 import pytest
-from structured import sector
+from structured import box, sector
 
+from bladefem.errors import NotSolvedError
 from bladefem.fem.body import assemble
 from bladefem.fem.compat import SLEPc
-from bladefem.fem.constraint import at_diameter, transformation
-from bladefem.fem.linalg import Doubled
-from bladefem.fem.modes import modes
+from bladefem.fem.constraint import at_diameter, constrain, transformation
+from bladefem.fem.eigensolver import Eigensolver
+from bladefem.fem.flexibility import flexible
+from bladefem.fem.linalg import Doubled, apply
+from bladefem.fem.modes import BLOCKS, SLEPC, modes, pairs
 from bladefem.scene.tables import Material
 
 
@@ -47,3 +50,60 @@ def test_same_frequencies(n):
         assert abs(theirs / f - 1).min() < 1e-9
     for f in theirs[theirs < ours[-1] * (1 + 1e-6)]:
         assert abs(ours / f - 1).min() < 1e-9
+
+
+def square_beam():
+    """Bending modes of a square beam come in pairs of one frequency."""
+    return constrain(
+        assemble(box((10, 2, 2), (0.3, 0.02, 0.02), "hexahedron27"), "blade", Material())
+    )
+
+
+def test_double_frequencies_are_both_found():
+    """One start vector sees one of a pair; the inertia notices, and blocks find the other."""
+    found = modes(square_beam(), 6).frequencies
+    assert found[1] == pytest.approx(found[0], rel=1e-9)
+    assert found[3] == pytest.approx(found[2], rel=1e-9)
+    blocks = modes(square_beam(), 6, solver=BLOCKS).frequencies
+    np.testing.assert_allclose(found, blocks, rtol=1e-9)
+
+
+@pytest.mark.parametrize("n", [0, 3, 6])
+def test_slepc_and_blocks_are_the_same(n):
+    """Frequencies, and shapes up to the phase that both are given; no pair twice or lost."""
+    t = transformation(
+        assemble(sector(13, (5, 2, 1), bump=0.2), "blade", Material()), "clamp", True
+    )
+    con = at_diameter(t, n)
+    slepc, blocks = (modes(con, 12, tolerance=1e-9, solver=solver) for solver in (SLEPC, BLOCKS))
+    np.testing.assert_allclose(slepc.frequencies, blocks.frequencies, rtol=1e-11)
+    scale = abs(blocks.shapes).max()
+    np.testing.assert_allclose(slepc.shapes, blocks.shapes, atol=1e-6 * scale)
+    assert slepc.residuals.max() < 1e-8
+
+
+def test_restarts_of_a_complex_pencil_keep_every_pair_single():
+    """A basis as small as SLEPc takes: directions that a restart threw away come back."""
+    t = transformation(
+        assemble(sector(13, (5, 2, 1), bump=0.2), "blade", Material()), "clamp", True
+    )
+    flex = flexible(at_diameter(t, 4))
+    small = Eigensolver(vectors=12)
+    lam, X = pairs(flex, 10, 1e-10, solver=small)
+    exact, _ = pairs(flex, 10, 1e-10, solver=BLOCKS)
+    np.testing.assert_allclose(lam, exact, rtol=1e-10)
+    gram = X.conj().T @ apply(flex.con.M, X)
+    np.testing.assert_allclose(gram, np.eye(10), atol=1e-10)
+
+
+def test_options_of_petsc_reach_the_solver(monkeypatch):
+    """An iteration that may not restart says that it did not converge."""
+    from bladefem.fem.compat import PETSc
+
+    con = constrain(assemble(box((12, 2, 2), (0.3, 0.02, 0.03), "tetra10"), "blade", Material()))
+    try:
+        with pytest.raises(NotSolvedError, match="SLEPc found . of 10 modes: too many restarts"):
+            modes(con, 10, solver=Eigensolver(options="-eps_max_it 1 -eps_ncv 12 -eps_tol 1e-13"))
+    finally:
+        for name in ("eps_max_it", "eps_ncv", "eps_tol"):
+            PETSc.Options().delValue(name)

@@ -25,8 +25,8 @@ def test_shipped_scenes_load_and_come_back_from_their_own_text(path, tmp_path):
     assert load_scene(tmp_path / "scene.toml") == scene
 
 
-def test_every_kind_but_imports_has_a_shipped_scene():
-    assert {load_scene(p).kind for p in SCENES} == set(KINDS) - {"imported"}
+def test_every_kind_has_a_shipped_scene():
+    assert {load_scene(p).kind for p in SCENES} == set(KINDS)
 
 
 def test_wedge_scene_says_what_it_means():

@@ -32,6 +32,7 @@ def conditions(scene: Scene) -> Iterator[str]:
             "mesh.order = 1: a mesh file keeps the order of its elements, expected mesh.order = 2; "
             "imported.linear says what becomes of first-order ones"
         )
+    yield from _seat_conditions(scene)
     if not any(scene.imported.axis):
         yield "imported.axis = 0, 0, 0: expected a direction"
     if scene.imported.sectors in (1, 2):
@@ -43,6 +44,30 @@ def conditions(scene: Scene) -> Iterator[str]:
         yield from known_diameters(scene, scene.imported.sectors)
 
 
+def _seat_conditions(scene: Scene) -> Iterator[str]:
+    """A damper is drawn between the platforms of a STEP blade on a wheel."""
+    imported = scene.imported
+    if imported.seats is None:
+        if imported.seat_width is not None:
+            yield "imported.seat_width: expected beside imported.seats, the faces of the seats"
+        return
+    if not is_drawing(scene):
+        yield (
+            f"imported.seats: '{Path(imported.file).name}' is a mesh, expected a STEP file, into "
+            "whose faces seats can be cut"
+        )
+    if imported.sectors < 3:
+        yield (
+            f"imported.sectors = {imported.sectors}: expected the number of blades beside "
+            "imported.seats, since the damper sits between two of them"
+        )
+    if scene.damper.clearance != 0:
+        yield (
+            "damper.clearance: a damper that is fitted to imported.seats is drawn in contact, "
+            "expected 0 mm"
+        )
+
+
 def is_drawing(scene: Scene) -> bool:
     """A STEP file is meshed here, a mesh is given."""
     return Path(scene.imported.file).suffix.lower() in (".step", ".stp")
@@ -52,7 +77,7 @@ KIND = Kind(
     name="imported",
     tables=("imported", "damper", *ENGINE_TABLES),
     builder="geometry.imported:read_geometry",
-    shape=("imported", "mesh"),
+    shape=("imported", "mesh", "damper"),
     runner="bladefem.report.run:run",
     table="bladefem.cli.tables:run_table",
     result="forced responses",

@@ -12,6 +12,7 @@ from typing import Any
 import numpy as np
 
 from ...contact.interface_elements import seat_contact
+from ...hbm.history_interval import POINT
 from ...hbm.solution import Solution
 from ...hbm.sweep import size
 from ...scene.tables import Scene
@@ -25,6 +26,7 @@ from ..adaptive.settings import Settings, restarted
 from .assemble_model import LoadCase
 from .liftoff import named
 from .linear_limits import Limit
+from .load_interval import LoadInterval, load_interval
 from .stability import Stability, stability_of
 
 Keep = Callable[[LoadCase, Callable[[], Any]], Any]
@@ -83,6 +85,8 @@ class Curve:
     halved: float
     # the highest converged point
     peak: Solution
+    # range of the resonance over loading histories; None where it was not asked for
+    interval: LoadInterval | None = None
     # contacts lift off and the balance is too large for following its motions round folds: a
     # higher motion may exist
     unfollowed: bool = False
@@ -164,6 +168,10 @@ def curve_of(
         marks = stability_of(member(models, curve.settings).model, curve.points)
     lifts = any(p.states["lift"] > 0 for p in curve.points if p.converged)
     halved = np.nan if scene.contact.points else halved_change(models, curve.settings, top)
+    interval = None
+    if scene.study.interval:
+        model = member(models, curve.settings).model
+        interval = load_interval(model, curve.settings, top, scene.accuracy)
     return Curve(
         case.load,
         case.mass,
@@ -176,6 +184,7 @@ def curve_of(
         marks.multiplier,
         halved,
         top,
+        interval,
         lifts and unfollowed(models, curve.settings),
     )
 
@@ -200,6 +209,11 @@ def summary(curves: list[Curve], limits: tuple[Limit, Limit]) -> dict[str, np.nd
     """The design table: one row a load, from no damper (load 0) to full stick (load inf)."""
     free, stuck = (_linear_row(limit) for limit in limits)
     rows = [free, *map(_row, curves), stuck]
+    if any(c.interval is not None for c in curves):
+        ends = [limits[0].peak_amplitude, limits[1].peak_amplitude]
+        added = [_certain(ends[0]), *(_interval_row(c) for c in curves), _certain(ends[1])]
+        rows = [row | more for row, more in zip(rows, added, strict=True)]
+        free = rows[0]
     table = {name: np.array([row[name] for row in rows]) for name in free}
     if any(c.mass is not None for c in curves):
         table["mass"] = np.array([np.nan, *(c.mass for c in curves), np.nan])
@@ -220,6 +234,22 @@ def _row(c: Curve) -> dict[str, float]:
         "harmonics": c.settings.harmonics,
         "points": len(c.frequency),
         "unconverged": int((~c.converged).sum()),
+    }
+
+
+def _certain(amplitude: float) -> dict[str, float | str]:
+    """Columns of the interval where the response is linear."""
+    return {"lowest": amplitude, "highest": amplitude, "interval": POINT}
+
+
+def _interval_row(c: Curve) -> dict[str, float | str]:
+    if c.interval is None:
+        return {"lowest": np.nan, "highest": np.nan, "interval": ""}
+    return {
+        # the curve's highest point may lie below its maximum by the tolerance
+        "lowest": min(c.interval.lowest, c.peak_amplitude),
+        "highest": max(c.interval.highest, c.peak_amplitude),
+        "interval": c.interval.certificate,
     }
 
 

@@ -48,6 +48,7 @@ from .contact_cycle import labels
 from .damped_motion import DampedStress, damped_stress
 from .liftoff import named
 from .linear_limits import Limit, linear_limits
+from .load_interval import interval_sentence
 from .loads import Curve, default_loads, study_loads
 from .stability import stability_sentence
 from .stage_inputs import stage_key
@@ -580,6 +581,9 @@ def _remarks(scene: Scene, settings: Settings, curves: list[Curve], nodes: int) 
         )
     if scene.study.stability:
         remarks.append(method(stability_sentence([(c.stability, c.multiplier) for c in curves])))
+    intervals = [c.interval for c in curves if c.interval is not None]
+    if intervals:
+        remarks.append(interval_sentence([c.load for c in curves], intervals))
     halved = halved_sentence([c.load for c in curves], [c.halved for c in curves], scene.accuracy)
     if halved:
         remarks.append(warning(halved))

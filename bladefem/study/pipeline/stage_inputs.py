@@ -48,6 +48,7 @@ STAGE_INPUTS = {
             "operation.preload",
             "excitation.engine_order",
             "model.nodal_diameters",
+            "solver",
         ),
         code=("bladefem.fem",),
     ),
@@ -82,7 +83,7 @@ STAGE_INPUTS = {
     ),
     "reduction": StageInputs(
         after=("bodies",),
-        fields=("excitation.at", "excitation.direction", "model.reduction"),
+        fields=("excitation.at", "excitation.direction", "model.reduction", "solver"),
         code=("bladefem.fem",),
     ),
     "response": StageInputs(

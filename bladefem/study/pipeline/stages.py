@@ -218,13 +218,20 @@ def find_modes(
 
     if not is_wheel(bodies.mesh):
         flex = bodies.factorised(0)
-        return [modes(flex.con, count, flex)]
+        return [modes(flex.con, count, flex, solver=eigensolver(bodies.scene))]
     wanted = (
         diameters
         or bodies.scene.model.nodal_diameters
         or harmonic_diameters(bodies.scene, bodies.mesh, 3)
     )
     return wheel_modes(bodies, count, wanted)
+
+
+def eigensolver(scene: Scene) -> Any:
+    """fem.eigensolver.Eigensolver that the scene asks for."""
+    from ...fem.eigensolver import Eigensolver
+
+    return Eigensolver(scene.solver.eigensolver, scene.solver.vectors, scene.solver.petsc)
 
 
 def excited_modes(scene: Scene, mesh: Mesh, modes: Sequence[ModeSet]) -> ModeSet:
@@ -258,15 +265,23 @@ def wheel_modes(
     comm = bodies.comm or MPI.COMM_WORLD
     mesh = bodies.mesh
     wanted = list(range(mesh.sector.count // 2 + 1)) if diameters is None else list(diameters)
+    solver = eigensolver(bodies.scene)
     if comm.size == 1 or len(wanted) == 1:
-        return all_diameters(bodies.frame, count, wanted, direct, progress=bodies.progress)
+        return all_diameters(
+            bodies.frame, count, wanted, direct, progress=bodies.progress, solver=solver
+        )
     size = group or group_size(comm, mesh.dimension * len(np.unique(mesh.bodies["blade"])))
     return shared_out(
         comm,
         wanted,
         size,
         lambda part, some: all_diameters(
-            Bodies(bodies.scene, mesh, part).frame, count, some, direct, progress=bodies.progress
+            Bodies(bodies.scene, mesh, part).frame,
+            count,
+            some,
+            direct,
+            progress=bodies.progress,
+            solver=solver,
         ),
     )
 
@@ -321,21 +336,29 @@ def reduce_sector(
         modes: modes kept in each nodal diameter.
     """
     from ...fem.loads import mass
-    from ...fem.ports import port_model, port_models
+    from ...fem.ports import port_model
 
     scene = bodies.scene
     mesh = bodies.mesh
     ports = blade_ports(mesh, patches, scene.excitation)
     other = damper_ports(mesh, patches)
-    kind = scene.model.reduction
+    solver = eigensolver(scene)
     if is_wheel(mesh):
-        solved = port_models(bodies.frame, ports.matrix, ports.names, modes, diameters, kind=kind)
-        sector = dict(bodies.progress(solved, "nodal diameters", len(diameters)))
+        sector = _reduced_diameters(bodies, ports, modes, diameters)
     else:
         flex = bodies.factorised(0)
-        sector = {0: port_model(flex.con, ports.matrix, ports.names, modes, kind=kind, flex=flex)}
+        kind = scene.model.reduction
+        model = port_model(
+            flex.con, ports.matrix, ports.names, modes, kind=kind, flex=flex, solver=solver
+        )
+        sector = {0: model}
     floating = port_model(
-        bodies.damper.con, other.matrix, other.names, DAMPER_MODES, flex=bodies.damper
+        bodies.damper.con,
+        other.matrix,
+        other.names,
+        DAMPER_MODES,
+        flex=bodies.damper,
+        solver=solver,
     )
     first = len(patches[0].area) * mesh.dimension
     return Reduced(
@@ -345,6 +368,42 @@ def reduce_sector(
         mesh.sector.count if is_wheel(mesh) else 0,
         mass(bodies.damper.con.body),
     )
+
+
+def _reduced_diameters(
+    bodies: Bodies, ports: Any, modes: int, diameters: Sequence[int]
+) -> dict[int, PortModel]:
+    """The blade side in each nodal diameter; groups of ranks share them out."""
+    from ...fem.compat import MPI
+    from ...fem.groups import group_size, shared_out
+    from ...fem.ports import port_models
+
+    scene = bodies.scene
+    solver = eigensolver(scene)
+    comm = bodies.comm or MPI.COMM_WORLD
+
+    def solved(some_bodies: Bodies, some: Sequence[int]) -> dict[int, PortModel]:
+        steps = port_models(
+            some_bodies.frame,
+            ports.matrix,
+            ports.names,
+            modes,
+            some,
+            kind=scene.model.reduction,
+            solver=solver,
+        )
+        return dict(bodies.progress(steps, "nodal diameters", len(some)))
+
+    wanted = sorted(set(diameters))
+    if comm.size == 1 or len(wanted) == 1:
+        return solved(bodies, wanted)
+
+    def of_group(part: Any, some: list[int]) -> list[PortModel]:
+        models = solved(Bodies(scene, bodies.mesh, part), some)
+        return [models[n] for n in some]
+
+    size = group_size(comm, bodies.mesh.dimension * len(np.unique(bodies.mesh.bodies["blade"])))
+    return dict(zip(wanted, shared_out(comm, wanted, size, of_group), strict=True))
 
 
 def blade_parts(scene: Scene, mesh: Mesh) -> tuple[Mesh, dict[str, Material]]:

@@ -1,0 +1,294 @@
+"""The lowest eigenpairs of K x = lambda M x by SLEPc: Krylov-Schur iteration, shift-inverted at
+zero with the factors that are there already.
+
+SLEPc sees a real symmetric pencil. A complex Hermitian one (nodal diameters between 0 and N/2)
+appears as its doubled real twin, whose eigenvalues come in pairs x and j x. In exact arithmetic the
+space built on one real vector holds one of each pair: the Lanczos coefficients of a Hermitian
+matrix are real. Rounding would let the others grow in; ``_Inverse`` takes the components along j
+times the earlier directions off each new one, so that within a few restarts no pair comes twice;
+repeated ones are dropped in the end. What the iteration may miss (the second vector of a truly
+double eigenvalue) is for the inertia count to notice.
+
+PETSc options of the user (-eps_ncv 60, -eps_monitor, -eps_type ...) act after the settings here.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from ..errors import NotSolvedError
+from .compat import PETSc, SLEPc
+from .constraint import Constrained
+from .lanczos import lowest, orthonormal
+from .linalg import apply, dot, minus, mix
+
+__all__ = ["Eigensolver", "basis_size", "krylov_schur"]
+
+# iterations (restarts) until SLEPc gives up
+RESTARTS = 100
+# basis vectors beyond twice the pairs wanted: fewer restart once more, more are not needed
+MORE_VECTORS = 2
+# share of a direction beyond which it counts as new, after those that are known
+NEW = 1e-6
+# largest imaginary part of products with earlier directions, for a direction of the same space
+STRAY = 1e-4
+# words of EPSConvergedReason
+REASONS = {-1: "too many restarts", -2: "breakdown", -3: "the pencil lost its symmetry"}
+
+
+@dataclass(frozen=True)
+class Eigensolver:
+    """How eigenpairs are computed."""
+
+    # "slepc", or "lanczos" for the block iteration of lanczos.py
+    method: str = "slepc"
+    # SLEPc's basis vectors; twice the pairs and MORE_VECTORS when None
+    vectors: int | None = None
+    # PETSc and SLEPc options as on a command line, such as "-eps_monitor"
+    options: str = ""
+
+
+@dataclass
+class _Pencil:
+    """The pencil as SLEPc's vectors see it: real and imaginary parts of an unknown side by side."""
+
+    con: Constrained
+    inverse: Callable[[np.ndarray], np.ndarray]
+    # the vector that M was applied to last: the one that the inverse acts on next
+    last: np.ndarray | None = None
+    # keep the directions of real pencils too
+    kept: bool = False
+    # directions solved for, and their products by M (those of complex pencils only)
+    known: list[np.ndarray] = field(default_factory=list)
+    images: list[np.ndarray] = field(default_factory=list)
+    # the first vector has been multiplied
+    started: bool = False
+
+    @property
+    def doubled(self) -> bool:
+        """Complex Hermitian matrices become real ones of twice the size."""
+        return self.con.dtype is complex
+
+    def column(self, vector: PETSc.Vec) -> np.ndarray:
+        """(n_own, 1) this rank's part of a PETSc vector."""
+        values = vector.getArray(readonly=True).copy()
+        return (values.view(complex) if self.doubled else values).reshape(-1, 1)
+
+    def put(self, column: np.ndarray, vector: PETSc.Vec) -> None:
+        """The inverse of ``column``."""
+        values = np.ascontiguousarray(column[:, 0], dtype=self.con.dtype)
+        vector.setArray(values.view(float))
+
+
+class _Mass:
+    """M as a PETSc matrix."""
+
+    def __init__(self, pencil: _Pencil) -> None:
+        self.pencil = pencil
+
+    def mult(self, _: PETSc.Mat, x: PETSc.Vec, y: PETSc.Vec) -> None:
+        pencil = self.pencil
+        pencil.last = pencil.column(x)
+        pencil.put(apply(pencil.con.M, pencil.last), y)
+
+
+class _Stiffness:
+    """K as a PETSc matrix."""
+
+    def __init__(self, pencil: _Pencil) -> None:
+        self.pencil = pencil
+
+    def mult(self, _: PETSc.Mat, x: PETSc.Vec, y: PETSc.Vec) -> None:
+        pencil = self.pencil
+        pencil.put(apply(pencil.con.K, pencil.column(x)), y)
+
+
+class _Inverse:
+    """K^-1 as a PETSc preconditioner."""
+
+    def __init__(self, pencil: _Pencil) -> None:
+        self.pencil = pencil
+
+    def apply(self, _: PETSc.PC, x: PETSc.Vec, y: PETSc.Vec) -> None:
+        pencil = self.pencil
+        load = pencil.column(x)
+        found = pencil.inverse(load)
+        if pencil.kept and not pencil.doubled:
+            pencil.known.append(np.asfortranarray(pencil.last))
+        if pencil.doubled:
+            _remember(pencil, np.asfortranarray(load))
+            # of the products with earlier directions only the imaginary part is rounding
+            error = dot(pencil.con.body.comm, pencil.images, np.asfortranarray(found)).imag
+            if len(error):
+                found = found - mix(pencil.known, 1j * error)
+        pencil.put(found, y)
+
+
+def _remember(pencil: _Pencil, load: np.ndarray) -> None:
+    """Add what is new of the last direction to those that are known, orthonormal.
+
+    All of them lie in one real space, in which inner products are real. The first vector of a space
+    is none of them: SLEPc multiplies it by K^-1 M before it starts. A direction outside of the
+    space (SLEPc starts again after a breakdown) is such a first vector.
+    """
+    comm = pencil.con.body.comm
+    product = dot(comm, pencil.images, np.asfortranarray(pencil.last))
+    size = float(dot(comm, load, np.asfortranarray(pencil.last)).real[0, 0])
+    if not pencil.started or abs(product.imag).max(initial=0.0) > STRAY * np.sqrt(size):
+        pencil.started = True
+        pencil.known.clear()
+        pencil.images.clear()
+        return
+    direction = pencil.last
+    image = load
+    if pencil.known:
+        share = product.real.astype(complex)
+        direction = direction - mix(pencil.known, share)
+        image = image - mix(pencil.images, share)
+    rest = size - (product.real**2).sum()
+    if rest > NEW * size:
+        pencil.known.append(np.asfortranarray(direction / np.sqrt(rest)))
+        pencil.images.append(np.asfortranarray(image / np.sqrt(rest)))
+
+
+def krylov_schur(
+    con: Constrained,
+    inverse: Callable[[np.ndarray], np.ndarray],
+    start: np.ndarray,
+    count: int,
+    tolerance: float,
+    guard: int = 0,
+    settings: Eigensolver | None = None,
+) -> tuple[np.ndarray, np.ndarray]:
+    """The lowest eigenpairs; arguments and result as of :func:`lanczos.lowest`.
+
+    Args:
+        start: (n_own, k), the columns' sum is the first vector.
+        guard: pairs beyond count, as far as they have come.
+
+    Raises:
+        NotSolvedError: no convergence, with SLEPc's reason.
+    """
+    pencil = _Pencil(con, inverse, kept=guard > 0)
+    eps = _solver(pencil, start, count, tolerance, settings or Eigensolver())
+    try:
+        eps.solve()
+        reason = int(eps.getConvergedReason())
+        found = _vectors(pencil, eps)
+    finally:
+        # now: at the end of the program its callbacks would be gone
+        eps.destroy()
+    lam, X = _purified(con, inverse, found, min(count + guard, found.shape[1]))
+    if len(lam) < count and reason > 0:
+        # some came twice after many restarts of a small basis: blocks find the others
+        return lowest(con, inverse, np.asfortranarray(X), count, tolerance, guard)
+    if len(lam) < count:
+        raise NotSolvedError(
+            f"SLEPc found {len(lam)} of {count} modes: {REASONS.get(reason, 'no convergence')}"
+        )
+    if guard and len(lam) < count + guard and pencil.known:
+        more, rough = _rough_pairs(pencil, X, count + guard - len(lam))
+        return np.concatenate([lam, more]), np.asfortranarray(np.hstack([X, rough]))
+    return lam, X
+
+
+def _rough_pairs(pencil: _Pencil, X: np.ndarray, count: int) -> tuple[np.ndarray, np.ndarray]:
+    """What the space of the iteration holds beside the converged vectors, by Rayleigh and Ritz."""
+    con = pencil.con
+    MX = apply(con.M, X)
+    basis = np.asfortranarray(np.hstack(pencil.known))
+    basis = minus(basis, [X], dot(con.body.comm, MX, basis))
+    rest, _, _ = orthonormal(con, [X], [MX], basis, 1.0)
+    lam, Z = np.linalg.eigh(_hermitian(dot(con.body.comm, rest, apply(con.K, rest))))
+    return lam[:count], mix(rest, np.ascontiguousarray(Z[:, :count]))
+
+
+def basis_size(count: int) -> int:
+    """Vectors of the basis when the user gives none."""
+    return 2 * count + MORE_VECTORS
+
+
+def _solver(
+    pencil: _Pencil,
+    start: np.ndarray,
+    count: int,
+    tolerance: float,
+    settings: Eigensolver,
+) -> SLEPc.EPS:
+    """SLEPc's solver with everything set."""
+    con = pencil.con
+    comm = con.body.comm
+    parts = 2 if pencil.doubled else 1
+    own = parts * (con.own.stop - con.own.start)
+    size = ((own, parts * con.T.shape[1]),) * 2
+    K = PETSc.Mat().createPython(size, _Stiffness(pencil), comm=comm)
+    M = PETSc.Mat().createPython(size, _Mass(pencil), comm=comm)
+    for matrix in (K, M):
+        matrix.setOption(PETSc.Mat.Option.SYMMETRIC, True)
+        matrix.setUp()
+    eps = SLEPc.EPS().create(comm)
+    eps.setOperators(K, M)
+    eps.setProblemType(SLEPc.EPS.ProblemType.GHEP)
+    eps.setType(SLEPc.EPS.Type.KRYLOVSCHUR)
+    eps.setWhichEigenpairs(SLEPc.EPS.Which.TARGET_MAGNITUDE)
+    eps.setTarget(0.0)
+    basis = settings.vectors or basis_size(count)
+    eps.setDimensions(count, max(basis, count + 1))
+    eps.setTolerances(tolerance, RESTARTS)
+    # done here, for all vectors in one batch
+    eps.setPurify(False)
+    transform = eps.getST()
+    transform.setType(SLEPc.ST.Type.SINVERT)
+    transform.setMatMode(SLEPc.ST.MatMode.SHELL)
+    inner = transform.getKSP()
+    inner.setType(PETSc.KSP.Type.PREONLY)
+    inner.getPC().setType(PETSc.PC.Type.PYTHON)
+    inner.getPC().setPythonContext(_Inverse(pencil))
+    first = K.createVecRight()
+    pencil.put(start.sum(axis=1, keepdims=True).astype(con.dtype), first)
+    eps.setInitialSpace(first)
+    if settings.options:
+        PETSc.Options().insertString(settings.options)
+    eps.setFromOptions()
+    return eps
+
+
+def _vectors(pencil: _Pencil, eps: SLEPc.EPS) -> np.ndarray:
+    """(n_own, m) converged vectors."""
+    columns = []
+    vector = eps.getOperators()[0].createVecRight()
+    for i in range(eps.getConverged()):
+        eps.getEigenvector(i, vector)
+        columns.append(pencil.column(vector))
+    if not columns:
+        return np.zeros((pencil.con.own.stop - pencil.con.own.start, 0), pencil.con.dtype)
+    return np.asfortranarray(np.hstack(columns))
+
+
+def _purified(
+    con: Constrained, inverse: Callable[[np.ndarray], np.ndarray], X: np.ndarray, wanted: int
+) -> tuple[np.ndarray, np.ndarray]:
+    """Eigenvalues and M-orthonormal vectors K^-1 M x, which inverse iteration frees from rounding
+    in stiff directions; repeated directions are dropped.
+    """
+    if not X.shape[1]:
+        return np.zeros(0), X
+    Q, MQ, _ = orthonormal(con, [], [], X, NEW)
+    Y = inverse(MQ)
+    theta, S = np.linalg.eigh(_hermitian(dot(con.body.comm, MQ, Y)))
+    theta = theta[::-1][:wanted]
+    good = theta > 0
+    V = mix(Y, np.ascontiguousarray((S[:, ::-1][:, :wanted] / theta)[:, good]))
+    MV = apply(con.M, V)
+    gram = _hermitian(dot(con.body.comm, V, MV))
+    # nearly the identity: its inverse root keeps each vector where it is
+    size, Z = np.linalg.eigh(gram)
+    root = (Z / np.sqrt(size)) @ Z.conj().T
+    return 1 / theta[good], mix(V, np.ascontiguousarray(root))
+
+
+def _hermitian(A: np.ndarray) -> np.ndarray:
+    return (A + A.conj().T) / 2

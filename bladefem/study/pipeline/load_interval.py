@@ -1,0 +1,101 @@
+"""How sure the resonance of one load is: its range over the friction forces that the loading history
+may have left in contact points that never slip.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+from ...errors import NotSolvedError
+from ...hbm.history_interval import MONOTONE, POINT, HistoryInterval, history_interval
+from ...hbm.model import ReducedModel
+from ...hbm.peak import find_peak
+from ...hbm.solution import Solution
+from ...hbm.sweep import size
+from ..adaptive.settings import Settings
+
+__all__ = ["LoadInterval", "interval_sentence", "load_interval"]
+
+# tolerance of heights, over the accuracy wanted
+SHARE = 0.02
+UNKNOWN = "unknown"
+
+
+@dataclass(frozen=True)
+class LoadInterval:
+    """Range of a resonance over all loading histories."""
+
+    # [m], [Hz]
+    lowest: float
+    lowest_frequency: float
+    highest: float
+    highest_frequency: float
+    # "point", "monotone", "sampled" (`bladefem.hbm.history_interval`), or "unknown"
+    certificate: str
+    # contact points that never slip at the resonance
+    sticking: int
+    # of the balance that were solved
+    points: int
+    # what could not be solved; "" when nothing
+    reason: str
+
+
+def load_interval(
+    model: ReducedModel, settings: Settings, top: Solution, accuracy: float
+) -> LoadInterval:
+    """The interval of the resonance near the highest point of a curve, with the curve's settings."""
+    tolerance = SHARE * accuracy
+    try:
+        peak = find_peak(
+            model,
+            top.omega,
+            settings.harmonics,
+            settings.samples,
+            near=top,
+            tolerance=tolerance,
+        )
+        found = history_interval(model, peak, tolerance=tolerance)
+    except NotSolvedError as error:
+        return LoadInterval(
+            size(top), top.frequency, size(top), top.frequency, UNKNOWN, 0, 0, str(error)
+        )
+    return _record(found, peak.points)
+
+
+def _record(found: HistoryInterval, before: int) -> LoadInterval:
+    return LoadInterval(
+        found.lowest.height,
+        found.lowest.solution.frequency,
+        found.highest.height,
+        found.highest.solution.frequency,
+        found.certificate,
+        found.sticking,
+        found.points + before,
+        found.reason,
+    )
+
+
+def interval_sentence(loads: Sequence[float], found: Sequence[LoadInterval]) -> str:
+    """What the intervals of several loads [N] say."""
+    points = [load for load, one in zip(loads, found, strict=True) if one.certificate == POINT]
+    parts = []
+    if points:
+        named = ", ".join(f"{load:.4g} N" for load in points)
+        parts.append(
+            f"at {named} the resonance does not depend on the loading history: the interval is a "
+            "point"
+        )
+    for load, one in zip(loads, found, strict=True):
+        if one.certificate == POINT:
+            continue
+        if one.certificate == UNKNOWN:
+            parts.append(f"at {load:.4g} N the interval was not found: {one.reason}")
+            continue
+        how = "certified monotone" if one.certificate == MONOTONE else "sampled, it may be wider"
+        parts.append(
+            f"at {load:.4g} N {one.sticking} contact points never slip, and what the loading "
+            f"history left in them puts the resonance between {1e6 * one.lowest:.4g} and "
+            f"{1e6 * one.highest:.4g} um ({how})"
+        )
+    return "loading history: " + "; ".join(parts)

@@ -1,0 +1,45 @@
+"""A blade of a CAD system, for examples and tests: the parametric sector without its damper, as a
+STEP file in millimetres whose faces have no names.
+"""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from .parameters import Aerofoil, Disc, Platform, Shank, Wedge
+from .profile import profile
+from .sector import blade_solid
+from .sector_check import check_sector
+from .session import gmsh_session
+
+__all__ = ["write_blade_step"]
+
+
+def write_blade_step(
+    file: str | Path,
+    aerofoil: Aerofoil,
+    platform: Platform,
+    shank: Shank,
+    disc: Disc,
+    wedge: Wedge,
+) -> Path:
+    """Write one sector of the wheel, from bore to tip; returns the file.
+
+    Args:
+        wedge: its angle is that of the platform's inclined undersides.
+
+    Raises:
+        InputError: a parameter has to change; the message names it.
+    """
+    check_sector(aerofoil, platform, shank, disc, wedge)
+    file = Path(file)
+    with gmsh_session() as gmsh:
+        gmsh.option.setString("Geometry.OCCTargetUnit", "MM")
+        blade = blade_solid(
+            gmsh, aerofoil, platform, shank, disc, profile(platform, shank, disc, wedge)
+        )
+        gmsh.model.occ.dilate([(3, blade)], 0, 0, 0, 1e3, 1e3, 1e3)
+        gmsh.model.occ.remove([e for e in gmsh.model.occ.getEntities(3) if e != (3, blade)])
+        gmsh.model.occ.synchronize()
+        gmsh.write(str(file))
+    return file

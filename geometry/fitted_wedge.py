@@ -1,0 +1,306 @@
+"""The parametric damper between the platforms of an imported blade: drawn between two plane faces,
+with seats cut into them that match its flanks.
+
+The flanks are as the platforms are: inclined alike or not (a wedge, an asymmetric wedge), or in one
+plane (a flat damper). The damper is a prism along the line in which the two planes meet.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from types import ModuleType
+
+import numpy as np
+
+from bladefem.errors import InputError, suggestion
+
+from .draw import centres, imprint, polygon
+from .parameters import Wedge
+from .session import attempt
+
+__all__ = ["Flanks", "fit_wedge", "flanks_between"]
+
+# (dimension, name) to entities
+Named = dict[tuple[int, str], list[int]]
+# sine between two planes below which they are one plane
+PARALLEL = 1e-6
+# of a length: what is left of rounding in a STEP file
+LOOSE = 1e-6
+# of a face's size: how far a plane may be from flat
+FLAT = 1e-6
+
+
+@dataclass(frozen=True)
+class Flanks:
+    """Both flanks of a damper, in the axes of the wheel, the second one under the next blade."""
+
+    # (2, 2, 3) flank, inner and outer end: corners in the section at the damper's lower end [m]
+    ends: np.ndarray
+    # (3,) along the damper, from its lower to its upper end [m]
+    along: np.ndarray
+    # (3,) unit vector out of the wheel's axis
+    outward: np.ndarray
+
+    @property
+    def width(self) -> float:
+        """Of a seat, across the damper [m]."""
+        return float(np.linalg.norm(self.ends[0, 1] - self.ends[0, 0]))
+
+    @property
+    def length(self) -> float:
+        """Of a seat, along the damper [m]."""
+        return float(np.linalg.norm(self.along))
+
+    def rectangle(self, flank: int) -> np.ndarray:
+        """(4, 3) corners of a flank's seat [m]."""
+        inner, outer = self.ends[flank]
+        return np.array([inner, outer, outer + self.along, inner + self.along])
+
+    def section(self, base: float) -> np.ndarray:
+        """(6, 3) corners of the damper's lower end: foot, inner, outer; outer, inner, foot [m]."""
+        drop = -base * self.outward
+        (inner, outer), (inner_next, outer_next) = self.ends
+        return np.array([inner + drop, inner, outer, outer_next, inner_next, inner_next + drop])
+
+
+def fit_wedge(
+    gmsh: ModuleType,
+    named: Named,
+    seats: tuple[str, str],
+    wedge: Wedge,
+    width: float | None,
+    on: np.ndarray,
+    axis: np.ndarray,
+) -> Named:
+    """Cut the seats into the blade and draw the damper; returns the names with these added.
+
+    Args:
+        named: solids and faces of the file, by name.
+        seats: names of the platform's faces towards the next blade and towards the last one.
+        wedge: its length, base; the angles are those of the faces.
+        width: of the seats, from the platforms' edges inwards [m]; of the narrower face when None.
+        on: rotation (3, 3) from a blade to the next one.
+        axis: (3,) unit vector of the engine axis.
+
+    Raises:
+        InputError: faces that are not there, not plane or not opposite each other, or a damper that
+            does not fit.
+    """
+    right, left = (_single_face(gmsh, named, name) for name in seats)
+    flanks = flanks_between(gmsh, right, left, wedge, width, on, axis)
+    blade = _owner(gmsh, right)
+    before = _faces(gmsh, blade)
+    marks = [
+        (2, polygon(gmsh, flanks.rectangle(0))[0]),
+        (2, polygon(gmsh, flanks.rectangle(1) @ on)[0]),
+    ]
+    with attempt("imported.seats", "cut the seats into the platforms"):
+        cut = imprint(gmsh, blade, marks)
+        base, _, _ = polygon(gmsh, flanks.section(wedge.base))
+        drawn = gmsh.model.occ.extrude([(2, base)], *flanks.along)
+    damper = next(tag for dim, tag in drawn if dim == 3)
+    gmsh.model.occ.synchronize()
+    result = _carried_over(gmsh, named, before, blade, cut)
+    middles = [flanks.rectangle(side).mean(axis=0) for side in (0, 1)]
+    found = {
+        "seat_right": _face_at(gmsh, cut, middles[0], flanks, seats[0]),
+        "seat_left": _face_at(gmsh, cut, middles[1] @ on, flanks, seats[1]),
+        "damper_left": _face_at(gmsh, damper, middles[0], flanks, "damper"),
+        "damper_right": _face_at(gmsh, damper, middles[1], flanks, "damper"),
+    }
+    return result | {(3, "damper"): [damper]} | {(2, name): [face] for name, face in found.items()}
+
+
+def flanks_between(
+    gmsh: ModuleType,
+    right: int,
+    left: int,
+    wedge: Wedge,
+    width: float | None,
+    on: np.ndarray,
+    axis: np.ndarray,
+) -> Flanks:
+    """Where the damper touches the faces ``right`` of this blade and ``left`` of the next one.
+
+    Raises:
+        InputError: the damper does not fit between them.
+    """
+    here = _plane_face(gmsh, right)
+    there = _plane_face(gmsh, left)
+    # the neighbour may stand in either sense of the rotation
+    turned = min((on, on.T), key=lambda turn: float(np.linalg.norm(turn @ there[0] - here[0])))
+    if not np.allclose(turned, on):
+        raise InputError(
+            "imported.seats: the first face looks towards the previous blade, expected the face "
+            "towards the next one first; exchange the two names"
+        )
+    places = (here[0], on @ there[0])
+    normals = (here[1], on @ there[1])
+    corners = (here[2], there[2] @ on.T)
+    along = np.cross(*normals)
+    if np.linalg.norm(along) < PARALLEL:
+        along = axis - (axis @ normals[0]) * normals[0]
+    along /= np.linalg.norm(along)
+    along *= 1.0 if along @ axis >= 0 else -1.0
+    low, high = _common_length(corners, along, wedge.length)
+    ends = []
+    widths = [_extent(corners[i], _across(normals, places, along, i)) for i in (0, 1)]
+    narrowest = min(top - bottom for bottom, top in widths)
+    wanted = narrowest if width is None else width
+    if wanted > narrowest * (1 + LOOSE):
+        raise InputError(
+            f"imported.seat_width = {1e3 * wanted:.4g} mm: expected at most "
+            f"{1e3 * narrowest:.4g} mm, the width of the narrower platform face"
+        )
+    for i in (0, 1):
+        across = _across(normals, places, along, i)
+        top = widths[i][1]
+        origin = places[i] - (places[i] @ across) * across - (places[i] @ along) * along
+        foot = origin + (low + high - wedge.length) / 2 * along
+        ends.append([foot + (top - wanted) * across, foot + top * across])
+    middle = (places[0] + places[1]) / 2
+    outward = middle - (middle @ axis) * axis
+    outward -= (outward @ along) * along
+    flanks = Flanks(np.array(ends), wedge.length * along, outward / np.linalg.norm(outward))
+    _refuse_crossed(flanks)
+    return flanks
+
+
+def _common_length(
+    corners: tuple[np.ndarray, np.ndarray], along: np.ndarray, length: float
+) -> tuple[float, float]:
+    """Where both faces are, along the damper [m]."""
+    extents = [_extent(points, along) for points in corners]
+    low = max(extent[0] for extent in extents)
+    high = min(extent[1] for extent in extents)
+    if length > (high - low) * (1 + LOOSE):
+        raise InputError(
+            f"damper.length = {1e3 * length:.4g} mm: expected at most {1e3 * (high - low):.4g} mm, "
+            "the length that both platform faces have in common"
+        )
+    return low, high
+
+
+def _across(
+    normals: tuple[np.ndarray, np.ndarray],
+    places: tuple[np.ndarray, np.ndarray],
+    along: np.ndarray,
+    flank: int,
+) -> np.ndarray:
+    """Unit vector in a flank's plane, across the damper, towards the other flank."""
+    direction = np.cross(normals[flank], along)
+    direction /= np.linalg.norm(direction)
+    towards = places[1 - flank] - places[flank]
+    return direction if direction @ towards >= 0 else -direction
+
+
+def _refuse_crossed(flanks: Flanks) -> None:
+    """The outer ends leave a gap, and the damper is wider inside than outside, or as wide."""
+    inner = flanks.ends[1, 0] - flanks.ends[0, 0]
+    outer = flanks.ends[1, 1] - flanks.ends[0, 1]
+    if not inner @ outer > 0 or np.linalg.norm(inner) < np.linalg.norm(outer):
+        raise InputError(
+            "imported.seats: the two faces cross each other or open outwards, so that no damper "
+            "would be pressed on them; expected the inclined undersides of neighbouring platforms"
+        )
+
+
+def _extent(points: np.ndarray, direction: np.ndarray) -> tuple[float, float]:
+    along = points @ direction
+    return float(along.min()), float(along.max())
+
+
+def _single_face(gmsh: ModuleType, named: Named, name: str) -> int:
+    """The one plane face of that name."""
+    known = {word.lower(): tags for (dim, word), tags in named.items() if dim == 2}
+    if name.lower() not in known:
+        raise InputError(f"imported.seats: the file has no face '{name}'{suggestion(name, known)}")
+    tags = known[name.lower()]
+    if len(tags) != 1 or not _is_plane(gmsh, tags[0]):
+        raise InputError(
+            f"imported.seats: '{name}' is not one plane face, expected the plane underside of a "
+            "platform"
+        )
+    return tags[0]
+
+
+def _is_plane(gmsh: ModuleType, face: int) -> bool:
+    """By its points: CAD systems write planes as splines too."""
+    centre, normal, corners = _plane_face(gmsh, face)
+    low, high = gmsh.model.getParametrizationBounds(2, face)
+    across = [a + (b - a) * np.linspace(0.05, 0.95, 5) for a, b in zip(low, high, strict=True)]
+    grid = np.stack(np.meshgrid(*across), axis=-1).reshape(-1, 2).ravel().tolist()
+    points = np.array(gmsh.model.getValue(2, face, grid)).reshape(-1, 3)
+    size = np.ptp(corners, axis=0).max()
+    away = np.abs((np.concatenate([points, corners]) - centre) @ normal).max()
+    return bool(away < FLAT * size)
+
+
+def _plane_face(gmsh: ModuleType, face: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Centre (3,), normal (3,) and corners (n, 3) of a plane face [m]."""
+    centre = np.array(gmsh.model.occ.getCenterOfMass(2, face))
+    normal = np.array(gmsh.model.getNormal(face, gmsh.model.getParametrization(2, face, centre)))
+    points = gmsh.model.getBoundary([(2, face)], oriented=False, recursive=True)
+    corners = np.array([gmsh.model.getValue(0, tag, []) for _, tag in points])
+    return centre, normal / np.linalg.norm(normal), corners
+
+
+def _owner(gmsh: ModuleType, face: int) -> int:
+    """The solid that a face bounds."""
+    upward, _ = gmsh.model.getAdjacencies(2, face)
+    return int(upward[0])
+
+
+def _faces(gmsh: ModuleType, volume: int) -> dict[int, tuple[np.ndarray, float]]:
+    """Centre and area of each face of a solid."""
+    return {
+        tag: (centre, float(gmsh.model.occ.getMass(2, tag)))
+        for tag, centre in centres(gmsh, volume).items()
+    }
+
+
+def _carried_over(
+    gmsh: ModuleType,
+    named: Named,
+    before: dict[int, tuple[np.ndarray, float]],
+    blade: int,
+    cut: int,
+) -> Named:
+    """The names after the cut: faces are found again by centre and area, what was cut is not."""
+    after = _faces(gmsh, cut)
+    scale = max(np.linalg.norm(centre) for centre, _ in before.values())
+    now = {}
+    for tag, (centre, area) in before.items():
+        same = [
+            other
+            for other, (place, size) in after.items()
+            if np.linalg.norm(place - centre) < LOOSE * scale and abs(size / area - 1) < LOOSE
+        ]
+        if same:
+            now[tag] = same[0]
+    result: Named = {}
+    for (dim, name), tags in named.items():
+        if dim == 3:
+            result[dim, name] = [cut if tag == blade else tag for tag in tags]
+            continue
+        kept = [now.get(tag, tag) for tag in tags if tag in now or tag not in before]
+        if kept:
+            result[dim, name] = kept
+    return result
+
+
+def _face_at(gmsh: ModuleType, volume: int, middle: np.ndarray, flanks: Flanks, name: str) -> int:
+    """The face with the seat's centre and area."""
+    area = flanks.width * flanks.length
+    found = [
+        tag
+        for tag, (centre, size) in _faces(gmsh, volume).items()
+        if np.linalg.norm(centre - middle) < 1e-3 * flanks.width and abs(size / area - 1) < 1e-4
+    ]
+    if len(found) != 1:
+        raise InputError(
+            f"imported.seats: a seat of {1e3 * flanks.width:.4g} mm by {1e3 * flanks.length:.4g} "
+            f"mm does not lie wholly on '{name}', expected a smaller imported.seat_width or "
+            "damper.length"
+        )
+    return found[0]
