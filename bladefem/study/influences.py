@@ -32,6 +32,7 @@ from ..hbm.solve import solve
 from ..scene.tables import Scene
 from .adaptive.choice import sufficient
 from .adaptive.family import Family, joined, member
+from .adaptive.settings import Settings
 from .pipeline.assemble_model import LoadCase
 from .pipeline.best_load import BestLoad, find_best_load
 
@@ -46,6 +47,8 @@ FRICTION = 1.3
 DAMPING = 2.0
 # relative step of a parameter, and of the load, in differences of exact derivatives
 STEP = 2e-3
+# most harmonics and contact points of a seat in the model that tells changes
+COARSE = {"harmonics": 3, "points": 8}
 # parameters that are solved again at the ends of their ranges
 CHECKED = 2
 
@@ -127,6 +130,9 @@ def influences(
 ) -> list[Influence]:
     """The influence of each parameter, the largest on the amplitude first.
 
+    Where harmonics and contact points were chosen, a model of at most COARSE of them tells the
+    changes, relative to its own best load.
+
     Args:
         best: a best load that was found.
         changed: load cases with one parameter changed by a factor.
@@ -134,6 +140,15 @@ def influences(
     Raises:
         NotSolvedError: the peak of the best load was not solved again.
     """
+    if any(name in best.settings.chosen for name in ("harmonics", "points")):
+        coarse = _coarse(best.settings)
+        quick = find_best_load(
+            scene, changed("kt", 1.0), family_of, coarse, best.mass, start=best.load
+        )
+        if quick.reason:
+            raise NotSolvedError(quick.reason)
+        found = influences(scene, quick, family_of, changed, parameters)
+        return [_rescaled(one, quick, best) for one in found]
     study = _Study(scene, best, family_of, changed)
     base = study.peak("kt", 1.0, best.load)
     slopes = []
@@ -147,6 +162,23 @@ def influences(
     found = [study.influence(p, base, bend, tilt) for p in parameters]
     found.sort(key=lambda one: -one.span)
     return [study.solved_again(one) if i < CHECKED else one for i, one in enumerate(found)]
+
+
+def _coarse(settings: Settings) -> Settings:
+    """The settings with at most COARSE of what was chosen; nothing is left to choose."""
+    least = {
+        name: min(value, getattr(settings, name) or value)
+        for name, value in COARSE.items()
+        if name in settings.chosen
+    }
+    return replace(settings, **least, chosen=())
+
+
+def _rescaled(one: Influence, quick: BestLoad, best: BestLoad) -> Influence:
+    """The changes of one best load, put on the values of another."""
+    values = [np.array([b.load, b.amplitude, b.frequency]) for b in (quick, best)]
+    ratio = values[1] / values[0]
+    return replace(one, predicted=one.predicted * ratio, solved=one.solved * ratio)
 
 
 @dataclass(frozen=True)
