@@ -47,6 +47,8 @@ FRICTION = 1.3
 DAMPING = 2.0
 # relative step of a parameter, and of the load, in differences of exact derivatives
 STEP = 2e-3
+# share of the frequency on each side of a peak over which its curvature is measured
+BESIDE = 5e-4
 # most harmonics and contact points of a seat in the model that tells changes
 COARSE = {"harmonics": 3, "points": 8}
 # parameters that are solved again at the ends of their ranges
@@ -240,12 +242,14 @@ class _Study:
         gradients = node_gradients(model, peak.solution, names)
         return sum(float(gradients[name] @ rates[name]) for name in names) / peak.height
 
-    def by_frequency(self, model: ReducedModel, peak: Peak) -> float:
-        """Derivative of the height by the circular frequency at the frequency of a peak."""
+    def by_frequency(self, model: ReducedModel, peak: Peak, beside: float = 0.0) -> float:
+        """Derivative of the height by the circular frequency at the frequency of a peak, or a share
+        of it beside.
+        """
         settings = self.best.settings
         point = solve(
             model,
-            peak.omega,
+            peak.omega * (1 + beside),
             settings.harmonics,
             settings.samples,
             start=peak.solution,
@@ -272,8 +276,9 @@ class _Study:
             slopes.append(self.by_load(peak, name, factor, load))
             tilts.append(self.by_frequency(self.model(name, factor, load), base))
         moved_load = -(slopes[1] - slopes[0]) / (2 * STEP) / bend
-        # of 1/height^2 at the peak: height_ww = -bend height^3 / 2
-        curvature = -base.bend * base.height**3 / 2
+        model = self.model(name, 1.0, load)
+        sides = [self.by_frequency(model, base, beside) for beside in (-BESIDE, BESIDE)]
+        curvature = (sides[1] - sides[0]) / (2 * BESIDE * base.omega)
         tilted = (tilts[1] - tilts[0]) / (2 * STEP) + tilt * moved_load
         moved = -tilted / curvature / base.omega
         centre = np.log([load, base.height, base.solution.frequency])

@@ -54,9 +54,10 @@ def draw_influences(table: pd.DataFrame, file: str | Path | None = None) -> obje
             ax.axvline(now, color="#333333", lw=1)
             ax.set(xlabel=title)
             ax.margins(x=0.08)
+            ax.tick_params(axis="x", labelsize=9)
         axes[0].set_yticks(rows, names)
         axes[1].set_title("what the best load hangs on")
-        axes[1].legend(
-            loc="upper center", bbox_to_anchor=(0.5, -0.28), ncols=4, fontsize=8, frameon=False
-        )
-        return axes[0].figure
+        handles, labels = axes[0].get_legend_handles_labels()
+        figure = axes[0].figure
+        figure.legend(handles, labels, loc="outside lower center", ncols=4, fontsize=8)
+        return figure
