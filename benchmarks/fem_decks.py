@@ -3,7 +3,7 @@
     python benchmarks/fem_decks.py          writes tests/fem/ccx_decks.json
 
 Modes of three nodal diameters of a ring sector, one of twelve: C3D20, C3D20R, C3D15 with C3D20,
-C3D10, and C3D4 promoted to C3D10.
+C3D10, and C3D4 promoted to C3D10; and clamped bars of a cubic crystal and an orthotropic solid.
 """
 
 from __future__ import annotations
@@ -39,6 +39,28 @@ def reference(kind: str, element_type: str | None, folder: Path) -> dict[str, li
     return {str(n): found[n][:COUNT].tolist() for n in DIAMETERS}
 
 
+def crystal(kind: str, folder: Path) -> list[float]:
+    """Frequencies [Hz] of a clamped bar of a crystal, its axes turned."""
+    import decks
+
+    from bladefem.fem.elasticity import rotation
+
+    given = decks.CRYSTALS[kind]
+    constants = given.get("orthotropic")
+    if constants is None:
+        constants = (*(given["E"],) * 3, *(given["nu"],) * 3, *(given["G"],) * 3)
+    _, m = decks.bar()
+    axes = rotation(given["angles"])
+    (folder / "job.inp").write_text(decks.crystal_job(m, constants, axes, given["rho"], COUNT))
+    environment = {**os.environ, "OMP_NUM_THREADS": "1"}
+    subprocess.run(
+        ["ccx", "-i", "job"], cwd=folder, check=True, capture_output=True, env=environment
+    )
+    rows = [line.split() for line in (folder / "job.dat").read_text().splitlines()]
+    found = [float(row[3]) for row in rows if len(row) == 5 and row[0].isdigit()]
+    return found[:COUNT]
+
+
 def main() -> None:
     """Write the reference file."""
     sys.path[:0] = [str(TESTS), str(HERE), str(HERE.parent)]
@@ -51,6 +73,7 @@ def main() -> None:
     }
     with tempfile.TemporaryDirectory() as name:
         out = {case: reference(*how, Path(name)) for case, how in cases.items()}
+        out["crystals"] = {kind: crystal(kind, Path(name)) for kind in ("cubic", "orthotropic")}
     GOLDEN.write_text(json.dumps(out, indent=1) + "\n")
 
 

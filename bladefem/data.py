@@ -130,6 +130,8 @@ class PressureMap:
     gap: np.ndarray
     # max |force gap| over (max force, max gap): the proof of optimality
     complementarity: float
+    # (n, tangents) static friction force [N], as `Elements.t0`; None: seated without friction
+    traction: np.ndarray | None = None
 
     @property
     def pressure(self) -> np.ndarray:

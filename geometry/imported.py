@@ -28,6 +28,7 @@ from .joined_files import joined_files
 from .matching import match, snap
 from .mesh import Mesh, Pair, Sector
 from .named_facets import named_facets
+from .numbered_faces import face_corners, numbered_faces
 from .parameters import MeshSize, Wedge
 from .profile import turn
 from .quality import report, straighten
@@ -121,8 +122,22 @@ def read_mesh(
     raw = joined_files(read_raw(Path(file)), more)
     wanted = read_names(names)
     if wanted:
-        raw = renamed_raw(raw, wanted)
+        raw = renamed_raw(_with_numbered_faces(raw, wanted), wanted)
     return mesh_of_raw(raw, scale, sectors, axis, str(file), linear, tolerance, frozenset(wanted))
+
+
+def _with_numbered_faces(raw: RawMesh, wanted: dict[str, list[str]]) -> RawMesh:
+    """Faces that are named by their numbers, see numbered_faces.py, as surfaces of the file."""
+    there = {name.lower() for name in (*raw.groups, *raw.node_sets, *raw.surfaces)}
+    asked = {old.lower() for olds in wanted.values() for old in olds} - there
+    numbers = {int(old[5:]) for old in asked if old.startswith("face_") and old[5:].isdigit()}
+    if not numbers:
+        return raw
+    faces = numbered_faces(raw)
+    found = {
+        f"face_{n}": face_corners(faces, n - 1) for n in sorted(numbers) if 0 < n <= faces.count
+    }
+    return replace(raw, surfaces={**raw.surfaces, **found})
 
 
 def mesh_of_raw(

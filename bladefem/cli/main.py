@@ -11,7 +11,8 @@ import sys
 from collections.abc import Sequence
 from contextlib import ExitStack
 
-from . import commands, ranks, study
+from . import commands, ranks, scatter, study
+from .look import add_look, look
 
 __all__ = ["main", "parser"]
 
@@ -69,6 +70,11 @@ _COMMANDS = {
         "the same for several values of one parameter, side by side",
         "bladefem study scenes/wedge.toml --vary damper.angle='30, 40, 50 deg'",
         study.study,
+    ),
+    "scatter": (
+        "statistics of mistuned wheels: amplification of the highest blade for each load",
+        "bladefem scatter scenes/mistuned.toml --set mistuning.wheels=100",
+        scatter.scatter,
     ),
     "chart": (
         "time against error of methods and models, with the automatic choice",
@@ -179,6 +185,15 @@ def parser() -> argparse.ArgumentParser:
         commands.info,
     )
     info.set_defaults(scene=None)
+    add_look(
+        _command(
+            subs,
+            "look",
+            "what a mesh file holds: bodies, sets, numbered faces, cut faces, a scene to start from",
+            "bladefem look sector.inp --view faces.png --scene sector.toml",
+            look,
+        )
+    )
     return top
 
 

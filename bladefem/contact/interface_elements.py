@@ -22,6 +22,7 @@ __all__ = [
     "friction_elements",
     "gives_stiffness",
     "interface_law",
+    "layer_friction",
     "layered",
     "mapped_stiffness",
     "mindlin_ratio",
@@ -145,6 +146,20 @@ def interface_law(patches: Sequence[Patch], contact: Contact, ratio: float) -> I
     return InterfaceLaw(np.concatenate(kn), doubling * area)
 
 
+def layer_friction(
+    patches: Sequence[Patch], contact: Contact, ratio: float
+) -> tuple[np.ndarray, np.ndarray]:
+    """Tangential stiffness (n,) [N/m] and friction coefficient (n,) of the layer at all nodes of
+    some patches; of a layer that stiffens the stiffness at first touch.
+    """
+    seats = [seat_contact(contact, patch.name) for patch in patches]
+    kt = [
+        stiffnesses(seat, ratio, patch.area)[0] for seat, patch in zip(seats, patches, strict=True)
+    ]
+    mu = [np.full(len(p.area), seat.mu) for seat, p in zip(seats, patches, strict=True)]
+    return np.concatenate(kt), np.concatenate(mu)
+
+
 def layered(problem: ContactProblem, contact: Contact, ratio: float) -> ContactProblem:
     """The contact problem with the interface law of [contact] between its faces."""
     return replace(problem, layer=interface_law(problem.patches, contact, ratio))
@@ -212,10 +227,12 @@ def friction_elements(
         n0 = force
     else:
         n0 = np.where(force > 0, force, -kn * gap)
+    t0 = None
+    if maps[0].traction is not None:
+        t0 = np.vstack([a.T @ m.traction for a, m in zip(members, maps, strict=True)])
     S = sp.kron(sp.block_diag(G), sp.identity(1 + tangents), format="csr")
-    return Elements(
-        kt, kn, np.repeat([c.mu for c in seats], [len(a) for a in area]), n0, tangents
-    ), S
+    mu = np.repeat([c.mu for c in seats], [len(a) for a in area])
+    return Elements(kt, kn, mu, n0, tangents, t0=t0), S
 
 
 def _require_stiffness(kt: np.ndarray, kn: np.ndarray) -> None:

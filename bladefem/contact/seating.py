@@ -41,7 +41,15 @@ from .complementarity import LCPSolution, held_directions, solve_lcp
 from .interface_law import InterfaceLaw, closure_of, compliance_at, rigid_faces
 from .patch import initial_gap, make_patch, normal_ports, port_matrix, rigid_ports
 
-__all__ = ["ContactProblem", "contact_problem", "seat", "solve", "spin_axis"]
+__all__ = [
+    "ContactProblem",
+    "condense_body",
+    "contact_problem",
+    "rigid_and_load",
+    "seat",
+    "solve",
+    "spin_axis",
+]
 
 # gaps over elastic displacements beyond which a load is too light to be solved for
 HOVERING = 1e4
@@ -114,18 +122,18 @@ def contact_problem(
     ports = normal_ports(patches, mesh)
     body = damper if isinstance(damper, Body) else damper.con.body
     pull = centrifugal(body, 1.0, spin_axis(mesh)) if pull is None else pull
-    C, blade_swell = _condense(
+    C, blade_swell = condense_body(
         blade,
         port_matrix(patches, mesh)[:, ports],
         centrifugal(blade.con.body, 1.0, spin_axis(mesh)),
     )
     damper_swell = np.zeros(len(ports))
     if not isinstance(damper, Body):
-        C_damper, damper_swell = _condense(
+        C_damper, damper_swell = condense_body(
             damper, port_matrix(patches, mesh, "damper")[:, ports], pull
         )
         C = C + C_damper
-    rigid, load = _rigid(mesh, patches, body, pull)
+    rigid, load = rigid_and_load(mesh, patches, body, pull)
     gap = np.concatenate([initial_gap(p, mesh) for p in patches])
     gap = gap + given("clearance", clearance, gap.shape if np.ndim(clearance) else ())
     return ContactProblem(
@@ -229,7 +237,9 @@ def _fitted(problem: ContactProblem) -> ContactProblem:
     return replace(problem, clearance=none, blade_swell=none, damper_swell=none)
 
 
-def _condense(flex: Flexibility, P: sp.spmatrix, load: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+def condense_body(
+    flex: Flexibility, P: sp.spmatrix, load: np.ndarray
+) -> tuple[np.ndarray, np.ndarray]:
     """Flexibility (n, n) at the ports, and their displacement (n,) under a load in mesh
     numbering.
     """
@@ -238,7 +248,7 @@ def _condense(flex: Flexibility, P: sp.spmatrix, load: np.ndarray) -> tuple[np.n
     return (G[:, :-1] + G[:, :-1].T) / 2, G[:, -1]
 
 
-def _rigid(
+def rigid_and_load(
     mesh: Mesh, patches: Sequence[Patch], body: Body, pull: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray]:
     """Rigid motions at all damper ports (ports, d) and the load that goes with them (d,), rotations

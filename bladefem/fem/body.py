@@ -22,10 +22,10 @@ from .compat import (
     build_mesh,
     cell_dofs,
     dolfinx,
-    scalar_space,
     ufl,
     vector_space,
 )
+from .elasticity import Law, elastic_law, owners, piecewise
 from .loads import centrifugal, mass, surface_load, volume
 from .memory import check
 
@@ -35,7 +35,6 @@ __all__ = [
     "cells_of",
     "centrifugal",
     "degrees",
-    "lame",
     "mass",
     "properties",
     "rigid_modes",
@@ -104,13 +103,13 @@ def assemble(
     check(dim * len(used), comm)
     domain, origin = build_mesh(comm, mesh.cell_type, local, mesh.points[used, :dim])
     space = vector_space(domain, CELLS[mesh.cell_type][1])
-    lam, mu, rho, depth = properties(mesh, {n: materials[n] for n in names}, domain, plane)
+    law, rho, depth = properties(mesh, {n: materials[n] for n in names}, domain, plane)
     stiff, mass = degrees(mesh, cells, quadrature)
     u = ufl.TrialFunction(space)
     v = ufl.TestFunction(space)
     e_u = ufl.sym(ufl.grad(u))
     e_v = ufl.sym(ufl.grad(v))
-    energy = depth * (lam * ufl.tr(e_u) * ufl.tr(e_v) + 2 * mu * ufl.inner(e_u, e_v))
+    energy = depth * ufl.inner(law(e_u), e_v)
     K = assemble_matrix(energy * ufl.dx(metadata={"quadrature_degree": stiff}))
     M = assemble_matrix(
         depth * rho * ufl.inner(u, v) * ufl.dx(metadata={"quadrature_degree": mass})
@@ -132,29 +131,14 @@ def assemble(
 
 def properties(
     mesh: Mesh, materials: dict[str, Material], domain: Any, plane: str
-) -> tuple[Any, Any, Any, Any]:
-    """Lame's constants [Pa] and density [kg/m^3], one value a cell of this rank, and the depth [m],
+) -> tuple[Law, Any, Any]:
+    """Stress from strain, density [kg/m^3] with one value a cell of this rank, and the depth [m],
     for forms.
     """
-    owner = np.repeat(np.arange(len(materials)), [len(mesh.bodies[n]) for n in materials])
-    owner = owner[np.asarray(domain.topology.original_cell_index)]
-    dim = mesh.dimension
-    values = np.array([lame(material, dim, plane) for material in materials.values()])
-    depth = dolfinx.fem.Constant(domain, float(mesh.depth if dim == 2 else 1.0))
-    return *(_piecewise(domain, column[owner]) for column in values.T), depth
-
-
-def lame(material: Material, dim: int, plane: str) -> tuple[float, float, float]:
-    """Lame's lambda [Pa] (its plane-stress substitute where asked), shear modulus [Pa] and density
-    [kg/m^3].
-    """
-    E = material.E
-    nu = material.nu
-    mu = E / (2 * (1 + nu))
-    lam = E * nu / ((1 + nu) * (1 - 2 * nu))
-    if dim == 2 and plane == "stress":
-        lam = 2 * mu * lam / (lam + 2 * mu)
-    return lam, mu, material.rho
+    density = np.array([material.rho for material in materials.values()])
+    rho = piecewise(domain, density[owners(mesh, materials, domain)])
+    depth = dolfinx.fem.Constant(domain, float(mesh.depth if mesh.dimension == 2 else 1.0))
+    return elastic_law(mesh, materials, domain, plane), rho, depth
 
 
 def cells_of(body: Body) -> np.ndarray:
@@ -218,13 +202,6 @@ def _check_jacobians(mesh: Mesh, cells: np.ndarray) -> None:
             f"{len(bad)} of {len(cells)} elements are turned over (the first near {at} m), "
             "expected positive Jacobians; straighten their edges or refine the mesh there"
         )
-
-
-def _piecewise(domain: Any, values: np.ndarray) -> Any:
-    """One value a cell of this rank; the compiled form stays the same for every material."""
-    function = dolfinx.fem.Function(scalar_space(domain))
-    function.x.array[cell_dofs(function.function_space)[:, 0]] = values
-    return function
 
 
 def degrees(mesh: Mesh, cells: np.ndarray, quadrature: str) -> tuple[int, int]:

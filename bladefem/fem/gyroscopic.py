@@ -56,7 +56,7 @@ class Waves:
 
 def coriolis(body: Body, axis: tuple[float, float, float] = AXIS) -> PETSc.Mat:
     """G [kg]: times the speed [rad/s] it multiplies velocities in the rotating frame; skew."""
-    _, _, rho, depth = properties(body.mesh, body.material, body.space.mesh, body.plane)
+    _, rho, depth = properties(body.mesh, body.material, body.space.mesh, body.plane)
     a = np.asarray(axis, float) / np.linalg.norm(axis)
     turn = np.array([[0, -a[2], a[1]], [a[2], 0, -a[0]], [-a[1], a[0], 0]])[: body.dim, : body.dim]
     v = ufl.TestFunction(body.space)

@@ -13,7 +13,8 @@ import numpy as np
 
 from ..errors import InputError
 from . import shape_functions as shape
-from .body import Body, lame
+from .body import Body
+from .elasticity import lame, stress_of
 
 __all__ = ["GaussStress", "gauss_stress", "nodal_stress", "patch_stress", "principal", "von_mises"]
 
@@ -190,10 +191,11 @@ def _of_cells(
     strain = (slope + slope.swapaxes(2, 3)) / 2
     if large:
         strain = strain + slope.swapaxes(2, 3) @ slope / 2
-    lam, mu, _ = lame(body.material[name], d, body.plane)
-    trace = np.trace(strain, axis1=2, axis2=3)
-    stress = 2 * mu * strain + lam * trace[..., None, None] * np.eye(d)
-    across = lam * trace if d == 2 and body.plane == "strain" else None
+    stress = stress_of(body.material[name], strain, body.plane)
+    across = None
+    if d == 2 and body.plane == "strain":
+        lam, _ = lame(body.material[name], d, body.plane)
+        across = lam * np.trace(strain, axis1=2, axis2=3)
     if large:
         F = np.eye(d) + slope
         J = np.linalg.det(F)

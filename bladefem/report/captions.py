@@ -57,6 +57,8 @@ CAPTIONS = {
     "engine's origin, under each load.",
     "contact/friction_work": "Where one period at the best load's resonance wears the seats: "
     "friction work per area, and state of each contact point.",
+    "contact/damper_mass": "Mass of the damper that makes each load at the operating speed: after "
+    "the scene's history, without friction, and over all friction forces that could be left.",
     "contact/own_load": "Load of a seat by the damper's own mass at the operating speed.",
     "contact/wear": "Wear in an hour of steady vibration at each resonance.",
     "response/forced_response": "Amplitude over frequency for each normal load per seat, without "

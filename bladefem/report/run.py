@@ -6,7 +6,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable
-from dataclasses import replace
+from dataclasses import asdict, replace
 from functools import partial
 from pathlib import Path
 from typing import Any
@@ -24,6 +24,7 @@ from ..io.stage_cache import on_root, write_results, write_table
 from ..scene.tables import Scene
 from ..scene.toml import dump
 from ..scene.units import show
+from ..study.mistuning.stage import check_mistuning, is_mistuned, with_whole_wheel
 from ..study.modes.comparison import family_table
 from ..study.modes.stress import Strength
 from ..study.modes.survey import excited_set
@@ -58,6 +59,7 @@ from .nodes import (
 from .pressure import PICTURE, draw_seats, pressure_table, write_points
 from .response_arrays import curve_arrays, loop_arrays, node_arrays, resonance_arrays
 from .tables import units_of, write_tables
+from .wheel import blade_table, pattern_drawings, pattern_sentences, pattern_table
 from .write import Page, write_report
 
 __all__ = ["run", "write_run"]
@@ -77,7 +79,10 @@ def run(
     Raises:
         InputError: the scene cannot be run as it is; NotSolvedError: a stage found no solution.
     """
+    check_mistuning(scene)
     result = pipeline.run(scene, folder, comm=comm, progress=progress)
+    if is_mistuned(scene):
+        result = with_whole_wheel(result, comm, progress)
     return write_run(result, comm, progress)
 
 
@@ -102,6 +107,7 @@ def _write(result: pipeline.Run, progress: Progress) -> None:
     tables = {
         **_tables(result),
         **({"contact/wear": wear_table(patches, cycles, coefficient)} if worn else {}),
+        **_wheel_tables(result),
     }
     for name, table in tables.items():
         write_tables(table, folder / name.split("/")[1], name.split("/")[1])
@@ -124,6 +130,7 @@ def _write(result: pipeline.Run, progress: Progress) -> None:
         **_drawings(result, tables),
         "response/hysteresis": lambda file: draw_hysteresis(cycles, file),
         "contact/friction_work": lambda file: draw_wear(patches, cycles[_best(result)], file),
+        **({} if result.wheel is None else pattern_drawings(result.wheel)),
     }
     figures = {}
     for name, draw in progress(list(drawings.items()), "pictures"):
@@ -143,6 +150,7 @@ def _write(result: pipeline.Run, progress: Progress) -> None:
         *_beyond_stick(result),
         *([influence_sentence(result.response.influences)] if result.response.influences else []),
         *([wear_sentence(cycles, coefficient)] if worn else []),
+        *([] if result.wheel is None else pattern_sentences(result.wheel)),
     ]
     write_report(
         folder,
@@ -173,6 +181,16 @@ def _live(
         "response/hysteresis": live_loops(seat_loops(cycles)),
         "modes/frequencies_by_nodal_diameter": live_diameters(tables["modes/nodal_diameters"]),
         **({} if shapes is None else {"modes/first_modes": shapes}),
+    }
+
+
+def _wheel_tables(result: pipeline.Run) -> dict[str, pd.DataFrame]:
+    """Tables of the whole wheel, where blades differ."""
+    if result.wheel is None:
+        return {}
+    return {
+        "wheel/whole_wheel": pattern_table(result.wheel),
+        "wheel/blades": blade_table(result.wheel),
     }
 
 
@@ -230,6 +248,7 @@ def _tables(result: pipeline.Run) -> dict[str, pd.DataFrame]:
         "contact/pressure": pressure_table(result.contact.maps),
         **_own_load(result),
         **_best_load(result),
+        **_damper_masses(result),
         "response/summary": _summary(result),
         "response/points": _joined(
             [*map(points_of, curves), *map(linear_points, result.response.limits)]
@@ -307,6 +326,12 @@ def _best_load(result: pipeline.Run) -> dict[str, pd.DataFrame]:
         lowest = min((b for b in best if not b.reason), key=lambda b: b.amplitude)
         found["response/influences"] = influence_table(result.response.influences, lowest)
     return found
+
+
+def _damper_masses(result: pipeline.Run) -> dict[str, pd.DataFrame]:
+    """The damper that makes each load, where friction takes part in the seating."""
+    masses = result.contact.masses
+    return {"contact/damper_mass": pd.DataFrame(map(asdict, masses))} if masses else {}
 
 
 def _by_mass(points: pd.DataFrame) -> list[tuple[str, pd.DataFrame]]:

@@ -31,6 +31,7 @@ def answer(
     summary: pd.DataFrame | None,
     points: pd.DataFrame | None = None,
     own: pd.DataFrame | None = None,
+    masses: pd.DataFrame | None = None,
     searched: pd.DataFrame | None = None,
 ) -> Answer:
     """The best load and what it brings; no optimum is named where the data cannot carry it.
@@ -43,6 +44,8 @@ def answer(
         points: response table, for the check that the peak lies inside the band.
         own: one row: mass [kg] of the damper, its speed [rad/s], the load [N] of a seat by that
             mass alone.
+        masses: one row a load where friction takes part in the seating: load [N] and the mass [kg]
+            that makes it, with its range lightest to heaviest.
         searched: one row a mass, what the exact search for the best load found
             (``best_load.best_load_table``); without it the best of the loads studied is named.
     """
@@ -87,7 +90,7 @@ def answer(
     elif energy(best):
         numbers.append(("friction work per cycle there", energy(best).split(" of ")[0], ""))
     return Answer(
-        [*numbers, *stress(summary, best), *own_mass(finite, best, own)],
+        [*numbers, *stress(summary, best), *own_mass(finite, best, own, masses)],
         cautions(finite, best, points, found is not None),
     )
 
@@ -131,7 +134,10 @@ def stress(summary: pd.DataFrame, best: pd.Series) -> list[tuple[str, str, str]]
 
 
 def own_mass(
-    finite: pd.DataFrame, best: pd.Series, own: pd.DataFrame | None
+    finite: pd.DataFrame,
+    best: pd.Series,
+    own: pd.DataFrame | None,
+    masses: pd.DataFrame | None = None,
 ) -> list[tuple[str, str, str]]:
     """What the damper does as it is, pressed by its own mass, and which mass would press it
     best.
@@ -152,11 +158,7 @@ def own_mass(
             f"{load:.4g} N",
             f"{1e3 * mass:.3g} g at {speed * 30 / np.pi:.5g} rpm; {there}",
         ),
-        (
-            "mass that makes the optimum load",
-            f"{1e3 * mass * best['load'] / load:.3g} g",
-            "at the same speed",
-        ),
+        ("mass that makes the optimum load", *best_mass(best, mass / load, masses)),
     ]
 
 
@@ -169,6 +171,22 @@ def assumed_stiffness(scene: Scene) -> list[str]:
         "while metal joints lie between 1000 and 100 000 N/mm^3. Give contact.kt_area; "
         "docs/contact.md lists measurements."
     ]
+
+
+def best_mass(best: pd.Series, each: float, masses: pd.DataFrame | None) -> tuple[str, str]:
+    """The mass for the best load, with its band where friction takes part in the seating.
+
+    Args:
+        each: mass for each newton on a seat [kg/N].
+    """
+    if masses is None or not (masses["load"] == best["load"]).any():
+        return f"{1e3 * each * best['load']:.3g} g", "at the same speed"
+    row = masses.loc[masses["load"] == best["load"]].iloc[0]
+    return (
+        f"{1e3 * row['mass']:.3g} g",
+        f"at the same speed; {1e3 * row['lightest']:.3g} to {1e3 * row['heaviest']:.3g} g over all "
+        "friction forces that could be left in the seats",
+    )
 
 
 def wrong_speed(scene: Scene, summary: pd.DataFrame | None) -> list[str]:

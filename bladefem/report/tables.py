@@ -33,9 +33,26 @@ COLUMNS = {
     "frequency": Column("frequency", "Hz"),
     "engine_order": Column("engine order"),
     "amplitude": Column("amplitude", "m", "µm", 1e6),
+    "tuned_amplitude": Column("tuned wheel", "m", "µm", 1e6),
+    "highest_amplitude": Column("highest blade", "m", "µm", 1e6),
+    "highest_blade": Column("its number"),
+    "amplification": Column("over the tuned wheel", "1", digits=4),
+    "amplification_free": Column("the same without dampers", "1", digits=4),
+    "deviation": Column("deviation of frequency", "1", "%", 100.0, 3),
+    "blade": Column("blade"),
+    "wheels": Column("wheels"),
+    "worst": Column("worst wheel", "1", digits=4),
+    **{
+        f"p{share}{end}": Column(f"{share} %{title}", "1", digits=4)
+        for share in (50, 95, 99)
+        for end, title in (("", " of wheels below"), ("_low", " from"), ("_high", " to"))
+    },
     "mass": Column("damper mass", "kg", "g", 1e3),
     "peak_frequency": Column("resonance", "Hz"),
     "peak_amplitude": Column("resonance amplitude", "m", "µm", 1e6),
+    "frictionless": Column("mass without friction", "kg", "g", 1e3),
+    "lightest": Column("lightest by friction", "kg", "g", 1e3),
+    "heaviest": Column("heaviest by friction", "kg", "g", 1e3),
     "lowest": Column("lowest by history", "m", "µm", 1e6),
     "highest": Column("highest by history", "m", "µm", 1e6),
     "interval": Column("range by history is"),

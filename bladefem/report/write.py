@@ -37,6 +37,7 @@ __all__ = ["SECTIONS", "Page", "inputs_hash", "write_report"]
 SECTIONS = {
     "answer": "Answer",
     "response": "Forced response",
+    "wheel": "Mistuned wheel",
     "contact": "Contact",
     "modes": "Modes",
     "mesh": "Mesh",
@@ -204,7 +205,7 @@ def _answer(scene: Scene, tables: Mapping[str, pd.DataFrame], page: Page) -> dic
         return {"numbers": list(page.numbers or ()), "steps": list(page.steps)}
     own = tables.get("contact/own_load")
     searched = tables.get("response/best_load")
-    found = answer(summary, points, own, searched)
+    found = answer(summary, points, own, tables.get("contact/damper_mass"), searched)
     cautions = [*assumed_stiffness(scene), *wrong_speed(scene, summary), *found.cautions]
     steps = next_steps(scene, cautions, summary, own)
     return {"numbers": headlines(found, summary, points, searched), "steps": [*steps, *page.steps]}

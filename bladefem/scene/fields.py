@@ -99,6 +99,8 @@ def convert(value: object, field: Field) -> Any:
         kind = next(k for k in get_args(kind) if k is not NoneType)
     if get_origin(kind) is tuple:
         return _tuple(value, get_args(kind), field)
+    if str in get_args(kind):
+        return _word_or_values(value, field)
     return _SCALARS[kind](value, field)
 
 
@@ -156,6 +158,20 @@ def split_values(text: str) -> list[str]:
     last = items[-1] if items else ""
     unit = last.lstrip("+-.0123456789eE_ ") if last[:1] in tuple("+-.0123456789") else ""
     return [f"{item} {unit}" if unit and item[-1] in "0123456789." else item for item in items]
+
+
+def _word_or_values(value: object, field: Field) -> Any:
+    """One of the choices of the field, or a list of numbers."""
+    choices = field.meta.get("choices") or ()
+    if isinstance(value, str) and value in choices:
+        return value
+    if isinstance(value, str) and not any(letter.isdigit() for letter in value):
+        raise InputError(
+            f"{field.name} = {shortened(repr(value))}: expected one of {', '.join(choices)}, or a "
+            f"list of values with units{_near(value, choices)}"
+        )
+    kind = next(k for k in get_args(field.kind) if get_origin(k) is tuple)
+    return _tuple(value, get_args(kind), field)
 
 
 def _items(value: object) -> list:

@@ -4,7 +4,8 @@ rho=4430 kg/m^3".
 
 from __future__ import annotations
 
-from dataclasses import replace
+from dataclasses import fields, replace
+from typing import Any
 
 from ..errors import InputError, suggestion
 from .fields import convert, field_at
@@ -36,13 +37,13 @@ def part_materials(scene: Scene) -> dict[str, Material]:
     return found
 
 
-def _value(item: str, text: str) -> tuple[str, float]:
+def _value(item: str, text: str) -> tuple[str, Any]:
     """One property."""
     name, _, value = (part.strip() for part in item.partition("="))
-    if name not in ("E", "nu", "rho"):
+    known = [each.name for each in fields(Material)]
+    if name not in known:
         raise InputError(
-            f"imported.materials = {text!r}: '{name}' is no property"
-            f"{suggestion(name, ('E', 'nu', 'rho'))}"
+            f"imported.materials = {text!r}: '{name}' is no property{suggestion(name, known)}"
         )
     return name, convert(
         value, field_at(f"material.blade.{name}")._replace(name=f"imported.materials, {name}")

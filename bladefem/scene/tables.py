@@ -30,6 +30,7 @@ __all__ = [
     "Imported",
     "Material",
     "Materials",
+    "Mistuning",
     "Model",
     "Operation",
     "Scene",
@@ -41,11 +42,31 @@ __all__ = [
 
 @dataclass(frozen=True)
 class Material:
-    """Linear elastic, isotropic. The default is a steel."""
+    """Linear elastic: isotropic, cubic (with G) or orthotropic. The default is a steel."""
 
     E: float = quantity(2.1e11, "Pa", 1e6, 1e13, "Young's modulus")
     nu: float = quantity(0.3, "1", -0.99, 0.499, "Poisson's ratio")
     rho: float = quantity(7850.0, "kg/m^3", 1.0, 3e4, "density")
+    G: float | None = quantity(
+        None,
+        "Pa",
+        1e6,
+        1e13,
+        "shear modulus of a cubic crystal, with E along its edges; isotropic when left out",
+    )
+    orthotropic: tuple[float, ...] | None = quantity(
+        None,
+        "1",
+        help="E1, E2, E3 [Pa], nu12, nu13, nu23, G12, G13, G23 [Pa] of an orthotropic solid, in "
+        "place of E, nu and G",
+    )
+    angles: tuple[float, float, float] = quantity(
+        (0.0, 0.0, 0.0),
+        "rad",
+        -2 * pi,
+        2 * pi,
+        "of the crystal: about the blade's x (radial), the new y, the new z",
+    )
 
 
 @dataclass(frozen=True)
@@ -122,6 +143,15 @@ class Contact:
         "coupled",
         choices=("coupled", "prescribed"),
         help="normal load follows the motion, or stays at its static value",
+    )
+    history: str | tuple[float, ...] = quantity(
+        "frictionless",
+        "rad/s",
+        0.0,
+        1e5,
+        choices=("frictionless", "spin-up"),
+        help="how the damper came to its seats: without friction; by spinning up from rest with "
+        "it; or through a list of speeds from rest, at last operation.speed",
     )
     crown: float | None = quantity(
         None, "m", 1e-3, 1e4, "radius of crowned seats along the engine axis; flat when left out"
@@ -221,6 +251,41 @@ class Study:
         False,
         help="also Floquet multipliers of the points of each curve, where normal loads "
         "follow the motion",
+    )
+
+
+@dataclass(frozen=True)
+class Mistuning:
+    """Blades that are not alike: a measured pattern, or a scatter; of wheels with all sectors."""
+
+    pattern: str | None = quantity(
+        None,
+        help="CSV file of relative deviations of blade-alone frequencies, one row a blade, one "
+        "column a family; relative to the scene file",
+    )
+    scatter: float | None = quantity(
+        None,
+        "1",
+        0.0,
+        0.3,
+        "relative standard deviation of the blade-alone frequencies; draws the pattern of a run "
+        "without a file, and those of 'bladefem scatter'",
+    )
+    friction: float = quantity(
+        0.0, "1", 0.0, 0.3, "relative standard deviation of the dampers' friction coefficients"
+    )
+    stiffness: float = quantity(
+        0.0, "1", 0.0, 0.3, "relative standard deviation of the dampers' contact stiffnesses"
+    )
+    load: float = quantity(
+        0.0, "1", 0.0, 0.3, "relative standard deviation of the dampers' normal loads"
+    )
+    seed: int = quantity(0, "1", 0, 1000000, "of the draws")
+    wheels: int = quantity(30, "1", 2, 100000, "drawn by 'bladefem scatter' for each load")
+    families: int = quantity(3, "1", 1, 10, "blade-alone modes that deviate")
+    orders: tuple[str, ...] | None = quantity(
+        None,
+        help="further engine orders, multiples of the first, as texts like '18: 0.3 N; 90 deg'",
     )
 
 
@@ -384,5 +449,6 @@ class Scene:
     operation: Operation = field(default_factory=Operation)
     excitation: Excitation = field(default_factory=Excitation)
     study: Study = field(default_factory=Study)
+    mistuning: Mistuning = field(default_factory=Mistuning)
     model: Model = field(default_factory=Model)
     solver: Solver = field(default_factory=Solver)

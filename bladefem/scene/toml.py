@@ -87,6 +87,11 @@ def scene_of(tables: dict[str, Any], folder: str | Path = ".") -> Scene:
         )
     if scene.kind == "imported" and scene.imported.file:
         scene = dataclasses.replace(scene, imported=_with_paths(scene.imported, Path(folder)))
+    if scene.mistuning.pattern:
+        whole = str((Path(folder) / scene.mistuning.pattern).resolve())
+        scene = dataclasses.replace(
+            scene, mistuning=dataclasses.replace(scene.mistuning, pattern=whole)
+        )
     validate(scene)
     return scene
 

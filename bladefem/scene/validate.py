@@ -22,6 +22,10 @@ from .validate_contact import contact_problems
 __all__ = ["refuse_given_mesh", "refuse_response", "validate"]
 
 
+# constants of an orthotropic solid
+CONSTANTS = 9
+
+
 def validate(scene: Scene) -> None:
     """Check every field and what must hold between them.
 
@@ -35,6 +39,7 @@ def validate(scene: Scene) -> None:
             convert(value_at(scene, field.name), field)
     problems = [
         *kind.conditions(scene),
+        *_crystals(scene),
         *_numerics(scene),
         *contact_problems(scene),
     ]
@@ -46,6 +51,17 @@ def validate(scene: Scene) -> None:
     if problems:
         raise InputError(problems[0])
     check_parameters(scene)
+
+
+def _crystals(scene: Scene) -> Iterator[str]:
+    """Nine constants make an orthotropic solid."""
+    for name in ("blade", "damper"):
+        constants = getattr(scene.material, name).orthotropic
+        if constants is not None and len(constants) != CONSTANTS:
+            yield (
+                f"material.{name}.orthotropic has {len(constants)} values, expected E1, E2, E3, "
+                "nu12, nu13, nu23, G12, G13, G23"
+            )
 
 
 def refuse_response(scene: Scene) -> None:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from math import atan, tan
 
 from .kinds import kind_named
 from .tables import Scene, Seat
@@ -29,6 +30,7 @@ def contact_problems(scene: Scene) -> Iterator[str]:
                         "map, expected only one of the two"
                     )
     yield from _interval(scene)
+    yield from _history(scene)
     shaped = [key for key in SHAPE if getattr(contact, key) is not None]
     if shaped and contact.bedded:
         yield (
@@ -46,6 +48,40 @@ def contact_problems(scene: Scene) -> Iterator[str]:
         yield (
             f"contact.{missing}: expected beside "
             f"contact.{'edge_radius' if missing == 'edge_width' else 'edge_width'}"
+        )
+
+
+def _history(scene: Scene) -> Iterator[str]:
+    """Histories that cannot press the damper on its seats, or leave it held by friction alone."""
+    contact = scene.contact
+    history = contact.history
+    if history == "frictionless":
+        return
+    name = f"contact.history = {history!r}"
+    if not isinstance(history, str):
+        name = "contact.history"
+        if min(history) == 0:
+            yield (
+                "contact.history: a speed of 0 rpm lifts the damper off its seats, which forgets "
+                "what came before; expected positive speeds"
+            )
+            return
+    if not kind_named(scene.kind).has_seats:
+        yield f"{name}: a scene of kind '{scene.kind}' has no two seats, expected 'frictionless'"
+        return
+    if not scene.operation.speed > 0:
+        yield f"{name}: operation.speed = 0 rpm presses nothing, expected a positive speed"
+    if contact.stiffness == "map":
+        yield f"{name}: expected contact.stiffness = 'given', friction acts on a layer known before"
+    both = [contact.mu if seat.mu is None else seat.mu for seat in (contact.left, contact.right)]
+    mu = min(both)
+    if not max(both) > 0:
+        yield f"{name}: contact.mu = 0 leaves no friction, expected 'frictionless'"
+    if scene.kind == "wedge sector" and tan(scene.damper.angle) <= mu:
+        yield (
+            f"damper.angle = {show(scene.damper.angle, 'rad')}: with contact.mu = {mu:g} friction "
+            f"alone holds the damper between its seats (self-locking up to {show(atan(mu), 'rad')})"
+            f", so that {name} does not tell its load; expected a larger angle"
         )
 
 

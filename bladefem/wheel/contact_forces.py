@@ -44,7 +44,8 @@ def contact_forces(
     """
     count, n, d, K = w.shape
     missing = 1 + elements.tangents - d
-    flat = w.reshape(count * n, d, K)
+    flat = w.reshape(count * n, d, K).copy()
+    flat[:, :, 0] += wheel.offset(elements).reshape(count * n, d)
     if missing:
         flat = np.concatenate([np.zeros((count * n, missing, K)), flat], axis=1)
     if samples:
@@ -53,8 +54,7 @@ def contact_forces(
         found = evaluate_exact(elements, flat)
     f = found.f[:, missing:].reshape(w.shape)
     p = f - wheel.springs[:, :, None] * w
-    if missing == 0:
-        p[:, :, 0, 0] -= np.maximum(elements.n0, 0.0).reshape(count, n)
+    p[..., 0] -= wheel.preload(elements)
     change = None
     if jacobian:
         change = found.dfdw[:, missing:, :, missing:].reshape(count, n, d * K, d * K).copy()

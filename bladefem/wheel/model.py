@@ -5,7 +5,7 @@ neighbours, the forces on all blades, and what differs from blade to blade.
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from functools import cached_property
 from typing import Any
 
@@ -13,6 +13,7 @@ import numpy as np
 
 from ..data import Elements, PortModel, RigidBody
 from ..errors import InputError
+from ..friction.law import select_elements
 from ..hbm.linear.bodies import Damping
 from ..reduction.assemble import pair_model
 
@@ -80,6 +81,8 @@ class Wheel:
     # see `hbm.model.ReducedModel`
     hold: float = 1e-3
     coupled: bool = True
+    # (n, tangents) friction force of one damper from which the law starts; elements.t0 when None [N]
+    start: np.ndarray | None = None
 
     def __post_init__(self) -> None:
         _check_wheel(self)
@@ -125,6 +128,28 @@ class Wheel:
         kn = e.kn.reshape(self.count, -1).mean(axis=0)
         tangents = np.repeat(kt[:, None], e.tangents, axis=1)
         return np.column_stack([kn, tangents]) if self.directions > e.tangents else tangents
+
+    def preload(self, elements: Elements) -> np.ndarray:
+        """(N, n, d) contact forces of the preload state [N]."""
+        force = np.zeros((len(elements.kt), self.directions))
+        first = self.directions - elements.tangents
+        if first:
+            force[:, 0] = np.maximum(elements.n0, 0.0)
+        force[:, first:] = elements.traction
+        return force.reshape(self.count, self.nodes, self.directions)
+
+    def offset(self, elements: Elements) -> np.ndarray:
+        """(N, n, d) mean displacement that makes the friction law start from its preload, see
+        `hbm.model.ReducedModel.offset` [m].
+        """
+        start = elements.traction
+        if self.start is not None:
+            start = np.tile(self.start, (self.count, 1))
+        kt = elements.kt[:, None]
+        moved = np.zeros((len(kt), self.directions))
+        tangential = moved[:, self.directions - elements.tangents :]
+        tangential[:] = np.divide(start, kt, out=np.zeros_like(start), where=kt > 0)
+        return moved.reshape(self.count, self.nodes, self.directions)
 
     @cached_property
     def kept(self) -> dict[Any, Any]:
@@ -222,7 +247,7 @@ def _spread(e: Elements, nodes: int, count: int) -> Elements:
         raise InputError(
             f"elements: {total} given, expected {nodes} for one damper or {nodes * count} for all"
         )
-    return replace(e, **{k: np.tile(getattr(e, k), count) for k in ("kt", "kn", "mu", "n0")})
+    return select_elements(e, np.tile(np.arange(nodes), count))
 
 
 def _size(body: PortModel, name: str) -> int:

@@ -8,16 +8,22 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from ..data import Elements
-from ..errors import InputError
+from ..errors import InputError, NotSolvedError
 from ..friction.fourier import to_complex, to_real
 from ..hbm.solver.newton import DEFAULTS, Options
 from .flexibility import WheelFlexibility, wheel_flexibility
 from .model import Pattern, Wheel, pattern_elements
 from .newton import WheelBalance, WheelNewton, evaluate_wheel, newton_wheel
+from .tuned import tuned_displacements
 
 __all__ = ["TUNED", "WheelSolution", "free_wheel", "solve_wheel", "stuck_wheel", "sweep_wheel"]
 
 TUNED = Pattern()
+# modal damping ratios within which a solved neighbour is the best start: resonances of a mistuned
+# wheel are that narrow
+NEIGHBOUR = 0.5
+# relative distance at which it is the same point, with other settings
+SAME = 1e-6
 # of the load homotopy: first share of the excitation, first and last factor to the next one, and
 # points before it is given up
 GENTLE = 0.02
@@ -77,7 +83,7 @@ def solve_wheel(
     Args:
         samples: time samples a period; 0 locates the transitions of 1-D elements exactly.
         pattern: what differs from blade to blade.
-        start: a solved neighbour; full stick when left out.
+        start: a solved neighbour; the tuned wheel when left out, or full stick.
 
     Returns:
         a WheelSolution whose `converged` and `reason` must be read.
@@ -91,24 +97,65 @@ def solve_wheel(
     elements = pattern_elements(wheel, pattern)
     stuck = _shaped(wheel, linear_motion(wheel, flex, "contact"))
     balance = WheelBalance(wheel, flex, elements, stuck, samples)
-    method = "newton"
-    begin = stuck if start is None else _fitted(start.w, wheel, H)
-    end = newton_wheel(balance, begin, options)
-    iterations = end.iterations
-    products = end.products
-    if not end.converged and start is not None:
-        end = newton_wheel(balance, stuck, options)
-        method = "newton from full stick"
-        iterations += end.iterations
-        products += end.products
-    if not end.converged and options.fallbacks:
-        eased = _homotopy(balance, options)
-        iterations += eased.iterations
-        products += eased.products
-        if eased.converged or eased.state.error < end.state.error:
-            end = eased
-            method = "load homotopy"
-    return _solution(balance, end, method, iterations, products)
+    end, method = _attempts(balance, start, options)
+    return _solution(balance, end, method)
+
+
+def _attempts(
+    balance: WheelBalance, start: WheelSolution | None, options: Options
+) -> tuple[WheelNewton, str]:
+    """The first attempt that converges, or the best one, with the cost of all."""
+    wheel = balance.wheel
+    H = balance.stuck.shape[3] // 2
+    omega = balance.flex.omega
+    tried: list[tuple[WheelNewton, str]] = []
+    ways = [
+        ("newton from the tuned wheel", lambda: _tuned(wheel, omega, H, balance.samples)),
+        ("newton from full stick", lambda: balance.stuck),
+    ]
+    if wheel.coupled and options.fallbacks:
+        ways.append(("newton from held means", lambda: _held(balance, options)))
+    if start is not None:
+        fitted = _fitted(start.w, wheel, H)
+        close = abs(start.omega / omega - 1) < max(NEIGHBOUR * np.max(wheel.damping.ratio), SAME)
+        ways.insert(0 if close else len(ways), ("newton", lambda: fitted))
+    for name, attempt in ways:
+        begin = attempt()
+        if begin is None:
+            continue
+        tried.append((newton_wheel(balance, begin, options), name))
+        if tried[-1][0].converged or not options.fallbacks:
+            break
+    if not tried[-1][0].converged and options.fallbacks:
+        tried.append((_homotopy(balance, options), "load homotopy"))
+    end, method = min(tried, key=lambda t: (not t[0].converged, t[0].state.error))
+    iterations = sum(t[0].iterations for t in tried)
+    products = sum(t[0].products for t in tried)
+    return replace(end, iterations=iterations, products=products), method
+
+
+def _held(balance: WheelBalance, options: Options) -> np.ndarray | None:
+    """Displacements of the wheel whose means stay in the preload state: dampers that slip throughout
+    drift far on nearly no force, which hides the way to the solution.
+    """
+    key = "held means"
+    wheel = balance.wheel
+    if key not in wheel.kept:
+        wheel.kept[key] = replace(wheel, coupled=False)
+    flex = replace(balance.flex, coupled=False)
+    stuck = balance.stuck.copy()
+    stuck[..., 0] = 0.0
+    held = replace(balance, wheel=wheel.kept[key], flex=flex, stuck=stuck)
+    end = newton_wheel(held, stuck, replace(options, fallbacks=False))
+    return end.state.w if end.converged else None
+
+
+def _tuned(wheel: Wheel, omega: float, H: int, samples: int) -> np.ndarray | None:
+    """Displacements of the tuned wheel, or None."""
+    try:
+        return tuned_displacements(wheel, omega, H, samples)
+    except NotSolvedError:
+        return None
 
 
 def sweep_wheel(
@@ -202,9 +249,7 @@ def _predicted(path: list[tuple[float, np.ndarray]], share: float, stuck: np.nda
     return w + (share - last) / (last - before) * (w - v)
 
 
-def _solution(
-    balance: WheelBalance, end: WheelNewton, method: str, iterations: int, products: int
-) -> WheelSolution:
+def _solution(balance: WheelBalance, end: WheelNewton, method: str) -> WheelSolution:
     wheel = balance.wheel
     flex = balance.flex
     state = end.state
@@ -221,8 +266,8 @@ def _solution(
         end.converged,
         end.reason,
         method,
-        iterations,
-        products,
+        end.iterations,
+        end.products,
         state.error,
         state.forces.shares,
         state.forces.dissipated.sum(axis=1),

@@ -7,6 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from scipy import stats
@@ -16,6 +17,7 @@ from ..hbm.linear.bodies import modal_flexibility
 from ..hbm.model import ReducedModel
 from ..hbm.solve import solve
 from ..hbm.solver.newton import DEFAULTS, Options
+from ..util.progress import Progress, unwatched
 from .model import Pattern, Wheel
 from .one_body import one_body_model
 from .resonance import Respond, WheelPeak, find_wheel_peak
@@ -95,19 +97,21 @@ def quantile(sample: np.ndarray, share: float, confidence: float = CONFIDENCE) -
 def scatter_statistics(
     wheels: Mapping[float, Wheel],
     patterns: Mapping[float, Sequence[Pattern]],
-    grid: Callable[[float], np.ndarray],
+    grid: Callable[[float, Pattern], np.ndarray],
     respond: Callable[[Wheel, Pattern], Respond],
-    comm: object = None,
+    comm: Any = None,
     tolerance: float = 5e-3,
+    progress: Progress = unwatched,
 ) -> Amplification:
     """Peaks of all patterns under all loads; wheels are dealt out over the ranks.
 
     Args:
         wheels: damper load [N] to the tuned wheel under it.
         patterns: damper load to the patterns, as many for each.
-        grid: damper load to the first circular frequencies of the search.
+        grid: damper load and pattern to the first circular frequencies of the search.
         respond: what solves one pattern at one frequency.
         tolerance: relative error of a peak's height by the search.
+        progress: wraps the list of wheels of this rank.
     """
     loads = list(wheels)
     sizes = {len(patterns[load]) for load in loads}
@@ -120,10 +124,11 @@ def scatter_statistics(
     for i, load in enumerate(loads):
         wheel = wheels[load]
         mine = range(rank, shape[1], ranks)
-        reference = find_wheel_peak(respond(wheel, TUNED), grid(load), tolerance)
+        reference = find_wheel_peak(respond(wheel, TUNED), grid(load, TUNED), tolerance)
         tuned[:, i] = reference.height, reference.omega
-        for j in mine:
-            peak = find_wheel_peak(respond(wheel, patterns[load][j]), grid(load), tolerance)
+        for j in progress(list(mine), f"wheels under {load:g} N", len(mine)):
+            pattern = patterns[load][j]
+            peak = find_wheel_peak(respond(wheel, pattern), grid(load, pattern), tolerance)
             row = (peak.height, peak.blade, peak.omega, peak.unsolved, len(peak.omegas))
             for part, value in zip(parts, row, strict=True):
                 part[i, j] = value

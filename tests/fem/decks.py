@@ -5,7 +5,7 @@ them are solved by CalculiX too (``benchmarks/fem_decks.py``).
 from dataclasses import dataclass
 
 import numpy as np
-from structured import sector
+from structured import box, sector
 
 from geometry.topology import EDGES, FAMILY, facet_nodes
 
@@ -161,6 +161,47 @@ def ccx_job(m, diameters, count, element_type=None):
             f"*SELECT CYCLIC SYMMETRY MODES, NMIN={diameters[0]}, NMAX={diameters[-1]}",
             "*END STEP\n",
         ]
+    )
+
+
+# CMSX-4 like cubic crystal, and nine constants of no symmetry; angles of the axes [rad]
+CRYSTALS = {
+    "cubic": {"E": 1.28e11, "nu": 0.38, "G": 1.3e11, "rho": 8700.0, "angles": (0.2, -0.35, 0.6)},
+    "orthotropic": {
+        "orthotropic": (2.0e11, 1.2e11, 0.8e11, 0.28, 0.22, 0.31, 0.7e11, 0.5e11, 0.4e11),
+        "rho": 8200.0,
+        "angles": (0.5, 0.1, -0.3),
+    },
+}
+
+
+def crystal_job(m, constants, axes, rho, count):
+    """A clamped bar of an orthotropic solid for CalculiX; ``axes`` (3, 3) are its own axes in
+    columns.
+    """
+    E1, E2, E3, nu12, nu13, nu23, G12, G13, G23 = constants
+    first = [f"{v:.15g}" for v in (E1, E2, E3, nu12, nu13, nu23, G12, G13)]
+    return "\n".join(
+        [
+            *flat_deck(m, {}),
+            *["*ORIENTATION, NAME=OR, SYSTEM=RECTANGULAR"],
+            ", ".join(f"{v:.15f}" for v in [*axes[:, 0], *axes[:, 1]]),
+            *["*MATERIAL, NAME=CRYSTAL", "*ELASTIC, TYPE=ENGINEERING CONSTANTS"],
+            *[", ".join(first), f"{G23:.15g}", "*DENSITY", f"{rho}"],
+            "*SOLID SECTION, ELSET=EALL, MATERIAL=CRYSTAL, ORIENTATION=OR",
+            *["*BOUNDARY", "clamp, 1, 3", "*STEP", "*FREQUENCY", str(count), "*END STEP\n"],
+        ]
+    )
+
+
+def bar():
+    """A clamped bar of 10-node tetrahedra, its mesh and its model."""
+    mesh = box((8, 2, 2), (0.12, 0.03, 0.02), "tetra10")
+    return mesh, Model(
+        mesh.points,
+        [("tetra10", mesh.bodies["blade"])],
+        {"clamp": np.unique(mesh.faces["clamp"])},
+        mesh.faces,
     )
 
 

@@ -75,7 +75,7 @@ def is_drawing(scene: Scene) -> bool:
 
 KIND = Kind(
     name="imported",
-    tables=("imported", "damper", *ENGINE_TABLES),
+    tables=("imported", "damper", "mistuning", *ENGINE_TABLES),
     builder="geometry.imported:read_geometry",
     shape=("imported", "mesh", "damper"),
     runner="bladefem.report.run:run",

@@ -79,7 +79,7 @@ def outer_radii(scene: Scene) -> dict[str, float]:
 
 KIND = Kind(
     name="wedge sector",
-    tables=("aerofoil", "platform", "shank", "disc", "damper", *ENGINE_TABLES),
+    tables=("aerofoil", "platform", "shank", "disc", "damper", "mistuning", *ENGINE_TABLES),
     builder="geometry.sector:wedge_sector",
     shape=("aerofoil", "platform", "shank", "disc", "damper", "mesh"),
     runner="bladefem.report.run:run",

@@ -17,6 +17,7 @@ from geometry.mesh import Mesh
 from geometry.parameters import MeshSize
 from geometry.sizing import ALONG
 
+from ...contact.frictional_seating import normal_part
 from ...contact.seating import solve as seat
 from ...errors import NotSolvedError
 from ...hbm.sweep import size as height
@@ -27,12 +28,14 @@ from ..adaptive.check_points import peak_of
 from ..adaptive.choice import covered
 from ..adaptive.family import member
 from ..adaptive.settings import Settings
+from ..pipeline.history import FRICTIONLESS, condense_friction, seat_by_history
 from ..pipeline.pipeline import EXACT_HARMONICS, Seating, family_of_case, load_cases
 from ..pipeline.stages import (
     Bodies,
     build_mesh,
     contact_patches,
     harmonic_diameters,
+    on_layer,
     reduce_sector,
     seat_damper,
 )
@@ -153,8 +156,13 @@ def _resonance(scene: Scene, settings: Settings, load: float, comm: Any) -> Reso
     mesh = build_mesh(scene, comm)
     bodies = Bodies(scene, mesh, comm)
     patches = contact_patches(mesh)
-    problem = seat_damper(bodies, patches)
-    maps = seat(problem, scene.operation.speed, normal=load, bedded=scene.contact.bedded)
+    if scene.contact.history == FRICTIONLESS:
+        problem = seat_damper(bodies, patches)
+        maps = seat(problem, scene.operation.speed, normal=load, bedded=scene.contact.bedded)
+    else:
+        rough = condense_friction(bodies, patches)
+        problem = on_layer(scene, normal_part(rough))
+        maps = seat_by_history(scene, rough, load).maps
     case = load_cases(scene, mesh, Seating(problem, {load: maps}))[0]
     diameters = harmonic_diameters(scene, mesh, EXACT_HARMONICS)
     reduced = reduce_sector(bodies, patches, diameters, settings.modes)

@@ -42,6 +42,7 @@ def joint_model(
     case: LoadCase,
     harmonics: int,
     damper: str,
+    sides: tuple[PortModel, ...] | None = None,
 ) -> ReducedModel:
     """The balance's model of one load case.
 
@@ -52,10 +53,12 @@ def joint_model(
     Args:
         damper: "mass" (the paper's: tangential motion only, prescribed normal load), "rigid" or
             "elastic".
+        sides: blade sides in pair coordinates, in place of those of the engine order's harmonics.
     """
     pick = case.selection.T.toarray()
     whole = pick.shape[0] == pick.shape[1]
-    sides = _sides(scene, reduced, harmonics)
+    if sides is None:
+        sides = _sides(scene, reduced, harmonics)
     elements = case.elements
     if not whole:
         sides = tuple(recombine(side, pick) for side in sides)

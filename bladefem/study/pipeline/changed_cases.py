@@ -6,6 +6,7 @@ from collections.abc import Callable
 from dataclasses import replace
 from functools import lru_cache
 
+from ...contact.frictional_seating import FrictionalProblem
 from ...contact.interface_elements import (
     friction_elements,
     layered,
@@ -16,24 +17,33 @@ from ...contact.seating import ContactProblem
 from ...contact.seating import solve as seat
 from ...scene.tables import Contact, Scene, Seat
 from .assemble_model import LoadCase
+from .history import seat_by_history
 
 __all__ = ["cases_of", "changed_cases"]
 
 
 def cases_of(
-    scene: Scene, problem: ContactProblem, tangents: int, mass: float | None = None
+    scene: Scene,
+    problem: ContactProblem,
+    tangents: int,
+    mass: float | None = None,
+    rough: FrictionalProblem | None = None,
 ) -> Callable[[float], LoadCase]:
     """Mean normal load of a seat [N] -> the seated damper's friction elements.
 
     Args:
         problem: with the scene's interface layer.
         tangents: 2 for solids, 1 for plane models.
+        rough: all ports of the seats, where friction takes part in the seating.
     """
     ratio = pair_ratio(scene.material.blade, scene.material.damper)
 
     def case_at(load: float) -> LoadCase:
-        speed = scene.operation.speed
-        maps = seat(problem, speed, normal=load, bedded=scene.contact.bedded)
+        if rough is None:
+            speed = scene.operation.speed
+            maps = seat(problem, speed, normal=load, bedded=scene.contact.bedded)
+        else:
+            maps = seat_by_history(scene, rough, load).maps
         elements, selection = friction_elements(problem, maps, scene.contact, ratio, tangents)
         return LoadCase(load, elements, selection, mass)
 
@@ -41,7 +51,11 @@ def cases_of(
 
 
 def changed_cases(
-    scene: Scene, problem: ContactProblem, tangents: int, mass: float | None = None
+    scene: Scene,
+    problem: ContactProblem,
+    tangents: int,
+    mass: float | None = None,
+    rough: FrictionalProblem | None = None,
 ) -> Callable[[str, float], Callable[[float], LoadCase]]:
     """Name of a parameter and its factor -> the load cases with it.
 
@@ -59,7 +73,7 @@ def changed_cases(
         else:
             contact = scene.contact
         there = replace(scene, contact=contact)
-        case_at = cases_of(there, layered(problem, contact, ratio), tangents, mass)
+        case_at = cases_of(there, layered(problem, contact, ratio), tangents, mass, rough)
         by_load = factor if name == "seat friction" else 1.0
 
         @lru_cache(maxsize=64)

@@ -17,6 +17,7 @@ import numpy as np
 
 from geometry.mesh import Mesh
 
+from ...contact.frictional_seating import FrictionalProblem, normal_part
 from ...contact.interface_elements import friction_elements, pair_ratio
 from ...contact.peak_pressure import peak_remarks
 from ...contact.seating import ContactProblem
@@ -46,6 +47,16 @@ from .best_load import BestLoad, chart_loads, find_best_load
 from .changed_cases import cases_of, changed_cases
 from .contact_cycle import labels
 from .damped_motion import DampedStress, damped_stress
+from .history import (
+    FRICTIONLESS,
+    DamperMass,
+    coarse_history,
+    condense_friction,
+    damper_masses,
+    history_sentence,
+    refuse_jamming,
+    seat_by_history,
+)
 from .liftoff import named
 from .linear_limits import Limit, linear_limits
 from .load_interval import interval_sentence
@@ -94,6 +105,10 @@ class Seating:
     maps: dict[float, list[PressureMap]]
     # that load by the damper's own mass at the operating speed [N]
     own: float | None = None
+    # the damper that makes each load, where friction takes part in the seating
+    masses: tuple[DamperMass, ...] = ()
+    # all ports of the seats, where friction takes part in the seating
+    rough: FrictionalProblem | None = None
 
 
 @dataclass(frozen=True, repr=False)
@@ -136,6 +151,8 @@ class Run:
     strength: Strength | None = None
     reduced: Reduced | None = None
     response: Response | None = None
+    # study.mistuning.pattern_response.PatternResponse of each load; None where all blades are alike
+    wheel: list[Any] | None = None
     # at the resonance of each curve, in their order
     damped: list[DampedStress] | None = None
     # stage to seconds
@@ -200,6 +217,8 @@ def run(
         return result
     check_blade(scene, mesh)
     patches = [] if until == "modes" else found_patches(scene, mesh, excited=until in STAGES[3:])
+    if patches:
+        refuse_jamming(scene, mesh, patches)
     bodies = Bodies(scene, mesh, comm, progress)
     with clock("modes"):
         result = replace(
@@ -210,12 +229,8 @@ def run(
     if until == "modes":
         return result
     with clock("contact"):
-        bare = keep(
-            "contact", stage_key("contact", scene), lambda: condense_contact(bodies, patches)
-        )
-        problem = on_layer(scene, bare)
-        own = _own_load(scene, problem, clock.messages)
-        maps = seated_maps(scene, problem, studied_loads(scene, own))
+        seating = _seated(scene, bodies, patches, keep, clock)
+        maps = seating.maps
         if mesh.dimension == 2:
             clock.messages.extend(
                 map(
@@ -224,7 +239,7 @@ def run(
                 )
             )
         clock.messages.extend(map(warning, peak_remarks(maps, scene, mesh.depth)))
-        result = replace(result, contact=Seating(problem, maps, own))
+        result = replace(result, contact=seating)
     if until == "contact":
         return result
     with clock("stresses"):
@@ -248,12 +263,12 @@ def run(
         best = _best_loads(scene, mesh, result.contact, family, settings, keep)
         clock.messages.extend(_best_remarks(scene, best))
     if scene.study.loads is None and best and not any(b.reason for b in best):
-        maps = seated_maps(scene, problem, studied_loads(scene, own, chart_loads(best)))
-        result = replace(result, contact=replace(result.contact, maps=maps))
+        loads = studied_loads(scene, result.contact.own, chart_loads(best))
+        result = replace(result, contact=_at_loads(scene, result.contact, loads, clock))
         cases = load_cases(scene, mesh, result.contact)
     response = _response(scene, cases, family, settings, keep, clock, progress)
     with clock("influences"):
-        hangs_on = _influences(scene, mesh, problem, family, best, keep)
+        hangs_on = _influences(scene, mesh, result.contact, family, best, keep)
     result = replace(result, response=replace(response, best=best, influences=hangs_on))
     with clock("stresses"):
         stressed = keep(
@@ -361,14 +376,53 @@ def _name(case: LoadCase) -> str:
     return f"{case.load:g}N" + ("" if case.mass is None else f"_{1e3 * case.mass:g}g")
 
 
-def _own_load(scene: Scene, problem: ContactProblem, messages: list[str]) -> float | None:
+def _seated(
+    scene: Scene, bodies: Bodies, patches: list[Patch], keep: _Keeper, clock: Clock
+) -> Seating:
+    """The damper on its seats under every load, without friction or after the scene's history."""
+    key = stage_key("contact", scene)
+    rough = None
+    if scene.contact.history == FRICTIONLESS:
+        bare = keep("contact", key, lambda: condense_contact(bodies, patches))
+    else:
+        rough = keep("contact_friction", key, lambda: condense_friction(bodies, patches))
+        bare = normal_part(rough)
+    problem = on_layer(scene, bare)
+    own = _own_load(scene, problem, rough, clock.messages)
+    return _at_loads(
+        scene, Seating(problem, {}, own, rough=rough), studied_loads(scene, own), clock
+    )
+
+
+def _at_loads(scene: Scene, seating: Seating, loads: Iterable[float], clock: Clock) -> Seating:
+    """The seats under some loads."""
+    rough = seating.rough
+    if rough is None:
+        speed = scene.operation.speed
+        bedded = scene.contact.bedded
+        maps = {load: seat(seating.problem, speed, normal=load, bedded=bedded) for load in loads}
+        return replace(seating, maps=maps)
+    seated = {load: seat_by_history(scene, rough, load) for load in loads}
+    masses = damper_masses(scene, rough, seated)
+    clock.messages.append(history_sentence(masses))
+    clock.messages.extend(map(warning, coarse_history(seated)))
+    maps = {load: found.maps for load, found in seated.items()}
+    return replace(seating, maps=maps, masses=tuple(masses))
+
+
+def _own_load(
+    scene: Scene, problem: ContactProblem, rough: FrictionalProblem | None, messages: list[str]
+) -> float | None:
     """Mean normal load of a seat [N] by the damper's mass at the operating speed; None when nothing
     presses it.
     """
     if not scene.operation.speed > 0:
         return None
     try:
-        maps = seat(problem, scene.operation.speed, bedded=scene.contact.bedded)
+        if rough is None:
+            maps = seat(problem, scene.operation.speed, bedded=scene.contact.bedded)
+        else:
+            maps = seat_by_history(scene, rough, None).maps
     except NotSolvedError as error:
         messages.append(warning(f"the damper's own centrifugal load does not seat it: {error}"))
         return None
@@ -378,16 +432,6 @@ def _own_load(scene: Scene, problem: ContactProblem, messages: list[str]) -> flo
         f"{show(scene.operation.speed, 'rad/s')}"
     )
     return own
-
-
-def seated_maps(
-    scene: Scene, problem: ContactProblem, loads: Iterable[float]
-) -> dict[float, list[PressureMap]]:
-    """The seated damper under each mean normal load of a seat [N]."""
-    return {
-        load: seat(problem, scene.operation.speed, normal=load, bedded=scene.contact.bedded)
-        for load in loads
-    }
 
 
 def _best_loads(
@@ -403,7 +447,7 @@ def _best_loads(
         return ()
 
     def search(mass: float | None) -> BestLoad:
-        case_at = cases_of(scene, contact.problem, mesh.dimension - 1, mass)
+        case_at = cases_of(scene, contact.problem, mesh.dimension - 1, mass, contact.rough)
         return find_best_load(scene, case_at, family, settings, mass)
 
     def compute() -> list[BestLoad]:
@@ -418,7 +462,7 @@ def _best_loads(
 def _influences(
     scene: Scene,
     mesh: Mesh,
-    problem: ContactProblem,
+    contact: Seating,
     family: Callable[[LoadCase], Family],
     best: tuple[BestLoad, ...],
     keep: _Keeper,
@@ -428,7 +472,7 @@ def _influences(
     if not found or not scene.study.influences:
         return ()
     lowest = min(found, key=lambda b: b.amplitude)
-    changed = changed_cases(scene, problem, mesh.dimension - 1, lowest.mass)
+    changed = changed_cases(scene, contact.problem, mesh.dimension - 1, lowest.mass, contact.rough)
     angle = scene.damper.angle if scene.kind == "wedge sector" else None
     parameters = parameters_of(scene, angle)
 

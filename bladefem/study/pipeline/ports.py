@@ -47,14 +47,21 @@ def named_nodes(mesh: Mesh, name: str) -> np.ndarray:
     )
 
 
-def blade_ports(mesh: Mesh, patches: list[Patch], excitation: Excitation) -> Ports:
+def blade_ports(
+    mesh: Mesh, patches: list[Patch], excitation: Excitation, readings: np.ndarray | None = None
+) -> Ports:
     """Contact ports of all patches on the blade side, one load and one probe port along the
     excitation.
+
+    Args:
+        readings: (n_points*dim, q) columns of one more port, "blade".
     """
     contact = port_matrix(patches, mesh, "blade") if patches else None
     nodes = named_nodes(mesh, excitation.at)
     load = _mean_displacement(mesh, nodes, np.asarray(excitation.direction, dtype=float))
-    return _stack({"contact": contact, "load": load, "probe": load})
+    blade = None if readings is None else sp.csc_matrix(readings)
+    blocks = {"contact": contact, "load": load, "probe": load}
+    return _stack(blocks if blade is None else {**blocks, "blade": blade})
 
 
 def damper_ports(mesh: Mesh, patches: list[Patch]) -> Ports:

@@ -38,6 +38,7 @@ __all__ = [
     "is_wheel",
     "on_layer",
     "reduce_sector",
+    "seat_clearance",
     "seat_damper",
     "wheel_modes",
 ]
@@ -304,15 +305,20 @@ def on_layer(scene: Scene, problem: Any) -> Any:
 
 def condense_contact(bodies: Bodies, patches: list[Patch]) -> Any:
     """The contact problem of rigid faces: all that takes finite elements."""
-    from ...contact.face_profile import seat_gap
     from ...contact.seating import contact_problem
+
+    gap = seat_clearance(bodies, patches)
+    return contact_problem(bodies.mesh, patches, bodies.still, bodies.damper, gap)
+
+
+def seat_clearance(bodies: Bodies, patches: list[Patch]) -> np.ndarray:
+    """(n,) gap of the seats beside that of the mesh: their shape, and the clearance [m]."""
+    from ...contact.face_profile import seat_gap
 
     scene = bodies.scene
     gap = np.concatenate([seat_gap(patch, bodies.mesh, scene.contact) for patch in patches])
     # a wedge that was drawn here has its clearance in the mesh
-    if scene.kind == "imported":
-        gap = gap + scene.damper.clearance
-    return contact_problem(bodies.mesh, patches, bodies.still, bodies.damper, gap)
+    return gap + scene.damper.clearance if scene.kind == "imported" else gap
 
 
 def harmonic_diameters(scene: Scene, mesh: Mesh, harmonics: int) -> list[int]:
@@ -327,20 +333,25 @@ def harmonic_diameters(scene: Scene, mesh: Mesh, harmonics: int) -> list[int]:
 
 
 def reduce_sector(
-    bodies: Bodies, patches: list[Patch], diameters: Sequence[int], modes: int
+    bodies: Bodies,
+    patches: list[Patch],
+    diameters: Sequence[int],
+    modes: int,
+    readings: np.ndarray | None = None,
 ) -> Reduced:
     """Blade side in each nodal diameter and damper side, at the contact, load and probe ports.
 
     Args:
         patches: "this" and "next".
         modes: modes kept in each nodal diameter.
+        readings: (n_points*dim, q) columns of the port "blade", where blades are to be mistuned.
     """
     from ...fem.loads import mass
     from ...fem.ports import port_model
 
     scene = bodies.scene
     mesh = bodies.mesh
-    ports = blade_ports(mesh, patches, scene.excitation)
+    ports = blade_ports(mesh, patches, scene.excitation, readings)
     other = damper_ports(mesh, patches)
     solver = eigensolver(scene)
     if is_wheel(mesh):

@@ -1,0 +1,89 @@
+"""bladefem look FILE: what a mesh file holds, on the terminal, as a picture, as a scene to start
+from.
+"""
+
+from __future__ import annotations
+
+import argparse
+from pathlib import Path
+from typing import Any
+
+from ..errors import InputError
+from .tables import plain
+
+__all__ = ["add_look", "look"]
+
+# faces in the table
+LISTED = 24
+
+
+def add_look(sub: argparse.ArgumentParser) -> None:
+    """The command's arguments."""
+    sub.add_argument("file", help="mesh or STEP file, such as sector.inp, .cdb, .bdf, .msh, .step")
+    sub.add_argument("--view", metavar="PNG", help="draw the numbered faces into this file")
+    sub.add_argument(
+        "--scene",
+        metavar="TOML",
+        nargs="?",
+        const="",
+        help="write a scene to start from (default: beside the mesh file)",
+    )
+
+
+def look(options: argparse.Namespace, comm: Any) -> None:
+    """Print, draw and write what was asked for; rank 0 alone."""
+    from geometry.look import look_at, starting_scene
+
+    if comm is not None and comm.rank:
+        return
+    found = look_at(options.file)
+    print(described(found))
+    if options.view:
+        from ..view.look import draw_look
+
+        draw_look(found, options.view)
+        print(f"picture: {options.view}")
+    if options.scene is not None:
+        target = Path(options.scene) if options.scene else found.file.with_suffix(".toml")
+        if target.exists():
+            raise InputError(f"--scene {target}: the file is there already, expected another name")
+        target.write_text(starting_scene(found), encoding="utf-8")
+        print(f"scene: {target}")
+
+
+def described(found: Any) -> str:
+    """Everything in words and tables; lengths in the file's unit."""
+    size = found.box[1] - found.box[0]
+    cells = ", ".join(f"{count} {word}" for word, count in found.cells.items())
+    lines = [
+        f"cells: {cells}",
+        f"bodies: {len(found.bodies)} of {', '.join(map(str, found.bodies[:8]))} solid cells",
+        f"size: {size[0]:.6g} x {size[1]:.6g} x {size[2]:.6g} in the file's unit; "
+        f"scale = {found.scale:g} makes it {found.scale * size.max():.4g} m long (guessed)",
+        *found.raw.notes,
+    ]
+    if found.cut is not None:
+        lines.append(
+            f"cut faces: {' + '.join(found.cut.low)} -> {' + '.join(found.cut.high)}, "
+            f"{found.cut.sectors} sectors about {found.cut.axis}"
+        )
+    else:
+        lines.append("cut faces: none found; the nodes of two faces would match after one turn")
+    sets = [[name, what] for name, what in found.sets.items()]
+    faces = [
+        [
+            face.name,
+            str(face.facets),
+            f"{face.area:.5g}",
+            " ".join(f"{v:.4g}" for v in face.centre),
+            "plane" if face.plane else "curved",
+        ]
+        for face in found.faces[:LISTED]
+    ]
+    lines += [plain(sets, ["set", "holds"]), ""] if sets else ["no named sets", ""]
+    lines.append(plain(faces, ["face", "facets", "area", "centre", "shape"]))
+    if len(found.faces) > LISTED:
+        lines.append(f"and {len(found.faces) - LISTED} smaller faces")
+    if found.missing:
+        lines += ["", "not in the file:", *(f"  {sentence}" for sentence in found.missing)]
+    return "\n".join(lines)

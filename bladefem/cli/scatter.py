@@ -1,0 +1,56 @@
+"""The command that draws mistuned wheels: amplification of the highest blade for each load."""
+
+from __future__ import annotations
+
+import argparse
+from pathlib import Path
+from typing import Any
+
+from ..errors import InputError
+from . import tables
+from .commands import prepared, tell
+
+__all__ = ["scatter"]
+
+
+def scatter(options: argparse.Namespace, comm: Any) -> None:
+    """Statistics of many wheels, on top of the run's tuned responses."""
+    scene, folder, bars = prepared(options, comm, responds=True)
+    # before the tuned responses, which take minutes
+    if scene.mistuning.scatter is None:
+        raise InputError(
+            "mistuning.scatter: expected a relative standard deviation of the blades' frequencies, "
+            "such as '1 %', for 'bladefem scatter'"
+        )
+    from ..io.stage_cache import on_root
+    from ..report.wheel import scatter_sentences
+    from ..study.mistuning.stage import check_mistuning, scatter_of_run
+    from ..study.pipeline import pipeline
+
+    check_mistuning(scene)
+    run = pipeline.run(scene, folder, comm=comm, progress=bars)
+    found = scatter_of_run(run, comm, bars)
+    table, files = on_root(comm, lambda: _written(found, folder))
+    sentences = scatter_sentences(found)
+    tell(
+        options,
+        comm,
+        lambda: "\n".join(
+            [tables.frame(table), "", *sentences, f"written: {', '.join(map(str, files))}"]
+        ),
+    )
+
+
+def _written(found: Any, folder: Path) -> tuple[Any, list[Path]]:
+    """The table as text, and the files of the folder."""
+    from ..report.tables import readable, write_tables
+    from ..report.wheel import scatter_drawings, scatter_table
+
+    table = scatter_table(found)
+    write_tables(table, folder / "scatter", "scatter")
+    files = [folder / "scatter.csv"]
+    for name, draw in scatter_drawings(found).items():
+        file = folder / f"{name.split('/')[1]}.png"
+        draw(file)
+        files.append(file)
+    return readable(table), files

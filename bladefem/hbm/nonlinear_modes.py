@@ -1,0 +1,384 @@
+"""Nonlinear modes of blade and damper: frequency and damping against amplitude.
+
+Extended periodic motion (Krack 2015, doi:10.1016/j.compstruc.2015.03.008): a free motion is made
+periodic by an artificial negative damping -2 zeta omega M. With the amplitude a of one blade mode
+given, its own equation tells both unknowns,
+
+    omega^2 = omega_r^2 + Re(phi_r^H f_1) / a,      2 zeta omega^2 = Im(phi_r^H f_1) / a,
+
+and all other modes answer the contact forces through a flexibility without that mode, which is
+regular at the resonance: w_1 = phi_r a - G' f_1. zeta is the damping of friction alone.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from scipy import linalg
+
+from ..errors import InputError
+from ..friction.fourier import to_complex, to_real
+from .linear.bodies import Stack
+from .linear.condensation import condense
+from .linear.woodbury import bodies_of
+from .model import ReducedModel
+from .solver.residual import contact_forces
+from .validate_model import check_point
+
+__all__ = ["NonlinearMode", "force_at_resonance", "mode_response", "nonlinear_mode"]
+
+# Newton steps of one amplitude
+STEPS = 40
+# amplitudes put in between where Newton fails
+BETWEEN = (4, 16)
+# step share below which the search direction is given up
+SHORTEST = 2.0**-10
+# relative step of frequency and damping in differences of the flexibility
+DIFFERENCE = 1e-7
+# residual of the motion, relative to its size
+TOLERANCE = 1e-10
+# unknowns of the dense factorisation
+LARGEST = 6000
+
+
+@dataclass(frozen=True)
+class NonlinearMode:
+    """The motion at one amplitude: converged, or the best that was found, with the reason."""
+
+    # of the blade mode, first harmonic [m kg^1/2]
+    amplitude: float
+    # number of the blade mode, from 0
+    mode: int
+    # [rad/s]
+    omega: float
+    # share of critical damping by friction [1]
+    zeta: float
+    # (n, d, 2H+1) relative displacements [m]
+    w: np.ndarray
+    # (H+1, probes) complex amplitudes at the probes [m]
+    probe: np.ndarray
+    converged: bool
+    reason: str
+    iterations: int
+    # relative to the size of the motion [1]
+    residual: float
+
+
+def nonlinear_mode(
+    model: ReducedModel,
+    amplitudes: Sequence[float],
+    mode: int = 0,
+    H: int = 3,
+    samples: int = 128,
+) -> Iterator[NonlinearMode]:
+    """Frequency and damping of one mode at growing amplitudes, each started from the one before.
+
+    Args:
+        model: its excitation and its damping are left out of account.
+        amplitudes: of the blade mode's first harmonic [m kg^1/2], above zero.
+        mode: number of the blade mode in the nodal diameter of harmonic 1, from 0.
+
+    Raises:
+        InputError: amplitudes, mode, H or samples are out of range, or there are too many unknowns.
+    """
+    own = model.side(1).omega
+    if not 0 <= mode < len(own) or not own[mode] > 0:
+        raise InputError(f"mode {mode}: expected an elastic mode from 0 to {len(own) - 1}")
+    check_point(model, float(own[mode]), max(H, *model.excitation, *model.normal), samples)
+    unknowns = model.springs.size * (2 * H + 1)
+    if unknowns > LARGEST:
+        raise InputError(
+            f"{unknowns} unknowns: expected at most {LARGEST}, fewer harmonics or nodes"
+        )
+    frame = _frame(model, mode, H, samples)
+    last = None
+    for amplitude in amplitudes:
+        if not 0 < amplitude < np.inf:
+            raise InputError(f"amplitude {amplitude}: expected a positive number")
+        last = _approached(frame, float(amplitude), last)
+        yield last
+
+
+def force_at_resonance(model: ReducedModel, point: NonlinearMode) -> float:
+    """Size of the modal force that keeps this motion up at its resonance, damping of the bodies
+    included [N kg^-1/2].
+    """
+    blades = model.blades(1)
+    own = blades.viscous[-1][point.mode] + blades.hysteretic[-1][point.mode] / point.omega
+    return float((2 * point.zeta * point.omega + own) * point.omega * point.amplitude)
+
+
+def mode_response(
+    model: ReducedModel, points: Sequence[NonlinearMode], omegas: np.ndarray
+) -> np.ndarray:
+    """(k, points) drive over the modal force at circular frequencies: 1 where that amplitude answers
+    the model's excitation.
+
+    The single nonlinear mode's equation |omega_n^2 - Omega^2 + 2i zeta omega_n Omega| a = |phi^H F|;
+    the forced response is the contour 1.
+    """
+    blades = model.blades(1)
+    force = blades.shapes[-1, blades.load].conj().T @ model.loads(1)[1]
+    found = np.empty((len(omegas), len(points)))
+    for i, p in enumerate(points):
+        own = blades.viscous[-1][p.mode] * omegas + blades.hysteretic[-1][p.mode]
+        Z = p.omega**2 - omegas**2 + 1j * (2 * p.zeta * p.omega * omegas + own)
+        found[:, i] = abs(Z) * p.amplitude / abs(force[p.mode])
+    return found
+
+
+@dataclass(frozen=True)
+class _Frame:
+    """What one mode's equations need at all amplitudes."""
+
+    model: ReducedModel
+    mode: int
+    H: int
+    samples: int
+    bodies: tuple[Stack, ...]
+    # (m,) of the mode in harmonic 1
+    shape: np.ndarray
+    # (m, m) and (m,) of the mean
+    A0: np.ndarray
+    stuck0: np.ndarray
+
+
+def _approached(frame: _Frame, amplitude: float, last: NonlinearMode | None) -> NonlinearMode:
+    """The motion from the last one, from full stick, or by amplitudes in between."""
+    found = _solve(frame, amplitude, last)
+    if not found.converged and last is not None:
+        found = _solve(frame, amplitude, None)
+    for parts in BETWEEN:
+        if found.converged or last is None or not last.converged:
+            break
+        near = last
+        for part in np.linspace(0, 1, parts + 1)[1:]:
+            near = _solve(frame, last.amplitude * (amplitude / last.amplitude) ** part, near)
+        found = near
+    return found
+
+
+def _solve(frame: _Frame, amplitude: float, last: NonlinearMode | None) -> NonlinearMode:
+    """Newton from the last motion, scaled, or from full stick."""
+    x = _start(frame, amplitude, last)
+    state = _residual(frame, x, amplitude)
+    reason = f"not converged after {STEPS} iterations"
+    iterations = 0
+    for iterations in range(STEPS + 1):
+        size = np.linalg.norm(state.w)
+        if np.linalg.norm(state.r) <= TOLERANCE * size:
+            reason = "residual within tolerance"
+            break
+        if iterations == STEPS or not np.isfinite(state.r).all():
+            break
+        try:
+            step = linalg.solve(_jacobian(frame, state, amplitude), state.r)
+        except linalg.LinAlgError:
+            reason = "singular Jacobian"
+            break
+        better = _search(frame, x, step, state, amplitude)
+        if better is None:
+            reason = "line search stalled"
+            break
+        x, state = better
+    residual = float(np.linalg.norm(state.r) / np.linalg.norm(state.w))
+    return NonlinearMode(
+        amplitude,
+        frame.mode,
+        state.omega,
+        state.zeta,
+        state.w,
+        _probe(frame, state, amplitude),
+        residual <= TOLERANCE,
+        reason,
+        iterations,
+        residual,
+    )
+
+
+@dataclass(frozen=True)
+class _State:
+    """Displacements (n, d, K), forces beyond the preload (m, H+1), frequency, damping, residual."""
+
+    w: np.ndarray
+    f: np.ndarray
+    dfdw: np.ndarray
+    omega: float
+    zeta: float
+    r: np.ndarray
+
+
+def _frame(model: ReducedModel, mode: int, H: int, samples: int) -> _Frame:
+    bodies = bodies_of(model, H)
+    if any(body.coupled is not None for body in bodies):
+        raise InputError("damping that couples modes: expected modal damping for nonlinear modes")
+    still = condense(_unloaded(model), float(model.side(1).omega[mode]), H)
+    shape = model.blades(H).shapes[_of(model.blades(H), 1)][model.blades(H).contact][:, mode]
+    return _Frame(model, mode, H, samples, bodies, shape, still.A[0].real, still.stuck[0].real)
+
+
+def _unloaded(model: ReducedModel) -> ReducedModel:
+    """The model with its static forces alone."""
+    load = np.zeros(len(model.loads(0)[0]))
+    return replace(model, excitation={0: load} if model.coupled else {})
+
+
+def _of(stack: Stack, h: int) -> int:
+    """Row of a harmonic in a stack that may serve all of them."""
+    return min(h, len(stack.omega) - 1)
+
+
+def _flexibility(frame: _Frame, h: int, omega: float, zeta: float) -> np.ndarray:
+    """(m, m) flexibility of both bodies in harmonic h, in harmonic 1 without the mode itself."""
+    G = 0.0
+    w = h * omega
+    for i, body in enumerate(frame.bodies):
+        s = _of(body, h)
+        shapes = body.shapes[s][body.contact]
+        Z = body.omega[s] ** 2 - w**2 - 2j * zeta * omega * w
+        if i == 0 and h == 1:
+            # left out
+            Z[frame.mode] = np.inf
+        inverse = 1 / Z
+        residual = body.residual[_of_residual(body, h)][body.contact, body.contact]
+        G = G + (shapes * inverse) @ shapes.conj().T + residual
+    return G
+
+
+def _of_residual(stack: Stack, h: int) -> int:
+    return min(h, len(stack.residual) - 1)
+
+
+def _residual(frame: _Frame, x: np.ndarray, amplitude: float) -> _State:
+    """Residual of  w - phi a + G' f  for the displacements x."""
+    model = frame.model
+    shape = (*model.springs.shape, 2 * frame.H + 1)
+    w = x.reshape(shape)
+    forces = contact_forces(model, w, frame.samples)
+    load = forces.f.copy()
+    load[:, :, 0] -= model.preload.reshape(shape[:2])
+    f = to_complex(load.reshape(-1, shape[2]))
+    omega, zeta = _frequency(frame, f[:, 1], amplitude)
+    motion = to_complex(w.reshape(-1, shape[2]))
+    r = motion.copy()
+    springs = model.springs.ravel()
+    # the mean as in the balance, w = stuck - A p
+    p = f[:, 0].real - springs * motion[:, 0].real
+    r[:, 0] = motion[:, 0].real - frame.stuck0 + frame.A0 @ p
+    r += _flexed(frame, f, omega, zeta)
+    r[:, 1] -= frame.shape * amplitude
+    return _State(w, f, forces.dfdw, omega, zeta, to_real(r).ravel())
+
+
+def _frequency(frame: _Frame, f: np.ndarray, amplitude: float) -> tuple[float, float]:
+    """Frequency [rad/s] and damping [1] that close the mode's own equation."""
+    own = frame.bodies[0].omega[_of(frame.bodies[0], 1)][frame.mode] ** 2
+    drive = frame.shape.conj() @ f / amplitude
+    squared = max(own + drive.real, 0.01 * own)
+    return float(np.sqrt(squared)), float(drive.imag / (2 * squared))
+
+
+def _jacobian(frame: _Frame, state: _State, amplitude: float) -> np.ndarray:
+    """(N, N) derivative of the residual: of the forces exactly, of frequency and damping through
+    differences of the flexibility.
+    """
+    n, d, K = state.w.shape
+    m = n * d
+    change = state.dfdw.reshape(n, d * K, d * K)
+    J = np.zeros((m, K, n, d * K))
+    springs = frame.model.springs
+    rows = change.reshape(n, d, K, d * K)
+    # mean
+    mean = rows[:, :, 0].copy()
+    for c in range(d):
+        mean[:, c, c * K] -= springs[:, c]
+    J[:, 0] = np.einsum("inc,nck->ink", frame.A0.reshape(m, n, d), mean)
+    for h in range(1, frame.H + 1):
+        G = _flexibility(frame, h, state.omega, state.zeta).reshape(m, n, d)
+        part = rows[:, :, 2 * h - 1] - 1j * rows[:, :, 2 * h]
+        moved = np.einsum("inc,nck->ink", G, part)
+        J[:, 2 * h - 1] = moved.real
+        J[:, 2 * h] = -moved.imag
+    J = J.reshape(m * K, m * K)
+    J[np.diag_indices_from(J)] += 1.0
+    return J + _through_frequency(frame, state, amplitude)
+
+
+def _through_frequency(frame: _Frame, state: _State, amplitude: float) -> np.ndarray:
+    """The part by omega and zeta: two columns of differences times the rows of phi^H df / a."""
+    n, d, K = state.w.shape
+    first = state.dfdw[:, :, 1] - 1j * state.dfdw[:, :, 2]
+    shape = frame.shape.conj().reshape(n, d, 1, 1)
+    drive = (shape * first).sum(axis=1).ravel() / amplitude
+    by_omega = drive.real / (2 * state.omega)
+    by_zeta = drive.imag / (2 * state.omega**2) - state.zeta / state.omega**2 * drive.real
+    here = _flexed(frame, state.f, state.omega, state.zeta)
+    step = DIFFERENCE * state.omega
+    faster = _flexed(frame, state.f, state.omega + step, state.zeta)
+    damped = _flexed(frame, state.f, state.omega, state.zeta + DIFFERENCE)
+    columns = [
+        to_real((faster - here) / step).ravel(),
+        to_real((damped - here) / DIFFERENCE).ravel(),
+    ]
+    return np.outer(columns[0], by_omega) + np.outer(columns[1], by_zeta)
+
+
+def _flexed(frame: _Frame, f: np.ndarray, omega: float, zeta: float) -> np.ndarray:
+    """(m, H+1) moving displacements by forces, without the mode itself."""
+    out = np.zeros_like(f)
+    for h in range(1, frame.H + 1):
+        out[:, h] = _flexibility(frame, h, omega, zeta) @ f[:, h]
+    return out
+
+
+def _search(
+    frame: _Frame, x: np.ndarray, step: np.ndarray, state: _State, amplitude: float
+) -> tuple[np.ndarray, _State] | None:
+    """The first halving of the step that lowers the residual."""
+    share = 1.0
+    before = np.linalg.norm(state.r)
+    while share >= SHORTEST:
+        trial = _residual(frame, x - share * step, amplitude)
+        if np.linalg.norm(trial.r) <= (1 - 1e-4 * share) * before:
+            return x - share * step, trial
+        share /= 2
+    return None
+
+
+def _start(frame: _Frame, amplitude: float, last: NonlinearMode | None) -> np.ndarray:
+    """The motion at the last amplitude, scaled; the free mode's without one."""
+    n, d = frame.model.springs.shape
+    if last is not None and last.converged:
+        return (amplitude / last.amplitude * last.w).ravel()
+    motion = np.zeros((n * d, frame.H + 1), dtype=complex)
+    motion[:, 1] = _stuck_mode(frame) * amplitude
+    return to_real(motion).ravel()
+
+
+def _stuck_mode(frame: _Frame) -> np.ndarray:
+    """(m,) relative displacement of unit amplitude with all contacts sticking, at the free
+    frequency.
+    """
+    body = frame.bodies[0]
+    G = _flexibility(frame, 1, float(body.omega[_of(body, 1)][frame.mode]), 0.0)
+    springs = frame.model.springs.ravel()
+    return np.linalg.solve(np.eye(len(G)) + G * springs, frame.shape)
+
+
+def _probe(frame: _Frame, state: _State, amplitude: float) -> np.ndarray:
+    """(H+1, probes) moving amplitudes of the blade."""
+    blades = frame.bodies[0]
+    out = np.zeros((frame.H + 1, blades.probe.stop - blades.probe.start), dtype=complex)
+    for h in range(1, frame.H + 1):
+        s = _of(blades, h)
+        w = h * state.omega
+        Z = blades.omega[s] ** 2 - w**2 - 2j * state.zeta * state.omega * w
+        modal = -(blades.shapes[s][blades.contact].conj().T @ state.f[:, h])
+        modal = modal / Z
+        if h == 1:
+            modal[frame.mode] = amplitude
+        residual = blades.residual[_of_residual(blades, h)][blades.probe, blades.contact]
+        out[h] = blades.shapes[s][blades.probe] @ modal - residual @ state.f[:, h]
+    return out

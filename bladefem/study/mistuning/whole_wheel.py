@@ -1,0 +1,149 @@
+"""The whole wheel of a scene: the sector reduced in every nodal diameter with the coordinates of its
+blade-alone modes, joined with the friction elements of a load case.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from math import pi
+
+import numpy as np
+
+from geometry.mesh import Mesh
+
+from ...data import ModeSet, Patch
+from ...errors import InputError
+from ...reduction.assemble import pair_model
+from ...reduction.truncate import truncated
+from ...scene.tables import Scene
+from ...wheel.model import Wheel, engine_order
+from ..adaptive.family import coarsened
+from ..adaptive.settings import Settings
+from ..pipeline.assemble_model import LoadCase, joint_model
+from ..pipeline.contact_cycle import labels
+from ..pipeline.stages import Bodies, Reduced, reduce_sector, weighted
+
+__all__ = ["WheelSector", "reduce_wheel", "read_orders", "whole_wheel"]
+
+
+@dataclass(frozen=True)
+class WheelSector:
+    """A sector in all nodal diameters."""
+
+    reduced: Reduced
+    # (q,) circular frequencies of the blade-alone modes that the port "blade" reads [rad/s]
+    families: np.ndarray
+
+
+def reduce_wheel(
+    bodies: Bodies, patches: list[Patch], modes: int, clamped: ModeSet | None, families: int
+) -> WheelSector:
+    """The sector in nodal diameters 0 to N/2.
+
+    Args:
+        modes: modes kept in each nodal diameter.
+        clamped: modes of the aerofoil held at its root.
+        families: of these that deviate from blade to blade.
+
+    Raises:
+        InputError: the scene is no wheel, or names no aerofoil.
+    """
+    from ...fem.readings import modal_readings
+
+    if bodies.mesh.sector is None or "cyclic" not in bodies.mesh.pairs:
+        raise InputError("mistuning: expected a wheel, blades clamped at their roots have no disc")
+    if clamped is None:
+        raise InputError(
+            "mistuning: the mesh has no faces 'pressure_side' or 'suction_side', expected them to "
+            "know the blade-alone modes"
+        )
+    if families > len(clamped.frequencies):
+        raise InputError(
+            f"mistuning.families = {families}: expected at most {len(clamped.frequencies)}"
+        )
+    readings = modal_readings(bodies.still_blade, clamped.shapes[:families])
+    diameters = range(bodies.mesh.sector.count // 2 + 1)
+    reduced = reduce_sector(bodies, patches, list(diameters), modes, readings)
+    return WheelSector(reduced, 2 * pi * clamped.frequencies[:families])
+
+
+def whole_wheel(
+    scene: Scene,
+    mesh: Mesh,
+    sector: WheelSector,
+    patches: list[Patch],
+    case: LoadCase,
+    settings: Settings,
+) -> Wheel:
+    """The tuned wheel under one load, with the modes, contact points and damper of the settings.
+
+    Mean displacements are held in the preload state: dampers that slip throughout drift each to a
+    place of its own on nearly no force, which takes long to find and moves the vibration little.
+    """
+    reduced = weighted(sector.reduced, case.mass)
+    count = reduced.sectors
+    sides = tuple(
+        pair_model(
+            truncated(reduced.sector[d], settings.modes), reduced.following, 2 * pi * d / count
+        )
+        for d in range(count // 2 + 1)
+    )
+    model = joint_model(
+        scene, mesh, reduced, patches, case, settings.harmonics, settings.damper, sides
+    )
+    nodes = len(case.elements.kt)
+    groups = np.arange(nodes) if settings.points is None else labels(patches, settings.points)
+    model = coarsened(model, groups)
+    damper = model.damper[0] if isinstance(model.damper, tuple) else model.damper
+    return Wheel(
+        count,
+        dict(enumerate(model.sides)),
+        model.elements,
+        _excitation(scene, count),
+        model.damping,
+        damper,
+        model.damper_damping,
+        hold=model.hold,
+        coupled=False,
+        start=model.start,
+    )
+
+
+def _excitation(scene: Scene, count: int) -> dict[int, np.ndarray]:
+    """Harmonic to amplitudes: the scene's engine order and its multiples in mistuning.orders."""
+    order = scene.excitation.engine_order
+    found = {1: engine_order(count, order, np.array([scene.excitation.force]))}
+    for multiple, force, phase in read_orders(scene):
+        part = engine_order(count, multiple, np.array([force]), phase)
+        harmonic = multiple // order
+        found[harmonic] = found.get(harmonic, 0.0) + part
+    return found
+
+
+def read_orders(scene: Scene) -> list[tuple[int, float, float]]:
+    """Order, amplitude [N] and phase [rad] of each entry of mistuning.orders.
+
+    Raises:
+        InputError: an entry is not "18: 0.3 N" or "18: 0.3 N, 90 deg", or no multiple of the
+            engine order.
+    """
+    from ...scene.units import parse
+
+    found = []
+    for entry in scene.mistuning.orders or ():
+        order, colon, rest = entry.partition(":")
+        force, _, phase = rest.partition(";")
+        name = f"mistuning.orders '{entry}'"
+        if not colon or not order.strip().isdigit():
+            raise InputError(
+                f"{name}: expected a whole order and a force, such as '18: 0.3 N; 90 deg'"
+            )
+        base = scene.excitation.engine_order
+        if base == 0 or int(order) % base or int(order) == 0:
+            raise InputError(
+                f"{name}: expected a multiple of excitation.engine_order = {base}, so that all "
+                "orders have one period"
+            )
+        angle = parse(phase.strip(), "rad", name) if phase.strip() else 0.0
+        found.append((int(order), parse(force.strip(), "N", name), angle))
+    return found

@@ -1,0 +1,133 @@
+"""Pictures of a mistuned wheel: amplitude of each blade, and what scatter does against the load."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+
+import numpy as np
+
+from .style import COLOURS, canvas, log_axis
+
+__all__ = ["draw_bands", "draw_blades", "draw_histogram", "draw_wheel_motion"]
+
+
+def draw_blades(
+    amplitude: np.ndarray, deviation: np.ndarray, tuned: float, title: str, file: str | Path
+) -> None:
+    """Amplitude of each blade over its pattern.
+
+    Args:
+        amplitude: (N,) highest amplitude of each blade [m].
+        deviation: (N,) relative deviation of its first family [1].
+        tuned: amplitude of all blades of the tuned wheel [m].
+    """
+    blades = np.arange(1, len(amplitude) + 1)
+    with canvas(file, size=(7.6, 5.0), grid=(2, 1), sharex=True, height_ratios=(3, 1)) as axes:
+        top, bottom = axes
+        worst = int(np.argmax(amplitude))
+        colours = [COLOURS[1] if i == worst else COLOURS[0] for i in range(len(amplitude))]
+        top.bar(blades, 1e6 * amplitude, color=colours)
+        top.axhline(1e6 * tuned, color=COLOURS[6], linewidth=1.2, label="tuned wheel")
+        top.set_ylabel("largest amplitude [µm]")
+        top.set_title(title)
+        top.legend(loc="upper right")
+        bottom.bar(blades, 100 * deviation, color=COLOURS[2])
+        bottom.set_ylabel("frequency [%]")
+        bottom.set_xlabel("blade")
+
+
+def draw_wheel_motion(
+    amplitude: np.ndarray, phase: np.ndarray, title: str, file: str | Path
+) -> None:
+    """The wheel seen along its axis: each blade as long as its amplitude, coloured by its phase.
+
+    Args:
+        amplitude: (N,) at one frequency [m].
+        phase: (N,) of its first harmonic [rad].
+    """
+    count = len(amplitude)
+    angle = 2 * np.pi * np.arange(count) / count
+    with canvas(file, size=(6.0, 5.4), subplot_kw={"projection": "polar"}) as ax:
+        inner = 0.5 * amplitude.max()
+        bars = ax.bar(
+            angle,
+            1e6 * amplitude,
+            width=0.8 * 2 * np.pi / count,
+            bottom=1e6 * inner,
+            color=_phase_colours(phase),
+        )
+        ax.set_title(title)
+        ax.set_theta_zero_location("N")
+        ax.set_xticks(angle[:: max(count // 12, 1)])
+        ax.set_xticklabels([f"{i + 1}" for i in range(count)][:: max(count // 12, 1)])
+        marks = np.linspace(0, amplitude.max(), 3)
+        ax.set_yticks(1e6 * (inner + marks))
+        ax.set_yticklabels([f"{1e6 * m:.3g} µm" for m in marks])
+        ax.figure.text(0.02, 0.02, "length: amplitude; colour: phase", fontsize=8)
+        ax.bar_label(bars, [""] * count)
+
+
+def draw_bands(
+    load: np.ndarray,
+    tuned: np.ndarray,
+    quantiles: dict[str, np.ndarray],
+    best: Sequence[tuple[str, float]],
+    file: str | Path,
+    unit: str = "N",
+) -> None:
+    """Resonance amplitude against the load: the tuned wheel, and quantiles of the drawn ones.
+
+    Args:
+        load: (L,) [N].
+        tuned: (L,) [m].
+        quantiles: name to (L, 3) value and interval of the highest blade [m].
+        best: names and loads of the optima.
+    """
+    with canvas(file) as ax:
+        ax.plot(load, 1e6 * tuned, color=COLOURS[6], marker="o", label="tuned wheel")
+        for colour, (name, value) in zip(COLOURS, quantiles.items(), strict=False):
+            middle, low, high = 1e6 * value.T
+            ax.plot(load, middle, color=colour, marker="o", label=name)
+            ax.fill_between(load, low, np.where(np.isfinite(high), high, middle), alpha=0.18)
+        for place, (name, at) in enumerate(best):
+            ax.axvline(at, color="#888888", linewidth=1.0, linestyle=("--", ":")[place % 2])
+            ax.annotate(
+                f"{name}: {at:.4g} {unit}",
+                (at, 0.97 - 0.06 * place),
+                xycoords=("data", "axes fraction"),
+                textcoords="offset points",
+                xytext=(4, 0),
+                fontsize=8.5,
+            )
+        log_axis(ax, "x")
+        log_axis(ax, "y")
+        ax.set_xlabel(f"normal load of a seat [{unit}]")
+        ax.set_ylabel("highest blade [µm]")
+        ax.set_title("Highest blade of mistuned wheels")
+        ax.legend(loc="best")
+
+
+def draw_histogram(
+    factor: np.ndarray, marks: dict[str, float], title: str, file: str | Path
+) -> None:
+    """How often an amplification occurs.
+
+    Args:
+        factor: (W,) highest blade over the tuned wheel [1].
+        marks: name to value.
+    """
+    with canvas(file) as ax:
+        ax.hist(factor, bins=max(8, int(np.sqrt(len(factor)))), color=COLOURS[5])
+        for colour, (name, value) in zip(COLOURS, marks.items(), strict=False):
+            ax.axvline(value, color=colour, label=f"{name}: {value:.3g}")
+        ax.set_xlabel("highest blade over the tuned wheel")
+        ax.set_ylabel("wheels")
+        ax.set_title(title)
+        ax.legend()
+
+
+def _phase_colours(phase: np.ndarray) -> np.ndarray:
+    from matplotlib import colormaps
+
+    return colormaps["twilight"]((phase % (2 * np.pi)) / (2 * np.pi))

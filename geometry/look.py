@@ -1,0 +1,351 @@
+"""What a mesh file holds and what a run would still need: bodies, cells, unit, sets, numbered faces,
+cut faces and their number of sectors; and a scene to start from.
+
+Everything here is a guess to be looked at: nothing of it decides a run.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+import numpy as np
+from scipy.sparse import coo_matrix
+from scipy.sparse.csgraph import connected_components
+from scipy.spatial import cKDTree
+
+from bladefem.errors import InputError
+
+from .numbered_faces import NumberedFaces, face_corners, numbered_faces
+from .raw_mesh import RawMesh, read_raw
+from .step_file import coarse_step
+from .topology import CORNERS, DIMENSION, FAMILY, NODES
+
+__all__ = ["CutFaces", "FacePart", "Look", "look_at", "starting_scene"]
+
+# lengths [m] of blades and sectors: a factor to metres is right that brings the model between them
+PLAUSIBLE = (0.01, 3.0)
+# factors to metres, the likeliest first
+SCALES = (1.0, 1e-3, 0.0254, 1e-2)
+AXES = {"x": (1.0, 0.0, 0.0), "y": (0.0, 1.0, 0.0), "z": (0.0, 0.0, 1.0)}
+# of the model's size: distance of nodes that match after a turn
+MATCHED = 1e-3
+# of the largest coordinate of a face's centre
+ROUNDOFF = 1e-6
+# from a whole number of sectors
+WHOLE = 0.01
+MOST_SECTORS = 400
+# names that a task needs, and what they are for
+# what a scene says beside a STEP file
+DRAWN = (
+    "imported.sectors = number of blades: cut faces and bore are then found by themselves",
+    "imported.names, such as 'tip = face_21', for the face of excitation.at",
+    "imported.seats = two plane platform faces: the damper is drawn between them",
+)
+NEEDED = {
+    "clamp": "face or node set that is held",
+    "cyclic_low": "cut face of a sector, with cyclic_high on the other side",
+    "tip_mid": "node set or face that the excitation acts on (excitation.at)",
+    "seat_left": "platform face that the damper of the blade before presses on",
+    "seat_right": "platform face that this blade's damper presses on",
+    "damper": "body of the damper, with faces damper_left and damper_right",
+}
+
+
+@dataclass(frozen=True)
+class FacePart:
+    """One numbered face; lengths in the file's unit."""
+
+    # "face_1", ...
+    name: str
+    facets: int
+    area: float
+    # (3,)
+    centre: np.ndarray
+    # (3,) mean outward unit normal, zero of a closed face
+    normal: np.ndarray
+    # all facets look the same way
+    plane: bool
+
+
+@dataclass(frozen=True)
+class CutFaces:
+    """Faces that a turn about an axis of the file carries onto each other."""
+
+    # "x", "y" or "z"
+    axis: str
+    sectors: int
+    # names of faces, in the same order
+    low: tuple[str, ...]
+    high: tuple[str, ...]
+
+
+@dataclass(frozen=True)
+class Look:
+    """What is in a file; lengths in the file's unit."""
+
+    file: Path
+    raw: RawMesh
+    # meshio's word -> number of cells, all dimensions
+    cells: dict[str, int]
+    # cells of each connected body, the largest first
+    bodies: tuple[int, ...]
+    # (2, 3) lowest and highest coordinates
+    box: np.ndarray
+    # factor to metres, guessed
+    scale: float
+    # name -> what it is and how much it holds
+    sets: dict[str, str]
+    outside: NumberedFaces
+    faces: tuple[FacePart, ...]
+    cut: CutFaces | None
+    # name of the face nearest to the axis, when there are cut faces
+    bore: str | None
+    # one sentence each
+    missing: tuple[str, ...]
+
+
+def look_at(file: str | Path) -> Look:
+    """Everything that a mesh file says about itself.
+
+    Raises:
+        InputError: the file cannot be read, or holds no solids.
+    """
+    drawing = Path(file).suffix.lower() in (".step", ".stp")
+    raw = coarse_step(file) if drawing else read_raw(Path(file))
+    solid = [cells for word, cells in raw.blocks if DIMENSION.get(FAMILY.get(word, "")) == 3]
+    if not solid:
+        raise InputError(
+            f"'{file}': no solid cells, expected tetrahedra, hexahedra, wedges or pyramids"
+        )
+    used = np.unique(np.concatenate([cells.ravel() for cells in solid]))
+    box = np.stack([raw.points[used].min(axis=0), raw.points[used].max(axis=0)])
+    outside = numbered_faces(raw)
+    names = [f"face_{number + 1}" for number in range(outside.count)]
+    if drawing:
+        outside, names = _drawn_faces(raw, outside)
+    faces = tuple(_face(outside, number, name) for number, name in enumerate(names))
+    cut = _cut_faces(raw, outside, faces, float(np.ptp(box, axis=0).max()))
+    bore = None if cut is None else _bore(raw, outside, faces, cut)
+    return Look(
+        Path(file),
+        raw,
+        _cell_counts(raw),
+        _bodies(raw),
+        box,
+        # a STEP file states its unit
+        1.0 if drawing else _scale(float(np.ptp(box, axis=0).max())),
+        _sets(raw),
+        outside,
+        faces,
+        cut,
+        bore,
+        DRAWN if drawing else _missing(raw, cut, bore),
+    )
+
+
+def starting_scene(look: Look) -> str:
+    """Text of a scene that holds what was guessed, with the rest as comments."""
+    names = []
+    taken = _names_of(look.raw)
+    if look.cut is not None:
+        wanted = {"cyclic_low": look.cut.low, "cyclic_high": look.cut.high}
+        if look.bore:
+            wanted["clamp"] = (look.bore,)
+        names = [f"{new} = {' + '.join(old)}" for new, old in wanted.items() if new not in taken]
+    axis = AXES[look.cut.axis] if look.cut else AXES["z"]
+    lines = [
+        f'title = "{look.file.stem}"',
+        'kind = "imported"',
+        "",
+        "[imported]",
+        f'file = "{look.file.name}"',
+        f"scale = {look.scale:g}".ljust(32) + "# guessed: to metres",
+        f"sectors = {look.cut.sectors if look.cut else 0}".ljust(32) + "# guessed from cut faces",
+        f"axis = {[float(v) for v in axis]}".ljust(32) + "# of the engine",
+    ]
+    if names:
+        lines += ["names = [", *(f'    "{name}",' for name in names), "]"]
+    if any(NODES[w] == CORNERS[FAMILY[w]] for w in look.cells if DIMENSION[FAMILY[w]] == 3):
+        lines.append('linear = "promote"'.ljust(32) + "# first-order cells get mid-side nodes")
+    lines += ["", "# still missing:", *(f"# {sentence}" for sentence in look.missing), ""]
+    return "\n".join(lines)
+
+
+def _cell_counts(raw: RawMesh) -> dict[str, int]:
+    counts: dict[str, int] = {}
+    for word, cells in raw.blocks:
+        counts[word] = counts.get(word, 0) + len(cells)
+    return counts
+
+
+def _bodies(raw: RawMesh) -> tuple[int, ...]:
+    """Cells of each connected body, the largest first."""
+    rows = []
+    columns = []
+    start = 0
+    for word, cells in raw.blocks:
+        if DIMENSION.get(FAMILY.get(word, "")) != 3:
+            continue
+        corners = cells[:, : CORNERS[FAMILY[word]]]
+        rows.append(np.repeat(start + np.arange(len(cells)), corners.shape[1]))
+        columns.append(corners.ravel())
+        start += len(cells)
+    cell = np.concatenate(rows)
+    node = np.concatenate(columns)
+    size = start + len(raw.points)
+    graph = coo_matrix((np.ones(len(cell)), (cell, start + node)), shape=(size, size))
+    label = connected_components(graph, directed=False)[1][:start]
+    return tuple(sorted(np.unique(label, return_counts=True)[1].tolist(), reverse=True))
+
+
+def _scale(size: float) -> float:
+    """Factor to metres that makes the model as large as blades are."""
+    fitting = [s for s in SCALES if PLAUSIBLE[0] <= s * size <= PLAUSIBLE[1]]
+    return fitting[0] if fitting else 1.0
+
+
+def _sets(raw: RawMesh) -> dict[str, str]:
+    found = {}
+    for name, parts in raw.groups.items():
+        words = sorted({FAMILY.get(raw.blocks[b][0], "cell") for b, _ in parts})
+        count = sum(len(rows) for _, rows in parts)
+        found[name] = f"{count} cells ({', '.join(words)})"
+    for name, parts in raw.surfaces.items():
+        found[name] = f"surface of {sum(len(part) for part in parts)} facets"
+    for name, nodes in raw.node_sets.items():
+        found.setdefault(name, f"{len(nodes)} nodes")
+    return found
+
+
+def _drawn_faces(raw: RawMesh, outside: NumberedFaces) -> tuple[NumberedFaces, list[str]]:
+    """The outer facets by the faces of the drawing, in its order, with their names."""
+    known: dict[tuple[int, ...], int] = {}
+    names = []
+    for name, parts in raw.groups.items():
+        blocks = [(block, rows) for block, rows in parts if DIMENSION[_family(raw, block)] == 2]
+        for block, rows in blocks:
+            for corners in np.sort(raw.blocks[block][1][rows][:, :3], axis=1).tolist():
+                known[tuple(corners)] = len(names)
+        names += [name] if blocks else []
+    facets = np.sort(outside.corners[:, :3], axis=1).tolist()
+    number = np.array([known.get(tuple(corners), -1) for corners in facets])
+    return replace(outside, number=number), names
+
+
+def _family(raw: RawMesh, block: int) -> str:
+    return FAMILY[raw.blocks[block][0]]
+
+
+def _face(outside: NumberedFaces, number: int, name: str) -> FacePart:
+    mine = outside.number == number
+    normals = outside.normals[mine]
+    area = np.linalg.norm(normals, axis=1)
+    total = float(area.sum())
+    mean = normals.sum(axis=0)
+    length = float(np.linalg.norm(mean))
+    centre = np.average(outside.centres[mine], axis=0, weights=np.maximum(area, 1e-300))
+    # round-off is no coordinate
+    centre[np.abs(centre) < ROUNDOFF * np.abs(centre).max(initial=0.0)] = 0.0
+    return FacePart(
+        name,
+        int(mine.sum()),
+        total,
+        centre,
+        mean / length if length > 1e-6 * total else np.zeros(3),
+        bool(length > (1 - 1e-6) * total),
+    )
+
+
+def _cut_faces(
+    raw: RawMesh, outside: NumberedFaces, faces: tuple[FacePart, ...], size: float
+) -> CutFaces | None:
+    """Pairs of faces on which nodes match after one turn about an axis through the origin."""
+    best: CutFaces | None = None
+    most = 0.0
+    for axis in AXES:
+        pairs: dict[int, list[tuple[int, int]]] = {}
+        for i, one in enumerate(faces):
+            for j, other in enumerate(faces):
+                if i != j and _alike(one, other):
+                    sectors = _sectors(one.centre, other.centre, axis, size)
+                    if sectors and _matching(raw, outside, (i, j), axis, sectors, size):
+                        pairs.setdefault(sectors, []).append((i, j))
+        for sectors, some in pairs.items():
+            area = sum(faces[i].area for i, _ in some)
+            if area > most * (1 + 1e-9):
+                most = area
+                low = tuple(faces[i].name for i, _ in some)
+                best = CutFaces(axis, sectors, low, tuple(faces[j].name for _, j in some))
+    return best
+
+
+def _alike(one: FacePart, other: FacePart) -> bool:
+    return one.facets == other.facets and abs(one.area - other.area) < 1e-3 * one.area
+
+
+def _sectors(start: np.ndarray, end: np.ndarray, axis: str, size: float) -> int:
+    """How many turns from one place to the other make a wheel, 0 when no whole number does."""
+    k = "xyz".index(axis)
+    a, b = (k + 1) % 3, (k + 2) % 3
+    radii = [np.hypot(x[a], x[b]) for x in (start, end)]
+    if abs(start[k] - end[k]) > MATCHED * size or abs(radii[0] - radii[1]) > MATCHED * size:
+        return 0
+    angle = (np.arctan2(end[b], end[a]) - np.arctan2(start[b], start[a])) % (2 * np.pi)
+    # the other way round is found with the faces exchanged
+    if radii[0] < MATCHED * size or not 2 * np.pi / MOST_SECTORS < angle < np.pi * 0.7:
+        return 0
+    count = 2 * np.pi / angle
+    return round(count) if abs(count - round(count)) < WHOLE * max(count / 36, 1.0) else 0
+
+
+def _matching(
+    raw: RawMesh,
+    outside: NumberedFaces,
+    pair: tuple[int, int],
+    axis: str,
+    sectors: int,
+    size: float,
+) -> bool:
+    """Whether the corner nodes of one face, turned, lie on those of the other."""
+    one, other = (
+        np.unique(np.concatenate([c.ravel() for c in face_corners(outside, i)])) for i in pair
+    )
+    if len(one) != len(other):
+        return False
+    k = "xyz".index(axis)
+    a, b = (k + 1) % 3, (k + 2) % 3
+    angle = 2 * np.pi / sectors
+    x = raw.points[one].copy()
+    first = x[:, a].copy()
+    x[:, a] = np.cos(angle) * first - np.sin(angle) * x[:, b]
+    x[:, b] = np.sin(angle) * first + np.cos(angle) * x[:, b]
+    return bool(cKDTree(raw.points[other]).query(x)[0].max() < MATCHED * size)
+
+
+def _bore(
+    raw: RawMesh, outside: NumberedFaces, faces: tuple[FacePart, ...], cut: CutFaces
+) -> str | None:
+    """The face whose farthest node is nearest to the axis: a disc is held there."""
+    k = "xyz".index(cut.axis)
+    radius = np.hypot(raw.points[:, (k + 1) % 3], raw.points[:, (k + 2) % 3])
+    reach = {
+        face.name: max(radius[c].max() for c in face_corners(outside, i))
+        for i, face in enumerate(faces)
+        if face.name not in (*cut.low, *cut.high)
+    }
+    return min(reach, key=reach.get) if reach else None
+
+
+def _names_of(raw: RawMesh) -> set[str]:
+    every = (*raw.groups, *raw.node_sets, *raw.surfaces)
+    return {"_".join(name.lower().split()) for name in every}
+
+
+def _missing(raw: RawMesh, cut: CutFaces | None, bore: str | None) -> tuple[str, ...]:
+    """What a run needs and neither a set of the file nor a guess provides."""
+    there = _names_of(raw)
+    if cut is not None:
+        there |= {"cyclic_low", "clamp"} if bore else {"cyclic_low"}
+    needed = [name for name in NEEDED if name not in there]
+    return tuple(f"{name}: {NEEDED[name]}" for name in needed)

@@ -1,0 +1,144 @@
+"""A damper seated with friction: statics, the closed form of a wedge, and what a history leaves."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from wedge import wedge_mesh
+
+from bladefem.contact.admissible_load import holds_itself, normal_load_bounds
+from bladefem.contact.frictional_seating import frictional_problem, seat_with_friction
+from bladefem.contact.interface_law import InterfaceLaw
+from bladefem.contact.patch import make_patch
+from bladefem.contact.seating import contact_problem, solve
+from bladefem.errors import InputError, NotSolvedError
+from bladefem.fem.body import assemble
+from bladefem.fem.constraint import constrain
+from bladefem.fem.flexibility import flexible
+from bladefem.scene.tables import Material
+
+ALPHA = np.radians(40)
+SPEED = 800.0
+MU = 0.3
+
+
+def condensed(dimension):
+    mesh = wedge_mesh(ALPHA, dimension=dimension)
+    patches = [make_patch(mesh, name) for name in ("this", "next")]
+    blade = flexible(constrain(assemble(mesh, "blade", Material()), "clamp"))
+    damper = flexible(constrain(assemble(mesh, "damper", Material()), None))
+    rough = frictional_problem(mesh, patches, blade, damper)
+    return rough, contact_problem(mesh, patches, blade, damper)
+
+
+@pytest.fixture(scope="module", params=[2, 3])
+def problems(request):
+    return condensed(request.param)
+
+
+def layer(problem, kn=5e13, kt=4e13):
+    area = np.concatenate([p.area for p in problem.patches])
+    count = len(area)
+    return InterfaceLaw(kn * area, np.full(count, np.inf)), kt * area
+
+
+def pull_of(problem):
+    return float(np.linalg.norm(problem.load[:2])) * SPEED**2
+
+
+def seated(problem, mu=MU, speeds=(SPEED,), bedded=True, normal=None, **stiffness):
+    law, kt = layer(problem, **stiffness)
+    return seat_with_friction(problem, law, kt, np.full(len(kt), mu), speeds, normal, bedded)
+
+
+def forces_of(found):
+    return np.concatenate([np.column_stack([m.force, m.traction]) for m in found.maps])
+
+
+def test_without_friction_it_is_the_frictionless_seating(problems):
+    rough, smooth = problems
+    law, _ = layer(rough)
+    plain = solve(replace(smooth, layer=law), SPEED)
+    found = seated(rough, mu=1e-4, bedded=False)
+    for rubbed, free in zip(found.maps, plain, strict=True):
+        assert rubbed.force == pytest.approx(free.force, rel=5e-3, abs=1e-3 * free.force.max())
+
+
+def test_the_damper_is_in_equilibrium_and_no_force_exceeds_its_limit(problems):
+    rough, _ = problems
+    for bedded in (True, False):
+        found = seated(rough, bedded=bedded)
+        f = forces_of(found)
+        unbalanced = rough.rigid.T @ f.ravel() + SPEED**2 * rough.load
+        assert np.abs(unbalanced).max() < 1e-8 * pull_of(rough)
+        assert (f[:, 0] >= 0).all()
+        assert (np.linalg.norm(f[:, 1:], axis=1) <= MU * f[:, 0] * (1 + 1e-7) + 1e-7).all()
+
+
+def test_a_wedge_that_slides_outwards_carries_the_closed_form(problems):
+    """Spin-up of a bedded wedge on a soft layer mobilises friction fully:
+    N = F / (2 (sin a + mu cos a)).
+    """
+    rough, _ = problems
+    found = seated(rough, kn=5e10, kt=4e10)
+    expected = pull_of(rough) / (2 * (np.sin(ALPHA) + MU * np.cos(ALPHA)))
+    for one in found.maps:
+        assert one.force.sum() == pytest.approx(expected, rel=2e-3)
+    carried = MU * np.cos(ALPHA) / (np.sin(ALPHA) + MU * np.cos(ALPHA))
+    assert found.share == pytest.approx(carried, rel=5e-3)
+
+
+def test_every_history_stays_between_the_closed_forms(problems):
+    rough, _ = problems
+    low = pull_of(rough) / (2 * (np.sin(ALPHA) + MU * np.cos(ALPHA)))
+    high = pull_of(rough) / (2 * (np.sin(ALPHA) - MU * np.cos(ALPHA)))
+    normal = []
+    for overspeed in (1.0, 1.2, 3.0):
+        found = seated(rough, speeds=(overspeed * SPEED, SPEED), kn=5e10, kt=4e10)
+        load = np.mean([m.force.sum() for m in found.maps])
+        assert low * (1 - 1e-6) <= load <= high * (1 + 1e-6)
+        normal.append(load)
+    # the further beyond, the more friction has turned round on the way back
+    assert normal[0] < normal[1] < normal[2]
+    assert normal[2] == pytest.approx(high, rel=1e-2)
+
+
+def test_a_wanted_load_is_met_and_scales(problems):
+    rough, _ = problems
+    found = seated(rough, normal=100.0)
+    twice = seated(rough, normal=200.0)
+    assert np.mean([m.force.sum() for m in found.maps]) == pytest.approx(100.0, rel=1e-8)
+    assert forces_of(twice) == pytest.approx(2 * forces_of(found), rel=1e-5, abs=1e-4)
+    assert twice.scale == pytest.approx(2 * found.scale, rel=1e-6)
+
+
+def test_histories_that_press_nothing_are_refused(problems):
+    rough, _ = problems
+    with pytest.raises(InputError, match="all positive: at rest nothing presses"):
+        seated(rough, speeds=(SPEED, 0.0))
+
+
+def test_a_history_that_lifts_the_damper_says_at_which_speed(problems):
+    rough, _ = problems
+    inwards = replace(rough, load=-rough.load)
+    with pytest.raises(NotSolvedError, match=r"at .* rpm on the way to 7639.4 rpm"):
+        seated(inwards)
+
+
+def test_bounds_of_the_load_are_those_of_the_wedge(problems):
+    rough, _ = problems
+    mu = np.full(len(rough.clearance), MU)
+    low, high = normal_load_bounds(rough.rigid, SPEED**2 * rough.load, mu)
+    pull = pull_of(rough)
+    assert low == pytest.approx(pull / (2 * (np.sin(ALPHA) + MU * np.cos(ALPHA))), rel=1e-3)
+    assert high == pytest.approx(pull / (2 * (np.sin(ALPHA) - MU * np.cos(ALPHA))), rel=1e-3)
+
+
+@pytest.mark.parametrize(("mu", "jams"), [(0.3, False), (0.82, False), (0.86, True)])
+def test_seats_jam_beyond_the_self_locking_angle(problems, mu, jams):
+    """tan 40 deg = 0.839; the pyramid of 16 edges has one along the slope."""
+    rough, _ = problems
+    friction = np.full(len(rough.clearance), mu)
+    assert holds_itself(rough.rigid, friction) == jams
+    if jams:
+        assert normal_load_bounds(rough.rigid, rough.load, friction)[1] == np.inf

@@ -1,0 +1,88 @@
+"""What a mesh file says of itself, and a run of the scene that comes of it."""
+
+import tomllib
+
+import decks
+import numpy as np
+import pytest
+
+from bladefem.cli.main import main
+from bladefem.errors import InputError
+from geometry.imported import read_mesh
+from geometry.look import look_at, starting_scene
+from geometry.numbered_faces import face_corners, numbered_faces
+from geometry.raw_mesh import read_raw
+
+
+@pytest.fixture
+def deck(tmp_path):
+    """Wedges and hexahedra in millimetres, the bore alone has a name."""
+    m = decks.model("c3d15_c3d20")
+    m = decks.Model(1e3 * m.points, m.blocks, {"ROOT": m.node_sets["clamp"]}, {})
+    (tmp_path / "a.inp").write_text("\n".join(decks.flat_deck(m, {})))
+    return tmp_path / "a.inp"
+
+
+def test_faces_are_cut_along_edges_and_numbered_from_the_largest(deck):
+    """Two flat sides, two cut faces, outside and bore."""
+    look = look_at(deck)
+    assert [face.facets for face in look.faces] == [81, 81, 36, 36, 24, 24]
+    # equal areas (to six digits of the largest) are ordered by place
+    ordered = zip(look.faces, look.faces[1:], strict=False)
+    assert all(a.area > b.area - 1e-6 * look.faces[0].area for a, b in ordered)
+    assert look.cells == {"hexahedron20": 108, "wedge15": 216}
+    assert look.bodies == (324,)
+    assert look.sets["ROOT"].endswith("nodes")
+
+
+def test_cut_faces_and_unit_are_guessed(deck):
+    look = look_at(deck)
+    assert (look.cut.axis, look.cut.sectors) == ("z", decks.SECTORS)
+    assert (look.cut.low, look.cut.high) == (("face_3",), ("face_4",))
+    assert look.bore == "face_6" and look.scale == 1e-3
+    assert not any(sentence.startswith(("clamp", "cyclic")) for sentence in look.missing)
+
+
+def test_the_scene_runs_as_it_is_written(deck):
+    """Faces by number have the nodes of faces by name."""
+    table = tomllib.loads(starting_scene(look_at(deck)))["imported"]
+    mesh = read_mesh(deck, table["scale"], table["sectors"], table["axis"], table["names"])
+    assert mesh.pairs["cyclic"].nodes.shape[1] == len(np.unique(mesh.faces["cyclic_low"]))
+    assert np.array_equal(np.unique(mesh.faces["clamp"]), np.unique(mesh.faces["root"]))
+
+
+def test_facets_keep_their_face_when_cells_change(deck):
+    raw = read_raw(deck)
+    faces = numbered_faces(raw)
+    corners = [face_corners(faces, number) for number in range(faces.count)]
+    assert sum(len(part) for parts in corners for part in parts) == len(faces.corners)
+
+
+def test_command(deck, capsys):
+    picture = deck.with_name("a.png")
+    assert main(["look", str(deck), "--view", str(picture), "--scene"]) == 0
+    said = capsys.readouterr().out
+    assert "12 sectors about z" in said and "not in the file" in said
+    assert picture.stat().st_size > 10_000
+    assert tomllib.loads(deck.with_suffix(".toml").read_text())["kind"] == "imported"
+    assert main(["look", str(deck), "--scene"]) == 2
+    assert "is there already" in capsys.readouterr().err
+
+
+def test_a_file_without_solids(tmp_path):
+    (tmp_path / "a.inp").write_text("*NODE\n1, 0, 0, 0\n2, 1, 0, 0\n")
+    with pytest.raises(InputError, match="no solid cells"):
+        look_at(tmp_path / "a.inp")
+
+
+def test_a_drawing_is_looked_at_by_its_own_faces():
+    """The numbers are those that imported.names and imported.seats take."""
+    found = look_at("scenes/own_blade.step")
+    assert [face.name for face in found.faces] == [f"face_{i}" for i in range(1, 22)]
+    assert found.scale == 1.0
+    right, left = (next(f for f in found.faces if f.name == n) for n in ("face_14", "face_11"))
+    assert right.plane
+    assert left.plane
+    assert np.allclose(right.centre, left.centre * [1, -1, 1], atol=1e-9)
+    assert right.centre[1] > 0.01
+    assert any("imported.seats" in sentence for sentence in found.missing)
