@@ -473,7 +473,9 @@ def _influences(
         return ()
     lowest = min(found, key=lambda b: b.amplitude)
     changed = changed_cases(scene, contact.problem, mesh.dimension - 1, lowest.mass, contact.rough)
-    angle = scene.damper.angle if scene.kind == "wedge sector" else None
+    # a history of the seating has its friction already
+    frictionless = scene.contact.history == FRICTIONLESS
+    angle = scene.damper.angle if scene.kind == "wedge sector" and frictionless else None
     parameters = parameters_of(scene, angle)
 
     def compute() -> list[Influence]:
