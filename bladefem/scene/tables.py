@@ -37,6 +37,7 @@ __all__ = [
     "Seat",
     "Solver",
     "Study",
+    "Support",
 ]
 
 
@@ -107,7 +108,7 @@ class Contact:
         1.0,
         1e15,
         "tangential contact stiffness for each unit of area; by Mindlin from the normal "
-        "one, 10 000 N/mm^3 without either",
+        "one, 40 N/mm^3 without either",
     )
     kt: float | None = quantity(None, "N/m", 1.0, 1e12, "tangential stiffness of one whole patch")
     kn_area: float | None = quantity(
@@ -120,8 +121,9 @@ class Contact:
     kn: float | None = quantity(None, "N/m", 1.0, 1e12, "normal stiffness of one whole patch")
     stiffness: str = quantity(
         "given",
-        choices=("given", "map"),
+        choices=("given", "rigid", "map"),
         help="normal stiffness: of one interface layer for seating and vibration, as given above; "
+        "rigid faces in both; "
         "or of each node from the pressure map between rigid faces, its static force over the "
         "approach of the bodies there (the paper's Eq. 23)",
     )
@@ -248,9 +250,9 @@ class Study:
         "history may have left in contact points that never slip",
     )
     stability: bool = quantity(
-        False,
-        help="also Floquet multipliers of the points of each curve, where normal loads "
-        "follow the motion",
+        True,
+        help="Floquet multipliers of the points of each curve, where normal loads follow the "
+        "motion: unstable ones are marked and are no resonance",
     )
 
 
@@ -319,6 +321,25 @@ class Model:
         1000,
         "nodal diameters of the mode tables; when left out those "
         "that the engine order excites ('bladefem modes': all)",
+    )
+
+
+@dataclass(frozen=True)
+class Support:
+    """How the blade or sector is held."""
+
+    clamp: str = quantity(
+        "clamp", help="face or node set that is held fast; '' for none: free, or on springs"
+    )
+    springs: tuple[str, ...] | None = quantity(
+        None,
+        help="springs to the ground for each unit of area of faces, such as "
+        "'root: normal=1e12 N/m^3; tangential=5e11 N/m^3'",
+    )
+    directions: tuple[str, ...] | None = quantity(
+        None,
+        help="single displacements that are zero on faces or node sets, such as 'rim: z' or "
+        "'foot: xy' (x radial, y circumferential at the middle of the sector, z axial)",
     )
 
 
@@ -452,3 +473,4 @@ class Scene:
     mistuning: Mistuning = field(default_factory=Mistuning)
     model: Model = field(default_factory=Model)
     solver: Solver = field(default_factory=Solver)
+    support: Support = field(default_factory=Support)

@@ -290,7 +290,7 @@ def test_next_steps_name_the_mass_to_try():
 
 def test_an_assumed_contact_stiffness_is_told():
     """Whichever of the stiffnesses is given, for both seats or for each, nothing is assumed."""
-    assert "10000 N/mm^3" in assumed_stiffness(Scene())[0]
+    assert "40 N/mm^3" in assumed_stiffness(Scene())[0]
     seats = Contact(left=Seat(kn=1e7), right=Seat(kt_area=1e12))
     for given in (Contact(kt_area=4e10), Contact(kn=1e7), Contact(stiffness="map"), seats):
         assert assumed_stiffness(Scene(contact=given)) == []

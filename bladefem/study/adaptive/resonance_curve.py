@@ -51,8 +51,8 @@ def resonance_curve(
     for _ in range(PASSES):
         used, peak, errors = _chosen(family, used, peak_of(points), accuracy)
         span = band or (points[0].frequency, points[-1].frequency)
-        folds = not unfollowed(family, used)
-        points = covered(member(family, used).model, used, span, mode, accuracy, widen, folds)
+        paths = not unfollowed(family, used)
+        points = covered(member(family, used).model, used, span, mode, accuracy, widen, paths)
         points = _with_peak(points, peak)
         found = _checked_flanks(family, used, points, errors)
         loud = _checked_loud(family, used, points, accuracy)

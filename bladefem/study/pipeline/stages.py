@@ -21,6 +21,7 @@ from ...reduction.assemble import folded_diameter
 from ...scene.fields import value_at
 from ...scene.kinds import kind_named
 from ...scene.part_materials import part_materials
+from ...scene.support import area_springs, held_letters
 from ...scene.tables import Material, Scene
 from ...util.progress import Progress, unwatched
 from .ports import blade_ports, damper_ports
@@ -70,9 +71,13 @@ class Bodies:
     def still_blade(self) -> Any:
         """fem.body.Body of the blade at rest."""
         from ...fem.body import assemble
+        from ...fem.supports import AreaSpring, supported
 
         mesh, materials = blade_parts(self.scene, self.mesh)
-        return assemble(mesh, tuple(materials), materials, self.comm)
+        body = assemble(mesh, tuple(materials), materials, self.comm)
+        support = self.scene.support
+        springs = [AreaSpring(*spring) for spring in area_springs(support)]
+        return supported(body, support.clamp, springs, held_letters(support))
 
     @cached_property
     def blade(self) -> Any:
