@@ -104,7 +104,10 @@ def contact_cycle(
         groups = labels(patches, curve.settings.points)
         elements = joined(elements, groups)
     elements, w = _in_all_directions(elements, curve.peak.w)
-    forces = evaluate(elements, w, curve.peak.samples or 512, jacobian=False)
+    # the friction law starts from the static friction force
+    started = w.copy()
+    started[:, 1:, 0] += elements.traction / elements.kt[:, None]
+    forces = evaluate(elements, started, curve.peak.samples or 512, jacobian=False)
     starts = np.cumsum([0] + [len(patch.area) for patch in patches])
     rows = [np.unique(groups[a:b]) for a, b in pairwise(starts)]
     part = area / np.bincount(groups, area)[groups]
@@ -117,7 +120,7 @@ def contact_cycle(
         forces.state[groups],
         part / area * forces.dissipated[groups],
         free_static_force(elements, w)[groups],
-        {patch.name: _loop(elements, w, some) for patch, some in zip(patches, rows, strict=True)},
+        {patch.name: _loop(elements, started, some) for patch, some in zip(patches, rows, strict=True)},
         _dealt(averaged, groups, part),
         _dealt(each, groups, part),
         _dealt_elements(elements, groups, part),
@@ -168,13 +171,7 @@ def _loop(elements: Elements, w: np.ndarray, rows: np.ndarray) -> Loop:
     """
     fine = np.zeros((len(rows), w.shape[1], 2 * SMOOTH + 1))
     fine[..., : w.shape[2]] = w[rows]
-    some = replace(
-        elements,
-        **{
-            name: np.broadcast_to(getattr(elements, name), len(w))[rows]
-            for name in ("kt", "kn", "mu", "n0")
-        },
-    )
+    some = select_elements(elements, rows)
     force = evaluate(some, fine, 8 * SMOOTH + 8, jacobian=False).f[:, 1:].sum(0)
     share = some.kt / some.kt.sum()
     mean = np.einsum("n,ndk->dk", share, fine[:, 1:])
