@@ -194,7 +194,6 @@ def _case(
     values = np.where(values < 1e-9 * values[-1], 0.0, values)
     n = len(e.kt)
     contact = np.zeros((n, 3, len(M)))
-    contact[:, 3 - rows - (2 - e.tangents) : 1 + e.tangents] = 0.0
     parts = (readings @ modes).reshape(n, rows, -1)
     first = 0 if rows > e.tangents else 1
     contact[:, first : first + rows] = parts
@@ -335,3 +334,40 @@ def _leapfrog(y, omega, periods, steps, L, D, contact, table, orders, force, pro
                 q[i] += dt * v[i]
             if period >= periods - 2:
                 history[period - periods + 2, k] = seen
+
+
+def state_of(case: Case, point: bf.Solution) -> np.ndarray:
+    """q, velocity and sliders of a solution of the balance at phase zero."""
+    n, _, d = case.contact.shape
+    H = point.harmonics
+    first = 0 if case.lifts else 1
+    rows = case.contact[:, first : first + _directions(case)].reshape(-1, d)
+    f = point.f.reshape(len(rows), -1)
+    w = point.w.reshape(len(rows), -1)
+    preload = np.zeros((n, _directions(case)))
+    if case.lifts:
+        preload[:, 0] = np.maximum(case.table[:, 3], 0.0)
+    q = np.zeros((H + 1, d), dtype=complex)
+    for h in range(H + 1):
+        force = f[:, 2 * h - 1] - 1j * f[:, 2 * h] if h else f[:, 0] - preload.ravel()
+        load = case.force.get(h, 0.0) - rows.T @ force
+        still = case.stiffness == 0
+        Z = np.diag(case.stiffness) - (h * point.omega) ** 2 * np.eye(d)
+        Z = Z + 1j * h * point.omega * case.damping
+        if h:
+            q[h] = np.linalg.solve(Z, load)
+            continue
+        q[0, ~still] = load[~still] / case.stiffness[~still]
+        missing = w[:, 0] - rows @ q[0].real
+        q[0, still] = np.linalg.lstsq(rows[:, still], missing, rcond=1e-9)[0]
+    v = (1j * point.omega * np.arange(H + 1)[:, None] * q).sum(axis=0).real
+    q = q.sum(axis=0).real
+    forces = (point.f[:, :, 0] + point.f[:, :, 1::2].sum(axis=2))[:, int(case.lifts) :]
+    z = np.zeros((n, 2))
+    for c in range(forces.shape[1]):
+        z[:, c] = case.contact[:, 1 + c] @ q - forces[:, c] / case.table[:, 0]
+    return np.concatenate([q, v, z.ravel()])
+
+
+def _directions(case: Case) -> int:
+    return case.model.elements.tangents + int(case.lifts)

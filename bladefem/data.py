@@ -153,8 +153,8 @@ class Elements:
     n0: np.ndarray
     # tangential directions: 1 (plane models) or 2
     tangents: int = 2
-    # friction law of all nodes, or a tuple with one a node; None: Coulomb's, see
-    # `bladefem.friction.law`
+    # friction law of all nodes, or a tuple with one a node: an object or a name of the table; None:
+    # Coulomb's, see `bladefem.friction.law_table`
     law: Any = None
     # (n, tangents) static friction force of the preload state [N]; none when None
     t0: np.ndarray | None = None

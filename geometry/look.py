@@ -6,7 +6,7 @@ Everything here is a guess to be looked at: nothing of it decides a run.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
@@ -18,6 +18,7 @@ from bladefem.errors import InputError
 
 from .numbered_faces import NumberedFaces, face_corners, numbered_faces
 from .raw_mesh import RawMesh, read_raw
+from .step_file import coarse_step
 from .topology import CORNERS, DIMENSION, FAMILY, NODES
 
 __all__ = ["CutFaces", "FacePart", "Look", "look_at", "starting_scene"]
@@ -29,10 +30,18 @@ SCALES = (1.0, 1e-3, 0.0254, 1e-2)
 AXES = {"x": (1.0, 0.0, 0.0), "y": (0.0, 1.0, 0.0), "z": (0.0, 0.0, 1.0)}
 # of the model's size: distance of nodes that match after a turn
 MATCHED = 1e-3
+# of the largest coordinate of a face's centre
+ROUNDOFF = 1e-6
 # from a whole number of sectors
 WHOLE = 0.01
 MOST_SECTORS = 400
 # names that a task needs, and what they are for
+# what a scene says beside a STEP file
+DRAWN = (
+    "imported.sectors = number of blades: cut faces and bore are then found by themselves",
+    "imported.names, such as 'tip = face_21', for the face of excitation.at",
+    "imported.seats = two plane platform faces: the damper is drawn between them",
+)
 NEEDED = {
     "clamp": "face or node set that is held",
     "cyclic_low": "cut face of a sector, with cyclic_high on the other side",
@@ -102,7 +111,8 @@ def look_at(file: str | Path) -> Look:
     Raises:
         InputError: the file cannot be read, or holds no solids.
     """
-    raw = read_raw(Path(file))
+    drawing = Path(file).suffix.lower() in (".step", ".stp")
+    raw = coarse_step(file) if drawing else read_raw(Path(file))
     solid = [cells for word, cells in raw.blocks if DIMENSION.get(FAMILY.get(word, "")) == 3]
     if not solid:
         raise InputError(
@@ -111,7 +121,10 @@ def look_at(file: str | Path) -> Look:
     used = np.unique(np.concatenate([cells.ravel() for cells in solid]))
     box = np.stack([raw.points[used].min(axis=0), raw.points[used].max(axis=0)])
     outside = numbered_faces(raw)
-    faces = tuple(_face(raw, outside, number) for number in range(outside.count))
+    names = [f"face_{number + 1}" for number in range(outside.count)]
+    if drawing:
+        outside, names = _drawn_faces(raw, outside)
+    faces = tuple(_face(outside, number, name) for number, name in enumerate(names))
     cut = _cut_faces(raw, outside, faces, float(np.ptp(box, axis=0).max()))
     bore = None if cut is None else _bore(raw, outside, faces, cut)
     return Look(
@@ -120,13 +133,14 @@ def look_at(file: str | Path) -> Look:
         _cell_counts(raw),
         _bodies(raw),
         box,
-        _scale(float(np.ptp(box, axis=0).max())),
+        # a STEP file states its unit
+        1.0 if drawing else _scale(float(np.ptp(box, axis=0).max())),
         _sets(raw),
         outside,
         faces,
         cut,
         bore,
-        _missing(raw, cut, bore),
+        DRAWN if drawing else _missing(raw, cut, bore),
     )
 
 
@@ -204,18 +218,40 @@ def _sets(raw: RawMesh) -> dict[str, str]:
     return found
 
 
-def _face(raw: RawMesh, outside: NumberedFaces, number: int) -> FacePart:
+def _drawn_faces(raw: RawMesh, outside: NumberedFaces) -> tuple[NumberedFaces, list[str]]:
+    """The outer facets by the faces of the drawing, in its order, with their names."""
+    known: dict[tuple[int, ...], int] = {}
+    names = []
+    for name, parts in raw.groups.items():
+        blocks = [(block, rows) for block, rows in parts if DIMENSION[_family(raw, block)] == 2]
+        for block, rows in blocks:
+            for corners in np.sort(raw.blocks[block][1][rows][:, :3], axis=1).tolist():
+                known[tuple(corners)] = len(names)
+        names += [name] if blocks else []
+    facets = np.sort(outside.corners[:, :3], axis=1).tolist()
+    number = np.array([known.get(tuple(corners), -1) for corners in facets])
+    return replace(outside, number=number), names
+
+
+def _family(raw: RawMesh, block: int) -> str:
+    return FAMILY[raw.blocks[block][0]]
+
+
+def _face(outside: NumberedFaces, number: int, name: str) -> FacePart:
     mine = outside.number == number
     normals = outside.normals[mine]
     area = np.linalg.norm(normals, axis=1)
     total = float(area.sum())
     mean = normals.sum(axis=0)
     length = float(np.linalg.norm(mean))
+    centre = np.average(outside.centres[mine], axis=0, weights=np.maximum(area, 1e-300))
+    # round-off is no coordinate
+    centre[np.abs(centre) < ROUNDOFF * np.abs(centre).max(initial=0.0)] = 0.0
     return FacePart(
-        f"face_{number + 1}",
+        name,
         int(mine.sum()),
         total,
-        np.average(outside.centres[mine], axis=0, weights=np.maximum(area, 1e-300)),
+        centre,
         mean / length if length > 1e-6 * total else np.zeros(3),
         bool(length > (1 - 1e-6) * total),
     )

@@ -28,15 +28,17 @@ from .fitted_wedge import fit_wedge
 from .imported import mesh_of_raw
 from .mesh import Mesh
 from .parameters import MeshSize, Wedge
-from .raw_mesh import from_gmsh_model
+from .raw_mesh import RawMesh, from_gmsh_model
 from .renaming import read_names, renamed
 from .session import attempt, gmsh_session
 
-__all__ = ["FittedDamper", "read_step"]
+__all__ = ["FittedDamper", "coarse_step", "read_step"]
 
 # (dimension, name) to entities
 Named = dict[tuple[int, str], list[int]]
 CONTACT = ("seat_left", "seat_right", "damper_left", "damper_right")
+# elements along a model that is only looked at
+COARSE = 30
 PREFIX = {"": 1.0, ".MILLI.": 1e-3, ".CENTI.": 1e-2, ".DECI.": 0.1, ".MICRO.": 1e-6, ".KILO.": 1e3}
 
 
@@ -104,6 +106,28 @@ def read_step(
             )
         raw = from_gmsh_model(gmsh)
     return mesh_of_raw(raw, 1.0, sectors, axis, str(file))
+
+
+def coarse_step(file: str | Path) -> RawMesh:
+    """Every solid and face of a STEP file by name, coarsely meshed, to look at; lengths in metres.
+
+    Raises:
+        InputError: the file cannot be read or meshed.
+    """
+    path = Path(file)
+    if not path.is_file():
+        raise InputError(f"'{file}': there is no such file")
+    with gmsh_session() as gmsh:
+        with attempt("imported.file", f"import '{file}'"):
+            _import(gmsh, path, 1.0)
+        for (dimension, name), tags in _names(gmsh, path.read_text(errors="replace")).items():
+            gmsh.model.addPhysicalGroup(dimension, tags, name=name)
+        low, high = np.array(gmsh.model.getBoundingBox(-1, -1)).reshape(2, 3)
+        gmsh.option.setNumber("Mesh.MeshSizeMax", float(np.linalg.norm(high - low)) / COARSE)
+        gmsh.option.setNumber("Mesh.MeshSizeFromCurvature", 6)
+        with attempt("imported.file", f"mesh '{file}'"):
+            gmsh.model.mesh.generate(3)
+        return from_gmsh_model(gmsh)
 
 
 def file_unit(text: str) -> float:

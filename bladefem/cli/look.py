@@ -19,7 +19,7 @@ LISTED = 24
 
 def add_look(sub: argparse.ArgumentParser) -> None:
     """The command's arguments."""
-    sub.add_argument("file", help="mesh file, such as sector.inp, .cdb, .bdf, .msh")
+    sub.add_argument("file", help="mesh or STEP file, such as sector.inp, .cdb, .bdf, .msh, .step")
     sub.add_argument("--view", metavar="PNG", help="draw the numbered faces into this file")
     sub.add_argument(
         "--scene",

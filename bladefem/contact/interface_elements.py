@@ -30,6 +30,10 @@ __all__ = [
     "stiffnesses",
 ]
 
+# stiffness for each unit of area that stands for rigid faces in the elements [N/m^3]: a layer of
+# 1e-8 of the compliance of steel over a millimetre
+RIGID = 1e22
+
 # tangential stiffness for each unit of area where the scene tells none [N/m^3]
 USUAL = 4e10
 
@@ -76,6 +80,8 @@ def stiffnesses(
         area: (n,) what each point stands for [m^2]; totals are shared by it.
         mapped: (n,) k_n from the pressure map, in place of a given one.
     """
+    if contact.stiffness == "rigid":
+        return RIGID * area, RIGID * area
     kt = _shared(contact.kt, contact.kt_area, area)
     kn = _shared(contact.kn, contact.kn_area, area)
     kn = kn if mapped is None else mapped
@@ -87,14 +93,14 @@ def stiffnesses(
 def interface_law(patches: Sequence[Patch], contact: Contact, ratio: float) -> InterfaceLaw:
     """The interface law of all nodes of some patches, one patch after the other.
 
-    Rigid faces where ``contact.stiffness`` is "map": the paper's Eq. 23 takes the stiffness of the
-    elements from the pressure between rigid faces, after the seating.
+    Rigid faces where ``contact.stiffness`` is "rigid", and where it is "map": the paper's Eq. 23
+    takes the stiffness of the elements from the pressure between rigid faces, after the seating.
 
     Args:
         ratio: k_t / k_n, used where only one of the two is given (``pair_ratio``).
     """
     area = np.concatenate([patch.area for patch in patches])
-    if contact.stiffness == "map":
+    if contact.stiffness != "given":
         return rigid_faces(len(area))
     kn = [stiffnesses(seat_contact(contact, patch.name), ratio, patch.area)[1] for patch in patches]
     doubling = np.inf if contact.stiffening is None else contact.stiffening

@@ -16,7 +16,7 @@ from numba import njit
 
 from bladefem.errors import InputError, NotSolvedError
 
-from ..time.event_integrator import State, rest
+from ..time.event_integrator import State, state_at_rest
 from ..time.system import System
 from .explicit import Cycle, March, check_steps, explicit_march, sampled, settle
 
@@ -47,7 +47,7 @@ def direct(
     if explicit:
         check_steps(system, omega, steps)
     march = (explicit_march if explicit else newmark_march)(system, omega, steps)
-    return settle(march, start or rest(system), most, tolerance)
+    return settle(march, start or state_at_rest(system), most, tolerance)
 
 
 def newmark_march(system: System, omega: float, steps: int) -> March:

@@ -18,7 +18,7 @@ from numba import njit
 from bladefem.errors import InputError
 
 from ..friction.time_step import stable_step, step_1d
-from ..time.event_integrator import State, rest
+from ..time.event_integrator import State, state_at_rest
 from ..time.system import System
 
 __all__ = ["Cycle", "check_steps", "damper_cycle", "explicit_march", "settle", "stable_steps"]
@@ -80,7 +80,9 @@ def damper_cycle(
         InputError: the step is beyond the stability limit.
     """
     check_steps(system, omega, steps)
-    return settle(explicit_march(system, omega, steps), start or rest(system), most, tolerance)
+    return settle(
+        explicit_march(system, omega, steps), start or state_at_rest(system), most, tolerance
+    )
 
 
 def settle(march: March, start: State, most: int, tolerance: float) -> Cycle:

@@ -17,30 +17,23 @@ from bladefem.errors import InputError
 from bladefem.friction.coulomb_2d_plain import plain_batch
 from bladefem.friction.fourier import harmonics_of
 from bladefem.friction.kernel_1d import jenkins_batch
-from bladefem.friction.law import groups_by_law, select_elements
+from bladefem.friction.law_table import groups_by_law, select_elements
 from bladefem.friction.periodic_law import periodic_forces
 from bladefem.friction.simd.kernel_2d import disc_batch
-from bladefem.friction.trigonometric_tables import patterns, tables
+from bladefem.friction.states import GROSS_SLIP, PARTIAL_SLIP, SEPARATED, STICK
+from bladefem.friction.trigonometric_tables import derivative_patterns, trigonometric_tables
 
 __all__ = [
-    "GROSS_SLIP",
-    "PARTIAL_SLIP",
     "PERIODIC",
-    "SEPARATED",
-    "STICK",
     "Forces",
     "check_motion",
+    "contact_states",
+    "convergence_reason",
     "dissipated_energy",
     "evaluate",
     "finite_load",
-    "contact_states",
-    "convergence_reason",
 ]
 
-SEPARATED = 0
-STICK = 1
-PARTIAL_SLIP = 2
-GROSS_SLIP = 3
 PRECISIONS = {"double": np.float64, "single": np.float32}
 PERIODIC = "periodic"
 
@@ -50,8 +43,8 @@ def _vector_kernel(w, load, nodes, samples, precision, cycles, jacobian, F, shar
     n, d, K = w.shape
     H = harmonics_of(w)
     J = np.empty((n, d, K, d * K) if jacobian else (n, 0, 0, 0))
-    rows = patterns(H, samples, PRECISIONS[precision])
-    disc_batch(w, load, nodes, tables(H, samples), rows, cycles, F, J, shares, used)
+    rows = derivative_patterns(H, samples, PRECISIONS[precision])
+    disc_batch(w, load, nodes, trigonometric_tables(H, samples), rows, cycles, F, J, shares, used)
     return J
 
 
@@ -59,7 +52,9 @@ def _plain_kernel(w, load, nodes, samples, precision, cycles, jacobian, F, share
     """The same by the plain kernel."""
     n, d, K = w.shape
     J = np.empty((n, d, K, d * K))
-    plain_batch(w, load, nodes, tables(harmonics_of(w), samples), cycles, F, J, shares, used)
+    plain_batch(
+        w, load, nodes, trigonometric_tables(harmonics_of(w), samples), cycles, F, J, shares, used
+    )
     return J
 
 
@@ -121,7 +116,7 @@ def evaluate(
     load = _prescribed_load(load, n, samples)
     if elements.law is not None:
         return _evaluate_laws(elements, w, samples, jacobian, load, cycles, precision)
-    tab = tables(harmonics_of(w), samples)
+    tab = trigonometric_tables(harmonics_of(w), samples)
     F = np.empty((n, d, K))
     shares = np.empty((n, 3))
     used = np.full(n, 2)
@@ -157,7 +152,7 @@ def _evaluate_laws(
     """The same for elements of several laws, law after law; Coulomb's with its kernels."""
     n, d, K = w.shape
     # raises where the samples are too few
-    tables(harmonics_of(w), samples)
+    trigonometric_tables(harmonics_of(w), samples)
     F = np.empty((n, d, K))
     J = np.empty((n, d, K, d, K)) if jacobian else None
     shares = np.empty((n, 3))

@@ -16,16 +16,13 @@ from math import sqrt
 
 from numba import njit
 
-__all__ = ["CLOSING", "SEPARATED", "SLIP", "STICK", "edge", "middle"]
+from bladefem.friction.states import CLOSING, SEPARATED, SLIP, STICK
 
-SEPARATED = 0
-STICK = 1
-SLIP = 2
-CLOSING = 3
+__all__ = ["force_at_middle", "march_edge"]
 
 
 @njit(cache=True, error_model="numpy", inline="always")
-def decay(x):
+def angle_decay(x):
     """Factor of tan(psi/2) over half an edge and the slope of its logarithm.
 
     The factor tends to exp(-x/2) for small x and to 1/x for large x.
@@ -36,7 +33,7 @@ def decay(x):
 
 
 @njit(cache=True, error_model="numpy", inline="always")
-def crossing(fx, fy, dx, dy, R0, dR):
+def limit_crossing(fx, fy, dx, dy, R0, dR):
     """Share of the edge after which |f + s d| reaches R0 + s dR; 0 if it starts on the circle and
     leaves it.
     """
@@ -50,7 +47,7 @@ def crossing(fx, fy, dx, dy, R0, dR):
 
 
 @njit(cache=True, error_model="numpy", inline="always")
-def turn(c, s, E):
+def turned_angle(c, s, E):
     """(cos, sin, d psi_1 / d psi) of the angle after tan(psi/2) has fallen by E, from cos psi = c,
     sin psi = s.
     """
@@ -60,7 +57,7 @@ def turn(c, s, E):
 
 
 @njit(cache=True, error_model="numpy", inline="always")
-def _direction(dx, dy, hx, hy, R):
+def _unit_increment(dx, dy, hx, hy, R):
     """(length, ux, uy) of the increment; a vanishing one is taken along the force."""
     L = sqrt(dx * dx + dy * dy)
     tiny = 1e-12 * R
@@ -71,7 +68,7 @@ def _direction(dx, dy, hx, hy, R):
 
 
 @njit(cache=True, error_model="numpy", inline="always")
-def _slip(fx, fy, dx, dy, N0, N1, mu, share):
+def _slipping_force(fx, fy, dx, dy, N0, N1, mu, share):
     """Unit force (2) at share 1 (end) or 0.5 (middle) of an edge that slips there, and share after
     which it slips.
 
@@ -80,22 +77,22 @@ def _slip(fx, fy, dx, dy, N0, N1, mu, share):
     R0 = mu * N0
     dR = mu * (N1 - N0)
     Rm = 0.5 * mu * (N0 + N1)
-    alpha = crossing(fx, fy, dx, dy, R0, dR)
+    alpha = limit_crossing(fx, fy, dx, dy, R0, dR)
     hx = fx + alpha * dx
     hy = fy + alpha * dy
     R = R0 + alpha * dR
     H = sqrt(hx * hx + hy * hy)
-    L, ux, uy = _direction(dx, dy, hx, hy, Rm)
+    L, ux, uy = _unit_increment(dx, dy, hx, hy, Rm)
     if H <= 0.0:
         return ux, uy, alpha, 0.0, 0.0, -uy / L, ux / L, 0.0, 0.0
     x = L / Rm
     y = x * (1.0 - alpha / share)
     inverse = 1.0 / H
-    E, fall = decay(y)
+    E, fall = angle_decay(y)
     if share == 1.0:
         E = E * E
         fall = 2.0 * fall
-    C, S, a = turn((hx * ux + hy * uy) * inverse, (hy * ux - hx * uy) * inverse, E)
+    C, S, a = turned_angle((hx * ux + hy * uy) * inverse, (hy * ux - hx * uy) * inverse, E)
     # n: d(angle of h)/dh
     nx = -hy * inverse * inverse
     ny = hx * inverse * inverse
@@ -121,7 +118,7 @@ def _slip(fx, fy, dx, dy, N0, N1, mu, share):
 
 
 @njit(cache=True, error_model="numpy", inline="always")
-def _closed(dx, dy, N0, N1, mu):
+def _closing_force(dx, dy, N0, N1, mu):
     """State and force at the end of an edge that closes: from f = 0 and R = 0 the force follows the
     motion.
     """
@@ -134,7 +131,7 @@ def _closed(dx, dy, N0, N1, mu):
 
 
 @njit(cache=True, error_model="numpy", inline="always")
-def edge(fx, fy, dx, dy, N0, N1, mu):
+def march_edge(fx, fy, dx, dy, N0, N1, mu):
     """(state at the end, f there (2), state in the middle, by (6)) after one edge from f = (fx, fy)
     [N].
 
@@ -147,7 +144,7 @@ def edge(fx, fy, dx, dy, N0, N1, mu):
     none = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
     if N0 <= 0.0:
         if N1 > 0.0:
-            end, ex, ey = _closed(dx, dy, N0, N1, mu)
+            end, ex, ey = _closing_force(dx, dy, N0, N1, mu)
             mid = end if N0 + N1 > 0.0 else SEPARATED
             if end == SLIP:
                 L2 = dx * dx + dy * dy
@@ -160,7 +157,7 @@ def edge(fx, fy, dx, dy, N0, N1, mu):
         ey = fy + dy
         if ex * ex + ey * ey <= R1 * R1:
             return STICK, ex, ey, STICK, none
-        ex, ey, alpha, p0, p1, q0, q1, r0, r1 = _slip(fx, fy, dx, dy, N0, N1, mu, 1.0)
+        ex, ey, alpha, p0, p1, q0, q1, r0, r1 = _slipping_force(fx, fy, dx, dy, N0, N1, mu, 1.0)
         return SLIP, R1 * ex, R1 * ey, SLIP if alpha < 0.5 else STICK, (p0, p1, q0, q1, r0, r1)
     if N0 + N1 > 0.0:
         mid = SLIP if (fx + 0.5 * dx) ** 2 + (fy + 0.5 * dy) ** 2 > Rm * Rm else STICK
@@ -168,7 +165,7 @@ def edge(fx, fy, dx, dy, N0, N1, mu):
 
 
 @njit(cache=True, error_model="numpy", inline="always")
-def middle(fx, fy, dx, dy, N0, N1, mu, mid):
+def force_at_middle(fx, fy, dx, dy, N0, N1, mu, mid):
     """f (2) in the middle, where the state is mid, of an edge from f = (fx, fy) [N]; by (6) as edge
     has it.
     """
@@ -185,5 +182,5 @@ def middle(fx, fy, dx, dy, N0, N1, mu, mid):
         L2 = dx * dx + dy * dy
         scale = Rm / sqrt(L2)
         return scale * dx, scale * dy, (0.0, 0.0, -dy / L2, dx / L2, 0.0, 0.0)
-    ux, uy, _, p0, p1, q0, q1, r0, r1 = _slip(fx, fy, dx, dy, N0, N1, mu, 0.5)
+    ux, uy, _, p0, p1, q0, q1, r0, r1 = _slipping_force(fx, fy, dx, dy, N0, N1, mu, 0.5)
     return Rm * ux, Rm * uy, (p0, p1, q0, q1, r0, r1)

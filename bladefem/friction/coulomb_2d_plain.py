@@ -1,12 +1,13 @@
 """Sampled 2-D Coulomb elements, written plainly: the definition of what `bladefem.friction.simd`
 computes in vectors, its judge in the tests, and its fallback.
 
-The force is marched from edge to edge of the polygon round the motion (`coulomb_2d.edge`), the
-force at a sample is that in the middle of its edge (`coulomb_2d.middle`). Its derivative by the
-coefficients is carried along as two rows, with two more columns by the force at the start. Marching
-ends when the force repeats itself; the derivative of the periodic force then follows from that of
-the period map, where it has one, else from the march itself. Some 35 to 70 times as slow as the
-vector kernel, as it carries the derivative through every period that it marches.
+The force is marched from edge to edge of the polygon round the motion (`coulomb_2d.march_edge`),
+the force at a sample is that in the middle of its edge (`coulomb_2d.force_at_middle`). Its
+derivative by the coefficients is carried along as two rows, with two more columns by the force at
+the start. Marching ends when the force repeats itself; the derivative of the periodic force then
+follows from that of the period map, where it has one, else from the march itself. Some 35 to 70
+times as slow as the vector kernel, as it carries the derivative through every period that it
+marches.
 """
 
 from __future__ import annotations
@@ -14,7 +15,8 @@ from __future__ import annotations
 import numpy as np
 from numba import njit
 
-from bladefem.friction.coulomb_2d import CLOSING, SLIP, STICK, edge, middle
+from bladefem.friction.coulomb_2d import force_at_middle, march_edge
+from bladefem.friction.states import CLOSING, SLIP, STICK
 
 __all__ = ["plain_batch"]
 
@@ -53,7 +55,7 @@ def _rows_at(state, f, limit, rise, by, before, change, mu, pressed):
 
 
 @njit(cache=True, error_model="numpy")
-def _march(path, basis, node, weights, f, rows, F, sums):
+def _march_period(path, basis, node, weights, f, rows, F, sums):
     """One period from the force f (2,) with its rows (2, 3K + 2), both changed to those at its end.
 
     Fills F (2, K) and sums (2, K, 3K + 2) with the harmonics of the forces at the samples and of
@@ -78,8 +80,8 @@ def _march(path, basis, node, weights, f, rows, F, sums):
         loads[0, :K] = kn * basis[i]
         loads[1, :K] = kn * basis[after]
         change = (moved, loads, (dx, dy))
-        end, ex, ey, mid, by = edge(f[0], f[1], dx, dy, N0, N1, mu)
-        mx, my, by_mid = middle(f[0], f[1], dx, dy, N0, N1, mu, mid)
+        end, ex, ey, mid, by = march_edge(f[0], f[1], dx, dy, N0, N1, mu)
+        mx, my, by_mid = force_at_middle(f[0], f[1], dx, dy, N0, N1, mu, mid)
         # in the middle half of the increment is felt, or what a closing contact has felt of it
         rise = N1 - N0 if mid == CLOSING or end == CLOSING else 1.0
         half = (loads[0] + loads[1]) / 2
@@ -113,7 +115,7 @@ def _march(path, basis, node, weights, f, rows, F, sums):
 
 
 @njit(cache=True, error_model="numpy")
-def _start(path, basis, node, f, rows):
+def _start_force(path, basis, node, f, rows):
     """The force k_t w at the first knot, drawn back onto the circle, and its rows."""
     kt, kn, mu = node
     K = basis.shape[1]
@@ -137,7 +139,7 @@ def _start(path, basis, node, f, rows):
 
 
 @njit(cache=True, error_model="numpy")
-def _periodic(path, basis, node, weights, limit, F, J):
+def _periodic_force(path, basis, node, weights, limit, F, J):
     """Fill F (2, K) and J (2, K, 3K) of the periodic state; returns samples that slip, and cycles,
     negative where the force does not repeat itself.
     """
@@ -146,14 +148,14 @@ def _periodic(path, basis, node, weights, limit, F, J):
     f = np.empty(2)
     rows = np.zeros((2, M + 2))
     sums = np.empty((2, K, M + 2))
-    _start(path, basis, node, f, rows)
+    _start_force(path, basis, node, f, rows)
     scale = node[2] * max(path[2].max(), 0.0)
     for cycle in range(1, limit + 1):
         fx = f[0]
         fy = f[1]
         rows[:, M:] = np.eye(2)
         before = rows[:, :M].copy()
-        slips = _march(path, basis, node, weights, f, rows, F, sums)
+        slips = _march_period(path, basis, node, weights, f, rows, F, sums)
         if np.hypot(f[0] - fx, f[1] - fy) <= TOLERANCE * scale:
             left = np.eye(2) - rows[:, M:]
             J[:] = sums[:, :, :M]
@@ -195,7 +197,7 @@ def plain_batch(w, load, nodes, tab, limit, F, J, shares, cycles):
             F[e, 0, k] = np.sum(weights[:, k] * np.maximum(sampled, 0.0))
             for l in range(K):
                 J[e, 0, k, l] = kn * np.sum(weights[:, k] * closed * tab.at[:, l])
-        slips, cycles[e] = _periodic(
+        slips, cycles[e] = _periodic_force(
             path, tab.knots, (kt, kn, mu), weights, limit, F[e, 1:], J[e, 1:]
         )
         shares[e, 1] = slips / S

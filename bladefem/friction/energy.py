@@ -6,7 +6,7 @@ import numpy as np
 
 from bladefem.data import Elements
 from bladefem.friction.fourier import harmonics_of, synthesis
-from bladefem.friction.law import groups_by_law
+from bladefem.friction.law_table import groups_by_law
 
 __all__ = ["free_static_force"]
 

@@ -19,7 +19,7 @@ from bladefem.friction.fourier import derivative, harmonics_of
 __all__ = ["Approximation", "by_harmonic", "force_of", "from_harmonics", "from_series", "work_of"]
 
 # of an element's largest harmonic: what is smaller is rounding
-FAINT = 1e-12
+ROUNDING_SHARE = 1e-12
 
 
 @dataclass(frozen=True)
@@ -85,7 +85,7 @@ def by_harmonic(u: np.ndarray, f: np.ndarray, omega: float) -> Approximation:
     cf = f[..., 1::2]
     sf = f[..., 2::2]
     size = cu**2 + su**2
-    size = np.where(size > FAINT**2 * size.max(-1, keepdims=True), size, np.nan)
+    size = np.where(size > ROUNDING_SHARE**2 * size.max(-1, keepdims=True), size, np.nan)
     return Approximation(
         (cu * cf + su * sf) / size, (su * cf - cu * sf) / (omega * h * size), f[..., 0]
     )

@@ -15,8 +15,8 @@ __all__ = [
     "analysis",
     "derivative",
     "harmonics_of",
-    "synthesis",
     "sample_instants",
+    "synthesis",
     "to_complex",
     "to_real",
 ]

@@ -14,27 +14,25 @@ import numpy as np
 from numba import njit
 
 from bladefem.friction.simd.codegen import zeros
-from bladefem.friction.trigonometric_tables import Node, empty_gram, gram, values, weighted
+from bladefem.friction.states import SEPARATED, SLIP_DOWN, SLIP_UP, STICK
+from bladefem.friction.trigonometric_tables import (
+    Node,
+    empty_gram,
+    gram_matrix,
+    indicator_coefficients,
+    motion_values,
+)
 
 __all__ = [
-    "SEPARATED",
-    "SLIP_DOWN",
-    "SLIP_UP",
-    "STICK",
-    "assemble",
-    "bounds",
+    "assemble_linear_parts",
     "jenkins_batch",
     "march_states",
+    "slider_bounds",
 ]
-
-SEPARATED = 0
-STICK = 1
-SLIP_UP = 2
-SLIP_DOWN = 3
 
 
 @njit(_nrt=False, cache=True, error_model="numpy")
-def bounds(g, N, mu, low, high):
+def slider_bounds(g, N, mu, low, high):
     """Fill the bounds low, high (S,) of the slider, g -+ mu N [N]; returns the smallest N."""
     least = N[0]
     for i in range(g.size):
@@ -46,7 +44,7 @@ def bounds(g, N, mu, low, high):
 
 
 @njit(_nrt=False, cache=True, error_model="numpy")
-def _scan(b, g, N, low, high, opens, first, state):
+def _scan_period(b, g, N, low, high, opens, first, state):
     """States of one period from slider b: (slider, last event, its sign, period without event).
 
     The first period writes all states, a later one only until it meets the period before.
@@ -104,15 +102,15 @@ def march_states(g, N, low, high, opens, state):
         b = high[S - 1]
         last = S - 1
         sign = -1.0
-    b, event, way, quiet = _scan(b, g, N, low, high, opens, True, state)
+    b, event, way, quiet = _scan_period(b, g, N, low, high, opens, True, state)
     if quiet:
         return last, sign, True
-    b, _, _, quiet = _scan(b, g, N, low, high, opens, False, state)
+    b, _, _, quiet = _scan_period(b, g, N, low, high, opens, False, state)
     return event, way, quiet
 
 
 @njit(_nrt=False, cache=True, error_model="numpy")
-def _origin(i, state, g, N, el, at, rows):
+def _stick_origin(i, state, g, N, el, at, rows):
     """Rows (2, K) of d(f - kt w) by normal and tangential coefficients in the stick after event i;
     f - kt w [N].
     """
@@ -134,7 +132,7 @@ def _origin(i, state, g, N, el, at, rows):
 
 
 @njit(cache=True, error_model="numpy")
-def _stuck(last, sign, g, N, el, tab, means, F, J):
+def _stuck_period(last, sign, g, N, el, tab, means, F, J):
     """A period without events; a slip of the first period leaves its offset."""
     means[0] += tab.sums[g.size]
     means[2] += tab.sums[g.size]
@@ -146,7 +144,7 @@ def _stuck(last, sign, g, N, el, tab, means, F, J):
 
 
 @njit(_nrt=False, cache=True, error_model="numpy")
-def _stretches(state, g, N, el, tab, means, F, J, rows, weight):
+def _add_stretches(state, g, N, el, tab, means, F, J, rows, weight):
     """Add to the basis means (3, 4H+1) of stick, signed slip and contact, and the offsets of
     sticking to F and J.
     """
@@ -174,8 +172,8 @@ def _stretches(state, g, N, el, tab, means, F, J, rows, weight):
             means[3, p] = mean
         if code != STICK:
             continue
-        c = _origin((a - 1) % S, state, g, N, el, tab.at, rows)
-        weighted(means[3], weight)
+        c = _stick_origin((a - 1) % S, state, g, N, el, tab.at, rows)
+        indicator_coefficients(means[3], weight)
         for k in range(K):
             F[1, k] += weight[k] * c
             for d in range(2):
@@ -184,14 +182,14 @@ def _stretches(state, g, N, el, tab, means, F, J, rows, weight):
 
 
 @njit(_nrt=False, cache=True, error_model="numpy")
-def assemble(w, base, el, means, F, J, around, block):
+def assemble_linear_parts(w, base, el, means, F, J, around, block):
     """Add the parts linear in w (2, K): kt M_stick, mu M_slip and M_contact of base (K,) + kn w.
 
     around as empty_gram makes it and block (K, K) are scratch.
     """
     K = w.shape[1]
     for row, factor, column, of in ((1, el.kt, 1, 0), (1, el.mu, 0, 1), (0, 1.0, 0, 2)):
-        gram(means[of], around, block)
+        gram_matrix(means[of], around, block)
         stiffness = factor if of == 0 else factor * el.kn
         for k in range(K):
             total = 0.0
@@ -244,21 +242,21 @@ def jenkins_batch(w, load, nodes, tab, F, J, shares):
     around = empty_gram(K // 2)
     for e in range(n):
         el = Node(nodes[e, 0], nodes[e, 1], nodes[e, 2], nodes[e, 3])
-        values(tab.transposed, w[e, 1], el.kt, 0.0, g)
+        motion_values(tab.transposed, w[e, 1], el.kt, 0.0, g)
         base[0] = 0.0 if load.shape[1] else el.n0
-        values(tab.transposed, w[e, 0], el.kn, base[0], N)
+        motion_values(tab.transposed, w[e, 0], el.kn, base[0], N)
         if load.shape[1]:
             N += load[e]
-        opens = bounds(g, N, el.mu, low, high) <= 0.0
+        opens = slider_bounds(g, N, el.mu, low, high) <= 0.0
         last, sign, stuck = march_states(g, N, low, high, opens, state)
         means[:] = 0.0
         F[e] = 0.0
         J[e] = 0.0
         if stuck:
-            _stuck(last, sign, g, N, el, tab, means, F[e], J[e])
+            _stuck_period(last, sign, g, N, el, tab, means, F[e], J[e])
         else:
-            _stretches(state, g, N, el, tab, means, F[e], J[e], rows, weight)
-        assemble(w[e], base, el, means, F[e], J[e], around, block)
+            _add_stretches(state, g, N, el, tab, means, F[e], J[e], rows, weight)
+        assemble_linear_parts(w[e], base, el, means, F[e], J[e], around, block)
         if load.shape[1]:
             _add_series(load[e], state, el.mu, tab, F[e])
         shares[e, 0] = means[0, 0]

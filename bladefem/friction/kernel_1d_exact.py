@@ -27,10 +27,11 @@ from bladefem.friction.aft import (
     finite_load,
 )
 from bladefem.friction.fourier import harmonics_of
-from bladefem.friction.kernel_1d import SEPARATED, SLIP_DOWN, SLIP_UP, STICK, assemble
-from bladefem.friction.law import require_coulomb
-from bladefem.friction.roots import NEVER, rise, value
-from bladefem.friction.trigonometric_tables import Node, empty_gram, weighted
+from bladefem.friction.kernel_1d import assemble_linear_parts
+from bladefem.friction.law_table import require_coulomb
+from bladefem.friction.roots import NO_ROOT, first_rise, motion_value
+from bladefem.friction.states import SEPARATED, SLIP_DOWN, SLIP_UP, STICK
+from bladefem.friction.trigonometric_tables import Node, empty_gram, indicator_coefficients
 
 __all__ = ["evaluate_exact", "transitions"]
 
@@ -47,9 +48,9 @@ AFTER_UP = 1
 AFTER_DOWN = 2
 CONTACT = 3
 # stretches kept in one period
-MOST = 512
+MOST_EVENTS = 512
 # events in one bracket
-MOST_AT_ONCE = 25
+MOST_EVENTS_IN_BRACKET = 25
 
 
 def evaluate_exact(
@@ -92,9 +93,12 @@ def evaluate_exact(
     J = np.zeros((n, d, K, d, K))
     shares = np.empty((n, 3))
     counts = np.empty(n, dtype=np.int64)
-    _batch(w, base, nodes, brackets, F, J, shares, counts)
+    exact_batch(w, base, nodes, brackets, F, J, shares, counts)
     reason = convergence_reason(
-        F, counts, f"have more than {MOST} transitions a period, or {MOST_AT_ONCE} nearly at once"
+        F,
+        counts,
+        f"have more than {MOST_EVENTS} transitions a period, or {MOST_EVENTS_IN_BRACKET} nearly "
+        "at once",
     )
     return Forces(
         F,
@@ -118,14 +122,16 @@ def transitions(
     K = w.shape[2]
     base = np.zeros(K)
     base[0] = nodes[0, 3]
-    spans = np.empty((MOST, 5))
+    spans = np.empty((MOST_EVENTS, 5))
     el = Node(*nodes[0])
-    count, _, _, _ = _steady(_polynomials(w[0], base, el), brackets or 12 * (K // 2 + 1), spans)
+    count, _, _, _ = _steady_stretches(
+        _event_polynomials(w[0], base, el), brackets or 12 * (K // 2 + 1), spans
+    )
     return [(float(a), float(b), int(state)) for a, b, state, _, _ in spans[: max(count, 0)]]
 
 
 @njit(cache=True, error_model="numpy")
-def _slope(c, out):
+def _motion_derivative(c, out):
     """Coefficients of the derivative of the motion c."""
     out[0] = 0.0
     for h in range(1, (c.size + 1) // 2):
@@ -133,7 +139,7 @@ def _slope(c, out):
 
 
 @njit(cache=True, error_model="numpy")
-def _polynomials(w, base, el):
+def _event_polynomials(w, base, el):
     """(8, K) coefficients [N]: the six whose rise ends a state, then g = kt w and N."""
     K = w.shape[1]
     q = np.empty((8, K))
@@ -143,36 +149,36 @@ def _polynomials(w, base, el):
     q[DOWN] = -q[6] - el.mu * q[7]
     q[OPEN] = -q[7]
     q[CLOSE] = q[7]
-    _slope(-q[UP], q[STOP_UP])
-    _slope(-q[DOWN], q[STOP_DOWN])
+    _motion_derivative(-q[UP], q[STOP_UP])
+    _motion_derivative(-q[DOWN], q[STOP_DOWN])
     return q
 
 
 @njit(cache=True, error_model="numpy")
-def _next(state, b, q, t, end, small):
+def _next_event(state, b, q, t, end, small):
     """(time, polynomial) of the first event after t in the bracket up to ``end``; time NEVER for
     none.
     """
-    best = NEVER
+    best = NO_ROOT
     which = -1
     if state == SEPARATED:
-        return rise(q[CLOSE], 0.0, t, end, small[CLOSE]), CLOSE
+        return first_rise(q[CLOSE], 0.0, t, end, small[CLOSE]), CLOSE
     if state == STICK:
-        best = rise(q[UP], b, t, end, small[UP])
+        best = first_rise(q[UP], b, t, end, small[UP])
         which = UP
-        other = rise(q[DOWN], -b, t, end, small[DOWN])
+        other = first_rise(q[DOWN], -b, t, end, small[DOWN])
         if other < best:
             best = other
             which = DOWN
     else:
         which = STOP_UP if state == SLIP_UP else STOP_DOWN
-        best = rise(q[which], 0.0, t, end, small[which])
-    opening = rise(q[OPEN], 0.0, t, end, small[OPEN])
+        best = first_rise(q[which], 0.0, t, end, small[which])
+    opening = first_rise(q[OPEN], 0.0, t, end, small[OPEN])
     return (opening, OPEN) if opening < best else (best, which)
 
 
 @njit(cache=True, error_model="numpy")
-def _enter(q, t, which, b):
+def _enter_state(q, t, which, b):
     """(state, slider, how it got there) after the event of polynomial ``which`` at time t."""
     if which == UP:
         return SLIP_UP, b, AFTER_UP
@@ -181,38 +187,38 @@ def _enter(q, t, which, b):
     if which == OPEN:
         return SEPARATED, b, CONTACT
     if which == STOP_UP:
-        return STICK, value(q[UP], t)[0], AFTER_UP
+        return STICK, motion_value(q[UP], t)[0], AFTER_UP
     if which == STOP_DOWN:
-        return STICK, -value(q[DOWN], t)[0], AFTER_DOWN
-    if value(q[UP], t)[1] > 0.0:
+        return STICK, -motion_value(q[DOWN], t)[0], AFTER_DOWN
+    if motion_value(q[UP], t)[1] > 0.0:
         return SLIP_UP, b, AFTER_UP
-    if value(q[DOWN], t)[1] > 0.0:
+    if motion_value(q[DOWN], t)[1] > 0.0:
         return SLIP_DOWN, b, AFTER_DOWN
-    return STICK, value(q[6], t)[0], CONTACT
+    return STICK, motion_value(q[6], t)[0], CONTACT
 
 
 @njit(cache=True, error_model="numpy")
-def _begin(q):
+def _initial_state(q):
     """(state, slider, how) at tau = 0, where f = g is clamped."""
-    low = value(q[UP], 0.0)[0]
-    high = -value(q[DOWN], 0.0)[0]
-    if value(q[CLOSE], 0.0)[0] <= 0.0:
+    low = motion_value(q[UP], 0.0)[0]
+    high = -motion_value(q[DOWN], 0.0)[0]
+    if motion_value(q[CLOSE], 0.0)[0] <= 0.0:
         return SEPARATED, 0.0, CONTACT
     if low > 0.0:
-        return (SLIP_UP if value(q[UP], 0.0)[1] > 0.0 else STICK), low, AFTER_UP
+        return (SLIP_UP if motion_value(q[UP], 0.0)[1] > 0.0 else STICK), low, AFTER_UP
     if high < 0.0:
-        return (SLIP_DOWN if value(q[DOWN], 0.0)[1] > 0.0 else STICK), high, AFTER_DOWN
+        return (SLIP_DOWN if motion_value(q[DOWN], 0.0)[1] > 0.0 else STICK), high, AFTER_DOWN
     return STICK, 0.0, START
 
 
 @njit(cache=True, error_model="numpy")
-def _steady(q, brackets, spans):
+def _steady_stretches(q, brackets, spans):
     """Stretches of the second period in spans (.., 5): start, end, state, how the slider came,
     when; their number.
 
     Returns (number, negative if there are too many; slider, how and when at the end).
     """
-    state, b, how = _begin(q)
+    state, b, how = _initial_state(q)
     when = 0.0
     count = 0
     small = np.empty(6)
@@ -228,8 +234,8 @@ def _steady(q, brackets, spans):
         for i in range(brackets):
             t = i * step
             end = (i + 1) * step
-            for _ in range(MOST_AT_ONCE):
-                at, which = _next(state, b, q, t, end, small)
+            for _ in range(MOST_EVENTS_IN_BRACKET):
+                at, which = _next_event(state, b, q, t, end, small)
                 if at > end:
                     break
                 if count + 1 >= spans.shape[0]:
@@ -241,7 +247,7 @@ def _steady(q, brackets, spans):
                     spans[count, 3] = how
                     spans[count, 4] = when
                     count += 1
-                state, b, how = _enter(q, at, which, b)
+                state, b, how = _enter_state(q, at, which, b)
                 begun = at
                 t = at
                 when = at
@@ -259,7 +265,7 @@ def _steady(q, brackets, spans):
 
 
 @njit(cache=True, error_model="numpy")
-def _means(a, b, out):
+def _basis_means(a, b, out):
     """Means over the circle of the basis up to 2H (4H+1,), restricted to a < tau < b."""
     out[0] = (b - a) / (2.0 * pi)
     for p in range(1, (out.size + 1) // 2):
@@ -268,15 +274,15 @@ def _means(a, b, out):
 
 
 @njit(cache=True, error_model="numpy")
-def _slider(how, t, q, el, basis, rows):
+def _slider_position(how, t, q, el, basis, rows):
     """Slider position b [N], set at time t, and its rows (2, K) by normal and tangential
     coefficients.
     """
     rows[:] = 0.0
     if how == START:
         return 0.0
-    g, dg, _ = value(q[6], t)
-    N, dN, _ = value(q[7], t)
+    g, dg, _ = motion_value(q[6], t)
+    N, dN, _ = motion_value(q[7], t)
     basis[0] = 1.0
     for h in range(1, (basis.size + 1) // 2):
         basis[2 * h - 1], basis[2 * h] = cos(h * t), sin(h * t)
@@ -291,13 +297,13 @@ def _slider(how, t, q, el, basis, rows):
 
 
 @njit(cache=True, error_model="numpy")
-def _batch(w, base, nodes, brackets, F, J, shares, counts):
+def exact_batch(w, base, nodes, brackets, F, J, shares, counts):
     """Forces F (n, 2, K), Jacobian J (n, 2, K, 2, K), shares (n, 3), numbers of stretches (n,); F
     and J come zeroed.
     """
     n = w.shape[0]
     K = w.shape[2]
-    spans = np.empty((MOST, 5))
+    spans = np.empty((MOST_EVENTS, 5))
     means = np.empty((4, 2 * K - 1))
     mean = np.empty(2 * K - 1)
     rows = np.empty((2, K))
@@ -307,8 +313,8 @@ def _batch(w, base, nodes, brackets, F, J, shares, counts):
     around = empty_gram(K // 2)
     for e in range(n):
         el = Node(nodes[e, 0], nodes[e, 1], nodes[e, 2], nodes[e, 3])
-        q = _polynomials(w[e], base[e], el)
-        count, _, _, _ = _steady(q, brackets, spans)
+        q = _event_polynomials(w[e], base[e], el)
+        count, _, _, _ = _steady_stretches(q, brackets, spans)
         counts[e] = count
         means[:] = 0.0
         for i in range(count):
@@ -317,20 +323,20 @@ def _batch(w, base, nodes, brackets, F, J, shares, counts):
             state = int(spans[i, 2])
             if state == SEPARATED:
                 continue
-            _means(a, b, mean)
+            _basis_means(a, b, mean)
             means[2] += mean
             if state != STICK:
                 means[1] += mean if state == SLIP_UP else -mean
                 means[3, 0] += mean[0]
                 continue
             means[0] += mean
-            slider = _slider(int(spans[i, 3]), spans[i, 4], q, el, basis, rows)
-            weighted(mean, weight)
+            slider = _slider_position(int(spans[i, 3]), spans[i, 4], q, el, basis, rows)
+            indicator_coefficients(mean, weight)
             for k in range(K):
                 F[e, 1, k] -= weight[k] * slider
                 for d in range(2):
                     for l in range(K):
                         J[e, 1, k, d, l] -= weight[k] * rows[d, l]
-        assemble(w[e], base[e], el, means, F[e], J[e], around, block)
+        assemble_linear_parts(w[e], base[e], el, means, F[e], J[e], around, block)
         shares[e, 0], shares[e, 1] = means[0, 0], means[3, 0]
         shares[e, 2] = 1.0 - shares[e, 0] - shares[e, 1]

@@ -1,8 +1,8 @@
-"""A friction law of one's own: what it has to say, and which element follows which law.
+"""A friction law of one's own: what it has to say.
 
-Without a law of their own (`Elements.law` is None) elements follow Coulomb's, for which there are
-compiled kernels. Any other rate-independent law is an object with the method `step`, see
-`FrictionLaw`; `bladefem.friction.periodic_law` finds its periodic state, and every path of the
+Without a law of their own elements follow Coulomb's, for which there are compiled kernels; see
+`bladefem.friction.law_table`. Any other rate-independent law is an object with the method `step`,
+see `FrictionLaw`; `bladefem.friction.periodic_law` finds its periodic state, and every path of the
 balance, its derivatives and the sweeps then use it. `docs/extending.md` shows Dahl's and Bouc and
 Wen's.
 """
@@ -10,24 +10,17 @@ Wen's.
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass, replace
-from typing import Any
+from dataclasses import dataclass
 
 import numpy as np
 from numba import njit
 
 from bladefem.data import Elements
-from bladefem.errors import InputError
 
 __all__ = [
     "FrictionLaw",
     "NodeLaw",
     "Slopes",
-    "groups_by_law",
-    "laws_of_nodes",
-    "merged_laws",
-    "require_coulomb",
-    "select_elements",
     "slopes_of",
 ]
 
@@ -207,78 +200,3 @@ def slopes_of(
         change(2, None, DIFFERENCE * before),
         change(3, None, DIFFERENCE * load),
     )
-
-
-def laws_of_nodes(elements: Elements) -> tuple[FrictionLaw | None, ...]:
-    """(n,) the law of each node; None is Coulomb's.
-
-    Raises:
-        InputError: as many laws as nodes are expected, each an object with the method step.
-    """
-    law: Any = elements.law
-    n = len(elements.kt)
-    laws = tuple(law) if isinstance(law, tuple | list) else (law,) * n
-    if len(laws) != n:
-        raise InputError(f"elements.law: {len(laws)} laws for {n} elements, expected one a node")
-    for one in laws:
-        if one is not None and not (
-            callable(getattr(one, "step", None)) and not isinstance(one, type)
-        ):
-            raise InputError(
-                f"elements.law: {one!r}, expected an object made from FrictionLaw, or None for "
-                "Coulomb's law"
-            )
-    return laws
-
-
-def groups_by_law(elements: Elements) -> list[tuple[FrictionLaw | None, np.ndarray]]:
-    """Each law with the numbers of its nodes."""
-    if elements.law is None:
-        return [(None, np.arange(len(elements.kt)))]
-    laws = laws_of_nodes(elements)
-    different = {id(law): law for law in laws}
-    return [
-        (law, np.array([i for i, other in enumerate(laws) if other is law]))
-        for law in different.values()
-    ]
-
-
-def select_elements(elements: Elements, rows: np.ndarray) -> Elements:
-    """Some of the elements, or some of them more than once."""
-    law = elements.law
-    if isinstance(law, tuple | list):
-        law = tuple(law[i] for i in rows)
-    parts = {name: np.asarray(getattr(elements, name))[rows] for name in ("kt", "kn", "mu", "n0")}
-    t0 = None if elements.t0 is None else np.asarray(elements.t0)[rows]
-    return replace(elements, **parts, law=law, t0=t0)
-
-
-def merged_laws(elements: Elements, groups: np.ndarray) -> Any:
-    """The law of elements that are joined in groups (n,) numbered 0 .. m-1.
-
-    Raises:
-        InputError: nodes of different laws in one group.
-    """
-    if not isinstance(elements.law, tuple | list):
-        return elements.law
-    laws = laws_of_nodes(elements)
-    merged = [laws[int(np.argmax(groups == group))] for group in range(int(groups.max()) + 1)]
-    for node, group in enumerate(groups):
-        if laws[node] is not merged[group]:
-            raise InputError(
-                f"elements.law: nodes of different laws in element {group}, expected one law for "
-                "the nodes that are joined"
-            )
-    return tuple(merged)
-
-
-def require_coulomb(elements: Elements, what: str) -> None:
-    """Raise InputError, with what asks for it, where an element follows another law."""
-    if elements.law is None:
-        return
-    others = [type(law).__name__ for law in laws_of_nodes(elements) if law is not None]
-    if others:
-        raise InputError(
-            f"elements.law: {what} is written for Coulomb's law, {len(others)} elements follow "
-            f"{', '.join(sorted(set(others)))}"
-        )

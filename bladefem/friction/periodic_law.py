@@ -20,7 +20,8 @@ import numpy as np
 
 from bladefem.data import Elements
 from bladefem.friction.fourier import analysis, harmonics_of, synthesis
-from bladefem.friction.law import DIFFERENCE, FrictionLaw, Slopes, select_elements, slopes_of
+from bladefem.friction.law import DIFFERENCE, FrictionLaw, Slopes, slopes_of
+from bladefem.friction.law_table import select_elements
 
 __all__ = ["LawForces", "periodic_forces"]
 

@@ -10,14 +10,14 @@ from math import cos, sin
 
 from numba import njit
 
-__all__ = ["rise", "value"]
+__all__ = ["first_rise", "motion_value"]
 
 # time of an event that does not happen
-NEVER = 1e300
+NO_ROOT = 1e300
 
 
 @njit(cache=True, error_model="numpy")
-def value(c, tau):
+def motion_value(c, tau):
     """(value, slope, curvature) at tau of the motion with coefficients c (K,)."""
     q = c[0]
     d = 0.0
@@ -38,14 +38,14 @@ def value(c, tau):
 
 
 @njit(cache=True, error_model="numpy")
-def _root(c, level, a, b, order):
+def _bracketed_root(c, level, a, b, order):
     """Zero in [a, b] of c - level (order 0), negative at a and positive at b, or of its slope
     falling through zero.
     """
     x = 0.5 * (a + b)
     sign = 1.0 if order == 0 else -1.0
     for _ in range(80):
-        q, d, e = value(c, x)
+        q, d, e = motion_value(c, x)
         f, slope = (q - level, d) if order == 0 else (sign * d, sign * e)
         if f > 0.0:
             b = x
@@ -62,11 +62,11 @@ def _root(c, level, a, b, order):
 
 
 @njit(cache=True, error_model="numpy")
-def _inflection(c, a, b, bend):
+def _inflection_time(c, a, b, bend):
     """Time in [a, b] at which the curvature, of the sign ``bend`` at a, changes its sign."""
     for _ in range(50):
         middle = 0.5 * (a + b)
-        if value(c, middle)[2] * bend > 0.0:
+        if motion_value(c, middle)[2] * bend > 0.0:
             a = middle
         else:
             b = middle
@@ -74,31 +74,31 @@ def _inflection(c, a, b, bend):
 
 
 @njit(cache=True, error_model="numpy")
-def rise(c, level, a, b, small):
+def first_rise(c, level, a, b, small):
     """Time in [a, b] at which the motion with coefficients c first exceeds ``level``, NEVER if it
     does not.
 
     ``small`` is the rounding error of values: a touch that is no higher does not count.
     """
-    qa, da, ea = value(c, a)
-    qb, db, eb = value(c, b)
+    qa, da, ea = motion_value(c, a)
+    qb, db, eb = motion_value(c, b)
     if qa - level > small:
         return a
     if qb - level > small:
-        return _root(c, level, a, b, 0)
+        return _bracketed_root(c, level, a, b, 0)
     low = a
     high = b
     # the slope may change its sign twice
     if da * ea < 0.0 and db * eb > 0.0 and ea * eb < 0.0:
-        middle = _inflection(c, a, b, ea)
+        middle = _inflection_time(c, a, b, ea)
         if da < 0.0:
             low = middle
-            da = value(c, middle)[1]
+            da = motion_value(c, middle)[1]
         else:
             high = middle
-            db = value(c, middle)[1]
+            db = motion_value(c, middle)[1]
     if da > 0.0 and db < 0.0:
-        peak = _root(c, level, low, high, 1)
-        if value(c, peak)[0] - level > small:
-            return _root(c, level, a, peak, 0)
-    return NEVER
+        peak = _bracketed_root(c, level, low, high, 1)
+        if motion_value(c, peak)[0] - level > small:
+            return _bracketed_root(c, level, a, peak, 0)
+    return NO_ROOT

@@ -36,9 +36,10 @@ def step_2d(px, py, dx, dy, N0, N1, mu):
     """New force x, y [N] and whether it slipped (1.0), from (px, py) and the elastic increment (dx,
     dy), loads N0, N1.
 
-    Sticks as long as it can, then slips: the angle psi between force and motion obeys psi' = -k |w'| sin(psi) / limit,
-    solved exactly for a straight step (Krieg and Krieg, J. Pressure Vessel Tech. 99 (1977) 510, for plasticity); the
-    plain radial return lags by half a step on curved paths.
+    Sticks as long as it can, then slips: the angle psi between force and motion obeys
+    psi' = -k |w'| sin(psi) / limit, solved exactly for a straight step (Krieg and Krieg, J.
+    Pressure Vessel Tech. 99 (1977) 510, for plasticity); the plain radial return lags by half a
+    step on curved paths.
     """
     if mu * N1 <= 0.0:
         return 0.0, 0.0, 0.0
@@ -53,7 +54,7 @@ def step_2d(px, py, dx, dy, N0, N1, mu):
         return tx, ty, 0.0
     path = np.hypot(dx, dy)
     grow = after - before
-    stick = _stick(
+    stick = _stick_share(
         path * path - grow * grow,
         px * dx + py * dy - before * grow,
         px * px + py * py - before * before,
@@ -75,7 +76,7 @@ def step_2d(px, py, dx, dy, N0, N1, mu):
 
 
 @njit(cache=True)
-def _stick(a, b, c):
+def _stick_share(a, b, c):
     """Share s of the step in stick: a s^2 + 2 b s + c = 0, where the force meets its growing
     limit.
     """

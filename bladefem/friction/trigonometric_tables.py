@@ -23,12 +23,12 @@ __all__ = [
     "Node",
     "Patterns",
     "Tables",
+    "derivative_patterns",
     "empty_gram",
-    "gram",
-    "patterns",
-    "tables",
-    "values",
-    "weighted",
+    "gram_matrix",
+    "indicator_coefficients",
+    "motion_values",
+    "trigonometric_tables",
 ]
 
 
@@ -46,7 +46,7 @@ class Node(NamedTuple):
 
 
 class Tables(NamedTuple):
-    """Read-only arrays for H harmonics and S samples; K = 2H+1, width as in lane_kernels.py, W as
+    """Read-only arrays for H harmonics and S samples; K = 2H+1, width as in time_kernels.py, W as
     in row_kernels.py.
     """
 
@@ -82,7 +82,7 @@ class Patterns(NamedTuple):
 
 
 @lru_cache(maxsize=8)
-def tables(H: int, samples: int) -> Tables:
+def trigonometric_tables(H: int, samples: int) -> Tables:
     """Tables for H harmonics; at least 4H+4 samples, below which the force harmonics are
     meaningless.
     """
@@ -96,26 +96,26 @@ def tables(H: int, samples: int) -> Tables:
     sums = np.concatenate([np.zeros((1, 4 * H + 1)), np.cumsum(wide, axis=0)])
     knots = synthesis(H, samples, -0.5)
     knots[:, 1:] /= np.repeat(np.cos(np.pi / samples * np.arange(1, H + 1)), 2)
-    more = _filled(samples) + LANES - samples
+    more = _filled_size(samples) + LANES - samples
     weights = analysis(H, samples).T
     along = knots[np.arange(samples + more) % samples].T
     blank = ((0, more), (0, 0))
-    arrays = at, at.T, sums, knots, along, np.pad(weights, blank), _fours(samples)
-    made = Tables(*map(_aligned, arrays), _filled(2 * H + 1))
+    arrays = at, at.T, sums, knots, along, np.pad(weights, blank), _sample_fours(samples)
+    made = Tables(*map(_aligned_copy, arrays), _filled_size(2 * H + 1))
     for array in made[:-1]:
         array.setflags(write=False)
     return made
 
 
 @lru_cache(maxsize=8)
-def patterns(H: int, samples: int, dtype: type) -> Patterns:
+def derivative_patterns(H: int, samples: int, dtype: type) -> Patterns:
     """Patterns for H harmonics and S samples."""
-    tab = tables(H, samples)
+    tab = trigonometric_tables(H, samples)
     pad = lambda x, rows=0: np.pad(x, ((0, rows), (0, tab.W - 2 * H - 1)))  # noqa: E731
     change = np.roll(tab.knots, -1, axis=0) - tab.knots
-    weights = np.pad(tab.analysis[: samples // 2 + 1], ((0, 0), (0, _tiled(H) - 2 * H - 1)))
+    weights = np.pad(tab.analysis[: samples // 2 + 1], ((0, 0), (0, _tiled_size(H) - 2 * H - 1)))
     at, change, weights = (
-        _aligned(x.astype(dtype)) for x in (pad(tab.at, 1), pad(change), weights)
+        _aligned_copy(x.astype(dtype)) for x in (pad(tab.at, 1), pad(change), weights)
     )
     made = Patterns(at, pad(tab.knots), change, weights)
     for array in made:
@@ -123,7 +123,7 @@ def patterns(H: int, samples: int, dtype: type) -> Patterns:
     return made
 
 
-def _aligned(array: np.ndarray) -> np.ndarray:
+def _aligned_copy(array: np.ndarray) -> np.ndarray:
     """A copy that begins as lanes.zeros does."""
     room = np.empty(array.nbytes + BLOCK, np.uint8)
     first = -room.ctypes.data % BLOCK
@@ -132,19 +132,19 @@ def _aligned(array: np.ndarray) -> np.ndarray:
     return copy
 
 
-def _filled(size: int) -> int:
+def _filled_size(size: int) -> int:
     """The next multiple of the lanes of a vector."""
     return -(-size // LANES) * LANES
 
 
-def _tiled(H: int) -> int:
+def _tiled_size(H: int) -> int:
     """Number of coefficients that folded sums fill, at least 2H+1: harmonics by twos up to 8, then
     by eights.
     """
     return 4 * (H // 2) + 3 if H < TILE else 2 * TILE * (H // TILE + 1) - 1
 
 
-def _fours(S: int) -> np.ndarray:
+def _sample_fours(S: int) -> np.ndarray:
     """(., 4) samples that share the values of all harmonics but for signs; where S is odd only
     pairs do.
     """
@@ -165,7 +165,7 @@ def empty_gram(H):
 
 
 @njit(_nrt=False, cache=True, error_model="numpy")
-def gram(m, around, out):
+def gram_matrix(m, around, out):
     """Analysis of synthesis restricted to a set whose basis means up to 2H are m (4H+1); I on a
     circle.
 
@@ -185,7 +185,7 @@ def gram(m, around, out):
 
 
 @njit(_nrt=False, cache=True, error_model="numpy")
-def weighted(m, out):
+def indicator_coefficients(m, out):
     """out (K,) = coefficients of the indicator function of a set with basis means m."""
     out[0] = m[0]
     for k in range(1, out.size):
@@ -193,7 +193,7 @@ def weighted(m, out):
 
 
 @njit(_nrt=False, cache=True, error_model="numpy", fastmath={"contract", "reassoc", "nsz"})
-def values(transposed, c, factor, offset, out):
+def motion_values(transposed, c, factor, offset, out):
     """out (S,) = offset plus factor times the motion with coefficients c (K,); synthesis transposed
     (K, S).
     """

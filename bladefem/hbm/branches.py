@@ -25,18 +25,23 @@ from .solve import solve
 from .solver.fallback import match_harmonics
 from .solver.newton import DEFAULTS, Options
 
-__all__ = ["Branches", "Resonance", "find_branches"]
+__all__ = ["TOLERANCE", "Branches", "Resonance", "find_branches"]
 
 # first and longest arc-length step, as shares of the band
 STEPS = (0.005, 0.05)
 # steps with which a local maximum is closed in
 FINE = 1e-4
-# points of all paths of a band
-LIMIT = 2000
+# points of all paths of a band: so many times unknowns, within these bounds
+EFFORT = 3e5
+FEWEST = 300
+MOST = 1500
 # paths of a band beside those from its ends
 MOST_PATHS = 6
 # relative distance of displacements up to which a motion lies on a path, between two of its points
 SAME = 0.03
+# residual of points of a path, relative: a looser one lets a path go on beyond a fold, 17 % above
+# the peak at 2e-5
+TOLERANCE = 1e-9
 # frequencies of the band where motions off the paths are looked for
 PROBES = 7
 # refinements of one local maximum
@@ -107,12 +112,19 @@ def find_branches(
         known: solutions in the band, such as those of a sweep.
         peak: relative accuracy of each local maximum.
     """
+    options = replace(options, tolerance=min(options.tolerance, TOLERANCE))
     notes: list[str] = []
     paths: list[_Path] = []
-    solved = sorted((p for p in known if p.converged), key=lambda p: p.omega)
+    # points that stick may have been solved with fewer harmonics
+    solved = [
+        replace(p, harmonics=H, samples=samples, w=match_harmonics(p.w, H))
+        for p in sorted(known, key=lambda p: p.omega)
+        if p.converged
+    ]
     if not solved:
         return Branches((), (), ("no point of the band was solved",))
-    budget = LIMIT
+    limit = int(np.clip(EFFORT / (model.springs.size * (2 * H + 1)), FEWEST, MOST))
+    budget = limit
     further = _further(model, band, solved[0], H, samples, options)
     for start in chain(solved[:1], solved[-1:], solved, further):
         forward = start is not solved[-1]
@@ -125,7 +137,7 @@ def find_branches(
         budget -= len(path.points)
         paths.append(path)
     if budget <= 0:
-        notes.append(f"paths ended after {LIMIT} points: there may be further motions")
+        notes.append(f"paths ended after {limit} points: there may be further motions")
     for path in paths:
         _close_in(model, path, band, peak, options)
     return _sorted_out(paths, options.probe, notes)

@@ -23,7 +23,7 @@ from .solver.residual import Balance, State, evaluate_balance
 __all__ = ["PathPoint", "follow"]
 
 # points of a path
-LIMIT = 5000
+MOST_PATH_POINTS = 5000
 # shares of the range beyond a point where the path stops, at which it is begun again
 RESTARTS = (1e-3, 3e-3, 0.01, 0.03)
 # times that a path is begun again
@@ -83,7 +83,7 @@ def follow(
     yield _path_point(task, spot)
     step, longest = steps
     restarts = 0
-    for _ in range(LIMIT):
+    for _ in range(MOST_PATH_POINTS):
         before = spot
         try:
             spot, step, fold = advance_path(task, spot, step, longest)
@@ -99,7 +99,8 @@ def follow(
         if not low <= spot.x <= high:
             return
     raise NotSolvedError(
-        f"path in {name} stopped at {parameter_value(name, spot.x):.6g} after {LIMIT} points"
+        f"path in {name} stopped at {parameter_value(name, spot.x):.6g} after {MOST_PATH_POINTS} "
+        "points"
     )
 
 

@@ -14,12 +14,12 @@ from .model import ReducedModel
 from .policy import uses_coulomb_kernels
 from .solution import Solution
 
-__all__ = ["INSTANTS", "leading_stuck_points", "sticks_safely"]
+__all__ = ["INSTANTS_PER_HARMONIC", "leading_stuck_points", "sticks_safely"]
 
 # a period of the highest harmonic at which full stick is confirmed
-INSTANTS = 64
+INSTANTS_PER_HARMONIC = 64
 # share of the friction limit kept in hand: between instants a harmonic rises by 1.2e-3
-SPARE = 4e-3
+FRICTION_MARGIN = 4e-3
 
 
 def sticks_safely(model: ReducedModel, solution: Solution) -> bool:
@@ -45,12 +45,12 @@ def _within_friction_limit(model: ReducedModel, f: np.ndarray) -> np.ndarray:
     """
     e = model.elements
     H = f.shape[-1] // 2
-    limit = (1 - SPARE) * e.mu
+    limit = (1 - FRICTION_MARGIN) * e.mu
     # of an alternating force the peak is known
     if f.shape[-2] == 1 and not model.normal and H == 1:
         peak = abs(f[..., 0, 0]) + np.hypot(f[..., 0, 1], f[..., 0, 2])
         return np.all(peak < limit * e.n0, axis=-1)
-    instants = INSTANTS * H
+    instants = INSTANTS_PER_HARMONIC * H
     force = f @ synthesis(H, instants).T
     normal = force[..., 0, :] if model.directions > e.tangents else e.n0[:, None]
     if model.normal and model.directions == e.tangents:

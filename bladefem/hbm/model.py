@@ -17,7 +17,7 @@ from ..friction.fourier import synthesis, to_real
 from .linear.bodies import Damping, Stack, stack_bodies
 from .validate_model import check_model, port_size
 
-__all__ = ["Damping", "ReducedModel"]
+__all__ = ["Damping", "ReducedModel", "in_series"]
 
 
 @dataclass(frozen=True)
@@ -69,6 +69,9 @@ class ReducedModel:
     # Prescribed part of the normal load beside n0 and kn w_n: harmonic >= 1 to complex amplitudes
     # of the nodes [N].
     normal: Mapping[int, np.ndarray] = field(default_factory=dict)
+    # (nodes, 1 + tangents) compliance of stiff interface layers that the residual flexibility of
+    # the sides already has [m/N] (contact.numerical_stiffness); None: the elements have it all
+    series: np.ndarray | None = None
     # (nodes, tangents) friction force at zero displacement from which the friction law starts [N]:
     # what the loading history left in nodes that never slip; elements.t0 when None
     start: np.ndarray | None = None
@@ -230,6 +233,14 @@ class ReducedModel:
     @cached_property
     def _kept(self) -> dict[Hashable, Any]:
         return {}
+
+
+def in_series(side: PortModel, compliance: np.ndarray) -> PortModel:
+    """A side with more compliance (nodes, 1 + tangents) [m/N] at its contact nodes."""
+    residual = np.array(side.residual)
+    rows = np.arange(len(residual))[side.ports["contact"]]
+    residual[rows, rows] += compliance.ravel()
+    return replace(side, residual=residual)
 
 
 def _first(models: tuple[PortModel, ...], H: int, name: str) -> tuple[PortModel, ...]:

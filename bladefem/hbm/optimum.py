@@ -23,15 +23,15 @@ from .sweep import first_look, local_maxima, response, size
 __all__ = ["Optimum", "optimum"]
 
 # values of the parameter tried before giving up
-LEVELS = 30
+MOST_LEVELS = 30
 # share of the highest peak below which the others are not solved again
-WORTH = 0.7
+SOLVED_HEIGHT_SHARE = 0.7
 # first step, as a share of the range (of a factor: of its logarithm)
-FIRST = 0.1
+FIRST_STEP_SHARE = 0.1
 # share of the highest peak from which a point of the coarse look is climbed
-NEARLY = 0.9
+NEARLY_HIGHEST = 0.9
 # dip of the height between two peaks, or distance where it is unknown: below it they are one
-SAME = 0.02
+SAME_PEAK_LOSS = 0.02
 
 
 @dataclass(frozen=True)
@@ -122,7 +122,7 @@ def optimum(
     )
     first, points = _first_level(search, middle)
     levels = {middle: first}
-    for _ in range(LEVELS):
+    for _ in range(MOST_LEVELS):
         points += _close_in(search, levels)
         tried = _highest_peaks(levels)
         best = min(tried, key=lambda peak: peak.height)
@@ -180,8 +180,8 @@ def _same_peak(peak: Peak, other: Peak) -> bool:
     way.
     """
     if peak.bend == 0:
-        return abs(peak.omega - other.omega) < SAME * peak.omega
-    return peak.bend * peak.height**2 / 4 * (peak.omega - other.omega) ** 2 < SAME
+        return abs(peak.omega - other.omega) < SAME_PEAK_LOSS * peak.omega
+    return peak.bend * peak.height**2 / 4 * (peak.omega - other.omega) ** 2 < SAME_PEAK_LOSS
 
 
 def _close_in(search: _Search, levels: dict[float, list[Peak]]) -> int:
@@ -190,10 +190,10 @@ def _close_in(search: _Search, levels: dict[float, list[Peak]]) -> int:
 
     Adds to the levels; returns the points spent.
     """
-    step = FIRST * search.width(*search.bounds)
+    step = FIRST_STEP_SHARE * search.width(*search.bounds)
     narrow = False
     points = 0
-    for _ in range(LEVELS):
+    for _ in range(MOST_LEVELS):
         low, high = _bracket_minimum(_highest_peaks(levels))
         if low is None or high is None:
             end, sign = (low, 1.0) if high is None else (high, -1.0)
@@ -209,7 +209,7 @@ def _close_in(search: _Search, levels: dict[float, list[Peak]]) -> int:
         levels[value], count = _solve_level(search, value, _nearby_peaks(levels, value))
         points += count
     raise NotSolvedError(
-        f"optimum of {search.name} not closed in with {LEVELS} values, last at {value:.4g}"
+        f"optimum of {search.name} not closed in with {MOST_LEVELS} values, last at {value:.4g}"
     )
 
 
@@ -304,7 +304,7 @@ def _solve_level(search: _Search, value: float, known: list[Peak]) -> tuple[list
     found = []
     points = 0
     for old in sorted(known, key=lambda peak: -_estimated_height(search, peak, value)):
-        if found and _estimated_height(search, old, value) < WORTH * max(
+        if found and _estimated_height(search, old, value) < SOLVED_HEIGHT_SHARE * max(
             peak.height for peak in found if peak.value == value
         ):
             found.append(old)
@@ -344,7 +344,10 @@ def _look_over_band(
     points = [point for point in found if point.converged]
     spent = len(points)
     for top in sorted(local_maxima(points), key=lambda point: -size(point))[:2]:
-        if met and (size(top) < NEARLY * met.height or abs(top.omega / met.omega - 1) < SAME):
+        if met and (
+            size(top) < NEARLY_HIGHEST * met.height
+            or abs(top.omega / met.omega - 1) < SAME_PEAK_LOSS
+        ):
             continue
         peak = find_peak(
             model, top.omega, search.H, search.samples, near=top, tolerance=search.tolerance

@@ -19,7 +19,7 @@ __all__ = ["share_work", "shared_response"]
 Item = TypeVar("Item")
 Result = TypeVar("Result")
 # frequencies that follow each other on one rank; the same for any number of ranks
-BLOCK = 16
+POINTS_AT_ONCE = 16
 
 
 def share_work(
@@ -72,7 +72,7 @@ def shared_response(
     """
 
     def solved(block: int) -> list[Solution]:
-        part = omegas[block : block + BLOCK]
+        part = omegas[block : block + POINTS_AT_ONCE]
         if folder is None:
             return list(response(model, part, H, samples, options=options))
         return list(
@@ -81,5 +81,5 @@ def shared_response(
             )
         )
 
-    blocks = share_work(solved, range(0, len(omegas), BLOCK), comm)
+    blocks = share_work(solved, range(0, len(omegas), POINTS_AT_ONCE), comm)
     return [point for block in blocks for point in block]

@@ -25,7 +25,7 @@ from .linear.bodies import (
 )
 from .linear.condensation import Linear
 from .model import ReducedModel
-from .parameters import check_parameter, vary
+from .parameters import check_parameter, layer_share, vary
 from .policy import uses_coulomb_kernels
 from .solution import blade_motion
 from .solver.residual import Balance, State, as_amplitudes, as_coefficients, contact_forces
@@ -89,7 +89,8 @@ def hold_rate(balance: Balance, state: State, name: str) -> np.ndarray:
         model.springs.shape
     )
     normal = np.arange(model.directions) < model.directions - model.elements.tangents
-    return model.springs * still * (normal == (name == "kn"))
+    share = layer_share(model, name)[:, None]
+    return share * model.springs * still * (normal == (name == "kn"))
 
 
 def contact_load(model: ReducedModel, state: State) -> np.ndarray:
@@ -114,9 +115,9 @@ def contact_rate(model: ReducedModel, state: State, name: str, samples: int) -> 
     by_tangents = np.einsum("nakbl,nbl->nak", D[:, :, :, first:], w[:, first:])
     by_normal = np.einsum("nakl,nl->nak", D[:, :, :, 0], w[:, 0]) if first else np.zeros_like(f)
     if name == "kt":
-        return by_tangents
+        return layer_share(model, name)[:, None, None] * by_tangents
     if name == "kn":
-        return by_normal
+        return layer_share(model, name)[:, None, None] * by_normal
     if name == "mu":
         # f is of degree one in (kt w + start, mu): the start of the march counts as a displacement
         offset = model.offset.reshape(w.shape[:2])[:, first:]

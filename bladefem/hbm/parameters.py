@@ -13,13 +13,44 @@ from ..data import Elements, PortModel, RigidBody
 from ..errors import InputError, suggestion
 from .model import Damping, ReducedModel
 
-__all__ = ["PARAMETERS", "check_parameter", "path_coordinate", "parameter_value", "vary"]
+__all__ = [
+    "PARAMETERS",
+    "check_parameter",
+    "layer_share",
+    "parameter_value",
+    "path_coordinate",
+    "vary",
+]
 
 
 def _changing_elements(
     change: Callable[[Elements, float], Elements],
 ) -> Callable[[ReducedModel, float], ReducedModel]:
     return lambda model, value: replace(model, elements=change(model.elements, value))
+
+
+def _scale_stiffness(name: str) -> Callable[[ReducedModel, float], ReducedModel]:
+    """Scale the stiffness of the whole layer, also where part of its compliance is in series."""
+
+    def scaled(model: ReducedModel, factor: float) -> ReducedModel:
+        stiffness = getattr(model.elements, name)
+        # 1 / k_num + change of 1 / k: the part in series stays as it is
+        changed = stiffness / (1.0 + (1.0 / factor - 1.0) * layer_share(model, name))
+        return replace(model, elements=replace(model.elements, **{name: changed}))
+
+    return scaled
+
+
+def layer_share(model: ReducedModel, name: str) -> np.ndarray:
+    """(nodes,) compliance of the whole layer over that of its element, for "kt" or "kn" [1].
+
+    1 where nothing is in series, 0 for rigid faces. It is also the derivative of ln k_num by ln k
+    with a fixed compliance in series.
+    """
+    stiffness = getattr(model.elements, name)
+    if model.series is None:
+        return np.ones(len(stiffness))
+    return 1.0 + stiffness * model.series[:, 0 if name == "kn" else 1]
 
 
 def _scale_force(model: ReducedModel, factor: float) -> ReducedModel:
@@ -80,9 +111,9 @@ PARAMETERS: dict[str, Callable[[ReducedModel, float], ReducedModel]] = {
     # factor
     "mu": _changing_elements(lambda e, factor: replace(e, mu=factor * e.mu)),
     # factor
-    "kt": _changing_elements(lambda e, factor: replace(e, kt=factor * e.kt)),
+    "kt": _scale_stiffness("kt"),
     # factor
-    "kn": _changing_elements(lambda e, factor: replace(e, kn=factor * e.kn)),
+    "kn": _scale_stiffness("kn"),
     # added opening [m]
     "gap": _changing_elements(lambda e, gap: replace(e, n0=e.n0 - e.kn * gap)),
     # factor of the damper's mass

@@ -19,7 +19,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from ..friction.law import groups_by_law
+from ..friction.law_table import groups_by_law
 
 if TYPE_CHECKING:
     from .model import ReducedModel

@@ -4,14 +4,14 @@ from __future__ import annotations
 
 from numba import njit
 
-__all__ = ["AHEAD", "ahead", "shifted"]
+__all__ = ["PREDICTOR_POINTS", "append_solution", "extrapolate_solution"]
 
 # points that a start is extrapolated from
-AHEAD = 3
+PREDICTOR_POINTS = 3
 
 
 @njit(cache=True, error_model="numpy")
-def ahead(omega, known, at, count, w):
+def extrapolate_solution(omega, known, at, count, w):
     """Fill w (m, K), a start at omega, from the first `count` of the points known (3, m, K) at
     (3,), the last one last.
 
@@ -36,7 +36,7 @@ def ahead(omega, known, at, count, w):
 
 
 @njit(cache=True, error_model="numpy")
-def shifted(omega, w, known, at, count):
+def append_solution(omega, w, known, at, count):
     """Put a point at the end of the known ones, in place of the first if they are full; their
     number then.
     """

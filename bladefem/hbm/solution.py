@@ -15,9 +15,9 @@ __all__ = [
     "Work",
     "at_probes",
     "blade_motion",
+    "period_works",
     "probe_motion",
     "size",
-    "period_works",
     "works_of",
 ]
 
@@ -78,11 +78,11 @@ class Solution:
     # number of nodes that stick, slip, lift off, are open
     states: dict[str, int]
     work: Work
+    # the way of `bladefem.hbm.policy` that ran: loop, linear solvers
+    route: str = ""
     # number of the piece of a response with several motions that the point lies on, from 1 on; 0
     # where one motion was looked for
     branch: int = 0
-    # the way of `bladefem.hbm.policy` that ran: loop, linear solvers
-    route: str = ""
 
     @property
     def amplitude(self) -> np.ndarray:

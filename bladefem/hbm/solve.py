@@ -9,21 +9,23 @@ import numpy as np
 
 from ..errors import InputError
 from ..friction.fourier import to_complex
-from .full_stick import INSTANTS, leading_stuck_points, sticks_safely
+from ..friction.states import NODE_STATES
+from .full_stick import INSTANTS_PER_HARMONIC, leading_stuck_points, sticks_safely
 from .linear.condensation import Linear, condense
 from .model import ReducedModel
+from .point_measures import count_states, holding_drift
 from .solution import Solution, at_probes, blade_motion, probe_motion, works_of
 from .solver.fallback import Attempt, match_harmonics, solve_balance
 from .solver.newton import DEFAULTS, Options
-from .solver.point_compiled import small, solve_each, solve_small
+from .solver.point_compiled import compiles_points, solve_each, solve_small
 from .solver.residual import Balance
 from .validate_model import check_point
 
-__all__ = ["as_solution", "free_response", "solve", "leading_stuck_solutions", "stuck_response"]
+__all__ = ["as_solution", "free_response", "leading_stuck_solutions", "solve", "stuck_response"]
 
 # contact springs over the bodies' stiffness from which a failure is put down to it
-STIFF = 1e5
-STUCK = Options(iterations=1, fallbacks=False)
+STIFF_CONTACT_RATIO = 1e5
+LINEAR_POINT = Options(iterations=1, fallbacks=False)
 
 
 def solve(
@@ -95,6 +97,8 @@ def as_solution(balance: Balance, attempt: Attempt, iterations: int, reason: str
     relative = to_complex(state.w.reshape(-1, load.shape[2])).T
     blade = blade_motion(model, linear.omega, force)
     stiffness = model.springs[:, :, None]
+    flat = load.reshape(-1, load.shape[2])
+    counts = count_states(state.forces.shares).tolist()
     return Solution(
         omega=linear.omega,
         harmonics=state.w.shape[2] // 2,
@@ -109,8 +113,8 @@ def as_solution(balance: Balance, attempt: Attempt, iterations: int, reason: str
         residual=state.error,
         residual_displacement=float(abs(state.residual).max()),
         residual_force=float(abs(stiffness * state.residual).max()),
-        drift=_holding_drift(linear, load),
-        states=_count_states(state.forces.shares),
+        drift=float(holding_drift(np.ascontiguousarray(linear.B), linear.g, flat)),
+        states=dict(zip(NODE_STATES, counts, strict=True)),
         work=works_of(
             model, linear.omega, relative, force, blade, float(np.sum(state.forces.dissipated))
         ),
@@ -126,7 +130,11 @@ def leading_stuck_solutions(model: ReducedModel, omegas: Sequence[float], H: int
     rounding: it is linear.
     """
     low = max((1, *model.excitation, *model.normal))
-    found = solve_each(model, np.array(omegas), low, INSTANTS * low, STUCK) if low < H else []
+    found = (
+        solve_each(model, np.array(omegas), low, INSTANTS_PER_HARMONIC * low, LINEAR_POINT)
+        if low < H
+        else []
+    )
     return leading_stuck_points(model, found)
 
 
@@ -137,9 +145,9 @@ def _stuck_throughout(
     low = max((1, *model.excitation, *model.normal))
     if low >= H or not (start is None or start.states["stick"] == len(model.elements.kt)):
         return None
-    if small(model, low):
+    if compiles_points(model, low):
         return next(iter(leading_stuck_solutions(model, [omega], H)), None)
-    found = solve(model, omega, low, INSTANTS * low, options=STUCK)
+    found = solve(model, omega, low, INSTANTS_PER_HARMONIC * low, options=LINEAR_POINT)
     return found if found.converged and sticks_safely(model, found) else None
 
 
@@ -149,40 +157,15 @@ def _failure_reasons(balance: Balance, attempts: list[Attempt]) -> str:
     ratio = float(np.median(linear.springs * abs(np.diagonal(linear.G[1]))))
     stiff = (
         [
-            f"contacts {ratio:.1g} times as stiff as the bodies: expected less than {STIFF:.0e} "
+            f"contacts {ratio:.1g} times as stiff as the bodies: expected less than "
+            f"{STIFF_CONTACT_RATIO:.0e} "
             "where they slip or "
             "lift off"
         ]
-        if ratio > STIFF
+        if ratio > STIFF_CONTACT_RATIO
         else []
     )
     return "; ".join([f"{a.method}: {a.end.reason}" for a in attempts] + stiff)
-
-
-def _holding_drift(linear: Linear, load: np.ndarray) -> float:
-    """Load on the holding springs over what the contacts could carry, both on the motions without
-    stiffness.
-    """
-    if linear.B.shape[1] == 0:
-        return 0.0
-    held = np.linalg.norm(linear.B.T @ load[:, :, 0].ravel() - linear.g)
-    carried = np.linalg.norm(abs(linear.B).T @ np.linalg.norm(load, axis=2).ravel())
-    return float(held / max(carried, np.finfo(float).tiny))
-
-
-def _count_states(shares: np.ndarray) -> dict[str, int]:
-    """Number of nodes by what they do in a period, from the shares (n, 3) of stick, slip and
-    separation.
-    """
-    slips = shares[:, 1] > 0
-    apart = shares[:, 2] > 1e-12
-    closed = shares[:, :2].sum(axis=1) > 1e-12
-    return {
-        "stick": int((~slips & ~apart).sum()),
-        "slip": int((slips & ~apart).sum()),
-        "lift": int((apart & closed).sum()),
-        "open": int((~closed).sum()),
-    }
 
 
 def _rigid_motion(linear: Linear, mean: np.ndarray, force: np.ndarray) -> np.ndarray:

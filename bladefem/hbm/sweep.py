@@ -15,7 +15,7 @@ from ..errors import InputError, NotSolvedError
 from .branches import find_branches
 from .linear_resonances import free_resonances, stuck_resonances
 from .model import ReducedModel
-from .predictor import AHEAD, ahead
+from .predictor import PREDICTOR_POINTS, extrapolate_solution
 from .sensitivity import sensitivities
 from .solution import Solution, size
 from .solve import leading_stuck_solutions, solve
@@ -31,14 +31,14 @@ Keep = Callable[[float, Callable[[], Solution]], Solution]
 Slope = Callable[[float], float]
 # of a frequency: how far beside a resonance without damping a sweep solves, where it hits it
 # exactly
-BESIDE = 1e-7
+OFF_RESONANCE = 1e-7
 # the same for the first look at a model without damping, whose flexibility stuck is all rounding
 # there
-SHY = 1e-5
+OFF_RESONANCE_UNDAMPED = 1e-5
 # intervals of the first look at a band
-COARSE = 12
+FIRST_LOOK_INTERVALS = 12
 # points that are solved at once
-BLOCK = 16
+POINTS_AT_ONCE = 16
 # points after which a sweep gives up refining
 BAND_LIMIT = 400
 # unknowns up to which paths are followed wherever contacts lift off; of larger models, where the
@@ -74,7 +74,9 @@ def response(
         if i not in ready:
             ready.clear()
             ready.update(
-                enumerate(_at_once(model, omegas[i : i + BLOCK], H, samples, last, options), i)
+                enumerate(
+                    _at_once(model, omegas[i : i + POINTS_AT_ONCE], H, samples, last, options), i
+                )
             )
         return (
             ready[i]
@@ -88,7 +90,7 @@ def response(
         solution = keep(omega, partial(compute, i))
         yield solution
         if solution.converged:
-            last = [*last[1 - AHEAD :], solution]
+            last = [*last[1 - PREDICTOR_POINTS :], solution]
 
 
 def _at_once(
@@ -121,6 +123,7 @@ def sweep(
     curve: float = 0.02,
     options: Options = DEFAULTS,
     notes: list[str] | None = None,
+    paths: bool = True,
 ) -> Iterator[Solution]:
     """Solve a band of circular frequencies [rad/s]; points come in the order of need, to be sorted
     by `omega`.
@@ -140,6 +143,7 @@ def sweep(
         curve: how far, as a share of the highest maximum, a point may lie off the line through its
             neighbours.
         notes: takes what the search could not do, in sentences.
+        paths: whether the response is followed round folds; otherwise one motion is looked for.
 
     Raises:
         InputError: the band is empty or not positive.
@@ -157,7 +161,7 @@ def sweep(
     for solution in response(model, first_look(model, band), H, samples, options=options):
         solved[solution.omega] = solution
         yield solution
-    while not _needs_continuation(model, solved, H, options.probe):
+    while not (paths and _needs_continuation(model, solved, H, options.probe)):
         wanted = _next_frequency(solved, slope, (peak, curve), options.probe)
         if wanted is None:
             return
@@ -166,7 +170,7 @@ def sweep(
                 f"the sweep ended after {BAND_LIMIT} points: peaks may be higher by more than "
                 "the accuracy"
             )
-            if not _normal_loads_follow(model):
+            if not (paths and _normal_loads_follow(model)):
                 return
             break
         near = sorted(
@@ -247,7 +251,7 @@ def _solve_off_resonance(
     try:
         return solve(model, omega, H, samples, start=start, options=options)
     except NotSolvedError:
-        return solve(model, omega * (1 + BESIDE), H, samples, start=start, options=options)
+        return solve(model, omega * (1 + OFF_RESONANCE), H, samples, start=start, options=options)
 
 
 def local_maxima(points: list[Solution], probe: int = 0) -> list[Solution]:
@@ -274,8 +278,8 @@ def first_look(model: ReducedModel, band: tuple[float, float]) -> np.ndarray:
     )
     inside = seeds[(seeds > band[0]) & (seeds < band[1])]
     if not model.damped:
-        inside = inside * (1 + SHY)
-    grid = np.linspace(*band, COARSE + 1)
+        inside = inside * (1 + OFF_RESONANCE_UNDAMPED)
+    grid = np.linspace(*band, FIRST_LOOK_INTERVALS + 1)
     keep = [x for x in grid[1:-1] if not np.any(abs(inside - x) < 0.2 * (grid[1] - grid[0]))]
     return np.unique(np.concatenate([grid[[0, -1]], keep, inside]))
 
@@ -363,7 +367,9 @@ def _predicted_start(last: list[Solution], omega: float, H: int) -> Solution | N
     known = np.array([match_harmonics(p.w, H) for p in last])
     w = np.empty(known.shape[1:])
     at = np.array([p.omega for p in last])
-    ahead(omega, known.reshape(len(last), -1, 2 * H + 1), at, len(last), w.reshape(-1, 2 * H + 1))
+    extrapolate_solution(
+        omega, known.reshape(len(last), -1, 2 * H + 1), at, len(last), w.reshape(-1, 2 * H + 1)
+    )
     return replace(last[-1], w=w)
 
 

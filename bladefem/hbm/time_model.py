@@ -12,7 +12,7 @@ import numpy as np
 from ..data import RigidBody
 from ..errors import InputError, NotSolvedError
 from ..friction.fourier import to_real
-from ..friction.law import require_coulomb
+from ..friction.law_table import require_coulomb
 from ..time.shooting import periodic_solution
 from ..time.system import System
 from .linear.bodies import Stack, rigid_stack
@@ -23,9 +23,9 @@ from .solver.residual import Balance
 __all__ = ["shooting_start", "time_system"]
 
 # highest frequency over the excitation's up to which shooting is tried: 1 s an iteration
-FASTEST = 1e4
+FASTEST_RATIO = 1e4
 # residual flexibility, over that of the contact springs, that is left out
-MASSLESS = 1e-9
+MASSLESS_FLEXIBILITY = 1e-9
 
 
 def time_system(model: ReducedModel, H: int) -> System:
@@ -94,9 +94,10 @@ def shooting_start(balance: Balance) -> np.ndarray:
             f"{SHOOTING_SIZE}"
         )
     ratio = system.fastest / balance.linear.omega
-    if ratio > FASTEST:
+    if ratio > FASTEST_RATIO:
         raise InputError(
-            f"motions {ratio:.1g} times as fast as the excitation, expected at most {FASTEST:.0e}"
+            f"motions {ratio:.1g} times as fast as the excitation, expected at most "
+            f"{FASTEST_RATIO:.0e}"
         )
     solution = periodic_solution(system, balance.linear.omega, samples=max(256, 8 * H))
     if not solution.converged:
@@ -122,7 +123,10 @@ def _bodies_in_time(model: ReducedModel) -> list[Stack]:
     if isinstance(model.damper, RigidBody):
         bodies.append(rigid_stack(model.damper.mass, model.damper.B[model.rows]))
     for body in bodies:
-        if abs(body.residual[0] * max(model.springs.max(), 1e-300)).max(initial=0.0) > MASSLESS:
+        if (
+            abs(body.residual[0] * max(model.springs.max(), 1e-300)).max(initial=0.0)
+            > MASSLESS_FLEXIBILITY
+        ):
             raise InputError(
                 "a residual flexibility without inertia, expected all modes to be kept"
             )

@@ -28,9 +28,9 @@ from .solver.residual import contact_forces
 __all__ = ["truncation_indicator"]
 
 # for each harmonic
-INSTANTS = 4
+INSTANTS_PER_HARMONIC = 4
 # of a frequency: how far beside it bodies are looked at, which without damping may be hit exactly
-BESIDE = 1e-7
+OFF_RESONANCE = 1e-7
 
 
 def truncation_indicator(model: ReducedModel, points: Sequence[Solution], most: int) -> np.ndarray:
@@ -53,7 +53,7 @@ def truncation_indicator(model: ReducedModel, points: Sequence[Solution], most: 
     w = np.array([p.w for p in points])
     forces = _higher_force_harmonics(model, w, most)
     orders = np.arange(H + 1, most + 1)
-    omegas = (1 + BESIDE) * np.array([p.omega for p in points])
+    omegas = (1 + OFF_RESONANCE) * np.array([p.omega for p in points])
     motion = sum(_higher_motion(body, orders, omegas, forces) for body in bodies_of(model, most))
     first = np.sum(w[..., 1:3] ** 2, axis=(1, 2, 3))
     return np.sqrt(np.sum(abs(motion) ** 2, axis=(0, 2)) / np.maximum(first, np.finfo(float).tiny))
@@ -67,7 +67,7 @@ def _higher_force_harmonics(model: ReducedModel, w: np.ndarray, most: int) -> np
         return _harmonics_by_law(model, w, most)
     e = model.elements
     p, n, d, K = w.shape
-    S = INSTANTS * (most + 1)
+    S = INSTANTS_PER_HARMONIC * (most + 1)
     tangents = e.tangents
     u = (w.reshape(-1, K) @ synthesis(K // 2, S).T).reshape(p, n, d, S)
     N = np.array(
@@ -91,7 +91,7 @@ def _harmonics_by_law(model: ReducedModel, w: np.ndarray, most: int) -> np.ndarr
     p, n, d, K = w.shape
     wide = np.zeros((p, n, d, 2 * most + 1))
     wide[..., :K] = w
-    forces = [contact_forces(model, one, INSTANTS * (most + 1)).f for one in wide]
+    forces = [contact_forces(model, one, INSTANTS_PER_HARMONIC * (most + 1)).f for one in wide]
     high = to_complex(np.array(forces))[..., K // 2 + 1 :]
     return np.moveaxis(high, 3, 0).reshape(most - K // 2, p, n * d)
 

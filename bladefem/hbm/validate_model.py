@@ -12,7 +12,7 @@ import numpy as np
 
 from ..data import Elements, PortModel, RigidBody
 from ..errors import InputError
-from ..friction.law import laws_of_nodes, require_coulomb
+from ..friction.law_table import laws_of_nodes, require_coulomb
 
 if TYPE_CHECKING:
     from .model import ReducedModel

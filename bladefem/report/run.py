@@ -372,8 +372,13 @@ def points_of(curve: Any) -> pd.DataFrame:
             "estimated_error": curve.estimated,
             "tolerated_error": curve.tolerated,
             "error_checked": curve.checked,
+            **({"branch": curve.branch} if curve.branch.any() else {}),
             **(
-                {"stability": curve.stability, "multiplier": curve.multiplier}
+                {
+                    "stability": curve.stability,
+                    "multiplier": curve.multiplier,
+                    "bifurcation": curve.bifurcation,
+                }
                 if any(curve.stability)
                 else {}
             ),

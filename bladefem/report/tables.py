@@ -141,6 +141,8 @@ COLUMNS = {
     "error_checked": Column("error checked here"),
     "stability": Column("stability"),
     "multiplier": Column("largest Floquet multiplier", "1", digits=6),
+    "bifurcation": Column("lost its stability by"),
+    "branch": Column("piece between folds"),
     "effective_mass": Column("effective mass", "kg", digits=4),
     "share": Column("share", "1", "%", 100.0, 3),
     "factor": Column("participation", "kg^1/2", digits=4),

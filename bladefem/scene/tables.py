@@ -120,8 +120,9 @@ class Contact:
     kn: float | None = quantity(None, "N/m", 1.0, 1e12, "normal stiffness of one whole patch")
     stiffness: str = quantity(
         "given",
-        choices=("given", "map"),
+        choices=("given", "rigid", "map"),
         help="normal stiffness: of one interface layer for seating and vibration, as given above; "
+        "rigid faces in both; "
         "or of each node from the pressure map between rigid faces, its static force over the "
         "approach of the bodies there (the paper's Eq. 23)",
     )
@@ -239,9 +240,9 @@ class Study:
         "history may have left in contact points that never slip",
     )
     stability: bool = quantity(
-        False,
-        help="also Floquet multipliers of the points of each curve, where normal loads "
-        "follow the motion",
+        True,
+        help="Floquet multipliers of the points of each curve, where normal loads follow the "
+        "motion: unstable ones are marked and are no resonance",
     )
 
 

@@ -30,6 +30,7 @@ def contact_problems(scene: Scene) -> Iterator[str]:
                         "map, expected only one of the two"
                     )
     yield from _interval(scene)
+    yield from _without_layer(scene)
     yield from _history(scene)
     shaped = [key for key in SHAPE if getattr(contact, key) is not None]
     if shaped and contact.bedded:
@@ -48,6 +49,25 @@ def contact_problems(scene: Scene) -> Iterator[str]:
         yield (
             f"contact.{missing}: expected beside "
             f"contact.{'edge_radius' if missing == 'edge_width' else 'edge_width'}"
+        )
+
+
+def _without_layer(scene: Scene) -> Iterator[str]:
+    """Fields of an interface layer beside faces that have none."""
+    contact = scene.contact
+    sides = {"contact.left": contact.left, "contact.right": contact.right}
+    if contact.stiffness == "rigid":
+        for name, side in {"contact": contact, **sides}.items():
+            for key in ("kt_area", "kt", "kn_area", "kn"):
+                if getattr(side, key) is not None:
+                    yield (
+                        f"{name}.{key}: contact.stiffness = 'rigid' has no interface layer, "
+                        "expected only one of the two"
+                    )
+    if contact.stiffness != "given" and contact.stiffening is not None:
+        yield (
+            f"contact.stiffening: contact.stiffness = '{contact.stiffness}' has no layer that "
+            "could stiffen, expected contact.stiffness = 'given' beside it"
         )
 
 

@@ -16,15 +16,13 @@ from numba import njit
 
 from bladefem.errors import InputError
 
+from ..friction.states import SIGNED_SEPARATED, SIGNED_STICK
 from .system import System
 
-__all__ = ["CODES", "Flow", "State", "flow", "rest", "stuck_start"]
+__all__ = ["CODES", "Flow", "State", "integrate_periods", "state_at_rest", "stuck_start"]
 
-# +1 and -1: slip in that direction
-STICK = 0
-APART = 2
 # of the normal force: states change once they are wrong by more than rounding
-SLACK = 1e-12
+ROUNDING_SHARE = 1e-12
 CODES = {0: "done", 1: "too many events in one step: the states chatter"}
 
 
@@ -62,7 +60,7 @@ class Flow:
     tangent: np.ndarray | None
 
 
-def rest(system: System) -> State:
+def state_at_rest(system: System) -> State:
     """Everything at zero and stuck."""
     d = system.W.shape[1]
     return State(np.zeros(d), np.zeros(d), system.drive[:, 0] + system.drive[:, 1::2].sum(axis=1))
@@ -88,7 +86,7 @@ def stuck_start(system: System, omega: float) -> State:
     return State(q, v, np.zeros(len(system.kt)))
 
 
-def flow(
+def integrate_periods(
     system: System,
     omega: float,
     start: State,
@@ -114,7 +112,7 @@ def flow(
     n, d = system.W.shape
     fastest = max(system.fastest, system.coefficients // 2 * omega)
     parts = int(np.ceil(fastest * 2 * np.pi / omega / samples))
-    order = _order(fastest * 2 * np.pi / omega / samples / parts)
+    order = _series_order(fastest * 2 * np.pi / omega / samples / parts)
     arrays = tuple(
         np.ascontiguousarray(a, float)
         for a in (
@@ -134,7 +132,7 @@ def flow(
     size = 2 * d + n if tangent else 0
     T = np.eye(2 * d + n)[:, :size].copy()
     y = np.r_[start.q, start.v, start.z]
-    events, code = _integrate(arrays, y, T, history, omega, (samples, parts, order))
+    events, code = _integrate_steps(arrays, y, T, history, omega, (samples, parts, order))
     end = State(y[:d].copy(), y[d : 2 * d].copy(), y[2 * d :].copy())
     return Flow(
         end,
@@ -148,7 +146,7 @@ def flow(
     )
 
 
-def _order(x: float) -> int:
+def _series_order(x: float) -> int:
     """Terms of the exponential series at x that reach rounding: x^(p+1) / (p+1)! < 1e-17."""
     order = 1
     term = x * x / 2
@@ -159,7 +157,7 @@ def _order(x: float) -> int:
 
 
 @njit(cache=True)
-def _inputs(coefficients, omega, t, out):
+def _input_series(coefficients, omega, t, out):
     """Taylor coefficients in time of rows of Fourier coefficients at t; out (order+1, rows)."""
     out[:] = 0.0
     for h in range(coefficients.shape[1] // 2 + 1):
@@ -179,16 +177,16 @@ def _inputs(coefficients, omega, t, out):
 
 
 @njit(cache=True)
-def _expand(arrays, y, contact, omega, t, series):
+def _taylor_series(arrays, y, contact, omega, t, series):
     """Taylor series of q, v, w, N from the present state; contact forces by their law in each
     state.
     """
     L, D, W, V, kt, mu, P, G, Nn, R = arrays
     Q, U, wc, nc, p = series
     n, d = W.shape
-    _inputs(P, omega, t, p)
-    _inputs(G, omega, t, wc)
-    _inputs(Nn, omega, t, nc)
+    _input_series(P, omega, t, p)
+    _input_series(G, omega, t, wc)
+    _input_series(Nn, omega, t, nc)
     Q[0], U[0] = y[:d], y[d : 2 * d]
     for j in range(Q.shape[0]):
         a = p[j]
@@ -202,11 +200,11 @@ def _expand(arrays, y, contact, omega, t, series):
                 nc[j, i] += V[i, k] * Q[j, k]
             f = 0.0
             lift = -Nn[i, 0] if j == 0 else 0.0
-            if contact[i] != APART:
+            if contact[i] != SIGNED_SEPARATED:
                 lift += nc[j, i]
-            if contact[i] == STICK:
+            if contact[i] == SIGNED_STICK:
                 f = kt[i] * (wc[j, i] - (y[2 * d + i] if j == 0 else 0.0))
-            elif contact[i] != APART:
+            elif contact[i] != SIGNED_SEPARATED:
                 f = contact[i] * mu[i] * nc[j, i]
             for k in range(d):
                 a[k] -= f * W[i, k] + lift * R[i, k]
@@ -217,7 +215,7 @@ def _expand(arrays, y, contact, omega, t, series):
 
 
 @njit(cache=True)
-def _value(c, i, x):
+def _polynomial_value(c, i, x):
     """Polynomial of column i of the coefficients, at x."""
     total = 0.0
     for j in range(c.shape[0] - 1, -1, -1):
@@ -226,7 +224,7 @@ def _value(c, i, x):
 
 
 @njit(cache=True)
-def _slope(c, i, x):
+def _polynomial_slope(c, i, x):
     """Derivative of the polynomial of column i, at x."""
     total = 0.0
     for j in range(c.shape[0] - 1, 0, -1):
@@ -235,20 +233,22 @@ def _slope(c, i, x):
 
 
 @njit(cache=True)
-def _margin(state, kt, mu, z, series, i, x, slack):
+def _state_margin(state, kt, mu, z, series, i, x, slack):
     """How far element i is from leaving its state, below zero when it is time to; ``slack`` keeps
     rounding out.
     """
     wc = series[2]
     nc = series[3]
-    N = _value(nc, i, x)
-    if state == APART:
+    N = _polynomial_value(nc, i, x)
+    if state == SIGNED_SEPARATED:
         return slack[0] - N
-    if state == STICK:
-        return mu * (N + slack[0]) - abs(kt * (_value(wc, i, x) - z))
+    if state == SIGNED_STICK:
+        return mu * (N + slack[0]) - abs(kt * (_polynomial_value(wc, i, x) - z))
     if N < -slack[0]:
         return N
-    return state * kt * _slope(wc, i, x) - mu * _slope(nc, i, x) + mu * slack[1]
+    return (
+        state * kt * _polynomial_slope(wc, i, x) - mu * _polynomial_slope(nc, i, x) + mu * slack[1]
+    )
 
 
 @njit(cache=True)
@@ -262,18 +262,20 @@ def _first_event(arrays, y, contact, series, h, step):
     who = -1
     for i in range(n):
         left = 0.0
-        size = SLACK * np.abs(arrays[8][i]).sum()
+        size = ROUNDING_SHARE * np.abs(arrays[8][i]).sum()
         # rounding of k_t (w - z) where the motion is large against the limit
         if mu[i] > 0:
             size += 1e-14 * kt[i] * (abs(series[2][0, i]) + abs(y[2 * d + i])) / mu[i]
         slack = (size, size / step)
         for part in range(1, 5):
             right = min(h * part / 4, best)
-            if _margin(contact[i], kt[i], mu[i], y[2 * d + i], series, i, right, slack) < 0.0:
+            if _state_margin(contact[i], kt[i], mu[i], y[2 * d + i], series, i, right, slack) < 0.0:
                 for _ in range(60):
                     middle = 0.5 * (left + right)
                     if (
-                        _margin(contact[i], kt[i], mu[i], y[2 * d + i], series, i, middle, slack)
+                        _state_margin(
+                            contact[i], kt[i], mu[i], y[2 * d + i], series, i, middle, slack
+                        )
                         < 0.0
                     ):
                         right = middle
@@ -291,7 +293,7 @@ def _first_event(arrays, y, contact, series, h, step):
 
 
 @njit(cache=True)
-def _switch(arrays, y, contact, T, i, rates):
+def _switch_state(arrays, y, contact, T, i, rates):
     """Change the state of element i; rates: w, N and their time derivatives at this instant."""
     W = arrays[2]
     V = arrays[3]
@@ -301,23 +303,25 @@ def _switch(arrays, y, contact, T, i, rates):
     w, N, dw, dN = rates
     d = W.shape[1]
     old = contact[i]
-    if old == STICK:
+    if old == SIGNED_STICK:
         f = kt[i] * (w - y[2 * d + i])
-        contact[i] = APART if N <= SLACK * np.abs(Nn[i]).sum() else (1 if f > 0 else -1)
-    elif old == APART:
-        contact[i] = STICK if kt[i] * abs(dw) <= mu[i] * dN else (1 if dw > 0 else -1)
+        contact[i] = (
+            SIGNED_SEPARATED if N <= ROUNDING_SHARE * np.abs(Nn[i]).sum() else (1 if f > 0 else -1)
+        )
+    elif old == SIGNED_SEPARATED:
+        contact[i] = SIGNED_STICK if kt[i] * abs(dw) <= mu[i] * dN else (1 if dw > 0 else -1)
         y[2 * d + i] = w
         T[2 * d + i] = W[i] @ T[:d] - dw / dN * (V[i] @ T[:d]) if dN != 0 else W[i] @ T[:d]
     elif N <= 0:
-        contact[i] = APART
+        contact[i] = SIGNED_SEPARATED
     else:
-        contact[i] = STICK
+        contact[i] = SIGNED_STICK
         y[2 * d + i] = w - old * mu[i] * N / kt[i]
         T[2 * d + i] = W[i] @ T[:d] - old * mu[i] / kt[i] * (V[i] @ T[:d])
 
 
 @njit(cache=True)
-def _carry(arrays, contact, T, x, order, memory):
+def _advance_tangent(arrays, contact, T, x, order, memory):
     """Advance the tangent (columns of T) over x with fixed states; the last matrix is kept for
     equal steps.
     """
@@ -326,12 +330,12 @@ def _carry(arrays, contact, T, x, order, memory):
     if key[n] != x or np.any(key[:n] != contact):
         key[:n] = contact
         key[n] = x
-        _exponential(arrays, contact, x, order, flow)
+        _tangent_exponential(arrays, contact, x, order, flow)
     T[: 2 * d] = flow @ T
 
 
 @njit(cache=True)
-def _exponential(arrays, contact, x, order, flow):
+def _tangent_exponential(arrays, contact, x, order, flow):
     """(2d, 2d + n) derivative of (q, v) after x by (q, v, z) before: the homogeneous series."""
     L = arrays[0]
     D = arrays[1]
@@ -347,9 +351,11 @@ def _exponential(arrays, contact, x, order, flow):
         A[k, k] -= L[k]
         A[k, d : 2 * d] -= D[k]
         for i in range(n):
-            if contact[i] != APART:
-                gain = W[i, k] * kt[i] if contact[i] == STICK else 0.0
-                lift = R[i, k] + (0.0 if contact[i] == STICK else contact[i] * mu[i] * W[i, k])
+            if contact[i] != SIGNED_SEPARATED:
+                gain = W[i, k] * kt[i] if contact[i] == SIGNED_STICK else 0.0
+                lift = R[i, k] + (
+                    0.0 if contact[i] == SIGNED_STICK else contact[i] * mu[i] * W[i, k]
+                )
                 A[k, 2 * d + i] = gain
                 for m in range(d):
                     A[k, m] -= gain * W[i, m] + lift * V[i, m]
@@ -373,7 +379,7 @@ def _exponential(arrays, contact, x, order, flow):
 
 
 @njit(cache=True)
-def _settle(arrays, y, contact, T, series, x, memory):
+def _advance_state(arrays, y, contact, T, series, x, memory):
     """Move the state to x on its series; sliders of slipping and open elements follow."""
     W = arrays[2]
     V = arrays[3]
@@ -383,19 +389,19 @@ def _settle(arrays, y, contact, T, series, x, memory):
     nc = series[3]
     n, d = W.shape
     if T.shape[1] > 0:
-        _carry(arrays, contact, T, x, series[0].shape[0] - 1, memory)
+        _advance_tangent(arrays, contact, T, x, series[0].shape[0] - 1, memory)
     for k in range(d):
-        y[k], y[d + k] = _value(series[0], k, x), _value(series[1], k, x)
+        y[k], y[d + k] = _polynomial_value(series[0], k, x), _polynomial_value(series[1], k, x)
     for i in range(n):
-        if contact[i] != STICK:
-            slip = contact[i] * mu[i] / kt[i] if contact[i] != APART else 0.0
-            y[2 * d + i] = _value(wc, i, x) - slip * _value(nc, i, x)
+        if contact[i] != SIGNED_STICK:
+            slip = contact[i] * mu[i] / kt[i] if contact[i] != SIGNED_SEPARATED else 0.0
+            y[2 * d + i] = _polynomial_value(wc, i, x) - slip * _polynomial_value(nc, i, x)
             if T.shape[1] > 0:
                 T[2 * d + i] = W[i] @ T[:d] - slip * (V[i] @ T[:d])
 
 
 @njit(cache=True)
-def _begin(arrays, y, contact, T, series):
+def _initial_states(arrays, y, contact, T, series):
     """States of the elements that fit the given q, v, z; sliders beyond the friction limit are
     pulled along.
     """
@@ -413,12 +419,12 @@ def _begin(arrays, y, contact, T, series):
         f = kt[i] * (w - y[2 * d + i])
         side = 1 if f > 0 else -1
         slip = 0.0
-        contact[i] = STICK
+        contact[i] = SIGNED_STICK
         if N <= 0:
-            contact[i] = APART
+            contact[i] = SIGNED_SEPARATED
         elif side * f >= mu[i] * N * (1 - 1e-13):
             slip = side * mu[i] / kt[i]
-            contact[i] = side if side * rate > mu[i] * nc[1, i] else STICK
+            contact[i] = side if side * rate > mu[i] * nc[1, i] else SIGNED_STICK
         if N <= 0 or slip != 0:
             y[2 * d + i] = w - slip * N
             if T.shape[1] > 0:
@@ -426,7 +432,7 @@ def _begin(arrays, y, contact, T, series):
 
 
 @njit(cache=True)
-def _integrate(arrays, y, T, history, omega, parts):
+def _integrate_steps(arrays, y, T, history, omega, parts):
     """All steps; returns the number of events and a code."""
     n, d = arrays[2].shape
     step = 2 * np.pi / omega / (parts[0] * parts[1])
@@ -440,14 +446,14 @@ def _integrate(arrays, y, T, history, omega, parts):
     )
     memory = (np.full(n + 1, np.nan), np.empty((2 * d, 2 * d + n)))
     contact = np.zeros(n, np.int64)
-    _expand(arrays, y, contact, omega, 0.0, series)
-    _begin(arrays, y, contact, T, series)
+    _taylor_series(arrays, y, contact, omega, 0.0, series)
+    _initial_states(arrays, y, contact, T, series)
     events = 0
     for k in range(history.shape[0] * parts[1]):
         t = k * step
         left = step
         count = 0
-        _expand(arrays, y, contact, omega, t, series)
+        _taylor_series(arrays, y, contact, omega, t, series)
         if k % parts[1] == 0:
             row = history[k // parts[1]]
             row[: 2 * d] = y[: 2 * d]
@@ -456,16 +462,16 @@ def _integrate(arrays, y, T, history, omega, parts):
                 row[2 * d + n + i] = arrays[4][i] * (series[2][0, i] - y[2 * d + i])
         while True:
             x, who = _first_event(arrays, y, contact, series, left, step)
-            _settle(arrays, y, contact, T, series, x, memory)
+            _advance_state(arrays, y, contact, T, series, x, memory)
             if who < 0:
                 break
             rates = (
-                _value(series[2], who, x),
-                _value(series[3], who, x),
-                _slope(series[2], who, x),
-                _slope(series[3], who, x),
+                _polynomial_value(series[2], who, x),
+                _polynomial_value(series[3], who, x),
+                _polynomial_slope(series[2], who, x),
+                _polynomial_slope(series[3], who, x),
             )
-            _switch(arrays, y, contact, T, who, rates)
+            _switch_state(arrays, y, contact, T, who, rates)
             events = events + 1
             count = count + 1
             t = t + x
@@ -474,5 +480,5 @@ def _integrate(arrays, y, T, history, omega, parts):
                 return events, 1
             if left <= 1e-13 * step:
                 break
-            _expand(arrays, y, contact, omega, t, series)
+            _taylor_series(arrays, y, contact, omega, t, series)
     return events, 0

@@ -13,10 +13,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from .event_integrator import Flow, State, flow, stuck_start
+from .event_integrator import Flow, State, integrate_periods, stuck_start
 from .system import System
 
-__all__ = ["Periodic", "probe_harmonics", "floquet_multipliers", "periodic_solution", "period_work"]
+__all__ = ["Periodic", "floquet_multipliers", "period_work", "periodic_solution", "probe_harmonics"]
 
 
 @dataclass(frozen=True)
@@ -63,7 +63,7 @@ def periodic_solution(
     """
     state = start or stuck_start(system, omega)
     scale = _unknown_scales(system, omega, state)
-    now = flow(system, omega, state, samples, tangent=True)
+    now = integrate_periods(system, omega, state, samples, tangent=True)
     residual = _period_residual(now, state, scale)
     periods = 1
     for iteration in range(most):
@@ -74,13 +74,13 @@ def periodic_solution(
         move = _newton_step(now, state, scale)
         for halving in range(4):
             trial = _shift_state(state, move * 0.5**halving)
-            attempt = flow(system, omega, trial, samples, tangent=True)
+            attempt = integrate_periods(system, omega, trial, samples, tangent=True)
             periods += 1
             if _period_residual(attempt, trial, scale) < 0.9 * residual:
                 break
         else:
-            trial = flow(system, omega, now.state, samples, 8).state
-            attempt = flow(system, omega, trial, samples, tangent=True)
+            trial = integrate_periods(system, omega, now.state, samples, 8).state
+            attempt = integrate_periods(system, omega, trial, samples, tangent=True)
             periods += 9
         state = trial
         now = attempt

@@ -21,9 +21,9 @@ import numpy as np
 
 from bladefem.data import Elements, PortModel
 from bladefem.errors import InputError
-from bladefem.friction.law import require_coulomb
+from bladefem.friction.law_table import require_coulomb
 
-__all__ = ["System", "damper_on_platforms", "friction_oscillator", "blade_ring"]
+__all__ = ["System", "blade_ring", "damper_on_platforms", "friction_oscillator"]
 
 
 @dataclass(frozen=True)
@@ -167,8 +167,8 @@ def blade_ring(
 
 
 def damper_on_platforms(motion: np.ndarray, elements: Elements, mass: float) -> System:
-    """A rigid damper with one freedom on platforms whose motion is prescribed (the paper's Fig.
-    13).
+    """A rigid damper with one degree of freedom on platforms whose motion is prescribed (the
+    paper's Fig. 13).
 
     Args:
         motion: (n, H+1) complex harmonics 0..H of the platform at each element [m].

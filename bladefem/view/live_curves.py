@@ -9,7 +9,7 @@ import matplotlib.colors
 import numpy as np
 import pandas as pd
 
-from .response import between, load_colours, load_name
+from .response import between, load_colours, load_name, pieces_of
 from .style import COLOURS, FAILED
 
 __all__ = ["live_diameters", "live_loops", "live_optimum", "live_responses"]
@@ -34,7 +34,12 @@ def live_responses(points: pd.DataFrame, title: str = "", per: str = "seat") -> 
     data: list[dict[str, Any]] = []
     for load in loads:
         curve = points[points["load"] == load].sort_values("frequency", kind="stable")
-        data += _curve(curve, float(load), matplotlib.colors.to_hex(colours[load]))
+        for piece, unstable in pieces_of(curve):
+            colour = matplotlib.colors.to_hex(colours[load])
+            lines = _curve(curve.iloc[piece], float(load), colour)
+            if unstable:
+                lines[0]["line"] = {**lines[0].get("line", {}), "dash": "dash"}
+            data += lines
     failed = points[~points["converged"].astype(bool) & (points["amplitude"] > 0)]
     if len(failed):
         data.append(

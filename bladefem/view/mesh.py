@@ -342,6 +342,10 @@ def draw_mesh(
         return axes[0].figure
 
 
+# names beside a picture in ordinary size; CAD files have more
+FEW_NAMES = 20
+
+
 def draw_legend(ax: object, mesh: Mesh) -> None:
     """Names and sizes beside the picture."""
     colours = label_colours(mesh)
@@ -351,10 +355,13 @@ def draw_legend(ax: object, mesh: Mesh) -> None:
         Swatch(facecolor=c, edgecolor="#555555", lw=0.5, label=f"{name} ({count})")
         for c, name, count in zip(colours, names, counts, strict=True)
     ]
+    many = len(swatches) > FEW_NAMES
     ax.legend(
         handles=swatches,
         loc="center left",
-        bbox_to_anchor=(0.0, 0.55),
+        bbox_to_anchor=(0.0, 0.57),
+        fontsize=6 if many else 8.5,
+        labelspacing=0.25 if many else 0.5,
         title="body or face (elements)",
         alignment="left",
         borderaxespad=0.0,

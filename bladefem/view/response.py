@@ -29,6 +29,7 @@ __all__ = [
     "draw_seat_loops",
     "loop_energy",
     "pareto_front",
+    "pieces_of",
 ]
 
 MICRO = 1e6
@@ -115,11 +116,19 @@ def draw_curve(ax: Any, curve: pd.DataFrame, load: float, colour: Any) -> None:
     frequency = curve["frequency"].to_numpy(float)
     amplitude = np.where(good, MICRO * curve["amplitude"], np.nan)
     style = {0.0: "--", np.inf: ":"}.get(load, "-")
-    ax.plot(*between(frequency, amplitude), style, color=colour, label=load_name(load))
+    label = load_name(load)
+    # stable pieces first: the legend shows their line
+    for piece, unstable in sorted(pieces_of(curve), key=lambda part: part[1]):
+        line = "--" if unstable else style
+        ax.plot(*between(frequency[piece], amplitude[piece]), line, color=colour, label=label)
+        label = "_nolegend_"
     if 0 < load < np.inf:
         ax.plot(frequency, amplitude, ".", color=colour, ms=2.5)
     if good.any():
-        top = np.nanargmax(amplitude)
+        lasting = amplitude.copy()
+        if "stability" in curve:
+            lasting[(curve["stability"] == "unstable").to_numpy()] = np.nan
+        top = np.nanargmax(lasting if np.isfinite(lasting).any() else amplitude)
         ax.plot(
             curve["frequency"].iloc[top],
             amplitude[top],
@@ -130,6 +139,31 @@ def draw_curve(ax: Any, curve: pd.DataFrame, load: float, colour: Any) -> None:
             mew=0.6,
             zorder=4,
         )
+
+
+def pieces_of(curve: pd.DataFrame) -> list[tuple[np.ndarray, bool]]:
+    """Rows that make one line each, and whether the motions there are unstable.
+
+    Pieces between the folds of a response with several motions are lines of their own, so that a
+    jump is a gap; a stable and an unstable part meet in a common point.
+    """
+    branch = curve["branch"].to_numpy() if "branch" in curve else np.zeros(len(curve))
+    branch = np.nan_to_num(branch.astype(float))
+    unstable = np.zeros(len(curve), dtype=bool)
+    if "stability" in curve:
+        unstable = (curve["stability"] == "unstable").to_numpy()
+    parts = []
+    for number in np.unique(branch):
+        rows = np.flatnonzero(branch == number)
+        # an unsolved point between the pieces belongs to none of them
+        if number == 0 and branch.any():
+            continue
+        cuts = np.flatnonzero(np.diff(unstable[rows])) + 1
+        for run in np.split(np.arange(len(rows)), cuts):
+            first = max(run[0] - 1, 0) if unstable[rows[run[0]]] else run[0]
+            last = min(run[-1] + 1, len(rows) - 1) if unstable[rows[run[0]]] else run[-1]
+            parts.append((rows[first : last + 1], bool(unstable[rows[run[0]]])))
+    return parts
 
 
 def between(x: np.ndarray, y: np.ndarray, steps: int = 8) -> tuple[np.ndarray, np.ndarray]:

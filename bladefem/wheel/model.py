@@ -13,7 +13,7 @@ import numpy as np
 
 from ..data import Elements, PortModel, RigidBody
 from ..errors import InputError
-from ..friction.law import select_elements
+from ..friction.law_table import select_elements
 from ..hbm.linear.bodies import Damping
 from ..reduction.assemble import pair_model
 

@@ -11,7 +11,7 @@ from systems import blades, rocking, seat
 from bladefem.damper.direct import direct
 from bladefem.damper.explicit import damper_cycle
 from bladefem.data import Elements
-from bladefem.time.event_integrator import State, flow, stuck_start
+from bladefem.time.event_integrator import State, integrate_periods, stuck_start
 from bladefem.time.shooting import (
     floquet_multipliers,
     period_work,
@@ -34,7 +34,8 @@ def fourier(signal, h=1):
 def test_result_does_not_depend_on_the_step():
     system = blades(1e6, 1.4, 0.06)
     coarse, fine = (
-        flow(system, OMEGA, stuck_start(system, OMEGA), samples, 10) for samples in (64, 512)
+        integrate_periods(system, OMEGA, stuck_start(system, OMEGA), samples, 10)
+        for samples in (64, 512)
     )
     assert coarse.events == fine.events > 100
     assert pack(coarse.state) == pytest.approx(
@@ -47,15 +48,15 @@ def test_tangent_against_finite_differences(case):
     system, omega = (
         (blades(1e6, 1.4, 0.06, nodes=2), OMEGA) if case == "ring" else (rocking(), 2 * np.pi * 130)
     )
-    start = flow(system, omega, stuck_start(system, omega), 64, 3).state
+    start = integrate_periods(system, omega, stuck_start(system, omega), 64, 3).state
     if case == "rocking":
         start = replace(start, q=start.q - 8e-5)  # opens and closes in this period
-    exact, d = flow(system, omega, start, 64, tangent=True).tangent, len(start.q)
+    exact, d = integrate_periods(system, omega, start, 64, tangent=True).tangent, len(start.q)
     x, numeric = pack(start), np.zeros_like(exact)
     sizes = np.r_[np.full(d, 1e-10), np.full(d, 1e-10 * omega), np.full(len(start.z), 1e-10)]
     for k, size in enumerate(sizes):
         ends = [
-            pack(flow(system, omega, State(y[:d], y[d : 2 * d], y[2 * d :]), 64).state)
+            pack(integrate_periods(system, omega, State(y[:d], y[d : 2 * d], y[2 * d :]), 64).state)
             for y in (x + size * np.eye(len(x))[k], x - size * np.eye(len(x))[k])
         ]
         numeric[:, k] = (ends[0] - ends[1]) / (2 * size)
@@ -72,7 +73,9 @@ def test_loop_of_a_held_damper_has_the_closed_form():
     k, F, A = 1e6, 12.0, 5e-5
     element = Elements(np.array([k]), np.zeros(1), np.ones(1), np.array([F]), 1)
     system = damper_on_platforms(np.array([[0, A + 0j]]), element, 1e12)
-    path = flow(system, OMEGA, flow(system, OMEGA, stuck_start(system, OMEGA), 64).state, 4096)
+    path = integrate_periods(
+        system, OMEGA, integrate_periods(system, OMEGA, stuck_start(system, OMEGA), 64).state, 4096
+    )
     theta = np.arccos(1 - 2 * F / (k * A))
     stiffness = k / np.pi * (theta - np.sin(2 * theta) / 2) + 1j * k / np.pi * np.sin(theta) ** 2
     assert fourier(path.force[:, 0]) / A == pytest.approx(
@@ -88,7 +91,9 @@ def test_load_that_lifts_off_agrees_with_the_return_map():
     element = Elements(np.array([1e6]), np.zeros(1), np.array([0.5]), np.array([10.0]), 1)
     system = damper_on_platforms(np.array([[0, 0, 3e-5j]]), element, 1e12)
     system = replace(system, normal=np.array([[10.0, 14.0, 0, 0, 0]]))
-    path = flow(system, OMEGA, flow(system, OMEGA, stuck_start(system, OMEGA), 64).state, 8192)
+    path = integrate_periods(
+        system, OMEGA, integrate_periods(system, OMEGA, stuck_start(system, OMEGA), 64).state, 8192
+    )
     z = g = 0.0
     t = np.arange(2 * 8192) / 8192 * 2 * np.pi
     f = np.zeros(len(t))

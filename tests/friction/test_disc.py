@@ -17,12 +17,13 @@ from friction_cases import (
 
 from bladefem.data import Elements
 from bladefem.errors import InputError
-from bladefem.friction.aft import SEPARATED, STICK, evaluate
+from bladefem.friction.aft import evaluate
 from bladefem.friction.closed_form import circular_orbit_work
-from bladefem.friction.coulomb_2d import edge, middle
+from bladefem.friction.coulomb_2d import force_at_middle, march_edge
 from bladefem.friction.fourier import to_complex
 from bladefem.friction.kernel_1d_exact import evaluate_exact
-from bladefem.friction.trigonometric_tables import tables
+from bladefem.friction.states import SEPARATED, STICK
+from bladefem.friction.trigonometric_tables import trigonometric_tables
 
 
 def ellipse(a: float, b: float, H: int = 3) -> np.ndarray:
@@ -235,7 +236,7 @@ def plainly_marched(element: Elements, w: np.ndarray, samples: int) -> tuple[np.
     number.
     """
     H, kt, mu = w.shape[1] // 2, element.kt[0], element.mu[0]
-    knots = tables(H, samples).knots[np.arange(samples + 1) % samples] @ w.T
+    knots = trigonometric_tables(H, samples).knots[np.arange(samples + 1) % samples] @ w.T
     N, path = element.n0[0] + element.kn[0] * knots[:, 0], kt * knots[:, 1:]
     (x, y), out, d = (
         path[0] * min(1, mu * N[0] / np.hypot(*path[0])),
@@ -246,8 +247,8 @@ def plainly_marched(element: Elements, w: np.ndarray, samples: int) -> tuple[np.
         before = x, y
         for i in range(samples):
             here = d[i, 0], d[i, 1], N[i], N[i + 1], mu
-            _, ex, ey, mid, _ = edge(x, y, *here)
-            out[0, i], out[1, i], _ = middle(x, y, *here, mid)
+            _, ex, ey, mid, _ = march_edge(x, y, *here)
+            out[0, i], out[1, i], _ = force_at_middle(x, y, *here, mid)
             x, y = ex, ey
         if np.hypot(x - before[0], y - before[1]) < 1e-13:
             break

@@ -14,7 +14,12 @@ from bladefem.friction.fourier import (
     to_complex,
     to_real,
 )
-from bladefem.friction.trigonometric_tables import empty_gram, gram, tables, weighted
+from bladefem.friction.trigonometric_tables import (
+    empty_gram,
+    gram_matrix,
+    indicator_coefficients,
+    trigonometric_tables,
+)
 
 
 def test_complex_amplitudes_and_back():
@@ -45,15 +50,15 @@ def test_gram_of_a_set_is_analysis_of_synthesis_on_it():
     wide = synthesis(2 * H, S)
     block, column = np.empty((2 * H + 1, 2 * H + 1)), np.empty(2 * H + 1)
     mean = wide[chosen].sum(0) / S
-    gram(mean, empty_gram(H), block)
-    weighted(mean, column)
+    gram_matrix(mean, empty_gram(H), block)
+    indicator_coefficients(mean, column)
     expected = analysis(H, S)[:, chosen] @ synthesis(H, S)[chosen]
     np.testing.assert_allclose(block, expected, atol=1e-15)
     np.testing.assert_allclose(column, analysis(H, S)[:, chosen].sum(1), atol=1e-15)
 
 
 def test_knots_have_the_samples_in_the_middle_of_their_edges():
-    tab = tables(3, 20)
+    tab = trigonometric_tables(3, 20)
     np.testing.assert_allclose(
         0.5 * (tab.knots + np.roll(tab.knots, -1, axis=0)), tab.at, atol=1e-15
     )
@@ -61,7 +66,7 @@ def test_knots_have_the_samples_in_the_middle_of_their_edges():
 
 def test_too_few_samples_and_odd_shapes_are_refused():
     with pytest.raises(InputError, match="samples"):
-        tables(5, 20)
+        trigonometric_tables(5, 20)
     with pytest.raises(InputError, match="2H"):
         to_complex(np.zeros(4))
     assert sample_instants(4)[1] == pytest.approx(np.pi / 2)

@@ -10,9 +10,10 @@ from friction_cases import decay, event_driven, numeric_jacobian, plain_jenkins,
 
 from bladefem.data import Elements
 from bladefem.errors import InputError
-from bladefem.friction.aft import GROSS_SLIP, PARTIAL_SLIP, SEPARATED, STICK, evaluate
+from bladefem.friction.aft import evaluate
 from bladefem.friction.closed_form import jenkins, jenkins_coefficients
 from bladefem.friction.kernel_1d_exact import evaluate_exact, transitions
+from bladefem.friction.states import GROSS_SLIP, PARTIAL_SLIP, SEPARATED, STICK
 
 
 def cosine(amplitude: float, H: int = 5, mean: float = 0.0, d: int = 2) -> np.ndarray:

@@ -15,7 +15,8 @@ from bladefem.data import Elements
 from bladefem.errors import InputError
 from bladefem.friction.aft import evaluate
 from bladefem.friction.kernel_1d_exact import evaluate_exact
-from bladefem.friction.law import FrictionLaw, NodeLaw, merged_laws
+from bladefem.friction.law import FrictionLaw, NodeLaw
+from bladefem.friction.law_table import LAWS, merged_laws
 
 
 class Clamp(FrictionLaw):
@@ -167,10 +168,21 @@ def test_every_node_keeps_its_own_law():
 def test_what_is_no_law_is_refused():
     elements, w = random_case(7, 3, 2, 1)
     with pytest.raises(InputError, match="expected an object made from FrictionLaw"):
-        evaluate(replace(elements, law="dahl"), w, 64)
+        evaluate(replace(elements, law=Dahl), w, 64)
+    with pytest.raises(InputError, match="did you mean 'dahl'"):
+        evaluate(replace(elements, law="dahll"), w, 64)
     with pytest.raises(InputError, match="2 laws for 3 elements"):
         evaluate(replace(elements, law=(None, None)), w, 64)
     with pytest.raises(InputError, match="3 elements follow Dahl"):
         evaluate_exact(replace(elements, law=Dahl()), w)
     with pytest.raises(InputError, match="different laws in element 0"):
         merged_laws(replace(elements, law=(None, Dahl(), None)), np.array([0, 0, 1]))
+
+
+def test_laws_of_the_table_are_known_by_name():
+    elements, w = random_case(6, 6, 2, 1)
+    elements = with_load_above(elements, w)
+    named = evaluate(replace(elements, law=("dahl", "coulomb", "bouc-wen") * 2), w, 64)
+    given = evaluate(replace(elements, law=(LAWS["dahl"], None, LAWS["bouc-wen"]) * 2), w, 64)
+    np.testing.assert_array_equal(named.f, given.f)
+    np.testing.assert_array_equal(named.f[1::3], evaluate(elements, w, 64).f[1::3])

@@ -18,7 +18,7 @@ from bladefem.friction.aft import evaluate
 from bladefem.friction.fourier import synthesis
 from bladefem.friction.kernel_1d_exact import evaluate_exact
 from bladefem.friction.time_step import stable_step, step_1d, step_2d
-from bladefem.time.event_integrator import rest
+from bladefem.time.event_integrator import state_at_rest
 from bladefem.time.system import damper_on_platforms
 
 HEAVY = 1e12
@@ -38,7 +38,7 @@ def test_explicit_march_reaches_the_exact_harmonics():
     errors = []
     for steps in (256, 1024):
         period = explicit_march(system, 1.0, steps)
-        force = period(period(rest(system))[0])[-1]
+        force = period(period(state_at_rest(system))[0])[-1]
         errors.append(np.abs(coefficients(force.T, 2) - exact.f[:, 1])[slips].max())
     assert errors[1] < 2e-3
     assert np.log2(errors[0] / errors[1]) / 2 > 1.5

@@ -73,3 +73,16 @@ def test_a_file_without_solids(tmp_path):
     (tmp_path / "a.inp").write_text("*NODE\n1, 0, 0, 0\n2, 1, 0, 0\n")
     with pytest.raises(InputError, match="no solid cells"):
         look_at(tmp_path / "a.inp")
+
+
+def test_a_drawing_is_looked_at_by_its_own_faces():
+    """The numbers are those that imported.names and imported.seats take."""
+    found = look_at("scenes/own_blade.step")
+    assert [face.name for face in found.faces] == [f"face_{i}" for i in range(1, 22)]
+    assert found.scale == 1.0
+    right, left = (next(f for f in found.faces if f.name == n) for n in ("face_14", "face_11"))
+    assert right.plane
+    assert left.plane
+    assert np.allclose(right.centre, left.centre * [1, -1, 1], atol=1e-9)
+    assert right.centre[1] > 0.01
+    assert any("imported.seats" in sentence for sentence in found.missing)

@@ -25,9 +25,9 @@ def test_the_installation_can_compile_the_kernels_ahead():
     warm.compile_kernels()
     for kernel in (
         compiled.compiled_newton,
-        small._points,
+        small._compiled_points,
         jenkins.jenkins_batch,
-        events._batch,
+        events.exact_batch,
         disc_batch.disc_batch,
     ):
         assert kernel.signatures

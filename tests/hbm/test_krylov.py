@@ -8,12 +8,12 @@ import pytest
 from bladefem.hbm import policy
 from bladefem.hbm.linear import packed_bodies as small_bodies
 from bladefem.hbm.linear.contact_flexibility import (
-    among,
-    apply,
+    apply_flexibility,
+    apply_matrices,
     by_harmonic,
-    flexed,
-    formed,
+    form_matrices,
     seen_by,
+    select_nodes,
 )
 from bladefem.hbm.linear_resonances import stuck_resonances
 from bladefem.hbm.reference_blade import reference_model
@@ -21,7 +21,7 @@ from bladefem.hbm.solve import leading_stuck_solutions, solve
 from bladefem.hbm.solver.deflation import no_level, second_level
 from bladefem.hbm.solver.krylov import conjugate_residuals
 from bladefem.hbm.solver.newton import Options
-from bladefem.hbm.solver.newton_compiled import _jacobian
+from bladefem.hbm.solver.newton_compiled import _dense_jacobian
 from bladefem.hbm.sweep import response
 
 
@@ -36,18 +36,18 @@ def system(strength, nodes=6, d=2, H=4):
 
 def test_the_jacobian_is_what_the_product_applies():
     A, C = system(1.0)
-    J, K, size = _jacobian(A, C), 2 * len(A) - 1, C.shape[1]
+    J, K, size = _dense_jacobian(A, C), 2 * len(A) - 1, C.shape[1]
     x = np.random.default_rng(4).normal(size=len(J))
     forces = np.concatenate([block @ x[i * size : (i + 1) * size] for i, block in enumerate(C)])
     out = x.reshape(-1, K).copy()
-    apply(A, forces.reshape(-1, K), out)
+    apply_matrices(A, forces.reshape(-1, K), out)
     np.testing.assert_allclose(J @ x, out.ravel(), atol=1e-13)
 
 
 @pytest.mark.parametrize("accuracy", [1e-2, 1e-6])
 def test_conjugate_residuals_reach_the_accuracy_or_say_no(accuracy):
     A, C = system(1.0)
-    J = _jacobian(A, C)
+    J = _dense_jacobian(A, C)
     r, x = np.random.default_rng(5).normal(size=len(J)), np.empty(len(J))
     assert conjugate_residuals(by_harmonic(A), C, r, accuracy, no_level(), x)
     assert np.linalg.norm(J @ x - r) <= 1.01 * accuracy * np.linalg.norm(r)
@@ -67,12 +67,12 @@ def by_modes(nodes=6, d=2, H=4, M=3):
 
 def test_both_forms_of_a_flexibility_are_the_same():
     flex, x = by_modes(), np.random.default_rng(8).normal(size=(12, 9))
-    A = formed(flex)
+    A = form_matrices(flex)
     np.testing.assert_allclose(A[2], flex[2] + flex[3] @ flex[4][2] @ flex[3].T, atol=1e-13)
     np.testing.assert_array_equal(A[0], flex[1])
     one, other = np.ones((2, 12, 9))
-    flexed(flex, x, one)
-    apply(A, x, other)
+    apply_flexibility(flex, x, one)
+    apply_matrices(A, x, other)
     np.testing.assert_allclose(one, other, atol=1e-12)
     Z = x[:, :2].copy()
     np.testing.assert_allclose(seen_by(flex, Z), Z.T @ A, atol=1e-12)
@@ -81,9 +81,9 @@ def test_both_forms_of_a_flexibility_are_the_same():
     rows = np.array([2, 3, 8, 9])
     for form in (flex, by_harmonic(A)):
         np.testing.assert_allclose(
-            formed(among(form, some, 2)), A[:, rows[:, None], rows], atol=1e-12
+            form_matrices(select_nodes(form, some, 2)), A[:, rows[:, None], rows], atol=1e-12
         )
-        assert among(form, np.arange(6), 2)[0] is not None
+        assert select_nodes(form, np.arange(6), 2)[0] is not None
 
 
 def test_a_second_level_needs_fewer_directions_for_the_same_step():
@@ -92,7 +92,7 @@ def test_a_second_level_needs_fewer_directions_for_the_same_step():
     """
     flex, (_, C) = by_modes(), system(3.0)
     Q, _ = np.linalg.qr(flex[3])
-    J, x = _jacobian(formed(flex), C), np.empty(C.shape[0] * C.shape[1])
+    J, x = _dense_jacobian(form_matrices(flex), C), np.empty(C.shape[0] * C.shape[1])
     r = np.random.default_rng(9).normal(size=len(x))
     level = second_level(flex, C, Q, np.arange(6), 2)
     Z = np.kron(Q, np.eye(9))

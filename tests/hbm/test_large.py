@@ -45,7 +45,7 @@ def test_the_preconditioner_takes_over_where_plain_gmres_is_too_slow(monkeypatch
     change[:, np.arange(d * K), np.arange(d * K)] -= np.repeat(model.springs, K, axis=1)
     right = state.residual.reshape(n * d, K)
     full = iterative_inverse(balance.linear.A, change)(right, 1e-5)
-    monkeypatch.setattr(iterative, "BASIS", 12)
+    monkeypatch.setattr(iterative, "GMRES_BASIS", 12)
     short = iterative_inverse(balance.linear.A, change)(right, 1e-3)
     assert np.linalg.norm(short - full) < 0.05 * np.linalg.norm(full)
 
@@ -87,7 +87,7 @@ def test_dense_factors_are_the_last_resort(monkeypatch):
     A, change = nearly_singular()
     right = np.random.default_rng(1).standard_normal((36, 7))
     monkeypatch.setattr(policy, "DENSE_UNKNOWNS", 0)
-    monkeypatch.setattr(iterative, "PASSES", 0)
+    monkeypatch.setattr(iterative, "GMRES_PASSES", 0)
     monkeypatch.setattr(iterative, "conjugate_residuals", lambda *_: False)
     step = residual_module._choose_inverse(A, change)(right, 1e-5)
     J = np.eye(252) + residual_module._dense_jacobian(A, change)
@@ -116,7 +116,7 @@ def test_blocks_serve_a_whole_newton_run(monkeypatch):
     plain = iterative._harmonic_blocks
     monkeypatch.setattr(iterative, "_harmonic_blocks", lambda *a: made.append(1) or plain(*a))
     monkeypatch.setattr(
-        iterative, "SLOW", 40
+        iterative, "RENEWING_PRODUCTS", 40
     )  # where fewer contacts make products cheap, blocks seldom pay
     solution = solve(model, 0.5, 5, 128)
     assert solution.converged and solution.work.imbalance < 1e-8 and solution.states["lift"] == 36

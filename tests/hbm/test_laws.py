@@ -169,4 +169,10 @@ def test_what_is_written_for_coulomb_refuses(page):
     with pytest.raises(InputError, match=r"samples = 0.*written for Coulomb's law"):
         solve(mass_on_law(page["Dahl"]()), 1.0, 3, 0)
     with pytest.raises(InputError, match="expected an object made from FrictionLaw"):
-        mass_on_law("Dahl")
+        mass_on_law(page["Dahl"])
+
+
+def test_the_page_writes_the_laws_of_the_table(page):
+    for name, law in (("dahl", page["Dahl"]()), ("bouc-wen", page["BoucWen"]())):
+        ours = solve(mass_on_law(name), 0.9, 5, 128)
+        np.testing.assert_allclose(solve(mass_on_law(law), 0.9, 5, 128).w, ours.w, atol=1e-12)

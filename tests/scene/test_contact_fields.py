@@ -52,7 +52,11 @@ def test_seats_and_units(tmp_path):
             ["contact.stiffness=map", "contact.left.kn_area=1e6"],
             "contact.left.kn_area: contact.stiffness",
         ),
-        ("wedge", ["contact.stiffness=maps"], "expected one of given, map; did you mean 'map'"),
+        (
+            "wedge",
+            ["contact.stiffness=maps"],
+            "expected one of given, rigid, map; did you mean 'map'",
+        ),
         (
             "wedge",
             ["contact.crown=2 m"],

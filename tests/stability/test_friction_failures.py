@@ -16,11 +16,12 @@ from bladefem.damper.loops import Drive, steady
 from bladefem.damper.zmass import MassOnFoundation, march
 from bladefem.data import Elements
 from bladefem.errors import InputError
-from bladefem.friction.aft import STICK, evaluate
+from bladefem.friction.aft import evaluate
 from bladefem.friction.closed_form import circular_orbit_work, jenkins
 from bladefem.friction.energy import free_static_force
 from bladefem.friction.equivalent_linear import from_series
 from bladefem.friction.kernel_1d_exact import evaluate_exact
+from bladefem.friction.states import STICK
 from bladefem.friction.time_step import stable_step, step_2d
 from bladefem.time.event_integrator import stuck_start
 from bladefem.time.system import damper_on_platforms

@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 
 from bladefem.data import Elements, Patch
-from bladefem.friction.aft import GROSS_SLIP, STICK
 from bladefem.friction.closed_form import circular_orbit_work
+from bladefem.friction.states import GROSS_SLIP, STICK
 from bladefem.report.linear import harmonic_table, linear_sentence
 from bladefem.report.nodes import draw_wear, node_table, save_cycles_vtu, wear_sentence, wear_table
 from bladefem.study.pipeline.assemble_model import LoadCase

@@ -54,9 +54,9 @@ def test_the_middle_one_of_three_motions_is_unstable(near):
     found = stability_of(model, points)
     assert list(found.verdict) == ["stable", "unstable", "stable"]
     assert found.multiplier[1] > 1.02
-    assert found.multiplier[2] == pytest.approx(
-        1.0, abs=1e-9
-    )  # the slider of a contact that sticks
+    assert found.bifurcation[1] == "fold"
+    # the slider of a contact that sticks, whose multiplier is one, is left out
+    assert 0.9 < found.multiplier[2] < 1.0
 
 
 def test_prescribed_loads_need_no_computing():

@@ -2,7 +2,7 @@
 themselves.
 
 Numba turns a loop into vectors only where it is long, writes one array and needs no sum to stay in
-registers. The functions of lane_kernels.py are written for blocks of 64 bytes instead; any
+registers. The functions of time_kernels.py are written for blocks of 64 bytes instead; any
 processor runs them, with as many instructions a block as its vectors ask for. A block has the
 precision of the array it comes from, and takes that of the array it goes to, so that one text
 serves arrays of 8 and of 4 bytes a number.

@@ -15,7 +15,6 @@ from typing import NamedTuple
 import numpy as np
 from numba import njit
 
-from bladefem.friction.coulomb_2d import CLOSING, SLIP, STICK
 from bladefem.friction.simd.codegen import zeros
 from bladefem.friction.simd.periodic_state import (
     CHANGING,
@@ -27,21 +26,30 @@ from bladefem.friction.simd.periodic_state import (
 from bladefem.friction.simd.row_kernels import (
     add_folded,
     add_products,
-    combine,
+    combine_rows,
     join_rows,
     turn_rows,
 )
 from bladefem.friction.simd.time_kernels import TURNS, find_turns
-from bladefem.friction.trigonometric_tables import Patterns, empty_gram, gram
+from bladefem.friction.states import CLOSING, SLIP, STICK
+from bladefem.friction.trigonometric_tables import Patterns, empty_gram, gram_matrix
 
-__all__ = ["Rows", "add_period", "close", "empty_rows", "start_rows", "to_carry", "unit_rows"]
+__all__ = [
+    "Rows",
+    "add_period",
+    "close_period",
+    "empty_rows",
+    "start_rows",
+    "to_carry",
+    "unit_rows",
+]
 
 FAST = {"contract", "reassoc", "nsz"}
 # samples after which a row is looked at for faint numbers
-LOT = 64
-# of 8 and of 4 bytes: forgotten before they become denormal and slow
-FAINT = 1e-60
-SHORT_FAINT = 1e-30
+SAMPLES_BETWEEN_FLUSHES = 64
+# of 8 and of 4 bytes: flush-to-zero thresholds: smaller numbers would become denormal and slow
+FLUSH_TO_ZERO = 1e-60
+FLUSH_TO_ZERO_SINGLE = 1e-30
 
 
 class Rows(NamedTuple):
@@ -114,7 +122,7 @@ def _angle_row(i, by, el, scratch, row):
     """
     C, knots, (p0, p1, q0, q1, r0, r1) = scratch.C, scratch.patterns.knots, by
     parts = el.kn * r0, el.kt * (p0 - q0), el.kt * (p1 - q1), el.kn * r1, el.kt * q0, el.kt * q1
-    combine(
+    combine_rows(
         p0,
         C[0],
         p1,
@@ -167,13 +175,13 @@ def _add_stick(a, b, tab, scratch):
 
 
 @njit(_nrt=False, cache=True, error_model="numpy", forceinline=True)
-def _slide(a, b, scratch):
+def _slide_row(a, b, scratch):
     """Turn the row of the angle along the edges a <= i < b."""
     row = scratch.row
     patterns = scratch.patterns
-    faint = FAINT if scratch.row.itemsize == 8 else SHORT_FAINT
+    faint = FLUSH_TO_ZERO if scratch.row.itemsize == 8 else FLUSH_TO_ZERO_SINGLE
     while a < b:
-        stop = min(b, a + LOT)
+        stop = min(b, a + SAMPLES_BETWEEN_FLUSHES)
         turn_rows(scratch.turns, patterns.at, patterns.change, a, stop, row, scratch.rows)
         for l in range(row.size):
             if abs(row[l]) < faint:
@@ -235,11 +243,11 @@ def _leave_slip(fx, fy, i, N, kt, kn, scratch):
     knots = scratch.patterns.knots
     for e, across, along in ((0, -fy, fx), (1, fx, fy)):
         parts = kn * along / N, -kt * (1 - e), -kt * e, 0.0, 0.0, 0.0
-        combine(across, row, 0.0, row, parts, i, i, knots, knots.shape[1], C[e])
+        combine_rows(across, row, 0.0, row, parts, i, i, knots, knots.shape[1], C[e])
 
 
 @njit(_nrt=False, cache=True, error_model="numpy", forceinline=True)
-def _turns(path, pieces, el, trail, scratch, trace):
+def _find_turns(path, pieces, el, trail, scratch, trace):
     """How the row of the angle turns along all edges that slide; their forces and factors."""
     scratch.g[:] = 0.0
     scratch.normal[:] = 0.0
@@ -276,7 +284,7 @@ def add_period(path, fx, fy, pieces, el, tab, trail, scratch, trace, summing):
     forces = trail.forces
     run = -1
     slipping = False
-    _turns(path, pieces, el, trail, scratch, trace)
+    _find_turns(path, pieces, el, trail, scratch, trace)
     if summing:
         scratch.J[:] = 0.0
         scratch.stick[:] = 0.0
@@ -286,7 +294,7 @@ def add_period(path, fx, fy, pieces, el, tab, trail, scratch, trace, summing):
         ax = forces[0, piece]
         ay = forces[1, piece]
         if kind == SLIDING:
-            _slide(i, trail.begins[piece + 1], scratch)
+            _slide_row(i, trail.begins[piece + 1], scratch)
             continue
         if slipping:
             _leave_slip(ax, ay, i, path[2, i], el.kt, el.kn, scratch)
@@ -379,7 +387,7 @@ def start_rows(vx, vy, N, el, tab, C):
 
 
 @njit(_nrt=False, cache=True, error_model="numpy", fastmath=FAST, forceinline=True)
-def close(rx, ry, kt, tab, scratch, F, J):
+def close_period(rx, ry, kt, tab, scratch, F, J):
     """J (2, K, 3K) and what F (3, K) lacks, from the sums, the rows C (2, M) at the end and its
     misfit (rx, ry).
 
@@ -410,7 +418,7 @@ def close(rx, ry, kt, tab, scratch, F, J):
             py = scratch.J[e, k, W + K]
             F[1 + e, k] += px * mx + py * my
     if scratch.stick[0] > 0.0:
-        gram(scratch.stick, scratch.around, scratch.gram)
+        gram_matrix(scratch.stick, scratch.around, scratch.gram)
     else:
         scratch.gram[:] = 0.0
     join_rows(scratch.J, scratch.J.shape[1], W, C, kt, scratch.gram, K, J)

@@ -10,7 +10,7 @@ from numba import njit
 from bladefem.friction.simd.codegen import zeros
 from bladefem.friction.simd.derivative_rows import (
     add_period,
-    close,
+    close_period,
     empty_rows,
     start_rows,
     to_carry,
@@ -19,26 +19,27 @@ from bladefem.friction.simd.derivative_rows import (
 from bladefem.friction.simd.periodic_state import (
     TOLERANCE,
     empty_trail,
-    follow,
+    follow_period,
     forces_along,
-    periodic,
-    start,
+    periodic_force,
+    start_force,
 )
 from bladefem.friction.simd.time_kernels import find_edges
-from bladefem.friction.trigonometric_tables import Node, empty_gram, gram
+from bladefem.friction.trigonometric_tables import Node, empty_gram, gram_matrix
 
 __all__ = ["disc_batch"]
 
-# whose motion and harmonics are one matrix product
-NODES = 8
-# of the largest limit: longest step by which a linearised period is finished,
-EXACT = 1e-11
-SHORT_EXACT = 1e-8
-#                     whose square the force takes, and the step itself the derivative, in 8 and in 4 bytes
+# nodes whose motion and harmonics are one matrix product
+NODES_AT_ONCE = 8
+# Longest step, over the largest friction limit, by which a linearised period is finished: its
+# square is the error of the force, the step itself that of the derivative, which is summed in
+# double or in single precision.
+STEP_TOLERANCE = 1e-11
+STEP_TOLERANCE_SINGLE = 1e-8
 
 
 @njit(cache=True, error_model="numpy")
-def _paths(w, load, nodes, tab, path):
+def _paths_at_knots(w, load, nodes, tab, path):
     """path (n, 3, width) = (kt w_1, kt w_2, N) at the knots [N]."""
     n = w.shape[0]
     S = tab.at.shape[0]
@@ -61,7 +62,7 @@ def _paths(w, load, nodes, tab, path):
 
 
 @njit(_nrt=False, cache=True, error_model="numpy")
-def _load(N, load, i):
+def _load_at_sample(N, load, i):
     """Normal load at sample i from those at the knots N (width,) [N], where prescribed not the mean
     over both knots.
     """
@@ -72,15 +73,15 @@ def _load(N, load, i):
 
 
 @njit(_nrt=False, cache=True, error_model="numpy")
-def _contact(N, load, tab, mean):
+def _contact_means(N, load, tab, mean):
     """Basis means (4H+1,) of the samples in contact."""
     S = tab.at.shape[0]
     a = 0
     mean[:] = 0.0
     while a < S:
         b = a
-        closed = _load(N, load, a) > 0.0
-        while b < S and (_load(N, load, b) > 0.0) == closed:
+        closed = _load_at_sample(N, load, a) > 0.0
+        while b < S and (_load_at_sample(N, load, b) > 0.0) == closed:
             b += 1
         if closed:
             for p in range(mean.size):
@@ -89,7 +90,7 @@ def _contact(N, load, tab, mean):
 
 
 @njit(_nrt=False, cache=True, error_model="numpy")
-def _normal(w, load, el, N, least, tab, spare, F, J):
+def _normal_force(w, load, el, N, least, tab, spare, F, J):
     """Normal force F (K,) and its Jacobian J[0], J (3, K, 3K) or (0, 0, 0); returns the share in
     contact.
 
@@ -108,8 +109,8 @@ def _normal(w, load, el, N, least, tab, spare, F, J):
             J[0, k, k] = el.kn
         return 1.0
     mean, block, around = spare
-    _contact(N, load, tab, mean)
-    gram(mean, around, block)
+    _contact_means(N, load, tab, mean)
+    gram_matrix(mean, around, block)
     for k in range(K):
         F[k] = 0.0 if load.size else el.n0 * block[k, 0]
         for l in range(K):
@@ -118,14 +119,14 @@ def _normal(w, load, el, N, least, tab, spare, F, J):
         for l in range(K):
             J[0, k, l] = el.kn * block[k, l]
     for i in range(load.size):
-        if _load(N, load, i) > 0.0:
+        if _load_at_sample(N, load, i) > 0.0:
             for k in range(K):
                 F[k] += load[i] * tab.analysis[i, k]
     return mean[0]
 
 
 @njit(_nrt=False, cache=True, error_model="numpy", fastmath=True)
-def _range(x):
+def _value_range(x):
     """Least and largest of x."""
     least = x[0]
     largest = x[0]
@@ -136,7 +137,7 @@ def _range(x):
 
 
 @njit(_nrt=False, cache=True, error_model="numpy")
-def _within(path, mu):
+def _within_limit(path, mu):
     """Whether kt w stays within the limit at all knots; if the load lasts all the time, then f = kt
     w.
     """
@@ -148,7 +149,7 @@ def _within(path, mu):
 
 
 @njit(_nrt=False, cache=True, error_model="numpy", forceinline=True)
-def _forces(w, load, el, path, tab, near, limit, trail, phi, spare, trace, F, J, shares):
+def _node_forces(w, load, el, path, tab, near, limit, trail, phi, spare, trace, F, J, shares):
     """Normal force of one node, and its last period as periodic returns it; 0 cycles where it
     sticks or stays open.
 
@@ -156,15 +157,15 @@ def _forces(w, load, el, path, tab, near, limit, trail, phi, spare, trace, F, J,
     width), J the tangents.
     """
     linear = J.shape[0] > 0
-    found, (least, largest) = (True, 0.0, 0.0, 0.0, 0.0, 0, 0, 0), _range(path[2])
-    closed = _normal(w[0], load, el, path[2], least, tab, spare, F[0], J)
-    if largest > 0.0 and not (least > 0.0 and _within(path, el.mu)):
+    found, (least, largest) = (True, 0.0, 0.0, 0.0, 0.0, 0, 0, 0), _value_range(path[2])
+    closed = _normal_force(w[0], load, el, path[2], least, tab, spare, F[0], J)
+    if largest > 0.0 and not (least > 0.0 and _within_limit(path, el.mu)):
         find_edges(path, path.shape[1], el.mu, trail.form)
-        found = periodic(path, el.mu, largest, near, limit, trail, phi)
+        found = periodic_force(path, el.mu, largest, near, limit, trail, phi)
         if not linear:
             forces_along(path, el.mu, found[6], trail, trace)
     else:
-        _stuck(w, el.kt if largest > 0.0 else 0.0, F, J)
+        _stuck_forces(w, el.kt if largest > 0.0 else 0.0, F, J)
     shares[1] = found[5] / tab.at.shape[0]
     shares[2] = 1.0 - closed
     shares[0] = 1.0 - shares[1] - shares[2]
@@ -172,7 +173,7 @@ def _forces(w, load, el, path, tab, near, limit, trail, phi, spare, trace, F, J,
 
 
 @njit(_nrt=False, cache=True, error_model="numpy", forceinline=True)
-def _stuck(w, kt, F, J):
+def _stuck_forces(w, kt, F, J):
     """Tangential forces of springs kt."""
     K, J[1:] = F.shape[1], 0.0
     for c in range(1, 3):
@@ -183,7 +184,7 @@ def _stuck(w, kt, F, J):
 
 
 @njit(_nrt=False, cache=True, error_model="numpy")
-def _rows(path, found, el, tab, trail, scratch, trace, phi, F, J):
+def _derivative_rows(path, found, el, tab, trail, scratch, trace, phi, F, J):
     """Rows J (2, K, 3K) of the tangential forces in the state that was found.
 
     F (3, K) takes what trace (2, width), zero on entry, lacks of the periodic force.
@@ -193,20 +194,20 @@ def _rows(path, found, el, tab, trail, scratch, trace, phi, F, J):
         unit_rows(el.kt, tab, scratch.C)
         add_period(path, gx, gy, pieces, el, tab, trail, scratch, trace, unique)
     else:
-        gx, gy = fx, fy = start(path[0, 0], path[1, 0], path[2, 0], el.mu)
+        gx, gy = fx, fy = start_force(path[0, 0], path[1, 0], path[2, 0], el.mu)
         start_rows(path[0, 0], path[1, 0], path[2, 0], el, tab, scratch.C)
         for cycle in range(cycles):
             if cycle > 0:
                 to_carry(scratch.C, 0, el.kt, tab)
             fx = gx
             fy = gy
-            gx, gy, _, _, _, pieces = follow(path, el.mu, fx, fy, trail, phi)
+            gx, gy, _, _, _, pieces = follow_period(path, el.mu, fx, fy, trail, phi)
             add_period(path, gx, gy, pieces, el, tab, trail, scratch, trace, cycle + 1 == cycles)
-    close(gx - fx, gy - fy, el.kt, tab, scratch, F, J)
+    close_period(gx - fx, gy - fy, el.kt, tab, scratch, F, J)
 
 
 @njit(_nrt=False, cache=True, error_model="numpy")
-def _lot(
+def _some_nodes(
     w, load, nodes, path, tab, near, limit, trail, scratch, phi, spare, trace, F, J, shares, cycles
 ):
     """disc_batch for some nodes but for the harmonics of trace (n, 2, width); returns whether any
@@ -215,7 +216,7 @@ def _lot(
     moving = False
     for e in range(w.shape[0]):
         el = Node(nodes[e, 0], nodes[e, 1], nodes[e, 2], nodes[e, 3])
-        found = _forces(
+        found = _node_forces(
             w[e],
             load[e],
             el,
@@ -232,13 +233,13 @@ def _lot(
             shares[e],
         )
         if found[7] and J.shape[1]:
-            _rows(path[e], found, el, tab, trail, scratch, trace[e], phi, F[e], J[e, 1:])
+            _derivative_rows(path[e], found, el, tab, trail, scratch, trace[e], phi, F[e], J[e, 1:])
         cycles[e], moving = found[7] or 1, moving or found[7] != 0
     return moving
 
 
 @njit(cache=True, error_model="numpy")
-def _harmonics(trace, tab, F):
+def _add_harmonics(trace, tab, F):
     """Add the harmonics of trace (n, 2, width) to F (n, 3, K)."""
     n = F.shape[0]
     width = trace.shape[2]
@@ -260,21 +261,25 @@ def disc_batch(w, load, nodes, tab, patterns, limit, F, J, shares, cycles):
     """
     n = w.shape[0]
     width = tab.along.shape[1]
-    path = zeros(3 * NODES * width, np.float64).reshape((NODES, 3, width))
-    trace = zeros(2 * NODES * width, np.float64).reshape((NODES, 2, width))
+    path = zeros(3 * NODES_AT_ONCE * width, np.float64).reshape((NODES_AT_ONCE, 3, width))
+    trace = zeros(2 * NODES_AT_ONCE * width, np.float64).reshape((NODES_AT_ONCE, 2, width))
     phi = np.empty((2, 2))
     spare = (
         np.empty(tab.sums.shape[1]),
         np.empty((w.shape[2], w.shape[2])),
         empty_gram(w.shape[2] // 2),
     )
-    near = (EXACT if patterns.at.itemsize == 8 else SHORT_EXACT) if J.shape[1] else TOLERANCE
+    near = (
+        (STEP_TOLERANCE if patterns.at.itemsize == 8 else STEP_TOLERANCE_SINGLE)
+        if J.shape[1]
+        else TOLERANCE
+    )
     trail, scratch, F[:] = empty_trail(tab.at.shape[0], width), empty_rows(tab, patterns), 0.0
-    for first in range(0, n, NODES):
-        last = min(first + NODES, n)
-        _paths(w[first:last], load[first:last], nodes[first:last], tab, path)
+    for first in range(0, n, NODES_AT_ONCE):
+        last = min(first + NODES_AT_ONCE, n)
+        _paths_at_knots(w[first:last], load[first:last], nodes[first:last], tab, path)
         trace[:] = 0.0
-        if _lot(
+        if _some_nodes(
             w[first:last],
             load[first:last],
             nodes[first:last],
@@ -292,4 +297,4 @@ def disc_batch(w, load, nodes, tab, patterns, limit, F, J, shares, cycles):
             shares[first:last],
             cycles[first:last],
         ):
-            _harmonics(trace, tab, F[first:last])
+            _add_harmonics(trace, tab, F[first:last])

@@ -1,11 +1,12 @@
 """Periodic state of 2-D Coulomb elements: fixed point of the period map, by marching and by Newton
 on its derivative.
 
-In slip the half-angle vector (P, Q) ~ (cos theta/2, sin theta/2) of the force moves by a 2 x 2 matrix on each edge,
-A = ((1 + E) I + (1 - E) [[ux, uy], [uy, -ux]]) / 2, so that marching needs no trigonometry and no division. Marching
-converges, but slowly near the stick limit, where Newton with the derivative of the period map takes a
-few periods. The derivative costs next to nothing: stick leaves it as it is, and along an edge in slip the row of the
-angle falls by det A |P, Q|^2 / |A (P, Q)|^2.
+In slip the half-angle vector (P, Q) ~ (cos theta/2, sin theta/2) of the force moves by a 2 x 2
+matrix on each edge, A = ((1 + E) I + (1 - E) [[ux, uy], [uy, -ux]]) / 2, so that marching needs no
+trigonometry and no division. Marching converges, but slowly near the stick limit, where Newton with
+the derivative of the period map takes a few periods. The derivative costs next to nothing: stick
+leaves it as it is, and along an edge in slip the row of the angle falls by
+det A |P, Q|^2 / |A (P, Q)|^2.
 
 Only `empty_trail` makes arrays: elsewhere Numba need not count references (_nrt), which costs as
 much as the rest.
@@ -19,7 +20,7 @@ from typing import NamedTuple
 import numpy as np
 from numba import njit
 
-from bladefem.friction.coulomb_2d import SLIP, STICK, edge, middle
+from bladefem.friction.coulomb_2d import force_at_middle, march_edge
 from bladefem.friction.simd.codegen import zeros
 from bladefem.friction.simd.time_kernels import (
     ACROSS,
@@ -37,6 +38,7 @@ from bladefem.friction.simd.time_kernels import (
     find_forces,
     stuck_until,
 )
+from bladefem.friction.states import SLIP, STICK
 
 __all__ = [
     "CHANGING",
@@ -45,35 +47,35 @@ __all__ = [
     "TOLERANCE",
     "Trail",
     "empty_trail",
-    "follow",
+    "follow_period",
     "forces_along",
     "middle_force",
-    "periodic",
-    "start",
+    "periodic_force",
+    "start_force",
     "stuck_forces",
 ]
 
 # of the largest friction limit: how well the force must repeat itself in marching
 TOLERANCE = 1e-12
 # periods before Newton: load that varies allows several states, and marching chooses
-MARCHED = 2
+MARCHED_PERIODS = 2
 # periods in which Newton's steps need not pay at once: states of the edges have to settle first
-FREE = 30
+FREE_NEWTON_PERIODS = 30
 # of det(I - Phi): below it the state keeps a memory of its start
-SINGULAR = 1e-6
+SINGULAR_DETERMINANT = 1e-6
 # of the way that is left: how far slow marching leaps
-LEAP = 0.9
+LEAP_SHARE = 0.9
 # of the change in the period before: from there on marching is slow
-SLOW = 0.7
+SLOW_CONVERGENCE = 0.7
 # of the limit: an edge that reaches no further beyond may be one that only touches it
-TOUCH = 1e-9
+TOUCH_SHARE = 1e-9
 # pieces of a period; a change of state is a piece of one edge
 OPEN, STICKING, SLIDING, CHANGING = range(4)
 
 
 class Trail(NamedTuple):
     """One period of a node along its knots and samples; rows of ``width`` numbers as in
-    lane_kernels.py.
+    time_kernels.py.
     """
 
     # (.., width) edges
@@ -116,7 +118,7 @@ def half_angle(x, y):
 
 
 @njit(_nrt=False, cache=True, error_model="numpy")
-def start(vx, vy, N, mu):
+def start_force(vx, vy, N, mu):
     """Force at the first knot: k_t w, drawn back onto the circle."""
     R = mu * max(N, 0.0)
     length = sqrt(vx * vx + vy * vy)
@@ -125,7 +127,7 @@ def start(vx, vy, N, mu):
 
 
 @njit(_nrt=False, cache=True, error_model="numpy", inline="always")
-def _begin(trail, pieces, kind, i, fx, fy):
+def _begin_piece(trail, pieces, kind, i, fx, fy):
     """Note a piece of the period that begins at knot i under the force (fx, fy); the number of
     pieces.
     """
@@ -137,7 +139,7 @@ def _begin(trail, pieces, kind, i, fx, fy):
 
 
 @njit(_nrt=False, cache=True, error_model="numpy", forceinline=True)
-def _change(path, i, mu, fx, fy, phi, change):
+def _changing_edge(path, i, mu, fx, fy, phi, change):
     """One edge on which the state may change: (state at its end, force there, sample slips, it is
     more than a touch).
 
@@ -148,7 +150,7 @@ def _change(path, i, mu, fx, fy, phi, change):
     dy = path[1, i + 1] - path[1, i]
     N0 = path[2, i]
     N1 = path[2, i + 1]
-    end, ex, ey, mid, by = edge(fx, fy, dx, dy, N0, N1, mu)
+    end, ex, ey, mid, by = march_edge(fx, fy, dx, dy, N0, N1, mu)
     change[0] = end
     change[1] = mid
     if end == SLIP:
@@ -158,12 +160,12 @@ def _change(path, i, mu, fx, fy, phi, change):
         phi[0, 0], phi[0, 1] = p0 * phi[0, 0] + p1 * phi[1, 0], p0 * phi[0, 1] + p1 * phi[1, 1]
     elif end != STICK:
         phi[:, :] = 0.0
-    touch = (1.0 + TOUCH) * mu * N1
+    touch = (1.0 + TOUCH_SHARE) * mu * N1
     return end, ex, ey, mid == SLIP, end == SLIP and (fx + dx) ** 2 + (fy + dy) ** 2 > touch * touch
 
 
 @njit(_nrt=False, cache=True, error_model="numpy", inline="always")
-def _leave(P, Q, R, fade, phi):
+def _leave_slip(P, Q, R, fade, phi):
     """Force of size R along the half-angle vector; phi (2, 2) from the row of the angle, which fell
     by fade.
     """
@@ -177,19 +179,19 @@ def _leave(P, Q, R, fade, phi):
 
 
 @njit(_nrt=False, cache=True, error_model="numpy", inline="always")
-def _ends(P, Q, form, i):
+def _slip_ends(P, Q, form, i):
     """Whether slip under the half-angle vector (P, Q) ends on edge i."""
     return P * (P * form[LIMIT_AHEAD, i] + Q * form[TWICE_Y, i]) < Q * Q * form[LIMIT_AWAY, i]
 
 
 @njit(_nrt=False, cache=True, error_model="numpy", inline="always")
-def _moved(P, Q, form, i):
+def _moved_half_angle(P, Q, form, i):
     """Half-angle vector after edge i."""
     return form[AHEAD, i] * P + form[ACROSS, i] * Q, form[ACROSS, i] * P + form[AWAY, i] * Q
 
 
 @njit(_nrt=False, cache=True, error_model="numpy", forceinline=True, fastmath={"contract", "nsz"})
-def _slide(first, S, P, Q, form, knots):
+def _follow_slip(first, S, P, Q, form, knots):
     """Follow slip from a knot to where it ends: (knot, P, Q) there; by two edges at once, as a
     product is slow.
     """
@@ -197,12 +199,12 @@ def _slide(first, S, P, Q, form, knots):
     p = knots[0, first:]
     q = knots[1, first:]
     for i in range(0, S - first - 1, 2):
-        if _ends(P, Q, form, i):
+        if _slip_ends(P, Q, form, i):
             return first + i, P, Q
         p[i] = P
         q[i] = Q
-        P1, Q1 = _moved(P, Q, form, i)
-        if _ends(P1, Q1, form, i + 1):
+        P1, Q1 = _moved_half_angle(P, Q, form, i)
+        if _slip_ends(P1, Q1, form, i + 1):
             return first + i + 1, P1, Q1
         p[i + 1] = P1
         q[i + 1] = Q1
@@ -212,16 +214,16 @@ def _slide(first, S, P, Q, form, knots):
         )
     i = S - first - 1
     if i % 2 == 0:
-        if _ends(P, Q, form, i):
+        if _slip_ends(P, Q, form, i):
             return S - 1, P, Q
         p[i] = P
         q[i] = Q
-        P, Q = _moved(P, Q, form, i)
+        P, Q = _moved_half_angle(P, Q, form, i)
     return S, P, Q
 
 
 @njit(_nrt=False, cache=True, error_model="numpy", forceinline=True, fastmath={"reassoc"})
-def _fall(a, b, form, slips):
+def _determinant_product(a, b, form, slips):
     """Note that the edges a <= i < b slide: the product of the determinants of their maps."""
     fall = 1.0
     falls = form[FALL, a:b]
@@ -233,7 +235,7 @@ def _fall(a, b, form, slips):
 
 
 @njit(_nrt=False, cache=True, error_model="numpy")
-def follow(path, mu, fx, fy, trail, phi):
+def follow_period(path, mu, fx, fy, trail, phi):
     """One period from (fx, fy) at the first knot: (fx, fy, edges that slip or open, that surely
     slip, samples, pieces).
 
@@ -255,23 +257,23 @@ def follow(path, mu, fx, fy, trail, phi):
             cy = fy - path[1, i]
             stop = stuck_until(path, path.shape[1], i, S, cx, cy, mu)
             if stop > i:
-                pieces = _begin(trail, pieces, STICKING, i, fx, fy)
+                pieces = _begin_piece(trail, pieces, STICKING, i, fx, fy)
                 i = stop
                 fx = cx + path[0, stop]
                 fy = cy + path[1, stop]
                 if i == S:
                     break
         elif path[2, i + 1] <= 0.0:
-            pieces = _begin(trail, pieces, OPEN, i, 0.0, 0.0)
+            pieces = _begin_piece(trail, pieces, OPEN, i, 0.0, 0.0)
             fx = 0.0
             fy = 0.0
             phi[:, :] = 0.0
             events = events + 1
             i = i + 1
             continue
-        pieces = _begin(trail, pieces, CHANGING, i, fx, fy)
+        pieces = _begin_piece(trail, pieces, CHANGING, i, fx, fy)
         R = mu * path[2, i + 1]
-        end, fx, fy, slipped, slipping = _change(
+        end, fx, fy, slipped, slipping = _changing_edge(
             path, i, mu, fx, fy, phi, trail.changes[pieces - 1]
         )
         events = events + (end != STICK)
@@ -281,14 +283,14 @@ def follow(path, mu, fx, fy, trail, phi):
         if end == SLIP and R > 0.0:
             begin, (P, Q) = i, half_angle(fx / R, fy / R)
             fade = P * P + Q * Q
-            i, P, Q = _slide(i, S, P, Q, trail.form, trail.knots)
+            i, P, Q = _follow_slip(i, S, P, Q, trail.form, trail.knots)
             if i > begin:
-                pieces = _begin(trail, pieces, SLIDING, begin, fx, fy)
-                fade *= _fall(begin, i, trail.form, trail.slips)
+                pieces = _begin_piece(trail, pieces, SLIDING, begin, fx, fy)
+                fade *= _determinant_product(begin, i, trail.form, trail.slips)
             events = events + i - begin
             sure = sure + i - begin
             slips = slips + i - begin
-            fx, fy = _leave(P, Q, mu * path[2, i], fade, phi)
+            fx, fy = _leave_slip(P, Q, mu * path[2, i], fade, phi)
         elif end == SLIP:
             phi[:, :] = 0.0
     trail.begins[pieces] = S
@@ -317,7 +319,7 @@ def middle_force(i, mid, fx, fy, path, mu, trace):
     dy = path[1, i + 1] - path[1, i]
     N0 = path[2, i]
     N1 = path[2, i + 1]
-    trace[0, i], trace[1, i], by = middle(fx, fy, dx, dy, N0, N1, mu, mid)
+    trace[0, i], trace[1, i], by = force_at_middle(fx, fy, dx, dy, N0, N1, mu, mid)
     return by
 
 
@@ -337,7 +339,7 @@ def forces_along(path, mu, pieces, trail, trace):
 
 
 @njit(_nrt=False, cache=True, error_model="numpy")
-def newton(fx, fy, gx, gy, R, phi):
+def newton_step(fx, fy, gx, gy, R, phi):
     """det(I - Phi) and the fixed point of the linearised period map f -> g, in the circle of radius
     R.
     """
@@ -360,13 +362,13 @@ def newton(fx, fy, gx, gy, R, phi):
 
 
 @njit(_nrt=False, cache=True, error_model="numpy")
-def _remembers(phi):
-    """Whether anything of the force at the start is left at the end."""
+def _has_memory(phi):
+    """True if the period map has memory."""
     return phi[0, 0] != 0.0 or phi[0, 1] != 0.0 or phi[1, 0] != 0.0 or phi[1, 1] != 0.0
 
 
 @njit(_nrt=False, cache=True, error_model="numpy", forceinline=True)
-def _iterated(path, mu, largest, near, limit, trail, phi):
+def _iterate_newton(path, mu, largest, near, limit, trail, phi):
     """Periodic force by Newton from kt w, returned as by periodic.
 
     Not unique is also where it ended on the rim of stick, at forces that touch the limit and no
@@ -374,21 +376,21 @@ def _iterated(path, mu, largest, near, limit, trail, phi):
     """
     scale = mu * largest
     R = mu * max(path[2, 0], 0.0)
-    fx, fy = start(path[0, 0], path[1, 0], path[2, 0], mu)
+    fx, fy = start_force(path[0, 0], path[1, 0], path[2, 0], mu)
     guess = False
     before = np.inf
     sx = 0.0
     sy = 0.0
     for cycle in range(1, limit + 1):
-        gx, gy, events, sure, slips, pieces = follow(path, mu, fx, fy, trail, phi)
+        gx, gy, events, sure, slips, pieces = follow_period(path, mu, fx, fy, trail, phi)
         residual = sqrt((gx - fx) ** 2 + (gy - fy) ** 2)
-        det, x, y = newton(fx, fy, gx, gy, R, phi)
-        if events == 0 or (residual <= TOLERANCE * scale and abs(det) < SINGULAR):
+        det, x, y = newton_step(fx, fy, gx, gy, R, phi)
+        if events == 0 or (residual <= TOLERANCE * scale and abs(det) < SINGULAR_DETERMINANT):
             return False, fx, fy, gx, gy, slips, pieces, cycle
-        if abs(det) >= SINGULAR and sqrt((x - fx) ** 2 + (y - fy) ** 2) <= near * scale:
-            return sure > 0 or not _remembers(phi), fx, fy, gx, gy, slips, pieces, cycle
+        if abs(det) >= SINGULAR_DETERMINANT and sqrt((x - fx) ** 2 + (y - fy) ** 2) <= near * scale:
+            return sure > 0 or not _has_memory(phi), fx, fy, gx, gy, slips, pieces, cycle
         # no better than marching: go back and march on
-        if guess and cycle > FREE and residual > 0.5 * before:
+        if guess and cycle > FREE_NEWTON_PERIODS and residual > 0.5 * before:
             fx = sx
             fy = sy
             guess = False
@@ -396,24 +398,24 @@ def _iterated(path, mu, largest, near, limit, trail, phi):
         before = residual
         sx = gx
         sy = gy
-        guess = cycle >= MARCHED and abs(det) >= 1e-9
+        guess = cycle >= MARCHED_PERIODS and abs(det) >= 1e-9
         fx, fy = (x, y) if guess else (gx, gy)
     return True, fx, fy, gx, gy, slips, pieces, -limit
 
 
 @njit(_nrt=False, cache=True, error_model="numpy")
-def _order(trail, pieces):
+def _state_hash(trail, pieces):
     """A number by which to tell the states of one period from those of another."""
     order = pieces
     for piece in range(pieces):
         order = 31 * order + 4 * trail.begins[piece] + trail.kinds[piece]
         if trail.kinds[piece] == CHANGING:
-            order = 31 * order + int(4.0 * trail.changes[piece, 0] + trail.changes[piece, 1])
+            order = 31 * order + int(8.0 * trail.changes[piece, 0] + trail.changes[piece, 1])
     return order
 
 
 @njit(_nrt=False, cache=True, error_model="numpy")
-def _marched(path, mu, largest, leap, limit, trail, phi):
+def _march_with_leaps(path, mu, largest, leap, limit, trail, phi):
     """Periodic force by marching from kt w, with leaps (their share of the way left) where it is
     slow.
 
@@ -426,7 +428,7 @@ def _marched(path, mu, largest, leap, limit, trail, phi):
     """
     scale = mu * largest
     R = mu * max(path[2, 0], 0.0)
-    fx, fy = start(path[0, 0], path[1, 0], path[2, 0], mu)
+    fx, fy = start_force(path[0, 0], path[1, 0], path[2, 0], mu)
     bx = fx
     by = fy
     share = leap
@@ -434,10 +436,10 @@ def _marched(path, mu, largest, leap, limit, trail, phi):
     last = 0
     before = 0.0
     for cycle in range(1, limit + 1):
-        gx, gy, events, _, slips, pieces = follow(path, mu, fx, fy, trail, phi)
+        gx, gy, events, _, slips, pieces = follow_period(path, mu, fx, fy, trail, phi)
         residual = sqrt((gx - fx) ** 2 + (gy - fy) ** 2)
-        order = _order(trail, pieces)
-        det, x, y = newton(fx, fy, gx, gy, R, phi)
+        order = _state_hash(trail, pieces)
+        det, x, y = newton_step(fx, fy, gx, gy, R, phi)
         if leapt and order != last:
             fx = bx
             fy = by
@@ -446,9 +448,23 @@ def _marched(path, mu, largest, leap, limit, trail, phi):
             last = 0
             continue
         if events == 0 or residual <= TOLERANCE * scale:
-            return events > 0 and abs(det) >= SINGULAR, fx, fy, gx, gy, slips, pieces, cycle
+            return (
+                events > 0 and abs(det) >= SINGULAR_DETERMINANT,
+                fx,
+                fy,
+                gx,
+                gy,
+                slips,
+                pieces,
+                cycle,
+            )
         share = min(2.0 * share, leap) if leapt else share
-        leapt = leap > 0.0 and order == last and residual > SLOW * before and det >= SINGULAR
+        leapt = (
+            leap > 0.0
+            and order == last
+            and residual > SLOW_CONVERGENCE * before
+            and det >= SINGULAR_DETERMINANT
+        )
         bx = gx
         by = gy
         last = order
@@ -458,7 +474,7 @@ def _marched(path, mu, largest, leap, limit, trail, phi):
 
 
 @njit(_nrt=False, cache=True, error_model="numpy", forceinline=True)
-def periodic(path, mu, largest, near, limit, trail, phi):
+def periodic_force(path, mu, largest, near, limit, trail, phi):
     """Periodic force: (unique, fx, fy, gx, gy, slips, pieces, cycles), cycles negative if none was
     found in ``limit``.
 
@@ -467,9 +483,9 @@ def periodic(path, mu, largest, near, limit, trail, phi):
     step. Not unique: the state keeps a memory of its start, and so many periods of marching from kt
     w lead there.
     """
-    found = _iterated(path, mu, largest, near, limit, trail, phi)
-    if not found[0] and found[7] > MARCHED:
-        found = _marched(path, mu, largest, LEAP, limit, trail, phi)
+    found = _iterate_newton(path, mu, largest, near, limit, trail, phi)
+    if not found[0] and found[7] > MARCHED_PERIODS:
+        found = _march_with_leaps(path, mu, largest, LEAP_SHARE, limit, trail, phi)
         if not found[0]:
-            found = _marched(path, mu, largest, 0.0, limit, trail, phi)
+            found = _march_with_leaps(path, mu, largest, 0.0, limit, trail, phi)
     return found

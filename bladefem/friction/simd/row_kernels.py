@@ -12,14 +12,22 @@ from numba import njit
 from bladefem.friction.simd.codegen import BLOCK, LANES, Code, kernel
 from bladefem.friction.simd.time_kernels import TURNS
 
-__all__ = ["TILE", "add_folded", "add_products", "combine", "fill_gram", "join_rows", "turn_rows"]
+__all__ = [
+    "TILE",
+    "add_folded",
+    "add_products",
+    "combine_rows",
+    "fill_gram",
+    "join_rows",
+    "turn_rows",
+]
 
 # harmonics summed at once
 TILE = 8
 
 
 @kernel
-def combine(code: Code, a, first, b, second, by, i, j, knots, W, out):
+def combine_rows(code: Code, a, first, b, second, by, i, j, knots, W, out):
     """Row out = a first + b second + by[q] knots[i] + by[3 + q] knots[j] in its parts q; knots (..,
     W), by (6,).
 

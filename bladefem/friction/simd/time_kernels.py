@@ -52,9 +52,9 @@ __all__ = [
 # m (3), a, t (3) of find_turns
 TURNS = 7
 # of the limit: the shortest edge
-FAINT = 1e-12
+SHORTEST_EDGE = 1e-12
 # [N]: the least limit
-LEAST = 1e-60
+SMALLEST_LIMIT = 1e-60
 
 
 @kernel
@@ -73,10 +73,10 @@ def find_edges(code: Code, path, width, mu, out):
             for row in range(3)
         )
         limit = mu * (code.load(path, (2, width), i) + 0.5 * dN)
-        limit = limit.above(LEAST, limit, limit * 0.0 + LEAST)
+        limit = limit.above(SMALLEST_LIMIT, limit, limit * 0.0 + SMALLEST_LIMIT)
         twice = 2.0 * limit
         square = dx * dx + dy * dy
-        least = FAINT * limit
+        least = SHORTEST_EDGE * limit
         square = square.above(least * least, square, least * least)
         # root = 2 limit sqrt(1 + x^2/4)
         length = square.sqrt()

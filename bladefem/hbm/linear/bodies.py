@@ -17,14 +17,14 @@ from ...errors import InputError, NotSolvedError
 __all__ = [
     "Damping",
     "Stack",
-    "modal_amplitudes",
-    "receptance_block",
     "damping_rate",
-    "modal_flexibility",
-    "impedance_rate",
     "dissipated_work",
+    "impedance_rate",
+    "modal_amplitudes",
+    "modal_flexibility",
     "port_motion",
     "port_receptance",
+    "receptance_block",
     "rigid_stack",
     "stack_bodies",
 ]

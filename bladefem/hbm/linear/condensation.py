@@ -29,7 +29,7 @@ from .woodbury import low_rank, low_rank_update
 __all__ = ["Linear", "condense", "rigid_motions", "with_springs"]
 
 # motions that the contact springs resist less than this, relatively, are left out
-UNSEEN = 1e-12
+UNRESISTED_SHARE = 1e-12
 
 
 @dataclass(frozen=True)
@@ -156,7 +156,7 @@ def rigid_motions(
     # metres and radians alike
     size = np.sqrt(np.where(np.diag(held) > 0, np.diag(held), 1.0))
     values, vectors = np.linalg.eigh(held / np.outer(size, size))
-    kept = values > UNSEEN
+    kept = values > UNRESISTED_SHARE
     rigid = vectors[:, kept] / np.sqrt(values[kept]) / size[:, None]
     return B @ rigid, rigid.T @ loads, rigid
 

@@ -2,9 +2,9 @@
 contact springs.
 
 `bladefem.hbm.linear.condensation` does the same in NumPy. Where there are few modes for the contact
-freedoms, neither flexibility without springs, G = R + C D C^H, is formed, nor is a system as large
-as the contact solved: see `woodbury`. Where they are the same for all harmonics as well, not even
-the flexibility with springs is formed: see `flex`.
+degrees of freedom, neither flexibility without springs, G = R + C D C^H, is formed, nor is a system
+as large as the contact solved: see `woodbury`. Where they are the same for all harmonics as well,
+not even the flexibility with springs is formed: see `bladefem.hbm.linear.contact_flexibility`.
 """
 
 from __future__ import annotations
@@ -12,7 +12,7 @@ from __future__ import annotations
 import numpy as np
 from numba import njit
 
-from ..solver.newton_compiled import Condensed, norm
+from ..solver.newton_compiled import Condensed, frobenius_norm
 from .contact_flexibility import by_harmonic
 
 __all__ = ["linear_part"]
@@ -24,8 +24,8 @@ def linear_part(omega, bodies, springs, H):
     contact = bodies.contact
     residual = bodies.residual
     m = springs.size
-    Z = _impedances(omega, H, bodies.own, bodies.viscous, bodies.hysteretic)
-    D = _inverted(Z, bodies.own)
+    Z = _modal_impedances(omega, H, bodies.own, bodies.viscous, bodies.hysteretic)
+    D = _modal_flexibilities(Z, bodies.own)
     free = np.empty((H + 1, m), np.complex128)
     stuck = np.empty((H + 1, m), np.complex128)
     for h in range(H + 1):
@@ -37,7 +37,7 @@ def linear_part(omega, bodies, springs, H):
     if bodies.R.shape[0]:
         T = np.zeros((H + 1, D.shape[1], D.shape[1]), np.complex128)
         for h in range(1, H + 1):
-            T[h] = np.linalg.inv(_loaded(Z[h], bodies.N[0]))
+            T[h] = np.linalg.inv(_stuck_impedances(Z[h], bodies.N[0]))
         flex = (np.empty((0, 0, 0), np.complex128), bodies.mean_A, bodies.R, bodies.shared, T)
         _stick_by_modes(T, bodies.shared, bodies.stuck, bodies.sprung, stuck)
     else:
@@ -49,16 +49,16 @@ def linear_part(omega, bodies, springs, H):
                 continue
             shapes = contact[min(h, contact.shape[0] - 1)]
             G[h] = residual[min(h, residual.shape[0] - 1)] + np.dot(shapes * D[h], shapes.conj().T)
-            _spring(G[h], free[h], springs, A[h], stuck[h])
+            _add_springs(G[h], free[h], springs, A[h], stuck[h])
         flex = by_harmonic(A)
-    still = _coefficients(free)
-    motion = _coefficients(stuck)
-    scale = max(max(norm(still), norm(motion)), 1e-300)
+    still = _real_coefficients(free)
+    motion = _real_coefficients(stuck)
+    scale = max(max(frobenius_norm(still), frobenius_norm(motion)), 1e-300)
     return D, Condensed(flex, G, motion, springs, scale, contact, residual, D, bodies.motions), free
 
 
 @njit(cache=True, error_model="numpy")
-def _impedances(omega, H, own, viscous, hysteretic):
+def _modal_impedances(omega, H, own, viscous, hysteretic):
     """(H+1, M) impedances of the modes [1/s^2]."""
     Z = np.empty((H + 1, own.shape[1]), np.complex128)
     for h in range(H + 1):
@@ -72,7 +72,7 @@ def _impedances(omega, H, own, viscous, hysteretic):
 
 
 @njit(cache=True, error_model="numpy")
-def _inverted(Z, own):
+def _modal_flexibilities(Z, own):
     """(H+1, M) flexibilities of the modes; 0 for rigid ones in the mean."""
     D = np.zeros(Z.shape, np.complex128)
     for h in range(Z.shape[0]):
@@ -83,7 +83,7 @@ def _inverted(Z, own):
 
 
 @njit(cache=True, error_model="numpy")
-def _loaded(Z, N):
+def _stuck_impedances(Z, N):
     """(M, M) impedances (M,) of the modes with the contact springs: the inverse of `woodbury`'s
     T.
     """
@@ -107,7 +107,7 @@ def _stick_by_modes(T, U, still, push, stuck):
 @njit(cache=True, error_model="numpy")
 def _spring_by_modes(Z, h, bodies, A, stuck):
     """Fill A (m, m) and stuck (m,) of harmonic h, from impedances (M,) and the parts of
-    `woodbury.staying`.
+    `woodbury.frequency_independent_parts`.
     """
     s = min(h, bodies.A.shape[0] - 1)
     fixed = bodies.A[s]
@@ -116,13 +116,13 @@ def _spring_by_modes(Z, h, bodies, A, stuck):
     m, M = U.shape
     right = np.empty((M, m + 1), np.complex128)
     right[:, :m], right[:, m] = UH, bodies.sprung[h]
-    solved = np.dot(U, np.linalg.solve(_loaded(Z, bodies.N[s]), right))
+    solved = np.dot(U, np.linalg.solve(_stuck_impedances(Z, bodies.N[s]), right))
     A[:] = fixed + solved[:, :m]
     stuck[:] = bodies.stuck[h] + solved[:, m]
 
 
 @njit(cache=True, error_model="numpy")
-def _spring(G, free, springs, A, stuck):
+def _add_springs(G, free, springs, A, stuck):
     """Fill A (m, m) = (1 + G K)^-1 G and stuck (m,)."""
     m = springs.size
     right = np.empty((m, m + 1), np.complex128)
@@ -133,7 +133,7 @@ def _spring(G, free, springs, A, stuck):
 
 
 @njit(cache=True, error_model="numpy")
-def _coefficients(q):
+def _real_coefficients(q):
     """(m, K) real coefficients of the amplitudes q (H+1, m)."""
     out = np.empty((q.shape[1], 2 * q.shape[0] - 1))
     for i in range(q.shape[1]):

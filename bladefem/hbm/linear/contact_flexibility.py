@@ -1,8 +1,8 @@
 """The flexibility of the contact in compiled loops: a matrix for each harmonic, or what modes add
 to one for all.
 
-With harmonics 0..H, m contact freedoms and M modes it is a tuple (A, mean, R, U, T) in one of two
-forms:
+With harmonics 0..H, m contact degrees of freedom and M modes it is a tuple (A, mean, R, U, T) in
+one of two forms:
 
 - A (H+1, m, m) complex, the others empty;
 - A empty, A_0 = mean (m, m), A_h = R + U T_h U^T from R (m, m) and U (m, M), real, and T (H+1, M,
@@ -15,7 +15,15 @@ from __future__ import annotations
 import numpy as np
 from numba import njit
 
-__all__ = ["among", "apply", "apply_modes", "by_harmonic", "flexed", "formed", "seen_by"]
+__all__ = [
+    "apply_flexibility",
+    "apply_matrices",
+    "apply_modes",
+    "by_harmonic",
+    "form_matrices",
+    "seen_by",
+    "select_nodes",
+]
 
 
 @njit(cache=True, error_model="numpy")
@@ -26,7 +34,7 @@ def by_harmonic(A):
 
 
 @njit(cache=True, error_model="numpy", fastmath={"contract", "reassoc"})
-def apply(A, x, out):
+def apply_matrices(A, x, out):
     """out (m, K) += A (H+1, m, m) times x (m, K), both as real coefficients."""
     m = x.shape[0]
     along = np.ascontiguousarray(x.T)
@@ -51,20 +59,20 @@ def apply(A, x, out):
 
 
 @njit(cache=True, error_model="numpy")
-def flexed(flex, x, out):
+def apply_flexibility(flex, x, out):
     """out (m, K) += A x, for either form."""
     A, mean, R, U, T = flex
     if A.shape[0]:
-        apply(A, x, out)
+        apply_matrices(A, x, out)
         return
     moved = np.dot(R, x)
     moved[:, 0] = np.dot(mean, np.ascontiguousarray(x[:, 0]))
     out += moved
-    out += np.dot(U, _turned(T, np.dot(U.T, x)))
+    out += np.dot(U, _apply_modal_matrix(T, np.dot(U.T, x)))
 
 
 @njit(cache=True, error_model="numpy")
-def _turned(T, q):
+def _apply_modal_matrix(T, q):
     """T (H+1, M, M) times q (M, K) but for the mean, which becomes 0."""
     out = np.zeros(q.shape)
     M = q.shape[0]
@@ -86,8 +94,8 @@ def _turned(T, q):
 
 
 @njit(cache=True, error_model="numpy")
-def among(flex, active, d):
-    """The flexibility among the freedoms of some nodes, d of each."""
+def select_nodes(flex, active, d):
+    """The flexibility among the degrees of freedom of some nodes, d of each."""
     A, mean, R, U, T = flex
     if active.size * d == max(A.shape[1], U.shape[0]):
         return flex
@@ -110,7 +118,7 @@ def among(flex, active, d):
 
 
 @njit(cache=True, error_model="numpy")
-def formed(flex):
+def form_matrices(flex):
     """The first form of either: (H+1, m, m)."""
     A, mean, R, U, T = flex
     if A.shape[0]:

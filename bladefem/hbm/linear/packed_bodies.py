@@ -24,8 +24,8 @@ __all__ = ["Bodies", "prepared_bodies"]
 
 
 class Bodies(NamedTuple):
-    """m contact freedoms, M modes, p probes; S = H+1, or 1 where one serves all harmonics. Complex
-    where not said.
+    """m contact degrees of freedom, M modes, p probes; S = H+1, or 1 where one serves all
+    harmonics. Complex where not said.
     """
 
     # (S, M) frequencies [rad/s], real
@@ -48,7 +48,8 @@ class Bodies(NamedTuple):
     direct: np.ndarray
     # (H+1, p) the same of the probes
     straight: np.ndarray
-    # (S, m, m), U (S, m, M), UH (S, M, m), N (S, M, M) of `woodbury.frequency_independent_parts`; empty where
+    # (S, m, m), U (S, m, M), UH (S, M, m), N (S, M, M) of `woodbury.frequency_independent_parts`;
+    # empty where
     A: np.ndarray
     # there are too many modes for it
     U: np.ndarray
@@ -58,16 +59,18 @@ class Bodies(NamedTuple):
     stuck: np.ndarray
     # (H+1, M) what pushes the modes then
     sprung: np.ndarray
-    # (m, m) and shared (m, M) of the second form of `flex`, real; empty in the first
+    # (m, m) and shared (m, M) of the second form of `bladefem.hbm.linear.contact_flexibility`,
+    # real; empty in the first
     R: np.ndarray
     shared: np.ndarray
-    # (m, q) common motions of `coarse`, real
+    # (m, q) common motions of `bladefem.hbm.solver.deflation`, real
     motions: np.ndarray
     # (m, m) of the mean, real, and as its stuck (m,) and G (m, m) whatever the frequency
     mean_A: np.ndarray
     mean_stuck: np.ndarray
     mean_G: np.ndarray
-    # (m, r) motions without stiffness and g (r,) their loads, see `linear`; real
+    # (m, r) motions without stiffness and g (r,) their loads, see
+    # `bladefem.hbm.linear.condensation`; real
     B: np.ndarray
     g: np.ndarray
     # (r0, r) the same in the blades' rigid modes, whose numbers are `still` (r0,)
@@ -145,7 +148,7 @@ def _pack_bodies(model: ReducedModel, H: int) -> Bodies | None:
 def _mean_flexibility(
     body: tuple[np.ndarray, ...], pushed: tuple[np.ndarray, np.ndarray], held: tuple
 ) -> tuple[np.ndarray, ...]:
-    """A (m, m), stuck (m,) and G (m, m) of the mean, as in `linear`."""
+    """A (m, m), stuck (m,) and G (m, m) of the mean, as in `bladefem.hbm.linear.condensation`."""
     (own, shapes, residual) = body
     (push, direct) = pushed
     D = np.divide(1.0, own**2, out=np.zeros_like(own), where=own > 0)

@@ -8,8 +8,8 @@ contact and D their inverse modal impedances, the flexibility with springs K is
     D,    N = L^H K U
 
 (Sherman, Morrison and Woodbury). Only T, as large as the number of modes, changes with the
-frequency: a point costs m^2 k operations for m contact freedoms and k modes, where solving anew
-costs m^3.
+frequency: a point costs m^2 k operations for m contact degrees of freedom and k modes, where
+solving anew costs m^3.
 """
 
 from __future__ import annotations
@@ -24,13 +24,13 @@ from ..model import ReducedModel
 from ..policy import uses_low_rank
 from .bodies import Stack, modal_flexibility, rigid_stack
 
-__all__ = ["LowRank", "bodies_of", "low_rank", "frequency_independent_parts", "low_rank_update"]
+__all__ = ["LowRank", "bodies_of", "frequency_independent_parts", "low_rank", "low_rank_update"]
 
 
 @dataclass(frozen=True)
 class LowRank:
-    """What stays, for each harmonic (S = H+1) or for all of them (S = 1); m contact freedoms, k
-    modes.
+    """What stays, for each harmonic (S = H+1) or for all of them (S = 1); m contact degrees of
+    freedom, k modes.
     """
 
     bodies: tuple[Stack, ...]

@@ -25,13 +25,13 @@ from .residual import Balance, State, determinant_sign, evaluate_balance, linear
 __all__ = ["Spot", "Task", "advance_path", "spot_at"]
 
 # Newton steps of one corrector
-CORRECTIONS = 12
+MOST_CORRECTIONS = 12
 # arc-length step, as a share of the range, below which only a leap can help
-SMALLEST = 1e-5
+SMALLEST_ARC_STEP = 1e-5
 # shares of the range that are leapt
-LEAPS = (1e-4, 1e-3, 5e-3)
+LEAP_STEPS = (1e-4, 1e-3, 5e-3)
 # scaled distance up to which a leap has found the same branch
-CLOSE = 0.05
+LEAP_DISTANCE = 0.05
 # arc lengths at which the direction beyond a corner is looked for
 CORNERS = (1e-4, 1e-3, 5e-3)
 # arc length up to which the path may turn more sharply than STRAIGHT: a corner, where contacts
@@ -40,9 +40,9 @@ CORNER = 1e-3
 # distance from the way back, in steps, from which a direction leads on
 ONWARD = 0.3
 # cosine between successive tangents below which a step is halved
-STRAIGHT = 0.7
+SMALLEST_COSINE = 0.7
 # distance from prediction to solution, in steps, above which it is halved
-GUARD = 0.5
+JUMP_GUARD = 0.5
 
 
 @dataclass(frozen=True)
@@ -102,13 +102,13 @@ def advance_path(task: Task, spot: Spot, step: float, longest: float) -> tuple[S
             path.
     """
     reason = ""
-    while step >= SMALLEST:
+    while step >= SMALLEST_ARC_STEP:
         found, reason = _correct_point(task, spot, step, _path_direction(task, spot))
         if found is not None:
             easy = found.iterations <= 4
             return found, min(1.5 * step, longest) if easy else step, found.sign != spot.sign
         step /= 2
-    for share in LEAPS:
+    for share in LEAP_STEPS:
         found = _leap_gap(task, spot, share)
         if found is not None:
             return found, share, False
@@ -143,12 +143,12 @@ def _correct_point(
     dw, dx = direction
     guess = spot.state.w + step * size * dw, spot.x + step * task.width * dx
     w, x = guess
-    for iteration in range(CORRECTIONS + 1):
+    for iteration in range(MOST_CORRECTIONS + 1):
         balance = task.balance(x)
         state = evaluate_balance(balance, w)
         if state.error <= task.options.tolerance:
             break
-        if iteration == CORRECTIONS or not np.isfinite(state.error):
+        if iteration == MOST_CORRECTIONS or not np.isfinite(state.error):
             return None, f"corrector left a residual of {state.error:.1e}"
         try:
             inverse = linearise_balance(balance, state, task.memory)
@@ -160,7 +160,10 @@ def _correct_point(
         change = (np.sum(dw * back) / size - off) / (dx / task.width - np.sum(dw * along) / size)
         w = w - back - change * along
         x = x + change
-    if np.hypot(np.linalg.norm(w - guess[0]) / size, (x - guess[1]) / task.width) > GUARD * step:
+    if (
+        np.hypot(np.linalg.norm(w - guess[0]) / size, (x - guess[1]) / task.width)
+        > JUMP_GUARD * step
+    ):
         return None, "the corrector jumps"
     try:
         found = spot_at(task, x, balance, state, iteration, spot.sign)
@@ -168,7 +171,7 @@ def _correct_point(
         return None, str(error)
     new_dw, new_dx = found.tangent(task, size)
     turn = np.sum(dw * new_dw) + dx * new_dx
-    if abs(turn) < STRAIGHT and not corner and step > CORNER:
+    if abs(turn) < SMALLEST_COSINE and not corner and step > CORNER:
         return None, "the path turns too sharply"
     return (found if turn > 0 else replace(found, sign=-found.sign)), ""
 
@@ -209,7 +212,7 @@ def _leap_gap(task: Task, spot: Spot, share: float) -> Spot | None:
     balance = task.balance(x)
     end = newton(balance, spot.state.w, task.options)
     size = max(task.size, float(np.linalg.norm(spot.state.w)))
-    if not end.converged or np.linalg.norm(end.state.w - spot.state.w) > CLOSE * size:
+    if not end.converged or np.linalg.norm(end.state.w - spot.state.w) > LEAP_DISTANCE * size:
         return None
     return replace(spot_at(task, x, balance, end.state, end.iterations, spot.sign), leapt=True)
 

@@ -21,16 +21,16 @@ from ..model import ReducedModel
 from ..policy import DEFLATION_UNKNOWNS
 from .dense_lu import back_substitute, factorise_large
 
-__all__ = ["common_motions", "no_level", "prepared", "second_level"]
+__all__ = ["apply_deflation", "common_motions", "no_level", "second_level"]
 
 # common motions of two rigid seats in space; more cost more than they save
-MOST = 12
-# contact freedoms for each of them at least
-EACH = 4
+MOST_COMMON_MOTIONS = 12
+# contact degrees of freedom for each of them at least
+DOFS_PER_MOTION = 4
 # motions whose compliance is below the square of this, over the largest one, are left out
-FAINT = 1e-2
+SMALLEST_COMPLIANCE_ROOT = 1e-2
 # part of a motion that has to be left beside the others where some contacts stick
-SAME = 1e-3
+DEPENDENT_SHARE = 1e-3
 
 
 def common_motions(model: ReducedModel, harmonics: int) -> np.ndarray:
@@ -40,10 +40,10 @@ def common_motions(model: ReducedModel, harmonics: int) -> np.ndarray:
     m = model.springs.size
     if m * (2 * harmonics + 1) < DEFLATION_UNKNOWNS:
         return np.zeros((m, 0))
-    return model.once(("common motions", harmonics), lambda: _common(model, harmonics))
+    return model.once(("common motions", harmonics), lambda: _softest_motions(model, harmonics))
 
 
-def _common(model: ReducedModel, harmonics: int) -> np.ndarray:
+def _softest_motions(model: ReducedModel, harmonics: int) -> np.ndarray:
     """Those that the modes give way to most under static loads, rigid bodies as much as the softest
     mode.
     """
@@ -58,8 +58,10 @@ def _common(model: ReducedModel, harmonics: int) -> np.ndarray:
     ]
     soft = np.concatenate([part for mode in modes for part in (mode.real, mode.imag)], axis=1)
     compliances, motions = np.linalg.eigh(soft @ soft.T)
-    kept = compliances >= FAINT**2 * compliances[-1]
-    return np.ascontiguousarray(motions[:, kept][:, : -min(MOST, len(soft) // EACH) - 1 : -1])
+    kept = compliances >= SMALLEST_COMPLIANCE_ROOT**2 * compliances[-1]
+    return np.ascontiguousarray(
+        motions[:, kept][:, : -min(MOST_COMMON_MOTIONS, len(soft) // DOFS_PER_MOTION) - 1 : -1]
+    )
 
 
 @njit(cache=True, error_model="numpy")
@@ -74,19 +76,19 @@ def second_level(flex, C, Q, active, d):
     singular.
 
     Args:
-        flex: flexibility among the active nodes, see `flex`.
+        flex: flexibility among the active nodes, see `bladefem.hbm.linear.contact_flexibility`.
         C: (nodes, dK, dK) their derivatives.
         Q: (m, q) common motions of all nodes.
         active: (nodes,) their numbers.
     """
-    Z = _orthonormal(Q, active, d)
-    E = _galerkin(seen_by(flex, Z), C, Z)
+    Z = _orthonormal_rows(Q, active, d)
+    E = _galerkin_matrix(seen_by(flex, Z), C, Z)
     pivots = np.empty(E.shape[0], np.int64)
     return (Z, E, pivots) if factorise_large(E, pivots) else no_level()
 
 
 @njit(cache=True, error_model="numpy")
-def _orthonormal(Q, active, d):
+def _orthonormal_rows(Q, active, d):
     """The rows of the active nodes, their columns made orthonormal; dependent ones are left out."""
     Z = np.empty((Q.shape[1], active.size * d))
     count = 0
@@ -99,14 +101,14 @@ def _orthonormal(Q, active, d):
             for i in range(count):
                 z -= np.dot(Z[i], z) * Z[i]
         left = np.sqrt(np.dot(z, z))
-        if left > SAME * before:
+        if left > DEPENDENT_SHARE * before:
             z /= left
             count += 1
     return np.ascontiguousarray(Z[:count].T)
 
 
 @njit(cache=True, error_model="numpy", fastmath={"contract", "reassoc"})
-def _galerkin(along, C, Z):
+def _galerkin_matrix(along, C, Z):
     """E (qK, qK) = Z^T (1 + A C) Z from Z^T A (H+1, q, a)."""
     q = Z.shape[1]
     K = 2 * along.shape[0] - 1
@@ -143,7 +145,7 @@ def _galerkin(along, C, Z):
 
 
 @njit(cache=True, error_model="numpy")
-def prepared(level, y, out):
+def apply_deflation(level, y, out):
     """out (a K,) becomes M^-1 y."""
     out[:] = y
     Z, E, pivots = level

@@ -5,20 +5,20 @@ from __future__ import annotations
 import numpy as np
 from numba import njit
 
-__all__ = ["back_substitute", "factorise", "factorise_large"]
+__all__ = ["back_substitute", "factorise_large", "factorise_small"]
 
 # columns of a block
-BLOCK = 32
+BLOCK_COLUMNS = 32
 
 
 @njit(cache=True, error_model="numpy")
-def factorise(M, pivots):
+def factorise_small(M, pivots):
     """LU factors in place with partial pivoting; False where a pivot is zero."""
-    return _eliminated(M, pivots, 0, M.shape[0])
+    return _eliminate_columns(M, pivots, 0, M.shape[0])
 
 
 @njit(cache=True, error_model="numpy")
-def _eliminated(M, pivots, low, high):
+def _eliminate_columns(M, pivots, low, high):
     """Columns low to high of such factors, rows exchanged as a whole; False where a pivot is
     zero.
     """
@@ -49,9 +49,9 @@ def factorise_large(M, pivots):
     product a block.
     """
     size = M.shape[0]
-    for low in range(0, size, BLOCK):
-        high = min(low + BLOCK, size)
-        if not _eliminated(M, pivots, low, high):
+    for low in range(0, size, BLOCK_COLUMNS):
+        high = min(low + BLOCK_COLUMNS, size)
+        if not _eliminate_columns(M, pivots, low, high):
             return False
         for k in range(low, high if high < size else low):
             for i in range(k + 1, high):

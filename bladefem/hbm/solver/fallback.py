@@ -33,16 +33,16 @@ from .residual import Balance, evaluate_balance, start_in_stick
 
 __all__ = ["Attempt", "match_harmonics", "solve_balance"]
 
-METHODS = (("newton", "step"), ("newton on the residual", "residual"))
+NEWTON_MERITS = (("newton", "step"), ("newton on the residual", "residual"))
 # multiples of the normal load where a homotopy starts
 FIRST_LOAD = 100.0
 LARGEST_LOAD = 1e8
 # residual from which more samples are tried
-CLOSE = 1e-3
+CLOSE_RESIDUAL = 1e-3
 # points of a path in the excitation
 LONGEST_PATH = 400
 # logarithm of the smallest part of the excitation that its path may visit
-FARTHEST = 30.0
+FARTHEST_LOGARITHM = 30.0
 # step in the logarithm of the load below which a homotopy gives up
 SMALLEST_STEP = 1e-3
 
@@ -81,13 +81,13 @@ def _attempts_in_order(
     stick = start_in_stick(balance)
     near = None
     for w in ([] if start is None else [start]) + [stick]:
-        for method, merit in METHODS if runs_compiled(balance) else reversed(METHODS):
+        for method, merit in NEWTON_MERITS if runs_compiled(balance) else reversed(NEWTON_MERITS):
             end = newton(balance, w, options, merit)
             yield Attempt(method, end)
             near = end if near is None or end.state.error < near.state.error else near
     if not options.fallbacks:
         return
-    for factor in (2, 4) if near.state.error < CLOSE else ():
+    for factor in (2, 4) if near.state.error < CLOSE_RESIDUAL else ():
         denser = replace(balance, samples=factor * balance.samples)
         yield Attempt("more samples", newton(denser, near.state.w, options), denser.samples)
     if balance.linear.A.shape[0] > 4:
@@ -178,7 +178,7 @@ def _along_excitation(balance: Balance, options: Options) -> Newton:
     """
 
     def part(x: float) -> Balance:
-        if not -FARTHEST <= x <= 1.0:
+        if not -FARTHEST_LOGARITHM <= x <= 1.0:
             raise NotSolvedError(
                 f"the path left the excitations up to the wanted one, for exp({x:.3g}) times it"
             )

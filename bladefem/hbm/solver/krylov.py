@@ -3,7 +3,8 @@ harmonics node by node.
 
 Eisenstat, Elman and Schultz, SIAM J. Numer. Anal. 20 (1983), doi:10.1137/0720023. The springs of
 full stick inside A are the preconditioner already: where contacts move alike, a few directions are
-enough; what many of them do in common a second level solves for, see `coarse`.
+enough; what many of them do in common a second level solves for, see
+`bladefem.hbm.solver.deflation`.
 """
 
 from __future__ import annotations
@@ -11,13 +12,13 @@ from __future__ import annotations
 import numpy as np
 from numba import njit
 
-from ..linear.contact_flexibility import flexed
-from .deflation import prepared
+from ..linear.contact_flexibility import apply_flexibility
+from .deflation import apply_deflation
 
 __all__ = ["conjugate_residuals"]
 
 # after which it is given up
-DIRECTIONS = 60
+MOST_DIRECTIONS = 60
 
 
 @njit(cache=True, error_model="numpy")
@@ -25,25 +26,26 @@ def conjugate_residuals(flex, C, r, accuracy, level, x):
     """Fill x (N,) with the solution for r (N,), to a relative residual; False where it is not
     found.
 
-    A as `flex` gives it, C (nodes, N/nodes, N/nodes) real; level as `coarse` gives it.
+    A as `flex` gives it, C (nodes, N/nodes, N/nodes) real; level as `bladefem.hbm.solver.deflation`
+    gives it.
     """
     N = r.size
     block = C.shape[1]
     m = max(flex[0].shape[1], flex[3].shape[0])
-    P = np.empty((DIRECTIONS, N))
-    Q = np.empty((DIRECTIONS, N))
+    P = np.empty((MOST_DIRECTIONS, N))
+    Q = np.empty((MOST_DIRECTIONS, N))
     forces = np.empty(N)
     rest = r.copy()
     goal = accuracy * np.sqrt(np.dot(r, r))
     x[:] = 0.0
-    for k in range(DIRECTIONS):
+    for k in range(MOST_DIRECTIONS):
         if np.sqrt(np.dot(rest, rest)) <= goal:
             return True
-        prepared(level, rest, P[k])
+        apply_deflation(level, rest, P[k])
         Q[k] = P[k]
         for i in range(0, N, block):
             np.dot(C[i // block], P[k, i : i + block], forces[i : i + block])
-        flexed(flex, forces.reshape(m, N // m), Q[k].reshape(m, N // m))
+        apply_flexibility(flex, forces.reshape(m, N // m), Q[k].reshape(m, N // m))
         for i in range(k):
             share = np.dot(Q[i], Q[k])
             for j in range(N):

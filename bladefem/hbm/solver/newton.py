@@ -29,7 +29,7 @@ from .newton_compiled import (
 )
 from .newton_krylov import Memory
 from .residual import (
-    STICKS,
+    STICKING_FORCE_SHARE,
     Balance,
     Inverse,
     State,
@@ -39,10 +39,10 @@ from .residual import (
     linearise_balance,
 )
 
-__all__ = ["DEFAULTS", "Newton", "Options", "runs_compiled", "newton", "route_of", "solvers_of"]
+__all__ = ["DEFAULTS", "Newton", "Options", "newton", "route_of", "runs_compiled", "solvers_of"]
 
 # step share below which the search direction is given up
-SHORTEST = 2.0**-8
+SHORTEST_STEP_SHARE = 2.0**-8
 
 
 @dataclass(frozen=True)
@@ -168,10 +168,10 @@ def _run_compiled(balance: Balance, w: np.ndarray, options: Options) -> Newton:
         d,
         compiled_arguments(balance),
         contact,
-        STICKS,
+        STICKING_FORCE_SHARE,
         options.tolerance,
         options.iterations,
-        SHORTEST,
+        SHORTEST_STEP_SHARE,
     )
     reasons = {
         CONVERGED: "residual within tolerance",
@@ -208,7 +208,7 @@ def _line_search(balance: Balance, state: State, inverse: Inverse, merit: str) -
     demand = 0.25 if merit == "step" else 1e-4
     before = np.linalg.norm(step if merit == "step" else state.residual)
     share = 1.0
-    while share >= SHORTEST:
+    while share >= SHORTEST_STEP_SHARE:
         trial = evaluate_balance(balance, state.w - share * step, "single")
         after = inverse(trial.residual, 0.1) if merit == "step" else trial.residual
         if np.linalg.norm(after) <= (1 - demand * share) * before:

@@ -13,11 +13,17 @@ import numpy as np
 from numba import njit
 
 from ...friction.kernel_1d import jenkins_batch
-from ...friction.kernel_1d_exact import _batch as exact_batch
-from ..linear.contact_flexibility import among, apply, apply_modes, flexed, formed
+from ...friction.kernel_1d_exact import exact_batch
+from ..linear.contact_flexibility import (
+    apply_flexibility,
+    apply_matrices,
+    apply_modes,
+    form_matrices,
+    select_nodes,
+)
 from ..policy import BLOCKED_LU_UNKNOWNS, DEFLATION_UNKNOWNS, DENSE_FALLBACK_UNKNOWNS
 from .deflation import no_level, second_level
-from .dense_lu import back_substitute, factorise, factorise_large
+from .dense_lu import back_substitute, factorise_large, factorise_small
 from .krylov import conjugate_residuals
 
 __all__ = [
@@ -30,7 +36,7 @@ __all__ = [
     "STALLED",
     "Condensed",
     "compiled_newton",
-    "norm",
+    "frobenius_norm",
 ]
 
 CONVERGED = 0
@@ -43,18 +49,18 @@ SEARCHING = 5
 BY_LU = 1
 BY_ITERATIONS = 2
 # accuracy of a step by iterations, relative,
-FINEST = 1e-6
-COARSEST = 1e-4
+FINEST_STEP_ACCURACY = 1e-6
+COARSEST_STEP_ACCURACY = 1e-4
 # where no more is needed to arrive,
-CLOSE = 1e-2
+LAST_STEP_ACCURACY = 1e-2
 # and of the one that the line search looks at; coarser ones mislead it
-ROUGH = 1e-3
+LINE_SEARCH_ACCURACY = 1e-3
 
 
 class Condensed(NamedTuple):
-    """The bodies at one frequency, seen from the m contact freedoms."""
+    """The bodies at one frequency, seen from the m contact degrees of freedom."""
 
-    # flexibility with contact springs, see `flex`
+    # flexibility with contact springs, see `bladefem.hbm.linear.contact_flexibility`
     flex: tuple
     # (H+1, m, m) the same without springs, but for the mean; (1, m, m) where `modal` tells it
     G: np.ndarray
@@ -68,12 +74,12 @@ class Condensed(NamedTuple):
     shapes: np.ndarray
     residual: np.ndarray
     modal: np.ndarray
-    # (m, q) that the contacts have in common, see `coarse`
+    # (m, q) that the contacts have in common, see `bladefem.hbm.solver.deflation`
     motions: np.ndarray
 
 
 @njit(cache=True, error_model="numpy")
-def norm(x):
+def frobenius_norm(x):
     """Root of the sum of squares."""
     total = 0.0
     for i in range(x.shape[0]):
@@ -83,7 +89,7 @@ def norm(x):
 
 
 @njit(cache=True, error_model="numpy")
-def _move(w, share, step, out):
+def _take_step(w, share, step, out):
     """out becomes  w - share step."""
     for i in range(w.shape[0]):
         for k in range(w.shape[1]):
@@ -91,7 +97,7 @@ def _move(w, share, step, out):
 
 
 @njit(cache=True, error_model="numpy")
-def _evaluate(w, d, linear, contact, work):
+def _evaluate_residual(w, d, linear, contact, work):
     """Forces and residual at w (m, K); fills work and returns the error of
     `bladefem.hbm.solver.residual`.
     """
@@ -119,7 +125,7 @@ def _evaluate(w, d, linear, contact, work):
                 F[i // d, 2 - d + i % d, k] - springs[i] * w[i, k] - (preload[i] if k == 0 else 0.0)
             )
             r[i, k] = w[i, k] - stuck[i, k]
-    flexed(linear.flex, p, r)
+    apply_flexibility(linear.flex, p, r)
     sprung = np.empty(r.shape)
     bare = np.empty(r.shape)
     for i in range(w.shape[0]):
@@ -127,14 +133,16 @@ def _evaluate(w, d, linear, contact, work):
             sprung[i, k] = springs[i] * r[i, k] if k else 0.0
             bare[i, k] = r[i, k]
     if 2 * G.shape[0] - 1 == K:
-        apply(G, sprung, bare)
+        apply_matrices(G, sprung, bare)
     else:
         apply_modes(linear.shapes, linear.residual, linear.modal, sprung, bare)
-    return max(norm(r) / max(norm(w), 1e-300), norm(bare) / linear.scale)
+    return max(
+        frobenius_norm(r) / max(frobenius_norm(w), 1e-300), frobenius_norm(bare) / linear.scale
+    )
 
 
 @njit(cache=True, error_model="numpy")
-def _jacobian(A, C):
+def _dense_jacobian(A, C):
     """(a K, a K) the matrix 1 + A C for A (H+1, a, a) and one block of C (nodes, dK, dK) a node."""
     a = A.shape[1]
     K = 2 * A.shape[0] - 1
@@ -162,18 +170,20 @@ def _jacobian(A, C):
 
 
 @njit(cache=True, error_model="numpy")
-def _factors(flex, C):
+def _lu_factors(flex, C):
     """LU factors and pivots of 1 + A C; without pivots where it is singular."""
-    M = _jacobian(formed(flex), C)
+    M = _dense_jacobian(form_matrices(flex), C)
     pivots = np.empty(M.shape[0], np.int64)
     regular = (
-        factorise_large(M, pivots) if pivots.size > BLOCKED_LU_UNKNOWNS else factorise(M, pivots)
+        factorise_large(M, pivots)
+        if pivots.size > BLOCKED_LU_UNKNOWNS
+        else factorise_small(M, pivots)
     )
     return M, pivots if regular else np.empty(0, np.int64)
 
 
 @njit(cache=True, error_model="numpy")
-def _inverse(r, accuracy, flex, C, factors, level):
+def _apply_inverse(r, accuracy, flex, C, factors, level):
     """(a K,) the solution of (1 + A C) x = r, and the factors where they were needed."""
     x = np.empty(r.size)
     if (
@@ -183,7 +193,7 @@ def _inverse(r, accuracy, flex, C, factors, level):
     ):
         return x, factors
     if factors[1].size == 0 and r.size <= DENSE_FALLBACK_UNKNOWNS:
-        factors = _factors(flex, C)
+        factors = _lu_factors(flex, C)
     x[:] = r
     if factors[1].size:
         back_substitute(factors[0], factors[1], x)
@@ -193,7 +203,7 @@ def _inverse(r, accuracy, flex, C, factors, level):
 
 
 @njit(cache=True, error_model="numpy")
-def _spread(x, r, d, active, C, flex, step):
+def _spread_to_all_nodes(x, r, d, active, C, flex, step):
     """Fill step (m, K) with x at the active nodes; the others follow from their residual and the
     active forces.
     """
@@ -206,7 +216,7 @@ def _spread(x, r, d, active, C, flex, step):
             p[active[y] * d : (active[y] + 1) * d] = np.dot(
                 C[y], x[y * size : (y + 1) * size]
             ).reshape(d, K)
-        flexed(flex, p, shift)
+        apply_flexibility(flex, p, shift)
     for i in range(m):
         for k in range(K):
             step[i, k] = r[i, k] - shift[i, k]
@@ -215,7 +225,7 @@ def _spread(x, r, d, active, C, flex, step):
 
 
 @njit(cache=True, error_model="numpy")
-def _moving(J, springs, d, sticks):
+def _moving_nodes(J, springs, d, sticks):
     """Numbers of the nodes whose forces do not follow the springs of full stick, and dp/dw there
     (nodes, dK, dK).
     """
@@ -278,7 +288,7 @@ def compiled_newton(w, d, linear, contact, sticks, tolerance, iterations, shorte
     step = np.empty((m, K))
     after = np.empty((m, K))
     trial = w.copy()
-    active, C = _moving(J, springs, d, np.inf)
+    active, C = _moving_nodes(J, springs, d, np.inf)
     few = flex
     factors = (np.empty((0, 0)), np.empty(0, np.int64))
     level = no_level()
@@ -289,32 +299,38 @@ def compiled_newton(w, d, linear, contact, sticks, tolerance, iterations, shorte
     before = np.inf
     error = np.inf
     while code == SEARCHING:
-        fresh = _evaluate(trial, d, linear, contact, work)
+        fresh = _evaluate_residual(trial, d, linear, contact, work)
         if steps >= 0 and not fresh <= tolerance:
-            factors = _step(r, ROUGH, d, active, C, flex, few, factors, level, after)
-            if not norm(after) <= (1 - 0.25 * share) * before:
+            factors = _newton_step(
+                r, LINE_SEARCH_ACCURACY, d, active, C, flex, few, factors, level, after
+            )
+            if not frobenius_norm(after) <= (1 - 0.25 * share) * before:
                 share /= 2
                 if share < shortest:
                     code = STALLED
-                _move(w, share, step, trial)
+                _take_step(w, share, step, trial)
                 continue
         error = fresh
         steps = steps + 1
-        _move(trial, 0.0, step, w)
+        _take_step(trial, 0.0, step, w)
         if error <= tolerance or not np.isfinite(error) or steps == iterations:
             code = (
                 CONVERGED if error <= tolerance else (EXHAUSTED if np.isfinite(error) else INFINITE)
             )
             break
-        active, C = _moving(J, springs, d, sticks)
-        few = among(flex, active, d)
+        active, C = _moving_nodes(J, springs, d, sticks)
+        few = select_nodes(flex, active, d)
         # new arrays: slices would have another memory layout, and compile everything twice
         factors = (np.empty((0, 0)), np.empty(0, np.int64))
         wide = motions.size > 0 and active.size * d * K >= DEFLATION_UNKNOWNS
         level = second_level(few, C, motions, active, d) if wide else no_level()
-        needed = max(FINEST, min(0.1 * error, COARSEST), min(0.1 * tolerance / error, CLOSE))
-        factors = _step(r, needed, d, active, C, flex, few, factors, level, step)
-        before = norm(step)
+        needed = max(
+            FINEST_STEP_ACCURACY,
+            min(0.1 * error, COARSEST_STEP_ACCURACY),
+            min(0.1 * tolerance / error, LAST_STEP_ACCURACY),
+        )
+        factors = _newton_step(r, needed, d, active, C, flex, few, factors, level, step)
+        before = frobenius_norm(step)
         if active.size * d * K > BLOCKED_LU_UNKNOWNS:
             solver |= BY_ITERATIONS
         if factors[1].size:
@@ -322,12 +338,12 @@ def compiled_newton(w, d, linear, contact, sticks, tolerance, iterations, shorte
         share = 1.0
         if not np.isfinite(before):
             code = SINGULAR
-        _move(w, share, step, trial)
+        _take_step(w, share, step, trial)
     return steps, code, error, work[1], J, work[3], r, work[4], solver
 
 
 @njit(cache=True, error_model="numpy")
-def _step(r, accuracy, d, active, C, flex, few, factors, level, step):
+def _newton_step(r, accuracy, d, active, C, flex, few, factors, level, step):
     """Fill step (m, K) with the inverse derivative times r (m, K); returns the factors where they
     were needed.
     """
@@ -335,6 +351,6 @@ def _step(r, accuracy, d, active, C, flex, few, factors, level, step):
     among = np.empty((active.size * d, K))
     for y in range(active.size):
         among[y * d : (y + 1) * d] = r[active[y] * d : (active[y] + 1) * d]
-    x, factors = _inverse(among.reshape(among.size), accuracy, few, C, factors, level)
-    _spread(x, r, d, active, C, flex, step)
+    x, factors = _apply_inverse(among.reshape(among.size), accuracy, few, C, factors, level)
+    _spread_to_all_nodes(x, r, d, active, C, flex, step)
     return factors

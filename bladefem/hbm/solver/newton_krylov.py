@@ -1,9 +1,9 @@
 """Newton steps of large patches without a dense Jacobian: iterations on  x + A (dp/dw) x = r.
 
 The springs of full stick inside A already are the preconditioner, with a second level for what the
-contacts move in common (`coarse`): compiled conjugate residuals mostly arrive in a few directions.
-Where they do not, GMRES does, at last with one complex block a harmonic that is factorised, with
-the part of dp/dw that keeps to its harmonic.
+contacts move in common (`bladefem.hbm.solver.deflation`): compiled conjugate residuals mostly
+arrive in a few directions. Where they do not, GMRES does, at last with one complex block a harmonic
+that is factorised, with the part of dp/dw that keeps to its harmonic.
 """
 
 from __future__ import annotations
@@ -23,15 +23,15 @@ from .krylov import conjugate_residuals
 __all__ = ["Memory", "iterative_inverse"]
 
 # vectors kept by GMRES
-BASIS = 80
+GMRES_BASIS = 80
 # of GMRES, each on what the last one left
-PASSES = 6
+GMRES_PASSES = 6
 # reduction by one pass from which the next one runs in double precision
-POOR = 0.1
+POOR_REDUCTION = 0.1
 # reduction of the residual by one pass in single precision that can be trusted
-SINGLE = 1e-3
+SINGLE_PRECISION_REDUCTION = 1e-3
 # products of one solve from which new harmonic blocks pay: they cost about as many
-SLOW = 80
+RENEWING_PRODUCTS = 80
 
 
 @dataclass
@@ -71,7 +71,8 @@ def iterative_inverse(
         A: (H+1, a, a) flexibility with contact springs [m/N].
         change: (nodes, dK, dK) derivative of the forces beyond the springs [N/m].
         memory: of the Newton run; changed in place.
-        motions: (a, q) that the contacts have in common, see `coarse`; none when left out.
+        motions: (a, q) that the contacts have in common, see `bladefem.hbm.solver.deflation`; none
+            when left out.
     """
     return partial(_solve_system, _System((A, change), memory or Memory(), motions))
 
@@ -149,21 +150,21 @@ def _solve_system(system: _System, residual: np.ndarray, accuracy: float) -> np.
     system.count, parts = 0, system.single
     x = np.zeros(residual.size)
     rest = residual.ravel()
-    for _ in range(PASSES):
+    for _ in range(GMRES_PASSES):
         left = float(np.linalg.norm(rest))
-        part, failed = system.krylov(rest, max(target, SINGLE * left), parts)
+        part, failed = system.krylov(rest, max(target, SINGLE_PRECISION_REDUCTION * left), parts)
         after = rest - system.product(part, system.double)
         gain = np.linalg.norm(after) / left
         if gain < 1:
             x = x + part
             rest = after
         if np.linalg.norm(rest) <= 2 * target:
-            memory.slow = memory.slow or system.count > SLOW
+            memory.slow = memory.slow or system.count > RENEWING_PRODUCTS
             return x.reshape(residual.shape)
         if failed and not fresh:
             fresh = True
             system.renew()
-        elif gain > POOR:
+        elif gain > POOR_REDUCTION:
             parts = system.double
     raise np.linalg.LinAlgError("GMRES did not solve for the Newton step")
 
@@ -174,7 +175,7 @@ def _run_gmres(
     operator = LinearOperator((residual.size, residual.size), matvec=product, dtype=float)
     # the relative tolerance has two names in the versions of SciPy: left at its default, atol rules
     # where it is larger
-    return gmres(operator, residual, atol=target, restart=BASIS, maxiter=1)
+    return gmres(operator, residual, atol=target, restart=GMRES_BASIS, maxiter=1)
 
 
 def _harmonic_blocks(A: np.ndarray, change: np.ndarray) -> np.ndarray:

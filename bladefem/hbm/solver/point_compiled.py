@@ -13,19 +13,19 @@ from collections.abc import Sequence
 import numpy as np
 from numba import njit
 
+from ...friction.states import NODE_STATES
 from ..linear.condensation_compiled import linear_part
 from ..linear.packed_bodies import prepared_bodies
 from ..model import ReducedModel
+from ..point_measures import count_states, holding_drift
 from ..policy import COMPILED_POINT
-from ..predictor import AHEAD, ahead, shifted
+from ..predictor import PREDICTOR_POINTS, append_solution, extrapolate_solution
 from ..solution import Solution, Work
-from .newton import SHORTEST, Options, route_of, solvers_of
-from .newton_compiled import CONVERGED, compiled_newton, norm
-from .residual import STICKS, contact_table
+from .newton import SHORTEST_STEP_SHARE, Options, route_of, solvers_of
+from .newton_compiled import CONVERGED, compiled_newton
+from .residual import STICKING_FORCE_SHARE, contact_table
 
-__all__ = ["small", "solve_along", "solve_each", "solve_small"]
-
-STATES = ("stick", "slip", "lift", "open")
+__all__ = ["compiles_points", "solve_along", "solve_each", "solve_small"]
 
 
 def solve_small(
@@ -36,11 +36,11 @@ def solve_small(
     start: np.ndarray | None,
     options: Options,
 ) -> Solution | None:
-    """The converged solution from displacements (n, d, *), else from full stick; None where this
-    way is not open.
+    """The converged solution from displacements (n, d, *), else from full stick; None if compiled
+    points do not apply.
     """
     for known in ([] if start is None else [(omega, start)], []):
-        found = _solved(model, np.array([omega]), H, samples, known, options)
+        found = _solve_points(model, np.array([omega]), H, samples, known, options)
         if found or start is None:
             return found[0] if found else None
     return None
@@ -49,10 +49,10 @@ def solve_small(
 def solve_each(
     model: ReducedModel, omegas: np.ndarray, H: int, samples: int, options: Options
 ) -> list[Solution]:
-    """The first frequencies from full stick, as long as they converge; none where this way is not
-    open.
+    """The first frequencies from full stick, as long as they converge; none if compiled points do
+    not apply.
     """
-    return _solved(model, omegas, H, samples, [], options)
+    return _solve_points(model, omegas, H, samples, [], options)
 
 
 def solve_along(
@@ -66,7 +66,7 @@ def solve_along(
     """The first frequencies, each from the curve through the last ones, as long as they converge;
     see `ahead`.
 
-    None where this way is not open.
+    None if compiled points do not apply.
 
     Args:
         last: solved points before them; full stick where there is none, or where the last one
@@ -74,11 +74,11 @@ def solve_along(
         options: frugal ones end with the first at which all contacts stick.
     """
     stuck = not last or last[-1].states["stick"] == len(last[-1].w)
-    known = [(p.omega, p.w) for p in ([] if stuck else last[-AHEAD:])]
-    return _solved(model, omegas, H, samples, known, options, 2 if options.frugal else 1)
+    known = [(p.omega, p.w) for p in ([] if stuck else last[-PREDICTOR_POINTS:])]
+    return _solve_points(model, omegas, H, samples, known, options, 2 if options.frugal else 1)
 
 
-def _solved(
+def _solve_points(
     model: ReducedModel,
     omegas: np.ndarray,
     H: int,
@@ -87,21 +87,21 @@ def _solved(
     options: Options,
     chained: int = 0,
 ) -> list[Solution]:
-    """The first frequencies, as long as they converge; `known` and `chained` as `_points` takes
-    them.
+    """The first frequencies, as long as they converge; `known` and `chained` as `_compiled_points`
+    takes them.
     """
-    prepared = _prepared(model, H, samples)
+    prepared = _prepared_arguments(model, H, samples)
     if prepared is None:
         return []
     bodies, springs, contact = prepared
     (n, d), K = model.springs.shape, 2 * H + 1
-    at = np.zeros(AHEAD)
-    begin = np.zeros((AHEAD, n * d, K))
+    at = np.zeros(PREDICTOR_POINTS)
+    begin = np.zeros((PREDICTOR_POINTS, n * d, K))
     for i, (omega, w) in enumerate(known):
         kept = min(K, w.shape[2])
         at[i], begin[i, :, :kept] = omega, w[:, :, :kept].reshape(n * d, kept)
     try:
-        w, ends, f, probe, counts, measures = _points(
+        w, ends, f, probe, counts, measures = _compiled_points(
             omegas,
             bodies,
             springs,
@@ -142,20 +142,20 @@ def _solved(
             moved,
             pushed,
             drift,
-            dict(zip(STATES, states, strict=True)),
+            dict(zip(NODE_STATES, states, strict=True)),
             Work(*works),
-            route_of(COMPILED_POINT, solvers_of(int(solver))),
+            route=route_of(COMPILED_POINT, solvers_of(int(solver))),
         )
         for omega, *fields, (steps, error, solver), states, (moved, pushed, drift, *works) in parts
     ]
 
 
 @njit(cache=True, error_model="numpy")
-def _points(
+def _compiled_points(
     omegas, bodies, springs, contact, d, H, known, at, count, chained, tolerance, iterations
 ):
-    """Displacements (p, m, K), steps, error and solver (p, 3), and what `_measure` gives, of the first
-    frequencies.
+    """Displacements (p, m, K), steps, error and solver (p, 3), and what `_measure_point` gives, of
+    the first frequencies.
 
     They start from the curve through `count` of known (3, m, K) at the frequencies at (3,), which
     are changed here; from full stick where count is 0. Ends before the first that does not
@@ -175,11 +175,18 @@ def _points(
     for i in range(p):
         flexible, linear, free = linear_part(omegas[i], bodies, springs, H)
         if count:
-            ahead(omegas[i], known, at, count, w[i])
+            extrapolate_solution(omegas[i], known, at, count, w[i])
         else:
             w[i] = linear.stuck
         steps, code, error, F, _, shares, residual, _, solver = compiled_newton(
-            w[i], d, linear, contact, STICKS, tolerance, iterations, SHORTEST
+            w[i],
+            d,
+            linear,
+            contact,
+            STICKING_FORCE_SHARE,
+            tolerance,
+            iterations,
+            SHORTEST_STEP_SHARE,
         )
         if code != CONVERGED:
             break
@@ -187,23 +194,23 @@ def _points(
         ends[i, 0] = steps
         ends[i, 1] = error
         ends[i, 2] = solver
-        f[i], probe[i], counts[i], measures[i] = _measure(
+        f[i], probe[i], counts[i], measures[i] = _measure_point(
             omegas[i], bodies, springs, (flexible, free), w[i], d, F, contact[5], residual, shares
         )
         if chained:
             sticks = counts[i, 0] == m // d
-            count = 0 if sticks else shifted(omegas[i], w[i], known, at, count)
+            count = 0 if sticks else append_solution(omegas[i], w[i], known, at, count)
             if chained == 2 and sticks:
                 break
     return w[:done], ends[:done], f[:done], probe[:done], counts[:done], measures[:done]
 
 
-def small(model: ReducedModel, H: int) -> bool:
-    """Whether this way is open."""
+def compiles_points(model: ReducedModel, H: int) -> bool:
+    """True if points of the model are compiled as a whole."""
     return prepared_bodies(model, H) is not None
 
 
-def _prepared(model: ReducedModel, H: int, samples: int) -> tuple | None:
+def _prepared_arguments(model: ReducedModel, H: int, samples: int) -> tuple | None:
     """What a point needs beside its frequency; made once."""
     bodies = prepared_bodies(model, H)
     return (
@@ -214,7 +221,7 @@ def _prepared(model: ReducedModel, H: int, samples: int) -> tuple | None:
 
 
 @njit(cache=True, error_model="numpy")
-def _measure(omega, bodies, springs, linear, w, d, F, preload, residual, shares):
+def _measure_point(omega, bodies, springs, linear, w, d, F, preload, residual, shares):
     """Forces (n, d, K), probe (H+1, p), numbers of states (4,); residuals, drift and works (7,)."""
     m, K = w.shape
     f = np.empty((m // d, d, K))
@@ -226,14 +233,14 @@ def _measure(omega, bodies, springs, linear, w, d, F, preload, residual, shares)
             load[i, k] = f[i // d, i % d, k] - (preload[i] if k == 0 else 0.0)
             out[0] = max(out[0], abs(residual[i, k]))
             out[1] = max(out[1], springs[i] * abs(residual[i, k]))
-    out[2] = _drift(bodies.B, bodies.g, load)
-    modal, probe = _motion(bodies, linear, load, w, springs)
-    _works(omega, bodies, modal, load, w, d, out[3:])
-    return f, probe, _counts(shares), out
+    out[2] = holding_drift(bodies.B, bodies.g, load)
+    modal, probe = _blade_motion(bodies, linear, load, w, springs)
+    _period_works(omega, bodies, modal, load, w, d, out[3:])
+    return f, probe, count_states(shares), out
 
 
 @njit(cache=True, error_model="numpy")
-def _motion(bodies, linear, load, w, springs):
+def _blade_motion(bodies, linear, load, w, springs):
     """Modal amplitudes (H+1, M) and probes (H+1, p) under the excitation and the contact load (m,
     K).
     """
@@ -267,14 +274,16 @@ def _motion(bodies, linear, load, w, springs):
         for k in range(M):
             modal[h, k] = push[h, k]
             for i in range(m):
-                modal[h, k] -= contact[s, i, k].conjugate() * _amplitude(load, i, h)
+                modal[h, k] -= contact[s, i, k].conjugate() * _complex_amplitude(load, i, h)
             modal[h, k] *= flexible[h, k]
         for a in range(probe.shape[1]):
             probe[h, a] = straight[h, a]
             for k in range(M):
                 probe[h, a] += probes[min(h, probes.shape[0] - 1), a, k] * modal[h, k]
             for i in range(m):
-                probe[h, a] -= across[min(h, across.shape[0] - 1), a, i] * _amplitude(load, i, h)
+                probe[h, a] -= across[min(h, across.shape[0] - 1), a, i] * _complex_amplitude(
+                    load, i, h
+                )
     for a in range(probe.shape[1]):
         for k in range(rigid.size):
             probe[0, a] += probes[0, a, still[k]] * rigid[k]
@@ -282,12 +291,12 @@ def _motion(bodies, linear, load, w, springs):
 
 
 @njit(cache=True, error_model="numpy", inline="always")
-def _amplitude(x, i, h):
+def _complex_amplitude(x, i, h):
     return complex(x[i, 2 * h - 1], -x[i, 2 * h]) if h else complex(x[i, 0], 0.0)
 
 
 @njit(cache=True, error_model="numpy")
-def _works(omega, bodies, modal, load, w, d, out):
+def _period_works(omega, bodies, modal, load, w, d, out):
     """out (4,): work of the excitation, lost in the bodies, of the balanced friction forces,
     dissipated in contacts.
     """
@@ -304,42 +313,8 @@ def _works(omega, bodies, modal, load, w, d, out):
             loss = h * omega * viscous[s, k] + hysteretic[s, k]
             out[1] += np.pi * h * loss * (q.real**2 + q.imag**2)
         for i in range(load.shape[0]):
-            force = _amplitude(load, i, h)
+            force = _complex_amplitude(load, i, h)
             out[0] += np.pi * h * (direct[h, i].conjugate() * force).imag
-            friction = np.pi * h * (force * _amplitude(w, i, h).conjugate()).imag
+            friction = np.pi * h * (force * _complex_amplitude(w, i, h).conjugate()).imag
             out[2] += friction
             out[3] += friction if i % d == d - 1 else 0.0
-
-
-@njit(cache=True, error_model="numpy")
-def _drift(B, g, load):
-    """Load on the holding springs over what the contacts could carry, both on the motions without
-    stiffness.
-    """
-    up = 0.0
-    down = 0.0
-    for a in range(B.shape[1]):
-        push = -g[a]
-        most = 0.0
-        for i in range(B.shape[0]):
-            push += B[i, a] * load[i, 0]
-            most += abs(B[i, a]) * norm(load[i : i + 1])
-        up = up + push**2
-        down = down + most**2
-    return np.sqrt(up) / max(np.sqrt(down), 1e-300)
-
-
-@njit(cache=True, error_model="numpy")
-def _counts(shares):
-    """(4,) nodes that stick, slip, lift off, are open, from the shares (n, 3) of stick, slip and
-    separation.
-    """
-    counts = np.zeros(4, np.int64)
-    for stick, slip, apart in shares:
-        if stick + slip <= 1e-12:
-            counts[3] += 1
-        elif apart > 1e-12:
-            counts[2] += 1
-        else:
-            counts[1 if slip > 0.0 else 0] += 1
-    return counts

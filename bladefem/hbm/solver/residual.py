@@ -18,7 +18,7 @@ from scipy import linalg
 from ...friction.aft import Forces, evaluate
 from ...friction.fourier import to_complex, to_real
 from ...friction.kernel_1d_exact import evaluate_exact
-from ...friction.trigonometric_tables import tables
+from ...friction.trigonometric_tables import trigonometric_tables
 from ..linear.condensation import Linear
 from ..linear.contact_flexibility import by_harmonic
 from ..model import ReducedModel
@@ -37,20 +37,20 @@ __all__ = [
     "compiled_arguments",
     "contact_forces",
     "contact_table",
+    "determinant_sign",
     "evaluate_balance",
     "linearise_balance",
-    "determinant_sign",
     "start_in_stick",
 ]
 
 # of a step by GMRES, relative
-ACCURACY = 1e-5
+STEP_ACCURACY = 1e-5
 # of the preload's compression: smaller motions drown in its rounding,
-QUIET = 1e-8
+SMALL_MOTION_RATIO = 1e-8
 # and their residual is measured by this share of it
-AT_REST = 1e-4
+REST_MOTION_SHARE = 1e-4
 # a node whose p is below this share of its spring force sticks
-STICKS = 1e-13
+STICKING_FORCE_SHARE = 1e-13
 
 
 Inverse = Callable[..., np.ndarray]
@@ -149,7 +149,7 @@ def linearise_balance(balance: Balance, state: State, memory: Memory | None = No
         )
     inverse = _choose_inverse(A, change, memory, common_motions(balance.model, K // 2)[dofs])
 
-    def solve(residual: np.ndarray, accuracy: float = ACCURACY) -> np.ndarray:
+    def solve(residual: np.ndarray, accuracy: float = STEP_ACCURACY) -> np.ndarray:
         step = residual.copy()
         step[active] = inverse(residual[active].reshape(-1, K), accuracy).reshape(-1, d, K)
         if len(others):
@@ -175,7 +175,7 @@ def adjoint_inverse(balance: Balance, state: State) -> Inverse:
     back = np.ascontiguousarray(change[active].swapaxes(1, 2))
     inverse = _choose_inverse(_select_dofs(turned, dofs), back)
 
-    def solve(b: np.ndarray, accuracy: float = ACCURACY) -> np.ndarray:
+    def solve(b: np.ndarray, accuracy: float = STEP_ACCURACY) -> np.ndarray:
         flexed = _as_node_coefficients(balance, _apply_flexibility(turned, as_amplitudes(b)))[
             active
         ]
@@ -207,7 +207,8 @@ def _active_nodes(balance: Balance, state: State) -> tuple[np.ndarray, np.ndarra
     n, d, _ = state.w.shape
     change = _force_change(balance, state)
     active = np.flatnonzero(
-        abs(change).reshape(n, -1).max(axis=1) > STICKS * balance.model.springs.max(axis=1)
+        abs(change).reshape(n, -1).max(axis=1)
+        > STICKING_FORCE_SHARE * balance.model.springs.max(axis=1)
     )
     return change, active, (active[:, None] * d + np.arange(d)).ravel()
 
@@ -291,7 +292,7 @@ def contact_table(model: ReducedModel, H: int, samples: int) -> tuple:
             model.normal_series(samples),
             model.normal_load(H),
             model.table,
-            tables(H, samples or 4 * H + 4),
+            trigonometric_tables(H, samples or 4 * H + 4),
             0 if samples else 12 * (H + 1),
             model.preload,
             model.offset,
@@ -341,9 +342,9 @@ def _relative_error(balance: Balance, w: np.ndarray, residual: np.ndarray) -> fl
     size = np.linalg.norm(as_amplitudes(w))
     scale = _motion_scale(linear)
     pressed = balance.model.compression
-    if scale < QUIET * pressed:
-        size = max(size, AT_REST * pressed)
-        scale = max(scale, AT_REST * pressed)
+    if scale < SMALL_MOTION_RATIO * pressed:
+        size = max(size, REST_MOTION_SHARE * pressed)
+        scale = max(scale, REST_MOTION_SHARE * pressed)
     with_springs = np.linalg.norm(r) / max(size, np.finfo(float).tiny)
     r[1:] += _apply_flexibility(linear.G[1:], linear.springs * r[1:])
     return float(max(with_springs, np.linalg.norm(r) / scale))

@@ -9,14 +9,16 @@ from dataclasses import replace
 
 import numpy as np
 
+from ...hbm.model import ReducedModel
 from ...hbm.solution import Solution
+from ...hbm.stability import AFFORDABLE, UNSTABLE, stability_verdict
 from ...hbm.sweep import size
 from ...hbm.truncation_indicator import truncation_indicator
 from .family import Family, member
 from .indicators import richer
 from .settings import Settings
 
-__all__ = ["heights_of", "hidden", "peak_of", "watched"]
+__all__ = ["heights_of", "hidden", "lasting_peak", "peak_of", "watched"]
 
 # of the peak's height: where a curve is checked on each side beside the peak itself
 SHARES = (0.7, 0.25)
@@ -24,6 +26,8 @@ SHARES = (0.7, 0.25)
 LOUDEST = 3
 # from this share of the accuracy on
 QUIET = 0.1
+# highest points among which one that is not unstable is looked for
+JUDGED = 100
 
 
 def watched(
@@ -97,3 +101,16 @@ def heights_of(points: Sequence[Solution]) -> np.ndarray:
 def peak_of(points: Sequence[Solution]) -> Solution:
     """The highest converged point."""
     return max((p for p in points if p.converged), key=size)
+
+
+def lasting_peak(model: ReducedModel, points: Sequence[Solution]) -> Solution:
+    """The highest converged point that is not unstable; the highest of all where none is known to
+    be otherwise.
+    """
+    good = sorted((p for p in points if p.converged), key=size, reverse=True)
+    if model.directions == model.elements.tangents:
+        return good[0]
+    judged = (
+        p for p in good[:JUDGED] if stability_verdict(model, p, AFFORDABLE).verdict != UNSTABLE
+    )
+    return next(judged, good[0])

@@ -16,7 +16,8 @@ from ...hbm.model import ReducedModel
 from ...hbm.solution import Solution
 from ...hbm.solver.newton import Options
 from ...hbm.sweep import size, sweep
-from .check_points import heights_of, hidden, peak_of, watched
+from .branch_choice import anchor_of, peak_error
+from .check_points import heights_of, hidden, lasting_peak, peak_of, watched
 from .family import Family, member, with_excited_harmonics
 from .indicators import Indicators, indicate, judge, moved
 from .settings import Settings, enriched
@@ -46,6 +47,8 @@ LIKELY = (
 # sweeps of one curve with ever richer settings
 PASSES = 3
 WIDENINGS = 4
+# factor by which the accuracy at a lower point is tightened at most, for a peak that is too wrong
+TIGHTER = 0.05
 
 
 @dataclass(frozen=True)
@@ -195,6 +198,8 @@ def adapted(
             points = covered(model, settings, band, mode, accuracy, widen)
         else:
             points = _replaced(points, response_points(model, settings, inner, accuracy))
+        if settings.chosen and any(p.branch for p in points):
+            return _adapted_branches(family, settings, band, mode, accuracy, fixed, points)
         top = peak_of(points)
         used = settings
         errors = {}
@@ -214,6 +219,37 @@ def adapted(
             return Checked(replace(settings, error=errors[top.omega]), points, errors)
         settings = used
     return Checked(replace(settings, error=errors[top.omega]), points, errors)
+
+
+def _adapted_branches(
+    family: Family,
+    settings: Settings,
+    band: tuple[float, float] | None,
+    mode: int,
+    accuracy: float,
+    fixed: tuple[str, ...],
+    points: list[Solution],
+) -> Checked:
+    """The same where several motions were found: the error is that of the height of the highest
+    peak that is not unstable, wherever it lies.
+    """
+    widen = band is None
+    band = band or (points[0].frequency, points[-1].frequency)
+    demanded = accuracy
+    top = lasting_peak(member(family, settings).model, points)
+    error = peak_error(family, settings, points, top)
+    for _ in range(PASSES):
+        if error <= accuracy / 2 or not np.isfinite(error):
+            break
+        demanded *= max(accuracy / 2 / error, TIGHTER)
+        before = replace(settings, error=None)
+        settings, _, _ = choose(family, settings, anchor_of(points, top), demanded, fixed)
+        if replace(settings, error=None) == before:
+            continue
+        points = covered(member(family, settings).model, settings, band, mode, accuracy, widen)
+        top = lasting_peak(member(family, settings).model, points)
+        error = peak_error(family, settings, points, top)
+    return Checked(replace(settings, error=error), points, {top.omega: error})
 
 
 def _solvable(points: Sequence[Solution]) -> tuple[float, float] | None:
@@ -325,6 +361,7 @@ def response_points(
         peak=min(accuracy / 10, 1e-2),
         curve=0.2 if accuracy >= 1 else 0.02,
         options=sufficient(accuracy),
+        paths=accuracy < 1,
     )
     points = sorted(swept, key=lambda s: s.omega)
     if any(p.branch for p in points):

@@ -15,7 +15,7 @@ from functools import cache, lru_cache
 import numpy as np
 
 from ...data import Elements, PortModel, RigidBody
-from ...friction.law import merged_laws
+from ...friction.law_table import merged_laws
 from ...hbm.model import ReducedModel
 from ...reduction.assemble import recombine
 from ...reduction.truncate import truncated
@@ -135,6 +135,7 @@ def coarsened(model: ReducedModel, groups: np.ndarray) -> ReducedModel:
         elements=elements,
         damper=damper,
         normal=normal,
+        series=None if model.series is None else pick**2 @ model.series,
         start=None if model.start is None else _totals(model.start, groups),
     )
 

@@ -11,7 +11,7 @@ import numpy as np
 
 from ...errors import InputError, NotSolvedError
 from ...hbm.full_stick import sticks_safely
-from ...hbm.predictor import AHEAD, ahead
+from ...hbm.predictor import PREDICTOR_POINTS, extrapolate_solution
 from ...hbm.solution import Solution
 from ...hbm.solver.fallback import match_harmonics
 from ...hbm.solver.newton import Options
@@ -316,11 +316,11 @@ def _change(
 
 def _expected(gained: list[tuple[Solution, np.ndarray]], omega: float) -> np.ndarray:
     """The curve through the last of them."""
-    at = np.array([p.omega for p, _ in gained[-AHEAD:]])
-    known = np.array([w for _, w in gained[-AHEAD:]])
+    at = np.array([p.omega for p, _ in gained[-PREDICTOR_POINTS:]])
+    known = np.array([w for _, w in gained[-PREDICTOR_POINTS:]])
     result = np.empty(known.shape[1:])
     flat = (len(known), -1, known.shape[-1])
-    ahead(omega, known.reshape(flat), at, len(known), result.reshape(flat[1:]))
+    extrapolate_solution(omega, known.reshape(flat), at, len(known), result.reshape(flat[1:]))
     return result
 
 

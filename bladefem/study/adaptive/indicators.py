@@ -35,7 +35,7 @@ from ...hbm.solver.newton import DEFAULTS, Options
 from .family import Family, carried, lowest_harmonics, member
 from .settings import DAMPERS, DIRECTIONS, Settings
 
-__all__ = ["Indicators", "indicate", "judge", "judged_orders", "moved", "richer"]
+__all__ = ["Indicators", "indicate", "judge", "judged_orders", "moved", "richer", "richest"]
 
 # for a point that only tells how wrong another one is
 ENOUGH = Options(1e-5, 30, fallbacks=False, frugal=True)
@@ -120,6 +120,17 @@ def judge(family: Family, settings: Settings, solution: Solution) -> Indicators:
         better["together"] = moved(family, settings, solution, rich, ENOUGH)
         errors["together"] = _change(family, settings, solution, better["together"])
     return Indicators(errors, better)
+
+
+def richest(family: Family, settings: Settings) -> Settings:
+    """Settings richer in every respect that has a richer one."""
+    rich = settings
+    for name in DIRECTIONS:
+        other = richer(family, settings, name)
+        if other is not None and not _poorer(settings, other, name):
+            rich = replace(rich, **{name: getattr(other, name)})
+            rich = replace(rich, samples=max(rich.samples, other.samples))
+    return rich
 
 
 def _poorer(settings: Settings, other: Settings, name: str) -> bool:

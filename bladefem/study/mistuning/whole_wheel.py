@@ -23,7 +23,7 @@ from ..pipeline.assemble_model import LoadCase, joint_model
 from ..pipeline.contact_cycle import labels
 from ..pipeline.stages import Bodies, Reduced, reduce_sector, weighted
 
-__all__ = ["WheelSector", "reduce_wheel", "read_orders", "whole_wheel"]
+__all__ = ["WheelSector", "read_orders", "reduce_wheel", "whole_wheel"]
 
 
 @dataclass(frozen=True)

@@ -13,7 +13,7 @@ import scipy.sparse as sp
 from geometry.mesh import Mesh
 
 from ...data import Elements, Patch, PortModel, RigidBody
-from ...hbm.model import Damping, ReducedModel
+from ...hbm.model import Damping, ReducedModel, in_series
 from ...reduction.assemble import pair_models, recombine, wheel_models
 from ...scene.tables import Scene
 from .stages import Reduced
@@ -32,6 +32,9 @@ class LoadCase:
     selection: sp.spmatrix
     # of the damper [kg]; as meshed when None
     mass: float | None = None
+    # (n, 1 + tangents) compliance of stiff layers that the elements leave to the bodies [m/N], see
+    # contact.numerical_stiffness; None where they leave none
+    series: np.ndarray | None = None
 
 
 def joint_model(
@@ -64,6 +67,10 @@ def joint_model(
         sides = tuple(recombine(side, pick) for side in sides)
     if damper == "mass" or scene.contact.normal == "prescribed":
         elements = replace(elements, kn=np.zeros_like(elements.kn))
+    series = case.series
+    if series is not None:
+        series = series * np.r_[float(elements.kn.any()), np.ones(elements.tangents)]
+        sides = tuple(in_series(side, series) for side in sides)
     other: RigidBody | tuple[PortModel, ...]
     if damper == "mass":
         other = mass_damper(mesh, patches, reduced.mass)
@@ -81,6 +88,7 @@ def joint_model(
         other,
         Damping(ratio=scene.operation.damping),
         coupled=scene.model.static == "coupled",
+        series=series,
     )
 
 

@@ -14,12 +14,13 @@ from itertools import pairwise
 import numpy as np
 
 from ...contact.interface_elements import aggregation
+from ...contact.numerical_stiffness import physical_stiffness
 from ...data import Elements, Patch
 from ...friction.aft import Forces, evaluate
 from ...friction.energy import free_static_force
 from ...friction.equivalent_linear import Approximation, by_harmonic, from_harmonics, work_of
 from ...friction.fourier import synthesis
-from ...friction.law import select_elements
+from ...friction.law_table import select_elements
 from ..adaptive.family import joined
 from .assemble_model import LoadCase
 from .loads import Curve
@@ -98,12 +99,16 @@ def contact_cycle(
     """
     area = np.concatenate([patch.area for patch in patches])
     elements = case.elements
+    layer = physical_stiffness(elements, case.series)
     groups = labels(patches, points)
     # of all nodes; the choice may have joined some
     if len(elements.kt) == len(area):
         groups = labels(patches, curve.settings.points)
         elements = joined(elements, groups)
+        layer = joined(layer, groups)
+    series = 1.0 / layer.kt - 1.0 / elements.kt
     elements, w = _in_all_directions(elements, curve.peak.w)
+    layer = replace(layer, kn=np.where(elements.kn > 0, layer.kn, 0.0))
     # the friction law starts from the static friction force
     started = w.copy()
     started[:, 1:, 0] += elements.traction / elements.kt[:, None]
@@ -111,7 +116,7 @@ def contact_cycle(
     starts = np.cumsum([0] + [len(patch.area) for patch in patches])
     rows = [np.unique(groups[a:b]) for a, b in pairwise(starts)]
     part = area / np.bincount(groups, area)[groups]
-    averaged, each, mismatch = _linear(forces, w, 2 * np.pi * curve.peak.frequency)
+    averaged, each, mismatch = _linear(forces, w, series, 2 * np.pi * curve.peak.frequency)
     return ContactCycle(
         case.load,
         case.mass,
@@ -120,10 +125,13 @@ def contact_cycle(
         forces.state[groups],
         part / area * forces.dissipated[groups],
         free_static_force(elements, w)[groups],
-        {patch.name: _loop(elements, started, some) for patch, some in zip(patches, rows, strict=True)},
+        {
+            patch.name: _loop(elements, started, series, some)
+            for patch, some in zip(patches, rows, strict=True)
+        },
         _dealt(averaged, groups, part),
         _dealt(each, groups, part),
-        _dealt_elements(elements, groups, part),
+        _dealt_elements(layer, groups, part),
         mismatch,
     )
 
@@ -136,13 +144,16 @@ def _dealt_elements(elements: Elements, groups: np.ndarray, part: np.ndarray) ->
 
 
 def _linear(
-    forces: Forces, w: np.ndarray, omega: float
+    forces: Forces, w: np.ndarray, series: np.ndarray, omega: float
 ) -> tuple[Approximation, Approximation, float]:
     """Optimal approximation of the tangential forces (n, d, K), averaged and by harmonic, and its
     error in work.
+
+    Args:
+        series: (n,) compliance of the layer beside that of the elements [m/N].
     """
-    u = w[:, 1:]
     f = forces.f[:, 1:]
+    u = w[:, 1:] + series[:, None, None] * f
     averaged = from_harmonics(u, f, omega)
     spent = forces.dissipated
     apart = np.abs(work_of(averaged, u, omega).sum(1) - spent).max() / max(spent.max(), 1e-300)
@@ -165,16 +176,21 @@ def _dealt(approximation: Approximation, groups: np.ndarray, part: np.ndarray) -
     )
 
 
-def _loop(elements: Elements, w: np.ndarray, rows: np.ndarray) -> Loop:
+def _loop(elements: Elements, w: np.ndarray, series: np.ndarray, rows: np.ndarray) -> Loop:
     """Hysteresis of some elements; their motion is that of the balance, their force has all its
     harmonics.
+
+    Args:
+        series: (n,) compliance of the layer beside that of the elements [m/N].
     """
     fine = np.zeros((len(rows), w.shape[1], 2 * SMOOTH + 1))
     fine[..., : w.shape[2]] = w[rows]
     some = select_elements(elements, rows)
-    force = evaluate(some, fine, 8 * SMOOTH + 8, jacobian=False).f[:, 1:].sum(0)
+    friction = evaluate(some, fine, 8 * SMOOTH + 8, jacobian=False).f[:, 1:]
+    force = friction.sum(0)
     share = some.kt / some.kt.sum()
-    mean = np.einsum("n,ndk->dk", share, fine[:, 1:])
+    across = fine[:, 1:] + series[rows, None, None] * friction
+    mean = np.einsum("n,ndk->dk", share, across)
     mean[:, 0] = 0.0
     direction = np.linalg.svd(mean)[0][:, 0]
     T = synthesis(SMOOTH, 8 * SMOOTH + 8)

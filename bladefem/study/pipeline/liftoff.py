@@ -9,6 +9,7 @@ from contextlib import contextmanager
 
 import numpy as np
 
+from ...contact.numerical_stiffness import physical_stiffness
 from ...errors import NotSolvedError
 from ...hbm.linear_resonances import free_resonances
 from ...hbm.model import ReducedModel
@@ -67,5 +68,5 @@ def seat_travel(model: ReducedModel, mode: int, excitation: float) -> float:
 
 def _compression(case: LoadCase) -> float:
     """Of the contact springs of one seat under the load [m]."""
-    stiffness = float(case.elements.kn.sum()) / 2
+    stiffness = float(physical_stiffness(case.elements, case.series).kn.sum()) / 2
     return case.load / stiffness if stiffness > 0 else np.inf

@@ -26,7 +26,7 @@ from .assemble_model import LoadCase
 from .liftoff import named
 from .linear_limits import Limit
 from .load_interval import LoadInterval, load_interval
-from .stability import Stability, stability_of
+from .stability import UNSTABLE, Stability, stability_of
 
 Keep = Callable[[LoadCase, Callable[[], Any]], Any]
 
@@ -70,6 +70,8 @@ class Curve:
     dissipated: np.ndarray
     # (k,) |work put in - work lost| over work put in
     imbalance: np.ndarray
+    # (k,) number of the monotone piece of the response; 0 where one motion was looked for
+    branch: np.ndarray
     # (k,) estimated relative error of the first harmonic
     estimated: np.ndarray
     # (k,) the same as wanted: the scene's accuracy times peak over amplitude
@@ -82,8 +84,12 @@ class Curve:
     multiplier: np.ndarray
     # relative change of the peak's height with half as many contact points; NaN: unknown
     halved: float
-    # the highest converged point
+    # the highest converged point that is not unstable
     peak: Solution
+    # (k,) "fold", "period doubling" or "torus" of unstable points, else ""
+    bifurcation: np.ndarray
+    # the highest converged point where that one is unstable, else None
+    unstable_peak: Solution | None = None
     # range of the resonance over loading histories; None where it was not asked for
     interval: LoadInterval | None = None
 
@@ -156,13 +162,21 @@ def curve_of(
         curve = adapted(
             models, restarted(settings), scene.study.band, mode, scene.accuracy, fixed=("modes",)
         )
-    top = peak_of(curve.points)
+    model = member(models, curve.settings).model
     heights = np.array([size(p) for p in curve.points])
-    tolerated = scene.accuracy * size(top) / np.maximum(heights, 1e-6 * size(top))
-    columns = (np.array(c) for c in zip(*map(_record, curve.points), strict=True))
     marks = Stability(np.full(len(heights), ""), np.full(len(heights), np.nan))
     if scene.study.stability:
-        marks = stability_of(member(models, curve.settings).model, curve.points)
+        marks = stability_of(model, curve.points)
+    top = highest = peak_of(curve.points)
+    lasting = [
+        p
+        for p, verdict in zip(curve.points, marks.verdict, strict=True)
+        if p.converged and verdict != UNSTABLE
+    ]
+    if scene.study.stability and lasting:
+        top = max(lasting, key=size)
+    tolerated = scene.accuracy * size(top) / np.maximum(heights, 1e-6 * size(top))
+    columns = (np.array(c) for c in zip(*map(_record, curve.points), strict=True))
     halved = np.nan if scene.contact.points else halved_change(models, curve.settings, top)
     interval = None
     if scene.study.interval:
@@ -180,6 +194,8 @@ def curve_of(
         marks.multiplier,
         halved,
         top,
+        marks.bifurcation if len(marks.bifurcation) else np.full(len(heights), ""),
+        None if top is highest else highest,
         interval,
     )
 
@@ -197,6 +213,7 @@ def _record(p: Solution) -> tuple[object, ...]:
         p.states["slip"] + p.states["lift"],
         p.work.dissipated,
         p.work.imbalance,
+        p.branch,
     )
 
 

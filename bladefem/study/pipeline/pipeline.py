@@ -19,6 +19,7 @@ from geometry.mesh import Mesh
 
 from ...contact.frictional_seating import FrictionalProblem, normal_part
 from ...contact.interface_elements import friction_elements, pair_ratio
+from ...contact.numerical_stiffness import numerical_stiffness, split_stiffness
 from ...contact.peak_pressure import peak_remarks
 from ...contact.seating import ContactProblem
 from ...contact.seating import solve as seat
@@ -57,7 +58,7 @@ from .liftoff import named
 from .linear_limits import Limit, linear_limits
 from .load_interval import interval_sentence
 from .loads import Curve, default_loads, study_loads
-from .stability import stability_sentence
+from .stability import stability_sentence, unstable_sentence
 from .stage_inputs import stage_key
 from .stages import (
     Bodies,
@@ -523,6 +524,7 @@ def _remarks(scene: Scene, settings: Settings, curves: list[Curve], nodes: int) 
         )
     if scene.study.stability:
         remarks.append(method(stability_sentence([(c.stability, c.multiplier) for c in curves])))
+    remarks.extend(warning(text) for text in map(unstable_sentence, curves) if text)
     intervals = [c.interval for c in curves if c.interval is not None]
     if intervals:
         remarks.append(interval_sentence([c.load for c in curves], intervals))
@@ -574,7 +576,9 @@ def _load_case(
     elements, selection = friction_elements(
         contact.problem, contact.maps[load], scene.contact, ratio, mesh.dimension - 1
     )
-    return LoadCase(load, elements, selection, mass)
+    limit = numerical_stiffness(contact.problem)
+    elements, series = split_stiffness(elements, contact.maps[load], scene.contact, limit)
+    return LoadCase(load, elements, selection, mass, series)
 
 
 def check_blade(scene: Scene, mesh: Mesh) -> None:

@@ -1,45 +1,42 @@
-"""Are the motions of a curve stable? Floquet multipliers of its points, by shooting on the exact
-flow.
+"""Are the motions of a curve stable? The verdicts of `bladefem.hbm.stability` on its points.
 
-Where normal loads are prescribed and the bodies damped there is one periodic motion and every other
-one decays to it, so that nothing needs to be computed. Where they follow the motion, each solution
-of the balance starts a shooting on the same modes in time; the multipliers of the closed period
-tell how disturbances grow from one period to the next. The time form has no massless flexibility,
-which costs some per cent of amplitude, and takes elements of one tangent and blades that move in
-phase.
+Every converged point is judged where that is affordable; of larger models the local maxima alone.
 """
 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
+from typing import Any
 
 import numpy as np
 
-from ...damper.branch import state_of
 from ...data import PortModel
 from ...errors import InputError
 from ...hbm.model import ReducedModel
-from ...hbm.solution import Solution
-from ...hbm.time_model import time_system
-from ...time.shooting import floquet_multipliers, periodic_solution, probe_harmonics
-from ...time.system import System
+from ...hbm.solution import Solution, size
+from ...hbm.stability import (
+    AFFORDABLE,
+    STABLE,
+    UNIQUE,
+    UNKNOWN,
+    UNSTABLE,
+    stability_verdict,
+)
 
-__all__ = ["UNIQUE", "Stability", "in_one_body", "stability_of", "stability_sentence"]
+__all__ = [
+    "UNIQUE",
+    "UNSTABLE",
+    "Stability",
+    "in_one_body",
+    "stability_of",
+    "stability_sentence",
+    "unstable_sentence",
+]
 
-UNIQUE = "unique"
-STABLE = "stable"
-UNSTABLE = "unstable"
-UNKNOWN = "unknown"
-# largest multiplier of a stable motion: sliders that never move have exactly 1
-ONE = 1 + 1e-5
-# of Newton on the period; from a solution of the balance two or three do
-STEPS = 8
-# accepted change over a period: where 80 contacts rock, Newton stalls at 1e-5 to 4e-4, and the
-# multipliers of two such ends differ by 4e-6
-CLOSED = 1e-3
-# relative distance of the first harmonic beyond which shooting has gone to another motion
-NEAR = 0.1
+
+# local maxima of a curve that are judged whatever that takes
+MAXIMA = 4
 
 
 @dataclass(frozen=True)
@@ -52,33 +49,35 @@ class Stability:
     multiplier: np.ndarray
     # why nothing could be computed
     reason: str = ""
+    # (k,) "fold", "period doubling" or "torus" of unstable points, else ""
+    bifurcation: np.ndarray = field(default_factory=lambda: np.zeros(0, dtype="<U15"))
 
 
 def stability_of(model: ReducedModel, points: Sequence[Solution]) -> Stability:
-    """Verdicts on solutions of the balance of one model."""
-    unknown = np.full(len(points), UNKNOWN)
-    nothing = np.full(len(points), np.nan)
-    solved = np.array([p.converged for p in points], dtype=bool)
-    if model.directions == model.elements.tangents:
-        return Stability(np.where(solved, UNIQUE, UNKNOWN), nothing)
-    try:
-        system = time_system(in_one_body(model), max(1, *model.excitation, *model.normal))
-    except InputError as error:
-        return Stability(unknown, nothing, str(error))
-    largest = np.array([_largest(system, p) if p.converged else np.nan for p in points])
-    verdict = np.where(np.isnan(largest), UNKNOWN, np.where(largest > ONE, UNSTABLE, STABLE))
-    return Stability(verdict, largest)
+    """Verdicts on solutions of the balance of one model, in the order of a curve."""
+    found = [stability_verdict(model, point, AFFORDABLE) for point in points]
+    for i in _maxima(points):
+        if found[i].verdict == UNKNOWN:
+            found[i] = stability_verdict(model, points[i])
+    reasons = [v.reason for v, p in zip(found, points, strict=True) if p.converged and v.reason]
+    return Stability(
+        np.array([v.verdict for v in found]),
+        np.array([v.multiplier for v in found]),
+        reasons[0] if len(reasons) == len(points) else "",
+        np.array([v.bifurcation for v in found], dtype="<U15"),
+    )
 
 
-def _largest(system: System, point: Solution) -> float:
-    """Largest modulus of the multipliers; NaN where shooting does not confirm the point."""
-    shot = periodic_solution(system, point.omega, state_of(point, system), most=STEPS)
-    if (
-        not shot.residual < CLOSED
-        or abs(probe_harmonics(shot, system, 1)[0, 1] / point.probe[1, 0] - 1) > NEAR
-    ):
-        return np.nan
-    return float(np.abs(floquet_multipliers(shot)).max())
+def _maxima(points: Sequence[Solution]) -> list[int]:
+    """Numbers of the local maxima along each piece of the curve, the highest MAXIMA of them."""
+    heights = np.array([size(p) if p.converged else 0.0 for p in points])
+    branch = np.array([p.branch for p in points])
+    found: list[int] = []
+    for number in np.unique(branch):
+        rows = np.flatnonzero((branch == number) & (heights > 0))
+        own = np.concatenate([[0.0], heights[rows], [0.0]])
+        found += rows[(own[1:-1] >= own[:-2]) & (own[1:-1] >= own[2:])].tolist()
+    return sorted(found, key=lambda i: -heights[i])[:MAXIMA]
 
 
 def in_one_body(model: ReducedModel) -> ReducedModel:
@@ -122,13 +121,38 @@ def stability_sentence(parts: Sequence[tuple[np.ndarray, np.ndarray]]) -> str:
         )
     if counts[UNKNOWN] == len(verdict):
         return (
-            "stability is unknown: no point could be closed in time (that takes elements of one "
-            "tangent, blades "
-            "that move in phase)"
+            "stability is unknown: no point could be judged (it takes Coulomb's law, a wave "
+            "that repeats after few blades, and not too many contact nodes that slip)"
         )
+    worst = f" (largest Floquet multiplier {np.nanmax(largest):.4g})" if counts[UNSTABLE] else ""
     return (
-        f"stability: {counts[STABLE]} points stable, {counts[UNSTABLE]} unstable (largest Floquet "
-        "multiplier "
-        f"{np.nanmax(largest):.4g}), {counts[UNKNOWN]} not closed in time; without residual "
-        "flexibility"
+        f"stability: {counts[STABLE]} points stable, {counts[UNSTABLE]} unstable{worst}, "
+        f"{counts[UNKNOWN]} not judged"
     )
+
+
+def unstable_sentence(curve: Any) -> str:
+    """What became of a resonance that is unstable, or "".
+
+    Args:
+        curve: a `bladefem.study.pipeline.loads.Curve`.
+    """
+    several = int(curve.branch.max(initial=0))
+    folded = (
+        f"load {curve.load:g} N: several motions at one frequency, the response has "
+        f"{several} pieces between folds"
+        if several > 1
+        else ""
+    )
+    top = curve.unstable_peak
+    if top is None:
+        return folded
+    at = int(np.flatnonzero(curve.frequency == top.frequency)[0])
+    named = f" ({curve.bifurcation[at]})" if curve.bifurcation[at] else ""
+    lost = (
+        f"load {curve.load:g} N: the highest motion, {1e6 * size(top):.4g} um at "
+        f"{top.frequency:.5g} Hz, is unstable{named}; the resonance given is the highest one that "
+        f"is not, {1e6 * curve.peak_amplitude:.4g} um at {curve.peak_frequency:.5g} Hz, and what "
+        "the blade does in between only a march in time tells"
+    )
+    return f"{folded}; {lost}" if folded else lost

@@ -1,0 +1,94 @@
+"""Stability verdicts against marching: random models with lift-off, some points of each path.
+
+    python benchmarks/verdicts.py [first seed] [last seed]
+
+Each point is disturbed by a thousandth and marched for 400 periods. A motion that is called stable
+has to stay, one that is called unstable has to leave.
+"""
+
+from __future__ import annotations
+
+import sys
+import time
+from collections import Counter
+
+import numpy as np
+from branch_models import Case, march, random_case, state_of
+
+from bladefem import balance as bf
+from bladefem.hbm.stability import UNKNOWN, stability_verdict
+from bladefem.hbm.sweep import first_look
+
+# points of a model: its highest maxima, and others spread over the paths
+MAXIMA = 2
+OTHERS = 4
+PERIODS = 400
+DISTURBANCE = 1e-3
+# relative change of the height beyond which the motion has left
+LEFT = 0.05
+# the same below which it has stayed
+STAYED = 0.01
+
+
+def chosen(case: Case, H: int, samples: int) -> list[bf.Solution]:
+    """Points on the paths of a model, solved with more harmonics."""
+    known = list(bf.response(case.model, first_look(case.model, case.band), H, samples))
+    found = bf.find_branches(case.model, case.band, known, H, samples)
+    points = found.points
+    rng = np.random.default_rng(case.seed)
+    some = [r.solution for r in found.resonances[:MAXIMA]]
+    some += [points[i] for i in rng.choice(len(points), min(OTHERS, len(points)), replace=False)]
+    falling = [p for p, q in zip(points[1:], points, strict=False) if p.branch == q.branch]
+    if len(found.pieces) > 1:
+        some += [falling[i] for i in rng.choice(len(falling), min(2, len(falling)), replace=False)]
+    return some
+
+
+def outcome(case: Case, point: bf.Solution) -> str:
+    """What marching says: "stays", "leaves", or "unclear"."""
+    state = state_of(case, point)
+    reference = march(case, point.omega, state, 3)
+    if abs(reference.height / bf.size(point) - 1) > 0.1:
+        return "unclear"
+    rng = np.random.default_rng(case.seed + 1)
+    d = len(case.stiffness)
+    disturbed = state.copy()
+    disturbed[:d] += DISTURBANCE * abs(state[:d]).max() * rng.normal(size=d) / np.sqrt(d)
+    end = march(case, point.omega, disturbed, PERIODS)
+    change = abs(end.height / reference.height - 1)
+    if change > LEFT or end.change > 2 * LEFT:
+        return "leaves"
+    return "stays" if change < STAYED and end.change < STAYED else "unclear"
+
+
+def main(first: int, last: int) -> None:
+    table: Counter[tuple[str, str]] = Counter()
+    spent = Counter()
+    for seed in range(first, last):
+        case = random_case(seed, lifts=True)
+        for rough in chosen(case, 7, 256):
+            clock = time.process_time()
+            point = bf.solve(case.model, rough.omega, 15, 1024, start=rough)
+            spent["point"] += time.process_time() - clock
+            if not point.converged:
+                table["not converged", ""] += 1
+                continue
+            clock = time.process_time()
+            told = stability_verdict(case.model, point)
+            spent["verdict"] += time.process_time() - clock
+            seen = outcome(case, point)
+            table[told.verdict, seen] += 1
+            wrong = (told.verdict, seen) in (("stable", "leaves"), ("unstable", "stays"))
+            if wrong or told.verdict == UNKNOWN:
+                print(
+                    f"seed {seed}, {case.name}, {point.omega:.6g} rad/s: {told.verdict} "
+                    f"({told.multiplier:.5f} {told.bifurcation} {told.reason}), marching {seen}",
+                    flush=True,
+                )
+    for (told, seen), count in sorted(table.items()):
+        print(f"{told:13} {seen:8} {count:5}")
+    print(f"CPU of verdicts over that of points: {spent['verdict'] / spent['point']:.2f}")
+
+
+if __name__ == "__main__":
+    main(*(int(a) for a in sys.argv[1:3]) if len(sys.argv) > 2 else (0, 40))

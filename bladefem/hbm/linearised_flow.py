@@ -1,0 +1,285 @@
+"""Disturbances of a periodic motion over one period, by the friction law's own steps.
+
+The motion of the contacts is known from the balance; each node's state (stick, slip, open) at the
+instants of a period, and how a step's force depends on the force before and on the displacements at
+both ends, follow from the return map. The bodies are integrated exactly for forces that are linear
+between two instants, and the contact forces implicitly, so that no step is too long for stability;
+what is left is the error of sampled friction, which falls with the square of the instants.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numba import njit
+from scipy import linalg
+
+from ..friction.time_step import step_2d
+from .sector_modes import SectorModes
+
+__all__ = ["contact_steps", "linear_steps", "period_map"]
+
+# periods marched until 2-D forces repeat
+CYCLES = 60
+# relative change of forces from one period to the next that counts as periodic
+REPEATS = 1e-9
+
+
+def linear_steps(system: SectorModes, dt: float) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Exact step of the bodies without contact.
+
+    Returns:
+        E (2M, 2M) from (q, v) before; G0 and G1 (2M, M) from the modal forces before and after,
+        linear in between.
+    """
+    M = len(system.stiffness)
+    A = np.zeros((4 * M, 4 * M))
+    A[:M, M : 2 * M] = np.eye(M)
+    A[M : 2 * M, :M] = -np.diag(system.stiffness)
+    A[M : 2 * M, M : 2 * M] = -system.damping
+    A[M : 2 * M, 2 * M : 3 * M] = np.eye(M)
+    A[2 * M : 3 * M, 3 * M :] = np.eye(M) / dt
+    flow = linalg.expm(A * dt)
+    E = flow[: 2 * M, : 2 * M]
+    constant = flow[: 2 * M, 2 * M : 3 * M]
+    rising = flow[: 2 * M, 3 * M :]
+    return E, constant - rising, rising
+
+
+@njit(cache=True, error_model="numpy")
+def contact_steps(u, du, N, dN, mu, before, now, load, share, stuck):
+    """Derivatives of the steps of one period of given motions, with which forces repeat.
+
+    A node that changes its state inside a step does so where the motion says, to second order: the
+    force before acts for this share of the step, and the force after for the rest.
+
+    Args:
+        u, du: (n, t, S) kt w at the instants, and its change in a step at the rate there [N].
+        N, dN: (n, S) the same of the normal load, negative where open [N].
+        before, now: (S, n, t, t) derivative of the force after step k, which ends at instant k, by
+            the force before, and by the change of kt w in it; load: (S, n, t, 2) by the loads
+            before and after. Filled.
+        share: (S, n) of the step for which the force before it acts, one half where nothing
+            changes. Filled.
+        stuck: (n,) whether the node never leaves its stick. Filled.
+    """
+    n, t, S = u.shape
+    for i in range(n):
+        x = u[i, 0, 0]
+        y = u[i, 1, 0] if t > 1 else 0.0
+        slips = False
+        size = mu[i] * max(np.abs(N[i]).max(), 1e-300)
+        for cycle in range(CYCLES):
+            x0 = x
+            y0 = y
+            stuck[i] = True
+            for k in range(1, S + 1):
+                j = k % S
+                loads = (N[i, k - 1], N[i, j], dN[i, k - 1], dN[i, j])
+                tangents = (before[j, i], now[j, i], load[j, i])
+                if t == 1:
+                    motion = (u[i, 0, k - 1], u[i, 0, j], du[i, 0, k - 1], du[i, 0, j])
+                    x, slips, share[j, i] = _step_1d(x, slips, motion, loads, mu[i], tangents)
+                else:
+                    dx = u[i, 0, j] - u[i, 0, k - 1]
+                    dy = u[i, 1, j] - u[i, 1, k - 1]
+                    x, y, share[j, i] = _step_2d(x, y, dx, dy, loads, mu[i], tangents)
+                if before[j, i, 0, 0] != 1.0 or now[j, i, 0, 0] != 1.0:
+                    stuck[i] = False
+            if cycle > 0 and abs(x - x0) + abs(y - y0) <= REPEATS * size:
+                break
+
+
+@njit(cache=True, error_model="numpy", inline="always")
+def _cubic(start, end, slope0, slope1, a):
+    """Cubic with these values and slopes at 0 and 1."""
+    rise = end - start
+    return start + a * (
+        slope0 + a * (3 * rise - 2 * slope0 - slope1 + a * (slope0 + slope1 - 2 * rise))
+    )
+
+
+@njit(cache=True, error_model="numpy")
+def _step_1d(x, slips, motion, loads, mu, tangents):
+    """One step of a node with one tangent from the force x: the new force, whether it slips then,
+    and the share of the step for which the old state lasts; derivatives are filled.
+    """
+    u0, u1, du0, du1 = motion
+    N0, N1, dN0, dN1 = loads
+    before, now, load = tangents
+    before[0, 0] = 0.0
+    now[0, 0] = 0.0
+    load[0, 0] = 0.0
+    load[0, 1] = 0.0
+    if N1 <= 0.0:
+        return 0.0, False, N0 / (N0 - N1) if N0 > 0.0 else 0.5
+    share = 0.5
+    if N0 <= 0.0:
+        # sticks or slips from where it closes
+        share = N0 / (N0 - N1)
+        rest = 1.0 - share
+        start = _cubic(u0, u1, du0, du1, share)
+        f = u1 - start
+        if abs(f) < mu * N1:
+            now[0, 0] = rest
+            load[0, 0] = (u1 - u0) * rest / (N1 - N0)
+            load[0, 1] = -(u1 - u0) * N0 / (N1 - N0) ** 2
+            return f, False, share
+        side = 1.0 if f > 0 else -1.0
+        load[0, 1] = side * mu
+        return side * mu * N1, True, share
+    if slips:
+        side = 1.0 if x > 0 else -1.0
+        ahead0 = side * du0 - mu * dN0
+        ahead1 = side * du1 - mu * dN1
+        if ahead1 >= 0.0:
+            load[0, 1] = side * mu
+            return side * mu * N1, True, 0.5
+        # the motion turns back inside the step: what it does after that sticks
+        a = ahead0 / (ahead0 - ahead1) if ahead0 > 0.0 else 0.0
+        f = side * mu * _cubic(N0, N1, dN0, dN1, a) + u1 - _cubic(u0, u1, du0, du1, a)
+        now[0, 0] = 1.0 - a
+        load[0, 0] = side * mu * (1.0 - a)
+        load[0, 1] = side * mu * a
+        if a == 0.0:
+            before[0, 0] = 1.0
+            load[0, 0] = 0.0
+        return min(max(f, -mu * N1), mu * N1), False, 0.5
+    f = x + u1 - u0
+    if abs(f) < mu * N1:
+        before[0, 0] = 1.0
+        now[0, 0] = 1.0
+        return f, False, share
+    side = 1.0 if f > 0 else -1.0
+    margin = max(mu * N0 - side * x, 0.0)
+    over = side * f - mu * N1
+    share = margin / (margin + over) if margin + over > 0.0 else 0.0
+    load[0, 1] = side * mu
+    return side * mu * N1, True, share
+
+
+@njit(cache=True, error_model="numpy")
+def _step_2d(x, y, dx, dy, loads, mu, tangents):
+    """One step of a node with two tangents: new force, and the share of the step for which the old
+    state lasts; derivatives are filled.
+    """
+    N0, N1, _, _ = loads
+    before, now, load = tangents
+    fx, fy, slips = step_2d(x, y, dx, dy, N0, N1, mu)
+    share = 0.5
+    if (N0 > 0.0) != (N1 > 0.0):
+        share = N0 / (N0 - N1)
+    elif slips != 0.0:
+        margin = max(mu * N0 - np.hypot(x, y), 0.0)
+        over = max(np.hypot(x + dx, y + dy) - mu * N1, 0.0)
+        # a node that slipped before goes on
+        if margin > 1e-9 * mu * N0:
+            share = margin / (margin + over)
+    before[:] = 0.0
+    now[:] = 0.0
+    load[:] = 0.0
+    if mu * N1 <= 0.0:
+        return fx, fy, share
+    if slips == 0.0 and N0 > 0.0:
+        before[0, 0] = 1.0
+        before[1, 1] = 1.0
+        now[0, 0] = 1.0
+        now[1, 1] = 1.0
+        return fx, fy, share
+    # of the step, in contact
+    part = 1.0 if N0 > 0.0 else N1 / (N1 - N0)
+    if slips == 0.0:
+        for c in range(2):
+            step = dx if c == 0 else dy
+            now[c, c] = part
+            load[c, 0] = step * part / (N1 - N0)
+            load[c, 1] = -step * N0 / (N1 - N0) ** 2
+        return fx, fy, share
+    # across the force the direction of the motion is approached over a length of limit over
+    # stiffness; along it the force is the limit
+    sliding = 1.0 - share if N0 > 0.0 and share != 0.5 else 1.0
+    path = sliding * part * np.hypot(dx, dy) / (mu * N1)
+    kept = np.exp(-path)
+    gained = -np.expm1(-path) / path if path > 1e-12 else 1.0
+    nx = fx / (mu * N1)
+    ny = fy / (mu * N1)
+    for a in range(2):
+        for b in range(2):
+            across = (a == b) - (nx if a == 0 else ny) * (nx if b == 0 else ny)
+            before[a, b] = kept * across if N0 > 0.0 else 0.0
+            now[a, b] = part * gained * across
+    load[0, 1] = mu * nx
+    load[1, 1] = mu * ny
+    return fx, fy, share
+
+
+@njit(cache=True, error_model="numpy")
+def period_map(E, G0, G1, U, R, A, B1, B0, share):
+    """(2M+m, 2M+m) map of disturbances of (q, v, f) over a period.
+
+    Args:
+        E, G0, G1: of `linear_steps`, the last two applied to -U^T: (2M, m).
+        U: (m, M) contact readings; R: (m, m) residual flexibility.
+        A, B1, B0: (S, n, d, d) derivatives of a step's force by the force before, and by the
+            displacements after and before [N/m].
+        share: (S, n) of each step for which the force before acts.
+    """
+    S, n, d, _ = A.shape
+    m, M = U.shape
+    size = 2 * M + m
+    X = np.zeros((2 * M, size))
+    F = np.zeros((m, size))
+    for i in range(2 * M):
+        X[i, i] = 1.0
+    for i in range(m):
+        F[i, 2 * M + i] = 1.0
+    bodies = np.dot(U, np.ascontiguousarray(G1[:M]))
+    flexible = R - bodies
+    W = np.dot(U, np.ascontiguousarray(X[:M])) - np.dot(R, F)
+    rhs = np.empty((m, size))
+    acting = np.empty((m, size))
+    inverse = np.empty((m, m))
+    for k in range(1, S + 1):
+        j = k % S
+        for row in range(m):
+            acting[row] = 2.0 * share[j, row // d] * F[row]
+        X = np.dot(E, X) + np.dot(G0, acting)
+        free = np.dot(U, np.ascontiguousarray(X[:M]))
+        rhs[:] = 0.0
+        for i in range(n):
+            for a in range(d):
+                row = i * d + a
+                for b in range(d):
+                    column = i * d + b
+                    if A[j, i, a, b] != 0.0:
+                        rhs[row] += A[j, i, a, b] * F[column]
+                    if B1[j, i, a, b] != 0.0:
+                        rhs[row] += B1[j, i, a, b] * free[column]
+                    if B0[j, i, a, b] != 0.0:
+                        rhs[row] += B0[j, i, a, b] * W[column]
+        if k == 1 or np.any(B1[j] != B1[k - 1]) or np.any(share[j] != share[k - 1]):
+            for column in range(m):
+                weight = 2.0 * (1.0 - share[j, column // d])
+                flexible[:, column] = R[:, column] - weight * bodies[:, column]
+            inverse = _inverse_of_contact(B1[j], flexible)
+        F = np.dot(inverse, rhs)
+        for row in range(m):
+            acting[row] = 2.0 * (1.0 - share[j, row // d]) * F[row]
+        X += np.dot(G1, acting)
+        W = free - np.dot(flexible, F)
+    full = np.empty((size, size))
+    full[: 2 * M] = X
+    full[2 * M :] = F
+    return full
+
+
+@njit(cache=True, error_model="numpy")
+def _inverse_of_contact(B, flexible):
+    """(m, m) inverse of 1 + B times the flexibility, for node blocks B (n, d, d)."""
+    n, d, _ = B.shape
+    matrix = np.eye(n * d)
+    for i in range(n):
+        for a in range(d):
+            for b in range(d):
+                if B[i, a, b] != 0.0:
+                    matrix[i * d + a] += B[i, a, b] * flexible[i * d + b]
+    return np.ascontiguousarray(np.linalg.inv(matrix))

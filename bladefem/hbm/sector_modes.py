@@ -1,0 +1,162 @@
+"""Blades and dampers as one real system of modes in time, for one blade or for those of a travelling
+wave.
+
+A model in a travelling wave has one body for each harmonic, in the nodal diameters that the engine
+order gives. Where these repeat after r harmonics, the wave repeats after r blades, and the bodies
+of harmonics 0..r-1 are all nodal diameters of a ring of r blades: their real and imaginary parts
+are its modes.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from ..data import PortModel
+from ..errors import InputError
+from .linear.woodbury import bodies_of
+from .model import ReducedModel
+
+__all__ = ["SectorModes", "blades_of_wave", "sector_modes"]
+
+# relative difference up to which two bodies are the same
+SAME = 1e-9
+
+
+@dataclass(frozen=True)
+class SectorModes:
+    """r blades with their dampers: q'' + D q' + L q = -U^T f,  w = U q - R f; M modes, m = r n d
+    contact degrees of freedom, blade by blade.
+    """
+
+    blades: int
+    # (M,) L [1/s^2]
+    stiffness: np.ndarray
+    # (M, M) D [1/s]; structural damping as the viscous one of the same loss at the mode's frequency
+    damping: np.ndarray
+    # (m, M) U [kg^-1/2]
+    contact: np.ndarray
+    # (m, m) R [m/N]
+    residual: np.ndarray
+
+
+def sector_modes(model: ReducedModel) -> SectorModes:
+    """The model without excitation, in time.
+
+    Raises:
+        InputError: the wave does not repeat after the harmonics that the model has bodies for.
+    """
+    r = blades_of_wave(model)
+    parts = [_ring(body, r, sign) for body, sign in _bodies(model, r)]
+    modes = sum(len(part.stiffness) for part in parts)
+    damping = np.zeros((modes, modes))
+    start = 0
+    for part in parts:
+        own = slice(start, start + len(part.stiffness))
+        damping[own, own] = part.damping
+        start = own.stop
+    return SectorModes(
+        r,
+        np.concatenate([part.stiffness for part in parts]),
+        damping,
+        np.hstack([part.contact for part in parts]),
+        sum(part.residual for part in parts),
+    )
+
+
+def blades_of_wave(model: ReducedModel) -> int:
+    """Blades after which the motion repeats; 1 where all move in phase.
+
+    Raises:
+        InputError: they are more than the harmonics that the model has bodies for.
+    """
+    found = [_period(bodies) for bodies in (model.sides, _damper_bodies(model)) if bodies]
+    if 0 in found:
+        raise InputError(
+            f"the travelling wave does not repeat within {len(model.sides)} harmonics, expected an "
+            "engine order that shares a larger divisor with the number of blades"
+        )
+    if len({r for r in found if r > 1}) > 1:
+        raise InputError("blades and dampers repeat after different numbers of harmonics")
+    return max(found)
+
+
+def _damper_bodies(model: ReducedModel) -> tuple[PortModel, ...]:
+    return model.damper if isinstance(model.damper, tuple) else ()
+
+
+def _period(bodies: tuple[PortModel, ...]) -> int:
+    """Harmonics after which the bodies repeat, mirrored in the middle; 0 where they do not."""
+    if len(bodies) == 1:
+        return int(abs(np.imag(bodies[0].shapes)).max(initial=0.0) == 0.0)
+    for r in range(1, len(bodies)):
+        repeats = all(_same(bodies[h], bodies[h - r]) for h in range(r, len(bodies)))
+        if repeats and all(_same(bodies[h], bodies[r - h], mirrored=True) for h in range(r + 1)):
+            return r
+    return 0
+
+
+def _same(one: PortModel, other: PortModel, mirrored: bool = False) -> bool:
+    if one.omega.shape != other.omega.shape:
+        return False
+    turn = np.conj if mirrored else np.asarray
+    return (
+        one is other
+        and not mirrored
+        or all(
+            np.allclose(a, turn(b), rtol=SAME, atol=SAME * max(abs(a).max(initial=0.0), 1e-300))
+            for a, b in (
+                (one.omega, other.omega),
+                (one.shapes, other.shapes),
+                (one.residual, other.residual),
+            )
+        )
+    )
+
+
+def _bodies(model: ReducedModel, r: int) -> list[tuple]:
+    """Each body's stack of harmonics 0..r-1 at least, and the sign of its motion."""
+    stacks = bodies_of(model, max(r - 1, 0))
+    return list(zip(stacks, (1.0, -1.0), strict=False))
+
+
+def _ring(stack: object, r: int, sign: float) -> SectorModes:
+    """One body in all diameters of a ring of r blades."""
+    stiffness, contact, loss = [], [], []
+    shape = stack.residual[0, stack.contact, stack.contact].shape
+    residual = np.zeros((r, r, *shape))
+    blade = np.arange(r)
+    for j in range(r):
+        row = min(j, len(stack.omega) - 1)
+        flexible = stack.residual[min(j, len(stack.residual) - 1), stack.contact, stack.contact]
+        turn = np.exp(2j * np.pi * j * (blade[:, None] - blade) / r)
+        residual += (turn[:, :, None, None] * flexible).real / r
+        if 2 * j > r:
+            continue
+        own = stack.omega[row]
+        viscous = np.diag(stack.viscous[row]) + np.diag(
+            np.divide(stack.hysteretic[row], own, out=np.zeros_like(own), where=own > 0)
+        )
+        if stack.coupled is not None:
+            viscous = viscous + stack.coupled[min(j, len(stack.coupled) - 1)]
+        phase = np.exp(2j * np.pi * j * blade / r)[:, None, None]
+        shapes = (sign * phase * stack.shapes[row, stack.contact]).reshape(-1, len(own))
+        double = 0 < 2 * j < r
+        size = np.sqrt((2 if double else 1) / r)
+        stiffness.extend([own**2] * (1 + double))
+        contact.extend([size * shapes.real] + [size * shapes.imag] * double)
+        loss.append(_real_form(viscous) if double else viscous.real)
+    order = residual.transpose(0, 2, 1, 3).reshape(r * shape[0], r * shape[1])
+    modes = sum(map(len, stiffness))
+    damping = np.zeros((modes, modes))
+    start = 0
+    for part in loss:
+        damping[start : start + len(part), start : start + len(part)] = part
+        start += len(part)
+    return SectorModes(r, np.concatenate(stiffness), damping, np.hstack(contact), order)
+
+
+def _real_form(matrix: np.ndarray) -> np.ndarray:
+    """A complex matrix on amplitudes x - i y as a real one on (x, y)."""
+    return np.block([[matrix.real, matrix.imag], [-matrix.imag, matrix.real]])

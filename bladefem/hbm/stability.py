@@ -1,0 +1,226 @@
+"""Is a solution of the balance a motion that lasts? Its Floquet multipliers, for every kind of model.
+
+Where normal loads are prescribed and the bodies damped there is one periodic motion, and every
+other one decays to it (the friction law is then monotone). Elsewhere the linearised motion is
+carried through one period along the solution (`bladefem.hbm.linearised_flow`): the largest modulus
+of its multipliers tells how much of a disturbance is left after a period. Nodes that stick
+throughout only add constant multipliers of one, the mean force that stick leaves open, and are
+condensed into the bodies. Travelling waves are judged against all disturbances that repeat after
+the same number of blades as they do.
+
+The named bifurcation is the one through which a motion with such multipliers lost its stability:
+"fold" at +1, "period doubling" at -1, "torus" for a complex pair.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from scipy import linalg
+
+from ..errors import InputError
+from ..friction.fourier import synthesis
+from .linearised_flow import contact_steps, linear_steps, period_map
+from .model import ReducedModel
+from .sector_modes import SectorModes, sector_modes
+from .solution import Solution
+
+__all__ = ["AFFORDABLE", "STABLE", "UNIQUE", "UNKNOWN", "UNSTABLE", "Verdict", "stability_verdict"]
+
+UNIQUE = "unique"
+STABLE = "stable"
+UNSTABLE = "unstable"
+UNKNOWN = "unknown"
+# growth of a disturbance over a period that counts as instability: less is lost in the error of
+# sampled friction
+GROWTH = 1e-3
+# instants a period, and how many times as many where the verdict is close
+INSTANTS = 256
+FINER = 4
+# distance from one within which it is
+CLOSE = 0.003
+# operations of one verdict above which only those are made that are asked for, some 0.3 s
+AFFORDABLE = 2e9
+# and above which none are made, some 10 s
+LARGEST = 3e10
+# angle of a multiplier to the real axis up to which it is real
+REAL = 1e-3
+
+
+@dataclass(frozen=True)
+class Verdict:
+    """Of one solution."""
+
+    # UNIQUE, STABLE, UNSTABLE or UNKNOWN
+    verdict: str
+    # largest modulus of the Floquet multipliers, those of stuck nodes left out; NaN: not computed
+    multiplier: float = float("nan")
+    # "fold", "period doubling" or "torus" of an unstable motion
+    bifurcation: str = ""
+    # why nothing is known
+    reason: str = ""
+
+
+def stability_verdict(model: ReducedModel, solution: Solution, most: float = LARGEST) -> Verdict:
+    """The verdict on a converged solution of the model.
+
+    Args:
+        most: operations above which it is not made; see `AFFORDABLE`.
+    """
+    if not solution.converged:
+        return Verdict(UNKNOWN, reason="not converged")
+    if model.directions == model.elements.tangents and model.damped:
+        return Verdict(UNIQUE)
+    if model.elements.law is not None:
+        return Verdict(UNKNOWN, reason="a friction law of its own, expected Coulomb's")
+    try:
+        system = model.once("sector modes", lambda: _outcome(model))
+    except InputError as error:
+        return Verdict(UNKNOWN, reason=str(error))
+    if isinstance(system, InputError):
+        return Verdict(UNKNOWN, reason=str(system))
+    leading = _leading(model, solution, system, INSTANTS, most)
+    if leading is not None and abs(abs(leading) - 1 - GROWTH) < CLOSE:
+        finer = _leading(model, solution, system, FINER * INSTANTS, most)
+        leading = leading if finer is None else finer
+    if leading is None:
+        return Verdict(UNKNOWN, reason=f"it would take more than {most:.0e} operations")
+    if abs(leading) <= 1 + GROWTH:
+        return Verdict(STABLE, float(abs(leading)))
+    return Verdict(UNSTABLE, float(abs(leading)), _bifurcation(leading))
+
+
+def _outcome(model: ReducedModel) -> SectorModes | InputError:
+    """The system in time, or why there is none: found once for a model."""
+    try:
+        return sector_modes(model)
+    except InputError as error:
+        return error
+
+
+def _bifurcation(multiplier: complex) -> str:
+    if abs(multiplier.imag) > REAL * abs(multiplier):
+        return "torus"
+    return "fold" if multiplier.real > 0 else "period doubling"
+
+
+def _leading(
+    model: ReducedModel, solution: Solution, system: SectorModes, instants: int, most: float
+) -> complex | None:
+    """The multiplier of largest modulus; None where it would take too many operations."""
+    S = max(instants, 16 * (solution.harmonics + 1))
+    A, B1, B0, share, stuck = _node_steps(model, solution, system.blades, S)
+    system, U, R = _without_stuck(model, system, stuck)
+    d = model.directions
+    moving = np.flatnonzero(~stuck)
+    m = len(moving) * d
+    unknowns = 2 * len(system.stiffness) + m
+    if S * (2 * m**3 + 4 * unknowns**3) > most:
+        return None
+    dt = 2 * np.pi / solution.omega / S
+    E, G0, G1 = linear_steps(system, dt)
+    by_contact = -U.T
+    nodes = (part[:, moving] for part in (A, B1, B0, share))
+    arrays = (E, G0 @ by_contact, G1 @ by_contact, U, R, *nodes)
+    full = period_map(*(np.ascontiguousarray(a) for a in arrays))
+    values = linalg.eigvals(full, check_finite=False)
+    return complex(values[np.argmax(abs(values))])
+
+
+def _node_steps(
+    model: ReducedModel, solution: Solution, blades: int, S: int
+) -> tuple[np.ndarray, ...]:
+    """A, B1, B0 (S, blades n, d, d) and share of `period_map`, and which nodes stick throughout."""
+    e = model.elements
+    n, d, K = solution.w.shape
+    t = e.tangents
+    w = solution.w + 0.0
+    w[:, :, 0] += model.offset.reshape(n, d)
+    base = synthesis(K // 2, S).T
+    turned = np.concatenate([_shifted(w, b / blades) for b in range(blades)])
+    motion = turned @ base
+    change = _rates(turned) @ base * (2 * np.pi / S)
+    load = model.normal_load(max((0, *model.normal)))[:, None]
+    load = np.concatenate([_shifted(load, b / blades) for b in range(blades)])
+    known = synthesis(load.shape[2] // 2, S).T
+    N = load[:, 0] @ known
+    dN = _rates(load)[:, 0] @ known * (2 * np.pi / S)
+    kt = np.tile(e.kt, blades)
+    kn = np.tile(e.kn, blades)
+    count = blades * n
+    if d > t:
+        N = N + kn[:, None] * motion[:, 0]
+        dN = dN + kn[:, None] * change[:, 0]
+    before = np.zeros((S, count, t, t))
+    now = np.zeros((S, count, t, t))
+    by_load = np.zeros((S, count, t, 2))
+    share = np.zeros((S, count))
+    stuck = np.zeros(count, dtype=bool)
+    tangential = np.ascontiguousarray(kt[:, None, None] * motion[:, d - t :])
+    rate = np.ascontiguousarray(kt[:, None, None] * change[:, d - t :])
+    contact_steps(
+        tangential, rate, N, dN, np.tile(e.mu, blades), before, now, by_load, share, stuck
+    )
+    A = np.zeros((S, count, d, d))
+    B1 = np.zeros((S, count, d, d))
+    B0 = np.zeros((S, count, d, d))
+    f = d - t
+    A[:, :, f:, f:] = before
+    B1[:, :, f:, f:] = now * kt[:, None, None]
+    B0[:, :, f:, f:] = -now * kt[:, None, None]
+    if f:
+        B1[:, :, 0, 0] = (kn[:, None] * (N > 0)).T
+        B1[:, :, f:, 0] = by_load[..., 1] * kn[:, None]
+        B0[:, :, f:, 0] = by_load[..., 0] * kn[:, None]
+    return A, B1, B0, share, stuck & (N > 0).all(axis=1)
+
+
+def _rates(w: np.ndarray) -> np.ndarray:
+    """Coefficients (n, d, K) of the derivative by the phase."""
+    rate = np.zeros_like(w)
+    h = np.arange(1, w.shape[2] // 2 + 1)
+    rate[:, :, 1::2] = h * w[:, :, 2::2]
+    rate[:, :, 2::2] = -h * w[:, :, 1::2]
+    return rate
+
+
+def _shifted(w: np.ndarray, share: float) -> np.ndarray:
+    """Coefficients (n, d, K) of the motion a share of a period later."""
+    turned = w.copy()
+    for h in range(1, w.shape[2] // 2 + 1):
+        c = np.cos(2 * np.pi * h * share)
+        s = np.sin(2 * np.pi * h * share)
+        turned[:, :, 2 * h - 1] = c * w[:, :, 2 * h - 1] + s * w[:, :, 2 * h]
+        turned[:, :, 2 * h] = c * w[:, :, 2 * h] - s * w[:, :, 2 * h - 1]
+    return turned
+
+
+def _without_stuck(
+    model: ReducedModel, system: SectorModes, stuck: np.ndarray
+) -> tuple[SectorModes, np.ndarray, np.ndarray]:
+    """The bodies with the springs of nodes that stick throughout, and U, R of the other nodes."""
+    d = model.directions
+    rows = np.repeat(stuck, d)
+    springs = np.tile(model.springs.ravel(), system.blades)
+    closed = np.flatnonzero(rows & (springs > 0))
+    others = np.flatnonzero(~rows)
+    U = system.contact[others]
+    R = system.residual[np.ix_(others, others)]
+    if not len(closed):
+        return system, U, R
+    own = system.contact[closed]
+    inverse = np.linalg.inv(np.diag(1 / springs[closed]) + system.residual[np.ix_(closed, closed)])
+    across = system.residual[np.ix_(others, closed)]
+    U = U - across @ inverse @ own
+    R = R - across @ inverse @ across.T
+    K = np.diag(system.stiffness) + own.T @ inverse @ own
+    values, vectors = np.linalg.eigh((K + K.T) / 2)
+    changed = SectorModes(
+        system.blades,
+        np.maximum(values, 0.0),
+        vectors.T @ system.damping @ vectors,
+        U @ vectors,
+        R,
+    )
+    return changed, changed.contact, R

@@ -1,0 +1,105 @@
+"""Settings for a response with several motions at one frequency, whose peak may lie on a fold.
+
+At the frequency of such a peak a richer model may have no motion of that kind at all, so that the
+error of a point says nothing. Settings are chosen at a point lower on the same piece, and the peak
+is judged by the peak of a richer model, followed from there.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from ...errors import NotSolvedError
+from ...hbm.branches import TOLERANCE
+from ...hbm.continuation import follow
+from ...hbm.solution import Solution, size
+from .family import Family, member
+from .indicators import ENOUGH, moved, richest
+from .settings import Settings
+
+__all__ = ["anchor_of", "peak_error"]
+
+# shares of the peak's height at which a point of the same piece is looked for
+ANCHOR = 0.6
+STARTS = (0.9, 0.75, 0.5)
+# arc-length steps of the path to the richer model's peak, as shares of the band
+STEPS = (0.003, 0.015)
+# points of that path
+LONGEST = 150
+# unknowns up to which the richer model's peak is followed; of larger ones points right below the
+# peak are compared
+FOLLOWED = 1200
+BELOW = (0.99, 0.95, 0.9, 0.75)
+# fall of the height by which its peak has been passed
+PASSED = 2e-3
+
+
+def anchor_of(points: Sequence[Solution], top: Solution, share: float = ANCHOR) -> Solution:
+    """The point on the piece of the peak that has about a share of its height."""
+    piece = [p for p in points if p.converged and p.branch == top.branch]
+    return min(piece, key=lambda p: abs(size(p) - share * size(top)))
+
+
+def peak_error(
+    family: Family, settings: Settings, points: Sequence[Solution], top: Solution
+) -> float:
+    """Relative error of a peak's height: against that of a model richer in every respect.
+
+    Large richer models are compared at the highest point below the peak at which they have the
+    same motion.
+
+    Returns:
+        infinite where the richer model's peak was not found.
+    """
+    rich = richest(family, settings)
+    if rich == settings:
+        return 0.0
+    model = member(family, rich).model
+    if model.springs.size * (2 * rich.harmonics + 1) > FOLLOWED:
+        return _error_below(family, settings, points, top, rich)
+    omegas = [p.omega for p in points]
+    bounds = 0.9 * min(omegas), 1.1 * max(omegas)
+    for share in STARTS:
+        anchor = anchor_of(points, top, share)
+        if anchor is top:
+            continue
+        start = moved(family, settings, anchor, rich, ENOUGH)
+        if not start.converged:
+            continue
+        height = 0.0
+        count = 0
+        options = replace(ENOUGH, tolerance=TOLERANCE, frugal=False)
+        forward = top.omega > anchor.omega
+        try:
+            for point in follow(
+                model, "omega", start, bounds, forward=forward, steps=STEPS, options=options
+            ):
+                count += 1
+                now = size(point.solution)
+                height = max(height, now)
+                if now < (1 - PASSED) * height or count > LONGEST:
+                    break
+        except NotSolvedError:
+            continue
+        if now < height:
+            return float(abs(height - size(top)) / height)
+    return float(np.inf)
+
+
+def _error_below(
+    family: Family,
+    settings: Settings,
+    points: Sequence[Solution],
+    top: Solution,
+    rich: Settings,
+) -> float:
+    """Relative error of the height of a point right below the peak."""
+    for share in BELOW:
+        point = anchor_of(points, top, share)
+        better = moved(family, settings, point, rich, ENOUGH)
+        if better.converged:
+            return float(abs(size(better) - size(point)) / size(better))
+    return float(np.inf)

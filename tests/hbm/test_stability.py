@@ -1,0 +1,150 @@
+"""Verdicts on single solutions: against the monodromy of the event-exact flow, against marching, and
+for models that neither of the two takes.
+"""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from models import single_mass
+
+from bladefem.damper.branch import inclined_contact, state_of
+from bladefem.data import Elements
+from bladefem.hbm.continuation import follow
+from bladefem.hbm.model import Damping, ReducedModel
+from bladefem.hbm.sector_modes import blades_of_wave, sector_modes
+from bladefem.hbm.solve import solve
+from bladefem.hbm.stability import STABLE, UNIQUE, UNKNOWN, UNSTABLE, stability_verdict
+from bladefem.hbm.time_model import time_system
+from bladefem.reduction.matrices import port_model_from_matrices
+from bladefem.time.shooting import floquet_multipliers, periodic_solution
+
+HZ = 2 * np.pi
+
+
+def test_multipliers_are_those_of_the_event_exact_flow():
+    """Along a path with two folds, from rocking over the unstable motion to partial slip."""
+    model, _ = inclined_contact()
+    start = solve(model, HZ * 200, 15, 512)
+    path = [
+        p.solution
+        for p in follow(
+            model, "omega", start, (HZ * 110, HZ * 200), forward=False, steps=(0.01, 0.05)
+        )
+    ]
+    system = time_system(model, 1)
+    told = []
+    errors = []
+    for point in path[20::12]:
+        found = stability_verdict(model, point)
+        told.append(found.verdict)
+        if point.states["stick"] == len(point.w):
+            continue
+        shot = periodic_solution(system, point.omega, state_of(point, system), most=8)
+        exact = float(abs(floquet_multipliers(shot)).max())
+        # sliders that never move have exactly one, and are left out here
+        if shot.residual < 1e-6 and abs(exact - 1) > 1e-6:
+            errors.append(abs(found.multiplier - exact))
+            assert found.verdict == (UNSTABLE if exact > 1.001 else STABLE)
+            assert found.bifurcation == ("fold" if exact > 1.001 else "")
+    assert {STABLE, UNSTABLE} <= set(told) and len(errors) > 5
+    assert max(errors) < 1e-3
+
+
+def test_prescribed_loads_have_one_motion_only():
+    model = replace(single_mass(), damping=Damping(ratio=0.01))
+    point = solve(model, 1.1, 3, 128)
+    assert stability_verdict(model, point).verdict == UNIQUE
+
+
+def bouncing():
+    """Three masses with one contact of two tangents that lifts off."""
+    K = np.array([[2.0, -0.3, 0.1], [-0.3, 1.5, 0.2], [0.1, 0.2, 1.2]])
+    ports = {"contact": [0, 1, 2], "load": [0, 1], "probe": [0]}
+    body = port_model_from_matrices(np.eye(3), K, ports, C=0.02 * K)
+    contact = Elements(*(np.array([x]) for x in (1.0, 2.0, 0.4, 0.15)), tangents=2)
+    return ReducedModel((body,), contact, {1: np.array([0.1, 0.08j])})
+
+
+def marched(model, point, periods, steps=1000):
+    """Displacement of the first mass over the last period, from the solution disturbed by 1e-3."""
+    body = model.sides[0]
+    e = model.elements
+    kt, kn, mu, n0 = (float(x[0]) for x in (e.kt, e.kn, e.mu, e.n0))
+    U = body.shapes[body.ports["contact"]]
+    H = point.harmonics
+    f = point.f[0]
+    q = np.zeros((3, H + 1), dtype=complex)
+    for h in range(H + 1):
+        w = h * point.omega
+        force = f[:, 2 * h - 1] - 1j * f[:, 2 * h] if h else f[:, 0] - [n0, 0.0, 0.0]
+        load = body.shapes[body.ports["load"]].T @ model.loads(H)[h] - U.T @ force
+        q[:, h] = load / (body.omega**2 - w**2 + 1j * w * body.damping)
+    v = (1j * point.omega * np.arange(H + 1) * q).sum(axis=1).real
+    q = q.sum(axis=1).real * (1 + 1e-3)
+    slider = (U @ q)[1:] - (f[1:, 0] + f[1:, 1::2].sum(axis=1)) / kt
+    dt = 2 * np.pi / point.omega / steps
+    push = body.shapes[body.ports["load"]].T @ model.loads(1)[1]
+    seen = np.empty((periods, steps))
+    probe = body.shapes[body.ports["probe"]][0]
+    for k in range(periods * steps):
+        seen[k // steps, k % steps] = probe @ q
+        w = U @ q
+        normal = max(n0 + kn * w[0], 0.0)
+        trial = kt * (w[1:] - slider)
+        size = np.hypot(*trial)
+        if size > mu * normal:
+            trial = trial * (mu * normal / size)
+        slider = w[1:] - trial / kt
+        drive = (push * np.exp(1j * point.omega * k * dt)).real
+        rate = drive - body.omega**2 * q - body.damping * v - U.T @ [normal - n0, *trial]
+        v = v + dt * rate
+        q = q + dt * v
+    return seen
+
+
+@pytest.mark.parametrize("omega", [1.3, 1.75])
+def test_two_tangents_that_lift_off(omega):
+    model = bouncing()
+    point = solve(model, omega, 15, 1024)
+    assert point.states["lift"] == 1
+    found = stability_verdict(model, point)
+    seen = marched(model, point, 40)
+    change = abs(seen[-1] - seen[0]).max() / abs(seen[0]).max()
+    assert found.verdict == (STABLE if change < 0.02 else UNSTABLE)
+
+
+def test_a_wave_is_judged_on_the_blades_after_which_it_repeats():
+    """Blades a quarter of a period apart, coupled by their dampers, are a ring of four; without
+    coupling its multipliers are those of one blade.
+    """
+    alone = bouncing()
+    ring = replace(alone, sides=tuple(alone.sides[0] for _ in range(9)))
+    assert blades_of_wave(ring) == 1
+    body = alone.sides[0]
+    turned = [np.exp(0.5j * np.pi * h) for h in range(9)]
+    sides = tuple(
+        replace(body, shapes=body.shapes * np.where(np.arange(3) == 2, t, 1.0)) for t in turned
+    )
+    # the third mode seen with a phase: a similar ring, whose modes are no longer real
+    wave = replace(alone, sides=sides)
+    assert blades_of_wave(wave) == 4
+    system = sector_modes(wave)
+    assert system.blades == 4 and len(system.stiffness) == 12
+    for h in range(1, 5):
+        # forces in a wave move the ring as the body of that harmonic says
+        w = h * 0.9
+        Z = np.diag(system.stiffness - w**2) + 1j * w * system.damping
+        wave_of = np.exp(0.5j * np.pi * h * np.arange(4))[:, None]
+        force = np.array([0.3, -0.2j, 0.5 + 0.1j])
+        forces = (wave_of * force).ravel()
+        moved = system.contact @ np.linalg.solve(Z, system.contact.T @ forces)
+        shapes = sides[h].shapes[sides[h].ports["contact"]]
+        own = shapes / (sides[h].omega ** 2 - w**2 + 1j * w * sides[h].damping) @ shapes.conj().T
+        np.testing.assert_allclose(moved, (wave_of * (own @ force)).ravel(), atol=1e-12)
+    point = solve(wave, 1.3, 7, 256)
+    assert point.converged
+    assert stability_verdict(wave, point).verdict in (STABLE, UNSTABLE)
+    odd = replace(alone, sides=sides[:3])
+    assert "does not repeat" in stability_verdict(odd, point).reason
+    assert stability_verdict(odd, point).verdict == UNKNOWN
