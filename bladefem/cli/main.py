@@ -67,8 +67,11 @@ _COMMANDS = {
         commands.response,
     ),
     "study": (
-        "the same for several values of one parameter, side by side",
-        "bladefem study scenes/wedge.toml --vary damper.angle='30, 40, 50 deg'",
+        "the same for several values of one or two parameters, or for scattered ones",
+        "bladefem study scenes/wedge.toml --vary damper.angle='30, 40, 50 deg'\n"
+        "  bladefem study scenes/wedge.toml --vary damper.angle='50, 60 deg' --vary "
+        "contact.mu='0.2, 0.3'\n"
+        "  bladefem study scenes/wedge.toml --scatter contact.mu='0.2, 0.4' --samples 16",
         study.study,
     ),
     "scatter": (
@@ -153,12 +156,7 @@ def parser() -> argparse.ArgumentParser:
             "--pdf", action="store_true", help="also print the report as PDF, by Chromium"
         )
     _modes_arguments(subs.choices["modes"])
-    subs.choices["study"].add_argument(
-        "--vary",
-        required=True,
-        metavar="KEY=VALUES",
-        help="field and its values, such as damper.angle='30, 40, 50 deg'",
-    )
+    study.add_study(subs.choices["study"])
     subs.choices["chart"].add_argument(
         "--budget",
         type=float,

@@ -1,10 +1,14 @@
-"""The command that varies one field: a response for each value, side by side in one table and one
-picture.
+"""The command that varies fields: a response for each value, side by side in tables and one picture.
+
+One field: curves over its values. Two fields: a map. Scattered fields: a band over the loads.
 """
 
 from __future__ import annotations
 
 import argparse
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from itertools import product
 from pathlib import Path
 from typing import Any
 
@@ -12,42 +16,149 @@ from ..errors import InputError
 from . import tables
 from .commands import default_folder, given_scene, prepared, tell, until
 
-__all__ = ["study"]
+__all__ = ["add_study", "study"]
+
+# runs of one study
+MOST_RUNS = 1000
+
+
+@dataclass(frozen=True)
+class Plan:
+    """What is run, and how it is written."""
+
+    # dotted names of the fields
+    names: tuple[str, ...]
+    # values of all fields, one tuple a run
+    runs: list[tuple[str, ...]]
+    # (variants, folder) -> (table, files)
+    write: Callable[[Sequence[Any], Path], tuple[Any, list[Path]]]
+    # of that table, for the terminal
+    show: Callable[[Any], str]
+
+
+def add_study(sub: argparse.ArgumentParser) -> None:
+    """The command's arguments."""
+    sub.add_argument(
+        "--vary",
+        action="append",
+        default=[],
+        metavar="KEY=VALUES",
+        help="field and its values, such as damper.angle='30, 40, 50 deg'; twice for a map of two",
+    )
+    sub.add_argument(
+        "--scatter",
+        action="append",
+        default=[],
+        metavar="KEY=LOW,HIGH",
+        help="field and the ends between which it scatters, such as contact.mu='0.2, 0.4'; may be "
+        "repeated",
+    )
+    sub.add_argument("--samples", type=int, default=16, metavar="N", help="runs of a scatter (16)")
 
 
 def study(options: argparse.Namespace, comm: Any) -> None:
-    """The response for several values of one field, each in its own folder inside the run
-    folder.
-    """
+    """The response for each run of the plan, each in its own folder inside the run folder."""
     from ..io.stage_cache import on_root
 
     base = Path(options.output or default_folder(options.scene))
-    parts = [(value, _one(options, base, name, value)) for name, value in _varied(options.vary)]
-    name = options.vary.partition("=")[0].strip()
+    plan = _planned(options)
+    parts = [_one(options, base, plan.names, values) for values in plan.runs]
     # all, before long work
-    scenes = on_root(comm, lambda: [given_scene(one, responds=True) for _, one in parts])
+    scenes = on_root(comm, lambda: [given_scene(one, responds=True) for one in parts])
+    if options.scatter and any(scene.study.loads is None for scene in scenes):
+        raise InputError("study.loads: expected the same loads for all samples of --scatter")
     prepared(options, comm)
-    count = len(parts)
-    done = []
-    for i, ((value, one), scene) in enumerate(zip(parts, scenes, strict=True), 1):
-        tell(options, comm, lambda text=f"\n{name} = {value} ({i} of {count})": text)
+    done: list[Any] = []
+    table: Any = None
+    files: list[Path] = []
+    for number, (values, one, scene) in enumerate(zip(plan.runs, parts, scenes, strict=True), 1):
+        said = ", ".join(f"{n} = {v}" for n, v in zip(plan.names, values, strict=True))
+        tell(options, comm, lambda text=f"\n{said} ({number} of {len(parts)})": text)
+        if done:
+            on_root(comm, lambda one=one: _borrow(Path(parts[0].output), Path(one.output)))
         run = until("response", one, comm)
         tell(options, comm, lambda run=run: tables.responses(run.response), run)
         # not before the first line: it is slow to load
-        from ..report.study import Variant, write_study
+        from ..report.study import Variant
 
-        done.append(Variant(value, scene, run.response))
+        done.append(Variant("; ".join(values), scene, run.response))
         # so that an interruption leaves some
-        table, files = on_root(comm, lambda: write_study(name, done, base))
-    tell(
-        options,
-        comm,
-        lambda: f"\n{tables.side_by_side(name, table)}\nwritten: {', '.join(map(str, files))}",
-    )
+        table, files = on_root(comm, lambda: plan.write(done, base))
+    written = ", ".join(map(str, files))
+    tell(options, comm, lambda: f"\n{plan.show(table)}\nwritten: {written}")
 
 
-def _varied(text: str) -> list[tuple[str, str]]:
-    """Name and text of each value; the last unit holds for those without one, as in "30, 40, 50
+def _planned(options: argparse.Namespace) -> Plan:
+    """What the options ask for.
+
+    Raises:
+        InputError: neither or both of --vary and --scatter, or too many of them.
+    """
+    if bool(options.vary) == bool(options.scatter):
+        raise InputError(
+            "study: expected --vary KEY=VALUES (once or twice), or --scatter KEY=LOW,HIGH"
+        )
+    if options.scatter:
+        return _scattered(options)
+    if len(options.vary) > 2:
+        raise InputError("--vary: given three times or more, expected one or two fields")
+    fields = [_varied(text) for text in options.vary]
+    names = tuple(name for name, _ in fields)
+    if len(set(names)) < len(names):
+        raise InputError(f"--vary {names[0]}: given twice, expected two fields")
+    values = [one for _, one in fields]
+    runs = list(product(*values))
+    if len(runs) > MOST_RUNS:
+        raise InputError(f"--vary: {len(runs)} runs, expected at most {MOST_RUNS}")
+    if len(fields) == 1:
+        return Plan(names, runs, _write_one(names[0]), lambda t: tables.side_by_side(names[0], t))
+    return Plan(names, runs, _write_map(names, values), _map_table)
+
+
+def _scattered(options: argparse.Namespace) -> Plan:
+    from ..study.scatter_plan import halton_values, read_ranges
+
+    ranges = read_ranges(options.scatter)
+    names = tuple(one.name for one in ranges)
+    if len(set(names)) < len(names):
+        raise InputError("--scatter: a field is given twice, expected each once")
+
+    def write(variants: Sequence[Any], folder: Path) -> tuple[Any, list[Path]]:
+        from ..report.study_map import write_scatter
+
+        return write_scatter(names, variants, folder)
+
+    return Plan(names, halton_values(ranges, options.samples), write, tables.table)
+
+
+def _write_one(name: str) -> Callable[[Sequence[Any], Path], tuple[Any, list[Path]]]:
+    def write(variants: Sequence[Any], folder: Path) -> tuple[Any, list[Path]]:
+        from ..report.study import write_study
+
+        return write_study(name, variants, folder)
+
+    return write
+
+
+def _write_map(
+    names: tuple[str, ...], values: list[list[str]]
+) -> Callable[[Sequence[Any], Path], tuple[Any, list[Path]]]:
+    def write(variants: Sequence[Any], folder: Path) -> tuple[Any, list[Path]]:
+        from ..report.study_map import write_map
+
+        return write_map((names[0], names[1]), (values[0], values[1]), variants, folder)
+
+    return write
+
+
+def _map_table(table: Any) -> str:
+    """The columns that fit on a terminal."""
+    shown = [*table.columns[:2], "load", "peak_frequency", "peak_amplitude", "reduction", "error"]
+    return tables.table(table[shown])
+
+
+def _varied(text: str) -> tuple[str, list[str]]:
+    """Name and texts of the values; the last unit holds for those without one, as in "30, 40, 50
     deg".
 
     Raises:
@@ -62,12 +173,24 @@ def _varied(text: str) -> list[tuple[str, str]]:
         raise InputError(
             f"--vary {text}: expected key=values, such as damper.angle='30, 40, 50 deg'"
         )
-    return [(name, value) for value in dict.fromkeys(split_values(values))]
+    return name, list(dict.fromkeys(split_values(values)))
 
 
-def _one(options: argparse.Namespace, base: Path, name: str, value: str) -> argparse.Namespace:
-    """The options of one value."""
+def _one(
+    options: argparse.Namespace, base: Path, names: Sequence[str], values: Sequence[str]
+) -> argparse.Namespace:
+    """The options of one run."""
     one = argparse.Namespace(**vars(options))
-    one.overrides = [*options.overrides, f"{name}={value}"]
-    one.output = str(base / f"{name}={value}".replace(" ", "").replace("/", "_"))
+    changes = [f"{name}={value}" for name, value in zip(names, values, strict=True)]
+    one.overrides = [*options.overrides, *changes]
+    one.output = str(base / ",".join(changes).replace(" ", "").replace("/", "_"))
     return one
+
+
+def _borrow(source: Path, target: Path) -> None:
+    """Finished stages of the first run are there for the others: each knows by its hash whether it
+    belongs to a scene, and a changed friction coefficient needs no new mesh.
+    """
+    from ..io.run_folder import borrow_stages
+
+    borrow_stages(source, target)

@@ -65,6 +65,12 @@ class Body:
     # "stress" or "strain", for plane meshes
     plane: str
     comm: MPI.Comm
+    # face or node set that a clamp named "clamp" stands for; "" for none
+    hold: str = "clamp"
+    # [N/m] springs to the ground, in K already
+    spring: PETSc.Mat | None = None
+    # face or node set, and the letters of the displacements held on it
+    directions: tuple[tuple[str, str], ...] = ()
 
     @property
     def scalar_rows(self) -> np.ndarray:

@@ -25,6 +25,7 @@ from .body import Body
 from .compat import PETSc
 from .linalg import Doubled, Folded, Matrix, combined
 from .ordering import interior_first
+from .supports import held_directions
 
 __all__ = [
     "Constrained",
@@ -206,7 +207,8 @@ def in_step(body: Body, clamp: str | None = "clamp") -> Constrained:
 
 def clamped_nodes(body: Body, clamp: str | None) -> np.ndarray:
     """Node numbers of a face or node set that belong to the body."""
-    if clamp is None:
+    clamp = body.hold if clamp == "clamp" else clamp
+    if not clamp:
         return np.empty(0, int)
     known = {**body.mesh.faces, **body.mesh.nodes}
     if clamp not in known:
@@ -329,7 +331,29 @@ def _slid(body: Body, pair: Pair | None) -> np.ndarray:
             (f"antisymmetry_{letter}", ~across),
         ):
             held[np.ix_(_plane(body, name, axis, pair), directions)] = True
-    return held.ravel()
+    return (held | _supported(body, pair)).ravel()
+
+
+def _supported(body: Body, pair: Pair | None) -> np.ndarray:
+    """(n_points, dim) true where the supports hold a displacement.
+
+    Raises:
+        InputError: a direction that turns from sector to sector, held on a cut face.
+    """
+    held = held_directions(body, body.directions)
+    if pair is None or not held.any():
+        return held
+    both = np.concatenate([pair.nodes[0], pair.nodes[1]])
+    turning = np.abs(np.diag(pair.rotation)[: body.dim] - 1) > 1e-12
+    if held[np.ix_(both, turning)].any():
+        raise InputError(
+            "support.directions: x and y turn from sector to sector, expected faces away from the "
+            "cut faces, or z"
+        )
+    either = held[pair.nodes[0]] | held[pair.nodes[1]]
+    held[pair.nodes[0]] = either
+    held[pair.nodes[1]] = either
+    return held
 
 
 def _plane(body: Body, name: str, axis: int, pair: Pair | None) -> np.ndarray:

@@ -14,10 +14,13 @@ import numpy as np
 from scipy.linalg import qr
 
 from .body import rigid_modes
-from .constraint import Constrained, unknowns
+from .constraint import Constrained, expand, unknowns
 from .linalg import Factor, apply, dense_rows, dot, factorise, scale, solve
 
 __all__ = ["Flexibility", "compliance", "flexible", "rigid_basis", "unknown_places"]
+
+# of the mean diagonal of K over that of M: squared frequency of a motion that springs do not hold
+SOFT = 1e-12
 
 
 @dataclass(frozen=True)
@@ -81,7 +84,21 @@ def rigid_basis(con: Constrained) -> np.ndarray:
     if not basis.shape[1]:
         return basis
     gram = dot(body.comm, basis, apply(con.M, basis))
-    return basis @ np.linalg.inv(np.linalg.cholesky(gram)).conj().T
+    basis = basis @ np.linalg.inv(np.linalg.cholesky(gram)).conj().T
+    return basis if body.spring is None else _unsprung(con, basis)
+
+
+def _unsprung(con: Constrained, basis: np.ndarray) -> np.ndarray:
+    """The rigid motions (n_own, r) that springs on faces leave without force."""
+    body = con.body
+    moves = expand(con, basis).reshape(len(body.scalar_rows), -1)
+    first, last = body.spring.owner_range
+    outside = np.count_nonzero(body.scalar_rows < 0)
+    mine = np.argsort(body.scalar_rows, kind="stable")[outside:][first:last]
+    local = np.asfortranarray(moves[mine])
+    stiffness = dot(body.comm, local, apply(body.spring, local))
+    lam, Z = np.linalg.eigh((stiffness + stiffness.conj().T) / 2)
+    return basis @ Z[:, lam < SOFT * scale(con.K) / scale(con.M)]
 
 
 def unknown_places(con: Constrained) -> np.ndarray:

@@ -110,10 +110,13 @@ def linear_tangent(
     moved = ufl.inner(stress(ufl.sym(F.T * ufl.grad(v))), ufl.sym(F.T * ufl.grad(w)))
     geometric = ufl.inner(ufl.grad(v) * stress(ufl.sym(gradient)), ufl.grad(w))
     elastic, inertial = _measures(body, quadrature)
-    return assemble_matrix(
+    out = assemble_matrix(
         depth * (moved + geometric) * elastic
         - depth * rho * speed2 * ufl.inner(across * v, w) * inertial
     )
+    if body.spring is not None:
+        out.axpy(1.0, body.spring, structure=PETSc.Mat.Structure.SUBSET_NONZERO_PATTERN)
+    return out
 
 
 def preload(
@@ -141,6 +144,10 @@ def preload(
             where.
     """
     _check_speed(speed)
+    if body.spring is not None:
+        raise InputError(
+            "operation.preload = 'nonlinear' knows no support.springs, expected 'linear'"
+        )
     u = np.zeros((len(body.mesh.points), body.dim))
     if speed == 0:
         return Preload(u, speed, 0, 0, 0.0)

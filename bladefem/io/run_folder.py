@@ -17,7 +17,7 @@ from ..scene.tables import Scene
 from ..scene.toml import dump, load_scene
 from .stage_cache import open_folder, write_text
 
-__all__ = ["EARLIER", "given_fields", "keep_given", "locked", "take_folder"]
+__all__ = ["EARLIER", "borrow_stages", "given_fields", "keep_given", "locked", "take_folder"]
 
 EARLIER = "earlier"
 # names of the fields that the user gave, beside the scene with all its values
@@ -73,6 +73,22 @@ def take_folder(folder: str | Path, scene: Scene) -> str:
     said = _put_away(folder) if file.is_file() and not _holds(file, scene) else ""
     write_text(file, dump(scene))
     return said
+
+
+def borrow_stages(source: str | Path, target: str | Path) -> None:
+    """Link the stored stages of one run folder into another that has none of these names.
+
+    Links cost no space; a stage that does not belong to the other scene is computed again and
+    replaces its link there.
+    """
+    to = open_folder(Path(target) / "stages")
+    for stage in (Path(source) / "stages").glob("*.npz"):
+        if not (to / stage.name).exists():
+            try:
+                os.link(stage, to / stage.name)
+            except OSError:
+                # a file system without links
+                shutil.copyfile(stage, to / stage.name)
 
 
 def keep_given(folder: str | Path, names: Iterable[str]) -> None:

@@ -37,6 +37,7 @@ __all__ = [
     "Seat",
     "Solver",
     "Study",
+    "Support",
 ]
 
 
@@ -315,6 +316,25 @@ class Model:
 
 
 @dataclass(frozen=True)
+class Support:
+    """How the blade or sector is held."""
+
+    clamp: str = quantity(
+        "clamp", help="face or node set that is held fast; '' for none: free, or on springs"
+    )
+    springs: tuple[str, ...] | None = quantity(
+        None,
+        help="springs to the ground for each unit of area of faces, such as "
+        "'root: normal=1e12 N/m^3; tangential=5e11 N/m^3'",
+    )
+    directions: tuple[str, ...] | None = quantity(
+        None,
+        help="single displacements that are zero on faces or node sets, such as 'rim: z' or "
+        "'foot: xy' (x radial, y circumferential at the middle of the sector, z axial)",
+    )
+
+
+@dataclass(frozen=True)
 class Solver:
     """How eigenvalue problems are solved."""
 
@@ -444,3 +464,4 @@ class Scene:
     mistuning: Mistuning = field(default_factory=Mistuning)
     model: Model = field(default_factory=Model)
     solver: Solver = field(default_factory=Solver)
+    support: Support = field(default_factory=Support)

@@ -15,6 +15,7 @@ from ..errors import InputError
 from .fields import convert, each_field, value_at
 from .kinds import kind_named
 from .kinds.conditions import at_most
+from .support import area_springs, held_letters
 from .tables import Scene
 from .units import show
 from .validate_contact import contact_problems
@@ -40,6 +41,7 @@ def validate(scene: Scene) -> None:
     problems = [
         *kind.conditions(scene),
         *_crystals(scene),
+        *_supports(scene),
         *_numerics(scene),
         *contact_problems(scene),
     ]
@@ -51,6 +53,20 @@ def validate(scene: Scene) -> None:
     if problems:
         raise InputError(problems[0])
     check_parameters(scene)
+
+
+def _supports(scene: Scene) -> Iterator[str]:
+    """Their texts can be read, and a nonlinear preload knows of clamps alone."""
+    springs = list(area_springs(scene.support))
+    held_letters(scene.support)
+    if springs and scene.operation.preload == "nonlinear":
+        yield "operation.preload = 'nonlinear' knows no support.springs, expected 'linear'"
+    free = not (scene.support.clamp or springs or scene.support.directions)
+    if free and scene.operation.stiffening and scene.operation.speed > 0:
+        yield (
+            "support.clamp = '': a free body has no steady place under rotation (its in-plane "
+            "motions are unstable there), expected operation.stiffening = false"
+        )
 
 
 def _crystals(scene: Scene) -> Iterator[str]:

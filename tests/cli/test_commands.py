@@ -33,6 +33,7 @@ def fake_curve(load, amplitude):
         peak=peak,
         settings=SimpleNamespace(error=0.013, harmonics=3),
         halved=np.nan,
+        interval=None,
         peak_frequency=830.0,
         peak_amplitude=amplitude,
         frequency=np.arange(5.0),

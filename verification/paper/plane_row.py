@@ -14,7 +14,6 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
-from bladefem.study.pipeline.keys import contact_key
 
 from bladefem.contact.interface_elements import friction_elements, pair_ratio
 from bladefem.contact.seating import ContactProblem, solve
@@ -26,6 +25,7 @@ from bladefem.reduction.assemble import recombine
 from bladefem.scene.tables import Scene
 from bladefem.scene.toml import vary
 from bladefem.study.pipeline.assemble_model import LoadCase, joint_model
+from bladefem.study.pipeline.stage_inputs import stage_key
 from bladefem.study.pipeline.stages import (
     Bodies,
     Reduced,
@@ -69,7 +69,7 @@ def row_of_blades(scene: Scene, modes: int = 8, folder: Any = None, comm: Any = 
             condense_contact(bodies, patches), reduce_sector(bodies, patches, [0], modes), mesh
         )
 
-    return stage(folder, "row", contact_key(scene) + f"-{modes}", compute, comm)[0]
+    return stage(folder, "row", stage_key("contact", scene, modes), compute, comm)[0]
 
 
 def paper_model(

@@ -14,7 +14,7 @@ __all__ = ["COMMON_TABLES", "ENGINE_TABLES", "Kind", "load_function", "no_condit
 # tables that every kind reads
 COMMON_TABLES = ("mesh", "material", "contact", "study", "model")
 # tables of the kinds that vibrate in an engine
-ENGINE_TABLES = (*COMMON_TABLES, "operation", "excitation", "solver")
+ENGINE_TABLES = (*COMMON_TABLES, "operation", "excitation", "solver", "support")
 
 
 def no_conditions(_: Scene) -> Iterator[str]:

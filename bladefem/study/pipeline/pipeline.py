@@ -589,8 +589,9 @@ def check_blade(scene: Scene, mesh: Mesh) -> None:
             f"kind '{scene.kind}' has no blade to vibrate: 'bladefem run' computes its "
             f"{kind.result}, 'bladefem mesh' draws it"
         )
-    if "clamp" not in mesh.faces:
+    clamp = scene.support.clamp
+    if clamp and clamp not in (*mesh.faces, *mesh.nodes):
         raise InputError(
-            "the mesh has no face 'clamp' to hold the blade; it has "
-            f"{', '.join(sorted(mesh.faces))}"
+            f"the mesh has no face or node set '{clamp}' to hold the blade; it has "
+            f"{', '.join(sorted((*mesh.faces, *mesh.nodes)))}"
         )

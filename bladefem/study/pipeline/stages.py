@@ -21,6 +21,7 @@ from ...reduction.assemble import folded_diameter
 from ...scene.fields import value_at
 from ...scene.kinds import kind_named
 from ...scene.part_materials import part_materials
+from ...scene.support import area_springs, held_letters
 from ...scene.tables import Material, Scene
 from ...util.progress import Progress, unwatched
 from .ports import blade_ports, damper_ports
@@ -70,9 +71,13 @@ class Bodies:
     def still_blade(self) -> Any:
         """fem.body.Body of the blade at rest."""
         from ...fem.body import assemble
+        from ...fem.supports import AreaSpring, supported
 
         mesh, materials = blade_parts(self.scene, self.mesh)
-        return assemble(mesh, tuple(materials), materials, self.comm)
+        body = assemble(mesh, tuple(materials), materials, self.comm)
+        support = self.scene.support
+        springs = [AreaSpring(*spring) for spring in area_springs(support)]
+        return supported(body, support.clamp, springs, held_letters(support))
 
     @cached_property
     def blade(self) -> Any:
@@ -174,6 +179,11 @@ def build_mesh(scene: Scene, comm: Any = None) -> Mesh:
 
     Raises:
         InputError: a parameter has to change; the message names it.
+
+    >>> import bladefem
+    >>> mesh = bladefem.build_mesh(bladefem.load_scene("scenes/plane.toml", ["mesh.size=8 mm"]))
+    >>> mesh.cell_type, sorted(mesh.bodies)
+    ('triangle6', ['blade', 'damper'])
     """
 
     def draw() -> Mesh:
@@ -214,6 +224,13 @@ def find_modes(
         diameters: nodal diameters; ``scene.model.nodal_diameters``, or all that the first harmonics
             of the engine order fall into, when left out.
         count: modes of each nodal diameter.
+
+    >>> import bladefem
+    >>> scene = bladefem.load_scene("scenes/plane.toml", ["mesh.size=8 mm"])
+    >>> bodies = bladefem.Bodies(scene, bladefem.build_mesh(scene))
+    >>> (modes,) = bladefem.find_modes(bodies, count=2)
+    >>> [f"{f / 1000:.1f} kHz" for f in modes.frequencies]
+    ['0.2 kHz', '1.1 kHz']
     """
     from ...fem.modes import modes
 

@@ -1,0 +1,107 @@
+"""Studies of two fields and of scattered inputs: a map, and a band over the loads."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+
+import numpy as np
+import pandas as pd
+
+from .style import COLOURS, canvas, log_axis
+
+__all__ = ["draw_band", "draw_map"]
+
+MICRO = 1e6
+# luminance below which white letters are read better
+DARK = 0.5
+
+
+def draw_map(
+    amplitude: np.ndarray,
+    load: np.ndarray,
+    labels: tuple[Sequence[str], Sequence[str]],
+    names: tuple[str, str],
+    file: str | Path | None = None,
+) -> object:
+    """Resonance amplitude at the best load over two fields, each field of the map with its numbers;
+    returns the figure.
+
+    Args:
+        amplitude: (rows, columns) smallest resonance amplitude [m], NaN where not solved.
+        load: (rows, columns) load of a seat there [N].
+        labels: values of rows and columns.
+        names: of the fields along rows and columns.
+        file: PNG to write.
+    """
+    rows, columns = amplitude.shape
+    with canvas(file, size=(2.2 + 1.1 * columns, 1.7 + 0.75 * rows)) as ax:
+        image = ax.imshow(MICRO * amplitude, origin="lower", aspect="auto", cmap="viridis_r")
+        ax.set_xticks(range(columns), labels[1])
+        ax.set_yticks(range(rows), labels[0])
+        ax.set(xlabel=names[1], ylabel=names[0], title="resonance amplitude at the best load")
+        ax.grid(False)
+        best = np.nanargmin(amplitude) if np.isfinite(amplitude).any() else -1
+        for number, (value, at) in enumerate(zip(amplitude.flat, load.flat, strict=True)):
+            shown = f"{MICRO * value:.4g} µm\n{at:.4g} N" if np.isfinite(value) else "not solved"
+            red, green, blue, _ = image.cmap(image.norm(MICRO * value))
+            dark = 0.3 * red + 0.59 * green + 0.11 * blue < DARK
+            ax.text(
+                number % columns,
+                number // columns,
+                shown,
+                ha="center",
+                va="center",
+                fontsize=8,
+                fontweight="bold" if number == best else "normal",
+                color="white" if dark and np.isfinite(value) else "black",
+            )
+        ax.figure.colorbar(image, ax=ax, label="resonance amplitude [µm]")
+        return ax.figure
+
+
+def draw_band(loads: pd.DataFrame, file: str | Path | None = None, *, title: str = "") -> object:
+    """Resonance amplitude over load with its scatter: all samples, the middle 80 %, the median;
+    returns the figure.
+
+    Args:
+        loads: one row a load of each sample: value, load [N], peak_amplitude [m]; load 0 is the
+            blade without damper.
+        file: PNG to write.
+        title: headline.
+    """
+    damped = loads[(loads["load"] > 0) & np.isfinite(loads["load"])]
+    amplitude = MICRO * damped.pivot_table(
+        index="load", columns="value", values="peak_amplitude", sort=True
+    )
+    quantiles = amplitude.quantile([0.1, 0.5, 0.9], axis=1).T
+    with canvas(file) as ax:
+        ax.fill_between(
+            amplitude.index,
+            amplitude.min(axis=1),
+            amplitude.max(axis=1),
+            color=COLOURS[0],
+            alpha=0.15,
+            label=f"all {amplitude.shape[1]} samples",
+        )
+        ax.fill_between(
+            amplitude.index,
+            quantiles[0.1],
+            quantiles[0.9],
+            color=COLOURS[0],
+            alpha=0.35,
+            label="80 % of them",
+        )
+        ax.plot(amplitude.index, quantiles[0.5], "o-", color=COLOURS[0], label="median")
+        free = MICRO * loads.loc[loads["load"] == 0, "peak_amplitude"]
+        if len(free):
+            ax.axhspan(free.min(), free.max(), color="#777777", alpha=0.3, label="no damper")
+        ax.set(
+            xlabel="normal load per seat [N]",
+            ylabel="resonance amplitude [µm]",
+            title=title or "scatter of inputs",
+        )
+        log_axis(ax, "x")
+        log_axis(ax, "y")
+        ax.legend()
+        return ax.figure

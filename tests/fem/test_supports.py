@@ -1,0 +1,107 @@
+"""Springs on faces, single directions, free bodies: closed forms and limits."""
+
+import numpy as np
+import pytest
+from structured import box, sector
+
+from bladefem.errors import InputError
+from bladefem.fem.all_diameters import all_diameters
+from bladefem.fem.body import assemble
+from bladefem.fem.constraint import constrain, transformation
+from bladefem.fem.modes import modes
+from bladefem.fem.rotation import preload, spinning
+from bladefem.fem.supports import AreaSpring, supported
+from bladefem.scene.support import area_springs, held_letters
+from bladefem.scene.tables import Material, Support
+from bladefem.scene.toml import scene_of
+
+SIZE = (0.04, 0.02, 0.03)
+STEEL = Material()
+
+
+@pytest.fixture(scope="module")
+def bar():
+    return assemble(box((4, 2, 2), SIZE, "tetra10"), "blade", STEEL)
+
+
+def test_a_stiff_block_bounces_on_its_springs(bar):
+    """Along the normal of the face: omega^2 = kn A / m; the five other motions are near zero."""
+    normal = 1e9
+    body = supported(bar, "", [AreaSpring("x0", normal, 0.0)])
+    found = 2 * np.pi * modes(constrain(body), 6).frequencies
+    mass = STEEL.rho * np.prod(SIZE)
+    bounce = np.sqrt(normal * SIZE[1] * SIZE[2] / mass)
+    assert abs(found / bounce - 1).min() < 1e-3
+
+
+def test_stiff_springs_are_a_clamp(bar):
+    """From below, and the nearer the stiffer."""
+    clamped = modes(constrain(bar), 3).frequencies
+    errors = []
+    for stiffness in (1e15, 1e17):
+        body = supported(bar, "", [AreaSpring("clamp", stiffness, stiffness)])
+        found = modes(constrain(body), 3).frequencies
+        errors.append((1 - found / clamped).max())
+        assert (found < clamped * (1 + 1e-9)).all()
+    assert errors[1] < 0.02 * errors[0] and errors[1] < 1e-3
+
+
+def test_three_directions_are_a_clamp(bar):
+    held = modes(constrain(supported(bar, "", directions=[("x0", "xyz")])), 4).frequencies
+    np.testing.assert_allclose(held, modes(constrain(bar), 4).frequencies, rtol=1e-10)
+
+
+def test_one_direction_leaves_the_others(bar):
+    """A bar on rollers: two translations and one rotation stay rigid."""
+    found = modes(constrain(supported(bar, "", directions=[("x0", "x")])), 6).frequencies
+    assert np.count_nonzero(found == 0) == 3
+
+
+@pytest.mark.parametrize("n, rigid", [(0, 2), (1, 4), (2, 0)])
+def test_a_free_wheel(n, rigid):
+    """Axial shift and turn in nodal diameter 0; two shifts and two tilts, as waves, in 1."""
+    body = supported(assemble(sector(9, (3, 2, 1), bump=0.2), "blade", STEEL), "")
+    found = all_diameters(body, 6, [n])[0].frequencies
+    # of a wave, one vector stands for both directions
+    assert np.count_nonzero(found == 0) == (rigid if n == 0 else rigid // 2)
+
+
+def test_an_elastic_root_under_rotation(bar):
+    """Springs stay in the stiffness under rotation, and lower what a clamp gives."""
+    springs = [AreaSpring("clamp", 1e13, 1e13)]
+    body = supported(bar, "", springs)
+    still, turning = (
+        modes(constrain(some), 2).frequencies for some in (body, spinning(body, 500.0, linear=True))
+    )
+    clamped = modes(constrain(spinning(bar, 500.0, linear=True)), 2).frequencies
+    assert (turning < clamped).all() and abs(turning / still - 1).max() < 0.05
+    with pytest.raises(InputError, match="nonlinear"):
+        preload(body, 500.0)
+
+
+def test_what_turns_with_the_sector_is_not_held_on_its_cut():
+    body = assemble(sector(9, (3, 2, 1)), "blade", STEEL)
+    with pytest.raises(InputError, match="turn from sector to sector"):
+        transformation(supported(body, "", directions=[("z0", "x")]), "clamp", True)
+    assert transformation(supported(body, "", directions=[("z0", "z")]), "clamp", True)
+
+
+def test_texts():
+    support = Support(springs=("root: normal=2 N/mm^3; tangential=1e9",), directions=("rim: y, z",))
+    assert list(area_springs(support)) == [("root", 2e9, 1e9)]
+    assert held_letters(support) == [("rim", "yz")]
+    for bad in ("root", "root: normal=-1", "root: stiff=1"):
+        with pytest.raises(InputError, match=r"support\.springs"):
+            list(area_springs(Support(springs=(bad,))))
+    with pytest.raises(InputError, match=r"support\.directions"):
+        held_letters(Support(directions=("rim: w",)))
+    body = assemble(box((1, 1, 1), SIZE), "blade", STEEL)
+    with pytest.raises(InputError, match="no face 'clmap'.*did you mean 'clamp'"):
+        supported(body, "", [AreaSpring("clmap", 1.0, 1.0)])
+
+
+def test_a_free_body_under_rotation_is_refused():
+    tables = {"kind": "wedge sector", "support": {"clamp": ""}}
+    with pytest.raises(InputError, match=r"expected operation\.stiffening = false"):
+        scene_of(tables)
+    assert scene_of(tables | {"operation": {"stiffening": False}}).support.clamp == ""
