@@ -22,9 +22,7 @@ from bladefem.time.shooting import periodic_solution, probe_harmonics
 DAMPER = RigidBody(np.array([[0.5]]), np.ones((1, 1)))
 # both contacts slip and forget the static friction forces, which the preload state balances
 WEDGE = wedge_between_masses(30.0)
-STATIC_FRICTION = replace(
-    WEDGE, elements=replace(WEDGE.elements, t0=np.array([[30.0], [-20.0]]))
-)
+STATIC_FRICTION = replace(WEDGE, elements=replace(WEDGE.elements, t0=np.array([[30.0], [-20.0]])))
 SWELLING = replace(single_mass(), normal={1: np.array([0.3]), 2: np.array([0.1 - 0.2j])})
 
 
