@@ -203,9 +203,8 @@ class MeshSize:
         "1",
         2,
         64,
-        "elements across the width of a wedge's seats, which are "
-        "then a grid with contact_size, or a sixth of the length, along them; free "
-        "triangles when left out",
+        "elements across the width of a wedge's seats, a grid with contact_size, or a sixth of "
+        "the length, along them; 8 when left out, free triangles where contact_size alone is given",
     )
     order: int = quantity(2, "1", 1, 2, "order of the elements; 1 is only for comparison")
     algorithm: str = quantity(

@@ -55,7 +55,8 @@ def wedge_sector(
         groups = mark_tip(gmsh, groups, aerofoil, shape)
         link(gmsh, groups, shape)
         set_sizes(gmsh, shape, wedge, sizes, edge_curves(gmsh, groups))
-        if size.seat_elements:
+        # an element size on the seats without a number across asks for free triangles
+        if size.seat_elements or size.contact_size is None:
             set_grids(gmsh, [groups.faces[name][0] for name in SEATS], wedge, size)
         with attempt("mesh.size", "mesh this geometry"):
             mesh = mesh_model(gmsh, groups, 3, size)

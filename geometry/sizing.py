@@ -20,6 +20,7 @@ __all__ = ["Sizes", "blade_volume", "sector_sizes", "set_grids", "set_sizes"]
 # element along the leading edge over those of the aerofoil
 NOSE = 0.6
 # elements along a seat at least
+ACROSS = 8
 ALONG = 6
 # cells above the rim at the finest, when the size is left open
 SOME = 40_000
@@ -134,20 +135,21 @@ def set_grids(gmsh: ModuleType, seats: list[int], wedge: Wedge, size: MeshSize) 
         InputError: a seat is no rectangle with one edge on each side.
     """
     along = max(2, round(wedge.length / (size.scale * (size.contact_size or wedge.length / ALONG))))
-    across = max(2, round(size.seat_elements / size.scale))
+    across = max(2, round((size.seat_elements or ACROSS) / size.scale))
     for seat in seats:
         edges = {abs(tag) for _, tag in gmsh.model.getBoundary([(2, seat)], oriented=False)}
         if len(edges) != 4:
             raise InputError(
-                f"mesh.seat_elements = {size.seat_elements}: a seat has {len(edges)} edges, "
-                "expected 4; "
-                "leave it out for free triangles"
+                f"mesh.seat_elements = {size.seat_elements or ACROSS}: a seat has {len(edges)} "
+                "edges, expected 4; give mesh.contact_size alone for free triangles"
             )
         for edge in edges:
             _, _, low, _, _, high = gmsh.model.getBoundingBox(1, edge)
             count = along if high - low > wedge.length / 2 else across
             gmsh.model.mesh.setTransfiniteCurve(edge, count + 1)
-        gmsh.model.mesh.setTransfiniteSurface(seat, "AlternateLeft")
+        # One direction of all diagonals: hat functions of inner nodes then have equal areas, where
+        # alternating ones give 1:2, which the pressure of rigid faces follows.
+        gmsh.model.mesh.setTransfiniteSurface(seat, "Left")
 
 
 def _box(

@@ -50,7 +50,7 @@ def draw_wheel_motion(
     angle = 2 * np.pi * np.arange(count) / count
     with canvas(file, size=(6.0, 5.4), subplot_kw={"projection": "polar"}) as ax:
         inner = 0.5 * amplitude.max()
-        bars = ax.bar(
+        ax.bar(
             angle,
             1e6 * amplitude,
             width=0.8 * 2 * np.pi / count,
@@ -65,7 +65,8 @@ def draw_wheel_motion(
         ax.set_yticks(1e6 * (inner + marks))
         ax.set_yticklabels([f"{1e6 * m:.3g} µm" for m in marks])
         ax.figure.text(0.02, 0.02, "length: amplitude; colour: phase", fontsize=8)
-        ax.bar_label(bars, [""] * count)
+        # between two blades
+        ax.set_rlabel_position(180 / count * (1 + 2 * (count // 8)))
 
 
 def draw_bands(

@@ -18,7 +18,7 @@ PINNED = {
     "blade_modes": 347.115898,
     "sector_modes": 372.39525292,
     "damper_seating": 1.0,
-    "forced_response": 171.68597325,
+    "forced_response": 174.78048614,
     "change_geometry": 1.2595481622,
     "plain_matrices": 3.84332830,
     "own_blade": 12.99114303,

@@ -157,6 +157,7 @@ def test_middle_nodes_of_the_seats_are_exactly_in_the_middle(coarse_sector):
 @pytest.mark.parametrize(
     ("given", "across", "along"),
     [
+        ({"seat_elements": None}, 8, 6),
         ({"seat_elements": 8}, 8, 6),
         ({"seat_elements": 5, "contact_size": 5e-3}, 5, 8),
         ({"seat_elements": 8, "scale": 2.0}, 4, 3),
@@ -186,6 +187,13 @@ def test_seats_in_a_grid_have_equal_elements_across_and_along(given, across, alo
         assert len(places) == len(grid)
         np.testing.assert_allclose(sorted(map(tuple, np.round(places, 9))), grid, atol=2e-9)
     assert mesh.pairs["this"].nodes.shape == mesh.pairs["next"].nodes.shape
+    cells = mesh.points[mesh.faces["seat_right"][:, :3]]
+    parts = np.linalg.norm(np.cross(cells[:, 1] - cells[:, 0], cells[:, 2] - cells[:, 0]), axis=1)
+    corners = mesh.faces["seat_right"][:, :3]
+    area = np.bincount(corners.ravel(), np.repeat(parts / 6, 3))[np.unique(corners)]
+    # inner nodes stand for one cell each, whatever the diagonals' direction
+    inner = np.isclose(area, length * width / across / along, rtol=1e-6)
+    assert inner.sum() == (across - 1) * (along - 1)
 
 
 def test_tip_nodes_stand_on_the_section_whatever_the_mesh(coarse_sector):

@@ -15,13 +15,14 @@ import pandas as pd
 
 from geometry.mesh import Mesh
 from geometry.parameters import MeshSize
-from geometry.sizing import ALONG
+from geometry.sizing import ACROSS, ALONG
 
 from ...contact.frictional_seating import normal_part
 from ...contact.seating import solve as seat
 from ...errors import NotSolvedError
 from ...hbm.sweep import size as height
 from ...io.stage_cache import on_root
+from ...scene.kinds import kind_named
 from ...scene.tables import Scene
 from ...scene.validate import refuse_given_mesh
 from ..adaptive.check_points import peak_of
@@ -120,11 +121,12 @@ def mesh_variants(scene: Scene, sizes: Sequence[float], drawn: Mesh) -> list[Mes
         for name, ratio, mesh in listed
     ]
     if not sizes:
-        if own.seat_elements:
+        across = own.seat_elements
+        if across is None and own.contact_size is None and kind_named(scene.kind).has_seat_grid:
+            across = ACROSS
+        if across:
             along = own.contact_size or scene.damper.length / ALONG
-            halved = replace(
-                own, order=2, seat_elements=2 * own.seat_elements, contact_size=along / 2
-            )
+            halved = replace(own, order=2, seat_elements=2 * across, contact_size=along / 2)
         else:
             halved = replace(own, order=2, contact_size=_seat_size(drawn) / (2 * own.scale))
         made.append(MeshVariant("own size, seats halved", halved, 2, 2.0 ** (power - 1), False))

@@ -1,0 +1,99 @@
+"""Time, memory and unknowns of one point of a mistuned wheel, from 6 to 36 sectors and 8 to 126
+contact nodes on each damper.
+
+    python benchmarks/wheel.py [sectors ...] [--nodes 8 32 126] [--harmonics 1 3]
+
+The sectors are random elastic bodies on a rigid damper of six motions, many of whose contacts slip;
+CPU times include the parts that are made once a wheel.
+"""
+
+from __future__ import annotations
+
+import argparse
+import resource
+import time
+
+import numpy as np
+
+from bladefem.data import Elements, RigidBody
+from bladefem.hbm.model import Damping
+from bladefem.reduction.matrices import port_model_from_matrices
+from bladefem.wheel.model import Pattern, Wheel, engine_order, tuned_wheel
+from bladefem.wheel.solve import solve_wheel
+
+MODES = 20
+
+
+def random_wheel(count: int, nodes: int, seed: int = 0) -> Wheel:
+    """A wheel whose sectors couple through one row of their matrices."""
+    rng = np.random.default_rng(seed)
+    dofs = 3 * nodes + 4
+    half = rng.normal(size=(dofs, dofs)) / np.sqrt(dofs)
+    own = half @ half.T + 0.3 * np.eye(dofs)
+    link = np.zeros((dofs, dofs))
+    link[-1, -2] = -0.02
+    ports = {
+        "contact": np.arange(3 * nodes),
+        "blade": np.array([dofs - 1, dofs - 2]),
+        "load": np.array([dofs - 1]),
+        "probe": np.array([dofs - 1]),
+    }
+    sectors = {}
+    for d in range(count // 2 + 1):
+        turn = np.exp(2j * np.pi * d / count)
+        K = own + link * turn + link.T * turn.conj()
+        K = K.real if 2 * d % count == 0 else K
+        sectors[d] = port_model_from_matrices(np.eye(dofs), K, ports, count=MODES)
+    share = 1.0 / nodes
+    elements = Elements(
+        np.full(nodes, 4 * share),
+        np.full(nodes, 4 * share),
+        np.full(nodes, 0.3),
+        share * rng.uniform(0.5, 1.5, nodes),
+    )
+    damper = RigidBody(np.diag(rng.uniform(2.0, 4.0, 6)), rng.normal(size=(3 * nodes, 6)))
+    excitation = {1: engine_order(count, 2, np.array([0.5]))}
+    following = slice(3 * (nodes // 2), 3 * nodes)
+    return tuned_wheel(
+        count,
+        sectors,
+        following,
+        elements,
+        excitation,
+        damping=Damping(ratio=0.005),
+        damper=damper,
+        coupled=False,
+    )
+
+
+def main() -> None:
+    arguments = argparse.ArgumentParser(description=__doc__)
+    arguments.add_argument("sectors", nargs="*", type=int, default=[6, 12, 36])
+    arguments.add_argument("--nodes", nargs="*", type=int, default=[8, 32, 126])
+    arguments.add_argument("--harmonics", nargs="*", type=int, default=[1, 3])
+    options = arguments.parse_args()
+    print(
+        "sectors nodes harmonics unknowns  CPU [s]  Newton  products  slipping  converged  memory [MB]"
+    )
+    for count in options.sectors:
+        for nodes in options.nodes:
+            wheel = random_wheel(count, nodes)
+            omega = 1.001 * float(wheel.sectors[min(2, count // 2)].omega[0])
+            rng = np.random.default_rng(1)
+            change = 0.01 * rng.normal(size=(count, 1, 1)) * np.eye(2)
+            for H in options.harmonics:
+                start = time.process_time()
+                point = solve_wheel(wheel, omega, H, 64, pattern=Pattern(change))
+                seconds = time.process_time() - start
+                slipping = 100 * (point.shares[..., 1] > 0).mean()
+                memory = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024
+                print(
+                    f"{count:7d} {nodes:5d} {H:9d} {point.w.size:8d} {seconds:8.2f} "
+                    f"{point.iterations:7d} {point.products:9d} {slipping:8.0f} %"
+                    f" {point.converged!s:>9} {memory:12.0f}",
+                    flush=True,
+                )
+
+
+if __name__ == "__main__":
+    main()

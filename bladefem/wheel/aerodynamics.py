@@ -1,0 +1,90 @@
+"""Aerodynamic influence between blades: damping and frequency shift of each nodal diameter, flutter,
+and the limit cycle that friction leaves.
+
+A blade mode of mass 1 in nodal diameter d feels -c_d q, c_d a complex stiffness [1/s^2]: its real
+part shifts the squared frequency, its imaginary part over 2 omega^2 is a damping ratio, negative
+where the flow feeds the motion. Influence coefficients L_k are the forces on a blade by the motion
+of the blade k places ahead: c_d = sum_k L_k e^{j 2 pi d k / N}.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from ..errors import InputError
+from ..hbm.nonlinear_modes import NonlinearMode
+
+__all__ = ["LimitCycle", "aerodynamic_damping", "influence_of_distance", "limit_cycles"]
+
+
+@dataclass(frozen=True)
+class LimitCycle:
+    """A free motion that neither grows nor decays."""
+
+    # of the mode [m kg^1/2]
+    amplitude: float
+    # [rad/s]
+    omega: float
+    # larger motions decay and smaller ones grow
+    stable: bool
+
+
+def influence_of_distance(
+    count: int, modes: int, mode: int, coefficients: Mapping[int, complex]
+) -> np.ndarray:
+    """(N, modes) `Wheel.influence` from influence coefficients of one mode.
+
+    Args:
+        coefficients: places ahead (0: the blade itself, -1: the one before) to complex stiffness
+            [1/s^2].
+
+    Raises:
+        InputError: a distance that the wheel does not have.
+    """
+    if not 0 <= mode < modes:
+        raise InputError(f"mode {mode}: expected a number from 0 to {modes - 1}")
+    d = np.arange(count)
+    found = np.zeros((count, modes), dtype=complex)
+    for distance, value in coefficients.items():
+        if int(distance) != distance or 2 * abs(distance) > count:
+            raise InputError(f"distance {distance}: expected whole places, at most half the wheel")
+        found[:, mode] += value * np.exp(2j * np.pi * d * distance / count)
+    return found
+
+
+def aerodynamic_damping(influence: np.ndarray, omega: np.ndarray) -> np.ndarray:
+    """(N, modes) damping ratios by aerodynamic stiffnesses of modes with frequencies omega."""
+    return influence.imag / (2 * omega**2)
+
+
+def limit_cycles(points: Sequence[NonlinearMode], damping: float) -> list[LimitCycle]:
+    """Amplitudes at which friction's damping balances what else there is, between the points.
+
+    Args:
+        points: of one nonlinear mode, ascending in amplitude.
+        damping: share of critical damping of bodies and flow together, negative for flutter.
+
+    Raises:
+        InputError: friction cannot hold the motion at any of the amplitudes: flutter.
+    """
+    known = [p for p in points if p.converged]
+    total = np.array([p.zeta for p in known]) + damping
+    if len(known) < 2:
+        raise InputError(f"points: {len(known)} converged amplitudes, expected at least 2")
+    if (total < 0).all():
+        raise InputError(
+            f"aerodynamic damping {100 * damping:.3g} %: flutter, friction holds "
+            f"{100 * max(p.zeta for p in known):.3g} % at most, expected less negative damping"
+        )
+    found = []
+    for i in np.flatnonzero(np.sign(total[1:]) != np.sign(total[:-1])):
+        share = total[i] / (total[i] - total[i + 1])
+        a, b = known[i], known[i + 1]
+        # straight in the logarithm of the amplitude
+        amplitude = a.amplitude * (b.amplitude / a.amplitude) ** share
+        omega = a.omega + share * (b.omega - a.omega)
+        found.append(LimitCycle(float(amplitude), float(omega), bool(total[i + 1] > total[i])))
+    return found

@@ -1,0 +1,103 @@
+"""Aerodynamic influence against dense matrices; limit cycles in closed form and marched in time."""
+
+from math import acos, pi, sin
+
+import numpy as np
+import pytest
+from models import single_mass
+from rings import BLADE, EO, LINK, LOAD, MASS, OWN, PROBE, N, elements, forces, ring_wheel
+from scipy import linalg, optimize
+
+from bladefem.errors import InputError
+from bladefem.hbm.model import Damping
+from bladefem.hbm.nonlinear_modes import nonlinear_mode
+from bladefem.wheel.aerodynamics import (
+    aerodynamic_damping,
+    influence_of_distance,
+    limit_cycles,
+)
+from bladefem.wheel.model import Pattern, engine_order
+from bladefem.wheel.solve import free_wheel
+
+
+def test_influence_of_neighbours_is_that_of_dense_matrices():
+    """Forces on the first mode of each sector by itself and its neighbours, blades mistuned."""
+    coefficients = {0: 0.3 + 0.2j, 1: -0.1 + 0.05j, -1: 0.04 - 0.12j}
+    influence = influence_of_distance(N, 3, 0, coefficients)
+    damping = Damping(mass=0.02)
+    wheel = ring_wheel(elements(2, 0.0), None, forces({1: 1.0}), damping, influence=influence)
+    dK = 0.2 * np.random.default_rng(0).normal(size=(N, 1, 1)) * np.eye(2)
+    following = np.roll(np.eye(N), 1, axis=1)
+    K = np.kron(np.eye(N), OWN) + np.kron(following, LINK) + np.kron(following.T, LINK.T)
+    K = K.astype(complex)
+    M = np.kron(np.eye(N), MASS)
+    # c_d M phi_d phi_d^H M in every nodal diameter, of the tuned sector's first mode
+    for d in range(N):
+        turn = np.exp(2j * np.pi * d / N)
+        own = OWN + turn * LINK + turn.conj() * LINK.T
+        shape = linalg.eigh(own, MASS)[1][:, 0]
+        wave = np.kron(turn ** np.arange(N), MASS @ shape) / np.sqrt(N)
+        K += influence[d, 0] * np.outer(wave, wave.conj())
+    for b in range(N):
+        part = slice(3 * b, 3 * b + 3)
+        K[part, part] += BLADE.T @ dK[b] @ BLADE
+    omega = 2.2
+    F = np.kron(np.eye(N), LOAD.T) @ engine_order(N, EO, np.array([1.0]))[:, 0]
+    expected = np.kron(np.eye(N), PROBE) @ np.linalg.solve(K - omega**2 * M + 0.02j * omega * M, F)
+    found = free_wheel(wheel, omega, 1, Pattern(dK))[:, 1, 0]
+    np.testing.assert_allclose(found, expected, atol=1e-10 * abs(expected).max())
+    # forward and backward waves differ
+    ratio = aerodynamic_damping(influence, np.ones(3))[:, 0]
+    assert abs(ratio[1] - ratio[-1]) > 0.05
+
+
+def test_limit_cycle_in_closed_form():
+    """One Jenkins element on a mass: (kt / pi) sin^2 theta* = -2 zeta omega^2."""
+    kt, limit, damping = 0.4, 0.3, -0.02
+    amplitudes = limit / kt * np.geomspace(1.01, 30, 200)
+    points = list(nonlinear_mode(single_mass(kt, limit), amplitudes, H=1, samples=0))
+    cycles = limit_cycles(points, damping)
+    assert [c.stable for c in cycles] == [True, False]
+
+    def balance(a):
+        theta = acos(1 - 2 * limit / (kt * a))
+        omega2 = 1 + kt / pi * (theta - sin(2 * theta) / 2)
+        return kt / pi * sin(theta) ** 2 / (2 * omega2) + damping
+
+    largest = limit / kt * 2
+    expected = [
+        optimize.brentq(balance, 1.0001 * limit / kt, largest),
+        optimize.brentq(balance, largest, 30 * limit / kt),
+    ]
+    np.testing.assert_allclose([c.amplitude for c in cycles], expected, rtol=1e-3)
+
+
+def test_limit_cycle_marched_in_time():
+    """Self-excited motion marched until it is steady ends on the stable limit cycle."""
+    kt, limit, damping = 0.4, 0.3, -0.02
+    amplitudes = limit / kt * np.geomspace(1.01, 30, 120)
+    points = list(nonlinear_mode(single_mass(kt, limit), amplitudes, H=5, samples=0))
+    stable = next(c for c in limit_cycles(points, damping) if c.stable)
+    dt = 4e-3
+    x, v = 0.95 * stable.amplitude, 0.0
+    slider = x - limit / kt
+    rate = 2 * damping * stable.omega
+    peaks = []
+    for _ in range(60000):
+        slider = min(max(slider, x - limit / kt), x + limit / kt)
+        before = v
+        v += dt * (-rate * v - x - kt * (x - slider))
+        x += dt * v
+        if before > 0 >= v:
+            peaks.append(x)
+    assert np.ptp(peaks[-5:]) < 1e-3 * peaks[-1]
+    middle = (max(peaks[-5:]) + min(peaks[-5:])) / 2
+    assert middle == pytest.approx(stable.amplitude, rel=0.02)
+
+
+def test_flutter_is_refused_in_words():
+    points = list(nonlinear_mode(single_mass(0.4, 0.3), [1.0, 1.5, 2.0], H=1, samples=0))
+    with pytest.raises(InputError, match="flutter, friction holds .* at most"):
+        limit_cycles(points, -0.5)
+    with pytest.raises(InputError, match="distance 4: expected whole places"):
+        influence_of_distance(N, 3, 0, {4: 1.0})
