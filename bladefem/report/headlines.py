@@ -17,6 +17,10 @@ from .statements import Answer
 __all__ = ["Headline", "headlines"]
 
 
+# what an answer says in place of a number that the data cannot carry
+UNDETERMINED = "not determined"
+
+
 class Headline(NamedTuple):
     """One number on the first screen."""
 
@@ -47,7 +51,14 @@ def headlines(
     if best is not None:
         sure |= _of_search(best)
     return [
-        Headline(what, value, sure.get(_quantity(what), "no estimate"), remark)
+        Headline(
+            what,
+            value,
+            "see what to do next"
+            if value == UNDETERMINED
+            else sure.get(_quantity(what), "no estimate"),
+            remark,
+        )
         for what, value, remark in answer.numbers
     ]
 

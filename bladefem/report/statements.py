@@ -17,6 +17,8 @@ __all__ = ["Answer", "answer", "assumed_stiffness", "trust", "wrong_speed"]
 
 # of the resonance frequency: farther off, an engine order does not drive it
 APART = 0.1
+# relative difference below which a load was itself studied; own loads are rounded to four digits
+STUDIED = 1e-3
 
 
 class Answer(NamedTuple):
@@ -147,7 +149,10 @@ def own_mass(
     mass, speed, load = own[["mass", "speed", "load"]].iloc[0]
     table = finite.sort_values("load")
     there = "outside the loads studied"
-    if table["load"].iloc[0] <= load <= table["load"].iloc[-1]:
+    studied = table[np.isclose(table["load"], load, rtol=STUDIED)]
+    if len(studied):
+        there = f"resonance amplitude {1e6 * studied['peak_amplitude'].iloc[0]:.4g} µm there"
+    elif table["load"].iloc[0] <= load <= table["load"].iloc[-1]:
         between = np.interp(np.log(load), np.log(table["load"]), np.log(table["peak_amplitude"]))
         there = (
             f"resonance amplitude about {1e6 * np.exp(between):.3g} µm, between the loads studied"

@@ -15,7 +15,7 @@ from bladefem.io.run_folder import keep_given
 from bladefem.report.headlines import headlines
 from bladefem.report.next_steps import next_steps
 from bladefem.report.page_tables import page_tables, without_roundoff
-from bladefem.report.statements import answer, assumed_stiffness, trust, wrong_speed
+from bladefem.report.statements import Answer, answer, assumed_stiffness, trust, wrong_speed
 from bladefem.report.tables import readable, to_latex, to_markdown, write_tables
 from bladefem.report.write import inputs_hash, write_report
 from bladefem.scene.tables import Contact, Excitation, Operation, Scene, Seat
@@ -295,3 +295,19 @@ def test_an_assumed_contact_stiffness_is_told():
     for given in (Contact(kt_area=4e10), Contact(kn=1e7), Contact(stiffness="map"), seats):
         assert assumed_stiffness(Scene(contact=given)) == []
     assert assumed_stiffness(Scene(contact=Contact(left=Seat(kn=1e7))))
+
+
+def test_an_own_load_that_was_studied_has_its_own_amplitude():
+    """No interpolation between loads where the load itself is among them."""
+    summary = synthetic.summary()
+    own = pd.DataFrame({"mass": [0.012], "speed": [800.0], "load": [199.96]})
+    remark = next(r for what, _, r in answer(summary, None, own).numbers if "own mass" in what)
+    assert "resonance amplitude 37.04 µm there" in remark
+    assert "between the loads studied" not in remark
+
+
+def test_what_is_not_determined_has_no_bracket():
+    summary = synthetic.summary().assign(error=0.01)
+    told = Answer([("optimum normal load per seat", "not determined", "why")], [])
+    (found,) = headlines(told, summary, None)
+    assert found.uncertainty == "see what to do next"
