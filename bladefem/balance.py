@@ -31,6 +31,7 @@ _WHERE = {
     "sweep": ".hbm.sweep",
     "track_peak": ".hbm.peak",
     # parameters
+    "history_interval": ".hbm.history_interval",
     "node_gradients": ".hbm.node_gradients",
     "optimum": ".hbm.optimum",
     "sensitivities": ".hbm.sensitivity",

@@ -6,6 +6,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 import scipy.sparse as sp
@@ -19,6 +20,7 @@ from .seating import ContactProblem
 __all__ = [
     "aggregation",
     "friction_elements",
+    "gives_stiffness",
     "interface_law",
     "layer_friction",
     "layered",
@@ -26,6 +28,7 @@ __all__ = [
     "mindlin_ratio",
     "normal_stiffness",
     "pair_ratio",
+    "scaled_contact",
     "seat_contact",
     "stiffnesses",
 ]
@@ -68,13 +71,53 @@ def seat_contact(contact: Contact, patch: str) -> Contact:
     return replace(contact, **changes)
 
 
+def gives_stiffness(contact: Contact) -> bool:
+    """The scene says how stiff the layer is, on both seats."""
+    both = all(_gives(seat, "kt") or _gives(seat, "kn") for seat in (contact.left, contact.right))
+    return both or contact.stiffness == "map" or _gives(contact, "kt") or _gives(contact, "kn")
+
+
+def _gives(table: Contact | Seat, name: str) -> bool:
+    """A stiffness is given, for the whole patch or each unit of area."""
+    return getattr(table, name) is not None or getattr(table, f"{name}_area") is not None
+
+
+def scaled_contact(contact: Contact, ratio: float, kt: float = 1.0, kn: float = 1.0) -> Contact:
+    """[contact] with the tangential and the normal stiffness of all seats times factors.
+
+    What follows from the other stiffness by ``ratio`` = k_t / k_n is written out first, so that
+    one changes without the other.
+    """
+    followed = {
+        "kt": (not _gives(contact, "kt"), "kn", ratio),
+        "kn": (not _gives(contact, "kn"), "kt", 1 / ratio),
+    }
+
+    def scaled(table: Any) -> Any:
+        changes: dict[str, float] = {}
+        for name, factor in (("kt", kt), ("kn", kn)):
+            follows, other, quotient = followed[name]
+            if follows and not _gives(table, name):
+                source, factor = other, factor * quotient
+            else:
+                source = name
+            for kind in ("", "_area"):
+                value = getattr(table, f"{source}{kind}")
+                if value is not None:
+                    changes[f"{name}{kind}"] = factor * value
+        return replace(table, **changes)
+
+    whole = contact if gives_stiffness(contact) else replace(contact, kt_area=USUAL)
+    return replace(scaled(whole), left=scaled(contact.left), right=scaled(contact.right))
+
+
 def stiffnesses(
     contact: Contact, ratio: float, area: np.ndarray, mapped: np.ndarray | None = None
 ) -> tuple[np.ndarray, np.ndarray]:
     """k_t and k_n (n,) [N/m] of the points of a patch.
 
-    Each is as given, else follows from the other by ``ratio`` = k_t / k_n; without either k_t has a
-    usual value.
+    Each is as given, else follows from the other by ``ratio`` = k_t / k_n; without either k_t is
+    USUAL.
 
     Args:
         area: (n,) what each point stands for [m^2]; totals are shared by it.

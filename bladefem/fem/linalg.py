@@ -189,8 +189,13 @@ def mix(V: Block, C: np.ndarray) -> np.ndarray:
 
 
 def inertia(A: Matrix) -> int:
-    """Number of negative eigenvalues, by Sylvester's law."""
-    return factorise(A, definite=False).negative
+    """Number of negative eigenvalues, by Sylvester's law; the factors are not kept."""
+    if isinstance(A, Folded):
+        core = interior.eliminate(A.A, interior.rim_of(A.C), definite=False, keep=False)
+        return interior.negative(core, A.C)
+    doubled = isinstance(A, Doubled)
+    parts = factorise_matrix(A.matrix if doubled else A, definite=False, keep=False)
+    return parts.negative // 2 if doubled else parts.negative
 
 
 def _dot(X: np.ndarray, Y: np.ndarray) -> np.ndarray:

@@ -15,10 +15,11 @@ import numpy as np
 from ..data import ModeSet
 from ..errors import InputError, NotSolvedError
 from .constraint import Constrained, expand, restrict
+from .cyclic_schur import eliminate, negative
 from .eigensolver import Eigensolver, basis_size, krylov_schur
 from .flexibility import Flexibility, compliance, flexible
 from .lanczos import lowest
-from .linalg import apply, combined, dot, inertia, scale
+from .linalg import Folded, apply, combined, dot, inertia, scale
 
 __all__ = [
     "canonical",
@@ -205,6 +206,13 @@ def _rotation(lam: np.ndarray, images: np.ndarray) -> np.ndarray:
 
 def count_below(con: Constrained, lam: float) -> int:
     """Number of eigenvalues below lam [rad^2/s^2], by Sylvester's law of inertia."""
+    if isinstance(con.K, Folded) and con.K.core is not None:
+        # the interior in the order that serves the stiffness too
+        core = con.K.core
+        shifted = (con.K.A - lam * con.M.A).tocsr()
+        return negative(
+            eliminate(shifted, core.rim, definite=False, order=core.order, keep=False), con.K.C
+        )
     return inertia(combined(con.K, -lam, con.M))
 
 

@@ -18,7 +18,7 @@ from bladefem.friction.coulomb_2d_plain import plain_batch
 from bladefem.friction.fourier import harmonics_of
 from bladefem.friction.kernel_1d import jenkins_batch
 from bladefem.friction.law_table import groups_by_law, select_elements
-from bladefem.friction.periodic_law import periodic_forces
+from bladefem.friction.periodic_law import LawForces, periodic_forces
 from bladefem.friction.simd.kernel_2d import disc_batch
 from bladefem.friction.states import GROSS_SLIP, PARTIAL_SLIP, SEPARATED, STICK
 from bladefem.friction.trigonometric_tables import derivative_patterns, trigonometric_tables
@@ -115,7 +115,7 @@ def evaluate(
         raise InputError(f"kernel {kernel!r}: expected one of {', '.join(KERNELS_2D)}")
     load = _prescribed_load(load, n, samples)
     if elements.law is not None:
-        return _evaluate_laws(elements, w, samples, jacobian, load, cycles, precision)
+        return _evaluate_laws(elements, w, samples, jacobian, load, cycles, precision, kernel)
     tab = trigonometric_tables(harmonics_of(w), samples)
     F = np.empty((n, d, K))
     shares = np.empty((n, 3))
@@ -148,6 +148,7 @@ def _evaluate_laws(
     load: np.ndarray,
     cycles: int,
     precision: str,
+    kernel: str,
 ) -> Forces:
     """The same for elements of several laws, law after law; Coulomb's with its kernels."""
     n, d, K = w.shape
@@ -160,6 +161,7 @@ def _evaluate_laws(
     for law, rows in groups_by_law(elements):
         some = replace(select_elements(elements, rows), law=None)
         prescribed = load[rows] if load.shape[1] else None
+        part: Forces | LawForces
         if law is None:
             part = evaluate(
                 some,
@@ -169,6 +171,7 @@ def _evaluate_laws(
                 load=prescribed,
                 cycles=cycles,
                 precision=precision,
+                kernel=kernel,
             )
             used[rows] = part.cycles if part.converged else -part.cycles
         else:

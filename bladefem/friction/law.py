@@ -189,7 +189,7 @@ def slopes_of(
             moved = [x.copy() for x in args]
             part = moved[which] if column is None else moved[which][:, column]
             part += sign * step
-            ends.append(law.step(*moved, elements))
+            ends.append(law.step(moved[0], moved[1], moved[2], moved[3], elements))
         return (ends[0] - ends[1]) / (2 * np.where(step > 0, step, 1.0))[:, None]
 
     by_state = np.stack([change(0, c, push) for c in range(s)], axis=2)

@@ -352,7 +352,7 @@ def _force_slopes(
             moved = [x.copy() for x in args]
             part = moved[which] if column is None else moved[which][:, column]
             part += sign * size
-            ends.append(law.force(*moved, period.repeated))
+            ends.append(law.force(moved[0], moved[1], moved[2], period.repeated))
         slope = (ends[0] - ends[1]) / (2 * DIFFERENCE * size)[:, None]
         return np.where(closed, slope.reshape(S, n, t), 0.0)
 

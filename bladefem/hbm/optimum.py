@@ -9,6 +9,7 @@ meet, which is exact when two peaks exchange their order.
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
@@ -18,9 +19,10 @@ from .linear_resonances import free_resonances, stuck_resonances
 from .model import ReducedModel
 from .parameters import check_parameter, parameter_value, path_coordinate, vary
 from .peak import Peak, cubic_minimum, find_peak, with_slope
+from .solver.newton import DEFAULTS, Options
 from .sweep import first_look, local_maxima, response, size
 
-__all__ = ["Optimum", "optimum"]
+__all__ = ["Optimum", "Variation", "lowest_peak", "optimum"]
 
 # values of the parameter tried before giving up
 MOST_LEVELS = 30
@@ -47,16 +49,46 @@ class Optimum:
 
 
 @dataclass(frozen=True)
+class Variation:
+    """Models along one parameter, and how the height of a peak changes with it."""
+
+    # value of the parameter -> model
+    model_at: Callable[[float], ReducedModel]
+    # model, peak, value -> the peak with its value and the derivative of its height by the
+    # coordinate of that value: its logarithm, or for "gap" the value itself
+    with_slope: Callable[[ReducedModel, Peak, float], Peak]
+    # decides the coordinate, and is named in messages
+    name: str = "load"
+
+
+@dataclass(frozen=True)
 class _Search:
     """What does not change on the way."""
 
-    model: ReducedModel
+    along: Variation
     band: tuple[float, float]
     H: int
     samples: int
-    name: str
     bounds: tuple[float, float]
     tolerance: float
+    options: Options
+
+    @property
+    def name(self) -> str:
+        """Of the parameter."""
+        return self.along.name
+
+    def peak(self, model: ReducedModel, omega: float, near: object = None) -> Peak:
+        """The peak uphill of a circular frequency [rad/s], without its slope."""
+        return find_peak(
+            model,
+            omega,
+            self.H,
+            self.samples,
+            near=near,
+            tolerance=self.tolerance,
+            options=self.options,
+        )
 
     def width(self, low: float, high: float) -> float:
         """Between two values of the parameter, in its own coordinate: the logarithm of a factor,
@@ -110,16 +142,48 @@ def optimum(
         NotSolvedError: a peak could not be solved, or the band has none.
     """
     check_parameter(name)
+    along = Variation(
+        lambda value: vary(model, name, value),
+        lambda changed, peak, value: with_slope(changed, peak, name, value),
+        name,
+    )
+    return lowest_peak(along, band, bounds, H, samples, tolerance=tolerance)
+
+
+def lowest_peak(
+    along: Variation,
+    band: tuple[float, float],
+    bounds: tuple[float, float],
+    H: int = 3,
+    samples: int = 128,
+    *,
+    start: float | None = None,
+    tolerance: float = 1e-3,
+    options: Options = DEFAULTS,
+) -> Optimum:
+    """``optimum`` along any variation of a model, for example with the seating solved for each
+    load.
+
+    Args:
+        start: value where the search begins; the middle of the bounds when left out.
+
+    Raises:
+        InputError: an empty band or range.
+        NotSolvedError: a peak could not be solved, or the band has none.
+    """
+    name = along.name
     for what, (low, high), least in (
         ("band", band, 0.0),
         ("bounds", bounds, -np.inf if name == "gap" else 0.0),
     ):
         if not least < low < high < np.inf:
             raise InputError(f"{what} ({low}, {high}): expected {least:g} < low < high")
-    search = _Search(model, band, H, samples, name, bounds, tolerance)
+    search = _Search(along, band, H, samples, bounds, tolerance, options)
     middle = parameter_value(
         name, (path_coordinate(name, bounds[0]) + path_coordinate(name, bounds[1])) / 2
     )
+    if start is not None:
+        middle = float(np.clip(start, *bounds))
     first, points = _first_level(search, middle)
     levels = {middle: first}
     for _ in range(MOST_LEVELS):
@@ -139,7 +203,7 @@ def optimum(
 
 def _first_level(search: _Search, value: float) -> tuple[list[Peak], int]:
     """Peaks uphill of the resonances of both limits at the first value, and the points spent."""
-    model = vary(search.model, search.name, value)
+    model = search.along.model_at(value)
     known = []
     points = 0
     reason = "the climb leaves it"
@@ -149,13 +213,13 @@ def _first_level(search: _Search, value: float) -> tuple[list[Peak], int]:
     seeds = seeds[(seeds > search.band[0]) & (seeds < search.band[1])]
     for omega in seeds if seeds.size else [float(np.sqrt(search.band[0] * search.band[1]))]:
         try:
-            peak = find_peak(model, omega, search.H, search.samples, tolerance=search.tolerance)
+            peak = search.peak(model, omega)
         except NotSolvedError as error:
             reason = str(error)
             continue
         points += peak.points
         if search.inside(peak):
-            known = _add_peak(search, with_slope(model, peak, search.name, value), known)
+            known = _add_peak(search, search.along.with_slope(model, peak, value), known)
     if not known:
         raise NotSolvedError(
             f"no peak in the band {search.band} with {search.name} at {value:.4g}: {reason}"
@@ -300,7 +364,7 @@ def _solve_level(search: _Search, value: float, known: list[Peak]) -> tuple[list
     """The known peaks at another value: solved where they may be the highest, estimated where they
     cannot.
     """
-    model = vary(search.model, search.name, value)
+    model = search.along.model_at(value)
     found = []
     points = 0
     for old in sorted(known, key=lambda peak: -_estimated_height(search, peak, value)):
@@ -311,12 +375,10 @@ def _solve_level(search: _Search, value: float, known: list[Peak]) -> tuple[list
             continue
         if any(peak.value == value and _same_peak(peak, old) for peak in found):
             continue
-        peak = find_peak(
-            model, old.omega, search.H, search.samples, near=old, tolerance=search.tolerance
-        )
+        peak = search.peak(model, old.omega, old)
         points += peak.points
         if search.inside(peak):
-            found = _add_peak(search, with_slope(model, peak, search.name, value), found)
+            found = _add_peak(search, search.along.with_slope(model, peak, value), found)
     if any(peak.value == value for peak in found):
         return found, points
     # the known peaks left the band, or became one with another
@@ -338,9 +400,10 @@ def _look_over_band(
     """The highest peak that a coarse look over the band meets, if it is higher than the best;
     points spent.
     """
-    model = vary(search.model, search.name, value)
+    model = search.along.model_at(value)
     met = best
-    found = response(model, first_look(model, search.band), search.H, search.samples)
+    looked = first_look(model, search.band)
+    found = response(model, looked, search.H, search.samples, options=search.options)
     points = [point for point in found if point.converged]
     spent = len(points)
     for top in sorted(local_maxima(points), key=lambda point: -size(point))[:2]:
@@ -349,12 +412,10 @@ def _look_over_band(
             or abs(top.omega / met.omega - 1) < SAME_PEAK_LOSS
         ):
             continue
-        peak = find_peak(
-            model, top.omega, search.H, search.samples, near=top, tolerance=search.tolerance
-        )
+        peak = search.peak(model, top.omega, top)
         spent += peak.points
         if search.inside(peak) and (
             met is None or peak.height > met.height * (1 + search.tolerance)
         ):
             met = peak
-    return (None if met is best else with_slope(model, met, search.name, value)), spent
+    return (None if met is best else search.along.with_slope(model, met, value)), spent

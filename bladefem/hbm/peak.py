@@ -89,11 +89,7 @@ def find_peak(
             raise NotSolvedError(
                 f"peak search at {start.frequency:.6g} Hz: probe {options.probe} does not move"
             )
-        now = _Look(
-            start,
-            size(start, options.probe),
-            float(sensitivities(model, start, ["omega"])["omega"].size[options.probe]),
-        )
+        now = _Look(start, size(start, options.probe), _slope(model, start, options.probe))
         low, high = (now, high) if now.slope > 0 else (low, now)
         if last is not None:
             bend = (now.line - last.line) / (omega - last.solution.omega)
@@ -113,6 +109,14 @@ def find_peak(
     raise NotSolvedError(
         f"peak search found no maximum in {STEPS} points, last at {start.frequency:.6g} Hz"
     )
+
+
+def _slope(model: ReducedModel, point: Solution, probe: int) -> float:
+    """Derivative of the height by the circular frequency."""
+    try:
+        return float(sensitivities(model, point, ["omega"])["omega"].size[probe])
+    except np.linalg.LinAlgError as error:
+        raise NotSolvedError(f"slope at {point.frequency:.6g} Hz: {error}") from error
 
 
 @dataclass(frozen=True)

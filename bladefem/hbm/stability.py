@@ -110,13 +110,15 @@ def _leading(
 ) -> complex | None:
     """The multiplier of largest modulus; None where it would take too many operations."""
     S = max(instants, 16 * (solution.harmonics + 1))
+    S = system.blades * -(-S // system.blades)
+    d = model.directions
+    moving_nodes = system.blades * (len(solution.w) - solution.states["stick"])
+    if _operations(system, moving_nodes * d, S) > most:
+        return None
     A, B1, B0, share, stuck = _node_steps(model, solution, system.blades, S)
     system, U, R = _without_stuck(model, system, stuck)
-    d = model.directions
     moving = np.flatnonzero(~stuck)
-    m = len(moving) * d
-    unknowns = 2 * len(system.stiffness) + m
-    if S * (2 * m**3 + 4 * unknowns**3) > most:
+    if _operations(system, len(moving) * d, S) > most:
         return None
     dt = 2 * np.pi / solution.omega / S
     E, G0, G1 = linear_steps(system, dt)
@@ -126,6 +128,14 @@ def _leading(
     full = period_map(*(np.ascontiguousarray(a) for a in arrays))
     values = linalg.eigvals(full, check_finite=False)
     return complex(values[np.argmax(abs(values))])
+
+
+def _operations(system: SectorModes, contacts: int, S: int) -> float:
+    """Of carrying all disturbances through S steps, with so many degrees of freedom in contact."""
+    modes = 2.0 * len(system.stiffness)
+    columns = modes + contacts
+    step = modes * (modes + 3 * contacts) + 2.0 * contacts**2
+    return S * (2 * columns * step + 2.0 * contacts**3)
 
 
 def _node_steps(
@@ -138,42 +148,45 @@ def _node_steps(
     w = solution.w + 0.0
     w[:, :, 0] += model.offset.reshape(n, d)
     base = synthesis(K // 2, S).T
-    turned = np.concatenate([_shifted(w, b / blades) for b in range(blades)])
-    motion = turned @ base
-    change = _rates(turned) @ base * (2 * np.pi / S)
+    motion = w @ base
+    change = _rates(w) @ base * (2 * np.pi / S)
     load = model.normal_load(max((0, *model.normal)))[:, None]
-    load = np.concatenate([_shifted(load, b / blades) for b in range(blades)])
     known = synthesis(load.shape[2] // 2, S).T
     N = load[:, 0] @ known
     dN = _rates(load)[:, 0] @ known * (2 * np.pi / S)
-    kt = np.tile(e.kt, blades)
-    kn = np.tile(e.kn, blades)
-    count = blades * n
     if d > t:
-        N = N + kn[:, None] * motion[:, 0]
-        dN = dN + kn[:, None] * change[:, 0]
-    before = np.zeros((S, count, t, t))
-    now = np.zeros((S, count, t, t))
-    by_load = np.zeros((S, count, t, 2))
-    share = np.zeros((S, count))
-    stuck = np.zeros(count, dtype=bool)
-    tangential = np.ascontiguousarray(kt[:, None, None] * motion[:, d - t :])
-    rate = np.ascontiguousarray(kt[:, None, None] * change[:, d - t :])
-    contact_steps(
-        tangential, rate, N, dN, np.tile(e.mu, blades), before, now, by_load, share, stuck
-    )
-    A = np.zeros((S, count, d, d))
-    B1 = np.zeros((S, count, d, d))
-    B0 = np.zeros((S, count, d, d))
+        N = N + e.kn[:, None] * motion[:, 0]
+        dN = dN + e.kn[:, None] * change[:, 0]
+    before = np.zeros((S, n, t, t))
+    now = np.zeros((S, n, t, t))
+    by_load = np.zeros((S, n, t, 2))
+    share = np.zeros((S, n))
+    stuck = np.zeros(n, dtype=bool)
+    tangential = np.ascontiguousarray(e.kt[:, None, None] * motion[:, d - t :])
+    rate = np.ascontiguousarray(e.kt[:, None, None] * change[:, d - t :])
+    contact_steps(tangential, rate, N, dN, e.mu, before, now, by_load, share, stuck)
+    A = np.zeros((S, n, d, d))
+    B1 = np.zeros((S, n, d, d))
+    B0 = np.zeros((S, n, d, d))
     f = d - t
     A[:, :, f:, f:] = before
-    B1[:, :, f:, f:] = now * kt[:, None, None]
-    B0[:, :, f:, f:] = -now * kt[:, None, None]
+    B1[:, :, f:, f:] = now * e.kt[:, None, None]
+    B0[:, :, f:, f:] = -now * e.kt[:, None, None]
     if f:
-        B1[:, :, 0, 0] = (kn[:, None] * (N > 0)).T
-        B1[:, :, f:, 0] = by_load[..., 1] * kn[:, None]
-        B0[:, :, f:, 0] = by_load[..., 0] * kn[:, None]
-    return A, B1, B0, share, stuck & (N > 0).all(axis=1)
+        B1[:, :, 0, 0] = (e.kn[:, None] * (N > 0)).T
+        B1[:, :, f:, 0] = by_load[..., 1] * e.kn[:, None]
+        B0[:, :, f:, 0] = by_load[..., 0] * e.kn[:, None]
+    stuck &= (N > 0).all(axis=1)
+    parts = (_of_all_blades(part, blades) for part in (A, B1, B0, share))
+    return *parts, np.tile(stuck, blades)
+
+
+def _of_all_blades(part: np.ndarray, blades: int) -> np.ndarray:
+    """(S, blades n, ...) from the nodes (S, n, ...) of one: each next blade is a share of the
+    period ahead.
+    """
+    ahead = len(part) // blades
+    return np.concatenate([np.roll(part, -b * ahead, axis=0) for b in range(blades)], axis=1)
 
 
 def _rates(w: np.ndarray) -> np.ndarray:
@@ -183,17 +196,6 @@ def _rates(w: np.ndarray) -> np.ndarray:
     rate[:, :, 1::2] = h * w[:, :, 2::2]
     rate[:, :, 2::2] = -h * w[:, :, 1::2]
     return rate
-
-
-def _shifted(w: np.ndarray, share: float) -> np.ndarray:
-    """Coefficients (n, d, K) of the motion a share of a period later."""
-    turned = w.copy()
-    for h in range(1, w.shape[2] // 2 + 1):
-        c = np.cos(2 * np.pi * h * share)
-        s = np.sin(2 * np.pi * h * share)
-        turned[:, :, 2 * h - 1] = c * w[:, :, 2 * h - 1] + s * w[:, :, 2 * h]
-        turned[:, :, 2 * h] = c * w[:, :, 2 * h] - s * w[:, :, 2 * h - 1]
-    return turned
 
 
 def _without_stuck(

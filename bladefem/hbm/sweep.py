@@ -24,7 +24,7 @@ from .solver.newton import DEFAULTS, Options
 from .solver.point_compiled import solve_along
 from .validate_model import check_point, check_probe
 
-__all__ = ["first_look", "local_maxima", "response", "size", "solve_from", "sweep"]
+__all__ = ["FOLLOWED", "first_look", "local_maxima", "response", "size", "solve_from", "sweep"]
 
 Keep = Callable[[float, Callable[[], Solution]], Solution]
 # of the height with the frequency, at a solved one

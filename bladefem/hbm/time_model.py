@@ -52,6 +52,8 @@ def time_system(model: ReducedModel, H: int) -> System:
     )
     # an open contact carries nothing in the preload state
     force[:, 0] += R.T @ (np.maximum(e.n0, 0.0) - e.n0)
+    # the preload state balances its static friction forces
+    force[:, 0] += W.T @ e.traction[:, 0]
     own = np.concatenate([body.omega[0] for body in bodies])
     damping = np.zeros((len(own), len(own)))
     start = 0

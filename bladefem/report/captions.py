@@ -34,6 +34,10 @@ CAPTIONS = {
     "modes/margins": "The mode closest to each engine order at the operating speed.",
     "modes/mac": "Modal assurance criterion against the modes of the other run.",
     "modes/nodal_diameters": "Natural frequencies over nodal diameter, without damper, by family.",
+    "response/best_load": "The load that makes the resonance smallest, by exact search; every load "
+    "of the range in the last columns was open to it.",
+    "response/influences": "What the best load hangs on: each parameter over its range, by exact "
+    "derivatives (bars); the two with the largest effect solved again at both ends (diamonds).",
     "response/resonances": "Linear resonances without damper.",
     "mesh/convergence": "Frequencies on refined meshes, with the estimated limit and order.",
     "response/side_by_side": "Resonance amplitude and frequency at the best load over the value, "

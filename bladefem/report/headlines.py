@@ -11,9 +11,14 @@ from typing import NamedTuple
 import numpy as np
 import pandas as pd
 
+from .best_load import found_best
 from .statements import Answer
 
 __all__ = ["Headline", "headlines"]
+
+
+# what an answer says in place of a number that the data cannot carry
+UNDETERMINED = "not determined"
 
 
 class Headline(NamedTuple):
@@ -27,7 +32,10 @@ class Headline(NamedTuple):
 
 
 def headlines(
-    answer: Answer, summary: pd.DataFrame | None, points: pd.DataFrame | None
+    answer: Answer,
+    summary: pd.DataFrame | None,
+    points: pd.DataFrame | None,
+    searched: pd.DataFrame | None = None,
 ) -> list[Headline]:
     """The numbers of an answer with their uncertainties.
 
@@ -36,10 +44,21 @@ def headlines(
         summary: one row a load, SI columns; "error" is the estimated relative error of the
             resonance amplitude (NaN: not estimated, inf: unknown).
         points: one row a response point.
+        searched: what the exact search for the best load found, one row a mass.
     """
     sure = {} if summary is None else _uncertainties(summary, points)
+    best = None if searched is None or summary is None else found_best(searched, summary)
+    if best is not None:
+        sure |= _of_search(best)
     return [
-        Headline(what, value, sure.get(_quantity(what), "no estimate"), remark)
+        Headline(
+            what,
+            value,
+            "see what to do next"
+            if value == UNDETERMINED
+            else sure.get(_quantity(what), "no estimate"),
+            remark,
+        )
         for what, value, remark in answer.numbers
     ]
 
@@ -71,6 +90,20 @@ def _uncertainties(summary: pd.DataFrame, points: pd.DataFrame | None) -> dict[s
         "frequency": _spacing_text(best, points),
         "load": _between_text(low, high, "N"),
         "own load": "by equilibrium, no model error",
+        "mass": _mass_text(low, high, best["load"]),
+    }
+
+
+def _of_search(best: pd.Series) -> dict[str, str]:
+    """How sure the exact search is; the load by where the amplitude stays within the accuracy."""
+    error = best["error"] + best["tolerance"]
+    low, high = (
+        None if np.isnan(best[name]) else float(best[name])
+        for name in ("tolerated_from", "tolerated_to")
+    )
+    return {
+        "amplitude": _error_text(error),
+        "load": _between_text(low, high, "N"),
         "mass": _mass_text(low, high, best["load"]),
     }
 

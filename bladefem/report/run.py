@@ -37,9 +37,12 @@ from ..study.pipeline.state_check import state_sentence
 from ..util.message import method, warning
 from ..util.progress import Progress, unwatched
 from ..view import mesh, modes, response, speed
+from ..view.influence import draw_influences
 from ..view.live_curves import live_diameters, live_loops, live_optimum, live_responses
 from ..view.live_shapes import live_shapes
+from .best_load import best_load_table
 from .datasets import datasets, table_dataset
+from .influences import influence_sentence, influence_table
 from .linear import harmonic_table, linear_sentence
 from .nodes import (
     SEATS,
@@ -145,6 +148,7 @@ def _write(result: pipeline.Run, progress: Progress) -> None:
         method(_states(result)),
         method(linear_sentence(cycles)),
         *_beyond_stick(result),
+        *([influence_sentence(result.response.influences)] if result.response.influences else []),
         *([wear_sentence(cycles, coefficient)] if worn else []),
         *([] if result.wheel is None else pattern_sentences(result.wheel)),
     ]
@@ -243,6 +247,7 @@ def _tables(result: pipeline.Run) -> dict[str, pd.DataFrame]:
         "modes/stresses": _stresses(result.strength),
         "contact/pressure": pressure_table(result.contact.maps),
         **_own_load(result),
+        **_best_load(result),
         **_damper_masses(result),
         "response/summary": _summary(result),
         "response/points": _joined(
@@ -309,6 +314,18 @@ def _own_load(result: pipeline.Run) -> dict[str, pd.DataFrame]:
             )
         }
     )
+
+
+def _best_load(result: pipeline.Run) -> dict[str, pd.DataFrame]:
+    """What the exact search for the best load found, where there was one."""
+    best = result.response.best
+    if not best:
+        return {}
+    found = {"response/best_load": best_load_table(best)}
+    if result.response.influences:
+        lowest = min((b for b in best if not b.reason), key=lambda b: b.amplitude)
+        found["response/influences"] = influence_table(result.response.influences, lowest)
+    return found
 
 
 def _damper_masses(result: pipeline.Run) -> dict[str, pd.DataFrame]:
@@ -448,6 +465,8 @@ def _drawings(
             own=result.contact.own,
         ),
     }
+    if "response/influences" in tables:
+        drawings["response/influences"] = partial(draw_influences, tables["response/influences"])
     if len(result.modes) > 1:
         number = result.scene.excitation.mode - 1
         drawings["modes/mode_on_the_wheel"] = lambda file: modes.draw_wheel_mode(

@@ -7,12 +7,18 @@ from typing import NamedTuple
 import numpy as np
 import pandas as pd
 
+from bladefem.contact.interface_elements import USUAL, gives_stiffness
 from bladefem.scene.tables import Scene
+from bladefem.scene.units import show
 
-__all__ = ["Answer", "answer", "trust", "wrong_speed"]
+from .best_load import certainty, flat_range, found_best, reasons_against
+
+__all__ = ["Answer", "answer", "assumed_stiffness", "trust", "wrong_speed"]
 
 # of the resonance frequency: farther off, an engine order does not drive it
 APART = 0.1
+# relative difference below which a load was itself studied; own loads are rounded to four digits
+STUDIED = 1e-3
 
 
 class Answer(NamedTuple):
@@ -28,9 +34,9 @@ def answer(
     points: pd.DataFrame | None = None,
     own: pd.DataFrame | None = None,
     masses: pd.DataFrame | None = None,
+    searched: pd.DataFrame | None = None,
 ) -> Answer:
-    """The best load and what it brings, from a summary table; cautions where that answer stands on
-    weak ground.
+    """The best load and what it brings; no optimum is named where the data cannot carry it.
 
     Args:
         summary: one row a load: load [N] (0: free blade, inf: full stick), peak_frequency [Hz],
@@ -42,23 +48,35 @@ def answer(
             mass alone.
         masses: one row a load where friction takes part in the seating: load [N] and the mass [kg]
             that makes it, with its range lightest to heaviest.
+        searched: one row a mass, what the exact search for the best load found
+            (``best_load.best_load_table``); without it the best of the loads studied is named.
     """
     if summary is None or summary.empty:
         return Answer([], [])
     finite = summary[(summary["load"] > 0) & np.isfinite(summary["load"])]
     if finite.empty:
         return Answer([], ["No damper load was studied."])
-    best = finite.loc[finite["peak_amplitude"].idxmin()]
+    found = None if searched is None else found_best(searched, summary)
+    best = finite.loc[finite["peak_amplitude"].idxmin()] if found is None else found
+    against = reasons_against(best, summary, points, searched)
+    beside = mass_of(best) or (among(finite) if found is None else flat_range(best))
+    if against:
+        numbers = [
+            ("optimum normal load per seat", "not determined", against[0]),
+            (
+                "lowest resonance amplitude found",
+                f"{1e6 * best['peak_amplitude']:.4g} µm",
+                f"at {best['load']:.4g} N and {best['peak_frequency']:.5g} Hz",
+            ),
+        ]
+        said = [f"No optimum load is named: {reason}." for reason in against]
+        return Answer(numbers, [*said, *cautions(finite, best, points, found is not None)])
     numbers = [
-        (
-            "optimum normal load per seat",
-            f"{best['load']:.4g} N",
-            mass_of(best) or among(finite, best),
-        ),
+        ("optimum normal load per seat", f"{best['load']:.4g} N", beside),
         (
             "resonance amplitude there",
             f"{1e6 * best['peak_amplitude']:.4g} µm",
-            reduction(summary, best),
+            ", ".join(filter(None, [reduction(summary, best), certainty(best)])),
         ),
         *history(best),
         ("resonance frequency there", f"{best['peak_frequency']:.5g} Hz", shift(summary, best)),
@@ -75,26 +93,13 @@ def answer(
         numbers.append(("friction work per cycle there", energy(best).split(" of ")[0], ""))
     return Answer(
         [*numbers, *stress(summary, best), *own_mass(finite, best, own, masses)],
-        cautions(finite, best, points),
+        cautions(finite, best, points, found is not None),
     )
 
 
-def among(finite: pd.DataFrame, best: pd.Series) -> str:
-    """How close the loads beside the best one are, and where a parabola through the three has its
-    lowest point.
-    """
-    table = finite.sort_values("load", ignore_index=True)
-    i = int(np.flatnonzero(table["load"] == best["load"])[0])
-    if not 0 < i < len(table) - 1:
-        return f"best of {len(table)}"
-    x, y = (
-        np.log(table[name].iloc[i - 1 : i + 2].to_numpy()) for name in ("load", "peak_amplitude")
-    )
-    a, b, _ = np.polyfit(x - x[1], y, 2)
-    return (
-        f"best of {len(table)}; a parabola through it and its neighbours has its lowest point at "
-        f"{best['load'] * np.exp(-b / (2 * a)):.3g} N"
-    )
+def among(finite: pd.DataFrame) -> str:
+    """That the load is the best of those studied, which is not the optimum."""
+    return f"best of {len(finite)} loads studied" if len(finite) > 1 else ""
 
 
 def history(best: pd.Series) -> list[tuple[str, str, str]]:
@@ -144,7 +149,10 @@ def own_mass(
     mass, speed, load = own[["mass", "speed", "load"]].iloc[0]
     table = finite.sort_values("load")
     there = "outside the loads studied"
-    if table["load"].iloc[0] <= load <= table["load"].iloc[-1]:
+    studied = table[np.isclose(table["load"], load, rtol=STUDIED)]
+    if len(studied):
+        there = f"resonance amplitude {1e6 * studied['peak_amplitude'].iloc[0]:.4g} µm there"
+    elif table["load"].iloc[0] <= load <= table["load"].iloc[-1]:
         between = np.interp(np.log(load), np.log(table["load"]), np.log(table["peak_amplitude"]))
         there = (
             f"resonance amplitude about {1e6 * np.exp(between):.3g} µm, between the loads studied"
@@ -156,6 +164,17 @@ def own_mass(
             f"{1e3 * mass:.3g} g at {speed * 30 / np.pi:.5g} rpm; {there}",
         ),
         ("mass that makes the optimum load", *best_mass(best, mass / load, masses)),
+    ]
+
+
+def assumed_stiffness(scene: Scene) -> list[str]:
+    """A caution where the scene gives no contact stiffness."""
+    if gives_stiffness(scene.contact):
+        return []
+    return [
+        f"The scene gives no contact stiffness: {show(USUAL, 'N/m^3')} (tangential) is assumed, "
+        "while metal joints lie between 1000 and 100 000 N/mm^3. Give contact.kt_area; "
+        "docs/contact.md lists measurements."
     ]
 
 
@@ -227,15 +246,22 @@ def energy(best: pd.Series) -> str:
     return f"{1e3 * work:.3g} mJ of friction work per cycle" if np.isfinite(work) else ""
 
 
-def cautions(finite: pd.DataFrame, best: pd.Series, points: pd.DataFrame | None) -> list[str]:
-    """Why the answer may not be the optimum."""
+def cautions(
+    finite: pd.DataFrame, best: pd.Series, points: pd.DataFrame | None, exact: bool = False
+) -> list[str]:
+    """Why the answer may not be the optimum.
+
+    Args:
+        exact: the best load was searched for, and need not be one of those studied.
+    """
     found = []
     if len(finite) == 1:
         found.append(
             "Only one load was studied: whether it is the optimum is not known; give more "
             "study.loads."
         )
-    if len(finite) > 1 and best["load"] in (finite["load"].min(), finite["load"].max()):
+    ends = (finite["load"].min(), finite["load"].max())
+    if len(finite) > 1 and not exact and best["load"] in ends:
         end = "smallest" if best["load"] == finite["load"].min() else "largest"
         found.append(
             f"The best load is the {end} one studied: the true optimum may lie beyond it; widen "

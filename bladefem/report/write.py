@@ -29,7 +29,7 @@ from .headlines import Headline, headlines
 from .library import chart_library
 from .next_steps import next_steps
 from .page_tables import page_tables
-from .statements import answer, trust, wrong_speed
+from .statements import answer, assumed_stiffness, trust, wrong_speed
 from .tables import numeric, readable, to_markdown
 
 __all__ = ["SECTIONS", "Page", "inputs_hash", "write_report"]
@@ -204,10 +204,11 @@ def _answer(scene: Scene, tables: Mapping[str, pd.DataFrame], page: Page) -> dic
     if page.numbers is not None or summary is None or "peak_amplitude" not in summary:
         return {"numbers": list(page.numbers or ()), "steps": list(page.steps)}
     own = tables.get("contact/own_load")
-    found = answer(summary, points, own, tables.get("contact/damper_mass"))
-    cautions = [*wrong_speed(scene, summary), *found.cautions]
+    searched = tables.get("response/best_load")
+    found = answer(summary, points, own, tables.get("contact/damper_mass"), searched)
+    cautions = [*assumed_stiffness(scene), *wrong_speed(scene, summary), *found.cautions]
     steps = next_steps(scene, cautions, summary, own)
-    return {"numbers": headlines(found, summary, points), "steps": [*steps, *page.steps]}
+    return {"numbers": headlines(found, summary, points, searched), "steps": [*steps, *page.steps]}
 
 
 def _sections(

@@ -224,7 +224,11 @@ class Study:
     """What is varied. Loads are the static normal force between damper and one seat."""
 
     loads: tuple[float, ...] | None = quantity(
-        None, "N", 0.0, 1e8, "normal loads per seat; eight round the optimum when left out"
+        None,
+        "N",
+        0.0,
+        1e8,
+        "normal loads per seat; from an eighth of the best one to thirty times it when left out",
     )
     own_load: bool = quantity(
         False, help="also the load that the damper's own mass makes at the operating speed"
@@ -234,6 +238,11 @@ class Study:
     )
     band: tuple[float, float] | None = quantity(
         None, "Hz", 0.0, 1e6, "frequency band; from the free to the stuck resonance when left out"
+    )
+    influences: bool = quantity(
+        True,
+        help="also what the best load hangs on: contact stiffness, friction, damping, and friction "
+        "while seating, each over its range",
     )
     interval: bool = quantity(
         False,

@@ -44,6 +44,14 @@ def load_scene(path: str | Path, overrides: Iterable[str] = ()) -> Scene:
 
     Raises:
         InputError: anything wrong with the file or its content, in one sentence.
+
+    >>> scene = load_scene("scenes/wedge.toml", ["aerofoil.span=130 mm"])
+    >>> scene.aerofoil.span, scene.disc.sectors
+    (0.13, 36)
+    >>> load_scene("scenes/wedge.toml", ["aerofoil.spam=130 mm"])
+    Traceback (most recent call last):
+        ...
+    bladefem.errors.InputError: unknown key 'aerofoil.spam'; did you mean 'aerofoil.span'?
     """
     return scene_of(read_tables(path, overrides), Path(path).resolve().parent)
 
@@ -113,6 +121,13 @@ def vary(scene: Scene, *pair: Any, **changes: Any) -> Scene:
 
     Raises:
         InputError: as in :func:`load_scene`.
+
+    >>> vary(Scene(), "damper.angle", "45 deg", "contact.mu", 0.2).contact.mu
+    0.2
+    >>> vary(Scene(), "damper.angle", "95 deg")
+    Traceback (most recent call last):
+        ...
+    bladefem.errors.InputError: damper.angle = 95 deg: expected 15 deg to 75 deg
     """
     if len(pair) % 2:
         raise InputError(f"vary: expected name and value in turn, got {len(pair)} arguments")

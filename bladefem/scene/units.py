@@ -103,6 +103,9 @@ def parse(value: object, unit: str = "1", name: str = "value") -> float:
 
     Raises:
         InputError: no number, an unknown unit, the wrong kind of unit, or not finite.
+
+    >>> parse("140 mm", "m"), parse("40 N/mm^3", "N/m^3"), parse(0.3)
+    (0.14, 40000000000.0, 0.3)
     """
     unit = unit or "1"
     number, written = _split(value, unit, name)
@@ -147,7 +150,11 @@ def readable_units(unit: str) -> tuple[str, ...]:
 
 
 def show(value: float, unit: str = "1") -> str:
-    """Six digits in the unit that an engineer would write: 0.14 m is "140 mm"."""
+    """Six digits in the unit that an engineer would write.
+
+    >>> show(0.14, "m"), show(2.1e11, "Pa"), show(267.0353755, "rad/s")
+    ('140 mm', '210 GPa', '2550 rpm')
+    """
     number, written = _scaled(value, unit or "1")
     return f"{number:.6g} {written}".rstrip()
 

@@ -310,6 +310,7 @@ def draw_optimum_curve(axes: Any, table: pd.DataFrame, colour: str, label: str |
             mew=2,
             label="curve with unconverged points",
         )
+    draw_unknown(axes[0], finite)
     best = finite.loc[finite["peak_amplitude"].idxmin()]
     text = f"optimum {best['load']:.4g} N: {MICRO * best['peak_amplitude']:.4g} µm"
     free = table.loc[table["load"] == 0, "peak_amplitude"]
@@ -329,6 +330,23 @@ def draw_optimum_curve(axes: Any, table: pd.DataFrame, colour: str, label: str |
         fontsize=8.5,
         va="top",
     )
+
+
+def draw_unknown(ax: Any, finite: pd.DataFrame) -> None:
+    """Hollow marks on peaks whose error is not known, because richer models were not solved."""
+    unknown = finite[np.isinf(finite["error"])] if "error" in finite else finite.iloc[:0]
+    if len(unknown):
+        ax.plot(
+            unknown["load"],
+            MICRO * unknown["peak_amplitude"],
+            "o",
+            mfc="white",
+            mec=FAILED,
+            ms=7,
+            mew=1.5,
+            zorder=5,
+            label="error unknown",
+        )
 
 
 def draw_cut(axes: Any, summary: pd.DataFrame, points: pd.DataFrame | None) -> None:

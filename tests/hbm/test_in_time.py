@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from hbm_models import beam, chain
-from models import block, single_mass
+from models import block, single_mass, wedge_between_masses
 
 from bladefem.data import RigidBody
 from bladefem.errors import InputError
@@ -20,6 +20,9 @@ from bladefem.hbm.time_model import shooting_start, time_system
 from bladefem.time.shooting import periodic_solution, probe_harmonics
 
 DAMPER = RigidBody(np.array([[0.5]]), np.ones((1, 1)))
+# both contacts slip and forget the static friction forces, which the preload state balances
+WEDGE = wedge_between_masses(30.0)
+STATIC_FRICTION = replace(WEDGE, elements=replace(WEDGE.elements, t0=np.array([[30.0], [-20.0]])))
 SWELLING = replace(single_mass(), normal={1: np.array([0.3]), 2: np.array([0.1 - 0.2j])})
 
 
@@ -31,6 +34,7 @@ SWELLING = replace(single_mass(), normal={1: np.array([0.3]), 2: np.array([0.1 -
         (beam().model, 8300.0, 15),
         (chain(masses=4).model, 1.1, 31),
         (replace(single_mass(), damper=DAMPER), 1.3, 31),
+        (STATIC_FRICTION, 2 * np.pi * 56.0, 31),
     ],
 )
 def test_shooting_and_balance_meet(model, omega, H):

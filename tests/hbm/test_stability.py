@@ -148,3 +148,17 @@ def test_a_wave_is_judged_on_the_blades_after_which_it_repeats():
     odd = replace(alone, sides=sides[:3])
     assert "does not repeat" in stability_verdict(odd, point).reason
     assert stability_verdict(odd, point).verdict == UNKNOWN
+
+
+def test_uncoupled_blades_in_a_wave_have_the_multipliers_of_one():
+    """Modes may carry any phase: four blades without coupling, told as a wave, are one blade."""
+    alone = bouncing()
+    body = alone.sides[0]
+    sides = tuple(replace(body, shapes=body.shapes * np.exp(0.5j * np.pi * h)) for h in range(8))
+    wave = replace(alone, sides=sides)
+    point = solve(alone, 1.3, 7, 256)
+    one = stability_verdict(alone, point)
+    four = stability_verdict(wave, solve(wave, 1.3, 7, 256))
+    assert blades_of_wave(wave) == 4
+    assert four.verdict == one.verdict
+    assert four.multiplier == pytest.approx(one.multiplier, rel=1e-8)

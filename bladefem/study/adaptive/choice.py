@@ -307,19 +307,21 @@ def covered(
     mode: int,
     accuracy: float,
     widen: bool = False,
+    paths: bool | None = None,
 ) -> list[Solution]:
     """A sweep of a band [Hz], or of one round the resonances; that one is widened until its highest
     point lies inside.
 
     Args:
         widen: a given band may be widened as well.
+        paths: whether the response is followed round folds; where accuracy is below 1 if left out.
 
     Raises:
         NotSolvedError: no point converged.
     """
     (low, high), limits = band or default_band(model, mode), _halfway(model, mode)
     for _ in range(1 if band and not widen else WIDENINGS):
-        points = response_points(model, settings, (low, high), accuracy)
+        points = response_points(model, settings, (low, high), accuracy, paths)
         good = [p.omega for p in points if p.converged]
         top = peak_of(points).omega
         if good[0] < top < good[-1]:
@@ -341,7 +343,11 @@ def _halfway(model: ReducedModel, mode: int) -> tuple[float, float]:
 
 
 def response_points(
-    model: ReducedModel, settings: Settings, band: tuple[float, float], accuracy: float
+    model: ReducedModel,
+    settings: Settings,
+    band: tuple[float, float],
+    accuracy: float,
+    paths: bool | None = None,
 ) -> list[Solution]:
     """A sweep of a band [Hz], sorted by frequency; an accuracy of 1 asks for no more than the place
     of the peak.
@@ -361,7 +367,7 @@ def response_points(
         peak=min(accuracy / 10, 1e-2),
         curve=0.2 if accuracy >= 1 else 0.02,
         options=sufficient(accuracy),
-        paths=accuracy < 1,
+        paths=accuracy < 1 if paths is None else paths,
     )
     points = sorted(swept, key=lambda s: s.omega)
     if any(p.branch for p in points):

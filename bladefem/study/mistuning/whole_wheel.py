@@ -61,10 +61,11 @@ def reduce_wheel(
         raise InputError(
             f"mistuning.families = {families}: expected at most {len(clamped.frequencies)}"
         )
-    readings = modal_readings(bodies.still_blade, clamped.shapes[:families])
+    omega = 2 * pi * clamped.frequencies[:families]
+    readings = modal_readings(bodies.still_blade, clamped.shapes[:families], omega)
     diameters = range(bodies.mesh.sector.count // 2 + 1)
     reduced = reduce_sector(bodies, patches, list(diameters), modes, readings)
-    return WheelSector(reduced, 2 * pi * clamped.frequencies[:families])
+    return WheelSector(reduced, omega)
 
 
 def whole_wheel(

@@ -109,7 +109,10 @@ def contact_cycle(
     series = 1.0 / layer.kt - 1.0 / elements.kt
     elements, w = _in_all_directions(elements, curve.peak.w)
     layer = replace(layer, kn=np.where(elements.kn > 0, layer.kn, 0.0))
-    forces = evaluate(elements, w, curve.peak.samples or 512, jacobian=False)
+    # the friction law starts from the static friction force
+    started = w.copy()
+    started[:, 1:, 0] += elements.traction / elements.kt[:, None]
+    forces = evaluate(elements, started, curve.peak.samples or 512, jacobian=False)
     starts = np.cumsum([0] + [len(patch.area) for patch in patches])
     rows = [np.unique(groups[a:b]) for a, b in pairwise(starts)]
     part = area / np.bincount(groups, area)[groups]
@@ -123,7 +126,7 @@ def contact_cycle(
         part / area * forces.dissipated[groups],
         free_static_force(elements, w)[groups],
         {
-            patch.name: _loop(elements, w, series, some)
+            patch.name: _loop(elements, started, series, some)
             for patch, some in zip(patches, rows, strict=True)
         },
         _dealt(averaged, groups, part),
@@ -182,13 +185,7 @@ def _loop(elements: Elements, w: np.ndarray, series: np.ndarray, rows: np.ndarra
     """
     fine = np.zeros((len(rows), w.shape[1], 2 * SMOOTH + 1))
     fine[..., : w.shape[2]] = w[rows]
-    some = replace(
-        elements,
-        **{
-            name: np.broadcast_to(getattr(elements, name), len(w))[rows]
-            for name in ("kt", "kn", "mu", "n0")
-        },
-    )
+    some = select_elements(elements, rows)
     friction = evaluate(some, fine, 8 * SMOOTH + 8, jacobian=False).f[:, 1:]
     force = friction.sum(0)
     share = some.kt / some.kt.sum()

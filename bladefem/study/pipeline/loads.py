@@ -18,9 +18,10 @@ from ...hbm.sweep import size
 from ...scene.tables import Scene
 from ...util.progress import Progress, unwatched
 from ..adaptive.check_points import peak_of
-from ..adaptive.choice import adapted, checked, estimated
+from ..adaptive.choice import checked, estimated
 from ..adaptive.contact_mesh import halved_change
 from ..adaptive.family import Family, member
+from ..adaptive.resonance_curve import resonance_curve, unfollowed
 from ..adaptive.settings import Settings, restarted
 from .assemble_model import LoadCase
 from .liftoff import named
@@ -92,6 +93,9 @@ class Curve:
     unstable_peak: Solution | None = None
     # range of the resonance over loading histories; None where it was not asked for
     interval: LoadInterval | None = None
+    # contacts lift off and the balance is too large for following its motions round folds: a
+    # higher motion may exist
+    unfollowed: bool = False
 
     @property
     def error(self) -> float | None:
@@ -168,9 +172,8 @@ def curve_of(
     models = family(case)
     mode = scene.excitation.mode
     with named(case, member(models, settings).model, mode, scene.excitation.force):
-        curve = adapted(
-            models, restarted(settings), scene.study.band, mode, scene.accuracy, fixed=("modes",)
-        )
+        start = restarted(settings)
+        curve = resonance_curve(models, start, scene.study.band, mode, scene.accuracy)
     model = member(models, curve.settings).model
     heights = np.array([size(p) for p in curve.points])
     marks = Stability(np.full(len(heights), ""), np.full(len(heights), np.nan))
@@ -186,6 +189,7 @@ def curve_of(
         top = max(lasting, key=size)
     tolerated = scene.accuracy * size(top) / np.maximum(heights, 1e-6 * size(top))
     columns = (np.array(c) for c in zip(*map(_record, curve.points), strict=True))
+    lifts = any(p.states["lift"] > 0 for p in curve.points if p.converged)
     halved = np.nan if scene.contact.points else halved_change(models, curve.settings, top)
     interval = None
     if scene.study.interval:
@@ -206,6 +210,7 @@ def curve_of(
         marks.bifurcation if len(marks.bifurcation) else np.full(len(heights), ""),
         None if top is highest else highest,
         interval,
+        lifts and unfollowed(models, curve.settings),
     )
 
 

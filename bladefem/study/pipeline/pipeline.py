@@ -5,7 +5,7 @@ by the next run.
 from __future__ import annotations
 
 import time
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, field, replace
 from functools import lru_cache, partial
@@ -25,7 +25,7 @@ from ...contact.seating import ContactProblem
 from ...contact.seating import solve as seat
 from ...data import ModeSet, Patch, PressureMap
 from ...errors import InputError, NotSolvedError
-from ...io.stage_cache import found_remark, stage
+from ...io.stage_cache import found_remark, on_root, stage
 from ...reduction.truncate import truncated
 from ...scene.kinds import kind_named
 from ...scene.tables import Scene
@@ -35,13 +35,17 @@ from ...scene.warnings import doubts
 from ...util.message import method, warning
 from ...util.progress import Progress, unwatched
 from ..adaptive.check_points import peak_of
-from ..adaptive.choice import choose, covered
+from ..adaptive.choice import covered
 from ..adaptive.contact_mesh import coarse_sentence
 from ..adaptive.family import Family, Member, coarsened, member, shared_harmonics
+from ..adaptive.resonance_choice import choose_at_peak, peak_from
 from ..adaptive.settings import DAMPERS, Settings, enriched, first_settings
+from ..influences import Influence, influences, parameters_of
 from ..modes.clamped_aerofoil import clamped_blade
 from ..modes.stress import Strength, strength
 from .assemble_model import LoadCase, joint_model
+from .best_load import BestLoad, chart_loads, find_best_load
+from .changed_cases import cases_of, changed_cases
 from .contact_cycle import labels
 from .damped_motion import DampedStress, damped_stress
 from .history import (
@@ -104,6 +108,8 @@ class Seating:
     own: float | None = None
     # the damper that makes each load, where friction takes part in the seating
     masses: tuple[DamperMass, ...] = ()
+    # all ports of the seats, where friction takes part in the seating
+    rough: FrictionalProblem | None = None
 
 
 @dataclass(frozen=True, repr=False)
@@ -114,6 +120,10 @@ class Response:
     curves: list[Curve]
     # no damper, full stick
     limits: tuple[Limit, Limit]
+    # of each mass of the damper; empty where a single load was asked for
+    best: tuple[BestLoad, ...] = ()
+    # what the lowest of them hangs on, the largest influence first
+    influences: tuple[Influence, ...] = ()
 
     @property
     def free_peak(self) -> tuple[float, float]:
@@ -250,8 +260,17 @@ def run(
     if until == "reduction":
         return result
     family = partial(family_of_case, scene, mesh, reduced, list(patches))
+    with clock("best load"):
+        best = _best_loads(scene, mesh, result.contact, family, settings, keep)
+        clock.messages.extend(_best_remarks(scene, best))
+    if scene.study.loads is None and best and not any(b.reason for b in best):
+        loads = studied_loads(scene, result.contact.own, chart_loads(best))
+        result = replace(result, contact=_at_loads(scene, result.contact, loads, clock))
+        cases = load_cases(scene, mesh, result.contact)
     response = _response(scene, cases, family, settings, keep, clock, progress)
-    result = replace(result, response=response)
+    with clock("influences"):
+        hangs_on = _influences(scene, mesh, result.contact, family, best, keep)
+    result = replace(result, response=replace(response, best=best, influences=hangs_on))
     with clock("stresses"):
         stressed = keep(
             "damped_stress",
@@ -371,19 +390,25 @@ def _seated(
         bare = normal_part(rough)
     problem = on_layer(scene, bare)
     own = _own_load(scene, problem, rough, clock.messages)
-    loads = studied_loads(scene, own)
+    return _at_loads(
+        scene, Seating(problem, {}, own, rough=rough), studied_loads(scene, own), clock
+    )
+
+
+def _at_loads(scene: Scene, seating: Seating, loads: Iterable[float], clock: Clock) -> Seating:
+    """The seats under some loads."""
+    rough = seating.rough
     if rough is None:
         speed = scene.operation.speed
         bedded = scene.contact.bedded
-        maps = {load: seat(problem, speed, normal=load, bedded=bedded) for load in loads}
-        return Seating(problem, maps, own)
+        maps = {load: seat(seating.problem, speed, normal=load, bedded=bedded) for load in loads}
+        return replace(seating, maps=maps)
     seated = {load: seat_by_history(scene, rough, load) for load in loads}
     masses = damper_masses(scene, rough, seated)
     clock.messages.append(history_sentence(masses))
     clock.messages.extend(map(warning, coarse_history(seated)))
-    return Seating(
-        problem, {load: found.maps for load, found in seated.items()}, own, tuple(masses)
-    )
+    maps = {load: found.maps for load, found in seated.items()}
+    return replace(seating, maps=maps, masses=tuple(masses))
 
 
 def _own_load(
@@ -410,11 +435,89 @@ def _own_load(
     return own
 
 
-def studied_loads(scene: Scene, own: float | None) -> list[float]:
+def _best_loads(
+    scene: Scene,
+    mesh: Mesh,
+    contact: Seating,
+    family: Callable[[LoadCase], Family],
+    settings: Settings,
+    keep: _Keeper,
+) -> tuple[BestLoad, ...]:
+    """The best load of each mass of the damper; none where a single load was asked for."""
+    if scene.study.loads is not None and len(scene.study.loads) == 1:
+        return ()
+
+    def search(mass: float | None) -> BestLoad:
+        case_at = cases_of(scene, contact.problem, mesh.dimension - 1, mass, contact.rough)
+        return find_best_load(scene, case_at, family, settings, mass)
+
+    def compute() -> list[BestLoad]:
+        return on_root(keep.comm, lambda: [search(mass) for mass in scene.study.masses or (None,)])
+
+    key = stage_key(
+        "response", scene, "best load", scene.study.masses, replace(settings, error=None)
+    )
+    return tuple(keep("best_load", key, compute))
+
+
+def _influences(
+    scene: Scene,
+    mesh: Mesh,
+    contact: Seating,
+    family: Callable[[LoadCase], Family],
+    best: tuple[BestLoad, ...],
+    keep: _Keeper,
+) -> tuple[Influence, ...]:
+    """What the lowest of the best loads hangs on; none where it was not found or not asked for."""
+    found = [b for b in best if not b.reason]
+    if not found or not scene.study.influences:
+        return ()
+    lowest = min(found, key=lambda b: b.amplitude)
+    changed = changed_cases(scene, contact.problem, mesh.dimension - 1, lowest.mass, contact.rough)
+    # a history of the seating has its friction already
+    frictionless = scene.contact.history == FRICTIONLESS
+    angle = scene.damper.angle if scene.kind == "wedge sector" and frictionless else None
+    parameters = parameters_of(scene, angle)
+
+    def compute() -> list[Influence]:
+        return on_root(keep.comm, lambda: influences(scene, lowest, family, changed, parameters))
+
+    key = stage_key("response", scene, "influences", lowest)
+    try:
+        return tuple(keep("influences", key, compute))
+    except NotSolvedError as error:
+        keep.clock.messages.append(f"what the best load hangs on is not known: {error}")
+        return ()
+
+
+def _best_remarks(scene: Scene, best: tuple[BestLoad, ...]) -> Iterator[str]:
+    """How the best load was found, or why it was not."""
+    for b in best:
+        damper = "" if b.mass is None else f" of a damper of {1e3 * b.mass:.4g} g"
+        if b.reason:
+            yield (
+                f"best load{damper}: not found between {b.searched[0]:.3g} and "
+                f"{b.searched[1]:.3g} N, since {b.reason}"
+            )
+            continue
+        yield (
+            f"best load{damper}: {b.load:.4g} N by exact search between {b.searched[0]:.3g} and "
+            f"{b.searched[1]:.3g} N, {len(b.tried)} loads and {b.points} points; no load near it "
+            f"lowers the amplitude by more than {100 * b.tolerance:.2g} %; "
+            f"{b.settings.sentence()}"
+        )
+
+
+def studied_loads(
+    scene: Scene, own: float | None, laid: Sequence[float] | None = None
+) -> list[float]:
     """Mean normal loads of a seat to study [N], ascending with the damper's own one where that is
     wanted.
+
+    Args:
+        laid: loads of the design chart where the scene gives none; rough ones when left out.
     """
-    given = scene.study.loads or default_loads(scene)
+    given = scene.study.loads or laid or default_loads(scene)
     if not scene.study.own_load:
         return list(given)
     if own is None:
@@ -503,12 +606,13 @@ def reduced_sector(
         mode = scene.excitation.mode
         with named(case, model, mode, scene.excitation.force):
             rough = covered(model, settings, scene.study.band, mode, 1.0)
-        settings, _, found = choose(
-            family, settings, peak_of(rough), scene.accuracy, fixed=("modes",), apart=True
+            peak = peak_from(family, settings, peak_of(rough), settings, scene.accuracy)
+        settings, _, found = choose_at_peak(
+            family, settings, peak, scene.accuracy, fixed=("modes",)
         )
         more = enriched(settings, "modes")
-        known = "modes" in settings.chosen and "modes" not in found.unknown
-        if not known or found.errors["modes"] <= scene.accuracy / 10 or more is None:
+        known = "modes" in settings.chosen and np.isfinite(found.height["modes"])
+        if not known or found.needs["modes"] <= scene.accuracy / 10 or more is None:
             return settings, reduced
         settings = more
 
@@ -535,6 +639,14 @@ def _remarks(scene: Scene, settings: Settings, curves: list[Curve], nodes: int) 
                 f"{lost} of {sum(len(c.frequency) for c in curves)} response points did not converge; "
                 "they are "
                 "marked in tables and pictures"
+            )
+        )
+    single = [f"{c.load:g} N" for c in curves if c.unfollowed]
+    if single:
+        remarks.append(
+            warning(
+                f"under {', '.join(single)} contacts lift off, and the response was not followed "
+                "round folds: a sweep sees one motion a frequency, a higher one may exist"
             )
         )
     for c in curves:

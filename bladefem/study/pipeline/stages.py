@@ -179,6 +179,11 @@ def build_mesh(scene: Scene, comm: Any = None) -> Mesh:
 
     Raises:
         InputError: a parameter has to change; the message names it.
+
+    >>> import bladefem
+    >>> mesh = bladefem.build_mesh(bladefem.load_scene("scenes/plane.toml", ["mesh.size=8 mm"]))
+    >>> mesh.cell_type, sorted(mesh.bodies)
+    ('triangle6', ['blade', 'damper'])
     """
 
     def draw() -> Mesh:
@@ -219,6 +224,13 @@ def find_modes(
         diameters: nodal diameters; ``scene.model.nodal_diameters``, or all that the first harmonics
             of the engine order fall into, when left out.
         count: modes of each nodal diameter.
+
+    >>> import bladefem
+    >>> scene = bladefem.load_scene("scenes/plane.toml", ["mesh.size=8 mm"])
+    >>> bodies = bladefem.Bodies(scene, bladefem.build_mesh(scene))
+    >>> (modes,) = bladefem.find_modes(bodies, count=2)
+    >>> [f"{f / 1000:.1f} kHz" for f in modes.frequencies]
+    ['0.2 kHz', '1.1 kHz']
     """
     from ...fem.modes import modes
 

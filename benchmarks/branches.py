@@ -1,0 +1,89 @@
+"""Missed peaks: random models, half of them with lift-off, against slow marching sweeps.
+
+    python benchmarks/branches.py [first seed] [last seed]
+
+The library sweeps the band of each model as its users do, `sweep` with 7 harmonics. The march steps
+through the same band up and down, and keeps its state from one frequency to the next. A peak is
+missed where the march keeps a motion that is more than 3 % higher than the highest that the library
+found and does not call unstable.
+"""
+
+from __future__ import annotations
+
+import sys
+import time
+
+import numpy as np
+from branch_models import Case, March, march, random_case, rest
+
+from bladefem import balance as bf
+from bladefem.hbm.stability import UNSTABLE, stability_verdict
+
+HARMONICS = 7
+SAMPLES = 256
+# frequencies of a marched sweep, and periods at each
+STEPS = 60
+PERIODS = 40
+# periods for which the highest motion has to last
+CONFIRMED = 300
+# excess of the march over the library that is a missed peak
+MISSED = 0.03
+# relative change from one period to the next of a motion that lasts
+STEADY = 2e-3
+
+
+def library_peak(case: Case, notes: list[str]) -> tuple[bf.Solution, int]:
+    """The highest solution that is not unstable, and the number of points solved."""
+    points = list(bf.sweep(case.model, case.band, HARMONICS, SAMPLES, notes=notes))
+    good = sorted((p for p in points if p.converged), key=bf.size, reverse=True)
+    lasting = (p for p in good if stability_verdict(case.model, p).verdict != UNSTABLE)
+    return next(lasting, good[0]), len(points)
+
+
+def marched_peak(case: Case) -> tuple[float, float]:
+    """(omega, height) of the highest motion that lasts, over sweeps up and down."""
+    found: list[tuple[float, float, np.ndarray]] = []
+    omegas = np.linspace(*case.band, STEPS)
+    for order in (omegas, omegas[::-1]):
+        state = rest(case)
+        for omega in order:
+            now: March = march(case, float(omega), state, PERIODS)
+            state = now.state
+            found.append((float(omega), now.height, state))
+    for omega, height, state in sorted(found, key=lambda f: -f[1])[:8]:
+        end = march(case, omega, state, CONFIRMED)
+        if end.change < STEADY and abs(end.height / height - 1) < 0.05:
+            return omega, end.height
+    return omegas[0], 0.0
+
+
+def main(first: int, last: int) -> None:
+    missed = []
+    lost = 0
+    told = 0
+    spent = {"library": 0.0, "march": 0.0}
+    for seed in range(first, last):
+        case = random_case(seed)
+        notes: list[str] = []
+        clock = time.process_time()
+        top, _ = library_peak(case, notes)
+        spent["library"] += time.process_time() - clock
+        clock = time.process_time()
+        omega, height = marched_peak(case)
+        spent["march"] += time.process_time() - clock
+        told += bool(notes)
+        lost += height == 0.0
+        if height > (1 + MISSED) * bf.size(top):
+            missed.append(seed)
+            print(
+                f"seed {seed}, {case.name}: library {bf.size(top):.4g} m at {top.omega:.5g} rad/s, "
+                f"march {height:.4g} m at {omega:.5g} rad/s {notes}",
+                flush=True,
+            )
+    print(f"missed peaks: {len(missed)} of {last - first}; no steady march in {lost}")
+    print(f"searches that report something left open: {told}")
+    print(f"CPU: library {spent['library']:.0f} s, march {spent['march']:.0f} s")
+
+
+if __name__ == "__main__":
+    main(*(int(a) for a in sys.argv[1:3]) if len(sys.argv) > 2 else (0, 200))

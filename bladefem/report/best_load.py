@@ -1,0 +1,156 @@
+"""What the search for the best load found, and whether the data can carry it as a headline."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import asdict
+
+import numpy as np
+import pandas as pd
+
+from ..study.pipeline.best_load import BestLoad
+
+__all__ = ["best_load_table", "certainty", "flat_range", "found_best", "reasons_against"]
+
+# share of the excitation's work that friction takes at an optimum that is one of damping; below it
+# the amplitude is low for another reason, such as a stiffer blade
+LEAST_FRICTION = 0.05
+# of the ends of the range of a search: a load nearer to one lies at it
+AT_END = 0.01
+
+
+def best_load_table(found: Sequence[BestLoad]) -> pd.DataFrame:
+    """One row a mass of the damper, SI units; no rows where nothing was searched."""
+    rows = []
+    for best in found:
+        row = asdict(best)
+        row["lowest_searched"], row["highest_searched"] = row.pop("searched")
+        row["tolerated_from"], row["tolerated_to"] = row.pop("between")
+        settings = row.pop("settings")
+        error = settings["error"]
+        row["error"] = np.nan if error is None else error
+        row["harmonics"] = settings["harmonics"]
+        del row["tried"], row["heights"]
+        rows.append(row)
+    table = pd.DataFrame(rows)
+    return table.drop(columns="mass") if len(table) and table["mass"].isna().all() else table
+
+
+def found_best(searched: pd.DataFrame, summary: pd.DataFrame) -> pd.Series | None:
+    """The best of all masses as a row of the design table; None where no search succeeded."""
+    good = searched[searched["amplitude"].notna()]
+    if good.empty:
+        return None
+    row = good.loc[good["amplitude"].idxmin()]
+    best = row.rename({"amplitude": "peak_amplitude", "frequency": "peak_frequency"})
+    if "alternating_stress" in summary:
+        nearest = (summary["load"] / best["load"] - 1).abs().idxmin()
+        per_metre = (summary["alternating_stress"] / summary["peak_amplitude"])[nearest]
+        best = pd.concat(
+            [best, pd.Series({"alternating_stress": per_metre * best["peak_amplitude"]})]
+        )
+    return best
+
+
+def flat_range(best: pd.Series) -> str:
+    """Loads that do nearly as well, from the peaks that the search solved."""
+    low, high = best.get("tolerated_from", np.nan), best.get("tolerated_to", np.nan)
+    if np.isfinite(low) and np.isfinite(high):
+        return f"by exact search; {low:.3g} to {high:.3g} N keep within the accuracy of it"
+    return "by exact search"
+
+
+def certainty(best: pd.Series) -> str:
+    """The estimated error of the amplitude and the tolerance of the search."""
+    if "tolerance" not in best:
+        return ""
+    return (
+        f"estimated error {100 * best['error']:.2g} %, search closed to "
+        f"{100 * best['tolerance']:.2g} %"
+    )
+
+
+def reasons_against(
+    best: pd.Series,
+    summary: pd.DataFrame,
+    points: pd.DataFrame | None,
+    searched: pd.DataFrame | None = None,
+) -> list[str]:
+    """Why the lowest resonance that was found must not be called the optimum; empty where it may.
+
+    Args:
+        best: row of the lowest resonance, by the search or among the loads studied.
+        summary: the design table, with the linear limits.
+        points: response table.
+        searched: what the search found.
+    """
+    found = []
+    if searched is not None and len(searched):
+        found += [
+            f"the exact search failed ({reason})"
+            for reason in searched["reason"]
+            if isinstance(reason, str) and reason
+        ]
+    found += _at_end(best)
+    found += _without_friction(best)
+    found += _below_error(best, summary)
+    found += _beside_missing(best, points)
+    return found
+
+
+def _at_end(best: pd.Series) -> list[str]:
+    low = best.get("lowest_searched", np.nan)
+    high = best.get("highest_searched", np.nan)
+    for bound, near, side in (
+        (low, best["load"] <= (1 + AT_END) * low, "falls to the lowest"),
+        (high, best["load"] >= (1 - AT_END) * high, "falls to the highest"),
+    ):
+        if near:
+            return [
+                f"the resonance amplitude {side} load searched, {bound:.3g} N, so that no minimum "
+                "lies between"
+            ]
+    return []
+
+
+def _without_friction(best: pd.Series) -> list[str]:
+    work = best.get("input_work", np.nan)
+    if not work > 0 or best["dissipated"] >= LEAST_FRICTION * work:
+        return []
+    return [
+        f"friction takes only {100 * best['dissipated'] / work:.2g} % of the excitation's work "
+        "there: the amplitude is not lowered by friction"
+    ]
+
+
+def _below_error(best: pd.Series, summary: pd.DataFrame) -> list[str]:
+    error = best.get("error", np.nan)
+    limits = summary[(summary["load"] == 0) | np.isinf(summary["load"])]
+    if limits.empty or np.isnan(error):
+        return []
+    if np.isinf(error):
+        return ["the error of its amplitude is unknown, since richer models were not solved"]
+    gain = 1 - best["peak_amplitude"] / limits["peak_amplitude"].min()
+    if gain > error:
+        return []
+    return [
+        f"it lies {100 * gain:.2g} % below the better of the free and the stuck blade, which is "
+        f"no more than its estimated error of {100 * error:.2g} %"
+    ]
+
+
+def _beside_missing(best: pd.Series, points: pd.DataFrame | None) -> list[str]:
+    """Whether the curve of this load has an unsolved point next to its highest one."""
+    if points is None or points.empty:
+        return []
+    here = np.isclose(points["load"], best["load"], rtol=1e-3)
+    if "mass" in points and "mass" in best:
+        here &= np.isclose(points["mass"], best["mass"])
+    curve = points[here].sort_values("frequency")
+    good = curve["converged"].to_numpy(bool)
+    if not good.any() or good.all():
+        return []
+    top = int(np.argmax(np.where(good, curve["amplitude"], -np.inf)))
+    if good[max(top - 1, 0) : top + 2].all():
+        return []
+    return ["a point next to its highest one was not solved, so that the resonance may be higher"]

@@ -1,0 +1,63 @@
+"""Tables of what the best load hangs on."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+import pandas as pd
+
+from ..study.influences import Influence
+from ..study.pipeline.best_load import BestLoad
+
+__all__ = ["influence_sentence", "influence_table"]
+
+NAMES = {
+    "kt": "tangential stiffness",
+    "kn": "normal stiffness",
+    "mu": "friction coefficient",
+    "damping": "damping ratio",
+    "seat friction": "friction while seating",
+}
+QUANTITIES = ("load", "amplitude", "frequency")
+
+
+def influence_table(found: Sequence[Influence], best: BestLoad) -> pd.DataFrame:
+    """One row a parameter: range, logarithmic derivatives, and values at both ends, SI units."""
+    now = {"load": best.load, "amplitude": best.amplitude, "frequency": best.frequency}
+    rows = []
+    for one in found:
+        row = {
+            "parameter": NAMES[one.parameter.name],
+            "low": one.parameter.low,
+            "high": one.parameter.high,
+            "range_from": one.parameter.range_from,
+        }
+        for i, name in enumerate(QUANTITIES):
+            row[f"{name}_by_parameter"] = getattr(one, name)
+            row[f"{name}_now"] = now[name]
+            for j, end in enumerate(("low", "high")):
+                row[f"{name}_{end}"] = one.predicted[j, i]
+                row[f"{name}_{end}_solved"] = one.solved[j, i]
+        rows.append(row)
+    return pd.DataFrame(rows)
+
+
+def influence_sentence(found: Sequence[Influence]) -> str:
+    """The largest influence in words, and where the derivatives do not carry over the range."""
+    top = found[0]
+    low, high = top.parameter.low, top.parameter.high
+    known = [one for one in found if np.isfinite(one.solved).all()]
+    off = [float(np.abs(np.log(one.predicted[:, 1] / one.solved[:, 1])).max()) for one in known]
+    checked = (
+        ""
+        if not off
+        else f"; solved again at the ends of {len(known)} ranges, the derivatives are off by up to "
+        f"{100 * np.expm1(max(off)):.2g} % of the amplitude there"
+    )
+    failed = "".join(f"; {one.reason}" for one in found if one.reason)
+    return (
+        f"the best amplitude hangs most on the {NAMES[top.parameter.name]}: over {low:.3g} to "
+        f"{high:.3g} times its value it changes by a factor of {np.exp(top.span):.3g} by the exact "
+        f"derivative{checked}{failed}"
+    )

@@ -1,0 +1,220 @@
+"""Settings chosen by what is asked for: the height of a resonance, wherever richer models put it.
+
+The indicators of ``indicators.py`` compare the first harmonic at one frequency. Beside a steep
+resonance a shift of a tenth of a hertz changes it by tens of per cent, while the height of the peak
+stays the same to one per cent (8 contact points in place of 126 on the shipped wedge at 80 N: 37 %
+by the first, 0.8 % by the second). Here the peak is found again in every richer model, from the
+peak that is judged; heights are compared, and the shift of the frequency is an error of its own.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+
+from ...errors import NotSolvedError
+from ...hbm.full_stick import sticks_safely
+from ...hbm.peak import Peak, find_peak
+from ...hbm.solution import Solution
+from .choice import sufficient
+from .family import Family, carried, member
+from .indicators import richer
+from .settings import DIRECTIONS, Settings, enriched
+
+__all__ = [
+    "PeakErrors",
+    "choose_at_peak",
+    "judge_settings",
+    "judge_too_large",
+    "peak_errors",
+    "peak_from",
+]
+
+# enrichments of one peak before giving up
+ROUNDS = 8
+# of the accuracy: to which a peak that only tells an error is found
+SHARE = 0.05
+# of the accuracy: errors that are small enough together, and one that need not be lowered
+ENOUGH = 0.8
+LEAST = 0.05
+# unknowns of the largest balance that is chosen where contacts lift off: finer ones cost minutes a
+# curve there and lose points
+LIFTING = 1500
+# the same of a model that only tells an error there
+LIFTING_JUDGE = 3000
+# contact points of the model that judges, over those of the judged one
+MORE_POINTS = 4
+# weight of a relative shift of the frequency beside a relative change of the height: an accuracy
+# of 5 % holds the frequency to 0.5 %
+SHIFT_WEIGHT = 5.0
+
+
+@dataclass(frozen=True)
+class PeakErrors:
+    """How a peak moves in richer models, by what was made richer (settings.DIRECTIONS)."""
+
+    # relative change of its height; infinite where the richer model was not solved, or is too large
+    # to be
+    height: Mapping[str, float]
+    # relative change of its frequency
+    frequency: Mapping[str, float]
+    # the peaks that were found
+    better: Mapping[str, Peak] = field(default_factory=dict, repr=False)
+
+    @property
+    def total(self) -> float:
+        """Sum of the changes of height: the estimated error of the amplitude."""
+        return float(sum(self.height.values()))
+
+    @property
+    def needs(self) -> Mapping[str, float]:
+        """What decides whether a respect is made richer: height and weighted frequency."""
+        return {
+            name: max(change, SHIFT_WEIGHT * self.frequency[name])
+            for name, change in self.height.items()
+        }
+
+    @property
+    def shift(self) -> float:
+        """Sum of the changes of frequency: its estimated error."""
+        return float(sum(self.frequency.values()))
+
+
+def peak_from(
+    family: Family,
+    old: Settings,
+    point: Solution,
+    new: Settings,
+    accuracy: float,
+    fallbacks: bool = True,
+) -> Peak:
+    """The peak of a model with other settings, uphill of a point solved with the old ones.
+
+    Args:
+        fallbacks: where Newton's method fails from that point.
+
+    Raises:
+        NotSolvedError: a point was not solved, or no maximum was closed in.
+    """
+    before = member(family, old)
+    after = member(family, new)
+    start = replace(point, w=carried(point.w, before, after, new.harmonics))
+    return find_peak(
+        after.model,
+        point.omega,
+        new.harmonics,
+        new.samples,
+        near=start,
+        tolerance=SHARE * accuracy,
+        options=replace(sufficient(accuracy), fallbacks=fallbacks),
+    )
+
+
+def peak_errors(family: Family, settings: Settings, peak: Peak, accuracy: float) -> PeakErrors:
+    """The peak again in a model that is richer in one respect, for each of them."""
+    point = peak.solution
+    exact = ("harmonics", "samples") if sticks_safely(member(family, settings).model, point) else ()
+    heights = dict.fromkeys(DIRECTIONS, 0.0)
+    shifts = dict.fromkeys(DIRECTIONS, 0.0)
+    better = {}
+    for name in DIRECTIONS:
+        other = None if name in exact else judge_settings(family, settings, name)
+        if other is None:
+            continue
+        if judge_too_large(family, other, point):
+            heights[name] = np.inf
+            shifts[name] = np.inf
+            continue
+        try:
+            found = peak_from(family, settings, point, other, accuracy, fallbacks=False)
+        except NotSolvedError:
+            heights[name] = np.inf
+            shifts[name] = np.inf
+            continue
+        better[name] = found
+        heights[name] = abs(peak.height / found.height - 1)
+        shifts[name] = abs(peak.omega / found.omega - 1)
+    return PeakErrors(heights, shifts, better)
+
+
+def judge_settings(family: Family, settings: Settings, name: str) -> Settings | None:
+    """The settings that one respect is judged by: those of ``indicators.richer``, but of contact
+    points only MORE_POINTS times as many.
+
+    Parts of a seat are halved again and again, so that the finer points are parts of the coarser
+    ones; all of them cost 20 times as much on the shipped wedge.
+    """
+    other = richer(family, settings, name)
+    if name != "points" or other is None:
+        return other
+    groups = member(family, settings).groups
+    more = MORE_POINTS * settings.points
+    # two seats
+    return replace(settings, points=more) if 2 * more < len(groups) else other
+
+
+def choose_at_peak(
+    family: Family,
+    settings: Settings,
+    peak: Peak,
+    accuracy: float,
+    fixed: tuple[str, ...] = (),
+) -> tuple[Settings, Peak, PeakErrors]:
+    """Settings whose estimated errors of height and frequency keep within ENOUGH of the accuracy,
+    or the best that may be chosen; the peak with them, and its errors.
+
+    Nothing is refined in a respect in which the richer model was not solved: its error is unknown.
+
+    Args:
+        peak: found with `settings`.
+        fixed: names that may not be changed here although they are not the user's.
+    """
+    for _ in range(ROUNDS):
+        errors = peak_errors(family, settings, peak, accuracy)
+        settings = replace(settings, error=errors.total)
+        better = _next_settings(family, settings, peak, errors, accuracy, fixed)
+        if better is None:
+            break
+        try:
+            peak = peak_from(family, settings, peak.solution, better, accuracy)
+        except NotSolvedError:
+            break
+        settings = better
+    return settings, peak, errors
+
+
+def _next_settings(
+    family: Family,
+    settings: Settings,
+    peak: Peak,
+    errors: PeakErrors,
+    accuracy: float,
+    fixed: tuple[str, ...],
+) -> Settings | None:
+    """Richer in the respect that is worst; None where the errors are small enough or nothing
+    helps.
+    """
+    needs = {name: need for name, need in errors.needs.items() if np.isfinite(need)}
+    if sum(errors.needs.values()) <= ENOUGH * accuracy:
+        return None
+    for name in sorted(needs, key=lambda name: -needs[name]):
+        if name not in settings.chosen or name in fixed or needs[name] <= LEAST * accuracy:
+            continue
+        better = enriched(settings, name, needs[name] / (ENOUGH * accuracy))
+        if better is not None and not _too_large(family, better, peak.solution, LIFTING):
+            return better
+    return None
+
+
+def judge_too_large(family: Family, other: Settings, point: Solution) -> bool:
+    """A model that only tells the error of a point where contacts lift off costs too much."""
+    return _too_large(family, other, point, LIFTING_JUDGE)
+
+
+def _too_large(family: Family, settings: Settings, point: Solution, limit: int) -> bool:
+    """Contacts lift off, and the balance would have more unknowns than a limit."""
+    model = member(family, settings).model
+    unknowns = model.springs.size * (2 * settings.harmonics + 1)
+    return point.states["lift"] > 0 and unknowns > limit

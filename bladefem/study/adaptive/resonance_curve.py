@@ -1,0 +1,176 @@
+"""A response curve whose settings hold at its resonance, and what its other points are wrong."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from ...errors import NotSolvedError
+from ...hbm.peak import Peak
+from ...hbm.solution import Solution
+from ...hbm.sweep import FOLLOWED, size
+from .check_points import LOUDEST, QUIET, SHARES, heights_of, hidden, peak_of
+from .choice import Checked, covered, sufficient
+from .family import Family, member
+from .indicators import moved, richer
+from .resonance_choice import PeakErrors, choose_at_peak, judge_settings, judge_too_large, peak_from
+from .settings import Settings, enriched
+
+__all__ = ["resonance_curve", "unfollowed"]
+
+# sweeps of one curve with ever richer settings
+PASSES = 3
+
+
+def resonance_curve(
+    family: Family,
+    settings: Settings,
+    band: tuple[float, float] | None,
+    mode: int,
+    accuracy: float,
+) -> Checked:
+    """A swept curve with settings that hold the height of its peak to half the accuracy.
+
+    A rough sweep finds the peak, the settings are chosen there, and the curve is swept with them.
+    It is swept again where that shows a higher peak, or points where harmonics that were left out
+    move more than the accuracy allows.
+
+    Args:
+        settings: where the choice begins, for example those of a neighbouring load.
+        band: [Hz]; round the resonances when None.
+
+    Raises:
+        NotSolvedError: no point converged.
+    """
+    settings = replace(settings, error=None)
+    widen = band is None
+    points = covered(member(family, settings).model, settings, band, mode, 1.0)
+    used = settings
+    for _ in range(PASSES):
+        used, peak, errors = _chosen(family, used, peak_of(points), accuracy)
+        span = band or (points[0].frequency, points[-1].frequency)
+        paths = not unfollowed(family, used)
+        points = covered(member(family, used).model, used, span, mode, accuracy, widen, paths)
+        points = _with_peak(points, peak)
+        found = _checked_flanks(family, used, points, errors)
+        loud = _checked_loud(family, used, points, accuracy)
+        found = loud | found
+        richer_harmonics = _harmonics_missed(used, points, loud, accuracy)
+        if richer_harmonics is not None:
+            used = richer_harmonics
+        elif size(peak_of(points)) <= (1 + accuracy / 2) * _height(peak, points):
+            break
+    return Checked(used, points, found)
+
+
+def unfollowed(family: Family, settings: Settings) -> bool:
+    """The balance has too many unknowns for following its motions round folds in a curve of many
+    points.
+    """
+    return member(family, settings).model.springs.size * (2 * settings.harmonics + 1) > FOLLOWED
+
+
+def _chosen(
+    family: Family, settings: Settings, top: Solution, accuracy: float
+) -> tuple[Settings, Peak | None, PeakErrors | None]:
+    """Settings that hold at the peak next to a point; the same with an unknown error where that
+    peak was not closed in.
+    """
+    try:
+        peak = peak_from(family, settings, top, settings, accuracy)
+    except NotSolvedError:
+        return replace(settings, error=np.inf), None, None
+    return choose_at_peak(family, settings, peak, accuracy, fixed=("modes",))
+
+
+def _height(peak: Peak | None, points: Sequence[Solution]) -> float:
+    return size(peak_of(points)) if peak is None else peak.height
+
+
+def _with_peak(points: list[Solution], peak: Peak | None) -> list[Solution]:
+    """The points with the peak that was found by its slope, if it is none of them."""
+    if peak is None or any(p.omega == peak.omega for p in points):
+        return points
+    return sorted([*points, peak.solution], key=lambda p: p.omega)
+
+
+def _checked_flanks(
+    family: Family, settings: Settings, points: Sequence[Solution], errors: PeakErrors | None
+) -> dict[float, float]:
+    """Circular frequency -> estimated relative error: of the peak, and of one point on each flank
+    for each of SHARES of its height.
+
+    A flank is judged in the respect that is worst at the peak, as far from the peak of the richer
+    model as it stands from its own.
+    """
+    top = peak_of(points)
+    found = {top.omega: np.inf if settings.error is None else settings.error}
+    if errors is None or not errors.better:
+        return found
+    worst = max(errors.better, key=lambda name: errors.needs[name])
+    other = judge_settings(family, settings, worst)
+    if other is None:
+        return found
+    shift = errors.better[worst].omega / top.omega
+    for point in _flanks(points, heights_of(points), top):
+        found[point.omega] = _change(family, settings, point, other, shift)
+    return found
+
+
+def _checked_loud(
+    family: Family, settings: Settings, points: Sequence[Solution], accuracy: float
+) -> dict[float, float]:
+    """Circular frequency -> estimated relative error by more harmonics, of the LOUDEST points
+    where harmonics that were left out move the contacts.
+    """
+    share = heights_of(points) / size(peak_of(points))
+    loud = hidden(family, [settings] * len(points), points) * share
+    order = np.argsort(-loud)[:LOUDEST]
+    chosen = [points[i] for i in order[loud[order] > QUIET * accuracy] if points[i].converged]
+    other = richer(family, settings, "harmonics")
+    if other is None:
+        return {}
+    return {p.omega: _change(family, settings, p, other, 1.0) for p in chosen}
+
+
+def _flanks(points: Sequence[Solution], heights: np.ndarray, top: Solution) -> list[Solution]:
+    """Of each side of the peak, the points whose heights are nearest to SHARES of it."""
+    omegas = np.array([p.omega for p in points])
+    chosen = []
+    for side in (omegas < top.omega, omegas > top.omega):
+        good = np.flatnonzero(side & (heights > 0))
+        for share in SHARES if len(good) else ():
+            chosen.append(good[np.argmin(abs(heights[good] - share * size(top)))])
+    return [points[i] for i in dict.fromkeys(chosen)]
+
+
+def _change(
+    family: Family, settings: Settings, point: Solution, other: Settings, shift: float
+) -> float:
+    """Relative change of the amplitude in another model, at a frequency shifted by a factor;
+    infinite where that is not solved, or too large to be.
+    """
+    if judge_too_large(family, other, point):
+        return np.inf
+    moved_point = replace(point, omega=point.omega * shift)
+    better = moved(family, settings, moved_point, other, replace(sufficient(1e-2), fallbacks=False))
+    return abs(size(point) / size(better) - 1) if better.converged else np.inf
+
+
+def _harmonics_missed(
+    settings: Settings, points: Sequence[Solution], loud: dict[float, float], accuracy: float
+) -> Settings | None:
+    """Settings with more harmonics where a loud point away from the peak is wrong beyond its
+    tolerance; None where all hold, or harmonics are not to be chosen.
+    """
+    top = peak_of(points)
+    if "harmonics" not in settings.chosen:
+        return None
+    for point in points:
+        error = loud.get(point.omega, 0.0)
+        tolerated = accuracy * size(top) / max(size(point), 1e-6 * size(top))
+        if point is not top and np.isfinite(error) and error > tolerated:
+            return enriched(settings, "harmonics")
+    return None

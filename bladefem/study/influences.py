@@ -1,0 +1,327 @@
+"""What the best load hangs on: how it, its amplitude and its frequency change with what is known
+least.
+
+With A(L, p) the height of the resonance under load L with a parameter p, both as logarithms, the
+best load L* is where dA/dL = 0. There
+
+    d ln A / dp = A_p / A                    (A does not change with L to first order),
+    d L* / dp = -A_Lp / A_LL,
+    d omega / dp = -(S_wp + S_wL dL*/dp) / S_ww   (S: height over frequency, S_w = 0 at the peak).
+
+The first derivatives are exact (``hbm.node_gradients``), with the seating solved anew for the
+parameter; second ones are differences of exact first ones. Ranges are wide, so that the two with
+the largest effect on the amplitude are solved again at both ends.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+from math import log
+
+import numpy as np
+
+from ..contact.interface_elements import gives_stiffness
+from ..errors import NotSolvedError
+from ..hbm.model import ReducedModel
+from ..hbm.node_gradients import node_gradients
+from ..hbm.parameters import vary
+from ..hbm.peak import Peak, find_peak
+from ..hbm.sensitivity import sensitivities
+from ..hbm.solve import solve
+from ..scene.tables import Scene
+from .adaptive.choice import sufficient
+from .adaptive.family import Family, joined, member
+from .adaptive.settings import Settings
+from .pipeline.assemble_model import LoadCase
+from .pipeline.best_load import BestLoad, find_best_load
+
+__all__ = ["Influence", "Parameter", "influences", "parameters_of", "seat_friction_range"]
+
+# factor on each side of a stiffness that the scene gives: a joint measured twice
+GIVEN_STIFFNESS = 2.0
+# the same where a measured range of other joints stands in for it
+USUAL_STIFFNESS = 10.0
+# factor on each side of the friction coefficient and of the damping ratio
+FRICTION = 1.3
+DAMPING = 2.0
+# relative step of a parameter, and of the load, in differences of exact derivatives
+STEP = 2e-3
+# share of the frequency on each side of a peak over which its curvature is measured
+BESIDE = 5e-4
+# most harmonics and contact points of a seat in the model that tells changes
+COARSE = {"harmonics": 3, "points": 8}
+# parameters that are solved again at the ends of their ranges
+CHECKED = 2
+
+
+@dataclass(frozen=True)
+class Parameter:
+    """One quantity of the scene that is multiplied by a factor."""
+
+    # "kt", "kn", "mu", "damping" or "seat friction"
+    name: str
+    # factors at the ends of its range
+    low: float
+    high: float
+    # why this range
+    range_from: str
+
+
+@dataclass(frozen=True)
+class Influence:
+    """How the answer changes with one parameter; logarithmic derivatives are per factor e."""
+
+    parameter: Parameter
+    # d ln of the best load, of the amplitude and of the frequency there by d ln of the parameter
+    load: float
+    amplitude: float
+    frequency: float
+    # (2, 3) load [N], amplitude [m], frequency [Hz] at the low and the high end by the derivatives
+    predicted: np.ndarray
+    # (2, 3) the same solved again; NaN where it was not
+    solved: np.ndarray
+    # why an end was not solved
+    reason: str = ""
+
+    @property
+    def span(self) -> float:
+        """Change of ln amplitude over the whole range."""
+        return abs(self.amplitude) * log(self.parameter.high / self.parameter.low)
+
+
+# parameter name, factor -> load [N] -> load case with that parameter changed
+ChangedCases = Callable[[str, float], Callable[[float], LoadCase]]
+
+
+def parameters_of(scene: Scene, angle: float | None = None) -> list[Parameter]:
+    """The parameters that an answer hangs on, with their ranges.
+
+    Args:
+        angle: of each flank against the radial plane [rad], where the damper is a wedge.
+    """
+    stiffness = GIVEN_STIFFNESS if gives_stiffness(scene.contact) else USUAL_STIFFNESS
+    known = "given by the scene" if gives_stiffness(scene.contact) else "measured joints"
+    found = [
+        Parameter("kt", 1 / stiffness, stiffness, known),
+        Parameter("kn", 1 / stiffness, stiffness, known),
+        Parameter("mu", 1 / FRICTION, FRICTION, "scatter of friction coefficients"),
+        Parameter("damping", 1 / DAMPING, DAMPING, "damping without friction"),
+    ]
+    ends = None if angle is None else seat_friction_range(scene.contact.mu, angle)
+    if ends is not None:
+        found.append(Parameter("seat friction", *ends, "friction while seating"))
+    return found
+
+
+def seat_friction_range(mu: float, angle: float) -> tuple[float, float] | None:
+    """Normal load of a seat with friction over that without, for friction either way.
+
+    N = F / (2 (sin a +- mu cos a)) in place of F / (2 sin a); None for a self-locking wedge.
+    """
+    holding = mu / np.tan(angle)
+    return None if holding >= 1 else (1 / (1 + holding), 1 / (1 - holding))
+
+
+def influences(
+    scene: Scene,
+    best: BestLoad,
+    family_of: Callable[[LoadCase], Family],
+    changed: ChangedCases,
+    parameters: Sequence[Parameter],
+) -> list[Influence]:
+    """The influence of each parameter, the largest on the amplitude first.
+
+    Where harmonics and contact points were chosen, a model of at most COARSE of them tells the
+    changes, relative to its own best load.
+
+    Args:
+        best: a best load that was found.
+        changed: load cases with one parameter changed by a factor.
+
+    Raises:
+        NotSolvedError: the peak of the best load was not solved again.
+    """
+    if any(name in best.settings.chosen for name in ("harmonics", "points")):
+        coarse = _coarse(best.settings)
+        quick = find_best_load(
+            scene, changed("kt", 1.0), family_of, coarse, best.mass, start=best.load
+        )
+        if quick.reason:
+            raise NotSolvedError(quick.reason)
+        found = influences(scene, quick, family_of, changed, parameters)
+        return [_rescaled(one, quick, best) for one in found]
+    study = _Study(scene, best, family_of, changed)
+    base = study.peak("kt", 1.0, best.load)
+    slopes = []
+    tilts = []
+    for load in (best.load * (1 - STEP), best.load * (1 + STEP)):
+        peak = study.peak("kt", 1.0, load, base)
+        slopes.append(study.by_load(peak, "kt", 1.0, load))
+        tilts.append(study.by_frequency(study.model("kt", 1.0, load), base))
+    bend = (slopes[1] - slopes[0]) / (2 * STEP)
+    tilt = (tilts[1] - tilts[0]) / (2 * STEP)
+    found = [study.influence(p, base, bend, tilt) for p in parameters]
+    found.sort(key=lambda one: -one.span)
+    return [study.solved_again(one) if i < CHECKED else one for i, one in enumerate(found)]
+
+
+def _coarse(settings: Settings) -> Settings:
+    """The settings with at most COARSE of what was chosen; nothing is left to choose."""
+    least = {
+        name: min(value, getattr(settings, name) or value)
+        for name, value in COARSE.items()
+        if name in settings.chosen
+    }
+    return replace(settings, **least, chosen=())
+
+
+def _rescaled(one: Influence, quick: BestLoad, best: BestLoad) -> Influence:
+    """The changes of one best load, put on the values of another."""
+    values = [np.array([b.load, b.amplitude, b.frequency]) for b in (quick, best)]
+    ratio = values[1] / values[0]
+    return replace(one, predicted=one.predicted * ratio, solved=one.solved * ratio)
+
+
+@dataclass(frozen=True)
+class _Study:
+    """What the influences of one best load share."""
+
+    scene: Scene
+    best: BestLoad
+    family_of: Callable[[LoadCase], Family]
+    changed: ChangedCases
+
+    def model(self, name: str, factor: float, load: float) -> ReducedModel:
+        """The model of one load with a parameter changed."""
+        case = self.changed(name, factor)(load)
+        model = member(self.family_of(case), self.best.settings).model
+        return vary(model, "damping", factor) if name == "damping" else model
+
+    def peak(self, name: str, factor: float, load: float, near: Peak | None = None) -> Peak:
+        """Its resonance."""
+        settings = self.best.settings
+        omega = 2 * np.pi * self.best.frequency if near is None else near.omega
+        return find_peak(
+            self.model(name, factor, load),
+            omega,
+            settings.harmonics,
+            settings.samples,
+            near=near,
+            tolerance=1e-6,
+            options=replace(sufficient(self.scene.accuracy), tolerance=1e-9),
+        )
+
+    def by_load(self, peak: Peak, name: str, factor: float, load: float) -> float:
+        """Derivative of ln height by ln load, the seating solved anew."""
+        case_at = self.changed(name, factor)
+        ends = [case_at(load * f).elements for f in (1 - STEP, 1 + STEP)]
+        return self._by_elements(peak, self.model(name, factor, load), ends)
+
+    def by_parameter(self, peak: Peak, name: str) -> float:
+        """Derivative of ln height at the best load by the logarithm of a parameter."""
+        model = self.model(name, 1.0, self.best.load)
+        if name == "damping":
+            slope = sensitivities(model, peak.solution, ["damping"])["damping"].size[0]
+            return float(slope) / peak.height
+        ends = [self.changed(name, f)(self.best.load).elements for f in (1 - STEP, 1 + STEP)]
+        return self._by_elements(peak, model, ends)
+
+    def _by_elements(self, peak: Peak, model: ReducedModel, ends: list) -> float:
+        """The same from the friction elements on both sides of a step."""
+        case = self.changed("kt", 1.0)(self.best.load)
+        groups = member(self.family_of(case), self.best.settings).groups
+        low, high = (joined(e, groups) for e in ends)
+        rates = {
+            "load": _log_rate(low.n0, high.n0),
+            "kt": _log_rate(low.kt, high.kt),
+            "kn": _log_rate(low.kn, high.kn),
+            "mu": _log_rate(low.mu, high.mu),
+        }
+        names = [name for name in rates if np.any(rates[name])]
+        gradients = node_gradients(model, peak.solution, names)
+        return sum(float(gradients[name] @ rates[name]) for name in names) / peak.height
+
+    def by_frequency(self, model: ReducedModel, peak: Peak, beside: float = 0.0) -> float:
+        """Derivative of the height by the circular frequency at the frequency of a peak, or a share
+        of it beside.
+        """
+        settings = self.best.settings
+        point = solve(
+            model,
+            peak.omega * (1 + beside),
+            settings.harmonics,
+            settings.samples,
+            start=peak.solution,
+            options=replace(sufficient(self.scene.accuracy), tolerance=1e-9),
+        )
+        if not point.converged:
+            raise NotSolvedError(f"influence at {peak.solution.frequency:.6g} Hz: {point.reason}")
+        return float(sensitivities(model, point, ["omega"])["omega"].size[0])
+
+    def influence(self, parameter: Parameter, base: Peak, bend: float, tilt: float) -> Influence:
+        """All three derivatives of one parameter.
+
+        Args:
+            bend, tilt: derivatives by ln load of the height's own by ln load, over the height, and
+                of that by the frequency.
+        """
+        name = parameter.name
+        load = self.best.load
+        amplitude = self.by_parameter(base, name)
+        slopes = []
+        tilts = []
+        for factor in (1 - STEP, 1 + STEP):
+            peak = self.peak(name, factor, load, base)
+            slopes.append(self.by_load(peak, name, factor, load))
+            tilts.append(self.by_frequency(self.model(name, factor, load), base))
+        moved_load = -(slopes[1] - slopes[0]) / (2 * STEP) / bend
+        model = self.model(name, 1.0, load)
+        sides = [self.by_frequency(model, base, beside) for beside in (-BESIDE, BESIDE)]
+        curvature = (sides[1] - sides[0]) / (2 * BESIDE * base.omega)
+        tilted = (tilts[1] - tilts[0]) / (2 * STEP) + tilt * moved_load
+        moved = -tilted / curvature / base.omega
+        centre = np.log([load, base.height, base.solution.frequency])
+        rates = np.array([moved_load, amplitude, moved])
+        ends = np.log([parameter.low, parameter.high])
+        predicted = np.exp(centre + ends[:, None] * rates)
+        return Influence(parameter, *rates, predicted, np.full((2, 3), np.nan))
+
+    def solved_again(self, one: Influence) -> Influence:
+        """The best load searched again at both ends of the range."""
+        solved = np.full((2, 3), np.nan)
+        reasons = []
+        for i, factor in enumerate((one.parameter.low, one.parameter.high)):
+            name = one.parameter.name
+
+            def family_of(case: LoadCase, name: str = name, factor: float = factor) -> Family:
+                family = self.family_of(case)
+                if name != "damping":
+                    return family
+
+                def build(settings):
+                    made = family.build(settings)
+                    return replace(made, model=vary(made.model, "damping", factor))
+
+                return replace(family, build=build)
+
+            found = find_best_load(
+                self.scene,
+                self.changed(name, factor),
+                family_of,
+                replace(self.best.settings, chosen=()),
+                self.best.mass,
+                start=one.predicted[i, 0],
+            )
+            solved[i] = found.load, found.amplitude, found.frequency
+            if found.reason:
+                reasons.append(f"{name} times {factor:.3g}: {found.reason}")
+        return replace(one, solved=solved, reason="; ".join(reasons))
+
+
+def _log_rate(low: np.ndarray, high: np.ndarray) -> np.ndarray:
+    """(n,) derivative of ln |x| by the logarithm that was stepped; 0 where x is 0."""
+    middle = (low + high) / 2
+    change = (high - low) / (2 * STEP)
+    rate = np.divide(change, middle, out=np.zeros_like(middle), where=middle != 0)
+    return np.where(abs(rate) < 1e-9, 0.0, rate)

@@ -1,0 +1,264 @@
+"""The best load: the static load of a seat that makes the resonance smallest, by an exact search.
+
+Peaks are followed from load to load along their exact derivatives (``hbm.optimum``); the damper is
+seated anew for each load. When the search is done, the settings are judged at its end; where they
+are too poor for the accuracy, it is repeated with richer ones near the load that it found.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+from functools import lru_cache
+
+import numpy as np
+from scipy.interpolate import CubicHermiteSpline
+from scipy.optimize import brentq
+
+from ...errors import NotSolvedError
+from ...hbm.model import ReducedModel
+from ...hbm.node_gradients import node_gradients
+from ...hbm.optimum import Optimum, Variation, lowest_peak
+from ...hbm.peak import Peak, with_slope
+from ...scene.tables import Scene
+from ..adaptive.choice import default_band, sufficient
+from ..adaptive.family import Family, joined, member
+from ..adaptive.resonance_choice import choose_at_peak
+from ..adaptive.settings import Settings
+from .assemble_model import LoadCase
+
+__all__ = ["BestLoad", "chart_loads", "find_best_load", "load_variation", "tolerated_loads"]
+
+CaseAt = Callable[[float], LoadCase]
+FamilyOf = Callable[[LoadCase], Family]
+
+# loads of a design chart over the best one: the branch where the damper slides, the optimum, and
+# the branch where it sticks
+FACTORS = (1 / 8, 1 / 4, 1 / 2, 1.0, 2.0, 4.0, 8.0, 15.0, 30.0)
+# range of the search, over the force at which friction could hold the excitation
+RANGE = (0.1, 1e4)
+# of the height of the resonance, over the accuracy of the scene: what the search stops at
+SHARE = 0.02
+# relative step of the load by which the seating is differentiated
+STEP = 1e-4
+# searches, each with richer settings than the last
+SEARCHES = 3
+# range of a repeated search on each side of the load found before, as a factor
+NEAR = 4.0
+
+
+@dataclass(frozen=True)
+class BestLoad:
+    """What the search found; where it failed, ``reason`` says why and the numbers are NaN."""
+
+    # of the damper [kg]; as meshed when None
+    mass: float | None
+    # mean normal force on each seat [N]
+    load: float
+    # resonance there [Hz]
+    frequency: float
+    # [m]
+    amplitude: float
+    # friction work a period there [J]
+    dissipated: float
+    # work that the excitation puts in a period there [J]
+    input_work: float
+    # relative, of the amplitude: how far the search may have stopped above the minimum
+    tolerance: float
+    # loads between which the amplitude is within the scene's accuracy of the lowest [N]; NaN where
+    # the search did not get that far
+    between: tuple[float, float]
+    # with the estimated error of the amplitude
+    settings: Settings
+    # (k,) loads that were tried, ascending [N], and the resonance amplitude of each [m]
+    tried: np.ndarray
+    heights: np.ndarray
+    # range of loads that was searched [N]
+    searched: tuple[float, float]
+    # solved altogether
+    points: int
+    # empty where the search succeeded
+    reason: str = ""
+
+
+def find_best_load(
+    scene: Scene,
+    case_at: CaseAt,
+    family_of: FamilyOf,
+    settings: Settings,
+    mass: float | None,
+    start: float | None = None,
+) -> BestLoad:
+    """The load with the smallest resonance, and how sure it is.
+
+    Args:
+        case_at: static load of a seat [N] -> the seated damper's friction elements.
+        family_of: load case -> its models.
+        settings: where to begin; what is open in them is enriched as the accuracy needs.
+        start: load to begin at [N].
+    """
+    case_at = lru_cache(maxsize=None)(case_at)
+    searched = search_range(scene)
+    bounds = searched
+    points = 0
+    try:
+        for _ in range(SEARCHES):
+            found = _search(scene, case_at, family_of, settings, bounds, start)
+            points += found.points
+            if not settings.chosen and settings.error is not None:
+                break
+            family = family_of(case_at(found.value))
+            richer, _, _ = choose_at_peak(
+                family, settings, found.peak, scene.accuracy, fixed=("modes",)
+            )
+            enough = replace(richer, error=settings.error) == settings
+            settings = richer
+            if enough:
+                break
+            start = found.value
+            bounds = (
+                max(searched[0], found.value / NEAR),
+                min(searched[1], found.value * NEAR),
+            )
+    except NotSolvedError as error:
+        return _unknown(settings, mass, searched, points, str(error))
+    return _record(scene, found, settings, mass, searched, points)
+
+
+def search_range(scene: Scene) -> tuple[float, float]:
+    """Loads [N] between which the best one is sought."""
+    mu = max(scene.contact.mu, 1e-3)
+    return tuple(factor * scene.excitation.force / mu for factor in RANGE)
+
+
+def _search(
+    scene: Scene,
+    case_at: CaseAt,
+    family_of: FamilyOf,
+    settings: Settings,
+    bounds: tuple[float, float],
+    start: float | None,
+) -> Optimum:
+    along = load_variation(case_at, family_of, settings)
+    middle = start or float(np.sqrt(bounds[0] * bounds[1]))
+    band = scene.study.band or default_band(along.model_at(middle), scene.excitation.mode)
+    return lowest_peak(
+        along,
+        (2 * np.pi * band[0], 2 * np.pi * band[1]),
+        bounds,
+        settings.harmonics,
+        settings.samples,
+        start=middle,
+        tolerance=SHARE * scene.accuracy,
+        options=sufficient(scene.accuracy),
+    )
+
+
+def load_variation(case_at: CaseAt, family_of: FamilyOf, settings: Settings) -> Variation:
+    """Models along the static load, the damper seated anew for each."""
+
+    @lru_cache(maxsize=None)
+    def model_at(load: float) -> ReducedModel:
+        return member(family_of(case_at(load)), settings).model
+
+    def sloped(model: ReducedModel, peak: Peak, load: float) -> Peak:
+        groups = member(family_of(case_at(load)), settings).groups
+        low, high = (joined(case_at(load * (1 + sign * STEP)).elements, groups) for sign in (-1, 1))
+        rates = {
+            "load": _relative_rate(low.n0, high.n0),
+            "kt": _relative_rate(low.kt, high.kt),
+            "kn": _relative_rate(low.kn, high.kn),
+        }
+        proportional = abs(rates["load"] - 1).max() < STEP
+        if proportional and not (rates["kt"].any() or rates["kn"].any()):
+            return with_slope(model, peak, "load", load)
+        names = [name for name in rates if np.any(rates[name])]
+        gradients = node_gradients(model, peak.solution, names)
+        slope = sum(float(gradients[name] @ rates[name]) for name in names)
+        return replace(peak, value=load, slope=slope)
+
+    return Variation(model_at, sloped)
+
+
+def _relative_rate(low: np.ndarray, high: np.ndarray) -> np.ndarray:
+    """(n,) derivative of ln |x| by the logarithm of the load; 0 where x is 0 or hardly changes."""
+    middle = (low + high) / 2
+    change = (high - low) / (2 * STEP)
+    rate = np.divide(change, middle, out=np.zeros_like(middle), where=middle != 0)
+    return np.where(abs(rate) < STEP, 0.0, rate)
+
+
+def _record(
+    scene: Scene,
+    found: Optimum,
+    settings: Settings,
+    mass: float | None,
+    searched: tuple[float, float],
+    points: int,
+) -> BestLoad:
+    tried = sorted(found.tried, key=lambda peak: peak.value)
+    solution = found.peak.solution
+    return BestLoad(
+        mass,
+        found.value,
+        solution.frequency,
+        found.peak.height,
+        solution.work.dissipated,
+        solution.work.input,
+        SHARE * scene.accuracy,
+        tolerated_loads(tried, scene.accuracy),
+        settings,
+        np.array([peak.value for peak in tried]),
+        np.array([peak.height for peak in tried]),
+        searched,
+        points,
+    )
+
+
+def _unknown(
+    settings: Settings, mass: float | None, searched: tuple[float, float], points: int, reason: str
+) -> BestLoad:
+    nan = np.nan
+    return BestLoad(
+        mass, nan, nan, nan, nan, nan, nan, (nan, nan), replace(settings, error=np.inf),
+        np.zeros(0), np.zeros(0), searched, points, reason,
+    )  # fmt: skip
+
+
+def tolerated_loads(tried: Sequence[Peak], accuracy: float) -> tuple[float, float]:
+    """Loads [N] on either side of the best one at which the amplitude has grown by the accuracy.
+
+    On the curve through heights and slopes of the peaks that were tried; NaN on a side where none
+    of them is that high.
+
+    Args:
+        tried: peaks with their loads ascending.
+    """
+    logs = np.log([peak.value for peak in tried])
+    heights = np.array([peak.height for peak in tried])
+    slopes = np.array([peak.slope for peak in tried])
+    best = int(np.argmin(heights))
+    ends = [np.nan, np.nan]
+    if len(tried) < 2:
+        return tuple(ends)
+    curve = CubicHermiteSpline(logs, heights / heights[best] - 1 - accuracy, slopes / heights[best])
+    for i, side in enumerate((range(best - 1, -1, -1), range(best + 1, len(tried)))):
+        last = best
+        for j in side:
+            if heights[j] > (1 + accuracy) * heights[best]:
+                ends[i] = float(np.exp(brentq(curve, logs[last], logs[j])))
+                break
+            last = j
+    return tuple(ends)
+
+
+def chart_loads(bests: Sequence[BestLoad]) -> tuple[float, ...]:
+    """Loads of a design chart [N], from an eighth of the best one to thirty times it.
+
+    With several best loads, of several masses, from an eighth of the smallest to thirty times the
+    largest, each of them included.
+    """
+    loads = {
+        float(f"{factor * best.load:.2g}") for best in bests for factor in FACTORS if factor != 1.0
+    }
+    return tuple(sorted(loads | {float(f"{best.load:.4g}") for best in bests}))

@@ -1,0 +1,100 @@
+"""Load cases of a scene with one contact parameter changed, the damper seated anew for it."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import replace
+from functools import lru_cache
+
+from ...contact.frictional_seating import FrictionalProblem
+from ...contact.interface_elements import (
+    friction_elements,
+    layered,
+    pair_ratio,
+    scaled_contact,
+)
+from ...contact.seating import ContactProblem
+from ...contact.seating import solve as seat
+from ...scene.tables import Contact, Scene, Seat
+from .assemble_model import LoadCase
+from .history import seat_by_history
+
+__all__ = ["cases_of", "changed_cases"]
+
+
+def cases_of(
+    scene: Scene,
+    problem: ContactProblem,
+    tangents: int,
+    mass: float | None = None,
+    rough: FrictionalProblem | None = None,
+) -> Callable[[float], LoadCase]:
+    """Mean normal load of a seat [N] -> the seated damper's friction elements.
+
+    Args:
+        problem: with the scene's interface layer.
+        tangents: 2 for solids, 1 for plane models.
+        rough: all ports of the seats, where friction takes part in the seating.
+    """
+    ratio = pair_ratio(scene.material.blade, scene.material.damper)
+
+    def case_at(load: float) -> LoadCase:
+        if rough is None:
+            speed = scene.operation.speed
+            maps = seat(problem, speed, normal=load, bedded=scene.contact.bedded)
+        else:
+            maps = seat_by_history(scene, rough, load).maps
+        elements, selection = friction_elements(problem, maps, scene.contact, ratio, tangents)
+        return LoadCase(load, elements, selection, mass)
+
+    return case_at
+
+
+def changed_cases(
+    scene: Scene,
+    problem: ContactProblem,
+    tangents: int,
+    mass: float | None = None,
+    rough: FrictionalProblem | None = None,
+) -> Callable[[str, float], Callable[[float], LoadCase]]:
+    """Name of a parameter and its factor -> the load cases with it.
+
+    "kt", "kn" and "mu" change [contact] on both seats; "seat friction" the normal load that a
+    nominal one makes; "damping" no contact.
+    """
+    ratio = pair_ratio(scene.material.blade, scene.material.damper)
+
+    @lru_cache(maxsize=64)
+    def changed(name: str, factor: float) -> Callable[[float], LoadCase]:
+        if name in ("kt", "kn"):
+            contact = scaled_contact(scene.contact, ratio, **{name: factor})
+        elif name == "mu":
+            contact = _with_friction(scene.contact, factor)
+        else:
+            contact = scene.contact
+        there = replace(scene, contact=contact)
+        case_at = cases_of(there, layered(problem, contact, ratio), tangents, mass, rough)
+        by_load = factor if name == "seat friction" else 1.0
+
+        @lru_cache(maxsize=64)
+        def nominal(load: float) -> LoadCase:
+            return replace(case_at(by_load * load), load=load)
+
+        return nominal
+
+    return changed
+
+
+def _with_friction(contact: Contact, factor: float) -> Contact:
+    """[contact] with the friction coefficients of all seats times a factor."""
+
+    def scaled(seat_values: Seat) -> Seat:
+        own = seat_values.mu
+        return seat_values if own is None else replace(seat_values, mu=factor * own)
+
+    return replace(
+        contact,
+        mu=factor * contact.mu,
+        left=scaled(contact.left),
+        right=scaled(contact.right),
+    )

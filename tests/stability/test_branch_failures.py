@@ -1,0 +1,108 @@
+"""Where a curve of converged points is not what the blade does (F30, F31): a motion that time leaves,
+a damper that walks. Truth is a plain march written here. F29, the peak beyond a fold, stands in
+tests/hbm/test_branches.py.
+"""
+
+import numpy as np
+import pytest
+
+from bladefem.data import Elements, RigidBody
+from bladefem.hbm.model import Damping, ReducedModel
+from bladefem.hbm.solve import solve
+from bladefem.hbm.stability import STABLE, UNSTABLE, stability_verdict
+from bladefem.hbm.sweep import size
+from bladefem.reduction.matrices import port_model_from_matrices
+
+STEPS = 2000
+
+
+def rebounding(stiffness, gap, loss):
+    """A unit mass on a unit spring that meets a one-sided elastic stop; the second degree of
+    freedom carries the friction element, which has none.
+    """
+    ports = {"contact": [0, 1], "load": [0], "probe": [0]}
+    K = np.diag([1.0, 50.0])
+    body = port_model_from_matrices(np.eye(2), K, ports, C=loss * np.diag([1.0, 7.0]))
+    parts = (1e-3, stiffness, 0.0, -gap * stiffness)
+    element = Elements(*(np.array([x]) for x in parts), tangents=1)
+    return ReducedModel((body,), element, {1: np.array([1.0])})
+
+
+def bounced(stiffness, gap, loss, omega, q, v, periods):
+    """(periods, STEPS) displacement of that mass, by leapfrog."""
+    dt = 2 * np.pi / omega / STEPS
+    drive = np.cos(2 * np.pi * np.arange(STEPS) / STEPS)
+    seen = np.empty((periods, STEPS))
+    for period in range(periods):
+        for k in range(STEPS):
+            seen[period, k] = q
+            v += dt * (drive[k] - q - loss * v - stiffness * max(q - gap, 0.0))
+            q += dt * v
+    return seen
+
+
+def state_at_start(point):
+    h = 1j * np.arange(point.harmonics + 1) * point.omega
+    return point.probe[:, 0].sum().real, (h * point.probe[:, 0]).sum().real
+
+
+@pytest.mark.parametrize(
+    ("omega", "verdict", "name"), [(1.5, STABLE, ""), (3.0, UNSTABLE, "period doubling")]
+)
+def test_F30_a_converged_motion_that_time_leaves(omega, verdict, name):
+    """A mass on a stop without gap, driven at twice its own frequency: it answers every second
+    period, three times as high.
+    """
+    model = rebounding(10.0, 0.0, 0.04)
+    point = solve(model, omega, 11, 512)
+    assert point.converged and point.residual < 1e-9
+    found = stability_verdict(model, point)
+    assert (found.verdict, found.bifurcation) == (verdict, name)
+    q, v = state_at_start(point)
+    seen = bounced(10.0, 0.0, 0.04, omega, 1.001 * q, v, 80)
+    left = abs(seen[-1] - seen[0]).max() / np.ptp(seen[0])
+    if verdict == STABLE:
+        assert left < 0.02
+    else:
+        assert left > 1.0
+        assert abs(seen[-1] - seen[-3]).max() < 0.02 * np.ptp(seen[-1])
+
+
+def test_F31_a_damper_that_walks():
+    """Friction pushes one way while the load is high: a free damper never comes back, and a balance
+    of periodic motions has no place for it; springs hold it, and what they carry is reported.
+    """
+    K = np.array([[1.0]])
+    body = port_model_from_matrices(
+        np.eye(1), K, {"contact": [0], "load": [0], "probe": [0]}, C=0.02 * K
+    )
+    parts = (20.0, 0.0, 0.5, 0.3)
+    element = Elements(*(np.array([x]) for x in parts), tangents=1)
+    damper = RigidBody(np.array([[0.3]]), np.array([[1.0]]))
+    model = ReducedModel(
+        (body,), element, {1: np.array([0.3])}, Damping(), damper, normal={1: np.array([0.25j])}
+    )
+    omega = 1.3
+    point = solve(model, omega, 7, 512)
+    assert point.converged and point.states["slip"] == 1
+    assert point.drift > 5e-3
+    dt = 2 * np.pi / omega / STEPS
+    blade = np.zeros(2)
+    rider = np.zeros(2)
+    slider = 0.0
+    places = []
+    for k in range(60 * STEPS):
+        phase = 2 * np.pi * (k % STEPS) / STEPS
+        limit = 0.5 * max(0.3 - 0.25 * np.sin(phase), 0.0)
+        w = blade[0] - rider[0]
+        f = min(max(20.0 * (w - slider), -limit), limit)
+        slider = w - f / 20.0
+        blade[1] += dt * (0.3 * np.cos(phase) - blade[0] - 0.02 * blade[1] - f)
+        rider[1] += dt * f / 0.3
+        blade[0] += dt * blade[1]
+        rider[0] += dt * rider[1]
+        if k % STEPS == 0:
+            places.append(rider[0])
+    steps = np.diff(places[-10:])
+    assert abs(steps).min() > 1e-3 * size(point)
+    assert len(set(np.sign(steps))) == 1

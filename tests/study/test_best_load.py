@@ -1,0 +1,145 @@
+"""The best load: against a search of another kind, and where the data cannot carry a headline."""
+
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pandas as pd
+import pytest
+
+from bladefem.hbm.optimum import optimum
+from bladefem.hbm.peak import find_peak
+from bladefem.hbm.reference_blade import reference_model
+from bladefem.report.best_load import best_load_table, reasons_against
+from bladefem.report.statements import answer
+from bladefem.scene.toml import load_scene
+from bladefem.study.adaptive.family import family_of
+from bladefem.study.adaptive.settings import Settings
+from bladefem.study.pipeline.assemble_model import LoadCase
+from bladefem.study.pipeline.best_load import (
+    FACTORS,
+    chart_loads,
+    find_best_load,
+    load_variation,
+)
+
+HZ = 2 * np.pi
+PLANE = Path(__file__).parents[2] / "scenes" / "plane.toml"
+# force that is needed to close a gap before the seat presses [N]
+CLOSING = 0.4
+MODEL = reference_model(1e6, 0.06, 1.0, harmonics=7)
+SETTINGS = Settings(len(MODEL.sides[0].omega), 3, 0, "mass")
+
+
+def case_at(load: float) -> LoadCase:
+    """A seat whose normal force is what the load leaves after closing a gap: not proportional."""
+    elements = replace(MODEL.elements, n0=np.full(2, load - CLOSING))
+    return LoadCase(load, elements, np.eye(2))
+
+
+def family(case: LoadCase):
+    return family_of(replace(MODEL, elements=case.elements))
+
+
+def scene(**study):
+    found = load_scene(PLANE, ["accuracy=1 %", "contact.mu=1", "excitation.force=0.05 N"])
+    return replace(found, study=replace(found.study, band=(1150.0, 1450.0), **study))
+
+
+@pytest.fixture(scope="module")
+def best():
+    return find_best_load(scene(), case_at, family, SETTINGS, None)
+
+
+def test_the_search_follows_a_seating_that_is_not_proportional_to_the_load(best):
+    """The same optimum as of the normal force alone, plus what closes the gap."""
+    band = (HZ * 1150, HZ * 1450)
+    force = optimum(MODEL, band, (0.3, 6.0), 3, 0)
+    assert best.reason == ""
+    assert best.amplitude == pytest.approx(force.peak.height, rel=2 * best.tolerance)
+    assert best.load == pytest.approx(force.value * MODEL.elements.n0[0] + CLOSING, rel=0.03)
+    assert best.between[0] < best.load < best.between[1]
+    for load in best.between:
+        peak = find_peak(family(case_at(load)).build(SETTINGS).model, HZ * best.frequency, 3, 0)
+        assert peak.height == pytest.approx(1.01 * best.amplitude, rel=2e-3)
+
+
+def test_the_slope_of_a_peak_with_the_load_is_the_difference_of_two_peaks():
+    along = load_variation(case_at, family, SETTINGS)
+    low, middle, high = (
+        find_peak(along.model_at(load), HZ * 1350, 3, 0, tolerance=1e-8)
+        for load in (1.398, 1.4, 1.402)
+    )
+    found = along.with_slope(along.model_at(1.4), middle, 1.4).slope
+    assert found == pytest.approx((high.height - low.height) / np.log(1.402 / 1.398), rel=0.02)
+
+
+def test_a_chart_reaches_from_an_eighth_of_the_best_to_thirty_times_it(best):
+    loads = chart_loads([best])
+    assert len(loads) == len(FACTORS)
+    assert loads[0] == pytest.approx(best.load / 8, rel=0.05)
+    assert loads[-1] == pytest.approx(30 * best.load, rel=0.05)
+    assert float(f"{best.load:.4g}") in loads
+
+
+def test_a_search_that_fails_says_why():
+    def lost(case: LoadCase):
+        return family_of(replace(MODEL, elements=case.elements, excitation={1: np.zeros(1)}))
+
+    found = find_best_load(scene(), case_at, lost, SETTINGS, None)
+    assert "does not move" in found.reason and np.isnan(found.load)
+    assert found.settings.error == np.inf
+
+
+def tables(best, **changes):
+    """Design table and search of a case that a headline may rest on, with changes."""
+    table = best_load_table([best]).assign(**changes)
+    summary = pd.DataFrame(
+        {
+            "load": [0.0, best.load, np.inf],
+            "peak_frequency": [1200.0, best.frequency, 1400.0],
+            "peak_amplitude": [20 * best.amplitude, best.amplitude, 20 * best.amplitude],
+            "dissipated": [0.0, best.dissipated, 0.0],
+        }
+    )
+    return summary, table
+
+
+@pytest.mark.parametrize(
+    ("changes", "said"),
+    [
+        ({"reason": "point lost", "amplitude": np.nan}, "search failed"),
+        ({"dissipated": 0.0}, "not lowered by friction"),
+        ({"lowest_searched": 1e3}, "falls to the lowest load searched"),
+        ({"highest_searched": 1e-3}, "falls to the highest load searched"),
+        ({"error": np.inf}, "is unknown"),
+        ({"error": 0.97}, "no more than its estimated error"),
+    ],
+)
+def test_a_headline_is_refused_when_its_data_cannot_carry_it(best, changes, said):
+    summary, table = tables(best, **changes)
+    found = answer(summary, searched=table)
+    assert found.numbers[0][1] == "not determined"
+    assert any(said in caution for caution in found.cautions)
+
+
+def test_a_headline_is_refused_beside_a_point_that_was_not_solved(best):
+    summary, table = tables(best)
+    points = pd.DataFrame(
+        {
+            "load": best.load,
+            "frequency": [1.0, 2.0, 3.0],
+            "amplitude": [1.0, 2.0, 1.5],
+            "converged": [True, True, False],
+        }
+    )
+    row = summary.iloc[1]
+    assert "not solved" in reasons_against(row, summary, points)[0]
+    assert not reasons_against(row, summary, points.assign(converged=True))
+
+
+def test_a_headline_tells_its_tolerance_and_the_loads_that_do_as_well(best):
+    summary, table = tables(best)
+    found = answer(summary, searched=table).numbers
+    assert found[0][1] == f"{best.load:.4g} N" and "by exact search" in found[0][2]
+    assert "search closed to" in found[1][2] and "estimated error" in found[1][2]

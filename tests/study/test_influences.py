@@ -1,0 +1,115 @@
+"""What the best load hangs on: derivatives against the search repeated with changed parameters."""
+
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from bladefem.contact.interface_elements import scaled_contact, stiffnesses
+from bladefem.hbm.reference_blade import reference_model
+from bladefem.scene.tables import Contact, Seat
+from bladefem.scene.toml import load_scene
+from bladefem.study.adaptive.family import family_of
+from bladefem.study.adaptive.settings import Settings
+from bladefem.study.influences import Parameter, influences, seat_friction_range
+from bladefem.study.pipeline.assemble_model import LoadCase
+from bladefem.study.pipeline.best_load import find_best_load
+
+PLANE = Path(__file__).parents[2] / "scenes" / "plane.toml"
+MODEL = reference_model(1e6, 0.06, 1.0, harmonics=1)
+SETTINGS = Settings(len(MODEL.sides[0].omega), 1, 0, "mass")
+# half of the range over which the derivatives are compared with repeated searches
+SMALL = 1.04
+
+
+def changed(name, factor):
+    """The seats press with the load less what closes a gap, which grows with kt."""
+
+    def case_at(load):
+        stiff = factor if name == "kt" else 1.0
+        mu = factor if name == "mu" else 1.0
+        scaled = factor * load if name == "seat friction" else load
+        elements = replace(
+            MODEL.elements,
+            kt=stiff * MODEL.elements.kt,
+            mu=mu * MODEL.elements.mu,
+            n0=np.full(2, scaled - 0.2 * stiff),
+        )
+        return LoadCase(load, elements, np.eye(2))
+
+    return case_at
+
+
+def family(case):
+    return family_of(replace(MODEL, elements=case.elements))
+
+
+@pytest.fixture(scope="module")
+def found():
+    scene = load_scene(PLANE, ["accuracy=0.2 %", "contact.mu=1", "excitation.force=0.05 N"])
+    scene = replace(scene, study=replace(scene.study, band=(1150.0, 1450.0)))
+    best = find_best_load(scene, changed("kt", 1.0), family, SETTINGS, None)
+    names = ("kt", "mu", "damping", "seat friction")
+    parameters = [Parameter(name, 1 / SMALL, SMALL, "a test") for name in names]
+    return best, influences(scene, best, family, changed, parameters)
+
+
+def test_derivatives_are_those_of_repeated_searches(found):
+    best, all_found = found
+    assert best.reason == ""
+    solved = [one for one in all_found if np.isfinite(one.solved).all()]
+    assert len(solved) == 2
+    for one in solved:
+        change = np.log(one.solved[1] / one.solved[0]) / (2 * np.log(SMALL))
+        assert one.amplitude == pytest.approx(change[1], rel=0.02)
+        # a frequency is found to the square root of the search's tolerance only
+        assert one.frequency == pytest.approx(change[2], rel=0.1, abs=5e-3)
+        assert one.load == pytest.approx(change[0], rel=0.1, abs=0.05)
+
+
+def test_the_largest_influence_comes_first(found):
+    spans = [one.span for one in found[1]]
+    assert spans == sorted(spans, reverse=True)
+
+
+def test_friction_acts_through_its_product_with_the_normal_force(found):
+    """mu N decides alone: the best load less what closes the gap goes with 1 / mu."""
+    best, all_found = found
+    by_name = {one.parameter.name: one for one in all_found}
+    assert by_name["mu"].amplitude == pytest.approx(0.0, abs=2e-3)
+    assert by_name["mu"].load == pytest.approx(-(best.load - 0.2) / best.load, rel=0.02)
+    assert by_name["seat friction"].load == pytest.approx(-1.0, rel=0.02)
+
+
+def test_seat_friction_of_a_wedge():
+    """F / (2 (sin a +- mu cos a)) over F / (2 sin a); a self-locking wedge has no range."""
+    low, high = seat_friction_range(0.3, np.radians(65))
+    sine, cosine = np.sin(np.radians(65)), np.cos(np.radians(65))
+    assert low == pytest.approx(sine / (sine + 0.3 * cosine))
+    assert high == pytest.approx(sine / (sine - 0.3 * cosine))
+    assert seat_friction_range(0.6, np.radians(30)) is None
+
+
+@pytest.mark.parametrize(
+    "contact",
+    [
+        Contact(),
+        Contact(kt_area=4e10),
+        Contact(kn=3e7),
+        Contact(kt=1e7, kn_area=2e11),
+        Contact(kt_area=4e10, left=Seat(kn=3e7)),
+        Contact(left=Seat(kn_area=3e11)),
+    ],
+)
+def test_one_stiffness_is_scaled_without_the_other(contact):
+    from bladefem.contact.interface_elements import seat_contact
+
+    area = np.array([1e-5, 3e-5])
+    for name in ("this", "next"):
+        plain = stiffnesses(seat_contact(contact, name), 0.8, area)
+        for factors in ((2.0, 1.0), (1.0, 3.0)):
+            other = scaled_contact(contact, 0.8, *factors)
+            scaled = stiffnesses(seat_contact(other, name), 0.8, area)
+            for before, after, factor in zip(plain, scaled, factors, strict=True):
+                assert after == pytest.approx(factor * before)
