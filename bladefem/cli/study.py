@@ -1,4 +1,4 @@
-"""The command that varies fields: a response for each value, side by side in tables and one picture.
+"""The command that varies fields: a response for each value, side by side in one picture.
 
 One field: curves over its values. Two fields: a map. Scattered fields: a band over the loads.
 """
@@ -73,7 +73,8 @@ def study(options: argparse.Namespace, comm: Any) -> None:
     files: list[Path] = []
     for number, (values, one, scene) in enumerate(zip(plan.runs, parts, scenes, strict=True), 1):
         said = ", ".join(f"{n} = {v}" for n, v in zip(plan.names, values, strict=True))
-        tell(options, comm, lambda text=f"\n{said} ({number} of {len(parts)})": text)
+        progress = f"\n{said} ({number} of {len(parts)})"
+        tell(options, comm, lambda text=progress: text)
         if done:
             on_root(comm, lambda one=one: _borrow(Path(parts[0].output), Path(one.output)))
         run = until("response", one, comm)

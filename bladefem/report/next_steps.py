@@ -38,8 +38,8 @@ def next_steps(
     steps += _mesh_step(best)
     if scene.contact.normal == "coupled" and not scene.study.stability:
         steps.append(
-            "Normal loads follow the motion, so that a point may be unstable: leave study.stability "
-            "at true."
+            "Normal loads follow the motion, so that a point may be unstable: leave "
+            "study.stability at true."
         )
     return steps
 

@@ -64,8 +64,8 @@ def write_map(
 def write_scatter(
     names: Sequence[str], variants: Sequence[Variant], folder: Path
 ) -> tuple[pd.DataFrame, list[Path]]:
-    """Write study, study_loads, study.png (a band over the loads) and the page; returns the table of
-    the band and the files.
+    """Write study, study_loads, study.png (a band over the loads) and the page; returns the table
+    of the band and the files.
     """
     best, loads = _tables(tuple(names), variants)
     band = band_of(loads)

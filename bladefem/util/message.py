@@ -1,4 +1,4 @@
-"""What a run has to say: sentences with a level, so that warnings are not lost among information."""
+"""What a run has to say: sentences with a level, so that warnings are not lost."""
 
 from __future__ import annotations
 

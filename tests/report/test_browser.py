@@ -59,7 +59,8 @@ async function probe() {
   found.kinds = [];
   for (const figure of figures) {
     const place = await live(figure);
-    found.kinds.push({live: figure.classList.contains("is-live"), failed: figure.dataset.failed || "",
+    found.kinds.push({live: figure.classList.contains("is-live"),
+      failed: figure.dataset.failed || "",
       traces: place ? place.data.length : 0, width: place ? place.clientWidth : 0,
       picture: getComputedStyle(figure.querySelector("img")).display});
   }
@@ -75,7 +76,8 @@ async function probe() {
   const y = place.top + yaxis._offset + yaxis.d2p(chart.data[number].y[3]);
   const layer = chart.querySelector(".nsewdrag");
   for (const type of ["mouseover", "mouseenter", "mousemove"]) {
-    layer.dispatchEvent(new MouseEvent(type, {clientX: x, clientY: y, bubbles: true, view: window}));
+    const at = {clientX: x, clientY: y, bubbles: true, view: window};
+    layer.dispatchEvent(new MouseEvent(type, at));
   }
   await pause(500);
   found.hover = hovered && [hovered.x, hovered.y, chart.querySelector(".hoverlayer").textContent];

@@ -1,4 +1,4 @@
-"""Plans of studies: grids of two fields, scattered values, what is refused; and a real small one."""
+"""Plans of studies: grids of two fields, scattered values, and what is refused."""
 
 from __future__ import annotations
 
@@ -61,8 +61,10 @@ def test_samples_fill_the_ranges_evenly():
         (options(scatter=["contact.mu=0.1, 0.2"] * 2), "given twice"),
         (
             options(
-                ["contact.mu=" + ",".join(map(str, np.linspace(0.1, 1, 40)))]
-                + ["damper.angle=" + ",".join(f"{a:.4f}" for a in np.linspace(0.3, 1, 40))]
+                [
+                    "contact.mu=" + ",".join(map(str, np.linspace(0.1, 1, 40))),
+                    "damper.angle=" + ",".join(f"{a:.4f}" for a in np.linspace(0.3, 1, 40)),
+                ]
             ),
             "1600 runs, expected at most 1000",
         ),
