@@ -63,10 +63,9 @@ def draw_wheel_motion(
         ax.set_xticklabels([f"{i + 1}" for i in range(count)][:: max(count // 12, 1)])
         marks = np.linspace(0, amplitude.max(), 3)
         ax.set_yticks(1e6 * (inner + marks))
-        ax.set_yticklabels([f"{1e6 * m:.3g} µm" for m in marks])
-        ax.figure.text(0.02, 0.02, "length: amplitude; colour: phase", fontsize=8)
-        # between two blades
-        ax.set_rlabel_position(180 / count * (1 + 2 * (count // 8)))
+        ax.set_yticklabels([])
+        note = f"length: amplitude, {1e6 * amplitude.max():.4g} µm the longest; colour: phase"
+        ax.figure.text(0.02, 0.02, note, fontsize=8)
 
 
 def draw_bands(
