@@ -65,7 +65,7 @@ def draw_wheel_motion(
         ax.set_yticks(1e6 * (inner + marks))
         ax.set_yticklabels([])
         note = f"length: amplitude, {1e6 * amplitude.max():.4g} µm the longest; colour: phase"
-        ax.figure.text(0.02, 0.02, note, fontsize=8)
+        ax.set_xlabel(note, labelpad=8)
 
 
 def draw_bands(
