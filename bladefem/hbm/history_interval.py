@@ -76,6 +76,7 @@ class _Search:
 
     model: ReducedModel
     tolerance: float
+    most: int
     options: Options
     places: list[_Place]
     points: int
@@ -107,22 +108,29 @@ class _Search:
 
 
 def history_interval(
-    model: ReducedModel, peak: Peak, *, tolerance: float = 1e-4, options: Options = DEFAULTS
+    model: ReducedModel,
+    peak: Peak,
+    *,
+    tolerance: float = 1e-4,
+    most: int = 150,
+    options: Options = DEFAULTS,
 ) -> HistoryInterval:
     """The interval of a resonance over all loading histories.
 
     Args:
         peak: of this model (`find_peak`); its harmonics and samples are kept.
         tolerance: of the height, relative.
+        most: points of the balance after which no further move begins: the range is then sampled.
     """
     here = _Place(peak, tractions(model, peak.solution, options.probe))
-    search = _Search(model, tolerance, options, [here], 0, [])
+    search = _Search(model, tolerance, most, options, [here], 0, [])
     if model.directions == model.elements.tangents or not model.coupled:
         # a prescribed normal load or fixed mean displacements: nothing acts back
         return _interval(search, here, True)
     for pattern in _extreme_loads(model, peak):
         search.solve(pattern, peak)
-    ended = [_climb(search, sign) for sign in (-1.0, 1.0)]
+    # one end may not take the other's share
+    ended = [_climb(search, sign, part) for sign, part in ((-1.0, most / 2), (1.0, most))]
     return _interval(search, here, all(ended))
 
 
@@ -147,13 +155,15 @@ def _extreme_loads(model: ReducedModel, peak: Peak) -> Sequence[np.ndarray]:
     return [sign * limit[:, None] * along for sign in (-1.0, 1.0)]
 
 
-def _climb(search: _Search, sign: float) -> bool:
+def _climb(search: _Search, sign: float, most: float) -> bool:
     """Push from the best place towards lower (-1) or higher (1) resonances, until that gains less
     than the tolerance; whether no admissible change promises more.
     """
     place = max(search.places, key=lambda one: sign * one.peak.height)
     share = 1.0
     for _ in range(MOVES):
+        if search.points >= most:
+            return False
         better = None
         while better is None and share >= SHORTEST:
             better = _gaining(search, place, share * _push(search.model, place, sign), sign)

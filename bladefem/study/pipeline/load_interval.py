@@ -19,6 +19,8 @@ __all__ = ["LoadInterval", "interval_sentence", "load_interval"]
 
 # tolerance of heights, over the accuracy wanted
 SHARE = 0.02
+# points of the balance, over those of the curve, after which no further move begins
+MOST = 4
 UNKNOWN = "unknown"
 
 
@@ -42,9 +44,13 @@ class LoadInterval:
 
 
 def load_interval(
-    model: ReducedModel, settings: Settings, top: Solution, accuracy: float
+    model: ReducedModel, settings: Settings, top: Solution, accuracy: float, points: int = 40
 ) -> LoadInterval:
-    """The interval of the resonance near the highest point of a curve, with the curve's settings."""
+    """The interval of the resonance near the highest point of a curve, with the curve's settings.
+
+    Args:
+        points: of the curve; the interval takes at most some MOST times as many.
+    """
     tolerance = SHARE * accuracy
     try:
         peak = find_peak(
@@ -55,7 +61,7 @@ def load_interval(
             near=top,
             tolerance=tolerance,
         )
-        found = history_interval(model, peak, tolerance=tolerance)
+        found = history_interval(model, peak, tolerance=tolerance, most=MOST * points)
     except NotSolvedError as error:
         return LoadInterval(
             size(top), top.frequency, size(top), top.frequency, UNKNOWN, 0, 0, str(error)

@@ -194,7 +194,7 @@ def curve_of(
     interval = None
     if scene.study.interval:
         model = member(models, curve.settings).model
-        interval = load_interval(model, curve.settings, top, scene.accuracy)
+        interval = load_interval(model, curve.settings, top, scene.accuracy, len(curve.points))
     return Curve(
         case.load,
         case.mass,
