@@ -198,11 +198,9 @@ def main(every: int = 1) -> None:
             o = outcomes[-1]
             print(
                 f"{case.name:58s} {accuracy:6g} {'ok ' if o.accepted else 'NO '} told "
-                f"{o.told:8.1e} "
-                f"true {o.true:8.1e} "
-                f"H {o.settings.harmonics:2d} Nt {o.settings.samples:4d} modes "
-                f"{o.settings.modes:2d} points "
-                f"{o.settings.points} {1e3 * o.seconds:7.1f} ms"
+                f"{o.told:8.1e} true {o.true:8.1e} H {o.settings.harmonics:2d} Nt "
+                f"{o.settings.samples:4d} modes {o.settings.modes:2d} points {o.settings.points} "
+                f"{1e3 * o.seconds:7.1f} ms"
             )
     beams = sum(case.name.startswith("beam") for case in cases)
     for accuracy, outcomes in results.items():
@@ -210,11 +208,9 @@ def main(every: int = 1) -> None:
         wrong = sum(o.true > accuracy for o in good)
         print(
             f"accuracy {accuracy:g}: {len(good)} of {len(outcomes)} accepted, {wrong} wrong, "
-            "largest true error "
-            f"{max(o.true for o in good):.2g}, time over the rich model: all "
-            f"{sum(spent) / sum(fixed):.2f}, beams "
-            f"{sum(spent[:beams]) / sum(fixed[:beams]):.2f}, bodies "
-            f"{sum(spent[beams:]) / sum(fixed[beams:]):.2f}"
+            f"largest true error {max(o.true for o in good):.2g}, time over the rich model: all "
+            f"{sum(spent) / sum(fixed):.2f}, beams {sum(spent[:beams]) / sum(fixed[:beams]):.2f}, "
+            f"bodies {sum(spent[beams:]) / sum(fixed[beams:]):.2f}"
         )
 
 

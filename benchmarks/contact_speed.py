@@ -69,8 +69,8 @@ def lcp():
         gemm, _ = best(lambda: np.linalg.cholesky(C))  # noqa: B023
         print(
             f"complementarity, {n * n} nodes ({s.active.sum()} pressed): cold {cold:.1f} ms in "
-            f"{s.iterations} steps, "
-            f"warm {warm:.1f} ms in {w.iterations}; one Cholesky factor of all nodes {gemm:.1f} ms",
+            f"{s.iterations} steps, warm {warm:.1f} ms in {w.iterations}; one Cholesky factor of "
+            f"all nodes {gemm:.1f} ms",
             flush=True,
         )
 
@@ -87,8 +87,8 @@ def states():
     warm, _ = best(lambda: solve(problem, 838.0, normal=210.0, start=maps))
     print(
         f"wedge sector, {len(mesh.points) * 3} dofs, {len(problem.clearance)} contact nodes: "
-        "condensed in "
-        f"{condensing:.1f} s, then a load state costs {cold:.2f} ms, warm {warm:.2f} ms",
+        f"condensed in {condensing:.1f} s, then a load state costs {cold:.2f} ms, warm {warm:.2f} "
+        "ms",
         flush=True,
     )
 
@@ -119,8 +119,7 @@ def right_hand_sides(divisions, size, count=1000):
         spent.append(time.process_time() - start)
     print(
         f"compliance, {con.own.stop} dofs, {count} right-hand sides: factor {factor:.1f} s, "
-        "contact ports "
-        f"{spent[0]:.1f} s, dense columns {spent[1]:.1f} s of CPU",
+        f"contact ports {spent[0]:.1f} s, dense columns {spent[1]:.1f} s of CPU",
         flush=True,
     )
 

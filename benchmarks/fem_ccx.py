@@ -195,11 +195,9 @@ def compare(mesh: Mesh, diameters: list[int], folder: Path) -> None:
     dofs = 3 * len(np.unique(mesh.bodies["blade"]))
     print(
         f"{dofs:7d} dofs, nodal diameters {diameters[0]}-{diameters[-1]}: ccx {cpu:.1f} s, "
-        f"bladefem {mine:.1f} s, "
-        f"ratio {cpu / mine:.1f}; memory {memory:.2f} and {mine_memory:.2f} GB, ratio "
-        f"{mine_memory / memory:.2f}; "
-        f"frequencies differ by {errors['ccx']:.1e} with ccx's mass, {errors['exact']:.1e} with "
-        "the exact one",
+        f"bladefem {mine:.1f} s, ratio {cpu / mine:.1f}; memory {memory:.2f} and {mine_memory:.2f} "
+        f"GB, ratio {mine_memory / memory:.2f}; frequencies differ by {errors['ccx']:.1e} with "
+        f"ccx's mass, {errors['exact']:.1e} with the exact one",
         flush=True,
     )
 

@@ -100,8 +100,8 @@ def main() -> None:
                 kind = f"NLGEOM in {increments:2d}" if nonlinear else "linear      "
                 print(
                     f"{speed:6.0f} rad/s  {kind}  largest difference "
-                    f"{abs(mine / theirs - 1).max():.1e}  "
-                    f"ccx {np.array2string(theirs, precision=7)}"
+                    f"{abs(mine / theirs - 1).max():.1e}  ccx "
+                    f"{np.array2string(theirs, precision=7)}"
                 )
 
 

@@ -275,8 +275,7 @@ def main(*names: str) -> None:
             good = all(solved[w, level].converged for w in FREQUENCIES[name])
             print(
                 f"{name:22s} {level[0]:3d} {level[1] or 'exact':>7} {max(errors):8.1e} "
-                f"{spent[level]:6.1f}"
-                f"{'' if good else '  not converged'}",
+                f"{spent[level]:6.1f}{'' if good else '  not converged'}",
                 flush=True,
             )
 

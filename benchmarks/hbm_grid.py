@@ -46,8 +46,8 @@ if __name__ == "__main__":
     )
     print(
         f"iterations: median {np.median(iterations):.0f}, 90 % within "
-        f"{np.percentile(iterations, 90):.0f}, "
-        f"most {iterations.max()}; where contacts slip: median {np.median(slipping):.0f}"
+        f"{np.percentile(iterations, 90):.0f}, most {iterations.max()}; where contacts slip: "
+        f"median {np.median(slipping):.0f}"
     )
     print(
         f"methods: {dict(Counter(s.method for s in found))}; work imbalance at most {imbalance:.1e}"

@@ -108,8 +108,7 @@ def ours(
 def main(python: str, *names: str) -> None:
     print(
         f"{'problem':22s} {'ms/point':>9s} {'pyHarm':>9s} {'ratio':>6s} {'solved':>9s} "
-        f"{'pyHarm':>9s} "
-        f"{'error':>8s} {'pyHarm':>8s} {'MB':>5s} {'pyHarm':>6s}"
+        f"{'pyHarm':>9s} {'error':>8s} {'pyHarm':>8s} {'MB':>5s} {'pyHarm':>6s}"
     )
     for name in names or PROBLEMS:
         problem, (H, samples, count) = PROBLEMS[name](), RUNS[name]
@@ -138,10 +137,8 @@ def main(python: str, *names: str) -> None:
         memory = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024
         print(
             f"{name:22s} {mine * 1e3:9.2f} {other * 1e3:9.1f} {other / mine:6.0f} "
-            f"{converged.sum():5d}/{count:<3d} "
-            f"{theirs['converged'].sum():5d}/{count:<3d} {errors[0]:8.1e} {errors[1]:8.1e} "
-            f"{memory:5.0f} "
-            f"{float(theirs['memory']):6.0f}",
+            f"{converged.sum():5d}/{count:<3d} {theirs['converged'].sum():5d}/{count:<3d} "
+            f"{errors[0]:8.1e} {errors[1]:8.1e} {memory:5.0f} {float(theirs['memory']):6.0f}",
             flush=True,
         )
 

@@ -1,13 +1,13 @@
-"""Random loading histories against the interval of a resonance, on a coarse wedge scene; and what the
-interval costs beside the plain curve.
+"""Random loading histories against the interval of a resonance, on a coarse wedge scene; and what
+the interval costs beside the plain curve.
 
     python benchmarks/history_interval.py [histories]
 
-Each history starts the friction law of every contact point from another force: of its own direction,
-the same on a seat, the same on both, or varying linearly across each seat, of any size up to 1.2
-times the friction limit.
-Measured at 2600 N with 12 points a seat joined from 63: 901 random histories from 2501 to 2887 um, the
-interval (sampled, 91 points) from 1675 to 2888 um about 2845, none outside; with 194 points from 1523.
+Each history starts the friction law of every contact point from another force: of its own
+direction, the same on a seat, the same on both, or varying linearly across each seat, of any size
+up to 1.2 times the friction limit. Measured at 2600 N with 12 points a seat joined from 63: 901
+random histories from 2501 to 2887 um, the interval (sampled, 91 points) from 1675 to 2888 um about
+2845, none outside; with 194 points from 1523.
 """
 
 from __future__ import annotations
@@ -124,8 +124,8 @@ def main(count: int) -> None:
         outside = int(((heights < low) | (heights > high)).sum())
         print(
             f"{case.load:8.4g}  {found.sticking:8d}  {1e6 * found.lowest.height:6.1f}  "
-            f"{1e6 * peak.height:6.1f}  {1e6 * found.highest.height:6.1f}  {found.certificate:>11}  "
-            f"{len(heights)} from {1e6 * heights.min():.1f} to {1e6 * heights.max():.1f}, "
+            f"{1e6 * peak.height:6.1f}  {1e6 * found.highest.height:6.1f}  {found.certificate:>11} "
+            f" {len(heights)} from {1e6 * heights.min():.1f} to {1e6 * heights.max():.1f}, "
             f"{outside} outside; cost {spent / plain:.2f} times the curve's",
             flush=True,
         )

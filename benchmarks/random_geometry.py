@@ -110,8 +110,7 @@ def table(meshes):
     )
     print(
         f"smallest scaled Jacobian {meshes[:, 1].min():.3f}; seconds: median "
-        f"{np.median(meshes[:, 4]):.1f}, "
-        f"most {meshes[:, 4].max():.1f}"
+        f"{np.median(meshes[:, 4]):.1f}, most {meshes[:, 4].max():.1f}"
     )
     print("worst meshes:\n  set  shape  Jacobian  mean shape  cells")
     for shape, jacobian, mean, cells, _, number in meshes[:WORST]:

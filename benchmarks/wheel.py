@@ -73,7 +73,8 @@ def main() -> None:
     arguments.add_argument("--harmonics", nargs="*", type=int, default=[1, 3])
     options = arguments.parse_args()
     print(
-        "sectors nodes harmonics unknowns  CPU [s]  Newton  products  slipping  converged  memory [MB]"
+        "sectors nodes harmonics unknowns  CPU [s]  Newton  products  slipping  converged  memory "
+        "[MB]"
     )
     for count in options.sectors:
         for nodes in options.nodes:
@@ -89,8 +90,8 @@ def main() -> None:
                 memory = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024
                 print(
                     f"{count:7d} {nodes:5d} {H:9d} {point.w.size:8d} {seconds:8.2f} "
-                    f"{point.iterations:7d} {point.products:9d} {slipping:8.0f} %"
-                    f" {point.converged!s:>9} {memory:12.0f}",
+                    f"{point.iterations:7d} {point.products:9d} {slipping:8.0f} % "
+                    f"{point.converged!s:>9} {memory:12.0f}",
                     flush=True,
                 )
 

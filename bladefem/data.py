@@ -17,8 +17,6 @@ import numpy as np
 
 from .errors import InputError
 
-__all__ = ["Elements", "ModeSet", "Patch", "PortModel", "PressureMap", "RigidBody"]
-
 
 @dataclass(frozen=True, repr=False)
 class ModeSet:
@@ -85,8 +83,7 @@ class PortModel:
             if np.shape(value) not in shapes or not np.isfinite(value).all():
                 raise InputError(
                     f"PortModel.{name} of shape {np.shape(value)}: expected finite numbers of "
-                    "shape "
-                    f"{' or '.join(map(str, shapes))}"
+                    f"shape {' or '.join(map(str, shapes))}"
                 )
             if (name == "omega" or np.ndim(value) == 1) and np.any(value < 0):
                 raise InputError(

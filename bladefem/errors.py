@@ -7,8 +7,6 @@ from __future__ import annotations
 import difflib
 from collections.abc import Iterable
 
-__all__ = ["InputError", "NotSolvedError", "suggestion"]
-
 
 class InputError(ValueError):
     """The input is wrong. The message is one sentence: field, value, what was expected."""

@@ -43,8 +43,7 @@ if comm.rank == 0:
     for seat in maps:
         print(
             f"seat '{seat.patch.name}': {seat.force.sum():.4f} N, {np.count_nonzero(seat.force)} "
-            "of "
-            f"{len(seat.force)} nodes press, peak {seat.pressure.max() / 1e6:.2f} MPa"
+            f"of {len(seat.force)} nodes press, peak {seat.pressure.max() / 1e6:.2f} MPa"
         )
     if not coarse:
         from bladefem.view.contact import draw_pressure

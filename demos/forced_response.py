@@ -47,8 +47,8 @@ if comm.rank == 0:
     for c in result.response.curves:
         print(
             f"{c.load:6.0f} N: {c.peak_frequency:12.3f} Hz {1e6 * c.peak_amplitude:9.2f} um, "
-            f"{len(c.frequency)} points, {int((~c.converged).sum())} not converged, "
-            f"estimated error {100 * c.error:.2g} %"
+            f"{len(c.frequency)} points, {int((~c.converged).sum())} not converged, estimated "
+            f"error {100 * c.error:.2g} %"
         )
     best = min(result.response.curves, key=lambda c: c.peak_amplitude)
     print(f"resonance amplitude at the best load [um]: {1e6 * best.peak_amplitude:.8f}")

@@ -64,8 +64,8 @@ def model_of(load, mass=0.06, kt=1e6):
 for kt in scenes:
     model = model_of(30.0, kt=kt)
     print(
-        f"k_t {kt:.2e} N/m: free {free_resonances(model)[1] / 2 / np.pi:.1f} Hz, "
-        f"stuck {[round(f, 1) for f in stuck_resonances(model)[:3] / 2 / np.pi]} Hz, "
+        f"k_t {kt:.2e} N/m: free {free_resonances(model)[1] / 2 / np.pi:.1f} Hz, stuck "
+        f"{[round(f, 1) for f in stuck_resonances(model)[:3] / 2 / np.pi]} Hz, "
         f"{np.count_nonzero(model.elements.n0)} of {len(model.elements.n0)} points press"
     )
 
@@ -130,8 +130,8 @@ for load in (6.0,) if coarse else (1.0, 6.0, 50.0):
         r = iterate(side, method, Rules())
         print(
             f"    {method:10s} {'accepted' if r.converged else 'gave up '} after "
-            f"{r.iterations:2d}, residual "
-            f"{r.residual:.1e}, error {abs(r.probe[1, 0] / truth - 1):.1e}"
+            f"{r.iterations:2d}, residual {r.residual:.1e}, error "
+            f"{abs(r.probe[1, 0] / truth - 1):.1e}"
         )
 
 # %% [markdown]
@@ -148,10 +148,8 @@ for load in (200.0,) if coarse else (20.0, 200.0):
         r = iterate(platform(model, top.omega, 1), "amplitude", Rules(damper=how))
         print(
             f"{load:5.1f} N, damper by {how:8s}: {'accepted' if r.converged else 'gave up '}, "
-            "error "
-            f"{abs(r.probe[1, 0] / truth - 1):8.1e}, residual {r.residual:.1e}, {r.periods} "
-            "periods, "
-            f"{time.process_time() - started:.2f} s"
+            f"error {abs(r.probe[1, 0] / truth - 1):8.1e}, residual {r.residual:.1e}, {r.periods} "
+            f"periods, {time.process_time() - started:.2f} s"
         )
 
 # %% [markdown]
@@ -190,9 +188,8 @@ for (kt, mode), span in list(cases.items())[: 1 if coarse else 3]:
         )
         smallest[kt, mode, mass] = p.amplitude
         print(
-            f"k_t {kt:.2e} N/m, mode {mode}, {1e3 * mass:3.0f} g: least {1e6 * p.amplitude:.2f} "
-            f"um at {best:.2f} N, "
-            f"{p.frequency:.1f} Hz"
+            f"k_t {kt:.2e} N/m, mode {mode}, {1e3 * mass:3.0f} g: least {1e6 * p.amplitude:.2f} um "
+            f"at {best:.2f} N, {p.frequency:.1f} Hz"
         )
     if not coarse:
         draw_peaks(

@@ -38,8 +38,8 @@ error = np.sqrt(area @ (found.pressure[inner] - exact) ** 2 / (area @ exact**2))
 approach = found.approach / johnson_approach(a, found.total, block.E, block.nu)
 print(
     f"{len(found.force)} nodes; pressure off by {error:.4f} (L2, r < 0.8 a), approach by "
-    f"{approach - 1:+.4f}; a "
-    f"block of {scene.punch.half_width / a:.0f} radii is stiffer than a half space"
+    f"{approach - 1:+.4f}; a block of {scene.punch.half_width / a:.0f} radii is stiffer than a "
+    "half space"
 )
 
 # %% [markdown]

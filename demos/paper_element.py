@@ -46,8 +46,8 @@ if not coarse:
 
 # %%
 print(
-    f"work {work(loop):.6e} J, of the linear force {trapezoid(linear, loop.motion):.6e} J, "
-    f"closed form {closed.energy:.6e} J"
+    f"work {work(loop):.6e} J, of the linear force {trapezoid(linear, loop.motion):.6e} J, closed "
+    f"form {closed.energy:.6e} J"
 )
 
 # %% [markdown]
@@ -74,8 +74,8 @@ for title, orders in cases.items():
     )
     ratios[title] = work(sliding) / work(right)
     print(
-        f"{title:28s} work over the right one: H(0) = 0 {work(frozen) / work(right):6.3f}, "
-        f"H(0) = 1 {ratios[title]:6.3f}; largest force error "
+        f"{title:28s} work over the right one: H(0) = 0 {work(frozen) / work(right):6.3f}, H(0) = "
+        f"1 {ratios[title]:6.3f}; largest force error "
         f"{np.abs(sliding.force - right.force).max():5.2f} N"
     )
     pictures[title] = [

@@ -52,8 +52,8 @@ body = mass_on_foundation(scene, seat)
 mean = seat.force.sum() / seat.patch.area.sum()
 print(
     f"{1e3 * body.mass:.2f} g, {1e6 * body.inertia:.3f}e-6 kg m^2; pressure "
-    f"{seat.pressure.min() / mean:.3f} to "
-    f"{seat.pressure.max() / mean:.3f} of its mean at {len(seat.force)} nodes"
+    f"{seat.pressure.min() / mean:.3f} to {seat.pressure.max() / mean:.3f} of its mean at "
+    f"{len(seat.force)} nodes"
 )
 if not coarse:
     draw_footprint(seat, body.footprint, folder / "fig_8.png")
@@ -91,8 +91,8 @@ ratios = [
 ]
 rows = ratio_table(body, ratios, steps // 2)
 print(
-    f"holds for {sum(row['rule'] for row in rows)} of {len(rows)} ratios at Table 1, where "
-    f"m x_0 w^2 / (mu P_0) = {0.035 * 0.005 * (200 * np.pi) ** 2 / 15:.1f}"
+    f"holds for {sum(row['rule'] for row in rows)} of {len(rows)} ratios at Table 1, where m x_0 "
+    f"w^2 / (mu P_0) = {0.035 * 0.005 * (200 * np.pi) ** 2 / 15:.1f}"
 )
 
 # %% [markdown]

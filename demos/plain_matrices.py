@@ -23,13 +23,12 @@ force = {
 model = bf.ReducedModel((body,), element, force)
 solution = bf.solve(model, omega=1125.0, H=7, samples=256)
 print(
-    f"{solution.frequency:.1f} Hz: {solution.method}, {solution.iterations} iterations, "
-    f"residual {solution.residual_force:.1e} N, nodes {solution.states}"
+    f"{solution.frequency:.1f} Hz: {solution.method}, {solution.iterations} iterations, residual "
+    f"{solution.residual_force:.1e} N, nodes {solution.states}"
 )
 print(
     f"work in {solution.work.input:.4e} J, out by damping {solution.work.damping:.4e} J and "
-    "friction "
-    f"{solution.work.friction:.4e} J"
+    f"friction {solution.work.friction:.4e} J"
 )
 assert solution.converged, solution.reason
 

@@ -1,4 +1,6 @@
-"""Draw the labelled parts of every shipped geometry into docs/parts and list their parameters in docs/parts.md."""
+"""Draw the labelled parts of every shipped geometry into docs/parts and list their parameters in
+docs/parts.md.
+"""
 
 from pathlib import Path
 
@@ -9,8 +11,15 @@ from geometry import parameters
 from geometry.quantity import describe
 
 HERE = Path(__file__).parent
-TABLES = {"aerofoil": ["Aerofoil"], "platform": ["Platform", "Shank", "Wedge"], "sector": ["Disc"], "plane": ["Plane"],
-          "z_mass": ["ZMass"], "hertz": ["HertzPair"], "punch": ["Punch"]}
+TABLES = {
+    "aerofoil": ["Aerofoil"],
+    "platform": ["Platform", "Shank", "Wedge"],
+    "sector": ["Disc"],
+    "plane": ["Plane"],
+    "z_mass": ["ZMass"],
+    "hertz": ["HertzPair"],
+    "punch": ["Punch"],
+}
 NAMES = """## names
 
 Groups of the mesh, which are the contract with the finite elements and the names that `.msh` and STEP files need, too.
@@ -36,21 +45,39 @@ all with contact |
 
 def number(value: object, unit: str) -> str:
     """A value with its unit, empty for none."""
-    return show(value, unit or "1") if isinstance(value, float | int) and not isinstance(value, bool) else str(value)
+    return (
+        show(value, unit or "1")
+        if isinstance(value, float | int) and not isinstance(value, bool)
+        else str(value)
+    )
 
 
 def rows(name: str) -> list[str]:
     """The parameters of one table as Markdown."""
-    text = [f"**{name}**", "", "| field | default | accepted | meaning |", "| --- | ---: | --- | --- |"]
+    text = [
+        f"**{name}**",
+        "",
+        "| field | default | accepted | meaning |",
+        "| --- | ---: | --- | --- |",
+    ]
     for field in describe(getattr(parameters, name)):
-        limits = "true or false" if isinstance(field["default"], bool) else " or ".join(field["choices"]) or \
-            f"{number(field['low'], field['unit'])} to {number(field['high'], field['unit'])}"
+        limits = (
+            "true or false"
+            if isinstance(field["default"], bool)
+            else " or ".join(field["choices"])
+            or f"{number(field['low'], field['unit'])} to {number(field['high'], field['unit'])}"
+        )
         default = "auto" if field["default"] is None else number(field["default"], field["unit"])
         text.append(f"| {field['name']} | {default} | {limits} | {field['help']} |")
     return [*text, ""]
 
 
-page = ["# Parts and their parameters", "", "Drawn with the default values by `python docs/make_parts.py`.", ""]
+page = [
+    "# Parts and their parameters",
+    "",
+    "Drawn with the default values by `python docs/make_parts.py`.",
+    "",
+]
 for kind, drawings in PARTS.items():
     page += [f"## {kind}", ""]
     for name, draw in drawings.items():

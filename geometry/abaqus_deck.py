@@ -10,8 +10,6 @@ from pathlib import Path
 
 from bladefem.errors import InputError
 
-__all__ = ["Keyword", "deck_error", "keywords_of"]
-
 # files inside files; more is a circle
 DEEPEST = 20
 
@@ -31,7 +29,11 @@ class Keyword:
     data: list[tuple[int, list[str]]] = field(default_factory=list)
 
 
-def deck_error(file: Path, line: int, what: str) -> InputError:
+def deck_error(
+    file: Path,
+    line: int,
+    what: str,
+) -> InputError:
     """One sentence that says where."""
     return InputError(f"imported.file = '{file}', line {line}: {what}")
 
@@ -76,7 +78,11 @@ def _text(file: Path) -> str:
     return raw.decode("utf-8-sig", errors="replace")
 
 
-def _keyword(head: str, file: Path, line: int) -> Keyword:
+def _keyword(
+    head: str,
+    file: Path,
+    line: int,
+) -> Keyword:
     """Parse "*ELEMENT, TYPE=C3D10, ELSET="a b"" into a Keyword."""
     first, *parts = [part.strip() for part in head.lstrip("*").split(",")]
     options = {}

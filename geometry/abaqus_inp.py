@@ -17,8 +17,6 @@ from bladefem.errors import InputError
 from .abaqus_deck import Keyword, deck_error, keywords_of
 from .raw_mesh import RawMesh, from_vtk_order
 
-__all__ = ["read_inp"]
-
 # element type up to its first letter behind the number of nodes -> meshio's word
 SOLIDS = {
     "C3D4": "tetra",
@@ -167,7 +165,12 @@ def _read_element_set(scope: _Scope, keyword: Keyword) -> None:
     _read_set(scope.element_sets, keyword, "ELSET", "element")
 
 
-def _read_set(sets: dict[str, list[Key]], keyword: Keyword, option: str, what: str) -> None:
+def _read_set(
+    sets: dict[str, list[Key]],
+    keyword: Keyword,
+    option: str,
+    what: str,
+) -> None:
     name = keyword.options.get(option)
     if not name:
         raise deck_error(keyword.file, keyword.line, f"*{option} without a name")
@@ -188,7 +191,11 @@ def _read_set(sets: dict[str, list[Key]], keyword: Keyword, option: str, what: s
                 members.append(_dotted(word, keyword, line, what))
 
 
-def _generated(words: list[str], keyword: Keyword, line: int) -> range:
+def _generated(
+    words: list[str],
+    keyword: Keyword,
+    line: int,
+) -> range:
     try:
         low, high, step = [*map(int, words), 1][:3]
         return range(low, high + 1, step)
@@ -198,7 +205,12 @@ def _generated(words: list[str], keyword: Keyword, line: int) -> range:
         ) from None
 
 
-def _dotted(word: str, keyword: Keyword, line: int, what: str) -> Key:
+def _dotted(
+    word: str,
+    keyword: Keyword,
+    line: int,
+    what: str,
+) -> Key:
     """A member written as "instance.number"."""
     instance, dot, tag = word.rpartition(".")
     if not (dot and tag.isdigit()):
@@ -231,7 +243,11 @@ READERS = {
 }
 
 
-def _add_instance(root: _Scope, parts: dict[str, _Scope], keyword: Keyword) -> None:
+def _add_instance(
+    root: _Scope,
+    parts: dict[str, _Scope],
+    keyword: Keyword,
+) -> None:
     """Copy a part into the assembly, moved as the data lines say."""
     name = keyword.options.get("NAME", "").upper()
     part = parts.get(keyword.options.get("PART", "").upper())
@@ -242,7 +258,10 @@ def _add_instance(root: _Scope, parts: dict[str, _Scope], keyword: Keyword) -> N
             f"*INSTANCE of the part '{keyword.options.get('PART', '')}' that is not there",
         )
     motion = _motion(keyword)
-    moved = lambda key: (name, key[1])  # noqa: E731
+
+    def moved(key):
+        return (name, key[1])
+
     for key, place in part.nodes.items():
         root.nodes[moved(key)] = motion[0] @ np.array(place) + motion[1]
     for key, (word, nodes) in part.elements.items():
@@ -330,7 +349,9 @@ def _raw_mesh(root: _Scope) -> RawMesh:
 
 
 def _node_surfaces(
-    root: _Scope, sets: dict[str, np.ndarray], place: dict[Key, int]
+    root: _Scope,
+    sets: dict[str, np.ndarray],
+    place: dict[Key, int],
 ) -> dict[str, np.ndarray]:
     """Surfaces of TYPE=NODE as node sets; a name that a node set has already stays with it."""
     known = {name.upper(): nodes for name, nodes in sets.items()}
@@ -347,7 +368,11 @@ def _node_surfaces(
     return found
 
 
-def _facets(root: _Scope, lines: list[tuple[str, str]], place: dict[Key, int]) -> list[np.ndarray]:
+def _facets(
+    root: _Scope,
+    lines: list[tuple[str, str]],
+    place: dict[Key, int],
+) -> list[np.ndarray]:
     """Corner nodes (nf, 3) and (nf, 4) of the facets of a surface."""
     known = {name.upper(): members for name, members in root.element_sets.items()}
     found: list[np.ndarray] = []

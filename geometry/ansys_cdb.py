@@ -16,8 +16,6 @@ from bladefem.errors import InputError
 
 from .raw_mesh import RawMesh, from_vtk_order
 
-__all__ = ["read_cdb"]
-
 # nodes of an element -> (shape, pairs of equal places, places of the nodes that are left in VTK's
 # order); the first that fits
 SHAPES: dict[int, list[tuple[str, list[tuple[int, int]], list[int]]]] = {
@@ -98,7 +96,9 @@ def _solid_rows(archive: Any) -> tuple[dict[int, np.ndarray], int]:
 
 
 def _blocks(
-    rows: dict[int, np.ndarray], numbers: np.ndarray, file: Path
+    rows: dict[int, np.ndarray],
+    numbers: np.ndarray,
+    file: Path,
 ) -> tuple[list[tuple[str, np.ndarray]], list[np.ndarray]]:
     """Cells of each shape in gmsh's node order, and their element numbers."""
     blocks = []
@@ -121,7 +121,12 @@ def _blocks(
     return blocks, tags
 
 
-def _check_nodes(cells: np.ndarray, tags: np.ndarray, numbers: np.ndarray, file: Path) -> None:
+def _check_nodes(
+    cells: np.ndarray,
+    tags: np.ndarray,
+    numbers: np.ndarray,
+    file: Path,
+) -> None:
     """Refuse elements without some of their mid-side nodes (written as 0) or of unknown shape."""
     ordered = np.sort(cells, axis=1)
     bad = (ordered[:, 1:] == ordered[:, :-1]).any(axis=1) | ~np.isin(cells, numbers).all(axis=1)

@@ -9,8 +9,6 @@ from bladefem.scene.kinds import kind_named, load_function
 
 from .mesh import Mesh
 
-__all__ = ["build_here"]
-
 
 def build_here(scene: Any) -> Mesh:
     """The mesh of a scene, by its ``kind``; the builders and gmsh are loaded when they are needed.

@@ -14,8 +14,6 @@ from bladefem.errors import InputError, suggestion
 
 from .parameters import Plane
 
-__all__ = ["NAMES", "check_names", "check_parameters"]
-
 # cells; as finalise_mesh.MANY, which counts again once the volumes are known
 MANY = 3e6
 # faces and node sets of the parametric shapes that a force can act on
@@ -77,8 +75,8 @@ def check_names(scene: Any) -> None:
     at = scene.excitation.at
     if at not in known:
         raise InputError(
-            f"excitation.at = {at!r}: a {scene.kind} has no face or node set of that name"
-            f"{suggestion(at, known)}"
+            f"excitation.at = {at!r}: a {scene.kind} has no face or node set of that "
+            f"name{suggestion(at, known)}"
         )
 
 

@@ -24,8 +24,6 @@ from .parameters import HertzPair, MeshSize, Punch
 from .quality import report
 from .session import attempt, gmsh_session
 
-__all__ = ["check_hertz", "check_punch", "hertz_pair", "punch"]
-
 # seat of the Hertz pair over the expected contact radius
 WIDER = 2.0
 
@@ -97,12 +95,21 @@ def check_punch(block: Punch, size: MeshSize) -> None:
     _inside("mesh.contact_size", fine, block.radius, "punch.radius")
 
 
-def _inside(name: str, value: float, limit: float, meaning: str) -> None:
+def _inside(
+    name: str,
+    value: float,
+    limit: float,
+    meaning: str,
+) -> None:
     if not value <= limit:
         raise InputError(f"{name} = {value:.4g} m: expected at most {limit:.4g} m ({meaning})")
 
 
-def _bend(mesh: Mesh, radius: float, height: float) -> np.ndarray:
+def _bend(
+    mesh: Mesh,
+    radius: float,
+    height: float,
+) -> np.ndarray:
     """Points [m] with the indenter's lower side on its sphere or cylinder, its far face still
     plane.
     """
@@ -164,7 +171,12 @@ def _square(width: float) -> np.ndarray:
     return np.array([[0.0, 0.0], [width, 0.0], [width, width], [0.0, width]])
 
 
-def _solids(gmsh: ModuleType, width: float, seat: float, upper: float | None) -> tuple[int, int]:
+def _solids(
+    gmsh: ModuleType,
+    width: float,
+    seat: float,
+    upper: float | None,
+) -> tuple[int, int]:
     """Quarter blocks with the seat imprinted, or a quarter round punch above."""
     blade = imprint(
         gmsh, prism(gmsh, _square(width), -width, 0.0), [(2, _quarter_disc(gmsh, seat))]
@@ -189,7 +201,12 @@ def _quarter_disc(gmsh: ModuleType, radius: float) -> int:
     return occ.addPlaneSurface([occ.addCurveLoop(loop)])
 
 
-def _plates(gmsh: ModuleType, width: float, seat: float, upper: float | None) -> tuple[int, int]:
+def _plates(
+    gmsh: ModuleType,
+    width: float,
+    seat: float,
+    upper: float | None,
+) -> tuple[int, int]:
     """Half plates; the end of the seat is a corner of each."""
     low = np.array([[0, 0], [0, -width], [width, -width], [width, 0], [seat, 0]])
     high = (

@@ -13,8 +13,6 @@ import numpy as np
 
 from .topology import EDGES, FAMILY, GMSH_TYPES, NODES, corner_count
 
-__all__ = ["second_order"]
-
 FLAT = ("Line", "Plane")
 # of the edge: a larger step off its middle means a seam or a pole of the parameters
 LARGEST = 0.4
@@ -47,7 +45,11 @@ def second_order(gmsh: ModuleType, curved: bool = True) -> None:
         gmsh.model.mesh.setNode(node, place, [])
 
 
-def _edges(gmsh: ModuleType, dimension: int, entity: int) -> list[tuple[int, np.ndarray]]:
+def _edges(
+    gmsh: ModuleType,
+    dimension: int,
+    entity: int,
+) -> list[tuple[int, np.ndarray]]:
     """(middle node, (2,) ends) of each edge of the entity's second-order elements, once."""
     found = {}
     types, _, nodes = gmsh.model.mesh.getElements(dimension, entity)

@@ -8,17 +8,6 @@ from types import ModuleType
 
 import numpy as np
 
-__all__ = [
-    "centres",
-    "clear_leftovers",
-    "face_at",
-    "imprint",
-    "polygon",
-    "prism",
-    "set_background",
-    "tie",
-]
-
 
 def polygon(gmsh: ModuleType, corners: np.ndarray) -> tuple[int, list[int], list[int]]:
     """Surface, lines and points of a plane polygon (n, 2 or 3) [m]; line i runs from corner i to i
@@ -30,7 +19,12 @@ def polygon(gmsh: ModuleType, corners: np.ndarray) -> tuple[int, list[int], list
     return occ.addPlaneSurface([occ.addCurveLoop(lines)]), lines, points
 
 
-def prism(gmsh: ModuleType, corners: np.ndarray, low: float, high: float) -> int:
+def prism(
+    gmsh: ModuleType,
+    corners: np.ndarray,
+    low: float,
+    high: float,
+) -> int:
     """Volume over a polygon (n, 2) [m] from z = low to z = high."""
     face, _, _ = polygon(gmsh, np.column_stack([corners, np.full(len(corners), low)]))
     return next(
@@ -38,7 +32,11 @@ def prism(gmsh: ModuleType, corners: np.ndarray, low: float, high: float) -> int
     )
 
 
-def imprint(gmsh: ModuleType, volume: int, marks: list[tuple[int, int]]) -> int:
+def imprint(
+    gmsh: ModuleType,
+    volume: int,
+    marks: list[tuple[int, int]],
+) -> int:
     """The volume with plane faces and points (dimension, tag) cut into its skin."""
     result, _ = gmsh.model.occ.fragment([(3, volume)], marks)
     return next(tag for dim, tag in result if dim == 3)
@@ -53,14 +51,21 @@ def clear_leftovers(gmsh: ModuleType) -> None:
         gmsh.model.occ.remove(gmsh.model.occ.getEntities(dimension))
 
 
-def centres(gmsh: ModuleType, body: int, dimension: int = 3) -> dict[int, np.ndarray]:
+def centres(
+    gmsh: ModuleType,
+    body: int,
+    dimension: int = 3,
+) -> dict[int, np.ndarray]:
     """Centre (3,) [m] of each boundary entity of a body."""
     faces = gmsh.model.getBoundary([(dimension, body)], oriented=False)
     return {tag: np.array(gmsh.model.occ.getCenterOfMass(dim, tag)) for dim, tag in faces}
 
 
 def face_at(
-    found: dict[int, np.ndarray], where: np.ndarray, tolerance: float, name: str
+    found: dict[int, np.ndarray],
+    where: np.ndarray,
+    tolerance: float,
+    name: str,
 ) -> list[int]:
     """The one entity with its centre there.
 

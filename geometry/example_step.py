@@ -12,8 +12,6 @@ from .sector import blade_solid
 from .sector_check import check_sector
 from .session import gmsh_session
 
-__all__ = ["write_blade_step"]
-
 
 def write_blade_step(
     file: str | Path,

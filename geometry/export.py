@@ -11,12 +11,15 @@ from .mesh import Mesh
 from .session import gmsh_session
 from .topology import GMSH_TYPES, face_word
 
-__all__ = ["write_msh"]
-
 NUMBER = {word: number for number, word in GMSH_TYPES.items()}
 
 
-def write_msh(mesh: Mesh, file: str | Path, version: float = 4.1, binary: bool = False) -> None:
+def write_msh(
+    mesh: Mesh,
+    file: str | Path,
+    version: float = 4.1,
+    binary: bool = False,
+) -> None:
     """Write bodies, faces and node sets under their names; `geometry.imported.read_mesh` reads them
     back.
 
@@ -48,7 +51,12 @@ def write_msh(mesh: Mesh, file: str | Path, version: float = 4.1, binary: bool =
 
 
 def _add(
-    gmsh: ModuleType, dimension: int, entity: int, name: str, word: str, cells: np.ndarray
+    gmsh: ModuleType,
+    dimension: int,
+    entity: int,
+    name: str,
+    word: str,
+    cells: np.ndarray,
 ) -> None:
     gmsh.model.mesh.addElementsByType(entity, NUMBER[word], [], (cells + 1).ravel())
     gmsh.model.setPhysicalName(dimension, gmsh.model.addPhysicalGroup(dimension, [entity]), name)

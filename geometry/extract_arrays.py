@@ -12,8 +12,6 @@ import numpy as np
 from .mesh import Mesh
 from .topology import GMSH_TYPES, NODES, outward
 
-__all__ = ["Groups", "extract"]
-
 
 @dataclass(frozen=True)
 class Groups:
@@ -26,7 +24,11 @@ class Groups:
     points: dict[str, list[int]] = field(default_factory=dict)
 
 
-def extract(gmsh: ModuleType, groups: Groups, dimension: int) -> Mesh:
+def extract(
+    gmsh: ModuleType,
+    groups: Groups,
+    dimension: int,
+) -> Mesh:
     """The current gmsh mesh as a Mesh without pairs; only nodes of the named bodies are kept.
 
     Raises:
@@ -56,7 +58,11 @@ def extract(gmsh: ModuleType, groups: Groups, dimension: int) -> Mesh:
     )
 
 
-def _elements(gmsh: ModuleType, dimension: int, entities: list[int]) -> tuple[str, np.ndarray]:
+def _elements(
+    gmsh: ModuleType,
+    dimension: int,
+    entities: list[int],
+) -> tuple[str, np.ndarray]:
     """Word and node tags (n, k) of the elements of the entities, all of one type."""
     blocks: dict[str, list[np.ndarray]] = {}
     for entity in entities:

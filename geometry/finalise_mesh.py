@@ -18,8 +18,6 @@ from .mesh import Mesh, Sector
 from .parameters import MeshSize
 from .quality import edge_of_middle, report, shape_quality, straighten
 
-__all__ = ["Motion", "check_count", "complete", "mesh_model"]
-
 # cells; far beyond what one machine solves
 MANY = 3e6
 # shape quality that asks for a second round of optimisation
@@ -31,7 +29,12 @@ ALGORITHMS = {"hxt": 10, "delaunay": 1}
 Motion = tuple[str, str, np.ndarray, np.ndarray]
 
 
-def mesh_model(gmsh: ModuleType, groups: Groups, dimension: int, size: MeshSize) -> Mesh:
+def mesh_model(
+    gmsh: ModuleType,
+    groups: Groups,
+    dimension: int,
+    size: MeshSize,
+) -> Mesh:
     """Generate the mesh of the current model, raise its order, and extract it.
 
     Raises:
@@ -49,7 +52,11 @@ def mesh_model(gmsh: ModuleType, groups: Groups, dimension: int, size: MeshSize)
     return extract(gmsh, groups, dimension)
 
 
-def fill(gmsh: ModuleType, groups: Groups, first: str) -> None:
+def fill(
+    gmsh: ModuleType,
+    groups: Groups,
+    first: str,
+) -> None:
     """Fill the volumes with tetrahedra by one algorithm, then by the other when the first fails or
     leaves flat cells.
 
@@ -81,14 +88,17 @@ def refuse_flat(mesh: Mesh) -> None:
     x, y, z = 1e3 * mesh.points[cells[shape.argmin()]].mean(axis=0)
     raise InputError(
         f"mesh.size: {np.count_nonzero(shape <= FLAT)} flat cells are left (the worst has shape "
-        "quality "
-        f"{shape.min():.1g} at x, y, z = {x:.4g}, {y:.4g}, {z:.4g} mm, expected above {FLAT}); "
-        "choose a "
-        "smaller mesh.size, or change the parts that nearly coincide there"
+        f"quality {shape.min():.1g} at x, y, z = {x:.4g}, {y:.4g}, {z:.4g} mm, expected above "
+        f"{FLAT}); choose a smaller mesh.size, or change the parts that nearly coincide there"
     )
 
 
-def check_count(gmsh: ModuleType, dimension: int, size: float, name: str = "mesh.size") -> None:
+def check_count(
+    gmsh: ModuleType,
+    dimension: int,
+    size: float,
+    name: str = "mesh.size",
+) -> None:
     """Refuse a mesh that would never end.
 
     Raises:
@@ -119,7 +129,11 @@ def improve(gmsh: ModuleType, groups: Groups) -> float:
     return _worst_shape(_corners(gmsh, groups, 3))
 
 
-def _corners(gmsh: ModuleType, groups: Groups, dimension: int) -> Mesh:
+def _corners(
+    gmsh: ModuleType,
+    groups: Groups,
+    dimension: int,
+) -> Mesh:
     """The first-order mesh as it stands, without its faces."""
     return extract(gmsh, Groups(groups.bodies, {}), dimension)
 

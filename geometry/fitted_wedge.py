@@ -18,8 +18,6 @@ from .draw import centres, imprint, polygon
 from .parameters import Wedge
 from .session import attempt
 
-__all__ = ["Flanks", "fit_wedge", "flanks_between"]
-
 # (dimension, name) to entities
 Named = dict[tuple[int, str], list[int]]
 # sine between two planes below which they are one plane
@@ -149,8 +147,8 @@ def flanks_between(
     wanted = narrowest if width is None else width
     if wanted > narrowest * (1 + LOOSE):
         raise InputError(
-            f"imported.seat_width = {1e3 * wanted:.4g} mm: expected at most "
-            f"{1e3 * narrowest:.4g} mm, the width of the narrower platform face"
+            f"imported.seat_width = {1e3 * wanted:.4g} mm: expected at most {1e3 * narrowest:.4g} "
+            "mm, the width of the narrower platform face"
         )
     for i in (0, 1):
         across = _across(normals, places, along, i)
@@ -167,7 +165,9 @@ def flanks_between(
 
 
 def _common_length(
-    corners: tuple[np.ndarray, np.ndarray], along: np.ndarray, length: float
+    corners: tuple[np.ndarray, np.ndarray],
+    along: np.ndarray,
+    length: float,
 ) -> tuple[float, float]:
     """Where both faces are, along the damper [m]."""
     extents = [_extent(points, along) for points in corners]
@@ -210,7 +210,11 @@ def _extent(points: np.ndarray, direction: np.ndarray) -> tuple[float, float]:
     return float(along.min()), float(along.max())
 
 
-def _single_face(gmsh: ModuleType, named: Named, name: str) -> int:
+def _single_face(
+    gmsh: ModuleType,
+    named: Named,
+    name: str,
+) -> int:
     """The one plane face of that name."""
     known = {word.lower(): tags for (dim, word), tags in named.items() if dim == 2}
     if name.lower() not in known:
@@ -289,7 +293,13 @@ def _carried_over(
     return result
 
 
-def _face_at(gmsh: ModuleType, volume: int, middle: np.ndarray, flanks: Flanks, name: str) -> int:
+def _face_at(
+    gmsh: ModuleType,
+    volume: int,
+    middle: np.ndarray,
+    flanks: Flanks,
+    name: str,
+) -> int:
     """The face with the seat's centre and area."""
     area = flanks.width * flanks.length
     found = [

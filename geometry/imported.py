@@ -37,8 +37,6 @@ from .renaming import read_names, renamed_raw
 from .solid_cells import SolidCells, solid_cells
 from .topology import CORNERS, DIMENSION, FACETS, FAMILY, boundary, outward
 
-__all__ = ["mesh_of_raw", "read_geometry", "read_mesh"]
-
 # files carry few digits; a match within this share of the face is a match, and is then snapped
 LOOSE = 1e-4
 # cosine between outward normals of two faces that look at each other
@@ -55,7 +53,11 @@ FLIPPED = {
 Axis = np.ndarray | tuple[float, float, float]
 
 
-def read_geometry(imported: Any, size: MeshSize, wedge: Wedge) -> Mesh:
+def read_geometry(
+    imported: Any,
+    size: MeshSize,
+    wedge: Wedge,
+) -> Mesh:
     """The mesh of a scene's [imported] table: STEP files are meshed, mesh files are read.
 
     Args:
@@ -176,7 +178,11 @@ def _word(name: str) -> str:
     return "_".join(name.lower().split())
 
 
-def _bodies(raw: RawMesh, solids: SolidCells, source: str) -> Mesh:
+def _bodies(
+    raw: RawMesh,
+    solids: SolidCells,
+    source: str,
+) -> Mesh:
     """Solid cells in bodies, in file order."""
     used = set(np.unique(solids.block).tolist())
     rows = {
@@ -213,7 +219,12 @@ def _bodies(raw: RawMesh, solids: SolidCells, source: str) -> Mesh:
     )
 
 
-def _positive(points: np.ndarray, cells: np.ndarray, word: str, source: str) -> np.ndarray:
+def _positive(
+    points: np.ndarray,
+    cells: np.ndarray,
+    word: str,
+    source: str,
+) -> np.ndarray:
     """Cells with positive volume; a simplex of the other sense is renumbered."""
     negative = straight_jacobian(points, cells, word) < 0
     if not negative.any():
@@ -227,7 +238,11 @@ def _positive(points: np.ndarray, cells: np.ndarray, word: str, source: str) -> 
     return result
 
 
-def _axes(mesh: Mesh, scale: float, axis: np.ndarray) -> np.ndarray:
+def _axes(
+    mesh: Mesh,
+    scale: float,
+    axis: np.ndarray,
+) -> np.ndarray:
     """Points [m] with the engine axis along z."""
     z = axis / np.linalg.norm(axis)
     if abs(z[2] - 1) < 1e-12:
@@ -236,7 +251,11 @@ def _axes(mesh: Mesh, scale: float, axis: np.ndarray) -> np.ndarray:
     return mesh.points * scale @ np.array([radial, np.cross(z, radial), z]).T
 
 
-def _with_faces(mesh: Mesh, raw: RawMesh, wanted: frozenset[str]) -> Mesh:
+def _with_faces(
+    mesh: Mesh,
+    raw: RawMesh,
+    wanted: frozenset[str],
+) -> Mesh:
     """Named faces and node sets; nodes that no body uses are dropped."""
     cells = np.vstack(list(mesh.bodies.values()))
     used = np.unique(cells)
@@ -250,7 +269,7 @@ def _with_faces(mesh: Mesh, raw: RawMesh, wanted: frozenset[str]) -> Mesh:
     joined = {_word(name) for name in wanted}
     for name, nodes in sets.items():
         inside = np.isin(skin, nodes)[:, : _facet_corners(mesh.cell_type)].all(axis=1)
-        if not inside.any() or name in faces and name not in joined:
+        if not inside.any() or (name in faces and name not in joined):
             continue
         both = [faces[name], skin[inside]] if name in faces else [skin[inside]]
         faces[name] = np.vstack(both)
@@ -270,7 +289,9 @@ def _facet_corners(cell_type: str) -> int:
 
 
 def _corners_of_faces(
-    raw: RawMesh, dimension: int, number: np.ndarray
+    raw: RawMesh,
+    dimension: int,
+    number: np.ndarray,
 ) -> dict[str, list[np.ndarray]]:
     """Corner nodes of all named facets: groups of cells of one dimension less, and surfaces.
 
@@ -297,7 +318,12 @@ def _corners_of_faces(
     return corners
 
 
-def _paired(mesh: Mesh, sectors: int, source: str, tolerance: float) -> Mesh:
+def _paired(
+    mesh: Mesh,
+    sectors: int,
+    source: str,
+    tolerance: float,
+) -> Mesh:
     """Cyclic and contact pairs, as far as the names are there."""
     on = turn(2 * np.pi / sectors) if sectors else np.eye(3)
     pairs: dict[str, Pair] = {}
@@ -306,8 +332,7 @@ def _paired(mesh: Mesh, sectors: int, source: str, tolerance: float) -> Mesh:
             if name not in mesh.faces:
                 raise InputError(
                     f"imported.file = '{source}': no face group '{name}', needed with "
-                    "imported.sectors = "
-                    f"{sectors}{suggestion(name, mesh.faces)}"
+                    f"imported.sectors = {sectors}{suggestion(name, mesh.faces)}"
                 )
         mesh, pairs["cyclic"] = _cyclic(mesh, on, tolerance)
         mesh = replace(mesh, points=_centred(mesh))
@@ -346,7 +371,12 @@ def _matched(
         raise InputError(f"{error}{hint}") from None
 
 
-def _facing(mesh: Mesh, names: tuple[str, str], rotation: np.ndarray, shift: np.ndarray) -> bool:
+def _facing(
+    mesh: Mesh,
+    names: tuple[str, str],
+    rotation: np.ndarray,
+    shift: np.ndarray,
+) -> bool:
     """Two faces look at each other, and half of the smaller one's nodes are within an edge of the
     other's.
     """
@@ -378,7 +408,11 @@ def _pitch(mesh: Mesh) -> np.ndarray:
     return mesh.points[high].mean(axis=0) - mesh.points[low].mean(axis=0)
 
 
-def _cyclic(mesh: Mesh, on: np.ndarray, tolerance: float) -> tuple[Mesh, Pair]:
+def _cyclic(
+    mesh: Mesh,
+    on: np.ndarray,
+    tolerance: float,
+) -> tuple[Mesh, Pair]:
     """The cyclic pair; the names are swapped when the file has them the other way round."""
     names = ("cyclic_low", "cyclic_high")
     try:

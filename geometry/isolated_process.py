@@ -25,8 +25,6 @@ from bladefem.scene.kinds import kind_named
 from .builders import build_here
 from .mesh import Mesh
 
-__all__ = ["build"]
-
 # seconds; the largest meshes that are accepted take a tenth of it
 LIMIT = 900
 # element size of the second try
@@ -54,8 +52,7 @@ def build(scene: Any) -> Mesh:
             raise answer
     raise InputError(
         f"mesh.size: gmsh {answer} on this {scene.kind} with both algorithms, expected a geometry "
-        "that it "
-        "can mesh; change mesh.size, or the parameter that was changed last"
+        "that it can mesh; change mesh.size, or the parameter that was changed last"
     )
 
 

@@ -12,10 +12,12 @@ import numpy as np
 
 from .topology import EDGES
 
-__all__ = ["scaled_jacobian", "straight_jacobian"]
 
-
-def straight_jacobian(points: np.ndarray, cells: np.ndarray, cell_type: str) -> np.ndarray:
+def straight_jacobian(
+    points: np.ndarray,
+    cells: np.ndarray,
+    cell_type: str,
+) -> np.ndarray:
     """Jacobian determinant (nc,) of the cell spanned by its corners; the smallest corner value for
     quads and hexes.
     """
@@ -48,7 +50,11 @@ def _simplex_volume(x: np.ndarray) -> np.ndarray:
     return np.linalg.det(x[:, 1:4] - x[:, :1])
 
 
-def scaled_jacobian(points: np.ndarray, cells: np.ndarray, cell_type: str) -> np.ndarray:
+def scaled_jacobian(
+    points: np.ndarray,
+    cells: np.ndarray,
+    cell_type: str,
+) -> np.ndarray:
     """Lower bound (nc,) of the Jacobian determinant over that of the straight cell: 1 when
     straight, <= 0 unsafe.
 

@@ -13,8 +13,6 @@ from bladefem.errors import InputError
 from .raw_mesh import RawMesh, read_raw
 from .topology import DIMENSION, FAMILY
 
-__all__ = ["joined_files", "split_entry"]
-
 
 def split_entry(entry: str) -> tuple[str, str]:
     """Body ("" when left out) and path of an entry "damper = damper.inp" of imported.more."""

@@ -1,5 +1,5 @@
-"""What a mesh file holds and what a run would still need: bodies, cells, unit, sets, numbered faces,
-cut faces and their number of sectors; and a scene to start from.
+"""What a mesh file holds and what a run would still need: bodies, cells, unit, sets, numbered
+faces, cut faces and their number of sectors; and a scene to start from.
 
 Everything here is a guess to be looked at: nothing of it decides a run.
 """
@@ -20,8 +20,6 @@ from .numbered_faces import NumberedFaces, face_corners, numbered_faces
 from .raw_mesh import RawMesh, read_raw
 from .step_file import coarse_step
 from .topology import CORNERS, DIMENSION, FAMILY, NODES
-
-__all__ = ["CutFaces", "FacePart", "Look", "look_at", "starting_scene"]
 
 # lengths [m] of blades and sectors: a factor to metres is right that brings the model between them
 PLAUSIBLE = (0.01, 3.0)
@@ -237,7 +235,11 @@ def _family(raw: RawMesh, block: int) -> str:
     return FAMILY[raw.blocks[block][0]]
 
 
-def _face(outside: NumberedFaces, number: int, name: str) -> FacePart:
+def _face(
+    outside: NumberedFaces,
+    number: int,
+    name: str,
+) -> FacePart:
     mine = outside.number == number
     normals = outside.normals[mine]
     area = np.linalg.norm(normals, axis=1)
@@ -258,7 +260,10 @@ def _face(outside: NumberedFaces, number: int, name: str) -> FacePart:
 
 
 def _cut_faces(
-    raw: RawMesh, outside: NumberedFaces, faces: tuple[FacePart, ...], size: float
+    raw: RawMesh,
+    outside: NumberedFaces,
+    faces: tuple[FacePart, ...],
+    size: float,
 ) -> CutFaces | None:
     """Pairs of faces on which nodes match after one turn about an axis through the origin."""
     best: CutFaces | None = None
@@ -284,7 +289,12 @@ def _alike(one: FacePart, other: FacePart) -> bool:
     return one.facets == other.facets and abs(one.area - other.area) < 1e-3 * one.area
 
 
-def _sectors(start: np.ndarray, end: np.ndarray, axis: str, size: float) -> int:
+def _sectors(
+    start: np.ndarray,
+    end: np.ndarray,
+    axis: str,
+    size: float,
+) -> int:
     """How many turns from one place to the other make a wheel, 0 when no whole number does."""
     k = "xyz".index(axis)
     a, b = (k + 1) % 3, (k + 2) % 3
@@ -324,7 +334,10 @@ def _matching(
 
 
 def _bore(
-    raw: RawMesh, outside: NumberedFaces, faces: tuple[FacePart, ...], cut: CutFaces
+    raw: RawMesh,
+    outside: NumberedFaces,
+    faces: tuple[FacePart, ...],
+    cut: CutFaces,
 ) -> str | None:
     """The face whose farthest node is nearest to the axis: a disc is held there."""
     k = "xyz".index(cut.axis)
@@ -342,7 +355,11 @@ def _names_of(raw: RawMesh) -> set[str]:
     return {"_".join(name.lower().split()) for name in every}
 
 
-def _missing(raw: RawMesh, cut: CutFaces | None, bore: str | None) -> tuple[str, ...]:
+def _missing(
+    raw: RawMesh,
+    cut: CutFaces | None,
+    bore: str | None,
+) -> tuple[str, ...]:
     """What a run needs and neither a set of the file nor a guess provides."""
     there = _names_of(raw)
     if cut is not None:

@@ -12,8 +12,6 @@ from bladefem.errors import InputError
 from .mesh import Pair
 from .topology import corner_count, face_word
 
-__all__ = ["match", "snap"]
-
 
 def match(
     points: np.ndarray,
@@ -65,8 +63,7 @@ def _bijection(
     if len(master) != len(slave):
         raise InputError(
             f"faces {names[0]} and {names[1]} do not match: {len(master)} against {len(slave)} "
-            "nodes, "
-            "expected a periodic mesh"
+            "nodes, expected a periodic mesh"
         )
     if len(master) == 0:
         return np.empty((2, 0), dtype=int)
@@ -74,9 +71,8 @@ def _bijection(
     if distance.max() > tolerance or len(np.unique(index)) != len(index):
         raise InputError(
             f"faces {names[0]} and {names[1]} do not match: "
-            f"{np.count_nonzero(distance > tolerance)} of "
-            f"{len(master)} nodes have no partner (largest distance {distance.max():.3g} m), "
-            "expected a periodic mesh"
+            f"{np.count_nonzero(distance > tolerance)} of {len(master)} nodes have no partner "
+            f"(largest distance {distance.max():.3g} m), expected a periodic mesh"
         )
     return np.vstack([master, slave[index]])
 

@@ -6,8 +6,6 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-__all__ = ["Mesh", "Pair", "Sector"]
-
 
 @dataclass(frozen=True)
 class Sector:
@@ -75,8 +73,8 @@ class Mesh:
     def __repr__(self) -> str:
         bodies = ", ".join(f"{name} {len(cells)} cells" for name, cells in self.bodies.items())
         return (
-            f"<mesh of {self.cell_type}: {len(self.points)} points, {bodies}; "
-            f"{len(self.faces)} named faces>"
+            f"<mesh of {self.cell_type}: {len(self.points)} points, {bodies}; {len(self.faces)} "
+            "named faces>"
         )
 
     @property

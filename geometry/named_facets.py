@@ -8,11 +8,11 @@ from bladefem.errors import InputError
 
 from .topology import FACETS, FAMILY, facets_of
 
-__all__ = ["named_facets"]
-
 
 def named_facets(
-    cells: np.ndarray, cell_type: str, corners: dict[str, list[np.ndarray]]
+    cells: np.ndarray,
+    cell_type: str,
+    corners: dict[str, list[np.ndarray]],
 ) -> dict[str, np.ndarray]:
     """Whole facets (nf, k) of the cells for each name.
 
@@ -28,7 +28,7 @@ def named_facets(
     facets = facets_of(cells, cell_type)
     k = len(FACETS[FAMILY[cell_type]][0])
     key = np.sort(facets[:, :k], axis=1)
-    _, first, number = np.unique(key, axis=0, return_index=True, return_inverse=True)
+    _, first, _number = np.unique(key, axis=0, return_index=True, return_inverse=True)
     distinct = key[first]
     found = {}
     for name, parts in corners.items():
@@ -41,7 +41,11 @@ def named_facets(
     return found
 
 
-def _keys(corners: np.ndarray, k: int, name: str) -> np.ndarray:
+def _keys(
+    corners: np.ndarray,
+    k: int,
+    name: str,
+) -> np.ndarray:
     """Sorted corners (m, k) of the facets that are meant."""
     if corners.shape[1] == k:
         return np.sort(corners, axis=1)

@@ -16,8 +16,6 @@ from scipy.sparse.csgraph import connected_components
 from .raw_mesh import RawMesh
 from .topology import CORNERS, DIMENSION, FACETS, FAMILY
 
-__all__ = ["NumberedFaces", "face_corners", "numbered_faces"]
-
 # [rad] between normals of neighbours across an edge of the body
 CREASE = np.radians(30.0)
 # digits to which areas and places count when faces are ordered
@@ -83,7 +81,9 @@ def _outer_facets(raw: RawMesh) -> tuple[np.ndarray, np.ndarray]:
 
 
 def _measured(
-    points: np.ndarray, corners: np.ndarray, inside: np.ndarray
+    points: np.ndarray,
+    corners: np.ndarray,
+    inside: np.ndarray,
 ) -> tuple[np.ndarray, np.ndarray]:
     """Centres and outward normals (nf, 3) of facets."""
     last = np.where(corners[:, 3] < 0, corners[:, 2], corners[:, 3])
@@ -123,7 +123,10 @@ def _parts(corners: np.ndarray, normals: np.ndarray) -> np.ndarray:
 
 
 def _by_size(
-    part: np.ndarray, centres: np.ndarray, normals: np.ndarray, points: np.ndarray
+    part: np.ndarray,
+    centres: np.ndarray,
+    normals: np.ndarray,
+    points: np.ndarray,
 ) -> np.ndarray:
     """(parts,) rank of each part: by area, ties by place."""
     if not len(part):

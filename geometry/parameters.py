@@ -13,19 +13,6 @@ from math import pi
 
 from .quantity import quantity
 
-__all__ = [
-    "Aerofoil",
-    "Disc",
-    "HertzPair",
-    "MeshSize",
-    "Plane",
-    "Platform",
-    "Punch",
-    "Shank",
-    "Wedge",
-    "ZMass",
-]
-
 DEG = pi / 180
 
 
@@ -113,8 +100,8 @@ class Wedge:
         "m",
         -5e-4,
         0.002,
-        "normal gap between flank and seat before seating; negative: "
-        "an interference, which the damper takes up as it travels inwards",
+        "normal gap between flank and seat before seating; negative: an interference, which the "
+        "damper takes up as it travels inwards",
     )
 
 
@@ -167,8 +154,8 @@ class HertzPair:
         "m",
         1e-9,
         0.01,
-        "how far the far faces are held closer than where the "
-        "bodies touch, in place of study.loads",
+        "how far the far faces are held closer than where the bodies touch, in place of "
+        "study.loads",
     )
 
 

@@ -21,8 +21,6 @@ from .session import attempt, gmsh_session
 # on each seat: half of it lifts off, and with 10 a resonance between stick and slip is 30 % low
 SEAT_ELEMENTS = 40
 
-__all__ = ["blade_corners", "check_plane", "damper_corners", "plane_blades"]
-
 
 def plane_blades(plane: Plane, size: MeshSize) -> Mesh:
     """Bodies "blade" and "damper" of triangles; the damper bridges this blade's right and the next
@@ -77,14 +75,14 @@ def check_plane(plane: Plane) -> None:
     if not top < plane.length:
         raise InputError(
             f"plane.platform_height = {plane.platform_height:.4g} m: the platform's top at "
-            f"{top:.4g} m is "
-            f"not below the tip, expected less than plane.length = {plane.length:.4g} m"
+            f"{top:.4g} m is not below the tip, expected less than plane.length = "
+            f"{plane.length:.4g} m"
         )
     room = 0.98 * (plane.platform_width - plane.thickness) / 2
     if not plane.seat_width <= room:
         raise InputError(
-            f"plane.seat_width = {plane.seat_width:.4g} m: expected at most {room:.4g} m "
-            "(98 % of the platform's overhang beside the blade)"
+            f"plane.seat_width = {plane.seat_width:.4g} m: expected at most {room:.4g} m (98 % of "
+            "the platform's overhang beside the blade)"
         )
 
 
@@ -150,7 +148,12 @@ def _draw(gmsh: ModuleType, plane: Plane) -> Groups:
     return Groups({"blade": [blade], "damper": [damper]}, faces, points)
 
 
-def _sizes(gmsh: ModuleType, groups: Groups, base: float, contact: float) -> None:
+def _sizes(
+    gmsh: ModuleType,
+    groups: Groups,
+    base: float,
+    contact: float,
+) -> None:
     field = gmsh.model.mesh.field
     distance = field.add("Distance")
     threshold = field.add("Threshold")

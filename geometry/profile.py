@@ -11,8 +11,6 @@ import numpy as np
 
 from .parameters import Disc, Platform, Shank, Wedge
 
-__all__ = ["Profile", "profile", "turn"]
-
 
 @dataclass(frozen=True)
 class Profile:
@@ -43,7 +41,12 @@ def turn(angle: float) -> np.ndarray:
     return np.array([[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]])
 
 
-def profile(platform: Platform, shank: Shank, disc: Disc, wedge: Wedge) -> Profile:
+def profile(
+    platform: Platform,
+    shank: Shank,
+    disc: Disc,
+    wedge: Wedge,
+) -> Profile:
     """Corners of the section; a flank leaves the radial plane between two blades at the angle
     alpha.
     """
@@ -51,7 +54,10 @@ def profile(platform: Platform, shank: Shank, disc: Disc, wedge: Wedge) -> Profi
     underside = disc.rim_radius + shank.height
     # of the seat against the blade's own radial direction
     slope = wedge.angle + theta
-    edge = lambda x: np.array([x, x * tan(theta) - platform.gap / 2 / cos(theta)])  # noqa: E731
+
+    def edge(x):
+        return np.array([x, x * tan(theta) - platform.gap / 2 / cos(theta)])
+
     outer = edge(underside + platform.seat_width * cos(slope))
     inner = outer - platform.seat_width * np.array([cos(slope), sin(slope)])
     corner = edge(outer[0] + platform.thickness)
@@ -71,7 +77,12 @@ def profile(platform: Platform, shank: Shank, disc: Disc, wedge: Wedge) -> Profi
     )
 
 
-def _wedge(inner: np.ndarray, outer: np.ndarray, theta: float, base: float) -> np.ndarray:
+def _wedge(
+    inner: np.ndarray,
+    outer: np.ndarray,
+    theta: float,
+    base: float,
+) -> np.ndarray:
     """Six corners, mirrored at the radial plane between the blades, anticlockwise seen from +z."""
     radial = np.array([cos(theta), sin(theta)])
     across = np.array([-sin(theta), cos(theta)])

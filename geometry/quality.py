@@ -12,20 +12,25 @@ from .jacobian import scaled_jacobian, straight_jacobian
 from .mesh import Mesh, Pair
 from .topology import EDGES, FAMILY, corner_count
 
-__all__ = ["edge_of_middle", "quality_table", "report", "shape_quality", "straighten"]
-
 # smallest accepted ratio of a curved cell's Jacobian to the straight cell's
 SAFE = 0.1
 
 
-def shape_quality(points: np.ndarray, cells: np.ndarray, cell_type: str) -> np.ndarray:
+def shape_quality(
+    points: np.ndarray,
+    cells: np.ndarray,
+    cell_type: str,
+) -> np.ndarray:
     """Ratio (nc,) of inscribed to circumscribed radius, 1 for the regular simplex; of the corners
     only.
 
     For quads and hexes: the smallest corner Jacobian over the product of its edges.
     """
     x = points[cells[:, : corner_count(cell_type)]]
-    side = lambda a, b: np.linalg.norm(x[:, a] - x[:, b], axis=1)  # noqa: E731
+
+    def side(a, b):
+        return np.linalg.norm(x[:, a] - x[:, b], axis=1)
+
     if cell_type.startswith("triangle"):
         a = side(1, 2)
         b = side(2, 0)
@@ -94,7 +99,11 @@ def straighten(mesh: Mesh, safe: float = SAFE) -> tuple[np.ndarray, int]:
         )
 
 
-def _with_partners(nodes: np.ndarray, pairs: dict[str, Pair], count: int) -> np.ndarray:
+def _with_partners(
+    nodes: np.ndarray,
+    pairs: dict[str, Pair],
+    count: int,
+) -> np.ndarray:
     """Mask (count,) of the nodes and of every node paired with one of them."""
     mask = np.zeros(count, dtype=bool)
     mask[nodes] = True
@@ -104,7 +113,11 @@ def _with_partners(nodes: np.ndarray, pairs: dict[str, Pair], count: int) -> np.
     return mask
 
 
-def report(mesh: Mesh, straightened: int, size: float) -> dict[str, object]:
+def report(
+    mesh: Mesh,
+    straightened: int,
+    size: float,
+) -> dict[str, object]:
     """What Mesh.report holds: counts, worst Jacobian and shape, cells straightened, element size
     wanted [m] and mean edge length [m].
 

@@ -7,8 +7,6 @@ from __future__ import annotations
 import dataclasses
 from typing import Any
 
-__all__ = ["describe", "quantity"]
-
 
 def quantity(
     default: Any = dataclasses.MISSING,

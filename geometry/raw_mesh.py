@@ -20,8 +20,6 @@ from bladefem.errors import InputError
 from .session import gmsh_session
 from .topology import CORNERS, DIMENSION, EDGES, FAMILY, GMSH_TYPES, NODES
 
-__all__ = ["RawMesh", "from_gmsh_model", "from_vtk_order", "read_by_gmsh", "read_raw"]
-
 # corner pairs of the edges in the order of VTK, meshio, Abaqus, Ansys and Nastran
 VTK_EDGES = {
     "tetra": [(0, 1), (1, 2), (2, 0), (0, 3), (1, 3), (2, 3)],
@@ -189,7 +187,7 @@ def from_vtk_order(word: str, cells: np.ndarray) -> np.ndarray:
         return cells
     k = CORNERS[family]
     edges = len(EDGES[family])
-    if word not in NODES or NODES[word] > k + edges and family != "hexahedron":
+    if word not in NODES or (NODES[word] > k + edges and family != "hexahedron"):
         raise InputError(
             f"imported.file: cells of type {word} are not supported, expected one node on each "
             "edge at most"

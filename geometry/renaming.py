@@ -12,8 +12,6 @@ from bladefem.errors import InputError, suggestion
 
 from .raw_mesh import RawMesh
 
-__all__ = ["read_names", "renamed", "renamed_raw"]
-
 Part = TypeVar("Part")
 
 

@@ -9,8 +9,6 @@ from typing import Any, TypeVar
 
 import numpy as np
 
-__all__ = ["anywhere", "around"]
-
 Table = TypeVar("Table")
 
 
@@ -21,7 +19,11 @@ def anywhere(table: type[Table], rng: np.random.Generator) -> Table:
     return table(**{f.name: _draw(f, rng) for f in dataclasses.fields(table)})
 
 
-def around(table: Table, rng: np.random.Generator, spread: float) -> Table:
+def around(
+    table: Table,
+    rng: np.random.Generator,
+    spread: float,
+) -> Table:
     """Every number within a factor exp(+-spread) of the table's own, inside its range.
 
     A number that is zero moves by the share ``spread`` of the way to a random place in its range,
@@ -45,7 +47,12 @@ def _draw(field: Any, rng: np.random.Generator) -> Any:
     return round(value) if isinstance(field.default, int) else float(value)
 
 
-def _near(value: Any, field: Any, rng: np.random.Generator, spread: float) -> Any:
+def _near(
+    value: Any,
+    field: Any,
+    rng: np.random.Generator,
+    spread: float,
+) -> Any:
     low, high, words = (field.metadata[key] for key in ("low", "high", "choices"))
     if words or value is None or low is None:
         return _draw(field, rng)

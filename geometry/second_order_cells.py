@@ -13,8 +13,6 @@ import numpy as np
 
 from .topology import CORNERS, EDGES, FAMILY, NODES, QUADS
 
-__all__ = ["COMPLETE", "completed_cells"]
-
 # family -> the word of its complete second-order cell
 COMPLETE = {
     "triangle": "triangle6",
@@ -60,7 +58,9 @@ def _with_middles(points: np.ndarray, blocks: Blocks) -> tuple[np.ndarray, list[
 
 
 def _with_face_centres(
-    points: np.ndarray, blocks: Blocks, middles: list[np.ndarray]
+    points: np.ndarray,
+    blocks: Blocks,
+    middles: list[np.ndarray],
 ) -> tuple[np.ndarray, list[np.ndarray]]:
     """Points, and the (nc, quadrilaterals) centre nodes of each block's faces."""
     if not any(FAMILY[word] in QUADS for word, _ in blocks):
@@ -89,7 +89,10 @@ def _with_face_centres(
 
 
 def _with_cell_centres(
-    points: np.ndarray, word: str, cells: np.ndarray, middle: np.ndarray
+    points: np.ndarray,
+    word: str,
+    cells: np.ndarray,
+    middle: np.ndarray,
 ) -> tuple[np.ndarray, np.ndarray]:
     """Points, and the (nc, 1) centre node of each hexahedron."""
     if NODES[word] == NODES["hexahedron27"]:

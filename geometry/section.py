@@ -8,15 +8,17 @@ import numpy as np
 
 from .parameters import Aerofoil
 
-__all__ = ["centroid", "grown", "outline", "place", "placement", "section"]
-
 # trailing edge over largest thickness: a spline closed by a short straight edge meshes well
 BLUNT = 0.2
 # points on each side
 POINTS = 24
 
 
-def half_thickness(family: str, x: np.ndarray, thickness: float) -> np.ndarray:
+def half_thickness(
+    family: str,
+    x: np.ndarray,
+    thickness: float,
+) -> np.ndarray:
     """Half thickness over chord at x = 0..1 along the chord.
 
     The NACA law is the four-digit one (NACA report 460) with its last coefficient opened to a blunt
@@ -33,7 +35,11 @@ def half_thickness(family: str, x: np.ndarray, thickness: float) -> np.ndarray:
     return thickness / 2 * ((1 - BLUNT) * 4 * x * (1 - x) + BLUNT * rounded)
 
 
-def spread(family: str, thickness: float, points: int) -> np.ndarray:
+def spread(
+    family: str,
+    thickness: float,
+    points: int,
+) -> np.ndarray:
     """Places (points,) along the chord, even in arc length plus turning angle, so that every nose
     is drawn round.
     """
@@ -47,7 +53,12 @@ def spread(family: str, thickness: float, points: int) -> np.ndarray:
     return np.interp(np.linspace(0, measure[-1], points), measure, x)
 
 
-def section(family: str, thickness: float, camber: float, points: int = POINTS) -> np.ndarray:
+def section(
+    family: str,
+    thickness: float,
+    camber: float,
+    points: int = POINTS,
+) -> np.ndarray:
     """Closed section over chord, (2 points - 1, 2): trailing edge (suction side), leading edge,
     trailing edge.
 
@@ -73,7 +84,9 @@ def centroid(polygon: np.ndarray) -> np.ndarray:
 
 
 def placement(
-    blade: Aerofoil, radius: float, t: float
+    blade: Aerofoil,
+    radius: float,
+    t: float,
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray, float]:
     """Frame of the section at the share t = 0..1 of the span; ``radius`` [m] is the platform's top.
 
@@ -89,7 +102,12 @@ def placement(
     return origin, along, across, chord
 
 
-def place(blade: Aerofoil, radius: float, t: float, plane: np.ndarray) -> np.ndarray:
+def place(
+    blade: Aerofoil,
+    radius: float,
+    t: float,
+    plane: np.ndarray,
+) -> np.ndarray:
     """Points (n, 3) [m] of chord coordinates (n, 2) in the section at share t, stacked on the
     centres of area.
     """
@@ -105,7 +123,12 @@ def shape(blade: Aerofoil, t: float) -> np.ndarray:
     )
 
 
-def outline(blade: Aerofoil, radius: float, t: float, grow: float = 0.0) -> np.ndarray:
+def outline(
+    blade: Aerofoil,
+    radius: float,
+    t: float,
+    grow: float = 0.0,
+) -> np.ndarray:
     """Section in space at the share t of the span, (n, 3) [m], its outline moved outwards by
     ``grow`` [m].
     """

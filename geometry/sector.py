@@ -22,15 +22,18 @@ from .sector_names import edge_curves, link, mark_tip, motions, moved, name_face
 from .session import attempt, gmsh_session
 from .sizing import sector_sizes, set_grids, set_sizes
 
-__all__ = ["blade_solid", "disc_segment", "wedge_sector"]
-
 SEATS = ("seat_left", "seat_right", "damper_left", "damper_right")
 # a fillet meets the platform at this angle, since tangent faces are hard on Boolean unions
 LIFT = 15 * DEG
 
 
 def wedge_sector(
-    aerofoil: Aerofoil, platform: Platform, shank: Shank, disc: Disc, wedge: Wedge, size: MeshSize
+    aerofoil: Aerofoil,
+    platform: Platform,
+    shank: Shank,
+    disc: Disc,
+    wedge: Wedge,
+    size: MeshSize,
 ) -> Mesh:
     """Blade, platform, shank and disc segment as body "blade", the wedge towards the next blade as
     "damper".
@@ -64,7 +67,11 @@ def wedge_sector(
     return moved(mesh, wedge, shape) if wedge.clearance else mesh
 
 
-def disc_segment(gmsh: ModuleType, disc: Disc, theta: float) -> int:
+def disc_segment(
+    gmsh: ModuleType,
+    disc: Disc,
+    theta: float,
+) -> int:
     """Ring segment between -theta and +theta."""
     occ = gmsh.model.occ
     z = -disc.width / 2
@@ -80,7 +87,11 @@ def disc_segment(gmsh: ModuleType, disc: Disc, theta: float) -> int:
     return next(tag for dim, tag in occ.extrude([(2, face)], 0, 0, disc.width) if dim == 3)
 
 
-def _aerofoil(gmsh: ModuleType, blade: Aerofoil, top: float) -> int:
+def _aerofoil(
+    gmsh: ModuleType,
+    blade: Aerofoil,
+    top: float,
+) -> int:
     """Solid lofted from platform to tip; with a fillet, two lofts sewn at a common ring: flared
     foot and blade.
 

@@ -14,14 +14,16 @@ from .parameters import Aerofoil, Disc, Platform, Shank, Wedge
 from .profile import Profile, profile
 from .section import outline, shape
 
-__all__ = ["check_sector"]
-
 # of a length: a strip of this width keeps the shape quality of its elements above 0.05
 STRIP = 0.02
 
 
 def check_sector(
-    aerofoil: Aerofoil, platform: Platform, shank: Shank, disc: Disc, wedge: Wedge
+    aerofoil: Aerofoil,
+    platform: Platform,
+    shank: Shank,
+    disc: Disc,
+    wedge: Wedge,
 ) -> None:
     """Refuse proportions that overlap or leave the sector.
 
@@ -43,7 +45,13 @@ def check_sector(
     check_aerofoil(aerofoil, platform, section)
 
 
-def _at_most(name: str, value: float, limit: float, meaning: str, unit: str = "m") -> None:
+def _at_most(
+    name: str,
+    value: float,
+    limit: float,
+    meaning: str,
+    unit: str = "m",
+) -> None:
     if not value <= limit:
         raise InputError(
             f"{name} = {value:.4g} {unit} is too large: expected at most {limit:.4g} {unit} "
@@ -51,18 +59,26 @@ def _at_most(name: str, value: float, limit: float, meaning: str, unit: str = "m
         )
 
 
-def _no_strip(name: str, value: float, other: str, limit: float) -> None:
+def _no_strip(
+    name: str,
+    value: float,
+    other: str,
+    limit: float,
+) -> None:
     """Two ends that nearly coincide leave a strip that no good element fits into."""
     _at_most(name, value, limit, other)
     if 0 < limit - value < STRIP * limit:
         raise InputError(
             f"{name} = {value:.6g} m ends {limit - value:.2g} m before {other}, expected the same "
-            "length "
-            f"or at most {(1 - STRIP) * limit:.4g} m"
+            f"length or at most {(1 - STRIP) * limit:.4g} m"
         )
 
 
-def check_disc(disc: Disc, shank: Shank, platform: Platform) -> None:
+def check_disc(
+    disc: Disc,
+    shank: Shank,
+    platform: Platform,
+) -> None:
     """Ring and neck."""
     theta = pi / disc.sectors
     _at_most(
@@ -78,7 +94,12 @@ def check_disc(disc: Disc, shank: Shank, platform: Platform) -> None:
     _no_strip("shank.length", shank.length, "disc.width", disc.width)
 
 
-def check_platform(section: Profile, platform: Platform, shank: Shank, wedge: Wedge) -> None:
+def check_platform(
+    section: Profile,
+    platform: Platform,
+    shank: Shank,
+    wedge: Wedge,
+) -> None:
     """The plate fits into the pitch and holds the seat beside the shank."""
     half = section.corner[1] + platform.gap / 2
     _at_most("platform.gap", platform.gap, half, "half the pitch at the platform")
@@ -93,7 +114,12 @@ def check_platform(section: Profile, platform: Platform, shank: Shank, wedge: We
     _no_strip("damper.length", wedge.length, "platform.length", platform.length)
 
 
-def check_pocket(section: Profile, shank: Shank, disc: Disc, wedge: Wedge) -> None:
+def check_pocket(
+    section: Profile,
+    shank: Shank,
+    disc: Disc,
+    wedge: Wedge,
+) -> None:
     """The wedge stays clear of shank and rim, also after it is moved inwards by its clearance."""
     drop = wedge.base + wedge.clearance / sin(wedge.angle)
     _at_most("damper.base", drop, 0.95 * shank.height, "95 % of shank.height, clearance included")
@@ -102,17 +128,21 @@ def check_pocket(section: Profile, shank: Shank, disc: Disc, wedge: Wedge) -> No
     if foot[1] < shank.width / 2:
         raise InputError(
             f"damper.base = {wedge.base:.4g} m: the wedge does not fit between shank and platform "
-            f"(it enters the shank by {shank.width / 2 - foot[1]:.3g} m); "
-            "choose a smaller damper.base, shank.width or platform.seat_width"
+            f"(it enters the shank by {shank.width / 2 - foot[1]:.3g} m); choose a smaller "
+            "damper.base, shank.width or platform.seat_width"
         )
     if np.hypot(*foot) < disc.rim_radius:
         raise InputError(
-            f"damper.base = {wedge.base:.4g} m: the wedge enters the rim of the disc; "
-            "choose a smaller damper.base or a larger shank.height"
+            f"damper.base = {wedge.base:.4g} m: the wedge enters the rim of the disc; choose a "
+            "smaller damper.base or a larger shank.height"
         )
 
 
-def check_aerofoil(blade: Aerofoil, platform: Platform, section: Profile) -> None:
+def check_aerofoil(
+    blade: Aerofoil,
+    platform: Platform,
+    section: Profile,
+) -> None:
     """Sections that do not cross themselves, and a root that stands on the platform."""
     for t, name in ((0.0, "thickness_root"), (1.0, "thickness_tip")):
         if crosses_itself(shape(blade, t)):
@@ -138,8 +168,7 @@ def check_aerofoil(blade: Aerofoil, platform: Platform, section: Profile) -> Non
         if excess > 0:
             raise InputError(
                 f"aerofoil.chord_root = {blade.chord_root:.4g} m: the root section overhangs the "
-                "platform "
-                f"{what} by {excess:.3g} m; choose a smaller {cure}"
+                f"platform {what} by {excess:.3g} m; choose a smaller {cure}"
             )
     thinnest = blade.thickness_root * blade.chord_root
     _at_most("aerofoil.fillet", blade.fillet, thinnest, "the thickness of the root section")
@@ -149,10 +178,12 @@ def crosses_itself(polygon: np.ndarray) -> bool:
     """Do two edges of the closed polygon (n, 2) cross?"""
     a = polygon
     b = np.roll(polygon, -1, axis=0)
-    side = lambda p, q, r: (
-        (q[..., 0] - p[..., 0]) * (r[..., 1] - p[..., 1])  # noqa: E731
-        - (q[..., 1] - p[..., 1]) * (r[..., 0] - p[..., 0])
-    )
+
+    def side(p, q, r):
+        return (q[..., 0] - p[..., 0]) * (r[..., 1] - p[..., 1]) - (q[..., 1] - p[..., 1]) * (
+            r[..., 0] - p[..., 0]
+        )
+
     ai = a[:, None]
     bi = b[:, None]
     aj = a[None]

@@ -18,10 +18,12 @@ from .parameters import Aerofoil, Disc, Wedge
 from .profile import Profile, turn
 from .section import outline, place, placement
 
-__all__ = ["edge_curves", "link", "mark_tip", "motions", "moved", "name_faces", "seat", "sector"]
 
-
-def seat(profile: Profile, length: float, side: int) -> np.ndarray:
+def seat(
+    profile: Profile,
+    length: float,
+    side: int,
+) -> np.ndarray:
     """Corners (4, 3) [m] of the contact face on this blade, side +1 towards +y."""
     (xi, yi), (xo, yo), z = profile.inner, profile.outer, length / 2
     return np.array(
@@ -73,7 +75,11 @@ def name_faces(
     return Groups({"blade": [blade], "damper": [damper]}, faces)
 
 
-def _skin(gmsh: ModuleType, sides: list[int], aerofoil: Aerofoil) -> dict[str, list[int]]:
+def _skin(
+    gmsh: ModuleType,
+    sides: list[int],
+    aerofoil: Aerofoil,
+) -> dict[str, list[int]]:
     """The three faces of the skin: the smallest is the trailing edge, the suction side lies across
     the chord.
     """
@@ -119,13 +125,22 @@ def motions(profile: Profile) -> dict[str, Motion]:
     }
 
 
-def link(gmsh: ModuleType, groups: Groups, profile: Profile) -> None:
+def link(
+    gmsh: ModuleType,
+    groups: Groups,
+    profile: Profile,
+) -> None:
     """Tell gmsh to copy the mesh of each master face onto its slave."""
     for master, slave, rotation, shift in motions(profile).values():
         tie(gmsh, 2, groups.faces[master], groups.faces[slave], rotation, shift)
 
 
-def mark_tip(gmsh: ModuleType, groups: Groups, aerofoil: Aerofoil, profile: Profile) -> Groups:
+def mark_tip(
+    gmsh: ModuleType,
+    groups: Groups,
+    aerofoil: Aerofoil,
+    profile: Profile,
+) -> Groups:
     """Groups with three points of the tip that are nodes of any mesh.
 
     tip_leading is the end of the leading edge; tip_trailing is the corner of the blunt edge on the
@@ -151,7 +166,11 @@ def mark_tip(gmsh: ModuleType, groups: Groups, aerofoil: Aerofoil, profile: Prof
     )
 
 
-def moved(mesh: Mesh, wedge: Wedge, profile: Profile) -> Mesh:
+def moved(
+    mesh: Mesh,
+    wedge: Wedge,
+    profile: Profile,
+) -> Mesh:
     """The mesh with the damper moved inwards so that both flanks clear their seats by
     wedge.clearance.
     """

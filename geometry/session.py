@@ -10,8 +10,6 @@ from types import ModuleType
 
 from bladefem.errors import InputError
 
-__all__ = ["attempt", "gmsh_session"]
-
 OPTIONS = {
     "General.Terminal": 0,
     # more threads change the mesh from run to run

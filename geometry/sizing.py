@@ -14,9 +14,6 @@ from .parameters import Aerofoil, Disc, MeshSize, Platform, Shank, Wedge
 from .profile import Profile
 from .section import BLUNT
 
-__all__ = ["Sizes", "blade_volume", "sector_sizes", "set_grids", "set_sizes"]
-
-
 # element along the leading edge over those of the aerofoil
 NOSE = 0.6
 # elements along a seat at least
@@ -45,7 +42,12 @@ class Sizes:
 
 
 def sector_sizes(
-    aerofoil: Aerofoil, platform: Platform, shank: Shank, disc: Disc, wedge: Wedge, size: MeshSize
+    aerofoil: Aerofoil,
+    platform: Platform,
+    shank: Shank,
+    disc: Disc,
+    wedge: Wedge,
+    size: MeshSize,
 ) -> Sizes:
     """Sizes from the thinnest part of the sector where the user leaves them open, in bounds of SOME
     cells.
@@ -65,7 +67,12 @@ def sector_sizes(
     )
 
 
-def blade_volume(aerofoil: Aerofoil, platform: Platform, shank: Shank, disc: Disc) -> float:
+def blade_volume(
+    aerofoil: Aerofoil,
+    platform: Platform,
+    shank: Shank,
+    disc: Disc,
+) -> float:
     """About the volume of everything above the rim [m^3]."""
     chord = (aerofoil.chord_root + aerofoil.chord_tip) / 2
     thickness = (aerofoil.thickness_root + aerofoil.thickness_tip) / 2
@@ -77,7 +84,12 @@ def blade_volume(aerofoil: Aerofoil, platform: Platform, shank: Shank, disc: Dis
     )
 
 
-def _affordable(aerofoil: Aerofoil, platform: Platform, shank: Shank, disc: Disc) -> float:
+def _affordable(
+    aerofoil: Aerofoil,
+    platform: Platform,
+    shank: Shank,
+    disc: Disc,
+) -> float:
     """Element size [m] that fills everything above the rim with SOME tetrahedra."""
     return (blade_volume(aerofoil, platform, shank, disc) / (0.12 * SOME)) ** (1 / 3)
 
@@ -125,7 +137,12 @@ def set_sizes(
     gmsh.option.setNumber("Mesh.MeshSizeMax", sizes.disc)
 
 
-def set_grids(gmsh: ModuleType, seats: list[int], wedge: Wedge, size: MeshSize) -> None:
+def set_grids(
+    gmsh: ModuleType,
+    seats: list[int],
+    wedge: Wedge,
+    size: MeshSize,
+) -> None:
     """Mesh rectangular seats in a grid, much finer across them than along.
 
     A wedge that rolls on its seats presses a strip of their width only: a few nodes there decide
@@ -153,7 +170,11 @@ def set_grids(gmsh: ModuleType, seats: list[int], wedge: Wedge, size: MeshSize) 
 
 
 def _box(
-    field: object, inside: float, outside: float, thickness: float, limits: list[float]
+    field: object,
+    inside: float,
+    outside: float,
+    thickness: float,
+    limits: list[float],
 ) -> int:
     tag = field.add("Box")
     for name, value in zip(("XMin", "XMax", "YMin", "YMax", "ZMin", "ZMax"), limits, strict=True):
@@ -164,7 +185,12 @@ def _box(
     return tag
 
 
-def _near(field: object, curves: list[int], size: float, far: float) -> int:
+def _near(
+    field: object,
+    curves: list[int],
+    size: float,
+    far: float,
+) -> int:
     distance = field.add("Distance")
     threshold = field.add("Threshold")
     field.setNumbers(distance, "CurvesList", curves)

@@ -18,8 +18,6 @@ from .second_order_cells import completed_cells
 from .split_cells import split_cells, vertex_order
 from .topology import CORNERS, DIMENSION, EDGES, FAMILY, NODES
 
-__all__ = ["LINEAR", "SolidCells", "solid_cells"]
-
 # what becomes of linear solids
 LINEAR = ("refuse", "promote", "keep")
 
@@ -40,7 +38,12 @@ class SolidCells:
     notes: tuple[str, ...]
 
 
-def solid_cells(raw: RawMesh, source: str, linear: str, axis: np.ndarray) -> SolidCells:
+def solid_cells(
+    raw: RawMesh,
+    source: str,
+    linear: str,
+    axis: np.ndarray,
+) -> SolidCells:
     """The cells of the highest dimension.
 
     Args:
@@ -66,7 +69,7 @@ def solid_cells(raw: RawMesh, source: str, linear: str, axis: np.ndarray) -> Sol
     words = {word for word, _ in blocks}
     owner = [np.repeat(b, len(cells)) for b, (_, cells) in zip(chosen, blocks, strict=True)]
     row = [np.arange(len(cells)) for _, cells in blocks]
-    if len(words) > 1 or top == 3 and not words <= {"tetra", "tetra10", *_HEXAHEDRA}:
+    if len(words) > 1 or (top == 3 and not words <= {"tetra", "tetra10", *_HEXAHEDRA}):
         if top == 2:
             raise InputError(
                 f"imported.file = '{source}': cells are {' and '.join(sorted(words))}, expected "
@@ -97,15 +100,18 @@ _HEXAHEDRA = ("hexahedron", "hexahedron27")
 
 
 def _of_wanted_order(
-    points: np.ndarray, blocks: list[tuple[str, np.ndarray]], linear: str, source: str
+    points: np.ndarray,
+    blocks: list[tuple[str, np.ndarray]],
+    linear: str,
+    source: str,
 ) -> tuple[np.ndarray, list[tuple[str, np.ndarray]], tuple[str, ...]]:
     """Points and blocks as they are to be solved with, and what was done."""
     first_order = [(word, cells) for word, cells in blocks if NODES[word] == CORNERS[FAMILY[word]]]
     if first_order and linear == "keep":
         if len(first_order) < len(blocks):
             raise InputError(
-                f"imported.linear = 'keep': '{source}' mixes first and second order, "
-                "expected 'promote'"
+                f"imported.linear = 'keep': '{source}' mixes first and second order, expected "
+                "'promote'"
             )
         return points, blocks, (f"{_counted(first_order)} are solved as they are: far too stiff",)
     if first_order and linear != "promote":
@@ -120,7 +126,12 @@ def _of_wanted_order(
     return *completed_cells(points, blocks), notes
 
 
-def _check_middles(points: np.ndarray, word: str, cells: np.ndarray, source: str) -> None:
+def _check_middles(
+    points: np.ndarray,
+    word: str,
+    cells: np.ndarray,
+    source: str,
+) -> None:
     """Refuse two nodes in the middle of one edge: dolfinx crashes on them.
 
     They come from cells that share corners but not mid-side nodes, or from a quadrilateral that

@@ -17,8 +17,6 @@ import numpy as np
 
 from .topology import CORNERS, EDGES, FACETS, FAMILY, NODES, QUADS
 
-__all__ = ["split_cells", "vertex_order"]
-
 # of the model's size: coordinates that differ by less count as equal in the order of vertices
 SAME = 1e-5
 
@@ -39,7 +37,10 @@ def vertex_order(points: np.ndarray, axis: np.ndarray) -> np.ndarray:
 
 
 def split_cells(
-    word: str, cells: np.ndarray, rank: np.ndarray, points: np.ndarray
+    word: str,
+    cells: np.ndarray,
+    rank: np.ndarray,
+    points: np.ndarray,
 ) -> tuple[np.ndarray, np.ndarray]:
     """Tetrahedra (nt, 4 or 10) with positive volume, and the row of the cell that each came from.
 
@@ -84,7 +85,11 @@ def _triangles(
 
 
 def _tetrahedra(
-    family: str, cells: np.ndarray, local: np.ndarray, points: np.ndarray, quadratic: bool
+    family: str,
+    cells: np.ndarray,
+    local: np.ndarray,
+    points: np.ndarray,
+    quadratic: bool,
 ) -> np.ndarray:
     """Node numbers (m, 4 or 10) of tetrahedra given by local corners (m, 4), turned to positive
     volume.

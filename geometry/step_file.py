@@ -32,8 +32,6 @@ from .raw_mesh import RawMesh, from_gmsh_model
 from .renaming import read_names, renamed
 from .session import attempt, gmsh_session
 
-__all__ = ["FittedDamper", "coarse_step", "read_step"]
-
 # (dimension, name) to entities
 Named = dict[tuple[int, str], list[int]]
 CONTACT = ("seat_left", "seat_right", "damper_left", "damper_right")
@@ -140,7 +138,11 @@ def file_unit(text: str) -> float:
     return 0.0254 if re.search(r"CONVERSION_BASED_UNIT\(\s*'INCH'", text, re.I) else 1e-3
 
 
-def _import(gmsh: ModuleType, path: Path, factor: float) -> None:
+def _import(
+    gmsh: ModuleType,
+    path: Path,
+    factor: float,
+) -> None:
     """Shapes in metres."""
     gmsh.option.setNumber("Geometry.OCCImportLabels", 1)
     gmsh.option.setString("Geometry.OCCTargetUnit", "M")
@@ -207,7 +209,10 @@ def _plain(name: str) -> str:
 
 
 def _found(
-    gmsh: ModuleType, named: dict[tuple[int, str], list[int]], sectors: int, axis: np.ndarray
+    gmsh: ModuleType,
+    named: dict[tuple[int, str], list[int]],
+    sectors: int,
+    axis: np.ndarray,
 ) -> dict[tuple[int, str], list[int]]:
     """Cyclic faces and clamp by where they are, when no face has these names."""
     words = {name.lower() for dim, name in named if dim == 2}
@@ -233,7 +238,9 @@ def _found(
 
 
 def _turned(
-    gmsh: ModuleType, middle: dict[int, np.ndarray], on: np.ndarray
+    gmsh: ModuleType,
+    middle: dict[int, np.ndarray],
+    on: np.ndarray,
 ) -> tuple[list[int], list[int]]:
     """Faces that the rotation carries onto each other: same area, centre turned."""
     scale = max(np.linalg.norm(c) for c in middle.values())
@@ -256,7 +263,10 @@ def rotation(axis: np.ndarray, angle: float) -> np.ndarray:
 
 
 def _periodic(
-    gmsh: ModuleType, named: dict[tuple[int, str], list[int]], sectors: int, axis: np.ndarray
+    gmsh: ModuleType,
+    named: dict[tuple[int, str], list[int]],
+    sectors: int,
+    axis: np.ndarray,
 ) -> None:
     """Tie cyclic faces and contact faces where both sides are named and the motion fits."""
     tags = {name.lower(): t for (dim, name), t in named.items() if dim == 2}
@@ -277,7 +287,12 @@ def _periodic(
             tie(gmsh, 2, tags[master], tags[slave], best, np.zeros(3))
 
 
-def _refined(gmsh: ModuleType, faces: list[int], fine: float, base: float) -> None:
+def _refined(
+    gmsh: ModuleType,
+    faces: list[int],
+    fine: float,
+    base: float,
+) -> None:
     """Size ``fine`` on some faces [m], growing to ``base`` within five of its elements."""
     field = gmsh.model.mesh.field
     distance = field.add("Distance")
@@ -295,7 +310,11 @@ def _refined(gmsh: ModuleType, faces: list[int], fine: float, base: float) -> No
     field.setAsBackgroundMesh(threshold)
 
 
-def _generate(gmsh: ModuleType, size: MeshSize, contact: list[int]) -> None:
+def _generate(
+    gmsh: ModuleType,
+    size: MeshSize,
+    contact: list[int],
+) -> None:
     """Elements that follow the curvature, of ``size.contact_size`` on the contact faces and coarser
     away from them.
     """

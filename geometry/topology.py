@@ -4,22 +4,6 @@ from __future__ import annotations
 
 import numpy as np
 
-__all__ = [
-    "CORNERS",
-    "DIMENSION",
-    "EDGES",
-    "FACETS",
-    "GMSH_TYPES",
-    "NODES",
-    "QUADS",
-    "boundary",
-    "corner_count",
-    "facet_nodes",
-    "facets_of",
-    "outward",
-    "owners",
-]
-
 # gmsh's number of an element type -> meshio's word
 GMSH_TYPES = {
     1: "line",
@@ -162,7 +146,11 @@ def face_word(nodes: int, dimension: int) -> str:
     return FACE_WORDS[dimension - 1][nodes]
 
 
-def owners(cells: np.ndarray, cell_type: str, faces: np.ndarray) -> np.ndarray:
+def owners(
+    cells: np.ndarray,
+    cell_type: str,
+    faces: np.ndarray,
+) -> np.ndarray:
     """For each face (nf, kc corners) the row of the cell that has it as a facet, -1 where there is
     none.
     """
@@ -176,7 +164,11 @@ def owners(cells: np.ndarray, cell_type: str, faces: np.ndarray) -> np.ndarray:
     return cell_of[inverse[len(facets) :]]
 
 
-def normals(points: np.ndarray, faces: np.ndarray, dimension: int) -> np.ndarray:
+def normals(
+    points: np.ndarray,
+    faces: np.ndarray,
+    dimension: int,
+) -> np.ndarray:
     """Normals (nf, 3) of faces by their corners, length = area (3-D) or edge length (2-D); outward
     after `outward`.
     """
@@ -190,7 +182,12 @@ def normals(points: np.ndarray, faces: np.ndarray, dimension: int) -> np.ndarray
     return np.cross(x[:, 2] - x[:, 0], x[:, 3] - x[:, 1]) / 2
 
 
-def outward(points: np.ndarray, cells: np.ndarray, cell_type: str, faces: np.ndarray) -> np.ndarray:
+def outward(
+    points: np.ndarray,
+    cells: np.ndarray,
+    cell_type: str,
+    faces: np.ndarray,
+) -> np.ndarray:
     """The faces (nf, k) reordered so that their normals leave the cells (in 2-D: the body lies on
     the left).
 

@@ -17,8 +17,6 @@ from .mesh import Mesh
 from .parameters import MeshSize, ZMass
 from .session import attempt, gmsh_session
 
-__all__ = ["check_z_mass", "z_corners", "z_mass", "z_section"]
-
 # side of the foundation block over the larger side of the Z
 WIDER = 2.0
 
@@ -44,7 +42,11 @@ def z_section(z: ZMass) -> tuple[float, float]:
     )
 
 
-def z_mass(z: ZMass, size: MeshSize, depth: float = 0.0) -> Mesh:
+def z_mass(
+    z: ZMass,
+    size: MeshSize,
+    depth: float = 0.0,
+) -> Mesh:
     """Body "damper" with the faces "footprint" (z = 0) and "top".
 
     Args:
@@ -86,12 +88,16 @@ def check_z_mass(z: ZMass) -> None:
     limit = 0.95 * min(z.height / 2, z.width)
     if not z.bar <= limit:
         raise InputError(
-            f"z_mass.bar = {z.bar:.4g} m: expected at most {limit:.4g} m "
-            "(95 % of z_mass.width and of half of z_mass.height)"
+            f"z_mass.bar = {z.bar:.4g} m: expected at most {limit:.4g} m (95 % of z_mass.width and "
+            "of half of z_mass.height)"
         )
 
 
-def _block(gmsh: ModuleType, z: ZMass, depth: float) -> int:
+def _block(
+    gmsh: ModuleType,
+    z: ZMass,
+    depth: float,
+) -> int:
     """The foundation with the Z cut into its top."""
     w = WIDER / 2 * max(z.width, z.height)
     square = np.array([[-w, -w], [w, -w], [w, w], [-w, w]])
@@ -99,7 +105,13 @@ def _block(gmsh: ModuleType, z: ZMass, depth: float) -> int:
     return imprint(gmsh, prism(gmsh, square, -depth, 0.0), [(2, mark)])
 
 
-def _names(gmsh: ModuleType, z: ZMass, depth: float, body: int, block: int | None) -> Groups:
+def _names(
+    gmsh: ModuleType,
+    z: ZMass,
+    depth: float,
+    body: int,
+    block: int | None,
+) -> Groups:
     """Faces by the heights of their centres; the seat is the inner one of the two faces on top of
     the block.
     """

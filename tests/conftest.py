@@ -31,8 +31,8 @@ def _refuse_skip(report: pytest.TestReport | pytest.CollectReport) -> None:
     if report.skipped and not hasattr(report, "wasxfail"):
         report.outcome = "failed"
         report.longrepr = (
-            f"{report.longrepr}\nA skipped test counts as failed: what it needs is "
-            "part of the set-up."
+            f"{report.longrepr}\nA skipped test counts as failed: what it needs is part of the "
+            "set-up."
         )
 
 

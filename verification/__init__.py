@@ -1,1 +1,3 @@
-"""What judges bladefem: the paper claim by claim. It imports bladefem, never the other way round."""
+"""What judges bladefem: the paper claim by claim. It imports bladefem, never the other way
+round.
+"""

@@ -14,22 +14,6 @@ from ..scene.kinds import kind_named, load_function
 from ..scene.tables import Scene
 from . import tables
 
-__all__ = [
-    "chart",
-    "check",
-    "contact",
-    "default_folder",
-    "info",
-    "mesh",
-    "modes",
-    "prepared",
-    "reduce",
-    "report",
-    "response",
-    "tell",
-    "until",
-]
-
 
 def check(options: argparse.Namespace, comm: Any) -> None:
     """Print the resolved scene, and what in it is improbable."""
@@ -155,7 +139,11 @@ def refuse_pdf(options: argparse.Namespace) -> None:
         require_browser()
 
 
-def print_report(options: argparse.Namespace, comm: Any, page: Path) -> None:
+def print_report(
+    options: argparse.Namespace,
+    comm: Any,
+    page: Path,
+) -> None:
     """The report as PDF, where that is wanted."""
     from ..io.stage_cache import on_root
     from ..report.pdf import print_pdf
@@ -166,7 +154,11 @@ def print_report(options: argparse.Namespace, comm: Any, page: Path) -> None:
 
 
 def run_kind(
-    scene: Scene, folder: Path, options: argparse.Namespace, comm: Any, progress: Any
+    scene: Scene,
+    folder: Path,
+    options: argparse.Namespace,
+    comm: Any,
+    progress: Any,
 ) -> None:
     """All that `bladefem run` does for a scene, by the record of its kind, and its table."""
     kind = kind_named(scene.kind)
@@ -212,7 +204,9 @@ def info(options: argparse.Namespace, comm: Any) -> None:
 
 
 def prepared(
-    options: argparse.Namespace, comm: Any, responds: bool = False
+    options: argparse.Namespace,
+    comm: Any,
+    responds: bool = False,
 ) -> tuple[Scene, Path, Any]:
     """The scene, the run folder with a copy of it, kept for this command, and progress bars;
     collective.
@@ -270,7 +264,12 @@ def given_scene(options: argparse.Namespace, responds: bool) -> Scene:
     return scene
 
 
-def until(stage: str, options: argparse.Namespace, comm: Any, responds: bool = False) -> Any:
+def until(
+    stage: str,
+    options: argparse.Namespace,
+    comm: Any,
+    responds: bool = False,
+) -> Any:
     """The pipeline up to a stage, with progress bars; collective."""
     scene, folder, bars = prepared(options, comm, responds)
     from ..study.pipeline import pipeline
@@ -278,7 +277,12 @@ def until(stage: str, options: argparse.Namespace, comm: Any, responds: bool = F
     return pipeline.run(scene, folder, until=stage, comm=comm, progress=bars)
 
 
-def tell(options: argparse.Namespace, comm: Any, table: Callable[[], str], run: Any = None) -> None:
+def tell(
+    options: argparse.Namespace,
+    comm: Any,
+    table: Callable[[], str],
+    run: Any = None,
+) -> None:
     """A table and the summary of a run, on rank 0 unless quiet."""
     if options.quiet or (comm is not None and comm.rank > 0):
         return

@@ -6,8 +6,6 @@ import os
 import platform
 from pathlib import Path
 
-__all__ = ["facts"]
-
 
 def facts() -> list[tuple[str, str]]:
     """Rows of name and value: versions, solvers, BLAS, MPI, threads."""

@@ -11,8 +11,6 @@ from typing import Any
 from ..errors import InputError
 from .tables import plain
 
-__all__ = ["add_look", "look"]
-
 # faces in the table
 LISTED = 24
 
@@ -58,8 +56,8 @@ def described(found: Any) -> str:
     lines = [
         f"cells: {cells}",
         f"bodies: {len(found.bodies)} of {', '.join(map(str, found.bodies[:8]))} solid cells",
-        f"size: {size[0]:.6g} x {size[1]:.6g} x {size[2]:.6g} in the file's unit; "
-        f"scale = {found.scale:g} makes it {found.scale * size.max():.4g} m long (guessed)",
+        f"size: {size[0]:.6g} x {size[1]:.6g} x {size[2]:.6g} in the file's unit; scale = "
+        f"{found.scale:g} makes it {found.scale * size.max():.4g} m long (guessed)",
         *found.raw.notes,
     ]
     if found.cut is not None:

@@ -14,14 +14,13 @@ from contextlib import ExitStack
 from . import commands, ranks, scatter, study
 from .look import add_look, look
 
-__all__ = ["main", "parser"]
-
 _EXAMPLES = """examples:
   bladefem check scenes/wedge.toml                          every value, defaults marked
   bladefem mesh scenes/wedge.toml --view mesh.png           mesh and picture in seconds
   bladefem modes scenes/wedge.toml --set operation.speed="9000 rpm"
   bladefem run scenes/wedge.toml -o runs/wedge              everything, with report and figures
-  bladefem run runs/wedge --set contact.mu=0.2              again from a run folder: finished stages are kept
+  bladefem run runs/wedge --set contact.mu=0.2              again from a run folder: finished
+  stages are kept
 
   bladefem modes scenes/wedge.toml -- -eps_monitor          options of PETSc and SLEPc
 
@@ -187,7 +186,7 @@ def parser() -> argparse.ArgumentParser:
         _command(
             subs,
             "look",
-            "what a mesh file holds: bodies, sets, numbered faces, cut faces, a scene to start from",
+            "what a mesh file holds: bodies, sets, numbered faces, a scene to start from",
             "bladefem look sector.inp --view faces.png --scene sector.toml",
             look,
         )

@@ -16,8 +16,6 @@ from typing import Any
 
 from ..errors import InputError, NotSolvedError
 
-__all__ = ["communicator", "guarded"]
-
 # [s] that a failed rank waits for the others to fail as well
 PATIENCE = 10.0
 
@@ -143,13 +141,16 @@ def _stopped(comm: Any, signals: list[int]) -> int:
     return _tell(
         comm,
         f"{'ended by SIGTERM' if ended else 'interrupted'}; finished stages are kept, the same "
-        "command "
-        "goes on after them",
+        "command goes on after them",
         143 if ended else 130,
     )
 
 
-def _tell(comm: Any, text: str, code: int) -> int:
+def _tell(
+    comm: Any,
+    text: str,
+    code: int,
+) -> int:
     if comm is None or comm.rank == 0:
         print(f"bladefem: {text}", file=sys.stderr, flush=True)
     return code

@@ -10,8 +10,6 @@ from ..errors import InputError
 from . import tables
 from .commands import prepared, tell
 
-__all__ = ["scatter"]
-
 
 def scatter(options: argparse.Namespace, comm: Any) -> None:
     """Statistics of many wheels, on top of the run's tuned responses."""
@@ -19,8 +17,8 @@ def scatter(options: argparse.Namespace, comm: Any) -> None:
     # before the tuned responses, which take minutes
     if scene.mistuning.scatter is None:
         raise InputError(
-            "mistuning.scatter: expected a relative standard deviation of the blades' frequencies, "
-            "such as '1 %', for 'bladefem scatter'"
+            "mistuning.scatter: expected a relative standard deviation of the blades' "
+            "frequencies, such as '1 %', for 'bladefem scatter'"
         )
     from ..io.stage_cache import on_root
     from ..report.wheel import scatter_sentences

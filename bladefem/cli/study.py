@@ -16,8 +16,6 @@ from ..errors import InputError
 from . import tables
 from .commands import default_folder, given_scene, prepared, tell, until
 
-__all__ = ["add_study", "study"]
-
 # runs of one study
 MOST_RUNS = 1000
 
@@ -178,7 +176,10 @@ def _varied(text: str) -> tuple[str, list[str]]:
 
 
 def _one(
-    options: argparse.Namespace, base: Path, names: Sequence[str], values: Sequence[str]
+    options: argparse.Namespace,
+    base: Path,
+    names: Sequence[str],
+    values: Sequence[str],
 ) -> argparse.Namespace:
     """The options of one run."""
     one = argparse.Namespace(**vars(options))

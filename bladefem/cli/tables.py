@@ -10,21 +10,6 @@ from geometry.quality import quality_rows
 
 from ..scene.units import show
 
-__all__ = [
-    "frame",
-    "frequencies",
-    "mesh_quality",
-    "plain",
-    "pressures",
-    "reduction",
-    "resolved_scene",
-    "responses",
-    "side_by_side",
-    "summary",
-    "survey",
-    "table",
-]
-
 
 def plain(rows: Sequence[Sequence[object]], head: Sequence[str] = ()) -> str:
     """Columns side by side: the first to the left, numbers to the right."""

@@ -13,15 +13,16 @@ from scipy.optimize import linprog
 
 from ..errors import NotSolvedError
 
-__all__ = ["holds_itself", "normal_load_bounds"]
-
 EDGES = 16
 # share of the forces' sum that may stay unbalanced in seats that jam
 BALANCED = 1e-9
 
 
 def normal_load_bounds(
-    rigid: np.ndarray, load: np.ndarray, mu: np.ndarray, patches: int = 2
+    rigid: np.ndarray,
+    load: np.ndarray,
+    mu: np.ndarray,
+    patches: int = 2,
 ) -> tuple[float, float]:
     """Lowest and highest mean normal load of a seat [N] under a load on the damper; the highest is
     infinite where the seats can jam.

@@ -7,10 +7,12 @@ from numpy.typing import ArrayLike
 
 from ..errors import InputError
 
-__all__ = ["given"]
 
-
-def given(name: str, value: ArrayLike, shape: tuple[int | None, ...]) -> np.ndarray:
+def given(
+    name: str,
+    value: ArrayLike,
+    shape: tuple[int | None, ...],
+) -> np.ndarray:
     """The value as floats.
 
     Args:

@@ -20,8 +20,6 @@ from scipy.optimize import nnls
 from ..errors import InputError
 from .as_array import given
 
-__all__ = ["LCPSolution", "complementarity", "held_directions", "solve_lcp"]
-
 # relative size below which a force or gap counts as zero when the active set is updated
 ROUND_OFF = 1e-12
 # singular value of R, relative to the largest, below which a rigid direction is not held
@@ -128,7 +126,10 @@ def solve_lcp(
 
 
 def _given(
-    C: np.ndarray, g0: np.ndarray, R: np.ndarray | None, load: np.ndarray | None
+    C: np.ndarray,
+    g0: np.ndarray,
+    R: np.ndarray | None,
+    load: np.ndarray | None,
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
     """All four as arrays that fit each other, without floating body and load where these are left
     out.
@@ -145,8 +146,14 @@ def _given(
     return given("C", C, (len(g0), len(g0))), g0, R, load
 
 
-def complementarity(force: np.ndarray, gap: np.ndarray, scale: float) -> float:
-    """Largest |min(f / max f, gap / scale)| [1], 0 when optimal; scale is a typical displacement [m]."""
+def complementarity(
+    force: np.ndarray,
+    gap: np.ndarray,
+    scale: float,
+) -> float:
+    """Largest |min(f / max f, gap / scale)| [1], 0 when optimal; scale is a typical displacement
+    [m].
+    """
     f = force / max(float(np.abs(force).max(initial=0.0)), 1e-300)
     return float(np.abs(np.minimum(f, gap / max(scale, 1e-300))).max(initial=0.0))
 
@@ -173,12 +180,17 @@ def _unbalanced(R: np.ndarray, load: np.ndarray) -> str:
     if rest <= UNBALANCED * size:
         return ""
     return (
-        f"pressing contact forces can't balance the load ({rest / size:.1%} of it stays): it "
-        "lifts the body off"
+        f"pressing contact forces can't balance the load ({rest / size:.1%} of it stays): it lifts "
+        "the body off"
     )
 
 
-def _winkler_set(C: np.ndarray, g0: np.ndarray, U: np.ndarray, load: np.ndarray) -> np.ndarray:
+def _winkler_set(
+    C: np.ndarray,
+    g0: np.ndarray,
+    U: np.ndarray,
+    load: np.ndarray,
+) -> np.ndarray:
     """First guess of the contact: each node on its own spring, soft enough to err towards a small
     set.
     """
@@ -200,7 +212,11 @@ def _winkler_set(C: np.ndarray, g0: np.ndarray, U: np.ndarray, load: np.ndarray)
 
 
 def _equality(
-    C: np.ndarray, g0: np.ndarray, U: np.ndarray, load: np.ndarray, active: np.ndarray
+    C: np.ndarray,
+    g0: np.ndarray,
+    U: np.ndarray,
+    load: np.ndarray,
+    active: np.ndarray,
 ) -> tuple[np.ndarray, np.ndarray]:
     """Forces and rigid part with zero gap on the active nodes, zero force elsewhere, and U^T f =
     load.
@@ -246,7 +262,10 @@ def _primal_dual(
 
 
 def _primal(
-    C: np.ndarray, g0: np.ndarray, U: np.ndarray, load: np.ndarray
+    C: np.ndarray,
+    g0: np.ndarray,
+    U: np.ndarray,
+    load: np.ndarray,
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray, int, bool]:
     """Primal active set in the manner of Lawson and Hanson: slower, but every step lowers the
     energy.

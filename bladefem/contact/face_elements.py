@@ -8,8 +8,6 @@ from collections.abc import Callable
 
 import numpy as np
 
-__all__ = ["corner_count", "face_quadrature", "shape", "traction_shape"]
-
 # (dimension, nodes): corners
 CORNERS = {(2, 2): 2, (2, 3): 2, (3, 3): 3, (3, 6): 3, (3, 4): 4, (3, 8): 4, (3, 9): 4}
 
@@ -60,7 +58,11 @@ def traction_shape(corners: int, points: np.ndarray) -> np.ndarray:
     return (hats + 2 * dual) / 3
 
 
-def shape(nodes: int, corners: int, points: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+def shape(
+    nodes: int,
+    corners: int,
+    points: np.ndarray,
+) -> tuple[np.ndarray, np.ndarray]:
     """Values (q, k) and gradients (q, k, d) of the face's own shape functions, order 1 or 2."""
     if nodes == corners:
         return LINEAR[corners](points)
@@ -100,7 +102,11 @@ def _triangle6(x: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
 SQUARE = np.array([(-1, -1), (1, -1), (1, 1), (-1, 1), (0, -1), (1, 0), (0, 1), (-1, 0), (0, 0)])
 
 
-def _tensor(values: Callable, order: np.ndarray, x: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+def _tensor(
+    values: Callable,
+    order: np.ndarray,
+    x: np.ndarray,
+) -> tuple[np.ndarray, np.ndarray]:
     """Products of one-dimensional functions; order (k, 2) tells which pair each node takes."""
     (A, dA), (B, dB) = values(x[:, :1]), values(x[:, 1:])
     i, j = order.T

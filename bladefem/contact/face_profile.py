@@ -19,13 +19,15 @@ from ..scene.tables import Contact
 from ..scene.units import show
 from .patch import patch_means
 
-__all__ = ["element_size", "seat_gap"]
-
 # width of the eased strip over the element size, at least
 RESOLVED = 1.0
 
 
-def seat_gap(patch: Patch, mesh: Mesh, contact: Contact) -> np.ndarray:
+def seat_gap(
+    patch: Patch,
+    mesh: Mesh,
+    contact: Contact,
+) -> np.ndarray:
     """(n,) gap [m] of a seat with the crowns and edges of [contact], means over what each node
     stands for.
 
@@ -58,7 +60,11 @@ def seat_gap(patch: Patch, mesh: Mesh, contact: Contact) -> np.ndarray:
     return means.T @ gap
 
 
-def _check_crown(name: str, radius: float, length: float) -> None:
+def _check_crown(
+    name: str,
+    radius: float,
+    length: float,
+) -> None:
     """No circle of a smaller radius reaches from end to end."""
     if radius < length / 2:
         raise InputError(
@@ -67,14 +73,18 @@ def _check_crown(name: str, radius: float, length: float) -> None:
         )
 
 
-def _check_width(patch: Patch, mesh: Mesh, width: float) -> None:
+def _check_width(
+    patch: Patch,
+    mesh: Mesh,
+    width: float,
+) -> None:
     """A strip that falls between two nodes would be felt at random."""
     size = element_size(patch, mesh.depth)
     if width < RESOLVED * size:
         raise InputError(
             f"contact.edge_width = {show(width, 'm')}: narrower than the elements of the seats, "
-            "expected "
-            f"at least {show(float(f'{RESOLVED * size:.2g}'), 'm')}, or a smaller mesh.contact_size"
+            f"expected at least {show(float(f'{RESOLVED * size:.2g}'), 'm')}, or a smaller "
+            "mesh.contact_size"
         )
 
 

@@ -30,15 +30,6 @@ from .interface_law import InterfaceLaw, closure_of, compliance_at
 from .patch import initial_gap, port_matrix
 from .seating import ContactProblem, condense_body, rigid_and_load, spin_axis
 
-__all__ = [
-    "STEPPED",
-    "FrictionalProblem",
-    "FrictionalSeating",
-    "frictional_problem",
-    "normal_part",
-    "seat_with_friction",
-]
-
 # accepted residual of a step, over the largest force
 SETTLED = 1e-10
 # Newton steps of a load step, and halvings of one
@@ -85,7 +76,8 @@ class FrictionalSeating:
     maps: list[PressureMap]
     # load on the damper over that of the meshed damper at this speed
     scale: float
-    # share of the damper's centrifugal load that friction carries; negative where it pushes outwards
+    # share of the damper's centrifugal load that friction carries; negative where it pushes
+    # outwards
     share: float
     # nodes that slipped in the last load step
     slipping: int
@@ -200,7 +192,11 @@ def seat_with_friction(
     )
 
 
-def _frictionless_scale(problem: FrictionalProblem, speed: float, normal: float) -> float:
+def _frictionless_scale(
+    problem: FrictionalProblem,
+    speed: float,
+    normal: float,
+) -> float:
     """First guess of the load: that the outward force goes half and half into the seats."""
     outward = float(np.linalg.norm(problem.load[:2]))
     if not outward > 0:
@@ -262,7 +258,11 @@ def _history(
 
 
 def _step(
-    problem: FrictionalProblem, face: _Interface, before: _State, s0: np.ndarray, scale: float
+    problem: FrictionalProblem,
+    face: _Interface,
+    before: _State,
+    s0: np.ndarray,
+    scale: float,
 ) -> _State:
     """One load step, by Newton's method on the projections with a line search."""
     n, d = s0.shape
@@ -299,7 +299,10 @@ def _step(
 
 
 def _first_guess(
-    problem: FrictionalProblem, face: _Interface, s0: np.ndarray, load: np.ndarray
+    problem: FrictionalProblem,
+    face: _Interface,
+    s0: np.ndarray,
+    load: np.ndarray,
 ) -> np.ndarray:
     """Even normal forces of about the load, and the rigid motion that closes the faces under them:
     without contact nothing would hold the damper in the first derivative.
@@ -323,7 +326,11 @@ def _solved(jacobian: np.ndarray, residual: np.ndarray) -> np.ndarray:
     return np.linalg.lstsq(jacobian, residual, rcond=1e-12)[0]
 
 
-def _moved(problem: FrictionalProblem, s0: np.ndarray, x: np.ndarray) -> np.ndarray:
+def _moved(
+    problem: FrictionalProblem,
+    s0: np.ndarray,
+    x: np.ndarray,
+) -> np.ndarray:
     m = s0.size
     return s0 + (problem.flexibility @ x[:m] + problem.rigid @ x[m:]).reshape(s0.shape)
 

@@ -17,22 +17,6 @@ from ..scene.tables import Contact, Material, Seat
 from .interface_law import InterfaceLaw, rigid_faces, stiffness_at
 from .seating import ContactProblem
 
-__all__ = [
-    "aggregation",
-    "friction_elements",
-    "gives_stiffness",
-    "interface_law",
-    "layer_friction",
-    "layered",
-    "mapped_stiffness",
-    "mindlin_ratio",
-    "normal_stiffness",
-    "pair_ratio",
-    "scaled_contact",
-    "seat_contact",
-    "stiffnesses",
-]
-
 # stiffness for each unit of area that stands for rigid faces in the elements [N/m^3]: a layer of
 # 1e-8 of the compliance of steel over a millimetre
 RIGID = 1e22
@@ -82,7 +66,12 @@ def _gives(table: Contact | Seat, name: str) -> bool:
     return getattr(table, name) is not None or getattr(table, f"{name}_area") is not None
 
 
-def scaled_contact(contact: Contact, ratio: float, kt: float = 1.0, kn: float = 1.0) -> Contact:
+def scaled_contact(
+    contact: Contact,
+    ratio: float,
+    kt: float = 1.0,
+    kn: float = 1.0,
+) -> Contact:
     """[contact] with the tangential and the normal stiffness of all seats times factors.
 
     What follows from the other stiffness by ``ratio`` = k_t / k_n is written out first, so that
@@ -112,7 +101,10 @@ def scaled_contact(contact: Contact, ratio: float, kt: float = 1.0, kn: float = 
 
 
 def stiffnesses(
-    contact: Contact, ratio: float, area: np.ndarray, mapped: np.ndarray | None = None
+    contact: Contact,
+    ratio: float,
+    area: np.ndarray,
+    mapped: np.ndarray | None = None,
 ) -> tuple[np.ndarray, np.ndarray]:
     """k_t and k_n (n,) [N/m] of the points of a patch.
 
@@ -133,7 +125,11 @@ def stiffnesses(
     return kt, kt / ratio if kn is None else kn
 
 
-def interface_law(patches: Sequence[Patch], contact: Contact, ratio: float) -> InterfaceLaw:
+def interface_law(
+    patches: Sequence[Patch],
+    contact: Contact,
+    ratio: float,
+) -> InterfaceLaw:
     """The interface law of all nodes of some patches, one patch after the other.
 
     Rigid faces where ``contact.stiffness`` is "rigid", and where it is "map": the paper's Eq. 23
@@ -151,7 +147,9 @@ def interface_law(patches: Sequence[Patch], contact: Contact, ratio: float) -> I
 
 
 def layer_friction(
-    patches: Sequence[Patch], contact: Contact, ratio: float
+    patches: Sequence[Patch],
+    contact: Contact,
+    ratio: float,
 ) -> tuple[np.ndarray, np.ndarray]:
     """Tangential stiffness (n,) [N/m] and friction coefficient (n,) of the layer at all nodes of
     some patches; of a layer that stiffens the stiffness at first touch.
@@ -164,12 +162,20 @@ def layer_friction(
     return np.concatenate(kt), np.concatenate(mu)
 
 
-def layered(problem: ContactProblem, contact: Contact, ratio: float) -> ContactProblem:
+def layered(
+    problem: ContactProblem,
+    contact: Contact,
+    ratio: float,
+) -> ContactProblem:
     """The contact problem with the interface law of [contact] between its faces."""
     return replace(problem, layer=interface_law(problem.patches, contact, ratio))
 
 
-def _shared(total: float | None, areal: float | None, area: np.ndarray) -> np.ndarray | None:
+def _shared(
+    total: float | None,
+    areal: float | None,
+    area: np.ndarray,
+) -> np.ndarray | None:
     if total is not None:
         return total * area / area.sum()
     return None if areal is None else areal * area
@@ -306,7 +312,12 @@ def _members(G: Sequence[sp.csr_matrix]) -> list[sp.csr_matrix]:
 
 
 def _halve(
-    x: np.ndarray, area: np.ndarray, nodes: np.ndarray, parts: int, first: int, label: np.ndarray
+    x: np.ndarray,
+    area: np.ndarray,
+    nodes: np.ndarray,
+    parts: int,
+    first: int,
+    label: np.ndarray,
 ) -> None:
     """Label some nodes first .. first + parts - 1."""
     if parts == 1:

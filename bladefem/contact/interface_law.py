@@ -20,8 +20,6 @@ import numpy as np
 
 from ..errors import InputError
 
-__all__ = ["InterfaceLaw", "closure_of", "compliance_at", "force_of", "rigid_faces", "stiffness_at"]
-
 
 @dataclass(frozen=True)
 class InterfaceLaw:

@@ -23,8 +23,6 @@ from ..errors import InputError
 from .face_elements import LINEAR, corner_count, face_quadrature, shape, traction_shape
 from .surface import FaceRule, frames, outward, surface
 
-__all__ = ["Overlap", "mortar_faces", "mortar_patch", "overlap"]
-
 # pieces below this part of a face's area are dropped
 SLIVER = 1e-9
 STEEP = np.cos(np.radians(75))
@@ -136,7 +134,11 @@ def mortar_patch(mesh: Mesh, pair: str) -> Patch:
     )
 
 
-def mortar_faces(patch: Patch, mesh: Mesh, side: str) -> FaceRule:
+def mortar_faces(
+    patch: Patch,
+    mesh: Mesh,
+    side: str,
+) -> FaceRule:
     """The quadrature rule of the patch on one of its sides."""
     o = overlap(mesh, patch.name)
     s = 0 if side == "blade" else 1
@@ -213,14 +215,17 @@ def _clip(polygon: list[np.ndarray] | np.ndarray, level: object) -> list[np.ndar
     return kept
 
 
-def _view(normals: np.ndarray, d: int, pair: str) -> np.ndarray:
+def _view(
+    normals: np.ndarray,
+    d: int,
+    pair: str,
+) -> np.ndarray:
     """(d - 1, 3) axes across the mean of the outward normals (nf, 3)."""
     axis = normals.sum(axis=0) / np.linalg.norm(normals.sum(axis=0))
     if (normals @ axis < STEEP * np.linalg.norm(normals, axis=1)).any():
         raise InputError(
             f"contact pair '{pair}' does not match and its master turns by more than 75 degrees "
-            "from its "
-            "mean normal, expected a face seen from one side: split it"
+            "from its mean normal, expected a face seen from one side: split it"
         )
     if d == 2:
         return np.array([[-axis[1], axis[0], 0.0]])
@@ -230,7 +235,10 @@ def _view(normals: np.ndarray, d: int, pair: str) -> np.ndarray:
 
 
 def _quadrature(
-    X: np.ndarray, Y: np.ndarray, pieces: np.ndarray, view: np.ndarray
+    X: np.ndarray,
+    Y: np.ndarray,
+    pieces: np.ndarray,
+    view: np.ndarray,
 ) -> tuple[tuple[np.ndarray, np.ndarray], np.ndarray]:
     """Reference points on both faces and area vectors (s, q, 3), from pieces (s, k, d) in the
     master's coordinates.
@@ -252,7 +260,11 @@ def _quadrature(
     return (on_master, _located(Y, place @ view.T, view)), vector * w[:, None]
 
 
-def _located(nodes: np.ndarray, target: np.ndarray, view: np.ndarray) -> np.ndarray:
+def _located(
+    nodes: np.ndarray,
+    target: np.ndarray,
+    view: np.ndarray,
+) -> np.ndarray:
     """Reference points (s, q, d) where faces with nodes (s, m, 3) are seen at target (s, q, d),
     also beyond the faces.
 
@@ -267,8 +279,7 @@ def _located(nodes: np.ndarray, target: np.ndarray, view: np.ndarray) -> np.ndar
         if (np.abs(np.linalg.det(slopes)) < SLIVER * np.abs(slopes).max(axis=(2, 3)) ** d).any():
             raise InputError(
                 "a face of a contact pair that does not match is seen edge-on along the master's "
-                "mean "
-                "normal, expected faces seen from the front: split the pair"
+                "mean normal, expected faces seen from the front: split the pair"
             )
         at = at + np.linalg.solve(slopes, off)[..., 0]
     return at

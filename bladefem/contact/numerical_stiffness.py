@@ -1,5 +1,5 @@
-"""Stiff interface layers in the balance: a numerical stiffness on the friction elements, the rest of
-the layer's compliance among the bodies' flexibility.
+"""Stiff interface layers in the balance: a numerical stiffness on the friction elements, the rest
+of the layer's compliance among the bodies' flexibility.
 
 Springs in series carry the same force, so that each contact direction may be written
 
@@ -24,8 +24,6 @@ from ..scene.tables import Contact
 from .interface_elements import aggregation
 from .seating import ContactProblem
 
-__all__ = ["numerical_stiffness", "physical_stiffness", "split_stiffness"]
-
 # Numerical stiffness over that of the softest common motion of the bodies at the seats. On the
 # shipped wedge with 8 points a seat and a layer of 4000 N/mm^3 7 harmonics are 8 % off without the
 # split; 1.0, 1.5 and 4 % with 4, 8 and 20 times. With 1e4 N/mm^3 and more small values lose points.
@@ -44,7 +42,10 @@ def numerical_stiffness(problem: ContactProblem) -> float:
 
 
 def split_stiffness(
-    elements: Elements, maps: Sequence[PressureMap], contact: Contact, areal: float
+    elements: Elements,
+    maps: Sequence[PressureMap],
+    contact: Contact,
+    areal: float,
 ) -> tuple[Elements, np.ndarray | None]:
     """Elements no stiffer than a numerical stiffness, and what of their compliance goes to the
     bodies.

@@ -4,7 +4,8 @@ after another.
 The normal forces are known; slip is along one tangential direction. A step finds tangential forces
 q with
 
-    slip = shift - C (q - q_old) + tie,    |q_i| <= limit_i,    slip_i (q_i - limit_i) = 0 for slip_i > 0, and so on,
+    slip = shift - C (q - q_old) + tie,    |q_i| <= limit_i,
+    slip_i (q_i - limit_i) = 0 for slip_i > 0, and so on,
 
 where shift is the rigid displacement of the step, or follows from the total force. Cattaneo 1938,
 Mindlin 1949.
@@ -19,8 +20,6 @@ from scipy.linalg import LinAlgError, cho_factor, cho_solve
 
 from ..errors import InputError, NotSolvedError
 from .as_array import given
-
-__all__ = ["SlipState", "slip_step"]
 
 ROUND_OFF = 1e-12
 
@@ -131,7 +130,12 @@ def _stuck(
     return q, move
 
 
-def _update(q: np.ndarray, slip: np.ndarray, limit: np.ndarray, state: np.ndarray) -> np.ndarray:
+def _update(
+    q: np.ndarray,
+    slip: np.ndarray,
+    limit: np.ndarray,
+    state: np.ndarray,
+) -> np.ndarray:
     """Stuck nodes beyond their limit slip; slipping nodes that move backwards stick."""
     edge = limit * (1 + ROUND_OFF)
     back = state * slip < -ROUND_OFF * np.abs(slip).max(initial=0.0)
@@ -142,7 +146,11 @@ def _update(q: np.ndarray, slip: np.ndarray, limit: np.ndarray, state: np.ndarra
 
 
 def _single(
-    new: np.ndarray, state: np.ndarray, q: np.ndarray, slip: np.ndarray, limit: np.ndarray
+    new: np.ndarray,
+    state: np.ndarray,
+    q: np.ndarray,
+    slip: np.ndarray,
+    limit: np.ndarray,
 ) -> np.ndarray:
     """After a repeated set, change the node only that breaks its condition most."""
     forced = np.where(

@@ -33,16 +33,6 @@ from .face_elements import corner_count, face_quadrature, shape
 from .mortar import mortar_faces, mortar_patch
 from .surface import FaceRule, frames, outward, surface
 
-__all__ = [
-    "initial_gap",
-    "make_patch",
-    "normal_ports",
-    "patch_faces",
-    "patch_means",
-    "port_matrix",
-    "rigid_ports",
-]
-
 
 def make_patch(mesh: Mesh, pair: str) -> Patch:
     """The contact patch of a matched pair of faces, seen from the blade.
@@ -119,7 +109,11 @@ def normal_ports(patches: Sequence[Patch], mesh: Mesh) -> np.ndarray:
     return np.arange(sum(len(p.area) for p in patches)) * mesh.dimension
 
 
-def port_matrix(patches: Sequence[Patch], mesh: Mesh, side: str = "blade") -> sp.csc_matrix:
+def port_matrix(
+    patches: Sequence[Patch],
+    mesh: Mesh,
+    side: str = "blade",
+) -> sp.csc_matrix:
     """Port vectors of the patches on one of the two bodies, in the pairs' frames.
 
     Args:
@@ -136,7 +130,11 @@ def port_matrix(patches: Sequence[Patch], mesh: Mesh, side: str = "blade") -> sp
     return sp.hstack([_ports(patch, mesh, side) for patch in patches], format="csc")
 
 
-def patch_means(patch: Patch, mesh: Mesh, side: str = "blade") -> sp.csr_matrix:
+def patch_means(
+    patch: Patch,
+    mesh: Mesh,
+    side: str = "blade",
+) -> sp.csr_matrix:
     """W (n_points, n): W^T v are the chi-weighted means of a field v given at the mesh's nodes.
 
     Initial gaps must be averaged by it too: at a corner or edge of the patch the mean is not the
@@ -165,7 +163,11 @@ def initial_gap(patch: Patch, mesh: Mesh) -> np.ndarray:
     return damper - blade
 
 
-def rigid_ports(patches: Sequence[Patch], mesh: Mesh, origin: np.ndarray) -> np.ndarray:
+def rigid_ports(
+    patches: Sequence[Patch],
+    mesh: Mesh,
+    origin: np.ndarray,
+) -> np.ndarray:
     """B (ports, d): displacement at the damper-side ports for unit rigid motions about `origin`
     (3,) [m].
 
@@ -181,7 +183,11 @@ def rigid_ports(patches: Sequence[Patch], mesh: Mesh, origin: np.ndarray) -> np.
     return port_matrix(patches, mesh, "damper").T @ motions.reshape(len(r) * d, -1)
 
 
-def _ports(patch: Patch, mesh: Mesh, side: str) -> sp.csc_matrix:
+def _ports(
+    patch: Patch,
+    mesh: Mesh,
+    side: str,
+) -> sp.csc_matrix:
     """Port vectors of one patch (dimension * n_points, dimension * n), with the master's own frame
     at each point.
     """
@@ -208,7 +214,11 @@ def _ports(patch: Patch, mesh: Mesh, side: str) -> sp.csc_matrix:
     return (P.tocsr() @ sp.diags(np.repeat(1 / patch.area, d))).tocsc()
 
 
-def _rule(patch: Patch, mesh: Mesh, side: str) -> FaceRule:
+def _rule(
+    patch: Patch,
+    mesh: Mesh,
+    side: str,
+) -> FaceRule:
     """The quadrature rule of the patch on one of its sides."""
     if not mesh.pairs[patch.name].nodes.size:
         return mortar_faces(patch, mesh, side)

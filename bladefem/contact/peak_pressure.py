@@ -21,8 +21,6 @@ from .face_profile import element_size
 from .hertz import FINEST, contact_modulus, line_width, point_radius
 from .interface_elements import interface_law, pair_ratio
 
-__all__ = ["at_edge", "edge_sentence", "narrow_sentence", "peak_remarks"]
-
 # half width of a crown's contact over the element size that is advised
 WANTED = 4.0
 # elements in the length E* / kn from which the pressure at a sharp edge is resolved
@@ -32,7 +30,11 @@ EDGE_ELEMENTS = 4.0
 Maps = Mapping[float, Sequence[PressureMap]]
 
 
-def peak_remarks(maps: Maps, scene: Scene, depth: float = 1.0) -> list[str]:
+def peak_remarks(
+    maps: Maps,
+    scene: Scene,
+    depth: float = 1.0,
+) -> list[str]:
     """Why peak pressures are not to be relied on; empty where nothing is known against them.
 
     Args:
@@ -45,7 +47,11 @@ def peak_remarks(maps: Maps, scene: Scene, depth: float = 1.0) -> list[str]:
     ]
 
 
-def edge_sentence(maps: Maps, scene: Scene, depth: float = 1.0) -> str:
+def edge_sentence(
+    maps: Maps,
+    scene: Scene,
+    depth: float = 1.0,
+) -> str:
     """A warning where the peak is at a sharp edge of a seat and its layer too stiff for the mesh,
     or "".
     """
@@ -63,10 +69,8 @@ def edge_sentence(maps: Maps, scene: Scene, depth: float = 1.0) -> str:
         return ""
     return (
         f"peak pressure: under {len(there)} of {len(maps)} loads it stands at a sharp edge of a "
-        "seat, where it may "
-        "grow without bound as mesh.contact_size falls; judge by the mean pressure, or ease the "
-        "edges "
-        "(contact.edge_radius)"
+        "seat, where it may grow without bound as mesh.contact_size falls; judge by the mean "
+        "pressure, or ease the edges (contact.edge_radius)"
     )
 
 
@@ -96,7 +100,11 @@ def _boundary(patch: Patch) -> np.ndarray:
     return out
 
 
-def narrow_sentence(maps: Maps, scene: Scene, depth: float = 1.0) -> str:
+def narrow_sentence(
+    maps: Maps,
+    scene: Scene,
+    depth: float = 1.0,
+) -> str:
     """A warning where Hertz' contact of crowned seats is too narrow for their elements, or "".
 
     Args:
@@ -125,15 +133,17 @@ def narrow_sentence(maps: Maps, scene: Scene, depth: float = 1.0) -> str:
     wanted = float(f"{worst / WANTED:.2g}")
     return (
         f"peak pressure not resolved: under {show(load, 'N')} Hertz' contact on the crowned seats "
-        "has a half width "
-        f"of {show(float(f'{worst:.2g}'), 'm')}, their elements have "
-        f"{show(float(f'{size:.2g}'), 'm')}; expected "
-        f"mesh.contact_size <= {show(wanted, 'm')}, or a larger crown radius"
+        f"has a half width of {show(float(f'{worst:.2g}'), 'm')}, their elements have "
+        f"{show(float(f'{size:.2g}'), 'm')}; expected mesh.contact_size <= {show(wanted, 'm')}, or "
+        "a larger crown radius"
     )
 
 
 def _layer_half_width(
-    pressure: PressureMap, contact: Contact, stiffness: float, depth: float
+    pressure: PressureMap,
+    contact: Contact,
+    stiffness: float,
+    depth: float,
 ) -> float:
     """Smallest half width [m] of the contact of crowned rigid faces on the interface layer alone.
 
@@ -157,7 +167,12 @@ def _layer_half_width(
     return float((1.5 * load / length * radii[0] / stiffness) ** (1 / 3))
 
 
-def _half_width(pressure: PressureMap, contact: Contact, modulus: float, depth: float) -> float:
+def _half_width(
+    pressure: PressureMap,
+    contact: Contact,
+    modulus: float,
+    depth: float,
+) -> float:
     """Smaller half width of Hertz' contact [m]; infinite where no crown leaves a part of the seat
     open.
 

@@ -8,8 +8,6 @@ import numpy as np
 
 from ..data import PressureMap
 
-__all__ = ["Resultant", "resultant"]
-
 
 @dataclass(frozen=True)
 class Resultant:

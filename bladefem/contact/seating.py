@@ -5,7 +5,8 @@ The wheel is at rest in the rotating frame and all blades move alike (nodal diam
 blade's seat_left is this blade's seat_left in its own axes. With f >= 0 the pressing forces at the
 normal ports of both seats,
 
-    opening = clearance - u_blade + u_damper = g0 + (C_blade + C_damper) f + B q,   B^T f + load = 0,
+    opening = clearance - u_blade + u_damper = g0 + (C_blade + C_damper) f + B q,   B^T f + load =
+    0,
 
 where q is the damper's rigid motion, found from equilibrium: no spring holds it. Directions that
 frictionless seats can't hold (the engine axis for a wedge, the circumference for a flat damper)
@@ -40,16 +41,6 @@ from .as_array import given
 from .complementarity import LCPSolution, held_directions, solve_lcp
 from .interface_law import InterfaceLaw, closure_of, compliance_at, rigid_faces
 from .patch import initial_gap, make_patch, normal_ports, port_matrix, rigid_ports
-
-__all__ = [
-    "ContactProblem",
-    "condense_body",
-    "contact_problem",
-    "rigid_and_load",
-    "seat",
-    "solve",
-    "spin_axis",
-]
 
 # gaps over elastic displacements beyond which a load is too light to be solved for
 HOVERING = 1e4
@@ -184,7 +175,11 @@ def solve(
         raise NotSolvedError(f"normal load {normal:g} N on each seat: {error}") from error
 
 
-def _check_load(speed: float, normal: float | None, damper_mass: float | None) -> None:
+def _check_load(
+    speed: float,
+    normal: float | None,
+    damper_mass: float | None,
+) -> None:
     """A finite load that presses."""
     if not np.isfinite(speed):
         raise InputError(f"speed is {speed} rad/s, expected a finite number")
@@ -238,7 +233,9 @@ def _fitted(problem: ContactProblem) -> ContactProblem:
 
 
 def condense_body(
-    flex: Flexibility, P: sp.spmatrix, load: np.ndarray
+    flex: Flexibility,
+    P: sp.spmatrix,
+    load: np.ndarray,
 ) -> tuple[np.ndarray, np.ndarray]:
     """Flexibility (n, n) at the ports, and their displacement (n,) under a load in mesh
     numbering.
@@ -249,7 +246,10 @@ def condense_body(
 
 
 def rigid_and_load(
-    mesh: Mesh, patches: Sequence[Patch], body: Body, pull: np.ndarray
+    mesh: Mesh,
+    patches: Sequence[Patch],
+    body: Body,
+    pull: np.ndarray,
 ) -> tuple[np.ndarray, np.ndarray]:
     """Rigid motions at all damper ports (ports, d) and the load that goes with them (d,), rotations
     times a length.
@@ -269,7 +269,10 @@ def rigid_and_load(
 
 
 def _state(
-    problem: ContactProblem, g0: np.ndarray, scale: float, active: np.ndarray | None
+    problem: ContactProblem,
+    g0: np.ndarray,
+    scale: float,
+    active: np.ndarray | None,
 ) -> LCPSolution:
     """One contact solve with `scale` times the unit load on the damper."""
     _, _, held = held_directions(problem.rigid)
@@ -290,7 +293,10 @@ def _state(
 
 
 def _on_layer(
-    problem: ContactProblem, g0: np.ndarray, load: np.ndarray, active: np.ndarray | None
+    problem: ContactProblem,
+    g0: np.ndarray,
+    load: np.ndarray,
+    active: np.ndarray | None,
 ) -> LCPSolution:
     """The complementarity problem with the layer in series; Newton's method where it stiffens."""
     law = problem.law
@@ -316,7 +322,12 @@ def _on_layer(
     )
 
 
-def _too_light(problem: ContactProblem, g0: np.ndarray, scale: float, load: np.ndarray) -> str:
+def _too_light(
+    problem: ContactProblem,
+    g0: np.ndarray,
+    scale: float,
+    load: np.ndarray,
+) -> str:
     """Empty, or that the load cannot bring faces together that the damper's travel alone leaves
     apart.
     """
@@ -327,16 +338,17 @@ def _too_light(problem: ContactProblem, g0: np.ndarray, scale: float, load: np.n
     if misfit <= HOVERING * bent:
         return ""
     return (
-        f" and rests on single points: the load presses bodies and layer together by some {1e6 * bent:.1g} um, "
-        "while the gaps of "
-        f"the seats differ by {1e6 * misfit:.3g} um, so it hardly touches; expected a larger "
-        "study.loads, faces "
-        "that fit, or contact.bedded = true"
+        " and rests on single points: the load presses bodies and layer together by some "
+        f"{1e6 * bent:.1g} um, while the gaps of the seats differ by {1e6 * misfit:.3g} um, so it "
+        "hardly touches; expected a larger study.loads, faces that fit, or contact.bedded = true"
     )
 
 
 def _wanted(
-    problem: ContactProblem, g0: np.ndarray, normal: float, active: np.ndarray | None
+    problem: ContactProblem,
+    g0: np.ndarray,
+    normal: float,
+    active: np.ndarray | None,
 ) -> LCPSolution:
     """Scale the damper's load until the mean normal load of a seat is `normal`; one step where
     seats are flat.

@@ -17,8 +17,6 @@ from ..data import Patch
 from ..errors import InputError
 from ..scene.tables import Material
 
-__all__ = ["QuasiStatic", "StateTable", "interpolate", "quasi_static", "state_table"]
-
 # what "much larger" means in T >> D / c
 MARGIN = 10.0
 
@@ -88,8 +86,14 @@ def interpolate(table: StateTable, point: Sequence[float]) -> tuple[np.ndarray, 
     return force, indicator / (float(np.abs(table.force).max()) or 1.0)
 
 
-def _bend(force: np.ndarray, a: np.ndarray, k: int) -> np.ndarray:
-    """h^2 |f''| with the wider neighbouring step h, at each table point along axis k; at the ends that next to them."""
+def _bend(
+    force: np.ndarray,
+    a: np.ndarray,
+    k: int,
+) -> np.ndarray:
+    """h^2 |f''| with the wider neighbouring step h, at each table point along axis k; at the ends
+    that next to them.
+    """
     f = np.moveaxis(force, k, 0)
     h = np.diff(a).reshape(-1, *[1] * (f.ndim - 1))
     slope = np.diff(f, axis=0) / h
@@ -115,14 +119,16 @@ class QuasiStatic:
         """For the report."""
         return (
             f"quasi-static contact {'holds' if self.holds else 'does NOT hold'}: the period "
-            f"{self.period:.3g} s is "
-            f"{self.period / self.transit:.3g} wave transits of the patch (at least {MARGIN:g} "
-            "wanted; "
-            f"up to {self.limit:.3g} Hz)"
+            f"{self.period:.3g} s is {self.period / self.transit:.3g} wave transits of the patch "
+            f"(at least {MARGIN:g} wanted; up to {self.limit:.3g} Hz)"
         )
 
 
-def quasi_static(patch: Patch, material: Material, frequency: float) -> QuasiStatic:
+def quasi_static(
+    patch: Patch,
+    material: Material,
+    frequency: float,
+) -> QuasiStatic:
     """Compare the period with D / c, D the patch's largest extent and c = sqrt(E / rho) (the
     paper's Eq. 26).
 

@@ -14,8 +14,6 @@ from geometry.mesh import Mesh
 from ..errors import InputError
 from .face_elements import corner_count, face_quadrature, shape, traction_shape
 
-__all__ = ["FaceRule", "frames", "outward", "surface"]
-
 BODY_CORNERS = {"triangle": 3, "quad": 4, "tetra": 4, "hexahedron": 8, "wedge": 6, "pyramid": 5}
 
 
@@ -50,7 +48,11 @@ def surface(mesh: Mesh, faces: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     return normals * weights[:, None], traction_shape(corners, points)
 
 
-def outward(mesh: Mesh, faces: np.ndarray, normals: np.ndarray) -> np.ndarray:
+def outward(
+    mesh: Mesh,
+    faces: np.ndarray,
+    normals: np.ndarray,
+) -> np.ndarray:
     """Sign (nf,) that makes each face's normal point out of the body that owns it."""
     k = corner_count(mesh.dimension, faces.shape[1])
     kind = next((v for name, v in BODY_CORNERS.items() if mesh.cell_type.startswith(name)), None)
@@ -78,7 +80,11 @@ def outward(mesh: Mesh, faces: np.ndarray, normals: np.ndarray) -> np.ndarray:
     return sign
 
 
-def frames(normals: np.ndarray, dimension: int, like: np.ndarray | None = None) -> np.ndarray:
+def frames(
+    normals: np.ndarray,
+    dimension: int,
+    like: np.ndarray | None = None,
+) -> np.ndarray:
     """Frames (n, 3, 3) with rows normal, t1, t2; ``like`` are the normals (k, 3) that decide which
     axis gives t2.
     """

@@ -21,8 +21,6 @@ from bladefem.hbm.solution import probe_motion
 
 from .paper import DamperResponse, Platform, balance, damper_response, equivalent, residual
 
-__all__ = ["METHODS", "Iterated", "Rules", "iterate"]
-
 # growth over the free motion at which an iteration is given up
 HUGE = 1e4
 
@@ -87,7 +85,11 @@ class Iterated:
 class _Map:
     """g(u) in the independent platform motions c, packed as a real vector; counts its work."""
 
-    def __init__(self, side: Platform, rules: Rules):
+    def __init__(
+        self,
+        side: Platform,
+        rules: Rules,
+    ):
         self.side = side
         self.rules = rules
         self.calls = 0
@@ -139,7 +141,13 @@ def iterate(
     return _finished_result(method, g, c, converged, reason)
 
 
-def _finished_result(method: str, g: _Map, c: np.ndarray, converged: bool, reason: str) -> Iterated:
+def _finished_result(
+    method: str,
+    g: _Map,
+    c: np.ndarray,
+    converged: bool,
+    reason: str,
+) -> Iterated:
     side = g.side
     u = g.spread(c)
     force = np.full_like(u, np.nan)
@@ -154,7 +162,9 @@ def _finished_result(method: str, g: _Map, c: np.ndarray, converged: bool, reaso
 
 
 def _fixed_point_loop(
-    g: _Map, c: np.ndarray, propose: Callable[[list, list], np.ndarray]
+    g: _Map,
+    c: np.ndarray,
+    propose: Callable[[list, list], np.ndarray],
 ) -> tuple[np.ndarray, bool, str]:
     """The shell of all fixed-point methods: ``propose`` makes the next motion from the lists of
     motions and images.
@@ -190,7 +200,12 @@ def _picard_iteration(g: _Map, c: np.ndarray) -> tuple[np.ndarray, bool, str]:
     return _fixed_point_loop(g, c, lambda motions, images: images[-1])
 
 
-def _secant_step(u1: np.ndarray, u0: np.ndarray, g1: np.ndarray, g0: np.ndarray) -> np.ndarray:
+def _secant_step(
+    u1: np.ndarray,
+    u0: np.ndarray,
+    g1: np.ndarray,
+    g0: np.ndarray,
+) -> np.ndarray:
     """Eq. 34, component by component; the image where the denominator vanishes."""
     below = g1 - u1 - g0 + u0
     return np.where(below != 0, (g1 * u0 - g0 * u1) / np.where(below != 0, below, 1), g1)
@@ -220,7 +235,11 @@ def _real_parts(g: _Map, c: np.ndarray) -> tuple[np.ndarray, bool, str]:
     return _fixed_point_loop(g, c, propose)
 
 
-def _anderson_mixing(g: _Map, c: np.ndarray, depth: int = 5) -> tuple[np.ndarray, bool, str]:
+def _anderson_mixing(
+    g: _Map,
+    c: np.ndarray,
+    depth: int = 5,
+) -> tuple[np.ndarray, bool, str]:
     def propose(motions: list, images: list) -> np.ndarray:
         x, y = (
             np.array([_as_real(v) for v in values[-depth - 1 :]]) for values in (motions, images)

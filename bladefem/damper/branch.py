@@ -25,8 +25,6 @@ from ..time.event_integrator import State
 from ..time.shooting import Periodic, floquet_multipliers, periodic_solution, probe_harmonics
 from ..time.system import System
 
-__all__ = ["BranchPoint", "branch", "inclined_contact", "state_of"]
-
 # relative distance beyond which shooting has left the solution of the balance
 NEAR = 0.02
 
@@ -91,7 +89,11 @@ def inclined_contact(load: float = 10.0, force: float = 2.0) -> tuple[ReducedMod
 
 
 def branch(
-    model: ReducedModel, system: System, band: tuple[float, float], H: int = 15, samples: int = 512
+    model: ReducedModel,
+    system: System,
+    band: tuple[float, float],
+    H: int = 15,
+    samples: int = 512,
 ) -> Iterator[BranchPoint]:
     """The path in frequency that starts at the upper end of a band [Hz] and runs down, round its
     folds.
@@ -115,7 +117,11 @@ def branch(
         )
 
 
-def _stability_verdict(shot: Periodic, amplitude: float, wanted: float) -> str:
+def _stability_verdict(
+    shot: Periodic,
+    amplitude: float,
+    wanted: float,
+) -> str:
     if shot.converged and abs(amplitude / wanted - 1) > NEAR:
         return "shooting went to another solution"
     return shot.reason

@@ -20,8 +20,6 @@ from ..time.event_integrator import State, state_at_rest
 from ..time.system import System
 from .explicit import Cycle, March, check_steps, explicit_march, sampled, settle
 
-__all__ = ["contact_step", "direct", "newmark_march"]
-
 
 def direct(
     system: System,
@@ -50,7 +48,11 @@ def direct(
     return settle(march, start or state_at_rest(system), most, tolerance)
 
 
-def newmark_march(system: System, omega: float, steps: int) -> March:
+def newmark_march(
+    system: System,
+    omega: float,
+    steps: int,
+) -> March:
     """A function that marches one period from t = 0, as ``explicit_march`` does.
 
     Raises:
@@ -85,7 +87,7 @@ def newmark_march(system: System, omega: float, steps: int) -> March:
         if code:
             raise NotSolvedError(
                 f"Newmark step {code - 1} of {steps}: neither Newton nor Gauss-Seidel found the "
-                f"contact forces"
+                "contact forces"
             )
         return State(y[:d].copy(), y[d : 2 * d].copy(), y[2 * d :].copy()), q, w, force
 

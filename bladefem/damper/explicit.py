@@ -21,8 +21,6 @@ from ..friction.time_step import stable_step, step_1d
 from ..time.event_integrator import State, state_at_rest
 from ..time.system import System
 
-__all__ = ["Cycle", "check_steps", "damper_cycle", "explicit_march", "settle", "stable_steps"]
-
 March = Callable[[State], tuple[State, np.ndarray, np.ndarray, np.ndarray]]
 
 
@@ -51,7 +49,11 @@ def stable_steps(system: System, omega: float) -> int:
     return int(np.floor(2 * np.pi / omega / stable_step(system.fastest))) + 1
 
 
-def check_steps(system: System, omega: float, steps: int) -> None:
+def check_steps(
+    system: System,
+    omega: float,
+    steps: int,
+) -> None:
     """Raise InputError when there are fewer steps a period than ``stable_steps``."""
     least = stable_steps(system, omega)
     if steps < least:
@@ -85,7 +87,12 @@ def damper_cycle(
     )
 
 
-def settle(march: March, start: State, most: int, tolerance: float) -> Cycle:
+def settle(
+    march: March,
+    start: State,
+    most: int,
+    tolerance: float,
+) -> Cycle:
     """March period by period, from state to (state, q, w, force), until motion and force repeat."""
     state = start
     last = None
@@ -107,7 +114,11 @@ def settle(march: March, start: State, most: int, tolerance: float) -> Cycle:
     return Cycle(q, force, w, state, residual, period, reason)
 
 
-def explicit_march(system: System, omega: float, steps: int) -> March:
+def explicit_march(
+    system: System,
+    omega: float,
+    steps: int,
+) -> March:
     """A function that marches one period from t = 0: state to (state, q (s, d), w (s, n), friction
     force (s, n)).
 

@@ -26,8 +26,6 @@ import numpy as np
 
 from .zmass import MassOnFoundation, Motion, ellipse, march, pulsating_load
 
-__all__ = ["Drive", "Steady", "count_loops", "ratio_table", "spectrum", "steady"]
-
 
 @dataclass(frozen=True)
 class Drive:
@@ -150,7 +148,9 @@ def spectrum(result: Steady) -> tuple[np.ndarray, np.ndarray]:
 
 
 def ratio_table(
-    body: MassOnFoundation, ratios: Iterable[Fraction], steps: int = 1000
+    body: MassOnFoundation,
+    ratios: Iterable[Fraction],
+    steps: int = 1000,
 ) -> list[dict[str, float | str]]:
     """The paper's rule on many frequency ratios: one row each, with loops, denominator, drift and
     whether it holds.
@@ -184,7 +184,12 @@ def _relative_change(motion: Motion, last: Motion | None) -> float:
     )
 
 
-def _smallest_period(motion: Motion, steps: int, q: int, tolerance: float = 1e-5) -> int:
+def _smallest_period(
+    motion: Motion,
+    steps: int,
+    q: int,
+    tolerance: float = 1e-5,
+) -> int:
     """Foundation cycles after which (velocity, force) repeat: the smallest divisor of q that
     fits.
     """

@@ -32,16 +32,6 @@ from ..time.shooting import periodic_solution
 from ..time.system import damper_on_platforms
 from .explicit import damper_cycle, stable_steps
 
-__all__ = [
-    "DamperResponse",
-    "Platform",
-    "balance",
-    "damper_response",
-    "equivalent",
-    "platform",
-    "residual",
-]
-
 
 @dataclass(frozen=True)
 class Platform:
@@ -78,7 +68,11 @@ class DamperResponse:
     reason: str
 
 
-def platform(model: ReducedModel, omega: float, harmonics: int) -> Platform:
+def platform(
+    model: ReducedModel,
+    omega: float,
+    harmonics: int,
+) -> Platform:
     """Flexibility and free motion of the platforms.
 
     Raises:
@@ -158,7 +152,12 @@ def damper_response(
     )
 
 
-def equivalent(force: np.ndarray, u: np.ndarray, omega: float, averaged: bool = True) -> np.ndarray:
+def equivalent(
+    force: np.ndarray,
+    u: np.ndarray,
+    omega: float,
+    averaged: bool = True,
+) -> np.ndarray:
     """Complex stiffness (H, n) with force = stiffness * u in the best sense [N/m].
 
     Averaged: K_ad + i h w C_ad of Eq. 16, with the factor k that the printed C lacks. Otherwise
@@ -182,7 +181,11 @@ def balance(side: Platform, stiffness: np.ndarray) -> np.ndarray:
     )
 
 
-def residual(side: Platform, u: np.ndarray, force: np.ndarray) -> np.ndarray:
+def residual(
+    side: Platform,
+    u: np.ndarray,
+    force: np.ndarray,
+) -> np.ndarray:
     """u - u_free + G f, (H, n) [m]: zero in equilibrium, whatever the loop thinks."""
     return u - side.free + np.einsum("hij,hj->hi", side.G, force)
 

@@ -1,9 +1,12 @@
 """A rigid mass on a vibrating foundation, held by friction alone (the paper's Sect. 4, Fig. 7-11,
 Table 1).
 
-Three freedoms (x, y, theta) of the mass, one friction element at each contact node. The force on the mass at node i is
-the radial return of f + k_t dw onto the circle |f| <= mu N_i(t), w = foundation minus mass (Eq. 28 corrected: the
-printed per-axis limits of Eq. 29 are not Coulomb friction). The nodes turn with the mass by the full rotation, so theta
+Three freedoms (x, y, theta) of the mass, one friction element at each contact node. The force on
+the mass at node i is
+the radial return of f + k_t dw onto the circle |f| <= mu N_i(t), w = foundation minus mass (Eq. 28
+corrected: the
+printed per-axis limits of Eq. 29 are not Coulomb friction). The nodes turn with the mass by the
+full rotation, so theta
 need not stay small; N_i follows the load in proportion (Eq. 27, receding contact).
 
 The march is the leapfrog scheme with the return map of ``friction.march``, which finds the start of
@@ -20,17 +23,6 @@ from numba import njit
 from bladefem.errors import InputError
 
 from ..friction.time_step import stable_step, step_2d
-
-__all__ = [
-    "Footprint",
-    "MassOnFoundation",
-    "Motion",
-    "ellipse",
-    "march",
-    "pulsating_load",
-    "skewed",
-    "z_footprint",
-]
 
 
 @dataclass(frozen=True)
@@ -80,7 +72,11 @@ class Motion:
     springs: np.ndarray
 
 
-def z_footprint(width: float = 0.06, height: float = 0.06, bar: float = 0.016) -> Footprint:
+def z_footprint(
+    width: float = 0.06,
+    height: float = 0.06,
+    bar: float = 0.016,
+) -> Footprint:
     """Forty nodes on a Z: two bars of 2 x 7 nodes along x, a diagonal of 2 x 6 between them;
     point-symmetric.
 
@@ -111,13 +107,21 @@ def skewed(footprint: Footprint, slope: tuple[float, float]) -> Footprint:
     return replace(footprint, share=share / share.sum())
 
 
-def pulsating_load(mean: float, amplitude: float, frequency: float, time: np.ndarray) -> np.ndarray:
+def pulsating_load(
+    mean: float,
+    amplitude: float,
+    frequency: float,
+    time: np.ndarray,
+) -> np.ndarray:
     """P(t) = P0 + P1 sin(2 pi fp t) of Eq. 30, at ``time`` (s,) [s]; (s,) [N]."""
     return mean + amplitude * np.sin(2 * np.pi * frequency * time)
 
 
 def ellipse(
-    amplitude: tuple[float, float], phase: float, frequency: float, time: np.ndarray
+    amplitude: tuple[float, float],
+    phase: float,
+    frequency: float,
+    time: np.ndarray,
 ) -> np.ndarray:
     """Foundation motion x0 sin(wt), y0 sin(wt + phase), at ``time`` (s,) [s]; (s, 2) [m]. y0 = 0 is
     Eq. 30.
@@ -152,8 +156,7 @@ def march(
     if not 0 < dt < limit:
         raise InputError(
             f"dt = {dt:.3g} s, expected a positive step below {limit:.3g} s, the stability limit "
-            "of the "
-            f"explicit march"
+            "of the explicit march"
         )
     n = len(body.footprint.share)
     position, velocity, springs = start or (np.zeros(3), np.zeros(3), np.zeros((n, 2)))

@@ -27,8 +27,6 @@ from .linalg import apply, combined, dot, inertia, minus, mix
 from .memory import give_back
 from .modes import BLOCKS, SLEPC, mode_set, pairs
 
-__all__ = ["Count", "Eigenpairs", "all_diameters", "eigenpairs", "found_again", "lost_modes"]
-
 # modes beyond those asked for, carried along
 GUARD = 2
 # rough ones beyond, from which other diameters are guessed
@@ -164,7 +162,11 @@ def _pairs(
     return Eigenpairs(flex, *pairs(flex, count, tolerance, start, guard, solver))
 
 
-def _space(t: Transformation, blocks: list[np.ndarray], known: _Space | None) -> _Space:
+def _space(
+    t: Transformation,
+    blocks: list[np.ndarray],
+    known: _Space | None,
+) -> _Space:
     """The parts of more vectors added to a space; what it has already is projected once."""
     new = _span(blocks, t, known)
     old = 0 if known is None else known.W.shape[1]
@@ -187,13 +189,22 @@ def _space(t: Transformation, blocks: list[np.ndarray], known: _Space | None) ->
     )
 
 
-def _grown(A: np.ndarray, columns: np.ndarray, sign: int) -> np.ndarray:
+def _grown(
+    A: np.ndarray,
+    columns: np.ndarray,
+    sign: int,
+) -> np.ndarray:
     """A symmetric (sign 1) or skew (-1) matrix with more columns, and the rows that they imply."""
     old = len(A)
     return np.block([[A, columns[:old]], [sign * columns[:old].T, columns[old:]]])
 
 
-def _guess(space: _Space, con: Constrained, angle: float, count: int) -> np.ndarray:
+def _guess(
+    space: _Space,
+    con: Constrained,
+    angle: float,
+    count: int,
+) -> np.ndarray:
     """(n_own, count) lowest vectors of the projected pencil."""
     Z = _small(space.K, space.M, angle, count)
     if con.dtype is not complex:
@@ -203,7 +214,11 @@ def _guess(space: _Space, con: Constrained, angle: float, count: int) -> np.ndar
     return out
 
 
-def _span(blocks: list[np.ndarray], t: Transformation, known: _Space | None) -> np.ndarray:
+def _span(
+    blocks: list[np.ndarray],
+    t: Transformation,
+    known: _Space | None,
+) -> np.ndarray:
     """(n_own, m) nearly orthonormal real basis of what all parts of the vectors add to the space
     known.
     """
@@ -221,7 +236,9 @@ def _span(blocks: list[np.ndarray], t: Transformation, known: _Space | None) -> 
 
 
 def _projected(
-    t: Transformation, W: np.ndarray, new: slice
+    t: Transformation,
+    W: np.ndarray,
+    new: slice,
 ) -> tuple[list[np.ndarray], list[np.ndarray]]:
     """(m, new) columns of the projections of K0, Kc, Ks and of M0, Mc, Ms."""
     if t.opened is None:
@@ -244,7 +261,11 @@ def _projected(
 
 
 def _inside(
-    t: Transformation, low: np.ndarray, high: np.ndarray, faces: np.ndarray, new: slice
+    t: Transformation,
+    low: np.ndarray,
+    high: np.ndarray,
+    faces: np.ndarray,
+    new: slice,
 ) -> list[tuple[np.ndarray, np.ndarray]]:
     """low^T A low and high^T A low of some columns, a few at a time, for K and for M."""
     pieces: list[list] = [[], []]
@@ -258,14 +279,23 @@ def _inside(
     ]
 
 
-def _small(K: list[np.ndarray], M: list[np.ndarray], angle: float, count: int) -> np.ndarray:
+def _small(
+    K: list[np.ndarray],
+    M: list[np.ndarray],
+    angle: float,
+    count: int,
+) -> np.ndarray:
     """(m, count) lowest eigenvectors of the projected pencil."""
     sine = 1j * np.sin(angle) if abs(np.sin(angle)) > 1e-12 else 0.0
     pencil = [A[0] + np.cos(angle) * A[1] + sine * A[2] for A in (K, M)]
     return eigh(*[(A + A.conj().T) / 2 for A in pencil])[1][:, :count]
 
 
-def _proved(t: Transformation, found: dict[int, Eigenpairs], count: int) -> dict[int, Eigenpairs]:
+def _proved(
+    t: Transformation,
+    found: dict[int, Eigenpairs],
+    count: int,
+) -> dict[int, Eigenpairs]:
     """Compare counts with inertia at one shift; a diameter that lost a mode is solved from
     scratch.
     """
@@ -290,9 +320,14 @@ class Count:
 
 
 def lost_modes(
-    t: Transformation, cons: dict[int, Constrained], lam: dict[int, np.ndarray], count: int
+    t: Transformation,
+    cons: dict[int, Constrained],
+    lam: dict[int, np.ndarray],
+    count: int,
 ) -> dict[int, Count]:
-    """Nodal diameters whose eigenvalues (m,) below a shift are not as many as the inertia counts."""
+    """Nodal diameters whose eigenvalues (m,) below a shift are not as many as the inertia
+    counts.
+    """
     give_back()
     shift = _gap([some[:count] for some in lam.values()])
     if not shift > 0:
@@ -310,7 +345,10 @@ def lost_modes(
 
 
 def found_again(
-    flex: Flexibility, count: int, truth: Count, tolerance: float = CLOSE
+    flex: Flexibility,
+    count: int,
+    truth: Count,
+    tolerance: float = CLOSE,
 ) -> Eigenpairs:
     """A nodal diameter solved from scratch by blocks, which do not miss double eigenvalues.
 
@@ -340,7 +378,11 @@ def _shifted(t: Transformation, shift: float) -> core.Core | None:
     )
 
 
-def _count_below(con: Constrained, shift: float, shared: core.Core | None) -> int:
+def _count_below(
+    con: Constrained,
+    shift: float,
+    shared: core.Core | None,
+) -> int:
     return (
         inertia(combined(con.K, -shift, con.M))
         if shared is None

@@ -11,8 +11,6 @@ import numpy as np
 from .body import Body
 from .stress import nodal_stress, patch_stress, von_mises
 
-__all__ = ["AlternatingStress", "alternating_stress", "mesh_error"]
-
 # instants of a period for each harmonic, the highest one included
 INSTANTS = 16
 # nodes that are followed in time: those with the largest sum of the harmonics' own stresses
@@ -67,7 +65,12 @@ def alternating_stress(body: Body, harmonics: np.ndarray) -> AlternatingStress:
     )
 
 
-def mesh_error(body: Body, u: np.ndarray, recovered: np.ndarray, node: int) -> float:
+def mesh_error(
+    body: Body,
+    u: np.ndarray,
+    recovered: np.ndarray,
+    node: int,
+) -> float:
     """Relative error of the recovered stress at a node.
 
     Polynomials of first and of second degree through the stresses at the Gauss points of the cells

@@ -26,21 +26,7 @@ from .compat import (
     vector_space,
 )
 from .elasticity import Law, elastic_law, owners, piecewise
-from .loads import centrifugal, mass, surface_load, volume
 from .memory import check
-
-__all__ = [
-    "Body",
-    "assemble",
-    "cells_of",
-    "centrifugal",
-    "degrees",
-    "mass",
-    "properties",
-    "rigid_modes",
-    "surface_load",
-    "volume",
-]
 
 
 @dataclass(frozen=True)
@@ -136,7 +122,10 @@ def assemble(
 
 
 def properties(
-    mesh: Mesh, materials: dict[str, Material], domain: Any, plane: str
+    mesh: Mesh,
+    materials: dict[str, Material],
+    domain: Any,
+    plane: str,
 ) -> tuple[Law, Any, Any]:
     """Stress from strain, density [kg/m^3] with one value a cell of this rank, and the depth [m],
     for forms.
@@ -170,7 +159,9 @@ def rigid_modes(body: Body) -> np.ndarray:
 
 
 def _checked(
-    mesh: Mesh, names: tuple[str, ...], materials: dict[str, Material]
+    mesh: Mesh,
+    names: tuple[str, ...],
+    materials: dict[str, Material],
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Cells, their node numbers without gaps, and the cells in these; everything that can be wrong
     is found here.
@@ -210,7 +201,11 @@ def _check_jacobians(mesh: Mesh, cells: np.ndarray) -> None:
         )
 
 
-def degrees(mesh: Mesh, cells: np.ndarray, quadrature: str) -> tuple[int, int]:
+def degrees(
+    mesh: Mesh,
+    cells: np.ndarray,
+    quadrature: str,
+) -> tuple[int, int]:
     """Quadrature degrees of stiffness and mass; elements with straight sides need less."""
     if quadrature not in ("exact", "ccx"):
         raise InputError(f"quadrature is '{quadrature}'{suggestion(quadrature, ('exact', 'ccx'))}")
@@ -240,7 +235,11 @@ def _straight(mesh: Mesh, cells: np.ndarray) -> bool:
 
 
 def _rows(
-    mesh: Mesh, space: Any, cells: np.ndarray, origin: np.ndarray, comm: MPI.Comm
+    mesh: Mesh,
+    space: Any,
+    cells: np.ndarray,
+    origin: np.ndarray,
+    comm: MPI.Comm,
 ) -> np.ndarray:
     """PETSc block row of each mesh node, found through the cells: dofmap and input list the same
     nodes.

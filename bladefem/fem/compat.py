@@ -36,7 +36,7 @@ try:
     import ufl
     from mpi4py import MPI
     from petsc4py import PETSc
-    from slepc4py import SLEPc
+    from slepc4py import SLEPc as SLEPc
 except ModuleNotFoundError:
     raise
 except (ImportError, AttributeError, RuntimeError) as error:
@@ -49,23 +49,6 @@ except (ImportError, AttributeError, RuntimeError) as error:
     ) from error
 
 sys.setdlopenflags = _setdlopenflags
-
-__all__ = [
-    "CELLS",
-    "MPI",
-    "PETSc",
-    "SLEPc",
-    "assemble_matrix",
-    "assemble_vector",
-    "build_mesh",
-    "cell_dofs",
-    "compile_form",
-    "dolfinx",
-    "no_error_messages",
-    "scalar_space",
-    "ufl",
-    "vector_space",
-]
 
 # meshio's word: dolfinx's cell, degree
 CELLS = {
@@ -94,7 +77,10 @@ def no_error_messages() -> Iterator[None]:
 
 
 def build_mesh(
-    comm: MPI.Comm, cell_type: str, cells: np.ndarray, points: np.ndarray
+    comm: MPI.Comm,
+    cell_type: str,
+    cells: np.ndarray,
+    points: np.ndarray,
 ) -> tuple[Any, np.ndarray]:
     """A distributed dolfinx mesh, and for each cell of this rank the row of ``cells`` that it came
     from.
@@ -165,8 +151,8 @@ def _patiently(build: Callable[[], Any], patience: int = 12) -> Any:
                 break
     stale = ", ".join(map(str, _unfinished(np.inf))) or "none found"
     raise NotSolvedError(
-        "the form compiler's cache holds a build that never finished; "
-        f"delete these files and start again: {stale}"
+        "the form compiler's cache holds a build that never finished; delete these files and "
+        f"start again: {stale}"
     )
 
 

@@ -27,20 +27,6 @@ from .linalg import Doubled, Folded, Matrix, combined
 from .ordering import interior_first
 from .supports import held_directions
 
-__all__ = [
-    "Constrained",
-    "Opened",
-    "Transformation",
-    "at_diameter",
-    "clamped_nodes",
-    "constrain",
-    "expand",
-    "in_step",
-    "restrict",
-    "transformation",
-    "unknowns",
-]
-
 
 @dataclass(frozen=True)
 class Opened:
@@ -276,7 +262,12 @@ def _cyclic_pair(body: Body) -> Pair:
     return Pair(pair.master, pair.slave, np.stack([low, high]), pair.rotation, pair.shift)
 
 
-def _check_match(points: np.ndarray, low: np.ndarray, high: np.ndarray, pair: Pair) -> None:
+def _check_match(
+    points: np.ndarray,
+    low: np.ndarray,
+    high: np.ndarray,
+    pair: Pair,
+) -> None:
     """Partners must coincide under the motion, to a tolerance that scales with the distance between
     nodes.
     """
@@ -287,15 +278,18 @@ def _check_match(points: np.ndarray, low: np.ndarray, high: np.ndarray, pair: Pa
         raise InputError(
             f"faces '{pair.master}' and '{pair.slave}' do not match: nodes {low[worst]} at "
             f"{points[low[worst]].round(6)} m and {high[worst]} at {points[high[worst]].round(6)} "
-            "m are "
-            f"{error[worst]:.2e} m apart after the rotation, expected at most {tolerance:.1e} m"
+            f"m are {error[worst]:.2e} m apart after the rotation, expected at most "
+            f"{tolerance:.1e} m"
         )
     if np.intersect1d(low, high).size:
         raise InputError("the cut faces share nodes (a solid hub on the axis), expected a bore")
 
 
 def _parts(
-    body: Body, clamped: np.ndarray, pair: Pair | None, ties: np.ndarray | None
+    body: Body,
+    clamped: np.ndarray,
+    pair: Pair | None,
+    ties: np.ndarray | None,
 ) -> tuple[sp.csr_matrix, sp.csr_matrix | None]:
     """T0 and T1 on all nodes' displacements; columns of dependent nodes stay empty."""
     n = len(body.mesh.points)
@@ -356,7 +350,12 @@ def _supported(body: Body, pair: Pair | None) -> np.ndarray:
     return held
 
 
-def _plane(body: Body, name: str, axis: int, pair: Pair | None) -> np.ndarray:
+def _plane(
+    body: Body,
+    name: str,
+    axis: int,
+    pair: Pair | None,
+) -> np.ndarray:
     """The body's nodes on a plane across an axis, checked."""
     points = body.mesh.points
     nodes = np.unique(body.mesh.faces.get(name, np.empty(0, int)))
@@ -371,8 +370,7 @@ def _plane(body: Body, name: str, axis: int, pair: Pair | None) -> np.ndarray:
     if pair is not None and abs(pair.rotation[axis, axis] - 1) > 1e-12:
         raise InputError(
             f"face '{name}' is not across the axis of the wheel, expected cyclic faces or a "
-            "symmetry "
-            "plane, not both"
+            "symmetry plane, not both"
         )
     return nodes
 
@@ -385,7 +383,11 @@ def _with_partners(clamped: np.ndarray, pair: Pair | None) -> np.ndarray:
     return np.union1d(clamped, pair.nodes[:, held].ravel())
 
 
-def _tied(n: int, d: int, ties: np.ndarray) -> sp.csr_matrix:
+def _tied(
+    n: int,
+    d: int,
+    ties: np.ndarray,
+) -> sp.csr_matrix:
     """Identity, but tied nodes are the mean of two others."""
     keep = np.ones(n)
     keep[ties[:, 0]] = 0
@@ -396,7 +398,9 @@ def _tied(n: int, d: int, ties: np.ndarray) -> sp.csr_matrix:
 
 
 def _numbered(
-    body: Body, low: sp.csr_matrix, high: sp.csr_matrix | None
+    body: Body,
+    low: sp.csr_matrix,
+    high: sp.csr_matrix | None,
 ) -> tuple[sp.csr_matrix, sp.csr_matrix | None, np.ndarray]:
     """Drop empty columns; number the others by their PETSc row, so that an unknown lives where its
     node lives.
@@ -416,7 +420,11 @@ def _numbered(
     return *cut, np.asarray(start, int)
 
 
-def _to_petsc(body: Body, T: sp.csr_matrix, start: np.ndarray) -> PETSc.Mat:
+def _to_petsc(
+    body: Body,
+    T: sp.csr_matrix,
+    start: np.ndarray,
+) -> PETSc.Mat:
     """Rows of T that this rank owns, in PETSc's row order."""
     first, last = body.K.owner_range
     rank = body.comm.rank
@@ -434,7 +442,12 @@ def _to_petsc(body: Body, T: sp.csr_matrix, start: np.ndarray) -> PETSc.Mat:
     return matrix
 
 
-def _opened(body: Body, T: sp.csr_matrix, low: sp.csr_matrix, high: sp.csr_matrix) -> Opened | None:
+def _opened(
+    body: Body,
+    T: sp.csr_matrix,
+    low: sp.csr_matrix,
+    high: sp.csr_matrix,
+) -> Opened | None:
     """Matrices of the open sector, None where it is all cut face; zeros between directions of the
     mass are dropped.
     """
@@ -463,7 +476,11 @@ def _projected(A: sp.csr_matrix, T: sp.csr_matrix) -> sp.csr_matrix:
     return out
 
 
-def _three(A: PETSc.Mat, T0: PETSc.Mat, T1: PETSc.Mat) -> tuple[PETSc.Mat, PETSc.Mat, PETSc.Mat]:
+def _three(
+    A: PETSc.Mat,
+    T0: PETSc.Mat,
+    T1: PETSc.Mat,
+) -> tuple[PETSc.Mat, PETSc.Mat, PETSc.Mat]:
     """K0, Kc and Ks."""
     cross = T0.transposeMatMult(A.matMult(T1))
     turned = cross.duplicate(copy=True)
@@ -475,7 +492,11 @@ def _three(A: PETSc.Mat, T0: PETSc.Mat, T1: PETSc.Mat) -> tuple[PETSc.Mat, PETSc
     )
 
 
-def _doubled(A: PETSc.Mat, B: PETSc.Mat, factor: float) -> Doubled:
+def _doubled(
+    A: PETSc.Mat,
+    B: PETSc.Mat,
+    factor: float,
+) -> Doubled:
     """The real twin of A + j factor B, parts interleaved: kron(A, I) + kron(factor B, [0 -1; 1
     0]).
     """

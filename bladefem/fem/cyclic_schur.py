@@ -20,20 +20,6 @@ from .compat import MPI, PETSc
 from .mumps import Factorised, factorise_matrix, solve_matrix
 from .schur import Bridge, bridge, schur_complement, through
 
-__all__ = [
-    "Core",
-    "Rim",
-    "close",
-    "eliminate",
-    "face_solve",
-    "inner_solve",
-    "masters",
-    "negative",
-    "rim_of",
-    "solve",
-    "times",
-]
-
 # complex columns a solve: from 32 real ones on MUMPS runs at the speed of matrix products
 BATCH = 32
 
@@ -131,7 +117,10 @@ def eliminate(
 
 
 def close(
-    core: Core, C: sp.csr_matrix, definite: bool = True, springs: np.ndarray | None = None
+    core: Core,
+    C: sp.csr_matrix,
+    definite: bool = True,
+    springs: np.ndarray | None = None,
 ) -> Rim:
     """Join the cut faces for one nodal diameter.
 

@@ -25,8 +25,6 @@ from .constraint import Constrained
 from .lanczos import lowest, orthonormal
 from .linalg import apply, dot, minus, mix
 
-__all__ = ["Eigensolver", "basis_size", "krylov_schur"]
-
 # iterations (restarts) until SLEPc gives up
 RESTARTS = 100
 # basis vectors beyond twice the pairs wanted: fewer restart once more, more are not needed
@@ -77,7 +75,11 @@ class _Pencil:
         values = vector.getArray(readonly=True).copy()
         return (values.view(complex) if self.doubled else values).reshape(-1, 1)
 
-    def put(self, column: np.ndarray, vector: PETSc.Vec) -> None:
+    def put(
+        self,
+        column: np.ndarray,
+        vector: PETSc.Vec,
+    ) -> None:
         """The inverse of ``column``."""
         values = np.ascontiguousarray(column[:, 0], dtype=self.con.dtype)
         vector.setArray(values.view(float))
@@ -89,7 +91,12 @@ class _Mass:
     def __init__(self, pencil: _Pencil) -> None:
         self.pencil = pencil
 
-    def mult(self, _: PETSc.Mat, x: PETSc.Vec, y: PETSc.Vec) -> None:
+    def mult(
+        self,
+        _: PETSc.Mat,
+        x: PETSc.Vec,
+        y: PETSc.Vec,
+    ) -> None:
         pencil = self.pencil
         pencil.last = pencil.column(x)
         pencil.put(apply(pencil.con.M, pencil.last), y)
@@ -101,7 +108,12 @@ class _Stiffness:
     def __init__(self, pencil: _Pencil) -> None:
         self.pencil = pencil
 
-    def mult(self, _: PETSc.Mat, x: PETSc.Vec, y: PETSc.Vec) -> None:
+    def mult(
+        self,
+        _: PETSc.Mat,
+        x: PETSc.Vec,
+        y: PETSc.Vec,
+    ) -> None:
         pencil = self.pencil
         pencil.put(apply(pencil.con.K, pencil.column(x)), y)
 
@@ -112,7 +124,12 @@ class _Inverse:
     def __init__(self, pencil: _Pencil) -> None:
         self.pencil = pencil
 
-    def apply(self, _: PETSc.PC, x: PETSc.Vec, y: PETSc.Vec) -> None:
+    def apply(
+        self,
+        _: PETSc.PC,
+        x: PETSc.Vec,
+        y: PETSc.Vec,
+    ) -> None:
         pencil = self.pencil
         load = pencil.column(x)
         found = pencil.inverse(load)
@@ -195,7 +212,11 @@ def krylov_schur(
     return lam, X
 
 
-def _rough_pairs(pencil: _Pencil, X: np.ndarray, count: int) -> tuple[np.ndarray, np.ndarray]:
+def _rough_pairs(
+    pencil: _Pencil,
+    X: np.ndarray,
+    count: int,
+) -> tuple[np.ndarray, np.ndarray]:
     """What the space of the iteration holds beside the converged vectors, by Rayleigh and Ritz."""
     con = pencil.con
     MX = apply(con.M, X)
@@ -269,14 +290,17 @@ def _vectors(pencil: _Pencil, eps: SLEPc.EPS) -> np.ndarray:
 
 
 def _purified(
-    con: Constrained, inverse: Callable[[np.ndarray], np.ndarray], X: np.ndarray, wanted: int
+    con: Constrained,
+    inverse: Callable[[np.ndarray], np.ndarray],
+    X: np.ndarray,
+    wanted: int,
 ) -> tuple[np.ndarray, np.ndarray]:
     """Eigenvalues and M-orthonormal vectors K^-1 M x, which inverse iteration frees from rounding
     in stiff directions; repeated directions are dropped.
     """
     if not X.shape[1]:
         return np.zeros(0), X
-    Q, MQ, _ = orthonormal(con, [], [], X, NEW)
+    _Q, MQ, _ = orthonormal(con, [], [], X, NEW)
     Y = inverse(MQ)
     theta, S = np.linalg.eigh(_hermitian(dot(con.body.comm, MQ, Y)))
     theta = theta[::-1][:wanted]

@@ -1,4 +1,5 @@
-"""Linear elasticity: isotropic, cubic and orthotropic with an orientation, for forms and for arrays.
+"""Linear elasticity: isotropic, cubic and orthotropic with an orientation, for forms and for
+arrays.
 
 Stresses and strains in six components are ordered xx, yy, zz, yz, zx, xy with engineering shear.
 A cubic crystal has three constants (E along its edges, nu, G), an orthotropic solid nine. Its axes
@@ -19,18 +20,6 @@ from ..errors import InputError
 from ..scene.tables import Material
 from .compat import cell_dofs, dolfinx, scalar_space, ufl
 
-__all__ = [
-    "Law",
-    "elastic_law",
-    "is_isotropic",
-    "lame",
-    "owners",
-    "piecewise",
-    "rotation",
-    "stiffness",
-    "stress_of",
-]
-
 # stress from strain, both (dim, dim) expressions of ufl
 Law = Callable[[Any], Any]
 PAIRS = ((0, 0), (1, 1), (2, 2), (1, 2), (2, 0), (0, 1))
@@ -41,7 +30,11 @@ def is_isotropic(material: Material) -> bool:
     return material.G is None and material.orthotropic is None
 
 
-def lame(material: Material, dim: int, plane: str) -> tuple[float, float]:
+def lame(
+    material: Material,
+    dim: int,
+    plane: str,
+) -> tuple[float, float]:
     """Lame's lambda [Pa] (its plane-stress substitute where asked) and shear modulus [Pa]."""
     E = material.E
     nu = material.nu
@@ -80,7 +73,12 @@ def rotation(angles: tuple[float, float, float]) -> np.ndarray:
     return total
 
 
-def elastic_law(mesh: Mesh, materials: dict[str, Material], domain: Any, plane: str) -> Law:
+def elastic_law(
+    mesh: Mesh,
+    materials: dict[str, Material],
+    domain: Any,
+    plane: str,
+) -> Law:
     """Stress from strain in every cell of this rank.
 
     Args:
@@ -114,7 +112,11 @@ def elastic_law(mesh: Mesh, materials: dict[str, Material], domain: Any, plane: 
     return law
 
 
-def stress_of(material: Material, strain: np.ndarray, plane: str) -> np.ndarray:
+def stress_of(
+    material: Material,
+    strain: np.ndarray,
+    plane: str,
+) -> np.ndarray:
     """(..., dim, dim) stress [Pa] of strains (..., dim, dim)."""
     dim = strain.shape[-1]
     if is_isotropic(material):
@@ -129,7 +131,11 @@ def stress_of(material: Material, strain: np.ndarray, plane: str) -> np.ndarray:
     return stress
 
 
-def owners(mesh: Mesh, materials: dict[str, Material], domain: Any) -> np.ndarray:
+def owners(
+    mesh: Mesh,
+    materials: dict[str, Material],
+    domain: Any,
+) -> np.ndarray:
     """Number of the material of each cell of this rank."""
     owner = np.repeat(np.arange(len(materials)), [len(mesh.bodies[n]) for n in materials])
     return owner[np.asarray(domain.topology.original_cell_index)]

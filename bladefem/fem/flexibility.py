@@ -17,8 +17,6 @@ from .body import rigid_modes
 from .constraint import Constrained, expand, unknowns
 from .linalg import Factor, apply, dense_rows, dot, factorise, scale, solve
 
-__all__ = ["Flexibility", "compliance", "flexible", "rigid_basis", "unknown_places"]
-
 # of the mean diagonal of K over that of M: squared frequency of a motion that springs do not hold
 SOFT = 1e-12
 
@@ -111,7 +109,11 @@ def unknown_places(con: Constrained) -> np.ndarray:
     return columns
 
 
-def _props(con: Constrained, R: np.ndarray, prop: float) -> np.ndarray:
+def _props(
+    con: Constrained,
+    R: np.ndarray,
+    prop: float,
+) -> np.ndarray:
     """(n_own,) springs at the freedoms that hold the rigid motions best (pivoted QR)."""
     everywhere = unknowns(con, R)
     allowed = dense_rows(con.K, len(everywhere))

@@ -21,8 +21,6 @@ from .constraint import expand, restrict
 from .flexibility import Flexibility, compliance, unknown_places
 from .linalg import apply, dot
 
-__all__ = ["ForcedMotion", "forced_motion"]
-
 # of the displacement: the last term of the series that is still added
 SERIES_TOLERANCE = 1e-9
 # bounds the terms; a series that needs more has a mode missing below the frequency
@@ -40,7 +38,11 @@ class ForcedMotion:
 
 
 def forced_motion(
-    flex: Flexibility, modes: ModeSet, loads: np.ndarray, omega: np.ndarray, damping: np.ndarray
+    flex: Flexibility,
+    modes: ModeSet,
+    loads: np.ndarray,
+    omega: np.ndarray,
+    damping: np.ndarray,
 ) -> ForcedMotion:
     """Displacements of a clamped body, or of a sector in one nodal diameter, under several loads.
 
@@ -85,9 +87,9 @@ def forced_motion(
         term = omega**2 * without_modes(compliance(flex, apply(con.M, term)))
     worst = int(np.argmax(np.where(open_ends, size, 0.0)))
     raise NotSolvedError(
-        f"the motion at {abs(omega[worst]) / (2 * np.pi):.5g} Hz is not covered by {len(natural)} modes "
-        f"up to {natural[-1] / (2 * np.pi):.5g} Hz (last term {size[worst]:.1e}): expected modes "
-        "beyond the frequency"
+        f"the motion at {abs(omega[worst]) / (2 * np.pi):.5g} Hz is not covered by {len(natural)} "
+        f"modes up to {natural[-1] / (2 * np.pi):.5g} Hz (last term {size[worst]:.1e}): expected "
+        "modes beyond the frequency"
     )
 
 

@@ -12,14 +12,16 @@ import numpy as np
 from .compat import MPI
 from .memory import available, needed
 
-__all__ = ["group_size", "shared_out"]
-
 Result = TypeVar("Result")
 # share of the free memory that groups may fill
 SPARE = 0.8
 
 
-def group_size(comm: MPI.Comm, dofs: int, free: float | None = None) -> int:
+def group_size(
+    comm: MPI.Comm,
+    dofs: int,
+    free: float | None = None,
+) -> int:
     """Ranks in a group: as few as memory allows, for a wheel is solved fastest by one rank; divides
     the ranks.
 

@@ -24,8 +24,6 @@ from .compat import PETSc, assemble_matrix, dolfinx, ufl
 from .linalg import apply, dot
 from .rotation import AXIS
 
-__all__ = ["Waves", "coriolis", "coupling", "own_rows", "waves"]
-
 
 @dataclass(frozen=True)
 class Waves:
@@ -69,7 +67,10 @@ def coriolis(body: Body, axis: tuple[float, float, float] = AXIS) -> PETSc.Mat:
 
 
 def coupling(
-    body: Body, modes: ModeSet, G: PETSc.Mat | None = None, axis: tuple[float, float, float] = AXIS
+    body: Body,
+    modes: ModeSet,
+    G: PETSc.Mat | None = None,
+    axis: tuple[float, float, float] = AXIS,
 ) -> np.ndarray:
     """(m, m) skew-Hermitian g = Phi^H G Phi [1], real where the modes are.
 
@@ -95,7 +96,12 @@ def own_rows(body: Body, shapes: np.ndarray) -> np.ndarray:
     return np.asfortranarray(shapes[:, :, : body.dim].reshape(len(shapes), -1)[:, order].T)
 
 
-def waves(modes: ModeSet, g: np.ndarray, speed: float, sense: int = 1) -> Waves:
+def waves(
+    modes: ModeSet,
+    g: np.ndarray,
+    speed: float,
+    sense: int = 1,
+) -> Waves:
     """Forward and backward waves made of the modes of one nodal diameter.
 
     Args:

@@ -18,8 +18,6 @@ from ..errors import NotSolvedError
 from .constraint import Constrained
 from .linalg import apply, dot, minus, mix
 
-__all__ = ["lowest", "orthonormal"]
-
 STEPS = 200
 # share of old directions in a new one below which its image under M is corrected, not computed
 # again
@@ -58,7 +56,8 @@ def lowest(
     Args:
         inverse: K^-1 (or what stands for it) on blocks (n_own, k).
         start: (n_own, k) first block.
-        tolerance: largest |K^-1 M x - x / lambda| lambda in the M-norm: the direction's error times a gap.
+        tolerance: largest |K^-1 M x - x / lambda| lambda in the M-norm: the direction's error
+            times a gap.
         guard: pairs returned beyond count as far as they have come.
 
     The vectors returned are K^-1 M x lambda, one free step of inverse iteration beyond the Ritz
@@ -92,7 +91,11 @@ def lowest(
 
 
 def orthonormal(
-    con: Constrained, V: list[np.ndarray], MV: list[np.ndarray], W: np.ndarray, size: float = 0.0
+    con: Constrained,
+    V: list[np.ndarray],
+    MV: list[np.ndarray],
+    W: np.ndarray,
+    size: float = 0.0,
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """W made M-orthonormal and, once more, M-orthogonal to V: basis Q, M Q, and R with W = V (...)
     + Q R.
@@ -114,7 +117,11 @@ def orthonormal(
 
 
 def _extend(
-    con: Constrained, space: _Space, block: np.ndarray, Mblock: np.ndarray, W: np.ndarray
+    con: Constrained,
+    space: _Space,
+    block: np.ndarray,
+    Mblock: np.ndarray,
+    W: np.ndarray,
 ) -> None:
     """One more block of V, with its image W = K^-1 M block; what is left of that becomes a block of
     P.
@@ -135,7 +142,11 @@ def _extend(
     space.MP.append(MQ)
 
 
-def _next(space: _Space, rest: np.ndarray, faint: float) -> tuple[np.ndarray, np.ndarray]:
+def _next(
+    space: _Space,
+    rest: np.ndarray,
+    faint: float,
+) -> tuple[np.ndarray, np.ndarray]:
     """The next block and its product by M, taken out of P: the directions that carry the residuals
     ``rest``.
     """
@@ -154,7 +165,11 @@ def _next(space: _Space, rest: np.ndarray, faint: float) -> tuple[np.ndarray, np
 
 
 def _scaled(
-    comm: object, W: np.ndarray, MW: np.ndarray, least: float, largest: float = np.finfo(float).tiny
+    comm: object,
+    W: np.ndarray,
+    MW: np.ndarray,
+    least: float,
+    largest: float = np.finfo(float).tiny,
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray, float]:
     """W Z, M W Z and R with W = (W Z) R, and the least square of a column, of the largest one's.
 

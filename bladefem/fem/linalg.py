@@ -23,22 +23,6 @@ from . import cyclic_schur as interior
 from .compat import PETSc
 from .mumps import Factorised, dense, factorise_matrix, solve_matrix, values
 
-__all__ = [
-    "Doubled",
-    "Factor",
-    "Folded",
-    "apply",
-    "combined",
-    "dense_rows",
-    "dot",
-    "factorise",
-    "inertia",
-    "minus",
-    "mix",
-    "scale",
-    "solve",
-]
-
 
 @dataclass(frozen=True)
 class Doubled:
@@ -83,7 +67,11 @@ class Factor:
         return self.parts.bytes
 
 
-def factorise(A: Matrix, definite: bool = True, springs: np.ndarray | None = None) -> Factor:
+def factorise(
+    A: Matrix,
+    definite: bool = True,
+    springs: np.ndarray | None = None,
+) -> Factor:
     """Factorise a symmetric or Hermitian matrix.
 
     Args:
@@ -128,7 +116,11 @@ def apply(A: Matrix, X: np.ndarray) -> np.ndarray:
     return _join(_times(A, _split(X))) if np.iscomplexobj(X) else _times(A, X)
 
 
-def combined(A: Matrix, factor: float, B: Matrix) -> Matrix:
+def combined(
+    A: Matrix,
+    factor: float,
+    B: Matrix,
+) -> Matrix:
     """A + factor B."""
     if isinstance(A, Folded):
         return Folded((A.A + factor * B.A).tocsr(), A.C, None)
@@ -152,7 +144,11 @@ def dense_rows(A: Matrix, n: int) -> np.ndarray:
     return interior.masters(A.C) if isinstance(A, Folded) else np.arange(n)
 
 
-def dot(comm: object, X: Block, Y: np.ndarray) -> np.ndarray:
+def dot(
+    comm: object,
+    X: Block,
+    Y: np.ndarray,
+) -> np.ndarray:
     """X^H Y over all ranks, (k, l); X may be a list of blocks side by side."""
     if isinstance(X, list):
         parts = [_dot(block, Y) for block in X]
@@ -162,7 +158,11 @@ def dot(comm: object, X: Block, Y: np.ndarray) -> np.ndarray:
     return comm.allreduce(np.ascontiguousarray(part)) if comm.size > 1 else part
 
 
-def minus(W: np.ndarray, V: list[np.ndarray], C: np.ndarray) -> np.ndarray:
+def minus(
+    W: np.ndarray,
+    V: list[np.ndarray],
+    C: np.ndarray,
+) -> np.ndarray:
     """W - V C, in W's own memory where its columns are contiguous; V is a list of blocks side by
     side.
     """

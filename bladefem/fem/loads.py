@@ -15,8 +15,6 @@ from . import shape_functions as shape
 if TYPE_CHECKING:
     from .body import Body
 
-__all__ = ["centrifugal", "face_areas", "mass", "surface_load", "volume"]
-
 
 def volume(mesh: Mesh, name: str) -> float:
     """Volume of a body [m^3], plane meshes with their depth.
@@ -97,7 +95,9 @@ def face_areas(body: Body, face: str) -> np.ndarray:
 
 
 def _measure(
-    mesh: Mesh, cells: np.ndarray, degree: int
+    mesh: Mesh,
+    cells: np.ndarray,
+    degree: int,
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Shape values (q, k), volumes (nc, q) and places (nc, q, 3) of the quadrature points."""
     d = mesh.dimension
@@ -124,7 +124,11 @@ def _normals(tangents: np.ndarray) -> np.ndarray:
     return np.cross(tangents[..., 0], tangents[..., 1])
 
 
-def _outward(body: Body, facets: np.ndarray, normal: np.ndarray) -> np.ndarray:
+def _outward(
+    body: Body,
+    facets: np.ndarray,
+    normal: np.ndarray,
+) -> np.ndarray:
     """Normals pointed away from the cell behind each facet."""
     mesh = body.mesh
     d = body.dim

@@ -22,8 +22,6 @@ from pathlib import Path
 from ..errors import InputError
 from .compat import MPI
 
-__all__ = ["available", "check", "give_back", "needed"]
-
 # interpreter and libraries of one rank [bytes]
 START = 1.2e8
 # bytes: a dofs + b dofs^(4/3)
@@ -67,7 +65,11 @@ def give_back() -> None:
         trim(0)
 
 
-def check(dofs: int, comm: MPI.Comm, free: float | None = None) -> float:
+def check(
+    dofs: int,
+    comm: MPI.Comm,
+    free: float | None = None,
+) -> float:
     """The memory that a solve will take [bytes], all ranks together.
 
     Args:

@@ -21,17 +21,6 @@ from .flexibility import Flexibility, compliance, flexible
 from .lanczos import lowest
 from .linalg import Folded, apply, combined, dot, inertia, scale
 
-__all__ = [
-    "canonical",
-    "certificate",
-    "count_below",
-    "elastic_pairs",
-    "mode_set",
-    "modes",
-    "pairs",
-    "proven_pairs",
-]
-
 # error of a vector's direction; that of a frequency is its square
 TOLERANCE = 1e-8
 # the same where modes are looked at, not reduced with
@@ -70,7 +59,10 @@ def modes(
 
 
 def proven_pairs(
-    flex: Flexibility, count: int, tolerance: float = TOLERANCE, solver: Eigensolver = SLEPC
+    flex: Flexibility,
+    count: int,
+    tolerance: float = TOLERANCE,
+    solver: Eigensolver = SLEPC,
 ) -> tuple[np.ndarray, np.ndarray]:
     """``pairs`` whose number the inertia confirms; those that were missed are found by blocks.
 
@@ -89,8 +81,8 @@ def proven_pairs(
     found = np.count_nonzero(lam < upper)
     if found != exact:
         raise NotSolvedError(
-            f"{found} modes were found below {np.sqrt(upper) / (2 * np.pi):.6g} Hz, "
-            f"the inertia counts {exact}"
+            f"{found} modes were found below {np.sqrt(upper) / (2 * np.pi):.6g} Hz, the inertia "
+            f"counts {exact}"
         )
     return lam[:count], X[:, :count]
 
@@ -117,7 +109,11 @@ def pairs(
     return np.concatenate([np.zeros(r), lam]), np.concatenate([flex.R[:, :r], X], axis=1)
 
 
-def mode_set(con: Constrained, lam: np.ndarray, X: np.ndarray) -> ModeSet:
+def mode_set(
+    con: Constrained,
+    lam: np.ndarray,
+    X: np.ndarray,
+) -> ModeSet:
     """Modes with a certificate, in mesh numbering, in a basis and phase that do not depend on the
     ranks.
     """
@@ -131,8 +127,14 @@ def mode_set(con: Constrained, lam: np.ndarray, X: np.ndarray) -> ModeSet:
     return ModeSet(np.sqrt(np.maximum(lam, 0)) / (2 * np.pi), shapes, con.nodal_diameter, residuals)
 
 
-def certificate(con: Constrained, lam: np.ndarray, X: np.ndarray) -> np.ndarray:
-    """(m,) |K x - lambda M x| / |K x|; for rigid motions |K x| over the largest |K x| of the set."""
+def certificate(
+    con: Constrained,
+    lam: np.ndarray,
+    X: np.ndarray,
+) -> np.ndarray:
+    """(m,) |K x - lambda M x| / |K x|; for rigid motions |K x| over the largest |K x| of the
+    set.
+    """
     if not X.shape[1]:
         return np.zeros(0)
     KX = apply(con.K, X)
@@ -185,7 +187,11 @@ def _probe(con: Constrained, width: int) -> np.ndarray:
     return np.random.default_rng(20).standard_normal((con.T.shape[0], width))
 
 
-def canonical(con: Constrained, lam: np.ndarray, X: np.ndarray) -> np.ndarray:
+def canonical(
+    con: Constrained,
+    lam: np.ndarray,
+    X: np.ndarray,
+) -> np.ndarray:
     """Bases of (nearly) multiple eigenvalues and phases of single ones, fixed by projecting given
     vectors.
     """

@@ -17,16 +17,6 @@ import numpy as np
 from ..errors import NotSolvedError
 from .compat import PETSc, no_error_messages
 
-__all__ = [
-    "Factorised",
-    "dense",
-    "factorise_matrix",
-    "petsc_call",
-    "set_operation",
-    "solve_matrix",
-    "values",
-]
-
 # columns a solve: MUMPS works on them by matrix products, 256 are no faster
 BATCH = 128
 # per cent of memory beyond MUMPS's own estimate
@@ -111,7 +101,11 @@ def factorise_matrix(
     )
 
 
-def solve_matrix(factor: Factorised, B: np.ndarray, whole: bool = False) -> np.ndarray:
+def solve_matrix(
+    factor: Factorised,
+    B: np.ndarray,
+    whole: bool = False,
+) -> np.ndarray:
     """A^-1 B (n_own, k), in batches; with rows left out, A is the matrix without them and these
     rows of B are 0.
 
@@ -166,7 +160,11 @@ def values(D: PETSc.Mat) -> np.ndarray:
     return out
 
 
-def _sparse(F: PETSc.Mat, rows: np.ndarray, values: np.ndarray) -> PETSc.Mat:
+def _sparse(
+    F: PETSc.Mat,
+    rows: np.ndarray,
+    values: np.ndarray,
+) -> PETSc.Mat:
     """The block as the transpose of a sparse matrix, the form that PETSc hands on to MUMPS."""
     k = values.shape[1]
     starts = np.arange(k + 1, dtype=PETSc.IntType) * len(rows)
@@ -182,7 +180,11 @@ def _sparse(F: PETSc.Mat, rows: np.ndarray, values: np.ndarray) -> PETSc.Mat:
     return out
 
 
-def set_operation(handle: int, place: int, function: object) -> None:
+def set_operation(
+    handle: int,
+    place: int,
+    function: object,
+) -> None:
     """Replace one of a matrix's operations, numbered as in PETSc's enumeration MatOperation."""
     ctypes.CDLL(PETSc.__file__).MatSetOperation(ctypes.c_void_p(handle), place, function)
 
@@ -212,7 +214,11 @@ def _prepared(A: PETSc.Mat, kind: str) -> PETSc.PC:
     return pc
 
 
-def _in_order(F: PETSc.Mat, A: PETSc.Mat, order: np.ndarray) -> None:
+def _in_order(
+    F: PETSc.Mat,
+    A: PETSc.Mat,
+    order: np.ndarray,
+) -> None:
     """Factorise with a given ordering, which PETSc hands on to MUMPS in its analysis for LU only:
     that one is borrowed, it does the same but for the ordering.
     """
@@ -233,7 +239,11 @@ def _in_order(F: PETSc.Mat, A: PETSc.Mat, order: np.ndarray) -> None:
         made.destroy()
 
 
-def _numeric(F: PETSc.Mat, size: int, factorise: Callable[[], None]) -> None:
+def _numeric(
+    F: PETSc.Mat,
+    size: int,
+    factorise: Callable[[], None],
+) -> None:
     """Factorise; failures become one sentence."""
     failed = False
     try:
@@ -246,7 +256,11 @@ def _numeric(F: PETSc.Mat, size: int, factorise: Callable[[], None]) -> None:
         raise NotSolvedError(_reason(code, F.getMumpsInfog(2), size))
 
 
-def _reason(code: int, detail: int, size: int) -> str:
+def _reason(
+    code: int,
+    detail: int,
+    size: int,
+) -> str:
     """MUMPS's complaint in words (users' guide 5.5, section 8)."""
     if code in (-5, -7, -8, -9, -11, -13, -19, -20):
         what = "memory ran out; use more ranks on more memory, or fewer unknowns"

@@ -17,14 +17,16 @@ from ctypes.util import find_library
 import numpy as np
 import scipy.sparse as sp
 
-__all__ = ["interior_first"]
-
 # unknowns from which METIS beats AMD
 WORTHWHILE = 60_000
 NAMES = ("libmetis.so.5", "libmetis.so", "libmetis.dylib")
 
 
-def interior_first(A: sp.csr_matrix, last: np.ndarray, groups: np.ndarray) -> np.ndarray | None:
+def interior_first(
+    A: sp.csr_matrix,
+    last: np.ndarray,
+    groups: np.ndarray,
+) -> np.ndarray | None:
     """(n,) place of each unknown in the elimination: interior by nested dissection, then the rows
     ``last``.
 

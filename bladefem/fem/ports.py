@@ -22,8 +22,6 @@ from .flexibility import Flexibility, compliance, flexible
 from .linalg import apply, dot
 from .modes import SLEPC, TOLERANCE, canonical, elastic_pairs, proven_pairs
 
-__all__ = ["flexibility", "port_model", "port_models"]
-
 # ports in one sweep
 BATCH = 64
 KINDS = ("rubin", "craig-bampton")
@@ -140,7 +138,11 @@ def _modelled(model: _Ports, p: Eigenpairs) -> PortModel:
     )
 
 
-def flexibility(con: Constrained, P: sp.spmatrix, flex: Flexibility | None = None) -> np.ndarray:
+def flexibility(
+    con: Constrained,
+    P: sp.spmatrix,
+    flex: Flexibility | None = None,
+) -> np.ndarray:
     """(p, p) static flexibility P^T T K^+ T^H P [m/N], Hermitian; without rigid motions where the
     body floats.
     """
@@ -158,7 +160,9 @@ def _restricted(con: Constrained, P: sp.spmatrix) -> np.ndarray:
 
 
 def _sweep(
-    opened: Opened, P: sp.spmatrix, load: np.ndarray | None
+    opened: Opened,
+    P: sp.spmatrix,
+    load: np.ndarray | None,
 ) -> tuple[np.ndarray, np.ndarray]:
     """What the interior of an open sector gives: its flexibility at the ports (p, p), and the
     ports' loads as the rim feels them (nb, p); a static load is the last column.
@@ -184,7 +188,11 @@ def _closed(shared: tuple[np.ndarray, np.ndarray], rim: Rim) -> tuple[np.ndarray
 
 
 def _rubin(
-    flex: Flexibility, F: np.ndarray, X: np.ndarray, count: int, solver: Eigensolver
+    flex: Flexibility,
+    F: np.ndarray,
+    X: np.ndarray,
+    count: int,
+    solver: Eigensolver,
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Free modes, and what the modes left out give to the static flexibility (Rubin 1975,
     doi:10.2514/3.60497).
@@ -195,14 +203,22 @@ def _rubin(
     return np.sqrt(lam), shapes, _residual(dot(comm, F, X), lam, shapes)
 
 
-def _residual(G: np.ndarray, lam: np.ndarray, shapes: np.ndarray) -> np.ndarray:
+def _residual(
+    G: np.ndarray,
+    lam: np.ndarray,
+    shapes: np.ndarray,
+) -> np.ndarray:
     """Static flexibility less that of the elastic modes kept."""
     elastic = lam > 0
     return _hermitian(G - shapes[:, elastic] / lam[elastic] @ shapes[:, elastic].conj().T)
 
 
 def _craig_bampton(
-    flex: Flexibility, F: np.ndarray, X: np.ndarray, count: int, solver: Eigensolver
+    flex: Flexibility,
+    F: np.ndarray,
+    X: np.ndarray,
+    count: int,
+    solver: Eigensolver,
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Constraint modes and fixed-interface modes (Craig and Bampton 1968, doi:10.2514/3.4741), then
     the eigenvectors of the small matrices, which are free modes in form: nothing is left for a
@@ -228,7 +244,11 @@ def _craig_bampton(
     )
 
 
-def _fixed_inverse(flex: Flexibility, F: np.ndarray, X: np.ndarray) -> object:
+def _fixed_inverse(
+    flex: Flexibility,
+    F: np.ndarray,
+    X: np.ndarray,
+) -> object:
     """K^-1 with the ports held: the reactions f make F^H u zero, and leave no rigid load on a
     floating body.
 

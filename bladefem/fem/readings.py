@@ -8,10 +8,12 @@ from .body import Body
 from .gyroscopic import own_rows
 from .linalg import apply
 
-__all__ = ["modal_readings"]
 
-
-def modal_readings(body: Body, shapes: np.ndarray, omega: np.ndarray) -> np.ndarray:
+def modal_readings(
+    body: Body,
+    shapes: np.ndarray,
+    omega: np.ndarray,
+) -> np.ndarray:
     """(n_points*dim, m) columns K phi / omega^2 in mesh numbering, the same on every rank.
 
     They read the strain of each mode: K phi is M phi omega^2 on the part and the reactions at its

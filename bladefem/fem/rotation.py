@@ -2,16 +2,20 @@
 
 In the rotating frame a Saint Venant-Kirchhoff body has the potential
 
-    integral of  E : C : E / 2  -  rho Omega^2 |P (X + u)|^2 / 2,      E = (F^T F - 1) / 2,  F = 1 + grad u,
+    integral of  E : C : E / 2  -  rho Omega^2 |P (X + u)|^2 / 2,      E = (F^T F - 1) / 2,
+    F = 1 + grad u,
 
 P the projection across the axis. Its first derivative is the balance of the preload, its second the
 stiffness of small vibrations about it: stress stiffening and spin softening in one matrix.
 
-The linear preload, which other codes call a perturbation step, takes u0 from the linear balance K u0 = f and puts
-K_L(u0) + K_geo(u0) - Omega^2 M_P in the place of the second derivative: material stiffness on the moved body, and the
-stress of the linear strain. The two are never mixed: the potential's second derivative at a linear u0 contains stresses
-of order |grad u0|^2 that the linear balance knows nothing of, and is wrong by a factor on a twisted blade.
-"""
+The linear preload, which other codes call a perturbation step, takes u0 from the linear balance K
+u0 = f and puts
+K_L(u0) + K_geo(u0) - Omega^2 M_P in the place of the second derivative: material stiffness on the
+moved body, and the
+stress of the linear strain. The two are never mixed: the potential's second derivative at a linear
+u0 contains stresses
+of order |grad u0|^2 that the linear balance knows nothing of, and is wrong by a factor on a
+twisted blade."""
 
 from __future__ import annotations
 
@@ -27,8 +31,6 @@ from .compat import PETSc, assemble_matrix, assemble_vector, compile_form, dolfi
 from .constraint import Constrained, expand, in_step, restrict
 from .flexibility import Flexibility, compliance, flexible
 from .loads import centrifugal
-
-__all__ = ["AXIS", "Preload", "linear_tangent", "preload", "spinning", "swell", "tangent"]
 
 AXIS = (0.0, 0.0, 1.0)
 # iterations of one load step
@@ -135,7 +137,8 @@ def preload(
     Args:
         speed: [rad/s].
         clamp: face or node set held fast.
-        tolerance: wanted |unbalanced force| over |centrifugal force|; rounding may leave more in slender bodies.
+        tolerance: wanted |unbalanced force| over |centrifugal force|; rounding may leave more in
+            slender bodies.
         quadrature: "exact" or "ccx", as in :func:`bladefem.fem.body.assemble`.
 
     Raises:
@@ -170,8 +173,7 @@ def preload(
             if halvings > HALVINGS:
                 raise NotSolvedError(
                     f"the preload at {speed:.6g} rad/s was not found: beyond {np.sqrt(done):.0%} "
-                    "of "
-                    f"the speed {error}"
+                    f"of the speed {error}"
                 )
             continue
         u = trial
@@ -181,7 +183,10 @@ def preload(
 
 
 def tangent(
-    body: Body, state: Preload, axis: tuple[float, float, float] = AXIS, quadrature: str = "exact"
+    body: Body,
+    state: Preload,
+    axis: tuple[float, float, float] = AXIS,
+    quadrature: str = "exact",
 ) -> PETSc.Mat:
     """Stiffness of small vibrations about a nonlinear preload, spin softening included [N/m]."""
     forms = _forms(body, axis, quadrature)
@@ -220,7 +225,12 @@ def _check_speed(speed: float) -> None:
 
 
 def _newton(
-    con: Constrained, clamp: str | None, forms: _Forms, u: np.ndarray, speed2: float, limit: float
+    con: Constrained,
+    clamp: str | None,
+    forms: _Forms,
+    u: np.ndarray,
+    speed2: float,
+    limit: float,
 ) -> tuple[np.ndarray, int, float | str]:
     """Newton's method from ``u``: the state, the steps taken, and the error left or the reason of a
     failure.
@@ -279,7 +289,11 @@ def _across(body: Body, axis: tuple[float, float, float]) -> Any:
     return ufl.as_matrix((np.eye(3) - np.outer(unit, unit))[: body.dim, : body.dim].tolist())
 
 
-def _forms(body: Body, axis: tuple[float, float, float], quadrature: str) -> _Forms:
+def _forms(
+    body: Body,
+    axis: tuple[float, float, float],
+    quadrature: str,
+) -> _Forms:
     """First and second derivative of the potential."""
     domain = body.space.mesh
     u = dolfinx.fem.Function(body.space)
@@ -301,7 +315,12 @@ def _forms(body: Body, axis: tuple[float, float, float], quadrature: str) -> _Fo
     )
 
 
-def _force(body: Body, forms: _Forms, u: np.ndarray, speed2: float) -> np.ndarray:
+def _force(
+    body: Body,
+    forms: _Forms,
+    u: np.ndarray,
+    speed2: float,
+) -> np.ndarray:
     """(n_points*dim, 1) unbalanced force in mesh numbering [N]."""
     _set(forms, u, speed2)
     part = assemble_vector(forms.force).array
@@ -312,12 +331,20 @@ def _force(body: Body, forms: _Forms, u: np.ndarray, speed2: float) -> np.ndarra
     return out.reshape(-1, 1)
 
 
-def _tangent(forms: _Forms, u: np.ndarray, speed2: float) -> PETSc.Mat:
+def _tangent(
+    forms: _Forms,
+    u: np.ndarray,
+    speed2: float,
+) -> PETSc.Mat:
     _set(forms, u, speed2)
     return assemble_matrix(forms.stiffness)
 
 
-def _set(forms: _Forms, u: np.ndarray, speed2: float) -> None:
+def _set(
+    forms: _Forms,
+    u: np.ndarray,
+    speed2: float,
+) -> None:
     forms.u.x.array[:] = u[forms.node_of].ravel()
     forms.speed2.value = speed2
 

@@ -21,8 +21,6 @@ import numpy as np
 
 from .mumps import Factorised, petsc_call, set_operation, solve_matrix
 
-__all__ = ["Bridge", "bridge", "schur_complement", "through"]
-
 # MATOP_MAT_SOLVE: PETSc 3.1 to 3.19, later
 MATSOLVE = (109, 100)
 CALLBACK = ctypes.CFUNCTYPE(ctypes.c_int, ctypes.c_void_p, ctypes.c_void_p, ctypes.c_void_p)
@@ -62,7 +60,11 @@ def bridge(factor: Factorised, n: int) -> Bridge | None:
     answers: list[Answer] = []
     raised: list[BaseException] = []
 
-    def answer(_: int, right: int, left: int) -> int:
+    def answer(
+        _: int,
+        right: int,
+        left: int,
+    ) -> int:
         try:
             rows = ctypes.c_int()
             columns = ctypes.c_int()
@@ -87,7 +89,11 @@ def bridge(factor: Factorised, n: int) -> Bridge | None:
     return made if heard else None
 
 
-def through(made: Bridge, B: np.ndarray, answer: Answer) -> np.ndarray:
+def through(
+    made: Bridge,
+    B: np.ndarray,
+    answer: Answer,
+) -> np.ndarray:
     """Solutions (n, k) for B (n, k), zero on the rows left out, where there x_b = answer(-A_bi
     A_ii^-1 b_i) (nb, k).
     """

@@ -13,8 +13,6 @@ from itertools import product
 import numpy as np
 from scipy.special import roots_jacobi
 
-__all__ = ["FACET_OF", "SHAPES", "corners", "geometry", "nodes", "quadrature", "tabulate"]
-
 # meshio's word: (shape, degree). quad8 and hexahedron20 are read but have no dolfinx twin.
 SHAPES = {
     "line": ("line", 1),
@@ -160,7 +158,9 @@ def _jacobi(n: int, power: int) -> tuple[np.ndarray, np.ndarray]:
 
 
 def geometry(
-    cell_type: str, x: np.ndarray, degree: int
+    cell_type: str,
+    x: np.ndarray,
+    degree: int,
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Quadrature on curved elements or faces.
 

@@ -16,8 +16,6 @@ from . import shape_functions as shape
 from .body import Body
 from .elasticity import lame, stress_of
 
-__all__ = ["GaussStress", "gauss_stress", "nodal_stress", "patch_stress", "principal", "von_mises"]
-
 PAIRS = ((0, 0), (1, 1), (2, 2), (0, 1), (1, 2), (2, 0))
 # cells at a time
 BLOCK = 20000
@@ -37,7 +35,11 @@ class GaussStress:
     stress: np.ndarray
 
 
-def gauss_stress(body: Body, u: np.ndarray, large: bool = False) -> GaussStress:
+def gauss_stress(
+    body: Body,
+    u: np.ndarray,
+    large: bool = False,
+) -> GaussStress:
     """Stresses in the cells, ordered as ``cells_of(body)``.
 
     Args:
@@ -66,7 +68,11 @@ def gauss_stress(body: Body, u: np.ndarray, large: bool = False) -> GaussStress:
     return GaussStress(*(np.concatenate(column) for column in zip(*parts, strict=True)))
 
 
-def nodal_stress(body: Body, u: np.ndarray, large: bool = False) -> np.ndarray:
+def nodal_stress(
+    body: Body,
+    u: np.ndarray,
+    large: bool = False,
+) -> np.ndarray:
     """(n_points, 6) stresses at the nodes [Pa]: each cell's Gauss points continued to its nodes,
     then the mean over the cells of one material, weighted by volume; 0 outside the body.
 
@@ -89,7 +95,11 @@ def nodal_stress(body: Body, u: np.ndarray, large: bool = False) -> np.ndarray:
     return out
 
 
-def patch_stress(body: Body, u: np.ndarray, node: int) -> tuple[np.ndarray, np.ndarray]:
+def patch_stress(
+    body: Body,
+    u: np.ndarray,
+    node: int,
+) -> tuple[np.ndarray, np.ndarray]:
     """(6,) stress at a node continued from the Gauss points of the cells round it, by polynomials
     of first and of second degree fitted to them; the cells share a node with those that touch it.
     """
@@ -176,7 +186,11 @@ def _tensor(stress: np.ndarray) -> np.ndarray:
 
 
 def _of_cells(
-    body: Body, u: np.ndarray, name: str, cells: np.ndarray, large: bool
+    body: Body,
+    u: np.ndarray,
+    name: str,
+    cells: np.ndarray,
+    large: bool,
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Places, volumes and stresses at the Gauss points of some cells of one material."""
     mesh = body.mesh
@@ -252,7 +266,12 @@ def _continuation(cell_type: str) -> np.ndarray:
     return shape.tabulate(kind, target)[0] @ np.linalg.pinv(lower)
 
 
-def _averaged(cells: np.ndarray, values: np.ndarray, weight: np.ndarray, n: int) -> np.ndarray:
+def _averaged(
+    cells: np.ndarray,
+    values: np.ndarray,
+    weight: np.ndarray,
+    n: int,
+) -> np.ndarray:
     """(n, s) weighted mean of what the cells (nc, k) say about their nodes (nc, k, s)."""
     total = np.bincount(cells.ravel(), np.repeat(weight, cells.shape[1]), n)
     out = np.zeros((n, values.shape[2]), values.dtype)

@@ -15,8 +15,6 @@ from . import shape_functions as shape
 from .body import Body
 from .compat import PETSc
 
-__all__ = ["AreaSpring", "held_directions", "spring_matrix", "supported"]
-
 # of the surface element times two shape functions, on curved faces
 DEGREE = 8
 
@@ -63,8 +61,8 @@ def held_directions(body: Body, directions: Sequence[tuple[str, str]]) -> np.nda
     for name, letters in directions:
         if name not in known:
             raise InputError(
-                f"support.directions: the mesh has no face or node set '{name}'"
-                f"{suggestion(name, known)}"
+                "support.directions: the mesh has no face or node set "
+                f"'{name}'{suggestion(name, known)}"
             )
         nodes = np.unique(known[name])
         nodes = nodes[body.rows[nodes] >= 0]
@@ -100,8 +98,8 @@ def _of_face(body: Body, spring: AreaSpring) -> sp.csr_matrix:
     mesh = body.mesh
     if spring.face not in mesh.faces:
         raise InputError(
-            f"support.springs: the mesh has no face '{spring.face}'"
-            f"{suggestion(spring.face, mesh.faces)}"
+            "support.springs: the mesh has no face "
+            f"'{spring.face}'{suggestion(spring.face, mesh.faces)}"
         )
     facets = mesh.faces[spring.face]
     facets = facets[(body.rows[facets] >= 0).all(axis=1)]

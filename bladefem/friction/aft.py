@@ -23,17 +23,6 @@ from bladefem.friction.simd.kernel_2d import disc_batch
 from bladefem.friction.states import GROSS_SLIP, PARTIAL_SLIP, SEPARATED, STICK
 from bladefem.friction.trigonometric_tables import derivative_patterns, trigonometric_tables
 
-__all__ = [
-    "PERIODIC",
-    "Forces",
-    "check_motion",
-    "contact_states",
-    "convergence_reason",
-    "dissipated_energy",
-    "evaluate",
-    "finite_load",
-]
-
 PRECISIONS = {"double": np.float64, "single": np.float32}
 PERIODIC = "periodic"
 
@@ -196,7 +185,11 @@ def _evaluate_laws(
     )
 
 
-def convergence_reason(f: np.ndarray, used: np.ndarray, failure: str) -> str:
+def convergence_reason(
+    f: np.ndarray,
+    used: np.ndarray,
+    failure: str,
+) -> str:
     """PERIODIC, or the failure of the elements with used < 0, or that forces f are not finite."""
     failed = int(np.count_nonzero(used < 0))
     if failed:
@@ -251,7 +244,11 @@ def check_motion(elements: Elements, w: np.ndarray) -> tuple[np.ndarray, np.ndar
     return w, np.ascontiguousarray(nodes)
 
 
-def _prescribed_load(load: np.ndarray | None, n: int, samples: int) -> np.ndarray:
+def _prescribed_load(
+    load: np.ndarray | None,
+    n: int,
+    samples: int,
+) -> np.ndarray:
     """(n, samples) prescribed loads, or (n, 0) for none."""
     if load is None:
         return np.zeros((n, 0))

@@ -13,15 +13,6 @@ import numpy as np
 
 from bladefem.errors import InputError
 
-__all__ = [
-    "Linearised",
-    "circular_orbit_work",
-    "iwan_force",
-    "iwan_limits",
-    "jenkins",
-    "jenkins_coefficients",
-]
-
 
 @dataclass(frozen=True)
 class Linearised:
@@ -35,7 +26,11 @@ class Linearised:
     energy: np.ndarray
 
 
-def jenkins(amplitude: np.ndarray, kt: float, limit: float) -> Linearised:
+def jenkins(
+    amplitude: np.ndarray,
+    kt: float,
+    limit: float,
+) -> Linearised:
     """First-harmonic stiffness, damping and energy of a Jenkins element with |f| <= limit [N] at an
     amplitude [m].
 
@@ -56,7 +51,12 @@ def jenkins(amplitude: np.ndarray, kt: float, limit: float) -> Linearised:
     )
 
 
-def jenkins_coefficients(amplitude: float, kt: float, limit: float, H: int) -> np.ndarray:
+def jenkins_coefficients(
+    amplitude: float,
+    kt: float,
+    limit: float,
+    H: int,
+) -> np.ndarray:
     """(2H+1,) force coefficients [mean, cos 1, sin 1, ...] for w = A cos tau, integrated by hand
     [N].
 
@@ -95,7 +95,11 @@ def _integral_of_sine(p: int, theta: float) -> float:
     return 0.0 if p == 0 else (1 - np.cos(p * theta)) / p
 
 
-def circular_orbit_work(radius: float, kt: float, limit: float) -> float:
+def circular_orbit_work(
+    radius: float,
+    kt: float,
+    limit: float,
+) -> float:
     """Energy [J] of one circular orbit of a 2-D element, W = 2 pi F sqrt(A^2 - (F/k)^2), 0 in full
     stick.
     """
@@ -103,7 +107,11 @@ def circular_orbit_work(radius: float, kt: float, limit: float) -> float:
     return 2 * np.pi * limit * np.sqrt(inside) if inside > 0 else 0.0
 
 
-def iwan_limits(kt: float, limit: float, n: int) -> tuple[np.ndarray, np.ndarray]:
+def iwan_limits(
+    kt: float,
+    limit: float,
+    n: int,
+) -> tuple[np.ndarray, np.ndarray]:
     """Stiffness (n,) [N/m] and limits (n,) [N] of parallel elements that make Mindlin's partial
     slip of a sphere.
 
@@ -127,7 +135,11 @@ def iwan_limits(kt: float, limit: float, n: int) -> tuple[np.ndarray, np.ndarray
     return k, moment
 
 
-def iwan_force(w: np.ndarray, kt: float, limit: float) -> np.ndarray:
+def iwan_force(
+    w: np.ndarray,
+    kt: float,
+    limit: float,
+) -> np.ndarray:
     """Force [N] of first loading to w [m] by Cattaneo and Mindlin; reversals follow Masing, Q = 2
     Q(w/2).
     """

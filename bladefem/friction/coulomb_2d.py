@@ -18,8 +18,6 @@ from numba import njit
 
 from bladefem.friction.states import CLOSING, SEPARATED, SLIP, STICK
 
-__all__ = ["force_at_middle", "march_edge"]
-
 
 @njit(cache=True, error_model="numpy", inline="always")
 def angle_decay(x):

@@ -18,8 +18,6 @@ from numba import njit
 from bladefem.friction.coulomb_2d import force_at_middle, march_edge
 from bladefem.friction.states import CLOSING, SLIP, STICK
 
-__all__ = ["plain_batch"]
-
 # of the largest friction limit: how well the force must repeat itself
 TOLERANCE = 1e-12
 # of det(I - Phi): below it the state keeps a memory of its start

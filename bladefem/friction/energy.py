@@ -8,10 +8,12 @@ from bladefem.data import Elements
 from bladefem.friction.fourier import harmonics_of, synthesis
 from bladefem.friction.law_table import groups_by_law
 
-__all__ = ["free_static_force"]
 
-
-def free_static_force(elements: Elements, w: np.ndarray, samples: int = 512) -> np.ndarray:
+def free_static_force(
+    elements: Elements,
+    w: np.ndarray,
+    samples: int = 512,
+) -> np.ndarray:
     """(n,) size up to which any static friction force is in equilibrium with the vibration w [N]; 0
     where it slips, and nan for laws other than Coulomb's.
 

@@ -16,8 +16,6 @@ import numpy as np
 
 from bladefem.friction.fourier import derivative, harmonics_of
 
-__all__ = ["Approximation", "by_harmonic", "force_of", "from_harmonics", "from_series", "work_of"]
-
 # of an element's largest harmonic: what is smaller is rounding
 ROUNDING_SHARE = 1e-12
 
@@ -34,7 +32,11 @@ class Approximation:
     constant: np.ndarray
 
 
-def from_series(u: np.ndarray, f: np.ndarray, omega: float) -> Approximation:
+def from_series(
+    u: np.ndarray,
+    f: np.ndarray,
+    omega: float,
+) -> Approximation:
     """Least squares over one period sampled at equal steps, u and f (..., samples) (Eq. 11); omega
     in rad/s.
 
@@ -53,7 +55,11 @@ def from_series(u: np.ndarray, f: np.ndarray, omega: float) -> Approximation:
     return Approximation(K, C, f.mean(-1) - K * mean)
 
 
-def from_harmonics(u: np.ndarray, f: np.ndarray, omega: float) -> Approximation:
+def from_harmonics(
+    u: np.ndarray,
+    f: np.ndarray,
+    omega: float,
+) -> Approximation:
     """The same from coefficients u, f (..., 2H+1) [mean, cos 1, sin 1, ...] (Eq. 16, factor k in
     both sums).
     """
@@ -70,7 +76,11 @@ def from_harmonics(u: np.ndarray, f: np.ndarray, omega: float) -> Approximation:
     return Approximation(K, C, f[..., 0] - K * u[..., 0])
 
 
-def by_harmonic(u: np.ndarray, f: np.ndarray, omega: float) -> Approximation:
+def by_harmonic(
+    u: np.ndarray,
+    f: np.ndarray,
+    omega: float,
+) -> Approximation:
     """K_ad and C_ad of each harmonic alone, (..., H); nan where the motion lacks it; F_c0 is the
     mean force.
 
@@ -91,7 +101,11 @@ def by_harmonic(u: np.ndarray, f: np.ndarray, omega: float) -> Approximation:
     )
 
 
-def force_of(approximation: Approximation, u: np.ndarray, omega: float) -> np.ndarray:
+def force_of(
+    approximation: Approximation,
+    u: np.ndarray,
+    omega: float,
+) -> np.ndarray:
     """(..., samples) the linear force [N] on a motion u (..., samples) [m] of one period at equal
     steps.
     """
@@ -102,7 +116,11 @@ def force_of(approximation: Approximation, u: np.ndarray, omega: float) -> np.nd
     return K * u + C * _time_derivative(u, omega) + constant
 
 
-def work_of(approximation: Approximation, u: np.ndarray, omega: float) -> np.ndarray:
+def work_of(
+    approximation: Approximation,
+    u: np.ndarray,
+    omega: float,
+) -> np.ndarray:
     """(...,) work of the averaged approximation on u (..., 2H+1) in one period [J] (Eq. 13); 0 at
     rest.
     """

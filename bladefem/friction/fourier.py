@@ -11,16 +11,6 @@ import numpy as np
 
 from bladefem.errors import InputError
 
-__all__ = [
-    "analysis",
-    "derivative",
-    "harmonics_of",
-    "sample_instants",
-    "synthesis",
-    "to_complex",
-    "to_real",
-]
-
 
 def harmonics_of(coefficients: np.ndarray) -> int:
     """The highest harmonic H of real coefficients (..., 2H+1)."""
@@ -59,7 +49,11 @@ def sample_instants(samples: int) -> np.ndarray:
     return 2 * np.pi / samples * np.arange(samples)
 
 
-def synthesis(H: int, samples: int, shift: float = 0.0) -> np.ndarray:
+def synthesis(
+    H: int,
+    samples: int,
+    shift: float = 0.0,
+) -> np.ndarray:
     """(samples, 2H+1) matrix from coefficients to values at tau = 2 pi (i + shift) / samples."""
     phase = np.outer(sample_instants(samples) + 2 * np.pi * shift / samples, np.arange(1, H + 1))
     T = np.ones((samples, 2 * H + 1))

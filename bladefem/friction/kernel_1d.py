@@ -23,13 +23,6 @@ from bladefem.friction.trigonometric_tables import (
     motion_values,
 )
 
-__all__ = [
-    "assemble_linear_parts",
-    "jenkins_batch",
-    "march_states",
-    "slider_bounds",
-]
-
 
 @njit(_nrt=False, cache=True, error_model="numpy")
 def slider_bounds(g, N, mu, low, high):

@@ -33,8 +33,6 @@ from bladefem.friction.roots import NO_ROOT, first_rise, motion_value
 from bladefem.friction.states import SEPARATED, SLIP_DOWN, SLIP_UP, STICK
 from bladefem.friction.trigonometric_tables import Node, empty_gram, indicator_coefficients
 
-__all__ = ["evaluate_exact", "transitions"]
-
 # polynomials whose rise ends a state
 UP = 0
 DOWN = 1
@@ -97,8 +95,8 @@ def evaluate_exact(
     reason = convergence_reason(
         F,
         counts,
-        f"have more than {MOST_EVENTS} transitions a period, or {MOST_EVENTS_IN_BRACKET} nearly "
-        "at once",
+        f"have more than {MOST_EVENTS} transitions a period, or {MOST_EVENTS_IN_BRACKET} nearly at "
+        "once",
     )
     return Forces(
         F,
@@ -113,7 +111,9 @@ def evaluate_exact(
 
 
 def transitions(
-    elements: Elements, w: np.ndarray, brackets: int | None = None
+    elements: Elements,
+    w: np.ndarray,
+    brackets: int | None = None,
 ) -> list[tuple[float, float, int]]:
     """Stretches (start, end, state) of the steady period of a single 1-D element, w (1, 2, 2H+1);
     for pictures.

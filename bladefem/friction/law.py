@@ -17,13 +17,6 @@ from numba import njit
 
 from bladefem.data import Elements
 
-__all__ = [
-    "FrictionLaw",
-    "NodeLaw",
-    "Slopes",
-    "slopes_of",
-]
-
 # Step of the differences over the size of the variable: rounding leaves 1e-10 of the derivative,
 # and an increment that is shorter than the step, where laws have a kink, 1e-6.
 DIFFERENCE = 1e-6
@@ -71,7 +64,11 @@ class FrictionLaw:
         raise NotImplementedError(f"{type(self).__name__}: expected a method step")
 
     def force(
-        self, state: np.ndarray, motion: np.ndarray, load: np.ndarray, elements: Elements
+        self,
+        state: np.ndarray,
+        motion: np.ndarray,
+        load: np.ndarray,
+        elements: Elements,
     ) -> np.ndarray:
         """(n, t) tangential force [N] in a state at the displacement (n, t) [m] and load (n,)
         [N].
@@ -90,7 +87,11 @@ class FrictionLaw:
         return None
 
     def slipping(
-        self, old: np.ndarray, state: np.ndarray, increment: np.ndarray, elements: Elements
+        self,
+        old: np.ndarray,
+        state: np.ndarray,
+        increment: np.ndarray,
+        elements: Elements,
     ) -> np.ndarray:
         """(n,) True where the step from the old state slipped; a law without a stick state always
         does.
@@ -182,7 +183,11 @@ def slopes_of(
     push = DIFFERENCE * np.maximum(abs(state).max(axis=1), elements.kt * sizes)
     args = (state, increment, before, load)
 
-    def change(which: int, column: int | None, step: np.ndarray) -> np.ndarray:
+    def change(
+        which: int,
+        column: int | None,
+        step: np.ndarray,
+    ) -> np.ndarray:
         """(n, s) derivative with one column of an argument."""
         ends = []
         for sign in (1.0, -1.0):

@@ -15,17 +15,6 @@ from bladefem.data import Elements
 from bladefem.errors import InputError, suggestion
 from bladefem.friction.law import FrictionLaw
 
-__all__ = [
-    "LAWS",
-    "BoucWen",
-    "Dahl",
-    "groups_by_law",
-    "laws_of_nodes",
-    "merged_laws",
-    "require_coulomb",
-    "select_elements",
-]
-
 
 class Dahl(FrictionLaw):
     """df/dw = kt (1 - f sign(dw) / (mu N)), exact along a straight increment (Dahl 1976,
@@ -82,7 +71,11 @@ class BoucWen(FrictionLaw):
         return state + increment / 6 * (first + 2 * second + 2 * third + last)
 
     def force(
-        self, state: np.ndarray, motion: np.ndarray, load: np.ndarray, elements: Elements
+        self,
+        state: np.ndarray,
+        motion: np.ndarray,
+        load: np.ndarray,
+        elements: Elements,
     ) -> np.ndarray:
         """(n, t) [N]."""
         spring = elements.kt[:, None] * motion

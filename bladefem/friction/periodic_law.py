@@ -23,8 +23,6 @@ from bladefem.friction.fourier import analysis, harmonics_of, synthesis
 from bladefem.friction.law import DIFFERENCE, FrictionLaw, Slopes, slopes_of
 from bladefem.friction.law_table import select_elements
 
-__all__ = ["LawForces", "periodic_forces"]
-
 # of the largest state of a node: how well it must repeat itself
 TOLERANCE = 1e-12
 # periods marched before Newton: states that varying loads allow are chosen by marching
@@ -190,7 +188,9 @@ def _step_slopes(steps: _Steps, before: np.ndarray) -> Slopes:
 
 
 def _periodic_state(
-    period: _Steps, first: _Steps, limit: int
+    period: _Steps,
+    first: _Steps,
+    limit: int,
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """State (n, s) at the start of the periodic period, states (S, n, s) at its samples, and
     periods marched (n,), negative where it is not periodic.
@@ -243,7 +243,11 @@ def _inverse_of_change(phi: np.ndarray) -> np.ndarray:
     return np.swapaxes(vh, 1, 2) @ (inverse[:, :, None] * np.swapaxes(u, 1, 2))
 
 
-def _state_shares(period: _Steps, before: np.ndarray, states: np.ndarray) -> np.ndarray:
+def _state_shares(
+    period: _Steps,
+    before: np.ndarray,
+    states: np.ndarray,
+) -> np.ndarray:
     """(n, 3) share of the samples in stick, slip and separation."""
     S, n, s = states.shape
     slips = period.law.slipping(
@@ -329,7 +333,9 @@ def _by_coefficients(
 
 
 def _force_slopes(
-    period: _Steps, states: np.ndarray, u: np.ndarray
+    period: _Steps,
+    states: np.ndarray,
+    u: np.ndarray,
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Derivatives of the force by state (S, n, t, s), motion (S, n, t, t) and load (S, n, t)."""
     S, n, s = states.shape
@@ -345,7 +351,11 @@ def _force_slopes(
     push = np.maximum(abs(args[0]).max(axis=1), period.repeated.kt * sizes)
     push = np.where(push > 0, push, 1.0)
 
-    def change(which: int, column: int | None, size: np.ndarray) -> np.ndarray:
+    def change(
+        which: int,
+        column: int | None,
+        size: np.ndarray,
+    ) -> np.ndarray:
         """(S, n, t) derivative with one column of the state, the motion or the load."""
         ends = []
         for sign in (DIFFERENCE, -DIFFERENCE):

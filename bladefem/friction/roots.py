@@ -10,8 +10,6 @@ from math import cos, sin
 
 from numba import njit
 
-__all__ = ["first_rise", "motion_value"]
-
 # time of an event that does not happen
 NO_ROOT = 1e300
 

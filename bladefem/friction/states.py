@@ -7,20 +7,6 @@ integrator in time numbers with the sign of slip, because its equations multiply
 
 from __future__ import annotations
 
-__all__ = [
-    "CLOSING",
-    "GROSS_SLIP",
-    "NODE_STATES",
-    "PARTIAL_SLIP",
-    "SEPARATED",
-    "SIGNED_SEPARATED",
-    "SIGNED_STICK",
-    "SLIP",
-    "SLIP_DOWN",
-    "SLIP_UP",
-    "STICK",
-]
-
 # at an instant, and in a period all the time
 SEPARATED = 0
 STICK = 1

@@ -14,8 +14,6 @@ from numba import njit
 
 from bladefem.errors import InputError
 
-__all__ = ["second_period", "stable_step", "step_1d", "step_2d"]
-
 
 @njit(cache=True)
 def step_1d(trial, N0, N1, mu):

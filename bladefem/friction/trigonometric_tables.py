@@ -19,18 +19,6 @@ from bladefem.friction.fourier import analysis, synthesis
 from bladefem.friction.simd.codegen import BLOCK, LANES
 from bladefem.friction.simd.row_kernels import TILE, fill_gram
 
-__all__ = [
-    "Node",
-    "Patterns",
-    "Tables",
-    "derivative_patterns",
-    "empty_gram",
-    "gram_matrix",
-    "indicator_coefficients",
-    "motion_values",
-    "trigonometric_tables",
-]
-
 
 class Node(NamedTuple):
     """One element, as the kernels see it."""
@@ -108,10 +96,17 @@ def trigonometric_tables(H: int, samples: int) -> Tables:
 
 
 @lru_cache(maxsize=8)
-def derivative_patterns(H: int, samples: int, dtype: type) -> Patterns:
+def derivative_patterns(
+    H: int,
+    samples: int,
+    dtype: type,
+) -> Patterns:
     """Patterns for H harmonics and S samples."""
     tab = trigonometric_tables(H, samples)
-    pad = lambda x, rows=0: np.pad(x, ((0, rows), (0, tab.W - 2 * H - 1)))  # noqa: E731
+
+    def pad(x, rows=0):
+        return np.pad(x, ((0, rows), (0, tab.W - 2 * H - 1)))
+
     change = np.roll(tab.knots, -1, axis=0) - tab.knots
     weights = np.pad(tab.analysis[: samples // 2 + 1], ((0, 0), (0, _tiled_size(H) - 2 * H - 1)))
     at, change, weights = (

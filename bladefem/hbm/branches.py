@@ -25,8 +25,6 @@ from .solve import solve
 from .solver.fallback import match_harmonics
 from .solver.newton import DEFAULTS, Options
 
-__all__ = ["TOLERANCE", "Branches", "Resonance", "find_branches"]
-
 # first and longest arc-length step, as shares of the band
 STEPS = (0.005, 0.05)
 # steps with which a local maximum is closed in
@@ -234,7 +232,11 @@ def _closed(points: Sequence[PathPoint], band: tuple[float, float]) -> bool:
     return _near(two.solution, three.solution, one.solution)
 
 
-def _near(left: Solution, right: Solution, point: Solution) -> bool:
+def _near(
+    left: Solution,
+    right: Solution,
+    point: Solution,
+) -> bool:
     """Whether a point lies on the chord between two others, in displacements."""
     H = max(left.harmonics, point.harmonics)
     a, b, c = (match_harmonics(p.w, H) for p in (left, right, point))
@@ -257,7 +259,11 @@ def _on_paths(paths: Sequence[_Path], point: Solution) -> bool:
 
 
 def _close_in(
-    model: ReducedModel, path: _Path, band: tuple[float, float], peak: float, options: Options
+    model: ReducedModel,
+    path: _Path,
+    band: tuple[float, float],
+    peak: float,
+    options: Options,
 ) -> None:
     """Further points round each local maximum, put into the path where they belong."""
     probe = options.probe
@@ -313,7 +319,11 @@ def _finer(
     return [*found, last]
 
 
-def _sorted_out(paths: Sequence[_Path], probe: int, notes: list[str]) -> Branches:
+def _sorted_out(
+    paths: Sequence[_Path],
+    probe: int,
+    notes: list[str],
+) -> Branches:
     """Pieces between folds, and the local maxima with what is known of them."""
     pieces: list[list[Solution]] = []
     maxima: list[tuple[Solution, int]] = []
@@ -359,7 +369,9 @@ def _pieces(points: Sequence[PathPoint]) -> list[list[Solution]]:
 
 
 def _swept(
-    pieces: Sequence[Sequence[Solution]], first: int | None, way: str
+    pieces: Sequence[Sequence[Solution]],
+    first: int | None,
+    way: str,
 ) -> list[tuple[int, float]]:
     """Pieces that a slow sweep visits, with the frequency at which it comes onto each.
 
@@ -395,7 +407,11 @@ def _distance(one: Solution, other: Solution) -> float:
     return float(np.linalg.norm(match_harmonics(one.w, H) - match_harmonics(other.w, H)))
 
 
-def _reached(swept: Mapping[str, Sequence[tuple[int, float]]], point: Solution, number: int) -> str:
+def _reached(
+    swept: Mapping[str, Sequence[tuple[int, float]]],
+    point: Solution,
+    number: int,
+) -> str:
     """By which sweeps a motion of a piece is reached."""
     ways = [
         way

@@ -13,8 +13,6 @@ from .solution import Solution
 from .solver.newton import DEFAULTS, Options
 from .sweep import response
 
-__all__ = ["response_with_checkpoints"]
-
 
 def response_with_checkpoints(
     folder: str | Path,

@@ -20,8 +20,6 @@ from .solver.fallback import Attempt, solve_balance
 from .solver.newton import DEFAULTS, Newton, Options
 from .solver.residual import Balance, State, evaluate_balance
 
-__all__ = ["PathPoint", "follow"]
-
 # points of a path
 MOST_PATH_POINTS = 5000
 # shares of the range beyond a point where the path stops, at which it is begun again
@@ -104,7 +102,11 @@ def follow(
     )
 
 
-def _begun_again(task: Task, spot: Spot, bounds: tuple[float, float]) -> Spot | None:
+def _begun_again(
+    task: Task,
+    spot: Spot,
+    bounds: tuple[float, float],
+) -> Spot | None:
     """A solution a little ahead in the parameter, by all fallbacks at the farthest; None where
     there is none.
     """
@@ -126,7 +128,11 @@ def _begun_again(task: Task, spot: Spot, bounds: tuple[float, float]) -> Spot | 
 
 
 def _prepare_path(
-    model: ReducedModel, name: str, start: Solution, bounds: tuple[float, float], options: Options
+    model: ReducedModel,
+    name: str,
+    start: Solution,
+    bounds: tuple[float, float],
+    options: Options,
 ) -> tuple[Task, float, State]:
     check_parameter(name, also=("omega",))
     value = {"omega": start.omega, "gap": 0.0}.get(name, 1.0)
@@ -156,7 +162,12 @@ def _prepare_path(
     return task, x, evaluate_balance(balance(x), near.w)
 
 
-def _path_point(task: Task, spot: Spot, fold: bool = False, branch: bool = False) -> PathPoint:
+def _path_point(
+    task: Task,
+    spot: Spot,
+    fold: bool = False,
+    branch: bool = False,
+) -> PathPoint:
     end = Newton(spot.state, spot.iterations, True, "residual within tolerance")
     solution = as_solution(
         spot.balance, Attempt("path following", end), spot.iterations, end.reason

@@ -14,8 +14,6 @@ from .model import ReducedModel
 from .policy import uses_coulomb_kernels
 from .solution import Solution
 
-__all__ = ["INSTANTS_PER_HARMONIC", "leading_stuck_points", "sticks_safely"]
-
 # a period of the highest harmonic at which full stick is confirmed
 INSTANTS_PER_HARMONIC = 64
 # share of the friction limit kept in hand: between instants a harmonic rises by 1.2e-3

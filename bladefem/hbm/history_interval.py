@@ -24,8 +24,6 @@ from .peak import Peak, find_peak
 from .solver.newton import DEFAULTS, Options
 from .traction_gradient import Tractions, farthest, tractions
 
-__all__ = ["MONOTONE", "POINT", "SAMPLED", "HistoryInterval", "history_interval"]
-
 POINT = "point"
 MONOTONE = "monotone"
 SAMPLED = "sampled"
@@ -82,7 +80,11 @@ class _Search:
     points: int
     reasons: list[str]
 
-    def solve(self, start: np.ndarray, near: Peak) -> _Place | None:
+    def solve(
+        self,
+        start: np.ndarray,
+        near: Peak,
+    ) -> _Place | None:
         """The resonance with another start, climbed from a known one; None where it is not
         found.
         """
@@ -155,7 +157,11 @@ def _extreme_loads(model: ReducedModel, peak: Peak) -> Sequence[np.ndarray]:
     return [sign * limit[:, None] * along for sign in (-1.0, 1.0)]
 
 
-def _climb(search: _Search, sign: float, most: float) -> bool:
+def _climb(
+    search: _Search,
+    sign: float,
+    most: float,
+) -> bool:
     """Push from the best place towards lower (-1) or higher (1) resonances, until that gains less
     than the tolerance; whether no admissible change promises more.
     """
@@ -186,7 +192,11 @@ def _climb(search: _Search, sign: float, most: float) -> bool:
     return False
 
 
-def _push(model: ReducedModel, place: _Place, sign: float) -> np.ndarray:
+def _push(
+    model: ReducedModel,
+    place: _Place,
+    sign: float,
+) -> np.ndarray:
     """(n, tangents) the friction limit of each node along its derivative [N]."""
     elements = model.elements
     gradient = place.free.gradient
@@ -196,18 +206,31 @@ def _push(model: ReducedModel, place: _Place, sign: float) -> np.ndarray:
     return sign * limit[:, None] * gradient / np.maximum(length, least)
 
 
-def _gain(better: _Place, place: _Place, sign: float) -> float:
+def _gain(
+    better: _Place,
+    place: _Place,
+    sign: float,
+) -> float:
     """Of the height, relative."""
     return sign * (better.peak.height / place.peak.height - 1)
 
 
-def _gaining(search: _Search, place: _Place, change: np.ndarray, sign: float) -> _Place | None:
+def _gaining(
+    search: _Search,
+    place: _Place,
+    change: np.ndarray,
+    sign: float,
+) -> _Place | None:
     """The place after a change of the start, if it gains."""
     reached = search.solve(place.free.start + change, place.peak)
     return reached if reached is not None and _gain(reached, place, sign) > 0 else None
 
 
-def _interval(search: _Search, here: _Place, ended: bool) -> HistoryInterval:
+def _interval(
+    search: _Search,
+    here: _Place,
+    ended: bool,
+) -> HistoryInterval:
     lowest = min(search.places, key=lambda one: one.peak.height)
     highest = max(search.places, key=lambda one: one.peak.height)
     spread = highest.peak.height - lowest.peak.height
@@ -229,7 +252,11 @@ def _interval(search: _Search, here: _Place, ended: bool) -> HistoryInterval:
     )
 
 
-def _monotone(search: _Search, lowest: _Place, highest: _Place) -> bool:
+def _monotone(
+    search: _Search,
+    lowest: _Place,
+    highest: _Place,
+) -> bool:
     """No node whose derivative points back, at any state solved, on its way from the lowest to the
     highest state.
     """

@@ -8,8 +8,6 @@ from scipy import linalg
 from ..data import RigidBody
 from .model import ReducedModel
 
-__all__ = ["free_resonances", "stuck_partners", "stuck_resonances"]
-
 
 def free_resonances(model: ReducedModel, h: int = 1) -> np.ndarray:
     """(m,) circular frequencies omega at which harmonic h meets a mode of the blades without

@@ -16,8 +16,6 @@ from scipy import linalg
 from ..friction.time_step import step_2d
 from .sector_modes import SectorModes
 
-__all__ = ["contact_steps", "linear_steps", "period_map"]
-
 # periods marched until 2-D forces repeat
 CYCLES = 60
 # relative change of forces from one period to the next that counts as periodic

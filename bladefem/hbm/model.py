@@ -17,8 +17,6 @@ from ..friction.fourier import synthesis, to_real
 from .linear.bodies import Damping, Stack, stack_bodies
 from .validate_model import check_model, port_size
 
-__all__ = ["Damping", "ReducedModel", "in_series"]
-
 
 @dataclass(frozen=True)
 class ReducedModel:
@@ -206,11 +204,21 @@ class ReducedModel:
                 force[h] = amplitudes
         return force
 
-    def _stack(self, name: str, H: int, damping: Damping) -> Stack:
+    def _stack(
+        self,
+        name: str,
+        H: int,
+        damping: Damping,
+    ) -> Stack:
         bodies = _first(getattr(self, name), H, name)
         return self.once(("stack", name, len(bodies)), lambda: self._made(name, bodies, damping))
 
-    def _made(self, name: str, bodies: tuple[PortModel, ...], damping: Damping) -> Stack:
+    def _made(
+        self,
+        name: str,
+        bodies: tuple[PortModel, ...],
+        damping: Damping,
+    ) -> Stack:
         """The stack, which is the beginning of a larger one where that is there already."""
         larger = (
             stack
@@ -222,7 +230,11 @@ class ReducedModel:
             stack_bodies(bodies, damping, self.rows) if found is None else found.first(len(bodies))
         )
 
-    def once(self, key: Hashable, make: Callable[[], Any]) -> Any:
+    def once(
+        self,
+        key: Hashable,
+        make: Callable[[], Any],
+    ) -> Any:
         """What `make` returns, kept with this model: what does not depend on the frequency is made
         once.
         """
@@ -243,7 +255,11 @@ def in_series(side: PortModel, compliance: np.ndarray) -> PortModel:
     return replace(side, residual=residual)
 
 
-def _first(models: tuple[PortModel, ...], H: int, name: str) -> tuple[PortModel, ...]:
+def _first(
+    models: tuple[PortModel, ...],
+    H: int,
+    name: str,
+) -> tuple[PortModel, ...]:
     if len(models) == 1:
         return models
     if H >= len(models):

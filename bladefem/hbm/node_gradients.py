@@ -23,11 +23,12 @@ from .solver.residual import (
     evaluate_balance,
 )
 
-__all__ = ["node_gradients", "size_by_force", "transposed_flexibility"]
-
 
 def node_gradients(
-    model: ReducedModel, solution: Solution, names: Iterable[str], probe: int = 0
+    model: ReducedModel,
+    solution: Solution,
+    names: Iterable[str],
+    probe: int = 0,
 ) -> dict[str, np.ndarray]:
     """(n,) derivatives of the response's size at a probe by the contact parameters of each node:
     maps for a designer.
@@ -77,7 +78,11 @@ def _by_hold(balance: Balance, back: np.ndarray) -> np.ndarray:
     return (B @ (by_imbalance(balance.linear).T @ back[:, :, 0].ravel())).reshape(back.shape[:2])
 
 
-def size_by_force(model: ReducedModel, solution: Solution, probe: int) -> np.ndarray:
+def size_by_force(
+    model: ReducedModel,
+    solution: Solution,
+    probe: int,
+) -> np.ndarray:
     """(n, d, K) derivative of the size by the coefficients of the contact forces [m/N]."""
     blades = model.blades(solution.harmonics)
     flexible = modal_flexibility(blades, solution.omega * np.arange(solution.harmonics + 1))

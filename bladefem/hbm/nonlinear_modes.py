@@ -27,8 +27,6 @@ from .model import ReducedModel
 from .solver.residual import contact_forces
 from .validate_model import check_point
 
-__all__ = ["NonlinearMode", "force_at_resonance", "mode_response", "nonlinear_mode"]
-
 # Newton steps of one amplitude
 STEPS = 40
 # amplitudes put in between where Newton fails
@@ -111,13 +109,15 @@ def force_at_resonance(model: ReducedModel, point: NonlinearMode) -> float:
 
 
 def mode_response(
-    model: ReducedModel, points: Sequence[NonlinearMode], omegas: np.ndarray
+    model: ReducedModel,
+    points: Sequence[NonlinearMode],
+    omegas: np.ndarray,
 ) -> np.ndarray:
-    """(k, points) drive over the modal force at circular frequencies: 1 where that amplitude answers
-    the model's excitation.
+    """(k, points) drive over the modal force at circular frequencies: 1 where that amplitude
+    answers the model's excitation.
 
-    The single nonlinear mode's equation |omega_n^2 - Omega^2 + 2i zeta omega_n Omega| a = |phi^H F|;
-    the forced response is the contour 1.
+    The single nonlinear mode's equation |omega_n^2 - Omega^2 + 2i zeta omega_n Omega| a = |phi^H
+    F|; the forced response is the contour 1.
     """
     blades = model.blades(1)
     force = blades.shapes[-1, blades.load].conj().T @ model.loads(1)[1]
@@ -145,7 +145,11 @@ class _Frame:
     stuck0: np.ndarray
 
 
-def _approached(frame: _Frame, amplitude: float, last: NonlinearMode | None) -> NonlinearMode:
+def _approached(
+    frame: _Frame,
+    amplitude: float,
+    last: NonlinearMode | None,
+) -> NonlinearMode:
     """The motion from the last one, from full stick, or by amplitudes in between."""
     found = _solve(frame, amplitude, last)
     if not found.converged and last is not None:
@@ -160,7 +164,11 @@ def _approached(frame: _Frame, amplitude: float, last: NonlinearMode | None) -> 
     return found
 
 
-def _solve(frame: _Frame, amplitude: float, last: NonlinearMode | None) -> NonlinearMode:
+def _solve(
+    frame: _Frame,
+    amplitude: float,
+    last: NonlinearMode | None,
+) -> NonlinearMode:
     """Newton from the last motion, scaled, or from full stick."""
     x = _start(frame, amplitude, last)
     state = _residual(frame, x, amplitude)
@@ -210,7 +218,12 @@ class _State:
     r: np.ndarray
 
 
-def _frame(model: ReducedModel, mode: int, H: int, samples: int) -> _Frame:
+def _frame(
+    model: ReducedModel,
+    mode: int,
+    H: int,
+    samples: int,
+) -> _Frame:
     bodies = bodies_of(model, H)
     if any(body.coupled is not None for body in bodies):
         raise InputError("damping that couples modes: expected modal damping for nonlinear modes")
@@ -230,7 +243,12 @@ def _of(stack: Stack, h: int) -> int:
     return min(h, len(stack.omega) - 1)
 
 
-def _flexibility(frame: _Frame, h: int, omega: float, zeta: float) -> np.ndarray:
+def _flexibility(
+    frame: _Frame,
+    h: int,
+    omega: float,
+    zeta: float,
+) -> np.ndarray:
     """(m, m) flexibility of both bodies in harmonic h, in harmonic 1 without the mode itself."""
     G = 0.0
     w = h * omega
@@ -251,7 +269,11 @@ def _of_residual(stack: Stack, h: int) -> int:
     return min(h, len(stack.residual) - 1)
 
 
-def _residual(frame: _Frame, x: np.ndarray, amplitude: float) -> _State:
+def _residual(
+    frame: _Frame,
+    x: np.ndarray,
+    amplitude: float,
+) -> _State:
     """Residual of  w - phi a + G' f  for the displacements x."""
     model = frame.model
     shape = (*model.springs.shape, 2 * frame.H + 1)
@@ -272,7 +294,11 @@ def _residual(frame: _Frame, x: np.ndarray, amplitude: float) -> _State:
     return _State(w, f, forces.dfdw, omega, zeta, to_real(r).ravel())
 
 
-def _frequency(frame: _Frame, f: np.ndarray, amplitude: float) -> tuple[float, float]:
+def _frequency(
+    frame: _Frame,
+    f: np.ndarray,
+    amplitude: float,
+) -> tuple[float, float]:
     """Frequency [rad/s] and damping [1] that close the mode's own equation."""
     own = frame.bodies[0].omega[_of(frame.bodies[0], 1)][frame.mode] ** 2
     drive = frame.shape.conj() @ f / amplitude
@@ -280,7 +306,11 @@ def _frequency(frame: _Frame, f: np.ndarray, amplitude: float) -> tuple[float, f
     return float(np.sqrt(squared)), float(drive.imag / (2 * squared))
 
 
-def _jacobian(frame: _Frame, state: _State, amplitude: float) -> np.ndarray:
+def _jacobian(
+    frame: _Frame,
+    state: _State,
+    amplitude: float,
+) -> np.ndarray:
     """(N, N) derivative of the residual: of the forces exactly, of frequency and damping through
     differences of the flexibility.
     """
@@ -306,9 +336,13 @@ def _jacobian(frame: _Frame, state: _State, amplitude: float) -> np.ndarray:
     return J + _through_frequency(frame, state, amplitude)
 
 
-def _through_frequency(frame: _Frame, state: _State, amplitude: float) -> np.ndarray:
+def _through_frequency(
+    frame: _Frame,
+    state: _State,
+    amplitude: float,
+) -> np.ndarray:
     """The part by omega and zeta: two columns of differences times the rows of phi^H df / a."""
-    n, d, K = state.w.shape
+    n, d, _K = state.w.shape
     first = state.dfdw[:, :, 1] - 1j * state.dfdw[:, :, 2]
     shape = frame.shape.conj().reshape(n, d, 1, 1)
     drive = (shape * first).sum(axis=1).ravel() / amplitude
@@ -325,7 +359,12 @@ def _through_frequency(frame: _Frame, state: _State, amplitude: float) -> np.nda
     return np.outer(columns[0], by_omega) + np.outer(columns[1], by_zeta)
 
 
-def _flexed(frame: _Frame, f: np.ndarray, omega: float, zeta: float) -> np.ndarray:
+def _flexed(
+    frame: _Frame,
+    f: np.ndarray,
+    omega: float,
+    zeta: float,
+) -> np.ndarray:
     """(m, H+1) moving displacements by forces, without the mode itself."""
     out = np.zeros_like(f)
     for h in range(1, frame.H + 1):
@@ -334,7 +373,11 @@ def _flexed(frame: _Frame, f: np.ndarray, omega: float, zeta: float) -> np.ndarr
 
 
 def _search(
-    frame: _Frame, x: np.ndarray, step: np.ndarray, state: _State, amplitude: float
+    frame: _Frame,
+    x: np.ndarray,
+    step: np.ndarray,
+    state: _State,
+    amplitude: float,
 ) -> tuple[np.ndarray, _State] | None:
     """The first halving of the step that lowers the residual."""
     share = 1.0
@@ -347,7 +390,11 @@ def _search(
     return None
 
 
-def _start(frame: _Frame, amplitude: float, last: NonlinearMode | None) -> np.ndarray:
+def _start(
+    frame: _Frame,
+    amplitude: float,
+    last: NonlinearMode | None,
+) -> np.ndarray:
     """The motion at the last amplitude, scaled; the free mode's without one."""
     n, d = frame.model.springs.shape
     if last is not None and last.converged:
@@ -367,7 +414,11 @@ def _stuck_mode(frame: _Frame) -> np.ndarray:
     return np.linalg.solve(np.eye(len(G)) + G * springs, frame.shape)
 
 
-def _probe(frame: _Frame, state: _State, amplitude: float) -> np.ndarray:
+def _probe(
+    frame: _Frame,
+    state: _State,
+    amplitude: float,
+) -> np.ndarray:
     """(H+1, probes) moving amplitudes of the blade."""
     blades = frame.bodies[0]
     out = np.zeros((frame.H + 1, blades.probe.stop - blades.probe.start), dtype=complex)

@@ -22,8 +22,6 @@ from .peak import Peak, cubic_minimum, find_peak, with_slope
 from .solver.newton import DEFAULTS, Options
 from .sweep import first_look, local_maxima, response, size
 
-__all__ = ["Optimum", "Variation", "lowest_peak", "optimum"]
-
 # values of the parameter tried before giving up
 MOST_LEVELS = 30
 # share of the highest peak below which the others are not solved again
@@ -78,7 +76,12 @@ class _Search:
         """Of the parameter."""
         return self.along.name
 
-    def peak(self, model: ReducedModel, omega: float, near: object = None) -> Peak:
+    def peak(
+        self,
+        model: ReducedModel,
+        omega: float,
+        near: object = None,
+    ) -> Peak:
         """The peak uphill of a circular frequency [rad/s], without its slope."""
         return find_peak(
             model,
@@ -90,13 +93,21 @@ class _Search:
             options=self.options,
         )
 
-    def width(self, low: float, high: float) -> float:
+    def width(
+        self,
+        low: float,
+        high: float,
+    ) -> float:
         """Between two values of the parameter, in its own coordinate: the logarithm of a factor,
         the gap itself.
         """
         return path_coordinate(self.name, high) - path_coordinate(self.name, low)
 
-    def moved(self, value: float, by: float) -> float:
+    def moved(
+        self,
+        value: float,
+        by: float,
+    ) -> float:
         """The value farther along the coordinate, inside the bounds."""
         return float(
             np.clip(
@@ -227,7 +238,11 @@ def _first_level(search: _Search, value: float) -> tuple[list[Peak], int]:
     return known, points
 
 
-def _add_peak(search: _Search, peak: Peak, known: list[Peak]) -> list[Peak]:
+def _add_peak(
+    search: _Search,
+    peak: Peak,
+    known: list[Peak],
+) -> list[Peak]:
     """The known peaks and this one; of those without a dip between them the highest."""
     same = [
         other
@@ -305,7 +320,9 @@ def _neighbour_values(
 
 
 def _add_missed_peak(
-    search: _Search, levels: dict[float, list[Peak]], missed: Peak
+    search: _Search,
+    levels: dict[float, list[Peak]],
+    missed: Peak,
 ) -> tuple[dict[float, list[Peak]], int]:
     """The level where a peak was missed and its neighbours, with that peak; and the points
     spent.
@@ -333,7 +350,12 @@ def _bracket_minimum(tried: list[Peak]) -> tuple[Peak | None, Peak | None]:
     ), best
 
 
-def _next_value(search: _Search, low: Peak, high: Peak, tangents: bool) -> tuple[float, float]:
+def _next_value(
+    search: _Search,
+    low: Peak,
+    high: Peak,
+    tangents: bool,
+) -> tuple[float, float]:
     """The next value inside a bracket, and the most that could still be gained, relative to its
     lower end.
 
@@ -360,7 +382,11 @@ def _next_value(search: _Search, low: Peak, high: Peak, tangents: bool) -> tuple
     )
 
 
-def _solve_level(search: _Search, value: float, known: list[Peak]) -> tuple[list[Peak], int]:
+def _solve_level(
+    search: _Search,
+    value: float,
+    known: list[Peak],
+) -> tuple[list[Peak], int]:
     """The known peaks at another value: solved where they may be the highest, estimated where they
     cannot.
     """
@@ -390,12 +416,18 @@ def _solve_level(search: _Search, value: float, known: list[Peak]) -> tuple[list
     return [met], points + count
 
 
-def _estimated_height(search: _Search, peak: Peak, value: float) -> float:
+def _estimated_height(
+    search: _Search,
+    peak: Peak,
+    value: float,
+) -> float:
     return peak.height * float(np.exp(peak.slope / peak.height * search.width(peak.value, value)))
 
 
 def _look_over_band(
-    search: _Search, value: float, best: Peak | None = None
+    search: _Search,
+    value: float,
+    best: Peak | None = None,
 ) -> tuple[Peak | None, int]:
     """The highest peak that a coarse look over the band meets, if it is higher than the best;
     points spent.

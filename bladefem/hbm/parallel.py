@@ -14,8 +14,6 @@ from .solution import Solution
 from .solver.newton import DEFAULTS, Options
 from .sweep import response
 
-__all__ = ["share_work", "shared_response"]
-
 Item = TypeVar("Item")
 Result = TypeVar("Result")
 # frequencies that follow each other on one rank; the same for any number of ranks
@@ -23,7 +21,9 @@ POINTS_AT_ONCE = 16
 
 
 def share_work(
-    work: Callable[[Item], Result], items: Sequence[Item], comm: Any = None
+    work: Callable[[Item], Result],
+    items: Sequence[Item],
+    comm: Any = None,
 ) -> list[Result]:
     """Results of work on each item, dealt out to the ranks of an mpi4py communicator; every rank
     returns all of them.

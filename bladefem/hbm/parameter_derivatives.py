@@ -35,18 +35,12 @@ BODIES = ("omega", "force", "mass", "damping")
 # step in the logarithm of a parameter where a law is differentiated by differences
 DIFFERENCE = 1e-5
 
-__all__ = [
-    "BODIES",
-    "body_rate",
-    "by_imbalance",
-    "contact_load",
-    "contact_rate",
-    "hold_rate",
-    "residual_rate",
-]
 
-
-def residual_rate(balance: Balance, state: State, name: str) -> np.ndarray:
+def residual_rate(
+    balance: Balance,
+    state: State,
+    name: str,
+) -> np.ndarray:
     """(n, d, K) derivative of the residual with a parameter at fixed displacements, at a solved
     state [m].
     """
@@ -75,7 +69,11 @@ def by_imbalance(linear: Linear) -> np.ndarray:
     return linear.B - linear.A[0].real @ (linear.springs[:, None] * linear.B)
 
 
-def hold_rate(balance: Balance, state: State, name: str) -> np.ndarray:
+def hold_rate(
+    balance: Balance,
+    state: State,
+    name: str,
+) -> np.ndarray:
     """(n, d) springs of a contact parameter times the mean motion without stiffness at their nodes
     [N].
 
@@ -100,7 +98,12 @@ def contact_load(model: ReducedModel, state: State) -> np.ndarray:
     return load
 
 
-def contact_rate(model: ReducedModel, state: State, name: str, samples: int) -> np.ndarray:
+def contact_rate(
+    model: ReducedModel,
+    state: State,
+    name: str,
+    samples: int,
+) -> np.ndarray:
     """(n, d, K) derivative of the contact forces beyond the preload with a contact parameter [N,
     N/m].
     """
@@ -136,7 +139,12 @@ def contact_rate(model: ReducedModel, state: State, name: str, samples: int) -> 
     return rate
 
 
-def _rate_by_differences(model: ReducedModel, state: State, name: str, samples: int) -> np.ndarray:
+def _rate_by_differences(
+    model: ReducedModel,
+    state: State,
+    name: str,
+    samples: int,
+) -> np.ndarray:
     """The same for laws that need not be homogeneous: central differences of the forces."""
     if name == "gap" and model.directions == model.elements.tangents:
         raise InputError("gap: a prescribed normal load has no gap, expected elements.kn > 0")
@@ -152,7 +160,10 @@ def _rate_by_differences(model: ReducedModel, state: State, name: str, samples: 
 
 
 def body_rate(
-    model: ReducedModel, omega: float, force: np.ndarray, name: str
+    model: ReducedModel,
+    omega: float,
+    force: np.ndarray,
+    name: str,
 ) -> tuple[np.ndarray, np.ndarray]:
     """Derivatives of the bodies' motion under constant contact forces (H+1, m), with a parameter of
     BODIES.
@@ -175,7 +186,12 @@ def body_rate(
     return contact, port_motion(blades, modal, ports, blades.probe)
 
 
-def _modal_rate(body: Stack, omega: float, modal: np.ndarray, name: str) -> np.ndarray:
+def _modal_rate(
+    body: Stack,
+    omega: float,
+    modal: np.ndarray,
+    name: str,
+) -> np.ndarray:
     """(H+1, m) derivative of modal amplitudes under constant forces."""
     orders = np.arange(len(modal))
     if name == "omega":
@@ -185,7 +201,12 @@ def _modal_rate(body: Stack, omega: float, modal: np.ndarray, name: str) -> np.n
     return _pushed_modes(body, omega * orders, push)
 
 
-def _damper_rate(model: ReducedModel, omega: float, force: np.ndarray, name: str) -> np.ndarray:
+def _damper_rate(
+    model: ReducedModel,
+    omega: float,
+    force: np.ndarray,
+    name: str,
+) -> np.ndarray:
     """(H+1, m) derivative of the damper's contact displacements under constant forces."""
     if name == "mass" and model.damper is None:
         raise InputError("mass: expected a model with a damper")
@@ -215,7 +236,11 @@ def _damper_rate(model: ReducedModel, omega: float, force: np.ndarray, name: str
     return port_motion(damper, rate, np.zeros_like(ports), damper.contact)
 
 
-def _pushed_modes(body: Stack, w: np.ndarray, push: np.ndarray) -> np.ndarray:
+def _pushed_modes(
+    body: Stack,
+    w: np.ndarray,
+    push: np.ndarray,
+) -> np.ndarray:
     """(H+1, m) derivative of modal amplitudes from that of the impedance times the amplitudes; none
     of the mean.
     """

@@ -13,15 +13,6 @@ from ..data import Elements, PortModel, RigidBody
 from ..errors import InputError, suggestion
 from .model import Damping, ReducedModel
 
-__all__ = [
-    "PARAMETERS",
-    "check_parameter",
-    "layer_share",
-    "parameter_value",
-    "path_coordinate",
-    "vary",
-]
-
 
 def _changing_elements(
     change: Callable[[Elements, float], Elements],
@@ -127,7 +118,11 @@ PARAMETERS: dict[str, Callable[[ReducedModel, float], ReducedModel]] = {
 ADDED = ("omega", "gap")
 
 
-def vary(model: ReducedModel, name: str, value: float) -> ReducedModel:
+def vary(
+    model: ReducedModel,
+    name: str,
+    value: float,
+) -> ReducedModel:
     """The model with one parameter changed: a factor on its present value, or for "gap" an added
     opening [m].
 

@@ -22,8 +22,6 @@ from .solver.newton import DEFAULTS, Options
 from .sweep import size
 from .validate_model import check_probe
 
-__all__ = ["Peak", "cubic_minimum", "find_peak", "track_peak", "with_slope"]
-
 # points spent on one peak before giving up
 STEPS = 40
 # first step, as a share of the frequency
@@ -111,7 +109,11 @@ def find_peak(
     )
 
 
-def _slope(model: ReducedModel, point: Solution, probe: int) -> float:
+def _slope(
+    model: ReducedModel,
+    point: Solution,
+    probe: int,
+) -> float:
     """Derivative of the height by the circular frequency."""
     try:
         return float(sensitivities(model, point, ["omega"])["omega"].size[probe])
@@ -133,7 +135,11 @@ class _Look:
         return -2 * self.slope / self.height**3
 
 
-def _vertex_between(low: _Look, high: _Look, corner: bool) -> tuple[float, float]:
+def _vertex_between(
+    low: _Look,
+    high: _Look,
+    corner: bool,
+) -> tuple[float, float]:
     """Where 1/height^2 is lowest between a rising and a falling point, and the relative gain of
     height there.
 
@@ -153,7 +159,11 @@ def _vertex_between(low: _Look, high: _Look, corner: bool) -> tuple[float, float
     return target, float(gain) if width > 1e-9 * target else 0.0
 
 
-def cubic_minimum(down: float, up: float, rise: float) -> float:
+def cubic_minimum(
+    down: float,
+    up: float,
+    rise: float,
+) -> float:
     """Place in [0, 1] of the minimum of the cubic with slopes down < 0 <= up at the ends and this
     rise between them.
     """
@@ -198,7 +208,13 @@ def track_peak(
         yield path[-1]
 
 
-def with_slope(model: ReducedModel, peak: Peak, name: str, value: float, probe: int = 0) -> Peak:
+def with_slope(
+    model: ReducedModel,
+    peak: Peak,
+    name: str,
+    value: float,
+    probe: int = 0,
+) -> Peak:
     """The peak with the derivative of its height by a parameter that has this value."""
     slope = sensitivities(model, peak.solution, [name])[name].size[probe]
     return replace(peak, value=value, slope=float(slope))

@@ -7,8 +7,6 @@ from __future__ import annotations
 import numpy as np
 from numba import njit
 
-__all__ = ["count_states", "holding_drift"]
-
 # share of a period below which a contact is not counted as closed, or as open
 ROUNDING_SHARE = 1e-12
 

@@ -24,26 +24,6 @@ from ..friction.law_table import groups_by_law
 if TYPE_CHECKING:
     from .model import ReducedModel
 
-__all__ = [
-    "BATCHED_SOLVE_DOFS",
-    "BLOCKED_LU_UNKNOWNS",
-    "COMPILED_NEWTON_UNKNOWNS",
-    "COMPILED_POINT_DOFS",
-    "DEFLATION_UNKNOWNS",
-    "DENSE_FALLBACK_UNKNOWNS",
-    "DENSE_UNKNOWNS",
-    "DETERMINANT_UNKNOWNS",
-    "ROUTES",
-    "SHARED_FLEXIBILITY_DOFS",
-    "SHOOTING_SIZE",
-    "linear_solver",
-    "updates_by_modes",
-    "uses_compiled_newton",
-    "uses_compiled_point",
-    "uses_coulomb_kernels",
-    "uses_low_rank",
-]
-
 COMPILED_POINT = "compiled point"
 COMPILED_NEWTON = "compiled Newton"
 NUMPY_NEWTON = "NumPy Newton"

@@ -27,8 +27,6 @@ from .solver.residual import Balance, evaluate_balance, start_in_stick
 from .sweep import response
 from .truncation_indicator import truncation_indicator
 
-__all__ = ["compile_in_parallel", "compile_kernels"]
-
 
 def compile_kernels() -> None:
     """Solve the smallest models that together reach every kernel, with and without a prescribed

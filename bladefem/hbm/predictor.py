@@ -4,8 +4,6 @@ from __future__ import annotations
 
 from numba import njit
 
-__all__ = ["PREDICTOR_POINTS", "append_solution", "extrapolate_solution"]
-
 # points that a start is extrapolated from
 PREDICTOR_POINTS = 3
 

@@ -11,8 +11,6 @@ from ..reduction.assemble import pair_models
 from ..reduction.beam import reference_blade
 from .model import Damping, ReducedModel
 
-__all__ = ["reference_model"]
-
 
 def reference_model(
     kt: float = 1e6,

@@ -1,5 +1,5 @@
-"""Blades and dampers as one real system of modes in time, for one blade or for those of a travelling
-wave.
+"""Blades and dampers as one real system of modes in time, for one blade or for those of a
+travelling wave.
 
 A model in a travelling wave has one body for each harmonic, in the nodal diameters that the engine
 order gives. Where these repeat after r harmonics, the wave repeats after r blades, and the bodies
@@ -17,8 +17,6 @@ from ..data import PortModel
 from ..errors import InputError
 from .linear.woodbury import bodies_of
 from .model import ReducedModel
-
-__all__ = ["SectorModes", "blades_of_wave", "sector_modes"]
 
 # relative difference up to which two bodies are the same
 SAME = 1e-9
@@ -97,20 +95,20 @@ def _period(bodies: tuple[PortModel, ...]) -> int:
     return 0
 
 
-def _same(one: PortModel, other: PortModel, mirrored: bool = False) -> bool:
+def _same(
+    one: PortModel,
+    other: PortModel,
+    mirrored: bool = False,
+) -> bool:
     if one.omega.shape != other.omega.shape:
         return False
     turn = np.conj if mirrored else np.asarray
-    return (
-        one is other
-        and not mirrored
-        or all(
-            np.allclose(a, turn(b), rtol=SAME, atol=SAME * max(abs(a).max(initial=0.0), 1e-300))
-            for a, b in (
-                (one.omega, other.omega),
-                (one.shapes, other.shapes),
-                (one.residual, other.residual),
-            )
+    return (one is other and not mirrored) or all(
+        np.allclose(a, turn(b), rtol=SAME, atol=SAME * max(abs(a).max(initial=0.0), 1e-300))
+        for a, b in (
+            (one.omega, other.omega),
+            (one.shapes, other.shapes),
+            (one.residual, other.residual),
         )
     )
 
@@ -121,7 +119,11 @@ def _bodies(model: ReducedModel, r: int) -> list[tuple]:
     return list(zip(stacks, (1.0, -1.0), strict=False))
 
 
-def _ring(stack: object, r: int, sign: float) -> SectorModes:
+def _ring(
+    stack: object,
+    r: int,
+    sign: float,
+) -> SectorModes:
     """One body in all diameters of a ring of r blades."""
     stiffness, contact, loss = [], [], []
     shape = stack.residual[0, stack.contact, stack.contact].shape

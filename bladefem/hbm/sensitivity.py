@@ -23,8 +23,6 @@ from .solver.residual import (
     linearise_balance,
 )
 
-__all__ = ["Sensitivity", "sensitivities"]
-
 
 @dataclass(frozen=True)
 class Sensitivity:
@@ -39,7 +37,9 @@ class Sensitivity:
 
 
 def sensitivities(
-    model: ReducedModel, solution: Solution, names: Iterable[str]
+    model: ReducedModel,
+    solution: Solution,
+    names: Iterable[str],
 ) -> dict[str, Sensitivity]:
     """Derivatives of a converged solution with the named parameters.
 
@@ -57,7 +57,11 @@ def sensitivities(
 
 
 def _one_sensitivity(
-    balance: Balance, state: State, inverse: Inverse, solution: Solution, name: str
+    balance: Balance,
+    state: State,
+    inverse: Inverse,
+    solution: Solution,
+    name: str,
 ) -> Sensitivity:
     model = balance.model
     linear = balance.linear

@@ -10,17 +10,6 @@ from ..friction.fourier import to_complex
 from .linear.bodies import Stack, dissipated_work, modal_amplitudes, modal_flexibility, port_motion
 from .model import ReducedModel
 
-__all__ = [
-    "Solution",
-    "Work",
-    "at_probes",
-    "blade_motion",
-    "period_works",
-    "probe_motion",
-    "size",
-    "works_of",
-]
-
 
 @dataclass(frozen=True)
 class Work:
@@ -104,7 +93,10 @@ def size(solution: Solution, probe: int = 0) -> float:
 
 
 def probe_motion(
-    model: ReducedModel, omega: float, force: np.ndarray, rigid: np.ndarray
+    model: ReducedModel,
+    omega: float,
+    force: np.ndarray,
+    rigid: np.ndarray,
 ) -> np.ndarray:
     """(H+1, probes) amplitudes at the probes by the excitation and contact forces (H+1, m) beyond
     the preload.
@@ -121,7 +113,9 @@ def at_probes(blade: tuple[Stack, np.ndarray, np.ndarray], rigid: np.ndarray) ->
 
 
 def blade_motion(
-    model: ReducedModel, omega: float, force: np.ndarray
+    model: ReducedModel,
+    omega: float,
+    force: np.ndarray,
 ) -> tuple[Stack, np.ndarray, np.ndarray]:
     """Blades under the excitation and contact forces (H+1, m): stack, forces at all ports (H+1, P),
     modes (H+1, m).
@@ -138,7 +132,11 @@ def blade_motion(
 
 
 def period_works(
-    model: ReducedModel, omega: float, w: np.ndarray, f: np.ndarray, dissipated: float
+    model: ReducedModel,
+    omega: float,
+    w: np.ndarray,
+    f: np.ndarray,
+    dissipated: float,
 ) -> Work:
     """Work of each kind in a period, for displacements and forces (n, d, K)."""
     force = to_complex(f.reshape(-1, f.shape[2])).T
@@ -178,6 +176,10 @@ def works_of(
     )
 
 
-def _harmonic_work(orders: np.ndarray, force: np.ndarray, moved: np.ndarray) -> float:
+def _harmonic_work(
+    orders: np.ndarray,
+    force: np.ndarray,
+    moved: np.ndarray,
+) -> float:
     """Work of harmonic forces on harmonic displacements (H+1, *) in a period."""
     return float(np.pi * np.sum(orders[:, None] * (force * (1j * moved).conj()).real))

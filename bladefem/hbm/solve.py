@@ -21,8 +21,6 @@ from .solver.point_compiled import compiles_points, solve_each, solve_small
 from .solver.residual import Balance
 from .validate_model import check_point
 
-__all__ = ["as_solution", "free_response", "leading_stuck_solutions", "solve", "stuck_response"]
-
 # contact springs over the bodies' stiffness from which a failure is put down to it
 STIFF_CONTACT_RATIO = 1e5
 LINEAR_POINT = Options(iterations=1, fallbacks=False)
@@ -73,20 +71,33 @@ def solve(
     return as_solution(balance, best, sum(a.end.iterations for a in attempts), reason)
 
 
-def free_response(model: ReducedModel, omega: float, H: int = 1) -> np.ndarray:
+def free_response(
+    model: ReducedModel,
+    omega: float,
+    H: int = 1,
+) -> np.ndarray:
     """(H+1, probes) amplitudes at the probes without contact forces [m]."""
     linear = condense(model, omega, H)
     return probe_motion(model, omega, np.zeros_like(linear.free), np.zeros(len(linear.rigid)))
 
 
-def stuck_response(model: ReducedModel, omega: float, H: int = 1) -> np.ndarray:
+def stuck_response(
+    model: ReducedModel,
+    omega: float,
+    H: int = 1,
+) -> np.ndarray:
     """(H+1, probes) amplitudes at the probes with all contacts closed and sticking [m]."""
     linear = condense(model, omega, H)
     force = linear.springs * linear.stuck
     return probe_motion(model, omega, force, _rigid_motion(linear, linear.stuck[0], force[0]))
 
 
-def as_solution(balance: Balance, attempt: Attempt, iterations: int, reason: str) -> Solution:
+def as_solution(
+    balance: Balance,
+    attempt: Attempt,
+    iterations: int,
+    reason: str,
+) -> Solution:
     """The record of a finished attempt."""
     model = balance.model
     linear = balance.linear
@@ -122,7 +133,11 @@ def as_solution(balance: Balance, attempt: Attempt, iterations: int, reason: str
     )
 
 
-def leading_stuck_solutions(model: ReducedModel, omegas: Sequence[float], H: int) -> list[Solution]:
+def leading_stuck_solutions(
+    model: ReducedModel,
+    omegas: Sequence[float],
+    H: int,
+) -> list[Solution]:
     """The first frequencies [rad/s], as long as all contacts stick, with the excited harmonics
     alone; small models.
 
@@ -139,7 +154,10 @@ def leading_stuck_solutions(model: ReducedModel, omegas: Sequence[float], H: int
 
 
 def _stuck_throughout(
-    model: ReducedModel, omega: float, H: int, start: Solution | None
+    model: ReducedModel,
+    omega: float,
+    H: int,
+    start: Solution | None,
 ) -> Solution | None:
     """The same for one point of any model; looked for only where the start sticks."""
     low = max((1, *model.excitation, *model.normal))
@@ -158,9 +176,7 @@ def _failure_reasons(balance: Balance, attempts: list[Attempt]) -> str:
     stiff = (
         [
             f"contacts {ratio:.1g} times as stiff as the bodies: expected less than "
-            f"{STIFF_CONTACT_RATIO:.0e} "
-            "where they slip or "
-            "lift off"
+            f"{STIFF_CONTACT_RATIO:.0e} where they slip or lift off"
         ]
         if ratio > STIFF_CONTACT_RATIO
         else []
@@ -168,7 +184,11 @@ def _failure_reasons(balance: Balance, attempts: list[Attempt]) -> str:
     return "; ".join([f"{a.method}: {a.end.reason}" for a in attempts] + stiff)
 
 
-def _rigid_motion(linear: Linear, mean: np.ndarray, force: np.ndarray) -> np.ndarray:
+def _rigid_motion(
+    linear: Linear,
+    mean: np.ndarray,
+    force: np.ndarray,
+) -> np.ndarray:
     """(r,) motions without stiffness that close  w_0 = free_0 - G_0 f_0 + B q."""
     if linear.B.shape[1] == 0:
         return np.zeros(len(linear.rigid))

@@ -1,4 +1,5 @@
-"""Is a solution of the balance a motion that lasts? Its Floquet multipliers, for every kind of model.
+"""Is a solution of the balance a motion that lasts? Its Floquet multipliers, for every kind of
+model.
 
 Where normal loads are prescribed and the bodies damped there is one periodic motion, and every
 other one decays to it (the friction law is then monotone). Elsewhere the linearised motion is
@@ -25,8 +26,6 @@ from .linearised_flow import contact_steps, linear_steps, period_map
 from .model import ReducedModel
 from .sector_modes import SectorModes, sector_modes
 from .solution import Solution
-
-__all__ = ["AFFORDABLE", "STABLE", "UNIQUE", "UNKNOWN", "UNSTABLE", "Verdict", "stability_verdict"]
 
 UNIQUE = "unique"
 STABLE = "stable"
@@ -62,7 +61,11 @@ class Verdict:
     reason: str = ""
 
 
-def stability_verdict(model: ReducedModel, solution: Solution, most: float = LARGEST) -> Verdict:
+def stability_verdict(
+    model: ReducedModel,
+    solution: Solution,
+    most: float = LARGEST,
+) -> Verdict:
     """The verdict on a converged solution of the model.
 
     Args:
@@ -106,7 +109,11 @@ def _bifurcation(multiplier: complex) -> str:
 
 
 def _leading(
-    model: ReducedModel, solution: Solution, system: SectorModes, instants: int, most: float
+    model: ReducedModel,
+    solution: Solution,
+    system: SectorModes,
+    instants: int,
+    most: float,
 ) -> complex | None:
     """The multiplier of largest modulus; None where it would take too many operations."""
     S = max(instants, 16 * (solution.harmonics + 1))
@@ -130,7 +137,11 @@ def _leading(
     return complex(values[np.argmax(abs(values))])
 
 
-def _operations(system: SectorModes, contacts: int, S: int) -> float:
+def _operations(
+    system: SectorModes,
+    contacts: int,
+    S: int,
+) -> float:
     """Of carrying all disturbances through S steps, with so many degrees of freedom in contact."""
     modes = 2.0 * len(system.stiffness)
     columns = modes + contacts
@@ -139,7 +150,10 @@ def _operations(system: SectorModes, contacts: int, S: int) -> float:
 
 
 def _node_steps(
-    model: ReducedModel, solution: Solution, blades: int, S: int
+    model: ReducedModel,
+    solution: Solution,
+    blades: int,
+    S: int,
 ) -> tuple[np.ndarray, ...]:
     """A, B1, B0 (S, blades n, d, d) and share of `period_map`, and which nodes stick throughout."""
     e = model.elements
@@ -199,7 +213,9 @@ def _rates(w: np.ndarray) -> np.ndarray:
 
 
 def _without_stuck(
-    model: ReducedModel, system: SectorModes, stuck: np.ndarray
+    model: ReducedModel,
+    system: SectorModes,
+    stuck: np.ndarray,
 ) -> tuple[SectorModes, np.ndarray, np.ndarray]:
     """The bodies with the springs of nodes that stick throughout, and U, R of the other nodes."""
     d = model.directions

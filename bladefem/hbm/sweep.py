@@ -24,8 +24,6 @@ from .solver.newton import DEFAULTS, Options
 from .solver.point_compiled import solve_along
 from .validate_model import check_point, check_probe
 
-__all__ = ["FOLLOWED", "first_look", "local_maxima", "response", "size", "solve_from", "sweep"]
-
 Keep = Callable[[float, Callable[[], Solution]], Solution]
 # of the height with the frequency, at a solved one
 Slope = Callable[[float], float]
@@ -167,8 +165,8 @@ def sweep(
             return
         if len(solved) >= BAND_LIMIT:
             notes.append(
-                f"the sweep ended after {BAND_LIMIT} points: peaks may be higher by more than "
-                "the accuracy"
+                f"the sweep ended after {BAND_LIMIT} points: peaks may be higher by more than the "
+                "accuracy"
             )
             if not (paths and _normal_loads_follow(model)):
                 return
@@ -193,7 +191,10 @@ def _normal_loads_follow(model: ReducedModel) -> bool:
 
 
 def _needs_continuation(
-    model: ReducedModel, solved: Mapping[float, Solution], H: int, probe: int
+    model: ReducedModel,
+    solved: Mapping[float, Solution],
+    H: int,
+    probe: int,
 ) -> bool:
     """Whether the response has to be followed round folds: contacts lift off, or the sweep
     jumps.
@@ -285,7 +286,10 @@ def first_look(model: ReducedModel, band: tuple[float, float]) -> np.ndarray:
 
 
 def _next_frequency(
-    solved: dict[float, Solution], slope: Slope, accuracy: tuple[float, float], probe: int
+    solved: dict[float, Solution],
+    slope: Slope,
+    accuracy: tuple[float, float],
+    probe: int,
 ) -> float | None:
     """The next frequency to solve: a maximum that is not closed in yet, else the worst corner; None
     when done.
@@ -306,7 +310,10 @@ def _next_frequency(
 
 
 def _peak_targets(
-    omegas: np.ndarray, heights: np.ndarray, slope: Slope, accuracy: tuple[float, float]
+    omegas: np.ndarray,
+    heights: np.ndarray,
+    slope: Slope,
+    accuracy: tuple[float, float],
 ) -> Iterator[float]:
     peak, curve = accuracy
     for i in range(1, len(omegas) - 1):
@@ -319,7 +326,10 @@ def _peak_targets(
 
 
 def _next_to_peak(
-    omegas: np.ndarray, heights: np.ndarray, slope: float, tolerance: float
+    omegas: np.ndarray,
+    heights: np.ndarray,
+    slope: float,
+    tolerance: float,
 ) -> float | None:
     """Where to look next for the maximum enclosed by three points, the middle one with its slope;
     None when known.
@@ -341,7 +351,11 @@ def _next_to_peak(
     return None
 
 
-def _corner_targets(omegas: np.ndarray, heights: np.ndarray, curve: float) -> Iterator[float]:
+def _corner_targets(
+    omegas: np.ndarray,
+    heights: np.ndarray,
+    curve: float,
+) -> Iterator[float]:
     """Middles of the wider neighbours of points that lie off the line through their neighbours,
     worst first.
     """
@@ -358,7 +372,11 @@ def _corner_targets(omegas: np.ndarray, heights: np.ndarray, curve: float) -> It
             yield omegas[i + 1] + (right / 2 if right > left else -left / 2)
 
 
-def _predicted_start(last: list[Solution], omega: float, H: int) -> Solution | None:
+def _predicted_start(
+    last: list[Solution],
+    omega: float,
+    H: int,
+) -> Solution | None:
     """A start on the curve through the last solutions; None, which is full stick, where the last
     one sticks.
     """

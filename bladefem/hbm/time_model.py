@@ -20,8 +20,6 @@ from .model import ReducedModel
 from .policy import SHOOTING_SIZE
 from .solver.residual import Balance
 
-__all__ = ["shooting_start", "time_system"]
-
 # highest frequency over the excitation's up to which shooting is tried: 1 s an iteration
 FASTEST_RATIO = 1e4
 # residual flexibility, over that of the contact springs, that is left out

@@ -26,8 +26,6 @@ from .node_gradients import size_by_force, transposed_flexibility
 from .solution import Solution
 from .solver.residual import Balance, adjoint_inverse, evaluate_balance
 
-__all__ = ["Tractions", "farthest", "tractions"]
-
 # instants of a period at which the friction limit is looked at, for each harmonic
 INSTANTS = 64
 # directions of the polygon round an admissible set of two tangents: 3.5 % too wide at most; what
@@ -54,7 +52,11 @@ class Tractions:
     room: np.ndarray
 
 
-def tractions(model: ReducedModel, solution: Solution, probe: int = 0) -> Tractions:
+def tractions(
+    model: ReducedModel,
+    solution: Solution,
+    probe: int = 0,
+) -> Tractions:
     """Admissible friction forces and the derivative of the response by them, from one adjoint
     solve.
     """
@@ -75,7 +77,11 @@ def tractions(model: ReducedModel, solution: Solution, probe: int = 0) -> Tracti
     )
 
 
-def farthest(model: ReducedModel, found: Tractions, direction: np.ndarray) -> np.ndarray:
+def farthest(
+    model: ReducedModel,
+    found: Tractions,
+    direction: np.ndarray,
+) -> np.ndarray:
     """(m, tangents) change of the start that goes farthest along a direction (m, tangents) and
     stays admissible for an unchanged vibration [N].
 
@@ -146,7 +152,10 @@ def _normals(tangents: int) -> np.ndarray:
 
 
 def _bounds(
-    model: ReducedModel, w: np.ndarray, nodes: np.ndarray, normals: np.ndarray
+    model: ReducedModel,
+    w: np.ndarray,
+    nodes: np.ndarray,
+    normals: np.ndarray,
 ) -> np.ndarray:
     """(m, directions) least of mu N(t) - normal . u(t) over the period [N]."""
     elements = model.elements
@@ -167,7 +176,11 @@ def _bounds(
 
 
 def _gradient(
-    balance: Balance, state: object, solution: Solution, nodes: np.ndarray, probe: int
+    balance: Balance,
+    state: object,
+    solution: Solution,
+    nodes: np.ndarray,
+    probe: int,
 ) -> np.ndarray:
     """(n, tangents) derivative by the start, with these nodes held in stick: their forces follow
     their springs, whatever the march says of a node that just reaches its limit.

@@ -25,15 +25,17 @@ from .policy import uses_coulomb_kernels
 from .solution import Solution
 from .solver.residual import contact_forces
 
-__all__ = ["truncation_indicator"]
-
 # for each harmonic
 INSTANTS_PER_HARMONIC = 4
 # of a frequency: how far beside it bodies are looked at, which without damping may be hit exactly
 OFF_RESONANCE = 1e-7
 
 
-def truncation_indicator(model: ReducedModel, points: Sequence[Solution], most: int) -> np.ndarray:
+def truncation_indicator(
+    model: ReducedModel,
+    points: Sequence[Solution],
+    most: int,
+) -> np.ndarray:
     """(p,) motion of the contacts with harmonics above the solutions' own up to `most`, over that
     of the first one.
 
@@ -46,9 +48,8 @@ def truncation_indicator(model: ReducedModel, points: Sequence[Solution], most: 
     H = points[0].harmonics
     if any(p.harmonics != H for p in points) or most <= H:
         raise InputError(
-            f"points: harmonics {sorted({p.harmonics for p in points})}, expected the same ones "
-            "in all "
-            f"points, below {most}"
+            f"points: harmonics {sorted({p.harmonics for p in points})}, expected the same ones in "
+            f"all points, below {most}"
         )
     w = np.array([p.w for p in points])
     forces = _higher_force_harmonics(model, w, most)
@@ -59,7 +60,11 @@ def truncation_indicator(model: ReducedModel, points: Sequence[Solution], most: 
     return np.sqrt(np.sum(abs(motion) ** 2, axis=(0, 2)) / np.maximum(first, np.finfo(float).tiny))
 
 
-def _higher_force_harmonics(model: ReducedModel, w: np.ndarray, most: int) -> np.ndarray:
+def _higher_force_harmonics(
+    model: ReducedModel,
+    w: np.ndarray,
+    most: int,
+) -> np.ndarray:
     """(most - H, p, m) complex harmonics H+1.. of the contact forces at displacements w (p, n, d,
     2H+1) [N].
     """
@@ -86,7 +91,11 @@ def _higher_force_harmonics(model: ReducedModel, w: np.ndarray, most: int) -> np
     return (high[::2] - 1j * high[1::2]).reshape(most - K // 2, p, n * d)
 
 
-def _harmonics_by_law(model: ReducedModel, w: np.ndarray, most: int) -> np.ndarray:
+def _harmonics_by_law(
+    model: ReducedModel,
+    w: np.ndarray,
+    most: int,
+) -> np.ndarray:
     """The same for any law, from its periodic state."""
     p, n, d, K = w.shape
     wide = np.zeros((p, n, d, 2 * most + 1))
@@ -97,7 +106,10 @@ def _harmonics_by_law(model: ReducedModel, w: np.ndarray, most: int) -> np.ndarr
 
 
 def _higher_motion(
-    body: Stack, orders: np.ndarray, omegas: np.ndarray, forces: np.ndarray
+    body: Stack,
+    orders: np.ndarray,
+    omegas: np.ndarray,
+    forces: np.ndarray,
 ) -> np.ndarray:
     """(k, p, m) displacements of a body under contact forces (k, p, m) of the harmonics (k,), at
     (p,) [rad/s] [m].

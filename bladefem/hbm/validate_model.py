@@ -17,8 +17,6 @@ from ..friction.law_table import laws_of_nodes, require_coulomb
 if TYPE_CHECKING:
     from .model import ReducedModel
 
-__all__ = ["check_model", "check_point", "check_probe", "port_size"]
-
 
 def check_model(model: ReducedModel) -> None:
     """Raise InputError where parts of the model do not fit each other."""
@@ -43,15 +41,19 @@ def check_model(model: ReducedModel) -> None:
         if port_size(model.damper[0], "contact") != dofs:
             raise InputError(
                 f"damper: contact port of {port_size(model.damper[0], 'contact')} dofs, expected "
-                f"{dofs}, "
-                "as the sides have"
+                f"{dofs}, as the sides have"
             )
     _check_ratio("damping", model.damping.ratio, model.sides)
     if isinstance(model.damper, tuple):
         _check_ratio("damper_damping", model.damper_damping.ratio, model.damper)
 
 
-def check_point(model: ReducedModel, omega: float, H: int, samples: int) -> None:
+def check_point(
+    model: ReducedModel,
+    omega: float,
+    H: int,
+    samples: int,
+) -> None:
     """Raise InputError where frequency, harmonics or samples are out of range."""
     if not isinstance(omega, Real) or not 0 < omega < np.inf:
         raise InputError(f"omega {omega}: expected a positive circular frequency")
@@ -65,8 +67,7 @@ def check_point(model: ReducedModel, omega: float, H: int, samples: int) -> None
     if samples == 0 and model.elements.tangents > 1:
         raise InputError(
             "samples 0: transitions are located exactly for elements with one tangent only, "
-            "expected "
-            "samples above 0 with two"
+            "expected samples above 0 with two"
         )
     if samples == 0:
         require_coulomb(model.elements, "samples = 0, which locates transitions exactly,")
@@ -92,7 +93,11 @@ def port_size(model: PortModel, name: str) -> int:
     return len(range(*model.ports[name].indices(len(model.residual))))
 
 
-def _check_bodies(name: str, bodies: Any, ports: tuple[str, ...]) -> None:
+def _check_bodies(
+    name: str,
+    bodies: Any,
+    ports: tuple[str, ...],
+) -> None:
     if (
         not isinstance(bodies, tuple)
         or not bodies
@@ -129,8 +134,8 @@ def _check_elements(elements: Elements, dofs: int) -> None:
                 f"of shape {value.shape}" if value.shape != (nodes,) else f"from {value.min():.4g}"
             )
             raise InputError(
-                f"elements.{name} {wrong}: expected {nodes} finite numbers"
-                f"{'' if name == 'n0' else ', none of them negative'}"
+                f"elements.{name} {wrong}: expected {nodes} finite "
+                f"numbers{'' if name == 'n0' else ', none of them negative'}"
             )
     laws_of_nodes(elements)
     _check_traction("elements.t0", elements.t0, elements)
@@ -142,7 +147,11 @@ def _check_elements(elements: Elements, dofs: int) -> None:
         )
 
 
-def _check_traction(name: str, traction: Any, elements: Elements) -> None:
+def _check_traction(
+    name: str,
+    traction: Any,
+    elements: Elements,
+) -> None:
     """Friction forces that the tangential springs can carry."""
     if traction is None:
         return
@@ -156,7 +165,12 @@ def _check_traction(name: str, traction: Any, elements: Elements) -> None:
         raise InputError(f"{name}: a node of kt = 0 carries no friction force, expected 0 N there")
 
 
-def _check_amplitudes(name: str, loads: Any, count: int, lowest: int) -> None:
+def _check_amplitudes(
+    name: str,
+    loads: Any,
+    count: int,
+    lowest: int,
+) -> None:
     if not isinstance(loads, Mapping):
         raise InputError(
             f"{name} of type {type(loads).__name__}: expected a dict of harmonic to {count} "
@@ -184,7 +198,11 @@ def _check_rigid(damper: RigidBody, dofs: int) -> None:
         raise InputError("damper.mass: expected a symmetric positive definite matrix")
 
 
-def _check_ratio(name: str, ratio: Any, bodies: tuple[PortModel, ...]) -> None:
+def _check_ratio(
+    name: str,
+    ratio: Any,
+    bodies: tuple[PortModel, ...],
+) -> None:
     if np.ndim(ratio) and any(np.shape(ratio) != body.omega.shape for body in bodies):
         raise InputError(
             f"{name}.ratio of shape {np.shape(ratio)}: expected one number, or one for each of the "

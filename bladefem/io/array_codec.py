@@ -15,12 +15,14 @@ from zipfile import BadZipFile
 
 import numpy as np
 
-__all__ = ["read_npz", "tree_of", "write_npz"]
-
 _HOMES = ("bladefem", "geometry")
 
 
-def write_npz(path: str | Path, key: str, value: Any) -> None:
+def write_npz(
+    path: str | Path,
+    key: str,
+    value: Any,
+) -> None:
     """Write a value with its key; TypeError for what has no encoding."""
     tree, arrays = tree_of(value)
     with open(path, "wb") as file:
@@ -138,7 +140,10 @@ _DECODERS = {
 
 
 def _sparse(
-    shape: tuple[int, int], data: np.ndarray, indices: np.ndarray, indptr: np.ndarray
+    shape: tuple[int, int],
+    data: np.ndarray,
+    indices: np.ndarray,
+    indptr: np.ndarray,
 ) -> Any:
     from scipy.sparse import csc_matrix
 

@@ -17,8 +17,6 @@ from ..scene.tables import Scene
 from ..scene.toml import dump, load_scene
 from .stage_cache import open_folder, write_text
 
-__all__ = ["EARLIER", "borrow_stages", "given_fields", "keep_given", "locked", "take_folder"]
-
 EARLIER = "earlier"
 # names of the fields that the user gave, beside the scene with all its values
 GIVEN = "given.json"
@@ -44,8 +42,7 @@ def locked(folder: str | Path) -> Iterator[None]:
         except BlockingIOError:
             raise InputError(
                 f"folder {folder}: another command works in it, expected one at a time; wait for "
-                "it, or "
-                "name another folder with -o"
+                "it, or name another folder with -o"
             ) from None
         except OSError:
             # a file system without locks
@@ -139,6 +136,6 @@ def _put_away(folder: Path) -> str:
             f"({error.strerror or error})"
         ) from None
     return (
-        f"{folder} holds results of another scene: {len(results)} "
-        f"file{'s'[: len(results) > 1]} moved to {earlier}"
+        f"{folder} holds results of another scene: {len(results)} file{'s'[: len(results) > 1]} "
+        f"moved to {earlier}"
     )

@@ -25,23 +25,6 @@ from ..errors import InputError
 from ..util.message import Message
 from .array_codec import read_npz, tree_of, write_npz
 
-__all__ = [
-    "attributes",
-    "bind_h5py",
-    "code_of",
-    "found_remark",
-    "key_of",
-    "on_root",
-    "open_folder",
-    "read_results",
-    "stage",
-    "versions",
-    "write_results",
-    "write_table",
-    "write_text",
-    "writing",
-]
-
 # Raised when the meaning or the layout of stored stages changes: older files are then computed
 # again.
 FORMAT = 4
@@ -136,7 +119,11 @@ def stage(
     return result, None
 
 
-def write_results(path: str | Path, groups: Mapping[str, Any], scene_text: str = "") -> Path:
+def write_results(
+    path: str | Path,
+    groups: Mapping[str, Any],
+    scene_text: str = "",
+) -> Path:
     """One netCDF-4 file of labelled arrays.
 
     Args:
@@ -176,7 +163,9 @@ def read_results(path: str | Path, group: str = "/") -> Any:
 
 
 def write_table(
-    path: str | Path, columns: Mapping[str, Any], units: Mapping[str, str] | None = None
+    path: str | Path,
+    columns: Mapping[str, Any],
+    units: Mapping[str, str] | None = None,
 ) -> Path:
     """A CSV table with units in its head, "amplitude [m]".
 
@@ -253,7 +242,11 @@ def _find(path: Path, key: str) -> tuple[Any, float] | None:
     return result, seconds
 
 
-def _keep(path: Path, key: str, made: tuple[Any, float]) -> None:
+def _keep(
+    path: Path,
+    key: str,
+    made: tuple[Any, float],
+) -> None:
     open_folder(path.parent)
     with writing(path) as temporary:
         write_npz(temporary, key, made)

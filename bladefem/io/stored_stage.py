@@ -10,8 +10,6 @@ import numpy as np
 from ..errors import InputError
 from .array_codec import read_npz
 
-__all__ = ["stored_stage"]
-
 
 def stored_stage(folder: str | Path, name: str) -> Any:
     """The result of a stage.

@@ -14,10 +14,12 @@ from scipy.linalg import block_diag
 from ..data import PortModel
 from ..errors import InputError
 
-__all__ = ["folded_diameter", "join", "pair_model", "pair_models", "recombine", "wheel_models"]
 
-
-def folded_diameter(harmonic: int, engine_order: int, sectors: int) -> tuple[int, bool]:
+def folded_diameter(
+    harmonic: int,
+    engine_order: int,
+    sectors: int,
+) -> tuple[int, bool]:
     """Nodal diameter 0..N/2 in which a harmonic moves, and whether the conjugate of that diameter's
     modes is meant.
     """
@@ -25,7 +27,11 @@ def folded_diameter(harmonic: int, engine_order: int, sectors: int) -> tuple[int
     return (sectors - n, True) if 2 * n > sectors else (n, False)
 
 
-def pair_model(body: PortModel, following: slice | np.ndarray, phase: float) -> PortModel:
+def pair_model(
+    body: PortModel,
+    following: slice | np.ndarray,
+    phase: float,
+) -> PortModel:
     """The body whose contact rows `following` belong to the next blade, which moves e^{j phase}
     times as this one.
 
@@ -48,7 +54,10 @@ def pair_model(body: PortModel, following: slice | np.ndarray, phase: float) -> 
 
 
 def pair_models(
-    body: PortModel, following: slice | np.ndarray, phase: float, harmonics: int
+    body: PortModel,
+    following: slice | np.ndarray,
+    phase: float,
+    harmonics: int,
 ) -> tuple[PortModel, ...]:
     """One model a harmonic 0..`harmonics` for blades clamped at their roots, one for all where they
     move in step.

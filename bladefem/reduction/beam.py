@@ -13,8 +13,6 @@ import numpy as np
 from ..data import PortModel
 from .matrices import port_model_from_matrices
 
-__all__ = ["beam_matrices", "reference_blade"]
-
 
 def beam_matrices(
     length: float = 0.15,

@@ -12,8 +12,6 @@ import numpy as np
 
 from ..errors import InputError
 
-__all__ = ["read_ansys", "read_dmig"]
-
 # form of a DMIG matrix of which one triangle is given
 SYMMETRIC = 6
 # types of complex matrices, single and double

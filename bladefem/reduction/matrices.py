@@ -14,8 +14,6 @@ from ..data import PortModel
 from ..errors import InputError
 from .exchange import read_ansys, read_dmig
 
-__all__ = ["port_model_from_matrices", "read_matrices"]
-
 # eigenvalues below this share of the largest one are rigid modes: omega = 0
 RIGID = 1e-10
 # eigenvalues of M below this share of the largest one belong to massless motions
@@ -144,7 +142,10 @@ def _dense(matrix: np.ndarray) -> np.ndarray:
 
 
 def _without_massless(
-    M: np.ndarray, K: np.ndarray, C: np.ndarray | None, P: np.ndarray
+    M: np.ndarray,
+    K: np.ndarray,
+    C: np.ndarray | None,
+    P: np.ndarray,
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray | None, np.ndarray, np.ndarray]:
     """M, K, C and port readings P (p, dofs) on the motions with mass, the others following
     statically, and the flexibility (p, p) of the others.

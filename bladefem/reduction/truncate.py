@@ -8,8 +8,6 @@ from dataclasses import replace
 
 from ..data import PortModel
 
-__all__ = ["truncated"]
-
 
 def truncated(body: PortModel, count: int) -> PortModel:
     """The same body with its lowest `count` modes; exactly what a Rubin reduction with `count`

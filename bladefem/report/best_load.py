@@ -10,8 +10,6 @@ import pandas as pd
 
 from ..study.pipeline.best_load import BestLoad
 
-__all__ = ["best_load_table", "certainty", "flat_range", "found_best", "reasons_against"]
-
 # share of the excitation's work that friction takes at an optimum that is one of damping; below it
 # the amplitude is low for another reason, such as a stiffer blade
 LEAST_FRICTION = 0.05
@@ -134,8 +132,8 @@ def _below_error(best: pd.Series, summary: pd.DataFrame) -> list[str]:
     if gain > error:
         return []
     return [
-        f"it lies {100 * gain:.2g} % below the better of the free and the stuck blade, which is "
-        f"no more than its estimated error of {100 * error:.2g} %"
+        f"it lies {100 * gain:.2g} % below the better of the free and the stuck blade, which is no "
+        f"more than its estimated error of {100 * error:.2g} %"
     ]
 
 

@@ -4,8 +4,6 @@ from __future__ import annotations
 
 import re
 
-__all__ = ["caption_of"]
-
 MODE = re.compile(r"modes/mode_(?P<number>\d+)(?P<wheel>_wheel)?")
 
 CAPTIONS = {

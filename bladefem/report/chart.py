@@ -14,8 +14,6 @@ from ..view.chart import draw_chart, draw_errors
 from .headlines import Headline
 from .write import Page, write_report
 
-__all__ = ["write_chart"]
-
 
 def write_chart(
     chart: Chart,

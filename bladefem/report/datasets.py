@@ -11,8 +11,6 @@ import pandas as pd
 from ..data import PressureMap
 from .tables import units_of
 
-__all__ = ["contact_arrays", "datasets", "mode_shapes", "resultants", "table_dataset"]
-
 MEANING = {
     "force": "contact force on the damper",
     "moment": "its moment about the engine's origin",

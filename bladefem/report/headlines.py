@@ -14,9 +14,6 @@ import pandas as pd
 from .best_load import found_best
 from .statements import Answer
 
-__all__ = ["Headline", "headlines"]
-
-
 # what an answer says in place of a number that the data cannot carry
 UNDETERMINED = "not determined"
 
@@ -128,7 +125,12 @@ def _bracket(finite: pd.DataFrame, best: pd.Series) -> tuple[float | None, float
     return low, high
 
 
-def _between_text(low: float | None, high: float | None, unit: str, factor: float = 1.0) -> str:
+def _between_text(
+    low: float | None,
+    high: float | None,
+    unit: str,
+    factor: float = 1.0,
+) -> str:
     if low is None and high is None:
         return "only one load studied"
     if low is None:
@@ -138,7 +140,11 @@ def _between_text(low: float | None, high: float | None, unit: str, factor: floa
     return f"between {factor * low:.4g} and {factor * high:.4g} {unit}"
 
 
-def _mass_text(low: float | None, high: float | None, load: float) -> str:
+def _mass_text(
+    low: float | None,
+    high: float | None,
+    load: float,
+) -> str:
     """Loads grow in proportion to the mass, and so does their bracket."""
     if low is None or high is None:
         return "open on one side, as the optimum load"

@@ -10,8 +10,6 @@ import pandas as pd
 from ..study.influences import Influence
 from ..study.pipeline.best_load import BestLoad
 
-__all__ = ["influence_sentence", "influence_table"]
-
 NAMES = {
     "kt": "tangential stiffness",
     "kn": "normal stiffness",

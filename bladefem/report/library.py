@@ -13,8 +13,6 @@ from importlib import metadata
 from importlib.util import find_spec
 from pathlib import Path
 
-__all__ = ["Library", "chart_library"]
-
 
 @dataclass(frozen=True)
 class Library:

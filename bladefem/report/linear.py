@@ -12,8 +12,6 @@ import pandas as pd
 from ..data import Patch
 from ..study.pipeline.contact_cycle import ContactCycle
 
-__all__ = ["harmonic_table", "linear_columns", "linear_sentence"]
-
 
 def linear_columns(cycle: ContactCycle) -> dict[str, np.ndarray]:
     """K_ad [N/m], C_ad [N s/m] and F_c0 [N] of each node, for each tangent; nan at rest."""
@@ -63,8 +61,6 @@ def linear_sentence(cycles: Sequence[ContactCycle]) -> str:
     worst = max(cycle.mismatch for cycle in cycles)
     return (
         "K_ad, C_ad and F_c0 of nodes.csv are the linear element closest to each friction element "
-        "at its resonance "
-        "(by harmonic in results.nc, group approximation): the work of a period is that of "
-        "friction, apart by "
-        f"{worst:.0e} of the largest"
+        "at its resonance (by harmonic in results.nc, group approximation): the work of a period "
+        f"is that of friction, apart by {worst:.0e} of the largest"
     )

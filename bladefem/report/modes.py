@@ -29,8 +29,6 @@ from .run import mode_table
 from .tables import write_tables
 from .write import Page, write_report
 
-__all__ = ["PICTURES", "run", "tables_of"]
-
 # modes that are drawn
 PICTURES = 4
 # frequencies on the first screen
@@ -105,7 +103,11 @@ def tables_of(result: Survey) -> dict[str, pd.DataFrame]:
     return out
 
 
-def mac_table(match: np.ndarray, mine: ModeSet, theirs: ModeSet) -> pd.DataFrame:
+def mac_table(
+    match: np.ndarray,
+    mine: ModeSet,
+    theirs: ModeSet,
+) -> pd.DataFrame:
     """One row a mode: its partner in the other run, both frequencies, and the whole row of the MAC
     matrix.
     """
@@ -151,7 +153,11 @@ def _write(
     _report(result, tables, list(drawings))
 
 
-def _report(result: Survey, tables: dict[str, pd.DataFrame], pictures: Sequence[str]) -> None:
+def _report(
+    result: Survey,
+    tables: dict[str, pd.DataFrame],
+    pictures: Sequence[str],
+) -> None:
     """``report_modes.html`` and ``.md``: frequencies first, shapes to rotate, everything else."""
     run = result.run
     folder = Path(run.folder)
@@ -187,7 +193,11 @@ def _entry(name: str) -> str:
     return f"{PLACES.get(stem, 'modes')}/{stem}"
 
 
-def _numbers(excited: ModeSet, families: Sequence[str], result: Survey) -> list[Headline]:
+def _numbers(
+    excited: ModeSet,
+    families: Sequence[str],
+    result: Survey,
+) -> list[Headline]:
     """The first frequencies with the error of the mesh, where that is known."""
     errors = {}
     if result.convergence is not None:
@@ -239,7 +249,9 @@ def _vectors(name: str, u: np.ndarray) -> dict[str, np.ndarray]:
 
 
 def _drawings(
-    result: Survey, tables: dict[str, pd.DataFrame], pictures: int
+    result: Survey,
+    tables: dict[str, pd.DataFrame],
+    pictures: int,
 ) -> dict[str, Callable[[Path], object]]:
     """File name to a function that draws it."""
     run = result.run

@@ -7,8 +7,6 @@ import pandas as pd
 
 from bladefem.scene.tables import Scene
 
-__all__ = ["next_steps"]
-
 # of the damper's own load: nearer to the optimum, another mass changes little
 NEAR = 0.15
 
@@ -44,7 +42,11 @@ def next_steps(
     return steps
 
 
-def _mass_step(best: pd.Series, own: pd.DataFrame | None, several: bool) -> list[str]:
+def _mass_step(
+    best: pd.Series,
+    own: pd.DataFrame | None,
+    several: bool,
+) -> list[str]:
     """Another mass, where the damper's own load is far from the best one."""
     if own is None or several:
         return []

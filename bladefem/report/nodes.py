@@ -18,20 +18,6 @@ from ..view.response import draw_seat_loops
 from ..view.wear import draw_work
 from .linear import linear_columns
 
-__all__ = [
-    "SEATS",
-    "cycles_of",
-    "draw_hysteresis",
-    "draw_wear",
-    "loop_table",
-    "node_table",
-    "save_cycles_vtu",
-    "seat_loops",
-    "wear_sentence",
-    "wear_table",
-]
-
-
 # contact pairs in words, as the pictures of pressure have them
 SEATS = {"this": "right seat", "next": "left seat"}
 
@@ -51,7 +37,9 @@ def cycles_of(result: Run) -> list[ContactCycle]:
 
 
 def node_table(
-    patches: Sequence[Patch], cycles: Sequence[ContactCycle], coefficient: float | None = None
+    patches: Sequence[Patch],
+    cycles: Sequence[ContactCycle],
+    coefficient: float | None = None,
 ) -> pd.DataFrame:
     """One row a contact node and resonance: place, element, shares of the period, state, work a
     period and area (SI).
@@ -114,7 +102,9 @@ def loop_table(cycles: Sequence[ContactCycle]) -> pd.DataFrame:
 
 
 def wear_table(
-    patches: Sequence[Patch], cycles: Sequence[ContactCycle], coefficient: float
+    patches: Sequence[Patch],
+    cycles: Sequence[ContactCycle],
+    coefficient: float,
 ) -> pd.DataFrame:
     """One row a resonance and face: friction work, and the mean and largest depth worn off in an
     hour (SI).
@@ -145,10 +135,8 @@ def wear_sentence(cycles: Sequence[ContactCycle], coefficient: float) -> str:
     worst = max(cycles, key=lambda c: float(c.wear(coefficient).max()))
     return (
         f"wear: up to {1e6 * worst.wear(coefficient).max():.3g} µm in an hour of steady vibration "
-        "at the resonance "
-        f"under {worst.load:g} N, both faces together; depth = {coefficient:.3g} m³/J times the "
-        "friction work an "
-        "area, while pressure and motion stay as they are"
+        f"at the resonance under {worst.load:g} N, both faces together; depth = {coefficient:.3g} "
+        "m³/J times the friction work an area, while pressure and motion stay as they are"
     )
 
 
@@ -174,7 +162,11 @@ def save_cycles_vtu(
     return save_faces_vtu(patches, fields, file)
 
 
-def draw_wear(patches: Sequence[Patch], cycle: ContactCycle, file: Path) -> object:
+def draw_wear(
+    patches: Sequence[Patch],
+    cycle: ContactCycle,
+    file: Path,
+) -> object:
     """Where a period at the resonance of one load wears the faces."""
     return draw_work(
         patches,

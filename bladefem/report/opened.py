@@ -25,8 +25,6 @@ from ..scene.toml import load_scene
 from ..view import contact, modes, response
 from .tables import COLUMNS
 
-__all__ = ["Arrays", "RunFolder", "open_run"]
-
 
 @dataclass(frozen=True, repr=False)
 class Arrays:
@@ -85,7 +83,11 @@ def _selected(data: Any, labels: dict[str, Any]) -> Any:
     return data
 
 
-def _nearest(name: str, known: np.ndarray, wanted: float) -> float:
+def _nearest(
+    name: str,
+    known: np.ndarray,
+    wanted: float,
+) -> float:
     """The label that is meant, round-off apart."""
     same = known[np.isclose(known, wanted, rtol=1e-3, atol=0.0)]
     if not len(same):
@@ -171,7 +173,12 @@ class RunFolder:
         scaled = table[shown] * [COLUMNS[name].factor for name in shown]
         return head + scaled.rename(columns=titles).to_html(index=False, float_format="%.5g")
 
-    def _draw_contact(self, data: Any, file: Any = None, load: float | None = None) -> object:
+    def _draw_contact(
+        self,
+        data: Any,
+        file: Any = None,
+        load: float | None = None,
+    ) -> object:
         """Both seats under one load, the middle one when none is named."""
         loads = data["load"].to_numpy()
         chosen = loads[len(loads) // 2] if load is None else _nearest("load", loads, load)
@@ -187,7 +194,11 @@ class RunFolder:
         return contact.draw_pressure(maps, file, title=title)
 
     def _draw_modes(
-        self, data: Any, file: Any = None, mode: int = 1, nodal_diameter: int | None = None
+        self,
+        data: Any,
+        file: Any = None,
+        mode: int = 1,
+        nodal_diameter: int | None = None,
     ) -> object:
         """One mode on the sector, of the excited nodal diameter when none is named."""
         known = data["nodal_diameter"].to_numpy()
@@ -252,7 +263,11 @@ def _draw_response(data: Any, file: Any = None, **options: Any) -> object:
     return response.draw_responses(table, file, **options)
 
 
-def _draw_resonance(data: Any, file: Any = None, ax: Any = None) -> object:
+def _draw_resonance(
+    data: Any,
+    file: Any = None,
+    ax: Any = None,
+) -> object:
     """Amplitude of each harmonic, a line a load."""
     with response.canvas(file, ax) as ax:
         if "mass" in data.dims:
@@ -268,7 +283,11 @@ def _draw_resonance(data: Any, file: Any = None, ax: Any = None) -> object:
         return ax.figure
 
 
-def _draw_cycle(data: Any, file: Any = None, ax: Any = None) -> object:
+def _draw_cycle(
+    data: Any,
+    file: Any = None,
+    ax: Any = None,
+) -> object:
     """Mean shares of the period in stick, slip and separation over load, weighted by area."""
     with response.canvas(file, ax) as ax:
         if "mass" in data.dims:

@@ -7,8 +7,6 @@ from collections.abc import Iterator
 import numpy as np
 import pandas as pd
 
-__all__ = ["page_tables", "without_roundoff"]
-
 # below this share of the largest entry of a column or vector a number is round-off
 ROUNDOFF = 1e-12
 # columns of a vector that share their scale

@@ -27,8 +27,6 @@ from .datasets import resultants, table_dataset
 from .tables import write_tables
 from .write import write_report
 
-__all__ = ["PairRun", "pair_summary", "run"]
-
 
 @dataclass(frozen=True)
 class PairRun:
@@ -43,7 +41,10 @@ class PairRun:
 
 
 def run(
-    scene: Scene, folder: str | Path, comm: Any = None, progress: Progress = unwatched
+    scene: Scene,
+    folder: str | Path,
+    comm: Any = None,
+    progress: Progress = unwatched,
 ) -> PairRun:
     """Mesh and pressures on all ranks, the folder on rank 0.
 
@@ -169,7 +170,11 @@ def _write(scene: Scene, result: PairRun) -> None:
     )
 
 
-def _draw(scene: Scene, result: PairRun, file: Path) -> None:
+def _draw(
+    scene: Scene,
+    result: PairRun,
+    file: Path,
+) -> None:
     """Pressure over the radius, with the closed form drawn as a curve of its own."""
     largest = max(result.states, key=lambda s: s.load)
     edge = largest.radius[1]

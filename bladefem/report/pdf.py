@@ -10,8 +10,6 @@ from pathlib import Path
 
 from bladefem.errors import InputError, NotSolvedError
 
-__all__ = ["browser_command", "print_pdf", "require_browser"]
-
 BROWSERS = ("chromium", "chromium-browser", "google-chrome", "google-chrome-stable", "chrome")
 # a page of pictures prints in seconds
 PATIENCE_SECONDS = 300
@@ -37,9 +35,8 @@ def require_browser() -> list[str]:
     command = browser_command()
     if command is None:
         raise InputError(
-            "--pdf: no Chromium was found, expected one of "
-            f"{', '.join(BROWSERS)} (Debian: apt install chromium); any browser prints "
-            "report.html as well"
+            f"--pdf: no Chromium was found, expected one of {', '.join(BROWSERS)} (Debian: apt "
+            "install chromium); any browser prints report.html as well"
         )
     return command
 

@@ -25,8 +25,6 @@ from .headlines import Headline
 from .tables import units_of, write_tables
 from .write import Page, write_report
 
-__all__ = ["PICTURE", "draw_seats", "pressure_table", "run", "write_points"]
-
 PICTURE = "pressure_on_both_seats"
 MESH_STEP = (
     "Halve mesh.contact_size and compare the mean pressure and the pressed share before numbers "
@@ -38,7 +36,10 @@ Maps = Mapping[float, Sequence[PressureMap]]
 
 
 def run(
-    scene: Scene, folder: str | Path, comm: Any = None, progress: Progress = unwatched
+    scene: Scene,
+    folder: str | Path,
+    comm: Any = None,
+    progress: Progress = unwatched,
 ) -> pipeline.Run:
     """Seat the damper under each load and write the pressures into the folder.
 
@@ -67,7 +68,11 @@ def write_points(folder: Path, maps: Maps) -> None:
     contact.save_pressure_vtu(maps, folder / "pressure.vtu")
 
 
-def draw_seats(maps: Maps, load: float, file: Path) -> object:
+def draw_seats(
+    maps: Maps,
+    load: float,
+    file: Path,
+) -> object:
     """The picture of both seats under one of the loads."""
     return contact.draw_pressure(
         maps[load], file, title=f"contact pressure under {load:g} N per seat"
@@ -91,7 +96,11 @@ def _write(result: pipeline.Run) -> None:
         )
 
 
-def _report(result: pipeline.Run, table: pd.DataFrame, load: float) -> None:
+def _report(
+    result: pipeline.Run,
+    table: pd.DataFrame,
+    load: float,
+) -> None:
     """``report_contact.html`` and ``.md``: pressures of one load first, then all of them."""
     folder = Path(result.folder)
     rows = table[table["load"] == load]

@@ -17,8 +17,6 @@ from ..study.pipeline.linear_limits import Limit
 from ..study.pipeline.loads import Curve
 from .tables import units_of
 
-__all__ = ["curve_arrays", "loop_arrays", "node_arrays", "resonance_arrays"]
-
 LOAD = {"units": "N", "long_name": "static normal force on each seat; 0 no damper, inf full stick"}
 # of the response table: name to long name
 CURVES = {
@@ -87,7 +85,12 @@ def resonance_arrays(curves: Sequence[Curve], limits: Sequence[Limit] = ()) -> A
     return _with_mass_units(data)
 
 
-def _one_resonance(load: float, mass: float | None, frequency: float, probe: np.ndarray) -> Any:
+def _one_resonance(
+    load: float,
+    mass: float | None,
+    frequency: float,
+    probe: np.ndarray,
+) -> Any:
     import xarray as xr
 
     data = xr.Dataset(

@@ -62,17 +62,18 @@ from .tables import units_of, write_tables
 from .wheel import blade_table, pattern_drawings, pattern_sentences, pattern_table
 from .write import Page, write_report
 
-__all__ = ["run", "write_run"]
-
 MESH = (
     "the estimated errors are those of modes, harmonics, samples, contact points and damper "
-    "model; the mesh's part "
-    "is shown by 'bladefem modes --converge' (frequencies) and 'bladefem chart --mesh' (resonance)"
+    "model; the mesh's part is shown by 'bladefem modes --converge' (frequencies) and 'bladefem "
+    "chart --mesh' (resonance)"
 )
 
 
 def run(
-    scene: Scene, folder: str | Path, comm: Any = None, progress: Progress = unwatched
+    scene: Scene,
+    folder: str | Path,
+    comm: Any = None,
+    progress: Progress = unwatched,
 ) -> pipeline.Run:
     """Everything: mesh, modes, contact, responses, and the folder with pictures and report.
 
@@ -87,7 +88,9 @@ def run(
 
 
 def write_run(
-    result: pipeline.Run, comm: Any = None, progress: Progress = unwatched
+    result: pipeline.Run,
+    comm: Any = None,
+    progress: Progress = unwatched,
 ) -> pipeline.Run:
     """Write the folder of a finished run, on rank 0; returns the run with the time that it took."""
     start = time.perf_counter()
@@ -164,7 +167,9 @@ def _write(result: pipeline.Run, progress: Progress) -> None:
 
 
 def _live(
-    result: pipeline.Run, tables: dict[str, pd.DataFrame], cycles: list[ContactCycle]
+    result: pipeline.Run,
+    tables: dict[str, pd.DataFrame],
+    cycles: list[ContactCycle],
 ) -> dict[str, dict[str, Any]]:
     """Figures to hover over and rotate, by the names of the pictures that they replace."""
     excited = excited_set(result)
@@ -229,8 +234,7 @@ def _beyond_stick(result: pipeline.Run) -> list[str]:
     return (
         [
             "resonances above that of full stick: contact points that the static load leaves open "
-            "close in vibration, "
-            "and count as open in full stick"
+            "close in vibration, and count as open in full stick"
         ]
         if above
         else []
@@ -349,7 +353,11 @@ def _by_mass(points: pd.DataFrame) -> list[tuple[str, pd.DataFrame]]:
     ]
 
 
-def mode_table(sets: list[ModeSet], geometry: Mesh, clamped: ModeSet | None = None) -> pd.DataFrame:
+def mode_table(
+    sets: list[ModeSet],
+    geometry: Mesh,
+    clamped: ModeSet | None = None,
+) -> pd.DataFrame:
     """One row a mode of each nodal diameter, named after the clamped blade's modes where these are
     given.
     """

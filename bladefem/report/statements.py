@@ -13,8 +13,6 @@ from bladefem.scene.units import show
 
 from .best_load import certainty, flat_range, found_best, reasons_against
 
-__all__ = ["Answer", "answer", "assumed_stiffness", "trust", "wrong_speed"]
-
 # of the resonance frequency: farther off, an engine order does not drive it
 APART = 0.1
 # relative difference below which a load was itself studied; own loads are rounded to four digits
@@ -178,7 +176,11 @@ def assumed_stiffness(scene: Scene) -> list[str]:
     ]
 
 
-def best_mass(best: pd.Series, each: float, masses: pd.DataFrame | None) -> tuple[str, str]:
+def best_mass(
+    best: pd.Series,
+    each: float,
+    masses: pd.DataFrame | None,
+) -> tuple[str, str]:
     """The mass for the best load, with its band where friction takes part in the seating.
 
     Args:
@@ -207,11 +209,9 @@ def wrong_speed(scene: Scene, summary: pd.DataFrame | None) -> list[str]:
     rpm = scene.operation.speed * 30 / np.pi
     return [
         f"At {rpm:.5g} rpm engine order {scene.excitation.engine_order} excites at {excited:.5g} "
-        "Hz and does not "
-        f"meet these resonances: with the stiffness of this speed they belong to "
+        "Hz and does not meet these resonances: with the stiffness of this speed they belong to "
         f"{rpm * peaks.min() / excited:.4g} to {rpm * peaks.max() / excited:.4g} rpm. 'bladefem "
-        "modes --campbell' "
-        "shows where they cross."
+        "modes --campbell' shows where they cross."
     ]
 
 
@@ -247,7 +247,10 @@ def energy(best: pd.Series) -> str:
 
 
 def cautions(
-    finite: pd.DataFrame, best: pd.Series, points: pd.DataFrame | None, exact: bool = False
+    finite: pd.DataFrame,
+    best: pd.Series,
+    points: pd.DataFrame | None,
+    exact: bool = False,
 ) -> list[str]:
     """Why the answer may not be the optimum.
 
@@ -275,9 +278,8 @@ def cautions(
     if cut:
         named = ", ".join(f"{load:.4g} N" for load in cut)
         found.append(
-            f"For {len(cut)} of {len(finite)} loads ({named}) the highest point lies at the end "
-            "of the "
-            "frequency band, so that no resonance was seen; widen study.band."
+            f"For {len(cut)} of {len(finite)} loads ({named}) the highest point lies at the end of "
+            "the frequency band, so that no resonance was seen; widen study.band."
         )
     return found
 
@@ -317,8 +319,7 @@ def trust(points: pd.DataFrame | None) -> tuple[list[str], pd.DataFrame]:
     if (~good).any():
         text.append(
             f"{int((~good).sum())} points did NOT converge. They are marked by crosses in the "
-            "charts and "
-            "take no part in any peak or optimum."
+            "charts and take no part in any peak or optimum."
         )
     if fallback.any():
         used = points.loc[fallback, "method"].value_counts()
@@ -330,7 +331,11 @@ def trust(points: pd.DataFrame | None) -> tuple[list[str], pd.DataFrame]:
     return text, doubtful_loads(points, good, fallback)
 
 
-def doubtful_loads(points: pd.DataFrame, good: pd.Series, fallback: pd.Series) -> pd.DataFrame:
+def doubtful_loads(
+    points: pd.DataFrame,
+    good: pd.Series,
+    fallback: pd.Series,
+) -> pd.DataFrame:
     """One row a load that has unconverged points or fallbacks."""
     rows = []
     for load, part in points.groupby("load"):

@@ -18,8 +18,6 @@ from .headlines import Headline
 from .tables import write_tables
 from .write import Page, write_report
 
-__all__ = ["Variant", "study_tables", "write_study"]
-
 
 @dataclass(frozen=True)
 class Variant:
@@ -33,7 +31,9 @@ class Variant:
 
 
 def write_study(
-    name: str, variants: Sequence[Variant], folder: Path
+    name: str,
+    variants: Sequence[Variant],
+    folder: Path,
 ) -> tuple[pd.DataFrame, list[Path]]:
     """Write study and study_loads (CSV, Markdown, LaTeX) and study.png; returns the table of values
     and the files.

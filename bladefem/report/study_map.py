@@ -15,8 +15,6 @@ from .study import Variant, study_tables
 from .tables import write_tables
 from .write import Page, write_report
 
-__all__ = ["band_of", "write_map", "write_scatter"]
-
 UNPRINTED = ["halved", "harmonics"]
 
 
@@ -62,7 +60,9 @@ def write_map(
 
 
 def write_scatter(
-    names: Sequence[str], variants: Sequence[Variant], folder: Path
+    names: Sequence[str],
+    variants: Sequence[Variant],
+    folder: Path,
 ) -> tuple[pd.DataFrame, list[Path]]:
     """Write study, study_loads, study.png (a band over the loads) and the page; returns the table
     of the band and the files.

@@ -11,8 +11,6 @@ import pandas as pd
 
 from bladefem.io.stage_cache import write_table, write_text
 
-__all__ = ["COLUMNS", "Column", "readable", "to_latex", "to_markdown", "units_of", "write_tables"]
-
 
 class Column(NamedTuple):
     """How a column of SI numbers is shown."""

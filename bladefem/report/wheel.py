@@ -15,17 +15,6 @@ from ..study.mistuning.pattern_response import PatternResponse
 from ..view import wheel as view
 from ..wheel.statistics import Amplification, best_load, quantile
 
-__all__ = [
-    "SHARES",
-    "blade_table",
-    "pattern_drawings",
-    "pattern_sentences",
-    "pattern_table",
-    "scatter_drawings",
-    "scatter_sentences",
-    "scatter_table",
-]
-
 # quantiles of a scatter
 SHARES = (0.5, 0.95, 0.99)
 

@@ -32,8 +32,6 @@ from .page_tables import page_tables
 from .statements import answer, assumed_stiffness, trust, wrong_speed
 from .tables import numeric, readable, to_markdown
 
-__all__ = ["SECTIONS", "Page", "inputs_hash", "write_report"]
-
 SECTIONS = {
     "answer": "Answer",
     "response": "Forced response",
@@ -197,7 +195,11 @@ def _shown_tables(
     return statements, shown
 
 
-def _answer(scene: Scene, tables: Mapping[str, pd.DataFrame], page: Page) -> dict[str, Any]:
+def _answer(
+    scene: Scene,
+    tables: Mapping[str, pd.DataFrame],
+    page: Page,
+) -> dict[str, Any]:
     """First numbers, and what to do next."""
     summary = tables.get("response/summary")
     points = tables.get("response/points")
@@ -252,7 +254,10 @@ def _sections(
 
 
 def _figure(
-    name: str, file: str | Path, numbers: Iterator[int], keys: Mapping[str, str]
+    name: str,
+    file: str | Path,
+    numbers: Iterator[int],
+    keys: Mapping[str, str],
 ) -> dict[str, Any]:
     return {
         "number": next(numbers),
@@ -262,7 +267,11 @@ def _figure(
     }
 
 
-def printed(name: str, table: pd.DataFrame, number: int) -> dict[str, Any]:
+def printed(
+    name: str,
+    table: pd.DataFrame,
+    number: int,
+) -> dict[str, Any]:
     """A table as text, cut to the longest that a page should hold."""
     text = readable(table.head(LONGEST))
     return {

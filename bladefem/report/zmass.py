@@ -26,8 +26,6 @@ from .datasets import resultants, table_dataset
 from .tables import units_of, write_tables
 from .write import write_report
 
-__all__ = ["MassRun", "draw_motions", "motion_table", "run"]
-
 
 @dataclass(frozen=True)
 class MassRun:
@@ -43,7 +41,10 @@ class MassRun:
 
 
 def run(
-    scene: Scene, folder: str | Path, comm: Any = None, progress: Progress = unwatched
+    scene: Scene,
+    folder: str | Path,
+    comm: Any = None,
+    progress: Progress = unwatched,
 ) -> MassRun:
     """Pressure on all ranks, motions and folder on rank 0.
 
@@ -87,7 +88,11 @@ def motion_table(found: list[tuple[Drive, Steady]]) -> pd.DataFrame:
     return pd.DataFrame(rows)
 
 
-def draw_motions(found: list[tuple[Drive, Steady]], loops: Path, spectra: Path) -> None:
+def draw_motions(
+    found: list[tuple[Drive, Steady]],
+    loops: Path,
+    spectra: Path,
+) -> None:
     """The pictures of Fig. 10 and 11."""
     shown: dict[str, tuple[np.ndarray, np.ndarray, int]] = {}
     lines: dict[str, tuple[np.ndarray, np.ndarray]] = {}

@@ -11,15 +11,6 @@ from ..errors import InputError, suggestion
 from .tables import Scene
 from .units import is_plain, parse, readable_units, shortened, show
 
-__all__ = [
-    "Field",
-    "convert",
-    "each_field",
-    "field_at",
-    "split_values",
-    "value_at",
-]
-
 # of one field: every load is a sweep of its own
 MOST_VALUES = 1000
 QUESTION = "did you mean '"
@@ -130,7 +121,8 @@ def _str(value: object, field: Field) -> str:
     choices = field.meta.get("choices") or ()
     if choices and value not in choices:
         raise InputError(
-            f"{field.name} = {shortened(repr(value))}: expected one of {', '.join(choices)}{_near(value, choices)}"
+            f"{field.name} = {shortened(repr(value))}: expected one of "
+            f"{', '.join(choices)}{_near(value, choices)}"
         )
     return value
 
@@ -138,7 +130,11 @@ def _str(value: object, field: Field) -> str:
 _SCALARS = {float: _float, int: _int, bool: _bool, str: _str}
 
 
-def _tuple(value: object, kinds: tuple, field: Field) -> tuple:
+def _tuple(
+    value: object,
+    kinds: tuple,
+    field: Field,
+) -> tuple:
     items = _items(value)
     length = None if kinds[-1] is Ellipsis else len(kinds)
     if length is not None and len(items) != length:
@@ -180,7 +176,11 @@ def _items(value: object) -> list:
     return list(value) if hasattr(value, "__iter__") else [value]
 
 
-def _in_range(number: Any, field: Field, written: object = "") -> Any:
+def _in_range(
+    number: Any,
+    field: Field,
+    written: object = "",
+) -> Any:
     low = field.meta.get("low")
     high = field.meta.get("high")
     unit = field.meta.get("unit") or "1"
@@ -195,7 +195,11 @@ def _in_range(number: Any, field: Field, written: object = "") -> Any:
     )
 
 
-def _between(number: float, low: float | None, high: float | None) -> bool:
+def _between(
+    number: float,
+    low: float | None,
+    high: float | None,
+) -> bool:
     """Within a range, round-off apart: "10 um" is 9.999...e-06."""
     return (low is None or number >= low - 1e-12 * abs(low)) and (
         high is None or number <= high + 1e-12 * abs(high)

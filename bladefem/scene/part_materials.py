@@ -11,8 +11,6 @@ from ..errors import InputError, suggestion
 from .fields import convert, field_at
 from .tables import Material, Scene
 
-__all__ = ["part_materials"]
-
 
 def part_materials(scene: Scene) -> dict[str, Material]:
     """Material of each volume that ``imported.materials`` names; what a text leaves out is as in
@@ -28,8 +26,8 @@ def part_materials(scene: Scene) -> dict[str, Material]:
         name = "_".join(name.lower().split())
         if not colon or not name or not values.strip() or name in found:
             raise InputError(
-                f"imported.materials = {text!r}: expected one text for each volume, such as "
-                "'disc: E=114 GPa; nu=0.34; rho=4430 kg/m^3'"
+                f"imported.materials = {text!r}: expected one text for each volume, such as 'disc: "
+                "E=114 GPa; nu=0.34; rho=4430 kg/m^3'"
             )
         found[name] = replace(
             scene.material.blade, **dict(_value(item, text) for item in values.split(";"))

@@ -8,8 +8,6 @@ from ..errors import InputError, suggestion
 from .tables import Support
 from .units import parse
 
-__all__ = ["area_springs", "held_letters"]
-
 LETTERS = ("x", "y", "z")
 SPRINGS = ("normal", "tangential")
 
@@ -24,8 +22,8 @@ def area_springs(support: Support) -> Iterator[tuple[str, float, float]]:
         face, colon, values = (part.strip() for part in text.partition(":"))
         if not colon or not face or not values:
             raise InputError(
-                f"support.springs = {text!r}: expected one text for each face, such as "
-                "'root: normal=1e12 N/m^3; tangential=5e11 N/m^3'"
+                f"support.springs = {text!r}: expected one text for each face, such as 'root: "
+                "normal=1e12 N/m^3; tangential=5e11 N/m^3'"
             )
         found = dict(_stiffness(item, text) for item in values.split(";"))
         yield face, found.get("normal", 0.0), found.get("tangential", 0.0)
@@ -43,8 +41,8 @@ def held_letters(support: Support) -> list[tuple[str, str]]:
         letters = letters.replace(",", "").replace(" ", "").lower()
         if not colon or not face or not letters or set(letters) - set(LETTERS):
             raise InputError(
-                f"support.directions = {text!r}: expected one text for each face, such as "
-                "'rim: z' or 'foot: xy'"
+                f"support.directions = {text!r}: expected one text for each face, such as 'rim: z' "
+                "or 'foot: xy'"
             )
         found.append((face, letters))
     return found

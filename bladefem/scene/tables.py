@@ -23,23 +23,6 @@ from geometry.parameters import (
 )
 from geometry.quantity import quantity
 
-__all__ = [
-    "Contact",
-    "Excitation",
-    "Foundation",
-    "Imported",
-    "Material",
-    "Materials",
-    "Mistuning",
-    "Model",
-    "Operation",
-    "Scene",
-    "Seat",
-    "Solver",
-    "Study",
-    "Support",
-]
-
 
 @dataclass(frozen=True)
 class Material:
@@ -107,8 +90,8 @@ class Contact:
         "N/m^3",
         1.0,
         1e15,
-        "tangential contact stiffness for each unit of area; by Mindlin from the normal "
-        "one, 40 N/mm^3 without either",
+        "tangential contact stiffness for each unit of area; by Mindlin from the normal one, 40 "
+        "N/mm^3 without either",
     )
     kt: float | None = quantity(None, "N/m", 1.0, 1e12, "tangential stiffness of one whole patch")
     kn_area: float | None = quantity(
@@ -132,8 +115,8 @@ class Contact:
         "Pa",
         1.0,
         1e12,
-        "pressure at which the layer is twice as stiff as at first touch; a linear layer when left "
-        "out",
+        "pressure at which the layer is twice as stiff as at first touch; a linear layer when "
+        "left out",
     )
     points: int | None = quantity(
         None, "1", 1, 5000, "friction elements on each patch; all mesh nodes when left out"
@@ -172,8 +155,8 @@ class Contact:
         "m^3/J",
         0.0,
         1e-6,
-        "worn volume for each joule of friction work (m^3/J is m^2/N); Archard's "
-        "coefficient over mu",
+        "worn volume for each joule of friction work (m^3/J is m^2/N); Archard's coefficient over "
+        "mu",
     )
     left: Seat = field(default_factory=Seat)
     right: Seat = field(default_factory=Seat)
@@ -319,8 +302,8 @@ class Model:
         "1",
         0,
         1000,
-        "nodal diameters of the mode tables; when left out those "
-        "that the engine order excites ('bladefem modes': all)",
+        "nodal diameters of the mode tables; when left out those that the engine order excites "
+        "('bladefem modes': all)",
     )
 
 
@@ -411,7 +394,7 @@ class Imported:
     )
     materials: tuple[str, ...] | None = quantity(
         None,
-        help="materials of named volumes, as texts like 'disc: E=114 GPa; nu=0.34; rho=4430 kg/m^3'",
+        help="materials of named volumes: 'disc: E=114 GPa; nu=0.34; rho=4430 kg/m^3'",
     )
     names: tuple[str, ...] | None = quantity(
         None,

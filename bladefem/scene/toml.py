@@ -21,8 +21,6 @@ from .tables import Imported, Scene
 from .units import exact, shortened, show
 from .validate import validate
 
-__all__ = ["Row", "dump", "given_keys", "load_scene", "read_tables", "resolved", "scene_of", "vary"]
-
 
 class Row(NamedTuple):
     """One line of the resolved table."""
@@ -180,7 +178,11 @@ def dump(scene: Scene) -> str:
     return "\n".join(lines) + "\n"
 
 
-def _build(table: type, data: dict[str, Any], path: str) -> Any:
+def _build(
+    table: type,
+    data: dict[str, Any],
+    path: str,
+) -> Any:
     hints = get_type_hints(table)
     leaves = {f.name: f for f in each_field(table, path)}
     values = {}
@@ -214,7 +216,11 @@ def _split(override: str) -> tuple[str, str]:
     return name.strip(), value.strip().strip("'\"")
 
 
-def _put(tables: dict[str, Any], name: str, value: str) -> None:
+def _put(
+    tables: dict[str, Any],
+    name: str,
+    value: str,
+) -> None:
     field_at(name)
     *heads, last = name.split(".")
     for head in heads:
@@ -224,7 +230,12 @@ def _put(tables: dict[str, Any], name: str, value: str) -> None:
     tables[last] = value
 
 
-def _replace(table: Any, path: list[str], value: object, name: str) -> Any:
+def _replace(
+    table: Any,
+    path: list[str],
+    value: object,
+    name: str,
+) -> Any:
     head, *rest = path
     hints = get_type_hints(type(table))
     if head not in hints:

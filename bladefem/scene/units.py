@@ -15,8 +15,6 @@ from numbers import Real
 
 from ..errors import InputError
 
-__all__ = ["exact", "is_plain", "parse", "readable_units", "shortened", "show"]
-
 # unit: (factor to SI, exponents of kg, m, s, rad)
 _UNITS = {
     "m": (1.0, (0, 1, 0, 0)),
@@ -93,7 +91,11 @@ _POWER = re.compile(r"(.+?)\^?(-?\d)?")
 LONGEST_UNIT = 60
 
 
-def parse(value: object, unit: str = "1", name: str = "value") -> float:
+def parse(
+    value: object,
+    unit: str = "1",
+    name: str = "value",
+) -> float:
     """The SI number of "140 mm" or of a plain number, which is SI already.
 
     Args:
@@ -171,7 +173,11 @@ def exact(value: float, unit: str = "1") -> str:
     return f"{float(value)!r} {'' if unit in ('', '1') else unit}".rstrip()
 
 
-def _split(value: object, unit: str, name: str) -> tuple[float, str]:
+def _split(
+    value: object,
+    unit: str,
+    name: str,
+) -> tuple[float, str]:
     if isinstance(value, Real) and not isinstance(value, bool):
         try:
             return float(value), ""

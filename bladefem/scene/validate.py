@@ -20,9 +20,6 @@ from .tables import Scene
 from .units import show
 from .validate_contact import contact_problems
 
-__all__ = ["refuse_given_mesh", "refuse_response", "validate"]
-
-
 # constants of an orthotropic solid
 CONSTANTS = 9
 
@@ -91,8 +88,7 @@ def refuse_response(scene: Scene) -> None:
     if not scene.operation.damping > 0:
         raise InputError(
             "operation.damping = 0: expected above 0 for a response, a resonance without damping "
-            "has no "
-            "bounds"
+            "has no bounds"
         )
     if not scene.excitation.force > 0:
         raise InputError("excitation.force = 0 N: expected above 0 N for a response")
@@ -117,14 +113,13 @@ def _numerics(scene: Scene) -> Iterator[str]:
         yield from at_most("mesh.contact_size", mesh.contact_size, mesh.size, "mesh.size")
     if mesh.seat_elements is not None and not kind_named(scene.kind).has_seat_grid:
         yield (
-            f"mesh.seat_elements = {mesh.seat_elements}: only the seats of kind 'wedge sector' "
-            "are meshed in a grid"
+            f"mesh.seat_elements = {mesh.seat_elements}: only the seats of kind 'wedge sector' are "
+            "meshed in a grid"
         )
     if model.samples == 0 and not kind_named(scene.kind).has_one_tangent:
         yield (
             "model.samples = 0: changes of contact state are located exactly in plane models "
-            "only, expected at "
-            "least 16"
+            "only, expected at least 16"
         )
     if model.samples is not None and 0 < model.samples < 16:
         yield f"model.samples = {model.samples}: expected 16 to 65536, or 0 in plane models"
@@ -157,6 +152,6 @@ def _excitation(scene: Scene) -> Iterator[str]:
     mode = scene.excitation.mode
     if modes is not None and mode > modes:
         yield (
-            f"excitation.mode = {mode}: expected at most model.modes = {modes}, the modes that "
-            "are kept"
+            f"excitation.mode = {mode}: expected at most model.modes = {modes}, the modes that are "
+            "kept"
         )

@@ -9,8 +9,6 @@ from .kinds import kind_named
 from .tables import Scene, Seat
 from .units import show
 
-__all__ = ["contact_problems"]
-
 SHAPE = ("crown", "crown_across", "edge_radius", "edge_width")
 
 
@@ -26,8 +24,7 @@ def contact_problems(scene: Scene) -> Iterator[str]:
                 if getattr(side, key) is not None:
                     yield (
                         f"{name}.{key}: contact.stiffness = 'map' takes the normal stiffness from "
-                        "the pressure "
-                        "map, expected only one of the two"
+                        "the pressure map, expected only one of the two"
                     )
     yield from _interval(scene)
     yield from _without_layer(scene)
@@ -36,8 +33,7 @@ def contact_problems(scene: Scene) -> Iterator[str]:
     if shaped and contact.bedded:
         yield (
             f"contact.{shaped[0]} = {show(getattr(contact, shaped[0]), 'm')}: bedded seats have "
-            "lost their shape by "
-            "wear, expected contact.bedded = false beside it"
+            "lost their shape by wear, expected contact.bedded = false beside it"
         )
     if contact.crown is not None and scene.kind == "plane blades":
         yield (

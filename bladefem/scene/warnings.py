@@ -9,8 +9,6 @@ from .part_materials import part_materials
 from .tables import Material, Scene
 from .units import show
 
-__all__ = ["doubts"]
-
 # Young's modulus [Pa]: plastics to diamond
 STIFF = (1e9, 1e12)
 # density [kg/m^3]: foam to osmium
@@ -39,8 +37,8 @@ def _material(name: str, material: Material) -> Iterator[str]:
         yield f"{name}.E = {show(material.E, 'Pa')}: solids for machines have 1 to 1000 GPa"
     if not DENSE[0] <= material.rho <= DENSE[1]:
         yield (
-            f"{name}.rho = {show(material.rho, 'kg/m^3')}: solids for machines have 500 to "
-            "25000 kg/m^3"
+            f"{name}.rho = {show(material.rho, 'kg/m^3')}: solids for machines have 500 to 25000 "
+            "kg/m^3"
         )
 
 
@@ -51,8 +49,8 @@ def _speed(scene: Scene) -> Iterator[str]:
         if speed > FASTEST:
             yield (
                 f"operation.speed = {show(scene.operation.speed, 'rad/s')}: the {name} at "
-                f"{show(radius, 'm')} moves "
-                f"with {speed:.0f} m/s, more than the {FASTEST:.0f} m/s that wheels stand"
+                f"{show(radius, 'm')} moves with {speed:.0f} m/s, more than the {FASTEST:.0f} m/s "
+                "that wheels stand"
             )
             return
 

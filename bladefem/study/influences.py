@@ -36,8 +36,6 @@ from .adaptive.settings import Settings
 from .pipeline.assemble_model import LoadCase
 from .pipeline.best_load import BestLoad, find_best_load
 
-__all__ = ["Influence", "Parameter", "influences", "parameters_of", "seat_friction_range"]
-
 # factor on each side of a stiffness that the scene gives: a joint measured twice
 GIVEN_STIFFNESS = 2.0
 # the same where a measured range of other joints stands in for it
@@ -176,7 +174,11 @@ def _coarse(settings: Settings) -> Settings:
     return replace(settings, **least, chosen=())
 
 
-def _rescaled(one: Influence, quick: BestLoad, best: BestLoad) -> Influence:
+def _rescaled(
+    one: Influence,
+    quick: BestLoad,
+    best: BestLoad,
+) -> Influence:
     """The changes of one best load, put on the values of another."""
     values = [np.array([b.load, b.amplitude, b.frequency]) for b in (quick, best)]
     ratio = values[1] / values[0]
@@ -192,13 +194,24 @@ class _Study:
     family_of: Callable[[LoadCase], Family]
     changed: ChangedCases
 
-    def model(self, name: str, factor: float, load: float) -> ReducedModel:
+    def model(
+        self,
+        name: str,
+        factor: float,
+        load: float,
+    ) -> ReducedModel:
         """The model of one load with a parameter changed."""
         case = self.changed(name, factor)(load)
         model = member(self.family_of(case), self.best.settings).model
         return vary(model, "damping", factor) if name == "damping" else model
 
-    def peak(self, name: str, factor: float, load: float, near: Peak | None = None) -> Peak:
+    def peak(
+        self,
+        name: str,
+        factor: float,
+        load: float,
+        near: Peak | None = None,
+    ) -> Peak:
         """Its resonance."""
         settings = self.best.settings
         omega = 2 * np.pi * self.best.frequency if near is None else near.omega
@@ -212,13 +225,23 @@ class _Study:
             options=replace(sufficient(self.scene.accuracy), tolerance=1e-9),
         )
 
-    def by_load(self, peak: Peak, name: str, factor: float, load: float) -> float:
+    def by_load(
+        self,
+        peak: Peak,
+        name: str,
+        factor: float,
+        load: float,
+    ) -> float:
         """Derivative of ln height by ln load, the seating solved anew."""
         case_at = self.changed(name, factor)
         ends = [case_at(load * f).elements for f in (1 - STEP, 1 + STEP)]
         return self._by_elements(peak, self.model(name, factor, load), ends)
 
-    def by_parameter(self, peak: Peak, name: str) -> float:
+    def by_parameter(
+        self,
+        peak: Peak,
+        name: str,
+    ) -> float:
         """Derivative of ln height at the best load by the logarithm of a parameter."""
         model = self.model(name, 1.0, self.best.load)
         if name == "damping":
@@ -227,7 +250,12 @@ class _Study:
         ends = [self.changed(name, f)(self.best.load).elements for f in (1 - STEP, 1 + STEP)]
         return self._by_elements(peak, model, ends)
 
-    def _by_elements(self, peak: Peak, model: ReducedModel, ends: list) -> float:
+    def _by_elements(
+        self,
+        peak: Peak,
+        model: ReducedModel,
+        ends: list,
+    ) -> float:
         """The same from the friction elements on both sides of a step."""
         case = self.changed("kt", 1.0)(self.best.load)
         groups = member(self.family_of(case), self.best.settings).groups
@@ -242,7 +270,12 @@ class _Study:
         gradients = node_gradients(model, peak.solution, names)
         return sum(float(gradients[name] @ rates[name]) for name in names) / peak.height
 
-    def by_frequency(self, model: ReducedModel, peak: Peak, beside: float = 0.0) -> float:
+    def by_frequency(
+        self,
+        model: ReducedModel,
+        peak: Peak,
+        beside: float = 0.0,
+    ) -> float:
         """Derivative of the height by the circular frequency at the frequency of a peak, or a share
         of it beside.
         """
@@ -259,7 +292,13 @@ class _Study:
             raise NotSolvedError(f"influence at {peak.solution.frequency:.6g} Hz: {point.reason}")
         return float(sensitivities(model, point, ["omega"])["omega"].size[0])
 
-    def influence(self, parameter: Parameter, base: Peak, bend: float, tilt: float) -> Influence:
+    def influence(
+        self,
+        parameter: Parameter,
+        base: Peak,
+        bend: float,
+        tilt: float,
+    ) -> Influence:
         """All three derivatives of one parameter.
 
         Args:
@@ -294,7 +333,11 @@ class _Study:
         for i, factor in enumerate((one.parameter.low, one.parameter.high)):
             name = one.parameter.name
 
-            def family_of(case: LoadCase, name: str = name, factor: float = factor) -> Family:
+            def family_of(
+                case: LoadCase,
+                name: str = name,
+                factor: float = factor,
+            ) -> Family:
                 family = self.family_of(case)
                 if name != "damping":
                     return family

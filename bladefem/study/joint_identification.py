@@ -17,8 +17,6 @@ from scipy.optimize import least_squares
 from ..errors import InputError
 from ..friction.closed_form import jenkins
 
-__all__ = ["PARAMETERS", "JointFit", "fit_joint", "joint_curve"]
-
 # frequency with the joint stuck [Hz], damping without friction [1], joint's share of the modal
 # stiffness [1], amplitude at which all of it slips [m], exponent of the distribution [1]
 PARAMETERS = ("stuck_frequency", "damping", "share", "full_slip", "exponent")

@@ -11,8 +11,6 @@ from ..errors import InputError
 from ..scene.fields import convert, field_at, split_values
 from ..scene.units import exact
 
-__all__ = ["Range", "halton_values", "read_ranges"]
-
 MOST_SAMPLES = 1000
 
 

@@ -19,8 +19,6 @@ from bladefem.errors import InputError
 from ..friction.states import SIGNED_SEPARATED, SIGNED_STICK
 from .system import System
 
-__all__ = ["CODES", "Flow", "State", "integrate_periods", "state_at_rest", "stuck_start"]
-
 # of the normal force: states change once they are wrong by more than rounding
 ROUNDING_SHARE = 1e-12
 CODES = {0: "done", 1: "too many events in one step: the states chatter"}

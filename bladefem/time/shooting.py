@@ -16,8 +16,6 @@ import numpy as np
 from .event_integrator import Flow, State, integrate_periods, stuck_start
 from .system import System
 
-__all__ = ["Periodic", "floquet_multipliers", "period_work", "periodic_solution", "probe_harmonics"]
-
 
 @dataclass(frozen=True)
 class Periodic:
@@ -104,7 +102,11 @@ def floquet_multipliers(solution: Periodic) -> np.ndarray:
     return values[np.argsort(-np.abs(values))]
 
 
-def probe_harmonics(solution: Periodic, system: System, highest: int) -> np.ndarray:
+def probe_harmonics(
+    solution: Periodic,
+    system: System,
+    highest: int,
+) -> np.ndarray:
     """Complex harmonics 0..highest of the probe (k, highest + 1) [m], Re(c e^{j h w t})."""
     return _fourier_rows(solution.flow.q @ system.probe.T, highest)
 
@@ -133,7 +135,11 @@ def _fourier_rows(signal: np.ndarray, highest: int) -> np.ndarray:
     return lines
 
 
-def _unknown_scales(system: System, omega: float, state: State) -> np.ndarray:
+def _unknown_scales(
+    system: System,
+    omega: float,
+    state: State,
+) -> np.ndarray:
     """Sizes of (q, v, z): one length for q and z each, the velocity by the base frequency."""
     d = len(state.q)
     n = len(state.z)
@@ -146,7 +152,11 @@ def _pack_state(state: State) -> np.ndarray:
     return np.r_[state.q, state.v, state.z]
 
 
-def _period_residual(now: Flow, state: State, scale: np.ndarray) -> float:
+def _period_residual(
+    now: Flow,
+    state: State,
+    scale: np.ndarray,
+) -> float:
     return (
         float(np.abs((_pack_state(now.state) - _pack_state(state)) / scale).max())
         if now.reason == "done"
@@ -154,7 +164,11 @@ def _period_residual(now: Flow, state: State, scale: np.ndarray) -> float:
     )
 
 
-def _newton_step(now: Flow, state: State, scale: np.ndarray) -> np.ndarray:
+def _newton_step(
+    now: Flow,
+    state: State,
+    scale: np.ndarray,
+) -> np.ndarray:
     """Least-norm step in the scaled unknowns, back in their units."""
     J = (now.tangent - np.eye(len(scale))) * (scale / scale[:, None])
     return (

@@ -23,8 +23,6 @@ from bladefem.data import Elements, PortModel
 from bladefem.errors import InputError
 from bladefem.friction.law_table import require_coulomb
 
-__all__ = ["System", "blade_ring", "damper_on_platforms", "friction_oscillator"]
-
 
 @dataclass(frozen=True)
 class System:
@@ -117,16 +115,15 @@ def blade_ring(
     if np.abs(body.residual).max() > 0:
         raise InputError(
             "body.residual: a massless flexibility has no place in time integration; keep all "
-            "modes, or "
-            "replace it by zeros"
+            "modes, or replace it by zeros"
         )
     m = len(body.omega)
     n = len(elements.kt)
     contact = body.shapes[body.ports["contact"]]
     if contact.shape[0] != n or n % 2 or np.iscomplexobj(contact):
         raise InputError(
-            f"contact port of {contact.shape[0]} dofs for {n} elements: expected two equal "
-            "halves, real"
+            f"contact port of {contact.shape[0]} dofs for {n} elements: expected two equal halves, "
+            "real"
         )
     size = m + 1
     half = n // 2
@@ -166,7 +163,11 @@ def blade_ring(
     )
 
 
-def damper_on_platforms(motion: np.ndarray, elements: Elements, mass: float) -> System:
+def damper_on_platforms(
+    motion: np.ndarray,
+    elements: Elements,
+    mass: float,
+) -> System:
     """A rigid damper with one degree of freedom on platforms whose motion is prescribed (the
     paper's Fig. 13).
 
@@ -201,7 +202,11 @@ def damper_on_platforms(motion: np.ndarray, elements: Elements, mass: float) -> 
 
 
 def friction_oscillator(
-    omega: float, ratio: float, kt: float, limit: float, force: complex
+    omega: float,
+    ratio: float,
+    kt: float,
+    limit: float,
+    force: complex,
 ) -> System:
     """One unit mass on a spring, with one friction element to the ground: the smallest system of
     its kind.

@@ -7,8 +7,6 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 from importlib import import_module
 
-__all__ = ["loader"]
-
 
 def loader(package: str, where: Mapping[str, str]) -> Callable[[str], object]:
     """What a package's ``__getattr__`` has to be.

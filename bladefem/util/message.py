@@ -4,8 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 
-__all__ = ["LEVELS", "Message", "by_level", "method", "warning"]
-
 # in the order in which a report prints them
 LEVELS = ("warning", "information", "method", "timing")
 
@@ -20,7 +18,11 @@ class Message(str):
 
     level: str
 
-    def __new__(cls, text: str, level: str = "information") -> Message:
+    def __new__(
+        cls,
+        text: str,
+        level: str = "information",
+    ) -> Message:
         """A sentence of one of LEVELS."""
         if level not in LEVELS:
             raise ValueError(f"level {level!r}: expected one of {', '.join(LEVELS)}")

@@ -11,8 +11,6 @@ import sys
 from collections.abc import Callable, Iterable, Iterator
 from typing import Any, TypeVar
 
-__all__ = ["Progress", "unwatched", "wanted", "watch"]
-
 T = TypeVar("T")
 # of a terminal that does not know its own
 SIZE = {"ncols": 80, "nrows": 24}

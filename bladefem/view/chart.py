@@ -13,8 +13,6 @@ from .labels import names_apart
 from .response import draw_accuracy
 from .style import canvas, log_axis
 
-__all__ = ["draw_chart", "draw_errors"]
-
 ERRORS = {
     "error": "resonance amplitude",
     "error_frequency": "resonance frequency",

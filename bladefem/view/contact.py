@@ -20,21 +20,6 @@ from bladefem.data import Patch, PressureMap
 from .skin import split_faces
 from .style import COLOURS, canvas, headline
 
-__all__ = [
-    "OPEN",
-    "PRESSURE_COLOURS",
-    "arrangement",
-    "colour_pressure",
-    "draw_pressure",
-    "label_outer",
-    "pressure_points",
-    "pressure_summary",
-    "save_faces_vtu",
-    "save_pressure_vtu",
-    "seat_name",
-    "unfold",
-]
-
 PRESSURE_COLOURS = "inferno_r"
 # faces that nothing presses
 OPEN = "#e6e6e6"
@@ -121,7 +106,9 @@ def save_pressure_vtu(states: Mapping[float, Sequence[PressureMap]], file: str |
 
 
 def save_faces_vtu(
-    patches: Sequence[Patch], fields: Mapping[str, np.ndarray], file: str | Path
+    patches: Sequence[Patch],
+    fields: Mapping[str, np.ndarray],
+    file: str | Path,
 ) -> Path:
     """Write fields (nodes of all patches,) on the faces, with areas and normals, as a VTU file for
     ParaView.
@@ -161,7 +148,10 @@ def unfold(patch: Patch, points: np.ndarray | None = None) -> np.ndarray:
 
 
 def draw_pressure(
-    seats: Sequence[PressureMap], file: str | Path | None = None, *, title: str = ""
+    seats: Sequence[PressureMap],
+    file: str | Path | None = None,
+    *,
+    title: str = "",
 ) -> object:
     """The pressure on each face, unfolded, with a common colour scale; a curve for plane models;
     returns the figure.
@@ -225,12 +215,15 @@ def caption(seat: PressureMap, between: str = ",\n") -> str:
     row = pressure_summary([seat]).iloc[0]
     return (
         f"{seat_name(seat.patch)}: {row.force:.4g} N, peak {row.peak_pressure / 1e6:.3g} "
-        f"MPa{between}"
-        f"{100 * row.contact_share:.0f} % of {1e6 * row.area:.3g} mm² pressed"
+        f"MPa{between}{100 * row.contact_share:.0f} % of {1e6 * row.area:.3g} mm² pressed"
     )
 
 
-def draw_face(ax: Any, seat: PressureMap, peak: float) -> None:
+def draw_face(
+    ax: Any,
+    seat: PressureMap,
+    peak: float,
+) -> None:
     """One face in its plane: pressure in colour, nodes as dots, peak and centre marked."""
     xy = 1e3 * unfold(seat.patch)
     pressure = seat.pressure / 1e6
@@ -247,7 +240,12 @@ def draw_face(ax: Any, seat: PressureMap, peak: float) -> None:
     ax.grid(False)
 
 
-def colour_pressure(ax: Any, xy: np.ndarray, seat: PressureMap, norm: Normalize) -> bool:
+def colour_pressure(
+    ax: Any,
+    xy: np.ndarray,
+    seat: PressureMap,
+    norm: Normalize,
+) -> bool:
     """Pressure [MPa] in colour over xy (n, 2); grey where no corner of a face is pressed, which is
     returned.
     """
@@ -268,7 +266,11 @@ def colour_pressure(ax: Any, xy: np.ndarray, seat: PressureMap, norm: Normalize)
     return not closed.all()
 
 
-def draw_line(ax: Any, seat: PressureMap, peak: float) -> None:
+def draw_line(
+    ax: Any,
+    seat: PressureMap,
+    peak: float,
+) -> None:
     """The face of a plane model: pressure over arc length."""
     xy = 1e3 * unfold(seat.patch)
     # The face of a plane model lies along t1 or the slope, whichever is the longer in the picture.

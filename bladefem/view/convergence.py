@@ -12,8 +12,6 @@ import pandas as pd
 
 from .style import COLOURS, canvas
 
-__all__ = ["draw_convergence"]
-
 
 def draw_convergence(
     points: pd.DataFrame,
@@ -51,7 +49,12 @@ def draw_convergence(
         return ax.figure
 
 
-def _draw_mode(ax: Any, line: pd.DataFrame, row: Any, colour: str) -> None:
+def _draw_mode(
+    ax: Any,
+    line: pd.DataFrame,
+    row: Any,
+    colour: str,
+) -> None:
     """Points, and the fit or dots."""
     h = 1e3 * line["size"].to_numpy()
     change = 100 * (line["frequency"].to_numpy() / row.frequency - 1)

@@ -9,8 +9,6 @@ import numpy as np
 
 from .style import COLOURS
 
-__all__ = ["angle", "length", "note", "shape"]
-
 DIMENSION = COLOURS[0]
 Point = Sequence[float]
 
@@ -24,7 +22,12 @@ def shape(ax: Any, corners: np.ndarray, colour: str = "#d5dbe1", **style: Any) -
 
 
 def length(
-    ax: Any, start: Point, end: Point, text: str, away: float = 0.0, beside: float = 0.0
+    ax: Any,
+    start: Point,
+    end: Point,
+    text: str,
+    away: float = 0.0,
+    beside: float = 0.0,
 ) -> None:
     """A dimension line from ``start`` to ``end``, moved to its left by ``away``, with the text on
     its outer side.
@@ -86,7 +89,13 @@ def length(
 
 
 def angle(
-    ax: Any, centre: Point, start: float, end: float, radius: float, text: str, rays: bool = True
+    ax: Any,
+    centre: Point,
+    start: float,
+    end: float,
+    radius: float,
+    text: str,
+    rays: bool = True,
 ) -> None:
     """An arc between two directions [rad] with a label outside of its middle."""
     turn = np.linspace(start, end, 40)
@@ -117,7 +126,12 @@ def angle(
     )
 
 
-def note(ax: Any, point: Point, text: str, offset: tuple[float, float]) -> None:
+def note(
+    ax: Any,
+    point: Point,
+    text: str,
+    offset: tuple[float, float],
+) -> None:
     """A label with a thin pointer to a point; the offset is in points."""
     ax.annotate(
         text,

@@ -9,8 +9,6 @@ import pandas as pd
 
 from .style import COLOURS, canvas, log_axis
 
-__all__ = ["draw_forced"]
-
 
 def draw_forced(
     points: pd.DataFrame,

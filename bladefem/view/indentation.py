@@ -18,8 +18,6 @@ from bladefem.data import PressureMap
 from .contact import OPEN, PRESSURE_COLOURS, colour_pressure
 from .style import COLOURS, canvas, headline
 
-__all__ = ["draw_indentation"]
-
 # radius [m], pressure [Pa]
 Curve = tuple[np.ndarray, np.ndarray]
 
@@ -66,12 +64,21 @@ def draw_indentation(
         return axes[0, 0].figure
 
 
-def _inner(seat: PressureMap, radius: np.ndarray, edge: float) -> float:
+def _inner(
+    seat: PressureMap,
+    radius: np.ndarray,
+    edge: float,
+) -> float:
     """Largest pressure [Pa] that is no singularity of an edge."""
     return float(seat.pressure[radius < 0.9 * edge].max())
 
 
-def _from_above(ax: Any, seat: PressureMap, edge: float, most: float) -> None:
+def _from_above(
+    ax: Any,
+    seat: PressureMap,
+    edge: float,
+    most: float,
+) -> None:
     peak = float(seat.pressure.max())
     norm = Normalize(0, min(peak, most) / 1e6)
     opened = colour_pressure(ax, 1e3 * seat.patch.points[:, :2], seat, norm)

@@ -9,8 +9,6 @@ import pandas as pd
 
 from .style import COLOURS, canvas
 
-__all__ = ["draw_influences"]
-
 PANELS = (
     ("load", "best load [N]", 1.0),
     ("amplitude", "resonance amplitude [µm]", 1e6),

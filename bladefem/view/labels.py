@@ -7,8 +7,6 @@ from typing import Any
 import numpy as np
 from matplotlib.transforms import Bbox
 
-__all__ = ["names_apart"]
-
 PLACES = (
     (6, 7, "left"),
     (6, -13, "left"),

@@ -12,8 +12,6 @@ import pandas as pd
 from .response import between, load_colours, load_name, pieces_of
 from .style import COLOURS, FAILED
 
-__all__ = ["live_diameters", "live_loops", "live_optimum", "live_responses"]
-
 MICRO = 1e6
 # significant digits of numbers on the page
 DIGITS = 7
@@ -21,7 +19,11 @@ SYMBOLS = ("circle", "diamond", "triangle-up", "square")
 DASHES = {0.0: "dash", np.inf: "dot"}
 
 
-def live_responses(points: pd.DataFrame, title: str = "", per: str = "seat") -> dict[str, Any]:
+def live_responses(
+    points: pd.DataFrame,
+    title: str = "",
+    per: str = "seat",
+) -> dict[str, Any]:
     """Amplitude over frequency, a curve a load, every solved point with its numbers.
 
     Args:
@@ -62,7 +64,11 @@ def live_responses(points: pd.DataFrame, title: str = "", per: str = "seat") -> 
     return {"kind": "chart", "data": data, "layout": layout}
 
 
-def _curve(curve: pd.DataFrame, load: float, colour: str) -> list[dict[str, Any]]:
+def _curve(
+    curve: pd.DataFrame,
+    load: float,
+    colour: str,
+) -> list[dict[str, Any]]:
     """A line that keeps the slopes, and the solved points to hover over."""
     good = curve["converged"].to_numpy(bool)
     frequency = curve["frequency"].to_numpy(float)
@@ -83,7 +89,11 @@ def _curve(curve: pd.DataFrame, load: float, colour: str) -> list[dict[str, Any]
     return [line, {**marks, "legendgroup": name, "showlegend": False}]
 
 
-def _marks(points: pd.DataFrame, name: str, style: dict[str, Any]) -> dict[str, Any]:
+def _marks(
+    points: pd.DataFrame,
+    name: str,
+    style: dict[str, Any],
+) -> dict[str, Any]:
     """Points with their numbers; names come from the scene and are plain text."""
     told = ["load", "method", "estimated_error", "slipping"]
     known = [column for column in told if column in points]
@@ -114,7 +124,9 @@ def _said(column: str, value: Any) -> str:
 
 
 def live_optimum(
-    summary: pd.DataFrame, own: float | None = None, title: str = "optimum load"
+    summary: pd.DataFrame,
+    own: float | None = None,
+    title: str = "optimum load",
 ) -> dict[str, Any]:
     """Resonance amplitude and frequency over load, a curve a damper mass.
 
@@ -156,7 +168,11 @@ def live_optimum(
     return {"kind": "chart", "data": data, "layout": layout}
 
 
-def _optimum_curve(finite: pd.DataFrame, name: str, colour: str) -> list[dict[str, Any]]:
+def _optimum_curve(
+    finite: pd.DataFrame,
+    name: str,
+    colour: str,
+) -> list[dict[str, Any]]:
     """Amplitude with its estimated error above, frequency below."""
     amplitude = MICRO * finite["peak_amplitude"].to_numpy(float)
     error = finite["error"].to_numpy(float) if "error" in finite else np.full(len(finite), np.nan)
@@ -201,7 +217,12 @@ def _level_lines(summary: pd.DataFrame) -> list[dict[str, Any]]:
     return lines
 
 
-def _line(axis: str, value: float, dash: str, label: str) -> dict[str, Any]:
+def _line(
+    axis: str,
+    value: float,
+    dash: str,
+    label: str,
+) -> dict[str, Any]:
     """A line across the upper panel."""
     other = "y" if axis == "x" else "x"
     return {

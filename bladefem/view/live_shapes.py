@@ -15,15 +15,16 @@ from .mesh import view_of
 from .modes import best_phase, mode_title, moving, scale_of
 from .skin import skin
 
-__all__ = ["live_shapes"]
-
 # triangles that a browser still turns smoothly
 MOST_TRIANGLES = 60_000
 LARGEST = 32767
 
 
 def live_shapes(
-    mesh: Mesh, modes: ModeSet, families: Sequence[str] = (), count: int = 4
+    mesh: Mesh,
+    modes: ModeSet,
+    families: Sequence[str] = (),
+    count: int = 4,
 ) -> dict[str, Any] | None:
     """Skin and shapes, for ``page.js``; None where the skin has too many triangles for a page.
 

@@ -11,8 +11,6 @@ from geometry.look import AXES, Look
 
 from .style import LIGHT, aim, canvas, open_plotter, trim
 
-__all__ = ["draw_look"]
-
 # from the object to the eye, in the frame of x radial, z along the engine
 SIDES = ((0.45, -0.75, 0.5), (-0.45, 0.75, -0.5))
 COLOURS = (
@@ -78,7 +76,12 @@ def _frame(look: Look) -> np.ndarray:
     return np.stack([radial, np.cross(z, radial), z])
 
 
-def _number_faces(plotter: Any, look: Look, frame: np.ndarray, side: np.ndarray) -> None:
+def _number_faces(
+    plotter: Any,
+    look: Look,
+    frame: np.ndarray,
+    side: np.ndarray,
+) -> None:
     """The number of each large face on a facet of it that looks at the eye."""
     eye = side / np.linalg.norm(side)
     lift = LIFT * np.ptp(look.box, axis=0).max()

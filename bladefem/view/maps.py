@@ -15,8 +15,6 @@ from matplotlib.patches import Patch as Swatch
 
 from .style import COLOURS, FAILED, SEQUENTIAL, canvas
 
-__all__ = ["draw_map"]
-
 
 def draw_map(
     table: pd.DataFrame,
@@ -89,7 +87,13 @@ def word_colours(codes: np.ndarray, count: int) -> list[str]:
     return ["#dbe2e8" if i == commonest else next(strong) for i in range(count)]
 
 
-def cross_failed(ax: Any, table: pd.DataFrame, cells: pd.DataFrame, x: str, y: str) -> list[Any]:
+def cross_failed(
+    ax: Any,
+    table: pd.DataFrame,
+    cells: pd.DataFrame,
+    x: str,
+    y: str,
+) -> list[Any]:
     """Crosses on points without convergence; the legend entry for them."""
     if "converged" not in table or table["converged"].astype(bool).all():
         return []

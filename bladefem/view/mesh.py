@@ -18,8 +18,6 @@ from .style import COLOURS, canvas, headline, photograph, show_photograph, size_
 if TYPE_CHECKING:
     from pyvista import PolyData, UnstructuredGrid
 
-__all__ = ["draw_mesh", "draw_wheel", "grid", "polydata", "save_vtu", "save_wheel_vtu"]
-
 VTK_NUMBERS = {
     "triangle": 5,
     "triangle6": 22,
@@ -206,7 +204,11 @@ def volume_wheel(mesh: Mesh, count: int) -> UnstructuredGrid:
     )
 
 
-def carry_round(mesh: Mesh, values: np.ndarray, nodal_diameter: int) -> np.ndarray:
+def carry_round(
+    mesh: Mesh,
+    values: np.ndarray,
+    nodal_diameter: int,
+) -> np.ndarray:
     """(count * n, ...) a field on every sector: e^{j n theta k} R^k u, R acting on vectors only.
 
     A real field of nodal diameter 0 stays real; so does N/2.
@@ -221,7 +223,11 @@ def carry_round(mesh: Mesh, values: np.ndarray, nodal_diameter: int) -> np.ndarr
     return np.concatenate(copies)
 
 
-def polydata(surface: Skin, points: np.ndarray | None = None, label: int | None = None) -> PolyData:
+def polydata(
+    surface: Skin,
+    points: np.ndarray | None = None,
+    label: int | None = None,
+) -> PolyData:
     """Triangles for pyvista; only those of one label when given."""
     import pyvista
 
@@ -232,7 +238,9 @@ def polydata(surface: Skin, points: np.ndarray | None = None, label: int | None 
 
 
 def edge_lines(
-    surface: Skin, points: np.ndarray, direction: tuple[float, float, float]
+    surface: Skin,
+    points: np.ndarray,
+    direction: tuple[float, float, float],
 ) -> PolyData:
     """Element edges, drawn a hair nearer to the eye than the faces so that they are not
     swallowed.
@@ -269,7 +277,11 @@ def view_of(
     return (0.0, 0.0, 1.0) if mesh.dimension == 2 else direction
 
 
-def photograph_mesh(mesh: Mesh, direction: tuple[float, float, float], edges: bool) -> np.ndarray:
+def photograph_mesh(
+    mesh: Mesh,
+    direction: tuple[float, float, float],
+    edges: bool,
+) -> np.ndarray:
     """One view of the skin, a colour a body and a named face."""
     surface = skin(mesh)
     parts = [
@@ -314,7 +326,11 @@ def pulled(mesh: Mesh, share: float = 0.07) -> Mesh:
 
 
 def draw_mesh(
-    mesh: Mesh, file: str | Path | None = None, *, title: str = "", edges: bool = True
+    mesh: Mesh,
+    file: str | Path | None = None,
+    *,
+    title: str = "",
+    edges: bool = True,
 ) -> object:
     """Bodies and named faces in colour, as they stand and with the damper pulled away; returns the
     figure.
@@ -378,7 +394,12 @@ def draw_legend(ax: object, mesh: Mesh) -> None:
     ax.set_axis_off()
 
 
-def draw_wheel(mesh: Mesh, file: str | Path | None = None, *, title: str = "") -> object:
+def draw_wheel(
+    mesh: Mesh,
+    file: str | Path | None = None,
+    *,
+    title: str = "",
+) -> object:
     """The full wheel, bodies in colour, the meshed sector marked; returns the figure."""
     wheel = wheel_skin(mesh)
     first = np.arange(len(wheel.triangles)) < len(wheel.triangles) // wheel_count(mesh)

@@ -31,16 +31,6 @@ from .style import (
     size_for,
 )
 
-__all__ = [
-    "animate_wave",
-    "best_phase",
-    "draw_mode",
-    "draw_mode_sheet",
-    "draw_wheel_mode",
-    "mode_title",
-    "save_modes_vtu",
-]
-
 WHEEL_VIEW = (0.0, -0.55, 1.0)
 COMPONENTS = ("radial", "circumferential", "axial")
 # share of the largest displacement below which a sign means nothing
@@ -55,7 +45,11 @@ def best_phase(shape: np.ndarray) -> complex:
     return np.exp(-0.5j * np.angle(square)) if abs(square) > 0 else 1.0 + 0.0j
 
 
-def mode_title(modes: ModeSet, number: int, family: str = "") -> str:
+def mode_title(
+    modes: ModeSet,
+    number: int,
+    family: str = "",
+) -> str:
     """ "mode 1, first flap: 812.4 Hz, nodal diameter 6" (number counts from 0)."""
     diameter = "" if modes.nodal_diameter is None else f", nodal diameter {modes.nodal_diameter}"
     return (
@@ -80,7 +74,12 @@ def scale_of(mesh: Mesh, shape: np.ndarray) -> float:
 
 
 def draw_mode(
-    mesh: Mesh, modes: ModeSet, number: int, file: str | Path | None = None, *, family: str = ""
+    mesh: Mesh,
+    modes: ModeSet,
+    number: int,
+    file: str | Path | None = None,
+    *,
+    family: str = "",
 ) -> object:
     """A mode on its sector: deformed, coloured by magnitude, the undeformed edges behind; returns
     the figure.
@@ -104,7 +103,11 @@ def draw_mode(
         return ax.figure
 
 
-def say_exaggeration(ax: Any, mesh: Mesh, modes: ModeSet) -> None:
+def say_exaggeration(
+    ax: Any,
+    mesh: Mesh,
+    modes: ModeSet,
+) -> None:
     """How much the picture exaggerates."""
     wave = ",\nat the phase of the largest motion" if np.iscomplexobj(modes.shapes) else ""
     ax.figure.supxlabel(f"{exaggeration(mesh)}{wave}", fontsize=7.5, color="#555555")
@@ -118,7 +121,12 @@ def exaggeration(mesh: Mesh) -> str:
     )
 
 
-def add_colour_bar(ax: Any, norm: Normalize, colours: str, label: str) -> None:
+def add_colour_bar(
+    ax: Any,
+    norm: Normalize,
+    colours: str,
+    label: str,
+) -> None:
     """A thin bar to the right of a picture."""
     bar = ax.figure.colorbar(ScalarMappable(norm, colours), ax=ax, shrink=0.6, aspect=30, pad=0.03)
     bar.set_label(label, fontsize=8.5)
@@ -189,15 +197,19 @@ def draw_mode_sheet(
         )
         headline(axes[0, 0].figure, f"first modes{diameter}")
         axes[0, 0].figure.supxlabel(
-            "colour: displacement over its largest value, drawn as "
-            f"{100 * EXAGGERATION:.0f} % of the height",
+            f"colour: displacement over its largest value, drawn as {100 * EXAGGERATION:.0f} % of "
+            "the height",
             fontsize=7.5,
             color="#555555",
         )
         return axes[0, 0].figure
 
 
-def wheel_motion(mesh: Mesh, shape: np.ndarray, nodal_diameter: int) -> tuple[Skin, np.ndarray]:
+def wheel_motion(
+    mesh: Mesh,
+    shape: np.ndarray,
+    nodal_diameter: int,
+) -> tuple[Skin, np.ndarray]:
     """The skin of the wheel and the complex displacement (n, 3) of its points."""
     wheel = wheel_skin(moving(mesh, shape))
     one = wheel.nodes[: len(wheel.nodes) // wheel_count(mesh)]
@@ -206,7 +218,11 @@ def wheel_motion(mesh: Mesh, shape: np.ndarray, nodal_diameter: int) -> tuple[Sk
     )
 
 
-def components(wheel: Skin, motion: np.ndarray, flat: bool = False) -> np.ndarray:
+def components(
+    wheel: Skin,
+    motion: np.ndarray,
+    flat: bool = False,
+) -> np.ndarray:
     """(n, 3) radial, circumferential and axial parts about the z axis; x, y and z for a flat
     row.
     """
@@ -226,7 +242,10 @@ def components(wheel: Skin, motion: np.ndarray, flat: bool = False) -> np.ndarra
 
 
 def wheel_component(
-    mesh: Mesh, wheel: Skin, motion: np.ndarray, component: str | None
+    mesh: Mesh,
+    wheel: Skin,
+    motion: np.ndarray,
+    component: str | None,
 ) -> tuple[str, np.ndarray]:
     """The wanted component of the motion, or the strongest one; scaled to a largest value of 1."""
     parts = components(wheel, motion, flat=mesh.sector is not None and mesh.sector.count == 0)
@@ -338,7 +357,13 @@ def animate_wave(
     return Path(file)
 
 
-def wave_frames(mesh: Mesh, modes: ModeSet, number: int, frames: int, pixels: int):
+def wave_frames(
+    mesh: Mesh,
+    modes: ModeSet,
+    number: int,
+    frames: int,
+    pixels: int,
+):
     """Yield (pixels, pixels, 3) pictures of Re(u e^{j 2 pi k / frames}), k = 0.. frames - 1."""
     wheel, motion = wheel_motion(mesh, modes.shapes[number], modes.nodal_diameter or 0)
     _, signed = wheel_component(mesh, wheel, motion, None)
@@ -357,7 +382,13 @@ def wave_frames(mesh: Mesh, modes: ModeSet, number: int, frames: int, pixels: in
     plotter.close()
 
 
-def save_modes_vtu(mesh: Mesh, modes: ModeSet, file: str | Path, *, volume: bool = False) -> Path:
+def save_modes_vtu(
+    mesh: Mesh,
+    modes: ModeSet,
+    file: str | Path,
+    *,
+    volume: bool = False,
+) -> Path:
     """Write all shapes of a mode set on the full wheel (or on the body alone without a sector)."""
     fields = {f"mode {i + 1}, {f:.6g} Hz": modes.shapes[i] for i, f in enumerate(modes.frequencies)}
     return save_wheel_vtu(mesh, file, fields, modes.nodal_diameter or 0, volume)

@@ -13,8 +13,6 @@ from geometry.parameters import HertzPair, Punch
 from .dimensions import length, note, shape
 from .style import COLOURS, canvas
 
-__all__ = ["draw_hertz", "draw_punch"]
-
 MM = 1e3
 DAMPER = "#e3cfa4"
 
@@ -62,7 +60,12 @@ def _block(ax: Any, wide: float) -> None:
     note(ax, (0.6 * wide, -wide), "clamp", (14, 24))
 
 
-def _axes(ax: Any, wide: float, dimension: int, title: str) -> None:
+def _axes(
+    ax: Any,
+    wide: float,
+    dimension: int,
+    title: str,
+) -> None:
     """The axis and what stands on it."""
     ax.axvline(0, color="#555555", lw=0.8, ls="-.", zorder=3)
     faces = (

@@ -15,18 +15,6 @@ from bladefem.data import PressureMap
 
 from .style import COLOURS, canvas, log_axis
 
-__all__ = [
-    "draw_coupled_loops",
-    "draw_fit",
-    "draw_footprint",
-    "draw_friction_loops",
-    "draw_histories",
-    "draw_mass_loops",
-    "draw_mass_spectra",
-    "draw_peaks",
-    "draw_tip_responses",
-]
-
 MICRO = 1e6
 MILLI = 1e3
 LIMIT = "friction limit of a seat [N]"
@@ -77,7 +65,11 @@ def draw_coupled_loops(
         return axes[0, 0].figure
 
 
-def draw_footprint(seat: PressureMap, points: Footprint, file: str | Path | None = None) -> object:
+def draw_footprint(
+    seat: PressureMap,
+    points: Footprint,
+    file: str | Path | None = None,
+) -> object:
     """Pressure under the mass over its mean, and the contact points with their shares (Fig. 8 and
     9); the figure.
 

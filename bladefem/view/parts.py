@@ -23,8 +23,6 @@ from .dimensions import angle, length, note, shape
 from .pairs import draw_hertz, draw_punch
 from .style import COLOURS, canvas, headline
 
-__all__ = ["PARTS", "draw_aerofoil", "draw_disc", "draw_plane", "draw_platform", "draw_z_mass"]
-
 MM = 1e3
 DAMPER = "#e3cfa4"
 NEXT = "#eceff2"
@@ -36,7 +34,12 @@ def said(table: Any, name: str) -> str:
     return f"{name} {show(getattr(table, name), field.metadata['unit'] or '1')}"
 
 
-def bare(ax: Any, title: str, horizontal: str, vertical: str) -> None:
+def bare(
+    ax: Any,
+    title: str,
+    horizontal: str,
+    vertical: str,
+) -> None:
     """Axes of a drawing: equal scales, no grid."""
     ax.set(aspect="equal", xlabel=f"{horizontal} [mm]", ylabel=f"{vertical} [mm]")
     ax.set_title(title, fontsize=9.5)
@@ -151,7 +154,11 @@ def turned(points: np.ndarray, theta: float) -> np.ndarray:
 
 
 def draw_platform(
-    platform: Platform, shank: Shank, disc: Disc, wedge: Wedge, file: str | Path | None = None
+    platform: Platform,
+    shank: Shank,
+    disc: Disc,
+    wedge: Wedge,
+    file: str | Path | None = None,
 ) -> object:
     """Two neighbouring platforms and the wedge between them, seen along the engine axis; returns
     the figure.
@@ -181,7 +188,11 @@ def draw_platform(
 
 
 def label_platform(
-    ax: Any, platform: Platform, shank: Shank, wedge: Wedge, corners: np.ndarray
+    ax: Any,
+    platform: Platform,
+    shank: Shank,
+    wedge: Wedge,
+    corners: np.ndarray,
 ) -> None:
     """Dimensions of platform and wedge; corners are the flank's foot, inner and outer end and the
     plate's corner.
@@ -218,7 +229,11 @@ def label_platform(
     )
 
 
-def ring(inner: float, outer: float, theta: float) -> np.ndarray:
+def ring(
+    inner: float,
+    outer: float,
+    theta: float,
+) -> np.ndarray:
     """Corners (n, 2) as (circumferential, radial) [mm] of a ring segment between -theta and
     theta.
     """
@@ -247,7 +262,12 @@ def draw_disc(
         return axes[0].figure
 
 
-def draw_front(ax: Any, cut: Any, aerofoil: Aerofoil, disc: Disc) -> None:
+def draw_front(
+    ax: Any,
+    cut: Any,
+    aerofoil: Aerofoil,
+    disc: Disc,
+) -> None:
     """Along the engine axis."""
     shape(ax, ring(disc.bore_radius, disc.rim_radius, cut.theta))
     shape(ax, MM * cut.blade[:, ::-1])
@@ -276,7 +296,12 @@ def draw_front(ax: Any, cut: Any, aerofoil: Aerofoil, disc: Disc) -> None:
 
 
 def draw_meridian(
-    ax: Any, cut: Any, aerofoil: Aerofoil, platform: Platform, shank: Shank, disc: Disc
+    ax: Any,
+    cut: Any,
+    aerofoil: Aerofoil,
+    platform: Platform,
+    shank: Shank,
+    disc: Disc,
 ) -> None:
     """From the side: axial widths and radii."""
     levels = [disc.bore_radius, disc.rim_radius, cut.underside, cut.top, cut.top + aerofoil.span]

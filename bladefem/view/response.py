@@ -21,17 +21,6 @@ from scipy.interpolate import PchipInterpolator
 from .labels import names_apart
 from .style import COLOURS, FAILED, canvas, log_axis
 
-__all__ = [
-    "draw_accuracy",
-    "draw_loops",
-    "draw_optimum",
-    "draw_responses",
-    "draw_seat_loops",
-    "loop_energy",
-    "pareto_front",
-    "pieces_of",
-]
-
 MICRO = 1e6
 
 
@@ -108,7 +97,12 @@ def load_name(load: float) -> str:
     return {0.0: "0 (no damper)", np.inf: "∞ (full stick)"}.get(load, f"{load:.4g} N")
 
 
-def draw_curve(ax: Any, curve: pd.DataFrame, load: float, colour: Any) -> None:
+def draw_curve(
+    ax: Any,
+    curve: pd.DataFrame,
+    load: float,
+    colour: Any,
+) -> None:
     """One load: dots are points that were solved, the line between them keeps their slopes; broken
     where one failed.
     """
@@ -166,7 +160,11 @@ def pieces_of(curve: pd.DataFrame) -> list[tuple[np.ndarray, bool]]:
     return parts
 
 
-def between(x: np.ndarray, y: np.ndarray, steps: int = 8) -> tuple[np.ndarray, np.ndarray]:
+def between(
+    x: np.ndarray,
+    y: np.ndarray,
+    steps: int = 8,
+) -> tuple[np.ndarray, np.ndarray]:
     """A curve through positive points without overshoot (monotone cubics of log y), NaN where a
     point is missing.
     """
@@ -269,7 +267,12 @@ def draw_optimum(
         return axes[0].figure
 
 
-def draw_optimum_curve(axes: Any, table: pd.DataFrame, colour: str, label: str | None) -> None:
+def draw_optimum_curve(
+    axes: Any,
+    table: pd.DataFrame,
+    colour: str,
+    label: str | None,
+) -> None:
     """One damper: two curves, its best load as a star with its numbers."""
     finite = table[(table["load"] > 0) & np.isfinite(table["load"])].sort_values("load")
     amplitude = MICRO * finite["peak_amplitude"]
@@ -349,7 +352,11 @@ def draw_unknown(ax: Any, finite: pd.DataFrame) -> None:
         )
 
 
-def draw_cut(axes: Any, summary: pd.DataFrame, points: pd.DataFrame | None) -> None:
+def draw_cut(
+    axes: Any,
+    summary: pd.DataFrame,
+    points: pd.DataFrame | None,
+) -> None:
     """Hollow marks on peaks that are only the end of the frequency band."""
     if points is None or points.empty:
         return

@@ -11,8 +11,6 @@ import numpy as np
 from bladefem.errors import InputError
 from geometry.mesh import Mesh
 
-__all__ = ["Skin", "outer_faces", "sector_motion", "skin", "split_faces", "wheel_skin"]
-
 # gmsh's node order: corners, then one node on each of these edges.
 EDGES = {
     "triangle": ((0, 1), (1, 2), (2, 0)),
@@ -95,7 +93,11 @@ def outer_faces(cells: np.ndarray, cell_type: str) -> np.ndarray:
     return faces[np.sort(first[count == 1])]
 
 
-def split_faces(faces: np.ndarray, corners: int, coarse: bool = False) -> np.ndarray:
+def split_faces(
+    faces: np.ndarray,
+    corners: int,
+    coarse: bool = False,
+) -> np.ndarray:
     """(nf, m, 3) plane triangles of faces given as a corner loop and, for quadratic faces, a loop
     of mid-side nodes.
     """
@@ -121,7 +123,11 @@ def face_corners(mesh: Mesh) -> int:
     return len(SIDES[shape][0]) if shape in SIDES else CORNERS[shape]
 
 
-def skin(mesh: Mesh, coarse: bool = False, without: tuple[str, ...] = ()) -> Skin:
+def skin(
+    mesh: Mesh,
+    coarse: bool = False,
+    without: tuple[str, ...] = (),
+) -> Skin:
     """The outer triangles of all bodies, labelled by body or named face.
 
     Args:
@@ -152,7 +158,12 @@ def skin(mesh: Mesh, coarse: bool = False, without: tuple[str, ...] = ()) -> Ski
     )
 
 
-def label_faces(faces: np.ndarray, labels: np.ndarray, mesh: Mesh, corners: int) -> np.ndarray:
+def label_faces(
+    faces: np.ndarray,
+    labels: np.ndarray,
+    mesh: Mesh,
+    corners: int,
+) -> np.ndarray:
     """Number of the named face where there is one, of the body elsewhere."""
     labels = labels.copy()
     known = {tuple(row): i for i, row in enumerate(np.sort(faces, axis=1).tolist())}
@@ -163,7 +174,11 @@ def label_faces(faces: np.ndarray, labels: np.ndarray, mesh: Mesh, corners: int)
     return labels
 
 
-def face_edges(faces: np.ndarray, corners: int, coarse: bool) -> np.ndarray:
+def face_edges(
+    faces: np.ndarray,
+    corners: int,
+    coarse: bool,
+) -> np.ndarray:
     """(e, 2) straight pieces of the faces' edges, each once; through the mid-side nodes when there
     are any.
     """

@@ -17,8 +17,6 @@ import pandas as pd
 
 from .style import COLOURS, FAILED, canvas
 
-__all__ = ["draw_campbell", "draw_interference", "draw_nodal_diameters"]
-
 RPM = 60 / (2 * np.pi)
 # not as many as colours, so that a pair comes again late
 MARKERS = "osD^vPX*<>h"
@@ -121,7 +119,12 @@ def diameter_names(table: pd.DataFrame) -> list[tuple[float, str, str]]:
     return names
 
 
-def name_lines(ax: Any, x: float, top: float, names: list[tuple[float, str, str]]) -> None:
+def name_lines(
+    ax: Any,
+    x: float,
+    top: float,
+    names: list[tuple[float, str, str]],
+) -> None:
     """Names beside the right ends of lines, moved apart where they would overlap; a thin line leads
     to a moved one.
     """
@@ -175,7 +178,10 @@ def line_name(rows: pd.DataFrame, mode: Any) -> str:
 
 
 def draw_order_lines(
-    ax: Any, orders: Sequence[int], fastest: float, top: float
+    ax: Any,
+    orders: Sequence[int],
+    fastest: float,
+    top: float,
 ) -> list[tuple[float, str, str]]:
     """Engine-order rays, named where they leave the picture above.
 

@@ -10,8 +10,6 @@ import pandas as pd
 
 from .style import COLOURS, canvas, log_axis
 
-__all__ = ["draw_study"]
-
 MICRO = 1e6
 
 

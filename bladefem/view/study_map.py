@@ -10,8 +10,6 @@ import pandas as pd
 
 from .style import COLOURS, canvas, log_axis
 
-__all__ = ["draw_band", "draw_map"]
-
 MICRO = 1e6
 # luminance below which white letters are read better
 DARK = 0.5
@@ -60,7 +58,12 @@ def draw_map(
         return ax.figure
 
 
-def draw_band(loads: pd.DataFrame, file: str | Path | None = None, *, title: str = "") -> object:
+def draw_band(
+    loads: pd.DataFrame,
+    file: str | Path | None = None,
+    *,
+    title: str = "",
+) -> object:
     """Resonance amplitude over load with its scatter: all samples, the middle 80 %, the median;
     returns the figure.
 

@@ -16,20 +16,6 @@ from matplotlib.figure import Figure
 from matplotlib.text import Text
 from matplotlib.ticker import FuncFormatter, LogLocator, NullFormatter
 
-__all__ = [
-    "COLOURS",
-    "DIVERGING",
-    "FAILED",
-    "SEQUENTIAL",
-    "STYLE",
-    "canvas",
-    "headline",
-    "log_axis",
-    "photograph",
-    "show_photograph",
-    "size_for",
-]
-
 # Okabe and Ito, Color Universal Design (2008); yellow last because it is weak on white.
 COLOURS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9", "#000000", "#F0E442")
 SEQUENTIAL = "viridis"
@@ -115,7 +101,11 @@ def take_words_as_they_are(figure: Any) -> None:
             text.set_parse_math(False)
 
 
-def log_axis(ax: Any, which: str, factor: float = 1.0) -> None:
+def log_axis(
+    ax: Any,
+    which: str,
+    factor: float = 1.0,
+) -> None:
     """A logarithmic "x" or "y" axis with plain numbers, times a factor, also at 2 and 5 when there
     are few decades.
     """
@@ -240,7 +230,10 @@ def show_photograph(
 
 
 def size_for(
-    image: np.ndarray, height: float, beside: float = 0.3, widest: float = 9.0
+    image: np.ndarray,
+    height: float,
+    beside: float = 0.3,
+    widest: float = 9.0,
 ) -> tuple[float, float]:
     """Figure size [inch] for a rendering about ``height`` tall, with room beside it and a line
     above and below.
@@ -259,7 +252,9 @@ def headline(figure: Any, text: str) -> None:
 
 
 def draw_triad(
-    ax: Any, direction: tuple[float, float, float], up: tuple[float, float, float]
+    ax: Any,
+    direction: tuple[float, float, float],
+    up: tuple[float, float, float],
 ) -> None:
     """The three axes as the camera sees them."""
     screen = screen_axes(direction, up)[:2]

@@ -19,8 +19,6 @@ from .contact import arrangement, label_outer, seat_name, unfold
 from .skin import split_faces
 from .style import COLOURS, canvas, headline
 
-__all__ = ["draw_work"]
-
 WORK_COLOURS = "inferno_r"
 MARKS = {
     0: ("o", "separated"),
@@ -79,7 +77,13 @@ def draw_work(
         return figure
 
 
-def _face(ax: Any, patch: Patch, work: np.ndarray, state: np.ndarray, most: float) -> None:
+def _face(
+    ax: Any,
+    patch: Patch,
+    work: np.ndarray,
+    state: np.ndarray,
+    most: float,
+) -> None:
     xy = 1e3 * unfold(patch)
     triangles = split_faces(patch.faces, patch.faces.shape[1]).reshape(-1, 3)
     ax.tripcolor(
@@ -108,7 +112,13 @@ def _face(ax: Any, patch: Patch, work: np.ndarray, state: np.ndarray, most: floa
     ax.grid(False)
 
 
-def _line(ax: Any, patch: Patch, work: np.ndarray, state: np.ndarray, most: float) -> None:
+def _line(
+    ax: Any,
+    patch: Patch,
+    work: np.ndarray,
+    state: np.ndarray,
+    most: float,
+) -> None:
     xy = 1e3 * unfold(patch)
     place = xy[:, np.argmax(np.ptp(xy, axis=0))]
     order = np.argsort(place)

@@ -9,11 +9,13 @@ import numpy as np
 
 from .style import COLOURS, canvas, log_axis
 
-__all__ = ["draw_bands", "draw_blades", "draw_histogram", "draw_wheel_motion"]
-
 
 def draw_blades(
-    amplitude: np.ndarray, deviation: np.ndarray, tuned: float, title: str, file: str | Path
+    amplitude: np.ndarray,
+    deviation: np.ndarray,
+    tuned: float,
+    title: str,
+    file: str | Path,
 ) -> None:
     """Amplitude of each blade over its pattern.
 
@@ -38,7 +40,10 @@ def draw_blades(
 
 
 def draw_wheel_motion(
-    amplitude: np.ndarray, phase: np.ndarray, title: str, file: str | Path
+    amplitude: np.ndarray,
+    phase: np.ndarray,
+    title: str,
+    file: str | Path,
 ) -> None:
     """The wheel seen along its axis: each blade as long as its amplitude, coloured by its phase.
 
@@ -109,7 +114,10 @@ def draw_bands(
 
 
 def draw_histogram(
-    factor: np.ndarray, marks: dict[str, float], title: str, file: str | Path
+    factor: np.ndarray,
+    marks: dict[str, float],
+    title: str,
+    file: str | Path,
 ) -> None:
     """How often an amplification occurs.
 

@@ -1,5 +1,5 @@
-"""Aerodynamic influence between blades: damping and frequency shift of each nodal diameter, flutter,
-and the limit cycle that friction leaves.
+"""Aerodynamic influence between blades: damping and frequency shift of each nodal diameter,
+flutter, and the limit cycle that friction leaves.
 
 A blade mode of mass 1 in nodal diameter d feels -c_d q, c_d a complex stiffness [1/s^2]: its real
 part shifts the squared frequency, its imaginary part over 2 omega^2 is a damping ratio, negative
@@ -17,8 +17,6 @@ import numpy as np
 from ..errors import InputError
 from ..hbm.nonlinear_modes import NonlinearMode
 
-__all__ = ["LimitCycle", "aerodynamic_damping", "influence_of_distance", "limit_cycles"]
-
 
 @dataclass(frozen=True)
 class LimitCycle:
@@ -33,7 +31,10 @@ class LimitCycle:
 
 
 def influence_of_distance(
-    count: int, modes: int, mode: int, coefficients: Mapping[int, complex]
+    count: int,
+    modes: int,
+    mode: int,
+    coefficients: Mapping[int, complex],
 ) -> np.ndarray:
     """(N, modes) `Wheel.influence` from influence coefficients of one mode.
 

@@ -21,16 +21,6 @@ from ..hbm.linear.bodies import Damping
 from ..hbm.linear.woodbury import frequency_independent_parts
 from .model import Wheel
 
-__all__ = [
-    "DiameterParts",
-    "diameter_parts",
-    "modal_flexibility",
-    "modal_impedance",
-    "residual_product",
-    "ring_product",
-    "tuned_product",
-]
-
 # rigid motions that the contact springs resist less than this, relatively, are left out
 UNSEEN = 1e-12
 
@@ -113,7 +103,10 @@ def _port_sizes(wheel: Wheel) -> list[int]:
 
 
 def _residual_and_modes(
-    wheel: Wheel, diameters: list[PortModel], most: int, ports: int
+    wheel: Wheel,
+    diameters: list[PortModel],
+    most: int,
+    ports: int,
 ) -> tuple[np.ndarray, np.ndarray]:
     """R (D, P, P) and L (D, P, k) of the blades and the damper, which moves against them."""
     damper = wheel.damper
@@ -148,7 +141,9 @@ def _port_order(wheel: Wheel, body: PortModel) -> np.ndarray:
 
 
 def _modal_terms(
-    wheel: Wheel, diameters: list[PortModel], most: int
+    wheel: Wheel,
+    diameters: list[PortModel],
+    most: int,
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Squared frequencies (D, k), viscous damping (D, k, k) and loss terms (D, k)."""
     damper = wheel.damper
@@ -176,7 +171,11 @@ def _modal_terms(
     return stiffness, viscous, hysteretic
 
 
-def _damping_matrix(omega: np.ndarray, own: np.ndarray | None, law: Damping) -> np.ndarray:
+def _damping_matrix(
+    omega: np.ndarray,
+    own: np.ndarray | None,
+    law: Damping,
+) -> np.ndarray:
     viscous = np.diag(np.broadcast_to(law.viscous(omega), omega.shape))
     if own is None:
         return viscous
@@ -184,7 +183,11 @@ def _damping_matrix(omega: np.ndarray, own: np.ndarray | None, law: Damping) -> 
 
 
 def _mean_flexibility(
-    stiffness: np.ndarray, L: np.ndarray, springs: np.ndarray, N: np.ndarray, hold: float
+    stiffness: np.ndarray,
+    L: np.ndarray,
+    springs: np.ndarray,
+    N: np.ndarray,
+    hold: float,
 ) -> np.ndarray:
     """(k, k) T of the mean in one nodal diameter: rigid motions are held by a share of what the
     contact springs do, and left out where these do not resist them.
@@ -208,9 +211,13 @@ def _all_diameters(half: np.ndarray, count: int) -> np.ndarray:
     return np.concatenate([half, half[count - len(half) : 0 : -1].conj()])
 
 
-def modal_impedance(parts: DiameterParts, omega: float, harmonics: int) -> np.ndarray:
+def modal_impedance(
+    parts: DiameterParts,
+    omega: float,
+    harmonics: int,
+) -> np.ndarray:
     """(N, H+1, k, k) modal impedance Z of the free bodies at the harmonics of omega [1/s^2]."""
-    count, k = parts.stiffness.shape
+    _count, k = parts.stiffness.shape
     w = omega * np.arange(harmonics + 1)
     Z = 1j * w[None, :, None, None] * parts.viscous[:, None]
     diagonal = parts.stiffness[:, None, :] - (w**2)[None, :, None]
@@ -254,9 +261,15 @@ def residual_product(A: np.ndarray, f: np.ndarray) -> np.ndarray:
 
 
 def tuned_product(
-    parts: DiameterParts, T: np.ndarray, f: np.ndarray, rows: slice, columns: slice
+    parts: DiameterParts,
+    T: np.ndarray,
+    f: np.ndarray,
+    rows: slice,
+    columns: slice,
 ) -> np.ndarray:
-    """(N, rows, H+1) motions of the tuned wheel by forces f (N, columns, H+1), both by diameters."""
+    """(N, rows, H+1) motions of the tuned wheel by forces f (N, columns, H+1), both by
+    diameters.
+    """
     push = parts.U[:, columns].conj().swapaxes(1, 2) @ f
     out = parts.U[:, rows] @ ring_product(T, push)
     out += residual_product(parts.A[:, rows, columns], f)

@@ -11,8 +11,6 @@ from ..friction.aft import evaluate
 from ..friction.kernel_1d_exact import evaluate_exact
 from .model import Wheel
 
-__all__ = ["ContactForces", "contact_forces"]
-
 
 @dataclass(frozen=True)
 class ContactForces:
@@ -34,7 +32,11 @@ class ContactForces:
 
 
 def contact_forces(
-    wheel: Wheel, elements: Elements, w: np.ndarray, samples: int, jacobian: bool = True
+    wheel: Wheel,
+    elements: Elements,
+    w: np.ndarray,
+    samples: int,
+    jacobian: bool = True,
 ) -> ContactForces:
     """Forces for relative displacements w (N, n, d, K) [m].
 

@@ -23,8 +23,6 @@ from .by_diameter import (
 )
 from .model import Pattern, Wheel
 
-__all__ = ["WheelFlexibility", "from_diameters", "to_diameters", "wheel_flexibility"]
-
 
 @dataclass(frozen=True)
 class WheelFlexibility:
@@ -45,7 +43,12 @@ class WheelFlexibility:
         """(N, m, H+1) relative displacements by forces (N, m, H+1) at the contacts [m]."""
         return self.motion(force, self.parts.contact, self.parts.contact)
 
-    def motion(self, force: np.ndarray, rows: slice, columns: slice) -> np.ndarray:
+    def motion(
+        self,
+        force: np.ndarray,
+        rows: slice,
+        columns: slice,
+    ) -> np.ndarray:
         """(N, rows, H+1) motions at some ports by forces (N, columns, H+1) at others [m]."""
         parts = self.parts
         f = to_diameters(force)
@@ -68,7 +71,10 @@ class WheelFlexibility:
 
 
 def wheel_flexibility(
-    wheel: Wheel, omega: float, harmonics: int, pattern: Pattern
+    wheel: Wheel,
+    omega: float,
+    harmonics: int,
+    pattern: Pattern,
 ) -> WheelFlexibility:
     """Flexibility of harmonics 0..H at circular frequency omega [rad/s].
 
@@ -102,7 +108,11 @@ def from_diameters(x: np.ndarray) -> np.ndarray:
     return np.fft.ifft(x, axis=0)
 
 
-def _blade_matrix(parts: DiameterParts, T: np.ndarray, h: int) -> np.ndarray:
+def _blade_matrix(
+    parts: DiameterParts,
+    T: np.ndarray,
+    h: int,
+) -> np.ndarray:
     """(N q, N q) flexibility among the readings of all blades, tuned."""
     count = len(T)
     U = parts.U[:, parts.blade]

@@ -14,8 +14,6 @@ from ..reduction.assemble import pair_model, recombine
 from ..reduction.matrices import port_model_from_matrices
 from .model import Pattern, Wheel, engine_order
 
-__all__ = ["LumpedBlades", "lumped_matrices", "lumped_pattern", "lumped_wheel"]
-
 DISC = 0
 PLATFORM = 1
 TIP = 2
@@ -54,7 +52,13 @@ def lumped_matrices(blades: LumpedBlades) -> tuple[np.ndarray, np.ndarray, np.nd
     return M, K, to_next
 
 
-def lumped_wheel(blades: LumpedBlades, order: int, force: float, kt: float, limit: float) -> Wheel:
+def lumped_wheel(
+    blades: LumpedBlades,
+    order: int,
+    force: float,
+    kt: float,
+    limit: float,
+) -> Wheel:
     """The wheel under an engine order on the tips, with elements of stiffness kt [N/m] and friction
     limit [N]; the stretches of aerofoil and shank are the readings of the port "blade".
     """

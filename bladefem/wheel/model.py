@@ -17,8 +17,6 @@ from ..friction.law_table import select_elements
 from ..hbm.linear.bodies import Damping
 from ..reduction.assemble import pair_model
 
-__all__ = ["Pattern", "Wheel", "engine_order", "frequency_pattern", "tuned_wheel"]
-
 
 @dataclass(frozen=True)
 class Pattern:
@@ -56,8 +54,8 @@ class Pattern:
 class Wheel:
     """A tuned wheel of N sectors with a damper between each sector and the next.
 
-    Contact rows of the sector's ports are pair coordinates (`reduction.assemble.pair_model`): damper
-    s touches blade s and blade s + 1. Harmonic 0 is counted from the preload state, as in
+    Contact rows of the sector's ports are pair coordinates (`reduction.assemble.pair_model`):
+    damper s touches blade s and blade s + 1. Harmonic 0 is counted from the preload state, as in
     `hbm.model.ReducedModel`.
 
     Raises:
@@ -81,7 +79,8 @@ class Wheel:
     # see `hbm.model.ReducedModel`
     hold: float = 1e-3
     coupled: bool = True
-    # (n, tangents) friction force of one damper from which the law starts; elements.t0 when None [N]
+    # (n, tangents) friction force of one damper from which the law starts; elements.t0 when None
+    # [N]
     start: np.ndarray | None = None
 
     def __post_init__(self) -> None:
@@ -181,7 +180,12 @@ def tuned_wheel(
     return Wheel(count, pairs, elements, excitation, **others)
 
 
-def engine_order(count: int, order: int, force: np.ndarray, phase: float = 0.0) -> np.ndarray:
+def engine_order(
+    count: int,
+    order: int,
+    force: np.ndarray,
+    phase: float = 0.0,
+) -> np.ndarray:
     """(N, loads) complex amplitudes of a force pattern with `order` waves round the wheel [N].
 
     Args:
@@ -239,7 +243,11 @@ def pattern_elements(wheel: Wheel, pattern: Pattern) -> Elements:
     return _spread(pattern.elements, wheel.nodes, wheel.count)
 
 
-def _spread(e: Elements, nodes: int, count: int) -> Elements:
+def _spread(
+    e: Elements,
+    nodes: int,
+    count: int,
+) -> Elements:
     total = len(e.kt)
     if total == nodes * count:
         return e

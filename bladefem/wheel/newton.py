@@ -20,8 +20,6 @@ from .flexibility import WheelFlexibility
 from .model import Wheel
 from .preconditioner import Preconditioner, make_preconditioner
 
-__all__ = ["WheelBalance", "WheelNewton", "WheelState", "evaluate_wheel", "newton_wheel"]
-
 # vectors kept by GMRES, and restarts
 BASIS = 60
 RESTARTS = 4
@@ -79,7 +77,11 @@ class WheelNewton:
     reason: str
 
 
-def evaluate_wheel(balance: WheelBalance, w: np.ndarray, jacobian: bool = True) -> WheelState:
+def evaluate_wheel(
+    balance: WheelBalance,
+    w: np.ndarray,
+    jacobian: bool = True,
+) -> WheelState:
     """Forces and residual at w (N, n, d, K)."""
     forces = contact_forces(balance.wheel, balance.elements, w, balance.samples, jacobian)
     residual = w - balance.stuck + flexed(balance.flex, forces.p)
@@ -95,7 +97,10 @@ def flexed(flex: WheelFlexibility, p: np.ndarray) -> np.ndarray:
 
 
 def newton_wheel(
-    balance: WheelBalance, w: np.ndarray, options: Options, merit: str = "step"
+    balance: WheelBalance,
+    w: np.ndarray,
+    options: Options,
+    merit: str = "step",
 ) -> WheelNewton:
     """Solve the balance from the displacements w (N, n, d, K).
 
@@ -147,7 +152,11 @@ class _Steps:
         self.stale = self.products - before > SLOW
         return found, not failed
 
-    def next_length(self, state: WheelState, residual: np.ndarray) -> float:
+    def next_length(
+        self,
+        state: WheelState,
+        residual: np.ndarray,
+    ) -> float:
         """Length of the step that the derivative at `state` would take from another residual."""
         found, _ = self._solve(state, residual, ROUGH * np.linalg.norm(residual))
         return float(np.linalg.norm(found))
@@ -157,7 +166,10 @@ class _Steps:
         self.stale = False
 
     def _solve(
-        self, state: WheelState, residual: np.ndarray, goal: float
+        self,
+        state: WheelState,
+        residual: np.ndarray,
+        goal: float,
     ) -> tuple[np.ndarray, bool]:
         shape = state.residual.shape
         flat = (shape[0], -1, shape[3])
@@ -178,7 +190,10 @@ class _Steps:
 
 
 def _search(
-    balance: WheelBalance, state: WheelState, steps: _Steps, merit: str
+    balance: WheelBalance,
+    state: WheelState,
+    steps: _Steps,
+    merit: str,
 ) -> tuple[WheelState | None, str]:
     """The first halving of the step that lowers the merit, or None and why."""
     step, solved = steps.step(state)

@@ -14,14 +14,16 @@ from ..hbm.model import ReducedModel
 from ..reduction.assemble import join
 from .model import Pattern, Wheel, pattern_elements
 
-__all__ = ["one_body_model"]
-
 # residual flexibility of the blade readings over that of their modes: no deviation acts on it
 NEGLIGIBLE = 1e-9
 PORTS = ("contact", "blade", "load", "probe")
 
 
-def one_body_model(wheel: Wheel, pattern: Pattern, coupled_damping: bool = False) -> ReducedModel:
+def one_body_model(
+    wheel: Wheel,
+    pattern: Pattern,
+    coupled_damping: bool = False,
+) -> ReducedModel:
     """The balance's model of all sectors, blade after blade in every port.
 
     Args:
@@ -118,7 +120,11 @@ def _real_residual(wheel: Wheel) -> np.ndarray:
 
 
 def _mistuned(
-    pattern: Pattern, omega: np.ndarray, shapes: np.ndarray, residual: np.ndarray, rows: np.ndarray
+    pattern: Pattern,
+    omega: np.ndarray,
+    shapes: np.ndarray,
+    residual: np.ndarray,
+    rows: np.ndarray,
 ) -> tuple[np.ndarray, np.ndarray]:
     """Eigenvalues and vectors of the mistuned wheel in its tuned modes."""
     K = np.diag(omega**2)

@@ -17,8 +17,6 @@ from scipy import linalg
 from ..friction.fourier import to_complex, to_real
 from .flexibility import WheelFlexibility, from_diameters, to_diameters
 
-__all__ = ["Preconditioner", "make_preconditioner"]
-
 # |T N| from which a harmonic is dynamically amplified, and couples all diameters; the mean does
 # always, since dampers that slip throughout have nearly no stiffness in it
 AMPLIFIED = 3.0
@@ -104,7 +102,12 @@ def _harmonic_part(change: np.ndarray, harmonics: int) -> np.ndarray:
     return C
 
 
-def _dense_factors(flex: WheelFlexibility, C: np.ndarray, h: int, kept: np.ndarray) -> tuple:
+def _dense_factors(
+    flex: WheelFlexibility,
+    C: np.ndarray,
+    h: int,
+    kept: np.ndarray,
+) -> tuple:
     """LU factors (N k', N k') of T^-1 + U^H C U + U_b^H E U_b over all nodal diameters."""
     parts = flex.parts
     count = len(C)

@@ -13,8 +13,6 @@ import numpy as np
 
 from ..errors import InputError
 
-__all__ = ["WheelPeak", "find_wheel_peak"]
-
 # points added to the first grid before the search is given up
 MOST = 40
 # points closer than this are not told apart, relative
@@ -50,7 +48,11 @@ class WheelPeak:
         return self.omegas[0] < self.omega < self.omegas[-1]
 
 
-def find_wheel_peak(respond: Respond, grid: np.ndarray, tolerance: float = 5e-3) -> WheelPeak:
+def find_wheel_peak(
+    respond: Respond,
+    grid: np.ndarray,
+    tolerance: float = 5e-3,
+) -> WheelPeak:
     """The highest amplitude over a band.
 
     Args:

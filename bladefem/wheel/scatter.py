@@ -15,8 +15,6 @@ from ..data import Elements
 from ..errors import InputError
 from .model import Pattern, Wheel
 
-__all__ = ["Scatter", "drawn_patterns", "element_factors", "read_pattern"]
-
 # standard deviations beyond which nothing is drawn: parts outside are sorted out
 LARGEST = 3.0
 
@@ -109,7 +107,11 @@ def read_pattern(path: str | Path, count: int) -> tuple[list[str], np.ndarray]:
     return names, values
 
 
-def _numbers(path: Path, rows: Sequence[Sequence[str]], columns: int) -> np.ndarray:
+def _numbers(
+    path: Path,
+    rows: Sequence[Sequence[str]],
+    columns: int,
+) -> np.ndarray:
     for i, row in enumerate(rows):
         if len(row) != columns:
             raise InputError(
@@ -132,7 +134,11 @@ def _check_order(path: Path, numbers: np.ndarray) -> None:
         )
 
 
-def _normal(wheels: int, columns: int, seed: int) -> np.ndarray:
+def _normal(
+    wheels: int,
+    columns: int,
+    seed: int,
+) -> np.ndarray:
     """(wheels, columns) of the normal distribution, cut off."""
     sequence = qmc.Sobol(columns, scramble=True, seed=seed)
     power = int(np.ceil(np.log2(max(wheels, 2))))

@@ -16,8 +16,6 @@ from .model import Pattern, Wheel, pattern_elements
 from .newton import WheelBalance, WheelNewton, evaluate_wheel, newton_wheel
 from .tuned import tuned_displacements
 
-__all__ = ["TUNED", "WheelSolution", "free_wheel", "solve_wheel", "stuck_wheel", "sweep_wheel"]
-
 TUNED = Pattern()
 # modal damping ratios within which a solved neighbour is the best start: resonances of a mistuned
 # wheel are that narrow
@@ -102,7 +100,9 @@ def solve_wheel(
 
 
 def _attempts(
-    balance: WheelBalance, start: WheelSolution | None, options: Options
+    balance: WheelBalance,
+    start: WheelSolution | None,
+    options: Options,
 ) -> tuple[WheelNewton, str]:
     """The first attempt that converges, or the best one, with the cost of all."""
     wheel = balance.wheel
@@ -135,8 +135,8 @@ def _attempts(
 
 
 def _held(balance: WheelBalance, options: Options) -> np.ndarray | None:
-    """Displacements of the wheel whose means stay in the preload state: dampers that slip throughout
-    drift far on nearly no force, which hides the way to the solution.
+    """Displacements of the wheel whose means stay in the preload state: dampers that slip
+    throughout drift far on nearly no force, which hides the way to the solution.
     """
     key = "held means"
     wheel = balance.wheel
@@ -150,7 +150,12 @@ def _held(balance: WheelBalance, options: Options) -> np.ndarray | None:
     return end.state.w if end.converged else None
 
 
-def _tuned(wheel: Wheel, omega: float, H: int, samples: int) -> np.ndarray | None:
+def _tuned(
+    wheel: Wheel,
+    omega: float,
+    H: int,
+    samples: int,
+) -> np.ndarray | None:
     """Displacements of the tuned wheel, or None."""
     try:
         return tuned_displacements(wheel, omega, H, samples)
@@ -175,14 +180,24 @@ def sweep_wheel(
         last = point if point.converged else None
 
 
-def stuck_wheel(wheel: Wheel, omega: float, H: int = 1, pattern: Pattern = TUNED) -> np.ndarray:
+def stuck_wheel(
+    wheel: Wheel,
+    omega: float,
+    H: int = 1,
+    pattern: Pattern = TUNED,
+) -> np.ndarray:
     """(N, H+1, probes) amplitudes with all contacts closed and sticking [m]."""
     _check_point(wheel, omega, H, 1, pattern)
     flex = wheel_flexibility(wheel, omega, H, pattern)
     return linear_motion(wheel, flex, "probe").swapaxes(1, 2)
 
 
-def free_wheel(wheel: Wheel, omega: float, H: int = 1, pattern: Pattern = TUNED) -> np.ndarray:
+def free_wheel(
+    wheel: Wheel,
+    omega: float,
+    H: int = 1,
+    pattern: Pattern = TUNED,
+) -> np.ndarray:
     """(N, H+1, probes) amplitudes without contact forces [m]."""
     return stuck_wheel(without_contact(wheel), omega, H, replace(pattern, elements=None))
 
@@ -197,7 +212,11 @@ def without_contact(wheel: Wheel) -> Wheel:
     return wheel.kept["free"]
 
 
-def linear_motion(wheel: Wheel, flex: WheelFlexibility, port: str) -> np.ndarray:
+def linear_motion(
+    wheel: Wheel,
+    flex: WheelFlexibility,
+    port: str,
+) -> np.ndarray:
     """(N, rows, H+1) motion of a port by the excitation, all contacts sticking [m]."""
     harmonics = flex.T.shape[1]
     parts = flex.parts
@@ -238,7 +257,11 @@ def _homotopy(balance: WheelBalance, options: Options) -> WheelNewton:
     return replace(end, iterations=iterations, products=products)
 
 
-def _predicted(path: list[tuple[float, np.ndarray]], share: float, stuck: np.ndarray) -> np.ndarray:
+def _predicted(
+    path: list[tuple[float, np.ndarray]],
+    share: float,
+    stuck: np.ndarray,
+) -> np.ndarray:
     """Displacements on the secant of the path; proportional or stuck where it has no two points."""
     if not path:
         return stuck
@@ -249,7 +272,11 @@ def _predicted(path: list[tuple[float, np.ndarray]], share: float, stuck: np.nda
     return w + (share - last) / (last - before) * (w - v)
 
 
-def _solution(balance: WheelBalance, end: WheelNewton, method: str) -> WheelSolution:
+def _solution(
+    balance: WheelBalance,
+    end: WheelNewton,
+    method: str,
+) -> WheelSolution:
     wheel = balance.wheel
     flex = balance.flex
     state = end.state
@@ -279,7 +306,11 @@ def _shaped(wheel: Wheel, q: np.ndarray) -> np.ndarray:
     return to_real(q).reshape(wheel.count, wheel.nodes, wheel.directions, -1)
 
 
-def _fitted(w: np.ndarray, wheel: Wheel, H: int) -> np.ndarray:
+def _fitted(
+    w: np.ndarray,
+    wheel: Wheel,
+    H: int,
+) -> np.ndarray:
     """Displacements with harmonics cut or filled up with zeros.
 
     Raises:
@@ -294,7 +325,13 @@ def _fitted(w: np.ndarray, wheel: Wheel, H: int) -> np.ndarray:
     return out
 
 
-def _check_point(wheel: Wheel, omega: float, H: int, samples: int, pattern: Pattern) -> None:
+def _check_point(
+    wheel: Wheel,
+    omega: float,
+    H: int,
+    samples: int,
+    pattern: Pattern,
+) -> None:
     if not 0 < omega < np.inf:
         raise InputError(f"omega {omega}: expected a positive circular frequency")
     highest = max(wheel.excitation, default=1)

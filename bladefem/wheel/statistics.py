@@ -23,18 +23,6 @@ from .one_body import one_body_model
 from .resonance import Respond, WheelPeak, find_wheel_peak
 from .solve import TUNED, WheelSolution, solve_wheel
 
-__all__ = [
-    "Amplification",
-    "Quantile",
-    "best_load",
-    "free_respond",
-    "one_body_respond",
-    "peak_of_pattern",
-    "quantile",
-    "scatter_statistics",
-    "wheel_respond",
-]
-
 CONFIDENCE = 0.95
 
 
@@ -74,7 +62,11 @@ class Amplification:
         return [quantile(row, share) for row in self.factor]
 
 
-def quantile(sample: np.ndarray, share: float, confidence: float = CONFIDENCE) -> Quantile:
+def quantile(
+    sample: np.ndarray,
+    share: float,
+    confidence: float = CONFIDENCE,
+) -> Quantile:
     """A quantile, with the distribution-free interval of order statistics.
 
     Between order statistics i and j lies the quantile with the probability that a binomial count
@@ -162,14 +154,23 @@ def best_load(loads: np.ndarray, heights: np.ndarray) -> tuple[float, float]:
 
 
 def peak_of_pattern(
-    wheel: Wheel, pattern: Pattern, grid: np.ndarray, H: int, samples: int, tolerance: float = 5e-3
+    wheel: Wheel,
+    pattern: Pattern,
+    grid: np.ndarray,
+    H: int,
+    samples: int,
+    tolerance: float = 5e-3,
 ) -> WheelPeak:
     """The highest blade of one pattern, by the whole wheel's own balance."""
     return find_wheel_peak(wheel_respond(wheel, pattern, H, samples), grid, tolerance)
 
 
 def wheel_respond(
-    wheel: Wheel, pattern: Pattern, H: int, samples: int, options: Options = DEFAULTS
+    wheel: Wheel,
+    pattern: Pattern,
+    H: int,
+    samples: int,
+    options: Options = DEFAULTS,
 ) -> Respond:
     """Amplitudes by the matrix-free balance, each point from the nearest one solved."""
     known: list[WheelSolution] = []
@@ -186,9 +187,15 @@ def wheel_respond(
 
 
 def one_body_respond(
-    wheel: Wheel, pattern: Pattern, H: int, samples: int, options: Options = DEFAULTS
+    wheel: Wheel,
+    pattern: Pattern,
+    H: int,
+    samples: int,
+    options: Options = DEFAULTS,
 ) -> Respond:
-    """Amplitudes by the balance of `bladefem.hbm` on one body: small wheels, thousands of points."""
+    """Amplitudes by the balance of `bladefem.hbm` on one body: small wheels, thousands of
+    points.
+    """
     model = one_body_model(wheel, pattern)
     known: list = []
 

@@ -1,4 +1,6 @@
-"""The tuned wheel as one sector: where the balance of all blades starts, and what it is measured by."""
+"""The tuned wheel as one sector: where the balance of all blades starts, and what it is measured
+by.
+"""
 
 from __future__ import annotations
 
@@ -12,8 +14,6 @@ from ..hbm.model import ReducedModel
 from ..hbm.solve import solve
 from ..reduction.assemble import folded_diameter
 from .model import Wheel
-
-__all__ = ["travelling_order", "tuned_displacements", "tuned_sector"]
 
 # relative deviation of the forces from a travelling wave
 ROUNDING = 1e-9
@@ -54,7 +54,10 @@ def tuned_sector(wheel: Wheel, harmonics: int) -> ReducedModel | None:
 
 
 def tuned_displacements(
-    wheel: Wheel, omega: float, harmonics: int, samples: int
+    wheel: Wheel,
+    omega: float,
+    harmonics: int,
+    samples: int,
 ) -> np.ndarray | None:
     """(N, n, d, 2H+1) displacements of the tuned wheel, solved in one sector; None where that has
     no solution or no such form.
@@ -74,8 +77,14 @@ def tuned_displacements(
     return to_real(to_complex(point.w) * shift[:, None, None, :])
 
 
-def _sector(wheel: Wheel, harmonic: int, order: int) -> PortModel:
-    """The sector in the nodal diameter of a harmonic, without the ports that the balance ignores."""
+def _sector(
+    wheel: Wheel,
+    harmonic: int,
+    order: int,
+) -> PortModel:
+    """The sector in the nodal diameter of a harmonic, without the ports that the balance
+    ignores.
+    """
     n, mirrored = folded_diameter(harmonic, order, wheel.count)
     body = wheel.sectors[n]
     if not mirrored:

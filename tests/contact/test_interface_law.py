@@ -108,7 +108,9 @@ def test_a_layer_that_hardly_stiffens_is_linear(problem):
 
 @pytest.mark.parametrize("name", ["linear", "stiffening", "stiff"])
 def test_elements_rest_in_the_seated_state(problem, name):
-    """Their force at rest is the seated one, n0 = kn closure about it, open nodes keep their gap."""
+    """Their force at rest is the seated one, n0 = kn closure about it, open nodes keep their
+    gap.
+    """
     contact = LAYERS[name]
     bedded = layered(problem, contact, 0.8)
     maps = solve(bedded, SPEED, normal=80.0)

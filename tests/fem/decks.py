@@ -40,7 +40,9 @@ class Model:
 
 
 def model(kind):
-    """ "c3d20", "c3d15_c3d20" (every second column of hexahedra cut in wedges), "c3d10" or "c3d4"."""
+    """ "c3d20", "c3d15_c3d20" (every second column of hexahedra cut in wedges), "c3d10" or
+    "c3d4".
+    """
     if kind in ("c3d10", "c3d4"):
         mesh = sector(SECTORS, (4, 3, 2), "tetra10", bump=0.2, straight=kind == "c3d4")
         cells = mesh.bodies["blade"]
@@ -206,7 +208,9 @@ def bar():
 
 
 def surface_lines(m, name):
-    """A surface made of labelled element faces, through internal element sets as CAE writes them."""
+    """A surface made of labelled element faces, through internal element sets as CAE writes
+    them.
+    """
     labels = {
         "tetra": [(0, 1, 2), (0, 3, 1), (1, 3, 2), (2, 3, 0)],
     }["tetra"]

@@ -5,7 +5,8 @@ import pytest
 from structured import box, sector
 
 from bladefem.errors import InputError
-from bladefem.fem.body import assemble, centrifugal, mass, surface_load, volume
+from bladefem.fem.body import assemble
+from bladefem.fem.loads import centrifugal, mass, surface_load, volume
 from bladefem.scene.tables import Material
 
 

@@ -76,7 +76,7 @@ def plain_jenkins(kt, kn, mu, n0, w: np.ndarray, samples: int, periods: int = 3)
     """
     tau = 2 * np.pi * np.arange(samples) / samples
     g, N = kt * motion(w[1], tau), n0 + kn * motion(w[0], tau)
-    clamp = lambda x, limit: min(max(x, -limit), limit)  # noqa: E731
+    clamp = lambda x, limit: min(max(x, -limit), limit)
     f = clamp(g[-1], mu * max(N[-1], 0))
     out = np.empty(samples)
     for _ in range(periods):

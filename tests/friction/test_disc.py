@@ -198,7 +198,7 @@ def test_a_derivative_summed_in_single_precision_is_that_in_double(H):
 def test_jacobian_with_a_prescribed_load_series():
     elements, w = random_case(5, 60, 2, 2)
     load = np.random.default_rng(5).normal(size=(60, 48)) + 1.5
-    force = lambda x: evaluate(elements, x, 48, load=load)  # noqa: E731
+    force = lambda x: evaluate(elements, x, 48, load=load)
     np.testing.assert_allclose(
         force(w).dfdw, numeric_jacobian(lambda x: force(x).f, w, 1e-7), rtol=0, atol=1e-6
     )
@@ -243,7 +243,7 @@ def plainly_marched(element: Elements, w: np.ndarray, samples: int) -> tuple[np.
         np.empty((2, samples)),
         np.diff(path, axis=0),
     )
-    for period in range(1, 4000):  # noqa: B007
+    for period in range(1, 4000):
         before = x, y
         for i in range(samples):
             here = d[i, 0], d[i, 1], N[i], N[i + 1], mu

@@ -102,7 +102,7 @@ def test_jacobian_against_finite_differences(exact, kn):
 def test_jacobian_with_a_prescribed_load_series():
     elements, w = random_case(7, 60, 2, 1)
     load = np.random.default_rng(7).normal(size=(60, 40)) + 1.5
-    force = lambda x: evaluate(elements, x, 40, load=load)  # noqa: E731
+    force = lambda x: evaluate(elements, x, 40, load=load)
     np.testing.assert_allclose(
         force(w).dfdw, numeric_jacobian(lambda x: force(x).f, w, 1e-6), rtol=0, atol=1e-6
     )

@@ -6,9 +6,9 @@ import sys
 
 def test_import_brings_neither_dolfinx_nor_pictures():
     code = (
-        "import sys, bladefem.hbm.solve, bladefem.hbm.peak, bladefem.hbm.continuation; "
-        "heavy = ('dolfinx', 'petsc4py', 'gmsh', 'matplotlib', 'pyvista', 'pandas'); "
-        "print([m for m in heavy if m in sys.modules])"
+        "import sys, bladefem.hbm.solve, bladefem.hbm.peak, bladefem.hbm.continuation; heavy = "
+        "('dolfinx', 'petsc4py', 'gmsh', 'matplotlib', 'pyvista', 'pandas'); print([m for m in "
+        "heavy if m in sys.modules])"
     )
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
     assert done.stdout.strip() == "[]"

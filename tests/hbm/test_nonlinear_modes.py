@@ -14,7 +14,9 @@ from bladefem.hbm.reference_blade import reference_model
 
 
 def test_one_element_in_closed_form():
-    """omega^2 = 1 + k_eq, 2 zeta omega^2 = omega c_eq: what one harmonic of a Jenkins element does."""
+    """omega^2 = 1 + k_eq, 2 zeta omega^2 = omega c_eq: what one harmonic of a Jenkins element
+    does.
+    """
     kt, limit = 0.6, 0.5
     amplitudes = limit / kt * np.array([0.5, 0.99, 1.2, 2.0, 5.0, 50.0])
     found = list(nonlinear_mode(single_mass(kt, limit), amplitudes, H=1, samples=0))

@@ -1,5 +1,5 @@
-"""Verdicts on single solutions: against the monodromy of the event-exact flow, against marching, and
-for models that neither of the two takes.
+"""Verdicts on single solutions: against the monodromy of the event-exact flow, against marching,
+and for models that neither of the two takes.
 """
 
 from dataclasses import replace

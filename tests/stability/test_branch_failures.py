@@ -1,6 +1,6 @@
-"""Where a curve of converged points is not what the blade does (F30, F31): a motion that time leaves,
-a damper that walks. Truth is a plain march written here. F29, the peak beyond a fold, stands in
-tests/hbm/test_branches.py.
+"""Where a curve of converged points is not what the blade does (F30, F31): a motion that time
+leaves, a damper that walks. Truth is a plain march written here. F29, the peak beyond a fold,
+stands in tests/hbm/test_branches.py.
 """
 
 import numpy as np

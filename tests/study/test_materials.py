@@ -87,7 +87,7 @@ def test_wrong_words(parted, tmp_path):
     write_msh(parted, tmp_path / "a.msh")
     mesh = read_mesh(tmp_path / "a.msh", sectors=6)
     with pytest.raises(InputError, match=r"no volume 'hup'.*did you mean 'hub'"):
-        Bodies(scene("hup: E=3 GPa"), mesh).still_blade  # noqa: B018
+        Bodies(scene("hup: E=3 GPa"), mesh).still_blade
     double = replace(mesh, parts={**mesh.parts, "all": np.arange(len(mesh.bodies["blade"]))})
     with pytest.raises(InputError, match="shares cells"):
-        Bodies(scene("hub: E=3 GPa", "all: E=4 GPa"), double).still_blade  # noqa: B018
+        Bodies(scene("hub: E=3 GPa", "all: E=4 GPa"), double).still_blade

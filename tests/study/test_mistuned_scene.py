@@ -1,5 +1,5 @@
-"""From a scene to the whole wheel: the same model as the tuned sector's, and bad input refused before
-long work.
+"""From a scene to the whole wheel: the same model as the tuned sector's, and bad input refused
+before long work.
 """
 
 from pathlib import Path

@@ -56,8 +56,8 @@ def ring_wheel(own, damper, excitation, damping=DAMPING, **others):
 
 
 def dense_ring(own, damper, excitation, damping=DAMPING, C=None, dK=None, dM=None):
-    """All sectors as one dense body, for the balance of `bladefem.hbm`; contact rows of damper b: on
-    blade b, then on blade b + 1.
+    """All sectors as one dense body, for the balance of `bladefem.hbm`; contact rows of damper b:
+    on blade b, then on blade b + 1.
 
     Args:
         dK, dM: (N, 2, 2) deviations of the blades.

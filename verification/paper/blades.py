@@ -37,17 +37,6 @@ from bladefem.hbm.sweep import size, sweep
 from bladefem.time.shooting import Periodic, periodic_solution, probe_harmonics
 from bladefem.time.system import System, blade_ring
 
-__all__ = [
-    "Peak",
-    "judge",
-    "load_curve",
-    "loop_response",
-    "optimum",
-    "paper_blade",
-    "peak",
-    "seat_loop",
-]
-
 
 def paper_blade(
     kt: float = 1e6,

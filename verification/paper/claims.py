@@ -42,8 +42,6 @@ from . import claims_time as paper_time
 from .claim import Chapter, Claim, verdict
 from .claims_mass import mass
 
-__all__ = ["CHAPTERS"]
-
 SCENES = Path(__file__).parents[2] / "scenes"
 MAPS = {
     "frequency": ("frequency", "frequency [Hz]", 1.0),
@@ -65,8 +63,7 @@ def element(folder: Path) -> Iterator[Claim]:
         verdict(abs(fit.stiffness / closed - 1) < 1e-4),
         ("fig_1.png",),
         "The two-slope loop of Fig. 3, amplitude 30 µm, and the linear force that is closest to "
-        "it in the mean "
-        "square.",
+        "it in the mean square.",
     )
     same = np.sum((linear[1:] + linear[:-1]) / 2 * np.diff(loop.motion)) / work(loop)
     yield Claim(
@@ -103,18 +100,15 @@ def element(folder: Path) -> Iterator[Claim]:
         verdict(list(loops.values()) == [2, 1, 4], max(loops.values()) > 1),
         ("fig_4.png",),
         "Limit 10 N + 6 N sin; the law as printed, with H(0) = 1, loses part of the loop, since "
-        "it cannot "
-        "stick again while the load falls.",
+        "it cannot stick again while the load falls.",
     )
     frozen = work(printed_loop(1e6, 1.0, (10.0, 0.0), 30e-6, (1, 1), 16384, at_zero=0)) / work(loop)
     yield Claim(
         "Eq. 19-21",
         "the rate law gives the friction force for any load",
-        f"with H(0) = 0 (Eq. 20) {abs(frozen):.3f} of the true work under constant load; with "
-        "H(0) = 1 "
-        f"{ratio['load at half the frequency']:.3f} and {ratio['at twice']:.3f} of it under loads "
-        "at half and "
-        "twice the frequency: it cannot stick again while the load falls",
+        f"with H(0) = 0 (Eq. 20) {abs(frozen):.3f} of the true work under constant load; with H(0) "
+        f"= 1 {ratio['load at half the frequency']:.3f} and {ratio['at twice']:.3f} of it under "
+        "loads at half and twice the frequency: it cannot stick again while the load falls",
         verdict(all(abs(r - 1) < 0.01 for r in (frozen, *ratio.values()))),
     )
 
@@ -137,8 +131,7 @@ def _printed_damping() -> Claim:
         "Eq. 16",
         "C from Fourier coefficients, several harmonics",
         f"three harmonics: {printed[3]:.3f} of Eq. 11 as printed, {mended[3]:.6f} with the factor "
-        "k that both "
-        f"sums lack; one harmonic: {printed[1]:.6f}",
+        f"k that both sums lack; one harmonic: {printed[1]:.6f}",
         verdict(abs(printed[3] - 1) < 1e-3, abs(printed[1] - 1) < 1e-3),
     )
 
@@ -169,14 +162,13 @@ def contact(folder: Path) -> Iterator[Claim]:
         "Fig. 5, Eq. 24",
         "pressure P / sqrt(a² - x²), approach pi P (1 - v²) / E",
         "as printed only if P is p0 a, a force for each unit of length; in terms of the force, P "
-        "/ (2 pi a "
-        f"sqrt(a² - r²)) holds to {100 * error:.1f} % for r < 0.8 a, and P (1 - v²) / (2 a E) to "
-        f"{100 * abs(approach):.1f} % (block of 50 radii)",
+        f"/ (2 pi a sqrt(a² - r²)) holds to {100 * error:.1f} % for r < 0.8 a, and P (1 - v²) / (2 "
+        f"a E) to {100 * abs(approach):.1f} % (block of 50 radii)",
         verdict(False, error < 0.03 and abs(approach) < 0.03),
         ("fig_5.png",),
         "Round rigid punch on an elastic block, quarter model, elements of a tenth of the radius. "
-        "Left, Fig. "
-        "5: pressure. Right, Fig. 6: the stiffness of discretised springs within a radius.",
+        "Left, Fig. 5: pressure. Right, Fig. 6: the stiffness of discretised springs within a "
+        "radius.",
     )
     whole = springs.sum() * found.approach / found.total
     yield Claim(
@@ -193,8 +185,7 @@ def contact(folder: Path) -> Iterator[Claim]:
         "Sect. 3.2",
         "springs that do not see each other must change with the contact state",
         f"tilted, these springs resist with {tilted:.3f} of the half space's moment; the finite "
-        "elements with "
-        f"{solid:.3f}",
+        f"elements with {solid:.3f}",
         verdict(abs(tilted - 1) > 0.1 and abs(solid - 1) < 0.05),
     )
     waves = 5200.0 / (5000.0 * 1.0)
@@ -221,8 +212,7 @@ def reference(_: Path) -> Iterator[Claim]:
         "Fig. 15",
         "the frequency rises with the load",
         f"from 1236.6 Hz to {stuck[0]:.0f} Hz (1e6 N/m a seat), {stuck[1]:.0f} Hz (2e7 N/m: mere "
-        "mass), "
-        f"{stuck[2]:.0f} Hz (2e7 N/m, neighbours in antiphase: the damper stands still)",
+        f"mass), {stuck[2]:.0f} Hz (2e7 N/m, neighbours in antiphase: the damper stands still)",
         verdict(all(rises), any(rises)),
     )
     best = {
@@ -270,16 +260,13 @@ def stability(folder: Path) -> Iterator[Claim]:
         "Sect. 2.1",
         "the steady state is one periodic motion",
         f"not where the normal load follows the motion: from {low:.1f} to {fold:.1f} Hz an "
-        "inclined contact "
-        "sticks, or its mass rocks off it with several times the amplitude; the motion between "
-        "the two is "
-        f"unstable, largest multiplier {worst:.2f}",
+        "inclined contact sticks, or its mass rocks off it with several times the amplitude; the "
+        f"motion between the two is unstable, largest multiplier {worst:.2f}",
         verdict(worst < 1 + 1e-6),
         ("stability.png",),
         "One mass on an inclined contact that can open: path of periodic motions and their "
-        "largest Floquet "
-        "multiplier, by event-exact monodromy matrices (1: the slider of a contact that always "
-        "sticks).",
+        "largest Floquet multiplier, by event-exact monodromy matrices (1: the slider of a "
+        "contact that always sticks).",
     )
     row = blades.model_of("soft", 6.0)
     solution, _, coupled = judge(row, 1148.7)
@@ -302,8 +289,7 @@ def stability(folder: Path) -> Iterator[Claim]:
         "Sect. 5",
         "prescribed normal loads: one response for a frequency",
         f"plane blades at resonance, 6 N, three random starts: amplitudes agree to {spread:.0e}, "
-        "largest "
-        f"multiplier {max(sizes):.6f}",
+        f"largest multiplier {max(sizes):.6f}",
         verdict(spread < 1e-6 and max(sizes) < 1 + 1e-6),
     )
 
@@ -327,17 +313,14 @@ def methods(folder: Path) -> Iterator[Claim]:
         verdict(table["paper"].get("converged", 0) == points),
         ("map_load_frequency.png",),
         "Each method over normal load and frequency, reference blade. Blue: converged, darker "
-        "with more "
-        "iterations; how many, and how many false, above each map.",
+        "with more iterations; how many, and how many false, above each map.",
     )
     yield Claim(
         "Eq. 35",
         "a small step means convergence",
-        f"of {points - table['paper'].get('no convergence', 0)} "
-        f"points that the paper's loop accepts, {table['paper'].get('false', 0)} are more than 10 "
-        "% off, most "
-        "of them since a stuck damper never settles from rest; with the damper solved exactly the "
-        "step still "
+        f"of {points - table['paper'].get('no convergence', 0)} points that the paper's loop "
+        f"accepts, {table['paper'].get('false', 0)} are more than 10 % off, most of them since a "
+        "stuck damper never settles from rest; with the damper solved exactly the step still "
         f"deceives the other methods at {others} points",
         verdict(table["paper"].get("false", 0) + others == 0),
         ("map_load_stiffness.png",),
@@ -349,40 +332,33 @@ CHAPTERS = (
     Chapter(
         "Element",
         "One node-to-node element with the force that it gives (Sect. 2.2 and 3.1). Stiffness 1e6 "
-        "N/m, "
-        "friction limit 10 N. demos/paper_element.py.",
+        "N/m, friction limit 10 N. demos/paper_element.py.",
         (element,),
     ),
     Chapter(
         "Contact",
         "A flat rigid punch on an elastic block (Sect. 3.2), by 3-D finite elements with "
-        "unilateral "
-        "contact: scenes/punch.toml, demos/paper_contact.py.",
+        "unilateral contact: scenes/punch.toml, demos/paper_contact.py.",
         (contact,),
     ),
     Chapter(
         "Mass on a vibrating foundation",
-        "A Z-shaped steel plate with the mass and moment of inertia of Table 1 "
-        "on a block of steel (Sect. 4), scenes/zmass.toml: pressure by finite elements, then "
-        "three freedoms with "
-        "coupled friction at 40 points, 1e6 N/m in all, integrated in time. "
+        "A Z-shaped steel plate with the mass and moment of inertia of Table 1 on a block of "
+        "steel (Sect. 4), scenes/zmass.toml: pressure by finite elements, then three freedoms "
+        "with coupled friction at 40 points, 1e6 N/m in all, integrated in time. "
         "demos/paper_zmass.py, or bladefem run scenes/zmass.toml.",
         (mass,),
     ),
     Chapter(
         "Blades with underplatform dampers",
-        "scenes/plane.toml: a clamped blade of 150 x 6 x 30 mm with its "
-        "platform, plane stress, a flat damper of 60 g to each side, 1 N at the tip, damping "
-        "ratio 0.002, friction "
+        "scenes/plane.toml: a clamped blade of 150 x 6 x 30 mm with its platform, plane stress, a "
+        "flat damper of 60 g to each side, 1 N at the tip, damping ratio 0.002, friction "
         "coefficient 0.3, inter-blade phase 0 (Eq. 32 holds for no other). Soft contact: 1e6 N/m "
-        "a seat; stiff "
-        "contact: 1.44e7 N/m. Seats of 40 elements, half of which press; with 160 a resonance of "
-        "mode 2 grows by "
-        "0.2 % at 6 N, 0.9 % at 63 N, 1.9 % at 100 N, 5 % at 200 N (soft contact). The damper "
-        "moves along the row "
-        "only, as in the paper, unless said otherwise; the judge is the exact integration of the "
-        "coupled system "
-        "in time. demos/paper_blades.py.",
+        "a seat; stiff contact: 1.44e7 N/m. Seats of 40 elements, half of which press; with 160 a "
+        "resonance of mode 2 grows by 0.2 % at 6 N, 0.9 % at 63 N, 1.9 % at 100 N, 5 % at 200 N "
+        "(soft contact). The damper moves along the row only, as in the paper, unless said "
+        "otherwise; the judge is the exact integration of the coupled system in time. "
+        "demos/paper_blades.py.",
         (
             blades.finite_elements,
             paper_loop.accuracy,

@@ -29,21 +29,6 @@ from verification.paper.plane_row import Row, paper_model, row_of_blades, whole_
 
 from .claim import Claim, verdict
 
-__all__ = [
-    "BANDS",
-    "LOADS",
-    "MASSES",
-    "SCENES",
-    "STIFF",
-    "dips",
-    "finite_elements",
-    "first_mode",
-    "model_of",
-    "normal_motion",
-    "row_and_scene",
-    "top_of",
-]
-
 # normal load of a seat [N]
 LOADS = (1.0, 2.0, 4.0, 6.0, 10.0, 20.0, 50.0, 200.0)
 # of a damper [kg]
@@ -100,8 +85,7 @@ def finite_elements(folder: Path) -> Iterator[Claim]:
         "Fig. 12",
         "the platform stands where both of the first two modes move it",
         f"platform over tip: {ratio[0]:.3f} in mode 1 ({modes.frequencies[0]:.1f} Hz), "
-        f"{ratio[1]:.3f} in mode "
-        f"2 ({modes.frequencies[1]:.1f} Hz)",
+        f"{ratio[1]:.3f} in mode 2 ({modes.frequencies[1]:.1f} Hz)",
         verdict(ratio[:2].min() > 0.05, ratio[:2].max() > 0.05),
         ("fig_12_mesh.png", "fig_12_modes.png"),
         "Blade with platform and flat damper, clamped at its root; first modes of the blade "
@@ -119,15 +103,12 @@ def finite_elements(folder: Path) -> Iterator[Claim]:
         "Sect. 5.1",
         "contact points carry the distributed normal load",
         f"the damper bends: {pressed} of {sum(len(m.force) for m in maps)} points press, "
-        f"{width:.1f} of "
-        f"{1e3 * scene.plane.seat_width:g} mm, and lean to the edge of the platform; shares at 30 "
-        "N and 60 N "
-        f"differ by {change:.0g}",
+        f"{width:.1f} of {1e3 * scene.plane.seat_width:g} mm, and lean to the edge of the "
+        f"platform; shares at 30 N and 60 N differ by {change:.0g}",
         verdict(change < 1e-6, change < 0.02),
         ("fig_13.png",),
         "Quasi-static contact of the two seats of Fig. 13; points beside the pressed part carry "
-        "nothing at any "
-        "load, so that full stick of the whole seat is never reached.",
+        "nothing at any load, so that full stick of the whole seat is never reached.",
     )
 
 
@@ -182,8 +163,7 @@ def first_mode(folder: Path) -> Iterator[Claim]:
         f"{heights[0]:.0f}, {min(heights):.0f}, {heights[-1]:.0f} µm at {LOADS[0]:g}, "
         f"{LOADS[int(np.argmin(heights))]:g}, {LOADS[-1]:g} N; the frequency goes from "
         f"{tops[0].frequency:.2f} to {tops[-1].frequency:.2f} Hz: so far below its own resonance "
-        "on the "
-        "springs the damper is mass",
+        "on the springs the damper is mass",
         verdict(dips(heights) and rises, dips(heights) or rises),
         ("fig_15_mode_1.png",),
         "Responses round mode 1, full balance with 5 harmonics.",
@@ -204,14 +184,13 @@ def normal_motion(_: Path) -> Iterator[Claim]:
             changes.append(abs(full.amplitude / plain.amplitude - 1))
             lines.append(
                 f"{load:g} N: {1e6 * plain.amplitude:.2f} µm, with it {1e6 * full.amplitude:.2f} "
-                "µm "
-                f"(load varies by {100 * _variation(full, model):.0f} %)"
+                f"µm (load varies by {100 * _variation(full, model):.0f} %)"
             )
         bounce = np.sqrt(model.elements.kn.sum() / row.reduced.mass) / 2 / np.pi
         yield Claim(
             "Fig. 13, Sect. 5.1",
-            f"the damper's normal motion does not matter ({contact} contact, it bounces "
-            f"at {bounce:.0f} Hz)",
+            f"the damper's normal motion does not matter ({contact} contact, it bounces at "
+            f"{bounce:.0f} Hz)",
             "; ".join(lines),
             verdict(max(changes) < 0.05, np.median(changes) < 0.05),
         )

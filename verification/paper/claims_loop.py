@@ -23,8 +23,6 @@ from verification.paper.blades import judge, loop_response
 from .claim import Claim, verdict
 from .claims_blades import LOADS, model_of, top_of
 
-__all__ = ["accuracy", "loop_points"]
-
 WAYS = {"march": "damper from rest", "shooting": "damper exact"}
 # of the points beside the resonance [Hz]
 NEAR = np.array([-40.0, -20.0, -8.0, 0.0, 8.0, 20.0, 40.0])
@@ -68,8 +66,7 @@ def accuracy(folder: Path) -> Iterator[Claim]:
         "Sect. 2.2",
         "one equivalent stiffness and damping is accurate enough",
         f"one harmonic, solved to the end: at worst {100 * worst['one']:.2f} %; full balance with "
-        "7 "
-        f"harmonics and Newton: {100 * worst['full']:.4f} %",
+        f"7 harmonics and Newton: {100 * worst['full']:.4f} %",
         verdict(worst["one"] < WANTED),
     )
     yield _several_harmonics()
@@ -92,8 +89,7 @@ def _converges(
         turns = [r.iterations for r in good.values()]
         told[how] = (
             f"{len(good)} of {len(LOADS)} accepted after {min(turns)} to {max(turns)} turns, at "
-            "worst "
-            f"{100 * worst[how]:.2f} % off"
+            f"worst {100 * worst[how]:.2f} % off"
         )
         for load in SHOWN:
             lines[load, name] = rows[how][load].steps, 100 * errors[how][load]
@@ -108,8 +104,7 @@ def _converges(
         verdict(whole, worst["march"] < 5 * WANTED),
         ("fig_14.png",),
         "Steps of the loop of Fig. 14 (left side of Eq. 35 over the motion) against its turns, to "
-        "where 2 % "
-        "stops it; beside each load, how far the tip then is off.",
+        "where 2 % stops it; beside each load, how far the tip then is off.",
     )
 
 
@@ -128,8 +123,7 @@ def _several_harmonics() -> Claim:
         "Eq. 6, 16",
         "several harmonics with one averaged K and C",
         f"with three harmonics the first one at the tip is {100 * max(first):.2f} % off at worst, "
-        "the third "
-        f"{100 * max(third):.1f} %",
+        f"the third {100 * max(third):.1f} %",
         verdict(max(third) < WANTED and max(first) < WANTED, max(first) < WANTED),
     )
 
@@ -149,8 +143,8 @@ def _cost(model: ReducedModel, omega: float) -> Claim:
         "Abstract",
         "remarkably efficient",
         f"at 4 N a point takes the loop {loop:.1f} times the CPU of the full balance with 3 "
-        "harmonics "
-        f"({exact:.1f} times with the damper solved exactly), 15 harmonics take {rich:.1f} times",
+        f"harmonics ({exact:.1f} times with the damper solved exactly), 15 harmonics take "
+        f"{rich:.1f} times",
         verdict(loop < 1, loop < 100),
     )
 
@@ -172,11 +166,9 @@ def _in_time(model: ReducedModel, top: Solution) -> Claim:
         "Sect. 1",
         "direct time integration is unbearable, so the balance is needed",
         "not on the reduced model: the judge integrates the coupled system exactly between events "
-        "and closes "
-        f"the period by Newton in {exact.periods} periods; Newmark with 1024 steps agrees to "
-        f"{abs(newmark / tip[1] - 1):.1e} after {cycle.periods}; from rest to 0.1 % it takes "
-        f"{slow:.0f} times "
-        "the CPU of the balance with 3 harmonics",
+        f"and closes the period by Newton in {exact.periods} periods; Newmark with 1024 steps "
+        f"agrees to {abs(newmark / tip[1] - 1):.1e} after {cycle.periods}; from rest to 0.1 % it "
+        f"takes {slow:.0f} times the CPU of the balance with 3 harmonics",
         verdict(slow > 1e4, slow > 3),
     )
 

@@ -21,8 +21,6 @@ from bladefem.view.paper import draw_footprint
 
 from .claim import Claim, verdict
 
-__all__ = ["RATIOS", "mass"]
-
 SCENE = Path(__file__).parents[2] / "scenes/zmass.toml"
 RATIOS = [
     Fraction(r) for r in "0 1/5 1/4 1/3 2/5 1/2 3/5 2/3 3/4 4/5 1 6/5 4/3 3/2 2 5/2 3 4 5 6".split()
@@ -84,11 +82,9 @@ def _table_1(scene: Scene, body: MassOnFoundation) -> Claim:
         f"{ours}, f_p = {ratios} Hz",
         verdict(all(abs(row[2] / row[1] - 1) < 1e-3 for row in rows)),
         ("fig_7.png",),
-        f"The Z, {MILLI * scene.z_mass.width:.4g} mm wide and "
-        f"{MILLI * scene.z_mass.thickness:.4g} mm thick, "
-        "sizes that give Table 1's mass and moment of inertia, seen with x upwards; in its mesh "
-        "the Z is the "
-        "damper, the block the blade.",
+        f"The Z, {MILLI * scene.z_mass.width:.4g} mm wide and {MILLI * scene.z_mass.thickness:.4g} "
+        "mm thick, sizes that give Table 1's mass and moment of inertia, seen with x upwards; in "
+        "its mesh the Z is the damper, the block the blade.",
     )
 
 
@@ -100,8 +96,8 @@ def _proportional(scene: Scene, seat: PressureMap) -> Claim:
         "Fig. 8, 9, Eq. 27",
         "the pressure under the Z keeps its shape and follows the load",
         f"{seat.pressure.min() / mean:.2f} to {seat.pressure.max() / mean:.2f} of the mean on an "
-        "elastic "
-        f"foundation of steel, highest at the edges; shares at 50 N and 80 N differ by {change:.0e}",
+        "elastic foundation of steel, highest at the edges; shares at 50 N and 80 N differ by "
+        f"{change:.0e}",
         verdict(change < 1e-9),
         ("fig_8.png",),
         "Left, Fig. 8: contact pressure under a uniformly loaded top. Right, Fig. 9: the 40 "
@@ -118,10 +114,9 @@ def _undisturbed(scene: Scene, seat: PressureMap) -> Iterator[Claim]:
     yield Claim(
         "Sect. 4.1",
         "the plate is thin: bending by its inertia does not change the pressure",
-        f"friction at its base turns it by at most μ P h / 2, {100 * (arm / reach).max():.1f} % "
-        "of P L / 2, "
-        f"which would lift it; at the edges this adds or takes {100 * edge.max():.1f} % of the "
-        "mean pressure",
+        f"friction at its base turns it by at most μ P h / 2, {100 * (arm / reach).max():.1f} % of "
+        f"P L / 2, which would lift it; at the edges this adds or takes {100 * edge.max():.1f} % "
+        "of the mean pressure",
         verdict(edge.max() < 0.02, edge.max() < 0.2),
     )
     one = scene.material.blade
@@ -130,10 +125,9 @@ def _undisturbed(scene: Scene, seat: PressureMap) -> Iterator[Claim]:
         "Sect. 4.1",
         "equal materials: tangential traction does not disturb the pressure",
         "true of two half spaces, whose normal displacements are then equal and opposite "
-        "(Dundurs' second "
-        f"constant is zero); the plate, {scene.z_mass.thickness / scene.z_mass.width:.2f} of its "
-        "width thick, "
-        "is none: taken over, not tested here",
+        "(Dundurs' second constant is zero); the plate, "
+        f"{scene.z_mass.thickness / scene.z_mass.width:.2f} of its width thick, is none: taken "
+        "over, not tested here",
         verdict(False, (one.E, one.nu) == (other.E, other.nu)),
     )
 
@@ -155,10 +149,9 @@ def _ratios(body: MassOnFoundation) -> Claim:
         "Sect. 4.2",
         "open loops = denominator of the reduced frequency ratio",
         f"{kept} of {len(rows)} ratios at Table 1, where inertia is 4.6 times the friction limit; "
-        "exceptions "
-        f"with smaller strokes, where the mass sticks part of the time: {told}. They depend on "
-        "the pressure: "
-        f"with the same load on all of 40 points other exceptions are {apart}",
+        f"exceptions with smaller strokes, where the mass sticks part of the time: {told}. They "
+        "depend on the pressure: with the same load on all of 40 points other exceptions are "
+        f"{apart}",
         verdict(kept == len(rows) and not any(broken.values()), kept == len(rows)),
     )
 
@@ -181,8 +174,7 @@ def _lag(body: MassOnFoundation) -> Claim:
         "Sect. 4.2",
         "the loop's shape depends on the phase lag between motion and load",
         f"load at 200 Hz, 0, 90, 180, 270° behind: {', '.join(f'{w:.1f}' for w in works)} mJ of "
-        "friction work "
-        f"a cycle, {', '.join(str(result.loops) for result in found)} loops",
+        f"friction work a cycle, {', '.join(str(result.loops) for result in found)} loops",
         verdict(swing > 0.05),
     )
 
@@ -214,9 +206,8 @@ def _spectra(results: Mapping[str, Steady]) -> Iterator[Claim]:
     yield Claim(
         "Fig. 11c, d",
         "more loops spread the response over more frequencies",
-        f"at 50 Hz load a line of {MILLI * lines[0]:.3f} mm at 50 Hz beside "
-        f"{MILLI * lines[1]:.3f} mm at "
-        "100 Hz",
+        f"at 50 Hz load a line of {MILLI * lines[0]:.3f} mm at 50 Hz beside {MILLI * lines[1]:.3f} "
+        "mm at 100 Hz",
         verdict(lines[0] > 0.1 * lines[1]),
         ("fig_11.png",),
         "Amplitude spectra of the displacement without its drift.",
@@ -264,14 +255,10 @@ def _coupled(scene: Scene) -> Claim:
         "Eq. 28, 29",
         "three freedoms, the two directions of friction coupled",
         "the symmetric pressure never uses them; top load skewed by 0.5 and 0.3, elliptic motion "
-        "5 mm by 3 "
-        "mm: the mass turns at up to "
-        f"{spin:.1f} rad/s, at 50 Hz it drifts at "
-        f"{turned[1].drift[0]:.3f}, {turned[1].drift[1]:.3f} m/s, and under constant load it "
-        "keeps turning by "
-        f"{turned[0].drift[2]:+.2f} rad/s on average, so that nothing repeats exactly. Eq. 29 "
-        "limits each "
-        "axis by itself: on a circle it loses half of the work; here the force stays on Coulomb's "
-        "circle",
+        f"5 mm by 3 mm: the mass turns at up to {spin:.1f} rad/s, at 50 Hz it drifts at "
+        f"{turned[1].drift[0]:.3f}, {turned[1].drift[1]:.3f} m/s, and under constant load it keeps "
+        f"turning by {turned[0].drift[2]:+.2f} rad/s on average, so that nothing repeats exactly. "
+        "Eq. 29 limits each axis by itself: on a circle it loses half of the work; here the force "
+        "stays on Coulomb's circle",
         verdict(False, spin > 0.1 and np.abs(turned[1].drift[1]) > 1e-3),
     )

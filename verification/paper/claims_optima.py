@@ -19,8 +19,6 @@ from .claims_blades import BANDS, LOADS, MASSES, SCENES, dips, model_of
 from .claims_loop import loop_points
 from .claims_response import slip_share
 
-__all__ = ["optima"]
-
 # normal load of a seat [N]
 WANTED = np.geomspace(0.5, 500, 16)
 # mass of the scene's damper [kg]
@@ -69,8 +67,7 @@ def optima(folder: Path) -> Iterator[Claim]:
             "Sect. 5.2",
             f"the optimum load of mode 1 is much smaller than that of mode 2 ({contact} contact)",
             f"60 g: {one:.2f} N in mode 1, {two:.2f} N in mode 2; under {WANTED[0]:g} N the same "
-            "force moves "
-            f"the tip {far:.0f} times as far in mode 1",
+            f"force moves the tip {far:.0f} times as far in mode 1",
             verdict(one < two / 2, one < two),
         )
 
@@ -104,8 +101,8 @@ def _masses(contact: str, mode: int, found: list[tuple[float, float]]) -> Claim:
     larger = all(a[0] < b[0] for a, b in pairwise(found))
     return Claim(
         f"Fig. 17{'b' if mode == 1 else 'd'}",
-        "a heavier damper has a larger optimum load and a smaller "
-        f"least amplitude (mode {mode}, {contact} contact)",
+        f"a heavier damper has a larger optimum load and a smaller least amplitude (mode {mode}, "
+        f"{contact} contact)",
         "; ".join(
             f"{1e3 * m:.0f} g {MICRO * h:.4g} µm at {x:.3g} N"
             for m, (x, h) in zip(MASSES, found, strict=True)
@@ -132,10 +129,8 @@ def _always(tables: Mapping[Key, np.ndarray], least: Mapping[Key, tuple[float, f
         "Fig. 17b, d",
         "there is always an optimum load",
         f"in {inside} of {len(least)} cases (modes, masses, stiffnesses); it leaves "
-        f"{min(depth):.2f} to "
-        f"{max(depth):.2f} of the lower of the amplitudes at {WANTED[0]:g} and {WANTED[-1]:g} N; "
-        "the curve "
-        f"has no second dip in {single} cases",
+        f"{min(depth):.2f} to {max(depth):.2f} of the lower of the amplitudes at {WANTED[0]:g} and "
+        f"{WANTED[-1]:g} N; the curve has no second dip in {single} cases",
         verdict(inside == len(least), inside > 0),
     )
 
@@ -175,9 +170,8 @@ def _jump(table: np.ndarray, best: float) -> Claim:
     return Claim(
         "Fig. 17a, c",
         "the resonance frequency jumps near the optimum load",
-        f"stiff contact, 60 g: from {f:.0f} Hz at {a:.1f} N to {g:.0f} Hz at {b:.1f} N, "
-        f"{best:.1f} N being "
-        "the optimum; no state jumps: the response has a sharp and a broad peak, and the higher "
-        "one changes",
+        f"stiff contact, 60 g: from {f:.0f} Hz at {a:.1f} N to {g:.0f} Hz at {b:.1f} N, {best:.1f} "
+        "N being the optimum; no state jumps: the response has a sharp and a broad peak, and the "
+        "higher one changes",
         verdict(False, steps[jump] > 0.5 * np.ptp(table[:, 1]) and a / 1.5 < best < 1.5 * b),
     )

@@ -20,8 +20,6 @@ from .claim import Claim, verdict
 from .claims_blades import BANDS, LOADS, STIFF, dips, model_of
 from .claims_loop import loop_points
 
-__all__ = ["responses", "slip_share"]
-
 # [Hz]
 BAND = (1060.0, 1260.0)
 
@@ -68,13 +66,13 @@ def _resonances(tops: Mapping[float, Solution]) -> Iterator[Claim]:
         "Fig. 15",
         "with the load the second resonance rises, its amplitude falls and rises again",
         f"{ends[0]:.1f} to {ends[-1]:.1f} Hz; {heights[0]:.1f}, {min(heights):.1f}, "
-        f"{heights[-1]:.1f} µm at "
-        f"{LOADS[0]:g}, {LOADS[int(np.argmin(heights))]:g}, {LOADS[-1]:g} N",
+        f"{heights[-1]:.1f} µm at {LOADS[0]:g}, {LOADS[int(np.argmin(heights))]:g}, {LOADS[-1]:g} "
+        "N",
         verdict(rises and dips(heights), rises or dips(heights)),
         ("fig_15.png",),
         "Lines: full balance with 5 harmonics. Dots: the loop with the damper solved exactly. "
-        "Crosses: the "
-        "paper's loop, its damper integrated from rest. Both only where they stopped by themselves.",
+        "Crosses: the paper's loop, its damper integrated from rest. Both only where they stopped "
+        "by themselves.",
     )
     stiff = [
         peak(model_of("stiff", load), BANDS["stiff", 2]).frequency for load in (LOADS[0], LOADS[-1])
@@ -85,8 +83,8 @@ def _resonances(tops: Mapping[float, Solution]) -> Iterator[Claim]:
         "Sect. 6",
         "the frequency rises with the load, in general",
         f"with {STIFF:.3g} N/m a seat it goes from {stiff[0]:.1f} to {stiff[1]:.1f} Hz: 2 k_t = "
-        f"{spring:.2g} "
-        f"N/m beside m w² = {damper:.2g} N/m, and a stuck damper on springs that stiff is mere mass",
+        f"{spring:.2g} N/m beside m w² = {damper:.2g} N/m, and a stuck damper on springs that "
+        "stiff is mere mass",
         verdict(stiff[1] > stiff[0]),
     )
 
@@ -105,10 +103,8 @@ def _loops(
         "Fig. 16",
         "with the load the relative displacement falls and the friction force rises",
         f"loops at resonance are {widths[0]:.1f}, {min(widths):.1f}, {widths[-1]:.1f} µm wide at "
-        f"{LOADS[0]:g}, "
-        f"{LOADS[int(np.argmin(widths))]:g}, {LOADS[-1]:g} N: past the optimum the blade swings "
-        "more again; "
-        f"the force goes from {forces[0]:.2f} to {forces[-1]:.2f} N",
+        f"{LOADS[0]:g}, {LOADS[int(np.argmin(widths))]:g}, {LOADS[-1]:g} N: past the optimum the "
+        f"blade swings more again; the force goes from {forces[0]:.2f} to {forces[-1]:.2f} N",
         verdict(falls and rises, falls or rises),
         ("fig_16.png",),
         "Friction force of a whole seat over its mean relative displacement, each at its own "

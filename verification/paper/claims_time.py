@@ -27,8 +27,6 @@ from verification.paper.view_contact import draw_sweeps
 from .claim import Claim, verdict
 from .claims_blades import BANDS, LOADS, MASSES, model_of, row_and_scene
 
-__all__ = ["following", "in_time", "two_motions"]
-
 # of the explicit march
 STEPS = 1024
 TOLERANCE = 1e-6
@@ -60,10 +58,8 @@ def in_time(_: Path) -> Iterator[Claim]:
         "Fig. 15, 17",
         "the harmonic balance gives the response of the coupled system",
         f"{len(errors)} of {count} resonances (modes 1 and 2, {len(MASSES)} masses, {len(LOADS)} "
-        "loads) closed "
-        f"in time, after {int(np.median(periods))} periods in the middle; 7 harmonics are "
-        f"{max(errors):.0e} "
-        f"off at worst, {np.median(errors):.0e} in the middle"
+        f"loads) closed in time, after {int(np.median(periods))} periods in the middle; 7 "
+        f"harmonics are {max(errors):.0e} off at worst, {np.median(errors):.0e} in the middle"
         + (f"; not closed: {'; '.join(lost)}" if lost else ""),
         verdict(not lost and max(errors) < 0.02, len(errors) > 0.9 * count),
     )
@@ -105,8 +101,7 @@ def following(loads: tuple[float, ...] = (4.0, 20.0, 100.0)) -> Iterator[Claim]:
         closed = "" if exact.converged else f" (closed to {exact.residual:.0e} only)"
         told.append(
             f"{load:g} N at {top.frequency:.1f} Hz {error:.0e} from the exact flow{closed}, "
-            "largest multiplier "
-            f"{multiplier:.4f}, {end}"
+            f"largest multiplier {multiplier:.4f}, {end}"
         )
     yield Claim(
         "Fig. 13, 14",
@@ -135,10 +130,8 @@ def _afterwards(system: System, cycle: Cycle, found: Solution, periods: int = 10
     )
     return (
         f"unstable: explicit steps leave it, {cycle.reason}; over {periods} more periods the tip "
-        "then swings by "
-        f"{swing[0]:.1f} µm rms, {swing[1]:.1f} µm at most, where the periodic motion has "
-        f"{swing[2]:.1f} and about "
-        f"{swing[3]:.1f} µm"
+        f"then swings by {swing[0]:.1f} µm rms, {swing[1]:.1f} µm at most, where the periodic "
+        f"motion has {swing[2]:.1f} and about {swing[3]:.1f} µm"
     )
 
 
@@ -156,8 +149,7 @@ def two_motions(folder: Path) -> Iterator[Claim]:
         told.append(
             f"{name} it reaches {1e6 * heights.max():.1f} µm, {int((largest > UNSTABLE).sum())} of "
             f"{len(points)} points unstable, {int(np.isnan(largest).sum())} not closed in time, "
-            "largest "
-            f"multiplier {np.nanmax(largest):.3f}"
+            f"largest multiplier {np.nanmax(largest):.3f}"
         )
     draw_sweeps(frequency, ways, folder / "stability_blades.png")
     up, down = (amplitude for amplitude, _ in ways.values())
@@ -177,8 +169,7 @@ def two_motions(folder: Path) -> Iterator[Claim]:
         verdict(not len(apart)),
         ("stability_blades.png",),
         "The same blade and damper swept up and down: two motions at one frequency where seats "
-        "lift off. Left: "
-        "circles stable, squares unstable. Right: the multipliers of both.",
+        "lift off. Left: circles stable, squares unstable. Right: the multipliers of both.",
     )
 
 

@@ -17,8 +17,6 @@ from bladefem.friction.equivalent_linear import Approximation, force_of, from_se
 
 from .printed_laws import corrected, differential
 
-__all__ = ["Loop", "coupled_loop", "linear_fit", "printed_loop", "two_slope_loop", "work"]
-
 Law = Callable[[np.ndarray, np.ndarray], np.ndarray]
 
 

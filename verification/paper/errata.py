@@ -4,8 +4,6 @@ from __future__ import annotations
 
 from typing import NamedTuple
 
-__all__ = ["ERRATA", "Erratum"]
-
 
 class Erratum(NamedTuple):
     """One formula."""
@@ -26,8 +24,7 @@ ERRATA = (
         "Eq. 19-21",
         "rate law with H(0) = 0",
         "it freezes at the first slip; with H(0) = 1 it cannot stick again while N falls; N < 0 "
-        "flips its sign. "
-        "Return map: f = clamp(f + k_t dg, ± μN), f = 0 for N ≤ 0",
+        "flips its sign. Return map: f = clamp(f + k_t dg, ± μN), f = 0 for N ≤ 0",
     ),
     Erratum(
         "Eq. 16",
@@ -55,8 +52,8 @@ ERRATA = (
     Erratum(
         "Eq. 29",
         "a limit for each axis",
-        "radial return onto the circle |f| ≤ μN: on a circular orbit the "
-        "printed limits lose half of the work",
+        "radial return onto the circle |f| ≤ μN: on a circular orbit the printed limits lose half "
+        "of the work",
     ),
     Erratum("Eq. 30, 31", "x_b a velocity; x_r = x_b - x", "x_b is a displacement, and x_r = -g"),
     Erratum(

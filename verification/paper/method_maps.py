@@ -18,8 +18,6 @@ from bladefem.damper.accelerate import Iterated, Rules, iterate
 from bladefem.damper.paper import Platform, platform
 from bladefem.hbm.model import ReducedModel
 
-__all__ = ["COLUMNS", "VARIANTS", "count_outcomes", "method_map", "write_rows"]
-
 VARIANTS = {
     "paper": ("amplitude", Rules(damper="march")),
     **{

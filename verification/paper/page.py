@@ -1,5 +1,5 @@
-"""The page "The paper, claim by claim":  python -m verification.paper.page [folder]  writes paper.md
-and paper.html.
+"""The page "The paper, claim by claim":  python -m verification.paper.page [folder]  writes
+paper.md and paper.html.
 
 Pictures, claims (claims.json) and the method map live in the folder ``paper`` beside the page.
 Eleven minutes of CPU; titles of chapters after the folder remake those alone. The method map itself
@@ -21,26 +21,20 @@ from bladefem.errors import InputError, suggestion
 from .claim import Chapter, Claim
 from .errata import ERRATA
 
-__all__ = ["as_html", "as_markdown", "main"]
-
 INTRODUCTION = (
     "An effective numerical method for calculating nonlinear dynamics of structures with dry "
-    "friction: application to "
-    "predict the vibration response of blades with underplatform dampers. Each figure and claim "
-    "of that paper beside "
-    "what is found here, in the paper's order. The paper gives no dimensions for its blades and "
-    "no stiffness for its "
-    "contacts: shapes and numbers of the blades are this project's, of the mass those of its "
-    "Table 1. Errors are "
-    "against the exact integration of the coupled system unless said otherwise."
+    "friction: application to predict the vibration response of blades with underplatform "
+    "dampers. Each figure and claim of that paper beside what is found here, in the paper's "
+    "order. The paper gives no dimensions for its blades and no stiffness for its contacts: "
+    "shapes and numbers of the blades are this project's, of the mass those of its Table 1. "
+    "Errors are against the exact integration of the coupled system unless said otherwise."
 )
 REMAKE = "python -m verification.paper.page docs"
 STYLE = (
     "body{font-family:sans-serif;max-width:64em;margin:2em auto;padding:0 "
-    "1em}table{border-collapse:collapse}"
-    "td,th{padding:.3em .6em;text-align:left;border-bottom:1px solid "
-    "#ddd;vertical-align:top}img{max-width:100%}"
-    "figure{margin:1em 0}figcaption{color:#555}.fails{color:#a00}.holds{color:#060}"
+    "1em}table{border-collapse:collapse}td,th{padding:.3em .6em;text-align:left;border-bottom:1px "
+    "solid #ddd;vertical-align:top}img{max-width:100%}figure{margin:1em "
+    "0}figcaption{color:#555}.fails{color:#a00}.holds{color:#060}"
 )
 Found = Mapping[str, Sequence[Claim]]
 
@@ -136,9 +130,8 @@ def tally(found: Found) -> str:
     """How many claims hold."""
     counts = Counter(claim.verdict for claims in found.values() for claim in claims)
     return (
-        f"{sum(counts.values())} claims: {counts['holds']} hold, {counts['holds in part']} hold "
-        "in part, "
-        f"{counts['fails']} fail."
+        f"{sum(counts.values())} claims: {counts['holds']} hold, {counts['holds in part']} hold in "
+        f"part, {counts['fails']} fail."
     )
 
 

@@ -36,8 +36,6 @@ from bladefem.study.pipeline.stages import (
     reduce_sector,
 )
 
-__all__ = ["Row", "paper_model", "row_of_blades", "whole_model"]
-
 
 @dataclass(frozen=True)
 class Row:

@@ -31,8 +31,6 @@ from bladefem.friction.time_step import step_1d
 
 Motion = Callable[[float], tuple[float, float]]
 
-__all__ = ["corrected", "corrected_rate", "differential", "per_axis", "per_axis_printed"]
-
 
 def differential(
     g: np.ndarray, N: np.ndarray, kt: float, mu: float, heaviside_at_zero: int = 0

@@ -11,8 +11,6 @@ import numpy as np
 
 from bladefem.view.style import COLOURS, canvas, log_axis
 
-__all__ = ["draw_branches", "draw_punch", "draw_sweeps"]
-
 # largest multiplier of a stable motion: sliders that never move have exactly 1
 STABLE = 1.001
 

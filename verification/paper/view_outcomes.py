@@ -16,8 +16,6 @@ from matplotlib.ticker import MaxNLocator
 
 from bladefem.view.style import canvas
 
-__all__ = ["draw_outcomes"]
-
 LOST = {"false": "#D55E00", "no convergence": "#222222", "diverged": "#CC79A7"}
 SHADES = "Blues"
 # of small maps
@@ -35,7 +33,8 @@ def draw_outcomes(
 
     Args:
         table: one row a point and method: load, stiffness, frequency, method, outcome, iterations,
-            residual, as ``verification.paper.method_maps.method_map`` gives them, with a column "plane".
+            residual, as ``verification.paper.method_maps.method_map`` gives them, with a column
+            "plane".
         planes: name of a plane to the column on its vertical axis, its label and the factor to its
             unit.
         file: PNG to write.

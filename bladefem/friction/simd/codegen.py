@@ -19,8 +19,6 @@ from numba import njit, types
 from numba.core import cgutils
 from numba.extending import intrinsic
 
-__all__ = ["BLOCK", "LANES", "Code", "Lanes", "kernel", "zeros"]
-
 # bytes of a block; numbers of 8 bytes in it
 BLOCK = 64
 LANES = 8
@@ -33,11 +31,20 @@ FUSED = ("contract",)
 class Lanes:
     """A block of numbers; + - * / with another block or a constant."""
 
-    def __init__(self, builder: ir.IRBuilder, value: ir.Value) -> None:
+    def __init__(
+        self,
+        builder: ir.IRBuilder,
+        value: ir.Value,
+    ) -> None:
         self.builder = builder
         self.value = value
 
-    def _with(self, name: str, other: Lanes | float, swapped: bool = False) -> Lanes:
+    def _with(
+        self,
+        name: str,
+        other: Lanes | float,
+        swapped: bool = False,
+    ) -> Lanes:
         pair = (self._value(other), self.value) if swapped else (self.value, self._value(other))
         return Lanes(self.builder, getattr(self.builder, name)(*pair, flags=FUSED))
 
@@ -80,7 +87,12 @@ class Lanes:
         )
         return Lanes(self.builder, self.builder.call(root, [self.value]))
 
-    def above(self, other: Lanes | float, yes: Lanes, no: Lanes) -> Lanes:
+    def above(
+        self,
+        other: Lanes | float,
+        yes: Lanes,
+        no: Lanes,
+    ) -> Lanes:
         """yes where this block is larger, no elsewhere."""
         return Lanes(self.builder, self.builder.select(self.over(other), yes.value, no.value))
 
@@ -94,7 +106,11 @@ class Code:
     whole numbers.
     """
 
-    def __init__(self, builder: ir.IRBuilder, size: int = BLOCK) -> None:
+    def __init__(
+        self,
+        builder: ir.IRBuilder,
+        size: int = BLOCK,
+    ) -> None:
         self.builder = builder
         self.size = size
 
@@ -130,7 +146,12 @@ class Code:
             total = self.builder.add(total, self.whole(term))
         return total
 
-    def _block(self, array: ir.Value, count: int, terms: tuple) -> ir.Value:
+    def _block(
+        self,
+        array: ir.Value,
+        count: int,
+        terms: tuple,
+    ) -> ir.Value:
         place = self.builder.gep(array, [self.place(*terms)])
         return self.builder.bitcast(place, ir.VectorType(array.type.pointee, count).as_pointer())
 
@@ -140,7 +161,11 @@ class Code:
             self.builder, self.builder.load(self._block(array, self.lanes(array), terms), align=4)
         )
 
-    def fit(self, block: Lanes, array: ir.Value) -> Lanes:
+    def fit(
+        self,
+        block: Lanes,
+        array: ir.Value,
+    ) -> Lanes:
         """A block in an array's precision."""
         return Lanes(self.builder, self._fit(block.value, array.type.pointee))
 
@@ -166,7 +191,11 @@ class Code:
             [value, spot, HALF(4), inside],
         )
 
-    def _fit(self, value: ir.Value, number: ir.Type) -> ir.Value:
+    def _fit(
+        self,
+        value: ir.Value,
+        number: ir.Type,
+    ) -> ir.Value:
         """A block or number in another precision."""
         block = isinstance(value.type, ir.VectorType)
         fit = ir.VectorType(number, value.type.count) if block else number
@@ -180,12 +209,20 @@ class Code:
         """The number at a place."""
         return self.builder.load(self.builder.gep(array, [self.place(*terms)]))
 
-    def spread(self, number: ir.Value, array: ir.Value | None = None) -> Lanes:
+    def spread(
+        self,
+        number: ir.Value,
+        array: ir.Value | None = None,
+    ) -> Lanes:
         """A number in all lanes, in the precision of an array if one is given."""
         number = number if array is None else self._fit(number, array.type.pointee)
         return Lanes(self.builder, self._spread(number, self._type(number.type).count))
 
-    def _spread(self, number: ir.Value, count: int) -> ir.Value:
+    def _spread(
+        self,
+        number: ir.Value,
+        count: int,
+    ) -> ir.Value:
         undefined = ir.Constant(ir.VectorType(number.type, count), ir.Undefined)
         first = self.builder.insert_element(undefined, number, HALF(0))
         return self.builder.shuffle_vector(
@@ -206,12 +243,19 @@ class Code:
         """A variable's block."""
         return Lanes(self.builder, self.builder.load(variable))
 
-    def set(self, variable: ir.Value, block: Lanes) -> None:
+    def set(
+        self,
+        variable: ir.Value,
+        block: Lanes,
+    ) -> None:
         """Change a variable."""
         self.builder.store(block.value, variable)
 
     def search(
-        self, begin: ir.Value, end: ir.Value, over: Callable[[ir.Value], ir.Value]
+        self,
+        begin: ir.Value,
+        end: ir.Value,
+        over: Callable[[ir.Value], ir.Value],
     ) -> ir.Value:
         """First place from begin on where a bit of over(place) is set, the bits of a block from
         there on; or end.
@@ -239,7 +283,12 @@ class Code:
         last = builder.load(spot)
         return builder.select(builder.icmp_signed("<", last, end), last, end)
 
-    def loop(self, begin: ir.Value | int, end: ir.Value, step: int = 1):
+    def loop(
+        self,
+        begin: ir.Value | int,
+        end: ir.Value,
+        step: int = 1,
+    ):
         """``with code.loop(begin, end, step) as i``."""
         return _Loop(self.builder, self.whole(begin), end, WHOLE(step))
 
@@ -250,7 +299,11 @@ def _bytes(number: ir.Type) -> int:
 
 class _Loop:
     def __init__(
-        self, builder: ir.IRBuilder, begin: ir.Value, end: ir.Value, step: ir.Value
+        self,
+        builder: ir.IRBuilder,
+        begin: ir.Value,
+        end: ir.Value,
+        step: ir.Value,
     ) -> None:
         self.context = cgutils.for_range_slice(builder, begin, end, step, WHOLE)
 

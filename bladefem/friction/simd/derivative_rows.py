@@ -34,16 +34,6 @@ from bladefem.friction.simd.time_kernels import TURNS, find_turns
 from bladefem.friction.states import CLOSING, SLIP, STICK
 from bladefem.friction.trigonometric_tables import Patterns, empty_gram, gram_matrix
 
-__all__ = [
-    "Rows",
-    "add_period",
-    "close_period",
-    "empty_rows",
-    "start_rows",
-    "to_carry",
-    "unit_rows",
-]
-
 FAST = {"contract", "reassoc", "nsz"}
 # samples after which a row is looked at for faint numbers
 SAMPLES_BETWEEN_FLUSHES = 64

@@ -27,8 +27,6 @@ from bladefem.friction.simd.periodic_state import (
 from bladefem.friction.simd.time_kernels import find_edges
 from bladefem.friction.trigonometric_tables import Node, empty_gram, gram_matrix
 
-__all__ = ["disc_batch"]
-
 # nodes whose motion and harmonics are one matrix product
 NODES_AT_ONCE = 8
 # Longest step, over the largest friction limit, by which a linearised period is finished: its

@@ -40,21 +40,6 @@ from bladefem.friction.simd.time_kernels import (
 )
 from bladefem.friction.states import SLIP, STICK
 
-__all__ = [
-    "CHANGING",
-    "SLIDING",
-    "STICKING",
-    "TOLERANCE",
-    "Trail",
-    "empty_trail",
-    "follow_period",
-    "forces_along",
-    "middle_force",
-    "periodic_force",
-    "start_force",
-    "stuck_forces",
-]
-
 # of the largest friction limit: how well the force must repeat itself in marching
 TOLERANCE = 1e-12
 # periods before Newton: load that varies allows several states, and marching chooses

@@ -12,22 +12,24 @@ from numba import njit
 from bladefem.friction.simd.codegen import BLOCK, LANES, Code, kernel
 from bladefem.friction.simd.time_kernels import TURNS
 
-__all__ = [
-    "TILE",
-    "add_folded",
-    "add_products",
-    "combine_rows",
-    "fill_gram",
-    "join_rows",
-    "turn_rows",
-]
-
 # harmonics summed at once
 TILE = 8
 
 
 @kernel
-def combine_rows(code: Code, a, first, b, second, by, i, j, knots, W, out):
+def combine_rows(
+    code: Code,
+    a,
+    first,
+    b,
+    second,
+    by,
+    i,
+    j,
+    knots,
+    W,
+    out,
+):
     """Row out = a first + b second + by[q] knots[i] + by[3 + q] knots[j] in its parts q; knots (..,
     W), by (6,).
 
@@ -48,7 +50,15 @@ def combine_rows(code: Code, a, first, b, second, by, i, j, knots, W, out):
 
 
 @kernel
-def add_products(code: Code, weights, K, rows, M, out, tiled):
+def add_products(
+    code: Code,
+    weights,
+    K,
+    rows,
+    M,
+    out,
+    tiled,
+):
     """Add weights[k] rows[e] to out[e, k]: weights (K,), rows (2, M), out (2, tiled, M)."""
     code = code.eight(out)
     with code.loop(0, M, code.lanes(out)) as l:
@@ -64,7 +74,19 @@ def _turn_rows(half: bool):
     """Kernel for turn_rows in blocks or halves of blocks."""
 
     @kernel
-    def turn(code: Code, turns, width, at, change, W, begin, end, row, rows, M):
+    def turn(
+        code: Code,
+        turns,
+        width,
+        at,
+        change,
+        W,
+        begin,
+        end,
+        row,
+        rows,
+        M,
+    ):
         code, columns = code.half() if half else code, code.whole(M)
         with code.loop(0, W, code.lanes(row)) as l:
             state = [code.variable(code.load(row, (part, W), l)) for part in range(3)]
@@ -106,7 +128,15 @@ def turn_rows(turns, at, change, begin, end, row, rows):
 
 
 @kernel
-def fill_gram(code: Code, around, length, H, K, columns, out):
+def fill_gram(
+    code: Code,
+    around,
+    length,
+    H,
+    K,
+    columns,
+    out,
+):
     """Gram matrix out (K, columns) but for row and column 0, from around (2, length) = (cos, sin
     .., sin, -cos ..).
 
@@ -124,7 +154,17 @@ def fill_gram(code: Code, around, length, H, K, columns, out):
 
 
 @kernel
-def join_rows(code: Code, sums, tiled, W, C, kt, gram, K, out):
+def join_rows(
+    code: Code,
+    sums,
+    tiled,
+    W,
+    C,
+    kt,
+    gram,
+    K,
+    out,
+):
     """Rows sums (2, tiled, M) + px C[0] + py C[1] without what fills up the K columns of each part:
     out (2, K, 3K).
 
@@ -157,7 +197,13 @@ def join_rows(code: Code, sums, tiled, W, C, kt, gram, K, out):
     write(1, code.place(K, -1), True)
 
 
-def _add_folded(harmonics: int, narrow: bool, first: bool = True, *, load: bool):
+def _add_folded(
+    harmonics: int,
+    narrow: bool,
+    first: bool = True,
+    *,
+    load: bool,
+):
     """Kernel for a number of harmonics from an even one on; the first one of all has no sine."""
     kinds = [
         (h, sine) for h in range(harmonics) for sine in (False, True) if h or not first or not sine
@@ -165,7 +211,21 @@ def _add_folded(harmonics: int, narrow: bool, first: bool = True, *, load: bool)
 
     @kernel
     def add(
-        code: Code, rows, columns, l, g, fours, chosen, count, weights, tile, out, k, normal, at, W
+        code: Code,
+        rows,
+        columns,
+        l,
+        g,
+        fours,
+        chosen,
+        count,
+        weights,
+        tile,
+        out,
+        k,
+        normal,
+        at,
+        W,
     ):
         """Add sum_i weights[i, k + .] g_i rows[i] to the rows of out (.., columns) from k on, a
         block from column l.

@@ -9,26 +9,6 @@ from __future__ import annotations
 
 from bladefem.friction.simd.codegen import LANES, Code, kernel
 
-__all__ = [
-    "ACROSS",
-    "AHEAD",
-    "AWAY",
-    "EDGE_ROWS",
-    "FALL",
-    "LIMIT_AHEAD",
-    "LIMIT_AWAY",
-    "PAIR_AHEAD",
-    "PAIR_AWAY",
-    "PAIR_TO_P",
-    "PAIR_TO_Q",
-    "TURNS",
-    "TWICE_Y",
-    "find_edges",
-    "find_forces",
-    "find_turns",
-    "stuck_until",
-]
-
 (
     DIRECTION_X,
     DIRECTION_Y,
@@ -58,7 +38,13 @@ SMALLEST_LIMIT = 1e-60
 
 
 @kernel
-def find_edges(code: Code, path, width, mu, out):
+def find_edges(
+    code: Code,
+    path,
+    width,
+    mu,
+    out,
+):
     """Fill out (17, width) from path (3, width), which is (kt w_1, kt w_2, N) at the knots [N].
 
     Rows: direction u (2), 1/length, decay over half an edge, x dln(decay)/dx, 1/limit; of the map
@@ -130,7 +116,16 @@ def find_edges(code: Code, path, width, mu, out):
 
 
 @kernel
-def stuck_until(code: Code, path, width, begin, end, cx, cy, mu) -> int:
+def stuck_until(
+    code: Code,
+    path,
+    width,
+    begin,
+    end,
+    cx,
+    cy,
+    mu,
+) -> int:
     """First edge i of begin <= i < end at whose end knot the force c + kt w is beyond the limit or
     the load is gone.
 
@@ -152,7 +147,21 @@ def stuck_until(code: Code, path, width, begin, end, cx, cy, mu) -> int:
 
 @kernel
 def find_turns(
-    code: Code, begin, end, path, form, knots, slips, width, kt, kn, mu, turns, g, normal, trace
+    code: Code,
+    begin,
+    end,
+    path,
+    form,
+    knots,
+    slips,
+    width,
+    kt,
+    kn,
+    mu,
+    turns,
+    g,
+    normal,
+    trace,
 ):
     """How the row of the angle turns along the edges begin <= i < end in slip, from half-angle
     vectors knots.
@@ -166,7 +175,10 @@ def find_turns(
     mu = code.spread(mu)
     mukn = mu * code.spread(kn)
     with code.loop(code.builder.and_(begin, code.whole(-LANES)), end, LANES) as i:
-        form_at = lambda row: code.load(form, (row, width), i)  # noqa: E731
+
+        def form_at(row):
+            return code.load(form, (row, width), i)
+
         ux, uy, h, slope = map(form_at, (DIRECTION_X, DIRECTION_Y, HALF, SLOPE))
         P = code.load(knots, i)
         Q = code.load(knots, width, i)
@@ -219,7 +231,16 @@ def find_turns(
 
 
 @kernel
-def find_forces(code: Code, path, form, knots, slips, width, mu, trace):
+def find_forces(
+    code: Code,
+    path,
+    form,
+    knots,
+    slips,
+    width,
+    mu,
+    trace,
+):
     """Forces trace (2, width) in the middle of edges in slip [N], from their half-angle vectors
     knots (2, width).
     """

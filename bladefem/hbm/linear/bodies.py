@@ -14,21 +14,6 @@ import numpy as np
 from ...data import PortModel
 from ...errors import InputError, NotSolvedError
 
-__all__ = [
-    "Damping",
-    "Stack",
-    "damping_rate",
-    "dissipated_work",
-    "impedance_rate",
-    "modal_amplitudes",
-    "modal_flexibility",
-    "port_motion",
-    "port_receptance",
-    "receptance_block",
-    "rigid_stack",
-    "stack_bodies",
-]
-
 # frequency of the modes that fill up a harmonic which has fewer [rad/s]: nothing moves them
 SPARE = 1e100
 
@@ -95,7 +80,11 @@ class Stack:
         )
 
 
-def stack_bodies(bodies: tuple[PortModel, ...], damping: Damping, rows: np.ndarray) -> Stack:
+def stack_bodies(
+    bodies: tuple[PortModel, ...],
+    damping: Damping,
+    rows: np.ndarray,
+) -> Stack:
     """The bodies of the harmonics as one; `rows` of the contact port enter the balance."""
     first = _port_slices(bodies[0], rows)
     ports = [
@@ -165,8 +154,7 @@ def modal_flexibility(stack: Stack, w: np.ndarray) -> np.ndarray:
         if hit.any():
             raise NotSolvedError(
                 f"a resonance without damping is hit exactly, at {w[hit][0, 0]:.10g} rad/s: "
-                "expected "
-                "some damping, or another frequency"
+                "expected some damping, or another frequency"
             )
         return np.divide(1.0, Z, out=np.zeros_like(Z), where=~still)
     full = 1j * w[:, :, None] * stack.coupled
@@ -177,7 +165,12 @@ def modal_flexibility(stack: Stack, w: np.ndarray) -> np.ndarray:
     return flexible
 
 
-def receptance_block(stack: Stack, flexible: np.ndarray, rows: slice, columns: slice) -> np.ndarray:
+def receptance_block(
+    stack: Stack,
+    flexible: np.ndarray,
+    rows: slice,
+    columns: slice,
+) -> np.ndarray:
     """(k, rows, columns) receptances [m/N]."""
     left = stack.shapes[:, rows]
     right = stack.shapes[:, columns].conj().swapaxes(1, 2)
@@ -197,13 +190,22 @@ def receptance_block(stack: Stack, flexible: np.ndarray, rows: slice, columns: s
     return (left * flexible[:, None, :]) @ right + residual
 
 
-def modal_amplitudes(stack: Stack, flexible: np.ndarray, forces: np.ndarray) -> np.ndarray:
+def modal_amplitudes(
+    stack: Stack,
+    flexible: np.ndarray,
+    forces: np.ndarray,
+) -> np.ndarray:
     """(k, m) modal amplitudes under forces (k, P) at the ports."""
     push = (forces[:, None, :] @ stack.shapes.conj())[:, 0]
     return flexible * push if flexible.ndim == 2 else (flexible @ push[:, :, None])[:, :, 0]
 
 
-def port_motion(stack: Stack, modal: np.ndarray, forces: np.ndarray, rows: slice) -> np.ndarray:
+def port_motion(
+    stack: Stack,
+    modal: np.ndarray,
+    forces: np.ndarray,
+    rows: slice,
+) -> np.ndarray:
     """(k, rows) displacements by modal amplitudes (k, m) and by forces (k, P) on the residual
     flexibility [m].
     """
@@ -212,7 +214,11 @@ def port_motion(stack: Stack, modal: np.ndarray, forces: np.ndarray, rows: slice
     )[:, :, 0]
 
 
-def impedance_rate(stack: Stack, w: np.ndarray, modal: np.ndarray) -> np.ndarray:
+def impedance_rate(
+    stack: Stack,
+    w: np.ndarray,
+    modal: np.ndarray,
+) -> np.ndarray:
     """(k, m) derivative with w of the modal impedances, times modal amplitudes (k, m)."""
     rate = (-2 * w[:, None] + 1j * stack.viscous) * modal
     return (
@@ -220,7 +226,11 @@ def impedance_rate(stack: Stack, w: np.ndarray, modal: np.ndarray) -> np.ndarray
     )
 
 
-def damping_rate(stack: Stack, w: np.ndarray, modal: np.ndarray) -> np.ndarray:
+def damping_rate(
+    stack: Stack,
+    w: np.ndarray,
+    modal: np.ndarray,
+) -> np.ndarray:
     """(k, m) the damping's part of the modal impedances, times modal amplitudes (k, m)."""
     w = w[:, None]
     rate = 1j * (w * stack.viscous + np.sign(w) * stack.hysteretic) * modal
@@ -231,7 +241,11 @@ def damping_rate(stack: Stack, w: np.ndarray, modal: np.ndarray) -> np.ndarray:
     )
 
 
-def dissipated_work(stack: Stack, w: np.ndarray, modal: np.ndarray) -> np.ndarray:
+def dissipated_work(
+    stack: Stack,
+    w: np.ndarray,
+    modal: np.ndarray,
+) -> np.ndarray:
     """(k,) work lost in the modes in one cycle of each circular frequency [J]."""
     w = w[:, None]
     loss = np.sum((w * stack.viscous + np.sign(w) * stack.hysteretic) * abs(modal) ** 2, axis=1)
@@ -280,7 +294,11 @@ def _padded_shapes(shapes: np.ndarray, count: int) -> np.ndarray:
     return np.pad(shapes, ((0, 0), (0, spare))) if spare else shapes
 
 
-def _fill_modes(values: np.ndarray, count: int, value: float = 0.0) -> np.ndarray:
+def _fill_modes(
+    values: np.ndarray,
+    count: int,
+    value: float = 0.0,
+) -> np.ndarray:
     spare = count - len(values)
     return np.concatenate([values, np.full(spare, value)]) if spare else values
 

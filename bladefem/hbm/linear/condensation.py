@@ -26,8 +26,6 @@ from .bodies import (
 )
 from .woodbury import low_rank, low_rank_update
 
-__all__ = ["Linear", "condense", "rigid_motions", "with_springs"]
-
 # motions that the contact springs resist less than this, relatively, are left out
 UNRESISTED_SHARE = 1e-12
 
@@ -57,7 +55,11 @@ class Linear:
     rigid: np.ndarray
 
 
-def condense(model: ReducedModel, omega: float, harmonics: int) -> Linear:
+def condense(
+    model: ReducedModel,
+    omega: float,
+    harmonics: int,
+) -> Linear:
     """Flexibilities of harmonics 0..H at circular frequency omega [rad/s]."""
     springs = model.springs.ravel()
     orders = omega * np.arange(harmonics + 1)
@@ -93,7 +95,11 @@ def condense(model: ReducedModel, omega: float, harmonics: int) -> Linear:
     return Linear(omega, springs, G, free, A, stuck, B, g, rigid)
 
 
-def _add_damper(model: ReducedModel, orders: np.ndarray, G: np.ndarray) -> None:
+def _add_damper(
+    model: ReducedModel,
+    orders: np.ndarray,
+    G: np.ndarray,
+) -> None:
     if isinstance(model.damper, RigidBody):
         B = model.damper.B[model.rows]
         G[1:] -= (B @ np.linalg.solve(model.damper.mass, B.T)) / orders[1:, None, None] ** 2
@@ -105,7 +111,10 @@ def _add_damper(model: ReducedModel, orders: np.ndarray, G: np.ndarray) -> None:
 
 
 def _add_contact_springs(
-    G: np.ndarray, free: np.ndarray, springs: np.ndarray, first: int
+    G: np.ndarray,
+    free: np.ndarray,
+    springs: np.ndarray,
+    first: int,
 ) -> tuple[np.ndarray, np.ndarray]:
     """(1 + G K)^-1 times G and times free, from harmonic `first` on."""
     m = len(springs)
@@ -162,7 +171,12 @@ def rigid_motions(
 
 
 def with_springs(
-    G: np.ndarray, free: np.ndarray, springs: np.ndarray, B: np.ndarray, g: np.ndarray, hold: float
+    G: np.ndarray,
+    free: np.ndarray,
+    springs: np.ndarray,
+    B: np.ndarray,
+    g: np.ndarray,
+    hold: float,
 ) -> tuple[np.ndarray, np.ndarray]:
     """Flexibility and displacement of harmonic 0 with contact springs, motions without stiffness
     eliminated.

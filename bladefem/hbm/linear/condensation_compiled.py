@@ -15,8 +15,6 @@ from numba import njit
 from ..solver.newton_compiled import Condensed, frobenius_norm
 from .contact_flexibility import by_harmonic
 
-__all__ = ["linear_part"]
-
 
 @njit(cache=True, error_model="numpy")
 def linear_part(omega, bodies, springs, H):

@@ -15,16 +15,6 @@ from __future__ import annotations
 import numpy as np
 from numba import njit
 
-__all__ = [
-    "apply_flexibility",
-    "apply_matrices",
-    "apply_modes",
-    "by_harmonic",
-    "form_matrices",
-    "seen_by",
-    "select_nodes",
-]
-
 
 @njit(cache=True, error_model="numpy")
 def by_harmonic(A):

@@ -20,8 +20,6 @@ from .bodies import Stack, rigid_stack
 from .condensation import rigid_motions, with_springs
 from .woodbury import frequency_independent_parts
 
-__all__ = ["Bodies", "prepared_bodies"]
-
 
 class Bodies(NamedTuple):
     """m contact degrees of freedom, M modes, p probes; S = H+1, or 1 where one serves all
@@ -146,7 +144,9 @@ def _pack_bodies(model: ReducedModel, H: int) -> Bodies | None:
 
 
 def _mean_flexibility(
-    body: tuple[np.ndarray, ...], pushed: tuple[np.ndarray, np.ndarray], held: tuple
+    body: tuple[np.ndarray, ...],
+    pushed: tuple[np.ndarray, np.ndarray],
+    held: tuple,
 ) -> tuple[np.ndarray, ...]:
     """A (m, m), stuck (m,) and G (m, m) of the mean, as in `bladefem.hbm.linear.condensation`."""
     (own, shapes, residual) = body
@@ -167,7 +167,10 @@ def _one_for_all(fixed: tuple[np.ndarray, ...], dofs: int) -> tuple[np.ndarray, 
 
 
 def _excited_modes(
-    fixed: tuple[np.ndarray, ...], springs: np.ndarray, push: np.ndarray, direct: np.ndarray
+    fixed: tuple[np.ndarray, ...],
+    springs: np.ndarray,
+    push: np.ndarray,
+    direct: np.ndarray,
 ) -> tuple[np.ndarray, np.ndarray]:
     """(H+1, m) what the excitation moves beside the modes in full stick, (H+1, M) what pushes the
     modes then.
@@ -195,7 +198,9 @@ def _with_reversed_shapes(body: Stack) -> Stack:
 
 
 def _joined_modes(
-    bodies: list[Stack], name: str, rows: Callable[[Stack], slice] = lambda _: slice(None)
+    bodies: list[Stack],
+    name: str,
+    rows: Callable[[Stack], slice] = lambda _: slice(None),
 ) -> np.ndarray:
     """Modes of several bodies side by side, on the harmonics of the one that has most."""
     most = max(len(body.omega) for body in bodies)

@@ -24,8 +24,6 @@ from ..model import ReducedModel
 from ..policy import uses_low_rank
 from .bodies import Stack, modal_flexibility, rigid_stack
 
-__all__ = ["LowRank", "bodies_of", "frequency_independent_parts", "low_rank", "low_rank_update"]
-
 
 @dataclass(frozen=True)
 class LowRank:
@@ -56,7 +54,11 @@ def low_rank(model: ReducedModel, harmonics: int) -> LowRank | None:
     )
 
 
-def low_rank_update(fixed: LowRank, orders: np.ndarray, first: int) -> np.ndarray:
+def low_rank_update(
+    fixed: LowRank,
+    orders: np.ndarray,
+    first: int,
+) -> np.ndarray:
     """(H+1, m, m) flexibility with springs at the circular frequencies `orders`, from harmonic
     `first` on.
 
@@ -106,7 +108,9 @@ def _constant_parts(bodies: tuple[Stack, ...], springs: np.ndarray) -> LowRank:
 
 
 def frequency_independent_parts(
-    R: np.ndarray, L: np.ndarray, springs: np.ndarray
+    R: np.ndarray,
+    L: np.ndarray,
+    springs: np.ndarray,
 ) -> tuple[np.ndarray, ...]:
     """A (S, m, m), U (S, m, k), its conjugate transpose and N (S, k, k) from R (S or 1, m, m) and L
     (S, m, k).

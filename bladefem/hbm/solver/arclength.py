@@ -22,8 +22,6 @@ from .newton import Options, newton
 from .newton_krylov import Memory
 from .residual import Balance, State, determinant_sign, evaluate_balance, linearise_balance
 
-__all__ = ["Spot", "Task", "advance_path", "spot_at"]
-
 # Newton steps of one corrector
 MOST_CORRECTIONS = 12
 # arc-length step, as a share of the range, below which only a leap can help
@@ -87,14 +85,23 @@ class Spot:
             not self.leapt and self.orientation * self.sign * before.orientation * before.sign < 0
         )
 
-    def tangent(self, task: Task, size: float) -> tuple[np.ndarray, float]:
+    def tangent(
+        self,
+        task: Task,
+        size: float,
+    ) -> tuple[np.ndarray, float]:
         """Unit tangent in displacements over their size and the parameter over its width."""
         dw = self.slope * task.width / size
         length = self.sign / np.sqrt(np.sum(dw**2) + 1.0)
         return dw * length, float(length)
 
 
-def advance_path(task: Task, spot: Spot, step: float, longest: float) -> tuple[Spot, float, bool]:
+def advance_path(
+    task: Task,
+    spot: Spot,
+    step: float,
+    longest: float,
+) -> tuple[Spot, float, bool]:
     """The next point, the next step, and whether the parameter turned back in between.
 
     Raises:
@@ -132,7 +139,11 @@ def _path_direction(task: Task, spot: Spot) -> Direction:
 
 
 def _correct_point(
-    task: Task, spot: Spot, step: float, direction: Direction, corner: bool = False
+    task: Task,
+    spot: Spot,
+    step: float,
+    direction: Direction,
+    corner: bool = False,
 ) -> tuple[Spot | None, str]:
     """Newton back to the path on the plane across a direction, a step ahead.
 
@@ -176,7 +187,11 @@ def _correct_point(
     return (found if turn > 0 else replace(found, sign=-found.sign)), ""
 
 
-def _around_corner(task: Task, spot: Spot, share: float) -> Spot | None:
+def _around_corner(
+    task: Task,
+    spot: Spot,
+    share: float,
+) -> Spot | None:
     """A solution beyond a corner of the path, where contacts change their state at once.
 
     The direction there is that of the balance linearised a little ahead, on either side; it leads
@@ -206,7 +221,11 @@ def _around_corner(task: Task, spot: Spot, share: float) -> Spot | None:
     return None
 
 
-def _leap_gap(task: Task, spot: Spot, share: float) -> Spot | None:
+def _leap_gap(
+    task: Task,
+    spot: Spot,
+    share: float,
+) -> Spot | None:
     """A solution across a small gap, if it lies where the path was heading."""
     x = spot.x + spot.sign * share * task.width
     balance = task.balance(x)
@@ -218,7 +237,12 @@ def _leap_gap(task: Task, spot: Spot, share: float) -> Spot | None:
 
 
 def spot_at(
-    task: Task, x: float, balance: Balance, state: State, iterations: int, sign: float
+    task: Task,
+    x: float,
+    balance: Balance,
+    state: State,
+    iterations: int,
+    sign: float,
 ) -> Spot:
     """A solved state with the direction of its path, x rising along it for sign 1 and falling for
     -1.

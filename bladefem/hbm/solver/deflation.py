@@ -21,8 +21,6 @@ from ..model import ReducedModel
 from ..policy import DEFLATION_UNKNOWNS
 from .dense_lu import back_substitute, factorise_large
 
-__all__ = ["apply_deflation", "common_motions", "no_level", "second_level"]
-
 # common motions of two rigid seats in space; more cost more than they save
 MOST_COMMON_MOTIONS = 12
 # contact degrees of freedom for each of them at least

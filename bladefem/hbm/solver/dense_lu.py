@@ -5,8 +5,6 @@ from __future__ import annotations
 import numpy as np
 from numba import njit
 
-__all__ = ["back_substitute", "factorise_large", "factorise_small"]
-
 # columns of a block
 BLOCK_COLUMNS = 32
 

@@ -31,8 +31,6 @@ from .arclength import Task, advance_path, spot_at
 from .newton import Newton, Options, newton, runs_compiled
 from .residual import Balance, evaluate_balance, start_in_stick
 
-__all__ = ["Attempt", "match_harmonics", "solve_balance"]
-
 NEWTON_MERITS = (("newton", "step"), ("newton on the residual", "residual"))
 # multiples of the normal load where a homotopy starts
 FIRST_LOAD = 100.0
@@ -57,7 +55,11 @@ class Attempt:
     samples: int | None = None
 
 
-def solve_balance(balance: Balance, start: np.ndarray | None, options: Options) -> list[Attempt]:
+def solve_balance(
+    balance: Balance,
+    start: np.ndarray | None,
+    options: Options,
+) -> list[Attempt]:
     """The attempts made, the last one converged unless every way failed."""
     attempts = []
     for attempt in _attempts_in_order(balance, start, options):
@@ -76,7 +78,9 @@ def match_harmonics(w: np.ndarray, H: int) -> np.ndarray:
 
 
 def _attempts_in_order(
-    balance: Balance, start: np.ndarray | None, options: Options
+    balance: Balance,
+    start: np.ndarray | None,
+    options: Options,
 ) -> Iterator[Attempt]:
     stick = start_in_stick(balance)
     near = None
@@ -222,7 +226,11 @@ def _along_excitation(balance: Balance, options: Options) -> Newton:
     )
 
 
-def _from_shooting(balance: Balance, near: Newton, options: Options) -> Newton:
+def _from_shooting(
+    balance: Balance,
+    near: Newton,
+    options: Options,
+) -> Newton:
     """Newton from the harmonics of a periodic solution in time."""
     try:
         return newton(balance, shooting_start(balance), options)
@@ -254,7 +262,12 @@ def _truncate_harmonics(linear: Linear, H: int) -> Linear:
     )
 
 
-def _failed_attempt(balance: Balance, end: Newton, iterations: int, reason: str) -> Newton:
+def _failed_attempt(
+    balance: Balance,
+    end: Newton,
+    iterations: int,
+    reason: str,
+) -> Newton:
     """A failed attempt as a state of the true balance."""
     w = match_harmonics(end.state.w, balance.linear.A.shape[0] - 1)
     return Newton(evaluate_balance(balance, w), iterations, False, reason)

@@ -15,8 +15,6 @@ from numba import njit
 from ..linear.contact_flexibility import apply_flexibility
 from .deflation import apply_deflation
 
-__all__ = ["conjugate_residuals"]
-
 # after which it is given up
 MOST_DIRECTIONS = 60
 

@@ -39,8 +39,6 @@ from .residual import (
     linearise_balance,
 )
 
-__all__ = ["DEFAULTS", "Newton", "Options", "newton", "route_of", "runs_compiled", "solvers_of"]
-
 # step share below which the search direction is given up
 SHORTEST_STEP_SHARE = 2.0**-8
 
@@ -103,7 +101,10 @@ def route_of(loop: str, solvers: Collection[str]) -> str:
 
 
 def newton(
-    balance: Balance, w: np.ndarray, options: Options = DEFAULTS, merit: str = "step"
+    balance: Balance,
+    w: np.ndarray,
+    options: Options = DEFAULTS,
+    merit: str = "step",
 ) -> Newton:
     """Solve the balance from the displacements w (n, d, K).
 
@@ -120,7 +121,11 @@ def newton(
 
 
 def _newton_loop(
-    balance: Balance, w: np.ndarray, options: Options, merit: str, memory: Memory
+    balance: Balance,
+    w: np.ndarray,
+    options: Options,
+    merit: str,
+    memory: Memory,
 ) -> Newton:
     """Newton with NumPy; memory takes what the linear solvers know."""
     state = evaluate_balance(balance, w, "single")
@@ -158,7 +163,11 @@ def runs_compiled(balance: Balance) -> bool:
     return uses_compiled_newton(balance.model, m * (2 * harmonics - 1))
 
 
-def _run_compiled(balance: Balance, w: np.ndarray, options: Options) -> Newton:
+def _run_compiled(
+    balance: Balance,
+    w: np.ndarray,
+    options: Options,
+) -> Newton:
     end = np.ascontiguousarray(w.reshape(-1, w.shape[2]), dtype=float).copy()
     d = balance.model.directions
     shape = w.shape
@@ -200,7 +209,12 @@ def _run_compiled(balance: Balance, w: np.ndarray, options: Options) -> Newton:
     return Newton(state, steps, True, reasons[code], route)
 
 
-def _line_search(balance: Balance, state: State, inverse: Inverse, merit: str) -> State | None:
+def _line_search(
+    balance: Balance,
+    state: State,
+    inverse: Inverse,
+    merit: str,
+) -> State | None:
     """The first halving of the step that lowers the merit, or None."""
     step = inverse(state.residual, float(np.clip(0.1 * state.error, 1e-5, 1e-2)))
     if not np.isfinite(step).all():

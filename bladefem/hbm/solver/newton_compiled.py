@@ -26,19 +26,6 @@ from .deflation import no_level, second_level
 from .dense_lu import back_substitute, factorise_large, factorise_small
 from .krylov import conjugate_residuals
 
-__all__ = [
-    "BY_ITERATIONS",
-    "BY_LU",
-    "CONVERGED",
-    "EXHAUSTED",
-    "INFINITE",
-    "SINGULAR",
-    "STALLED",
-    "Condensed",
-    "compiled_newton",
-    "frobenius_norm",
-]
-
 CONVERGED = 0
 EXHAUSTED = 1
 STALLED = 2

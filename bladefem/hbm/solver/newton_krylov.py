@@ -20,8 +20,6 @@ from ..linear.contact_flexibility import by_harmonic
 from .deflation import no_level, second_level
 from .krylov import conjugate_residuals
 
-__all__ = ["Memory", "iterative_inverse"]
-
 # vectors kept by GMRES
 GMRES_BASIS = 80
 # of GMRES, each on what the last one left
@@ -101,7 +99,11 @@ class _System:
         d = A.shape[1] // len(change)
         return second_level(by_harmonic(A), change, self.motions, np.arange(len(change)), d)
 
-    def directions(self, residual: np.ndarray, accuracy: float) -> np.ndarray | None:
+    def directions(
+        self,
+        residual: np.ndarray,
+        accuracy: float,
+    ) -> np.ndarray | None:
         """The solution by conjugate residuals, or None where they do not find it."""
         A, change = self.double
         x = np.empty(residual.size)
@@ -110,7 +112,11 @@ class _System:
         )
         return x.reshape(residual.shape) if found else None
 
-    def product(self, x: np.ndarray, parts: Parts) -> np.ndarray:
+    def product(
+        self,
+        x: np.ndarray,
+        parts: Parts,
+    ) -> np.ndarray:
         """The system times x, flat."""
         self.count += 1
         A, change = parts
@@ -126,7 +132,12 @@ class _System:
             else _apply_flexibility(blocks, x.reshape(blocks.shape[1], -1)).ravel()
         )
 
-    def krylov(self, rest: np.ndarray, target: float, parts: Parts) -> tuple[np.ndarray, int]:
+    def krylov(
+        self,
+        rest: np.ndarray,
+        target: float,
+        parts: Parts,
+    ) -> tuple[np.ndarray, int]:
         """What one pass of GMRES finds, and whether it stopped before the target."""
         y, failed = _run_gmres(lambda y: self.product(self.prepared(y), parts), rest, target)
         return self.prepared(y), failed
@@ -136,7 +147,11 @@ class _System:
         self.memory.blocks, self.memory.slow = _harmonic_blocks(*self.double), False
 
 
-def _solve_system(system: _System, residual: np.ndarray, accuracy: float) -> np.ndarray:
+def _solve_system(
+    system: _System,
+    residual: np.ndarray,
+    accuracy: float,
+) -> np.ndarray:
     memory = system.memory
     target = accuracy * float(np.linalg.norm(residual))
     fresh = system.memory.slow
@@ -170,7 +185,9 @@ def _solve_system(system: _System, residual: np.ndarray, accuracy: float) -> np.
 
 
 def _run_gmres(
-    product: Callable[[np.ndarray], np.ndarray], residual: np.ndarray, target: float
+    product: Callable[[np.ndarray], np.ndarray],
+    residual: np.ndarray,
+    target: float,
 ) -> tuple[np.ndarray, int]:
     operator = LinearOperator((residual.size, residual.size), matvec=product, dtype=float)
     # the relative tolerance has two names in the versions of SciPy: left at its default, atol rules

@@ -25,8 +25,6 @@ from .newton import SHORTEST_STEP_SHARE, Options, route_of, solvers_of
 from .newton_compiled import CONVERGED, compiled_newton
 from .residual import STICKING_FORCE_SHARE, contact_table
 
-__all__ = ["compiles_points", "solve_along", "solve_each", "solve_small"]
-
 
 def solve_small(
     model: ReducedModel,
@@ -47,7 +45,11 @@ def solve_small(
 
 
 def solve_each(
-    model: ReducedModel, omegas: np.ndarray, H: int, samples: int, options: Options
+    model: ReducedModel,
+    omegas: np.ndarray,
+    H: int,
+    samples: int,
+    options: Options,
 ) -> list[Solution]:
     """The first frequencies from full stick, as long as they converge; none if compiled points do
     not apply.
@@ -210,7 +212,11 @@ def compiles_points(model: ReducedModel, H: int) -> bool:
     return prepared_bodies(model, H) is not None
 
 
-def _prepared_arguments(model: ReducedModel, H: int, samples: int) -> tuple | None:
+def _prepared_arguments(
+    model: ReducedModel,
+    H: int,
+    samples: int,
+) -> tuple | None:
     """What a point needs beside its frequency; made once."""
     bodies = prepared_bodies(model, H)
     return (

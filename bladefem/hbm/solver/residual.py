@@ -27,22 +27,6 @@ from .deflation import common_motions
 from .newton_compiled import Condensed
 from .newton_krylov import Memory, iterative_inverse
 
-__all__ = [
-    "Balance",
-    "Inverse",
-    "State",
-    "adjoint_inverse",
-    "as_amplitudes",
-    "as_coefficients",
-    "compiled_arguments",
-    "contact_forces",
-    "contact_table",
-    "determinant_sign",
-    "evaluate_balance",
-    "linearise_balance",
-    "start_in_stick",
-]
-
 # of a step by GMRES, relative
 STEP_ACCURACY = 1e-5
 # of the preload's compression: smaller motions drown in its rounding,
@@ -91,7 +75,11 @@ def start_in_stick(balance: Balance) -> np.ndarray:
     return _as_node_coefficients(balance, balance.linear.stuck)
 
 
-def evaluate_balance(balance: Balance, w: np.ndarray, precision: str = "double") -> State:
+def evaluate_balance(
+    balance: Balance,
+    w: np.ndarray,
+    precision: str = "double",
+) -> State:
     """Forces and residual at w (n, d, K); precision is that of the forces' derivative."""
     model = balance.model
     linear = balance.linear
@@ -104,7 +92,10 @@ def evaluate_balance(balance: Balance, w: np.ndarray, precision: str = "double")
 
 
 def contact_forces(
-    model: ReducedModel, w: np.ndarray, samples: int, precision: str = "double"
+    model: ReducedModel,
+    w: np.ndarray,
+    samples: int,
+    precision: str = "double",
 ) -> Forces:
     """Friction forces in the directions (n, d, K) of the balance; displacements left out of it stay
     zero.
@@ -126,7 +117,11 @@ def contact_forces(
     return replace(forces, f=forces.f[:, missing:], dfdw=forces.dfdw[:, missing:, :, missing:])
 
 
-def linearise_balance(balance: Balance, state: State, memory: Memory | None = None) -> Inverse:
+def linearise_balance(
+    balance: Balance,
+    state: State,
+    memory: Memory | None = None,
+) -> Inverse:
     """The inverse of the balance's derivative: residual (n, d, K), accuracy [1] to displacement (n,
     d, K) [m].
 
@@ -236,7 +231,10 @@ def _choose_inverse(
 
 
 def _with_factors_at_need(
-    iterative: Inverse, A: np.ndarray, change: np.ndarray, memory: Memory
+    iterative: Inverse,
+    A: np.ndarray,
+    change: np.ndarray,
+    memory: Memory,
 ) -> Inverse:
     """GMRES; switches to dense LU after the first failure to converge."""
     dense: Inverse | None = None
@@ -284,7 +282,11 @@ def compiled_arguments(balance: Balance) -> Condensed:
     )
 
 
-def contact_table(model: ReducedModel, H: int, samples: int) -> tuple:
+def contact_table(
+    model: ReducedModel,
+    H: int,
+    samples: int,
+) -> tuple:
     """What the compiled loop needs of the elements."""
     return model.once(
         ("contact", H, samples),
@@ -336,7 +338,11 @@ def _dense_jacobian(A: np.ndarray, change: np.ndarray) -> np.ndarray:
     return J.reshape(a * K, nodes * size)
 
 
-def _relative_error(balance: Balance, w: np.ndarray, residual: np.ndarray) -> float:
+def _relative_error(
+    balance: Balance,
+    w: np.ndarray,
+    residual: np.ndarray,
+) -> float:
     linear = balance.linear
     r = as_amplitudes(residual)
     size = np.linalg.norm(as_amplitudes(w))

@@ -7,24 +7,36 @@ from collections.abc import Iterator
 from ..tables import Scene
 from ..units import show
 
-__all__ = ["at_most", "below", "known_diameters", "one_of"]
 
-
-def below(name: str, value: float, limit: float, what: str) -> Iterator[str]:
+def below(
+    name: str,
+    value: float,
+    limit: float,
+    what: str,
+) -> Iterator[str]:
     if value >= limit:
         yield f"{name} = {show(value, 'm')}: expected less than {show(limit, 'm')}, {what}"
 
 
-def at_most(name: str, value: float, limit: float, what: str) -> Iterator[str]:
+def at_most(
+    name: str,
+    value: float,
+    limit: float,
+    what: str,
+) -> Iterator[str]:
     if value > limit * (1 + 1e-12):
         yield f"{name} = {show(value, 'm')}: expected at most {show(limit, 'm')}, {what}"
 
 
-def one_of(name: str, given: float | None, scene: Scene) -> Iterator[str]:
+def one_of(
+    name: str,
+    given: float | None,
+    scene: Scene,
+) -> Iterator[str]:
     if given is not None and scene.study.loads is not None:
         yield (
-            f"{name} = {show(given, 'm')}: it takes the place of study.loads, expected only one "
-            "of the two"
+            f"{name} = {show(given, 'm')}: it takes the place of study.loads, expected only one of "
+            "the two"
         )
 
 
@@ -33,6 +45,5 @@ def known_diameters(scene: Scene, sectors: int) -> Iterator[str]:
         if n > sectors // 2:
             yield (
                 f"model.nodal_diameters = {n}: expected 0 to {sectors // 2}, half the number of "
-                "sectors "
-                f"({sectors})"
+                f"sectors ({sectors})"
             )

@@ -29,8 +29,8 @@ def conditions(scene: Scene) -> Iterator[str]:
             yield f"imported.more = {entry!r}: there is no file '{other}'"
     if scene.mesh.order == 1 and not is_drawing(scene):
         yield (
-            "mesh.order = 1: a mesh file keeps the order of its elements, expected mesh.order = 2; "
-            "imported.linear says what becomes of first-order ones"
+            "mesh.order = 1: a mesh file keeps the order of its elements, expected mesh.order = "
+            "2; imported.linear says what becomes of first-order ones"
         )
     yield from _seat_conditions(scene)
     if not any(scene.imported.axis):

@@ -9,8 +9,6 @@ from typing import Any
 
 from ..tables import Scene
 
-__all__ = ["COMMON_TABLES", "ENGINE_TABLES", "Kind", "load_function", "no_conditions"]
-
 # tables that every kind reads
 COMMON_TABLES = ("mesh", "material", "contact", "study", "model")
 # tables of the kinds that vibrate in an engine

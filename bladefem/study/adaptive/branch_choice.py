@@ -20,8 +20,6 @@ from .family import Family, member
 from .indicators import ENOUGH, moved, richest
 from .settings import Settings
 
-__all__ = ["anchor_of", "peak_error"]
-
 # shares of the peak's height at which a point of the same piece is looked for
 ANCHOR = 0.6
 STARTS = (0.9, 0.75, 0.5)
@@ -37,14 +35,21 @@ BELOW = (0.99, 0.95, 0.9, 0.75)
 PASSED = 2e-3
 
 
-def anchor_of(points: Sequence[Solution], top: Solution, share: float = ANCHOR) -> Solution:
+def anchor_of(
+    points: Sequence[Solution],
+    top: Solution,
+    share: float = ANCHOR,
+) -> Solution:
     """The point on the piece of the peak that has about a share of its height."""
     piece = [p for p in points if p.converged and p.branch == top.branch]
     return min(piece, key=lambda p: abs(size(p) - share * size(top)))
 
 
 def peak_error(
-    family: Family, settings: Settings, points: Sequence[Solution], top: Solution
+    family: Family,
+    settings: Settings,
+    points: Sequence[Solution],
+    top: Solution,
 ) -> float:
     """Relative error of a peak's height: against that of a model richer in every respect.
 

@@ -18,8 +18,6 @@ from .family import Family, member
 from .indicators import richer
 from .settings import Settings
 
-__all__ = ["heights_of", "hidden", "lasting_peak", "peak_of", "watched"]
-
 # of the peak's height: where a curve is checked on each side beside the peak itself
 SHARES = (0.7, 0.25)
 # points that are checked because left-out harmonics move much there,
@@ -31,7 +29,10 @@ JUDGED = 100
 
 
 def watched(
-    points: Sequence[Solution], heights: np.ndarray, moved: np.ndarray, accuracy: float
+    points: Sequence[Solution],
+    heights: np.ndarray,
+    moved: np.ndarray,
+    accuracy: float,
 ) -> list[Solution]:
     """The points that a curve is checked at.
 
@@ -73,7 +74,11 @@ def watched(
     return [good[i] for i in dict.fromkeys(chosen)]
 
 
-def hidden(family: Family, used: Sequence[Settings], points: Sequence[Solution]) -> np.ndarray:
+def hidden(
+    family: Family,
+    used: Sequence[Settings],
+    points: Sequence[Solution],
+) -> np.ndarray:
     """(points,) motion of the contacts by harmonics that were left out, over the first one; 0 where
     all of them stick.
 

@@ -22,20 +22,6 @@ from .family import Family, member, with_excited_harmonics
 from .indicators import Indicators, indicate, judge, moved
 from .settings import Settings, enriched
 
-__all__ = [
-    "Checked",
-    "adapted",
-    "checked",
-    "choose",
-    "covered",
-    "default_band",
-    "estimated",
-    "following",
-    "likely",
-    "response_points",
-    "sufficient",
-]
-
 ROUNDS = 12
 # whose indicators, where they are small, outlast a change of the others
 KEPT = ("modes", "damper")
@@ -114,7 +100,10 @@ def choose(
 
 
 def likely(
-    family: Family, settings: Settings, accuracy: float, fixed: tuple[str, ...] = ()
+    family: Family,
+    settings: Settings,
+    accuracy: float,
+    fixed: tuple[str, ...] = (),
 ) -> Settings:
     """Where a search had better begin than at its first settings: with what most points need whose
     contacts slip.
@@ -130,7 +119,11 @@ def likely(
 
 
 def _solved(
-    family: Family, settings: Settings, point: Solution, better: Settings, found: Indicators
+    family: Family,
+    settings: Settings,
+    point: Solution,
+    better: Settings,
+    found: Indicators,
 ) -> Solution:
     """The point solved with better settings, from the solution with more harmonics where there is
     one.
@@ -142,7 +135,10 @@ def _solved(
 
 
 def following(
-    settings: Settings, found: Indicators, accuracy: float, fixed: tuple[str, ...] = ()
+    settings: Settings,
+    found: Indicators,
+    accuracy: float,
+    fixed: tuple[str, ...] = (),
 ) -> Settings | None:
     """Enriched in each open respect that takes more than its share, the worst at least; None when
     nothing helps.
@@ -374,8 +370,8 @@ def response_points(
         points = [p for p in points if p.branch or not p.converged]
     if not any(p.converged for p in points):
         raise NotSolvedError(
-            f"no point between {band[0]:.5g} and {band[1]:.5g} Hz was solved; "
-            f"the first stopped because: {points[0].reason}"
+            f"no point between {band[0]:.5g} and {band[1]:.5g} Hz was solved; the first stopped "
+            f"because: {points[0].reason}"
         )
     return points
 

@@ -24,8 +24,6 @@ from ...hbm.sweep import size
 from .family import Family, carried, member
 from .settings import Settings
 
-__all__ = ["FEW", "coarse_sentence", "halved_change"]
-
 # pressed nodes of a seat: 6 left an amplitude between stick and slip 37 % low, 11 19 %, 16 12 %, 21
 # 5 %
 FEW = 16
@@ -45,14 +43,16 @@ def coarse_sentence(maps: Iterable[PressureMap]) -> str:
         return ""
     return (
         f"contact mesh: only {pressed} of {nodes} nodes of a seat are pressed; with fewer than "
-        f"{FEW} a resonance "
-        "amplitude between stick and slip may be 10 to 40 % wrong, which the estimated errors do "
-        "not contain; try "
-        "a smaller mesh.contact_size"
+        f"{FEW} a resonance amplitude between stick and slip may be 10 to 40 % wrong, which the "
+        "estimated errors do not contain; try a smaller mesh.contact_size"
     )
 
 
-def halved_change(family: Family, settings: Settings, top: Solution) -> float:
+def halved_change(
+    family: Family,
+    settings: Settings,
+    top: Solution,
+) -> float:
     """Relative change of a resonance amplitude with half as many contact points on each seat.
 
     NaN where that was not solved, and where no more than half of the nodes are used: then they were

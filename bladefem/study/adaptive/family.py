@@ -21,19 +21,6 @@ from ...reduction.assemble import recombine
 from ...reduction.truncate import truncated
 from .settings import Settings
 
-__all__ = [
-    "Family",
-    "Member",
-    "carried",
-    "coarsened",
-    "family_of",
-    "joined",
-    "lowest_harmonics",
-    "member",
-    "shared_harmonics",
-    "with_excited_harmonics",
-]
-
 SHARED = (1, 7, 15, 31, 63)
 
 
@@ -86,7 +73,12 @@ def with_excited_harmonics(family: Family, settings: Settings) -> Settings:
     return replace(settings, harmonics=lowest, samples=samples)
 
 
-def carried(w: np.ndarray, old: Member, new: Member, H: int) -> np.ndarray:
+def carried(
+    w: np.ndarray,
+    old: Member,
+    new: Member,
+    H: int,
+) -> np.ndarray:
     """Displacements (n, d, K) of one member as a start (m, d', 2H+1) for another.
 
     Each new element takes the mean over the finest nodes that it stands for; a normal direction
@@ -192,7 +184,11 @@ def family_of(rich: ReducedModel, patches: Sequence[int] | None = None) -> Famil
         return truncated(rich.sides[h], min(modes, len(rich.sides[h].omega)))
 
     @lru_cache(maxsize=8)
-    def thinned(modes: int, points: int | None, harmonics: int) -> Member:
+    def thinned(
+        modes: int,
+        points: int | None,
+        harmonics: int,
+    ) -> Member:
         groups = _runs(sizes, points)
         few = replace(
             rich, sides=tuple(side(h, modes) for h in range(min(harmonics + 1, len(rich.sides))))

@@ -22,8 +22,6 @@ from .family import Family, carried, member, with_excited_harmonics
 from .indicators import Indicators, indicate, judge, judged_orders
 from .settings import Settings, enriched
 
-__all__ = ["along"]
-
 # of richer settings, each round one point
 PASSES = 16
 # accuracy that the first sweep is made for where contacts may lift off
@@ -63,7 +61,12 @@ class _Curve:
         return self.accuracy * float(self.heights.max()) / 2
 
 
-def along(family: Family, omegas: Sequence[float], settings: Settings, accuracy: float) -> Checked:
+def along(
+    family: Family,
+    omegas: Sequence[float],
+    settings: Settings,
+    accuracy: float,
+) -> Checked:
     """Response at ascending circular frequencies [rad/s], everywhere within the accuracy of its
     highest point.
 
@@ -144,7 +147,11 @@ def along(family: Family, omegas: Sequence[float], settings: Settings, accuracy:
     )
 
 
-def _first(family: Family, settings: Settings, accuracy: float) -> Settings:
+def _first(
+    family: Family,
+    settings: Settings,
+    accuracy: float,
+) -> Settings:
     """What all points are solved with; where contacts may lift off, few harmonics lead the way for
     more.
 
@@ -196,7 +203,12 @@ def _confirm(curve: _Curve, i: int) -> None:
     curve.foretold.discard(point.omega)
 
 
-def _raise(curve: _Curve, at: int, better: Settings, found: Indicators) -> None:
+def _raise(
+    curve: _Curve,
+    at: int,
+    better: Settings,
+    found: Indicators,
+) -> None:
     """Solve a point with better settings, and its neighbours of the same settings as far as that
     changes them.
 
@@ -272,7 +284,10 @@ def _foretell(
 
 
 def _change(
-    curve: _Curve, i: int, better: Settings, gained: list[tuple[Solution, np.ndarray]]
+    curve: _Curve,
+    i: int,
+    better: Settings,
+    gained: list[tuple[Solution, np.ndarray]],
 ) -> float:
     """Put the point of better settings in place of the present one; the distance of their first
     harmonics [m].

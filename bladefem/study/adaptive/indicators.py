@@ -1,9 +1,10 @@
 """How wrong is a solved point? The same point in a richer model tells, for each choice that was
 made.
 
-eta_d = |T_d - T| / |T_d|, where T is the first harmonic at the probe and T_d the same in the model enriched in
-direction d, solved from the point that is judged: a step or two where the contacts stay closed. One Newton step alone
-overshoots with lift-off (16 % told for 0.4 % on the wedge of 46 nodes).
+eta_d = |T_d - T| / |T_d|, where T is the first harmonic at the probe and T_d the same in the model
+enriched in
+direction d, solved from the point that is judged: a step or two where the contacts stay closed.
+One Newton step alone overshoots with lift-off (16 % told for 0.4 % on the wedge of 46 nodes).
 
 Modes are doubled and samples taken four times; 1 and 3 harmonics are compared with 7 and 15
 (against 3 and 7 an internal resonance of a higher harmonic was missed, told 2.5e-4 for a true
@@ -34,8 +35,6 @@ from ...hbm.solve import solve
 from ...hbm.solver.newton import DEFAULTS, Options
 from .family import Family, carried, lowest_harmonics, member
 from .settings import DAMPERS, DIRECTIONS, Settings
-
-__all__ = ["Indicators", "indicate", "judge", "judged_orders", "moved", "richer", "richest"]
 
 # for a point that only tells how wrong another one is
 ENOUGH = Options(1e-5, 30, fallbacks=False, frugal=True)
@@ -70,7 +69,10 @@ class Indicators:
 
 
 def indicate(
-    family: Family, settings: Settings, solution: Solution, known: Mapping[str, float] | None = None
+    family: Family,
+    settings: Settings,
+    solution: Solution,
+    known: Mapping[str, float] | None = None,
 ) -> Indicators:
     """All indicators of a point that was solved with some settings.
 
@@ -91,7 +93,11 @@ def indicate(
     return Indicators({name: errors.get(name, 0.0) for name in DIRECTIONS}, better)
 
 
-def judge(family: Family, settings: Settings, solution: Solution) -> Indicators:
+def judge(
+    family: Family,
+    settings: Settings,
+    solution: Solution,
+) -> Indicators:
     """The whole error of a point at once: against one model that is richer in every respect that
     has a richer one.
 
@@ -133,12 +139,20 @@ def richest(family: Family, settings: Settings) -> Settings:
     return rich
 
 
-def _poorer(settings: Settings, other: Settings, name: str) -> bool:
+def _poorer(
+    settings: Settings,
+    other: Settings,
+    name: str,
+) -> bool:
     """Whether the model that judges a respect has less of it, because there is no more."""
     return name in ("harmonics", "modes") and getattr(other, name) < getattr(settings, name)
 
 
-def richer(family: Family, settings: Settings, name: str) -> Settings | None:
+def richer(
+    family: Family,
+    settings: Settings,
+    name: str,
+) -> Settings | None:
     """The settings that a direction is judged by; None where the family has nothing to compare
     with.
     """
@@ -196,7 +210,12 @@ def judged_orders(model: ReducedModel) -> np.ndarray:
     return np.array(sorted(h for h in model.excitation if h > 0) or [1])
 
 
-def _change(family: Family, settings: Settings, solution: Solution, better: Solution) -> float:
+def _change(
+    family: Family,
+    settings: Settings,
+    solution: Solution,
+    better: Solution,
+) -> float:
     if not better.converged:
         return np.inf
     orders = judged_orders(member(family, settings).model)

@@ -23,15 +23,6 @@ from .family import Family, carried, member
 from .indicators import richer
 from .settings import DIRECTIONS, Settings, enriched
 
-__all__ = [
-    "PeakErrors",
-    "choose_at_peak",
-    "judge_settings",
-    "judge_too_large",
-    "peak_errors",
-    "peak_from",
-]
-
 # enrichments of one peak before giving up
 ROUNDS = 8
 # of the accuracy: to which a peak that only tells an error is found
@@ -112,7 +103,12 @@ def peak_from(
     )
 
 
-def peak_errors(family: Family, settings: Settings, peak: Peak, accuracy: float) -> PeakErrors:
+def peak_errors(
+    family: Family,
+    settings: Settings,
+    peak: Peak,
+    accuracy: float,
+) -> PeakErrors:
     """The peak again in a model that is richer in one respect, for each of them."""
     point = peak.solution
     exact = ("harmonics", "samples") if sticks_safely(member(family, settings).model, point) else ()
@@ -139,7 +135,11 @@ def peak_errors(family: Family, settings: Settings, peak: Peak, accuracy: float)
     return PeakErrors(heights, shifts, better)
 
 
-def judge_settings(family: Family, settings: Settings, name: str) -> Settings | None:
+def judge_settings(
+    family: Family,
+    settings: Settings,
+    name: str,
+) -> Settings | None:
     """The settings that one respect is judged by: those of ``indicators.richer``, but of contact
     points only MORE_POINTS times as many.
 
@@ -208,12 +208,21 @@ def _next_settings(
     return None
 
 
-def judge_too_large(family: Family, other: Settings, point: Solution) -> bool:
+def judge_too_large(
+    family: Family,
+    other: Settings,
+    point: Solution,
+) -> bool:
     """A model that only tells the error of a point where contacts lift off costs too much."""
     return _too_large(family, other, point, LIFTING_JUDGE)
 
 
-def _too_large(family: Family, settings: Settings, point: Solution, limit: int) -> bool:
+def _too_large(
+    family: Family,
+    settings: Settings,
+    point: Solution,
+    limit: int,
+) -> bool:
     """Contacts lift off, and the balance would have more unknowns than a limit."""
     model = member(family, settings).model
     unknowns = model.springs.size * (2 * settings.harmonics + 1)

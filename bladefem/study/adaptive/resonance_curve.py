@@ -18,8 +18,6 @@ from .indicators import moved, richer
 from .resonance_choice import PeakErrors, choose_at_peak, judge_settings, judge_too_large, peak_from
 from .settings import Settings, enriched
 
-__all__ = ["resonance_curve", "unfollowed"]
-
 # sweeps of one curve with ever richer settings
 PASSES = 3
 
@@ -73,7 +71,10 @@ def unfollowed(family: Family, settings: Settings) -> bool:
 
 
 def _chosen(
-    family: Family, settings: Settings, top: Solution, accuracy: float
+    family: Family,
+    settings: Settings,
+    top: Solution,
+    accuracy: float,
 ) -> tuple[Settings, Peak | None, PeakErrors | None]:
     """Settings that hold at the peak next to a point; the same with an unknown error where that
     peak was not closed in.
@@ -97,7 +98,10 @@ def _with_peak(points: list[Solution], peak: Peak | None) -> list[Solution]:
 
 
 def _checked_flanks(
-    family: Family, settings: Settings, points: Sequence[Solution], errors: PeakErrors | None
+    family: Family,
+    settings: Settings,
+    points: Sequence[Solution],
+    errors: PeakErrors | None,
 ) -> dict[float, float]:
     """Circular frequency -> estimated relative error: of the peak, and of one point on each flank
     for each of SHARES of its height.
@@ -120,7 +124,10 @@ def _checked_flanks(
 
 
 def _checked_loud(
-    family: Family, settings: Settings, points: Sequence[Solution], accuracy: float
+    family: Family,
+    settings: Settings,
+    points: Sequence[Solution],
+    accuracy: float,
 ) -> dict[float, float]:
     """Circular frequency -> estimated relative error by more harmonics, of the LOUDEST points
     where harmonics that were left out move the contacts.
@@ -135,7 +142,11 @@ def _checked_loud(
     return {p.omega: _change(family, settings, p, other, 1.0) for p in chosen}
 
 
-def _flanks(points: Sequence[Solution], heights: np.ndarray, top: Solution) -> list[Solution]:
+def _flanks(
+    points: Sequence[Solution],
+    heights: np.ndarray,
+    top: Solution,
+) -> list[Solution]:
     """Of each side of the peak, the points whose heights are nearest to SHARES of it."""
     omegas = np.array([p.omega for p in points])
     chosen = []
@@ -147,7 +158,11 @@ def _flanks(points: Sequence[Solution], heights: np.ndarray, top: Solution) -> l
 
 
 def _change(
-    family: Family, settings: Settings, point: Solution, other: Settings, shift: float
+    family: Family,
+    settings: Settings,
+    point: Solution,
+    other: Settings,
+    shift: float,
 ) -> float:
     """Relative change of the amplitude in another model, at a frequency shifted by a factor;
     infinite where that is not solved, or too large to be.
@@ -160,7 +175,10 @@ def _change(
 
 
 def _harmonics_missed(
-    settings: Settings, points: Sequence[Solution], loud: dict[float, float], accuracy: float
+    settings: Settings,
+    points: Sequence[Solution],
+    loud: dict[float, float],
+    accuracy: float,
 ) -> Settings | None:
     """Settings with more harmonics where a loud point away from the peak is wrong beyond its
     tolerance; None where all hold, or harmonics are not to be chosen.

@@ -7,16 +7,6 @@ from math import ceil, inf, log2, sqrt
 
 from ...scene.tables import Scene
 
-__all__ = [
-    "DAMPERS",
-    "DIRECTIONS",
-    "Settings",
-    "enriched",
-    "first_for",
-    "first_settings",
-    "restarted",
-]
-
 # from poor to rich
 DAMPERS = ("mass", "rigid", "elastic")
 # in which a model is enriched
@@ -53,18 +43,17 @@ class Settings:
         kind = "balance of harmonics"
         if self.harmonics == 1:
             kind = (
-                "equivalent linearisation, which is the balance of one harmonic and whose "
-                "error the next ones tell,"
+                "equivalent linearisation, which is the balance of one harmonic and whose error "
+                "the next ones tell,"
             )
         if self.samples == 0:
             return (
-                f"method: {kind} by Newton, slip and lift-off located exactly, as the scene "
-                "asks for"
+                f"method: {kind} by Newton, slip and lift-off located exactly, as the scene asks "
+                "for"
             )
         return (
             f"method: {kind} by Newton with friction sampled, because no other method is faster "
-            "where it is as "
-            "accurate"
+            "where it is as accurate"
         )
 
     def sentence(self, nodes: int | None = None) -> str:
@@ -89,8 +78,7 @@ class Settings:
             )
         return (
             f"model: {self.modes} modes, {self.harmonics} harmonics, {self.samples} samples, "
-            f"{points}, "
-            f"{self.damper} damper ({error}; {kind})"
+            f"{points}, {self.damper} damper ({error}; {kind})"
         )
 
 
@@ -121,7 +109,11 @@ def first_settings(scene: Scene) -> Settings:
     return _enough_samples(settings)
 
 
-def enriched(settings: Settings, name: str, need: float = 4.0) -> Settings | None:
+def enriched(
+    settings: Settings,
+    name: str,
+    need: float = 4.0,
+) -> Settings | None:
     """The next richer settings in one respect; None where there is none.
 
     Args:

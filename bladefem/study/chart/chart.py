@@ -26,8 +26,6 @@ from .cpu_clock import Clock, running
 from .methods import applicable, balance, methods, tangential
 from .rows import Bench, Job, errors, resonance, rows, timed
 
-__all__ = ["Chart", "chart", "check_budget"]
-
 # frequencies, in half widths of the resonance
 WIDTHS = (-6, -3, -1.5, -0.75, -0.3, 0, 0.3, 0.75, 1.5, 3, 6)
 # harmonics and samples of the reference
@@ -146,7 +144,10 @@ def frequencies(curve: Iterable[tuple[float, float]]) -> np.ndarray:
 
 
 def _bench(
-    course: _Course, model: Callable[[int], ReducedModel], omegas: np.ndarray, name: str
+    course: _Course,
+    model: Callable[[int], ReducedModel],
+    omegas: np.ndarray,
+    name: str,
 ) -> Bench:
     """Climb the ladder past the chosen harmonics, and on while the next rung fits into a quarter of
     the time.
@@ -188,7 +189,11 @@ def _bench(
     return Bench(omegas, truth, doubt)
 
 
-def _methods(course: _Course, mode: int, shared: Bench) -> Iterator[Job]:
+def _methods(
+    course: _Course,
+    mode: int,
+    shared: Bench,
+) -> Iterator[Job]:
     """All methods that apply, on one model."""
     chosen, (model, bench, reason) = course.chosen, _simplified(course, mode, shared)
     for m in methods(not reason):
@@ -204,7 +209,11 @@ def _methods(course: _Course, mode: int, shared: Bench) -> Iterator[Job]:
     )
 
 
-def _simplified(course: _Course, mode: int, shared: Bench) -> tuple[ReducedModel, Bench, str]:
+def _simplified(
+    course: _Course,
+    mode: int,
+    shared: Bench,
+) -> tuple[ReducedModel, Bench, str]:
     """A tangential model that all methods take, with its reference; the richest and why where there
     is none such.
     """
@@ -223,9 +232,8 @@ def _simplified(course: _Course, mode: int, shared: Bench) -> tuple[ReducedModel
     omegas = course.omegas
     if family.dampers:
         course.remarks.append(
-            "methods are compared on the scene's tangential model: prescribed normal load, "
-            "damper a "
-            f"mass, up to {POINTS} contact points on each seat; what that model itself costs in "
+            "methods are compared on the scene's tangential model: prescribed normal load, damper "
+            f"a mass, up to {POINTS} contact points on each seat; what that model itself costs in "
             "accuracy stands among the models"
         )
         omegas = _own_frequencies(model, omegas, mode)
@@ -286,7 +294,11 @@ def _counted(count: int, what: str) -> str:
     return f"{count} {what}" + ("" if count == 1 else "s")
 
 
-def _own_frequencies(model: ReducedModel, omegas: np.ndarray, mode: int) -> np.ndarray:
+def _own_frequencies(
+    model: ReducedModel,
+    omegas: np.ndarray,
+    mode: int,
+) -> np.ndarray:
     """Frequencies round the resonance of the tangential model, which may lie elsewhere."""
     swept = covered(model, Settings(1, 3, 128, "mass"), None, mode, 0.05)
     good = [(p.omega, size(p)) for p in swept if p.converged]

@@ -8,8 +8,6 @@ from contextlib import contextmanager
 
 from numba.core.event import Event, Listener, install_listener
 
-__all__ = ["Clock", "running"]
-
 
 class Clock(Listener):
     """CPU seconds of this process, those of compilation apart; it hears of compilation from

@@ -42,8 +42,6 @@ from ..pipeline.stages import (
 )
 from .cpu_clock import running
 
-__all__ = ["MeshVariant", "Resonance", "mesh_table", "mesh_variants", "on_mesh"]
-
 # of the scene's own element sizes, when none are given
 RATIOS = (1.7, 1.3, 1.0)
 # at the most: what more of them change does not hang on the mesh
@@ -83,7 +81,11 @@ class MeshVariant:
         return replace(scene, mesh=self.mesh)
 
 
-def mesh_variants(scene: Scene, sizes: Sequence[float], drawn: Mesh) -> list[MeshVariant]:
+def mesh_variants(
+    scene: Scene,
+    sizes: Sequence[float],
+    drawn: Mesh,
+) -> list[MeshVariant]:
     """Meshes of first and then of second order, from coarse to fine; seats are refined as
     everything else is.
 
@@ -141,7 +143,12 @@ def _seat_size(mesh: Mesh) -> float:
     )
 
 
-def on_mesh(scene: Scene, settings: Settings, load: float, comm: Any = None) -> Resonance:
+def on_mesh(
+    scene: Scene,
+    settings: Settings,
+    load: float,
+    comm: Any = None,
+) -> Resonance:
     """The resonance under one load on the scene's own mesh, with given settings of the balance.
 
     Raises:
@@ -153,7 +160,12 @@ def on_mesh(scene: Scene, settings: Settings, load: float, comm: Any = None) -> 
         return replace(found, seconds=clock.now() - start)
 
 
-def _resonance(scene: Scene, settings: Settings, load: float, comm: Any) -> Resonance:
+def _resonance(
+    scene: Scene,
+    settings: Settings,
+    load: float,
+    comm: Any,
+) -> Resonance:
     """On one mesh, its time left open."""
     mesh = build_mesh(scene, comm)
     bodies = Bodies(scene, mesh, comm)
@@ -205,8 +217,8 @@ def mesh_table(
     doubt = abs(before.amplitude / truth.amplitude - 1) if before else np.nan
     remarks.append(
         f"reference of the meshes: {rich[-1]['name']} of second order, resonance "
-        f"{truth.frequency:.6g} Hz, "
-        f"{truth.amplitude:.6g} m, changed by {doubt:.1e} from the mesh before, its frequency by "
+        f"{truth.frequency:.6g} Hz, {truth.amplitude:.6g} m, changed by {doubt:.1e} from the mesh "
+        "before, its frequency by "
         f"{abs(before.frequency / truth.frequency - 1) if before else np.nan:.1e}"
     )
     remarks += [f"mesh {row['name']}: {row['reason']}" for row in rows if row["reason"]]
@@ -248,14 +260,23 @@ def _left_and(end: float, expected: float) -> tuple[float, float]:
     return end - time.process_time(), expected
 
 
-def _tried(scene: Scene, settings: Settings, load: float, comm: Any) -> dict[str, Any]:
+def _tried(
+    scene: Scene,
+    settings: Settings,
+    load: float,
+    comm: Any,
+) -> dict[str, Any]:
     try:
         return {"found": on_mesh(scene, settings, load, comm)}
     except NotSolvedError as error:
         return {"reason": str(error)}
 
 
-def _told(row: dict[str, Any], truth: Resonance, doubt: float) -> dict[str, object]:
+def _told(
+    row: dict[str, Any],
+    truth: Resonance,
+    doubt: float,
+) -> dict[str, object]:
     found = row["found"]
     return {
         "name": row["name"],

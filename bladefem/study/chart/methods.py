@@ -25,8 +25,6 @@ from ...time.event_integrator import stuck_start
 from ...time.shooting import periodic_solution, probe_harmonics
 from ...time.system import System, blade_ring
 
-__all__ = ["Method", "Point", "applicable", "balance", "exact", "methods", "tangential"]
-
 HARMONICS = (1, 3, 5, 7, 9, 15, 31)
 # most that are integrated at one frequency
 PERIODS = 500
@@ -84,8 +82,8 @@ def applicable(model: ReducedModel) -> str:
     damper = model.damper
     if model.elements.tangents != 1 or model.directions != 1:
         return (
-            "contacts have more than one tangential direction, or their normal load follows "
-            "the motion"
+            "contacts have more than one tangential direction, or their normal load follows the "
+            "motion"
         )
     if not (isinstance(damper, RigidBody) and damper.mass.shape == (1, 1)):
         return "the damper is not a rigid mass with one freedom"
@@ -114,7 +112,11 @@ def tangential(model: ReducedModel) -> ReducedModel:
 def balance(H: int, samples: int) -> Callable[[ReducedModel, float, object], Point]:
     """Full balance with sampled forces."""
 
-    def run(model: ReducedModel, omega: float, start: object) -> Point:
+    def run(
+        model: ReducedModel,
+        omega: float,
+        start: object,
+    ) -> Point:
         s = solve(model, omega, H, samples, start=start)
         return Point(complex(s.probe[1, 0]), s.converged, s.reason, s if s.converged else None)
 
@@ -131,7 +133,11 @@ def paper(H: int, averaged: bool) -> Callable[[ReducedModel, float, object], Poi
     periodic motion.
     """
 
-    def run(model: ReducedModel, omega: float, start: object) -> Point:
+    def run(
+        model: ReducedModel,
+        omega: float,
+        start: object,
+    ) -> Point:
         end = iterate(platform(model, omega, H), "amplitude", Rules(averaged=averaged))
         first = complex(end.probe[1, 0])
         reason = end.reason
@@ -149,7 +155,11 @@ def integrated(steps: int, explicit: bool) -> Callable[[ReducedModel, float, obj
     reason says so.
     """
 
-    def run(model: ReducedModel, omega: float, start: object) -> Point:
+    def run(
+        model: ReducedModel,
+        omega: float,
+        start: object,
+    ) -> Point:
         system = in_time(model, omega)
         try:
             cycle = direct(
@@ -171,7 +181,11 @@ def integrated(steps: int, explicit: bool) -> Callable[[ReducedModel, float, obj
     return run
 
 
-def shooting(model: ReducedModel, omega: float, start: object) -> Point:
+def shooting(
+    model: ReducedModel,
+    omega: float,
+    start: object,
+) -> Point:
     """Periodic solution of the exact flow."""
     system = in_time(model, omega)
     end = periodic_solution(system, omega, _fitting(start, system), samples=512)

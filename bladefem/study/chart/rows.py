@@ -17,8 +17,6 @@ from ...hbm.model import ReducedModel
 from .cpu_clock import Clock
 from .methods import Point
 
-__all__ = ["Bench", "Job", "Peak", "Solve", "Timing", "errors", "resonance", "rows", "timed"]
-
 # times that a variant may cost more than the cheaper one of its kind before it
 DEARER = 3.0
 # of the time that is left, for a variant of unknown cost
@@ -96,14 +94,22 @@ class _Known:
     own: dict[int, float] = field(default_factory=dict)
     kind: dict[str, float] = field(default_factory=dict)
 
-    def expected(self, number: int, job: Job) -> float:
+    def expected(
+        self,
+        number: int,
+        job: Job,
+    ) -> float:
         """Seconds a frequency; zero when nothing is known."""
         cheaper = DEARER * self.kind.get(job.kind, 0.0) if job.ordered else 0.0
         return self.own.get(number, cheaper)
 
 
 def timed(
-    model: ReducedModel, run: Solve, omegas: np.ndarray, allowed: tuple[float, float], clock: Clock
+    model: ReducedModel,
+    run: Solve,
+    omegas: np.ndarray,
+    allowed: tuple[float, float],
+    clock: Clock,
 ) -> Timing:
     """All frequencies, or as many as tell that they would take more than is allowed; the middle one
     first.
@@ -134,7 +140,11 @@ def timed(
     return Timing(points, best)
 
 
-def rows(jobs: Sequence[Job], end: float, clock: Clock) -> list[dict[str, object]]:
+def rows(
+    jobs: Sequence[Job],
+    end: float,
+    clock: Clock,
+) -> list[dict[str, object]]:
     """One row a job, in their order, solved as long as the clock has not come to the end, cheap
     ones first.
     """
@@ -174,7 +184,12 @@ def _eligible(waiting: dict[int, Job]) -> list[int]:
     return [k for k, job in waiting.items() if not job.ordered or firsts[job.kind] == k]
 
 
-def _too_dear(seconds: float, measured: bool, left: float, job: Job) -> str:
+def _too_dear(
+    seconds: float,
+    measured: bool,
+    left: float,
+    job: Job,
+) -> str:
     """Why a job is not begun: a call cannot be cut short."""
     if measured and seconds * len(job.bench.omegas) > COLD * left:
         return (
@@ -185,8 +200,7 @@ def _too_dear(seconds: float, measured: bool, left: float, job: Job) -> str:
     if seconds > left:
         return (
             f"left out: {seconds:.2g} s a frequency are expected after the cheaper one of its "
-            f"kind, {left:.2g} s "
-            "of the budget were left"
+            f"kind, {left:.2g} s of the budget were left"
         )
     return ""
 
@@ -211,7 +225,11 @@ def _row(job: Job, timing: Timing) -> dict[str, object]:
     return _lost(job, timing.seconds, reason) | errors(peak, bench.truth) | {"converged": True}
 
 
-def _lost(job: Job, seconds: float, reason: str) -> dict[str, object]:
+def _lost(
+    job: Job,
+    seconds: float,
+    reason: str,
+) -> dict[str, object]:
     """The row of a variant without a result."""
     return {
         "name": job.name,

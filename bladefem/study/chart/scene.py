@@ -20,8 +20,6 @@ from ..pipeline.stages import Bodies, Reduced
 from .chart import Chart, chart, check_budget
 from .meshes import mesh_table, mesh_variants
 
-__all__ = ["reference_chart", "scene_chart"]
-
 REFERENCE_LOAD = 3.0
 REFERENCE_BAND = (1150.0, 1600.0)
 REFERENCE_POINTS = 4

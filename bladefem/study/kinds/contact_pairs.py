@@ -21,8 +21,6 @@ from ..pipeline.stage_inputs import stage_key
 from .hertz import hertz_pressure, hertz_radius, press_pair, second_moment_radius
 from .punch import Indented, indent, johnson_approach, johnson_pressure
 
-__all__ = ["INNER", "PairState", "radii", "solve_pair"]
-
 # of the punch's radius: further out its pressure grows without bound
 INNER = 0.8
 
@@ -46,7 +44,9 @@ class PairState:
 
 
 def solve_pair(
-    scene: Scene, folder: str | Path | None = None, comm: Any = None
+    scene: Scene,
+    folder: str | Path | None = None,
+    comm: Any = None,
 ) -> tuple[Mesh, list[PairState]]:
     """Mesh and states of a scene of kind "hertz" or "punch", on all ranks of a communicator.
 
@@ -103,7 +103,11 @@ def _punch(scene: Scene, comm: Any) -> tuple[Mesh, list[PairState]]:
     return found.mesh, [_punched(scene, found, load) for load in loads]
 
 
-def _punched(scene: Scene, found: Indented, load: float) -> PairState:
+def _punched(
+    scene: Scene,
+    found: Indented,
+    load: float,
+) -> PairState:
     """A rigid flat punch presses in proportion to its load."""
     a = scene.punch.radius
     block = scene.material.blade
@@ -126,7 +130,9 @@ def _punched(scene: Scene, found: Indented, load: float) -> PairState:
 
 
 def _difference(
-    seat: PressureMap, exact: np.ndarray, where: np.ndarray | slice = slice(None)
+    seat: PressureMap,
+    exact: np.ndarray,
+    where: np.ndarray | slice = slice(None),
 ) -> float:
     area = seat.patch.area[where]
     p = seat.pressure[where]

@@ -30,16 +30,6 @@ from ...scene.units import show
 from ..pipeline.stages import build_mesh
 from .punch import flexibility
 
-__all__ = [
-    "Pressed",
-    "check_loads",
-    "hertz_load",
-    "hertz_pressure",
-    "hertz_radius",
-    "press_pair",
-    "second_moment_radius",
-]
-
 # contact radius over the expected one, at most
 WIDEST = 0.9 * WIDER
 
@@ -113,7 +103,11 @@ def hertz_load(scene: Scene, a: float) -> float:
     return 4 * E * a**3 / (3 * R) if scene.hertz.dimension == 3 else np.pi * E * a**2 / (4 * R)
 
 
-def hertz_pressure(scene: Scene, load: float, r: np.ndarray) -> np.ndarray:
+def hertz_pressure(
+    scene: Scene,
+    load: float,
+    r: np.ndarray,
+) -> np.ndarray:
     """Pressure [Pa] at the radii r [m], zero outside of the contact."""
     a = hertz_radius(scene, load)
     peak = 1.5 * load / (np.pi * a**2) if scene.hertz.dimension == 3 else 2 * load / (np.pi * a)

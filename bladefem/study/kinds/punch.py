@@ -31,16 +31,6 @@ from ...errors import InputError, NotSolvedError
 from ...scene.tables import Scene
 from ..pipeline.stages import build_mesh
 
-__all__ = [
-    "Indented",
-    "flexibility",
-    "indent",
-    "johnson_approach",
-    "johnson_pressure",
-    "ring_stiffness",
-    "spring_tilt",
-]
-
 
 @dataclass(frozen=True)
 class Indented:
@@ -114,24 +104,44 @@ def indent(scene: Scene, comm: Any = None) -> Indented:
     )
 
 
-def johnson_pressure(r: np.ndarray, a: float, force: float, plane: bool = False) -> np.ndarray:
+def johnson_pressure(
+    r: np.ndarray,
+    a: float,
+    force: float,
+    plane: bool = False,
+) -> np.ndarray:
     """Pressure [Pa] at r < a under a force [N], or [N/m] in the plane."""
     return force / (np.pi * np.sqrt(a**2 - r**2)) / (1.0 if plane else 2 * a)
 
 
-def johnson_approach(a: float, force: float, E: float, nu: float) -> float:
+def johnson_approach(
+    a: float,
+    force: float,
+    E: float,
+    nu: float,
+) -> float:
     """Approach of a round punch and a half space [m]."""
     return force * (1 - nu**2) / (2 * a * E)
 
 
-def ring_stiffness(edges: np.ndarray, a: float, E: float, nu: float) -> np.ndarray:
+def ring_stiffness(
+    edges: np.ndarray,
+    a: float,
+    E: float,
+    nu: float,
+) -> np.ndarray:
     """Normal stiffness [N/m] of the rings between radii (k + 1,) [m]: Eq. 25 integrated over
     each.
     """
     return -np.diff(2 * E / (1 - nu**2) * np.sqrt(np.maximum(a**2 - edges**2, 0.0)))
 
 
-def spring_tilt(edges: np.ndarray, a: float, E: float, nu: float) -> float:
+def spring_tilt(
+    edges: np.ndarray,
+    a: float,
+    E: float,
+    nu: float,
+) -> float:
     """Moment a radian that those springs resist a tilt with [N m]: half of the ring's stiffness
     times r^2.
     """
@@ -139,7 +149,11 @@ def spring_tilt(edges: np.ndarray, a: float, E: float, nu: float) -> float:
     return float(np.diff(E / (1 - nu**2) * (s**3 / 3 - a**2 * s)).sum())
 
 
-def flexibility(body: Any, ports: Any, held: str = "clamp") -> np.ndarray:
+def flexibility(
+    body: Any,
+    ports: Any,
+    held: str = "clamp",
+) -> np.ndarray:
     """(n, n) displacements at the ports for unit forces there [m/N]; the body is held at a face.
     Collective.
     """

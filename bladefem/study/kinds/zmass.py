@@ -32,8 +32,6 @@ from ...scene.tables import Scene
 from ..pipeline.stage_inputs import stage_key
 from ..pipeline.stages import build_mesh
 
-__all__ = ["Pressed", "drives", "mass_on_foundation", "mean_load", "motions", "press"]
-
 # largest of a frequency ratio
 DENOMINATOR = 1000
 
@@ -46,7 +44,11 @@ class Pressed:
     seat: PressureMap
 
 
-def press(scene: Scene, folder: Any = None, comm: Any = None) -> Pressed:
+def press(
+    scene: Scene,
+    folder: Any = None,
+    comm: Any = None,
+) -> Pressed:
     """Mesh and contact pressure of a scene of kind "z mass", on all ranks of a communicator.
 
     Raises:
@@ -83,7 +85,11 @@ def mass_on_foundation(scene: Scene, seat: PressureMap) -> MassOnFoundation:
     )
 
 
-def clusters(points: np.ndarray, area: np.ndarray, count: int | None) -> np.ndarray:
+def clusters(
+    points: np.ndarray,
+    area: np.ndarray,
+    count: int | None,
+) -> np.ndarray:
     """(n,) number of the contact point that each node belongs to: nearest centres, moved to their
     means (Lloyd).
 
@@ -115,7 +121,9 @@ def drives(scene: Scene) -> list[Drive]:
 
 
 def motions(
-    scene: Scene, body: MassOnFoundation, steps: int = 2000
+    scene: Scene,
+    body: MassOnFoundation,
+    steps: int = 2000,
 ) -> Iterator[tuple[Drive, Steady]]:
     """The steady motion for each frequency ratio of the scene, to 1e-6: an odd footprint keeps
     turning slowly.

@@ -20,14 +20,6 @@ from ...wheel.tuned import tuned_sector
 from ..pipeline.loads import Curve
 from .whole_wheel import WheelSector
 
-__all__ = [
-    "PatternResponse",
-    "frequency_grid",
-    "pattern_responses",
-    "scene_deviations",
-    "scene_scatter",
-]
-
 # points of the first look at a band
 GRID = 15
 # of the linear wheel, which costs little
@@ -58,7 +50,8 @@ class PatternResponse:
     free_factor: float
     # relative change of the peak's height with twice the harmonics and samples; NaN: not solved
     truncation: float
-    # relative difference of the tuned peak from that of the sector's own curve, whose means are free
+    # relative difference of the tuned peak from that of the sector's own curve, whose means are
+    # free
     sector_difference: float
 
     @property
@@ -67,7 +60,11 @@ class PatternResponse:
         return self.peak.height / self.tuned
 
 
-def scene_deviations(scene: Scene, count: int, families: int) -> np.ndarray:
+def scene_deviations(
+    scene: Scene,
+    count: int,
+    families: int,
+) -> np.ndarray:
     """(N, q) relative deviations of frequency: of the file, or the first ones drawn.
 
     Raises:
@@ -109,11 +106,16 @@ def scene_scatter(scene: Scene) -> Scatter:
     return Scatter(m.scatter or 0.0, m.friction, m.stiffness, m.load, m.seed)
 
 
-def frequency_grid(wheel: Wheel, curve: Curve, pattern: Pattern, spread: float) -> np.ndarray:
+def frequency_grid(
+    wheel: Wheel,
+    curve: Curve,
+    pattern: Pattern,
+    spread: float,
+) -> np.ndarray:
     """(k,) circular frequencies to look at first, as far as deviations reach [rad/s].
 
-    Even steps find the broad resonances of sliding dampers; where dampers stick a blade resonates as
-    sharply as its own damping lets it, at resonances of the linear wheel, which are added.
+    Even steps find the broad resonances of sliding dampers; where dampers stick a blade resonates
+    as sharply as its own damping lets it, at resonances of the linear wheel, which are added.
 
     Args:
         spread: largest relative deviation of frequency.
@@ -129,7 +131,12 @@ def frequency_grid(wheel: Wheel, curve: Curve, pattern: Pattern, spread: float) 
     return np.union1d(np.linspace(low, high, GRID), _stuck_peaks(wheel, pattern, low, high))
 
 
-def _stuck_peaks(wheel: Wheel, pattern: Pattern, low: float, high: float) -> np.ndarray:
+def _stuck_peaks(
+    wheel: Wheel,
+    pattern: Pattern,
+    low: float,
+    high: float,
+) -> np.ndarray:
     """Circular frequencies of the highest resonances with all contacts sticking."""
     fine = np.linspace(low, high, FINE)
     sizes = [stuck_wheel(wheel, w, max(wheel.excitation), pattern)[:, 1:, 0] for w in fine]
@@ -161,7 +168,10 @@ def pattern_responses(
 
 
 def _one_load(
-    wheel: Wheel, pattern: Pattern, deviation: np.ndarray, curve: Curve
+    wheel: Wheel,
+    pattern: Pattern,
+    deviation: np.ndarray,
+    curve: Curve,
 ) -> PatternResponse:
     settings = curve.settings
     H = max(settings.harmonics, *wheel.excitation)
@@ -193,7 +203,11 @@ def _one_load(
     )
 
 
-def _free_factor(wheel: Wheel, pattern: Pattern, grid: np.ndarray) -> float:
+def _free_factor(
+    wheel: Wheel,
+    pattern: Pattern,
+    grid: np.ndarray,
+) -> float:
     """Amplification without dampers over the same band."""
     fine = np.linspace(grid[0], grid[-1], FINE)
 

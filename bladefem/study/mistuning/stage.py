@@ -1,4 +1,6 @@
-"""What a mistuned scene adds to a run: the whole wheel with one pattern, or the statistics of many."""
+"""What a mistuned scene adds to a run: the whole wheel with one pattern, or the statistics of
+many.
+"""
 
 from __future__ import annotations
 
@@ -26,8 +28,6 @@ from .pattern_response import (
 )
 from .whole_wheel import WheelSector, read_orders, reduce_wheel, whole_wheel
 
-__all__ = ["check_mistuning", "is_mistuned", "scatter_of_run", "with_whole_wheel"]
-
 
 def is_mistuned(scene: Scene) -> bool:
     """The scene tells how its blades differ."""
@@ -49,7 +49,11 @@ def check_mistuning(scene: Scene) -> None:
     read_orders(scene)
 
 
-def with_whole_wheel(run: Run, comm: Any = None, progress: Progress = unwatched) -> Run:
+def with_whole_wheel(
+    run: Run,
+    comm: Any = None,
+    progress: Progress = unwatched,
+) -> Run:
     """The run with the whole wheel under the load whose tuned resonance is lowest."""
     start = time.perf_counter()
     best = min(run.response.curves, key=lambda curve: curve.peak_amplitude)
@@ -59,7 +63,11 @@ def with_whole_wheel(run: Run, comm: Any = None, progress: Progress = unwatched)
     return replace(run, wheel=found, timings={**run.timings, "whole wheel": seconds})
 
 
-def scatter_of_run(run: Run, comm: Any = None, progress: Progress = unwatched) -> Amplification:
+def scatter_of_run(
+    run: Run,
+    comm: Any = None,
+    progress: Progress = unwatched,
+) -> Amplification:
     """Statistics under all loads of a run; wheels are dealt out over the ranks.
 
     Raises:
@@ -68,8 +76,8 @@ def scatter_of_run(run: Run, comm: Any = None, progress: Progress = unwatched) -
     scene = run.scene
     if scene.mistuning.scatter is None:
         raise InputError(
-            "mistuning.scatter: expected a relative standard deviation of the blades' frequencies, "
-            "such as '1 %', for 'bladefem scatter'"
+            "mistuning.scatter: expected a relative standard deviation of the blades' "
+            "frequencies, such as '1 %', for 'bladefem scatter'"
         )
     curves = run.response.curves
     if len({curve.mass for curve in curves}) > 1:
@@ -113,7 +121,10 @@ def _respond_by(
 
 
 def _wheels(
-    run: Run, curves: list[Curve], comm: Any, progress: Progress
+    run: Run,
+    curves: list[Curve],
+    comm: Any,
+    progress: Progress,
 ) -> tuple[WheelSector, list[Wheel]]:
     """The sector in all nodal diameters, and the tuned wheel of each curve."""
     scene = run.scene

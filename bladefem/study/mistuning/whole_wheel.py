@@ -1,5 +1,5 @@
-"""The whole wheel of a scene: the sector reduced in every nodal diameter with the coordinates of its
-blade-alone modes, joined with the friction elements of a load case.
+"""The whole wheel of a scene: the sector reduced in every nodal diameter with the coordinates of
+its blade-alone modes, joined with the friction elements of a load case.
 """
 
 from __future__ import annotations
@@ -23,8 +23,6 @@ from ..pipeline.assemble_model import LoadCase, joint_model
 from ..pipeline.contact_cycle import labels
 from ..pipeline.stages import Bodies, Reduced, reduce_sector, weighted
 
-__all__ = ["WheelSector", "read_orders", "reduce_wheel", "whole_wheel"]
-
 
 @dataclass(frozen=True)
 class WheelSector:
@@ -36,7 +34,11 @@ class WheelSector:
 
 
 def reduce_wheel(
-    bodies: Bodies, patches: list[Patch], modes: int, clamped: ModeSet | None, families: int
+    bodies: Bodies,
+    patches: list[Patch],
+    modes: int,
+    clamped: ModeSet | None,
+    families: int,
 ) -> WheelSector:
     """The sector in nodal diameters 0 to N/2.
 

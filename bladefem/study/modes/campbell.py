@@ -23,8 +23,6 @@ from ...scene.units import is_plain, parse
 from ..pipeline.stages import Bodies, is_wheel
 from .crossings import campbell_crossings, fold, interference_table, margins, wave
 
-__all__ = ["Campbell", "campbell", "campbell_table", "read_speeds", "sense_of"]
-
 # modes beyond those asked for: Coriolis forces mix neighbours
 GUARD = 6
 # of one diagram: more cannot be told apart in a picture
@@ -86,7 +84,10 @@ def campbell(
 
 
 def campbell_table(
-    bodies: Bodies, speeds: Sequence[float], diameters: Sequence[int] | None, count: int = 5
+    bodies: Bodies,
+    speeds: Sequence[float],
+    diameters: Sequence[int] | None,
+    count: int = 5,
 ) -> pd.DataFrame:
     """One row a mode and speed.
 
@@ -158,7 +159,12 @@ def sense_of(mesh: Any) -> int:
     return 1 if mesh.sector.rotation[1, 0] >= 0 else -1
 
 
-def _modes(bodies: Bodies, body: Any, diameters: Sequence[int] | None, count: int) -> list[ModeSet]:
+def _modes(
+    bodies: Bodies,
+    body: Any,
+    diameters: Sequence[int] | None,
+    count: int,
+) -> list[ModeSet]:
     """Modes with the stiffness of one speed."""
     from ...fem.all_diameters import all_diameters
     from ...fem.constraint import constrain
@@ -208,7 +214,9 @@ def _lines(
 
 
 def _projections(
-    at: list[Any], sets: list[ModeSet], G: Any
+    at: list[Any],
+    sets: list[ModeSet],
+    G: Any,
 ) -> tuple[list[np.ndarray], np.ndarray, np.ndarray]:
     """Stiffness of each speed, mass and Coriolis matrix on the modes of all three."""
     from ...fem.gyroscopic import own_rows
@@ -221,7 +229,11 @@ def _projections(
     return K, _hermitian(dot(comm, X, apply(at[0].M, X))), (g - g.conj().T) / 2
 
 
-def _frequencies(K: np.ndarray, M: np.ndarray, count: int) -> tuple[np.ndarray, np.ndarray]:
+def _frequencies(
+    K: np.ndarray,
+    M: np.ndarray,
+    count: int,
+) -> tuple[np.ndarray, np.ndarray]:
     """Lowest frequencies [Hz] and vectors in a basis that may nearly depend on itself."""
     size, Q = np.linalg.eigh(M)
     keep = size > 1e-11 * size[-1]
@@ -231,7 +243,11 @@ def _frequencies(K: np.ndarray, M: np.ndarray, count: int) -> tuple[np.ndarray, 
 
 
 def _split(
-    f: np.ndarray, g: np.ndarray, speed: float, sense: int, diameter: int | None
+    f: np.ndarray,
+    g: np.ndarray,
+    speed: float,
+    sense: int,
+    diameter: int | None,
 ) -> tuple[np.ndarray, np.ndarray]:
     from ...fem.gyroscopic import waves
 
@@ -244,7 +260,11 @@ def _lagrange(nodes: np.ndarray, s: float) -> list[float]:
     return [float(np.prod([(s - b) / (a - b) for b in nodes if b != a])) for a in nodes]
 
 
-def _excited(table: pd.DataFrame, order: int, sectors: int) -> pd.DataFrame:
+def _excited(
+    table: pd.DataFrame,
+    order: int,
+    sectors: int,
+) -> pd.DataFrame:
     """The table with the frequency of the wave that an order excites.
 
     A pattern that stands still in space runs against the rotation for a rider on the wheel; orders
@@ -258,7 +278,10 @@ def _excited(table: pd.DataFrame, order: int, sectors: int) -> pd.DataFrame:
 
 
 def _interference(
-    table: pd.DataFrame, order: int, sectors: int, speed: float
+    table: pd.DataFrame,
+    order: int,
+    sectors: int,
+    speed: float,
 ) -> tuple[pd.DataFrame, pd.DataFrame]:
     """SAFE rows and the closest mode of one order; single blades take every order."""
     rows = _excited(table, order, sectors)

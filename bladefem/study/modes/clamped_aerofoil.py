@@ -10,8 +10,6 @@ from ...data import ModeSet
 from ..pipeline.stages import MODES_SHOWN, Bodies, is_wheel
 from .comparison import blade_root
 
-__all__ = ["clamped_blade"]
-
 
 def clamped_blade(bodies: Bodies) -> ModeSet | None:
     """Modes of the aerofoil clamped at its root, at rest.

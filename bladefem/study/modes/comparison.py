@@ -15,8 +15,6 @@ from geometry.mesh import Mesh
 
 from .mesh_transfer import nodal_volumes, transfer
 
-__all__ = ["blade_root", "family_table", "mac", "participation", "pure_shapes"]
-
 ORDINALS = ("first", "second", "third", "fourth", "fifth")
 # Roots of cos(b) cosh(b) = -1, the clamped-free beam (Blevins, Formulas for Natural Frequency,
 # Table 8-1).
@@ -30,12 +28,17 @@ BEAM_ROOTS = (
 SLICES = 16
 
 
-def mac(a: ModeSet, b: ModeSet, mesh: Mesh | None = None, other: Mesh | None = None) -> np.ndarray:
+def mac(
+    a: ModeSet,
+    b: ModeSet,
+    mesh: Mesh | None = None,
+    other: Mesh | None = None,
+) -> np.ndarray:
     """Modal assurance criterion between the modes of two runs, (modes of a, modes of b), 1 for
     equal shapes.
 
-    |a^H W b|^2 / (a^H W a)(b^H W b), W the nodes' shares of the volume (Allemang and Brown, IMAC 1982); independent of
-    the phase of complex modes.
+    |a^H W b|^2 / (a^H W a)(b^H W b), W the nodes' shares of the volume (Allemang and Brown, IMAC
+    1982); independent of the phase of complex modes.
 
     Args:
         a, b: mode sets.
@@ -47,7 +50,11 @@ def mac(a: ModeSet, b: ModeSet, mesh: Mesh | None = None, other: Mesh | None = N
     return mac_of(a.shapes, shapes, weight)
 
 
-def mac_of(a: np.ndarray, b: np.ndarray, weight: np.ndarray) -> np.ndarray:
+def mac_of(
+    a: np.ndarray,
+    b: np.ndarray,
+    weight: np.ndarray,
+) -> np.ndarray:
     """(p, q) MAC of fields (p, n, 3) and (q, n, 3) with weights (n,)."""
     product = np.einsum("pni,n,qni->pq", a.conj(), weight, b, optimize=True)
     length = [np.einsum("pni,n,pni->p", x.conj(), weight, x, optimize=True).real for x in (a, b)]
@@ -103,7 +110,10 @@ def section_axes(points: np.ndarray, s: np.ndarray) -> tuple[np.ndarray, np.ndar
 
 
 def pure_shapes(
-    mesh: Mesh, nodes: np.ndarray, root: float, orders: int = 4
+    mesh: Mesh,
+    nodes: np.ndarray,
+    root: float,
+    orders: int = 4,
 ) -> dict[str, np.ndarray]:
     """Names and fields (n, 3) of ideal blade motions on ``nodes``: flap, edge, torsion, stretch of
     a clamped beam.
@@ -183,7 +193,12 @@ def family_table(
     )
 
 
-def families(match: np.ndarray, names: Sequence[str], share: np.ndarray, below: str) -> list[str]:
+def families(
+    match: np.ndarray,
+    names: Sequence[str],
+    share: np.ndarray,
+    below: str,
+) -> list[str]:
     """Names of the modes from the MAC (modes, references), the references' names and the aerofoil's
     share.
     """
@@ -212,8 +227,8 @@ def participation(
     """Participation factors and effective masses of rigid translations and rotations, one row a
     mode and direction.
 
-    Gamma = phi^H M r / (phi^H M phi), effective mass |phi^H M r|^2 / (phi^H M phi); over all modes of a body they add
-    up to r^T M r (Clough and Penzien, Dynamics of Structures, sect. 26).
+    Gamma = phi^H M r / (phi^H M phi), effective mass |phi^H M r|^2 / (phi^H M phi); over all modes
+    of a body they add up to r^T M r (Clough and Penzien, Dynamics of Structures, sect. 26).
 
     Args:
         modes: (m, n, 3) shapes.

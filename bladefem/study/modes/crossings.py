@@ -13,8 +13,6 @@ from collections.abc import Iterable
 import numpy as np
 import pandas as pd
 
-__all__ = ["campbell_crossings", "fold", "interference_table", "margins"]
-
 
 def fold(order: int, sectors: int) -> int:
     """The nodal diameter, 0..N/2, that an engine order excites on a wheel of N sectors."""
@@ -31,7 +29,9 @@ def wave(order: int, sectors: int) -> str:
 
 
 def campbell_crossings(
-    table: pd.DataFrame, orders: Iterable[int], sectors: int | None = None
+    table: pd.DataFrame,
+    orders: Iterable[int],
+    sectors: int | None = None,
 ) -> pd.DataFrame:
     """Speeds at which an engine-order line crosses a frequency line, one row a crossing.
 
@@ -86,7 +86,10 @@ def line_crossings(line: pd.DataFrame, order: int) -> list[float]:
 
 
 def interference_table(
-    table: pd.DataFrame, sectors: int, speed: float, orders: Iterable[int]
+    table: pd.DataFrame,
+    sectors: int,
+    speed: float,
+    orders: Iterable[int],
 ) -> pd.DataFrame:
     """Every engine order against the modes of the nodal diameter that it excites, at one speed
     (SAFE diagram).

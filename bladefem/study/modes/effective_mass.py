@@ -18,8 +18,6 @@ from ...data import ModeSet
 from .campbell import sense_of
 from .comparison import rigid_motion
 
-__all__ = ["effective_masses"]
-
 
 def effective_masses(sets: Sequence[ModeSet], body: Any) -> pd.DataFrame:
     """One row a mode and direction that it can follow.
@@ -58,7 +56,12 @@ def _directions(modes: ModeSet, body: Any) -> list[tuple[str, float]]:
     }.get(n, [])
 
 
-def _rows(modes: ModeSet, body: Any, direction: str, factor: float) -> pd.DataFrame:
+def _rows(
+    modes: ModeSet,
+    body: Any,
+    direction: str,
+    factor: float,
+) -> pd.DataFrame:
     from ...fem.gyroscopic import own_rows
     from ...fem.linalg import apply, dot
 

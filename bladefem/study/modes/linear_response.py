@@ -22,18 +22,6 @@ from ...reduction.assemble import folded_diameter
 from ..pipeline.ports import blade_ports
 from ..pipeline.stages import Bodies, is_wheel
 
-__all__ = [
-    "Forced",
-    "displacement",
-    "excitation_load",
-    "forced",
-    "half_widths",
-    "peak",
-    "pressure_load",
-    "probe",
-    "static_offset",
-]
-
 MODES = 20
 
 
@@ -63,7 +51,11 @@ def excitation_load(bodies: Bodies) -> np.ndarray:
     return excitation.force * ports.matrix[:, ports.names["load"]].toarray()[:, 0]
 
 
-def pressure_load(bodies: Bodies, face: str, amplitude: complex) -> np.ndarray:
+def pressure_load(
+    bodies: Bodies,
+    face: str,
+    amplitude: complex,
+) -> np.ndarray:
     """(n_points*dim,) nodal forces [N] of a pressure wave on a face, complex amplitude [Pa],
     towards the body.
     """
@@ -102,8 +94,7 @@ def forced(
     ):
         raise InputError(
             f"load of shape {load.shape}, expected {mesh.dimension * len(mesh.points)} finite "
-            "values, "
-            "not all zero"
+            "values, not all zero"
         )
     order = scene.excitation.engine_order
     n, mirrored = folded_diameter(1, order, mesh.sector.count) if is_wheel(mesh) else (0, False)
@@ -136,7 +127,11 @@ def displacement(response: Forced, frequency: float) -> np.ndarray:
     return np.tensordot(_amplitudes(response, frequency), response.shapes, 1) + response.rest
 
 
-def probe(response: Forced, vector: np.ndarray, frequencies: np.ndarray) -> np.ndarray:
+def probe(
+    response: Forced,
+    vector: np.ndarray,
+    frequencies: np.ndarray,
+) -> np.ndarray:
     """(k,) complex amplitudes of vector . u [m] at frequencies [Hz]; amplitude is their size, phase
     their angle.
 
@@ -152,7 +147,11 @@ def probe(response: Forced, vector: np.ndarray, frequencies: np.ndarray) -> np.n
     return np.array([_amplitudes(response, f) @ seen + rest for f in frequencies])
 
 
-def peak(response: Forced, vector: np.ndarray, mode: int = 1) -> tuple[float, float]:
+def peak(
+    response: Forced,
+    vector: np.ndarray,
+    mode: int = 1,
+) -> tuple[float, float]:
     """Resonance of a mode: frequency [Hz] and amplitude [m] of vector . u, by golden section round
     the mode.
 
@@ -206,7 +205,11 @@ def _damping(response: Forced, w: float) -> np.ndarray:
     return 1j * (w * damping.viscous(omega) + np.sign(w) * damping.structural * omega**2)
 
 
-def _modal(mesh: Any, modes: ModeSet, load: np.ndarray) -> np.ndarray:
+def _modal(
+    mesh: Any,
+    modes: ModeSet,
+    load: np.ndarray,
+) -> np.ndarray:
     force = load.reshape(len(mesh.points), -1)
     return np.einsum("mni,ni->m", modes.shapes[:, :, : force.shape[1]].conj(), force)
 

@@ -29,8 +29,6 @@ from .linear_response import (
     static_offset,
 )
 
-__all__ = ["Answer", "answer", "read_damping", "read_loads", "stress_states", "stress_table"]
-
 # resonances
 SHOWN = 5
 # points across each resonance
@@ -147,7 +145,10 @@ def read_damping(text: str) -> Damping:
 
 
 def stress_states(
-    bodies: Bodies, modes: ModeSet, count: int, found: Answer | None = None
+    bodies: Bodies,
+    modes: ModeSet,
+    count: int,
+    found: Answer | None = None,
 ) -> dict[str, np.ndarray]:
     """Displacements (n_points, 3) [m] by name: of rotation, of modes scaled to 1 mm, of
     resonances.
@@ -215,7 +216,11 @@ def _of_all_bodies(bodies: Bodies, values: np.ndarray) -> np.ndarray:
     )
 
 
-def _curve(found: Forced, vector: np.ndarray, count: int) -> pd.DataFrame:
+def _curve(
+    found: Forced,
+    vector: np.ndarray,
+    count: int,
+) -> pd.DataFrame:
     """Points over the band, close together at the resonances."""
     f = found.omega[:count] / (2 * np.pi)
     width = half_widths(found)[:count]

@@ -34,17 +34,6 @@ from ..pipeline.stages import Bodies, build_mesh, find_modes
 from .comparison import mac_of
 from .mesh_transfer import nodal_volumes, transfer
 
-__all__ = [
-    "RATIOS",
-    "Convergence",
-    "converge",
-    "default_sizes",
-    "element_size",
-    "fitted",
-    "of_meshes",
-    "richardson",
-]
-
 # of the scene's own element sizes
 RATIOS = (2.0, 1.7, 1.4, 1.2, 1.0)
 # order that is looked for
@@ -131,7 +120,11 @@ def of_meshes(runs: Sequence[tuple[Mesh, Sequence[ModeSet]]], count: int) -> Con
 
 
 def paired(
-    mesh: Mesh, modes: ModeSet, finest: Mesh, reference: ModeSet, count: int
+    mesh: Mesh,
+    modes: ModeSet,
+    finest: Mesh,
+    reference: ModeSet,
+    count: int,
 ) -> tuple[np.ndarray, np.ndarray]:
     """(count,) numbers in ``modes`` of the modes most like the first of ``reference``, and their
     MAC.
@@ -149,7 +142,13 @@ def paired(
     return columns, match[rows, columns]
 
 
-def _rows(mesh: Mesh, modes: ModeSet, finest: Mesh, reference: ModeSet, count: int) -> pd.DataFrame:
+def _rows(
+    mesh: Mesh,
+    modes: ModeSet,
+    finest: Mesh,
+    reference: ModeSet,
+    count: int,
+) -> pd.DataFrame:
     """One mesh and nodal diameter."""
     numbers, match = paired(mesh, modes, finest, reference, count)
     diameter = {} if modes.nodal_diameter is None else {"nodal_diameter": modes.nodal_diameter}

@@ -7,8 +7,6 @@ from scipy.spatial import cKDTree
 
 from geometry.mesh import Mesh
 
-__all__ = ["nodal_volumes", "transfer"]
-
 # Six tetrahedra of a hexahedron round its diagonal 0-6, two triangles of a quadrilateral.
 SPLIT = {
     "hexahedron": (
@@ -49,7 +47,10 @@ def nodal_volumes(mesh: Mesh) -> np.ndarray:
 
 
 def transfer(
-    mesh: Mesh, fields: np.ndarray, points: np.ndarray, candidates: int = 24
+    mesh: Mesh,
+    fields: np.ndarray,
+    points: np.ndarray,
+    candidates: int = 24,
 ) -> np.ndarray:
     """(m, k, 3) fields of a mesh at other points, by the shape functions of the nearest cell.
 
@@ -78,7 +79,9 @@ def transfer(
 
 
 def locate(
-    corners: np.ndarray, points: np.ndarray, candidates: int
+    corners: np.ndarray,
+    points: np.ndarray,
+    candidates: int,
 ) -> tuple[np.ndarray, np.ndarray]:
     """The simplex (k,) that holds each point, and its barycentric coordinates (k, corners)."""
     tree = cKDTree(corners.mean(axis=1))

@@ -13,8 +13,6 @@ from ..pipeline.ports import blade_ports
 from ..pipeline.stages import Bodies
 from .linear_response import static_offset
 
-__all__ = ["Strength", "strength"]
-
 
 @dataclass(frozen=True)
 class Strength:

@@ -31,8 +31,6 @@ from .effective_mass import effective_masses
 from .linear_response_report import Answer, answer
 from .mesh_convergence import Convergence, converge, default_sizes
 
-__all__ = ["Survey", "Wanted", "excited_set", "survey"]
-
 # engine orders above and below the scene's own, in Campbell and SAFE diagrams
 ORDERS = 3
 
@@ -143,7 +141,11 @@ def _orders(scene: Scene) -> list[int]:
     return list(range(max(order - ORDERS, 1), order + ORDERS + 1))
 
 
-def _timed(run: pipeline.Run, name: str, since: float) -> float:
+def _timed(
+    run: pipeline.Run,
+    name: str,
+    since: float,
+) -> float:
     now = time.perf_counter()
     run.timings[name] = now - since
     return now
@@ -172,7 +174,11 @@ def _kept(folder: Path, name: str) -> Any:
         return None
 
 
-def _compared(result: Survey, mesh: Mesh, sets: list[ModeSet]) -> Survey:
+def _compared(
+    result: Survey,
+    mesh: Mesh,
+    sets: list[ModeSet],
+) -> Survey:
     """MAC against the same nodal diameter of another run; its shapes are interpolated where the
     mesh is another one.
     """

@@ -18,8 +18,6 @@ from ...reduction.assemble import pair_models, recombine, wheel_models
 from ...scene.tables import Scene
 from .stages import Reduced
 
-__all__ = ["LoadCase", "joint_model", "mass_damper", "rigid_damper"]
-
 
 @dataclass(frozen=True)
 class LoadCase:
@@ -100,7 +98,11 @@ def rigid_damper(reduced: Reduced) -> RigidBody:
     )
 
 
-def mass_damper(mesh: Mesh, patches: list[Patch], mass: float) -> RigidBody:
+def mass_damper(
+    mesh: Mesh,
+    patches: list[Patch],
+    mass: float,
+) -> RigidBody:
     """The paper's damper: a mass that moves circumferentially (and axially in 3-D), never up or
     down the slope.
     """
@@ -115,7 +117,11 @@ def mass_damper(mesh: Mesh, patches: list[Patch], mass: float) -> RigidBody:
     return RigidBody(mass * np.eye(dim - 1), np.concatenate(rows))
 
 
-def _sides(scene: Scene, reduced: Reduced, harmonics: int) -> tuple[PortModel, ...]:
+def _sides(
+    scene: Scene,
+    reduced: Reduced,
+    harmonics: int,
+) -> tuple[PortModel, ...]:
     order = scene.excitation.engine_order
     if reduced.sectors:
         nearest = {

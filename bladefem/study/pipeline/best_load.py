@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
-from functools import lru_cache
+from functools import cache, lru_cache
 
 import numpy as np
 from scipy.interpolate import CubicHermiteSpline
@@ -26,8 +26,6 @@ from ..adaptive.family import Family, joined, member
 from ..adaptive.resonance_choice import choose_at_peak
 from ..adaptive.settings import Settings
 from .assemble_model import LoadCase
-
-__all__ = ["BestLoad", "chart_loads", "find_best_load", "load_variation", "tolerated_loads"]
 
 CaseAt = Callable[[float], LoadCase]
 FamilyOf = Callable[[LoadCase], Family]
@@ -154,14 +152,22 @@ def _search(
     )
 
 
-def load_variation(case_at: CaseAt, family_of: FamilyOf, settings: Settings) -> Variation:
+def load_variation(
+    case_at: CaseAt,
+    family_of: FamilyOf,
+    settings: Settings,
+) -> Variation:
     """Models along the static load, the damper seated anew for each."""
 
-    @lru_cache(maxsize=None)
+    @cache
     def model_at(load: float) -> ReducedModel:
         return member(family_of(case_at(load)), settings).model
 
-    def sloped(model: ReducedModel, peak: Peak, load: float) -> Peak:
+    def sloped(
+        model: ReducedModel,
+        peak: Peak,
+        load: float,
+    ) -> Peak:
         groups = member(family_of(case_at(load)), settings).groups
         low, high = (joined(case_at(load * (1 + sign * STEP)).elements, groups) for sign in (-1, 1))
         rates = {
@@ -216,7 +222,11 @@ def _record(
 
 
 def _unknown(
-    settings: Settings, mass: float | None, searched: tuple[float, float], points: int, reason: str
+    settings: Settings,
+    mass: float | None,
+    searched: tuple[float, float],
+    points: int,
+    reason: str,
 ) -> BestLoad:
     nan = np.nan
     return BestLoad(

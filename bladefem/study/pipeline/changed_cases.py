@@ -19,8 +19,6 @@ from ...scene.tables import Contact, Scene, Seat
 from .assemble_model import LoadCase
 from .history import seat_by_history
 
-__all__ = ["cases_of", "changed_cases"]
-
 
 def cases_of(
     scene: Scene,

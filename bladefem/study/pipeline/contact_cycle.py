@@ -25,8 +25,6 @@ from ..adaptive.family import joined
 from .assemble_model import LoadCase
 from .loads import Curve
 
-__all__ = ["ContactCycle", "Loop", "contact_cycle", "labels"]
-
 # harmonics that draw the corners of a loop; the balance has fewer
 SMOOTH = 63
 
@@ -88,7 +86,10 @@ class ContactCycle:
 
 
 def contact_cycle(
-    case: LoadCase, curve: Curve, patches: Sequence[Patch], points: int | None
+    case: LoadCase,
+    curve: Curve,
+    patches: Sequence[Patch],
+    points: int | None,
 ) -> ContactCycle:
     """The period at the highest point of a response curve.
 
@@ -136,7 +137,11 @@ def contact_cycle(
     )
 
 
-def _dealt_elements(elements: Elements, groups: np.ndarray, part: np.ndarray) -> Elements:
+def _dealt_elements(
+    elements: Elements,
+    groups: np.ndarray,
+    part: np.ndarray,
+) -> Elements:
     """The elements of all nodes, each with its part of that of its group."""
     each = select_elements(elements, groups)
     t0 = None if each.t0 is None else each.t0 * part[:, None]
@@ -144,7 +149,10 @@ def _dealt_elements(elements: Elements, groups: np.ndarray, part: np.ndarray) ->
 
 
 def _linear(
-    forces: Forces, w: np.ndarray, series: np.ndarray, omega: float
+    forces: Forces,
+    w: np.ndarray,
+    series: np.ndarray,
+    omega: float,
 ) -> tuple[Approximation, Approximation, float]:
     """Optimal approximation of the tangential forces (n, d, K), averaged and by harmonic, and its
     error in work.
@@ -164,7 +172,11 @@ def _linear(
     )
 
 
-def _dealt(approximation: Approximation, groups: np.ndarray, part: np.ndarray) -> Approximation:
+def _dealt(
+    approximation: Approximation,
+    groups: np.ndarray,
+    part: np.ndarray,
+) -> Approximation:
     """The approximation (elements, ...) shared out to the nodes of its elements, part (nodes,)
     [1].
     """
@@ -176,7 +188,12 @@ def _dealt(approximation: Approximation, groups: np.ndarray, part: np.ndarray) -
     )
 
 
-def _loop(elements: Elements, w: np.ndarray, series: np.ndarray, rows: np.ndarray) -> Loop:
+def _loop(
+    elements: Elements,
+    w: np.ndarray,
+    series: np.ndarray,
+    rows: np.ndarray,
+) -> Loop:
     """Hysteresis of some elements; their motion is that of the balance, their force has all its
     harmonics.
 

@@ -23,8 +23,6 @@ from .contact_cycle import labels
 from .ports import blade_ports
 from .stages import Bodies, is_wheel
 
-__all__ = ["DampedMotion", "DampedStress", "blade_loads", "damped_motion", "damped_stress"]
-
 # highest harmonic's frequency over the highest mode's: beyond it the inertia series is too slow
 COVERED = 0.8
 
@@ -170,7 +168,10 @@ def blade_loads(
 
 
 def _node_forces(
-    case: LoadCase, patches: Sequence[Patch], solution: Solution, points: int | None
+    case: LoadCase,
+    patches: Sequence[Patch],
+    solution: Solution,
+    points: int | None,
 ) -> np.ndarray:
     """(H+1, elements, 1 + tangents) complex forces of the case's own elements [N]."""
     elements = case.elements
@@ -183,7 +184,11 @@ def _node_forces(
     return to_complex(f.reshape(n * d, K)).T.reshape(-1, n, d)
 
 
-def _shared_forces(elements: Elements, f: np.ndarray, groups: np.ndarray) -> np.ndarray:
+def _shared_forces(
+    elements: Elements,
+    f: np.ndarray,
+    groups: np.ndarray,
+) -> np.ndarray:
     """Forces of joined elements, shared by their nodes as the joined motion weighs them."""
     whole = joined(elements, groups).kt[groups]
     share = np.divide(elements.kt, whole, out=np.ones_like(whole), where=whole > 0)

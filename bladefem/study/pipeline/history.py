@@ -24,17 +24,6 @@ from ...errors import InputError
 from ...scene.tables import Scene
 from .stages import Bodies, seat_clearance
 
-__all__ = [
-    "FRICTIONLESS",
-    "DamperMass",
-    "coarse_history",
-    "condense_friction",
-    "damper_masses",
-    "history_sentence",
-    "refuse_jamming",
-    "seat_by_history",
-]
-
 FRICTIONLESS = "frictionless"
 
 
@@ -54,7 +43,11 @@ class DamperMass:
     share: float
 
 
-def refuse_jamming(scene: Scene, mesh: Mesh, patches: Sequence[Patch]) -> None:
+def refuse_jamming(
+    scene: Scene,
+    mesh: Mesh,
+    patches: Sequence[Patch],
+) -> None:
     """Refuse seats that friction alone can hold a damper between, which only takes the mesh.
 
     Raises:
@@ -66,8 +59,8 @@ def refuse_jamming(scene: Scene, mesh: Mesh, patches: Sequence[Patch]) -> None:
     if holds_itself(rigid_ports(patches, mesh, np.zeros(3)), mu):
         raise InputError(
             f"contact.mu = {scene.contact.mu:g}: friction alone holds the damper between its seats "
-            "(self-locking), so that contact.history does not tell its load; expected flatter seats "
-            "or less friction"
+            "(self-locking), so that contact.history does not tell its load; expected flatter "
+            "seats or less friction"
         )
 
 
@@ -78,7 +71,9 @@ def condense_friction(bodies: Bodies, patches: Sequence[Patch]) -> FrictionalPro
 
 
 def seat_by_history(
-    scene: Scene, problem: FrictionalProblem, normal: float | None
+    scene: Scene,
+    problem: FrictionalProblem,
+    normal: float | None,
 ) -> FrictionalSeating:
     """The seats after the scene's history.
 
@@ -95,7 +90,9 @@ def seat_by_history(
 
 
 def damper_masses(
-    scene: Scene, problem: FrictionalProblem, seated: dict[float, FrictionalSeating]
+    scene: Scene,
+    problem: FrictionalProblem,
+    seated: dict[float, FrictionalSeating],
 ) -> list[DamperMass]:
     """The mass that makes each load, with its band."""
     mu = _layer(scene, problem.patches)[1]

@@ -16,14 +16,17 @@ from ...hbm.model import ReducedModel
 from ...scene.units import show
 from .assemble_model import LoadCase
 
-__all__ = ["named", "seat_travel"]
-
 # travel of the seats over the compression by the load, beyond which the damper is said to lift off
 FAR = 10.0
 
 
 @contextmanager
-def named(case: LoadCase, model: ReducedModel, mode: int, excitation: float) -> Iterator[None]:
+def named(
+    case: LoadCase,
+    model: ReducedModel,
+    mode: int,
+    excitation: float,
+) -> Iterator[None]:
     """A failure inside tells the load that it belongs to, and whether the damper lifts off under
     it.
     """
@@ -36,17 +39,20 @@ def named(case: LoadCase, model: ReducedModel, mode: int, excitation: float) -> 
             ""
             if travel <= FAR * pressed
             else (
-                f"the damper lifts off, since the seats move by up to {1e6 * travel:.3g} um "
-                "normal to themselves at the "
-                "resonance without damper, and this load presses them together by "
-                f"{1e6 * pressed:.3g} um only; "
-                "expected a larger load, or contact.normal = 'prescribed': "
+                f"the damper lifts off, since the seats move by up to {1e6 * travel:.3g} um normal "
+                "to themselves at the resonance without damper, and this load presses them "
+                f"together by {1e6 * pressed:.3g} um only; expected a larger load, or "
+                "contact.normal = 'prescribed': "
             )
         )
         raise NotSolvedError(f"study.loads = {show(case.load, 'N')}: {lifts}{error}") from error
 
 
-def seat_travel(model: ReducedModel, mode: int, excitation: float) -> float:
+def seat_travel(
+    model: ReducedModel,
+    mode: int,
+    excitation: float,
+) -> float:
     """Largest normal amplitude [m] of a contact point at a resonance without damper; 0 where it
     plays no part.
 

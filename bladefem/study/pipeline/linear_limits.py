@@ -15,8 +15,6 @@ from ...hbm.linear_resonances import free_resonances, stuck_partners
 from ...hbm.model import ReducedModel
 from ...hbm.solve import free_response, stuck_response
 
-__all__ = ["Limit", "linear_limits"]
-
 # of the resonance frequency, each side: where its height is looked for
 WIDTH = 0.02
 # points of that search, before it is refined between the highest and its neighbours
@@ -41,7 +39,11 @@ class Limit:
     peak_amplitude: float
 
 
-def linear_limits(model: ReducedModel, mode: int, band: tuple[float, float]) -> tuple[Limit, Limit]:
+def linear_limits(
+    model: ReducedModel,
+    mode: int,
+    band: tuple[float, float],
+) -> tuple[Limit, Limit]:
     """No damper and full stick, in a frequency band [Hz]; nodes that the static load leaves open
     stay open.
     """

@@ -1,5 +1,5 @@
-"""How sure the resonance of one load is: its range over the friction forces that the loading history
-may have left in contact points that never slip.
+"""How sure the resonance of one load is: its range over the friction forces that the loading
+history may have left in contact points that never slip.
 """
 
 from __future__ import annotations
@@ -14,8 +14,6 @@ from ...hbm.peak import find_peak
 from ...hbm.solution import Solution
 from ...hbm.sweep import size
 from ..adaptive.settings import Settings
-
-__all__ = ["LoadInterval", "interval_sentence", "load_interval"]
 
 # tolerance of heights, over the accuracy wanted
 SHARE = 0.02
@@ -44,7 +42,11 @@ class LoadInterval:
 
 
 def load_interval(
-    model: ReducedModel, settings: Settings, top: Solution, accuracy: float, points: int = 40
+    model: ReducedModel,
+    settings: Settings,
+    top: Solution,
+    accuracy: float,
+    points: int = 40,
 ) -> LoadInterval:
     """The interval of the resonance near the highest point of a curve, with the curve's settings.
 

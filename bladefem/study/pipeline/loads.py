@@ -31,8 +31,6 @@ from .stability import UNSTABLE, Stability, stability_of
 
 Keep = Callable[[LoadCase, Callable[[], Any]], Any]
 
-__all__ = ["Curve", "curve_of", "default_loads", "forgotten", "study_loads", "summary"]
-
 
 def forgotten(case: LoadCase, compute: Callable[[], Any]) -> Any:
     """The keeper that keeps nothing."""
@@ -149,7 +147,11 @@ def study_loads(
     return [curves[i] for i in range(len(cases))]
 
 
-def dealt(count: int, rank: int, ranks: int) -> list[int]:
+def dealt(
+    count: int,
+    rank: int,
+    ranks: int,
+) -> list[int]:
     """What a rank gets of a list whose items get cheaper: dealt to and fro, 0 3 4 7 .. and 1 2 5 6
     .. for two ranks.
     """
@@ -161,7 +163,10 @@ def dealt(count: int, rank: int, ranks: int) -> list[int]:
 
 
 def curve_of(
-    scene: Scene, case: LoadCase, family: Callable[[LoadCase], Family], settings: Settings
+    scene: Scene,
+    case: LoadCase,
+    family: Callable[[LoadCase], Family],
+    settings: Settings,
 ) -> Curve:
     """Sweep a band with points where the curve needs them, with settings that hold at its peak and
     on its flanks.

@@ -78,18 +78,6 @@ from .stages import (
 )
 from .validate_mesh import found_patches
 
-__all__ = [
-    "STAGES",
-    "Response",
-    "Run",
-    "Seating",
-    "family_of_case",
-    "load_cases",
-    "reduced_sector",
-    "run",
-    "studied_loads",
-]
-
 # higher ones borrow the nodal diameter next to their own
 EXACT_HARMONICS = 3
 # of the largest balance that the automatic choice solves; model.harmonics may ask for more
@@ -282,7 +270,10 @@ def run(
 
 
 def _stresses(
-    bodies: Bodies, patches: Sequence[Patch], result: Run, cases: list[LoadCase]
+    bodies: Bodies,
+    patches: Sequence[Patch],
+    result: Run,
+    cases: list[LoadCase],
 ) -> list[DampedStress]:
     """The stress at the resonance of each curve."""
     return [
@@ -329,14 +320,29 @@ class _Keeper:
     comm: Any
     clock: Clock
 
-    def __call__(self, name: str, key: str, compute: Callable[[], Any]) -> Any:
+    def __call__(
+        self,
+        name: str,
+        key: str,
+        compute: Callable[[], Any],
+    ) -> Any:
         return self._said(name, *stage(self.folder, name, key, compute, self.comm))
 
-    def alone(self, name: str, key: str, compute: Callable[[], Any]) -> Any:
+    def alone(
+        self,
+        name: str,
+        key: str,
+        compute: Callable[[], Any],
+    ) -> Any:
         """The same for what one rank does without the others."""
         return self._said(name, *stage(self.folder, name, key, compute))
 
-    def _said(self, name: str, result: Any, seconds: float | None) -> Any:
+    def _said(
+        self,
+        name: str,
+        result: Any,
+        seconds: float | None,
+    ) -> Any:
         if seconds is not None:
             self.clock.messages.append(found_remark(name, seconds))
         return result
@@ -378,7 +384,11 @@ def _name(case: LoadCase) -> str:
 
 
 def _seated(
-    scene: Scene, bodies: Bodies, patches: list[Patch], keep: _Keeper, clock: Clock
+    scene: Scene,
+    bodies: Bodies,
+    patches: list[Patch],
+    keep: _Keeper,
+    clock: Clock,
 ) -> Seating:
     """The damper on its seats under every load, without friction or after the scene's history."""
     key = stage_key("contact", scene)
@@ -395,7 +405,12 @@ def _seated(
     )
 
 
-def _at_loads(scene: Scene, seating: Seating, loads: Iterable[float], clock: Clock) -> Seating:
+def _at_loads(
+    scene: Scene,
+    seating: Seating,
+    loads: Iterable[float],
+    clock: Clock,
+) -> Seating:
     """The seats under some loads."""
     rough = seating.rough
     if rough is None:
@@ -412,7 +427,10 @@ def _at_loads(scene: Scene, seating: Seating, loads: Iterable[float], clock: Clo
 
 
 def _own_load(
-    scene: Scene, problem: ContactProblem, rough: FrictionalProblem | None, messages: list[str]
+    scene: Scene,
+    problem: ContactProblem,
+    rough: FrictionalProblem | None,
+    messages: list[str],
 ) -> float | None:
     """Mean normal load of a seat [N] by the damper's mass at the operating speed; None when nothing
     presses it.
@@ -496,20 +514,21 @@ def _best_remarks(scene: Scene, best: tuple[BestLoad, ...]) -> Iterator[str]:
         damper = "" if b.mass is None else f" of a damper of {1e3 * b.mass:.4g} g"
         if b.reason:
             yield (
-                f"best load{damper}: not found between {b.searched[0]:.3g} and "
-                f"{b.searched[1]:.3g} N, since {b.reason}"
+                f"best load{damper}: not found between {b.searched[0]:.3g} and {b.searched[1]:.3g} "
+                f"N, since {b.reason}"
             )
             continue
         yield (
             f"best load{damper}: {b.load:.4g} N by exact search between {b.searched[0]:.3g} and "
             f"{b.searched[1]:.3g} N, {len(b.tried)} loads and {b.points} points; no load near it "
-            f"lowers the amplitude by more than {100 * b.tolerance:.2g} %; "
-            f"{b.settings.sentence()}"
+            f"lowers the amplitude by more than {100 * b.tolerance:.2g} %; {b.settings.sentence()}"
         )
 
 
 def studied_loads(
-    scene: Scene, own: float | None, laid: Sequence[float] | None = None
+    scene: Scene,
+    own: float | None,
+    laid: Sequence[float] | None = None,
 ) -> list[float]:
     """Mean normal loads of a seat to study [N], ascending with the damper's own one where that is
     wanted.
@@ -529,7 +548,11 @@ def studied_loads(
     return sorted({*given, float(f"{own:.4g}")})
 
 
-def load_cases(scene: Scene, mesh: Mesh, contact: Seating) -> list[LoadCase]:
+def load_cases(
+    scene: Scene,
+    mesh: Mesh,
+    contact: Seating,
+) -> list[LoadCase]:
     """The friction elements of each load, for each mass of the damper."""
     return [
         _load_case(scene, mesh, contact, load, mass)
@@ -539,7 +562,11 @@ def load_cases(scene: Scene, mesh: Mesh, contact: Seating) -> list[LoadCase]:
 
 
 def family_of_case(
-    scene: Scene, mesh: Mesh, reduced: Reduced, patches: list[Patch], case: LoadCase
+    scene: Scene,
+    mesh: Mesh,
+    reduced: Reduced,
+    patches: list[Patch],
+    case: LoadCase,
 ) -> Family:
     """All models of a load case that the reduced sector allows."""
     nodes = len(case.elements.kt)
@@ -617,7 +644,12 @@ def reduced_sector(
         settings = more
 
 
-def _remarks(scene: Scene, settings: Settings, curves: list[Curve], nodes: int) -> list[str]:
+def _remarks(
+    scene: Scene,
+    settings: Settings,
+    curves: list[Curve],
+    nodes: int,
+) -> list[str]:
     """What a reader of the results has to know; ``nodes`` are the contact points of a seat."""
     remarks: list[str] = [method(settings.sentence(nodes)), method(settings.method)]
     if scene.model.static == "uncoupled":
@@ -636,9 +668,8 @@ def _remarks(scene: Scene, settings: Settings, curves: list[Curve], nodes: int) 
     if lost:
         remarks.append(
             warning(
-                f"{lost} of {sum(len(c.frequency) for c in curves)} response points did not converge; "
-                "they are "
-                "marked in tables and pictures"
+                f"{lost} of {sum(len(c.frequency) for c in curves)} response points did not "
+                "converge; they are marked in tables and pictures"
             )
         )
     single = [f"{c.load:g} N" for c in curves if c.unfollowed]
@@ -654,25 +685,23 @@ def _remarks(scene: Scene, settings: Settings, curves: list[Curve], nodes: int) 
         if not c.converged[near[(near >= 0) & (near < len(c.frequency))]].all():
             remarks.append(
                 warning(
-                    f"load {c.load:g} N: the highest point that was solved stands beside one that was "
-                    "not; the "
-                    "resonance may be higher"
+                    f"load {c.load:g} N: the highest point that was solved stands beside one that "
+                    "was not; the resonance may be higher"
                 )
             )
         if c.error == np.inf:
             remarks.append(
                 warning(
                     f"load {c.load:g} N: the error of the resonance amplitude is unknown, since "
-                    "richer models "
-                    "of it were not solved; nothing was refined because of that"
+                    "richer models of it were not solved; nothing was refined because of that"
                 )
             )
         elif c.error is not None and c.error > scene.accuracy:
             remarks.append(
                 warning(
                     f"load {c.load:g} N: estimated error {100 * c.error:.2g} % of the resonance "
-                    f"amplitude, above the wanted {100 * scene.accuracy:.2g} %"
-                    f"{_of_the_contact_mesh(c)}"
+                    f"amplitude, above the wanted {100 * scene.accuracy:.2g} "
+                    f"%{_of_the_contact_mesh(c)}"
                 )
             )
     return remarks
@@ -689,7 +718,11 @@ def _of_the_contact_mesh(curve: Curve) -> str:
 
 
 def _load_case(
-    scene: Scene, mesh: Mesh, contact: Seating, load: float, mass: float | None
+    scene: Scene,
+    mesh: Mesh,
+    contact: Seating,
+    load: float,
+    mass: float | None,
 ) -> LoadCase:
     ratio = pair_ratio(scene.material.blade, scene.material.damper)
     elements, selection = friction_elements(

@@ -16,8 +16,6 @@ from ...data import Patch
 from ...errors import InputError, suggestion
 from ...scene.tables import Excitation
 
-__all__ = ["Ports", "blade_ports", "damper_ports", "named_nodes"]
-
 
 @dataclass(frozen=True)
 class Ports:
@@ -48,7 +46,10 @@ def named_nodes(mesh: Mesh, name: str) -> np.ndarray:
 
 
 def blade_ports(
-    mesh: Mesh, patches: list[Patch], excitation: Excitation, readings: np.ndarray | None = None
+    mesh: Mesh,
+    patches: list[Patch],
+    excitation: Excitation,
+    readings: np.ndarray | None = None,
 ) -> Ports:
     """Contact ports of all patches on the blade side, one load and one probe port along the
     excitation.
@@ -79,7 +80,11 @@ def _stack(blocks: dict[str, sp.spmatrix | None]) -> Ports:
     return Ports(sp.csc_matrix(sp.hstack([b for b in blocks.values() if b is not None])), names)
 
 
-def _mean_displacement(mesh: Mesh, nodes: np.ndarray, direction: np.ndarray) -> sp.csc_matrix:
+def _mean_displacement(
+    mesh: Mesh,
+    nodes: np.ndarray,
+    direction: np.ndarray,
+) -> sp.csc_matrix:
     """(dim n_points, 1): mean displacement of some nodes along a direction; as a load, one newton
     shared by them.
     """
@@ -88,8 +93,7 @@ def _mean_displacement(mesh: Mesh, nodes: np.ndarray, direction: np.ndarray) -> 
     if size == 0:
         raise InputError(
             f"excitation.direction: {direction.tolist()} is zero in the {dim} dimensions of the "
-            "model, "
-            "expected a direction"
+            "model, expected a direction"
         )
     rows = (np.asarray(nodes)[:, None] * dim + np.arange(dim)).ravel()
     values = np.tile(direction[:dim] / size, len(nodes)) / len(nodes)

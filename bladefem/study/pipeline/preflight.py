@@ -8,8 +8,6 @@ from ...scene.tables import Scene
 from ...scene.units import show
 from ..kinds.hertz import check_loads
 
-__all__ = ["refuse_run"]
-
 
 def refuse_run(scene: Scene) -> None:
     """Refuse a scene that a later stage could not solve.

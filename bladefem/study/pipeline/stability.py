@@ -24,17 +24,6 @@ from ...hbm.stability import (
     stability_verdict,
 )
 
-__all__ = [
-    "UNIQUE",
-    "UNSTABLE",
-    "Stability",
-    "in_one_body",
-    "stability_of",
-    "stability_sentence",
-    "unstable_sentence",
-]
-
-
 # local maxima of a curve that are judged whatever that takes
 MAXIMA = 4
 
@@ -121,8 +110,8 @@ def stability_sentence(parts: Sequence[tuple[np.ndarray, np.ndarray]]) -> str:
         )
     if counts[UNKNOWN] == len(verdict):
         return (
-            "stability is unknown: no point could be judged (it takes Coulomb's law, a wave "
-            "that repeats after few blades, and not too many contact nodes that slip)"
+            "stability is unknown: no point could be judged (it takes Coulomb's law, a wave that "
+            "repeats after few blades, and not too many contact nodes that slip)"
         )
     worst = f" (largest Floquet multiplier {np.nanmax(largest):.4g})" if counts[UNSTABLE] else ""
     return (
@@ -139,8 +128,8 @@ def unstable_sentence(curve: Any) -> str:
     """
     several = int(curve.branch.max(initial=0))
     folded = (
-        f"load {curve.load:g} N: several motions at one frequency, the response has "
-        f"{several} pieces between folds"
+        f"load {curve.load:g} N: several motions at one frequency, the response has {several} "
+        "pieces between folds"
         if several > 1
         else ""
     )

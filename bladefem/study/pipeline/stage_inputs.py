@@ -18,8 +18,6 @@ from ...scene.fields import value_at
 from ...scene.kinds import kind_named
 from ...scene.tables import Scene
 
-__all__ = ["STAGE_INPUTS", "StageInputs", "declared_fields", "stage_key"]
-
 
 @dataclass(frozen=True)
 class StageInputs:
@@ -135,7 +133,11 @@ def declared_fields(name: str, scene: Scene) -> Iterator[str]:
     yield from STAGE_INPUTS[name].fields
 
 
-def _without(scene: Scene, field: str, inputs: StageInputs) -> Any:
+def _without(
+    scene: Scene,
+    field: str,
+    inputs: StageInputs,
+) -> Any:
     """The value of a field; of a table without what the stage does not read."""
     value = value_at(scene, field)
     left_out = [name for name in inputs.without if name.startswith(f"{field}.")]

@@ -26,24 +26,6 @@ from ...scene.tables import Material, Scene
 from ...util.progress import Progress, unwatched
 from .ports import blade_ports, damper_ports
 
-__all__ = [
-    "Bodies",
-    "Reduced",
-    "blade_parts",
-    "build_mesh",
-    "condense_contact",
-    "contact_patches",
-    "excited_modes",
-    "find_modes",
-    "harmonic_diameters",
-    "is_wheel",
-    "on_layer",
-    "reduce_sector",
-    "seat_clearance",
-    "seat_damper",
-    "wheel_modes",
-]
-
 # of each nodal diameter, in tables and pictures
 MODES_SHOWN = 10
 # of the elastic damper, its six rigid ones included
@@ -209,14 +191,15 @@ def contact_patches(mesh: Mesh) -> list[Patch]:
     if missing:
         raise InputError(
             f"the mesh has no contact pair '{missing[0]}': faces seat_right and damper_left "
-            "(this), "
-            "seat_left and damper_right (next) with matching nodes were expected"
+            "(this), seat_left and damper_right (next) with matching nodes were expected"
         )
     return [make_patch(mesh, name) for name in ("this", "next")]
 
 
 def find_modes(
-    bodies: Bodies, diameters: Sequence[int] | None = None, count: int = MODES_SHOWN
+    bodies: Bodies,
+    diameters: Sequence[int] | None = None,
+    count: int = MODES_SHOWN,
 ) -> list[ModeSet]:
     """Normal modes without damper: of the clamped blade, or of the sector in each nodal diameter.
 
@@ -252,7 +235,11 @@ def eigensolver(scene: Scene) -> Any:
     return Eigensolver(scene.solver.eigensolver, scene.solver.vectors, scene.solver.petsc)
 
 
-def excited_modes(scene: Scene, mesh: Mesh, modes: Sequence[ModeSet]) -> ModeSet:
+def excited_modes(
+    scene: Scene,
+    mesh: Mesh,
+    modes: Sequence[ModeSet],
+) -> ModeSet:
     """The modes of the nodal diameter that the engine order excites, or of the nearest one that is
     there.
     """
@@ -338,7 +325,11 @@ def seat_clearance(bodies: Bodies, patches: list[Patch]) -> np.ndarray:
     return gap + scene.damper.clearance if scene.kind == "imported" else gap
 
 
-def harmonic_diameters(scene: Scene, mesh: Mesh, harmonics: int) -> list[int]:
+def harmonic_diameters(
+    scene: Scene,
+    mesh: Mesh,
+    harmonics: int,
+) -> list[int]:
     """Nodal diameters that harmonics 0..H of the engine order fall into, sorted; [0] for blades
     without a wheel.
     """
@@ -399,7 +390,10 @@ def reduce_sector(
 
 
 def _reduced_diameters(
-    bodies: Bodies, ports: Any, modes: int, diameters: Sequence[int]
+    bodies: Bodies,
+    ports: Any,
+    modes: int,
+    diameters: Sequence[int],
 ) -> dict[int, PortModel]:
     """The blade side in each nodal diameter; groups of ranks share them out."""
     from ...fem.compat import MPI
@@ -454,8 +448,8 @@ def blade_parts(scene: Scene, mesh: Mesh) -> tuple[Mesh, dict[str, Material]]:
             )
         if owner[mesh.parts[name]].any():
             raise InputError(
-                f"imported.materials: volume '{name}' shares cells with another one, "
-                "expected separate ones"
+                f"imported.materials: volume '{name}' shares cells with another one, expected "
+                "separate ones"
             )
         owner[mesh.parts[name]] = i
     names = [("blade", scene.material.blade), *given.items()]

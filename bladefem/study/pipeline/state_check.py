@@ -16,8 +16,6 @@ from ...contact.state_table import interpolate, state_table
 from ...errors import NotSolvedError
 from ...scene.tables import Scene
 
-__all__ = ["StateCheck", "check_states", "platform_tilt", "state_sentence"]
-
 # of each axis
 STATES = 5
 # of the largest nodal force
@@ -46,7 +44,10 @@ class StateCheck:
 
 
 def check_states(
-    scene: Scene, problem: ContactProblem, loads: Sequence[float], travel: float
+    scene: Scene,
+    problem: ContactProblem,
+    loads: Sequence[float],
+    travel: float,
 ) -> StateCheck:
     """Table over the normal load and a tilt of the platforms, for the paper's load and relative
     position.
@@ -114,7 +115,10 @@ def platform_tilt(problem: ContactProblem) -> np.ndarray:
 
 
 def state_sentence(
-    scene: Scene, problem: ContactProblem, loads: Sequence[float], travel: float
+    scene: Scene,
+    problem: ContactProblem,
+    loads: Sequence[float],
+    travel: float,
 ) -> str:
     """For the report."""
     try:
@@ -123,10 +127,9 @@ def state_sentence(
         return f"a table of contact states could not be made: {error}"
     verdict = "is enough" if check.enough else "is NOT enough"
     return (
-        f"a table of {check.states} contact states over {min(loads):.4g} to {max(loads):.4g} N "
-        "and ±"
-        f"{1e6 * travel:.3g} µm of tilt at the seats' ends {verdict}: interpolation misses "
-        f"nodal forces by up to {100 * check.error:.2g} % of the largest (its indicator says "
+        f"a table of {check.states} contact states over {min(loads):.4g} to {max(loads):.4g} N and "
+        f"±{1e6 * travel:.3g} µm of tilt at the seats' ends {verdict}: interpolation misses nodal "
+        f"forces by up to {100 * check.error:.2g} % of the largest (its indicator says "
         f"{100 * check.indicator:.2g} %); the direct solve, used here, takes "
         f"{1e3 * check.direct:.2g} ms a state"
     )

@@ -14,10 +14,12 @@ from ...scene.tables import Scene
 from .ports import named_nodes
 from .stages import contact_patches
 
-__all__ = ["found_patches", "refuse_loads"]
 
-
-def found_patches(scene: Scene, mesh: Mesh, excited: bool) -> list[Patch]:
+def found_patches(
+    scene: Scene,
+    mesh: Mesh,
+    excited: bool,
+) -> list[Patch]:
     """The contact patches of a mesh that also has the nodes to excite, where these are needed.
 
     Raises:
@@ -36,7 +38,10 @@ def found_patches(scene: Scene, mesh: Mesh, excited: bool) -> list[Patch]:
 
 
 def refuse_loads(
-    scene: Scene, mesh: Mesh, loads: Sequence[tuple[str, float]], damping: Damping | None
+    scene: Scene,
+    mesh: Mesh,
+    loads: Sequence[tuple[str, float]],
+    damping: Damping | None,
 ) -> None:
     """Check that a mesh has the faces of pressure waves, and the nodes of the excitation that all
     are seen at.
