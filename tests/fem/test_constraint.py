@@ -10,10 +10,10 @@ from structured import box, sector
 
 from bladefem.errors import InputError, NotSolvedError
 from bladefem.fem.body import assemble
-from bladefem.fem.loads import mass
 from bladefem.fem.constraint import constrain
 from bladefem.fem.flexibility import flexible
 from bladefem.fem.linalg import factorise
+from bladefem.fem.loads import mass
 from bladefem.fem.modes import modes
 from bladefem.scene.tables import Material
 

@@ -95,9 +95,7 @@ def march(shapes, omega, zeta, loads, dampers, contact, state, drive, steps):
                 for d in range(3):
                     row = 3 * k + d
                     w[d] = shapes_times(shapes, q, blade, row) - row_times(dampers, p[b], row)
-                n, a, c = return_map(
-                    w, old[b, k], slider[b, k], kt[k], kn[k], mu[k], n0[k]
-                )
+                n, a, c = return_map(w, old[b, k], slider[b, k], kt[k], kn[k], mu[k], n0[k])
                 old[b, k] = w
                 force[b, 3 * k] = n
                 force[b, 3 * k + 1] = a
@@ -117,9 +115,7 @@ def march(shapes, omega, zeta, loads, dampers, contact, state, drive, steps):
                 for row in range(half):
                     push += dampers[m, row] * force[b, row]
                 z[b, m] += dt * (
-                    push
-                    - w_damper[m] ** 2 * p[b, m]
-                    - 2 * zeta_damper * w_damper[m] * z[b, m]
+                    push - w_damper[m] ** 2 * p[b, m] - 2 * zeta_damper * w_damper[m] * z[b, m]
                 )
         q += dt * v
         p += dt * z
