@@ -338,17 +338,19 @@ def test_results_of_another_scene_are_put_away(pipeline, tmp_path, capsys):
     assert main([*mesh, "--set", "contact.mu=0.2"]) == 0
     said = capsys.readouterr().err
     assert (
-        said == f"bladefem: {tmp_path} holds results of another scene: 2 files moved to "
+        said == f"bladefem: {tmp_path} holds results of another scene: 3 files moved to "
         f"{tmp_path / 'earlier'}\n"
     )
     assert {p.name for p in (tmp_path / "earlier").iterdir()} == {
         "report.html",
         "first.png",
         "scene.toml",
+        "given.json",
     }
     (tmp_path / "second.png").write_text("second")
     assert main([*mesh, "--quiet"]) == 0 and capsys.readouterr().err == ""
-    assert {p.name for p in (tmp_path / "earlier").iterdir()} == {"second.png", "scene.toml"}
+    kept = {p.name for p in (tmp_path / "earlier").iterdir()}
+    assert kept == {"second.png", "scene.toml", "given.json"}
 
 
 def test_one_command_at_a_time_in_a_folder(pipeline, tmp_path, capsys):
@@ -410,6 +412,7 @@ def test_what_goes_wrong_has_an_exit_code_and_a_sentence(
         ["modes", WEDGE, "-o", "/proc/run"],
         ["modes", WEDGE, "-o", WEDGE],
         ["mesh", WEDGE, "--view", "mesh.xyz"],
+        ["study", WEDGE],
     ],
 )
 def test_bad_input_stops_before_any_work(arguments, pipeline, capsys):
@@ -418,7 +421,7 @@ def test_bad_input_stops_before_any_work(arguments, pipeline, capsys):
 
 
 @pytest.mark.parametrize(
-    "arguments", [[], ["mehs", WEDGE], ["mesh"], ["study", WEDGE], ["check", WEDGE, "--nonsense"]]
+    "arguments", [[], ["mehs", WEDGE], ["mesh"], ["check", WEDGE, "--nonsense"]]
 )
 def test_wrong_arguments_exit_with_2(arguments, capsys):
     with pytest.raises(SystemExit) as stop:

@@ -159,17 +159,17 @@ def ring(reduced):
     return np.concatenate(omega), np.concatenate(shapes)
 
 
-@pytest.mark.parametrize("load", [80.0])
-def test_balance_agrees_with_the_free_ring_in_time(wheel, load):
+@pytest.mark.parametrize(("load", "harmonics"), [(80.0, 31), (640.0, 15)])
+def test_balance_agrees_with_the_free_ring_in_time(wheel, load, harmonics):
     scene = wheel.scene
     maps = {load: seat(wheel.problem, scene.operation.speed, normal=load, bedded=True)}
     case = pipeline.load_cases(scene, wheel.mesh, pipeline.Seating(wheel.problem, maps))[0]
-    model = joint_model(scene, wheel.mesh, wheel.reduced, wheel.patches, case, 15, "elastic")
+    model = joint_model(scene, wheel.mesh, wheel.reduced, wheel.patches, case, harmonics, "elastic")
     free = wheel.reduced.sector[9].omega[0]
     curve = [solve(model, free * x, 3, 128) for x in np.linspace(1.03, 1.07, 5)]
     highest = max((p for p in curve if p.converged), key=lambda p: abs(p.probe[1, 0]))
-    # where every node slips the tangential forces turn fast: 15 harmonics to be within 0.2 %
-    top = solve(model, highest.omega, 15, 512, start=highest)
+    # where every node slips the tangential forces turn fast: 15 harmonics are 0.4 % off
+    top = solve(model, highest.omega, harmonics, 512, start=highest)
     assert top.converged
     omega, shapes = ring(wheel.reduced)
     body = next(iter(wheel.reduced.sector.values()))
@@ -208,6 +208,6 @@ def test_balance_agrees_with_the_free_ring_in_time(wheel, load):
         drive[2] += STEPS * dt
         angle = top.omega * (drive[2] - STEPS * dt + dt * np.arange(1, STEPS + 1))
         heights.append(2 * abs(np.mean(x * np.exp(-1j * angle)[:, None], axis=0)))
-    print(load, top.frequency, abs(top.probe[1, 0]), heights[::12], top.states)
-    assert abs(heights[-1] / heights[-5] - 1) < 1e-3, "not steady"
-    assert heights[-1] == pytest.approx(abs(top.probe[1, 0]), rel=5e-3)
+    assert heights[-1] == pytest.approx(heights[-5], rel=1e-3), "not steady"
+    # all four blades, each with its own phase
+    assert heights[-1] == pytest.approx(np.full(BLADES, abs(top.probe[1, 0])), rel=5e-3)

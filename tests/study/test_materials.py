@@ -77,7 +77,7 @@ def test_wrong_words(parted, tmp_path):
     for text, words in (
         ("hub", "one text for each volume"),
         ("hub: E=3 m", "Pa"),
-        ("hub: G=3 GPa", "'G' is no property"),
+        ("hub: H=3 GPa", "'H' is no property"),
         ("hub: nu=0.5", "imported.materials, nu = 0.5"),
     ):
         with pytest.raises(InputError, match=words):
