@@ -20,7 +20,7 @@ from bladefem.study.adaptive.family import carried, coarsened, family_of, member
 from bladefem.study.adaptive.indicators import indicate, richer
 from bladefem.study.adaptive.settings import Settings, enriched, first_for
 from bladefem.study.pipeline.assemble_model import LoadCase
-from bladefem.study.pipeline.loads import curve_of
+from bladefem.study.pipeline.loads import beyond_tolerance, curve_of
 
 
 @pytest.mark.parametrize("accuracy", [0.02, 0.001])
@@ -95,7 +95,9 @@ def test_displacements_are_carried_between_numbers_of_points():
 
 
 def test_a_response_reports_told_against_tolerated_error_at_each_point():
-    """The tolerated error grows down the flanks; each converged point keeps to it."""
+    """The tolerated error grows down the flanks. The resonance keeps to it; settings are chosen for
+    its height, and where the flanks miss it a sentence says so.
+    """
     scene = load_scene("scenes/plane.toml", ["accuracy=2 %", "study.band=1150 Hz, 1600 Hz"])
     model = reference_model(load=3.0, points=4, modes=20, harmonics=63)
     case = LoadCase(3.0, model.elements, np.eye(8))
@@ -103,8 +105,10 @@ def test_a_response_reports_told_against_tolerated_error_at_each_point():
     assert curve.tolerated.min() == pytest.approx(0.02)
     np.testing.assert_allclose(curve.tolerated * curve.amplitude, 0.02 * curve.peak_amplitude)
     assert curve.converged.all()
-    assert (curve.estimated < curve.tolerated).all()
-    assert curve.checked[curve.frequency == curve.peak_frequency].all()
+    top = curve.frequency == curve.peak_frequency
+    assert (curve.estimated < curve.tolerated)[top].all() and curve.checked[top].all()
+    missed = int((curve.estimated > curve.tolerated).sum())
+    assert (f"{missed} of {len(top)} points" in beyond_tolerance(curve)) == (missed > 0)
 
 
 def test_settings_tell_how_many_contact_points_there_are():

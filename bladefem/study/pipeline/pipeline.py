@@ -61,7 +61,7 @@ from .history import (
 from .liftoff import named
 from .linear_limits import Limit, linear_limits
 from .load_interval import interval_sentence
-from .loads import Curve, default_loads, study_loads
+from .loads import Curve, beyond_tolerance, default_loads, study_loads
 from .stability import stability_sentence, unstable_sentence
 from .stage_inputs import stage_key
 from .stages import (
@@ -672,6 +672,8 @@ def _remarks(
                 "converge; they are marked in tables and pictures"
             )
         )
+    for text in filter(None, map(beyond_tolerance, curves)):
+        remarks.append(warning(text))
     single = [f"{c.load:g} N" for c in curves if c.unfollowed]
     if single:
         remarks.append(
