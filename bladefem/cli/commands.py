@@ -218,6 +218,9 @@ def prepared(
     from ..util.progress import wanted, watch
 
     folder = Path(options.output or default_folder(options.scene))
+    if comm is not None:
+        # it loads PETSc, which takes all ranks: not inside what rank 0 does alone
+        from ..study.pipeline import preflight  # noqa: F401
 
     def prepare() -> Scene:
         from ..io.run_folder import keep_given, locked, take_folder

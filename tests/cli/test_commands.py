@@ -22,6 +22,7 @@ from bladefem.io.run_folder import locked
 from bladefem.scene.toml import load_scene
 from geometry.mesh import Mesh
 
+SCENES = Path(__file__).parents[2] / "scenes"
 WEDGE = "scenes/wedge.toml"
 
 
@@ -568,6 +569,20 @@ def test_no_rank_waits_for_ever(all_ranks, message):
         command, capture_output=True, text=True, env=clean_environment(), timeout=60
     )
     assert done.returncode == 2 and done.stderr.count(message) == 1, done.stderr
+
+
+def test_a_scene_is_read_by_one_rank_and_solved_by_two(tmp_path):
+    """Fresh processes: what rank 0 does alone must load nothing that needs all ranks."""
+    command = [
+        *("mpirun", "--oversubscribe", "--bind-to", "none", "-n", "2", sys.executable),
+        *("-m", "bladefem.cli.main", "contact", str(SCENES / "plane.toml"), "-o", str(tmp_path)),
+        *("--set", "mesh.scale=4", "--set", "study.loads=20 N"),
+    ]
+    done = subprocess.run(
+        command, capture_output=True, text=True, env=clean_environment(), timeout=120
+    )
+    assert done.returncode == 0, done.stderr
+    assert (tmp_path / "pressure.csv").is_file()
 
 
 @pytest.mark.mpi
