@@ -278,12 +278,12 @@ def _summary(result: pipeline.Run) -> pd.DataFrame:
 
 
 def _alternating(result: pipeline.Run, amplitudes: np.ndarray) -> np.ndarray:
-    """(rows,) alternating stress [Pa] of the design table: of the whole motion at each load, of the
-    mode alone where all is linear, without damper and stuck.
+    """(rows,) alternating stress [Pa] of the design table: of the whole motion where that was
+    computed, of the mode alone at the other loads, without damper and stuck.
     """
     stress = result.strength.alternating * amplitudes
-    if result.damped is not None:
-        stress[1:-1] = [one.largest for one in result.damped]
+    for curve, found in (result.damped or {}).items():
+        stress[1 + curve] = found.largest
     return stress
 
 

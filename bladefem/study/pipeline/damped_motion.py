@@ -6,9 +6,10 @@ elements give the displacement of every node, harmonic by harmonic, and the stre
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from math import pi
+from typing import Any
 
 import numpy as np
 
@@ -69,6 +70,7 @@ def damped_motion(
     case: LoadCase,
     solution: Solution,
     points: int | None = None,
+    factorised: Callable[[int], Any] | None = None,
 ) -> DampedMotion:
     """The field of displacements that belongs to a solved point.
 
@@ -77,6 +79,8 @@ def damped_motion(
             among them borrows the nearest one, as in the balance.
         case: the load of the solution.
         points: friction elements on each patch that the solution was made with; None for all.
+        factorised: nodal diameter to fem.flexibility.Flexibility, kept from load to load; made anew
+            when left out.
 
     """
     from ...fem.forced_motion import forced_motion
@@ -100,7 +104,7 @@ def damped_motion(
         if not own:
             continue
         mirrored = np.array([waves[h][1] for h in own])
-        flex = bodies.factorised(found.nodal_diameter or 0)
+        flex = (factorised or bodies.factorised)(found.nodal_diameter or 0)
         # a wave of diameter -n is the conjugate of one of diameter n at the negative frequency
         omega = (np.array(own) + 1) * solution.omega * np.where(mirrored, -1.0, 1.0)
         viscous = damping.viscous(2 * np.pi * found.frequencies)
@@ -120,11 +124,12 @@ def damped_stress(
     case: LoadCase,
     solution: Solution,
     points: int | None = None,
+    factorised: Callable[[int], Any] | None = None,
 ) -> DampedStress:
     """The largest alternating stress of the motion of `damped_motion`, which has the arguments."""
     from ...fem.alternating_stress import alternating_stress
 
-    motion = damped_motion(bodies, patches, modes, case, solution, points)
+    motion = damped_motion(bodies, patches, modes, case, solution, points, factorised)
     found = alternating_stress(bodies.still_blade, motion.harmonics)
     return DampedStress(
         case.load,
