@@ -2,12 +2,10 @@
 Table 1).
 
 Three freedoms (x, y, theta) of the mass, one friction element at each contact node. The force on
-the mass at node i is
-the radial return of f + k_t dw onto the circle |f| <= mu N_i(t), w = foundation minus mass (Eq. 28
-corrected: the
-printed per-axis limits of Eq. 29 are not Coulomb friction). The nodes turn with the mass by the
-full rotation, so theta
-need not stay small; N_i follows the load in proportion (Eq. 27, receding contact).
+the mass at node i is the radial return of f + k_t dw onto the circle |f| <= mu N_i(t), w =
+foundation minus mass (Eq. 28 corrected: the printed per-axis limits of Eq. 29 are not Coulomb
+friction). The nodes turn with the mass by the full rotation, so theta need not stay small; N_i
+follows the load in proportion (Eq. 27, receding contact).
 
 The march is the leapfrog scheme with the return map of ``friction.march``, which finds the start of
 slip within the step and turns the force exactly: second order, on curved paths too.

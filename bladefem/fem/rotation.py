@@ -9,13 +9,11 @@ P the projection across the axis. Its first derivative is the balance of the pre
 stiffness of small vibrations about it: stress stiffening and spin softening in one matrix.
 
 The linear preload, which other codes call a perturbation step, takes u0 from the linear balance K
-u0 = f and puts
-K_L(u0) + K_geo(u0) - Omega^2 M_P in the place of the second derivative: material stiffness on the
-moved body, and the
-stress of the linear strain. The two are never mixed: the potential's second derivative at a linear
-u0 contains stresses
-of order |grad u0|^2 that the linear balance knows nothing of, and is wrong by a factor on a
-twisted blade."""
+u0 = f and puts K_L(u0) + K_geo(u0) - Omega^2 M_P in the place of the second derivative: material
+stiffness on the moved body, and the stress of the linear strain. The two are never mixed: the
+potential's second derivative at a linear u0 contains stresses of order |grad u0|^2 that the linear
+balance knows nothing of, and is wrong by a factor on a twisted blade.
+"""
 
 from __future__ import annotations
 

@@ -91,10 +91,10 @@ def evaluate(
     the constant n0. precision is that in which the derivative of 2-D elements is summed: "single"
     is faster and leaves about 1e-7 of it in error, which is enough for Newton; forces are the same.
     kernel is that of 2-D elements: "vector", or "plain", the readable definition of it, some 50
-    times as slow and always in double precision.
-    The error falls as samples^-2. Forces.converged is False, with the reason, when a 2-D element
-    was not periodic after ``cycles`` periods or the motion is not finite. Raises InputError for
-    shapes that do not fit or too few samples (at least 4H+4).
+    times as slow and always in double precision. The error falls as samples^-2. Forces.converged is
+    False, with the reason, when a 2-D element was not periodic after ``cycles`` periods or the
+    motion is not finite. Raises InputError for shapes that do not fit or too few samples (at least
+    4H+4).
     """
     w, nodes = check_motion(elements, w)
     if precision not in PRECISIONS:

@@ -2,9 +2,9 @@
 made.
 
 eta_d = |T_d - T| / |T_d|, where T is the first harmonic at the probe and T_d the same in the model
-enriched in
-direction d, solved from the point that is judged: a step or two where the contacts stay closed.
-One Newton step alone overshoots with lift-off (16 % told for 0.4 % on the wedge of 46 nodes).
+enriched in direction d, solved from the point that is judged: a step or two where the contacts stay
+closed. One Newton step alone overshoots with lift-off (16 % told for 0.4 % on the wedge of 46
+nodes).
 
 Modes are doubled and samples taken four times; 1 and 3 harmonics are compared with 7 and 15
 (against 3 and 7 an internal resonance of a higher harmonic was missed, told 2.5e-4 for a true
