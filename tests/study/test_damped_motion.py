@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -148,3 +149,12 @@ def test_a_wheel_moves_at_the_probe_as_in_the_balance(order):
     assert solution.converged and solution.work.friction > 0
     motion = subject.damped_motion(bodies, patches, modes, case, solution)
     assert motion.mismatch < 2e-3
+
+
+@pytest.mark.parametrize(("error", "warns"), [(0.05, False), (0.5, True)])
+def test_a_stress_that_the_mesh_does_not_carry_is_a_warning(error, warns):
+    curves = [SimpleNamespace(peak_amplitude=2.0), SimpleNamespace(peak_amplitude=1.0)]
+    stress = SimpleNamespace(load=80.0, largest=2e7, place=np.zeros(3), mesh_error=error)
+    said = pipeline.stress_message(curves, {1: stress})
+    assert "20 MPa" in said
+    assert ("no stress to sign" in said) == warns

@@ -82,6 +82,8 @@ from .validate_mesh import found_patches
 EXACT_HARMONICS = 3
 # of the largest balance that the automatic choice solves; model.harmonics may ask for more
 UNKNOWNS = 6000
+# largest estimated error by the mesh of a stress that is no warning
+TRUSTED_STRESS = 0.2
 STAGES = ("mesh", "modes", "contact", "reduction", "response")
 
 
@@ -265,7 +267,7 @@ def run(
             stage_key("stress", scene, [(c.load, c.mass, c.peak.f) for c in response.curves]),
             lambda: _stresses(scene, patches, result, cases, comm),
         )
-        clock.messages.append(_stress_sentence(response.curves, stressed))
+        clock.messages.append(stress_message(response.curves, stressed))
     return replace(result, damped=stressed)
 
 
@@ -301,16 +303,19 @@ def _stresses(
     return on_root(comm, compute)
 
 
-def _stress_sentence(curves: list[Curve], stressed: dict[int, DampedStress]) -> str:
+def stress_message(curves: list[Curve], stressed: dict[int, DampedStress]) -> str:
     """The stress of the lowest resonance, and how far it can be trusted."""
     best = min(range(len(curves)), key=lambda k: curves[k].peak_amplitude)
     found = stressed[best]
     place = ", ".join(f"{1e3 * x:.1f}" for x in found.place)
-    return (
+    text = (
         f"alternating stress at the best load, {found.load:.4g} N: {1e-6 * found.largest:.4g} MPa "
         f"at ({place}) mm, of all modes, harmonics and damper forces; by its mesh "
         f"{found.mesh_error:.1%} uncertain there"
     )
+    if found.mesh_error <= TRUSTED_STRESS:
+        return text
+    return warning(f"{text}: a sharp edge or too coarse a mesh, so no stress to sign")
 
 
 @dataclass(frozen=True)
