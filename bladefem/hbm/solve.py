@@ -15,8 +15,8 @@ from .linear.condensation import Linear, condense
 from .model import ReducedModel
 from .point_measures import count_states, holding_drift
 from .solution import Solution, at_probes, blade_motion, probe_motion, works_of
-from .solver.fallback import Attempt, match_harmonics, solve_balance
-from .solver.newton import DEFAULTS, Options
+from .solver.fallback import NEWTON_MERITS, Attempt, match_harmonics, solve_balance
+from .solver.newton import DEFAULTS, Options, newton, runs_compiled
 from .solver.point_compiled import compiles_points, solve_each, solve_small
 from .solver.residual import Balance
 from .validate_model import check_point
@@ -69,6 +69,22 @@ def solve(
     reason = best.end.reason if best.end.converged else _failure_reasons(balance, attempts)
     balance = replace(balance, samples=best.samples or samples)
     return as_solution(balance, best, sum(a.end.iterations for a in attempts), reason)
+
+
+def solve_near(
+    model: ReducedModel,
+    omega: float,
+    H: int,
+    samples: int,
+    start: Solution,
+    options: Options = DEFAULTS,
+) -> Solution:
+    """The point by Newton from a solved neighbour alone; nothing else is tried where that fails."""
+    balance = Balance(model, condense(model, omega, H), samples)
+    merit = "step" if runs_compiled(balance) else "residual"
+    end = newton(balance, match_harmonics(start.w, H), options, merit)
+    method = next(name for name, lowered in NEWTON_MERITS if lowered == merit)
+    return as_solution(balance, Attempt(method, end), end.iterations, end.reason)
 
 
 def free_response(

@@ -18,7 +18,7 @@ from .model import ReducedModel
 from .predictor import PREDICTOR_POINTS, extrapolate_solution
 from .sensitivity import sensitivities
 from .solution import Solution, size
-from .solve import leading_stuck_solutions, solve
+from .solve import leading_stuck_solutions, solve, solve_near
 from .solver.fallback import match_harmonics
 from .solver.newton import DEFAULTS, Options
 from .solver.point_compiled import solve_along
@@ -39,6 +39,13 @@ FIRST_LOOK_INTERVALS = 12
 POINTS_AT_ONCE = 16
 # points after which a sweep gives up refining
 BAND_LIMIT = 400
+# Newton steps of one point of a walk from a neighbour: more are better spent on shorter steps
+WALK_ITERATIONS = 20
+# points tried on one walk, and its shortest step as a share of the way
+MOST_WALK_POINTS = 48
+SHORTEST_WALK_STEP = 0.002
+# times the samples that are tried where walks end close to a point
+MORE_SAMPLES = (2, 4)
 # unknowns up to which paths are followed wherever contacts lift off; of larger models, where the
 # sweep shows a jump, too
 FOLLOWED = 600
@@ -156,9 +163,20 @@ def sweep(
         return float(sensitivities(model, solved[omega], ["omega"])["omega"].size[options.probe])
 
     notes = [] if notes is None else notes
-    for solution in response(model, first_look(model, band), H, samples, options=options):
+    simply = replace(options, fallbacks=False)
+    lost = []
+    for solution in response(model, first_look(model, band), H, samples, options=simply):
+        if options.fallbacks and not solution.converged:
+            lost.append(solution.omega)
+            continue
         solved[solution.omega] = solution
         yield solution
+    # points that the neighbour below does not lead to are tried again when those above are known
+    for omega in lost:
+        near = _neighbours(solved.values(), omega)
+        for solution in _walk_from(model, omega, H, samples, near, options):
+            solved[solution.omega] = solution
+            yield solution
     while not (paths and _needs_continuation(model, solved, H, options.probe)):
         wanted = _next_frequency(solved, slope, (peak, curve), options.probe)
         if wanted is None:
@@ -171,11 +189,8 @@ def sweep(
             if not (paths and _normal_loads_follow(model)):
                 return
             break
-        near = sorted(
-            (s for s in solved.values() if s.converged), key=lambda s: abs(s.omega - wanted)
-        )
-        beyond = (s for s in near if (s.omega > wanted) != (near[0].omega > wanted))
-        solution = solve_from(model, wanted, H, samples, [*near[:1], *islice(beyond, 1)], options)
+        near = _neighbours(solved.values(), wanted)
+        solution = solve_from(model, wanted, H, samples, near, options)
         solved[wanted] = solution
         yield solution
     found = find_branches(
@@ -224,8 +239,8 @@ def solve_from(
     starts: Sequence[Solution],
     options: Options = DEFAULTS,
 ) -> Solution:
-    """The point from the first of several neighbours that leads to it, before fallbacks, which take
-    far longer.
+    """The point from the first of several neighbours that leads to it, at once or in small steps,
+    before fallbacks, which take far longer.
 
     Beside a fold of the curve only the neighbour on its other side does.
     """
@@ -235,9 +250,76 @@ def solve_from(
         if len(starts) > 1
         else ()
     )
-    return next((point for point in tries if point.converged), None) or _solve_off_resonance(
-        model, omega, H, samples, starts[0] if starts else None, options
-    )
+    found = next((point for point in tries if point.converged), None)
+    return found or _walk_from(model, omega, H, samples, starts, options)[-1]
+
+
+def _neighbours(points: Iterable[Solution], omega: float) -> list[Solution]:
+    """The converged point that is nearest to a frequency, and the nearest on its other side."""
+    near = sorted((p for p in points if p.converged), key=lambda p: abs(p.omega - omega))
+    beyond = (p for p in near if (p.omega > omega) != (near[0].omega > omega))
+    return [*near[:1], *islice(beyond, 1)]
+
+
+def _walk_from(
+    model: ReducedModel,
+    omega: float,
+    H: int,
+    samples: int,
+    starts: Sequence[Solution],
+    options: Options,
+) -> list[Solution]:
+    """Points on the way from one of several neighbours to a frequency, the last one at it; with
+    more samples where walks end close to it, by fallbacks where no neighbour leads there.
+    """
+    walked = []
+    for start in starts if options.fallbacks else ():
+        way = walk_in_frequency(model, omega, H, samples, start, options)
+        if way and way[-1].omega == omega:
+            return way
+        walked += way
+    nearest = min(walked, key=lambda p: abs(p.omega - omega), default=None)
+    # sampled friction jumps a little at the limit of stick: between two neighbours that are close
+    # to each other there may be no exact zero
+    for factor in MORE_SAMPLES if samples and nearest is not None else ():
+        point = solve_near(model, omega, H, factor * samples, nearest, options)
+        if point.converged:
+            return [*walked, replace(point, method="more samples")]
+    start = starts[0] if starts else None
+    return [*walked, _solve_off_resonance(model, omega, H, samples, start, options)]
+
+
+def walk_in_frequency(
+    model: ReducedModel,
+    omega: float,
+    H: int,
+    samples: int,
+    start: Solution,
+    options: Options = DEFAULTS,
+) -> list[Solution]:
+    """Converged points from a solved one towards a frequency, each by Newton from the curve
+    through the last ones; the step is halved where that fails.
+
+    The last point is at the frequency, unless a fold or a corner of the curve ended the walk.
+    """
+    brief = replace(options, iterations=min(options.iterations, WALK_ITERATIONS))
+    way = [start]
+    step = (omega - start.omega) / 2
+    shortest = SHORTEST_WALK_STEP * abs(omega - start.omega)
+    for _ in range(MOST_WALK_POINTS if step else 0):
+        target = way[-1].omega + step
+        if abs(omega - way[-1].omega) <= 1.5 * abs(step):
+            target = omega
+        guess = _predicted_start(way[-PREDICTOR_POINTS:], target, H) or way[-1]
+        point = solve_near(model, target, H, samples, guess, brief)
+        if point.converged:
+            way.append(point)
+            step *= 1.0 if point.iterations > WALK_ITERATIONS / 2 else 2.0
+        else:
+            step = (target - way[-1].omega) / 4
+        if abs(step) < shortest or way[-1].omega == omega:
+            break
+    return way[1:]
 
 
 def _solve_off_resonance(

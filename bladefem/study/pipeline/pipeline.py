@@ -18,8 +18,6 @@ import numpy as np
 from geometry.mesh import Mesh
 
 from ...contact.frictional_seating import FrictionalProblem, normal_part
-from ...contact.interface_elements import friction_elements, pair_ratio
-from ...contact.numerical_stiffness import numerical_stiffness, split_stiffness
 from ...contact.peak_pressure import peak_remarks
 from ...contact.seating import ContactProblem
 from ...contact.seating import solve as seat
@@ -45,7 +43,7 @@ from ..modes.clamped_aerofoil import clamped_blade
 from ..modes.stress import Strength, strength
 from .assemble_model import LoadCase, joint_model
 from .best_load import BestLoad, chart_loads, find_best_load
-from .changed_cases import cases_of, changed_cases
+from .changed_cases import cases_of, changed_cases, seated_case
 from .contact_cycle import labels
 from .damped_motion import DampedStress, damped_stress
 from .history import (
@@ -579,7 +577,7 @@ def load_cases(
 ) -> list[LoadCase]:
     """The friction elements of each load, for each mass of the damper."""
     return [
-        _load_case(scene, mesh, contact, load, mass)
+        seated_case(scene, contact.problem, contact.maps[load], load, mesh.dimension - 1, mass)
         for mass in scene.study.masses or (None,)
         for load in contact.maps
     ]
@@ -741,22 +739,6 @@ def _of_the_contact_mesh(curve: Curve) -> str:
         f"; {100 * curve.halved:.2g} % are what half as many contact points change, expected a "
         "finer contact mesh (mesh.seat_elements, mesh.contact_size)"
     )
-
-
-def _load_case(
-    scene: Scene,
-    mesh: Mesh,
-    contact: Seating,
-    load: float,
-    mass: float | None,
-) -> LoadCase:
-    ratio = pair_ratio(scene.material.blade, scene.material.damper)
-    elements, selection = friction_elements(
-        contact.problem, contact.maps[load], scene.contact, ratio, mesh.dimension - 1
-    )
-    limit = numerical_stiffness(contact.problem)
-    elements, series = split_stiffness(elements, contact.maps[load], scene.contact, limit)
-    return LoadCase(load, elements, selection, mass, series)
 
 
 def check_blade(scene: Scene, mesh: Mesh) -> None:
