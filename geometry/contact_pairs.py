@@ -41,7 +41,7 @@ def hertz_pair(hertz: HertzPair, size: MeshSize) -> Mesh:
     """
     check_hertz(hertz, size)
     fine = size.contact_size or hertz.contact_radius / 10
-    mesh = _facing(
+    mesh = _mesh_facing_bodies(
         hertz.dimension,
         hertz.half_width,
         WIDER * hertz.contact_radius,
@@ -49,7 +49,7 @@ def hertz_pair(hertz: HertzPair, size: MeshSize) -> Mesh:
         (fine, 1.2 * hertz.contact_radius),
         size,
     )
-    points = _bend(mesh, hertz.radius, hertz.half_width)
+    points = _bend_indenter(mesh, hertz.radius, hertz.half_width)
     bent = replace(mesh, points=points)
     return replace(bent, report=report(bent, mesh.report["straightened"], mesh.report["size"]))
 
@@ -62,7 +62,7 @@ def punch(block: Punch, size: MeshSize) -> Mesh:
     """
     check_punch(block, size)
     fine = size.contact_size or block.radius / 10
-    return _facing(
+    return _mesh_facing_bodies(
         block.dimension, block.half_width, block.radius, None, (fine, 1.1 * block.radius), size
     )
 
@@ -73,15 +73,15 @@ def check_hertz(hertz: HertzPair, size: MeshSize) -> None:
     Raises:
         InputError: the first rule that is broken.
     """
-    _inside(
+    _check_range(
         "hertz.contact_radius",
         hertz.contact_radius,
         hertz.half_width / 2.5,
         "hertz.half_width / 2.5",
     )
-    _inside("hertz.half_width", hertz.half_width, 0.7 * hertz.radius, "70 % of hertz.radius")
+    _check_range("hertz.half_width", hertz.half_width, 0.7 * hertz.radius, "70 % of hertz.radius")
     fine = size.contact_size or hertz.contact_radius / 10
-    _inside("mesh.contact_size", fine, hertz.contact_radius, "hertz.contact_radius")
+    _check_range("mesh.contact_size", fine, hertz.contact_radius, "hertz.contact_radius")
 
 
 def check_punch(block: Punch, size: MeshSize) -> None:
@@ -90,12 +90,12 @@ def check_punch(block: Punch, size: MeshSize) -> None:
     Raises:
         InputError: the first rule that is broken.
     """
-    _inside("punch.radius", block.radius, block.half_width / 2, "half of punch.half_width")
+    _check_range("punch.radius", block.radius, block.half_width / 2, "half of punch.half_width")
     fine = size.contact_size or block.radius / 10
-    _inside("mesh.contact_size", fine, block.radius, "punch.radius")
+    _check_range("mesh.contact_size", fine, block.radius, "punch.radius")
 
 
-def _inside(
+def _check_range(
     name: str,
     value: float,
     limit: float,
@@ -105,7 +105,7 @@ def _inside(
         raise InputError(f"{name} = {value:.4g} m: expected at most {limit:.4g} m ({meaning})")
 
 
-def _bend(
+def _bend_indenter(
     mesh: Mesh,
     radius: float,
     height: float,
@@ -122,7 +122,7 @@ def _bend(
     return points
 
 
-def _facing(
+def _mesh_facing_bodies(
     dimension: int,
     width: float,
     seat: float,
@@ -140,9 +140,9 @@ def _facing(
     """
     far = size.size or width / 4
     with gmsh_session() as gmsh:
-        draw = _solids if dimension == 3 else _plates
+        draw = _draw_solids if dimension == 3 else _draw_plates
         blade, damper = draw(gmsh, width, seat, upper)
-        groups = _names(gmsh, dimension, blade, damper, (width, upper or seat), seat)
+        groups = _name_faces(gmsh, dimension, blade, damper, (width, upper or seat), seat)
         tie(
             gmsh,
             dimension - 1,
@@ -167,11 +167,11 @@ def _facing(
     )
 
 
-def _square(width: float) -> np.ndarray:
+def _square_corners(width: float) -> np.ndarray:
     return np.array([[0.0, 0.0], [width, 0.0], [width, width], [0.0, width]])
 
 
-def _solids(
+def _draw_solids(
     gmsh: ModuleType,
     width: float,
     seat: float,
@@ -179,14 +179,14 @@ def _solids(
 ) -> tuple[int, int]:
     """Quarter blocks with the seat imprinted, or a quarter round punch above."""
     blade = imprint(
-        gmsh, prism(gmsh, _square(width), -width, 0.0), [(2, _quarter_disc(gmsh, seat))]
+        gmsh, prism(gmsh, _square_corners(width), -width, 0.0), [(2, _quarter_disc(gmsh, seat))]
     )
     if upper is None:
         solid = gmsh.model.occ.extrude([(2, _quarter_disc(gmsh, seat))], 0, 0, seat)
         damper = next(tag for dim, tag in solid if dim == 3)
     else:
         damper = imprint(
-            gmsh, prism(gmsh, _square(upper), 0.0, upper), [(2, _quarter_disc(gmsh, seat))]
+            gmsh, prism(gmsh, _square_corners(upper), 0.0, upper), [(2, _quarter_disc(gmsh, seat))]
         )
     gmsh.model.occ.synchronize()
     return blade, damper
@@ -201,7 +201,7 @@ def _quarter_disc(gmsh: ModuleType, radius: float) -> int:
     return occ.addPlaneSurface([occ.addCurveLoop(loop)])
 
 
-def _plates(
+def _draw_plates(
     gmsh: ModuleType,
     width: float,
     seat: float,
@@ -219,7 +219,7 @@ def _plates(
     return blade, damper
 
 
-def _names(
+def _name_faces(
     gmsh: ModuleType,
     dimension: int,
     blade: int,

@@ -39,13 +39,13 @@ def second_order(gmsh: ModuleType, curved: bool = True) -> None:
         moved.update(_of_entity(gmsh, dimension, entity, *nodes))
     for _, entity in gmsh.model.getEntities(1):
         if gmsh.model.getType(1, entity) in FLAT:
-            for middle, _ in _edges(gmsh, 1, entity):
+            for middle, _ in _second_order_edges(gmsh, 1, entity):
                 moved.pop(int(middle), None)
     for node, place in moved.items():
         gmsh.model.mesh.setNode(node, place, [])
 
 
-def _edges(
+def _second_order_edges(
     gmsh: ModuleType,
     dimension: int,
     entity: int,
@@ -73,7 +73,7 @@ def _of_entity(
     """Places (3,) [m] of the mid-side nodes of one curve or surface whose corner nodes and
     parameters are given.
     """
-    edges = _edges(gmsh, dimension, entity)
+    edges = _second_order_edges(gmsh, dimension, entity)
     row = {int(tag): i for i, tag in enumerate(tags)}
     ends = np.array([[row[int(a)], row[int(b)]] for _, (a, b) in edges])
     xyz = xyz.reshape(-1, 3)

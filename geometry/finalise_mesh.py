@@ -46,7 +46,7 @@ def mesh_model(
     gmsh.model.mesh.generate(2)
     if dimension == 3:
         fill(gmsh, groups, size.algorithm)
-    refuse_flat(_corners(gmsh, groups, dimension))
+    refuse_flat(_first_order_mesh(gmsh, groups, dimension))
     if size.order == 2:
         second_order(gmsh, size.curved)
     return extract(gmsh, groups, dimension)
@@ -123,13 +123,13 @@ def improve(gmsh: ModuleType, groups: Groups) -> float:
     Either alone leaves more of them.
     """
     for method in ("Netgen", ""):
-        if (worst := _worst_shape(_corners(gmsh, groups, 3))) > POOR:
+        if (worst := _worst_shape(_first_order_mesh(gmsh, groups, 3))) > POOR:
             return worst
         gmsh.model.mesh.optimize(method, True)
-    return _worst_shape(_corners(gmsh, groups, 3))
+    return _worst_shape(_first_order_mesh(gmsh, groups, 3))
 
 
-def _corners(
+def _first_order_mesh(
     gmsh: ModuleType,
     groups: Groups,
     dimension: int,
@@ -159,7 +159,7 @@ def complete(
         flat: plane faces, whose mid-side nodes go to the middle of their edges exactly (contact
             needs it).
     """
-    mesh = replace(mesh, points=_flatten(mesh, flat))
+    mesh = replace(mesh, points=_flatten_faces(mesh, flat))
     pairs = {
         name: match(mesh.points, mesh.faces, (m, s), mesh.dimension, r, t)
         for name, (m, s, r, t) in motions.items()
@@ -170,7 +170,7 @@ def complete(
     return replace(mesh, report=report(mesh, straightened, size))
 
 
-def _flatten(mesh: Mesh, names: tuple[str, ...]) -> np.ndarray:
+def _flatten_faces(mesh: Mesh, names: tuple[str, ...]) -> np.ndarray:
     points = mesh.points.copy()
     ends = edge_of_middle(mesh)
     for name in names:

@@ -86,8 +86,8 @@ def fit_wedge(
     """
     right, left = (_single_face(gmsh, named, name) for name in seats)
     flanks = flanks_between(gmsh, right, left, wedge, width, on, axis)
-    blade = _owner(gmsh, right)
-    before = _faces(gmsh, blade)
+    blade = _owning_solid(gmsh, right)
+    before = _solid_faces(gmsh, blade)
     marks = [
         (2, polygon(gmsh, flanks.rectangle(0))[0]),
         (2, polygon(gmsh, flanks.rectangle(1) @ on)[0]),
@@ -142,7 +142,7 @@ def flanks_between(
     along *= 1.0 if along @ axis >= 0 else -1.0
     low, high = _common_length(corners, along, wedge.length)
     ends = []
-    widths = [_extent(corners[i], _across(normals, places, along, i)) for i in (0, 1)]
+    widths = [_extent_along(corners[i], _across_flank(normals, places, along, i)) for i in (0, 1)]
     narrowest = min(top - bottom for bottom, top in widths)
     wanted = narrowest if width is None else width
     if wanted > narrowest * (1 + LOOSE):
@@ -151,7 +151,7 @@ def flanks_between(
             "mm, the width of the narrower platform face"
         )
     for i in (0, 1):
-        across = _across(normals, places, along, i)
+        across = _across_flank(normals, places, along, i)
         top = widths[i][1]
         origin = places[i] - (places[i] @ across) * across - (places[i] @ along) * along
         foot = origin + (low + high - wedge.length) / 2 * along
@@ -170,7 +170,7 @@ def _common_length(
     length: float,
 ) -> tuple[float, float]:
     """Where both faces are, along the damper [m]."""
-    extents = [_extent(points, along) for points in corners]
+    extents = [_extent_along(points, along) for points in corners]
     low = max(extent[0] for extent in extents)
     high = min(extent[1] for extent in extents)
     if length > (high - low) * (1 + LOOSE):
@@ -181,7 +181,7 @@ def _common_length(
     return low, high
 
 
-def _across(
+def _across_flank(
     normals: tuple[np.ndarray, np.ndarray],
     places: tuple[np.ndarray, np.ndarray],
     along: np.ndarray,
@@ -205,7 +205,7 @@ def _refuse_crossed(flanks: Flanks) -> None:
         )
 
 
-def _extent(points: np.ndarray, direction: np.ndarray) -> tuple[float, float]:
+def _extent_along(points: np.ndarray, direction: np.ndarray) -> tuple[float, float]:
     along = points @ direction
     return float(along.min()), float(along.max())
 
@@ -249,13 +249,13 @@ def _plane_face(gmsh: ModuleType, face: int) -> tuple[np.ndarray, np.ndarray, np
     return centre, normal / np.linalg.norm(normal), corners
 
 
-def _owner(gmsh: ModuleType, face: int) -> int:
+def _owning_solid(gmsh: ModuleType, face: int) -> int:
     """The solid that a face bounds."""
     upward, _ = gmsh.model.getAdjacencies(2, face)
     return int(upward[0])
 
 
-def _faces(gmsh: ModuleType, volume: int) -> dict[int, tuple[np.ndarray, float]]:
+def _solid_faces(gmsh: ModuleType, volume: int) -> dict[int, tuple[np.ndarray, float]]:
     """Centre and area of each face of a solid."""
     return {
         tag: (centre, float(gmsh.model.occ.getMass(2, tag)))
@@ -271,7 +271,7 @@ def _carried_over(
     cut: int,
 ) -> Named:
     """The names after the cut: faces are found again by centre and area, what was cut is not."""
-    after = _faces(gmsh, cut)
+    after = _solid_faces(gmsh, cut)
     scale = max(np.linalg.norm(centre) for centre, _ in before.values())
     now = {}
     for tag, (centre, area) in before.items():
@@ -304,7 +304,7 @@ def _face_at(
     area = flanks.width * flanks.length
     found = [
         tag
-        for tag, (centre, size) in _faces(gmsh, volume).items()
+        for tag, (centre, size) in _solid_faces(gmsh, volume).items()
         if np.linalg.norm(centre - middle) < 1e-3 * flanks.width and abs(size / area - 1) < 1e-4
     ]
     if len(found) != 1:

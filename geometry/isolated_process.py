@@ -44,8 +44,8 @@ def build(scene: Any) -> Mesh:
         RuntimeError: the child failed in another way; the message holds its last words.
     """
     kind_named(scene.kind)
-    for size in _tries(scene.mesh):
-        answer = _ask(SimpleNamespace(**vars(scene) | {"mesh": size}))
+    for size in _mesh_attempts(scene.mesh):
+        answer = _ask_child(SimpleNamespace(**vars(scene) | {"mesh": size}))
         if isinstance(answer, Mesh):
             return answer
         if isinstance(answer, Exception):
@@ -56,14 +56,14 @@ def build(scene: Any) -> Mesh:
     )
 
 
-def _tries(size: Any) -> list[Any]:
+def _mesh_attempts(size: Any) -> list[Any]:
     """Mesh settings to try one after the other."""
     other = "delaunay" if size.algorithm == "hxt" else "hxt"
     smaller = {"size": SMALLER * size.size} if size.size else {}
     return [size, replace(size, algorithm=other, **smaller)]
 
 
-def _ask(scene: SimpleNamespace) -> Mesh | Exception | str:
+def _ask_child(scene: SimpleNamespace) -> Mesh | Exception | str:
     """The child's answer; a word when it died or did not end."""
     with tempfile.TemporaryDirectory(prefix="bladefem-") as folder:
         job = Path(folder, "job")
@@ -72,7 +72,7 @@ def _ask(scene: SimpleNamespace) -> Mesh | Exception | str:
         try:
             done = subprocess.run(
                 [sys.executable, "-m", "geometry.isolated_process", job, answer],
-                env=_environment(),
+                env=_child_environment(),
                 stdin=subprocess.DEVNULL,
                 capture_output=True,
                 text=True,
@@ -89,7 +89,7 @@ def _ask(scene: SimpleNamespace) -> Mesh | Exception | str:
         return pickle.loads(answer.read_bytes())
 
 
-def _environment() -> dict[str, str]:
+def _child_environment() -> dict[str, str]:
     """This process's environment without what belongs to MPI, the project's folder first on the
     path.
     """

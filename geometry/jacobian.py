@@ -68,7 +68,7 @@ def scaled_jacobian(
         return np.sign(straight)
     if cell_type in ("tetra10", "triangle6"):
         dim = 3 if cell_type == "tetra10" else 2
-        gradients, transform = _bernstein(dim)
+        gradients, transform = _bernstein_basis(dim)
         x = points[cells][:, :, :dim]
         edges = np.einsum("qkd,nki->nqid", gradients, x, optimize=True)
         return (np.linalg.det(edges) @ transform.T).min(axis=1) / np.abs(straight)
@@ -79,7 +79,7 @@ def scaled_jacobian(
 
 
 @cache
-def _bernstein(dim: int) -> tuple[np.ndarray, np.ndarray]:
+def _bernstein_basis(dim: int) -> tuple[np.ndarray, np.ndarray]:
     """Gradients of the second-order shape functions (q, k, dim) at q points, and values ->
     coefficients (q, q).
     """

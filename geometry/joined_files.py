@@ -33,7 +33,7 @@ def joined_files(first: RawMesh, more: Iterable[str]) -> RawMesh:
     for entry in more:
         body, path = split_entry(entry)
         raw = read_raw(Path(path))
-        first = _beside(first, _as_body(raw, body) if body else raw)
+        first = _join_meshes(first, _as_body(raw, body) if body else raw)
     return first
 
 
@@ -48,7 +48,7 @@ def _as_body(raw: RawMesh, body: str) -> RawMesh:
     return replace(raw, groups={**raw.groups, body: every})
 
 
-def _beside(one: RawMesh, other: RawMesh) -> RawMesh:
+def _join_meshes(one: RawMesh, other: RawMesh) -> RawMesh:
     """Nodes and cells of both; nothing is merged, bodies stay apart."""
     nodes = len(one.points)
     count = len(one.blocks)

@@ -44,8 +44,8 @@ class NumberedFaces:
 def numbered_faces(raw: RawMesh) -> NumberedFaces:
     """Faces of the solid cells of a file; none of a plane mesh."""
     corners, inside = _outer_facets(raw)
-    centres, normals = _measured(raw.points, corners, inside)
-    part = _parts(corners, normals)
+    centres, normals = _measure_facets(raw.points, corners, inside)
+    part = _smooth_parts(corners, normals)
     order = _by_size(part, centres, normals, raw.points)
     return NumberedFaces(corners, order[part], normals, centres)
 
@@ -80,7 +80,7 @@ def _outer_facets(raw: RawMesh) -> tuple[np.ndarray, np.ndarray]:
     return every[outer], np.vstack(inside)[outer]
 
 
-def _measured(
+def _measure_facets(
     points: np.ndarray,
     corners: np.ndarray,
     inside: np.ndarray,
@@ -96,7 +96,7 @@ def _measured(
     return centres, normals
 
 
-def _parts(corners: np.ndarray, normals: np.ndarray) -> np.ndarray:
+def _smooth_parts(corners: np.ndarray, normals: np.ndarray) -> np.ndarray:
     """(nf,) part of the outside, its facets joined across smooth edges."""
     length = np.linalg.norm(normals, axis=1, keepdims=True)
     unit = normals / np.maximum(length, np.finfo(float).tiny)

@@ -39,10 +39,10 @@ def plane_blades(plane: Plane, size: MeshSize) -> Mesh:
     contact = size.contact_size or min(base, plane.seat_width / SEAT_ELEMENTS)
     motions = plane_motions(plane)
     with gmsh_session() as gmsh:
-        groups = _draw(gmsh, plane)
+        groups = _draw_plane(gmsh, plane)
         for master, slave, rotation, shift in motions.values():
             tie(gmsh, 1, groups.faces[master], groups.faces[slave], rotation, shift)
-        _sizes(gmsh, groups, base, contact)
+        _set_sizes(gmsh, groups, base, contact)
         with attempt("mesh.size", "mesh this geometry"):
             mesh = mesh_model(gmsh, groups, 2, size)
     sector = Sector(0, np.eye(3), np.array([0.0, plane.pitch, 0.0]))
@@ -130,7 +130,7 @@ def damper_corners(plane: Plane) -> np.ndarray:
     return np.array([[low, a], [top, a], [top, b], [top, c], [top, d], [low, d]])
 
 
-def _draw(gmsh: ModuleType, plane: Plane) -> Groups:
+def _draw_plane(gmsh: ModuleType, plane: Plane) -> Groups:
     blade, b, p = polygon(gmsh, blade_corners(plane))
     damper, d, _ = polygon(gmsh, damper_corners(plane))
     gmsh.model.occ.synchronize()
@@ -148,7 +148,7 @@ def _draw(gmsh: ModuleType, plane: Plane) -> Groups:
     return Groups({"blade": [blade], "damper": [damper]}, faces, points)
 
 
-def _sizes(
+def _set_sizes(
     gmsh: ModuleType,
     groups: Groups,
     base: float,

@@ -73,11 +73,11 @@ def profile(
         outer,
         corner,
         np.vstack([half, mirror])[::-1],
-        _wedge(inner, outer, theta, wedge.base),
+        _wedge_corners(inner, outer, theta, wedge.base),
     )
 
 
-def _wedge(
+def _wedge_corners(
     inner: np.ndarray,
     outer: np.ndarray,
     theta: float,

@@ -201,13 +201,13 @@ def from_vtk_order(word: str, cells: np.ndarray) -> np.ndarray:
     return cells[:, [*range(k), *middle, *rest]]
 
 
-def _ansys(file: Path) -> RawMesh:
+def _read_ansys(file: Path) -> RawMesh:
     from .ansys_cdb import read_cdb
 
     return read_cdb(file)
 
 
-def _abaqus(file: Path) -> RawMesh:
+def _read_abaqus(file: Path) -> RawMesh:
     from .abaqus_inp import read_inp
 
     return read_inp(file)
@@ -217,9 +217,9 @@ READERS: dict[str, Callable[[Path], RawMesh]] = {
     ".msh": read_by_gmsh,
     ".med": read_by_gmsh,
     ".unv": read_by_gmsh,
-    ".inp": _abaqus,
+    ".inp": _read_abaqus,
     ".bdf": read_by_meshio,
     ".nas": read_by_meshio,
     ".vtu": read_by_meshio,
-    ".cdb": _ansys,
+    ".cdb": _read_ansys,
 }

@@ -87,7 +87,7 @@ def disc_segment(
     return next(tag for dim, tag in occ.extrude([(2, face)], 0, 0, disc.width) if dim == 3)
 
 
-def _aerofoil(
+def _draw_aerofoil(
     gmsh: ModuleType,
     blade: Aerofoil,
     top: float,
@@ -102,14 +102,14 @@ def _aerofoil(
     foot = blade.fillet / blade.span
     stations = np.linspace(foot, 1, 3 + int(np.ceil(abs(blade.twist) / (12 * pi / 180))))
     with attempt("aerofoil.twist", "loft the sections of the aerofoil"):
-        rings = [_ring(gmsh, outline(blade, top, t)) for t in stations]
+        rings = [_profile_wire(gmsh, outline(blade, top, t)) for t in stations]
         if not foot:
             return next(tag for dim, tag in occ.addThruSections(rings, makeSolid=True) if dim == 3)
     with attempt("aerofoil.fillet", "round the root of the aerofoil"):
         # from the platform's plane to the blade's skin
         arc = np.linspace(LIFT, pi / 2, 6)[:-1]
         flare = [
-            _ring(gmsh, outline(blade, top, t, grow))
+            _profile_wire(gmsh, outline(blade, top, t, grow))
             for t, grow in zip(
                 foot * (1 - np.cos(arc) / np.cos(LIFT)),
                 blade.fillet * (1 - np.sin(arc)),
@@ -125,7 +125,7 @@ def _aerofoil(
         return occ.addVolume([occ.addSurfaceLoop(skin + ends, sewing=True)])
 
 
-def _ring(gmsh: ModuleType, points: np.ndarray) -> int:
+def _profile_wire(gmsh: ModuleType, points: np.ndarray) -> int:
     """Closed wire through points (n, 3): a spline each for suction and pressure side, and the blunt
     trailing edge.
 
@@ -164,7 +164,7 @@ def blade_solid(
             -platform.length / 2,
             platform.length / 2,
         ),
-        _aerofoil(gmsh, aerofoil, shape.top),
+        _draw_aerofoil(gmsh, aerofoil, shape.top),
     ]
     with attempt("aerofoil", "join aerofoil, platform, shank and disc"):
         solid, _ = occ.fuse([(3, disc_segment(gmsh, disc, shape.theta))], [(3, p) for p in parts])

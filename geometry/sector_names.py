@@ -71,11 +71,11 @@ def name_faces(
         for t, height in above.items()
         if height > aerofoil.fillet + tolerance and t not in faces["tip"]
     ]
-    faces |= _skin(gmsh, sides, aerofoil)
+    faces |= _aerofoil_faces(gmsh, sides, aerofoil)
     return Groups({"blade": [blade], "damper": [damper]}, faces)
 
 
-def _skin(
+def _aerofoil_faces(
     gmsh: ModuleType,
     sides: list[int],
     aerofoil: Aerofoil,

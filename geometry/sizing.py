@@ -55,7 +55,7 @@ def sector_sizes(
     tip = aerofoil.thickness_tip * aerofoil.chord_tip
     root = aerofoil.thickness_root * aerofoil.chord_root
     thin = 0.6 * min((tip + root) / 2, platform.thickness, shank.width / 2)
-    base = size.size or max(thin, _affordable(aerofoil, platform, shank, disc))
+    base = size.size or max(thin, _affordable_size(aerofoil, platform, shank, disc))
     contact = size.contact_size or min(base, platform.seat_width, wedge.length / ALONG)
     return Sizes(
         base,
@@ -84,7 +84,7 @@ def blade_volume(
     )
 
 
-def _affordable(
+def _affordable_size(
     aerofoil: Aerofoil,
     platform: Platform,
     shank: Shank,
@@ -111,13 +111,13 @@ def set_sizes(
     z = wedge.length / 2
     (x_in, y_in), x_out = profile.inner, profile.outer[0]
     boxes = [
-        _box(
+        _box_field(
             field, sizes.base, sizes.disc, 5 * sizes.base, [profile.underside, 10, -10, 10, -10, 10]
         )
     ]
     for low, high in ((y_in, 2 * y_in), (-2 * y_in, -y_in)):
         boxes.append(
-            _box(
+            _box_field(
                 field,
                 sizes.contact,
                 sizes.disc,
@@ -126,7 +126,7 @@ def set_sizes(
             )
         )
     boxes += [
-        _near(field, curves, size, sizes.base)
+        _distance_field(field, curves, size, sizes.base)
         for curves, size in zip(edges, (sizes.nose, sizes.edge), strict=True)
     ]
     least = field.add("Min")
@@ -169,7 +169,7 @@ def set_grids(
         gmsh.model.mesh.setTransfiniteSurface(seat, "Left")
 
 
-def _box(
+def _box_field(
     field: object,
     inside: float,
     outside: float,
@@ -185,7 +185,7 @@ def _box(
     return tag
 
 
-def _near(
+def _distance_field(
     field: object,
     curves: list[int],
     size: float,

@@ -80,15 +80,15 @@ def read_step(
     text = path.read_text(errors="replace")
     with gmsh_session() as gmsh:
         with attempt("imported.file", f"import '{file}'"):
-            _import(gmsh, path, 1.0 if scale == 1.0 else scale / file_unit(text))
-        named = _renamed(_names(gmsh, text), read_names(names))
+            _import_shapes(gmsh, path, 1.0 if scale == 1.0 else scale / file_unit(text))
+        named = _apply_names(_named_entities(gmsh, text), read_names(names))
         if fitted is not None:
             on = rotation(axis, 2 * np.pi / sectors)
             named = fit_wedge(gmsh, named, fitted.seats, fitted.wedge, fitted.seat_width, on, axis)
-        named |= _found(gmsh, named, sectors, axis)
-        _periodic(gmsh, named, sectors, axis)
+        named |= _find_faces(gmsh, named, sectors, axis)
+        _tie_faces(gmsh, named, sectors, axis)
         with attempt("mesh.size", f"mesh '{file}'"):
-            _generate(
+            _generate_mesh(
                 gmsh,
                 size,
                 [
@@ -117,8 +117,10 @@ def coarse_step(file: str | Path) -> RawMesh:
         raise InputError(f"'{file}': there is no such file")
     with gmsh_session() as gmsh:
         with attempt("imported.file", f"import '{file}'"):
-            _import(gmsh, path, 1.0)
-        for (dimension, name), tags in _names(gmsh, path.read_text(errors="replace")).items():
+            _import_shapes(gmsh, path, 1.0)
+        for (dimension, name), tags in _named_entities(
+            gmsh, path.read_text(errors="replace")
+        ).items():
             gmsh.model.addPhysicalGroup(dimension, tags, name=name)
         low, high = np.array(gmsh.model.getBoundingBox(-1, -1)).reshape(2, 3)
         gmsh.option.setNumber("Mesh.MeshSizeMax", float(np.linalg.norm(high - low)) / COARSE)
@@ -138,7 +140,7 @@ def file_unit(text: str) -> float:
     return 0.0254 if re.search(r"CONVERSION_BASED_UNIT\(\s*'INCH'", text, re.I) else 1e-3
 
 
-def _import(
+def _import_shapes(
     gmsh: ModuleType,
     path: Path,
     factor: float,
@@ -154,10 +156,10 @@ def _import(
     gmsh.model.occ.synchronize()
 
 
-def _names(gmsh: ModuleType, text: str) -> Named:
+def _named_entities(gmsh: ModuleType, text: str) -> Named:
     """(dimension, name) -> entities, by the names in the file where they can be told apart."""
     named: dict[tuple[int, str], list[int]] = {}
-    solids = _written(text)
+    solids = _written_names(text)
     volumes = [tag for _, tag in gmsh.model.getEntities(3)]
     for i, volume in enumerate(volumes):
         faces = [tag for _, tag in gmsh.model.getBoundary([(3, volume)], oriented=False)]
@@ -170,7 +172,7 @@ def _names(gmsh: ModuleType, text: str) -> Named:
     return named
 
 
-def _renamed(named: Named, wanted: dict[str, list[str]]) -> Named:
+def _apply_names(named: Named, wanted: dict[str, list[str]]) -> Named:
     """The user's names for solids and faces; a new name belongs to the dimension of its first old
     one.
     """
@@ -185,7 +187,7 @@ def _renamed(named: Named, wanted: dict[str, list[str]]) -> Named:
     return result
 
 
-def _written(text: str) -> list[tuple[str, list[str]]]:
+def _written_names(text: str) -> list[tuple[str, list[str]]]:
     """Name of each solid and of its faces, in the order of the file."""
     record = {
         int(n): body for n, body in re.findall(r"#(\d+)\s*=\s*(.*?);\s*(?=#|ENDSEC)", text, re.S)
@@ -199,16 +201,16 @@ def _written(text: str) -> list[tuple[str, list[str]]]:
         words = [
             re.match(r"\w+\s*\(\s*'(.*?)'", record.get(int(face), "X('')"), re.S) for face in faces
         ]
-        solids.append((_plain(name), [_plain(word[1]) if word else "" for word in words]))
+        solids.append((_plain_name(name), [_plain_name(word[1]) if word else "" for word in words]))
     return solids
 
 
-def _plain(name: str) -> str:
+def _plain_name(name: str) -> str:
     """A name worth using; CAD systems write NONE and the like."""
     return "" if name.strip().upper() in ("", "NONE", "$") else name.strip()
 
 
-def _found(
+def _find_faces(
     gmsh: ModuleType,
     named: dict[tuple[int, str], list[int]],
     sectors: int,
@@ -225,7 +227,7 @@ def _found(
     middle = {tag: c for volume in body for tag, c in centres(gmsh, volume).items()}
     found: dict[tuple[int, str], list[int]] = {}
     if sectors and not {"cyclic_low", "cyclic_high"} & words:
-        low, high = _turned(gmsh, middle, rotation(axis, 2 * np.pi / sectors))
+        low, high = _turned_faces(gmsh, middle, rotation(axis, 2 * np.pi / sectors))
         found |= {(2, "cyclic_low"): low, (2, "cyclic_high"): high} if low else {}
     if sectors and "clamp" not in words:
         radius = {
@@ -237,7 +239,7 @@ def _found(
     return found
 
 
-def _turned(
+def _turned_faces(
     gmsh: ModuleType,
     middle: dict[int, np.ndarray],
     on: np.ndarray,
@@ -262,7 +264,7 @@ def rotation(axis: np.ndarray, angle: float) -> np.ndarray:
     return np.eye(3) + np.sin(angle) * cross + (1 - np.cos(angle)) * cross @ cross
 
 
-def _periodic(
+def _tie_faces(
     gmsh: ModuleType,
     named: dict[tuple[int, str], list[int]],
     sectors: int,
@@ -287,7 +289,7 @@ def _periodic(
             tie(gmsh, 2, tags[master], tags[slave], best, np.zeros(3))
 
 
-def _refined(
+def _refine_faces(
     gmsh: ModuleType,
     faces: list[int],
     fine: float,
@@ -310,7 +312,7 @@ def _refined(
     field.setAsBackgroundMesh(threshold)
 
 
-def _generate(
+def _generate_mesh(
     gmsh: ModuleType,
     size: MeshSize,
     contact: list[int],
@@ -324,7 +326,7 @@ def _generate(
     gmsh.option.setNumber("Mesh.MeshSizeMin", min(base / 4, size.contact_size or base))
     gmsh.option.setNumber("Mesh.MeshSizeFromCurvature", 10)
     if size.contact_size and contact:
-        _refined(gmsh, contact, size.contact_size, base)
+        _refine_faces(gmsh, contact, size.contact_size, base)
     check_count(gmsh, 3, size.scale * base)
     gmsh.option.setNumber("Mesh.MeshSizeFactor", size.scale)
     gmsh.model.mesh.generate(3)

@@ -61,9 +61,9 @@ def z_mass(
     contact = size.contact_size or base
     with gmsh_session() as gmsh:
         body = prism(gmsh, z_corners(z), 0.0, z.thickness)
-        block = _block(gmsh, z, depth) if depth else None
+        block = _draw_foundation(gmsh, z, depth) if depth else None
         gmsh.model.occ.synchronize()
-        groups = _names(gmsh, z, depth, body, block)
+        groups = _name_faces(gmsh, z, depth, body, block)
         if block is not None:
             tie(gmsh, 2, groups.faces["seat"], groups.faces["footprint"], np.eye(3), np.zeros(3))
         set_background(
@@ -93,7 +93,7 @@ def check_z_mass(z: ZMass) -> None:
         )
 
 
-def _block(
+def _draw_foundation(
     gmsh: ModuleType,
     z: ZMass,
     depth: float,
@@ -105,7 +105,7 @@ def _block(
     return imprint(gmsh, prism(gmsh, square, -depth, 0.0), [(2, mark)])
 
 
-def _names(
+def _name_faces(
     gmsh: ModuleType,
     z: ZMass,
     depth: float,

@@ -73,7 +73,7 @@ def modes_wanted(options: argparse.Namespace) -> Any:
 
     if options.pictures < 0:
         raise InputError(f"--pictures {options.pictures}: expected a number of modes, 0 for none")
-    sizes = _sizes(options.converge, "converge")
+    sizes = _parse_sizes(options.converge, "converge")
     speeds = None if options.campbell is None else read_speeds(options.campbell)
     loads = None if options.forced is None else read_loads(options.forced)
     if loads is None and options.damping:
@@ -88,7 +88,7 @@ def modes_wanted(options: argparse.Namespace) -> Any:
     )
 
 
-def _sizes(text: str | None, option: str) -> list[float] | None:
+def _parse_sizes(text: str | None, option: str) -> list[float] | None:
     """Element sizes [m] as given to an option; empty where they are to be chosen."""
     from ..scene.fields import convert, field_at, split_values
 
@@ -183,7 +183,7 @@ def chart(options: argparse.Namespace, comm: Any) -> None:
     elif options.scene is None:
         raise InputError("chart: expected a scene file, or --reference")
     else:
-        sizes = _sizes(options.mesh, "mesh")
+        sizes = _parse_sizes(options.mesh, "mesh")
         scene, folder, _ = prepared(options, comm, responds=True)
         made = scene_chart(scene, folder, options.budget, comm, sizes)
         accuracy = scene.accuracy
@@ -226,7 +226,7 @@ def prepared(
         from ..io.run_folder import keep_given, locked, take_folder
 
         scene = given_scene(options, responds)
-        given = _given(options)
+        given = _given_fields(options)
         options.held.enter_context(locked(folder))
         moved = take_folder(folder, scene)
         keep_given(folder, given)
@@ -239,7 +239,7 @@ def prepared(
     return scene, folder, partial(watch, shown=wanted(options.quiet, rank))
 
 
-def _given(options: argparse.Namespace) -> set[str]:
+def _given_fields(options: argparse.Namespace) -> set[str]:
     """Dotted names of the fields that the user gave; a run folder remembers its own."""
     from ..io.run_folder import given_fields
     from ..scene.toml import given_keys, read_tables

@@ -123,7 +123,7 @@ def parser() -> argparse.ArgumentParser:
     )
     subs = top.add_subparsers(dest="command", required=True, metavar="command")
     for name, (what, example, function) in _COMMANDS.items():
-        sub = _command(subs, name, what, example, function)
+        sub = _add_command(subs, name, what, example, function)
         sub.add_argument(
             "scene",
             nargs="?" if name == "chart" else None,
@@ -174,7 +174,7 @@ def parser() -> argparse.ArgumentParser:
         help="also compare meshes of "
         "first and second order with these element sizes, such as '10, 7, 5 mm'",
     )
-    info = _command(
+    info = _add_command(
         subs,
         "info",
         "versions and threads of what bladefem runs on",
@@ -183,7 +183,7 @@ def parser() -> argparse.ArgumentParser:
     )
     info.set_defaults(scene=None)
     add_look(
-        _command(
+        _add_command(
             subs,
             "look",
             "what a mesh file holds: bodies, sets, numbered faces, a scene to start from",
@@ -239,7 +239,7 @@ def _modes_arguments(sub: argparse.ArgumentParser) -> None:
     )
 
 
-def _command(
+def _add_command(
     subs: argparse._SubParsersAction,
     name: str,
     what: str,

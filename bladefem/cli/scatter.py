@@ -28,7 +28,7 @@ def scatter(options: argparse.Namespace, comm: Any) -> None:
     check_mistuning(scene)
     run = pipeline.run(scene, folder, comm=comm, progress=bars)
     found = scatter_of_run(run, comm, bars)
-    table, files = on_root(comm, lambda: _written(found, folder))
+    table, files = on_root(comm, lambda: _write_results(found, folder))
     sentences = scatter_sentences(found)
     tell(
         options,
@@ -39,7 +39,7 @@ def scatter(options: argparse.Namespace, comm: Any) -> None:
     )
 
 
-def _written(found: Any, folder: Path) -> tuple[Any, list[Path]]:
+def _write_results(found: Any, folder: Path) -> tuple[Any, list[Path]]:
     """The table as text, and the files of the folder."""
     from ..report.tables import readable, write_tables
     from ..report.wheel import scatter_drawings, scatter_table

@@ -151,10 +151,10 @@ def responses(response: Any) -> str:
     curves = response.curves
     rows = pd.DataFrame(summary(curves, response.limits))
     rows = rows[[name for name in SHOWN if name in rows]]
-    rows.insert(0, "seat load", ["no damper", *map(_case, curves), "full stick"])
+    rows.insert(0, "seat load", ["no damper", *map(_case_label, curves), "full stick"])
     best = min(curves, key=lambda c: c.peak_amplitude)
     return (
-        f"{table(rows)}\nbest of these loads: {_case(best)}, amplitude divided by "
+        f"{table(rows)}\nbest of these loads: {_case_label(best)}, amplitude divided by "
         f"{undamped / best.peak_amplitude:.3g}"
     )
 
@@ -173,7 +173,7 @@ SHOWN = (
 )
 
 
-def _case(curve: Any) -> str:
+def _case_label(curve: Any) -> str:
     """Load, and mass where several are studied."""
     return show(curve.load, "N") + ("" if curve.mass is None else f" on {show(curve.mass, 'kg')}")
 

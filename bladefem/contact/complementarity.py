@@ -80,11 +80,11 @@ def solve_lcp(
     Source: semismooth Newton form of the active set, Hintermueller, Ito, Kunisch, DOI
     10.1137/S1052623401383558.
     """
-    C, g0, R, load = _given(C, g0, R, load)
+    C, g0, R, load = _check_arrays(C, g0, R, load)
     n = len(g0)
     U, S, V = held_directions(R)
     reduced = (V.T @ load) / S
-    reason = _unbalanced(R, load) if load.size else ""
+    reason = _balance_failure(R, load) if load.size else ""
     if reason:
         return LCPSolution(
             np.zeros(n), g0.copy(), np.zeros(R.shape[1]), np.zeros(n, bool), np.inf, 0, reason
@@ -96,7 +96,7 @@ def solve_lcp(
     try:
         f, y, active, its, settled = _primal_dual(C, g0, U, reduced, active, max_iterations)
         if not settled:
-            f, y, active, more, settled = _primal(C, g0, U, reduced)
+            f, y, active, more, settled = _primal_active_set(C, g0, U, reduced)
             its += more
     except LinAlgError:
         return LCPSolution(
@@ -125,7 +125,7 @@ def solve_lcp(
     return LCPSolution(f, gap, V @ ((y + travel) / S), active, residual, its, reason)
 
 
-def _given(
+def _check_arrays(
     C: np.ndarray,
     g0: np.ndarray,
     R: np.ndarray | None,
@@ -167,7 +167,7 @@ def held_directions(R: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     return U[:, held], S[held], Vt[held].T
 
 
-def _unbalanced(R: np.ndarray, load: np.ndarray) -> str:
+def _balance_failure(R: np.ndarray, load: np.ndarray) -> str:
     """Empty when forces >= 0 with R^T f = load exist (found by non-negative least squares), else
     the reason.
     """
@@ -211,7 +211,7 @@ def _winkler_set(
     return active if active.any() else np.ones(len(g0), dtype=bool)
 
 
-def _equality(
+def _solve_active(
     C: np.ndarray,
     g0: np.ndarray,
     U: np.ndarray,
@@ -245,7 +245,7 @@ def _primal_dual(
     """Semismooth Newton: drop pulling nodes, add penetrating ones, until the set repeats."""
     seen = set()
     for its in range(1, max_iterations + 1):
-        f, y = _equality(C, g0, U, load, active)
+        f, y = _solve_active(C, g0, U, load, active)
         gap = g0 + C @ f + U @ y
         keep = active & (f > -ROUND_OFF * np.abs(f).max(initial=0.0))
         new = keep | (~active & (gap < -ROUND_OFF * max(np.abs(gap).max(), np.abs(gap - g0).max())))
@@ -261,7 +261,7 @@ def _primal_dual(
     return f, y, active, its, False
 
 
-def _primal(
+def _primal_active_set(
     C: np.ndarray,
     g0: np.ndarray,
     U: np.ndarray,
@@ -274,7 +274,7 @@ def _primal(
     f = nnls(U.T, load)[0] if U.shape[1] else np.zeros(n)
     active = f > 0
     for its in range(1, 5 * n + 10):
-        target, y = _equality(C, g0, U, load, active)
+        target, y = _solve_active(C, g0, U, load, active)
         falling = active & (target < -ROUND_OFF * np.abs(target).max(initial=0.0))
         if falling.any():
             step = f[falling] / np.maximum(f[falling] - target[falling], 1e-300)

@@ -73,11 +73,11 @@ def overlap(mesh: Mesh, pair: str) -> Overlap:
     Y = places[1][slave[:, :d]]
     weighted, _ = surface(mesh, master)
     sign = outward(mesh, master, weighted.sum(axis=1))
-    view = _view(weighted.sum(axis=1) * sign[:, None], d, pair)
-    close = np.array(_close(X, Y), dtype=int).reshape(-1, 2)
+    view = _view_axes(weighted.sum(axis=1) * sign[:, None], d, pair)
+    close = np.array(_close_pairs(X, Y), dtype=int).reshape(-1, 2)
     # The corners of the slave in the master's own coordinates, in which its edges are taken as
     # straight.
-    corners = _located(places[0][master[close[:, 0]]], Y[close[:, 1]] @ view.T, view)
+    corners = _locate_points(places[0][master[close[:, 0]]], Y[close[:, 1]] @ view.T, view)
     cut = _cut_line if d == 2 else _cut_triangle
     pieces = [
         (i, j, piece)
@@ -90,7 +90,7 @@ def overlap(mesh: Mesh, pair: str) -> Overlap:
         )
     face = np.array([piece[:2] for piece in pieces])
     nodes = places[0][master[face[:, 0]]], places[1][slave[face[:, 1]]]
-    at, vector = _quadrature(*nodes, np.array([piece[2] for piece in pieces]), view)
+    at, vector = _piece_quadrature(*nodes, np.array([piece[2] for piece in pieces]), view)
     vector = vector * ((mesh.depth if d == 2 else 1.0) * sign[face[:, 0], None, None])
     weight = np.linalg.norm(vector, axis=2)
     whole = np.linalg.norm(weighted, axis=2).sum(axis=1)
@@ -117,7 +117,7 @@ def mortar_patch(mesh: Mesh, pair: str) -> Patch:
     np.add.at(normals, faces[:, :d], direction[:, None, :])
     area = np.bincount(
         o.master[o.face[:, 0], :d].ravel(),
-        np.einsum("sqk,sq->sk", _traction(o), o.weight).ravel(),
+        np.einsum("sqk,sq->sk", _traction_functions(o), o.weight).ravel(),
         len(mesh.points),
     )
     normal = normals[nodes] / np.linalg.norm(normals[nodes], axis=1, keepdims=True)
@@ -152,12 +152,12 @@ def mortar_faces(
         faces,
         number[o.master[o.face[:, 0], :d]],
         N.reshape(len(faces), q, -1),
-        _traction(o) * o.weight[:, :, None],
+        _traction_functions(o) * o.weight[:, :, None],
         o.normal,
     )
 
 
-def _traction(o: Overlap) -> np.ndarray:
+def _traction_functions(o: Overlap) -> np.ndarray:
     """Traction functions (s, q, k) on the pieces: hats on faces covered in part, where the others
     could be negative.
     """
@@ -170,7 +170,7 @@ def _traction(o: Overlap) -> np.ndarray:
     )
 
 
-def _close(X: np.ndarray, Y: np.ndarray) -> list[tuple[int, int]]:
+def _close_pairs(X: np.ndarray, Y: np.ndarray) -> list[tuple[int, int]]:
     """Pairs of faces (corners (n, k, 3)) whose spheres touch."""
     cx = X.mean(axis=1)
     cy = Y.mean(axis=1)
@@ -195,14 +195,14 @@ def _cut_triangle(polygon: np.ndarray) -> list[np.ndarray]:
     (Sutherland-Hodgman).
     """
     for level in (lambda p: p[0], lambda p: p[1], lambda p: 1 - p[0] - p[1]):
-        polygon = _clip(polygon, level)
+        polygon = _clip_polygon(polygon, level)
         if len(polygon) < 3:
             return []
     fan = [np.array([polygon[0], polygon[i], polygon[i + 1]]) for i in range(1, len(polygon) - 1)]
     return [f for f in fan if abs(np.linalg.det(f[1:] - f[0])) > SLIVER]
 
 
-def _clip(polygon: list[np.ndarray] | np.ndarray, level: object) -> list[np.ndarray]:
+def _clip_polygon(polygon: list[np.ndarray] | np.ndarray, level: object) -> list[np.ndarray]:
     """The part of a convex polygon where a linear function is not negative."""
     kept = []
     for a, b in zip(polygon, [*polygon[1:], polygon[0]], strict=True):
@@ -215,7 +215,7 @@ def _clip(polygon: list[np.ndarray] | np.ndarray, level: object) -> list[np.ndar
     return kept
 
 
-def _view(
+def _view_axes(
     normals: np.ndarray,
     d: int,
     pair: str,
@@ -234,7 +234,7 @@ def _view(
     return np.array([first, np.cross(axis, first)])
 
 
-def _quadrature(
+def _piece_quadrature(
     X: np.ndarray,
     Y: np.ndarray,
     pieces: np.ndarray,
@@ -248,7 +248,7 @@ def _quadrature(
     d = pieces.shape[2]
     points, w = face_quadrature(d + 1)
     on_master = np.einsum("qk,skd->sqd", LINEAR[d + 1](points)[0], pieces)
-    place, tangents = _mapped(X, on_master)
+    place, tangents = _map_points(X, on_master)
     edges = pieces[:, 1:] - pieces[:, :1]
     if d == 1:
         vector = np.cross(tangents[:, :, 0], [0.0, 0.0, 1.0]) * (edges[:, :, 0] / 2)[:, :, None]
@@ -257,10 +257,10 @@ def _quadrature(
             np.cross(tangents[:, :, 0], tangents[:, :, 1])
             * np.abs(np.linalg.det(edges))[:, None, None]
         )
-    return (on_master, _located(Y, place @ view.T, view)), vector * w[:, None]
+    return (on_master, _locate_points(Y, place @ view.T, view)), vector * w[:, None]
 
 
-def _located(
+def _locate_points(
     nodes: np.ndarray,
     target: np.ndarray,
     view: np.ndarray,
@@ -273,7 +273,7 @@ def _located(
     s, q, d = target.shape
     at = np.full((s, q, d), 0.0 if d == 1 else 1 / 3)
     for _ in range(STEPS):
-        there, slopes = _mapped(nodes, at)
+        there, slopes = _map_points(nodes, at)
         off = (target - there @ view.T)[..., None]
         slopes = (slopes @ view.T).swapaxes(2, 3)
         if (np.abs(np.linalg.det(slopes)) < SLIVER * np.abs(slopes).max(axis=(2, 3)) ** d).any():
@@ -285,7 +285,7 @@ def _located(
     return at
 
 
-def _mapped(nodes: np.ndarray, at: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+def _map_points(nodes: np.ndarray, at: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Places (s, q, 3) and tangents (s, q, d, 3) on faces with nodes (s, m, 3) at reference points
     (s, q, d).
     """

@@ -82,10 +82,12 @@ def areal_stiffness(patch: Patch, scene: Scene) -> float:
 
 def at_edge(pressure: PressureMap) -> bool:
     """Whether the largest pressure is at the boundary of its patch."""
-    return bool(pressure.force.any() and _boundary(pressure.patch)[np.argmax(pressure.pressure)])
+    return bool(
+        pressure.force.any() and _boundary_nodes(pressure.patch)[np.argmax(pressure.pressure)]
+    )
 
 
-def _boundary(patch: Patch) -> np.ndarray:
+def _boundary_nodes(patch: Patch) -> np.ndarray:
     """(n,) bool, nodes on sides that belong to one face only; the two ends of a plane seat."""
     faces = patch.faces
     k = patch.faces.shape[1]

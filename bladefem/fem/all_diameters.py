@@ -103,7 +103,7 @@ def all_diameters(
     )
     found = {p.con.nodal_diameter: p for p in steps}
     if prove:
-        found = _proved(t, found, count)
+        found = _check_inertia(t, found, count)
     sets = {}
     # vectors go as shapes come: both at once would be the peak of memory
     for n in sorted(found):
@@ -126,16 +126,22 @@ def eigenpairs(
     cons = {n: at_diameter(t, n) for n in diameters}
     blocks: list[np.ndarray] = []
     space = None
-    for i, n in enumerate(_sampled(sorted(cons))):
+    for i, n in enumerate(_diameter_order(sorted(cons))):
         if i in LEVELS and not direct:
             give_back()
-            space = _space(t, blocks, space)
+            space = _extend_space(t, blocks, space)
             blocks = []
         helps = len(cons) > LEVELS[0] and i < LEVELS[-1] and not direct
         # the last ones need a step or two: guards would not pay
         guess = count + (GUARD if helps else 0)
-        start = None if space is None else _guess(space, cons[n], 2 * np.pi * n / t.sectors, guess)
-        found = _pairs(flexible(cons[n]), count, start, solver, tolerance, MORE if helps else GUARD)
+        start = (
+            None
+            if space is None
+            else _initial_vectors(space, cons[n], 2 * np.pi * n / t.sectors, guess)
+        )
+        found = _solve_pairs(
+            flexible(cons[n]), count, start, solver, tolerance, MORE if helps else GUARD
+        )
         if helps:
             blocks.append(found.X)
         few = slice(0, count + GUARD)
@@ -144,13 +150,13 @@ def eigenpairs(
         )
 
 
-def _sampled(order: list[int]) -> list[int]:
+def _diameter_order(order: list[int]) -> list[int]:
     """Those that guess well between them, then the others."""
     first = [round(part * (len(order) - 1)) for part in FIRST] if order else []
     return [order[i] for i in dict.fromkeys([*first, *range(len(order))])]
 
 
-def _pairs(
+def _solve_pairs(
     flex: Flexibility,
     count: int,
     start: np.ndarray | None,
@@ -162,13 +168,13 @@ def _pairs(
     return Eigenpairs(flex, *pairs(flex, count, tolerance, start, guard, solver))
 
 
-def _space(
+def _extend_space(
     t: Transformation,
     blocks: list[np.ndarray],
     known: _Space | None,
 ) -> _Space:
     """The parts of more vectors added to a space; what it has already is projected once."""
-    new = _span(blocks, t, known)
+    new = _span_parts(blocks, t, known)
     old = 0 if known is None else known.W.shape[1]
     W = (
         new
@@ -177,19 +183,19 @@ def _space(
             [known.W, new], axis=1, out=np.empty((len(new), old + new.shape[1]), order="F")
         )
     )
-    columns = _projected(t, W, slice(old, W.shape[1]))
+    columns = _project_columns(t, W, slice(old, W.shape[1]))
     if known is None:
         return _Space(W, *columns)
     return _Space(
         W,
         *(
-            [_grown(*each) for each in zip(A, B, (1, 1, -1), strict=True)]
+            [_append_columns(*each) for each in zip(A, B, (1, 1, -1), strict=True)]
             for A, B in zip((known.K, known.M), columns, strict=True)
         ),
     )
 
 
-def _grown(
+def _append_columns(
     A: np.ndarray,
     columns: np.ndarray,
     sign: int,
@@ -199,14 +205,14 @@ def _grown(
     return np.block([[A, columns[:old]], [sign * columns[:old].T, columns[old:]]])
 
 
-def _guess(
+def _initial_vectors(
     space: _Space,
     con: Constrained,
     angle: float,
     count: int,
 ) -> np.ndarray:
     """(n_own, count) lowest vectors of the projected pencil."""
-    Z = _small(space.K, space.M, angle, count)
+    Z = _projected_modes(space.K, space.M, angle, count)
     if con.dtype is not complex:
         return mix(space.W, Z.real)
     out = np.empty((len(space.W), count), complex, order="F")
@@ -214,7 +220,7 @@ def _guess(
     return out
 
 
-def _span(
+def _span_parts(
     blocks: list[np.ndarray],
     t: Transformation,
     known: _Space | None,
@@ -235,7 +241,7 @@ def _span(
     return mix(W, Z[:, good] / np.sqrt(size[good]) / length[:, None])
 
 
-def _projected(
+def _project_columns(
     t: Transformation,
     W: np.ndarray,
     new: slice,
@@ -251,7 +257,7 @@ def _projected(
     high = T1[faces] @ W
     out = []
     for A, (LL, HL) in zip(
-        (t.opened.K, t.opened.M), _inside(t, low, high, faces, new), strict=True
+        (t.opened.K, t.opened.M), _project_interior(t, low, high, faces, new), strict=True
     ):
         beside = A[faces].T.tocsr()
         near = np.flatnonzero(np.diff(beside.indptr))
@@ -260,7 +266,7 @@ def _projected(
     return tuple(out)
 
 
-def _inside(
+def _project_interior(
     t: Transformation,
     low: np.ndarray,
     high: np.ndarray,
@@ -279,7 +285,7 @@ def _inside(
     ]
 
 
-def _small(
+def _projected_modes(
     K: list[np.ndarray],
     M: list[np.ndarray],
     angle: float,
@@ -291,7 +297,7 @@ def _small(
     return eigh(*[(A + A.conj().T) / 2 for A in pencil])[1][:, :count]
 
 
-def _proved(
+def _check_inertia(
     t: Transformation,
     found: dict[int, Eigenpairs],
     count: int,
@@ -299,13 +305,13 @@ def _proved(
     """Compare counts with inertia at one shift; a diameter that lost a mode is solved from
     scratch.
     """
-    lost = lost_modes(t, {n: p.con for n, p in found.items()}, _eigenvalues(found), count)
+    lost = lost_modes(t, {n: p.con for n, p in found.items()}, _list_eigenvalues(found), count)
     for n in lost:
         found[n] = found_again(found[n].flex, count, lost[n])
     return found
 
 
-def _eigenvalues(found: dict[int, Eigenpairs]) -> dict[int, np.ndarray]:
+def _list_eigenvalues(found: dict[int, Eigenpairs]) -> dict[int, np.ndarray]:
     return {n: p.lam for n, p in found.items()}
 
 
@@ -329,11 +335,11 @@ def lost_modes(
     counts.
     """
     give_back()
-    shift = _gap([some[:count] for some in lam.values()])
+    shift = _widest_gap([some[:count] for some in lam.values()])
     if not shift > 0:
         # rigid motions alone, which geometry counts
         return {}
-    shared = _shifted(t, shift)
+    shared = _shifted_core(t, shift)
     lost = {}
     for n, con in cons.items():
         exact = _count_below(con, shift, shared)
@@ -355,7 +361,7 @@ def found_again(
     Raises:
         NotSolvedError: the numbers differ even so.
     """
-    p = _pairs(flex, max(count, truth.exact + 1), None, BLOCKS, tolerance)
+    p = _solve_pairs(flex, max(count, truth.exact + 1), None, BLOCKS, tolerance)
     found = np.count_nonzero(p.lam < truth.shift)
     if found != truth.exact:
         raise NotSolvedError(
@@ -365,7 +371,7 @@ def found_again(
     return p
 
 
-def _shifted(t: Transformation, shift: float) -> core.Core | None:
+def _shifted_core(t: Transformation, shift: float) -> core.Core | None:
     """K - shift M of the open sector with its interior eliminated, for all nodal diameters."""
     if t.opened is None:
         return None
@@ -390,7 +396,7 @@ def _count_below(
     )
 
 
-def _gap(lists: list[np.ndarray]) -> float:
+def _widest_gap(lists: list[np.ndarray]) -> float:
     """A shift in the widest relative gap of all eigenvalues, in the upper half of what every
     diameter covers.
     """

@@ -124,7 +124,7 @@ def transformation(
     """
     pair = _cyclic_pair(body) if cyclic else None
     clamped = _with_partners(clamped_nodes(body, clamp), pair)
-    low, high, start = _numbered(body, *_parts(body, clamped, pair, ties))
+    low, high, start = _number_unknowns(body, *_constraint_parts(body, clamped, pair, ties))
     if high is None:
         T0 = _to_petsc(body, low, start)
         return Transformation(
@@ -132,13 +132,25 @@ def transformation(
         )
     sectors = body.mesh.sector.count
     if body.comm.size == 1 and one_core is not False:
-        opened = _opened(body, _numbered(body, *_parts(body, clamped, None, ties))[0], low, high)
+        opened = _open_sector(
+            body,
+            _number_unknowns(body, *_constraint_parts(body, clamped, None, ties))[0],
+            low,
+            high,
+        )
         if opened is not None:
             return Transformation(body, low, high, start, (), (), opened, sectors)
     T0 = _to_petsc(body, low, start)
     T1 = _to_petsc(body, high, start)
     return Transformation(
-        body, low, high, start, _three(body.K, T0, T1), _three(body.M, T0, T1), None, sectors
+        body,
+        low,
+        high,
+        start,
+        _three_matrices(body.K, T0, T1),
+        _three_matrices(body.M, T0, T1),
+        None,
+        sectors,
     )
 
 
@@ -164,7 +176,8 @@ def at_diameter(t: Transformation, nodal_diameter: int | None) -> Constrained:
         K, M = (combined(A[0], phase, A[1]) for A in (t.K, t.M))
     else:
         K, M = (
-            _doubled(combined(A[0], np.cos(angle), A[1]), A[2], np.sin(angle)) for A in (t.K, t.M)
+            _doubled_matrix(combined(A[0], np.cos(angle), A[1]), A[2], np.sin(angle))
+            for A in (t.K, t.M)
         )
     return Constrained(t.body, T, own, K, M, n)
 
@@ -177,8 +190,10 @@ def in_step(body: Body, clamp: str | None = "clamp") -> Constrained:
         InputError: see :func:`constrain`.
     """
     pair = _cyclic_pair(body) if "cyclic" in body.mesh.pairs else None
-    low, high = _parts(body, _with_partners(clamped_nodes(body, clamp), pair), pair, None)
-    T, _, start = _numbered(body, low if high is None else (low + high).tocsr(), None)
+    low, high = _constraint_parts(
+        body, _with_partners(clamped_nodes(body, clamp), pair), pair, None
+    )
+    T, _, start = _number_unknowns(body, low if high is None else (low + high).tocsr(), None)
     T0 = _to_petsc(body, T, start)
     rank = body.comm.rank
     return Constrained(
@@ -285,7 +300,7 @@ def _check_match(
         raise InputError("the cut faces share nodes (a solid hub on the axis), expected a bore")
 
 
-def _parts(
+def _constraint_parts(
     body: Body,
     clamped: np.ndarray,
     pair: Pair | None,
@@ -297,7 +312,7 @@ def _parts(
     free = body.rows >= 0
     free[clamped] = False
     slaves = np.empty(0, int) if pair is None else pair.nodes[1]
-    keep = np.repeat(free, d) & ~_slid(body, pair)
+    keep = np.repeat(free, d) & ~_plane_supports(body, pair)
     keep[d * slaves[:, None] + np.arange(d)] = False
     low = sp.diags(keep.astype(float)).tocsr()
     high = None
@@ -306,16 +321,16 @@ def _parts(
         rows = pair.nodes[1][alive]
         cols = pair.nodes[0][alive]
         block = sp.coo_matrix((np.ones(len(rows)), (rows, cols)), shape=(n, n))
-        moving = sp.diags((~_slid(body, pair)).astype(float))
+        moving = sp.diags((~_plane_supports(body, pair)).astype(float))
         high = (moving @ sp.kron(block, pair.rotation[:d, :d])).tocsr()
         high.eliminate_zeros()
     if ties is not None and len(ties):
-        tie = _tied(n, d, np.asarray(ties))
+        tie = _tied_identity(n, d, np.asarray(ties))
         low, high = (A if A is None else (tie @ A @ tie).tocsr() for A in (low, high))
     return low, high
 
 
-def _slid(body: Body, pair: Pair | None) -> np.ndarray:
+def _plane_supports(body: Body, pair: Pair | None) -> np.ndarray:
     """(n_points*dim,) true where a plane of symmetry or antisymmetry holds a displacement."""
     held = np.zeros((len(body.mesh.points), body.dim), bool)
     for axis, letter in enumerate("xyz"[: body.dim]):
@@ -324,11 +339,11 @@ def _slid(body: Body, pair: Pair | None) -> np.ndarray:
             (f"symmetry_{letter}", across),
             (f"antisymmetry_{letter}", ~across),
         ):
-            held[np.ix_(_plane(body, name, axis, pair), directions)] = True
-    return (held | _supported(body, pair)).ravel()
+            held[np.ix_(_plane_nodes(body, name, axis, pair), directions)] = True
+    return (held | _direction_supports(body, pair)).ravel()
 
 
-def _supported(body: Body, pair: Pair | None) -> np.ndarray:
+def _direction_supports(body: Body, pair: Pair | None) -> np.ndarray:
     """(n_points, dim) true where the supports hold a displacement.
 
     Raises:
@@ -350,7 +365,7 @@ def _supported(body: Body, pair: Pair | None) -> np.ndarray:
     return held
 
 
-def _plane(
+def _plane_nodes(
     body: Body,
     name: str,
     axis: int,
@@ -383,7 +398,7 @@ def _with_partners(clamped: np.ndarray, pair: Pair | None) -> np.ndarray:
     return np.union1d(clamped, pair.nodes[:, held].ravel())
 
 
-def _tied(
+def _tied_identity(
     n: int,
     d: int,
     ties: np.ndarray,
@@ -397,7 +412,7 @@ def _tied(
     return sp.kron(sp.diags(keep) + half, sp.identity(d)).tocsr()
 
 
-def _numbered(
+def _number_unknowns(
     body: Body,
     low: sp.csr_matrix,
     high: sp.csr_matrix | None,
@@ -442,7 +457,7 @@ def _to_petsc(
     return matrix
 
 
-def _opened(
+def _open_sector(
     body: Body,
     T: sp.csr_matrix,
     low: sp.csr_matrix,
@@ -452,7 +467,7 @@ def _opened(
     mass are dropped.
     """
     to_open = T[np.argsort(body.scalar_rows)[np.count_nonzero(body.scalar_rows < 0) :]]
-    K, M = (_projected(_csr(A), to_open) for A in (body.K, body.M))
+    K, M = (_project_matrix(_local_rows(A), to_open) for A in (body.K, body.M))
     M.eliminate_zeros()
     rows = T.tocoo()
     unit = (rows.data == 1) & (np.diff(T.indptr)[rows.row] == 1)
@@ -466,7 +481,7 @@ def _opened(
     )
 
 
-def _projected(A: sp.csr_matrix, T: sp.csr_matrix) -> sp.csr_matrix:
+def _project_matrix(A: sp.csr_matrix, T: sp.csr_matrix) -> sp.csr_matrix:
     """T^T A T; a mere selection of unknowns is done by indexing."""
     if T.nnz == T.shape[1] and (T.data == 1).all():
         chosen = T.tocsc().indices
@@ -476,7 +491,7 @@ def _projected(A: sp.csr_matrix, T: sp.csr_matrix) -> sp.csr_matrix:
     return out
 
 
-def _three(
+def _three_matrices(
     A: PETSc.Mat,
     T0: PETSc.Mat,
     T1: PETSc.Mat,
@@ -492,7 +507,7 @@ def _three(
     )
 
 
-def _doubled(
+def _doubled_matrix(
     A: PETSc.Mat,
     B: PETSc.Mat,
     factor: float,
@@ -500,8 +515,8 @@ def _doubled(
     """The real twin of A + j factor B, parts interleaved: kron(A, I) + kron(factor B, [0 -1; 1
     0]).
     """
-    twin = sp.kron(_csr(A), np.eye(2), "csr") + factor * sp.kron(
-        _csr(B), np.array([[0.0, -1.0], [1.0, 0.0]]), "csr"
+    twin = sp.kron(_local_rows(A), np.eye(2), "csr") + factor * sp.kron(
+        _local_rows(B), np.array([[0.0, -1.0], [1.0, 0.0]]), "csr"
     )
     twin.sum_duplicates()
     (n, N), _ = A.sizes
@@ -514,7 +529,7 @@ def _doubled(
     return Doubled(out)
 
 
-def _csr(A: PETSc.Mat) -> sp.csr_matrix:
+def _local_rows(A: PETSc.Mat) -> sp.csr_matrix:
     """This rank's rows."""
     indptr, indices, data = A.getValuesCSR()
     return sp.csr_matrix((data, indices, indptr), shape=(len(indptr) - 1, A.size[1]))

@@ -47,7 +47,9 @@ def flexible(con: Constrained, prop: float = 1.0) -> Flexibility:
     R = rigid_basis(con)
     if not R.shape[1]:
         return Flexibility(con, factorise(con.K), R, R)
-    return Flexibility(con, factorise(con.K, springs=_props(con, R, prop)), R, apply(con.M, R))
+    return Flexibility(
+        con, factorise(con.K, springs=_place_springs(con, R, prop)), R, apply(con.M, R)
+    )
 
 
 def compliance(flex: Flexibility, B: np.ndarray) -> np.ndarray:
@@ -83,10 +85,10 @@ def rigid_basis(con: Constrained) -> np.ndarray:
         return basis
     gram = dot(body.comm, basis, apply(con.M, basis))
     basis = basis @ np.linalg.inv(np.linalg.cholesky(gram)).conj().T
-    return basis if body.spring is None else _unsprung(con, basis)
+    return basis if body.spring is None else _unsprung_motions(con, basis)
 
 
-def _unsprung(con: Constrained, basis: np.ndarray) -> np.ndarray:
+def _unsprung_motions(con: Constrained, basis: np.ndarray) -> np.ndarray:
     """The rigid motions (n_own, r) that springs on faces leave without force."""
     body = con.body
     moves = expand(con, basis).reshape(len(body.scalar_rows), -1)
@@ -109,7 +111,7 @@ def unknown_places(con: Constrained) -> np.ndarray:
     return columns
 
 
-def _props(
+def _place_springs(
     con: Constrained,
     R: np.ndarray,
     prop: float,

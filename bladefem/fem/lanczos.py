@@ -73,7 +73,7 @@ def lowest(
     space = _Space()
     block, Mblock, _ = orthonormal(con, [], [], start.astype(con.dtype))
     for _ in range(STEPS):
-        _extend(con, space, block, Mblock, inverse(Mblock))
+        _extend_basis(con, space, block, Mblock, inverse(Mblock))
         theta, S = eigh(space.H)
         theta = theta[::-1]
         S = S[:, ::-1]
@@ -84,7 +84,9 @@ def lowest(
             raise NotSolvedError(f"{count} modes were asked of a body that has {k} elastic ones")
         if (k >= count and error < tolerance) or not len(rest):
             return 1 / theta[:k], mix([*space.V, *space.P], np.concatenate([S[:, :k], rest]))
-        block, Mblock = _next(space, rest[:, :count], FAINT * tolerance if k >= count else 0.0)
+        block, Mblock = _next_block(
+            space, rest[:, :count], FAINT * tolerance if k >= count else 0.0
+        )
     raise NotSolvedError(
         f"the modes did not converge in {STEPS} steps (error {error:.1e}, expected {tolerance:.1e})"
     )
@@ -105,18 +107,18 @@ def orthonormal(
             so that Q may have fewer columns than W.
     """
     comm = con.body.comm
-    W, MW, R, spread = _scaled(comm, W, apply(con.M, W), 1e-26, size**2)
+    W, MW, R, spread = _orthogonal_factor(comm, W, apply(con.M, W), 1e-26, size**2)
     left = dot(comm, MV, W)
     W = minus(W, V, left)
     clean = abs(left).max(initial=0.0) < CLEAN
     MW = minus(MW, MV, left) if clean else apply(con.M, W)
     if clean and spread > EVEN:
         return W, MW, R
-    W, MW, S, _ = _scaled(comm, W, MW, 0.25, 1.0)
+    W, MW, S, _ = _orthogonal_factor(comm, W, MW, 0.25, 1.0)
     return W, MW, S @ R
 
 
-def _extend(
+def _extend_basis(
     con: Constrained,
     space: _Space,
     block: np.ndarray,
@@ -142,7 +144,7 @@ def _extend(
     space.MP.append(MQ)
 
 
-def _next(
+def _next_block(
     space: _Space,
     rest: np.ndarray,
     faint: float,
@@ -164,7 +166,7 @@ def _next(
     )
 
 
-def _scaled(
+def _orthogonal_factor(
     comm: object,
     W: np.ndarray,
     MW: np.ndarray,

@@ -103,7 +103,7 @@ def solve(factor: Factor, B: np.ndarray) -> np.ndarray:
     if factor.doubled:
         return _complex(solve_matrix(factor.parts, _real(B)))
     if np.iscomplexobj(B):
-        return _join(solve_matrix(factor.parts, _split(B)))
+        return _join_complex(solve_matrix(factor.parts, _split_complex(B)))
     return solve_matrix(factor.parts, B)
 
 
@@ -113,7 +113,7 @@ def apply(A: Matrix, X: np.ndarray) -> np.ndarray:
         return np.asfortranarray(A.C.conj().T @ interior.times(A.A, A.C @ X))
     if isinstance(A, Doubled):
         return _complex(_times(A.matrix, _real(X)))
-    return _join(_times(A, _split(X))) if np.iscomplexobj(X) else _times(A, X)
+    return _join_complex(_times(A, _split_complex(X))) if np.iscomplexobj(X) else _times(A, X)
 
 
 def combined(
@@ -151,10 +151,10 @@ def dot(
 ) -> np.ndarray:
     """X^H Y over all ranks, (k, l); X may be a list of blocks side by side."""
     if isinstance(X, list):
-        parts = [_dot(block, Y) for block in X]
+        parts = [_local_product(block, Y) for block in X]
         part = np.concatenate(parts) if parts else np.zeros((0, Y.shape[1]), Y.dtype)
     else:
-        part = _dot(X, Y)
+        part = _local_product(X, Y)
     return comm.allreduce(np.ascontiguousarray(part)) if comm.size > 1 else part
 
 
@@ -167,7 +167,7 @@ def minus(
     side.
     """
     gemm = blas.zgemm if np.iscomplexobj(W) else blas.dgemm
-    for block, part in _paired(V, C):
+    for block, part in _paired_blocks(V, C):
         W = gemm(-1.0, block, part, 1.0, W, overwrite_c=1)
     return W
 
@@ -177,7 +177,7 @@ def mix(V: Block, C: np.ndarray) -> np.ndarray:
     blocks = V if isinstance(V, list) else [V]
     gemm = blas.zgemm if np.iscomplexobj(blocks[0]) else blas.dgemm
     out = None
-    for block, part in _paired(blocks, C):
+    for block, part in _paired_blocks(blocks, C):
         out = (
             gemm(1.0, block, part)
             if out is None
@@ -198,7 +198,7 @@ def inertia(A: Matrix) -> int:
     return parts.negative // 2 if doubled else parts.negative
 
 
-def _dot(X: np.ndarray, Y: np.ndarray) -> np.ndarray:
+def _local_product(X: np.ndarray, Y: np.ndarray) -> np.ndarray:
     """X^H Y on this rank."""
     if not (X.size and Y.size):
         return X.conj().T @ Y
@@ -207,7 +207,9 @@ def _dot(X: np.ndarray, Y: np.ndarray) -> np.ndarray:
     return blas.dgemm(1.0, X, Y, trans_a=1)
 
 
-def _paired(blocks: list[np.ndarray], C: np.ndarray) -> Iterator[tuple[np.ndarray, np.ndarray]]:
+def _paired_blocks(
+    blocks: list[np.ndarray], C: np.ndarray
+) -> Iterator[tuple[np.ndarray, np.ndarray]]:
     """Each block with the rows of C that belong to it, empty ones left out."""
     ends = np.cumsum([block.shape[1] for block in blocks]).tolist()
     for block, first, last in zip(blocks, [0, *ends], ends, strict=False):
@@ -225,11 +227,11 @@ def _times(A: PETSc.Mat, X: np.ndarray) -> np.ndarray:
     return out
 
 
-def _split(X: np.ndarray) -> np.ndarray:
+def _split_complex(X: np.ndarray) -> np.ndarray:
     return np.concatenate([X.real, X.imag], axis=1)
 
 
-def _join(both: np.ndarray) -> np.ndarray:
+def _join_complex(both: np.ndarray) -> np.ndarray:
     k = both.shape[1] // 2
     out = np.empty((both.shape[0], k), complex, order="F")
     out.real, out.imag = both[:, :k], both[:, k:]

@@ -44,7 +44,7 @@ class Bridge:
 
 def schur_complement(factor: Factorised, n: int) -> np.ndarray:
     """(n, n) A_bb - A_bi A_ii^-1 A_ib of the rows left out."""
-    S = _borrowed(factor, lambda handle: _array(handle, (n, n)).copy())
+    S = _use_complement(factor, lambda handle: _dense_array(handle, (n, n)).copy())
     # a symmetric factorisation fills one triangle
     lower = np.tril(S, -1)
     upper = np.triu(S, 1)
@@ -69,7 +69,7 @@ def bridge(factor: Factorised, n: int) -> Bridge | None:
             rows = ctypes.c_int()
             columns = ctypes.c_int()
             petsc_call("MatGetSize", left, ctypes.byref(rows), ctypes.byref(columns))
-            r = _array(left, (columns.value, rows.value)).T
+            r = _dense_array(left, (columns.value, rows.value)).T
             r[:] = answers[-1](r)
         except BaseException as error:
             raised.append(error)
@@ -77,12 +77,14 @@ def bridge(factor: Factorised, n: int) -> Bridge | None:
 
     def ones(handle: int) -> None:
         # of floating bodies S is singular; PETSc must factorise it
-        _array(handle, (n, n))[:] = np.eye(n)
+        _dense_array(handle, (n, n))[:] = np.eye(n)
 
     callback = CALLBACK(answer)
-    _borrowed(factor, ones)
+    _use_complement(factor, ones)
     petsc_call("MatFactorFactorizeSchurComplement", factor.matrix.handle)
-    _borrowed(factor, lambda handle: [set_operation(handle, place, callback) for place in MATSOLVE])
+    _use_complement(
+        factor, lambda handle: [set_operation(handle, place, callback) for place in MATSOLVE]
+    )
     made = Bridge(factor, n, answers, raised, callback)
     heard: list[int] = []
     through(made, np.zeros((factor.matrix.size[0], 1)), lambda r: heard.append(1) or r)
@@ -131,7 +133,7 @@ def _signals_wait() -> Iterator[None]:
             signal.raise_signal(came[0])
 
 
-def _borrowed(factor: Factorised, use: Callable[[int], object]) -> object:
+def _use_complement(factor: Factorised, use: Callable[[int], object]) -> object:
     """Do something with PETSc's Schur complement."""
     matrix = ctypes.c_void_p()
     status = ctypes.c_int()
@@ -148,7 +150,7 @@ def _borrowed(factor: Factorised, use: Callable[[int], object]) -> object:
     return out
 
 
-def _array(handle: int, shape: tuple[int, int]) -> np.ndarray:
+def _dense_array(handle: int, shape: tuple[int, int]) -> np.ndarray:
     """The memory of a dense matrix, columns of it as rows."""
     data = ctypes.POINTER(ctypes.c_double)()
     petsc_call("MatDenseGetArray", handle, ctypes.byref(data))

@@ -87,8 +87,10 @@ def nodal_stress(
         cells = body.mesh.bodies[name]
         part = slice(start, start + len(cells))
         start += len(cells)
-        at_nodes = np.einsum("kq,cqs->cks", _continuation(body.mesh.cell_type), found.stress[part])
-        mean = _averaged(cells, at_nodes, found.volume[part].sum(1), len(out))
+        at_nodes = np.einsum(
+            "kq,cqs->cks", _extrapolation_matrix(body.mesh.cell_type), found.stress[part]
+        )
+        mean = _average_at_nodes(cells, at_nodes, found.volume[part].sum(1), len(out))
         size = np.where(np.bincount(cells.ravel(), minlength=len(out)) > 0, von_mises(mean), -1.0)
         better = size > largest
         out[better], largest[better] = mean[better], size[better]
@@ -132,9 +134,9 @@ def von_mises(stress: np.ndarray) -> np.ndarray:
     The square is a quadratic form Q of s(t): Q = (Q(s, s*) + Re(Q(s, s) e^{2 j w t})) / 2.
     """
     if not np.iscomplexobj(stress):
-        return np.sqrt(np.maximum(_form(stress, stress), 0.0))
-    mean = _form(stress, stress.conj()).real
-    swing = np.abs(_form(stress, stress))
+        return np.sqrt(np.maximum(_mises_form(stress, stress), 0.0))
+    mean = _mises_form(stress, stress.conj()).real
+    swing = np.abs(_mises_form(stress, stress))
     return np.sqrt(np.maximum(mean + swing, 0.0) / 2)
 
 
@@ -143,16 +145,16 @@ def principal(stress: np.ndarray) -> np.ndarray:
     period.
     """
     if not np.iscomplexobj(stress):
-        return np.linalg.eigvalsh(_tensor(stress))[..., ::-1]
+        return np.linalg.eigvalsh(_stress_tensor(stress))[..., ::-1]
     best = np.full((*stress.shape[:-1], 3), -np.inf)
     # half a period later the sign is the other
     for turn in np.exp(2j * np.pi * np.arange(PHASES // 2) / PHASES):
-        now = _roots((stress * turn).real)
+        now = _cubic_roots((stress * turn).real)
         best = np.maximum(best, np.maximum(now, -now[..., ::-1]))
     return best
 
 
-def _roots(s: np.ndarray) -> np.ndarray:
+def _cubic_roots(s: np.ndarray) -> np.ndarray:
     """(..., 3) principal stresses of real (..., 6), descending, by the cosine formula (Smith 1961,
     doi:10.1145/355578.366316); double ones to eight digits, many times faster than an eigenvalue
     solver.
@@ -170,7 +172,7 @@ def _roots(s: np.ndarray) -> np.ndarray:
     return mean[..., None] + np.stack([first, -first - last, last], axis=-1)
 
 
-def _form(a: np.ndarray, b: np.ndarray) -> np.ndarray:
+def _mises_form(a: np.ndarray, b: np.ndarray) -> np.ndarray:
     """The bilinear form whose square root is the von Mises stress."""
     mean_a = a[..., :3].mean(-1, keepdims=True)
     mean_b = b[..., :3].mean(-1, keepdims=True)
@@ -178,7 +180,7 @@ def _form(a: np.ndarray, b: np.ndarray) -> np.ndarray:
     return 1.5 * normal + 3 * (a[..., 3:] * b[..., 3:]).sum(-1)
 
 
-def _tensor(stress: np.ndarray) -> np.ndarray:
+def _stress_tensor(stress: np.ndarray) -> np.ndarray:
     out = np.empty((*stress.shape[:-1], 3, 3), stress.dtype)
     for i, (a, b) in enumerate(PAIRS):
         out[..., a, b] = out[..., b, a] = stress[..., i]
@@ -215,10 +217,14 @@ def _of_cells(
         J = np.linalg.det(F)
         stress = F @ stress @ F.swapaxes(2, 3) / J[..., None, None]
         across = None if across is None else across / J
-    return np.einsum("qk,ckg->cqg", values, mesh.points[cells]), volume, _voigt(stress, across)
+    return (
+        np.einsum("qk,ckg->cqg", values, mesh.points[cells]),
+        volume,
+        _stress_vector(stress, across),
+    )
 
 
-def _voigt(stress: np.ndarray, across: np.ndarray | None) -> np.ndarray:
+def _stress_vector(stress: np.ndarray, across: np.ndarray | None) -> np.ndarray:
     d = stress.shape[-1]
     out = np.zeros((*stress.shape[:-2], 6), stress.dtype)
     for i, (a, b) in enumerate(PAIRS):
@@ -255,7 +261,7 @@ def _four_points(corners: int) -> tuple[np.ndarray, np.ndarray]:
 
 
 @cache
-def _continuation(cell_type: str) -> np.ndarray:
+def _extrapolation_matrix(cell_type: str) -> np.ndarray:
     """(k, q) from Gauss points to nodes, by the polynomial that the points determine."""
     kind = shape.SHAPES[cell_type][0]
     at, _ = _best_points(cell_type)
@@ -266,7 +272,7 @@ def _continuation(cell_type: str) -> np.ndarray:
     return shape.tabulate(kind, target)[0] @ np.linalg.pinv(lower)
 
 
-def _averaged(
+def _average_at_nodes(
     cells: np.ndarray,
     values: np.ndarray,
     weight: np.ndarray,

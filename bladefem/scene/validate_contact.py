@@ -26,9 +26,9 @@ def contact_problems(scene: Scene) -> Iterator[str]:
                         f"{name}.{key}: contact.stiffness = 'map' takes the normal stiffness from "
                         "the pressure map, expected only one of the two"
                     )
-    yield from _interval(scene)
+    yield from _check_interval(scene)
     yield from _without_layer(scene)
-    yield from _history(scene)
+    yield from _check_history(scene)
     shaped = [key for key in SHAPE if getattr(contact, key) is not None]
     if shaped and contact.bedded:
         yield (
@@ -67,7 +67,7 @@ def _without_layer(scene: Scene) -> Iterator[str]:
         )
 
 
-def _history(scene: Scene) -> Iterator[str]:
+def _check_history(scene: Scene) -> Iterator[str]:
     """Histories that cannot press the damper on its seats, or leave it held by friction alone."""
     contact = scene.contact
     history = contact.history
@@ -101,7 +101,7 @@ def _history(scene: Scene) -> Iterator[str]:
         )
 
 
-def _interval(scene: Scene) -> Iterator[str]:
+def _check_interval(scene: Scene) -> Iterator[str]:
     """Models whose response no loading history changes."""
     if not scene.study.interval:
         return

@@ -30,15 +30,15 @@ def names_apart(*axes: Any) -> None:
     """
     axes[0].figure.draw_without_rendering()
     for ax in axes:
-        _apart(ax)
+        _move_apart(ax)
 
 
-def _apart(ax: Any) -> None:
+def _move_apart(ax: Any) -> None:
     taken = [
         box
         for line in ax.lines
         if line.get_marker() not in ("None", "", None)
-        for box in _markers(line)
+        for box in _marker_boxes(line)
     ]
     inside = ax.get_window_extent()
     for text in list(ax.texts):
@@ -59,7 +59,7 @@ def _apart(ax: Any) -> None:
             text.remove()
 
 
-def _markers(line: Any) -> list[Bbox]:
+def _marker_boxes(line: Any) -> list[Bbox]:
     """Where the markers of a line stand on the page [pixels]."""
     half = line.get_markersize() / 2 * line.figure.dpi / 72
     places = line.get_transform().transform(np.asarray(line.get_xydata(), float))

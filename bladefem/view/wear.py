@@ -52,7 +52,7 @@ def draw_work(
     stacked = shape[0] > 1
     with canvas(file, size=size, grid=shape, squeeze=False, sharex=stacked, sharey=True) as axes:
         for ax, (patch, w, s) in zip(axes.flat, parts, strict=True):
-            (_line if line else _face)(ax, patch, w, s, most)
+            (_draw_line if line else _draw_face)(ax, patch, w, s, most)
             total = 1e3 * float(w @ patch.area)
             ax.set_title(
                 f"{seat_name(patch)}: {total:.3g} mJ a period", fontsize=9, fontweight="normal"
@@ -77,7 +77,7 @@ def draw_work(
         return figure
 
 
-def _face(
+def _draw_face(
     ax: Any,
     patch: Patch,
     work: np.ndarray,
@@ -112,7 +112,7 @@ def _face(
     ax.grid(False)
 
 
-def _line(
+def _draw_line(
     ax: Any,
     patch: Patch,
     work: np.ndarray,

@@ -56,7 +56,7 @@ def drawn_patterns(
     Args:
         blade_pattern: a pattern from relative deviations (N,) of the blades.
     """
-    values = _normal(wheels, 4 * wheel.count, scatter.seed).reshape(wheels, 4, wheel.count)
+    values = _normal_sample(wheels, 4 * wheel.count, scatter.seed).reshape(wheels, 4, wheel.count)
     dampers = np.array([scatter.friction, scatter.stiffness, scatter.load])
     patterns = []
     for draw in values:
@@ -93,7 +93,7 @@ def read_pattern(path: str | Path, count: int) -> tuple[list[str], np.ndarray]:
     if len(cells) < 2:
         raise InputError(f"pattern file {path.name}: expected a row of names and {count} blades")
     names = cells[0]
-    values = _numbers(path, cells[1:], len(names))
+    values = _read_numbers(path, cells[1:], len(names))
     if names[0].lower() == "blade":
         _check_order(path, values[:, 0])
         names = names[1:]
@@ -107,7 +107,7 @@ def read_pattern(path: str | Path, count: int) -> tuple[list[str], np.ndarray]:
     return names, values
 
 
-def _numbers(
+def _read_numbers(
     path: Path,
     rows: Sequence[Sequence[str]],
     columns: int,
@@ -134,7 +134,7 @@ def _check_order(path: Path, numbers: np.ndarray) -> None:
         )
 
 
-def _normal(
+def _normal_sample(
     wheels: int,
     columns: int,
     seed: int,

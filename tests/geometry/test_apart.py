@@ -61,7 +61,7 @@ def test_the_second_try_takes_the_other_algorithm_and_smaller_elements(monkeypat
         asked.append(scene.mesh)
         return "crashed (signal 11)" if len(asked) == 1 else build_here(scene)
 
-    monkeypatch.setattr(apart, "_ask", ask)
+    monkeypatch.setattr(apart, "_ask_child", ask)
     assert isinstance(build(SCENE), Mesh)
     assert [(m.algorithm, m.size) for m in asked] == [
         ("hxt", 6e-3),

@@ -18,7 +18,7 @@ from geometry.fitted_wedge import flanks_between
 from geometry.parameters import DEG, Aerofoil, Disc, MeshSize, Platform, Shank, Wedge
 from geometry.profile import profile
 from geometry.session import gmsh_session
-from geometry.step_file import FittedDamper, _import, read_step, rotation
+from geometry.step_file import FittedDamper, _import_shapes, read_step, rotation
 
 AXIS = np.array([0.0, 0.0, 1.0])
 SIZE = MeshSize(size=0.02, order=1)
@@ -90,7 +90,7 @@ def test_twenty_variations_are_fitted(tmp_path):
         shape = profile(platform, BLADE[2], BLADE[3], wedge)
         on = rotation(AXIS, 2 * pi / BLADE[3].sectors)
         with gmsh_session() as gmsh:
-            _import(gmsh, file, 1.0)
+            _import_shapes(gmsh, file, 1.0)
             flanks = flanks_between(gmsh, 14, 11, wedge, width, on, AXIS)
         assert flanks.width == pytest.approx(width, rel=1e-9)
         assert flanks.length == pytest.approx(wedge.length, rel=1e-9)

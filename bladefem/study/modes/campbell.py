@@ -70,10 +70,10 @@ def campbell(
     table = campbell_table(bodies, sorted({*speeds, operating}), diameters, count)
     at_speed = table[table["speed"] == operating]
     crossed = [
-        campbell_crossings(_excited(table, order, sectors), [order], sectors or None)
+        campbell_crossings(_excited_waves(table, order, sectors), [order], sectors or None)
         for order in orders
     ]
-    tables = [_interference(at_speed, order, sectors, operating) for order in orders]
+    tables = [_order_interference(at_speed, order, sectors, operating) for order in orders]
     return Campbell(
         table,
         pd.concat(crossed, ignore_index=True).sort_values("speed", ignore_index=True),
@@ -108,11 +108,12 @@ def campbell_table(
     squares = np.linspace(0.0, max(speeds) ** 2, 3)
     at = [bodies.blade_at(float(np.sqrt(s))) for s in squares]
     sets = [
-        _modes(bodies, body, diameters, count + GUARD) for body in bodies.progress(at, "speeds")
+        _modes_at_speed(bodies, body, diameters, count + GUARD)
+        for body in bodies.progress(at, "speeds")
     ]
     G = coriolis(bodies.still_blade, spin_axis(bodies.mesh))
     rows = [
-        _lines(at, [s[i] for s in sets], squares, speeds, G, sense_of(bodies.mesh))
+        _frequency_lines(at, [s[i] for s in sets], squares, speeds, G, sense_of(bodies.mesh))
         for i in range(len(sets[0]))
     ]
     return pd.concat(rows, ignore_index=True)
@@ -159,7 +160,7 @@ def sense_of(mesh: Any) -> int:
     return 1 if mesh.sector.rotation[1, 0] >= 0 else -1
 
 
-def _modes(
+def _modes_at_speed(
     bodies: Bodies,
     body: Any,
     diameters: Sequence[int] | None,
@@ -175,7 +176,7 @@ def _modes(
     return [modes(constrain(body), count)]
 
 
-def _lines(
+def _frequency_lines(
     at: list[Any],
     sets: list[ModeSet],
     squares: np.ndarray,
@@ -188,16 +189,19 @@ def _lines(
     """
     count = len(sets[0].frequencies)
     shown = slice(0, count - GUARD)
-    K, M, g = _projections(at, sets, G)
+    K, M, g = _project_speeds(at, sets, G)
     outer = np.r_[0:count, 2 * count : 3 * count]
     frames = []
     for speed in speeds:
         small = sum(
-            weight * part for weight, part in zip(_lagrange(squares, speed**2), K, strict=True)
+            weight * part
+            for weight, part in zip(_lagrange_weights(squares, speed**2), K, strict=True)
         )
-        f, Z = _frequencies(small, M, count)
-        rough, _ = _frequencies(small[np.ix_(outer, outer)], M[np.ix_(outer, outer)], count)
-        forward, backward = _split(f, Z.conj().T @ g @ Z, speed, sense, sets[0].nodal_diameter)
+        f, Z = _lowest_frequencies(small, M, count)
+        rough, _ = _lowest_frequencies(small[np.ix_(outer, outer)], M[np.ix_(outer, outer)], count)
+        forward, backward = _split_waves(
+            f, Z.conj().T @ g @ Z, speed, sense, sets[0].nodal_diameter
+        )
         values = {
             "frequency": f,
             "forward": forward,
@@ -213,7 +217,7 @@ def _lines(
     return table
 
 
-def _projections(
+def _project_speeds(
     at: list[Any],
     sets: list[ModeSet],
     G: Any,
@@ -224,12 +228,12 @@ def _projections(
 
     comm = at[0].comm
     X = own_rows(at[0], np.concatenate([s.shapes for s in sets]))
-    K = [_hermitian(dot(comm, X, apply(body.K, X))) for body in at]
+    K = [_hermitian_part(dot(comm, X, apply(body.K, X))) for body in at]
     g = dot(comm, X, apply(G, X))
-    return K, _hermitian(dot(comm, X, apply(at[0].M, X))), (g - g.conj().T) / 2
+    return K, _hermitian_part(dot(comm, X, apply(at[0].M, X))), (g - g.conj().T) / 2
 
 
-def _frequencies(
+def _lowest_frequencies(
     K: np.ndarray,
     M: np.ndarray,
     count: int,
@@ -238,11 +242,11 @@ def _frequencies(
     size, Q = np.linalg.eigh(M)
     keep = size > 1e-11 * size[-1]
     W = Q[:, keep] / np.sqrt(size[keep])
-    lam, Z = eigh(_hermitian(W.conj().T @ K @ W))
+    lam, Z = eigh(_hermitian_part(W.conj().T @ K @ W))
     return np.sqrt(np.maximum(lam[:count], 0)) / (2 * np.pi), W @ Z[:, :count]
 
 
-def _split(
+def _split_waves(
     f: np.ndarray,
     g: np.ndarray,
     speed: float,
@@ -255,12 +259,12 @@ def _split(
     return found.forward, found.backward
 
 
-def _lagrange(nodes: np.ndarray, s: float) -> list[float]:
+def _lagrange_weights(nodes: np.ndarray, s: float) -> list[float]:
     """Weights of the values at the nodes for the value at s."""
     return [float(np.prod([(s - b) / (a - b) for b in nodes if b != a])) for a in nodes]
 
 
-def _excited(
+def _excited_waves(
     table: pd.DataFrame,
     order: int,
     sectors: int,
@@ -277,14 +281,14 @@ def _excited(
     )
 
 
-def _interference(
+def _order_interference(
     table: pd.DataFrame,
     order: int,
     sectors: int,
     speed: float,
 ) -> tuple[pd.DataFrame, pd.DataFrame]:
     """SAFE rows and the closest mode of one order; single blades take every order."""
-    rows = _excited(table, order, sectors)
+    rows = _excited_waves(table, order, sectors)
     if sectors:
         return interference_table(rows, sectors, speed, [order]), margins(
             rows, sectors, speed, [order]
@@ -296,5 +300,5 @@ def _interference(
     )
 
 
-def _hermitian(A: np.ndarray) -> np.ndarray:
+def _hermitian_part(A: np.ndarray) -> np.ndarray:
     return (A + A.conj().T) / 2

@@ -33,15 +33,15 @@ def effective_masses(sets: Sequence[ModeSet], body: Any) -> pd.DataFrame:
         up to this mode.
     """
     frames = [
-        _rows(modes, body, direction, factor)
+        _mass_rows(modes, body, direction, factor)
         for modes in sets
-        for direction, factor in _directions(modes, body)
+        for direction, factor in _mass_directions(modes, body)
     ]
     columns = ["mode", "frequency", "direction", "factor", "effective_mass", "share", "sum"]
     return pd.concat(frames, ignore_index=True) if frames else pd.DataFrame(columns=columns)
 
 
-def _directions(modes: ModeSet, body: Any) -> list[tuple[str, float]]:
+def _mass_directions(modes: ModeSet, body: Any) -> list[tuple[str, float]]:
     """Directions of one set, with the factor from a sector to the wheel."""
     n = modes.nodal_diameter
     plane = body.dim == 2
@@ -56,7 +56,7 @@ def _directions(modes: ModeSet, body: Any) -> list[tuple[str, float]]:
     }.get(n, [])
 
 
-def _rows(
+def _mass_rows(
     modes: ModeSet,
     body: Any,
     direction: str,

@@ -103,7 +103,7 @@ def answer(
             "peaked": peaked,
         }
     )
-    return Answer(found, _curve(found, vector, count), resonances, shapes)
+    return Answer(found, _response_curve(found, vector, count), resonances, shapes)
 
 
 def read_loads(text: str) -> list[tuple[str, float]]:
@@ -216,7 +216,7 @@ def _of_all_bodies(bodies: Bodies, values: np.ndarray) -> np.ndarray:
     )
 
 
-def _curve(
+def _response_curve(
     found: Forced,
     vector: np.ndarray,
     count: int,

@@ -110,13 +110,13 @@ def of_meshes(runs: Sequence[tuple[Mesh, Sequence[ModeSet]]], count: int) -> Con
     finest = runs[-1]
     points = pd.concat(
         [
-            _rows(mesh, found, finest[0], reference, count)
+            _mesh_rows(mesh, found, finest[0], reference, count)
             for mesh, sets in runs
             for found, reference in zip(sets, finest[1], strict=True)
         ],
         ignore_index=True,
     )
-    return Convergence(points, _summary(points))
+    return Convergence(points, _convergence_summary(points))
 
 
 def paired(
@@ -142,7 +142,7 @@ def paired(
     return columns, match[rows, columns]
 
 
-def _rows(
+def _mesh_rows(
     mesh: Mesh,
     modes: ModeSet,
     finest: Mesh,
@@ -227,14 +227,14 @@ def fitted(h: np.ndarray, f: np.ndarray) -> tuple[float, float, float]:
     return float(limit), float(p), scatter
 
 
-def _summary(points: pd.DataFrame) -> pd.DataFrame:
+def _convergence_summary(points: pd.DataFrame) -> pd.DataFrame:
     keys = [key for key in ("nodal_diameter", "mode") if key in points]
     rows = []
     for _, line in points.groupby(keys):
         line = line.sort_values("size", ascending=False)
         f = line["frequency"].to_numpy()
         limit, order, scatter = fitted(line["size"].to_numpy() / line["size"].iloc[-1], f)
-        reason = _doubt(order, line["mac"].min())
+        reason = _order_doubt(order, line["mac"].min())
         change = np.ptp(f[-2:] if len(f) == 3 else f[-3:])
         error = SAFETY * change / f[-1] if reason else abs(f[-1] / limit - 1) + scatter / f[-1]
         rows.append(
@@ -251,7 +251,7 @@ def _summary(points: pd.DataFrame) -> pd.DataFrame:
     return pd.DataFrame(rows)
 
 
-def _doubt(order: float, mac: float) -> str:
+def _order_doubt(order: float, mac: float) -> str:
     """Why an order is not believed."""
     if mac < ALIKE:
         return f"the shapes of two meshes differ, MAC {mac:.2f}"

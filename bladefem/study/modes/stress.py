@@ -45,15 +45,15 @@ def strength(bodies: Bodies, modes: ModeSet) -> Strength:
     seen = abs(ports.matrix[:, ports.names["probe"]].T @ shape[:, : bodies.mesh.dimension].ravel())[
         0
     ]
-    alternating, there = _worst(bodies, shape / max(seen, 1e-300))
+    alternating, there = _worst_place(bodies, shape / max(seen, 1e-300))
     rest = 0.0, np.full(3, np.nan)
     steady, place = (
-        _worst(bodies, static_offset(bodies)) if bodies.scene.operation.speed > 0 else rest
+        _worst_place(bodies, static_offset(bodies)) if bodies.scene.operation.speed > 0 else rest
     )
     return Strength(excitation.mode, alternating, there, steady, place)
 
 
-def _worst(bodies: Bodies, u: np.ndarray) -> tuple[float, np.ndarray]:
+def _worst_place(bodies: Bodies, u: np.ndarray) -> tuple[float, np.ndarray]:
     """Largest von Mises stress [Pa] of displacements (n_points, d) and its place (3,) [m]."""
     from ...fem.stress import gauss_stress, von_mises
 

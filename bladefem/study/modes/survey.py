@@ -85,7 +85,7 @@ def survey(
     Raises:
         InputError, NotSolvedError: from the stages.
     """
-    other = None if wanted.other is None else on_root(comm, lambda: _other(wanted.other))
+    other = None if wanted.other is None else on_root(comm, lambda: _read_other(wanted.other))
     start = pipeline.run(scene, folder, until="mesh", comm=comm, progress=progress)
     pipeline.check_blade(scene, start.mesh)
     if wanted.loads is not None:
@@ -96,14 +96,14 @@ def survey(
     sets, before = stage(folder, "survey", key, lambda: _all_modes(bodies, wanted.direct), comm)
     messages = [*start.messages, *([] if before is None else [found_remark("modes", before)])]
     run = replace(start, modes=sets, messages=messages)
-    clock = _timed(run, "modes", clock)
+    clock = _stage_seconds(run, "modes", clock)
     result = Survey(
         run, bodies, effective_masses(sets, bodies.still_blade), clamped=clamped_blade(bodies)
     )
-    clock = _timed(run, "effective masses, clamped blade", clock)
+    clock = _stage_seconds(run, "effective masses, clamped blade", clock)
     if wanted.speeds is not None:
-        result = replace(result, campbell=campbell(bodies, wanted.speeds, _orders(scene)))
-        clock = _timed(run, "campbell", clock)
+        result = replace(result, campbell=campbell(bodies, wanted.speeds, _engine_orders(scene)))
+        clock = _stage_seconds(run, "campbell", clock)
     if wanted.sizes is not None:
         sizes = list(wanted.sizes) or default_sizes(scene)
         n = excited_set(run).nodal_diameter
@@ -113,11 +113,11 @@ def survey(
                 scene, sizes, None if n is None else [n], comm=comm, progress=progress
             ),
         )
-        clock = _timed(run, "mesh refinement", clock)
+        clock = _stage_seconds(run, "mesh refinement", clock)
     if wanted.loads is not None:
         result = replace(result, answer=answer(bodies, wanted.loads, wanted.damping))
-        clock = _timed(run, "forced response", clock)
-    return result if other is None else _compared(result, *other)
+        clock = _stage_seconds(run, "forced response", clock)
+    return result if other is None else _compare_modes(result, *other)
 
 
 def excited_set(run: pipeline.Run) -> ModeSet:
@@ -136,12 +136,12 @@ def _all_modes(bodies: Bodies, direct: bool) -> list[ModeSet]:
     return wheel_modes(bodies, MODES_SHOWN, bodies.scene.model.nodal_diameters, direct)
 
 
-def _orders(scene: Scene) -> list[int]:
+def _engine_orders(scene: Scene) -> list[int]:
     order = scene.excitation.engine_order
     return list(range(max(order - ORDERS, 1), order + ORDERS + 1))
 
 
-def _timed(
+def _stage_seconds(
     run: pipeline.Run,
     name: str,
     since: float,
@@ -151,14 +151,14 @@ def _timed(
     return now
 
 
-def _other(folder: Path) -> tuple[Mesh, list[ModeSet]]:
+def _read_other(folder: Path) -> tuple[Mesh, list[ModeSet]]:
     """Mesh and modes of another run.
 
     Raises:
         InputError: the folder holds none.
     """
-    mesh = _kept(folder, "mesh")
-    sets = _kept(folder, "survey") or _kept(folder, "modes")
+    mesh = _read_stage(folder, "mesh")
+    sets = _read_stage(folder, "survey") or _read_stage(folder, "modes")
     if mesh is None or sets is None:
         raise InputError(
             f"compare = {folder}: expected the folder of an earlier run of 'bladefem modes'"
@@ -166,7 +166,7 @@ def _other(folder: Path) -> tuple[Mesh, list[ModeSet]]:
     return mesh, sets
 
 
-def _kept(folder: Path, name: str) -> Any:
+def _read_stage(folder: Path, name: str) -> Any:
     """A stage of another run, whatever it was made from; None where it has none."""
     try:
         return stored_stage(folder, name)
@@ -174,7 +174,7 @@ def _kept(folder: Path, name: str) -> Any:
         return None
 
 
-def _compared(
+def _compare_modes(
     result: Survey,
     mesh: Mesh,
     sets: list[ModeSet],
@@ -193,13 +193,13 @@ def _compared(
     match = mac(
         _of_blade(own, mine),
         _of_blade(mesh, theirs[0]) if same else theirs[0],
-        _blade(own),
-        None if same else _blade(mesh),
+        _blade_alone(own),
+        None if same else _blade_alone(mesh),
     )
     return replace(result, mac=match, compared=theirs[0])
 
 
-def _blade(mesh: Mesh) -> Mesh:
+def _blade_alone(mesh: Mesh) -> Mesh:
     """The blade alone: the damper is not part of the modes."""
     return replace(mesh, bodies={"blade": mesh.bodies["blade"]})
 
