@@ -10,7 +10,7 @@ import pandas as pd
 import pytest
 
 from bladefem.cli.main import main
-from bladefem.cli.study import _run_options, _make_plan
+from bladefem.cli.study import _make_plan, _run_options
 from bladefem.errors import InputError
 from bladefem.io.run_folder import borrow_stages
 from bladefem.report.study import Variant
