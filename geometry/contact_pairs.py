@@ -63,7 +63,12 @@ def punch(block: Punch, size: MeshSize) -> Mesh:
     check_punch(block, size)
     fine = size.contact_size or block.radius / 10
     return _mesh_facing_bodies(
-        block.dimension, block.half_width, block.radius, None, (fine, 1.1 * block.radius), size
+        block.dimension,
+        block.half_width,
+        block.radius,
+        None,
+        (fine, 1.1 * block.radius),
+        size,
     )
 
 
@@ -142,7 +147,14 @@ def _mesh_facing_bodies(
     with gmsh_session() as gmsh:
         draw = _draw_solids if dimension == 3 else _draw_plates
         blade, damper = draw(gmsh, width, seat, upper)
-        groups = _name_faces(gmsh, dimension, blade, damper, (width, upper or seat), seat)
+        groups = _name_faces(
+            gmsh,
+            dimension,
+            blade,
+            damper,
+            (width, upper or seat),
+            seat,
+        )
         tie(
             gmsh,
             dimension - 1,

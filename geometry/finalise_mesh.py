@@ -161,7 +161,14 @@ def complete(
     """
     mesh = replace(mesh, points=_flatten_faces(mesh, flat))
     pairs = {
-        name: match(mesh.points, mesh.faces, (m, s), mesh.dimension, r, t)
+        name: match(
+            mesh.points,
+            mesh.faces,
+            (m, s),
+            mesh.dimension,
+            r,
+            t,
+        )
         for name, (m, s, r, t) in motions.items()
     }
     mesh = replace(mesh, points=snap(mesh.points, pairs), pairs=pairs, sector=sector)

@@ -85,7 +85,15 @@ def fit_wedge(
             does not fit.
     """
     right, left = (_single_face(gmsh, named, name) for name in seats)
-    flanks = flanks_between(gmsh, right, left, wedge, width, on, axis)
+    flanks = flanks_between(
+        gmsh,
+        right,
+        left,
+        wedge,
+        width,
+        on,
+        axis,
+    )
     blade = _owning_solid(gmsh, right)
     before = _solid_faces(gmsh, blade)
     marks = [

@@ -125,7 +125,16 @@ def read_mesh(
     wanted = read_names(names)
     if wanted:
         raw = renamed_raw(_with_numbered_faces(raw, wanted), wanted)
-    return mesh_of_raw(raw, scale, sectors, axis, str(file), linear, tolerance, frozenset(wanted))
+    return mesh_of_raw(
+        raw,
+        scale,
+        sectors,
+        axis,
+        str(file),
+        linear,
+        tolerance,
+        frozenset(wanted),
+    )
 
 
 def _with_numbered_faces(raw: RawMesh, wanted: dict[str, list[str]]) -> RawMesh:
@@ -346,7 +355,14 @@ def _find_pairs(
     }
     for name, (master, slave, rotation, way) in motions.items():
         if master in mesh.faces and slave in mesh.faces:
-            pairs[name] = _matched_contact(mesh, (master, slave), rotation, way, sectors, tolerance)
+            pairs[name] = _matched_contact(
+                mesh,
+                (master, slave),
+                rotation,
+                way,
+                sectors,
+                tolerance,
+            )
     row = Sector(sectors, on, shift) if sectors or shift.any() else None
     return replace(mesh, pairs=pairs, sector=row)
 
@@ -366,7 +382,15 @@ def _matched_contact(
         InputError: neither; with a hint when the number of sectors was left out.
     """
     try:
-        return match(mesh.points, mesh.faces, names, mesh.dimension, rotation, shift, tolerance)
+        return match(
+            mesh.points,
+            mesh.faces,
+            names,
+            mesh.dimension,
+            rotation,
+            shift,
+            tolerance,
+        )
     except InputError as error:
         if sectors and _faces_look(mesh, names, rotation, shift):
             return Pair(*names, np.zeros((2, 0), dtype=int), rotation, shift)
@@ -419,7 +443,15 @@ def _cyclic_pair(
     """The cyclic pair; the names are swapped when the file has them the other way round."""
     names = ("cyclic_low", "cyclic_high")
     try:
-        return mesh, match(mesh.points, mesh.faces, names, mesh.dimension, on, None, tolerance)
+        return mesh, match(
+            mesh.points,
+            mesh.faces,
+            names,
+            mesh.dimension,
+            on,
+            None,
+            tolerance,
+        )
     except InputError as first:
         swapped = replace(
             mesh,
@@ -427,7 +459,13 @@ def _cyclic_pair(
         )
         try:
             return swapped, match(
-                mesh.points, swapped.faces, names, mesh.dimension, on, None, tolerance
+                mesh.points,
+                swapped.faces,
+                names,
+                mesh.dimension,
+                on,
+                None,
+                tolerance,
             )
         except InputError:
             raise first from None

@@ -276,7 +276,14 @@ def _cut_faces(
             for j, other in enumerate(faces):
                 if i != j and _similar_faces(one, other):
                     sectors = _sector_count(one.centre, other.centre, axis, size)
-                    if sectors and _cut_faces_match(raw, outside, (i, j), axis, sectors, size):
+                    if sectors and _cut_faces_match(
+                        raw,
+                        outside,
+                        (i, j),
+                        axis,
+                        sectors,
+                        size,
+                    ):
                         pairs.setdefault(sectors, []).append((i, j))
         for sectors, some in pairs.items():
             area = sum(faces[i].area for i, _ in some)

@@ -38,7 +38,15 @@ def match(
     kinds = [_split_nodes(faces[name], dimension) for name in names]
     scale = np.ptp(points[np.unique(faces[names[0]])], axis=0).max()
     columns = [
-        _match_nodes(points, master, slave, rotation, shift, tolerance * scale, names)
+        _match_nodes(
+            points,
+            master,
+            slave,
+            rotation,
+            shift,
+            tolerance * scale,
+            names,
+        )
         for master, slave in zip(*kinds, strict=True)
     ]
     return Pair(*names, np.hstack(columns), rotation, shift)

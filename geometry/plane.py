@@ -41,7 +41,14 @@ def plane_blades(plane: Plane, size: MeshSize) -> Mesh:
     with gmsh_session() as gmsh:
         groups = _draw_plane(gmsh, plane)
         for master, slave, rotation, shift in motions.values():
-            tie(gmsh, 1, groups.faces[master], groups.faces[slave], rotation, shift)
+            tie(
+                gmsh,
+                1,
+                groups.faces[master],
+                groups.faces[slave],
+                rotation,
+                shift,
+            )
         _set_sizes(gmsh, groups, base, contact)
         with attempt("mesh.size", "mesh this geometry"):
             mesh = mesh_model(gmsh, groups, 2, size)

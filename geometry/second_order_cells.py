@@ -55,7 +55,12 @@ def _with_middles(points: np.ndarray, blocks: Blocks) -> tuple[np.ndarray, list[
         given.append(middle.ravel())
     edges, number = _shared_rows(np.vstack(ends))
     return _fill_nodes(
-        points, number, np.concatenate(given), points[edges].mean(axis=1), blocks, EDGES
+        points,
+        number,
+        np.concatenate(given),
+        points[edges].mean(axis=1),
+        blocks,
+        EDGES,
     )
 
 
@@ -87,7 +92,14 @@ def _with_face_centres(
         np.vstack(keys), axis=0, return_index=True, return_inverse=True
     )
     place = np.vstack(places)[first_row]
-    return _fill_nodes(points, number.ravel(), np.concatenate(given), place, blocks, QUADS)
+    return _fill_nodes(
+        points,
+        number.ravel(),
+        np.concatenate(given),
+        place,
+        blocks,
+        QUADS,
+    )
 
 
 def _with_cell_centres(

@@ -45,16 +45,38 @@ def wedge_sector(
     """
     check_sector(aerofoil, platform, shank, disc, wedge)
     shape = profile(platform, shank, disc, wedge)
-    sizes = sector_sizes(aerofoil, platform, shank, disc, wedge, size)
+    sizes = sector_sizes(
+        aerofoil,
+        platform,
+        shank,
+        disc,
+        wedge,
+        size,
+    )
     with gmsh_session() as gmsh:
-        blade = blade_solid(gmsh, aerofoil, platform, shank, disc, shape)
+        blade = blade_solid(
+            gmsh,
+            aerofoil,
+            platform,
+            shank,
+            disc,
+            shape,
+        )
         marks = [(2, polygon(gmsh, seat(shape, wedge.length, side))[0]) for side in (-1, 1)]
         with attempt("damper.length", "imprint the seats on the platform"):
             blade = imprint(gmsh, blade, marks)
         damper = prism(gmsh, shape.wedge, -wedge.length / 2, wedge.length / 2)
         clear_leftovers(gmsh)
         gmsh.model.occ.synchronize()
-        groups = name_faces(gmsh, blade, damper, aerofoil, disc, wedge, shape)
+        groups = name_faces(
+            gmsh,
+            blade,
+            damper,
+            aerofoil,
+            disc,
+            wedge,
+            shape,
+        )
         groups = mark_tip(gmsh, groups, aerofoil, shape)
         link(gmsh, groups, shape)
         set_sizes(gmsh, shape, wedge, sizes, edge_curves(gmsh, groups))

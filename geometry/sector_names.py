@@ -132,7 +132,14 @@ def link(
 ) -> None:
     """Tell gmsh to copy the mesh of each master face onto its slave."""
     for master, slave, rotation, shift in motions(profile).values():
-        tie(gmsh, 2, groups.faces[master], groups.faces[slave], rotation, shift)
+        tie(
+            gmsh,
+            2,
+            groups.faces[master],
+            groups.faces[slave],
+            rotation,
+            shift,
+        )
 
 
 def mark_tip(

@@ -84,7 +84,15 @@ def read_step(
         named = _apply_names(_named_entities(gmsh, text), read_names(names))
         if fitted is not None:
             on = rotation(axis, 2 * np.pi / sectors)
-            named = fit_wedge(gmsh, named, fitted.seats, fitted.wedge, fitted.seat_width, on, axis)
+            named = fit_wedge(
+                gmsh,
+                named,
+                fitted.seats,
+                fitted.wedge,
+                fitted.seat_width,
+                on,
+                axis,
+            )
         named |= _find_faces(gmsh, named, sectors, axis)
         _tie_faces(gmsh, named, sectors, axis)
         with attempt("mesh.size", f"mesh '{file}'"):
@@ -152,7 +160,15 @@ def _import_shapes(
     if not any(dim == 3 for dim, _ in shapes):
         raise InputError(f"imported.file = '{path}': no solids inside, expected at least one")
     if factor != 1.0:
-        gmsh.model.occ.dilate(shapes, 0, 0, 0, factor, factor, factor)
+        gmsh.model.occ.dilate(
+            shapes,
+            0,
+            0,
+            0,
+            factor,
+            factor,
+            factor,
+        )
     gmsh.model.occ.synchronize()
 
 
@@ -286,7 +302,14 @@ def _tie_faces(
         )
         best = min(motions, key=lambda r, a=start, b=end: np.linalg.norm(r @ a - b))
         with attempt("imported.file", f"match the faces {master} and {slave}"):
-            tie(gmsh, 2, tags[master], tags[slave], best, np.zeros(3))
+            tie(
+                gmsh,
+                2,
+                tags[master],
+                tags[slave],
+                best,
+                np.zeros(3),
+            )
 
 
 def _refine_faces(

@@ -65,7 +65,14 @@ def z_mass(
         gmsh.model.occ.synchronize()
         groups = _name_faces(gmsh, z, depth, body, block)
         if block is not None:
-            tie(gmsh, 2, groups.faces["seat"], groups.faces["footprint"], np.eye(3), np.zeros(3))
+            tie(
+                gmsh,
+                2,
+                groups.faces["seat"],
+                groups.faces["footprint"],
+                np.eye(3),
+                np.zeros(3),
+            )
         set_background(
             gmsh,
             min(base, contact) / 2,
