@@ -255,3 +255,25 @@ def _name_faces(
                 tag for tag, c in found.items() if abs(c[axis]) < 1e-6 * seat
             )
     return Groups({"blade": [blade], "damper": [damper]}, faces)
+
+
+def count_hertz_cells(pair: HertzPair, mesh: MeshSize) -> float:
+    """A lower bound of the number of cells."""
+    return _seat_cells(pair.contact_radius, pair.dimension, mesh)
+
+
+def count_punch_cells(pair: Punch, mesh: MeshSize) -> float:
+    """A lower bound of the number of cells."""
+    return _seat_cells(pair.radius, pair.dimension, mesh)
+
+
+def _seat_cells(
+    radius: float,
+    dimension: int,
+    mesh: MeshSize,
+) -> float:
+    """Three layers of elements of the contact size on the seats of both bodies."""
+    fine = mesh.scale * (mesh.contact_size or radius / 10)
+    if dimension == 3:
+        return 6 * np.pi / 4 * radius**2 / (0.43 * fine**2)
+    return 6 * radius / fine

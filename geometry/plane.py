@@ -177,3 +177,14 @@ def _set_sizes(
         field.setNumber(threshold, name, value)
     field.setAsBackgroundMesh(threshold)
     gmsh.option.setNumber("Mesh.MeshSizeMin", contact / 2)
+
+
+def count_plane_cells(plane: Plane, mesh: MeshSize) -> float:
+    """A lower bound of the number of triangles."""
+    thinnest = min(plane.thickness / 2, plane.platform_thickness / 3, plane.damper_height / 2)
+    base = mesh.size or thinnest
+    area = plane.length * plane.thickness + plane.platform_width * plane.platform_thickness
+    cells = area / (0.43 * (mesh.scale * base) ** 2)
+    if mesh.contact_size is None:
+        return cells
+    return cells + 4 * plane.seat_width / (mesh.scale * mesh.contact_size)

@@ -204,3 +204,19 @@ def _distance_field(
     ):
         field.setNumber(threshold, name, value)
     return threshold
+
+
+def count_sector_cells(
+    aerofoil: Aerofoil,
+    platform: Platform,
+    shank: Shank,
+    disc: Disc,
+    wedge: Wedge,
+    mesh: MeshSize,
+) -> float:
+    """A lower bound: the volume above the rim in elements of the base size, and the seats."""
+    parts = (aerofoil, platform, shank, disc)
+    sizes = sector_sizes(*parts, wedge, mesh)
+    solid = blade_volume(*parts) / (0.12 * (mesh.scale * sizes.base) ** 3)
+    seats = 2 * platform.seat_width * wedge.length
+    return solid + seats / (0.43 * (mesh.scale * sizes.contact) ** 2)

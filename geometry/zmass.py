@@ -132,3 +132,13 @@ def _name_faces(
     faces["seat"] = [min(level, key=lambda tag: abs(gmsh.model.occ.getMass(2, tag) - area))]
     faces["clamp"] = [tag for tag, height in found.items() if abs(height + depth) < 1e-6 * depth]
     return Groups({"blade": [block], "damper": [body]}, faces)
+
+
+def count_z_mass_cells(z: ZMass, mesh: MeshSize) -> float:
+    """A lower bound of the number of tetrahedra."""
+    base = mesh.size or min(z.thickness / 2, z.bar / 3)
+    solid = z.thickness * z.bar * (z.height + 2 * z.width)
+    cells = 0.5 * solid / (0.12 * (mesh.scale * base) ** 3)
+    contact = mesh.contact_size or base
+    surface = 0.5 * z.bar * (z.height + 2 * z.width)
+    return cells + surface / (0.43 * (mesh.scale * contact) ** 2)

@@ -8,6 +8,7 @@ import numpy as np
 import pandas as pd
 
 from bladefem.contact.interface_elements import USUAL, gives_stiffness
+from bladefem.scene.kinds import kind_named
 from bladefem.scene.tables import Scene
 from bladefem.scene.units import show
 
@@ -200,7 +201,7 @@ def wrong_speed(scene: Scene, summary: pd.DataFrame | None) -> list[str]:
     """A caution where the engine order, at the scene's speed, excites far from the resonances that
     were studied.
     """
-    if summary is None or scene.kind == "plane blades" or not scene.operation.speed > 0:
+    if summary is None or kind_named(scene.kind).is_plane or not scene.operation.speed > 0:
         return []
     excited = scene.excitation.engine_order * scene.operation.speed / (2 * np.pi)
     peaks = summary["peak_frequency"]

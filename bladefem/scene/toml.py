@@ -12,12 +12,10 @@ from collections.abc import Iterable
 from pathlib import Path
 from typing import Any, NamedTuple, get_type_hints
 
-from geometry.joined_files import split_entry
-
 from ..errors import InputError, suggestion
 from .fields import Field, convert, each_field, field_at, value_at
 from .kinds import KINDS, kind_named
-from .tables import Imported, Scene
+from .tables import Scene
 from .units import exact, shortened, show
 from .validate import validate
 
@@ -91,8 +89,7 @@ def scene_of(tables: dict[str, Any], folder: str | Path = ".") -> Scene:
             f"[{unused[0]}]: a scene of kind '{scene.kind}' does not use this table, expected only "
             f"{', '.join(kind_named(scene.kind).tables)}"
         )
-    if scene.kind == "imported" and scene.imported.file:
-        scene = dataclasses.replace(scene, imported=_with_paths(scene.imported, Path(folder)))
+    scene = kind_named(scene.kind).whole_paths(scene, Path(folder))
     if scene.mistuning.pattern:
         whole = str((Path(folder) / scene.mistuning.pattern).resolve())
         scene = dataclasses.replace(
@@ -100,17 +97,6 @@ def scene_of(tables: dict[str, Any], folder: str | Path = ".") -> Scene:
         )
     validate(scene)
     return scene
-
-
-def _with_paths(imported: Imported, folder: Path) -> Imported:
-    """Files with their whole paths."""
-    more = []
-    for entry in imported.more or ():
-        body, path = split_entry(entry)
-        whole = str((folder / path).resolve())
-        more.append(f"{body} = {whole}" if body else whole)
-    file = str((folder / imported.file).resolve())
-    return dataclasses.replace(imported, file=file, more=tuple(more) or None)
 
 
 def vary(scene: Scene, *pair: Any, **changes: Any) -> Scene:

@@ -132,10 +132,7 @@ def _check_numerics(scene: Scene) -> Iterator[str]:
 
 def _check_study(scene: Scene) -> Iterator[str]:
     if scene.study.loads is not None and min(scene.study.loads) == 0:
-        pair = scene.kind in ("hertz", "punch")
-        why = (
-            "nothing presses the two bodies together" if pair else "a damper without load lifts off"
-        )
+        why = kind_named(scene.kind).without_load
         yield f"study.loads = 0 N: {why}, expected more than 0 N"
     band = scene.study.band
     if band is not None and not band[0] < band[1]:

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 from math import atan, tan
 
+from .fields import value_at
 from .kinds import kind_named
 from .tables import Scene, Seat
 from .units import show
@@ -35,9 +36,9 @@ def contact_problems(scene: Scene) -> Iterator[str]:
             f"contact.{shaped[0]} = {show(getattr(contact, shaped[0]), 'm')}: bedded seats have "
             "lost their shape by wear, expected contact.bedded = false beside it"
         )
-    if contact.crown is not None and scene.kind == "plane blades":
+    if contact.crown is not None and kind_named(scene.kind).is_plane:
         yield (
-            "contact.crown: plane blades have no length along the engine axis, expected "
+            f"contact.crown: {scene.kind} have no length along the engine axis, expected "
             "contact.crown_across"
         )
     if (contact.edge_radius is None) != (contact.edge_width is None):
@@ -93,9 +94,13 @@ def _check_history(scene: Scene) -> Iterator[str]:
     mu = min(both)
     if not max(both) > 0:
         yield f"{name}: contact.mu = 0 leaves no friction, expected 'frictionless'"
-    if scene.kind == "wedge sector" and tan(scene.damper.angle) <= mu:
+    name_of_angle = kind_named(scene.kind).flank_angle
+    if name_of_angle is None:
+        return
+    angle = value_at(scene, name_of_angle)
+    if tan(angle) <= mu:
         yield (
-            f"damper.angle = {show(scene.damper.angle, 'rad')}: with contact.mu = {mu:g} friction "
+            f"{name_of_angle} = {show(angle, 'rad')}: with contact.mu = {mu:g} friction "
             f"alone holds the damper between its seats (self-locking up to {show(atan(mu), 'rad')})"
             f", so that {name} does not tell its load; expected a larger angle"
         )

@@ -4,13 +4,11 @@ shows.
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from bladefem.scene.tables import Scene
 from bladefem.scene.units import show
 from geometry.parameters import Aerofoil, Disc, Plane, Platform, Shank, Wedge, ZMass
 from geometry.plane import blade_corners, damper_corners
@@ -20,7 +18,6 @@ from geometry.section import shape as section_shape
 from geometry.zmass import z_corners
 
 from .dimensions import angle, length, note, shape
-from .pairs import draw_hertz, draw_punch
 from .style import COLOURS, canvas, headline
 
 MM = 1e3
@@ -405,19 +402,3 @@ def draw_z_mass(z: ZMass, file: str | Path | None = None) -> object:
         note(ax, (0, -0.75 * high), f"{said(z, 'thickness')}, footprint at z = 0", (0, 0))
         bare(ax, "Z mass, seen from above", "x", "y")
         return ax.figure
-
-
-# Drawings of a scene by the name of its kind: name of the picture -> function of (scene, file).
-PARTS: dict[str, dict[str, Callable[[Scene, str | Path | None], object]]] = {
-    "wedge sector": {
-        "aerofoil": lambda s, file=None: draw_aerofoil(s.aerofoil, file),
-        "platform": lambda s, file=None: draw_platform(s.platform, s.shank, s.disc, s.damper, file),
-        "sector": lambda s, file=None: draw_disc(
-            s.aerofoil, s.platform, s.shank, s.disc, s.damper, file
-        ),
-    },
-    "plane blades": {"plane": lambda s, file=None: draw_plane(s.plane, file)},
-    "z mass": {"z_mass": lambda s, file=None: draw_z_mass(s.z_mass, file)},
-    "hertz": {"hertz": lambda s, file=None: draw_hertz(s.hertz, file)},
-    "punch": {"punch": lambda s, file=None: draw_punch(s.punch, file)},
-}

@@ -123,6 +123,16 @@ def second_moment_radius(scene: Scene, seat: PressureMap) -> float:
     return float(np.sqrt((2.5 if dimension == 3 else 4.0) * (seat.force @ r**2) / seat.force.sum()))
 
 
+def refuse_loads(scene: Scene) -> None:
+    """Refuse loads whose contact does not fit the mesh; an interference has none.
+
+    Raises:
+        InputError: the load, and those that the mesh is made for.
+    """
+    if scene.hertz.interference is None:
+        check_loads(scene)
+
+
 def check_loads(scene: Scene) -> tuple[float, ...]:
     """The loads of the study, or the one that gives the expected contact radius.
 

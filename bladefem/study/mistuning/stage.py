@@ -10,6 +10,8 @@ from dataclasses import replace
 from typing import Any
 
 from ...errors import InputError
+from ...scene.fields import value_at
+from ...scene.kinds import kind_named
 from ...scene.tables import Scene
 from ...util.progress import Progress, unwatched
 from ...wheel.model import Pattern, Wheel, frequency_pattern
@@ -42,7 +44,10 @@ def check_mistuning(scene: Scene) -> None:
     """
     if not is_mistuned(scene):
         return
-    count = scene.imported.sectors if scene.kind == "imported" else scene.disc.sectors
+    name = kind_named(scene.kind).sectors
+    if name is None:
+        raise InputError(f"mistuning: a scene of kind '{scene.kind}' has no wheel")
+    count = value_at(scene, name)
     if count == 0:
         raise InputError("mistuning: expected a wheel, imported.sectors = 0 has a single blade")
     scene_deviations(scene, count, scene.mistuning.families)

@@ -27,6 +27,7 @@ from ...data import ModeSet, Patch, PressureMap
 from ...errors import InputError, NotSolvedError
 from ...io.stage_cache import found_remark, on_root, stage
 from ...reduction.truncate import truncated
+from ...scene.fields import value_at
 from ...scene.kinds import kind_named
 from ...scene.tables import Scene
 from ...scene.units import show
@@ -518,7 +519,8 @@ def _influences(
     changed = changed_cases(scene, contact.problem, mesh.dimension - 1, lowest.mass, contact.rough)
     # a history of the seating has its friction already
     frictionless = scene.contact.history == FRICTIONLESS
-    angle = scene.damper.angle if scene.kind == "wedge sector" and frictionless else None
+    name = kind_named(scene.kind).flank_angle
+    angle = value_at(scene, name) if name is not None and frictionless else None
     parameters = parameters_of(scene, angle)
 
     def compute() -> list[Influence]:

@@ -321,8 +321,7 @@ def seat_clearance(bodies: Bodies, patches: list[Patch]) -> np.ndarray:
 
     scene = bodies.scene
     gap = np.concatenate([seat_gap(patch, bodies.mesh, scene.contact) for patch in patches])
-    # a wedge that was drawn here has its clearance in the mesh
-    return gap + scene.damper.clearance if scene.kind == "imported" else gap
+    return gap if kind_named(scene.kind).clearance_is_meshed else gap + scene.damper.clearance
 
 
 def harmonic_diameters(
