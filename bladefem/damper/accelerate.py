@@ -18,11 +18,14 @@ import numpy as np
 
 from bladefem.errors import InputError
 from bladefem.hbm.solution import probe_motion
+from bladefem.util.newton import Outcome, StepError, halve_step, iterate_newton
 
 from .paper import DamperResponse, Platform, balance, damper_response, equivalent, residual
 
 # growth over the free motion at which an iteration is given up
 HUGE = 1e4
+# step share below which Newton's search direction is given up
+SHORTEST_STEP_SHARE = 2.0**-7
 
 
 @dataclass(frozen=True)
@@ -261,6 +264,10 @@ def _describing_function(g: _Map, c: np.ndarray) -> tuple[np.ndarray, bool, str]
     return (found, True, reason) if converged else _damped_newton(g, c)
 
 
+# real unknowns, residual there
+_Guess = tuple[np.ndarray, np.ndarray]
+
+
 def _damped_newton(g: _Map, c: np.ndarray) -> tuple[np.ndarray, bool, str]:
     """Step halving; Jacobian by differences in 2 H r directions."""
     side = g.side
@@ -271,26 +278,35 @@ def _damped_newton(g: _Map, c: np.ndarray) -> tuple[np.ndarray, bool, str]:
         u = g.spread(_packed_motion(x, c.shape))
         return _as_real(residual(side, u, g.force(u))[:, side.rows])
 
-    x = _as_real(c)
-    value = r(x)
-    while g.calls < most:
-        if np.linalg.norm(value) < goal * np.linalg.norm(x):
-            return _packed_motion(x, c.shape), True, f"residual below {goal:.1e}"
+    def advance(guess: _Guess) -> _Guess | None:
+        if g.calls >= most:
+            raise StepError(Outcome.EXHAUSTED, f"no convergence in {g.rules.most} evaluations")
+        x, value = guess
         delta = 1e-6 * np.linalg.norm(x)
         J = np.column_stack([(r(x + delta * e) - value) / delta for e in np.eye(len(x))])
         if not np.isfinite(J).all():
-            return _packed_motion(x, c.shape), False, f"damper not solved: {g.last.reason}"
+            raise StepError(Outcome.NOT_FINITE, "Jacobian is not finite")
         step = np.linalg.lstsq(J, -value, rcond=None)[0]
-        for halving in range(8):
-            trial = x + step * 0.5**halving
-            new = r(trial)
-            if np.linalg.norm(new) < np.linalg.norm(value):
-                break
-        else:
-            return _packed_motion(x, c.shape), False, "line search stalled"
-        x = trial
-        value = new
-    return _packed_motion(x, c.shape), False, f"no convergence in {g.rules.most} evaluations"
+        before = np.linalg.norm(value)
+        return halve_step(
+            lambda share: (x + share * step, r(x + share * step)),
+            lambda trial, _: bool(np.linalg.norm(trial[1]) < before),
+            SHORTEST_STEP_SHARE,
+        )
+
+    first = _as_real(c)
+    run = iterate_newton(
+        (first, r(first)),
+        lambda guess: float(
+            np.linalg.norm(guess[1]) / max(np.linalg.norm(guess[0]), np.finfo(float).tiny)
+        ),
+        advance,
+        goal,
+        g.rules.most,
+    )
+    unsolved = run.outcome is Outcome.NOT_FINITE
+    reason = f"damper not solved: {g.last.reason}" if unsolved else run.reason
+    return _packed_motion(run.state[0], c.shape), run.converged, reason
 
 
 def _as_real(c: np.ndarray) -> np.ndarray:

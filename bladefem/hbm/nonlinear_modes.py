@@ -20,6 +20,7 @@ from scipy import linalg
 
 from ..errors import InputError
 from ..friction.fourier import to_complex, to_real
+from ..util.newton import halve_step, iterate_newton
 from .linear.bodies import Stack
 from .linear.condensation import condense
 from .linear.woodbury import bodies_of
@@ -170,28 +171,14 @@ def _solve(
     last: NonlinearMode | None,
 ) -> NonlinearMode:
     """Newton from the last motion, scaled, or from full stick."""
-    x = _start(frame, amplitude, last)
-    state = _residual(frame, x, amplitude)
-    reason = f"not converged after {STEPS} iterations"
-    iterations = 0
-    for iterations in range(STEPS + 1):
-        size = np.linalg.norm(state.w)
-        if np.linalg.norm(state.r) <= TOLERANCE * size:
-            reason = "residual within tolerance"
-            break
-        if iterations == STEPS or not np.isfinite(state.r).all():
-            break
-        try:
-            step = linalg.solve(_jacobian(frame, state, amplitude), state.r)
-        except linalg.LinAlgError:
-            reason = "singular Jacobian"
-            break
-        better = _search(frame, x, step, state, amplitude)
-        if better is None:
-            reason = "line search stalled"
-            break
-        x, state = better
-    residual = float(np.linalg.norm(state.r) / np.linalg.norm(state.w))
+    run = iterate_newton(
+        _residual(frame, _start(frame, amplitude, last), amplitude),
+        lambda state: float(np.linalg.norm(state.r) / np.linalg.norm(state.w)),
+        lambda state: _line_search(frame, state, amplitude),
+        TOLERANCE,
+        STEPS,
+    )
+    state = run.state
     return NonlinearMode(
         amplitude,
         frame.mode,
@@ -199,10 +186,10 @@ def _solve(
         state.zeta,
         state.w,
         _probe(frame, state, amplitude),
-        residual <= TOLERANCE,
-        reason,
-        iterations,
-        residual,
+        run.converged,
+        run.reason,
+        run.iterations,
+        run.error,
     )
 
 
@@ -372,22 +359,20 @@ def _flexed(
     return out
 
 
-def _search(
+def _line_search(
     frame: _Frame,
-    x: np.ndarray,
-    step: np.ndarray,
     state: _State,
     amplitude: float,
-) -> tuple[np.ndarray, _State] | None:
-    """The first halving of the step that lowers the residual."""
-    share = 1.0
+) -> _State | None:
+    """The first halving of the Newton step that lowers the residual, or None."""
+    step = linalg.solve(_jacobian(frame, state, amplitude), state.r)
+    x = state.w.ravel()
     before = np.linalg.norm(state.r)
-    while share >= SHORTEST:
-        trial = _residual(frame, x - share * step, amplitude)
-        if np.linalg.norm(trial.r) <= (1 - 1e-4 * share) * before:
-            return x - share * step, trial
-        share /= 2
-    return None
+    return halve_step(
+        lambda share: _residual(frame, x - share * step, amplitude),
+        lambda trial, share: bool(np.linalg.norm(trial.r) <= (1 - 1e-4 * share) * before),
+        SHORTEST,
+    )
 
 
 def _start(

@@ -15,10 +15,11 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..errors import InputError, NotSolvedError
+from ..util.curve_extremum import cubic_minimum, tangents_meet
 from .linear_resonances import free_resonances, stuck_resonances
 from .model import ReducedModel
 from .parameters import check_parameter, parameter_value, path_coordinate, vary
-from .peak import Peak, cubic_minimum, find_peak, with_slope
+from .peak import Peak, find_peak, with_slope
 from .solver.newton import DEFAULTS, Options
 from .sweep import first_look, local_maxima, response, size
 
@@ -368,13 +369,11 @@ def _next_value(
     rise = high.height - low.height
     if not down < 0 <= up:
         return search.moved(low.value, width / 2), np.inf
-    meet = (rise - up) / (down - up)
-    smooth = cubic_minimum(down, up, rise)
-    floor = low.height + smooth * (
-        down + smooth * (3 * rise - 2 * down - up + smooth * (down + up - 2 * rise))
-    )
+    meet, corner = tangents_meet(down, up, rise)
+    smooth, bottom = cubic_minimum(down, up, rise)
+    floor = low.height + bottom
     if 0 < meet < 1:
-        floor = min(floor, low.height + meet * down)
+        floor = min(floor, low.height + corner)
     share = meet if tangents and 0 < meet < 1 else smooth
     return (
         search.moved(low.value, float(np.clip(share, 0.05, 0.95)) * width),

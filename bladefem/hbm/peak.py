@@ -13,6 +13,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from ..errors import NotSolvedError
+from ..util.curve_extremum import cubic_minimum, tangents_meet
 from .model import ReducedModel
 from .parameters import vary
 from .sensitivity import sensitivities
@@ -150,28 +151,11 @@ def _vertex_between(
     down = low.line * width
     up = high.line * width
     rise = high.height**-2 - low.height**-2
-    share = (rise - up) / (down - up) if corner else cubic_minimum(down, up, rise)
-    a = down + up - 2 * rise
-    b = 3 * rise - 2 * down - up
-    bottom = low.height**-2 + share * (down + (0.0 if corner else share * (b + share * a)))
+    share, depth = tangents_meet(down, up, rise) if corner else cubic_minimum(down, up, rise)
+    bottom = low.height**-2 + depth
     gain = max(low.height, high.height) ** -2 / bottom - 1 if bottom > 0 else np.inf
     target = low.solution.omega + float(np.clip(share, 0.02, 0.98)) * width
     return target, float(gain) if width > 1e-9 * target else 0.0
-
-
-def cubic_minimum(
-    down: float,
-    up: float,
-    rise: float,
-) -> float:
-    """Place in [0, 1] of the minimum of the cubic with slopes down < 0 <= up at the ends and this
-    rise between them.
-    """
-    # down x + b x^2 + a x^3
-    a = down + up - 2 * rise
-    b = 3 * rise - 2 * down - up
-    root = np.sqrt(max(b**2 - 3 * a * down, 0.0))
-    return float(np.clip(-down / (b + root), 0.0, 1.0)) if b + root > 0 else 0.5
 
 
 def track_peak(

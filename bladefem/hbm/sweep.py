@@ -12,6 +12,7 @@ from itertools import chain, islice
 import numpy as np
 
 from ..errors import InputError, NotSolvedError
+from ..util.curve_extremum import find_maxima, parabola_at_middle
 from .branches import find_branches
 from .linear_resonances import free_resonances, stuck_resonances
 from .model import ReducedModel
@@ -257,12 +258,8 @@ def _solve_off_resonance(
 
 def local_maxima(points: list[Solution], probe: int = 0) -> list[Solution]:
     """Those of the points, sorted by frequency, that stand above both neighbours."""
-    heights = [size(point, probe) for point in points]
-    return [
-        points[i]
-        for i in range(1, len(points) - 1)
-        if heights[i] >= max(heights[i - 1], heights[i + 1])
-    ]
+    heights = np.array([size(point, probe) for point in points])
+    return [points[i] for i in find_maxima(heights)]
 
 
 def first_look(model: ReducedModel, band: tuple[float, float]) -> np.ndarray:
@@ -316,8 +313,8 @@ def _peak_targets(
     accuracy: tuple[float, float],
 ) -> Iterator[float]:
     peak, curve = accuracy
-    for i in range(1, len(omegas) - 1):
-        if heights[i] >= max(heights[i - 1], heights[i + 1]) and heights[i] > curve * heights.max():
+    for i in find_maxima(heights):
+        if heights[i] > curve * heights.max():
             target = _next_to_peak(
                 omegas[i - 1 : i + 2], heights[i - 1 : i + 2], slope(float(omegas[i])), peak
             )
@@ -340,7 +337,7 @@ def _next_to_peak(
     )
     # of 1/height^2 over that of the middle, with omega^2
     exact = -slope / heights[1] / omegas[1]
-    through = (down * left**2 - up * right**2) / (left * right * (left + right))
+    through, _ = parabola_at_middle(left, right, up, down)
     # sampled friction ripples: the three heights are asked as well
     for tilt in (exact, through):
         bends = (up + tilt * left) / left**2, (down - tilt * right) / right**2

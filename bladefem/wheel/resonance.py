@@ -12,6 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..errors import InputError
+from ..util.curve_extremum import parabola_at_middle
 
 # points added to the first grid before the search is given up
 MOST = 40
@@ -100,10 +101,7 @@ def _next_frequency(w: np.ndarray, a: np.ndarray) -> tuple[float | None, float]:
     is_peak = (a[middle] >= a[:-2]) & (a[middle] >= a[2:])
     left = (w[middle] - w[:-2])[:, None]
     right = (w[2:] - w[middle])[:, None]
-    down = (y[middle] - y[:-2]) / left
-    up = (y[2:] - y[middle]) / right
-    bend = (up - down) / (left + right)
-    slope = (down * right + up * left) / (left + right)
+    slope, bend = parabola_at_middle(left, right, y[:-2] - y[middle], y[2:] - y[middle])
     with np.errstate(divide="ignore", invalid="ignore"):
         step = np.where(bend > 0, -slope / (2 * bend), 0.0)
         # half-way at most: the parabola is the three points' only

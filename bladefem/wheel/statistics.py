@@ -17,6 +17,7 @@ from ..hbm.linear.bodies import modal_flexibility
 from ..hbm.model import ReducedModel
 from ..hbm.solve import solve
 from ..hbm.solver.newton import DEFAULTS, Options
+from ..util.curve_extremum import parabola_minimum
 from ..util.progress import Progress, unwatched
 from .model import Pattern, Wheel
 from .one_body import one_body_model
@@ -146,11 +147,10 @@ def best_load(loads: np.ndarray, heights: np.ndarray) -> tuple[float, float]:
         return float(loads[i]), float(heights[i])
     x = np.log(loads[i - 1 : i + 2])
     y = np.log(heights[i - 1 : i + 2])
-    c = np.polyfit(x - x[1], y, 2)
-    if not c[0] > 0:
+    vertex = parabola_minimum(x, y)
+    if vertex is None:
         return float(loads[i]), float(heights[i])
-    step = float(np.clip(-c[1] / (2 * c[0]), x[0] - x[1], x[2] - x[1]))
-    return float(np.exp(x[1] + step)), float(np.exp(np.polyval(c, step)))
+    return float(np.exp(vertex[0])), float(np.exp(vertex[1]))
 
 
 def peak_of_pattern(

@@ -14,6 +14,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from ...hbm.model import ReducedModel
+from ...util.curve_extremum import parabola_minimum
 from .cpu_clock import Clock
 from .methods import Point
 
@@ -255,17 +256,12 @@ def resonance(omegas: np.ndarray, first: np.ndarray) -> Peak:
     if not 0 < top < len(omegas) - 1 or min(height[top - 1 : top + 2]) == 0:
         return Peak(first, float(height[top]), float(omegas[top] / (2 * np.pi)), False)
     x = omegas[top - 1 : top + 2] ** 2
-    centre = x[1]
-    width = x[2] - x[0]
-    a, b, c = np.polyfit((x - centre) / width, 1 / height[top - 1 : top + 2] ** 2, 2)
-    if a <= 0:
+    vertex = parabola_minimum(x, 1 / height[top - 1 : top + 2] ** 2)
+    if vertex is None:
         return Peak(first, float(height[top]), float(omegas[top] / (2 * np.pi)), True)
-    vertex = -b / (2 * a)
-    low = c - b**2 / (4 * a)
+    place, low = vertex
     amplitude = low**-0.5 if low > 0 else height[top]
-    return Peak(
-        first, float(amplitude), float(np.sqrt(centre + width * vertex) / (2 * np.pi)), True
-    )
+    return Peak(first, float(amplitude), float(np.sqrt(place) / (2 * np.pi)), True)
 
 
 def errors(peak: Peak, truth: Peak) -> dict[str, float]:
