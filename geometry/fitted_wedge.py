@@ -14,6 +14,7 @@ import numpy as np
 
 from bladefem.errors import InputError, suggestion
 
+from .damper_shapes import SHAPES
 from .draw import centres, imprint, polygon
 from .parameters import Wedge
 from .session import attempt
@@ -54,11 +55,16 @@ class Flanks:
         inner, outer = self.ends[flank]
         return np.array([inner, outer, outer + self.along, inner + self.along])
 
-    def section(self, base: float) -> np.ndarray:
-        """(6, 3) corners of the damper's lower end: foot, inner, outer; outer, inner, foot [m]."""
-        drop = -base * self.outward
-        (inner, outer), (inner_next, outer_next) = self.ends
-        return np.array([inner + drop, inner, outer, outer_next, inner_next, inner_next + drop])
+    def section(self, damper: Wedge) -> np.ndarray:
+        """(n, 3) corners of the damper's lower end [m]."""
+        across = np.cross(self.along, self.outward)
+        across /= np.linalg.norm(across)
+        origin = self.ends[:, 0].mean(axis=0)
+        if (self.ends[1, 0] - origin) @ across < 0:
+            across = -across
+        axes = np.column_stack([self.outward, across])
+        outline = SHAPES[damper.shape].outline((self.ends - origin) @ axes, damper.base)
+        return origin + outline @ axes.T
 
 
 def fit_wedge(
@@ -102,7 +108,7 @@ def fit_wedge(
     ]
     with attempt("imported.seats", "cut the seats into the platforms"):
         cut = imprint(gmsh, blade, marks)
-        base, _, _ = polygon(gmsh, flanks.section(wedge.base))
+        base, _, _ = polygon(gmsh, flanks.section(wedge))
         drawn = gmsh.model.occ.extrude([(2, base)], *flanks.along)
     damper = next(tag for dim, tag in drawn if dim == 3)
     gmsh.model.occ.synchronize()

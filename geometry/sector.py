@@ -65,7 +65,7 @@ def wedge_sector(
         marks = [(2, polygon(gmsh, seat(shape, wedge.length, side))[0]) for side in (-1, 1)]
         with attempt("damper.length", "imprint the seats on the platform"):
             blade = imprint(gmsh, blade, marks)
-        damper = prism(gmsh, shape.wedge, -wedge.length / 2, wedge.length / 2)
+        damper = prism(gmsh, shape.damper, -wedge.length / 2, wedge.length / 2)
         clear_leftovers(gmsh)
         gmsh.model.occ.synchronize()
         groups = name_faces(
@@ -174,7 +174,9 @@ def blade_solid(
     occ = gmsh.model.occ
     half = shank.width / 2
     foot = np.sqrt(disc.rim_radius**2 - half**2) - 0.2 * (disc.rim_radius - disc.bore_radius)
-    plate = np.array([shape.inner, shape.outer, shape.corner])
+    right, left = (
+        np.vstack([seat, corner]) for seat, corner in zip(shape.seats, shape.corners, strict=True)
+    )
     neck = np.array(
         [[foot, -half], [shape.underside, -half], [shape.underside, half], [foot, half]]
     )
@@ -182,7 +184,7 @@ def blade_solid(
         prism(gmsh, neck, -shank.length / 2, shank.length / 2),
         prism(
             gmsh,
-            np.vstack([plate, plate[::-1] * [1, -1]]),
+            np.vstack([right, left[::-1]]),
             -platform.length / 2,
             platform.length / 2,
         ),

@@ -25,10 +25,9 @@ def seat(
     side: int,
 ) -> np.ndarray:
     """Corners (4, 3) [m] of the contact face on this blade, side +1 towards +y."""
-    (xi, yi), (xo, yo), z = profile.inner, profile.outer, length / 2
-    return np.array(
-        [[xi, side * yi, -z], [xo, side * yo, -z], [xo, side * yo, z], [xi, side * yi, z]]
-    )
+    inner, outer = profile.seats[0 if side > 0 else 1]
+    z = length / 2
+    return np.array([[*inner, -z], [*outer, -z], [*outer, z], [*inner, z]])
 
 
 def name_faces(
@@ -181,14 +180,25 @@ def moved(
     """The mesh with the damper moved inwards so that both flanks clear their seats by
     wedge.clearance.
     """
-    shift = (
-        -wedge.clearance
-        / sin(wedge.angle)
-        * np.array([np.cos(profile.theta), np.sin(profile.theta), 0])
-    )
+    shift = np.append(clearing_shift(wedge, profile), 0.0)
     points = mesh.points.copy()
     points[np.unique(mesh.bodies["damper"])] += shift
     pairs = {
         n: replace(p, shift=p.shift + shift) if n != "cyclic" else p for n, p in mesh.pairs.items()
     }
     return replace(mesh, points=points, pairs=pairs)
+
+
+def clearing_shift(wedge: Wedge, profile: Profile) -> np.ndarray:
+    """(2,) motion of the damper that opens both flanks by wedge.clearance [m]."""
+    # unit normals of the flanks, out of the damper, in the axes of the radial plane midway
+    normals = np.array(
+        [
+            [np.sin(angle), side * np.cos(angle)]
+            for angle, side in zip(wedge.angles, (-1, 1), strict=True)
+        ]
+    )
+    radial, across = np.linalg.solve(normals, np.full(2, -wedge.clearance))
+    c = np.cos(profile.theta)
+    s = np.sin(profile.theta)
+    return np.array([radial * c - across * s, radial * s + across * c])

@@ -109,7 +109,8 @@ def set_sizes(
     field = gmsh.model.mesh.field
     reach = 4 * sizes.base
     z = wedge.length / 2
-    (x_in, y_in), x_out = profile.inner, profile.outer[0]
+    radii = profile.seats[..., 0]
+    y_in = float(abs(profile.seats[:, 0, 1]).max())
     boxes = [
         _box_field(
             field, sizes.base, sizes.disc, 5 * sizes.base, [profile.underside, 10, -10, 10, -10, 10]
@@ -122,7 +123,7 @@ def set_sizes(
                 sizes.contact,
                 sizes.disc,
                 reach,
-                [min(x_in, x_out) - wedge.base, max(x_in, x_out), low, high, -z, z],
+                [radii.min() - wedge.base, radii.max(), low, high, -z, z],
             )
         )
     boxes += [

@@ -3,9 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from math import atan, tan
+from math import atan
 
-from .fields import value_at
 from .kinds import kind_named
 from .tables import Scene, Seat
 from .units import show
@@ -94,14 +93,16 @@ def _check_history(scene: Scene) -> Iterator[str]:
     mu = min(both)
     if not max(both) > 0:
         yield f"{name}: contact.mu = 0 leaves no friction, expected 'frictionless'"
-    name_of_angle = kind_named(scene.kind).flank_angle
-    if name_of_angle is None:
+    flank_angles = kind_named(scene.kind).flank_angles
+    if flank_angles is None:
         return
-    angle = value_at(scene, name_of_angle)
-    if tan(angle) <= mu:
+    # both reactions may lie on one line, within the friction cone of either seat
+    angle = sum(flank_angles(scene)) / 2
+    limit = (atan(both[0]) + atan(both[1])) / 2
+    if angle <= limit:
         yield (
-            f"{name_of_angle} = {show(angle, 'rad')}: with contact.mu = {mu:g} friction "
-            f"alone holds the damper between its seats (self-locking up to {show(atan(mu), 'rad')})"
+            f"damper.angle = {show(angle, 'rad')}: with contact.mu = {mu:g} friction "
+            f"alone holds the damper between its seats (self-locking up to {show(limit, 'rad')})"
             f", so that {name} does not tell its load; expected a larger angle"
         )
 

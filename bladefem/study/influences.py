@@ -92,11 +92,14 @@ class Influence:
 ChangedCases = Callable[[str, float], Callable[[float], LoadCase]]
 
 
-def parameters_of(scene: Scene, angle: float | None = None) -> list[Parameter]:
+def parameters_of(
+    scene: Scene,
+    angles: tuple[float, float] | None = None,
+) -> list[Parameter]:
     """The parameters that an answer hangs on, with their ranges.
 
     Args:
-        angle: of each flank against the radial plane [rad], where the damper is a wedge.
+        angles: of both flanks against the radial plane [rad], where the damper is a wedge.
     """
     stiffness = GIVEN_STIFFNESS if gives_stiffness(scene.contact) else USUAL_STIFFNESS
     known = "given by the scene" if gives_stiffness(scene.contact) else "measured joints"
@@ -106,19 +109,40 @@ def parameters_of(scene: Scene, angle: float | None = None) -> list[Parameter]:
         Parameter("mu", 1 / FRICTION, FRICTION, "scatter of friction coefficients"),
         Parameter("damping", 1 / DAMPING, DAMPING, "damping without friction"),
     ]
-    ends = None if angle is None else seat_friction_range(scene.contact.mu, angle)
+    ends = None if angles is None else seat_friction_range(scene.contact.mu, angles)
     if ends is not None:
         found.append(Parameter("seat friction", *ends, "friction while seating"))
     return found
 
 
-def seat_friction_range(mu: float, angle: float) -> tuple[float, float] | None:
+def seat_friction_range(mu: float, angles: tuple[float, float]) -> tuple[float, float] | None:
     """Normal load of a seat with friction over that without, for friction either way.
 
-    N = F / (2 (sin a +- mu cos a)) in place of F / (2 sin a); None for a self-locking wedge.
+    Friction turns both reactions by atan(mu). The radial force F on the damper and they are in
+    balance: N_1 = F cos(mu) cos(a_2) / sin(a_1 + a_2) with both angles a larger or smaller by it,
+    which is F / (2 (sin a +- mu cos a)) for equal angles.
+
+    Returns:
+        The least and the largest of both seats; None for a self-locking wedge.
     """
-    holding = mu / np.tan(angle)
-    return None if holding >= 1 else (1 / (1 + holding), 1 / (1 - holding))
+    turn = float(np.arctan(mu))
+    if sum(angles) <= 2 * turn:
+        return None
+    ratios = [
+        np.cos(turn) * _share_of_load(angles, side, way) / _share_of_load(angles, side, 0.0)
+        for side in (0, 1)
+        for way in (turn, -turn)
+    ]
+    return float(min(ratios)), float(max(ratios))
+
+
+def _share_of_load(
+    angles: tuple[float, float],
+    side: int,
+    turn: float,
+) -> float:
+    """Reaction of one seat over the radial force on the damper, turned by an angle [rad]."""
+    return float(np.cos(angles[1 - side] + turn) / np.sin(sum(angles) + 2 * turn))
 
 
 def influences(

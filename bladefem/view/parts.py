@@ -157,30 +157,33 @@ def draw_platform(
     wedge: Wedge,
     file: str | Path | None = None,
 ) -> object:
-    """Two neighbouring platforms and the wedge between them, seen along the engine axis; returns
+    """Two neighbouring platforms and the damper between them, seen along the engine axis; returns
     the figure.
     """
     cut = profile(platform, shank, disc, wedge)
     blade = turned(cut.blade, cut.theta)
-    damper = turned(cut.wedge, cut.theta)
-    foot, inner, outer = damper[:3]
-    corner = turned(cut.corner[None], cut.theta)[0]
+    damper = turned(cut.damper, cut.theta)
+    inner, outer = turned(cut.seats[0], cut.theta)
+    foot = inner - [0, MM * wedge.base]
+    corner = turned(cut.corners[:1], cut.theta)[0]
     with canvas(file, size=(8.4, 5.6)) as ax:
         shape(ax, blade)
-        shape(ax, blade * [-1, 1], NEXT)
+        shape(ax, turned(cut.blade * [1, -1], cut.theta) * [-1, 1], NEXT)
         shape(ax, damper, DAMPER)
         ax.plot([0, 0], [foot[1] - 6, corner[1] + 7], color="#555555", lw=0.8, ls="-.", zorder=3)
-        for side in (-1, 1):
-            ax.plot(*(np.stack([inner, outer]) * [side, 1]).T, color=COLOURS[1], lw=3, zorder=4)
+        next_seat = turned(cut.seats[1] * [1, -1], cut.theta) * [-1, 1]
+        for seat in (np.stack([inner, outer]), next_seat):
+            ax.plot(*seat.T, color=COLOURS[1], lw=3, zorder=4)
         label_platform(ax, platform, shank, wedge, np.stack([foot, inner, outer, corner]))
         span = max(2.6 * abs(inner[0]), 4 * MM * platform.thickness)
         bare(
             ax,
-            "platforms and wedge, seen along the engine axis",
+            "platforms and damper, seen along the engine axis",
             "circumferential, from the gap",
             "radial",
         )
-        ax.set(xlim=(-span, span), ylim=(foot[1] - 8, corner[1] + 8))
+        low = min(foot[1], damper[:, 1].min())
+        ax.set(xlim=(-span, span), ylim=(low - 8, corner[1] + 8))
         return ax.figure
 
 
@@ -199,15 +202,24 @@ def label_platform(
     length(ax, corner, corner * mirror, said(platform, "gap"), 3.0)
     length(ax, inner, outer, said(platform, "seat_width"), 2.0)
     length(ax, corner * mirror, outer * mirror, said(platform, "thickness"), 2.5)
-    length(ax, foot * mirror, inner * mirror, said(wedge, "base"), -2.5)
+    if wedge.shape == "wedge":
+        length(ax, foot * mirror, inner * mirror, said(wedge, "base"), -2.5)
     apex = np.array([0.0, inner[1] - inner[0] / np.tan(wedge.angle)])
     angle(
         ax,
         apex,
+        -np.pi / 2 - wedge.angle,
         -np.pi / 2,
-        wedge.angle - np.pi / 2,
         0.75 * (apex[1] - inner[1]),
         said(wedge, "angle"),
+    )
+    angle(
+        ax,
+        apex,
+        -np.pi / 2,
+        wedge.angles[1] - np.pi / 2,
+        0.6 * (apex[1] - inner[1]),
+        "angle_next" if wedge.angle_next is None else said(wedge, "angle_next"),
     )
     note(
         ax,
@@ -217,7 +229,8 @@ def label_platform(
     )
     note(ax, 0.3 * inner + 0.7 * outer, "seat_right of this blade\non damper_left", (-70, 28))
     low = foot * [-0.3, 1] + [0, 0.6]
-    note(ax, low, f"wedge damper\n{said(wedge, 'length')}, {said(wedge, 'clearance')}", (20, -44))
+    words = f"damper, shape {wedge.shape}\n{said(wedge, 'length')}, {said(wedge, 'clearance')}"
+    note(ax, low, words, (20, -44))
     note(
         ax,
         inner * [4, 1] - [0, 4],
@@ -268,7 +281,7 @@ def draw_front(
     """Along the engine axis."""
     shape(ax, ring(disc.bore_radius, disc.rim_radius, cut.theta))
     shape(ax, MM * cut.blade[:, ::-1])
-    shape(ax, MM * cut.wedge[:, ::-1], DAMPER)
+    shape(ax, MM * cut.damper[:, ::-1], DAMPER)
     width = [np.ptp(plane_section(aerofoil, t)[0][:, 1]) / 2 for t in (0.0, 1.0)]
     top = MM * cut.top
     tip = MM * (cut.top + aerofoil.span)

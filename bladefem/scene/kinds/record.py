@@ -84,8 +84,8 @@ class Kind:
     is_plane: bool = False
     # field with the number of blades of the wheel
     sectors: str | None = None
-    # field with the angle of each flank against the radial plane between two blades
-    flank_angle: str | None = None
+    # angles [rad] of both flanks against the radial plane between two blades
+    flank_angles: Callable[[Scene], tuple[float, float]] | None = None
     # damper.clearance is a gap of the mesh already
     clearance_is_meshed: bool = True
     # why a load of zero is refused

@@ -58,7 +58,7 @@ def conditions(scene: Scene) -> Iterator[str]:
     yield from at_most(
         "platform.seat_width",
         platform.seat_width,
-        max(overhang, 0) / sin(damper.angle),
+        max(overhang, 0) / sin(max(damper.angles)),
         "what the overhang of the platform beside the shank leaves at damper.angle",
     )
     yield from at_most(
@@ -93,6 +93,11 @@ def outer_radii(scene: Scene) -> dict[str, float]:
     return {"rim": rim, "tip": rim + scene.shank.height + scene.aerofoil.span}
 
 
+def flank_angles(scene: Scene) -> tuple[float, float]:
+    """Under this blade and under the next one [rad]."""
+    return scene.damper.angles
+
+
 def face_names(scene: Scene) -> tuple[str, ...]:
     """Faces and node sets of the blade; the fillet is a face where it has a radius."""
     return (*FACES, "fillet") if scene.aerofoil.fillet > 0 else FACES
@@ -108,7 +113,7 @@ KIND = Kind(
     result="forced responses",
     has_seat_grid=True,
     sectors="disc.sectors",
-    flank_angle="damper.angle",
+    flank_angles=flank_angles,
     check=SceneCall("geometry.sector_check:check_sector", SHAPE),
     cells=SceneCall("geometry.sizing:count_sector_cells", (*SHAPE, "mesh")),
     face_names=face_names,

@@ -27,7 +27,6 @@ from ...data import ModeSet, Patch, PressureMap
 from ...errors import InputError, NotSolvedError
 from ...io.stage_cache import found_remark, on_root, stage
 from ...reduction.truncate import truncated
-from ...scene.fields import value_at
 from ...scene.kinds import kind_named
 from ...scene.tables import Scene
 from ...scene.units import show
@@ -519,9 +518,9 @@ def _influences(
     changed = changed_cases(scene, contact.problem, mesh.dimension - 1, lowest.mass, contact.rough)
     # a history of the seating has its friction already
     frictionless = scene.contact.history == FRICTIONLESS
-    name = kind_named(scene.kind).flank_angle
-    angle = value_at(scene, name) if name is not None and frictionless else None
-    parameters = parameters_of(scene, angle)
+    flank_angles = kind_named(scene.kind).flank_angles
+    angles = flank_angles(scene) if flank_angles is not None and frictionless else None
+    parameters = parameters_of(scene, angles)
 
     def compute() -> list[Influence]:
         return on_root(keep.comm, lambda: influences(scene, lowest, family, changed, parameters))
