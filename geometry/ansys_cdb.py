@@ -1,8 +1,8 @@
 """Reader of Ansys .cdb archives (CDWRITE, blocked) by mapdl-archive: nodes, solid elements, node
 and element components.
 
-Solids are told apart by their number of nodes and by repeated ones (element reference, SOLID185 and
-SOLID186: wedges, pyramids and tetrahedra are hexahedra with repeated nodes).
+Solids are distinguished by their number of nodes and by repeated ones (element reference, SOLID185
+and SOLID186: wedges, pyramids and tetrahedra are hexahedra with repeated nodes).
 """
 
 from __future__ import annotations

@@ -34,7 +34,7 @@ ROUNDOFF = 1e-6
 WHOLE = 0.01
 MOST_SECTORS = 400
 # names that a task needs, and what they are for
-# what a scene says beside a STEP file
+# what a scene says in addition to a STEP file
 DRAWN = (
     "imported.sectors = number of blades: cut faces and bore are then found by themselves",
     "imported.names, such as 'tip = face_21', for the face of excitation.at",

@@ -89,7 +89,7 @@ def check_plane(plane: Plane) -> None:
     if not plane.seat_width <= room:
         raise InputError(
             f"plane.seat_width = {plane.seat_width:.4g} m: expected at most {room:.4g} m (98 % of "
-            "the platform's overhang beside the blade)"
+            "the platform's overhang next to the blade)"
         )
 
 

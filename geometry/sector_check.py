@@ -102,7 +102,7 @@ def check_platform(
     shank: Shank,
     wedge: Wedge,
 ) -> None:
-    """The plate fits into the pitch and holds the seat beside the shank."""
+    """The plate fits into the pitch and holds the seat next to the shank."""
     half = section.corners[0, 1] + platform.gap / 2
     _at_most("platform.gap", platform.gap, half, "half the pitch at the platform")
     room = np.abs(section.seats[:, 1, 1]).min() - shank.width / 2
@@ -111,7 +111,8 @@ def check_platform(
         "platform.seat_width",
         platform.seat_width,
         max(0.98 * room / needed, 0) * platform.seat_width,
-        "the platform's overhang beside the shank; or choose a smaller shank.width or damper.angle",
+        "the platform's overhang next to the shank; or choose a smaller shank.width or "
+        "damper.angle",
     )
     _no_strip("damper.length", wedge.length, "platform.length", platform.length)
 

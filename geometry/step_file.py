@@ -173,7 +173,7 @@ def _import_shapes(
 
 
 def _named_entities(gmsh: ModuleType, text: str) -> Named:
-    """(dimension, name) -> entities, by the names in the file where they can be told apart."""
+    """(dimension, name) -> entities, by the names in the file where they can be distinguished."""
     named: dict[tuple[int, str], list[int]] = {}
     solids = _written_names(text)
     volumes = [tag for _, tag in gmsh.model.getEntities(3)]

@@ -132,7 +132,7 @@ def report(options: argparse.Namespace, comm: Any) -> None:
 
 
 def refuse_pdf(options: argparse.Namespace) -> None:
-    """A missing browser is told before long work."""
+    """A missing browser is reported before long work."""
     from ..report.pdf import require_browser
 
     if options.pdf:

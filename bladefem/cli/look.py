@@ -24,7 +24,7 @@ def add_look(sub: argparse.ArgumentParser) -> None:
         metavar="TOML",
         nargs="?",
         const="",
-        help="write a scene to start from (default: beside the mesh file)",
+        help="write a scene to start from (default: next to the mesh file)",
     )
 
 

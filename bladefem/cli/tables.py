@@ -75,12 +75,12 @@ def reduction(reduced: Any) -> str:
         for n, body in reduced.sector.items()
     ]
     return plain(
-        [*rows, row("damper", reduced.damper)], ["body", "modes", "highest [Hz]", "port freedoms"]
+        [*rows, row("damper", reduced.damper)], ["body", "modes", "highest [Hz]", "port dofs"]
     )
 
 
 def survey(found: Any) -> str:
-    """Frequencies, and the short tables of what was asked for beside them."""
+    """Frequencies, and the short tables of what was asked for in addition."""
     parts = [frequencies(found.run.modes)]
     if found.campbell is not None:
         rows = [

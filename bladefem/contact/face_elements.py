@@ -107,7 +107,7 @@ def _tensor_product(
     order: np.ndarray,
     x: np.ndarray,
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Products of one-dimensional functions; order (k, 2) tells which pair each node takes."""
+    """Products of one-dimensional functions; order (k, 2) is the pair that each node takes."""
     (A, dA), (B, dB) = values(x[:, :1]), values(x[:, 1:])
     i, j = order.T
     N = A[:, i] * B[:, j]

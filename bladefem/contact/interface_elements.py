@@ -17,11 +17,11 @@ from ..scene.tables import Contact, Material, Seat
 from .interface_law import InterfaceLaw, rigid_faces, stiffness_at
 from .seating import ContactProblem
 
-# stiffness for each unit of area that stands for rigid faces in the elements [N/m^3]: a layer of
+# stiffness per unit area that stands for rigid faces in the elements [N/m^3]: a layer of
 # 1e-8 of the compliance of steel over a millimetre
 RIGID = 1e22
 
-# tangential stiffness for each unit of area where the scene tells none [N/m^3]
+# tangential stiffness per unit area where the scene gives none [N/m^3]
 USUAL = 4e10
 
 

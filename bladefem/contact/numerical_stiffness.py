@@ -53,7 +53,7 @@ def split_stiffness(
     Args:
         elements: of ``friction_elements``.
         maps: static pressure of each patch.
-        areal: numerical stiffness for each unit of area [N/m^3].
+        areal: numerical stiffness per unit area [N/m^3].
 
     Returns:
         The elements, which rest in the same state, and (n, 1 + tangents) compliances [m/N], not

@@ -105,7 +105,7 @@ def patch_faces(mesh: Mesh, pair: str) -> tuple[np.ndarray, np.ndarray]:
 
 
 def normal_ports(patches: Sequence[Patch], mesh: Mesh) -> np.ndarray:
-    """Numbers of the normal freedoms among the ports of port_matrix, (sum of nodes,)."""
+    """Numbers of the normal degrees of freedom among the ports of port_matrix, (sum of nodes,)."""
     return np.arange(sum(len(p.area) for p in patches)) * mesh.dimension
 
 

@@ -160,8 +160,8 @@ def equivalent(
 ) -> np.ndarray:
     """Complex stiffness (H, n) with force = stiffness * u in the best sense [N/m].
 
-    Averaged: K_ad + i h w C_ad of Eq. 16, with the factor k that the printed C lacks. Otherwise
-    each harmonic gets its own quotient. Nodes that do not move get zero.
+    Averaged: K_ad + i h w C_ad of Eq. 16, with the factor k that is missing in the printed C.
+    Otherwise each harmonic gets its own quotient. Nodes that do not move get zero.
     """
     mean = np.zeros((1, u.shape[1]))
     u, force = (to_real(np.vstack([mean, x]).T) for x in (u, force))

@@ -40,9 +40,9 @@ try:
 except ModuleNotFoundError:
     raise
 except (ImportError, AttributeError, RuntimeError) as error:
-    # a compiled module beside a numpy that it was not compiled for
+    # a compiled module next to a numpy that it was not compiled for
     raise InputError(
-        f"dolfinx cannot be loaded beside numpy {np.__version__} "
+        f"dolfinx cannot be loaded with numpy {np.__version__} "
         f"({str(error).strip().splitlines()[0] if str(error).strip() else type(error).__name__}); "
         "expected the numpy that it was compiled with, on Debian 12: pip install "
         "'bladefem[run,debian12]'"

@@ -217,7 +217,9 @@ def _rough_pairs(
     X: np.ndarray,
     count: int,
 ) -> tuple[np.ndarray, np.ndarray]:
-    """What the space of the iteration holds beside the converged vectors, by Rayleigh and Ritz."""
+    """What the space of the iteration holds in addition to the converged vectors, by Rayleigh and
+    Ritz.
+    """
     con = pencil.con
     MX = apply(con.M, X)
     basis = np.asfortranarray(np.hstack(pencil.known))

@@ -1,9 +1,9 @@
 """The static flexibility K^+ of a constrained body, also where the body can still move rigidly.
 
 Rigid motions R (M-orthonormal) are found exactly from geometry. A floating body is propped by
-springs at as many freedoms as it has rigid motions: loads without a resultant leave such a
-statically determinate support without force, so for them (K + C)^-1 is exact whatever the stiffness
-of the springs.
+springs at as many degrees of freedom as it has rigid motions: loads without a resultant leave such
+a statically determinate support without force, so for them (K + C)^-1 is exact whatever the
+stiffness of the springs.
 """
 
 from __future__ import annotations
@@ -116,7 +116,7 @@ def _place_springs(
     R: np.ndarray,
     prop: float,
 ) -> np.ndarray:
-    """(n_own,) springs at the freedoms that hold the rigid motions best (pivoted QR)."""
+    """(n_own,) springs at the degrees of freedom that hold the rigid motions best (pivoted QR)."""
     everywhere = unknowns(con, R)
     allowed = dense_rows(con.K, len(everywhere))
     places = allowed[qr(everywhere[allowed].conj().T, mode="r", pivoting=True)[1][: R.shape[1]]]

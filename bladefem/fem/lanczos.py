@@ -103,8 +103,8 @@ def orthonormal(
     + Q R.
 
     Args:
-        size: M-norm of what W was taken from. Directions that are rounding beside it are dropped,
-            so that Q may have fewer columns than W.
+        size: M-norm of what W was taken from. Directions that are rounding compared with it are
+            dropped, so that Q may have fewer columns than W.
     """
     comm = con.body.comm
     W, MW, R, spread = _orthogonal_factor(comm, W, apply(con.M, W), 1e-26, size**2)

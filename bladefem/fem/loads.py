@@ -65,7 +65,7 @@ def surface_load(
     """(n_points*dim,) consistent nodal forces [N] on a named face.
 
     Args:
-        traction: (dim,) force for each unit of area [Pa].
+        traction: (dim,) force per unit area [Pa].
         pressure: [Pa], positive towards the body.
 
     Raises:

@@ -4,7 +4,7 @@ Where contacts lift off, several motions exist at one frequency, and a sweep see
 the response is followed from both ends of the band, and from every known motion that lies on none
 of the paths so far. Each path is cut at its folds into pieces along which the frequency keeps its
 direction; a local maximum along a path is closed in on the path itself, so that it may lie right
-beside a fold. (Krack and Gross, Harmonic Balance for Nonlinear Vibration Problems, 2019, Sect. 4.)
+next to a fold. (Krack and Gross, Harmonic Balance for Nonlinear Vibration Problems, 2019, Sect. 4.)
 """
 
 from __future__ import annotations
@@ -33,7 +33,7 @@ FINE = 1e-4
 EFFORT = 3e5
 FEWEST = 300
 MOST = 1500
-# paths of a band beside those from its ends
+# paths of a band in addition to those from its ends
 MOST_PATHS = 6
 # relative distance of displacements up to which a motion lies on a path, between two of its points
 SAME = 0.03

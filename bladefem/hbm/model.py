@@ -64,8 +64,8 @@ class ReducedModel:
     # the preload state, whose static solution is left as it is; mean forces that friction raises
     # are reported and do not act back.
     coupled: bool = True
-    # Prescribed part of the normal load beside n0 and kn w_n: harmonic >= 1 to complex amplitudes
-    # of the nodes [N].
+    # Prescribed part of the normal load in addition to n0 and kn w_n: harmonic >= 1 to complex
+    # amplitudes of the nodes [N].
     normal: Mapping[int, np.ndarray] = field(default_factory=dict)
     # (nodes, 1 + tangents) compliance of stiff interface layers that the residual flexibility of
     # the sides already has [m/N] (contact.numerical_stiffness); None: the elements have it all

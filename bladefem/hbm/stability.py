@@ -4,7 +4,7 @@ model.
 Where normal loads are prescribed and the bodies damped there is one periodic motion, and every
 other one decays to it (the friction law is then monotone). Elsewhere the linearised motion is
 carried through one period along the solution (`bladefem.hbm.linearised_flow`): the largest modulus
-of its multipliers tells how much of a disturbance is left after a period. Nodes that stick
+of its multipliers shows how much of a disturbance is left after a period. Nodes that stick
 throughout only add constant multipliers of one, the mean force that stick leaves open, and are
 condensed into the bodies. Travelling waves are judged against all disturbances that repeat after
 the same number of blades as they do.

@@ -28,7 +28,7 @@ from .validate_model import check_point, check_probe
 Keep = Callable[[float, Callable[[], Solution]], Solution]
 # of the height with the frequency, at a solved one
 Slope = Callable[[float], float]
-# of a frequency: how far beside a resonance without damping a sweep solves, where it hits it
+# of a frequency: how far next to a resonance without damping a sweep solves, where it hits it
 # exactly
 OFF_RESONANCE = 1e-7
 # the same for the first look at a model without damping, whose flexibility stuck is all rounding
@@ -59,7 +59,7 @@ def response(
 ) -> Iterator[Solution]:
     """Solve one point after the other, each started from the curve through the last ones.
 
-    Where a resonance without damping is hit exactly, the point 1e-7 beside it is solved, as its
+    Where a resonance without damping is hit exactly, the point 1e-7 next to it is solved, as its
     `omega` says.
 
     Args:
@@ -228,7 +228,7 @@ def solve_from(
     """The point from the first of several neighbours that leads to it, before fallbacks, which take
     far longer.
 
-    Beside a fold of the curve only the neighbour on its other side does.
+    Next to a fold of the curve only the neighbour on its other side does.
     """
     simply = replace(options, fallbacks=False)
     tries = (
@@ -249,7 +249,7 @@ def _solve_off_resonance(
     start: Solution | None,
     options: Options,
 ) -> Solution:
-    """The point, or the one a hair beside it."""
+    """The point, or the one just next to it."""
     try:
         return solve(model, omega, H, samples, start=start, options=options)
     except NotSolvedError:

@@ -27,7 +27,7 @@ from .solver.residual import contact_forces
 
 # for each harmonic
 INSTANTS_PER_HARMONIC = 4
-# of a frequency: how far beside it bodies are looked at, which without damping may be hit exactly
+# of a frequency: how far next to it bodies are looked at, which without damping may be hit exactly
 OFF_RESONANCE = 1e-7
 
 

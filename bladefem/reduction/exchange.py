@@ -71,9 +71,9 @@ def read_ansys(path: str | Path) -> dict[str, np.ndarray]:
     """K and M of an Ansys ``.full`` file, dense, and "dofs" (n, 2): node and degree of freedom of
     each row.
 
-    Constrained freedoms, whose rows are empty, are left out. Ansys' own library reads the file (pip
-    install ansys-mapdl-reader); it has no reader for ``.sub``: write the generation pass as
-    ``.full``, or as DMIG or Matrix Market.
+    Constrained degrees of freedom, whose rows are empty, are left out. Ansys' own library reads the
+    file (pip install ansys-mapdl-reader); it has no reader for ``.sub``: write the generation pass
+    as ``.full``, or as DMIG or Matrix Market.
 
     Raises:
         InputError: the library is not installed.

@@ -152,7 +152,7 @@ def _mass_text(
 
 
 def _spacing_text(best: pd.Series, points: pd.DataFrame | None) -> str:
-    """Half the distance of the points beside the highest one."""
+    """Half the distance of the points next to the highest one."""
     if points is None or points.empty:
         return "no estimate"
     curve = points[points["load"] == best["load"]]

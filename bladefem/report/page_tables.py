@@ -11,7 +11,7 @@ import pandas as pd
 ROUNDOFF = 1e-12
 # columns of a vector that share their scale
 VECTORS = ("force", "moment", "centre")
-# table: names of its parts on the page and their columns, where all do not fit beside each other
+# table: names of its parts on the page and their columns, where all do not fit next to each other
 COLUMNS = {
     "contact/pressure": {
         "contact/pressure": (

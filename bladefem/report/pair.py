@@ -1,4 +1,4 @@
-"""The run folder of a verification pair, kinds "hertz" and "punch": pressures beside their closed
+"""The run folder of a verification pair, kinds "hertz" and "punch": pressures next to their closed
 forms.
 """
 

@@ -62,7 +62,7 @@ LEADS = (
 
 @dataclass(frozen=True)
 class Page:
-    """What a command adds to its report beside tables and pictures."""
+    """What a command adds to its report besides tables and pictures."""
 
     # caption-less figures of plotly.js or shapes, by the name of the picture that they replace
     live: Mapping[str, dict[str, Any]] | None = None

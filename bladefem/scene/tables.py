@@ -69,12 +69,10 @@ class Seat:
         None, "1", 0.0, 2.0, "friction coefficient of this seat; contact.mu when left out"
     )
     kt_area: float | None = quantity(
-        None, "N/m^3", 1.0, 1e15, "its tangential stiffness for each unit of area"
+        None, "N/m^3", 1.0, 1e15, "its tangential stiffness per unit area"
     )
     kt: float | None = quantity(None, "N/m", 1.0, 1e12, "its whole tangential stiffness")
-    kn_area: float | None = quantity(
-        None, "N/m^3", 1.0, 1e15, "its normal stiffness for each unit of area"
-    )
+    kn_area: float | None = quantity(None, "N/m^3", 1.0, 1e15, "its normal stiffness per unit area")
     kn: float | None = quantity(None, "N/m", 1.0, 1e12, "its whole normal stiffness")
 
 
@@ -90,7 +88,7 @@ class Contact:
         "N/m^3",
         1.0,
         1e15,
-        "tangential contact stiffness for each unit of area; by Mindlin from the normal one, 40 "
+        "tangential contact stiffness per unit area; by Mindlin from the normal one, 40 "
         "N/mm^3 without either",
     )
     kt: float | None = quantity(None, "N/m", 1.0, 1e12, "tangential stiffness of one whole patch")
@@ -99,7 +97,7 @@ class Contact:
         "N/m^3",
         1.0,
         1e15,
-        "normal contact stiffness for each unit of area; by Mindlin from the tangential",
+        "normal contact stiffness per unit area; by Mindlin from the tangential",
     )
     kn: float | None = quantity(None, "N/m", 1.0, 1e12, "normal stiffness of one whole patch")
     stiffness: str = quantity(
@@ -316,7 +314,7 @@ class Support:
     )
     springs: tuple[str, ...] | None = quantity(
         None,
-        help="springs to the ground for each unit of area of faces, such as "
+        help="springs to the ground per unit area of faces, such as "
         "'root: normal=1e12 N/m^3; tangential=5e11 N/m^3'",
     )
     directions: tuple[str, ...] | None = quantity(

@@ -190,7 +190,7 @@ def _build_table(
 
 
 def _refuse_unknown(name: str, value: object) -> None:
-    """An unknown table is told apart from an unknown key."""
+    """An unknown table is distinguished from an unknown key."""
     if isinstance(value, dict):
         tables = {f.name.rsplit(".", 1)[0] for f in each_field() if "." in f.name}
         raise InputError(f"unknown table [{name}]{suggestion(name, {*tables, 'material'})}")
@@ -270,8 +270,8 @@ def _toml_value(value: Any, field: Field) -> str:
 
 
 def _nearby_scenes(path: Path) -> str:
-    """The scene of a name like that, in its folder or among the examples beside it; else the scenes
-    that there are.
+    """The scene of a name like that, in its folder or among the examples next to it; else the
+    scenes that there are.
     """
     folders = [folder for folder in (path.parent, path.parent / "scenes") if folder.is_dir()]
     others = {

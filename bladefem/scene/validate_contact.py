@@ -33,7 +33,7 @@ def contact_problems(scene: Scene) -> Iterator[str]:
     if shaped and contact.bedded:
         yield (
             f"contact.{shaped[0]} = {show(getattr(contact, shaped[0]), 'm')}: bedded seats have "
-            "lost their shape by wear, expected contact.bedded = false beside it"
+            "lost their shape by wear, expected contact.bedded = false with it"
         )
     if contact.crown is not None and kind_named(scene.kind).is_plane:
         yield (
@@ -43,13 +43,13 @@ def contact_problems(scene: Scene) -> Iterator[str]:
     if (contact.edge_radius is None) != (contact.edge_width is None):
         missing = "edge_width" if contact.edge_width is None else "edge_radius"
         yield (
-            f"contact.{missing}: expected beside "
+            f"contact.{missing}: expected together with "
             f"contact.{'edge_radius' if missing == 'edge_width' else 'edge_width'}"
         )
 
 
 def _without_layer(scene: Scene) -> Iterator[str]:
-    """Fields of an interface layer beside faces that have none."""
+    """Fields of an interface layer given for faces that have none."""
     contact = scene.contact
     sides = {"contact.left": contact.left, "contact.right": contact.right}
     if contact.stiffness == "rigid":
@@ -63,7 +63,7 @@ def _without_layer(scene: Scene) -> Iterator[str]:
     if contact.stiffness != "given" and contact.stiffening is not None:
         yield (
             f"contact.stiffening: contact.stiffness = '{contact.stiffness}' has no layer that "
-            "could stiffen, expected contact.stiffness = 'given' beside it"
+            "could stiffen, expected contact.stiffness = 'given' with it"
         )
 
 

@@ -47,7 +47,7 @@ DAMPING = 2.0
 STEP = 2e-3
 # share of the frequency on each side of a peak over which its curvature is measured
 BESIDE = 5e-4
-# most harmonics and contact points of a seat in the model that tells changes
+# most harmonics and contact points of a seat in the model that estimates changes
 COARSE = {"harmonics": 3, "points": 8}
 # parameters that are solved again at the ends of their ranges
 CHECKED = 2
@@ -154,7 +154,7 @@ def influences(
 ) -> list[Influence]:
     """The influence of each parameter, the largest on the amplitude first.
 
-    Where harmonics and contact points were chosen, a model of at most COARSE of them tells the
+    Where harmonics and contact points were chosen, a model of at most COARSE of them gives the
     changes, relative to its own best load.
 
     Args:

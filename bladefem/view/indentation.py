@@ -1,4 +1,4 @@
-"""Pressure between a verification pair: seen from above, and over the radius beside its closed
+"""Pressure between a verification pair: seen from above, and over the radius next to its closed
 form.
 """
 

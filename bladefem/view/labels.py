@@ -1,4 +1,4 @@
-"""Names beside points that cover neither one another nor the points."""
+"""Names next to points that cover neither one another nor the points."""
 
 from __future__ import annotations
 
@@ -22,8 +22,8 @@ PLACES = (
 
 
 def names_apart(*axes: Any) -> None:
-    """Give each annotation of finished axes a free place beside its point, first come first served;
-    drop the others.
+    """Give each annotation of finished axes a free place next to its point, first come first
+    served; drop the others.
 
     Args:
         axes: of one figure; it is laid out once for all of them, which is what takes time.

@@ -358,12 +358,12 @@ def draw_mesh(
         return axes[0].figure
 
 
-# names beside a picture in ordinary size; CAD files have more
+# names next to a picture in ordinary size; CAD files have more
 FEW_NAMES = 20
 
 
 def draw_legend(ax: object, mesh: Mesh) -> None:
-    """Names and sizes beside the picture."""
+    """Names and sizes next to the picture."""
     colours = label_colours(mesh)
     counts = [len(c) for c in (*mesh.bodies.values(), *mesh.faces.values())]
     names = (*mesh.bodies, *mesh.faces)

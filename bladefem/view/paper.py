@@ -1,4 +1,6 @@
-"""Pictures to lay beside those of the paper: loops, spectra, responses, resonance against load."""
+"""Pictures to compare with those of the paper: loops, spectra, responses, resonance against
+load.
+"""
 
 from __future__ import annotations
 

@@ -125,8 +125,8 @@ def name_lines(
     top: float,
     names: list[tuple[float, str, str]],
 ) -> None:
-    """Names beside the right ends of lines, moved apart where they would overlap; a thin line leads
-    to a moved one.
+    """Names next to the right ends of lines, moved apart where they would overlap; a thin line
+    leads to a moved one.
     """
     names = sorted(names)
     places = spread(np.array([height for height, _, _ in names]), 0.03 * top)

@@ -21,7 +21,7 @@ def draw_study(
     label: str = "value",
     title: str = "",
 ) -> object:
-    """Resonance amplitude and frequency at the best load over the value, and beside it all loads;
+    """Resonance amplitude and frequency at the best load over the value, and next to it all loads;
     returns the figure.
 
     Args:

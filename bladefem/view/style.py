@@ -235,7 +235,7 @@ def size_for(
     beside: float = 0.3,
     widest: float = 9.0,
 ) -> tuple[float, float]:
-    """Figure size [inch] for a rendering about ``height`` tall, with room beside it and a line
+    """Figure size [inch] for a rendering about ``height`` tall, with room next to it and a line
     above and below.
     """
     rows, columns = image.shape[:2]

@@ -16,7 +16,7 @@ from ..util.curve_extremum import parabola_at_middle
 
 # points added to the first grid before the search is given up
 MOST = 40
-# points closer than this are not told apart, relative
+# points closer than this are not distinguished, relative
 NEAR = 1e-7
 
 # amplitudes (N,) of the blades at a circular frequency, NaN where it was not solved

@@ -120,7 +120,7 @@ def test_what_does_not_fit_is_refused(step, seats, wedge, width, said):
 @pytest.mark.parametrize(
     ("changes", "said"),
     [
-        ({"seat_width": "5 mm"}, "expected beside imported.seats"),
+        ({"seat_width": "5 mm"}, "expected together with imported.seats"),
         ({"seats": ["a", "b"]}, "imported.sectors = 0: expected the number of blades"),
         ({"seats": ["a"], "sectors": 36}, "expected 2 values"),
     ],

@@ -50,7 +50,9 @@ def _seat_conditions(scene: Scene) -> Iterator[str]:
     imported = scene.imported
     if imported.seats is None:
         if imported.seat_width is not None:
-            yield "imported.seat_width: expected beside imported.seats, the faces of the seats"
+            yield (
+                "imported.seat_width: expected together with imported.seats, the faces of the seats"
+            )
         return
     if not is_drawing(scene):
         yield (
@@ -59,7 +61,7 @@ def _seat_conditions(scene: Scene) -> Iterator[str]:
         )
     if imported.sectors < 3:
         yield (
-            f"imported.sectors = {imported.sectors}: expected the number of blades beside "
+            f"imported.sectors = {imported.sectors}: expected the number of blades together with "
             "imported.seats, since the damper sits between two of them"
         )
     if scene.damper.clearance != 0:

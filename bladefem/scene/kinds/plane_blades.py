@@ -31,7 +31,7 @@ def conditions(scene: Scene) -> Iterator[str]:
         "plane.seat_width",
         plane.seat_width,
         (plane.platform_width - plane.thickness) / 2,
-        "the overhang of the platform beside the blade",
+        "the overhang of the platform next to the blade",
     )
     yield from below(
         "plane.platform_height",

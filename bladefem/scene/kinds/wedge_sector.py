@@ -59,7 +59,7 @@ def conditions(scene: Scene) -> Iterator[str]:
         "platform.seat_width",
         platform.seat_width,
         max(overhang, 0) / sin(max(damper.angles)),
-        "what the overhang of the platform beside the shank leaves at damper.angle",
+        "what the overhang of the platform next to the shank leaves at damper.angle",
     )
     yield from at_most(
         "damper.length", damper.length, platform.length, "platform.length, under which it sits"

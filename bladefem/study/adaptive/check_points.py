@@ -18,7 +18,7 @@ from .family import Family, member
 from .indicators import richer
 from .settings import Settings
 
-# of the peak's height: where a curve is checked on each side beside the peak itself
+# of the peak's height: where a curve is checked on each side in addition to the peak itself
 SHARES = (0.7, 0.25)
 # points that are checked because left-out harmonics move much there,
 LOUDEST = 3

@@ -27,7 +27,7 @@ PASSES = 16
 # accuracy that the first sweep is made for where contacts may lift off
 COARSE = 0.02
 TINY = float(np.finfo(float).tiny)
-# neighbours for which a point that is less wrong than foretold speaks, and how much at most
+# neighbours for which a point that is less wrong than predicted speaks, and how much at most
 NEAR = 3
 LEAST = 0.25
 # times the tolerated error that two steps of harmonics change, where one of them leaves half of it
@@ -167,8 +167,8 @@ def _first(
 
 
 def _judged(curve: _Curve) -> Iterator[int]:
-    """Numbers of the points whose error is told: those that are watched, the peak first, then
-    others that tell it.
+    """Numbers of the points whose error is estimated: those that are watched, the peak first, then
+    others that show it.
     """
     places = {p.omega: i for i, p in enumerate(curve.points)}
     for point in watched(curve.points, curve.heights, curve.moved, curve.accuracy):
@@ -183,7 +183,7 @@ def _judged(curve: _Curve) -> Iterator[int]:
 
 
 def _confirm(curve: _Curve, i: int) -> None:
-    """Judge a point that was foretold to be too wrong.
+    """Judge a point that was predicted to be too wrong.
 
     Where it is more wrong than that, so are all the others of the same settings; less goes for its
     neighbours only: an error that changes its sign along the curve vanishes somewhere.
@@ -212,7 +212,7 @@ def _raise(
     """Solve a point with better settings, and its neighbours of the same settings as far as that
     changes them.
 
-    Where two steps of the harmonics at once are a matter of few points, one does beside them.
+    Where two steps of the harmonics at once are a matter of few points, one does next to them.
     """
     old = curve.used[at]
     limit = curve.limit

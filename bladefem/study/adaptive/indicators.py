@@ -1,13 +1,13 @@
-"""How wrong is a solved point? The same point in a richer model tells, for each choice that was
+"""How wrong is a solved point? The same point in a richer model shows it, for each choice that was
 made.
 
 eta_d = |T_d - T| / |T_d|, where T is the first harmonic at the probe and T_d the same in the model
 enriched in direction d, solved from the point that is judged: a step or two where the contacts stay
-closed. One Newton step alone overshoots with lift-off (16 % told for 0.4 % on the wedge of 46
+closed. One Newton step alone overshoots with lift-off (16 % estimated for 0.4 % on the wedge of 46
 nodes).
 
 Modes are doubled and samples taken four times; 1 and 3 harmonics are compared with 7 and 15
-(against 3 and 7 an internal resonance of a higher harmonic was missed, told 2.5e-4 for a true
+(against 3 and 7 an internal resonance of a higher harmonic was missed, estimated 2.5e-4 for a true
 1.3e-3), from 7 on with twice as many; contact points with the finest ones, because a number half as
 large again can be blind (true error 45 % with an indicator of 1e-14).
 
@@ -17,7 +17,7 @@ at.
 A point, or a richer model of it, that was not solved gives no indicator: its error is unknown
 (infinite), and nobody refines because of it.
 
-One model that is richer in all respects at once (`judge`) tells the whole error for the price of
+One model that is richer in all respects at once (`judge`) gives the whole error for the price of
 one; which respect is to blame takes one model each (`indicate`).
 """
 
@@ -36,7 +36,7 @@ from ...hbm.solver.newton import DEFAULTS, Options
 from .family import Family, carried, lowest_harmonics, member
 from .settings import DAMPERS, DIRECTIONS, Settings
 
-# for a point that only tells how wrong another one is
+# for a point that only estimates the error of another one
 ENOUGH = Options(1e-5, 30, fallbacks=False, frugal=True)
 
 
@@ -59,7 +59,7 @@ class Indicators:
 
     @property
     def unknown(self) -> tuple[str, ...]:
-        """Sources that tell nothing, because the richer model was not solved."""
+        """Sources without an estimate, because the richer model was not solved."""
         return tuple(name for name, error in self.errors.items() if not np.isfinite(error))
 
     @property

@@ -44,7 +44,7 @@ class Settings:
         if self.harmonics == 1:
             kind = (
                 "equivalent linearisation, which is the balance of one harmonic and whose error "
-                "the next ones tell,"
+                "the next ones estimate,"
             )
         if self.samples == 0:
             return (

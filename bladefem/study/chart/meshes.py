@@ -52,7 +52,7 @@ PEAK = 0.01
 
 @dataclass(frozen=True)
 class Resonance:
-    """What one mesh tells."""
+    """What one mesh gives."""
 
     # [Hz]
     frequency: float

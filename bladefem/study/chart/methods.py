@@ -56,7 +56,7 @@ class Method:
 
 
 def methods(one_dimensional: bool) -> Iterator[Method]:
-    """All methods of the chart, from cheap to dear within each family."""
+    """All methods of the chart, from cheap to expensive within each family."""
     for H in HARMONICS:
         yield Method(f"H {H}", "balance, harmonics", balance(H, max(512, 32 * (H + 1))))
     for samples in (64, 128, 256, 1024, 4096):

@@ -1,5 +1,5 @@
-"""Variants of a chart solved on common frequencies, timed, and laid beside the reference; the cheap
-ones first.
+"""Variants of a chart solved on common frequencies, timed, and compared with the reference; the
+cheap ones first.
 
 What a variant costs is known only when it was tried. Each first gets a small share of the time; one
 that would take more is put back with the time of the frequency that it solved, and has its turn
@@ -35,7 +35,7 @@ Solve = Callable[[ReducedModel, float, object], Point]
 
 @dataclass(frozen=True)
 class Peak:
-    """Responses on the common frequencies and the resonance that they tell."""
+    """Responses on the common frequencies and the resonance that they show."""
 
     # (k,) complex [m]
     first: np.ndarray
@@ -112,11 +112,11 @@ def timed(
     allowed: tuple[float, float],
     clock: Clock,
 ) -> Timing:
-    """All frequencies, or as many as tell that they would take more than is allowed; the middle one
+    """All frequencies, or as many as show that they would take more than is allowed; the middle one
     first.
 
     Args:
-        allowed: seconds for all, as the first frequencies tell, and as more than FEW of them tell.
+        allowed: seconds for all, as the first frequencies show, and as more than FEW of them show.
     """
     begun = clock.now()
     # caches warm

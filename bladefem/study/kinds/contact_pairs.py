@@ -1,5 +1,5 @@
 """The verification pairs, Hertz and flat punch: pressure under each load, and its closed form
-beside it.
+next to it.
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""A sphere or a cylinder pressed on a block, from its scene, and Hertz' closed form beside it.
+"""A sphere or a cylinder pressed on a block, from its scene, and Hertz' closed form next to it.
 
 Johnson, Contact Mechanics (1985), Sect. 4.2; P is the whole force, in the plane that on a metre of
 cylinder, and a the radius or half width of the contact (contact/hertz.py):

@@ -32,7 +32,7 @@ from .whole_wheel import WheelSector, read_orders, reduce_wheel, whole_wheel
 
 
 def is_mistuned(scene: Scene) -> bool:
-    """The scene tells how its blades differ."""
+    """The scene gives how its blades differ."""
     return scene.mistuning.pattern is not None or scene.mistuning.scatter is not None
 
 

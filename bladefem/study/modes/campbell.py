@@ -25,7 +25,7 @@ from .crossings import campbell_crossings, fold, interference_table, margins, wa
 
 # modes beyond those asked for: Coriolis forces mix neighbours
 GUARD = 6
-# of one diagram: more cannot be told apart in a picture
+# of one diagram: more cannot be distinguished in a picture
 MOST_SPEEDS = 2000
 
 

@@ -161,7 +161,7 @@ def family_table(
     Args:
         modes: shapes on the nodes of ``mesh``.
         mesh: sector or blade.
-        clamped: modes of the blade clamped at its root, on the same nodes, as references beside
+        clamped: modes of the blade clamped at its root, on the same nodes, as references next to
             pure motions.
         body: the aerofoil's body; the whole mesh when there is no such body.
         root: height x of the aerofoil's root [m]; found from the named faces when left out.

@@ -1,4 +1,4 @@
-"""What the amplitude means for the blade's life: stress of the mode studied, beside that of
+"""What the amplitude means for the blade's life: stress of the mode studied, next to that of
 rotation.
 """
 

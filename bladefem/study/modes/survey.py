@@ -1,4 +1,4 @@
-"""A survey of the modes: all nodal diameters, and what was asked for beside them."""
+"""A survey of the modes: all nodal diameters, and what was asked for in addition."""
 
 from __future__ import annotations
 
@@ -37,7 +37,7 @@ ORDERS = 3
 
 @dataclass(frozen=True)
 class Wanted:
-    """What to find beside the modes."""
+    """What to find besides the modes."""
 
     # [rad/s] of a Campbell diagram
     speeds: Sequence[float] | None = None
@@ -80,7 +80,7 @@ def survey(
     comm: Any = None,
     progress: Progress = unwatched,
 ) -> Survey:
-    """Modes of every nodal diameter, and what is wanted beside them; collective.
+    """Modes of every nodal diameter, and what is asked for in addition; collective.
 
     Raises:
         InputError, NotSolvedError: from the stages.

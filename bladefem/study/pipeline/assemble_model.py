@@ -91,7 +91,7 @@ def joint_model(
 
 
 def rigid_damper(reduced: Reduced) -> RigidBody:
-    """Six freedoms (three in a plane), in mass-normalised coordinates."""
+    """Six degrees of freedom (three in a plane), in mass-normalised coordinates."""
     rigid = reduced.damper.omega == 0
     return RigidBody(
         np.eye(int(rigid.sum())), reduced.damper.shapes[reduced.damper.ports["contact"]][:, rigid]

@@ -27,7 +27,7 @@ def named(
     mode: int,
     excitation: float,
 ) -> Iterator[None]:
-    """A failure inside tells the load that it belongs to, and whether the damper lifts off under
+    """A failure inside names the load that it belongs to, and whether the damper lifts off under
     it.
     """
     try:

@@ -237,7 +237,7 @@ def _record(p: Solution) -> tuple[object, ...]:
 
 
 def beyond_tolerance(curve: Curve) -> str:
-    """A sentence where points beside the resonance are estimated to be wrong by more than the
+    """A sentence where points next to the resonance are estimated to be wrong by more than the
     scene's accuracy of the highest amplitude; empty where all keep it.
     """
     away = curve.frequency != curve.peak_frequency
@@ -246,7 +246,8 @@ def beyond_tolerance(curve: Curve) -> str:
         return ""
     band = curve.frequency[missed]
     return (
-        f"load {curve.load:g} N: beside the resonance {missed.sum()} of {len(missed)} points, from "
+        f"load {curve.load:g} N: next to the resonance {missed.sum()} of {len(missed)} points, "
+        "from "
         f"{band.min():.5g} to {band.max():.5g} Hz, are estimated to be off by more than the "
         "accuracy of the highest amplitude (estimated and tolerated error in the table of points)"
     )

@@ -712,7 +712,7 @@ def _remarks(
         if not c.converged[near[(near >= 0) & (near < len(c.frequency))]].all():
             remarks.append(
                 warning(
-                    f"load {c.load:g} N: the highest point that was solved stands beside one that "
+                    f"load {c.load:g} N: the highest point that was solved lies next to one that "
                     "was not; the resonance may be higher"
                 )
             )

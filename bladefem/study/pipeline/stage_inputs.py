@@ -117,7 +117,7 @@ def stage_key(name: str, scene: Scene, *more: Any) -> str:
     """The key of a stage's result.
 
     Args:
-        more: what it depends on beside the scene, such as one load of many.
+        more: what it depends on besides the scene, such as one load of many.
     """
     values = [_without(scene, field, STAGE_INPUTS[name]) for field in declared_fields(name, scene)]
     keys = [stage_key(earlier, scene) for earlier in STAGE_INPUTS[name].after]

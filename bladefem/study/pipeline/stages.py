@@ -316,7 +316,7 @@ def condense_contact(bodies: Bodies, patches: list[Patch]) -> Any:
 
 
 def seat_clearance(bodies: Bodies, patches: list[Patch]) -> np.ndarray:
-    """(n,) gap of the seats beside that of the mesh: their shape, and the clearance [m]."""
+    """(n,) gap of the seats in addition to that of the mesh: their shape, and the clearance [m]."""
     from ...contact.face_profile import seat_gap
 
     scene = bodies.scene
@@ -428,7 +428,7 @@ def _reduced_diameters(
 
 
 def blade_parts(scene: Scene, mesh: Mesh) -> tuple[Mesh, dict[str, Material]]:
-    """The mesh with the volumes of other materials as bodies beside the rest of the blade, and the
+    """The mesh with the volumes of other materials as bodies next to the rest of the blade, and the
     material of each.
 
     Raises:

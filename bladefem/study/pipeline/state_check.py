@@ -1,5 +1,5 @@
-"""The paper's table of quasi-static contact states beside the direct solve: is the table enough for
-this scene?
+"""The paper's table of quasi-static contact states against the direct solve: is the table enough
+for this scene?
 """
 
 from __future__ import annotations
@@ -32,7 +32,7 @@ class StateCheck:
     states: int
     # largest, over the largest nodal force [1]
     error: float
-    # largest that the table tells of itself [1]
+    # largest that the table estimates of itself [1]
     indicator: float
     # time of a direct solve [s]
     direct: float
