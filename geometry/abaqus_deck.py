@@ -11,7 +11,7 @@ from pathlib import Path
 from bladefem.errors import InputError
 
 # files inside files; more is a circle
-DEEPEST = 20
+MAX_INCLUDE_DEPTH = 20
 
 
 @dataclass
@@ -99,6 +99,6 @@ def _included_keywords(keyword: Keyword, depth: int) -> Iterator[Keyword]:
         raise deck_error(
             keyword.file, keyword.line, f"*INCLUDE, INPUT={name}: there is no such file"
         )
-    if depth >= DEEPEST:
+    if depth >= MAX_INCLUDE_DEPTH:
         raise deck_error(keyword.file, keyword.line, "*INCLUDE goes in circles")
     yield from keywords_of(found, depth + 1)

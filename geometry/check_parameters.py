@@ -11,8 +11,8 @@ from typing import Any
 from bladefem.errors import InputError, suggestion
 from bladefem.scene.kinds import kind_named
 
-# cells; as finalise_mesh.MANY, which counts again once the volumes are known
-MANY = 3e6
+# cells; as finalise_mesh.MAX_CELLS, which counts again once the volumes are known
+MAX_CELLS = 3e6
 
 
 def check_parameters(scene: Any) -> None:
@@ -51,7 +51,7 @@ def check_names(scene: Any) -> None:
 
 def _refuse_many(scene: Any, cells: float) -> None:
     """The field that is to blame is the one that was given."""
-    if cells <= MANY:
+    if cells <= MAX_CELLS:
         return
     mesh = scene.mesh
     given = {
@@ -64,5 +64,5 @@ def _refuse_many(scene: Any, cells: float) -> None:
     value = getattr(mesh, name.partition(".")[2])
     raise InputError(
         f"{name} = {value:.4g}{'' if name == 'mesh.scale' else ' m'}: gives about {cells:.1g} "
-        f"cells, expected at most {MANY:.0e}; choose larger elements, or check the length unit"
+        f"cells, expected at most {MAX_CELLS:.0e}; choose larger elements, or check the length unit"
     )

@@ -25,7 +25,7 @@ from .quality import report
 from .session import attempt, gmsh_session
 
 # seat of the Hertz pair over the expected contact radius
-WIDER = 2.0
+SEAT_RATIO = 2.0
 
 
 def hertz_pair(hertz: HertzPair, size: MeshSize) -> Mesh:
@@ -44,7 +44,7 @@ def hertz_pair(hertz: HertzPair, size: MeshSize) -> Mesh:
     mesh = _mesh_facing_bodies(
         hertz.dimension,
         hertz.half_width,
-        WIDER * hertz.contact_radius,
+        SEAT_RATIO * hertz.contact_radius,
         hertz.half_width,
         (fine, 1.2 * hertz.contact_radius),
         size,

@@ -15,7 +15,7 @@ from .topology import EDGES, FAMILY, GMSH_TYPES, NODES, corner_count
 
 FLAT = ("Line", "Plane")
 # of the edge: a larger step off its middle means a seam or a pole of the parameters
-LARGEST = 0.4
+MAX_MIDDLE_OFFSET = 0.4
 
 
 def second_order(gmsh: ModuleType, curved: bool = True) -> None:
@@ -82,4 +82,4 @@ def _of_entity(
     place = np.array(gmsh.model.getValue(dimension, entity, middle.ravel())).reshape(-1, 3)
     step = np.linalg.norm(place - xyz[ends].mean(axis=1), axis=1)
     length = np.linalg.norm(xyz[ends[:, 1]] - xyz[ends[:, 0]], axis=1)
-    return {edges[i][0]: place[i] for i in np.flatnonzero(step < LARGEST * length)}
+    return {edges[i][0]: place[i] for i in np.flatnonzero(step < MAX_MIDDLE_OFFSET * length)}

@@ -19,7 +19,7 @@ from .parameters import MeshSize
 from .quality import edge_of_middle, report, shape_quality, straighten
 
 # cells; far beyond what one machine solves
-MANY = 3e6
+MAX_CELLS = 3e6
 # shape quality that asks for a second round of optimisation
 POOR = 0.1
 # shape quality of a tetrahedron that is refused
@@ -102,16 +102,17 @@ def check_count(
     """Refuse a mesh that would never end.
 
     Raises:
-        InputError: elements of this size [m] in all bodies would be more than MANY.
+        InputError: elements of this size [m] in all bodies would be more than MAX_CELLS.
     """
     low, high = np.array(gmsh.model.getBoundingBox(-1, -1)).reshape(2, 3)
     mass = sum(gmsh.model.occ.getMass(d, tag) for d, tag in gmsh.model.getEntities(dimension))
     count = min(mass, np.prod((high - low)[:dimension])) / (
         0.12 * size**3 if dimension == 3 else 0.43 * size**2
     )
-    if count > MANY:
+    if count > MAX_CELLS:
         raise InputError(
-            f"{name} = {size:.4g} m gives about {count:.1g} cells, expected at most {MANY:.0e}; "
+            f"{name} = {size:.4g} m gives about {count:.1g} cells, expected at most "
+            f"{MAX_CELLS:.0e}; "
             "choose larger elements, or check the length unit"
         )
 

@@ -24,7 +24,7 @@ Named = dict[tuple[int, str], list[int]]
 # sine between two planes below which they are one plane
 PARALLEL = 1e-6
 # of a length: what is left of rounding in a STEP file
-LOOSE = 1e-6
+ROUNDING_TOLERANCE = 1e-6
 # of a face's size: how far a plane may be from flat
 FLAT = 1e-6
 
@@ -159,7 +159,7 @@ def flanks_between(
     widths = [_extent_along(corners[i], _across_flank(normals, places, along, i)) for i in (0, 1)]
     narrowest = min(top - bottom for bottom, top in widths)
     wanted = narrowest if width is None else width
-    if wanted > narrowest * (1 + LOOSE):
+    if wanted > narrowest * (1 + ROUNDING_TOLERANCE):
         raise InputError(
             f"imported.seat_width = {1e3 * wanted:.4g} mm: expected at most {1e3 * narrowest:.4g} "
             "mm, the width of the narrower platform face"
@@ -187,7 +187,7 @@ def _common_length(
     extents = [_extent_along(points, along) for points in corners]
     low = max(extent[0] for extent in extents)
     high = min(extent[1] for extent in extents)
-    if length > (high - low) * (1 + LOOSE):
+    if length > (high - low) * (1 + ROUNDING_TOLERANCE):
         raise InputError(
             f"damper.length = {1e3 * length:.4g} mm: expected at most {1e3 * (high - low):.4g} mm, "
             "the length that both platform faces have in common"
@@ -292,7 +292,8 @@ def _carried_over(
         same = [
             other
             for other, (place, size) in after.items()
-            if np.linalg.norm(place - centre) < LOOSE * scale and abs(size / area - 1) < LOOSE
+            if np.linalg.norm(place - centre) < ROUNDING_TOLERANCE * scale
+            and abs(size / area - 1) < ROUNDING_TOLERANCE
         ]
         if same:
             now[tag] = same[0]

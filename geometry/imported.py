@@ -38,12 +38,12 @@ from .solid_cells import SolidCells, solid_cells
 from .topology import CORNERS, DIMENSION, FACETS, FAMILY, boundary, outward
 
 # files carry few digits; a match within this share of the face is a match, and is then snapped
-LOOSE = 1e-4
+MATCH_TOLERANCE = 1e-4
 # cosine between outward normals of two faces that look at each other
 OPPOSITE = -0.98
 # of a model [m]: beyond these its unit was taken for another
-SMALLEST = 1e-4
-LARGEST = 20.0
+MIN_MODEL_SIZE = 1e-4
+MAX_MODEL_SIZE = 20.0
 FLIPPED = {
     "tetra": [0, 2, 1, 3],
     "tetra10": [0, 2, 1, 3, 6, 5, 4, 7, 9, 8],
@@ -103,7 +103,7 @@ def read_mesh(
     axis: Axis = (0.0, 0.0, 1.0),
     names: Iterable[str] = (),
     linear: str = "refuse",
-    tolerance: float = LOOSE,
+    tolerance: float = MATCH_TOLERANCE,
     more: Iterable[str] = (),
 ) -> Mesh:
     """Mesh from .msh, .med, .unv, .inp, .bdf, .nas, .vtu or .cdb.
@@ -158,7 +158,7 @@ def mesh_of_raw(
     axis: Axis,
     source: str,
     linear: str = "keep",
-    tolerance: float = LOOSE,
+    tolerance: float = MATCH_TOLERANCE,
     wanted: frozenset[str] = frozenset(),
 ) -> Mesh:
     """Names, axes, directions and pairs on what a file holds.
@@ -170,7 +170,7 @@ def mesh_of_raw(
     mesh = _split_bodies(raw, solids, source)
     mesh = replace(mesh, points=_turn_to_axis(mesh, scale, np.asarray(axis, dtype=float)))
     across = float(np.ptp(mesh.points[np.unique(solids.cells)], axis=0).max())
-    if not SMALLEST < across < LARGEST:
+    if not MIN_MODEL_SIZE < across < MAX_MODEL_SIZE:
         raise InputError(
             f"imported.scale = {scale:g}: the model would be {across:.3g} m across, expected the "
             "factor from the file's unit to metres (0.001 for millimetres)"

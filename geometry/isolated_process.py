@@ -28,7 +28,7 @@ from .mesh import Mesh
 # seconds; the largest meshes that are accepted take a tenth of it
 LIMIT = 900
 # element size of the second try
-SMALLER = 0.9
+SECOND_TRY_SIZE = 0.9
 ROOT = Path(__file__).parents[1]
 # a child that saw these would join the ranks
 MPI = ("OMPI_", "PMIX_", "PMI_", "PRTE_", "ORTE_", "HYDRA_", "MPI_")
@@ -59,7 +59,7 @@ def build(scene: Any) -> Mesh:
 def _mesh_attempts(size: Any) -> list[Any]:
     """Mesh settings to try one after the other."""
     other = "delaunay" if size.algorithm == "hxt" else "hxt"
-    smaller = {"size": SMALLER * size.size} if size.size else {}
+    smaller = {"size": SECOND_TRY_SIZE * size.size} if size.size else {}
     return [size, replace(size, algorithm=other, **smaller)]
 
 

@@ -20,7 +20,7 @@ NOSE = 0.6
 ACROSS = 8
 ALONG = 6
 # cells above the rim at the finest, when the size is left open
-SOME = 40_000
+MAX_AUTOMATIC_CELLS = 40_000
 
 
 @dataclass(frozen=True)
@@ -49,8 +49,8 @@ def sector_sizes(
     wedge: Wedge,
     size: MeshSize,
 ) -> Sizes:
-    """Sizes from the thinnest part of the sector where the user leaves them open, in bounds of SOME
-    cells.
+    """Sizes from the thinnest part of the sector where the user leaves them open, in bounds of
+    MAX_AUTOMATIC_CELLS cells.
     """
     tip = aerofoil.thickness_tip * aerofoil.chord_tip
     root = aerofoil.thickness_root * aerofoil.chord_root
@@ -90,8 +90,8 @@ def _affordable_size(
     shank: Shank,
     disc: Disc,
 ) -> float:
-    """Element size [m] that fills everything above the rim with SOME tetrahedra."""
-    return (blade_volume(aerofoil, platform, shank, disc) / (0.12 * SOME)) ** (1 / 3)
+    """Element size [m] that fills everything above the rim with MAX_AUTOMATIC_CELLS tetrahedra."""
+    return (blade_volume(aerofoil, platform, shank, disc) / (0.12 * MAX_AUTOMATIC_CELLS)) ** (1 / 3)
 
 
 def set_sizes(

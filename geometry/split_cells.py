@@ -18,7 +18,7 @@ import numpy as np
 from .topology import CORNERS, EDGES, FACETS, FAMILY, NODES, QUADS
 
 # of the model's size: coordinates that differ by less count as equal in the order of vertices
-SAME = 1e-5
+SAME_COORDINATE = 1e-5
 
 
 def vertex_order(points: np.ndarray, axis: np.ndarray) -> np.ndarray:
@@ -27,7 +27,7 @@ def vertex_order(points: np.ndarray, axis: np.ndarray) -> np.ndarray:
     x = np.linalg.svd(z[None])[2][1]
     y = np.cross(z, x)
     across = np.stack([points @ x, points @ y])
-    unit = SAME * np.ptp(points, axis=0).max()
+    unit = SAME_COORDINATE * np.ptp(points, axis=0).max()
     radius = np.rint(np.hypot(*across) / unit)
     along = np.rint(points @ z / unit)
     angle = np.arctan2(across[1], across[0])

@@ -36,7 +36,7 @@ from .session import attempt, gmsh_session
 Named = dict[tuple[int, str], list[int]]
 CONTACT = ("seat_left", "seat_right", "damper_left", "damper_right")
 # elements along a model that is only looked at
-COARSE = 30
+PREVIEW_ELEMENTS = 30
 PREFIX = {"": 1.0, ".MILLI.": 1e-3, ".CENTI.": 1e-2, ".DECI.": 0.1, ".MICRO.": 1e-6, ".KILO.": 1e3}
 
 
@@ -131,7 +131,9 @@ def coarse_step(file: str | Path) -> RawMesh:
         ).items():
             gmsh.model.addPhysicalGroup(dimension, tags, name=name)
         low, high = np.array(gmsh.model.getBoundingBox(-1, -1)).reshape(2, 3)
-        gmsh.option.setNumber("Mesh.MeshSizeMax", float(np.linalg.norm(high - low)) / COARSE)
+        gmsh.option.setNumber(
+            "Mesh.MeshSizeMax", float(np.linalg.norm(high - low)) / PREVIEW_ELEMENTS
+        )
         gmsh.option.setNumber("Mesh.MeshSizeFromCurvature", 6)
         with attempt("imported.file", f"mesh '{file}'"):
             gmsh.model.mesh.generate(3)

@@ -18,7 +18,7 @@ from .parameters import MeshSize, ZMass
 from .session import attempt, gmsh_session
 
 # side of the foundation block over the larger side of the Z
-WIDER = 2.0
+FOUNDATION_RATIO = 2.0
 
 
 def z_corners(z: ZMass) -> np.ndarray:
@@ -106,7 +106,7 @@ def _draw_foundation(
     depth: float,
 ) -> int:
     """The foundation with the Z cut into its top."""
-    w = WIDER / 2 * max(z.width, z.height)
+    w = FOUNDATION_RATIO / 2 * max(z.width, z.height)
     square = np.array([[-w, -w], [w, -w], [w, w], [-w, w]])
     mark, _, _ = polygon(gmsh, z_corners(z))
     return imprint(gmsh, prism(gmsh, square, -depth, 0.0), [(2, mark)])

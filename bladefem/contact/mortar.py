@@ -24,8 +24,8 @@ from .face_elements import LINEAR, corner_count, face_quadrature, shape, tractio
 from .surface import FaceRule, frames, outward, surface
 
 # pieces below this part of a face's area are dropped
-SLIVER = 1e-9
-STEEP = np.cos(np.radians(75))
+SLIVER_AREA = 1e-9
+MIN_FACING_COSINE = np.cos(np.radians(75))
 # of Newton's method to the place on a curved face
 STEPS = 8
 # a face counts as covered when less than this part of it is left over
@@ -187,7 +187,7 @@ def _close_pairs(X: np.ndarray, Y: np.ndarray) -> list[tuple[int, int]]:
 def _cut_line(ends: np.ndarray) -> list[np.ndarray]:
     """The part (2, 1) of a line (2, 1) within the reference line."""
     a, b = np.sort(ends[:, 0]).clip(-1, 1)
-    return [np.array([[a], [b]])] if b - a > 2 * SLIVER else []
+    return [np.array([[a], [b]])] if b - a > 2 * SLIVER_AREA else []
 
 
 def _cut_triangle(polygon: np.ndarray) -> list[np.ndarray]:
@@ -199,7 +199,7 @@ def _cut_triangle(polygon: np.ndarray) -> list[np.ndarray]:
         if len(polygon) < 3:
             return []
     fan = [np.array([polygon[0], polygon[i], polygon[i + 1]]) for i in range(1, len(polygon) - 1)]
-    return [f for f in fan if abs(np.linalg.det(f[1:] - f[0])) > SLIVER]
+    return [f for f in fan if abs(np.linalg.det(f[1:] - f[0])) > SLIVER_AREA]
 
 
 def _clip_polygon(polygon: list[np.ndarray] | np.ndarray, level: object) -> list[np.ndarray]:
@@ -222,7 +222,7 @@ def _view_axes(
 ) -> np.ndarray:
     """(d - 1, 3) axes across the mean of the outward normals (nf, 3)."""
     axis = normals.sum(axis=0) / np.linalg.norm(normals.sum(axis=0))
-    if (normals @ axis < STEEP * np.linalg.norm(normals, axis=1)).any():
+    if (normals @ axis < MIN_FACING_COSINE * np.linalg.norm(normals, axis=1)).any():
         raise InputError(
             f"contact pair '{pair}' does not match and its master turns by more than 75 degrees "
             "from its mean normal, expected a face seen from one side: split it"
@@ -276,7 +276,9 @@ def _locate_points(
         there, slopes = _map_points(nodes, at)
         off = (target - there @ view.T)[..., None]
         slopes = (slopes @ view.T).swapaxes(2, 3)
-        if (np.abs(np.linalg.det(slopes)) < SLIVER * np.abs(slopes).max(axis=(2, 3)) ** d).any():
+        if (
+            np.abs(np.linalg.det(slopes)) < SLIVER_AREA * np.abs(slopes).max(axis=(2, 3)) ** d
+        ).any():
             raise InputError(
                 "a face of a contact pair that does not match is seen edge-on along the master's "
                 "mean normal, expected faces seen from the front: split the pair"

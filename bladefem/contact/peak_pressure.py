@@ -18,7 +18,7 @@ from ..data import Patch, PressureMap
 from ..scene.tables import Contact, Scene
 from ..scene.units import show
 from .face_profile import element_size
-from .hertz import FINEST, contact_modulus, line_width, point_radius
+from .hertz import MIN_ELEMENTS_PER_RADIUS, contact_modulus, line_width, point_radius
 from .interface_elements import interface_law, pair_ratio
 
 # half width of a crown's contact over the element size that is advised
@@ -130,7 +130,7 @@ def narrow_sentence(
         ),
         key=lambda found: found[0] / found[1],
     )
-    if worst >= FINEST * size:
+    if worst >= MIN_ELEMENTS_PER_RADIUS * size:
         return ""
     wanted = float(f"{worst / WANTED:.2g}")
     return (

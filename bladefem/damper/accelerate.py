@@ -23,7 +23,7 @@ from bladefem.util.newton import Outcome, StepError, halve_step, iterate_newton
 from .paper import DamperResponse, Platform, balance, damper_response, equivalent, residual
 
 # growth over the free motion at which an iteration is given up
-HUGE = 1e4
+DIVERGED_GROWTH = 1e4
 # step share below which Newton's search direction is given up
 SHORTEST_STEP_SHARE = 2.0**-7
 
@@ -180,7 +180,7 @@ def _fixed_point_loop(
         new = images[0] if len(images) == 1 else propose(motions, images)
         step = np.linalg.norm(new - motions[-1]) / np.linalg.norm(new)
         g.steps.append(float(step))
-        if not np.isfinite(step) or np.linalg.norm(new) > HUGE * size:
+        if not np.isfinite(step) or np.linalg.norm(new) > DIVERGED_GROWTH * size:
             solved = g.last.reason == "periodic" or rules.damper == "march"
             return (
                 motions[-1],

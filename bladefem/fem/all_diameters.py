@@ -38,7 +38,7 @@ LEVELS = (3, 4, 5)
 # columns of a sparse product at a time, to spare memory
 CHUNK = 32
 # error of a vector's direction; that of a frequency is its square
-CLOSE = 5e-6
+VECTOR_TOLERANCE = 5e-6
 
 
 @dataclass(frozen=True)
@@ -117,7 +117,7 @@ def eigenpairs(
     count: int,
     diameters: Sequence[int],
     direct: bool = False,
-    tolerance: float = CLOSE,
+    tolerance: float = VECTOR_TOLERANCE,
     solver: Eigensolver = SLEPC,
 ) -> Iterator[Eigenpairs]:
     """``count`` pairs and some guards in each nodal diameter, in the order in which they are
@@ -161,7 +161,7 @@ def _solve_pairs(
     count: int,
     start: np.ndarray | None,
     solver: Eigensolver,
-    tolerance: float = CLOSE,
+    tolerance: float = VECTOR_TOLERANCE,
     guard: int = GUARD,
 ) -> Eigenpairs:
     guard = min(guard, flex.con.T.shape[1] - count)
@@ -354,7 +354,7 @@ def found_again(
     flex: Flexibility,
     count: int,
     truth: Count,
-    tolerance: float = CLOSE,
+    tolerance: float = VECTOR_TOLERANCE,
 ) -> Eigenpairs:
     """A nodal diameter solved from scratch by blocks, which do not miss double eigenvalues.
 

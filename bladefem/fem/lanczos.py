@@ -25,7 +25,7 @@ CLEAN = 1e-8
 # least square of a column, of the largest, up to which one normalisation is enough
 EVEN = 1e-6
 # share of the tolerance below which a direction of the residual waits
-FAINT = 0.1
+DEFERRED_SHARE = 0.1
 
 
 @dataclass
@@ -85,7 +85,7 @@ def lowest(
         if (k >= count and error < tolerance) or not len(rest):
             return 1 / theta[:k], mix([*space.V, *space.P], np.concatenate([S[:, :k], rest]))
         block, Mblock = _next_block(
-            space, rest[:, :count], FAINT * tolerance if k >= count else 0.0
+            space, rest[:, :count], DEFERRED_SHARE * tolerance if k >= count else 0.0
         )
     raise NotSolvedError(
         f"the modes did not converge in {STEPS} steps (error {error:.1e}, expected {tolerance:.1e})"

@@ -29,7 +29,7 @@ SLEPC = Eigensolver()
 BLOCKS = Eigensolver("lanczos")
 # bodies with fewer unknowns than this many times the basis are left to blocks, which end cleanly
 # when the space is exhausted
-FEW = 3
+MIN_SPARE_MODES = 3
 
 
 def modes(
@@ -171,7 +171,7 @@ def elastic_pairs(
         NotSolvedError: there are fewer, or no convergence.
     """
     inverse = inverse or (lambda B: compliance(flex, B))
-    few = flex.con.T.shape[1] < FEW * basis_size(count)
+    few = flex.con.T.shape[1] < MIN_SPARE_MODES * basis_size(count)
     if start is None and solver.method == "slepc" and not few:
         first = inverse(restrict(flex.con, _rotation_probe(flex.con, 1)))
         return krylov_schur(flex.con, inverse, first, count, tolerance, guard, solver)

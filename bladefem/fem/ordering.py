@@ -18,7 +18,7 @@ import numpy as np
 import scipy.sparse as sp
 
 # unknowns from which METIS beats AMD
-WORTHWHILE = 60_000
+MIN_METIS_UNKNOWNS = 60_000
 NAMES = ("libmetis.so.5", "libmetis.so", "libmetis.dylib")
 
 
@@ -37,7 +37,7 @@ def interior_first(
     Returns:
         None for small matrices, and where METIS is not there.
     """
-    library = _metis_library() if A.shape[0] > WORTHWHILE else None
+    library = _metis_library() if A.shape[0] > MIN_METIS_UNKNOWNS else None
     if library is None:
         return None
     inner = np.setdiff1d(np.arange(A.shape[0]), last)

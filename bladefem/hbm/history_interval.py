@@ -33,7 +33,7 @@ MOVES = 15
 LONGEST = 2.0
 SHORTEST = 0.1
 # derivative below which a node is pushed less, over the mean of all nodes
-FAINT = 0.1
+WEAK_DERIVATIVE = 0.1
 # start of the extreme loads, over the friction limit
 BEYOND = 1.5
 
@@ -201,7 +201,7 @@ def _push(
     elements = model.elements
     gradient = place.free.gradient
     length = np.linalg.norm(gradient, axis=1, keepdims=True)
-    least = max(FAINT * float(length.mean()), np.finfo(float).tiny)
+    least = max(WEAK_DERIVATIVE * float(length.mean()), np.finfo(float).tiny)
     limit = elements.mu * np.maximum(elements.n0, 0.0)
     return sign * limit[:, None] * gradient / np.maximum(length, least)
 

@@ -39,7 +39,7 @@ DIFFERENCE = 1e-7
 # residual of the motion, relative to its size
 TOLERANCE = 1e-10
 # unknowns of the dense factorisation
-LARGEST = 6000
+MAX_DENSE_UNKNOWNS = 6000
 
 
 @dataclass(frozen=True)
@@ -87,9 +87,9 @@ def nonlinear_mode(
         raise InputError(f"mode {mode}: expected an elastic mode from 0 to {len(own) - 1}")
     check_point(model, float(own[mode]), max(H, *model.excitation, *model.normal), samples)
     unknowns = model.springs.size * (2 * H + 1)
-    if unknowns > LARGEST:
+    if unknowns > MAX_DENSE_UNKNOWNS:
         raise InputError(
-            f"{unknowns} unknowns: expected at most {LARGEST}, fewer harmonics or nodes"
+            f"{unknowns} unknowns: expected at most {MAX_DENSE_UNKNOWNS}, fewer harmonics or nodes"
         )
     frame = _frame(model, mode, H, samples)
     last = None

@@ -30,7 +30,7 @@ FIRST_STEP = 1e-3
 # share of a predicted step that is taken, so that the maximum is soon enclosed
 AHEAD = 1.3
 # longest step, as a share of the frequency
-FARTHEST = 0.05
+MAX_STEP = 0.05
 
 
 @dataclass(frozen=True)
@@ -99,7 +99,7 @@ def find_peak(
             best = now
             step = -now.line / bend if bend > 0 else np.sign(now.slope) * reach
             gain = abs(now.slope * step) / now.height if bend > 0 and count > 1 else np.inf
-            target = omega + float(np.clip(AHEAD * step, -FARTHEST * omega, FARTHEST * omega))
+            target = omega + float(np.clip(AHEAD * step, -MAX_STEP * omega, MAX_STEP * omega))
             reach = 2 * reach
         if gain < tolerance / 4:
             return Peak(best.solution, best.height, count, bend=float(max(bend, 0.0)))
@@ -182,7 +182,7 @@ def track_peak(
         if len(path) > 1 and path[-1].value != path[-2].value:
             ahead = (value - path[-1].value) / (path[-1].value - path[-2].value)
             guess += float(
-                np.clip(ahead * (guess - path[-2].omega), -FARTHEST * guess, FARTHEST * guess)
+                np.clip(ahead * (guess - path[-2].omega), -MAX_STEP * guess, MAX_STEP * guess)
             )
         changed = vary(model, name, value)
         peak = find_peak(

@@ -19,7 +19,7 @@ from .linear.woodbury import bodies_of
 from .model import ReducedModel
 
 # relative difference up to which two bodies are the same
-SAME = 1e-9
+SAME_BODY = 1e-9
 
 
 @dataclass(frozen=True)
@@ -104,7 +104,9 @@ def _same(
         return False
     turn = np.conj if mirrored else np.asarray
     return (one is other and not mirrored) or all(
-        np.allclose(a, turn(b), rtol=SAME, atol=SAME * max(abs(a).max(initial=0.0), 1e-300))
+        np.allclose(
+            a, turn(b), rtol=SAME_BODY, atol=SAME_BODY * max(abs(a).max(initial=0.0), 1e-300)
+        )
         for a, b in (
             (one.omega, other.omega),
             (one.shapes, other.shapes),

@@ -32,7 +32,7 @@ INSTANTS = 64
 # lies outside is returned by the march
 DIRECTIONS = 12
 # largest change of a force, over the largest friction limit
-LARGEST = 20.0
+MAX_FORCE_CHANGE = 20.0
 
 
 @dataclass(frozen=True)
@@ -102,7 +102,7 @@ def farthest(
         -direction.ravel() / size,
         rows.reshape(m * len(found.normals), -1),
         found.room.ravel() / scale,
-        bounds=(-LARGEST, LARGEST),
+        bounds=(-MAX_FORCE_CHANGE, MAX_FORCE_CHANGE),
         method="highs",
     )
     if solved.x is None:

@@ -15,7 +15,7 @@ from bladefem.scene.units import show
 from .best_load import certainty, flat_range, found_best, reasons_against
 
 # of the resonance frequency: farther off, an engine order does not drive it
-APART = 0.1
+OFF_RESONANCE = 0.1
 # relative difference below which a load was itself studied; own loads are rounded to four digits
 STUDIED = 1e-3
 
@@ -205,7 +205,7 @@ def wrong_speed(scene: Scene, summary: pd.DataFrame | None) -> list[str]:
         return []
     excited = scene.excitation.engine_order * scene.operation.speed / (2 * np.pi)
     peaks = summary["peak_frequency"]
-    if (1 - APART) * peaks.min() <= excited <= (1 + APART) * peaks.max():
+    if (1 - OFF_RESONANCE) * peaks.min() <= excited <= (1 + OFF_RESONANCE) * peaks.max():
         return []
     rpm = scene.operation.speed * 30 / np.pi
     return [

@@ -46,9 +46,9 @@ DAMPING = 2.0
 # relative step of a parameter, and of the load, in differences of exact derivatives
 STEP = 2e-3
 # share of the frequency on each side of a peak over which its curvature is measured
-BESIDE = 5e-4
+CURVATURE_STEP = 5e-4
 # most harmonics and contact points of a seat in the model that estimates changes
-COARSE = {"harmonics": 3, "points": 8}
+COARSE_SETTINGS = {"harmonics": 3, "points": 8}
 # parameters that are solved again at the ends of their ranges
 CHECKED = 2
 
@@ -154,8 +154,8 @@ def influences(
 ) -> list[Influence]:
     """The influence of each parameter, the largest on the amplitude first.
 
-    Where harmonics and contact points were chosen, a model of at most COARSE of them gives the
-    changes, relative to its own best load.
+    Where harmonics and contact points were chosen, a model of at most COARSE_SETTINGS of them gives
+    the changes, relative to its own best load.
 
     Args:
         best: a best load that was found.
@@ -189,10 +189,10 @@ def influences(
 
 
 def _coarse(settings: Settings) -> Settings:
-    """The settings with at most COARSE of what was chosen; nothing is left to choose."""
+    """The settings with at most COARSE_SETTINGS of what was chosen; nothing is left to choose."""
     least = {
         name: min(value, getattr(settings, name) or value)
-        for name, value in COARSE.items()
+        for name, value in COARSE_SETTINGS.items()
         if name in settings.chosen
     }
     return replace(settings, **least, chosen=())
@@ -340,8 +340,10 @@ class _Study:
             tilts.append(self.by_frequency(self.model(name, factor, load), base))
         moved_load = -(slopes[1] - slopes[0]) / (2 * STEP) / bend
         model = self.model(name, 1.0, load)
-        sides = [self.by_frequency(model, base, beside) for beside in (-BESIDE, BESIDE)]
-        curvature = (sides[1] - sides[0]) / (2 * BESIDE * base.omega)
+        sides = [
+            self.by_frequency(model, base, beside) for beside in (-CURVATURE_STEP, CURVATURE_STEP)
+        ]
+        curvature = (sides[1] - sides[0]) / (2 * CURVATURE_STEP * base.omega)
         tilted = (tilts[1] - tilts[0]) / (2 * STEP) + tilt * moved_load
         moved = -tilted / curvature / base.omega
         centre = np.log([load, base.height, base.solution.frequency])

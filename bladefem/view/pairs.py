@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from geometry.contact_pairs import WIDER
+from geometry.contact_pairs import SEAT_RATIO
 from geometry.parameters import HertzPair, Punch
 
 from .dimensions import length, note, shape
@@ -27,7 +27,7 @@ def draw_hertz(hertz: HertzPair, file: str | Path | None = None) -> object:
     with canvas(file, size=(7.2, 6.4)) as ax:
         _draw_block(ax, wide)
         shape(ax, np.vstack([cap, [[wide, wide], [0, wide]]]), DAMPER)
-        ax.plot([0, WIDER * contact], [0, 0], color=COLOURS[1], lw=3.5, zorder=4)
+        ax.plot([0, SEAT_RATIO * contact], [0, 0], color=COLOURS[1], lw=3.5, zorder=4)
         length(ax, (0, 0), (contact, 0), "", 0.12 * wide)
         note(ax, (0.5 * contact, 0.12 * wide), f"contact_radius {contact:g} mm", (40, 26))
         length(ax, (0, -wide), (wide, -wide), f"half_width {wide:g} mm", -0.14 * wide)

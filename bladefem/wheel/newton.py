@@ -25,10 +25,10 @@ from .preconditioner import Preconditioner, make_preconditioner
 BASIS = 60
 RESTARTS = 4
 # relative accuracy of a step: loose far from the solution, tight near it
-LOOSE = 1e-2
+LOOSE_STEP_TOLERANCE = 1e-2
 TIGHT = 1e-6
 # relative accuracy of the step that only measures a trial
-ROUGH = 0.1
+TRIAL_TOLERANCE = 0.1
 # reduction of the residual by one step that needs no further test
 QUADRATIC = 1e-2
 # weight of the mean in the residual that the line search lowers
@@ -134,7 +134,7 @@ class _Steps:
 
     def step(self, state: WheelState) -> tuple[np.ndarray, bool]:
         """The step (N, n, d, K), and whether GMRES reached its accuracy."""
-        accuracy = float(np.clip(0.1 * state.error, TIGHT, LOOSE))
+        accuracy = float(np.clip(0.1 * state.error, TIGHT, LOOSE_STEP_TOLERANCE))
         goal = accuracy * np.linalg.norm(state.residual)
         if self.stale:
             self._renew(state)
@@ -152,7 +152,7 @@ class _Steps:
         residual: np.ndarray,
     ) -> float:
         """Length of the step that the derivative at `state` would take from another residual."""
-        found, _ = self._solve(state, residual, ROUGH * np.linalg.norm(residual))
+        found, _ = self._solve(state, residual, TRIAL_TOLERANCE * np.linalg.norm(residual))
         return float(np.linalg.norm(found))
 
     def _renew(self, state: WheelState) -> None:

@@ -15,9 +15,9 @@ from ..errors import InputError
 from ..util.curve_extremum import parabola_at_middle
 
 # points added to the first grid before the search is given up
-MOST = 40
+MAX_ADDED_POINTS = 40
 # points closer than this are not distinguished, relative
-NEAR = 1e-7
+SAME_POINT = 1e-7
 
 # amplitudes (N,) of the blades at a circular frequency, NaN where it was not solved
 Respond = Callable[[float], np.ndarray]
@@ -68,13 +68,13 @@ def find_wheel_peak(
     omegas = [float(w) for w in grid]
     sizes = [respond(w) for w in omegas]
     gain = 0.0
-    for _ in range(MOST + 1):
+    for _ in range(MAX_ADDED_POINTS + 1):
         order = np.argsort(omegas)
         w = np.array(omegas)[order]
         a = np.array(sizes)[order]
         solved = np.isfinite(a).all(axis=1)
         target, gain = _next_frequency(w[solved], a[solved])
-        if target is None or gain <= tolerance or len(omegas) >= len(grid) + MOST:
+        if target is None or gain <= tolerance or len(omegas) >= len(grid) + MAX_ADDED_POINTS:
             break
         omegas.append(target)
         sizes.append(respond(target))
@@ -108,7 +108,7 @@ def _next_frequency(w: np.ndarray, a: np.ndarray) -> tuple[float | None, float]:
         step = np.clip(step, -0.5 * left, 0.5 * right)
         bottom = y[middle] + slope * step + bend * step**2
         predicted = np.where(is_peak & (bottom > 0), bottom, np.inf) ** -0.5
-    far = abs(step) > NEAR * w[middle, None]
+    far = abs(step) > SAME_POINT * w[middle, None]
     predicted = np.where(far, predicted, 0.0)
     i, blade = np.unravel_index(int(np.argmax(predicted)), predicted.shape)
     gain = predicted[i, blade] / a.max() - 1

@@ -16,7 +16,7 @@ from ..errors import InputError
 from .model import Pattern, Wheel
 
 # standard deviations beyond which nothing is drawn: parts outside are sorted out
-LARGEST = 3.0
+MAX_DEVIATIONS = 3.0
 
 
 @dataclass(frozen=True)
@@ -38,10 +38,10 @@ class Scatter:
     def __post_init__(self) -> None:
         for name in ("blades", "friction", "stiffness", "load"):
             value = getattr(self, name)
-            if not 0 <= value * LARGEST < 1:
+            if not 0 <= value * MAX_DEVIATIONS < 1:
                 raise InputError(
                     f"scatter.{name} {value}: expected a relative standard deviation from 0 to "
-                    f"{1 / LARGEST:.2f}"
+                    f"{1 / MAX_DEVIATIONS:.2f}"
                 )
 
 
@@ -143,5 +143,5 @@ def _normal_sample(
     sequence = qmc.Sobol(columns, scramble=True, seed=seed)
     power = int(np.ceil(np.log2(max(wheels, 2))))
     uniform = sequence.random_base2(power)[:wheels]
-    low = norm.cdf(-LARGEST)
+    low = norm.cdf(-MAX_DEVIATIONS)
     return norm.ppf(low + (1 - 2 * low) * uniform)

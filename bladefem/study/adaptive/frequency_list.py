@@ -25,15 +25,15 @@ from .settings import Settings, enriched
 # of richer settings, each round one point
 PASSES = 16
 # accuracy that the first sweep is made for where contacts may lift off
-COARSE = 0.02
+FIRST_SWEEP_ACCURACY = 0.02
 TINY = float(np.finfo(float).tiny)
 # neighbours for which a point that is less wrong than predicted speaks, and how much at most
-NEAR = 3
-LEAST = 0.25
+REPRESENTED_NEIGHBOURS = 3
+MIN_REDUCTION = 0.25
 # times the tolerated error that two steps of harmonics change, where one of them leaves half of it
 ONE_STEP = 4
 # neighbours that richer settings do not change, beyond which the others are left as they are
-QUIET = 2
+UNCHANGED_NEIGHBOURS = 2
 
 
 @dataclass
@@ -158,12 +158,18 @@ def _first(
     With few modes the way may end on another of two solutions there, which were 0.17 % of the peak
     apart.
     """
-    fine, coarse = (likely(family, settings, told) for told in (accuracy, max(accuracy, COARSE)))
+    fine, coarse = (
+        likely(family, settings, told) for told in (accuracy, max(accuracy, FIRST_SWEEP_ACCURACY))
+    )
     model = member(family, fine).model
     if model.directions == model.elements.tangents:
         return fine
     led = replace(fine, harmonics=coarse.harmonics, samples=coarse.samples)
-    return enriched(led, "modes") or led if accuracy < COARSE and "modes" in led.chosen else led
+    return (
+        enriched(led, "modes") or led
+        if accuracy < FIRST_SWEEP_ACCURACY and "modes" in led.chosen
+        else led
+    )
 
 
 def _judged(curve: _Curve) -> Iterator[int]:
@@ -197,8 +203,8 @@ def _confirm(curve: _Curve, i: int) -> None:
         alike = (
             other.omega in curve.foretold and curve.used[j] == curve.used[i] and np.isfinite(true)
         )
-        if alike and (true > told or abs(j - i) <= NEAR):
-            curve.errors[other.omega] *= max(true / told, LEAST)
+        if alike and (true > told or abs(j - i) <= REPRESENTED_NEIGHBOURS):
+            curve.errors[other.omega] *= max(true / told, MIN_REDUCTION)
     curve.errors[point.omega] = true
     curve.foretold.discard(point.omega)
 
@@ -224,7 +230,7 @@ def _raise(
         gained = first.copy()
         settings = better
         for i in side:
-            if curve.used[i] != old or quiet == QUIET:
+            if curve.used[i] != old or quiet == UNCHANGED_NEIGHBOURS:
                 break
             changed[i] = _change(curve, i, settings, gained)
             quiet = quiet + 1 if changed[i] <= limit else 0

@@ -37,7 +37,7 @@ from .family import Family, carried, lowest_harmonics, member
 from .settings import DAMPERS, DIRECTIONS, Settings
 
 # for a point that only estimates the error of another one
-ENOUGH = Options(1e-5, 30, fallbacks=False, frugal=True)
+ESTIMATE_OPTIONS = Options(1e-5, 30, fallbacks=False, frugal=True)
 
 
 @dataclass(frozen=True)
@@ -88,7 +88,7 @@ def indicate(
     for name in DIRECTIONS:
         other = None if name in errors else richer(family, settings, name)
         if other is not None:
-            better[name] = moved(family, settings, solution, other, ENOUGH)
+            better[name] = moved(family, settings, solution, other, ESTIMATE_OPTIONS)
             errors[name] = _change(family, settings, solution, better[name])
     return Indicators({name: errors.get(name, 0.0) for name in DIRECTIONS}, better)
 
@@ -117,13 +117,13 @@ def judge(
         if other is None:
             continue
         if _poorer(settings, other, name):
-            point = moved(family, settings, solution, other, ENOUGH)
+            point = moved(family, settings, solution, other, ESTIMATE_OPTIONS)
             errors[name] = _change(family, settings, solution, point)
         else:
             rich = replace(rich, **{name: getattr(other, name)})
             rich = replace(rich, samples=max(rich.samples, other.samples))
     if rich != settings:
-        better["together"] = moved(family, settings, solution, rich, ENOUGH)
+        better["together"] = moved(family, settings, solution, rich, ESTIMATE_OPTIONS)
         errors["together"] = _change(family, settings, solution, better["together"])
     return Indicators(errors, better)
 

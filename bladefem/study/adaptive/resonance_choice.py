@@ -28,8 +28,8 @@ ROUNDS = 8
 # of the accuracy: to which a peak that only estimates an error is found
 SHARE = 0.05
 # of the accuracy: errors that are small enough together, and one that need not be lowered
-ENOUGH = 0.8
-LEAST = 0.05
+SUFFICIENT_SHARE = 0.8
+NEGLIGIBLE_SHARE = 0.05
 # unknowns of the largest balance that is chosen where contacts lift off: finer ones cost minutes a
 # curve there and lose points
 LIFTING = 1500
@@ -162,8 +162,8 @@ def choose_at_peak(
     accuracy: float,
     fixed: tuple[str, ...] = (),
 ) -> tuple[Settings, Peak, PeakErrors]:
-    """Settings whose estimated errors of height and frequency keep within ENOUGH of the accuracy,
-    or the best that may be chosen; the peak with them, and its errors.
+    """Settings whose estimated errors of height and frequency keep within SUFFICIENT_SHARE of the
+    accuracy, or the best that may be chosen; the peak with them, and its errors.
 
     Nothing is refined in a respect in which the richer model was not solved: its error is unknown.
 
@@ -197,12 +197,16 @@ def _next_settings(
     helps.
     """
     needs = {name: need for name, need in errors.needs.items() if np.isfinite(need)}
-    if sum(errors.needs.values()) <= ENOUGH * accuracy:
+    if sum(errors.needs.values()) <= SUFFICIENT_SHARE * accuracy:
         return None
     for name in sorted(needs, key=lambda name: -needs[name]):
-        if name not in settings.chosen or name in fixed or needs[name] <= LEAST * accuracy:
+        if (
+            name not in settings.chosen
+            or name in fixed
+            or needs[name] <= NEGLIGIBLE_SHARE * accuracy
+        ):
             continue
-        better = enriched(settings, name, needs[name] / (ENOUGH * accuracy))
+        better = enriched(settings, name, needs[name] / (SUFFICIENT_SHARE * accuracy))
         if better is not None and not _too_large(family, better, peak.solution, LIFTING):
             return better
     return None

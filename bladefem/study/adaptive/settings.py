@@ -13,7 +13,7 @@ DAMPERS = ("mass", "rigid", "elastic")
 DIRECTIONS = ("harmonics", "samples", "modes", "points", "damper")
 RICHEST = {"modes": 160, "harmonics": 31, "samples": 4096, "points": 4096}
 # how many times smaller an error has to be for two steps of the first harmonics at once
-STEEP = 40.0
+DOUBLE_STEP_RATIO = 40.0
 FIRST = {"modes": 10, "harmonics": 1, "samples": 64, "points": 4, "damper": "rigid"}
 
 
@@ -128,7 +128,7 @@ def enriched(
     if value is None:
         return None
     if name == "harmonics":
-        more = 4 * value + 3 if value < 7 and need > STEEP else 2 * value + 1
+        more = 4 * value + 3 if value < 7 and need > DOUBLE_STEP_RATIO else 2 * value + 1
     elif name == "modes":
         more = 2 * value
     else:

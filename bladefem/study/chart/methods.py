@@ -29,7 +29,7 @@ HARMONICS = (1, 3, 5, 7, 9, 15, 31)
 # most that are integrated at one frequency
 PERIODS = 500
 # relative difference of the damper's motion at its contacts that is none
-ALIKE = 1e-6
+RIGID_MOTION = 1e-6
 # frequency of the modes that stand for the residual flexibility, over the excitation's
 STIFF = 30.0
 
@@ -87,7 +87,7 @@ def applicable(model: ReducedModel) -> str:
         )
     if not (isinstance(damper, RigidBody) and damper.mass.shape == (1, 1)):
         return "the damper is not a rigid mass with one freedom"
-    if np.ptp(damper.B[model.rows]) > ALIKE * abs(damper.B[model.rows]).max():
+    if np.ptp(damper.B[model.rows]) > RIGID_MOTION * abs(damper.B[model.rows]).max():
         return "the damper's motion is not along one direction on all contacts"
     if np.iscomplexobj(model.side(1).shapes):
         return "blades are not in phase"
@@ -104,7 +104,7 @@ def tangential(model: ReducedModel) -> ReducedModel:
         B = damper.B[model.rows]
         scale = float(B[0, 0]) or 1.0
         # joined points leave rounding
-        B = np.ones_like(B) if np.ptp(B) < ALIKE * abs(scale) else B / scale
+        B = np.ones_like(B) if np.ptp(B) < RIGID_MOTION * abs(scale) else B / scale
         damper = replace(damper, B=B, mass=damper.mass / scale**2)
     return replace(model, sides=sides, damper=damper)
 

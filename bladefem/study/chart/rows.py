@@ -19,12 +19,12 @@ from .cpu_clock import Clock
 from .methods import Point
 
 # times that a variant may cost more than the cheaper one of its kind before it
-DEARER = 3.0
+MAX_COST_STEP = 3.0
 # of the time that is left, for a variant of unknown cost
 SHARE = 0.1
 # times that the first frequencies, from rest or at the resonance, may cost more than the mean
-COLD = 2.0
-FEW = 3
+FIRST_CALL_FACTOR = 2.0
+MIN_FREQUENCIES = 3
 # shorter runs [s] are repeated so often at the most; the fastest counts
 BRIEF = 0.02
 REPEATS = 5
@@ -101,7 +101,7 @@ class _Known:
         job: Job,
     ) -> float:
         """Seconds a frequency; zero when nothing is known."""
-        cheaper = DEARER * self.kind.get(job.kind, 0.0) if job.ordered else 0.0
+        cheaper = MAX_COST_STEP * self.kind.get(job.kind, 0.0) if job.ordered else 0.0
         return self.own.get(number, cheaper)
 
 
@@ -116,7 +116,8 @@ def timed(
     first.
 
     Args:
-        allowed: seconds for all, as the first frequencies show, and as more than FEW of them show.
+        allowed: seconds for all, as the first frequencies show, and as more than MIN_FREQUENCIES of
+            them show.
     """
     begun = clock.now()
     # caches warm
@@ -133,7 +134,7 @@ def timed(
             points.append(run(model, omega, last))
             last = points[-1].start
             spent = clock.now() - begun
-            if spent / k * len(omegas) > allowed[k > FEW] and k < len(omegas):
+            if spent / k * len(omegas) > allowed[k > MIN_FREQUENCIES] and k < len(omegas):
                 return Timing(points, spent / k)
         best = min(best, spent / len(omegas))
         if spent > BRIEF:
@@ -165,8 +166,10 @@ def rows(
         ):
             done[k] = _lost(waiting.pop(k), known.own.get(k, np.nan), reason)
             continue
-        share = np.inf if job.needed else COLD * left if k in known.own else SHARE * left
-        allowed = share, min(left, COLD * share) if not job.needed else np.inf
+        share = (
+            np.inf if job.needed else FIRST_CALL_FACTOR * left if k in known.own else SHARE * left
+        )
+        allowed = share, min(left, FIRST_CALL_FACTOR * share) if not job.needed else np.inf
         timing = timed(job.model, job.run, job.bench.omegas, allowed, clock)
         if len(timing.points) < len(job.bench.omegas) and k not in known.own:
             known.own[k] = timing.seconds
@@ -192,7 +195,7 @@ def _too_dear(
     job: Job,
 ) -> str:
     """Why a job is not begun: a call cannot be cut short."""
-    if measured and seconds * len(job.bench.omegas) > COLD * left:
+    if measured and seconds * len(job.bench.omegas) > FIRST_CALL_FACTOR * left:
         return (
             f"left out: {seconds:.2g} s a frequency, {max(left, 0.0):.2g} s of the budget were left"
         )

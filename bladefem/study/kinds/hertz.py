@@ -17,11 +17,11 @@ from typing import Any
 
 import numpy as np
 
-from geometry.contact_pairs import WIDER
+from geometry.contact_pairs import SEAT_RATIO
 from geometry.mesh import Mesh
 
 from ...contact.complementarity import solve_lcp
-from ...contact.hertz import FINEST, contact_modulus, line_width, point_radius
+from ...contact.hertz import MIN_ELEMENTS_PER_RADIUS, contact_modulus, line_width, point_radius
 from ...contact.patch import initial_gap, make_patch, normal_ports, port_matrix
 from ...data import PressureMap
 from ...errors import InputError, NotSolvedError
@@ -31,7 +31,7 @@ from ..pipeline.stages import build_mesh
 from .punch import flexibility
 
 # contact radius over the expected one, at most
-WIDEST = 0.9 * WIDER
+MAX_RADIUS_RATIO = 0.9 * SEAT_RATIO
 
 
 @dataclass(frozen=True)
@@ -149,7 +149,9 @@ def _check_load(scene: Scene, load: float) -> None:
     """Its contact must fit the mesh."""
     expected = scene.hertz.contact_radius
     fine = scene.mesh.contact_size or expected / 10
-    low, high = (hertz_load(scene, a) for a in (FINEST * fine, WIDEST * expected))
+    low, high = (
+        hertz_load(scene, a) for a in (MIN_ELEMENTS_PER_RADIUS * fine, MAX_RADIUS_RATIO * expected)
+    )
     if not low <= load <= high:
         raise InputError(
             f"{_said(scene, load)}: the contact radius would be "

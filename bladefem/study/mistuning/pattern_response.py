@@ -23,7 +23,7 @@ from .whole_wheel import WheelSector
 # points of the first look at a band
 GRID = 15
 # of the linear wheel, which costs little
-FINE = 300
+LINEAR_POINTS = 300
 # resonances with sticking dampers that are looked at
 SHARPEST = 8
 # relative error of a peak's height by the search over frequencies
@@ -138,7 +138,7 @@ def _stuck_peaks(
     high: float,
 ) -> np.ndarray:
     """Circular frequencies of the highest resonances with all contacts sticking."""
-    fine = np.linspace(low, high, FINE)
+    fine = np.linspace(low, high, LINEAR_POINTS)
     sizes = [stuck_wheel(wheel, w, max(wheel.excitation), pattern)[:, 1:, 0] for w in fine]
     height = np.linalg.norm(np.array(sizes), axis=2).max(axis=1)
     inner = np.flatnonzero((height[1:-1] >= height[:-2]) & (height[1:-1] >= height[2:])) + 1
@@ -209,7 +209,7 @@ def _free_factor(
     grid: np.ndarray,
 ) -> float:
     """Amplification without dampers over the same band."""
-    fine = np.linspace(grid[0], grid[-1], FINE)
+    fine = np.linspace(grid[0], grid[-1], LINEAR_POINTS)
 
     def respond(pattern: Pattern) -> float:
         def sizes(w: float) -> np.ndarray:

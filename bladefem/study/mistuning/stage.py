@@ -16,7 +16,7 @@ from ...scene.tables import Scene
 from ...util.progress import Progress, unwatched
 from ...wheel.model import Pattern, Wheel, frequency_pattern
 from ...wheel.resonance import Respond
-from ...wheel.scatter import LARGEST, drawn_patterns
+from ...wheel.scatter import MAX_DEVIATIONS, drawn_patterns
 from ...wheel.statistics import Amplification, scatter_statistics, wheel_respond
 from ..pipeline.loads import Curve
 from ..pipeline.pipeline import Run, load_cases
@@ -99,7 +99,7 @@ def scatter_of_run(
             lambda deviation: frequency_pattern(sector.families, deviation),
         )
 
-    spread = LARGEST * scene.mistuning.scatter + 0.005
+    spread = MAX_DEVIATIONS * scene.mistuning.scatter + 0.005
     return scatter_statistics(
         wheels,
         {load: patterns(wheel) for load, wheel in wheels.items()},

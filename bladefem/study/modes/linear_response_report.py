@@ -38,7 +38,7 @@ BETWEEN = 500
 # half-widths of a resonance that are drawn closely
 WIDTHS = 12.0
 # displacement [m] that the stresses of a mode are given for
-LARGEST = 1e-3
+REPORTED_DISPLACEMENT = 1e-3
 
 Fields = dict[str, dict[str, np.ndarray]]
 
@@ -160,7 +160,7 @@ def stress_states(
     for i, shape in enumerate(modes.shapes[:count]):
         largest = max(np.linalg.norm(shape, axis=1).max(), 1e-300)
         # it swings to both sides
-        states[f"mode {i + 1} for 1 mm"] = LARGEST / largest * shape.astype(complex)
+        states[f"mode {i + 1} for 1 mm"] = REPORTED_DISPLACEMENT / largest * shape.astype(complex)
     for i, shape in enumerate(() if found is None else found.shapes):
         states[f"resonance {i + 1}"] = shape
     return states

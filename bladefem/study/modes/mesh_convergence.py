@@ -41,11 +41,11 @@ HIGHEST = 12.0
 # orders that frequencies can have: from sharp re-entrant edges to 4 for P2, and some luck
 BELIEVED = (1.0, 6.0)
 # error over change where no order is believed
-SAFETY = 3.0
+UNTRUSTED_FACTOR = 3.0
 # scatter over trend from which there is no trend
-LOUD = 0.5
+MAX_SCATTER = 0.5
 # MAC of the same mode on two meshes
-ALIKE = 0.8
+MIN_MAC = 0.8
 # modes beyond those asked for, candidates for pairs
 SPARE = 3
 # nodes that shapes are compared at
@@ -222,7 +222,7 @@ def fitted(h: np.ndarray, f: np.ndarray) -> tuple[float, float, float]:
     ).x
     (limit, slope), left = fit(p)
     scatter = float(np.sqrt(left / (len(f) - 3)))
-    if scatter > LOUD * abs(slope) * (h.max() ** p - h.min() ** p):
+    if scatter > MAX_SCATTER * abs(slope) * (h.max() ** p - h.min() ** p):
         return float(f[-1]), np.nan, scatter
     return float(limit), float(p), scatter
 
@@ -236,7 +236,11 @@ def _convergence_summary(points: pd.DataFrame) -> pd.DataFrame:
         limit, order, scatter = fitted(line["size"].to_numpy() / line["size"].iloc[-1], f)
         reason = _order_doubt(order, line["mac"].min())
         change = np.ptp(f[-2:] if len(f) == 3 else f[-3:])
-        error = SAFETY * change / f[-1] if reason else abs(f[-1] / limit - 1) + scatter / f[-1]
+        error = (
+            UNTRUSTED_FACTOR * change / f[-1]
+            if reason
+            else abs(f[-1] / limit - 1) + scatter / f[-1]
+        )
         rows.append(
             {
                 **{name: int(line[name].iloc[0]) for name in keys},
@@ -253,7 +257,7 @@ def _convergence_summary(points: pd.DataFrame) -> pd.DataFrame:
 
 def _order_doubt(order: float, mac: float) -> str:
     """Why an order is not believed."""
-    if mac < ALIKE:
+    if mac < MIN_MAC:
         return f"the shapes of two meshes differ, MAC {mac:.2f}"
     if np.isnan(order):
         return "the frequencies do not fall into line"

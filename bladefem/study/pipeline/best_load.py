@@ -42,7 +42,7 @@ STEP = 1e-4
 # searches, each with richer settings than the last
 SEARCHES = 3
 # range of a repeated search on each side of the load found before, as a factor
-NEAR = 4.0
+REPEATED_RANGE = 4.0
 
 
 @dataclass(frozen=True)
@@ -115,8 +115,8 @@ def find_best_load(
                 break
             start = found.value
             bounds = (
-                max(searched[0], found.value / NEAR),
-                min(searched[1], found.value * NEAR),
+                max(searched[0], found.value / REPEATED_RANGE),
+                min(searched[1], found.value * REPEATED_RANGE),
             )
     except NotSolvedError as error:
         return _unknown(settings, mass, searched, points, str(error))

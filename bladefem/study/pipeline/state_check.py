@@ -19,7 +19,7 @@ from ...scene.tables import Scene
 # of each axis
 STATES = 5
 # of the largest nodal force
-ENOUGH = 0.01
+SUFFICIENT_ACCURACY = 0.01
 # of the largest turn of a seat, below which a turn counts as none
 SEEN = 1e-6
 
@@ -40,7 +40,7 @@ class StateCheck:
     @property
     def enough(self) -> bool:
         """The table may take the place of direct solves."""
-        return max(self.error, self.indicator) <= ENOUGH
+        return max(self.error, self.indicator) <= SUFFICIENT_ACCURACY
 
 
 def check_states(
