@@ -73,7 +73,7 @@ def test_given_order_gives_the_same_modes(monkeypatch):
     nothing else.
     """
     own = opened()
-    monkeypatch.setattr(ordering, "WORTHWHILE", 0)
+    monkeypatch.setattr(ordering, "MIN_METIS_UNKNOWNS", 0)
     given = opened()
     found, kept = given.opened.core, own.opened.core
     assert kept.order is None and found.factor.ordering == 1
