@@ -273,6 +273,23 @@ class Mistuning:
 
 
 @dataclass(frozen=True)
+class Fatigue:
+    """What the blade's material lasts: Goodman's line by two values, or Haigh's diagram."""
+
+    endurance: float | None = quantity(
+        None, "Pa", 1e5, 1e11, "stress amplitude that lasts without mean stress"
+    )
+    ultimate: float | None = quantity(
+        None, "Pa", 1e5, 1e11, "mean stress at which no amplitude lasts: ultimate strength"
+    )
+    haigh: tuple[str, ...] | None = quantity(
+        None,
+        help="mean stresses and the amplitudes that last there, texts like '200 MPa: 150 MPa'; in "
+        "place of the two values",
+    )
+
+
+@dataclass(frozen=True)
 class Model:
     """Numerical settings. None: chosen by error indicators so that the answer keeps the scene's
     accuracy.
@@ -452,6 +469,7 @@ class Scene:
     excitation: Excitation = field(default_factory=Excitation)
     study: Study = field(default_factory=Study)
     mistuning: Mistuning = field(default_factory=Mistuning)
+    fatigue: Fatigue = field(default_factory=Fatigue)
     model: Model = field(default_factory=Model)
     solver: Solver = field(default_factory=Solver)
     support: Support = field(default_factory=Support)

@@ -6,6 +6,7 @@ from ...errors import InputError
 from ...scene.kinds import kind_named, load_function
 from ...scene.tables import Scene
 from ...scene.units import show
+from ..fatigue import haigh_diagram
 
 
 def refuse_run(scene: Scene) -> None:
@@ -14,6 +15,7 @@ def refuse_run(scene: Scene) -> None:
     Raises:
         InputError: the first thing that is wrong, with the field to change.
     """
+    haigh_diagram(scene.fatigue)
     kind = kind_named(scene.kind)
     if kind.preflight is not None:
         load_function(kind.preflight)(scene)
