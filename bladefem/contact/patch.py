@@ -6,15 +6,8 @@ turned into consistent loads of the elements' own shape functions; the displacem
 f_i is the chi_i-weighted mean. One matrix P serves both (u_port = P^T u, nodal forces = P f), so
 the element stiffness is left alone.
 
-The choice of chi was measured, relative errors on quadratic tetrahedra with element size a/10
-(Hertz sphere) and a/20 (plane flat punch, r < 0.8 a); benchmarks/contact_hertz.py makes the table
-again:
-
-    chi                              sphere: peak   pressure L2     edge    punch: L2 hat functions
-    0.2 %         6.8 %     3.4 %        1.3 %  (wiggles at the edge) their dual functions
-    0.2 %         4.8 %     4.2 %        0.4 % a third hat, two thirds dual (used)    0.0 %
-    3.0 %     1.8 %        0.4 % mid-side nodes tied to corners         0.8 %         4.7 %     4.2
-    %    (needs a constrained stiffness)
+chi is a third of the hat function and two thirds of its dual function: of four choices the most
+accurate on a Hertz sphere and under a flat punch (docs/contact.md, benchmarks/contact_hertz.py).
 """
 
 from __future__ import annotations

@@ -5,8 +5,8 @@ The wheel is at rest in the rotating frame and all blades move alike (nodal diam
 blade's seat_left is this blade's seat_left in its own axes. With f >= 0 the pressing forces at the
 normal ports of both seats,
 
-    opening = clearance - u_blade + u_damper = g0 + (C_blade + C_damper) f + B q,   B^T f + load =
-    0,
+    opening = clearance - u_blade + u_damper = g0 + (C_blade + C_damper) f + B q,
+    B^T f + load = 0,
 
 where q is the damper's rigid motion, found from equilibrium: no spring holds it. Directions that
 frictionless seats can't hold (the engine axis for a wedge, the circumference for a flat damper)

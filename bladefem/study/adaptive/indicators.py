@@ -3,19 +3,15 @@ made.
 
 eta_d = |T_d - T| / |T_d|, where T is the first harmonic at the probe and T_d the same in the model
 enriched in direction d, solved from the point that is judged: a step or two where the contacts stay
-closed. One Newton step alone overshoots with lift-off (16 % estimated for 0.4 % on the wedge of 46
-nodes).
+closed. One Newton step alone would overshoot where they lift off (docs/stability.md, F23).
 
-Modes are doubled and samples taken four times; 1 and 3 harmonics are compared with 7 and 15
-(against 3 and 7 an internal resonance of a higher harmonic was missed, estimated 2.5e-4 for a true
-1.3e-3), from 7 on with twice as many; contact points with the finest ones, because a number half as
-large again can be blind (true error 45 % with an indicator of 1e-14).
+Modes are doubled and samples taken four times; 1 and 3 harmonics are compared with 7 and 15, since
+fewer miss internal resonances (F20), from 7 on with twice as many; contact points with the finest
+ones, because a number half as large again can be blind (F19).
 
-Where all contacts stick, friction is linear: harmonics and samples are exact, and are not looked
-at.
-
-A point, or a richer model of it, that was not solved gives no indicator: its error is unknown
-(infinite), and nobody refines because of it.
+Where all contacts stick, friction is linear: harmonics and samples are exact and need no look. A
+point, or a richer model of it, that was not solved gives no indicator: its error is unknown
+(infinite), and nothing is refined because of it.
 
 One model that is richer in all respects at once (`judge`) gives the whole error for the price of
 one; which respect is to blame takes one model each (`indicate`).

@@ -4,10 +4,11 @@ elements.
 Johnson, Contact Mechanics (1985), Sect. 3.8 and 2.8, the paper's Eq. 24 corrected: in terms of the
 whole force P
 
-    round:  p = P / (2 pi a sqrt(a^2 - r^2)),   u = P (1 - nu^2) / (2 a E) plane:  p = P / (pi
-    sqrt(a^2 - x^2)) for a force P a unit of depth, in plane strain; u grows with the logarithm of
-            how far the body reaches, by 2 P (1 - nu^2) / (pi E) each time that it reaches e times
-            as far.
+    round:  p = P / (2 pi a sqrt(a^2 - r^2)),   u = P (1 - nu^2) / (2 a E)
+    plane:  p = P / (pi sqrt(a^2 - x^2))
+
+The plane force P acts on a unit of depth, in plane strain; there u grows with the logarithm of how
+far the body reaches, by 2 P (1 - nu^2) / (pi E) each time that it reaches e times as far.
 
 Eq. 25 is the stiffness of a ring: the force on it over u, so that the rings together carry 2 a E /
 (1 - nu^2). Such springs give back the pressure and the approach of the load that they were made
