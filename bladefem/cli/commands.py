@@ -45,7 +45,10 @@ def mesh(options: argparse.Namespace, comm: Any) -> None:
         raise InputError(
             f"--view {options.view}: expected a file name that ends with {' or '.join(PICTURES)}"
         )
-    run = until("mesh", options, comm)
+    scene, folder, bars = prepared(options, comm)
+    from ..study.pipeline import pipeline
+
+    run = pipeline.run(scene, folder, until="mesh", comm=comm, progress=bars)
     if options.view and (comm is None or comm.rank == 0):
         draw(run.mesh, options.view)
     tell(options, comm, lambda: tables.mesh_quality(run.mesh), run)
@@ -113,13 +116,19 @@ def reduce(options: argparse.Namespace, comm: Any) -> None:
     """Blade and damper reduced to their contact, load and probe points; a later response starts
     from there.
     """
-    run = until("reduction", options, comm, responds=True)
+    scene, folder, bars = prepared(options, comm, responds=True)
+    from ..study.pipeline import pipeline
+
+    run = pipeline.run(scene, folder, until="reduction", comm=comm, progress=bars)
     tell(options, comm, lambda: tables.reduction(run.reduced), run)
 
 
 def response(options: argparse.Namespace, comm: Any) -> None:
     """Forced response for each load."""
-    run = until("response", options, comm, responds=True)
+    scene, folder, bars = prepared(options, comm, responds=True)
+    from ..study.pipeline import pipeline
+
+    run = pipeline.run(scene, folder, comm=comm, progress=bars)
     tell(options, comm, lambda: tables.responses(run.response), run)
 
 
@@ -265,19 +274,6 @@ def given_scene(options: argparse.Namespace, responds: bool) -> Scene:
 
         refuse_run(scene)
     return scene
-
-
-def until(
-    stage: str,
-    options: argparse.Namespace,
-    comm: Any,
-    responds: bool = False,
-) -> Any:
-    """The pipeline up to a stage, with progress bars; collective."""
-    scene, folder, bars = prepared(options, comm, responds)
-    from ..study.pipeline import pipeline
-
-    return pipeline.run(scene, folder, until=stage, comm=comm, progress=bars)
 
 
 def tell(

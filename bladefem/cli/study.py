@@ -10,11 +10,14 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from itertools import product
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from ..errors import InputError
 from . import tables
-from .commands import default_folder, given_scene, prepared, tell, until
+from .commands import default_folder, given_scene, prepared, tell
+
+if TYPE_CHECKING:
+    from ..study.pipeline.run_records import SolvedRun
 
 # runs of one study
 MOST_RUNS = 1000
@@ -75,7 +78,7 @@ def study(options: argparse.Namespace, comm: Any) -> None:
         tell(options, comm, lambda text=progress: text)
         if done:
             on_root(comm, lambda one=one: _borrow_stages(Path(parts[0].output), Path(one.output)))
-        run = until("response", one, comm)
+        run = _solve_variant(one, comm)
         tell(options, comm, lambda run=run: tables.responses(run.response), run)
         # not before the first line: it is slow to load
         from ..report.study import Variant
@@ -85,6 +88,14 @@ def study(options: argparse.Namespace, comm: Any) -> None:
         table, files = on_root(comm, lambda: plan.write(done, base))
     written = ", ".join(map(str, files))
     tell(options, comm, lambda: f"\n{plan.show(table)}\nwritten: {written}")
+
+
+def _solve_variant(options: argparse.Namespace, comm: Any) -> SolvedRun:
+    """The responses of one run of the plan, in its own folder; collective."""
+    scene, folder, bars = prepared(options, comm)
+    from ..study.pipeline import pipeline
+
+    return pipeline.run(scene, folder, comm=comm, progress=bars)
 
 
 def _make_plan(options: argparse.Namespace) -> Plan:

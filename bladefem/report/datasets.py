@@ -9,6 +9,7 @@ import numpy as np
 import pandas as pd
 
 from ..data import PressureMap
+from ..study.pipeline.run_records import ModalRun, SolvedRun
 from .tables import units_of
 
 MEANING = {
@@ -20,10 +21,8 @@ MEANING = {
 }
 
 
-def datasets(result: Any, tables: dict[str, pd.DataFrame]) -> dict[str, Any]:
-    """Groups "modes", "contact", "resultants", "points", "summary" of a finished run
-    (study.pipeline.Run).
-    """
+def datasets(result: SolvedRun, tables: dict[str, pd.DataFrame]) -> dict[str, Any]:
+    """Groups "modes", "contact", "resultants", "points", "summary" of a finished run."""
     return {
         "modes": mode_shapes(result),
         "contact": contact_arrays(result.contact.maps),
@@ -33,7 +32,7 @@ def datasets(result: Any, tables: dict[str, pd.DataFrame]) -> dict[str, Any]:
     }
 
 
-def mode_shapes(result: Any) -> Any:
+def mode_shapes(result: ModalRun) -> Any:
     """Frequencies, shapes and node positions of all nodal diameters."""
     import xarray as xr
 

@@ -19,6 +19,7 @@ from ..scene.tables import Scene
 from ..study.modes.comparison import family_table
 from ..study.modes.linear_response_report import stress_states, stress_table
 from ..study.modes.survey import Survey, Wanted, excited_set, survey
+from ..study.pipeline.run_records import folder_of
 from ..util.progress import Progress, unwatched
 from ..view import convergence, forced, mesh, modes, speed
 from ..view.live_curves import live_diameters
@@ -133,7 +134,7 @@ def _write(
     progress: Progress,
 ) -> None:
     run = result.run
-    folder = Path(result.run.folder)
+    folder = folder_of(result.run)
     tables = tables_of(result) | {"stresses": stresses}
     for name, table in tables.items():
         write_tables(table, folder / name, name.replace("_", " "))
@@ -160,7 +161,7 @@ def _report(
 ) -> None:
     """``report_modes.html`` and ``.md``: frequencies first, shapes to rotate, everything else."""
     run = result.run
-    folder = Path(run.folder)
+    folder = folder_of(run)
     excited = excited_set(run)
     families = [str(name) for name in tables["excited_modes"]["family"]]
     live = {}

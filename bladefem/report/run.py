@@ -32,6 +32,7 @@ from ..study.pipeline import pipeline
 from ..study.pipeline.contact_cycle import ContactCycle
 from ..study.pipeline.linear_limits import Limit
 from ..study.pipeline.loads import summary
+from ..study.pipeline.run_records import SolvedRun, folder_of
 from ..study.pipeline.stability import UNIQUE
 from ..study.pipeline.state_check import state_sentence
 from ..util.message import method, warning
@@ -74,7 +75,7 @@ def run(
     folder: str | Path,
     comm: Any = None,
     progress: Progress = unwatched,
-) -> pipeline.Run:
+) -> SolvedRun:
     """Everything: mesh, modes, contact, responses, and the folder with pictures and report.
 
     Raises:
@@ -88,10 +89,10 @@ def run(
 
 
 def write_run(
-    result: pipeline.Run,
+    result: SolvedRun,
     comm: Any = None,
     progress: Progress = unwatched,
-) -> pipeline.Run:
+) -> SolvedRun:
     """Write the folder of a finished run, on rank 0; returns the run with the time that it took."""
     start = time.perf_counter()
     on_root(comm, lambda: _write(result, progress))
@@ -100,8 +101,8 @@ def write_run(
     )
 
 
-def _write(result: pipeline.Run, progress: Progress) -> None:
-    folder = result.folder
+def _write(result: SolvedRun, progress: Progress) -> None:
+    folder = folder_of(result)
     moved = take_folder(folder, result.scene)
     patches = list(result.contact.problem.patches)
     cycles = cycles_of(result)
@@ -167,7 +168,7 @@ def _write(result: pipeline.Run, progress: Progress) -> None:
 
 
 def _live(
-    result: pipeline.Run,
+    result: SolvedRun,
     tables: dict[str, pd.DataFrame],
     cycles: list[ContactCycle],
 ) -> dict[str, dict[str, Any]]:
@@ -189,7 +190,7 @@ def _live(
     }
 
 
-def _wheel_tables(result: pipeline.Run) -> dict[str, pd.DataFrame]:
+def _wheel_tables(result: SolvedRun) -> dict[str, pd.DataFrame]:
     """Tables of the whole wheel, where blades differ."""
     if result.wheel is None:
         return {}
@@ -199,7 +200,7 @@ def _wheel_tables(result: pipeline.Run) -> dict[str, pd.DataFrame]:
     }
 
 
-def _static_contact(result: pipeline.Run) -> str:
+def _static_contact(result: SolvedRun) -> str:
     """Whether the contact may be taken as quasi-static up to the last harmonic kept of the highest
     frequency.
     """
@@ -212,7 +213,7 @@ def _static_contact(result: pipeline.Run) -> str:
     return method(found.sentence) if found.holds else warning(found.sentence)
 
 
-def _states(result: pipeline.Run) -> str:
+def _states(result: SolvedRun) -> str:
     """Whether the paper's table of states would do for the loads of the run and the normal motion
     at its resonances.
     """
@@ -227,7 +228,7 @@ def _states(result: pipeline.Run) -> str:
     )
 
 
-def _beyond_stick(result: pipeline.Run) -> list[str]:
+def _beyond_stick(result: SolvedRun) -> list[str]:
     """Why a resonance may lie above that of full stick."""
     stuck = result.response.limits[1].peak_frequency
     above = [curve for curve in result.response.curves if curve.peak_frequency > stuck]
@@ -241,7 +242,7 @@ def _beyond_stick(result: pipeline.Run) -> list[str]:
     )
 
 
-def _tables(result: pipeline.Run) -> dict[str, pd.DataFrame]:
+def _tables(result: SolvedRun) -> dict[str, pd.DataFrame]:
     """Tables of the report, "section/name", SI columns."""
     curves = result.response.curves
     return {
@@ -266,7 +267,7 @@ def _joined(parts: list[pd.DataFrame]) -> pd.DataFrame:
     return points.fillna({"stability": UNIQUE}) if "stability" in points else points
 
 
-def _summary(result: pipeline.Run) -> pd.DataFrame:
+def _summary(result: SolvedRun) -> pd.DataFrame:
     """The design table, with the alternating stress at each resonance."""
     table = pd.DataFrame(summary(result.response.curves, result.response.limits))
     table.insert(
@@ -277,7 +278,7 @@ def _summary(result: pipeline.Run) -> pd.DataFrame:
     return table
 
 
-def _alternating(result: pipeline.Run, amplitudes: np.ndarray) -> np.ndarray:
+def _alternating(result: SolvedRun, amplitudes: np.ndarray) -> np.ndarray:
     """(rows,) alternating stress [Pa] of the design table: of the whole motion where that was
     computed, of the mode alone at the other loads, without damper and stuck.
     """
@@ -302,7 +303,7 @@ def _stresses(found: Strength) -> pd.DataFrame:
     )
 
 
-def _own_load(result: pipeline.Run) -> dict[str, pd.DataFrame]:
+def _own_load(result: SolvedRun) -> dict[str, pd.DataFrame]:
     """The load that the damper's own mass makes at the operating speed, where it makes any."""
     own = result.contact.own
     return (
@@ -320,7 +321,7 @@ def _own_load(result: pipeline.Run) -> dict[str, pd.DataFrame]:
     )
 
 
-def _best_load(result: pipeline.Run) -> dict[str, pd.DataFrame]:
+def _best_load(result: SolvedRun) -> dict[str, pd.DataFrame]:
     """What the exact search for the best load found, where there was one."""
     best = result.response.best
     if not best:
@@ -332,7 +333,7 @@ def _best_load(result: pipeline.Run) -> dict[str, pd.DataFrame]:
     return found
 
 
-def _damper_masses(result: pipeline.Run) -> dict[str, pd.DataFrame]:
+def _damper_masses(result: SolvedRun) -> dict[str, pd.DataFrame]:
     """The damper that makes each load, where friction takes part in the seating."""
     masses = result.contact.masses
     return {"contact/damper_mass": pd.DataFrame(map(asdict, masses))} if masses else {}
@@ -434,7 +435,7 @@ def linear_points(limit: Limit) -> pd.DataFrame:
     )
 
 
-def _best(result: pipeline.Run) -> int:
+def _best(result: SolvedRun) -> int:
     """Number of the curve with the lowest resonance: pictures of one load show that one."""
     return int(np.argmin([curve.peak_amplitude for curve in result.response.curves]))
 
@@ -450,7 +451,7 @@ def _title(scene: Scene) -> str:
 
 
 def _drawings(
-    result: pipeline.Run, tables: dict[str, pd.DataFrame]
+    result: SolvedRun, tables: dict[str, pd.DataFrame]
 ) -> dict[str, Callable[[Path], object]]:
     """What to draw: "section/name" to a function of the file."""
     geometry = result.mesh

@@ -19,7 +19,8 @@ from ...wheel.resonance import Respond
 from ...wheel.scatter import MAX_DEVIATIONS, drawn_patterns
 from ...wheel.statistics import Amplification, scatter_statistics, wheel_respond
 from ..pipeline.loads import Curve
-from ..pipeline.pipeline import Run, load_cases
+from ..pipeline.pipeline import load_cases
+from ..pipeline.run_records import SolvedRun
 from ..pipeline.stages import Bodies
 from .pattern_response import (
     SEARCH,
@@ -55,10 +56,10 @@ def check_mistuning(scene: Scene) -> None:
 
 
 def with_whole_wheel(
-    run: Run,
+    run: SolvedRun,
     comm: Any = None,
     progress: Progress = unwatched,
-) -> Run:
+) -> SolvedRun:
     """The run with the whole wheel under the load whose tuned resonance is lowest."""
     start = time.perf_counter()
     best = min(run.response.curves, key=lambda curve: curve.peak_amplitude)
@@ -69,7 +70,7 @@ def with_whole_wheel(
 
 
 def scatter_of_run(
-    run: Run,
+    run: SolvedRun,
     comm: Any = None,
     progress: Progress = unwatched,
 ) -> Amplification:
@@ -126,7 +127,7 @@ def _respond_by(
 
 
 def _wheels(
-    run: Run,
+    run: SolvedRun,
     curves: list[Curve],
     comm: Any,
     progress: Progress,

@@ -21,6 +21,7 @@ from ...io.stored_stage import stored_stage
 from ...scene.tables import Scene
 from ...util.progress import Progress, unwatched
 from ..pipeline import pipeline
+from ..pipeline.run_records import ModalRun
 from ..pipeline.stage_inputs import stage_key
 from ..pipeline.stages import MODES_SHOWN, Bodies, excited_modes, is_wheel, wheel_modes
 from ..pipeline.validate_mesh import refuse_loads
@@ -57,7 +58,7 @@ class Wanted:
 class Survey:
     """What was found; the run's modes are those of all nodal diameters."""
 
-    run: pipeline.Run
+    run: ModalRun
     bodies: Bodies
     # effective masses
     masses: pd.DataFrame
@@ -95,7 +96,7 @@ def survey(
     key = stage_key("survey", scene, wanted.direct)
     sets, before = stage(folder, "survey", key, lambda: _all_modes(bodies, wanted.direct), comm)
     messages = [*start.messages, *([] if before is None else [found_remark("modes", before)])]
-    run = replace(start, modes=sets, messages=messages)
+    run = ModalRun(**{**vars(start), "messages": messages}, modes=sets)
     clock = _stage_seconds(run, "modes", clock)
     result = Survey(
         run, bodies, effective_masses(sets, bodies.still_blade), clamped=clamped_blade(bodies)
@@ -120,7 +121,7 @@ def survey(
     return result if other is None else _compare_modes(result, *other)
 
 
-def excited_set(run: pipeline.Run) -> ModeSet:
+def excited_set(run: ModalRun) -> ModeSet:
     """The modes of the nodal diameter that the engine order excites, or the nearest one that is
     there.
     """
@@ -142,7 +143,7 @@ def _engine_orders(scene: Scene) -> list[int]:
 
 
 def _stage_seconds(
-    run: pipeline.Run,
+    run: ModalRun,
     name: str,
     since: float,
 ) -> float:
