@@ -128,7 +128,7 @@ def response(options: argparse.Namespace, comm: Any) -> None:
     scene, folder, bars = prepared(options, comm, responds=True)
     from ..study.pipeline import pipeline
 
-    run = pipeline.run(scene, folder, comm=comm, progress=bars)
+    run = pipeline.run(scene, folder, until="response", comm=comm, progress=bars)
     tell(options, comm, lambda: tables.responses(run.response), run)
 
 

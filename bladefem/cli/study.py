@@ -95,7 +95,7 @@ def _solve_variant(options: argparse.Namespace, comm: Any) -> SolvedRun:
     scene, folder, bars = prepared(options, comm)
     from ..study.pipeline import pipeline
 
-    return pipeline.run(scene, folder, comm=comm, progress=bars)
+    return pipeline.run(scene, folder, until="response", comm=comm, progress=bars)
 
 
 def _make_plan(options: argparse.Namespace) -> Plan:
