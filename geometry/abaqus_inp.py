@@ -33,7 +33,7 @@ SOLIDS = {
 FLAT = {3: "triangle", 6: "triangle6", 4: "quad", 8: "quad8"}
 FLAT_PREFIXES = ("S", "SFM3D", "M3D", "CPS", "CPE", "CPEG", "CAX", "STRI", "R3D", "DS", "CPT")
 # corners of the faces S1, S2, ... of a cell
-FACES = {
+FACES: dict[str, list[tuple[int, ...]]] = {
     "tetra": [(0, 1, 2), (0, 3, 1), (1, 3, 2), (2, 3, 0)],
     "hexahedron": [
         (0, 1, 2, 3),

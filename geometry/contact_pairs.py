@@ -248,7 +248,7 @@ def _name_faces(
     for body, end, contact, far in ends:
         found = centres(gmsh, body, dimension)
         level = [tag for tag, c in found.items() if abs(c[up]) < 1e-6 * seat]
-        faces[contact] = [min(level, key=lambda t, c=found: np.linalg.norm(c[t]))]
+        faces[contact] = [_nearest_axis({tag: found[tag] for tag in level})]
         faces[far] = [tag for tag, c in found.items() if abs(c[up] - end) < 1e-6 * seat]
         for axis, name in enumerate(("symmetry_x", "symmetry_y")[:up]):
             faces.setdefault(name, []).extend(
@@ -277,3 +277,7 @@ def _seat_cells(
     if dimension == 3:
         return 6 * np.pi / 4 * radius**2 / (0.43 * fine**2)
     return 6 * radius / fine
+
+
+def _nearest_axis(places: dict[int, np.ndarray]) -> int:
+    return min(places, key=lambda tag: float(np.linalg.norm(places[tag])))

@@ -51,7 +51,7 @@ def _second_order_edges(
     entity: int,
 ) -> list[tuple[int, np.ndarray]]:
     """(middle node, (2,) ends) of each edge of the entity's second-order elements, once."""
-    found = {}
+    found: dict[int, np.ndarray] = {}
     types, _, nodes = gmsh.model.mesh.getElements(dimension, entity)
     for kind, connectivity in zip(types, nodes, strict=True):
         word = GMSH_TYPES[int(kind)]

@@ -15,7 +15,7 @@ from __future__ import annotations
 from collections.abc import Iterable
 from dataclasses import replace
 from pathlib import Path
-from typing import Any
+from typing import Any, TypeAlias
 
 import numpy as np
 from scipy.spatial import cKDTree
@@ -50,7 +50,7 @@ FLIPPED = {
     "triangle": [0, 2, 1],
     "triangle6": [0, 2, 1, 5, 4, 3],
 }
-Axis = np.ndarray | tuple[float, float, float]
+Axis: TypeAlias = np.ndarray | tuple[float, float, float]
 
 
 def read_geometry(
@@ -277,7 +277,7 @@ def _with_faces(
         for name, nodes in raw.node_sets.items()
     }
     faces = named_facets(cells, mesh.cell_type, _corners_of_faces(raw, mesh.dimension, number))
-    skin = boundary(cells, mesh.cell_type) if sets else None
+    skin = boundary(cells, mesh.cell_type) if sets else np.empty((0, 0), int)
     joined = {_family_word(name) for name in wanted}
     for name, nodes in sets.items():
         inside = np.isin(skin, nodes)[:, : _facet_corners(mesh.cell_type)].all(axis=1)
@@ -317,11 +317,11 @@ def _corners_of_faces(
             corners[_family_word(name)] = [
                 raw.blocks[b][1][rows][:, : CORNERS[FAMILY[raw.blocks[b][0]]]] for b, rows in parts
             ]
-    for name, parts in raw.surfaces.items():
-        if parts:
-            corners.setdefault(_family_word(name), []).extend(parts)
-    for name, parts in corners.items():
-        corners[name] = [number[part] for part in parts]
+    for name, surface in raw.surfaces.items():
+        if surface:
+            corners.setdefault(_family_word(name), []).extend(surface)
+    for name, some in corners.items():
+        corners[name] = [number[part] for part in some]
         if any((part < 0).any() for part in corners[name]):
             raise InputError(
                 f"imported.file: face {name} has nodes that no cell uses, expected faces on the "

@@ -23,7 +23,7 @@ def straight_jacobian(
     """
     if cell_type.startswith(("tetra", "triangle")):
         return _simplex_volume(points[cells])
-    corners = {
+    by_family: dict[str, list[tuple[int, ...]]] = {
         "q": [(0, 1, 3), (1, 2, 0), (2, 3, 1), (3, 0, 2)],
         "h": [
             (0, 1, 3, 4),
@@ -35,7 +35,8 @@ def straight_jacobian(
             (6, 5, 7, 2),
             (7, 6, 4, 3),
         ],
-    }[cell_type[0]]
+    }
+    corners = by_family[cell_type[0]]
     return np.min([_simplex_volume(points[cells[:, c]]) for c in corners], axis=0)
 
 

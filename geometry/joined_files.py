@@ -59,8 +59,8 @@ def _join_meshes(one: RawMesh, other: RawMesh) -> RawMesh:
     for name, members in other.node_sets.items():
         sets[name] = np.concatenate([sets.get(name, np.empty(0, dtype=int)), members + nodes])
     surfaces = {name: list(parts) for name, parts in one.surfaces.items()}
-    for name, parts in other.surfaces.items():
-        surfaces.setdefault(name, []).extend(part + nodes for part in parts)
+    for name, facets in other.surfaces.items():
+        surfaces.setdefault(name, []).extend(part + nodes for part in facets)
     return RawMesh(
         np.vstack([one.points, other.points]),
         [*one.blocks, *((word, cells + nodes) for word, cells in other.blocks)],

@@ -209,8 +209,8 @@ def _set_kinds(raw: RawMesh) -> dict[str, str]:
         words = sorted({FAMILY.get(raw.blocks[b][0], "cell") for b, _ in parts})
         count = sum(len(rows) for _, rows in parts)
         found[name] = f"{count} cells ({', '.join(words)})"
-    for name, parts in raw.surfaces.items():
-        found[name] = f"surface of {sum(len(part) for part in parts)} facets"
+    for name, surface in raw.surfaces.items():
+        found[name] = f"surface of {sum(len(part) for part in surface)} facets"
     for name, nodes in raw.node_sets.items():
         found.setdefault(name, f"{len(nodes)} nodes")
     return found
@@ -219,7 +219,7 @@ def _set_kinds(raw: RawMesh) -> dict[str, str]:
 def _drawn_faces(raw: RawMesh, outside: NumberedFaces) -> tuple[NumberedFaces, list[str]]:
     """The outer facets by the faces of the drawing, in its order, with their names."""
     known: dict[tuple[int, ...], int] = {}
-    names = []
+    names: list[str] = []
     for name, parts in raw.groups.items():
         blocks = [
             (block, rows) for block, rows in parts if DIMENSION[_cell_family(raw, block)] == 2
@@ -356,7 +356,7 @@ def _bore_face(
         for i, face in enumerate(faces)
         if face.name not in (*cut.low, *cut.high)
     }
-    return min(reach, key=reach.get) if reach else None
+    return min(reach, key=lambda name: reach[name]) if reach else None
 
 
 def _names_of(raw: RawMesh) -> set[str]:

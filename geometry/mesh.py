@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field
+from typing import Any
 
 import numpy as np
 
@@ -66,7 +67,7 @@ class Mesh:
     # out-of-plane thickness of a plane mesh [m]
     depth: float = 1.0
     # quality: cells, worst Jacobian, straightened, ...
-    report: dict[str, object] = field(default_factory=dict)
+    report: dict[str, Any] = field(default_factory=dict)
     # named volumes of the blade -> rows of bodies["blade"]
     parts: dict[str, np.ndarray] = field(default_factory=dict)
 

@@ -109,13 +109,12 @@ def _smooth_parts(corners: np.ndarray, normals: np.ndarray) -> np.ndarray:
         there = ~triangle | (i < 3)
         edges.append(np.sort(np.column_stack([start, end])[there], axis=1))
         owner.append(np.flatnonzero(there))
-    edges = np.vstack(edges)
-    owner = np.concatenate(owner)
-    _, number, count = np.unique(edges, axis=0, return_inverse=True, return_counts=True)
+    every = np.concatenate(owner)
+    _, number, count = np.unique(np.vstack(edges), axis=0, return_inverse=True, return_counts=True)
     number = number.ravel()
     order = np.argsort(number, kind="stable")
     order = order[count[number[order]] == 2]
-    one, other = owner[order].reshape(-1, 2).T
+    one, other = every[order].reshape(-1, 2).T
     smooth = np.einsum("ij,ij->i", unit[one], unit[other]) > np.cos(CREASE)
     n = len(corners)
     graph = coo_matrix((np.ones(smooth.sum()), (one[smooth], other[smooth])), shape=(n, n))

@@ -4,6 +4,8 @@ a table.
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 
 from bladefem.errors import InputError
@@ -117,7 +119,7 @@ def report(
     mesh: Mesh,
     straightened: int,
     size: float,
-) -> dict[str, object]:
+) -> dict[str, Any]:
     """What Mesh.report holds: counts, worst Jacobian and shape, cells straightened, element size
     wanted [m] and mean edge length [m].
 

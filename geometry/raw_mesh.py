@@ -12,6 +12,7 @@ import io
 from collections.abc import Callable
 from dataclasses import dataclass, field
 from pathlib import Path
+from types import ModuleType
 
 import numpy as np
 
@@ -111,15 +112,15 @@ def read_by_gmsh(file: Path) -> RawMesh:
         return from_gmsh_model(gmsh)
 
 
-def from_gmsh_model(gmsh: object) -> RawMesh:
+def from_gmsh_model(gmsh: ModuleType) -> RawMesh:
     """The mesh of the current gmsh model; a physical group without a name is called by its
     number.
     """
     tags, xyz, _ = gmsh.model.mesh.getNodes()
     place = np.full(int(tags.max(initial=0)) + 1, -1)
     place[tags.astype(int)] = np.arange(len(tags))
-    blocks = []
-    of_entity = {}
+    blocks: list[tuple[str, np.ndarray]] = []
+    of_entity: dict[tuple[int, int], list[int]] = {}
     for dim, entity in gmsh.model.getEntities():
         for kind, nodes in zip(
             *(gmsh.model.mesh.getElements(dim, entity)[i] for i in (0, 2)), strict=True

@@ -158,10 +158,8 @@ def mark_tip(
         for _, tag in gmsh.model.getBoundary([(2, tip)], oriented=False, recursive=True)
     }
     edge = outline(aerofoil, profile.top, 1)
-    leading, trailing = (
-        min(corners, key=lambda tag, p=p: np.linalg.norm(corners[tag] - p))
-        for p in (edge[len(edge) // 2], edge[0])
-    )
+    leading = _nearest_tag(corners, edge[len(edge) // 2])
+    trailing = _nearest_tag(corners, edge[0])
     middle = gmsh.model.occ.addPoint(
         *place(aerofoil, profile.top, 1, np.array([[0.5, aerofoil.camber]]))[0]
     )
@@ -170,6 +168,10 @@ def mark_tip(
     return replace(
         groups, points={"tip_leading": [leading], "tip_mid": [middle], "tip_trailing": [trailing]}
     )
+
+
+def _nearest_tag(places: dict[int, np.ndarray], point: np.ndarray) -> int:
+    return min(places, key=lambda tag: float(np.linalg.norm(places[tag] - point)))
 
 
 def moved(

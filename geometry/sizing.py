@@ -7,6 +7,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from math import pi
 from types import ModuleType
+from typing import Any
 
 from bladefem.errors import InputError
 
@@ -171,7 +172,7 @@ def set_grids(
 
 
 def _box_field(
-    field: object,
+    field: Any,
     inside: float,
     outside: float,
     thickness: float,
@@ -187,7 +188,7 @@ def _box_field(
 
 
 def _distance_field(
-    field: object,
+    field: Any,
     curves: list[int],
     size: float,
     far: float,

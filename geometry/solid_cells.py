@@ -124,7 +124,7 @@ def _of_wanted_order(
             "in bending, expected second-order cells; imported.linear = 'promote' adds nodes in "
             "the middle of their edges, 'keep' solves them as they are"
         )
-    notes = ()
+    notes: tuple[str, ...] = ()
     if first_order:
         notes = (f"{_count_text(first_order)} were promoted to second order, edges straight",)
     return *completed_cells(points, blocks), notes

@@ -76,14 +76,14 @@ def read_step(
     path = Path(file)
     if not path.is_file():
         raise InputError(f"imported.file = '{file}': there is no such file")
-    axis = np.asarray(axis, dtype=float) / np.linalg.norm(axis)
+    unit = np.asarray(axis, dtype=float) / np.linalg.norm(axis)
     text = path.read_text(errors="replace")
     with gmsh_session() as gmsh:
         with attempt("imported.file", f"import '{file}'"):
             _import_shapes(gmsh, path, 1.0 if scale == 1.0 else scale / file_unit(text))
         named = _apply_names(_named_entities(gmsh, text), read_names(names))
         if fitted is not None:
-            on = rotation(axis, 2 * np.pi / sectors)
+            on = rotation(unit, 2 * np.pi / sectors)
             named = fit_wedge(
                 gmsh,
                 named,
@@ -91,10 +91,10 @@ def read_step(
                 fitted.wedge,
                 fitted.seat_width,
                 on,
-                axis,
+                unit,
             )
-        named |= _find_faces(gmsh, named, sectors, axis)
-        _tie_faces(gmsh, named, sectors, axis)
+        named |= _find_faces(gmsh, named, sectors, unit)
+        _tie_faces(gmsh, named, sectors, unit)
         with attempt("mesh.size", f"mesh '{file}'"):
             _generate_mesh(
                 gmsh,
@@ -111,7 +111,7 @@ def read_step(
                 dimension, gmsh.model.addPhysicalGroup(dimension, tags), name
             )
         raw = from_gmsh_model(gmsh)
-    return mesh_of_raw(raw, 1.0, sectors, axis, str(file))
+    return mesh_of_raw(raw, 1.0, sectors, unit, str(file))
 
 
 def coarse_step(file: str | Path) -> RawMesh:
@@ -195,7 +195,7 @@ def _apply_names(named: Named, wanted: dict[str, list[str]]) -> Named:
     one.
     """
     solids = {name.lower() for dim, name in named if dim == 3}
-    result = {}
+    result: Named = {}
     for dim in (3, 2):
         groups = {name: tags for (d, name), tags in named.items() if d == dim}
         here = {
@@ -212,9 +212,12 @@ def _written_names(text: str) -> list[tuple[str, list[str]]]:
     }
     solids = []
     for body in (record[n] for n in sorted(record) if record[n].startswith("MANIFOLD_SOLID_BREP")):
-        name, shell = re.match(
-            r"MANIFOLD_SOLID_BREP\s*\(\s*'(.*?)'\s*,\s*#(\d+)", body, re.S
-        ).groups()
+        head = re.match(r"MANIFOLD_SOLID_BREP\s*\(\s*'(.*?)'\s*,\s*#(\d+)", body, re.S)
+        if head is None:
+            raise InputError(
+                f"imported.file: solid '{body[:60]}', expected MANIFOLD_SOLID_BREP('name', #shell)"
+            )
+        name, shell = head.groups()
         faces = re.findall(r"#(\d+)", record.get(int(shell), ""))
         words = [
             re.match(r"\w+\s*\(\s*'(.*?)'", record.get(int(face), "X('')"), re.S) for face in faces
@@ -253,7 +256,7 @@ def _find_faces(
             for tag, c in middle.items()
             if not any(tag in tags for tags in found.values())
         }
-        found[2, "clamp"] = [min(radius, key=radius.get)]
+        found[2, "clamp"] = [min(radius, key=lambda tag: radius[tag])]
     return found
 
 
@@ -346,7 +349,7 @@ def _generate_mesh(
     away from them.
     """
     low, high = np.array(gmsh.model.getBoundingBox(-1, -1)).reshape(2, 3)
-    base = size.size or np.linalg.norm(high - low) / 40
+    base = size.size or float(np.linalg.norm(high - low)) / 40
     gmsh.option.setNumber("Mesh.MeshSizeMax", base)
     gmsh.option.setNumber("Mesh.MeshSizeMin", min(base / 4, size.contact_size or base))
     gmsh.option.setNumber("Mesh.MeshSizeFromCurvature", 10)

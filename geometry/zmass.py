@@ -123,7 +123,10 @@ def _name_faces(
     the block.
     """
     found = {tag: centre[2] for tag, centre in centres(gmsh, body).items()}
-    faces = {"footprint": [min(found, key=found.get)], "top": [max(found, key=found.get)]}
+    faces = {
+        "footprint": [min(found, key=lambda tag: found[tag])],
+        "top": [max(found, key=lambda tag: found[tag])],
+    }
     if block is None:
         return Groups({"damper": [body]}, faces)
     found = {tag: centre[2] for tag, centre in centres(gmsh, block).items()}
