@@ -71,7 +71,7 @@ class PortModel:
     def __post_init__(self) -> None:
         p = len(self.residual)
         m = len(self.omega)
-        wanted = {
+        wanted: dict[str, list[tuple[int, ...]]] = {
             "omega": [(m,)],
             "shapes": [(p, m)],
             "residual": [(p, p)],

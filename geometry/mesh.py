@@ -7,6 +7,8 @@ from typing import Any
 
 import numpy as np
 
+from bladefem.errors import InputError
+
 
 @dataclass(frozen=True)
 class Sector:
@@ -82,3 +84,14 @@ class Mesh:
     def dimension(self) -> int:
         """2 for plane meshes, 3 for solids."""
         return 2 if self.cell_type.startswith(("triangle", "quad")) else 3
+
+
+def sector_of(mesh: Mesh) -> Sector:
+    """How the next blade is reached.
+
+    Raises:
+        InputError: the mesh is of a single blade.
+    """
+    if mesh.sector is None:
+        raise InputError("the mesh is of a single blade, expected the sector of a wheel")
+    return mesh.sector

@@ -48,7 +48,7 @@ def seat_contact(contact: Contact, patch: str) -> Contact:
     A stiffness of the seat itself, total or areal, wins over both of [contact].
     """
     own = {"this": contact.right, "next": contact.left}.get(patch, Seat())
-    changes: dict[str, float | None] = {} if own.mu is None else {"mu": own.mu}
+    changes: dict[str, Any] = {} if own.mu is None else {"mu": own.mu}
     for total, areal in (("kt", "kt_area"), ("kn", "kn_area")):
         if getattr(own, total) is not None or getattr(own, areal) is not None:
             changes |= {total: getattr(own, total), areal: getattr(own, areal)}
@@ -216,6 +216,8 @@ def friction_elements(
     area = [a.T @ m.patch.area for a, m in zip(members, maps, strict=True)]
     mapped: list[np.ndarray | None] = [None] * len(maps)
     if contact.stiffness == "map":
+        if problem is None:
+            raise InputError("contact.stiffness = 'map': expected the contact problem of the maps")
         mapped = [a.T @ k for a, k in zip(members, mapped_stiffness(problem, maps), strict=True)]
     kt, kn = map(
         np.concatenate,

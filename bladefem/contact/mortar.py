@@ -11,6 +11,7 @@ of the other. Source of the method: Puso and Laursen, DOI 10.1016/j.cma.2003.10.
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
@@ -190,11 +191,17 @@ def _cut_line(ends: np.ndarray) -> list[np.ndarray]:
     return [np.array([[a], [b]])] if b - a > 2 * SLIVER_AREA else []
 
 
-def _cut_triangle(polygon: np.ndarray) -> list[np.ndarray]:
+def _cut_triangle(triangle: np.ndarray) -> list[np.ndarray]:
     """The part of a triangle (3, 2) within the reference triangle as triangles (3, 2)
     (Sutherland-Hodgman).
     """
-    for level in (lambda p: p[0], lambda p: p[1], lambda p: 1 - p[0] - p[1]):
+    polygon = list(triangle)
+    levels: tuple[Callable[[np.ndarray], float], ...] = (
+        lambda p: p[0],
+        lambda p: p[1],
+        lambda p: 1 - p[0] - p[1],
+    )
+    for level in levels:
         polygon = _clip_polygon(polygon, level)
         if len(polygon) < 3:
             return []
@@ -202,7 +209,9 @@ def _cut_triangle(polygon: np.ndarray) -> list[np.ndarray]:
     return [f for f in fan if abs(np.linalg.det(f[1:] - f[0])) > SLIVER_AREA]
 
 
-def _clip_polygon(polygon: list[np.ndarray] | np.ndarray, level: object) -> list[np.ndarray]:
+def _clip_polygon(
+    polygon: list[np.ndarray], level: Callable[[np.ndarray], float]
+) -> list[np.ndarray]:
     """The part of a convex polygon where a linear function is not negative."""
     kept = []
     for a, b in zip(polygon, [*polygon[1:], polygon[0]], strict=True):

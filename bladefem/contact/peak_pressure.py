@@ -186,15 +186,14 @@ def _half_width(
     axes = pressure.patch.frame.mean(axis=0)[1 : 2 if plane else 3]
     lengths = [*np.ptp(pressure.patch.points @ axes.T, axis=0), *([depth] if plane else [])]
     radii = [contact.crown_across, None if plane else contact.crown]
+    both = [radius for radius in radii if radius is not None]
     widths = []
     for radius, length, other in zip(radii, lengths, lengths[::-1], strict=True):
         if radius is not None:
             width = line_width(load / other, radius, modulus)
-            if None not in radii:
-                width = max(
-                    width,
-                    point_radius(load, np.prod(radii) ** 0.5, modulus)
-                    * (radius / max(radii)) ** (1 / 3),
-                )
+            if len(both) == 2:
+                mean = float(np.prod(both)) ** 0.5
+                ellipse = (radius / max(both)) ** (1 / 3)
+                width = max(width, point_radius(load, mean, modulus) * ellipse)
             widths.append(width if width < length / 2 else np.inf)
     return min(widths, default=np.inf)

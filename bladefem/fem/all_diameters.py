@@ -11,6 +11,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 from scipy.linalg import eigh
@@ -20,10 +21,10 @@ from ..errors import InputError, NotSolvedError
 from ..util.progress import Progress, unwatched
 from . import cyclic_schur as core
 from .body import Body
-from .constraint import Constrained, Transformation, at_diameter, transformation
+from .constraint import Constrained, Transformation, at_diameter, high_part, transformation
 from .eigensolver import Eigensolver
 from .flexibility import Flexibility, flexible
-from .linalg import apply, combined, dot, inertia, minus, mix
+from .linalg import Folded, apply, combined, dot, inertia, minus, mix
 from .memory import give_back
 from .modes import BLOCKS, SLEPC, mode_set, pairs
 
@@ -247,27 +248,28 @@ def _project_columns(
     new: slice,
 ) -> tuple[list[np.ndarray], list[np.ndarray]]:
     """(m, new) columns of the projections of K0, Kc, Ks and of M0, Mc, Ms."""
+    comm = t.body.comm
     if t.opened is None:
-        return tuple(
-            [dot(t.body.comm, W, apply(A, W[:, new])) for A in three] for three in (t.K, t.M)
-        )
-    T1 = t.high[t.opened.places]
+        stiff = [dot(comm, W, apply(A, W[:, new])) for A in t.K]
+        return stiff, [dot(comm, W, apply(A, W[:, new])) for A in t.M]
+    T1 = high_part(t)[t.opened.places]
     faces = np.flatnonzero(np.diff(T1.indptr))
     low = t.low[t.opened.places] @ W
     high = T1[faces] @ W
     out = []
-    for A, (LL, HL) in zip(
-        (t.opened.K, t.opened.M), _project_interior(t, low, high, faces, new), strict=True
-    ):
+    both = t.opened.K, t.opened.M
+    inner = _project_interior(both, low, high, faces, new)
+    for A, (LL, HL) in zip(both, inner, strict=True):
         beside = A[faces].T.tocsr()
         near = np.flatnonzero(np.diff(beside.indptr))
         LH = low[near].T @ (beside[near] @ high[:, new])
         out.append([LL + high.T @ (A[faces][:, faces] @ high[:, new]), LH + HL, LH - HL])
-    return tuple(out)
+    K, M = out
+    return K, M
 
 
 def _project_interior(
-    t: Transformation,
+    both: tuple[Any, Any],
     low: np.ndarray,
     high: np.ndarray,
     faces: np.ndarray,
@@ -277,7 +279,7 @@ def _project_interior(
     pieces: list[list] = [[], []]
     for first in range(new.start, low.shape[1], CHUNK):
         moved = np.ascontiguousarray(low[:, first : first + CHUNK])
-        for piece, A in zip(pieces, (t.opened.K, t.opened.M), strict=True):
+        for piece, A in zip(pieces, both, strict=True):
             image = A @ moved
             piece.append((low.T @ image, high.T @ image[faces]))
     return [
@@ -389,11 +391,9 @@ def _count_below(
     shift: float,
     shared: core.Core | None,
 ) -> int:
-    return (
-        inertia(combined(con.K, -shift, con.M))
-        if shared is None
-        else core.negative(shared, con.K.C)
-    )
+    if shared is None or not isinstance(con.K, Folded):
+        return inertia(combined(con.K, -shift, con.M))
+    return core.negative(shared, con.K.C)
 
 
 def _widest_gap(lists: list[np.ndarray]) -> float:

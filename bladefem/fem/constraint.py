@@ -17,7 +17,7 @@ from dataclasses import dataclass
 import numpy as np
 import scipy.sparse as sp
 
-from geometry.mesh import Pair
+from geometry.mesh import Pair, sector_of
 
 from ..errors import InputError, suggestion
 from . import cyclic_schur as core
@@ -130,7 +130,7 @@ def transformation(
         return Transformation(
             body, low, None, start, (body.K.ptap(T0),), (body.M.ptap(T0),), None, 0
         )
-    sectors = body.mesh.sector.count
+    sectors = sector_of(body.mesh).count
     if body.comm.size == 1 and one_core is not False:
         opened = _open_sector(
             body,
@@ -154,6 +154,17 @@ def transformation(
     )
 
 
+def high_part(t: Transformation) -> sp.csr_matrix:
+    """T1, the part of a wheel's transformation that the next sector's motion adds.
+
+    Raises:
+        InputError: the body has no cyclic faces.
+    """
+    if t.high is None:
+        raise InputError(f"body '{t.body.name}' has no cyclic faces, expected a sector of a wheel")
+    return t.high
+
+
 def at_diameter(t: Transformation, nodal_diameter: int | None) -> Constrained:
     """The constrained body in one nodal diameter, 0 <= n <= N/2."""
     rank = t.body.comm.rank
@@ -166,7 +177,7 @@ def at_diameter(t: Transformation, nodal_diameter: int | None) -> Constrained:
     angle = 2 * np.pi * n / t.sectors
     real = 2 * n % t.sectors == 0
     phase = np.exp(1j * angle) if not real else 1.0 if n == 0 else -1.0
-    T = (t.low + phase * t.high).tocsr()
+    T = (t.low + phase * high_part(t)).tocsr()
     if t.opened is not None:
         C = T[t.opened.places]
         return Constrained(
@@ -431,8 +442,9 @@ def _number_unknowns(
     )
     if not len(columns):
         raise InputError(f"body '{body.name}' has no free node left, expected a smaller clamp")
-    cut = (A if A is None else A[:, columns].tocsr() for A in (low, high))
-    return *cut, np.asarray(start, int)
+    kept = low[:, columns].tocsr()
+    moved = None if high is None else high[:, columns].tocsr()
+    return kept, moved, np.asarray(start, int)
 
 
 def _to_petsc(

@@ -10,6 +10,7 @@ real and imaginary parts. One rank only.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import partial
 
 import numpy as np
 import scipy.sparse as sp
@@ -159,14 +160,15 @@ def negative(core: Core, C: sp.csr_matrix) -> int:
 def solve(rim: Rim, B: np.ndarray) -> np.ndarray:
     """Solve for a block of vectors (n_free, k)."""
     X = np.empty(B.shape, np.result_type(B, rim.C.dtype), order="F")
-    one_go = _solve_one_sweep if rim.core.bridge else _solve_two_sweeps
+    made = rim.core.bridge
+    one_go = _solve_two_sweeps if made is None else partial(_solve_one_sweep, made)
     for first in range(0, B.shape[1], BATCH):
         part = slice(first, first + BATCH)
         X[rim.inner, part], X[rim.masters, part] = one_go(rim, B[:, part])
     return X
 
 
-def _solve_one_sweep(rim: Rim, B: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+def _solve_one_sweep(made: Bridge, rim: Rim, B: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Solution inside and on the low cut face, by one sweep down and one up."""
     core = rim.core
     on_face = []
@@ -178,7 +180,7 @@ def _solve_one_sweep(rim: Rim, B: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     B = B.astype(np.result_type(B, rim.C.dtype))
     k = B.shape[1] * (2 if np.iscomplexobj(B) else 1)
     return _join_parts(
-        through(core.bridge, _widen_columns(core, B[rim.inner]), answer)[core.inner], B
+        through(made, _widen_columns(core, B[rim.inner]), answer)[core.inner], B
     ), on_face[-1]
 
 

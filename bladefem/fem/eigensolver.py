@@ -81,7 +81,7 @@ class _Pencil:
         vector: PETSc.Vec,
     ) -> None:
         """The inverse of ``column``."""
-        values = np.ascontiguousarray(column[:, 0], dtype=self.con.dtype)
+        values: np.ndarray = np.ascontiguousarray(column[:, 0], dtype=self.con.dtype)
         vector.setArray(values.view(float))
 
 

@@ -151,10 +151,10 @@ def piecewise(domain: Any, values: np.ndarray) -> Any:
 def _material_flexibility(material: Material) -> np.ndarray:
     """(6, 6) strains of unit stresses in the material's own axes [1/Pa]."""
     if material.orthotropic is None:
-        E = (material.E,) * 3
-        nu = (material.nu,) * 3
         shear = material.E / (2 * (1 + material.nu)) if material.G is None else material.G
-        G = (shear,) * 3
+        E: tuple[float, ...] = (material.E,) * 3
+        nu: tuple[float, ...] = (material.nu,) * 3
+        G: tuple[float, ...] = (shear,) * 3
     else:
         E = material.orthotropic[:3]
         nu = material.orthotropic[3:6]

@@ -9,6 +9,7 @@ stiffness of the springs.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from scipy.linalg import qr
@@ -72,7 +73,7 @@ def rigid_basis(con: Constrained) -> np.ndarray:
     body = con.body
     if (con.nodal_diameter or 0) > 1:
         return np.zeros((con.own.stop - con.own.start, 0), con.dtype)
-    R = rigid_modes(body).reshape(con.T.shape[0], -1).astype(con.dtype)
+    R: np.ndarray = rigid_modes(body).reshape(con.T.shape[0], -1).astype(con.dtype)
     weight = np.asarray(abs(con.T).max(1).todense()).ravel() > 0
     inside = np.repeat(body.rows >= 0, body.dim)
     columns = unknown_places(con)
@@ -85,18 +86,18 @@ def rigid_basis(con: Constrained) -> np.ndarray:
         return basis
     gram = dot(body.comm, basis, apply(con.M, basis))
     basis = basis @ np.linalg.inv(np.linalg.cholesky(gram)).conj().T
-    return basis if body.spring is None else _unsprung_motions(con, basis)
+    return basis if body.spring is None else _unsprung_motions(con, body.spring, basis)
 
 
-def _unsprung_motions(con: Constrained, basis: np.ndarray) -> np.ndarray:
+def _unsprung_motions(con: Constrained, spring: Any, basis: np.ndarray) -> np.ndarray:
     """The rigid motions (n_own, r) that springs on faces leave without force."""
     body = con.body
     moves = expand(con, basis).reshape(len(body.scalar_rows), -1)
-    first, last = body.spring.owner_range
+    first, last = spring.owner_range
     outside = np.count_nonzero(body.scalar_rows < 0)
     mine = np.argsort(body.scalar_rows, kind="stable")[outside:][first:last]
     local = np.asfortranarray(moves[mine])
-    stiffness = dot(body.comm, local, apply(body.spring, local))
+    stiffness = dot(body.comm, local, apply(spring, local))
     lam, Z = np.linalg.eigh((stiffness + stiffness.conj().T) / 2)
     return basis @ Z[:, lam < SOFT * scale(con.K) / scale(con.M)]
 

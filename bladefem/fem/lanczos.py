@@ -135,7 +135,9 @@ def _extend_basis(
     known = [*space.V, *space.P]
     Mknown = [*space.MV, *space.MP]
     column = dot(comm, Mknown, W)
-    Q, MQ, tail = orthonormal(con, known, Mknown, minus(W, known, column), np.linalg.norm(column))
+    Q, MQ, tail = orthonormal(
+        con, known, Mknown, minus(W, known, column), float(np.linalg.norm(column))
+    )
     total = old + block.shape[1]
     corner = (column[old:total] + column[old:total].conj().T) / 2
     space.H = np.block([[space.H, column[:old]], [column[:old].conj().T, corner]])

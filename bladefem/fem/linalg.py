@@ -14,6 +14,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass
+from typing import Any, TypeAlias
 
 import numpy as np
 import scipy.sparse as sp
@@ -43,8 +44,8 @@ class Folded:
     core: interior.Core | None
 
 
-Matrix = PETSc.Mat | Doubled | Folded
-Block = np.ndarray | list[np.ndarray]
+Matrix: TypeAlias = PETSc.Mat | Doubled | Folded
+Block: TypeAlias = np.ndarray | list[np.ndarray]
 
 
 @dataclass(frozen=True)
@@ -86,7 +87,7 @@ def factorise(
         core = A.core or interior.eliminate(A.A, interior.rim_of(A.C), definite)
         return Factor(interior.close(core, A.C, definite, springs), False)
     doubled = isinstance(A, Doubled)
-    matrix = A.matrix if doubled else A
+    matrix = A.matrix if isinstance(A, Doubled) else A
     if springs is not None:
         matrix = matrix.duplicate(copy=True)
         diagonal = matrix.createVecRight()
@@ -122,9 +123,9 @@ def combined(
     B: Matrix,
 ) -> Matrix:
     """A + factor B."""
-    if isinstance(A, Folded):
+    if isinstance(A, Folded) and isinstance(B, Folded):
         return Folded((A.A + factor * B.A).tocsr(), A.C, None)
-    if isinstance(A, Doubled):
+    if isinstance(A, Doubled) and isinstance(B, Doubled):
         return Doubled(combined(A.matrix, factor, B.matrix))
     out = A.duplicate(copy=True)
     out.axpy(factor, B, structure=PETSc.Mat.Structure.DIFFERENT_NONZERO_PATTERN)
@@ -145,7 +146,7 @@ def dense_rows(A: Matrix, n: int) -> np.ndarray:
 
 
 def dot(
-    comm: object,
+    comm: Any,
     X: Block,
     Y: np.ndarray,
 ) -> np.ndarray:

@@ -79,10 +79,10 @@ def surface_load(
     values, tangents, w = shape.geometry(kind, body.mesh.points[facets][:, :, :d], 8)
     normal = _outward_normals(body, facets, _area_normals(tangents))
     depth = body.mesh.depth if d == 2 else 1.0
-    if traction is not None:
-        field = np.linalg.norm(normal, axis=2)[:, :, None] * np.asarray(traction, float)[:d]
-    else:
+    if pressure is not None:
         field = -pressure * normal
+    else:
+        field = np.linalg.norm(normal, axis=2)[:, :, None] * np.asarray(traction, float)[:d]
     force = np.zeros((len(body.mesh.points), d))
     np.add.at(force, facets, depth * np.einsum("qk,q,cqd->ckd", values, w, field))
     return force.ravel()

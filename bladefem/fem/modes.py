@@ -9,6 +9,7 @@ has; so the inertia of K - s M counts the eigenvalues, and what was missed is fo
 from __future__ import annotations
 
 from collections.abc import Callable
+from typing import Any
 
 import numpy as np
 
@@ -214,7 +215,7 @@ def _basis_rotation(lam: np.ndarray, images: np.ndarray) -> np.ndarray:
 
 def count_below(con: Constrained, lam: float) -> int:
     """Number of eigenvalues below lam [rad^2/s^2], by Sylvester's law of inertia."""
-    if isinstance(con.K, Folded) and con.K.core is not None:
+    if isinstance(con.K, Folded) and isinstance(con.M, Folded) and con.K.core is not None:
         # the interior in the order that serves the stiffness too
         core = con.K.core
         shifted = (con.K.A - lam * con.M.A).tocsr()
@@ -234,6 +235,6 @@ def _widest_gap(lam: np.ndarray) -> tuple[float, int]:
     return (lam[gap - 1] + lam[gap]) / 2, gap
 
 
-def _column_norms(comm: object, X: np.ndarray) -> np.ndarray:
+def _column_norms(comm: Any, X: np.ndarray) -> np.ndarray:
     squares = (X.real**2 + X.imag**2).sum(0) if np.iscomplexobj(X) else (X**2).sum(0)
     return np.sqrt(comm.allreduce(squares) if comm.size > 1 else squares)

@@ -5,7 +5,7 @@ Both come from the one factorisation that also gives the modes.
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -97,6 +97,8 @@ def port_models(
     lam = {}
     for p in eigenpairs(t, count, diameters, tolerance=TOLERANCE, solver=solver):
         n = p.con.nodal_diameter
+        # None is for bodies without cyclic faces only
+        assert n is not None
         cons[n] = p.con
         lam[n] = p.lam
         yield n, _port_model(model, p)
@@ -123,11 +125,12 @@ def _port_model(model: _Ports, p: Eigenpairs) -> PortModel:
     n = p.con.nodal_diameter
     load = model.static_load if n == 0 else None
     P = model.P
-    if model.shared is None or p.flex.R.shape[1]:
+    rim = p.flex.factor.parts
+    if model.shared is None or not isinstance(rim, Rim) or p.flex.R.shape[1]:
         return port_model(
             p.con, P, model.names, model.count, load, model.kind, p.flex, model.solver
         )
-    G, offset = _closed_flexibility(model.shared, p.flex.factor.parts)
+    G, offset = _closed_flexibility(model.shared, rim)
     lam = p.lam[: model.count]
     vectors = canonical(p.con, lam, p.X[:, : model.count])
     shapes = dot(p.con.body.comm, _restrict_ports(p.con, P), vectors)
@@ -254,7 +257,7 @@ def _fixed_inverse(
     flex: Flexibility,
     F: np.ndarray,
     X: np.ndarray,
-) -> object:
+) -> Callable[[np.ndarray], np.ndarray]:
     """K^-1 with the ports held: the reactions f make F^H u zero, and leave no rigid load on a
     floating body.
 

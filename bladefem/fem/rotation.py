@@ -161,6 +161,7 @@ def preload(
     iterations = 0
     steps = 0
     halvings = 0
+    misfit = 0.0
     while done < 1.0:
         target = min(done + part, 1.0)
         trial, used, error = _solve_newton(
@@ -177,9 +178,10 @@ def preload(
                 )
             continue
         u = trial
+        misfit = error
         done = target
         steps = steps + 1
-    return Preload(u, speed, iterations, steps, error / size)
+    return Preload(u, speed, iterations, steps, misfit / size)
 
 
 def tangent(

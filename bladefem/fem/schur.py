@@ -16,9 +16,11 @@ import threading
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
+from typing import TypeVar
 
 import numpy as np
 
+from ..errors import NotSolvedError
 from .mumps import Factorised, petsc_call, set_operation, solve_matrix
 
 # MATOP_MAT_SOLVE: PETSc 3.1 to 3.19, later
@@ -82,12 +84,20 @@ def bridge(factor: Factorised, n: int) -> Bridge | None:
     callback = CALLBACK(answer)
     _use_complement(factor, ones)
     petsc_call("MatFactorFactorizeSchurComplement", factor.matrix.handle)
-    _use_complement(
-        factor, lambda handle: [set_operation(handle, place, callback) for place in MATSOLVE]
-    )
+
+    def redirect(handle: int) -> None:
+        for place in MATSOLVE:
+            set_operation(handle, place, callback)
+
+    _use_complement(factor, redirect)
     made = Bridge(factor, n, answers, raised, callback)
     heard: list[int] = []
-    through(made, np.zeros((factor.matrix.size[0], 1)), lambda r: heard.append(1) or r)
+
+    def listen(r: np.ndarray) -> np.ndarray:
+        heard.append(1)
+        return r
+
+    through(made, np.zeros((factor.matrix.size[0], 1)), listen)
     return made if heard else None
 
 
@@ -133,7 +143,10 @@ def _signals_wait() -> Iterator[None]:
             signal.raise_signal(came[0])
 
 
-def _use_complement(factor: Factorised, use: Callable[[int], object]) -> object:
+Result = TypeVar("Result")
+
+
+def _use_complement(factor: Factorised, use: Callable[[int], Result]) -> Result:
     """Do something with PETSc's Schur complement."""
     matrix = ctypes.c_void_p()
     status = ctypes.c_int()
@@ -143,6 +156,8 @@ def _use_complement(factor: Factorised, use: Callable[[int], object]) -> object:
         ctypes.byref(matrix),
         ctypes.byref(status),
     )
+    if matrix.value is None:
+        raise NotSolvedError("PETSc handed out no Schur complement of the cut faces")
     out = use(matrix.value)
     petsc_call(
         "MatFactorRestoreSchurComplement", factor.matrix.handle, ctypes.byref(matrix), status

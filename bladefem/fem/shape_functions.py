@@ -37,7 +37,7 @@ FACET_OF = {
     "hexahedron27": "quad9",
 }
 
-_CORNERS = {
+_CORNERS: dict[str, list[tuple[int, ...]]] = {
     "line": [(0,), (1,)],
     "triangle": [(0, 0), (1, 0), (0, 1)],
     "quad": [(0, 0), (1, 0), (1, 1), (0, 1)],

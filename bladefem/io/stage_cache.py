@@ -79,8 +79,10 @@ def code_of(*packages: str) -> str:
     """
     digest = hashlib.sha256()
     for package in packages:
-        folder = Path(next(iter(find_spec(package).submodule_search_locations)))
-        for file in sorted(folder.rglob("*.py")):
+        found = find_spec(package)
+        if found is None or not found.submodule_search_locations:
+            raise ModuleNotFoundError(f"{package}: no such package of sources")
+        for file in sorted(Path(found.submodule_search_locations[0]).rglob("*.py")):
             digest.update(file.read_bytes())
     return digest.hexdigest()[:20]
 

@@ -99,7 +99,7 @@ def _read_entries(path: Path) -> Iterator[tuple[int, list[str]]]:
     * + or blanks.
     """
     number = 0
-    fields = []
+    fields: list[str] = []
     for count, line in enumerate(path.read_text().splitlines(), 1):
         line = line.split("$")[0].rstrip()
         first, data = _split_fields(line)

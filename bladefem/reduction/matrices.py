@@ -6,6 +6,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from scipy import io, linalg, sparse
@@ -139,7 +140,7 @@ def _read_market(path: Path) -> dict[str, np.ndarray]:
     return {path.stem: _dense_array(io.mmread(path))}
 
 
-def _dense_array(matrix: np.ndarray) -> np.ndarray:
+def _dense_array(matrix: Any) -> np.ndarray:
     return matrix.toarray() if sparse.issparse(matrix) else np.asarray(matrix)
 
 

@@ -188,10 +188,12 @@ def _in_range(
     unit = field.meta.get("unit") or "1"
     if _within_range(number, low, high):
         return number
-    if low is None or high is None:
-        limit = f"at most {show(high, unit)}" if low is None else f"at least {show(low, unit)}"
-    else:
+    if low is not None and high is not None:
         limit = f"{show(low, unit)} to {show(high, unit)}"
+    elif low is not None:
+        limit = f"at least {show(low, unit)}"
+    else:
+        limit = f"at most {show(high, unit)}"
     raise InputError(
         f"{field.name} = {show(number, unit)}: expected {limit}{_forgotten_unit(written, field)}"
     )

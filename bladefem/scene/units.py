@@ -143,7 +143,7 @@ def shortened(value: object, length: int = 60) -> str:
 def is_plain(text: str) -> bool:
     """Whether a text is a number without a unit."""
     match = _NUMBER.fullmatch(text)
-    return bool(match) and not match[2]
+    return match is not None and not match[2]
 
 
 def readable_units(unit: str) -> tuple[str, ...]:
