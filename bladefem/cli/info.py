@@ -5,6 +5,7 @@ from __future__ import annotations
 import os
 import platform
 from pathlib import Path
+from typing import Any
 
 
 def facts() -> list[tuple[str, str]]:
@@ -47,7 +48,7 @@ def _solver_versions() -> list[tuple[str, str]]:
     ]
 
 
-def _mumps_check(PETSc: object) -> str:
+def _mumps_check(PETSc: Any) -> str:
     """Whether a factorisation with MUMPS works, and which ordering it chose."""
     try:
         size = 2000

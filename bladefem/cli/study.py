@@ -8,6 +8,7 @@ from __future__ import annotations
 import argparse
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from functools import partial
 from itertools import product
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -75,11 +76,11 @@ def study(options: argparse.Namespace, comm: Any) -> None:
     for number, (values, one, scene) in enumerate(zip(plan.runs, parts, scenes, strict=True), 1):
         said = ", ".join(f"{n} = {v}" for n, v in zip(plan.names, values, strict=True))
         progress = f"\n{said} ({number} of {len(parts)})"
-        tell(options, comm, lambda text=progress: text)
+        tell(options, comm, partial(str, progress))
         if done:
-            on_root(comm, lambda one=one: _borrow_stages(Path(parts[0].output), Path(one.output)))
+            on_root(comm, partial(_borrow_stages, Path(parts[0].output), Path(one.output)))
         run = _solve_variant(one, comm)
-        tell(options, comm, lambda run=run: tables.responses(run.response), run)
+        tell(options, comm, partial(tables.responses, run.response), run)
         # not before the first line: it is slow to load
         from ..report.study import Variant
 

@@ -104,6 +104,13 @@ class _Map:
     def spread(self, c: np.ndarray) -> np.ndarray:
         return np.einsum("hnr,hr->hn", self.side.T, c)
 
+    @property
+    def latest(self) -> DamperResponse:
+        """The damper's motion under the platform motion that was tried last."""
+        if self.last is None:
+            raise RuntimeError("no motion of the damper was computed yet")
+        return self.last
+
     def force(self, u: np.ndarray) -> np.ndarray:
         self.last = damper_response(self.side, u, self.rules.damper, steps=self.rules.steps)
         self.calls, self.periods = self.calls + 1, self.periods + self.last.periods
@@ -181,11 +188,11 @@ def _fixed_point_loop(
         step = np.linalg.norm(new - motions[-1]) / np.linalg.norm(new)
         g.steps.append(float(step))
         if not np.isfinite(step) or np.linalg.norm(new) > DIVERGED_GROWTH * size:
-            solved = g.last.reason == "periodic" or rules.damper == "march"
+            solved = g.latest.reason == "periodic" or rules.damper == "march"
             return (
                 motions[-1],
                 False,
-                "diverged" if solved else f"damper not solved: {g.last.reason}",
+                "diverged" if solved else f"damper not solved: {g.latest.reason}",
             )
         if rules.criterion == "step" and step < rules.tolerance:
             return new, True, f"step {step:.1e} below {rules.tolerance:.1e}"
@@ -193,7 +200,7 @@ def _fixed_point_loop(
         images.append(g(new))
         if rules.criterion == "residual":
             u = g.spread(new)
-            error = np.linalg.norm(residual(g.side, u, g.last.force)) / np.linalg.norm(u)
+            error = np.linalg.norm(residual(g.side, u, g.latest.force)) / np.linalg.norm(u)
             if error < rules.tolerance:
                 return new, True, f"residual {error:.1e} below {rules.tolerance:.1e}"
     return motions[-1], False, f"no convergence in {rules.most} evaluations"
@@ -305,7 +312,7 @@ def _damped_newton(g: _Map, c: np.ndarray) -> tuple[np.ndarray, bool, str]:
         g.rules.most,
     )
     unsolved = run.outcome is Outcome.NOT_FINITE
-    reason = f"damper not solved: {g.last.reason}" if unsolved else run.reason
+    reason = f"damper not solved: {g.latest.reason}" if unsolved else run.reason
     return _packed_motion(run.state[0], c.shape), run.converged, reason
 
 

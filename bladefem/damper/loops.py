@@ -148,7 +148,7 @@ def ratio_table(
     """The paper's rule on many frequency ratios: one row each, with loops, denominator, drift and
     whether it holds.
     """
-    rows = []
+    rows: list[dict[str, float | str]] = []
     for ratio in ratios:
         result = steady(body, Drive(Fraction(ratio)), steps)
         rows.append(

@@ -127,6 +127,8 @@ def combined(
         return Folded((A.A + factor * B.A).tocsr(), A.C, None)
     if isinstance(A, Doubled) and isinstance(B, Doubled):
         return Doubled(combined(A.matrix, factor, B.matrix))
+    if isinstance(A, Folded | Doubled):
+        raise TypeError("the sum of two matrices: expected both of one kind")
     out = A.duplicate(copy=True)
     out.axpy(factor, B, structure=PETSc.Mat.Structure.DIFFERENT_NONZERO_PATTERN)
     return out

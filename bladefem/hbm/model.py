@@ -75,7 +75,7 @@ class ReducedModel:
     start: np.ndarray | None = None
 
     def __post_init__(self) -> None:
-        parts = {
+        parts: dict[str, Any] = {
             name: np.asarray(getattr(self.elements, name), dtype=float)
             for name in ("kt", "kn", "mu", "n0")
         }
@@ -223,7 +223,7 @@ class ReducedModel:
         larger = (
             stack
             for key, stack in self._kept.items()
-            if key[:2] == ("stack", name) and key[2] > len(bodies)
+            if isinstance(key, tuple) and key[:2] == ("stack", name) and key[2] > len(bodies)
         )
         found = next(larger, None)
         return (
@@ -245,6 +245,17 @@ class ReducedModel:
     @cached_property
     def _kept(self) -> dict[Hashable, Any]:
         return {}
+
+
+def rigid_damper(model: ReducedModel) -> RigidBody:
+    """The damper of a model whose damper is rigid.
+
+    Raises:
+        InputError: an elastic damper, or none.
+    """
+    if not isinstance(model.damper, RigidBody):
+        raise InputError("model.damper: expected a rigid body")
+    return model.damper
 
 
 def in_series(side: PortModel, compliance: np.ndarray) -> PortModel:

@@ -237,7 +237,7 @@ def _flexibility(
     zeta: float,
 ) -> np.ndarray:
     """(m, m) flexibility of both bodies in harmonic h, in harmonic 1 without the mode itself."""
-    G = 0.0
+    G: np.ndarray = np.zeros(())
     w = h * omega
     for i, body in enumerate(frame.bodies):
         s = _of(body, h)
@@ -278,7 +278,7 @@ def _residual(
     r[:, 0] = motion[:, 0].real - frame.stuck0 + frame.A0 @ p
     r += _flexed(frame, f, omega, zeta)
     r[:, 1] -= frame.shape * amplitude
-    return _State(w, f, forces.dfdw, omega, zeta, to_real(r).ravel())
+    return _State(w, f, forces.jacobian, omega, zeta, to_real(r).ravel())
 
 
 def _frequency(

@@ -20,6 +20,7 @@ from .linear_resonances import free_resonances, stuck_resonances
 from .model import ReducedModel
 from .parameters import check_parameter, parameter_value, path_coordinate, vary
 from .peak import Peak, find_peak, with_slope
+from .solution import Solution
 from .solver.newton import DEFAULTS, Options
 from .sweep import first_look, local_maxima, response, size
 
@@ -81,7 +82,7 @@ class _Search:
         self,
         model: ReducedModel,
         omega: float,
-        near: object = None,
+        near: Peak | Solution | None = None,
     ) -> Peak:
         """The peak uphill of a circular frequency [rad/s], without its slope."""
         return find_peak(
@@ -216,7 +217,7 @@ def lowest_peak(
 def _first_level(search: _Search, value: float) -> tuple[list[Peak], int]:
     """Peaks uphill of the resonances of both limits at the first value, and the points spent."""
     model = search.along.model_at(value)
-    known = []
+    known: list[Peak] = []
     points = 0
     reason = "the climb leaves it"
     seeds = np.concatenate(
@@ -277,6 +278,8 @@ def _close_in(search: _Search, levels: dict[float, list[Peak]]) -> int:
         low, high = _bracket_minimum(_highest_peaks(levels))
         if low is None or high is None:
             end, sign = (low, 1.0) if high is None else (high, -1.0)
+            # the lowest peak itself is one of the two
+            assert end is not None
             value = search.moved(end.value, sign * step)
             if value == end.value:
                 return points
@@ -305,7 +308,9 @@ def _nearby_peaks(levels: dict[float, list[Peak]], value: float) -> list[Peak]:
     """The peaks of the next levels below and above a value, without those of one that stand where
     the other's do.
     """
-    below, above = (levels.get(near, []) for near in _neighbour_values(levels, value))
+    below, above = (
+        [] if near is None else levels[near] for near in _neighbour_values(levels, value)
+    )
     return below + [
         p for p in above if not any(_same_peak(p, other) or _same_peak(other, p) for other in below)
     ]
@@ -390,7 +395,7 @@ def _solve_level(
     cannot.
     """
     model = search.along.model_at(value)
-    found = []
+    found: list[Peak] = []
     points = 0
     for old in sorted(known, key=lambda peak: -_estimated_height(search, peak, value)):
         if found and _estimated_height(search, old, value) < SOLVED_HEIGHT_SHARE * max(
@@ -449,4 +454,6 @@ def _look_over_band(
             met is None or peak.height > met.height * (1 + search.tolerance)
         ):
             met = peak
-    return (None if met is best else search.along.with_slope(model, met, value)), spent
+    if met is None or met is best:
+        return None, spent
+    return search.along.with_slope(model, met, value), spent

@@ -80,8 +80,10 @@ def find_peak(
     low = high = last = None
     bend, start = (near.bend, near.solution) if isinstance(near, Peak) else (0.0, near)
     reach = FIRST_STEP * omega
+    frequency = omega / (2 * np.pi)
     for count in range(1, STEPS + 1):
         start = solve(model, omega, H, samples, start=start, options=options)
+        frequency = start.frequency
         if not start.converged:
             raise NotSolvedError(f"peak search stopped at {start.frequency:.6g} Hz: {start.reason}")
         if size(start, options.probe) == 0:
@@ -106,7 +108,7 @@ def find_peak(
         last = now
         omega = target
     raise NotSolvedError(
-        f"peak search found no maximum in {STEPS} points, last at {start.frequency:.6g} Hz"
+        f"peak search found no maximum in {STEPS} points, last at {frequency:.6g} Hz"
     )
 
 

@@ -10,11 +10,13 @@ are its modes.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import reduce
 
 import numpy as np
 
 from ..data import PortModel
 from ..errors import InputError
+from .linear.bodies import Stack
 from .linear.woodbury import bodies_of
 from .model import ReducedModel
 
@@ -59,7 +61,7 @@ def sector_modes(model: ReducedModel) -> SectorModes:
         np.concatenate([part.stiffness for part in parts]),
         damping,
         np.hstack([part.contact for part in parts]),
-        sum(part.residual for part in parts),
+        reduce(np.add, [part.residual for part in parts]),
     )
 
 
@@ -115,14 +117,14 @@ def _same(
     )
 
 
-def _bodies(model: ReducedModel, r: int) -> list[tuple]:
+def _bodies(model: ReducedModel, r: int) -> list[tuple[Stack, float]]:
     """Each body's stack of harmonics 0..r-1 at least, and the sign of its motion."""
     stacks = bodies_of(model, max(r - 1, 0))
     return list(zip(stacks, (1.0, -1.0), strict=False))
 
 
 def _ring(
-    stack: object,
+    stack: Stack,
     r: int,
     sign: float,
 ) -> SectorModes:

@@ -66,8 +66,8 @@ def response(
         keep: is given each frequency and what solves it; see `bladefem.hbm.checkpoint`.
     """
     omegas = list(omegas)
-    last = []
-    ready = {}
+    last: list[Solution] = []
+    ready: dict[int, Solution] = {}
 
     def compute(i: int) -> Solution:
         if i not in ready:

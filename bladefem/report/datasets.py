@@ -113,7 +113,7 @@ def resultants(table: pd.DataFrame) -> Any:
     loads = table["load"].unique()
     seats = table["patch"].unique()
     units = units_of(table)
-    data = {}
+    data: dict[str, Any] = {}
     vectors = {name: [f"{name}_{axis}" for axis in "xyz"] for name in ("force", "moment", "centre")}
     for name, columns in vectors.items():
         values = table[columns].to_numpy().reshape(len(loads), len(seats), 3)

@@ -12,7 +12,7 @@ ROUNDOFF = 1e-12
 # columns of a vector that share their scale
 VECTORS = ("force", "moment", "centre")
 # table: names of its parts on the page and their columns, where all do not fit next to each other
-COLUMNS = {
+COLUMNS: dict[str, dict[str, tuple[str, ...]]] = {
     "contact/pressure": {
         "contact/pressure": (
             "load",

@@ -107,12 +107,9 @@ def _write(result: SolvedRun, progress: Progress) -> None:
     patches = list(result.contact.problem.patches)
     cycles = cycles_of(result)
     coefficient = result.scene.contact.wear_coefficient
-    worn = coefficient is not None
-    tables = {
-        **_tables(result),
-        **({"contact/wear": wear_table(patches, cycles, coefficient)} if worn else {}),
-        **_wheel_tables(result),
-    }
+    tables = {**_tables(result), **_wheel_tables(result)}
+    if coefficient is not None:
+        tables["contact/wear"] = wear_table(patches, cycles, coefficient)
     for name, table in tables.items():
         write_tables(table, folder / name.split("/")[1], name.split("/")[1])
     nodes = node_table(patches, cycles, coefficient)
@@ -153,7 +150,7 @@ def _write(result: SolvedRun, progress: Progress) -> None:
         method(linear_sentence(cycles)),
         *_beyond_stick(result),
         *([influence_sentence(result.response.influences)] if result.response.influences else []),
-        *([wear_sentence(cycles, coefficient)] if worn else []),
+        *([] if coefficient is None else [wear_sentence(cycles, coefficient)]),
         *([] if result.wheel is None else pattern_sentences(result.wheel)),
     ]
     write_report(
@@ -457,7 +454,7 @@ def _drawings(
     geometry = result.mesh
     excited = excited_set(result)
     best = result.response.curves[_best(result)].load
-    drawings = {
+    drawings: dict[str, Callable[[Path], object]] = {
         "mesh/mesh": lambda file: mesh.draw_mesh(geometry, file, title=result.scene.title),
         "modes/first_modes": lambda file: modes.draw_mode_sheet(
             geometry, excited, file, families=list(tables["modes/modes"]["family"])

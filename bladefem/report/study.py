@@ -133,8 +133,9 @@ def _axis(name: str, variants: Sequence[Variant]) -> tuple[list[Any], str]:
     """Where each value stands on the axis, in the unit that people read; texts where they are no
     numbers.
     """
-    numbers = [_number(name, variant.scene) for variant in variants]
-    if None in numbers:
+    read = [_number(name, variant.scene) for variant in variants]
+    numbers = [number for number in read if number is not None]
+    if len(numbers) < len(variants):
         return [variant.text for variant in variants], name
     unit = field_at(name).meta.get("unit") or "1"
     shown = show(max(numbers, key=abs), unit).partition(" ")[2]

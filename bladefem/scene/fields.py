@@ -190,10 +190,9 @@ def _in_range(
         return number
     if low is not None and high is not None:
         limit = f"{show(low, unit)} to {show(high, unit)}"
-    elif low is not None:
-        limit = f"at least {show(low, unit)}"
     else:
-        limit = f"at most {show(high, unit)}"
+        bounds = {"at least": low, "at most": high}
+        limit = " ".join(f"{word} {show(n, unit)}" for word, n in bounds.items() if n is not None)
     raise InputError(
         f"{field.name} = {show(number, unit)}: expected {limit}{_forgotten_unit(written, field)}"
     )

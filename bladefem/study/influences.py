@@ -18,6 +18,7 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from math import log
+from typing import Any
 
 import numpy as np
 
@@ -190,7 +191,7 @@ def influences(
 
 def _coarse(settings: Settings) -> Settings:
     """The settings with at most COARSE_SETTINGS of what was chosen; nothing is left to choose."""
-    least = {
+    least: dict[str, Any] = {
         name: min(value, getattr(settings, name) or value)
         for name, value in COARSE_SETTINGS.items()
         if name in settings.chosen
@@ -347,10 +348,18 @@ class _Study:
         tilted = (tilts[1] - tilts[0]) / (2 * STEP) + tilt * moved_load
         moved = -tilted / curvature / base.omega
         centre = np.log([load, base.height, base.solution.frequency])
-        rates = np.array([moved_load, amplitude, moved])
+        by_parameter = [float(moved_load), float(amplitude), float(moved)]
+        rates = np.array(by_parameter)
         ends = np.log([parameter.low, parameter.high])
         predicted = np.exp(centre + ends[:, None] * rates)
-        return Influence(parameter, *rates, predicted, np.full((2, 3), np.nan))
+        return Influence(
+            parameter,
+            load=by_parameter[0],
+            amplitude=by_parameter[1],
+            frequency=by_parameter[2],
+            predicted=predicted,
+            solved=np.full((2, 3), np.nan),
+        )
 
     def solved_again(self, one: Influence) -> Influence:
         """The best load searched again at both ends of the range."""

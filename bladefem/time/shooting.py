@@ -141,7 +141,7 @@ def floquet_multipliers(solution: Periodic) -> np.ndarray:
     One multiplier equals one for each element that sticks through the whole period: a neutral shift
     of its slider.
     """
-    values = np.linalg.eigvals(solution.flow.tangent)
+    values = np.linalg.eigvals(solution.flow.monodromy)
     return values[np.argsort(-np.abs(values))]
 
 
@@ -213,7 +213,7 @@ def _newton_step(
     scale: np.ndarray,
 ) -> np.ndarray:
     """Least-norm step in the scaled unknowns, back in their units."""
-    J = (now.tangent - np.eye(len(scale))) * (scale / scale[:, None])
+    J = (now.monodromy - np.eye(len(scale))) * (scale / scale[:, None])
     return (
         scale
         * np.linalg.lstsq(J, (_pack_state(state) - _pack_state(now.state)) / scale, rcond=1e-11)[0]

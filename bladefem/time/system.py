@@ -15,7 +15,7 @@ frequency.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 
@@ -48,8 +48,8 @@ class System:
     V: np.ndarray
     # (k, d) readings of interest [kg^-1/2]
     probe: np.ndarray
-    # (n, d) normal readings, where normal forces react on q [kg^-1/2]; none: zeros
-    R: np.ndarray | None = None
+    # (n, d) normal readings, where normal forces react on q [kg^-1/2]; empty: zeros
+    R: np.ndarray = field(default_factory=lambda: np.zeros((0, 0)))
 
     def __post_init__(self) -> None:
         n, d = self.W.shape
@@ -63,7 +63,7 @@ class System:
             "drive": (n, self.coefficients),
             "normal": (n, self.coefficients),
         }
-        if self.R is None:
+        if self.R.size == 0:
             object.__setattr__(self, "R", np.zeros((n, d)))
         for name, shape in (shapes | {"R": (n, d)}).items():
             value = getattr(self, name)

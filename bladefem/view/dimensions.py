@@ -3,14 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Any
+from typing import Any, TypeAlias
 
 import numpy as np
 
 from .style import COLOURS
 
 DIMENSION = COLOURS[0]
-Point = Sequence[float]
+Point: TypeAlias = Sequence[float] | np.ndarray
 
 
 def shape(ax: Any, corners: np.ndarray, colour: str = "#d5dbe1", **style: Any) -> None:
@@ -40,14 +40,14 @@ def length(
             end.
         beside: further distance of the text; 0 writes it close to the line.
     """
-    start = np.asarray(start, float)
-    end = np.asarray(end, float)
-    way = (end - start) / np.linalg.norm(end - start)
+    first = np.asarray(start, float)
+    last = np.asarray(end, float)
+    way = (last - first) / np.linalg.norm(last - first)
     left = np.array([-way[1], way[0]])
     side = np.sign(away) or 1.0
-    a = start + away * left
-    b = end + away * left
-    for point, moved in ((start, a), (end, b)):
+    a = first + away * left
+    b = last + away * left
+    for point, moved in ((first, a), (last, b)):
         ax.plot(
             *np.stack([point, moved + 0.08 * (moved - point)]).T,
             color=DIMENSION,
@@ -99,13 +99,13 @@ def angle(
 ) -> None:
     """An arc between two directions [rad] with a label outside of its middle."""
     turn = np.linspace(start, end, 40)
-    centre = np.asarray(centre, float)
-    arc = centre + radius * np.stack([np.cos(turn), np.sin(turn)], axis=1)
+    hub = np.asarray(centre, float)
+    arc = hub + radius * np.stack([np.cos(turn), np.sin(turn)], axis=1)
     ax.plot(*arc.T, color=DIMENSION, lw=1.0, zorder=4)
     if rays:
         for end_point in (arc[0], arc[-1]):
             ax.plot(
-                *np.stack([centre, centre + 1.15 * (end_point - centre)]).T,
+                *np.stack([hub, hub + 1.15 * (end_point - hub)]).T,
                 color=DIMENSION,
                 lw=0.7,
                 ls="--",

@@ -4,7 +4,7 @@ form.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
@@ -110,7 +110,7 @@ def _over_radius(
     exact: Callable[[float], Curve],
     edge: float,
 ) -> None:
-    order: Sequence[int] = np.argsort(radius)
+    order = np.argsort(radius)
     for i, (load, seat) in enumerate(seats.items()):
         r, p = exact(load)
         ax.plot(

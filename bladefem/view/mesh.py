@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import replace
 from itertools import cycle
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from matplotlib.patches import Patch as Swatch
@@ -362,7 +362,7 @@ def draw_mesh(
 FEW_NAMES = 20
 
 
-def draw_legend(ax: object, mesh: Mesh) -> None:
+def draw_legend(ax: Any, mesh: Mesh) -> None:
     """Names and sizes next to the picture."""
     colours = label_colours(mesh)
     counts = [len(c) for c in (*mesh.bodies.values(), *mesh.faces.values())]

@@ -130,7 +130,7 @@ def draw_side(ax: Any, blade: Aerofoil) -> None:
     ax.plot(axis, [0, height[-1]], color=COLOURS[1], lw=1, ls="-.", zorder=3)
     note(
         ax,
-        (np.mean(axis), 0.5 * height[-1]),
+        (float(np.mean(axis)), 0.5 * height[-1]),
         f"stacking line\n{said(blade, 'lean')}\n{said(blade, 'sweep')}",
         (44, 0),
     )

@@ -5,6 +5,7 @@ them.
 from __future__ import annotations
 
 from pathlib import Path
+from typing import Any
 
 import pandas as pd
 
@@ -63,7 +64,7 @@ def draw_study(
         return axes[0, 0].figure
 
 
-def _draw_loads(axis: object, loads: pd.DataFrame) -> None:
+def _draw_loads(axis: Any, loads: pd.DataFrame) -> None:
     """Amplitude against load, a line a value."""
     damped = loads[(loads["load"] > 0) & (loads["load"] < float("inf"))]
     for (value, part), colour in zip(

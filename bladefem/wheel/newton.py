@@ -135,7 +135,7 @@ class _Steps:
     def step(self, state: WheelState) -> tuple[np.ndarray, bool]:
         """The step (N, n, d, K), and whether GMRES reached its accuracy."""
         accuracy = float(np.clip(0.1 * state.error, TIGHT, LOOSE_STEP_TOLERANCE))
-        goal = accuracy * np.linalg.norm(state.residual)
+        goal = accuracy * float(np.linalg.norm(state.residual))
         if self.stale:
             self._renew(state)
         before = self.products
@@ -152,12 +152,13 @@ class _Steps:
         residual: np.ndarray,
     ) -> float:
         """Length of the step that the derivative at `state` would take from another residual."""
-        found, _ = self._solve(state, residual, TRIAL_TOLERANCE * np.linalg.norm(residual))
+        found, _ = self._solve(state, residual, TRIAL_TOLERANCE * float(np.linalg.norm(residual)))
         return float(np.linalg.norm(found))
 
-    def _renew(self, state: WheelState) -> None:
-        self.preconditioner = make_preconditioner(self.balance.flex, state.forces.change)
+    def _renew(self, state: WheelState) -> Preconditioner:
+        self.preconditioner = make_preconditioner(self.balance.flex, state.forces.jacobian)
         self.stale = False
+        return self.preconditioner
 
     def _solve(
         self,
@@ -167,8 +168,8 @@ class _Steps:
     ) -> tuple[np.ndarray, bool]:
         shape = state.residual.shape
         flat = (shape[0], -1, shape[3])
-        change = state.forces.change
-        prepare = self.preconditioner.apply
+        change = state.forces.jacobian
+        prepare = (self.preconditioner or self._renew(state)).apply
 
         def product(y: np.ndarray) -> np.ndarray:
             self.products += 1
@@ -204,7 +205,7 @@ def _line_search(
         if trial.error <= QUADRATIC * state.error:
             return True
         if merit == "residual":
-            return _moving_first(trial.residual) <= (1 - 1e-4 * share) * weighted
+            return bool(_moving_first(trial.residual) <= (1 - 1e-4 * share) * weighted)
         return bool(steps.next_length(state, trial.residual) <= (1 - 0.25 * share) * before)
 
     better = halve_step(

@@ -45,6 +45,13 @@ class Scatter:
                 )
 
 
+def drawn_deviations(count: int, scatter: Scatter, wheels: int) -> np.ndarray:
+    """(wheels, 4, count) deviations of each sector in standard deviations: of the blade, then of
+    friction, stiffness and load of its damper.
+    """
+    return _normal_sample(wheels, 4 * count, scatter.seed).reshape(wheels, 4, count)
+
+
 def drawn_patterns(
     wheel: Wheel,
     scatter: Scatter,
@@ -56,7 +63,7 @@ def drawn_patterns(
     Args:
         blade_pattern: a pattern from relative deviations (N,) of the blades.
     """
-    values = _normal_sample(wheels, 4 * wheel.count, scatter.seed).reshape(wheels, 4, wheel.count)
+    values = drawn_deviations(wheel.count, scatter, wheels)
     dampers = np.array([scatter.friction, scatter.stiffness, scatter.load])
     patterns = []
     for draw in values:

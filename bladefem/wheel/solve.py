@@ -236,7 +236,7 @@ def _homotopy(balance: WheelBalance, options: Options) -> WheelNewton:
     share = GENTLE
     factor = FACTOR
     path: list[tuple[float, np.ndarray]] = []
-    end = None
+    end: WheelNewton | None = None
     for _ in range(HOMOTOPY_POINTS):
         part = replace(balance, stuck=share * balance.stuck)
         end = newton_wheel(part, _predicted(path, share, part.stuck), options)
@@ -252,6 +252,8 @@ def _homotopy(balance: WheelBalance, options: Options) -> WheelNewton:
         if factor < LEAST_FACTOR:
             break
         share = min(1.0, factor * (path[-1][0] if path else GENTLE / FACTOR))
+    # HOMOTOPY_POINTS is at least one
+    assert end is not None
     if share < 1.0:
         state = evaluate_wheel(balance, end.state.w)
         reason = f"the load homotopy stopped at {share:.3g} of the excitation: {end.reason}"

@@ -86,13 +86,13 @@ def hidden(
         used: settings of each point.
     """
     moved = np.zeros(len(points))
-    groups = {}
+    groups: dict[tuple[Settings, int], list[int]] = {}
     for i, (settings, point) in enumerate(zip(used, points, strict=True)):
         if point.converged and point.states["stick"] < len(point.w):
             groups.setdefault((settings, point.harmonics), []).append(i)
     for (settings, harmonics), found in groups.items():
         more = richer(family, settings, "harmonics")
-        if more.harmonics > harmonics:
+        if more is not None and more.harmonics > harmonics:
             model = member(family, replace(more, modes=max(settings.modes, family.modes))).model
             moved[found] = truncation_indicator(model, [points[i] for i in found], more.harmonics)
     return moved

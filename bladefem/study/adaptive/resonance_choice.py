@@ -147,7 +147,7 @@ def judge_settings(
     ones; all of them cost 20 times as much on the shipped wedge.
     """
     other = richer(family, settings, name)
-    if name != "points" or other is None:
+    if name != "points" or other is None or settings.points is None:
         return other
     groups = member(family, settings).groups
     more = MORE_POINTS * settings.points

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, replace
 from math import ceil, inf, log2, sqrt
+from typing import Any
 
 from ...scene.tables import Scene
 
@@ -14,7 +15,7 @@ DIRECTIONS = ("harmonics", "samples", "modes", "points", "damper")
 RICHEST = {"modes": 160, "harmonics": 31, "samples": 4096, "points": 4096}
 # how many times smaller an error has to be for two steps of the first harmonics at once
 DOUBLE_STEP_RATIO = 40.0
-FIRST = {"modes": 10, "harmonics": 1, "samples": 64, "points": 4, "damper": "rigid"}
+FIRST: dict[str, Any] = {"modes": 10, "harmonics": 1, "samples": 64, "points": 4, "damper": "rigid"}
 
 
 @dataclass(frozen=True)

@@ -101,16 +101,14 @@ def mesh_variants(
     refuse_given_mesh(scene)
     power = drawn.dimension
     own = scene.mesh
-    base = own.size or min(sizes, default=None)
-    listed = [
-        (f"{1e3 * size:.3g} mm", size / base, replace(own, size=base))
-        for size in sorted(sizes, reverse=True)
-    ]
-    if not sizes:
+    if sizes:
+        base = own.size or min(sizes)
         listed = [
-            (f"{1e3 * base * ratio:.3g} mm" if base else f"own size x {ratio:g}", ratio, own)
-            for ratio in RATIOS
+            (f"{1e3 * size:.3g} mm", size / base, replace(own, size=base))
+            for size in sorted(sizes, reverse=True)
         ]
+    else:
+        listed = [(_size_name(own.size, ratio), ratio, own) for ratio in RATIOS]
     made = [
         MeshVariant(
             name,
@@ -225,6 +223,10 @@ def mesh_table(
     return pd.DataFrame([_told(row, truth, doubt) for row in rows])
 
 
+def _size_name(size: float | None, ratio: float) -> str:
+    return f"{1e3 * size * ratio:.3g} mm" if size else f"own size x {ratio:g}"
+
+
 def _rows(
     scene: Scene,
     settings: Settings,
@@ -237,7 +239,7 @@ def _rows(
     last = None
     for variant in variants:
         last = last if last and last[0].order == variant.order else None
-        row = {
+        row: dict[str, Any] = {
             "name": variant.name,
             "order": variant.order,
             "found": None,

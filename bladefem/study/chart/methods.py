@@ -10,6 +10,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 
@@ -18,7 +19,7 @@ from ...damper.direct import direct
 from ...damper.paper import platform
 from ...data import PortModel, RigidBody
 from ...errors import InputError, NotSolvedError
-from ...hbm.model import ReducedModel
+from ...hbm.model import ReducedModel, rigid_damper
 from ...hbm.solve import solve
 from ...reduction.truncate import truncated
 from ...time.event_integrator import stuck_start
@@ -115,7 +116,7 @@ def balance(H: int, samples: int) -> Callable[[ReducedModel, float, object], Poi
     def run(
         model: ReducedModel,
         omega: float,
-        start: object,
+        start: Any,
     ) -> Point:
         s = solve(model, omega, H, samples, start=start)
         return Point(complex(s.probe[1, 0]), s.converged, s.reason, s if s.converged else None)
@@ -136,7 +137,7 @@ def paper(H: int, averaged: bool) -> Callable[[ReducedModel, float, object], Poi
     def run(
         model: ReducedModel,
         omega: float,
-        start: object,
+        start: Any,
     ) -> Point:
         end = iterate(platform(model, omega, H), "amplitude", Rules(averaged=averaged))
         first = complex(end.probe[1, 0])
@@ -158,7 +159,7 @@ def integrated(steps: int, explicit: bool) -> Callable[[ReducedModel, float, obj
     def run(
         model: ReducedModel,
         omega: float,
-        start: object,
+        start: Any,
     ) -> Point:
         system = in_time(model, omega)
         try:
@@ -184,7 +185,7 @@ def integrated(steps: int, explicit: bool) -> Callable[[ReducedModel, float, obj
 def shooting(
     model: ReducedModel,
     omega: float,
-    start: object,
+    start: Any,
 ) -> Point:
     """Periodic solution of the exact flow."""
     system = in_time(model, omega)
@@ -194,7 +195,7 @@ def shooting(
     )
 
 
-def _fitting(start: object, system: System) -> object:
+def _fitting(start: Any, system: System) -> Any:
     """The last frequency's end, unless a mode has become a stiff one since."""
     return start if start is not None and len(start.q) == len(system.stiffness) else None
 
@@ -204,7 +205,7 @@ def in_time(model: ReducedModel, omega: float) -> System:
     (1 / STIFF)^2.
     """
     damping = model.damping
-    damper = model.damper
+    damper = rigid_damper(model)
     return blade_ring(
         _with_stiff_modes(model.side(1), STIFF * omega),
         float(np.mean(damping.ratio)),

@@ -66,6 +66,8 @@ class Indented:
     @property
     def tilt_stiffness(self) -> float:
         """Moment a radian of the punch glued to the block [N m]."""
+        if self.tilted is None:
+            raise InputError("tilt_stiffness: a plane punch does not tilt, expected a solid one")
         return 4 * float(self.arm @ np.linalg.solve(self.tilted, self.arm))
 
 
@@ -87,7 +89,9 @@ def indent(scene: Scene, comm: Any = None) -> Indented:
     solid = mesh.dimension == 3
     even = flexibility(body, ports)
     part = 4 if solid else 2
-    found = solve_lcp(even, np.zeros(len(even)), -np.ones((len(even), 1)), [-total / part])
+    found = solve_lcp(
+        even, np.zeros(len(even)), -np.ones((len(even), 1)), np.array([-total / part])
+    )
     if found.reason:
         raise NotSolvedError(f"the punch: {found.reason}")
     radius = np.linalg.norm(patch.points[:, : mesh.dimension - 1], axis=1)

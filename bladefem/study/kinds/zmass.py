@@ -148,9 +148,9 @@ def _press(scene: Scene, comm: Any) -> Pressed:
 
     mesh = build_mesh(scene, comm)
     mass = assemble(mesh, "damper", scene.material.damper, comm)
-    load = surface_load(mass, "top", pressure=1.0).reshape(-1, 3)
+    even = surface_load(mass, "top", pressure=1.0).reshape(-1, 3)
     reach = np.array([scene.z_mass.width, scene.z_mass.height]) / 2
-    load = (load * (1 + mesh.points[:, :2] @ (scene.foundation.skew / reach))[:, None]).ravel()
+    load = (even * (1 + mesh.points[:, :2] @ (scene.foundation.skew / reach))[:, None]).ravel()
     block = flexible(constrain(assemble(mesh, "blade", scene.material.blade, comm), "clamp"))
     patch = make_patch(mesh, "this")
     problem = contact_problem(mesh, [patch], block, flexible(constrain(mass, None)), pull=load)

@@ -13,7 +13,7 @@ from ...scene.tables import Scene
 from ...util.progress import Progress, unwatched
 from ...wheel.model import Pattern, Wheel, frequency_pattern
 from ...wheel.resonance import WheelPeak, find_wheel_peak
-from ...wheel.scatter import Scatter, drawn_patterns, read_pattern
+from ...wheel.scatter import Scatter, drawn_deviations, read_pattern
 from ...wheel.solve import WheelSolution, free_wheel, solve_wheel, stuck_wheel
 from ...wheel.statistics import wheel_respond
 from ...wheel.tuned import tuned_sector
@@ -81,23 +81,10 @@ def scene_deviations(
         return np.broadcast_to(values, (count, families)).copy()
     if given.scatter is None:
         raise InputError("mistuning: expected a pattern file or a scatter")
-    found: list[np.ndarray] = []
-
-    def keep(deviation: np.ndarray) -> Pattern:
-        found.append(deviation)
-        return Pattern()
-
     # the same first wheel as the statistics draw
-    blank = _Blank(count)
-    drawn_patterns(blank, Scatter(given.scatter, seed=given.seed), 1, keep)
-    return np.repeat(found[0][:, None], families, axis=1)
-
-
-@dataclass(frozen=True)
-class _Blank:
-    """What a draw of blades alone reads of a wheel."""
-
-    count: int
+    scatter = Scatter(given.scatter, seed=given.seed)
+    deviation = scatter.blades * drawn_deviations(count, scatter, 1)[0, 0]
+    return np.repeat(deviation[:, None], families, axis=1)
 
 
 def scene_scatter(scene: Scene) -> Scatter:

@@ -10,11 +10,14 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import reduce
 from typing import Any
 
 import numpy as np
 import pandas as pd
 from scipy.linalg import eigh
+
+from geometry.mesh import sector_of
 
 from ...data import ModeSet
 from ...errors import InputError
@@ -63,7 +66,7 @@ def campbell(
     Raises:
         InputError: fewer than two speeds, negative ones.
     """
-    sectors = bodies.mesh.sector.count if is_wheel(bodies.mesh) else 0
+    sectors = sector_of(bodies.mesh).count if is_wheel(bodies.mesh) else 0
     operating = bodies.scene.operation.speed
     if sectors and diameters is None:
         diameters = sorted({fold(order, sectors) for order in orders})
@@ -138,18 +141,19 @@ def read_speeds(text: str) -> list[float]:
         if number is not None:
             out.append(number)
             continue
-        if len(out) < 2 or i + 1 >= len(numbers) or numbers[i + 1] is None or not out[-1] > out[-2]:
+        end = numbers[i + 1] if i + 1 < len(numbers) else None
+        if len(out) < 2 or end is None or not out[-1] > out[-2]:
             raise InputError(
                 f"campbell = {text}: expected two rising speeds before '...' and the last one "
                 "after it"
             )
         step = out[-1] - out[-2]
-        if (numbers[i + 1] - out[-1]) / step > MOST_SPEEDS:
+        if (end - out[-1]) / step > MOST_SPEEDS:
             raise InputError(
-                f"campbell = {text}: {(numbers[i + 1] - out[-1]) / step:.3g} speeds, expected at "
+                f"campbell = {text}: {(end - out[-1]) / step:.3g} speeds, expected at "
                 f"most {MOST_SPEEDS}"
             )
-        out += list(np.arange(out[-1] + step, numbers[i + 1] - step / 2, step))
+        out += list(np.arange(out[-1] + step, end - step / 2, step))
     return out
 
 
@@ -193,10 +197,8 @@ def _frequency_lines(
     outer = np.r_[0:count, 2 * count : 3 * count]
     frames = []
     for speed in speeds:
-        small = sum(
-            weight * part
-            for weight, part in zip(_lagrange_weights(squares, speed**2), K, strict=True)
-        )
+        weights = _lagrange_weights(squares, speed**2)
+        small = reduce(np.add, [weight * part for weight, part in zip(weights, K, strict=True)])
         f, Z = _lowest_frequencies(small, M, count)
         rough, _ = _lowest_frequencies(small[np.ix_(outer, outer)], M[np.ix_(outer, outer)], count)
         forward, backward = _split_waves(

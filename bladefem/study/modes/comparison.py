@@ -13,6 +13,7 @@ import pandas as pd
 from bladefem.data import ModeSet
 from geometry.mesh import Mesh
 
+from ...errors import InputError
 from .mesh_transfer import nodal_volumes, transfer
 
 ORDINALS = ("first", "second", "third", "fourth", "fifth")
@@ -45,7 +46,11 @@ def mac(
         mesh: the mesh of ``a``; without it all nodes weigh the same.
         other: the mesh of ``b`` when it is another one; its shapes are interpolated onto ``mesh``.
     """
-    shapes = b.shapes if other is None else transfer(other, b.shapes, mesh.points)
+    shapes = b.shapes
+    if other is not None:
+        if mesh is None:
+            raise InputError("mac: expected the meshes of both mode sets, only one was given")
+        shapes = transfer(other, shapes, mesh.points)
     weight = np.ones(a.shapes.shape[1]) if mesh is None else nodal_volumes(mesh)
     return mac_of(a.shapes, shapes, weight)
 

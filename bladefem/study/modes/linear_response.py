@@ -15,6 +15,8 @@ from typing import Any
 
 import numpy as np
 
+from geometry.mesh import sector_of
+
 from ...data import ModeSet
 from ...errors import InputError
 from ...hbm.model import Damping
@@ -97,7 +99,7 @@ def forced(
             "values, not all zero"
         )
     order = scene.excitation.engine_order
-    n, mirrored = folded_diameter(1, order, mesh.sector.count) if is_wheel(mesh) else (0, False)
+    n, mirrored = folded_diameter(1, order, sector_of(mesh).count) if is_wheel(mesh) else (0, False)
     flex = bodies.factorised(n)
     found = normal_modes(flex.con, modes, flex)
     if not found.frequencies.all():

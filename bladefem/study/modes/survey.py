@@ -5,6 +5,7 @@ from __future__ import annotations
 import time
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -86,7 +87,7 @@ def survey(
     Raises:
         InputError, NotSolvedError: from the stages.
     """
-    other = None if wanted.other is None else on_root(comm, lambda: _read_other(wanted.other))
+    other = None if wanted.other is None else on_root(comm, partial(_read_other, wanted.other))
     start = pipeline.run(scene, folder, until="mesh", comm=comm, progress=progress)
     pipeline.check_blade(scene, start.mesh)
     if wanted.loads is not None:

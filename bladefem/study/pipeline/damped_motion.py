@@ -13,6 +13,8 @@ from typing import Any
 
 import numpy as np
 
+from geometry.mesh import sector_of
+
 from ...data import Elements, ModeSet, Patch
 from ...friction.fourier import to_complex
 from ...hbm.model import Damping
@@ -204,7 +206,8 @@ def _diameter(bodies: Bodies, harmonic: int) -> tuple[int, bool]:
     """Nodal diameter of a harmonic, and whether the conjugate wave is meant."""
     if not is_wheel(bodies.mesh):
         return 0, False
-    return folded_diameter(harmonic, bodies.scene.excitation.engine_order, bodies.mesh.sector.count)
+    order = bodies.scene.excitation.engine_order
+    return folded_diameter(harmonic, order, sector_of(bodies.mesh).count)
 
 
 def _nearest(modes: Sequence[ModeSet], diameter: int) -> ModeSet:
@@ -216,4 +219,4 @@ def _interblade_phase(bodies: Bodies) -> float:
     """Phase from blade to blade of harmonic 1 [rad]."""
     if not is_wheel(bodies.mesh):
         return float(bodies.scene.excitation.phase)
-    return 2 * pi * bodies.scene.excitation.engine_order / bodies.mesh.sector.count
+    return 2 * pi * bodies.scene.excitation.engine_order / sector_of(bodies.mesh).count

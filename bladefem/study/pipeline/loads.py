@@ -193,7 +193,8 @@ def curve_of(
     if scene.study.stability and lasting:
         top = max(lasting, key=size)
     tolerated = scene.accuracy * size(top) / np.maximum(heights, 1e-6 * size(top))
-    columns = (np.array(c) for c in zip(*map(_record, curve.points), strict=True))
+    rows = [_record(point) for point in curve.points]
+    columns = {name: np.array([row[name] for row in rows]) for name in rows[0]}
     lifts = any(p.states["lift"] > 0 for p in curve.points if p.converged)
     halved = np.nan if scene.contact.points else halved_change(models, curve.settings, top)
     interval = None
@@ -201,39 +202,40 @@ def curve_of(
         model = member(models, curve.settings).model
         interval = load_interval(model, curve.settings, top, scene.accuracy, len(curve.points))
     return Curve(
-        case.load,
-        case.mass,
-        curve.settings,
-        *columns,
-        estimated(curve),
-        tolerated,
-        checked(curve),
-        marks.verdict,
-        marks.multiplier,
-        halved,
-        top,
-        marks.bifurcation if len(marks.bifurcation) else np.full(len(heights), ""),
-        None if top is highest else highest,
-        interval,
-        lifts and unfollowed(models, curve.settings),
+        load=case.load,
+        mass=case.mass,
+        settings=curve.settings,
+        **columns,
+        estimated=estimated(curve),
+        tolerated=tolerated,
+        checked=checked(curve),
+        stability=marks.verdict,
+        multiplier=marks.multiplier,
+        halved=halved,
+        peak=top,
+        bifurcation=marks.bifurcation if len(marks.bifurcation) else np.full(len(heights), ""),
+        unstable_peak=None if top is highest else highest,
+        interval=interval,
+        unfollowed=lifts and unfollowed(models, curve.settings),
     )
 
 
-def _record(p: Solution) -> tuple[object, ...]:
-    return (
-        p.frequency,
-        size(p),
-        p.probe[1, 0],
-        p.converged,
-        p.method,
-        p.route,
-        p.residual,
-        p.iterations,
-        p.states["slip"] + p.states["lift"],
-        p.work.dissipated,
-        p.work.imbalance,
-        p.branch,
-    )
+def _record(p: Solution) -> dict[str, Any]:
+    """The columns of a curve at one point."""
+    return {
+        "frequency": p.frequency,
+        "amplitude": size(p),
+        "first": p.probe[1, 0],
+        "converged": p.converged,
+        "method": p.method,
+        "route": p.route,
+        "residual": p.residual,
+        "iterations": p.iterations,
+        "slipping": p.states["slip"] + p.states["lift"],
+        "dissipated": p.work.dissipated,
+        "imbalance": p.work.imbalance,
+        "branch": p.branch,
+    }
 
 
 def beyond_tolerance(curve: Curve) -> str:
@@ -269,7 +271,7 @@ def summary(curves: list[Curve], limits: tuple[Limit, Limit]) -> dict[str, np.nd
     return table
 
 
-def _row(c: Curve) -> dict[str, float]:
+def _row(c: Curve) -> dict[str, Any]:
     return {
         "load": c.load,
         "peak_frequency": c.peak_frequency,
@@ -301,7 +303,7 @@ def _interval_row(c: Curve) -> dict[str, float | str]:
     }
 
 
-def _linear_row(limit: Limit) -> dict[str, float]:
+def _linear_row(limit: Limit) -> dict[str, Any]:
     return {
         "load": limit.load,
         "peak_frequency": limit.peak_frequency,
@@ -321,6 +323,6 @@ def default_loads(scene: Scene, count: int = 8) -> tuple[float, ...]:
     """Loads when none are given: three decades round the force at which friction can hold the
     excitation.
     """
-    mu = np.mean([seat_contact(scene.contact, patch).mu for patch in ("this", "next")])
+    mu = float(np.mean([seat_contact(scene.contact, patch).mu for patch in ("this", "next")]))
     held = scene.excitation.force / max(mu, 1e-3)
     return tuple(float(f"{x:.2g}") for x in np.geomspace(held, 300 * held, count))

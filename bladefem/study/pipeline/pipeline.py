@@ -727,7 +727,7 @@ def _remarks(
 
 def _of_the_contact_mesh(curve: Curve) -> str:
     """The part of an estimated error that a finer contact mesh lowers, where it is the larger."""
-    if not np.isfinite(curve.halved) or curve.halved < curve.error / 2:
+    if curve.error is None or not np.isfinite(curve.halved) or curve.halved < curve.error / 2:
         return ""
     return (
         f"; {100 * curve.halved:.2g} % are what half as many contact points change, expected a "

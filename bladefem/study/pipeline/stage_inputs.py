@@ -141,7 +141,7 @@ def _without(
     """The value of a field; of a table without what the stage does not read."""
     value = value_at(scene, field)
     left_out = [name for name in inputs.without if name.startswith(f"{field}.")]
-    if not left_out or not is_dataclass(value):
+    if not left_out or not is_dataclass(value) or isinstance(value, type):
         return value
     return replace(value, **{name.rpartition(".")[2]: None for name in left_out})
 

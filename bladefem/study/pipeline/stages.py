@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from geometry.mesh import Mesh
+from geometry.mesh import Mesh, sector_of
 
 from ...contact.interface_elements import layered, pair_ratio
 from ...contact.patch import make_patch
@@ -246,7 +246,7 @@ def excited_modes(
     if modes[0].nodal_diameter is None or mesh.sector is None:
         return modes[0]
     wanted, _ = folded_diameter(1, scene.excitation.engine_order, mesh.sector.count)
-    return min(modes, key=lambda m: abs(m.nodal_diameter - wanted))
+    return min(modes, key=lambda m: abs((m.nodal_diameter or 0) - wanted))
 
 
 def wheel_modes(
@@ -269,7 +269,7 @@ def wheel_modes(
 
     comm = bodies.comm or MPI.COMM_WORLD
     mesh = bodies.mesh
-    wanted = list(range(mesh.sector.count // 2 + 1)) if diameters is None else list(diameters)
+    wanted = list(range(sector_of(mesh).count // 2 + 1)) if diameters is None else list(diameters)
     solver = eigensolver(bodies.scene)
     if comm.size == 1 or len(wanted) == 1:
         return all_diameters(
@@ -335,7 +335,7 @@ def harmonic_diameters(
     if not is_wheel(mesh):
         return [0]
     order = scene.excitation.engine_order
-    count = mesh.sector.count
+    count = sector_of(mesh).count
     return sorted({folded_diameter(h, order, count)[0] for h in range(harmonics + 1)})
 
 
@@ -383,7 +383,7 @@ def reduce_sector(
         sector,
         floating,
         slice(first, first + len(patches[1].area) * mesh.dimension),
-        mesh.sector.count if is_wheel(mesh) else 0,
+        sector_of(mesh).count if is_wheel(mesh) else 0,
         mass(bodies.damper.con.body),
     )
 
