@@ -173,7 +173,7 @@ def _orthogonal_factor(
     W: np.ndarray,
     MW: np.ndarray,
     least: float,
-    largest: float = np.finfo(float).tiny,
+    largest: float = float(np.finfo(float).tiny),
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray, float]:
     """W Z, M W Z and R with W = (W Z) R, and the least square of a column, of the largest one's.
 

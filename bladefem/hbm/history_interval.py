@@ -201,7 +201,7 @@ def _push(
     elements = model.elements
     gradient = place.free.gradient
     length = np.linalg.norm(gradient, axis=1, keepdims=True)
-    least = max(WEAK_DERIVATIVE * float(length.mean()), np.finfo(float).tiny)
+    least = max(WEAK_DERIVATIVE * float(length.mean()), float(np.finfo(float).tiny))
     limit = elements.mu * np.maximum(elements.n0, 0.0)
     return sign * limit[:, None] * gradient / np.maximum(length, least)
 

@@ -351,9 +351,9 @@ def _relative_error(
     if scale < SMALL_MOTION_RATIO * pressed:
         size = max(size, REST_MOTION_SHARE * pressed)
         scale = max(scale, REST_MOTION_SHARE * pressed)
-    with_springs = np.linalg.norm(r) / max(size, np.finfo(float).tiny)
+    with_springs = float(np.linalg.norm(r)) / max(size, float(np.finfo(float).tiny))
     r[1:] += _apply_flexibility(linear.G[1:], linear.springs * r[1:])
-    return float(max(with_springs, np.linalg.norm(r) / scale))
+    return max(with_springs, float(np.linalg.norm(r)) / scale)
 
 
 def _apply_flexibility(flexibility: np.ndarray, forces: np.ndarray) -> np.ndarray:

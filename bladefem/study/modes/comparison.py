@@ -109,9 +109,9 @@ def section_axes(points: np.ndarray, s: np.ndarray) -> tuple[np.ndarray, np.ndar
     if not height:
         thin = np.tile([0.0, 1.0, 0.0], (len(points), 1))
         return np.tile(points.mean(axis=0), (len(points), 1)), thin
-    angle = np.interp(s, height, np.unwrap(angle, period=np.pi))
+    turn = np.interp(s, height, np.unwrap(angle, period=np.pi))
     middle = np.stack([np.interp(s, height, c) for c in np.array(centre).T], axis=1)
-    return middle, np.stack([np.zeros_like(angle), np.cos(angle), np.sin(angle)], axis=1)
+    return middle, np.stack([np.zeros_like(turn), np.cos(turn), np.sin(turn)], axis=1)
 
 
 def pure_shapes(
