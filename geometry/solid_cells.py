@@ -121,8 +121,8 @@ def _of_wanted_order(
     if first_order and linear != "promote":
         raise InputError(
             f"imported.file = '{source}': {_count_text(first_order)} of first order are far too "
-            "stiff in bending, expected second-order cells; imported.linear = 'promote' adds nodes in "
-            "the middle of their edges, 'keep' solves them as they are"
+            "stiff in bending, expected second-order cells; imported.linear = 'promote' adds nodes "
+            "in the middle of their edges, 'keep' solves them as they are"
         )
     notes: tuple[str, ...] = ()
     if first_order:
