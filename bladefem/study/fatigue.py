@@ -113,10 +113,10 @@ def _read_diagram(texts: tuple[str, ...]) -> HaighDiagram:
         rows.append([parse(value.strip(), "Pa", "fatigue.haigh") for value in (mean, amplitude)])
     if len(rows) < 2:
         raise InputError(f"fatigue.haigh: {len(rows)} mean stress, expected at least two")
-    for (mean, _), (following, _) in pairwise(rows):
-        if not following > mean:
+    for (lower, _), (following, _) in pairwise(rows):
+        if not following > lower:
             raise InputError(
-                f"fatigue.haigh: {show(following, 'Pa')} after {show(mean, 'Pa')}, expected rising "
+                f"fatigue.haigh: {show(following, 'Pa')} after {show(lower, 'Pa')}, expected rising "
                 "mean stresses"
             )
     lowest = min(amplitude for _, amplitude in rows)
