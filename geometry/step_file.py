@@ -95,17 +95,14 @@ def read_step(
             )
         named |= _find_faces(gmsh, named, sectors, unit)
         _tie_faces(gmsh, named, sectors, unit)
+        contact = [
+            tag
+            for (dim, name), tags in named.items()
+            if dim == 2 and name.lower() in CONTACT
+            for tag in tags
+        ]
         with attempt("mesh.size", f"mesh '{file}'"):
-            _generate_mesh(
-                gmsh,
-                size,
-                [
-                    tag
-                    for (dim, name), tags in named.items()
-                    if dim == 2 and name.lower() in CONTACT
-                    for tag in tags
-                ],
-            )
+            _generate_mesh(gmsh, size, contact)
         for (dimension, name), tags in named.items():
             gmsh.model.setPhysicalName(
                 dimension, gmsh.model.addPhysicalGroup(dimension, tags), name

@@ -28,6 +28,9 @@ HELD = 1e-6
 UNBALANCED = 1e-8
 
 
+INDEFINITE = "the contact flexibility is not positive definite"
+
+
 @dataclass(frozen=True)
 class LCPSolution:
     """Forces, gaps and rigid displacements, with the proof that they are optimal."""
@@ -82,13 +85,11 @@ def solve_lcp(
     """
     C, g0, R, load = _check_arrays(C, g0, R, load)
     n = len(g0)
-    U, S, V = held_directions(R)
-    reduced = (V.T @ load) / S
     reason = _balance_failure(R, load) if load.size else ""
     if reason:
-        return LCPSolution(
-            np.zeros(n), g0.copy(), np.zeros(R.shape[1]), np.zeros(n, bool), np.inf, 0, reason
-        )
+        return _unsolved_problem(g0, R, np.zeros(n, bool), reason)
+    U, S, V = held_directions(R)
+    reduced = (V.T @ load) / S
     # closes even gaps, however wide, before round-off could drown the elastic ones in them
     travel = -(U.T @ g0)
     g0 = g0 + U @ travel
@@ -99,30 +100,32 @@ def solve_lcp(
             f, y, active, more, settled = _primal_active_set(C, g0, U, reduced)
             its += more
     except LinAlgError:
-        return LCPSolution(
-            np.zeros(n),
-            g0.copy(),
-            np.zeros(R.shape[1]),
-            active,
-            np.inf,
-            0,
-            "the contact flexibility is not positive definite",
-        )
+        return _unsolved_problem(g0, R, active, INDEFINITE)
     gap = g0 + C @ f + U @ y
     residual = complementarity(f, gap, float(np.abs(C @ f).max()))
-    if load.size:
-        residual = max(
-            residual, float(np.abs(U.T @ f - reduced).max(initial=0.0) / (np.abs(f).max() + 1e-300))
-        )
-    reason = (
-        ""
-        if residual <= tolerance
-        else (
+    residual = max(residual, _unbalanced_part(U.T @ f - reduced, f))
+    if residual > tolerance:
+        reason = (
             f"the contact iteration stopped after {its} steps with a residual of {residual:.1e}, "
             f"wanted {tolerance:.1e}"
         )
-    )
     return LCPSolution(f, gap, V @ ((y + travel) / S), active, residual, its, reason)
+
+
+def _unbalanced_part(missing: np.ndarray, force: np.ndarray) -> float:
+    """What is missing in the balance, relative to the largest force."""
+    return float(np.abs(missing).max(initial=0.0) / (np.abs(force).max() + 1e-300))
+
+
+def _unsolved_problem(
+    g0: np.ndarray,
+    R: np.ndarray,
+    active: np.ndarray,
+    reason: str,
+) -> LCPSolution:
+    """No forces, and why."""
+    nothing = np.zeros(len(g0))
+    return LCPSolution(nothing, g0.copy(), np.zeros(R.shape[1]), active, np.inf, 0, reason)
 
 
 def _check_arrays(

@@ -219,14 +219,7 @@ def friction_elements(
         if problem is None:
             raise InputError("contact.stiffness = 'map': expected the contact problem of the maps")
         mapped = [a.T @ k for a, k in zip(members, mapped_stiffness(problem, maps), strict=True)]
-    kt, kn = map(
-        np.concatenate,
-        zip(
-            *(stiffnesses(c, ratio, a, k) for c, a, k in zip(seats, area, mapped, strict=True)),
-            strict=True,
-        ),
-    )
-    _require_stiffness(kt, kn)
+    kt, kn = _layer_stiffness(seats, ratio, area, mapped)
     force = np.concatenate([a.T @ m.force for a, m in zip(members, maps, strict=True)])
     if contact.stiffening is not None:
         law = InterfaceLaw(kn, contact.stiffening * np.concatenate(area))
@@ -245,6 +238,20 @@ def friction_elements(
     S = sp.kron(sp.block_diag(G), sp.identity(1 + tangents), format="csr")
     mu = np.repeat([c.mu for c in seats], [len(a) for a in area])
     return Elements(kt, kn, mu, n0, tangents, t0=t0), S
+
+
+def _layer_stiffness(
+    seats: Sequence[Contact],
+    ratio: float,
+    area: Sequence[np.ndarray],
+    mapped: Sequence[np.ndarray | None],
+) -> tuple[np.ndarray, np.ndarray]:
+    """Tangential and normal stiffness (n,) [N/m] of the elements of all seats."""
+    parts = [stiffnesses(c, ratio, a, k) for c, a, k in zip(seats, area, mapped, strict=True)]
+    kt = np.concatenate([tangential for tangential, _ in parts])
+    kn = np.concatenate([normal for _, normal in parts])
+    _require_stiffness(kt, kn)
+    return kt, kn
 
 
 def _require_stiffness(kt: np.ndarray, kn: np.ndarray) -> None:

@@ -149,13 +149,25 @@ def preload(
         raise InputError(
             "operation.preload = 'nonlinear' knows no support.springs, expected 'linear'"
         )
-    u = np.zeros((len(body.mesh.points), body.dim))
     if speed == 0:
-        return Preload(u, speed, 0, 0, 0.0)
+        return Preload(np.zeros((len(body.mesh.points), body.dim)), speed, 0, 0, 0.0)
     forms = _potential_forms(body, axis, quadrature)
     con = in_step(body, clamp)
     load = centrifugal(body, speed, axis)
     size = _vector_length(con, restrict(con, load.reshape(-1, 1)))
+    u, iterations, steps, misfit = _load_steps(con, clamp, forms, speed, tolerance * size)
+    return Preload(u, speed, iterations, steps, misfit / size)
+
+
+def _load_steps(
+    con: Constrained,
+    clamp: str | None,
+    forms: _Forms,
+    speed: float,
+    limit: float,
+) -> tuple[np.ndarray, int, int, float]:
+    """The state at a speed, Newton iterations, load steps, and the unbalanced force left [N]."""
+    u = np.zeros((len(con.body.mesh.points), con.body.dim))
     done = 0.0
     part = 1.0
     iterations = 0
@@ -164,9 +176,7 @@ def preload(
     misfit = 0.0
     while done < 1.0:
         target = min(done + part, 1.0)
-        trial, used, error = _solve_newton(
-            con, clamp, forms, u, target * speed**2, tolerance * size
-        )
+        trial, used, error = _solve_newton(con, clamp, forms, u, target * speed**2, limit)
         iterations += used
         if isinstance(error, str):
             halvings = halvings + 1
@@ -181,7 +191,7 @@ def preload(
         misfit = error
         done = target
         steps = steps + 1
-    return Preload(u, speed, iterations, steps, misfit / size)
+    return u, iterations, steps, misfit
 
 
 def tangent(

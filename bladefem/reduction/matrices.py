@@ -51,14 +51,7 @@ def port_model_from_matrices(
         InputError: shapes do not fit, M or K is not Hermitian, M is not positive semidefinite, or a
             motion has neither mass nor stiffness.
     """
-    M = _hermitian_matrix(M, "M")
-    K = _hermitian_matrix(K, "K")
-    if M.shape != K.shape:
-        raise InputError(f"M {M.shape} and K {K.shape}: expected the same shape")
-    if C is not None:
-        C = _square_matrix(C, "C")
-        if C.shape != M.shape:
-            raise InputError(f"C {C.shape} and M {M.shape}: expected the same shape")
+    M, K, C = _checked_matrices(M, K, C)
     P, slices = _port_selection(ports, M.shape[0])
     massless = np.zeros((len(P), len(P)))
     try:
@@ -88,6 +81,23 @@ def port_model_from_matrices(
         nodal_diameter,
         damping=damping,
     )
+
+
+def _checked_matrices(
+    M: np.ndarray,
+    K: np.ndarray,
+    C: np.ndarray | None,
+) -> tuple[np.ndarray, np.ndarray, np.ndarray | None]:
+    """Dense matrices of one shape, M and K Hermitian."""
+    M = _hermitian_matrix(M, "M")
+    K = _hermitian_matrix(K, "K")
+    if M.shape != K.shape:
+        raise InputError(f"M {M.shape} and K {K.shape}: expected the same shape")
+    if C is not None:
+        C = _square_matrix(C, "C")
+        if C.shape != M.shape:
+            raise InputError(f"C {C.shape} and M {M.shape}: expected the same shape")
+    return M, K, C
 
 
 def read_matrices(path: str | Path) -> dict[str, np.ndarray]:

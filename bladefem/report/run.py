@@ -141,27 +141,35 @@ def _write(result: SolvedRun, progress: Progress) -> None:
     modes.save_modes_vtu(result.mesh, excited_set(result), folder / "modes.vtu")
     write_points(folder, result.contact.maps)
     save_cycles_vtu(patches, cycles, folder / "friction_work.vtu", coefficient)
+    write_report(
+        folder,
+        result.scene,
+        tables,
+        figures,
+        [*filter(None, [moved]), *_report_messages(result, cycles)],
+        result.timings,
+        page=Page(_live(result, tables, cycles)),
+    )
+
+
+def _report_messages(result: SolvedRun, cycles: list[ContactCycle]) -> list[str]:
+    """What the run had to say, and how far its models reach."""
+    coefficient = result.scene.contact.wear_coefficient
     messages = [
-        *filter(None, [moved]),
         *result.messages,
         method(MESH),
         _static_contact(result),
         method(_states(result)),
         method(linear_sentence(cycles)),
         *_beyond_stick(result),
-        *([influence_sentence(result.response.influences)] if result.response.influences else []),
-        *([] if coefficient is None else [wear_sentence(cycles, coefficient)]),
-        *([] if result.wheel is None else pattern_sentences(result.wheel)),
     ]
-    write_report(
-        folder,
-        result.scene,
-        tables,
-        figures,
-        messages,
-        result.timings,
-        page=Page(_live(result, tables, cycles)),
-    )
+    if result.response.influences:
+        messages.append(influence_sentence(result.response.influences))
+    if coefficient is not None:
+        messages.append(wear_sentence(cycles, coefficient))
+    if result.wheel is not None:
+        messages.extend(pattern_sentences(result.wheel))
+    return messages
 
 
 def _live(

@@ -59,17 +59,29 @@ def answer(
     best = finite.loc[finite["peak_amplitude"].idxmin()] if found is None else found
     against = reasons_against(best, summary, points, searched)
     beside = mass_of(best) or (among(finite) if found is None else flat_range(best))
+    doubts = cautions(finite, best, points, found is not None)
     if against:
-        numbers = [
-            ("optimum normal load per seat", "not determined", against[0]),
-            (
-                "lowest resonance amplitude found",
-                f"{1e6 * best['peak_amplitude']:.4g} µm",
-                f"at {best['load']:.4g} N and {best['peak_frequency']:.5g} Hz",
-            ),
-        ]
+        lowest = (
+            "lowest resonance amplitude found",
+            f"{1e6 * best['peak_amplitude']:.4g} µm",
+            f"at {best['load']:.4g} N and {best['peak_frequency']:.5g} Hz",
+        )
         said = [f"No optimum load is named: {reason}." for reason in against]
-        return Answer(numbers, [*said, *cautions(finite, best, points, found is not None)])
+        unknown = ("optimum normal load per seat", "not determined", against[0])
+        return Answer([unknown, lowest], [*said, *doubts])
+    numbers = _optimum_numbers(summary, best, beside)
+    return Answer(
+        [*numbers, *stress(summary, best), *own_mass(finite, best, own, masses)],
+        doubts,
+    )
+
+
+def _optimum_numbers(
+    summary: pd.DataFrame,
+    best: pd.Series,
+    beside: str,
+) -> list[tuple[str, str, str]]:
+    """The best load and the resonance there: what, value, remark."""
     numbers = [
         ("optimum normal load per seat", f"{best['load']:.4g} N", beside),
         (
@@ -90,10 +102,7 @@ def answer(
         )
     elif energy(best):
         numbers.append(("friction work per cycle there", energy(best).split(" of ")[0], ""))
-    return Answer(
-        [*numbers, *stress(summary, best), *own_mass(finite, best, own, masses)],
-        cautions(finite, best, points, found is not None),
-    )
+    return numbers
 
 
 def among(finite: pd.DataFrame) -> str:

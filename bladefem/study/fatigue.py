@@ -116,8 +116,8 @@ def _read_diagram(texts: tuple[str, ...]) -> HaighDiagram:
     for (lower, _), (following, _) in pairwise(rows):
         if not following > lower:
             raise InputError(
-                f"fatigue.haigh: {show(following, 'Pa')} after {show(lower, 'Pa')}, expected rising "
-                "mean stresses"
+                f"fatigue.haigh: {show(following, 'Pa')} after {show(lower, 'Pa')}, expected "
+                "rising mean stresses"
             )
     lowest = min(amplitude for _, amplitude in rows)
     if lowest < 0:

@@ -55,20 +55,7 @@ def length(
             alpha=0.7,
             zorder=3,
         )
-    ax.annotate(
-        "",
-        a,
-        b,
-        arrowprops={
-            "arrowstyle": "<|-|>",
-            "color": DIMENSION,
-            "lw": 0.9,
-            "shrinkA": 0,
-            "shrinkB": 0,
-            "mutation_scale": 8,
-        },
-        zorder=4,
-    )
+    _draw_arrow(ax, a, b)
     turn = np.degrees(np.arctan2(way[1], way[0]))
     turn = turn - 180 if turn > 90 else turn + 180 if turn <= -90 else turn
     place = (a + b) / 2 + side * beside * left
@@ -85,6 +72,24 @@ def length(
         fontsize=8,
         zorder=5,
         bbox={"boxstyle": "square,pad=0.1", "fc": "white", "ec": "none", "alpha": 0.75},
+    )
+
+
+def _draw_arrow(ax: Any, start: np.ndarray, end: np.ndarray) -> None:
+    """A line with a head at both ends."""
+    ax.annotate(
+        "",
+        start,
+        end,
+        arrowprops={
+            "arrowstyle": "<|-|>",
+            "color": DIMENSION,
+            "lw": 0.9,
+            "shrinkA": 0,
+            "shrinkB": 0,
+            "mutation_scale": 8,
+        },
+        zorder=4,
     )
 
 

@@ -48,16 +48,12 @@ def draw_map(
     columns = np.arange(len(cells.columns))
     rows = np.arange(len(cells.index))
     with canvas(file, None, (7.2, 4.6)) as ax:
-        colours = (
-            ListedColormap(word_colours(codes, len(names)))
-            if words
-            else matplotlib.colormaps[SEQUENTIAL]
-        )
-        norm = (
-            BoundaryNorm(np.arange(len(names) + 1) - 0.5, max(len(names), 1))
-            if words and len(names) > 1
-            else None
-        )
+        colours = matplotlib.colormaps[SEQUENTIAL]
+        norm = None
+        if words:
+            colours = ListedColormap(word_colours(codes, len(names)))
+        if words and len(names) > 1:
+            norm = BoundaryNorm(np.arange(len(names) + 1) - 0.5, len(names))
         image = ax.pcolormesh(
             columns,
             rows,

@@ -278,25 +278,7 @@ def draw_optimum_curve(
     amplitude = MICRO * finite["peak_amplitude"]
     axes[0].plot(finite["load"], amplitude, "o-", color=colour, label=label)
     if "lowest" in finite and finite["lowest"].notna().any():
-        sure = finite["interval"] != "sampled"
-        axes[0].fill_between(
-            finite["load"],
-            MICRO * finite["lowest"],
-            MICRO * finite["highest"],
-            color=colour,
-            alpha=0.22,
-            lw=0,
-            label="range by loading history" + ("" if sure.all() else " (hollow: sampled)"),
-        )
-        for name in ("lowest", "highest"):
-            axes[0].plot(
-                finite["load"][~sure],
-                MICRO * finite[name][~sure],
-                "o",
-                mfc="none",
-                mec=colour,
-                ms=4,
-            )
+        _draw_history_range(axes[0], finite, colour)
     axes[1].plot(finite["load"], finite["peak_frequency"], "o-", color=colour)
     doubtful = (
         finite["unconverged"] > 0
@@ -333,6 +315,29 @@ def draw_optimum_curve(
         fontsize=8.5,
         va="top",
     )
+
+
+def _draw_history_range(ax: Any, finite: pd.DataFrame, colour: str) -> None:
+    """Between which amplitudes the loading history decides; hollow where that was sampled."""
+    sure = finite["interval"] != "sampled"
+    ax.fill_between(
+        finite["load"],
+        MICRO * finite["lowest"],
+        MICRO * finite["highest"],
+        color=colour,
+        alpha=0.22,
+        lw=0,
+        label="range by loading history" + ("" if sure.all() else " (hollow: sampled)"),
+    )
+    for name in ("lowest", "highest"):
+        ax.plot(
+            finite["load"][~sure],
+            MICRO * finite[name][~sure],
+            "o",
+            mfc="none",
+            mec=colour,
+            ms=4,
+        )
 
 
 def draw_unknown(ax: Any, finite: pd.DataFrame) -> None:
@@ -528,28 +533,7 @@ def draw_accuracy(
             if part.empty:
                 continue
             ax.plot(part["time"], part["error"], "o", color=colour, ms=5, alpha=0.8, label=name)
-        failed = table[~good]
-        if len(failed):
-            ax.plot(
-                failed["time"],
-                np.full(len(failed), 0.98),
-                "x",
-                color=FAILED,
-                ms=7,
-                mew=1.8,
-                transform=ax.get_xaxis_transform(),
-                label=f"not converged ({len(failed)})",
-            )
-            for _, row in failed[failed["time"].notna()].iterrows():
-                ax.annotate(
-                    str(row["name"]),
-                    (row["time"], 0.98),
-                    (6, -13),
-                    xycoords=ax.get_xaxis_transform(),
-                    textcoords="offset points",
-                    fontsize=7.5,
-                    color=FAILED,
-                )
+        _draw_failed_settings(ax, table[~good])
         draw_front(ax, table[good])
         if tolerance is not None:
             ax.axhline(
@@ -566,6 +550,32 @@ def draw_accuracy(
         if alone:
             names_apart(ax)
         return ax.figure
+
+
+def _draw_failed_settings(ax: Any, failed: pd.DataFrame) -> None:
+    """Crosses at the top, with names, for settings without an error to show."""
+    if failed.empty:
+        return
+    ax.plot(
+        failed["time"],
+        np.full(len(failed), 0.98),
+        "x",
+        color=FAILED,
+        ms=7,
+        mew=1.8,
+        transform=ax.get_xaxis_transform(),
+        label=f"not converged ({len(failed)})",
+    )
+    for _, row in failed[failed["time"].notna()].iterrows():
+        ax.annotate(
+            str(row["name"]),
+            (row["time"], 0.98),
+            (6, -13),
+            xycoords=ax.get_xaxis_transform(),
+            textcoords="offset points",
+            fontsize=7.5,
+            color=FAILED,
+        )
 
 
 def draw_front(ax: Any, table: pd.DataFrame) -> None:

@@ -44,23 +44,8 @@ def draw_campbell(
         title: headline.
     """
     with canvas(file, ax, (7.6, 5.0)) as ax:
-        keys = [key for key in ("mode", "nodal_diameter") if key in table]
         fastest = RPM * table["speed"].max()
-        for key, line in table.groupby(keys):
-            mode, *diameter = key
-            line = line.sort_values("speed")
-            colour = COLOURS[(int(mode) - 1) % len(COLOURS)]
-            first = (
-                not diameter
-                or diameter[0] == table.loc[table["mode"] == mode, "nodal_diameter"].min()
-            )
-            ax.plot(
-                RPM * line["speed"],
-                line["frequency"],
-                color=colour,
-                lw=1.7 if not diameter else 1.2,
-                label=line_name(line, mode) if first else None,
-            )
+        _draw_modes(ax, table)
         top = 1.12 * table["frequency"].max()
         names = diameter_names(table) if "nodal_diameter" in table else []
         name_lines(ax, fastest, top, names + draw_order_lines(ax, orders, fastest, top))
@@ -93,6 +78,25 @@ def draw_campbell(
         )
         ax.legend(loc="center left", bbox_to_anchor=(1.14, 0.5))
         return ax.figure
+
+
+def _draw_modes(ax: Any, table: pd.DataFrame) -> None:
+    """A line a mode and nodal diameter, named at the first diameter of each mode."""
+    keys = [key for key in ("mode", "nodal_diameter") if key in table]
+    for key, line in table.groupby(keys):
+        mode, *diameter = key
+        line = line.sort_values("speed")
+        colour = COLOURS[(int(mode) - 1) % len(COLOURS)]
+        first = (
+            not diameter or diameter[0] == table.loc[table["mode"] == mode, "nodal_diameter"].min()
+        )
+        ax.plot(
+            RPM * line["speed"],
+            line["frequency"],
+            color=colour,
+            lw=1.7 if not diameter else 1.2,
+            label=line_name(line, mode) if first else None,
+        )
 
 
 def diameter_names(table: pd.DataFrame) -> list[tuple[float, str, str]]:

@@ -85,6 +85,41 @@ def along(
         InputError: no frequencies, or an accuracy that is none.
         NotSolvedError: no point converged.
     """
+    curve = _first_curve(family, omegas, settings, accuracy)
+    points = curve.points
+    final: set[int] = set()
+    known: dict[str, float] = {}
+    for _ in range(PASSES):
+        limit = curve.limit
+        wrong = _first_wrong(curve, limit, final)
+        if wrong is None:
+            break
+        found = indicate(family, curve.used[wrong], points[wrong], known)
+        better = following(curve.used[wrong], found, 2 * limit / curve.heights[wrong])
+        if better is not None:
+            _raise(curve, wrong, better, found)
+        # there is none, or it was not solved
+        if curve.used[wrong] != better:
+            final.add(wrong)
+        known = {name: found.errors[name] for name in KEPT if found.errors[name] <= accuracy / 20}
+    top, *_ = _judged(curve)
+    return Checked(
+        replace(curve.used[top], error=curve.errors[points[top].omega]), points, curve.errors
+    )
+
+
+def _first_curve(
+    family: Family,
+    omegas: Sequence[float],
+    settings: Settings,
+    accuracy: float,
+) -> _Curve:
+    """All points with the settings that points commonly need, none of them judged.
+
+    Raises:
+        InputError: no frequencies, or an accuracy that is none.
+        NotSolvedError: no point converged.
+    """
     if not len(omegas):
         raise InputError("omegas: none given, expected at least one circular frequency")
     if not 0 < accuracy < 1:
@@ -108,7 +143,7 @@ def along(
             f"{points[0].reason}"
         )
     used = [settings] * len(points)
-    curve = _Curve(
+    return _Curve(
         family,
         options,
         accuracy,
@@ -119,32 +154,19 @@ def along(
         {},
         set(),
     )
-    final: set[int] = set()
-    known: dict[str, float] = {}
-    for _ in range(PASSES):
-        limit = curve.limit
-        wrong = next(
-            (
-                i
-                for i in _judged(curve)
-                if curve.errors[points[i].omega] * curve.heights[i] > limit and i not in final
-            ),
-            None,
-        )
-        if wrong is None:
-            break
-        found = indicate(family, curve.used[wrong], points[wrong], known)
-        better = following(curve.used[wrong], found, 2 * limit / curve.heights[wrong])
-        if better is not None:
-            _raise(curve, wrong, better, found)
-        # there is none, or it was not solved
-        if curve.used[wrong] != better:
-            final.add(wrong)
-        known = {name: found.errors[name] for name in KEPT if found.errors[name] <= accuracy / 20}
-    top, *_ = _judged(curve)
-    return Checked(
-        replace(curve.used[top], error=curve.errors[points[top].omega]), points, curve.errors
-    )
+
+
+def _first_wrong(
+    curve: _Curve,
+    limit: float,
+    final: set[int],
+) -> int | None:
+    """The first judged point whose error [m] exceeds a limit, and which may still be refined."""
+    for i in _judged(curve):
+        error = curve.errors[curve.points[i].omega] * curve.heights[i]
+        if error > limit and i not in final:
+            return i
+    return None
 
 
 def _first(

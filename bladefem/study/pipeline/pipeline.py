@@ -699,30 +699,28 @@ def _remarks(
             )
         )
     for c in curves:
-        near = np.flatnonzero(c.frequency == c.peak_frequency)[0] + np.array([-1, 1])
-        if not c.converged[near[(near >= 0) & (near < len(c.frequency))]].all():
-            remarks.append(
-                warning(
-                    f"load {c.load:g} N: the highest point that was solved lies next to one that "
-                    "was not; the resonance may be higher"
-                )
-            )
-        if c.error == np.inf:
-            remarks.append(
-                warning(
-                    f"load {c.load:g} N: the error of the resonance amplitude is unknown, since "
-                    "richer models of it were not solved; nothing was refined because of that"
-                )
-            )
-        elif c.error is not None and c.error > scene.accuracy:
-            remarks.append(
-                warning(
-                    f"load {c.load:g} N: estimated error {100 * c.error:.2g} % of the resonance "
-                    f"amplitude, above the wanted {100 * scene.accuracy:.2g} "
-                    f"%{_of_the_contact_mesh(c)}"
-                )
-            )
+        remarks.extend(map(warning, _resonance_warnings(c, scene.accuracy)))
     return remarks
+
+
+def _resonance_warnings(c: Curve, accuracy: float) -> Iterator[str]:
+    """Why the highest point of a curve may be wrong."""
+    near = np.flatnonzero(c.frequency == c.peak_frequency)[0] + np.array([-1, 1])
+    if not c.converged[near[(near >= 0) & (near < len(c.frequency))]].all():
+        yield (
+            f"load {c.load:g} N: the highest point that was solved lies next to one that was not; "
+            "the resonance may be higher"
+        )
+    if c.error == np.inf:
+        yield (
+            f"load {c.load:g} N: the error of the resonance amplitude is unknown, since richer "
+            "models of it were not solved; nothing was refined because of that"
+        )
+    elif c.error is not None and c.error > accuracy:
+        yield (
+            f"load {c.load:g} N: estimated error {100 * c.error:.2g} % of the resonance "
+            f"amplitude, above the wanted {100 * accuracy:.2g} %{_of_the_contact_mesh(c)}"
+        )
 
 
 def _of_the_contact_mesh(curve: Curve) -> str:
