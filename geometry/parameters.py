@@ -211,6 +211,13 @@ class MeshSize:
         "elements across the width of a wedge's seats, a grid with contact_size, or a sixth of "
         "the length, along them; 8 when left out, free triangles where contact_size alone is given",
     )
+    fillet_elements: int | None = quantity(
+        None,
+        "1",
+        1,
+        64,
+        "elements over the arc of a fillet; 4 when left out, in proportion where size is given",
+    )
     order: int = quantity(2, "1", 1, 2, "order of the elements; 1 is only for comparison")
     algorithm: str = quantity(
         "hxt",

@@ -14,17 +14,15 @@ from bladefem.errors import InputError
 from .draw import clear_leftovers, imprint, polygon, prism
 from .finalise_mesh import complete, mesh_model
 from .mesh import Mesh
-from .parameters import DEG, Aerofoil, Disc, MeshSize, Platform, Shank, Wedge
+from .parameters import Aerofoil, Disc, MeshSize, Platform, Shank, Wedge
 from .profile import Profile, profile
-from .section import outline
+from .section import LIFT, outline
 from .sector_check import check_sector
 from .sector_names import edge_curves, link, mark_tip, motions, moved, name_faces, seat, sector
 from .session import attempt, gmsh_session
-from .sizing import sector_sizes, set_grids, set_sizes
+from .sizing import sector_sizes, set_fillet_grid, set_grids, set_sizes
 
 SEATS = ("seat_left", "seat_right", "damper_left", "damper_right")
-# a fillet meets the platform at this angle, since tangent faces are hard on Boolean unions
-LIFT = 15 * DEG
 
 
 def wedge_sector(
@@ -79,7 +77,10 @@ def wedge_sector(
         )
         groups = mark_tip(gmsh, groups, aerofoil, shape)
         link(gmsh, groups, shape)
-        set_sizes(gmsh, shape, wedge, sizes, edge_curves(gmsh, groups))
+        fillet = groups.faces.get("fillet", [])
+        set_sizes(gmsh, shape, wedge, sizes, edge_curves(gmsh, groups), fillet)
+        with attempt("aerofoil.fillet", "mesh the fillet in a grid"):
+            set_fillet_grid(gmsh, fillet, sizes, size)
         # an element size on the seats without a number across asks for free triangles
         if size.seat_elements or size.contact_size is None:
             set_grids(gmsh, [groups.faces[name][0] for name in SEATS], wedge, size)

@@ -21,6 +21,8 @@ PAIRS = ((0, 0), (1, 1), (2, 2), (0, 1), (1, 2), (2, 0))
 BLOCK = 20000
 # of a period, for principal stresses of complex fields
 PHASES = 64
+# square of a patch's radius: bounds the weight of Gauss points next to the node
+NEAREST = 0.01
 
 
 @dataclass(frozen=True)
@@ -102,12 +104,16 @@ def patch_stress(
     u: np.ndarray,
     node: int,
 ) -> tuple[np.ndarray, np.ndarray]:
-    """(6,) stress at a node continued from the Gauss points of the cells round it, by polynomials
-    of first and of second degree fitted to them; the cells share a node with those that touch it.
+    """Two values (6,) of the stress at a node, continued from the Gauss points near it.
+
+    The first is a linear fit to the cells at the node. The second is a quadratic fit to these and
+    to all that touch them, in which a residual counts with the inverse square of its distance: round
+    a notch the stress falls within an element or two, and far points would flatten it.
     """
     mesh = body.mesh
     places = []
     stresses = []
+    at_node = []
     for name in body.material:
         cells = mesh.bodies[name]
         near = cells[(cells == node).any(axis=1)]
@@ -117,14 +123,18 @@ def patch_stress(
         at, _, stress = _of_cells(body, np.asarray(u)[:, : body.dim], name, some, False)
         places.append(at.reshape(-1, 3)[:, : body.dim])
         stresses.append(stress.reshape(-1, 6))
+        at_node.append(np.repeat((some == node).any(axis=1), at.shape[1]))
     x = np.concatenate(places) - mesh.points[node, : body.dim]
     x = x / np.abs(x).max()
     values = np.concatenate(stresses)
+    own = np.concatenate(at_node)
     linear = np.column_stack([np.ones(len(x)), x])
     squares = [x[:, i] * x[:, j] for i in range(body.dim) for j in range(i, body.dim)]
     quadratic = np.column_stack([linear, *squares])
-    fits = [np.linalg.lstsq(basis, values, rcond=None)[0][0] for basis in (linear, quadratic)]
-    return fits[0], fits[1]
+    weight = 1 / (NEAREST + (x**2).sum(axis=1))[:, None]
+    first = np.linalg.lstsq(linear[own], values[own], rcond=None)[0][0]
+    second = np.linalg.lstsq(quadratic * weight, values * weight, rcond=None)[0][0]
+    return first, second
 
 
 def von_mises(stress: np.ndarray) -> np.ndarray:

@@ -281,6 +281,15 @@ def test_fillet_is_a_quarter_groove_round_the_root():
     assert mesh.report["min scaled jacobian"] > 0.1
 
 
+@pytest.mark.parametrize(("asked", "over"), [({}, 2), ({"fillet_elements": 3}, 3)])
+def test_fillet_is_a_grid_of_elements_over_its_arc(asked, over):
+    """A closed grid of n rows has (n + 1) / (2 n) corner nodes a triangle. Where the number is left
+    open it is 4 at the automatic size, 3.1 mm, and in proportion otherwise.
+    """
+    faces = build(MeshSize(size=6e-3, **asked), aerofoil={"fillet": 2e-3}).faces["fillet"]
+    assert 2 * over * len(np.unique(faces[:, :3])) == (over + 1) * len(faces)
+
+
 @pytest.mark.parametrize(
     "changes, field",
     [

@@ -20,6 +20,7 @@ from ...friction.fourier import to_complex
 from ...hbm.model import Damping
 from ...hbm.solution import Solution
 from ...reduction.assemble import folded_diameter
+from ...scene.support import area_springs, held_letters
 from ..adaptive.family import joined
 from .assemble_model import LoadCase
 from .contact_cycle import labels
@@ -132,7 +133,7 @@ def damped_stress(
     from ...fem.alternating_stress import alternating_stress
 
     motion = damped_motion(bodies, patches, modes, case, solution, points, factorised)
-    found = alternating_stress(bodies.still_blade, motion.harmonics)
+    found = alternating_stress(bodies.still_blade, motion.harmonics, touched_nodes(bodies))
     return DampedStress(
         case.load,
         case.mass,
@@ -142,6 +143,26 @@ def damped_stress(
         found.mesh_error,
         motion.mismatch,
     )
+
+
+def touched_nodes(bodies: Bodies) -> np.ndarray:
+    """(n_points,) True where the blade is held, cut, seated or excited: all else is a free face."""
+    mesh = bodies.mesh
+    support = bodies.scene.support
+    names = [
+        support.clamp,
+        *(face for face, *_ in area_springs(support)),
+        *(face for face, _ in held_letters(support)),
+        bodies.scene.excitation.at,
+        *(name for pair in mesh.pairs.values() for name in (pair.master, pair.slave)),
+    ]
+    touched = np.zeros(len(mesh.points), bool)
+    for name in names:
+        if name in mesh.faces:
+            touched[np.unique(mesh.faces[name])] = True
+        if name in mesh.nodes:
+            touched[mesh.nodes[name]] = True
+    return touched
 
 
 def blade_loads(
