@@ -6,16 +6,19 @@ mesh that passes may still be refused by the mesher.
 
 from __future__ import annotations
 
-from typing import Any
+from typing import TYPE_CHECKING
 
 from bladefem.errors import InputError, suggestion
 from bladefem.scene.kinds import kind_named
+
+if TYPE_CHECKING:
+    from bladefem.scene.tables import Scene
 
 # cells; as finalise_mesh.MAX_CELLS, which counts again once the volumes are known
 MAX_CELLS = 3e6
 
 
-def check_parameters(scene: Any) -> None:
+def check_parameters(scene: Scene) -> None:
     """Refuse what cannot be drawn, and meshes that would never end.
 
     Args:
@@ -31,7 +34,7 @@ def check_parameters(scene: Any) -> None:
         _refuse_many(scene, kind.cells(scene))
 
 
-def check_names(scene: Any) -> None:
+def check_names(scene: Scene) -> None:
     """Refuse an excitation at a face or node set that the shape does not have.
 
     Raises:
@@ -49,7 +52,7 @@ def check_names(scene: Any) -> None:
         )
 
 
-def _refuse_many(scene: Any, cells: float) -> None:
+def _refuse_many(scene: Scene, cells: float) -> None:
     """The field that is to blame is the one that was given."""
     if cells <= MAX_CELLS:
         return

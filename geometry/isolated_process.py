@@ -17,13 +17,16 @@ import tempfile
 from dataclasses import replace
 from pathlib import Path
 from types import SimpleNamespace
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from bladefem.errors import InputError
 from bladefem.scene.kinds import kind_named
 
 from .builders import build_here
 from .mesh import Mesh
+
+if TYPE_CHECKING:
+    from bladefem.scene.tables import Scene
 
 # seconds; the largest meshes that are accepted take a tenth of it
 LIMIT = 900
@@ -34,7 +37,7 @@ ROOT = Path(__file__).parents[1]
 MPI = ("OMPI_", "PMIX_", "PMI_", "PRTE_", "ORTE_", "HYDRA_", "MPI_")
 
 
-def build(scene: Any) -> Mesh:
+def build(scene: Scene) -> Mesh:
     """The mesh of a scene, made in a child process; after a crash with the other algorithm and
     smaller elements.
 

@@ -7,15 +7,20 @@ import sys
 from collections.abc import Callable
 from functools import partial
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from ..errors import InputError
 from ..scene.kinds import kind_named, load_function
 from ..scene.tables import Scene
+from ..util.communicator import Communicator
 from . import tables
 
+if TYPE_CHECKING:
+    from ..study.modes.survey import Wanted
+    from ..study.pipeline.run_records import Run
 
-def check(options: argparse.Namespace, comm: Any) -> None:
+
+def check(options: argparse.Namespace, comm: Communicator | None) -> None:
     """Print the resolved scene, and what in it is improbable."""
     from ..io.stage_cache import on_root
     from ..scene.toml import given_keys, read_tables, resolved, scene_of
@@ -39,7 +44,7 @@ def check(options: argparse.Namespace, comm: Any) -> None:
 PICTURES = (".png", ".pdf", ".svg", ".jpg")
 
 
-def mesh(options: argparse.Namespace, comm: Any) -> None:
+def mesh(options: argparse.Namespace, comm: Communicator | None) -> None:
     """Mesh, quality table, picture."""
     if options.view and Path(options.view).suffix.lower() not in PICTURES:
         raise InputError(
@@ -54,7 +59,7 @@ def mesh(options: argparse.Namespace, comm: Any) -> None:
     tell(options, comm, lambda: tables.mesh_quality(run.mesh), run)
 
 
-def modes(options: argparse.Namespace, comm: Any) -> None:
+def modes(options: argparse.Namespace, comm: Communicator | None) -> None:
     """Natural frequencies and shapes of all nodal diameters; Campbell diagram, mesh refinement,
     comparison.
     """
@@ -68,7 +73,7 @@ def modes(options: argparse.Namespace, comm: Any) -> None:
         print_report(options, comm, folder / "report_modes.html")
 
 
-def modes_wanted(options: argparse.Namespace) -> Any:
+def modes_wanted(options: argparse.Namespace) -> Wanted:
     """What the options of ``modes`` ask for."""
     from ..study.modes.campbell import read_speeds
     from ..study.modes.linear_response_report import read_damping, read_loads
@@ -99,7 +104,7 @@ def _parse_sizes(text: str | None, option: str) -> list[float] | None:
     return None if text is None else [convert(item, size) for item in split_values(text)]
 
 
-def contact(options: argparse.Namespace, comm: Any) -> None:
+def contact(options: argparse.Namespace, comm: Communicator | None) -> None:
     """Seat the damper: force and pressure of each face under each load, with tables, picture and
     ParaView file.
     """
@@ -112,7 +117,7 @@ def contact(options: argparse.Namespace, comm: Any) -> None:
     tell(options, comm, lambda: tables.pressures(run.contact.maps), run)
 
 
-def reduce(options: argparse.Namespace, comm: Any) -> None:
+def reduce(options: argparse.Namespace, comm: Communicator | None) -> None:
     """Blade and damper reduced to their contact, load and probe points; a later response starts
     from there.
     """
@@ -123,7 +128,7 @@ def reduce(options: argparse.Namespace, comm: Any) -> None:
     tell(options, comm, lambda: tables.reduction(run.reduced), run)
 
 
-def response(options: argparse.Namespace, comm: Any) -> None:
+def response(options: argparse.Namespace, comm: Communicator | None) -> None:
     """Forced response for each load."""
     scene, folder, bars = prepared(options, comm, responds=True)
     from ..study.pipeline import pipeline
@@ -132,7 +137,7 @@ def response(options: argparse.Namespace, comm: Any) -> None:
     tell(options, comm, lambda: tables.responses(run.response), run)
 
 
-def report(options: argparse.Namespace, comm: Any) -> None:
+def report(options: argparse.Namespace, comm: Communicator | None) -> None:
     """Everything, with figures and report."""
     refuse_pdf(options)
     scene, folder, bars = prepared(options, comm, responds=True)
@@ -150,7 +155,7 @@ def refuse_pdf(options: argparse.Namespace) -> None:
 
 def print_report(
     options: argparse.Namespace,
-    comm: Any,
+    comm: Communicator | None,
     page: Path,
 ) -> None:
     """The report as PDF, where that is wanted."""
@@ -166,7 +171,7 @@ def run_kind(
     scene: Scene,
     folder: Path,
     options: argparse.Namespace,
-    comm: Any,
+    comm: Communicator | None,
     progress: Any,
 ) -> None:
     """All that `bladefem run` does for a scene, by the record of its kind, and its table."""
@@ -175,7 +180,7 @@ def run_kind(
     tell(options, comm, lambda: load_function(kind.table)(found), found)
 
 
-def chart(options: argparse.Namespace, comm: Any) -> None:
+def chart(options: argparse.Namespace, comm: Communicator | None) -> None:
     """Speed against accuracy of methods and models: tables and picture."""
     from ..io.stage_cache import on_root
     from ..report.chart import write_chart
@@ -203,7 +208,7 @@ def chart(options: argparse.Namespace, comm: Any) -> None:
     )
 
 
-def info(options: argparse.Namespace, comm: Any) -> None:
+def info(options: argparse.Namespace, comm: Communicator | None) -> None:
     """Versions and threads."""
     from .info import facts
 
@@ -214,7 +219,7 @@ def info(options: argparse.Namespace, comm: Any) -> None:
 
 def prepared(
     options: argparse.Namespace,
-    comm: Any,
+    comm: Communicator | None,
     responds: bool = False,
 ) -> tuple[Scene, Path, Any]:
     """The scene, the run folder with a copy of it, kept for this command, and progress bars;
@@ -278,9 +283,9 @@ def given_scene(options: argparse.Namespace, responds: bool) -> Scene:
 
 def tell(
     options: argparse.Namespace,
-    comm: Any,
+    comm: Communicator | None,
     table: Callable[[], str],
-    run: Any = None,
+    run: Run | None = None,
 ) -> None:
     """A table and the summary of a run, on rank 0 unless quiet."""
     if options.quiet or (comm is not None and comm.rank > 0):

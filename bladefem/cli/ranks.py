@@ -15,6 +15,7 @@ from contextlib import contextmanager, suppress
 from typing import Any
 
 from ..errors import InputError, NotSolvedError
+from ..util.communicator import Communicator
 
 # [s] that a failed rank waits for the others to fail as well
 PATIENCE = 10.0
@@ -133,7 +134,7 @@ def _catch_signals() -> Iterator[list[int]]:
             signal.signal(number, handler)
 
 
-def _stop_ranks(comm: Any, signals: list[int]) -> int:
+def _stop_ranks(comm: Communicator | None, signals: list[int]) -> int:
     """Ctrl-C, or the end that a batch system asks for: 128 plus the signal's number, as shells have
     it.
     """
@@ -147,7 +148,7 @@ def _stop_ranks(comm: Any, signals: list[int]) -> int:
 
 
 def _print_error(
-    comm: Any,
+    comm: Communicator | None,
     text: str,
     code: int,
 ) -> int:

@@ -7,11 +7,12 @@ from pathlib import Path
 from typing import Any
 
 from ..errors import InputError
+from ..util.communicator import Communicator
 from . import tables
 from .commands import prepared, tell
 
 
-def scatter(options: argparse.Namespace, comm: Any) -> None:
+def scatter(options: argparse.Namespace, comm: Communicator | None) -> None:
     """Statistics of many wheels, on top of the run's tuned responses."""
     scene, folder, bars = prepared(options, comm, responds=True)
     # before the tuned responses, which take minutes

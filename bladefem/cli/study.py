@@ -14,6 +14,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from ..errors import InputError
+from ..util.communicator import Communicator
 from . import tables
 from .commands import default_folder, given_scene, prepared, tell
 
@@ -58,7 +59,7 @@ def add_study(sub: argparse.ArgumentParser) -> None:
     sub.add_argument("--samples", type=int, default=16, metavar="N", help="runs of a scatter (16)")
 
 
-def study(options: argparse.Namespace, comm: Any) -> None:
+def study(options: argparse.Namespace, comm: Communicator | None) -> None:
     """The response for each run of the plan, each in its own folder inside the run folder."""
     from ..io.stage_cache import on_root
 
@@ -91,7 +92,7 @@ def study(options: argparse.Namespace, comm: Any) -> None:
     tell(options, comm, lambda: f"\n{plan.show(table)}\nwritten: {written}")
 
 
-def _solve_variant(options: argparse.Namespace, comm: Any) -> SolvedRun:
+def _solve_variant(options: argparse.Namespace, comm: Communicator | None) -> SolvedRun:
     """The responses of one run of the plan, in its own folder; collective."""
     scene, folder, bars = prepared(options, comm)
     from ..study.pipeline import pipeline

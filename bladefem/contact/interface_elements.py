@@ -6,7 +6,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import replace
-from typing import Any
+from typing import Any, TypeVar
 
 import numpy as np
 import scipy.sparse as sp
@@ -16,6 +16,9 @@ from ..errors import InputError
 from ..scene.tables import Contact, Material, Seat
 from .interface_law import InterfaceLaw, rigid_faces, stiffness_at
 from .seating import ContactProblem
+
+# [contact], or the values of one seat
+Layer = TypeVar("Layer", Contact, Seat)
 
 # stiffness per unit area that stands for rigid faces in the elements [N/m^3]: a layer of
 # 1e-8 of the compliance of steel over a millimetre
@@ -82,8 +85,8 @@ def scaled_contact(
         "kn": (not _gives(contact, "kn"), "kt", 1 / ratio),
     }
 
-    def scaled(table: Any) -> Any:
-        changes: dict[str, float] = {}
+    def scaled(table: Layer) -> Layer:
+        changes: dict[str, Any] = {}
         for name, factor in (("kt", kt), ("kn", kn)):
             follows, other, quotient = followed[name]
             if follows and not _gives(table, name):

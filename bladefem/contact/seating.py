@@ -37,6 +37,7 @@ from ..fem.flexibility import Flexibility, compliance, flexible
 from ..fem.linalg import dot
 from ..fem.loads import centrifugal, mass
 from ..scene.tables import Materials
+from ..util.communicator import Communicator
 from .as_array import given
 from .complementarity import LCPSolution, held_directions, solve_lcp
 from .interface_law import InterfaceLaw, closure_of, compliance_at, rigid_faces
@@ -199,7 +200,7 @@ def seat(
     speed: float,
     clearance: float = 0.0,
     normal: float | None = None,
-    comm: object = None,
+    comm: Communicator | None = None,
 ) -> list[PressureMap]:
     """Everything from the mesh to the pressure maps of "this" and "next" in one call (``solve``
     tells the arguments).

@@ -17,6 +17,7 @@ import numpy as np
 
 from ..data import ModeSet
 from ..errors import NotSolvedError
+from .compat import MPI
 from .constraint import expand, restrict
 from .flexibility import Flexibility, compliance, unknown_places
 from .linalg import apply, dot
@@ -93,7 +94,7 @@ def forced_motion(
     )
 
 
-def _column_norms(comm: object, v: np.ndarray) -> np.ndarray:
+def _column_norms(comm: MPI.Comm, v: np.ndarray) -> np.ndarray:
     """(k,) of the columns over all ranks."""
     return np.sqrt(
         abs(np.array([dot(comm, v[:, [i]], v[:, [i]])[0, 0] for i in range(v.shape[1])]))

@@ -15,6 +15,7 @@ import numpy as np
 from scipy.linalg import eigh
 
 from ..errors import NotSolvedError
+from .compat import MPI
 from .constraint import Constrained
 from .linalg import apply, dot, minus, mix
 
@@ -169,7 +170,7 @@ def _next_block(
 
 
 def _orthogonal_factor(
-    comm: object,
+    comm: MPI.Comm,
     W: np.ndarray,
     MW: np.ndarray,
     least: float,

@@ -14,14 +14,14 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass
-from typing import Any, TypeAlias
+from typing import TypeAlias
 
 import numpy as np
 import scipy.sparse as sp
 from scipy.linalg import blas
 
 from . import cyclic_schur as interior
-from .compat import PETSc
+from .compat import MPI, PETSc
 from .mumps import Factorised, dense, factorise_matrix, solve_matrix, values
 
 
@@ -148,7 +148,7 @@ def dense_rows(A: Matrix, n: int) -> np.ndarray:
 
 
 def dot(
-    comm: Any,
+    comm: MPI.Comm,
     X: Block,
     Y: np.ndarray,
 ) -> np.ndarray:

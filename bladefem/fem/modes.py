@@ -9,12 +9,12 @@ has; so the inertia of K - s M counts the eigenvalues, and what was missed is fo
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import Any
 
 import numpy as np
 
 from ..data import ModeSet
 from ..errors import InputError, NotSolvedError
+from .compat import MPI
 from .constraint import Constrained, expand, restrict
 from .cyclic_schur import eliminate, negative
 from .eigensolver import Eigensolver, basis_size, krylov_schur
@@ -235,6 +235,6 @@ def _widest_gap(lam: np.ndarray) -> tuple[float, int]:
     return (lam[gap - 1] + lam[gap]) / 2, gap
 
 
-def _column_norms(comm: Any, X: np.ndarray) -> np.ndarray:
+def _column_norms(comm: MPI.Comm, X: np.ndarray) -> np.ndarray:
     squares = (X.real**2 + X.imag**2).sum(0) if np.iscomplexobj(X) else (X**2).sum(0)
     return np.sqrt(comm.allreduce(squares) if comm.size > 1 else squares)

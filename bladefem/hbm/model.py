@@ -7,7 +7,7 @@ from __future__ import annotations
 from collections.abc import Callable, Hashable, Mapping
 from dataclasses import dataclass, field, replace
 from functools import cached_property
-from typing import Any
+from typing import Any, TypeVar
 
 import numpy as np
 
@@ -16,6 +16,8 @@ from ..errors import InputError
 from ..friction.fourier import synthesis, to_real
 from .linear.bodies import Damping, Stack, stack_bodies
 from .validate_model import check_model, port_size
+
+Result = TypeVar("Result")
 
 
 @dataclass(frozen=True)
@@ -233,8 +235,8 @@ class ReducedModel:
     def once(
         self,
         key: Hashable,
-        make: Callable[[], Any],
-    ) -> Any:
+        make: Callable[[], Result],
+    ) -> Result:
         """What `make` returns, kept with this model: what does not depend on the frequency is made
         once.
         """

@@ -17,17 +17,19 @@ from contextlib import contextmanager, suppress
 from importlib import metadata
 from importlib.util import find_spec
 from pathlib import Path
-from typing import Any
+from typing import Any, TypeVar
 
 import numpy as np
 
 from ..errors import InputError
+from ..util.communicator import Communicator
 from ..util.message import Message
 from .array_codec import read_npz, tree_of, write_npz
 
 # Raised when the meaning or the layout of stored stages changes: older files are then computed
 # again.
 FORMAT = 4
+Result = TypeVar("Result")
 
 
 def open_folder(path: str | Path) -> Path:
@@ -91,9 +93,9 @@ def stage(
     folder: str | Path | None,
     name: str,
     key: str,
-    compute: Callable[[], Any],
-    comm: Any = None,
-) -> tuple[Any, float | None]:
+    compute: Callable[[], Result],
+    comm: Communicator | None = None,
+) -> tuple[Result, float | None]:
     """The result of a stage: found in the folder when it was made from the same things, else
     computed and kept.
 
@@ -254,21 +256,22 @@ def _keep(
         write_npz(temporary, key, made)
 
 
-def on_root(comm: Any, action: Callable[[], Any]) -> Any:
+def on_root(comm: Communicator | None, action: Callable[[], Result]) -> Result:
     """The value of ``action`` on rank 0, or its error, on every rank."""
     if comm is None or comm.size == 1:
         return action()
-    value = error = None
+    value: Result | None = None
+    error: Exception | None = None
     if comm.rank == 0:
         try:
             value = action()
         except Exception as problem:
             # whatever it is, the other ranks must not wait for ever
             error = problem
-    value, error = comm.bcast((value, error))
-    if error is not None:
-        raise error
-    return value
+    shared, failure = comm.bcast((value, error))
+    if failure is not None:
+        raise failure
+    return shared
 
 
 def _feed(digest: Any, part: Any) -> None:

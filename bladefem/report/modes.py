@@ -9,7 +9,6 @@ from collections.abc import Callable, Sequence
 from dataclasses import replace
 from functools import partial
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 import pandas as pd
@@ -23,6 +22,7 @@ from ..study.modes.comparison import family_table
 from ..study.modes.linear_response_report import stress_states, stress_table
 from ..study.modes.survey import Survey, Wanted, excited_set, survey
 from ..study.pipeline.run_records import folder_of
+from ..util.communicator import Communicator
 from ..util.progress import Progress, unwatched
 from ..view import convergence, forced, mesh, modes, speed
 from ..view.live_curves import live_diameters
@@ -57,7 +57,7 @@ def run(
     folder: str | Path,
     wanted: Wanted,
     pictures: int = PICTURES,
-    comm: Any = None,
+    comm: Communicator | None = None,
     progress: Progress = unwatched,
 ) -> Survey:
     """Survey the modes and write the folder.

@@ -8,7 +8,6 @@ import time
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
-from typing import Any
 
 import pandas as pd
 
@@ -19,6 +18,7 @@ from ..scene.tables import Scene
 from ..scene.toml import dump
 from ..study.pipeline import pipeline
 from ..study.pipeline.run_records import SeatedRun, folder_of
+from ..util.communicator import Communicator
 from ..util.progress import Progress, unwatched
 from ..view import contact
 from .datasets import contact_arrays, resultants
@@ -39,7 +39,7 @@ Maps = Mapping[float, Sequence[PressureMap]]
 def run(
     scene: Scene,
     folder: str | Path,
-    comm: Any = None,
+    comm: Communicator | None = None,
     progress: Progress = unwatched,
 ) -> SeatedRun:
     """Seat the damper under each load and write the pressures into the folder.

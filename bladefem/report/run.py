@@ -31,10 +31,11 @@ from ..study.modes.survey import excited_set
 from ..study.pipeline import pipeline
 from ..study.pipeline.contact_cycle import ContactCycle
 from ..study.pipeline.linear_limits import Limit
-from ..study.pipeline.loads import summary
+from ..study.pipeline.loads import Curve, summary
 from ..study.pipeline.run_records import SolvedRun, folder_of
 from ..study.pipeline.stability import UNIQUE
 from ..study.pipeline.state_check import state_sentence
+from ..util.communicator import Communicator
 from ..util.message import method, warning
 from ..util.progress import Progress, unwatched
 from ..view import mesh, modes, response, speed
@@ -73,7 +74,7 @@ MESH = (
 def run(
     scene: Scene,
     folder: str | Path,
-    comm: Any = None,
+    comm: Communicator | None = None,
     progress: Progress = unwatched,
 ) -> SolvedRun:
     """Everything: mesh, modes, contact, responses, and the folder with pictures and report.
@@ -90,7 +91,7 @@ def run(
 
 def write_run(
     result: SolvedRun,
-    comm: Any = None,
+    comm: Communicator | None = None,
     progress: Progress = unwatched,
 ) -> SolvedRun:
     """Write the folder of a finished run, on rank 0; returns the run with the time that it took."""
@@ -382,7 +383,7 @@ def mode_table(
     return pd.concat(rows, ignore_index=True)
 
 
-def points_of(curve: Any) -> pd.DataFrame:
+def points_of(curve: Curve) -> pd.DataFrame:
     """One row a response point."""
     mass = {} if curve.mass is None else {"mass": curve.mass}
     return pd.DataFrame(

@@ -13,6 +13,7 @@ from ..scene.fields import field_at, value_at
 from ..scene.tables import Scene
 from ..scene.units import parse, show
 from ..study.pipeline.loads import summary
+from ..study.pipeline.run_records import Response
 from ..view.study import draw_study
 from .headlines import Headline
 from .tables import write_tables
@@ -26,8 +27,7 @@ class Variant:
     # as written, "30 deg"
     text: str
     scene: Scene
-    # study.pipeline.Response
-    response: Any
+    response: Response
 
 
 def write_study(

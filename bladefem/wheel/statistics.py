@@ -7,7 +7,6 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 from scipy import stats
@@ -17,6 +16,7 @@ from ..hbm.linear.bodies import modal_flexibility
 from ..hbm.model import ReducedModel
 from ..hbm.solve import solve
 from ..hbm.solver.newton import DEFAULTS, Options
+from ..util.communicator import Communicator
 from ..util.curve_extremum import parabola_minimum
 from ..util.progress import Progress, unwatched
 from .model import Pattern, Wheel
@@ -92,7 +92,7 @@ def scatter_statistics(
     patterns: Mapping[float, Sequence[Pattern]],
     grid: Callable[[float, Pattern], np.ndarray],
     respond: Callable[[Wheel, Pattern], Respond],
-    comm: Any = None,
+    comm: Communicator | None = None,
     tolerance: float = 5e-3,
     progress: Progress = unwatched,
 ) -> Amplification:

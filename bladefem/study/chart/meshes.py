@@ -25,6 +25,7 @@ from ...io.stage_cache import on_root
 from ...scene.kinds import kind_named
 from ...scene.tables import Scene
 from ...scene.validate import refuse_given_mesh
+from ...util.communicator import Communicator
 from ..adaptive.check_points import peak_of
 from ..adaptive.choice import covered
 from ..adaptive.family import member
@@ -145,7 +146,7 @@ def on_mesh(
     scene: Scene,
     settings: Settings,
     load: float,
-    comm: Any = None,
+    comm: Communicator | None = None,
 ) -> Resonance:
     """The resonance under one load on the scene's own mesh, with given settings of the balance.
 
@@ -162,7 +163,7 @@ def _resonance(
     scene: Scene,
     settings: Settings,
     load: float,
-    comm: Any,
+    comm: Communicator | None,
 ) -> Resonance:
     """On one mesh, its time left open."""
     mesh = build_mesh(scene, comm)
@@ -191,7 +192,7 @@ def mesh_table(
     variants: Sequence[MeshVariant],
     budget: float,
     remarks: list[str],
-    comm: Any = None,
+    comm: Communicator | None = None,
 ) -> pd.DataFrame:
     """One row a mesh: name, family, CPU time [s], dofs, errors against the richest one.
 
@@ -233,7 +234,7 @@ def _rows(
     load: float,
     variants: Sequence[MeshVariant],
     budget: float,
-    comm: Any,
+    comm: Communicator | None,
 ) -> Iterator[dict[str, Any]]:
     end = time.process_time() + budget
     last = None
@@ -266,7 +267,7 @@ def _tried(
     scene: Scene,
     settings: Settings,
     load: float,
-    comm: Any,
+    comm: Communicator | None,
 ) -> dict[str, Any]:
     try:
         return {"found": on_mesh(scene, settings, load, comm)}

@@ -13,7 +13,6 @@ hardly the pressure.
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 
@@ -27,6 +26,7 @@ from ...data import PressureMap
 from ...errors import InputError, NotSolvedError
 from ...scene.tables import Scene
 from ...scene.units import show
+from ...util.communicator import Communicator
 from ..pipeline.stages import build_mesh
 from .punch import flexibility
 
@@ -46,7 +46,7 @@ class Pressed:
     approach: dict[float, float]
 
 
-def press_pair(scene: Scene, comm: Any = None) -> Pressed:
+def press_pair(scene: Scene, comm: Communicator | None = None) -> Pressed:
     """Press the pair of a scene of kind "hertz" with each of its loads.
 
     Raises:

@@ -19,7 +19,7 @@ nu^2) a radian instead of 4/3.
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from typing import Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -30,7 +30,13 @@ from ...contact.patch import make_patch, normal_ports, patch_means, port_matrix
 from ...data import Patch
 from ...errors import InputError, NotSolvedError
 from ...scene.tables import Scene
+from ...util.communicator import Communicator
 from ..pipeline.stages import build_mesh
+
+if TYPE_CHECKING:
+    import scipy.sparse as sp
+
+    from ...fem.body import Body
 
 
 @dataclass(frozen=True)
@@ -71,7 +77,7 @@ class Indented:
         return 4 * float(self.arm @ np.linalg.solve(self.tilted, self.arm))
 
 
-def indent(scene: Scene, comm: Any = None) -> Indented:
+def indent(scene: Scene, comm: Communicator | None = None) -> Indented:
     """Press the punch of a scene of kind "punch" with its first load.
 
     Raises:
@@ -155,8 +161,8 @@ def spring_tilt(
 
 
 def flexibility(
-    body: Any,
-    ports: Any,
+    body: Body,
+    ports: sp.spmatrix,
     held: str = "clamp",
 ) -> np.ndarray:
     """(n, n) displacements at the ports for unit forces there [m/N]; the body is held at a face.
@@ -172,7 +178,7 @@ def flexibility(
     return (C + C.T) / 2
 
 
-def _odd(body: Any) -> Any:
+def _odd(body: Body) -> Body:
     """The same body for motions that turn over in the mirror x = 0."""
     faces = dict(body.mesh.faces)
     faces["antisymmetry_x"] = faces.pop("symmetry_x")

@@ -7,12 +7,12 @@ from __future__ import annotations
 import time
 from collections.abc import Callable
 from dataclasses import replace
-from typing import Any
 
 from ...errors import InputError
 from ...scene.fields import value_at
 from ...scene.kinds import kind_named
 from ...scene.tables import Scene
+from ...util.communicator import Communicator
 from ...util.progress import Progress, unwatched
 from ...wheel.model import Pattern, Wheel, frequency_pattern
 from ...wheel.resonance import Respond
@@ -57,7 +57,7 @@ def check_mistuning(scene: Scene) -> None:
 
 def with_whole_wheel(
     run: SolvedRun,
-    comm: Any = None,
+    comm: Communicator | None = None,
     progress: Progress = unwatched,
 ) -> SolvedRun:
     """The run with the whole wheel under the load whose tuned resonance is lowest."""
@@ -71,7 +71,7 @@ def with_whole_wheel(
 
 def scatter_of_run(
     run: SolvedRun,
-    comm: Any = None,
+    comm: Communicator | None = None,
     progress: Progress = unwatched,
 ) -> Amplification:
     """Statistics under all loads of a run; wheels are dealt out over the ranks.
@@ -129,7 +129,7 @@ def _respond_by(
 def _wheels(
     run: SolvedRun,
     curves: list[Curve],
-    comm: Any,
+    comm: Communicator | None,
     progress: Progress,
 ) -> tuple[WheelSector, list[Wheel]]:
     """The sector in all nodal diameters, and the tuned wheel of each curve."""

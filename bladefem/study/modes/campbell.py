@@ -11,13 +11,13 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import reduce
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import pandas as pd
 from scipy.linalg import eigh
 
-from geometry.mesh import sector_of
+from geometry.mesh import Mesh, sector_of
 
 from ...data import ModeSet
 from ...errors import InputError
@@ -25,6 +25,9 @@ from ...scene.fields import split_values
 from ...scene.units import is_plain, parse
 from ..pipeline.stages import Bodies, is_wheel
 from .crossings import campbell_crossings, fold, interference_table, margins, wave
+
+if TYPE_CHECKING:
+    from ...fem.body import Body
 
 # modes beyond those asked for: Coriolis forces mix neighbours
 GUARD = 6
@@ -157,7 +160,7 @@ def read_speeds(text: str) -> list[float]:
     return out
 
 
-def sense_of(mesh: Any) -> int:
+def sense_of(mesh: Mesh) -> int:
     """+1 where sectors are counted in the sense of a positive rotation about z, else -1."""
     if mesh.sector is None or not mesh.sector.count:
         return 1
@@ -166,7 +169,7 @@ def sense_of(mesh: Any) -> int:
 
 def _modes_at_speed(
     bodies: Bodies,
-    body: Any,
+    body: Body,
     diameters: Sequence[int] | None,
     count: int,
 ) -> list[ModeSet]:

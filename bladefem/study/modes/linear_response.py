@@ -11,11 +11,11 @@ diameter. Modes carry the resonance, the static answer of the modes left out com
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 
-from geometry.mesh import sector_of
+from geometry.mesh import Mesh, sector_of
 
 from ...data import ModeSet
 from ...errors import InputError
@@ -23,6 +23,9 @@ from ...hbm.model import Damping
 from ...reduction.assemble import folded_diameter
 from ..pipeline.ports import blade_ports
 from ..pipeline.stages import Bodies, is_wheel
+
+if TYPE_CHECKING:
+    from ...fem.flexibility import Flexibility
 
 MODES = 20
 
@@ -211,7 +214,7 @@ def _damping_terms(response: Forced, w: float) -> np.ndarray:
 
 
 def _modal_forces(
-    mesh: Any,
+    mesh: Mesh,
     modes: ModeSet,
     load: np.ndarray,
 ) -> np.ndarray:
@@ -219,7 +222,7 @@ def _modal_forces(
     return np.einsum("mni,ni->m", modes.shapes[:, :, : force.shape[1]].conj(), force)
 
 
-def _static_motion(flex: Any, load: np.ndarray) -> np.ndarray:
+def _static_motion(flex: Flexibility, load: np.ndarray) -> np.ndarray:
     """(n_points, 3) K^-1 f."""
     from ...fem.constraint import expand, restrict
     from ...fem.flexibility import compliance

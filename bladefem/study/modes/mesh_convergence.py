@@ -17,7 +17,6 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from itertools import pairwise
-from typing import Any
 
 import numpy as np
 import pandas as pd
@@ -29,6 +28,7 @@ from ...data import ModeSet
 from ...errors import InputError
 from ...scene.tables import Scene
 from ...scene.validate import refuse_given_mesh
+from ...util.communicator import Communicator
 from ...util.progress import Progress, unwatched
 from ..pipeline.stages import Bodies, build_mesh, find_modes
 from .comparison import mac_of
@@ -69,7 +69,7 @@ def converge(
     sizes: Sequence[float],
     diameters: Sequence[int] | None = None,
     count: int = 5,
-    comm: Any = None,
+    comm: Communicator | None = None,
     progress: Progress = unwatched,
 ) -> Convergence:
     """The same scene on several meshes.

@@ -20,6 +20,7 @@ from ...hbm.model import Damping
 from ...io.stage_cache import found_remark, on_root, stage
 from ...io.stored_stage import stored_stage
 from ...scene.tables import Scene
+from ...util.communicator import Communicator
 from ...util.progress import Progress, unwatched
 from ..pipeline import pipeline
 from ..pipeline.run_records import ModalRun
@@ -79,7 +80,7 @@ def survey(
     scene: Scene,
     folder: str | Path,
     wanted: Wanted,
-    comm: Any = None,
+    comm: Communicator | None = None,
     progress: Progress = unwatched,
 ) -> Survey:
     """Modes of every nodal diameter, and what is asked for in addition; collective.

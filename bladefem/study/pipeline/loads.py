@@ -7,7 +7,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import partial
-from typing import Any
+from typing import Any, TypeAlias
 
 import numpy as np
 
@@ -16,6 +16,7 @@ from ...hbm.history_interval import POINT
 from ...hbm.solution import Solution
 from ...hbm.sweep import size
 from ...scene.tables import Scene
+from ...util.communicator import Communicator
 from ...util.progress import Progress, unwatched
 from ..adaptive.check_points import peak_of
 from ..adaptive.choice import checked, estimated
@@ -29,10 +30,10 @@ from .linear_limits import Limit
 from .load_interval import LoadInterval, load_interval
 from .stability import UNSTABLE, Stability, stability_of
 
-Keep = Callable[[LoadCase, Callable[[], Any]], Any]
+Keep: TypeAlias = "Callable[[LoadCase, Callable[[], Curve]], Curve]"
 
 
-def forgotten(case: LoadCase, compute: Callable[[], Any]) -> Any:
+def forgotten(case: LoadCase, compute: Callable[[], Curve]) -> Curve:
     """The keeper that keeps nothing."""
     return compute()
 
@@ -120,7 +121,7 @@ def study_loads(
     cases: list[LoadCase],
     family: Callable[[LoadCase], Family],
     settings: Settings,
-    comm: Any = None,
+    comm: Communicator | None = None,
     progress: Progress = unwatched,
     keep: Keep = forgotten,
 ) -> list[Curve]:
@@ -137,13 +138,15 @@ def study_loads(
         keep: keep(case, compute) gives the curve of a load, found from an earlier run or computed
             and kept.
     """
-    rank, ranks = (comm.rank, comm.size) if comm is not None else (0, 1)
+    rank = 0 if comm is None else comm.rank
+    ranks = 1 if comm is None else comm.size
     curves = {
         i: keep(cases[i], partial(curve_of, scene, cases[i], family, settings))
         for i in progress(dealt(len(cases), rank, ranks), "forced responses", delay=0.0)
     }
-    for part in comm.allgather(curves) if ranks > 1 else []:
-        curves.update(part)
+    if comm is not None and ranks > 1:
+        for part in comm.allgather(curves):
+            curves.update(part)
     return [curves[i] for i in range(len(cases))]
 
 

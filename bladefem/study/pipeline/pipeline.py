@@ -10,7 +10,7 @@ from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from functools import lru_cache, partial
 from pathlib import Path
-from typing import Any, Literal, overload
+from typing import Literal, TypeAlias, TypeVar, overload
 
 import numpy as np
 
@@ -31,6 +31,7 @@ from ...scene.tables import Scene
 from ...scene.units import show
 from ...scene.validate import refuse_response
 from ...scene.warnings import doubts
+from ...util.communicator import Communicator
 from ...util.message import method, warning
 from ...util.progress import Progress, unwatched
 from ..adaptive.check_points import peak_of
@@ -84,18 +85,27 @@ UNKNOWNS = 6000
 # largest estimated error by the mesh of a stress that is no warning
 TRUSTED_STRESS = 0.2
 STAGES = ("mesh", "modes", "contact", "reduction", "response")
-Folder = str | Path | None
+Folder: TypeAlias = str | Path | None
+Result = TypeVar("Result")
 
 
 @overload
 def run(
-    scene: Scene, folder: Folder, until: Literal["mesh"], comm: Any = ..., progress: Progress = ...
+    scene: Scene,
+    folder: Folder,
+    until: Literal["mesh"],
+    comm: Communicator | None = ...,
+    progress: Progress = ...,
 ) -> Run: ...
 
 
 @overload
 def run(
-    scene: Scene, folder: Folder, until: Literal["modes"], comm: Any = ..., progress: Progress = ...
+    scene: Scene,
+    folder: Folder,
+    until: Literal["modes"],
+    comm: Communicator | None = ...,
+    progress: Progress = ...,
 ) -> ModalRun: ...
 
 
@@ -104,7 +114,7 @@ def run(
     scene: Scene,
     folder: Folder,
     until: Literal["contact"],
-    comm: Any = ...,
+    comm: Communicator | None = ...,
     progress: Progress = ...,
 ) -> SeatedRun: ...
 
@@ -114,7 +124,7 @@ def run(
     scene: Scene,
     folder: Folder,
     until: Literal["reduction"],
-    comm: Any = ...,
+    comm: Communicator | None = ...,
     progress: Progress = ...,
 ) -> ReducedRun: ...
 
@@ -124,7 +134,7 @@ def run(
     scene: Scene,
     folder: Folder,
     until: Literal["response"] = ...,
-    comm: Any = ...,
+    comm: Communicator | None = ...,
     progress: Progress = ...,
 ) -> SolvedRun: ...
 
@@ -133,7 +143,7 @@ def run(
     scene: Scene,
     folder: Folder,
     until: str = "response",
-    comm: Any = None,
+    comm: Communicator | None = None,
     progress: Progress = unwatched,
 ) -> Run:
     """Run a scene as far as a stage, on all ranks of a communicator.
@@ -268,7 +278,7 @@ def _stresses(
     patches: Sequence[Patch],
     curves: Sequence[Curve],
     cases: Sequence[LoadCase],
-    comm: Any,
+    comm: Communicator | None,
 ) -> dict[int, DampedStress]:
     """The stress at the lowest resonance and at that of the damper's own load, by number of the
     curve; on rank 0, whose bodies share one factorisation over the nodal diameters.
@@ -318,7 +328,7 @@ class Clock:
     progress: Progress = unwatched
 
     @contextmanager
-    def __call__(self, name: str) -> Any:
+    def __call__(self, name: str) -> Iterator[None]:
         start = time.perf_counter()
         try:
             for _ in self.progress([name], name, delay=0.0, bar_format="{desc} ..."):
@@ -333,32 +343,32 @@ class _Keeper:
 
     # None keeps nothing
     folder: Folder
-    comm: Any
+    comm: Communicator | None
     clock: Clock
 
     def __call__(
         self,
         name: str,
         key: str,
-        compute: Callable[[], Any],
-    ) -> Any:
+        compute: Callable[[], Result],
+    ) -> Result:
         return self._said(name, *stage(self.folder, name, key, compute, self.comm))
 
     def alone(
         self,
         name: str,
         key: str,
-        compute: Callable[[], Any],
-    ) -> Any:
+        compute: Callable[[], Result],
+    ) -> Result:
         """The same for what one rank does without the others."""
         return self._said(name, *stage(self.folder, name, key, compute))
 
     def _said(
         self,
         name: str,
-        result: Any,
+        result: Result,
         seconds: float | None,
-    ) -> Any:
+    ) -> Result:
         if seconds is not None:
             self.clock.messages.append(found_remark(name, seconds))
         return result
@@ -627,7 +637,7 @@ def reduced_sector(
     bodies: Bodies,
     case: LoadCase,
     patches: list[Patch],
-    keep: Callable[[str, str, Callable[[], Any]], Any],
+    keep: Callable[[str, str, Callable[[], Reduced]], Reduced],
 ) -> tuple[Settings, Reduced]:
     """The sector with as many modes as the resonance of one load needs, and settings to start the
     others from.
