@@ -233,7 +233,7 @@ def _radial_extent(gmsh: ModuleType, curve: int) -> float:
 
 
 def _fillet_field(
-    field: object,
+    field: Any,
     faces: list[int],
     sizes: Sizes,
 ) -> int:

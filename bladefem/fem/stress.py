@@ -107,8 +107,8 @@ def patch_stress(
     """Two values (6,) of the stress at a node, continued from the Gauss points near it.
 
     The first is a linear fit to the cells at the node. The second is a quadratic fit to these and
-    to all that touch them, in which a residual counts with the inverse square of its distance: round
-    a notch the stress falls within an element or two, and far points would flatten it.
+    to all that touch them, in which a residual counts with the inverse square of its distance:
+    round a notch the stress falls within an element or two, and far points would flatten it.
     """
     mesh = body.mesh
     places = []

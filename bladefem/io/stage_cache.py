@@ -17,7 +17,7 @@ from contextlib import contextmanager, suppress
 from importlib import metadata
 from importlib.util import find_spec
 from pathlib import Path
-from typing import Any, TypeVar
+from typing import TYPE_CHECKING, Any, TypeVar
 
 import numpy as np
 
@@ -25,6 +25,9 @@ from ..errors import InputError
 from ..util.communicator import Communicator
 from ..util.message import Message
 from .array_codec import read_npz, tree_of, write_npz
+
+if TYPE_CHECKING:
+    import xarray as xr
 
 # Raised when the meaning or the layout of stored stages changes: older files are then computed
 # again.
@@ -150,8 +153,8 @@ def write_results(
     return path
 
 
-def read_results(path: str | Path, group: str = "/") -> Any:
-    """An xarray Dataset of one group, complex variables put together again, wholly in memory.
+def read_results(path: str | Path, group: str = "/") -> xr.Dataset:
+    """One group, complex variables put together again, wholly in memory.
 
     Raises:
         InputError: no such file or group.
@@ -296,7 +299,7 @@ def bind_h5py() -> None:
         sys.setdlopenflags(flags)
 
 
-def _real(dataset: Any) -> Any:
+def _real(dataset: xr.Dataset) -> xr.Dataset:
     """netCDF has no complex numbers: "x" becomes "x_re" and "x_im"."""
     for name in [n for n, v in dataset.data_vars.items() if np.iscomplexobj(v)]:
         variable = dataset[name]
@@ -307,7 +310,7 @@ def _real(dataset: Any) -> Any:
     return dataset
 
 
-def _complex(dataset: Any) -> Any:
+def _complex(dataset: xr.Dataset) -> xr.Dataset:
     for name in [
         n[:-3] for n in dataset.data_vars if n.endswith("_re") and f"{n[:-3]}_im" in dataset
     ]:

@@ -3,17 +3,20 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Any, TypeAlias
+from typing import TYPE_CHECKING, Any, TypeAlias
 
 import numpy as np
 
 from .style import COLOURS
 
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+
 DIMENSION = COLOURS[0]
 Point: TypeAlias = Sequence[float] | np.ndarray
 
 
-def shape(ax: Any, corners: np.ndarray, colour: str = "#d5dbe1", **style: Any) -> None:
+def shape(ax: Axes, corners: np.ndarray, colour: str = "#d5dbe1", **style: Any) -> None:
     """A filled outline, (n, 2) corners."""
     ax.fill(
         *np.asarray(corners).T,
@@ -22,7 +25,7 @@ def shape(ax: Any, corners: np.ndarray, colour: str = "#d5dbe1", **style: Any) -
 
 
 def length(
-    ax: Any,
+    ax: Axes,
     start: Point,
     end: Point,
     text: str,
@@ -75,7 +78,7 @@ def length(
     )
 
 
-def _draw_arrow(ax: Any, start: np.ndarray, end: np.ndarray) -> None:
+def _draw_arrow(ax: Axes, start: np.ndarray, end: np.ndarray) -> None:
     """A line with a head at both ends."""
     ax.annotate(
         "",
@@ -94,7 +97,7 @@ def _draw_arrow(ax: Any, start: np.ndarray, end: np.ndarray) -> None:
 
 
 def angle(
-    ax: Any,
+    ax: Axes,
     centre: Point,
     start: float,
     end: float,
@@ -132,7 +135,7 @@ def angle(
 
 
 def note(
-    ax: Any,
+    ax: Axes,
     point: Point,
     text: str,
     offset: tuple[float, float],

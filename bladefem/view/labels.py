@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from matplotlib.transforms import Bbox
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
 
 PLACES = (
     (6, 7, "left"),
@@ -33,7 +36,7 @@ def names_apart(*axes: Any) -> None:
         _move_apart(ax)
 
 
-def _move_apart(ax: Any) -> None:
+def _move_apart(ax: Axes) -> None:
     taken = [
         box
         for line in ax.lines

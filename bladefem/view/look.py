@@ -3,13 +3,16 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from geometry.look import AXES, Look
 
 from .style import LIGHT, aim, canvas, open_plotter, trim
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
 
 # from the object to the eye, in the frame of x radial, z along the engine
 SIDES = ((0.45, -0.75, 0.5), (-0.45, 0.75, -0.5))
@@ -109,7 +112,7 @@ def _number_faces(
         )
 
 
-def _draw_legend(ax: Any, look: Look) -> None:
+def _draw_legend(ax: Axes, look: Look) -> None:
     """Number, what is guessed, area of the largest faces."""
     ax.set_axis_off()
     said = _face_roles(look)

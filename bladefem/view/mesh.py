@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import replace
 from itertools import cycle
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 from matplotlib.patches import Patch as Swatch
@@ -16,6 +16,7 @@ from .skin import CORNERS, Skin, family, sector_motion, skin, wheel_count, wheel
 from .style import COLOURS, canvas, headline, photograph, show_photograph, size_for
 
 if TYPE_CHECKING:
+    from matplotlib.axes import Axes
     from pyvista import PolyData, UnstructuredGrid
 
 VTK_NUMBERS = {
@@ -362,7 +363,7 @@ def draw_mesh(
 FEW_NAMES = 20
 
 
-def draw_legend(ax: Any, mesh: Mesh) -> None:
+def draw_legend(ax: Axes, mesh: Mesh) -> None:
     """Names and sizes next to the picture."""
     colours = label_colours(mesh)
     counts = [len(c) for c in (*mesh.bodies.values(), *mesh.faces.values())]

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -12,6 +12,9 @@ from geometry.parameters import HertzPair, Punch
 
 from .dimensions import length, note, shape
 from .style import COLOURS, canvas
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
 
 MM = 1e3
 DAMPER = "#e3cfa4"
@@ -55,13 +58,13 @@ def draw_punch(punch: Punch, file: str | Path | None = None) -> object:
         return ax.figure
 
 
-def _draw_block(ax: Any, wide: float) -> None:
+def _draw_block(ax: Axes, wide: float) -> None:
     shape(ax, np.array([[0, -wide], [wide, -wide], [wide, 0], [0, 0]]))
     note(ax, (0.6 * wide, -wide), "clamp", (14, 24))
 
 
 def _draw_axes(
-    ax: Any,
+    ax: Axes,
     wide: float,
     dimension: int,
     title: str,

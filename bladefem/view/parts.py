@@ -5,7 +5,7 @@ shows.
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -20,6 +20,9 @@ from geometry.zmass import z_corners
 from .dimensions import angle, length, note, shape
 from .style import COLOURS, canvas, headline
 
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+
 MM = 1e3
 DAMPER = "#e3cfa4"
 NEXT = "#eceff2"
@@ -32,7 +35,7 @@ def said(table: Any, name: str) -> str:
 
 
 def bare(
-    ax: Any,
+    ax: Axes,
     title: str,
     horizontal: str,
     vertical: str,
@@ -56,7 +59,7 @@ def draw_aerofoil(aerofoil: Aerofoil, file: str | Path | None = None) -> object:
         return axes[0].figure
 
 
-def draw_section(ax: Any, blade: Aerofoil) -> None:
+def draw_section(ax: Axes, blade: Aerofoil) -> None:
     """The root section along its chord, with thickness and camber."""
     chord = MM * blade.chord_root
     points = chord * section_shape(blade, 0.0)
@@ -93,7 +96,7 @@ def plane_section(blade: Aerofoil, t: float) -> tuple[np.ndarray, np.ndarray]:
     return MM * space[:-2, [2, 1]], MM * space[-2:, [2, 1]]
 
 
-def draw_stacking(ax: Any, blade: Aerofoil) -> None:
+def draw_stacking(ax: Axes, blade: Aerofoil) -> None:
     """Root and tip sections over each other: stagger, twist, lean and sweep."""
     for t, colour, name in ((0.0, "#d5dbe1", "root"), (1.0, "#9fc5e0", "tip")):
         points, chord = plane_section(blade, t)
@@ -110,7 +113,7 @@ def draw_stacking(ax: Any, blade: Aerofoil) -> None:
     ax.set(xlim=(-0.6 * reach, 1.25 * reach), ylim=(-0.6 * reach, 0.75 * reach))
 
 
-def draw_side(ax: Any, blade: Aerofoil) -> None:
+def draw_side(ax: Axes, blade: Aerofoil) -> None:
     """Span against the engine axis, with the extents of the turned sections."""
     shares = np.linspace(0, 1, 21)
     extents = [plane_section(blade, t)[0][:, 0] for t in shares]
@@ -188,7 +191,7 @@ def draw_platform(
 
 
 def label_platform(
-    ax: Any,
+    ax: Axes,
     platform: Platform,
     shank: Shank,
     wedge: Wedge,
@@ -273,7 +276,7 @@ def draw_disc(
 
 
 def draw_front(
-    ax: Any,
+    ax: Axes,
     cut: Any,
     aerofoil: Aerofoil,
     disc: Disc,
@@ -306,7 +309,7 @@ def draw_front(
 
 
 def draw_meridian(
-    ax: Any,
+    ax: Axes,
     cut: Any,
     aerofoil: Aerofoil,
     platform: Platform,

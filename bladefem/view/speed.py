@@ -10,12 +10,15 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import pandas as pd
 
 from .style import COLOURS, FAILED, canvas
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
 
 RPM = 60 / (2 * np.pi)
 # not as many as colours, so that a pair comes again late
@@ -29,7 +32,7 @@ def draw_campbell(
     *,
     crossings: pd.DataFrame | None = None,
     operating: float | None = None,
-    ax: Any = None,
+    ax: Axes | None = None,
     title: str = "",
 ) -> object:
     """Frequencies over speed with engine-order lines; crossings are ringed; returns the figure.
@@ -80,7 +83,7 @@ def draw_campbell(
         return ax.figure
 
 
-def _draw_modes(ax: Any, table: pd.DataFrame) -> None:
+def _draw_modes(ax: Axes, table: pd.DataFrame) -> None:
     """A line a mode and nodal diameter, named at the first diameter of each mode."""
     keys = [key for key in ("mode", "nodal_diameter") if key in table]
     for key, line in table.groupby(keys):
@@ -124,7 +127,7 @@ def diameter_names(table: pd.DataFrame) -> list[tuple[float, str, str]]:
 
 
 def name_lines(
-    ax: Any,
+    ax: Axes,
     x: float,
     top: float,
     names: list[tuple[float, str, str]],
@@ -182,7 +185,7 @@ def line_name(rows: pd.DataFrame, mode: Any) -> str:
 
 
 def draw_order_lines(
-    ax: Any,
+    ax: Axes,
     orders: Sequence[int],
     fastest: float,
     top: float,
@@ -217,7 +220,7 @@ def draw_nodal_diameters(
     table: pd.DataFrame,
     file: str | Path | None = None,
     *,
-    ax: Any = None,
+    ax: Axes | None = None,
     title: str = "",
 ) -> object:
     """Frequency over nodal diameter, a line a mode number, coloured by family when it is known;
@@ -254,7 +257,7 @@ def draw_nodal_diameters(
         return ax.figure
 
 
-def draw_families(ax: Any, table: pd.DataFrame) -> None:
+def draw_families(ax: Axes, table: pd.DataFrame) -> None:
     """A marker a mode, by family (or by mode number); coupled modes are hollow."""
     names = table["family"] if "family" in table else table["mode"].map("mode {}".format)
     plain = names.str.removesuffix(", coupled")
@@ -325,7 +328,7 @@ def draw_interference(
 
 
 def draw_excitations(
-    ax: Any,
+    ax: Axes,
     table: pd.DataFrame,
     sectors: int,
     speed: float,

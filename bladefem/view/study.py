@@ -5,11 +5,14 @@ them.
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING
 
 import pandas as pd
 
 from .style import COLOURS, canvas, log_axis
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
 
 MICRO = 1e6
 
@@ -64,7 +67,7 @@ def draw_study(
         return axes[0, 0].figure
 
 
-def _draw_loads(axis: Any, loads: pd.DataFrame) -> None:
+def _draw_loads(axis: Axes, loads: pd.DataFrame) -> None:
     """Amplitude against load, a line a value."""
     damped = loads[(loads["load"] > 0) & (loads["load"] < float("inf"))]
     for (value, part), colour in zip(

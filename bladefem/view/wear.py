@@ -6,7 +6,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 from matplotlib.cm import ScalarMappable
@@ -18,6 +18,9 @@ from bladefem.data import Patch
 from .contact import arrangement, label_outer, seat_name, unfold
 from .skin import split_faces
 from .style import COLOURS, canvas, headline
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
 
 WORK_COLOURS = "inferno_r"
 MARKS = {
@@ -78,7 +81,7 @@ def draw_work(
 
 
 def _draw_face(
-    ax: Any,
+    ax: Axes,
     patch: Patch,
     work: np.ndarray,
     state: np.ndarray,
@@ -113,7 +116,7 @@ def _draw_face(
 
 
 def _draw_line(
-    ax: Any,
+    ax: Axes,
     patch: Patch,
     work: np.ndarray,
     state: np.ndarray,
