@@ -44,6 +44,7 @@ from ..view.live_curves import live_diameters, live_loops, live_optimum, live_re
 from ..view.live_shapes import live_shapes
 from .best_load import best_load_table
 from .datasets import datasets, table_dataset
+from .fatigue import save_fatigue_vtu, utilisation_drawing, utilisation_table
 from .influences import influence_sentence, influence_table
 from .linear import harmonic_table, linear_sentence
 from .nodes import (
@@ -132,6 +133,7 @@ def _write(result: SolvedRun, progress: Progress) -> None:
         **_drawings(result, tables),
         "response/hysteresis": lambda file: draw_hysteresis(cycles, file),
         "contact/friction_work": lambda file: draw_wear(patches, cycles[_best(result)], file),
+        **utilisation_drawing(result),
         **({} if result.wheel is None else pattern_drawings(result.wheel)),
     }
     figures = {}
@@ -140,6 +142,7 @@ def _write(result: SolvedRun, progress: Progress) -> None:
         draw(figures[name])
     mesh.save_vtu(result.mesh, folder / "mesh.vtu")
     modes.save_modes_vtu(result.mesh, excited_set(result), folder / "modes.vtu")
+    save_fatigue_vtu(result, folder / "fatigue.vtu")
     write_points(folder, result.contact.maps)
     save_cycles_vtu(patches, cycles, folder / "friction_work.vtu", coefficient)
     write_report(
@@ -256,6 +259,7 @@ def _tables(result: SolvedRun) -> dict[str, pd.DataFrame]:
         "modes/modes": family_table(excited_set(result), result.mesh, result.clamped),
         "modes/nodal_diameters": mode_table(result.modes, result.mesh, result.clamped),
         "modes/stresses": _stresses(result.strength),
+        **utilisation_table(result),
         "contact/pressure": pressure_table(result.contact.maps),
         **_own_load(result),
         **_best_load(result),

@@ -76,6 +76,7 @@ from .stages import (
     reduce_sector,
     weighted,
 )
+from .utilisation import utilisation_message
 from .validate_mesh import found_patches
 
 # higher ones borrow the nodal diameter next to their own
@@ -270,7 +271,9 @@ def _run_response(before: ReducedRun, patches: list[Patch], keep: _Keeper) -> So
         )
         clock.messages.append(stress_message(curves, damped))
     response = replace(response, best=best, influences=found)
-    return SolvedRun(**vars(before), response=response, damped=damped)
+    result = SolvedRun(**vars(before), response=response, damped=damped)
+    clock.messages.extend(filter(None, [utilisation_message(result)]))
+    return result
 
 
 def _stresses(
