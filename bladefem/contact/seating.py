@@ -5,8 +5,8 @@ The wheel is at rest in the rotating frame and all blades move alike (nodal diam
 blade's seat_left is this blade's seat_left in its own axes. With f >= 0 the pressing forces at the
 normal ports of both seats,
 
-    opening = clearance - u_blade + u_damper = g0 + (C_blade + C_damper) f + B q,   B^T f + load =
-    0,
+    opening = clearance - u_blade + u_damper = g0 + (C_blade + C_damper) f + B q,
+    B^T f + load = 0,
 
 where q is the damper's rigid motion, found from equilibrium: no spring holds it. Directions that
 frictionless seats can't hold (the engine axis for a wedge, the circumference for a flat damper)
@@ -37,6 +37,8 @@ from ..fem.flexibility import Flexibility, compliance, flexible
 from ..fem.linalg import dot
 from ..fem.loads import centrifugal, mass
 from ..scene.tables import Materials
+from ..util.arrays import RealArray
+from ..util.communicator import Communicator
 from .as_array import given
 from .complementarity import LCPSolution, held_directions, solve_lcp
 from .interface_law import InterfaceLaw, closure_of, compliance_at, rigid_faces
@@ -61,17 +63,17 @@ class ContactProblem:
 
     patches: tuple[Patch, ...]
     # (n, n) blade and damper, elastic [m/N]
-    flexibility: np.ndarray
+    flexibility: RealArray
     # (n,) gap before anything moves [m]
-    clearance: np.ndarray
+    clearance: RealArray
     # (n,) gap opened by the blade's centrifugal displacement, for unit rotation
-    blade_swell: np.ndarray
+    blade_swell: RealArray
     # (n,) gap opened by the damper's deformation under its load, for unit rotation
-    damper_swell: np.ndarray
+    damper_swell: RealArray
     # (n, d) gap opened by unit rigid motions of the damper; rotations per length
-    rigid: np.ndarray
+    rigid: RealArray
     # (d,) centrifugal load on the damper, for unit rotation
-    load: np.ndarray
+    load: RealArray
     # of the damper as meshed [kg]
     mass: float
     # (n,) of the interface layer; rigid faces when None
@@ -199,7 +201,7 @@ def seat(
     speed: float,
     clearance: float = 0.0,
     normal: float | None = None,
-    comm: object = None,
+    comm: Communicator | None = None,
 ) -> list[PressureMap]:
     """Everything from the mesh to the pressure maps of "this" and "next" in one call (``solve``
     tells the arguments).

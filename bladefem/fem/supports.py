@@ -1,5 +1,5 @@
-"""How a body is supported beside its clamp: springs per unit area on a face, such as the elastic
-root in a disc, and single directions held.
+"""How a body is supported in addition to its clamp: springs per unit area on a face, such as the
+elastic root in a disc, and single directions held.
 """
 
 from __future__ import annotations
@@ -66,7 +66,8 @@ def held_directions(body: Body, directions: Sequence[tuple[str, str]]) -> np.nda
             )
         nodes = np.unique(known[name])
         nodes = nodes[body.rows[nodes] >= 0]
-        held[np.ix_(nodes, ["xyz".index(letter) for letter in letters])] = True
+        axes = np.array(["xyz".index(letter) for letter in letters])
+        held[np.ix_(nodes, axes)] = True
     return held
 
 

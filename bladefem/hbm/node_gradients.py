@@ -57,7 +57,7 @@ def node_gradients(
     state = evaluate_balance(balance, solution.w)
     n, d, K = state.w.shape
     by_force = size_by_force(model, solution, probe)
-    by_motion = state.forces.dfdw.reshape(n, d * K, d * K).swapaxes(1, 2) @ by_force.reshape(
+    by_motion = state.forces.jacobian.reshape(n, d * K, d * K).swapaxes(1, 2) @ by_force.reshape(
         n, d * K, 1
     )
     back = adjoint_inverse(balance, state)(by_motion.reshape(n, d, K), 1e-9)

@@ -67,7 +67,7 @@ def _one_sensitivity(
     linear = balance.linear
     n, d, K = state.w.shape
     dw = -inverse(residual_rate(balance, state, name), 1e-9)
-    df = (state.forces.dfdw.reshape(n, d * K, d * K) @ dw.reshape(n, d * K, 1)).reshape(n, d, K)
+    df = (state.forces.jacobian.reshape(n, d * K, d * K) @ dw.reshape(n, d * K, 1)).reshape(n, d, K)
     probe = np.zeros_like(solution.probe)
     if name in BODIES:
         load = as_amplitudes(contact_load(model, state))

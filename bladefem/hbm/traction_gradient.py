@@ -24,7 +24,7 @@ from .linear.condensation import condense, with_springs
 from .model import ReducedModel
 from .node_gradients import size_by_force, transposed_flexibility
 from .solution import Solution
-from .solver.residual import Balance, adjoint_inverse, evaluate_balance
+from .solver.residual import Balance, State, adjoint_inverse, evaluate_balance
 
 # instants of a period at which the friction limit is looked at, for each harmonic
 INSTANTS = 64
@@ -32,7 +32,7 @@ INSTANTS = 64
 # lies outside is returned by the march
 DIRECTIONS = 12
 # largest change of a force, over the largest friction limit
-LARGEST = 20.0
+MAX_FORCE_CHANGE = 20.0
 
 
 @dataclass(frozen=True)
@@ -102,7 +102,7 @@ def farthest(
         -direction.ravel() / size,
         rows.reshape(m * len(found.normals), -1),
         found.room.ravel() / scale,
-        bounds=(-LARGEST, LARGEST),
+        bounds=(-MAX_FORCE_CHANGE, MAX_FORCE_CHANGE),
         method="highs",
     )
     if solved.x is None:
@@ -177,7 +177,7 @@ def _bounds(
 
 def _gradient(
     balance: Balance,
-    state: object,
+    state: State,
     solution: Solution,
     nodes: np.ndarray,
     probe: int,
@@ -188,7 +188,7 @@ def _gradient(
     model = balance.model
     n, d, K = state.w.shape
     first = d - model.elements.tangents
-    dfdw = state.forces.dfdw.copy()
+    dfdw = state.forces.jacobian.copy()
     dfdw[nodes] = 0.0
     for a in range(d):
         for k in range(K):

@@ -4,10 +4,10 @@ waves.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import replace
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from matplotlib.cm import ScalarMappable
@@ -30,6 +30,9 @@ from .style import (
     show_photograph,
     size_for,
 )
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
 
 WHEEL_VIEW = (0.0, -0.55, 1.0)
 COMPONENTS = ("radial", "circumferential", "axial")
@@ -104,7 +107,7 @@ def draw_mode(
 
 
 def say_exaggeration(
-    ax: Any,
+    ax: Axes,
     mesh: Mesh,
     modes: ModeSet,
 ) -> None:
@@ -122,7 +125,7 @@ def exaggeration(mesh: Mesh) -> str:
 
 
 def add_colour_bar(
-    ax: Any,
+    ax: Axes,
     norm: Normalize,
     colours: str,
     label: str,
@@ -363,8 +366,8 @@ def wave_frames(
     number: int,
     frames: int,
     pixels: int,
-):
-    """Yield (pixels, pixels, 3) pictures of Re(u e^{j 2 pi k / frames}), k = 0.. frames - 1."""
+) -> Iterator[np.ndarray]:
+    """(pixels, pixels, 3) pictures of Re(u e^{j 2 pi k / frames}), k = 0.. frames - 1."""
     wheel, motion = wheel_motion(mesh, modes.shapes[number], modes.nodal_diameter or 0)
     _, signed = wheel_component(mesh, wheel, motion, None)
     factor = scale_of(mesh, modes.shapes[number])

@@ -39,7 +39,7 @@ def one_body_model(
     shapes, omega, viscous = _real_modes(wheel)
     rows = _port_rows(wheel)
     residual = _real_residual(wheel)
-    values, V = _mistuned(pattern, omega, shapes, residual, rows["blade"])
+    values, V = _mistuned_modes(pattern, omega, shapes, residual, rows["blade"])
     if values.min() < 0:
         raise InputError("pattern: deviations make a blade unstable, expected smaller ones")
     C = (V.T * viscous) @ V
@@ -71,7 +71,8 @@ def one_body_model(
 def _all_dampers(wheel: Wheel) -> RigidBody | tuple[PortModel, ...] | None:
     if isinstance(wheel.damper, RigidBody):
         ones = np.eye(wheel.count)
-        return RigidBody(np.kron(ones, wheel.damper.mass), np.kron(ones, wheel.damper.B))
+        mass = np.asarray(np.kron(ones, wheel.damper.mass), float)
+        return RigidBody(mass, np.asarray(np.kron(ones, wheel.damper.B), float))
     return None if wheel.damper is None else (join((wheel.damper,) * wheel.count),)
 
 
@@ -119,7 +120,7 @@ def _real_residual(wheel: Wheel) -> np.ndarray:
     return full.transpose(0, 2, 1, 3).reshape(count * half.shape[1], -1)
 
 
-def _mistuned(
+def _mistuned_modes(
     pattern: Pattern,
     omega: np.ndarray,
     shapes: np.ndarray,

@@ -23,7 +23,7 @@ AMPLIFIED = 3.0
 # |T N| below which a mode is left out of the dense matrix
 IMMOVABLE = 1e-2
 # unknowns of the dense matrix: 2 s of factorisation
-LARGEST = 2500
+MAX_DENSE_UNKNOWNS = 2500
 
 
 @dataclass(frozen=True)
@@ -36,7 +36,7 @@ class Preconditioner:
     # (N, H+1, k, k) in nodal diameters
     by_diameter: np.ndarray
     # harmonic to the modes that take part, and LU factors of all diameters
-    dense: dict[int, tuple[np.ndarray, tuple]]
+    dense: dict[int, tuple[np.ndarray, tuple[np.ndarray, np.ndarray]]]
 
     def apply(self, r: np.ndarray) -> np.ndarray:
         """The approximate inverse times real coefficients r (N, m, K)."""
@@ -73,7 +73,7 @@ def make_preconditioner(flex: WheelFlexibility, change: np.ndarray) -> Precondit
         amplified = abs(np.einsum("nii,nii->ni", flex.T[:, h], parts.N))
         kept = np.flatnonzero(amplified.max(axis=0) > IMMOVABLE)
         coupled = h == 0 or amplified.max() > AMPLIFIED
-        if coupled and 0 < count * len(kept) <= LARGEST:
+        if coupled and 0 < count * len(kept) <= MAX_DENSE_UNKNOWNS:
             dense[h] = (kept, _dense_factors(flex, C[h].reshape(count, -1, *C.shape[2:]), h, kept))
             continue
         mean = C[h].reshape(count, -1, *C.shape[2:]).mean(axis=0)
@@ -107,7 +107,7 @@ def _dense_factors(
     C: np.ndarray,
     h: int,
     kept: np.ndarray,
-) -> tuple:
+) -> tuple[np.ndarray, np.ndarray]:
     """LU factors (N k', N k') of T^-1 + U^H C U + U_b^H E U_b over all nodal diameters."""
     parts = flex.parts
     count = len(C)

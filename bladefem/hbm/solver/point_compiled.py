@@ -9,6 +9,7 @@ is left to the fallback chain; a test holds the two ways together.
 from __future__ import annotations
 
 from collections.abc import Sequence
+from typing import Any
 
 import numpy as np
 from numba import njit
@@ -130,26 +131,37 @@ def _solve_points(
         measures.tolist(),
         strict=False,
     )
-    return [
-        Solution(
-            omega,
-            H,
-            samples,
-            *fields,
-            True,
-            "residual within tolerance",
-            "newton",
-            int(steps),
-            error,
-            moved,
-            pushed,
-            drift,
-            dict(zip(NODE_STATES, states, strict=True)),
-            Work(*works),
-            route=route_of(COMPILED_POINT, solvers_of(int(solver))),
-        )
-        for omega, *fields, (steps, error, solver), states, (moved, pushed, drift, *works) in parts
-    ]
+    return [_point_solution(H, samples, point) for point in parts]
+
+
+def _point_solution(
+    H: int,
+    samples: int,
+    point: tuple[Any, ...],
+) -> Solution:
+    """A converged point as `_compiled_points` hands it out."""
+    omega, w, f, probe, end, states, measures = point
+    steps, error, solver = end
+    moved, pushed, drift, *works = measures
+    return Solution(
+        omega=omega,
+        harmonics=H,
+        samples=samples,
+        w=w,
+        f=f,
+        probe=probe,
+        converged=True,
+        reason="residual within tolerance",
+        method="newton",
+        iterations=int(steps),
+        residual=error,
+        residual_displacement=moved,
+        residual_force=pushed,
+        drift=drift,
+        states=dict(zip(NODE_STATES, states, strict=True)),
+        work=Work(*works),
+        route=route_of(COMPILED_POINT, solvers_of(int(solver))),
+    )
 
 
 @njit(cache=True, error_model="numpy")

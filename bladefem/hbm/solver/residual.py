@@ -114,7 +114,7 @@ def contact_forces(
         forces = evaluate_exact(model.elements, w, load=base)
     if missing == 0:
         return forces
-    return replace(forces, f=forces.f[:, missing:], dfdw=forces.dfdw[:, missing:, :, missing:])
+    return replace(forces, f=forces.f[:, missing:], dfdw=forces.jacobian[:, missing:, :, missing:])
 
 
 def linearise_balance(
@@ -311,7 +311,7 @@ def _motion_scale(linear: Linear) -> float:
 def _force_change(balance: Balance, state: State) -> np.ndarray:
     """(n, dK, dK) derivative of p."""
     n, d, K = state.w.shape
-    change = state.forces.dfdw.reshape(n, d * K, d * K).copy()
+    change = state.forces.jacobian.reshape(n, d * K, d * K).copy()
     change[:, np.arange(d * K), np.arange(d * K)] -= np.repeat(balance.model.springs, K, axis=1)
     return change
 
@@ -345,15 +345,15 @@ def _relative_error(
 ) -> float:
     linear = balance.linear
     r = as_amplitudes(residual)
-    size = np.linalg.norm(as_amplitudes(w))
+    size = float(np.linalg.norm(as_amplitudes(w)))
     scale = _motion_scale(linear)
     pressed = balance.model.compression
     if scale < SMALL_MOTION_RATIO * pressed:
         size = max(size, REST_MOTION_SHARE * pressed)
         scale = max(scale, REST_MOTION_SHARE * pressed)
-    with_springs = np.linalg.norm(r) / max(size, np.finfo(float).tiny)
+    with_springs = float(np.linalg.norm(r)) / max(size, float(np.finfo(float).tiny))
     r[1:] += _apply_flexibility(linear.G[1:], linear.springs * r[1:])
-    return float(max(with_springs, np.linalg.norm(r) / scale))
+    return max(with_springs, float(np.linalg.norm(r)) / scale)
 
 
 def _apply_flexibility(flexibility: np.ndarray, forces: np.ndarray) -> np.ndarray:

@@ -10,7 +10,7 @@ from math import pi
 import numpy as np
 import scipy.sparse as sp
 
-from geometry.mesh import Mesh
+from geometry.mesh import Mesh, sector_of
 
 from ...data import Elements, Patch, PortModel, RigidBody
 from ...hbm.model import Damping, ReducedModel, in_series
@@ -91,11 +91,11 @@ def joint_model(
 
 
 def rigid_damper(reduced: Reduced) -> RigidBody:
-    """Six freedoms (three in a plane), in mass-normalised coordinates."""
+    """Six degrees of freedom (three in a plane), in mass-normalised coordinates."""
     rigid = reduced.damper.omega == 0
-    return RigidBody(
-        np.eye(int(rigid.sum())), reduced.damper.shapes[reduced.damper.ports["contact"]][:, rigid]
-    )
+    # a floating body moves alike in every sector: its shapes are real
+    shapes = np.real(reduced.damper.shapes[reduced.damper.ports["contact"]][:, rigid])
+    return RigidBody(np.eye(int(rigid.sum())), shapes)
 
 
 def mass_damper(
@@ -107,7 +107,8 @@ def mass_damper(
     down the slope.
     """
     dim = mesh.dimension
-    angle = pi / mesh.sector.count if mesh.sector.count else 0.0
+    count = sector_of(mesh).count
+    angle = pi / count if count else 0.0
     moves = np.array([[-np.sin(angle), np.cos(angle), 0.0], [0.0, 0.0, 1.0]])[: dim - 1]
     rows = []
     for patch in patches:

@@ -14,11 +14,12 @@ from ...data import Elements
 from ...hbm.linear_resonances import free_resonances, stuck_partners
 from ...hbm.model import ReducedModel
 from ...hbm.solve import free_response, stuck_response
+from ...util.arrays import ComplexArray, RealArray
 
 # of the resonance frequency, each side: where its height is looked for
 WIDTH = 0.02
 # points of that search, before it is refined between the highest and its neighbours
-COARSE = 21
+SEARCH_POINTS = 21
 # points of a drawn curve that crowd round its resonance
 DETAIL = 50
 
@@ -30,9 +31,9 @@ class Limit:
     # 0: no damper, inf: full stick [N]
     load: float
     # (k,) [Hz], ascending
-    frequency: np.ndarray
+    frequency: RealArray
     # (k,) complex first harmonic at the probe [m]
-    first: np.ndarray
+    first: ComplexArray
     # [Hz]
     peak_frequency: float
     # [m]
@@ -69,8 +70,8 @@ def _limit(
     def first(frequency: float) -> complex:
         return complex(response(model, 2 * np.pi * frequency)[1, 0])
 
-    near = omega / (2 * np.pi) * np.linspace(1 - WIDTH, 1 + WIDTH, COARSE)
-    top = min(max(int(np.argmax([abs(first(f)) for f in near])), 1), COARSE - 2)
+    near = omega / (2 * np.pi) * np.linspace(1 - WIDTH, 1 + WIDTH, SEARCH_POINTS)
+    top = min(max(int(np.argmax([abs(first(f)) for f in near])), 1), SEARCH_POINTS - 2)
     found = minimize_scalar(
         lambda f: -abs(first(f)),
         bounds=(near[top - 1], near[top + 1]),
