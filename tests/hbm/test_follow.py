@@ -17,8 +17,8 @@ from bladefem.hbm.linear.condensation import condense
 from bladefem.hbm.model import Damping, ReducedModel
 from bladefem.hbm.parameters import vary
 from bladefem.hbm.solve import solve
-from bladefem.hbm.solver.residual import Balance, evaluate_balance
 from bladefem.hbm.solver.newton import Options
+from bladefem.hbm.solver.residual import Balance, evaluate_balance
 from bladefem.hbm.sweep import response, size
 from bladefem.reduction.matrices import port_model_from_matrices
 

@@ -11,6 +11,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
+from typing import Any
 
 import numpy as np
 
@@ -240,9 +241,10 @@ def compared_settings(
     for fewer in FEWER[respect]:
         if here is not None and fewer >= here:
             continue
-        richer_one = replace(other, **{respect: fewer})
+        reduced: dict[str, Any] = {respect: fewer}
+        richer_one = replace(other, **reduced)
         if not _too_large(family, richer_one, point, LIFTING_JUDGE):
-            return replace(settings, **{respect: fewer}), richer_one
+            return replace(settings, **reduced), richer_one
     return None
 
 
