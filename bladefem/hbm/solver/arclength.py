@@ -21,6 +21,7 @@ from ..parameter_derivatives import residual_rate
 from .newton import Options, newton
 from .newton_krylov import Memory
 from .residual import Balance, State, determinant_sign, evaluate_balance, linearise_balance
+from .walking import walk_fault
 
 # Newton steps of one corrector
 MOST_CORRECTIONS = 12
@@ -155,7 +156,7 @@ def _correct_point(
     guess = spot.state.w + step * size * dw, spot.x + step * task.width * dx
     w, x = guess
     for iteration in range(MOST_CORRECTIONS + 1):
-        balance = task.balance(x)
+        balance = replace(task.balance(x), walk=spot.balance.walk)
         state = evaluate_balance(balance, w)
         if state.error <= task.options.tolerance:
             break
@@ -176,6 +177,9 @@ def _correct_point(
         > JUMP_GUARD * step
     ):
         return None, "the corrector jumps"
+    fault = walk_fault(balance, state)
+    if fault:
+        return None, fault
     try:
         found = spot_at(task, x, balance, state, iteration, spot.sign)
     except np.linalg.LinAlgError as error:
@@ -201,7 +205,7 @@ def _around_corner(
     dw, dx = _path_direction(task, spot)
     for ahead in (1.0, -1.0):
         x = spot.x + ahead * share * task.width * dx
-        balance = task.balance(x)
+        balance = replace(task.balance(x), walk=spot.balance.walk)
         state = evaluate_balance(balance, spot.state.w + ahead * share * size * dw)
         try:
             inverse = linearise_balance(balance, state, task.memory)
@@ -231,8 +235,13 @@ def _leap_gap(
     balance = task.balance(x)
     end = newton(balance, spot.state.w, task.options)
     size = max(task.size, float(np.linalg.norm(spot.state.w)))
-    if not end.converged or np.linalg.norm(end.state.w - spot.state.w) > LEAP_DISTANCE * size:
+    change = end.state.w - spot.state.w
+    # the means of a damper that begins or ceases to walk do not compare
+    if (end.walk is None) != (spot.balance.walk is None):
+        change = change[:, :, 1:]
+    if not end.converged or np.linalg.norm(change) > LEAP_DISTANCE * size:
         return None
+    balance = replace(balance, walk=end.walk)
     return replace(spot_at(task, x, balance, end.state, end.iterations, spot.sign), leapt=True)
 
 

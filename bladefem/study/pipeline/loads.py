@@ -65,6 +65,8 @@ class Curve:
     iterations: np.ndarray
     # (k,) number of elements that slip or lift off in a period
     slipping: np.ndarray
+    # (k,) how fast the damper walks where friction alone does not hold it [m/s]
+    drift: np.ndarray
     # (k,) friction work a period [J]
     dissipated: np.ndarray
     # (k,) |work put in - work lost| over work put in
@@ -230,6 +232,7 @@ def _record(p: Solution) -> tuple[object, ...]:
         p.residual,
         p.iterations,
         p.states["slip"] + p.states["lift"],
+        p.drift,
         p.work.dissipated,
         p.work.imbalance,
         p.branch,
@@ -276,6 +279,7 @@ def _row(c: Curve) -> dict[str, float]:
         "reduction": 1.0,
         "dissipated": c.peak.work.dissipated,
         "slipping": c.peak.states["slip"] + c.peak.states["lift"],
+        "drift": c.peak.drift,
         "error": np.nan if c.error is None else c.error,
         "halved": c.halved,
         "harmonics": c.settings.harmonics,
@@ -308,6 +312,7 @@ def _linear_row(limit: Limit) -> dict[str, float]:
         "reduction": 1.0,
         "dissipated": 0.0,
         "slipping": 0,
+        "drift": 0.0,
         "error": 0.0,
         "halved": 0.0,
         "harmonics": 1,
