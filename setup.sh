@@ -97,6 +97,8 @@ assert not numpy.__file__.startswith(sys.prefix + "/"), "pip installed a second 
 PYTHON
 say "compiling kernels, once"
 "$V/bin/python" -m bladefem.hbm.precompile >"$LOG" 2>&1 || { show_log; say "they will be compiled when they are used"; }
+# Those that the main job does not need follow in the background; the lock is not theirs to hold.
+nice -n 19 "$V/bin/python" -m bladefem.hbm.precompile later </dev/null >/dev/null 2>&1 9>&- &
 key >"$STAMP.new"
 mv "$STAMP.new" "$STAMP"
 say "ready"

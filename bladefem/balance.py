@@ -1,7 +1,7 @@
 """The balance alone: from matrices and friction elements to responses, without finite elements.
 
 ``body_from_matrices`` takes NumPy arrays, ``read_matrices`` files of other codes. All names come
-from :mod:`bladefem.hbm` and what it stands on; each is loaded when it is first used.
+from :mod:`bladefem.hbm` and what it builds on; each is loaded when it is first used.
 """
 
 from __future__ import annotations

@@ -43,7 +43,8 @@ class ModeSet:
 
 @dataclass(frozen=True)
 class PortModel:
-    """A linear body seen from its ports (contact, load and probe freedoms) in one nodal diameter.
+    """A linear body seen from its ports (contact, load and probe degrees of freedom) in one nodal
+    diameter.
 
     Receptance at circular frequency w:  shapes diag(1/(omega^2 - w^2 + damping)) shapes^H +
     residual  [m/N].
@@ -64,13 +65,13 @@ class PortModel:
     nodal_diameter: int | None = None
     # (p,) displacement under the static loads (n = 0 only) [m]
     static_offset: np.ndarray | None = None
-    # (m,) or coupled (m, m) viscous modal damping, beside the model's [1/s]
+    # (m,) or coupled (m, m) viscous modal damping, in addition to the model's [1/s]
     damping: np.ndarray | None = None
 
     def __post_init__(self) -> None:
         p = len(self.residual)
         m = len(self.omega)
-        wanted = {
+        wanted: dict[str, list[tuple[int, ...]]] = {
             "omega": [(m,)],
             "shapes": [(p, m)],
             "residual": [(p, p)],

@@ -12,6 +12,10 @@ class InputError(ValueError):
     """The input is wrong. The message is one sentence: field, value, what was expected."""
 
 
+class StageMissingError(InputError, AttributeError):
+    """A result was asked for that the run did not come to."""
+
+
 class NotSolvedError(RuntimeError):
     """The input was right and no acceptable solution was found. The message says which loop stopped
     and why.

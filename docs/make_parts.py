@@ -4,9 +4,9 @@ docs/parts.md.
 
 from pathlib import Path
 
+from bladefem.scene.kinds import KINDS
 from bladefem.scene.tables import Scene
 from bladefem.scene.units import show
-from bladefem.view.parts import PARTS
 from geometry import parameters
 from geometry.quantity import describe
 
@@ -78,10 +78,12 @@ page = [
     "Drawn with the default values by `python docs/make_parts.py`.",
     "",
 ]
-for kind, drawings in PARTS.items():
+for kind, record in KINDS.items():
+    if not record.pictures:
+        continue
     page += [f"## {kind}", ""]
-    for name, draw in drawings.items():
-        draw(Scene(kind=kind), HERE / "parts" / f"{name}.png")
+    for name, draw in record.pictures.items():
+        draw(Scene(kind=kind), file=HERE / "parts" / f"{name}.png")
         page += [f"![{name}](parts/{name}.png)", ""]
         for table in TABLES[name]:
             page += rows(table)

@@ -11,7 +11,7 @@ from pathlib import Path
 from bladefem.errors import InputError
 
 # files inside files; more is a circle
-DEEPEST = 20
+MAX_INCLUDE_DEPTH = 20
 
 
 @dataclass
@@ -47,7 +47,7 @@ def keywords_of(file: Path, depth: int = 0) -> Iterator[Keyword]:
     current: Keyword | None = None
     head = ""
     head_line = 0
-    for number, raw in enumerate(_text(file).splitlines(), 1):
+    for number, raw in enumerate(_read_text(file).splitlines(), 1):
         line = raw.strip()
         if not line or line.startswith("**"):
             continue
@@ -59,10 +59,10 @@ def keywords_of(file: Path, depth: int = 0) -> Iterator[Keyword]:
                 continue
             if current is not None:
                 yield current
-            current = _keyword(head, file, head_line)
+            current = _parse_keyword(head, file, head_line)
             head = ""
             if current.name == "INCLUDE":
-                yield from _included(current, depth)
+                yield from _included_keywords(current, depth)
                 current = None
         elif current is not None:
             current.data.append((number, [part.strip() for part in line.split(",")]))
@@ -70,7 +70,7 @@ def keywords_of(file: Path, depth: int = 0) -> Iterator[Keyword]:
         yield current
 
 
-def _text(file: Path) -> str:
+def _read_text(file: Path) -> str:
     """Text of a file in whatever encoding it was written."""
     raw = file.read_bytes()
     if raw.startswith((b"\xff\xfe", b"\xfe\xff")):
@@ -78,7 +78,7 @@ def _text(file: Path) -> str:
     return raw.decode("utf-8-sig", errors="replace")
 
 
-def _keyword(
+def _parse_keyword(
     head: str,
     file: Path,
     line: int,
@@ -92,13 +92,13 @@ def _keyword(
     return Keyword(" ".join(first.upper().split()), options, file, line)
 
 
-def _included(keyword: Keyword, depth: int) -> Iterator[Keyword]:
+def _included_keywords(keyword: Keyword, depth: int) -> Iterator[Keyword]:
     name = keyword.options.get("INPUT", "")
     found = keyword.file.parent / name
     if not name or not found.is_file():
         raise deck_error(
             keyword.file, keyword.line, f"*INCLUDE, INPUT={name}: there is no such file"
         )
-    if depth >= DEEPEST:
+    if depth >= MAX_INCLUDE_DEPTH:
         raise deck_error(keyword.file, keyword.line, "*INCLUDE goes in circles")
     yield from keywords_of(found, depth + 1)

@@ -33,7 +33,7 @@ SOLIDS = {
 FLAT = {3: "triangle", 6: "triangle6", 4: "quad", 8: "quad8"}
 FLAT_PREFIXES = ("S", "SFM3D", "M3D", "CPS", "CPE", "CPEG", "CAX", "STRI", "R3D", "DS", "CPT")
 # corners of the faces S1, S2, ... of a cell
-FACES = {
+FACES: dict[str, list[tuple[int, ...]]] = {
     "tetra": [(0, 1, 2), (0, 3, 1), (1, 3, 2), (2, 3, 0)],
     "hexahedron": [
         (0, 1, 2, 3),
@@ -180,7 +180,7 @@ def _read_set(
     for line, fields in keyword.data:
         words = [v.strip("\"'") for v in fields if v]
         if "GENERATE" in keyword.options:
-            members += [(instance, tag) for tag in _generated(words, keyword, line)]
+            members += [(instance, tag) for tag in _generated_range(words, keyword, line)]
             continue
         for word in words:
             if word.lstrip("-").isdigit():
@@ -188,10 +188,10 @@ def _read_set(
             elif word.upper() in known:
                 members += sets[known[word.upper()]]
             else:
-                members.append(_dotted(word, keyword, line, what))
+                members.append(_instance_member(word, keyword, line, what))
 
 
-def _generated(
+def _generated_range(
     words: list[str],
     keyword: Keyword,
     line: int,
@@ -205,7 +205,7 @@ def _generated(
         ) from None
 
 
-def _dotted(
+def _instance_member(
     word: str,
     keyword: Keyword,
     line: int,
@@ -257,7 +257,7 @@ def _add_instance(
             keyword.line,
             f"*INSTANCE of the part '{keyword.options.get('PART', '')}' that is not there",
         )
-    motion = _motion(keyword)
+    motion = _instance_motion(keyword)
 
     def moved(key):
         return (name, key[1])
@@ -281,7 +281,7 @@ def _add_instance(
         root.left_out[kind] = root.left_out.get(kind, 0) + count
 
 
-def _motion(keyword: Keyword) -> tuple[np.ndarray, np.ndarray]:
+def _instance_motion(keyword: Keyword) -> tuple[np.ndarray, np.ndarray]:
     """Rotation and shift of an instance: a translation, then a turn about an axis by two points."""
     rotation = np.eye(3)
     shift = np.zeros(3)
@@ -293,13 +293,13 @@ def _motion(keyword: Keyword) -> tuple[np.ndarray, np.ndarray]:
         if len(values) == 3:
             shift = values
         elif len(values) == 7:
-            turn = _rotation(values[3:6] - values[:3], np.radians(values[6]))
+            turn = _axis_rotation(values[3:6] - values[:3], np.radians(values[6]))
             rotation = turn
             shift = turn @ (shift - values[:3]) + values[:3]
     return rotation, shift
 
 
-def _rotation(axis: np.ndarray, angle: float) -> np.ndarray:
+def _axis_rotation(axis: np.ndarray, angle: float) -> np.ndarray:
     """Rotation (3, 3) about an axis (Rodrigues)."""
     x, y, z = axis / np.linalg.norm(axis)
     cross = np.array([[0, -z, y], [z, 0, -x], [-y, x, 0]])
@@ -343,7 +343,7 @@ def _raw_mesh(root: _Scope) -> RawMesh:
         [(word, from_vtk_order(word, np.array(rows))) for word, rows in kinds.items()],
         groups,
         sets | _node_surfaces(root, sets, place),
-        {name: _facets(root, lines, place) for name, lines in root.surfaces.items()},
+        {name: _surface_facets(root, lines, place) for name, lines in root.surfaces.items()},
         notes,
     )
 
@@ -368,7 +368,7 @@ def _node_surfaces(
     return found
 
 
-def _facets(
+def _surface_facets(
     root: _Scope,
     lines: list[tuple[str, str]],
     place: dict[Key, int],
@@ -384,22 +384,22 @@ def _facets(
             if key not in root.elements:
                 continue
             word, nodes = root.elements[key]
-            for facet in _labelled(word, label):
+            for facet in _faces_of_label(word, label):
                 corners[len(facet)].append([place[nodes[i]] for i in facet])
         rows = [np.array(some) for some in corners.values() if some]
         # without a label: the outside of the set
-        found += rows if label else [_once(some) for some in rows]
+        found += rows if label else [_single_facets(some) for some in rows]
     return found
 
 
-def _once(facets: np.ndarray) -> np.ndarray:
+def _single_facets(facets: np.ndarray) -> np.ndarray:
     """Facets (nf, k) that no other one coincides with."""
     key = np.sort(facets, axis=1)
     _, first, count = np.unique(key, axis=0, return_index=True, return_counts=True)
     return facets[first[count == 1]]
 
 
-def _labelled(word: str, label: str) -> list[tuple[int, ...]]:
+def _faces_of_label(word: str, label: str) -> list[tuple[int, ...]]:
     """Local corners of the faces that a label stands for; all of them without a label."""
     family = word.rstrip("0123456789")
     if family in ("triangle", "quad"):

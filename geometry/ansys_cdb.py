@@ -1,8 +1,8 @@
 """Reader of Ansys .cdb archives (CDWRITE, blocked) by mapdl-archive: nodes, solid elements, node
 and element components.
 
-Solids are told apart by their number of nodes and by repeated ones (element reference, SOLID185 and
-SOLID186: wedges, pyramids and tetrahedra are hexahedra with repeated nodes).
+Solids are distinguished by their number of nodes and by repeated ones (element reference, SOLID185
+and SOLID186: wedges, pyramids and tetrahedra are hexahedra with repeated nodes).
 """
 
 from __future__ import annotations
@@ -66,7 +66,7 @@ def read_cdb(file: Path) -> RawMesh:
 
     archive = Archive(str(file), parse_vtk=False)
     rows, left_out = _solid_rows(archive)
-    blocks, tags = _blocks(rows, np.asarray(archive.nnum), file)
+    blocks, tags = _cell_blocks(rows, np.asarray(archive.nnum), file)
     place = {int(tag): i for i, tag in enumerate(archive.nnum)}
     where = {int(tag): (b, i) for b, some in enumerate(tags) for i, tag in enumerate(some)}
     notes = (f"{left_out} elements that are no solids were left out",) if left_out else ()
@@ -95,7 +95,7 @@ def _solid_rows(archive: Any) -> tuple[dict[int, np.ndarray], int]:
     return {count: np.array(rows) for count, rows in found.items()}, left_out
 
 
-def _blocks(
+def _cell_blocks(
     rows: dict[int, np.ndarray],
     numbers: np.ndarray,
     file: Path,

@@ -2,15 +2,18 @@
 
 from __future__ import annotations
 
-from typing import Any
+from typing import TYPE_CHECKING
 
 from bladefem.scene.fields import value_at
 from bladefem.scene.kinds import kind_named, load_function
 
 from .mesh import Mesh
 
+if TYPE_CHECKING:
+    from bladefem.scene.tables import Scene
 
-def build_here(scene: Any) -> Mesh:
+
+def build_here(scene: Scene) -> Mesh:
     """The mesh of a scene, by its ``kind``; the builders and gmsh are loaded when they are needed.
 
     Args:

@@ -25,7 +25,7 @@ from .quality import report
 from .session import attempt, gmsh_session
 
 # seat of the Hertz pair over the expected contact radius
-WIDER = 2.0
+SEAT_RATIO = 2.0
 
 
 def hertz_pair(hertz: HertzPair, size: MeshSize) -> Mesh:
@@ -41,15 +41,15 @@ def hertz_pair(hertz: HertzPair, size: MeshSize) -> Mesh:
     """
     check_hertz(hertz, size)
     fine = size.contact_size or hertz.contact_radius / 10
-    mesh = _facing(
+    mesh = _mesh_facing_bodies(
         hertz.dimension,
         hertz.half_width,
-        WIDER * hertz.contact_radius,
+        SEAT_RATIO * hertz.contact_radius,
         hertz.half_width,
         (fine, 1.2 * hertz.contact_radius),
         size,
     )
-    points = _bend(mesh, hertz.radius, hertz.half_width)
+    points = _bend_indenter(mesh, hertz.radius, hertz.half_width)
     bent = replace(mesh, points=points)
     return replace(bent, report=report(bent, mesh.report["straightened"], mesh.report["size"]))
 
@@ -62,8 +62,13 @@ def punch(block: Punch, size: MeshSize) -> Mesh:
     """
     check_punch(block, size)
     fine = size.contact_size or block.radius / 10
-    return _facing(
-        block.dimension, block.half_width, block.radius, None, (fine, 1.1 * block.radius), size
+    return _mesh_facing_bodies(
+        block.dimension,
+        block.half_width,
+        block.radius,
+        None,
+        (fine, 1.1 * block.radius),
+        size,
     )
 
 
@@ -73,15 +78,15 @@ def check_hertz(hertz: HertzPair, size: MeshSize) -> None:
     Raises:
         InputError: the first rule that is broken.
     """
-    _inside(
+    _check_range(
         "hertz.contact_radius",
         hertz.contact_radius,
         hertz.half_width / 2.5,
         "hertz.half_width / 2.5",
     )
-    _inside("hertz.half_width", hertz.half_width, 0.7 * hertz.radius, "70 % of hertz.radius")
+    _check_range("hertz.half_width", hertz.half_width, 0.7 * hertz.radius, "70 % of hertz.radius")
     fine = size.contact_size or hertz.contact_radius / 10
-    _inside("mesh.contact_size", fine, hertz.contact_radius, "hertz.contact_radius")
+    _check_range("mesh.contact_size", fine, hertz.contact_radius, "hertz.contact_radius")
 
 
 def check_punch(block: Punch, size: MeshSize) -> None:
@@ -90,12 +95,12 @@ def check_punch(block: Punch, size: MeshSize) -> None:
     Raises:
         InputError: the first rule that is broken.
     """
-    _inside("punch.radius", block.radius, block.half_width / 2, "half of punch.half_width")
+    _check_range("punch.radius", block.radius, block.half_width / 2, "half of punch.half_width")
     fine = size.contact_size or block.radius / 10
-    _inside("mesh.contact_size", fine, block.radius, "punch.radius")
+    _check_range("mesh.contact_size", fine, block.radius, "punch.radius")
 
 
-def _inside(
+def _check_range(
     name: str,
     value: float,
     limit: float,
@@ -105,7 +110,7 @@ def _inside(
         raise InputError(f"{name} = {value:.4g} m: expected at most {limit:.4g} m ({meaning})")
 
 
-def _bend(
+def _bend_indenter(
     mesh: Mesh,
     radius: float,
     height: float,
@@ -122,7 +127,7 @@ def _bend(
     return points
 
 
-def _facing(
+def _mesh_facing_bodies(
     dimension: int,
     width: float,
     seat: float,
@@ -140,9 +145,16 @@ def _facing(
     """
     far = size.size or width / 4
     with gmsh_session() as gmsh:
-        draw = _solids if dimension == 3 else _plates
+        draw = _draw_solids if dimension == 3 else _draw_plates
         blade, damper = draw(gmsh, width, seat, upper)
-        groups = _names(gmsh, dimension, blade, damper, (width, upper or seat), seat)
+        groups = _name_faces(
+            gmsh,
+            dimension,
+            blade,
+            damper,
+            (width, upper or seat),
+            seat,
+        )
         tie(
             gmsh,
             dimension - 1,
@@ -167,11 +179,11 @@ def _facing(
     )
 
 
-def _square(width: float) -> np.ndarray:
+def _square_corners(width: float) -> np.ndarray:
     return np.array([[0.0, 0.0], [width, 0.0], [width, width], [0.0, width]])
 
 
-def _solids(
+def _draw_solids(
     gmsh: ModuleType,
     width: float,
     seat: float,
@@ -179,14 +191,14 @@ def _solids(
 ) -> tuple[int, int]:
     """Quarter blocks with the seat imprinted, or a quarter round punch above."""
     blade = imprint(
-        gmsh, prism(gmsh, _square(width), -width, 0.0), [(2, _quarter_disc(gmsh, seat))]
+        gmsh, prism(gmsh, _square_corners(width), -width, 0.0), [(2, _quarter_disc(gmsh, seat))]
     )
     if upper is None:
         solid = gmsh.model.occ.extrude([(2, _quarter_disc(gmsh, seat))], 0, 0, seat)
         damper = next(tag for dim, tag in solid if dim == 3)
     else:
         damper = imprint(
-            gmsh, prism(gmsh, _square(upper), 0.0, upper), [(2, _quarter_disc(gmsh, seat))]
+            gmsh, prism(gmsh, _square_corners(upper), 0.0, upper), [(2, _quarter_disc(gmsh, seat))]
         )
     gmsh.model.occ.synchronize()
     return blade, damper
@@ -201,7 +213,7 @@ def _quarter_disc(gmsh: ModuleType, radius: float) -> int:
     return occ.addPlaneSurface([occ.addCurveLoop(loop)])
 
 
-def _plates(
+def _draw_plates(
     gmsh: ModuleType,
     width: float,
     seat: float,
@@ -219,7 +231,7 @@ def _plates(
     return blade, damper
 
 
-def _names(
+def _name_faces(
     gmsh: ModuleType,
     dimension: int,
     blade: int,
@@ -236,10 +248,36 @@ def _names(
     for body, end, contact, far in ends:
         found = centres(gmsh, body, dimension)
         level = [tag for tag, c in found.items() if abs(c[up]) < 1e-6 * seat]
-        faces[contact] = [min(level, key=lambda t, c=found: np.linalg.norm(c[t]))]
+        faces[contact] = [_nearest_axis({tag: found[tag] for tag in level})]
         faces[far] = [tag for tag, c in found.items() if abs(c[up] - end) < 1e-6 * seat]
         for axis, name in enumerate(("symmetry_x", "symmetry_y")[:up]):
             faces.setdefault(name, []).extend(
                 tag for tag, c in found.items() if abs(c[axis]) < 1e-6 * seat
             )
     return Groups({"blade": [blade], "damper": [damper]}, faces)
+
+
+def count_hertz_cells(pair: HertzPair, mesh: MeshSize) -> float:
+    """A lower bound of the number of cells."""
+    return _seat_cells(pair.contact_radius, pair.dimension, mesh)
+
+
+def count_punch_cells(pair: Punch, mesh: MeshSize) -> float:
+    """A lower bound of the number of cells."""
+    return _seat_cells(pair.radius, pair.dimension, mesh)
+
+
+def _seat_cells(
+    radius: float,
+    dimension: int,
+    mesh: MeshSize,
+) -> float:
+    """Three layers of elements of the contact size on the seats of both bodies."""
+    fine = mesh.scale * (mesh.contact_size or radius / 10)
+    if dimension == 3:
+        return 6 * np.pi / 4 * radius**2 / (0.43 * fine**2)
+    return 6 * radius / fine
+
+
+def _nearest_axis(places: dict[int, np.ndarray]) -> int:
+    return min(places, key=lambda tag: float(np.linalg.norm(places[tag])))

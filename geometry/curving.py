@@ -15,7 +15,7 @@ from .topology import EDGES, FAMILY, GMSH_TYPES, NODES, corner_count
 
 FLAT = ("Line", "Plane")
 # of the edge: a larger step off its middle means a seam or a pole of the parameters
-LARGEST = 0.4
+MAX_MIDDLE_OFFSET = 0.4
 
 
 def second_order(gmsh: ModuleType, curved: bool = True) -> None:
@@ -39,19 +39,19 @@ def second_order(gmsh: ModuleType, curved: bool = True) -> None:
         moved.update(_of_entity(gmsh, dimension, entity, *nodes))
     for _, entity in gmsh.model.getEntities(1):
         if gmsh.model.getType(1, entity) in FLAT:
-            for middle, _ in _edges(gmsh, 1, entity):
+            for middle, _ in _second_order_edges(gmsh, 1, entity):
                 moved.pop(int(middle), None)
     for node, place in moved.items():
         gmsh.model.mesh.setNode(node, place, [])
 
 
-def _edges(
+def _second_order_edges(
     gmsh: ModuleType,
     dimension: int,
     entity: int,
 ) -> list[tuple[int, np.ndarray]]:
     """(middle node, (2,) ends) of each edge of the entity's second-order elements, once."""
-    found = {}
+    found: dict[int, np.ndarray] = {}
     types, _, nodes = gmsh.model.mesh.getElements(dimension, entity)
     for kind, connectivity in zip(types, nodes, strict=True):
         word = GMSH_TYPES[int(kind)]
@@ -73,7 +73,7 @@ def _of_entity(
     """Places (3,) [m] of the mid-side nodes of one curve or surface whose corner nodes and
     parameters are given.
     """
-    edges = _edges(gmsh, dimension, entity)
+    edges = _second_order_edges(gmsh, dimension, entity)
     row = {int(tag): i for i, tag in enumerate(tags)}
     ends = np.array([[row[int(a)], row[int(b)]] for _, (a, b) in edges])
     xyz = xyz.reshape(-1, 3)
@@ -82,4 +82,4 @@ def _of_entity(
     place = np.array(gmsh.model.getValue(dimension, entity, middle.ravel())).reshape(-1, 3)
     step = np.linalg.norm(place - xyz[ends].mean(axis=1), axis=1)
     length = np.linalg.norm(xyz[ends[:, 1]] - xyz[ends[:, 0]], axis=1)
-    return {edges[i][0]: place[i] for i in np.flatnonzero(step < LARGEST * length)}
+    return {edges[i][0]: place[i] for i in np.flatnonzero(step < MAX_MIDDLE_OFFSET * length)}

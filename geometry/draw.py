@@ -95,7 +95,9 @@ def tie(
     gmsh.model.mesh.setPeriodic(dimension, slave, master, affine.ravel().tolist())
 
 
-def set_background(gmsh: ModuleType, least: float, **parameters: dict[str, object]) -> None:
+def set_background(
+    gmsh: ModuleType, least: float, **parameters: list[dict[str, str | float]]
+) -> None:
     """Use the smallest of some size fields, given as kind=[{option: value}, ...]; no element below
     ``least`` [m].
     """

@@ -33,9 +33,16 @@ def write_msh(
         tags = np.arange(1, len(mesh.points) + 1)
         gmsh.model.mesh.addNodes(dimension, entities[first], tags, mesh.points.ravel())
         for name, cells in mesh.bodies.items():
-            _add(gmsh, dimension, entities[name], name, mesh.cell_type, cells)
+            _add_group(
+                gmsh,
+                dimension,
+                entities[name],
+                name,
+                mesh.cell_type,
+                cells,
+            )
         for name, faces in mesh.faces.items():
-            _add(
+            _add_group(
                 gmsh,
                 dimension - 1,
                 gmsh.model.addDiscreteEntity(dimension - 1),
@@ -44,13 +51,20 @@ def write_msh(
                 faces,
             )
         for name, nodes in mesh.nodes.items():
-            _add(gmsh, 0, gmsh.model.addDiscreteEntity(0), name, "vertex", nodes[:, None])
+            _add_group(
+                gmsh,
+                0,
+                gmsh.model.addDiscreteEntity(0),
+                name,
+                "vertex",
+                nodes[:, None],
+            )
         gmsh.option.setNumber("Mesh.MshFileVersion", version)
         gmsh.option.setNumber("Mesh.Binary", int(binary))
         gmsh.write(str(file))
 
 
-def _add(
+def _add_group(
     gmsh: ModuleType,
     dimension: int,
     entity: int,

@@ -36,10 +36,12 @@ def extract(
     """
     tags, xyz, _ = gmsh.model.mesh.getNodes()
     bodies = {
-        name: _elements(gmsh, dimension, entities) for name, entities in groups.bodies.items()
+        name: _entity_elements(gmsh, dimension, entities)
+        for name, entities in groups.bodies.items()
     }
     faces = {
-        name: _elements(gmsh, dimension - 1, entities)[1] for name, entities in groups.faces.items()
+        name: _entity_elements(gmsh, dimension - 1, entities)[1]
+        for name, entities in groups.faces.items()
     }
     used = np.unique(np.concatenate([cells.ravel() for _, cells in bodies.values()]))
     number, place = np.full((2, int(tags.max()) + 1), -1)
@@ -58,7 +60,7 @@ def extract(
     )
 
 
-def _elements(
+def _entity_elements(
     gmsh: ModuleType,
     dimension: int,
     entities: list[int],

@@ -19,7 +19,7 @@ from .parameters import MeshSize
 from .quality import edge_of_middle, report, shape_quality, straighten
 
 # cells; far beyond what one machine solves
-MANY = 3e6
+MAX_CELLS = 3e6
 # shape quality that asks for a second round of optimisation
 POOR = 0.1
 # shape quality of a tetrahedron that is refused
@@ -46,7 +46,7 @@ def mesh_model(
     gmsh.model.mesh.generate(2)
     if dimension == 3:
         fill(gmsh, groups, size.algorithm)
-    refuse_flat(_corners(gmsh, groups, dimension))
+    refuse_flat(_first_order_mesh(gmsh, groups, dimension))
     if size.order == 2:
         second_order(gmsh, size.curved)
     return extract(gmsh, groups, dimension)
@@ -102,16 +102,17 @@ def check_count(
     """Refuse a mesh that would never end.
 
     Raises:
-        InputError: elements of this size [m] in all bodies would be more than MANY.
+        InputError: elements of this size [m] in all bodies would be more than MAX_CELLS.
     """
     low, high = np.array(gmsh.model.getBoundingBox(-1, -1)).reshape(2, 3)
     mass = sum(gmsh.model.occ.getMass(d, tag) for d, tag in gmsh.model.getEntities(dimension))
     count = min(mass, np.prod((high - low)[:dimension])) / (
         0.12 * size**3 if dimension == 3 else 0.43 * size**2
     )
-    if count > MANY:
+    if count > MAX_CELLS:
         raise InputError(
-            f"{name} = {size:.4g} m gives about {count:.1g} cells, expected at most {MANY:.0e}; "
+            f"{name} = {size:.4g} m gives about {count:.1g} cells, expected at most "
+            f"{MAX_CELLS:.0e}; "
             "choose larger elements, or check the length unit"
         )
 
@@ -123,13 +124,13 @@ def improve(gmsh: ModuleType, groups: Groups) -> float:
     Either alone leaves more of them.
     """
     for method in ("Netgen", ""):
-        if (worst := _worst_shape(_corners(gmsh, groups, 3))) > POOR:
+        if (worst := _worst_shape(_first_order_mesh(gmsh, groups, 3))) > POOR:
             return worst
         gmsh.model.mesh.optimize(method, True)
-    return _worst_shape(_corners(gmsh, groups, 3))
+    return _worst_shape(_first_order_mesh(gmsh, groups, 3))
 
 
-def _corners(
+def _first_order_mesh(
     gmsh: ModuleType,
     groups: Groups,
     dimension: int,
@@ -159,9 +160,16 @@ def complete(
         flat: plane faces, whose mid-side nodes go to the middle of their edges exactly (contact
             needs it).
     """
-    mesh = replace(mesh, points=_flatten(mesh, flat))
+    mesh = replace(mesh, points=_flatten_faces(mesh, flat))
     pairs = {
-        name: match(mesh.points, mesh.faces, (m, s), mesh.dimension, r, t)
+        name: match(
+            mesh.points,
+            mesh.faces,
+            (m, s),
+            mesh.dimension,
+            r,
+            t,
+        )
         for name, (m, s, r, t) in motions.items()
     }
     mesh = replace(mesh, points=snap(mesh.points, pairs), pairs=pairs, sector=sector)
@@ -170,7 +178,7 @@ def complete(
     return replace(mesh, report=report(mesh, straightened, size))
 
 
-def _flatten(mesh: Mesh, names: tuple[str, ...]) -> np.ndarray:
+def _flatten_faces(mesh: Mesh, names: tuple[str, ...]) -> np.ndarray:
     points = mesh.points.copy()
     ends = edge_of_middle(mesh)
     for name in names:

@@ -14,6 +14,7 @@ import numpy as np
 
 from bladefem.errors import InputError, suggestion
 
+from .damper_shapes import SHAPES
 from .draw import centres, imprint, polygon
 from .parameters import Wedge
 from .session import attempt
@@ -23,7 +24,7 @@ Named = dict[tuple[int, str], list[int]]
 # sine between two planes below which they are one plane
 PARALLEL = 1e-6
 # of a length: what is left of rounding in a STEP file
-LOOSE = 1e-6
+ROUNDING_TOLERANCE = 1e-6
 # of a face's size: how far a plane may be from flat
 FLAT = 1e-6
 
@@ -54,11 +55,16 @@ class Flanks:
         inner, outer = self.ends[flank]
         return np.array([inner, outer, outer + self.along, inner + self.along])
 
-    def section(self, base: float) -> np.ndarray:
-        """(6, 3) corners of the damper's lower end: foot, inner, outer; outer, inner, foot [m]."""
-        drop = -base * self.outward
-        (inner, outer), (inner_next, outer_next) = self.ends
-        return np.array([inner + drop, inner, outer, outer_next, inner_next, inner_next + drop])
+    def section(self, damper: Wedge) -> np.ndarray:
+        """(n, 3) corners of the damper's lower end [m]."""
+        across = np.cross(self.along, self.outward)
+        across /= np.linalg.norm(across)
+        origin = self.ends[:, 0].mean(axis=0)
+        if (self.ends[1, 0] - origin) @ across < 0:
+            across = -across
+        axes = np.column_stack([self.outward, across])
+        outline = SHAPES[damper.shape].outline((self.ends - origin) @ axes, damper.base)
+        return origin + outline @ axes.T
 
 
 def fit_wedge(
@@ -85,16 +91,24 @@ def fit_wedge(
             does not fit.
     """
     right, left = (_single_face(gmsh, named, name) for name in seats)
-    flanks = flanks_between(gmsh, right, left, wedge, width, on, axis)
-    blade = _owner(gmsh, right)
-    before = _faces(gmsh, blade)
+    flanks = flanks_between(
+        gmsh,
+        right,
+        left,
+        wedge,
+        width,
+        on,
+        axis,
+    )
+    blade = _owning_solid(gmsh, right)
+    before = _solid_faces(gmsh, blade)
     marks = [
         (2, polygon(gmsh, flanks.rectangle(0))[0]),
         (2, polygon(gmsh, flanks.rectangle(1) @ on)[0]),
     ]
     with attempt("imported.seats", "cut the seats into the platforms"):
         cut = imprint(gmsh, blade, marks)
-        base, _, _ = polygon(gmsh, flanks.section(wedge.base))
+        base, _, _ = polygon(gmsh, flanks.section(wedge))
         drawn = gmsh.model.occ.extrude([(2, base)], *flanks.along)
     damper = next(tag for dim, tag in drawn if dim == 3)
     gmsh.model.occ.synchronize()
@@ -142,16 +156,16 @@ def flanks_between(
     along *= 1.0 if along @ axis >= 0 else -1.0
     low, high = _common_length(corners, along, wedge.length)
     ends = []
-    widths = [_extent(corners[i], _across(normals, places, along, i)) for i in (0, 1)]
+    widths = [_extent_along(corners[i], _across_flank(normals, places, along, i)) for i in (0, 1)]
     narrowest = min(top - bottom for bottom, top in widths)
     wanted = narrowest if width is None else width
-    if wanted > narrowest * (1 + LOOSE):
+    if wanted > narrowest * (1 + ROUNDING_TOLERANCE):
         raise InputError(
             f"imported.seat_width = {1e3 * wanted:.4g} mm: expected at most {1e3 * narrowest:.4g} "
             "mm, the width of the narrower platform face"
         )
     for i in (0, 1):
-        across = _across(normals, places, along, i)
+        across = _across_flank(normals, places, along, i)
         top = widths[i][1]
         origin = places[i] - (places[i] @ across) * across - (places[i] @ along) * along
         foot = origin + (low + high - wedge.length) / 2 * along
@@ -170,10 +184,10 @@ def _common_length(
     length: float,
 ) -> tuple[float, float]:
     """Where both faces are, along the damper [m]."""
-    extents = [_extent(points, along) for points in corners]
+    extents = [_extent_along(points, along) for points in corners]
     low = max(extent[0] for extent in extents)
     high = min(extent[1] for extent in extents)
-    if length > (high - low) * (1 + LOOSE):
+    if length > (high - low) * (1 + ROUNDING_TOLERANCE):
         raise InputError(
             f"damper.length = {1e3 * length:.4g} mm: expected at most {1e3 * (high - low):.4g} mm, "
             "the length that both platform faces have in common"
@@ -181,7 +195,7 @@ def _common_length(
     return low, high
 
 
-def _across(
+def _across_flank(
     normals: tuple[np.ndarray, np.ndarray],
     places: tuple[np.ndarray, np.ndarray],
     along: np.ndarray,
@@ -205,7 +219,7 @@ def _refuse_crossed(flanks: Flanks) -> None:
         )
 
 
-def _extent(points: np.ndarray, direction: np.ndarray) -> tuple[float, float]:
+def _extent_along(points: np.ndarray, direction: np.ndarray) -> tuple[float, float]:
     along = points @ direction
     return float(along.min()), float(along.max())
 
@@ -249,13 +263,13 @@ def _plane_face(gmsh: ModuleType, face: int) -> tuple[np.ndarray, np.ndarray, np
     return centre, normal / np.linalg.norm(normal), corners
 
 
-def _owner(gmsh: ModuleType, face: int) -> int:
+def _owning_solid(gmsh: ModuleType, face: int) -> int:
     """The solid that a face bounds."""
     upward, _ = gmsh.model.getAdjacencies(2, face)
     return int(upward[0])
 
 
-def _faces(gmsh: ModuleType, volume: int) -> dict[int, tuple[np.ndarray, float]]:
+def _solid_faces(gmsh: ModuleType, volume: int) -> dict[int, tuple[np.ndarray, float]]:
     """Centre and area of each face of a solid."""
     return {
         tag: (centre, float(gmsh.model.occ.getMass(2, tag)))
@@ -271,14 +285,15 @@ def _carried_over(
     cut: int,
 ) -> Named:
     """The names after the cut: faces are found again by centre and area, what was cut is not."""
-    after = _faces(gmsh, cut)
+    after = _solid_faces(gmsh, cut)
     scale = max(np.linalg.norm(centre) for centre, _ in before.values())
     now = {}
     for tag, (centre, area) in before.items():
         same = [
             other
             for other, (place, size) in after.items()
-            if np.linalg.norm(place - centre) < LOOSE * scale and abs(size / area - 1) < LOOSE
+            if np.linalg.norm(place - centre) < ROUNDING_TOLERANCE * scale
+            and abs(size / area - 1) < ROUNDING_TOLERANCE
         ]
         if same:
             now[tag] = same[0]
@@ -304,7 +319,7 @@ def _face_at(
     area = flanks.width * flanks.length
     found = [
         tag
-        for tag, (centre, size) in _faces(gmsh, volume).items()
+        for tag, (centre, size) in _solid_faces(gmsh, volume).items()
         if np.linalg.norm(centre - middle) < 1e-3 * flanks.width and abs(size / area - 1) < 1e-4
     ]
     if len(found) != 1:

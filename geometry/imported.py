@@ -15,7 +15,7 @@ from __future__ import annotations
 from collections.abc import Iterable
 from dataclasses import replace
 from pathlib import Path
-from typing import Any
+from typing import Any, TypeAlias
 
 import numpy as np
 from scipy.spatial import cKDTree
@@ -38,19 +38,19 @@ from .solid_cells import SolidCells, solid_cells
 from .topology import CORNERS, DIMENSION, FACETS, FAMILY, boundary, outward
 
 # files carry few digits; a match within this share of the face is a match, and is then snapped
-LOOSE = 1e-4
+MATCH_TOLERANCE = 1e-4
 # cosine between outward normals of two faces that look at each other
 OPPOSITE = -0.98
 # of a model [m]: beyond these its unit was taken for another
-SMALLEST = 1e-4
-LARGEST = 20.0
+MIN_MODEL_SIZE = 1e-4
+MAX_MODEL_SIZE = 20.0
 FLIPPED = {
     "tetra": [0, 2, 1, 3],
     "tetra10": [0, 2, 1, 3, 6, 5, 4, 7, 9, 8],
     "triangle": [0, 2, 1],
     "triangle6": [0, 2, 1, 5, 4, 3],
 }
-Axis = np.ndarray | tuple[float, float, float]
+Axis: TypeAlias = np.ndarray | tuple[float, float, float]
 
 
 def read_geometry(
@@ -103,7 +103,7 @@ def read_mesh(
     axis: Axis = (0.0, 0.0, 1.0),
     names: Iterable[str] = (),
     linear: str = "refuse",
-    tolerance: float = LOOSE,
+    tolerance: float = MATCH_TOLERANCE,
     more: Iterable[str] = (),
 ) -> Mesh:
     """Mesh from .msh, .med, .unv, .inp, .bdf, .nas, .vtu or .cdb.
@@ -125,7 +125,16 @@ def read_mesh(
     wanted = read_names(names)
     if wanted:
         raw = renamed_raw(_with_numbered_faces(raw, wanted), wanted)
-    return mesh_of_raw(raw, scale, sectors, axis, str(file), linear, tolerance, frozenset(wanted))
+    return mesh_of_raw(
+        raw,
+        scale,
+        sectors,
+        axis,
+        str(file),
+        linear,
+        tolerance,
+        frozenset(wanted),
+    )
 
 
 def _with_numbered_faces(raw: RawMesh, wanted: dict[str, list[str]]) -> RawMesh:
@@ -149,7 +158,7 @@ def mesh_of_raw(
     axis: Axis,
     source: str,
     linear: str = "keep",
-    tolerance: float = LOOSE,
+    tolerance: float = MATCH_TOLERANCE,
     wanted: frozenset[str] = frozenset(),
 ) -> Mesh:
     """Names, axes, directions and pairs on what a file holds.
@@ -158,27 +167,27 @@ def mesh_of_raw(
         wanted: names given by the user; their faces join groups, surfaces and node sets.
     """
     solids = solid_cells(raw, source, linear, np.asarray(axis, dtype=float))
-    mesh = _bodies(raw, solids, source)
-    mesh = replace(mesh, points=_axes(mesh, scale, np.asarray(axis, dtype=float)))
+    mesh = _split_bodies(raw, solids, source)
+    mesh = replace(mesh, points=_turn_to_axis(mesh, scale, np.asarray(axis, dtype=float)))
     across = float(np.ptp(mesh.points[np.unique(solids.cells)], axis=0).max())
-    if not SMALLEST < across < LARGEST:
+    if not MIN_MODEL_SIZE < across < MAX_MODEL_SIZE:
         raise InputError(
             f"imported.scale = {scale:g}: the model would be {across:.3g} m across, expected the "
             "factor from the file's unit to metres (0.001 for millimetres)"
         )
     mesh = _with_faces(mesh, raw, wanted)
-    mesh = _paired(mesh, sectors, source, tolerance)
+    mesh = _find_pairs(mesh, sectors, source, tolerance)
     points, straightened = straighten(replace(mesh, points=snap(mesh.points, mesh.pairs)))
     mesh = replace(mesh, points=points)
     words = {"source": source, "notes": (*raw.notes, *solids.notes)}
     return replace(mesh, report={**report(mesh, straightened, _edge_length(mesh)), **words})
 
 
-def _word(name: str) -> str:
+def _family_word(name: str) -> str:
     return "_".join(name.lower().split())
 
 
-def _bodies(
+def _split_bodies(
     raw: RawMesh,
     solids: SolidCells,
     source: str,
@@ -186,7 +195,7 @@ def _bodies(
     """Solid cells in bodies, in file order."""
     used = set(np.unique(solids.block).tolist())
     rows = {
-        _word(name): np.concatenate(
+        _family_word(name): np.concatenate(
             [np.flatnonzero((solids.block == b) & np.isin(solids.row, some)) for b, some in parts]
         )
         for name, parts in raw.groups.items()
@@ -214,12 +223,12 @@ def _bodies(
     return Mesh(
         solids.points,
         solids.cell_type,
-        {n: _positive(solids.points, c, solids.cell_type, source) for n, c in bodies.items()},
+        {n: _positive_cells(solids.points, c, solids.cell_type, source) for n, c in bodies.items()},
         parts=parts,
     )
 
 
-def _positive(
+def _positive_cells(
     points: np.ndarray,
     cells: np.ndarray,
     word: str,
@@ -238,7 +247,7 @@ def _positive(
     return result
 
 
-def _axes(
+def _turn_to_axis(
     mesh: Mesh,
     scale: float,
     axis: np.ndarray,
@@ -263,10 +272,13 @@ def _with_faces(
     number[used] = np.arange(len(used))
     points = mesh.points[used]
     cells = number[cells]
-    sets = {_word(name): number[nodes][number[nodes] >= 0] for name, nodes in raw.node_sets.items()}
+    sets = {
+        _family_word(name): number[nodes][number[nodes] >= 0]
+        for name, nodes in raw.node_sets.items()
+    }
     faces = named_facets(cells, mesh.cell_type, _corners_of_faces(raw, mesh.dimension, number))
-    skin = boundary(cells, mesh.cell_type) if sets else None
-    joined = {_word(name) for name in wanted}
+    skin = boundary(cells, mesh.cell_type) if sets else np.empty((0, 0), int)
+    joined = {_family_word(name) for name in wanted}
     for name, nodes in sets.items():
         inside = np.isin(skin, nodes)[:, : _facet_corners(mesh.cell_type)].all(axis=1)
         if not inside.any() or (name in faces and name not in joined):
@@ -302,14 +314,14 @@ def _corners_of_faces(
     for name, parts in raw.groups.items():
         words = [raw.blocks[b][0] for b, _ in parts]
         if words and all(DIMENSION[FAMILY[word]] == dimension - 1 for word in words):
-            corners[_word(name)] = [
+            corners[_family_word(name)] = [
                 raw.blocks[b][1][rows][:, : CORNERS[FAMILY[raw.blocks[b][0]]]] for b, rows in parts
             ]
-    for name, parts in raw.surfaces.items():
-        if parts:
-            corners.setdefault(_word(name), []).extend(parts)
-    for name, parts in corners.items():
-        corners[name] = [number[part] for part in parts]
+    for name, surface in raw.surfaces.items():
+        if surface:
+            corners.setdefault(_family_word(name), []).extend(surface)
+    for name, some in corners.items():
+        corners[name] = [number[part] for part in some]
         if any((part < 0).any() for part in corners[name]):
             raise InputError(
                 f"imported.file: face {name} has nodes that no cell uses, expected faces on the "
@@ -318,7 +330,7 @@ def _corners_of_faces(
     return corners
 
 
-def _paired(
+def _find_pairs(
     mesh: Mesh,
     sectors: int,
     source: str,
@@ -334,21 +346,28 @@ def _paired(
                     f"imported.file = '{source}': no face group '{name}', needed with "
                     f"imported.sectors = {sectors}{suggestion(name, mesh.faces)}"
                 )
-        mesh, pairs["cyclic"] = _cyclic(mesh, on, tolerance)
-        mesh = replace(mesh, points=_centred(mesh))
-    shift = _pitch(mesh) if not sectors else np.zeros(3)
+        mesh, pairs["cyclic"] = _cyclic_pair(mesh, on, tolerance)
+        mesh = replace(mesh, points=_centre_sector(mesh))
+    shift = _row_pitch(mesh) if not sectors else np.zeros(3)
     motions: dict[str, Motion] = {
         "this": ("seat_right", "damper_left", np.eye(3), np.zeros(3)),
         "next": ("seat_left", "damper_right", on, shift),
     }
     for name, (master, slave, rotation, way) in motions.items():
         if master in mesh.faces and slave in mesh.faces:
-            pairs[name] = _matched(mesh, (master, slave), rotation, way, sectors, tolerance)
+            pairs[name] = _matched_contact(
+                mesh,
+                (master, slave),
+                rotation,
+                way,
+                sectors,
+                tolerance,
+            )
     row = Sector(sectors, on, shift) if sectors or shift.any() else None
     return replace(mesh, pairs=pairs, sector=row)
 
 
-def _matched(
+def _matched_contact(
     mesh: Mesh,
     names: tuple[str, str],
     rotation: np.ndarray,
@@ -363,15 +382,23 @@ def _matched(
         InputError: neither; with a hint when the number of sectors was left out.
     """
     try:
-        return match(mesh.points, mesh.faces, names, mesh.dimension, rotation, shift, tolerance)
+        return match(
+            mesh.points,
+            mesh.faces,
+            names,
+            mesh.dimension,
+            rotation,
+            shift,
+            tolerance,
+        )
     except InputError as error:
-        if sectors and _facing(mesh, names, rotation, shift):
+        if sectors and _faces_look(mesh, names, rotation, shift):
             return Pair(*names, np.zeros((2, 0), dtype=int), rotation, shift)
         hint = "" if sectors else "; on a wheel, imported.sectors must be given"
         raise InputError(f"{error}{hint}") from None
 
 
-def _facing(
+def _faces_look(
     mesh: Mesh,
     names: tuple[str, str],
     rotation: np.ndarray,
@@ -381,14 +408,14 @@ def _facing(
     other's.
     """
     master, slave = (mesh.points[np.unique(mesh.faces[name])] for name in names)
-    edges, normals = zip(*(_measured(mesh, name) for name in names), strict=True)
+    edges, normals = zip(*(_measure_face(mesh, name) for name in names), strict=True)
     apart = cKDTree(master).query((slave - shift) @ rotation)[0]
     back = cKDTree((slave - shift) @ rotation).query(master)[0]
     near = max((apart < max(edges)).mean(), (back < max(edges)).mean())
     return bool(near > 0.5 and normals[0] @ (normals[1] @ rotation) < OPPOSITE)
 
 
-def _measured(mesh: Mesh, name: str) -> tuple[float, np.ndarray]:
+def _measure_face(mesh: Mesh, name: str) -> tuple[float, np.ndarray]:
     """Longest edge [m] and mean outward normal (3,) of a face group, from its elements' corners."""
     x = mesh.points[mesh.faces[name][:, : mesh.dimension]]
     first = x[:, 1] - x[:, 0]
@@ -398,7 +425,7 @@ def _measured(mesh: Mesh, name: str) -> tuple[float, np.ndarray]:
     return float(edge), normal / np.linalg.norm(normal)
 
 
-def _pitch(mesh: Mesh) -> np.ndarray:
+def _row_pitch(mesh: Mesh) -> np.ndarray:
     """Shift [m] from seat_left to damper_right: a straight row of blades; zero when the faces are
     not there.
     """
@@ -408,7 +435,7 @@ def _pitch(mesh: Mesh) -> np.ndarray:
     return mesh.points[high].mean(axis=0) - mesh.points[low].mean(axis=0)
 
 
-def _cyclic(
+def _cyclic_pair(
     mesh: Mesh,
     on: np.ndarray,
     tolerance: float,
@@ -416,7 +443,15 @@ def _cyclic(
     """The cyclic pair; the names are swapped when the file has them the other way round."""
     names = ("cyclic_low", "cyclic_high")
     try:
-        return mesh, match(mesh.points, mesh.faces, names, mesh.dimension, on, None, tolerance)
+        return mesh, match(
+            mesh.points,
+            mesh.faces,
+            names,
+            mesh.dimension,
+            on,
+            None,
+            tolerance,
+        )
     except InputError as first:
         swapped = replace(
             mesh,
@@ -424,13 +459,19 @@ def _cyclic(
         )
         try:
             return swapped, match(
-                mesh.points, swapped.faces, names, mesh.dimension, on, None, tolerance
+                mesh.points,
+                swapped.faces,
+                names,
+                mesh.dimension,
+                on,
+                None,
+                tolerance,
             )
         except InputError:
             raise first from None
 
 
-def _centred(mesh: Mesh) -> np.ndarray:
+def _centre_sector(mesh: Mesh) -> np.ndarray:
     """Points [m] turned about z so that +x is midway between the cyclic faces."""
     low, high = (
         mesh.points[np.unique(mesh.faces[name])].mean(axis=0)[:2]

@@ -17,7 +17,7 @@ import tempfile
 from dataclasses import replace
 from pathlib import Path
 from types import SimpleNamespace
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from bladefem.errors import InputError
 from bladefem.scene.kinds import kind_named
@@ -25,16 +25,19 @@ from bladefem.scene.kinds import kind_named
 from .builders import build_here
 from .mesh import Mesh
 
+if TYPE_CHECKING:
+    from bladefem.scene.tables import Scene
+
 # seconds; the largest meshes that are accepted take a tenth of it
 LIMIT = 900
 # element size of the second try
-SMALLER = 0.9
+SECOND_TRY_SIZE = 0.9
 ROOT = Path(__file__).parents[1]
 # a child that saw these would join the ranks
 MPI = ("OMPI_", "PMIX_", "PMI_", "PRTE_", "ORTE_", "HYDRA_", "MPI_")
 
 
-def build(scene: Any) -> Mesh:
+def build(scene: Scene) -> Mesh:
     """The mesh of a scene, made in a child process; after a crash with the other algorithm and
     smaller elements.
 
@@ -44,8 +47,8 @@ def build(scene: Any) -> Mesh:
         RuntimeError: the child failed in another way; the message holds its last words.
     """
     kind_named(scene.kind)
-    for size in _tries(scene.mesh):
-        answer = _ask(SimpleNamespace(**vars(scene) | {"mesh": size}))
+    for size in _mesh_attempts(scene.mesh):
+        answer = _ask_child(SimpleNamespace(**vars(scene) | {"mesh": size}))
         if isinstance(answer, Mesh):
             return answer
         if isinstance(answer, Exception):
@@ -56,14 +59,14 @@ def build(scene: Any) -> Mesh:
     )
 
 
-def _tries(size: Any) -> list[Any]:
+def _mesh_attempts(size: Any) -> list[Any]:
     """Mesh settings to try one after the other."""
     other = "delaunay" if size.algorithm == "hxt" else "hxt"
-    smaller = {"size": SMALLER * size.size} if size.size else {}
+    smaller = {"size": SECOND_TRY_SIZE * size.size} if size.size else {}
     return [size, replace(size, algorithm=other, **smaller)]
 
 
-def _ask(scene: SimpleNamespace) -> Mesh | Exception | str:
+def _ask_child(scene: SimpleNamespace) -> Mesh | Exception | str:
     """The child's answer; a word when it died or did not end."""
     with tempfile.TemporaryDirectory(prefix="bladefem-") as folder:
         job = Path(folder, "job")
@@ -72,7 +75,7 @@ def _ask(scene: SimpleNamespace) -> Mesh | Exception | str:
         try:
             done = subprocess.run(
                 [sys.executable, "-m", "geometry.isolated_process", job, answer],
-                env=_environment(),
+                env=_child_environment(),
                 stdin=subprocess.DEVNULL,
                 capture_output=True,
                 text=True,
@@ -89,7 +92,7 @@ def _ask(scene: SimpleNamespace) -> Mesh | Exception | str:
         return pickle.loads(answer.read_bytes())
 
 
-def _environment() -> dict[str, str]:
+def _child_environment() -> dict[str, str]:
     """This process's environment without what belongs to MPI, the project's folder first on the
     path.
     """

@@ -23,7 +23,7 @@ def straight_jacobian(
     """
     if cell_type.startswith(("tetra", "triangle")):
         return _simplex_volume(points[cells])
-    corners = {
+    by_family: dict[str, list[tuple[int, ...]]] = {
         "q": [(0, 1, 3), (1, 2, 0), (2, 3, 1), (3, 0, 2)],
         "h": [
             (0, 1, 3, 4),
@@ -35,7 +35,8 @@ def straight_jacobian(
             (6, 5, 7, 2),
             (7, 6, 4, 3),
         ],
-    }[cell_type[0]]
+    }
+    corners = by_family[cell_type[0]]
     return np.min([_simplex_volume(points[cells[:, c]]) for c in corners], axis=0)
 
 
@@ -68,7 +69,7 @@ def scaled_jacobian(
         return np.sign(straight)
     if cell_type in ("tetra10", "triangle6"):
         dim = 3 if cell_type == "tetra10" else 2
-        gradients, transform = _bernstein(dim)
+        gradients, transform = _bernstein_basis(dim)
         x = points[cells][:, :, :dim]
         edges = np.einsum("qkd,nki->nqid", gradients, x, optimize=True)
         return (np.linalg.det(edges) @ transform.T).min(axis=1) / np.abs(straight)
@@ -79,7 +80,7 @@ def scaled_jacobian(
 
 
 @cache
-def _bernstein(dim: int) -> tuple[np.ndarray, np.ndarray]:
+def _bernstein_basis(dim: int) -> tuple[np.ndarray, np.ndarray]:
     """Gradients of the second-order shape functions (q, k, dim) at q points, and values ->
     coefficients (q, q).
     """

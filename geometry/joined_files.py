@@ -33,7 +33,7 @@ def joined_files(first: RawMesh, more: Iterable[str]) -> RawMesh:
     for entry in more:
         body, path = split_entry(entry)
         raw = read_raw(Path(path))
-        first = _beside(first, _as_body(raw, body) if body else raw)
+        first = _join_meshes(first, _as_body(raw, body) if body else raw)
     return first
 
 
@@ -48,7 +48,7 @@ def _as_body(raw: RawMesh, body: str) -> RawMesh:
     return replace(raw, groups={**raw.groups, body: every})
 
 
-def _beside(one: RawMesh, other: RawMesh) -> RawMesh:
+def _join_meshes(one: RawMesh, other: RawMesh) -> RawMesh:
     """Nodes and cells of both; nothing is merged, bodies stay apart."""
     nodes = len(one.points)
     count = len(one.blocks)
@@ -59,8 +59,8 @@ def _beside(one: RawMesh, other: RawMesh) -> RawMesh:
     for name, members in other.node_sets.items():
         sets[name] = np.concatenate([sets.get(name, np.empty(0, dtype=int)), members + nodes])
     surfaces = {name: list(parts) for name, parts in one.surfaces.items()}
-    for name, parts in other.surfaces.items():
-        surfaces.setdefault(name, []).extend(part + nodes for part in parts)
+    for name, facets in other.surfaces.items():
+        surfaces.setdefault(name, []).extend(part + nodes for part in facets)
     return RawMesh(
         np.vstack([one.points, other.points]),
         [*one.blocks, *((word, cells + nodes) for word, cells in other.blocks)],

@@ -34,7 +34,7 @@ ROUNDOFF = 1e-6
 WHOLE = 0.01
 MOST_SECTORS = 400
 # names that a task needs, and what they are for
-# what a scene says beside a STEP file
+# what a scene says in addition to a STEP file
 DRAWN = (
     "imported.sectors = number of blades: cut faces and bore are then found by themselves",
     "imported.names, such as 'tip = face_21', for the face of excitation.at",
@@ -122,23 +122,23 @@ def look_at(file: str | Path) -> Look:
     names = [f"face_{number + 1}" for number in range(outside.count)]
     if drawing:
         outside, names = _drawn_faces(raw, outside)
-    faces = tuple(_face(outside, number, name) for number, name in enumerate(names))
+    faces = tuple(_face_part(outside, number, name) for number, name in enumerate(names))
     cut = _cut_faces(raw, outside, faces, float(np.ptp(box, axis=0).max()))
-    bore = None if cut is None else _bore(raw, outside, faces, cut)
+    bore = None if cut is None else _bore_face(raw, outside, faces, cut)
     return Look(
         Path(file),
         raw,
         _cell_counts(raw),
-        _bodies(raw),
+        _body_sizes(raw),
         box,
         # a STEP file states its unit
-        1.0 if drawing else _scale(float(np.ptp(box, axis=0).max())),
-        _sets(raw),
+        1.0 if drawing else _guessed_scale(float(np.ptp(box, axis=0).max())),
+        _set_kinds(raw),
         outside,
         faces,
         cut,
         bore,
-        DRAWN if drawing else _missing(raw, cut, bore),
+        DRAWN if drawing else _missing_names(raw, cut, bore),
     )
 
 
@@ -177,7 +177,7 @@ def _cell_counts(raw: RawMesh) -> dict[str, int]:
     return counts
 
 
-def _bodies(raw: RawMesh) -> tuple[int, ...]:
+def _body_sizes(raw: RawMesh) -> tuple[int, ...]:
     """Cells of each connected body, the largest first."""
     rows = []
     columns = []
@@ -197,20 +197,20 @@ def _bodies(raw: RawMesh) -> tuple[int, ...]:
     return tuple(sorted(np.unique(label, return_counts=True)[1].tolist(), reverse=True))
 
 
-def _scale(size: float) -> float:
+def _guessed_scale(size: float) -> float:
     """Factor to metres that makes the model as large as blades are."""
     fitting = [s for s in SCALES if PLAUSIBLE[0] <= s * size <= PLAUSIBLE[1]]
     return fitting[0] if fitting else 1.0
 
 
-def _sets(raw: RawMesh) -> dict[str, str]:
+def _set_kinds(raw: RawMesh) -> dict[str, str]:
     found = {}
     for name, parts in raw.groups.items():
         words = sorted({FAMILY.get(raw.blocks[b][0], "cell") for b, _ in parts})
         count = sum(len(rows) for _, rows in parts)
         found[name] = f"{count} cells ({', '.join(words)})"
-    for name, parts in raw.surfaces.items():
-        found[name] = f"surface of {sum(len(part) for part in parts)} facets"
+    for name, surface in raw.surfaces.items():
+        found[name] = f"surface of {sum(len(part) for part in surface)} facets"
     for name, nodes in raw.node_sets.items():
         found.setdefault(name, f"{len(nodes)} nodes")
     return found
@@ -219,9 +219,11 @@ def _sets(raw: RawMesh) -> dict[str, str]:
 def _drawn_faces(raw: RawMesh, outside: NumberedFaces) -> tuple[NumberedFaces, list[str]]:
     """The outer facets by the faces of the drawing, in its order, with their names."""
     known: dict[tuple[int, ...], int] = {}
-    names = []
+    names: list[str] = []
     for name, parts in raw.groups.items():
-        blocks = [(block, rows) for block, rows in parts if DIMENSION[_family(raw, block)] == 2]
+        blocks = [
+            (block, rows) for block, rows in parts if DIMENSION[_cell_family(raw, block)] == 2
+        ]
         for block, rows in blocks:
             for corners in np.sort(raw.blocks[block][1][rows][:, :3], axis=1).tolist():
                 known[tuple(corners)] = len(names)
@@ -231,11 +233,11 @@ def _drawn_faces(raw: RawMesh, outside: NumberedFaces) -> tuple[NumberedFaces, l
     return replace(outside, number=number), names
 
 
-def _family(raw: RawMesh, block: int) -> str:
+def _cell_family(raw: RawMesh, block: int) -> str:
     return FAMILY[raw.blocks[block][0]]
 
 
-def _face(
+def _face_part(
     outside: NumberedFaces,
     number: int,
     name: str,
@@ -272,9 +274,16 @@ def _cut_faces(
         pairs: dict[int, list[tuple[int, int]]] = {}
         for i, one in enumerate(faces):
             for j, other in enumerate(faces):
-                if i != j and _alike(one, other):
-                    sectors = _sectors(one.centre, other.centre, axis, size)
-                    if sectors and _matching(raw, outside, (i, j), axis, sectors, size):
+                if i != j and _similar_faces(one, other):
+                    sectors = _sector_count(one.centre, other.centre, axis, size)
+                    if sectors and _cut_faces_match(
+                        raw,
+                        outside,
+                        (i, j),
+                        axis,
+                        sectors,
+                        size,
+                    ):
                         pairs.setdefault(sectors, []).append((i, j))
         for sectors, some in pairs.items():
             area = sum(faces[i].area for i, _ in some)
@@ -285,11 +294,11 @@ def _cut_faces(
     return best
 
 
-def _alike(one: FacePart, other: FacePart) -> bool:
+def _similar_faces(one: FacePart, other: FacePart) -> bool:
     return one.facets == other.facets and abs(one.area - other.area) < 1e-3 * one.area
 
 
-def _sectors(
+def _sector_count(
     start: np.ndarray,
     end: np.ndarray,
     axis: str,
@@ -309,7 +318,7 @@ def _sectors(
     return round(count) if abs(count - round(count)) < WHOLE * max(count / 36, 1.0) else 0
 
 
-def _matching(
+def _cut_faces_match(
     raw: RawMesh,
     outside: NumberedFaces,
     pair: tuple[int, int],
@@ -333,7 +342,7 @@ def _matching(
     return bool(cKDTree(raw.points[other]).query(x)[0].max() < MATCHED * size)
 
 
-def _bore(
+def _bore_face(
     raw: RawMesh,
     outside: NumberedFaces,
     faces: tuple[FacePart, ...],
@@ -347,7 +356,7 @@ def _bore(
         for i, face in enumerate(faces)
         if face.name not in (*cut.low, *cut.high)
     }
-    return min(reach, key=reach.get) if reach else None
+    return min(reach, key=lambda name: reach[name]) if reach else None
 
 
 def _names_of(raw: RawMesh) -> set[str]:
@@ -355,7 +364,7 @@ def _names_of(raw: RawMesh) -> set[str]:
     return {"_".join(name.lower().split()) for name in every}
 
 
-def _missing(
+def _missing_names(
     raw: RawMesh,
     cut: CutFaces | None,
     bore: str | None,

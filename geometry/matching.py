@@ -35,22 +35,30 @@ def match(
     """
     rotation = np.eye(3) if rotation is None else rotation
     shift = np.zeros(3) if shift is None else shift
-    kinds = [_split(faces[name], dimension) for name in names]
+    kinds = [_split_nodes(faces[name], dimension) for name in names]
     scale = np.ptp(points[np.unique(faces[names[0]])], axis=0).max()
     columns = [
-        _bijection(points, master, slave, rotation, shift, tolerance * scale, names)
+        _match_nodes(
+            points,
+            master,
+            slave,
+            rotation,
+            shift,
+            tolerance * scale,
+            names,
+        )
         for master, slave in zip(*kinds, strict=True)
     ]
     return Pair(*names, np.hstack(columns), rotation, shift)
 
 
-def _split(faces: np.ndarray, dimension: int) -> tuple[np.ndarray, np.ndarray]:
+def _split_nodes(faces: np.ndarray, dimension: int) -> tuple[np.ndarray, np.ndarray]:
     """Corner nodes and mid-side nodes of a face."""
     k = corner_count(face_word(faces.shape[1], dimension))
     return np.unique(faces[:, :k]), np.unique(faces[:, k:])
 
 
-def _bijection(
+def _match_nodes(
     points: np.ndarray,
     master: np.ndarray,
     slave: np.ndarray,

@@ -3,8 +3,11 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field
+from typing import Any
 
 import numpy as np
+
+from bladefem.errors import InputError
 
 
 @dataclass(frozen=True)
@@ -66,7 +69,7 @@ class Mesh:
     # out-of-plane thickness of a plane mesh [m]
     depth: float = 1.0
     # quality: cells, worst Jacobian, straightened, ...
-    report: dict[str, object] = field(default_factory=dict)
+    report: dict[str, Any] = field(default_factory=dict)
     # named volumes of the blade -> rows of bodies["blade"]
     parts: dict[str, np.ndarray] = field(default_factory=dict)
 
@@ -81,3 +84,14 @@ class Mesh:
     def dimension(self) -> int:
         """2 for plane meshes, 3 for solids."""
         return 2 if self.cell_type.startswith(("triangle", "quad")) else 3
+
+
+def sector_of(mesh: Mesh) -> Sector:
+    """How the next blade is reached.
+
+    Raises:
+        InputError: the mesh is of a single blade.
+    """
+    if mesh.sector is None:
+        raise InputError("the mesh is of a single blade, expected the sector of a wheel")
+    return mesh.sector

@@ -32,7 +32,7 @@ def named_facets(
     distinct = key[first]
     found = {}
     for name, parts in corners.items():
-        asked = np.unique(np.vstack([_keys(part, k, name) for part in parts]), axis=0)
+        asked = np.unique(np.vstack([_facet_keys(part, k, name) for part in parts]), axis=0)
         both, count = np.unique(np.vstack([distinct, asked]), axis=0, return_counts=True)
         hit = np.isin(_as_rows(distinct), _as_rows(both[count == 2]))
         if not hit.any():
@@ -41,7 +41,7 @@ def named_facets(
     return found
 
 
-def _keys(
+def _facet_keys(
     corners: np.ndarray,
     k: int,
     name: str,

@@ -44,8 +44,8 @@ class NumberedFaces:
 def numbered_faces(raw: RawMesh) -> NumberedFaces:
     """Faces of the solid cells of a file; none of a plane mesh."""
     corners, inside = _outer_facets(raw)
-    centres, normals = _measured(raw.points, corners, inside)
-    part = _parts(corners, normals)
+    centres, normals = _measure_facets(raw.points, corners, inside)
+    part = _smooth_parts(corners, normals)
     order = _by_size(part, centres, normals, raw.points)
     return NumberedFaces(corners, order[part], normals, centres)
 
@@ -80,7 +80,7 @@ def _outer_facets(raw: RawMesh) -> tuple[np.ndarray, np.ndarray]:
     return every[outer], np.vstack(inside)[outer]
 
 
-def _measured(
+def _measure_facets(
     points: np.ndarray,
     corners: np.ndarray,
     inside: np.ndarray,
@@ -96,7 +96,7 @@ def _measured(
     return centres, normals
 
 
-def _parts(corners: np.ndarray, normals: np.ndarray) -> np.ndarray:
+def _smooth_parts(corners: np.ndarray, normals: np.ndarray) -> np.ndarray:
     """(nf,) part of the outside, its facets joined across smooth edges."""
     length = np.linalg.norm(normals, axis=1, keepdims=True)
     unit = normals / np.maximum(length, np.finfo(float).tiny)
@@ -109,13 +109,12 @@ def _parts(corners: np.ndarray, normals: np.ndarray) -> np.ndarray:
         there = ~triangle | (i < 3)
         edges.append(np.sort(np.column_stack([start, end])[there], axis=1))
         owner.append(np.flatnonzero(there))
-    edges = np.vstack(edges)
-    owner = np.concatenate(owner)
-    _, number, count = np.unique(edges, axis=0, return_inverse=True, return_counts=True)
+    every = np.concatenate(owner)
+    _, number, count = np.unique(np.vstack(edges), axis=0, return_inverse=True, return_counts=True)
     number = number.ravel()
     order = np.argsort(number, kind="stable")
     order = order[count[number[order]] == 2]
-    one, other = owner[order].reshape(-1, 2).T
+    one, other = every[order].reshape(-1, 2).T
     smooth = np.einsum("ij,ij->i", unit[one], unit[other]) > np.cos(CREASE)
     n = len(corners)
     graph = coo_matrix((np.ones(smooth.sum()), (one[smooth], other[smooth])), shape=(n, n))

@@ -11,6 +11,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from math import pi
 
+from .damper_shapes import SHAPES
 from .quantity import quantity
 
 DEG = pi / 180
@@ -79,10 +80,11 @@ class Disc:
 
 @dataclass(frozen=True)
 class Wedge:
-    """The underplatform damper: a prism of triangular section, blunted at top and bottom, pressed
-    outwards.
+    """The underplatform damper: a prism with two plane flanks, pressed outwards between two
+    platforms.
     """
 
+    shape: str = quantity("wedge", choices=tuple(SHAPES), help="what its section looks like")
     angle: float = quantity(
         40 * DEG,
         "rad",
@@ -90,9 +92,20 @@ class Wedge:
         75 * DEG,
         "alpha: each flank against the radial plane between two blades",
     )
+    angle_next: float | None = quantity(
+        None,
+        "rad",
+        15 * DEG,
+        75 * DEG,
+        "of the flank under the next blade, for an asymmetric wedge; as angle when left out",
+    )
     length: float = quantity(0.04, "m", 0.005, 0.5, "axial length")
     base: float = quantity(
-        0.002, "m", 2e-4, 0.05, "height of the straight part below the flanks (the blunted bottom)"
+        0.002,
+        "m",
+        2e-4,
+        0.05,
+        "height of the straight part below the flanks of a wedge (the blunted bottom)",
     )
     mass: float | None = quantity(None, "kg", 1e-4, 5.0, "mass; sets the density when given")
     clearance: float = quantity(
@@ -109,6 +122,11 @@ class Wedge:
         help="motion of the damper along the engine axis: left to friction, or held by a stop such "
         "as a cover plate; it may turn in both cases",
     )
+
+    @property
+    def angles(self) -> tuple[float, float]:
+        """Of the flanks under this blade and under the next one [rad]."""
+        return self.angle, self.angle if self.angle_next is None else self.angle_next
 
 
 @dataclass(frozen=True)
@@ -198,6 +216,13 @@ class MeshSize:
         64,
         "elements across the width of a wedge's seats, a grid with contact_size, or a sixth of "
         "the length, along them; 8 when left out, free triangles where contact_size alone is given",
+    )
+    fillet_elements: int | None = quantity(
+        None,
+        "1",
+        1,
+        64,
+        "elements over the arc of a fillet; 4 when left out, in proportion where size is given",
     )
     order: int = quantity(2, "1", 1, 2, "order of the elements; 1 is only for comparison")
     algorithm: str = quantity(

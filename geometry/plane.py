@@ -39,10 +39,17 @@ def plane_blades(plane: Plane, size: MeshSize) -> Mesh:
     contact = size.contact_size or min(base, plane.seat_width / SEAT_ELEMENTS)
     motions = plane_motions(plane)
     with gmsh_session() as gmsh:
-        groups = _draw(gmsh, plane)
+        groups = _draw_plane(gmsh, plane)
         for master, slave, rotation, shift in motions.values():
-            tie(gmsh, 1, groups.faces[master], groups.faces[slave], rotation, shift)
-        _sizes(gmsh, groups, base, contact)
+            tie(
+                gmsh,
+                1,
+                groups.faces[master],
+                groups.faces[slave],
+                rotation,
+                shift,
+            )
+        _set_sizes(gmsh, groups, base, contact)
         with attempt("mesh.size", "mesh this geometry"):
             mesh = mesh_model(gmsh, groups, 2, size)
     sector = Sector(0, np.eye(3), np.array([0.0, plane.pitch, 0.0]))
@@ -82,7 +89,7 @@ def check_plane(plane: Plane) -> None:
     if not plane.seat_width <= room:
         raise InputError(
             f"plane.seat_width = {plane.seat_width:.4g} m: expected at most {room:.4g} m (98 % of "
-            "the platform's overhang beside the blade)"
+            "the platform's overhang next to the blade)"
         )
 
 
@@ -130,7 +137,7 @@ def damper_corners(plane: Plane) -> np.ndarray:
     return np.array([[low, a], [top, a], [top, b], [top, c], [top, d], [low, d]])
 
 
-def _draw(gmsh: ModuleType, plane: Plane) -> Groups:
+def _draw_plane(gmsh: ModuleType, plane: Plane) -> Groups:
     blade, b, p = polygon(gmsh, blade_corners(plane))
     damper, d, _ = polygon(gmsh, damper_corners(plane))
     gmsh.model.occ.synchronize()
@@ -148,7 +155,7 @@ def _draw(gmsh: ModuleType, plane: Plane) -> Groups:
     return Groups({"blade": [blade], "damper": [damper]}, faces, points)
 
 
-def _sizes(
+def _set_sizes(
     gmsh: ModuleType,
     groups: Groups,
     base: float,
@@ -170,3 +177,14 @@ def _sizes(
         field.setNumber(threshold, name, value)
     field.setAsBackgroundMesh(threshold)
     gmsh.option.setNumber("Mesh.MeshSizeMin", contact / 2)
+
+
+def count_plane_cells(plane: Plane, mesh: MeshSize) -> float:
+    """A lower bound of the number of triangles."""
+    thinnest = min(plane.thickness / 2, plane.platform_thickness / 3, plane.damper_height / 2)
+    base = mesh.size or thinnest
+    area = plane.length * plane.thickness + plane.platform_width * plane.platform_thickness
+    cells = area / (0.43 * (mesh.scale * base) ** 2)
+    if mesh.contact_size is None:
+        return cells
+    return cells + 4 * plane.seat_width / (mesh.scale * mesh.contact_size)

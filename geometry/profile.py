@@ -1,5 +1,5 @@
 """The cross-section of a wedge sector as points: disc, shank, platform with inclined seats, and the
-wedge between.
+damper between.
 """
 
 from __future__ import annotations
@@ -9,6 +9,7 @@ from math import cos, pi, sin, tan
 
 import numpy as np
 
+from .damper_shapes import SHAPES
 from .parameters import Disc, Platform, Shank, Wedge
 
 
@@ -22,16 +23,15 @@ class Profile:
     underside: float
     # radius of the platform's top [m]
     top: float
-    # (2,) inner end of this blade's seat_right, where the flat underside starts
-    inner: np.ndarray
-    # (2,) outer end of seat_right, where the edge of the plate starts
-    outer: np.ndarray
-    # (2,) top corner of the plate
-    corner: np.ndarray
+    # (2, 2, 2) ends of the blade's seats, seat_right (y > 0) first: inner, where the flat underside
+    # starts, and outer, where the edge of the plate starts
+    seats: np.ndarray
+    # (2, 2) top corners of the plate, on the side of seat_right and of seat_left
+    corners: np.ndarray
     # (10, 2) shank and platform, anticlockwise seen from +z
     blade: np.ndarray
-    # (6, 2) damper in contact, anticlockwise: foot, inner, outer; outer, inner, foot
-    wedge: np.ndarray
+    # (n, 2) damper in contact, anticlockwise, from this blade's flank to the next one's
+    damper: np.ndarray
 
 
 def turn(angle: float) -> np.ndarray:
@@ -45,51 +45,54 @@ def profile(
     platform: Platform,
     shank: Shank,
     disc: Disc,
-    wedge: Wedge,
+    damper: Wedge,
 ) -> Profile:
     """Corners of the section; a flank leaves the radial plane between two blades at the angle
     alpha.
+
+    Raises:
+        InputError: the damper's shape does not fit between the seats.
     """
     theta = pi / disc.sectors
     underside = disc.rim_radius + shank.height
-    # of the seat against the blade's own radial direction
-    slope = wedge.angle + theta
+    # of the seats against the blade's own radial direction
+    slopes = [angle + theta for angle in damper.angles]
 
-    def edge(x):
+    def edge(x: float) -> np.ndarray:
         return np.array([x, x * tan(theta) - platform.gap / 2 / cos(theta)])
 
-    outer = edge(underside + platform.seat_width * cos(slope))
-    inner = outer - platform.seat_width * np.array([cos(slope), sin(slope)])
-    corner = edge(outer[0] + platform.thickness)
-    half = np.array(
-        [[disc.rim_radius, shank.width / 2], [underside, shank.width / 2], inner, outer, corner]
-    )
-    mirror = half[::-1] * [1, -1]
+    # as on the side of seat_right
+    outer = [edge(underside + platform.seat_width * cos(slope)) for slope in slopes]
+    inner = [
+        end - platform.seat_width * np.array([cos(slope), sin(slope)])
+        for end, slope in zip(outer, slopes, strict=True)
+    ]
+    top = max(end[0] for end in outer) + platform.thickness
+    neck = np.array([[disc.rim_radius, shank.width / 2], [underside, shank.width / 2]])
+    right, left = (np.vstack([neck, inner[side], outer[side], edge(top)]) for side in (0, 1))
+    mirror = np.array([1.0, -1.0])
+    seats = np.array([right[2:4], left[2:4] * mirror])
     return Profile(
         theta,
         underside,
-        corner[0],
-        inner,
-        outer,
-        corner,
-        np.vstack([half, mirror])[::-1],
-        _wedge(inner, outer, theta, wedge.base),
+        top,
+        seats,
+        np.array([right[4], left[4] * mirror]),
+        np.vstack([right, left[::-1] * mirror])[::-1],
+        _damper_corners(seats, theta, damper),
     )
 
 
-def _wedge(
-    inner: np.ndarray,
-    outer: np.ndarray,
+def _damper_corners(
+    seats: np.ndarray,
     theta: float,
-    base: float,
+    damper: Wedge,
 ) -> np.ndarray:
-    """Six corners, mirrored at the radial plane between the blades, anticlockwise seen from +z."""
+    """The damper's outline between this blade's seat_right and the next blade's seat_left."""
     radial = np.array([cos(theta), sin(theta)])
     across = np.array([-sin(theta), cos(theta)])
-    local = np.array([[p @ radial, p @ across] for p in (inner, outer)])
-    foot = local[0] - [base, 0.0]
-    # foot, inner and outer end on this blade's side (Y < 0)
-    this = np.vstack([foot, local])
-    other = this[::-1] * [1, -1]
-    corners = np.vstack([this, other])
-    return corners[:, :1] * radial + corners[:, 1:] * across
+    axes = np.column_stack([radial, across])
+    # the next blade's seat is this one's turned on, or its mirror image mirrored midway
+    mirrored = seats[1] * [1, -1] @ axes * [1, -1]
+    flanks = np.stack([seats[0] @ axes, mirrored])
+    return SHAPES[damper.shape].outline(flanks, damper.base) @ axes.T

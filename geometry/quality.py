@@ -4,6 +4,8 @@ a table.
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 
 from bladefem.errors import InputError
@@ -13,7 +15,7 @@ from .mesh import Mesh, Pair
 from .topology import EDGES, FAMILY, corner_count
 
 # smallest accepted ratio of a curved cell's Jacobian to the straight cell's
-SAFE = 0.1
+MIN_JACOBIAN = 0.1
 
 
 def shape_quality(
@@ -64,7 +66,7 @@ def edge_of_middle(mesh: Mesh) -> np.ndarray:
     return ends
 
 
-def straighten(mesh: Mesh, safe: float = SAFE) -> tuple[np.ndarray, int]:
+def straighten(mesh: Mesh, safe: float = MIN_JACOBIAN) -> tuple[np.ndarray, int]:
     """Points (n, 3) [m] where no second-order cell has a doubtful Jacobian, and how many cells were
     touched.
 
@@ -117,7 +119,7 @@ def report(
     mesh: Mesh,
     straightened: int,
     size: float,
-) -> dict[str, object]:
+) -> dict[str, Any]:
     """What Mesh.report holds: counts, worst Jacobian and shape, cells straightened, element size
     wanted [m] and mean edge length [m].
 

@@ -12,6 +12,7 @@ import io
 from collections.abc import Callable
 from dataclasses import dataclass, field
 from pathlib import Path
+from types import ModuleType
 
 import numpy as np
 
@@ -111,15 +112,15 @@ def read_by_gmsh(file: Path) -> RawMesh:
         return from_gmsh_model(gmsh)
 
 
-def from_gmsh_model(gmsh: object) -> RawMesh:
+def from_gmsh_model(gmsh: ModuleType) -> RawMesh:
     """The mesh of the current gmsh model; a physical group without a name is called by its
     number.
     """
     tags, xyz, _ = gmsh.model.mesh.getNodes()
     place = np.full(int(tags.max(initial=0)) + 1, -1)
     place[tags.astype(int)] = np.arange(len(tags))
-    blocks = []
-    of_entity = {}
+    blocks: list[tuple[str, np.ndarray]] = []
+    of_entity: dict[tuple[int, int], list[int]] = {}
     for dim, entity in gmsh.model.getEntities():
         for kind, nodes in zip(
             *(gmsh.model.mesh.getElements(dim, entity)[i] for i in (0, 2)), strict=True
@@ -201,13 +202,13 @@ def from_vtk_order(word: str, cells: np.ndarray) -> np.ndarray:
     return cells[:, [*range(k), *middle, *rest]]
 
 
-def _ansys(file: Path) -> RawMesh:
+def _read_ansys(file: Path) -> RawMesh:
     from .ansys_cdb import read_cdb
 
     return read_cdb(file)
 
 
-def _abaqus(file: Path) -> RawMesh:
+def _read_abaqus(file: Path) -> RawMesh:
     from .abaqus_inp import read_inp
 
     return read_inp(file)
@@ -217,9 +218,9 @@ READERS: dict[str, Callable[[Path], RawMesh]] = {
     ".msh": read_by_gmsh,
     ".med": read_by_gmsh,
     ".unv": read_by_gmsh,
-    ".inp": _abaqus,
+    ".inp": _read_abaqus,
     ".bdf": read_by_meshio,
     ".nas": read_by_meshio,
     ".vtu": read_by_meshio,
-    ".cdb": _ansys,
+    ".cdb": _read_ansys,
 }

@@ -43,7 +43,7 @@ def renamed(
         InputError: an old name that is not there.
     """
     _check_names(wanted, groups)
-    return _joined(groups, wanted)
+    return _join_parts(groups, wanted)
 
 
 def renamed_raw(raw: RawMesh, wanted: Mapping[str, list[str]]) -> RawMesh:
@@ -53,12 +53,12 @@ def renamed_raw(raw: RawMesh, wanted: Mapping[str, list[str]]) -> RawMesh:
         InputError: an old name that is none of them.
     """
     _check_names(wanted, [*raw.groups, *raw.node_sets, *raw.surfaces])
-    sets = _joined({name: [nodes] for name, nodes in raw.node_sets.items()}, wanted)
+    sets = _join_parts({name: [nodes] for name, nodes in raw.node_sets.items()}, wanted)
     return replace(
         raw,
-        groups=_joined(raw.groups, wanted),
+        groups=_join_parts(raw.groups, wanted),
         node_sets={name: np.unique(np.concatenate(parts)) for name, parts in sets.items()},
-        surfaces=_joined(raw.surfaces, wanted),
+        surfaces=_join_parts(raw.surfaces, wanted),
     )
 
 
@@ -73,7 +73,7 @@ def _check_names(wanted: Mapping[str, list[str]], known: Iterable[str]) -> None:
                 )
 
 
-def _joined(
+def _join_parts(
     groups: Mapping[str, list[Part]], wanted: Mapping[str, list[str]]
 ) -> dict[str, list[Part]]:
     """Parts of the old names under the new ones, as far as this kind of group has them."""

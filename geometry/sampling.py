@@ -5,18 +5,21 @@ design studies.
 from __future__ import annotations
 
 import dataclasses
-from typing import Any, TypeVar
+from typing import TYPE_CHECKING, Any, TypeVar
 
 import numpy as np
 
-Table = TypeVar("Table")
+if TYPE_CHECKING:
+    from _typeshed import DataclassInstance
+
+Table = TypeVar("Table", bound="DataclassInstance")
 
 
 def anywhere(table: type[Table], rng: np.random.Generator) -> Table:
     """Every number anywhere in its range (evenly in its logarithm where the range is positive),
     words at random.
     """
-    return table(**{f.name: _draw(f, rng) for f in dataclasses.fields(table)})
+    return table(**{f.name: _draw_value(f, rng) for f in dataclasses.fields(table)})
 
 
 def around(
@@ -32,12 +35,13 @@ def around(
     return dataclasses.replace(
         table,
         **{
-            f.name: _near(getattr(table, f.name), f, rng, spread) for f in dataclasses.fields(table)
+            f.name: _draw_nearby(getattr(table, f.name), f, rng, spread)
+            for f in dataclasses.fields(table)
         },
     )
 
 
-def _draw(field: Any, rng: np.random.Generator) -> Any:
+def _draw_value(field: Any, rng: np.random.Generator) -> Any:
     low, high, words = (field.metadata[key] for key in ("low", "high", "choices"))
     if words:
         return words[rng.integers(len(words))]
@@ -47,7 +51,7 @@ def _draw(field: Any, rng: np.random.Generator) -> Any:
     return round(value) if isinstance(field.default, int) else float(value)
 
 
-def _near(
+def _draw_nearby(
     value: Any,
     field: Any,
     rng: np.random.Generator,
@@ -55,8 +59,8 @@ def _near(
 ) -> Any:
     low, high, words = (field.metadata[key] for key in ("low", "high", "choices"))
     if words or value is None or low is None:
-        return _draw(field, rng)
+        return _draw_value(field, rng)
     if value == 0:
-        return float(spread * _draw(field, rng)) if rng.random() < 0.5 else 0.0
+        return float(spread * _draw_value(field, rng)) if rng.random() < 0.5 else 0.0
     moved = min(max(value * np.exp(rng.uniform(-spread, spread)), low), high)
     return round(moved) if isinstance(value, int) else float(moved)

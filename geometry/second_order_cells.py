@@ -53,8 +53,15 @@ def _with_middles(points: np.ndarray, blocks: Blocks) -> tuple[np.ndarray, list[
         has_middles = NODES[word] > k
         middle = cells[:, k : k + count] if has_middles else np.full((len(cells), count), -1)
         given.append(middle.ravel())
-    edges, number = _shared(np.vstack(ends))
-    return _filled(points, number, np.concatenate(given), points[edges].mean(axis=1), blocks, EDGES)
+    edges, number = _shared_rows(np.vstack(ends))
+    return _fill_nodes(
+        points,
+        number,
+        np.concatenate(given),
+        points[edges].mean(axis=1),
+        blocks,
+        EDGES,
+    )
 
 
 def _with_face_centres(
@@ -85,7 +92,14 @@ def _with_face_centres(
         np.vstack(keys), axis=0, return_index=True, return_inverse=True
     )
     place = np.vstack(places)[first_row]
-    return _filled(points, number.ravel(), np.concatenate(given), place, blocks, QUADS)
+    return _fill_nodes(
+        points,
+        number.ravel(),
+        np.concatenate(given),
+        place,
+        blocks,
+        QUADS,
+    )
 
 
 def _with_cell_centres(
@@ -108,13 +122,13 @@ def _edges_of_quads(family: str) -> list[list[int]]:
     return [[row[frozenset((quad[i - 1], quad[i]))] for i in range(4)] for quad in QUADS[family]]
 
 
-def _shared(keys: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+def _shared_rows(keys: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Distinct rows, and the number of each row's own."""
     distinct, number = np.unique(keys, axis=0, return_inverse=True)
     return distinct, number.ravel()
 
 
-def _filled(
+def _fill_nodes(
     points: np.ndarray,
     number: np.ndarray,
     given: np.ndarray,

@@ -6,10 +6,12 @@ from __future__ import annotations
 
 import numpy as np
 
-from .parameters import Aerofoil
+from .parameters import DEG, Aerofoil
 
 # trailing edge over largest thickness: a spline closed by a short straight edge meshes well
 BLUNT = 0.2
+# a fillet meets the platform at this angle, since tangent faces are hard on Boolean unions
+LIFT = 15 * DEG
 # points on each side
 POINTS = 24
 

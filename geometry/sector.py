@@ -14,17 +14,15 @@ from bladefem.errors import InputError
 from .draw import clear_leftovers, imprint, polygon, prism
 from .finalise_mesh import complete, mesh_model
 from .mesh import Mesh
-from .parameters import DEG, Aerofoil, Disc, MeshSize, Platform, Shank, Wedge
+from .parameters import Aerofoil, Disc, MeshSize, Platform, Shank, Wedge
 from .profile import Profile, profile
-from .section import outline
+from .section import LIFT, outline
 from .sector_check import check_sector
 from .sector_names import edge_curves, link, mark_tip, motions, moved, name_faces, seat, sector
 from .session import attempt, gmsh_session
-from .sizing import sector_sizes, set_grids, set_sizes
+from .sizing import sector_sizes, set_fillet_grid, set_grids, set_sizes
 
 SEATS = ("seat_left", "seat_right", "damper_left", "damper_right")
-# a fillet meets the platform at this angle, since tangent faces are hard on Boolean unions
-LIFT = 15 * DEG
 
 
 def wedge_sector(
@@ -45,19 +43,44 @@ def wedge_sector(
     """
     check_sector(aerofoil, platform, shank, disc, wedge)
     shape = profile(platform, shank, disc, wedge)
-    sizes = sector_sizes(aerofoil, platform, shank, disc, wedge, size)
+    sizes = sector_sizes(
+        aerofoil,
+        platform,
+        shank,
+        disc,
+        wedge,
+        size,
+    )
     with gmsh_session() as gmsh:
-        blade = blade_solid(gmsh, aerofoil, platform, shank, disc, shape)
+        blade = blade_solid(
+            gmsh,
+            aerofoil,
+            platform,
+            shank,
+            disc,
+            shape,
+        )
         marks = [(2, polygon(gmsh, seat(shape, wedge.length, side))[0]) for side in (-1, 1)]
         with attempt("damper.length", "imprint the seats on the platform"):
             blade = imprint(gmsh, blade, marks)
-        damper = prism(gmsh, shape.wedge, -wedge.length / 2, wedge.length / 2)
+        damper = prism(gmsh, shape.damper, -wedge.length / 2, wedge.length / 2)
         clear_leftovers(gmsh)
         gmsh.model.occ.synchronize()
-        groups = name_faces(gmsh, blade, damper, aerofoil, disc, wedge, shape)
+        groups = name_faces(
+            gmsh,
+            blade,
+            damper,
+            aerofoil,
+            disc,
+            wedge,
+            shape,
+        )
         groups = mark_tip(gmsh, groups, aerofoil, shape)
         link(gmsh, groups, shape)
-        set_sizes(gmsh, shape, wedge, sizes, edge_curves(gmsh, groups))
+        fillet = groups.faces.get("fillet", [])
+        set_sizes(gmsh, shape, wedge, sizes, edge_curves(gmsh, groups), fillet)
+        with attempt("aerofoil.fillet", "mesh the fillet in a grid"):
+            set_fillet_grid(gmsh, fillet, sizes, size)
         # an element size on the seats without a number across asks for free triangles
         if size.seat_elements or size.contact_size is None:
             set_grids(gmsh, [groups.faces[name][0] for name in SEATS], wedge, size)
@@ -87,7 +110,7 @@ def disc_segment(
     return next(tag for dim, tag in occ.extrude([(2, face)], 0, 0, disc.width) if dim == 3)
 
 
-def _aerofoil(
+def _draw_aerofoil(
     gmsh: ModuleType,
     blade: Aerofoil,
     top: float,
@@ -102,14 +125,14 @@ def _aerofoil(
     foot = blade.fillet / blade.span
     stations = np.linspace(foot, 1, 3 + int(np.ceil(abs(blade.twist) / (12 * pi / 180))))
     with attempt("aerofoil.twist", "loft the sections of the aerofoil"):
-        rings = [_ring(gmsh, outline(blade, top, t)) for t in stations]
+        rings = [_profile_wire(gmsh, outline(blade, top, t)) for t in stations]
         if not foot:
             return next(tag for dim, tag in occ.addThruSections(rings, makeSolid=True) if dim == 3)
     with attempt("aerofoil.fillet", "round the root of the aerofoil"):
         # from the platform's plane to the blade's skin
         arc = np.linspace(LIFT, pi / 2, 6)[:-1]
         flare = [
-            _ring(gmsh, outline(blade, top, t, grow))
+            _profile_wire(gmsh, outline(blade, top, t, grow))
             for t, grow in zip(
                 foot * (1 - np.cos(arc) / np.cos(LIFT)),
                 blade.fillet * (1 - np.sin(arc)),
@@ -125,7 +148,7 @@ def _aerofoil(
         return occ.addVolume([occ.addSurfaceLoop(skin + ends, sewing=True)])
 
 
-def _ring(gmsh: ModuleType, points: np.ndarray) -> int:
+def _profile_wire(gmsh: ModuleType, points: np.ndarray) -> int:
     """Closed wire through points (n, 3): a spline each for suction and pressure side, and the blunt
     trailing edge.
 
@@ -152,7 +175,9 @@ def blade_solid(
     occ = gmsh.model.occ
     half = shank.width / 2
     foot = np.sqrt(disc.rim_radius**2 - half**2) - 0.2 * (disc.rim_radius - disc.bore_radius)
-    plate = np.array([shape.inner, shape.outer, shape.corner])
+    right, left = (
+        np.vstack([seat, corner]) for seat, corner in zip(shape.seats, shape.corners, strict=True)
+    )
     neck = np.array(
         [[foot, -half], [shape.underside, -half], [shape.underside, half], [foot, half]]
     )
@@ -160,11 +185,11 @@ def blade_solid(
         prism(gmsh, neck, -shank.length / 2, shank.length / 2),
         prism(
             gmsh,
-            np.vstack([plate, plate[::-1] * [1, -1]]),
+            np.vstack([right, left[::-1]]),
             -platform.length / 2,
             platform.length / 2,
         ),
-        _aerofoil(gmsh, aerofoil, shape.top),
+        _draw_aerofoil(gmsh, aerofoil, shape.top),
     ]
     with attempt("aerofoil", "join aerofoil, platform, shank and disc"):
         solid, _ = occ.fuse([(3, disc_segment(gmsh, disc, shape.theta))], [(3, p) for p in parts])

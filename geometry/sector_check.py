@@ -13,6 +13,7 @@ from bladefem.errors import InputError
 from .parameters import Aerofoil, Disc, Platform, Shank, Wedge
 from .profile import Profile, profile
 from .section import outline, shape
+from .sector_names import clearing_shift
 
 # of a length: a strip of this width keeps the shape quality of its elements above 0.05
 STRIP = 0.02
@@ -32,13 +33,14 @@ def check_sector(
     """
     check_disc(disc, shank, platform)
     theta = pi / disc.sectors
-    _at_most(
-        "damper.angle",
-        wedge.angle,
-        radians(85) - theta,
-        "85 deg minus half the sector angle",
-        "rad",
-    )
+    for name, angle in zip(("angle", "angle_next"), wedge.angles, strict=True):
+        _at_most(
+            f"damper.{name}",
+            angle,
+            radians(85) - theta,
+            "85 deg minus half the sector angle",
+            "rad",
+        )
     section = profile(platform, shank, disc, wedge)
     check_platform(section, platform, shank, wedge)
     check_pocket(section, shank, disc, wedge)
@@ -100,16 +102,17 @@ def check_platform(
     shank: Shank,
     wedge: Wedge,
 ) -> None:
-    """The plate fits into the pitch and holds the seat beside the shank."""
-    half = section.corner[1] + platform.gap / 2
+    """The plate fits into the pitch and holds the seat next to the shank."""
+    half = section.corners[0, 1] + platform.gap / 2
     _at_most("platform.gap", platform.gap, half, "half the pitch at the platform")
-    room = section.outer[1] - shank.width / 2
-    needed = platform.seat_width * sin(wedge.angle + section.theta)
+    room = np.abs(section.seats[:, 1, 1]).min() - shank.width / 2
+    needed = platform.seat_width * sin(max(wedge.angles) + section.theta)
     _at_most(
         "platform.seat_width",
         platform.seat_width,
         max(0.98 * room / needed, 0) * platform.seat_width,
-        "the platform's overhang beside the shank; or choose a smaller shank.width or damper.angle",
+        "the platform's overhang next to the shank; or choose a smaller shank.width or "
+        "damper.angle",
     )
     _no_strip("damper.length", wedge.length, "platform.length", platform.length)
 
@@ -120,21 +123,26 @@ def check_pocket(
     disc: Disc,
     wedge: Wedge,
 ) -> None:
-    """The wedge stays clear of shank and rim, also after it is moved inwards by its clearance."""
-    drop = wedge.base + wedge.clearance / sin(wedge.angle)
+    """The damper stays clear of shank and rim, also after it is moved by its clearance."""
+    drop = wedge.base + wedge.clearance / sin(min(wedge.angles))
     _at_most("damper.base", drop, 0.95 * shank.height, "95 % of shank.height, clearance included")
-    foot = section.wedge[0] - drop * np.array([np.cos(section.theta), np.sin(section.theta)])
-    foot += wedge.base * np.array([np.cos(section.theta), np.sin(section.theta)])
-    if foot[1] < shank.width / 2:
+    radial = np.array([np.cos(section.theta), np.sin(section.theta)])
+    across = np.array([-radial[1], radial[0]])
+    moved = section.damper + clearing_shift(wedge, section)
+    # what lies on the next blade's side is seen as that blade sees it
+    corners = np.outer(moved @ radial, radial) - np.outer(np.abs(moved @ across), across)
+    below = corners[moved @ radial < section.underside]
+    inside = shank.width / 2 - below[:, 1].min(initial=np.inf)
+    if inside > 0:
         raise InputError(
-            f"damper.base = {wedge.base:.4g} m: the wedge does not fit between shank and platform "
-            f"(it enters the shank by {shank.width / 2 - foot[1]:.3g} m); choose a smaller "
-            "damper.base, shank.width or platform.seat_width"
+            f"damper.base = {wedge.base:.4g} m: the {wedge.shape} does not fit between shank and "
+            f"platform (it enters the shank by {inside:.3g} m); choose a smaller damper.base, "
+            "shank.width or platform.seat_width"
         )
-    if np.hypot(*foot) < disc.rim_radius:
+    if np.hypot(*corners.T).min() < disc.rim_radius:
         raise InputError(
-            f"damper.base = {wedge.base:.4g} m: the wedge enters the rim of the disc; choose a "
-            "smaller damper.base or a larger shank.height"
+            f"damper.base = {wedge.base:.4g} m: the {wedge.shape} enters the rim of the disc; "
+            "choose a smaller damper.base or a larger shank.height"
         )
 
 
@@ -158,7 +166,7 @@ def check_aerofoil(
         (2, platform.length / 2, "axially", f"{smaller} or a larger platform.length"),
         (
             1,
-            section.corner[1],
+            section.corners[0, 1],
             "circumferentially",
             f"{smaller} or aerofoil.stagger, or fewer disc.sectors",
         ),

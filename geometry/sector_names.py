@@ -25,10 +25,9 @@ def seat(
     side: int,
 ) -> np.ndarray:
     """Corners (4, 3) [m] of the contact face on this blade, side +1 towards +y."""
-    (xi, yi), (xo, yo), z = profile.inner, profile.outer, length / 2
-    return np.array(
-        [[xi, side * yi, -z], [xo, side * yo, -z], [xo, side * yo, z], [xi, side * yi, z]]
-    )
+    inner, outer = profile.seats[0 if side > 0 else 1]
+    z = length / 2
+    return np.array([[*inner, -z], [*outer, -z], [*outer, z], [*inner, z]])
 
 
 def name_faces(
@@ -71,11 +70,11 @@ def name_faces(
         for t, height in above.items()
         if height > aerofoil.fillet + tolerance and t not in faces["tip"]
     ]
-    faces |= _skin(gmsh, sides, aerofoil)
+    faces |= _aerofoil_faces(gmsh, sides, aerofoil)
     return Groups({"blade": [blade], "damper": [damper]}, faces)
 
 
-def _skin(
+def _aerofoil_faces(
     gmsh: ModuleType,
     sides: list[int],
     aerofoil: Aerofoil,
@@ -132,7 +131,14 @@ def link(
 ) -> None:
     """Tell gmsh to copy the mesh of each master face onto its slave."""
     for master, slave, rotation, shift in motions(profile).values():
-        tie(gmsh, 2, groups.faces[master], groups.faces[slave], rotation, shift)
+        tie(
+            gmsh,
+            2,
+            groups.faces[master],
+            groups.faces[slave],
+            rotation,
+            shift,
+        )
 
 
 def mark_tip(
@@ -152,10 +158,8 @@ def mark_tip(
         for _, tag in gmsh.model.getBoundary([(2, tip)], oriented=False, recursive=True)
     }
     edge = outline(aerofoil, profile.top, 1)
-    leading, trailing = (
-        min(corners, key=lambda tag, p=p: np.linalg.norm(corners[tag] - p))
-        for p in (edge[len(edge) // 2], edge[0])
-    )
+    leading = _nearest_tag(corners, edge[len(edge) // 2])
+    trailing = _nearest_tag(corners, edge[0])
     middle = gmsh.model.occ.addPoint(
         *place(aerofoil, profile.top, 1, np.array([[0.5, aerofoil.camber]]))[0]
     )
@@ -166,6 +170,10 @@ def mark_tip(
     )
 
 
+def _nearest_tag(places: dict[int, np.ndarray], point: np.ndarray) -> int:
+    return min(places, key=lambda tag: float(np.linalg.norm(places[tag] - point)))
+
+
 def moved(
     mesh: Mesh,
     wedge: Wedge,
@@ -174,14 +182,25 @@ def moved(
     """The mesh with the damper moved inwards so that both flanks clear their seats by
     wedge.clearance.
     """
-    shift = (
-        -wedge.clearance
-        / sin(wedge.angle)
-        * np.array([np.cos(profile.theta), np.sin(profile.theta), 0])
-    )
+    shift = np.append(clearing_shift(wedge, profile), 0.0)
     points = mesh.points.copy()
     points[np.unique(mesh.bodies["damper"])] += shift
     pairs = {
         n: replace(p, shift=p.shift + shift) if n != "cyclic" else p for n, p in mesh.pairs.items()
     }
     return replace(mesh, points=points, pairs=pairs)
+
+
+def clearing_shift(wedge: Wedge, profile: Profile) -> np.ndarray:
+    """(2,) motion of the damper that opens both flanks by wedge.clearance [m]."""
+    # unit normals of the flanks, out of the damper, in the axes of the radial plane midway
+    normals = np.array(
+        [
+            [np.sin(angle), side * np.cos(angle)]
+            for angle, side in zip(wedge.angles, (-1, 1), strict=True)
+        ]
+    )
+    radial, across = np.linalg.solve(normals, np.full(2, -wedge.clearance))
+    c = np.cos(profile.theta)
+    s = np.sin(profile.theta)
+    return np.array([radial * c - across * s, radial * s + across * c])

@@ -75,7 +75,7 @@ def solid_cells(
                 f"imported.file = '{source}': cells are {' and '.join(sorted(words))}, expected "
                 "triangles or quadrilaterals, not both"
             )
-        notes += (f"{_counted(blocks)} were split into tetrahedra: shapes are mixed",)
+        notes += (f"{_count_text(blocks)} were split into tetrahedra: shapes are mixed",)
         rank = vertex_order(points, axis)
         parts = [split_cells(word, cells, rank, points) for word, cells in blocks]
         quadratic = any(NODES[word] > CORNERS[FAMILY[word]] for word in words)
@@ -113,16 +113,20 @@ def _of_wanted_order(
                 f"imported.linear = 'keep': '{source}' mixes first and second order, expected "
                 "'promote'"
             )
-        return points, blocks, (f"{_counted(first_order)} are solved as they are: far too stiff",)
+        return (
+            points,
+            blocks,
+            (f"{_count_text(first_order)} are solved as they are: far too stiff",),
+        )
     if first_order and linear != "promote":
         raise InputError(
-            f"imported.file = '{source}': {_counted(first_order)} of first order are far too stiff "
-            "in bending, expected second-order cells; imported.linear = 'promote' adds nodes in "
-            "the middle of their edges, 'keep' solves them as they are"
+            f"imported.file = '{source}': {_count_text(first_order)} of first order are far too "
+            "stiff in bending, expected second-order cells; imported.linear = 'promote' adds nodes "
+            "in the middle of their edges, 'keep' solves them as they are"
         )
-    notes = ()
+    notes: tuple[str, ...] = ()
     if first_order:
-        notes = (f"{_counted(first_order)} were promoted to second order, edges straight",)
+        notes = (f"{_count_text(first_order)} were promoted to second order, edges straight",)
     return *completed_cells(points, blocks), notes
 
 
@@ -154,7 +158,7 @@ def _check_middles(
         )
 
 
-def _counted(blocks: list[tuple[str, np.ndarray]]) -> str:
+def _count_text(blocks: list[tuple[str, np.ndarray]]) -> str:
     """Such as "120 hexahedra and 4 wedges"."""
     count: dict[str, int] = {}
     for word, cells in blocks:

@@ -18,7 +18,7 @@ import numpy as np
 from .topology import CORNERS, EDGES, FACETS, FAMILY, NODES, QUADS
 
 # of the model's size: coordinates that differ by less count as equal in the order of vertices
-SAME = 1e-5
+SAME_COORDINATE = 1e-5
 
 
 def vertex_order(points: np.ndarray, axis: np.ndarray) -> np.ndarray:
@@ -27,7 +27,7 @@ def vertex_order(points: np.ndarray, axis: np.ndarray) -> np.ndarray:
     x = np.linalg.svd(z[None])[2][1]
     y = np.cross(z, x)
     across = np.stack([points @ x, points @ y])
-    unit = SAME * np.ptp(points, axis=0).max()
+    unit = SAME_COORDINATE * np.ptp(points, axis=0).max()
     radius = np.rint(np.hypot(*across) / unit)
     along = np.rint(points @ z / unit)
     angle = np.arctan2(across[1], across[0])
@@ -63,16 +63,16 @@ def split_cells(
         for facet in FACETS[family]:
             if apex in facet or not len(rows):
                 continue
-            for triangle, some in _triangles(facet, corner_rank[rows]):
+            for triangle, some in _facet_triangles(facet, corner_rank[rows]):
                 local = np.column_stack([np.full(len(some), apex), triangle])
-                found.append(_tetrahedra(family, cells[rows[some]], local, points, quadratic))
+                found.append(_cell_tetrahedra(family, cells[rows[some]], local, points, quadratic))
                 owner.append(rows[some])
     owner = np.concatenate(owner)
     order = np.argsort(owner, kind="stable")
     return np.vstack(found)[order], owner[order]
 
 
-def _triangles(
+def _facet_triangles(
     facet: tuple[int, ...], corner_rank: np.ndarray
 ) -> list[tuple[np.ndarray, np.ndarray]]:
     """Local triangles (m, 3) of a facet and the rows that they are for."""
@@ -84,7 +84,7 @@ def _triangles(
     return [(turned[:, [0, 1, 2]], every), (turned[:, [0, 2, 3]], every)]
 
 
-def _tetrahedra(
+def _cell_tetrahedra(
     family: str,
     cells: np.ndarray,
     local: np.ndarray,
@@ -102,12 +102,12 @@ def _tetrahedra(
     if not quadratic:
         return corner
     ends = np.array(EDGES["tetra"])
-    between = _between(family)[local[:, ends[:, 0]], local[:, ends[:, 1]]]
+    between = _middle_nodes(family)[local[:, ends[:, 0]], local[:, ends[:, 1]]]
     return np.hstack([corner, cells[row, between]])
 
 
 @cache
-def _between(family: str) -> np.ndarray:
+def _middle_nodes(family: str) -> np.ndarray:
     """(corners, corners) local number of the node half-way between two corners."""
     k = CORNERS[family]
     edges = EDGES[family]

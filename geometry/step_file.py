@@ -36,7 +36,7 @@ from .session import attempt, gmsh_session
 Named = dict[tuple[int, str], list[int]]
 CONTACT = ("seat_left", "seat_right", "damper_left", "damper_right")
 # elements along a model that is only looked at
-COARSE = 30
+PREVIEW_ELEMENTS = 30
 PREFIX = {"": 1.0, ".MILLI.": 1e-3, ".CENTI.": 1e-2, ".DECI.": 0.1, ".MICRO.": 1e-6, ".KILO.": 1e3}
 
 
@@ -76,34 +76,39 @@ def read_step(
     path = Path(file)
     if not path.is_file():
         raise InputError(f"imported.file = '{file}': there is no such file")
-    axis = np.asarray(axis, dtype=float) / np.linalg.norm(axis)
+    unit = np.asarray(axis, dtype=float) / np.linalg.norm(axis)
     text = path.read_text(errors="replace")
     with gmsh_session() as gmsh:
         with attempt("imported.file", f"import '{file}'"):
-            _import(gmsh, path, 1.0 if scale == 1.0 else scale / file_unit(text))
-        named = _renamed(_names(gmsh, text), read_names(names))
+            _import_shapes(gmsh, path, 1.0 if scale == 1.0 else scale / file_unit(text))
+        named = _apply_names(_named_entities(gmsh, text), read_names(names))
         if fitted is not None:
-            on = rotation(axis, 2 * np.pi / sectors)
-            named = fit_wedge(gmsh, named, fitted.seats, fitted.wedge, fitted.seat_width, on, axis)
-        named |= _found(gmsh, named, sectors, axis)
-        _periodic(gmsh, named, sectors, axis)
-        with attempt("mesh.size", f"mesh '{file}'"):
-            _generate(
+            on = rotation(unit, 2 * np.pi / sectors)
+            named = fit_wedge(
                 gmsh,
-                size,
-                [
-                    tag
-                    for (dim, name), tags in named.items()
-                    if dim == 2 and name.lower() in CONTACT
-                    for tag in tags
-                ],
+                named,
+                fitted.seats,
+                fitted.wedge,
+                fitted.seat_width,
+                on,
+                unit,
             )
+        named |= _find_faces(gmsh, named, sectors, unit)
+        _tie_faces(gmsh, named, sectors, unit)
+        contact = [
+            tag
+            for (dim, name), tags in named.items()
+            if dim == 2 and name.lower() in CONTACT
+            for tag in tags
+        ]
+        with attempt("mesh.size", f"mesh '{file}'"):
+            _generate_mesh(gmsh, size, contact)
         for (dimension, name), tags in named.items():
             gmsh.model.setPhysicalName(
                 dimension, gmsh.model.addPhysicalGroup(dimension, tags), name
             )
         raw = from_gmsh_model(gmsh)
-    return mesh_of_raw(raw, 1.0, sectors, axis, str(file))
+    return mesh_of_raw(raw, 1.0, sectors, unit, str(file))
 
 
 def coarse_step(file: str | Path) -> RawMesh:
@@ -117,11 +122,15 @@ def coarse_step(file: str | Path) -> RawMesh:
         raise InputError(f"'{file}': there is no such file")
     with gmsh_session() as gmsh:
         with attempt("imported.file", f"import '{file}'"):
-            _import(gmsh, path, 1.0)
-        for (dimension, name), tags in _names(gmsh, path.read_text(errors="replace")).items():
+            _import_shapes(gmsh, path, 1.0)
+        for (dimension, name), tags in _named_entities(
+            gmsh, path.read_text(errors="replace")
+        ).items():
             gmsh.model.addPhysicalGroup(dimension, tags, name=name)
         low, high = np.array(gmsh.model.getBoundingBox(-1, -1)).reshape(2, 3)
-        gmsh.option.setNumber("Mesh.MeshSizeMax", float(np.linalg.norm(high - low)) / COARSE)
+        gmsh.option.setNumber(
+            "Mesh.MeshSizeMax", float(np.linalg.norm(high - low)) / PREVIEW_ELEMENTS
+        )
         gmsh.option.setNumber("Mesh.MeshSizeFromCurvature", 6)
         with attempt("imported.file", f"mesh '{file}'"):
             gmsh.model.mesh.generate(3)
@@ -138,7 +147,7 @@ def file_unit(text: str) -> float:
     return 0.0254 if re.search(r"CONVERSION_BASED_UNIT\(\s*'INCH'", text, re.I) else 1e-3
 
 
-def _import(
+def _import_shapes(
     gmsh: ModuleType,
     path: Path,
     factor: float,
@@ -150,14 +159,22 @@ def _import(
     if not any(dim == 3 for dim, _ in shapes):
         raise InputError(f"imported.file = '{path}': no solids inside, expected at least one")
     if factor != 1.0:
-        gmsh.model.occ.dilate(shapes, 0, 0, 0, factor, factor, factor)
+        gmsh.model.occ.dilate(
+            shapes,
+            0,
+            0,
+            0,
+            factor,
+            factor,
+            factor,
+        )
     gmsh.model.occ.synchronize()
 
 
-def _names(gmsh: ModuleType, text: str) -> Named:
-    """(dimension, name) -> entities, by the names in the file where they can be told apart."""
+def _named_entities(gmsh: ModuleType, text: str) -> Named:
+    """(dimension, name) -> entities, by the names in the file where they can be distinguished."""
     named: dict[tuple[int, str], list[int]] = {}
-    solids = _written(text)
+    solids = _written_names(text)
     volumes = [tag for _, tag in gmsh.model.getEntities(3)]
     for i, volume in enumerate(volumes):
         faces = [tag for _, tag in gmsh.model.getBoundary([(3, volume)], oriented=False)]
@@ -170,12 +187,12 @@ def _names(gmsh: ModuleType, text: str) -> Named:
     return named
 
 
-def _renamed(named: Named, wanted: dict[str, list[str]]) -> Named:
+def _apply_names(named: Named, wanted: dict[str, list[str]]) -> Named:
     """The user's names for solids and faces; a new name belongs to the dimension of its first old
     one.
     """
     solids = {name.lower() for dim, name in named if dim == 3}
-    result = {}
+    result: Named = {}
     for dim in (3, 2):
         groups = {name: tags for (d, name), tags in named.items() if d == dim}
         here = {
@@ -185,30 +202,33 @@ def _renamed(named: Named, wanted: dict[str, list[str]]) -> Named:
     return result
 
 
-def _written(text: str) -> list[tuple[str, list[str]]]:
+def _written_names(text: str) -> list[tuple[str, list[str]]]:
     """Name of each solid and of its faces, in the order of the file."""
     record = {
         int(n): body for n, body in re.findall(r"#(\d+)\s*=\s*(.*?);\s*(?=#|ENDSEC)", text, re.S)
     }
     solids = []
     for body in (record[n] for n in sorted(record) if record[n].startswith("MANIFOLD_SOLID_BREP")):
-        name, shell = re.match(
-            r"MANIFOLD_SOLID_BREP\s*\(\s*'(.*?)'\s*,\s*#(\d+)", body, re.S
-        ).groups()
+        head = re.match(r"MANIFOLD_SOLID_BREP\s*\(\s*'(.*?)'\s*,\s*#(\d+)", body, re.S)
+        if head is None:
+            raise InputError(
+                f"imported.file: solid '{body[:60]}', expected MANIFOLD_SOLID_BREP('name', #shell)"
+            )
+        name, shell = head.groups()
         faces = re.findall(r"#(\d+)", record.get(int(shell), ""))
         words = [
             re.match(r"\w+\s*\(\s*'(.*?)'", record.get(int(face), "X('')"), re.S) for face in faces
         ]
-        solids.append((_plain(name), [_plain(word[1]) if word else "" for word in words]))
+        solids.append((_plain_name(name), [_plain_name(word[1]) if word else "" for word in words]))
     return solids
 
 
-def _plain(name: str) -> str:
+def _plain_name(name: str) -> str:
     """A name worth using; CAD systems write NONE and the like."""
     return "" if name.strip().upper() in ("", "NONE", "$") else name.strip()
 
 
-def _found(
+def _find_faces(
     gmsh: ModuleType,
     named: dict[tuple[int, str], list[int]],
     sectors: int,
@@ -225,7 +245,7 @@ def _found(
     middle = {tag: c for volume in body for tag, c in centres(gmsh, volume).items()}
     found: dict[tuple[int, str], list[int]] = {}
     if sectors and not {"cyclic_low", "cyclic_high"} & words:
-        low, high = _turned(gmsh, middle, rotation(axis, 2 * np.pi / sectors))
+        low, high = _turned_faces(gmsh, middle, rotation(axis, 2 * np.pi / sectors))
         found |= {(2, "cyclic_low"): low, (2, "cyclic_high"): high} if low else {}
     if sectors and "clamp" not in words:
         radius = {
@@ -233,11 +253,11 @@ def _found(
             for tag, c in middle.items()
             if not any(tag in tags for tags in found.values())
         }
-        found[2, "clamp"] = [min(radius, key=radius.get)]
+        found[2, "clamp"] = [min(radius, key=lambda tag: radius[tag])]
     return found
 
 
-def _turned(
+def _turned_faces(
     gmsh: ModuleType,
     middle: dict[int, np.ndarray],
     on: np.ndarray,
@@ -262,7 +282,7 @@ def rotation(axis: np.ndarray, angle: float) -> np.ndarray:
     return np.eye(3) + np.sin(angle) * cross + (1 - np.cos(angle)) * cross @ cross
 
 
-def _periodic(
+def _tie_faces(
     gmsh: ModuleType,
     named: dict[tuple[int, str], list[int]],
     sectors: int,
@@ -284,10 +304,17 @@ def _periodic(
         )
         best = min(motions, key=lambda r, a=start, b=end: np.linalg.norm(r @ a - b))
         with attempt("imported.file", f"match the faces {master} and {slave}"):
-            tie(gmsh, 2, tags[master], tags[slave], best, np.zeros(3))
+            tie(
+                gmsh,
+                2,
+                tags[master],
+                tags[slave],
+                best,
+                np.zeros(3),
+            )
 
 
-def _refined(
+def _refine_faces(
     gmsh: ModuleType,
     faces: list[int],
     fine: float,
@@ -310,7 +337,7 @@ def _refined(
     field.setAsBackgroundMesh(threshold)
 
 
-def _generate(
+def _generate_mesh(
     gmsh: ModuleType,
     size: MeshSize,
     contact: list[int],
@@ -319,12 +346,12 @@ def _generate(
     away from them.
     """
     low, high = np.array(gmsh.model.getBoundingBox(-1, -1)).reshape(2, 3)
-    base = size.size or np.linalg.norm(high - low) / 40
+    base = size.size or float(np.linalg.norm(high - low)) / 40
     gmsh.option.setNumber("Mesh.MeshSizeMax", base)
     gmsh.option.setNumber("Mesh.MeshSizeMin", min(base / 4, size.contact_size or base))
     gmsh.option.setNumber("Mesh.MeshSizeFromCurvature", 10)
     if size.contact_size and contact:
-        _refined(gmsh, contact, size.contact_size, base)
+        _refine_faces(gmsh, contact, size.contact_size, base)
     check_count(gmsh, 3, size.scale * base)
     gmsh.option.setNumber("Mesh.MeshSizeFactor", size.scale)
     gmsh.model.mesh.generate(3)

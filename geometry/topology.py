@@ -70,7 +70,7 @@ NODES = {
 }
 # Corner pairs of the edges; row i carries the mid-side node number CORNERS + i of the second-order
 # cell.
-EDGES = {
+EDGES: dict[str, list[tuple[int, ...]]] = {
     "line": [(0, 1)],
     "triangle": [(0, 1), (1, 2), (2, 0)],
     "quad": [(0, 1), (1, 2), (2, 3), (3, 0)],
@@ -93,7 +93,7 @@ EDGES = {
     "pyramid": [(0, 1), (0, 3), (0, 4), (1, 2), (1, 4), (2, 3), (2, 4), (3, 4)],
 }
 # Corners of the quadrilateral faces; row i carries the centre node CORNERS + edges + i.
-QUADS = {
+QUADS: dict[str, list[tuple[int, ...]]] = {
     "quad": [(0, 1, 2, 3)],
     "hexahedron": [
         (0, 3, 2, 1),
@@ -106,7 +106,7 @@ QUADS = {
     "wedge": [(0, 1, 4, 3), (0, 3, 5, 2), (1, 2, 5, 4)],
     "pyramid": [(0, 3, 2, 1)],
 }
-FACETS = {
+FACETS: dict[str, list[tuple[int, ...]]] = {
     "triangle": EDGES["triangle"],
     "quad": EDGES["quad"],
     "tetra": [(0, 2, 1), (0, 1, 3), (0, 3, 2), (1, 2, 3)],

@@ -18,7 +18,7 @@ from .parameters import MeshSize, ZMass
 from .session import attempt, gmsh_session
 
 # side of the foundation block over the larger side of the Z
-WIDER = 2.0
+FOUNDATION_RATIO = 2.0
 
 
 def z_corners(z: ZMass) -> np.ndarray:
@@ -61,11 +61,18 @@ def z_mass(
     contact = size.contact_size or base
     with gmsh_session() as gmsh:
         body = prism(gmsh, z_corners(z), 0.0, z.thickness)
-        block = _block(gmsh, z, depth) if depth else None
+        block = _draw_foundation(gmsh, z, depth) if depth else None
         gmsh.model.occ.synchronize()
-        groups = _names(gmsh, z, depth, body, block)
+        groups = _name_faces(gmsh, z, depth, body, block)
         if block is not None:
-            tie(gmsh, 2, groups.faces["seat"], groups.faces["footprint"], np.eye(3), np.zeros(3))
+            tie(
+                gmsh,
+                2,
+                groups.faces["seat"],
+                groups.faces["footprint"],
+                np.eye(3),
+                np.zeros(3),
+            )
         set_background(
             gmsh,
             min(base, contact) / 2,
@@ -93,19 +100,19 @@ def check_z_mass(z: ZMass) -> None:
         )
 
 
-def _block(
+def _draw_foundation(
     gmsh: ModuleType,
     z: ZMass,
     depth: float,
 ) -> int:
     """The foundation with the Z cut into its top."""
-    w = WIDER / 2 * max(z.width, z.height)
+    w = FOUNDATION_RATIO / 2 * max(z.width, z.height)
     square = np.array([[-w, -w], [w, -w], [w, w], [-w, w]])
     mark, _, _ = polygon(gmsh, z_corners(z))
     return imprint(gmsh, prism(gmsh, square, -depth, 0.0), [(2, mark)])
 
 
-def _names(
+def _name_faces(
     gmsh: ModuleType,
     z: ZMass,
     depth: float,
@@ -116,7 +123,10 @@ def _names(
     the block.
     """
     found = {tag: centre[2] for tag, centre in centres(gmsh, body).items()}
-    faces = {"footprint": [min(found, key=found.get)], "top": [max(found, key=found.get)]}
+    faces = {
+        "footprint": [min(found, key=lambda tag: found[tag])],
+        "top": [max(found, key=lambda tag: found[tag])],
+    }
     if block is None:
         return Groups({"damper": [body]}, faces)
     found = {tag: centre[2] for tag, centre in centres(gmsh, block).items()}
@@ -125,3 +135,13 @@ def _names(
     faces["seat"] = [min(level, key=lambda tag: abs(gmsh.model.occ.getMass(2, tag) - area))]
     faces["clamp"] = [tag for tag, height in found.items() if abs(height + depth) < 1e-6 * depth]
     return Groups({"blade": [block], "damper": [body]}, faces)
+
+
+def count_z_mass_cells(z: ZMass, mesh: MeshSize) -> float:
+    """A lower bound of the number of tetrahedra."""
+    base = mesh.size or min(z.thickness / 2, z.bar / 3)
+    solid = z.thickness * z.bar * (z.height + 2 * z.width)
+    cells = 0.5 * solid / (0.12 * (mesh.scale * base) ** 3)
+    contact = mesh.contact_size or base
+    surface = 0.5 * z.bar * (z.height + 2 * z.width)
+    return cells + surface / (0.43 * (mesh.scale * contact) ** 2)

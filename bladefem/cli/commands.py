@@ -7,15 +7,20 @@ import sys
 from collections.abc import Callable
 from functools import partial
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from ..errors import InputError
 from ..scene.kinds import kind_named, load_function
 from ..scene.tables import Scene
+from ..util.communicator import Communicator
 from . import tables
 
+if TYPE_CHECKING:
+    from ..study.modes.survey import Wanted
+    from ..study.pipeline.run_records import Run
 
-def check(options: argparse.Namespace, comm: Any) -> None:
+
+def check(options: argparse.Namespace, comm: Communicator | None) -> None:
     """Print the resolved scene, and what in it is improbable."""
     from ..io.stage_cache import on_root
     from ..scene.toml import given_keys, read_tables, resolved, scene_of
@@ -39,19 +44,22 @@ def check(options: argparse.Namespace, comm: Any) -> None:
 PICTURES = (".png", ".pdf", ".svg", ".jpg")
 
 
-def mesh(options: argparse.Namespace, comm: Any) -> None:
+def mesh(options: argparse.Namespace, comm: Communicator | None) -> None:
     """Mesh, quality table, picture."""
     if options.view and Path(options.view).suffix.lower() not in PICTURES:
         raise InputError(
             f"--view {options.view}: expected a file name that ends with {' or '.join(PICTURES)}"
         )
-    run = until("mesh", options, comm)
+    scene, folder, bars = prepared(options, comm)
+    from ..study.pipeline import pipeline
+
+    run = pipeline.run(scene, folder, until="mesh", comm=comm, progress=bars)
     if options.view and (comm is None or comm.rank == 0):
         draw(run.mesh, options.view)
     tell(options, comm, lambda: tables.mesh_quality(run.mesh), run)
 
 
-def modes(options: argparse.Namespace, comm: Any) -> None:
+def modes(options: argparse.Namespace, comm: Communicator | None) -> None:
     """Natural frequencies and shapes of all nodal diameters; Campbell diagram, mesh refinement,
     comparison.
     """
@@ -65,7 +73,7 @@ def modes(options: argparse.Namespace, comm: Any) -> None:
         print_report(options, comm, folder / "report_modes.html")
 
 
-def modes_wanted(options: argparse.Namespace) -> Any:
+def modes_wanted(options: argparse.Namespace) -> Wanted:
     """What the options of ``modes`` ask for."""
     from ..study.modes.campbell import read_speeds
     from ..study.modes.linear_response_report import read_damping, read_loads
@@ -73,7 +81,7 @@ def modes_wanted(options: argparse.Namespace) -> Any:
 
     if options.pictures < 0:
         raise InputError(f"--pictures {options.pictures}: expected a number of modes, 0 for none")
-    sizes = _sizes(options.converge, "converge")
+    sizes = _parse_sizes(options.converge, "converge")
     speeds = None if options.campbell is None else read_speeds(options.campbell)
     loads = None if options.forced is None else read_loads(options.forced)
     if loads is None and options.damping:
@@ -88,7 +96,7 @@ def modes_wanted(options: argparse.Namespace) -> Any:
     )
 
 
-def _sizes(text: str | None, option: str) -> list[float] | None:
+def _parse_sizes(text: str | None, option: str) -> list[float] | None:
     """Element sizes [m] as given to an option; empty where they are to be chosen."""
     from ..scene.fields import convert, field_at, split_values
 
@@ -96,7 +104,7 @@ def _sizes(text: str | None, option: str) -> list[float] | None:
     return None if text is None else [convert(item, size) for item in split_values(text)]
 
 
-def contact(options: argparse.Namespace, comm: Any) -> None:
+def contact(options: argparse.Namespace, comm: Communicator | None) -> None:
     """Seat the damper: force and pressure of each face under each load, with tables, picture and
     ParaView file.
     """
@@ -109,21 +117,27 @@ def contact(options: argparse.Namespace, comm: Any) -> None:
     tell(options, comm, lambda: tables.pressures(run.contact.maps), run)
 
 
-def reduce(options: argparse.Namespace, comm: Any) -> None:
+def reduce(options: argparse.Namespace, comm: Communicator | None) -> None:
     """Blade and damper reduced to their contact, load and probe points; a later response starts
     from there.
     """
-    run = until("reduction", options, comm, responds=True)
+    scene, folder, bars = prepared(options, comm, responds=True)
+    from ..study.pipeline import pipeline
+
+    run = pipeline.run(scene, folder, until="reduction", comm=comm, progress=bars)
     tell(options, comm, lambda: tables.reduction(run.reduced), run)
 
 
-def response(options: argparse.Namespace, comm: Any) -> None:
+def response(options: argparse.Namespace, comm: Communicator | None) -> None:
     """Forced response for each load."""
-    run = until("response", options, comm, responds=True)
+    scene, folder, bars = prepared(options, comm, responds=True)
+    from ..study.pipeline import pipeline
+
+    run = pipeline.run(scene, folder, until="response", comm=comm, progress=bars)
     tell(options, comm, lambda: tables.responses(run.response), run)
 
 
-def report(options: argparse.Namespace, comm: Any) -> None:
+def report(options: argparse.Namespace, comm: Communicator | None) -> None:
     """Everything, with figures and report."""
     refuse_pdf(options)
     scene, folder, bars = prepared(options, comm, responds=True)
@@ -132,7 +146,7 @@ def report(options: argparse.Namespace, comm: Any) -> None:
 
 
 def refuse_pdf(options: argparse.Namespace) -> None:
-    """A missing browser is told before long work."""
+    """A missing browser is reported before long work."""
     from ..report.pdf import require_browser
 
     if options.pdf:
@@ -141,7 +155,7 @@ def refuse_pdf(options: argparse.Namespace) -> None:
 
 def print_report(
     options: argparse.Namespace,
-    comm: Any,
+    comm: Communicator | None,
     page: Path,
 ) -> None:
     """The report as PDF, where that is wanted."""
@@ -157,7 +171,7 @@ def run_kind(
     scene: Scene,
     folder: Path,
     options: argparse.Namespace,
-    comm: Any,
+    comm: Communicator | None,
     progress: Any,
 ) -> None:
     """All that `bladefem run` does for a scene, by the record of its kind, and its table."""
@@ -166,7 +180,7 @@ def run_kind(
     tell(options, comm, lambda: load_function(kind.table)(found), found)
 
 
-def chart(options: argparse.Namespace, comm: Any) -> None:
+def chart(options: argparse.Namespace, comm: Communicator | None) -> None:
     """Speed against accuracy of methods and models: tables and picture."""
     from ..io.stage_cache import on_root
     from ..report.chart import write_chart
@@ -183,7 +197,7 @@ def chart(options: argparse.Namespace, comm: Any) -> None:
     elif options.scene is None:
         raise InputError("chart: expected a scene file, or --reference")
     else:
-        sizes = _sizes(options.mesh, "mesh")
+        sizes = _parse_sizes(options.mesh, "mesh")
         scene, folder, _ = prepared(options, comm, responds=True)
         made = scene_chart(scene, folder, options.budget, comm, sizes)
         accuracy = scene.accuracy
@@ -194,7 +208,7 @@ def chart(options: argparse.Namespace, comm: Any) -> None:
     )
 
 
-def info(options: argparse.Namespace, comm: Any) -> None:
+def info(options: argparse.Namespace, comm: Communicator | None) -> None:
     """Versions and threads."""
     from .info import facts
 
@@ -205,7 +219,7 @@ def info(options: argparse.Namespace, comm: Any) -> None:
 
 def prepared(
     options: argparse.Namespace,
-    comm: Any,
+    comm: Communicator | None,
     responds: bool = False,
 ) -> tuple[Scene, Path, Any]:
     """The scene, the run folder with a copy of it, kept for this command, and progress bars;
@@ -226,7 +240,7 @@ def prepared(
         from ..io.run_folder import keep_given, locked, take_folder
 
         scene = given_scene(options, responds)
-        given = _given(options)
+        given = _given_fields(options)
         options.held.enter_context(locked(folder))
         moved = take_folder(folder, scene)
         keep_given(folder, given)
@@ -239,7 +253,7 @@ def prepared(
     return scene, folder, partial(watch, shown=wanted(options.quiet, rank))
 
 
-def _given(options: argparse.Namespace) -> set[str]:
+def _given_fields(options: argparse.Namespace) -> set[str]:
     """Dotted names of the fields that the user gave; a run folder remembers its own."""
     from ..io.run_folder import given_fields
     from ..scene.toml import given_keys, read_tables
@@ -267,24 +281,11 @@ def given_scene(options: argparse.Namespace, responds: bool) -> Scene:
     return scene
 
 
-def until(
-    stage: str,
-    options: argparse.Namespace,
-    comm: Any,
-    responds: bool = False,
-) -> Any:
-    """The pipeline up to a stage, with progress bars; collective."""
-    scene, folder, bars = prepared(options, comm, responds)
-    from ..study.pipeline import pipeline
-
-    return pipeline.run(scene, folder, until=stage, comm=comm, progress=bars)
-
-
 def tell(
     options: argparse.Namespace,
-    comm: Any,
+    comm: Communicator | None,
     table: Callable[[], str],
-    run: Any = None,
+    run: Run | None = None,
 ) -> None:
     """A table and the summary of a run, on rank 0 unless quiet."""
     if options.quiet or (comm is not None and comm.rank > 0):

@@ -5,30 +5,35 @@ from __future__ import annotations
 import os
 import platform
 from pathlib import Path
+from typing import Any
 
 
 def facts() -> list[tuple[str, str]]:
     """Rows of name and value: versions, solvers, BLAS, MPI, threads."""
     from ..io.stage_cache import versions
 
-    rows = [("python", platform.python_version()), ("system", _system()), *versions().items()]
-    rows += _solvers()
+    rows = [("python", platform.python_version()), ("system", _system_text()), *versions().items()]
+    rows += _solver_versions()
     rows += [
-        ("BLAS", ", ".join(_loaded("openblas", "blis", "mkl", "refblas", "libblas")) or "unknown"),
+        (
+            "BLAS",
+            ", ".join(_loaded_libraries("openblas", "blis", "mkl", "refblas", "libblas"))
+            or "unknown",
+        ),
         ("cores", str(os.cpu_count())),
         ("OMP_NUM_THREADS", os.environ.get("OMP_NUM_THREADS", "not set")),
     ]
     return rows
 
 
-def _system() -> str:
+def _system_text() -> str:
     try:
         return platform.freedesktop_os_release().get("PRETTY_NAME", platform.platform())
     except OSError:
         return platform.platform()
 
 
-def _solvers() -> list[tuple[str, str]]:
+def _solver_versions() -> list[tuple[str, str]]:
     """PETSc, MUMPS and MPI as they answer themselves."""
     try:
         from ..fem.compat import MPI, PETSc
@@ -38,12 +43,12 @@ def _solvers() -> list[tuple[str, str]]:
     return [
         ("PETSc", ".".join(map(str, PETSc.Sys.getVersion()))),
         ("PETSc scalars", str(PETSc.ScalarType.__name__)),
-        ("MUMPS", _mumps(PETSc)),
+        ("MUMPS", _mumps_check(PETSc)),
         ("MPI", f"{implementation} {'.'.join(map(str, version))}"),
     ]
 
 
-def _mumps(PETSc: object) -> str:
+def _mumps_check(PETSc: Any) -> str:
     """Whether a factorisation with MUMPS works, and which ordering it chose."""
     try:
         size = 2000
@@ -65,7 +70,7 @@ def _mumps(PETSc: object) -> str:
     return f"present (ordering {names.get(ordering, ordering)})"
 
 
-def _loaded(*words: str) -> list[str]:
+def _loaded_libraries(*words: str) -> list[str]:
     """Shared libraries of this process whose name holds one of the words."""
     try:
         lines = Path("/proc/self/maps").read_text(encoding="utf-8", errors="replace").splitlines()

@@ -6,10 +6,14 @@ from __future__ import annotations
 
 import argparse
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING
 
 from ..errors import InputError
+from ..util.communicator import Communicator
 from .tables import plain
+
+if TYPE_CHECKING:
+    from geometry.look import Look
 
 # faces in the table
 LISTED = 24
@@ -24,11 +28,11 @@ def add_look(sub: argparse.ArgumentParser) -> None:
         metavar="TOML",
         nargs="?",
         const="",
-        help="write a scene to start from (default: beside the mesh file)",
+        help="write a scene to start from (default: next to the mesh file)",
     )
 
 
-def look(options: argparse.Namespace, comm: Any) -> None:
+def look(options: argparse.Namespace, comm: Communicator | None) -> None:
     """Print, draw and write what was asked for; rank 0 alone."""
     from geometry.look import look_at, starting_scene
 
@@ -49,7 +53,7 @@ def look(options: argparse.Namespace, comm: Any) -> None:
         print(f"scene: {target}")
 
 
-def described(found: Any) -> str:
+def described(found: Look) -> str:
     """Everything in words and tables; lengths in the file's unit."""
     size = found.box[1] - found.box[0]
     cells = ", ".join(f"{count} {word}" for word, count in found.cells.items())

@@ -123,30 +123,7 @@ def parser() -> argparse.ArgumentParser:
     )
     subs = top.add_subparsers(dest="command", required=True, metavar="command")
     for name, (what, example, function) in _COMMANDS.items():
-        sub = _command(subs, name, what, example, function)
-        sub.add_argument(
-            "scene",
-            nargs="?" if name == "chart" else None,
-            help="scene file (TOML), or the folder of an earlier run",
-        )
-        sub.add_argument(
-            "--set",
-            action="append",
-            default=[],
-            metavar="KEY=VALUE",
-            dest="overrides",
-            help="another value for one field, such as aerofoil.twist='25 deg'; may be repeated",
-        )
-        if name != "check":
-            sub.add_argument(
-                "-o",
-                "--output",
-                metavar="FOLDER",
-                help="run folder (default: runs/<name of the scene>)",
-            )
-            sub.add_argument(
-                "-q", "--quiet", action="store_true", help="no progress bars and no summary"
-            )
+        _scene_arguments(name, _add_command(subs, name, what, example, function))
     subs.choices["mesh"].add_argument(
         "--view", metavar="PNG", help="also draw the mesh into this file"
     )
@@ -156,25 +133,8 @@ def parser() -> argparse.ArgumentParser:
         )
     _modes_arguments(subs.choices["modes"])
     study.add_study(subs.choices["study"])
-    subs.choices["chart"].add_argument(
-        "--budget",
-        type=float,
-        default=120.0,
-        metavar="SECONDS",
-        help="CPU time for the variants; what would exceed it is left out and named",
-    )
-    subs.choices["chart"].add_argument(
-        "--reference", action="store_true", help="the built-in reference blade instead"
-    )
-    subs.choices["chart"].add_argument(
-        "--mesh",
-        metavar="SIZES",
-        nargs="?",
-        const="",
-        help="also compare meshes of "
-        "first and second order with these element sizes, such as '10, 7, 5 mm'",
-    )
-    info = _command(
+    _chart_arguments(subs.choices["chart"])
+    info = _add_command(
         subs,
         "info",
         "versions and threads of what bladefem runs on",
@@ -183,7 +143,7 @@ def parser() -> argparse.ArgumentParser:
     )
     info.set_defaults(scene=None)
     add_look(
-        _command(
+        _add_command(
             subs,
             "look",
             "what a mesh file holds: bodies, sets, numbered faces, a scene to start from",
@@ -192,6 +152,53 @@ def parser() -> argparse.ArgumentParser:
         )
     )
     return top
+
+
+def _scene_arguments(name: str, sub: argparse.ArgumentParser) -> None:
+    """What every command takes that reads a scene."""
+    sub.add_argument(
+        "scene",
+        nargs="?" if name == "chart" else None,
+        help="scene file (TOML), or the folder of an earlier run",
+    )
+    sub.add_argument(
+        "--set",
+        action="append",
+        default=[],
+        metavar="KEY=VALUE",
+        dest="overrides",
+        help="another value for one field, such as aerofoil.twist='25 deg'; may be repeated",
+    )
+    if name == "check":
+        return
+    sub.add_argument(
+        "-o",
+        "--output",
+        metavar="FOLDER",
+        help="run folder (default: runs/<name of the scene>)",
+    )
+    sub.add_argument("-q", "--quiet", action="store_true", help="no progress bars and no summary")
+
+
+def _chart_arguments(sub: argparse.ArgumentParser) -> None:
+    sub.add_argument(
+        "--budget",
+        type=float,
+        default=120.0,
+        metavar="SECONDS",
+        help="CPU time for the variants; what would exceed it is left out and named",
+    )
+    sub.add_argument(
+        "--reference", action="store_true", help="the built-in reference blade instead"
+    )
+    sub.add_argument(
+        "--mesh",
+        metavar="SIZES",
+        nargs="?",
+        const="",
+        help="also compare meshes of "
+        "first and second order with these element sizes, such as '10, 7, 5 mm'",
+    )
 
 
 def _modes_arguments(sub: argparse.ArgumentParser) -> None:
@@ -239,7 +246,7 @@ def _modes_arguments(sub: argparse.ArgumentParser) -> None:
     )
 
 
-def _command(
+def _add_command(
     subs: argparse._SubParsersAction,
     name: str,
     what: str,

@@ -15,6 +15,7 @@ from contextlib import contextmanager, suppress
 from typing import Any
 
 from ..errors import InputError, NotSolvedError
+from ..util.communicator import Communicator
 
 # [s] that a failed rank waits for the others to fail as well
 PATIENCE = 10.0
@@ -37,30 +38,30 @@ def communicator() -> Any:
 
 def guarded(action: Callable[[Any], None], options: argparse.Namespace) -> int:
     """The exit code of an action that gets the communicator; errors are told on rank 0."""
-    with _interruptible() as stopped:
-        return _guarded(action, stopped)
+    with _catch_signals() as stopped:
+        return _run_guarded(action, stopped)
 
 
-def _guarded(action: Callable[[Any], None], stopped: list[int]) -> int:
+def _run_guarded(action: Callable[[Any], None], stopped: list[int]) -> int:
     comm = None
     try:
         comm = communicator()
         meeting = comm.Dup() if comm else None
         action(comm)
-        return _flush()
+        return _flush_output()
     except BrokenPipeError:
-        return _flush()
+        return _flush_output()
     except KeyboardInterrupt:
-        return _stopped(comm, stopped)
+        return _stop_ranks(comm, stopped)
     except Exception as error:
         # a library made an error of its own out of the interrupt
         if stopped:
-            return _stopped(comm, stopped)
-        code, text = _sentence(error)
+            return _stop_ranks(comm, stopped)
+        code, text = _error_sentence(error)
         if comm is None:
-            return _tell(None, text, code)
+            return _print_error(None, text, code)
         if comm.rank == 0:
-            _tell(comm, text, code)
+            _print_error(comm, text, code)
         if not _all_arrive(meeting):
             if comm.rank > 0:
                 print(f"bladefem: rank {comm.rank} alone: {text}", file=sys.stderr, flush=True)
@@ -68,7 +69,7 @@ def _guarded(action: Callable[[Any], None], stopped: list[int]) -> int:
         return code
 
 
-def _sentence(error: Exception) -> tuple[int, str]:
+def _error_sentence(error: Exception) -> tuple[int, str]:
     """Exit code and text: one sentence for what a user can mend, the whole traceback for our own
     mistakes.
     """
@@ -110,7 +111,7 @@ _INSTALLED = {
 
 
 @contextmanager
-def _interruptible() -> Iterator[list[int]]:
+def _catch_signals() -> Iterator[list[int]]:
     """The signals that came; a batch system's SIGTERM cleans up like Ctrl-C, to which background
     jobs stay deaf.
     """
@@ -133,12 +134,12 @@ def _interruptible() -> Iterator[list[int]]:
             signal.signal(number, handler)
 
 
-def _stopped(comm: Any, signals: list[int]) -> int:
+def _stop_ranks(comm: Communicator | None, signals: list[int]) -> int:
     """Ctrl-C, or the end that a batch system asks for: 128 plus the signal's number, as shells have
     it.
     """
     ended = signal.SIGTERM in signals
-    return _tell(
+    return _print_error(
         comm,
         f"{'ended by SIGTERM' if ended else 'interrupted'}; finished stages are kept, the same "
         "command goes on after them",
@@ -146,8 +147,8 @@ def _stopped(comm: Any, signals: list[int]) -> int:
     )
 
 
-def _tell(
-    comm: Any,
+def _print_error(
+    comm: Communicator | None,
     text: str,
     code: int,
 ) -> int:
@@ -169,7 +170,7 @@ def _all_arrive(meeting: Any) -> bool:
     return True
 
 
-def _flush() -> int:
+def _flush_output() -> int:
     """A reader that closes the pipe early (| head) is no error."""
     try:
         sys.stdout.flush()

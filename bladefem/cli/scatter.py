@@ -7,11 +7,12 @@ from pathlib import Path
 from typing import Any
 
 from ..errors import InputError
+from ..util.communicator import Communicator
 from . import tables
 from .commands import prepared, tell
 
 
-def scatter(options: argparse.Namespace, comm: Any) -> None:
+def scatter(options: argparse.Namespace, comm: Communicator | None) -> None:
     """Statistics of many wheels, on top of the run's tuned responses."""
     scene, folder, bars = prepared(options, comm, responds=True)
     # before the tuned responses, which take minutes
@@ -28,7 +29,7 @@ def scatter(options: argparse.Namespace, comm: Any) -> None:
     check_mistuning(scene)
     run = pipeline.run(scene, folder, comm=comm, progress=bars)
     found = scatter_of_run(run, comm, bars)
-    table, files = on_root(comm, lambda: _written(found, folder))
+    table, files = on_root(comm, lambda: _write_results(found, folder))
     sentences = scatter_sentences(found)
     tell(
         options,
@@ -39,7 +40,7 @@ def scatter(options: argparse.Namespace, comm: Any) -> None:
     )
 
 
-def _written(found: Any, folder: Path) -> tuple[Any, list[Path]]:
+def _write_results(found: Any, folder: Path) -> tuple[Any, list[Path]]:
     """The table as text, and the files of the folder."""
     from ..report.tables import readable, write_tables
     from ..report.wheel import scatter_drawings, scatter_table

@@ -8,13 +8,18 @@ from __future__ import annotations
 import argparse
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from functools import partial
 from itertools import product
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from ..errors import InputError
+from ..util.communicator import Communicator
 from . import tables
-from .commands import default_folder, given_scene, prepared, tell, until
+from .commands import default_folder, given_scene, prepared, tell
+
+if TYPE_CHECKING:
+    from ..study.pipeline.run_records import SolvedRun
 
 # runs of one study
 MOST_RUNS = 1000
@@ -54,13 +59,13 @@ def add_study(sub: argparse.ArgumentParser) -> None:
     sub.add_argument("--samples", type=int, default=16, metavar="N", help="runs of a scatter (16)")
 
 
-def study(options: argparse.Namespace, comm: Any) -> None:
+def study(options: argparse.Namespace, comm: Communicator | None) -> None:
     """The response for each run of the plan, each in its own folder inside the run folder."""
     from ..io.stage_cache import on_root
 
     base = Path(options.output or default_folder(options.scene))
-    plan = _planned(options)
-    parts = [_one(options, base, plan.names, values) for values in plan.runs]
+    plan = _make_plan(options)
+    parts = [_run_options(options, base, plan.names, values) for values in plan.runs]
     # all, before long work
     scenes = on_root(comm, lambda: [given_scene(one, responds=True) for one in parts])
     if options.scatter and any(scene.study.loads is None for scene in scenes):
@@ -72,11 +77,11 @@ def study(options: argparse.Namespace, comm: Any) -> None:
     for number, (values, one, scene) in enumerate(zip(plan.runs, parts, scenes, strict=True), 1):
         said = ", ".join(f"{n} = {v}" for n, v in zip(plan.names, values, strict=True))
         progress = f"\n{said} ({number} of {len(parts)})"
-        tell(options, comm, lambda text=progress: text)
+        tell(options, comm, partial(str, progress))
         if done:
-            on_root(comm, lambda one=one: _borrow(Path(parts[0].output), Path(one.output)))
-        run = until("response", one, comm)
-        tell(options, comm, lambda run=run: tables.responses(run.response), run)
+            on_root(comm, partial(_borrow_stages, Path(parts[0].output), Path(one.output)))
+        run = _solve_variant(one, comm)
+        tell(options, comm, partial(tables.responses, run.response), run)
         # not before the first line: it is slow to load
         from ..report.study import Variant
 
@@ -87,7 +92,15 @@ def study(options: argparse.Namespace, comm: Any) -> None:
     tell(options, comm, lambda: f"\n{plan.show(table)}\nwritten: {written}")
 
 
-def _planned(options: argparse.Namespace) -> Plan:
+def _solve_variant(options: argparse.Namespace, comm: Communicator | None) -> SolvedRun:
+    """The responses of one run of the plan, in its own folder; collective."""
+    scene, folder, bars = prepared(options, comm)
+    from ..study.pipeline import pipeline
+
+    return pipeline.run(scene, folder, until="response", comm=comm, progress=bars)
+
+
+def _make_plan(options: argparse.Namespace) -> Plan:
     """What the options ask for.
 
     Raises:
@@ -98,10 +111,10 @@ def _planned(options: argparse.Namespace) -> Plan:
             "study: expected --vary KEY=VALUES (once or twice), or --scatter KEY=LOW,HIGH"
         )
     if options.scatter:
-        return _scattered(options)
+        return _scatter_plan(options)
     if len(options.vary) > 2:
         raise InputError("--vary: given three times or more, expected one or two fields")
-    fields = [_varied(text) for text in options.vary]
+    fields = [_parse_variation(text) for text in options.vary]
     names = tuple(name for name, _ in fields)
     if len(set(names)) < len(names):
         raise InputError(f"--vary {names[0]}: given twice, expected two fields")
@@ -114,7 +127,7 @@ def _planned(options: argparse.Namespace) -> Plan:
     return Plan(names, runs, _write_map(names, values), _map_table)
 
 
-def _scattered(options: argparse.Namespace) -> Plan:
+def _scatter_plan(options: argparse.Namespace) -> Plan:
     from ..study.scatter_plan import halton_values, read_ranges
 
     ranges = read_ranges(options.scatter)
@@ -156,7 +169,7 @@ def _map_table(table: Any) -> str:
     return tables.table(table[shown])
 
 
-def _varied(text: str) -> tuple[str, list[str]]:
+def _parse_variation(text: str) -> tuple[str, list[str]]:
     """Name and texts of the values; the last unit holds for those without one, as in "30, 40, 50
     deg".
 
@@ -175,7 +188,7 @@ def _varied(text: str) -> tuple[str, list[str]]:
     return name, list(dict.fromkeys(split_values(values)))
 
 
-def _one(
+def _run_options(
     options: argparse.Namespace,
     base: Path,
     names: Sequence[str],
@@ -189,7 +202,7 @@ def _one(
     return one
 
 
-def _borrow(source: Path, target: Path) -> None:
+def _borrow_stages(source: Path, target: Path) -> None:
     """Finished stages of the first run are there for the others: each knows by its hash whether it
     belongs to a scene, and a changed friction coefficient needs no new mesh.
     """

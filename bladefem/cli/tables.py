@@ -4,11 +4,22 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from math import pi
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from geometry.quality import quality_rows
 
 from ..scene.units import show
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+    from geometry.mesh import Mesh
+
+    from ..data import ModeSet, PortModel, PressureMap
+    from ..study.modes.survey import Survey
+    from ..study.pipeline.loads import Curve
+    from ..study.pipeline.run_records import Response, Run, SolvedRun
+    from ..study.pipeline.stages import Reduced
 
 
 def plain(rows: Sequence[Sequence[object]], head: Sequence[str] = ()) -> str:
@@ -29,7 +40,7 @@ def plain(rows: Sequence[Sequence[object]], head: Sequence[str] = ()) -> str:
     return "\n".join(lines)
 
 
-def frame(table: Any) -> str:
+def frame(table: pd.DataFrame) -> str:
     """A pandas table of texts, titles at the head."""
     return plain(table.to_numpy().tolist(), list(table.columns))
 
@@ -40,9 +51,9 @@ def resolved_scene(rows: Sequence[Any]) -> str:
     return plain(lines, ["field", "value", "given", "meaning"])
 
 
-def mesh_quality(mesh: Any) -> str:
+def mesh_quality(mesh: Mesh) -> str:
     """Sizes of bodies and faces, then what the mesher reports."""
-    rows = [["points", len(mesh.points)]]
+    rows: list[Sequence[object]] = [["points", len(mesh.points)]]
     rows += [[f"body {name}, cells", len(cells)] for name, cells in mesh.bodies.items()]
     rows += [[f"volume {name}, cells", len(part)] for name, part in mesh.parts.items()]
     rows += [[f"face {name}, cells", len(cells)] for name, cells in mesh.faces.items()]
@@ -50,7 +61,7 @@ def mesh_quality(mesh: Any) -> str:
     return plain(rows, ["mesh", "value"])
 
 
-def frequencies(sets: Sequence[Any]) -> str:
+def frequencies(sets: Sequence[ModeSet]) -> str:
     """Natural frequencies, a row for each nodal diameter."""
     count = max(len(s.frequencies) for s in sets)
     head = ["nodal diameter", *(f"f{i + 1} [Hz]" for i in range(count)), "residual"]
@@ -62,12 +73,12 @@ def frequencies(sets: Sequence[Any]) -> str:
     return plain(rows, head)
 
 
-def reduction(reduced: Any) -> str:
+def reduction(reduced: Reduced) -> str:
     """Size of the reduced bodies: a row for each nodal diameter of the blade, one for the
     damper.
     """
 
-    def row(name: str, body: Any) -> list[object]:
+    def row(name: str, body: PortModel) -> list[object]:
         return [name, len(body.omega), f"{body.omega.max() / (2 * pi):.1f}", body.shapes.shape[0]]
 
     rows = [
@@ -75,12 +86,12 @@ def reduction(reduced: Any) -> str:
         for n, body in reduced.sector.items()
     ]
     return plain(
-        [*rows, row("damper", reduced.damper)], ["body", "modes", "highest [Hz]", "port freedoms"]
+        [*rows, row("damper", reduced.damper)], ["body", "modes", "highest [Hz]", "port dofs"]
     )
 
 
-def survey(found: Any) -> str:
-    """Frequencies, and the short tables of what was asked for beside them."""
+def survey(found: Survey) -> str:
+    """Frequencies, and the short tables of what was asked for in addition."""
     parts = [frequencies(found.run.modes)]
     if found.campbell is not None:
         rows = [
@@ -117,7 +128,7 @@ def survey(found: Any) -> str:
     return "\n\n".join(parts)
 
 
-def pressures(maps: Mapping[float, Sequence[Any]]) -> str:
+def pressures(maps: Mapping[float, Sequence[PressureMap]]) -> str:
     """Force and pressure of each face, for each load."""
     rows = []
     for load, seats in maps.items():
@@ -139,7 +150,7 @@ def pressures(maps: Mapping[float, Sequence[Any]]) -> str:
     )
 
 
-def responses(response: Any) -> str:
+def responses(response: Response) -> str:
     """Resonance against load, and what damping is gained over no damper; in the units of the
     report.
     """
@@ -151,10 +162,10 @@ def responses(response: Any) -> str:
     curves = response.curves
     rows = pd.DataFrame(summary(curves, response.limits))
     rows = rows[[name for name in SHOWN if name in rows]]
-    rows.insert(0, "seat load", ["no damper", *map(_case, curves), "full stick"])
+    rows.insert(0, "seat load", ["no damper", *map(_case_label, curves), "full stick"])
     best = min(curves, key=lambda c: c.peak_amplitude)
     return (
-        f"{table(rows)}\nbest of these loads: {_case(best)}, amplitude divided by "
+        f"{table(rows)}\nbest of these loads: {_case_label(best)}, amplitude divided by "
         f"{undamped / best.peak_amplitude:.3g}"
     )
 
@@ -173,12 +184,12 @@ SHOWN = (
 )
 
 
-def _case(curve: Any) -> str:
+def _case_label(curve: Curve) -> str:
     """Load, and mass where several are studied."""
     return show(curve.load, "N") + ("" if curve.mass is None else f" on {show(curve.mass, 'kg')}")
 
 
-def side_by_side(name: str, best: Any) -> str:
+def side_by_side(name: str, best: pd.DataFrame) -> str:
     """The best load of each value of a field; the files hold more columns."""
     columns = [
         "value",
@@ -189,14 +200,14 @@ def side_by_side(name: str, best: Any) -> str:
     return table(best[columns].rename(columns={"value": name}))
 
 
-def table(rows: Any) -> str:
+def table(rows: pd.DataFrame) -> str:
     """A pandas table of SI columns, in the units of the report."""
     from ..report.tables import readable
 
     return frame(readable(rows))
 
 
-def summary(run: Any) -> str:
+def summary(run: Run) -> str:
     """Messages of the run, where the time went and where the results are."""
     total = sum(run.timings.values())
     rows = [
@@ -215,7 +226,7 @@ def _is_number(text: str) -> bool:
     return True
 
 
-def run_table(run: Any) -> str:
+def run_table(run: SolvedRun) -> str:
     """What a run of a blade with its damper ends with."""
     return responses(run.response)
 

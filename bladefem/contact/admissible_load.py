@@ -35,7 +35,7 @@ def normal_load_bounds(
     Raises:
         NotSolvedError: no admissible forces balance the load.
     """
-    balance = _edges(rigid, mu)
+    balance = _cone_edges(rigid, mu)
     size = float(np.abs(load).max())
     bounds = []
     for sign in (1.0, -1.0):
@@ -55,7 +55,7 @@ def normal_load_bounds(
 
 def holds_itself(rigid: np.ndarray, mu: np.ndarray) -> bool:
     """Whether friction alone can hold the damper between its seats, without any load."""
-    balance = _edges(rigid, mu)
+    balance = _cone_edges(rigid, mu)
     balance = balance / np.abs(balance).max(axis=1, keepdims=True)
     ones = np.ones((1, balance.shape[1]))
     rows = np.vstack([balance, ones])
@@ -64,7 +64,7 @@ def holds_itself(rigid: np.ndarray, mu: np.ndarray) -> bool:
     return found.status == 0 and float(np.abs(rows @ found.x - wanted).max()) < BALANCED
 
 
-def _edges(rigid: np.ndarray, mu: np.ndarray) -> np.ndarray:
+def _cone_edges(rigid: np.ndarray, mu: np.ndarray) -> np.ndarray:
     """(d, columns) what a unit normal force along each edge of each friction cone adds to the
     balance.
     """

@@ -28,6 +28,9 @@ HELD = 1e-6
 UNBALANCED = 1e-8
 
 
+INDEFINITE = "the contact flexibility is not positive definite"
+
+
 @dataclass(frozen=True)
 class LCPSolution:
     """Forces, gaps and rigid displacements, with the proof that they are optimal."""
@@ -80,15 +83,13 @@ def solve_lcp(
     Source: semismooth Newton form of the active set, Hintermueller, Ito, Kunisch, DOI
     10.1137/S1052623401383558.
     """
-    C, g0, R, load = _given(C, g0, R, load)
+    C, g0, R, load = _check_arrays(C, g0, R, load)
     n = len(g0)
+    reason = _balance_failure(R, load) if load.size else ""
+    if reason:
+        return _unsolved_problem(g0, R, np.zeros(n, bool), reason)
     U, S, V = held_directions(R)
     reduced = (V.T @ load) / S
-    reason = _unbalanced(R, load) if load.size else ""
-    if reason:
-        return LCPSolution(
-            np.zeros(n), g0.copy(), np.zeros(R.shape[1]), np.zeros(n, bool), np.inf, 0, reason
-        )
     # closes even gaps, however wide, before round-off could drown the elastic ones in them
     travel = -(U.T @ g0)
     g0 = g0 + U @ travel
@@ -96,36 +97,38 @@ def solve_lcp(
     try:
         f, y, active, its, settled = _primal_dual(C, g0, U, reduced, active, max_iterations)
         if not settled:
-            f, y, active, more, settled = _primal(C, g0, U, reduced)
+            f, y, active, more, settled = _primal_active_set(C, g0, U, reduced)
             its += more
     except LinAlgError:
-        return LCPSolution(
-            np.zeros(n),
-            g0.copy(),
-            np.zeros(R.shape[1]),
-            active,
-            np.inf,
-            0,
-            "the contact flexibility is not positive definite",
-        )
+        return _unsolved_problem(g0, R, active, INDEFINITE)
     gap = g0 + C @ f + U @ y
     residual = complementarity(f, gap, float(np.abs(C @ f).max()))
-    if load.size:
-        residual = max(
-            residual, float(np.abs(U.T @ f - reduced).max(initial=0.0) / (np.abs(f).max() + 1e-300))
-        )
-    reason = (
-        ""
-        if residual <= tolerance
-        else (
+    residual = max(residual, _unbalanced_part(U.T @ f - reduced, f))
+    if residual > tolerance:
+        reason = (
             f"the contact iteration stopped after {its} steps with a residual of {residual:.1e}, "
             f"wanted {tolerance:.1e}"
         )
-    )
     return LCPSolution(f, gap, V @ ((y + travel) / S), active, residual, its, reason)
 
 
-def _given(
+def _unbalanced_part(missing: np.ndarray, force: np.ndarray) -> float:
+    """What is missing in the balance, relative to the largest force."""
+    return float(np.abs(missing).max(initial=0.0) / (np.abs(force).max() + 1e-300))
+
+
+def _unsolved_problem(
+    g0: np.ndarray,
+    R: np.ndarray,
+    active: np.ndarray,
+    reason: str,
+) -> LCPSolution:
+    """No forces, and why."""
+    nothing = np.zeros(len(g0))
+    return LCPSolution(nothing, g0.copy(), np.zeros(R.shape[1]), active, np.inf, 0, reason)
+
+
+def _check_arrays(
     C: np.ndarray,
     g0: np.ndarray,
     R: np.ndarray | None,
@@ -167,7 +170,7 @@ def held_directions(R: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     return U[:, held], S[held], Vt[held].T
 
 
-def _unbalanced(R: np.ndarray, load: np.ndarray) -> str:
+def _balance_failure(R: np.ndarray, load: np.ndarray) -> str:
     """Empty when forces >= 0 with R^T f = load exist (found by non-negative least squares), else
     the reason.
     """
@@ -211,7 +214,7 @@ def _winkler_set(
     return active if active.any() else np.ones(len(g0), dtype=bool)
 
 
-def _equality(
+def _solve_active(
     C: np.ndarray,
     g0: np.ndarray,
     U: np.ndarray,
@@ -245,7 +248,7 @@ def _primal_dual(
     """Semismooth Newton: drop pulling nodes, add penetrating ones, until the set repeats."""
     seen = set()
     for its in range(1, max_iterations + 1):
-        f, y = _equality(C, g0, U, load, active)
+        f, y = _solve_active(C, g0, U, load, active)
         gap = g0 + C @ f + U @ y
         keep = active & (f > -ROUND_OFF * np.abs(f).max(initial=0.0))
         new = keep | (~active & (gap < -ROUND_OFF * max(np.abs(gap).max(), np.abs(gap - g0).max())))
@@ -261,7 +264,7 @@ def _primal_dual(
     return f, y, active, its, False
 
 
-def _primal(
+def _primal_active_set(
     C: np.ndarray,
     g0: np.ndarray,
     U: np.ndarray,
@@ -274,7 +277,7 @@ def _primal(
     f = nnls(U.T, load)[0] if U.shape[1] else np.zeros(n)
     active = f > 0
     for its in range(1, 5 * n + 10):
-        target, y = _equality(C, g0, U, load, active)
+        target, y = _solve_active(C, g0, U, load, active)
         falling = active & (target < -ROUND_OFF * np.abs(target).max(initial=0.0))
         if falling.any():
             step = f[falling] / np.maximum(f[falling] - target[falling], 1e-300)

@@ -69,12 +69,12 @@ def shape(
     return QUADRATIC[nodes](points)
 
 
-def _line2(x: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+def _line_2(x: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     s = x[:, 0]
     return np.stack([(1 - s) / 2, (1 + s) / 2], 1), np.tile([[[-0.5], [0.5]]], (len(x), 1, 1))
 
 
-def _line3(x: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+def _line_3(x: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     s = x[:, 0]
     return (
         np.stack([s * (s - 1) / 2, s * (s + 1) / 2, 1 - s * s], 1),
@@ -82,15 +82,15 @@ def _line3(x: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     )
 
 
-def _triangle3(x: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+def _triangle_3(x: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     r, s = x.T
     return np.stack([1 - r - s, r, s], 1), np.tile(
         [[-1.0, -1.0], [1.0, 0.0], [0.0, 1.0]], (len(x), 1, 1)
     )
 
 
-def _triangle6(x: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    L, dL = _triangle3(x)
+def _triangle_6(x: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    L, dL = _triangle_3(x)
     N = [L[:, i] * (2 * L[:, i] - 1) for i in range(3)]
     dN = [(4 * L[:, i : i + 1] - 1) * dL[:, i] for i in range(3)]
     for i, j in ((0, 1), (1, 2), (2, 0)):
@@ -102,33 +102,33 @@ def _triangle6(x: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
 SQUARE = np.array([(-1, -1), (1, -1), (1, 1), (-1, 1), (0, -1), (1, 0), (0, 1), (-1, 0), (0, 0)])
 
 
-def _tensor(
+def _tensor_product(
     values: Callable,
     order: np.ndarray,
     x: np.ndarray,
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Products of one-dimensional functions; order (k, 2) tells which pair each node takes."""
+    """Products of one-dimensional functions; order (k, 2) is the pair that each node takes."""
     (A, dA), (B, dB) = values(x[:, :1]), values(x[:, 1:])
     i, j = order.T
     N = A[:, i] * B[:, j]
     return N, np.stack([dA[:, i, 0] * B[:, j], A[:, i] * dB[:, j, 0]], 2)
 
 
-def _square4(x: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    return _tensor(_line2, (SQUARE[:4] + 1) // 2, x)
+def _square_4(x: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    return _tensor_product(_line_2, (SQUARE[:4] + 1) // 2, x)
 
 
-def _square9(x: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+def _square_9(x: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     # -1, 0, 1 -> nodes 0, 2, 1 of the line
-    return _tensor(_line3, np.array([0, 2, 1])[SQUARE + 1], x)
+    return _tensor_product(_line_3, np.array([0, 2, 1])[SQUARE + 1], x)
 
 
-def _square8(x: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+def _square_8(x: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Serendipity: the nine-node functions with the centre spread so that quadratics survive."""
-    N, dN = _square9(x)
+    N, dN = _square_9(x)
     spread = np.array([-0.25] * 4 + [0.5] * 4)
     return N[:, :8] + N[:, 8:] * spread, dN[:, :8] + dN[:, 8:] * spread[:, None]
 
 
-LINEAR = {2: _line2, 3: _triangle3, 4: _square4}
-QUADRATIC = {3: _line3, 6: _triangle6, 8: _square8, 9: _square9}
+LINEAR = {2: _line_2, 3: _triangle_3, 4: _square_4}
+QUADRATIC = {3: _line_3, 6: _triangle_6, 8: _square_8, 9: _square_9}

@@ -3,8 +3,8 @@ anything presses.
 
 A crown of radius R leaves s^2 / (2 R) at the distance s from the middle of the seat; an eased edge
 leaves (b - e)^2 / (2 r) at the distance e < b from the edge, r its radius and b the width of its
-strip. Both are parabolas in place of circles, as in Hertz' theory: heights are small beside the
-radii.
+strip. Both are parabolas in place of circles, as in Hertz' theory: heights are small compared with
+the radii.
 """
 
 from __future__ import annotations

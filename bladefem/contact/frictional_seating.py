@@ -241,7 +241,7 @@ def _refined(
         after = _history(problem, face, speeds, scale, bedded, steps)
         limit = float((face.mu * after.force[:, 0]).max())
         apart = float(np.abs(after.force[:, 1:] - before.force[:, 1:]).max())
-        change = apart / max(limit, np.finfo(float).tiny)
+        change = apart / max(limit, float(np.finfo(float).tiny))
         if change < STEPPED or steps >= MOST_STEPS:
             break
         before = after

@@ -16,7 +16,7 @@ from ..scene.tables import Material
 
 # width over element size, at least: wherever the nodes lie the peak is within 2 % (1: 28 %, 4: 0.4
 # %)
-FINEST = 2.0
+MIN_ELEMENTS_PER_RADIUS = 2.0
 
 
 def contact_modulus(one: Material, other: Material) -> float:

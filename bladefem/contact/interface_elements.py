@@ -6,7 +6,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import replace
-from typing import Any
+from typing import Any, TypeVar
 
 import numpy as np
 import scipy.sparse as sp
@@ -17,11 +17,14 @@ from ..scene.tables import Contact, Material, Seat
 from .interface_law import InterfaceLaw, rigid_faces, stiffness_at
 from .seating import ContactProblem
 
-# stiffness for each unit of area that stands for rigid faces in the elements [N/m^3]: a layer of
+# [contact], or the values of one seat
+Layer = TypeVar("Layer", Contact, Seat)
+
+# stiffness per unit area that stands for rigid faces in the elements [N/m^3]: a layer of
 # 1e-8 of the compliance of steel over a millimetre
 RIGID = 1e22
 
-# tangential stiffness for each unit of area where the scene tells none [N/m^3]
+# tangential stiffness per unit area where the scene gives none [N/m^3]
 USUAL = 4e10
 
 
@@ -48,7 +51,7 @@ def seat_contact(contact: Contact, patch: str) -> Contact:
     A stiffness of the seat itself, total or areal, wins over both of [contact].
     """
     own = {"this": contact.right, "next": contact.left}.get(patch, Seat())
-    changes: dict[str, float | None] = {} if own.mu is None else {"mu": own.mu}
+    changes: dict[str, Any] = {} if own.mu is None else {"mu": own.mu}
     for total, areal in (("kt", "kt_area"), ("kn", "kn_area")):
         if getattr(own, total) is not None or getattr(own, areal) is not None:
             changes |= {total: getattr(own, total), areal: getattr(own, areal)}
@@ -82,8 +85,8 @@ def scaled_contact(
         "kn": (not _gives(contact, "kn"), "kt", 1 / ratio),
     }
 
-    def scaled(table: Any) -> Any:
-        changes: dict[str, float] = {}
+    def scaled(table: Layer) -> Layer:
+        changes: dict[str, Any] = {}
         for name, factor in (("kt", kt), ("kn", kn)):
             follows, other, quotient = followed[name]
             if follows and not _gives(table, name):
@@ -216,15 +219,10 @@ def friction_elements(
     area = [a.T @ m.patch.area for a, m in zip(members, maps, strict=True)]
     mapped: list[np.ndarray | None] = [None] * len(maps)
     if contact.stiffness == "map":
+        if problem is None:
+            raise InputError("contact.stiffness = 'map': expected the contact problem of the maps")
         mapped = [a.T @ k for a, k in zip(members, mapped_stiffness(problem, maps), strict=True)]
-    kt, kn = map(
-        np.concatenate,
-        zip(
-            *(stiffnesses(c, ratio, a, k) for c, a, k in zip(seats, area, mapped, strict=True)),
-            strict=True,
-        ),
-    )
-    _require_stiffness(kt, kn)
+    kt, kn = _layer_stiffness(seats, ratio, area, mapped)
     force = np.concatenate([a.T @ m.force for a, m in zip(members, maps, strict=True)])
     if contact.stiffening is not None:
         law = InterfaceLaw(kn, contact.stiffening * np.concatenate(area))
@@ -243,6 +241,20 @@ def friction_elements(
     S = sp.kron(sp.block_diag(G), sp.identity(1 + tangents), format="csr")
     mu = np.repeat([c.mu for c in seats], [len(a) for a in area])
     return Elements(kt, kn, mu, n0, tangents, t0=t0), S
+
+
+def _layer_stiffness(
+    seats: Sequence[Contact],
+    ratio: float,
+    area: Sequence[np.ndarray],
+    mapped: Sequence[np.ndarray | None],
+) -> tuple[np.ndarray, np.ndarray]:
+    """Tangential and normal stiffness (n,) [N/m] of the elements of all seats."""
+    parts = [stiffnesses(c, ratio, a, k) for c, a, k in zip(seats, area, mapped, strict=True)]
+    kt = np.concatenate([tangential for tangential, _ in parts])
+    kn = np.concatenate([normal for _, normal in parts])
+    _require_stiffness(kt, kn)
+    return kt, kn
 
 
 def _require_stiffness(kt: np.ndarray, kn: np.ndarray) -> None:

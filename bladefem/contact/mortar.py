@@ -11,6 +11,7 @@ of the other. Source of the method: Puso and Laursen, DOI 10.1016/j.cma.2003.10.
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
@@ -24,8 +25,8 @@ from .face_elements import LINEAR, corner_count, face_quadrature, shape, tractio
 from .surface import FaceRule, frames, outward, surface
 
 # pieces below this part of a face's area are dropped
-SLIVER = 1e-9
-STEEP = np.cos(np.radians(75))
+SLIVER_AREA = 1e-9
+MIN_FACING_COSINE = np.cos(np.radians(75))
 # of Newton's method to the place on a curved face
 STEPS = 8
 # a face counts as covered when less than this part of it is left over
@@ -73,11 +74,11 @@ def overlap(mesh: Mesh, pair: str) -> Overlap:
     Y = places[1][slave[:, :d]]
     weighted, _ = surface(mesh, master)
     sign = outward(mesh, master, weighted.sum(axis=1))
-    view = _view(weighted.sum(axis=1) * sign[:, None], d, pair)
-    close = np.array(_close(X, Y), dtype=int).reshape(-1, 2)
+    view = _view_axes(weighted.sum(axis=1) * sign[:, None], d, pair)
+    close = np.array(_close_pairs(X, Y), dtype=int).reshape(-1, 2)
     # The corners of the slave in the master's own coordinates, in which its edges are taken as
     # straight.
-    corners = _located(places[0][master[close[:, 0]]], Y[close[:, 1]] @ view.T, view)
+    corners = _locate_points(places[0][master[close[:, 0]]], Y[close[:, 1]] @ view.T, view)
     cut = _cut_line if d == 2 else _cut_triangle
     pieces = [
         (i, j, piece)
@@ -90,7 +91,7 @@ def overlap(mesh: Mesh, pair: str) -> Overlap:
         )
     face = np.array([piece[:2] for piece in pieces])
     nodes = places[0][master[face[:, 0]]], places[1][slave[face[:, 1]]]
-    at, vector = _quadrature(*nodes, np.array([piece[2] for piece in pieces]), view)
+    at, vector = _piece_quadrature(*nodes, np.array([piece[2] for piece in pieces]), view)
     vector = vector * ((mesh.depth if d == 2 else 1.0) * sign[face[:, 0], None, None])
     weight = np.linalg.norm(vector, axis=2)
     whole = np.linalg.norm(weighted, axis=2).sum(axis=1)
@@ -117,7 +118,7 @@ def mortar_patch(mesh: Mesh, pair: str) -> Patch:
     np.add.at(normals, faces[:, :d], direction[:, None, :])
     area = np.bincount(
         o.master[o.face[:, 0], :d].ravel(),
-        np.einsum("sqk,sq->sk", _traction(o), o.weight).ravel(),
+        np.einsum("sqk,sq->sk", _traction_functions(o), o.weight).ravel(),
         len(mesh.points),
     )
     normal = normals[nodes] / np.linalg.norm(normals[nodes], axis=1, keepdims=True)
@@ -152,12 +153,12 @@ def mortar_faces(
         faces,
         number[o.master[o.face[:, 0], :d]],
         N.reshape(len(faces), q, -1),
-        _traction(o) * o.weight[:, :, None],
+        _traction_functions(o) * o.weight[:, :, None],
         o.normal,
     )
 
 
-def _traction(o: Overlap) -> np.ndarray:
+def _traction_functions(o: Overlap) -> np.ndarray:
     """Traction functions (s, q, k) on the pieces: hats on faces covered in part, where the others
     could be negative.
     """
@@ -170,7 +171,7 @@ def _traction(o: Overlap) -> np.ndarray:
     )
 
 
-def _close(X: np.ndarray, Y: np.ndarray) -> list[tuple[int, int]]:
+def _close_pairs(X: np.ndarray, Y: np.ndarray) -> list[tuple[int, int]]:
     """Pairs of faces (corners (n, k, 3)) whose spheres touch."""
     cx = X.mean(axis=1)
     cy = Y.mean(axis=1)
@@ -187,22 +188,30 @@ def _close(X: np.ndarray, Y: np.ndarray) -> list[tuple[int, int]]:
 def _cut_line(ends: np.ndarray) -> list[np.ndarray]:
     """The part (2, 1) of a line (2, 1) within the reference line."""
     a, b = np.sort(ends[:, 0]).clip(-1, 1)
-    return [np.array([[a], [b]])] if b - a > 2 * SLIVER else []
+    return [np.array([[a], [b]])] if b - a > 2 * SLIVER_AREA else []
 
 
-def _cut_triangle(polygon: np.ndarray) -> list[np.ndarray]:
+def _cut_triangle(triangle: np.ndarray) -> list[np.ndarray]:
     """The part of a triangle (3, 2) within the reference triangle as triangles (3, 2)
     (Sutherland-Hodgman).
     """
-    for level in (lambda p: p[0], lambda p: p[1], lambda p: 1 - p[0] - p[1]):
-        polygon = _clip(polygon, level)
+    polygon = list(triangle)
+    levels: tuple[Callable[[np.ndarray], float], ...] = (
+        lambda p: p[0],
+        lambda p: p[1],
+        lambda p: 1 - p[0] - p[1],
+    )
+    for level in levels:
+        polygon = _clip_polygon(polygon, level)
         if len(polygon) < 3:
             return []
     fan = [np.array([polygon[0], polygon[i], polygon[i + 1]]) for i in range(1, len(polygon) - 1)]
-    return [f for f in fan if abs(np.linalg.det(f[1:] - f[0])) > SLIVER]
+    return [f for f in fan if abs(np.linalg.det(f[1:] - f[0])) > SLIVER_AREA]
 
 
-def _clip(polygon: list[np.ndarray] | np.ndarray, level: object) -> list[np.ndarray]:
+def _clip_polygon(
+    polygon: list[np.ndarray], level: Callable[[np.ndarray], float]
+) -> list[np.ndarray]:
     """The part of a convex polygon where a linear function is not negative."""
     kept = []
     for a, b in zip(polygon, [*polygon[1:], polygon[0]], strict=True):
@@ -215,14 +224,14 @@ def _clip(polygon: list[np.ndarray] | np.ndarray, level: object) -> list[np.ndar
     return kept
 
 
-def _view(
+def _view_axes(
     normals: np.ndarray,
     d: int,
     pair: str,
 ) -> np.ndarray:
     """(d - 1, 3) axes across the mean of the outward normals (nf, 3)."""
     axis = normals.sum(axis=0) / np.linalg.norm(normals.sum(axis=0))
-    if (normals @ axis < STEEP * np.linalg.norm(normals, axis=1)).any():
+    if (normals @ axis < MIN_FACING_COSINE * np.linalg.norm(normals, axis=1)).any():
         raise InputError(
             f"contact pair '{pair}' does not match and its master turns by more than 75 degrees "
             "from its mean normal, expected a face seen from one side: split it"
@@ -234,7 +243,7 @@ def _view(
     return np.array([first, np.cross(axis, first)])
 
 
-def _quadrature(
+def _piece_quadrature(
     X: np.ndarray,
     Y: np.ndarray,
     pieces: np.ndarray,
@@ -248,7 +257,7 @@ def _quadrature(
     d = pieces.shape[2]
     points, w = face_quadrature(d + 1)
     on_master = np.einsum("qk,skd->sqd", LINEAR[d + 1](points)[0], pieces)
-    place, tangents = _mapped(X, on_master)
+    place, tangents = _map_points(X, on_master)
     edges = pieces[:, 1:] - pieces[:, :1]
     if d == 1:
         vector = np.cross(tangents[:, :, 0], [0.0, 0.0, 1.0]) * (edges[:, :, 0] / 2)[:, :, None]
@@ -257,10 +266,10 @@ def _quadrature(
             np.cross(tangents[:, :, 0], tangents[:, :, 1])
             * np.abs(np.linalg.det(edges))[:, None, None]
         )
-    return (on_master, _located(Y, place @ view.T, view)), vector * w[:, None]
+    return (on_master, _locate_points(Y, place @ view.T, view)), vector * w[:, None]
 
 
-def _located(
+def _locate_points(
     nodes: np.ndarray,
     target: np.ndarray,
     view: np.ndarray,
@@ -273,10 +282,12 @@ def _located(
     s, q, d = target.shape
     at = np.full((s, q, d), 0.0 if d == 1 else 1 / 3)
     for _ in range(STEPS):
-        there, slopes = _mapped(nodes, at)
+        there, slopes = _map_points(nodes, at)
         off = (target - there @ view.T)[..., None]
         slopes = (slopes @ view.T).swapaxes(2, 3)
-        if (np.abs(np.linalg.det(slopes)) < SLIVER * np.abs(slopes).max(axis=(2, 3)) ** d).any():
+        if (
+            np.abs(np.linalg.det(slopes)) < SLIVER_AREA * np.abs(slopes).max(axis=(2, 3)) ** d
+        ).any():
             raise InputError(
                 "a face of a contact pair that does not match is seen edge-on along the master's "
                 "mean normal, expected faces seen from the front: split the pair"
@@ -285,7 +296,7 @@ def _located(
     return at
 
 
-def _mapped(nodes: np.ndarray, at: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+def _map_points(nodes: np.ndarray, at: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Places (s, q, 3) and tangents (s, q, d, 3) on faces with nodes (s, m, 3) at reference points
     (s, q, d).
     """

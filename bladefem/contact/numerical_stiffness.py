@@ -53,13 +53,13 @@ def split_stiffness(
     Args:
         elements: of ``friction_elements``.
         maps: static pressure of each patch.
-        areal: numerical stiffness for each unit of area [N/m^3].
+        areal: numerical stiffness per unit area [N/m^3].
 
     Returns:
         The elements, which rest in the same state, and (n, 1 + tangents) compliances [m/N], not
         positive; None where nothing is stiff.
     """
-    area = np.concatenate([_areas(m, contact) for m in maps])
+    area = np.concatenate([_element_areas(m, contact) for m in maps])
     kt = np.minimum(elements.kt, areal * area)
     kn = np.minimum(elements.kn, areal * area)
     if np.array_equal(kt, elements.kt) and np.array_equal(kn, elements.kn):
@@ -87,7 +87,7 @@ def physical_stiffness(elements: Elements, series: np.ndarray | None) -> Element
     return replace(elements, kt=kt, kn=kn, n0=np.where(elements.n0 < 0, open_load, elements.n0))
 
 
-def _areas(pressure: PressureMap, contact: Contact) -> np.ndarray:
+def _element_areas(pressure: PressureMap, contact: Contact) -> np.ndarray:
     """(m,) what each element of a patch stands for [m^2]."""
     groups = aggregation(pressure.patch, contact.points).indices
     return np.bincount(groups, pressure.patch.area)

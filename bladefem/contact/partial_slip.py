@@ -84,20 +84,20 @@ def slip_step(
     state = np.where(limit > 0, before.state, 1)
     seen = set()
     for _ in range(max_iterations):
-        q, move = _stuck(C, limit, before, state, shift, total)
+        q, move = _stuck_forces(C, limit, before, state, shift, total)
         slip = move - C @ (q - before.force)
-        new = _update(q, slip, limit, state)
+        new = _update_states(q, slip, limit, state)
         if np.array_equal(new, state):
             slip[state == 0] = 0.0
             return SlipState(
                 q, before.shift + move, slip, np.where(limit > 0, state, 0), float(q @ slip)
             )
-        state = _single(new, state, q, slip, limit) if new.tobytes() in seen else new
+        state = _change_worst(new, state, q, slip, limit) if new.tobytes() in seen else new
         seen.add(new.tobytes())
     raise NotSolvedError(f"the stick and slip sets did not settle in {max_iterations} steps")
 
 
-def _stuck(
+def _stuck_forces(
     C: np.ndarray,
     limit: np.ndarray,
     before: SlipState,
@@ -130,7 +130,7 @@ def _stuck(
     return q, move
 
 
-def _update(
+def _update_states(
     q: np.ndarray,
     slip: np.ndarray,
     limit: np.ndarray,
@@ -145,7 +145,7 @@ def _update(
     return np.where(limit > 0, new, state)
 
 
-def _single(
+def _change_worst(
     new: np.ndarray,
     state: np.ndarray,
     q: np.ndarray,

@@ -6,15 +6,8 @@ turned into consistent loads of the elements' own shape functions; the displacem
 f_i is the chi_i-weighted mean. One matrix P serves both (u_port = P^T u, nodal forces = P f), so
 the element stiffness is left alone.
 
-The choice of chi was measured, relative errors on quadratic tetrahedra with element size a/10
-(Hertz sphere) and a/20 (plane flat punch, r < 0.8 a); benchmarks/contact_hertz.py makes the table
-again:
-
-    chi                              sphere: peak   pressure L2     edge    punch: L2 hat functions
-    0.2 %         6.8 %     3.4 %        1.3 %  (wiggles at the edge) their dual functions
-    0.2 %         4.8 %     4.2 %        0.4 % a third hat, two thirds dual (used)    0.0 %
-    3.0 %     1.8 %        0.4 % mid-side nodes tied to corners         0.8 %         4.7 %     4.2
-    %    (needs a constrained stiffness)
+chi is a third of the hat function and two thirds of its dual function: of four choices the most
+accurate on a Hertz sphere and under a flat punch (docs/contact.md, benchmarks/contact_hertz.py).
 """
 
 from __future__ import annotations
@@ -57,11 +50,11 @@ def make_patch(mesh: Mesh, pair: str) -> Patch:
             f"contact pair '{pair}' is not in the mesh; it has "
             f"{', '.join(sorted(mesh.pairs)) or 'none'}"
         )
-    patch = _matched(mesh, pair) if mesh.pairs[pair].nodes.size else mortar_patch(mesh, pair)
+    patch = _matched_patch(mesh, pair) if mesh.pairs[pair].nodes.size else mortar_patch(mesh, pair)
     return replace(patch, places=patch_means(patch, mesh).T @ mesh.points)
 
 
-def _matched(mesh: Mesh, pair: str) -> Patch:
+def _matched_patch(mesh: Mesh, pair: str) -> Patch:
     """The patch of faces that match."""
     faces, slave = patch_faces(mesh, pair)
     corners = corner_count(mesh.dimension, faces.shape[1])
@@ -105,7 +98,7 @@ def patch_faces(mesh: Mesh, pair: str) -> tuple[np.ndarray, np.ndarray]:
 
 
 def normal_ports(patches: Sequence[Patch], mesh: Mesh) -> np.ndarray:
-    """Numbers of the normal freedoms among the ports of port_matrix, (sum of nodes,)."""
+    """Numbers of the normal degrees of freedom among the ports of port_matrix, (sum of nodes,)."""
     return np.arange(sum(len(p.area) for p in patches)) * mesh.dimension
 
 
@@ -127,7 +120,7 @@ def port_matrix(
         gives the elements' consistent loads, and a linear displacement is measured at the centre of
         each chi.
     """
-    return sp.hstack([_ports(patch, mesh, side) for patch in patches], format="csc")
+    return sp.hstack([_patch_ports(patch, mesh, side) for patch in patches], format="csc")
 
 
 def patch_means(
@@ -140,7 +133,7 @@ def patch_means(
     Initial gaps must be averaged by it too: at a corner or edge of the patch the mean is not the
     value at the node.
     """
-    rule = _rule(patch, mesh, side)
+    rule = _side_rule(patch, mesh, side)
     blocks = np.einsum("fqk,fqm->fmk", rule.traction, rule.shape)
     rows = np.repeat(rule.nodes[:, :, None], blocks.shape[2], axis=2)
     columns = np.repeat(rule.columns[:, None, :], blocks.shape[1], axis=1)
@@ -157,7 +150,7 @@ def initial_gap(patch: Patch, mesh: Mesh) -> np.ndarray:
     pair = mesh.pairs[patch.name]
     d = mesh.dimension
     blade, damper = (
-        _ports(patch, mesh, side)[:, ::d].T @ place[:, :d].ravel()
+        _patch_ports(patch, mesh, side)[:, ::d].T @ place[:, :d].ravel()
         for side, place in (("blade", mesh.points), ("damper", mesh.points - pair.shift))
     )
     return damper - blade
@@ -183,7 +176,7 @@ def rigid_ports(
     return port_matrix(patches, mesh, "damper").T @ motions.reshape(len(r) * d, -1)
 
 
-def _ports(
+def _patch_ports(
     patch: Patch,
     mesh: Mesh,
     side: str,
@@ -192,7 +185,7 @@ def _ports(
     at each point.
     """
     d = mesh.dimension
-    rule = _rule(patch, mesh, side)
+    rule = _side_rule(patch, mesh, side)
     frame = frames(rule.normal.reshape(-1, 3), d, patch.frame[:, 0])
     if side != "blade":
         frame = frame @ mesh.pairs[patch.name].rotation.T
@@ -214,7 +207,7 @@ def _ports(
     return (P.tocsr() @ sp.diags(np.repeat(1 / patch.area, d))).tocsc()
 
 
-def _rule(
+def _side_rule(
     patch: Patch,
     mesh: Mesh,
     side: str,

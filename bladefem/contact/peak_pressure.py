@@ -18,7 +18,7 @@ from ..data import Patch, PressureMap
 from ..scene.tables import Contact, Scene
 from ..scene.units import show
 from .face_profile import element_size
-from .hertz import FINEST, contact_modulus, line_width, point_radius
+from .hertz import MIN_ELEMENTS_PER_RADIUS, contact_modulus, line_width, point_radius
 from .interface_elements import interface_law, pair_ratio
 
 # half width of a crown's contact over the element size that is advised
@@ -82,10 +82,12 @@ def areal_stiffness(patch: Patch, scene: Scene) -> float:
 
 def at_edge(pressure: PressureMap) -> bool:
     """Whether the largest pressure is at the boundary of its patch."""
-    return bool(pressure.force.any() and _boundary(pressure.patch)[np.argmax(pressure.pressure)])
+    return bool(
+        pressure.force.any() and _boundary_nodes(pressure.patch)[np.argmax(pressure.pressure)]
+    )
 
 
-def _boundary(patch: Patch) -> np.ndarray:
+def _boundary_nodes(patch: Patch) -> np.ndarray:
     """(n,) bool, nodes on sides that belong to one face only; the two ends of a plane seat."""
     faces = patch.faces
     k = patch.faces.shape[1]
@@ -128,7 +130,7 @@ def narrow_sentence(
         ),
         key=lambda found: found[0] / found[1],
     )
-    if worst >= FINEST * size:
+    if worst >= MIN_ELEMENTS_PER_RADIUS * size:
         return ""
     wanted = float(f"{worst / WANTED:.2g}")
     return (
@@ -184,15 +186,14 @@ def _half_width(
     axes = pressure.patch.frame.mean(axis=0)[1 : 2 if plane else 3]
     lengths = [*np.ptp(pressure.patch.points @ axes.T, axis=0), *([depth] if plane else [])]
     radii = [contact.crown_across, None if plane else contact.crown]
+    both = [radius for radius in radii if radius is not None]
     widths = []
     for radius, length, other in zip(radii, lengths, lengths[::-1], strict=True):
         if radius is not None:
             width = line_width(load / other, radius, modulus)
-            if None not in radii:
-                width = max(
-                    width,
-                    point_radius(load, np.prod(radii) ** 0.5, modulus)
-                    * (radius / max(radii)) ** (1 / 3),
-                )
+            if len(both) == 2:
+                mean = float(np.prod(both)) ** 0.5
+                ellipse = (radius / max(both)) ** (1 / 3)
+                width = max(width, point_radius(load, mean, modulus) * ellipse)
             widths.append(width if width < length / 2 else np.inf)
     return min(widths, default=np.inf)

@@ -5,8 +5,8 @@ The wheel is at rest in the rotating frame and all blades move alike (nodal diam
 blade's seat_left is this blade's seat_left in its own axes. With f >= 0 the pressing forces at the
 normal ports of both seats,
 
-    opening = clearance - u_blade + u_damper = g0 + (C_blade + C_damper) f + B q,   B^T f + load =
-    0,
+    opening = clearance - u_blade + u_damper = g0 + (C_blade + C_damper) f + B q,
+    B^T f + load = 0,
 
 where q is the damper's rigid motion, found from equilibrium: no spring holds it. Directions that
 frictionless seats can't hold (the engine axis for a wedge, the circumference for a flat damper)
@@ -37,6 +37,7 @@ from ..fem.flexibility import Flexibility, compliance, flexible
 from ..fem.linalg import dot
 from ..fem.loads import centrifugal, mass
 from ..scene.tables import Materials
+from ..util.communicator import Communicator
 from .as_array import given
 from .complementarity import LCPSolution, held_directions, solve_lcp
 from .interface_law import InterfaceLaw, closure_of, compliance_at, rigid_faces
@@ -199,7 +200,7 @@ def seat(
     speed: float,
     clearance: float = 0.0,
     normal: float | None = None,
-    comm: object = None,
+    comm: Communicator | None = None,
 ) -> list[PressureMap]:
     """Everything from the mesh to the pressure maps of "this" and "next" in one call (``solve``
     tells the arguments).

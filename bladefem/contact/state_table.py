@@ -52,7 +52,9 @@ def state_table(solve: Callable[..., np.ndarray], axes: Sequence[np.ndarray]) ->
             )
     force = np.array([solve(*point) for point in product(*axes)])
     force = force.reshape(*(len(a) for a in axes), -1)
-    return StateTable(axes, force, np.stack([_bend(force, a, k) for k, a in enumerate(axes)]))
+    return StateTable(
+        axes, force, np.stack([_second_difference(force, a, k) for k, a in enumerate(axes)])
+    )
 
 
 def interpolate(table: StateTable, point: Sequence[float]) -> tuple[np.ndarray, float]:
@@ -86,7 +88,7 @@ def interpolate(table: StateTable, point: Sequence[float]) -> tuple[np.ndarray, 
     return force, indicator / (float(np.abs(table.force).max()) or 1.0)
 
 
-def _bend(
+def _second_difference(
     force: np.ndarray,
     a: np.ndarray,
     k: int,

@@ -18,11 +18,14 @@ import numpy as np
 
 from bladefem.errors import InputError
 from bladefem.hbm.solution import probe_motion
+from bladefem.util.newton import Outcome, StepError, halve_step, iterate_newton
 
 from .paper import DamperResponse, Platform, balance, damper_response, equivalent, residual
 
 # growth over the free motion at which an iteration is given up
-HUGE = 1e4
+DIVERGED_GROWTH = 1e4
+# step share below which Newton's search direction is given up
+SHORTEST_STEP_SHARE = 2.0**-7
 
 
 @dataclass(frozen=True)
@@ -101,6 +104,13 @@ class _Map:
     def spread(self, c: np.ndarray) -> np.ndarray:
         return np.einsum("hnr,hr->hn", self.side.T, c)
 
+    @property
+    def latest(self) -> DamperResponse:
+        """The damper's motion under the platform motion that was tried last."""
+        if self.last is None:
+            raise RuntimeError("no motion of the damper was computed yet")
+        return self.last
+
     def force(self, u: np.ndarray) -> np.ndarray:
         self.last = damper_response(self.side, u, self.rules.damper, steps=self.rules.steps)
         self.calls, self.periods = self.calls + 1, self.periods + self.last.periods
@@ -177,12 +187,12 @@ def _fixed_point_loop(
         new = images[0] if len(images) == 1 else propose(motions, images)
         step = np.linalg.norm(new - motions[-1]) / np.linalg.norm(new)
         g.steps.append(float(step))
-        if not np.isfinite(step) or np.linalg.norm(new) > HUGE * size:
-            solved = g.last.reason == "periodic" or rules.damper == "march"
+        if not np.isfinite(step) or np.linalg.norm(new) > DIVERGED_GROWTH * size:
+            solved = g.latest.reason == "periodic" or rules.damper == "march"
             return (
                 motions[-1],
                 False,
-                "diverged" if solved else f"damper not solved: {g.last.reason}",
+                "diverged" if solved else f"damper not solved: {g.latest.reason}",
             )
         if rules.criterion == "step" and step < rules.tolerance:
             return new, True, f"step {step:.1e} below {rules.tolerance:.1e}"
@@ -190,7 +200,7 @@ def _fixed_point_loop(
         images.append(g(new))
         if rules.criterion == "residual":
             u = g.spread(new)
-            error = np.linalg.norm(residual(g.side, u, g.last.force)) / np.linalg.norm(u)
+            error = np.linalg.norm(residual(g.side, u, g.latest.force)) / np.linalg.norm(u)
             if error < rules.tolerance:
                 return new, True, f"residual {error:.1e} below {rules.tolerance:.1e}"
     return motions[-1], False, f"no convergence in {rules.most} evaluations"
@@ -261,6 +271,10 @@ def _describing_function(g: _Map, c: np.ndarray) -> tuple[np.ndarray, bool, str]
     return (found, True, reason) if converged else _damped_newton(g, c)
 
 
+# real unknowns, residual there
+_Guess = tuple[np.ndarray, np.ndarray]
+
+
 def _damped_newton(g: _Map, c: np.ndarray) -> tuple[np.ndarray, bool, str]:
     """Step halving; Jacobian by differences in 2 H r directions."""
     side = g.side
@@ -271,26 +285,35 @@ def _damped_newton(g: _Map, c: np.ndarray) -> tuple[np.ndarray, bool, str]:
         u = g.spread(_packed_motion(x, c.shape))
         return _as_real(residual(side, u, g.force(u))[:, side.rows])
 
-    x = _as_real(c)
-    value = r(x)
-    while g.calls < most:
-        if np.linalg.norm(value) < goal * np.linalg.norm(x):
-            return _packed_motion(x, c.shape), True, f"residual below {goal:.1e}"
+    def advance(guess: _Guess) -> _Guess | None:
+        if g.calls >= most:
+            raise StepError(Outcome.EXHAUSTED, f"no convergence in {g.rules.most} evaluations")
+        x, value = guess
         delta = 1e-6 * np.linalg.norm(x)
         J = np.column_stack([(r(x + delta * e) - value) / delta for e in np.eye(len(x))])
         if not np.isfinite(J).all():
-            return _packed_motion(x, c.shape), False, f"damper not solved: {g.last.reason}"
+            raise StepError(Outcome.NOT_FINITE, "Jacobian is not finite")
         step = np.linalg.lstsq(J, -value, rcond=None)[0]
-        for halving in range(8):
-            trial = x + step * 0.5**halving
-            new = r(trial)
-            if np.linalg.norm(new) < np.linalg.norm(value):
-                break
-        else:
-            return _packed_motion(x, c.shape), False, "line search stalled"
-        x = trial
-        value = new
-    return _packed_motion(x, c.shape), False, f"no convergence in {g.rules.most} evaluations"
+        before = np.linalg.norm(value)
+        return halve_step(
+            lambda share: (x + share * step, r(x + share * step)),
+            lambda trial, _: bool(np.linalg.norm(trial[1]) < before),
+            SHORTEST_STEP_SHARE,
+        )
+
+    first = _as_real(c)
+    run = iterate_newton(
+        (first, r(first)),
+        lambda guess: float(
+            np.linalg.norm(guess[1]) / max(np.linalg.norm(guess[0]), np.finfo(float).tiny)
+        ),
+        advance,
+        goal,
+        g.rules.most,
+    )
+    unsolved = run.outcome is Outcome.NOT_FINITE
+    reason = f"damper not solved: {g.latest.reason}" if unsolved else run.reason
+    return _packed_motion(run.state[0], c.shape), run.converged, reason
 
 
 def _as_real(c: np.ndarray) -> np.ndarray:

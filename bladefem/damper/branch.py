@@ -26,7 +26,7 @@ from ..time.shooting import Periodic, floquet_multipliers, periodic_solution, pr
 from ..time.system import System
 
 # relative distance beyond which shooting has left the solution of the balance
-NEAR = 0.02
+SAME_SOLUTION = 0.02
 
 
 @dataclass(frozen=True)
@@ -122,7 +122,7 @@ def _stability_verdict(
     amplitude: float,
     wanted: float,
 ) -> str:
-    if shot.converged and abs(amplitude / wanted - 1) > NEAR:
+    if shot.converged and abs(amplitude / wanted - 1) > SAME_SOLUTION:
         return "shooting went to another solution"
     return shot.reason
 

@@ -23,7 +23,7 @@ from scipy import linalg
 from bladefem.data import RigidBody
 from bladefem.errors import InputError
 from bladefem.hbm.linear.bodies import port_receptance
-from bladefem.hbm.model import ReducedModel
+from bladefem.hbm.model import ReducedModel, rigid_damper
 
 from ..friction.equivalent_linear import by_harmonic, from_harmonics
 from ..friction.fourier import to_real
@@ -103,10 +103,8 @@ def platform(
             port_receptance(side, model.damping, h * omega, rows, side.ports["load"]) @ load
         )
     rows = _independent_rows(np.column_stack([*G, *[f[:, None] for f in free]]))
-    G = np.array(G, complex)
-    free = np.array(free, complex)
-    T = np.array([np.linalg.lstsq(g[rows].T, g.T, rcond=1e-10)[0].T for g in G])
-    return Platform(model, omega, G, free, T, rows)
+    T = [np.linalg.lstsq(g[rows].T, g.T, rcond=1e-10)[0].T for g in G]
+    return Platform(model, omega, np.array(G, complex), np.array(free, complex), np.array(T), rows)
 
 
 def damper_response(
@@ -127,8 +125,9 @@ def damper_response(
     """
     model = side.model
     motion = np.concatenate([np.zeros((1, u.shape[1])), u]).T
-    scale = float(model.damper.B[0, 0]) or 1.0
-    system = damper_on_platforms(motion, model.elements, float(model.damper.mass[0, 0]) / scale**2)
+    damper = rigid_damper(model)
+    scale = float(damper.B[0, 0]) or 1.0
+    system = damper_on_platforms(motion, model.elements, float(damper.mass[0, 0]) / scale**2)
     H = len(u)
     if how == "march":
         steps = max(steps, stable_steps(system, side.omega), 4 * H)
@@ -160,8 +159,8 @@ def equivalent(
 ) -> np.ndarray:
     """Complex stiffness (H, n) with force = stiffness * u in the best sense [N/m].
 
-    Averaged: K_ad + i h w C_ad of Eq. 16, with the factor k that the printed C lacks. Otherwise
-    each harmonic gets its own quotient. Nodes that do not move get zero.
+    Averaged: K_ad + i h w C_ad of Eq. 16, with the factor k that is missing in the printed C.
+    Otherwise each harmonic gets its own quotient. Nodes that do not move get zero.
     """
     mean = np.zeros((1, u.shape[1]))
     u, force = (to_real(np.vstack([mean, x]).T) for x in (u, force))

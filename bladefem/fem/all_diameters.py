@@ -11,6 +11,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 from scipy.linalg import eigh
@@ -20,10 +21,10 @@ from ..errors import InputError, NotSolvedError
 from ..util.progress import Progress, unwatched
 from . import cyclic_schur as core
 from .body import Body
-from .constraint import Constrained, Transformation, at_diameter, transformation
+from .constraint import Constrained, Transformation, at_diameter, high_part, transformation
 from .eigensolver import Eigensolver
 from .flexibility import Flexibility, flexible
-from .linalg import apply, combined, dot, inertia, minus, mix
+from .linalg import Folded, apply, combined, dot, inertia, minus, mix
 from .memory import give_back
 from .modes import BLOCKS, SLEPC, mode_set, pairs
 
@@ -38,7 +39,7 @@ LEVELS = (3, 4, 5)
 # columns of a sparse product at a time, to spare memory
 CHUNK = 32
 # error of a vector's direction; that of a frequency is its square
-CLOSE = 5e-6
+VECTOR_TOLERANCE = 5e-6
 
 
 @dataclass(frozen=True)
@@ -103,7 +104,7 @@ def all_diameters(
     )
     found = {p.con.nodal_diameter: p for p in steps}
     if prove:
-        found = _proved(t, found, count)
+        found = _check_inertia(t, found, count)
     sets = {}
     # vectors go as shapes come: both at once would be the peak of memory
     for n in sorted(found):
@@ -117,7 +118,7 @@ def eigenpairs(
     count: int,
     diameters: Sequence[int],
     direct: bool = False,
-    tolerance: float = CLOSE,
+    tolerance: float = VECTOR_TOLERANCE,
     solver: Eigensolver = SLEPC,
 ) -> Iterator[Eigenpairs]:
     """``count`` pairs and some guards in each nodal diameter, in the order in which they are
@@ -126,16 +127,22 @@ def eigenpairs(
     cons = {n: at_diameter(t, n) for n in diameters}
     blocks: list[np.ndarray] = []
     space = None
-    for i, n in enumerate(_sampled(sorted(cons))):
+    for i, n in enumerate(_diameter_order(sorted(cons))):
         if i in LEVELS and not direct:
             give_back()
-            space = _space(t, blocks, space)
+            space = _extend_space(t, blocks, space)
             blocks = []
         helps = len(cons) > LEVELS[0] and i < LEVELS[-1] and not direct
         # the last ones need a step or two: guards would not pay
         guess = count + (GUARD if helps else 0)
-        start = None if space is None else _guess(space, cons[n], 2 * np.pi * n / t.sectors, guess)
-        found = _pairs(flexible(cons[n]), count, start, solver, tolerance, MORE if helps else GUARD)
+        start = (
+            None
+            if space is None
+            else _initial_vectors(space, cons[n], 2 * np.pi * n / t.sectors, guess)
+        )
+        found = _solve_pairs(
+            flexible(cons[n]), count, start, solver, tolerance, MORE if helps else GUARD
+        )
         if helps:
             blocks.append(found.X)
         few = slice(0, count + GUARD)
@@ -144,31 +151,31 @@ def eigenpairs(
         )
 
 
-def _sampled(order: list[int]) -> list[int]:
+def _diameter_order(order: list[int]) -> list[int]:
     """Those that guess well between them, then the others."""
     first = [round(part * (len(order) - 1)) for part in FIRST] if order else []
     return [order[i] for i in dict.fromkeys([*first, *range(len(order))])]
 
 
-def _pairs(
+def _solve_pairs(
     flex: Flexibility,
     count: int,
     start: np.ndarray | None,
     solver: Eigensolver,
-    tolerance: float = CLOSE,
+    tolerance: float = VECTOR_TOLERANCE,
     guard: int = GUARD,
 ) -> Eigenpairs:
     guard = min(guard, flex.con.T.shape[1] - count)
     return Eigenpairs(flex, *pairs(flex, count, tolerance, start, guard, solver))
 
 
-def _space(
+def _extend_space(
     t: Transformation,
     blocks: list[np.ndarray],
     known: _Space | None,
 ) -> _Space:
     """The parts of more vectors added to a space; what it has already is projected once."""
-    new = _span(blocks, t, known)
+    new = _span_parts(blocks, t, known)
     old = 0 if known is None else known.W.shape[1]
     W = (
         new
@@ -177,19 +184,19 @@ def _space(
             [known.W, new], axis=1, out=np.empty((len(new), old + new.shape[1]), order="F")
         )
     )
-    columns = _projected(t, W, slice(old, W.shape[1]))
+    columns = _project_columns(t, W, slice(old, W.shape[1]))
     if known is None:
         return _Space(W, *columns)
     return _Space(
         W,
         *(
-            [_grown(*each) for each in zip(A, B, (1, 1, -1), strict=True)]
+            [_append_columns(*each) for each in zip(A, B, (1, 1, -1), strict=True)]
             for A, B in zip((known.K, known.M), columns, strict=True)
         ),
     )
 
 
-def _grown(
+def _append_columns(
     A: np.ndarray,
     columns: np.ndarray,
     sign: int,
@@ -199,14 +206,14 @@ def _grown(
     return np.block([[A, columns[:old]], [sign * columns[:old].T, columns[old:]]])
 
 
-def _guess(
+def _initial_vectors(
     space: _Space,
     con: Constrained,
     angle: float,
     count: int,
 ) -> np.ndarray:
     """(n_own, count) lowest vectors of the projected pencil."""
-    Z = _small(space.K, space.M, angle, count)
+    Z = _projected_modes(space.K, space.M, angle, count)
     if con.dtype is not complex:
         return mix(space.W, Z.real)
     out = np.empty((len(space.W), count), complex, order="F")
@@ -214,7 +221,7 @@ def _guess(
     return out
 
 
-def _span(
+def _span_parts(
     blocks: list[np.ndarray],
     t: Transformation,
     known: _Space | None,
@@ -235,33 +242,34 @@ def _span(
     return mix(W, Z[:, good] / np.sqrt(size[good]) / length[:, None])
 
 
-def _projected(
+def _project_columns(
     t: Transformation,
     W: np.ndarray,
     new: slice,
 ) -> tuple[list[np.ndarray], list[np.ndarray]]:
     """(m, new) columns of the projections of K0, Kc, Ks and of M0, Mc, Ms."""
+    comm = t.body.comm
     if t.opened is None:
-        return tuple(
-            [dot(t.body.comm, W, apply(A, W[:, new])) for A in three] for three in (t.K, t.M)
-        )
-    T1 = t.high[t.opened.places]
+        stiff = [dot(comm, W, apply(A, W[:, new])) for A in t.K]
+        return stiff, [dot(comm, W, apply(A, W[:, new])) for A in t.M]
+    T1 = high_part(t)[t.opened.places]
     faces = np.flatnonzero(np.diff(T1.indptr))
     low = t.low[t.opened.places] @ W
     high = T1[faces] @ W
     out = []
-    for A, (LL, HL) in zip(
-        (t.opened.K, t.opened.M), _inside(t, low, high, faces, new), strict=True
-    ):
+    both = t.opened.K, t.opened.M
+    inner = _project_interior(both, low, high, faces, new)
+    for A, (LL, HL) in zip(both, inner, strict=True):
         beside = A[faces].T.tocsr()
         near = np.flatnonzero(np.diff(beside.indptr))
         LH = low[near].T @ (beside[near] @ high[:, new])
         out.append([LL + high.T @ (A[faces][:, faces] @ high[:, new]), LH + HL, LH - HL])
-    return tuple(out)
+    K, M = out
+    return K, M
 
 
-def _inside(
-    t: Transformation,
+def _project_interior(
+    both: tuple[Any, Any],
     low: np.ndarray,
     high: np.ndarray,
     faces: np.ndarray,
@@ -271,7 +279,7 @@ def _inside(
     pieces: list[list] = [[], []]
     for first in range(new.start, low.shape[1], CHUNK):
         moved = np.ascontiguousarray(low[:, first : first + CHUNK])
-        for piece, A in zip(pieces, (t.opened.K, t.opened.M), strict=True):
+        for piece, A in zip(pieces, both, strict=True):
             image = A @ moved
             piece.append((low.T @ image, high.T @ image[faces]))
     return [
@@ -279,7 +287,7 @@ def _inside(
     ]
 
 
-def _small(
+def _projected_modes(
     K: list[np.ndarray],
     M: list[np.ndarray],
     angle: float,
@@ -291,7 +299,7 @@ def _small(
     return eigh(*[(A + A.conj().T) / 2 for A in pencil])[1][:, :count]
 
 
-def _proved(
+def _check_inertia(
     t: Transformation,
     found: dict[int, Eigenpairs],
     count: int,
@@ -299,13 +307,13 @@ def _proved(
     """Compare counts with inertia at one shift; a diameter that lost a mode is solved from
     scratch.
     """
-    lost = lost_modes(t, {n: p.con for n, p in found.items()}, _eigenvalues(found), count)
+    lost = lost_modes(t, {n: p.con for n, p in found.items()}, _list_eigenvalues(found), count)
     for n in lost:
         found[n] = found_again(found[n].flex, count, lost[n])
     return found
 
 
-def _eigenvalues(found: dict[int, Eigenpairs]) -> dict[int, np.ndarray]:
+def _list_eigenvalues(found: dict[int, Eigenpairs]) -> dict[int, np.ndarray]:
     return {n: p.lam for n, p in found.items()}
 
 
@@ -329,11 +337,11 @@ def lost_modes(
     counts.
     """
     give_back()
-    shift = _gap([some[:count] for some in lam.values()])
+    shift = _widest_gap([some[:count] for some in lam.values()])
     if not shift > 0:
         # rigid motions alone, which geometry counts
         return {}
-    shared = _shifted(t, shift)
+    shared = _shifted_core(t, shift)
     lost = {}
     for n, con in cons.items():
         exact = _count_below(con, shift, shared)
@@ -348,14 +356,14 @@ def found_again(
     flex: Flexibility,
     count: int,
     truth: Count,
-    tolerance: float = CLOSE,
+    tolerance: float = VECTOR_TOLERANCE,
 ) -> Eigenpairs:
     """A nodal diameter solved from scratch by blocks, which do not miss double eigenvalues.
 
     Raises:
         NotSolvedError: the numbers differ even so.
     """
-    p = _pairs(flex, max(count, truth.exact + 1), None, BLOCKS, tolerance)
+    p = _solve_pairs(flex, max(count, truth.exact + 1), None, BLOCKS, tolerance)
     found = np.count_nonzero(p.lam < truth.shift)
     if found != truth.exact:
         raise NotSolvedError(
@@ -365,7 +373,7 @@ def found_again(
     return p
 
 
-def _shifted(t: Transformation, shift: float) -> core.Core | None:
+def _shifted_core(t: Transformation, shift: float) -> core.Core | None:
     """K - shift M of the open sector with its interior eliminated, for all nodal diameters."""
     if t.opened is None:
         return None
@@ -383,14 +391,12 @@ def _count_below(
     shift: float,
     shared: core.Core | None,
 ) -> int:
-    return (
-        inertia(combined(con.K, -shift, con.M))
-        if shared is None
-        else core.negative(shared, con.K.C)
-    )
+    if shared is None or not isinstance(con.K, Folded):
+        return inertia(combined(con.K, -shift, con.M))
+    return core.negative(shared, con.K.C)
 
 
-def _gap(lists: list[np.ndarray]) -> float:
+def _widest_gap(lists: list[np.ndarray]) -> float:
     """A shift in the widest relative gap of all eigenvalues, in the upper half of what every
     diameter covers.
     """

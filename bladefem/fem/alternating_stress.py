@@ -9,7 +9,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from .body import Body
-from .stress import nodal_stress, patch_stress, von_mises
+from .stress import nodal_stress, von_mises
+from .stress_error import mesh_error
 
 # instants of a period for each harmonic, the highest one included
 INSTANTS = 16
@@ -29,15 +30,24 @@ class AlternatingStress:
     place: np.ndarray
     # (H,) of each harmonic alone at that place, harmonic 1 first [Pa]
     by_harmonic: np.ndarray
-    # estimated relative error by the mesh, see `mesh_error`
+    # estimated relative error by the mesh, see `stress_error.mesh_error`
     mesh_error: float
+    # (n_points,) at each node [Pa]; of nodes that are far from the largest the sum of the
+    # harmonics' own amplitudes, which is not below it
+    field: np.ndarray
 
 
-def alternating_stress(body: Body, harmonics: np.ndarray) -> AlternatingStress:
+def alternating_stress(
+    body: Body,
+    harmonics: np.ndarray,
+    touched: np.ndarray | None = None,
+) -> AlternatingStress:
     """Stress of the motion Re(sum over h of u_h e^{j h w t}), by the recovered nodal stresses.
 
     Args:
         harmonics: (H, n_points, dim) complex displacements of harmonics 1..H [m].
+        touched: (n_points,) True where tractions may act; without it free faces do not count in the
+            estimated error.
     """
     size = np.array([np.abs(u).max() for u in harmonics])
     kept = [h for h in range(len(harmonics)) if size[h] > NEGLIGIBLE * size.max()]
@@ -52,6 +62,8 @@ def alternating_stress(body: Body, harmonics: np.ndarray) -> AlternatingStress:
     turns = np.exp(1j * np.outer(angle, np.array(kept) + 1))
     in_time = [von_mises(np.einsum("h,hns->ns", turn, found[:, nodes]).real) for turn in turns]
     largest = np.max(in_time, axis=0)
+    field = bound.copy()
+    field[nodes] = largest
     worst = int(largest.argmax())
     node = int(nodes[worst])
     by_harmonic = np.zeros(len(harmonics))
@@ -61,30 +73,6 @@ def alternating_stress(body: Body, harmonics: np.ndarray) -> AlternatingStress:
         float(largest[worst]),
         body.mesh.points[node],
         by_harmonic,
-        mesh_error(body, harmonics[kept[strongest]], found[strongest], node),
+        mesh_error(body, harmonics[kept[strongest]], found[strongest], node, touched),
+        field,
     )
-
-
-def mesh_error(
-    body: Body,
-    u: np.ndarray,
-    recovered: np.ndarray,
-    node: int,
-) -> float:
-    """Relative error of the recovered stress at a node.
-
-    Polynomials of first and of second degree through the stresses at the Gauss points of the cells
-    round the node (superconvergent patch recovery, Zienkiewicz and Zhu 1992,
-    doi:10.1002/nme.1620330702) are continued to the node. The spread between them and the recovered
-    stress, and the jumps between the cells, are the estimate: where the stress varies too fast for
-    the elements, as at a sharp corner, these disagree however fine the mesh is.
-
-    Args:
-        u: (n_points, dim) displacements, complex or real [m].
-        recovered: (n_points, 6) their recovered stress [Pa].
-    """
-    here = recovered[node]
-    size = max(float(von_mises(here)), np.finfo(float).tiny)
-    first, second = patch_stress(body, u, node)
-    spread = (von_mises(first - here), von_mises(second - here), von_mises(first - second))
-    return float(max(spread) / size)

@@ -89,7 +89,7 @@ def assemble(
     """
     names = (name,) if isinstance(name, str) else tuple(name)
     materials = material if isinstance(material, dict) else dict.fromkeys(names, material)
-    cells, used, local = _checked(mesh, names, materials)
+    cells, used, local = _check_cells(mesh, names, materials)
     comm = comm or MPI.COMM_WORLD
     dim = mesh.dimension
     check(dim * len(used), comm)
@@ -106,7 +106,7 @@ def assemble(
     M = assemble_matrix(
         depth * rho * ufl.inner(u, v) * ufl.dx(metadata={"quadrature_degree": mass})
     )
-    rows = _rows(mesh, space, used[local], origin, comm)
+    rows = _block_rows(mesh, space, used[local], origin, comm)
     return Body(
         mesh,
         " + ".join(names),
@@ -158,7 +158,7 @@ def rigid_modes(body: Body) -> np.ndarray:
     return np.stack(moves, axis=2)
 
 
-def _checked(
+def _check_cells(
     mesh: Mesh,
     names: tuple[str, ...],
     materials: dict[str, Material],
@@ -215,7 +215,7 @@ def degrees(
     simplex = mesh.cell_type.startswith(("tri", "tet"))
     if not simplex:
         return 2 * degree, 2 * degree + 2
-    straight = degree == 1 or _straight(mesh, cells)
+    straight = degree == 1 or _has_straight_cells(mesh, cells)
     return (
         (2 * degree - 2, 2 * degree)
         if straight
@@ -223,7 +223,7 @@ def degrees(
     )
 
 
-def _straight(mesh: Mesh, cells: np.ndarray) -> bool:
+def _has_straight_cells(mesh: Mesh, cells: np.ndarray) -> bool:
     """True where every node lies where the corners put it."""
     k = shape.corners(mesh.cell_type)
     linear, _ = shape.tabulate(mesh.cell_type.rstrip("0123456789"), shape.nodes(mesh.cell_type))
@@ -234,7 +234,7 @@ def _straight(mesh: Mesh, cells: np.ndarray) -> bool:
     )
 
 
-def _rows(
+def _block_rows(
     mesh: Mesh,
     space: Any,
     cells: np.ndarray,

@@ -40,9 +40,9 @@ try:
 except ModuleNotFoundError:
     raise
 except (ImportError, AttributeError, RuntimeError) as error:
-    # a compiled module beside a numpy that it was not compiled for
+    # a compiled module next to a numpy that it was not compiled for
     raise InputError(
-        f"dolfinx cannot be loaded beside numpy {np.__version__} "
+        f"dolfinx cannot be loaded with numpy {np.__version__} "
         f"({str(error).strip().splitlines()[0] if str(error).strip() else type(error).__name__}); "
         "expected the numpy that it was compiled with, on Debian 12: pip install "
         "'bladefem[run,debian12]'"
@@ -111,14 +111,18 @@ def vector_space(mesh: Any, degree: int) -> Any:
     """Continuous Lagrange vectors with as many components as the space has dimensions."""
     gdim = mesh.geometry.dim
     if hasattr(dolfinx.fem, "functionspace"):
-        return _patiently(lambda: dolfinx.fem.functionspace(mesh, ("Lagrange", degree, (gdim,))))
-    return _patiently(lambda: dolfinx.fem.VectorFunctionSpace(mesh, ("Lagrange", degree), dim=gdim))
+        return _wait_for_build(
+            lambda: dolfinx.fem.functionspace(mesh, ("Lagrange", degree, (gdim,)))
+        )
+    return _wait_for_build(
+        lambda: dolfinx.fem.VectorFunctionSpace(mesh, ("Lagrange", degree), dim=gdim)
+    )
 
 
 def scalar_space(mesh: Any) -> Any:
     """One value a cell."""
     make = getattr(dolfinx.fem, "functionspace", None) or dolfinx.fem.FunctionSpace
-    return _patiently(lambda: make(mesh, ("DG", 0)))
+    return _wait_for_build(lambda: make(mesh, ("DG", 0)))
 
 
 def cell_dofs(space: Any) -> np.ndarray:
@@ -130,11 +134,11 @@ def cell_dofs(space: Any) -> np.ndarray:
 
 
 def compile_form(form: Any) -> Any:
-    """Compile a form, see ``_patiently``."""
-    return _patiently(lambda: dolfinx.fem.form(form))
+    """Compile a form, see ``_wait_for_build``."""
+    return _wait_for_build(lambda: dolfinx.fem.form(form))
 
 
-def _patiently(build: Callable[[], Any], patience: int = 12) -> Any:
+def _wait_for_build(build: Callable[[], Any], patience: int = 12) -> Any:
     """Run what may compile; a build by another process is waited for, a dead one is named.
 
     Raises:
@@ -142,21 +146,21 @@ def _patiently(build: Callable[[], Any], patience: int = 12) -> Any:
     """
     for _ in range(patience):
         try:
-            with _quiet():
+            with _quiet_logger():
                 return build()
         except (TimeoutError, RuntimeError) as error:
             if "timed out" not in str(error):
                 raise
-            if not _unfinished(120.0):
+            if not _unfinished_builds(120.0):
                 break
-    stale = ", ".join(map(str, _unfinished(np.inf))) or "none found"
+    stale = ", ".join(map(str, _unfinished_builds(np.inf))) or "none found"
     raise NotSolvedError(
         "the form compiler's cache holds a build that never finished; delete these files and "
         f"start again: {stale}"
     )
 
 
-def _unfinished(age: float) -> list[Path]:
+def _unfinished_builds(age: float) -> list[Path]:
     """C files without the mark of a finished build, not older than ``age`` seconds."""
     options = getattr(dolfinx.jit, "get_parameters", None) or dolfinx.jit.get_options
     folder = Path(options()["cache_dir"])
@@ -168,7 +172,7 @@ def _unfinished(age: float) -> list[Path]:
 
 
 @contextmanager
-def _quiet() -> Iterator[None]:
+def _quiet_logger() -> Iterator[None]:
     """ffcx and its compiler write to the root logger (and lower its level) in dolfinx 0.5; it warns
     of many points.
     """

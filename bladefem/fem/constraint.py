@@ -17,7 +17,7 @@ from dataclasses import dataclass
 import numpy as np
 import scipy.sparse as sp
 
-from geometry.mesh import Pair
+from geometry.mesh import Pair, sector_of
 
 from ..errors import InputError, suggestion
 from . import cyclic_schur as core
@@ -124,22 +124,45 @@ def transformation(
     """
     pair = _cyclic_pair(body) if cyclic else None
     clamped = _with_partners(clamped_nodes(body, clamp), pair)
-    low, high, start = _numbered(body, *_parts(body, clamped, pair, ties))
+    low, high, start = _number_unknowns(body, *_constraint_parts(body, clamped, pair, ties))
     if high is None:
         T0 = _to_petsc(body, low, start)
         return Transformation(
             body, low, None, start, (body.K.ptap(T0),), (body.M.ptap(T0),), None, 0
         )
-    sectors = body.mesh.sector.count
+    sectors = sector_of(body.mesh).count
     if body.comm.size == 1 and one_core is not False:
-        opened = _opened(body, _numbered(body, *_parts(body, clamped, None, ties))[0], low, high)
+        opened = _open_sector(
+            body,
+            _number_unknowns(body, *_constraint_parts(body, clamped, None, ties))[0],
+            low,
+            high,
+        )
         if opened is not None:
             return Transformation(body, low, high, start, (), (), opened, sectors)
     T0 = _to_petsc(body, low, start)
     T1 = _to_petsc(body, high, start)
     return Transformation(
-        body, low, high, start, _three(body.K, T0, T1), _three(body.M, T0, T1), None, sectors
+        body,
+        low,
+        high,
+        start,
+        _three_matrices(body.K, T0, T1),
+        _three_matrices(body.M, T0, T1),
+        None,
+        sectors,
     )
+
+
+def high_part(t: Transformation) -> sp.csr_matrix:
+    """T1, the part of a wheel's transformation that the next sector's motion adds.
+
+    Raises:
+        InputError: the body has no cyclic faces.
+    """
+    if t.high is None:
+        raise InputError(f"body '{t.body.name}' has no cyclic faces, expected a sector of a wheel")
+    return t.high
 
 
 def at_diameter(t: Transformation, nodal_diameter: int | None) -> Constrained:
@@ -154,7 +177,7 @@ def at_diameter(t: Transformation, nodal_diameter: int | None) -> Constrained:
     angle = 2 * np.pi * n / t.sectors
     real = 2 * n % t.sectors == 0
     phase = np.exp(1j * angle) if not real else 1.0 if n == 0 else -1.0
-    T = (t.low + phase * t.high).tocsr()
+    T = (t.low + phase * high_part(t)).tocsr()
     if t.opened is not None:
         C = T[t.opened.places]
         return Constrained(
@@ -164,7 +187,8 @@ def at_diameter(t: Transformation, nodal_diameter: int | None) -> Constrained:
         K, M = (combined(A[0], phase, A[1]) for A in (t.K, t.M))
     else:
         K, M = (
-            _doubled(combined(A[0], np.cos(angle), A[1]), A[2], np.sin(angle)) for A in (t.K, t.M)
+            _doubled_matrix(combined(A[0], np.cos(angle), A[1]), A[2], np.sin(angle))
+            for A in (t.K, t.M)
         )
     return Constrained(t.body, T, own, K, M, n)
 
@@ -177,8 +201,10 @@ def in_step(body: Body, clamp: str | None = "clamp") -> Constrained:
         InputError: see :func:`constrain`.
     """
     pair = _cyclic_pair(body) if "cyclic" in body.mesh.pairs else None
-    low, high = _parts(body, _with_partners(clamped_nodes(body, clamp), pair), pair, None)
-    T, _, start = _numbered(body, low if high is None else (low + high).tocsr(), None)
+    low, high = _constraint_parts(
+        body, _with_partners(clamped_nodes(body, clamp), pair), pair, None
+    )
+    T, _, start = _number_unknowns(body, low if high is None else (low + high).tocsr(), None)
     T0 = _to_petsc(body, T, start)
     rank = body.comm.rank
     return Constrained(
@@ -285,7 +311,7 @@ def _check_match(
         raise InputError("the cut faces share nodes (a solid hub on the axis), expected a bore")
 
 
-def _parts(
+def _constraint_parts(
     body: Body,
     clamped: np.ndarray,
     pair: Pair | None,
@@ -297,7 +323,7 @@ def _parts(
     free = body.rows >= 0
     free[clamped] = False
     slaves = np.empty(0, int) if pair is None else pair.nodes[1]
-    keep = np.repeat(free, d) & ~_slid(body, pair)
+    keep = np.repeat(free, d) & ~_plane_supports(body, pair)
     keep[d * slaves[:, None] + np.arange(d)] = False
     low = sp.diags(keep.astype(float)).tocsr()
     high = None
@@ -306,16 +332,16 @@ def _parts(
         rows = pair.nodes[1][alive]
         cols = pair.nodes[0][alive]
         block = sp.coo_matrix((np.ones(len(rows)), (rows, cols)), shape=(n, n))
-        moving = sp.diags((~_slid(body, pair)).astype(float))
+        moving = sp.diags((~_plane_supports(body, pair)).astype(float))
         high = (moving @ sp.kron(block, pair.rotation[:d, :d])).tocsr()
         high.eliminate_zeros()
     if ties is not None and len(ties):
-        tie = _tied(n, d, np.asarray(ties))
+        tie = _tied_identity(n, d, np.asarray(ties))
         low, high = (A if A is None else (tie @ A @ tie).tocsr() for A in (low, high))
     return low, high
 
 
-def _slid(body: Body, pair: Pair | None) -> np.ndarray:
+def _plane_supports(body: Body, pair: Pair | None) -> np.ndarray:
     """(n_points*dim,) true where a plane of symmetry or antisymmetry holds a displacement."""
     held = np.zeros((len(body.mesh.points), body.dim), bool)
     for axis, letter in enumerate("xyz"[: body.dim]):
@@ -324,11 +350,11 @@ def _slid(body: Body, pair: Pair | None) -> np.ndarray:
             (f"symmetry_{letter}", across),
             (f"antisymmetry_{letter}", ~across),
         ):
-            held[np.ix_(_plane(body, name, axis, pair), directions)] = True
-    return (held | _supported(body, pair)).ravel()
+            held[np.ix_(_plane_nodes(body, name, axis, pair), directions)] = True
+    return (held | _direction_supports(body, pair)).ravel()
 
 
-def _supported(body: Body, pair: Pair | None) -> np.ndarray:
+def _direction_supports(body: Body, pair: Pair | None) -> np.ndarray:
     """(n_points, dim) true where the supports hold a displacement.
 
     Raises:
@@ -350,7 +376,7 @@ def _supported(body: Body, pair: Pair | None) -> np.ndarray:
     return held
 
 
-def _plane(
+def _plane_nodes(
     body: Body,
     name: str,
     axis: int,
@@ -383,7 +409,7 @@ def _with_partners(clamped: np.ndarray, pair: Pair | None) -> np.ndarray:
     return np.union1d(clamped, pair.nodes[:, held].ravel())
 
 
-def _tied(
+def _tied_identity(
     n: int,
     d: int,
     ties: np.ndarray,
@@ -397,7 +423,7 @@ def _tied(
     return sp.kron(sp.diags(keep) + half, sp.identity(d)).tocsr()
 
 
-def _numbered(
+def _number_unknowns(
     body: Body,
     low: sp.csr_matrix,
     high: sp.csr_matrix | None,
@@ -416,8 +442,9 @@ def _numbered(
     )
     if not len(columns):
         raise InputError(f"body '{body.name}' has no free node left, expected a smaller clamp")
-    cut = (A if A is None else A[:, columns].tocsr() for A in (low, high))
-    return *cut, np.asarray(start, int)
+    kept = low[:, columns].tocsr()
+    moved = None if high is None else high[:, columns].tocsr()
+    return kept, moved, np.asarray(start, int)
 
 
 def _to_petsc(
@@ -442,7 +469,7 @@ def _to_petsc(
     return matrix
 
 
-def _opened(
+def _open_sector(
     body: Body,
     T: sp.csr_matrix,
     low: sp.csr_matrix,
@@ -452,7 +479,7 @@ def _opened(
     mass are dropped.
     """
     to_open = T[np.argsort(body.scalar_rows)[np.count_nonzero(body.scalar_rows < 0) :]]
-    K, M = (_projected(_csr(A), to_open) for A in (body.K, body.M))
+    K, M = (_project_matrix(_local_rows(A), to_open) for A in (body.K, body.M))
     M.eliminate_zeros()
     rows = T.tocoo()
     unit = (rows.data == 1) & (np.diff(T.indptr)[rows.row] == 1)
@@ -466,7 +493,7 @@ def _opened(
     )
 
 
-def _projected(A: sp.csr_matrix, T: sp.csr_matrix) -> sp.csr_matrix:
+def _project_matrix(A: sp.csr_matrix, T: sp.csr_matrix) -> sp.csr_matrix:
     """T^T A T; a mere selection of unknowns is done by indexing."""
     if T.nnz == T.shape[1] and (T.data == 1).all():
         chosen = T.tocsc().indices
@@ -476,7 +503,7 @@ def _projected(A: sp.csr_matrix, T: sp.csr_matrix) -> sp.csr_matrix:
     return out
 
 
-def _three(
+def _three_matrices(
     A: PETSc.Mat,
     T0: PETSc.Mat,
     T1: PETSc.Mat,
@@ -492,7 +519,7 @@ def _three(
     )
 
 
-def _doubled(
+def _doubled_matrix(
     A: PETSc.Mat,
     B: PETSc.Mat,
     factor: float,
@@ -500,8 +527,8 @@ def _doubled(
     """The real twin of A + j factor B, parts interleaved: kron(A, I) + kron(factor B, [0 -1; 1
     0]).
     """
-    twin = sp.kron(_csr(A), np.eye(2), "csr") + factor * sp.kron(
-        _csr(B), np.array([[0.0, -1.0], [1.0, 0.0]]), "csr"
+    twin = sp.kron(_local_rows(A), np.eye(2), "csr") + factor * sp.kron(
+        _local_rows(B), np.array([[0.0, -1.0], [1.0, 0.0]]), "csr"
     )
     twin.sum_duplicates()
     (n, N), _ = A.sizes
@@ -514,7 +541,7 @@ def _doubled(
     return Doubled(out)
 
 
-def _csr(A: PETSc.Mat) -> sp.csr_matrix:
+def _local_rows(A: PETSc.Mat) -> sp.csr_matrix:
     """This rank's rows."""
     indptr, indices, data = A.getValuesCSR()
     return sp.csr_matrix((data, indices, indptr), shape=(len(indptr) - 1, A.size[1]))

@@ -10,6 +10,7 @@ real and imaginary parts. One rank only.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import partial
 
 import numpy as np
 import scipy.sparse as sp
@@ -135,7 +136,9 @@ def close(
         S = S + np.diag(springs[on_face])
     inner = np.asarray(C[core.inner].indices)
     if not definite:
-        return Rim(core, inner, on_face, Cb, lu_factor(S), core.factor.negative + _negative(S))
+        return Rim(
+            core, inner, on_face, Cb, lu_factor(S), core.factor.negative + _count_negative(S)
+        )
     try:
         return Rim(core, inner, on_face, Cb, cho_factor(S, lower=True), -1)
     except np.linalg.LinAlgError as error:
@@ -151,36 +154,37 @@ def negative(core: Core, C: sp.csr_matrix) -> int:
         NotSolvedError: zero is an eigenvalue.
     """
     Cb = C[core.rim][:, masters(C)].tocsr()
-    return core.factor.negative + _negative(Cb.conj().T @ (Cb.T @ core.S).T)
+    return core.factor.negative + _count_negative(Cb.conj().T @ (Cb.T @ core.S).T)
 
 
 def solve(rim: Rim, B: np.ndarray) -> np.ndarray:
     """Solve for a block of vectors (n_free, k)."""
     X = np.empty(B.shape, np.result_type(B, rim.C.dtype), order="F")
-    one_go = _through if rim.core.bridge else _twice
+    made = rim.core.bridge
+    one_go = _solve_two_sweeps if made is None else partial(_solve_one_sweep, made)
     for first in range(0, B.shape[1], BATCH):
         part = slice(first, first + BATCH)
         X[rim.inner, part], X[rim.masters, part] = one_go(rim, B[:, part])
     return X
 
 
-def _through(rim: Rim, B: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+def _solve_one_sweep(made: Bridge, rim: Rim, B: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Solution inside and on the low cut face, by one sweep down and one up."""
     core = rim.core
     on_face = []
 
     def answer(r: np.ndarray) -> np.ndarray:
-        on_face.append(face_solve(rim, B[rim.masters] + rim.C.conj().T @ _whole(r, B)))
-        return _parts(rim.C @ on_face[-1], k)
+        on_face.append(face_solve(rim, B[rim.masters] + rim.C.conj().T @ _join_parts(r, B)))
+        return _split_parts(rim.C @ on_face[-1], k)
 
     B = B.astype(np.result_type(B, rim.C.dtype))
     k = B.shape[1] * (2 if np.iscomplexobj(B) else 1)
-    return _whole(
-        through(core.bridge, _widened(core, B[rim.inner]), answer)[core.inner], B
+    return _join_parts(
+        through(made, _widen_columns(core, B[rim.inner]), answer)[core.inner], B
     ), on_face[-1]
 
 
-def _twice(rim: Rim, B: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+def _solve_two_sweeps(rim: Rim, B: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """The same by two solves inside."""
     core = rim.core
     inside = inner_solve(core, B[rim.inner])
@@ -195,10 +199,10 @@ def face_solve(rim: Rim, g: np.ndarray) -> np.ndarray:
 
 def inner_solve(core: Core, B: np.ndarray) -> np.ndarray:
     """A_ii^-1 B (ni, k), real or complex."""
-    return _whole(solve_matrix(core.factor, _widened(core, B))[core.inner], B)
+    return _join_parts(solve_matrix(core.factor, _widen_columns(core, B))[core.inner], B)
 
 
-def _widened(core: Core, B: np.ndarray) -> np.ndarray:
+def _widen_columns(core: Core, B: np.ndarray) -> np.ndarray:
     """Real and imaginary parts of (ni, k) side by side, with zeros on the rim."""
     parts = [B.real, B.imag] if np.iscomplexobj(B) else [B]
     k = B.shape[1]
@@ -208,13 +212,13 @@ def _widened(core: Core, B: np.ndarray) -> np.ndarray:
     return full
 
 
-def _parts(X: np.ndarray, k: int) -> np.ndarray:
+def _split_parts(X: np.ndarray, k: int) -> np.ndarray:
     """k real columns."""
     return X.real if X.shape[1] == k else np.concatenate([X.real, X.imag], axis=1)
 
 
-def _whole(X: np.ndarray, like: np.ndarray) -> np.ndarray:
-    """The inverse of ``_parts``."""
+def _join_parts(X: np.ndarray, like: np.ndarray) -> np.ndarray:
+    """The inverse of ``_split_parts``."""
     k = like.shape[1]
     return X if not np.iscomplexobj(like) else X[:, :k] + 1j * X[:, k:]
 
@@ -227,7 +231,7 @@ def times(A: sp.csr_matrix, X: np.ndarray) -> np.ndarray:
     return (A @ X.view(float)).view(complex)
 
 
-def _negative(S: np.ndarray) -> int:
+def _count_negative(S: np.ndarray) -> int:
     """Number of negative eigenvalues of a Hermitian matrix, by Bunch and Kaufman's
     factorisation.
     """

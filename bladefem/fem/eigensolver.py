@@ -81,7 +81,7 @@ class _Pencil:
         vector: PETSc.Vec,
     ) -> None:
         """The inverse of ``column``."""
-        values = np.ascontiguousarray(column[:, 0], dtype=self.con.dtype)
+        values: np.ndarray = np.ascontiguousarray(column[:, 0], dtype=self.con.dtype)
         vector.setArray(values.view(float))
 
 
@@ -136,7 +136,7 @@ class _Inverse:
         if pencil.kept and not pencil.doubled:
             pencil.known.append(np.asfortranarray(pencil.last))
         if pencil.doubled:
-            _remember(pencil, np.asfortranarray(load))
+            _remember_direction(pencil, np.asfortranarray(load))
             # of the products with earlier directions only the imaginary part is rounding
             error = dot(pencil.con.body.comm, pencil.images, np.asfortranarray(found)).imag
             if len(error):
@@ -144,7 +144,7 @@ class _Inverse:
         pencil.put(found, y)
 
 
-def _remember(pencil: _Pencil, load: np.ndarray) -> None:
+def _remember_direction(pencil: _Pencil, load: np.ndarray) -> None:
     """Add what is new of the last direction to those that are known, orthonormal.
 
     All of them lie in one real space, in which inner products are real. The first vector of a space
@@ -190,15 +190,15 @@ def krylov_schur(
         NotSolvedError: no convergence, with SLEPc's reason.
     """
     pencil = _Pencil(con, inverse, kept=guard > 0)
-    eps = _solver(pencil, start, count, tolerance, settings or Eigensolver())
+    eps = _make_solver(pencil, start, count, tolerance, settings or Eigensolver())
     try:
         eps.solve()
         reason = int(eps.getConvergedReason())
-        found = _vectors(pencil, eps)
+        found = _converged_vectors(pencil, eps)
     finally:
         # now: at the end of the program its callbacks would be gone
         eps.destroy()
-    lam, X = _purified(con, inverse, found, min(count + guard, found.shape[1]))
+    lam, X = _purify_vectors(con, inverse, found, min(count + guard, found.shape[1]))
     if len(lam) < count and reason > 0:
         # some came twice after many restarts of a small basis: blocks find the others
         return lowest(con, inverse, np.asfortranarray(X), count, tolerance, guard)
@@ -217,13 +217,15 @@ def _rough_pairs(
     X: np.ndarray,
     count: int,
 ) -> tuple[np.ndarray, np.ndarray]:
-    """What the space of the iteration holds beside the converged vectors, by Rayleigh and Ritz."""
+    """What the space of the iteration holds in addition to the converged vectors, by Rayleigh and
+    Ritz.
+    """
     con = pencil.con
     MX = apply(con.M, X)
     basis = np.asfortranarray(np.hstack(pencil.known))
     basis = minus(basis, [X], dot(con.body.comm, MX, basis))
     rest, _, _ = orthonormal(con, [X], [MX], basis, 1.0)
-    lam, Z = np.linalg.eigh(_hermitian(dot(con.body.comm, rest, apply(con.K, rest))))
+    lam, Z = np.linalg.eigh(_hermitian_part(dot(con.body.comm, rest, apply(con.K, rest))))
     return lam[:count], mix(rest, np.ascontiguousarray(Z[:, :count]))
 
 
@@ -232,7 +234,7 @@ def basis_size(count: int) -> int:
     return 2 * count + MORE_VECTORS
 
 
-def _solver(
+def _make_solver(
     pencil: _Pencil,
     start: np.ndarray,
     count: int,
@@ -277,7 +279,7 @@ def _solver(
     return eps
 
 
-def _vectors(pencil: _Pencil, eps: SLEPc.EPS) -> np.ndarray:
+def _converged_vectors(pencil: _Pencil, eps: SLEPc.EPS) -> np.ndarray:
     """(n_own, m) converged vectors."""
     columns = []
     vector = eps.getOperators()[0].createVecRight()
@@ -289,7 +291,7 @@ def _vectors(pencil: _Pencil, eps: SLEPc.EPS) -> np.ndarray:
     return np.asfortranarray(np.hstack(columns))
 
 
-def _purified(
+def _purify_vectors(
     con: Constrained,
     inverse: Callable[[np.ndarray], np.ndarray],
     X: np.ndarray,
@@ -302,17 +304,17 @@ def _purified(
         return np.zeros(0), X
     _Q, MQ, _ = orthonormal(con, [], [], X, NEW)
     Y = inverse(MQ)
-    theta, S = np.linalg.eigh(_hermitian(dot(con.body.comm, MQ, Y)))
+    theta, S = np.linalg.eigh(_hermitian_part(dot(con.body.comm, MQ, Y)))
     theta = theta[::-1][:wanted]
     good = theta > 0
     V = mix(Y, np.ascontiguousarray((S[:, ::-1][:, :wanted] / theta)[:, good]))
     MV = apply(con.M, V)
-    gram = _hermitian(dot(con.body.comm, V, MV))
+    gram = _hermitian_part(dot(con.body.comm, V, MV))
     # nearly the identity: its inverse root keeps each vector where it is
     size, Z = np.linalg.eigh(gram)
     root = (Z / np.sqrt(size)) @ Z.conj().T
     return 1 / theta[good], mix(V, np.ascontiguousarray(root))
 
 
-def _hermitian(A: np.ndarray) -> np.ndarray:
+def _hermitian_part(A: np.ndarray) -> np.ndarray:
     return (A + A.conj().T) / 2

@@ -51,14 +51,14 @@ def stiffness(material: Material) -> np.ndarray:
     Raises:
         InputError: constants of a material that would give off energy.
     """
-    flexibility = _flexibility(material)
+    flexibility = _material_flexibility(material)
     size = np.sqrt(np.abs(flexibility.diagonal()))
     if not np.linalg.eigvalsh(flexibility / np.outer(size, size)).min() > 0:
         raise InputError(
             "material: its elastic constants are not those of a stable material (a strain would "
             "give off energy), expected smaller Poisson's ratios"
         )
-    return _turned(np.linalg.inv(flexibility), rotation(material.angles))
+    return _turn_stiffness(np.linalg.inv(flexibility), rotation(material.angles))
 
 
 def rotation(angles: tuple[float, float, float]) -> np.ndarray:
@@ -148,13 +148,13 @@ def piecewise(domain: Any, values: np.ndarray) -> Any:
     return function
 
 
-def _flexibility(material: Material) -> np.ndarray:
+def _material_flexibility(material: Material) -> np.ndarray:
     """(6, 6) strains of unit stresses in the material's own axes [1/Pa]."""
     if material.orthotropic is None:
-        E = (material.E,) * 3
-        nu = (material.nu,) * 3
         shear = material.E / (2 * (1 + material.nu)) if material.G is None else material.G
-        G = (shear,) * 3
+        E: tuple[float, ...] = (material.E,) * 3
+        nu: tuple[float, ...] = (material.nu,) * 3
+        G: tuple[float, ...] = (shear,) * 3
     else:
         E = material.orthotropic[:3]
         nu = material.orthotropic[3:6]
@@ -168,7 +168,7 @@ def _flexibility(material: Material) -> np.ndarray:
     return S
 
 
-def _turned(C: np.ndarray, R: np.ndarray) -> np.ndarray:
+def _turn_stiffness(C: np.ndarray, R: np.ndarray) -> np.ndarray:
     """The same stiffness in axes in which the material's own are the columns of R."""
     full = np.empty((3, 3, 3, 3))
     for i, (a, b) in enumerate(PAIRS):

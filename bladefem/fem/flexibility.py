@@ -1,14 +1,15 @@
 """The static flexibility K^+ of a constrained body, also where the body can still move rigidly.
 
 Rigid motions R (M-orthonormal) are found exactly from geometry. A floating body is propped by
-springs at as many freedoms as it has rigid motions: loads without a resultant leave such a
-statically determinate support without force, so for them (K + C)^-1 is exact whatever the stiffness
-of the springs.
+springs at as many degrees of freedom as it has rigid motions: loads without a resultant leave such
+a statically determinate support without force, so for them (K + C)^-1 is exact whatever the
+stiffness of the springs.
 """
 
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from scipy.linalg import qr
@@ -47,7 +48,9 @@ def flexible(con: Constrained, prop: float = 1.0) -> Flexibility:
     R = rigid_basis(con)
     if not R.shape[1]:
         return Flexibility(con, factorise(con.K), R, R)
-    return Flexibility(con, factorise(con.K, springs=_props(con, R, prop)), R, apply(con.M, R))
+    return Flexibility(
+        con, factorise(con.K, springs=_place_springs(con, R, prop)), R, apply(con.M, R)
+    )
 
 
 def compliance(flex: Flexibility, B: np.ndarray) -> np.ndarray:
@@ -70,7 +73,7 @@ def rigid_basis(con: Constrained) -> np.ndarray:
     body = con.body
     if (con.nodal_diameter or 0) > 1:
         return np.zeros((con.own.stop - con.own.start, 0), con.dtype)
-    R = rigid_modes(body).reshape(con.T.shape[0], -1).astype(con.dtype)
+    R: np.ndarray = rigid_modes(body).reshape(con.T.shape[0], -1).astype(con.dtype)
     weight = np.asarray(abs(con.T).max(1).todense()).ravel() > 0
     inside = np.repeat(body.rows >= 0, body.dim)
     columns = unknown_places(con)
@@ -83,18 +86,18 @@ def rigid_basis(con: Constrained) -> np.ndarray:
         return basis
     gram = dot(body.comm, basis, apply(con.M, basis))
     basis = basis @ np.linalg.inv(np.linalg.cholesky(gram)).conj().T
-    return basis if body.spring is None else _unsprung(con, basis)
+    return basis if body.spring is None else _unsprung_motions(con, body.spring, basis)
 
 
-def _unsprung(con: Constrained, basis: np.ndarray) -> np.ndarray:
+def _unsprung_motions(con: Constrained, spring: Any, basis: np.ndarray) -> np.ndarray:
     """The rigid motions (n_own, r) that springs on faces leave without force."""
     body = con.body
     moves = expand(con, basis).reshape(len(body.scalar_rows), -1)
-    first, last = body.spring.owner_range
+    first, last = spring.owner_range
     outside = np.count_nonzero(body.scalar_rows < 0)
     mine = np.argsort(body.scalar_rows, kind="stable")[outside:][first:last]
     local = np.asfortranarray(moves[mine])
-    stiffness = dot(body.comm, local, apply(body.spring, local))
+    stiffness = dot(body.comm, local, apply(spring, local))
     lam, Z = np.linalg.eigh((stiffness + stiffness.conj().T) / 2)
     return basis @ Z[:, lam < SOFT * scale(con.K) / scale(con.M)]
 
@@ -109,12 +112,12 @@ def unknown_places(con: Constrained) -> np.ndarray:
     return columns
 
 
-def _props(
+def _place_springs(
     con: Constrained,
     R: np.ndarray,
     prop: float,
 ) -> np.ndarray:
-    """(n_own,) springs at the freedoms that hold the rigid motions best (pivoted QR)."""
+    """(n_own,) springs at the degrees of freedom that hold the rigid motions best (pivoted QR)."""
     everywhere = unknowns(con, R)
     allowed = dense_rows(con.K, len(everywhere))
     places = allowed[qr(everywhere[allowed].conj().T, mode="r", pivoting=True)[1][: R.shape[1]]]

@@ -17,6 +17,7 @@ import numpy as np
 
 from ..data import ModeSet
 from ..errors import NotSolvedError
+from .compat import MPI
 from .constraint import expand, restrict
 from .flexibility import Flexibility, compliance, unknown_places
 from .linalg import apply, dot
@@ -76,7 +77,7 @@ def forced_motion(
     for count in range(SERIES_TERMS + 1):
         u = u + term
         before = size
-        size = _norms(comm, term) / np.maximum(_norms(comm, u), np.finfo(float).tiny)
+        size = _column_norms(comm, term) / np.maximum(_column_norms(comm, u), np.finfo(float).tiny)
         open_ends = (size >= SERIES_TOLERANCE) & (omega != 0)
         if not open_ends.any():
             return ForcedMotion(expand(con, u), count)
@@ -93,7 +94,7 @@ def forced_motion(
     )
 
 
-def _norms(comm: object, v: np.ndarray) -> np.ndarray:
+def _column_norms(comm: MPI.Comm, v: np.ndarray) -> np.ndarray:
     """(k,) of the columns over all ranks."""
     return np.sqrt(
         abs(np.array([dot(comm, v[:, [i]], v[:, [i]])[0, 0] for i in range(v.shape[1])]))

@@ -60,7 +60,7 @@ def shared_out(
     mine = [int(n) for n in np.array_split(sorted(set(tasks)), groups)[color]]
     part = comm.Split(color, comm.rank)
     found: dict[int, Result] = {}
-    error = None
+    error: Exception | None = None
     try:
         found = dict(zip(mine, work(part, mine), strict=True))
     except Exception as problem:
@@ -69,8 +69,8 @@ def shared_out(
     first = part.rank == 0
     part.Free()
     merged: dict[int, Result] = {}
-    for results, problem in comm.allgather((found if first and error is None else {}, error)):
-        if problem is not None:
-            raise problem
+    for results, failure in comm.allgather((found if first and error is None else {}, error)):
+        if failure is not None:
+            raise failure
         merged |= results
     return [merged[n] for n in tasks]

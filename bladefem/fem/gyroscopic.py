@@ -119,10 +119,10 @@ def waves(
     root = np.diag(2 * np.pi * modes.frequencies)
     w, Z = np.linalg.eigh(np.block([[np.zeros((m, m)), root], [root, 1j * speed * g]]))
     order = np.argsort(np.abs(w[:m])), m + np.argsort(w[m:])
-    turned = [(np.abs(w[part]) / (2 * np.pi), _normalised(Z[m:, part])) for part in order]
+    turned = [(np.abs(w[part]) / (2 * np.pi), _normalise_columns(Z[m:, part])) for part in order]
     (forward, ahead), (backward, behind) = turned if sense > 0 else turned[::-1]
     return Waves(modes.nodal_diameter, speed, forward, backward, ahead, behind)
 
 
-def _normalised(Z: np.ndarray) -> np.ndarray:
+def _normalise_columns(Z: np.ndarray) -> np.ndarray:
     return Z / np.maximum(np.linalg.norm(Z, axis=0), 1e-300)

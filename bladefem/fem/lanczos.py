@@ -15,6 +15,7 @@ import numpy as np
 from scipy.linalg import eigh
 
 from ..errors import NotSolvedError
+from .compat import MPI
 from .constraint import Constrained
 from .linalg import apply, dot, minus, mix
 
@@ -25,7 +26,7 @@ CLEAN = 1e-8
 # least square of a column, of the largest, up to which one normalisation is enough
 EVEN = 1e-6
 # share of the tolerance below which a direction of the residual waits
-FAINT = 0.1
+DEFERRED_SHARE = 0.1
 
 
 @dataclass
@@ -73,7 +74,7 @@ def lowest(
     space = _Space()
     block, Mblock, _ = orthonormal(con, [], [], start.astype(con.dtype))
     for _ in range(STEPS):
-        _extend(con, space, block, Mblock, inverse(Mblock))
+        _extend_basis(con, space, block, Mblock, inverse(Mblock))
         theta, S = eigh(space.H)
         theta = theta[::-1]
         S = S[:, ::-1]
@@ -84,7 +85,9 @@ def lowest(
             raise NotSolvedError(f"{count} modes were asked of a body that has {k} elastic ones")
         if (k >= count and error < tolerance) or not len(rest):
             return 1 / theta[:k], mix([*space.V, *space.P], np.concatenate([S[:, :k], rest]))
-        block, Mblock = _next(space, rest[:, :count], FAINT * tolerance if k >= count else 0.0)
+        block, Mblock = _next_block(
+            space, rest[:, :count], DEFERRED_SHARE * tolerance if k >= count else 0.0
+        )
     raise NotSolvedError(
         f"the modes did not converge in {STEPS} steps (error {error:.1e}, expected {tolerance:.1e})"
     )
@@ -101,22 +104,22 @@ def orthonormal(
     + Q R.
 
     Args:
-        size: M-norm of what W was taken from. Directions that are rounding beside it are dropped,
-            so that Q may have fewer columns than W.
+        size: M-norm of what W was taken from. Directions that are rounding compared with it are
+            dropped, so that Q may have fewer columns than W.
     """
     comm = con.body.comm
-    W, MW, R, spread = _scaled(comm, W, apply(con.M, W), 1e-26, size**2)
+    W, MW, R, spread = _orthogonal_factor(comm, W, apply(con.M, W), 1e-26, size**2)
     left = dot(comm, MV, W)
     W = minus(W, V, left)
     clean = abs(left).max(initial=0.0) < CLEAN
     MW = minus(MW, MV, left) if clean else apply(con.M, W)
     if clean and spread > EVEN:
         return W, MW, R
-    W, MW, S, _ = _scaled(comm, W, MW, 0.25, 1.0)
+    W, MW, S, _ = _orthogonal_factor(comm, W, MW, 0.25, 1.0)
     return W, MW, S @ R
 
 
-def _extend(
+def _extend_basis(
     con: Constrained,
     space: _Space,
     block: np.ndarray,
@@ -133,7 +136,9 @@ def _extend(
     known = [*space.V, *space.P]
     Mknown = [*space.MV, *space.MP]
     column = dot(comm, Mknown, W)
-    Q, MQ, tail = orthonormal(con, known, Mknown, minus(W, known, column), np.linalg.norm(column))
+    Q, MQ, tail = orthonormal(
+        con, known, Mknown, minus(W, known, column), float(np.linalg.norm(column))
+    )
     total = old + block.shape[1]
     corner = (column[old:total] + column[old:total].conj().T) / 2
     space.H = np.block([[space.H, column[:old]], [column[:old].conj().T, corner]])
@@ -142,7 +147,7 @@ def _extend(
     space.MP.append(MQ)
 
 
-def _next(
+def _next_block(
     space: _Space,
     rest: np.ndarray,
     faint: float,
@@ -164,12 +169,12 @@ def _next(
     )
 
 
-def _scaled(
-    comm: object,
+def _orthogonal_factor(
+    comm: MPI.Comm,
     W: np.ndarray,
     MW: np.ndarray,
     least: float,
-    largest: float = np.finfo(float).tiny,
+    largest: float = float(np.finfo(float).tiny),
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray, float]:
     """W Z, M W Z and R with W = (W Z) R, and the least square of a column, of the largest one's.
 

@@ -14,13 +14,14 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass
+from typing import TypeAlias
 
 import numpy as np
 import scipy.sparse as sp
 from scipy.linalg import blas
 
 from . import cyclic_schur as interior
-from .compat import PETSc
+from .compat import MPI, PETSc
 from .mumps import Factorised, dense, factorise_matrix, solve_matrix, values
 
 
@@ -43,8 +44,8 @@ class Folded:
     core: interior.Core | None
 
 
-Matrix = PETSc.Mat | Doubled | Folded
-Block = np.ndarray | list[np.ndarray]
+Matrix: TypeAlias = PETSc.Mat | Doubled | Folded
+Block: TypeAlias = np.ndarray | list[np.ndarray]
 
 
 @dataclass(frozen=True)
@@ -86,7 +87,7 @@ def factorise(
         core = A.core or interior.eliminate(A.A, interior.rim_of(A.C), definite)
         return Factor(interior.close(core, A.C, definite, springs), False)
     doubled = isinstance(A, Doubled)
-    matrix = A.matrix if doubled else A
+    matrix = A.matrix if isinstance(A, Doubled) else A
     if springs is not None:
         matrix = matrix.duplicate(copy=True)
         diagonal = matrix.createVecRight()
@@ -103,7 +104,7 @@ def solve(factor: Factor, B: np.ndarray) -> np.ndarray:
     if factor.doubled:
         return _complex(solve_matrix(factor.parts, _real(B)))
     if np.iscomplexobj(B):
-        return _join(solve_matrix(factor.parts, _split(B)))
+        return _join_complex(solve_matrix(factor.parts, _split_complex(B)))
     return solve_matrix(factor.parts, B)
 
 
@@ -113,7 +114,7 @@ def apply(A: Matrix, X: np.ndarray) -> np.ndarray:
         return np.asfortranarray(A.C.conj().T @ interior.times(A.A, A.C @ X))
     if isinstance(A, Doubled):
         return _complex(_times(A.matrix, _real(X)))
-    return _join(_times(A, _split(X))) if np.iscomplexobj(X) else _times(A, X)
+    return _join_complex(_times(A, _split_complex(X))) if np.iscomplexobj(X) else _times(A, X)
 
 
 def combined(
@@ -122,10 +123,12 @@ def combined(
     B: Matrix,
 ) -> Matrix:
     """A + factor B."""
-    if isinstance(A, Folded):
+    if isinstance(A, Folded) and isinstance(B, Folded):
         return Folded((A.A + factor * B.A).tocsr(), A.C, None)
-    if isinstance(A, Doubled):
+    if isinstance(A, Doubled) and isinstance(B, Doubled):
         return Doubled(combined(A.matrix, factor, B.matrix))
+    if isinstance(A, Folded | Doubled):
+        raise TypeError("the sum of two matrices: expected both of one kind")
     out = A.duplicate(copy=True)
     out.axpy(factor, B, structure=PETSc.Mat.Structure.DIFFERENT_NONZERO_PATTERN)
     return out
@@ -145,16 +148,16 @@ def dense_rows(A: Matrix, n: int) -> np.ndarray:
 
 
 def dot(
-    comm: object,
+    comm: MPI.Comm,
     X: Block,
     Y: np.ndarray,
 ) -> np.ndarray:
     """X^H Y over all ranks, (k, l); X may be a list of blocks side by side."""
     if isinstance(X, list):
-        parts = [_dot(block, Y) for block in X]
+        parts = [_local_product(block, Y) for block in X]
         part = np.concatenate(parts) if parts else np.zeros((0, Y.shape[1]), Y.dtype)
     else:
-        part = _dot(X, Y)
+        part = _local_product(X, Y)
     return comm.allreduce(np.ascontiguousarray(part)) if comm.size > 1 else part
 
 
@@ -167,7 +170,7 @@ def minus(
     side.
     """
     gemm = blas.zgemm if np.iscomplexobj(W) else blas.dgemm
-    for block, part in _paired(V, C):
+    for block, part in _paired_blocks(V, C):
         W = gemm(-1.0, block, part, 1.0, W, overwrite_c=1)
     return W
 
@@ -177,7 +180,7 @@ def mix(V: Block, C: np.ndarray) -> np.ndarray:
     blocks = V if isinstance(V, list) else [V]
     gemm = blas.zgemm if np.iscomplexobj(blocks[0]) else blas.dgemm
     out = None
-    for block, part in _paired(blocks, C):
+    for block, part in _paired_blocks(blocks, C):
         out = (
             gemm(1.0, block, part)
             if out is None
@@ -198,7 +201,7 @@ def inertia(A: Matrix) -> int:
     return parts.negative // 2 if doubled else parts.negative
 
 
-def _dot(X: np.ndarray, Y: np.ndarray) -> np.ndarray:
+def _local_product(X: np.ndarray, Y: np.ndarray) -> np.ndarray:
     """X^H Y on this rank."""
     if not (X.size and Y.size):
         return X.conj().T @ Y
@@ -207,7 +210,9 @@ def _dot(X: np.ndarray, Y: np.ndarray) -> np.ndarray:
     return blas.dgemm(1.0, X, Y, trans_a=1)
 
 
-def _paired(blocks: list[np.ndarray], C: np.ndarray) -> Iterator[tuple[np.ndarray, np.ndarray]]:
+def _paired_blocks(
+    blocks: list[np.ndarray], C: np.ndarray
+) -> Iterator[tuple[np.ndarray, np.ndarray]]:
     """Each block with the rows of C that belong to it, empty ones left out."""
     ends = np.cumsum([block.shape[1] for block in blocks]).tolist()
     for block, first, last in zip(blocks, [0, *ends], ends, strict=False):
@@ -225,11 +230,11 @@ def _times(A: PETSc.Mat, X: np.ndarray) -> np.ndarray:
     return out
 
 
-def _split(X: np.ndarray) -> np.ndarray:
+def _split_complex(X: np.ndarray) -> np.ndarray:
     return np.concatenate([X.real, X.imag], axis=1)
 
 
-def _join(both: np.ndarray) -> np.ndarray:
+def _join_complex(both: np.ndarray) -> np.ndarray:
     k = both.shape[1] // 2
     out = np.empty((both.shape[0], k), complex, order="F")
     out.real, out.imag = both[:, :k], both[:, k:]

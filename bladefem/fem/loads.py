@@ -24,7 +24,7 @@ def volume(mesh: Mesh, name: str) -> float:
     """
     if name not in mesh.bodies:
         raise InputError(f"the mesh has no body '{name}'{suggestion(name, mesh.bodies)}")
-    _, weight, _ = _measure(mesh, mesh.bodies[name], 6)
+    _, weight, _ = _quadrature_measure(mesh, mesh.bodies[name], 6)
     return float(weight.sum())
 
 
@@ -50,7 +50,7 @@ def centrifugal(
     force = np.zeros((len(body.mesh.points), body.dim))
     for name, material in body.material.items():
         cells = body.mesh.bodies[name]
-        values, weight, x = _measure(body.mesh, cells, 8)
+        values, weight, x = _quadrature_measure(body.mesh, cells, 8)
         field = ((x - centre) @ across)[:, :, : body.dim] * (material.rho * speed**2)
         np.add.at(force, cells, np.einsum("qk,cq,cqd->ckd", values, weight, field))
     return force.ravel()
@@ -65,7 +65,7 @@ def surface_load(
     """(n_points*dim,) consistent nodal forces [N] on a named face.
 
     Args:
-        traction: (dim,) force for each unit of area [Pa].
+        traction: (dim,) force per unit area [Pa].
         pressure: [Pa], positive towards the body.
 
     Raises:
@@ -73,16 +73,16 @@ def surface_load(
     """
     if (traction is None) == (pressure is None):
         raise InputError("surface_load needs traction or pressure, expected exactly one of them")
-    facets = _facets(body, face)
+    facets = _face_facets(body, face)
     d = body.dim
     kind = shape.FACET_OF[body.mesh.cell_type]
     values, tangents, w = shape.geometry(kind, body.mesh.points[facets][:, :, :d], 8)
-    normal = _outward(body, facets, _normals(tangents))
+    normal = _outward_normals(body, facets, _area_normals(tangents))
     depth = body.mesh.depth if d == 2 else 1.0
-    if traction is not None:
-        field = np.linalg.norm(normal, axis=2)[:, :, None] * np.asarray(traction, float)[:d]
-    else:
+    if pressure is not None:
         field = -pressure * normal
+    else:
+        field = np.linalg.norm(normal, axis=2)[:, :, None] * np.asarray(traction, float)[:d]
     force = np.zeros((len(body.mesh.points), d))
     np.add.at(force, facets, depth * np.einsum("qk,q,cqd->ckd", values, w, field))
     return force.ravel()
@@ -94,7 +94,7 @@ def face_areas(body: Body, face: str) -> np.ndarray:
     return surface_load(body, face, traction=traction).reshape(-1, body.dim)[:, 0]
 
 
-def _measure(
+def _quadrature_measure(
     mesh: Mesh,
     cells: np.ndarray,
     degree: int,
@@ -106,7 +106,7 @@ def _measure(
     return values, weight, np.einsum("qk,ckg->cqg", values, mesh.points[cells])
 
 
-def _facets(body: Body, face: str) -> np.ndarray:
+def _face_facets(body: Body, face: str) -> np.ndarray:
     faces = body.mesh.faces
     if face not in faces:
         raise InputError(f"the mesh has no face '{face}'{suggestion(face, faces)}")
@@ -116,7 +116,7 @@ def _facets(body: Body, face: str) -> np.ndarray:
     return facets
 
 
-def _normals(tangents: np.ndarray) -> np.ndarray:
+def _area_normals(tangents: np.ndarray) -> np.ndarray:
     """(nf, q, d) normals with the length of the surface element."""
     if tangents.shape[3] == 1:
         t = tangents[..., 0]
@@ -124,7 +124,7 @@ def _normals(tangents: np.ndarray) -> np.ndarray:
     return np.cross(tangents[..., 0], tangents[..., 1])
 
 
-def _outward(
+def _outward_normals(
     body: Body,
     facets: np.ndarray,
     normal: np.ndarray,
@@ -134,13 +134,13 @@ def _outward(
     d = body.dim
     cells = np.concatenate([mesh.bodies[n] for n in body.material])
     corner = facets[:, : shape.corners(shape.FACET_OF[mesh.cell_type])]
-    shared = _incidence(corner, len(mesh.points)) @ _incidence(cells, len(mesh.points)).T
+    shared = _cell_incidence(corner, len(mesh.points)) @ _cell_incidence(cells, len(mesh.points)).T
     behind = np.asarray(shared.argmax(axis=1)).ravel()
     inward = mesh.points[cells[behind]].mean(1) - mesh.points[corner].mean(1)
     side = np.einsum("cd,cd->c", normal.mean(1), inward[:, :d])
     return normal * -np.sign(side)[:, None, None]
 
 
-def _incidence(cells: np.ndarray, n: int) -> sp.csr_matrix:
+def _cell_incidence(cells: np.ndarray, n: int) -> sp.csr_matrix:
     rows = np.repeat(np.arange(len(cells)), cells.shape[1])
     return sp.csr_matrix((np.ones(cells.size), (rows, cells.ravel())), shape=(len(cells), n))

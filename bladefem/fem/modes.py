@@ -14,6 +14,7 @@ import numpy as np
 
 from ..data import ModeSet
 from ..errors import InputError, NotSolvedError
+from .compat import MPI
 from .constraint import Constrained, expand, restrict
 from .cyclic_schur import eliminate, negative
 from .eigensolver import Eigensolver, basis_size, krylov_schur
@@ -29,7 +30,7 @@ SLEPC = Eigensolver()
 BLOCKS = Eigensolver("lanczos")
 # bodies with fewer unknowns than this many times the basis are left to blocks, which end cleanly
 # when the space is exhausted
-FEW = 3
+MIN_SPARE_MODES = 3
 
 
 def modes(
@@ -73,7 +74,7 @@ def proven_pairs(
     if not lam[-1] > 0:
         # rigid motions alone, which geometry counts
         return lam, X
-    upper, expected = _gap(lam)
+    upper, expected = _widest_gap(lam)
     exact = count_below(flex.con, upper)
     if exact == expected:
         return lam, X
@@ -118,8 +119,8 @@ def mode_set(
     ranks.
     """
     shapes = expand(con, X)
-    images = shapes.reshape(-1, shapes.shape[2]).conj().T @ _probe(con, len(lam))
-    turn = _rotation(lam, images)
+    images = shapes.reshape(-1, shapes.shape[2]).conj().T @ _rotation_probe(con, len(lam))
+    turn = _basis_rotation(lam, images)
     residuals = certificate(con, lam, X @ turn)
     shapes = (shapes @ turn).transpose(2, 0, 1)
     if con.body.dim == 2:
@@ -139,15 +140,15 @@ def certificate(
         return np.zeros(0)
     KX = apply(con.K, X)
     comm = con.body.comm
-    size = _norms(comm, KX)
-    scale = size.max() if (lam > 0).any() else _stiffness(con, X)
+    size = _column_norms(comm, KX)
+    scale = size.max() if (lam > 0).any() else _stiffness_scale(con, X)
     KX -= apply(con.M, X) * lam
-    return _norms(comm, KX) / np.where(lam > 0, size, scale)
+    return _column_norms(comm, KX) / np.where(lam > 0, size, scale)
 
 
-def _stiffness(con: Constrained, X: np.ndarray) -> float:
+def _stiffness_scale(con: Constrained, X: np.ndarray) -> float:
     """A force to measure |K x| of rigid motions by."""
-    return scale(con.K) * _norms(con.body.comm, X).max()
+    return scale(con.K) * _column_norms(con.body.comm, X).max()
 
 
 def elastic_pairs(
@@ -171,19 +172,19 @@ def elastic_pairs(
         NotSolvedError: there are fewer, or no convergence.
     """
     inverse = inverse or (lambda B: compliance(flex, B))
-    few = flex.con.T.shape[1] < FEW * basis_size(count)
+    few = flex.con.T.shape[1] < MIN_SPARE_MODES * basis_size(count)
     if start is None and solver.method == "slepc" and not few:
-        first = inverse(restrict(flex.con, _probe(flex.con, 1)))
+        first = inverse(restrict(flex.con, _rotation_probe(flex.con, 1)))
         return krylov_schur(flex.con, inverse, first, count, tolerance, guard, solver)
     if start is None:
         width = min(max(8 if flex.con.dtype is float else 6, count // 3), 16)
-        start = inverse(restrict(flex.con, _probe(flex.con, width)))
+        start = inverse(restrict(flex.con, _rotation_probe(flex.con, width)))
     elif flex.R.shape[1]:
         start = start - flex.R @ dot(flex.con.body.comm, flex.MR, start)
     return lowest(flex.con, inverse, start, count, tolerance, guard)
 
 
-def _probe(con: Constrained, width: int) -> np.ndarray:
+def _rotation_probe(con: Constrained, width: int) -> np.ndarray:
     return np.random.default_rng(20).standard_normal((con.T.shape[0], width))
 
 
@@ -195,10 +196,12 @@ def canonical(
     """Bases of (nearly) multiple eigenvalues and phases of single ones, fixed by projecting given
     vectors.
     """
-    return X @ _rotation(lam, dot(con.body.comm, X, restrict(con, _probe(con, len(lam)))))
+    return X @ _basis_rotation(
+        lam, dot(con.body.comm, X, restrict(con, _rotation_probe(con, len(lam))))
+    )
 
 
-def _rotation(lam: np.ndarray, images: np.ndarray) -> np.ndarray:
+def _basis_rotation(lam: np.ndarray, images: np.ndarray) -> np.ndarray:
     """(m, m) the same as a rotation of the given basis, from its products X^H W (m, m) with given
     vectors.
     """
@@ -212,7 +215,7 @@ def _rotation(lam: np.ndarray, images: np.ndarray) -> np.ndarray:
 
 def count_below(con: Constrained, lam: float) -> int:
     """Number of eigenvalues below lam [rad^2/s^2], by Sylvester's law of inertia."""
-    if isinstance(con.K, Folded) and con.K.core is not None:
+    if isinstance(con.K, Folded) and isinstance(con.M, Folded) and con.K.core is not None:
         # the interior in the order that serves the stiffness too
         core = con.K.core
         shifted = (con.K.A - lam * con.M.A).tocsr()
@@ -222,7 +225,7 @@ def count_below(con: Constrained, lam: float) -> int:
     return inertia(combined(con.K, -lam, con.M))
 
 
-def _gap(lam: np.ndarray) -> tuple[float, int]:
+def _widest_gap(lam: np.ndarray) -> tuple[float, int]:
     """A shift [rad^2/s^2] in the widest gap of the upper half, and how many are below it."""
     if len(lam) < 2:
         return lam[-1] * 1.0001, len(lam)
@@ -232,6 +235,6 @@ def _gap(lam: np.ndarray) -> tuple[float, int]:
     return (lam[gap - 1] + lam[gap]) / 2, gap
 
 
-def _norms(comm: object, X: np.ndarray) -> np.ndarray:
+def _column_norms(comm: MPI.Comm, X: np.ndarray) -> np.ndarray:
     squares = (X.real**2 + X.imag**2).sum(0) if np.iscomplexobj(X) else (X**2).sum(0)
     return np.sqrt(comm.allreduce(squares) if comm.size > 1 else squares)

@@ -67,7 +67,7 @@ def factorise_matrix(
     """
     A.setOption(PETSc.Mat.Option.SYMMETRIC, True)
     A.setOption(PETSc.Mat.Option.SPD, definite)
-    pc = _prepared(A, PETSc.PC.Type.CHOLESKY)
+    pc = _prepare_solver(A, PETSc.PC.Type.CHOLESKY)
     F = pc.getFactorMatrix()
     F.setMumpsIcntl(14, ROOM)
     if not definite:
@@ -81,7 +81,7 @@ def factorise_matrix(
     if schur is not None:
         index = PETSc.IS().createGeneral(schur.astype(PETSc.IntType), comm=F.comm)
         petsc_call("MatFactorSetSchurIS", F.handle, index.handle)
-    _numeric(F, A.size[0], pc.setUp if order is None else lambda: _in_order(F, A, order))
+    _factorise_numeric(F, A.size[0], pc.setUp if order is None else lambda: _in_order(F, A, order))
     # and with it PETSc's hold on A
     pc.destroy()
     negative = F.getMumpsInfog(12)
@@ -93,7 +93,7 @@ def factorise_matrix(
         )
     return Factorised(
         F,
-        _large(F.getMumpsInfog(29)),
+        _large_count(F.getMumpsInfog(29)),
         F.getMumpsRinfog(3),
         1e6 * F.getMumpsInfog(22),
         F.getMumpsInfog(7),
@@ -124,7 +124,7 @@ def solve_matrix(
         part = slice(first, min(first + batch, B.shape[1]))
         sparse = 0 < len(rows) < SPARSE * len(B)
         right = (
-            _sparse(F, rows, B[rows, part])
+            _sparse_block(F, rows, B[rows, part])
             if sparse
             else dense(F, np.asfortranarray(B[:, part], dtype=float))
         )
@@ -160,7 +160,7 @@ def values(D: PETSc.Mat) -> np.ndarray:
     return out
 
 
-def _sparse(
+def _sparse_block(
     F: PETSc.Mat,
     rows: np.ndarray,
     values: np.ndarray,
@@ -199,7 +199,7 @@ def petsc_call(name: str, *arguments: object) -> None:
         raise NotSolvedError(f"PETSc's {name} failed with error {code}")
 
 
-def _prepared(A: PETSc.Mat, kind: str) -> PETSc.PC:
+def _prepare_solver(A: PETSc.Mat, kind: str) -> PETSc.PC:
     """A solver with an empty factor of MUMPS's kind."""
     pc = PETSc.PC().create(A.comm)
     pc.setOperators(A)
@@ -222,7 +222,7 @@ def _in_order(
     """Factorise with a given ordering, which PETSc hands on to MUMPS in its analysis for LU only:
     that one is borrowed, it does the same but for the ordering.
     """
-    unsymmetric = _prepared(A, PETSc.PC.Type.LU)
+    unsymmetric = _prepare_solver(A, PETSc.PC.Type.LU)
     analysis = ctypes.c_void_p()
     petsc_call(
         "MatGetOperation", unsymmetric.getFactorMatrix().handle, ANALYSIS, ctypes.byref(analysis)
@@ -239,7 +239,7 @@ def _in_order(
         made.destroy()
 
 
-def _numeric(
+def _factorise_numeric(
     F: PETSc.Mat,
     size: int,
     factorise: Callable[[], None],
@@ -253,10 +253,10 @@ def _numeric(
         failed = True
     code = F.getMumpsInfog(1)
     if failed or code < 0:
-        raise NotSolvedError(_reason(code, F.getMumpsInfog(2), size))
+        raise NotSolvedError(_failure_reason(code, F.getMumpsInfog(2), size))
 
 
-def _reason(
+def _failure_reason(
     code: int,
     detail: int,
     size: int,
@@ -272,6 +272,6 @@ def _reason(
     return f"MUMPS stopped on {size} unknowns: {what} (INFOG(1) = {code}, INFOG(2) = {detail})"
 
 
-def _large(infog: int) -> int:
+def _large_count(infog: int) -> int:
     """MUMPS gives large counts in millions, as a negative number."""
     return -infog * 1_000_000 if infog < 0 else infog

@@ -18,7 +18,7 @@ import numpy as np
 import scipy.sparse as sp
 
 # unknowns from which METIS beats AMD
-WORTHWHILE = 60_000
+MIN_METIS_UNKNOWNS = 60_000
 NAMES = ("libmetis.so.5", "libmetis.so", "libmetis.dylib")
 
 
@@ -37,7 +37,7 @@ def interior_first(
     Returns:
         None for small matrices, and where METIS is not there.
     """
-    library = _metis() if A.shape[0] > WORTHWHILE else None
+    library = _metis_library() if A.shape[0] > MIN_METIS_UNKNOWNS else None
     if library is None:
         return None
     inner = np.setdiff1d(np.arange(A.shape[0]), last)
@@ -48,7 +48,7 @@ def interior_first(
     graph = (join.T @ pattern @ join).tocsr()
     graph.setdiag(0)
     graph.eliminate_zeros()
-    place = _dissected(library, graph)
+    place = _nested_dissection(library, graph)
     if place is None:
         return None
     out = np.empty(A.shape[0], np.int64)
@@ -57,7 +57,7 @@ def interior_first(
     return out
 
 
-def _dissected(library: ctypes.CDLL, graph: sp.csr_matrix) -> np.ndarray | None:
+def _nested_dissection(library: ctypes.CDLL, graph: sp.csr_matrix) -> np.ndarray | None:
     """(n,) place of each node (METIS_NodeND)."""
     n = ctypes.c_int32(graph.shape[0])
     starts = graph.indptr.astype(np.int32)
@@ -67,17 +67,17 @@ def _dissected(library: ctypes.CDLL, graph: sp.csr_matrix) -> np.ndarray | None:
     failed = (
         library.METIS_NodeND(
             ctypes.byref(n),
-            *map(_pointer, (starts, neighbours)),
+            *map(_array_pointer, (starts, neighbours)),
             None,
             None,
-            *map(_pointer, (order, place)),
+            *map(_array_pointer, (order, place)),
         )
         != 1
     )
     return None if failed else place.astype(np.int64)
 
 
-def _metis() -> ctypes.CDLL | None:
+def _metis_library() -> ctypes.CDLL | None:
     """The library, if it is there and counts in 32 bits: two nodes without edges are the same input
     for both widths.
     """
@@ -94,16 +94,16 @@ def _metis() -> ctypes.CDLL | None:
         place = np.full(4, -1, np.int64)
         library.METIS_NodeND(
             ctypes.byref(n),
-            _pointer(nothing),
-            _pointer(nothing),
+            _array_pointer(nothing),
+            _array_pointer(nothing),
             None,
             None,
-            _pointer(order),
-            _pointer(place),
+            _array_pointer(order),
+            _array_pointer(place),
         )
         return library if place[0] != -1 and place[1] == -1 else None
     return None
 
 
-def _pointer(a: np.ndarray) -> ctypes.c_void_p:
+def _array_pointer(a: np.ndarray) -> ctypes.c_void_p:
     return a.ctypes.data_as(ctypes.c_void_p)

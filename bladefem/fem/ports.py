@@ -5,7 +5,7 @@ Both come from the one factorisation that also gives the modes.
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -53,7 +53,7 @@ def port_model(
     """
     if kind not in KINDS:
         raise InputError(f"reduction is '{kind}'{suggestion(kind, KINDS)}")
-    F = _restricted(con, P)
+    F = _restrict_ports(con, P)
     flex = flex or flexible(con)
     columns = (
         F
@@ -63,7 +63,7 @@ def port_model(
     X = compliance(flex, columns)
     offset = None if static_load is None else dot(con.body.comm, F, X[:, F.shape[1] :])[:, 0].real
     X = X[:, : F.shape[1]]
-    reduce = _rubin if kind == "rubin" else _craig_bampton
+    reduce = _rubin_modes if kind == "rubin" else _craig_bampton
     omega, shapes, residual = reduce(flex, F, X, count, solver)
     return PortModel(omega, shapes, residual, names, con.nodal_diameter, offset)
 
@@ -87,17 +87,23 @@ def port_models(
     Args:
         static_load: (n_points*dim,) [N], of nodal diameter 0.
     """
-    shared = _sweep(t.opened, P, static_load) if t.opened is not None and kind == "rubin" else None
+    shared = (
+        _interior_flexibility(t.opened, P, static_load)
+        if t.opened is not None and kind == "rubin"
+        else None
+    )
     model = _Ports(P, names, count, static_load, kind, solver, shared)
     cons = {}
     lam = {}
     for p in eigenpairs(t, count, diameters, tolerance=TOLERANCE, solver=solver):
         n = p.con.nodal_diameter
+        # None is for bodies without cyclic faces only
+        assert n is not None
         cons[n] = p.con
         lam[n] = p.lam
-        yield n, _modelled(model, p)
+        yield n, _port_model(model, p)
     for n, truth in lost_modes(t, cons, lam, count).items():
-        yield n, _modelled(model, found_again(flexible(cons[n]), count, truth, TOLERANCE))
+        yield n, _port_model(model, found_again(flexible(cons[n]), count, truth, TOLERANCE))
 
 
 @dataclass(frozen=True)
@@ -110,28 +116,29 @@ class _Ports:
     static_load: np.ndarray | None
     kind: str
     solver: Eigensolver
-    # see ``_sweep``
+    # see ``_interior_flexibility``
     shared: tuple[np.ndarray, np.ndarray] | None
 
 
-def _modelled(model: _Ports, p: Eigenpairs) -> PortModel:
+def _port_model(model: _Ports, p: Eigenpairs) -> PortModel:
     """The port model of one nodal diameter from its modes."""
     n = p.con.nodal_diameter
     load = model.static_load if n == 0 else None
     P = model.P
-    if model.shared is None or p.flex.R.shape[1]:
+    rim = p.flex.factor.parts
+    if model.shared is None or not isinstance(rim, Rim) or p.flex.R.shape[1]:
         return port_model(
             p.con, P, model.names, model.count, load, model.kind, p.flex, model.solver
         )
-    G, offset = _closed(model.shared, p.flex.factor.parts)
+    G, offset = _closed_flexibility(model.shared, rim)
     lam = p.lam[: model.count]
     vectors = canonical(p.con, lam, p.X[:, : model.count])
-    shapes = dot(p.con.body.comm, _restricted(p.con, P), vectors)
+    shapes = dot(p.con.body.comm, _restrict_ports(p.con, P), vectors)
     ports = P.shape[1]
     return PortModel(
         np.sqrt(lam),
         shapes,
-        _residual(G[:ports, :ports], lam, shapes),
+        _residual_flexibility(G[:ports, :ports], lam, shapes),
         model.names,
         n,
         None if load is None else offset,
@@ -146,11 +153,11 @@ def flexibility(
     """(p, p) static flexibility P^T T K^+ T^H P [m/N], Hermitian; without rigid motions where the
     body floats.
     """
-    F = _restricted(con, P)
-    return _hermitian(dot(con.body.comm, F, compliance(flex or flexible(con), F)))
+    F = _restrict_ports(con, P)
+    return _hermitian_part(dot(con.body.comm, F, compliance(flex or flexible(con), F)))
 
 
-def _restricted(con: Constrained, P: sp.spmatrix) -> np.ndarray:
+def _restrict_ports(con: Constrained, P: sp.spmatrix) -> np.ndarray:
     if P.shape[0] != con.T.shape[0]:
         raise InputError(
             f"port vectors have {P.shape[0]} rows, expected {con.T.shape[0]} (nodes times "
@@ -159,7 +166,7 @@ def _restricted(con: Constrained, P: sp.spmatrix) -> np.ndarray:
     return restrict(con, sp.csc_matrix(P)).astype(con.dtype)
 
 
-def _sweep(
+def _interior_flexibility(
     opened: Opened,
     P: sp.spmatrix,
     load: np.ndarray | None,
@@ -180,14 +187,16 @@ def _sweep(
     return G, rim
 
 
-def _closed(shared: tuple[np.ndarray, np.ndarray], rim: Rim) -> tuple[np.ndarray, np.ndarray]:
+def _closed_flexibility(
+    shared: tuple[np.ndarray, np.ndarray], rim: Rim
+) -> tuple[np.ndarray, np.ndarray]:
     """The flexibility (p, p) with the cut faces joined, and its last column's real part."""
     g = rim.C.conj().T @ shared[1]
-    G = _hermitian(shared[0] + g.conj().T @ face_solve(rim, g))
+    G = _hermitian_part(shared[0] + g.conj().T @ face_solve(rim, g))
     return G, G[:-1, -1].real
 
 
-def _rubin(
+def _rubin_modes(
     flex: Flexibility,
     F: np.ndarray,
     X: np.ndarray,
@@ -200,17 +209,17 @@ def _rubin(
     comm = flex.con.body.comm
     lam, V = proven_pairs(flex, count, solver=solver)
     shapes = dot(comm, F, canonical(flex.con, lam, V))
-    return np.sqrt(lam), shapes, _residual(dot(comm, F, X), lam, shapes)
+    return np.sqrt(lam), shapes, _residual_flexibility(dot(comm, F, X), lam, shapes)
 
 
-def _residual(
+def _residual_flexibility(
     G: np.ndarray,
     lam: np.ndarray,
     shapes: np.ndarray,
 ) -> np.ndarray:
     """Static flexibility less that of the elastic modes kept."""
     elastic = lam > 0
-    return _hermitian(G - shapes[:, elastic] / lam[elastic] @ shapes[:, elastic].conj().T)
+    return _hermitian_part(G - shapes[:, elastic] / lam[elastic] @ shapes[:, elastic].conj().T)
 
 
 def _craig_bampton(
@@ -229,13 +238,13 @@ def _craig_bampton(
     _, inner = elastic_pairs(flex, count, inverse=fixed, solver=solver)
     V = np.concatenate([flex.R, X, inner], axis=1)
     V = V / np.sqrt(np.abs(dot(comm, V, apply(flex.con.M, V)).diagonal()))
-    mass = _hermitian(dot(comm, V, apply(flex.con.M, V)))
-    stiff = _hermitian(dot(comm, V, apply(flex.con.K, V)))
+    mass = _hermitian_part(dot(comm, V, apply(flex.con.M, V)))
+    stiff = _hermitian_part(dot(comm, V, apply(flex.con.K, V)))
     size, Q = np.linalg.eigh(mass)
     # ports that repeat each other
     keep = size > 1e-12 * size[-1]
     W = Q[:, keep] / np.sqrt(size[keep])
-    lam, Z = eigh(_hermitian(W.conj().T @ stiff @ W))
+    lam, Z = eigh(_hermitian_part(W.conj().T @ stiff @ W))
     lam[: flex.R.shape[1]] = 0.0
     return (
         np.sqrt(np.maximum(lam, 0)),
@@ -248,7 +257,7 @@ def _fixed_inverse(
     flex: Flexibility,
     F: np.ndarray,
     X: np.ndarray,
-) -> object:
+) -> Callable[[np.ndarray], np.ndarray]:
     """K^-1 with the ports held: the reactions f make F^H u zero, and leave no rigid load on a
     floating body.
 
@@ -256,7 +265,7 @@ def _fixed_inverse(
     """
     comm = flex.con.body.comm
     R = flex.R
-    G = _hermitian(dot(comm, F, X))
+    G = _hermitian_part(dot(comm, F, X))
     FR = dot(comm, F, R)
     saddle = np.linalg.pinv(
         np.block([[G, -FR], [FR.conj().T, np.zeros((R.shape[1],) * 2)]]), rcond=1e-11
@@ -270,5 +279,5 @@ def _fixed_inverse(
     return inverse
 
 
-def _hermitian(A: np.ndarray) -> np.ndarray:
+def _hermitian_part(A: np.ndarray) -> np.ndarray:
     return (A + A.conj().T) / 2

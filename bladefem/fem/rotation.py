@@ -103,13 +103,13 @@ def linear_tangent(
     w = ufl.TrialFunction(body.space)
     stress, rho, depth = properties(body.mesh, body.material, body.space.mesh, body.plane)
     speed2 = dolfinx.fem.Constant(body.space.mesh, float(speed) ** 2)
-    across = _across(body, axis)
-    gradient = ufl.grad(_function(body, u0))
+    across = _across_axis(body, axis)
+    gradient = ufl.grad(_displacement_function(body, u0))
     F = ufl.Identity(body.dim) + gradient
 
     moved = ufl.inner(stress(ufl.sym(F.T * ufl.grad(v))), ufl.sym(F.T * ufl.grad(w)))
     geometric = ufl.inner(ufl.grad(v) * stress(ufl.sym(gradient)), ufl.grad(w))
-    elastic, inertial = _measures(body, quadrature)
+    elastic, inertial = _integral_measures(body, quadrature)
     out = assemble_matrix(
         depth * (moved + geometric) * elastic
         - depth * rho * speed2 * ufl.inner(across * v, w) * inertial
@@ -149,21 +149,34 @@ def preload(
         raise InputError(
             "operation.preload = 'nonlinear' knows no support.springs, expected 'linear'"
         )
-    u = np.zeros((len(body.mesh.points), body.dim))
     if speed == 0:
-        return Preload(u, speed, 0, 0, 0.0)
-    forms = _forms(body, axis, quadrature)
+        return Preload(np.zeros((len(body.mesh.points), body.dim)), speed, 0, 0, 0.0)
+    forms = _potential_forms(body, axis, quadrature)
     con = in_step(body, clamp)
     load = centrifugal(body, speed, axis)
-    size = _length(con, restrict(con, load.reshape(-1, 1)))
+    size = _vector_length(con, restrict(con, load.reshape(-1, 1)))
+    u, iterations, steps, misfit = _load_steps(con, clamp, forms, speed, tolerance * size)
+    return Preload(u, speed, iterations, steps, misfit / size)
+
+
+def _load_steps(
+    con: Constrained,
+    clamp: str | None,
+    forms: _Forms,
+    speed: float,
+    limit: float,
+) -> tuple[np.ndarray, int, int, float]:
+    """The state at a speed, Newton iterations, load steps, and the unbalanced force left [N]."""
+    u = np.zeros((len(con.body.mesh.points), con.body.dim))
     done = 0.0
     part = 1.0
     iterations = 0
     steps = 0
     halvings = 0
+    misfit = 0.0
     while done < 1.0:
         target = min(done + part, 1.0)
-        trial, used, error = _newton(con, clamp, forms, u, target * speed**2, tolerance * size)
+        trial, used, error = _solve_newton(con, clamp, forms, u, target * speed**2, limit)
         iterations += used
         if isinstance(error, str):
             halvings = halvings + 1
@@ -175,9 +188,10 @@ def preload(
                 )
             continue
         u = trial
+        misfit = error
         done = target
         steps = steps + 1
-    return Preload(u, speed, iterations, steps, error / size)
+    return u, iterations, steps, misfit
 
 
 def tangent(
@@ -187,8 +201,8 @@ def tangent(
     quadrature: str = "exact",
 ) -> PETSc.Mat:
     """Stiffness of small vibrations about a nonlinear preload, spin softening included [N/m]."""
-    forms = _forms(body, axis, quadrature)
-    return _tangent(forms, state.displacement, state.speed**2)
+    forms = _potential_forms(body, axis, quadrature)
+    return _tangent_matrix(forms, state.displacement, state.speed**2)
 
 
 def spinning(
@@ -222,7 +236,7 @@ def _check_speed(speed: float) -> None:
         raise InputError(f"speed is {speed} rad/s, expected a number not below 0")
 
 
-def _newton(
+def _solve_newton(
     con: Constrained,
     clamp: str | None,
     forms: _Forms,
@@ -235,14 +249,14 @@ def _newton(
     """
     error = np.inf
     for k in range(NEWTON):
-        r = restrict(con, _force(con.body, forms, u, speed2))
+        r = restrict(con, _unbalanced_force(con.body, forms, u, speed2))
         before = error
-        error = _length(con, r)
+        error = _vector_length(con, r)
         if error <= limit or (error < ROUNDED * limit and error > before / 2):
             return u, k, "elements turn over" if _turned_over(con.body, u) else error
         if not np.isfinite(error):
             return u, k, "Newton's method diverges"
-        held = in_step(replace(con.body, K=_tangent(forms, u, speed2)), clamp)
+        held = in_step(replace(con.body, K=_tangent_matrix(forms, u, speed2)), clamp)
         try:
             step = compliance(flexible(held), -r)
         except NotSolvedError:
@@ -265,11 +279,11 @@ def _turned_over(body: Body, u: np.ndarray) -> bool:
     return bool((before * after <= 0).any())
 
 
-def _length(con: Constrained, r: np.ndarray) -> float:
+def _vector_length(con: Constrained, r: np.ndarray) -> float:
     return float(np.sqrt(con.body.comm.allreduce(float((np.abs(r) ** 2).sum()))))
 
 
-def _measures(body: Body, quadrature: str) -> tuple[Any, Any]:
+def _integral_measures(body: Body, quadrature: str) -> tuple[Any, Any]:
     """Measures for the elastic and the inertial integrals; the elastic one is of fourth power in
     grad u.
     """
@@ -281,13 +295,13 @@ def _measures(body: Body, quadrature: str) -> tuple[Any, Any]:
     )
 
 
-def _across(body: Body, axis: tuple[float, float, float]) -> Any:
+def _across_axis(body: Body, axis: tuple[float, float, float]) -> Any:
     """(dim, dim) projection across the axis."""
     unit = np.asarray(axis, float) / np.linalg.norm(axis)
     return ufl.as_matrix((np.eye(3) - np.outer(unit, unit))[: body.dim, : body.dim].tolist())
 
 
-def _forms(
+def _potential_forms(
     body: Body,
     axis: tuple[float, float, float],
     quadrature: str,
@@ -301,26 +315,30 @@ def _forms(
     stress, rho, depth = properties(body.mesh, body.material, domain, body.plane)
     # F^T F - 1 would cancel small strains
     E = ufl.sym(ufl.grad(u)) + ufl.grad(u).T * ufl.grad(u) / 2
-    place = _across(body, axis) * (ufl.SpatialCoordinate(domain) + u)
-    elastic, inertial = _measures(body, quadrature)
+    place = _across_axis(body, axis) * (ufl.SpatialCoordinate(domain) + u)
+    elastic, inertial = _integral_measures(body, quadrature)
     potential = (
         depth / 2 * ufl.inner(stress(E), E) * elastic
         - depth * rho * speed2 / 2 * ufl.inner(place, place) * inertial
     )
     force = ufl.derivative(potential, u, v)
     return _Forms(
-        u, speed2, compile_form(force), compile_form(ufl.derivative(force, u, w)), _nodes(body)
+        u,
+        speed2,
+        compile_form(force),
+        compile_form(ufl.derivative(force, u, w)),
+        _block_nodes(body),
     )
 
 
-def _force(
+def _unbalanced_force(
     body: Body,
     forms: _Forms,
     u: np.ndarray,
     speed2: float,
 ) -> np.ndarray:
     """(n_points*dim, 1) unbalanced force in mesh numbering [N]."""
-    _set(forms, u, speed2)
+    _set_state(forms, u, speed2)
     part = assemble_vector(forms.force).array
     rows = np.concatenate(body.comm.allgather(part))
     out = np.zeros((body.rows.size, body.dim))
@@ -329,16 +347,16 @@ def _force(
     return out.reshape(-1, 1)
 
 
-def _tangent(
+def _tangent_matrix(
     forms: _Forms,
     u: np.ndarray,
     speed2: float,
 ) -> PETSc.Mat:
-    _set(forms, u, speed2)
+    _set_state(forms, u, speed2)
     return assemble_matrix(forms.stiffness)
 
 
-def _set(
+def _set_state(
     forms: _Forms,
     u: np.ndarray,
     speed2: float,
@@ -347,14 +365,14 @@ def _set(
     forms.speed2.value = speed2
 
 
-def _function(body: Body, u: np.ndarray) -> Any:
+def _displacement_function(body: Body, u: np.ndarray) -> Any:
     """A displacement in mesh numbering as a function of the body's space."""
     function = dolfinx.fem.Function(body.space)
-    function.x.array[:] = u[_nodes(body)].ravel()
+    function.x.array[:] = u[_block_nodes(body)].ravel()
     return function
 
 
-def _nodes(body: Body) -> np.ndarray:
+def _block_nodes(body: Body) -> np.ndarray:
     """(local blocks,) mesh node of each block of this rank, ghosts included."""
     index_map = body.space.dofmap.index_map
     node_of = np.empty(index_map.size_global, np.int64)

@@ -16,9 +16,11 @@ import threading
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
+from typing import TypeVar
 
 import numpy as np
 
+from ..errors import NotSolvedError
 from .mumps import Factorised, petsc_call, set_operation, solve_matrix
 
 # MATOP_MAT_SOLVE: PETSc 3.1 to 3.19, later
@@ -44,7 +46,7 @@ class Bridge:
 
 def schur_complement(factor: Factorised, n: int) -> np.ndarray:
     """(n, n) A_bb - A_bi A_ii^-1 A_ib of the rows left out."""
-    S = _borrowed(factor, lambda handle: _array(handle, (n, n)).copy())
+    S = _use_complement(factor, lambda handle: _dense_array(handle, (n, n)).copy())
     # a symmetric factorisation fills one triangle
     lower = np.tril(S, -1)
     upper = np.triu(S, 1)
@@ -69,7 +71,7 @@ def bridge(factor: Factorised, n: int) -> Bridge | None:
             rows = ctypes.c_int()
             columns = ctypes.c_int()
             petsc_call("MatGetSize", left, ctypes.byref(rows), ctypes.byref(columns))
-            r = _array(left, (columns.value, rows.value)).T
+            r = _dense_array(left, (columns.value, rows.value)).T
             r[:] = answers[-1](r)
         except BaseException as error:
             raised.append(error)
@@ -77,15 +79,25 @@ def bridge(factor: Factorised, n: int) -> Bridge | None:
 
     def ones(handle: int) -> None:
         # of floating bodies S is singular; PETSc must factorise it
-        _array(handle, (n, n))[:] = np.eye(n)
+        _dense_array(handle, (n, n))[:] = np.eye(n)
 
     callback = CALLBACK(answer)
-    _borrowed(factor, ones)
+    _use_complement(factor, ones)
     petsc_call("MatFactorFactorizeSchurComplement", factor.matrix.handle)
-    _borrowed(factor, lambda handle: [set_operation(handle, place, callback) for place in MATSOLVE])
+
+    def redirect(handle: int) -> None:
+        for place in MATSOLVE:
+            set_operation(handle, place, callback)
+
+    _use_complement(factor, redirect)
     made = Bridge(factor, n, answers, raised, callback)
     heard: list[int] = []
-    through(made, np.zeros((factor.matrix.size[0], 1)), lambda r: heard.append(1) or r)
+
+    def listen(r: np.ndarray) -> np.ndarray:
+        heard.append(1)
+        return r
+
+    through(made, np.zeros((factor.matrix.size[0], 1)), listen)
     return made if heard else None
 
 
@@ -131,7 +143,10 @@ def _signals_wait() -> Iterator[None]:
             signal.raise_signal(came[0])
 
 
-def _borrowed(factor: Factorised, use: Callable[[int], object]) -> object:
+Result = TypeVar("Result")
+
+
+def _use_complement(factor: Factorised, use: Callable[[int], Result]) -> Result:
     """Do something with PETSc's Schur complement."""
     matrix = ctypes.c_void_p()
     status = ctypes.c_int()
@@ -141,6 +156,8 @@ def _borrowed(factor: Factorised, use: Callable[[int], object]) -> object:
         ctypes.byref(matrix),
         ctypes.byref(status),
     )
+    if matrix.value is None:
+        raise NotSolvedError("PETSc handed out no Schur complement of the cut faces")
     out = use(matrix.value)
     petsc_call(
         "MatFactorRestoreSchurComplement", factor.matrix.handle, ctypes.byref(matrix), status
@@ -148,7 +165,7 @@ def _borrowed(factor: Factorised, use: Callable[[int], object]) -> object:
     return out
 
 
-def _array(handle: int, shape: tuple[int, int]) -> np.ndarray:
+def _dense_array(handle: int, shape: tuple[int, int]) -> np.ndarray:
     """The memory of a dense matrix, columns of it as rows."""
     data = ctypes.POINTER(ctypes.c_double)()
     petsc_call("MatDenseGetArray", handle, ctypes.byref(data))

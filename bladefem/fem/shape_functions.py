@@ -37,7 +37,7 @@ FACET_OF = {
     "hexahedron27": "quad9",
 }
 
-_CORNERS = {
+_CORNERS: dict[str, list[tuple[int, ...]]] = {
     "line": [(0,), (1,)],
     "triangle": [(0, 0), (1, 0), (0, 1)],
     "quad": [(0, 0), (1, 0), (1, 1), (0, 1)],
@@ -105,7 +105,7 @@ def nodes(cell_type: str) -> np.ndarray:
 
 
 @cache
-def _basis(cell_type: str) -> tuple[np.ndarray, np.ndarray]:
+def _polynomial_basis(cell_type: str) -> tuple[np.ndarray, np.ndarray]:
     """Exponents (k, d) of the monomials and their coefficients (k, k) in each shape function's
     column.
     """
@@ -123,7 +123,7 @@ def _basis(cell_type: str) -> tuple[np.ndarray, np.ndarray]:
 
 def tabulate(cell_type: str, x: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Values (q, k) and reference gradients (q, k, d) of the shape functions at x (q, d)."""
-    exponents, coefficients = _basis(cell_type)
+    exponents, coefficients = _polynomial_basis(cell_type)
     d = x.shape[1]
     values = np.prod(x[:, None, :] ** exponents, axis=2) @ coefficients
     gradients = np.empty((*values.shape, d))
@@ -140,7 +140,7 @@ def quadrature(shape: str, degree: int) -> tuple[np.ndarray, np.ndarray]:
     d = len(_CORNERS[shape][0])
     n = degree // 2 + 1
     simplex = shape in ("triangle", "tetra")
-    lines = [_jacobi(n, d - 1 - i if simplex else 0) for i in range(d)]
+    lines = [_jacobi_rule(n, d - 1 - i if simplex else 0) for i in range(d)]
     x = np.array(list(product(*[line[0] for line in lines])))
     w = np.array([np.prod(c) for c in product(*[line[1] for line in lines])])
     if simplex:
@@ -151,7 +151,7 @@ def quadrature(shape: str, degree: int) -> tuple[np.ndarray, np.ndarray]:
     return x, w
 
 
-def _jacobi(n: int, power: int) -> tuple[np.ndarray, np.ndarray]:
+def _jacobi_rule(n: int, power: int) -> tuple[np.ndarray, np.ndarray]:
     """Gauss rule on (0, 1) for the weight (1 - x)^power."""
     x, w = roots_jacobi(n, power, 0)
     return (x + 1) / 2, w / 2 ** (power + 1)

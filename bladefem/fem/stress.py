@@ -21,6 +21,8 @@ PAIRS = ((0, 0), (1, 1), (2, 2), (0, 1), (1, 2), (2, 0))
 BLOCK = 20000
 # of a period, for principal stresses of complex fields
 PHASES = 64
+# square of a patch's radius: bounds the weight of Gauss points next to the node
+NEAREST = 0.01
 
 
 @dataclass(frozen=True)
@@ -87,8 +89,10 @@ def nodal_stress(
         cells = body.mesh.bodies[name]
         part = slice(start, start + len(cells))
         start += len(cells)
-        at_nodes = np.einsum("kq,cqs->cks", _continuation(body.mesh.cell_type), found.stress[part])
-        mean = _averaged(cells, at_nodes, found.volume[part].sum(1), len(out))
+        at_nodes = np.einsum(
+            "kq,cqs->cks", _extrapolation_matrix(body.mesh.cell_type), found.stress[part]
+        )
+        mean = _average_at_nodes(cells, at_nodes, found.volume[part].sum(1), len(out))
         size = np.where(np.bincount(cells.ravel(), minlength=len(out)) > 0, von_mises(mean), -1.0)
         better = size > largest
         out[better], largest[better] = mean[better], size[better]
@@ -100,12 +104,16 @@ def patch_stress(
     u: np.ndarray,
     node: int,
 ) -> tuple[np.ndarray, np.ndarray]:
-    """(6,) stress at a node continued from the Gauss points of the cells round it, by polynomials
-    of first and of second degree fitted to them; the cells share a node with those that touch it.
+    """Two values (6,) of the stress at a node, continued from the Gauss points near it.
+
+    The first is a linear fit to the cells at the node. The second is a quadratic fit to these and
+    to all that touch them, in which a residual counts with the inverse square of its distance:
+    round a notch the stress falls within an element or two, and far points would flatten it.
     """
     mesh = body.mesh
     places = []
     stresses = []
+    at_node = []
     for name in body.material:
         cells = mesh.bodies[name]
         near = cells[(cells == node).any(axis=1)]
@@ -115,14 +123,25 @@ def patch_stress(
         at, _, stress = _of_cells(body, np.asarray(u)[:, : body.dim], name, some, False)
         places.append(at.reshape(-1, 3)[:, : body.dim])
         stresses.append(stress.reshape(-1, 6))
+        at_node.append(np.repeat((some == node).any(axis=1), at.shape[1]))
     x = np.concatenate(places) - mesh.points[node, : body.dim]
     x = x / np.abs(x).max()
     values = np.concatenate(stresses)
+    own = np.concatenate(at_node)
     linear = np.column_stack([np.ones(len(x)), x])
     squares = [x[:, i] * x[:, j] for i in range(body.dim) for j in range(i, body.dim)]
     quadratic = np.column_stack([linear, *squares])
-    fits = [np.linalg.lstsq(basis, values, rcond=None)[0][0] for basis in (linear, quadratic)]
-    return fits[0], fits[1]
+    weight = 1 / (NEAREST + (x**2).sum(axis=1))[:, None]
+    first = np.linalg.lstsq(linear[own], values[own], rcond=None)[0][0]
+    second = np.linalg.lstsq(quadratic * weight, values * weight, rcond=None)[0][0]
+    return first, second
+
+
+def signed_von_mises(stress: np.ndarray) -> np.ndarray:
+    """(...) von Mises stress of real (..., 6), negative where the mean of the principal stresses is
+    (compression) [Pa].
+    """
+    return np.where(stress[..., :3].sum(axis=-1) < 0, -1.0, 1.0) * von_mises(stress)
 
 
 def von_mises(stress: np.ndarray) -> np.ndarray:
@@ -132,9 +151,9 @@ def von_mises(stress: np.ndarray) -> np.ndarray:
     The square is a quadratic form Q of s(t): Q = (Q(s, s*) + Re(Q(s, s) e^{2 j w t})) / 2.
     """
     if not np.iscomplexobj(stress):
-        return np.sqrt(np.maximum(_form(stress, stress), 0.0))
-    mean = _form(stress, stress.conj()).real
-    swing = np.abs(_form(stress, stress))
+        return np.sqrt(np.maximum(_mises_form(stress, stress), 0.0))
+    mean = _mises_form(stress, stress.conj()).real
+    swing = np.abs(_mises_form(stress, stress))
     return np.sqrt(np.maximum(mean + swing, 0.0) / 2)
 
 
@@ -143,16 +162,16 @@ def principal(stress: np.ndarray) -> np.ndarray:
     period.
     """
     if not np.iscomplexobj(stress):
-        return np.linalg.eigvalsh(_tensor(stress))[..., ::-1]
+        return np.linalg.eigvalsh(_stress_tensor(stress))[..., ::-1]
     best = np.full((*stress.shape[:-1], 3), -np.inf)
     # half a period later the sign is the other
     for turn in np.exp(2j * np.pi * np.arange(PHASES // 2) / PHASES):
-        now = _roots((stress * turn).real)
+        now = _cubic_roots((stress * turn).real)
         best = np.maximum(best, np.maximum(now, -now[..., ::-1]))
     return best
 
 
-def _roots(s: np.ndarray) -> np.ndarray:
+def _cubic_roots(s: np.ndarray) -> np.ndarray:
     """(..., 3) principal stresses of real (..., 6), descending, by the cosine formula (Smith 1961,
     doi:10.1145/355578.366316); double ones to eight digits, many times faster than an eigenvalue
     solver.
@@ -170,7 +189,7 @@ def _roots(s: np.ndarray) -> np.ndarray:
     return mean[..., None] + np.stack([first, -first - last, last], axis=-1)
 
 
-def _form(a: np.ndarray, b: np.ndarray) -> np.ndarray:
+def _mises_form(a: np.ndarray, b: np.ndarray) -> np.ndarray:
     """The bilinear form whose square root is the von Mises stress."""
     mean_a = a[..., :3].mean(-1, keepdims=True)
     mean_b = b[..., :3].mean(-1, keepdims=True)
@@ -178,7 +197,7 @@ def _form(a: np.ndarray, b: np.ndarray) -> np.ndarray:
     return 1.5 * normal + 3 * (a[..., 3:] * b[..., 3:]).sum(-1)
 
 
-def _tensor(stress: np.ndarray) -> np.ndarray:
+def _stress_tensor(stress: np.ndarray) -> np.ndarray:
     out = np.empty((*stress.shape[:-1], 3, 3), stress.dtype)
     for i, (a, b) in enumerate(PAIRS):
         out[..., a, b] = out[..., b, a] = stress[..., i]
@@ -215,10 +234,14 @@ def _of_cells(
         J = np.linalg.det(F)
         stress = F @ stress @ F.swapaxes(2, 3) / J[..., None, None]
         across = None if across is None else across / J
-    return np.einsum("qk,ckg->cqg", values, mesh.points[cells]), volume, _voigt(stress, across)
+    return (
+        np.einsum("qk,ckg->cqg", values, mesh.points[cells]),
+        volume,
+        _stress_vector(stress, across),
+    )
 
 
-def _voigt(stress: np.ndarray, across: np.ndarray | None) -> np.ndarray:
+def _stress_vector(stress: np.ndarray, across: np.ndarray | None) -> np.ndarray:
     d = stress.shape[-1]
     out = np.zeros((*stress.shape[:-2], 6), stress.dtype)
     for i, (a, b) in enumerate(PAIRS):
@@ -255,7 +278,7 @@ def _four_points(corners: int) -> tuple[np.ndarray, np.ndarray]:
 
 
 @cache
-def _continuation(cell_type: str) -> np.ndarray:
+def _extrapolation_matrix(cell_type: str) -> np.ndarray:
     """(k, q) from Gauss points to nodes, by the polynomial that the points determine."""
     kind = shape.SHAPES[cell_type][0]
     at, _ = _best_points(cell_type)
@@ -266,7 +289,7 @@ def _continuation(cell_type: str) -> np.ndarray:
     return shape.tabulate(kind, target)[0] @ np.linalg.pinv(lower)
 
 
-def _averaged(
+def _average_at_nodes(
     cells: np.ndarray,
     values: np.ndarray,
     weight: np.ndarray,

@@ -1,5 +1,5 @@
-"""How a body is supported beside its clamp: springs per unit area on a face, such as the elastic
-root in a disc, and single directions held.
+"""How a body is supported in addition to its clamp: springs per unit area on a face, such as the
+elastic root in a disc, and single directions held.
 """
 
 from __future__ import annotations

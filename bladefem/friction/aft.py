@@ -73,6 +73,13 @@ class Forces:
     converged: bool
     reason: str
 
+    @property
+    def jacobian(self) -> np.ndarray:
+        """``dfdw`` of forces that were evaluated with it."""
+        if self.dfdw is None:
+            raise RuntimeError("the contact forces were evaluated without their Jacobian")
+        return self.dfdw
+
 
 def evaluate(
     elements: Elements,

@@ -81,8 +81,8 @@ def by_harmonic(
     f: np.ndarray,
     omega: float,
 ) -> Approximation:
-    """K_ad and C_ad of each harmonic alone, (..., H); nan where the motion lacks it; F_c0 is the
-    mean force.
+    """K_ad and C_ad of each harmonic alone, (..., H); nan where the motion does not have it; F_c0
+    is the mean force.
 
     Each harmonic's approximation does the work of that harmonic, and reproduces its amplitude and
     phase.

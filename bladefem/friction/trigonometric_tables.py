@@ -89,7 +89,7 @@ def trigonometric_tables(H: int, samples: int) -> Tables:
     along = knots[np.arange(samples + more) % samples].T
     blank = ((0, more), (0, 0))
     arrays = at, at.T, sums, knots, along, np.pad(weights, blank), _sample_fours(samples)
-    made = Tables(*map(_aligned_copy, arrays), _filled_size(2 * H + 1))
+    made = Tables._make([*map(_aligned_copy, arrays), _filled_size(2 * H + 1)])
     for array in made[:-1]:
         array.setflags(write=False)
     return made

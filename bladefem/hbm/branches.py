@@ -4,7 +4,7 @@ Where contacts lift off, several motions exist at one frequency, and a sweep see
 the response is followed from both ends of the band, and from every known motion that lies on none
 of the paths so far. Each path is cut at its folds into pieces along which the frequency keeps its
 direction; a local maximum along a path is closed in on the path itself, so that it may lie right
-beside a fold. (Krack and Gross, Harmonic Balance for Nonlinear Vibration Problems, 2019, Sect. 4.)
+next to a fold. (Krack and Gross, Harmonic Balance for Nonlinear Vibration Problems, 2019, Sect. 4.)
 """
 
 from __future__ import annotations
@@ -28,15 +28,15 @@ from .solver.newton import DEFAULTS, Options
 # first and longest arc-length step, as shares of the band
 STEPS = (0.005, 0.05)
 # steps with which a local maximum is closed in
-FINE = 1e-4
+PEAK_STEP = 1e-4
 # points of all paths of a band: so many times unknowns, within these bounds
-EFFORT = 3e5
-FEWEST = 300
-MOST = 1500
-# paths of a band beside those from its ends
+POINT_BUDGET = 3e5
+MIN_POINTS = 300
+MAX_POINTS = 1500
+# paths of a band in addition to those from its ends
 MOST_PATHS = 6
 # relative distance of displacements up to which a motion lies on a path, between two of its points
-SAME = 0.03
+SAME_MOTION = 0.03
 # residual of points of a path, relative: a looser one lets a path go on beyond a fold, 17 % above
 # the peak at 2e-5
 TOLERANCE = 1e-9
@@ -121,7 +121,7 @@ def find_branches(
     ]
     if not solved:
         return Branches((), (), ("no point of the band was solved",))
-    limit = int(np.clip(EFFORT / (model.springs.size * (2 * H + 1)), FEWEST, MOST))
+    limit = int(np.clip(POINT_BUDGET / (model.springs.size * (2 * H + 1)), MIN_POINTS, MAX_POINTS))
     budget = limit
     further = _further(model, band, solved[0], H, samples, options)
     for start in chain(solved[:1], solved[-1:], solved, further):
@@ -244,7 +244,7 @@ def _near(
     share = np.clip((point.omega - left.omega) / width, 0, 1) if width else 0.0
     between = (1 - share) * a + share * b
     # the chord of a curved path lies off it by a share of its own length
-    off = SAME * max(np.linalg.norm(a), np.linalg.norm(b)) + 0.1 * np.linalg.norm(b - a)
+    off = SAME_MOTION * max(np.linalg.norm(a), np.linalg.norm(b)) + 0.1 * np.linalg.norm(b - a)
     # a stuck contact may rest anywhere
     return bool(np.linalg.norm((c - between)[:, :, 1:]) <= off)
 
@@ -289,7 +289,7 @@ def _finer(
     probe = options.probe
     first, _, last = three
     length = abs(three[1].value - first.value) + abs(last.value - three[1].value)
-    step = max(length / (band[1] - band[0]) / 8, FINE)
+    step = max(length / (band[1] - band[0]) / 8, PEAK_STEP)
     options = replace(options, frugal=False)
     found = [first]
     try:

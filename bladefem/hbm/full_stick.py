@@ -32,8 +32,14 @@ def sticks_safely(model: ReducedModel, solution: Solution) -> bool:
 def leading_stuck_points(model: ReducedModel, points: Sequence[Solution | None]) -> list[Solution]:
     """The first of the points, which have the same harmonics, as long as they grip."""
     nodes = len(model.elements.kt)
-    stuck = list(takewhile(lambda p: p is not None and p.states["stick"] == nodes, points))
-    holds = _within_friction_limit(model, np.array([p.f for p in stuck])) if stuck else []
+    stuck: list[Solution] = []
+    for point in points:
+        if point is None or point.states["stick"] != nodes:
+            break
+        stuck.append(point)
+    if not stuck:
+        return []
+    holds = _within_friction_limit(model, np.array([p.f for p in stuck]))
     return [p for p, _ in takewhile(lambda pair: pair[1], zip(stuck, holds, strict=True))]
 
 

@@ -1,10 +1,10 @@
 """The lowest and the highest resonance that the loading history can leave: extremes over all
 admissible friction forces of the nodes that never slip.
 
-From a resonance the derivative by these forces (`traction_gradient`) tells where to push each node.
+From a resonance the derivative by these forces (`traction_gradient`) shows where to push each node.
 The march of the friction law returns a force beyond the friction limit to it, so that every state
 that is solved is admissible, and both ends are attained; the next resonance is climbed from the
-last one. Where pushing gains no more, a linear programme tells what the best admissible change
+last one. Where pushing gains no more, a linear programme gives what the best admissible change
 promises to first order (the conditional gradient method, Frank and Wolfe 1956, DOI
 10.1002/nav.3800030109). Whether nothing lies beyond the ends is certified only where that is
 nothing and the response is monotone.
@@ -33,7 +33,7 @@ MOVES = 15
 LONGEST = 2.0
 SHORTEST = 0.1
 # derivative below which a node is pushed less, over the mean of all nodes
-FAINT = 0.1
+WEAK_DERIVATIVE = 0.1
 # start of the extreme loads, over the friction limit
 BEYOND = 1.5
 
@@ -201,7 +201,7 @@ def _push(
     elements = model.elements
     gradient = place.free.gradient
     length = np.linalg.norm(gradient, axis=1, keepdims=True)
-    least = max(FAINT * float(length.mean()), np.finfo(float).tiny)
+    least = max(WEAK_DERIVATIVE * float(length.mean()), float(np.finfo(float).tiny))
     limit = elements.mu * np.maximum(elements.n0, 0.0)
     return sign * limit[:, None] * gradient / np.maximum(length, least)
 

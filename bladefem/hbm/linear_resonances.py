@@ -45,9 +45,9 @@ def _stuck_modes(model: ReducedModel, h: int) -> tuple[np.ndarray, np.ndarray]:
     side = model.side(h)
     rows = np.arange(len(side.residual))[side.ports["contact"]][model.rows]
     shapes = [side.shapes[rows]]
-    stiffness = [side.omega**2]
+    stiffness: list[np.ndarray] = [side.omega**2]
     flexibility = side.residual[np.ix_(rows, rows)]
-    masses = [np.eye(len(side.omega))]
+    masses: list[np.ndarray] = [np.eye(len(side.omega))]
     if isinstance(model.damper, RigidBody):
         shapes.append(-model.damper.B[model.rows])
         stiffness.append(np.zeros(len(model.damper.mass)))

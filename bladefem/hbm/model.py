@@ -7,7 +7,7 @@ from __future__ import annotations
 from collections.abc import Callable, Hashable, Mapping
 from dataclasses import dataclass, field, replace
 from functools import cached_property
-from typing import Any
+from typing import Any, TypeVar
 
 import numpy as np
 
@@ -16,6 +16,8 @@ from ..errors import InputError
 from ..friction.fourier import synthesis, to_real
 from .linear.bodies import Damping, Stack, stack_bodies
 from .validate_model import check_model, port_size
+
+Result = TypeVar("Result")
 
 
 @dataclass(frozen=True)
@@ -60,8 +62,8 @@ class ReducedModel:
     # the preload state, whose static solution is left as it is; mean forces that friction raises
     # are reported and do not act back.
     coupled: bool = True
-    # Prescribed part of the normal load beside n0 and kn w_n: harmonic >= 1 to complex amplitudes
-    # of the nodes [N].
+    # Prescribed part of the normal load in addition to n0 and kn w_n: harmonic >= 1 to complex
+    # amplitudes of the nodes [N].
     normal: Mapping[int, np.ndarray] = field(default_factory=dict)
     # (nodes, 1 + tangents) compliance of stiff interface layers that the residual flexibility of
     # the sides already has [m/N] (contact.numerical_stiffness); None: the elements have it all
@@ -71,7 +73,7 @@ class ReducedModel:
     start: np.ndarray | None = None
 
     def __post_init__(self) -> None:
-        parts = {
+        parts: dict[str, Any] = {
             name: np.asarray(getattr(self.elements, name), dtype=float)
             for name in ("kt", "kn", "mu", "n0")
         }
@@ -219,7 +221,7 @@ class ReducedModel:
         larger = (
             stack
             for key, stack in self._kept.items()
-            if key[:2] == ("stack", name) and key[2] > len(bodies)
+            if isinstance(key, tuple) and key[:2] == ("stack", name) and key[2] > len(bodies)
         )
         found = next(larger, None)
         return (
@@ -229,8 +231,8 @@ class ReducedModel:
     def once(
         self,
         key: Hashable,
-        make: Callable[[], Any],
-    ) -> Any:
+        make: Callable[[], Result],
+    ) -> Result:
         """What `make` returns, kept with this model: what does not depend on the frequency is made
         once.
         """
@@ -241,6 +243,17 @@ class ReducedModel:
     @cached_property
     def _kept(self) -> dict[Hashable, Any]:
         return {}
+
+
+def rigid_damper(model: ReducedModel) -> RigidBody:
+    """The damper of a model whose damper is rigid.
+
+    Raises:
+        InputError: an elastic damper, or none.
+    """
+    if not isinstance(model.damper, RigidBody):
+        raise InputError("model.damper: expected a rigid body")
+    return model.damper
 
 
 def in_series(side: PortModel, compliance: np.ndarray) -> PortModel:

@@ -20,6 +20,7 @@ from scipy import linalg
 
 from ..errors import InputError
 from ..friction.fourier import to_complex, to_real
+from ..util.newton import halve_step, iterate_newton
 from .linear.bodies import Stack
 from .linear.condensation import condense
 from .linear.woodbury import bodies_of
@@ -38,7 +39,7 @@ DIFFERENCE = 1e-7
 # residual of the motion, relative to its size
 TOLERANCE = 1e-10
 # unknowns of the dense factorisation
-LARGEST = 6000
+MAX_DENSE_UNKNOWNS = 6000
 
 
 @dataclass(frozen=True)
@@ -86,9 +87,9 @@ def nonlinear_mode(
         raise InputError(f"mode {mode}: expected an elastic mode from 0 to {len(own) - 1}")
     check_point(model, float(own[mode]), max(H, *model.excitation, *model.normal), samples)
     unknowns = model.springs.size * (2 * H + 1)
-    if unknowns > LARGEST:
+    if unknowns > MAX_DENSE_UNKNOWNS:
         raise InputError(
-            f"{unknowns} unknowns: expected at most {LARGEST}, fewer harmonics or nodes"
+            f"{unknowns} unknowns: expected at most {MAX_DENSE_UNKNOWNS}, fewer harmonics or nodes"
         )
     frame = _frame(model, mode, H, samples)
     last = None
@@ -170,28 +171,14 @@ def _solve(
     last: NonlinearMode | None,
 ) -> NonlinearMode:
     """Newton from the last motion, scaled, or from full stick."""
-    x = _start(frame, amplitude, last)
-    state = _residual(frame, x, amplitude)
-    reason = f"not converged after {STEPS} iterations"
-    iterations = 0
-    for iterations in range(STEPS + 1):
-        size = np.linalg.norm(state.w)
-        if np.linalg.norm(state.r) <= TOLERANCE * size:
-            reason = "residual within tolerance"
-            break
-        if iterations == STEPS or not np.isfinite(state.r).all():
-            break
-        try:
-            step = linalg.solve(_jacobian(frame, state, amplitude), state.r)
-        except linalg.LinAlgError:
-            reason = "singular Jacobian"
-            break
-        better = _search(frame, x, step, state, amplitude)
-        if better is None:
-            reason = "line search stalled"
-            break
-        x, state = better
-    residual = float(np.linalg.norm(state.r) / np.linalg.norm(state.w))
+    run = iterate_newton(
+        _residual(frame, _start(frame, amplitude, last), amplitude),
+        lambda state: float(np.linalg.norm(state.r) / np.linalg.norm(state.w)),
+        lambda state: _line_search(frame, state, amplitude),
+        TOLERANCE,
+        STEPS,
+    )
+    state = run.state
     return NonlinearMode(
         amplitude,
         frame.mode,
@@ -199,10 +186,10 @@ def _solve(
         state.zeta,
         state.w,
         _probe(frame, state, amplitude),
-        residual <= TOLERANCE,
-        reason,
-        iterations,
-        residual,
+        run.converged,
+        run.reason,
+        run.iterations,
+        run.error,
     )
 
 
@@ -250,7 +237,7 @@ def _flexibility(
     zeta: float,
 ) -> np.ndarray:
     """(m, m) flexibility of both bodies in harmonic h, in harmonic 1 without the mode itself."""
-    G = 0.0
+    G: np.ndarray = np.zeros(())
     w = h * omega
     for i, body in enumerate(frame.bodies):
         s = _of(body, h)
@@ -291,7 +278,7 @@ def _residual(
     r[:, 0] = motion[:, 0].real - frame.stuck0 + frame.A0 @ p
     r += _flexed(frame, f, omega, zeta)
     r[:, 1] -= frame.shape * amplitude
-    return _State(w, f, forces.dfdw, omega, zeta, to_real(r).ravel())
+    return _State(w, f, forces.jacobian, omega, zeta, to_real(r).ravel())
 
 
 def _frequency(
@@ -372,22 +359,20 @@ def _flexed(
     return out
 
 
-def _search(
+def _line_search(
     frame: _Frame,
-    x: np.ndarray,
-    step: np.ndarray,
     state: _State,
     amplitude: float,
-) -> tuple[np.ndarray, _State] | None:
-    """The first halving of the step that lowers the residual."""
-    share = 1.0
+) -> _State | None:
+    """The first halving of the Newton step that lowers the residual, or None."""
+    step = linalg.solve(_jacobian(frame, state, amplitude), state.r)
+    x = state.w.ravel()
     before = np.linalg.norm(state.r)
-    while share >= SHORTEST:
-        trial = _residual(frame, x - share * step, amplitude)
-        if np.linalg.norm(trial.r) <= (1 - 1e-4 * share) * before:
-            return x - share * step, trial
-        share /= 2
-    return None
+    return halve_step(
+        lambda share: _residual(frame, x - share * step, amplitude),
+        lambda trial, share: bool(np.linalg.norm(trial.r) <= (1 - 1e-4 * share) * before),
+        SHORTEST,
+    )
 
 
 def _start(

@@ -15,10 +15,12 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..errors import InputError, NotSolvedError
+from ..util.curve_extremum import cubic_minimum, tangents_meet
 from .linear_resonances import free_resonances, stuck_resonances
 from .model import ReducedModel
 from .parameters import check_parameter, parameter_value, path_coordinate, vary
-from .peak import Peak, cubic_minimum, find_peak, with_slope
+from .peak import Peak, find_peak, with_slope
+from .solution import Solution
 from .solver.newton import DEFAULTS, Options
 from .sweep import first_look, local_maxima, response, size
 
@@ -80,7 +82,7 @@ class _Search:
         self,
         model: ReducedModel,
         omega: float,
-        near: object = None,
+        near: Peak | Solution | None = None,
     ) -> Peak:
         """The peak uphill of a circular frequency [rad/s], without its slope."""
         return find_peak(
@@ -215,7 +217,7 @@ def lowest_peak(
 def _first_level(search: _Search, value: float) -> tuple[list[Peak], int]:
     """Peaks uphill of the resonances of both limits at the first value, and the points spent."""
     model = search.along.model_at(value)
-    known = []
+    known: list[Peak] = []
     points = 0
     reason = "the climb leaves it"
     seeds = np.concatenate(
@@ -276,6 +278,8 @@ def _close_in(search: _Search, levels: dict[float, list[Peak]]) -> int:
         low, high = _bracket_minimum(_highest_peaks(levels))
         if low is None or high is None:
             end, sign = (low, 1.0) if high is None else (high, -1.0)
+            # the lowest peak itself is one of the two
+            assert end is not None
             value = search.moved(end.value, sign * step)
             if value == end.value:
                 return points
@@ -304,7 +308,9 @@ def _nearby_peaks(levels: dict[float, list[Peak]], value: float) -> list[Peak]:
     """The peaks of the next levels below and above a value, without those of one that stand where
     the other's do.
     """
-    below, above = (levels.get(near, []) for near in _neighbour_values(levels, value))
+    below, above = (
+        [] if near is None else levels[near] for near in _neighbour_values(levels, value)
+    )
     return below + [
         p for p in above if not any(_same_peak(p, other) or _same_peak(other, p) for other in below)
     ]
@@ -368,13 +374,11 @@ def _next_value(
     rise = high.height - low.height
     if not down < 0 <= up:
         return search.moved(low.value, width / 2), np.inf
-    meet = (rise - up) / (down - up)
-    smooth = cubic_minimum(down, up, rise)
-    floor = low.height + smooth * (
-        down + smooth * (3 * rise - 2 * down - up + smooth * (down + up - 2 * rise))
-    )
+    meet, corner = tangents_meet(down, up, rise)
+    smooth, bottom = cubic_minimum(down, up, rise)
+    floor = low.height + bottom
     if 0 < meet < 1:
-        floor = min(floor, low.height + meet * down)
+        floor = min(floor, low.height + corner)
     share = meet if tangents and 0 < meet < 1 else smooth
     return (
         search.moved(low.value, float(np.clip(share, 0.05, 0.95)) * width),
@@ -391,7 +395,7 @@ def _solve_level(
     cannot.
     """
     model = search.along.model_at(value)
-    found = []
+    found: list[Peak] = []
     points = 0
     for old in sorted(known, key=lambda peak: -_estimated_height(search, peak, value)):
         if found and _estimated_height(search, old, value) < SOLVED_HEIGHT_SHARE * max(
@@ -450,4 +454,6 @@ def _look_over_band(
             met is None or peak.height > met.height * (1 + search.tolerance)
         ):
             met = peak
-    return (None if met is best else search.along.with_slope(model, met, value)), spent
+    if met is None or met is best:
+        return None, spent
+    return search.along.with_slope(model, met, value), spent

@@ -6,8 +6,9 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from pathlib import Path
-from typing import Any, TypeVar
+from typing import TypeVar
 
+from ..util.communicator import Communicator
 from .checkpoint import response_with_checkpoints
 from .model import ReducedModel
 from .solution import Solution
@@ -23,7 +24,7 @@ POINTS_AT_ONCE = 16
 def share_work(
     work: Callable[[Item], Result],
     items: Sequence[Item],
-    comm: Any = None,
+    comm: Communicator | None = None,
 ) -> list[Result]:
     """Results of work on each item, dealt out to the ranks of an mpi4py communicator; every rank
     returns all of them.
@@ -56,7 +57,7 @@ def shared_response(
     H: int = 3,
     samples: int = 128,
     *,
-    comm: Any = None,
+    comm: Communicator | None = None,
     folder: str | Path | None = None,
     options: Options = DEFAULTS,
 ) -> list[Solution]:

@@ -88,7 +88,7 @@ def contact_rate(
     if not uses_coulomb_kernels(model):
         return _rate_by_differences(balance, state, name)
     f = state.forces.f
-    D = state.forces.dfdw
+    D = state.forces.jacobian
     w = state.w
     # where the tangents begin
     first = model.directions - elements.tangents
@@ -189,7 +189,7 @@ def _damper_rate(
     """(H+1, m) derivative of the damper's contact displacements under constant forces."""
     if name == "mass" and model.damper is None:
         raise InputError("mass: expected a model with a damper")
-    if model.damper is None or name == "force":
+    if name == "force":
         return np.zeros_like(force)
     w = omega * np.arange(len(force))
     if isinstance(model.damper, RigidBody):
@@ -200,6 +200,8 @@ def _damper_rate(
         )
         return moved * {"omega": -2 / omega, "mass": -1.0, "damping": 0.0}[name]
     damper = model.elastic_damper(len(force) - 1)
+    if damper is None:
+        return np.zeros_like(force)
     ports = np.zeros((len(force), damper.shapes.shape[1]), dtype=complex)
     ports[:, damper.contact] = force
     modal = modal_amplitudes(damper, modal_flexibility(damper, w), ports)

@@ -13,6 +13,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from ..errors import NotSolvedError
+from ..util.curve_extremum import cubic_minimum, tangents_meet
 from .model import ReducedModel
 from .parameters import vary
 from .sensitivity import sensitivities
@@ -29,7 +30,7 @@ FIRST_STEP = 1e-3
 # share of a predicted step that is taken, so that the maximum is soon enclosed
 AHEAD = 1.3
 # longest step, as a share of the frequency
-FARTHEST = 0.05
+MAX_STEP = 0.05
 
 
 @dataclass(frozen=True)
@@ -79,8 +80,10 @@ def find_peak(
     low = high = last = None
     bend, start = (near.bend, near.solution) if isinstance(near, Peak) else (0.0, near)
     reach = FIRST_STEP * omega
+    frequency = omega / (2 * np.pi)
     for count in range(1, STEPS + 1):
         start = solve(model, omega, H, samples, start=start, options=options)
+        frequency = start.frequency
         if not start.converged:
             raise NotSolvedError(f"peak search stopped at {start.frequency:.6g} Hz: {start.reason}")
         if size(start, options.probe) == 0:
@@ -98,14 +101,14 @@ def find_peak(
             best = now
             step = -now.line / bend if bend > 0 else np.sign(now.slope) * reach
             gain = abs(now.slope * step) / now.height if bend > 0 and count > 1 else np.inf
-            target = omega + float(np.clip(AHEAD * step, -FARTHEST * omega, FARTHEST * omega))
+            target = omega + float(np.clip(AHEAD * step, -MAX_STEP * omega, MAX_STEP * omega))
             reach = 2 * reach
         if gain < tolerance / 4:
             return Peak(best.solution, best.height, count, bend=float(max(bend, 0.0)))
         last = now
         omega = target
     raise NotSolvedError(
-        f"peak search found no maximum in {STEPS} points, last at {start.frequency:.6g} Hz"
+        f"peak search found no maximum in {STEPS} points, last at {frequency:.6g} Hz"
     )
 
 
@@ -150,28 +153,11 @@ def _vertex_between(
     down = low.line * width
     up = high.line * width
     rise = high.height**-2 - low.height**-2
-    share = (rise - up) / (down - up) if corner else cubic_minimum(down, up, rise)
-    a = down + up - 2 * rise
-    b = 3 * rise - 2 * down - up
-    bottom = low.height**-2 + share * (down + (0.0 if corner else share * (b + share * a)))
+    share, depth = tangents_meet(down, up, rise) if corner else cubic_minimum(down, up, rise)
+    bottom = low.height**-2 + depth
     gain = max(low.height, high.height) ** -2 / bottom - 1 if bottom > 0 else np.inf
     target = low.solution.omega + float(np.clip(share, 0.02, 0.98)) * width
     return target, float(gain) if width > 1e-9 * target else 0.0
-
-
-def cubic_minimum(
-    down: float,
-    up: float,
-    rise: float,
-) -> float:
-    """Place in [0, 1] of the minimum of the cubic with slopes down < 0 <= up at the ends and this
-    rise between them.
-    """
-    # down x + b x^2 + a x^3
-    a = down + up - 2 * rise
-    b = 3 * rise - 2 * down - up
-    root = np.sqrt(max(b**2 - 3 * a * down, 0.0))
-    return float(np.clip(-down / (b + root), 0.0, 1.0)) if b + root > 0 else 0.5
 
 
 def track_peak(
@@ -198,7 +184,7 @@ def track_peak(
         if len(path) > 1 and path[-1].value != path[-2].value:
             ahead = (value - path[-1].value) / (path[-1].value - path[-2].value)
             guess += float(
-                np.clip(ahead * (guess - path[-2].omega), -FARTHEST * guess, FARTHEST * guess)
+                np.clip(ahead * (guess - path[-2].omega), -MAX_STEP * guess, MAX_STEP * guess)
             )
         changed = vary(model, name, value)
         peak = find_peak(

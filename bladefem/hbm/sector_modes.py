@@ -10,16 +10,18 @@ are its modes.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import reduce
 
 import numpy as np
 
 from ..data import PortModel
 from ..errors import InputError
+from .linear.bodies import Stack
 from .linear.woodbury import bodies_of
 from .model import ReducedModel
 
 # relative difference up to which two bodies are the same
-SAME = 1e-9
+SAME_BODY = 1e-9
 
 
 @dataclass(frozen=True)
@@ -59,7 +61,7 @@ def sector_modes(model: ReducedModel) -> SectorModes:
         np.concatenate([part.stiffness for part in parts]),
         damping,
         np.hstack([part.contact for part in parts]),
-        sum(part.residual for part in parts),
+        reduce(np.add, [part.residual for part in parts]),
     )
 
 
@@ -104,7 +106,9 @@ def _same(
         return False
     turn = np.conj if mirrored else np.asarray
     return (one is other and not mirrored) or all(
-        np.allclose(a, turn(b), rtol=SAME, atol=SAME * max(abs(a).max(initial=0.0), 1e-300))
+        np.allclose(
+            a, turn(b), rtol=SAME_BODY, atol=SAME_BODY * max(abs(a).max(initial=0.0), 1e-300)
+        )
         for a, b in (
             (one.omega, other.omega),
             (one.shapes, other.shapes),
@@ -113,14 +117,14 @@ def _same(
     )
 
 
-def _bodies(model: ReducedModel, r: int) -> list[tuple]:
+def _bodies(model: ReducedModel, r: int) -> list[tuple[Stack, float]]:
     """Each body's stack of harmonics 0..r-1 at least, and the sign of its motion."""
     stacks = bodies_of(model, max(r - 1, 0))
     return list(zip(stacks, (1.0, -1.0), strict=False))
 
 
 def _ring(
-    stack: object,
+    stack: Stack,
     r: int,
     sign: float,
 ) -> SectorModes:

@@ -30,7 +30,7 @@ class Work:
     def imbalance(self) -> float:
         """|input - damping - friction| over the input work."""
         return abs(self.input - self.damping - self.friction) / max(
-            abs(self.input), np.finfo(float).tiny
+            abs(self.input), float(np.finfo(float).tiny)
         )
 
 

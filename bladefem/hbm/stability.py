@@ -4,7 +4,7 @@ model.
 Where normal loads are prescribed and the bodies damped there is one periodic motion, and every
 other one decays to it (the friction law is then monotone). Elsewhere the linearised motion is
 carried through one period along the solution (`bladefem.hbm.linearised_flow`): the largest modulus
-of its multipliers tells how much of a disturbance is left after a period. Nodes that stick
+of its multipliers shows how much of a disturbance is left after a period. Nodes that stick
 throughout only add constant multipliers of one, the mean force that stick leaves open, and are
 condensed into the bodies. Travelling waves are judged against all disturbances that repeat after
 the same number of blades as they do.
@@ -36,13 +36,13 @@ UNKNOWN = "unknown"
 GROWTH = 1e-3
 # instants a period, and how many times as many where the verdict is close
 INSTANTS = 256
-FINER = 4
+INSTANT_REFINEMENT = 4
 # distance from one within which it is
-CLOSE = 0.003
+NEAR_ONE = 0.003
 # operations of one verdict above which only those are made that are asked for, some 0.3 s
 AFFORDABLE = 2e9
 # and above which none are made, some 10 s
-LARGEST = 3e10
+MAX_OPERATIONS = 3e10
 # angle of a multiplier to the real axis up to which it is real
 REAL = 1e-3
 
@@ -64,7 +64,7 @@ class Verdict:
 def stability_verdict(
     model: ReducedModel,
     solution: Solution,
-    most: float = LARGEST,
+    most: float = MAX_OPERATIONS,
 ) -> Verdict:
     """The verdict on a converged solution of the model.
 
@@ -84,8 +84,8 @@ def stability_verdict(
     if isinstance(system, InputError):
         return Verdict(UNKNOWN, reason=str(system))
     leading = _leading(model, solution, system, INSTANTS, most)
-    if leading is not None and abs(abs(leading) - 1 - GROWTH) < CLOSE:
-        finer = _leading(model, solution, system, FINER * INSTANTS, most)
+    if leading is not None and abs(abs(leading) - 1 - GROWTH) < NEAR_ONE:
+        finer = _leading(model, solution, system, INSTANT_REFINEMENT * INSTANTS, most)
         leading = leading if finer is None else finer
     if leading is None:
         return Verdict(UNKNOWN, reason=f"it would take more than {most:.0e} operations")

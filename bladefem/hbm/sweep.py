@@ -12,6 +12,7 @@ from itertools import chain, islice
 import numpy as np
 
 from ..errors import InputError, NotSolvedError
+from ..util.curve_extremum import find_maxima, parabola_at_middle
 from .branches import find_branches
 from .linear_resonances import free_resonances, stuck_resonances
 from .model import ReducedModel
@@ -27,7 +28,7 @@ from .validate_model import check_point, check_probe
 Keep = Callable[[float, Callable[[], Solution]], Solution]
 # of the height with the frequency, at a solved one
 Slope = Callable[[float], float]
-# of a frequency: how far beside a resonance without damping a sweep solves, where it hits it
+# of a frequency: how far next to a resonance without damping a sweep solves, where it hits it
 # exactly
 OFF_RESONANCE = 1e-7
 # the same for the first look at a model without damping, whose flexibility stuck is all rounding
@@ -58,15 +59,15 @@ def response(
 ) -> Iterator[Solution]:
     """Solve one point after the other, each started from the curve through the last ones.
 
-    Where a resonance without damping is hit exactly, the point 1e-7 beside it is solved, as its
+    Where a resonance without damping is hit exactly, the point 1e-7 next to it is solved, as its
     `omega` says.
 
     Args:
         keep: is given each frequency and what solves it; see `bladefem.hbm.checkpoint`.
     """
     omegas = list(omegas)
-    last = []
-    ready = {}
+    last: list[Solution] = []
+    ready: dict[int, Solution] = {}
 
     def compute(i: int) -> Solution:
         if i not in ready:
@@ -227,7 +228,7 @@ def solve_from(
     """The point from the first of several neighbours that leads to it, before fallbacks, which take
     far longer.
 
-    Beside a fold of the curve only the neighbour on its other side does.
+    Next to a fold of the curve only the neighbour on its other side does.
     """
     simply = replace(options, fallbacks=False)
     tries = (
@@ -248,7 +249,7 @@ def _solve_off_resonance(
     start: Solution | None,
     options: Options,
 ) -> Solution:
-    """The point, or the one a hair beside it."""
+    """The point, or the one just next to it."""
     try:
         return solve(model, omega, H, samples, start=start, options=options)
     except NotSolvedError:
@@ -257,12 +258,8 @@ def _solve_off_resonance(
 
 def local_maxima(points: list[Solution], probe: int = 0) -> list[Solution]:
     """Those of the points, sorted by frequency, that stand above both neighbours."""
-    heights = [size(point, probe) for point in points]
-    return [
-        points[i]
-        for i in range(1, len(points) - 1)
-        if heights[i] >= max(heights[i - 1], heights[i + 1])
-    ]
+    heights = np.array([size(point, probe) for point in points])
+    return [points[i] for i in find_maxima(heights)]
 
 
 def first_look(model: ReducedModel, band: tuple[float, float]) -> np.ndarray:
@@ -316,8 +313,8 @@ def _peak_targets(
     accuracy: tuple[float, float],
 ) -> Iterator[float]:
     peak, curve = accuracy
-    for i in range(1, len(omegas) - 1):
-        if heights[i] >= max(heights[i - 1], heights[i + 1]) and heights[i] > curve * heights.max():
+    for i in find_maxima(heights):
+        if heights[i] > curve * heights.max():
             target = _next_to_peak(
                 omegas[i - 1 : i + 2], heights[i - 1 : i + 2], slope(float(omegas[i])), peak
             )
@@ -340,7 +337,7 @@ def _next_to_peak(
     )
     # of 1/height^2 over that of the middle, with omega^2
     exact = -slope / heights[1] / omegas[1]
-    through = (down * left**2 - up * right**2) / (left * right * (left + right))
+    through, _ = parabola_at_middle(left, right, up, down)
     # sampled friction ripples: the three heights are asked as well
     for tilt in (exact, through):
         bends = (up + tilt * left) / left**2, (down - tilt * right) / right**2

@@ -115,9 +115,8 @@ def _bodies_in_time(model: ReducedModel) -> list[Stack]:
         raise InputError("elements with two tangents, expected tangents = 1")
     if len(model.sides) > 1 or (isinstance(model.damper, tuple) and len(model.damper) > 1):
         raise InputError("one body for each harmonic, expected a single one for all of them")
-    bodies = [model.blades(0)] + (
-        [model.elastic_damper(0)] if isinstance(model.damper, tuple) else []
-    )
+    damper = model.elastic_damper(0)
+    bodies = [model.blades(0)] + ([] if damper is None else [damper])
     if isinstance(model.damper, RigidBody):
         bodies.append(rigid_stack(model.damper.mass, model.damper.B[model.rows]))
     for body in bodies:

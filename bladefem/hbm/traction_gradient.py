@@ -38,7 +38,7 @@ INSTANTS = 64
 # lies outside is returned by the march
 DIRECTIONS = 12
 # largest change of a force, over the largest friction limit
-LARGEST = 20.0
+MAX_FORCE_CHANGE = 20.0
 
 
 @dataclass(frozen=True)
@@ -107,7 +107,7 @@ def farthest(
         -direction.ravel() / size,
         rows.reshape(m * len(found.normals), -1),
         found.room.ravel() / scale,
-        bounds=(-LARGEST, LARGEST),
+        bounds=(-MAX_FORCE_CHANGE, MAX_FORCE_CHANGE),
         method="highs",
     )
     if solved.x is None:
@@ -192,7 +192,7 @@ def _gradient(
     model = balance.model
     _, d, K = state.w.shape
     first = d - model.elements.tangents
-    dfdw = state.forces.dfdw.copy()
+    dfdw = state.forces.jacobian.copy()
     dfdw[nodes] = 0.0
     for a in range(d):
         for k in range(K):

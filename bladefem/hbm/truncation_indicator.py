@@ -12,6 +12,8 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import replace
+from functools import reduce
+from typing import Any
 
 import numpy as np
 
@@ -27,7 +29,7 @@ from .solver.residual import contact_forces
 
 # for each harmonic
 INSTANTS_PER_HARMONIC = 4
-# of a frequency: how far beside it bodies are looked at, which without damping may be hit exactly
+# of a frequency: how far next to it bodies are looked at, which without damping may be hit exactly
 OFF_RESONANCE = 1e-7
 
 
@@ -55,7 +57,8 @@ def truncation_indicator(
     forces = _higher_force_harmonics(model, w, most)
     orders = np.arange(H + 1, most + 1)
     omegas = (1 + OFF_RESONANCE) * np.array([p.omega for p in points])
-    motion = sum(_higher_motion(body, orders, omegas, forces) for body in bodies_of(model, most))
+    motions = [_higher_motion(body, orders, omegas, forces) for body in bodies_of(model, most)]
+    motion = reduce(np.add, motions)
     first = np.sum(w[..., 1:3] ** 2, axis=(1, 2, 3))
     return np.sqrt(np.sum(abs(motion) ** 2, axis=(0, 2)) / np.maximum(first, np.finfo(float).tiny))
 
@@ -121,7 +124,7 @@ def _higher_motion(
         for part in (body.shapes[:, body.contact], body.residual[:, body.contact, body.contact])
     )
     names = ("omega", "viscous", "hysteretic", "coupled")
-    each = {
+    each: dict[str, Any] = {
         name: np.repeat(part[rows], p, axis=0)
         for name in names
         if (part := getattr(body, name)) is not None

@@ -83,7 +83,7 @@ def check_probe(model: ReducedModel, probe: int) -> None:
 
 
 def port_size(model: PortModel, name: str) -> int:
-    """Freedoms of a port."""
+    """Degrees of freedom of a port."""
     if name not in model.ports:
         raise InputError(f"ports {', '.join(model.ports)}: expected a port '{name}'")
     return len(range(*model.ports[name].indices(len(model.residual))))

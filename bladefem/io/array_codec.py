@@ -26,12 +26,8 @@ def write_npz(
     """Write a value with its key; TypeError for what has no encoding."""
     tree, arrays = tree_of(value)
     with open(path, "wb") as file:
-        np.savez(
-            file,
-            key=np.array(key),
-            tree=np.array(tree),
-            **{f"a{i}": a for i, a in enumerate(arrays)},
-        )
+        members: dict[str, Any] = {f"a{i}": a for i, a in enumerate(arrays)}
+        np.savez(file, key=np.array(key), tree=np.array(tree), **members)
 
 
 def read_npz(path: str | Path, key: str) -> Any:
@@ -155,6 +151,6 @@ def _class(home: str) -> type:
     if module.partition(".")[0] not in _HOMES:
         raise ValueError(f"{home} is not a class of bladefem")
     kind = getattr(import_module(module), name)
-    if not dataclasses.is_dataclass(kind):
+    if not (isinstance(kind, type) and dataclasses.is_dataclass(kind)):
         raise ValueError(f"{home} is not a dataclass")
     return kind

@@ -1,4 +1,4 @@
-"""Taking a run folder into use: one command at a time, and no results of another scene beside the
+"""Taking a run folder into use: one command at a time, and no results of another scene next to the
 new ones.
 """
 
@@ -18,7 +18,7 @@ from ..scene.toml import dump, load_scene
 from .stage_cache import open_folder, write_text
 
 EARLIER = "earlier"
-# names of the fields that the user gave, beside the scene with all its values
+# names of the fields that the user gave, in addition to the scene with all its values
 GIVEN = "given.json"
 RESULTS = (".csv", ".gif", ".html", ".json", ".md", ".nc", ".png", ".svg", ".tex", ".txt", ".vtu")
 

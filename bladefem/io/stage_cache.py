@@ -17,17 +17,22 @@ from contextlib import contextmanager, suppress
 from importlib import metadata
 from importlib.util import find_spec
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any, TypeVar
 
 import numpy as np
 
 from ..errors import InputError
+from ..util.communicator import Communicator
 from ..util.message import Message
 from .array_codec import read_npz, tree_of, write_npz
+
+if TYPE_CHECKING:
+    import xarray as xr
 
 # Raised when the meaning or the layout of stored stages changes: older files are then computed
 # again.
 FORMAT = 4
+Result = TypeVar("Result")
 
 
 def open_folder(path: str | Path) -> Path:
@@ -79,8 +84,10 @@ def code_of(*packages: str) -> str:
     """
     digest = hashlib.sha256()
     for package in packages:
-        folder = Path(next(iter(find_spec(package).submodule_search_locations)))
-        for file in sorted(folder.rglob("*.py")):
+        found = find_spec(package)
+        if found is None or not found.submodule_search_locations:
+            raise ModuleNotFoundError(f"{package}: no such package of sources")
+        for file in sorted(Path(found.submodule_search_locations[0]).rglob("*.py")):
             digest.update(file.read_bytes())
     return digest.hexdigest()[:20]
 
@@ -89,9 +96,9 @@ def stage(
     folder: str | Path | None,
     name: str,
     key: str,
-    compute: Callable[[], Any],
-    comm: Any = None,
-) -> tuple[Any, float | None]:
+    compute: Callable[[], Result],
+    comm: Communicator | None = None,
+) -> tuple[Result, float | None]:
     """The result of a stage: found in the folder when it was made from the same things, else
     computed and kept.
 
@@ -146,8 +153,8 @@ def write_results(
     return path
 
 
-def read_results(path: str | Path, group: str = "/") -> Any:
-    """An xarray Dataset of one group, complex variables put together again, wholly in memory.
+def read_results(path: str | Path, group: str = "/") -> xr.Dataset:
+    """One group, complex variables put together again, wholly in memory.
 
     Raises:
         InputError: no such file or group.
@@ -252,21 +259,22 @@ def _keep(
         write_npz(temporary, key, made)
 
 
-def on_root(comm: Any, action: Callable[[], Any]) -> Any:
+def on_root(comm: Communicator | None, action: Callable[[], Result]) -> Result:
     """The value of ``action`` on rank 0, or its error, on every rank."""
     if comm is None or comm.size == 1:
         return action()
-    value = error = None
+    value: Result | None = None
+    error: Exception | None = None
     if comm.rank == 0:
         try:
             value = action()
         except Exception as problem:
             # whatever it is, the other ranks must not wait for ever
             error = problem
-    value, error = comm.bcast((value, error))
-    if error is not None:
-        raise error
-    return value
+    shared, failure = comm.bcast((value, error))
+    if failure is not None:
+        raise failure
+    return shared
 
 
 def _feed(digest: Any, part: Any) -> None:
@@ -291,7 +299,7 @@ def bind_h5py() -> None:
         sys.setdlopenflags(flags)
 
 
-def _real(dataset: Any) -> Any:
+def _real(dataset: xr.Dataset) -> xr.Dataset:
     """netCDF has no complex numbers: "x" becomes "x_re" and "x_im"."""
     for name in [n for n, v in dataset.data_vars.items() if np.iscomplexobj(v)]:
         variable = dataset[name]
@@ -302,7 +310,7 @@ def _real(dataset: Any) -> Any:
     return dataset
 
 
-def _complex(dataset: Any) -> Any:
+def _complex(dataset: xr.Dataset) -> xr.Dataset:
     for name in [
         n[:-3] for n in dataset.data_vars if n.endswith("_re") and f"{n[:-3]}_im" in dataset
     ]:

@@ -127,7 +127,8 @@ def join(bodies: tuple[PortModel, ...]) -> PortModel:
 
 
 def recombine(body: PortModel, selection: np.ndarray) -> PortModel:
-    """The body with other contact freedoms: selection (k, contact dofs) times the present ones.
+    """The body with other contact degrees of freedom: selection (k, contact dofs) times the present
+    ones.
 
     With two blades joined as one body a row (1, -1) makes their relative displacement a contact.
     """

@@ -32,7 +32,7 @@ def read_dmig(path: str | Path) -> dict[str, np.ndarray]:
     """
     forms: dict[str, tuple[int, int]] = {}
     entries: list[tuple[str, tuple[int, int], tuple[int, int], complex]] = []
-    for number, fields in _entries(Path(path)):
+    for number, fields in _read_entries(Path(path)):
         try:
             name = fields[1].upper()
             point = int(fields[2])
@@ -40,7 +40,7 @@ def read_dmig(path: str | Path) -> dict[str, np.ndarray]:
                 forms[name] = int(fields[3]), int(fields[4])
             else:
                 column = point, int(fields[3] or 0)
-                entries += [(name, column, *term) for term in _terms(fields[5:])]
+                entries += [(name, column, *term) for term in _column_terms(fields[5:])]
         except (ValueError, IndexError) as error:
             raise InputError(
                 f"file {path}, line {number}: cannot read the DMIG entry {' '.join(fields)}"
@@ -71,9 +71,9 @@ def read_ansys(path: str | Path) -> dict[str, np.ndarray]:
     """K and M of an Ansys ``.full`` file, dense, and "dofs" (n, 2): node and degree of freedom of
     each row.
 
-    Constrained freedoms, whose rows are empty, are left out. Ansys' own library reads the file (pip
-    install ansys-mapdl-reader); it has no reader for ``.sub``: write the generation pass as
-    ``.full``, or as DMIG or Matrix Market.
+    Constrained degrees of freedom, whose rows are empty, are left out. Ansys' own library reads the
+    file (pip install ansys-mapdl-reader); it has no reader for ``.sub``: write the generation pass
+    as ``.full``, or as DMIG or Matrix Market.
 
     Raises:
         InputError: the library is not installed.
@@ -91,7 +91,7 @@ def read_ansys(path: str | Path) -> dict[str, np.ndarray]:
     return {"K": K, "M": M, "dofs": np.asarray(dofs)[free]}
 
 
-def _entries(path: Path) -> Iterator[tuple[int, list[str]]]:
+def _read_entries(path: Path) -> Iterator[tuple[int, list[str]]]:
     """Line number and fields of each DMIG entry with its continuations: [DMIG, name, gj, cj, -, g1,
     c1, a1, b1, ...].
 
@@ -99,10 +99,10 @@ def _entries(path: Path) -> Iterator[tuple[int, list[str]]]:
     * + or blanks.
     """
     number = 0
-    fields = []
+    fields: list[str] = []
     for count, line in enumerate(path.read_text().splitlines(), 1):
         line = line.split("$")[0].rstrip()
-        first, data = _fields(line)
+        first, data = _split_fields(line)
         if first.upper().rstrip("*") == "DMIG":
             if fields:
                 yield number, fields
@@ -118,7 +118,7 @@ def _entries(path: Path) -> Iterator[tuple[int, list[str]]]:
         yield number, fields
 
 
-def _fields(line: str) -> tuple[str, list[str]]:
+def _split_fields(line: str) -> tuple[str, list[str]]:
     """The first field, and the data fields filled up to eight, or to four in long format."""
     if "," in line:
         first, *data = (part.strip() for part in line.split(","))
@@ -130,15 +130,18 @@ def _fields(line: str) -> tuple[str, list[str]]:
     return first, [padded[8 + i * width : 8 + (i + 1) * width].strip() for i in range(count)]
 
 
-def _terms(fields: list[str]) -> Iterator[tuple[tuple[int, int], complex]]:
+def _column_terms(fields: list[str]) -> Iterator[tuple[tuple[int, int], complex]]:
     """Row and value of each term: point, component, real and imaginary part."""
     for start in range(0, len(fields), 4):
         point, component, real, imaginary = (fields[start : start + 4] + [""] * 4)[:4]
         if point:
-            yield (int(point), int(component or 0)), complex(_number(real), _number(imaginary))
+            yield (
+                (int(point), int(component or 0)),
+                complex(_parse_real(real), _parse_real(imaginary)),
+            )
 
 
-def _number(text: str) -> float:
+def _parse_real(text: str) -> float:
     """A Nastran real, whose exponent may be written without its letter: 2.5+10, 1.D-3."""
     text = text.upper().replace("D", "E")
     return float(re.sub(r"(?<=[0-9.])([+-])", r"E\1", text)) if text else 0.0

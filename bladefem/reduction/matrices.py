@@ -6,6 +6,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from scipy import io, linalg, sparse
@@ -50,15 +51,8 @@ def port_model_from_matrices(
         InputError: shapes do not fit, M or K is not Hermitian, M is not positive semidefinite, or a
             motion has neither mass nor stiffness.
     """
-    M = _hermitian(M, "M")
-    K = _hermitian(K, "K")
-    if M.shape != K.shape:
-        raise InputError(f"M {M.shape} and K {K.shape}: expected the same shape")
-    if C is not None:
-        C = _square(C, "C")
-        if C.shape != M.shape:
-            raise InputError(f"C {C.shape} and M {M.shape}: expected the same shape")
-    P, slices = _selection(ports, M.shape[0])
+    M, K, C = _checked_matrices(M, K, C)
+    P, slices = _port_selection(ports, M.shape[0])
     massless = np.zeros((len(P), len(P)))
     try:
         values, vectors = linalg.eigh(K, M)
@@ -87,6 +81,23 @@ def port_model_from_matrices(
         nodal_diameter,
         damping=damping,
     )
+
+
+def _checked_matrices(
+    M: np.ndarray,
+    K: np.ndarray,
+    C: np.ndarray | None,
+) -> tuple[np.ndarray, np.ndarray, np.ndarray | None]:
+    """Dense matrices of one shape, M and K Hermitian."""
+    M = _hermitian_matrix(M, "M")
+    K = _hermitian_matrix(K, "K")
+    if M.shape != K.shape:
+        raise InputError(f"M {M.shape} and K {K.shape}: expected the same shape")
+    if C is not None:
+        C = _square_matrix(C, "C")
+        if C.shape != M.shape:
+            raise InputError(f"C {C.shape} and M {M.shape}: expected the same shape")
+    return M, K, C
 
 
 def read_matrices(path: str | Path) -> dict[str, np.ndarray]:
@@ -129,15 +140,17 @@ def _read_npz(path: Path) -> dict[str, np.ndarray]:
 
 def _read_mat(path: Path) -> dict[str, np.ndarray]:
     return {
-        name: _dense(value) for name, value in io.loadmat(path).items() if not name.startswith("__")
+        name: _dense_array(value)
+        for name, value in io.loadmat(path).items()
+        if not name.startswith("__")
     }
 
 
 def _read_market(path: Path) -> dict[str, np.ndarray]:
-    return {path.stem: _dense(io.mmread(path))}
+    return {path.stem: _dense_array(io.mmread(path))}
 
 
-def _dense(matrix: np.ndarray) -> np.ndarray:
+def _dense_array(matrix: Any) -> np.ndarray:
     return matrix.toarray() if sparse.issparse(matrix) else np.asarray(matrix)
 
 
@@ -176,8 +189,8 @@ def _without_massless(
     )
 
 
-def _square(matrix: np.ndarray, name: str) -> np.ndarray:
-    matrix = np.atleast_2d(_dense(matrix))
+def _square_matrix(matrix: np.ndarray, name: str) -> np.ndarray:
+    matrix = np.atleast_2d(_dense_array(matrix))
     if matrix.ndim != 2 or matrix.shape[0] != matrix.shape[1] or not np.isfinite(matrix).all():
         raise InputError(
             f"{name} of shape {matrix.shape}: expected a square matrix of finite numbers"
@@ -185,8 +198,8 @@ def _square(matrix: np.ndarray, name: str) -> np.ndarray:
     return matrix
 
 
-def _hermitian(matrix: np.ndarray, name: str) -> np.ndarray:
-    matrix = _square(matrix, name)
+def _hermitian_matrix(matrix: np.ndarray, name: str) -> np.ndarray:
+    matrix = _square_matrix(matrix, name)
     error = abs(matrix - matrix.conj().T).max()
     if error > 1e-8 * abs(matrix).max():
         raise InputError(
@@ -211,7 +224,9 @@ def _modal_damping(matrix: np.ndarray) -> np.ndarray:
     return diagonal if abs(matrix - np.diag(diagonal)).max() <= rounding else matrix
 
 
-def _selection(ports: Mapping[str, np.ndarray], dofs: int) -> tuple[np.ndarray, dict[str, slice]]:
+def _port_selection(
+    ports: Mapping[str, np.ndarray], dofs: int
+) -> tuple[np.ndarray, dict[str, slice]]:
     if not isinstance(ports, Mapping) or not ports:
         raise InputError(
             f"ports of type {type(ports).__name__}: expected a dict of names to dof numbers, not "

@@ -3,13 +3,17 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import pandas as pd
 
 from ..data import PressureMap
+from ..study.pipeline.run_records import ModalRun, SolvedRun
 from .tables import units_of
+
+if TYPE_CHECKING:
+    import xarray as xr
 
 MEANING = {
     "force": "contact force on the damper",
@@ -20,10 +24,8 @@ MEANING = {
 }
 
 
-def datasets(result: Any, tables: dict[str, pd.DataFrame]) -> dict[str, Any]:
-    """Groups "modes", "contact", "resultants", "points", "summary" of a finished run
-    (study.pipeline.Run).
-    """
+def datasets(result: SolvedRun, tables: dict[str, pd.DataFrame]) -> dict[str, xr.Dataset]:
+    """Groups "modes", "contact", "resultants", "points", "summary" of a finished run."""
     return {
         "modes": mode_shapes(result),
         "contact": contact_arrays(result.contact.maps),
@@ -33,7 +35,7 @@ def datasets(result: Any, tables: dict[str, pd.DataFrame]) -> dict[str, Any]:
     }
 
 
-def mode_shapes(result: Any) -> Any:
+def mode_shapes(result: ModalRun) -> xr.Dataset:
     """Frequencies, shapes and node positions of all nodal diameters."""
     import xarray as xr
 
@@ -72,7 +74,7 @@ def mode_shapes(result: Any) -> Any:
     )
 
 
-def contact_arrays(maps: Mapping[float, Sequence[PressureMap]]) -> Any:
+def contact_arrays(maps: Mapping[float, Sequence[PressureMap]]) -> xr.Dataset:
     """Force, gap and pressure of each contact node under each load [N], with its place and
     patch.
     """
@@ -102,7 +104,7 @@ def contact_arrays(maps: Mapping[float, Sequence[PressureMap]]) -> Any:
     )
 
 
-def resultants(table: pd.DataFrame) -> Any:
+def resultants(table: pd.DataFrame) -> xr.Dataset:
     """Force, moment, centre, area and peak pressure of each face under each load: the table's rows
     by (load, seat).
 
@@ -114,7 +116,7 @@ def resultants(table: pd.DataFrame) -> Any:
     loads = table["load"].unique()
     seats = table["patch"].unique()
     units = units_of(table)
-    data = {}
+    data: dict[str, Any] = {}
     vectors = {name: [f"{name}_{axis}" for axis in "xyz"] for name in ("force", "moment", "centre")}
     for name, columns in vectors.items():
         values = table[columns].to_numpy().reshape(len(loads), len(seats), 3)
@@ -144,7 +146,7 @@ def resultants(table: pd.DataFrame) -> Any:
     )
 
 
-def table_dataset(table: pd.DataFrame, rows: str) -> Any:
+def table_dataset(table: pd.DataFrame, rows: str) -> xr.Dataset:
     """The columns of a table as variables with units along one dimension; "drift x [m/s]" becomes
     drift_x in m/s.
     """

@@ -131,13 +131,13 @@ def _between_text(
     unit: str,
     factor: float = 1.0,
 ) -> str:
-    if low is None and high is None:
-        return "only one load studied"
-    if low is None:
-        return f"below {factor * high:.4g} {unit}, no lower bound studied"
-    if high is None:
+    if low is not None and high is not None:
+        return f"between {factor * low:.4g} and {factor * high:.4g} {unit}"
+    if low is not None:
         return f"above {factor * low:.4g} {unit}, no upper bound studied"
-    return f"between {factor * low:.4g} and {factor * high:.4g} {unit}"
+    if high is not None:
+        return f"below {factor * high:.4g} {unit}, no lower bound studied"
+    return "only one load studied"
 
 
 def _mass_text(
@@ -152,7 +152,7 @@ def _mass_text(
 
 
 def _spacing_text(best: pd.Series, points: pd.DataFrame | None) -> str:
-    """Half the distance of the points beside the highest one."""
+    """Half the distance of the points next to the highest one."""
     if points is None or points.empty:
         return "no estimate"
     curve = points[points["load"] == best["load"]]

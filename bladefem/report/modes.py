@@ -7,11 +7,13 @@ from __future__ import annotations
 import time
 from collections.abc import Callable, Sequence
 from dataclasses import replace
+from functools import partial
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 import pandas as pd
+
+from geometry.mesh import sector_of
 
 from ..data import ModeSet
 from ..io.stage_cache import on_root, write_results
@@ -19,6 +21,8 @@ from ..scene.tables import Scene
 from ..study.modes.comparison import family_table
 from ..study.modes.linear_response_report import stress_states, stress_table
 from ..study.modes.survey import Survey, Wanted, excited_set, survey
+from ..study.pipeline.run_records import folder_of
+from ..util.communicator import Communicator
 from ..util.progress import Progress, unwatched
 from ..view import convergence, forced, mesh, modes, speed
 from ..view.live_curves import live_diameters
@@ -53,7 +57,7 @@ def run(
     folder: str | Path,
     wanted: Wanted,
     pictures: int = PICTURES,
-    comm: Any = None,
+    comm: Communicator | None = None,
     progress: Progress = unwatched,
 ) -> Survey:
     """Survey the modes and write the folder.
@@ -98,7 +102,7 @@ def tables_of(result: Survey) -> dict[str, pd.DataFrame]:
         }
     if result.answer is not None:
         out |= {"forced_response": result.answer.points, "resonances": result.answer.resonances}
-    if result.mac is not None:
+    if result.mac is not None and result.compared is not None:
         out["mac"] = mac_table(result.mac, excited, result.compared)
     return out
 
@@ -133,7 +137,7 @@ def _write(
     progress: Progress,
 ) -> None:
     run = result.run
-    folder = Path(result.run.folder)
+    folder = folder_of(result.run)
     tables = tables_of(result) | {"stresses": stresses}
     for name, table in tables.items():
         write_tables(table, folder / name, name.replace("_", " "))
@@ -160,7 +164,7 @@ def _report(
 ) -> None:
     """``report_modes.html`` and ``.md``: frequencies first, shapes to rotate, everything else."""
     run = result.run
-    folder = Path(run.folder)
+    folder = folder_of(run)
     excited = excited_set(run)
     families = [str(name) for name in tables["excited_modes"]["family"]]
     live = {}
@@ -263,13 +267,11 @@ def _drawings(
         "modes.png": lambda file: modes.draw_mode_sheet(run.mesh, excited, file, families=names)
     }
     for i in shown:
-        out[f"mode_{i + 1}.png"] = lambda file, i=i: modes.draw_mode(
-            run.mesh, excited, i, file, family=names[i]
-        )
+        one = partial(modes.draw_mode, run.mesh, excited, i, family=names[i])
+        out[f"mode_{i + 1}.png"] = one
         if wheel:
-            out[f"mode_{i + 1}_wheel.png"] = lambda file, i=i: modes.draw_wheel_mode(
-                run.mesh, excited, i, file, family=names[i]
-            )
+            turned = partial(modes.draw_wheel_mode, run.mesh, excited, i, family=names[i])
+            out[f"mode_{i + 1}_wheel.png"] = turned
     turning = min(run.scene.excitation.mode, len(excited.frequencies)) - 1
     out["wave.gif"] = lambda file: modes.animate_wave(
         run.mesh, excited, turning, file, family=names[turning]
@@ -307,7 +309,8 @@ def _speed_drawings(
         )
     }
     if len(result.run.modes) > 1 and found.speed > 0:
+        count = sector_of(result.run.mesh).count
         out["interference.png"] = lambda file: speed.draw_interference(
-            tables["frequencies"], result.run.mesh.sector.count, found.speed, file, orders=orders
+            tables["frequencies"], count, found.speed, file, orders=orders
         )
     return out

@@ -8,7 +8,7 @@ import pandas as pd
 from bladefem.scene.tables import Scene
 
 # of the damper's own load: nearer to the optimum, another mass changes little
-NEAR = 0.15
+NEAR_OPTIMUM = 0.15
 
 
 def next_steps(
@@ -51,7 +51,7 @@ def _mass_step(
     if own is None or several:
         return []
     mass, load = own[["mass", "load"]].iloc[0]
-    if abs(best["load"] / load - 1) <= NEAR:
+    if abs(best["load"] / load - 1) <= NEAR_OPTIMUM:
         return [
             f"The damper's own {1e3 * mass:.3g} g press it nearly at the optimum: keep its mass."
         ]

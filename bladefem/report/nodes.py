@@ -12,7 +12,8 @@ import pandas as pd
 
 from ..data import Patch
 from ..study.pipeline.contact_cycle import ContactCycle, contact_cycle
-from ..study.pipeline.pipeline import Run, load_cases
+from ..study.pipeline.pipeline import load_cases
+from ..study.pipeline.run_records import SolvedRun
 from ..view.contact import save_faces_vtu
 from ..view.response import draw_seat_loops
 from ..view.wear import draw_work
@@ -22,7 +23,7 @@ from .linear import linear_columns
 SEATS = {"this": "right seat", "next": "left seat"}
 
 
-def cycles_of(result: Run) -> list[ContactCycle]:
+def cycles_of(result: SolvedRun) -> list[ContactCycle]:
     """The period at the resonance of each curve of a finished run."""
     patches = list(result.contact.problem.patches)
     points = result.scene.contact.points

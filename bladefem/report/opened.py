@@ -11,7 +11,7 @@ from dataclasses import dataclass
 from functools import cached_property
 from html import escape
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import pandas as pd
@@ -25,6 +25,13 @@ from ..scene.toml import load_scene
 from ..view import contact, modes, response
 from .tables import COLUMNS
 
+if TYPE_CHECKING:
+    import xarray as xr
+
+    from geometry.mesh import Mesh
+
+    from ..data import Patch
+
 
 @dataclass(frozen=True, repr=False)
 class Arrays:
@@ -36,8 +43,7 @@ class Arrays:
 
     # "response", "modes", ...
     name: str
-    # xarray Dataset
-    data: Any
+    data: xr.Dataset
     # draws the data into a file or axes
     draw: Callable[..., object]
 
@@ -65,7 +71,7 @@ class Arrays:
         return f"<b>{escape(self.name)}</b>{self.data._repr_html_()}"
 
 
-def _selected(data: Any, labels: dict[str, Any]) -> Any:
+def _selected(data: xr.Dataset, labels: dict[str, Any]) -> xr.Dataset:
     """Dimensions stay, so that pictures and tables keep their form."""
     for name, label in labels.items():
         if name not in data.indexes:
@@ -140,11 +146,11 @@ class RunFolder:
         return self.group("summary").to_dataframe().reset_index(drop=True)
 
     @cached_property
-    def mesh(self) -> Any:
-        """The mesh (``geometry.mesh.Mesh``)."""
+    def mesh(self) -> Mesh:
+        """The mesh."""
         return stored_stage(self.folder, "mesh")
 
-    def group(self, name: str) -> Any:
+    def group(self, name: str) -> xr.Dataset:
         """A group of ``results.nc`` as an xarray Dataset.
 
         Raises:
@@ -175,8 +181,8 @@ class RunFolder:
 
     def _draw_contact(
         self,
-        data: Any,
-        file: Any = None,
+        data: xr.Dataset,
+        file: str | Path | None = None,
         load: float | None = None,
     ) -> object:
         """Both seats under one load, the middle one when none is named."""
@@ -195,8 +201,8 @@ class RunFolder:
 
     def _draw_modes(
         self,
-        data: Any,
-        file: Any = None,
+        data: xr.Dataset,
+        file: str | Path | None = None,
         mode: int = 1,
         nodal_diameter: int | None = None,
     ) -> object:
@@ -248,12 +254,12 @@ def _folded(order: int, sectors: int) -> int:
     return min(rest, sectors - rest)
 
 
-def _patches(folder: Path) -> list[Any]:
+def _patches(folder: Path) -> list[Patch]:
     """Contact patches of the stored seating."""
     return list(stored_stage(folder, "contact").patches)
 
 
-def _draw_response(data: Any, file: Any = None, **options: Any) -> object:
+def _draw_response(data: xr.Dataset, file: str | Path | None = None, **options: Any) -> object:
     """Curves of one damper mass, the first where there are several."""
     if "mass" in data.dims:
         data = data.isel(mass=0)
@@ -264,8 +270,8 @@ def _draw_response(data: Any, file: Any = None, **options: Any) -> object:
 
 
 def _draw_resonance(
-    data: Any,
-    file: Any = None,
+    data: xr.Dataset,
+    file: str | Path | None = None,
     ax: Any = None,
 ) -> object:
     """Amplitude of each harmonic, a line a load."""
@@ -284,8 +290,8 @@ def _draw_resonance(
 
 
 def _draw_cycle(
-    data: Any,
-    file: Any = None,
+    data: xr.Dataset,
+    file: str | Path | None = None,
     ax: Any = None,
 ) -> object:
     """Mean shares of the period in stick, slip and separation over load, weighted by area."""
@@ -304,7 +310,7 @@ def _draw_cycle(
         return ax.figure
 
 
-def _draw_loops(data: Any, file: Any = None) -> object:
+def _draw_loops(data: xr.Dataset, file: str | Path | None = None) -> object:
     """A panel a load."""
     if "mass" in data.dims:
         data = data.isel(mass=0)

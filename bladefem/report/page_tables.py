@@ -11,8 +11,8 @@ import pandas as pd
 ROUNDOFF = 1e-12
 # columns of a vector that share their scale
 VECTORS = ("force", "moment", "centre")
-# table: names of its parts on the page and their columns, where all do not fit beside each other
-COLUMNS = {
+# table: names of its parts on the page and their columns, where all do not fit next to each other
+COLUMNS: dict[str, dict[str, tuple[str, ...]]] = {
     "contact/pressure": {
         "contact/pressure": (
             "load",

@@ -1,4 +1,4 @@
-"""The run folder of a verification pair, kinds "hertz" and "punch": pressures beside their closed
+"""The run folder of a verification pair, kinds "hertz" and "punch": pressures next to their closed
 forms.
 """
 
@@ -7,7 +7,6 @@ from __future__ import annotations
 from dataclasses import dataclass
 from pathlib import Path
 from time import perf_counter
-from typing import Any
 
 import numpy as np
 import pandas as pd
@@ -23,6 +22,7 @@ from bladefem.view import contact, indentation, mesh
 from geometry.mesh import Mesh
 from geometry.quality import quality_rows
 
+from ..util.communicator import Communicator
 from .datasets import resultants, table_dataset
 from .tables import write_tables
 from .write import write_report
@@ -43,7 +43,7 @@ class PairRun:
 def run(
     scene: Scene,
     folder: str | Path,
-    comm: Any = None,
+    comm: Communicator | None = None,
     progress: Progress = unwatched,
 ) -> PairRun:
     """Mesh and pressures on all ranks, the folder on rank 0.

@@ -21,7 +21,7 @@ def browser_command() -> list[str] | None:
     browser = next((path for name in found if name and (path := shutil.which(name))), None)
     if browser is None:
         return None
-    # the sandbox needs user name spaces, which root in a container lacks
+    # the sandbox needs user name spaces, which root in a container does not have
     sandbox = ["--no-sandbox"] if os.geteuid() == 0 else []
     return [browser, "--headless", "--disable-gpu", *sandbox]
 
@@ -42,7 +42,7 @@ def require_browser() -> list[str]:
 
 
 def print_pdf(page: str | Path, file: str | Path | None = None) -> Path:
-    """Print a page; beside it under the same name when no file is named.
+    """Print a page; next to it under the same name when no file is named.
 
     Raises:
         InputError: no such page, or no Chromium. NotSolvedError: it wrote nothing.

@@ -8,7 +8,6 @@ import time
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
-from typing import Any
 
 import pandas as pd
 
@@ -18,6 +17,8 @@ from ..io.stage_cache import on_root, read_results, write_results, write_table
 from ..scene.tables import Scene
 from ..scene.toml import dump
 from ..study.pipeline import pipeline
+from ..study.pipeline.run_records import SeatedRun, folder_of
+from ..util.communicator import Communicator
 from ..util.progress import Progress, unwatched
 from ..view import contact
 from .datasets import contact_arrays, resultants
@@ -38,9 +39,9 @@ Maps = Mapping[float, Sequence[PressureMap]]
 def run(
     scene: Scene,
     folder: str | Path,
-    comm: Any = None,
+    comm: Communicator | None = None,
     progress: Progress = unwatched,
-) -> pipeline.Run:
+) -> SeatedRun:
     """Seat the damper under each load and write the pressures into the folder.
 
     Raises:
@@ -79,8 +80,8 @@ def draw_seats(
     )
 
 
-def _write(result: pipeline.Run) -> None:
-    folder = Path(result.folder)
+def _write(result: SeatedRun) -> None:
+    folder = folder_of(result)
     maps = result.contact.maps
     table = pressure_table(maps)
     write_tables(table, folder / "pressure", "pressure")
@@ -97,12 +98,12 @@ def _write(result: pipeline.Run) -> None:
 
 
 def _report(
-    result: pipeline.Run,
+    result: SeatedRun,
     table: pd.DataFrame,
     load: float,
 ) -> None:
     """``report_contact.html`` and ``.md``: pressures of one load first, then all of them."""
-    folder = Path(result.folder)
+    folder = folder_of(result)
     rows = table[table["load"] == load]
     worst = rows.loc[rows["peak_pressure"].idxmax()]
     numbers = [

@@ -7,7 +7,7 @@ that ``data.sel(load=80).dropna("frequency")`` is that curve again.
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from typing import Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 import pandas as pd
@@ -16,6 +16,9 @@ from ..study.pipeline.contact_cycle import ContactCycle
 from ..study.pipeline.linear_limits import Limit
 from ..study.pipeline.loads import Curve
 from .tables import units_of
+
+if TYPE_CHECKING:
+    import xarray as xr
 
 LOAD = {"units": "N", "long_name": "static normal force on each seat; 0 no damper, inf full stick"}
 # of the response table: name to long name
@@ -31,7 +34,7 @@ CURVES = {
 }
 
 
-def curve_arrays(points: pd.DataFrame) -> Any:
+def curve_arrays(points: pd.DataFrame) -> xr.Dataset:
     """Response points over (load, frequency), over (mass, load, frequency) with several masses.
 
     Args:
@@ -61,7 +64,7 @@ def _for_each_mass(points: pd.DataFrame) -> pd.DataFrame:
     )
 
 
-def resonance_arrays(curves: Sequence[Curve], limits: Sequence[Limit] = ()) -> Any:
+def resonance_arrays(curves: Sequence[Curve], limits: Sequence[Limit] = ()) -> xr.Dataset:
     """Harmonics of the motion at the probe at each resonance, over (load, harmonic).
 
     Harmonics beyond those of a curve's own balance are NaN; the linear limits have the first one.
@@ -91,7 +94,7 @@ def _one_resonance(
     mass: float | None,
     frequency: float,
     probe: np.ndarray,
-) -> Any:
+) -> xr.Dataset:
     import xarray as xr
 
     data = xr.Dataset(
@@ -101,7 +104,7 @@ def _one_resonance(
     return data if mass is None else data.expand_dims(mass=[mass])
 
 
-def node_arrays(table: pd.DataFrame) -> Any:
+def node_arrays(table: pd.DataFrame) -> xr.Dataset:
     """What each contact node does in a period at each resonance, over (load, node).
 
     Args:
@@ -123,7 +126,9 @@ def node_arrays(table: pd.DataFrame) -> Any:
     return _with_mass_units(data)
 
 
-def loop_arrays(cycles: Sequence[ContactCycle], names: Mapping[str, str] | None = None) -> Any:
+def loop_arrays(
+    cycles: Sequence[ContactCycle], names: Mapping[str, str] | None = None
+) -> xr.Dataset:
     """Hysteresis of each seat in a period at each resonance, over (load, seat, phase).
 
     Args:
@@ -154,7 +159,7 @@ def loop_arrays(cycles: Sequence[ContactCycle], names: Mapping[str, str] | None 
     return _with_mass_units(data)
 
 
-def _with_mass_units(data: Any) -> Any:
+def _with_mass_units(data: xr.Dataset) -> xr.Dataset:
     if "mass" in data.coords:
         data["mass"].attrs |= {"units": "kg", "long_name": "mass of the damper"}
     return data

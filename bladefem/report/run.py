@@ -31,9 +31,11 @@ from ..study.modes.survey import excited_set
 from ..study.pipeline import pipeline
 from ..study.pipeline.contact_cycle import ContactCycle
 from ..study.pipeline.linear_limits import Limit
-from ..study.pipeline.loads import summary
+from ..study.pipeline.loads import Curve, summary
+from ..study.pipeline.run_records import SolvedRun, folder_of
 from ..study.pipeline.stability import UNIQUE
 from ..study.pipeline.state_check import state_sentence
+from ..util.communicator import Communicator
 from ..util.message import method, warning
 from ..util.progress import Progress, unwatched
 from ..view import mesh, modes, response, speed
@@ -42,6 +44,7 @@ from ..view.live_curves import live_diameters, live_loops, live_optimum, live_re
 from ..view.live_shapes import live_shapes
 from .best_load import best_load_table
 from .datasets import datasets, table_dataset
+from .fatigue import save_fatigue_vtu, utilisation_drawing, utilisation_table
 from .influences import influence_sentence, influence_table
 from .linear import harmonic_table, linear_sentence
 from .nodes import (
@@ -72,9 +75,9 @@ MESH = (
 def run(
     scene: Scene,
     folder: str | Path,
-    comm: Any = None,
+    comm: Communicator | None = None,
     progress: Progress = unwatched,
-) -> pipeline.Run:
+) -> SolvedRun:
     """Everything: mesh, modes, contact, responses, and the folder with pictures and report.
 
     Raises:
@@ -88,10 +91,10 @@ def run(
 
 
 def write_run(
-    result: pipeline.Run,
-    comm: Any = None,
+    result: SolvedRun,
+    comm: Communicator | None = None,
     progress: Progress = unwatched,
-) -> pipeline.Run:
+) -> SolvedRun:
     """Write the folder of a finished run, on rank 0; returns the run with the time that it took."""
     start = time.perf_counter()
     on_root(comm, lambda: _write(result, progress))
@@ -100,18 +103,15 @@ def write_run(
     )
 
 
-def _write(result: pipeline.Run, progress: Progress) -> None:
-    folder = result.folder
+def _write(result: SolvedRun, progress: Progress) -> None:
+    folder = folder_of(result)
     moved = take_folder(folder, result.scene)
     patches = list(result.contact.problem.patches)
     cycles = cycles_of(result)
     coefficient = result.scene.contact.wear_coefficient
-    worn = coefficient is not None
-    tables = {
-        **_tables(result),
-        **({"contact/wear": wear_table(patches, cycles, coefficient)} if worn else {}),
-        **_wheel_tables(result),
-    }
+    tables = {**_tables(result), **_wheel_tables(result)}
+    if coefficient is not None:
+        tables["contact/wear"] = wear_table(patches, cycles, coefficient)
     for name, table in tables.items():
         write_tables(table, folder / name.split("/")[1], name.split("/")[1])
     nodes = node_table(patches, cycles, coefficient)
@@ -133,6 +133,7 @@ def _write(result: pipeline.Run, progress: Progress) -> None:
         **_drawings(result, tables),
         "response/hysteresis": lambda file: draw_hysteresis(cycles, file),
         "contact/friction_work": lambda file: draw_wear(patches, cycles[_best(result)], file),
+        **utilisation_drawing(result),
         **({} if result.wheel is None else pattern_drawings(result.wheel)),
     }
     figures = {}
@@ -141,33 +142,42 @@ def _write(result: pipeline.Run, progress: Progress) -> None:
         draw(figures[name])
     mesh.save_vtu(result.mesh, folder / "mesh.vtu")
     modes.save_modes_vtu(result.mesh, excited_set(result), folder / "modes.vtu")
+    save_fatigue_vtu(result, folder / "fatigue.vtu")
     write_points(folder, result.contact.maps)
     save_cycles_vtu(patches, cycles, folder / "friction_work.vtu", coefficient)
+    write_report(
+        folder,
+        result.scene,
+        tables,
+        figures,
+        [*filter(None, [moved]), *_report_messages(result, cycles)],
+        result.timings,
+        page=Page(_live(result, tables, cycles)),
+    )
+
+
+def _report_messages(result: SolvedRun, cycles: list[ContactCycle]) -> list[str]:
+    """What the run had to say, and how far its models reach."""
+    coefficient = result.scene.contact.wear_coefficient
     messages = [
-        *filter(None, [moved]),
         *result.messages,
         method(MESH),
         _static_contact(result),
         method(_states(result)),
         method(linear_sentence(cycles)),
         *_beyond_stick(result),
-        *([influence_sentence(result.response.influences)] if result.response.influences else []),
-        *([wear_sentence(cycles, coefficient)] if worn else []),
-        *([] if result.wheel is None else pattern_sentences(result.wheel)),
     ]
-    write_report(
-        folder,
-        result.scene,
-        tables,
-        figures,
-        messages,
-        result.timings,
-        page=Page(_live(result, tables, cycles)),
-    )
+    if result.response.influences:
+        messages.append(influence_sentence(result.response.influences))
+    if coefficient is not None:
+        messages.append(wear_sentence(cycles, coefficient))
+    if result.wheel is not None:
+        messages.extend(pattern_sentences(result.wheel))
+    return messages
 
 
 def _live(
-    result: pipeline.Run,
+    result: SolvedRun,
     tables: dict[str, pd.DataFrame],
     cycles: list[ContactCycle],
 ) -> dict[str, dict[str, Any]]:
@@ -189,7 +199,7 @@ def _live(
     }
 
 
-def _wheel_tables(result: pipeline.Run) -> dict[str, pd.DataFrame]:
+def _wheel_tables(result: SolvedRun) -> dict[str, pd.DataFrame]:
     """Tables of the whole wheel, where blades differ."""
     if result.wheel is None:
         return {}
@@ -199,7 +209,7 @@ def _wheel_tables(result: pipeline.Run) -> dict[str, pd.DataFrame]:
     }
 
 
-def _static_contact(result: pipeline.Run) -> str:
+def _static_contact(result: SolvedRun) -> str:
     """Whether the contact may be taken as quasi-static up to the last harmonic kept of the highest
     frequency.
     """
@@ -212,7 +222,7 @@ def _static_contact(result: pipeline.Run) -> str:
     return method(found.sentence) if found.holds else warning(found.sentence)
 
 
-def _states(result: pipeline.Run) -> str:
+def _states(result: SolvedRun) -> str:
     """Whether the paper's table of states would do for the loads of the run and the normal motion
     at its resonances.
     """
@@ -227,7 +237,7 @@ def _states(result: pipeline.Run) -> str:
     )
 
 
-def _beyond_stick(result: pipeline.Run) -> list[str]:
+def _beyond_stick(result: SolvedRun) -> list[str]:
     """Why a resonance may lie above that of full stick."""
     stuck = result.response.limits[1].peak_frequency
     above = [curve for curve in result.response.curves if curve.peak_frequency > stuck]
@@ -241,7 +251,7 @@ def _beyond_stick(result: pipeline.Run) -> list[str]:
     )
 
 
-def _tables(result: pipeline.Run) -> dict[str, pd.DataFrame]:
+def _tables(result: SolvedRun) -> dict[str, pd.DataFrame]:
     """Tables of the report, "section/name", SI columns."""
     curves = result.response.curves
     return {
@@ -249,6 +259,7 @@ def _tables(result: pipeline.Run) -> dict[str, pd.DataFrame]:
         "modes/modes": family_table(excited_set(result), result.mesh, result.clamped),
         "modes/nodal_diameters": mode_table(result.modes, result.mesh, result.clamped),
         "modes/stresses": _stresses(result.strength),
+        **utilisation_table(result),
         "contact/pressure": pressure_table(result.contact.maps),
         **_own_load(result),
         **_best_load(result),
@@ -266,7 +277,7 @@ def _joined(parts: list[pd.DataFrame]) -> pd.DataFrame:
     return points.fillna({"stability": UNIQUE}) if "stability" in points else points
 
 
-def _summary(result: pipeline.Run) -> pd.DataFrame:
+def _summary(result: SolvedRun) -> pd.DataFrame:
     """The design table, with the alternating stress at each resonance."""
     table = pd.DataFrame(summary(result.response.curves, result.response.limits))
     table.insert(
@@ -277,7 +288,7 @@ def _summary(result: pipeline.Run) -> pd.DataFrame:
     return table
 
 
-def _alternating(result: pipeline.Run, amplitudes: np.ndarray) -> np.ndarray:
+def _alternating(result: SolvedRun, amplitudes: np.ndarray) -> np.ndarray:
     """(rows,) alternating stress [Pa] of the design table: of the whole motion where that was
     computed, of the mode alone at the other loads, without damper and stuck.
     """
@@ -302,7 +313,7 @@ def _stresses(found: Strength) -> pd.DataFrame:
     )
 
 
-def _own_load(result: pipeline.Run) -> dict[str, pd.DataFrame]:
+def _own_load(result: SolvedRun) -> dict[str, pd.DataFrame]:
     """The load that the damper's own mass makes at the operating speed, where it makes any."""
     own = result.contact.own
     return (
@@ -320,7 +331,7 @@ def _own_load(result: pipeline.Run) -> dict[str, pd.DataFrame]:
     )
 
 
-def _best_load(result: pipeline.Run) -> dict[str, pd.DataFrame]:
+def _best_load(result: SolvedRun) -> dict[str, pd.DataFrame]:
     """What the exact search for the best load found, where there was one."""
     best = result.response.best
     if not best:
@@ -332,7 +343,7 @@ def _best_load(result: pipeline.Run) -> dict[str, pd.DataFrame]:
     return found
 
 
-def _damper_masses(result: pipeline.Run) -> dict[str, pd.DataFrame]:
+def _damper_masses(result: SolvedRun) -> dict[str, pd.DataFrame]:
     """The damper that makes each load, where friction takes part in the seating."""
     masses = result.contact.masses
     return {"contact/damper_mass": pd.DataFrame(map(asdict, masses))} if masses else {}
@@ -376,7 +387,7 @@ def mode_table(
     return pd.concat(rows, ignore_index=True)
 
 
-def points_of(curve: Any) -> pd.DataFrame:
+def points_of(curve: Curve) -> pd.DataFrame:
     """One row a response point."""
     mass = {} if curve.mass is None else {"mass": curve.mass}
     return pd.DataFrame(
@@ -436,7 +447,7 @@ def linear_points(limit: Limit) -> pd.DataFrame:
     )
 
 
-def _best(result: pipeline.Run) -> int:
+def _best(result: SolvedRun) -> int:
     """Number of the curve with the lowest resonance: pictures of one load show that one."""
     return int(np.argmin([curve.peak_amplitude for curve in result.response.curves]))
 
@@ -452,13 +463,13 @@ def _title(scene: Scene) -> str:
 
 
 def _drawings(
-    result: pipeline.Run, tables: dict[str, pd.DataFrame]
+    result: SolvedRun, tables: dict[str, pd.DataFrame]
 ) -> dict[str, Callable[[Path], object]]:
     """What to draw: "section/name" to a function of the file."""
     geometry = result.mesh
     excited = excited_set(result)
     best = result.response.curves[_best(result)].load
-    drawings = {
+    drawings: dict[str, Callable[[Path], object]] = {
         "mesh/mesh": lambda file: mesh.draw_mesh(geometry, file, title=result.scene.title),
         "modes/first_modes": lambda file: modes.draw_mode_sheet(
             geometry, excited, file, families=list(tables["modes/modes"]["family"])

@@ -8,13 +8,14 @@ import numpy as np
 import pandas as pd
 
 from bladefem.contact.interface_elements import USUAL, gives_stiffness
+from bladefem.scene.kinds import kind_named
 from bladefem.scene.tables import Scene
 from bladefem.scene.units import show
 
 from .best_load import certainty, flat_range, found_best, reasons_against
 
 # of the resonance frequency: farther off, an engine order does not drive it
-APART = 0.1
+OFF_RESONANCE = 0.1
 # relative difference below which a load was itself studied; own loads are rounded to four digits
 STUDIED = 1e-3
 
@@ -58,17 +59,29 @@ def answer(
     best = finite.loc[finite["peak_amplitude"].idxmin()] if found is None else found
     against = reasons_against(best, summary, points, searched)
     beside = mass_of(best) or (among(finite) if found is None else flat_range(best))
+    doubts = cautions(finite, best, points, found is not None)
     if against:
-        numbers = [
-            ("optimum normal load per seat", "not determined", against[0]),
-            (
-                "lowest resonance amplitude found",
-                f"{1e6 * best['peak_amplitude']:.4g} µm",
-                f"at {best['load']:.4g} N and {best['peak_frequency']:.5g} Hz",
-            ),
-        ]
+        lowest = (
+            "lowest resonance amplitude found",
+            f"{1e6 * best['peak_amplitude']:.4g} µm",
+            f"at {best['load']:.4g} N and {best['peak_frequency']:.5g} Hz",
+        )
         said = [f"No optimum load is named: {reason}." for reason in against]
-        return Answer(numbers, [*said, *cautions(finite, best, points, found is not None)])
+        unknown = ("optimum normal load per seat", "not determined", against[0])
+        return Answer([unknown, lowest], [*said, *doubts])
+    numbers = _optimum_numbers(summary, best, beside)
+    return Answer(
+        [*numbers, *stress(summary, best), *own_mass(finite, best, own, masses)],
+        doubts,
+    )
+
+
+def _optimum_numbers(
+    summary: pd.DataFrame,
+    best: pd.Series,
+    beside: str,
+) -> list[tuple[str, str, str]]:
+    """The best load and the resonance there: what, value, remark."""
     numbers = [
         ("optimum normal load per seat", f"{best['load']:.4g} N", beside),
         (
@@ -89,10 +102,7 @@ def answer(
         )
     elif energy(best):
         numbers.append(("friction work per cycle there", energy(best).split(" of ")[0], ""))
-    return Answer(
-        [*numbers, *stress(summary, best), *own_mass(finite, best, own, masses)],
-        cautions(finite, best, points, found is not None),
-    )
+    return numbers
 
 
 def among(finite: pd.DataFrame) -> str:
@@ -128,7 +138,7 @@ def stress(summary: pd.DataFrame, best: pd.Series) -> list[tuple[str, str, str]]
         (
             "alternating stress there",
             f"{1e-6 * best['alternating_stress']:.3g} MPa",
-            f"largest von Mises amplitude of the mode alone{beside}",
+            f"largest von Mises stress of all modes, harmonics and damper forces{beside}",
         )
     ]
 
@@ -200,11 +210,11 @@ def wrong_speed(scene: Scene, summary: pd.DataFrame | None) -> list[str]:
     """A caution where the engine order, at the scene's speed, excites far from the resonances that
     were studied.
     """
-    if summary is None or scene.kind == "plane blades" or not scene.operation.speed > 0:
+    if summary is None or kind_named(scene.kind).is_plane or not scene.operation.speed > 0:
         return []
     excited = scene.excitation.engine_order * scene.operation.speed / (2 * np.pi)
     peaks = summary["peak_frequency"]
-    if (1 - APART) * peaks.min() <= excited <= (1 + APART) * peaks.max():
+    if (1 - OFF_RESONANCE) * peaks.min() <= excited <= (1 + OFF_RESONANCE) * peaks.max():
         return []
     rpm = scene.operation.speed * 30 / np.pi
     return [

@@ -13,6 +13,7 @@ from ..scene.fields import field_at, value_at
 from ..scene.tables import Scene
 from ..scene.units import parse, show
 from ..study.pipeline.loads import summary
+from ..study.pipeline.run_records import Response
 from ..view.study import draw_study
 from .headlines import Headline
 from .tables import write_tables
@@ -26,8 +27,7 @@ class Variant:
     # as written, "30 deg"
     text: str
     scene: Scene
-    # study.pipeline.Response
-    response: Any
+    response: Response
 
 
 def write_study(
@@ -133,8 +133,9 @@ def _axis(name: str, variants: Sequence[Variant]) -> tuple[list[Any], str]:
     """Where each value stands on the axis, in the unit that people read; texts where they are no
     numbers.
     """
-    numbers = [_number(name, variant.scene) for variant in variants]
-    if None in numbers:
+    read = [_number(name, variant.scene) for variant in variants]
+    numbers = [number for number in read if number is not None]
+    if len(numbers) < len(variants):
         return [variant.text for variant in variants], name
     unit = field_at(name).meta.get("unit") or "1"
     shown = show(max(numbers, key=abs), unit).partition(" ")[2]

@@ -20,6 +20,7 @@ import pandas as pd
 from bladefem.errors import InputError
 from bladefem.io.run_folder import given_fields
 from bladefem.io.stage_cache import open_folder, versions, write_text
+from bladefem.scene.kinds import kind_named
 from bladefem.scene.tables import Scene
 from bladefem.scene.toml import dump, resolved
 from bladefem.util.message import by_level
@@ -61,7 +62,7 @@ LEADS = (
 
 @dataclass(frozen=True)
 class Page:
-    """What a command adds to its report beside tables and pictures."""
+    """What a command adds to its report besides tables and pictures."""
 
     # caption-less figures of plotly.js or shapes, by the name of the picture that they replace
     live: Mapping[str, dict[str, Any]] | None = None
@@ -291,8 +292,9 @@ def inputs_hash(scene: Scene) -> str:
     it reads.
     """
     digest = hashlib.sha256(dump(scene).encode())
-    if scene.kind == "imported" and Path(scene.imported.file).is_file():
-        digest.update(Path(scene.imported.file).read_bytes())
+    for file in kind_named(scene.kind).files(scene):
+        if file.is_file():
+            digest.update(file.read_bytes())
     return digest.hexdigest()[:16]
 
 

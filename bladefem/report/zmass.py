@@ -8,7 +8,6 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from time import perf_counter
-from typing import Any
 
 import numpy as np
 import pandas as pd
@@ -22,6 +21,7 @@ from bladefem.study.kinds.zmass import Pressed, mass_on_foundation, mean_load, m
 from bladefem.util.progress import Progress, unwatched
 from bladefem.view import contact, mesh, paper
 
+from ..util.communicator import Communicator
 from .datasets import resultants, table_dataset
 from .tables import units_of, write_tables
 from .write import write_report
@@ -43,7 +43,7 @@ class MassRun:
 def run(
     scene: Scene,
     folder: str | Path,
-    comm: Any = None,
+    comm: Communicator | None = None,
     progress: Progress = unwatched,
 ) -> MassRun:
     """Pressure on all ranks, motions and folder on rank 0.

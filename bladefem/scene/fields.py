@@ -46,7 +46,7 @@ def field_at(name: str) -> Field:
         return known[name]
     last = name.rsplit(".", 1)[-1]
     same = [k for k in known if k.rsplit(".", 1)[-1] == last]
-    tables = sorted({_head(k) for k in known if "." in k})
+    tables = sorted({_table_name(k) for k in known if "." in k})
     if name in tables:
         raise InputError(
             f"{name}: expected a field of this table, such as "
@@ -54,16 +54,18 @@ def field_at(name: str) -> Field:
         )
     if same:
         raise InputError(f"unknown key '{name}'; did you mean '{same[0]}'?")
-    head = _head(name)
+    head = _table_name(name)
     if head in tables:
-        inside = [k.rpartition(".")[2] for k in known if _head(k) == head]
+        inside = [k.rpartition(".")[2] for k in known if _table_name(k) == head]
         near = suggestion(last, inside)
         raise InputError(f"unknown key '{name}'{near.replace(QUESTION, f'{QUESTION}{head}.')}")
-    outside = [*tables, *(k for k in known if not _head(k))]
-    raise InputError(f"unknown key '{name}'{_near(name, known) or suggestion(name, outside)}")
+    outside = [*tables, *(k for k in known if not _table_name(k))]
+    raise InputError(
+        f"unknown key '{name}'{_similar_words(name, known) or suggestion(name, outside)}"
+    )
 
 
-def _head(name: str) -> str:
+def _table_name(name: str) -> str:
     return name.rpartition(".")[0]
 
 
@@ -89,24 +91,24 @@ def convert(value: object, field: Field) -> Any:
             return None
         kind = next(k for k in get_args(kind) if k is not NoneType)
     if get_origin(kind) is tuple:
-        return _tuple(value, get_args(kind), field)
+        return _parse_tuple(value, get_args(kind), field)
     if str in get_args(kind):
         return _word_or_values(value, field)
     return _SCALARS[kind](value, field)
 
 
-def _float(value: object, field: Field) -> float:
+def _parse_float(value: object, field: Field) -> float:
     return _in_range(parse(value, field.meta.get("unit") or "1", field.name), field, value)
 
 
-def _int(value: object, field: Field) -> int:
+def _parse_int(value: object, field: Field) -> int:
     number = parse(value, "1", field.name)
     if number != int(number):
         raise InputError(f"{field.name} = {value}: expected a whole number")
     return _in_range(int(number), field)
 
 
-def _bool(value: object, field: Field) -> bool:
+def _parse_bool(value: object, field: Field) -> bool:
     words = {"true": True, "yes": True, "on": True, "false": False, "no": False, "off": False}
     if isinstance(value, str) and value.lower() in words:
         return words[value.lower()]
@@ -115,27 +117,27 @@ def _bool(value: object, field: Field) -> bool:
     return value
 
 
-def _str(value: object, field: Field) -> str:
+def _parse_text(value: object, field: Field) -> str:
     if not isinstance(value, str):
         raise InputError(f"{field.name} = {shortened(value)}: expected text")
     choices = field.meta.get("choices") or ()
     if choices and value not in choices:
         raise InputError(
             f"{field.name} = {shortened(repr(value))}: expected one of "
-            f"{', '.join(choices)}{_near(value, choices)}"
+            f"{', '.join(choices)}{_similar_words(value, choices)}"
         )
     return value
 
 
-_SCALARS = {float: _float, int: _int, bool: _bool, str: _str}
+_SCALARS = {float: _parse_float, int: _parse_int, bool: _parse_bool, str: _parse_text}
 
 
-def _tuple(
+def _parse_tuple(
     value: object,
     kinds: tuple,
     field: Field,
 ) -> tuple:
-    items = _items(value)
+    items = _list_items(value)
     length = None if kinds[-1] is Ellipsis else len(kinds)
     if length is not None and len(items) != length:
         raise InputError(f"{field.name} = {shortened(value)}: expected {length} values")
@@ -164,13 +166,13 @@ def _word_or_values(value: object, field: Field) -> Any:
     if isinstance(value, str) and not any(letter.isdigit() for letter in value):
         raise InputError(
             f"{field.name} = {shortened(repr(value))}: expected one of {', '.join(choices)}, or a "
-            f"list of values with units{_near(value, choices)}"
+            f"list of values with units{_similar_words(value, choices)}"
         )
     kind = next(k for k in get_args(field.kind) if get_origin(k) is tuple)
-    return _tuple(value, get_args(kind), field)
+    return _parse_tuple(value, get_args(kind), field)
 
 
-def _items(value: object) -> list:
+def _list_items(value: object) -> list:
     if isinstance(value, str):
         return split_values(value)
     return list(value) if hasattr(value, "__iter__") else [value]
@@ -184,18 +186,19 @@ def _in_range(
     low = field.meta.get("low")
     high = field.meta.get("high")
     unit = field.meta.get("unit") or "1"
-    if _between(number, low, high):
+    if _within_range(number, low, high):
         return number
-    if low is None or high is None:
-        limit = f"at most {show(high, unit)}" if low is None else f"at least {show(low, unit)}"
-    else:
+    if low is not None and high is not None:
         limit = f"{show(low, unit)} to {show(high, unit)}"
+    else:
+        bounds = {"at least": low, "at most": high}
+        limit = " ".join(f"{word} {show(n, unit)}" for word, n in bounds.items() if n is not None)
     raise InputError(
         f"{field.name} = {show(number, unit)}: expected {limit}{_forgotten_unit(written, field)}"
     )
 
 
-def _between(
+def _within_range(
     number: float,
     low: float | None,
     high: float | None,
@@ -214,13 +217,13 @@ def _forgotten_unit(written: object, field: Field) -> str:
     meta = field.meta
     unit = meta.get("unit") or "1"
     for name in readable_units(unit) if is_plain(number) else ():
-        if name != unit and _between(
+        if name != unit and _within_range(
             parse(f"{number} {name}", unit), meta.get("low"), meta.get("high")
         ):
             return f"; did you mean '{number} {name}'?"
     return ""
 
 
-def _near(word: str, known: Any) -> str:
+def _similar_words(word: str, known: Any) -> str:
     near = suggestion(word, known)
     return near if "did you mean" in near else ""

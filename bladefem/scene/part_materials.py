@@ -30,12 +30,12 @@ def part_materials(scene: Scene) -> dict[str, Material]:
                 "E=114 GPa; nu=0.34; rho=4430 kg/m^3'"
             )
         found[name] = replace(
-            scene.material.blade, **dict(_value(item, text) for item in values.split(";"))
+            scene.material.blade, **dict(_parse_property(item, text) for item in values.split(";"))
         )
     return found
 
 
-def _value(item: str, text: str) -> tuple[str, Any]:
+def _parse_property(item: str, text: str) -> tuple[str, Any]:
     """One property."""
     name, _, value = (part.strip() for part in item.partition("="))
     known = [each.name for each in fields(Material)]

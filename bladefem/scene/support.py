@@ -25,7 +25,7 @@ def area_springs(support: Support) -> Iterator[tuple[str, float, float]]:
                 f"support.springs = {text!r}: expected one text for each face, such as 'root: "
                 "normal=1e12 N/m^3; tangential=5e11 N/m^3'"
             )
-        found = dict(_stiffness(item, text) for item in values.split(";"))
+        found = dict(_parse_stiffness(item, text) for item in values.split(";"))
         yield face, found.get("normal", 0.0), found.get("tangential", 0.0)
 
 
@@ -48,7 +48,7 @@ def held_letters(support: Support) -> list[tuple[str, str]]:
     return found
 
 
-def _stiffness(item: str, text: str) -> tuple[str, float]:
+def _parse_stiffness(item: str, text: str) -> tuple[str, float]:
     name, _, value = (part.strip() for part in item.partition("="))
     if name not in SPRINGS:
         raise InputError(

@@ -69,12 +69,10 @@ class Seat:
         None, "1", 0.0, 2.0, "friction coefficient of this seat; contact.mu when left out"
     )
     kt_area: float | None = quantity(
-        None, "N/m^3", 1.0, 1e15, "its tangential stiffness for each unit of area"
+        None, "N/m^3", 1.0, 1e15, "its tangential stiffness per unit area"
     )
     kt: float | None = quantity(None, "N/m", 1.0, 1e12, "its whole tangential stiffness")
-    kn_area: float | None = quantity(
-        None, "N/m^3", 1.0, 1e15, "its normal stiffness for each unit of area"
-    )
+    kn_area: float | None = quantity(None, "N/m^3", 1.0, 1e15, "its normal stiffness per unit area")
     kn: float | None = quantity(None, "N/m", 1.0, 1e12, "its whole normal stiffness")
 
 
@@ -90,7 +88,7 @@ class Contact:
         "N/m^3",
         1.0,
         1e15,
-        "tangential contact stiffness for each unit of area; by Mindlin from the normal one, 40 "
+        "tangential contact stiffness per unit area; by Mindlin from the normal one, 40 "
         "N/mm^3 without either",
     )
     kt: float | None = quantity(None, "N/m", 1.0, 1e12, "tangential stiffness of one whole patch")
@@ -99,7 +97,7 @@ class Contact:
         "N/m^3",
         1.0,
         1e15,
-        "normal contact stiffness for each unit of area; by Mindlin from the tangential",
+        "normal contact stiffness per unit area; by Mindlin from the tangential",
     )
     kn: float | None = quantity(None, "N/m", 1.0, 1e12, "normal stiffness of one whole patch")
     stiffness: str = quantity(
@@ -275,6 +273,23 @@ class Mistuning:
 
 
 @dataclass(frozen=True)
+class Fatigue:
+    """What the blade's material lasts: Goodman's line by two values, or Haigh's diagram."""
+
+    endurance: float | None = quantity(
+        None, "Pa", 1e5, 1e11, "stress amplitude that lasts without mean stress"
+    )
+    ultimate: float | None = quantity(
+        None, "Pa", 1e5, 1e11, "mean stress at which no amplitude lasts: ultimate strength"
+    )
+    haigh: tuple[str, ...] | None = quantity(
+        None,
+        help="mean stresses and the amplitudes that last there, texts like '200 MPa: 150 MPa'; in "
+        "place of the two values",
+    )
+
+
+@dataclass(frozen=True)
 class Model:
     """Numerical settings. None: chosen by error indicators so that the answer keeps the scene's
     accuracy.
@@ -316,7 +331,7 @@ class Support:
     )
     springs: tuple[str, ...] | None = quantity(
         None,
-        help="springs to the ground for each unit of area of faces, such as "
+        help="springs to the ground per unit area of faces, such as "
         "'root: normal=1e12 N/m^3; tangential=5e11 N/m^3'",
     )
     directions: tuple[str, ...] | None = quantity(
@@ -454,6 +469,7 @@ class Scene:
     excitation: Excitation = field(default_factory=Excitation)
     study: Study = field(default_factory=Study)
     mistuning: Mistuning = field(default_factory=Mistuning)
+    fatigue: Fatigue = field(default_factory=Fatigue)
     model: Model = field(default_factory=Model)
     solver: Solver = field(default_factory=Solver)
     support: Support = field(default_factory=Support)

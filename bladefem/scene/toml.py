@@ -12,12 +12,10 @@ from collections.abc import Iterable
 from pathlib import Path
 from typing import Any, NamedTuple, get_type_hints
 
-from geometry.joined_files import split_entry
-
 from ..errors import InputError, suggestion
 from .fields import Field, convert, each_field, field_at, value_at
 from .kinds import KINDS, kind_named
-from .tables import Imported, Scene
+from .tables import Scene
 from .units import exact, shortened, show
 from .validate import validate
 
@@ -61,7 +59,7 @@ def read_tables(path: str | Path, overrides: Iterable[str] = ()) -> dict[str, An
         # editors on Windows put a byte order mark before the text
         tables = tomllib.loads(path.read_text(encoding="utf-8-sig"))
     except FileNotFoundError:
-        raise InputError(f"{path}: there is no such scene file{_neighbours(path)}") from None
+        raise InputError(f"{path}: there is no such scene file{_nearby_scenes(path)}") from None
     except (OSError, UnicodeDecodeError) as error:
         raise InputError(f"{path}: cannot be read as a scene file ({error})") from None
     except RecursionError:
@@ -70,8 +68,8 @@ def read_tables(path: str | Path, overrides: Iterable[str] = ()) -> dict[str, An
         # TOMLDecodeError, and integers of more digits than Python converts
         raise InputError(f"{path}: not valid TOML: {error}") from None
     for override in overrides:
-        name, value = _split(override)
-        _put(tables, name, value)
+        name, value = _split_override(override)
+        _put_value(tables, name, value)
     if "kind" not in tables:
         raise InputError(
             f"{path}: not a scene without its kind, expected kind = one of "
@@ -82,7 +80,7 @@ def read_tables(path: str | Path, overrides: Iterable[str] = ()) -> dict[str, An
 
 def scene_of(tables: dict[str, Any], folder: str | Path = ".") -> Scene:
     """A checked scene from nested tables; relative file names in it start at ``folder``."""
-    scene = _build(Scene, tables, "")
+    scene = _build_table(Scene, tables, "")
     unused = [
         t for t in tables if isinstance(tables[t], dict) and t not in kind_named(scene.kind).tables
     ]
@@ -91,8 +89,7 @@ def scene_of(tables: dict[str, Any], folder: str | Path = ".") -> Scene:
             f"[{unused[0]}]: a scene of kind '{scene.kind}' does not use this table, expected only "
             f"{', '.join(kind_named(scene.kind).tables)}"
         )
-    if scene.kind == "imported" and scene.imported.file:
-        scene = dataclasses.replace(scene, imported=_with_paths(scene.imported, Path(folder)))
+    scene = kind_named(scene.kind).whole_paths(scene, Path(folder))
     if scene.mistuning.pattern:
         whole = str((Path(folder) / scene.mistuning.pattern).resolve())
         scene = dataclasses.replace(
@@ -100,17 +97,6 @@ def scene_of(tables: dict[str, Any], folder: str | Path = ".") -> Scene:
         )
     validate(scene)
     return scene
-
-
-def _with_paths(imported: Imported, folder: Path) -> Imported:
-    """Files with their whole paths."""
-    more = []
-    for entry in imported.more or ():
-        body, path = split_entry(entry)
-        whole = str((folder / path).resolve())
-        more.append(f"{body} = {whole}" if body else whole)
-    file = str((folder / imported.file).resolve())
-    return dataclasses.replace(imported, file=file, more=tuple(more) or None)
 
 
 def vary(scene: Scene, *pair: Any, **changes: Any) -> Scene:
@@ -131,7 +117,7 @@ def vary(scene: Scene, *pair: Any, **changes: Any) -> Scene:
         raise InputError(f"vary: expected name and value in turn, got {len(pair)} arguments")
     named = {name.replace("__", "."): value for name, value in changes.items()}
     for name, value in [*zip(pair[::2], pair[1::2], strict=True), *named.items()]:
-        scene = _replace(scene, name.split("."), value, name)
+        scene = _replace_field(scene, name.split("."), value, name)
     for name in (*pair[::2], *named):
         if "." in name and name.split(".")[0] not in kind_named(scene.kind).tables:
             raise InputError(f"{name}: a scene of kind '{scene.kind}' does not use this table")
@@ -157,7 +143,9 @@ def resolved(scene: Scene, given: Iterable[str] | None = None) -> list[Row]:
     for field in _used_fields(scene):
         value = value_at(scene, field.name)
         default = value == field.default if given is None else field.name not in given
-        rows.append(Row(field.name, _shown(value, field), default, field.meta.get("help", "")))
+        rows.append(
+            Row(field.name, _display_value(value, field), default, field.meta.get("help", ""))
+        )
     return rows
 
 
@@ -173,12 +161,12 @@ def dump(scene: Scene) -> str:
         if head != table:
             lines += ["", f"[{head}]"]
             table = head
-        text = f"# {key} = auto" if value is None else f"{key} = {_toml(value, field)}"
+        text = f"# {key} = auto" if value is None else f"{key} = {_toml_value(value, field)}"
         lines.append(f"{text:<40s}  # {field.meta['help']}" if field.meta.get("help") else text)
     return "\n".join(lines) + "\n"
 
 
-def _build(
+def _build_table(
     table: type,
     data: dict[str, Any],
     path: str,
@@ -189,11 +177,11 @@ def _build(
     for key, value in data.items():
         name = f"{path}.{key}" if path else key
         if key not in hints:
-            _refuse(name, value)
+            _refuse_unknown(name, value)
         if dataclasses.is_dataclass(hints[key]):
             if not isinstance(value, dict):
                 raise InputError(f"{name} = {shortened(value)}: expected a table [{name}]")
-            values[key] = _build(hints[key], value, name)
+            values[key] = _build_table(hints[key], value, name)
         elif isinstance(value, dict):
             raise InputError(f"[{name}]: expected a single value, not a table")
         else:
@@ -201,22 +189,22 @@ def _build(
     return table(**values)
 
 
-def _refuse(name: str, value: object) -> None:
-    """An unknown table is told apart from an unknown key."""
+def _refuse_unknown(name: str, value: object) -> None:
+    """An unknown table is distinguished from an unknown key."""
     if isinstance(value, dict):
         tables = {f.name.rsplit(".", 1)[0] for f in each_field() if "." in f.name}
         raise InputError(f"unknown table [{name}]{suggestion(name, {*tables, 'material'})}")
     field_at(name)
 
 
-def _split(override: str) -> tuple[str, str]:
+def _split_override(override: str) -> tuple[str, str]:
     name, equals, value = override.partition("=")
     if not equals or not name.strip():
         raise InputError(f"--set {override}: expected key=value, such as aerofoil.twist='25 deg'")
     return name.strip(), value.strip().strip("'\"")
 
 
-def _put(
+def _put_value(
     tables: dict[str, Any],
     name: str,
     value: str,
@@ -230,7 +218,7 @@ def _put(
     tables[last] = value
 
 
-def _replace(
+def _replace_field(
     table: Any,
     path: list[str],
     value: object,
@@ -242,7 +230,7 @@ def _replace(
         field_at(name)
     if rest and dataclasses.is_dataclass(hints[head]):
         return dataclasses.replace(
-            table, **{head: _replace(getattr(table, head), rest, value, name)}
+            table, **{head: _replace_field(getattr(table, head), rest, value, name)}
         )
     if (
         not rest
@@ -258,19 +246,19 @@ def _used_fields(scene: Scene) -> Iterable[Field]:
     return (f for f in each_field() if "." not in f.name or f.name.split(".")[0] in tables)
 
 
-def _shown(value: Any, field: Field) -> str:
+def _display_value(value: Any, field: Field) -> str:
     if value is None:
         return "auto"
     if isinstance(value, tuple):
-        return ", ".join(_shown(v, field) for v in value)
+        return ", ".join(_display_value(v, field) for v in value)
     if isinstance(value, float):
         return show(value, field.meta.get("unit") or "1")
     return str(value).lower() if isinstance(value, bool) else str(value)
 
 
-def _toml(value: Any, field: Field) -> str:
+def _toml_value(value: Any, field: Field) -> str:
     if isinstance(value, tuple):
-        return "[" + ", ".join(_toml(v, field) for v in value) + "]"
+        return "[" + ", ".join(_toml_value(v, field) for v in value) + "]"
     if isinstance(value, bool):
         return str(value).lower()
     if isinstance(value, int):
@@ -281,9 +269,9 @@ def _toml(value: Any, field: Field) -> str:
     return json.dumps(value, ensure_ascii=False)
 
 
-def _neighbours(path: Path) -> str:
-    """The scene of a name like that, in its folder or among the examples beside it; else the scenes
-    that there are.
+def _nearby_scenes(path: Path) -> str:
+    """The scene of a name like that, in its folder or among the examples next to it; else the
+    scenes that there are.
     """
     folders = [folder for folder in (path.parent, path.parent / "scenes") if folder.is_dir()]
     others = {

@@ -110,21 +110,21 @@ def parse(
     (0.14, 40000000000.0, 0.3)
     """
     unit = unit or "1"
-    number, written = _split(value, unit, name)
+    number, written = _split_number(value, unit, name)
     if not isfinite(number):
-        raise InputError(f"{name} = {shortened(value)}: expected a finite number{_in(unit)}")
+        raise InputError(f"{name} = {shortened(value)}: expected a finite number{_in_unit(unit)}")
     if not written:
         return number
-    factor, dimension = _dimension(written, f"{name} = {shortened(value)}")
-    _, wanted = _dimension(unit, name)
+    factor, dimension = _parse_dimension(written, f"{name} = {shortened(value)}")
+    _, wanted = _parse_dimension(unit, name)
     if dimension != wanted:
         raise InputError(
             f"{name} = {shortened(value)}: '{written}' is not a unit of this field, expected "
-            f"{_examples(unit)}"
+            f"{_unit_examples(unit)}"
         )
     result = number * factor
     if not isfinite(result):
-        raise InputError(f"{name} = {shortened(value)}: expected a finite number{_in(unit)}")
+        raise InputError(f"{name} = {shortened(value)}: expected a finite number{_in_unit(unit)}")
     return result
 
 
@@ -143,7 +143,7 @@ def shortened(value: object, length: int = 60) -> str:
 def is_plain(text: str) -> bool:
     """Whether a text is a number without a unit."""
     match = _NUMBER.fullmatch(text)
-    return bool(match) and not match[2]
+    return match is not None and not match[2]
 
 
 def readable_units(unit: str) -> tuple[str, ...]:
@@ -157,7 +157,7 @@ def show(value: float, unit: str = "1") -> str:
     >>> show(0.14, "m"), show(2.1e11, "Pa"), show(267.0353755, "rad/s")
     ('140 mm', '210 GPa', '2550 rpm')
     """
-    number, written = _scaled(value, unit or "1")
+    number, written = _scale_unit(value, unit or "1")
     return f"{number:.6g} {written}".rstrip()
 
 
@@ -165,7 +165,7 @@ def exact(value: float, unit: str = "1") -> str:
     """Like :func:`show`, but with as many digits as bring the very same number back through
     :func:`parse`.
     """
-    number, written = _scaled(value, unit or "1")
+    number, written = _scale_unit(value, unit or "1")
     for digits in (6, 12, 15, 16, 17):
         text = f"{number:.{digits}g} {written}".rstrip()
         if parse(text, unit) == value:
@@ -173,7 +173,7 @@ def exact(value: float, unit: str = "1") -> str:
     return f"{float(value)!r} {'' if unit in ('', '1') else unit}".rstrip()
 
 
-def _split(
+def _split_number(
     value: object,
     unit: str,
     name: str,
@@ -183,20 +183,20 @@ def _split(
             return float(value), ""
         except OverflowError:
             raise InputError(
-                f"{name} = {shortened(value)}: expected a finite number{_in(unit)}"
+                f"{name} = {shortened(value)}: expected a finite number{_in_unit(unit)}"
             ) from None
     if not isinstance(value, str):
-        raise InputError(f"{name} = {shortened(value)}: expected a number{_in(unit)}")
+        raise InputError(f"{name} = {shortened(value)}: expected a number{_in_unit(unit)}")
     match = _NUMBER.fullmatch(value)
     if not match:
         raise InputError(
             f"{name} = {shortened(repr(value))}: expected a number with a unit such as "
-            f"{_examples(unit)}"
+            f"{_unit_examples(unit)}"
         )
     return float(match[1]), match[2] or ""
 
 
-def _dimension(text: str, where: str) -> tuple[float, tuple[int, ...]]:
+def _parse_dimension(text: str, where: str) -> tuple[float, tuple[int, ...]]:
     """Factor to SI and exponents of a product of powers."""
     if len(text) > LONGEST_UNIT:
         raise InputError(f"{where}: unknown unit '{shortened(text, 20)}'")
@@ -205,7 +205,7 @@ def _dimension(text: str, where: str) -> tuple[float, tuple[int, ...]]:
     exponents = [0, 0, 0, 0]
     for place, part in enumerate(text.replace("**", "^").split("/")):
         for word in filter(None, re.split(r"[ *·]+", part)):
-            size, dimension, power = _one(word, where)
+            size, dimension, power = _parse_unit(word, where)
             power = power if place == 0 else -power
             factor *= Fraction(str(size)) ** power
             exponents = [e + power * d for e, d in zip(exponents, dimension, strict=True)]
@@ -215,25 +215,25 @@ def _dimension(text: str, where: str) -> tuple[float, tuple[int, ...]]:
         raise InputError(f"{where}: expected a unit of this world, not {text}") from None
 
 
-def _one(word: str, where: str) -> tuple[float, tuple[int, ...], int]:
+def _parse_unit(word: str, where: str) -> tuple[float, tuple[int, ...], int]:
     word = word.replace("²", "^2").replace("³", "^3")
-    for candidate, power in ((word, 1), *_powers(word)):
+    for candidate, power in ((word, 1), *_split_powers(word)):
         candidate = _SPELLINGS.get(candidate, candidate)
         if candidate in _UNITS:
             return *_UNITS[candidate], power
     raise InputError(f"{where}: unknown unit '{shortened(word, 20)}'")
 
 
-def _powers(word: str) -> list[tuple[str, int]]:
+def _split_powers(word: str) -> list[tuple[str, int]]:
     match = _POWER.fullmatch(word)
     return [(match[1], int(match[2]))] if match and match[2] else []
 
 
-def _scaled(value: float, unit: str) -> tuple[float, str]:
+def _scale_unit(value: float, unit: str) -> tuple[float, str]:
     """The number and the readable unit in which its size is at least one."""
     names = _READABLE.get(unit, (unit,))
     for name in names:
-        number = value / _dimension(name, unit)[0]
+        number = value / _parse_dimension(name, unit)[0]
         if abs(number) >= 1 and value != 0:
             break
     if value == 0:
@@ -242,11 +242,11 @@ def _scaled(value: float, unit: str) -> tuple[float, str]:
     return number, "" if name == "1" else name
 
 
-def _in(unit: str) -> str:
+def _in_unit(unit: str) -> str:
     return "" if unit == "1" else f" in {unit}"
 
 
-def _examples(unit: str) -> str:
+def _unit_examples(unit: str) -> str:
     if unit == "1":
         return "a plain number or %"
     known = [*_READABLE.get(unit, ()), unit]

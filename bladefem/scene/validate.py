@@ -37,22 +37,22 @@ def validate(scene: Scene) -> None:
             convert(value_at(scene, field.name), field)
     problems = [
         *kind.conditions(scene),
-        *_crystals(scene),
-        *_supports(scene),
-        *_numerics(scene),
+        *_check_crystals(scene),
+        *_check_supports(scene),
+        *_check_numerics(scene),
         *contact_problems(scene),
     ]
     if "study" in tables:
-        problems += _study(scene)
+        problems += _check_study(scene)
     if "excitation" in tables:
-        problems += _excitation(scene)
+        problems += _check_excitation(scene)
         check_names(scene)
     if problems:
         raise InputError(problems[0])
     check_parameters(scene)
 
 
-def _supports(scene: Scene) -> Iterator[str]:
+def _check_supports(scene: Scene) -> Iterator[str]:
     """Their texts can be read, and a nonlinear preload knows of clamps alone."""
     springs = list(area_springs(scene.support))
     held_letters(scene.support)
@@ -66,7 +66,7 @@ def _supports(scene: Scene) -> Iterator[str]:
         )
 
 
-def _crystals(scene: Scene) -> Iterator[str]:
+def _check_crystals(scene: Scene) -> Iterator[str]:
     """Nine constants make an orthotropic solid."""
     for name in ("blade", "damper"):
         constants = getattr(scene.material, name).orthotropic
@@ -106,7 +106,7 @@ def refuse_given_mesh(scene: Scene) -> None:
         )
 
 
-def _numerics(scene: Scene) -> Iterator[str]:
+def _check_numerics(scene: Scene) -> Iterator[str]:
     mesh = scene.mesh
     model = scene.model
     if mesh.size is not None and mesh.contact_size is not None:
@@ -130,12 +130,9 @@ def _numerics(scene: Scene) -> Iterator[str]:
         )
 
 
-def _study(scene: Scene) -> Iterator[str]:
+def _check_study(scene: Scene) -> Iterator[str]:
     if scene.study.loads is not None and min(scene.study.loads) == 0:
-        pair = scene.kind in ("hertz", "punch")
-        why = (
-            "nothing presses the two bodies together" if pair else "a damper without load lifts off"
-        )
+        why = kind_named(scene.kind).without_load
         yield f"study.loads = 0 N: {why}, expected more than 0 N"
     band = scene.study.band
     if band is not None and not band[0] < band[1]:
@@ -145,7 +142,7 @@ def _study(scene: Scene) -> Iterator[str]:
         )
 
 
-def _excitation(scene: Scene) -> Iterator[str]:
+def _check_excitation(scene: Scene) -> Iterator[str]:
     if not any(scene.excitation.direction):
         yield "excitation.direction = 0, 0, 0: expected a direction"
     modes = scene.model.modes

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from math import atan, tan
+from math import atan
 
 from .kinds import kind_named
 from .tables import Scene, Seat
@@ -26,30 +26,30 @@ def contact_problems(scene: Scene) -> Iterator[str]:
                         f"{name}.{key}: contact.stiffness = 'map' takes the normal stiffness from "
                         "the pressure map, expected only one of the two"
                     )
-    yield from _interval(scene)
+    yield from _check_interval(scene)
     yield from _without_layer(scene)
-    yield from _history(scene)
+    yield from _check_history(scene)
     shaped = [key for key in SHAPE if getattr(contact, key) is not None]
     if shaped and contact.bedded:
         yield (
             f"contact.{shaped[0]} = {show(getattr(contact, shaped[0]), 'm')}: bedded seats have "
-            "lost their shape by wear, expected contact.bedded = false beside it"
+            "lost their shape by wear, expected contact.bedded = false with it"
         )
-    if contact.crown is not None and scene.kind == "plane blades":
+    if contact.crown is not None and kind_named(scene.kind).is_plane:
         yield (
-            "contact.crown: plane blades have no length along the engine axis, expected "
+            f"contact.crown: {scene.kind} have no length along the engine axis, expected "
             "contact.crown_across"
         )
     if (contact.edge_radius is None) != (contact.edge_width is None):
         missing = "edge_width" if contact.edge_width is None else "edge_radius"
         yield (
-            f"contact.{missing}: expected beside "
+            f"contact.{missing}: expected together with "
             f"contact.{'edge_radius' if missing == 'edge_width' else 'edge_width'}"
         )
 
 
 def _without_layer(scene: Scene) -> Iterator[str]:
-    """Fields of an interface layer beside faces that have none."""
+    """Fields of an interface layer given for faces that have none."""
     contact = scene.contact
     sides = {"contact.left": contact.left, "contact.right": contact.right}
     if contact.stiffness == "rigid":
@@ -63,11 +63,11 @@ def _without_layer(scene: Scene) -> Iterator[str]:
     if contact.stiffness != "given" and contact.stiffening is not None:
         yield (
             f"contact.stiffening: contact.stiffness = '{contact.stiffness}' has no layer that "
-            "could stiffen, expected contact.stiffness = 'given' beside it"
+            "could stiffen, expected contact.stiffness = 'given' with it"
         )
 
 
-def _history(scene: Scene) -> Iterator[str]:
+def _check_history(scene: Scene) -> Iterator[str]:
     """Histories that cannot press the damper on its seats, or leave it held by friction alone."""
     contact = scene.contact
     history = contact.history
@@ -93,15 +93,21 @@ def _history(scene: Scene) -> Iterator[str]:
     mu = min(both)
     if not max(both) > 0:
         yield f"{name}: contact.mu = 0 leaves no friction, expected 'frictionless'"
-    if scene.kind == "wedge sector" and tan(scene.damper.angle) <= mu:
+    flank_angles = kind_named(scene.kind).flank_angles
+    if flank_angles is None:
+        return
+    # both reactions may lie on one line, within the friction cone of either seat
+    angle = sum(flank_angles(scene)) / 2
+    limit = (atan(both[0]) + atan(both[1])) / 2
+    if angle <= limit:
         yield (
-            f"damper.angle = {show(scene.damper.angle, 'rad')}: with contact.mu = {mu:g} friction "
-            f"alone holds the damper between its seats (self-locking up to {show(atan(mu), 'rad')})"
+            f"damper.angle = {show(angle, 'rad')}: with contact.mu = {mu:g} friction "
+            f"alone holds the damper between its seats (self-locking up to {show(limit, 'rad')})"
             f", so that {name} does not tell its load; expected a larger angle"
         )
 
 
-def _interval(scene: Scene) -> Iterator[str]:
+def _check_interval(scene: Scene) -> Iterator[str]:
     """Models whose response no loading history changes."""
     if not scene.study.interval:
         return

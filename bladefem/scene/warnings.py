@@ -19,20 +19,20 @@ FASTEST = 900.0
 
 def doubts(scene: Scene) -> list[str]:
     """One sentence for each value that is unlikely to be meant."""
-    said = [*_materials(scene), *_mesh(scene)]
+    said = [*_doubtful_materials(scene), *_doubtful_mesh(scene)]
     if "operation" in kind_named(scene.kind).tables:
-        said += [*_speed(scene), *_damping(scene)]
+        said += [*_doubtful_speed(scene), *_doubtful_damping(scene)]
     return said
 
 
-def _materials(scene: Scene) -> Iterator[str]:
+def _doubtful_materials(scene: Scene) -> Iterator[str]:
     named = {"material.blade": scene.material.blade, "material.damper": scene.material.damper}
     named |= {f"imported.materials, {name}": one for name, one in part_materials(scene).items()}
     for name, material in named.items():
-        yield from _material(name, material)
+        yield from _doubtful_material(name, material)
 
 
-def _material(name: str, material: Material) -> Iterator[str]:
+def _doubtful_material(name: str, material: Material) -> Iterator[str]:
     if not STIFF[0] <= material.E <= STIFF[1]:
         yield f"{name}.E = {show(material.E, 'Pa')}: solids for machines have 1 to 1000 GPa"
     if not DENSE[0] <= material.rho <= DENSE[1]:
@@ -42,7 +42,7 @@ def _material(name: str, material: Material) -> Iterator[str]:
         )
 
 
-def _speed(scene: Scene) -> Iterator[str]:
+def _doubtful_speed(scene: Scene) -> Iterator[str]:
     radii = kind_named(scene.kind).radii
     for name, radius in radii(scene).items() if radii is not None else ():
         speed = scene.operation.speed * radius
@@ -55,12 +55,12 @@ def _speed(scene: Scene) -> Iterator[str]:
             return
 
 
-def _damping(scene: Scene) -> Iterator[str]:
+def _doubtful_damping(scene: Scene) -> Iterator[str]:
     if scene.operation.damping == 0:
         yield "operation.damping = 0: enough for modes, responses need more than 0"
 
 
-def _mesh(scene: Scene) -> Iterator[str]:
+def _doubtful_mesh(scene: Scene) -> Iterator[str]:
     parts = kind_named(scene.kind).thin_parts
     if parts is None or scene.mesh.size is None:
         return

@@ -18,6 +18,7 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from math import log
+from typing import Any
 
 import numpy as np
 
@@ -46,9 +47,9 @@ DAMPING = 2.0
 # relative step of a parameter, and of the load, in differences of exact derivatives
 STEP = 2e-3
 # share of the frequency on each side of a peak over which its curvature is measured
-BESIDE = 5e-4
-# most harmonics and contact points of a seat in the model that tells changes
-COARSE = {"harmonics": 3, "points": 8}
+CURVATURE_STEP = 5e-4
+# most harmonics and contact points of a seat in the model that estimates changes
+COARSE_SETTINGS = {"harmonics": 3, "points": 8}
 # parameters that are solved again at the ends of their ranges
 CHECKED = 2
 
@@ -92,11 +93,14 @@ class Influence:
 ChangedCases = Callable[[str, float], Callable[[float], LoadCase]]
 
 
-def parameters_of(scene: Scene, angle: float | None = None) -> list[Parameter]:
+def parameters_of(
+    scene: Scene,
+    angles: tuple[float, float] | None = None,
+) -> list[Parameter]:
     """The parameters that an answer hangs on, with their ranges.
 
     Args:
-        angle: of each flank against the radial plane [rad], where the damper is a wedge.
+        angles: of both flanks against the radial plane [rad], where the damper is a wedge.
     """
     stiffness = GIVEN_STIFFNESS if gives_stiffness(scene.contact) else USUAL_STIFFNESS
     known = "given by the scene" if gives_stiffness(scene.contact) else "measured joints"
@@ -106,19 +110,40 @@ def parameters_of(scene: Scene, angle: float | None = None) -> list[Parameter]:
         Parameter("mu", 1 / FRICTION, FRICTION, "scatter of friction coefficients"),
         Parameter("damping", 1 / DAMPING, DAMPING, "damping without friction"),
     ]
-    ends = None if angle is None else seat_friction_range(scene.contact.mu, angle)
+    ends = None if angles is None else seat_friction_range(scene.contact.mu, angles)
     if ends is not None:
         found.append(Parameter("seat friction", *ends, "friction while seating"))
     return found
 
 
-def seat_friction_range(mu: float, angle: float) -> tuple[float, float] | None:
+def seat_friction_range(mu: float, angles: tuple[float, float]) -> tuple[float, float] | None:
     """Normal load of a seat with friction over that without, for friction either way.
 
-    N = F / (2 (sin a +- mu cos a)) in place of F / (2 sin a); None for a self-locking wedge.
+    Friction turns both reactions by atan(mu). The radial force F on the damper and they are in
+    balance: N_1 = F cos(mu) cos(a_2) / sin(a_1 + a_2) with both angles a larger or smaller by it,
+    which is F / (2 (sin a +- mu cos a)) for equal angles.
+
+    Returns:
+        The least and the largest of both seats; None for a self-locking wedge.
     """
-    holding = mu / np.tan(angle)
-    return None if holding >= 1 else (1 / (1 + holding), 1 / (1 - holding))
+    turn = float(np.arctan(mu))
+    if sum(angles) <= 2 * turn:
+        return None
+    ratios = [
+        np.cos(turn) * _share_of_load(angles, side, way) / _share_of_load(angles, side, 0.0)
+        for side in (0, 1)
+        for way in (turn, -turn)
+    ]
+    return float(min(ratios)), float(max(ratios))
+
+
+def _share_of_load(
+    angles: tuple[float, float],
+    side: int,
+    turn: float,
+) -> float:
+    """Reaction of one seat over the radial force on the damper, turned by an angle [rad]."""
+    return float(np.cos(angles[1 - side] + turn) / np.sin(sum(angles) + 2 * turn))
 
 
 def influences(
@@ -130,8 +155,8 @@ def influences(
 ) -> list[Influence]:
     """The influence of each parameter, the largest on the amplitude first.
 
-    Where harmonics and contact points were chosen, a model of at most COARSE of them tells the
-    changes, relative to its own best load.
+    Where harmonics and contact points were chosen, a model of at most COARSE_SETTINGS of them gives
+    the changes, relative to its own best load.
 
     Args:
         best: a best load that was found.
@@ -165,10 +190,10 @@ def influences(
 
 
 def _coarse(settings: Settings) -> Settings:
-    """The settings with at most COARSE of what was chosen; nothing is left to choose."""
-    least = {
+    """The settings with at most COARSE_SETTINGS of what was chosen; nothing is left to choose."""
+    least: dict[str, Any] = {
         name: min(value, getattr(settings, name) or value)
-        for name, value in COARSE.items()
+        for name, value in COARSE_SETTINGS.items()
         if name in settings.chosen
     }
     return replace(settings, **least, chosen=())
@@ -316,15 +341,25 @@ class _Study:
             tilts.append(self.by_frequency(self.model(name, factor, load), base))
         moved_load = -(slopes[1] - slopes[0]) / (2 * STEP) / bend
         model = self.model(name, 1.0, load)
-        sides = [self.by_frequency(model, base, beside) for beside in (-BESIDE, BESIDE)]
-        curvature = (sides[1] - sides[0]) / (2 * BESIDE * base.omega)
+        sides = [
+            self.by_frequency(model, base, beside) for beside in (-CURVATURE_STEP, CURVATURE_STEP)
+        ]
+        curvature = (sides[1] - sides[0]) / (2 * CURVATURE_STEP * base.omega)
         tilted = (tilts[1] - tilts[0]) / (2 * STEP) + tilt * moved_load
         moved = -tilted / curvature / base.omega
         centre = np.log([load, base.height, base.solution.frequency])
-        rates = np.array([moved_load, amplitude, moved])
+        by_parameter = [float(moved_load), float(amplitude), float(moved)]
+        rates = np.array(by_parameter)
         ends = np.log([parameter.low, parameter.high])
         predicted = np.exp(centre + ends[:, None] * rates)
-        return Influence(parameter, *rates, predicted, np.full((2, 3), np.nan))
+        return Influence(
+            parameter,
+            load=by_parameter[0],
+            amplitude=by_parameter[1],
+            frequency=by_parameter[2],
+            predicted=predicted,
+            solved=np.full((2, 3), np.nan),
+        )
 
     def solved_again(self, one: Influence) -> Influence:
         """The best load searched again at both ends of the range."""

@@ -3,7 +3,7 @@
 One mode with a patch of friction elements in parallel: their whole stiffness is a share of the
 mode's, and element i of n starts to slip at the amplitude x_max ((i - 1/2) / n)^q, as a patch does
 whose pressure falls towards its edge. Each element answers with its first harmonic in closed form.
-Intervals come from the sensitivities of the fit; what the data cannot tell is said.
+Intervals come from the sensitivities of the fit; what the data do not determine is reported.
 """
 
 from __future__ import annotations
@@ -39,7 +39,7 @@ class JointFit:
     values: np.ndarray
     # (5, 2) 95 % intervals
     intervals: np.ndarray
-    # (5,) whether the data tell the parameter
+    # (5,) whether the data determine the parameter
     known: np.ndarray
     # root of the mean square of the weighted misfit [1]
     misfit: float
@@ -47,11 +47,13 @@ class JointFit:
     fitted: np.ndarray
 
     def sentence(self) -> str:
-        """Which parameters the data tell, and which they do not."""
+        """Which parameters the data determine, and which they do not."""
         unknown = [name for name, known in zip(PARAMETERS, self.known, strict=True) if not known]
         if not unknown:
-            return "the data tell all parameters of the joint"
-        return f"the data do not tell {', '.join(unknown)}: each within a factor of two at best"
+            return "the data determine all parameters of the joint"
+        return (
+            f"the data do not determine {', '.join(unknown)}: each within a factor of two at best"
+        )
 
 
 def joint_curve(values: np.ndarray, amplitude: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

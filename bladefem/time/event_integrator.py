@@ -57,6 +57,13 @@ class Flow:
     # (2d + n, 2d + n) d(q, v, z) at the end by d(q, v, z) at the start
     tangent: np.ndarray | None
 
+    @property
+    def monodromy(self) -> np.ndarray:
+        """``tangent`` of a flow that was asked for it."""
+        if self.tangent is None:
+            raise RuntimeError("the flow was integrated without its derivative")
+        return self.tangent
+
 
 def state_at_rest(system: System) -> State:
     """Everything at zero and stuck."""

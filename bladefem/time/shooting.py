@@ -13,8 +13,14 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from ..util.newton import halve_step, iterate_newton
 from .event_integrator import Flow, State, integrate_periods, stuck_start
 from .system import System
+
+# step share below which periods are marched instead
+SHORTEST_STEP_SHARE = 2.0**-3
+# periods marched where Newton makes no headway
+MARCHED_PERIODS = 8
 
 
 @dataclass(frozen=True)
@@ -59,37 +65,74 @@ def periodic_solution(
         most: largest number of Newton steps.
         samples: equal instants a period in the returned flow.
     """
-    state = start or stuck_start(system, omega)
-    scale = _unknown_scales(system, omega, state)
-    now = integrate_periods(system, omega, state, samples, tangent=True)
-    residual = _period_residual(now, state, scale)
-    periods = 1
-    for iteration in range(most):
-        if now.reason != "done":
-            return Periodic(omega, now, state, residual, iteration, periods, now.reason)
-        if residual < tolerance:
-            return Periodic(omega, now, state, residual, iteration, periods, "periodic")
-        move = _newton_step(now, state, scale)
-        for halving in range(4):
-            trial = _shift_state(state, move * 0.5**halving)
-            attempt = integrate_periods(system, omega, trial, samples, tangent=True)
-            periods += 1
-            if _period_residual(attempt, trial, scale) < 0.9 * residual:
-                break
-        else:
-            trial = integrate_periods(system, omega, now.state, samples, 8).state
-            attempt = integrate_periods(system, omega, trial, samples, tangent=True)
-            periods += 9
-        state = trial
-        now = attempt
-        scale = _unknown_scales(system, omega, trial)
-        residual = _period_residual(now, state, scale)
-    reason = (
-        "periodic"
-        if residual < tolerance
-        else f"change {residual:.1e} over a period after {most} Newton steps"
+    shooting = _Shooting(system, omega, samples)
+    run = iterate_newton(
+        shooting.integrate_from(start or stuck_start(system, omega)),
+        lambda guess: guess.residual,
+        shooting.advance_guess,
+        tolerance,
+        most,
     )
-    return Periodic(omega, now, state, residual, most, periods, reason)
+    end = run.state
+    if end.flow.reason != "done":
+        reason = end.flow.reason
+    elif run.converged:
+        reason = "periodic"
+    else:
+        reason = f"change {run.error:.1e} over a period after {run.iterations} Newton steps"
+    return Periodic(omega, end.flow, end.start, run.error, run.iterations, shooting.periods, reason)
+
+
+@dataclass(frozen=True)
+class _Guess:
+    """A state at the start of a period, and what becomes of it."""
+
+    start: State
+    flow: Flow
+    # of the unknowns
+    scale: np.ndarray
+    # change over the period over the size of the motion [1]
+    residual: float
+
+
+class _Shooting:
+    """Newton steps on the period map of one system, and the periods integrated for them."""
+
+    def __init__(
+        self,
+        system: System,
+        omega: float,
+        samples: int,
+    ) -> None:
+        self.system = system
+        self.omega = omega
+        self.samples = samples
+        self.periods = 0
+
+    def integrate_from(self, start: State) -> _Guess:
+        """One period with its tangent."""
+        self.periods += 1
+        flow = integrate_periods(self.system, self.omega, start, self.samples, tangent=True)
+        scale = _unknown_scales(self.system, self.omega, start)
+        return _Guess(start, flow, scale, _period_residual(flow, start, scale))
+
+    def advance_guess(self, guess: _Guess) -> _Guess:
+        """After a Newton step that lowers the residual, else after some periods of marching."""
+        move = _newton_step(guess.flow, guess.start, guess.scale)
+        better = halve_step(
+            lambda share: self.integrate_from(_shift_state(guess.start, share * move)),
+            lambda trial, _: (
+                _period_residual(trial.flow, trial.start, guess.scale) < 0.9 * guess.residual
+            ),
+            SHORTEST_STEP_SHARE,
+        )
+        if better is not None:
+            return better
+        self.periods += MARCHED_PERIODS
+        marched = integrate_periods(
+            self.system, self.omega, guess.flow.state, self.samples, MARCHED_PERIODS
+        )
+        return self.integrate_from(marched.state)
 
 
 def floquet_multipliers(solution: Periodic) -> np.ndarray:
@@ -98,7 +141,7 @@ def floquet_multipliers(solution: Periodic) -> np.ndarray:
     One multiplier equals one for each element that sticks through the whole period: a neutral shift
     of its slider.
     """
-    values = np.linalg.eigvals(solution.flow.tangent)
+    values = np.linalg.eigvals(solution.flow.monodromy)
     return values[np.argsort(-np.abs(values))]
 
 
@@ -170,7 +213,7 @@ def _newton_step(
     scale: np.ndarray,
 ) -> np.ndarray:
     """Least-norm step in the scaled unknowns, back in their units."""
-    J = (now.tangent - np.eye(len(scale))) * (scale / scale[:, None])
+    J = (now.monodromy - np.eye(len(scale))) * (scale / scale[:, None])
     return (
         scale
         * np.linalg.lstsq(J, (_pack_state(state) - _pack_state(now.state)) / scale, rcond=1e-11)[0]

@@ -15,7 +15,7 @@ frequency.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 
@@ -48,8 +48,8 @@ class System:
     V: np.ndarray
     # (k, d) readings of interest [kg^-1/2]
     probe: np.ndarray
-    # (n, d) normal readings, where normal forces react on q [kg^-1/2]; none: zeros
-    R: np.ndarray | None = None
+    # (n, d) normal readings, where normal forces react on q [kg^-1/2]; empty: zeros
+    R: np.ndarray = field(default_factory=lambda: np.zeros((0, 0)))
 
     def __post_init__(self) -> None:
         n, d = self.W.shape
@@ -63,7 +63,7 @@ class System:
             "drive": (n, self.coefficients),
             "normal": (n, self.coefficients),
         }
-        if self.R is None:
+        if self.R.size == 0:
             object.__setattr__(self, "R", np.zeros((n, d)))
         for name, shape in (shapes | {"R": (n, d)}).items():
             value = getattr(self, name)
@@ -119,31 +119,15 @@ def blade_ring(
         )
     m = len(body.omega)
     n = len(elements.kt)
-    contact = body.shapes[body.ports["contact"]]
-    if contact.shape[0] != n or n % 2 or np.iscomplexobj(contact):
-        raise InputError(
-            f"contact port of {contact.shape[0]} dofs for {n} elements: expected two equal halves, "
-            "real"
-        )
+    contact = _contact_halves(body, n)
     size = m + 1
-    half = n // 2
-    W = np.zeros((blades * n, blades * size))
+    W = _ring_readings(contact, mass, blades)
     force = np.zeros((blades * size, 3))
     for b in range(blades):
-        before = (b - 1) % blades
-        rows = slice(b * n, (b + 1) * n)
-        W[rows, b * size : b * size + m] = contact
-        W[b * n : b * n + half, b * size + m] -= mass**-0.5
-        W[b * n + half : (b + 1) * n, before * size + m] -= mass**-0.5
-        amplitude = (
-            excitation
-            * np.exp(2j * np.pi * waves * b / blades)
-            * body.shapes[body.ports["load"]][0]
-        )
-        force[b * size : b * size + m, 1], force[b * size : b * size + m, 2] = (
-            amplitude.real,
-            -amplitude.imag,
-        )
+        turned = excitation * np.exp(2j * np.pi * waves * b / blades)
+        amplitude = turned * body.shapes[body.ports["load"]][0]
+        force[b * size : b * size + m, 1] = amplitude.real
+        force[b * size : b * size + m, 2] = -amplitude.imag
     probe = np.zeros((1, blades * size))
     probe[0, :m] = body.shapes[body.ports["probe"]][0]
     omega = np.tile(np.r_[body.omega, 0.0], blades)
@@ -161,6 +145,34 @@ def blade_ring(
         np.zeros_like(W),
         probe,
     )
+
+
+def _contact_halves(body: PortModel, elements: int) -> np.ndarray:
+    """(elements, modes) real shapes of a contact port of two equal halves."""
+    contact = body.shapes[body.ports["contact"]]
+    if contact.shape[0] != elements or elements % 2 or np.iscomplexobj(contact):
+        raise InputError(
+            f"contact port of {contact.shape[0]} dofs for {elements} elements: expected two equal "
+            "halves, real"
+        )
+    return contact
+
+
+def _ring_readings(contact: np.ndarray, mass: float, blades: int) -> np.ndarray:
+    """(elements, coordinates) relative displacements from contact shapes (n, m): of each blade the
+    first half to its own damper, the second to the damper of the blade before.
+    """
+    n, m = contact.shape
+    size = m + 1
+    half = n // 2
+    W = np.zeros((blades * n, blades * size))
+    for b in range(blades):
+        before = (b - 1) % blades
+        rows = slice(b * n, (b + 1) * n)
+        W[rows, b * size : b * size + m] = contact
+        W[b * n : b * n + half, b * size + m] -= mass**-0.5
+        W[b * n + half : (b + 1) * n, before * size + m] -= mass**-0.5
+    return W
 
 
 def damper_on_platforms(

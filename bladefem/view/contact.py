@@ -6,7 +6,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 import pandas as pd
@@ -19,6 +19,9 @@ from bladefem.data import Patch, PressureMap
 
 from .skin import split_faces
 from .style import COLOURS, canvas, headline
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
 
 PRESSURE_COLOURS = "inferno_r"
 # faces that nothing presses
@@ -220,7 +223,7 @@ def caption(seat: PressureMap, between: str = ",\n") -> str:
 
 
 def draw_face(
-    ax: Any,
+    ax: Axes,
     seat: PressureMap,
     peak: float,
 ) -> None:
@@ -241,7 +244,7 @@ def draw_face(
 
 
 def colour_pressure(
-    ax: Any,
+    ax: Axes,
     xy: np.ndarray,
     seat: PressureMap,
     norm: Normalize,
@@ -267,7 +270,7 @@ def colour_pressure(
 
 
 def draw_line(
-    ax: Any,
+    ax: Axes,
     seat: PressureMap,
     peak: float,
 ) -> None:

@@ -5,12 +5,15 @@ order.
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import pandas as pd
 
 from .style import COLOURS, canvas
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
 
 
 def draw_convergence(
@@ -18,7 +21,7 @@ def draw_convergence(
     summary: pd.DataFrame,
     file: str | Path | None = None,
     *,
-    ax: Any = None,
+    ax: Axes | None = None,
     title: str = "",
 ) -> object:
     """Each mode's frequency against its finest one over element size; returns the figure.
@@ -50,7 +53,7 @@ def draw_convergence(
 
 
 def _draw_mode(
-    ax: Any,
+    ax: Axes,
     line: pd.DataFrame,
     row: Any,
     colour: str,

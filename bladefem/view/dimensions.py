@@ -3,17 +3,20 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Any
+from typing import TYPE_CHECKING, Any, TypeAlias
 
 import numpy as np
 
 from .style import COLOURS
 
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+
 DIMENSION = COLOURS[0]
-Point = Sequence[float]
+Point: TypeAlias = Sequence[float] | np.ndarray
 
 
-def shape(ax: Any, corners: np.ndarray, colour: str = "#d5dbe1", **style: Any) -> None:
+def shape(ax: Axes, corners: np.ndarray, colour: str = "#d5dbe1", **style: Any) -> None:
     """A filled outline, (n, 2) corners."""
     ax.fill(
         *np.asarray(corners).T,
@@ -22,7 +25,7 @@ def shape(ax: Any, corners: np.ndarray, colour: str = "#d5dbe1", **style: Any) -
 
 
 def length(
-    ax: Any,
+    ax: Axes,
     start: Point,
     end: Point,
     text: str,
@@ -40,14 +43,14 @@ def length(
             end.
         beside: further distance of the text; 0 writes it close to the line.
     """
-    start = np.asarray(start, float)
-    end = np.asarray(end, float)
-    way = (end - start) / np.linalg.norm(end - start)
+    first = np.asarray(start, float)
+    last = np.asarray(end, float)
+    way = (last - first) / np.linalg.norm(last - first)
     left = np.array([-way[1], way[0]])
     side = np.sign(away) or 1.0
-    a = start + away * left
-    b = end + away * left
-    for point, moved in ((start, a), (end, b)):
+    a = first + away * left
+    b = last + away * left
+    for point, moved in ((first, a), (last, b)):
         ax.plot(
             *np.stack([point, moved + 0.08 * (moved - point)]).T,
             color=DIMENSION,
@@ -55,20 +58,7 @@ def length(
             alpha=0.7,
             zorder=3,
         )
-    ax.annotate(
-        "",
-        a,
-        b,
-        arrowprops={
-            "arrowstyle": "<|-|>",
-            "color": DIMENSION,
-            "lw": 0.9,
-            "shrinkA": 0,
-            "shrinkB": 0,
-            "mutation_scale": 8,
-        },
-        zorder=4,
-    )
+    _draw_arrow(ax, a, b)
     turn = np.degrees(np.arctan2(way[1], way[0]))
     turn = turn - 180 if turn > 90 else turn + 180 if turn <= -90 else turn
     place = (a + b) / 2 + side * beside * left
@@ -88,8 +78,26 @@ def length(
     )
 
 
+def _draw_arrow(ax: Axes, start: np.ndarray, end: np.ndarray) -> None:
+    """A line with a head at both ends."""
+    ax.annotate(
+        "",
+        start,
+        end,
+        arrowprops={
+            "arrowstyle": "<|-|>",
+            "color": DIMENSION,
+            "lw": 0.9,
+            "shrinkA": 0,
+            "shrinkB": 0,
+            "mutation_scale": 8,
+        },
+        zorder=4,
+    )
+
+
 def angle(
-    ax: Any,
+    ax: Axes,
     centre: Point,
     start: float,
     end: float,
@@ -99,13 +107,13 @@ def angle(
 ) -> None:
     """An arc between two directions [rad] with a label outside of its middle."""
     turn = np.linspace(start, end, 40)
-    centre = np.asarray(centre, float)
-    arc = centre + radius * np.stack([np.cos(turn), np.sin(turn)], axis=1)
+    hub = np.asarray(centre, float)
+    arc = hub + radius * np.stack([np.cos(turn), np.sin(turn)], axis=1)
     ax.plot(*arc.T, color=DIMENSION, lw=1.0, zorder=4)
     if rays:
         for end_point in (arc[0], arc[-1]):
             ax.plot(
-                *np.stack([centre, centre + 1.15 * (end_point - centre)]).T,
+                *np.stack([hub, hub + 1.15 * (end_point - hub)]).T,
                 color=DIMENSION,
                 lw=0.7,
                 ls="--",
@@ -127,7 +135,7 @@ def angle(
 
 
 def note(
-    ax: Any,
+    ax: Axes,
     point: Point,
     text: str,
     offset: tuple[float, float],

@@ -1,12 +1,12 @@
-"""Pressure between a verification pair: seen from above, and over the radius beside its closed
+"""Pressure between a verification pair: seen from above, and over the radius next to its closed
 form.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from matplotlib.cm import ScalarMappable
@@ -17,6 +17,9 @@ from bladefem.data import PressureMap
 
 from .contact import OPEN, PRESSURE_COLOURS, colour_pressure
 from .style import COLOURS, canvas, headline
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
 
 # radius [m], pressure [Pa]
 Curve = tuple[np.ndarray, np.ndarray]
@@ -74,7 +77,7 @@ def _inner(
 
 
 def _from_above(
-    ax: Any,
+    ax: Axes,
     seat: PressureMap,
     edge: float,
     most: float,
@@ -104,13 +107,13 @@ def _from_above(
 
 
 def _over_radius(
-    ax: Any,
+    ax: Axes,
     seats: dict[float, PressureMap],
     radius: np.ndarray,
     exact: Callable[[float], Curve],
     edge: float,
 ) -> None:
-    order: Sequence[int] = np.argsort(radius)
+    order = np.argsort(radius)
     for i, (load, seat) in enumerate(seats.items()):
         r, p = exact(load)
         ax.plot(

@@ -1,11 +1,14 @@
-"""Names beside points that cover neither one another nor the points."""
+"""Names next to points that cover neither one another nor the points."""
 
 from __future__ import annotations
 
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from matplotlib.transforms import Bbox
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
 
 PLACES = (
     (6, 7, "left"),
@@ -22,23 +25,23 @@ PLACES = (
 
 
 def names_apart(*axes: Any) -> None:
-    """Give each annotation of finished axes a free place beside its point, first come first served;
-    drop the others.
+    """Give each annotation of finished axes a free place next to its point, first come first
+    served; drop the others.
 
     Args:
         axes: of one figure; it is laid out once for all of them, which is what takes time.
     """
     axes[0].figure.draw_without_rendering()
     for ax in axes:
-        _apart(ax)
+        _move_apart(ax)
 
 
-def _apart(ax: Any) -> None:
+def _move_apart(ax: Axes) -> None:
     taken = [
         box
         for line in ax.lines
         if line.get_marker() not in ("None", "", None)
-        for box in _markers(line)
+        for box in _marker_boxes(line)
     ]
     inside = ax.get_window_extent()
     for text in list(ax.texts):
@@ -59,7 +62,7 @@ def _apart(ax: Any) -> None:
             text.remove()
 
 
-def _markers(line: Any) -> list[Bbox]:
+def _marker_boxes(line: Any) -> list[Bbox]:
     """Where the markers of a line stand on the page [pixels]."""
     half = line.get_markersize() / 2 * line.figure.dpi / 72
     places = line.get_transform().transform(np.asarray(line.get_xydata(), float))

@@ -38,21 +38,21 @@ def live_responses(
         curve = points[points["load"] == load].sort_values("frequency", kind="stable")
         for piece, unstable in pieces_of(curve):
             colour = matplotlib.colors.to_hex(colours[load])
-            lines = _curve(curve.iloc[piece], float(load), colour)
+            lines = _curve_traces(curve.iloc[piece], float(load), colour)
             if unstable:
                 lines[0]["line"] = {**lines[0].get("line", {}), "dash": "dash"}
             data += lines
     failed = points[~points["converged"].astype(bool) & (points["amplitude"] > 0)]
     if len(failed):
         data.append(
-            _marks(failed, f"not converged ({len(failed)})", {"symbol": "x", "color": FAILED})
+            _mark_points(failed, f"not converged ({len(failed)})", {"symbol": "x", "color": FAILED})
         )
     if "stability" in points and (points["stability"] == "unstable").any():
         unstable = points[points["stability"] == "unstable"]
         style = {"symbol": "square-open", "color": FAILED, "size": 7}
-        data.append(_marks(unstable, f"unstable ({len(unstable)})", style))
+        data.append(_mark_points(unstable, f"unstable ({len(unstable)})", style))
     layout = {
-        "title": _text(title),
+        "title": _escape_title(title),
         "xaxis": {"title": {"text": "excitation frequency [Hz]"}},
         "yaxis": {
             "title": {"text": "vibration amplitude [µm]"},
@@ -64,7 +64,7 @@ def live_responses(
     return {"kind": "chart", "data": data, "layout": layout}
 
 
-def _curve(
+def _curve_traces(
     curve: pd.DataFrame,
     load: float,
     colour: str,
@@ -85,11 +85,11 @@ def _curve(
         "line": {"color": colour, "dash": DASHES.get(load, "solid"), "width": 2},
         "hoverinfo": "skip",
     }
-    marks = _marks(curve[good], name, {"color": colour, "size": 5})
+    marks = _mark_points(curve[good], name, {"color": colour, "size": 5})
     return [line, {**marks, "legendgroup": name, "showlegend": False}]
 
 
-def _marks(
+def _mark_points(
     points: pd.DataFrame,
     name: str,
     style: dict[str, Any],
@@ -98,7 +98,8 @@ def _marks(
     told = ["load", "method", "estimated_error", "slipping"]
     known = [column for column in told if column in points]
     texts = [
-        "<br>".join(_said(column, row[column]) for column in known) for _, row in points.iterrows()
+        "<br>".join(_hover_line(column, row[column]) for column in known)
+        for _, row in points.iterrows()
     ]
     return {
         "type": "scatter",
@@ -112,7 +113,7 @@ def _marks(
     }
 
 
-def _said(column: str, value: Any) -> str:
+def _hover_line(column: str, value: Any) -> str:
     """One line of a hover text."""
     if column == "load":
         return f"load {load_name(float(value))}"
@@ -143,11 +144,11 @@ def live_optimum(
         data += _optimum_curve(finite, name, COLOURS[number % len(COLOURS)])
     shapes = _level_lines(summary)
     if own is not None:
-        shapes.append(_line("x", own, "dot", f"own load {own:.4g} N"))
+        shapes.append(_level_line("x", own, "dot", f"own load {own:.4g} N"))
     finite = summary[np.isfinite(summary["load"]) & (summary["load"] > 0)]
     loads = _log_axis(finite["load"])
     layout = {
-        "title": _text(title),
+        "title": _escape_title(title),
         "showlegend": len(groups) > 1,
         "grid": {"rows": 2, "columns": 1, "pattern": "independent"},
         "xaxis": {**loads, "domain": [0, 1], "anchor": "y"},
@@ -213,11 +214,11 @@ def _level_lines(summary: pd.DataFrame) -> list[dict[str, Any]]:
         row = summary[summary["load"] == load]
         if len(row):
             value = MICRO * float(row["peak_amplitude"].iloc[0])
-            lines.append(_line("y", value, dash, load_name(load)))
+            lines.append(_level_line("y", value, dash, load_name(load)))
     return lines
 
 
-def _line(
+def _level_line(
     axis: str,
     value: float,
     dash: str,
@@ -268,7 +269,7 @@ def live_loops(
                 }
             )
     layout = {
-        "title": _text("hysteresis loops"),
+        "title": _escape_title("hysteresis loops"),
         "xaxis": {"title": {"text": "relative displacement [µm]"}},
         "yaxis": {"title": {"text": "friction force [N]"}},
         "hovermode": "closest",
@@ -300,7 +301,7 @@ def live_diameters(table: pd.DataFrame) -> dict[str, Any]:
         for i, name in enumerate(dict.fromkeys(names))
     ]
     layout = {
-        "title": _text("natural frequencies of the wheel"),
+        "title": _escape_title("natural frequencies of the wheel"),
         "xaxis": {"title": {"text": "nodal diameter"}, "dtick": 1},
         "yaxis": {"title": {"text": "frequency [Hz]"}, "rangemode": "tozero"},
         "hovermode": "closest",
@@ -329,7 +330,7 @@ def numbers(values: Any) -> list[float | None]:
     return [float(f"{v:.{DIGITS}g}") if np.isfinite(v) else None for v in array]
 
 
-def _text(words: str) -> dict[str, Any]:
+def _escape_title(words: str) -> dict[str, Any]:
     """A title; plotly.js takes markup, so that the user's own words are escaped."""
     plain = words.replace("&", "&amp;").replace("<", "&lt;").replace(">", "&gt;")
     return {"text": plain, "x": 0.0, "xref": "paper", "font": {"size": 14}}

@@ -54,8 +54,8 @@ def live_shapes(
         )
     return {
         "kind": "shape",
-        "points": _packed(surface.points, np.float32),
-        "triangles": _packed(surface.triangles, np.uint32),
+        "points": _pack_numbers(surface.points, np.float32),
+        "triangles": _pack_numbers(surface.triangles, np.uint32),
         "modes": found,
         "eye": [float(x) for x in view_of(mesh)],
         "up": [1.0, 0.0, 0.0],
@@ -65,13 +65,16 @@ def live_shapes(
 def _packed_shape(drawn: np.ndarray) -> dict[str, Any]:
     """Real and imaginary displacement as drawn [m], in shares of their largest component."""
     largest = float(max(np.abs(drawn.real).max(), np.abs(drawn.imag).max(), 1e-300))
-    parts = {"scale": largest / LARGEST, "real": _packed(drawn.real * LARGEST / largest, np.int16)}
+    parts = {
+        "scale": largest / LARGEST,
+        "real": _pack_numbers(drawn.real * LARGEST / largest, np.int16),
+    }
     if np.iscomplexobj(drawn) and np.abs(drawn.imag).max() > 1e-6 * largest:
-        parts["imaginary"] = _packed(drawn.imag * LARGEST / largest, np.int16)
+        parts["imaginary"] = _pack_numbers(drawn.imag * LARGEST / largest, np.int16)
     return parts
 
 
-def _packed(values: np.ndarray, kind: type) -> str:
+def _pack_numbers(values: np.ndarray, kind: type) -> str:
     """Little-endian numbers in base64; whole ones rounded."""
     array = np.round(values) if np.issubdtype(kind, np.integer) else values
     return base64.b64encode(np.ascontiguousarray(array, dtype=kind).tobytes()).decode()

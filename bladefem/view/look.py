@@ -3,13 +3,16 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from geometry.look import AXES, Look
 
 from .style import LIGHT, aim, canvas, open_plotter, trim
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
 
 # from the object to the eye, in the frame of x radial, z along the engine
 SIDES = ((0.45, -0.75, 0.5), (-0.45, 0.75, -0.5))
@@ -25,21 +28,21 @@ LIFT = 0.01
 
 def draw_look(look: Look, file: str | Path) -> None:
     """Write the picture."""
-    images = [_photograph(look, side) for side in SIDES]
+    images = [_photograph_side(look, side) for side in SIDES]
     with canvas(file, size=(13.0, 5.6), grid=(1, 3), width_ratios=(1.0, 1.0, 0.62)) as axes:
         for ax, image in zip(axes, images, strict=False):
             ax.imshow(image, interpolation="lanczos")
             ax.set_axis_off()
         axes[0].set_title(look.file.name)
         axes[1].set_title("from the other side")
-        _legend(axes[2], look)
+        _draw_legend(axes[2], look)
 
 
-def _photograph(look: Look, side: tuple[float, float, float]) -> np.ndarray:
+def _photograph_side(look: Look, side: tuple[float, float, float]) -> np.ndarray:
     """(rows, columns, 3) the faces from one side."""
     import pyvista
 
-    frame = _frame(look)
+    frame = _model_axes(look)
     points = look.raw.points @ frame.T
     plotter = open_plotter((1300, 1150))
     for i, face in enumerate(look.faces):
@@ -65,7 +68,7 @@ def _photograph(look: Look, side: tuple[float, float, float]) -> np.ndarray:
     return trim(image)
 
 
-def _frame(look: Look) -> np.ndarray:
+def _model_axes(look: Look) -> np.ndarray:
     """(3, 3) rows: radial through the model's middle, across, along the engine's axis."""
     z = np.array(AXES[look.cut.axis if look.cut else "z"])
     middle = look.box.mean(axis=0)
@@ -109,10 +112,10 @@ def _number_faces(
         )
 
 
-def _legend(ax: Any, look: Look) -> None:
+def _draw_legend(ax: Axes, look: Look) -> None:
     """Number, what is guessed, area of the largest faces."""
     ax.set_axis_off()
-    said = _roles(look)
+    said = _face_roles(look)
     total = sum(face.area for face in look.faces)
     shown = look.faces[:SHOWN]
     step = 1.0 / (max(len(shown), 8) + 2)
@@ -128,7 +131,7 @@ def _legend(ax: Any, look: Look) -> None:
         ax.text(0.0, 0.2 * step, f"and {len(look.faces) - SHOWN} smaller ones", fontsize=9)
 
 
-def _roles(look: Look) -> dict[str, str]:
+def _face_roles(look: Look) -> dict[str, str]:
     """Face name -> what it looks like."""
     said = dict.fromkeys(look.cut.low, "cut face, low") if look.cut else {}
     said |= dict.fromkeys(look.cut.high, "cut face, high") if look.cut else {}

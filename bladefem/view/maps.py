@@ -5,7 +5,7 @@ large the answer is.
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import matplotlib
 import numpy as np
@@ -14,6 +14,9 @@ from matplotlib.colors import BoundaryNorm, ListedColormap
 from matplotlib.patches import Patch as Swatch
 
 from .style import COLOURS, FAILED, SEQUENTIAL, canvas
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
 
 
 def draw_map(
@@ -48,16 +51,12 @@ def draw_map(
     columns = np.arange(len(cells.columns))
     rows = np.arange(len(cells.index))
     with canvas(file, None, (7.2, 4.6)) as ax:
-        colours = (
-            ListedColormap(word_colours(codes, len(names)))
-            if words
-            else matplotlib.colormaps[SEQUENTIAL]
-        )
-        norm = (
-            BoundaryNorm(np.arange(len(names) + 1) - 0.5, max(len(names), 1))
-            if words and len(names) > 1
-            else None
-        )
+        colours = matplotlib.colormaps[SEQUENTIAL]
+        norm = None
+        if words:
+            colours = ListedColormap(word_colours(codes, len(names)))
+        if words and len(names) > 1:
+            norm = BoundaryNorm(np.arange(len(names) + 1) - 0.5, len(names))
         image = ax.pcolormesh(
             columns,
             rows,
@@ -88,7 +87,7 @@ def word_colours(codes: np.ndarray, count: int) -> list[str]:
 
 
 def cross_failed(
-    ax: Any,
+    ax: Axes,
     table: pd.DataFrame,
     cells: pd.DataFrame,
     x: str,
@@ -103,7 +102,7 @@ def cross_failed(
     return ax.plot(*place, "x", color=FAILED, ms=6, mew=1.6, label=f"not converged ({len(failed)})")
 
 
-def tick(axis: Any, values: pd.Index) -> None:
+def tick(axis: Axes, values: pd.Index) -> None:
     """At most ten labels, the values themselves: the grid need not be even."""
     chosen = np.unique(np.linspace(0, len(values) - 1, min(len(values), 10)).astype(int))
     axis.set_ticks(chosen, [f"{values[i]:.4g}" for i in chosen])

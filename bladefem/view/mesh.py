@@ -16,6 +16,7 @@ from .skin import CORNERS, Skin, family, sector_motion, skin, wheel_count, wheel
 from .style import COLOURS, canvas, headline, photograph, show_photograph, size_for
 
 if TYPE_CHECKING:
+    from matplotlib.axes import Axes
     from pyvista import PolyData, UnstructuredGrid
 
 VTK_NUMBERS = {
@@ -358,12 +359,12 @@ def draw_mesh(
         return axes[0].figure
 
 
-# names beside a picture in ordinary size; CAD files have more
+# names next to a picture in ordinary size; CAD files have more
 FEW_NAMES = 20
 
 
-def draw_legend(ax: object, mesh: Mesh) -> None:
-    """Names and sizes beside the picture."""
+def draw_legend(ax: Axes, mesh: Mesh) -> None:
+    """Names and sizes next to the picture."""
     colours = label_colours(mesh)
     counts = [len(c) for c in (*mesh.bodies.values(), *mesh.faces.values())]
     names = (*mesh.bodies, *mesh.faces)

@@ -7,7 +7,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from matplotlib.cm import ScalarMappable
@@ -30,6 +30,9 @@ from .style import (
     show_photograph,
     size_for,
 )
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
 
 WHEEL_VIEW = (0.0, -0.55, 1.0)
 COMPONENTS = ("radial", "circumferential", "axial")
@@ -104,7 +107,7 @@ def draw_mode(
 
 
 def say_exaggeration(
-    ax: Any,
+    ax: Axes,
     mesh: Mesh,
     modes: ModeSet,
 ) -> None:
@@ -122,7 +125,7 @@ def exaggeration(mesh: Mesh) -> str:
 
 
 def add_colour_bar(
-    ax: Any,
+    ax: Axes,
     norm: Normalize,
     colours: str,
     label: str,

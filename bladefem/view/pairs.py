@@ -3,15 +3,18 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 
-from geometry.contact_pairs import WIDER
+from geometry.contact_pairs import SEAT_RATIO
 from geometry.parameters import HertzPair, Punch
 
 from .dimensions import length, note, shape
 from .style import COLOURS, canvas
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
 
 MM = 1e3
 DAMPER = "#e3cfa4"
@@ -25,16 +28,16 @@ def draw_hertz(hertz: HertzPair, file: str | Path | None = None) -> object:
     x = np.linspace(0, wide, 60)
     cap = np.column_stack([x, radius - np.sqrt(radius**2 - x**2)])
     with canvas(file, size=(7.2, 6.4)) as ax:
-        _block(ax, wide)
+        _draw_block(ax, wide)
         shape(ax, np.vstack([cap, [[wide, wide], [0, wide]]]), DAMPER)
-        ax.plot([0, WIDER * contact], [0, 0], color=COLOURS[1], lw=3.5, zorder=4)
+        ax.plot([0, SEAT_RATIO * contact], [0, 0], color=COLOURS[1], lw=3.5, zorder=4)
         length(ax, (0, 0), (contact, 0), "", 0.12 * wide)
         note(ax, (0.5 * contact, 0.12 * wide), f"contact_radius {contact:g} mm", (40, 26))
         length(ax, (0, -wide), (wide, -wide), f"half_width {wide:g} mm", -0.14 * wide)
         note(ax, cap[45], f"radius {radius:g} mm", (60, -14))
         note(ax, (1.7 * contact, 0), "seat_right and damper_left", (70, -30))
         note(ax, (0.6 * wide, wide), "load", (20, 14))
-        _axes(ax, wide, hertz.dimension, "Hertz pair, half section")
+        _draw_axes(ax, wide, hertz.dimension, "Hertz pair, half section")
         return ax.figure
 
 
@@ -43,7 +46,7 @@ def draw_punch(punch: Punch, file: str | Path | None = None) -> object:
     wide = MM * punch.half_width
     radius = MM * punch.radius
     with canvas(file, size=(7.2, 5.2)) as ax:
-        _block(ax, wide)
+        _draw_block(ax, wide)
         shape(ax, np.array([[0, 0], [radius, 0], [radius, radius], [0, radius]]), DAMPER)
         ax.plot([0, radius], [0, 0], color=COLOURS[1], lw=3.5, zorder=4)
         length(ax, (0, radius), (radius, radius), "", 0.05 * wide)
@@ -51,17 +54,17 @@ def draw_punch(punch: Punch, file: str | Path | None = None) -> object:
         length(ax, (0, -wide), (wide, -wide), f"half_width {wide:g} mm", -0.14 * wide)
         note(ax, (0.7 * radius, 0), "seat_right and damper_left", (70, -30))
         note(ax, (0.5 * radius, radius), "load", (60, -8))
-        _axes(ax, wide, punch.dimension, "flat punch, half section")
+        _draw_axes(ax, wide, punch.dimension, "flat punch, half section")
         return ax.figure
 
 
-def _block(ax: Any, wide: float) -> None:
+def _draw_block(ax: Axes, wide: float) -> None:
     shape(ax, np.array([[0, -wide], [wide, -wide], [wide, 0], [0, 0]]))
     note(ax, (0.6 * wide, -wide), "clamp", (14, 24))
 
 
-def _axes(
-    ax: Any,
+def _draw_axes(
+    ax: Axes,
     wide: float,
     dimension: int,
     title: str,

@@ -1,4 +1,6 @@
-"""Pictures to lay beside those of the paper: loops, spectra, responses, resonance against load."""
+"""Pictures to compare with those of the paper: loops, spectra, responses, resonance against
+load.
+"""
 
 from __future__ import annotations
 
@@ -278,7 +280,8 @@ def draw_histories(
         lines: (load [N], way) to the relative steps and the error of the end [%].
         wanted: step at which it stops.
     """
-    ways, loads = (list(dict.fromkeys(key[k] for key in lines)) for k in (1, 0))
+    ways = list(dict.fromkeys(way for _, way in lines))
+    loads = list(dict.fromkeys(load for load, _ in lines))
     shades = dict(
         zip(loads, matplotlib.colormaps["viridis"](np.linspace(0, 0.92, len(loads))), strict=True)
     )

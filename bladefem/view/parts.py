@@ -4,13 +4,11 @@ shows.
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from bladefem.scene.tables import Scene
 from bladefem.scene.units import show
 from geometry.parameters import Aerofoil, Disc, Plane, Platform, Shank, Wedge, ZMass
 from geometry.plane import blade_corners, damper_corners
@@ -20,8 +18,10 @@ from geometry.section import shape as section_shape
 from geometry.zmass import z_corners
 
 from .dimensions import angle, length, note, shape
-from .pairs import draw_hertz, draw_punch
 from .style import COLOURS, canvas, headline
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
 
 MM = 1e3
 DAMPER = "#e3cfa4"
@@ -35,7 +35,7 @@ def said(table: Any, name: str) -> str:
 
 
 def bare(
-    ax: Any,
+    ax: Axes,
     title: str,
     horizontal: str,
     vertical: str,
@@ -59,7 +59,7 @@ def draw_aerofoil(aerofoil: Aerofoil, file: str | Path | None = None) -> object:
         return axes[0].figure
 
 
-def draw_section(ax: Any, blade: Aerofoil) -> None:
+def draw_section(ax: Axes, blade: Aerofoil) -> None:
     """The root section along its chord, with thickness and camber."""
     chord = MM * blade.chord_root
     points = chord * section_shape(blade, 0.0)
@@ -96,7 +96,7 @@ def plane_section(blade: Aerofoil, t: float) -> tuple[np.ndarray, np.ndarray]:
     return MM * space[:-2, [2, 1]], MM * space[-2:, [2, 1]]
 
 
-def draw_stacking(ax: Any, blade: Aerofoil) -> None:
+def draw_stacking(ax: Axes, blade: Aerofoil) -> None:
     """Root and tip sections over each other: stagger, twist, lean and sweep."""
     for t, colour, name in ((0.0, "#d5dbe1", "root"), (1.0, "#9fc5e0", "tip")):
         points, chord = plane_section(blade, t)
@@ -113,7 +113,7 @@ def draw_stacking(ax: Any, blade: Aerofoil) -> None:
     ax.set(xlim=(-0.6 * reach, 1.25 * reach), ylim=(-0.6 * reach, 0.75 * reach))
 
 
-def draw_side(ax: Any, blade: Aerofoil) -> None:
+def draw_side(ax: Axes, blade: Aerofoil) -> None:
     """Span against the engine axis, with the extents of the turned sections."""
     shares = np.linspace(0, 1, 21)
     extents = [plane_section(blade, t)[0][:, 0] for t in shares]
@@ -133,7 +133,7 @@ def draw_side(ax: Any, blade: Aerofoil) -> None:
     ax.plot(axis, [0, height[-1]], color=COLOURS[1], lw=1, ls="-.", zorder=3)
     note(
         ax,
-        (np.mean(axis), 0.5 * height[-1]),
+        (float(np.mean(axis)), 0.5 * height[-1]),
         f"stacking line\n{said(blade, 'lean')}\n{said(blade, 'sweep')}",
         (44, 0),
     )
@@ -160,35 +160,38 @@ def draw_platform(
     wedge: Wedge,
     file: str | Path | None = None,
 ) -> object:
-    """Two neighbouring platforms and the wedge between them, seen along the engine axis; returns
+    """Two neighbouring platforms and the damper between them, seen along the engine axis; returns
     the figure.
     """
     cut = profile(platform, shank, disc, wedge)
     blade = turned(cut.blade, cut.theta)
-    damper = turned(cut.wedge, cut.theta)
-    foot, inner, outer = damper[:3]
-    corner = turned(cut.corner[None], cut.theta)[0]
+    damper = turned(cut.damper, cut.theta)
+    inner, outer = turned(cut.seats[0], cut.theta)
+    foot = inner - [0, MM * wedge.base]
+    corner = turned(cut.corners[:1], cut.theta)[0]
     with canvas(file, size=(8.4, 5.6)) as ax:
         shape(ax, blade)
-        shape(ax, blade * [-1, 1], NEXT)
+        shape(ax, turned(cut.blade * [1, -1], cut.theta) * [-1, 1], NEXT)
         shape(ax, damper, DAMPER)
         ax.plot([0, 0], [foot[1] - 6, corner[1] + 7], color="#555555", lw=0.8, ls="-.", zorder=3)
-        for side in (-1, 1):
-            ax.plot(*(np.stack([inner, outer]) * [side, 1]).T, color=COLOURS[1], lw=3, zorder=4)
+        next_seat = turned(cut.seats[1] * [1, -1], cut.theta) * [-1, 1]
+        for seat in (np.stack([inner, outer]), next_seat):
+            ax.plot(*seat.T, color=COLOURS[1], lw=3, zorder=4)
         label_platform(ax, platform, shank, wedge, np.stack([foot, inner, outer, corner]))
         span = max(2.6 * abs(inner[0]), 4 * MM * platform.thickness)
         bare(
             ax,
-            "platforms and wedge, seen along the engine axis",
+            "platforms and damper, seen along the engine axis",
             "circumferential, from the gap",
             "radial",
         )
-        ax.set(xlim=(-span, span), ylim=(foot[1] - 8, corner[1] + 8))
+        low = min(foot[1], damper[:, 1].min())
+        ax.set(xlim=(-span, span), ylim=(low - 8, corner[1] + 8))
         return ax.figure
 
 
 def label_platform(
-    ax: Any,
+    ax: Axes,
     platform: Platform,
     shank: Shank,
     wedge: Wedge,
@@ -202,15 +205,24 @@ def label_platform(
     length(ax, corner, corner * mirror, said(platform, "gap"), 3.0)
     length(ax, inner, outer, said(platform, "seat_width"), 2.0)
     length(ax, corner * mirror, outer * mirror, said(platform, "thickness"), 2.5)
-    length(ax, foot * mirror, inner * mirror, said(wedge, "base"), -2.5)
+    if wedge.shape == "wedge":
+        length(ax, foot * mirror, inner * mirror, said(wedge, "base"), -2.5)
     apex = np.array([0.0, inner[1] - inner[0] / np.tan(wedge.angle)])
     angle(
         ax,
         apex,
+        -np.pi / 2 - wedge.angle,
         -np.pi / 2,
-        wedge.angle - np.pi / 2,
         0.75 * (apex[1] - inner[1]),
         said(wedge, "angle"),
+    )
+    angle(
+        ax,
+        apex,
+        -np.pi / 2,
+        wedge.angles[1] - np.pi / 2,
+        0.6 * (apex[1] - inner[1]),
+        "angle_next" if wedge.angle_next is None else said(wedge, "angle_next"),
     )
     note(
         ax,
@@ -220,7 +232,8 @@ def label_platform(
     )
     note(ax, 0.3 * inner + 0.7 * outer, "seat_right of this blade\non damper_left", (-70, 28))
     low = foot * [-0.3, 1] + [0, 0.6]
-    note(ax, low, f"wedge damper\n{said(wedge, 'length')}, {said(wedge, 'clearance')}", (20, -44))
+    words = f"damper, shape {wedge.shape}\n{said(wedge, 'length')}, {said(wedge, 'clearance')}"
+    note(ax, low, words, (20, -44))
     note(
         ax,
         inner * [4, 1] - [0, 4],
@@ -263,7 +276,7 @@ def draw_disc(
 
 
 def draw_front(
-    ax: Any,
+    ax: Axes,
     cut: Any,
     aerofoil: Aerofoil,
     disc: Disc,
@@ -271,7 +284,7 @@ def draw_front(
     """Along the engine axis."""
     shape(ax, ring(disc.bore_radius, disc.rim_radius, cut.theta))
     shape(ax, MM * cut.blade[:, ::-1])
-    shape(ax, MM * cut.wedge[:, ::-1], DAMPER)
+    shape(ax, MM * cut.damper[:, ::-1], DAMPER)
     width = [np.ptp(plane_section(aerofoil, t)[0][:, 1]) / 2 for t in (0.0, 1.0)]
     top = MM * cut.top
     tip = MM * (cut.top + aerofoil.span)
@@ -296,7 +309,7 @@ def draw_front(
 
 
 def draw_meridian(
-    ax: Any,
+    ax: Axes,
     cut: Any,
     aerofoil: Aerofoil,
     platform: Platform,
@@ -405,19 +418,3 @@ def draw_z_mass(z: ZMass, file: str | Path | None = None) -> object:
         note(ax, (0, -0.75 * high), f"{said(z, 'thickness')}, footprint at z = 0", (0, 0))
         bare(ax, "Z mass, seen from above", "x", "y")
         return ax.figure
-
-
-# Drawings of a scene by the name of its kind: name of the picture -> function of (scene, file).
-PARTS: dict[str, dict[str, Callable[[Scene, str | Path | None], object]]] = {
-    "wedge sector": {
-        "aerofoil": lambda s, file=None: draw_aerofoil(s.aerofoil, file),
-        "platform": lambda s, file=None: draw_platform(s.platform, s.shank, s.disc, s.damper, file),
-        "sector": lambda s, file=None: draw_disc(
-            s.aerofoil, s.platform, s.shank, s.disc, s.damper, file
-        ),
-    },
-    "plane blades": {"plane": lambda s, file=None: draw_plane(s.plane, file)},
-    "z mass": {"z_mass": lambda s, file=None: draw_z_mass(s.z_mass, file)},
-    "hertz": {"hertz": lambda s, file=None: draw_hertz(s.hertz, file)},
-    "punch": {"punch": lambda s, file=None: draw_punch(s.punch, file)},
-}

@@ -11,7 +11,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import matplotlib
 import numpy as np
@@ -21,6 +21,9 @@ from scipy.interpolate import PchipInterpolator
 from .labels import names_apart
 from .style import COLOURS, FAILED, canvas, log_axis
 
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+
 MICRO = 1e6
 
 
@@ -28,7 +31,7 @@ def draw_responses(
     points: pd.DataFrame,
     file: str | Path | None = None,
     *,
-    ax: Any = None,
+    ax: Axes | None = None,
     title: str = "",
     logarithmic: bool = True,
 ) -> object:
@@ -98,7 +101,7 @@ def load_name(load: float) -> str:
 
 
 def draw_curve(
-    ax: Any,
+    ax: Axes,
     curve: pd.DataFrame,
     load: float,
     colour: Any,
@@ -187,7 +190,7 @@ def between(
     )
 
 
-def draw_failed(ax: Any, failed: pd.DataFrame) -> None:
+def draw_failed(ax: Axes, failed: pd.DataFrame) -> None:
     """Points without a solution: crosses at their last amplitude, or on the lower edge when there
     is none.
     """
@@ -224,7 +227,7 @@ def draw_optimum(
     *,
     points: pd.DataFrame | None = None,
     own: float | None = None,
-    ax: Any = None,
+    ax: Axes | None = None,
     title: str = "",
 ) -> object:
     """Resonance amplitude and frequency over load, the optimum marked; a curve a mass if there is
@@ -278,25 +281,7 @@ def draw_optimum_curve(
     amplitude = MICRO * finite["peak_amplitude"]
     axes[0].plot(finite["load"], amplitude, "o-", color=colour, label=label)
     if "lowest" in finite and finite["lowest"].notna().any():
-        sure = finite["interval"] != "sampled"
-        axes[0].fill_between(
-            finite["load"],
-            MICRO * finite["lowest"],
-            MICRO * finite["highest"],
-            color=colour,
-            alpha=0.22,
-            lw=0,
-            label="range by loading history" + ("" if sure.all() else " (hollow: sampled)"),
-        )
-        for name in ("lowest", "highest"):
-            axes[0].plot(
-                finite["load"][~sure],
-                MICRO * finite[name][~sure],
-                "o",
-                mfc="none",
-                mec=colour,
-                ms=4,
-            )
+        _draw_history_range(axes[0], finite, colour)
     axes[1].plot(finite["load"], finite["peak_frequency"], "o-", color=colour)
     doubtful = (
         finite["unconverged"] > 0
@@ -335,7 +320,30 @@ def draw_optimum_curve(
     )
 
 
-def draw_unknown(ax: Any, finite: pd.DataFrame) -> None:
+def _draw_history_range(ax: Axes, finite: pd.DataFrame, colour: str) -> None:
+    """Between which amplitudes the loading history decides; hollow where that was sampled."""
+    sure = finite["interval"] != "sampled"
+    ax.fill_between(
+        finite["load"],
+        MICRO * finite["lowest"],
+        MICRO * finite["highest"],
+        color=colour,
+        alpha=0.22,
+        lw=0,
+        label="range by loading history" + ("" if sure.all() else " (hollow: sampled)"),
+    )
+    for name in ("lowest", "highest"):
+        ax.plot(
+            finite["load"][~sure],
+            MICRO * finite[name][~sure],
+            "o",
+            mfc="none",
+            mec=colour,
+            ms=4,
+        )
+
+
+def draw_unknown(ax: Axes, finite: pd.DataFrame) -> None:
     """Hollow marks on peaks whose error is not known, because richer models were not solved."""
     unknown = finite[np.isinf(finite["error"])] if "error" in finite else finite.iloc[:0]
     if len(unknown):
@@ -421,7 +429,7 @@ def draw_loops(
     loops: Mapping[str, tuple[np.ndarray, np.ndarray]],
     file: str | Path | None = None,
     *,
-    ax: Any = None,
+    ax: Axes | None = None,
     title: str = "",
 ) -> object:
     """Friction force over relative displacement, one closed loop a name, with its energy; returns
@@ -495,7 +503,7 @@ def draw_accuracy(
     table: pd.DataFrame,
     file: str | Path | None = None,
     *,
-    ax: Any = None,
+    ax: Axes | None = None,
     tolerance: float | None = None,
     title: str = "",
 ) -> object:
@@ -528,28 +536,7 @@ def draw_accuracy(
             if part.empty:
                 continue
             ax.plot(part["time"], part["error"], "o", color=colour, ms=5, alpha=0.8, label=name)
-        failed = table[~good]
-        if len(failed):
-            ax.plot(
-                failed["time"],
-                np.full(len(failed), 0.98),
-                "x",
-                color=FAILED,
-                ms=7,
-                mew=1.8,
-                transform=ax.get_xaxis_transform(),
-                label=f"not converged ({len(failed)})",
-            )
-            for _, row in failed[failed["time"].notna()].iterrows():
-                ax.annotate(
-                    str(row["name"]),
-                    (row["time"], 0.98),
-                    (6, -13),
-                    xycoords=ax.get_xaxis_transform(),
-                    textcoords="offset points",
-                    fontsize=7.5,
-                    color=FAILED,
-                )
+        _draw_failed_settings(ax, table[~good])
         draw_front(ax, table[good])
         if tolerance is not None:
             ax.axhline(
@@ -568,7 +555,33 @@ def draw_accuracy(
         return ax.figure
 
 
-def draw_front(ax: Any, table: pd.DataFrame) -> None:
+def _draw_failed_settings(ax: Axes, failed: pd.DataFrame) -> None:
+    """Crosses at the top, with names, for settings without an error to show."""
+    if failed.empty:
+        return
+    ax.plot(
+        failed["time"],
+        np.full(len(failed), 0.98),
+        "x",
+        color=FAILED,
+        ms=7,
+        mew=1.8,
+        transform=ax.get_xaxis_transform(),
+        label=f"not converged ({len(failed)})",
+    )
+    for _, row in failed[failed["time"].notna()].iterrows():
+        ax.annotate(
+            str(row["name"]),
+            (row["time"], 0.98),
+            (6, -13),
+            xycoords=ax.get_xaxis_transform(),
+            textcoords="offset points",
+            fontsize=7.5,
+            color=FAILED,
+        )
+
+
+def draw_front(ax: Axes, table: pd.DataFrame) -> None:
     """The Pareto front as stairs, with names where there is room, and the chosen setting."""
     front = table.iloc[pareto_front(table["time"].to_numpy(float), table["error"].to_numpy(float))]
     ax.step(

@@ -9,7 +9,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from bladefem.errors import InputError
-from geometry.mesh import Mesh
+from geometry.mesh import Mesh, sector_of
 
 # gmsh's node order: corners, then one node on each of these edges.
 EDGES = {
@@ -199,8 +199,9 @@ def sector_motion(mesh: Mesh, k: int) -> tuple[np.ndarray, np.ndarray]:
     rotation = np.eye(3)
     shift = np.zeros(3)
     for _ in range(k):
-        shift = mesh.sector.rotation @ shift + mesh.sector.shift
-        rotation = mesh.sector.rotation @ rotation
+        step = sector_of(mesh)
+        shift = step.rotation @ shift + step.shift
+        rotation = step.rotation @ rotation
     return rotation, shift
 
 

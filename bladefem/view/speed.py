@@ -10,12 +10,15 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import pandas as pd
 
 from .style import COLOURS, FAILED, canvas
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
 
 RPM = 60 / (2 * np.pi)
 # not as many as colours, so that a pair comes again late
@@ -29,7 +32,7 @@ def draw_campbell(
     *,
     crossings: pd.DataFrame | None = None,
     operating: float | None = None,
-    ax: Any = None,
+    ax: Axes | None = None,
     title: str = "",
 ) -> object:
     """Frequencies over speed with engine-order lines; crossings are ringed; returns the figure.
@@ -44,23 +47,8 @@ def draw_campbell(
         title: headline.
     """
     with canvas(file, ax, (7.6, 5.0)) as ax:
-        keys = [key for key in ("mode", "nodal_diameter") if key in table]
         fastest = RPM * table["speed"].max()
-        for key, line in table.groupby(keys):
-            mode, *diameter = key
-            line = line.sort_values("speed")
-            colour = COLOURS[(int(mode) - 1) % len(COLOURS)]
-            first = (
-                not diameter
-                or diameter[0] == table.loc[table["mode"] == mode, "nodal_diameter"].min()
-            )
-            ax.plot(
-                RPM * line["speed"],
-                line["frequency"],
-                color=colour,
-                lw=1.7 if not diameter else 1.2,
-                label=line_name(line, mode) if first else None,
-            )
+        _draw_modes(ax, table)
         top = 1.12 * table["frequency"].max()
         names = diameter_names(table) if "nodal_diameter" in table else []
         name_lines(ax, fastest, top, names + draw_order_lines(ax, orders, fastest, top))
@@ -95,6 +83,25 @@ def draw_campbell(
         return ax.figure
 
 
+def _draw_modes(ax: Axes, table: pd.DataFrame) -> None:
+    """A line a mode and nodal diameter, named at the first diameter of each mode."""
+    keys = [key for key in ("mode", "nodal_diameter") if key in table]
+    for key, line in table.groupby(keys):
+        mode, *diameter = key
+        line = line.sort_values("speed")
+        colour = COLOURS[(int(mode) - 1) % len(COLOURS)]
+        first = (
+            not diameter or diameter[0] == table.loc[table["mode"] == mode, "nodal_diameter"].min()
+        )
+        ax.plot(
+            RPM * line["speed"],
+            line["frequency"],
+            color=colour,
+            lw=1.7 if not diameter else 1.2,
+            label=line_name(line, mode) if first else None,
+        )
+
+
 def diameter_names(table: pd.DataFrame) -> list[tuple[float, str, str]]:
     """(height, text, colour) of the nodal diameters at the right end of each mode's lines: both
     ends of a fan, one name for a bundle.
@@ -120,13 +127,13 @@ def diameter_names(table: pd.DataFrame) -> list[tuple[float, str, str]]:
 
 
 def name_lines(
-    ax: Any,
+    ax: Axes,
     x: float,
     top: float,
     names: list[tuple[float, str, str]],
 ) -> None:
-    """Names beside the right ends of lines, moved apart where they would overlap; a thin line leads
-    to a moved one.
+    """Names next to the right ends of lines, moved apart where they would overlap; a thin line
+    leads to a moved one.
     """
     names = sorted(names)
     places = spread(np.array([height for height, _, _ in names]), 0.03 * top)
@@ -178,7 +185,7 @@ def line_name(rows: pd.DataFrame, mode: Any) -> str:
 
 
 def draw_order_lines(
-    ax: Any,
+    ax: Axes,
     orders: Sequence[int],
     fastest: float,
     top: float,
@@ -213,7 +220,7 @@ def draw_nodal_diameters(
     table: pd.DataFrame,
     file: str | Path | None = None,
     *,
-    ax: Any = None,
+    ax: Axes | None = None,
     title: str = "",
 ) -> object:
     """Frequency over nodal diameter, a line a mode number, coloured by family when it is known;
@@ -250,7 +257,7 @@ def draw_nodal_diameters(
         return ax.figure
 
 
-def draw_families(ax: Any, table: pd.DataFrame) -> None:
+def draw_families(ax: Axes, table: pd.DataFrame) -> None:
     """A marker a mode, by family (or by mode number); coupled modes are hollow."""
     names = table["family"] if "family" in table else table["mode"].map("mode {}".format)
     plain = names.str.removesuffix(", coupled")
@@ -321,7 +328,7 @@ def draw_interference(
 
 
 def draw_excitations(
-    ax: Any,
+    ax: Axes,
     table: pd.DataFrame,
     sectors: int,
     speed: float,

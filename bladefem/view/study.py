@@ -5,10 +5,14 @@ them.
 from __future__ import annotations
 
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import pandas as pd
 
 from .style import COLOURS, canvas, log_axis
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
 
 MICRO = 1e6
 
@@ -21,7 +25,7 @@ def draw_study(
     label: str = "value",
     title: str = "",
 ) -> object:
-    """Resonance amplitude and frequency at the best load over the value, and beside it all loads;
+    """Resonance amplitude and frequency at the best load over the value, and next to it all loads;
     returns the figure.
 
     Args:
@@ -63,7 +67,7 @@ def draw_study(
         return axes[0, 0].figure
 
 
-def _draw_loads(axis: object, loads: pd.DataFrame) -> None:
+def _draw_loads(axis: Axes, loads: pd.DataFrame) -> None:
     """Amplitude against load, a line a value."""
     damped = loads[(loads["load"] > 0) & (loads["load"] < float("inf"))]
     for (value, part), colour in zip(

@@ -8,13 +8,16 @@ import os
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import matplotlib
 import numpy as np
 from matplotlib.figure import Figure
 from matplotlib.text import Text
 from matplotlib.ticker import FuncFormatter, LogLocator, NullFormatter
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
 
 # Okabe and Ito, Color Universal Design (2008); yellow last because it is weak on white.
 COLOURS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9", "#000000", "#F0E442")
@@ -59,7 +62,7 @@ STYLE: dict[str, Any] = {
 @contextmanager
 def canvas(
     file: str | Path | None = None,
-    ax: Any = None,
+    ax: Axes | None = None,
     size: tuple[float, float] = (7.2, 4.4),
     grid: tuple[int, int] = (1, 1),
     **subplots: Any,
@@ -102,7 +105,7 @@ def take_words_as_they_are(figure: Any) -> None:
 
 
 def log_axis(
-    ax: Any,
+    ax: Axes,
     which: str,
     factor: float = 1.0,
 ) -> None:
@@ -210,7 +213,7 @@ def trim(image: np.ndarray, margin: int = 12) -> np.ndarray:
 
 
 def show_photograph(
-    ax: Any,
+    ax: Axes,
     image: np.ndarray,
     direction: tuple[float, float, float] | None = None,
     up: tuple[float, float, float] = (1.0, 0.0, 0.0),
@@ -235,7 +238,7 @@ def size_for(
     beside: float = 0.3,
     widest: float = 9.0,
 ) -> tuple[float, float]:
-    """Figure size [inch] for a rendering about ``height`` tall, with room beside it and a line
+    """Figure size [inch] for a rendering about ``height`` tall, with room next to it and a line
     above and below.
     """
     rows, columns = image.shape[:2]
@@ -252,7 +255,7 @@ def headline(figure: Any, text: str) -> None:
 
 
 def draw_triad(
-    ax: Any,
+    ax: Axes,
     direction: tuple[float, float, float],
     up: tuple[float, float, float],
 ) -> None:

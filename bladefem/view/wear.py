@@ -6,7 +6,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 from matplotlib.cm import ScalarMappable
@@ -18,6 +18,9 @@ from bladefem.data import Patch
 from .contact import arrangement, label_outer, seat_name, unfold
 from .skin import split_faces
 from .style import COLOURS, canvas, headline
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
 
 WORK_COLOURS = "inferno_r"
 MARKS = {
@@ -52,7 +55,7 @@ def draw_work(
     stacked = shape[0] > 1
     with canvas(file, size=size, grid=shape, squeeze=False, sharex=stacked, sharey=True) as axes:
         for ax, (patch, w, s) in zip(axes.flat, parts, strict=True):
-            (_line if line else _face)(ax, patch, w, s, most)
+            (_draw_line if line else _draw_face)(ax, patch, w, s, most)
             total = 1e3 * float(w @ patch.area)
             ax.set_title(
                 f"{seat_name(patch)}: {total:.3g} mJ a period", fontsize=9, fontweight="normal"
@@ -77,8 +80,8 @@ def draw_work(
         return figure
 
 
-def _face(
-    ax: Any,
+def _draw_face(
+    ax: Axes,
     patch: Patch,
     work: np.ndarray,
     state: np.ndarray,
@@ -112,8 +115,8 @@ def _face(
     ax.grid(False)
 
 
-def _line(
-    ax: Any,
+def _draw_line(
+    ax: Axes,
     patch: Patch,
     work: np.ndarray,
     state: np.ndarray,

@@ -147,6 +147,7 @@ def _modal_terms(
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Squared frequencies (D, k), viscous damping (D, k, k) and loss terms (D, k)."""
     damper = wheel.damper
+    extra: tuple[np.ndarray, np.ndarray | None]
     if isinstance(damper, RigidBody):
         extra = (np.zeros(len(damper.mass)), None)
     elif damper is not None:

@@ -30,6 +30,13 @@ class ContactForces:
     converged: bool
     reason: str
 
+    @property
+    def jacobian(self) -> np.ndarray:
+        """``change`` of forces that were evaluated with it."""
+        if self.change is None:
+            raise RuntimeError("the contact forces were evaluated without their Jacobian")
+        return self.change
+
 
 def contact_forces(
     wheel: Wheel,
@@ -59,10 +66,10 @@ def contact_forces(
     p[..., 0] -= wheel.preload(elements)
     change = None
     if jacobian:
-        change = found.dfdw[:, missing:, :, missing:].reshape(count, n, d * K, d * K).copy()
+        blocks = found.jacobian[:, missing:, :, missing:].reshape(count, n, d * K, d * K).copy()
         diagonal = np.arange(d * K)
-        change[:, :, diagonal, diagonal] -= np.repeat(wheel.springs, K, axis=1)
-        change = change.reshape(count * n, d * K, d * K)
+        blocks[:, :, diagonal, diagonal] -= np.repeat(wheel.springs, K, axis=1)
+        change = blocks.reshape(count * n, d * K, d * K)
     return ContactForces(
         f,
         p,

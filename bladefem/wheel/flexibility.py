@@ -94,7 +94,7 @@ def wheel_flexibility(
         if "yy" not in shared:
             shared["yy"] = [_blade_matrix(parts, T, h) for h in range(harmonics + 1)]
         E = np.array([pattern.change(h * omega) for h in range(harmonics + 1)])
-        factors = tuple(_factorised(A, E[h]) for h, A in enumerate(shared["yy"]))
+        factors = tuple(_factorise_blocks(A, E[h]) for h, A in enumerate(shared["yy"]))
     return WheelFlexibility(omega, parts, Z, T, E, factors, wheel.coupled)
 
 
@@ -126,7 +126,7 @@ def _blade_matrix(
     return full.transpose(0, 2, 1, 3).reshape(count * q, count * q)
 
 
-def _factorised(A: np.ndarray, E: np.ndarray) -> tuple:
+def _factorise_blocks(A: np.ndarray, E: np.ndarray) -> tuple:
     """LU factors of 1 + E A for E (N, q, q)."""
     count, q = E.shape[:2]
     system = (E @ A.reshape(count, q, count * q)).reshape(count * q, count * q)

@@ -262,7 +262,7 @@ def _size(body: PortModel, name: str) -> int:
     return len(range(*body.ports.get(name, slice(0, 0)).indices(len(body.residual))))
 
 
-def _counts(wheel: Wheel, directions: int) -> tuple[int, int]:
+def _counts(wheel: Wheel, directions: int) -> tuple[float, float]:
     """Numbers of elements that fit the contact port: of one damper, of all."""
     nodes = wheel.contact_size / directions
     return nodes, nodes * wheel.count

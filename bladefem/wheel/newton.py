@@ -15,6 +15,7 @@ from scipy.sparse.linalg import LinearOperator, gmres
 from ..data import Elements
 from ..friction.fourier import to_complex, to_real
 from ..hbm.solver.newton import Options
+from ..util.newton import Outcome, StepError, halve_step, iterate_newton
 from .contact_forces import ContactForces, contact_forces
 from .flexibility import WheelFlexibility
 from .model import Wheel
@@ -24,10 +25,10 @@ from .preconditioner import Preconditioner, make_preconditioner
 BASIS = 60
 RESTARTS = 4
 # relative accuracy of a step: loose far from the solution, tight near it
-LOOSE = 1e-2
+LOOSE_STEP_TOLERANCE = 1e-2
 TIGHT = 1e-6
 # relative accuracy of the step that only measures a trial
-ROUGH = 0.1
+TRIAL_TOLERANCE = 0.1
 # reduction of the residual by one step that needs no further test
 QUADRATIC = 1e-2
 # weight of the mean in the residual that the line search lowers
@@ -109,24 +110,17 @@ def newton_wheel(
             next, which does not depend on how the equations are scaled (Deuflhard, Newton Methods
             for Nonlinear Problems, 2004, Sect. 3.3), or "residual", which costs no more solves.
     """
-    state = evaluate_wheel(balance, w)
-    step = _Steps(balance)
-    for iteration in range(options.iterations + 1):
-        if not (np.isfinite(state.error) and state.forces.converged):
-            reason = state.forces.reason if np.isfinite(state.error) else "residual is not finite"
-            return WheelNewton(state, iteration, step.products, False, reason)
-        if state.error <= options.tolerance:
-            reason = "residual within tolerance"
-            return WheelNewton(state, iteration, step.products, True, reason)
-        if iteration == options.iterations:
-            break
-        better, failure = _search(balance, state, step, merit)
-        if better is None:
-            reason = f"{failure} at residual {state.error:.1e}"
-            return WheelNewton(state, iteration + 1, step.products, False, reason)
-        state = better
-    reason = f"residual {state.error:.1e} after {options.iterations} iterations"
-    return WheelNewton(state, options.iterations, step.products, False, reason)
+    steps = _Steps(balance)
+    run = iterate_newton(
+        evaluate_wheel(balance, w),
+        lambda state: state.error if state.forces.converged else np.inf,
+        lambda state: _line_search(balance, state, steps, merit),
+        options.tolerance,
+        options.iterations,
+    )
+    forces = run.state.forces
+    reason = run.reason if forces.converged else forces.reason
+    return WheelNewton(run.state, run.iterations, steps.products, run.converged, reason)
 
 
 class _Steps:
@@ -140,8 +134,8 @@ class _Steps:
 
     def step(self, state: WheelState) -> tuple[np.ndarray, bool]:
         """The step (N, n, d, K), and whether GMRES reached its accuracy."""
-        accuracy = float(np.clip(0.1 * state.error, TIGHT, LOOSE))
-        goal = accuracy * np.linalg.norm(state.residual)
+        accuracy = float(np.clip(0.1 * state.error, TIGHT, LOOSE_STEP_TOLERANCE))
+        goal = accuracy * float(np.linalg.norm(state.residual))
         if self.stale:
             self._renew(state)
         before = self.products
@@ -158,12 +152,13 @@ class _Steps:
         residual: np.ndarray,
     ) -> float:
         """Length of the step that the derivative at `state` would take from another residual."""
-        found, _ = self._solve(state, residual, ROUGH * np.linalg.norm(residual))
+        found, _ = self._solve(state, residual, TRIAL_TOLERANCE * float(np.linalg.norm(residual)))
         return float(np.linalg.norm(found))
 
-    def _renew(self, state: WheelState) -> None:
-        self.preconditioner = make_preconditioner(self.balance.flex, state.forces.change)
+    def _renew(self, state: WheelState) -> Preconditioner:
+        self.preconditioner = make_preconditioner(self.balance.flex, state.forces.jacobian)
         self.stale = False
+        return self.preconditioner
 
     def _solve(
         self,
@@ -173,8 +168,8 @@ class _Steps:
     ) -> tuple[np.ndarray, bool]:
         shape = state.residual.shape
         flat = (shape[0], -1, shape[3])
-        change = state.forces.change
-        prepare = self.preconditioner.apply
+        change = state.forces.jacobian
+        prepare = (self.preconditioner or self._renew(state)).apply
 
         def product(y: np.ndarray) -> np.ndarray:
             self.products += 1
@@ -189,31 +184,36 @@ class _Steps:
         return prepare(y.reshape(flat)).reshape(shape), failed != 0
 
 
-def _search(
+def _line_search(
     balance: WheelBalance,
     state: WheelState,
     steps: _Steps,
     merit: str,
-) -> tuple[WheelState | None, str]:
-    """The first halving of the step that lowers the merit, or None and why."""
+) -> WheelState | None:
+    """The first halving of the step that lowers the merit, or None where it stalls.
+
+    Raises:
+        StepError: the step is not finite, or GMRES did not converge and the step leads nowhere.
+    """
     step, solved = steps.step(state)
     if not np.isfinite(step).all():
-        return None, "the Newton step is not finite"
+        raise StepError(Outcome.SINGULAR, "the Newton step is not finite")
     before = np.linalg.norm(step)
     weighted = _moving_first(state.residual)
-    share = 1.0
-    while share >= SHORTEST:
-        trial = evaluate_wheel(balance, state.w - share * step)
+
+    def lowers_merit(trial: WheelState, share: float) -> bool:
         if trial.error <= QUADRATIC * state.error:
-            return trial, ""
+            return True
         if merit == "residual":
-            lower = _moving_first(trial.residual) <= (1 - 1e-4 * share) * weighted
-        else:
-            lower = steps.next_length(state, trial.residual) <= (1 - 0.25 * share) * before
-        if lower:
-            return trial, ""
-        share /= 2
-    return None, "line search stalled" if solved else "GMRES did not converge"
+            return bool(_moving_first(trial.residual) <= (1 - 1e-4 * share) * weighted)
+        return bool(steps.next_length(state, trial.residual) <= (1 - 0.25 * share) * before)
+
+    better = halve_step(
+        lambda share: evaluate_wheel(balance, state.w - share * step), lowers_merit, SHORTEST
+    )
+    if better is None and not solved:
+        raise StepError(Outcome.SINGULAR, f"GMRES did not converge at residual {state.error:.1e}")
+    return better
 
 
 def _moving_first(residual: np.ndarray) -> float:

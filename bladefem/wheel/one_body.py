@@ -39,7 +39,7 @@ def one_body_model(
     shapes, omega, viscous = _real_modes(wheel)
     rows = _port_rows(wheel)
     residual = _real_residual(wheel)
-    values, V = _mistuned(pattern, omega, shapes, residual, rows["blade"])
+    values, V = _mistuned_modes(pattern, omega, shapes, residual, rows["blade"])
     if values.min() < 0:
         raise InputError("pattern: deviations make a blade unstable, expected smaller ones")
     C = (V.T * viscous) @ V
@@ -118,7 +118,7 @@ def _real_residual(wheel: Wheel) -> np.ndarray:
     return full.transpose(0, 2, 1, 3).reshape(count * half.shape[1], -1)
 
 
-def _mistuned(
+def _mistuned_modes(
     pattern: Pattern,
     omega: np.ndarray,
     shapes: np.ndarray,

@@ -23,7 +23,7 @@ AMPLIFIED = 3.0
 # |T N| below which a mode is left out of the dense matrix
 IMMOVABLE = 1e-2
 # unknowns of the dense matrix: 2 s of factorisation
-LARGEST = 2500
+MAX_DENSE_UNKNOWNS = 2500
 
 
 @dataclass(frozen=True)
@@ -73,7 +73,7 @@ def make_preconditioner(flex: WheelFlexibility, change: np.ndarray) -> Precondit
         amplified = abs(np.einsum("nii,nii->ni", flex.T[:, h], parts.N))
         kept = np.flatnonzero(amplified.max(axis=0) > IMMOVABLE)
         coupled = h == 0 or amplified.max() > AMPLIFIED
-        if coupled and 0 < count * len(kept) <= LARGEST:
+        if coupled and 0 < count * len(kept) <= MAX_DENSE_UNKNOWNS:
             dense[h] = (kept, _dense_factors(flex, C[h].reshape(count, -1, *C.shape[2:]), h, kept))
             continue
         mean = C[h].reshape(count, -1, *C.shape[2:]).mean(axis=0)

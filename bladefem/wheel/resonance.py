@@ -12,11 +12,12 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..errors import InputError
+from ..util.curve_extremum import parabola_at_middle
 
 # points added to the first grid before the search is given up
-MOST = 40
-# points closer than this are not told apart, relative
-NEAR = 1e-7
+MAX_ADDED_POINTS = 40
+# points closer than this are not distinguished, relative
+SAME_POINT = 1e-7
 
 # amplitudes (N,) of the blades at a circular frequency, NaN where it was not solved
 Respond = Callable[[float], np.ndarray]
@@ -67,13 +68,13 @@ def find_wheel_peak(
     omegas = [float(w) for w in grid]
     sizes = [respond(w) for w in omegas]
     gain = 0.0
-    for _ in range(MOST + 1):
+    for _ in range(MAX_ADDED_POINTS + 1):
         order = np.argsort(omegas)
         w = np.array(omegas)[order]
         a = np.array(sizes)[order]
         solved = np.isfinite(a).all(axis=1)
         target, gain = _next_frequency(w[solved], a[solved])
-        if target is None or gain <= tolerance or len(omegas) >= len(grid) + MOST:
+        if target is None or gain <= tolerance or len(omegas) >= len(grid) + MAX_ADDED_POINTS:
             break
         omegas.append(target)
         sizes.append(respond(target))
@@ -100,17 +101,14 @@ def _next_frequency(w: np.ndarray, a: np.ndarray) -> tuple[float | None, float]:
     is_peak = (a[middle] >= a[:-2]) & (a[middle] >= a[2:])
     left = (w[middle] - w[:-2])[:, None]
     right = (w[2:] - w[middle])[:, None]
-    down = (y[middle] - y[:-2]) / left
-    up = (y[2:] - y[middle]) / right
-    bend = (up - down) / (left + right)
-    slope = (down * right + up * left) / (left + right)
+    slope, bend = parabola_at_middle(left, right, y[:-2] - y[middle], y[2:] - y[middle])
     with np.errstate(divide="ignore", invalid="ignore"):
         step = np.where(bend > 0, -slope / (2 * bend), 0.0)
         # half-way at most: the parabola is the three points' only
         step = np.clip(step, -0.5 * left, 0.5 * right)
         bottom = y[middle] + slope * step + bend * step**2
         predicted = np.where(is_peak & (bottom > 0), bottom, np.inf) ** -0.5
-    far = abs(step) > NEAR * w[middle, None]
+    far = abs(step) > SAME_POINT * w[middle, None]
     predicted = np.where(far, predicted, 0.0)
     i, blade = np.unravel_index(int(np.argmax(predicted)), predicted.shape)
     gain = predicted[i, blade] / a.max() - 1

@@ -16,7 +16,7 @@ from ..errors import InputError
 from .model import Pattern, Wheel
 
 # standard deviations beyond which nothing is drawn: parts outside are sorted out
-LARGEST = 3.0
+MAX_DEVIATIONS = 3.0
 
 
 @dataclass(frozen=True)
@@ -38,11 +38,18 @@ class Scatter:
     def __post_init__(self) -> None:
         for name in ("blades", "friction", "stiffness", "load"):
             value = getattr(self, name)
-            if not 0 <= value * LARGEST < 1:
+            if not 0 <= value * MAX_DEVIATIONS < 1:
                 raise InputError(
                     f"scatter.{name} {value}: expected a relative standard deviation from 0 to "
-                    f"{1 / LARGEST:.2f}"
+                    f"{1 / MAX_DEVIATIONS:.2f}"
                 )
+
+
+def drawn_deviations(count: int, scatter: Scatter, wheels: int) -> np.ndarray:
+    """(wheels, 4, count) deviations of each sector in standard deviations: of the blade, then of
+    friction, stiffness and load of its damper.
+    """
+    return _normal_sample(wheels, 4 * count, scatter.seed).reshape(wheels, 4, count)
 
 
 def drawn_patterns(
@@ -56,7 +63,7 @@ def drawn_patterns(
     Args:
         blade_pattern: a pattern from relative deviations (N,) of the blades.
     """
-    values = _normal(wheels, 4 * wheel.count, scatter.seed).reshape(wheels, 4, wheel.count)
+    values = drawn_deviations(wheel.count, scatter, wheels)
     dampers = np.array([scatter.friction, scatter.stiffness, scatter.load])
     patterns = []
     for draw in values:
@@ -93,7 +100,7 @@ def read_pattern(path: str | Path, count: int) -> tuple[list[str], np.ndarray]:
     if len(cells) < 2:
         raise InputError(f"pattern file {path.name}: expected a row of names and {count} blades")
     names = cells[0]
-    values = _numbers(path, cells[1:], len(names))
+    values = _read_numbers(path, cells[1:], len(names))
     if names[0].lower() == "blade":
         _check_order(path, values[:, 0])
         names = names[1:]
@@ -107,7 +114,7 @@ def read_pattern(path: str | Path, count: int) -> tuple[list[str], np.ndarray]:
     return names, values
 
 
-def _numbers(
+def _read_numbers(
     path: Path,
     rows: Sequence[Sequence[str]],
     columns: int,
@@ -134,7 +141,7 @@ def _check_order(path: Path, numbers: np.ndarray) -> None:
         )
 
 
-def _normal(
+def _normal_sample(
     wheels: int,
     columns: int,
     seed: int,
@@ -143,5 +150,5 @@ def _normal(
     sequence = qmc.Sobol(columns, scramble=True, seed=seed)
     power = int(np.ceil(np.log2(max(wheels, 2))))
     uniform = sequence.random_base2(power)[:wheels]
-    low = norm.cdf(-LARGEST)
+    low = norm.cdf(-MAX_DEVIATIONS)
     return norm.ppf(low + (1 - 2 * low) * uniform)

@@ -21,7 +21,7 @@ TUNED = Pattern()
 # wheel are that narrow
 NEIGHBOUR = 0.5
 # relative distance at which it is the same point, with other settings
-SAME = 1e-6
+SAME_FREQUENCY = 1e-6
 # of the load homotopy: first share of the excitation, first and last factor to the next one, and
 # points before it is given up
 GENTLE = 0.02
@@ -117,7 +117,9 @@ def _attempts(
         ways.append(("newton from held means", lambda: _held(balance, options)))
     if start is not None:
         fitted = _fitted(start.w, wheel, H)
-        close = abs(start.omega / omega - 1) < max(NEIGHBOUR * np.max(wheel.damping.ratio), SAME)
+        close = abs(start.omega / omega - 1) < max(
+            NEIGHBOUR * np.max(wheel.damping.ratio), SAME_FREQUENCY
+        )
         ways.insert(0 if close else len(ways), ("newton", lambda: fitted))
     for name, attempt in ways:
         begin = attempt()
@@ -234,7 +236,7 @@ def _homotopy(balance: WheelBalance, options: Options) -> WheelNewton:
     share = GENTLE
     factor = FACTOR
     path: list[tuple[float, np.ndarray]] = []
-    end = None
+    end: WheelNewton | None = None
     for _ in range(HOMOTOPY_POINTS):
         part = replace(balance, stuck=share * balance.stuck)
         end = newton_wheel(part, _predicted(path, share, part.stuck), options)
@@ -250,6 +252,8 @@ def _homotopy(balance: WheelBalance, options: Options) -> WheelNewton:
         if factor < LEAST_FACTOR:
             break
         share = min(1.0, factor * (path[-1][0] if path else GENTLE / FACTOR))
+    # HOMOTOPY_POINTS is at least one
+    assert end is not None
     if share < 1.0:
         state = evaluate_wheel(balance, end.state.w)
         reason = f"the load homotopy stopped at {share:.3g} of the excitation: {end.reason}"

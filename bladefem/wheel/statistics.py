@@ -7,7 +7,6 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 from scipy import stats
@@ -17,6 +16,8 @@ from ..hbm.linear.bodies import modal_flexibility
 from ..hbm.model import ReducedModel
 from ..hbm.solve import solve
 from ..hbm.solver.newton import DEFAULTS, Options
+from ..util.communicator import Communicator
+from ..util.curve_extremum import parabola_minimum
 from ..util.progress import Progress, unwatched
 from .model import Pattern, Wheel
 from .one_body import one_body_model
@@ -91,7 +92,7 @@ def scatter_statistics(
     patterns: Mapping[float, Sequence[Pattern]],
     grid: Callable[[float, Pattern], np.ndarray],
     respond: Callable[[Wheel, Pattern], Respond],
-    comm: Any = None,
+    comm: Communicator | None = None,
     tolerance: float = 5e-3,
     progress: Progress = unwatched,
 ) -> Amplification:
@@ -146,11 +147,10 @@ def best_load(loads: np.ndarray, heights: np.ndarray) -> tuple[float, float]:
         return float(loads[i]), float(heights[i])
     x = np.log(loads[i - 1 : i + 2])
     y = np.log(heights[i - 1 : i + 2])
-    c = np.polyfit(x - x[1], y, 2)
-    if not c[0] > 0:
+    vertex = parabola_minimum(x, y)
+    if vertex is None:
         return float(loads[i]), float(heights[i])
-    step = float(np.clip(-c[1] / (2 * c[0]), x[0] - x[1], x[2] - x[1]))
-    return float(np.exp(x[1] + step)), float(np.exp(np.polyval(c, step)))
+    return float(np.exp(vertex[0])), float(np.exp(vertex[1]))
 
 
 def peak_of_pattern(

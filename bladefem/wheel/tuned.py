@@ -65,12 +65,13 @@ def tuned_displacements(
     if key not in wheel.kept:
         wheel.kept[key] = tuned_sector(wheel, harmonics)
     model = wheel.kept[key]
-    if model is None:
+    order = travelling_order(wheel)
+    if model is None or order is None:
         return None
     point = solve(model, omega, harmonics, samples)
     if not point.converged:
         return None
-    turns = 2j * np.pi * travelling_order(wheel) / wheel.count
+    turns = 2j * np.pi * order / wheel.count
     sectors = np.arange(wheel.count)[:, None]
     shift = np.exp(turns * sectors * np.arange(harmonics + 1))
     return to_real(to_complex(point.w) * shift[:, None, None, :])

@@ -169,7 +169,7 @@ SHOWN = {
     "mesh": ["worst Jacobian", "0.31", "body blade, cells"],
     "modes": ["812.40", "2000.00", "2.0e-12"],
     "contact": ["40 N", "this", "4 ", "25.0", "1.0e-14"],
-    "reduce": ["sector, nodal diameter 9", "159.2", "damper", "port freedoms"],
+    "reduce": ["sector, nodal diameter 9", "159.2", "damper", "port dofs"],
     "report": ["best of these loads: 50 N"],
     "response": [
         "no damper",

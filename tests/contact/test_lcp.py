@@ -66,7 +66,7 @@ def test_the_fallback_was_needed_and_agrees():
         U, S, V = lcp.held_directions(R)
         reduced = (V.T @ load) / S
         f, _, _, _, settled = lcp._primal_dual(C, g0, U, reduced, np.ones(len(g0), bool), 60)
-        twin = lcp._primal(C, g0, U, reduced)
+        twin = lcp._primal_active_set(C, g0, U, reduced)
         assert twin[4]
         cycled += not settled
         if settled:

@@ -13,7 +13,12 @@ from wedge import wedge_mesh
 import bladefem
 from bladefem.contact.complementarity import solve_lcp
 from bladefem.contact.face_profile import seat_gap
-from bladefem.contact.hertz import FINEST, contact_modulus, line_width, point_radius
+from bladefem.contact.hertz import (
+    MIN_ELEMENTS_PER_RADIUS,
+    contact_modulus,
+    line_width,
+    point_radius,
+)
 from bladefem.contact.patch import make_patch, patch_means
 from bladefem.contact.peak_pressure import narrow_sentence, peak_remarks
 from bladefem.contact.seating import solve
@@ -91,13 +96,15 @@ def bodies():
 
 @pytest.mark.parametrize(("shift", "error"), [(0.0, 0.01), (0.5, 0.02)])
 def test_two_elements_in_the_half_width_give_the_peak(shift, error):
-    """FINEST, wherever the nodes lie: measured 0.8 and 1.7 %; with one element 12 and 28 %."""
-    half = graded(A / FINEST, 2.5 * A, 15 * A, 1.4)
-    mesh = facing_blocks(np.r_[-half[:0:-1], half], graded(A / FINEST, 0.5 * A, 15 * A, 1.4))
+    """The allowed mesh, wherever its nodes lie: 0.8 and 1.7 %; with one element 12 and 28 %."""
+    half = graded(A / MIN_ELEMENTS_PER_RADIUS, 2.5 * A, 15 * A, 1.4)
+    mesh = facing_blocks(
+        np.r_[-half[:0:-1], half], graded(A / MIN_ELEMENTS_PER_RADIUS, 0.5 * A, 15 * A, 1.4)
+    )
     patch, e = make_patch(mesh, "this"), modulus(*STEEL)
     C = sum(compliances(mesh, patch, *STEEL, clamped))
     gap = patch_means(patch, mesh).T @ (
-        (mesh.points[:, 0] - shift * A / FINEST) ** 2 / (2 * RADIUS)
+        (mesh.points[:, 0] - shift * A / MIN_ELEMENTS_PER_RADIUS) ** 2 / (2 * RADIUS)
     )
     s = solve_lcp(C, gap, -np.ones((len(C), 1)), [-np.pi * e * A**2 / (4 * RADIUS)])
     assert (s.force / patch.area).max() == pytest.approx(e * A / (2 * RADIUS), rel=error)

@@ -45,7 +45,7 @@ def test_a_dead_build_is_named(monkeypatch, tmp_path):
     with pytest.raises(
         NotSolvedError, match=r"never finished; .* libffcx|never finished; delete .*forms_1\.c$"
     ):
-        compat._patiently(build, patience=2)
+        compat._wait_for_build(build, patience=2)
 
 
 def test_other_errors_pass():
@@ -53,7 +53,7 @@ def test_other_errors_pass():
         raise RuntimeError("something else")
 
     with pytest.raises(RuntimeError, match="something else"):
-        compat._patiently(build)
+        compat._wait_for_build(build)
 
 
 def test_compiling_is_silent_and_leaves_logging_alone(caplog):
@@ -65,6 +65,6 @@ def test_compiling_is_silent_and_leaves_logging_alone(caplog):
         logging.getLogger().setLevel(logging.DEBUG)
         return 1
 
-    assert compat._patiently(build) == 1
+    assert compat._wait_for_build(build) == 1
     assert (root.level, list(root.handlers)) == before
     assert not caplog.records

@@ -41,9 +41,9 @@ def test_out_of_memory(bar, monkeypatch):
     ],
 )
 def test_codes_in_words(code, words):
-    assert words in mumps._reason(code, 7, 1000) and f"INFOG(1) = {code}" in mumps._reason(
+    assert words in mumps._failure_reason(
         code, 7, 1000
-    )
+    ) and f"INFOG(1) = {code}" in mumps._failure_reason(code, 7, 1000)
 
 
 def test_petsc_without_mumps(bar, monkeypatch):

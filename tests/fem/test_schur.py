@@ -30,7 +30,7 @@ def test_one_sweep_each_way_equals_two_solves(n, columns):
     B = np.random.default_rng(1).standard_normal((size, columns)) + (1j if n == 1 else 0)
     assert rim.core.bridge is not None
     X = np.zeros_like(B)
-    X[rim.inner], X[rim.masters] = core._twice(rim, B)
+    X[rim.inner], X[rim.masters] = core._solve_two_sweeps(rim, B)
     np.testing.assert_allclose(core.solve(rim, B), X, atol=1e-11 * abs(X).max())
 
 
@@ -73,7 +73,7 @@ def test_given_order_gives_the_same_modes(monkeypatch):
     nothing else.
     """
     own = opened()
-    monkeypatch.setattr(ordering, "WORTHWHILE", 0)
+    monkeypatch.setattr(ordering, "MIN_METIS_UNKNOWNS", 0)
     given = opened()
     found, kept = given.opened.core, own.opened.core
     assert kept.order is None and found.factor.ordering == 1

@@ -55,7 +55,7 @@ def test_a_lost_mode_is_noticed_and_found():
     found = {p.con.nodal_diameter: p for p in eigenpairs(t, 6, [0, 1, 2])}
     whole = found[1]
     found[1] = wheel.Eigenpairs(whole.flex, np.delete(whole.lam, 2), np.delete(whole.X, 2, axis=1))
-    repaired = wheel._proved(t, dict(found), 6)[1]
+    repaired = wheel._check_inertia(t, dict(found), 6)[1]
     np.testing.assert_allclose(repaired.lam[:6], whole.lam[:6], rtol=1e-10)
 
 

@@ -61,7 +61,7 @@ def test_the_second_try_takes_the_other_algorithm_and_smaller_elements(monkeypat
         asked.append(scene.mesh)
         return "crashed (signal 11)" if len(asked) == 1 else build_here(scene)
 
-    monkeypatch.setattr(apart, "_ask", ask)
+    monkeypatch.setattr(apart, "_ask_child", ask)
     assert isinstance(build(SCENE), Mesh)
     assert [(m.algorithm, m.size) for m in asked] == [
         ("hxt", 6e-3),
@@ -77,7 +77,7 @@ def test_a_mistake_in_the_child_is_not_hidden():
 def test_the_child_sees_nothing_of_the_ranks(monkeypatch):
     for name in ("OMPI_COMM_WORLD_RANK", "PMIX_RANK", "PMI_SIZE"):
         monkeypatch.setenv(name, "1")
-    assert not [name for name in apart._environment() if name.startswith(apart.MPI)]
+    assert not [name for name in apart._child_environment() if name.startswith(apart.MPI)]
 
 
 def test_flat_cells_are_refused_with_their_place():

@@ -18,7 +18,7 @@ from geometry.fitted_wedge import flanks_between
 from geometry.parameters import DEG, Aerofoil, Disc, MeshSize, Platform, Shank, Wedge
 from geometry.profile import profile
 from geometry.session import gmsh_session
-from geometry.step_file import FittedDamper, _import, read_step, rotation
+from geometry.step_file import FittedDamper, _import_shapes, read_step, rotation
 
 AXIS = np.array([0.0, 0.0, 1.0])
 SIZE = MeshSize(size=0.02, order=1)
@@ -41,7 +41,7 @@ def mesh(step):
 def seat_corners(side: int) -> np.ndarray:
     """(4, 3) of the parametric sector's seat, +1 towards +y."""
     shape = profile(BLADE[1], BLADE[2], BLADE[3], Wedge())
-    (xi, yi), (xo, yo), z = shape.inner, shape.outer, Wedge().length / 2
+    (xi, yi), (xo, yo), z = *shape.seats[0], Wedge().length / 2
     rows = [[xi, side * yi, -z], [xo, side * yo, -z], [xo, side * yo, z], [xi, side * yi, z]]
     return np.array(rows)
 
@@ -52,7 +52,7 @@ def test_seats_and_damper_are_those_of_the_parametric_sector(mesh):
         corners = seat_corners(side)
         assert np.allclose(points.min(axis=0), corners.min(axis=0), atol=1e-9)
         assert np.allclose(points.max(axis=0), corners.max(axis=0), atol=1e-9)
-    wedge = profile(BLADE[1], BLADE[2], BLADE[3], Wedge()).wedge
+    wedge = profile(BLADE[1], BLADE[2], BLADE[3], Wedge()).damper
     x, y = wedge.T
     area = abs(x @ np.roll(y, -1) - y @ np.roll(x, -1)) / 2
     assert volume(mesh, "damper") == pytest.approx(area * Wedge().length, rel=1e-9)
@@ -90,11 +90,11 @@ def test_twenty_variations_are_fitted(tmp_path):
         shape = profile(platform, BLADE[2], BLADE[3], wedge)
         on = rotation(AXIS, 2 * pi / BLADE[3].sectors)
         with gmsh_session() as gmsh:
-            _import(gmsh, file, 1.0)
+            _import_shapes(gmsh, file, 1.0)
             flanks = flanks_between(gmsh, 14, 11, wedge, width, on, AXIS)
         assert flanks.width == pytest.approx(width, rel=1e-9)
         assert flanks.length == pytest.approx(wedge.length, rel=1e-9)
-        outer = np.array([*shape.outer, -wedge.length / 2])
+        outer = np.array([*shape.seats[0, 1], -wedge.length / 2])
         mirrored = on @ (outer * [1, -1, 1])
         assert np.allclose(flanks.ends[0, 1], outer, atol=1e-9)
         assert np.allclose(flanks.ends[1, 1], mirrored, atol=1e-9)
@@ -120,7 +120,7 @@ def test_what_does_not_fit_is_refused(step, seats, wedge, width, said):
 @pytest.mark.parametrize(
     ("changes", "said"),
     [
-        ({"seat_width": "5 mm"}, "expected beside imported.seats"),
+        ({"seat_width": "5 mm"}, "expected together with imported.seats"),
         ({"seats": ["a", "b"]}, "imported.sectors = 0: expected the number of blades"),
         ({"seats": ["a"], "sectors": 36}, "expected 2 values"),
     ],

@@ -58,7 +58,7 @@ def test_volume_of_the_blade_is_the_sum_of_its_parts(coarse_sector):
     sag = d.rim_radius**2 * np.arcsin(half / d.rim_radius)
     under = sag + half * np.sqrt(d.rim_radius**2 - half**2)  # of the shank's width, below the rim
     neck = ((d.rim_radius + s.height) * s.width - under) * s.length
-    plate = np.array([shape.inner, shape.outer, shape.corner])
+    plate = np.vstack([shape.seats[0], shape.corners[:1]])
     slab = abs(shoelace(np.vstack([plate, plate[::-1] * [1, -1]]))) * p.length
     stations = np.linspace(0, 1, 201)
     chords = (1 - stations) * a.chord_root + stations * a.chord_tip
@@ -281,6 +281,15 @@ def test_fillet_is_a_quarter_groove_round_the_root():
     assert mesh.report["min scaled jacobian"] > 0.1
 
 
+@pytest.mark.parametrize(("asked", "over"), [({}, 2), ({"fillet_elements": 3}, 3)])
+def test_fillet_is_a_grid_of_elements_over_its_arc(asked, over):
+    """A closed grid of n rows has (n + 1) / (2 n) corner nodes a triangle. Where the number is left
+    open it is 4 at the automatic size, 3.1 mm, and in proportion otherwise.
+    """
+    faces = build(MeshSize(size=6e-3, **asked), aerofoil={"fillet": 2e-3}).faces["fillet"]
+    assert 2 * over * len(np.unique(faces[:, :3])) == (over + 1) * len(faces)
+
+
 @pytest.mark.parametrize(
     "changes, field",
     [
@@ -309,6 +318,8 @@ def test_slope_of_the_platform_at_the_midplane():
     blades.
     """
     shape = profile(*[PARTS[k] for k in ("platform", "shank", "disc", "wedge")])
-    for x, y in (shape.outer, shape.corner):
+    for x, y in (shape.seats[0, 1], shape.corners[0]):
         assert (x * tan(shape.theta) - y) * cos(shape.theta) == pytest.approx(Platform().gap / 2)
-    assert np.linalg.norm(shape.outer - shape.inner) == pytest.approx(Platform().seat_width)
+    assert np.linalg.norm(shape.seats[0, 1] - shape.seats[0, 0]) == pytest.approx(
+        Platform().seat_width
+    )

@@ -8,6 +8,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from models import block, wedge_between_masses
+from plain import marched_wedge
 
 from bladefem.data import Elements
 from bladefem.errors import InputError
@@ -102,57 +103,12 @@ def test_without_excitation_the_model_rests_in_the_preload_state():
     assert found.f[:, 1, 0] == pytest.approx([20.0, -15.0], rel=1e-12)
 
 
-def integrated(model, omega, periods, ramp, steps=800):
-    """Plain explicit integration of the wedge between two masses, from the preload state at rest
-    with a force that grows over some periods: displacement of the first mass (steps,), mean forces
-    (2, 2) normal and tangential of the last period, and whether each contact slipped in it.
-    """
-    a = np.radians(40.0)
-    first = np.array([[0.0, -np.sin(a), np.cos(a)], [0.0, np.cos(a), np.sin(a)]])
-    W = np.zeros((4, 4))
-    # coordinates: masses along y, wedge along x, y; relative displacement mass minus wedge
-    W[:2, 0] = [np.cos(a), np.sin(a)]
-    W[:2, 2:] = -first[:, 1:]
-    W[2:, 1] = [-np.cos(a), -np.sin(a)]
-    W[2:, 2:] = [[np.sin(a), np.cos(a)], [-np.cos(a), np.sin(a)]]
-    mass = np.array([10.0, 10.0, 0.1, 0.1])
-    K = np.diag([1e6, 4e5, 1e6, 1e6])
-    K[0, 1] = K[1, 0] = -1e5
-    C = 200.0 * np.eye(4)
-    e = model.elements
-    t0 = e.traction[:, 0]
-    static = np.column_stack([e.n0, t0]).ravel()
-    dt = 2 * np.pi / omega / steps
-    q, v = np.zeros(4), np.zeros(4)
-    friction, before = t0.copy(), np.zeros(2)
-    force = np.zeros(4)
-    moved, carried, slips = np.empty(steps), np.zeros((2, 2)), np.zeros(2, dtype=bool)
-    for step in range(periods * steps):
-        w = W @ q
-        normal = np.maximum(e.n0 + e.kn * w[::2], 0.0)
-        trial = friction + e.kt * (w[1::2] - before)
-        limit = e.mu * normal
-        friction = np.clip(trial, -limit, limit)
-        before = w[1::2]
-        force[::2], force[1::2] = normal, friction
-        push = -W.T @ (force - static) - K @ q - C @ v
-        grown = min(1.0, step / (ramp * steps))
-        push[0] += grown * model.excitation[1][0] * np.cos(omega * step * dt)
-        v = v + dt * push / mass
-        q = q + dt * v
-        if step >= (periods - 1) * steps:
-            moved[step % steps] = q[0]
-            carried += np.column_stack([normal, friction]) / steps
-            slips |= np.abs(trial) > limit
-    return moved, carried, slips
-
-
 @pytest.mark.parametrize("t0", [(-40.0, 30.0), (20.0, 5.0)])
 def test_marching_in_time_ends_where_the_balance_with_its_tractions_is(t0):
     model = wedge_between_masses(60.0, damping=200.0)
     model = replace(model, elements=replace(model.elements, t0=np.array(t0)[:, None]))
     omega = 2 * np.pi * 57.0
-    moved, carried, slips = integrated(model, omega, periods=50, ramp=15)
+    moved, carried, slips = marched_wedge(model, omega, periods=50, ramp=15)
     assert slips.sum() == 1
     settled = replace(model, start=model.elements.traction + 0.0)
     sticking = ~slips

@@ -33,7 +33,11 @@ PERIODS = 120
 @pytest.fixture(scope="module")
 def wheel():
     """The wedge scene on a coarse mesh, by its modes alone."""
-    scene = load_scene("scenes/wedge.toml", ["mesh.size=14 mm", "mesh.seat_elements=4"])
+    # with the fillet the wave at this mesh is still not steady after 180 periods
+    scene = load_scene(
+        "scenes/wedge.toml",
+        ["mesh.size=14 mm", "mesh.seat_elements=4", "aerofoil.fillet=0 mm"],
+    )
     mesh = build_mesh(scene)
     bodies = Bodies(scene, mesh)
     patches = found_patches(scene, mesh, excited=True)

@@ -13,7 +13,7 @@ import xarray as xr
 
 import bladefem
 from bladefem.data import ModeSet
-from bladefem.errors import InputError
+from bladefem.errors import InputError, StageMissingError
 from bladefem.io.stage_cache import write_results
 from bladefem.report.response_arrays import (
     curve_arrays,
@@ -23,7 +23,14 @@ from bladefem.report.response_arrays import (
 )
 from bladefem.scene.tables import Scene
 from bladefem.scene.toml import dump
-from bladefem.study.pipeline.pipeline import Response, Run
+from bladefem.study.pipeline import pipeline
+from bladefem.study.pipeline.run_records import (
+    ModalRun,
+    Response,
+    Run,
+    SolvedRun,
+    folder_of,
+)
 from geometry.mesh import Mesh
 
 sys.path.insert(0, str(Path(__file__).parents[1] / "view"))
@@ -186,10 +193,45 @@ def test_a_run_in_memory_is_short_too():
     mesh = Mesh(np.zeros((4000, 3)), "tetra", {"blade": cells})
     modes = ModeSet(np.array([100.0, 300.0]), np.zeros((2, 4000, 3)), 9, np.zeros(2))
     best = SimpleNamespace(load=80.0, peak_amplitude=2e-4)
-    run = Run(Scene(title="A <run>"), None, mesh, [modes], response=Response(None, [best], ()))
-    assert repr(run) == "<bladefem run of 'A <run>' in memory: mesh, modes, response>"
+    run = SolvedRun(
+        scene=Scene(title="A <run>"),
+        folder=None,
+        mesh=mesh,
+        modes=[modes],
+        contact=None,
+        strength=None,
+        settings=None,
+        reduced=None,
+        response=Response(None, [best], ()),
+        damped={},
+    )
+    stages = "mesh, modes, contact, reduced, response"
+    assert repr(run) == f"<bladefem run of 'A <run>' in memory: {stages}>"
     assert len(repr(mesh)) < 200
     page = run._repr_html_()
     assert "nodal diameter 9" in page
     assert "200 µm under 80 N" in page
     assert "A &lt;run&gt;" in page
+
+
+def test_a_result_of_a_later_stage_is_missed_in_one_sentence(tmp_path):
+    """A shorter run says which stage finds the result, not "NoneType has no attribute"."""
+    found = {"scene": Scene(title="Short"), "folder": tmp_path, "mesh": None}
+    with pytest.raises(StageMissingError, match="'modes' is found by the stage 'modes'"):
+        _ = Run(**found).modes
+    modal = ModalRun(**found, modes=[])
+    with pytest.raises(InputError, match="'response'.*expected a run that reached it.*mesh, modes"):
+        _ = modal.response
+    assert not hasattr(modal, "reduced")
+    with pytest.raises(AttributeError, match="'ModalRun' object has no attribute 'solutions'"):
+        _ = modal.solutions
+
+
+def test_files_of_a_run_in_memory_are_refused():
+    with pytest.raises(InputError, match="made in memory, expected a folder"):
+        folder_of(Run(scene=Scene(title="Short"), folder=None, mesh=None))
+
+
+def test_an_unknown_stage_is_refused_before_any_work():
+    with pytest.raises(InputError, match="until = 'respons'.*did you mean 'response'"):
+        pipeline.run(Scene(), None, until="respons")

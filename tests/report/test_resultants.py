@@ -73,7 +73,13 @@ def test_contact_alone_leaves_all_maps(tmp_path, monkeypatch):
     import xarray as xr
 
     maps = pressed()
-    seated = pipeline.Run(Scene(), tmp_path, None, contact=pipeline.Seating(None, maps))
+    seated = pipeline.SeatedRun(
+        scene=Scene(),
+        folder=tmp_path,
+        mesh=None,
+        modes=[],
+        contact=pipeline.Seating(None, maps),
+    )
     monkeypatch.setattr(pipeline, "run", lambda *_, **__: seated)
     result = pressure.run(Scene(), tmp_path)
     assert "tables and picture" in result.timings

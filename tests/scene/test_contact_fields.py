@@ -65,7 +65,7 @@ def test_seats_and_units(tmp_path):
         (
             "wedge",
             ["contact.edge_radius=40 mm", "contact.bedded=false"],
-            "contact.edge_width: expected beside",
+            "contact.edge_width: expected together with",
         ),
         ("wedge", ["contact.wear_coefficient=1 mm"], "not a unit of this field, expected m.3/J"),
         ("wedge", ["model.samples=0"], "model.samples = 0: .* in plane models only"),

@@ -24,6 +24,11 @@ while [ "${1#-}" != "$1" ]; do case "$1" in -n) n=$2; shift 2 ;; --bind-to) shif
 echo "ranks $n"
 exec "$@" "on $n"
 """
+# Prints its name; the one whose name is in FAIL ends with 1.
+LINTER = """#!/bin/sh
+echo "linter ${0##*/} $*"
+case "${0##*/}" in "${FAIL:-nothing}") exit 1 ;; esac
+"""
 
 
 @pytest.fixture
@@ -35,11 +40,14 @@ def place(tmp_path):
         ("setup.sh", "#!/bin/sh\nexit ${SETUP_CODE:-0}\n"),
         (".venv/bin/python", PYTHON),
         (".venv/bin/mpirun", MPIRUN),
+        *((f".venv/lint/bin/{tool}", LINTER) for tool in ("ruff", "mypy", "lint-imports")),
     ):
         path = tmp_path / name
         path.parent.mkdir(parents=True, exist_ok=True)
         path.write_text(text)
         path.chmod(path.stat().st_mode | stat.S_IXUSR)
+    # the linters count as installed
+    shutil.copy(ROOT / ".ci" / "lint.txt", tmp_path / ".venv" / "lint" / "installed.txt")
     return tmp_path
 
 
@@ -134,3 +142,32 @@ def test_a_failure_in_any_pass_fails_the_whole(failing, place):
 def test_a_pass_without_tests_is_a_failure_unless_tests_were_selected(place):
     assert run(place, "test", FAIL="on 4", CODE="5").returncode == 1
     assert run(place, "test", "-k", "units", FAIL="on 4", CODE="5").returncode == 0
+
+
+def test_all_linters_run_and_each_can_fail_the_whole(place):
+    tools = ["ruff format", "ruff check", "mypy", "lint-imports"]
+    done = run(place, "lint")
+    assert done.returncode == 0
+    said = [line for line in done.stdout.splitlines() if line.startswith("linter ")]
+    assert all(line.startswith(f"linter {tool}") for line, tool in zip(said, tools, strict=True))
+    for failing in ("ruff", "mypy", "lint-imports"):
+        done = run(place, "lint", FAIL=failing)
+        assert done.returncode == 1
+        assert done.stdout.count("linter ") == 4
+
+
+def test_linters_are_installed_again_when_their_versions_change(place):
+    (place / ".ci" / "lint.txt").write_text("mypy==0.0\n")
+    done = run(place, "lint")
+    assert done.stdout.startswith("python -m venv") and done.returncode != 0
+
+
+def test_ci_runs_linters_and_tests_and_fails_with_either(place):
+    for failing, code in (("mypy", 1), ("on 4", 1), ("nothing", 0)):
+        env = {**os.environ, "FAIL": failing, "CODE": "1"}
+        done = subprocess.run(
+            ["sh", place / ".ci" / "run"], capture_output=True, text=True, env=env
+        )
+        assert done.returncode == code
+        assert done.stdout.count("linter ") == 4
+        assert done.stdout.count("python") == 3

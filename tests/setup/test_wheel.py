@@ -83,5 +83,5 @@ def test_a_numpy_that_dolfinx_was_not_compiled_for_is_named(tmp_path):
     done = subprocess.run(
         [sys.executable, "-c", code], env=environment, capture_output=True, text=True, check=False
     )
-    assert done.stdout.startswith("dolfinx cannot be loaded beside numpy"), done.stderr
+    assert done.stdout.startswith("dolfinx cannot be loaded with numpy"), done.stderr
     assert "bladefem[run,debian12]" in done.stdout

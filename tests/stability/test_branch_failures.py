@@ -1,13 +1,20 @@
-"""Where a curve of converged points is not what the blade does (F30, F31): a motion that time
-leaves, a damper that walks. Truth is a plain march written here. F29, the peak beyond a fold,
-stands in tests/hbm/test_branches.py.
+"""Where a curve of converged points is not what the blade does (F30 to F33): a motion that time
+leaves, a damper that walks, a period that doubles, a preload that is not unique. Truth is a plain
+march in time. F29, the peak beyond a fold, is in tests/hbm/test_branches.py.
 """
+
+from dataclasses import replace
 
 import numpy as np
 import pytest
+from models import wedge_between_masses
+from plain import marched_wedge
 
 from bladefem.data import Elements, RigidBody
+from bladefem.hbm.history_interval import history_interval
+from bladefem.hbm.linear_resonances import stuck_resonances
 from bladefem.hbm.model import Damping, ReducedModel
+from bladefem.hbm.peak import find_peak
 from bladefem.hbm.solve import solve
 from bladefem.hbm.stability import STABLE, UNSTABLE, stability_verdict
 from bladefem.hbm.sweep import size
@@ -108,3 +115,40 @@ def test_F31_a_damper_that_walks():
     assert len(set(np.sign(steps))) == 1
     # the contact is 60 times as stiff as the blade: the step hangs on high harmonics
     assert point.drift * 2 * np.pi / omega == pytest.approx(abs(steps).mean(), rel=0.03)
+
+
+@pytest.mark.parametrize("omega", [2.8, 3.0])
+def test_F32_a_gap_that_answers_every_second_period(omega):
+    """A stop that is not touched at rest: the motion of one period, which the balance finds to
+    1e-9, is left within a few periods, for one of two periods and another height.
+    """
+    model = rebounding(10.0, 0.1, 0.04)
+    point = solve(model, omega, 15, 1024)
+    assert point.converged and point.residual < 1e-9
+    found = stability_verdict(model, point)
+    assert (found.verdict, found.bifurcation) == (UNSTABLE, "period doubling")
+    q, v = state_at_start(point)
+    seen = bounced(10.0, 0.1, 0.04, omega, 1.001 * q, v, 120)
+    assert abs(seen[0] - seen[1]).max() < 0.02 * np.ptp(seen[0])
+    every_second = abs(seen[-1] - seen[-3]).max() / np.ptp(seen[-1])
+    every_period = abs(seen[-1] - seen[-2]).max() / np.ptp(seen[-1])
+    assert every_second < 0.02 < 0.3 < every_period
+    assert np.ptp(seen[-2:]) > 4 * np.ptp(seen[0])
+
+
+def test_F33_a_preload_that_is_not_unique():
+    """A node that never slips keeps the friction force that assembly left: two histories, two
+    motions in time. One balance knows one of them; its interval holds both.
+    """
+    model = wedge_between_masses(10.0)
+    peak = find_peak(model, stuck_resonances(model)[0], 3, 256)
+    assert peak.solution.converged and peak.solution.residual < 1e-9
+    found = history_interval(model, peak)
+    heights = []
+    for start in (found.lowest_start, found.highest_start):
+        moved, _, _ = marched_wedge(replace(model, start=start), peak.omega, 240, 150, 300, 20.0)
+        heights.append(2 * abs(np.fft.rfft(moved)[1]) / len(moved))
+    assert heights[1] > 1.04 * heights[0]
+    assert heights[0] > 0.98 * found.lowest.height
+    assert heights[1] < 1.02 * found.highest.height
+    assert abs(np.log(heights[0] / peak.height)) > 0.03

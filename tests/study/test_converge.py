@@ -21,7 +21,7 @@ from bladefem.study.modes.effective_mass import effective_masses
 from bladefem.study.modes.mesh_convergence import (
     BELIEVED,
     RATIOS,
-    _summary,
+    _convergence_summary,
     converge,
     default_sizes,
     fitted,
@@ -127,13 +127,13 @@ def test_an_order_that_no_element_has_is_not_believed():
     points = pd.DataFrame(
         {"size": [2.0, 1.4, 1.0], "mode": 1, "frequency": [130.0, 103.0, 100.0], "mac": 1.0}
     )
-    row = _summary(points).iloc[0]
+    row = _convergence_summary(points).iloc[0]
     assert (
         "order 6.1 is none" in row["reason"]
         and row["limit"] == 100
         and row["error"] == pytest.approx(0.09)
     )
-    assert "MAC 0.50" in _summary(points.assign(mac=0.5)).iloc[0]["reason"]
+    assert "MAC 0.50" in _convergence_summary(points.assign(mac=0.5)).iloc[0]["reason"]
 
 
 def test_wrong_sizes():

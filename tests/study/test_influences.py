@@ -84,11 +84,11 @@ def test_friction_acts_through_its_product_with_the_normal_force(found):
 
 def test_seat_friction_of_a_wedge():
     """F / (2 (sin a +- mu cos a)) over F / (2 sin a); a self-locking wedge has no range."""
-    low, high = seat_friction_range(0.3, np.radians(65))
+    low, high = seat_friction_range(0.3, (np.radians(65), np.radians(65)))
     sine, cosine = np.sin(np.radians(65)), np.cos(np.radians(65))
     assert low == pytest.approx(sine / (sine + 0.3 * cosine))
     assert high == pytest.approx(sine / (sine - 0.3 * cosine))
-    assert seat_friction_range(0.6, np.radians(30)) is None
+    assert seat_friction_range(0.6, (np.radians(30), np.radians(30))) is None
 
 
 @pytest.mark.parametrize(

@@ -20,7 +20,7 @@ def test_known_parameters_come_back():
     frequency, damping = joint_curve(TRUE, a)
     found = fit_joint(a, frequency, damping)
     np.testing.assert_allclose(found.values, TRUE, rtol=0.02)
-    assert found.known.all() and "tell all" in found.sentence()
+    assert found.known.all() and "determine all" in found.sentence()
     assert ((found.intervals[:, 0] <= TRUE) & (TRUE <= found.intervals[:, 1])).all()
 
 
@@ -29,7 +29,7 @@ def test_micro_slip_alone_does_not_tell_the_full_slip():
     frequency, damping = joint_curve(TRUE, a)
     found = fit_joint(a, frequency, damping)
     assert not found.known[PARAMETERS.index("full_slip")]
-    assert "do not tell" in found.sentence() and "full_slip" in found.sentence()
+    assert "do not determine" in found.sentence() and "full_slip" in found.sentence()
     # what it can tell is right all the same: one level further
     further = joint_curve(TRUE, np.array([9e-5]))
     predicted = joint_curve(found.values, np.array([9e-5]))

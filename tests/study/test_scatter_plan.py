@@ -10,7 +10,7 @@ import pandas as pd
 import pytest
 
 from bladefem.cli.main import main
-from bladefem.cli.study import _one, _planned
+from bladefem.cli.study import _make_plan, _run_options
 from bladefem.errors import InputError
 from bladefem.io.run_folder import borrow_stages
 from bladefem.report.study import Variant
@@ -28,7 +28,7 @@ def options(vary=(), scatter=(), samples=4):
 
 
 def test_two_fields_make_a_grid():
-    plan = _planned(options(["damper.angle=50, 60 deg", "contact.mu=0.2, 0.3, 0.4"]))
+    plan = _make_plan(options(["damper.angle=50, 60 deg", "contact.mu=0.2, 0.3, 0.4"]))
     assert plan.names == ("damper.angle", "contact.mu")
     assert len(plan.runs) == 6
     assert plan.runs[1] == ("50 deg", "0.3")
@@ -73,11 +73,11 @@ def test_samples_fill_the_ranges_evenly():
 )
 def test_bad_plans_are_refused(given, said):
     with pytest.raises(InputError, match=said):
-        _planned(given)
+        _make_plan(given)
 
 
 def test_folders_are_named_by_their_values(tmp_path):
-    one = _one(options(), tmp_path, ["damper.angle", "contact.mu"], ["50 deg", "0.3"])
+    one = _run_options(options(), tmp_path, ["damper.angle", "contact.mu"], ["50 deg", "0.3"])
     assert one.output.endswith("damper.angle=50deg,contact.mu=0.3")
     assert one.overrides == ["damper.angle=50 deg", "contact.mu=0.3"]
 

@@ -6,11 +6,11 @@ import pytest
 import synthetic
 from test_pictures import ink
 
+from bladefem.scene.kinds import kind_named
 from bladefem.scene.tables import Scene
 from bladefem.study.modes.crossings import campbell_crossings, fold
 from bladefem.view.convergence import draw_convergence
 from bladefem.view.maps import draw_map
-from bladefem.view.parts import PARTS
 from bladefem.view.speed import (
     draw_campbell,
     draw_interference,
@@ -90,7 +90,7 @@ def test_maps_name_methods_and_cross_failures(folder):
 )
 def test_drawings_label_every_parameter(kind, part, table, skipped, folder):
     scene = Scene(kind=kind)
-    figure = PARTS[kind][part](scene, folder / f"{part}.png")
+    figure = kind_named(kind).pictures[part](scene, file=folder / f"{part}.png")
     names = set(type(getattr(scene, table)).__dataclass_fields__) - skipped
     missing = {name for name in names if name not in texts(figure)}
     assert not missing

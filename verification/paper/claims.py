@@ -73,6 +73,11 @@ def element(folder: Path) -> Iterator[Claim]:
         verdict(abs(same - 1) < 1e-5),
     )
     yield _printed_damping()
+    yield from _varying_loads(folder, work(loop))
+
+
+def _varying_loads(folder: Path, whole: float) -> Iterator[Claim]:
+    """Fig. 4, and the printed law; ``whole`` is the work of a period under constant load [J]."""
     pictures = {}
     ratio = {}
     loops = {}
@@ -102,7 +107,7 @@ def element(folder: Path) -> Iterator[Claim]:
         "Limit 10 N + 6 N sin; the law as printed, with H(0) = 1, loses part of the loop, since "
         "it cannot stick again while the load falls.",
     )
-    frozen = work(printed_loop(1e6, 1.0, (10.0, 0.0), 30e-6, (1, 1), 16384, at_zero=0)) / work(loop)
+    frozen = work(printed_loop(1e6, 1.0, (10.0, 0.0), 30e-6, (1, 1), 16384, at_zero=0)) / whole
     yield Claim(
         "Eq. 19-21",
         "the rate law gives the friction force for any load",

@@ -5,7 +5,7 @@ iterations.
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING
 
 import matplotlib
 import numpy as np
@@ -15,6 +15,9 @@ from matplotlib.patches import Patch as Swatch
 from matplotlib.ticker import MaxNLocator
 
 from bladefem.view.style import canvas
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
 
 LOST = {"false": "#D55E00", "no convergence": "#222222", "diverged": "#CC79A7"}
 SHADES = "Blues"
@@ -76,7 +79,7 @@ def draw_outcomes(
         return figure
 
 
-def _draw(ax: Any, part: pd.DataFrame, y: str, norm: LogNorm) -> None:
+def _draw(ax: Axes, part: pd.DataFrame, y: str, norm: LogNorm) -> None:
     """Cells shaded by iterations, or in the colour of their failure."""
     cells = part.pivot_table(index=y, columns="load", values="iterations", aggfunc="last")
     words = part.pivot(index=y, columns="load", values="outcome").to_numpy()

@@ -12,6 +12,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from inspect import signature
+from typing import Any
 
 import numpy as np
 from llvmlite import ir
@@ -344,5 +345,6 @@ def kernel(write: Callable) -> Callable:
         return result(*[t if isinstance(t, kept) else types.int64 for t in given]), generate
 
     # the names of the arguments, which Numba counts
-    typed.__signature__ = signature(write)
-    return intrinsic(typed)
+    described: Any = typed
+    described.__signature__ = signature(write)
+    return intrinsic(described)

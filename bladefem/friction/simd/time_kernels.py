@@ -49,7 +49,7 @@ def find_edges(
 
     Rows: direction u (2), 1/length, decay over half an edge, x dln(decay)/dx, 1/limit; of the map
     of the half-angle vector (P, Q) its elements 11, 12 = 21, 22 and determinant; of the form in P
-    and Q whose sign tells whether slip goes on its factors of P^2, P Q and -Q^2; of the map of this
+    and Q whose sign shows whether slip goes on its factors of P^2, P Q and -Q^2; of the map of this
     edge and the next its elements 11, 12, 21, 22. Lengths and limits are forces [N].
     """
     mu = code.spread(mu)

@@ -107,8 +107,7 @@ def _add_damper(
     if isinstance(model.damper, RigidBody):
         B = model.damper.B[model.rows]
         G[1:] -= (B @ np.linalg.solve(model.damper.mass, B.T)) / orders[1:, None, None] ** 2
-    elif model.damper is not None:
-        damper = model.elastic_damper(len(orders) - 1)
+    elif (damper := model.elastic_damper(len(orders) - 1)) is not None:
         G += receptance_block(
             damper, modal_flexibility(damper, orders), damper.contact, damper.contact
         )
@@ -158,9 +157,9 @@ def rigid_motions(
     loads = blades.shapes[0, blades.load][:, still].real.T @ model.loads(0)[0].real
     if isinstance(model.damper, RigidBody):
         motions.append(-model.damper.B[model.rows])
-    elif model.damper is not None:
-        damper = model.elastic_damper(0)
-        motions.append(-damper.shapes[0, damper.contact][:, damper.omega[0] == 0].real)
+    elif (damper := model.elastic_damper(0)) is not None:
+        loose = damper.omega[0] == 0
+        motions.append(-damper.shapes[0, damper.contact][:, loose].real)
     B = np.column_stack(motions)
     if B.shape[1] == 0:
         return B, np.zeros(0), np.zeros((0, 0))

@@ -8,6 +8,7 @@ with the shapes that they give the relative displacement.
 from __future__ import annotations
 
 from collections.abc import Callable
+from functools import reduce
 from typing import NamedTuple
 
 import numpy as np
@@ -86,8 +87,9 @@ def _pack_bodies(model: ReducedModel, H: int) -> Bodies | None:
     if not policy.uses_compiled_point(model, H):
         return None
     bodies = [model.blades(H)]
-    if isinstance(model.damper, tuple):
-        bodies.append(model.elastic_damper(H))
+    damper = model.elastic_damper(H)
+    if damper is not None:
+        bodies.append(damper)
     blades = bodies[0]
     loads = model.loads(H)
     springs = model.springs.ravel()
@@ -101,7 +103,7 @@ def _pack_bodies(model: ReducedModel, H: int) -> Bodies | None:
     )
     spare = ((0, 0), (0, 0), (0, contact.shape[2] - blades.shapes.shape[2]))
     load, probe = (np.pad(blades.shapes[:, rows], spare) for rows in (blades.load, blades.probe))
-    residual = sum(b.residual[:, b.contact, b.contact] for b in bodies)
+    residual = reduce(np.add, [b.residual[:, b.contact, b.contact] for b in bodies])
     direct, straight = (
         (blades.residual[:, rows, blades.load] @ loads[:, :, None])[:, :, 0]
         for rows in (blades.contact, blades.probe)
@@ -110,7 +112,7 @@ def _pack_bodies(model: ReducedModel, H: int) -> Bodies | None:
     fixed = (
         frequency_independent_parts(residual, contact, springs)
         if policy.updates_by_modes(dofs, contact.shape[2])
-        else [np.zeros((0, 0, 0))] * 4
+        else (np.zeros((0, 0, 0)),) * 4
     )
     parts = [
         contact,
@@ -128,18 +130,20 @@ def _pack_bodies(model: ReducedModel, H: int) -> Bodies | None:
     mean = _mean_flexibility(
         (own[0], contact[0], residual[0]), (push[0], direct[0]), (springs, B, g)
     )
-    return Bodies(
-        own,
-        viscous,
-        hysteretic,
-        *(np.ascontiguousarray(part, dtype=complex) for part in parts),
-        *_one_for_all(fixed, dofs),
-        common_motions(model, H),
-        *mean,
-        np.ascontiguousarray(B),
-        g,
-        np.ascontiguousarray(rigid[: len(still)]),
-        still,
+    return Bodies._make(
+        [
+            own,
+            viscous,
+            hysteretic,
+            *(np.ascontiguousarray(part, dtype=complex) for part in parts),
+            *_one_for_all(fixed, dofs),
+            common_motions(model, H),
+            *mean,
+            np.ascontiguousarray(B),
+            g,
+            np.ascontiguousarray(rigid[: len(still)]),
+            still,
+        ]
     )
 
 

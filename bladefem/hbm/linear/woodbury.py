@@ -15,6 +15,7 @@ solving anew costs m^3.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import reduce
 
 import numpy as np
 
@@ -94,7 +95,7 @@ def bodies_of(model: ReducedModel, harmonics: int) -> tuple[Stack, ...]:
 
 def _constant_parts(bodies: tuple[Stack, ...], springs: np.ndarray) -> LowRank:
     size = max(len(body.shapes) for body in bodies)
-    R = sum(body.residual[:, body.contact, body.contact] for body in bodies)
+    R = reduce(np.add, [body.residual[:, body.contact, body.contact] for body in bodies])
     L = np.concatenate(
         [
             np.broadcast_to(

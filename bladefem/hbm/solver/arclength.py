@@ -17,6 +17,7 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from ...errors import NotSolvedError
+from ...util.newton import iterate_newton
 from ..parameter_derivatives import residual_rate
 from .newton import Options, newton
 from .newton_krylov import Memory
@@ -153,35 +154,32 @@ def _correct_point(
     """
     size = _step_size(task, spot)
     dw, dx = direction
-    guess = spot.state.w + step * size * dw, spot.x + step * task.width * dx
-    w, x = guess
-    for iteration in range(MOST_CORRECTIONS + 1):
-        balance = replace(task.balance(x), walk=spot.balance.walk)
-        state = evaluate_balance(balance, w)
-        if state.error <= task.options.tolerance:
-            break
-        if iteration == MOST_CORRECTIONS or not np.isfinite(state.error):
-            return None, f"corrector left a residual of {state.error:.1e}"
-        try:
-            inverse = linearise_balance(balance, state, task.memory)
-            back = inverse(state.residual)
-            along = inverse(residual_rate(balance, state, task.name))
-        except np.linalg.LinAlgError as error:
-            return None, str(error)
-        off = np.sum(dw * (w - guess[0])) / size + dx * (x - guess[1]) / task.width
+    walk = spot.balance.walk
+    guess = _guess_at(task, spot.x + step * task.width * dx, spot.state.w + step * size * dw, walk)
+
+    def advance(now: _Guess) -> _Guess:
+        inverse = linearise_balance(now.balance, now.state, task.memory)
+        back = inverse(now.state.residual)
+        along = inverse(residual_rate(now.balance, now.state, task.name))
+        w = now.state.w
+        off = np.sum(dw * (w - guess.state.w)) / size + dx * (now.x - guess.x) / task.width
         change = (np.sum(dw * back) / size - off) / (dx / task.width - np.sum(dw * along) / size)
-        w = w - back - change * along
-        x = x + change
-    if (
-        np.hypot(np.linalg.norm(w - guess[0]) / size, (x - guess[1]) / task.width)
-        > JUMP_GUARD * step
-    ):
+        return _guess_at(task, now.x + change, w - back - change * along, walk)
+
+    run = iterate_newton(
+        guess, lambda now: now.state.error, advance, task.options.tolerance, MOST_CORRECTIONS
+    )
+    if not run.converged:
+        return None, f"corrector: {run.reason}"
+    end = run.state
+    away = np.linalg.norm(end.state.w - guess.state.w) / size
+    if np.hypot(away, (end.x - guess.x) / task.width) > JUMP_GUARD * step:
         return None, "the corrector jumps"
-    fault = walk_fault(balance, state)
+    fault = walk_fault(end.balance, end.state)
     if fault:
         return None, fault
     try:
-        found = spot_at(task, x, balance, state, iteration, spot.sign)
+        found = spot_at(task, end.x, end.balance, end.state, run.iterations, spot.sign)
     except np.linalg.LinAlgError as error:
         return None, str(error)
     new_dw, new_dx = found.tangent(task, size)
@@ -189,6 +187,25 @@ def _correct_point(
     if abs(turn) < SMALLEST_COSINE and not corner and step > CORNER:
         return None, "the path turns too sharply"
     return (found if turn > 0 else replace(found, sign=-found.sign)), ""
+
+
+@dataclass(frozen=True)
+class _Guess:
+    """A point on the way back to the path."""
+
+    x: float
+    balance: Balance
+    state: State
+
+
+def _guess_at(
+    task: Task,
+    x: float,
+    w: np.ndarray,
+    walk: np.ndarray | None,
+) -> _Guess:
+    balance = replace(task.balance(x), walk=walk)
+    return _Guess(x, balance, evaluate_balance(balance, w))
 
 
 def _around_corner(

@@ -83,7 +83,7 @@ def _attempts_in_order(
     options: Options,
 ) -> Iterator[Attempt]:
     stick = start_in_stick(balance)
-    near = None
+    near: Newton | None = None
     for w in ([] if start is None else [start]) + [stick]:
         for method, merit in NEWTON_MERITS if runs_compiled(balance) else reversed(NEWTON_MERITS):
             end = newton(balance, w, options, merit)
@@ -91,6 +91,8 @@ def _attempts_in_order(
             near = end if near is None or end.state.error < near.state.error else near
     if not options.fallbacks:
         return
+    # the start in stick was tried in any case
+    assert near is not None
     for factor in (2, 4) if near.state.error < CLOSE_RESIDUAL else ():
         denser = replace(balance, samples=factor * balance.samples)
         yield Attempt("more samples", newton(denser, near.state.w, options), denser.samples)

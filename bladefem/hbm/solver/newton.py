@@ -10,6 +10,7 @@ import numpy as np
 
 from ...errors import InputError
 from ...friction.aft import Forces, contact_states, dissipated_energy
+from ...util.newton import NewtonRun, Outcome, halve_step, iterate_newton, outcome_reason
 from ..policy import (
     COMPILED_NEWTON,
     DENSE_LU,
@@ -20,11 +21,6 @@ from ..policy import (
 from .newton_compiled import (
     BY_ITERATIONS,
     BY_LU,
-    CONVERGED,
-    EXHAUSTED,
-    INFINITE,
-    SINGULAR,
-    STALLED,
     compiled_newton,
 )
 from .newton_krylov import Memory
@@ -209,8 +205,9 @@ def newton_as_given(
     if merit == "step" and runs_compiled(balance):
         return _run_compiled(balance, w, options)
     memory = Memory()
-    end = _newton_loop(balance, w, options, merit, memory)
-    return replace(end, route=route_of(NUMPY_NEWTON, memory.solvers))
+    run = _newton_loop(balance, w, options, merit, memory)
+    route = route_of(NUMPY_NEWTON, memory.solvers)
+    return Newton(run.state, run.iterations, run.converged, run.reason, route)
 
 
 def _newton_loop(
@@ -219,34 +216,18 @@ def _newton_loop(
     options: Options,
     merit: str,
     memory: Memory,
-) -> Newton:
+) -> NewtonRun[State]:
     """Newton with NumPy; memory takes what the linear solvers know."""
-    state = evaluate_balance(balance, w, "single")
-    for iteration in range(options.iterations + 1):
-        if state.error <= options.tolerance:
-            return Newton(state, iteration, True, "residual within tolerance")
-        if not np.isfinite(state.error):
-            return Newton(state, iteration, False, "residual is not finite")
-        if iteration == options.iterations:
-            break
-        try:
-            inverse = linearise_balance(balance, state, memory)
-        except np.linalg.LinAlgError:
-            return Newton(state, iteration, False, "singular Jacobian")
-        try:
-            better = _line_search(balance, state, inverse, merit)
-        except np.linalg.LinAlgError as error:
-            return Newton(state, iteration + 1, False, str(error))
-        if better is None:
-            return Newton(
-                state, iteration + 1, False, f"line search stalled at residual {state.error:.1e}"
-            )
-        state = better
-    return Newton(
-        state,
+
+    def advance(state: State) -> State | None:
+        return _line_search(balance, state, linearise_balance(balance, state, memory), merit)
+
+    return iterate_newton(
+        evaluate_balance(balance, w, "single"),
+        lambda state: state.error,
+        advance,
+        options.tolerance,
         options.iterations,
-        False,
-        f"residual {state.error:.1e} after {options.iterations} iterations",
     )
 
 
@@ -275,17 +256,12 @@ def _run_compiled(
         options.iterations,
         SHORTEST_STEP_SHARE,
     )
-    reasons = {
-        CONVERGED: "residual within tolerance",
-        EXHAUSTED: f"residual {error:.1e} after {steps} iterations",
-        STALLED: f"line search stalled at residual {error:.1e}",
-        SINGULAR: "singular Jacobian",
-        INFINITE: "residual is not finite",
-    }
+    outcome = Outcome(code)
+    reason = outcome_reason(outcome, error, steps)
     route = route_of(COMPILED_NEWTON, solvers_of(solver))
-    if code != CONVERGED:
+    if outcome is not Outcome.CONVERGED:
         state = evaluate_balance(balance, end.reshape(shape))
-        return Newton(state, steps, False, reasons[code], route)
+        return Newton(state, steps, False, reason, route)
     full = np.zeros_like(f)
     full[:, 2 - d :] = end.reshape(shape)
     forces = Forces(
@@ -299,7 +275,7 @@ def _run_compiled(
         "periodic",
     )
     state = State(end.reshape(shape), forces, p.reshape(shape), residual.reshape(shape), error)
-    return Newton(state, steps, True, reasons[code], route)
+    return Newton(state, steps, True, reason, route)
 
 
 def _line_search(
@@ -314,11 +290,13 @@ def _line_search(
         return None
     demand = 0.25 if merit == "step" else 1e-4
     before = np.linalg.norm(step if merit == "step" else state.residual)
-    share = 1.0
-    while share >= SHORTEST_STEP_SHARE:
-        trial = evaluate_balance(balance, state.w - share * step, "single")
+
+    def lowers_merit(trial: State, share: float) -> bool:
         after = inverse(trial.residual, 0.1) if merit == "step" else trial.residual
-        if np.linalg.norm(after) <= (1 - demand * share) * before:
-            return trial
-        share /= 2
-    return None
+        return bool(np.linalg.norm(after) <= (1 - demand * share) * before)
+
+    return halve_step(
+        lambda share: evaluate_balance(balance, state.w - share * step, "single"),
+        lowers_merit,
+        SHORTEST_STEP_SHARE,
+    )

@@ -2,8 +2,8 @@
 
 The springs of full stick inside A already are the preconditioner, with a second level for what the
 contacts move in common (`bladefem.hbm.solver.deflation`): compiled conjugate residuals mostly
-arrive in a few directions. Where they do not, GMRES does, at last with one complex block a harmonic
-that is factorised, with the part of dp/dw that keeps to its harmonic.
+converge in a few directions. Where they do not, GMRES does, at last with one complex block a
+harmonic that is factorised, with the part of dp/dw that keeps to its harmonic.
 """
 
 from __future__ import annotations

@@ -10,6 +10,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from itertools import takewhile
+from typing import Any
 
 import numpy as np
 from numba import njit
@@ -133,32 +134,38 @@ def _solve_points(
         strict=False,
     )
     # a damper that walks is left to the plain way
-    accepted = takewhile(lambda part: part[-1][2] <= CARRIED_SHARE, parts)
-    return [
-        Solution(
-            omega,
-            H,
-            samples,
-            *fields,
-            True,
-            "residual within tolerance",
-            "newton",
-            int(steps),
-            error,
-            moved,
-            pushed,
-            0.0,
-            dict(zip(NODE_STATES, states, strict=True)),
-            Work(*works),
-            route=route_of(COMPILED_POINT, solvers_of(int(solver))),
-        )
-        for omega, *fields, (steps, error, solver), states, (
-            moved,
-            pushed,
-            held,
-            *works,
-        ) in accepted
-    ]
+    accepted = takewhile(lambda point: point[-1][2] <= CARRIED_SHARE, parts)
+    return [_point_solution(H, samples, point) for point in accepted]
+
+
+def _point_solution(
+    H: int,
+    samples: int,
+    point: tuple[Any, ...],
+) -> Solution:
+    """A converged point as `_compiled_points` hands it out."""
+    omega, w, f, probe, end, states, measures = point
+    steps, error, solver = end
+    moved, pushed, _, *works = measures
+    return Solution(
+        omega=omega,
+        harmonics=H,
+        samples=samples,
+        w=w,
+        f=f,
+        probe=probe,
+        converged=True,
+        reason="residual within tolerance",
+        method="newton",
+        iterations=int(steps),
+        residual=error,
+        residual_displacement=moved,
+        residual_force=pushed,
+        drift=0.0,
+        states=dict(zip(NODE_STATES, states, strict=True)),
+        work=Work(*works),
+        route=route_of(COMPILED_POINT, solvers_of(int(solver))),
+    )
 
 
 @njit(cache=True, error_model="numpy")

@@ -140,7 +140,9 @@ def contact_forces(
     if missing == 0:
         return forces
     f = forces.f[:, missing:]
-    return replace(forces, f=f, dfdw=forces.dfdw[:, missing:, :, missing:] if jacobian else None)
+    return replace(
+        forces, f=f, dfdw=forces.jacobian[:, missing:, :, missing:] if jacobian else None
+    )
 
 
 def solved_balance(model: ReducedModel, solution: Solution) -> tuple[Balance, State]:
@@ -209,7 +211,7 @@ def force_change(
 ) -> np.ndarray:
     """(n, d, K) change of the contact forces by a change dw of the displacements."""
     n, d, K = dw.shape
-    change = state.forces.dfdw.reshape(n, d * K, d * K) @ dw.reshape(n, d * K, 1)
+    change = state.forces.jacobian.reshape(n, d * K, d * K) @ dw.reshape(n, d * K, 1)
     return change.reshape(dw.shape) + walking_force_change(balance, state, dw)
 
 
@@ -220,7 +222,7 @@ def transposed_force_change(
 ) -> np.ndarray:
     """(n, d, K) the transpose of `force_change` times y."""
     n, d, K = y.shape
-    back = state.forces.dfdw.reshape(n, d * K, d * K).swapaxes(1, 2) @ y.reshape(n, d * K, 1)
+    back = state.forces.jacobian.reshape(n, d * K, d * K).swapaxes(1, 2) @ y.reshape(n, d * K, 1)
     back = back.reshape(y.shape).copy()
     if balance.walk is not None:
         weights = np.array([np.vdot(rate, y) for rate in walk_rates(balance, state)])
@@ -514,7 +516,7 @@ def _motion_scale(linear: Linear) -> float:
 def _force_change(balance: Balance, state: State) -> np.ndarray:
     """(n, dK, dK) derivative of p."""
     n, d, K = state.w.shape
-    change = state.forces.dfdw.reshape(n, d * K, d * K).copy()
+    change = state.forces.jacobian.reshape(n, d * K, d * K).copy()
     change[:, np.arange(d * K), np.arange(d * K)] -= np.repeat(balance.model.springs, K, axis=1)
     return change
 
@@ -548,15 +550,15 @@ def _relative_error(
 ) -> float:
     linear = balance.linear
     r = as_amplitudes(residual)
-    size = np.linalg.norm(as_amplitudes(w))
+    size = float(np.linalg.norm(as_amplitudes(w)))
     scale = _motion_scale(linear)
     pressed = balance.model.compression
     if scale < SMALL_MOTION_RATIO * pressed:
         size = max(size, REST_MOTION_SHARE * pressed)
         scale = max(scale, REST_MOTION_SHARE * pressed)
-    with_springs = np.linalg.norm(r) / max(size, np.finfo(float).tiny)
+    with_springs = float(np.linalg.norm(r)) / max(size, float(np.finfo(float).tiny))
     r[1:] += _apply_flexibility(linear.G[1:], linear.springs * r[1:])
-    return float(max(with_springs, np.linalg.norm(r) / scale))
+    return max(with_springs, float(np.linalg.norm(r)) / scale)
 
 
 def _apply_flexibility(flexibility: np.ndarray, forces: np.ndarray) -> np.ndarray:

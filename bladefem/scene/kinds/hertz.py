@@ -6,7 +6,7 @@ from collections.abc import Iterator
 
 from ..tables import Scene
 from .conditions import at_most, below, one_of
-from .record import COMMON_TABLES, Kind
+from .record import COMMON_TABLES, Kind, SceneCall
 
 
 def conditions(scene: Scene) -> Iterator[str]:
@@ -41,6 +41,11 @@ KIND = Kind(
     has_blade=False,
     has_seats=False,
     has_one_tangent=True,
+    without_load="nothing presses the two bodies together",
+    check=SceneCall("geometry.contact_pairs:check_hertz", ("hertz", "mesh")),
+    cells=SceneCall("geometry.contact_pairs:count_hertz_cells", ("hertz", "mesh")),
+    preflight="bladefem.study.kinds.hertz:refuse_loads",
+    pictures={"hertz": SceneCall("bladefem.view.pairs:draw_hertz", ("hertz",))},
     conditions=conditions,
     thin_parts=thin_parts,
 )

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from dataclasses import replace
 from pathlib import Path
 
 from geometry.joined_files import split_entry
@@ -10,7 +11,7 @@ from geometry.joined_files import split_entry
 from ..part_materials import part_materials
 from ..tables import Scene
 from .conditions import known_diameters
-from .record import ENGINE_TABLES, Kind
+from .record import ENGINE_TABLES, Kind, SceneCall
 
 
 def conditions(scene: Scene) -> Iterator[str]:
@@ -49,7 +50,9 @@ def _seat_conditions(scene: Scene) -> Iterator[str]:
     imported = scene.imported
     if imported.seats is None:
         if imported.seat_width is not None:
-            yield "imported.seat_width: expected beside imported.seats, the faces of the seats"
+            yield (
+                "imported.seat_width: expected together with imported.seats, the faces of the seats"
+            )
         return
     if not is_drawing(scene):
         yield (
@@ -58,7 +61,7 @@ def _seat_conditions(scene: Scene) -> Iterator[str]:
         )
     if imported.sectors < 3:
         yield (
-            f"imported.sectors = {imported.sectors}: expected the number of blades beside "
+            f"imported.sectors = {imported.sectors}: expected the number of blades together with "
             "imported.seats, since the damper sits between two of them"
         )
     if scene.damper.clearance != 0:
@@ -73,6 +76,25 @@ def is_drawing(scene: Scene) -> bool:
     return Path(scene.imported.file).suffix.lower() in (".step", ".stp")
 
 
+def whole_paths(scene: Scene, folder: Path) -> Scene:
+    """The scene with whole paths of its files."""
+    imported = scene.imported
+    if not imported.file:
+        return scene
+    more = []
+    for entry in imported.more or ():
+        body, path = split_entry(entry)
+        whole = str((folder / path).resolve())
+        more.append(f"{body} = {whole}" if body else whole)
+    file = str((folder / imported.file).resolve())
+    return replace(scene, imported=replace(imported, file=file, more=tuple(more) or None))
+
+
+def input_files(scene: Scene) -> tuple[Path, ...]:
+    """The geometry's files."""
+    return (Path(scene.imported.file),)
+
+
 KIND = Kind(
     name="imported",
     tables=("imported", "damper", "mistuning", *ENGINE_TABLES),
@@ -82,6 +104,11 @@ KIND = Kind(
     table="bladefem.cli.tables:run_table",
     result="forced responses",
     has_one_tangent=True,
+    sectors="imported.sectors",
+    clearance_is_meshed=False,
+    check=SceneCall("geometry.imported_check:check_imported", ("imported",)),
     meshed_here=is_drawing,
+    whole_paths=whole_paths,
+    files=input_files,
     conditions=conditions,
 )

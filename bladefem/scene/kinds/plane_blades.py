@@ -6,7 +6,19 @@ from collections.abc import Iterator
 
 from ..tables import Scene
 from .conditions import at_most, below
-from .record import ENGINE_TABLES, Kind
+from .record import ENGINE_TABLES, Kind, SceneCall
+
+FACES = (
+    "clamp",
+    "pressure_side",
+    "seat_left",
+    "seat_right",
+    "suction_side",
+    "tip",
+    "tip_leading",
+    "tip_mid",
+    "tip_trailing",
+)
 
 
 def conditions(scene: Scene) -> Iterator[str]:
@@ -19,7 +31,7 @@ def conditions(scene: Scene) -> Iterator[str]:
         "plane.seat_width",
         plane.seat_width,
         (plane.platform_width - plane.thickness) / 2,
-        "the overhang of the platform beside the blade",
+        "the overhang of the platform next to the blade",
     )
     yield from below(
         "plane.platform_height",
@@ -40,6 +52,11 @@ def thin_parts(scene: Scene) -> dict[str, float]:
     }
 
 
+def face_names(_: Scene) -> tuple[str, ...]:
+    """Faces and node sets of the blade."""
+    return FACES
+
+
 KIND = Kind(
     name="plane blades",
     tables=("plane", *ENGINE_TABLES),
@@ -50,6 +67,11 @@ KIND = Kind(
     result="forced responses",
     has_one_tangent=True,
     damper_mass="plane.damper_mass",
+    is_plane=True,
+    check=SceneCall("geometry.plane:check_plane", ("plane",)),
+    cells=SceneCall("geometry.plane:count_plane_cells", ("plane", "mesh")),
+    face_names=face_names,
+    pictures={"plane": SceneCall("bladefem.view.parts:draw_plane", ("plane",))},
     conditions=conditions,
     thin_parts=thin_parts,
 )

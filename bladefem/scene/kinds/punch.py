@@ -6,7 +6,7 @@ from collections.abc import Iterator
 
 from ..tables import Scene
 from .conditions import below, one_of
-from .record import COMMON_TABLES, Kind
+from .record import COMMON_TABLES, Kind, SceneCall
 
 
 def conditions(scene: Scene) -> Iterator[str]:
@@ -34,6 +34,10 @@ KIND = Kind(
     has_blade=False,
     has_seats=False,
     has_one_tangent=True,
+    without_load="nothing presses the two bodies together",
+    check=SceneCall("geometry.contact_pairs:check_punch", ("punch", "mesh")),
+    cells=SceneCall("geometry.contact_pairs:count_punch_cells", ("punch", "mesh")),
+    pictures={"punch": SceneCall("bladefem.view.pairs:draw_punch", ("punch",))},
     conditions=conditions,
     thin_parts=thin_parts,
 )

@@ -2,17 +2,19 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
-from dataclasses import dataclass
+from collections.abc import Callable, Iterator, Mapping
+from dataclasses import dataclass, field
 from importlib import import_module
+from pathlib import Path
 from typing import Any
 
+from ..fields import value_at
 from ..tables import Scene
 
 # tables that every kind reads
 COMMON_TABLES = ("mesh", "material", "contact", "study", "model")
 # tables of the kinds that vibrate in an engine
-ENGINE_TABLES = (*COMMON_TABLES, "operation", "excitation", "solver", "support")
+ENGINE_TABLES = (*COMMON_TABLES, "operation", "excitation", "solver", "support", "fatigue")
 
 
 def no_conditions(_: Scene) -> Iterator[str]:
@@ -20,9 +22,34 @@ def no_conditions(_: Scene) -> Iterator[str]:
     return iter(())
 
 
+def no_files(_: Scene) -> tuple[Path, ...]:
+    """None."""
+    return ()
+
+
 def always(_: Scene) -> bool:
     """True."""
     return True
+
+
+def same_paths(scene: Scene, _: Path) -> Scene:
+    """The scene of a kind that names no file."""
+    return scene
+
+
+@dataclass(frozen=True)
+class SceneCall:
+    """A function that takes parts of a scene."""
+
+    # "module:function"; the module is loaded when it is called
+    function: str
+    # fields or tables of the scene
+    arguments: tuple[str, ...]
+
+    def __call__(self, scene: Scene, **others: Any) -> Any:
+        """The function's result; others are passed on by name."""
+        values = (value_at(scene, name) for name in self.arguments)
+        return load_function(self.function)(*values, **others)
 
 
 @dataclass(frozen=True)
@@ -53,6 +80,30 @@ class Kind:
     has_one_tangent: bool = False
     # field with the damper's mass where it is not the meshed one
     damper_mass: str = "damper.mass"
+    # a model in two dimensions: no length along the engine axis, no rotation
+    is_plane: bool = False
+    # field with the number of blades of the wheel
+    sectors: str | None = None
+    # angles [rad] of both flanks against the radial plane between two blades
+    flank_angles: Callable[[Scene], tuple[float, float]] | None = None
+    # damper.clearance is a gap of the mesh already
+    clearance_is_meshed: bool = True
+    # why a load of zero is refused
+    without_load: str = "a damper without load lifts off"
+    # refuses what cannot be drawn, by arithmetic on the shape's tables
+    check: SceneCall | None = None
+    # a lower bound of the number of cells
+    cells: SceneCall | None = None
+    # what a run would refuse later on and the scene alone can tell: "module:function" of it
+    preflight: str | None = None
+    # faces and node sets that a force can act on; None where a file names them
+    face_names: Callable[[Scene], tuple[str, ...]] | None = None
+    # drawings of the parameters by name, each taking ``file``
+    pictures: Mapping[str, SceneCall] = field(default_factory=dict)
+    # the scene with whole paths, from the folder that its own start from
+    whole_paths: Callable[[Scene, Path], Scene] = same_paths
+    # files that it reads
+    files: Callable[[Scene], tuple[Path, ...]] = no_files
     # whether elements are made here, so that their sizes can be studied
     meshed_here: Callable[[Scene], bool] = always
     # conditions between the fields of a scene, one sentence for each that does not hold

@@ -8,7 +8,23 @@ from math import cos, pi, sin, tan
 from ..tables import Scene
 from ..units import show
 from .conditions import at_most, below, known_diameters
-from .record import ENGINE_TABLES, Kind
+from .record import ENGINE_TABLES, Kind, SceneCall
+
+SHAPE = ("aerofoil", "platform", "shank", "disc", "damper")
+FACES = (
+    "clamp",
+    "cyclic_high",
+    "cyclic_low",
+    "pressure_side",
+    "seat_left",
+    "seat_right",
+    "suction_side",
+    "tip",
+    "tip_leading",
+    "tip_mid",
+    "tip_trailing",
+    "trailing_edge",
+)
 
 
 def conditions(scene: Scene) -> Iterator[str]:
@@ -42,8 +58,8 @@ def conditions(scene: Scene) -> Iterator[str]:
     yield from at_most(
         "platform.seat_width",
         platform.seat_width,
-        max(overhang, 0) / sin(damper.angle),
-        "what the overhang of the platform beside the shank leaves at damper.angle",
+        max(overhang, 0) / sin(max(damper.angles)),
+        "what the overhang of the platform next to the shank leaves at damper.angle",
     )
     yield from at_most(
         "damper.length", damper.length, platform.length, "platform.length, under which it sits"
@@ -77,15 +93,37 @@ def outer_radii(scene: Scene) -> dict[str, float]:
     return {"rim": rim, "tip": rim + scene.shank.height + scene.aerofoil.span}
 
 
+def flank_angles(scene: Scene) -> tuple[float, float]:
+    """Under this blade and under the next one [rad]."""
+    return scene.damper.angles
+
+
+def face_names(scene: Scene) -> tuple[str, ...]:
+    """Faces and node sets of the blade; the fillet is a face where it has a radius."""
+    return (*FACES, "fillet") if scene.aerofoil.fillet > 0 else FACES
+
+
 KIND = Kind(
     name="wedge sector",
-    tables=("aerofoil", "platform", "shank", "disc", "damper", "mistuning", *ENGINE_TABLES),
+    tables=(*SHAPE, "mistuning", *ENGINE_TABLES),
     builder="geometry.sector:wedge_sector",
-    shape=("aerofoil", "platform", "shank", "disc", "damper", "mesh"),
+    shape=(*SHAPE, "mesh"),
     runner="bladefem.report.run:run",
     table="bladefem.cli.tables:run_table",
     result="forced responses",
     has_seat_grid=True,
+    sectors="disc.sectors",
+    flank_angles=flank_angles,
+    check=SceneCall("geometry.sector_check:check_sector", SHAPE),
+    cells=SceneCall("geometry.sizing:count_sector_cells", (*SHAPE, "mesh")),
+    face_names=face_names,
+    pictures={
+        "aerofoil": SceneCall("bladefem.view.parts:draw_aerofoil", ("aerofoil",)),
+        "platform": SceneCall(
+            "bladefem.view.parts:draw_platform", ("platform", "shank", "disc", "damper")
+        ),
+        "sector": SceneCall("bladefem.view.parts:draw_disc", SHAPE),
+    },
     conditions=conditions,
     thin_parts=thin_parts,
     radii=outer_radii,

@@ -6,7 +6,7 @@ from collections.abc import Iterator
 
 from ..tables import Scene
 from .conditions import below
-from .record import COMMON_TABLES, Kind
+from .record import COMMON_TABLES, Kind, SceneCall
 
 
 def conditions(scene: Scene) -> Iterator[str]:
@@ -33,6 +33,9 @@ KIND = Kind(
     result="pressure and motion",
     has_blade=False,
     has_seats=False,
+    check=SceneCall("geometry.zmass:check_z_mass", ("z_mass",)),
+    cells=SceneCall("geometry.zmass:count_z_mass_cells", ("z_mass", "mesh")),
+    pictures={"z_mass": SceneCall("bladefem.view.parts:draw_z_mass", ("z_mass",))},
     conditions=conditions,
     thin_parts=thin_parts,
 )

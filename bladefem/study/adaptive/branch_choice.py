@@ -17,7 +17,7 @@ from ...hbm.branches import TOLERANCE
 from ...hbm.continuation import follow
 from ...hbm.solution import Solution, size
 from .family import Family, member
-from .indicators import ENOUGH, moved, richest
+from .indicators import ESTIMATE_OPTIONS, moved, richest
 from .settings import Settings
 
 # shares of the peak's height at which a point of the same piece is looked for
@@ -71,12 +71,12 @@ def peak_error(
         anchor = anchor_of(points, top, share)
         if anchor is top:
             continue
-        start = moved(family, settings, anchor, rich, ENOUGH)
+        start = moved(family, settings, anchor, rich, ESTIMATE_OPTIONS)
         if not start.converged:
             continue
         height = 0.0
         count = 0
-        options = replace(ENOUGH, tolerance=TOLERANCE, frugal=False)
+        options = replace(ESTIMATE_OPTIONS, tolerance=TOLERANCE, frugal=False)
         forward = top.omega > anchor.omega
         try:
             for point in follow(
@@ -104,7 +104,7 @@ def _error_below(
     """Relative error of the height of a point right below the peak."""
     for share in BELOW:
         point = anchor_of(points, top, share)
-        better = moved(family, settings, point, rich, ENOUGH)
+        better = moved(family, settings, point, rich, ESTIMATE_OPTIONS)
         if better.converged:
             return float(abs(size(better) - size(point)) / size(better))
     return float(np.inf)

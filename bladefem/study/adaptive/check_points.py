@@ -18,12 +18,12 @@ from .family import Family, member
 from .indicators import richer
 from .settings import Settings
 
-# of the peak's height: where a curve is checked on each side beside the peak itself
+# of the peak's height: where a curve is checked on each side in addition to the peak itself
 SHARES = (0.7, 0.25)
 # points that are checked because left-out harmonics move much there,
-LOUDEST = 3
+MAX_CHECKED_PEAKS = 3
 # from this share of the accuracy on
-QUIET = 0.1
+MIN_SHARE_OF_ACCURACY = 0.1
 # highest points among which one that is not unstable is looked for
 JUDGED = 100
 
@@ -38,9 +38,9 @@ def watched(
 
     The peak, one on each flank for each of SHARES of its height, the highest of the others at which
     contacts begin to slip or to lift, since a short slip needs more samples than a long one, the
-    highest at which more of them do, where the curve has a kink, and the LOUDEST maxima of the
-    motion by harmonics that were left out: internal resonances of higher harmonics keep to no
-    height.
+    highest at which more of them do, where the curve has a kink, and the MAX_CHECKED_PEAKS highest
+    maxima of the motion by harmonics that were left out: internal resonances of higher harmonics
+    keep to no height.
 
     Args:
         heights: (points,) what `heights_of` gives.
@@ -68,9 +68,9 @@ def watched(
     loud = loud * heights / heights[top]
     beside = np.concatenate([[0.0], loud, [0.0]])
     maxima = np.flatnonzero(
-        (loud > QUIET * accuracy) & (loud >= beside[:-2]) & (loud >= beside[2:])
+        (loud > MIN_SHARE_OF_ACCURACY * accuracy) & (loud >= beside[:-2]) & (loud >= beside[2:])
     )
-    chosen += sorted(maxima, key=lambda i: -loud[i])[:LOUDEST]
+    chosen += sorted(maxima, key=lambda i: -loud[i])[:MAX_CHECKED_PEAKS]
     return [good[i] for i in dict.fromkeys(chosen)]
 
 
@@ -86,13 +86,13 @@ def hidden(
         used: settings of each point.
     """
     moved = np.zeros(len(points))
-    groups = {}
+    groups: dict[tuple[Settings, int], list[int]] = {}
     for i, (settings, point) in enumerate(zip(used, points, strict=True)):
         if point.converged and point.states["stick"] < len(point.w):
             groups.setdefault((settings, point.harmonics), []).append(i)
     for (settings, harmonics), found in groups.items():
         more = richer(family, settings, "harmonics")
-        if more.harmonics > harmonics:
+        if more is not None and more.harmonics > harmonics:
             model = member(family, replace(more, modes=max(settings.modes, family.modes))).model
             moved[found] = truncation_indicator(model, [points[i] for i in found], more.harmonics)
     return moved

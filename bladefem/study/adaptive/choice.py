@@ -77,16 +77,21 @@ def choose(
         usual = likely(family, settings, accuracy, fixed)
         further = moved(family, settings, point, usual) if usual != settings else point
         settings, point = (usual, further) if further.converged else (settings, point)
+    found: Indicators
     for _ in range(ROUNDS):
-        found = judge(family, settings, point) if not apart else None
-        if found is None or found.total > accuracy / 2:
+        judged = None if apart else judge(family, settings, point)
+        if judged is not None and judged.total <= accuracy / 2:
+            found = judged
+        else:
             found = indicate(family, settings, point, known)
         settings = replace(settings, error=found.total)
-        better = (
-            None if found.total <= accuracy / 2 else following(settings, found, accuracy, fixed)
-        )
-        further = None if better is None else _solved(family, settings, point, better, found)
-        if further is None or not further.converged:
+        if found.total <= accuracy / 2:
+            break
+        better = following(settings, found, accuracy, fixed)
+        if better is None:
+            break
+        richer_point = _solved(family, settings, point, better, found)
+        if richer_point is None or not richer_point.converged:
             break
         known = {
             name: error
@@ -94,7 +99,7 @@ def choose(
             if (error := found.errors[name]) <= accuracy / 20
             and getattr(better, name) == getattr(settings, name)
         } | dict.fromkeys(found.unknown, np.inf)
-        point = further
+        point = richer_point
         settings = better
     return settings, point, found
 

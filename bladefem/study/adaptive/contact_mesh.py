@@ -26,24 +26,27 @@ from .settings import Settings
 
 # pressed nodes of a seat: 6 left an amplitude between stick and slip 37 % low, 11 19 %, 16 12 %, 21
 # 5 %
-FEW = 16
+MIN_NODES = 16
 
 
 def coarse_sentence(maps: Iterable[PressureMap]) -> str:
-    """A warning where fewer than FEW nodes of a plane seat, and not all, are pressed, else "".
+    """A warning where fewer than MIN_NODES nodes of a plane seat, and not all, are pressed, else
+    "".
 
     Args:
         maps: of the seats of a plane scene, under any loads.
     """
     pressed, nodes = min(
-        ((int(np.count_nonzero(m.force > 0)), len(m.force)) for m in maps), default=(FEW, FEW)
+        ((int(np.count_nonzero(m.force > 0)), len(m.force)) for m in maps),
+        default=(MIN_NODES, MIN_NODES),
     )
     # a seat that presses everywhere has no narrow contact to resolve
-    if pressed >= FEW or pressed == nodes:
+    if pressed >= MIN_NODES or pressed == nodes:
         return ""
     return (
         f"contact mesh: only {pressed} of {nodes} nodes of a seat are pressed; with fewer than "
-        f"{FEW} a resonance amplitude between stick and slip may be 10 to 40 % wrong, which the "
+        f"{MIN_NODES} a resonance amplitude between stick and slip may be 10 to 40 % wrong, which "
+        "the "
         "estimated errors do not contain; try a smaller mesh.contact_size"
     )
 

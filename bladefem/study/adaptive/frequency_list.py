@@ -25,15 +25,15 @@ from .settings import Settings, enriched
 # of richer settings, each round one point
 PASSES = 16
 # accuracy that the first sweep is made for where contacts may lift off
-COARSE = 0.02
+FIRST_SWEEP_ACCURACY = 0.02
 TINY = float(np.finfo(float).tiny)
-# neighbours for which a point that is less wrong than foretold speaks, and how much at most
-NEAR = 3
-LEAST = 0.25
+# neighbours for which a point that is less wrong than predicted speaks, and how much at most
+REPRESENTED_NEIGHBOURS = 3
+MIN_REDUCTION = 0.25
 # times the tolerated error that two steps of harmonics change, where one of them leaves half of it
 ONE_STEP = 4
 # neighbours that richer settings do not change, beyond which the others are left as they are
-QUIET = 2
+UNCHANGED_NEIGHBOURS = 2
 
 
 @dataclass
@@ -85,6 +85,41 @@ def along(
         InputError: no frequencies, or an accuracy that is none.
         NotSolvedError: no point converged.
     """
+    curve = _first_curve(family, omegas, settings, accuracy)
+    points = curve.points
+    final: set[int] = set()
+    known: dict[str, float] = {}
+    for _ in range(PASSES):
+        limit = curve.limit
+        wrong = _first_wrong(curve, limit, final)
+        if wrong is None:
+            break
+        found = indicate(family, curve.used[wrong], points[wrong], known)
+        better = following(curve.used[wrong], found, 2 * limit / curve.heights[wrong])
+        if better is not None:
+            _raise(curve, wrong, better, found)
+        # there is none, or it was not solved
+        if curve.used[wrong] != better:
+            final.add(wrong)
+        known = {name: found.errors[name] for name in KEPT if found.errors[name] <= accuracy / 20}
+    top, *_ = _judged(curve)
+    return Checked(
+        replace(curve.used[top], error=curve.errors[points[top].omega]), points, curve.errors
+    )
+
+
+def _first_curve(
+    family: Family,
+    omegas: Sequence[float],
+    settings: Settings,
+    accuracy: float,
+) -> _Curve:
+    """All points with the settings that points commonly need, none of them judged.
+
+    Raises:
+        InputError: no frequencies, or an accuracy that is none.
+        NotSolvedError: no point converged.
+    """
     if not len(omegas):
         raise InputError("omegas: none given, expected at least one circular frequency")
     if not 0 < accuracy < 1:
@@ -108,7 +143,7 @@ def along(
             f"{points[0].reason}"
         )
     used = [settings] * len(points)
-    curve = _Curve(
+    return _Curve(
         family,
         options,
         accuracy,
@@ -119,32 +154,19 @@ def along(
         {},
         set(),
     )
-    final: set[int] = set()
-    known: dict[str, float] = {}
-    for _ in range(PASSES):
-        limit = curve.limit
-        wrong = next(
-            (
-                i
-                for i in _judged(curve)
-                if curve.errors[points[i].omega] * curve.heights[i] > limit and i not in final
-            ),
-            None,
-        )
-        if wrong is None:
-            break
-        found = indicate(family, curve.used[wrong], points[wrong], known)
-        better = following(curve.used[wrong], found, 2 * limit / curve.heights[wrong])
-        if better is not None:
-            _raise(curve, wrong, better, found)
-        # there is none, or it was not solved
-        if curve.used[wrong] != better:
-            final.add(wrong)
-        known = {name: found.errors[name] for name in KEPT if found.errors[name] <= accuracy / 20}
-    top, *_ = _judged(curve)
-    return Checked(
-        replace(curve.used[top], error=curve.errors[points[top].omega]), points, curve.errors
-    )
+
+
+def _first_wrong(
+    curve: _Curve,
+    limit: float,
+    final: set[int],
+) -> int | None:
+    """The first judged point whose error [m] exceeds a limit, and which may still be refined."""
+    for i in _judged(curve):
+        error = curve.errors[curve.points[i].omega] * curve.heights[i]
+        if error > limit and i not in final:
+            return i
+    return None
 
 
 def _first(
@@ -158,17 +180,23 @@ def _first(
     With few modes the way may end on another of two solutions there, which were 0.17 % of the peak
     apart.
     """
-    fine, coarse = (likely(family, settings, told) for told in (accuracy, max(accuracy, COARSE)))
+    fine, coarse = (
+        likely(family, settings, told) for told in (accuracy, max(accuracy, FIRST_SWEEP_ACCURACY))
+    )
     model = member(family, fine).model
     if model.directions == model.elements.tangents:
         return fine
     led = replace(fine, harmonics=coarse.harmonics, samples=coarse.samples)
-    return enriched(led, "modes") or led if accuracy < COARSE and "modes" in led.chosen else led
+    return (
+        enriched(led, "modes") or led
+        if accuracy < FIRST_SWEEP_ACCURACY and "modes" in led.chosen
+        else led
+    )
 
 
 def _judged(curve: _Curve) -> Iterator[int]:
-    """Numbers of the points whose error is told: those that are watched, the peak first, then
-    others that tell it.
+    """Numbers of the points whose error is estimated: those that are watched, the peak first, then
+    others that show it.
     """
     places = {p.omega: i for i, p in enumerate(curve.points)}
     for point in watched(curve.points, curve.heights, curve.moved, curve.accuracy):
@@ -183,7 +211,7 @@ def _judged(curve: _Curve) -> Iterator[int]:
 
 
 def _confirm(curve: _Curve, i: int) -> None:
-    """Judge a point that was foretold to be too wrong.
+    """Judge a point that was predicted to be too wrong.
 
     Where it is more wrong than that, so are all the others of the same settings; less goes for its
     neighbours only: an error that changes its sign along the curve vanishes somewhere.
@@ -197,8 +225,8 @@ def _confirm(curve: _Curve, i: int) -> None:
         alike = (
             other.omega in curve.foretold and curve.used[j] == curve.used[i] and np.isfinite(true)
         )
-        if alike and (true > told or abs(j - i) <= NEAR):
-            curve.errors[other.omega] *= max(true / told, LEAST)
+        if alike and (true > told or abs(j - i) <= REPRESENTED_NEIGHBOURS):
+            curve.errors[other.omega] *= max(true / told, MIN_REDUCTION)
     curve.errors[point.omega] = true
     curve.foretold.discard(point.omega)
 
@@ -212,7 +240,7 @@ def _raise(
     """Solve a point with better settings, and its neighbours of the same settings as far as that
     changes them.
 
-    Where two steps of the harmonics at once are a matter of few points, one does beside them.
+    Where two steps of the harmonics at once are a matter of few points, one does next to them.
     """
     old = curve.used[at]
     limit = curve.limit
@@ -224,7 +252,7 @@ def _raise(
         gained = first.copy()
         settings = better
         for i in side:
-            if curve.used[i] != old or quiet == QUIET:
+            if curve.used[i] != old or quiet == UNCHANGED_NEIGHBOURS:
                 break
             changed[i] = _change(curve, i, settings, gained)
             quiet = quiet + 1 if changed[i] <= limit else 0

@@ -1,23 +1,19 @@
-"""How wrong is a solved point? The same point in a richer model tells, for each choice that was
+"""How wrong is a solved point? The same point in a richer model shows it, for each choice that was
 made.
 
 eta_d = |T_d - T| / |T_d|, where T is the first harmonic at the probe and T_d the same in the model
 enriched in direction d, solved from the point that is judged: a step or two where the contacts stay
-closed. One Newton step alone overshoots with lift-off (16 % told for 0.4 % on the wedge of 46
-nodes).
+closed. One Newton step alone would overshoot where they lift off (docs/stability.md, F23).
 
-Modes are doubled and samples taken four times; 1 and 3 harmonics are compared with 7 and 15
-(against 3 and 7 an internal resonance of a higher harmonic was missed, told 2.5e-4 for a true
-1.3e-3), from 7 on with twice as many; contact points with the finest ones, because a number half as
-large again can be blind (true error 45 % with an indicator of 1e-14).
+Modes are doubled and samples taken four times; 1 and 3 harmonics are compared with 7 and 15, since
+fewer miss internal resonances (F20), from 7 on with twice as many; contact points with the finest
+ones, because a number half as large again can be blind (F19).
 
-Where all contacts stick, friction is linear: harmonics and samples are exact, and are not looked
-at.
+Where all contacts stick, friction is linear: harmonics and samples are exact and need no look. A
+point, or a richer model of it, that was not solved gives no indicator: its error is unknown
+(infinite), and nothing is refined because of it.
 
-A point, or a richer model of it, that was not solved gives no indicator: its error is unknown
-(infinite), and nobody refines because of it.
-
-One model that is richer in all respects at once (`judge`) tells the whole error for the price of
+One model that is richer in all respects at once (`judge`) gives the whole error for the price of
 one; which respect is to blame takes one model each (`indicate`).
 """
 
@@ -36,8 +32,8 @@ from ...hbm.solver.newton import DEFAULTS, Options
 from .family import Family, carried, lowest_harmonics, member
 from .settings import DAMPERS, DIRECTIONS, Settings
 
-# for a point that only tells how wrong another one is
-ENOUGH = Options(1e-5, 30, fallbacks=False, frugal=True)
+# for a point that only estimates the error of another one
+ESTIMATE_OPTIONS = Options(1e-5, 30, fallbacks=False, frugal=True)
 
 
 @dataclass(frozen=True)
@@ -59,7 +55,7 @@ class Indicators:
 
     @property
     def unknown(self) -> tuple[str, ...]:
-        """Sources that tell nothing, because the richer model was not solved."""
+        """Sources without an estimate, because the richer model was not solved."""
         return tuple(name for name, error in self.errors.items() if not np.isfinite(error))
 
     @property
@@ -88,7 +84,7 @@ def indicate(
     for name in DIRECTIONS:
         other = None if name in errors else richer(family, settings, name)
         if other is not None:
-            better[name] = moved(family, settings, solution, other, ENOUGH)
+            better[name] = moved(family, settings, solution, other, ESTIMATE_OPTIONS)
             errors[name] = _change(family, settings, solution, better[name])
     return Indicators({name: errors.get(name, 0.0) for name in DIRECTIONS}, better)
 
@@ -117,13 +113,13 @@ def judge(
         if other is None:
             continue
         if _poorer(settings, other, name):
-            point = moved(family, settings, solution, other, ENOUGH)
+            point = moved(family, settings, solution, other, ESTIMATE_OPTIONS)
             errors[name] = _change(family, settings, solution, point)
         else:
             rich = replace(rich, **{name: getattr(other, name)})
             rich = replace(rich, samples=max(rich.samples, other.samples))
     if rich != settings:
-        better["together"] = moved(family, settings, solution, rich, ENOUGH)
+        better["together"] = moved(family, settings, solution, rich, ESTIMATE_OPTIONS)
         errors["together"] = _change(family, settings, solution, better["together"])
     return Indicators(errors, better)
 

@@ -1,6 +1,6 @@
 """Settings chosen by what is asked for: the height of a resonance, wherever richer models put it.
 
-The indicators of ``indicators.py`` compare the first harmonic at one frequency. Beside a steep
+The indicators of ``indicators.py`` compare the first harmonic at one frequency. Next to a steep
 resonance a shift of a tenth of a hertz changes it by tens of per cent, while the height of the peak
 stays the same to one per cent (8 contact points in place of 126 on the shipped wedge at 80 N: 37 %
 by the first, 0.8 % by the second). Here the peak is found again in every richer model, from the
@@ -25,19 +25,19 @@ from .settings import DIRECTIONS, Settings, enriched
 
 # enrichments of one peak before giving up
 ROUNDS = 8
-# of the accuracy: to which a peak that only tells an error is found
+# of the accuracy: to which a peak that only estimates an error is found
 SHARE = 0.05
 # of the accuracy: errors that are small enough together, and one that need not be lowered
-ENOUGH = 0.8
-LEAST = 0.05
+SUFFICIENT_SHARE = 0.8
+NEGLIGIBLE_SHARE = 0.05
 # unknowns of the largest balance that is chosen where contacts lift off: finer ones cost minutes a
 # curve there and lose points
 LIFTING = 1500
-# the same of a model that only tells an error there
+# the same of a model that only estimates an error there
 LIFTING_JUDGE = 3000
 # contact points of the model that judges, over those of the judged one
 MORE_POINTS = 4
-# weight of a relative shift of the frequency beside a relative change of the height: an accuracy
+# weight of a relative shift of the frequency against a relative change of the height: an accuracy
 # of 5 % holds the frequency to 0.5 %
 SHIFT_WEIGHT = 5.0
 
@@ -147,7 +147,7 @@ def judge_settings(
     ones; all of them cost 20 times as much on the shipped wedge.
     """
     other = richer(family, settings, name)
-    if name != "points" or other is None:
+    if name != "points" or other is None or settings.points is None:
         return other
     groups = member(family, settings).groups
     more = MORE_POINTS * settings.points
@@ -162,8 +162,8 @@ def choose_at_peak(
     accuracy: float,
     fixed: tuple[str, ...] = (),
 ) -> tuple[Settings, Peak, PeakErrors]:
-    """Settings whose estimated errors of height and frequency keep within ENOUGH of the accuracy,
-    or the best that may be chosen; the peak with them, and its errors.
+    """Settings whose estimated errors of height and frequency keep within SUFFICIENT_SHARE of the
+    accuracy, or the best that may be chosen; the peak with them, and its errors.
 
     Nothing is refined in a respect in which the richer model was not solved: its error is unknown.
 
@@ -197,12 +197,16 @@ def _next_settings(
     helps.
     """
     needs = {name: need for name, need in errors.needs.items() if np.isfinite(need)}
-    if sum(errors.needs.values()) <= ENOUGH * accuracy:
+    if sum(errors.needs.values()) <= SUFFICIENT_SHARE * accuracy:
         return None
     for name in sorted(needs, key=lambda name: -needs[name]):
-        if name not in settings.chosen or name in fixed or needs[name] <= LEAST * accuracy:
+        if (
+            name not in settings.chosen
+            or name in fixed
+            or needs[name] <= NEGLIGIBLE_SHARE * accuracy
+        ):
             continue
-        better = enriched(settings, name, needs[name] / (ENOUGH * accuracy))
+        better = enriched(settings, name, needs[name] / (SUFFICIENT_SHARE * accuracy))
         if better is not None and not _too_large(family, better, peak.solution, LIFTING):
             return better
     return None
@@ -213,7 +217,7 @@ def judge_too_large(
     other: Settings,
     point: Solution,
 ) -> bool:
-    """A model that only tells the error of a point where contacts lift off costs too much."""
+    """A model that only estimates the error of a point where contacts lift off costs too much."""
     return _too_large(family, other, point, LIFTING_JUDGE)
 
 

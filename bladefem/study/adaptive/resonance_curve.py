@@ -11,7 +11,14 @@ from ...errors import NotSolvedError
 from ...hbm.peak import Peak
 from ...hbm.solution import Solution
 from ...hbm.sweep import FOLLOWED, size
-from .check_points import LOUDEST, QUIET, SHARES, heights_of, hidden, peak_of
+from .check_points import (
+    MAX_CHECKED_PEAKS,
+    MIN_SHARE_OF_ACCURACY,
+    SHARES,
+    heights_of,
+    hidden,
+    peak_of,
+)
 from .choice import Checked, covered, sufficient
 from .family import Family, member
 from .indicators import moved, richer
@@ -129,13 +136,17 @@ def _checked_loud(
     points: Sequence[Solution],
     accuracy: float,
 ) -> dict[float, float]:
-    """Circular frequency -> estimated relative error by more harmonics, of the LOUDEST points
-    where harmonics that were left out move the contacts.
+    """Circular frequency -> estimated relative error by more harmonics, of the MAX_CHECKED_PEAKS
+    points where harmonics that were left out move the contacts.
     """
     share = heights_of(points) / size(peak_of(points))
     loud = hidden(family, [settings] * len(points), points) * share
-    order = np.argsort(-loud)[:LOUDEST]
-    chosen = [points[i] for i in order[loud[order] > QUIET * accuracy] if points[i].converged]
+    order = np.argsort(-loud)[:MAX_CHECKED_PEAKS]
+    chosen = [
+        points[i]
+        for i in order[loud[order] > MIN_SHARE_OF_ACCURACY * accuracy]
+        if points[i].converged
+    ]
     other = richer(family, settings, "harmonics")
     if other is None:
         return {}

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, replace
 from math import ceil, inf, log2, sqrt
+from typing import Any
 
 from ...scene.tables import Scene
 
@@ -13,8 +14,8 @@ DAMPERS = ("mass", "rigid", "elastic")
 DIRECTIONS = ("harmonics", "samples", "modes", "points", "damper")
 RICHEST = {"modes": 160, "harmonics": 31, "samples": 4096, "points": 4096}
 # how many times smaller an error has to be for two steps of the first harmonics at once
-STEEP = 40.0
-FIRST = {"modes": 10, "harmonics": 1, "samples": 64, "points": 4, "damper": "rigid"}
+DOUBLE_STEP_RATIO = 40.0
+FIRST: dict[str, Any] = {"modes": 10, "harmonics": 1, "samples": 64, "points": 4, "damper": "rigid"}
 
 
 @dataclass(frozen=True)
@@ -44,7 +45,7 @@ class Settings:
         if self.harmonics == 1:
             kind = (
                 "equivalent linearisation, which is the balance of one harmonic and whose error "
-                "the next ones tell,"
+                "the next ones estimate,"
             )
         if self.samples == 0:
             return (
@@ -128,7 +129,7 @@ def enriched(
     if value is None:
         return None
     if name == "harmonics":
-        more = 4 * value + 3 if value < 7 and need > STEEP else 2 * value + 1
+        more = 4 * value + 3 if value < 7 and need > DOUBLE_STEP_RATIO else 2 * value + 1
     elif name == "modes":
         more = 2 * value
     else:

@@ -25,6 +25,7 @@ from ...io.stage_cache import on_root
 from ...scene.kinds import kind_named
 from ...scene.tables import Scene
 from ...scene.validate import refuse_given_mesh
+from ...util.communicator import Communicator
 from ..adaptive.check_points import peak_of
 from ..adaptive.choice import covered
 from ..adaptive.family import member
@@ -52,7 +53,7 @@ PEAK = 0.01
 
 @dataclass(frozen=True)
 class Resonance:
-    """What one mesh tells."""
+    """What one mesh gives."""
 
     # [Hz]
     frequency: float
@@ -101,16 +102,14 @@ def mesh_variants(
     refuse_given_mesh(scene)
     power = drawn.dimension
     own = scene.mesh
-    base = own.size or min(sizes, default=None)
-    listed = [
-        (f"{1e3 * size:.3g} mm", size / base, replace(own, size=base))
-        for size in sorted(sizes, reverse=True)
-    ]
-    if not sizes:
+    if sizes:
+        base = own.size or min(sizes)
         listed = [
-            (f"{1e3 * base * ratio:.3g} mm" if base else f"own size x {ratio:g}", ratio, own)
-            for ratio in RATIOS
+            (f"{1e3 * size:.3g} mm", size / base, replace(own, size=base))
+            for size in sorted(sizes, reverse=True)
         ]
+    else:
+        listed = [(_size_name(own.size, ratio), ratio, own) for ratio in RATIOS]
     made = [
         MeshVariant(
             name,
@@ -147,7 +146,7 @@ def on_mesh(
     scene: Scene,
     settings: Settings,
     load: float,
-    comm: Any = None,
+    comm: Communicator | None = None,
 ) -> Resonance:
     """The resonance under one load on the scene's own mesh, with given settings of the balance.
 
@@ -164,7 +163,7 @@ def _resonance(
     scene: Scene,
     settings: Settings,
     load: float,
-    comm: Any,
+    comm: Communicator | None,
 ) -> Resonance:
     """On one mesh, its time left open."""
     mesh = build_mesh(scene, comm)
@@ -193,7 +192,7 @@ def mesh_table(
     variants: Sequence[MeshVariant],
     budget: float,
     remarks: list[str],
-    comm: Any = None,
+    comm: Communicator | None = None,
 ) -> pd.DataFrame:
     """One row a mesh: name, family, CPU time [s], dofs, errors against the richest one.
 
@@ -225,19 +224,23 @@ def mesh_table(
     return pd.DataFrame([_told(row, truth, doubt) for row in rows])
 
 
+def _size_name(size: float | None, ratio: float) -> str:
+    return f"{1e3 * size * ratio:.3g} mm" if size else f"own size x {ratio:g}"
+
+
 def _rows(
     scene: Scene,
     settings: Settings,
     load: float,
     variants: Sequence[MeshVariant],
     budget: float,
-    comm: Any,
+    comm: Communicator | None,
 ) -> Iterator[dict[str, Any]]:
     end = time.process_time() + budget
     last = None
     for variant in variants:
         last = last if last and last[0].order == variant.order else None
-        row = {
+        row: dict[str, Any] = {
             "name": variant.name,
             "order": variant.order,
             "found": None,
@@ -264,7 +267,7 @@ def _tried(
     scene: Scene,
     settings: Settings,
     load: float,
-    comm: Any,
+    comm: Communicator | None,
 ) -> dict[str, Any]:
     try:
         return {"found": on_mesh(scene, settings, load, comm)}

@@ -10,6 +10,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 
@@ -18,7 +19,7 @@ from ...damper.direct import direct
 from ...damper.paper import platform
 from ...data import PortModel, RigidBody
 from ...errors import InputError, NotSolvedError
-from ...hbm.model import ReducedModel
+from ...hbm.model import ReducedModel, rigid_damper
 from ...hbm.solve import solve
 from ...reduction.truncate import truncated
 from ...time.event_integrator import stuck_start
@@ -29,7 +30,7 @@ HARMONICS = (1, 3, 5, 7, 9, 15, 31)
 # most that are integrated at one frequency
 PERIODS = 500
 # relative difference of the damper's motion at its contacts that is none
-ALIKE = 1e-6
+RIGID_MOTION = 1e-6
 # frequency of the modes that stand for the residual flexibility, over the excitation's
 STIFF = 30.0
 
@@ -56,7 +57,7 @@ class Method:
 
 
 def methods(one_dimensional: bool) -> Iterator[Method]:
-    """All methods of the chart, from cheap to dear within each family."""
+    """All methods of the chart, from cheap to expensive within each family."""
     for H in HARMONICS:
         yield Method(f"H {H}", "balance, harmonics", balance(H, max(512, 32 * (H + 1))))
     for samples in (64, 128, 256, 1024, 4096):
@@ -87,7 +88,7 @@ def applicable(model: ReducedModel) -> str:
         )
     if not (isinstance(damper, RigidBody) and damper.mass.shape == (1, 1)):
         return "the damper is not a rigid mass with one freedom"
-    if np.ptp(damper.B[model.rows]) > ALIKE * abs(damper.B[model.rows]).max():
+    if np.ptp(damper.B[model.rows]) > RIGID_MOTION * abs(damper.B[model.rows]).max():
         return "the damper's motion is not along one direction on all contacts"
     if np.iscomplexobj(model.side(1).shapes):
         return "blades are not in phase"
@@ -104,7 +105,7 @@ def tangential(model: ReducedModel) -> ReducedModel:
         B = damper.B[model.rows]
         scale = float(B[0, 0]) or 1.0
         # joined points leave rounding
-        B = np.ones_like(B) if np.ptp(B) < ALIKE * abs(scale) else B / scale
+        B = np.ones_like(B) if np.ptp(B) < RIGID_MOTION * abs(scale) else B / scale
         damper = replace(damper, B=B, mass=damper.mass / scale**2)
     return replace(model, sides=sides, damper=damper)
 
@@ -115,7 +116,7 @@ def balance(H: int, samples: int) -> Callable[[ReducedModel, float, object], Poi
     def run(
         model: ReducedModel,
         omega: float,
-        start: object,
+        start: Any,
     ) -> Point:
         s = solve(model, omega, H, samples, start=start)
         return Point(complex(s.probe[1, 0]), s.converged, s.reason, s if s.converged else None)
@@ -136,7 +137,7 @@ def paper(H: int, averaged: bool) -> Callable[[ReducedModel, float, object], Poi
     def run(
         model: ReducedModel,
         omega: float,
-        start: object,
+        start: Any,
     ) -> Point:
         end = iterate(platform(model, omega, H), "amplitude", Rules(averaged=averaged))
         first = complex(end.probe[1, 0])
@@ -158,7 +159,7 @@ def integrated(steps: int, explicit: bool) -> Callable[[ReducedModel, float, obj
     def run(
         model: ReducedModel,
         omega: float,
-        start: object,
+        start: Any,
     ) -> Point:
         system = in_time(model, omega)
         try:
@@ -184,7 +185,7 @@ def integrated(steps: int, explicit: bool) -> Callable[[ReducedModel, float, obj
 def shooting(
     model: ReducedModel,
     omega: float,
-    start: object,
+    start: Any,
 ) -> Point:
     """Periodic solution of the exact flow."""
     system = in_time(model, omega)
@@ -194,7 +195,7 @@ def shooting(
     )
 
 
-def _fitting(start: object, system: System) -> object:
+def _fitting(start: Any, system: System) -> Any:
     """The last frequency's end, unless a mode has become a stiff one since."""
     return start if start is not None and len(start.q) == len(system.stiffness) else None
 
@@ -204,7 +205,7 @@ def in_time(model: ReducedModel, omega: float) -> System:
     (1 / STIFF)^2.
     """
     damping = model.damping
-    damper = model.damper
+    damper = rigid_damper(model)
     return blade_ring(
         _with_stiff_modes(model.side(1), STIFF * omega),
         float(np.mean(damping.ratio)),

@@ -1,5 +1,5 @@
-"""Variants of a chart solved on common frequencies, timed, and laid beside the reference; the cheap
-ones first.
+"""Variants of a chart solved on common frequencies, timed, and compared with the reference; the
+cheap ones first.
 
 What a variant costs is known only when it was tried. Each first gets a small share of the time; one
 that would take more is put back with the time of the frequency that it solved, and has its turn
@@ -14,16 +14,17 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from ...hbm.model import ReducedModel
+from ...util.curve_extremum import parabola_minimum
 from .cpu_clock import Clock
 from .methods import Point
 
 # times that a variant may cost more than the cheaper one of its kind before it
-DEARER = 3.0
+MAX_COST_STEP = 3.0
 # of the time that is left, for a variant of unknown cost
 SHARE = 0.1
 # times that the first frequencies, from rest or at the resonance, may cost more than the mean
-COLD = 2.0
-FEW = 3
+FIRST_CALL_FACTOR = 2.0
+MIN_FREQUENCIES = 3
 # shorter runs [s] are repeated so often at the most; the fastest counts
 BRIEF = 0.02
 REPEATS = 5
@@ -34,7 +35,7 @@ Solve = Callable[[ReducedModel, float, object], Point]
 
 @dataclass(frozen=True)
 class Peak:
-    """Responses on the common frequencies and the resonance that they tell."""
+    """Responses on the common frequencies and the resonance that they show."""
 
     # (k,) complex [m]
     first: np.ndarray
@@ -100,7 +101,7 @@ class _Known:
         job: Job,
     ) -> float:
         """Seconds a frequency; zero when nothing is known."""
-        cheaper = DEARER * self.kind.get(job.kind, 0.0) if job.ordered else 0.0
+        cheaper = MAX_COST_STEP * self.kind.get(job.kind, 0.0) if job.ordered else 0.0
         return self.own.get(number, cheaper)
 
 
@@ -111,11 +112,12 @@ def timed(
     allowed: tuple[float, float],
     clock: Clock,
 ) -> Timing:
-    """All frequencies, or as many as tell that they would take more than is allowed; the middle one
+    """All frequencies, or as many as show that they would take more than is allowed; the middle one
     first.
 
     Args:
-        allowed: seconds for all, as the first frequencies tell, and as more than FEW of them tell.
+        allowed: seconds for all, as the first frequencies show, and as more than MIN_FREQUENCIES of
+            them show.
     """
     begun = clock.now()
     # caches warm
@@ -132,7 +134,7 @@ def timed(
             points.append(run(model, omega, last))
             last = points[-1].start
             spent = clock.now() - begun
-            if spent / k * len(omegas) > allowed[k > FEW] and k < len(omegas):
+            if spent / k * len(omegas) > allowed[k > MIN_FREQUENCIES] and k < len(omegas):
                 return Timing(points, spent / k)
         best = min(best, spent / len(omegas))
         if spent > BRIEF:
@@ -164,8 +166,10 @@ def rows(
         ):
             done[k] = _lost(waiting.pop(k), known.own.get(k, np.nan), reason)
             continue
-        share = np.inf if job.needed else COLD * left if k in known.own else SHARE * left
-        allowed = share, min(left, COLD * share) if not job.needed else np.inf
+        share = (
+            np.inf if job.needed else FIRST_CALL_FACTOR * left if k in known.own else SHARE * left
+        )
+        allowed = share, min(left, FIRST_CALL_FACTOR * share) if not job.needed else np.inf
         timing = timed(job.model, job.run, job.bench.omegas, allowed, clock)
         if len(timing.points) < len(job.bench.omegas) and k not in known.own:
             known.own[k] = timing.seconds
@@ -191,7 +195,7 @@ def _too_dear(
     job: Job,
 ) -> str:
     """Why a job is not begun: a call cannot be cut short."""
-    if measured and seconds * len(job.bench.omegas) > COLD * left:
+    if measured and seconds * len(job.bench.omegas) > FIRST_CALL_FACTOR * left:
         return (
             f"left out: {seconds:.2g} s a frequency, {max(left, 0.0):.2g} s of the budget were left"
         )
@@ -255,17 +259,12 @@ def resonance(omegas: np.ndarray, first: np.ndarray) -> Peak:
     if not 0 < top < len(omegas) - 1 or min(height[top - 1 : top + 2]) == 0:
         return Peak(first, float(height[top]), float(omegas[top] / (2 * np.pi)), False)
     x = omegas[top - 1 : top + 2] ** 2
-    centre = x[1]
-    width = x[2] - x[0]
-    a, b, c = np.polyfit((x - centre) / width, 1 / height[top - 1 : top + 2] ** 2, 2)
-    if a <= 0:
+    vertex = parabola_minimum(x, 1 / height[top - 1 : top + 2] ** 2)
+    if vertex is None:
         return Peak(first, float(height[top]), float(omegas[top] / (2 * np.pi)), True)
-    vertex = -b / (2 * a)
-    low = c - b**2 / (4 * a)
+    place, low = vertex
     amplitude = low**-0.5 if low > 0 else height[top]
-    return Peak(
-        first, float(amplitude), float(np.sqrt(centre + width * vertex) / (2 * np.pi)), True
-    )
+    return Peak(first, float(amplitude), float(np.sqrt(place) / (2 * np.pi)), True)
 
 
 def errors(peak: Peak, truth: Peak) -> dict[str, float]:

@@ -7,12 +7,12 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
 from pathlib import Path
-from typing import Any
 
 from ...hbm.reference_blade import reference_model
 from ...io.stage_cache import on_root, stage
 from ...reduction.assemble import folded_diameter
 from ...scene.tables import Scene
+from ...util.communicator import Communicator
 from ..adaptive.family import Family, family_of
 from ..adaptive.settings import first_for, restarted
 from ..pipeline.pipeline import family_of_case, load_cases, reduced_sector, run
@@ -29,7 +29,7 @@ def scene_chart(
     scene: Scene,
     folder: str | Path,
     budget: float = 120.0,
-    comm: Any = None,
+    comm: Communicator | None = None,
     sizes: Sequence[float] | None = None,
 ) -> Chart:
     """The chart of a scene under the middle one of its loads; finished stages are picked up from

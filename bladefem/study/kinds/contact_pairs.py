@@ -1,5 +1,5 @@
 """The verification pairs, Hertz and flat punch: pressure under each load, and its closed form
-beside it.
+next to it.
 """
 
 from __future__ import annotations
@@ -7,7 +7,6 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 
@@ -17,6 +16,7 @@ from ...data import PressureMap
 from ...errors import InputError
 from ...io.stage_cache import stage
 from ...scene.tables import Scene
+from ...util.communicator import Communicator
 from ..pipeline.stage_inputs import stage_key
 from .hertz import hertz_pressure, hertz_radius, press_pair, second_moment_radius
 from .punch import Indented, indent, johnson_approach, johnson_pressure
@@ -46,7 +46,7 @@ class PairState:
 def solve_pair(
     scene: Scene,
     folder: str | Path | None = None,
-    comm: Any = None,
+    comm: Communicator | None = None,
 ) -> tuple[Mesh, list[PairState]]:
     """Mesh and states of a scene of kind "hertz" or "punch", on all ranks of a communicator.
 
@@ -54,7 +54,7 @@ def solve_pair(
         InputError: another kind of scene, or a load whose contact does not fit the mesh.
             NotSolvedError: the contact iteration stopped.
     """
-    kinds: dict[str, Callable[[Scene, Any], tuple[Mesh, list[PairState]]]] = {
+    kinds: dict[str, Callable[[Scene, Communicator | None], tuple[Mesh, list[PairState]]]] = {
         "hertz": _hertz,
         "punch": _punch,
     }
@@ -74,7 +74,7 @@ def radii(seat: PressureMap, dimension: int) -> np.ndarray:
     return np.linalg.norm(seat.patch.points[:, : dimension - 1], axis=1)
 
 
-def _hertz(scene: Scene, comm: Any) -> tuple[Mesh, list[PairState]]:
+def _hertz(scene: Scene, comm: Communicator | None) -> tuple[Mesh, list[PairState]]:
     found = press_pair(scene, comm)
     states = []
     for load, seat in found.maps.items():
@@ -94,7 +94,7 @@ def _hertz(scene: Scene, comm: Any) -> tuple[Mesh, list[PairState]]:
     return found.mesh, states
 
 
-def _punch(scene: Scene, comm: Any) -> tuple[Mesh, list[PairState]]:
+def _punch(scene: Scene, comm: Communicator | None) -> tuple[Mesh, list[PairState]]:
     found = indent(scene, comm)
     loads = scene.study.loads or (found.total,)
     given = scene.punch.interference

@@ -1,4 +1,4 @@
-"""A sphere or a cylinder pressed on a block, from its scene, and Hertz' closed form beside it.
+"""A sphere or a cylinder pressed on a block, from its scene, and Hertz' closed form next to it.
 
 Johnson, Contact Mechanics (1985), Sect. 4.2; P is the whole force, in the plane that on a metre of
 cylinder, and a the radius or half width of the contact (contact/hertz.py):
@@ -13,25 +13,25 @@ hardly the pressure.
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 
-from geometry.contact_pairs import WIDER
+from geometry.contact_pairs import SEAT_RATIO
 from geometry.mesh import Mesh
 
-from ...contact.complementarity import solve_lcp
-from ...contact.hertz import FINEST, contact_modulus, line_width, point_radius
+from ...contact.complementarity import LCPSolution, solve_lcp
+from ...contact.hertz import MIN_ELEMENTS_PER_RADIUS, contact_modulus, line_width, point_radius
 from ...contact.patch import initial_gap, make_patch, normal_ports, port_matrix
 from ...data import PressureMap
 from ...errors import InputError, NotSolvedError
 from ...scene.tables import Scene
 from ...scene.units import show
+from ...util.communicator import Communicator
 from ..pipeline.stages import build_mesh
 from .punch import flexibility
 
 # contact radius over the expected one, at most
-WIDEST = 0.9 * WIDER
+MAX_RADIUS_RATIO = 0.9 * SEAT_RATIO
 
 
 @dataclass(frozen=True)
@@ -46,7 +46,7 @@ class Pressed:
     approach: dict[float, float]
 
 
-def press_pair(scene: Scene, comm: Any = None) -> Pressed:
+def press_pair(scene: Scene, comm: Communicator | None = None) -> Pressed:
     """Press the pair of a scene of kind "hertz" with each of its loads.
 
     Raises:
@@ -62,30 +62,37 @@ def press_pair(scene: Scene, comm: Any = None) -> Pressed:
     mesh = build_mesh(scene, comm)
     patch = make_patch(mesh, "this")
     ports = normal_ports([patch], mesh)
-    C = 0.0
+    parts = []
     for name, material, held in (
         ("blade", scene.material.blade, "clamp"),
         ("damper", scene.material.damper, "load"),
     ):
         body = assemble(mesh, name, material, comm, plane="strain")
-        C = C + flexibility(body, port_matrix([patch], mesh, name)[:, ports], held)
+        parts.append(flexibility(body, port_matrix([patch], mesh, name)[:, ports], held))
+    C = parts[0] + parts[1]
     gap = initial_gap(patch, mesh)
     part = 4 if mesh.dimension == 3 else 2
+    if given is not None:
+        found = solve_lcp(C, gap - given)
+        _require_solved(scene, None, found)
+        load = part * float(found.force.sum())
+        _check_load(scene, load)
+        seat = PressureMap(patch, found.force, found.gap, found.residual)
+        return Pressed(mesh, {load: seat}, {load: given})
     maps = {}
     approach = {}
-    for wanted in loads if given is None else (None,):
-        found = (
-            solve_lcp(C, gap - given)
-            if wanted is None
-            else solve_lcp(C, gap, -np.ones((len(C), 1)), [-wanted / part])
-        )
-        if found.reason:
-            raise NotSolvedError(f"{_said(scene, wanted)}: {found.reason}")
-        load = part * float(found.force.sum()) if wanted is None else wanted
+    for load in loads:
+        found = solve_lcp(C, gap, -np.ones((len(C), 1)), np.array([-load / part]))
+        _require_solved(scene, load, found)
         _check_load(scene, load)
         maps[load] = PressureMap(patch, found.force, found.gap, found.residual)
-        approach[load] = given if wanted is None else float(found.rigid[0])
+        approach[load] = float(found.rigid[0])
     return Pressed(mesh, maps, approach)
+
+
+def _require_solved(scene: Scene, load: float | None, found: LCPSolution) -> None:
+    if found.reason:
+        raise NotSolvedError(f"{_said(scene, load)}: {found.reason}")
 
 
 def hertz_radius(scene: Scene, load: float) -> float:
@@ -123,6 +130,16 @@ def second_moment_radius(scene: Scene, seat: PressureMap) -> float:
     return float(np.sqrt((2.5 if dimension == 3 else 4.0) * (seat.force @ r**2) / seat.force.sum()))
 
 
+def refuse_loads(scene: Scene) -> None:
+    """Refuse loads whose contact does not fit the mesh; an interference has none.
+
+    Raises:
+        InputError: the load, and those that the mesh is made for.
+    """
+    if scene.hertz.interference is None:
+        check_loads(scene)
+
+
 def check_loads(scene: Scene) -> tuple[float, ...]:
     """The loads of the study, or the one that gives the expected contact radius.
 
@@ -139,7 +156,9 @@ def _check_load(scene: Scene, load: float) -> None:
     """Its contact must fit the mesh."""
     expected = scene.hertz.contact_radius
     fine = scene.mesh.contact_size or expected / 10
-    low, high = (hertz_load(scene, a) for a in (FINEST * fine, WIDEST * expected))
+    low, high = (
+        hertz_load(scene, a) for a in (MIN_ELEMENTS_PER_RADIUS * fine, MAX_RADIUS_RATIO * expected)
+    )
     if not low <= load <= high:
         raise InputError(
             f"{_said(scene, load)}: the contact radius would be "
@@ -151,8 +170,7 @@ def _check_load(scene: Scene, load: float) -> None:
 def _said(scene: Scene, load: float | None) -> str:
     """What was given, and the load that it means."""
     given = scene.hertz.interference
+    meant = "" if load is None else show(load, "N")
     if given is None:
-        return f"study.loads = {show(load, 'N')}"
-    return f"hertz.interference = {show(given, 'm')}" + (
-        "" if load is None else f" (a load of {show(load, 'N')})"
-    )
+        return f"study.loads = {meant}"
+    return f"hertz.interference = {show(given, 'm')}" + (f" (a load of {meant})" if meant else "")

@@ -4,10 +4,11 @@ elements.
 Johnson, Contact Mechanics (1985), Sect. 3.8 and 2.8, the paper's Eq. 24 corrected: in terms of the
 whole force P
 
-    round:  p = P / (2 pi a sqrt(a^2 - r^2)),   u = P (1 - nu^2) / (2 a E) plane:  p = P / (pi
-    sqrt(a^2 - x^2)) for a force P a unit of depth, in plane strain; u grows with the logarithm of
-            how far the body reaches, by 2 P (1 - nu^2) / (pi E) each time that it reaches e times
-            as far.
+    round:  p = P / (2 pi a sqrt(a^2 - r^2)),   u = P (1 - nu^2) / (2 a E)
+    plane:  p = P / (pi sqrt(a^2 - x^2))
+
+The plane force P acts on a unit of depth, in plane strain; there u grows with the logarithm of how
+far the body reaches, by 2 P (1 - nu^2) / (pi E) each time that it reaches e times as far.
 
 Eq. 25 is the stiffness of a ring: the force on it over u, so that the rings together carry 2 a E /
 (1 - nu^2). Such springs give back the pressure and the approach of the load that they were made
@@ -18,7 +19,7 @@ nu^2) a radian instead of 4/3.
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from typing import Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -29,7 +30,13 @@ from ...contact.patch import make_patch, normal_ports, patch_means, port_matrix
 from ...data import Patch
 from ...errors import InputError, NotSolvedError
 from ...scene.tables import Scene
+from ...util.communicator import Communicator
 from ..pipeline.stages import build_mesh
+
+if TYPE_CHECKING:
+    import scipy.sparse as sp
+
+    from ...fem.body import Body
 
 
 @dataclass(frozen=True)
@@ -65,10 +72,12 @@ class Indented:
     @property
     def tilt_stiffness(self) -> float:
         """Moment a radian of the punch glued to the block [N m]."""
+        if self.tilted is None:
+            raise InputError("tilt_stiffness: a plane punch does not tilt, expected a solid one")
         return 4 * float(self.arm @ np.linalg.solve(self.tilted, self.arm))
 
 
-def indent(scene: Scene, comm: Any = None) -> Indented:
+def indent(scene: Scene, comm: Communicator | None = None) -> Indented:
     """Press the punch of a scene of kind "punch" with its first load.
 
     Raises:
@@ -86,7 +95,9 @@ def indent(scene: Scene, comm: Any = None) -> Indented:
     solid = mesh.dimension == 3
     even = flexibility(body, ports)
     part = 4 if solid else 2
-    found = solve_lcp(even, np.zeros(len(even)), -np.ones((len(even), 1)), [-total / part])
+    found = solve_lcp(
+        even, np.zeros(len(even)), -np.ones((len(even), 1)), np.array([-total / part])
+    )
     if found.reason:
         raise NotSolvedError(f"the punch: {found.reason}")
     radius = np.linalg.norm(patch.points[:, : mesh.dimension - 1], axis=1)
@@ -150,8 +161,8 @@ def spring_tilt(
 
 
 def flexibility(
-    body: Any,
-    ports: Any,
+    body: Body,
+    ports: sp.spmatrix,
     held: str = "clamp",
 ) -> np.ndarray:
     """(n, n) displacements at the ports for unit forces there [m/N]; the body is held at a face.
@@ -167,7 +178,7 @@ def flexibility(
     return (C + C.T) / 2
 
 
-def _odd(body: Any) -> Any:
+def _odd(body: Body) -> Body:
     """The same body for motions that turn over in the mirror x = 0."""
     faces = dict(body.mesh.faces)
     faces["antisymmetry_x"] = faces.pop("symmetry_x")

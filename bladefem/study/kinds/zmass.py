@@ -12,7 +12,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 from dataclasses import dataclass
 from fractions import Fraction
-from typing import Any
+from pathlib import Path
 
 import numpy as np
 from scipy.spatial import cKDTree
@@ -29,6 +29,7 @@ from ...data import PressureMap
 from ...errors import InputError
 from ...io.stage_cache import stage
 from ...scene.tables import Scene
+from ...util.communicator import Communicator
 from ..pipeline.stage_inputs import stage_key
 from ..pipeline.stages import build_mesh
 
@@ -46,8 +47,8 @@ class Pressed:
 
 def press(
     scene: Scene,
-    folder: Any = None,
-    comm: Any = None,
+    folder: str | Path | None = None,
+    comm: Communicator | None = None,
 ) -> Pressed:
     """Mesh and contact pressure of a scene of kind "z mass", on all ranks of a communicator.
 
@@ -140,7 +141,7 @@ def mean_load(scene: Scene) -> float:
     return 50.0 if scene.study.loads is None else scene.study.loads[0]
 
 
-def _press(scene: Scene, comm: Any) -> Pressed:
+def _press(scene: Scene, comm: Communicator | None) -> Pressed:
     from ...fem.body import assemble
     from ...fem.constraint import constrain
     from ...fem.flexibility import flexible
@@ -148,9 +149,9 @@ def _press(scene: Scene, comm: Any) -> Pressed:
 
     mesh = build_mesh(scene, comm)
     mass = assemble(mesh, "damper", scene.material.damper, comm)
-    load = surface_load(mass, "top", pressure=1.0).reshape(-1, 3)
+    even = surface_load(mass, "top", pressure=1.0).reshape(-1, 3)
     reach = np.array([scene.z_mass.width, scene.z_mass.height]) / 2
-    load = (load * (1 + mesh.points[:, :2] @ (scene.foundation.skew / reach))[:, None]).ravel()
+    load = (even * (1 + mesh.points[:, :2] @ (scene.foundation.skew / reach))[:, None]).ravel()
     block = flexible(constrain(assemble(mesh, "blade", scene.material.blade, comm), "clamp"))
     patch = make_patch(mesh, "this")
     problem = contact_problem(mesh, [patch], block, flexible(constrain(mass, None)), pull=load)

@@ -13,7 +13,7 @@ from ...scene.tables import Scene
 from ...util.progress import Progress, unwatched
 from ...wheel.model import Pattern, Wheel, frequency_pattern
 from ...wheel.resonance import WheelPeak, find_wheel_peak
-from ...wheel.scatter import Scatter, drawn_patterns, read_pattern
+from ...wheel.scatter import Scatter, drawn_deviations, read_pattern
 from ...wheel.solve import WheelSolution, free_wheel, solve_wheel, stuck_wheel
 from ...wheel.statistics import wheel_respond
 from ...wheel.tuned import tuned_sector
@@ -23,7 +23,7 @@ from .whole_wheel import WheelSector
 # points of the first look at a band
 GRID = 15
 # of the linear wheel, which costs little
-FINE = 300
+LINEAR_POINTS = 300
 # resonances with sticking dampers that are looked at
 SHARPEST = 8
 # relative error of a peak's height by the search over frequencies
@@ -81,23 +81,10 @@ def scene_deviations(
         return np.broadcast_to(values, (count, families)).copy()
     if given.scatter is None:
         raise InputError("mistuning: expected a pattern file or a scatter")
-    found: list[np.ndarray] = []
-
-    def keep(deviation: np.ndarray) -> Pattern:
-        found.append(deviation)
-        return Pattern()
-
     # the same first wheel as the statistics draw
-    blank = _Blank(count)
-    drawn_patterns(blank, Scatter(given.scatter, seed=given.seed), 1, keep)
-    return np.repeat(found[0][:, None], families, axis=1)
-
-
-@dataclass(frozen=True)
-class _Blank:
-    """What a draw of blades alone reads of a wheel."""
-
-    count: int
+    scatter = Scatter(given.scatter, seed=given.seed)
+    deviation = scatter.blades * drawn_deviations(count, scatter, 1)[0, 0]
+    return np.repeat(deviation[:, None], families, axis=1)
 
 
 def scene_scatter(scene: Scene) -> Scatter:
@@ -138,7 +125,7 @@ def _stuck_peaks(
     high: float,
 ) -> np.ndarray:
     """Circular frequencies of the highest resonances with all contacts sticking."""
-    fine = np.linspace(low, high, FINE)
+    fine = np.linspace(low, high, LINEAR_POINTS)
     sizes = [stuck_wheel(wheel, w, max(wheel.excitation), pattern)[:, 1:, 0] for w in fine]
     height = np.linalg.norm(np.array(sizes), axis=2).max(axis=1)
     inner = np.flatnonzero((height[1:-1] >= height[:-2]) & (height[1:-1] >= height[2:])) + 1
@@ -209,7 +196,7 @@ def _free_factor(
     grid: np.ndarray,
 ) -> float:
     """Amplification without dampers over the same band."""
-    fine = np.linspace(grid[0], grid[-1], FINE)
+    fine = np.linspace(grid[0], grid[-1], LINEAR_POINTS)
 
     def respond(pattern: Pattern) -> float:
         def sizes(w: float) -> np.ndarray:

@@ -7,17 +7,20 @@ from __future__ import annotations
 import time
 from collections.abc import Callable
 from dataclasses import replace
-from typing import Any
 
 from ...errors import InputError
+from ...scene.fields import value_at
+from ...scene.kinds import kind_named
 from ...scene.tables import Scene
+from ...util.communicator import Communicator
 from ...util.progress import Progress, unwatched
 from ...wheel.model import Pattern, Wheel, frequency_pattern
 from ...wheel.resonance import Respond
-from ...wheel.scatter import LARGEST, drawn_patterns
+from ...wheel.scatter import MAX_DEVIATIONS, drawn_patterns
 from ...wheel.statistics import Amplification, scatter_statistics, wheel_respond
 from ..pipeline.loads import Curve
-from ..pipeline.pipeline import Run, load_cases
+from ..pipeline.pipeline import load_cases
+from ..pipeline.run_records import SolvedRun
 from ..pipeline.stages import Bodies
 from .pattern_response import (
     SEARCH,
@@ -30,7 +33,7 @@ from .whole_wheel import WheelSector, read_orders, reduce_wheel, whole_wheel
 
 
 def is_mistuned(scene: Scene) -> bool:
-    """The scene tells how its blades differ."""
+    """The scene gives how its blades differ."""
     return scene.mistuning.pattern is not None or scene.mistuning.scatter is not None
 
 
@@ -42,7 +45,10 @@ def check_mistuning(scene: Scene) -> None:
     """
     if not is_mistuned(scene):
         return
-    count = scene.imported.sectors if scene.kind == "imported" else scene.disc.sectors
+    name = kind_named(scene.kind).sectors
+    if name is None:
+        raise InputError(f"mistuning: a scene of kind '{scene.kind}' has no wheel")
+    count = value_at(scene, name)
     if count == 0:
         raise InputError("mistuning: expected a wheel, imported.sectors = 0 has a single blade")
     scene_deviations(scene, count, scene.mistuning.families)
@@ -50,10 +56,10 @@ def check_mistuning(scene: Scene) -> None:
 
 
 def with_whole_wheel(
-    run: Run,
-    comm: Any = None,
+    run: SolvedRun,
+    comm: Communicator | None = None,
     progress: Progress = unwatched,
-) -> Run:
+) -> SolvedRun:
     """The run with the whole wheel under the load whose tuned resonance is lowest."""
     start = time.perf_counter()
     best = min(run.response.curves, key=lambda curve: curve.peak_amplitude)
@@ -64,8 +70,8 @@ def with_whole_wheel(
 
 
 def scatter_of_run(
-    run: Run,
-    comm: Any = None,
+    run: SolvedRun,
+    comm: Communicator | None = None,
     progress: Progress = unwatched,
 ) -> Amplification:
     """Statistics under all loads of a run; wheels are dealt out over the ranks.
@@ -94,7 +100,7 @@ def scatter_of_run(
             lambda deviation: frequency_pattern(sector.families, deviation),
         )
 
-    spread = LARGEST * scene.mistuning.scatter + 0.005
+    spread = MAX_DEVIATIONS * scene.mistuning.scatter + 0.005
     return scatter_statistics(
         wheels,
         {load: patterns(wheel) for load, wheel in wheels.items()},
@@ -121,9 +127,9 @@ def _respond_by(
 
 
 def _wheels(
-    run: Run,
+    run: SolvedRun,
     curves: list[Curve],
-    comm: Any,
+    comm: Communicator | None,
     progress: Progress,
 ) -> tuple[WheelSector, list[Wheel]]:
     """The sector in all nodal diameters, and the tuned wheel of each curve."""

@@ -10,11 +10,14 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any
+from functools import reduce
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import pandas as pd
 from scipy.linalg import eigh
+
+from geometry.mesh import Mesh, sector_of
 
 from ...data import ModeSet
 from ...errors import InputError
@@ -23,9 +26,12 @@ from ...scene.units import is_plain, parse
 from ..pipeline.stages import Bodies, is_wheel
 from .crossings import campbell_crossings, fold, interference_table, margins, wave
 
+if TYPE_CHECKING:
+    from ...fem.body import Body
+
 # modes beyond those asked for: Coriolis forces mix neighbours
 GUARD = 6
-# of one diagram: more cannot be told apart in a picture
+# of one diagram: more cannot be distinguished in a picture
 MOST_SPEEDS = 2000
 
 
@@ -63,17 +69,17 @@ def campbell(
     Raises:
         InputError: fewer than two speeds, negative ones.
     """
-    sectors = bodies.mesh.sector.count if is_wheel(bodies.mesh) else 0
+    sectors = sector_of(bodies.mesh).count if is_wheel(bodies.mesh) else 0
     operating = bodies.scene.operation.speed
     if sectors and diameters is None:
         diameters = sorted({fold(order, sectors) for order in orders})
     table = campbell_table(bodies, sorted({*speeds, operating}), diameters, count)
     at_speed = table[table["speed"] == operating]
     crossed = [
-        campbell_crossings(_excited(table, order, sectors), [order], sectors or None)
+        campbell_crossings(_excited_waves(table, order, sectors), [order], sectors or None)
         for order in orders
     ]
-    tables = [_interference(at_speed, order, sectors, operating) for order in orders]
+    tables = [_order_interference(at_speed, order, sectors, operating) for order in orders]
     return Campbell(
         table,
         pd.concat(crossed, ignore_index=True).sort_values("speed", ignore_index=True),
@@ -108,11 +114,12 @@ def campbell_table(
     squares = np.linspace(0.0, max(speeds) ** 2, 3)
     at = [bodies.blade_at(float(np.sqrt(s))) for s in squares]
     sets = [
-        _modes(bodies, body, diameters, count + GUARD) for body in bodies.progress(at, "speeds")
+        _modes_at_speed(bodies, body, diameters, count + GUARD)
+        for body in bodies.progress(at, "speeds")
     ]
     G = coriolis(bodies.still_blade, spin_axis(bodies.mesh))
     rows = [
-        _lines(at, [s[i] for s in sets], squares, speeds, G, sense_of(bodies.mesh))
+        _frequency_lines(at, [s[i] for s in sets], squares, speeds, G, sense_of(bodies.mesh))
         for i in range(len(sets[0]))
     ]
     return pd.concat(rows, ignore_index=True)
@@ -137,31 +144,32 @@ def read_speeds(text: str) -> list[float]:
         if number is not None:
             out.append(number)
             continue
-        if len(out) < 2 or i + 1 >= len(numbers) or numbers[i + 1] is None or not out[-1] > out[-2]:
+        end = numbers[i + 1] if i + 1 < len(numbers) else None
+        if len(out) < 2 or end is None or not out[-1] > out[-2]:
             raise InputError(
                 f"campbell = {text}: expected two rising speeds before '...' and the last one "
                 "after it"
             )
         step = out[-1] - out[-2]
-        if (numbers[i + 1] - out[-1]) / step > MOST_SPEEDS:
+        if (end - out[-1]) / step > MOST_SPEEDS:
             raise InputError(
-                f"campbell = {text}: {(numbers[i + 1] - out[-1]) / step:.3g} speeds, expected at "
+                f"campbell = {text}: {(end - out[-1]) / step:.3g} speeds, expected at "
                 f"most {MOST_SPEEDS}"
             )
-        out += list(np.arange(out[-1] + step, numbers[i + 1] - step / 2, step))
+        out += list(np.arange(out[-1] + step, end - step / 2, step))
     return out
 
 
-def sense_of(mesh: Any) -> int:
+def sense_of(mesh: Mesh) -> int:
     """+1 where sectors are counted in the sense of a positive rotation about z, else -1."""
     if mesh.sector is None or not mesh.sector.count:
         return 1
     return 1 if mesh.sector.rotation[1, 0] >= 0 else -1
 
 
-def _modes(
+def _modes_at_speed(
     bodies: Bodies,
-    body: Any,
+    body: Body,
     diameters: Sequence[int] | None,
     count: int,
 ) -> list[ModeSet]:
@@ -175,7 +183,7 @@ def _modes(
     return [modes(constrain(body), count)]
 
 
-def _lines(
+def _frequency_lines(
     at: list[Any],
     sets: list[ModeSet],
     squares: np.ndarray,
@@ -188,16 +196,17 @@ def _lines(
     """
     count = len(sets[0].frequencies)
     shown = slice(0, count - GUARD)
-    K, M, g = _projections(at, sets, G)
+    K, M, g = _project_speeds(at, sets, G)
     outer = np.r_[0:count, 2 * count : 3 * count]
     frames = []
     for speed in speeds:
-        small = sum(
-            weight * part for weight, part in zip(_lagrange(squares, speed**2), K, strict=True)
+        weights = _lagrange_weights(squares, speed**2)
+        small = reduce(np.add, [weight * part for weight, part in zip(weights, K, strict=True)])
+        f, Z = _lowest_frequencies(small, M, count)
+        rough, _ = _lowest_frequencies(small[np.ix_(outer, outer)], M[np.ix_(outer, outer)], count)
+        forward, backward = _split_waves(
+            f, Z.conj().T @ g @ Z, speed, sense, sets[0].nodal_diameter
         )
-        f, Z = _frequencies(small, M, count)
-        rough, _ = _frequencies(small[np.ix_(outer, outer)], M[np.ix_(outer, outer)], count)
-        forward, backward = _split(f, Z.conj().T @ g @ Z, speed, sense, sets[0].nodal_diameter)
         values = {
             "frequency": f,
             "forward": forward,
@@ -213,7 +222,7 @@ def _lines(
     return table
 
 
-def _projections(
+def _project_speeds(
     at: list[Any],
     sets: list[ModeSet],
     G: Any,
@@ -224,12 +233,12 @@ def _projections(
 
     comm = at[0].comm
     X = own_rows(at[0], np.concatenate([s.shapes for s in sets]))
-    K = [_hermitian(dot(comm, X, apply(body.K, X))) for body in at]
+    K = [_hermitian_part(dot(comm, X, apply(body.K, X))) for body in at]
     g = dot(comm, X, apply(G, X))
-    return K, _hermitian(dot(comm, X, apply(at[0].M, X))), (g - g.conj().T) / 2
+    return K, _hermitian_part(dot(comm, X, apply(at[0].M, X))), (g - g.conj().T) / 2
 
 
-def _frequencies(
+def _lowest_frequencies(
     K: np.ndarray,
     M: np.ndarray,
     count: int,
@@ -238,11 +247,11 @@ def _frequencies(
     size, Q = np.linalg.eigh(M)
     keep = size > 1e-11 * size[-1]
     W = Q[:, keep] / np.sqrt(size[keep])
-    lam, Z = eigh(_hermitian(W.conj().T @ K @ W))
+    lam, Z = eigh(_hermitian_part(W.conj().T @ K @ W))
     return np.sqrt(np.maximum(lam[:count], 0)) / (2 * np.pi), W @ Z[:, :count]
 
 
-def _split(
+def _split_waves(
     f: np.ndarray,
     g: np.ndarray,
     speed: float,
@@ -255,12 +264,12 @@ def _split(
     return found.forward, found.backward
 
 
-def _lagrange(nodes: np.ndarray, s: float) -> list[float]:
+def _lagrange_weights(nodes: np.ndarray, s: float) -> list[float]:
     """Weights of the values at the nodes for the value at s."""
     return [float(np.prod([(s - b) / (a - b) for b in nodes if b != a])) for a in nodes]
 
 
-def _excited(
+def _excited_waves(
     table: pd.DataFrame,
     order: int,
     sectors: int,
@@ -277,14 +286,14 @@ def _excited(
     )
 
 
-def _interference(
+def _order_interference(
     table: pd.DataFrame,
     order: int,
     sectors: int,
     speed: float,
 ) -> tuple[pd.DataFrame, pd.DataFrame]:
     """SAFE rows and the closest mode of one order; single blades take every order."""
-    rows = _excited(table, order, sectors)
+    rows = _excited_waves(table, order, sectors)
     if sectors:
         return interference_table(rows, sectors, speed, [order]), margins(
             rows, sectors, speed, [order]
@@ -296,5 +305,5 @@ def _interference(
     )
 
 
-def _hermitian(A: np.ndarray) -> np.ndarray:
+def _hermitian_part(A: np.ndarray) -> np.ndarray:
     return (A + A.conj().T) / 2

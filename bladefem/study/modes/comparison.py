@@ -13,6 +13,7 @@ import pandas as pd
 from bladefem.data import ModeSet
 from geometry.mesh import Mesh
 
+from ...errors import InputError
 from .mesh_transfer import nodal_volumes, transfer
 
 ORDINALS = ("first", "second", "third", "fourth", "fifth")
@@ -45,7 +46,11 @@ def mac(
         mesh: the mesh of ``a``; without it all nodes weigh the same.
         other: the mesh of ``b`` when it is another one; its shapes are interpolated onto ``mesh``.
     """
-    shapes = b.shapes if other is None else transfer(other, b.shapes, mesh.points)
+    shapes = b.shapes
+    if other is not None:
+        if mesh is None:
+            raise InputError("mac: expected the meshes of both mode sets, only one was given")
+        shapes = transfer(other, shapes, mesh.points)
     weight = np.ones(a.shapes.shape[1]) if mesh is None else nodal_volumes(mesh)
     return mac_of(a.shapes, shapes, weight)
 
@@ -104,9 +109,9 @@ def section_axes(points: np.ndarray, s: np.ndarray) -> tuple[np.ndarray, np.ndar
     if not height:
         thin = np.tile([0.0, 1.0, 0.0], (len(points), 1))
         return np.tile(points.mean(axis=0), (len(points), 1)), thin
-    angle = np.interp(s, height, np.unwrap(angle, period=np.pi))
+    turn = np.interp(s, height, np.unwrap(angle, period=np.pi))
     middle = np.stack([np.interp(s, height, c) for c in np.array(centre).T], axis=1)
-    return middle, np.stack([np.zeros_like(angle), np.cos(angle), np.sin(angle)], axis=1)
+    return middle, np.stack([np.zeros_like(turn), np.cos(turn), np.sin(turn)], axis=1)
 
 
 def pure_shapes(
@@ -161,7 +166,7 @@ def family_table(
     Args:
         modes: shapes on the nodes of ``mesh``.
         mesh: sector or blade.
-        clamped: modes of the blade clamped at its root, on the same nodes, as references beside
+        clamped: modes of the blade clamped at its root, on the same nodes, as references next to
             pure motions.
         body: the aerofoil's body; the whole mesh when there is no such body.
         root: height x of the aerofoil's root [m]; found from the named faces when left out.

@@ -9,17 +9,22 @@ and Penzien, Dynamics of Structures, sect. 26).
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 import pandas as pd
+
+from geometry.mesh import sector_of
 
 from ...data import ModeSet
 from .campbell import sense_of
 from .comparison import rigid_motion
 
+if TYPE_CHECKING:
+    from ...fem.body import Body
 
-def effective_masses(sets: Sequence[ModeSet], body: Any) -> pd.DataFrame:
+
+def effective_masses(sets: Sequence[ModeSet], body: Body) -> pd.DataFrame:
     """One row a mode and direction that it can follow.
 
     Args:
@@ -33,15 +38,15 @@ def effective_masses(sets: Sequence[ModeSet], body: Any) -> pd.DataFrame:
         up to this mode.
     """
     frames = [
-        _rows(modes, body, direction, factor)
+        _mass_rows(modes, body, direction, factor)
         for modes in sets
-        for direction, factor in _directions(modes, body)
+        for direction, factor in _mass_directions(modes, body)
     ]
     columns = ["mode", "frequency", "direction", "factor", "effective_mass", "share", "sum"]
     return pd.concat(frames, ignore_index=True) if frames else pd.DataFrame(columns=columns)
 
 
-def _directions(modes: ModeSet, body: Any) -> list[tuple[str, float]]:
+def _mass_directions(modes: ModeSet, body: Body) -> list[tuple[str, float]]:
     """Directions of one set, with the factor from a sector to the wheel."""
     n = modes.nodal_diameter
     plane = body.dim == 2
@@ -49,16 +54,16 @@ def _directions(modes: ModeSet, body: Any) -> list[tuple[str, float]]:
         return [
             (name, 1.0) for name in (("x", "y") if plane else ("x", "y", "z", "rx", "ry", "rz"))
         ]
-    count = float(body.mesh.sector.count)
+    count = float(sector_of(body.mesh).count)
     return {
         0: [("rz", count)] if plane else [("z", count), ("rz", count)],
         1: [("x, y", count / 2)],
     }.get(n, [])
 
 
-def _rows(
+def _mass_rows(
     modes: ModeSet,
-    body: Any,
+    body: Body,
     direction: str,
     factor: float,
 ) -> pd.DataFrame:

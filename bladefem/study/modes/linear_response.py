@@ -11,9 +11,11 @@ diameter. Modes carry the resonance, the static answer of the modes left out com
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any
+from typing import TYPE_CHECKING
 
 import numpy as np
+
+from geometry.mesh import Mesh, sector_of
 
 from ...data import ModeSet
 from ...errors import InputError
@@ -21,6 +23,9 @@ from ...hbm.model import Damping
 from ...reduction.assemble import folded_diameter
 from ..pipeline.ports import blade_ports
 from ..pipeline.stages import Bodies, is_wheel
+
+if TYPE_CHECKING:
+    from ...fem.flexibility import Flexibility
 
 MODES = 20
 
@@ -97,7 +102,7 @@ def forced(
             "values, not all zero"
         )
     order = scene.excitation.engine_order
-    n, mirrored = folded_diameter(1, order, mesh.sector.count) if is_wheel(mesh) else (0, False)
+    n, mirrored = folded_diameter(1, order, sector_of(mesh).count) if is_wheel(mesh) else (0, False)
     flex = bodies.factorised(n)
     found = normal_modes(flex.con, modes, flex)
     if not found.frequencies.all():
@@ -105,8 +110,8 @@ def forced(
     # the opposite wave is the conjugate of this one
     seen = load.conj() if mirrored else load
     omega = 2 * np.pi * found.frequencies
-    modal = _modal(mesh, found, seen)
-    rest = _static(flex, seen) - np.tensordot(modal / omega**2, found.shapes, 1)
+    modal = _modal_forces(mesh, found, seen)
+    rest = _static_motion(flex, seen) - np.tensordot(modal / omega**2, found.shapes, 1)
     parts = (found.shapes, modal, rest)
     shapes, modal, rest = (np.conj(part) for part in parts) if mirrored else parts
     return Forced(
@@ -124,7 +129,7 @@ def displacement(response: Forced, frequency: float) -> np.ndarray:
     """(n_points, 3) complex amplitudes [m] of this blade at a frequency [Hz]; stresses come from
     fem.stress.
     """
-    return np.tensordot(_amplitudes(response, frequency), response.shapes, 1) + response.rest
+    return np.tensordot(_modal_amplitudes(response, frequency), response.shapes, 1) + response.rest
 
 
 def probe(
@@ -144,7 +149,7 @@ def probe(
     weight[:, : len(vector) // points] = np.reshape(vector, (points, -1))
     seen = np.einsum("mni,ni->m", response.shapes, weight)
     rest = np.einsum("ni,ni->", response.rest, weight)
-    return np.array([_amplitudes(response, f) @ seen + rest for f in frequencies])
+    return np.array([_modal_amplitudes(response, f) @ seen + rest for f in frequencies])
 
 
 def peak(
@@ -179,7 +184,7 @@ def half_widths(response: Forced) -> np.ndarray:
     resonance.
     """
     w = response.omega
-    return abs(np.array([_damping(response, x)[i] for i, x in enumerate(w)])) / (2 * w**2)
+    return abs(np.array([_damping_terms(response, x)[i] for i, x in enumerate(w)])) / (2 * w**2)
 
 
 def static_offset(bodies: Bodies, load: np.ndarray | None = None) -> np.ndarray:
@@ -189,24 +194,27 @@ def static_offset(bodies: Bodies, load: np.ndarray | None = None) -> np.ndarray:
     offset = bodies.scene.operation.speed**2 * bodies.swell
     if load is None:
         return offset
-    return offset + _static(bodies.factorised(0), np.real(load))[:, : bodies.mesh.dimension].real
+    return (
+        offset
+        + _static_motion(bodies.factorised(0), np.real(load))[:, : bodies.mesh.dimension].real
+    )
 
 
-def _amplitudes(response: Forced, frequency: float) -> np.ndarray:
+def _modal_amplitudes(response: Forced, frequency: float) -> np.ndarray:
     """(m,) modal amplitudes."""
     w = 2 * np.pi * frequency
-    return response.modal_load / (response.omega**2 - w**2 + _damping(response, w))
+    return response.modal_load / (response.omega**2 - w**2 + _damping_terms(response, w))
 
 
-def _damping(response: Forced, w: float) -> np.ndarray:
+def _damping_terms(response: Forced, w: float) -> np.ndarray:
     """(m,) what damping adds to omega_r^2 - w^2; a loss factor does not act at rest [1/s^2]."""
     omega = response.omega
     damping = response.damping
     return 1j * (w * damping.viscous(omega) + np.sign(w) * damping.structural * omega**2)
 
 
-def _modal(
-    mesh: Any,
+def _modal_forces(
+    mesh: Mesh,
     modes: ModeSet,
     load: np.ndarray,
 ) -> np.ndarray:
@@ -214,7 +222,7 @@ def _modal(
     return np.einsum("mni,ni->m", modes.shapes[:, :, : force.shape[1]].conj(), force)
 
 
-def _static(flex: Any, load: np.ndarray) -> np.ndarray:
+def _static_motion(flex: Flexibility, load: np.ndarray) -> np.ndarray:
     """(n_points, 3) K^-1 f."""
     from ...fem.constraint import expand, restrict
     from ...fem.flexibility import compliance

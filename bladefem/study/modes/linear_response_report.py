@@ -38,7 +38,7 @@ BETWEEN = 500
 # half-widths of a resonance that are drawn closely
 WIDTHS = 12.0
 # displacement [m] that the stresses of a mode are given for
-LARGEST = 1e-3
+REPORTED_DISPLACEMENT = 1e-3
 
 Fields = dict[str, dict[str, np.ndarray]]
 
@@ -103,7 +103,7 @@ def answer(
             "peaked": peaked,
         }
     )
-    return Answer(found, _curve(found, vector, count), resonances, shapes)
+    return Answer(found, _response_curve(found, vector, count), resonances, shapes)
 
 
 def read_loads(text: str) -> list[tuple[str, float]]:
@@ -160,7 +160,7 @@ def stress_states(
     for i, shape in enumerate(modes.shapes[:count]):
         largest = max(np.linalg.norm(shape, axis=1).max(), 1e-300)
         # it swings to both sides
-        states[f"mode {i + 1} for 1 mm"] = LARGEST / largest * shape.astype(complex)
+        states[f"mode {i + 1} for 1 mm"] = REPORTED_DISPLACEMENT / largest * shape.astype(complex)
     for i, shape in enumerate(() if found is None else found.shapes):
         states[f"resonance {i + 1}"] = shape
     return states
@@ -216,7 +216,7 @@ def _of_all_bodies(bodies: Bodies, values: np.ndarray) -> np.ndarray:
     )
 
 
-def _curve(
+def _response_curve(
     found: Forced,
     vector: np.ndarray,
     count: int,

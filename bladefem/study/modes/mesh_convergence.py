@@ -17,7 +17,6 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from itertools import pairwise
-from typing import Any
 
 import numpy as np
 import pandas as pd
@@ -29,6 +28,7 @@ from ...data import ModeSet
 from ...errors import InputError
 from ...scene.tables import Scene
 from ...scene.validate import refuse_given_mesh
+from ...util.communicator import Communicator
 from ...util.progress import Progress, unwatched
 from ..pipeline.stages import Bodies, build_mesh, find_modes
 from .comparison import mac_of
@@ -41,11 +41,11 @@ HIGHEST = 12.0
 # orders that frequencies can have: from sharp re-entrant edges to 4 for P2, and some luck
 BELIEVED = (1.0, 6.0)
 # error over change where no order is believed
-SAFETY = 3.0
+UNTRUSTED_FACTOR = 3.0
 # scatter over trend from which there is no trend
-LOUD = 0.5
+MAX_SCATTER = 0.5
 # MAC of the same mode on two meshes
-ALIKE = 0.8
+MIN_MAC = 0.8
 # modes beyond those asked for, candidates for pairs
 SPARE = 3
 # nodes that shapes are compared at
@@ -69,7 +69,7 @@ def converge(
     sizes: Sequence[float],
     diameters: Sequence[int] | None = None,
     count: int = 5,
-    comm: Any = None,
+    comm: Communicator | None = None,
     progress: Progress = unwatched,
 ) -> Convergence:
     """The same scene on several meshes.
@@ -110,13 +110,13 @@ def of_meshes(runs: Sequence[tuple[Mesh, Sequence[ModeSet]]], count: int) -> Con
     finest = runs[-1]
     points = pd.concat(
         [
-            _rows(mesh, found, finest[0], reference, count)
+            _mesh_rows(mesh, found, finest[0], reference, count)
             for mesh, sets in runs
             for found, reference in zip(sets, finest[1], strict=True)
         ],
         ignore_index=True,
     )
-    return Convergence(points, _summary(points))
+    return Convergence(points, _convergence_summary(points))
 
 
 def paired(
@@ -142,7 +142,7 @@ def paired(
     return columns, match[rows, columns]
 
 
-def _rows(
+def _mesh_rows(
     mesh: Mesh,
     modes: ModeSet,
     finest: Mesh,
@@ -222,21 +222,25 @@ def fitted(h: np.ndarray, f: np.ndarray) -> tuple[float, float, float]:
     ).x
     (limit, slope), left = fit(p)
     scatter = float(np.sqrt(left / (len(f) - 3)))
-    if scatter > LOUD * abs(slope) * (h.max() ** p - h.min() ** p):
+    if scatter > MAX_SCATTER * abs(slope) * (h.max() ** p - h.min() ** p):
         return float(f[-1]), np.nan, scatter
     return float(limit), float(p), scatter
 
 
-def _summary(points: pd.DataFrame) -> pd.DataFrame:
+def _convergence_summary(points: pd.DataFrame) -> pd.DataFrame:
     keys = [key for key in ("nodal_diameter", "mode") if key in points]
     rows = []
     for _, line in points.groupby(keys):
         line = line.sort_values("size", ascending=False)
         f = line["frequency"].to_numpy()
         limit, order, scatter = fitted(line["size"].to_numpy() / line["size"].iloc[-1], f)
-        reason = _doubt(order, line["mac"].min())
+        reason = _order_doubt(order, line["mac"].min())
         change = np.ptp(f[-2:] if len(f) == 3 else f[-3:])
-        error = SAFETY * change / f[-1] if reason else abs(f[-1] / limit - 1) + scatter / f[-1]
+        error = (
+            UNTRUSTED_FACTOR * change / f[-1]
+            if reason
+            else abs(f[-1] / limit - 1) + scatter / f[-1]
+        )
         rows.append(
             {
                 **{name: int(line[name].iloc[0]) for name in keys},
@@ -251,9 +255,9 @@ def _summary(points: pd.DataFrame) -> pd.DataFrame:
     return pd.DataFrame(rows)
 
 
-def _doubt(order: float, mac: float) -> str:
+def _order_doubt(order: float, mac: float) -> str:
     """Why an order is not believed."""
-    if mac < ALIKE:
+    if mac < MIN_MAC:
         return f"the shapes of two meshes differ, MAC {mac:.2f}"
     if np.isnan(order):
         return "the frequencies do not fall into line"

@@ -1,10 +1,11 @@
-"""A survey of the modes: all nodal diameters, and what was asked for beside them."""
+"""A survey of the modes: all nodal diameters, and what was asked for in addition."""
 
 from __future__ import annotations
 
 import time
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -19,8 +20,10 @@ from ...hbm.model import Damping
 from ...io.stage_cache import found_remark, on_root, stage
 from ...io.stored_stage import stored_stage
 from ...scene.tables import Scene
+from ...util.communicator import Communicator
 from ...util.progress import Progress, unwatched
 from ..pipeline import pipeline
+from ..pipeline.run_records import ModalRun
 from ..pipeline.stage_inputs import stage_key
 from ..pipeline.stages import MODES_SHOWN, Bodies, excited_modes, is_wheel, wheel_modes
 from ..pipeline.validate_mesh import refuse_loads
@@ -37,7 +40,7 @@ ORDERS = 3
 
 @dataclass(frozen=True)
 class Wanted:
-    """What to find beside the modes."""
+    """What to find besides the modes."""
 
     # [rad/s] of a Campbell diagram
     speeds: Sequence[float] | None = None
@@ -57,7 +60,7 @@ class Wanted:
 class Survey:
     """What was found; the run's modes are those of all nodal diameters."""
 
-    run: pipeline.Run
+    run: ModalRun
     bodies: Bodies
     # effective masses
     masses: pd.DataFrame
@@ -77,15 +80,15 @@ def survey(
     scene: Scene,
     folder: str | Path,
     wanted: Wanted,
-    comm: Any = None,
+    comm: Communicator | None = None,
     progress: Progress = unwatched,
 ) -> Survey:
-    """Modes of every nodal diameter, and what is wanted beside them; collective.
+    """Modes of every nodal diameter, and what is asked for in addition; collective.
 
     Raises:
         InputError, NotSolvedError: from the stages.
     """
-    other = None if wanted.other is None else on_root(comm, lambda: _other(wanted.other))
+    other = None if wanted.other is None else on_root(comm, partial(_read_other, wanted.other))
     start = pipeline.run(scene, folder, until="mesh", comm=comm, progress=progress)
     pipeline.check_blade(scene, start.mesh)
     if wanted.loads is not None:
@@ -95,15 +98,15 @@ def survey(
     key = stage_key("survey", scene, wanted.direct)
     sets, before = stage(folder, "survey", key, lambda: _all_modes(bodies, wanted.direct), comm)
     messages = [*start.messages, *([] if before is None else [found_remark("modes", before)])]
-    run = replace(start, modes=sets, messages=messages)
-    clock = _timed(run, "modes", clock)
+    run = ModalRun(**{**vars(start), "messages": messages}, modes=sets)
+    clock = _stage_seconds(run, "modes", clock)
     result = Survey(
         run, bodies, effective_masses(sets, bodies.still_blade), clamped=clamped_blade(bodies)
     )
-    clock = _timed(run, "effective masses, clamped blade", clock)
+    clock = _stage_seconds(run, "effective masses, clamped blade", clock)
     if wanted.speeds is not None:
-        result = replace(result, campbell=campbell(bodies, wanted.speeds, _orders(scene)))
-        clock = _timed(run, "campbell", clock)
+        result = replace(result, campbell=campbell(bodies, wanted.speeds, _engine_orders(scene)))
+        clock = _stage_seconds(run, "campbell", clock)
     if wanted.sizes is not None:
         sizes = list(wanted.sizes) or default_sizes(scene)
         n = excited_set(run).nodal_diameter
@@ -113,14 +116,14 @@ def survey(
                 scene, sizes, None if n is None else [n], comm=comm, progress=progress
             ),
         )
-        clock = _timed(run, "mesh refinement", clock)
+        clock = _stage_seconds(run, "mesh refinement", clock)
     if wanted.loads is not None:
         result = replace(result, answer=answer(bodies, wanted.loads, wanted.damping))
-        clock = _timed(run, "forced response", clock)
-    return result if other is None else _compared(result, *other)
+        clock = _stage_seconds(run, "forced response", clock)
+    return result if other is None else _compare_modes(result, *other)
 
 
-def excited_set(run: pipeline.Run) -> ModeSet:
+def excited_set(run: ModalRun) -> ModeSet:
     """The modes of the nodal diameter that the engine order excites, or the nearest one that is
     there.
     """
@@ -136,13 +139,13 @@ def _all_modes(bodies: Bodies, direct: bool) -> list[ModeSet]:
     return wheel_modes(bodies, MODES_SHOWN, bodies.scene.model.nodal_diameters, direct)
 
 
-def _orders(scene: Scene) -> list[int]:
+def _engine_orders(scene: Scene) -> list[int]:
     order = scene.excitation.engine_order
     return list(range(max(order - ORDERS, 1), order + ORDERS + 1))
 
 
-def _timed(
-    run: pipeline.Run,
+def _stage_seconds(
+    run: ModalRun,
     name: str,
     since: float,
 ) -> float:
@@ -151,14 +154,14 @@ def _timed(
     return now
 
 
-def _other(folder: Path) -> tuple[Mesh, list[ModeSet]]:
+def _read_other(folder: Path) -> tuple[Mesh, list[ModeSet]]:
     """Mesh and modes of another run.
 
     Raises:
         InputError: the folder holds none.
     """
-    mesh = _kept(folder, "mesh")
-    sets = _kept(folder, "survey") or _kept(folder, "modes")
+    mesh = _read_stage(folder, "mesh")
+    sets = _read_stage(folder, "survey") or _read_stage(folder, "modes")
     if mesh is None or sets is None:
         raise InputError(
             f"compare = {folder}: expected the folder of an earlier run of 'bladefem modes'"
@@ -166,7 +169,7 @@ def _other(folder: Path) -> tuple[Mesh, list[ModeSet]]:
     return mesh, sets
 
 
-def _kept(folder: Path, name: str) -> Any:
+def _read_stage(folder: Path, name: str) -> Any:
     """A stage of another run, whatever it was made from; None where it has none."""
     try:
         return stored_stage(folder, name)
@@ -174,7 +177,7 @@ def _kept(folder: Path, name: str) -> Any:
         return None
 
 
-def _compared(
+def _compare_modes(
     result: Survey,
     mesh: Mesh,
     sets: list[ModeSet],
@@ -193,13 +196,13 @@ def _compared(
     match = mac(
         _of_blade(own, mine),
         _of_blade(mesh, theirs[0]) if same else theirs[0],
-        _blade(own),
-        None if same else _blade(mesh),
+        _blade_alone(own),
+        None if same else _blade_alone(mesh),
     )
     return replace(result, mac=match, compared=theirs[0])
 
 
-def _blade(mesh: Mesh) -> Mesh:
+def _blade_alone(mesh: Mesh) -> Mesh:
     """The blade alone: the damper is not part of the modes."""
     return replace(mesh, bodies={"blade": mesh.bodies["blade"]})
 

@@ -11,7 +11,7 @@ import numpy as np
 import scipy.sparse as sp
 from scipy.linalg import null_space
 
-from geometry.mesh import Mesh
+from geometry.mesh import Mesh, sector_of
 
 from ...data import Elements, Patch, PortModel, RigidBody
 from ...errors import InputError
@@ -121,7 +121,8 @@ def mass_damper(
     held), never up or down the slope.
     """
     dim = mesh.dimension
-    angle = pi / mesh.sector.count if mesh.sector.count else 0.0
+    count = sector_of(mesh).count
+    angle = pi / count if count else 0.0
     moves = np.array([[-np.sin(angle), np.cos(angle), 0.0], AXIS])[: 1 if held else dim - 1]
     return RigidBody(mass * np.eye(len(moves)), _motion_at_contact(mesh, patches, moves))
 

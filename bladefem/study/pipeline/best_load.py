@@ -42,7 +42,7 @@ STEP = 1e-4
 # searches, each with richer settings than the last
 SEARCHES = 3
 # range of a repeated search on each side of the load found before, as a factor
-NEAR = 4.0
+REPEATED_RANGE = 4.0
 
 
 @dataclass(frozen=True)
@@ -115,8 +115,8 @@ def find_best_load(
                 break
             start = found.value
             bounds = (
-                max(searched[0], found.value / NEAR),
-                min(searched[1], found.value * NEAR),
+                max(searched[0], found.value / REPEATED_RANGE),
+                min(searched[1], found.value * REPEATED_RANGE),
             )
     except NotSolvedError as error:
         return _unknown(settings, mass, searched, points, str(error))
@@ -126,7 +126,8 @@ def find_best_load(
 def search_range(scene: Scene) -> tuple[float, float]:
     """Loads [N] between which the best one is sought."""
     mu = max(scene.contact.mu, 1e-3)
-    return tuple(factor * scene.excitation.force / mu for factor in RANGE)
+    low, high = RANGE
+    return low * scene.excitation.force / mu, high * scene.excitation.force / mu
 
 
 def _search(
@@ -250,7 +251,7 @@ def tolerated_loads(tried: Sequence[Peak], accuracy: float) -> tuple[float, floa
     best = int(np.argmin(heights))
     ends = [np.nan, np.nan]
     if len(tried) < 2:
-        return tuple(ends)
+        return ends[0], ends[1]
     curve = CubicHermiteSpline(logs, heights / heights[best] - 1 - accuracy, slopes / heights[best])
     for i, side in enumerate((range(best - 1, -1, -1), range(best + 1, len(tried)))):
         last = best
@@ -259,7 +260,7 @@ def tolerated_loads(tried: Sequence[Peak], accuracy: float) -> tuple[float, floa
                 ends[i] = float(np.exp(brentq(curve, logs[last], logs[j])))
                 break
             last = j
-    return tuple(ends)
+    return ends[0], ends[1]
 
 
 def chart_loads(bests: Sequence[BestLoad]) -> tuple[float, ...]:

@@ -1,7 +1,7 @@
 """What the contact nodes do in one period at a resonance: stick, slip, separation, friction work,
 hysteresis loops.
 
-Beside them the linear element that comes closest to each friction element there (the paper's K_ad,
+Next to them the linear element that comes closest to each friction element there (the paper's K_ad,
 C_ad, F_c0).
 """
 
@@ -68,7 +68,7 @@ class ContactCycle:
     loops: dict[str, Loop]
     # (nodes, tangents) K_ad, C_ad, F_c0 averaged over the harmonics; nan at rest
     linear: Approximation
-    # (nodes, tangents, H) K_ad, C_ad of each harmonic alone; nan where the motion lacks it
+    # (nodes, tangents, H) K_ad, C_ad of each harmonic alone; nan where the motion does not have it
     harmonic: Approximation
     # (nodes,) what the period was computed with; an element's own mu, shares of the rest
     elements: Elements
@@ -158,7 +158,7 @@ def _linear(
     error in work.
 
     Args:
-        series: (n,) compliance of the layer beside that of the elements [m/N].
+        series: (n,) compliance of the layer in addition to that of the elements [m/N].
     """
     f = forces.f[:, 1:]
     u = w[:, 1:] + series[:, None, None] * f
@@ -198,7 +198,7 @@ def _loop(
     harmonics.
 
     Args:
-        series: (n,) compliance of the layer beside that of the elements [m/N].
+        series: (n,) compliance of the layer in addition to that of the elements [m/N].
     """
     fine = np.zeros((len(rows), w.shape[1], 2 * SMOOTH + 1))
     fine[..., : w.shape[2]] = w[rows]

@@ -13,11 +13,14 @@ from typing import Any
 
 import numpy as np
 
+from geometry.mesh import sector_of
+
 from ...data import Elements, ModeSet, Patch
 from ...friction.fourier import to_complex
 from ...hbm.model import Damping
 from ...hbm.solution import Solution
 from ...reduction.assemble import folded_diameter
+from ...scene.support import area_springs, held_letters
 from ..adaptive.family import joined
 from .assemble_model import LoadCase
 from .contact_cycle import labels
@@ -61,6 +64,8 @@ class DampedStress:
     mesh_error: float
     # of the motion at the probe against the balance, relative
     mismatch: float
+    # (n_points,) largest von Mises stress at each node [Pa], see AlternatingStress.field
+    field: np.ndarray
 
 
 def damped_motion(
@@ -130,7 +135,7 @@ def damped_stress(
     from ...fem.alternating_stress import alternating_stress
 
     motion = damped_motion(bodies, patches, modes, case, solution, points, factorised)
-    found = alternating_stress(bodies.still_blade, motion.harmonics)
+    found = alternating_stress(bodies.still_blade, motion.harmonics, touched_nodes(bodies))
     return DampedStress(
         case.load,
         case.mass,
@@ -139,7 +144,28 @@ def damped_stress(
         found.by_harmonic,
         found.mesh_error,
         motion.mismatch,
+        found.field,
     )
+
+
+def touched_nodes(bodies: Bodies) -> np.ndarray:
+    """(n_points,) True where the blade is held, cut, seated or excited: all else is a free face."""
+    mesh = bodies.mesh
+    support = bodies.scene.support
+    names = [
+        support.clamp,
+        *(face for face, *_ in area_springs(support)),
+        *(face for face, _ in held_letters(support)),
+        bodies.scene.excitation.at,
+        *(name for pair in mesh.pairs.values() for name in (pair.master, pair.slave)),
+    ]
+    touched = np.zeros(len(mesh.points), bool)
+    for name in names:
+        if name in mesh.faces:
+            touched[np.unique(mesh.faces[name])] = True
+        if name in mesh.nodes:
+            touched[mesh.nodes[name]] = True
+    return touched
 
 
 def blade_loads(
@@ -204,7 +230,8 @@ def _diameter(bodies: Bodies, harmonic: int) -> tuple[int, bool]:
     """Nodal diameter of a harmonic, and whether the conjugate wave is meant."""
     if not is_wheel(bodies.mesh):
         return 0, False
-    return folded_diameter(harmonic, bodies.scene.excitation.engine_order, bodies.mesh.sector.count)
+    order = bodies.scene.excitation.engine_order
+    return folded_diameter(harmonic, order, sector_of(bodies.mesh).count)
 
 
 def _nearest(modes: Sequence[ModeSet], diameter: int) -> ModeSet:
@@ -216,4 +243,4 @@ def _interblade_phase(bodies: Bodies) -> float:
     """Phase from blade to blade of harmonic 1 [rad]."""
     if not is_wheel(bodies.mesh):
         return float(bodies.scene.excitation.phase)
-    return 2 * pi * bodies.scene.excitation.engine_order / bodies.mesh.sector.count
+    return 2 * pi * bodies.scene.excitation.engine_order / sector_of(bodies.mesh).count

@@ -17,7 +17,7 @@ from ...scene.units import show
 from .assemble_model import LoadCase
 
 # travel of the seats over the compression by the load, beyond which the damper is said to lift off
-FAR = 10.0
+LIFTED_TRAVEL = 10.0
 
 
 @contextmanager
@@ -27,7 +27,7 @@ def named(
     mode: int,
     excitation: float,
 ) -> Iterator[None]:
-    """A failure inside tells the load that it belongs to, and whether the damper lifts off under
+    """A failure inside names the load that it belongs to, and whether the damper lifts off under
     it.
     """
     try:
@@ -37,7 +37,7 @@ def named(
         pressed = _compression(case)
         lifts = (
             ""
-            if travel <= FAR * pressed
+            if travel <= LIFTED_TRAVEL * pressed
             else (
                 f"the damper lifts off, since the seats move by up to {1e6 * travel:.3g} um normal "
                 "to themselves at the resonance without damper, and this load presses them "

@@ -18,7 +18,7 @@ from ...hbm.solve import free_response, stuck_response
 # of the resonance frequency, each side: where its height is looked for
 WIDTH = 0.02
 # points of that search, before it is refined between the highest and its neighbours
-COARSE = 21
+SEARCH_POINTS = 21
 # points of a drawn curve that crowd round its resonance
 DETAIL = 50
 
@@ -69,8 +69,8 @@ def _limit(
     def first(frequency: float) -> complex:
         return complex(response(model, 2 * np.pi * frequency)[1, 0])
 
-    near = omega / (2 * np.pi) * np.linspace(1 - WIDTH, 1 + WIDTH, COARSE)
-    top = min(max(int(np.argmax([abs(first(f)) for f in near])), 1), COARSE - 2)
+    near = omega / (2 * np.pi) * np.linspace(1 - WIDTH, 1 + WIDTH, SEARCH_POINTS)
+    top = min(max(int(np.argmax([abs(first(f)) for f in near])), 1), SEARCH_POINTS - 2)
     found = minimize_scalar(
         lambda f: -abs(first(f)),
         bounds=(near[top - 1], near[top + 1]),

@@ -18,7 +18,7 @@ from ..adaptive.settings import Settings
 # tolerance of heights, over the accuracy wanted
 SHARE = 0.02
 # points of the balance, over those of the curve, after which no further move begins
-MOST = 4
+MAX_COST_RATIO = 4
 UNKNOWN = "unknown"
 
 
@@ -51,7 +51,7 @@ def load_interval(
     """The interval of the resonance near the highest point of a curve, with the curve's settings.
 
     Args:
-        points: of the curve; the interval takes at most some MOST times as many.
+        points: of the curve; the interval takes at most some MAX_COST_RATIO times as many.
     """
     tolerance = SHARE * accuracy
     try:
@@ -63,7 +63,7 @@ def load_interval(
             near=top,
             tolerance=tolerance,
         )
-        found = history_interval(model, peak, tolerance=tolerance, most=MOST * points)
+        found = history_interval(model, peak, tolerance=tolerance, most=MAX_COST_RATIO * points)
     except NotSolvedError as error:
         return LoadInterval(
             size(top), top.frequency, size(top), top.frequency, UNKNOWN, 0, 0, str(error)

@@ -7,7 +7,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import partial
-from typing import Any
+from typing import Any, TypeAlias
 
 import numpy as np
 
@@ -16,6 +16,7 @@ from ...hbm.history_interval import POINT
 from ...hbm.solution import Solution
 from ...hbm.sweep import size
 from ...scene.tables import Scene
+from ...util.communicator import Communicator
 from ...util.progress import Progress, unwatched
 from ..adaptive.check_points import peak_of
 from ..adaptive.choice import checked, estimated
@@ -29,10 +30,10 @@ from .linear_limits import Limit
 from .load_interval import LoadInterval, load_interval
 from .stability import UNSTABLE, Stability, stability_of
 
-Keep = Callable[[LoadCase, Callable[[], Any]], Any]
+Keep: TypeAlias = "Callable[[LoadCase, Callable[[], Curve]], Curve]"
 
 
-def forgotten(case: LoadCase, compute: Callable[[], Any]) -> Any:
+def forgotten(case: LoadCase, compute: Callable[[], Curve]) -> Curve:
     """The keeper that keeps nothing."""
     return compute()
 
@@ -122,7 +123,7 @@ def study_loads(
     cases: list[LoadCase],
     family: Callable[[LoadCase], Family],
     settings: Settings,
-    comm: Any = None,
+    comm: Communicator | None = None,
     progress: Progress = unwatched,
     keep: Keep = forgotten,
 ) -> list[Curve]:
@@ -139,13 +140,15 @@ def study_loads(
         keep: keep(case, compute) gives the curve of a load, found from an earlier run or computed
             and kept.
     """
-    rank, ranks = (comm.rank, comm.size) if comm is not None else (0, 1)
+    rank = 0 if comm is None else comm.rank
+    ranks = 1 if comm is None else comm.size
     curves = {
         i: keep(cases[i], partial(curve_of, scene, cases[i], family, settings))
         for i in progress(dealt(len(cases), rank, ranks), "forced responses", delay=0.0)
     }
-    for part in comm.allgather(curves) if ranks > 1 else []:
-        curves.update(part)
+    if comm is not None and ranks > 1:
+        for part in comm.allgather(curves):
+            curves.update(part)
     return [curves[i] for i in range(len(cases))]
 
 
@@ -195,7 +198,8 @@ def curve_of(
     if scene.study.stability and lasting:
         top = max(lasting, key=size)
     tolerated = scene.accuracy * size(top) / np.maximum(heights, 1e-6 * size(top))
-    columns = (np.array(c) for c in zip(*map(_record, curve.points), strict=True))
+    rows = [_record(point) for point in curve.points]
+    columns = {name: np.array([row[name] for row in rows]) for name in rows[0]}
     lifts = any(p.states["lift"] > 0 for p in curve.points if p.converged)
     halved = np.nan if scene.contact.points else halved_change(models, curve.settings, top)
     interval = None
@@ -203,44 +207,45 @@ def curve_of(
         model = member(models, curve.settings).model
         interval = load_interval(model, curve.settings, top, scene.accuracy, len(curve.points))
     return Curve(
-        case.load,
-        case.mass,
-        curve.settings,
-        *columns,
-        estimated(curve),
-        tolerated,
-        checked(curve),
-        marks.verdict,
-        marks.multiplier,
-        halved,
-        top,
-        marks.bifurcation if len(marks.bifurcation) else np.full(len(heights), ""),
-        None if top is highest else highest,
-        interval,
-        lifts and unfollowed(models, curve.settings),
+        load=case.load,
+        mass=case.mass,
+        settings=curve.settings,
+        **columns,
+        estimated=estimated(curve),
+        tolerated=tolerated,
+        checked=checked(curve),
+        stability=marks.verdict,
+        multiplier=marks.multiplier,
+        halved=halved,
+        peak=top,
+        bifurcation=marks.bifurcation if len(marks.bifurcation) else np.full(len(heights), ""),
+        unstable_peak=None if top is highest else highest,
+        interval=interval,
+        unfollowed=lifts and unfollowed(models, curve.settings),
     )
 
 
-def _record(p: Solution) -> tuple[object, ...]:
-    return (
-        p.frequency,
-        size(p),
-        p.probe[1, 0],
-        p.converged,
-        p.method,
-        p.route,
-        p.residual,
-        p.iterations,
-        p.states["slip"] + p.states["lift"],
-        p.drift,
-        p.work.dissipated,
-        p.work.imbalance,
-        p.branch,
-    )
+def _record(p: Solution) -> dict[str, Any]:
+    """The columns of a curve at one point."""
+    return {
+        "frequency": p.frequency,
+        "amplitude": size(p),
+        "first": p.probe[1, 0],
+        "converged": p.converged,
+        "method": p.method,
+        "route": p.route,
+        "residual": p.residual,
+        "iterations": p.iterations,
+        "slipping": p.states["slip"] + p.states["lift"],
+        "drift": p.drift,
+        "dissipated": p.work.dissipated,
+        "imbalance": p.work.imbalance,
+        "branch": p.branch,
+    }
 
 
 def beyond_tolerance(curve: Curve) -> str:
-    """A sentence where points beside the resonance are estimated to be wrong by more than the
+    """A sentence where points next to the resonance are estimated to be wrong by more than the
     scene's accuracy of the highest amplitude; empty where all keep it.
     """
     away = curve.frequency != curve.peak_frequency
@@ -249,7 +254,8 @@ def beyond_tolerance(curve: Curve) -> str:
         return ""
     band = curve.frequency[missed]
     return (
-        f"load {curve.load:g} N: beside the resonance {missed.sum()} of {len(missed)} points, from "
+        f"load {curve.load:g} N: next to the resonance {missed.sum()} of {len(missed)} points, "
+        "from "
         f"{band.min():.5g} to {band.max():.5g} Hz, are estimated to be off by more than the "
         "accuracy of the highest amplitude (estimated and tolerated error in the table of points)"
     )
@@ -271,7 +277,7 @@ def summary(curves: list[Curve], limits: tuple[Limit, Limit]) -> dict[str, np.nd
     return table
 
 
-def _row(c: Curve) -> dict[str, float]:
+def _row(c: Curve) -> dict[str, Any]:
     return {
         "load": c.load,
         "peak_frequency": c.peak_frequency,
@@ -304,7 +310,7 @@ def _interval_row(c: Curve) -> dict[str, float | str]:
     }
 
 
-def _linear_row(limit: Limit) -> dict[str, float]:
+def _linear_row(limit: Limit) -> dict[str, Any]:
     return {
         "load": limit.load,
         "peak_frequency": limit.peak_frequency,
@@ -325,6 +331,6 @@ def default_loads(scene: Scene, count: int = 8) -> tuple[float, ...]:
     """Loads when none are given: three decades round the force at which friction can hold the
     excitation.
     """
-    mu = np.mean([seat_contact(scene.contact, patch).mu for patch in ("this", "next")])
+    mu = float(np.mean([seat_contact(scene.contact, patch).mu for patch in ("this", "next")]))
     held = scene.excitation.force / max(mu, 1e-3)
     return tuple(float(f"{x:.2g}") for x in np.geomspace(held, 300 * held, count))

@@ -7,11 +7,10 @@ from __future__ import annotations
 import time
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import contextmanager
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 from functools import lru_cache, partial
-from html import escape
 from pathlib import Path
-from typing import Any
+from typing import Literal, TypeAlias, TypeVar, overload
 
 import numpy as np
 
@@ -23,8 +22,8 @@ from ...contact.numerical_stiffness import numerical_stiffness, split_stiffness
 from ...contact.peak_pressure import peak_remarks
 from ...contact.seating import ContactProblem
 from ...contact.seating import solve as seat
-from ...data import ModeSet, Patch, PressureMap
-from ...errors import InputError, NotSolvedError
+from ...data import Patch
+from ...errors import InputError, NotSolvedError, suggestion
 from ...io.stage_cache import found_remark, on_root, stage
 from ...reduction.truncate import truncated
 from ...scene.kinds import kind_named
@@ -32,6 +31,7 @@ from ...scene.tables import Scene
 from ...scene.units import show
 from ...scene.validate import refuse_response
 from ...scene.warnings import doubts
+from ...util.communicator import Communicator
 from ...util.message import method, warning
 from ...util.progress import Progress, unwatched
 from ..adaptive.check_points import peak_of
@@ -42,7 +42,7 @@ from ..adaptive.resonance_choice import choose_at_peak, peak_from
 from ..adaptive.settings import DAMPERS, Settings, enriched, first_settings
 from ..influences import Influence, influences, parameters_of
 from ..modes.clamped_aerofoil import clamped_blade
-from ..modes.stress import Strength, strength
+from ..modes.stress import strength
 from .assemble_model import LoadCase, joint_model
 from .best_load import BestLoad, chart_loads, find_best_load
 from .changed_cases import cases_of, changed_cases
@@ -50,7 +50,6 @@ from .contact_cycle import labels
 from .damped_motion import DampedStress, damped_stress
 from .history import (
     FRICTIONLESS,
-    DamperMass,
     coarse_history,
     condense_friction,
     damper_masses,
@@ -59,9 +58,10 @@ from .history import (
     seat_by_history,
 )
 from .liftoff import named
-from .linear_limits import Limit, linear_limits
+from .linear_limits import linear_limits
 from .load_interval import interval_sentence
 from .loads import Curve, beyond_tolerance, default_loads, study_loads
+from .run_records import ModalRun, ReducedRun, Response, Run, SeatedRun, Seating, SolvedRun
 from .stability import stability_sentence, unstable_sentence
 from .stage_inputs import stage_key
 from .stages import (
@@ -76,6 +76,7 @@ from .stages import (
     reduce_sector,
     weighted,
 )
+from .utilisation import utilisation_message
 from .validate_mesh import found_patches
 
 # higher ones borrow the nodal diameter next to their own
@@ -85,218 +86,221 @@ UNKNOWNS = 6000
 # largest estimated error by the mesh of a stress that is no warning
 TRUSTED_STRESS = 0.2
 STAGES = ("mesh", "modes", "contact", "reduction", "response")
+Folder: TypeAlias = str | Path | None
+Result = TypeVar("Result")
 
 
-@dataclass(frozen=True)
-class Seating:
-    """The seated damper: the condensed problem, and the pressure of each load."""
-
-    problem: ContactProblem
-    # mean normal load of a seat [N] to the map of each patch
-    maps: dict[float, list[PressureMap]]
-    # that load by the damper's own mass at the operating speed [N]
-    own: float | None = None
-    # the damper that makes each load, where friction takes part in the seating
-    masses: tuple[DamperMass, ...] = ()
-    # all ports of the seats, where friction takes part in the seating
-    rough: FrictionalProblem | None = None
+@overload
+def run(
+    scene: Scene,
+    folder: Folder,
+    until: Literal["mesh"],
+    comm: Communicator | None = ...,
+    progress: Progress = ...,
+) -> Run: ...
 
 
-@dataclass(frozen=True, repr=False)
-class Response:
-    """Forced responses and what they were made with."""
-
-    settings: Settings
-    curves: list[Curve]
-    # no damper, full stick
-    limits: tuple[Limit, Limit]
-    # of each mass of the damper; empty where a single load was asked for
-    best: tuple[BestLoad, ...] = ()
-    # what the lowest of them hangs on, the largest influence first
-    influences: tuple[Influence, ...] = ()
-
-    @property
-    def free_peak(self) -> tuple[float, float]:
-        """Resonance without damper: [Hz], [m]."""
-        return self.limits[0].peak_frequency, self.limits[0].peak_amplitude
-
-    def __repr__(self) -> str:
-        best = min(self.curves, key=lambda curve: curve.peak_amplitude)
-        return (
-            f"<bladefem response: {len(self.curves)} loads, smallest resonance "
-            f"{1e6 * best.peak_amplitude:.4g} µm under {best.load:g} N>"
-        )
+@overload
+def run(
+    scene: Scene,
+    folder: Folder,
+    until: Literal["modes"],
+    comm: Communicator | None = ...,
+    progress: Progress = ...,
+) -> ModalRun: ...
 
 
-@dataclass(frozen=True, repr=False)
-class Run:
-    """What a run has so far; stages after ``until`` are None."""
+@overload
+def run(
+    scene: Scene,
+    folder: Folder,
+    until: Literal["contact"],
+    comm: Communicator | None = ...,
+    progress: Progress = ...,
+) -> SeatedRun: ...
 
-    scene: Scene
-    folder: Path | None
-    mesh: Mesh
-    modes: list[ModeSet] | None = None
-    # of the aerofoil held at its root, at rest; None where the blade is that itself
-    clamped: ModeSet | None = None
-    contact: Seating | None = None
-    strength: Strength | None = None
-    reduced: Reduced | None = None
-    response: Response | None = None
-    # study.mistuning.pattern_response.PatternResponse of each load; None where all blades are alike
-    wheel: list[Any] | None = None
-    # number of a curve to the stress at its resonance: of the lowest one and of the own load
-    damped: dict[int, DampedStress] | None = None
-    # stage to seconds
-    timings: dict[str, float] = field(default_factory=dict)
-    messages: list[str] = field(default_factory=list)
 
-    def __repr__(self) -> str:
-        stages = [
-            name
-            for name in ("mesh", "modes", "contact", "reduced", "response")
-            if getattr(self, name) is not None
-        ]
-        where = "in memory" if self.folder is None else f"in '{self.folder}'"
-        return f"<bladefem run of '{self.scene.title}' {where}: {', '.join(stages)}>"
+@overload
+def run(
+    scene: Scene,
+    folder: Folder,
+    until: Literal["reduction"],
+    comm: Communicator | None = ...,
+    progress: Progress = ...,
+) -> ReducedRun: ...
 
-    def _repr_html_(self) -> str:
-        """What a notebook shows: the stages and what they found."""
-        rows = {"scene": self.scene.title, "folder": self.folder, "mesh": self.mesh}
-        if self.modes is not None:
-            rows["modes"] = self.modes
-        if self.response is not None:
-            rows["response"] = self.response
-        cells = "".join(
-            f"<tr><th>{name}</th><td>{escape(str(value))}</td></tr>" for name, value in rows.items()
-        )
-        return f"<table>{cells}</table>"
+
+@overload
+def run(
+    scene: Scene,
+    folder: Folder,
+    until: Literal["response"] = ...,
+    comm: Communicator | None = ...,
+    progress: Progress = ...,
+) -> SolvedRun: ...
 
 
 def run(
     scene: Scene,
-    folder: str | Path,
+    folder: Folder,
     until: str = "response",
-    comm: Any = None,
+    comm: Communicator | None = None,
     progress: Progress = unwatched,
 ) -> Run:
     """Run a scene as far as a stage, on all ranks of a communicator.
 
     Args:
-        folder: the run folder; finished stages are picked up from it.
+        folder: the run folder; finished stages are picked up from it. None: in memory.
         until: one of STAGES.
         progress: wraps long loops, as tqdm does: progress(items, label).
+
+    Returns:
+        the record of that stage, see :mod:`bladefem.study.pipeline.run_records`.
 
     Raises:
         InputError: the scene cannot be run as it is; NotSolvedError: a stage found no solution.
     """
-    if until in STAGES[3:]:
+    if until not in STAGES:
+        raise InputError(f"until = {until!r}: expected a stage{suggestion(until, STAGES)}")
+    responds = until in STAGES[3:]
+    if responds:
         refuse_response(scene)
-    clock = Clock({}, [*map(warning, doubts(scene))], progress)
-    keep = _Keeper(folder, comm, clock)
+    keep = _Keeper(folder, comm, Clock({}, [*map(warning, doubts(scene))], progress))
+    meshed = _run_mesh(scene, keep)
+    if until == "mesh":
+        return meshed
+    check_blade(scene, meshed.mesh)
+    patches = [] if until == "modes" else found_patches(scene, meshed.mesh, excited=responds)
+    if patches:
+        refuse_jamming(scene, meshed.mesh, patches)
+    bodies = Bodies(scene, meshed.mesh, comm, progress)
+    modal = _run_modes(meshed, bodies, keep)
+    if until == "modes":
+        return modal
+    seated = _run_contact(modal, bodies, patches, keep)
+    if until == "contact":
+        return seated
+    reduced = _run_reduction(seated, bodies, patches, keep)
+    if until == "reduction":
+        return reduced
+    return _run_response(reduced, patches, keep)
+
+
+def _run_mesh(scene: Scene, keep: _Keeper) -> Run:
+    clock = keep.clock
     with clock("mesh"):
-        mesh = keep("mesh", stage_key("mesh", scene), lambda: build_mesh(scene, comm))
+        mesh = keep("mesh", stage_key("mesh", scene), lambda: build_mesh(scene, keep.comm))
     # what was done to a user's own elements
     clock.messages.extend(mesh.report.get("notes", ()))
-    result = Run(
-        scene,
-        None if folder is None else Path(folder),
-        mesh,
+    return Run(
+        scene=scene,
+        folder=None if keep.folder is None else Path(keep.folder),
+        mesh=mesh,
         timings=clock.seconds,
         messages=clock.messages,
     )
-    if until == "mesh":
-        return result
-    check_blade(scene, mesh)
-    patches = [] if until == "modes" else found_patches(scene, mesh, excited=until in STAGES[3:])
-    if patches:
-        refuse_jamming(scene, mesh, patches)
-    bodies = Bodies(scene, mesh, comm, progress)
-    with clock("modes"):
-        result = replace(
-            result,
-            modes=keep("modes", stage_key("modes", scene), lambda: find_modes(bodies)),
-            clamped=keep("clamped", stage_key("modes", scene), lambda: clamped_blade(bodies)),
-        )
-    if until == "modes":
-        return result
+
+
+def _run_modes(before: Run, bodies: Bodies, keep: _Keeper) -> ModalRun:
+    key = stage_key("modes", before.scene)
+    with keep.clock("modes"):
+        modes = keep("modes", key, lambda: find_modes(bodies))
+        clamped = keep("clamped", key, lambda: clamped_blade(bodies))
+    return ModalRun(**vars(before), modes=modes, clamped=clamped)
+
+
+def _run_contact(
+    before: ModalRun,
+    bodies: Bodies,
+    patches: list[Patch],
+    keep: _Keeper,
+) -> SeatedRun:
+    scene = before.scene
+    mesh = before.mesh
+    clock = keep.clock
     with clock("contact"):
         seating = _seated(scene, bodies, patches, keep, clock)
-        maps = seating.maps
         if mesh.dimension == 2:
-            clock.messages.extend(
-                map(
-                    warning,
-                    filter(None, [coarse_sentence(m for pair in maps.values() for m in pair)]),
-                )
-            )
-        clock.messages.extend(map(warning, peak_remarks(maps, scene, mesh.depth)))
-        result = replace(result, contact=seating)
-    if until == "contact":
-        return result
-    with clock("stresses"):
-        excited = excited_modes(scene, mesh, result.modes)
-        result = replace(
-            result,
-            strength=keep(
-                "strength", stage_key("stress", scene), lambda: strength(bodies, excited)
-            ),
-        )
-    cases = load_cases(scene, mesh, result.contact)
-    with clock("reduction"):
-        settings, reduced = reduced_sector(
-            scene, bodies, cases[len(cases) // 2], list(patches), keep
-        )
-    result = replace(result, reduced=reduced)
-    if until == "reduction":
-        return result
-    family = partial(family_of_case, scene, mesh, reduced, list(patches))
+            coarse = coarse_sentence(m for pair in seating.maps.values() for m in pair)
+            clock.messages.extend(map(warning, filter(None, [coarse])))
+        clock.messages.extend(map(warning, peak_remarks(seating.maps, scene, mesh.depth)))
+    return SeatedRun(**vars(before), contact=seating)
+
+
+def _run_reduction(
+    before: SeatedRun,
+    bodies: Bodies,
+    patches: list[Patch],
+    keep: _Keeper,
+) -> ReducedRun:
+    scene = before.scene
+    mesh = before.mesh
+    with keep.clock("stresses"):
+        excited = excited_modes(scene, mesh, before.modes)
+        stressed = keep("strength", stage_key("stress", scene), lambda: strength(bodies, excited))
+    cases = load_cases(scene, mesh, before.contact)
+    middle = cases[len(cases) // 2]
+    with keep.clock("reduction"):
+        settings, reduced = reduced_sector(scene, bodies, middle, patches, keep)
+    return ReducedRun(**vars(before), strength=stressed, settings=settings, reduced=reduced)
+
+
+def _run_response(before: ReducedRun, patches: list[Patch], keep: _Keeper) -> SolvedRun:
+    scene = before.scene
+    mesh = before.mesh
+    settings = before.settings
+    clock = keep.clock
+    family = partial(family_of_case, scene, mesh, before.reduced, patches)
     with clock("best load"):
-        best = _best_loads(scene, mesh, result.contact, family, settings, keep)
+        best = _best_loads(scene, mesh, before.contact, family, settings, keep)
         clock.messages.extend(_best_remarks(scene, best))
-    if scene.study.loads is None and best and not any(b.reason for b in best):
-        loads = studied_loads(scene, result.contact.own, chart_loads(best))
-        result = replace(result, contact=_at_loads(scene, result.contact, loads, clock))
-        cases = load_cases(scene, mesh, result.contact)
-    response = _response(scene, cases, family, settings, keep, clock, progress)
+    charted = scene.study.loads is None and best and not any(b.reason for b in best)
+    if charted:
+        loads = studied_loads(scene, before.contact.own, chart_loads(best))
+        before = replace(before, contact=_at_loads(scene, before.contact, loads, clock))
+    cases = load_cases(scene, mesh, before.contact)
+    response = _response(scene, cases, family, settings, keep)
     with clock("influences"):
-        hangs_on = _influences(scene, mesh, result.contact, family, best, keep)
-    result = replace(result, response=replace(response, best=best, influences=hangs_on))
+        found = _influences(scene, mesh, before.contact, family, best, keep)
+    curves = response.curves
     with clock("stresses"):
-        stressed = keep(
+        damped = keep(
             "damped_stress",
-            stage_key("stress", scene, [(c.load, c.mass, c.peak.f) for c in response.curves]),
-            lambda: _stresses(scene, patches, result, cases, comm),
+            stage_key("stress", scene, [(c.load, c.mass, c.peak.f) for c in curves]),
+            lambda: _stresses(before, patches, curves, cases, keep.comm),
         )
-        clock.messages.append(stress_message(response.curves, stressed))
-    return replace(result, damped=stressed)
+        clock.messages.append(stress_message(curves, damped))
+    response = replace(response, best=best, influences=found)
+    result = SolvedRun(**vars(before), response=response, damped=damped)
+    clock.messages.extend(filter(None, [utilisation_message(result)]))
+    return result
 
 
 def _stresses(
-    scene: Scene,
+    before: ReducedRun,
     patches: Sequence[Patch],
-    result: Run,
-    cases: list[LoadCase],
-    comm: Any,
+    curves: Sequence[Curve],
+    cases: Sequence[LoadCase],
+    comm: Communicator | None,
 ) -> dict[int, DampedStress]:
     """The stress at the lowest resonance and at that of the damper's own load, by number of the
     curve; on rank 0, whose bodies share one factorisation over the nodal diameters.
     """
-    curves = result.response.curves
-    lowest = min(range(len(curves)), key=lambda k: curves[k].peak_amplitude)
-    wanted = {lowest}
-    if result.contact.own is not None:
-        wanted.add(min(range(len(curves)), key=lambda k: abs(curves[k].load - result.contact.own)))
+    own = before.contact.own
+    wanted = {min(range(len(curves)), key=lambda k: curves[k].peak_amplitude)}
+    if own is not None:
+        wanted.add(min(range(len(curves)), key=lambda k: abs(curves[k].load - own)))
 
     def compute() -> dict[int, DampedStress]:
         from ...fem.compat import MPI
 
-        alone = Bodies(scene, result.mesh, MPI.COMM_SELF)
+        alone = Bodies(before.scene, before.mesh, MPI.COMM_SELF)
         factorised = lru_cache(maxsize=None)(alone.factorised)
         found = {}
         for k in sorted(wanted):
             points = curves[k].settings.points
             found[k] = damped_stress(
-                alone, patches, result.modes, cases[k], curves[k].peak, points, factorised
+                alone, patches, before.modes, cases[k], curves[k].peak, points, factorised
             )
         return found
 
@@ -327,7 +331,7 @@ class Clock:
     progress: Progress = unwatched
 
     @contextmanager
-    def __call__(self, name: str) -> Any:
+    def __call__(self, name: str) -> Iterator[None]:
         start = time.perf_counter()
         try:
             for _ in self.progress([name], name, delay=0.0, bar_format="{desc} ..."):
@@ -340,33 +344,34 @@ class Clock:
 class _Keeper:
     """Compute a stage or find it in the folder, and say so."""
 
-    folder: str | Path
-    comm: Any
+    # None keeps nothing
+    folder: Folder
+    comm: Communicator | None
     clock: Clock
 
     def __call__(
         self,
         name: str,
         key: str,
-        compute: Callable[[], Any],
-    ) -> Any:
+        compute: Callable[[], Result],
+    ) -> Result:
         return self._said(name, *stage(self.folder, name, key, compute, self.comm))
 
     def alone(
         self,
         name: str,
         key: str,
-        compute: Callable[[], Any],
-    ) -> Any:
+        compute: Callable[[], Result],
+    ) -> Result:
         """The same for what one rank does without the others."""
         return self._said(name, *stage(self.folder, name, key, compute))
 
     def _said(
         self,
         name: str,
-        result: Any,
+        result: Result,
         seconds: float | None,
-    ) -> Any:
+    ) -> Result:
         if seconds is not None:
             self.clock.messages.append(found_remark(name, seconds))
         return result
@@ -378,9 +383,8 @@ def _response(
     family: Callable[[LoadCase], Family],
     settings: Settings,
     keep: _Keeper,
-    clock: Clock,
-    progress: Progress,
 ) -> Response:
+    clock = keep.clock
     with clock("response"):
         curves = study_loads(
             scene,
@@ -388,7 +392,7 @@ def _response(
             family,
             settings,
             keep.comm,
-            progress,
+            clock.progress,
             lambda case, make: keep.alone(
                 f"response_{_name(case)}",
                 stage_key("response", scene, case.load, case.mass, replace(settings, error=None)),
@@ -518,8 +522,9 @@ def _influences(
     changed = changed_cases(scene, contact.problem, mesh.dimension - 1, lowest.mass, contact.rough)
     # a history of the seating has its friction already
     frictionless = scene.contact.history == FRICTIONLESS
-    angle = scene.damper.angle if scene.kind == "wedge sector" and frictionless else None
-    parameters = parameters_of(scene, angle)
+    flank_angles = kind_named(scene.kind).flank_angles
+    angles = flank_angles(scene) if flank_angles is not None and frictionless else None
+    parameters = parameters_of(scene, angles)
 
     def compute() -> list[Influence]:
         return on_root(keep.comm, lambda: influences(scene, lowest, family, changed, parameters))
@@ -635,7 +640,7 @@ def reduced_sector(
     bodies: Bodies,
     case: LoadCase,
     patches: list[Patch],
-    keep: Callable[[str, str, Callable[[], Any]], Any],
+    keep: Callable[[str, str, Callable[[], Reduced]], Reduced],
 ) -> tuple[Settings, Reduced]:
     """The sector with as many modes as the resonance of one load needs, and settings to start the
     others from.
@@ -707,35 +712,33 @@ def _remarks(
             )
         )
     for c in curves:
-        near = np.flatnonzero(c.frequency == c.peak_frequency)[0] + np.array([-1, 1])
-        if not c.converged[near[(near >= 0) & (near < len(c.frequency))]].all():
-            remarks.append(
-                warning(
-                    f"load {c.load:g} N: the highest point that was solved stands beside one that "
-                    "was not; the resonance may be higher"
-                )
-            )
-        if c.error == np.inf:
-            remarks.append(
-                warning(
-                    f"load {c.load:g} N: the error of the resonance amplitude is unknown, since "
-                    "richer models of it were not solved; nothing was refined because of that"
-                )
-            )
-        elif c.error is not None and c.error > scene.accuracy:
-            remarks.append(
-                warning(
-                    f"load {c.load:g} N: estimated error {100 * c.error:.2g} % of the resonance "
-                    f"amplitude, above the wanted {100 * scene.accuracy:.2g} "
-                    f"%{_of_the_contact_mesh(c)}"
-                )
-            )
+        remarks.extend(map(warning, _resonance_warnings(c, scene.accuracy)))
     return remarks
+
+
+def _resonance_warnings(c: Curve, accuracy: float) -> Iterator[str]:
+    """Why the highest point of a curve may be wrong."""
+    near = np.flatnonzero(c.frequency == c.peak_frequency)[0] + np.array([-1, 1])
+    if not c.converged[near[(near >= 0) & (near < len(c.frequency))]].all():
+        yield (
+            f"load {c.load:g} N: the highest point that was solved lies next to one that was not; "
+            "the resonance may be higher"
+        )
+    if c.error == np.inf:
+        yield (
+            f"load {c.load:g} N: the error of the resonance amplitude is unknown, since richer "
+            "models of it were not solved; nothing was refined because of that"
+        )
+    elif c.error is not None and c.error > accuracy:
+        yield (
+            f"load {c.load:g} N: estimated error {100 * c.error:.2g} % of the resonance "
+            f"amplitude, above the wanted {100 * accuracy:.2g} %{_of_the_contact_mesh(c)}"
+        )
 
 
 def _of_the_contact_mesh(curve: Curve) -> str:
     """The part of an estimated error that a finer contact mesh lowers, where it is the larger."""
-    if not np.isfinite(curve.halved) or curve.halved < curve.error / 2:
+    if curve.error is None or not np.isfinite(curve.halved) or curve.halved < curve.error / 2:
         return ""
     return (
         f"; {100 * curve.halved:.2g} % are what half as many contact points change, expected a "

@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 from ...errors import InputError
-from ...scene.kinds import kind_named
+from ...scene.kinds import kind_named, load_function
 from ...scene.tables import Scene
 from ...scene.units import show
-from ..kinds.hertz import check_loads
+from ..fatigue import haigh_diagram
 
 
 def refuse_run(scene: Scene) -> None:
@@ -15,9 +15,11 @@ def refuse_run(scene: Scene) -> None:
     Raises:
         InputError: the first thing that is wrong, with the field to change.
     """
-    if scene.kind == "hertz" and scene.hertz.interference is None:
-        check_loads(scene)
-    if kind_named(scene.kind).has_seats:
+    haigh_diagram(scene.fatigue)
+    kind = kind_named(scene.kind)
+    if kind.preflight is not None:
+        load_function(kind.preflight)(scene)
+    if kind.has_seats:
         _refuse_own_load(scene)
 
 

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
-from typing import Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -23,6 +23,9 @@ from ...hbm.stability import (
     UNSTABLE,
     stability_verdict,
 )
+
+if TYPE_CHECKING:
+    from .loads import Curve
 
 # local maxima of a curve that are judged whatever that takes
 MAXIMA = 4
@@ -120,12 +123,8 @@ def stability_sentence(parts: Sequence[tuple[np.ndarray, np.ndarray]]) -> str:
     )
 
 
-def unstable_sentence(curve: Any) -> str:
-    """What became of a resonance that is unstable, or "".
-
-    Args:
-        curve: a `bladefem.study.pipeline.loads.Curve`.
-    """
+def unstable_sentence(curve: Curve) -> str:
+    """What became of a resonance that is unstable, or ""."""
     several = int(curve.branch.max(initial=0))
     folded = (
         f"load {curve.load:g} N: several motions at one frequency, the response has {several} "

@@ -119,7 +119,7 @@ def stage_key(name: str, scene: Scene, *more: Any) -> str:
     """The key of a stage's result.
 
     Args:
-        more: what it depends on beside the scene, such as one load of many.
+        more: what it depends on besides the scene, such as one load of many.
     """
     values = [_without(scene, field, STAGE_INPUTS[name]) for field in declared_fields(name, scene)]
     keys = [stage_key(earlier, scene) for earlier in STAGE_INPUTS[name].after]
@@ -143,7 +143,7 @@ def _without(
     """The value of a field; of a table without what the stage does not read."""
     value = value_at(scene, field)
     left_out = [name for name in inputs.without if name.startswith(f"{field}.")]
-    if not left_out or not is_dataclass(value):
+    if not left_out or not is_dataclass(value) or isinstance(value, type):
         return value
     return replace(value, **{name.rpartition(".")[2]: None for name in left_out})
 

@@ -5,15 +5,15 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from geometry.mesh import Mesh
+from geometry.mesh import Mesh, sector_of
 
 from ...contact.interface_elements import layered, pair_ratio
 from ...contact.patch import make_patch
-from ...contact.seating import spin_axis
+from ...contact.seating import ContactProblem, spin_axis
 from ...data import ModeSet, Patch, PortModel
 from ...errors import InputError, suggestion
 from ...io.stage_cache import on_root
@@ -23,8 +23,16 @@ from ...scene.kinds import kind_named
 from ...scene.part_materials import part_materials
 from ...scene.support import area_springs, held_letters
 from ...scene.tables import Material, Scene
+from ...util.communicator import Communicator
 from ...util.progress import Progress, unwatched
-from .ports import blade_ports, damper_ports
+from .ports import Ports, blade_ports, damper_ports
+
+# dolfinx is slow to load: the functions below import it when they run
+if TYPE_CHECKING:
+    from ...fem.body import Body
+    from ...fem.constraint import Transformation
+    from ...fem.eigensolver import Eigensolver
+    from ...fem.flexibility import Flexibility
 
 # of each nodal diameter, in tables and pictures
 MODES_SHOWN = 10
@@ -46,12 +54,12 @@ class Bodies:
 
     scene: Scene
     mesh: Mesh
-    comm: Any = None
+    comm: Communicator | None = None
     progress: Progress = unwatched
 
     @cached_property
-    def still_blade(self) -> Any:
-        """fem.body.Body of the blade at rest."""
+    def still_blade(self) -> Body:
+        """The blade at rest."""
         from ...fem.body import assemble
         from ...fem.supports import AreaSpring, supported
 
@@ -62,12 +70,12 @@ class Bodies:
         return supported(body, support.clamp, springs, held_letters(support))
 
     @cached_property
-    def blade(self) -> Any:
-        """fem.body.Body of the blade, with the stiffness that it has under rotation."""
+    def blade(self) -> Body:
+        """The blade, with the stiffness that it has under rotation."""
         return self.blade_at(self.scene.operation.speed if self.scene.operation.stiffening else 0.0)
 
-    def blade_at(self, speed: float) -> Any:
-        """fem.body.Body of the blade with its stiffness at a speed [rad/s]."""
+    def blade_at(self, speed: float) -> Body:
+        """The blade with its stiffness at a speed [rad/s]."""
         from ...fem.rotation import linear_tangent, spinning
 
         if speed == 0:
@@ -80,15 +88,15 @@ class Bodies:
         )
 
     @cached_property
-    def swell(self) -> Any:
+    def swell(self) -> np.ndarray:
         """(n_points, dim) linear displacement of the blade for unit rotation [m s^2]."""
         from ...fem.rotation import swell
 
         return swell(self.still, spin_axis(self.mesh))
 
     @cached_property
-    def damper(self) -> Any:
-        """fem.flexibility.Flexibility of the floating damper."""
+    def damper(self) -> Flexibility:
+        """The floating damper."""
         from ...fem.body import assemble
         from ...fem.constraint import constrain
         from ...fem.flexibility import flexible
@@ -101,15 +109,15 @@ class Bodies:
         )
 
     @cached_property
-    def frame(self) -> Any:
-        """fem.constraint.Transformation that serves every nodal diameter."""
+    def frame(self) -> Transformation:
+        """What serves every nodal diameter."""
         from ...fem.constraint import transformation
 
         return transformation(self.blade, "clamp", is_wheel(self.mesh))
 
     @cached_property
-    def still(self) -> Any:
-        """fem.flexibility.Flexibility of the blade at rest under loads that are the same on all
+    def still(self) -> Flexibility:
+        """The blade at rest under loads that are the same on all
         blades.
         """
         from ...fem.constraint import in_step
@@ -117,8 +125,8 @@ class Bodies:
 
         return flexible(in_step(self.still_blade))
 
-    def factorised(self, diameter: int) -> Any:
-        """fem.flexibility.Flexibility of the blade in one nodal diameter, or clamped at its root;
+    def factorised(self, diameter: int) -> Flexibility:
+        """The blade in one nodal diameter, or clamped at its root;
         under rotation.
         """
         from ...fem.constraint import at_diameter
@@ -156,7 +164,7 @@ def weighted(reduced: Reduced, mass: float | None) -> Reduced:
     return replace(reduced, damper=damper, mass=mass)
 
 
-def build_mesh(scene: Scene, comm: Any = None) -> Mesh:
+def build_mesh(scene: Scene, comm: Communicator | None = None) -> Mesh:
     """The scene's mesh, drawn on rank 0 and the same on every rank.
 
     Raises:
@@ -228,8 +236,8 @@ def find_modes(
     return wheel_modes(bodies, count, wanted)
 
 
-def eigensolver(scene: Scene) -> Any:
-    """fem.eigensolver.Eigensolver that the scene asks for."""
+def eigensolver(scene: Scene) -> Eigensolver:
+    """The eigensolver that the scene asks for."""
     from ...fem.eigensolver import Eigensolver
 
     return Eigensolver(scene.solver.eigensolver, scene.solver.vectors, scene.solver.petsc)
@@ -246,7 +254,7 @@ def excited_modes(
     if modes[0].nodal_diameter is None or mesh.sector is None:
         return modes[0]
     wanted, _ = folded_diameter(1, scene.excitation.engine_order, mesh.sector.count)
-    return min(modes, key=lambda m: abs(m.nodal_diameter - wanted))
+    return min(modes, key=lambda m: abs((m.nodal_diameter or 0) - wanted))
 
 
 def wheel_modes(
@@ -269,7 +277,7 @@ def wheel_modes(
 
     comm = bodies.comm or MPI.COMM_WORLD
     mesh = bodies.mesh
-    wanted = list(range(mesh.sector.count // 2 + 1)) if diameters is None else list(diameters)
+    wanted = list(range(sector_of(mesh).count // 2 + 1)) if diameters is None else list(diameters)
     solver = eigensolver(bodies.scene)
     if comm.size == 1 or len(wanted) == 1:
         return all_diameters(
@@ -291,7 +299,7 @@ def wheel_modes(
     )
 
 
-def seat_damper(bodies: Bodies, patches: list[Patch]) -> Any:
+def seat_damper(bodies: Bodies, patches: list[Patch]) -> ContactProblem:
     """The contact problem of the damper between two platforms, with the scene's interface layer:
     after it, each load state costs milliseconds.
 
@@ -301,13 +309,13 @@ def seat_damper(bodies: Bodies, patches: list[Patch]) -> Any:
     return on_layer(bodies.scene, condense_contact(bodies, patches))
 
 
-def on_layer(scene: Scene, problem: Any) -> Any:
+def on_layer(scene: Scene, problem: ContactProblem) -> ContactProblem:
     """A contact problem with the scene's interface layer between its faces."""
     ratio = pair_ratio(scene.material.blade, scene.material.damper)
     return layered(problem, scene.contact, ratio)
 
 
-def condense_contact(bodies: Bodies, patches: list[Patch]) -> Any:
+def condense_contact(bodies: Bodies, patches: list[Patch]) -> ContactProblem:
     """The contact problem of rigid faces: all that takes finite elements."""
     from ...contact.frictional_seating import hold_axially
     from ...contact.seating import contact_problem
@@ -318,13 +326,12 @@ def condense_contact(bodies: Bodies, patches: list[Patch]) -> Any:
 
 
 def seat_clearance(bodies: Bodies, patches: list[Patch]) -> np.ndarray:
-    """(n,) gap of the seats beside that of the mesh: their shape, and the clearance [m]."""
+    """(n,) gap of the seats in addition to that of the mesh: their shape, and the clearance [m]."""
     from ...contact.face_profile import seat_gap
 
     scene = bodies.scene
     gap = np.concatenate([seat_gap(patch, bodies.mesh, scene.contact) for patch in patches])
-    # a wedge that was drawn here has its clearance in the mesh
-    return gap + scene.damper.clearance if scene.kind == "imported" else gap
+    return gap if kind_named(scene.kind).clearance_is_meshed else gap + scene.damper.clearance
 
 
 def harmonic_diameters(
@@ -338,7 +345,7 @@ def harmonic_diameters(
     if not is_wheel(mesh):
         return [0]
     order = scene.excitation.engine_order
-    count = mesh.sector.count
+    count = sector_of(mesh).count
     return sorted({folded_diameter(h, order, count)[0] for h in range(harmonics + 1)})
 
 
@@ -386,14 +393,14 @@ def reduce_sector(
         sector,
         floating,
         slice(first, first + len(patches[1].area) * mesh.dimension),
-        mesh.sector.count if is_wheel(mesh) else 0,
+        sector_of(mesh).count if is_wheel(mesh) else 0,
         mass(bodies.damper.con.body),
     )
 
 
 def _reduced_diameters(
     bodies: Bodies,
-    ports: Any,
+    ports: Ports,
     modes: int,
     diameters: Sequence[int],
 ) -> dict[int, PortModel]:
@@ -431,7 +438,7 @@ def _reduced_diameters(
 
 
 def blade_parts(scene: Scene, mesh: Mesh) -> tuple[Mesh, dict[str, Material]]:
-    """The mesh with the volumes of other materials as bodies beside the rest of the blade, and the
+    """The mesh with the volumes of other materials as bodies next to the rest of the blade, and the
     material of each.
 
     Raises:

@@ -1,5 +1,5 @@
-"""The paper's table of quasi-static contact states beside the direct solve: is the table enough for
-this scene?
+"""The paper's table of quasi-static contact states against the direct solve: is the table enough
+for this scene?
 """
 
 from __future__ import annotations
@@ -19,7 +19,7 @@ from ...scene.tables import Scene
 # of each axis
 STATES = 5
 # of the largest nodal force
-ENOUGH = 0.01
+SUFFICIENT_ACCURACY = 0.01
 # of the largest turn of a seat, below which a turn counts as none
 SEEN = 1e-6
 
@@ -32,7 +32,7 @@ class StateCheck:
     states: int
     # largest, over the largest nodal force [1]
     error: float
-    # largest that the table tells of itself [1]
+    # largest that the table estimates of itself [1]
     indicator: float
     # time of a direct solve [s]
     direct: float
@@ -40,7 +40,7 @@ class StateCheck:
     @property
     def enough(self) -> bool:
         """The table may take the place of direct solves."""
-        return max(self.error, self.indicator) <= ENOUGH
+        return max(self.error, self.indicator) <= SUFFICIENT_ACCURACY
 
 
 def check_states(

@@ -1,4 +1,4 @@
-"""What a mesh lacks for a task, all of it at once and before long work."""
+"""Prerequisites that a mesh is missing for a task, checked together before long work."""
 
 from __future__ import annotations
 
@@ -23,8 +23,8 @@ def found_patches(
     """The contact patches of a mesh that also has the nodes to excite, where these are needed.
 
     Raises:
-        InputError: it lacks one or both, or cannot show crowns and eased edges as [contact] wants
-            them.
+        InputError: one or both are missing, or cannot show crowns and eased edges as [contact]
+            wants them.
     """
     patches: list[Patch] = []
     looks: list[Callable[[], object]] = [

@@ -1,0 +1,132 @@
+"""Haigh's diagram: Goodman's line in closed form, tables, what is refused, the worst places."""
+
+from __future__ import annotations
+
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+
+from bladefem.errors import InputError
+from bladefem.fem.stress import signed_von_mises, von_mises
+from bladefem.scene.tables import Fatigue, Scene
+from bladefem.scene.toml import vary
+from bladefem.study.fatigue import haigh_diagram, utilisation
+from bladefem.study.pipeline.preflight import refuse_run
+from bladefem.study.pipeline.utilisation import highest_use, run_utilisation, utilisation_message
+
+MPA = 1e6
+TABLE = ["0 MPa: 300 MPa", "400 MPa: 180 MPa"]
+
+
+def nodes(count: int) -> np.ndarray:
+    """Places on a line of a metre."""
+    return np.column_stack([np.linspace(0, 1, count), np.zeros(count), np.zeros(count)])
+
+
+def test_goodman_line_is_its_closed_form():
+    """alternating / endurance + mean / ultimate = 1 at the limit; compression helps nothing."""
+    diagram = haigh_diagram(Fatigue(endurance=300 * MPA, ultimate=900 * MPA))
+    mean = np.array([-400.0, 0.0, 300.0, 600.0]) * MPA
+    alternating = np.array([150.0, 150.0, 200.0, 100.0]) * MPA
+    used = utilisation(diagram, nodes(4), alternating, mean).used
+    assert used == pytest.approx([0.5, 0.5, 1.0, 1.0], rel=1e-12)
+
+
+def test_table_is_straight_between_its_points():
+    table = Fatigue(haigh=("-200 MPa: 350 MPa", "0 MPa: 300 MPa", "0.4 GPa: 180 MPa"))
+    diagram = haigh_diagram(table)
+    assert diagram.allowed(np.array([-100.0, 200.0]) * MPA) == pytest.approx([325 * MPA, 240 * MPA])
+    assert np.isnan(diagram.allowed(np.array([500 * MPA]))).all()
+    assert haigh_diagram(Fatigue()) is None
+
+
+def test_nothing_lasts_at_the_ultimate_strength():
+    diagram = haigh_diagram(Fatigue(endurance=300 * MPA, ultimate=900 * MPA))
+    found = utilisation(diagram, nodes(2), np.array([1.0, 0.0]), np.full(2, 900 * MPA))
+    assert np.isinf(found.used[0])
+    assert found.used[1] == 0
+
+
+def test_worst_places_are_apart():
+    """Neighbours of a worse node are the same place; the order is that of the utilisation."""
+    count = 1001
+    alternating = 100 * MPA * np.exp(-((np.linspace(0, 1, count) - 0.3) ** 2) / 0.02)
+    diagram = haigh_diagram(Fatigue(endurance=300 * MPA, ultimate=900 * MPA))
+    found = utilisation(diagram, nodes(count), alternating, np.zeros(count))
+    places = found.worst_places(5)
+    assert places[0] == found.worst == 300
+    assert np.all(np.diff(found.used[places]) <= 0)
+    apart = np.abs(np.subtract.outer(places, places))[np.triu_indices(5, 1)]
+    assert apart.min() > 0.01 * count - 1
+
+
+def test_mean_stress_outside_of_the_diagram_names_the_place():
+    diagram = haigh_diagram(Fatigue(haigh=("0 MPa: 300 MPa", "400 MPa: 180 MPa")))
+    with pytest.raises(InputError, match=r"450 MPa at \(1000.0, 0.0, 0.0\) mm.*0 Pa to 400 MPa"):
+        utilisation(diagram, nodes(2), np.ones(2), np.array([100.0, 450.0]) * MPA)
+
+
+@pytest.mark.parametrize(
+    ("changes", "said"),
+    [
+        ({"endurance": "300 MPa"}, "fatigue.ultimate: expected with"),
+        ({"ultimate": "300 MPa"}, "fatigue.endurance: expected with"),
+        ({"endurance": "900 MPa", "ultimate": "300 MPa"}, "expected at most fatigue.ultimate"),
+        ({"endurance": "1 GPa", "haigh": ["0 MPa: 1 MPa", "1 MPa: 1 MPa"]}, "only one of the two"),
+        ({"haigh": ["0 MPa: 1 MPa"]}, "1 mean stress, expected at least two"),
+        ({"haigh": ["0 MPa", "1 MPa: 1 MPa"]}, "expected mean stress and amplitude"),
+        ({"haigh": ["5 MPa: 1 MPa", "1 MPa: 1 MPa"]}, "expected rising mean stresses"),
+        ({"haigh": ["0 MPa: 1 MPa", "1 MPa: -1 MPa"]}, "expected none below 0"),
+        ({"haigh": ["0 MPa: 1 mm", "1 MPa: 1 MPa"]}, "is not a unit of this field"),
+    ],
+)
+def test_diagrams_are_refused_before_long_work(changes, said):
+    scene = vary(Scene(), **{f"fatigue__{name}": value for name, value in changes.items()})
+    with pytest.raises(InputError, match=said):
+        refuse_run(scene)
+
+
+def run_of(scene: Scene, mean: float) -> SimpleNamespace:
+    """A run with one curve: two blade nodes, and one of the damper with a far larger stress."""
+    damped = SimpleNamespace(field=np.array([60.0, 30.0, 900.0]) * MPA, mesh_error=0.1)
+    curve = SimpleNamespace(
+        load=80.0, peak_amplitude=1.0, interval=SimpleNamespace(highest=1.2, lowest=0.9)
+    )
+    bodies = {"blade": np.array([[0, 1]]), "damper": np.array([[2, 2]])}
+    return SimpleNamespace(
+        scene=scene,
+        mesh=SimpleNamespace(points=nodes(3), bodies=bodies),
+        strength=SimpleNamespace(mean=np.array([mean, 0.0, 0.0])),
+        damped={0: damped},
+        response=SimpleNamespace(curves=[curve]),
+    )
+
+
+def test_a_run_knows_its_utilisation_and_its_bound():
+    """300 MPa last without mean stress, 200 at 300 of 900: 60 / 200, and 1.2 * 1.1 times that."""
+    scene = vary(Scene(), fatigue__endurance="300 MPa", fatigue__ultimate="900 MPa")
+    run = run_of(scene, 300 * MPA)
+    found = run_utilisation(run)[0]
+    assert found.used == pytest.approx([0.3, 0.1], rel=1e-12)
+    assert highest_use(run, 0, found) == pytest.approx(0.3 * 1.2 * 1.1, rel=1e-12)
+    assert "80 N: 0.3 at (0.0, 0.0, 0.0) mm, 60 MPa over a mean stress of 300 MPa; 0.396" in (
+        utilisation_message(run)
+    )
+    assert run_utilisation(run_of(Scene(), 0.0)) == {}
+    assert utilisation_message(run_of(Scene(), 0.0)) == ""
+
+
+def test_a_diagram_that_is_too_short_is_a_warning_of_the_run():
+    message = utilisation_message(run_of(vary(Scene(), fatigue__haigh=TABLE), 500 * MPA))
+    assert message.level == "warning"
+    assert "the mean stress is 500 MPa at (0.0, 0.0, 0.0) mm" in message
+
+
+def test_compression_is_negative():
+    """Uniaxial stress: its own value with its sign."""
+    stress = np.zeros((2, 6))
+    stress[:, 0] = 5.0, -5.0
+    assert signed_von_mises(stress) == pytest.approx([5.0, -5.0])
+    shear = np.array([0, 0, 0, 2.0, 0, 0])
+    assert signed_von_mises(shear) == pytest.approx(von_mises(shear))
