@@ -63,6 +63,13 @@ class Balance:
     # (m, z) motions along which the damper walks; None: it rests in the mean
     walk: np.ndarray | None = None
 
+    @property
+    def walking(self) -> np.ndarray:
+        """``walk`` of a balance in which the damper walks."""
+        if self.walk is None:
+            raise RuntimeError("the damper of this balance does not walk")
+        return self.walk
+
 
 @dataclass(frozen=True)
 class State:
@@ -161,13 +168,13 @@ def walk_ramp(balance: Balance, w: np.ndarray) -> np.ndarray | None:
 
 def _walk_steps(balance: Balance, w: np.ndarray) -> np.ndarray:
     """(z,) steps along the motions of the walk, from the mean of w (n, d, K)."""
-    return balance.walk.T @ (balance.linear.springs * w[:, :, 0].ravel())
+    return balance.walking.T @ (balance.linear.springs * w[:, :, 0].ravel())
 
 
 def _as_ramp(balance: Balance, steps: np.ndarray) -> np.ndarray:
     model = balance.model
     first = model.directions - model.elements.tangents
-    return (balance.walk @ steps).reshape(model.springs.shape)[:, first:]
+    return (balance.walking @ steps).reshape(model.springs.shape)[:, first:]
 
 
 def walk_rates(balance: Balance, state: State) -> np.ndarray:
@@ -183,7 +190,7 @@ def walk_rates(balance: Balance, state: State) -> np.ndarray:
     for j in range(len(steps)):
         # away from a walk of zero, where the law has a corner
         change = np.zeros(len(steps))
-        change[j] = np.copysign(size / abs(balance.walk[:, j]).max(), steps[j])
+        change[j] = np.copysign(size / abs(balance.walking[:, j]).max(), steps[j])
         ramp = _as_ramp(balance, steps + change)
         moved = contact_forces(balance.model, state.w, balance.samples, walk=ramp, jacobian=False).f
         rates.append((moved - state.forces.f) / change[j])
@@ -226,7 +233,7 @@ def transposed_force_change(
     back = back.reshape(y.shape).copy()
     if balance.walk is not None:
         weights = np.array([np.vdot(rate, y) for rate in walk_rates(balance, state)])
-        mean = balance.linear.springs * (balance.walk @ weights)
+        mean = balance.linear.springs * (balance.walking @ weights)
         back[:, :, 0] += mean.reshape(n, d)
     return back
 
@@ -255,7 +262,7 @@ def _held_walk(balance: Balance) -> Balance:
     along b has no influence.
     """
     A = balance.linear.A.copy()
-    A[0] -= balance.walk @ balance.walk.T
+    A[0] -= balance.walking @ balance.walking.T
     return replace(balance, linear=replace(balance.linear, A=A), walk=None)
 
 
@@ -273,7 +280,7 @@ def _walk_terms(balance: Balance, state: State) -> tuple[np.ndarray, np.ndarray]
     motions = []
     rows = []
     projections = []
-    for b in balance.walk.T:
+    for b in balance.walking.T:
         motion = np.zeros(shape)
         motion[:, :, 0] = b.reshape(shape[:2])
         motions.append(motion)

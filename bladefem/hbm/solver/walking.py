@@ -122,16 +122,16 @@ def drift_speed(balance: Balance, w: np.ndarray) -> float:
     """Step a period times frequency, of the contact that moves most [m/s]."""
     if balance.walk is None:
         return 0.0
-    steps = balance.walk.T @ (balance.linear.springs * w[:, :, 0].ravel())
-    ramp = (balance.walk @ steps).reshape(w.shape[:2])
+    steps = balance.walking.T @ (balance.linear.springs * w[:, :, 0].ravel())
+    ramp = (balance.walking @ steps).reshape(w.shape[:2])
     return float(np.linalg.norm(ramp, axis=1).max() * balance.linear.omega / (2 * np.pi))
 
 
 def without_step(balance: Balance, w: np.ndarray) -> np.ndarray:
     """w (n, d, K) with a walk of zero along the motions of the balance."""
-    steps = balance.walk.T @ (balance.linear.springs * w[:, :, 0].ravel())
+    steps = balance.walking.T @ (balance.linear.springs * w[:, :, 0].ravel())
     still = w.copy()
-    still[:, :, 0] -= (balance.walk @ steps).reshape(w.shape[:2])
+    still[:, :, 0] -= (balance.walking @ steps).reshape(w.shape[:2])
     return still
 
 
