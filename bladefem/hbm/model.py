@@ -245,7 +245,7 @@ class ReducedModel:
         return {}
 
 
-def rigid_damper(model: ReducedModel) -> RigidBody:
+def require_rigid_damper(model: ReducedModel) -> RigidBody:
     """The damper of a model whose damper is rigid.
 
     Raises:
@@ -258,7 +258,7 @@ def rigid_damper(model: ReducedModel) -> RigidBody:
 
 def in_series(side: PortModel, compliance: np.ndarray) -> PortModel:
     """A side with more compliance (nodes, 1 + tangents) [m/N] at its contact nodes."""
-    residual = np.array(side.residual)
+    residual = side.residual.copy(order="K")
     rows = np.arange(len(residual))[side.ports["contact"]]
     residual[rows, rows] += compliance.ravel()
     return replace(side, residual=residual)

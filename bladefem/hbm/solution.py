@@ -7,6 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..friction.fourier import to_complex
+from ..util.arrays import ComplexArray, RealArray
 from .linear.bodies import Stack, dissipated_work, modal_amplitudes, modal_flexibility, port_motion
 from .model import ReducedModel
 
@@ -45,11 +46,11 @@ class Solution:
     # a period
     samples: int
     # (n, d, 2H+1) relative displacements: mean, cos 1, sin 1, ... [m]
-    w: np.ndarray
+    w: RealArray
     # (n, d, 2H+1) contact forces, with the preload in the mean of the normal ones [N]
-    f: np.ndarray
+    f: RealArray
     # (H+1, probes) complex amplitudes, Re(q e^{i h omega t}) [m]
-    probe: np.ndarray
+    probe: ComplexArray
     converged: bool
     reason: str
     # "newton" or the fallback that reached the point

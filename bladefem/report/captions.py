@@ -48,9 +48,10 @@ CAPTIONS = {
     "accuracy/meshes": "Meshes with the settings of the automatic choice: time and errors.",
     "modes/stresses": "Where the blade is stressed most: by rotation, and by the excited mode "
     "scaled to 1 mm at the probe (mesh values at Gauss points).",
-    "modes/fatigue": "The places of the blade that use most of what the material lasts: alternating "
-    "stress of the whole damped motion, mean stress of rotation (negative: compression), the "
-    "amplitude allowed there, and the utilisation with the upper ends of its estimates.",
+    "modes/fatigue": "The places of the blade that use most of what the material lasts: "
+    "alternating stress of the whole damped motion, mean stress of rotation (negative: "
+    "compression), the amplitude allowed there, and the utilisation with the upper ends of its "
+    "estimates.",
     "modes/utilisation": "Alternating stress over the amplitude that lasts at the mean stress "
     "there, at the resonance under the best load.",
     "contact/pressure_on_both_seats": "Contact pressure on both seats under the load in the "

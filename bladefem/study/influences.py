@@ -23,6 +23,7 @@ from typing import Any
 import numpy as np
 
 from ..contact.interface_elements import gives_stiffness
+from ..data import Elements
 from ..errors import NotSolvedError
 from ..hbm.model import ReducedModel
 from ..hbm.node_gradients import node_gradients
@@ -32,7 +33,7 @@ from ..hbm.sensitivity import sensitivities
 from ..hbm.solve import solve
 from ..scene.tables import Scene
 from .adaptive.choice import sufficient
-from .adaptive.family import Family, joined, member
+from .adaptive.family import Family, Member, joined, member
 from .adaptive.settings import Settings
 from .pipeline.assemble_model import LoadCase
 from .pipeline.best_load import BestLoad, find_best_load
@@ -279,7 +280,7 @@ class _Study:
         self,
         peak: Peak,
         model: ReducedModel,
-        ends: list,
+        ends: list[Elements],
     ) -> float:
         """The same from the friction elements on both sides of a step."""
         case = self.changed("kt", 1.0)(self.best.load)
@@ -377,7 +378,7 @@ class _Study:
                 if name != "damping":
                     return family
 
-                def build(settings):
+                def build(settings: Settings) -> Member:
                     made = family.build(settings)
                     return replace(made, model=vary(made.model, "damping", factor))
 

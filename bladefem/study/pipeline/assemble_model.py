@@ -106,9 +106,9 @@ def joint_model(
 def rigid_damper(reduced: Reduced) -> RigidBody:
     """Six degrees of freedom (three in a plane, five with a stop), mass-normalised."""
     rigid = reduced.damper.omega == 0
-    return RigidBody(
-        np.eye(int(rigid.sum())), reduced.damper.shapes[reduced.damper.ports["contact"]][:, rigid]
-    )
+    # a floating body moves alike in every sector: its shapes are real
+    shapes = np.real(reduced.damper.shapes[reduced.damper.ports["contact"]][:, rigid])
+    return RigidBody(np.eye(int(rigid.sum())), shapes)
 
 
 def mass_damper(
