@@ -58,10 +58,6 @@ class ReducedModel:
     # None: the other side of each contact is fixed
     damper: RigidBody | tuple[PortModel, ...] | None = None
     damper_damping: Damping = field(default_factory=Damping)
-    # A damper whose contacts all slip has an indifferent mean position, and drifts where friction
-    # pushes it: springs of this share of the contact stiffness hold the mean. What they carry is
-    # reported as Solution.drift.
-    hold: float = 1e-3
     # Whether the mean displacements take part in the balance. Uncoupled, the contacts vibrate about
     # the preload state, whose static solution is left as it is; mean forces that friction raises
     # are reported and do not act back.

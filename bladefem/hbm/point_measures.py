@@ -1,5 +1,5 @@
 """What every solved point reports of its contacts, compiled: numbers of states, and the load on the
-springs that hold a drifting damper.
+springs that choose the mean position of a damper on which every contact slips.
 """
 
 from __future__ import annotations
@@ -28,10 +28,10 @@ def count_states(shares):
 
 
 @njit(cache=True, error_model="numpy")
-def holding_drift(B, g, load):
-    """Load on the holding springs over what the contacts could carry, both on the motions without
-    stiffness B (m, r) under the loads g (r,), for contact forces (m, K) [N]; 0 without such
-    motions.
+def carried_load(B, g, load):
+    """Load on the springs of the regularisation over what the contacts could carry, both on the
+    motions without stiffness B (m, r) under the loads g (r,), for contact forces (m, K) [N]; 0
+    without such motions.
     """
     held = 0.0
     carried = 0.0

@@ -63,7 +63,8 @@ class Solution:
     residual_displacement: float
     # the same times the contact stiffness [N]
     residual_force: float
-    # mean load on the springs that hold the damper, over the contacts' load [1]
+    # how fast a free damper walks: step a period times frequency, of the contact that moves most
+    # [m/s]
     drift: float
     # number of nodes that stick, slip, lift off, are open
     states: dict[str, int]
@@ -73,6 +74,9 @@ class Solution:
     # number of the piece of a response with several motions that the point lies on, from 1 on; 0
     # where one motion was looked for
     branch: int = 0
+    # (m, z) motions along which the damper walks; there the mean of w is no position but the step a
+    # period (`bladefem.hbm.solver.residual`). None: no contact walks
+    walk: np.ndarray | None = None
 
     @property
     def amplitude(self) -> np.ndarray:

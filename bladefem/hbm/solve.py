@@ -13,12 +13,13 @@ from ..friction.states import NODE_STATES
 from .full_stick import INSTANTS_PER_HARMONIC, leading_stuck_points, sticks_safely
 from .linear.condensation import Linear, condense
 from .model import ReducedModel
-from .point_measures import count_states, holding_drift
+from .point_measures import count_states
 from .solution import Solution, at_probes, blade_motion, probe_motion, works_of
 from .solver.fallback import NEWTON_MERITS, Attempt, match_harmonics, solve_balance
 from .solver.newton import DEFAULTS, Options, newton, runs_compiled
 from .solver.point_compiled import compiles_points, solve_each, solve_small
 from .solver.residual import Balance
+from .solver.walking import drift_speed
 from .validate_model import check_point
 
 # contact springs over the bodies' stiffness from which a failure is put down to it
@@ -67,7 +68,8 @@ def solve(
     )
     best = min(attempts, key=lambda a: (not a.end.converged, a.end.state.error))
     reason = best.end.reason if best.end.converged else _failure_reasons(balance, attempts)
-    balance = replace(balance, samples=best.samples or samples)
+    samples = best.samples or best.end.samples or samples
+    balance = replace(balance, samples=samples, walk=best.end.walk)
     return as_solution(balance, best, sum(a.end.iterations for a in attempts), reason)
 
 
@@ -124,7 +126,6 @@ def as_solution(
     relative = to_complex(state.w.reshape(-1, load.shape[2])).T
     blade = blade_motion(model, linear.omega, force)
     stiffness = model.springs[:, :, None]
-    flat = load.reshape(-1, load.shape[2])
     counts = count_states(state.forces.shares).tolist()
     return Solution(
         omega=linear.omega,
@@ -140,12 +141,13 @@ def as_solution(
         residual=state.error,
         residual_displacement=float(abs(state.residual).max()),
         residual_force=float(abs(stiffness * state.residual).max()),
-        drift=float(holding_drift(np.ascontiguousarray(linear.B), linear.g, flat)),
+        drift=drift_speed(balance, state.w),
         states=dict(zip(NODE_STATES, counts, strict=True)),
         work=works_of(
             model, linear.omega, relative, force, blade, float(np.sum(state.forces.dissipated))
         ),
         route=attempt.end.route,
+        walk=balance.walk,
     )
 
 

@@ -62,6 +62,7 @@ COLUMNS = {
     "phase": Column("phase", "rad", "deg", 180 / np.pi, 4),
     "imbalance": Column("energy imbalance", "1", digits=2),
     "slipping": Column("slipping elements"),
+    "drift": Column("walk of the damper", "m/s", "µm/s", 1e6),
     "points": Column("points"),
     "unconverged": Column("not converged"),
     "nodal_diameter": Column("nodal diameter"),

@@ -63,7 +63,6 @@ def one_body_model(
         Damping(),
         _all_dampers(wheel),
         wheel.damper_damping,
-        hold=wheel.hold,
         coupled=wheel.coupled,
     )
 

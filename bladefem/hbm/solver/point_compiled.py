@@ -9,6 +9,7 @@ is left to the fallback chain; a test holds the two ways together.
 from __future__ import annotations
 
 from collections.abc import Sequence
+from itertools import takewhile
 from typing import Any
 
 import numpy as np
@@ -18,13 +19,14 @@ from ...friction.states import NODE_STATES
 from ..linear.condensation_compiled import linear_part
 from ..linear.packed_bodies import prepared_bodies
 from ..model import ReducedModel
-from ..point_measures import count_states, holding_drift
+from ..point_measures import carried_load, count_states
 from ..policy import COMPILED_POINT
 from ..predictor import PREDICTOR_POINTS, append_solution, extrapolate_solution
 from ..solution import Solution, Work
 from .newton import SHORTEST_STEP_SHARE, Options, route_of, solvers_of
 from .newton_compiled import CONVERGED, compiled_newton
 from .residual import STICKING_FORCE_SHARE, contact_table
+from .walking import CARRIED_SHARE
 
 
 def solve_small(
@@ -131,7 +133,9 @@ def _solve_points(
         measures.tolist(),
         strict=False,
     )
-    return [_point_solution(H, samples, point) for point in parts]
+    # a damper that walks is left to the plain way
+    accepted = takewhile(lambda point: point[-1][2] <= CARRIED_SHARE, parts)
+    return [_point_solution(H, samples, point) for point in accepted]
 
 
 def _point_solution(
@@ -142,7 +146,7 @@ def _point_solution(
     """A converged point as `_compiled_points` hands it out."""
     omega, w, f, probe, end, states, measures = point
     steps, error, solver = end
-    moved, pushed, drift, *works = measures
+    moved, pushed, _, *works = measures
     return Solution(
         omega=omega,
         harmonics=H,
@@ -157,7 +161,7 @@ def _point_solution(
         residual=error,
         residual_displacement=moved,
         residual_force=pushed,
-        drift=drift,
+        drift=0.0,
         states=dict(zip(NODE_STATES, states, strict=True)),
         work=Work(*works),
         route=route_of(COMPILED_POINT, solvers_of(int(solver))),
@@ -240,7 +244,9 @@ def _prepared_arguments(
 
 @njit(cache=True, error_model="numpy")
 def _measure_point(omega, bodies, springs, linear, w, d, F, preload, residual, shares):
-    """Forces (n, d, K), probe (H+1, p), numbers of states (4,); residuals, drift and works (7,)."""
+    """Forces (n, d, K), probe (H+1, p), numbers of states (4,); residuals, load on the springs of
+    the regularisation and works (7,).
+    """
     m, K = w.shape
     f = np.empty((m // d, d, K))
     load = np.empty((m, K))
@@ -251,7 +257,7 @@ def _measure_point(omega, bodies, springs, linear, w, d, F, preload, residual, s
             load[i, k] = f[i // d, i % d, k] - (preload[i] if k == 0 else 0.0)
             out[0] = max(out[0], abs(residual[i, k]))
             out[1] = max(out[1], springs[i] * abs(residual[i, k]))
-    out[2] = holding_drift(bodies.B, bodies.g, load)
+    out[2] = carried_load(bodies.B, bodies.g, load)
     modal, probe = _blade_motion(bodies, linear, load, w, springs)
     _period_works(omega, bodies, modal, load, w, d, out[3:])
     return f, probe, count_states(shares), out

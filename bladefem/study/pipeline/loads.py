@@ -67,6 +67,8 @@ class Curve:
     iterations: IntegerArray
     # (k,) number of elements that slip or lift off in a period
     slipping: IntegerArray
+    # (k,) how fast the damper walks where friction alone does not hold it [m/s]
+    drift: RealArray
     # (k,) friction work a period [J]
     dissipated: RealArray
     # (k,) |work put in - work lost| over work put in
@@ -236,6 +238,7 @@ def _record(p: Solution) -> dict[str, Any]:
         "residual": p.residual,
         "iterations": p.iterations,
         "slipping": p.states["slip"] + p.states["lift"],
+        "drift": p.drift,
         "dissipated": p.work.dissipated,
         "imbalance": p.work.imbalance,
         "branch": p.branch,
@@ -283,6 +286,7 @@ def _row(c: Curve) -> dict[str, Any]:
         "reduction": 1.0,
         "dissipated": c.peak.work.dissipated,
         "slipping": c.peak.states["slip"] + c.peak.states["lift"],
+        "drift": c.peak.drift,
         "error": np.nan if c.error is None else c.error,
         "halved": c.halved,
         "harmonics": c.settings.harmonics,
@@ -315,6 +319,7 @@ def _linear_row(limit: Limit) -> dict[str, Any]:
         "reduction": 1.0,
         "dissipated": 0.0,
         "slipping": 0,
+        "drift": 0.0,
         "error": 0.0,
         "halved": 0.0,
         "harmonics": 1,
