@@ -36,6 +36,8 @@ CAPTIONS = {
     "of the range in the last columns was open to it.",
     "response/influences": "What the best load hangs on: each parameter over its range, by exact "
     "derivatives (bars); the two with the largest effect solved again at both ends (diamonds).",
+    "response/local_resonances": "Every local maximum of each response: motions found at its "
+    "frequency, and by which slow sweep it is reached (isolated: by neither).",
     "response/resonances": "Linear resonances without damper.",
     "mesh/convergence": "Frequencies on refined meshes, with the estimated limit and order.",
     "response/side_by_side": "Resonance amplitude and frequency at the best load over the value, "

@@ -60,6 +60,7 @@ from .nodes import (
     wear_table,
 )
 from .pressure import PICTURE, draw_seats, pressure_table, write_points
+from .resonance_table import resonance_table
 from .response_arrays import curve_arrays, loop_arrays, node_arrays, resonance_arrays
 from .tables import units_of, write_tables
 from .wheel import blade_table, pattern_drawings, pattern_sentences, pattern_table
@@ -265,6 +266,7 @@ def _tables(result: SolvedRun) -> dict[str, pd.DataFrame]:
         **_best_load(result),
         **_damper_masses(result),
         "response/summary": _summary(result),
+        **resonance_table(curves),
         "response/points": _joined(
             [*map(points_of, curves), *map(linear_points, result.response.limits)]
         ),

@@ -58,6 +58,8 @@ COLUMNS = {
     "dissipated": Column("friction work per cycle", "J", "mJ", 1e3, 4),
     "friction_damping": Column("friction damping", "1", "%", 100.0, 3),
     "reduction": Column("free over damped", "1", digits=4),
+    "motions": Column("motions there"),
+    "reached": Column("reached by a sweep"),
     "residual": Column("residual", "1", digits=2),
     "phase": Column("phase", "rad", "deg", 180 / np.pi, 4),
     "imbalance": Column("energy imbalance", "1", digits=2),

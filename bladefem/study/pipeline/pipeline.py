@@ -59,6 +59,7 @@ from .liftoff import named
 from .linear_limits import linear_limits
 from .load_interval import interval_sentence
 from .loads import Curve, beyond_tolerance, default_loads, study_loads
+from .resonance_list import reach_sentence
 from .run_records import ModalRun, ReducedRun, Response, Run, SeatedRun, Seating, SolvedRun
 from .stability import stability_sentence, unstable_sentence
 from .stage_inputs import stage_key
@@ -709,6 +710,7 @@ def _remarks(
                 "round folds: a sweep sees one motion a frequency, a higher one may exist"
             )
         )
+    remarks.extend(warning(text) for text in map(reach_sentence, curves) if text)
     for c in curves:
         remarks.extend(map(warning, _resonance_warnings(c, scene.accuracy)))
     return remarks
