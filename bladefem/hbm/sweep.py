@@ -287,8 +287,8 @@ def _walk_from(
             point = solve_near(model, omega, H, factor * samples, nearest, options)
             if point.converged:
                 return [*walked, replace(point, method="more samples")]
-    start = starts[0] if starts else None
-    return [*walked, _solve_off_resonance(model, omega, H, samples, start, options)]
+    first = starts[0] if starts else None
+    return [*walked, _solve_off_resonance(model, omega, H, samples, first, options)]
 
 
 def walk_in_frequency(

@@ -16,6 +16,7 @@ from scipy.linalg import lapack
 
 from ...data import RigidBody
 from ...errors import NotSolvedError
+from ...util.arrays import ComplexArray, RealArray
 from ..model import ReducedModel
 from ..policy import BATCHED_SOLVE_DOFS
 from .bodies import (
@@ -42,21 +43,21 @@ class Linear:
 
     omega: float
     # (m,) K [N/m]
-    springs: np.ndarray
+    springs: RealArray
     # (H+1, m, m) flexibility without contact springs and rigid motions [m/N]
-    G: np.ndarray
+    G: ComplexArray
     # (H+1, m) relative displacement without contact forces [m]
-    free: np.ndarray
+    free: ComplexArray
     # (H+1, m, m) flexibility with contact springs [m/N]
-    A: np.ndarray
+    A: ComplexArray
     # (H+1, m) relative displacement in full stick [m]
-    stuck: np.ndarray
+    stuck: ComplexArray
     # (m, r) motions without stiffness of harmonic 0, scaled to B^T K B = 1
-    B: np.ndarray
+    B: RealArray
     # (r,) loads on these motions
-    g: np.ndarray
+    g: RealArray
     # (r0, r) the same motions in the rigid coordinates of blade, then damper
-    rigid: np.ndarray
+    rigid: RealArray
 
 
 def condense(

@@ -26,6 +26,7 @@ from ...friction.aft import Forces, evaluate
 from ...friction.fourier import to_complex, to_real
 from ...friction.kernel_1d_exact import evaluate_exact
 from ...friction.trigonometric_tables import trigonometric_tables
+from ...util.arrays import RealArray
 from ..linear.condensation import Linear, condense
 from ..linear.contact_flexibility import by_harmonic
 from ..model import ReducedModel
@@ -78,13 +79,13 @@ class State:
     """
 
     # (n, d, K) relative displacements [m]
-    w: np.ndarray
+    w: RealArray
     # friction forces and their derivative, of the total load
     forces: Forces
     # (n, d, K) forces beyond preload and springs [N]
-    p: np.ndarray
+    p: RealArray
     # (n, d, K) [m]
-    residual: np.ndarray
+    residual: RealArray
     # residual of both forms over the size of the motion [1]
     error: float
     # what was derived from it, see `walk_rates`
