@@ -135,9 +135,10 @@ def blade_ring(
     omega: np.ndarray = np.tile(np.r_[body.omega, 0.0], blades)
     extra = np.zeros((m, m)) if body.damping is None else np.real(body.damping)
     one = np.pad(np.diag(2 * ratio * body.omega) + extra, (0, 1))
+    damping: np.ndarray = np.kron(np.eye(blades), one)
     return System(
-        omega**2,
-        np.kron(np.eye(blades), one),
+        np.square(omega),
+        damping,
         W,
         np.tile(elements.kt, blades),
         np.tile(elements.mu, blades),

@@ -48,7 +48,7 @@ class DiameterParts:
     # (N, k) aerodynamic stiffness, not for the mean [1/s^2]
     influence: ComplexArray
     # (N, k, k) T of the mean [s^2]
-    mean: ComplexArray
+    mean: RealOrComplex
     contact: slice
     blade: slice
     load: slice
@@ -91,7 +91,7 @@ def _made_parts(wheel: Wheel) -> DiameterParts:
         _all_diameters(viscous, count),
         _all_diameters(hysteretic, count),
         influence,
-        _all_diameters(mean, count) * float(wheel.coupled),
+        _all_diameters(mean if wheel.coupled else np.zeros_like(mean), count),
         *slices,
     )
 
