@@ -40,6 +40,9 @@ FIRST_LOOK_INTERVALS = 12
 POINTS_AT_ONCE = 16
 # points after which a sweep gives up refining
 BAND_LIMIT = 400
+BAND_LIMIT_NOTE = (
+    f"the sweep ended after {BAND_LIMIT} points: peaks may be higher by more than the accuracy"
+)
 # unknowns up to which paths are followed wherever contacts lift off; of larger models, where the
 # sweep shows a jump, too
 FOLLOWED = 600
@@ -147,15 +150,11 @@ def sweep(
     Raises:
         InputError: the band is empty or not positive.
     """
-    if not 0 < band[0] < band[1] < np.inf:
-        raise InputError(f"band {band}: expected 0 < low < high")
+    _check_band(band)
     check_probe(model, options.probe)
     solved: dict[float, Solution] = {}
 
-    @cache
-    def slope(omega: float) -> float:
-        return float(sensitivities(model, solved[omega], ["omega"])["omega"].size[options.probe])
-
+    slope = _slope_of(model, solved, options.probe)
     notes = [] if notes is None else notes
     for solution in response(model, first_look(model, band), H, samples, options=options):
         solved[solution.omega] = solution
@@ -165,25 +164,39 @@ def sweep(
         if wanted is None:
             return
         if len(solved) >= BAND_LIMIT:
-            notes.append(
-                f"the sweep ended after {BAND_LIMIT} points: peaks may be higher by more than the "
-                "accuracy"
-            )
+            notes.append(BAND_LIMIT_NOTE)
             if not (paths and _normal_loads_follow(model)):
                 return
             break
-        near = sorted(
-            (s for s in solved.values() if s.converged), key=lambda s: abs(s.omega - wanted)
-        )
-        beyond = (s for s in near if (s.omega > wanted) != (near[0].omega > wanted))
-        solution = solve_from(model, wanted, H, samples, [*near[:1], *islice(beyond, 1)], options)
-        solved[wanted] = solution
-        yield solution
-    found = find_branches(
-        model, band, list(solved.values()), H, samples, peak=peak, options=options
-    )
+        starts = _nearest_solutions(solved, wanted)
+        solved[wanted] = solve_from(model, wanted, H, samples, starts, options)
+        yield solved[wanted]
+    points = list(solved.values())
+    found = find_branches(model, band, points, H, samples, peak=peak, options=options)
     notes.extend(found.notes)
     yield from found.points
+
+
+def _check_band(band: tuple[float, float]) -> None:
+    if not 0 < band[0] < band[1] < np.inf:
+        raise InputError(f"band {band}: expected 0 < low < high")
+
+
+def _slope_of(model: ReducedModel, solved: Mapping[float, Solution], probe: int) -> Slope:
+    """The slope of the height with the frequency at solved ones, computed once for each."""
+
+    @cache
+    def slope(omega: float) -> float:
+        return float(sensitivities(model, solved[omega], ["omega"])["omega"].size[probe])
+
+    return slope
+
+
+def _nearest_solutions(solved: Mapping[float, Solution], omega: float) -> list[Solution]:
+    """The nearest converged point, and the nearest one on its other side."""
+    near = sorted((s for s in solved.values() if s.converged), key=lambda s: abs(s.omega - omega))
+    beyond = (s for s in near if (s.omega > omega) != (near[0].omega > omega))
+    return [*near[:1], *islice(beyond, 1)]
 
 
 def _normal_loads_follow(model: ReducedModel) -> bool:

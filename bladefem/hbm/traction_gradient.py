@@ -20,7 +20,8 @@ from scipy.optimize import linprog
 from ..errors import NotSolvedError
 from ..friction.fourier import synthesis
 from ..friction.law_table import require_coulomb
-from .linear.condensation import condense, with_springs
+from .linear.condensation import condense
+from .linear.mean_motion import with_springs
 from .model import ReducedModel
 from .node_gradients import size_by_force, transposed_flexibility
 from .solution import Solution

@@ -20,19 +20,18 @@ from ...friction.fourier import to_complex, to_real
 from ...friction.kernel_1d_exact import evaluate_exact
 from ...friction.trigonometric_tables import trigonometric_tables
 from ..linear.condensation import Linear
-from ..linear.contact_flexibility import by_harmonic
 from ..model import ReducedModel
 from ..policy import DENSE_LU, DETERMINANT_UNKNOWNS, ITERATIONS, linear_solver
-from .deflation import common_motions
-from .newton_compiled import Condensed
+from .newton_compiled import (
+    balance_residual,
+    dense_jacobian,
+    moving_nodes,
+    spread_to_all_nodes,
+)
 from .newton_krylov import Memory, iterative_inverse
 
 # of a step by GMRES, relative
 STEP_ACCURACY = 1e-5
-# of the preload's compression: smaller motions drown in its rounding,
-SMALL_MOTION_RATIO = 1e-8
-# and their residual is measured by this share of it
-REST_MOTION_SHARE = 1e-4
 # a node whose p is below this share of its spring force sticks
 STICKING_FORCE_SHARE = 1e-13
 
@@ -84,11 +83,18 @@ def evaluate_balance(
     model = balance.model
     linear = balance.linear
     forces = contact_forces(model, w, balance.samples, precision)
-    p = forces.f - model.springs[:, :, None] * w
-    p[:, :, 0] -= model.preload.reshape(p.shape[:2])
-    flexed = _as_node_coefficients(balance, _apply_flexibility(linear.A, as_amplitudes(p)))
-    residual = w - _as_node_coefficients(balance, linear.stuck) + flexed
-    return State(w, forces, p, residual, _relative_error(balance, w, residual))
+    p = np.empty(w.shape)
+    residual = np.empty(w.shape)
+    flat = (model.springs.size, w.shape[2])
+    error = balance_residual(
+        np.ascontiguousarray(w, dtype=float).reshape(flat),
+        linear.condensed,
+        model.preload,
+        np.ascontiguousarray(forces.f),
+        p.reshape(flat),
+        residual.reshape(flat),
+    )
+    return State(w, forces, p, residual, error)
 
 
 def contact_forces(
@@ -129,12 +135,10 @@ def linearise_balance(
     reduced to the nodes that slip or lift; the others follow from their forces. Raises
     numpy.linalg.LinAlgError where the derivative is singular.
     """
-    n, d, K = state.w.shape
+    _, d, K = state.w.shape
     change, active, dofs = _active_nodes(balance, state)
     if len(active) == 0:
         return lambda residual, accuracy=0.0: residual.copy()
-    others = np.setdiff1d(np.arange(n), active)
-    change = change[active]
     A = _select_dofs(balance.linear.A, dofs)
     if memory is not None and memory.nodes != active.tobytes():
         memory.nodes, memory.blocks, memory.slow = (
@@ -142,17 +146,20 @@ def linearise_balance(
             None,
             memory.slow or memory.blocks is not None,
         )
-    inverse = _choose_inverse(A, change, memory, common_motions(balance.model, K // 2)[dofs])
+    inverse = _choose_inverse(A, change, memory, balance.linear.condensed.motions[dofs])
 
     def solve(residual: np.ndarray, accuracy: float = STEP_ACCURACY) -> np.ndarray:
-        step = residual.copy()
-        step[active] = inverse(residual[active].reshape(-1, K), accuracy).reshape(-1, d, K)
-        if len(others):
-            p = np.zeros_like(step)
-            p[active] = (change @ step[active].reshape(len(active), d * K, 1)).reshape(-1, d, K)
-            step[others] -= _as_node_coefficients(
-                balance, _apply_flexibility(balance.linear.A, as_amplitudes(p))
-            )[others]
+        step = np.empty(residual.shape)
+        x = inverse(residual[active].reshape(-1, K), accuracy)
+        spread_to_all_nodes(
+            np.ascontiguousarray(x).ravel(),
+            np.ascontiguousarray(residual).reshape(-1, K),
+            d,
+            active,
+            change,
+            balance.linear.condensed.flex,
+            step.reshape(-1, K),
+        )
         return step
 
     return solve
@@ -167,7 +174,7 @@ def adjoint_inverse(balance: Balance, state: State) -> Inverse:
     if len(active) == 0:
         return lambda b, accuracy=0.0: b.copy()
     turned = np.ascontiguousarray(balance.linear.A.conj().swapaxes(1, 2))
-    back = np.ascontiguousarray(change[active].swapaxes(1, 2))
+    back = np.ascontiguousarray(change.swapaxes(1, 2))
     inverse = _choose_inverse(_select_dofs(turned, dofs), back)
 
     def solve(b: np.ndarray, accuracy: float = STEP_ACCURACY) -> np.ndarray:
@@ -192,25 +199,27 @@ def determinant_sign(balance: Balance, state: State) -> float:
     # everything sticks: the derivative is the identity
     if not len(dofs):
         return 1.0
-    J = _dense_jacobian(_select_dofs(balance.linear.A, dofs), change[active])
-    J[np.diag_indices_from(J)] += 1.0
+    J = dense_jacobian(_select_dofs(balance.linear.A, dofs), change)
     return float(np.linalg.slogdet(J)[0])
 
 
 def _active_nodes(balance: Balance, state: State) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Derivative of p (n, dK, dK), the nodes where it does not vanish, and their dofs."""
-    n, d, _ = state.w.shape
-    change = _force_change(balance, state)
-    active = np.flatnonzero(
-        abs(change).reshape(n, -1).max(axis=1)
-        > STICKING_FORCE_SHARE * balance.model.springs.max(axis=1)
+    """Derivative of p where it does not vanish (nodes, dK, dK), these nodes, and their dofs."""
+    d = state.w.shape[1]
+    active, change = moving_nodes(
+        np.ascontiguousarray(state.forces.jacobian, dtype=float),
+        balance.model.springs.ravel(),
+        d,
+        STICKING_FORCE_SHARE,
     )
     return change, active, (active[:, None] * d + np.arange(d)).ravel()
 
 
 def _select_dofs(A: np.ndarray, dofs: np.ndarray) -> np.ndarray:
     """(H+1, a, a) the flexibilities among some of the dofs, in one copy where one is needed."""
-    return A if len(dofs) == A.shape[1] else A[np.ix_(np.arange(len(A)), dofs, dofs)]
+    if len(dofs) == A.shape[1]:
+        return A
+    return np.ascontiguousarray(A[np.ix_(np.arange(len(A)), dofs, dofs)])
 
 
 def _choose_inverse(
@@ -253,33 +262,13 @@ def _with_factors_at_need(
 
 
 def _dense_inverse(A: np.ndarray, change: np.ndarray) -> Inverse:
-    J = _dense_jacobian(A, change)
-    J[np.diag_indices_from(J)] += 1.0
+    J = dense_jacobian(A, change)
     factors = linalg.lu_factor(J, overwrite_a=True, check_finite=False)
     if not abs(np.diag(factors[0])).min() > 0:
         raise np.linalg.LinAlgError("singular Jacobian")
     return lambda residual, _: linalg.lu_solve(
         factors, residual.ravel(), check_finite=False
     ).reshape(residual.shape)
-
-
-def compiled_arguments(balance: Balance) -> Condensed:
-    """The linear part as the compiled loop takes it."""
-    linear = balance.linear
-    G = linear.G.copy()
-    none = np.zeros((0, 0, 0), dtype=complex)
-    G[0] = 0.0
-    return Condensed(
-        by_harmonic(linear.A),
-        G,
-        to_real(linear.stuck.T),
-        linear.springs,
-        _motion_scale(linear),
-        none,
-        none,
-        none.reshape(0, 0),
-        common_motions(balance.model, len(G) - 1),
-    )
 
 
 def contact_table(
@@ -300,60 +289,6 @@ def contact_table(
             model.offset,
         ),
     )
-
-
-def _motion_scale(linear: Linear) -> float:
-    return float(
-        max(np.linalg.norm(linear.free), np.linalg.norm(linear.stuck), np.finfo(float).tiny)
-    )
-
-
-def _force_change(balance: Balance, state: State) -> np.ndarray:
-    """(n, dK, dK) derivative of p."""
-    n, d, K = state.w.shape
-    change = state.forces.jacobian.reshape(n, d * K, d * K).copy()
-    change[:, np.arange(d * K), np.arange(d * K)] -= np.repeat(balance.model.springs, K, axis=1)
-    return change
-
-
-def _dense_jacobian(A: np.ndarray, change: np.ndarray) -> np.ndarray:
-    """(a K, a K) real matrix of  p -> A p  times `change` (nodes, dK, dK), for a = nodes * d
-    dofs.
-    """
-    nodes, size = change.shape[:2]
-    H = A.shape[0] - 1
-    a = A.shape[1]
-    d = a // nodes
-    K = 2 * H + 1
-    # (K, nodes, d, dK)
-    rows = change.reshape(nodes, d, K, size).transpose(2, 0, 1, 3)
-    rows = np.concatenate([rows[:1].astype(complex), rows[1::2] - 1j * rows[2::2]])
-    # (H+1, nodes, a, d)
-    blocks = A.reshape(H + 1, a, nodes, d).transpose(0, 2, 1, 3)
-    product = (blocks @ rows).transpose(0, 2, 1, 3).reshape(H + 1, a, nodes * size)
-    J = np.empty((a, K, nodes * size))
-    J[:, 0] = product[0].real
-    J[:, 1::2] = product[1:].real.transpose(1, 0, 2)
-    J[:, 2::2] = -product[1:].imag.transpose(1, 0, 2)
-    return J.reshape(a * K, nodes * size)
-
-
-def _relative_error(
-    balance: Balance,
-    w: np.ndarray,
-    residual: np.ndarray,
-) -> float:
-    linear = balance.linear
-    r = as_amplitudes(residual)
-    size = float(np.linalg.norm(as_amplitudes(w)))
-    scale = _motion_scale(linear)
-    pressed = balance.model.compression
-    if scale < SMALL_MOTION_RATIO * pressed:
-        size = max(size, REST_MOTION_SHARE * pressed)
-        scale = max(scale, REST_MOTION_SHARE * pressed)
-    with_springs = float(np.linalg.norm(r)) / max(size, float(np.finfo(float).tiny))
-    r[1:] += _apply_flexibility(linear.G[1:], linear.springs * r[1:])
-    return max(with_springs, float(np.linalg.norm(r)) / scale)
 
 
 def _apply_flexibility(flexibility: np.ndarray, forces: np.ndarray) -> np.ndarray:
