@@ -16,6 +16,7 @@ from typing import Any
 import numpy as np
 
 from .errors import InputError
+from .util.arrays import IntegerArray, RealArray, RealOrComplex
 
 
 @dataclass(frozen=True, repr=False)
@@ -23,13 +24,13 @@ class ModeSet:
     """Normal modes of a body or of a cyclic sector in one nodal diameter, mass-normalised."""
 
     # (m,) [Hz]
-    frequencies: np.ndarray
+    frequencies: RealArray
     # (m, n_points, 3) [kg^-1/2], complex where 0 < nodal_diameter < N/2
-    shapes: np.ndarray
+    shapes: RealOrComplex
     # None for a body without cyclic symmetry
     nodal_diameter: int | None
     # (m,) |K x - w^2 M x| / |K x|, the certificate
-    residuals: np.ndarray
+    residuals: RealArray
 
     def __repr__(self) -> str:
         """
@@ -55,18 +56,18 @@ class PortModel:
     """
 
     # (m,) [rad/s], ascending; 0 for rigid modes
-    omega: np.ndarray
+    omega: RealArray
     # (p, m) mode values at the ports [kg^-1/2]
-    shapes: np.ndarray
+    shapes: RealOrComplex
     # (p, p) residual flexibility [m/N], Hermitian
-    residual: np.ndarray
+    residual: RealOrComplex
     # "contact" (node-major: normal, t1, t2), "load", "probe"
     ports: dict[str, slice]
     nodal_diameter: int | None = None
     # (p,) displacement under the static loads (n = 0 only) [m]
-    static_offset: np.ndarray | None = None
+    static_offset: RealOrComplex | None = None
     # (m,) or coupled (m, m) viscous modal damping, in addition to the model's [1/s]
-    damping: np.ndarray | None = None
+    damping: RealOrComplex | None = None
 
     def __post_init__(self) -> None:
         p = len(self.residual)
@@ -101,19 +102,19 @@ class Patch:
     # "this" or "next"
     name: str
     # (n, 3) on the blade side [m]
-    points: np.ndarray
+    points: RealArray
     # (n,) share of the face [m^2]
-    area: np.ndarray
+    area: RealArray
     # (n, 3, 3) rows: normal (out of the blade), t1, t2
-    frame: np.ndarray
+    frame: RealArray
     # (nf, k) corner numbers into points, for pictures
-    faces: np.ndarray
+    faces: IntegerArray
     # (n,) node numbers in the mesh
-    blade_nodes: np.ndarray
+    blade_nodes: IntegerArray
     # (n,) node numbers in the mesh
-    damper_nodes: np.ndarray
+    damper_nodes: IntegerArray
     # (n, 3) where their forces act: mean places of what they stand for [m]
-    places: np.ndarray | None = None
+    places: RealArray | None = None
 
 
 @dataclass(frozen=True)
@@ -122,14 +123,14 @@ class PressureMap:
 
     patch: Patch
     # (n,) normal force, pressing > 0 [N]
-    force: np.ndarray
+    force: RealArray
     # (n,) opening between the unpressed surfaces of the faces [m]; 0 where they press: how far the
     # interface layer is closed there follows from the force (contact.interface_law)
-    gap: np.ndarray
+    gap: RealArray
     # max |force gap| over (max force, max gap): the proof of optimality
     complementarity: float
     # (n, tangents) static friction force [N], as `Elements.t0`; None: seated without friction
-    traction: np.ndarray | None = None
+    traction: RealArray | None = None
 
     @property
     def pressure(self) -> np.ndarray:
@@ -142,20 +143,20 @@ class Elements:
     """Node-to-node friction elements, one a contact node."""
 
     # (n,) tangential stiffness [N/m]
-    kt: np.ndarray
+    kt: RealArray
     # (n,) normal stiffness [N/m]; 0: the normal load is prescribed, N(t) = n0
-    kn: np.ndarray
+    kn: RealArray
     # (n,) friction coefficient [1]
-    mu: np.ndarray
+    mu: RealArray
     # (n,) static normal force [N]; negative means an initial gap of -n0/kn
-    n0: np.ndarray
+    n0: RealArray
     # tangential directions: 1 (plane models) or 2
     tangents: int = 2
     # friction law of all nodes, or a tuple with one a node: an object or a name of the table; None:
     # Coulomb's, see `bladefem.friction.law_table`
     law: Any = None
     # (n, tangents) static friction force of the preload state [N]; none when None
-    t0: np.ndarray | None = None
+    t0: RealArray | None = None
 
     @property
     def traction(self) -> np.ndarray:
@@ -172,8 +173,8 @@ class RigidBody:
     """
 
     # (d, d) [kg, kg m, kg m^2]
-    mass: np.ndarray
+    mass: RealArray
     # (contact dofs, d) from q to displacements in the pairs' frames
-    B: np.ndarray
+    B: RealArray
     # (d,) static load [N, N m]
-    load: np.ndarray = field(default_factory=lambda: np.zeros(0))
+    load: RealArray = field(default_factory=lambda: np.zeros(0))

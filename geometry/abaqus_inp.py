@@ -259,7 +259,7 @@ def _add_instance(
         )
     motion = _instance_motion(keyword)
 
-    def moved(key):
+    def moved(key: Key) -> Key:
         return (name, key[1])
 
     for key, place in part.nodes.items():

@@ -21,6 +21,7 @@ import numpy as np
 from scipy.spatial import cKDTree
 
 from bladefem.errors import InputError, suggestion
+from bladefem.util.arrays import IntegerArray
 
 from .finalise_mesh import Motion
 from .jacobian import straight_jacobian
@@ -215,7 +216,7 @@ def _split_bodies(
     bodies = {"blade": solids.cells[blade]}
     if damper.size:
         bodies["damper"] = solids.cells[damper]
-    parts = {
+    parts: dict[str, IntegerArray] = {
         name: np.searchsorted(blade, np.unique(some))
         for name, some in rows.items()
         if some.size and not np.isin(some, damper).any()

@@ -5,9 +5,8 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 from typing import Any
 
-import numpy as np
-
 from bladefem.errors import InputError
+from bladefem.util.arrays import IntegerArray, RealArray
 
 
 @dataclass(frozen=True)
@@ -17,9 +16,9 @@ class Sector:
     # number of blades on the wheel; 0 when the row has no end (plane blades)
     count: int
     # (3, 3)
-    rotation: np.ndarray
+    rotation: RealArray
     # (3,) [m]
-    shift: np.ndarray
+    shift: RealArray
 
 
 @dataclass(frozen=True)
@@ -33,11 +32,11 @@ class Pair:
     # name of a face
     slave: str
     # (2, m) node numbers, row 0 on the master, row 1 on the slave
-    nodes: np.ndarray
+    nodes: IntegerArray
     # (3, 3)
-    rotation: np.ndarray
+    rotation: RealArray
     # (3,) [m]
-    shift: np.ndarray
+    shift: RealArray
 
 
 @dataclass(frozen=True, repr=False)
@@ -55,15 +54,15 @@ class Mesh:
     """
 
     # (n, 3) [m]
-    points: np.ndarray
+    points: RealArray
     # meshio's word: "tetra", "tetra10", "triangle", "triangle6", "hexahedron", ...
     cell_type: str
     # name -> (nc, k) node numbers of its cells
-    bodies: dict[str, np.ndarray]
+    bodies: dict[str, IntegerArray]
     # name -> (nf, kf) node numbers (edges in 2-D)
-    faces: dict[str, np.ndarray] = field(default_factory=dict)
+    faces: dict[str, IntegerArray] = field(default_factory=dict)
     # name -> (k,) node numbers
-    nodes: dict[str, np.ndarray] = field(default_factory=dict)
+    nodes: dict[str, IntegerArray] = field(default_factory=dict)
     pairs: dict[str, Pair] = field(default_factory=dict)
     sector: Sector | None = None
     # out-of-plane thickness of a plane mesh [m]
@@ -71,7 +70,7 @@ class Mesh:
     # quality: cells, worst Jacobian, straightened, ...
     report: dict[str, Any] = field(default_factory=dict)
     # named volumes of the blade -> rows of bodies["blade"]
-    parts: dict[str, np.ndarray] = field(default_factory=dict)
+    parts: dict[str, IntegerArray] = field(default_factory=dict)
 
     def __repr__(self) -> str:
         bodies = ", ".join(f"{name} {len(cells)} cells" for name, cells in self.bodies.items())

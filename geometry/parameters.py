@@ -116,6 +116,12 @@ class Wedge:
         "normal gap between flank and seat before seating; negative: an interference, which the "
         "damper takes up as it travels inwards",
     )
+    axial: str = quantity(
+        "free",
+        choices=("free", "held"),
+        help="motion of the damper along the engine axis: left to friction, or held by a stop such "
+        "as a cover plate; it may turn in both cases",
+    )
 
     @property
     def angles(self) -> tuple[float, float]:

@@ -30,7 +30,7 @@ def shape_quality(
     """
     x = points[cells[:, : corner_count(cell_type)]]
 
-    def side(a, b):
+    def side(a: int, b: int) -> np.ndarray:
         return np.linalg.norm(x[:, a] - x[:, b], axis=1)
 
     if cell_type.startswith("triangle"):

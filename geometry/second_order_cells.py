@@ -134,7 +134,7 @@ def _fill_nodes(
     given: np.ndarray,
     places: np.ndarray,
     blocks: Blocks,
-    table: dict[str, list],
+    table: dict[str, list[tuple[int, ...]]],
 ) -> tuple[np.ndarray, list[np.ndarray]]:
     """Nodes of edges or faces, those that no cell has appended to the points at ``places``.
 

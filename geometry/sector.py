@@ -12,6 +12,7 @@ import numpy as np
 from bladefem.errors import InputError
 
 from .draw import clear_leftovers, imprint, polygon, prism
+from .extract_arrays import Groups
 from .finalise_mesh import complete, mesh_model
 from .mesh import Mesh
 from .parameters import Aerofoil, Disc, MeshSize, Platform, Shank, Wedge
@@ -20,7 +21,7 @@ from .section import LIFT, outline
 from .sector_check import check_sector
 from .sector_names import edge_curves, link, mark_tip, motions, moved, name_faces, seat, sector
 from .session import attempt, gmsh_session
-from .sizing import sector_sizes, set_fillet_grid, set_grids, set_sizes
+from .sizing import Sizes, sector_sizes, set_fillet_grid, set_grids, set_sizes
 
 SEATS = ("seat_left", "seat_right", "damper_left", "damper_right")
 
@@ -77,17 +78,29 @@ def wedge_sector(
         )
         groups = mark_tip(gmsh, groups, aerofoil, shape)
         link(gmsh, groups, shape)
-        fillet = groups.faces.get("fillet", [])
-        set_sizes(gmsh, shape, wedge, sizes, edge_curves(gmsh, groups), fillet)
-        with attempt("aerofoil.fillet", "mesh the fillet in a grid"):
-            set_fillet_grid(gmsh, fillet, sizes, size)
-        # an element size on the seats without a number across asks for free triangles
-        if size.seat_elements or size.contact_size is None:
-            set_grids(gmsh, [groups.faces[name][0] for name in SEATS], wedge, size)
+        _prescribe_sizes(gmsh, groups, shape, wedge, sizes, size)
         with attempt("mesh.size", "mesh this geometry"):
             mesh = mesh_model(gmsh, groups, 3, size)
     mesh = complete(mesh, motions(shape), sizes.base, sector(disc.sectors), flat=SEATS)
     return moved(mesh, wedge, shape) if wedge.clearance else mesh
+
+
+def _prescribe_sizes(
+    gmsh: ModuleType,
+    groups: Groups,
+    shape: Profile,
+    wedge: Wedge,
+    sizes: Sizes,
+    size: MeshSize,
+) -> None:
+    """Element sizes of the volumes, grids on fillet and seats."""
+    fillet = groups.faces.get("fillet", [])
+    set_sizes(gmsh, shape, wedge, sizes, edge_curves(gmsh, groups), fillet)
+    with attempt("aerofoil.fillet", "mesh the fillet in a grid"):
+        set_fillet_grid(gmsh, fillet, sizes, size)
+    # an element size on the seats without a number across asks for free triangles
+    if size.seat_elements or size.contact_size is None:
+        set_grids(gmsh, [groups.faces[name][0] for name in SEATS], wedge, size)
 
 
 def disc_segment(

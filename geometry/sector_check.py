@@ -187,7 +187,7 @@ def crosses_itself(polygon: np.ndarray) -> bool:
     a = polygon
     b = np.roll(polygon, -1, axis=0)
 
-    def side(p, q, r):
+    def side(p: np.ndarray, q: np.ndarray, r: np.ndarray) -> np.ndarray:
         return (q[..., 0] - p[..., 0]) * (r[..., 1] - p[..., 1]) - (q[..., 1] - p[..., 1]) * (
             r[..., 0] - p[..., 0]
         )

@@ -247,7 +247,7 @@ def _modes_arguments(sub: argparse.ArgumentParser) -> None:
 
 
 def _add_command(
-    subs: argparse._SubParsersAction,
+    subs: argparse._SubParsersAction[argparse.ArgumentParser],
     name: str,
     what: str,
     example: str,

@@ -18,6 +18,7 @@ from scipy.linalg import LinAlgError, cho_factor, cho_solve
 from scipy.optimize import nnls
 
 from ..errors import InputError
+from ..util.arrays import BooleanArray, RealArray
 from .as_array import given
 
 # relative size below which a force or gap counts as zero when the active set is updated
@@ -36,13 +37,13 @@ class LCPSolution:
     """Forces, gaps and rigid displacements, with the proof that they are optimal."""
 
     # (n,) [N]
-    force: np.ndarray
+    force: RealArray
     # (n,) [m]
-    gap: np.ndarray
+    gap: RealArray
     # (d,) rigid displacement q, smallest norm where directions are not held
-    rigid: np.ndarray
+    rigid: RealArray
     # (n,) bool, nodes in contact
-    active: np.ndarray
+    active: BooleanArray
     # largest violation of any of the conditions, relative (see complementarity)
     residual: float
     iterations: int

@@ -103,7 +103,7 @@ SQUARE = np.array([(-1, -1), (1, -1), (1, 1), (-1, 1), (0, -1), (1, 0), (0, 1), 
 
 
 def _tensor_product(
-    values: Callable,
+    values: Callable[[np.ndarray], tuple[np.ndarray, np.ndarray]],
     order: np.ndarray,
     x: np.ndarray,
 ) -> tuple[np.ndarray, np.ndarray]:

@@ -16,7 +16,8 @@ system of projections, solved by Newton's method (Alart, Curnier 1991, DOI
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from typing import TypeVar
 
 import numpy as np
 
@@ -30,6 +31,8 @@ from .interface_law import InterfaceLaw, closure_of, compliance_at
 from .patch import initial_gap, port_matrix
 from .seating import ContactProblem, condense_body, rigid_and_load, spin_axis
 
+# number of the translation along the engine axis among the rigid motions of a body in space
+AXIAL = 2
 # accepted residual of a step, over the largest force
 SETTLED = 1e-10
 # Newton steps of a load step, and halvings of one
@@ -66,6 +69,9 @@ class FrictionalProblem:
     load: np.ndarray
     # of the damper as meshed [kg]
     mass: float
+
+
+Seated = TypeVar("Seated", ContactProblem, FrictionalProblem)
 
 
 @dataclass(frozen=True)
@@ -130,6 +136,22 @@ def frictional_problem(
     return FrictionalProblem(
         tuple(patches), C + C_damper, gap, -blade_swell, damper_swell, rigid, load, mass(body)
     )
+
+
+def hold_axially(problem: Seated) -> Seated:
+    """A contact problem whose damper has a stop along the engine axis, which takes the load along
+    it and lets the damper turn.
+
+    Raises:
+        InputError: the bodies are plane.
+    """
+    if len(problem.load) < 6:
+        raise InputError(
+            'damper.axial = "held": a plane damper does not move along the engine axis, expected '
+            '"free"'
+        )
+    others = np.arange(len(problem.load)) != AXIAL
+    return replace(problem, rigid=problem.rigid[:, others], load=problem.load[others])
 
 
 def normal_part(problem: FrictionalProblem) -> ContactProblem:
@@ -406,10 +428,13 @@ def _seating(
 ) -> FrictionalSeating:
     """The state as maps, and what friction carries of the load."""
     d = state.force.shape[1]
-    outward = problem.load[:d] / np.linalg.norm(problem.load[:d])
+    # without the rotations: fewer translations than directions where one is held
+    translations = len(problem.load) - (1 if d == 2 else 3)
+    force = problem.load[:translations]
+    outward = force / np.linalg.norm(force)
     tangential = state.force.copy()
     tangential[:, 0] = 0.0
-    carried = -(problem.rigid.T @ tangential.ravel())[:d] @ outward
+    carried = -(problem.rigid.T @ tangential.ravel())[:translations] @ outward
     closure = closure_of(face.law, state.force[:, 0])
     gap = np.maximum(state.moved[:, 0] + closure, 0.0)
     gap[state.force[:, 0] > 0] = 0.0
@@ -420,5 +445,5 @@ def _seating(
             problem.patches, np.split(state.force, cuts), np.split(gap, cuts), strict=True
         )
     ]
-    share = float(carried / (pull * np.linalg.norm(problem.load[:d])))
+    share = float(carried / (pull * np.linalg.norm(force)))
     return FrictionalSeating(maps, scale, share, state.slips, steps, change)

@@ -61,7 +61,8 @@ def seat_contact(contact: Contact, patch: str) -> Contact:
 def gives_stiffness(contact: Contact) -> bool:
     """The scene says how stiff the layer is, on both seats."""
     both = all(_gives(seat, "kt") or _gives(seat, "kn") for seat in (contact.left, contact.right))
-    return both or contact.stiffness == "map" or _gives(contact, "kt") or _gives(contact, "kn")
+    given = contact.stiffness != "given" or _gives(contact, "kt") or _gives(contact, "kn")
+    return both or given
 
 
 def _gives(table: Contact | Seat, name: str) -> bool:

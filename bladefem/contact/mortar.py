@@ -116,7 +116,7 @@ def mortar_patch(mesh: Mesh, pair: str) -> Patch:
     normals = np.zeros((len(mesh.points), 3))
     direction = weighted.sum(axis=1) * outward(mesh, faces, weighted.sum(axis=1))[:, None]
     np.add.at(normals, faces[:, :d], direction[:, None, :])
-    area = np.bincount(
+    area: np.ndarray = np.bincount(
         o.master[o.face[:, 0], :d].ravel(),
         np.einsum("sqk,sq->sk", _traction_functions(o), o.weight).ravel(),
         len(mesh.points),

@@ -9,7 +9,8 @@ with an element of stiffness k_num and c added to the flexibility of its own nod
 the same for every k_num; what changes is how fast the iteration converges and how a few harmonics
 see a contact that opens. Rigid faces are 1 / k = 0: k_num then is the penalty of the dynamic
 Lagrangian of Nacivet, Pierre, Thouverez, Jezequel, J. Sound Vib. 265 (2003) 201-219, DOI
-10.1016/S0022-460X(02)01447-5, whose result does not depend on it either.
+10.1016/S0022-460X(02)01447-5, whose result does not depend on it either. In the balance they keep
+a layer that is stiff beside the bodies (STIFFEST).
 """
 
 from __future__ import annotations
@@ -24,21 +25,39 @@ from ..scene.tables import Contact
 from .interface_elements import aggregation
 from .seating import ContactProblem
 
-# Numerical stiffness over that of the softest common motion of the bodies at the seats. On the
-# shipped wedge with 8 points a seat and a layer of 4000 N/mm^3 7 harmonics are 8 % off without the
-# split; 1.0, 1.5 and 4 % with 4, 8 and 20 times. With 1e4 N/mm^3 and more small values lose points.
-MULTIPLE = 20.0
+# Numerical stiffness over that of the bodies under a medium wave of pressure. The part of the
+# compliance that goes to the bodies is negative: where it outweighs their own compliance under
+# short waves, Newton's method loses points. On the shipped wedge with rigid faces, 16 points a
+# seat, 3 harmonics and 320 N, 0.006, 0.025 and 0.1 lose 3, 0 and 0 of 12 points without fallbacks,
+# in 320, 210 and 100 iterations; at 80 N, where contacts lift off, 7 harmonics and 4000 N/mm^3 are
+# 6 and 14 % off with 0.006 and without the split.
+MULTIPLE = 0.05
+# Stiffest layer of the balance over the same, rigid faces included. Without any layer, forces of
+# short waves are all but undetermined and sweeps lose points; on the shipped wedge under 320 N
+# resonances with 2e5, 3.5e5 and 1e6 N/mm^3 (1.3, 2.3 and 6.5 times) differ by 0.1 %.
+STIFFEST = 1.4
+
+
+def medium_stiffness(problem: ContactProblem) -> float:
+    """Stiffness per unit area [N/m^3] of the bodies under a medium wave of pressure: half of the
+    waves that the contact mesh resolves meet a softer, half a stiffer body.
+
+    It grows as the contact mesh gets finer, and common motions of the seats, however soft, do not
+    change it.
+    """
+    root = np.sqrt(np.concatenate([patch.area for patch in problem.patches]))
+    compliances = np.linalg.eigvalsh(root[:, None] * problem.flexibility * root)
+    return float(1.0 / np.median(compliances))
 
 
 def numerical_stiffness(problem: ContactProblem) -> float:
-    """Stiffness per unit area [N/m^3] above which a layer is split.
+    """Stiffness per unit area [N/m^3] above which a layer is split."""
+    return MULTIPLE * medium_stiffness(problem)
 
-    The bodies' softest common motion is the largest eigenvalue of their flexibility for an evenly
-    shared pressure, which does not depend on the number of nodes.
-    """
-    root = np.sqrt(np.concatenate([patch.area for patch in problem.patches]))
-    softest = np.linalg.eigvalsh(root[:, None] * problem.flexibility * root)[-1]
-    return float(MULTIPLE / softest)
+
+def stiffest_layer(problem: ContactProblem) -> float:
+    """Stiffness per unit area [N/m^3] that stands for rigid faces in the balance."""
+    return STIFFEST * medium_stiffness(problem)
 
 
 def split_stiffness(
@@ -46,6 +65,7 @@ def split_stiffness(
     maps: Sequence[PressureMap],
     contact: Contact,
     areal: float,
+    stiffest: float = np.inf,
 ) -> tuple[Elements, np.ndarray | None]:
     """Elements no stiffer than a numerical stiffness, and what of their compliance goes to the
     bodies.
@@ -54,6 +74,7 @@ def split_stiffness(
         elements: of ``friction_elements``.
         maps: static pressure of each patch.
         areal: numerical stiffness per unit area [N/m^3].
+        stiffest: of a layer per unit area [N/m^3]; stiffer ones are taken as that.
 
     Returns:
         The elements, which rest in the same state, and (n, 1 + tangents) compliances [m/N], not
@@ -64,13 +85,16 @@ def split_stiffness(
     kn = np.minimum(elements.kn, areal * area)
     if np.array_equal(kt, elements.kt) and np.array_equal(kn, elements.kn):
         return elements, None
-    normal = np.divide(kn, elements.kn, out=np.ones_like(kn), where=elements.kn > 0)
-    tangential = 1.0 / elements.kt - 1.0 / kt
+    layer_kt = np.minimum(elements.kt, stiffest * area)
+    layer_kn = np.minimum(elements.kn, stiffest * area)
+    normal = np.divide(kn, layer_kn, out=np.ones_like(kn), where=kn > 0)
+    tangential = 1.0 / layer_kt - 1.0 / kt
     series = np.column_stack([np.zeros(len(kt)), *[tangential] * elements.tangents])
     # (1 - kn / k_num) / kn, zero where the normal load is prescribed
     np.divide(normal - 1.0, kn, out=series[:, 0], where=kn > 0)
     # an open node keeps its gap, a pressed one its force
-    n0 = np.where(elements.n0 > 0, elements.n0, normal * elements.n0)
+    ratio = np.divide(kn, elements.kn, out=np.ones_like(kn), where=kn > 0)
+    n0 = np.where(elements.n0 > 0, elements.n0, ratio * elements.n0)
     return replace(elements, kt=kt, kn=kn, n0=n0), series
 
 

@@ -37,6 +37,7 @@ from ..fem.flexibility import Flexibility, compliance, flexible
 from ..fem.linalg import dot
 from ..fem.loads import centrifugal, mass
 from ..scene.tables import Materials
+from ..util.arrays import RealArray
 from ..util.communicator import Communicator
 from .as_array import given
 from .complementarity import LCPSolution, held_directions, solve_lcp
@@ -62,17 +63,17 @@ class ContactProblem:
 
     patches: tuple[Patch, ...]
     # (n, n) blade and damper, elastic [m/N]
-    flexibility: np.ndarray
+    flexibility: RealArray
     # (n,) gap before anything moves [m]
-    clearance: np.ndarray
+    clearance: RealArray
     # (n,) gap opened by the blade's centrifugal displacement, for unit rotation
-    blade_swell: np.ndarray
+    blade_swell: RealArray
     # (n,) gap opened by the damper's deformation under its load, for unit rotation
-    damper_swell: np.ndarray
+    damper_swell: RealArray
     # (n, d) gap opened by unit rigid motions of the damper; rotations per length
-    rigid: np.ndarray
+    rigid: RealArray
     # (d,) centrifugal load on the damper, for unit rotation
-    load: np.ndarray
+    load: RealArray
     # of the damper as meshed [kg]
     mass: float
     # (n,) of the interface layer; rigid faces when None

@@ -23,7 +23,7 @@ from scipy import linalg
 from bladefem.data import RigidBody
 from bladefem.errors import InputError
 from bladefem.hbm.linear.bodies import port_receptance
-from bladefem.hbm.model import ReducedModel, rigid_damper
+from bladefem.hbm.model import ReducedModel, require_rigid_damper
 
 from ..friction.equivalent_linear import by_harmonic, from_harmonics
 from ..friction.fourier import to_real
@@ -125,7 +125,7 @@ def damper_response(
     """
     model = side.model
     motion = np.concatenate([np.zeros((1, u.shape[1])), u]).T
-    damper = rigid_damper(model)
+    damper = require_rigid_damper(model)
     scale = float(damper.B[0, 0]) or 1.0
     system = damper_on_platforms(motion, model.elements, float(damper.mass[0, 0]) / scale**2)
     H = len(u)

@@ -276,14 +276,18 @@ def _project_interior(
     new: slice,
 ) -> list[tuple[np.ndarray, np.ndarray]]:
     """low^T A low and high^T A low of some columns, a few at a time, for K and for M."""
-    pieces: list[list] = [[], []]
+    pieces: list[list[tuple[np.ndarray, np.ndarray]]] = [[], []]
     for first in range(new.start, low.shape[1], CHUNK):
         moved = np.ascontiguousarray(low[:, first : first + CHUNK])
         for piece, A in zip(pieces, both, strict=True):
             image = A @ moved
             piece.append((low.T @ image, high.T @ image[faces]))
     return [
-        tuple(np.concatenate(part, axis=1) for part in zip(*piece, strict=True)) for piece in pieces
+        (
+            np.concatenate([own for own, _ in piece], axis=1),
+            np.concatenate([x for _, x in piece], axis=1),
+        )
+        for piece in pieces
     ]
 
 

@@ -32,6 +32,9 @@ class AlternatingStress:
     by_harmonic: np.ndarray
     # estimated relative error by the mesh, see `stress_error.mesh_error`
     mesh_error: float
+    # (n_points,) at each node [Pa]; of nodes that are far from the largest the sum of the
+    # harmonics' own amplitudes, which is not below it
+    field: np.ndarray
 
 
 def alternating_stress(
@@ -59,6 +62,8 @@ def alternating_stress(
     turns = np.exp(1j * np.outer(angle, np.array(kept) + 1))
     in_time = [von_mises(np.einsum("h,hns->ns", turn, found[:, nodes]).real) for turn in turns]
     largest = np.max(in_time, axis=0)
+    field = bound.copy()
+    field[nodes] = largest
     worst = int(largest.argmax())
     node = int(nodes[worst])
     by_harmonic = np.zeros(len(harmonics))
@@ -69,4 +74,5 @@ def alternating_stress(
         body.mesh.points[node],
         by_harmonic,
         mesh_error(body, harmonics[kept[strongest]], found[strongest], node, touched),
+        field,
     )

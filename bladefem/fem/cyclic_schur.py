@@ -11,6 +11,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import partial
+from typing import Any
 
 import numpy as np
 import scipy.sparse as sp
@@ -57,7 +58,7 @@ class Rim:
     # (nb, nm) rim from masters
     C: sp.csr_matrix
     # Cholesky factor, or LU where indefinite
-    dense: tuple
+    dense: tuple[np.ndarray, Any]
     # negative eigenvalues; -1 when Cholesky proved that there are none
     negative: int
 

@@ -137,6 +137,13 @@ def patch_stress(
     return first, second
 
 
+def signed_von_mises(stress: np.ndarray) -> np.ndarray:
+    """(...) von Mises stress of real (..., 6), negative where the mean of the principal stresses is
+    (compression) [Pa].
+    """
+    return np.where(stress[..., :3].sum(axis=-1) < 0, -1.0, 1.0) * von_mises(stress)
+
+
 def von_mises(stress: np.ndarray) -> np.ndarray:
     """(...) von Mises stress of (..., 6) [Pa]; of complex amplitudes the largest in a period, in
     closed form.

@@ -66,7 +66,8 @@ def held_directions(body: Body, directions: Sequence[tuple[str, str]]) -> np.nda
             )
         nodes = np.unique(known[name])
         nodes = nodes[body.rows[nodes] >= 0]
-        held[np.ix_(nodes, ["xyz".index(letter) for letter in letters])] = True
+        axes = np.array(["xyz".index(letter) for letter in letters])
+        held[np.ix_(nodes, axes)] = True
     return held
 
 

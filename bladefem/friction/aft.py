@@ -17,33 +17,34 @@ from bladefem.errors import InputError
 from bladefem.friction.coulomb_2d_plain import plain_batch
 from bladefem.friction.fourier import harmonics_of
 from bladefem.friction.kernel_1d import jenkins_batch
-from bladefem.friction.law_table import groups_by_law, select_elements
+from bladefem.friction.law_table import forgets_position, groups_by_law, select_elements
 from bladefem.friction.periodic_law import LawForces, periodic_forces
 from bladefem.friction.simd.kernel_2d import disc_batch
 from bladefem.friction.states import GROSS_SLIP, PARTIAL_SLIP, SEPARATED, STICK
 from bladefem.friction.trigonometric_tables import derivative_patterns, trigonometric_tables
+from bladefem.friction.walking_1d import walking_batch
 
 PRECISIONS = {"double": np.float64, "single": np.float32}
 PERIODIC = "periodic"
 
 
-def _vector_kernel(w, load, nodes, samples, precision, cycles, jacobian, F, shares, used):
+def _vector_kernel(w, ramp, load, nodes, samples, precision, cycles, jacobian, F, shares, used):
     """Fill forces, shares and cycles of 2-D elements; returns their Jacobian (n, d, K, d K)."""
     n, d, K = w.shape
     H = harmonics_of(w)
     J = np.empty((n, d, K, d * K) if jacobian else (n, 0, 0, 0))
     rows = derivative_patterns(H, samples, PRECISIONS[precision])
-    disc_batch(w, load, nodes, trigonometric_tables(H, samples), rows, cycles, F, J, shares, used)
+    tab = trigonometric_tables(H, samples)
+    disc_batch(w, ramp, load, nodes, tab, rows, cycles, F, J, shares, used)
     return J
 
 
-def _plain_kernel(w, load, nodes, samples, precision, cycles, jacobian, F, shares, used):
+def _plain_kernel(w, ramp, load, nodes, samples, precision, cycles, jacobian, F, shares, used):
     """The same by the plain kernel."""
     n, d, K = w.shape
     J = np.empty((n, d, K, d * K))
-    plain_batch(
-        w, load, nodes, trigonometric_tables(harmonics_of(w), samples), cycles, F, J, shares, used
-    )
+    tab = trigonometric_tables(harmonics_of(w), samples)
+    plain_batch(w, ramp, load, nodes, tab, cycles, F, J, shares, used)
     return J
 
 
@@ -90,6 +91,7 @@ def evaluate(
     cycles: int = 4000,
     precision: str = "double",
     kernel: str = "vector",
+    walk: np.ndarray | None = None,
 ) -> Forces:
     """Harmonics of the contact forces for relative motion w (n, d, 2H+1) [m], sampled at
     ``samples`` instants.
@@ -98,7 +100,9 @@ def evaluate(
     the constant n0. precision is that in which the derivative of 2-D elements is summed: "single"
     is faster and leaves about 1e-7 of it in error, which is enough for Newton; forces are the same.
     kernel is that of 2-D elements: "vector", or "plain", the readable definition of it, some 50
-    times as slow and always in double precision. The error falls as samples^-2. Forces.converged is
+    times as slow and always in double precision. walk (n, tangents) [m], where given, is how far
+    the tangential motion goes on in each period; the mean displacement that way then has no
+    influence. The error falls as samples^-2. Forces.converged is
     False, with the reason, when a 2-D element was not periodic after ``cycles`` periods or the
     motion is not finite. Raises InputError for shapes that do not fit or too few samples (at least
     4H+4).
@@ -110,18 +114,23 @@ def evaluate(
     if kernel not in KERNELS_2D:
         raise InputError(f"kernel {kernel!r}: expected one of {', '.join(KERNELS_2D)}")
     load = _prescribed_load(load, n, samples)
+    ramp = _checked_walk(elements, walk)
     if elements.law is not None:
-        return _evaluate_laws(elements, w, samples, jacobian, load, cycles, precision, kernel)
+        return _evaluate_laws(elements, w, samples, jacobian, load, cycles, precision, kernel, ramp)
     tab = trigonometric_tables(harmonics_of(w), samples)
     F = np.empty((n, d, K))
     shares = np.empty((n, 3))
     used = np.full(n, 2)
     if d == 2:
         J = np.empty((n, d, K, d, K))
-        jenkins_batch(w, load, nodes, tab, F, J, shares)
+        if np.any(ramp):
+            along = np.ascontiguousarray(ramp[:, 0])
+            walking_batch(w, along, load, nodes, tab, cycles, jacobian, F, J, shares, used)
+        else:
+            jenkins_batch(w, load, nodes, tab, F, J, shares)
     else:
         J = KERNELS_2D[kernel](
-            w, load, nodes, samples, precision, cycles, jacobian, F, shares, used
+            w, ramp, load, nodes, samples, precision, cycles, jacobian, F, shares, used
         )
     reason = convergence_reason(F, used, f"were not periodic after {cycles} cycles")
     return Forces(
@@ -129,11 +138,25 @@ def evaluate(
         J.reshape(n, d, K, d, K) if jacobian else None,
         contact_states(shares),
         shares,
-        dissipated_energy(F, w),
+        dissipated_energy(F, w) + np.sum(F[:, 1:, 0] * ramp, axis=1),
         np.abs(used),
         reason == PERIODIC,
         reason,
     )
+
+
+def _checked_walk(elements: Elements, walk: np.ndarray | None) -> np.ndarray:
+    """(n, tangents) the motion that goes on in each period, zeros for none."""
+    shape = (len(np.atleast_1d(elements.kt)), elements.tangents)
+    if walk is None:
+        return np.zeros(shape)
+    if not forgets_position(elements) and np.any(walk):
+        raise InputError("walk: expected friction laws whose force does not depend on the position")
+    if np.shape(walk) != shape or not np.all(np.isfinite(walk)):
+        raise InputError(
+            f"walk: expected {shape} finite displacements a period, one row an element"
+        )
+    return np.ascontiguousarray(walk, dtype=float)
 
 
 def _evaluate_laws(
@@ -145,6 +168,7 @@ def _evaluate_laws(
     cycles: int,
     precision: str,
     kernel: str,
+    ramp: np.ndarray,
 ) -> Forces:
     """The same for elements of several laws, law after law; Coulomb's with its kernels."""
     n, d, K = w.shape
@@ -168,11 +192,19 @@ def _evaluate_laws(
                 cycles=cycles,
                 precision=precision,
                 kernel=kernel,
+                walk=ramp[rows],
             )
             used[rows] = part.cycles if part.converged else -part.cycles
         else:
             part = periodic_forces(
-                law, some, w[rows], samples, load=prescribed, jacobian=jacobian, cycles=cycles
+                law,
+                some,
+                w[rows],
+                samples,
+                load=prescribed,
+                jacobian=jacobian,
+                cycles=cycles,
+                walk=ramp[rows],
             )
             used[rows] = part.cycles
         F[rows] = part.f
@@ -185,7 +217,7 @@ def _evaluate_laws(
         J,
         contact_states(shares),
         shares,
-        dissipated_energy(F, w),
+        dissipated_energy(F, w) + np.sum(F[:, 1:, 0] * ramp, axis=1),
         np.abs(used),
         reason == PERIODIC,
         reason,

@@ -115,12 +115,18 @@ def _march_period(path, basis, node, weights, f, rows, F, sums):
 
 @njit(**INNER_KERNEL)
 def _start_force(path, basis, node, f, rows):
-    """The force k_t w at the first knot, drawn back onto the circle, and its rows."""
+    """The force k_t w at the first knot, drawn back onto the circle, and its rows; where the path
+    goes on from period to period, the limit that way.
+    """
     kt, kn, mu = node
     K = basis.shape[1]
     rows[:] = 0.0
     f[:] = path[:2, 0]
     limit = mu * max(path[2, 0], 0.0)
+    way = path[:2, -1] - path[:2, 0]
+    if np.hypot(way[0], way[1]) > 0.0:
+        f[:] = limit / np.hypot(way[0], way[1]) * way
+        return
     size = np.hypot(f[0], f[1])
     rows[0, K : 2 * K] = kt * basis[0]
     rows[1, 2 * K : 3 * K] = kt * basis[0]
@@ -168,7 +174,7 @@ def _periodic_force(path, basis, node, weights, limit, F, J):
 
 
 @njit(**KERNEL)
-def plain_batch(w, load, nodes, tab, limit, F, J, shares, cycles):
+def plain_batch(w, ramp, load, nodes, tab, limit, F, J, shares, cycles):
     """Forces F (n, 3, K), Jacobian J (n, 3, K, 3K), shares (n, 3) of stick, slip and separation,
     cycles (n,): arguments as `bladefem.friction.simd.kernel_2d.disc_batch` has them, but for the
     patterns.
@@ -184,6 +190,8 @@ def plain_batch(w, load, nodes, tab, limit, F, J, shares, cycles):
             path[0, i] = kt * np.dot(knot, w[e, 1])
             path[1, i] = kt * np.dot(knot, w[e, 2])
             path[2, i] = kn * np.dot(knot, w[e, 0])
+            path[0, i] += kt * ramp[e, 0] * i / S
+            path[1, i] += kt * ramp[e, 1] * i / S
             path[2, i] += 0.5 * (load[e, i % S] + load[e, i - 1]) if load.shape[1] else n0
         if load.shape[1]:
             sampled += load[e]

@@ -135,6 +135,12 @@ def groups_by_law(elements: Elements) -> list[tuple[FrictionLaw | None, np.ndarr
     ]
 
 
+def forgets_position(elements: Elements) -> bool:
+    """True if no force depends on the position, but on increments alone: such contacts can walk."""
+    laws = (law for law, _ in groups_by_law(elements))
+    return all(law is None or type(law).force is FrictionLaw.force for law in laws)
+
+
 def select_elements(elements: Elements, rows: np.ndarray) -> Elements:
     """Some of the elements, or some of them more than once."""
     law = elements.law

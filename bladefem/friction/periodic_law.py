@@ -108,10 +108,12 @@ def periodic_forces(
     load: np.ndarray | None = None,
     jacobian: bool = True,
     cycles: int = 4000,
+    walk: np.ndarray | float = 0.0,
 ) -> LawForces:
     """Forces of elements that all follow the law, for relative motion w (n, 1 + t, K) [m].
 
-    load (n, samples) [N] replaces the constant n0, as in `bladefem.friction.aft.evaluate`.
+    walk (n, t) [m] is how far the motion goes on in each period, for laws that forget where they
+    began. load (n, samples) [N] replaces the constant n0, as in `bladefem.friction.aft.evaluate`.
     """
     basis = synthesis(harmonics_of(w), samples)
     constant = elements.n0[:, None] if load is None else load
@@ -119,9 +121,8 @@ def periodic_forces(
     u = np.moveaxis(w[:, 1:] @ basis.T, 2, 0)
     reach = abs(u).max(axis=(0, 2))
     sizes = np.where(reach > 0, reach, 1.0)
-    period = _Steps(
-        law, elements, u - np.roll(u, 1, axis=0), np.roll(normal, 1, axis=0), normal, sizes
-    )
+    increment = u - np.roll(u, 1, axis=0) + np.asarray(walk) / samples
+    period = _Steps(law, elements, increment, np.roll(normal, 1, axis=0), normal, sizes)
     # from rest to the last sample, under its load
     first = _Steps(law, elements, u[-1:], normal[-1:], normal[-1:], sizes)
     start, states, used = _periodic_state(period, first, cycles)

@@ -75,9 +75,9 @@ def follow(
         InputError: unknown parameter, or a start outside the bounds.
         NotSolvedError: the path could not be followed further; the message says why.
     """
-    task, x, state = _prepare_path(model, name, start, bounds, options)
+    task, x, balance, state = _prepare_path(model, name, start, bounds, options)
     low, high = (path_coordinate(name, bound) for bound in bounds)
-    spot = spot_at(task, x, task.balance(x), state, 0, 1.0 if forward else -1.0)
+    spot = spot_at(task, x, balance, state, 0, 1.0 if forward else -1.0)
     yield _path_point(task, spot)
     step, longest = steps
     restarts = 0
@@ -121,6 +121,7 @@ def _begun_again(
         if not end.converged:
             continue
         try:
+            balance = replace(balance, walk=end.walk)
             return spot_at(task, x, balance, end.state, end.iterations, spot.sign)
         except np.linalg.LinAlgError:
             continue
@@ -133,7 +134,7 @@ def _prepare_path(
     start: Solution,
     bounds: tuple[float, float],
     options: Options,
-) -> tuple[Task, float, State]:
+) -> tuple[Task, float, Balance, State]:
     check_parameter(name, also=("omega",))
     value = {"omega": start.omega, "gap": 0.0}.get(name, 1.0)
     if (
@@ -159,7 +160,8 @@ def _prepare_path(
     width = path_coordinate(name, bounds[1]) - path_coordinate(name, bounds[0])
     x = path_coordinate(name, value)
     task = Task(balance, name, width, float(np.linalg.norm(near.w)) or 1.0, options)
-    return task, x, evaluate_balance(balance(x), near.w)
+    first = replace(balance(x), walk=near.walk)
+    return task, x, first, evaluate_balance(first, near.w)
 
 
 def _path_point(

@@ -58,10 +58,6 @@ class ReducedModel:
     # None: the other side of each contact is fixed
     damper: RigidBody | tuple[PortModel, ...] | None = None
     damper_damping: Damping = field(default_factory=Damping)
-    # A damper whose contacts all slip has an indifferent mean position, and drifts where friction
-    # pushes it: springs of this share of the contact stiffness hold the mean. What they carry is
-    # reported as Solution.drift.
-    hold: float = 1e-3
     # Whether the mean displacements take part in the balance. Uncoupled, the contacts vibrate about
     # the preload state, whose static solution is left as it is; mean forces that friction raises
     # are reported and do not act back.
@@ -249,7 +245,7 @@ class ReducedModel:
         return {}
 
 
-def rigid_damper(model: ReducedModel) -> RigidBody:
+def require_rigid_damper(model: ReducedModel) -> RigidBody:
     """The damper of a model whose damper is rigid.
 
     Raises:
@@ -262,7 +258,7 @@ def rigid_damper(model: ReducedModel) -> RigidBody:
 
 def in_series(side: PortModel, compliance: np.ndarray) -> PortModel:
     """A side with more compliance (nodes, 1 + tangents) [m/N] at its contact nodes."""
-    residual = np.array(side.residual)
+    residual = side.residual.copy(order="K")
     rows = np.arange(len(residual))[side.ports["contact"]]
     residual[rows, rows] += compliance.ravel()
     return replace(side, residual=residual)

@@ -10,17 +10,16 @@ import numpy as np
 
 from ..errors import InputError
 from .linear.bodies import modal_flexibility, receptance_block
-from .linear.condensation import condense
 from .model import ReducedModel
-from .parameter_derivatives import BODIES, by_imbalance, contact_rate, hold_rate
+from .parameter_derivatives import BODIES, contact_rate
 from .parameters import check_parameter
 from .solution import Solution
 from .solver.residual import (
-    Balance,
     adjoint_inverse,
     as_amplitudes,
     as_coefficients,
-    evaluate_balance,
+    solved_balance,
+    transposed_force_change,
 )
 
 
@@ -53,29 +52,14 @@ def node_gradients(
         raise InputError(
             f"parameters {names}: expected contact parameters, not {', '.join(BODIES)}"
         )
-    balance = Balance(model, condense(model, solution.omega, solution.harmonics), solution.samples)
-    state = evaluate_balance(balance, solution.w)
-    n, d, K = state.w.shape
+    balance, state = solved_balance(model, solution)
     by_force = size_by_force(model, solution, probe)
-    by_motion = state.forces.jacobian.reshape(n, d * K, d * K).swapaxes(1, 2) @ by_force.reshape(
-        n, d * K, 1
-    )
-    back = adjoint_inverse(balance, state)(by_motion.reshape(n, d, K), 1e-9)
+    by_motion = transposed_force_change(balance, state, by_force)
+    back = adjoint_inverse(balance, state)(by_motion, 1e-9)
     weight = by_force - transposed_flexibility(balance.linear.A, back)
-    held = _by_hold(balance, back)
     return {
-        name: np.sum(weight * contact_rate(model, state, name, solution.samples), axis=(1, 2))
-        - (np.sum(held * hold_rate(balance, state, name), axis=1) if name in ("kt", "kn") else 0.0)
-        for name in names
+        name: np.sum(weight * contact_rate(balance, state, name), axis=(1, 2)) for name in names
     }
-
-
-def _by_hold(balance: Balance, back: np.ndarray) -> np.ndarray:
-    """(n, d) weights of what the springs that hold a body take at each node, from the adjoint
-    solution.
-    """
-    B = balance.linear.B
-    return (B @ (by_imbalance(balance.linear).T @ back[:, :, 0].ravel())).reshape(back.shape[:2])
 
 
 def size_by_force(

@@ -23,12 +23,19 @@ from .linear.bodies import (
     modal_flexibility,
     port_motion,
 )
-from .linear.condensation import Linear
 from .model import ReducedModel
 from .parameters import check_parameter, layer_share, vary
 from .policy import uses_coulomb_kernels
 from .solution import blade_motion
-from .solver.residual import Balance, State, as_amplitudes, as_coefficients, contact_forces
+from .solver.residual import (
+    Balance,
+    State,
+    as_amplitudes,
+    as_coefficients,
+    contact_forces,
+    walk_ramp,
+    walking_force_change,
+)
 
 # parameters that the contact law does not see
 BODIES = ("omega", "force", "mass", "damping")
@@ -46,49 +53,19 @@ def residual_rate(
     """
     linear = balance.linear
     check_parameter(name, also=("omega",))
+    if name == "force":
+        # the motion in full stick is linear in the loads
+        return -as_coefficients(linear.stuck, state.w.shape)
     if name in BODIES:
         moved, _ = body_rate(
             balance.model, linear.omega, as_amplitudes(contact_load(balance.model, state)), name
         )
         moved[1:] -= (linear.A[1:] @ (linear.springs * moved[1:])[:, :, None])[:, :, 0]
         moved[0] -= linear.A[0] @ (linear.springs * moved[0])
-        if name == "force" and np.any(linear.g):
-            moved[0] += by_imbalance(linear) @ linear.g / balance.model.hold
         return -as_coefficients(moved, state.w.shape)
-    force = as_amplitudes(contact_rate(balance.model, state, name, balance.samples))
+    force = as_amplitudes(contact_rate(balance, state, name))
     moved = (linear.A @ force[:, :, None])[:, :, 0]
-    if name in ("kt", "kn") and linear.B.shape[1]:
-        moved[0] += by_imbalance(linear) @ (linear.B.T @ hold_rate(balance, state, name).ravel())
     return as_coefficients(moved, state.w.shape)
-
-
-def by_imbalance(linear: Linear) -> np.ndarray:
-    """(m, r) mean displacements by a unit of imbalance on each motion without stiffness, times the
-    hold [m].
-    """
-    return linear.B - linear.A[0].real @ (linear.springs[:, None] * linear.B)
-
-
-def hold_rate(
-    balance: Balance,
-    state: State,
-    name: str,
-) -> np.ndarray:
-    """(n, d) springs of a contact parameter times the mean motion without stiffness at their nodes
-    [N].
-
-    The springs that hold this motion are a share of the contact stiffness and change with kt and kn
-    as it does.
-    """
-    model = balance.model
-    linear = balance.linear
-    force = as_amplitudes(contact_load(model, state))[0]
-    still = (as_amplitudes(state.w)[0] - linear.free[0] + linear.G[0] @ force).real.reshape(
-        model.springs.shape
-    )
-    normal = np.arange(model.directions) < model.directions - model.elements.tangents
-    share = layer_share(model, name)[:, None]
-    return share * model.springs * still * (normal == (name == "kn"))
 
 
 def contact_load(model: ReducedModel, state: State) -> np.ndarray:
@@ -99,23 +76,24 @@ def contact_load(model: ReducedModel, state: State) -> np.ndarray:
 
 
 def contact_rate(
-    model: ReducedModel,
+    balance: Balance,
     state: State,
     name: str,
-    samples: int,
 ) -> np.ndarray:
     """(n, d, K) derivative of the contact forces beyond the preload with a contact parameter [N,
     N/m].
     """
+    model = balance.model
     elements = model.elements
     if not uses_coulomb_kernels(model):
-        return _rate_by_differences(model, state, name, samples)
+        return _rate_by_differences(balance, state, name)
     f = state.forces.f
     D = state.forces.jacobian
     w = state.w
     # where the tangents begin
     first = model.directions - elements.tangents
     by_tangents = np.einsum("nakbl,nbl->nak", D[:, :, :, first:], w[:, first:])
+    by_tangents += walking_force_change(balance, state, w)
     by_normal = np.einsum("nakl,nl->nak", D[:, :, :, 0], w[:, 0]) if first else np.zeros_like(f)
     if name == "kt":
         return layer_share(model, name)[:, None, None] * by_tangents
@@ -140,12 +118,13 @@ def contact_rate(
 
 
 def _rate_by_differences(
-    model: ReducedModel,
+    balance: Balance,
     state: State,
     name: str,
-    samples: int,
 ) -> np.ndarray:
     """The same for laws that need not be homogeneous: central differences of the forces."""
+    model = balance.model
+    walk = walk_ramp(balance, state.w)
     if name == "gap" and model.directions == model.elements.tangents:
         raise InputError("gap: a prescribed normal load has no gap, expected elements.kn > 0")
     step = DIFFERENCE * (model.compression if name == "gap" else 1.0)
@@ -153,7 +132,7 @@ def _rate_by_differences(
     for sign in (1.0, -1.0):
         value = sign * step if name == "gap" else float(np.exp(sign * step))
         changed = vary(model, name, value)
-        force = contact_forces(changed, state.w, samples).f
+        force = contact_forces(changed, state.w, balance.samples, walk=walk).f
         force[:, :, 0] -= changed.preload.reshape(force.shape[:2])
         ends.append(force)
     return (ends[0] - ends[1]) / (2 * step)

@@ -1,5 +1,6 @@
 """What every solved point reports, compiled: motion of the probes, works, residuals, numbers of
-states, and the load on the springs that hold a drifting damper.
+states, and the load on the springs that choose the mean position of a damper on which every contact
+slips.
 """
 
 from __future__ import annotations
@@ -13,7 +14,7 @@ from .linear.condensation_compiled import modal_motion
 
 # share of a period below which a contact is not counted as closed, or as open
 ROUNDING_SHARE = 1e-12
-# numbers that `measure_point` gives: residuals, drift and works
+# numbers that `measure_point` gives: residuals, load on the regularisation, works
 MEASURES = 7
 
 
@@ -34,10 +35,10 @@ def count_states(shares):
 
 
 @njit(**INNER_KERNEL)
-def holding_drift(B, g, load):
-    """Load on the holding springs over what the contacts could carry, both on the motions without
-    stiffness B (m, r) under the loads g (r,), for contact forces (m, K) [N]; 0 without such
-    motions.
+def carried_load(B, g, load):
+    """Load on the springs of the regularisation over what the contacts could carry, both on the
+    motions without stiffness B (m, r) under the loads g (r,), for contact forces (m, K) [N]; 0
+    without such motions.
     """
     held = 0.0
     carried = 0.0
@@ -58,7 +59,7 @@ def holding_drift(B, g, load):
 @njit(**KERNEL)
 def measure_point(omega, bodies, springs, linear, w, normals, F, preload, residual, f, probe, out):
     """Fill f (n, d, K), the contact forces of the balance, probe (H+1, p), and out (7,): largest
-    residual [m] and residual force [N], drift [1], works of the excitation, in the bodies, of the
+    residual [m] and residual force [N], load on the springs of the regularisation [1], works of the excitation, in the bodies, of the
     balanced friction forces, dissipated in contacts [J].
 
     Args:
@@ -79,7 +80,7 @@ def measure_point(omega, bodies, springs, linear, w, normals, F, preload, residu
             load[i, k] = f[i // d, i % d, k] - (preload[i] if k == 0 else 0.0)
             out[0] = max(out[0], abs(residual[i, k]))
             out[1] = max(out[1], springs[i] * abs(residual[i, k]))
-    out[2] = holding_drift(bodies.B, bodies.g, load)
+    out[2] = carried_load(bodies.B, bodies.g, load)
     modal = _blade_motion(bodies, linear, load, w, springs, probe)
     _period_works(omega, bodies, modal, load, w, d, normals, out[3:])
 

@@ -10,7 +10,6 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from ..errors import InputError
-from .linear.condensation import condense
 from .model import ReducedModel
 from .parameter_derivatives import BODIES, body_rate, contact_load, contact_rate, residual_rate
 from .solution import Solution, probe_motion
@@ -19,8 +18,9 @@ from .solver.residual import (
     Inverse,
     State,
     as_amplitudes,
-    evaluate_balance,
+    force_change,
     linearise_balance,
+    solved_balance,
 )
 
 
@@ -50,8 +50,7 @@ def sensitivities(
         raise InputError(
             f"solution at {solution.frequency:.6g} Hz is not converged: expected a solved point"
         )
-    balance = Balance(model, condense(model, solution.omega, solution.harmonics), solution.samples)
-    state = evaluate_balance(balance, solution.w)
+    balance, state = solved_balance(model, solution)
     inverse = linearise_balance(balance, state)
     return {name: _one_sensitivity(balance, state, inverse, solution, name) for name in names}
 
@@ -65,20 +64,19 @@ def _one_sensitivity(
 ) -> Sensitivity:
     model = balance.model
     linear = balance.linear
-    n, d, K = state.w.shape
     dw = -inverse(residual_rate(balance, state, name), 1e-9)
-    df = (state.forces.jacobian.reshape(n, d * K, d * K) @ dw.reshape(n, d * K, 1)).reshape(n, d, K)
+    df = force_change(balance, state, dw)
     probe = np.zeros_like(solution.probe)
     if name in BODIES:
         load = as_amplitudes(contact_load(model, state))
         direct, probe = body_rate(model, linear.omega, load, name)
     else:
-        df = df + contact_rate(model, state, name, balance.samples)
+        df = df + contact_rate(balance, state, name)
         direct = np.zeros_like(linear.free)
     force = as_amplitudes(df)
     rigid = np.zeros(len(linear.rigid))
     if linear.B.shape[1]:
-        gap = as_amplitudes(dw)[0] - direct[0] + linear.G[0] @ force[0]
+        gap = as_amplitudes(dw)[0] - direct[0] + linear.bodies.mean_G @ force[0]
         rigid = linear.rigid @ (linear.B.T @ (linear.springs * gap.real))
     probe = probe + probe_motion(replace(model, excitation={}), linear.omega, force, rigid)
     size = np.linalg.norm(solution.probe[1:], axis=0)

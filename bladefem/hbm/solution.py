@@ -6,6 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from ..util.arrays import ComplexArray, RealArray
 from .linear.bodies import Stack, modal_amplitudes, modal_flexibility, port_motion
 from .model import ReducedModel
 
@@ -44,11 +45,11 @@ class Solution:
     # a period
     samples: int
     # (n, d, 2H+1) relative displacements: mean, cos 1, sin 1, ... [m]
-    w: np.ndarray
+    w: RealArray
     # (n, d, 2H+1) contact forces, with the preload in the mean of the normal ones [N]
-    f: np.ndarray
+    f: RealArray
     # (H+1, probes) complex amplitudes, Re(q e^{i h omega t}) [m]
-    probe: np.ndarray
+    probe: ComplexArray
     converged: bool
     reason: str
     # "newton" or the fallback that reached the point
@@ -61,7 +62,8 @@ class Solution:
     residual_displacement: float
     # the same times the contact stiffness [N]
     residual_force: float
-    # mean load on the springs that hold the damper, over the contacts' load [1]
+    # how fast a free damper walks: step a period times frequency, of the contact that moves most
+    # [m/s]
     drift: float
     # number of nodes that stick, slip, lift off, are open
     states: dict[str, int]
@@ -71,6 +73,9 @@ class Solution:
     # number of the piece of a response with several motions that the point lies on, from 1 on; 0
     # where one motion was looked for
     branch: int = 0
+    # (m, z) motions along which the damper walks; there the mean of w is no position but the step a
+    # period (`bladefem.hbm.solver.residual`). None: no contact walks
+    walk: np.ndarray | None = None
 
     @property
     def amplitude(self) -> np.ndarray:

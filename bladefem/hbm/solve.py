@@ -14,10 +14,11 @@ from .linear.condensation import Linear, condense
 from .model import ReducedModel
 from .point_measures import MEASURES, count_states, measure_point
 from .solution import Solution, Work, probe_motion
-from .solver.fallback import Attempt, match_harmonics, solve_balance
-from .solver.newton import DEFAULTS, Options
+from .solver.fallback import NEWTON_MERITS, Attempt, match_harmonics, solve_balance
+from .solver.newton import DEFAULTS, Options, newton, runs_compiled
 from .solver.point_compiled import compiles_points, solve_each, solve_small
 from .solver.residual import Balance
+from .solver.walking import drift_speed
 from .validate_model import check_point
 
 # contact springs over the bodies' stiffness from which a failure is put down to it
@@ -66,8 +67,25 @@ def solve(
     )
     best = min(attempts, key=lambda a: (not a.end.converged, a.end.state.error))
     reason = best.end.reason if best.end.converged else _failure_reasons(balance, attempts)
-    balance = replace(balance, samples=best.samples or samples)
+    samples = best.samples or best.end.samples or samples
+    balance = replace(balance, samples=samples, walk=best.end.walk)
     return as_solution(balance, best, sum(a.end.iterations for a in attempts), reason)
+
+
+def solve_near(
+    model: ReducedModel,
+    omega: float,
+    H: int,
+    samples: int,
+    start: Solution,
+    options: Options = DEFAULTS,
+) -> Solution:
+    """The point by Newton from a solved neighbour alone; nothing else is tried where that fails."""
+    balance = Balance(model, condense(model, omega, H), samples)
+    merit = "step" if runs_compiled(balance) else "residual"
+    end = newton(balance, match_harmonics(start.w, H), options, merit)
+    method = next(name for name, lowered in NEWTON_MERITS if lowered == merit)
+    return as_solution(balance, Attempt(method, end), end.iterations, end.reason)
 
 
 def free_response(
@@ -119,7 +137,9 @@ def as_solution(
         probe,
         measures,
     )
-    residual, residual_force, drift, *works = measures.tolist()
+    residual, residual_force, _, fed, lost, friction, _ = measures.tolist()
+    # what a law loses in a walk is more than its harmonics tell
+    dissipated = float(np.sum(state.forces.dissipated))
     counts = count_states(state.forces.shares).tolist()
     return Solution(
         omega=linear.omega,
@@ -135,10 +155,11 @@ def as_solution(
         residual=state.error,
         residual_displacement=residual,
         residual_force=residual_force,
-        drift=drift,
+        drift=drift_speed(balance, state.w),
         states=dict(zip(NODE_STATES, counts, strict=True)),
-        work=Work(*works),
+        work=Work(fed, lost, friction, dissipated),
         route=attempt.end.route,
+        walk=balance.walk,
     )
 
 
@@ -201,5 +222,5 @@ def _rigid_motion(
     """(r,) motions without stiffness that close  w_0 = free_0 - G_0 f_0 + B q."""
     if linear.B.shape[1] == 0:
         return np.zeros(len(linear.rigid))
-    gap = mean - linear.free[0] + linear.G[0] @ force
+    gap = mean - linear.free[0] + linear.bodies.mean_G @ force
     return linear.rigid @ (linear.B.T @ (linear.springs * gap.real))

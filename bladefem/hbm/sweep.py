@@ -19,7 +19,7 @@ from .model import ReducedModel
 from .predictor import PREDICTOR_POINTS, extrapolate_solution
 from .sensitivity import sensitivities
 from .solution import Solution, size
-from .solve import leading_stuck_solutions, solve
+from .solve import leading_stuck_solutions, solve, solve_near
 from .solver.fallback import match_harmonics
 from .solver.newton import DEFAULTS, Options
 from .solver.point_compiled import solve_along
@@ -43,6 +43,13 @@ BAND_LIMIT = 400
 BAND_LIMIT_NOTE = (
     f"the sweep ended after {BAND_LIMIT} points: peaks may be higher by more than the accuracy"
 )
+# Newton steps of one point of a walk from a neighbour: more are better spent on shorter steps
+WALK_ITERATIONS = 20
+# points tried on one walk, and its shortest step as a share of the way
+MOST_WALK_POINTS = 48
+SHORTEST_WALK_STEP = 0.002
+# times the samples that are tried where walks end close to a point
+MORE_SAMPLES = (2, 4)
 # unknowns up to which paths are followed wherever contacts lift off; of larger models, where the
 # sweep shows a jump, too
 FOLLOWED = 600
@@ -156,9 +163,20 @@ def sweep(
 
     slope = _slope_of(model, solved, options.probe)
     notes = [] if notes is None else notes
-    for solution in response(model, first_look(model, band), H, samples, options=options):
+    simply = replace(options, fallbacks=False)
+    lost = []
+    for solution in response(model, first_look(model, band), H, samples, options=simply):
+        if options.fallbacks and not solution.converged:
+            lost.append(solution.omega)
+            continue
         solved[solution.omega] = solution
         yield solution
+    # points that the neighbour below does not lead to are tried again when those above are known
+    for omega in lost:
+        near = _neighbours(solved.values(), omega)
+        for solution in _walk_from(model, omega, H, samples, near, options):
+            solved[solution.omega] = solution
+            yield solution
     while not (paths and _needs_continuation(model, solved, H, options.probe)):
         wanted = _next_frequency(solved, slope, (peak, curve), options.probe)
         if wanted is None:
@@ -168,8 +186,8 @@ def sweep(
             if not (paths and _normal_loads_follow(model)):
                 return
             break
-        starts = _nearest_solutions(solved, wanted)
-        solved[wanted] = solve_from(model, wanted, H, samples, starts, options)
+        near = _neighbours(solved.values(), wanted)
+        solved[wanted] = solve_from(model, wanted, H, samples, near, options)
         yield solved[wanted]
     points = list(solved.values())
     found = find_branches(model, band, points, H, samples, peak=peak, options=options)
@@ -190,13 +208,6 @@ def _slope_of(model: ReducedModel, solved: Mapping[float, Solution], probe: int)
         return float(sensitivities(model, solved[omega], ["omega"])["omega"].size[probe])
 
     return slope
-
-
-def _nearest_solutions(solved: Mapping[float, Solution], omega: float) -> list[Solution]:
-    """The nearest converged point, and the nearest one on its other side."""
-    near = sorted((s for s in solved.values() if s.converged), key=lambda s: abs(s.omega - omega))
-    beyond = (s for s in near if (s.omega > omega) != (near[0].omega > omega))
-    return [*near[:1], *islice(beyond, 1)]
 
 
 def _normal_loads_follow(model: ReducedModel) -> bool:
@@ -238,8 +249,8 @@ def solve_from(
     starts: Sequence[Solution],
     options: Options = DEFAULTS,
 ) -> Solution:
-    """The point from the first of several neighbours that leads to it, before fallbacks, which take
-    far longer.
+    """The point from the first of several neighbours that leads to it, at once or in small steps,
+    before fallbacks, which take far longer.
 
     Next to a fold of the curve only the neighbour on its other side does.
     """
@@ -249,9 +260,77 @@ def solve_from(
         if len(starts) > 1
         else ()
     )
-    return next((point for point in tries if point.converged), None) or _solve_off_resonance(
-        model, omega, H, samples, starts[0] if starts else None, options
-    )
+    found = next((point for point in tries if point.converged), None)
+    return found or _walk_from(model, omega, H, samples, starts, options)[-1]
+
+
+def _neighbours(points: Iterable[Solution], omega: float) -> list[Solution]:
+    """The converged point that is nearest to a frequency, and the nearest on its other side."""
+    near = sorted((p for p in points if p.converged), key=lambda p: abs(p.omega - omega))
+    beyond = (p for p in near if (p.omega > omega) != (near[0].omega > omega))
+    return [*near[:1], *islice(beyond, 1)]
+
+
+def _walk_from(
+    model: ReducedModel,
+    omega: float,
+    H: int,
+    samples: int,
+    starts: Sequence[Solution],
+    options: Options,
+) -> list[Solution]:
+    """Points on the way from one of several neighbours to a frequency, the last one at it; with
+    more samples where walks end close to it, by fallbacks where no neighbour leads there.
+    """
+    walked = []
+    for start in starts if options.fallbacks else ():
+        way = walk_in_frequency(model, omega, H, samples, start, options)
+        if way and way[-1].omega == omega:
+            return way
+        walked += way
+    # sampled friction jumps a little at the limit of stick: between two neighbours that are close
+    # to each other there may be no exact zero
+    if walked and samples:
+        nearest = min(walked, key=lambda p: abs(p.omega - omega))
+        for factor in MORE_SAMPLES:
+            point = solve_near(model, omega, H, factor * samples, nearest, options)
+            if point.converged:
+                return [*walked, replace(point, method="more samples")]
+    first = starts[0] if starts else None
+    return [*walked, _solve_off_resonance(model, omega, H, samples, first, options)]
+
+
+def walk_in_frequency(
+    model: ReducedModel,
+    omega: float,
+    H: int,
+    samples: int,
+    start: Solution,
+    options: Options = DEFAULTS,
+) -> list[Solution]:
+    """Converged points from a solved one towards a frequency, each by Newton from the curve
+    through the last ones; the step is halved where that fails.
+
+    The last point is at the frequency, unless a fold or a corner of the curve ended the walk.
+    """
+    brief = replace(options, iterations=min(options.iterations, WALK_ITERATIONS))
+    way = [start]
+    step = (omega - start.omega) / 2
+    shortest = SHORTEST_WALK_STEP * abs(omega - start.omega)
+    for _ in range(MOST_WALK_POINTS if step else 0):
+        target = way[-1].omega + step
+        if abs(omega - way[-1].omega) <= 1.5 * abs(step):
+            target = omega
+        guess = _predicted_start(way[-PREDICTOR_POINTS:], target, H) or way[-1]
+        point = solve_near(model, target, H, samples, guess, brief)
+        if point.converged:
+            way.append(point)
+            step *= 1.0 if point.iterations > WALK_ITERATIONS / 2 else 2.0
+        else:
+            step = (target - way[-1].omega) / 4
+        if abs(step) < shortest or way[-1].omega == omega:
+            break
+    return way[1:]
 
 
 def _solve_off_resonance(

@@ -25,7 +25,13 @@ from .linear.mean_motion import with_springs
 from .model import ReducedModel
 from .node_gradients import size_by_force, transposed_flexibility
 from .solution import Solution
-from .solver.residual import Balance, State, adjoint_inverse, evaluate_balance
+from .solver.residual import (
+    Balance,
+    State,
+    adjoint_inverse,
+    solved_balance,
+    transposed_force_change,
+)
 
 # instants of a period at which the friction limit is looked at, for each harmonic
 INSTANTS = 64
@@ -62,8 +68,7 @@ def tractions(
     solve.
     """
     require_coulomb(model.elements, "the range of static friction forces")
-    balance = Balance(model, condense(model, solution.omega, solution.harmonics), solution.samples)
-    state = evaluate_balance(balance, solution.w)
+    balance, state = solved_balance(model, solution)
     shares = state.forces.shares
     nodes = np.flatnonzero((shares[:, 1] == 0) & (shares[:, 2] < 1e-12))
     first = model.directions - model.elements.tangents
@@ -128,12 +133,11 @@ def _mean_change(model: ReducedModel, nodes: np.ndarray) -> tuple[np.ndarray, np
     # the frequency has no part in the mean
     linear = condense(model, 1.0, 1)
     flexible, _ = with_springs(
-        linear.G[0].real,
+        linear.bodies.mean_G,
         np.zeros(springs.size),
         springs.ravel(),
         linear.B,
         np.zeros(linear.B.shape[1]),
-        model.hold,
     )
     flexible = flexible.reshape(*springs.shape, *springs.shape)[nodes][:, :, nodes][..., first:]
     count = len(nodes) * elements.tangents
@@ -187,7 +191,7 @@ def _gradient(
     their springs, whatever the march says of a node that just reaches its limit.
     """
     model = balance.model
-    n, d, K = state.w.shape
+    _, d, K = state.w.shape
     first = d - model.elements.tangents
     dfdw = state.forces.jacobian.copy()
     dfdw[nodes] = 0.0
@@ -196,7 +200,7 @@ def _gradient(
             dfdw[nodes, a, k, a, k] = model.springs[nodes, a]
     state = replace(state, forces=replace(state.forces, dfdw=dfdw))
     by_force = size_by_force(model, solution, probe)
-    by_motion = dfdw.reshape(n, d * K, d * K).swapaxes(1, 2) @ by_force.reshape(n, d * K, 1)
-    back = adjoint_inverse(balance, state)(by_motion.reshape(n, d, K), 1e-9)
+    by_motion = transposed_force_change(balance, state, by_force)
+    back = adjoint_inverse(balance, state)(by_motion, 1e-9)
     weight = by_force - transposed_flexibility(balance.linear.A, back)
     return weight[:, first:, 0]

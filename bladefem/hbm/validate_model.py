@@ -23,10 +23,6 @@ def check_model(model: ReducedModel) -> None:
     _check_bodies("sides", model.sides, ("contact", "load", "probe"))
     dofs = port_size(model.sides[0], "contact")
     _check_elements(model.elements, dofs)
-    if not 0 < model.hold <= 1:
-        raise InputError(
-            f"hold {model.hold}: expected a share of the contact stiffness, above 0 and at most 1"
-        )
     _check_traction("start", model.start, model.elements)
     _check_amplitudes("excitation", model.excitation, port_size(model.sides[0], "load"), 0)
     if not model.coupled and 0 in model.excitation:

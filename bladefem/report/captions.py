@@ -36,6 +36,8 @@ CAPTIONS = {
     "of the range in the last columns was open to it.",
     "response/influences": "What the best load hangs on: each parameter over its range, by exact "
     "derivatives (bars); the two with the largest effect solved again at both ends (diamonds).",
+    "response/local_resonances": "Every local maximum of each response: motions found at its "
+    "frequency, and by which slow sweep it is reached (isolated: by neither).",
     "response/resonances": "Linear resonances without damper.",
     "mesh/convergence": "Frequencies on refined meshes, with the estimated limit and order.",
     "response/side_by_side": "Resonance amplitude and frequency at the best load over the value, "
@@ -48,6 +50,12 @@ CAPTIONS = {
     "accuracy/meshes": "Meshes with the settings of the automatic choice: time and errors.",
     "modes/stresses": "Where the blade is stressed most: by rotation, and by the excited mode "
     "scaled to 1 mm at the probe (mesh values at Gauss points).",
+    "modes/fatigue": "The places of the blade that use most of what the material lasts: "
+    "alternating stress of the whole damped motion, mean stress of rotation (negative: "
+    "compression), the amplitude allowed there, and the utilisation with the upper ends of its "
+    "estimates.",
+    "modes/utilisation": "Alternating stress over the amplitude that lasts at the mean stress "
+    "there, at the resonance under the best load.",
     "contact/pressure_on_both_seats": "Contact pressure on both seats under the load in the "
     "title, seen along their normals.",
     "contact/pressure": "Seats under each static load: normal force, pressed share and pressure.",

@@ -30,6 +30,7 @@ CURVES = {
     "dissipated": "friction work of a period",
     "estimated_error": "estimated relative error of the first harmonic",
     "slipping": "elements that slip or lift off",
+    "drift": "speed at which the damper walks",
 }
 
 

@@ -44,6 +44,7 @@ from ..view.live_curves import live_diameters, live_loops, live_optimum, live_re
 from ..view.live_shapes import live_shapes
 from .best_load import best_load_table
 from .datasets import datasets, table_dataset
+from .fatigue import save_fatigue_vtu, utilisation_drawing, utilisation_table
 from .influences import influence_sentence, influence_table
 from .linear import harmonic_table, linear_sentence
 from .nodes import (
@@ -59,6 +60,7 @@ from .nodes import (
     wear_table,
 )
 from .pressure import PICTURE, draw_seats, pressure_table, write_points
+from .resonance_table import resonance_table
 from .response_arrays import curve_arrays, loop_arrays, node_arrays, resonance_arrays
 from .tables import units_of, write_tables
 from .wheel import blade_table, pattern_drawings, pattern_sentences, pattern_table
@@ -132,6 +134,7 @@ def _write(result: SolvedRun, progress: Progress) -> None:
         **_drawings(result, tables),
         "response/hysteresis": lambda file: draw_hysteresis(cycles, file),
         "contact/friction_work": lambda file: draw_wear(patches, cycles[_best(result)], file),
+        **utilisation_drawing(result),
         **({} if result.wheel is None else pattern_drawings(result.wheel)),
     }
     figures = {}
@@ -140,6 +143,7 @@ def _write(result: SolvedRun, progress: Progress) -> None:
         draw(figures[name])
     mesh.save_vtu(result.mesh, folder / "mesh.vtu")
     modes.save_modes_vtu(result.mesh, excited_set(result), folder / "modes.vtu")
+    save_fatigue_vtu(result, folder / "fatigue.vtu")
     write_points(folder, result.contact.maps)
     save_cycles_vtu(patches, cycles, folder / "friction_work.vtu", coefficient)
     write_report(
@@ -256,11 +260,13 @@ def _tables(result: SolvedRun) -> dict[str, pd.DataFrame]:
         "modes/modes": family_table(excited_set(result), result.mesh, result.clamped),
         "modes/nodal_diameters": mode_table(result.modes, result.mesh, result.clamped),
         "modes/stresses": _stresses(result.strength),
+        **utilisation_table(result),
         "contact/pressure": pressure_table(result.contact.maps),
         **_own_load(result),
         **_best_load(result),
         **_damper_masses(result),
         "response/summary": _summary(result),
+        **resonance_table(curves),
         "response/points": _joined(
             [*map(points_of, curves), *map(linear_points, result.response.limits)]
         ),
@@ -399,6 +405,7 @@ def points_of(curve: Curve) -> pd.DataFrame:
             "residual": curve.residual,
             "iterations": curve.iterations,
             "slipping": curve.slipping,
+            "drift": curve.drift,
             "dissipated": curve.dissipated,
             "imbalance": curve.imbalance,
             "estimated_error": curve.estimated,
@@ -432,6 +439,7 @@ def linear_points(limit: Limit) -> pd.DataFrame:
             "residual": 0.0,
             "iterations": 0,
             "slipping": 0,
+            "drift": 0.0,
             "dissipated": 0.0,
             "imbalance": 0.0,
             "estimated_error": 0.0,

@@ -138,7 +138,7 @@ def stress(summary: pd.DataFrame, best: pd.Series) -> list[tuple[str, str, str]]
         (
             "alternating stress there",
             f"{1e-6 * best['alternating_stress']:.3g} MPa",
-            f"largest von Mises amplitude of the mode alone{beside}",
+            f"largest von Mises stress of all modes, harmonics and damper forces{beside}",
         )
     ]
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from types import NoneType
 from typing import Any, NamedTuple, get_args, get_origin, get_type_hints
 
@@ -24,7 +24,7 @@ class Field(NamedTuple):
     # type hint: float, int | None, tuple[float, ...], ...
     kind: Any
     # unit, low, high, help, choices
-    meta: dict
+    meta: Mapping[str, Any]
     default: Any
 
 
@@ -134,9 +134,9 @@ _SCALARS = {float: _parse_float, int: _parse_int, bool: _parse_bool, str: _parse
 
 def _parse_tuple(
     value: object,
-    kinds: tuple,
+    kinds: tuple[Any, ...],
     field: Field,
-) -> tuple:
+) -> tuple[Any, ...]:
     items = _list_items(value)
     length = None if kinds[-1] is Ellipsis else len(kinds)
     if length is not None and len(items) != length:
@@ -172,7 +172,7 @@ def _word_or_values(value: object, field: Field) -> Any:
     return _parse_tuple(value, get_args(kind), field)
 
 
-def _list_items(value: object) -> list:
+def _list_items(value: object) -> list[Any]:
     if isinstance(value, str):
         return split_values(value)
     return list(value) if hasattr(value, "__iter__") else [value]

@@ -23,16 +23,17 @@ from typing import Any
 import numpy as np
 
 from ..contact.interface_elements import gives_stiffness
+from ..contact.numerical_stiffness import physical_stiffness
 from ..errors import NotSolvedError
 from ..hbm.model import ReducedModel
 from ..hbm.node_gradients import node_gradients
-from ..hbm.parameters import vary
+from ..hbm.parameters import layer_share, vary
 from ..hbm.peak import Peak, find_peak
 from ..hbm.sensitivity import sensitivities
 from ..hbm.solve import solve
 from ..scene.tables import Scene
 from .adaptive.choice import sufficient
-from .adaptive.family import Family, joined, member
+from .adaptive.family import Family, Member, joined, member
 from .adaptive.settings import Settings
 from .pipeline.assemble_model import LoadCase
 from .pipeline.best_load import BestLoad, find_best_load
@@ -104,9 +105,13 @@ def parameters_of(
     """
     stiffness = GIVEN_STIFFNESS if gives_stiffness(scene.contact) else USUAL_STIFFNESS
     known = "given by the scene" if gives_stiffness(scene.contact) else "measured joints"
-    found = [
+    layer = [
         Parameter("kt", 1 / stiffness, stiffness, known),
         Parameter("kn", 1 / stiffness, stiffness, known),
+    ]
+    # rigid faces have no layer whose stiffness could change
+    found = [] if scene.contact.stiffness == "rigid" else layer
+    found += [
         Parameter("mu", 1 / FRICTION, FRICTION, "scatter of friction coefficients"),
         Parameter("damping", 1 / DAMPING, DAMPING, "damping without friction"),
     ]
@@ -259,7 +264,7 @@ class _Study:
     ) -> float:
         """Derivative of ln height by ln load, the seating solved anew."""
         case_at = self.changed(name, factor)
-        ends = [case_at(load * f).elements for f in (1 - STEP, 1 + STEP)]
+        ends = [case_at(load * f) for f in (1 - STEP, 1 + STEP)]
         return self._by_elements(peak, self.model(name, factor, load), ends)
 
     def by_parameter(
@@ -272,23 +277,30 @@ class _Study:
         if name == "damping":
             slope = sensitivities(model, peak.solution, ["damping"])["damping"].size[0]
             return float(slope) / peak.height
-        ends = [self.changed(name, f)(self.best.load).elements for f in (1 - STEP, 1 + STEP)]
+        ends = [self.changed(name, f)(self.best.load) for f in (1 - STEP, 1 + STEP)]
         return self._by_elements(peak, model, ends)
 
     def _by_elements(
         self,
         peak: Peak,
         model: ReducedModel,
-        ends: list,
+        ends: list[LoadCase],
     ) -> float:
-        """The same from the friction elements on both sides of a step."""
+        """The same from the friction elements on both sides of a step.
+
+        Stiffnesses are those of the whole layer. Elements of a split layer keep theirs over the
+        step; for an open one that shifts the load at zero displacement, -kn times its gap.
+        """
         case = self.changed("kt", 1.0)(self.best.load)
         groups = member(self.family_of(case), self.best.settings).groups
-        low, high = (joined(e, groups) for e in ends)
+        low, high = (joined(end.elements, groups) for end in ends)
+        layers = [physical_stiffness(end.elements, end.series) for end in ends]
+        by_layer = _log_rate(*(np.bincount(groups, layer.kn) for layer in layers))
+        shift = layer_share(model, "kn") * by_layer - _log_rate(low.kn, high.kn)
         rates = {
-            "load": _log_rate(low.n0, high.n0),
-            "kt": _log_rate(low.kt, high.kt),
-            "kn": _log_rate(low.kn, high.kn),
+            "load": _log_rate(low.n0, high.n0) + np.where(low.n0 < 0, shift, 0.0),
+            "kt": _log_rate(*(np.bincount(groups, layer.kt) for layer in layers)),
+            "kn": by_layer,
             "mu": _log_rate(low.mu, high.mu),
         }
         names = [name for name in rates if np.any(rates[name])]
@@ -377,7 +389,7 @@ class _Study:
                 if name != "damping":
                     return family
 
-                def build(settings):
+                def build(settings: Settings) -> Member:
                     made = family.build(settings)
                     return replace(made, model=vary(made.model, "damping", factor))
 
@@ -398,8 +410,9 @@ class _Study:
 
 
 def _log_rate(low: np.ndarray, high: np.ndarray) -> np.ndarray:
-    """(n,) derivative of ln |x| by the logarithm that was stepped; 0 where x is 0."""
-    middle = (low + high) / 2
-    change = (high - low) / (2 * STEP)
+    """(n,) derivative of ln |x| by the logarithm that was stepped; 0 where x is 0 or infinite."""
+    finite = np.isfinite(low) & np.isfinite(high)
+    middle = np.where(finite, low + high, 0.0) / 2
+    change = np.subtract(high, low, out=np.zeros_like(middle), where=finite) / (2 * STEP)
     rate = np.divide(change, middle, out=np.zeros_like(middle), where=middle != 0)
     return np.where(abs(rate) < 1e-9, 0.0, rate)

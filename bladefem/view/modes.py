@@ -4,7 +4,7 @@ waves.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -366,8 +366,8 @@ def wave_frames(
     number: int,
     frames: int,
     pixels: int,
-):
-    """Yield (pixels, pixels, 3) pictures of Re(u e^{j 2 pi k / frames}), k = 0.. frames - 1."""
+) -> Iterator[np.ndarray]:
+    """(pixels, pixels, 3) pictures of Re(u e^{j 2 pi k / frames}), k = 0.. frames - 1."""
     wheel, motion = wheel_motion(mesh, modes.shapes[number], modes.nodal_diameter or 0)
     _, signed = wheel_component(mesh, wheel, motion, None)
     factor = scale_of(mesh, modes.shapes[number])

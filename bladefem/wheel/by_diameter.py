@@ -19,6 +19,7 @@ from ..data import PortModel, RigidBody
 from ..errors import NotSolvedError
 from ..hbm.linear.bodies import Damping
 from ..hbm.linear.woodbury import frequency_independent_parts
+from ..util.arrays import RealOrComplex
 from .model import Wheel
 
 # rigid motions that the contact springs resist less than this, relatively, are left out
@@ -111,6 +112,8 @@ def _residual_and_modes(
     """R (D, P, P) and L (D, P, k) of the blades and the damper, which moves against them."""
     damper = wheel.damper
     contact = np.arange(len(wheel.rows))
+    other: RealOrComplex
+    flexibility: RealOrComplex
     if isinstance(damper, RigidBody):
         half = np.linalg.cholesky(damper.mass)
         other = np.linalg.solve(half, damper.B[wheel.rows].T).T

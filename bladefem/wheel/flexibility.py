@@ -35,7 +35,7 @@ class WheelFlexibility:
     T: np.ndarray
     # (H+1, N, q, q) dynamic stiffness of the deviations, and LU factors of 1 + E A_yy; empty: tuned
     E: np.ndarray
-    factors: tuple
+    factors: tuple[tuple[np.ndarray, np.ndarray], ...]
     # whether the mean takes part in the balance
     coupled: bool
 
@@ -89,7 +89,7 @@ def wheel_flexibility(
         wheel.kept["last"] = (key, Z, modal_flexibility(parts, Z), {})
     _, Z, T, shared = wheel.kept["last"]
     E = np.zeros((0, 0, 0, 0))
-    factors: tuple = ()
+    factors: tuple[tuple[np.ndarray, np.ndarray], ...] = ()
     if not pattern.tuned:
         if "yy" not in shared:
             shared["yy"] = [_blade_matrix(parts, T, h) for h in range(harmonics + 1)]
@@ -126,7 +126,7 @@ def _blade_matrix(
     return full.transpose(0, 2, 1, 3).reshape(count * q, count * q)
 
 
-def _factorise_blocks(A: np.ndarray, E: np.ndarray) -> tuple:
+def _factorise_blocks(A: np.ndarray, E: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """LU factors of 1 + E A for E (N, q, q)."""
     count, q = E.shape[:2]
     system = (E @ A.reshape(count, q, count * q)).reshape(count * q, count * q)

@@ -63,7 +63,6 @@ def one_body_model(
         Damping(),
         _all_dampers(wheel),
         wheel.damper_damping,
-        hold=wheel.hold,
         coupled=wheel.coupled,
     )
 
@@ -71,7 +70,8 @@ def one_body_model(
 def _all_dampers(wheel: Wheel) -> RigidBody | tuple[PortModel, ...] | None:
     if isinstance(wheel.damper, RigidBody):
         ones = np.eye(wheel.count)
-        return RigidBody(np.kron(ones, wheel.damper.mass), np.kron(ones, wheel.damper.B))
+        mass = np.asarray(np.kron(ones, wheel.damper.mass), float)
+        return RigidBody(mass, np.asarray(np.kron(ones, wheel.damper.B), float))
     return None if wheel.damper is None else (join((wheel.damper,) * wheel.count),)
 
 

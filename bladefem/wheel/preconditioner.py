@@ -36,7 +36,7 @@ class Preconditioner:
     # (N, H+1, k, k) in nodal diameters
     by_diameter: np.ndarray
     # harmonic to the modes that take part, and LU factors of all diameters
-    dense: dict[int, tuple[np.ndarray, tuple]]
+    dense: dict[int, tuple[np.ndarray, tuple[np.ndarray, np.ndarray]]]
 
     def apply(self, r: np.ndarray) -> np.ndarray:
         """The approximate inverse times real coefficients r (N, m, K)."""
@@ -107,7 +107,7 @@ def _dense_factors(
     C: np.ndarray,
     h: int,
     kept: np.ndarray,
-) -> tuple:
+) -> tuple[np.ndarray, np.ndarray]:
     """LU factors (N k', N k') of T^-1 + U^H C U + U_b^H E U_b over all nodal diameters."""
     parts = flex.parts
     count = len(C)

@@ -14,6 +14,7 @@ from scipy import stats
 from ..errors import InputError
 from ..hbm.linear.bodies import modal_flexibility
 from ..hbm.model import ReducedModel
+from ..hbm.solution import Solution
 from ..hbm.solve import solve
 from ..hbm.solver.newton import DEFAULTS, Options
 from ..util.communicator import Communicator
@@ -197,7 +198,7 @@ def one_body_respond(
     points.
     """
     model = one_body_model(wheel, pattern)
-    known: list = []
+    known: list[Solution] = []
 
     def respond(omega: float) -> np.ndarray:
         start = min(known, key=lambda s: abs(s.omega - omega), default=None)

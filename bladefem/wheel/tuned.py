@@ -47,7 +47,6 @@ def tuned_sector(wheel: Wheel, harmonics: int) -> ReducedModel | None:
         wheel.damping,
         damper,
         wheel.damper_damping,
-        hold=wheel.hold,
         coupled=wheel.coupled,
         start=wheel.start,
     )

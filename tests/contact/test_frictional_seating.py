@@ -7,7 +7,11 @@ import pytest
 from wedge import wedge_mesh
 
 from bladefem.contact.admissible_load import holds_itself, normal_load_bounds
-from bladefem.contact.frictional_seating import frictional_problem, seat_with_friction
+from bladefem.contact.frictional_seating import (
+    frictional_problem,
+    hold_axially,
+    seat_with_friction,
+)
 from bladefem.contact.interface_law import InterfaceLaw
 from bladefem.contact.patch import make_patch
 from bladefem.contact.seating import contact_problem, solve
@@ -142,3 +146,29 @@ def test_seats_jam_beyond_the_self_locking_angle(problems, mu, jams):
     assert holds_itself(rough.rigid, friction) == jams
     if jams:
         assert normal_load_bounds(rough.rigid, rough.load, friction)[1] == np.inf
+
+
+def test_a_stop_along_the_axis_takes_the_load_along_it(problems):
+    """Without an axial load it changes nothing; a tenth of the load along the axis slides a free
+    damper out, and leaves a held one as it is. Plane dampers have no such motion.
+    """
+    rough, smooth = problems
+    if len(rough.load) == 3:
+        with pytest.raises(InputError, match='damper.axial = "held": a plane damper'):
+            hold_axially(smooth)
+        return
+    plain = np.concatenate([m.force for m in solve(smooth, SPEED)])
+    held = np.concatenate([m.force for m in solve(hold_axially(smooth), SPEED)])
+    np.testing.assert_allclose(held, plain, rtol=0, atol=1e-9 * plain.max())
+    axial = np.zeros(6)
+    axial[2] = 0.1 * np.linalg.norm(rough.load[:2])
+    pushed = replace(smooth, load=smooth.load + axial)
+    with pytest.raises(NotSolvedError, match="frictionless seats can't hold"):
+        solve(pushed, SPEED)
+    stopped = np.concatenate([m.force for m in solve(hold_axially(pushed), SPEED)])
+    np.testing.assert_allclose(stopped, plain, rtol=0, atol=1e-9 * plain.max())
+    one, other = (
+        forces_of(seated(hold_axially(replace(rough, load=rough.load + x))))
+        for x in (0 * axial, axial)
+    )
+    np.testing.assert_allclose(one, other, rtol=0, atol=1e-9 * np.abs(one).max())

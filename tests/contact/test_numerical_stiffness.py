@@ -6,15 +6,26 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from test_seat import ALPHA, condensed
+from wedge import wedge_mesh
 
-from bladefem.contact.numerical_stiffness import physical_stiffness, split_stiffness
+from bladefem.contact.interface_elements import gives_stiffness, layered, pair_ratio
+from bladefem.contact.numerical_stiffness import (
+    numerical_stiffness,
+    physical_stiffness,
+    split_stiffness,
+    stiffest_layer,
+)
 from bladefem.data import Elements, Patch, PressureMap
 from bladefem.hbm.model import ReducedModel, in_series
 from bladefem.hbm.parameters import vary
 from bladefem.hbm.sensitivity import sensitivities
 from bladefem.hbm.solve import solve, stuck_response
 from bladefem.reduction.matrices import port_model_from_matrices
-from bladefem.scene.tables import Contact
+from bladefem.scene.tables import Contact, Scene
+from bladefem.scene.toml import vary as vary_scene
+from bladefem.study.influences import parameters_of
+from bladefem.study.pipeline.changed_cases import cases_of
 
 STIFFNESS = 4e6
 OMEGA = 120.0
@@ -114,3 +125,25 @@ def test_the_derivative_by_the_stiffness_is_that_of_the_layer(name):
     whole = solve(chain(), OMEGA, 31, 512)
     same = sensitivities(chain(), whole, [name])[name].size[0]
     assert rate == pytest.approx(same, rel=0.1, abs=1e-3 * height)
+
+
+def test_every_search_solves_the_split_layer():
+    """Loads that are studied and loads that the best one is searched among have the same
+    elements.
+    """
+    scene = vary_scene(Scene(), "contact.kt_area", 1e15, "contact.mu", 0.3)
+    ratio = pair_ratio(scene.material.blade, scene.material.damper)
+    problem = layered(condensed(wedge_mesh(ALPHA)), scene.contact, ratio)
+    case = cases_of(scene, problem, 2)(120.0)
+    assert case.series is not None and (case.series < 0).all()
+    area = np.concatenate([patch.area for patch in problem.patches])
+    np.testing.assert_allclose(case.elements.kt, numerical_stiffness(problem) * area)
+    layer = physical_stiffness(case.elements, case.series)
+    np.testing.assert_allclose(layer.kt, stiffest_layer(problem) * area)
+
+
+def test_rigid_faces_have_no_stiffness_to_vary():
+    scene = vary_scene(Scene(), "contact.stiffness", "rigid")
+    assert gives_stiffness(scene.contact)
+    names = {parameter.name for parameter in parameters_of(scene)}
+    assert "mu" in names and not names & {"kt", "kn"}

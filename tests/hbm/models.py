@@ -65,3 +65,23 @@ def wedge_between_masses(force=10.0, at=0, damping=20.0, excited=True):
     elements = Elements(np.full(2, 3e5), np.full(2, 3e5), np.full(2, 0.3), n0, tangents=1)
     loads = {1: np.array([force])} if excited else {}
     return ReducedModel((masses,), elements, loads, damper=(wedge,))
+
+
+# two masses and one contact whose lift-off bends the resonance to lower frequencies
+FOLDING = {
+    "M": np.diag([0.4331616, 2.3952948]),
+    "K": np.array([[933998.0, -256323.86], [-256323.86, 256323.86]]),
+    "C": np.array([[9.510, -2.194], [-2.194, 10.581]]),
+    "contact": np.array([[-0.77105, -0.63678], [-0.24764, -0.96885]]),
+    "force": np.array([-9.354 - 2.544j, -10.289 + 9.410j]),
+    # kt, kn [N/m], mu, n0 [N]
+    "element": (92819.6, 133550.0, 0.75, 38.374),
+}
+
+
+def folding_pair():
+    """The two masses of FOLDING."""
+    ports = {"contact": FOLDING["contact"], "load": np.eye(2), "probe": np.eye(2)}
+    body = port_model_from_matrices(FOLDING["M"], FOLDING["K"], ports, C=FOLDING["C"])
+    element = Elements(*(np.array([x]) for x in FOLDING["element"]), tangents=1)
+    return ReducedModel((body,), element, {1: FOLDING["force"]})

@@ -58,7 +58,7 @@ def plain_condense(model, omega, H):
     solved = np.linalg.solve(G * springs + np.eye(len(springs)), both)
     A = solved[:, :, :-1].copy()
     stuck = solved[:, :, -1].copy()
-    A[0], stuck[0] = with_springs(G[0].real, free[0].real, springs, B, g, model.hold)
+    A[0], stuck[0] = with_springs(G[0].real, free[0].real, springs, B, g)
     if not model.coupled:
         for part in (G, free, A, stuck):
             part[0] = 0.0

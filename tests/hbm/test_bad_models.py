@@ -76,7 +76,6 @@ def test_bodies(make, words):
         ({"elements": replace(E, kn=E.kt)}, "expected normal dofs"),
         ({"elements": replace(E, tangents=3)}, "tangents"),
         ({"elements": Elements([], [], [], [], 1)}, "with 0 elements"),
-        ({"hold": np.nan}, "hold"),
         ({"excitation": np.ones(1)}, "expected a dict"),
         ({"excitation": {1: 1.0}}, r"shape \(1,\)"),
         ({"excitation": {"one": np.ones(1)}}, "harmonic one"),
@@ -86,7 +85,6 @@ def test_bodies(make, words):
         ({"damper": SIDE}, "damper of type PortModel"),
         ({"damper": (block().side(1),)}, "damper: contact port of 12 dofs"),
         ({"damper": RigidBody(np.eye(1), np.ones((2, 1)))}, "damper.B"),
-        ({"hold": 0.0}, "hold"),
         (
             {"damper": RigidBody(-np.eye(1), np.ones((1, 1)))},
             "damper.mass: expected a symmetric positive definite",

@@ -2,31 +2,23 @@
 
 import numpy as np
 import pytest
+from models import FOLDING, folding_pair
 
-from bladefem.data import Elements
 from bladefem.hbm import sweep as sweep_module
 from bladefem.hbm.branches import find_branches
-from bladefem.hbm.model import ReducedModel
 from bladefem.hbm.solve import solve
 from bladefem.hbm.sweep import response, size, sweep
-from bladefem.reduction.matrices import port_model_from_matrices
 
 BAND = (249.0, 431.0)
-M = np.diag([0.4331616, 2.3952948])
-K = np.array([[933998.0, -256323.86], [-256323.86, 256323.86]])
-C = np.array([[9.510, -2.194], [-2.194, 10.581]])
-CONTACT = np.array([[-0.77105, -0.63678], [-0.24764, -0.96885]])
-FORCE = np.array([-9.354 - 2.544j, -10.289 + 9.410j])
-KT, KN, MU, N0 = 92819.6, 133550.0, 0.75, 38.374
+# matrices of the model, for the march
+M, K, C = FOLDING["M"], FOLDING["K"], FOLDING["C"]
+CONTACT, FORCE = FOLDING["contact"], FOLDING["force"]
+KT, KN, MU, N0 = FOLDING["element"]
 
 
 @pytest.fixture(scope="module")
 def folding():
-    """Two masses and one contact whose lift-off bends the resonance to lower frequencies."""
-    ports = {"contact": CONTACT, "load": np.eye(2), "probe": np.eye(2)}
-    body = port_model_from_matrices(M, K, ports, C=C)
-    element = Elements(*(np.array([x]) for x in (KT, KN, MU, N0)), tangents=1)
-    return ReducedModel((body,), element, {1: FORCE})
+    return folding_pair()
 
 
 def marched(q, v, slider, omega, periods, steps=1000):

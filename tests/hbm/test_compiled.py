@@ -13,7 +13,7 @@ from bladefem.hbm.linear.condensation import condense
 from bladefem.hbm.model import Damping
 from bladefem.hbm.reference_blade import reference_model
 from bladefem.hbm.solve import solve
-from bladefem.hbm.solver.newton import newton
+from bladefem.hbm.solver.newton import newton_as_given
 from bladefem.hbm.solver.residual import Balance, contact_forces, start_in_stick
 
 
@@ -42,9 +42,9 @@ MODELS = [
 @pytest.mark.parametrize(("model", "omega"), MODELS)
 def test_compiled_and_plain_newton_take_the_same_steps(model, omega, samples, monkeypatch):
     balance = Balance(model, condense(model, omega, 5), samples)
-    fast = newton(balance, start_in_stick(balance))
+    fast = newton_as_given(balance, start_in_stick(balance))
     monkeypatch.setattr(policy, "COMPILED_NEWTON_UNKNOWNS", 0)
-    slow = newton(balance, start_in_stick(balance))
+    slow = newton_as_given(balance, start_in_stick(balance))
     assert fast.converged and slow.converged and fast.iterations == slow.iterations > 0
     np.testing.assert_allclose(
         fast.state.w, slow.state.w, rtol=0, atol=1e-9 * abs(slow.state.w).max()

@@ -17,8 +17,9 @@ from bladefem.hbm.linear.condensation import condense
 from bladefem.hbm.model import Damping, ReducedModel
 from bladefem.hbm.parameters import vary
 from bladefem.hbm.solve import solve
+from bladefem.hbm.solver.newton import Options
 from bladefem.hbm.solver.residual import Balance, evaluate_balance
-from bladefem.hbm.sweep import size
+from bladefem.hbm.sweep import response, size
 from bladefem.reduction.matrices import port_model_from_matrices
 
 
@@ -87,10 +88,11 @@ def test_folds_lie_where_sweeps_up_and_down_jump():
 
 
 def test_the_neighbour_beyond_a_fold_is_tried_before_the_fallbacks(monkeypatch):
-    """One that leads nowhere costs no fallbacks where another leads to the point; they are the last
-    resort.
+    """One that leads nowhere costs no fallbacks where another leads to the point, at once or in
+    small steps; they are the last resort.
     """
     model, plain, asked = stop(), sweep_module._solve_off_resonance, []
+    walked = []
     near, beyond = (solve(model, omega, 5, 0) for omega in (1.0, 1.3))
 
     def counted(*arguments):
@@ -99,7 +101,12 @@ def test_the_neighbour_beyond_a_fold_is_tried_before_the_fallbacks(monkeypatch):
         point = plain(*arguments)
         return replace(point, converged=point.converged and any(start is s for s in leading))
 
+    def no_way(*arguments):
+        walked.append(arguments[4])
+        return []
+
     monkeypatch.setattr(sweep_module, "_solve_off_resonance", counted)
+    monkeypatch.setattr(sweep_module, "walk_in_frequency", no_way)
     for leading, tried in (
         ([near], [(near, False)]),
         ([beyond], [(near, False), (beyond, False)]),
@@ -109,6 +116,19 @@ def test_the_neighbour_beyond_a_fold_is_tried_before_the_fallbacks(monkeypatch):
         point = sweep_module.solve_from(model, 1.1, 5, 0, [near, beyond])
         assert point.converged == bool(leading) and [f for _, f in asked] == [f for _, f in tried]
         assert all(one is other for (one, _), (other, _) in zip(asked, tried, strict=True))
+    # both neighbours, and only where neither leads there at once
+    assert len(walked) == 2 and walked[0] is near and walked[1] is beyond
+
+
+def test_a_walk_ends_at_the_frequency_or_before_a_fold():
+    """The spring with a stop hardens: its upper motion ends at a fold."""
+    model = stop()
+    omegas = np.linspace(0.9, 1.02, 25)
+    *_, low = response(model, omegas, 5, 0)
+    way = sweep_module.walk_in_frequency(model, 1.05, 5, 0, low)
+    assert way[-1].omega == 1.05 and all(p.converged for p in way)
+    beyond = sweep_module.walk_in_frequency(model, 3.0, 5, 0, low, Options(iterations=3))
+    assert all(p.converged for p in beyond)
 
 
 def twins(coupling):

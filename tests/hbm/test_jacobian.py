@@ -1,5 +1,7 @@
 """The structured derivative against differences of the residual, and against the dense matrix."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from models import block, single_mass
@@ -12,6 +14,7 @@ from bladefem.hbm.solver.residual import (
     linearise_balance,
     start_in_stick,
 )
+from bladefem.hbm.solver.walking import may_walk, walking_motions
 
 
 def differences(balance, w, step):
@@ -39,6 +42,10 @@ def test_the_inverse_derivative_undoes_the_differences(model, omega, scale):
     w = start_in_stick(balance) * scale
     w = w + 0.05 * abs(w).max() * rng.normal(size=w.shape)
     state = evaluate_balance(balance, w)
+    if may_walk(balance):
+        # every contact slips: a balance at rest does not determine where the damper is
+        balance = replace(balance, walk=walking_motions(balance, state.forces.shares))
+        state = evaluate_balance(balance, w)
     J = differences(balance, w, 1e-7 * abs(w).max())
     x = rng.normal(size=w.shape)
     undone = linearise_balance(balance, state)((J @ x.ravel()).reshape(w.shape))

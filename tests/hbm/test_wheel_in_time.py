@@ -197,6 +197,7 @@ def test_balance_agrees_with_the_free_ring_in_time(wheel, load, harmonics):
     contact = tuple(np.broadcast_to(x, nodes).astype(float) for x in (e.kt, e.kn, e.mu, e.n0))
     zeta = scene.operation.damping
     heights = []
+    places = []
     for _ in range(PERIODS):
         x = march(
             np.ascontiguousarray(shapes[:, :, body.ports["contact"]]),
@@ -211,7 +212,12 @@ def test_balance_agrees_with_the_free_ring_in_time(wheel, load, harmonics):
         )
         drive[2] += STEPS * dt
         angle = top.omega * (drive[2] - STEPS * dt + dt * np.arange(1, STEPS + 1))
+        places.append(state[2] @ slips)
         heights.append(2 * abs(np.mean(x * np.exp(-1j * angle)[:, None], axis=0)))
     assert heights[-1] == pytest.approx(heights[-5], rel=1e-3), "not steady"
     # all four blades, each with its own phase
     assert heights[-1] == pytest.approx(np.full(BLADES, abs(top.probe[1, 0])), rel=5e-3)
+    # the step that each damper makes in a period, at the contact that moves most
+    step = (places[-1] - places[-2]).reshape(BLADES, nodes, 3)
+    speed = np.linalg.norm(step, axis=2).max(axis=1) * top.omega / (2 * np.pi)
+    assert speed == pytest.approx(np.full(BLADES, top.drift), rel=0.05, abs=1e-7)

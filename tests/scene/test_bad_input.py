@@ -35,6 +35,7 @@ REFUSED = [
     ("disc.sectors=36 mm", "expected a plain number"),
     ("operation.stiffening=maybe", "expected true or false"),
     ("contact.normal=couple", "did you mean 'coupled'?"),
+    ("damper.axial=hold", "damper.axial = 'hold': expected one of free, held"),
     ("model.damper=stiff", "expected one of mass, rigid, elastic"),
     ("kind=wedge secter", "did you mean 'wedge sector'?"),
     ("excitation.direction=1, 0", "expected 3 values"),

@@ -97,7 +97,10 @@ def test_F11_newton_on_the_residual_stalls_and_the_chain_does_not():
     reached = solve(model, omega, 31, 2048)
     for other in (_by_harmonics(model, omega), _by_load(model, omega)):
         assert other.converged and other.method == "newton"
-        np.testing.assert_allclose(other.w, reached.w, rtol=0, atol=1e-7 * abs(reached.w).max())
+        # every contact slips: the mean position of the free damper is not determined
+        moving = abs(other.w - reached.w)[:, :, 1:]
+        assert moving.max() < 1e-7 * abs(reached.w).max()
+        np.testing.assert_allclose(other.f, reached.f, rtol=0, atol=1e-7 * abs(reached.f).max())
 
 
 def _by_harmonics(model, omega):

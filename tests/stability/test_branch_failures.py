@@ -77,7 +77,8 @@ def test_F30_a_converged_motion_that_time_leaves(omega, verdict, name):
 
 def test_F31_a_damper_that_walks():
     """Friction pushes one way while the load is high: a free damper never comes back, and a balance
-    of periodic motions has no place for it; springs hold it, and what they carry is reported.
+    of periodic motions has no place for it. The step that it makes in each period is an unknown,
+    and reported as a speed.
     """
     K = np.array([[1.0]])
     body = port_model_from_matrices(
@@ -90,15 +91,14 @@ def test_F31_a_damper_that_walks():
         (body,), element, {1: np.array([0.3])}, Damping(), damper, normal={1: np.array([0.25j])}
     )
     omega = 1.3
-    point = solve(model, omega, 7, 512)
+    point = solve(model, omega, 31, 2048)
     assert point.converged and point.states["slip"] == 1
-    assert point.drift > 5e-3
     dt = 2 * np.pi / omega / STEPS
     blade = np.zeros(2)
     rider = np.zeros(2)
     slider = 0.0
     places = []
-    for k in range(60 * STEPS):
+    for k in range(100 * STEPS):
         phase = 2 * np.pi * (k % STEPS) / STEPS
         limit = 0.5 * max(0.3 - 0.25 * np.sin(phase), 0.0)
         w = blade[0] - rider[0]
@@ -113,6 +113,8 @@ def test_F31_a_damper_that_walks():
     steps = np.diff(places[-10:])
     assert abs(steps).min() > 1e-3 * size(point)
     assert len(set(np.sign(steps))) == 1
+    # the contact is 60 times as stiff as the blade: the step hangs on high harmonics
+    assert point.drift * 2 * np.pi / omega == pytest.approx(abs(steps).mean(), rel=0.03)
 
 
 @pytest.mark.parametrize("omega", [2.8, 3.0])

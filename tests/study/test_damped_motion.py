@@ -16,7 +16,7 @@ from bladefem.fem.alternating_stress import alternating_stress
 from bladefem.fem.flexibility import unknown_places
 from bladefem.fem.forced_motion import forced_motion
 from bladefem.fem.modes import modes as normal_modes
-from bladefem.fem.stress import gauss_stress
+from bladefem.fem.stress import gauss_stress, nodal_stress, von_mises
 from bladefem.hbm.solve import solve
 from bladefem.scene.toml import load_scene
 from bladefem.study.modes.linear_response import excitation_load
@@ -112,6 +112,10 @@ def test_more_harmonics_are_followed_in_time():
     u = np.zeros((len(bodies.mesh.points), 2))
     u[:, 1] = bodies.mesh.points[:, 0] ** 2
     one = alternating_stress(bodies.still_blade, np.array([u + 0j]))
+    assert one.field.max() == one.largest
+    # one harmonic: the field is its amplitude, and the bound of the others is no smaller
+    amplitude = von_mises(nodal_stress(bodies.still_blade, u + 0j))
+    np.testing.assert_allclose(one.field, amplitude, rtol=2e-2, atol=1e-6 * one.largest)
     # cos t - cos(3 t) / 3 reaches 0.943 of the amplitude, cos t + cos(3 t) / 3 reaches 4/3 of it
     flat = alternating_stress(bodies.still_blade, np.array([u + 0j, 0 * u, -u / 3 + 0j]))
     sharp = alternating_stress(bodies.still_blade, np.array([u + 0j, 0 * u, u / 3 + 0j]))

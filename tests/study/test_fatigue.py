@@ -2,16 +2,21 @@
 
 from __future__ import annotations
 
+from types import SimpleNamespace
+
 import numpy as np
 import pytest
 
 from bladefem.errors import InputError
+from bladefem.fem.stress import signed_von_mises, von_mises
 from bladefem.scene.tables import Fatigue, Scene
 from bladefem.scene.toml import vary
 from bladefem.study.fatigue import haigh_diagram, utilisation
 from bladefem.study.pipeline.preflight import refuse_run
+from bladefem.study.pipeline.utilisation import highest_use, run_utilisation, utilisation_message
 
 MPA = 1e6
+TABLE = ["0 MPa: 300 MPa", "400 MPa: 180 MPa"]
 
 
 def nodes(count: int) -> np.ndarray:
@@ -80,3 +85,48 @@ def test_diagrams_are_refused_before_long_work(changes, said):
     scene = vary(Scene(), **{f"fatigue__{name}": value for name, value in changes.items()})
     with pytest.raises(InputError, match=said):
         refuse_run(scene)
+
+
+def run_of(scene: Scene, mean: float) -> SimpleNamespace:
+    """A run with one curve: two blade nodes, and one of the damper with a far larger stress."""
+    damped = SimpleNamespace(field=np.array([60.0, 30.0, 900.0]) * MPA, mesh_error=0.1)
+    curve = SimpleNamespace(
+        load=80.0, peak_amplitude=1.0, interval=SimpleNamespace(highest=1.2, lowest=0.9)
+    )
+    bodies = {"blade": np.array([[0, 1]]), "damper": np.array([[2, 2]])}
+    return SimpleNamespace(
+        scene=scene,
+        mesh=SimpleNamespace(points=nodes(3), bodies=bodies),
+        strength=SimpleNamespace(mean=np.array([mean, 0.0, 0.0])),
+        damped={0: damped},
+        response=SimpleNamespace(curves=[curve]),
+    )
+
+
+def test_a_run_knows_its_utilisation_and_its_bound():
+    """300 MPa last without mean stress, 200 at 300 of 900: 60 / 200, and 1.2 * 1.1 times that."""
+    scene = vary(Scene(), fatigue__endurance="300 MPa", fatigue__ultimate="900 MPa")
+    run = run_of(scene, 300 * MPA)
+    found = run_utilisation(run)[0]
+    assert found.used == pytest.approx([0.3, 0.1], rel=1e-12)
+    assert highest_use(run, 0, found) == pytest.approx(0.3 * 1.2 * 1.1, rel=1e-12)
+    assert "80 N: 0.3 at (0.0, 0.0, 0.0) mm, 60 MPa over a mean stress of 300 MPa; 0.396" in (
+        utilisation_message(run)
+    )
+    assert run_utilisation(run_of(Scene(), 0.0)) == {}
+    assert utilisation_message(run_of(Scene(), 0.0)) == ""
+
+
+def test_a_diagram_that_is_too_short_is_a_warning_of_the_run():
+    message = utilisation_message(run_of(vary(Scene(), fatigue__haigh=TABLE), 500 * MPA))
+    assert message.level == "warning"
+    assert "the mean stress is 500 MPa at (0.0, 0.0, 0.0) mm" in message
+
+
+def test_compression_is_negative():
+    """Uniaxial stress: its own value with its sign."""
+    stress = np.zeros((2, 6))
+    stress[:, 0] = 5.0, -5.0
+    assert signed_von_mises(stress) == pytest.approx([5.0, -5.0])
+    shear = np.array([0, 0, 0, 2.0, 0, 0])
+    assert signed_von_mises(shear) == pytest.approx(von_mises(shear))

@@ -38,8 +38,10 @@ STEP_TOLERANCE_SINGLE = 1e-8
 
 
 @njit(**INNER_KERNEL)
-def _paths_at_knots(w, load, nodes, tab, path):
-    """path (n, 3, width) = (kt w_1, kt w_2, N) at the knots [N]."""
+def _paths_at_knots(w, ramp, load, nodes, tab, path):
+    """path (n, 3, width) = (kt w_1, kt w_2, N) at the knots [N], with the ramps (n, 2) added, by
+    which the motion goes on in each period [m].
+    """
     n = w.shape[0]
     S = tab.at.shape[0]
     K = w.shape[2]
@@ -54,6 +56,12 @@ def _paths_at_knots(w, load, nodes, tab, path):
         tab.along,
         path.reshape((3 * path.shape[0], path.shape[2]))[: 3 * n],
     )
+    for e in range(n):
+        for c in range(2):
+            step = nodes[e, 0] * ramp[e, c] / S
+            if step != 0.0:
+                for i in range(path.shape[2]):
+                    path[e, c, i] += i * step
     if load.shape[1]:
         for e in range(n):
             for i in range(path.shape[2]):
@@ -148,7 +156,9 @@ def _within_limit(path, mu):
 
 
 @njit(_nrt=False, cache=True, error_model="numpy", inline="always")
-def _node_forces(w, load, el, path, tab, near, limit, trail, phi, spare, trace, F, J, shares):
+def _node_forces(
+    w, walks, load, el, path, tab, near, limit, trail, phi, spare, trace, F, J, shares
+):
     """Normal force of one node, and its last period as periodic returns it; 0 cycles where it
     sticks or stays open.
 
@@ -158,9 +168,9 @@ def _node_forces(w, load, el, path, tab, near, limit, trail, phi, spare, trace, 
     linear = J.shape[0] > 0
     found, (least, largest) = (True, 0.0, 0.0, 0.0, 0.0, 0, 0, 0), _value_range(path[2])
     closed = _normal_force(w[0], load, el, path[2], least, tab, spare, F[0], J)
-    if largest > 0.0 and not (least > 0.0 and _within_limit(path, el.mu)):
+    if largest > 0.0 and (walks or not (least > 0.0 and _within_limit(path, el.mu))):
         find_edges(path, path.shape[1], el.mu, trail.form)
-        found = periodic_force(path, el.mu, largest, near, limit, trail, phi)
+        found = periodic_force(path, walks, el.mu, largest, near, limit, trail, phi)
         if not linear:
             forces_along(path, el.mu, found[6], trail, trace)
     else:
@@ -183,15 +193,16 @@ def _stuck_forces(w, kt, F, J):
 
 
 @njit(_nrt=False, cache=True, error_model="numpy", inline="always")
-def _derivative_rows(path, found, el, tab, trail, scratch, trace, phi, F, J):
+def _derivative_rows(path, walks, found, el, tab, trail, scratch, trace, phi, F, J):
     """Rows J (2, K, 3K) of the tangential forces in the state that was found.
 
-    F (3, K) takes what trace (2, width), zero on entry, lacks of the periodic force.
+    F (3, K) takes what trace (2, width), zero on entry, lacks of the periodic force. A motion that
+    walks leaves no memory of the start.
     """
     unique, fx, fy, gx, gy, _, pieces, cycles = found
-    if unique:
+    if unique or walks:
         unit_rows(el.kt, tab, scratch.C)
-        add_period(path, gx, gy, pieces, el, tab, trail, scratch, trace, unique)
+        add_period(path, gx, gy, pieces, el, tab, trail, scratch, trace, True)
     else:
         gx, gy = fx, fy = start_force(path[0, 0], path[1, 0], path[2, 0], el.mu)
         start_rows(path[0, 0], path[1, 0], path[2, 0], el, tab, scratch.C)
@@ -207,7 +218,23 @@ def _derivative_rows(path, found, el, tab, trail, scratch, trace, phi, F, J):
 
 @njit(_nrt=False, **INNER_KERNEL)
 def _some_nodes(
-    w, load, nodes, path, tab, near, limit, trail, scratch, phi, spare, trace, F, J, shares, cycles
+    w,
+    ramp,
+    load,
+    nodes,
+    path,
+    tab,
+    near,
+    limit,
+    trail,
+    scratch,
+    phi,
+    spare,
+    trace,
+    F,
+    J,
+    shares,
+    cycles,
 ):
     """disc_batch for some nodes but for the harmonics of trace (n, 2, width); returns whether any
     moves.
@@ -215,8 +242,10 @@ def _some_nodes(
     moving = False
     for e in range(w.shape[0]):
         el = Node(nodes[e, 0], nodes[e, 1], nodes[e, 2], nodes[e, 3])
+        walks = tab.at.shape[0] if ramp[e, 0] != 0.0 or ramp[e, 1] != 0.0 else 0
         found = _node_forces(
             w[e],
+            walks,
             load[e],
             el,
             path[e],
@@ -232,7 +261,9 @@ def _some_nodes(
             shares[e],
         )
         if found[7] and J.shape[1]:
-            _derivative_rows(path[e], found, el, tab, trail, scratch, trace[e], phi, F[e], J[e, 1:])
+            _derivative_rows(
+                path[e], walks, found, el, tab, trail, scratch, trace[e], phi, F[e], J[e, 1:]
+            )
         cycles[e], moving = found[7] or 1, moving or found[7] != 0
     return moving
 
@@ -250,13 +281,14 @@ def _add_harmonics(trace, tab, F):
 
 
 @njit(**KERNEL)
-def disc_batch(w, load, nodes, tab, patterns, limit, F, J, shares, cycles):
+def disc_batch(w, ramp, load, nodes, tab, patterns, limit, F, J, shares, cycles):
     """Forces F (n, 3, K), Jacobian J (n, 3, K, 3K), shares (n, 3) of stick, slip and separation,
     cycles (n,).
 
-    w (n, 3, K) [m]; load (n, S) [N] in place of n0, or (n, 0); nodes (n, 4): kt, kn, mu, n0;
-    patterns in the precision in which the derivative is summed. If J is (n, 0, 0, 0), no derivative
-    is made. Cycles are negative where the force was not periodic after ``limit``.
+    w (n, 3, K) [m]; ramp (n, 2) by which the tangential motion goes on in each period [m]; load
+    (n, S) [N] in place of n0, or (n, 0); nodes (n, 4): kt, kn, mu, n0; patterns in the precision in
+    which the derivative is summed. If J is (n, 0, 0, 0), no derivative is made. Cycles are negative
+    where the force was not periodic after ``limit``.
     """
     n = w.shape[0]
     width = tab.along.shape[1]
@@ -276,10 +308,12 @@ def disc_batch(w, load, nodes, tab, patterns, limit, F, J, shares, cycles):
     trail, scratch, F[:] = empty_trail(tab.at.shape[0], width), empty_rows(tab, patterns), 0.0
     for first in range(0, n, NODES_AT_ONCE):
         last = min(first + NODES_AT_ONCE, n)
-        _paths_at_knots(w[first:last], load[first:last], nodes[first:last], tab, path)
+        some = slice(first, last)
+        _paths_at_knots(w[some], ramp[some], load[some], nodes[some], tab, path)
         trace[:] = 0.0
         if _some_nodes(
             w[first:last],
+            ramp[first:last],
             load[first:last],
             nodes[first:last],
             path,

@@ -354,15 +354,31 @@ def _has_memory(phi):
 
 
 @njit(_nrt=False, **INNER_KERNEL, forceinline=True)
-def _iterate_newton(path, mu, largest, near, limit, trail, phi):
-    """Periodic force by Newton from kt w, returned as by periodic.
+def _first_force(path, walks, mu):
+    """Force at the first knot from which the march begins: k_t w, drawn back onto the circle.
+
+    A motion that walks by path[:, S] - path[:, 0] in each period drags the force to its limit that
+    way, where the march would come from kt w as well, after many periods if the walk is short.
+    """
+    x = path[0, walks] - path[0, 0]
+    y = path[1, walks] - path[1, 0]
+    R = mu * max(path[2, 0], 0.0)
+    length = sqrt(x * x + y * y)
+    if not walks or length == 0.0:
+        return start_force(path[0, 0], path[1, 0], path[2, 0], mu)
+    return R * x / length, R * y / length
+
+
+@njit(_nrt=False, **INNER_KERNEL, forceinline=True)
+def _iterate_newton(path, walks, mu, largest, near, limit, trail, phi):
+    """Periodic force by Newton from `_first_force`, returned as by periodic.
 
     Not unique is also where it ended on the rim of stick, at forces that touch the limit and no
     more.
     """
     scale = mu * largest
     R = mu * max(path[2, 0], 0.0)
-    fx, fy = start_force(path[0, 0], path[1, 0], path[2, 0], mu)
+    fx, fy = _first_force(path, walks, mu)
     guess = False
     before = np.inf
     sx = 0.0
@@ -371,7 +387,8 @@ def _iterate_newton(path, mu, largest, near, limit, trail, phi):
         gx, gy, events, sure, slips, pieces = follow_period(path, mu, fx, fy, trail, phi)
         residual = sqrt((gx - fx) ** 2 + (gy - fy) ** 2)
         det, x, y = newton_step(fx, fy, gx, gy, R, phi)
-        if events == 0 or (residual <= TOLERANCE * scale and abs(det) < SINGULAR_DETERMINANT):
+        still = events == 0 and not walks
+        if still or (residual <= TOLERANCE * scale and abs(det) < SINGULAR_DETERMINANT):
             return False, fx, fy, gx, gy, slips, pieces, cycle
         if abs(det) >= SINGULAR_DETERMINANT and sqrt((x - fx) ** 2 + (y - fy) ** 2) <= near * scale:
             return sure > 0 or not _has_memory(phi), fx, fy, gx, gy, slips, pieces, cycle
@@ -401,9 +418,9 @@ def _state_hash(trail, pieces):
 
 
 @njit(_nrt=False, **INNER_KERNEL)
-def _march_with_leaps(path, mu, largest, leap, limit, trail, phi):
-    """Periodic force by marching from kt w, with leaps (their share of the way left) where it is
-    slow.
+def _march_with_leaps(path, walks, mu, largest, leap, limit, trail, phi):
+    """Periodic force by marching from `_first_force`, with leaps (their share of the way left)
+    where it is slow.
 
     Returned as by periodic.
 
@@ -414,7 +431,7 @@ def _march_with_leaps(path, mu, largest, leap, limit, trail, phi):
     """
     scale = mu * largest
     R = mu * max(path[2, 0], 0.0)
-    fx, fy = start_force(path[0, 0], path[1, 0], path[2, 0], mu)
+    fx, fy = _first_force(path, walks, mu)
     bx = fx
     by = fy
     share = leap
@@ -433,7 +450,7 @@ def _march_with_leaps(path, mu, largest, leap, limit, trail, phi):
             leapt = False
             last = 0
             continue
-        if events == 0 or residual <= TOLERANCE * scale:
+        if (events == 0 and not walks) or residual <= TOLERANCE * scale:
             return (
                 events > 0 and abs(det) >= SINGULAR_DETERMINANT,
                 fx,
@@ -460,18 +477,21 @@ def _march_with_leaps(path, mu, largest, leap, limit, trail, phi):
 
 
 @njit(_nrt=False, **INNER_KERNEL, forceinline=True)
-def periodic_force(path, mu, largest, near, limit, trail, phi):
+def periodic_force(path, walks, mu, largest, near, limit, trail, phi):
     """Periodic force: (unique, fx, fy, gx, gy, slips, pieces, cycles), cycles negative if none was
     found in ``limit``.
+
+    walks is the number of samples S where the path goes on by path[:, S] - path[:, 0] in each
+    period, else 0.
 
     The last period went from f to g, and Newton's step from f is at most ``near`` times the limit
     under the largest load: the trail is that of the periodic state but for what is linear in the
     step. Not unique: the state keeps a memory of its start, and so many periods of marching from kt
     w lead there.
     """
-    found = _iterate_newton(path, mu, largest, near, limit, trail, phi)
+    found = _iterate_newton(path, walks, mu, largest, near, limit, trail, phi)
     if not found[0] and found[7] > MARCHED_PERIODS:
-        found = _march_with_leaps(path, mu, largest, LEAP_SHARE, limit, trail, phi)
+        found = _march_with_leaps(path, walks, mu, largest, LEAP_SHARE, limit, trail, phi)
         if not found[0]:
-            found = _march_with_leaps(path, mu, largest, 0.0, limit, trail, phi)
+            found = _march_with_leaps(path, walks, mu, largest, 0.0, limit, trail, phi)
     return found

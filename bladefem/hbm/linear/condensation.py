@@ -109,6 +109,24 @@ def truncate_harmonics(linear: Linear, H: int) -> Linear:
     return _with_motion(less, linear.free[few], linear.stuck[few])
 
 
+def with_mean(
+    linear: Linear,
+    A: np.ndarray,
+    stuck: np.ndarray,
+) -> Linear:
+    """The same bodies with another mean: flexibility with springs (m, m) and displacement in full
+    stick (m,).
+    """
+    matrices, mean, R, U, T = linear.condensed.flex
+    if len(matrices):
+        matrices = np.concatenate([A[None], matrices[1:]])
+    else:
+        mean = np.ascontiguousarray(A.real)
+    condensed = linear.condensed._replace(flex=(matrices, mean, R, U, T))
+    motion = np.concatenate([stuck[None], linear.stuck[1:]])
+    return _with_motion(replace(linear, condensed=condensed), linear.free, motion)
+
+
 def _with_motion(
     linear: Linear,
     free: np.ndarray,

@@ -11,6 +11,10 @@ from ..model import ReducedModel
 
 # motions that the contact springs resist less than this, relatively, are left out
 UNRESISTED_SHARE = 1e-12
+# Springs on the mean of the motions without stiffness, over the contact stiffness. Where every
+# contact on such a motion slips its mean position has no influence, and these springs choose one;
+# no accepted point leaves them a load (`bladefem.hbm.solver.walking`).
+REGULARISATION = 5e-8
 
 
 def rigid_motions(
@@ -47,12 +51,13 @@ def with_springs(
     springs: np.ndarray,
     B: np.ndarray,
     g: np.ndarray,
-    hold: float,
+    regularisation: float | None = None,
 ) -> tuple[np.ndarray, np.ndarray]:
     """Flexibility and displacement of harmonic 0 with contact springs, motions without stiffness
     eliminated.
     """
     m, r = B.shape
-    system = np.block([[np.eye(m) + G * springs, -B], [B.T * springs, hold * np.eye(r)]])
+    regularisation = REGULARISATION if regularisation is None else regularisation
+    system = np.block([[np.eye(m) + G * springs, -B], [B.T * springs, regularisation * np.eye(r)]])
     solved = np.linalg.solve(system, np.block([[G, free[:, None]], [B.T, g[:, None]]]))
     return solved[:m, :m], solved[:m, m]

@@ -118,7 +118,7 @@ def _pack_bodies(model: ReducedModel, H: int) -> Bodies:
     B, g, rigid = model.once("rigid motions", lambda: rigid_motions(model, springs))
     still = np.flatnonzero(blades.omega[0] == 0)
     mean = _mean_flexibility(
-        (own[0], contact[0], residual[0]), (push[0], direct[0]), (springs, B, g, model.hold)
+        (own[0], contact[0], residual[0]), (push[0], direct[0]), (springs, B, g)
     )
     # the mean displacements have no part in the balance
     if not model.coupled:

@@ -22,6 +22,7 @@ from ..parameter_derivatives import residual_rate
 from .newton import Options, newton
 from .newton_krylov import Memory
 from .residual import Balance, State, determinant_sign, evaluate_balance, linearise_balance
+from .walking import walk_fault
 
 # Newton steps of one corrector
 MOST_CORRECTIONS = 12
@@ -153,7 +154,8 @@ def _correct_point(
     """
     size = _step_size(task, spot)
     dw, dx = direction
-    guess = _guess_at(task, spot.x + step * task.width * dx, spot.state.w + step * size * dw)
+    walk = spot.balance.walk
+    guess = _guess_at(task, spot.x + step * task.width * dx, spot.state.w + step * size * dw, walk)
 
     def advance(now: _Guess) -> _Guess:
         inverse = linearise_balance(now.balance, now.state, task.memory)
@@ -162,7 +164,7 @@ def _correct_point(
         w = now.state.w
         off = np.sum(dw * (w - guess.state.w)) / size + dx * (now.x - guess.x) / task.width
         change = (np.sum(dw * back) / size - off) / (dx / task.width - np.sum(dw * along) / size)
-        return _guess_at(task, now.x + change, w - back - change * along)
+        return _guess_at(task, now.x + change, w - back - change * along, walk)
 
     run = iterate_newton(
         guess, lambda now: now.state.error, advance, task.options.tolerance, MOST_CORRECTIONS
@@ -173,6 +175,9 @@ def _correct_point(
     away = np.linalg.norm(end.state.w - guess.state.w) / size
     if np.hypot(away, (end.x - guess.x) / task.width) > JUMP_GUARD * step:
         return None, "the corrector jumps"
+    fault = walk_fault(end.balance, end.state)
+    if fault:
+        return None, fault
     try:
         found = spot_at(task, end.x, end.balance, end.state, run.iterations, spot.sign)
     except np.linalg.LinAlgError as error:
@@ -193,8 +198,13 @@ class _Guess:
     state: State
 
 
-def _guess_at(task: Task, x: float, w: np.ndarray) -> _Guess:
-    balance = task.balance(x)
+def _guess_at(
+    task: Task,
+    x: float,
+    w: np.ndarray,
+    walk: np.ndarray | None,
+) -> _Guess:
+    balance = replace(task.balance(x), walk=walk)
     return _Guess(x, balance, evaluate_balance(balance, w))
 
 
@@ -212,7 +222,7 @@ def _around_corner(
     dw, dx = _path_direction(task, spot)
     for ahead in (1.0, -1.0):
         x = spot.x + ahead * share * task.width * dx
-        balance = task.balance(x)
+        balance = replace(task.balance(x), walk=spot.balance.walk)
         state = evaluate_balance(balance, spot.state.w + ahead * share * size * dw)
         try:
             inverse = linearise_balance(balance, state, task.memory)
@@ -242,8 +252,13 @@ def _leap_gap(
     balance = task.balance(x)
     end = newton(balance, spot.state.w, task.options)
     size = max(task.size, float(np.linalg.norm(spot.state.w)))
-    if not end.converged or np.linalg.norm(end.state.w - spot.state.w) > LEAP_DISTANCE * size:
+    change = end.state.w - spot.state.w
+    # the means of a damper that begins or ceases to walk do not compare
+    if (end.walk is None) != (spot.balance.walk is None):
+        change = change[:, :, 1:]
+    if not end.converged or np.linalg.norm(change) > LEAP_DISTANCE * size:
         return None
+    balance = replace(balance, walk=end.walk)
     return replace(spot_at(task, x, balance, end.state, end.iterations, spot.sign), leapt=True)
 
 

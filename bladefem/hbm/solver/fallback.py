@@ -206,7 +206,7 @@ def _along_excitation(balance: Balance, options: Options) -> Newton:
     task = Task(part, "force", -x, float(np.linalg.norm(end.state.w)), options)
     reached = end.state
     try:
-        spot = spot_at(task, x, part(x), end.state, 0, 1.0)
+        spot = spot_at(task, x, replace(part(x), walk=end.walk), end.state, 0, 1.0)
         step = 0.05
         for _ in range(LONGEST_PATH):
             spot, step, _ = advance_path(task, spot, step, 0.2)

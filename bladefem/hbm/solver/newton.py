@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection
-from dataclasses import dataclass
+from collections.abc import Collection, Iterator
+from dataclasses import dataclass, replace
 from numbers import Integral
 
 import numpy as np
@@ -32,6 +32,15 @@ from .residual import (
     contact_table,
     evaluate_balance,
     linearise_balance,
+)
+from .walking import (
+    held_balance,
+    may_walk,
+    sampled_walk,
+    tangential_motions,
+    walk_fault,
+    walking_motions,
+    without_step,
 )
 
 # step share below which the search direction is given up
@@ -77,6 +86,10 @@ class Newton:
     reason: str
     # loop and linear solvers of `bladefem.hbm.policy` that ran
     route: str = ""
+    # (m, z) motions along which the damper walks at the end, as `Balance` has them
+    walk: np.ndarray | None = None
+    # a period, where they differ from those asked for
+    samples: int | None = None
 
 
 def solvers_of(code: int) -> tuple[str, ...]:
@@ -108,6 +121,86 @@ def newton(
             take next, which does not depend on how the equations are scaled (Deuflhard, Newton
             Methods for Nonlinear Problems, 2004, Sect. 3.3), or "residual".
     """
+    if balance.walk is None and may_walk(balance):
+        return _newton_of_free_damper(balance, w, options, merit)
+    end = newton_as_given(balance, w, options, merit)
+    fault = walk_fault(balance, end.state) if end.converged else ""
+    return replace(end, converged=False, reason=fault) if fault else end
+
+
+def _newton_of_free_damper(
+    balance: Balance,
+    w: np.ndarray,
+    options: Options,
+    merit: str,
+) -> Newton:
+    """Newton for a damper that walks or rests, whichever the solution asks for."""
+    iterations = 0
+    starts = list(_likely_starts(balance, w))
+    for variant, start in starts:
+        end = _newton_of_one_kind(variant, start, options, merit)
+        iterations += end.iterations
+        if end.converged:
+            return replace(end, iterations=iterations)
+    # springs on the mean lead to a start from which the rest is near
+    led = newton_as_given(held_balance(balance), w, options, merit)
+    iterations += led.iterations
+    best = end
+    if led.converged:
+        for variant, start in _likely_starts(balance, led.state.w):
+            end = _newton_of_one_kind(variant, start, options, merit)
+            iterations += end.iterations
+            if end.converged:
+                return replace(end, iterations=iterations)
+            best = min(best, end, key=lambda end: end.state.error)
+    return replace(best, iterations=iterations)
+
+
+def _likely_starts(balance: Balance, w: np.ndarray) -> Iterator[tuple[Balance, np.ndarray]]:
+    """The balance at rest and walking, with starts; the one that leaves less first, where both
+    leave the same the one that the states of the contacts ask for. Rest comes first where its loop
+    is compiled: it is found or refused in no time.
+
+    The mean of w along a motion of the walk is either a position or a step a period.
+    """
+    compiled = runs_compiled(balance)
+    if compiled:
+        yield balance, w
+    rest = evaluate_balance(balance, w, "single")
+    walking = sampled_walk(balance)
+    motions = walking_motions(balance, rest.forces.shares)
+    found = [] if motions is None else [(rest.error, replace(walking, walk=motions), None)]
+    every = replace(walking, walk=tangential_motions(balance.model, balance.linear.B))
+    going = evaluate_balance(every, w, "single")
+    motions = walking_motions(balance, going.forces.shares)
+    if motions is not None and np.isfinite(going.error):
+        found.append((going.error, replace(walking, walk=motions), w))
+    if not compiled:
+        found.append((rest.error, balance, w))
+    for _, variant, start in sorted(found, key=lambda part: part[0]):
+        yield variant, without_step(variant, w) if start is None else start
+
+
+def _newton_of_one_kind(
+    balance: Balance,
+    w: np.ndarray,
+    options: Options,
+    merit: str,
+) -> Newton:
+    """Newton with the walk of the balance, not converged where its end contradicts it."""
+    end = newton_as_given(balance, w, options, merit)
+    end = replace(end, walk=balance.walk, samples=balance.samples)
+    fault = walk_fault(balance, end.state) if end.converged else ""
+    return replace(end, converged=False, reason=fault) if fault else end
+
+
+def newton_as_given(
+    balance: Balance,
+    w: np.ndarray,
+    options: Options = DEFAULTS,
+    merit: str = "step",
+) -> Newton:
+    """`newton` for a balance as it is: whether the damper walks is taken from it."""
     if merit == "step" and runs_compiled(balance):
         return _run_compiled(balance, w, options)
     memory = Memory()
@@ -140,7 +233,7 @@ def _newton_loop(
 def runs_compiled(balance: Balance) -> bool:
     """True if Newton's loop is compiled for this balance."""
     harmonics, m = balance.linear.stuck.shape
-    return uses_compiled_newton(balance.model, m * (2 * harmonics - 1))
+    return balance.walk is None and uses_compiled_newton(balance.model, m * (2 * harmonics - 1))
 
 
 def _run_compiled(

@@ -8,6 +8,7 @@ the time where there are few contacts. A point that does not end well is left to
 from __future__ import annotations
 
 from collections.abc import Sequence
+from itertools import takewhile
 from typing import Any
 
 import numpy as np
@@ -26,6 +27,7 @@ from ..solution import Solution, Work
 from .newton import SHORTEST_STEP_SHARE, Options, route_of, solvers_of
 from .newton_compiled import CONVERGED, compiled_newton
 from .residual import STICKING_FORCE_SHARE, contact_table
+from .walking import CARRIED_SHARE
 
 
 def solve_small(
@@ -132,7 +134,9 @@ def _solve_points(
         measures.tolist(),
         strict=False,
     )
-    return [_point_solution(H, samples, point) for point in parts]
+    # a damper that walks is left to the plain way
+    accepted = takewhile(lambda point: point[-1][2] <= CARRIED_SHARE, parts)
+    return [_point_solution(H, samples, point) for point in accepted]
 
 
 def _point_solution(
@@ -143,7 +147,7 @@ def _point_solution(
     """A converged point as `_compiled_points` hands it out."""
     omega, w, f, probe, end, states, measures = point
     steps, error, solver = end
-    moved, pushed, drift, *works = measures
+    moved, pushed, _, *works = measures
     return Solution(
         omega=omega,
         harmonics=H,
@@ -158,7 +162,7 @@ def _point_solution(
         residual=error,
         residual_displacement=moved,
         residual_force=pushed,
-        drift=drift,
+        drift=0.0,
         states=dict(zip(NODE_STATES, states, strict=True)),
         work=Work(*works),
         route=route_of(COMPILED_POINT, solvers_of(int(solver))),

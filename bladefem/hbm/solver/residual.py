@@ -5,12 +5,19 @@ Residual, additive form:  r_h = w_h - stuck_h + A_h p_h,  p = f(w) - K w  [m]. I
 times the form without springs  w_h - free_h + G_h f_h; both are measured before a point is
 accepted. The derivative of p is one block a node, A is one block a harmonic, and both vanish
 together at nodes that stick: these are eliminated exactly.
+
+A damper on which every node slips along a motion without stiffness walks: the mean position that
+way has no influence on the forces, and the step by which the motion goes on in each period has. The
+component of the mean displacement along such a motion b (`Balance.walk`, with b^T K b = 1) then
+stands for that step: the law is evaluated with the ramp  b (b^T K w_0)  a period. Equations and
+number of unknowns stay the same; the derivative gains a term of low rank, as the ramp of every node
+depends on the means of all.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 from scipy import linalg
@@ -19,9 +26,10 @@ from ...friction.aft import Forces, evaluate
 from ...friction.fourier import to_complex, to_real
 from ...friction.kernel_1d_exact import evaluate_exact
 from ...friction.trigonometric_tables import trigonometric_tables
-from ..linear.condensation import Linear
+from ..linear.condensation import Linear, condense, with_mean
 from ..model import ReducedModel
 from ..policy import DENSE_LU, DETERMINANT_UNKNOWNS, ITERATIONS, linear_solver
+from ..solution import Solution
 from .newton_compiled import (
     balance_residual,
     dense_jacobian,
@@ -34,6 +42,8 @@ from .newton_krylov import Memory, iterative_inverse
 STEP_ACCURACY = 1e-5
 # a node whose p is below this share of its spring force sticks
 STICKING_FORCE_SHARE = 1e-13
+# of the size of the motion: step of the walk by which forces are differenced
+WALK_DIFFERENCE = 1e-6
 
 
 Inverse = Callable[..., np.ndarray]
@@ -49,6 +59,15 @@ class Balance:
     linear: Linear
     # 0: transitions located exactly, for elements of one tangent
     samples: int
+    # (m, z) motions along which the damper walks; None: it rests in the mean
+    walk: np.ndarray | None = None
+
+    @property
+    def walking(self) -> np.ndarray:
+        """``walk`` of a balance in which the damper walks."""
+        if self.walk is None:
+            raise RuntimeError("the damper of this balance does not walk")
+        return self.walk
 
 
 @dataclass(frozen=True)
@@ -67,6 +86,8 @@ class State:
     residual: np.ndarray
     # residual of both forms over the size of the motion [1]
     error: float
+    # what was derived from it, see `walk_rates`
+    derived: dict[str, np.ndarray] = field(default_factory=dict, repr=False, compare=False)
 
 
 def start_in_stick(balance: Balance) -> np.ndarray:
@@ -82,7 +103,7 @@ def evaluate_balance(
     """Forces and residual at w (n, d, K); precision is that of the forces' derivative."""
     model = balance.model
     linear = balance.linear
-    forces = contact_forces(model, w, balance.samples, precision)
+    forces = contact_forces(model, w, balance.samples, precision, walk_ramp(balance, w))
     p = np.empty(w.shape)
     residual = np.empty(w.shape)
     flat = (model.springs.size, w.shape[2])
@@ -102,9 +123,14 @@ def contact_forces(
     w: np.ndarray,
     samples: int,
     precision: str = "double",
+    walk: np.ndarray | None = None,
+    jacobian: bool = True,
 ) -> Forces:
     """Friction forces in the directions (n, d, K) of the balance; displacements left out of it stay
     zero.
+
+    Args:
+        walk: (n, tangents) by which the motion goes on in each period [m].
     """
     w = w.copy()
     w[:, :, 0] += model.offset.reshape(w.shape[:2])
@@ -114,13 +140,108 @@ def contact_forces(
     load, base = contact_table(model, w.shape[2] // 2, samples)[:2]
     if samples:
         forces = evaluate(
-            model.elements, w, samples, load=load if load.shape[1] else None, precision=precision
+            model.elements,
+            w,
+            samples,
+            jacobian,
+            load=load if load.shape[1] else None,
+            precision=precision,
+            walk=walk,
         )
     else:
         forces = evaluate_exact(model.elements, w, load=base)
     if missing == 0:
         return forces
-    return replace(forces, f=forces.f[:, missing:], dfdw=forces.jacobian[:, missing:, :, missing:])
+    f = forces.f[:, missing:]
+    return replace(
+        forces, f=f, dfdw=forces.jacobian[:, missing:, :, missing:] if jacobian else None
+    )
+
+
+def solved_balance(model: ReducedModel, solution: Solution) -> tuple[Balance, State]:
+    """The equations of a solved point and their state there."""
+    linear = condense(model, solution.omega, solution.harmonics)
+    balance = Balance(model, linear, solution.samples, solution.walk)
+    return balance, evaluate_balance(balance, solution.w)
+
+
+def walk_ramp(balance: Balance, w: np.ndarray) -> np.ndarray | None:
+    """(n, tangents) by which the motion goes on in each period [m]; None where nothing walks."""
+    if balance.walk is None:
+        return None
+    return _as_ramp(balance, _walk_steps(balance, w))
+
+
+def _walk_steps(balance: Balance, w: np.ndarray) -> np.ndarray:
+    """(z,) steps along the motions of the walk, from the mean of w (n, d, K)."""
+    return balance.walking.T @ (balance.linear.springs * w[:, :, 0].ravel())
+
+
+def _as_ramp(balance: Balance, steps: np.ndarray) -> np.ndarray:
+    model = balance.model
+    first = model.directions - model.elements.tangents
+    return (balance.walking @ steps).reshape(model.springs.shape)[:, first:]
+
+
+def walk_rates(balance: Balance, state: State) -> np.ndarray:
+    """(z, n, d, K) derivatives of the forces with the steps of the walk [N/m], by differences; made
+    once a state.
+    """
+    if "walk rates" in state.derived:
+        return state.derived["walk rates"]
+    steps = _walk_steps(balance, state.w)
+    first = balance.model.directions - balance.model.elements.tangents
+    size = WALK_DIFFERENCE * max(np.abs(state.w[:, first:, 1:]).max(), np.finfo(float).tiny)
+    rates = []
+    for j in range(len(steps)):
+        # away from a walk of zero, where the law has a corner
+        change = np.zeros(len(steps))
+        change[j] = np.copysign(size / abs(balance.walking[:, j]).max(), steps[j])
+        ramp = _as_ramp(balance, steps + change)
+        moved = contact_forces(balance.model, state.w, balance.samples, walk=ramp, jacobian=False).f
+        rates.append((moved - state.forces.f) / change[j])
+    state.derived["walk rates"] = np.array(rates)
+    return state.derived["walk rates"]
+
+
+def walking_force_change(
+    balance: Balance,
+    state: State,
+    dw: np.ndarray,
+) -> np.ndarray | float:
+    """(n, d, K) change of the forces by the ramps that belong to a change dw of the displacements;
+    0 where nothing walks.
+    """
+    if balance.walk is None:
+        return 0.0
+    return np.tensordot(_walk_steps(balance, dw), walk_rates(balance, state), 1)
+
+
+def force_change(
+    balance: Balance,
+    state: State,
+    dw: np.ndarray,
+) -> np.ndarray:
+    """(n, d, K) change of the contact forces by a change dw of the displacements."""
+    n, d, K = dw.shape
+    change = state.forces.jacobian.reshape(n, d * K, d * K) @ dw.reshape(n, d * K, 1)
+    return change.reshape(dw.shape) + walking_force_change(balance, state, dw)
+
+
+def transposed_force_change(
+    balance: Balance,
+    state: State,
+    y: np.ndarray,
+) -> np.ndarray:
+    """(n, d, K) the transpose of `force_change` times y."""
+    n, d, K = y.shape
+    back = state.forces.jacobian.reshape(n, d * K, d * K).swapaxes(1, 2) @ y.reshape(n, d * K, 1)
+    back = back.reshape(y.shape).copy()
+    if balance.walk is not None:
+        weights = np.array([np.vdot(rate, y) for rate in walk_rates(balance, state)])
+        mean = balance.linear.springs * (balance.walking @ weights)
+        back[:, :, 0] += mean.reshape(n, d)
+    return back
 
 
 def linearise_balance(
@@ -135,6 +256,79 @@ def linearise_balance(
     reduced to the nodes that slip or lift; the others follow from their forces. Raises
     numpy.linalg.LinAlgError where the derivative is singular.
     """
+    if balance.walk is None:
+        return _linearise_blocks(balance, state, memory)
+    base = _linearise_blocks(_held_walk(balance), state, memory)
+    left, right = _walk_terms(balance, state)
+    return _low_rank_inverse(base, left, right)
+
+
+def _held_walk(balance: Balance) -> Balance:
+    """The balance with  A - b b^T  in place of A: its derivative is regular where the mean position
+    along b has no influence.
+    """
+    linear = balance.linear
+    mean = linear.A[0] - balance.walking @ balance.walking.T
+    return replace(balance, linear=with_mean(linear, mean, linear.stuck[0]), walk=None)
+
+
+def _walk_terms(balance: Balance, state: State) -> tuple[np.ndarray, np.ndarray]:
+    """left and right (2z, n, d, K): the derivative of the balance is that of `_held_walk` plus
+    the sum of  left_j (right_j . x):  A f_s (b^T K x_0)  of the ramps, and  b (b^T C x)  of what
+    was taken from A.
+    """
+    shape = state.w.shape
+    steps = [
+        _as_node_coefficients(balance, _apply_flexibility(balance.linear.A, as_amplitudes(rate)))
+        for rate in walk_rates(balance, state)
+    ]
+    change = state.forces.jacobian.reshape(shape[0], shape[1] * shape[2], -1)
+    springs = balance.model.springs[:, :, None]
+    motions = []
+    rows = []
+    projections = []
+    for b in balance.walking.T:
+        motion = np.zeros(shape)
+        motion[:, :, 0] = b.reshape(shape[:2])
+        motions.append(motion)
+        flat = motion.reshape(shape[0], -1, 1)
+        rows.append((change.swapaxes(1, 2) @ flat).reshape(shape) - springs * motion)
+        projection = np.zeros(shape)
+        projection[:, :, 0] = (balance.linear.springs * b).reshape(shape[:2])
+        projections.append(projection)
+    return np.array(steps + motions), np.array(projections + rows)
+
+
+def _low_rank_inverse(
+    base: Inverse,
+    left: np.ndarray,
+    right: np.ndarray,
+) -> Inverse:
+    """Inverse of  B + sum left_j right_j^T,  for the inverse of B and (r, n, d, K) vectors."""
+    solved: dict[float, np.ndarray] = {}
+
+    def terms(accuracy: float) -> np.ndarray:
+        finest = min([accuracy, *solved])
+        if finest not in solved:
+            solved[finest] = np.array([base(vector, finest) for vector in left])
+        return solved[finest]
+
+    def solve(residual: np.ndarray, accuracy: float = STEP_ACCURACY) -> np.ndarray:
+        Y = terms(min(accuracy, STEP_ACCURACY))
+        x = base(residual, accuracy)
+        small = np.eye(len(right)) + np.tensordot(right, Y, axes=([1, 2, 3], [1, 2, 3]))
+        parts = np.linalg.solve(small, np.tensordot(right, x, axes=3))
+        return x - np.tensordot(parts, Y, 1)
+
+    return solve
+
+
+def _linearise_blocks(
+    balance: Balance,
+    state: State,
+    memory: Memory | None = None,
+) -> Inverse:
+    """`linearise_balance` without the walk."""
     _, d, K = state.w.shape
     change, active, dofs = _active_nodes(balance, state)
     if len(active) == 0:
@@ -169,6 +363,15 @@ def adjoint_inverse(balance: Balance, state: State) -> Inverse:
     """The transposed inverse of the balance's derivative:  (1 + A C)^-T b = b - C^T (1 + A^T
     C^T)^-1 A^T b.
     """
+    if balance.walk is None:
+        return _adjoint_blocks(balance, state)
+    base = _adjoint_blocks(_held_walk(balance), state)
+    left, right = _walk_terms(balance, state)
+    return _low_rank_inverse(base, right, left)
+
+
+def _adjoint_blocks(balance: Balance, state: State) -> Inverse:
+    """`adjoint_inverse` without the walk."""
     K = state.w.shape[2]
     change, active, dofs = _active_nodes(balance, state)
     if len(active) == 0:
@@ -193,6 +396,16 @@ def determinant_sign(balance: Balance, state: State) -> float:
     """Sign of the determinant of the balance's derivative; 0 where there are too many unknowns to
     ask.
     """
+    if balance.walk is not None:
+        held = _held_walk(balance)
+        sign = determinant_sign(held, state)
+        if not sign:
+            return 0.0
+        left, right = _walk_terms(balance, state)
+        base = _linearise_blocks(held, state)
+        Y = np.array([base(vector, STEP_ACCURACY) for vector in left])
+        small = np.eye(len(right)) + np.tensordot(right, Y, axes=([1, 2, 3], [1, 2, 3]))
+        return sign * float(np.sign(np.linalg.det(small)))
     change, active, dofs = _active_nodes(balance, state)
     if len(dofs) * state.w.shape[2] > DETERMINANT_UNKNOWNS:
         return 0.0

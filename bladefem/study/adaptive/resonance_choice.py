@@ -11,6 +11,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
+from typing import Any
 
 import numpy as np
 
@@ -31,10 +32,13 @@ SHARE = 0.05
 SUFFICIENT_SHARE = 0.8
 NEGLIGIBLE_SHARE = 0.05
 # unknowns of the largest balance that is chosen where contacts lift off: finer ones cost minutes a
-# curve there and lose points
+# curve there
 LIFTING = 1500
 # the same of a model that only estimates an error there
 LIFTING_JUDGE = 3000
+# harmonics and contact points of a seat of the models that tell an error in another respect where
+# those of the judged one are too large
+FEWER = {"harmonics": (7, 3, 1), "points": (32, 16, 8, 4)}
 # contact points of the model that judges, over those of the judged one
 MORE_POINTS = 4
 # weight of a relative shift of the frequency against a relative change of the height: an accuracy
@@ -119,19 +123,22 @@ def peak_errors(
         other = None if name in exact else judge_settings(family, settings, name)
         if other is None:
             continue
-        if judge_too_large(family, other, point):
-            heights[name] = np.inf
-            shifts[name] = np.inf
+        heights[name] = np.inf
+        shifts[name] = np.inf
+        pair = compared_settings(family, settings, other, name, point)
+        if pair is None:
             continue
+        own, judge = pair
         try:
-            found = peak_from(family, settings, point, other, accuracy, fallbacks=False)
+            base = peak
+            if own != settings:
+                base = peak_from(family, settings, point, own, accuracy, fallbacks=False)
+            found = peak_from(family, own, base.solution, judge, accuracy, fallbacks=False)
         except NotSolvedError:
-            heights[name] = np.inf
-            shifts[name] = np.inf
             continue
         better[name] = found
-        heights[name] = abs(peak.height / found.height - 1)
-        shifts[name] = abs(peak.omega / found.omega - 1)
+        heights[name] = abs(base.height / found.height - 1)
+        shifts[name] = abs(base.omega / found.omega - 1)
     return PeakErrors(heights, shifts, better)
 
 
@@ -212,13 +219,33 @@ def _next_settings(
     return None
 
 
-def judge_too_large(
+def compared_settings(
     family: Family,
+    settings: Settings,
     other: Settings,
+    name: str,
     point: Solution,
-) -> bool:
-    """A model that only estimates the error of a point where contacts lift off costs too much."""
-    return _too_large(family, other, point, LIFTING_JUDGE)
+) -> tuple[Settings, Settings] | None:
+    """The two models whose difference tells an error: the judged and the richer one, or both with
+    FEWER harmonics, for the error by harmonics with fewer points, where contacts lift off and the
+    richer one is too large; None where that does not help.
+
+    The respects are taken as independent of each other then: on the shipped wedge with 4000 N/mm^3
+    and 320 N, 16 in place of 63 points a seat change the height by 5.2 % with 3 harmonics and by
+    4.1 % with 7.
+    """
+    if not _too_large(family, other, point, LIFTING_JUDGE):
+        return settings, other
+    respect = "points" if name == "harmonics" else "harmonics"
+    here = getattr(settings, respect)
+    for fewer in FEWER[respect]:
+        if here is not None and fewer >= here:
+            continue
+        reduced: dict[str, Any] = {respect: fewer}
+        richer_one = replace(other, **reduced)
+        if not _too_large(family, richer_one, point, LIFTING_JUDGE):
+            return replace(settings, **reduced), richer_one
+    return None
 
 
 def _too_large(

@@ -22,7 +22,13 @@ from .check_points import (
 from .choice import Checked, covered, sufficient
 from .family import Family, member
 from .indicators import moved, richer
-from .resonance_choice import PeakErrors, choose_at_peak, judge_settings, judge_too_large, peak_from
+from .resonance_choice import (
+    PeakErrors,
+    choose_at_peak,
+    compared_settings,
+    judge_settings,
+    peak_from,
+)
 from .settings import Settings, enriched
 
 # sweeps of one curve with ever richer settings
@@ -126,7 +132,7 @@ def _checked_flanks(
         return found
     shift = errors.better[worst].omega / top.omega
     for point in _flanks(points, heights_of(points), top):
-        found[point.omega] = _change(family, settings, point, other, shift)
+        found[point.omega] = _change(family, settings, point, other, worst, shift)
     return found
 
 
@@ -150,7 +156,7 @@ def _checked_loud(
     other = richer(family, settings, "harmonics")
     if other is None:
         return {}
-    return {p.omega: _change(family, settings, p, other, 1.0) for p in chosen}
+    return {p.omega: _change(family, settings, p, other, "harmonics", 1.0) for p in chosen}
 
 
 def _flanks(
@@ -173,16 +179,22 @@ def _change(
     settings: Settings,
     point: Solution,
     other: Settings,
+    name: str,
     shift: float,
 ) -> float:
-    """Relative change of the amplitude in another model, at a frequency shifted by a factor;
-    infinite where that is not solved, or too large to be.
+    """Relative change of the amplitude in a model that is richer in the respect of this name, at a
+    frequency shifted by a factor; infinite where that is not solved, or too large to be.
     """
-    if judge_too_large(family, other, point):
+    pair = compared_settings(family, settings, other, name, point)
+    if pair is None:
         return np.inf
-    moved_point = replace(point, omega=point.omega * shift)
-    better = moved(family, settings, moved_point, other, replace(sufficient(1e-2), fallbacks=False))
-    return abs(size(point) / size(better) - 1) if better.converged else np.inf
+    own, judge = pair
+    options = replace(sufficient(1e-2), fallbacks=False)
+    base = point if own == settings else moved(family, settings, point, own, options)
+    if not base.converged:
+        return np.inf
+    better = moved(family, own, replace(base, omega=base.omega * shift), judge, options)
+    return abs(size(base) / size(better) - 1) if better.converged else np.inf
 
 
 def _harmonics_missed(

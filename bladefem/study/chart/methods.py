@@ -19,7 +19,7 @@ from ...damper.direct import direct
 from ...damper.paper import platform
 from ...data import PortModel, RigidBody
 from ...errors import InputError, NotSolvedError
-from ...hbm.model import ReducedModel, rigid_damper
+from ...hbm.model import ReducedModel, require_rigid_damper
 from ...hbm.solve import solve
 from ...reduction.truncate import truncated
 from ...time.event_integrator import stuck_start
@@ -205,7 +205,7 @@ def in_time(model: ReducedModel, omega: float) -> System:
     (1 / STIFF)^2.
     """
     damping = model.damping
-    damper = rigid_damper(model)
+    damper = require_rigid_damper(model)
     return blade_ring(
         _with_stiff_modes(model.side(1), STIFF * omega),
         float(np.mean(damping.ratio)),

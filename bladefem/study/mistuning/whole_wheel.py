@@ -106,7 +106,6 @@ def whole_wheel(
         model.damping,
         damper,
         model.damper_damping,
-        hold=model.hold,
         coupled=False,
         start=model.start,
     )

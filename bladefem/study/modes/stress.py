@@ -30,6 +30,8 @@ class Strength:
     steady: float
     # (3,)
     steady_at: np.ndarray
+    # (n_points,) of rotation at the nodes, as signed von Mises stress [Pa]; 0 at rest
+    mean: np.ndarray
 
 
 def strength(bodies: Bodies, modes: ModeSet) -> Strength:
@@ -39,6 +41,8 @@ def strength(bodies: Bodies, modes: ModeSet) -> Strength:
     Args:
         modes: of the nodal diameter that the engine order excites.
     """
+    from ...fem.stress import nodal_stress, signed_von_mises
+
     excitation = bodies.scene.excitation
     ports = blade_ports(bodies.mesh, [], excitation)
     shape = modes.shapes[min(excitation.mode, len(modes.shapes)) - 1].astype(complex)
@@ -47,10 +51,13 @@ def strength(bodies: Bodies, modes: ModeSet) -> Strength:
     ]
     alternating, there = _worst_place(bodies, shape / max(seen, 1e-300))
     rest = 0.0, np.full(3, np.nan)
-    steady, place = (
-        _worst_place(bodies, static_offset(bodies)) if bodies.scene.operation.speed > 0 else rest
-    )
-    return Strength(excitation.mode, alternating, there, steady, place)
+    mean = np.zeros(len(bodies.mesh.points))
+    steady, place = rest
+    if bodies.scene.operation.speed > 0:
+        offset = static_offset(bodies)
+        steady, place = _worst_place(bodies, offset)
+        mean = signed_von_mises(nodal_stress(bodies.still_blade, offset))
+    return Strength(excitation.mode, alternating, there, steady, place, mean)
 
 
 def _worst_place(bodies: Bodies, u: np.ndarray) -> tuple[float, np.ndarray]:

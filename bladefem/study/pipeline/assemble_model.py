@@ -9,14 +9,23 @@ from math import pi
 
 import numpy as np
 import scipy.sparse as sp
+from scipy.linalg import null_space
 
 from geometry.mesh import Mesh, sector_of
 
 from ...data import Elements, Patch, PortModel, RigidBody
+from ...errors import InputError
 from ...hbm.model import Damping, ReducedModel, in_series
 from ...reduction.assemble import pair_models, recombine, wheel_models
 from ...scene.tables import Scene
 from .stages import Reduced
+
+# of [damper] axial: a stop
+HELD = "held"
+# the engine axis
+AXIS = [0.0, 0.0, 1.0]
+# of a translation: what rigid modes may miss of it
+RIGID_SHARE = 1e-6
 
 
 @dataclass(frozen=True)
@@ -56,6 +65,10 @@ def joint_model(
             "elastic".
         sides: blade sides in pair coordinates, in place of those of the engine order's harmonics.
     """
+    held = scene.damper.axial == HELD
+    if held and damper != "mass":
+        along = axial_motion(mesh, patches)
+        reduced = replace(reduced, damper=hold_translation(reduced.damper, along))
     pick = case.selection.T.toarray()
     whole = pick.shape[0] == pick.shape[1]
     if sides is None:
@@ -71,7 +84,7 @@ def joint_model(
         sides = tuple(in_series(side, series) for side in sides)
     other: RigidBody | tuple[PortModel, ...]
     if damper == "mass":
-        other = mass_damper(mesh, patches, reduced.mass)
+        other = mass_damper(mesh, patches, reduced.mass, held)
     elif damper == "rigid":
         other = rigid_damper(reduced)
     else:
@@ -91,31 +104,85 @@ def joint_model(
 
 
 def rigid_damper(reduced: Reduced) -> RigidBody:
-    """Six degrees of freedom (three in a plane), in mass-normalised coordinates."""
+    """Six degrees of freedom (three in a plane, five with a stop), mass-normalised."""
     rigid = reduced.damper.omega == 0
-    return RigidBody(
-        np.eye(int(rigid.sum())), reduced.damper.shapes[reduced.damper.ports["contact"]][:, rigid]
-    )
+    # a floating body moves alike in every sector: its shapes are real
+    shapes = np.real(reduced.damper.shapes[reduced.damper.ports["contact"]][:, rigid])
+    return RigidBody(np.eye(int(rigid.sum())), shapes)
 
 
 def mass_damper(
     mesh: Mesh,
     patches: list[Patch],
     mass: float,
+    held: bool = False,
 ) -> RigidBody:
-    """The paper's damper: a mass that moves circumferentially (and axially in 3-D), never up or
-    down the slope.
+    """The paper's damper: a mass that moves circumferentially (and axially in 3-D, unless it is
+    held), never up or down the slope.
     """
     dim = mesh.dimension
     count = sector_of(mesh).count
     angle = pi / count if count else 0.0
-    moves = np.array([[-np.sin(angle), np.cos(angle), 0.0], [0.0, 0.0, 1.0]])[: dim - 1]
+    moves = np.array([[-np.sin(angle), np.cos(angle), 0.0], AXIS])[: 1 if held else dim - 1]
+    return RigidBody(mass * np.eye(len(moves)), _motion_at_contact(mesh, patches, moves))
+
+
+def axial_motion(mesh: Mesh, patches: list[Patch]) -> np.ndarray:
+    """(contact dofs,) a unit translation along the engine axis."""
+    return _motion_at_contact(mesh, patches, np.array([AXIS]))[:, 0]
+
+
+def _motion_at_contact(
+    mesh: Mesh,
+    patches: list[Patch],
+    moves: np.ndarray,
+) -> np.ndarray:
+    """(contact dofs, k) translations (k, 3) in the frames of the contact."""
+    dim = mesh.dimension
     rows = []
     for patch in patches:
         # into the axes in which the frame is given
         turned = moves @ mesh.pairs[patch.name].rotation
-        rows.append((patch.frame[:, :dim] @ turned.T).reshape(-1, dim - 1))
-    return RigidBody(mass * np.eye(dim - 1), np.concatenate(rows))
+        rows.append((patch.frame[:, :dim] @ turned.T).reshape(-1, len(moves)))
+    return np.concatenate(rows)
+
+
+def hold_translation(damper: PortModel, along: np.ndarray) -> PortModel:
+    """A free body whose centre of mass does not move along a translation.
+
+    Rigid modes are mass-normalised, and elastic ones leave the centre of mass where it is: of the
+    rigid modes those remain that are orthogonal to the translation. The body turns freely, its
+    residual flexibility stays as it is.
+
+    Args:
+        along: (contact dofs,) the translation at the contact port.
+
+    Raises:
+        InputError: the translation is no rigid motion of the body.
+    """
+    rigid = damper.omega == 0
+    at_contact = damper.shapes[damper.ports["contact"]][:, rigid].real
+    share, _, _, _ = np.linalg.lstsq(at_contact, along, rcond=None)
+    missed = np.linalg.norm(at_contact @ share - along)
+    if missed > RIGID_SHARE * np.linalg.norm(along):
+        raise InputError(
+            'damper.axial = "held": the damper has no rigid motion along the engine axis, expected '
+            "one that is not held elsewhere"
+        )
+    others = null_space(share[None])
+    change = np.zeros((len(damper.omega), len(damper.omega) - 1))
+    change[np.ix_(rigid, np.arange(others.shape[1]))] = others
+    change[~rigid, others.shape[1] :] = np.eye(int((~rigid).sum()))
+    damping = damper.damping
+    if damping is not None:
+        whole = np.diag(damping) if damping.ndim == 1 else damping
+        damping = change.T @ whole @ change
+    return replace(
+        damper,
+        omega=np.concatenate([np.zeros(others.shape[1]), damper.omega[~rigid]]),
+        shapes=damper.shapes @ change,
+        damping=damping,
+    )
 
 
 def _sides(

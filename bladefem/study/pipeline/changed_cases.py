@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 from functools import lru_cache
 
@@ -13,11 +13,35 @@ from ...contact.interface_elements import (
     pair_ratio,
     scaled_contact,
 )
+from ...contact.numerical_stiffness import numerical_stiffness, split_stiffness, stiffest_layer
 from ...contact.seating import ContactProblem
 from ...contact.seating import solve as seat
+from ...data import PressureMap
 from ...scene.tables import Contact, Scene, Seat
 from .assemble_model import LoadCase
 from .history import seat_by_history
+
+
+def seated_case(
+    scene: Scene,
+    problem: ContactProblem,
+    maps: Sequence[PressureMap],
+    load: float,
+    tangents: int,
+    mass: float | None = None,
+) -> LoadCase:
+    """The friction elements of a seated damper, stiff layers split.
+
+    Args:
+        maps: static pressure of each patch under the mean normal load [N] of a seat.
+        tangents: 2 for solids, 1 for plane models.
+    """
+    ratio = pair_ratio(scene.material.blade, scene.material.damper)
+    elements, selection = friction_elements(problem, maps, scene.contact, ratio, tangents)
+    elements, series = split_stiffness(
+        elements, maps, scene.contact, numerical_stiffness(problem), stiffest_layer(problem)
+    )
+    return LoadCase(load, elements, selection, mass, series)
 
 
 def cases_of(
@@ -34,7 +58,6 @@ def cases_of(
         tangents: 2 for solids, 1 for plane models.
         rough: all ports of the seats, where friction takes part in the seating.
     """
-    ratio = pair_ratio(scene.material.blade, scene.material.damper)
 
     def case_at(load: float) -> LoadCase:
         if rough is None:
@@ -42,8 +65,7 @@ def cases_of(
             maps = seat(problem, speed, normal=load, bedded=scene.contact.bedded)
         else:
             maps = seat_by_history(scene, rough, load).maps
-        elements, selection = friction_elements(problem, maps, scene.contact, ratio, tangents)
-        return LoadCase(load, elements, selection, mass)
+        return seated_case(scene, problem, maps, load, tangents, mass)
 
     return case_at
 

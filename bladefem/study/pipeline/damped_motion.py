@@ -64,6 +64,8 @@ class DampedStress:
     mesh_error: float
     # of the motion at the probe against the balance, relative
     mismatch: float
+    # (n_points,) largest von Mises stress at each node [Pa], see AlternatingStress.field
+    field: np.ndarray
 
 
 def damped_motion(
@@ -142,6 +144,7 @@ def damped_stress(
         found.by_harmonic,
         found.mesh_error,
         motion.mismatch,
+        found.field,
     )
 
 

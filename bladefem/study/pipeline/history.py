@@ -15,6 +15,7 @@ from ...contact.frictional_seating import (
     FrictionalProblem,
     FrictionalSeating,
     frictional_problem,
+    hold_axially,
     seat_with_friction,
 )
 from ...contact.interface_elements import interface_law, layer_friction, pair_ratio
@@ -67,7 +68,8 @@ def refuse_jamming(
 def condense_friction(bodies: Bodies, patches: Sequence[Patch]) -> FrictionalProblem:
     """All ports of the seats, normal and tangential: what takes finite elements."""
     gap = seat_clearance(bodies, list(patches))
-    return frictional_problem(bodies.mesh, patches, bodies.still, bodies.damper, gap)
+    problem = frictional_problem(bodies.mesh, patches, bodies.still, bodies.damper, gap)
+    return hold_axially(problem) if bodies.scene.damper.axial == "held" else problem
 
 
 def seat_by_history(

@@ -14,6 +14,7 @@ from ...data import Elements
 from ...hbm.linear_resonances import free_resonances, stuck_partners
 from ...hbm.model import ReducedModel
 from ...hbm.solve import free_response, stuck_response
+from ...util.arrays import ComplexArray, RealArray
 
 # of the resonance frequency, each side: where its height is looked for
 WIDTH = 0.02
@@ -30,9 +31,9 @@ class Limit:
     # 0: no damper, inf: full stick [N]
     load: float
     # (k,) [Hz], ascending
-    frequency: np.ndarray
+    frequency: RealArray
     # (k,) complex first harmonic at the probe [m]
-    first: np.ndarray
+    first: ComplexArray
     # [Hz]
     peak_frequency: float
     # [m]

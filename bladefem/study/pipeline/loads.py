@@ -16,6 +16,7 @@ from ...hbm.history_interval import POINT
 from ...hbm.solution import Solution
 from ...hbm.sweep import size
 from ...scene.tables import Scene
+from ...util.arrays import BooleanArray, ComplexArray, IntegerArray, RealArray
 from ...util.communicator import Communicator
 from ...util.progress import Progress, unwatched
 from ..adaptive.check_points import peak_of
@@ -49,39 +50,41 @@ class Curve:
     # with the estimated error at the resonance
     settings: Settings
     # (k,) [Hz]
-    frequency: np.ndarray
+    frequency: RealArray
     # (k,) root of the sum of squares of the harmonics at the probe [m]
-    amplitude: np.ndarray
+    amplitude: RealArray
     # (k,) complex first harmonic at the probe [m]
-    first: np.ndarray
+    first: ComplexArray
     # (k,) bool
-    converged: np.ndarray
+    converged: BooleanArray
     # (k,) text
     method: np.ndarray
     # (k,) text: the way of `bladefem.hbm.policy` that ran
     route: np.ndarray
     # (k,) relative residual of the balance
-    residual: np.ndarray
+    residual: RealArray
     # (k,)
-    iterations: np.ndarray
+    iterations: IntegerArray
     # (k,) number of elements that slip or lift off in a period
-    slipping: np.ndarray
+    slipping: IntegerArray
+    # (k,) how fast the damper walks where friction alone does not hold it [m/s]
+    drift: RealArray
     # (k,) friction work a period [J]
-    dissipated: np.ndarray
+    dissipated: RealArray
     # (k,) |work put in - work lost| over work put in
-    imbalance: np.ndarray
+    imbalance: RealArray
     # (k,) number of the monotone piece of the response; 0 where one motion was looked for
-    branch: np.ndarray
+    branch: IntegerArray
     # (k,) estimated relative error of the first harmonic
-    estimated: np.ndarray
+    estimated: RealArray
     # (k,) the same as wanted: the scene's accuracy times peak over amplitude
-    tolerated: np.ndarray
+    tolerated: RealArray
     # (k,) bool: estimated at this very point; else between its neighbours
-    checked: np.ndarray
+    checked: BooleanArray
     # (k,) "unique", "stable", "unstable", "unknown", or "" where it was not asked for
     stability: np.ndarray
     # (k,) largest modulus of the Floquet multipliers; NaN where not computed
-    multiplier: np.ndarray
+    multiplier: RealArray
     # relative change of the peak's height with half as many contact points; NaN: unknown
     halved: float
     # the highest converged point that is not unstable
@@ -235,6 +238,7 @@ def _record(p: Solution) -> dict[str, Any]:
         "residual": p.residual,
         "iterations": p.iterations,
         "slipping": p.states["slip"] + p.states["lift"],
+        "drift": p.drift,
         "dissipated": p.work.dissipated,
         "imbalance": p.work.imbalance,
         "branch": p.branch,
@@ -282,6 +286,7 @@ def _row(c: Curve) -> dict[str, Any]:
         "reduction": 1.0,
         "dissipated": c.peak.work.dissipated,
         "slipping": c.peak.states["slip"] + c.peak.states["lift"],
+        "drift": c.peak.drift,
         "error": np.nan if c.error is None else c.error,
         "halved": c.halved,
         "harmonics": c.settings.harmonics,
@@ -314,6 +319,7 @@ def _linear_row(limit: Limit) -> dict[str, Any]:
         "reduction": 1.0,
         "dissipated": 0.0,
         "slipping": 0,
+        "drift": 0.0,
         "error": 0.0,
         "halved": 0.0,
         "harmonics": 1,

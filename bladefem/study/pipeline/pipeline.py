@@ -17,8 +17,6 @@ import numpy as np
 from geometry.mesh import Mesh
 
 from ...contact.frictional_seating import FrictionalProblem, normal_part
-from ...contact.interface_elements import friction_elements, pair_ratio
-from ...contact.numerical_stiffness import numerical_stiffness, split_stiffness
 from ...contact.peak_pressure import peak_remarks
 from ...contact.seating import ContactProblem
 from ...contact.seating import solve as seat
@@ -45,7 +43,7 @@ from ..modes.clamped_aerofoil import clamped_blade
 from ..modes.stress import strength
 from .assemble_model import LoadCase, joint_model
 from .best_load import BestLoad, chart_loads, find_best_load
-from .changed_cases import cases_of, changed_cases
+from .changed_cases import cases_of, changed_cases, seated_case
 from .contact_cycle import labels
 from .damped_motion import DampedStress, damped_stress
 from .history import (
@@ -61,6 +59,7 @@ from .liftoff import named
 from .linear_limits import linear_limits
 from .load_interval import interval_sentence
 from .loads import Curve, beyond_tolerance, default_loads, study_loads
+from .resonance_list import reach_sentence
 from .run_records import ModalRun, ReducedRun, Response, Run, SeatedRun, Seating, SolvedRun
 from .stability import stability_sentence, unstable_sentence
 from .stage_inputs import stage_key
@@ -76,6 +75,7 @@ from .stages import (
     reduce_sector,
     weighted,
 )
+from .utilisation import utilisation_message
 from .validate_mesh import found_patches
 
 # higher ones borrow the nodal diameter next to their own
@@ -270,7 +270,9 @@ def _run_response(before: ReducedRun, patches: list[Patch], keep: _Keeper) -> So
         )
         clock.messages.append(stress_message(curves, damped))
     response = replace(response, best=best, influences=found)
-    return SolvedRun(**vars(before), response=response, damped=damped)
+    result = SolvedRun(**vars(before), response=response, damped=damped)
+    clock.messages.extend(filter(None, [utilisation_message(result)]))
+    return result
 
 
 def _stresses(
@@ -581,7 +583,7 @@ def load_cases(
 ) -> list[LoadCase]:
     """The friction elements of each load, for each mass of the damper."""
     return [
-        _load_case(scene, mesh, contact, load, mass)
+        seated_case(scene, contact.problem, contact.maps[load], load, mesh.dimension - 1, mass)
         for mass in scene.study.masses or (None,)
         for load in contact.maps
     ]
@@ -708,6 +710,7 @@ def _remarks(
                 "round folds: a sweep sees one motion a frequency, a higher one may exist"
             )
         )
+    remarks.extend(warning(text) for text in map(reach_sentence, curves) if text)
     for c in curves:
         remarks.extend(map(warning, _resonance_warnings(c, scene.accuracy)))
     return remarks
@@ -741,22 +744,6 @@ def _of_the_contact_mesh(curve: Curve) -> str:
         f"; {100 * curve.halved:.2g} % are what half as many contact points change, expected a "
         "finer contact mesh (mesh.seat_elements, mesh.contact_size)"
     )
-
-
-def _load_case(
-    scene: Scene,
-    mesh: Mesh,
-    contact: Seating,
-    load: float,
-    mass: float | None,
-) -> LoadCase:
-    ratio = pair_ratio(scene.material.blade, scene.material.damper)
-    elements, selection = friction_elements(
-        contact.problem, contact.maps[load], scene.contact, ratio, mesh.dimension - 1
-    )
-    limit = numerical_stiffness(contact.problem)
-    elements, series = split_stiffness(elements, contact.maps[load], scene.contact, limit)
-    return LoadCase(load, elements, selection, mass, series)
 
 
 def check_blade(scene: Scene, mesh: Mesh) -> None:

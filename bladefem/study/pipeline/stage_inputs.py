@@ -35,7 +35,7 @@ class StageInputs:
 
 STAGE_INPUTS = {
     # its fields are those of the kind, see `declared_fields`
-    "mesh": StageInputs(without=("damper.mass",), code=("geometry",)),
+    "mesh": StageInputs(without=("damper.mass", "damper.axial"), code=("geometry",)),
     "modes": StageInputs(
         after=("mesh",),
         fields=(
@@ -78,6 +78,7 @@ STAGE_INPUTS = {
             "contact.crown_across",
             "contact.edge_radius",
             "contact.edge_width",
+            "damper.axial",
             "damper.clearance",
         ),
     ),
@@ -91,6 +92,7 @@ STAGE_INPUTS = {
         fields=(
             "accuracy",
             "contact",
+            "damper.axial",
             "operation",
             "excitation",
             "study",

@@ -317,10 +317,12 @@ def on_layer(scene: Scene, problem: ContactProblem) -> ContactProblem:
 
 def condense_contact(bodies: Bodies, patches: list[Patch]) -> ContactProblem:
     """The contact problem of rigid faces: all that takes finite elements."""
+    from ...contact.frictional_seating import hold_axially
     from ...contact.seating import contact_problem
 
     gap = seat_clearance(bodies, patches)
-    return contact_problem(bodies.mesh, patches, bodies.still, bodies.damper, gap)
+    problem = contact_problem(bodies.mesh, patches, bodies.still, bodies.damper, gap)
+    return hold_axially(problem) if bodies.scene.damper.axial == "held" else problem
 
 
 def seat_clearance(bodies: Bodies, patches: list[Patch]) -> np.ndarray:

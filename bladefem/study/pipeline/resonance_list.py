@@ -1,0 +1,190 @@
+"""Every local maximum of a response: its height, how many motions there are at its frequency, and by
+which sweep it is reached.
+
+A curve keeps its points in ascending frequency with the number of their piece between folds; the
+paths are put together again from the ends of the pieces.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from .loads import Curve
+
+# distance of the first harmonics of two ends over the largest one, up to which pieces are joined
+JOINED = 0.2
+# relative difference of two heights that are the same
+SAME_HEIGHT = 1e-6
+UP = "up"
+DOWN = "down"
+ISOLATED = "isolated"
+
+
+@dataclass(frozen=True)
+class LocalResonance:
+    """A local maximum along a path of motions."""
+
+    # [Hz]
+    frequency: float
+    # root of the sum of squares of the harmonics at the probe [m]
+    amplitude: float
+    # verdict, or "" where it was not asked for
+    stability: str
+    # of an unstable motion, else ""
+    bifurcation: str
+    # motions found at this frequency
+    motions: int
+    # "up and down", "up", "down": by a slow sweep in that direction; "isolated": by neither
+    reached: str
+
+
+@dataclass(frozen=True)
+class _Piece:
+    """Points between two folds, by ascending frequency."""
+
+    number: int
+    # of the points in the curve
+    rows: np.ndarray
+    frequency: np.ndarray
+    first: np.ndarray
+
+    def end(self, high: bool) -> int:
+        """Place of one end among its points."""
+        return len(self.rows) - 1 if high else 0
+
+
+def local_resonances(curve: Curve) -> list[LocalResonance]:
+    """The local maxima of a curve by falling height."""
+    pieces = _pieces_of(curve)
+    visited = {UP: _visited(pieces, True), DOWN: _visited(pieces, False)}
+    found = []
+    for path in _paths_of(pieces):
+        rows = np.concatenate([piece.rows[order] for piece, order in path])
+        owners = np.concatenate([np.full(len(order), piece.number) for piece, order in path])
+        heights = curve.amplitude[rows]
+        for i in range(1, len(rows) - 1):
+            if not heights[i - 1] < heights[i] >= heights[i + 1]:
+                continue
+            row = rows[i]
+            frequency = float(curve.frequency[row])
+            found.append(
+                LocalResonance(
+                    frequency,
+                    float(heights[i]),
+                    str(curve.stability[row]),
+                    str(curve.bifurcation[row]),
+                    sum(p.frequency[0] <= frequency <= p.frequency[-1] for p in pieces),
+                    _reached_by(visited, int(owners[i]), frequency),
+                )
+            )
+    return sorted(found, key=lambda resonance: -resonance.amplitude)
+
+
+def reach_sentence(curve: Curve) -> str:
+    """How the resonance that is given is reached, where not every slow sweep comes to it."""
+    listed = local_resonances(curve)
+    given = [r for r in listed if abs(r.amplitude / curve.peak_amplitude - 1) < SAME_HEIGHT]
+    if not given or given[0].reached == f"{UP} and {DOWN}":
+        return ""
+    reached = given[0].reached
+    other = [r.amplitude for r in listed if reached != r.reached and r.reached != ISOLATED]
+    keeps = f"{1e6 * max(other):.4g} um and less" if other else "lower motions"
+    if reached == ISOLATED:
+        return (
+            f"load {curve.load:g} N: the resonance is reached by no slow sweep, only from motions "
+            f"that start near it; sweeps keep to {keeps}"
+        )
+    way = UP if reached == DOWN else DOWN
+    return (
+        f"load {curve.load:g} N: the resonance is reached by a slow sweep {reached}; a sweep {way} "
+        f"keeps to {keeps}"
+    )
+
+
+def _pieces_of(curve: Curve) -> list[_Piece]:
+    pieces = []
+    for number in np.unique(curve.branch[curve.converged]):
+        rows = np.flatnonzero(curve.converged & (curve.branch == number))
+        rows = rows[np.argsort(curve.frequency[rows], kind="stable")]
+        pieces.append(_Piece(int(number), rows, curve.frequency[rows], curve.first[rows]))
+    return pieces
+
+
+def _paths_of(pieces: Sequence[_Piece]) -> list[list[tuple[_Piece, np.ndarray]]]:
+    """Pieces in the order along their paths, each with the order of its points."""
+    paths: list[list[tuple[_Piece, np.ndarray]]] = []
+    # the end by which the last piece is left; None where either is open
+    left_high: bool | None = None
+    for piece in pieces:
+        order = np.arange(len(piece.rows))
+        joint = None
+        if paths and paths[-1][-1][0].number == piece.number - 1:
+            joint = _joint(paths[-1][-1][0], piece, left_high)
+        if joint is None:
+            paths.append([(piece, order)])
+            left_high = None
+            continue
+        if left_high is None:
+            before, along = paths[-1][-1]
+            paths[-1][-1] = (before, along if joint else along[::-1])
+        paths[-1].append((piece, order[::-1] if joint else order))
+        left_high = not joint
+    return paths
+
+
+def _joint(
+    before: _Piece,
+    piece: _Piece,
+    left_high: bool | None,
+) -> bool | None:
+    """Whether two pieces meet at their high ends (True) or at their low ones; None: at neither."""
+    sides = (True, False) if left_high is None else (left_high,)
+    size = max(np.abs(before.first).max(), np.abs(piece.first).max())
+    away = {
+        side: abs(before.first[before.end(side)] - piece.first[piece.end(side)]) for side in sides
+    }
+    nearest = min(away, key=lambda side: away[side])
+    return nearest if away[nearest] <= JOINED * size else None
+
+
+def _visited(pieces: Sequence[_Piece], upward: bool) -> list[tuple[int, float]]:
+    """Pieces that a slow sweep visits, and the frequency at which it comes onto each: at the end of
+    a piece it jumps to the nearest motion that leads further.
+    """
+    if not pieces:
+        return []
+    sign = 1.0 if upward else -1.0
+    here = min(pieces, key=lambda p: sign * p.frequency[p.end(not upward)])
+    visited = [(here.number, float(here.frequency[here.end(not upward)]))]
+    while len(visited) <= len(pieces):
+        edge = here.end(upward)
+        at = float(here.frequency[edge])
+        onward = [
+            p
+            for p in pieces
+            if sign * p.frequency[p.end(upward)] > sign * at + 1e-9 * at
+            and sign * p.frequency[p.end(not upward)] <= sign * at
+        ]
+        if not onward:
+            break
+        motion = here.first[edge]
+        here = min(onward, key=lambda p: abs(p.first[np.abs(p.frequency - at).argmin()] - motion))
+        visited.append((here.number, at))
+    return visited
+
+
+def _reached_by(
+    visited: dict[str, list[tuple[int, float]]],
+    number: int,
+    frequency: float,
+) -> str:
+    ways = [
+        way
+        for way, pieces in visited.items()
+        for piece, entry in pieces
+        if piece == number and (frequency - entry) * (1 if way == UP else -1) >= 0
+    ]
+    return " and ".join(dict.fromkeys(ways)) or ISOLATED

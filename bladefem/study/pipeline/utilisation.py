@@ -1,0 +1,81 @@
+"""What of the material's endurance a run uses, at the loads whose whole motion is known."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from geometry.mesh import Mesh
+
+from ...errors import InputError
+from ...util.message import warning
+from ..fatigue import Utilisation, haigh_diagram, utilisation
+from .run_records import SolvedRun
+
+
+def run_utilisation(run: SolvedRun) -> dict[int, Utilisation]:
+    """Number of a curve to the utilisation at the blade's nodes at its resonance.
+
+    Empty where the scene gives no diagram.
+
+    Raises:
+        InputError: the diagram does not reach a mean stress of the blade.
+    """
+    diagram = haigh_diagram(run.scene.fatigue)
+    if diagram is None:
+        return {}
+    blade = blade_nodes(run.mesh)
+    points = run.mesh.points[blade]
+    mean = run.strength.mean[blade]
+    return {
+        number: utilisation(diagram, points, found.field[blade], mean)
+        for number, found in run.damped.items()
+    }
+
+
+def blade_nodes(mesh: Mesh) -> np.ndarray:
+    """Numbers of the nodes of all bodies but the damper."""
+    cells = [body.ravel() for name, body in mesh.bodies.items() if name != "damper"]
+    return np.unique(np.concatenate(cells))
+
+
+def utilisation_message(run: SolvedRun) -> str:
+    """The highest utilisation under the best load, with what its estimate leaves open; empty where
+    the scene gives no diagram.
+    """
+    try:
+        found = run_utilisation(run)
+    except InputError as error:
+        return warning(f"the utilisation is not known: {error}")
+    if not found:
+        return ""
+    number = lowest_curve(run)
+    used = found[number]
+    worst = used.worst
+    place = ", ".join(f"{1e3 * x:.1f}" for x in used.points[worst])
+    return (
+        f"utilisation at the best load, {run.response.curves[number].load:.4g} N: "
+        f"{used.used[worst]:.3g} at ({place}) mm, {1e-6 * used.alternating[worst]:.4g} MPa over a "
+        f"mean stress of {1e-6 * used.mean[worst]:.4g} MPa; {highest_use(run, number, used):.3g} "
+        "with the upper ends of the error of the mesh and of the loading history"
+    )
+
+
+def lowest_curve(run: SolvedRun) -> int:
+    """Number of the curve with the lowest resonance."""
+    curves = run.response.curves
+    return min(range(len(curves)), key=lambda k: curves[k].peak_amplitude)
+
+
+def highest_use(
+    run: SolvedRun,
+    number: int,
+    used: Utilisation,
+) -> float:
+    """The largest utilisation with the estimated error of the mesh and the largest amplitude that
+    a loading history can leave.
+    """
+    curve = run.response.curves[number]
+    share = 1.0
+    if curve.interval is not None:
+        share = max(curve.interval.highest / curve.peak_amplitude, 1.0)
+    return float(used.used[used.worst] * share * (1 + run.damped[number].mesh_error))
