@@ -26,6 +26,7 @@ from ..adaptive.family import Family, member
 from ..adaptive.resonance_curve import resonance_curve, unfollowed
 from ..adaptive.settings import Settings, restarted
 from .assemble_model import LoadCase
+from .kept_band import KeptBand, kept_band
 from .liftoff import named
 from .linear_limits import Limit
 from .load_interval import LoadInterval, load_interval
@@ -93,6 +94,8 @@ class Curve:
     bifurcation: np.ndarray
     # the highest converged point where that one is unstable, else None
     unstable_peak: Solution | None = None
+    # what the blade does at that one in time; None where it is stable
+    kept: KeptBand | None = None
     # range of the resonance over loading histories; None where it was not asked for
     interval: LoadInterval | None = None
     # contacts lift off and the balance is too large for following its motions round folds: a
@@ -221,6 +224,7 @@ def curve_of(
         peak=top,
         bifurcation=marks.bifurcation if len(marks.bifurcation) else np.full(len(heights), ""),
         unstable_peak=None if top is highest else highest,
+        kept=None if top is highest else kept_band(model, highest),
         interval=interval,
         unfollowed=lifts and unfollowed(models, curve.settings),
     )
