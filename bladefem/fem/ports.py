@@ -14,7 +14,7 @@ from scipy.linalg import eigh
 
 from ..data import PortModel
 from ..errors import InputError, suggestion
-from .all_diameters import Eigenpairs, eigenpairs, found_again, lost_modes
+from .all_diameters import Eigenpairs, KeptPairs, eigenpairs, found_again, lost_modes
 from .constraint import Constrained, Opened, Transformation, restrict
 from .cyclic_schur import Rim, face_solve, inner_solve
 from .eigensolver import Eigensolver
@@ -77,6 +77,7 @@ def port_models(
     static_load: np.ndarray | None = None,
     kind: str = "rubin",
     solver: Eigensolver = SLEPC,
+    kept: KeptPairs | None = None,
 ) -> Iterator[tuple[int, PortModel]]:
     """``port_model`` in several nodal diameters, as they are solved, with all work shared that does
     not depend on them.
@@ -86,6 +87,7 @@ def port_models(
 
     Args:
         static_load: (n_points*dim,) [N], of nodal diameter 0.
+        kept: modes of the same body that are known; they are used up.
     """
     shared = (
         _interior_flexibility(t.opened, P, static_load)
@@ -93,6 +95,10 @@ def port_models(
         else None
     )
     model = _Ports(P, names, count, static_load, kind, solver, shared)
+    if kept is not None and kept.serves(diameters, count):
+        for n in diameters:
+            yield n, _port_model(model, kept.pairs.pop(n))
+        return
     cons = {}
     lam = {}
     for p in eigenpairs(t, count, diameters, tolerance=TOLERANCE, solver=solver):
