@@ -486,6 +486,7 @@ def _drawings(
             file,
             points=tables["response/points"],
             own=result.contact.own,
+            searched=tables.get("response/best_load"),
         ),
     }
     if "response/influences" in tables:
