@@ -31,6 +31,8 @@ FIRST_STEP = 1e-3
 AHEAD = 1.3
 # longest step, as a share of the frequency
 MAX_STEP = 0.05
+# of the frequency: where a search begins instead when its first point is not solved
+BESIDE = (1.005, 1.01, 1.02, 0.99)
 
 
 @dataclass(frozen=True)
