@@ -10,7 +10,7 @@ of K(n) - s M(n), one more factorisation for all n, proves the count.
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
@@ -26,7 +26,7 @@ from .eigensolver import Eigensolver
 from .flexibility import Flexibility, flexible
 from .linalg import Folded, apply, combined, dot, inertia, minus, mix
 from .memory import give_back
-from .modes import BLOCKS, SLEPC, mode_set, pairs
+from .modes import BLOCKS, SLEPC, TOLERANCE, mode_set, pairs
 
 # modes beyond those asked for, carried along
 GUARD = 2
@@ -71,6 +71,20 @@ class Eigenpairs:
         return self.flex.con
 
 
+@dataclass(frozen=True)
+class KeptPairs:
+    """Proven modes that a reduction of the same body needs, too."""
+
+    # modes of each nodal diameter
+    count: int
+    # nodal diameter to its modes
+    pairs: dict[int, Eigenpairs] = field(default_factory=dict)
+
+    def serves(self, diameters: Sequence[int], count: int) -> bool:
+        """Whether it has so many modes of all these nodal diameters."""
+        return count <= self.count and all(n in self.pairs for n in diameters)
+
+
 def all_diameters(
     body: Body | Transformation,
     count: int,
@@ -80,6 +94,7 @@ def all_diameters(
     clamp: str | None = "clamp",
     progress: Progress = unwatched,
     solver: Eigensolver = SLEPC,
+    kept: KeptPairs | None = None,
 ) -> list[ModeSet]:
     """The lowest modes in each nodal diameter.
 
@@ -89,6 +104,7 @@ def all_diameters(
         direct: solve every nodal diameter from scratch.
         prove: count the eigenvalues below the highest common gap by inertia.
         progress: shows which nodal diameter is at work.
+        kept: more modes are solved, more exactly, and kept here for a reduction.
 
     Raises:
         InputError: a nodal diameter that the wheel does not have, count not positive.
@@ -99,12 +115,16 @@ def all_diameters(
         raise InputError(f"count is {count}, expected at least 1 mode")
     t = transformation(body, clamp, True) if isinstance(body, Body) else body
     wanted = list(range(t.sectors // 2 + 1)) if diameters is None else list(diameters)
+    solved = count if kept is None else max(count, kept.count)
+    tolerance = VECTOR_TOLERANCE if kept is None else TOLERANCE
     steps = progress(
-        eigenpairs(t, count, wanted, direct, solver=solver), "nodal diameters", len(wanted)
+        eigenpairs(t, solved, wanted, direct, tolerance, solver), "nodal diameters", len(wanted)
     )
     found = {p.con.nodal_diameter: p for p in steps}
     if prove:
-        found = _check_inertia(t, found, count)
+        found = _check_inertia(t, found, solved, tolerance)
+    if kept is not None:
+        kept.pairs.update(found)
     sets = {}
     # vectors go as shapes come: both at once would be the peak of memory
     for n in sorted(found):
@@ -307,13 +327,14 @@ def _check_inertia(
     t: Transformation,
     found: dict[int, Eigenpairs],
     count: int,
+    tolerance: float = VECTOR_TOLERANCE,
 ) -> dict[int, Eigenpairs]:
     """Compare counts with inertia at one shift; a diameter that lost a mode is solved from
     scratch.
     """
     lost = lost_modes(t, {n: p.con for n, p in found.items()}, _list_eigenvalues(found), count)
     for n in lost:
-        found[n] = found_again(found[n].flex, count, lost[n])
+        found[n] = found_again(found[n].flex, count, lost[n], tolerance)
     return found
 
 

@@ -9,13 +9,15 @@ from dataclasses import dataclass
 import numpy as np
 
 from .body import Body
-from .stress import nodal_stress, von_mises
+from .stress import nodal_stress, stress_jumps, von_mises
 from .stress_error import mesh_error
 
 # instants of a period for each harmonic, the highest one included
 INSTANTS = 16
 # nodes that are followed in time: those with the largest sum of the harmonics' own stresses
 FOLLOWED = 4000
+# places where the mesh may hide a larger stress
+RIVALS = 12
 # harmonics below this share of the largest one's displacement are left out
 NEGLIGIBLE = 1e-5
 
@@ -30,7 +32,8 @@ class AlternatingStress:
     place: np.ndarray
     # (H,) of each harmonic alone at that place, harmonic 1 first [Pa]
     by_harmonic: np.ndarray
-    # estimated relative error by the mesh, see `stress_error.mesh_error`
+    # estimated relative error by the mesh: what the largest stress may be at this place or at one
+    # where the mesh leaves more open, see `stress_error.mesh_error`
     mesh_error: float
     # (n_points,) at each node [Pa]; of nodes that are far from the largest the sum of the
     # harmonics' own amplitudes, which is not below it
@@ -69,10 +72,18 @@ def alternating_stress(
     by_harmonic = np.zeros(len(harmonics))
     by_harmonic[kept] = own[:, node]
     strongest = int(own[:, node].argmax())
+    u = harmonics[kept[strongest]]
+    possible = bound + stress_jumps(body, u, found[strongest])
+    rivals = np.argpartition(possible, -min(RIVALS, count))[-min(RIVALS, count) :]
+    highest = [
+        bound[rival] * (1 + mesh_error(body, u, found[strongest], int(rival), touched))
+        for rival in rivals
+    ]
+    own_error = mesh_error(body, u, found[strongest], node, touched)
     return AlternatingStress(
         float(largest[worst]),
         body.mesh.points[node],
         by_harmonic,
-        mesh_error(body, harmonics[kept[strongest]], found[strongest], node, touched),
+        max(own_error, float(max(highest) / bound[node] - 1)),
         field,
     )

@@ -14,7 +14,7 @@ from scipy.linalg import eigh
 
 from ..data import PortModel
 from ..errors import InputError, suggestion
-from .all_diameters import Eigenpairs, eigenpairs, found_again, lost_modes
+from .all_diameters import Eigenpairs, KeptPairs, eigenpairs, found_again, lost_modes
 from .constraint import Constrained, Opened, Transformation, restrict
 from .cyclic_schur import Rim, face_solve, inner_solve
 from .eigensolver import Eigensolver
@@ -77,6 +77,7 @@ def port_models(
     static_load: np.ndarray | None = None,
     kind: str = "rubin",
     solver: Eigensolver = SLEPC,
+    kept: KeptPairs | None = None,
 ) -> Iterator[tuple[int, PortModel]]:
     """``port_model`` in several nodal diameters, as they are solved, with all work shared that does
     not depend on them.
@@ -86,6 +87,7 @@ def port_models(
 
     Args:
         static_load: (n_points*dim,) [N], of nodal diameter 0.
+        kept: modes of the same body that are known; they are used up.
     """
     shared = (
         _interior_flexibility(t.opened, P, static_load)
@@ -93,15 +95,19 @@ def port_models(
         else None
     )
     model = _Ports(P, names, count, static_load, kind, solver, shared)
+    if kept is not None and kept.serves(diameters, count):
+        for n in diameters:
+            yield n, _port_model(model, kept.pairs.pop(n))
+        return
     cons = {}
     lam = {}
     for p in eigenpairs(t, count, diameters, tolerance=TOLERANCE, solver=solver):
-        n = p.con.nodal_diameter
+        diameter = p.con.nodal_diameter
         # None is for bodies without cyclic faces only
-        assert n is not None
-        cons[n] = p.con
-        lam[n] = p.lam
-        yield n, _port_model(model, p)
+        assert diameter is not None
+        cons[diameter] = p.con
+        lam[diameter] = p.lam
+        yield diameter, _port_model(model, p)
     for n, truth in lost_modes(t, cons, lam, count).items():
         yield n, _port_model(model, found_again(flexible(cons[n]), count, truth, TOLERANCE))
 

@@ -90,13 +90,31 @@ def nodal_stress(
         part = slice(start, start + len(cells))
         start += len(cells)
         at_nodes = np.einsum(
-            "kq,cqs->cks", _extrapolation_matrix(body.mesh.cell_type), found.stress[part]
+            "kq,cqs->cks", extrapolation_matrix(body.mesh.cell_type), found.stress[part]
         )
         mean = _average_at_nodes(cells, at_nodes, found.volume[part].sum(1), len(out))
         size = np.where(np.bincount(cells.ravel(), minlength=len(out)) > 0, von_mises(mean), -1.0)
         better = size > largest
         out[better], largest[better] = mean[better], size[better]
     return out
+
+
+def stress_jumps(
+    body: Body,
+    u: np.ndarray,
+    recovered: np.ndarray,
+) -> np.ndarray:
+    """(n_points,) largest von Mises stress of the differences between the cells at a node and the
+    recovered stress there [Pa].
+    """
+    found = gauss_stress(body, u)
+    matrix = extrapolation_matrix(body.mesh.cell_type)
+    jumps = np.zeros(len(body.mesh.points))
+    cells = np.vstack([body.mesh.bodies[name] for name in body.material])
+    for some in np.array_split(np.arange(len(cells)), len(cells) // BLOCK + 1):
+        at_nodes = np.einsum("kq,cqs->cks", matrix, found.stress[some])
+        np.maximum.at(jumps, cells[some], von_mises(at_nodes - recovered[cells[some]]))
+    return jumps
 
 
 def patch_stress(
@@ -241,6 +259,39 @@ def _of_cells(
     )
 
 
+def element_stress(
+    body: Body,
+    u: np.ndarray,
+    name: str,
+    cells: np.ndarray,
+) -> tuple[np.ndarray, np.ndarray]:
+    """Stresses of several real displacement fields at once, in some cells of one material.
+
+    Args:
+        u: (n_points, dim, m) displacements [m].
+        cells: (nc, k) of the body's material ``name``.
+
+    Returns:
+        volumes (nc,) [m^3], and stresses (nc, q, m, 6) at the points of `gauss_stress` [Pa].
+    """
+    d = body.dim
+    at, weight = _best_points(body.mesh.cell_type)
+    _, gradients = shape.tabulate(body.mesh.cell_type, at)
+    tangents = np.einsum("ckg,qkd->cqgd", body.mesh.points[cells][:, :, :d], gradients)
+    depth = body.mesh.depth if d == 2 else 1.0
+    volume = (np.abs(np.linalg.det(tangents)) * weight * depth).sum(axis=1)
+    # (nc, q, k, d) gradients of the shape functions in space
+    spatial = gradients @ np.linalg.inv(tangents)
+    slope = np.einsum("ckim,cqkj->cqmij", u[cells], spatial, optimize=True)
+    strain = (slope + slope.swapaxes(3, 4)) / 2
+    stress = stress_of(body.material[name], strain, body.plane)
+    across = None
+    if d == 2 and body.plane == "strain":
+        lam, _ = lame(body.material[name], d, body.plane)
+        across = lam * np.trace(strain, axis1=3, axis2=4)
+    return volume, _stress_vector(stress, across)
+
+
 def _stress_vector(stress: np.ndarray, across: np.ndarray | None) -> np.ndarray:
     d = stress.shape[-1]
     out = np.zeros((*stress.shape[:-2], 6), stress.dtype)
@@ -278,8 +329,10 @@ def _four_points(corners: int) -> tuple[np.ndarray, np.ndarray]:
 
 
 @cache
-def _extrapolation_matrix(cell_type: str) -> np.ndarray:
-    """(k, q) from Gauss points to nodes, by the polynomial that the points determine."""
+def extrapolation_matrix(cell_type: str) -> np.ndarray:
+    """(k, q) from the points of `gauss_stress` to the nodes of a cell, by the polynomial that the
+    points determine.
+    """
     kind = shape.SHAPES[cell_type][0]
     at, _ = _best_points(cell_type)
     target = shape.nodes(cell_type)

@@ -17,6 +17,7 @@ from numba import njit
 
 from bladefem.friction.coulomb_2d import force_at_middle, march_edge
 from bladefem.friction.states import CLOSING, SLIP, STICK
+from bladefem.util.numba_options import INNER_KERNEL, KERNEL
 
 # of the largest friction limit: how well the force must repeat itself
 TOLERANCE = 1e-12
@@ -24,7 +25,7 @@ TOLERANCE = 1e-12
 SINGULAR = 1e-6
 
 
-@njit(cache=True, error_model="numpy")
+@njit(**INNER_KERNEL)
 def _rows_at(state, f, limit, rise, by, before, change, mu, pressed):
     """Rows (2, M) of the force f (2,) in its state, after a change of the motion.
 
@@ -52,7 +53,7 @@ def _rows_at(state, f, limit, rise, by, before, change, mu, pressed):
     return rows
 
 
-@njit(cache=True, error_model="numpy")
+@njit(**KERNEL)
 def _march_period(path, basis, node, weights, f, rows, F, sums):
     """One period from the force f (2,) with its rows (2, 3K + 2), both changed to those at its end.
 
@@ -112,7 +113,7 @@ def _march_period(path, basis, node, weights, f, rows, F, sums):
     return slips
 
 
-@njit(cache=True, error_model="numpy")
+@njit(**INNER_KERNEL)
 def _start_force(path, basis, node, f, rows):
     """The force k_t w at the first knot, drawn back onto the circle, and its rows; where the path
     goes on from period to period, the limit that way.
@@ -142,7 +143,7 @@ def _start_force(path, basis, node, f, rows):
         f[1] = uy * limit
 
 
-@njit(cache=True, error_model="numpy")
+@njit(**INNER_KERNEL)
 def _periodic_force(path, basis, node, weights, limit, F, J):
     """Fill F (2, K) and J (2, K, 3K) of the periodic state; returns samples that slip, and cycles,
     negative where the force does not repeat itself.
@@ -172,7 +173,7 @@ def _periodic_force(path, basis, node, weights, limit, F, J):
     return slips, -limit
 
 
-@njit(cache=True, error_model="numpy")
+@njit(**KERNEL)
 def plain_batch(w, ramp, load, nodes, tab, limit, F, J, shares, cycles):
     """Forces F (n, 3, K), Jacobian J (n, 3, K, 3K), shares (n, 3) of stick, slip and separation,
     cycles (n,): arguments as `bladefem.friction.simd.kernel_2d.disc_batch` has them, but for the

@@ -22,9 +22,10 @@ from bladefem.friction.trigonometric_tables import (
     indicator_coefficients,
     motion_values,
 )
+from bladefem.util.numba_options import INNER_KERNEL, KERNEL
 
 
-@njit(_nrt=False, cache=True, error_model="numpy")
+@njit(_nrt=False, **INNER_KERNEL)
 def slider_bounds(g, N, mu, low, high):
     """Fill the bounds low, high (S,) of the slider, g -+ mu N [N]; returns the smallest N."""
     least = N[0]
@@ -36,7 +37,7 @@ def slider_bounds(g, N, mu, low, high):
     return least
 
 
-@njit(_nrt=False, cache=True, error_model="numpy")
+@njit(_nrt=False, **INNER_KERNEL)
 def _scan_period(b, g, N, low, high, opens, first, state):
     """States of one period from slider b: (slider, last event, its sign, period without event).
 
@@ -75,7 +76,7 @@ def _scan_period(b, g, N, low, high, opens, first, state):
     return b, last, sign, quiet
 
 
-@njit(_nrt=False, cache=True, error_model="numpy")
+@njit(_nrt=False, **INNER_KERNEL)
 def march_states(g, N, low, high, opens, state):
     """Fill the states (S,) of the steady period for g = kt w, normal load N and slider bounds (S,),
     all [N].
@@ -102,7 +103,7 @@ def march_states(g, N, low, high, opens, state):
     return event, way, quiet
 
 
-@njit(_nrt=False, cache=True, error_model="numpy")
+@njit(_nrt=False, **INNER_KERNEL)
 def _stick_origin(i, state, g, N, el, at, rows):
     """Rows (2, K) of d(f - kt w) by normal and tangential coefficients in the stick after event i;
     f - kt w [N].
@@ -124,7 +125,7 @@ def _stick_origin(i, state, g, N, el, at, rows):
     return part * dg - g[j]
 
 
-@njit(cache=True, error_model="numpy")
+@njit(**INNER_KERNEL)
 def _stuck_period(last, sign, g, N, el, tab, means, F, J):
     """A period without events; a slip of the first period leaves its offset."""
     means[0] += tab.sums[g.size]
@@ -136,7 +137,7 @@ def _stuck_period(last, sign, g, N, el, tab, means, F, J):
             J[1, 0, 0] += sign * el.mu * el.kn * tab.at[last]
 
 
-@njit(_nrt=False, cache=True, error_model="numpy")
+@njit(_nrt=False, **INNER_KERNEL)
 def _add_stretches(state, g, N, el, tab, means, F, J, rows, weight):
     """Add to the basis means (3, 4H+1) of stick, signed slip and contact, and the offsets of
     sticking to F and J.
@@ -174,7 +175,7 @@ def _add_stretches(state, g, N, el, tab, means, F, J, rows, weight):
                     J[1, k, d, l] += weight[k] * rows[d, l]
 
 
-@njit(_nrt=False, cache=True, error_model="numpy")
+@njit(_nrt=False, **INNER_KERNEL)
 def assemble_linear_parts(w, base, el, means, F, J, around, block):
     """Add the parts linear in w (2, K): kt M_stick, mu M_slip and M_contact of base (K,) + kn w.
 
@@ -194,7 +195,7 @@ def assemble_linear_parts(w, base, el, means, F, J, around, block):
             F[row, k] += stiffness * total + (0.0 if of == 0 else factor * fixed)
 
 
-@njit(cache=True, error_model="numpy")
+@njit(**INNER_KERNEL)
 def _add_series(load, state, mu, tab, F):
     """Add the harmonics of a prescribed normal load (S,) and of its friction limit where the
     element slips.
@@ -212,7 +213,7 @@ def _add_series(load, state, mu, tab, F):
                 F[1, k] += slip * double
 
 
-@njit(cache=True, error_model="numpy")
+@njit(**KERNEL)
 def jenkins_batch(w, load, nodes, tab, F, J, shares):
     """Forces F (n, 2, K), Jacobian J (n, 2, K, 2, K), shares (n, 3) of stick, slip and separation;
     zeroed here.

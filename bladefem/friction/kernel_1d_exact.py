@@ -32,6 +32,7 @@ from bladefem.friction.law_table import require_coulomb
 from bladefem.friction.roots import NO_ROOT, first_rise, motion_value
 from bladefem.friction.states import SEPARATED, SLIP_DOWN, SLIP_UP, STICK
 from bladefem.friction.trigonometric_tables import Node, empty_gram, indicator_coefficients
+from bladefem.util.numba_options import INNER_KERNEL, KERNEL
 
 # polynomials whose rise ends a state
 UP = 0
@@ -130,7 +131,7 @@ def transitions(
     return [(float(a), float(b), int(state)) for a, b, state, _, _ in spans[: max(count, 0)]]
 
 
-@njit(cache=True, error_model="numpy")
+@njit(**INNER_KERNEL)
 def _motion_derivative(c, out):
     """Coefficients of the derivative of the motion c."""
     out[0] = 0.0
@@ -138,7 +139,7 @@ def _motion_derivative(c, out):
         out[2 * h - 1], out[2 * h] = h * c[2 * h], -h * c[2 * h - 1]
 
 
-@njit(cache=True, error_model="numpy")
+@njit(**KERNEL)
 def _event_polynomials(w, base, el):
     """(8, K) coefficients [N]: the six whose rise ends a state, then g = kt w and N."""
     K = w.shape[1]
@@ -154,7 +155,7 @@ def _event_polynomials(w, base, el):
     return q
 
 
-@njit(cache=True, error_model="numpy")
+@njit(**INNER_KERNEL)
 def _next_event(state, b, q, t, end, small):
     """(time, polynomial) of the first event after t in the bracket up to ``end``; time NEVER for
     none.
@@ -177,7 +178,7 @@ def _next_event(state, b, q, t, end, small):
     return (opening, OPEN) if opening < best else (best, which)
 
 
-@njit(cache=True, error_model="numpy")
+@njit(**INNER_KERNEL)
 def _enter_state(q, t, which, b):
     """(state, slider, how it got there) after the event of polynomial ``which`` at time t."""
     if which == UP:
@@ -197,7 +198,7 @@ def _enter_state(q, t, which, b):
     return STICK, motion_value(q[6], t)[0], CONTACT
 
 
-@njit(cache=True, error_model="numpy")
+@njit(**INNER_KERNEL)
 def _initial_state(q):
     """(state, slider, how) at tau = 0, where f = g is clamped."""
     low = motion_value(q[UP], 0.0)[0]
@@ -211,7 +212,7 @@ def _initial_state(q):
     return STICK, 0.0, START
 
 
-@njit(cache=True, error_model="numpy")
+@njit(**KERNEL)
 def _steady_stretches(q, brackets, spans):
     """Stretches of the second period in spans (.., 5): start, end, state, how the slider came,
     when; their number.
@@ -264,7 +265,7 @@ def _steady_stretches(q, brackets, spans):
     return count, b, how, when
 
 
-@njit(cache=True, error_model="numpy")
+@njit(**INNER_KERNEL)
 def _basis_means(a, b, out):
     """Means over the circle of the basis up to 2H (4H+1,), restricted to a < tau < b."""
     out[0] = (b - a) / (2.0 * pi)
@@ -273,7 +274,7 @@ def _basis_means(a, b, out):
         out[2 * p] = (cos(p * a) - cos(p * b)) / (2.0 * pi * p)
 
 
-@njit(cache=True, error_model="numpy")
+@njit(**INNER_KERNEL)
 def _slider_position(how, t, q, el, basis, rows):
     """Slider position b [N], set at time t, and its rows (2, K) by normal and tangential
     coefficients.
@@ -296,7 +297,7 @@ def _slider_position(how, t, q, el, basis, rows):
     return g - sign * el.mu * N
 
 
-@njit(cache=True, error_model="numpy")
+@njit(**KERNEL)
 def exact_batch(w, base, nodes, brackets, F, J, shares, counts):
     """Forces F (n, 2, K), Jacobian J (n, 2, K, 2, K), shares (n, 3), numbers of stretches (n,); F
     and J come zeroed.

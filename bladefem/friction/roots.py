@@ -10,11 +10,13 @@ from math import cos, sin
 
 from numba import njit
 
+from bladefem.util.numba_options import INNER_KERNEL
+
 # time of an event that does not happen
 NO_ROOT = 1e300
 
 
-@njit(cache=True, error_model="numpy")
+@njit(**INNER_KERNEL)
 def motion_value(c, tau):
     """(value, slope, curvature) at tau of the motion with coefficients c (K,)."""
     q = c[0]
@@ -35,7 +37,7 @@ def motion_value(c, tau):
     return q, d, e
 
 
-@njit(cache=True, error_model="numpy")
+@njit(**INNER_KERNEL)
 def _bracketed_root(c, level, a, b, order):
     """Zero in [a, b] of c - level (order 0), negative at a and positive at b, or of its slope
     falling through zero.
@@ -59,7 +61,7 @@ def _bracketed_root(c, level, a, b, order):
     return x
 
 
-@njit(cache=True, error_model="numpy")
+@njit(**INNER_KERNEL)
 def _inflection_time(c, a, b, bend):
     """Time in [a, b] at which the curvature, of the sign ``bend`` at a, changes its sign."""
     for _ in range(50):
@@ -71,7 +73,7 @@ def _inflection_time(c, a, b, bend):
     return b
 
 
-@njit(cache=True, error_model="numpy")
+@njit(**INNER_KERNEL)
 def first_rise(c, level, a, b, small):
     """Time in [a, b] at which the motion with coefficients c first exceeds ``level``, NEVER if it
     does not.

@@ -18,6 +18,7 @@ from bladefem.errors import InputError
 from bladefem.friction.fourier import analysis, synthesis
 from bladefem.friction.simd.codegen import BLOCK, LANES
 from bladefem.friction.simd.row_kernels import TILE, fill_gram
+from bladefem.util.numba_options import INNER_KERNEL, KERNEL
 
 
 class Node(NamedTuple):
@@ -153,13 +154,13 @@ def _sample_fours(S: int) -> np.ndarray:
     return four
 
 
-@njit(cache=True, error_model="numpy")
+@njit(**KERNEL)
 def empty_gram(H):
     """Scratch for gram."""
     return np.zeros((2, 6 * H + 2 + 2 * LANES))
 
 
-@njit(_nrt=False, cache=True, error_model="numpy")
+@njit(_nrt=False, **KERNEL)
 def gram_matrix(m, around, out):
     """Analysis of synthesis restricted to a set whose basis means up to 2H are m (4H+1); I on a
     circle.
@@ -179,7 +180,7 @@ def gram_matrix(m, around, out):
         out[0, k], out[k, 0] = m[k], 2.0 * m[k]
 
 
-@njit(_nrt=False, cache=True, error_model="numpy")
+@njit(_nrt=False, **KERNEL)
 def indicator_coefficients(m, out):
     """out (K,) = coefficients of the indicator function of a set with basis means m."""
     out[0] = m[0]
@@ -187,7 +188,7 @@ def indicator_coefficients(m, out):
         out[k] = 2 * m[k]
 
 
-@njit(_nrt=False, cache=True, error_model="numpy", fastmath={"contract", "reassoc", "nsz"})
+@njit(_nrt=False, **INNER_KERNEL, fastmath={"contract", "reassoc", "nsz"})
 def motion_values(transposed, c, factor, offset, out):
     """out (S,) = offset plus factor times the motion with coefficients c (K,); synthesis transposed
     (K, S).

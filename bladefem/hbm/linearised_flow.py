@@ -14,6 +14,7 @@ from numba import njit
 from scipy import linalg
 
 from ..friction.time_step import step_2d
+from ..util.numba_options import INNER_KERNEL, KERNEL
 from .sector_modes import SectorModes
 
 # periods marched until 2-D forces repeat
@@ -43,7 +44,7 @@ def linear_steps(system: SectorModes, dt: float) -> tuple[np.ndarray, np.ndarray
     return E, constant - rising, rising
 
 
-@njit(cache=True, error_model="numpy")
+@njit(**KERNEL)
 def contact_steps(u, du, N, dN, mu, before, now, load, share, stuck):
     """Derivatives of the steps of one period of given motions, with which forces repeat.
 
@@ -96,7 +97,7 @@ def _cubic(start, end, slope0, slope1, a):
     )
 
 
-@njit(cache=True, error_model="numpy")
+@njit(**INNER_KERNEL)
 def _step_1d(x, slips, motion, loads, mu, tangents):
     """One step of a node with one tangent from the force x: the new force, whether it slips then,
     and the share of the step for which the old state lasts; derivatives are filled.
@@ -155,7 +156,7 @@ def _step_1d(x, slips, motion, loads, mu, tangents):
     return side * mu * N1, True, share
 
 
-@njit(cache=True, error_model="numpy")
+@njit(**INNER_KERNEL)
 def _step_2d(x, y, dx, dy, loads, mu, tangents):
     """One step of a node with two tangents: new force, and the share of the step for which the old
     state lasts; derivatives are filled.
@@ -210,7 +211,7 @@ def _step_2d(x, y, dx, dy, loads, mu, tangents):
     return fx, fy, share
 
 
-@njit(cache=True, error_model="numpy")
+@njit(**KERNEL)
 def period_map(E, G0, G1, U, R, A, B1, B0, share):
     """(2M+m, 2M+m) map of disturbances of (q, v, f) over a period.
 
@@ -270,7 +271,7 @@ def period_map(E, G0, G1, U, R, A, B1, B0, share):
     return full
 
 
-@njit(cache=True, error_model="numpy")
+@njit(**INNER_KERNEL)
 def _inverse_of_contact(B, flexible):
     """(m, m) inverse of 1 + B times the flexibility, for node blocks B (n, d, d)."""
     n, d, _ = B.shape

@@ -20,7 +20,7 @@ from .sensitivity import sensitivities
 from .solution import Solution
 from .solve import solve
 from .solver.newton import DEFAULTS, Options
-from .sweep import size
+from .sweep import size, walk_in_frequency
 from .validate_model import check_probe
 
 # points spent on one peak before giving up
@@ -31,6 +31,8 @@ FIRST_STEP = 1e-3
 AHEAD = 1.3
 # longest step, as a share of the frequency
 MAX_STEP = 0.05
+# of the frequency: where a search begins instead when its first point is not solved
+BESIDE = (1.005, 1.01, 1.02, 0.99)
 
 
 @dataclass(frozen=True)
@@ -82,10 +84,11 @@ def find_peak(
     reach = FIRST_STEP * omega
     frequency = omega / (2 * np.pi)
     for count in range(1, STEPS + 1):
-        start = solve(model, omega, H, samples, start=start, options=options)
+        start = _solved_near(model, omega, H, samples, start, last is None, options)
         frequency = start.frequency
         if not start.converged:
             raise NotSolvedError(f"peak search stopped at {start.frequency:.6g} Hz: {start.reason}")
+        omega = start.omega
         if size(start, options.probe) == 0:
             raise NotSolvedError(
                 f"peak search at {start.frequency:.6g} Hz: probe {options.probe} does not move"
@@ -110,6 +113,34 @@ def find_peak(
     raise NotSolvedError(
         f"peak search found no maximum in {STEPS} points, last at {frequency:.6g} Hz"
     )
+
+
+def _solved_near(
+    model: ReducedModel,
+    omega: float,
+    H: int,
+    samples: int,
+    start: Solution | None,
+    first: bool,
+    options: Options,
+) -> Solution:
+    """The point at a frequency, or the nearest to it that its start leads to.
+
+    Args:
+        first: of a search, whose start belongs to a similar model: where it leads nowhere, the
+            same is tried BESIDE the frequency, away from folds.
+    """
+    point = solve(model, omega, H, samples, start=start, options=options)
+    if point.converged or start is None:
+        return point
+    if not first:
+        way = walk_in_frequency(model, omega, H, samples, start, options)
+        return way[-1] if way else point
+    simply = replace(options, fallbacks=False)
+    tries = (
+        solve(model, omega * beside, H, samples, start=start, options=simply) for beside in BESIDE
+    )
+    return next((other for other in tries if other.converged), point)
 
 
 def _slope(

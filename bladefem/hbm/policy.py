@@ -4,7 +4,7 @@ choice.
 Four ways lead to the same solution, the cheapest that applies is taken:
 
 1. compiled point: linear part, Newton and works of a small model in one compiled call;
-2. compiled Newton: the loop alone is compiled, the linear part is condensed with NumPy;
+2. compiled Newton: the same kernels one after the other, for more contacts or another start;
 3. NumPy Newton with a dense LU of the Jacobian (2-D elements and other friction laws, few
 unknowns);
 4. NumPy Newton with iterations (conjugate residuals, then GMRES), dense LU where they fail.
@@ -49,13 +49,9 @@ BLOCKED_LU_UNKNOWNS = 64
 DEFLATION_UNKNOWNS = 300
 # Unknowns up to which the sign of the Jacobian's determinant is worth its time.
 DETERMINANT_UNKNOWNS = 600
-# Contact degrees of freedom below which all harmonics are condensed in one batched call; above, one
-# LAPACK call a harmonic without copies, or the low-rank update.
-BATCHED_SOLVE_DOFS = 64
 # Contact degrees of freedom for each mode from which contact springs are added by the modes
-# (Woodbury): with NumPy, and in compiled points.
-LOW_RANK_RATIO = 3
-LOW_RANK_RATIO_COMPILED = 2
+# (Woodbury).
+LOW_RANK_RATIO = 2
 # Contact degrees of freedom from which one flexibility serves all harmonics without being formed.
 SHARED_FLEXIBILITY_DOFS = 64
 # Coordinates and elements up to which shooting is tried.
@@ -68,16 +64,9 @@ def uses_coulomb_kernels(model: ReducedModel) -> bool:
 
 
 def uses_compiled_point(model: ReducedModel, harmonics: int) -> bool:
-    """True if a whole point is one compiled call: few 1-D Coulomb elements, the mean in the
-    balance, modes that damping does not couple.
-    """
+    """True if a whole point is one compiled call: few 1-D Coulomb elements."""
     dofs = model.springs.size
-    if dofs > COMPILED_POINT_DOFS or not model.coupled:
-        return False
-    if not uses_compiled_newton(model, dofs * (2 * harmonics + 1)):
-        return False
-    bodies = (model.blades(harmonics), model.elastic_damper(harmonics))
-    return all(body is None or body.coupled is None for body in bodies)
+    return dofs <= COMPILED_POINT_DOFS and uses_compiled_newton(model, dofs * (2 * harmonics + 1))
 
 
 def uses_compiled_newton(model: ReducedModel, unknowns: int) -> bool:
@@ -96,11 +85,6 @@ def linear_solver(unknowns: int) -> str:
     return ITERATIONS_THEN_LU if unknowns <= DENSE_FALLBACK_UNKNOWNS else ITERATIONS
 
 
-def uses_low_rank(dofs: int, modes: int) -> bool:
-    """True if NumPy adds the contact springs by the modes."""
-    return dofs >= BATCHED_SOLVE_DOFS and LOW_RANK_RATIO * modes <= dofs
-
-
 def updates_by_modes(dofs: int, modes: int) -> bool:
-    """True if a compiled point adds the contact springs by the modes."""
-    return LOW_RANK_RATIO_COMPILED * modes <= dofs
+    """True if the contact springs are added by the modes."""
+    return LOW_RANK_RATIO * modes <= dofs

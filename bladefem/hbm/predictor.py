@@ -4,11 +4,14 @@ from __future__ import annotations
 
 from numba import njit
 
+from ..util.numba_options import INNER_KERNEL, KERNEL
+from .linear.array_copy import copy_matrix
+
 # points that a start is extrapolated from
 PREDICTOR_POINTS = 3
 
 
-@njit(cache=True, error_model="numpy")
+@njit(**KERNEL)
 def extrapolate_solution(omega, known, at, count, w):
     """Fill w (m, K), a start at omega, from the first `count` of the points known (3, m, K) at
     (3,), the last one last.
@@ -17,7 +20,7 @@ def extrapolate_solution(omega, known, at, count, w):
     it is where the step is more than twice the last one, or two of them are one.
     """
     last = count - 1
-    w[:] = known[last]
+    copy_matrix(known[last], w)
     if (
         count == 1
         or abs(omega - at[last]) > 2.0 * abs(at[last] - at[last - 1])
@@ -30,18 +33,21 @@ def extrapolate_solution(omega, known, at, count, w):
         for b in range(count):
             if b != a:
                 share *= (omega - at[b]) / (at[a] - at[b])
-        w += share * known[a]
+        for i in range(w.shape[0]):
+            for k in range(w.shape[1]):
+                w[i, k] += share * known[a, i, k]
 
 
-@njit(cache=True, error_model="numpy")
+@njit(**INNER_KERNEL)
 def append_solution(omega, w, known, at, count):
     """Put a point at the end of the known ones, in place of the first if they are full; their
     number then.
     """
     if count == at.size:
         for a in range(count - 1):
-            known[a], at[a] = known[a + 1], at[a + 1]
+            copy_matrix(known[a + 1], known[a])
+            at[a] = at[a + 1]
         count -= 1
-    known[count] = w
+    copy_matrix(w, known[count])
     at[count] = omega
     return count + 1

@@ -76,7 +76,7 @@ def _one_sensitivity(
     force = as_amplitudes(df)
     rigid = np.zeros(len(linear.rigid))
     if linear.B.shape[1]:
-        gap = as_amplitudes(dw)[0] - direct[0] + linear.G[0] @ force[0]
+        gap = as_amplitudes(dw)[0] - direct[0] + linear.bodies.mean_G @ force[0]
         rigid = linear.rigid @ (linear.B.T @ (linear.springs * gap.real))
     probe = probe + probe_motion(replace(model, excitation={}), linear.omega, force, rigid)
     size = np.linalg.norm(solution.probe[1:], axis=0)

@@ -6,9 +6,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..friction.fourier import to_complex
 from ..util.arrays import ComplexArray, RealArray
-from .linear.bodies import Stack, dissipated_work, modal_amplitudes, modal_flexibility, port_motion
+from .linear.bodies import Stack, modal_amplitudes, modal_flexibility, port_motion
 from .model import ReducedModel
 
 
@@ -134,57 +133,3 @@ def blade_motion(
         ports,
         modal_amplitudes(blades, modal_flexibility(blades, omega * np.arange(H + 1)), ports),
     )
-
-
-def period_works(
-    model: ReducedModel,
-    omega: float,
-    w: np.ndarray,
-    f: np.ndarray,
-    dissipated: float,
-) -> Work:
-    """Work of each kind in a period, for displacements and forces (n, d, K)."""
-    force = to_complex(f.reshape(-1, f.shape[2])).T
-    return works_of(
-        model,
-        omega,
-        to_complex(w.reshape(-1, w.shape[2])).T,
-        force,
-        blade_motion(model, omega, force),
-        dissipated,
-    )
-
-
-def works_of(
-    model: ReducedModel,
-    omega: float,
-    relative: np.ndarray,
-    force: np.ndarray,
-    blade: tuple[Stack, np.ndarray, np.ndarray],
-    dissipated: float,
-) -> Work:
-    """The same from complex amplitudes (H+1, m), and from the blades' motion under them."""
-    orders, (blades, ports, modal) = np.arange(len(force)), blade
-    lost_work = orders @ dissipated_work(blades, omega * orders, modal)
-    damper = model.elastic_damper(len(force) - 1)
-    if damper is not None:
-        at_ports = np.zeros((len(force), damper.shapes.shape[1]), dtype=complex)
-        at_ports[:, damper.contact] = force
-        moved = modal_amplitudes(damper, modal_flexibility(damper, omega * orders), at_ports)
-        lost_work += orders @ dissipated_work(damper, omega * orders, moved)
-    loaded = port_motion(blades, modal, ports, blades.load)
-    return Work(
-        _harmonic_work(orders, ports[:, blades.load], loaded),
-        float(lost_work),
-        _harmonic_work(orders, force, relative),
-        dissipated,
-    )
-
-
-def _harmonic_work(
-    orders: np.ndarray,
-    force: np.ndarray,
-    moved: np.ndarray,
-) -> float:
-    """Work of harmonic forces on harmonic displacements (H+1, *) in a period."""
-    return float(np.pi * np.sum(orders[:, None] * (force * (1j * moved).conj()).real))

@@ -8,13 +8,12 @@ from dataclasses import replace
 import numpy as np
 
 from ..errors import InputError
-from ..friction.fourier import to_complex
 from ..friction.states import NODE_STATES
 from .full_stick import INSTANTS_PER_HARMONIC, leading_stuck_points, sticks_safely
 from .linear.condensation import Linear, condense
 from .model import ReducedModel
-from .point_measures import count_states
-from .solution import Solution, at_probes, blade_motion, probe_motion, works_of
+from .point_measures import MEASURES, count_states, measure_point
+from .solution import Solution, Work, probe_motion
 from .solver.fallback import NEWTON_MERITS, Attempt, match_harmonics, solve_balance
 from .solver.newton import DEFAULTS, Options, newton, runs_compiled
 from .solver.point_compiled import compiles_points, solve_each, solve_small
@@ -120,32 +119,45 @@ def as_solution(
     model = balance.model
     linear = balance.linear
     state = attempt.end.state
-    load = state.forces.f.copy()
-    load[:, :, 0] -= model.preload.reshape(load.shape[:2])
-    force = to_complex(load.reshape(-1, load.shape[2])).T
-    relative = to_complex(state.w.reshape(-1, load.shape[2])).T
-    blade = blade_motion(model, linear.omega, force)
-    stiffness = model.springs[:, :, None]
+    flat = (linear.springs.size, state.w.shape[2])
+    f = np.empty(state.w.shape)
+    probe = np.empty(linear.bodies.straight.shape, dtype=complex)
+    measures = np.empty(MEASURES)
+    measure_point(
+        linear.omega,
+        linear.bodies,
+        linear.springs,
+        (linear.modal, linear.free),
+        np.ascontiguousarray(state.w, dtype=float).reshape(flat),
+        model.directions - model.elements.tangents,
+        np.ascontiguousarray(state.forces.f),
+        model.preload,
+        state.residual.reshape(flat),
+        f,
+        probe,
+        measures,
+    )
+    residual, residual_force, _, fed, lost, friction, _ = measures.tolist()
+    # what a law loses in a walk is more than its harmonics tell
+    dissipated = float(np.sum(state.forces.dissipated))
     counts = count_states(state.forces.shares).tolist()
     return Solution(
         omega=linear.omega,
         harmonics=state.w.shape[2] // 2,
         samples=balance.samples,
         w=state.w,
-        f=state.forces.f,
-        probe=at_probes(blade, _rigid_motion(linear, relative[0], force[0])),
+        f=f,
+        probe=probe,
         converged=attempt.end.converged,
         reason=reason,
         method=attempt.method,
         iterations=iterations,
         residual=state.error,
-        residual_displacement=float(abs(state.residual).max()),
-        residual_force=float(abs(stiffness * state.residual).max()),
+        residual_displacement=residual,
+        residual_force=residual_force,
         drift=drift_speed(balance, state.w),
         states=dict(zip(NODE_STATES, counts, strict=True)),
-        work=works_of(
-            model, linear.omega, relative, force, blade, float(np.sum(state.forces.dissipated))
-        ),
+        work=Work(fed, lost, friction, dissipated),
         route=attempt.end.route,
         walk=balance.walk,
     )
@@ -210,5 +222,5 @@ def _rigid_motion(
     """(r,) motions without stiffness that close  w_0 = free_0 - G_0 f_0 + B q."""
     if linear.B.shape[1] == 0:
         return np.zeros(len(linear.rigid))
-    gap = mean - linear.free[0] + linear.G[0] @ force
+    gap = mean - linear.free[0] + linear.bodies.mean_G @ force
     return linear.rigid @ (linear.B.T @ (linear.springs * gap.real))

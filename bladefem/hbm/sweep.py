@@ -40,6 +40,9 @@ FIRST_LOOK_INTERVALS = 12
 POINTS_AT_ONCE = 16
 # points after which a sweep gives up refining
 BAND_LIMIT = 400
+BAND_LIMIT_NOTE = (
+    f"the sweep ended after {BAND_LIMIT} points: peaks may be higher by more than the accuracy"
+)
 # Newton steps of one point of a walk from a neighbour: more are better spent on shorter steps
 WALK_ITERATIONS = 20
 # points tried on one walk, and its shortest step as a share of the way
@@ -154,15 +157,11 @@ def sweep(
     Raises:
         InputError: the band is empty or not positive.
     """
-    if not 0 < band[0] < band[1] < np.inf:
-        raise InputError(f"band {band}: expected 0 < low < high")
+    _check_band(band)
     check_probe(model, options.probe)
     solved: dict[float, Solution] = {}
 
-    @cache
-    def slope(omega: float) -> float:
-        return float(sensitivities(model, solved[omega], ["omega"])["omega"].size[options.probe])
-
+    slope = _slope_of(model, solved, options.probe)
     notes = [] if notes is None else notes
     simply = replace(options, fallbacks=False)
     lost = []
@@ -183,22 +182,32 @@ def sweep(
         if wanted is None:
             return
         if len(solved) >= BAND_LIMIT:
-            notes.append(
-                f"the sweep ended after {BAND_LIMIT} points: peaks may be higher by more than the "
-                "accuracy"
-            )
+            notes.append(BAND_LIMIT_NOTE)
             if not (paths and _normal_loads_follow(model)):
                 return
             break
         near = _neighbours(solved.values(), wanted)
-        solution = solve_from(model, wanted, H, samples, near, options)
-        solved[wanted] = solution
-        yield solution
-    found = find_branches(
-        model, band, list(solved.values()), H, samples, peak=peak, options=options
-    )
+        solved[wanted] = solve_from(model, wanted, H, samples, near, options)
+        yield solved[wanted]
+    points = list(solved.values())
+    found = find_branches(model, band, points, H, samples, peak=peak, options=options)
     notes.extend(found.notes)
     yield from found.points
+
+
+def _check_band(band: tuple[float, float]) -> None:
+    if not 0 < band[0] < band[1] < np.inf:
+        raise InputError(f"band {band}: expected 0 < low < high")
+
+
+def _slope_of(model: ReducedModel, solved: Mapping[float, Solution], probe: int) -> Slope:
+    """The slope of the height with the frequency at solved ones, computed once for each."""
+
+    @cache
+    def slope(omega: float) -> float:
+        return float(sensitivities(model, solved[omega], ["omega"])["omega"].size[probe])
+
+    return slope
 
 
 def _normal_loads_follow(model: ReducedModel) -> bool:

@@ -21,7 +21,8 @@ from ..errors import NotSolvedError
 from ..friction.fourier import synthesis
 from ..friction.law_table import require_coulomb
 from ..util.arrays import IntegerArray, RealArray
-from .linear.condensation import condense, with_springs
+from .linear.condensation import condense
+from .linear.mean_motion import with_springs
 from .model import ReducedModel
 from .node_gradients import size_by_force, transposed_flexibility
 from .solution import Solution
@@ -133,7 +134,7 @@ def _mean_change(model: ReducedModel, nodes: np.ndarray) -> tuple[np.ndarray, np
     # the frequency has no part in the mean
     linear = condense(model, 1.0, 1)
     flexible, _ = with_springs(
-        linear.G[0].real,
+        linear.bodies.mean_G,
         np.zeros(springs.size),
         springs.ravel(),
         linear.B,

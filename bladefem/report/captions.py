@@ -71,8 +71,8 @@ CAPTIONS = {
     "damper (dashed) and in full stick (dotted). Dots are solved points, large dots the highest "
     "of each curve.",
     "response/optimum": "Amplitude and frequency of the resonance over the normal load per seat. "
-    "The star marks the best load studied, dashed lines the blade without damper and in full "
-    "stick.",
+    "The star marks the best load, by exact search where that was made, with the band of loads "
+    "that keep within the accuracy of it; dashed lines the blade without damper and in full stick.",
     "response/hysteresis": "Friction force over relative displacement, summed over each seat, "
     "in one period at each resonance; the enclosed area is the friction work.",
     "response/summary": "Resonance for each normal load. The error is that estimated for the "

@@ -67,9 +67,9 @@ from .wheel import blade_table, pattern_drawings, pattern_sentences, pattern_tab
 from .write import Page, write_report
 
 MESH = (
-    "the estimated errors are those of modes, harmonics, samples, contact points and damper "
-    "model; the mesh's part is shown by 'bladefem modes --converge' (frequencies) and 'bladefem "
-    "chart --mesh' (resonance)"
+    "the estimated errors are those of modes, harmonics, samples, contact points, damper model and "
+    "of the mesh, of seats and blade; other meshes are compared by 'bladefem modes --converge' "
+    "(frequencies) and 'bladefem chart --mesh' (resonance)"
 )
 
 
@@ -486,6 +486,7 @@ def _drawings(
             file,
             points=tables["response/points"],
             own=result.contact.own,
+            searched=tables.get("response/best_load"),
         ),
     }
     if "response/influences" in tables:

@@ -87,8 +87,10 @@ def _report(
         folder,
         variants[0].scene,
         {
-            "response/best_load_of_each_value": table.drop(columns=["halved", "harmonics"]),
-            "response/all_loads": loads.drop(columns=["halved", "harmonics"]),
+            "response/best_load_of_each_value": table.drop(
+                columns=["halved", "body_mesh", "harmonics"]
+            ),
+            "response/all_loads": loads.drop(columns=["halved", "body_mesh", "harmonics"]),
         },
         {"response/side_by_side": folder / "study.png"},
         page=Page(numbers=numbers, stem="report_study", subject=f"study of {name}"),

@@ -15,7 +15,7 @@ from .study import Variant, study_tables
 from .tables import write_tables
 from .write import Page, write_report
 
-UNPRINTED = ["halved", "harmonics"]
+UNPRINTED = ["halved", "body_mesh", "harmonics"]
 
 
 def write_map(

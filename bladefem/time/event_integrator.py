@@ -247,10 +247,11 @@ def _state_margin(state, kt, mu, z, series, i, x, slack):
     N = _polynomial_value(nc, i, x)
     if state == SIGNED_SEPARATED:
         return slack[0] - N
-    if state == SIGNED_STICK:
-        return mu * (N + slack[0]) - abs(kt * (_polynomial_value(wc, i, x) - z))
+    # before the limit of stick, which without friction has no sign
     if N < -slack[0]:
         return N
+    if state == SIGNED_STICK:
+        return mu * (N + slack[0]) - abs(kt * (_polynomial_value(wc, i, x) - z))
     return (
         state * kt * _polynomial_slope(wc, i, x) - mu * _polynomial_slope(nc, i, x) + mu * slack[1]
     )

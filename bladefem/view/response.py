@@ -227,6 +227,7 @@ def draw_optimum(
     *,
     points: pd.DataFrame | None = None,
     own: float | None = None,
+    searched: pd.DataFrame | None = None,
     ax: Axes | None = None,
     title: str = "",
 ) -> object:
@@ -241,15 +242,16 @@ def draw_optimum(
         points: response table; peaks at the end of the frequency band, which are none, are then
             drawn hollow.
         own: load that the damper's mass gives at the operating speed [N].
+        searched: table of best loads by exact search, a row a mass; the star then stands there,
+            in the band of loads whose amplitudes keep within the accuracy of it.
         ax: two axes to draw into, amplitude and frequency.
         title: headline.
     """
     with canvas(file, ax, (7.2, 5.8), (2, 1), sharex=True, height_ratios=[1.6, 1]) as axes:
         groups = summary.groupby("mass") if "mass" in summary else [(None, summary)]
         for (mass, table), colour in zip(groups, COLOURS * 9, strict=False):
-            draw_optimum_curve(
-                axes, table, colour, None if mass is None else f"damper of {1e3 * mass:.4g} g"
-            )
+            label = None if mass is None else f"damper of {1e3 * mass:.4g} g"
+            draw_optimum_curve(axes, table, colour, label, _exact_optimum(searched, mass))
         draw_limits(axes, summary)
         draw_cut(axes, summary, points)
         if own is not None:
@@ -275,8 +277,11 @@ def draw_optimum_curve(
     table: pd.DataFrame,
     colour: str,
     label: str | None,
+    exact: pd.Series | None = None,
 ) -> None:
-    """One damper: two curves, its best load as a star with its numbers."""
+    """One damper: two curves, its best load as a star with its numbers, the exact one where that
+    was searched.
+    """
     finite = table[(table["load"] > 0) & np.isfinite(table["load"])].sort_values("load")
     amplitude = MICRO * finite["peak_amplitude"]
     axes[0].plot(finite["load"], amplitude, "o-", color=colour, label=label)
@@ -299,12 +304,14 @@ def draw_optimum_curve(
             label="curve with unconverged points",
         )
     draw_unknown(axes[0], finite)
-    best = finite.loc[finite["peak_amplitude"].idxmin()]
+    best = finite.loc[finite["peak_amplitude"].idxmin()] if exact is None else exact
+    if exact is not None:
+        _draw_tolerated_loads(axes, exact, colour)
     text = f"optimum {best['load']:.4g} N: {MICRO * best['peak_amplitude']:.4g} µm"
     free = table.loc[table["load"] == 0, "peak_amplitude"]
     if len(free):
         text += f"\n{100 * (1 - best['peak_amplitude'] / free.iloc[0]):.1f} % below the free blade"
-    elif "reduction" in best:
+    elif exact is None and "reduction" in best:
         text += f"\n{best['reduction']:.3g} times smaller than the free blade's"
     for axis, y in zip(axes, (MICRO * best["peak_amplitude"], best["peak_frequency"]), strict=True):
         axis.plot(best["load"], y, "*", color=colour, ms=14, mec="black", mew=0.7, zorder=5)
@@ -318,6 +325,30 @@ def draw_optimum_curve(
         fontsize=8.5,
         va="top",
     )
+
+
+def _exact_optimum(searched: pd.DataFrame | None, mass: float | None) -> pd.Series | None:
+    """The best load of a damper mass as a row with the names of the summary; None where no search
+    succeeded.
+    """
+    if searched is None or searched.empty:
+        return None
+    found = searched[searched["amplitude"].notna()]
+    if mass is not None and "mass" in found:
+        found = found[np.isclose(found["mass"], mass)]
+    if found.empty:
+        return None
+    return found.iloc[0].rename({"amplitude": "peak_amplitude", "frequency": "peak_frequency"})
+
+
+def _draw_tolerated_loads(axes: Any, exact: pd.Series, colour: str) -> None:
+    """The band of loads whose amplitudes keep within the accuracy of the optimum."""
+    low, high = exact.get("tolerated_from", np.nan), exact.get("tolerated_to", np.nan)
+    if not (np.isfinite(low) and np.isfinite(high)):
+        return
+    label = f"{low:.3g} to {high:.3g} N: within accuracy of the optimum"
+    for axis, words in zip(axes, (label, None), strict=True):
+        axis.axvspan(low, high, color=colour, alpha=0.12, lw=0, label=words, zorder=0)
 
 
 def _draw_history_range(ax: Axes, finite: pd.DataFrame, colour: str) -> None:

@@ -34,6 +34,7 @@ def fake_curve(load, amplitude):
         peak=peak,
         settings=SimpleNamespace(error=0.013, harmonics=3),
         halved=np.nan,
+        body_mesh=np.nan,
         error=0.013,
         interval=None,
         peak_frequency=830.0,

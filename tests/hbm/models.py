@@ -85,3 +85,15 @@ def folding_pair():
     body = port_model_from_matrices(FOLDING["M"], FOLDING["K"], ports, C=FOLDING["C"])
     element = Elements(*(np.array([x]) for x in FOLDING["element"]), tangents=1)
     return ReducedModel((body,), element, {1: FOLDING["force"]})
+
+
+def rebounding(stiffness, gap, loss):
+    """A unit mass on a unit spring that meets a one-sided elastic stop; the second degree of
+    freedom carries the friction element, which has none.
+    """
+    ports = {"contact": [0, 1], "load": [0], "probe": [0]}
+    K = np.diag([1.0, 50.0])
+    body = port_model_from_matrices(np.eye(2), K, ports, C=loss * np.diag([1.0, 7.0]))
+    parts = (1e-3, stiffness, 0.0, -gap * stiffness)
+    element = Elements(*(np.array([x]) for x in parts), tangents=1)
+    return ReducedModel((body,), element, {1: np.array([1.0])})

@@ -21,7 +21,7 @@ from bladefem.hbm.solve import leading_stuck_solutions, solve
 from bladefem.hbm.solver.deflation import no_level, second_level
 from bladefem.hbm.solver.krylov import conjugate_residuals
 from bladefem.hbm.solver.newton import Options
-from bladefem.hbm.solver.newton_compiled import _dense_jacobian
+from bladefem.hbm.solver.newton_compiled import dense_jacobian
 from bladefem.hbm.sweep import response
 
 
@@ -36,7 +36,7 @@ def system(strength, nodes=6, d=2, H=4):
 
 def test_the_jacobian_is_what_the_product_applies():
     A, C = system(1.0)
-    J, K, size = _dense_jacobian(A, C), 2 * len(A) - 1, C.shape[1]
+    J, K, size = dense_jacobian(A, C), 2 * len(A) - 1, C.shape[1]
     x = np.random.default_rng(4).normal(size=len(J))
     forces = np.concatenate([block @ x[i * size : (i + 1) * size] for i, block in enumerate(C)])
     out = x.reshape(-1, K).copy()
@@ -47,7 +47,7 @@ def test_the_jacobian_is_what_the_product_applies():
 @pytest.mark.parametrize("accuracy", [1e-2, 1e-6])
 def test_conjugate_residuals_reach_the_accuracy_or_say_no(accuracy):
     A, C = system(1.0)
-    J = _dense_jacobian(A, C)
+    J = dense_jacobian(A, C)
     r, x = np.random.default_rng(5).normal(size=len(J)), np.empty(len(J))
     assert conjugate_residuals(by_harmonic(A), C, r, accuracy, no_level(), x)
     assert np.linalg.norm(J @ x - r) <= 1.01 * accuracy * np.linalg.norm(r)
@@ -92,7 +92,7 @@ def test_a_second_level_needs_fewer_directions_for_the_same_step():
     """
     flex, (_, C) = by_modes(), system(3.0)
     Q, _ = np.linalg.qr(flex[3])
-    J, x = _dense_jacobian(form_matrices(flex), C), np.empty(C.shape[0] * C.shape[1])
+    J, x = dense_jacobian(form_matrices(flex), C), np.empty(C.shape[0] * C.shape[1])
     r = np.random.default_rng(9).normal(size=len(x))
     level = second_level(flex, C, Q, np.arange(6), 2)
     Z = np.kron(Q, np.eye(9))

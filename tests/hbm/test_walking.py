@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from bladefem.data import Elements, RigidBody
-from bladefem.hbm.linear import condensation
+from bladefem.hbm.linear import mean_motion
 from bladefem.hbm.model import Damping, ReducedModel
 from bladefem.hbm.node_gradients import node_gradients
 from bladefem.hbm.parameters import vary
@@ -112,7 +112,7 @@ def test_the_spring_that_chooses_the_mean_position_has_no_influence(limits, monk
     """
     heights = []
     for share in (1e-9, 1e-8, 1e-7, 1e-6, 1e-5):
-        monkeypatch.setattr(condensation, "REGULARISATION", share)
+        monkeypatch.setattr(mean_motion, "REGULARISATION", share)
         model = walking_model()
         model = replace(model, elements=replace(model.elements, mu=np.array(limits)))
         point = solve(model, OMEGA, 7, 256)

@@ -2,9 +2,9 @@
 
 import numpy as np
 import pytest
+from plain_linear import plain_condense
 
 from bladefem.data import Elements, PortModel, RigidBody
-from bladefem.hbm.linear import condensation as linear_module
 from bladefem.hbm.linear.condensation import condense
 from bladefem.hbm.model import Damping, ReducedModel
 
@@ -39,7 +39,7 @@ def elastic_damper(rng):
 
 @pytest.mark.parametrize("kind", ["ground", "rigid", "elastic"])
 @pytest.mark.parametrize("sides", [1, 4])
-def test_update_is_the_solution_of_the_whole_system(kind, sides, monkeypatch):
+def test_update_is_the_solution_of_the_whole_system(kind, sides):
     rng = np.random.default_rng(3)
     bodies = tuple(port_model(rng, 1.0 + 0.1 * h) for h in range(sides))
     springs = rng.uniform(1.0, 20.0, NODES) * (np.arange(NODES) % 5 > 0)  # some nodes are open
@@ -59,9 +59,8 @@ def test_update_is_the_solution_of_the_whole_system(kind, sides, monkeypatch):
     )
     for omega in (0.9, 1.0, 3.3):
         quick = condense(model, omega, 3)
-        monkeypatch.setattr(linear_module, "low_rank", lambda *_: None)
-        whole = condense(model, omega, 3)
-        monkeypatch.undo()
+        assert len(quick.bodies.A) > 0
+        whole = plain_condense(model, omega, 3)
         system = whole.G[1] * whole.springs + np.eye(
             len(whole.springs)
         )  # 1.0 meets a mode: 6e5, else 1e4

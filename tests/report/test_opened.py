@@ -202,6 +202,7 @@ def test_a_run_in_memory_is_short_too():
         strength=None,
         settings=None,
         reduced=None,
+        mode_errors=None,
         response=Response(None, [best], ()),
         damped={},
     )

@@ -22,6 +22,7 @@ def curve(load, amplitude):
         peak_amplitude=amplitude,
         settings=SimpleNamespace(error=0.01, harmonics=3),
         halved=np.nan,
+        body_mesh=np.nan,
         error=0.01,
         interval=None,
         frequency=np.arange(4.0),

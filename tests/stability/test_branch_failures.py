@@ -7,7 +7,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from models import wedge_between_masses
+from models import rebounding, wedge_between_masses
 from plain import marched_wedge
 
 from bladefem.data import Elements, RigidBody
@@ -21,18 +21,6 @@ from bladefem.hbm.sweep import size
 from bladefem.reduction.matrices import port_model_from_matrices
 
 STEPS = 2000
-
-
-def rebounding(stiffness, gap, loss):
-    """A unit mass on a unit spring that meets a one-sided elastic stop; the second degree of
-    freedom carries the friction element, which has none.
-    """
-    ports = {"contact": [0, 1], "load": [0], "probe": [0]}
-    K = np.diag([1.0, 50.0])
-    body = port_model_from_matrices(np.eye(2), K, ports, C=loss * np.diag([1.0, 7.0]))
-    parts = (1e-3, stiffness, 0.0, -gap * stiffness)
-    element = Elements(*(np.array([x]) for x in parts), tangents=1)
-    return ReducedModel((body,), element, {1: np.array([1.0])})
 
 
 def bounced(stiffness, gap, loss, omega, q, v, periods):

@@ -3,6 +3,7 @@ geometry.
 """
 
 import numpy as np
+import pandas as pd
 import pytest
 import synthetic
 from matplotlib.image import imread
@@ -224,6 +225,18 @@ def test_response_charts(folder):
     figure = draw_optimum(synthetic.summary(), folder / "optimum.png")
     text = " ".join(t.get_text() for t in figure.axes[0].get_legend().get_texts())
     assert "optimum 200 N" in text and "92.6 % below" in text
+    searched = pd.DataFrame(
+        {
+            "load": [170.0],
+            "frequency": [842.0],
+            "amplitude": [40e-6],
+            "tolerated_from": [140.0],
+            "tolerated_to": [210.0],
+        }
+    )
+    figure = draw_optimum(synthetic.summary(), folder / "exact.png", searched=searched)
+    text = " ".join(t.get_text() for t in figure.axes[0].get_legend().get_texts())
+    assert "optimum 170 N: 40 µm" in text and "140 to 210 N: within accuracy of the optimum" in text
     draw_accuracy(synthetic.accuracy(), folder / "accuracy.png", tolerance=0.02)
     draw_loops(synthetic.loops(), folder / "loops.png")
     draw_seat_loops({f"{n} N": synthetic.loops() for n in range(5)}, folder / "seats.png")

@@ -20,6 +20,8 @@ from numba import njit, types
 from numba.core import cgutils
 from numba.extending import intrinsic
 
+from bladefem.util.numba_options import KERNEL
+
 # bytes of a block; numbers of 8 bytes in it
 BLOCK = 64
 LANES = 8
@@ -315,7 +317,7 @@ class _Loop:
         self.context.__exit__(*error)
 
 
-@njit(cache=True, error_model="numpy")
+@njit(**KERNEL)
 def zeros(size, dtype):
     """Zeros (size,) that begin where a block does in memory, so that no load of a block crosses a
     line of the cache.

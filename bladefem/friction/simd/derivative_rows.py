@@ -33,6 +33,7 @@ from bladefem.friction.simd.row_kernels import (
 from bladefem.friction.simd.time_kernels import TURNS, find_turns
 from bladefem.friction.states import CLOSING, SLIP, STICK
 from bladefem.friction.trigonometric_tables import Patterns, empty_gram, gram_matrix
+from bladefem.util.numba_options import INNER_KERNEL
 
 FAST = {"contract", "reassoc", "nsz"}
 # samples after which a row is looked at for faint numbers
@@ -76,7 +77,7 @@ class Rows(NamedTuple):
     patterns: Patterns
 
 
-@njit(cache=True, error_model="numpy")
+@njit(**INNER_KERNEL)
 def empty_rows(tab, patterns):
     """Scratch for one node."""
     (S, W), tile, width, dtype = (
@@ -105,7 +106,7 @@ def empty_rows(tab, patterns):
     )
 
 
-@njit(_nrt=False, cache=True, error_model="numpy", forceinline=True)
+@njit(_nrt=False, **INNER_KERNEL, forceinline=True)
 def _angle_row(i, by, el, scratch, row):
     """Row (M,) of the angle of a slipping force, from by (6,): by force (2), increment (2), N_i and
     N_j.
@@ -126,7 +127,7 @@ def _angle_row(i, by, el, scratch, row):
     )
 
 
-@njit(_nrt=False, cache=True, error_model="numpy", forceinline=True)
+@njit(_nrt=False, **INNER_KERNEL, forceinline=True)
 def _closing_rows(i, dx, dy, N0, N1, part, el, tab, out):
     """Rows out (2, M) of f = part d, part = N / (N1 - N0), of an element that closes in edge i and
     sticks.
@@ -141,7 +142,7 @@ def _closing_rows(i, dx, dy, N0, N1, part, el, tab, out):
         out[0, W + l] = out[1, 2 * W + l] = el.kt * part * (tab.knots[j, l] - tab.knots[i, l])
 
 
-@njit(_nrt=False, cache=True, error_model="numpy", forceinline=True)
+@njit(_nrt=False, **INNER_KERNEL, forceinline=True)
 def to_carry(C, j, kt, tab):
     """C (2, M) from D to D - kt V at knot j."""
     W = tab.W
@@ -150,7 +151,7 @@ def to_carry(C, j, kt, tab):
         C[1, 2 * W + l] -= kt * tab.knots[j, l]
 
 
-@njit(_nrt=False, cache=True, error_model="numpy", forceinline=True)
+@njit(_nrt=False, **INNER_KERNEL, forceinline=True)
 def _add_stick(a, b, tab, scratch):
     """Add samples a <= i < b, which stick with the carried rows C."""
     stick = scratch.stick
@@ -164,7 +165,7 @@ def _add_stick(a, b, tab, scratch):
     add_products(share, share.size, scratch.C, J.shape[2], J, J.shape[1])
 
 
-@njit(_nrt=False, cache=True, error_model="numpy", forceinline=True)
+@njit(_nrt=False, **INNER_KERNEL, forceinline=True)
 def _slide_row(a, b, scratch):
     """Turn the row of the angle along the edges a <= i < b."""
     row = scratch.row
@@ -179,7 +180,7 @@ def _slide_row(a, b, scratch):
         a = stop
 
 
-@njit(_nrt=False, cache=True, error_model="numpy", forceinline=True)
+@njit(_nrt=False, **INNER_KERNEL, forceinline=True)
 def _add_mixed(i, mid, fx, fy, path, el, tab, scratch, slips, trace):
     """Add sample i of an edge that changes state and slips there or closes, from the force (fx, fy)
     at its begin.
@@ -206,7 +207,7 @@ def _add_mixed(i, mid, fx, fy, path, el, tab, scratch, slips, trace):
                     scratch.J[e, k, l] += tab.analysis[i, k] * rows[e, l]
 
 
-@njit(_nrt=False, cache=True, error_model="numpy", forceinline=True)
+@njit(_nrt=False, **INNER_KERNEL, forceinline=True)
 def _after_mixed(i, end, by, path, el, tab, scratch):
     """Bring C (2, M), and in slip the row of the angle, from knot i over an edge that changes
     state.
@@ -225,7 +226,7 @@ def _after_mixed(i, end, by, path, el, tab, scratch):
         to_carry(C, i + 1 if i + 1 < tab.at.shape[0] else 0, el.kt, tab)
 
 
-@njit(_nrt=False, cache=True, error_model="numpy", forceinline=True)
+@njit(_nrt=False, **INNER_KERNEL, forceinline=True)
 def _leave_slip(fx, fy, i, N, kt, kn, scratch):
     """D - kt V goes to C (2, M), from the row of the angle, at knot i under the force (fx, fy)."""
     C = scratch.C
@@ -236,7 +237,7 @@ def _leave_slip(fx, fy, i, N, kt, kn, scratch):
         combine_rows(across, row, 0.0, row, parts, i, i, knots, knots.shape[1], C[e])
 
 
-@njit(_nrt=False, cache=True, error_model="numpy", forceinline=True)
+@njit(_nrt=False, cache=True, error_model="numpy", inline="always")
 def _find_turns(path, pieces, el, trail, scratch, trace):
     """How the row of the angle turns along all edges that slide; their forces and factors."""
     scratch.g[:] = 0.0
@@ -261,7 +262,7 @@ def _find_turns(path, pieces, el, trail, scratch, trace):
             )
 
 
-@njit(_nrt=False, cache=True, error_model="numpy")
+@njit(_nrt=False, **INNER_KERNEL)
 def add_period(path, fx, fy, pieces, el, tab, trail, scratch, trace, summing):
     """Carry the derivative C (2, M) through the period of the trail, which ends with the force (fx,
     fy).
@@ -318,7 +319,7 @@ def add_period(path, fx, fy, pieces, el, tab, trail, scratch, trace, summing):
         _add_slip(trail.slips, tab, scratch)
 
 
-@njit(_nrt=False, cache=True, error_model="numpy", forceinline=True)
+@njit(_nrt=False, cache=True, error_model="numpy", inline="always")
 def _add_slip(slips, tab, scratch):
     """Add the samples that slip, fours without one left out."""
     count = 0
@@ -340,7 +341,7 @@ def _add_slip(slips, tab, scratch):
     )
 
 
-@njit(_nrt=False, cache=True, error_model="numpy", forceinline=True)
+@njit(_nrt=False, **INNER_KERNEL, forceinline=True)
 def unit_rows(kt, tab, C):
     """Carried rows C (2, M) of a force at the first knot that is given."""
     K = tab.at.shape[1]
@@ -350,7 +351,7 @@ def unit_rows(kt, tab, C):
     to_carry(C, 0, kt, tab)
 
 
-@njit(_nrt=False, cache=True, error_model="numpy")
+@njit(_nrt=False, **INNER_KERNEL)
 def start_rows(vx, vy, N, el, tab, C):
     """Carried rows C (2, M) of the force at the first knot: kt w = (vx, vy) drawn back onto the
     circle mu N.
@@ -376,7 +377,7 @@ def start_rows(vx, vy, N, el, tab, C):
     to_carry(C, 0, el.kt, tab)
 
 
-@njit(_nrt=False, cache=True, error_model="numpy", fastmath=FAST, forceinline=True)
+@njit(_nrt=False, **INNER_KERNEL, fastmath=FAST, forceinline=True)
 def close_period(rx, ry, kt, tab, scratch, F, J):
     """J (2, K, 3K) and what F (3, K) lacks, from the sums, the rows C (2, M) at the end and its
     misfit (rx, ry).

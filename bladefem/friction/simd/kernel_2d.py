@@ -26,6 +26,7 @@ from bladefem.friction.simd.periodic_state import (
 )
 from bladefem.friction.simd.time_kernels import find_edges
 from bladefem.friction.trigonometric_tables import Node, empty_gram, gram_matrix
+from bladefem.util.numba_options import INNER_KERNEL, KERNEL
 
 # nodes whose motion and harmonics are one matrix product
 NODES_AT_ONCE = 8
@@ -36,7 +37,7 @@ STEP_TOLERANCE = 1e-11
 STEP_TOLERANCE_SINGLE = 1e-8
 
 
-@njit(cache=True, error_model="numpy")
+@njit(**INNER_KERNEL)
 def _paths_at_knots(w, ramp, load, nodes, tab, path):
     """path (n, 3, width) = (kt w_1, kt w_2, N) at the knots [N], with the ramps (n, 2) added, by
     which the motion goes on in each period [m].
@@ -67,7 +68,7 @@ def _paths_at_knots(w, ramp, load, nodes, tab, path):
                 path[e, 2, i] += 0.5 * (load[e, i % S] + load[e, i % S - 1])
 
 
-@njit(_nrt=False, cache=True, error_model="numpy")
+@njit(_nrt=False, **INNER_KERNEL)
 def _load_at_sample(N, load, i):
     """Normal load at sample i from those at the knots N (width,) [N], where prescribed not the mean
     over both knots.
@@ -78,7 +79,7 @@ def _load_at_sample(N, load, i):
     return 0.5 * (N[i] + N[i + 1]) + 0.25 * (2.0 * load[i] - load[i - 1] - after)
 
 
-@njit(_nrt=False, cache=True, error_model="numpy")
+@njit(_nrt=False, **INNER_KERNEL)
 def _contact_means(N, load, tab, mean):
     """Basis means (4H+1,) of the samples in contact."""
     S = tab.at.shape[0]
@@ -95,7 +96,7 @@ def _contact_means(N, load, tab, mean):
         a = b
 
 
-@njit(_nrt=False, cache=True, error_model="numpy")
+@njit(_nrt=False, **INNER_KERNEL)
 def _normal_force(w, load, el, N, least, tab, spare, F, J):
     """Normal force F (K,) and its Jacobian J[0], J (3, K, 3K) or (0, 0, 0); returns the share in
     contact.
@@ -131,7 +132,7 @@ def _normal_force(w, load, el, N, least, tab, spare, F, J):
     return mean[0]
 
 
-@njit(_nrt=False, cache=True, error_model="numpy", fastmath=True)
+@njit(_nrt=False, **INNER_KERNEL, fastmath=True)
 def _value_range(x):
     """Least and largest of x."""
     least = x[0]
@@ -142,7 +143,7 @@ def _value_range(x):
     return least, largest
 
 
-@njit(_nrt=False, cache=True, error_model="numpy")
+@njit(_nrt=False, **INNER_KERNEL)
 def _within_limit(path, mu):
     """Whether kt w stays within the limit at all knots; if the load lasts all the time, then f = kt
     w.
@@ -154,7 +155,7 @@ def _within_limit(path, mu):
     return beyond == 0
 
 
-@njit(_nrt=False, cache=True, error_model="numpy", forceinline=True)
+@njit(_nrt=False, cache=True, error_model="numpy", inline="always")
 def _node_forces(
     w, walks, load, el, path, tab, near, limit, trail, phi, spare, trace, F, J, shares
 ):
@@ -180,7 +181,7 @@ def _node_forces(
     return found
 
 
-@njit(_nrt=False, cache=True, error_model="numpy", forceinline=True)
+@njit(_nrt=False, **INNER_KERNEL, forceinline=True)
 def _stuck_forces(w, kt, F, J):
     """Tangential forces of springs kt."""
     K, J[1:] = F.shape[1], 0.0
@@ -191,7 +192,7 @@ def _stuck_forces(w, kt, F, J):
                 J[c, k, c * K + k] = kt
 
 
-@njit(_nrt=False, cache=True, error_model="numpy")
+@njit(_nrt=False, cache=True, error_model="numpy", inline="always")
 def _derivative_rows(path, walks, found, el, tab, trail, scratch, trace, phi, F, J):
     """Rows J (2, K, 3K) of the tangential forces in the state that was found.
 
@@ -215,7 +216,7 @@ def _derivative_rows(path, walks, found, el, tab, trail, scratch, trace, phi, F,
     close_period(gx - fx, gy - fy, el.kt, tab, scratch, F, J)
 
 
-@njit(_nrt=False, cache=True, error_model="numpy")
+@njit(_nrt=False, **INNER_KERNEL)
 def _some_nodes(
     w,
     ramp,
@@ -267,7 +268,7 @@ def _some_nodes(
     return moving
 
 
-@njit(cache=True, error_model="numpy")
+@njit(**INNER_KERNEL)
 def _add_harmonics(trace, tab, F):
     """Add the harmonics of trace (n, 2, width) to F (n, 3, K)."""
     n = F.shape[0]
@@ -279,7 +280,7 @@ def _add_harmonics(trace, tab, F):
             F[e, 2, k] += forces[2 * e + 1, k]
 
 
-@njit(cache=True, error_model="numpy")
+@njit(**KERNEL)
 def disc_batch(w, ramp, load, nodes, tab, patterns, limit, F, J, shares, cycles):
     """Forces F (n, 3, K), Jacobian J (n, 3, K, 3K), shares (n, 3) of stick, slip and separation,
     cycles (n,).

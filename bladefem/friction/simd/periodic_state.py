@@ -39,6 +39,7 @@ from bladefem.friction.simd.time_kernels import (
     stuck_until,
 )
 from bladefem.friction.states import SLIP, STICK
+from bladefem.util.numba_options import INNER_KERNEL
 
 # of the largest friction limit: how well the force must repeat itself in marching
 TOLERANCE = 1e-12
@@ -80,7 +81,7 @@ class Trail(NamedTuple):
     changes: np.ndarray
 
 
-@njit(cache=True, error_model="numpy")
+@njit(**INNER_KERNEL)
 def empty_trail(S, width):
     """Scratch for one node."""
     form = zeros(EDGE_ROWS * width, np.float64)
@@ -102,7 +103,7 @@ def half_angle(x, y):
     return (1.0 + x, y) if x >= 0.0 else (y, 1.0 - x)
 
 
-@njit(_nrt=False, cache=True, error_model="numpy")
+@njit(_nrt=False, **INNER_KERNEL)
 def start_force(vx, vy, N, mu):
     """Force at the first knot: k_t w, drawn back onto the circle."""
     R = mu * max(N, 0.0)
@@ -123,7 +124,7 @@ def _begin_piece(trail, pieces, kind, i, fx, fy):
     return pieces + 1
 
 
-@njit(_nrt=False, cache=True, error_model="numpy", forceinline=True)
+@njit(_nrt=False, **INNER_KERNEL, forceinline=True)
 def _changing_edge(path, i, mu, fx, fy, phi, change):
     """One edge on which the state may change: (state at its end, force there, sample slips, it is
     more than a touch).
@@ -175,7 +176,7 @@ def _moved_half_angle(P, Q, form, i):
     return form[AHEAD, i] * P + form[ACROSS, i] * Q, form[ACROSS, i] * P + form[AWAY, i] * Q
 
 
-@njit(_nrt=False, cache=True, error_model="numpy", forceinline=True, fastmath={"contract", "nsz"})
+@njit(_nrt=False, **INNER_KERNEL, forceinline=True, fastmath={"contract", "nsz"})
 def _follow_slip(first, S, P, Q, form, knots):
     """Follow slip from a knot to where it ends: (knot, P, Q) there; by two edges at once, as a
     product is slow.
@@ -207,7 +208,7 @@ def _follow_slip(first, S, P, Q, form, knots):
     return S, P, Q
 
 
-@njit(_nrt=False, cache=True, error_model="numpy", forceinline=True, fastmath={"reassoc"})
+@njit(_nrt=False, **INNER_KERNEL, forceinline=True, fastmath={"reassoc"})
 def _determinant_product(a, b, form, slips):
     """Note that the edges a <= i < b slide: the product of the determinants of their maps."""
     fall = 1.0
@@ -219,7 +220,7 @@ def _determinant_product(a, b, form, slips):
     return fall
 
 
-@njit(_nrt=False, cache=True, error_model="numpy")
+@njit(_nrt=False, **INNER_KERNEL)
 def follow_period(path, mu, fx, fy, trail, phi):
     """One period from (fx, fy) at the first knot: (fx, fy, edges that slip or open, that surely
     slip, samples, pieces).
@@ -282,7 +283,7 @@ def follow_period(path, mu, fx, fy, trail, phi):
     return fx, fy, events, sure, slips, pieces
 
 
-@njit(_nrt=False, cache=True, error_model="numpy", forceinline=True, fastmath={"contract", "nsz"})
+@njit(_nrt=False, **INNER_KERNEL, forceinline=True, fastmath={"contract", "nsz"})
 def stuck_forces(a, b, fx, fy, path, trace):
     """Forces trace (2, width) at the samples a <= i < b, which stick from the force (fx, fy) at
     knot a on.
@@ -295,7 +296,7 @@ def stuck_forces(a, b, fx, fy, path, trace):
             out[i] = first + 0.5 * (v[i] + v[i + 1])
 
 
-@njit(_nrt=False, cache=True, error_model="numpy", forceinline=True)
+@njit(_nrt=False, **INNER_KERNEL, forceinline=True)
 def middle_force(i, mid, fx, fy, path, mu, trace):
     """Force trace (2, width) at sample i of an edge from (fx, fy) on that changes state; by as
     middle has it.
@@ -308,7 +309,7 @@ def middle_force(i, mid, fx, fy, path, mu, trace):
     return by
 
 
-@njit(_nrt=False, cache=True, error_model="numpy")
+@njit(_nrt=False, **INNER_KERNEL)
 def forces_along(path, mu, pieces, trail, trace):
     """Forces trace (2, width) at all samples of a period [N], zero on entry."""
     for piece in range(pieces):
@@ -323,7 +324,7 @@ def forces_along(path, mu, pieces, trail, trace):
     find_forces(path, trail.form, trail.knots, trail.slips, path.shape[1], mu, trace)
 
 
-@njit(_nrt=False, cache=True, error_model="numpy")
+@njit(_nrt=False, **INNER_KERNEL)
 def newton_step(fx, fy, gx, gy, R, phi):
     """det(I - Phi) and the fixed point of the linearised period map f -> g, in the circle of radius
     R.
@@ -346,13 +347,13 @@ def newton_step(fx, fy, gx, gy, R, phi):
     return det, x, y
 
 
-@njit(_nrt=False, cache=True, error_model="numpy")
+@njit(_nrt=False, **INNER_KERNEL)
 def _has_memory(phi):
     """True if the period map has memory."""
     return phi[0, 0] != 0.0 or phi[0, 1] != 0.0 or phi[1, 0] != 0.0 or phi[1, 1] != 0.0
 
 
-@njit(_nrt=False, cache=True, error_model="numpy", forceinline=True)
+@njit(_nrt=False, **INNER_KERNEL, forceinline=True)
 def _first_force(path, walks, mu):
     """Force at the first knot from which the march begins: k_t w, drawn back onto the circle.
 
@@ -368,7 +369,7 @@ def _first_force(path, walks, mu):
     return R * x / length, R * y / length
 
 
-@njit(_nrt=False, cache=True, error_model="numpy", forceinline=True)
+@njit(_nrt=False, **INNER_KERNEL, forceinline=True)
 def _iterate_newton(path, walks, mu, largest, near, limit, trail, phi):
     """Periodic force by Newton from `_first_force`, returned as by periodic.
 
@@ -405,7 +406,7 @@ def _iterate_newton(path, walks, mu, largest, near, limit, trail, phi):
     return True, fx, fy, gx, gy, slips, pieces, -limit
 
 
-@njit(_nrt=False, cache=True, error_model="numpy")
+@njit(_nrt=False, **INNER_KERNEL)
 def _state_hash(trail, pieces):
     """A number by which to tell the states of one period from those of another."""
     order = pieces
@@ -416,7 +417,7 @@ def _state_hash(trail, pieces):
     return order
 
 
-@njit(_nrt=False, cache=True, error_model="numpy")
+@njit(_nrt=False, **INNER_KERNEL)
 def _march_with_leaps(path, walks, mu, largest, leap, limit, trail, phi):
     """Periodic force by marching from `_first_force`, with leaps (their share of the way left)
     where it is slow.
@@ -475,7 +476,7 @@ def _march_with_leaps(path, walks, mu, largest, leap, limit, trail, phi):
     return True, fx, fy, gx, gy, slips, pieces, -limit
 
 
-@njit(_nrt=False, cache=True, error_model="numpy", forceinline=True)
+@njit(_nrt=False, **INNER_KERNEL, forceinline=True)
 def periodic_force(path, walks, mu, largest, near, limit, trail, phi):
     """Periodic force: (unique, fx, fy, gx, gy, slips, pieces, cycles), cycles negative if none was
     found in ``limit``.

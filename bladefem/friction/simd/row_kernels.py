@@ -9,8 +9,9 @@ from __future__ import annotations
 
 from numba import njit
 
-from bladefem.friction.simd.codegen import BLOCK, LANES, Code, kernel
+from bladefem.friction.simd.codegen import BLOCK, LANES, Code, Lanes, kernel
 from bladefem.friction.simd.time_kernels import TURNS
+from bladefem.util.numba_options import INNER_KERNEL
 
 # harmonics summed at once
 TILE = 8
@@ -110,7 +111,7 @@ _turn_blocks = _turn_rows(False)
 _turn_halves = _turn_rows(True)
 
 
-@njit(cache=True, error_model="numpy")
+@njit(**INNER_KERNEL)
 def turn_rows(turns, at, change, begin, end, row, rows):
     """Turn the row (M,) of the angle along the edges begin <= i < end; rows (.., M) in their
     middles, without b.
@@ -197,6 +198,22 @@ def join_rows(
     write(1, code.place(K, -1), True)
 
 
+def _folded_sums(r: list[Lanes]) -> dict[tuple[int, bool], Lanes]:
+    """Sums of the rows at samples i, S/2 - i, S/2 + i, S - i, with the signs of cos and sin (True)
+    of even (0) and odd (1) harmonics there.
+    """
+    even = r[0] + r[3]
+    odd = r[0] - r[3]
+    even_back = r[2] + r[1]
+    odd_back = r[2] - r[1]
+    return {
+        (0, False): even + even_back,
+        (1, False): even - even_back,
+        (0, True): odd + odd_back,
+        (1, True): odd - odd_back,
+    }
+
+
 def _add_folded(
     harmonics: int,
     narrow: bool,
@@ -243,16 +260,7 @@ def _add_folded(
             if load:
                 loads = [code.spread(code.one(normal, i)) * code.load(at, (i, W), l) for i in four]
                 r = [x + y for x, y in zip(r, loads, strict=True)]
-            even = r[0] + r[3]
-            odd = r[0] - r[3]
-            even_back = r[2] + r[1]
-            odd_back = r[2] - r[1]
-            folded = {
-                (0, False): even + even_back,
-                (1, False): even - even_back,
-                (0, True): odd + odd_back,
-                (1, True): odd - odd_back,
-            }
+            folded = _folded_sums(r)
             for q, (h, sine) in enumerate(kinds):
                 weight = code.spread(code.one(weights, (place, tile), k, q))
                 code.set(sums[q], code.get(sums[q]) + weight * folded[h % 2, sine])
@@ -272,7 +280,7 @@ _KINDS = (2, True), (4, True), (6, False), (8, False), (8, True), (8, True, Fals
 )
 
 
-@njit(cache=True, error_model="numpy")
+@njit(**INNER_KERNEL)
 def add_folded(rows, g, normal, at, fours, chosen, count, weights, out):
     """Add sum_i weights[i, k] (g[e, i] rows[i] + normal[e, i] at[i]) to out (2, tiled, M), at in
     the first W columns.
@@ -319,7 +327,7 @@ def add_folded(rows, g, normal, at, fours, chosen, count, weights, out):
                 )
 
 
-@njit(cache=True, error_model="numpy")
+@njit(**INNER_KERNEL)
 def _add_load(rows, columns, l, g, fours, chosen, count, weights, tile, out, normal, at, W):
     """A block of columns to which the normal load matters."""
     if tile == 3:
@@ -340,7 +348,7 @@ def _add_load(rows, columns, l, g, fours, chosen, count, weights, tile, out, nor
         )
 
 
-@njit(cache=True, error_model="numpy")
+@njit(**INNER_KERNEL)
 def _add_motion(rows, columns, l, g, fours, chosen, count, weights, tile, out, normal, at, W):
     """A block of columns of a tangent."""
     if tile == 3:

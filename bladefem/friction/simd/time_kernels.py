@@ -7,7 +7,7 @@ eight and eight more.
 
 from __future__ import annotations
 
-from bladefem.friction.simd.codegen import LANES, Code, kernel
+from bladefem.friction.simd.codegen import LANES, Code, Lanes, kernel
 
 (
     DIRECTION_X,
@@ -37,6 +37,26 @@ SHORTEST_EDGE = 1e-12
 SMALLEST_LIMIT = 1e-60
 
 
+def _edge_decay(dx: Lanes, dy: Lanes, limit: Lanes) -> tuple[Lanes, ...]:
+    """1/length and 1/limit of edges (dx, dy), decay over half of them, x dln(decay)/dx."""
+    twice = 2.0 * limit
+    square = dx * dx + dy * dy
+    least = SHORTEST_EDGE * limit
+    square = square.above(least * least, square, least * least)
+    # root = 2 limit sqrt(1 + x^2/4)
+    length = square.sqrt()
+    root = (square + twice * twice).sqrt()
+    both = length * limit
+    roots = root * (root + length)
+    # one division for four
+    product = 1.0 / (both * roots)
+    by_both = roots * product
+    by_roots = both * product
+    half = twice * root * by_roots
+    slope = -1.0 * length * (root + length) * by_roots
+    return limit * by_both, length * by_both, half, slope
+
+
 @kernel
 def find_edges(
     code: Code,
@@ -60,25 +80,9 @@ def find_edges(
         )
         limit = mu * (code.load(path, (2, width), i) + 0.5 * dN)
         limit = limit.above(SMALLEST_LIMIT, limit, limit * 0.0 + SMALLEST_LIMIT)
-        twice = 2.0 * limit
-        square = dx * dx + dy * dy
-        least = SHORTEST_EDGE * limit
-        square = square.above(least * least, square, least * least)
-        # root = 2 limit sqrt(1 + x^2/4)
-        length = square.sqrt()
-        root = (square + twice * twice).sqrt()
-        both = length * limit
-        roots = root * (root + length)
-        # one division for four
-        product = 1.0 / (both * roots)
-        by_both = roots * product
-        by_roots = both * product
-        inverse = limit * by_both
-        inverse_limit = length * by_both
+        inverse, inverse_limit, half, slope = _edge_decay(dx, dy, limit)
         ux = dx * inverse
         uy = dy * inverse
-        slope = -1.0 * length * (root + length) * by_roots
-        half = twice * root * by_roots
         fall = half * half
         a = 0.5 + 0.5 * fall
         b = 0.5 - 0.5 * fall
@@ -103,6 +107,11 @@ def find_edges(
             )
         ):
             code.store(values, out, (row, width), i)
+    _write_pairs(code, width, out)
+
+
+def _write_pairs(code: Code, width, out) -> None:
+    """The maps of each edge and the next, from those of single edges."""
     with code.loop(0, code.place(width, -LANES), LANES) as i:
         a, b, d = (code.load(out, (row, width), i) for row in (AHEAD, ACROSS, AWAY))
         A, B, D = (code.load(out, (row, width), i, 1) for row in (AHEAD, ACROSS, AWAY))
@@ -145,6 +154,35 @@ def stuck_until(
     return code.search(begin, end, beyond)
 
 
+def _turned_vectors(P: Lanes, Q: Lanes, ux: Lanes, uy: Lanes, h: Lanes) -> tuple[Lanes, ...]:
+    """Twice the half-angle vector (P, Q) in the middle and at the end of an edge along (ux, uy).
+
+    Its parts along and across the direction's half angle, of which the second falls by the decay h
+    on each half of the edge.
+    """
+    ax = (1.0 + ux) * P + uy * Q
+    ay = uy * P + (1.0 - ux) * Q
+    bx = (1.0 - ux) * P - uy * Q
+    by = (1.0 + ux) * Q - uy * P
+    return ax + h * bx, ay + h * by, ax + h * h * bx, ay + h * h * by
+
+
+def _inverse_sizes(shrunk: Lanes, middle: Lanes, last: Lanes) -> tuple[Lanes, ...]:
+    """1 over the product of the sizes of a half-angle vector, over that in the middle and over that
+    at the end of an edge, by one division; shrunk is its size after half the edge.
+    """
+    inverse = 1.0 / (shrunk * middle * last)
+    return inverse, shrunk * last * inverse, shrunk * middle * inverse
+
+
+def _angle_rates(y: Lanes, gone: Lanes, rates: tuple[Lanes, ...]) -> tuple[Lanes, ...]:
+    """How the angle follows normal load and motion along x and y, by its slope y with the length of
+    the edge and the part of the row that is gone.
+    """
+    by_load, kx, ky = rates
+    return -1.0 * y * by_load, y * kx - gone * ky, y * ky + gone * kx
+
+
 @kernel
 def find_turns(
     code: Code,
@@ -175,59 +213,37 @@ def find_turns(
     mu = code.spread(mu)
     mukn = mu * code.spread(kn)
     with code.loop(code.builder.and_(begin, code.whole(-LANES)), end, LANES) as i:
-
-        def form_at(row):
-            return code.load(form, (row, width), i)
-
-        ux, uy, h, slope = map(form_at, (DIRECTION_X, DIRECTION_Y, HALF, SLOPE))
+        ux, uy, h, slope, by_length, by_limit = (
+            code.load(form, (row, width), i)
+            for row in (DIRECTION_X, DIRECTION_Y, HALF, SLOPE, INVERSE_LENGTH, INVERSE_LIMIT)
+        )
         P = code.load(knots, i)
         Q = code.load(knots, width, i)
         slip = code.load(slips, i)
         N = 0.5 * (code.load(path, (2, width), i) + code.load(path, (2, width), i, 1))
-        # twice the parts along and across the direction's half angle, of which the second falls by
-        # the decay
-        ax = (1.0 + ux) * P + uy * Q
-        ay = uy * P + (1.0 - ux) * Q
-        bx = (1.0 - ux) * P - uy * Q
-        by = (1.0 + ux) * Q - uy * P
-        Pm = ax + h * bx
-        Qm = ay + h * by
-        P1 = ax + h * h * bx
-        Q1 = ay + h * h * by
-        size = 4.0 * (P * P + Q * Q)
+        Pm, Qm, P1, Q1 = _turned_vectors(P, Q, ux, uy, h)
+        shrunk = 4.0 * h * (P * P + Q * Q)
         middle = Pm * Pm + Qm * Qm
         last = P1 * P1 + Q1 * Q1
-        # shrunk: size after half the edge
-        inverse = 1.0 / (h * size * middle * last)
-        shrunk = h * size
-        inverse_middle = shrunk * last * inverse
-        inverse_last = shrunk * middle * inverse
+        inverse, inverse_middle, inverse_last = _inverse_sizes(shrunk, middle, last)
         ex = (Pm * Pm - Qm * Qm) * inverse_middle
         ey = 2.0 * Pm * Qm * inverse_middle
         b = shrunk * inverse_middle
         a = h * shrunk * inverse_last
         ym = slope * (ux * ey - uy * ex)
         y1 = 2.0 * slope * (2.0 * ux * P1 * Q1 - uy * (P1 * P1 - Q1 * Q1)) * inverse_last
-        kl = kt * form_at(INVERSE_LENGTH)
-        by_load = mukn * form_at(INVERSE_LIMIT)
-        kx = kl * ux
-        ky = kl * uy
+        rates = mukn * by_limit, kt * by_length * ux, kt * by_length * uy
         over = middle * (middle * last * inverse)
-        m = (-1.0 * ym * by_load, ym * kx - (1.0 - b) * ky, ym * ky + (1.0 - b) * kx)
-        t = (-1.0 * y1 * by_load, y1 * kx - (1.0 - a) * ky, y1 * ky + (1.0 - a) * kx)
+        m = _angle_rates(ym, 1.0 - b, rates)
+        t = _angle_rates(y1, 1.0 - a, rates)
         for row, values in enumerate((*(over * x for x in m), a, *t)):
             code.store(values, turns, (row, width), i)
         R = slip * mu * N
-        none = slip * 0.0
         for row, across, along in ((0, -1.0 * ey, ex), (1, ex, ey)):
-            code.store(slip.above(0.5, R * b * across, none), g, (row, width), i)
-            code.store(slip.above(0.5, mukn * along, none), normal, (row, width), i)
-            code.store(
-                slip.above(0.5, R * along, code.load(trace, (row, width), i)),
-                trace,
-                (row, width),
-                i,
-            )
+            for values, out in ((R * b * across, g), (mukn * along, normal), (R * along, trace)):
+                # the trace keeps what it has where nothing slips
+                rest = code.load(out, (row, width), i) if out is trace else slip * 0.0
+                code.store(slip.above(0.5, values, rest), out, (row, width), i)
 
 
 @kernel

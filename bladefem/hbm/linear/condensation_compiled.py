@@ -1,10 +1,9 @@
-"""The linear bodies of a small model at one frequency, compiled: flexibilities without and with
-contact springs.
+"""The linear bodies of a model at one frequency: flexibilities without and with contact springs.
 
-`bladefem.hbm.linear.condensation` does the same in NumPy. Where there are few modes for the contact
-degrees of freedom, neither flexibility without springs, G = R + C D C^H, is formed, nor is a system
-as large as the contact solved: see `woodbury`. Where they are the same for all harmonics as well,
-not even the flexibility with springs is formed: see `bladefem.hbm.linear.contact_flexibility`.
+Where there are few modes for the contact degrees of freedom, neither flexibility without springs,
+G = R + C D C^H, is formed, nor is a system as large as the contact solved: see `woodbury`. Where
+they are the same for all harmonics as well, not even the flexibility with springs is formed: see
+`bladefem.hbm.linear.contact_flexibility`.
 """
 
 from __future__ import annotations
@@ -12,50 +11,130 @@ from __future__ import annotations
 import numpy as np
 from numba import njit
 
-from ..solver.newton_compiled import Condensed, frobenius_norm
+from ...util.numba_options import INNER_KERNEL, KERNEL
+from ..solver.newton_compiled import Condensed, motion_scale
+from .array_copy import copy_matrix, copy_vector
 from .contact_flexibility import by_harmonic
 
 
-@njit(cache=True, error_model="numpy")
+@njit(**KERNEL)
 def linear_part(omega, bodies, springs, H):
-    """Modal flexibilities D (H+1, M), the `Condensed` bodies, free (H+1, m)."""
+    """The bodies at one frequency.
+
+    Returns:
+        (D, full) modal flexibilities: D (H+1, M) of modes that damping does not couple, full (H+1,
+        M, M) of those that it does, else (0, M, M); the `Condensed` bodies; free (H+1, m) and stuck
+        (H+1, m), displacements without contact forces and in full stick.
+    """
     contact = bodies.contact
     residual = bodies.residual
     m = springs.size
     Z = _modal_impedances(omega, H, bodies.own, bodies.viscous, bodies.hysteretic)
     D = _modal_flexibilities(Z, bodies.own)
+    full = _coupled_flexibilities(omega, Z, D, bodies.coupled)
     free = np.empty((H + 1, m), np.complex128)
     stuck = np.empty((H + 1, m), np.complex128)
     for h in range(H + 1):
-        free[h] = bodies.direct[h] + np.dot(
-            contact[min(h, contact.shape[0] - 1)], D[h] * bodies.push[h]
+        moved = np.dot(
+            contact[min(h, contact.shape[0] - 1)], modal_motion(D, full, h, bodies.push[h])
         )
-    stuck[0], few = bodies.mean_stuck, bodies.A.shape[0] > 0
-    G = np.zeros((1 if few else H + 1, m, m), np.complex128)
+        for i in range(m):
+            free[h, i] = bodies.direct[h, i] + moved[i]
+    copy_vector(bodies.mean_stuck, stuck[0])
+    few = bodies.A.shape[0] > 0
+    formed = not few or full.shape[0] > 0
+    G = np.zeros((H + 1 if formed else 1, m, m), np.complex128)
+    for h in range(1, G.shape[0]):
+        _receptance(bodies, D, full, h, G[h])
     if bodies.R.shape[0]:
         T = np.zeros((H + 1, D.shape[1], D.shape[1]), np.complex128)
         for h in range(1, H + 1):
-            T[h] = np.linalg.inv(_stuck_impedances(Z[h], bodies.N[0]))
+            system = _stuck_impedances(omega * h, Z[h], bodies.N[0], bodies.coupled, h)
+            copy_matrix(np.linalg.solve(system, _identity(D.shape[1])), T[h])
         flex = (np.empty((0, 0, 0), np.complex128), bodies.mean_A, bodies.R, bodies.shared, T)
         _stick_by_modes(T, bodies.shared, bodies.stuck, bodies.sprung, stuck)
     else:
         A = np.empty((H + 1, m, m), np.complex128)
-        A[0] = bodies.mean_A
+        copy_matrix(bodies.mean_A, A[0])
         for h in range(1, H + 1):
             if few:
-                _spring_by_modes(Z[h], h, bodies, A[h], stuck[h])
-                continue
-            shapes = contact[min(h, contact.shape[0] - 1)]
-            G[h] = residual[min(h, residual.shape[0] - 1)] + np.dot(shapes * D[h], shapes.conj().T)
-            _add_springs(G[h], free[h], springs, A[h], stuck[h])
+                _spring_by_modes(omega * h, Z[h], h, bodies, A[h], stuck[h])
+            else:
+                _add_springs(G[h], free[h], springs, A[h], stuck[h])
         flex = by_harmonic(A)
     still = _real_coefficients(free)
     motion = _real_coefficients(stuck)
-    scale = max(max(frobenius_norm(still), frobenius_norm(motion)), 1e-300)
-    return D, Condensed(flex, G, motion, springs, scale, contact, residual, D, bodies.motions), free
+    scale, least = motion_scale(still, motion, bodies.compression)
+    condensed = Condensed(
+        flex, G, motion, springs, scale, least, contact, residual, D, bodies.motions
+    )
+    return (D, full), condensed, free, stuck
 
 
-@njit(cache=True, error_model="numpy")
+@njit(**KERNEL)
+def unsprung_flexibility(bodies, D, full):
+    """(H+1, m, m) flexibility without contact springs, from the modal ones of `linear_part`."""
+    m = bodies.contact.shape[1]
+    G = np.empty((D.shape[0], m, m), np.complex128)
+    copy_matrix(bodies.mean_G, G[0])
+    for h in range(1, D.shape[0]):
+        _receptance(bodies, D, full, h, G[h])
+    return G
+
+
+@njit(**INNER_KERNEL)
+def modal_motion(D, full, h, push):
+    """(M,) amplitudes of the modes of harmonic h under modal forces (M,)."""
+    if full.shape[0]:
+        return np.dot(full[h], push)
+    return D[h] * push
+
+
+@njit(**INNER_KERNEL)
+def _receptance(bodies, D, full, h, G):
+    """Fill G (m, m) = R + C D C^H of harmonic h > 0."""
+    shapes = bodies.contact[min(h, bodies.contact.shape[0] - 1)]
+    residual = bodies.residual[min(h, bodies.residual.shape[0] - 1)]
+    m = G.shape[0]
+    real = _real_part(shapes)
+    if full.shape[0] == 0 and real.shape[0]:
+        # two real products: half the work of a complex one
+        across = np.ascontiguousarray(real.T)
+        stiff = np.dot(real * D[h].real, across)
+        loss = np.dot(real * D[h].imag, across)
+        for i in range(m):
+            for j in range(m):
+                G[i, j] = residual[i, j] + complex(stiff[i, j], loss[i, j])
+        return
+    left = np.dot(shapes, full[h]) if full.shape[0] else shapes * D[h]
+    moved = np.dot(left, np.ascontiguousarray(shapes.conj().T))
+    for i in range(m):
+        for j in range(m):
+            G[i, j] = residual[i, j] + moved[i, j]
+
+
+@njit(**INNER_KERNEL)
+def _real_part(shapes):
+    """(m, M) of real shapes; (0, 0) where some are complex."""
+    out = np.empty(shapes.shape)
+    for i in range(shapes.shape[0]):
+        for k in range(shapes.shape[1]):
+            if shapes[i, k].imag != 0.0:
+                return np.empty((0, 0))
+            out[i, k] = shapes[i, k].real
+    return out
+
+
+@njit(**INNER_KERNEL)
+def _identity(size):
+    """(size, size) complex."""
+    out = np.zeros((size, size), np.complex128)
+    for i in range(size):
+        out[i, i] = 1.0
+    return out
+
+
+@njit(**INNER_KERNEL)
 def _modal_impedances(omega, H, own, viscous, hysteretic):
     """(H+1, M) impedances of the modes [1/s^2]."""
     Z = np.empty((H + 1, own.shape[1]), np.complex128)
@@ -69,7 +148,7 @@ def _modal_impedances(omega, H, own, viscous, hysteretic):
     return Z
 
 
-@njit(cache=True, error_model="numpy")
+@njit(**INNER_KERNEL)
 def _modal_flexibilities(Z, own):
     """(H+1, M) flexibilities of the modes; 0 for rigid ones in the mean."""
     D = np.zeros(Z.shape, np.complex128)
@@ -80,18 +159,40 @@ def _modal_flexibilities(Z, own):
     return D
 
 
-@njit(cache=True, error_model="numpy")
-def _stuck_impedances(Z, N):
+@njit(**INNER_KERNEL)
+def _coupled_flexibilities(omega, Z, D, coupled):
+    """(H+1, M, M) flexibilities of modes that the viscous damping (S, M, M) couples; (0, M, M)
+    where there is none. The mean does not know of damping.
+    """
+    M = D.shape[1]
+    out = np.zeros((D.shape[0] if coupled.shape[0] else 0, M, M), np.complex128)
+    for h in range(out.shape[0]):
+        if h == 0:
+            for k in range(M):
+                out[h, k, k] = D[h, k]
+            continue
+        system = _stuck_impedances(h * omega, Z[h], out[h], coupled, h)
+        copy_matrix(np.linalg.solve(system, _identity(M)), out[h])
+    return out
+
+
+@njit(**INNER_KERNEL)
+def _stuck_impedances(w, Z, N, coupled, h):
     """(M, M) impedances (M,) of the modes with the contact springs: the inverse of `woodbury`'s
     T.
     """
     system = N.copy()
     for k in range(Z.size):
         system[k, k] += Z[k]
+    if coupled.shape[0]:
+        C = coupled[min(h, coupled.shape[0] - 1)]
+        for k in range(Z.size):
+            for l in range(Z.size):
+                system[k, l] += 1j * w * C[k, l]
     return system
 
 
-@njit(cache=True, error_model="numpy")
+@njit(**INNER_KERNEL)
 def _stick_by_modes(T, U, still, push, stuck):
     """Fill stuck (H+1, m) but for the mean from T (H+1, M, M)."""
     for h in range(1, T.shape[0]):
@@ -102,35 +203,44 @@ def _stick_by_modes(T, U, still, push, stuck):
                 stuck[h, i] += U[i, k] * modal[k]
 
 
-@njit(cache=True, error_model="numpy")
-def _spring_by_modes(Z, h, bodies, A, stuck):
+@njit(**INNER_KERNEL)
+def _spring_by_modes(w, Z, h, bodies, A, stuck):
     """Fill A (m, m) and stuck (m,) of harmonic h, from impedances (M,) and the parts of
     `woodbury.frequency_independent_parts`.
     """
     s = min(h, bodies.A.shape[0] - 1)
     fixed = bodies.A[s]
     U = bodies.U[s]
-    UH = bodies.UH[s]
     m, M = U.shape
     right = np.empty((M, m + 1), np.complex128)
-    right[:, :m], right[:, m] = UH, bodies.sprung[h]
-    solved = np.dot(U, np.linalg.solve(_stuck_impedances(Z, bodies.N[s]), right))
-    A[:] = fixed + solved[:, :m]
-    stuck[:] = bodies.stuck[h] + solved[:, m]
+    copy_matrix(bodies.UH[s], right)
+    copy_vector(bodies.sprung[h], right[:, m])
+    system = _stuck_impedances(w, Z, bodies.N[s], bodies.coupled, h)
+    solved = np.dot(U, np.linalg.solve(system, right))
+    for i in range(m):
+        stuck[i] = bodies.stuck[h, i] + solved[i, m]
+        for j in range(m):
+            A[i, j] = fixed[i, j] + solved[i, j]
 
 
-@njit(cache=True, error_model="numpy")
+@njit(**INNER_KERNEL)
 def _add_springs(G, free, springs, A, stuck):
     """Fill A (m, m) = (1 + G K)^-1 G and stuck (m,)."""
     m = springs.size
     right = np.empty((m, m + 1), np.complex128)
-    right[:, :m] = G
-    right[:, m] = free
-    solved = np.linalg.solve(np.eye(m) + G * springs, right)
-    A[:], stuck[:] = solved[:, :m], solved[:, m]
+    system = np.empty((m, m), np.complex128)
+    copy_matrix(G, right)
+    copy_vector(free, right[:, m])
+    for i in range(m):
+        for j in range(m):
+            system[i, j] = G[i, j] * springs[j]
+        system[i, i] += 1.0
+    solved = np.linalg.solve(system, right)
+    copy_vector(solved[:, m], stuck)
+    copy_matrix(solved[:, :m], A)
 
 
-@njit(cache=True, error_model="numpy")
+@njit(**INNER_KERNEL)
 def _real_coefficients(q):
     """(m, K) real coefficients of the amplitudes q (H+1, m)."""
     out = np.empty((q.shape[1], 2 * q.shape[0] - 1))

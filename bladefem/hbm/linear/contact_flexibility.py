@@ -15,15 +15,18 @@ from __future__ import annotations
 import numpy as np
 from numba import njit
 
+from ...util.numba_options import INNER_KERNEL, KERNEL
+from .array_copy import copy_matrix, copy_vector
 
-@njit(cache=True, error_model="numpy")
+
+@njit(**KERNEL)
 def by_harmonic(A):
     """The first form."""
     none = np.empty((0, 0))
     return A, none, none, none, np.empty((0, 0, 0), np.complex128)
 
 
-@njit(cache=True, error_model="numpy", fastmath={"contract", "reassoc"})
+@njit(**KERNEL, fastmath={"contract", "reassoc"})
 def apply_matrices(A, x, out):
     """out (m, K) += A (H+1, m, m) times x (m, K), both as real coefficients."""
     m = x.shape[0]
@@ -48,7 +51,7 @@ def apply_matrices(A, x, out):
                 out[i, s] += sin
 
 
-@njit(cache=True, error_model="numpy")
+@njit(**KERNEL)
 def apply_flexibility(flex, x, out):
     """out (m, K) += A x, for either form."""
     A, mean, R, U, T = flex
@@ -56,12 +59,14 @@ def apply_flexibility(flex, x, out):
         apply_matrices(A, x, out)
         return
     moved = np.dot(R, x)
-    moved[:, 0] = np.dot(mean, np.ascontiguousarray(x[:, 0]))
-    out += moved
-    out += np.dot(U, _apply_modal_matrix(T, np.dot(U.T, x)))
+    copy_vector(np.dot(mean, np.ascontiguousarray(x[:, 0])), moved[:, 0])
+    by_modes = np.dot(U, _apply_modal_matrix(T, np.dot(U.T, x)))
+    for i in range(out.shape[0]):
+        for k in range(out.shape[1]):
+            out[i, k] += moved[i, k] + by_modes[i, k]
 
 
-@njit(cache=True, error_model="numpy")
+@njit(**INNER_KERNEL)
 def _apply_modal_matrix(T, q):
     """T (H+1, M, M) times q (M, K) but for the mean, which becomes 0."""
     out = np.zeros(q.shape)
@@ -83,7 +88,7 @@ def _apply_modal_matrix(T, q):
     return out
 
 
-@njit(cache=True, error_model="numpy")
+@njit(**KERNEL)
 def select_nodes(flex, active, d):
     """The flexibility among the degrees of freedom of some nodes, d of each."""
     A, mean, R, U, T = flex
@@ -101,13 +106,15 @@ def select_nodes(flex, active, d):
         return part, mean, R, U, T
     some = np.empty((rows.size, rows.size))
     rest = np.empty((rows.size, rows.size))
+    shapes = np.empty((rows.size, U.shape[1]))
     for i in range(rows.size):
         for j in range(rows.size):
             some[i, j], rest[i, j] = mean[rows[i], rows[j]], R[rows[i], rows[j]]
-    return A, some, rest, U[rows], T
+        copy_vector(U[rows[i]], shapes[i])
+    return A, some, rest, shapes, T
 
 
-@njit(cache=True, error_model="numpy")
+@njit(**KERNEL)
 def form_matrices(flex):
     """The first form of either: (H+1, m, m)."""
     A, mean, R, U, T = flex
@@ -115,13 +122,16 @@ def form_matrices(flex):
         return A
     out = np.empty((T.shape[0], *R.shape), np.complex128)
     shapes = U.astype(np.complex128)
-    out[0] = mean
+    copy_matrix(mean, out[0])
     for h in range(1, T.shape[0]):
-        out[h] = R + np.dot(np.dot(shapes, T[h]), shapes.T)
+        by_modes = np.dot(np.dot(shapes, T[h]), shapes.T)
+        for i in range(R.shape[0]):
+            for j in range(R.shape[1]):
+                out[h, i, j] = R[i, j] + by_modes[i, j]
     return out
 
 
-@njit(cache=True, error_model="numpy")
+@njit(**KERNEL)
 def seen_by(flex, Z):
     """(H+1, q, m) Z^T A for real motions Z (m, q)."""
     A, mean, R, U, T = flex
@@ -131,18 +141,21 @@ def seen_by(flex, Z):
     if A.shape[0]:
         motions = turned.astype(np.complex128)
         for h in range(harmonics):
-            out[h] = np.dot(motions, A[h])
+            copy_matrix(np.dot(motions, A[h]), out[h])
         return out
     fixed = np.dot(turned, R)
     push = np.dot(turned, U).astype(np.complex128)
     shapes = U.T.astype(np.complex128)
-    out[0] = np.dot(turned, mean)
+    copy_matrix(np.dot(turned, mean), out[0])
     for h in range(1, harmonics):
-        out[h] = fixed + np.dot(np.dot(push, T[h]), shapes)
+        by_modes = np.dot(np.dot(push, T[h]), shapes)
+        for i in range(fixed.shape[0]):
+            for j in range(fixed.shape[1]):
+                out[h, i, j] = fixed[i, j] + by_modes[i, j]
     return out
 
 
-@njit(cache=True, error_model="numpy", fastmath={"contract", "reassoc"})
+@njit(**INNER_KERNEL, fastmath={"contract", "reassoc"})
 def apply_modes(C, R, D, x, out):
     """out (m, K) += (R + C D C^H) x for x (m, K) but for the mean, from C (S, m, M), R (S', m, m)
     and D (H+1, M).

@@ -1,4 +1,4 @@
-"""The bodies of a small model as one tuple of arrays, which numba takes: all that does not depend
+"""The bodies of a model as one tuple of arrays, which numba takes: all that does not depend
 on the frequency.
 
 Both bodies are one: the damper's modes, rigid ones with frequency zero, stand beside the blades'
@@ -7,19 +7,18 @@ with the shapes that they give the relative displacement.
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from functools import reduce
 from typing import NamedTuple
 
 import numpy as np
 
-from ...data import RigidBody
 from .. import policy
 from ..model import ReducedModel
 from ..solver.deflation import common_motions
-from .bodies import Stack, rigid_stack
-from .condensation import rigid_motions, with_springs
-from .woodbury import frequency_independent_parts
+from .bodies import Stack
+from .mean_motion import rigid_motions, with_springs
+from .woodbury import bodies_of, frequency_independent_parts
 
 
 class Bodies(NamedTuple):
@@ -33,6 +32,8 @@ class Bodies(NamedTuple):
     viscous: np.ndarray
     # (S, M) [1/s^2], real
     hysteretic: np.ndarray
+    # (S, M, M) viscous damping that couples modes [1/s]; (0, M, M) where there is none
+    coupled: np.ndarray
     # (S, m, M) shapes, the damper's reversed
     contact: np.ndarray
     # (S, m, m)
@@ -75,40 +76,29 @@ class Bodies(NamedTuple):
     # (r0, r) the same in the blades' rigid modes, whose numbers are `still` (r0,)
     rigid: np.ndarray
     still: np.ndarray
+    # size of what the preload presses the contact springs together [m]
+    compression: float
 
 
-def prepared_bodies(model: ReducedModel, H: int) -> Bodies | None:
-    """Made once; None where points are not compiled as a whole."""
+def prepared_bodies(model: ReducedModel, H: int) -> Bodies:
+    """Made once for a model and its harmonics 0..H."""
     return model.once(("small", H), lambda: _pack_bodies(model, H))
 
 
-def _pack_bodies(model: ReducedModel, H: int) -> Bodies | None:
+def _pack_bodies(model: ReducedModel, H: int) -> Bodies:
     dofs = model.springs.size
-    if not policy.uses_compiled_point(model, H):
-        return None
-    bodies = [model.blades(H)]
-    damper = model.elastic_damper(H)
-    if damper is not None:
-        bodies.append(damper)
-    blades = bodies[0]
-    loads = model.loads(H)
     springs = model.springs.ravel()
-    if isinstance(model.damper, RigidBody):
-        bodies.append(rigid_stack(model.damper.mass, model.damper.B[model.rows]))
+    bodies = bodies_of(model, H)
+    blades = bodies[0]
     own, viscous, hysteretic = (
         _joined_modes(bodies, name) for name in ("omega", "viscous", "hysteretic")
     )
     contact = _joined_modes(
         [blades, *(_with_reversed_shapes(b) for b in bodies[1:])], "shapes", lambda b: b.contact
     )
-    spare = ((0, 0), (0, 0), (0, contact.shape[2] - blades.shapes.shape[2]))
-    load, probe = (np.pad(blades.shapes[:, rows], spare) for rows in (blades.load, blades.probe))
     residual = reduce(np.add, [b.residual[:, b.contact, b.contact] for b in bodies])
-    direct, straight = (
-        (blades.residual[:, rows, blades.load] @ loads[:, :, None])[:, :, 0]
-        for rows in (blades.contact, blades.probe)
-    )
-    push = (loads[:, None] @ load.conj())[:, 0]
+    spare = ((0, 0), (0, 0), (0, contact.shape[2] - blades.shapes.shape[2]))
+    push, direct, straight = _excitation(blades, model.loads(H), spare)
     fixed = (
         frequency_independent_parts(residual, contact, springs)
         if policy.updates_by_modes(dofs, contact.shape[2])
@@ -117,7 +107,7 @@ def _pack_bodies(model: ReducedModel, H: int) -> Bodies | None:
     parts = [
         contact,
         residual,
-        probe,
+        np.pad(blades.shapes[:, blades.probe], spare),
         blades.residual[:, blades.probe, blades.contact],
         push,
         direct,
@@ -125,16 +115,23 @@ def _pack_bodies(model: ReducedModel, H: int) -> Bodies | None:
         *fixed,
         *_excited_modes(fixed, springs, push, direct),
     ]
-    B, g, rigid = model.once("rigid", lambda: rigid_motions(model, springs))
+    B, g, rigid = model.once("rigid motions", lambda: rigid_motions(model, springs))
     still = np.flatnonzero(blades.omega[0] == 0)
     mean = _mean_flexibility(
         (own[0], contact[0], residual[0]), (push[0], direct[0]), (springs, B, g)
     )
+    # the mean displacements have no part in the balance
+    if not model.coupled:
+        mean = tuple(np.zeros_like(part) for part in mean)
+        B = B[:, :0]
+        g = g[:0]
+        rigid = rigid[:, :0]
     return Bodies._make(
         [
             own,
             viscous,
             hysteretic,
+            _coupled_damping(bodies, own.shape[1]),
             *(np.ascontiguousarray(part, dtype=complex) for part in parts),
             *_one_for_all(fixed, dofs),
             common_motions(model, H),
@@ -143,8 +140,40 @@ def _pack_bodies(model: ReducedModel, H: int) -> Bodies | None:
             g,
             np.ascontiguousarray(rigid[: len(still)]),
             still,
+            model.compression,
         ]
     )
+
+
+def _excitation(
+    blades: Stack,
+    loads: np.ndarray,
+    spare: tuple[tuple[int, int], ...],
+) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """What loads (H+1, l) do: (H+1, M) forces on the modes, filled up for those of the damper, and
+    the motion next to the modes of contact (H+1, m) and probes (H+1, p).
+    """
+    shapes = np.pad(blades.shapes[:, blades.load], spare)
+    direct, straight = (
+        (blades.residual[:, rows, blades.load] @ loads[:, :, None])[:, :, 0]
+        for rows in (blades.contact, blades.probe)
+    )
+    return (loads[:, None] @ shapes.conj())[:, 0], direct, straight
+
+
+def _coupled_damping(bodies: Sequence[Stack], count: int) -> np.ndarray:
+    """(S, M, M) viscous damping that couples the M = count modes of each body; (0, M, M) where none
+    does.
+    """
+    parts = [body.coupled for body in bodies if body.coupled is not None]
+    most = max((len(part) for part in parts), default=0)
+    coupled = np.zeros((most, count, count), dtype=complex)
+    start = 0
+    for body in bodies:
+        own = slice(start, start := start + body.omega.shape[1])
+        if body.coupled is not None:
+            coupled[:, own, own] = body.coupled
+    return coupled
 
 
 def _mean_flexibility(
@@ -202,7 +231,7 @@ def _with_reversed_shapes(body: Stack) -> Stack:
 
 
 def _joined_modes(
-    bodies: list[Stack],
+    bodies: Sequence[Stack],
     name: str,
     rows: Callable[[Stack], slice] = lambda _: slice(None),
 ) -> np.ndarray:

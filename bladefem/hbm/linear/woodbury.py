@@ -14,73 +14,11 @@ solving anew costs m^3.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-from functools import reduce
-
 import numpy as np
 
 from ...data import RigidBody
-from ...errors import NotSolvedError
 from ..model import ReducedModel
-from ..policy import uses_low_rank
-from .bodies import Stack, modal_flexibility, rigid_stack
-
-
-@dataclass(frozen=True)
-class LowRank:
-    """What stays, for each harmonic (S = H+1) or for all of them (S = 1); m contact degrees of
-    freedom, k modes.
-    """
-
-    bodies: tuple[Stack, ...]
-    # (S, m, m)
-    A: np.ndarray
-    # (S, m, k)
-    U: np.ndarray
-    # (S, k, m) its conjugate transpose
-    UH: np.ndarray
-    # (S, k, k)
-    N: np.ndarray
-
-
-def low_rank(model: ReducedModel, harmonics: int) -> LowRank | None:
-    """The parts that stay; None where modes are coupled by damping or too many."""
-    bodies = bodies_of(model, harmonics)
-    m = model.springs.size
-    k = sum(body.omega.shape[1] for body in bodies)
-    if any(body.coupled is not None for body in bodies) or not uses_low_rank(m, k):
-        return None
-    return model.once(
-        ("low rank", harmonics), lambda: _constant_parts(bodies, model.springs.ravel())
-    )
-
-
-def low_rank_update(
-    fixed: LowRank,
-    orders: np.ndarray,
-    first: int,
-) -> np.ndarray:
-    """(H+1, m, m) flexibility with springs at the circular frequencies `orders`, from harmonic
-    `first` on.
-
-    Raises:
-        NotSolvedError: a resonance without damping is hit exactly.
-    """
-    D = np.concatenate([modal_flexibility(body, orders) for body in fixed.bodies], axis=1)[first:]
-    N, U, UH, A = (
-        part[first:] if len(part) > 1 else part for part in (fixed.N, fixed.U, fixed.UH, fixed.A)
-    )
-    k = D.shape[1]
-    try:
-        T = np.linalg.solve(np.eye(k) + D[:, :, None] * N, D[:, :, None] * np.eye(k))
-    except np.linalg.LinAlgError:
-        raise NotSolvedError(
-            "contact flexibility is singular: a resonance without damping is hit exactly"
-        ) from None
-    found = np.zeros((len(orders), *A.shape[1:]), dtype=complex)
-    np.matmul(U @ T, UH, out=found[first:])
-    found[first:] += A
-    return found
+from .bodies import Stack, rigid_stack
 
 
 def bodies_of(model: ReducedModel, harmonics: int) -> tuple[Stack, ...]:
@@ -91,21 +29,6 @@ def bodies_of(model: ReducedModel, harmonics: int) -> tuple[Stack, ...]:
         return blades, model.once("rigid stack", lambda: rigid_stack(body.mass, body.B[model.rows]))
     damper = model.elastic_damper(harmonics)
     return (blades,) if damper is None else (blades, damper)
-
-
-def _constant_parts(bodies: tuple[Stack, ...], springs: np.ndarray) -> LowRank:
-    size = max(len(body.shapes) for body in bodies)
-    R = reduce(np.add, [body.residual[:, body.contact, body.contact] for body in bodies])
-    L = np.concatenate(
-        [
-            np.broadcast_to(
-                body.shapes[:, body.contact], (size, *body.shapes[:, body.contact].shape[1:])
-            )
-            for body in bodies
-        ],
-        axis=2,
-    )
-    return LowRank(bodies, *frequency_independent_parts(R, L, springs))
 
 
 def frequency_independent_parts(

@@ -15,6 +15,8 @@ from __future__ import annotations
 import numpy as np
 from numba import njit
 
+from ...util.numba_options import INNER_KERNEL, KERNEL
+from ..linear.array_copy import copy_vector
 from ..linear.contact_flexibility import seen_by
 from ..linear.woodbury import bodies_of
 from ..model import ReducedModel
@@ -62,13 +64,13 @@ def _softest_motions(model: ReducedModel, harmonics: int) -> np.ndarray:
     )
 
 
-@njit(cache=True, error_model="numpy")
+@njit(**KERNEL)
 def no_level():
     """In place of the second level where there is none."""
     return np.empty((0, 0)), np.empty((0, 0)), np.empty(0, np.int64)
 
 
-@njit(cache=True, error_model="numpy")
+@njit(**KERNEL)
 def second_level(flex, C, Q, active, d):
     """Motions Z (a, q) of the active nodes, LU factors of E and their pivots; nothing where E is
     singular.
@@ -85,7 +87,7 @@ def second_level(flex, C, Q, active, d):
     return (Z, E, pivots) if factorise_large(E, pivots) else no_level()
 
 
-@njit(cache=True, error_model="numpy")
+@njit(**INNER_KERNEL)
 def _orthonormal_rows(Q, active, d):
     """The rows of the active nodes, their columns made orthonormal; dependent ones are left out."""
     Z = np.empty((Q.shape[1], active.size * d))
@@ -93,19 +95,23 @@ def _orthonormal_rows(Q, active, d):
     for j in range(Q.shape[1]):
         z = Z[count]
         for y in range(active.size):
-            z[y * d : (y + 1) * d] = Q[active[y] * d : (active[y] + 1) * d, j]
+            for b in range(d):
+                z[y * d + b] = Q[active[y] * d + b, j]
         before = np.sqrt(np.dot(z, z))
         for _ in range(2):
             for i in range(count):
-                z -= np.dot(Z[i], z) * Z[i]
+                share = np.dot(Z[i], z)
+                for l in range(z.size):
+                    z[l] -= share * Z[i, l]
         left = np.sqrt(np.dot(z, z))
         if left > DEPENDENT_SHARE * before:
-            z /= left
+            for l in range(z.size):
+                z[l] /= left
             count += 1
     return np.ascontiguousarray(Z[:count].T)
 
 
-@njit(cache=True, error_model="numpy", fastmath={"contract", "reassoc"})
+@njit(**INNER_KERNEL, fastmath={"contract", "reassoc"})
 def _galerkin_matrix(along, C, Z):
     """E (qK, qK) = Z^T (1 + A C) Z from Z^T A (H+1, q, a)."""
     q = Z.shape[1]
@@ -142,10 +148,10 @@ def _galerkin_matrix(along, C, Z):
     return E
 
 
-@njit(cache=True, error_model="numpy")
+@njit(**INNER_KERNEL)
 def apply_deflation(level, y, out):
     """out (a K,) becomes M^-1 y."""
-    out[:] = y
+    copy_vector(y, out)
     Z, E, pivots = level
     if pivots.size == 0:
         return
@@ -154,4 +160,7 @@ def apply_deflation(level, y, out):
     common = np.dot(Z.T, rest)
     solved = common.copy().reshape(common.size)
     back_substitute(E, pivots, solved)
-    moved += np.dot(Z, solved.reshape(common.shape) - common)
+    change = np.dot(Z, solved.reshape(common.shape) - common)
+    for i in range(moved.shape[0]):
+        for k in range(moved.shape[1]):
+            moved[i, k] += change[i, k]

@@ -5,17 +5,19 @@ from __future__ import annotations
 import numpy as np
 from numba import njit
 
+from ...util.numba_options import INNER_KERNEL, KERNEL
+
 # columns of a block
 BLOCK_COLUMNS = 32
 
 
-@njit(cache=True, error_model="numpy")
+@njit(**KERNEL)
 def factorise_small(M, pivots):
     """LU factors in place with partial pivoting; False where a pivot is zero."""
     return _eliminate_columns(M, pivots, 0, M.shape[0])
 
 
-@njit(cache=True, error_model="numpy")
+@njit(**INNER_KERNEL)
 def _eliminate_columns(M, pivots, low, high):
     """Columns low to high of such factors, rows exchanged as a whole; False where a pivot is
     zero.
@@ -41,7 +43,7 @@ def _eliminate_columns(M, pivots, low, high):
     return True
 
 
-@njit(cache=True, error_model="numpy")
+@njit(**KERNEL)
 def factorise_large(M, pivots):
     """The same for a contiguous real matrix, in blocks of columns: most of the work is one matrix
     product a block.
@@ -63,7 +65,7 @@ def factorise_large(M, pivots):
     return True
 
 
-@njit(cache=True, error_model="numpy")
+@njit(**KERNEL)
 def back_substitute(M, pivots, x):
     """x becomes M^-1 x."""
     size = M.shape[0]

@@ -24,7 +24,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from ...errors import InputError, NotSolvedError
-from ..linear.condensation import Linear
+from ..linear.condensation import scale_loads, truncate_harmonics
 from ..parameters import vary
 from ..time_model import shooting_start
 from .arclength import Task, advance_path, spot_at
@@ -96,7 +96,7 @@ def _attempts_in_order(
     for factor in (2, 4) if near.state.error < CLOSE_RESIDUAL else ():
         denser = replace(balance, samples=factor * balance.samples)
         yield Attempt("more samples", newton(denser, near.state.w, options), denser.samples)
-    if balance.linear.A.shape[0] > 4:
+    if len(balance.linear.stuck) > 4:
         yield Attempt("harmonics in sequence", _more_harmonics(balance, options))
     yield Attempt("load homotopy", _from_high_load(balance, options))
     path = _along_excitation(balance, options)
@@ -114,12 +114,12 @@ def _attempts_in_order(
 
 def _more_harmonics(balance: Balance, options: Options) -> Newton:
     """Solve with 3, 7, 15, ... harmonics, each from the one before."""
-    highest = balance.linear.A.shape[0] - 1
+    highest = len(balance.linear.stuck) - 1
     iterations = 0
     w = None
     sequence = [H for H in (3, 7, 15, 31, 63) if H < highest] + [highest]
     for H in sequence:
-        less = replace(balance, linear=_truncate_harmonics(balance.linear, H))
+        less = replace(balance, linear=truncate_harmonics(balance.linear, H))
         end = newton(less, start_in_stick(less) if w is None else match_harmonics(w, H), options)
         if not end.converged and w is None:
             second = newton(less, start_in_stick(less), options, "residual")
@@ -189,13 +189,7 @@ def _along_excitation(balance: Balance, options: Options) -> Newton:
                 f"the path left the excitations up to the wanted one, for exp({x:.3g}) times it"
             )
         model = vary(balance.model, "force", float(np.exp(x)))
-        factor = float(np.exp(x))
-        linear = replace(
-            balance.linear,
-            free=factor * balance.linear.free,
-            stuck=factor * balance.linear.stuck,
-            g=factor * balance.linear.g,
-        )
+        linear = scale_loads(balance.linear, float(np.exp(x)))
         return replace(balance, model=model, linear=linear)
 
     iterations = 0
@@ -258,12 +252,6 @@ def _extrapolated_start(path: list[tuple[float, np.ndarray]], target: float) -> 
     return now + (target - new) / (new - old) * (now - before)
 
 
-def _truncate_harmonics(linear: Linear, H: int) -> Linear:
-    return replace(
-        linear, **{name: getattr(linear, name)[: H + 1] for name in ("G", "free", "A", "stuck")}
-    )
-
-
 def _failed_attempt(
     balance: Balance,
     end: Newton,
@@ -271,5 +259,5 @@ def _failed_attempt(
     reason: str,
 ) -> Newton:
     """A failed attempt as a state of the true balance."""
-    w = match_harmonics(end.state.w, balance.linear.A.shape[0] - 1)
+    w = match_harmonics(end.state.w, len(balance.linear.stuck) - 1)
     return Newton(evaluate_balance(balance, w), iterations, False, reason)

@@ -12,6 +12,8 @@ from __future__ import annotations
 import numpy as np
 from numba import njit
 
+from ...util.numba_options import KERNEL
+from ..linear.array_copy import copy_vector
 from ..linear.contact_flexibility import apply_flexibility
 from .deflation import apply_deflation
 
@@ -19,7 +21,7 @@ from .deflation import apply_deflation
 MOST_DIRECTIONS = 60
 
 
-@njit(cache=True, error_model="numpy")
+@njit(**KERNEL)
 def conjugate_residuals(flex, C, r, accuracy, level, x):
     """Fill x (N,) with the solution for r (N,), to a relative residual; False where it is not
     found.
@@ -40,7 +42,7 @@ def conjugate_residuals(flex, C, r, accuracy, level, x):
         if np.sqrt(np.dot(rest, rest)) <= goal:
             return True
         apply_deflation(level, rest, P[k])
-        Q[k] = P[k]
+        copy_vector(P[k], Q[k])
         for i in range(0, N, block):
             np.dot(C[i // block], P[k, i : i + block], forces[i : i + block])
         apply_flexibility(flex, forces.reshape(m, N // m), Q[k].reshape(m, N // m))

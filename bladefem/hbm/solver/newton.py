@@ -29,7 +29,6 @@ from .residual import (
     Balance,
     Inverse,
     State,
-    compiled_arguments,
     contact_table,
     evaluate_balance,
     linearise_balance,
@@ -251,7 +250,7 @@ def _run_compiled(
     steps, code, error, f, dfdw, shares, residual, p, solver = compiled_newton(
         end,
         d,
-        compiled_arguments(balance),
+        balance.linear.condensed,
         contact,
         STICKING_FORCE_SHARE,
         options.tolerance,

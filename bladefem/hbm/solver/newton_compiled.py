@@ -1,8 +1,9 @@
-"""Newton on small balances of 1-D elements, compiled: the loop of `bladefem.hbm.solver.newton`
-without its overhead.
+"""Newton on balances of 1-D elements in one compiled call: the loop of `bladefem.util.newton` without
+its overhead, which is most of the time of a model with few contacts.
 
-It takes the same steps, with the line search on the step, and ends for the same reasons; a test
-holds the two together.
+It takes the same steps, with the line search on the step, and ends for the same reasons. Residual,
+moving nodes, Jacobian and the motion of the other nodes are those of
+`bladefem.hbm.solver.residual`, which calls them for all other elements.
 """
 
 from __future__ import annotations
@@ -14,6 +15,9 @@ from numba import njit
 
 from ...friction.kernel_1d import jenkins_batch
 from ...friction.kernel_1d_exact import exact_batch
+from ...util.newton import Outcome
+from ...util.numba_options import INNER_KERNEL, KERNEL
+from ..linear.array_copy import copy_vector
 from ..linear.contact_flexibility import (
     apply_flexibility,
     apply_matrices,
@@ -26,12 +30,13 @@ from .deflation import no_level, second_level
 from .dense_lu import back_substitute, factorise_large, factorise_small
 from .krylov import conjugate_residuals
 
-CONVERGED = 0
-EXHAUSTED = 1
-STALLED = 2
-SINGULAR = 3
-INFINITE = 4
-SEARCHING = 5
+CONVERGED = int(Outcome.CONVERGED)
+EXHAUSTED = int(Outcome.EXHAUSTED)
+STALLED = int(Outcome.STALLED)
+SINGULAR = int(Outcome.SINGULAR)
+NOT_FINITE = int(Outcome.NOT_FINITE)
+# the loop goes on
+SEARCHING = -1
 # how steps were solved for: bits of the code that compiled_newton returns
 BY_LU = 1
 BY_ITERATIONS = 2
@@ -42,6 +47,10 @@ COARSEST_STEP_ACCURACY = 1e-4
 LAST_STEP_ACCURACY = 1e-2
 # and of the one that the line search looks at; coarser ones mislead it
 LINE_SEARCH_ACCURACY = 1e-3
+# of the preload's compression: smaller motions drown in its rounding,
+SMALL_MOTION_RATIO = 1e-8
+# and their residual is measured by this share of it
+REST_MOTION_SHARE = 1e-4
 
 
 class Condensed(NamedTuple):
@@ -55,8 +64,9 @@ class Condensed(NamedTuple):
     stuck: np.ndarray
     # (m,) [N/m]
     springs: np.ndarray
-    # size of the linear motion [m]
+    # size of the linear motion, and the least size that a motion is measured by [m]
     scale: float
+    least: float
     # (S, m, M), residual (S, m, m) and modal (H+1, M): these give G by `apply_modes`; or empty
     shapes: np.ndarray
     residual: np.ndarray
@@ -65,7 +75,7 @@ class Condensed(NamedTuple):
     motions: np.ndarray
 
 
-@njit(cache=True, error_model="numpy")
+@njit(**INNER_KERNEL)
 def frobenius_norm(x):
     """Root of the sum of squares."""
     total = 0.0
@@ -75,7 +85,7 @@ def frobenius_norm(x):
     return np.sqrt(total)
 
 
-@njit(cache=True, error_model="numpy")
+@njit(**INNER_KERNEL)
 def _take_step(w, share, step, out):
     """out becomes  w - share step."""
     for i in range(w.shape[0]):
@@ -83,14 +93,59 @@ def _take_step(w, share, step, out):
             out[i, k] = w[i, k] - share * step[i, k] if share else w[i, k]
 
 
-@njit(cache=True, error_model="numpy")
-def _evaluate_residual(w, d, linear, contact, work):
-    """Forces and residual at w (m, K); fills work and returns the error of
-    `bladefem.hbm.solver.residual`.
+@njit(**KERNEL)
+def motion_scale(free, stuck, compression):
+    """`scale` and `least` of the `Condensed` bodies, from the motions without contact forces and in
+    full stick (m, K), and the compression by the preload [m].
+    """
+    scale = max(max(frobenius_norm(free), frobenius_norm(stuck)), 1e-300)
+    if scale < SMALL_MOTION_RATIO * compression:
+        least = REST_MOTION_SHARE * compression
+        return max(scale, least), least
+    return scale, 1e-300
+
+
+@njit(**KERNEL)
+def balance_residual(w, linear, preload, F, p, r):
+    """Fill p and the residual r (m, K) at w (m, K) from the forces F (n, a, K), whose last
+    directions are those of the balance, under the preload (m,).
+
+    Returns:
+        the error: the larger of the residual with contact springs over the size of the motion, and
+        the residual without them over that of the linear motion.
     """
     G = linear.G
     stuck = linear.stuck
     springs = linear.springs
+    m, K = w.shape
+    d = m // F.shape[0]
+    first = F.shape[1] - d
+    for i in range(m):
+        for k in range(K):
+            p[i, k] = (
+                F[i // d, first + i % d, k] - springs[i] * w[i, k] - (preload[i] if k == 0 else 0.0)
+            )
+            r[i, k] = w[i, k] - stuck[i, k]
+    apply_flexibility(linear.flex, p, r)
+    sprung = np.empty(r.shape)
+    bare = np.empty(r.shape)
+    for i in range(m):
+        for k in range(K):
+            sprung[i, k] = springs[i] * r[i, k] if k else 0.0
+            bare[i, k] = r[i, k]
+    if 2 * G.shape[0] - 1 == K:
+        apply_matrices(G, sprung, bare)
+    else:
+        apply_modes(linear.shapes, linear.residual, linear.modal, sprung, bare)
+    return max(
+        frobenius_norm(r) / max(frobenius_norm(w), linear.least),
+        frobenius_norm(bare) / linear.scale,
+    )
+
+
+@njit(cache=True, error_model="numpy", inline="always")
+def _evaluate_residual(w, d, linear, contact, work):
+    """Forces and residual at w (m, K); fills work and returns the error."""
     load, base, nodes, tab, brackets, preload, offset = contact
     full, F, J, shares, p, r = work
     n = nodes.shape[0]
@@ -106,30 +161,11 @@ def _evaluate_residual(w, d, linear, contact, work):
         exact_batch(full, base, nodes, brackets, F, J, shares, counts)
     else:
         jenkins_batch(full, load, nodes, tab, F, J, shares)
-    for i in range(w.shape[0]):
-        for k in range(K):
-            p[i, k] = (
-                F[i // d, 2 - d + i % d, k] - springs[i] * w[i, k] - (preload[i] if k == 0 else 0.0)
-            )
-            r[i, k] = w[i, k] - stuck[i, k]
-    apply_flexibility(linear.flex, p, r)
-    sprung = np.empty(r.shape)
-    bare = np.empty(r.shape)
-    for i in range(w.shape[0]):
-        for k in range(K):
-            sprung[i, k] = springs[i] * r[i, k] if k else 0.0
-            bare[i, k] = r[i, k]
-    if 2 * G.shape[0] - 1 == K:
-        apply_matrices(G, sprung, bare)
-    else:
-        apply_modes(linear.shapes, linear.residual, linear.modal, sprung, bare)
-    return max(
-        frobenius_norm(r) / max(frobenius_norm(w), 1e-300), frobenius_norm(bare) / linear.scale
-    )
+    return balance_residual(w, linear, preload, F, p, r)
 
 
-@njit(cache=True, error_model="numpy")
-def _dense_jacobian(A, C):
+@njit(**KERNEL)
+def dense_jacobian(A, C):
     """(a K, a K) the matrix 1 + A C for A (H+1, a, a) and one block of C (nodes, dK, dK) a node."""
     a = A.shape[1]
     K = 2 * A.shape[0] - 1
@@ -156,10 +192,10 @@ def _dense_jacobian(A, C):
     return out
 
 
-@njit(cache=True, error_model="numpy")
+@njit(cache=True, error_model="numpy", inline="always")
 def _lu_factors(flex, C):
     """LU factors and pivots of 1 + A C; without pivots where it is singular."""
-    M = _dense_jacobian(form_matrices(flex), C)
+    M = dense_jacobian(form_matrices(flex), C)
     pivots = np.empty(M.shape[0], np.int64)
     regular = (
         factorise_large(M, pivots)
@@ -169,7 +205,7 @@ def _lu_factors(flex, C):
     return M, pivots if regular else np.empty(0, np.int64)
 
 
-@njit(cache=True, error_model="numpy")
+@njit(cache=True, error_model="numpy", inline="always")
 def _apply_inverse(r, accuracy, flex, C, factors, level):
     """(a K,) the solution of (1 + A C) x = r, and the factors where they were needed."""
     x = np.empty(r.size)
@@ -181,16 +217,16 @@ def _apply_inverse(r, accuracy, flex, C, factors, level):
         return x, factors
     if factors[1].size == 0 and r.size <= DENSE_FALLBACK_UNKNOWNS:
         factors = _lu_factors(flex, C)
-    x[:] = r
     if factors[1].size:
+        copy_vector(r, x)
         back_substitute(factors[0], factors[1], x)
     else:
         x[:] = np.nan
     return x, factors
 
 
-@njit(cache=True, error_model="numpy")
-def _spread_to_all_nodes(x, r, d, active, C, flex, step):
+@njit(**KERNEL)
+def spread_to_all_nodes(x, r, d, active, C, flex, step):
     """Fill step (m, K) with x at the active nodes; the others follow from their residual and the
     active forces.
     """
@@ -200,23 +236,31 @@ def _spread_to_all_nodes(x, r, d, active, C, flex, step):
     size = d * K
     if 0 < active.size < m // d:
         for y in range(active.size):
-            p[active[y] * d : (active[y] + 1) * d] = np.dot(
-                C[y], x[y * size : (y + 1) * size]
-            ).reshape(d, K)
+            forces = np.dot(C[y], x[y * size : (y + 1) * size])
+            for b in range(d):
+                for k in range(K):
+                    p[active[y] * d + b, k] = forces[b * K + k]
         apply_flexibility(flex, p, shift)
     for i in range(m):
         for k in range(K):
             step[i, k] = r[i, k] - shift[i, k]
     for y in range(active.size):
-        step[active[y] * d : (active[y] + 1) * d] = x[y * size : (y + 1) * size].reshape(d, K)
+        for b in range(d):
+            for k in range(K):
+                step[active[y] * d + b, k] = x[y * size + b * K + k]
 
 
-@njit(cache=True, error_model="numpy")
-def _moving_nodes(J, springs, d, sticks):
+@njit(**KERNEL)
+def moving_nodes(J, springs, d, sticks):
     """Numbers of the nodes whose forces do not follow the springs of full stick, and dp/dw there
-    (nodes, dK, dK).
+    (nodes, dK, dK), from df/dw (n, a, K, a, K), of which the last d directions are those of the
+    balance.
+
+    Args:
+        sticks: share of a node's stiffness that dp/dw must exceed.
     """
     n = J.shape[0]
+    first = J.shape[1] - d
     K = J.shape[2]
     C = np.empty((n, d * K, d * K))
     found = np.empty(n, np.int64)
@@ -230,7 +274,7 @@ def _moving_nodes(J, springs, d, sticks):
             for k in range(K):
                 for e in range(d):
                     for l in range(K):
-                        value = J[node, 2 - d + b, k, 2 - d + e, l]
+                        value = J[node, first + b, k, first + e, l]
                         if b == e and k == l:
                             value -= springs[node * d + b]
                         block[b * K + k, e * K + l] = value
@@ -241,7 +285,52 @@ def _moving_nodes(J, springs, d, sticks):
     return found[:count], C[:count]
 
 
-@njit(cache=True, error_model="numpy")
+@njit(cache=True, error_model="numpy", inline="always")
+def _empty_work(m, d, K):
+    """Scratch of one run: motion of all directions, forces, their derivative, shares, p, residual."""
+    n = m // d
+    return (
+        np.zeros((n, 2, K)),
+        np.zeros((n, 2, K)),
+        np.zeros((n, 2, K, 2, K)),
+        np.zeros((n, 3)),
+        np.zeros((m, K)),
+        np.zeros((m, K)),
+    )
+
+
+@njit(cache=True, error_model="numpy", inline="always")
+def _stop_code(error, tolerance, steps, iterations):
+    """How the run ends with this error, or SEARCHING."""
+    if error <= tolerance:
+        return CONVERGED
+    if not np.isfinite(error):
+        return NOT_FINITE
+    return EXHAUSTED if steps == iterations else SEARCHING
+
+
+@njit(cache=True, error_model="numpy", inline="always")
+def _step_accuracy(error, tolerance):
+    """Relative accuracy of a step: no finer than what the next error needs."""
+    return max(
+        FINEST_STEP_ACCURACY,
+        min(0.1 * error, COARSEST_STEP_ACCURACY),
+        min(0.1 * tolerance / error, LAST_STEP_ACCURACY),
+    )
+
+
+@njit(cache=True, error_model="numpy", inline="always")
+def _linearise_nodes(J, linear, d, sticks):
+    """Moving nodes, dp/dw there, the flexibility among them, and the second level of iterations."""
+    K = J.shape[2]
+    active, C = moving_nodes(J, linear.springs, d, sticks)
+    few = select_nodes(linear.flex, active, d)
+    wide = linear.motions.size > 0 and active.size * d * K >= DEFLATION_UNKNOWNS
+    level = second_level(few, C, linear.motions, active, d) if wide else no_level()
+    return active, C, few, level
+
+
+@njit(**KERNEL)
 def compiled_newton(w, d, linear, contact, sticks, tolerance, iterations, shortest):
     """Newton from w (m, K), changed in place to the end.
 
@@ -257,28 +346,14 @@ def compiled_newton(w, d, linear, contact, sticks, tolerance, iterations, shorte
         forces (n, 2, K), their derivative, shares (n, 3), residual (m, K), p (m, K); and how steps
         were solved for: the sum of BY_LU and BY_ITERATIONS, 0 where every contact sticks.
     """
-    m, K = w.shape
-    n = m // d
-    work = (
-        np.zeros((n, 2, K)),
-        np.zeros((n, 2, K)),
-        np.zeros((n, 2, K, 2, K)),
-        np.zeros((n, 3)),
-        np.zeros((m, K)),
-        np.zeros((m, K)),
-    )
-    flex = linear.flex
-    springs = linear.springs
-    motions = linear.motions
+    work = _empty_work(w.shape[0], d, w.shape[1])
     J = work[2]
     r = work[5]
-    step = np.empty((m, K))
-    after = np.empty((m, K))
+    step = np.empty(w.shape)
+    after = np.empty(w.shape)
     trial = w.copy()
-    active, C = _moving_nodes(J, springs, d, np.inf)
-    few = flex
+    active, C, few, level = _linearise_nodes(J, linear, d, np.inf)
     factors = (np.empty((0, 0)), np.empty(0, np.int64))
-    level = no_level()
     code = SEARCHING
     solver = 0
     steps = -1
@@ -289,47 +364,36 @@ def compiled_newton(w, d, linear, contact, sticks, tolerance, iterations, shorte
         fresh = _evaluate_residual(trial, d, linear, contact, work)
         if steps >= 0 and not fresh <= tolerance:
             factors = _newton_step(
-                r, LINE_SEARCH_ACCURACY, d, active, C, flex, few, factors, level, after
+                r, LINE_SEARCH_ACCURACY, d, active, C, linear.flex, few, factors, level, after
             )
             if not frobenius_norm(after) <= (1 - 0.25 * share) * before:
                 share /= 2
-                if share < shortest:
-                    code = STALLED
+                code = STALLED if share < shortest else SEARCHING
                 _take_step(w, share, step, trial)
                 continue
         error = fresh
         steps = steps + 1
         _take_step(trial, 0.0, step, w)
-        if error <= tolerance or not np.isfinite(error) or steps == iterations:
-            code = (
-                CONVERGED if error <= tolerance else (EXHAUSTED if np.isfinite(error) else INFINITE)
-            )
+        code = _stop_code(error, tolerance, steps, iterations)
+        if code != SEARCHING:
             break
-        active, C = _moving_nodes(J, springs, d, sticks)
-        few = select_nodes(flex, active, d)
+        active, C, few, level = _linearise_nodes(J, linear, d, sticks)
+        accuracy = _step_accuracy(error, tolerance)
         # new arrays: slices would have another memory layout, and compile everything twice
         factors = (np.empty((0, 0)), np.empty(0, np.int64))
-        wide = motions.size > 0 and active.size * d * K >= DEFLATION_UNKNOWNS
-        level = second_level(few, C, motions, active, d) if wide else no_level()
-        needed = max(
-            FINEST_STEP_ACCURACY,
-            min(0.1 * error, COARSEST_STEP_ACCURACY),
-            min(0.1 * tolerance / error, LAST_STEP_ACCURACY),
-        )
-        factors = _newton_step(r, needed, d, active, C, flex, few, factors, level, step)
+        factors = _newton_step(r, accuracy, d, active, C, linear.flex, few, factors, level, step)
         before = frobenius_norm(step)
-        if active.size * d * K > BLOCKED_LU_UNKNOWNS:
+        if C.shape[0] * C.shape[1] > BLOCKED_LU_UNKNOWNS:
             solver |= BY_ITERATIONS
         if factors[1].size:
             solver |= BY_LU
         share = 1.0
-        if not np.isfinite(before):
-            code = SINGULAR
+        code = SEARCHING if np.isfinite(before) else SINGULAR
         _take_step(w, share, step, trial)
     return steps, code, error, work[1], J, work[3], r, work[4], solver
 
 
-@njit(cache=True, error_model="numpy")
+@njit(**INNER_KERNEL)
 def _newton_step(r, accuracy, d, active, C, flex, few, factors, level, step):
     """Fill step (m, K) with the inverse derivative times r (m, K); returns the factors where they
     were needed.
@@ -337,7 +401,9 @@ def _newton_step(r, accuracy, d, active, C, flex, few, factors, level, step):
     K = r.shape[1]
     among = np.empty((active.size * d, K))
     for y in range(active.size):
-        among[y * d : (y + 1) * d] = r[active[y] * d : (active[y] + 1) * d]
+        for b in range(d):
+            for k in range(K):
+                among[y * d + b, k] = r[active[y] * d + b, k]
     x, factors = _apply_inverse(among.reshape(among.size), accuracy, few, C, factors, level)
-    _spread_to_all_nodes(x, r, d, active, C, flex, step)
+    spread_to_all_nodes(x, r, d, active, C, flex, step)
     return factors

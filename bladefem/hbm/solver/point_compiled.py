@@ -1,9 +1,8 @@
 """A whole point of a small model of 1-D elements in one compiled call: flexibilities, Newton, works
 and states.
 
-The plain way through `bladefem.hbm.linear.condensation`, `newton` and `api` does the same in fifty
-NumPy calls, which is most of its time where there are few contacts. A point that does not end well
-is left to the fallback chain; a test holds the two ways together.
+The same kernels one after the other, with NumPy between them, take fifty calls, which is most of
+the time where there are few contacts. A point that does not end well is left to the fallback chain.
 """
 
 from __future__ import annotations
@@ -16,11 +15,13 @@ import numpy as np
 from numba import njit
 
 from ...friction.states import NODE_STATES
+from ...util.numba_options import KERNEL
+from ..linear.array_copy import copy_matrix, copy_vector
 from ..linear.condensation_compiled import linear_part
 from ..linear.packed_bodies import prepared_bodies
 from ..model import ReducedModel
-from ..point_measures import carried_load, count_states
-from ..policy import COMPILED_POINT
+from ..point_measures import MEASURES, count_states, measure_point
+from ..policy import COMPILED_POINT, uses_compiled_point
 from ..predictor import PREDICTOR_POINTS, append_solution, extrapolate_solution
 from ..solution import Solution, Work
 from .newton import SHORTEST_STEP_SHARE, Options, route_of, solvers_of
@@ -168,11 +169,25 @@ def _point_solution(
     )
 
 
-@njit(cache=True, error_model="numpy")
+@njit(cache=True, error_model="numpy", inline="always")
+def _empty_points(p, n, d, K):
+    """Room for p points: displacements (p, n d, K), forces (p, n, d, K), ends (p, 3), counts (p, 4),
+    measures (p, MEASURES).
+    """
+    return (
+        np.empty((p, n * d, K)),
+        np.empty((p, n, d, K)),
+        np.empty((p, 3)),
+        np.empty((p, 4), np.int64),
+        np.empty((p, MEASURES)),
+    )
+
+
+@njit(**KERNEL)
 def _compiled_points(
     omegas, bodies, springs, contact, d, H, known, at, count, chained, tolerance, iterations
 ):
-    """Displacements (p, m, K), steps, error and solver (p, 3), and what `_measure_point` gives, of
+    """Displacements (p, m, K), steps, error and solver (p, 3), and what `measure_point` gives, of
     the first frequencies.
 
     They start from the curve through `count` of known (3, m, K) at the frequencies at (3,), which
@@ -180,22 +195,16 @@ def _compiled_points(
     converge. If chained is 0 all have the same start; else the known are those solved last, and
     none where all contacts stick; 2 ends with such a point.
     """
-    p = omegas.size
-    m = springs.size
-    K = 2 * H + 1
-    w = np.empty((p, m, K))
-    f = np.empty((p, m // d, d, K))
-    ends = np.empty((p, 3))
-    counts = np.empty((p, 4), np.int64)
-    measures = np.empty((p, 7))
-    probe = np.empty((p, *bodies.straight.shape), np.complex128)
+    nodes = springs.size // d
+    w, f, ends, counts, measures = _empty_points(omegas.size, nodes, d, 2 * H + 1)
+    probe = np.empty((omegas.size, *bodies.straight.shape), np.complex128)
     done = 0
-    for i in range(p):
-        flexible, linear, free = linear_part(omegas[i], bodies, springs, H)
+    for i in range(omegas.size):
+        modal, linear, free, _ = linear_part(omegas[i], bodies, springs, H)
         if count:
             extrapolate_solution(omegas[i], known, at, count, w[i])
         else:
-            w[i] = linear.stuck
+            copy_matrix(linear.stuck, w[i])
         steps, code, error, F, _, shares, residual, _, solver = compiled_newton(
             w[i],
             d,
@@ -212,11 +221,23 @@ def _compiled_points(
         ends[i, 0] = steps
         ends[i, 1] = error
         ends[i, 2] = solver
-        f[i], probe[i], counts[i], measures[i] = _measure_point(
-            omegas[i], bodies, springs, (flexible, free), w[i], d, F, contact[5], residual, shares
+        measure_point(
+            omegas[i],
+            bodies,
+            springs,
+            (modal, free),
+            w[i],
+            d - 1,
+            F,
+            contact[5],
+            residual,
+            f[i],
+            probe[i],
+            measures[i],
         )
+        copy_vector(count_states(shares), counts[i])
         if chained:
-            sticks = counts[i, 0] == m // d
+            sticks = counts[i, 0] == nodes
             count = 0 if sticks else append_solution(omegas[i], w[i], known, at, count)
             if chained == 2 and sticks:
                 break
@@ -225,7 +246,7 @@ def _compiled_points(
 
 def compiles_points(model: ReducedModel, H: int) -> bool:
     """True if points of the model are compiled as a whole."""
-    return prepared_bodies(model, H) is not None
+    return uses_compiled_point(model, H)
 
 
 def _prepared_arguments(
@@ -233,112 +254,7 @@ def _prepared_arguments(
     H: int,
     samples: int,
 ) -> tuple | None:
-    """What a point needs beside its frequency; made once."""
-    bodies = prepared_bodies(model, H)
-    return (
-        None
-        if bodies is None
-        else (bodies, model.springs.ravel(), contact_table(model, H, samples))
-    )
-
-
-@njit(cache=True, error_model="numpy")
-def _measure_point(omega, bodies, springs, linear, w, d, F, preload, residual, shares):
-    """Forces (n, d, K), probe (H+1, p), numbers of states (4,); residuals, load on the springs of
-    the regularisation and works (7,).
-    """
-    m, K = w.shape
-    f = np.empty((m // d, d, K))
-    load = np.empty((m, K))
-    out = np.zeros(7)
-    for i in range(m):
-        for k in range(K):
-            f[i // d, i % d, k] = F[i // d, 2 - d + i % d, k]
-            load[i, k] = f[i // d, i % d, k] - (preload[i] if k == 0 else 0.0)
-            out[0] = max(out[0], abs(residual[i, k]))
-            out[1] = max(out[1], springs[i] * abs(residual[i, k]))
-    out[2] = carried_load(bodies.B, bodies.g, load)
-    modal, probe = _blade_motion(bodies, linear, load, w, springs)
-    _period_works(omega, bodies, modal, load, w, d, out[3:])
-    return f, probe, count_states(shares), out
-
-
-@njit(cache=True, error_model="numpy")
-def _blade_motion(bodies, linear, load, w, springs):
-    """Modal amplitudes (H+1, M) and probes (H+1, p) under the excitation and the contact load (m,
-    K).
-    """
-    flexible, free = linear
-    contact = bodies.contact
-    probes = bodies.probe
-    across = bodies.across
-    push = bodies.push
-    straight = bodies.straight
-    mean = bodies.mean_G
-    still = bodies.still
-    m = load.shape[0]
-    H = flexible.shape[0] - 1
-    M = flexible.shape[1]
-    B = bodies.B
-    r = bodies.B.shape[1]
-    modal = np.empty((H + 1, M), np.complex128)
-    probe = np.empty(straight.shape, np.complex128)
-    rigid = np.zeros(still.size)
-    for a in range(r):
-        along = 0.0
-        for i in range(m):
-            gap = w[i, 0] - free[0, i].real
-            for j in range(m):
-                gap += mean[i, j] * load[j, 0]
-            along += B[i, a] * springs[i] * gap
-        for k in range(rigid.size):
-            rigid[k] += bodies.rigid[k, a] * along
-    for h in range(H + 1):
-        s = min(h, contact.shape[0] - 1)
-        for k in range(M):
-            modal[h, k] = push[h, k]
-            for i in range(m):
-                modal[h, k] -= contact[s, i, k].conjugate() * _complex_amplitude(load, i, h)
-            modal[h, k] *= flexible[h, k]
-        for a in range(probe.shape[1]):
-            probe[h, a] = straight[h, a]
-            for k in range(M):
-                probe[h, a] += probes[min(h, probes.shape[0] - 1), a, k] * modal[h, k]
-            for i in range(m):
-                probe[h, a] -= across[min(h, across.shape[0] - 1), a, i] * _complex_amplitude(
-                    load, i, h
-                )
-    for a in range(probe.shape[1]):
-        for k in range(rigid.size):
-            probe[0, a] += probes[0, a, still[k]] * rigid[k]
-    return modal, probe
-
-
-@njit(cache=True, error_model="numpy", inline="always")
-def _complex_amplitude(x, i, h):
-    return complex(x[i, 2 * h - 1], -x[i, 2 * h]) if h else complex(x[i, 0], 0.0)
-
-
-@njit(cache=True, error_model="numpy")
-def _period_works(omega, bodies, modal, load, w, d, out):
-    """out (4,): work of the excitation, lost in the bodies, of the balanced friction forces,
-    dissipated in contacts.
-    """
-    own = bodies.own
-    viscous = bodies.viscous
-    hysteretic = bodies.hysteretic
-    push = bodies.push
-    direct = bodies.direct
-    for h in range(1, modal.shape[0]):
-        s = min(h, own.shape[0] - 1)
-        for k in range(modal.shape[1]):
-            q = modal[h, k]
-            out[0] -= np.pi * h * (push[h, k].conjugate() * q).imag
-            loss = h * omega * viscous[s, k] + hysteretic[s, k]
-            out[1] += np.pi * h * loss * (q.real**2 + q.imag**2)
-        for i in range(load.shape[0]):
-            force = _complex_amplitude(load, i, h)
-            out[0] += np.pi * h * (direct[h, i].conjugate() * force).imag
-            friction = np.pi * h * (force * _complex_amplitude(w, i, h).conjugate()).imag
-            out[2] += friction
-            out[3] += friction if i % d == d - 1 else 0.0
+    """What a point needs next to its frequency; None if compiled points do not apply."""
+    if not uses_compiled_point(model, H):
+        return None
+    return prepared_bodies(model, H), model.springs.ravel(), contact_table(model, H, samples)

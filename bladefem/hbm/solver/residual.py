@@ -27,21 +27,20 @@ from ...friction.fourier import to_complex, to_real
 from ...friction.kernel_1d_exact import evaluate_exact
 from ...friction.trigonometric_tables import trigonometric_tables
 from ...util.arrays import RealArray
-from ..linear.condensation import Linear, condense
-from ..linear.contact_flexibility import by_harmonic
+from ..linear.condensation import Linear, condense, with_mean
 from ..model import ReducedModel
 from ..policy import DENSE_LU, DETERMINANT_UNKNOWNS, ITERATIONS, linear_solver
 from ..solution import Solution
-from .deflation import common_motions
-from .newton_compiled import Condensed
+from .newton_compiled import (
+    balance_residual,
+    dense_jacobian,
+    moving_nodes,
+    spread_to_all_nodes,
+)
 from .newton_krylov import Memory, iterative_inverse
 
 # of a step by GMRES, relative
 STEP_ACCURACY = 1e-5
-# of the preload's compression: smaller motions drown in its rounding,
-SMALL_MOTION_RATIO = 1e-8
-# and their residual is measured by this share of it
-REST_MOTION_SHARE = 1e-4
 # a node whose p is below this share of its spring force sticks
 STICKING_FORCE_SHARE = 1e-13
 # of the size of the motion: step of the walk by which forces are differenced
@@ -106,11 +105,18 @@ def evaluate_balance(
     model = balance.model
     linear = balance.linear
     forces = contact_forces(model, w, balance.samples, precision, walk_ramp(balance, w))
-    p = forces.f - model.springs[:, :, None] * w
-    p[:, :, 0] -= model.preload.reshape(p.shape[:2])
-    flexed = _as_node_coefficients(balance, _apply_flexibility(linear.A, as_amplitudes(p)))
-    residual = w - _as_node_coefficients(balance, linear.stuck) + flexed
-    return State(w, forces, p, residual, _relative_error(balance, w, residual))
+    p = np.empty(w.shape)
+    residual = np.empty(w.shape)
+    flat = (model.springs.size, w.shape[2])
+    error = balance_residual(
+        np.ascontiguousarray(w, dtype=float).reshape(flat),
+        linear.condensed,
+        model.preload,
+        np.ascontiguousarray(forces.f),
+        p.reshape(flat),
+        residual.reshape(flat),
+    )
+    return State(w, forces, p, residual, error)
 
 
 def contact_forces(
@@ -262,9 +268,9 @@ def _held_walk(balance: Balance) -> Balance:
     """The balance with  A - b b^T  in place of A: its derivative is regular where the mean position
     along b has no influence.
     """
-    A = balance.linear.A.copy()
-    A[0] -= balance.walking @ balance.walking.T
-    return replace(balance, linear=replace(balance.linear, A=A), walk=None)
+    linear = balance.linear
+    mean = linear.A[0] - balance.walking @ balance.walking.T
+    return replace(balance, linear=with_mean(linear, mean, linear.stuck[0]), walk=None)
 
 
 def _walk_terms(balance: Balance, state: State) -> tuple[np.ndarray, np.ndarray]:
@@ -277,7 +283,8 @@ def _walk_terms(balance: Balance, state: State) -> tuple[np.ndarray, np.ndarray]
         _as_node_coefficients(balance, _apply_flexibility(balance.linear.A, as_amplitudes(rate)))
         for rate in walk_rates(balance, state)
     ]
-    change = _force_change(balance, state)
+    change = state.forces.jacobian.reshape(shape[0], shape[1] * shape[2], -1)
+    springs = balance.model.springs[:, :, None]
     motions = []
     rows = []
     projections = []
@@ -286,7 +293,7 @@ def _walk_terms(balance: Balance, state: State) -> tuple[np.ndarray, np.ndarray]
         motion[:, :, 0] = b.reshape(shape[:2])
         motions.append(motion)
         flat = motion.reshape(shape[0], -1, 1)
-        rows.append((change.swapaxes(1, 2) @ flat).reshape(shape))
+        rows.append((change.swapaxes(1, 2) @ flat).reshape(shape) - springs * motion)
         projection = np.zeros(shape)
         projection[:, :, 0] = (balance.linear.springs * b).reshape(shape[:2])
         projections.append(projection)
@@ -323,12 +330,10 @@ def _linearise_blocks(
     memory: Memory | None = None,
 ) -> Inverse:
     """`linearise_balance` without the walk."""
-    n, d, K = state.w.shape
+    _, d, K = state.w.shape
     change, active, dofs = _active_nodes(balance, state)
     if len(active) == 0:
         return lambda residual, accuracy=0.0: residual.copy()
-    others = np.setdiff1d(np.arange(n), active)
-    change = change[active]
     A = _select_dofs(balance.linear.A, dofs)
     if memory is not None and memory.nodes != active.tobytes():
         memory.nodes, memory.blocks, memory.slow = (
@@ -336,17 +341,20 @@ def _linearise_blocks(
             None,
             memory.slow or memory.blocks is not None,
         )
-    inverse = _choose_inverse(A, change, memory, common_motions(balance.model, K // 2)[dofs])
+    inverse = _choose_inverse(A, change, memory, balance.linear.condensed.motions[dofs])
 
     def solve(residual: np.ndarray, accuracy: float = STEP_ACCURACY) -> np.ndarray:
-        step = residual.copy()
-        step[active] = inverse(residual[active].reshape(-1, K), accuracy).reshape(-1, d, K)
-        if len(others):
-            p = np.zeros_like(step)
-            p[active] = (change @ step[active].reshape(len(active), d * K, 1)).reshape(-1, d, K)
-            step[others] -= _as_node_coefficients(
-                balance, _apply_flexibility(balance.linear.A, as_amplitudes(p))
-            )[others]
+        step = np.empty(residual.shape)
+        x = inverse(residual[active].reshape(-1, K), accuracy)
+        spread_to_all_nodes(
+            np.ascontiguousarray(x).ravel(),
+            np.ascontiguousarray(residual).reshape(-1, K),
+            d,
+            active,
+            change,
+            balance.linear.condensed.flex,
+            step.reshape(-1, K),
+        )
         return step
 
     return solve
@@ -370,7 +378,7 @@ def _adjoint_blocks(balance: Balance, state: State) -> Inverse:
     if len(active) == 0:
         return lambda b, accuracy=0.0: b.copy()
     turned = np.ascontiguousarray(balance.linear.A.conj().swapaxes(1, 2))
-    back = np.ascontiguousarray(change[active].swapaxes(1, 2))
+    back = np.ascontiguousarray(change.swapaxes(1, 2))
     inverse = _choose_inverse(_select_dofs(turned, dofs), back)
 
     def solve(b: np.ndarray, accuracy: float = STEP_ACCURACY) -> np.ndarray:
@@ -405,25 +413,27 @@ def determinant_sign(balance: Balance, state: State) -> float:
     # everything sticks: the derivative is the identity
     if not len(dofs):
         return 1.0
-    J = _dense_jacobian(_select_dofs(balance.linear.A, dofs), change[active])
-    J[np.diag_indices_from(J)] += 1.0
+    J = dense_jacobian(_select_dofs(balance.linear.A, dofs), change)
     return float(np.linalg.slogdet(J)[0])
 
 
 def _active_nodes(balance: Balance, state: State) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Derivative of p (n, dK, dK), the nodes where it does not vanish, and their dofs."""
-    n, d, _ = state.w.shape
-    change = _force_change(balance, state)
-    active = np.flatnonzero(
-        abs(change).reshape(n, -1).max(axis=1)
-        > STICKING_FORCE_SHARE * balance.model.springs.max(axis=1)
+    """Derivative of p where it does not vanish (nodes, dK, dK), these nodes, and their dofs."""
+    d = state.w.shape[1]
+    active, change = moving_nodes(
+        np.ascontiguousarray(state.forces.jacobian, dtype=float),
+        balance.model.springs.ravel(),
+        d,
+        STICKING_FORCE_SHARE,
     )
     return change, active, (active[:, None] * d + np.arange(d)).ravel()
 
 
 def _select_dofs(A: np.ndarray, dofs: np.ndarray) -> np.ndarray:
     """(H+1, a, a) the flexibilities among some of the dofs, in one copy where one is needed."""
-    return A if len(dofs) == A.shape[1] else A[np.ix_(np.arange(len(A)), dofs, dofs)]
+    if len(dofs) == A.shape[1]:
+        return A
+    return np.ascontiguousarray(A[np.ix_(np.arange(len(A)), dofs, dofs)])
 
 
 def _choose_inverse(
@@ -466,33 +476,13 @@ def _with_factors_at_need(
 
 
 def _dense_inverse(A: np.ndarray, change: np.ndarray) -> Inverse:
-    J = _dense_jacobian(A, change)
-    J[np.diag_indices_from(J)] += 1.0
+    J = dense_jacobian(A, change)
     factors = linalg.lu_factor(J, overwrite_a=True, check_finite=False)
     if not abs(np.diag(factors[0])).min() > 0:
         raise np.linalg.LinAlgError("singular Jacobian")
     return lambda residual, _: linalg.lu_solve(
         factors, residual.ravel(), check_finite=False
     ).reshape(residual.shape)
-
-
-def compiled_arguments(balance: Balance) -> Condensed:
-    """The linear part as the compiled loop takes it."""
-    linear = balance.linear
-    G = linear.G.copy()
-    none = np.zeros((0, 0, 0), dtype=complex)
-    G[0] = 0.0
-    return Condensed(
-        by_harmonic(linear.A),
-        G,
-        to_real(linear.stuck.T),
-        linear.springs,
-        _motion_scale(linear),
-        none,
-        none,
-        none.reshape(0, 0),
-        common_motions(balance.model, len(G) - 1),
-    )
 
 
 def contact_table(
@@ -513,60 +503,6 @@ def contact_table(
             model.offset,
         ),
     )
-
-
-def _motion_scale(linear: Linear) -> float:
-    return float(
-        max(np.linalg.norm(linear.free), np.linalg.norm(linear.stuck), np.finfo(float).tiny)
-    )
-
-
-def _force_change(balance: Balance, state: State) -> np.ndarray:
-    """(n, dK, dK) derivative of p."""
-    n, d, K = state.w.shape
-    change = state.forces.jacobian.reshape(n, d * K, d * K).copy()
-    change[:, np.arange(d * K), np.arange(d * K)] -= np.repeat(balance.model.springs, K, axis=1)
-    return change
-
-
-def _dense_jacobian(A: np.ndarray, change: np.ndarray) -> np.ndarray:
-    """(a K, a K) real matrix of  p -> A p  times `change` (nodes, dK, dK), for a = nodes * d
-    dofs.
-    """
-    nodes, size = change.shape[:2]
-    H = A.shape[0] - 1
-    a = A.shape[1]
-    d = a // nodes
-    K = 2 * H + 1
-    # (K, nodes, d, dK)
-    rows = change.reshape(nodes, d, K, size).transpose(2, 0, 1, 3)
-    rows = np.concatenate([rows[:1].astype(complex), rows[1::2] - 1j * rows[2::2]])
-    # (H+1, nodes, a, d)
-    blocks = A.reshape(H + 1, a, nodes, d).transpose(0, 2, 1, 3)
-    product = (blocks @ rows).transpose(0, 2, 1, 3).reshape(H + 1, a, nodes * size)
-    J = np.empty((a, K, nodes * size))
-    J[:, 0] = product[0].real
-    J[:, 1::2] = product[1:].real.transpose(1, 0, 2)
-    J[:, 2::2] = -product[1:].imag.transpose(1, 0, 2)
-    return J.reshape(a * K, nodes * size)
-
-
-def _relative_error(
-    balance: Balance,
-    w: np.ndarray,
-    residual: np.ndarray,
-) -> float:
-    linear = balance.linear
-    r = as_amplitudes(residual)
-    size = float(np.linalg.norm(as_amplitudes(w)))
-    scale = _motion_scale(linear)
-    pressed = balance.model.compression
-    if scale < SMALL_MOTION_RATIO * pressed:
-        size = max(size, REST_MOTION_SHARE * pressed)
-        scale = max(scale, REST_MOTION_SHARE * pressed)
-    with_springs = float(np.linalg.norm(r)) / max(size, float(np.finfo(float).tiny))
-    r[1:] += _apply_flexibility(linear.G[1:], linear.springs * r[1:])
-    return max(with_springs, float(np.linalg.norm(r)) / scale)
 
 
 def _apply_flexibility(flexibility: np.ndarray, forces: np.ndarray) -> np.ndarray:

@@ -15,7 +15,8 @@ from dataclasses import replace
 import numpy as np
 
 from ...friction.law_table import forgets_position
-from ..linear.condensation import with_springs
+from ..linear.condensation import with_mean
+from ..linear.mean_motion import with_springs
 from ..model import ReducedModel
 from .residual import Balance, State
 
@@ -140,16 +141,14 @@ def held_balance(balance: Balance) -> Balance:
     without them.
     """
     linear = balance.linear
-    A = linear.A.copy()
-    stuck = linear.stuck.copy()
-    A[0], stuck[0] = with_springs(
-        linear.G[0].real, linear.free[0].real, linear.springs, linear.B, linear.g, HOLDING_SHARE
+    A, stuck = with_springs(
+        linear.bodies.mean_G, linear.free[0].real, linear.springs, linear.B, linear.g, HOLDING_SHARE
     )
-    return replace(balance, linear=replace(linear, A=A, stuck=stuck), walk=None)
+    return replace(balance, linear=with_mean(linear, A, stuck), walk=None)
 
 
 def sampled_walk(balance: Balance) -> Balance:
     """The balance with samples, which the ramp of a walk needs."""
     if balance.samples:
         return balance
-    return replace(balance, samples=WALK_SAMPLES * len(balance.linear.G))
+    return replace(balance, samples=WALK_SAMPLES * len(balance.linear.stuck))

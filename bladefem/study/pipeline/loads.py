@@ -26,6 +26,8 @@ from ..adaptive.family import Family, member
 from ..adaptive.resonance_curve import resonance_curve, unfollowed
 from ..adaptive.settings import Settings, restarted
 from .assemble_model import LoadCase
+from .body_mesh import SofterBody, softened_change
+from .kept_band import KeptBand, kept_band
 from .liftoff import named
 from .linear_limits import Limit
 from .load_interval import LoadInterval, load_interval
@@ -93,20 +95,28 @@ class Curve:
     bifurcation: np.ndarray
     # the highest converged point where that one is unstable, else None
     unstable_peak: Solution | None = None
+    # what the blade does at that one in time; None where it is stable
+    kept: KeptBand | None = None
     # range of the resonance over loading histories; None where it was not asked for
     interval: LoadInterval | None = None
     # contacts lift off and the balance is too large for following its motions round folds: a
     # higher motion may exist
     unfollowed: bool = False
+    # relative change of the peak's height by the estimated error of the body's mesh; NaN: not
+    # estimated
+    body_mesh: float = np.nan
 
     @property
     def error(self) -> float | None:
-        """Estimated relative error of the resonance amplitude: that of the balance, and what half
-        as many contact points change (the contact mesh); None where it was not asked for.
+        """Estimated relative error of the resonance amplitude: that of the balance, what half as
+        many contact points change (the contact mesh), and the body's mesh; None where it was not
+        asked for.
         """
         if self.settings.error is None:
             return None
-        return self.settings.error + (self.halved if np.isfinite(self.halved) else 0.0)
+        contact_mesh = self.halved if np.isfinite(self.halved) else 0.0
+        body_mesh = 0.0 if np.isnan(self.body_mesh) else self.body_mesh
+        return self.settings.error + contact_mesh + body_mesh
 
     @property
     def peak_frequency(self) -> float:
@@ -127,6 +137,7 @@ def study_loads(
     comm: Communicator | None = None,
     progress: Progress = unwatched,
     keep: Keep = forgotten,
+    softer: SofterBody | None = None,
 ) -> list[Curve]:
     """One response curve a load case, shared over the ranks; every rank returns all of them.
 
@@ -140,11 +151,12 @@ def study_loads(
             label.
         keep: keep(case, compute) gives the curve of a load, found from an earlier run or computed
             and kept.
+        softer: the body less the error of its stiffness, for the error by its mesh.
     """
     rank = 0 if comm is None else comm.rank
     ranks = 1 if comm is None else comm.size
     curves = {
-        i: keep(cases[i], partial(curve_of, scene, cases[i], family, settings))
+        i: keep(cases[i], partial(curve_of, scene, cases[i], family, settings, softer))
         for i in progress(dealt(len(cases), rank, ranks), "forced responses", delay=0.0)
     }
     if comm is not None and ranks > 1:
@@ -173,6 +185,7 @@ def curve_of(
     case: LoadCase,
     family: Callable[[LoadCase], Family],
     settings: Settings,
+    softer: SofterBody | None = None,
 ) -> Curve:
     """Sweep a band with points where the curve needs them, with settings that hold at its peak and
     on its flanks.
@@ -203,6 +216,7 @@ def curve_of(
     columns = {name: np.array([row[name] for row in rows]) for name in rows[0]}
     lifts = any(p.states["lift"] > 0 for p in curve.points if p.converged)
     halved = np.nan if scene.contact.points else halved_change(models, curve.settings, top)
+    body_mesh = np.nan if softer is None else softened_change(softer, case, curve.settings, top)
     interval = None
     if scene.study.interval:
         model = member(models, curve.settings).model
@@ -221,8 +235,10 @@ def curve_of(
         peak=top,
         bifurcation=marks.bifurcation if len(marks.bifurcation) else np.full(len(heights), ""),
         unstable_peak=None if top is highest else highest,
+        kept=None if top is highest else kept_band(model, highest),
         interval=interval,
         unfollowed=lifts and unfollowed(models, curve.settings),
+        body_mesh=body_mesh,
     )
 
 
@@ -289,6 +305,7 @@ def _row(c: Curve) -> dict[str, Any]:
         "drift": c.peak.drift,
         "error": np.nan if c.error is None else c.error,
         "halved": c.halved,
+        "body_mesh": c.body_mesh,
         "harmonics": c.settings.harmonics,
         "points": len(c.frequency),
         "unconverged": int((~c.converged).sum()),
@@ -322,6 +339,7 @@ def _linear_row(limit: Limit) -> dict[str, Any]:
         "drift": 0.0,
         "error": 0.0,
         "halved": 0.0,
+        "body_mesh": 0.0,
         "harmonics": 1,
         "points": len(limit.frequency),
         "unconverged": 0,

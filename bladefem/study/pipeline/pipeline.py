@@ -43,6 +43,13 @@ from ..modes.clamped_aerofoil import clamped_blade
 from ..modes.stress import strength
 from .assemble_model import LoadCase, joint_model
 from .best_load import BestLoad, chart_loads, find_best_load
+from .body_mesh import (
+    ModeErrors,
+    SofterBody,
+    frequency_ratio,
+    mode_errors,
+    softened,
+)
 from .changed_cases import cases_of, changed_cases, seated_case
 from .contact_cycle import labels
 from .damped_motion import DampedStress, damped_stress
@@ -173,7 +180,7 @@ def run(
     if patches:
         refuse_jamming(scene, meshed.mesh, patches)
     bodies = Bodies(scene, meshed.mesh, comm, progress)
-    modal = _run_modes(meshed, bodies, keep)
+    modal = _run_modes(meshed, bodies, keep, responds)
     if until == "modes":
         return modal
     seated = _run_contact(modal, bodies, patches, keep)
@@ -200,10 +207,17 @@ def _run_mesh(scene: Scene, keep: _Keeper) -> Run:
     )
 
 
-def _run_modes(before: Run, bodies: Bodies, keep: _Keeper) -> ModalRun:
+def _run_modes(
+    before: Run,
+    bodies: Bodies,
+    keep: _Keeper,
+    responds: bool,
+) -> ModalRun:
     key = stage_key("modes", before.scene)
+    # the reduction needs more modes of the same pencils
+    reduced = judged_modes(before.scene, first_settings(before.scene)) if responds else 0
     with keep.clock("modes"):
-        modes = keep("modes", key, lambda: find_modes(bodies))
+        modes = keep("modes", key, lambda: find_modes(bodies, reduced=reduced))
         clamped = keep("clamped", key, lambda: clamped_blade(bodies))
     return ModalRun(**vars(before), modes=modes, clamped=clamped)
 
@@ -241,7 +255,18 @@ def _run_reduction(
     middle = cases[len(cases) // 2]
     with keep.clock("reduction"):
         settings, reduced = reduced_sector(scene, bodies, middle, patches, keep)
-    return ReducedRun(**vars(before), strength=stressed, settings=settings, reduced=reduced)
+        errors = keep(
+            "mode_errors",
+            stage_key("reduction", scene, "mode errors"),
+            lambda: mode_errors(bodies, patches, excited),
+        )
+    return ReducedRun(
+        **vars(before),
+        strength=stressed,
+        settings=settings,
+        reduced=reduced,
+        mode_errors=errors,
+    )
 
 
 def _run_response(before: ReducedRun, patches: list[Patch], keep: _Keeper) -> SolvedRun:
@@ -258,7 +283,13 @@ def _run_response(before: ReducedRun, patches: list[Patch], keep: _Keeper) -> So
         loads = studied_loads(scene, before.contact.own, chart_loads(best))
         before = replace(before, contact=_at_loads(scene, before.contact, loads, clock))
     cases = load_cases(scene, mesh, before.contact)
-    response = _response(scene, cases, family, settings, keep)
+    softer = softer_body(scene, mesh, before.reduced, patches, before.mode_errors)
+    if softer is None:
+        clock.messages.append(
+            "errors by the body's mesh are not estimated: the reduced model has other modes than "
+            "those of the stage, or its elements are far too large"
+        )
+    response = _response(scene, cases, family, settings, keep, softer)
     with clock("influences"):
         found = _influences(scene, mesh, before.contact, family, best, keep)
     curves = response.curves
@@ -382,6 +413,7 @@ def _response(
     family: Callable[[LoadCase], Family],
     settings: Settings,
     keep: _Keeper,
+    softer: SofterBody | None,
 ) -> Response:
     clock = keep.clock
     with clock("response"):
@@ -397,6 +429,7 @@ def _response(
                 stage_key("response", scene, case.load, case.mass, replace(settings, error=None)),
                 make,
             ),
+            softer,
         )
         band = min(c.frequency[0] for c in curves), max(c.frequency[-1] for c in curves)
         rich = member(family(cases[-1]), settings).model
@@ -626,12 +659,34 @@ def family_of_case(
     )
 
 
+def softer_body(
+    scene: Scene,
+    mesh: Mesh,
+    reduced: Reduced,
+    patches: Sequence[Patch],
+    errors: ModeErrors,
+) -> SofterBody | None:
+    """All models of each load case on the blade less the error of its stiffness."""
+    softer = softened(reduced, errors)
+    if softer is None:
+        return None
+    ratio = frequency_ratio(reduced, softer, errors, scene.excitation.mode)
+    return SofterBody(partial(family_of_case, scene, mesh, softer, list(patches)), ratio)
+
+
 def _affordable(case: LoadCase) -> int:
     """Harmonics that UNKNOWNS allow with all contact points; twice as many judge them, at single
     points.
     """
     dofs = case.selection.shape[1]
     return max((h for h in (3, 7, 15, 31) if dofs * (2 * h + 1) <= UNKNOWNS), default=3)
+
+
+def judged_modes(scene: Scene, settings: Settings) -> int:
+    """Modes of each nodal diameter to reduce with: where their number is open, twice as many as the
+    balance takes, which judge it.
+    """
+    return settings.modes if scene.model.modes else 2 * settings.modes
 
 
 def reduced_sector(
@@ -643,15 +698,11 @@ def reduced_sector(
 ) -> tuple[Settings, Reduced]:
     """The sector with as many modes as the resonance of one load needs, and settings to start the
     others from.
-
-    Where the number of modes is open, twice as many are reduced as the balance takes: they judge
-    it.
     """
     settings = replace(first_settings(scene), most=_affordable(case))
-    spare = 1 if scene.model.modes else 2
     diameters = harmonic_diameters(scene, bodies.mesh, EXACT_HARMONICS)
     while True:
-        count = spare * settings.modes
+        count = judged_modes(scene, settings)
         key = stage_key("reduction", scene, np.array(diameters), count)
         reduced = keep("reduction", key, partial(reduce_sector, bodies, patches, diameters, count))
         if not settings.chosen:

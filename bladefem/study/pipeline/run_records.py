@@ -22,6 +22,7 @@ from ..adaptive.settings import Settings
 from ..influences import Influence
 from ..modes.stress import Strength
 from .best_load import BestLoad
+from .body_mesh import ModeErrors
 from .damped_motion import DampedStress
 from .history import DamperMass
 from .linear_limits import Limit
@@ -158,6 +159,8 @@ class ReducedRun(SeatedRun):
     # of the balance, to start the responses from
     settings: Settings
     reduced: Reduced
+    # of the stiffness, by the body's mesh
+    mode_errors: ModeErrors
 
 
 @dataclass(frozen=True, repr=False, kw_only=True)

@@ -140,7 +140,8 @@ def unstable_sentence(curve: Curve) -> str:
     lost = (
         f"load {curve.load:g} N: the highest motion, {1e6 * size(top):.4g} um at "
         f"{top.frequency:.5g} Hz, is unstable{named}; the resonance given is the highest one that "
-        f"is not, {1e6 * curve.peak_amplitude:.4g} um at {curve.peak_frequency:.5g} Hz, and what "
-        "the blade does in between only a march in time tells"
+        f"is not, {1e6 * curve.peak_amplitude:.4g} um at {curve.peak_frequency:.5g} Hz"
     )
+    if curve.kept is not None:
+        lost += f"; {curve.kept.sentence}"
     return f"{folded}; {lost}" if folded else lost

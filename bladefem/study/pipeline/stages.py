@@ -36,6 +36,8 @@ if TYPE_CHECKING:
 
 # of each nodal diameter, in tables and pictures
 MODES_SHOWN = 10
+# name of the modes that are kept for the reduction
+KEPT_MODES = "modes"
 # of the elastic damper, its six rigid ones included
 DAMPER_MODES = 16
 
@@ -56,6 +58,11 @@ class Bodies:
     mesh: Mesh
     comm: Communicator | None = None
     progress: Progress = unwatched
+
+    @cached_property
+    def kept(self) -> dict[str, Any]:
+        """What one stage leaves to a later one: under KEPT_MODES fem.all_diameters.KeptPairs."""
+        return {}
 
     @cached_property
     def still_blade(self) -> Body:
@@ -208,6 +215,7 @@ def find_modes(
     bodies: Bodies,
     diameters: Sequence[int] | None = None,
     count: int = MODES_SHOWN,
+    reduced: int = 0,
 ) -> list[ModeSet]:
     """Normal modes without damper: of the clamped blade, or of the sector in each nodal diameter.
 
@@ -215,6 +223,8 @@ def find_modes(
         diameters: nodal diameters; ``scene.model.nodal_diameters``, or all that the first harmonics
             of the engine order fall into, when left out.
         count: modes of each nodal diameter.
+        reduced: modes that a reduction of the wheel will need; they are solved at once and kept
+            with the bodies.
 
     >>> import bladefem
     >>> scene = bladefem.load_scene("scenes/plane.toml", ["mesh.size=8 mm"])
@@ -233,7 +243,7 @@ def find_modes(
         or bodies.scene.model.nodal_diameters
         or harmonic_diameters(bodies.scene, bodies.mesh, 3)
     )
-    return wheel_modes(bodies, count, wanted)
+    return wheel_modes(bodies, count, wanted, reduced=reduced)
 
 
 def eigensolver(scene: Scene) -> Eigensolver:
@@ -263,6 +273,7 @@ def wheel_modes(
     diameters: Sequence[int] | None = None,
     direct: bool = False,
     group: int | None = None,
+    reduced: int = 0,
 ) -> list[ModeSet]:
     """Normal modes of a wheel in several nodal diameters, which groups of ranks share out.
 
@@ -270,8 +281,9 @@ def wheel_modes(
         diameters: 0 to N/2 when left out.
         direct: solve every nodal diameter from scratch.
         group: ranks in a group; as few as memory allows when left out.
+        reduced: modes that a reduction will need, kept with the bodies where one rank has them.
     """
-    from ...fem.all_diameters import all_diameters
+    from ...fem.all_diameters import KeptPairs, all_diameters
     from ...fem.compat import MPI
     from ...fem.groups import group_size, shared_out
 
@@ -280,9 +292,18 @@ def wheel_modes(
     wanted = list(range(sector_of(mesh).count // 2 + 1)) if diameters is None else list(diameters)
     solver = eigensolver(bodies.scene)
     if comm.size == 1 or len(wanted) == 1:
-        return all_diameters(
-            bodies.frame, count, wanted, direct, progress=bodies.progress, solver=solver
+        kept = KeptPairs(reduced) if reduced else None
+        found = all_diameters(
+            bodies.frame,
+            count,
+            wanted,
+            direct,
+            progress=bodies.progress,
+            solver=solver,
+            kept=kept,
         )
+        bodies.kept[KEPT_MODES] = kept
+        return found
     size = group or group_size(comm, mesh.dimension * len(np.unique(mesh.bodies["blade"])))
     return shared_out(
         comm,
@@ -422,6 +443,7 @@ def _reduced_diameters(
             some,
             kind=scene.model.reduction,
             solver=solver,
+            kept=some_bodies.kept.pop(KEPT_MODES, None),
         )
         return dict(bodies.progress(steps, "nodal diameters", len(some)))
 

@@ -1,0 +1,148 @@
+"""Is the body's mesh fine enough? By how much its estimated error changes a resonance.
+
+The blade's elements are too stiff. What recovered stress says about that (`fem.stiffness_error`)
+softens the modes of the reduced model, and the resonance is looked for again: the change of its
+amplitude is the estimate. It holds what the modes carry: the shape of the motion at the seats
+against that at the probe, on which friction acts, and the excited mode's share in the force.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from ...data import ModeSet, Patch, PortModel
+from ...errors import NotSolvedError
+from ...hbm.peak import find_peak
+from ...hbm.solution import Solution
+from ...hbm.solver.newton import Options
+from ...hbm.sweep import size
+from ..adaptive.family import Family, member
+from ..adaptive.settings import Settings
+from .assemble_model import LoadCase
+from .ports import blade_ports
+from .stages import Bodies, Reduced
+
+# deviation of the modes seen by the reduction from those of the stage, beyond which they are not
+# the same ones
+SAME_MODES = 0.05
+# relative accuracy of the resonance amplitude
+PEAK_TOLERANCE = 2e-3
+
+
+@dataclass(frozen=True)
+class SofterBody:
+    """All models of a load case on the body less the error of its stiffness."""
+
+    family: Callable[[LoadCase], Family]
+    # frequency of the excited mode over that as meshed
+    ratio: float
+
+
+@dataclass(frozen=True)
+class ModeErrors:
+    """The estimated error of the stiffness, in the modes of one nodal diameter."""
+
+    # key of Reduced.sector
+    diameter: int
+    # (p, m) the modes at the ports [kg^-1/2]
+    shapes: np.ndarray
+    # (m, m) Hermitian [1/s^2]
+    energies: np.ndarray
+
+
+def mode_errors(
+    bodies: Bodies,
+    patches: Sequence[Patch],
+    modes: ModeSet,
+) -> ModeErrors:
+    """Of the modes that the excitation meets."""
+    from ...fem.stiffness_error import stiffness_error
+
+    ports = blade_ports(bodies.mesh, list(patches), bodies.scene.excitation)
+    dim = bodies.mesh.dimension
+    fields = modes.shapes[:, :, :dim]
+    seen = ports.matrix.T @ fields.reshape(len(fields), -1).T
+    energies = stiffness_error(bodies.still_blade, fields)
+    return ModeErrors(modes.nodal_diameter or 0, np.asarray(seen), energies)
+
+
+def softened(reduced: Reduced, errors: ModeErrors) -> Reduced | None:
+    """The sector less the error of its stiffness; None where the reduction has other modes, or the
+    error is as large as the stiffness.
+    """
+    model = reduced.sector.get(errors.diameter)
+    if model is None or model.damping is not None:
+        return None
+    softer = _softened_model(model, errors)
+    if softer is None:
+        return None
+    return replace(reduced, sector={**reduced.sector, errors.diameter: softer})
+
+
+def _softened_model(model: PortModel, errors: ModeErrors) -> PortModel | None:
+    count = min(len(model.omega), len(errors.energies))
+    kept = model.shapes[:, :count]
+    # ports of readings may follow
+    rows = min(len(kept), len(errors.shapes))
+    seen = errors.shapes[:rows, :count]
+    # modes are known up to a phase, and equal ones up to a rotation
+    turn, *_ = np.linalg.lstsq(seen, kept[:rows], rcond=None)
+    missed = np.linalg.norm(seen @ turn - kept[:rows]) / np.linalg.norm(kept[:rows])
+    if missed > SAME_MODES:
+        return None
+    left, _, right = np.linalg.svd(turn)
+    turn = left @ right
+    energies = turn.conj().T @ errors.energies[:count, :count] @ turn
+    stiffness = np.diag(model.omega[:count] ** 2) - (energies + energies.conj().T) / 2
+    squares, vectors = np.linalg.eigh(stiffness)
+    if squares[0] <= 0:
+        return None
+    if np.isrealobj(model.shapes):
+        vectors = vectors.real
+    omega = model.omega.copy()
+    omega[:count] = np.sqrt(squares)
+    shapes = model.shapes.copy()
+    shapes[:, :count] = kept @ vectors
+    return replace(model, omega=omega, shapes=shapes)
+
+
+def frequency_ratio(
+    reduced: Reduced,
+    softer: Reduced,
+    errors: ModeErrors,
+    mode: int,
+) -> float:
+    """Frequency of the excited mode (1 = lowest), softened over as meshed."""
+    before = reduced.sector[errors.diameter].omega
+    after = softer.sector[errors.diameter].omega
+    row = min(mode, len(before)) - 1
+    return float(after[row] / before[row])
+
+
+def softened_change(
+    softer: SofterBody,
+    case: LoadCase,
+    settings: Settings,
+    top: Solution,
+) -> float:
+    """Relative change of a resonance amplitude on the softened body; inf where that was not solved.
+
+    Args:
+        settings, top: of the resonance, and its highest point.
+    """
+    try:
+        peak = find_peak(
+            member(softer.family(case), settings).model,
+            top.omega * softer.ratio,
+            settings.harmonics,
+            settings.samples,
+            near=top,
+            tolerance=PEAK_TOLERANCE,
+            options=Options(1e-6, frugal=True),
+        )
+    except NotSolvedError:
+        return np.inf
+    return abs(peak.height / size(top) - 1)

@@ -1,0 +1,85 @@
+"""What the blade does where its motion is unstable: marched in time from there, and the amplitudes
+between which it keeps.
+
+The march is exact between changes of contact state (`bladefem.time.event_integrator`), on the same
+reduced model as the balance. It takes contacts with one tangential direction and blades in phase.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from ...damper.branch import state_of
+from ...errors import InputError
+from ...hbm.model import ReducedModel
+from ...hbm.solution import Solution
+from ...hbm.time_model import time_system
+from ...time.event_integrator import State, integrate_periods
+from .stability import in_one_body
+
+# disturbance of the unstable motion at the start, relative
+DISTURBANCE = 1e-3
+# periods before the amplitudes are taken, and those in which they are
+LEFT_PERIODS = 300
+KEPT_PERIODS = 100
+# instants of a period
+SAMPLES = 256
+# steps of the whole march above which it is not begun: some 20 s
+MAX_STEPS = 4e6
+# relative width of a band that is one periodic motion
+ONE_MOTION = 2e-3
+
+
+@dataclass(frozen=True)
+class KeptBand:
+    """Amplitudes of single periods, as root of the sum of squares of the harmonics at the probe."""
+
+    # [Hz]
+    frequency: float
+    # [m]
+    lowest: float
+    highest: float
+    # periods marched
+    periods: int
+    # why nothing was marched; else ""
+    reason: str = ""
+
+    @property
+    def sentence(self) -> str:
+        """What is known."""
+        if self.reason:
+            return f"what the blade does there is not known: {self.reason}"
+        if self.highest <= (1 + ONE_MOTION) * self.lowest:
+            return f"marched in time, it ends on a motion of {1e6 * self.highest:.4g} um there"
+        return (
+            f"marched in time over {self.periods} periods, it keeps between "
+            f"{1e6 * self.lowest:.4g} and {1e6 * self.highest:.4g} um there"
+        )
+
+
+def kept_band(model: ReducedModel, point: Solution) -> KeptBand:
+    """The band of amplitudes that the model keeps to after an unstable motion."""
+    try:
+        system = time_system(in_one_body(model), point.harmonics)
+    except InputError as error:
+        return _unknown_band(point, str(error))
+    periods = LEFT_PERIODS + KEPT_PERIODS
+    steps = periods * max(SAMPLES, 2 * np.pi * system.fastest / point.omega)
+    if steps > MAX_STEPS:
+        return _unknown_band(point, f"a march takes {steps:.1g} steps, at most {MAX_STEPS:.0e}")
+    start = state_of(point, system)
+    state = State((1 + DISTURBANCE) * start.q, start.v, start.z)
+    left = integrate_periods(system, point.omega, state, SAMPLES, LEFT_PERIODS)
+    kept = integrate_periods(system, point.omega, left.state, SAMPLES, KEPT_PERIODS)
+    if kept.reason != "done":
+        return _unknown_band(point, kept.reason)
+    motion = (kept.q @ system.probe[0]).reshape(KEPT_PERIODS, SAMPLES)
+    lines = 2 / SAMPLES * np.fft.rfft(motion, axis=1)[:, 1 : point.harmonics + 1]
+    amplitudes = np.linalg.norm(lines, axis=1)
+    return KeptBand(point.frequency, float(amplitudes.min()), float(amplitudes.max()), periods)
+
+
+def _unknown_band(point: Solution, reason: str) -> KeptBand:
+    return KeptBand(point.frequency, np.nan, np.nan, 0, reason)

@@ -1,0 +1,86 @@
+"""The error by the body's mesh: of frequencies, of the reduced model, of a reported resonance."""
+
+from __future__ import annotations
+
+import sys
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from bladefem.fem.body import assemble
+from bladefem.fem.stiffness_error import stiffness_error
+from bladefem.scene.tables import Material
+from bladefem.scene.toml import load_scene
+from bladefem.study.pipeline import body_mesh, pipeline
+from bladefem.study.pipeline.stages import Bodies, build_mesh, find_modes, reduce_sector
+from bladefem.study.pipeline.validate_mesh import found_patches
+
+sys.path.insert(0, str(Path(__file__).parents[1] / "fem"))
+from structured import box
+
+
+def plane(scale):
+    return load_scene("scenes/plane.toml", [f"mesh.scale={scale}", "study.loads=20 N"])
+
+
+def solved_modes(scene, count=4):
+    bodies = Bodies(scene, build_mesh(scene))
+    return bodies, find_modes(bodies, count=count)[0]
+
+
+@pytest.fixture(scope="module")
+def finest():
+    return solved_modes(plane(0.75))[1].frequencies
+
+
+@pytest.mark.parametrize("scale", [6, 3, 1.5])
+def test_error_of_a_frequency_is_not_below_half_of_the_true_one(scale, finest):
+    """The platforms have re-entrant corners."""
+    bodies, modes = solved_modes(plane(scale))
+    squares = (2 * np.pi * modes.frequencies) ** 2
+    found = stiffness_error(bodies.still_blade, modes.shapes).diagonal().real / squares / 2
+    true = modes.frequencies / finest - 1
+    assert (found > 0.5 * true).all()
+    assert (found < 2 * true).all()
+
+
+def test_a_stress_that_the_elements_carry_has_no_error():
+    """Uniform strain, beside waves that six elements do not carry."""
+    mesh = box((6, 2), (0.1, 0.02), "triangle6")
+    body = assemble(mesh, "blade", Material(), None)
+    x, y, _ = mesh.points.T
+    stretch = np.column_stack([x, -0.2 * y, 0 * x])
+    bent = np.column_stack([0 * x, 1e-3 * np.sin(60 * x), 0 * x])
+    energies = stiffness_error(body, np.array([stretch, bent]))
+    assert energies[1, 1].real > 0
+    assert abs(energies[0, 0]) < 1e-20 * energies[1, 1].real
+
+
+def test_modes_in_another_phase_and_order_soften_the_same_model():
+    """Modes are known up to a phase, equal ones up to a rotation."""
+    scene = plane(4)
+    bodies, modes = solved_modes(scene, 6)
+    patches = found_patches(scene, bodies.mesh, excited=True)
+    reduced = reduce_sector(bodies, patches, [0], 8)
+    errors = body_mesh.mode_errors(bodies, patches, modes)
+    turned = replace(modes, shapes=modes.shapes * np.array([1, -1, 1, -1, -1, 1])[:, None, None])
+    others = body_mesh.mode_errors(bodies, patches, turned)
+    first, second = (body_mesh.softened(reduced, e).sector[0] for e in (errors, others))
+    np.testing.assert_allclose(first.omega, second.omega, rtol=1e-12)
+    drop = 1 - first.omega[:6] / reduced.sector[0].omega[:6]
+    alone = errors.energies.diagonal().real / reduced.sector[0].omega[:6] ** 2 / 2
+    np.testing.assert_allclose(drop, alone, rtol=0.2)
+
+    strangers = replace(errors, shapes=errors.shapes[:, ::-1] ** 2)
+    assert body_mesh.softened(reduced, strangers) is None
+
+
+def test_reported_error_is_not_below_half_of_the_true_one():
+    """Plane blades on a coarse mesh, all parts of the mesh refined."""
+    curves = [pipeline.run(plane(scale), None).response.curves[0] for scale in (6, 3)]
+    true = abs(curves[0].peak_amplitude / curves[1].peak_amplitude - 1)
+    assert true > 0.01
+    assert 0.5 * true < curves[0].error < 5 * true
+    assert curves[0].body_mesh > 3 * curves[1].body_mesh

@@ -1,0 +1,73 @@
+"""The band of amplitudes after an unstable motion, against a plain march written here."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from models import rebounding
+
+from bladefem.hbm.solve import solve
+from bladefem.hbm.sweep import size
+from bladefem.hbm.time_model import time_system
+from bladefem.study.pipeline.kept_band import kept_band
+from bladefem.study.pipeline.stability import in_one_body
+from bladefem.time.event_integrator import integrate_periods, state_at_rest
+
+STEPS = 1000
+
+
+def marched_amplitudes(gap, omega, harmonics, periods=240, kept=60):
+    """Amplitude of each of the last periods, by leapfrog from rest."""
+    dt = 2 * np.pi / omega / STEPS
+    drive = np.cos(2 * np.pi * np.arange(STEPS) / STEPS)
+    q = v = 0.0
+    found = []
+    for period in range(periods):
+        seen = np.empty(STEPS)
+        for k in range(STEPS):
+            seen[k] = q
+            v += dt * (drive[k] - q - 0.04 * v - 10.0 * max(q - gap, 0.0))
+            q += dt * v
+        if period >= periods - kept:
+            lines = 2 / STEPS * np.fft.rfft(seen)[1 : harmonics + 1]
+            found.append(np.linalg.norm(lines))
+    return np.array(found)
+
+
+def test_band_of_a_doubled_period_is_that_of_a_plain_march():
+    omega = 3.0
+    model = rebounding(10.0, 0.1, 0.04)
+    point = solve(model, omega, 15, 1024)
+    found = kept_band(model, point)
+    truth = marched_amplitudes(0.1, omega, 15)
+    assert found.reason == ""
+    assert found.lowest == pytest.approx(truth.min(), rel=0.01)
+    assert found.highest == pytest.approx(truth.max(), rel=0.01)
+    assert found.highest > 4 * size(point)
+    assert "keeps between" in found.sentence or "ends on a motion" in found.sentence
+
+
+def test_a_contact_without_friction_lifts_off_in_time():
+    """Stick without friction has no limit that could end it: the normal force alone does."""
+    system = time_system(in_one_body(rebounding(10.0, 0.1, 0.04)), 1)
+    assert system.mu[0] == 0
+    flow = integrate_periods(system, 3.0, state_at_rest(system), 256, 20)
+    assert flow.q[:, 0].max() > 0.2 and flow.events >= 10
+    # pushed by one side only, the mass swings farther to the other
+    assert abs(flow.q[:, 0].min()) > 1.5 * flow.q[:, 0].max()
+
+
+def test_a_stable_motion_is_kept():
+    model = rebounding(10.0, 0.2, 0.04)
+    point = solve(model, 3.0, 15, 1024)
+    found = kept_band(model, point)
+    assert found.lowest == pytest.approx(size(point), rel=2e-3)
+    assert found.highest == pytest.approx(size(point), rel=2e-3)
+    assert "ends on a motion" in found.sentence
+
+
+def test_what_cannot_be_marched_says_why(monkeypatch):
+    monkeypatch.setattr("bladefem.study.pipeline.kept_band.MAX_STEPS", 10.0)
+    model = rebounding(10.0, 0.1, 0.04)
+    found = kept_band(model, solve(model, 3.0, 3, 128))
+    assert "is not known: a march takes" in found.sentence

@@ -1,0 +1,33 @@
+"""Modes solved once for tables and reduction."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from bladefem.scene.toml import load_scene
+from bladefem.study.pipeline.stages import Bodies, build_mesh, find_modes, reduce_sector
+from bladefem.study.pipeline.validate_mesh import found_patches
+
+
+def test_the_reduction_takes_the_modes_that_are_solved_already():
+    """The port models of kept modes are those of modes solved again."""
+    scene = load_scene("scenes/wedge.toml", ["mesh.size=24 mm", "aerofoil.fillet=0 mm"])
+    mesh = build_mesh(scene)
+    patches = found_patches(scene, mesh, excited=True)
+    again = Bodies(scene, mesh)
+    kept = Bodies(scene, mesh)
+    plain = find_modes(again, count=4)
+    shown = find_modes(kept, count=4, reduced=8)
+    assert [len(one.frequencies) for one in shown] == [4] * len(plain)
+    for one, other in zip(plain, shown, strict=True):
+        np.testing.assert_allclose(one.frequencies, other.frequencies, rtol=1e-9)
+    diameters = [0, 9, 18]
+    first, second = (reduce_sector(b, patches, diameters, 8).sector for b in (again, kept))
+    for n in diameters:
+        np.testing.assert_allclose(first[n].omega, second[n].omega, rtol=1e-9)
+        response = [
+            m.shapes @ np.diag(1 / (m.omega**2 - 4e6)) @ m.shapes.conj().T + m.residual
+            for m in (first[n], second[n])
+        ]
+        assert abs(response[0] - response[1]).max() < 1e-6 * abs(response[0]).max()
+    assert not kept.kept
