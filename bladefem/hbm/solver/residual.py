@@ -407,7 +407,7 @@ def determinant_sign(balance: Balance, state: State) -> float:
         Y = np.array([base(vector, STEP_ACCURACY) for vector in left])
         small = np.eye(len(right)) + np.tensordot(right, Y, axes=([1, 2, 3], [1, 2, 3]))
         return sign * float(np.sign(np.linalg.det(small)))
-    change, active, dofs = _active_nodes(balance, state)
+    change, _, dofs = _active_nodes(balance, state)
     if len(dofs) * state.w.shape[2] > DETERMINANT_UNKNOWNS:
         return 0.0
     # everything sticks: the derivative is the identity
