@@ -15,6 +15,7 @@ from ..data import Elements, PortModel, RigidBody
 from ..errors import InputError
 from ..friction.law_table import select_elements
 from ..hbm.linear.bodies import Damping
+from ..hbm.linear.mean_motion import REGULARISATION
 from ..reduction.assemble import pair_model
 from ..util.arrays import RealArray, RealOrComplex
 
@@ -78,7 +79,7 @@ class Wheel:
     # motion e^{j 2 pi d s / N}; d > N/2 are waves that run backwards
     influence: RealOrComplex | None = None
     # see `hbm.model.ReducedModel`
-    hold: float = 1e-3
+    hold: float = REGULARISATION
     coupled: bool = True
     # (n, tangents) friction force of one damper from which the law starts; elements.t0 when None
     # [N]
