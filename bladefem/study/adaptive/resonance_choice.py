@@ -20,7 +20,7 @@ from ...hbm.full_stick import sticks_safely
 from ...hbm.peak import Peak, find_peak
 from ...hbm.solution import Solution
 from .choice import sufficient
-from .family import Family, carried, member
+from .family import Family, carried, lowest_harmonics, member
 from .indicators import richer
 from .settings import DIRECTIONS, Settings, enriched
 
@@ -125,21 +125,46 @@ def peak_errors(
             continue
         heights[name] = np.inf
         shifts[name] = np.inf
-        pair = compared_settings(family, settings, other, name, point)
-        if pair is None:
-            continue
-        own, judge = pair
-        try:
-            base = peak
-            if own != settings:
-                base = peak_from(family, settings, point, own, accuracy, fallbacks=False)
-            found = peak_from(family, own, base.solution, judge, accuracy, fallbacks=False)
-        except NotSolvedError:
-            continue
-        better[name] = found
-        heights[name] = abs(base.height / found.height - 1)
-        shifts[name] = abs(base.omega / found.omega - 1)
+        pairs = (
+            compared_settings(family, settings, other, name, point),
+            poorer_settings(family, settings, name),
+        )
+        for pair in pairs:
+            if pair is None:
+                continue
+            own, judge = pair
+            try:
+                base = peak
+                if own != settings:
+                    base = peak_from(family, settings, point, own, accuracy, fallbacks=False)
+                found = peak_from(family, own, base.solution, judge, accuracy, fallbacks=False)
+            except NotSolvedError:
+                continue
+            if pair is pairs[0]:
+                better[name] = found
+            heights[name] = abs(base.height / found.height - 1)
+            shifts[name] = abs(base.omega / found.omega - 1)
+            break
     return PeakErrors(heights, shifts, better)
+
+
+def poorer_settings(
+    family: Family,
+    settings: Settings,
+    name: str,
+) -> tuple[Settings, Settings] | None:
+    """The judged model and one with half as many contact points or fewer harmonics, which is more
+    wrong than the judged one: what is compared where the richer model was not solved. None where
+    the model has no less.
+    """
+    if name == "points" and settings.points is not None and settings.points > 1:
+        return settings, replace(settings, points=settings.points // 2)
+    if name == "harmonics":
+        least = lowest_harmonics(family, settings)
+        fewer = max(least, settings.harmonics // 2)
+        if fewer < settings.harmonics:
+            return settings, replace(settings, harmonics=fewer)
+    return None
 
 
 def judge_settings(

@@ -1,0 +1,73 @@
+"""The error of a resonance where richer models of it are not solved: poorer ones tell it."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+
+from bladefem.errors import NotSolvedError
+from bladefem.hbm.reference_blade import reference_model
+from bladefem.study.adaptive import resonance_choice
+from bladefem.study.adaptive.family import family_of
+from bladefem.study.adaptive.settings import first_for
+
+
+@dataclass(frozen=True)
+class KnownPeak:
+    """A peak whose height is known, without a solve."""
+
+    height: float
+    omega: float
+    solution: SimpleNamespace
+
+
+def peak_of_settings(settings):
+    """Heights that tend to 1 with contact points and harmonics, at a frequency of 100 rad/s."""
+    points = 8 if settings.points is None else settings.points
+    height = 1.0 + 0.4 / points + 0.3 / settings.harmonics
+    slips = {"stick": 0, "slip": 16, "lift": 0, "open": 0}
+    return KnownPeak(height, 100.0, SimpleNamespace(states=slips))
+
+
+@pytest.fixture
+def judged(monkeypatch):
+    """A family, settings, and the error of their peak with a limit on what can be solved."""
+    family = family_of(reference_model(points=8, load=1.4, phase=0.7, modes=10, harmonics=31))
+    settings = replace(first_for(family.modes), harmonics=3, samples=128, points=4)
+
+    def errors(most_harmonics, most_points):
+        def known(family, old, point, new, accuracy, fallbacks=True):
+            points = 8 if new.points is None else new.points
+            if new.harmonics > most_harmonics or points > most_points:
+                raise NotSolvedError("too rich")
+            return peak_of_settings(new)
+
+        monkeypatch.setattr(resonance_choice, "peak_from", known)
+        return resonance_choice.peak_errors(family, settings, peak_of_settings(settings), 0.05)
+
+    return errors
+
+
+def test_an_unsolved_richer_model_leaves_the_error_to_a_poorer_one(judged):
+    """Of contact points half as many, of harmonics fewer: they differ by more than the richer model
+    does, and are no start for other work.
+    """
+    whole = judged(99, 99)
+    poorer = judged(3, 4)
+    for name in ("harmonics", "points"):
+        assert 0 < whole.height[name] < poorer.height[name] < np.inf
+        assert name in whole.better and name not in poorer.better
+
+
+def test_where_nothing_is_solved_the_error_stays_unknown(judged):
+    assert judged(0, 0).total == np.inf
+
+
+@pytest.mark.parametrize("name", ["points", "harmonics"])
+def test_the_poorest_model_has_no_poorer_one(name):
+    family = family_of(reference_model(points=4, load=1.4))
+    settings = replace(first_for(family.modes), **{name: 1})
+    assert resonance_choice.poorer_settings(family, settings, name) is None
