@@ -15,6 +15,7 @@ from scipy.sparse.csgraph import connected_components
 from scipy.spatial import cKDTree
 
 from bladefem.errors import InputError
+from bladefem.util.arrays import RealArray
 
 from .numbered_faces import NumberedFaces, face_corners, numbered_faces
 from .raw_mesh import RawMesh, read_raw
@@ -59,9 +60,9 @@ class FacePart:
     facets: int
     area: float
     # (3,)
-    centre: np.ndarray
+    centre: RealArray
     # (3,) mean outward unit normal, zero of a closed face
-    normal: np.ndarray
+    normal: RealArray
     # all facets look the same way
     plane: bool
 
@@ -89,7 +90,7 @@ class Look:
     # cells of each connected body, the largest first
     bodies: tuple[int, ...]
     # (2, 3) lowest and highest coordinates
-    box: np.ndarray
+    box: RealArray
     # factor to metres, guessed
     scale: float
     # name -> what it is and how much it holds

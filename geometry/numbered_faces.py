@@ -13,6 +13,8 @@ import numpy as np
 from scipy.sparse import coo_matrix
 from scipy.sparse.csgraph import connected_components
 
+from bladefem.util.arrays import IntegerArray, RealArray
+
 from .raw_mesh import RawMesh
 from .topology import CORNERS, DIMENSION, FACETS, FAMILY
 
@@ -27,13 +29,13 @@ class NumberedFaces:
     """Outer facets of the solid cells and the face that each belongs to."""
 
     # (nf, 4) corner nodes, -1 in place of the fourth of a triangle
-    corners: np.ndarray
+    corners: IntegerArray
     # (nf,) from 0, the largest face first
-    number: np.ndarray
+    number: IntegerArray
     # (nf, 3) outward, as long as the facet's area
-    normals: np.ndarray
+    normals: RealArray
     # (nf, 3)
-    centres: np.ndarray
+    centres: RealArray
 
     @property
     def count(self) -> int:

@@ -9,6 +9,8 @@ from math import cos, pi, sin, tan
 
 import numpy as np
 
+from bladefem.util.arrays import RealArray
+
 from .damper_shapes import SHAPES
 from .parameters import Disc, Platform, Shank, Wedge
 
@@ -25,13 +27,13 @@ class Profile:
     top: float
     # (2, 2, 2) ends of the blade's seats, seat_right (y > 0) first: inner, where the flat underside
     # starts, and outer, where the edge of the plate starts
-    seats: np.ndarray
+    seats: RealArray
     # (2, 2) top corners of the plate, on the side of seat_right and of seat_left
-    corners: np.ndarray
+    corners: RealArray
     # (10, 2) shank and platform, anticlockwise seen from +z
-    blade: np.ndarray
+    blade: RealArray
     # (n, 2) damper in contact, anticlockwise, from this blade's flank to the next one's
-    damper: np.ndarray
+    damper: RealArray
 
 
 def turn(angle: float) -> np.ndarray:

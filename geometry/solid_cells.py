@@ -12,6 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from bladefem.errors import InputError
+from bladefem.util.arrays import IntegerArray, RealArray
 
 from .raw_mesh import RawMesh
 from .second_order_cells import completed_cells
@@ -27,13 +28,13 @@ class SolidCells:
     """All solid cells of a file (plane cells of a plane model), of one type."""
 
     # (n, 3) the file's points, new ones appended
-    points: np.ndarray
+    points: RealArray
     cell_type: str
     # (nc, k)
-    cells: np.ndarray
+    cells: IntegerArray
     # (nc,) block of the file, and row of it, that each cell comes from
-    block: np.ndarray
-    row: np.ndarray
+    block: IntegerArray
+    row: IntegerArray
     # what was done to the cells, one sentence each
     notes: tuple[str, ...]
 

@@ -27,6 +27,7 @@ from ..data import Patch, PressureMap
 from ..errors import InputError, NotSolvedError
 from ..fem.flexibility import Flexibility
 from ..fem.loads import centrifugal, mass
+from ..util.arrays import RealArray
 from .interface_law import InterfaceLaw, closure_of, compliance_at
 from .patch import initial_gap, port_matrix
 from .seating import ContactProblem, condense_body, rigid_and_load, spin_axis
@@ -56,17 +57,17 @@ class FrictionalProblem:
 
     patches: tuple[Patch, ...]
     # (m, m) blade and damper, elastic [m/N]
-    flexibility: np.ndarray
+    flexibility: RealArray
     # (n,) gap before anything moves [m]
-    clearance: np.ndarray
+    clearance: RealArray
     # (m,) damper minus blade by the rotation of the blade, for unit rotation
-    blade_swell: np.ndarray
+    blade_swell: RealArray
     # (m,) damper minus blade by the damper's deformation under its load, for unit rotation
-    damper_swell: np.ndarray
+    damper_swell: RealArray
     # (m, d) of unit rigid motions of the damper; rotations per length
-    rigid: np.ndarray
+    rigid: RealArray
     # (d,) centrifugal load on the damper, for unit rotation
-    load: np.ndarray
+    load: RealArray
     # of the damper as meshed [kg]
     mass: float
 
@@ -98,8 +99,8 @@ class _Interface:
     """The layer and its friction, (n,) each."""
 
     law: InterfaceLaw
-    kt: np.ndarray
-    mu: np.ndarray
+    kt: RealArray
+    mu: RealArray
 
 
 @dataclass(frozen=True)
@@ -107,11 +108,11 @@ class _State:
     """After a load step."""
 
     # (n, d) normal, tangential
-    force: np.ndarray
+    force: RealArray
     # (r,)
-    rigid: np.ndarray
+    rigid: RealArray
     # (n, d) damper minus blade
-    moved: np.ndarray
+    moved: RealArray
     slips: int
 
 

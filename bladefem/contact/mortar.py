@@ -21,6 +21,7 @@ from geometry.mesh import Mesh
 
 from ..data import Patch
 from ..errors import InputError
+from ..util.arrays import BooleanArray, IntegerArray, RealArray
 from .face_elements import LINEAR, corner_count, face_quadrature, shape, traction_shape
 from .surface import FaceRule, frames, outward, surface
 
@@ -38,19 +39,19 @@ class Overlap:
     """Pieces of overlap with q quadrature points each."""
 
     # (nf, k) master faces
-    master: np.ndarray
+    master: IntegerArray
     # (nf, k) slave faces
-    slave: np.ndarray
+    slave: IntegerArray
     # (s, 2) which master and which slave face a piece belongs to
-    face: np.ndarray
+    face: IntegerArray
     # two (s, q, d) reference coordinates on the master and on the slave face
     at: tuple[np.ndarray, np.ndarray]
     # (s, q) [m^2]
-    weight: np.ndarray
+    weight: RealArray
     # (s, q, 3) unit vectors out of the master
-    normal: np.ndarray
+    normal: RealArray
     # (nf,) bool, master faces that are covered by slaves
-    covered: np.ndarray
+    covered: BooleanArray
 
 
 def overlap(mesh: Mesh, pair: str) -> Overlap:

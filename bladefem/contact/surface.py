@@ -12,6 +12,7 @@ import numpy as np
 from geometry.mesh import Mesh
 
 from ..errors import InputError
+from ..util.arrays import IntegerArray, RealArray
 from .face_elements import corner_count, face_quadrature, shape, traction_shape
 
 BODY_CORNERS = {"triangle": 3, "quad": 4, "tetra": 4, "hexahedron": 8, "wedge": 6, "pyramid": 5}
@@ -22,15 +23,15 @@ class FaceRule:
     """Quadrature over the faces (or pieces of faces) of a patch, seen from one of its bodies."""
 
     # (f, m) nodes of the body
-    nodes: np.ndarray
+    nodes: IntegerArray
     # (f, k) nodes of the patch that carry the traction
-    columns: np.ndarray
+    columns: IntegerArray
     # (f, q, m) the body's shape functions
-    shape: np.ndarray
+    shape: RealArray
     # (f, q, k) traction functions times weights [m^2]
-    traction: np.ndarray
+    traction: RealArray
     # (f, q, 3) unit vectors out of the master
-    normal: np.ndarray
+    normal: RealArray
 
 
 def surface(mesh: Mesh, faces: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

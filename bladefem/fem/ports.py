@@ -102,12 +102,12 @@ def port_models(
     cons = {}
     lam = {}
     for p in eigenpairs(t, count, diameters, tolerance=TOLERANCE, solver=solver):
-        n = p.con.nodal_diameter
+        diameter = p.con.nodal_diameter
         # None is for bodies without cyclic faces only
-        assert n is not None
-        cons[n] = p.con
-        lam[n] = p.lam
-        yield n, _port_model(model, p)
+        assert diameter is not None
+        cons[diameter] = p.con
+        lam[diameter] = p.lam
+        yield diameter, _port_model(model, p)
     for n, truth in lost_modes(t, cons, lam, count).items():
         yield n, _port_model(model, found_again(flexible(cons[n]), count, truth, TOLERANCE))
 

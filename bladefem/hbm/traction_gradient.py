@@ -20,6 +20,7 @@ from scipy.optimize import linprog
 from ..errors import NotSolvedError
 from ..friction.fourier import synthesis
 from ..friction.law_table import require_coulomb
+from ..util.arrays import IntegerArray, RealArray
 from .linear.condensation import condense
 from .linear.mean_motion import with_springs
 from .model import ReducedModel
@@ -47,16 +48,16 @@ class Tractions:
     """The friction forces of a solved point, those of m of its n nodes undetermined."""
 
     # (m,) numbers of the nodes that never slip or open
-    nodes: np.ndarray
+    nodes: IntegerArray
     # (n, tangents) mean force at zero displacement: a model of this `start` stays here [N]
-    start: np.ndarray
+    start: RealArray
     # (n, tangents) derivative of the response's size at the probe by the start, as if only these
     # m nodes and the node itself stuck [m/N]
-    gradient: np.ndarray
+    gradient: RealArray
     # (directions, tangents) unit vectors: normals of the edges of the admissible polygons
-    normals: np.ndarray
+    normals: RealArray
     # (m, directions) how far the mean force may move along the normals [N]
-    room: np.ndarray
+    room: RealArray
 
 
 def tractions(

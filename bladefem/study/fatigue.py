@@ -16,6 +16,7 @@ import numpy as np
 from ..errors import InputError
 from ..scene.tables import Fatigue
 from ..scene.units import parse, show
+from ..util.arrays import RealArray
 
 # places of the table
 WORST_PLACES = 10
@@ -28,9 +29,9 @@ class HaighDiagram:
     """Stress amplitudes that last, by mean stress; straight in between."""
 
     # (k,) mean stress [Pa], ascending
-    mean: np.ndarray
+    mean: RealArray
     # (k,) largest amplitude there [Pa]
-    amplitude: np.ndarray
+    amplitude: RealArray
 
     def allowed(self, mean: np.ndarray) -> np.ndarray:
         """Largest amplitude [Pa] at mean stresses [Pa]; NaN outside of the diagram."""
@@ -43,14 +44,14 @@ class Utilisation:
     """How much of what the material lasts is used, at the nodes of a blade."""
 
     # (n, 3) [m]
-    points: np.ndarray
+    points: RealArray
     # (n,) [Pa]
-    alternating: np.ndarray
+    alternating: RealArray
     # (n,) [Pa], negative in compression
-    mean: np.ndarray
+    mean: RealArray
     # (n,) alternating stress over the allowed one; infinite where none is allowed, NaN outside of
     # the diagram
-    used: np.ndarray
+    used: RealArray
 
     @property
     def worst(self) -> int:

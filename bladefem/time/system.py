@@ -23,31 +23,33 @@ from bladefem.data import Elements, PortModel
 from bladefem.errors import InputError
 from bladefem.friction.law_table import require_coulomb
 
+from ..util.arrays import RealArray
+
 
 @dataclass(frozen=True)
 class System:
     """Matrices of the equations above; d coordinates, n elements, H harmonics of the inputs."""
 
     # (d,) L, squared circular frequencies [1/s^2]
-    stiffness: np.ndarray
+    stiffness: RealArray
     # (d, d) D [1/s]
-    damping: np.ndarray
+    damping: RealArray
     # (n, d) tangential readings [kg^-1/2]
-    W: np.ndarray
+    W: RealArray
     # (n,) [N/m]
-    kt: np.ndarray
+    kt: RealArray
     # (n,) [1]
-    mu: np.ndarray
+    mu: RealArray
     # (d, 2H+1) p [N kg^-1/2]
-    force: np.ndarray
+    force: RealArray
     # (n, 2H+1) g, prescribed part of w [m]
-    drive: np.ndarray
+    drive: RealArray
     # (n, 2H+1) n, prescribed part of N [N]
-    normal: np.ndarray
+    normal: RealArray
     # (n, d) normal force for each coordinate [N kg^-1/2 / m]; zero when prescribed
-    V: np.ndarray
+    V: RealArray
     # (k, d) readings of interest [kg^-1/2]
-    probe: np.ndarray
+    probe: RealArray
     # (n, d) normal readings, where normal forces react on q [kg^-1/2]; empty: zeros
     R: np.ndarray = field(default_factory=lambda: np.zeros((0, 0)))
 
@@ -130,12 +132,13 @@ def blade_ring(
         force[b * size : b * size + m, 2] = -amplitude.imag
     probe = np.zeros((1, blades * size))
     probe[0, :m] = body.shapes[body.ports["probe"]][0]
-    omega = np.tile(np.r_[body.omega, 0.0], blades)
-    extra = np.zeros((m, m)) if body.damping is None else body.damping
+    omega: np.ndarray = np.tile(np.r_[body.omega, 0.0], blades)
+    extra = np.zeros((m, m)) if body.damping is None else np.real(body.damping)
     one = np.pad(np.diag(2 * ratio * body.omega) + extra, (0, 1))
+    damping: np.ndarray = np.kron(np.eye(blades), one)
     return System(
-        omega**2,
-        np.kron(np.eye(blades), one),
+        np.square(omega),
+        damping,
         W,
         np.tile(elements.kt, blades),
         np.tile(elements.mu, blades),

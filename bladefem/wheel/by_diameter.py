@@ -19,7 +19,7 @@ from ..data import PortModel, RigidBody
 from ..errors import NotSolvedError
 from ..hbm.linear.bodies import Damping
 from ..hbm.linear.woodbury import frequency_independent_parts
-from ..util.arrays import RealOrComplex
+from ..util.arrays import ComplexArray, RealArray, RealOrComplex
 from .model import Wheel
 
 # rigid motions that the contact springs resist less than this, relatively, are left out
@@ -34,21 +34,21 @@ class DiameterParts:
     """
 
     # (D, P, P) residual flexibility with contact springs [m/N]
-    A: np.ndarray
+    A: ComplexArray
     # (N, P, k) modes with contact springs [kg^-1/2]
-    U: np.ndarray
+    U: ComplexArray
     # (N, k, k) stiffness of the contact springs in the modes [1/s^2]
-    N: np.ndarray
+    N: ComplexArray
     # (N, k) squared circular frequencies [1/s^2]
-    stiffness: np.ndarray
+    stiffness: RealArray
     # (N, k, k) viscous damping [1/s]
-    viscous: np.ndarray
+    viscous: ComplexArray
     # (N, k) loss factor times squared frequency [1/s^2]
-    hysteretic: np.ndarray
+    hysteretic: RealArray
     # (N, k) aerodynamic stiffness, not for the mean [1/s^2]
-    influence: np.ndarray
+    influence: ComplexArray
     # (N, k, k) T of the mean [s^2]
-    mean: np.ndarray
+    mean: RealOrComplex
     contact: slice
     blade: slice
     load: slice
@@ -91,7 +91,7 @@ def _made_parts(wheel: Wheel) -> DiameterParts:
         _all_diameters(viscous, count),
         _all_diameters(hysteretic, count),
         influence,
-        _all_diameters(mean, count) * wheel.coupled,
+        _all_diameters(mean if wheel.coupled else np.zeros_like(mean), count),
         *slices,
     )
 

@@ -9,6 +9,7 @@ import numpy as np
 from ..data import Elements
 from ..friction.aft import evaluate
 from ..friction.kernel_1d_exact import evaluate_exact
+from ..util.arrays import RealArray
 from .model import Wheel
 
 
@@ -17,15 +18,15 @@ class ContactForces:
     """Forces of all contacts in the directions of the balance; N dampers of n nodes, K = 2H+1."""
 
     # (N, n, d, K) contact forces [N]
-    f: np.ndarray
+    f: RealArray
     # (N, n, d, K) forces beyond preload and springs of full stick [N]
-    p: np.ndarray
+    p: RealArray
     # (N n, dK, dK) derivative of p [N/m]
     change: np.ndarray | None
     # (N, n, 3) shares of stick, slip, separation
-    shares: np.ndarray
+    shares: RealArray
     # (N, n) energy a period [J]
-    dissipated: np.ndarray
+    dissipated: RealArray
     # False: a two-dimensional element found no periodic state
     converged: bool
     reason: str

@@ -15,7 +15,9 @@ from ..data import Elements, PortModel, RigidBody
 from ..errors import InputError
 from ..friction.law_table import select_elements
 from ..hbm.linear.bodies import Damping
+from ..hbm.linear.mean_motion import REGULARISATION
 from ..reduction.assemble import pair_model
+from ..util.arrays import RealArray, RealOrComplex
 
 
 @dataclass(frozen=True)
@@ -28,9 +30,9 @@ class Pattern:
     """
 
     # (N, q, q) symmetric [1/s^2 for modal coordinates of mass 1, N/m for displacements]
-    stiffness: np.ndarray | None = None
+    stiffness: RealArray | None = None
     # (N, q, q) symmetric [1 for modal coordinates of mass 1, kg for displacements]
-    mass: np.ndarray | None = None
+    mass: RealArray | None = None
     # friction elements of all dampers, sector by sector, N times as many as the wheel has
     elements: Elements | None = None
 
@@ -75,13 +77,13 @@ class Wheel:
     damper_damping: Damping = field(default_factory=Damping)
     # (N, modes) complex aerodynamic stiffness of each nodal diameter and mode [1/s^2], for a
     # motion e^{j 2 pi d s / N}; d > N/2 are waves that run backwards
-    influence: np.ndarray | None = None
+    influence: RealOrComplex | None = None
     # see `hbm.model.ReducedModel`
-    hold: float = 1e-3
+    hold: float = REGULARISATION
     coupled: bool = True
     # (n, tangents) friction force of one damper from which the law starts; elements.t0 when None
     # [N]
-    start: np.ndarray | None = None
+    start: RealArray | None = None
 
     def __post_init__(self) -> None:
         _check_wheel(self)

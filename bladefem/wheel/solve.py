@@ -11,6 +11,7 @@ from ..data import Elements
 from ..errors import InputError, NotSolvedError
 from ..friction.fourier import to_complex, to_real
 from ..hbm.solver.newton import DEFAULTS, Options
+from ..util.arrays import ComplexArray, RealArray
 from .flexibility import WheelFlexibility, wheel_flexibility
 from .model import Pattern, Wheel, pattern_elements
 from .newton import WheelBalance, WheelNewton, evaluate_wheel, newton_wheel
@@ -38,11 +39,11 @@ class WheelSolution:
     omega: float
     samples: int
     # (N, n, d, K) relative displacements: mean, cos 1, sin 1, ... [m]
-    w: np.ndarray
+    w: RealArray
     # (N, n, d, K) contact forces, with the preload in the mean of the normal ones [N]
-    f: np.ndarray
+    f: RealArray
     # (N, H+1, probes) complex amplitudes, Re(q e^{i h omega t}) [m]
-    probe: np.ndarray
+    probe: ComplexArray
     converged: bool
     reason: str
     # "newton", or what reached the point
@@ -52,9 +53,9 @@ class WheelSolution:
     # over the size of the motion [1]
     residual: float
     # (N, n, 3) shares of stick, slip and separation in a period
-    shares: np.ndarray
+    shares: RealArray
     # (N,) friction work of each damper in a period [J]
-    dissipated: np.ndarray
+    dissipated: RealArray
 
     @property
     def frequency(self) -> float:

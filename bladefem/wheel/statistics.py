@@ -17,6 +17,7 @@ from ..hbm.model import ReducedModel
 from ..hbm.solution import Solution
 from ..hbm.solve import solve
 from ..hbm.solver.newton import DEFAULTS, Options
+from ..util.arrays import IntegerArray, RealArray
 from ..util.communicator import Communicator
 from ..util.curve_extremum import parabola_minimum
 from ..util.progress import Progress, unwatched
@@ -42,17 +43,17 @@ class Amplification:
     """Peaks of many wheels under several damper loads; L loads, W wheels."""
 
     # (L,) [N]
-    loads: np.ndarray
+    loads: RealArray
     # (L,) peak of the tuned wheel [m], and where [rad/s]
-    tuned: np.ndarray
-    tuned_omega: np.ndarray
+    tuned: RealArray
+    tuned_omega: RealArray
     # (L, W) peak of the highest blade [m], its number, and where [rad/s]
-    peak: np.ndarray
-    blade: np.ndarray
-    omega: np.ndarray
+    peak: RealArray
+    blade: IntegerArray
+    omega: RealArray
     # (L, W) points that were not solved, and points altogether
-    unsolved: np.ndarray
-    points: np.ndarray
+    unsolved: IntegerArray
+    points: IntegerArray
 
     @property
     def factor(self) -> np.ndarray:

@@ -68,9 +68,13 @@ def test_tuned_wheel_is_the_sector_in_every_blade(case, damper):
 @pytest.mark.parametrize("case", CASES)
 @pytest.mark.parametrize("damper", DAMPERS)
 def test_mistuned_wheel_is_the_dense_ring(case, damper):
-    """Stiffness and mass deviations, two harmonics of force; the dense ring knows no diameters."""
+    """Stiffness and mass deviations, two harmonics of force; the dense ring knows no diameters.
+
+    Odd harmonics push dampers that only friction holds no way in the mean: under an even one they
+    walk, which the wheel does not know.
+    """
     own = elements(*CASES[case])
-    excitation = forces({1: 0.9, 2: 0.3j})
+    excitation = forces({1: 0.9, 2 if own.kn.any() else 3: 0.3j})
     dK, dM = patterns()
     C = np.kron(np.eye(N), 0.05 * MASS)
     damping = Damping(mass=0.05)

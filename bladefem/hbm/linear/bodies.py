@@ -13,6 +13,7 @@ import numpy as np
 
 from ...data import PortModel
 from ...errors import InputError, NotSolvedError
+from ...util.arrays import RealArray, RealOrComplex
 
 # frequency of the modes that fill up a harmonic which has fewer [rad/s]: nothing moves them
 SPARE = 1e100
@@ -56,17 +57,17 @@ class Stack:
     """
 
     # (S, m) [rad/s]; filled up with SPARE where a harmonic has fewer modes
-    omega: np.ndarray
+    omega: RealArray
     # (S, m) modal damping [1/s]
-    viscous: np.ndarray
+    viscous: RealArray
     # (S, m) loss factor times omega^2 [1/s^2]
-    hysteretic: np.ndarray
+    hysteretic: RealArray
     # (S, m, m) viscous damping that couples modes [1/s]
-    coupled: np.ndarray | None
+    coupled: RealOrComplex | None
     # (S, P, m) [kg^-1/2]
-    shapes: np.ndarray
+    shapes: RealOrComplex
     # (S, P, P) [m/N]
-    residual: np.ndarray
+    residual: RealOrComplex
     contact: slice
     load: slice
     probe: slice

@@ -16,6 +16,7 @@ import numpy as np
 
 from ...errors import NotSolvedError
 from ...friction.fourier import to_real
+from ...util.arrays import ComplexArray, RealArray
 from ..model import ReducedModel
 from ..solver.newton_compiled import Condensed, motion_scale
 from .bodies import modal_flexibility
@@ -43,13 +44,13 @@ class Linear:
     # (H+1, m) relative displacement without contact forces [m]
     free: np.ndarray
     # (H+1, m) relative displacement in full stick [m]
-    stuck: np.ndarray
+    stuck: ComplexArray
     # (m, r) motions without stiffness of harmonic 0, scaled to B^T K B = 1
-    B: np.ndarray
+    B: RealArray
     # (r,) loads on these motions
-    g: np.ndarray
+    g: RealArray
     # (r0, r) the same motions in the rigid coordinates of blade, then damper
-    rigid: np.ndarray
+    rigid: RealArray
 
     @cached_property
     def A(self) -> np.ndarray:

@@ -169,7 +169,9 @@ def _likely_starts(balance: Balance, w: np.ndarray) -> Iterator[tuple[Balance, n
     rest = evaluate_balance(balance, w, "single")
     walking = sampled_walk(balance)
     motions = walking_motions(balance, rest.forces.shares)
-    found = [] if motions is None else [(rest.error, replace(walking, walk=motions), None)]
+    found: list[tuple[float, Balance, np.ndarray | None]] = []
+    if motions is not None:
+        found.append((rest.error, replace(walking, walk=motions), None))
     every = replace(walking, walk=tangential_motions(balance.model, balance.linear.B))
     going = evaluate_balance(every, w, "single")
     motions = walking_motions(balance, going.forces.shares)

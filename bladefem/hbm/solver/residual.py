@@ -26,6 +26,7 @@ from ...friction.aft import Forces, evaluate
 from ...friction.fourier import to_complex, to_real
 from ...friction.kernel_1d_exact import evaluate_exact
 from ...friction.trigonometric_tables import trigonometric_tables
+from ...util.arrays import RealArray
 from ..linear.condensation import Linear, condense, with_mean
 from ..model import ReducedModel
 from ..policy import DENSE_LU, DETERMINANT_UNKNOWNS, ITERATIONS, linear_solver
@@ -77,13 +78,13 @@ class State:
     """
 
     # (n, d, K) relative displacements [m]
-    w: np.ndarray
+    w: RealArray
     # friction forces and their derivative, of the total load
     forces: Forces
     # (n, d, K) forces beyond preload and springs [N]
-    p: np.ndarray
+    p: RealArray
     # (n, d, K) [m]
-    residual: np.ndarray
+    residual: RealArray
     # residual of both forms over the size of the motion [1]
     error: float
     # what was derived from it, see `walk_rates`
@@ -406,7 +407,7 @@ def determinant_sign(balance: Balance, state: State) -> float:
         Y = np.array([base(vector, STEP_ACCURACY) for vector in left])
         small = np.eye(len(right)) + np.tensordot(right, Y, axes=([1, 2, 3], [1, 2, 3]))
         return sign * float(np.sign(np.linalg.det(small)))
-    change, active, dofs = _active_nodes(balance, state)
+    change, _, dofs = _active_nodes(balance, state)
     if len(dofs) * state.w.shape[2] > DETERMINANT_UNKNOWNS:
         return 0.0
     # everything sticks: the derivative is the identity

@@ -30,6 +30,7 @@ from ...contact.patch import make_patch, normal_ports, patch_means, port_matrix
 from ...data import Patch
 from ...errors import InputError, NotSolvedError
 from ...scene.tables import Scene
+from ...util.arrays import RealArray
 from ...util.communicator import Communicator
 from ..pipeline.stages import build_mesh
 
@@ -48,19 +49,19 @@ class Indented:
     mesh: Mesh
     patch: Patch
     # (n,) distance of the nodes from the axis [m]
-    radius: np.ndarray
+    radius: RealArray
     # (n,) on the nodes of the meshed part [N]
-    force: np.ndarray
+    force: RealArray
     # of the punch [m]
     approach: float
     # force on the whole punch [N]
     total: float
     # (n, n) of the nodes of the meshed part, symmetric motion [m/N]
-    flexibility: np.ndarray
+    flexibility: RealArray
     # (n, n) of the same under loads odd in x; None in the plane
-    tilted: np.ndarray | None
+    tilted: RealArray | None
     # (n,) mean of x over what each node stands for [m]
-    arm: np.ndarray
+    arm: RealArray
     # the proof of optimality, see PressureMap
     complementarity: float
 

@@ -21,6 +21,7 @@ from ...data import ModeSet
 from ...errors import InputError
 from ...hbm.model import Damping
 from ...reduction.assemble import folded_diameter
+from ...util.arrays import RealArray, RealOrComplex
 from ..pipeline.ports import blade_ports
 from ..pipeline.stages import Bodies, is_wheel
 
@@ -36,13 +37,13 @@ class Forced:
 
     engine_order: int
     # (m,) natural circular frequencies of the excited nodal diameter [rad/s]
-    omega: np.ndarray
+    omega: RealArray
     # (m, n_points, 3) as the wave runs, conjugated where EO folds back [kg^-1/2]
-    shapes: np.ndarray
+    shapes: RealOrComplex
     # (m,) phi^H f [N kg^-1/2]
-    modal_load: np.ndarray
+    modal_load: RealOrComplex
     # (n_points, 3) static displacement that the modes do not hold [m]
-    rest: np.ndarray
+    rest: RealOrComplex
     damping: Damping
     nodal_diameter: int | None
 

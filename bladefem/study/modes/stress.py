@@ -9,6 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from ...data import ModeSet
+from ...util.arrays import RealArray
 from ..pipeline.ports import blade_ports
 from ..pipeline.stages import Bodies
 from .linear_response import static_offset
@@ -25,13 +26,13 @@ class Strength:
     # amplitude in that mode, for each metre of motion at the probe [Pa/m]
     alternating: float
     # (3,) where [m]
-    alternating_at: np.ndarray
+    alternating_at: RealArray
     # of rotation [Pa]; 0 at rest
     steady: float
     # (3,)
-    steady_at: np.ndarray
+    steady_at: RealArray
     # (n_points,) of rotation at the nodes, as signed von Mises stress [Pa]; 0 at rest
-    mean: np.ndarray
+    mean: RealArray
 
 
 def strength(bodies: Bodies, modes: ModeSet) -> Strength:

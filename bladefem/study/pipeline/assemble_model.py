@@ -173,7 +173,7 @@ def hold_translation(damper: PortModel, along: np.ndarray) -> PortModel:
     change = np.zeros((len(damper.omega), len(damper.omega) - 1))
     change[np.ix_(rigid, np.arange(others.shape[1]))] = others
     change[~rigid, others.shape[1] :] = np.eye(int((~rigid).sum()))
-    damping = damper.damping
+    damping: np.ndarray | None = damper.damping
     if damping is not None:
         whole = np.diag(damping) if damping.ndim == 1 else damping
         damping = change.T @ whole @ change

@@ -21,6 +21,7 @@ from ...friction.energy import free_static_force
 from ...friction.equivalent_linear import Approximation, by_harmonic, from_harmonics, work_of
 from ...friction.fourier import synthesis
 from ...friction.law_table import select_elements
+from ...util.arrays import IntegerArray, RealArray
 from ..adaptive.family import joined_elements
 from .assemble_model import LoadCase
 from .loads import Curve
@@ -36,9 +37,9 @@ class Loop:
     """
 
     # (s,) mean of the nodes by their stiffness, less its mean in time [m]
-    displacement: np.ndarray
+    displacement: RealArray
     # (s,) friction force of the patch on the damper [N]
-    force: np.ndarray
+    force: RealArray
 
 
 @dataclass(frozen=True)
@@ -57,13 +58,13 @@ class ContactCycle:
     # of the resonance [Hz]
     frequency: float
     # (nodes, 3) share of the period in stick, slip and separation [1]
-    shares: np.ndarray
+    shares: RealArray
     # (nodes,) SEPARATED, STICK, PARTIAL_SLIP or GROSS_SLIP of friction.aft
-    state: np.ndarray
+    state: IntegerArray
     # (nodes,) friction work a period and area, the wear-work map [J/m^2]
-    work: np.ndarray
+    work: RealArray
     # (nodes,) size up to which the static friction force of their element is free [N]
-    spare: np.ndarray
+    spare: RealArray
     # name of the patch to its hysteresis
     loops: dict[str, Loop]
     # (nodes, tangents) K_ad, C_ad, F_c0 averaged over the harmonics; nan at rest

@@ -21,6 +21,7 @@ from ...hbm.model import Damping
 from ...hbm.solution import Solution
 from ...reduction.assemble import folded_diameter
 from ...scene.support import area_springs, held_letters
+from ...util.arrays import ComplexArray, RealArray
 from ..adaptive.family import joined_elements
 from .assemble_model import LoadCase
 from .contact_cycle import labels
@@ -38,9 +39,9 @@ class DampedMotion:
     # of harmonic 1 [Hz]
     frequency: float
     # (H, n_points, dim) complex displacements of harmonics 1..H [m]
-    harmonics: np.ndarray
+    harmonics: ComplexArray
     # (H,) complex, the same at the probe [m]
-    probe: np.ndarray
+    probe: ComplexArray
     # |probe of the balance - probe| over the largest amplitude: what the reduction leaves out,
     # and harmonics beyond the modes, whose displacements are left at zero
     mismatch: float
@@ -57,15 +58,15 @@ class DampedStress:
     # largest von Mises stress in a period [Pa]
     largest: float
     # (3,) where [m]
-    place: np.ndarray
+    place: RealArray
     # (H,) of each harmonic alone at that place [Pa]
-    by_harmonic: np.ndarray
+    by_harmonic: RealArray
     # estimated relative error by the mesh
     mesh_error: float
     # of the motion at the probe against the balance, relative
     mismatch: float
     # (n_points,) largest von Mises stress at each node [Pa], see AlternatingStress.field
-    field: np.ndarray
+    field: RealArray
 
 
 def damped_motion(
