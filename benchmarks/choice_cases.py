@@ -41,8 +41,8 @@ from bladefem.hbm.model import Damping, ReducedModel
 from bladefem.hbm.precompile import compile_kernels
 from bladefem.hbm.reference_blade import reference_model
 from bladefem.hbm.solve import solve
-from bladefem.study.adaptive.choice import choose
-from bladefem.study.adaptive.family import Family, family_of, member
+from bladefem.study.adaptive.choice import choose_settings
+from bladefem.study.adaptive.family import Family, family_member, family_of
 from bladefem.study.adaptive.settings import Settings, first_for
 
 TRUTH, RICH = (31, 4096), (15, 1024)
@@ -153,8 +153,10 @@ def automatic(case: Case, family: Family, truth: complex, accuracy: float) -> Ou
     """Choose and solve one point."""
     start = time.process_time()
     settings = first_for(family.modes)
-    point = solve(member(family, settings).model, case.omega, settings.harmonics, settings.samples)
-    settings, point, found = choose(family, settings, point, accuracy)
+    point = solve(
+        family_member(family, settings).model, case.omega, settings.harmonics, settings.samples
+    )
+    settings, point, found = choose_settings(family, settings, point, accuracy)
     seconds = time.process_time() - start
     return Outcome(
         settings,

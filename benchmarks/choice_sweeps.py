@@ -68,9 +68,9 @@ from bladefem.hbm.solution import Solution
 from bladefem.hbm.solve import solve
 from bladefem.hbm.sweep import response, size
 from bladefem.scene.toml import load_scene
-from bladefem.study.adaptive.choice import covered
-from bladefem.study.adaptive.family import Family, family_of, member
-from bladefem.study.adaptive.frequency_list import along
+from bladefem.study.adaptive.choice import covered_band
+from bladefem.study.adaptive.family import Family, family_member, family_of
+from bladefem.study.adaptive.frequency_list import adapt_frequency_list
 from bladefem.study.adaptive.settings import Settings, first_for, restarted
 from bladefem.study.pipeline.pipeline import family_of_case, load_cases, reduced_sector, run
 from bladefem.study.pipeline.stages import Bodies
@@ -132,7 +132,7 @@ def of_scene() -> Swept:
         return family_of_case(scene, done.mesh, reduced, patches, case)
 
     def rich() -> ReducedModel:
-        return member(family(), Settings(family().modes, RICH[0], RICH[1], "elastic")).model
+        return family_member(family(), Settings(family().modes, RICH[0], RICH[1], "elastic")).model
 
     return Swept(
         f"{SCENE}, {case.load:g} N",
@@ -158,7 +158,7 @@ def around(model: ReducedModel, mode: int, points: int = 100) -> np.ndarray:
     """Circular frequencies of the band that a study would take, which is as wide as its peak needs
     [rad/s].
     """
-    rough = covered(model, first_for(len(model.sides[0].omega)), None, mode, 1.0)
+    rough = covered_band(model, first_for(len(model.sides[0].omega)), None, mode, 1.0)
     return np.linspace(rough[0].omega, rough[-1].omega, points)
 
 
@@ -169,7 +169,7 @@ def fixed(swept: Swept, settings: tuple[int, int], every: int = 1) -> list[Solut
 
 def chosen(swept: Swept, accuracy: float) -> list[Solution]:
     """The automatic choice."""
-    return along(swept.family(), swept.omegas, swept.first, accuracy).points
+    return adapt_frequency_list(swept.family(), swept.omegas, swept.first, accuracy).points
 
 
 def measured(swept: Swept) -> dict[str, tuple[float, list[Solution]]]:

@@ -25,7 +25,7 @@ from bladefem.hbm.history_interval import history_interval
 from bladefem.hbm.model import ReducedModel
 from bladefem.hbm.peak import Peak, find_peak
 from bladefem.scene.toml import load_scene, vary
-from bladefem.study.adaptive.family import member
+from bladefem.study.adaptive.family import family_member
 from bladefem.study.pipeline import pipeline
 from bladefem.study.pipeline.loads import curve_of
 from bladefem.study.pipeline.stages import Bodies
@@ -105,7 +105,7 @@ def main(count: int) -> None:
         start = time.process_time()
         curve = curve_of(scene, case, family, settings)
         plain = time.process_time() - start
-        model = member(family(case), curve.settings).model
+        model = family_member(family(case), curve.settings).model
         chosen = curve.settings
         start = time.process_time()
         peak = find_peak(

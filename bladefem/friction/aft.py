@@ -102,10 +102,11 @@ def evaluate(
     kernel is that of 2-D elements: "vector", or "plain", the readable definition of it, some 50
     times as slow and always in double precision. walk (n, tangents) [m], where given, is how far
     the tangential motion goes on in each period; the mean displacement that way then has no
-    influence. The error falls as samples^-2. Forces.converged is
-    False, with the reason, when a 2-D element was not periodic after ``cycles`` periods or the
-    motion is not finite. Raises InputError for shapes that do not fit or too few samples (at least
-    4H+4).
+    influence. The error falls as samples^-2. Forces.converged is False, with the reason, when a 2-D
+    element was not periodic after ``cycles`` periods or the motion is not finite.
+
+    Raises:
+        InputError: shapes that do not fit, or too few samples (at least 4H+4).
     """
     w, nodes = check_motion(elements, w)
     if precision not in PRECISIONS:
@@ -132,17 +133,8 @@ def evaluate(
         J = KERNELS_2D[kernel](
             w, ramp, load, nodes, samples, precision, cycles, jacobian, F, shares, used
         )
-    reason = convergence_reason(F, used, f"were not periodic after {cycles} cycles")
-    return Forces(
-        F,
-        J.reshape(n, d, K, d, K) if jacobian else None,
-        contact_states(shares),
-        shares,
-        dissipated_energy(F, w) + np.sum(F[:, 1:, 0] * ramp, axis=1),
-        np.abs(used),
-        reason == PERIODIC,
-        reason,
-    )
+    derivative = J.reshape(n, d, K, d, K) if jacobian else None
+    return _forces_of(F, derivative, w, ramp, shares, used, cycles)
 
 
 def _checked_walk(elements: Elements, walk: np.ndarray | None) -> np.ndarray:
@@ -211,6 +203,21 @@ def _evaluate_laws(
         shares[rows] = part.shares
         if J is not None:
             J[rows] = part.dfdw
+    return _forces_of(F, J, w, ramp, shares, used, cycles)
+
+
+def _forces_of(
+    F: np.ndarray,
+    J: np.ndarray | None,
+    w: np.ndarray,
+    ramp: np.ndarray,
+    shares: np.ndarray,
+    used: np.ndarray,
+    cycles: int,
+) -> Forces:
+    """The result, with states, works and the reason from harmonics (n, d, K), shares of the period
+    (n, 3) and periods (n,), below zero where the state was not periodic.
+    """
     reason = convergence_reason(F, used, f"were not periodic after {cycles} cycles")
     return Forces(
         F,

@@ -59,8 +59,8 @@ def carried_load(B, g, load):
 @njit(**KERNEL)
 def measure_point(omega, bodies, springs, linear, w, normals, F, preload, residual, f, probe, out):
     """Fill f (n, d, K), the contact forces of the balance, probe (H+1, p), and out (7,): largest
-    residual [m] and residual force [N], load on the springs of the regularisation [1], works of the excitation, in the bodies, of the
-    balanced friction forces, dissipated in contacts [J].
+    residual [m] and residual force [N], load on the springs of the regularisation [1], works of the
+    excitation, in the bodies, of the balanced friction forces, dissipated in contacts [J].
 
     Args:
         linear: modal flexibilities and free displacements of `linear_part`.

@@ -160,23 +160,11 @@ def sweep(
     _check_band(band)
     check_probe(model, options.probe)
     solved: dict[float, Solution] = {}
-
     slope = _slope_of(model, solved, options.probe)
     notes = [] if notes is None else notes
-    simply = replace(options, fallbacks=False)
-    lost = []
-    for solution in response(model, first_look(model, band), H, samples, options=simply):
-        if options.fallbacks and not solution.converged:
-            lost.append(solution.omega)
-            continue
+    for solution in _first_solutions(model, band, H, samples, options):
         solved[solution.omega] = solution
         yield solution
-    # points that the neighbour below does not lead to are tried again when those above are known
-    for omega in lost:
-        near = _neighbours(solved.values(), omega)
-        for solution in _walk_from(model, omega, H, samples, near, options):
-            solved[solution.omega] = solution
-            yield solution
     while not (paths and _needs_continuation(model, solved, H, options.probe)):
         wanted = _next_frequency(solved, slope, (peak, curve), options.probe)
         if wanted is None:
@@ -193,6 +181,32 @@ def sweep(
     found = find_branches(model, band, points, H, samples, peak=peak, options=options)
     notes.extend(found.notes)
     yield from found.points
+
+
+def _first_solutions(
+    model: ReducedModel,
+    band: tuple[float, float],
+    H: int,
+    samples: int,
+    options: Options,
+) -> Iterator[Solution]:
+    """The first look of a sweep: upwards without fallbacks, then the points that the neighbour
+    below does not lead to, now that those above are known.
+    """
+    simply = replace(options, fallbacks=False)
+    solved = []
+    lost = []
+    for solution in response(model, first_look(model, band), H, samples, options=simply):
+        if options.fallbacks and not solution.converged:
+            lost.append(solution.omega)
+            continue
+        solved.append(solution)
+        yield solution
+    for omega in lost:
+        near = _neighbours(solved, omega)
+        for solution in _walk_from(model, omega, H, samples, near, options):
+            solved.append(solution)
+            yield solution
 
 
 def _check_band(band: tuple[float, float]) -> None:

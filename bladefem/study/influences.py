@@ -32,8 +32,8 @@ from ..hbm.peak import Peak, find_peak
 from ..hbm.sensitivity import sensitivities
 from ..hbm.solve import solve
 from ..scene.tables import Scene
-from .adaptive.choice import sufficient
-from .adaptive.family import Family, Member, joined, member
+from .adaptive.choice import solver_options
+from .adaptive.family import Family, Member, family_member, joined_elements
 from .adaptive.settings import Settings
 from .pipeline.assemble_model import LoadCase
 from .pipeline.best_load import BestLoad, find_best_load
@@ -232,7 +232,7 @@ class _Study:
     ) -> ReducedModel:
         """The model of one load with a parameter changed."""
         case = self.changed(name, factor)(load)
-        model = member(self.family_of(case), self.best.settings).model
+        model = family_member(self.family_of(case), self.best.settings).model
         return vary(model, "damping", factor) if name == "damping" else model
 
     def peak(
@@ -252,7 +252,7 @@ class _Study:
             settings.samples,
             near=near,
             tolerance=1e-6,
-            options=replace(sufficient(self.scene.accuracy), tolerance=1e-9),
+            options=replace(solver_options(self.scene.accuracy), tolerance=1e-9),
         )
 
     def by_load(
@@ -292,8 +292,8 @@ class _Study:
         step; for an open one that shifts the load at zero displacement, -kn times its gap.
         """
         case = self.changed("kt", 1.0)(self.best.load)
-        groups = member(self.family_of(case), self.best.settings).groups
-        low, high = (joined(end.elements, groups) for end in ends)
+        groups = family_member(self.family_of(case), self.best.settings).groups
+        low, high = (joined_elements(end.elements, groups) for end in ends)
         layers = [physical_stiffness(end.elements, end.series) for end in ends]
         by_layer = _log_rate(*(np.bincount(groups, layer.kn) for layer in layers))
         shift = layer_share(model, "kn") * by_layer - _log_rate(low.kn, high.kn)
@@ -323,7 +323,7 @@ class _Study:
             settings.harmonics,
             settings.samples,
             start=peak.solution,
-            options=replace(sufficient(self.scene.accuracy), tolerance=1e-9),
+            options=replace(solver_options(self.scene.accuracy), tolerance=1e-9),
         )
         if not point.converged:
             raise NotSolvedError(f"influence at {peak.solution.frequency:.6g} Hz: {point.reason}")

@@ -131,15 +131,18 @@ def test_every_search_solves_the_split_layer():
     """Loads that are studied and loads that the best one is searched among have the same
     elements.
     """
-    scene = vary_scene(Scene(), "contact.kt_area", 1e15, "contact.mu", 0.3)
-    ratio = pair_ratio(scene.material.blade, scene.material.damper)
-    problem = layered(condensed(wedge_mesh(ALPHA)), scene.contact, ratio)
-    case = cases_of(scene, problem, 2)(120.0)
-    assert case.series is not None and (case.series < 0).all()
-    area = np.concatenate([patch.area for patch in problem.patches])
-    np.testing.assert_allclose(case.elements.kt, numerical_stiffness(problem) * area)
-    layer = physical_stiffness(case.elements, case.series)
-    np.testing.assert_allclose(layer.kt, stiffest_layer(problem) * area)
+    for given, value in (("contact.stiffness", "rigid"), ("contact.kt_area", 1e15)):
+        scene = vary_scene(Scene(), given, value, "contact.mu", 0.3)
+        ratio = pair_ratio(scene.material.blade, scene.material.damper)
+        problem = layered(condensed(wedge_mesh(ALPHA)), scene.contact, ratio)
+        case = cases_of(scene, problem, 2)(120.0)
+        assert case.series is not None and (case.series < 0).all()
+        area = np.concatenate([patch.area for patch in problem.patches])
+        np.testing.assert_allclose(case.elements.kt, numerical_stiffness(problem) * area)
+        layer = physical_stiffness(case.elements, case.series)
+        # a given layer is taken as it is, rigid faces as a stiff one
+        stiffness = stiffest_layer(problem) if value == "rigid" else value
+        np.testing.assert_allclose(layer.kt, stiffness * area, rtol=1e-6)
 
 
 def test_rigid_faces_have_no_stiffness_to_vary():

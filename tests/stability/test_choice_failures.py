@@ -25,10 +25,16 @@ from bladefem.hbm.sweep import response, size, sweep
 from bladefem.study.adaptive import check_points as watched
 from bladefem.study.adaptive import indicators
 from bladefem.study.adaptive.check_points import peak_of
-from bladefem.study.adaptive.choice import Checked, adapted, choose, covered, estimated
-from bladefem.study.adaptive.family import family_of, member
-from bladefem.study.adaptive.frequency_list import along
-from bladefem.study.adaptive.indicators import indicate, richer
+from bladefem.study.adaptive.choice import (
+    Checked,
+    adapted_settings,
+    choose_settings,
+    covered_band,
+    estimated_errors,
+)
+from bladefem.study.adaptive.family import family_member, family_of
+from bladefem.study.adaptive.frequency_list import adapt_frequency_list
+from bladefem.study.adaptive.indicators import indicate_errors, richer_settings
 from bladefem.study.adaptive.settings import DIRECTIONS, Settings, first_for
 
 HZ = 2 * np.pi
@@ -55,8 +61,8 @@ def oscillator(limit: float, second: float = 1e4, phase: float = 0.0) -> Reduced
 
 def chosen(model: ReducedModel, omega: float, first: Settings, accuracy: float):
     family = family_of(model)
-    point = solve(member(family, first).model, omega, first.harmonics, first.samples)
-    return choose(family, first, point, accuracy)
+    point = solve(family_member(family, first).model, omega, first.harmonics, first.samples)
+    return choose_settings(family, first, point, accuracy)
 
 
 def test_F19_points_are_compared_with_the_finest():
@@ -68,8 +74,8 @@ def test_F19_points_are_compared_with_the_finest():
         HZ * 1385.7 * 1.01,
     )
     first = replace(first_for(5), points=3)
-    told = indicate(
-        family_of(model), first, solve(member(family_of(model), first).model, omega, 1, 64)
+    told = indicate_errors(
+        family_of(model), first, solve(family_member(family_of(model), first).model, omega, 1, 64)
     )
     assert told.errors["points"] > 0.4
     _, point, found = chosen(model, omega, first, 0.02)
@@ -105,7 +111,7 @@ def test_F21_slip_between_two_samples():
     missed = abs(blind.probe[1, 0] / true.probe[1, 0] - 1)
     assert missed > 5e-4
     assert not sticks_safely(model, blind)
-    told = indicate(family_of(model), first_for(2), blind).total
+    told = indicate_errors(family_of(model), first_for(2), blind).total
     assert told == pytest.approx(missed, rel=0.3)
 
 
@@ -118,13 +124,16 @@ def test_F22_an_indicator_beside_the_peak():
     model, band, first = oscillator(1.0, 1129.079), (98.0, 116.0), first_for(2)
     family = family_of(model)
     beside = solve(
-        member(family, first).model, 1.003 * HZ * 1129.079 / 11, first.harmonics, first.samples
+        family_member(family, first).model,
+        1.003 * HZ * 1129.079 / 11,
+        first.harmonics,
+        first.samples,
     )
-    there, _, found = choose(family, first, beside, 0.02)
+    there, _, found = choose_settings(family, first, beside, 0.02)
     assert found.total <= 0.01  # told 0.1 %
-    top = peak_of(covered(member(family, there).model, there, band, 1, 0.02))
+    top = peak_of(covered_band(family_member(family, there).model, there, band, 1, 0.02))
     assert off(model, top) > 0.02
-    curve = adapted(family, first, band, 1, 0.02)
+    curve = adapted_settings(family, first, band, 1, 0.02)
     assert off(model, peak_of(curve.points)) < 0.01
     assert curve.settings.error <= 0.01
     assert curve.settings.harmonics > there.harmonics
@@ -142,14 +151,14 @@ def test_F23_one_newton_step_as_an_indicator():
     model = random_body(3, 3, modes=8)
     family, settings = family_of(model, (3, 3)), replace(first_for(8), harmonics=3)
     omega = 0.6 * free_resonances(model)[0] + 0.4 * stuck_resonances(model)[0]
-    point = solve(member(family, settings).model, omega, 3, 64)
+    point = solve(family_member(family, settings).model, omega, 3, 64)
     assert point.converged
-    other = richer(family, settings, "harmonics")
+    other = richer_settings(family, settings, "harmonics")
     balance = Balance(model, condense(model, omega, other.harmonics), other.samples)
     end = newton(balance, match_harmonics(point.w, other.harmonics), Options(iterations=1))
     step = as_solution(balance, Attempt("one step", end), 1, "")
     assert abs(step.probe[1, 0] / point.probe[1, 0] - 1) > 0.1
-    told = indicate(family, settings, point).errors["harmonics"]
+    told = indicate_errors(family, settings, point).errors["harmonics"]
     true = abs(solve(model, omega, 15, 512, start=point).probe[1, 0] / point.probe[1, 0] - 1)
     assert told < 2e-3
     assert told == pytest.approx(true, rel=0.5)
@@ -161,9 +170,9 @@ def test_F24_a_point_that_is_not_solved_asks_for_nothing(monkeypatch):
     """
     model = reference_model(1e6, 0.06, 1.0, points=4, modes=10, harmonics=63)
     family, first = family_of(model), first_for(10)
-    point = solve(member(family, first).model, HZ * 1240, 1, 64)
+    point = solve(family_member(family, first).model, HZ * 1240, 1, 64)
     lost = replace(point, converged=False)
-    settings, same, found = choose(family, first, lost, 0.001)
+    settings, same, found = choose_settings(family, first, lost, 0.001)
     assert (settings, same) == (replace(first, error=np.inf), lost)
     assert set(found.unknown) == set(DIRECTIONS)
     assert "unknown" in settings.sentence()
@@ -175,7 +184,7 @@ def test_F24_a_point_that_is_not_solved_asks_for_nothing(monkeypatch):
         return replace(solve(model, omega, H, samples, **how), converged=H == 1)
 
     monkeypatch.setattr(indicators, "solve", never)  # richer harmonics are never found
-    settings, point, found = choose(family, first, point, 0.001)
+    settings, point, found = choose_settings(family, first, point, 0.001)
     assert point.converged
     assert settings.harmonics == 1
     assert "harmonics" in found.unknown and settings.error == np.inf
@@ -186,7 +195,7 @@ def test_F24_a_point_that_is_not_solved_asks_for_nothing(monkeypatch):
 def test_F24_the_curve_says_where_nothing_is_known():
     point = solve(reference_model(load=3.0, points=4), HZ * 1300, 1, 64)
     points = [replace(point, omega=HZ * f, converged=f != 1200) for f in (1100, 1200, 1300, 1400)]
-    told = estimated(Checked(first_for(10), points, {HZ * 1300: 0.01, HZ * 1400: np.inf}))
+    told = estimated_errors(Checked(first_for(10), points, {HZ * 1300: 0.01, HZ * 1400: np.inf}))
     np.testing.assert_array_equal(told, [0.01, np.inf, 0.01, np.inf])
 
 
@@ -199,7 +208,7 @@ def test_F25_a_sweep_that_follows_one_of_two_peaks():
     circular = (HZ * band[0], HZ * band[1])
     coarse = max(sweep(model, circular, 7, 256, peak=1e-3, curve=0.1), key=size)
     assert size(coarse) < 0.8 * size(dense)
-    curve = adapted(family_of(model), first_for(2), band, 1, 0.02)
+    curve = adapted_settings(family_of(model), first_for(2), band, 1, 0.02)
     assert size(peak_of(curve.points)) == pytest.approx(size(dense), rel=0.01)
     assert peak_of(curve.points).frequency == pytest.approx(dense.frequency, rel=1e-3)
 
@@ -214,7 +223,7 @@ def test_F26_a_curve_checked_by_height_alone(monkeypatch):
     truth = list(response(model, omegas[::6], 31, 2048))
 
     def worst(accuracy: float = 1e-3) -> tuple[float, float]:
-        curve = along(
+        curve = adapt_frequency_list(
             family_of(model, (1, 1)), omegas, first_for(len(model.side(1).omega)), accuracy
         )
         top = max(size(p) for p in curve.points)
@@ -241,7 +250,9 @@ def test_F28_internal_resonances_between_the_checks(monkeypatch):
     truth = [solve(model, omegas[i], 31, 2048) for i in spikes]
 
     def worst() -> float:
-        curve = along(family_of(model, (8, 8)), omegas, first_for(len(model.side(1).omega)), 1e-3)
+        curve = adapt_frequency_list(
+            family_of(model, (8, 8)), omegas, first_for(len(model.side(1).omega)), 1e-3
+        )
         top = max(size(p) for p in curve.points)
         return max(
             abs(curve.points[i].probe[1, 0] - p.probe[1, 0]) / top

@@ -17,7 +17,7 @@ from bladefem.hbm.reference_blade import reference_model
 from bladefem.hbm.solve import solve
 from bladefem.hbm.sweep import size, sweep
 from bladefem.study.adaptive.check_points import peak_of
-from bladefem.study.adaptive.choice import adapted
+from bladefem.study.adaptive.choice import adapted_settings
 from bladefem.study.adaptive.family import family_of
 from bladefem.study.adaptive.settings import first_for
 from bladefem.time.shooting import periodic_solution, probe_harmonics
@@ -174,7 +174,7 @@ def test_f10_peaks_of_the_one_harmonic_iteration(load, near, amplitude, shift):
     true = peak_of([p for p in sweep(model, (HZ * 1000, HZ * 1250), 15, 512, peak=2e-3, curve=0.2)])
     assert heights[1] / size(true) - 1 == pytest.approx(amplitude, abs=0.02)
     assert near[1] / true.frequency - 1 == pytest.approx(shift, abs=3e-3)
-    chosen = adapted(family_of(model), first_for(5), (1000.0, 1250.0), 2, 0.02)
+    chosen = adapted_settings(family_of(model), first_for(5), (1000.0, 1250.0), 2, 0.02)
     assert chosen.settings.harmonics >= 3
     assert size(peak_of(chosen.points)) == pytest.approx(size(true), rel=0.02)
     assert peak_of(chosen.points).frequency == pytest.approx(true.frequency, rel=3e-3)

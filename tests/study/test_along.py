@@ -12,9 +12,9 @@ from bladefem.hbm.solve import solve
 from bladefem.hbm.solver.newton import Options
 from bladefem.hbm.sweep import response, size
 from bladefem.reduction.matrices import port_model_from_matrices
-from bladefem.study.adaptive.check_points import heights_of, peak_of, watched
+from bladefem.study.adaptive.check_points import heights_of, peak_of, points_to_check
 from bladefem.study.adaptive.family import family_of
-from bladefem.study.adaptive.frequency_list import along
+from bladefem.study.adaptive.frequency_list import adapt_frequency_list
 from bladefem.study.adaptive.settings import first_for
 
 
@@ -44,7 +44,7 @@ def test_no_point_is_wrong(blade, omegas, mode, accuracy):
     higher harmonic is in resonance half way down the slipping stretch, which 7 harmonics miss by
     1.2 %.
     """
-    curve = along(
+    curve = adapt_frequency_list(
         family_of(blade, (1, 1)), omegas[mode], first_for(len(blade.side(1).omega)), accuracy
     )
     truth = list(response(blade, omegas[mode], 31, 2048))
@@ -68,7 +68,7 @@ def test_the_first_slip_is_watched(blade, omegas):
     onset = [
         p for p, before, now in zip(points[1:], slips, slips[1:], strict=False) if now > before
     ]
-    looked_at = watched(points, heights_of(points), np.zeros(len(points)), 0.001)
+    looked_at = points_to_check(points, heights_of(points), np.zeros(len(points)), 0.001)
     assert onset and all(p in looked_at or p is peak_of(points) for p in onset)
 
 
@@ -76,7 +76,7 @@ def test_only_points_that_need_it_get_richer_settings(blade, omegas):
     """At 0.1 % slips that only begin take 15 harmonics here, the peak 7, and what sticks the
     excited one.
     """
-    curve = along(
+    curve = adapt_frequency_list(
         family_of(blade, (1, 1)), omegas["second"], first_for(len(blade.side(1).omega)), 0.001
     )
     slipping = [p.harmonics for p in curve.points if p.states["slip"]]
@@ -107,7 +107,9 @@ def test_points_that_stick_take_the_excited_harmonic_alone(blade, omegas):
 )
 def test_bad_input_is_named(blade, omegas, accuracy, named):
     with pytest.raises(InputError, match=named):
-        along(family_of(blade, (1, 1)), omegas, first_for(len(blade.side(1).omega)), accuracy)
+        adapt_frequency_list(
+            family_of(blade, (1, 1)), omegas, first_for(len(blade.side(1).omega)), accuracy
+        )
 
 
 def two_masses(n0, excitation):
@@ -131,7 +133,7 @@ def test_points_that_stick_with_fewer_harmonics_are_compared_and_all_excited_one
     """A stuck point is solved with the excited harmonics alone, of which there may be several."""
     model = two_masses(n0, excitation)
     omegas = np.linspace(800, 1600, 40)
-    curve = along(family_of(model, (1,)), omegas, first_for(2), 0.01)
+    curve = adapt_frequency_list(family_of(model, (1,)), omegas, first_for(2), 0.01)
     truth = list(response(model, omegas, 31, 2048))
     top = max(size(p) for p in truth)
     for p, q in zip(curve.points, truth, strict=True):

@@ -15,10 +15,20 @@ from bladefem.hbm.solve import solve
 from bladefem.hbm.sweep import size
 from bladefem.scene.toml import load_scene
 from bladefem.study.adaptive.check_points import peak_of
-from bladefem.study.adaptive.choice import adapted, checked, choose, estimated
-from bladefem.study.adaptive.family import carried, coarsened, family_of, member
-from bladefem.study.adaptive.indicators import indicate, richer
-from bladefem.study.adaptive.settings import Settings, enriched, first_for
+from bladefem.study.adaptive.choice import (
+    adapted_settings,
+    checked_points,
+    choose_settings,
+    estimated_errors,
+)
+from bladefem.study.adaptive.family import (
+    carried_displacements,
+    coarsened_elements,
+    family_member,
+    family_of,
+)
+from bladefem.study.adaptive.indicators import indicate_errors, richer_settings
+from bladefem.study.adaptive.settings import Settings, enriched_settings, first_for
 from bladefem.study.pipeline.assemble_model import LoadCase
 from bladefem.study.pipeline.loads import beyond_tolerance, curve_of
 
@@ -43,35 +53,37 @@ def test_accepted_settings_keep_the_accuracy(kt, mass, phase, points, load, shar
     truth = solve(model, omega, 31, 4096).probe[1, 0]
     family = family_of(model)
     settings = first_for(family.modes)
-    point = solve(member(family, settings).model, omega, settings.harmonics, settings.samples)
-    settings, point, found = choose(family, settings, point, accuracy)
+    point = solve(
+        family_member(family, settings).model, omega, settings.harmonics, settings.samples
+    )
+    settings, point, found = choose_settings(family, settings, point, accuracy)
     assert found.total <= accuracy / 2
     assert abs(point.probe[1, 0] / truth - 1) < accuracy
 
 
 def test_a_curve_tells_its_error_at_every_point():
     model = reference_model(load=3.0, points=4, modes=20, harmonics=63)
-    curve = adapted(family_of(model), first_for(20), (1150.0, 1600.0), 2, 0.02)
-    told, top = estimated(curve), size(peak_of(curve.points))
+    curve = adapted_settings(family_of(model), first_for(20), (1150.0, 1600.0), 2, 0.02)
+    told, top = estimated_errors(curve), size(peak_of(curve.points))
     true = [
         abs(p.probe[1, 0] / solve(model, p.omega, 31, 2048).probe[1, 0] - 1) * size(p) / top
         for p in curve.points
     ]
     assert max(true) < 0.02  # at every point, of the peak: measured 0.19 %
     assert len(told) == len(curve.points) and np.isfinite(told).all()
-    assert 3 <= checked(curve).sum() <= 8
+    assert 3 <= checked_points(curve).sum() <= 8
     assert curve.settings.error <= 0.01
 
 
 def test_joined_contact_points_keep_stiffness_and_load():
     model = reference_model(points=6, load=4.0, harmonics=3)
-    few = coarsened(model, np.repeat(np.arange(4), 3))
+    few = coarsened_elements(model, np.repeat(np.arange(4), 3))
     assert few.elements.kt.sum() == pytest.approx(model.elements.kt.sum())
     assert few.elements.n0.sum() == pytest.approx(8.0)
     omega = 2 * np.pi * 1300
     stuck = [
         solve(m, omega, 1, 64).probe[1, 0]
-        for m in (coarsened(heavy(model), np.repeat(np.arange(4), 3)), heavy(model))
+        for m in (coarsened_elements(heavy(model), np.repeat(np.arange(4), 3)), heavy(model))
     ]
     assert stuck[0] == pytest.approx(
         stuck[1], rel=1e-9
@@ -87,11 +99,14 @@ def heavy(model):
 def test_displacements_are_carried_between_numbers_of_points():
     family = family_of(reference_model(points=6, harmonics=7))
     settings = first_for(family.modes)
-    coarse, fine = member(family, settings), member(family, enriched(settings, "points"))
+    coarse, fine = (
+        family_member(family, settings),
+        family_member(family, enriched_settings(settings, "points")),
+    )
     w = np.arange(8.0)[:, None, None] * np.ones((1, 1, 3))
-    there = carried(w, coarse, fine, 3)
+    there = carried_displacements(w, coarse, fine, 3)
     assert there.shape == (12, 1, 7)
-    np.testing.assert_allclose(carried(there, fine, coarse, 1), w)
+    np.testing.assert_allclose(carried_displacements(there, fine, coarse, 1), w)
 
 
 def test_a_response_reports_told_against_tolerated_error_at_each_point():
@@ -126,8 +141,8 @@ def test_exact_events_stay_exact_in_the_models_that_judge():
     """samples 0: richer models locate changes of state too, and there is no error of sampling."""
     family = family_of(reference_model(points=4, load=0.3))
     settings = replace(first_for(family.modes), harmonics=3, samples=0)
-    assert richer(family, settings, "samples") is None
-    assert richer(family, settings, "harmonics").samples == 0
-    point = solve(member(family, settings).model, 2 * np.pi * 1237.0, 3, 0)
-    found = indicate(family, settings, point)
+    assert richer_settings(family, settings, "samples") is None
+    assert richer_settings(family, settings, "harmonics").samples == 0
+    point = solve(family_member(family, settings).model, 2 * np.pi * 1237.0, 3, 0)
+    found = indicate_errors(family, settings, point)
     assert point.converged and found.errors["samples"] == 0 and 0 < found.errors["harmonics"] < 0.1

@@ -10,7 +10,7 @@ import pytest
 from bladefem.errors import InputError
 from bladefem.hbm.solve import solve
 from bladefem.scene.toml import load_scene
-from bladefem.study.adaptive.family import member
+from bladefem.study.adaptive.family import family_member
 from bladefem.study.adaptive.settings import first_settings
 from bladefem.study.mistuning.stage import check_mistuning
 from bladefem.study.mistuning.whole_wheel import reduce_wheel, whole_wheel
@@ -45,7 +45,7 @@ def test_whole_wheel_is_the_tuned_sector(reduced):
     scene, run, patches, sector, case, settings = reduced
     wheel = whole_wheel(scene, run.mesh, sector, patches, case, settings)
     family = pipeline.family_of_case(scene, run.mesh, run.reduced, patches, case)
-    model = member(family, settings).model
+    model = family_member(family, settings).model
     omega = 0.99 * model.side(1).omega[0]
     one = solve(model, omega, 1, 72)
     found = solve_wheel(wheel, omega, 1, 72)

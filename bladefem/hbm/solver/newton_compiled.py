@@ -1,5 +1,5 @@
-"""Newton on balances of 1-D elements in one compiled call: the loop of `bladefem.util.newton` without
-its overhead, which is most of the time of a model with few contacts.
+"""Newton on balances of 1-D elements in one compiled call: the loop of `bladefem.util.newton`
+without its overhead, which is most of the time of a model with few contacts.
 
 It takes the same steps, with the line search on the step, and ends for the same reasons. Residual,
 moving nodes, Jacobian and the motion of the other nodes are those of
@@ -287,7 +287,9 @@ def moving_nodes(J, springs, d, sticks):
 
 @njit(cache=True, error_model="numpy", inline="always")
 def _empty_work(m, d, K):
-    """Scratch of one run: motion of all directions, forces, their derivative, shares, p, residual."""
+    """Scratch of one run: motion of all directions, forces, their derivative, shares, p,
+    residual.
+    """
     n = m // d
     return (
         np.zeros((n, 2, K)),

@@ -171,8 +171,8 @@ def _point_solution(
 
 @njit(cache=True, error_model="numpy", inline="always")
 def _empty_points(p, n, d, K):
-    """Room for p points: displacements (p, n d, K), forces (p, n, d, K), ends (p, 3), counts (p, 4),
-    measures (p, MEASURES).
+    """Room for p points: displacements (p, n d, K), forces (p, n, d, K), ends (p, 3), counts (p,
+    4), measures (p, MEASURES).
     """
     return (
         np.empty((p, n * d, K)),

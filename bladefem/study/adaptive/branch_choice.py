@@ -16,8 +16,8 @@ from ...errors import NotSolvedError
 from ...hbm.branches import TOLERANCE
 from ...hbm.continuation import follow
 from ...hbm.solution import Solution, size
-from .family import Family, member
-from .indicators import ESTIMATE_OPTIONS, moved, richest
+from .family import Family, family_member
+from .indicators import ESTIMATE_OPTIONS, moved_solution, richest_settings
 from .settings import Settings
 
 # shares of the peak's height at which a point of the same piece is looked for
@@ -59,10 +59,10 @@ def peak_error(
     Returns:
         infinite where the richer model's peak was not found.
     """
-    rich = richest(family, settings)
+    rich = richest_settings(family, settings)
     if rich == settings:
         return 0.0
-    model = member(family, rich).model
+    model = family_member(family, rich).model
     if model.springs.size * (2 * rich.harmonics + 1) > FOLLOWED:
         return _error_below(family, settings, points, top, rich)
     omegas = [p.omega for p in points]
@@ -71,7 +71,7 @@ def peak_error(
         anchor = anchor_of(points, top, share)
         if anchor is top:
             continue
-        start = moved(family, settings, anchor, rich, ESTIMATE_OPTIONS)
+        start = moved_solution(family, settings, anchor, rich, ESTIMATE_OPTIONS)
         if not start.converged:
             continue
         height = 0.0
@@ -104,7 +104,7 @@ def _error_below(
     """Relative error of the height of a point right below the peak."""
     for share in BELOW:
         point = anchor_of(points, top, share)
-        better = moved(family, settings, point, rich, ESTIMATE_OPTIONS)
+        better = moved_solution(family, settings, point, rich, ESTIMATE_OPTIONS)
         if better.converged:
             return float(abs(size(better) - size(point)) / size(better))
     return float(np.inf)

@@ -14,8 +14,8 @@ from ...hbm.solution import Solution
 from ...hbm.stability import AFFORDABLE, UNSTABLE, stability_verdict
 from ...hbm.sweep import size
 from ...hbm.truncation_indicator import truncation_indicator
-from .family import Family, member
-from .indicators import richer
+from .family import Family, family_member
+from .indicators import richer_settings
 from .settings import Settings
 
 # of the peak's height: where a curve is checked on each side in addition to the peak itself
@@ -28,7 +28,7 @@ MIN_SHARE_OF_ACCURACY = 0.1
 JUDGED = 100
 
 
-def watched(
+def points_to_check(
     points: Sequence[Solution],
     heights: np.ndarray,
     moved: np.ndarray,
@@ -44,7 +44,7 @@ def watched(
 
     Args:
         heights: (points,) what `heights_of` gives.
-        moved: (points,) what `hidden` gives.
+        moved: (points,) what `left_out_motion` gives.
         accuracy: relative, of the peak.
     """
     places = [i for i, p in enumerate(points) if p.converged]
@@ -74,7 +74,7 @@ def watched(
     return [good[i] for i in dict.fromkeys(chosen)]
 
 
-def hidden(
+def left_out_motion(
     family: Family,
     used: Sequence[Settings],
     points: Sequence[Solution],
@@ -91,9 +91,11 @@ def hidden(
         if point.converged and point.states["stick"] < len(point.w):
             groups.setdefault((settings, point.harmonics), []).append(i)
     for (settings, harmonics), found in groups.items():
-        more = richer(family, settings, "harmonics")
+        more = richer_settings(family, settings, "harmonics")
         if more is not None and more.harmonics > harmonics:
-            model = member(family, replace(more, modes=max(settings.modes, family.modes))).model
+            model = family_member(
+                family, replace(more, modes=max(settings.modes, family.modes))
+            ).model
             moved[found] = truncation_indicator(model, [points[i] for i in found], more.harmonics)
     return moved
 

@@ -17,10 +17,10 @@ from ...hbm.solution import Solution
 from ...hbm.solver.newton import Options
 from ...hbm.sweep import size, sweep
 from .branch_choice import anchor_of, peak_error
-from .check_points import heights_of, hidden, lasting_peak, peak_of, watched
-from .family import Family, member, with_excited_harmonics
-from .indicators import Indicators, indicate, judge, moved
-from .settings import Settings, enriched
+from .check_points import heights_of, lasting_peak, left_out_motion, peak_of, points_to_check
+from .family import Family, family_member, with_excited_harmonics
+from .indicators import Indicators, indicate_errors, moved_solution, total_error
+from .settings import Settings, enriched_settings
 
 ROUNDS = 12
 # whose indicators, where they are small, outlast a change of the others
@@ -49,7 +49,7 @@ class Checked:
     errors: dict[float, float]
 
 
-def choose(
+def choose_settings(
     family: Family,
     settings: Settings,
     point: Solution,
@@ -72,22 +72,22 @@ def choose(
     if (
         settings.error is None
         and point.converged
-        and not sticks_safely(member(family, settings).model, point)
+        and not sticks_safely(family_member(family, settings).model, point)
     ):
-        usual = likely(family, settings, accuracy, fixed)
-        further = moved(family, settings, point, usual) if usual != settings else point
+        usual = likely_settings(family, settings, accuracy, fixed)
+        further = moved_solution(family, settings, point, usual) if usual != settings else point
         settings, point = (usual, further) if further.converged else (settings, point)
     found: Indicators
     for _ in range(ROUNDS):
-        judged = None if apart else judge(family, settings, point)
+        judged = None if apart else total_error(family, settings, point)
         if judged is not None and judged.total <= accuracy / 2:
             found = judged
         else:
-            found = indicate(family, settings, point, known)
+            found = indicate_errors(family, settings, point, known)
         settings = replace(settings, error=found.total)
         if found.total <= accuracy / 2:
             break
-        better = following(settings, found, accuracy, fixed)
+        better = next_settings(settings, found, accuracy, fixed)
         if better is None:
             break
         richer_point = _solved(family, settings, point, better, found)
@@ -104,7 +104,7 @@ def choose(
     return settings, point, found
 
 
-def likely(
+def likely_settings(
     family: Family,
     settings: Settings,
     accuracy: float,
@@ -134,12 +134,12 @@ def _solved(
     one.
     """
     ahead = found.better.get("harmonics")
-    return moved(
+    return moved_solution(
         family, settings, ahead if ahead is not None and ahead.converged else point, better
     )
 
 
-def following(
+def next_settings(
     settings: Settings,
     found: Indicators,
     accuracy: float,
@@ -160,11 +160,11 @@ def following(
     better = settings
     for name in names:
         if name == names[0] or found.errors[name] > share:
-            better = enriched(better, name, found.errors[name] / share) or better
+            better = enriched_settings(better, name, found.errors[name] / share) or better
     return None if better == settings else better
 
 
-def adapted(
+def adapted_settings(
     family: Family,
     settings: Settings,
     band: tuple[float, float] | None,
@@ -188,15 +188,15 @@ def adapted(
     widen = band is None
     settings = with_excited_harmonics(family, settings)
     if settings.chosen:
-        rough = covered(member(family, settings).model, settings, band, mode, 1.0)
-        settings, _, _ = choose(family, settings, peak_of(rough), accuracy, fixed)
+        rough = covered_band(family_member(family, settings).model, settings, band, mode, 1.0)
+        settings, _, _ = choose_settings(family, settings, peak_of(rough), accuracy, fixed)
         band = band or (rough[0].frequency, rough[-1].frequency)
     points: list[Solution] = []
     for last in [False] * (PASSES - 1) + [True]:
-        model = member(family, settings).model
+        model = family_member(family, settings).model
         inner = _solvable(points)
         if inner is None:
-            points = covered(model, settings, band, mode, accuracy, widen)
+            points = covered_band(model, settings, band, mode, accuracy, widen)
         else:
             points = _replaced(points, response_points(model, settings, inner, accuracy))
         if settings.chosen and any(p.branch for p in points):
@@ -205,13 +205,13 @@ def adapted(
         used = settings
         errors = {}
         whole = all(p.converged for p in points)
-        moved = hidden(family, [settings] * len(points), points)
-        for point in watched(points, heights_of(points), moved, accuracy):
+        left_out = left_out_motion(family, [settings] * len(points), points)
+        for point in points_to_check(points, heights_of(points), left_out, accuracy):
             tolerated = accuracy * size(top) / size(point)
             if last or not (whole or point is top):
-                found = judge(family, settings, point)
+                found = total_error(family, settings, point)
             else:
-                used, _, found = choose(family, settings, point, tolerated, fixed)
+                used, _, found = choose_settings(family, settings, point, tolerated, fixed)
                 used = replace(used, error=settings.error)
             errors[point.omega] = found.total
             if used != settings:
@@ -237,18 +237,20 @@ def _adapted_branches(
     widen = band is None
     band = band or (points[0].frequency, points[-1].frequency)
     demanded = accuracy
-    top = lasting_peak(member(family, settings).model, points)
+    top = lasting_peak(family_member(family, settings).model, points)
     error = peak_error(family, settings, points, top)
     for _ in range(PASSES):
         if error <= accuracy / 2 or not np.isfinite(error):
             break
         demanded *= max(accuracy / 2 / error, TIGHTER)
         before = replace(settings, error=None)
-        settings, _, _ = choose(family, settings, anchor_of(points, top), demanded, fixed)
+        settings, _, _ = choose_settings(family, settings, anchor_of(points, top), demanded, fixed)
         if replace(settings, error=None) == before:
             continue
-        points = covered(member(family, settings).model, settings, band, mode, accuracy, widen)
-        top = lasting_peak(member(family, settings).model, points)
+        points = covered_band(
+            family_member(family, settings).model, settings, band, mode, accuracy, widen
+        )
+        top = lasting_peak(family_member(family, settings).model, points)
         error = peak_error(family, settings, points, top)
     return Checked(replace(settings, error=error), points, {top.omega: error})
 
@@ -274,17 +276,17 @@ def _replaced(old: Sequence[Solution], new: Sequence[Solution]) -> list[Solution
     )
 
 
-def sufficient(accuracy: float) -> Options:
+def solver_options(accuracy: float) -> Options:
     """When a point is accepted whose model may be wrong by the accuracy anyway."""
     return Options(tolerance=float(np.clip(1e-3 * accuracy, 1e-10, 1e-6)), frugal=True)
 
 
-def checked(curve: Checked) -> np.ndarray:
+def checked_points(curve: Checked) -> np.ndarray:
     """(k,) bool: which points were checked themselves."""
     return np.array([p.omega in curve.errors for p in curve.points])
 
 
-def estimated(curve: Checked) -> np.ndarray:
+def estimated_errors(curve: Checked) -> np.ndarray:
     """(k,) estimated relative error of each point: linear in frequency between the checked ones,
     held beyond them.
 
@@ -301,7 +303,7 @@ def estimated(curve: Checked) -> np.ndarray:
     return np.where(blind | [not p.converged for p in curve.points], np.inf, between)
 
 
-def covered(
+def covered_band(
     model: ReducedModel,
     settings: Settings,
     band: tuple[float, float] | None,
@@ -367,7 +369,7 @@ def response_points(
         settings.samples,
         peak=min(accuracy / 10, 1e-2),
         curve=0.2 if accuracy >= 1 else 0.02,
-        options=sufficient(accuracy),
+        options=solver_options(accuracy),
         paths=accuracy < 1 if paths is None else paths,
     )
     points = sorted(swept, key=lambda s: s.omega)

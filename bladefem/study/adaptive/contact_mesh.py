@@ -21,7 +21,7 @@ from ...hbm.peak import find_peak
 from ...hbm.solution import Solution
 from ...hbm.solver.newton import Options
 from ...hbm.sweep import size
-from .family import Family, carried, member
+from .family import Family, carried_displacements, family_member
 from .settings import Settings
 
 # pressed nodes of a seat: 6 left an amplitude between stick and slip 37 % low, 11 19 %, 16 12 %, 21
@@ -64,12 +64,12 @@ def halved_change(
     Args:
         settings, top: of the resonance, and its highest point.
     """
-    own = member(family, settings)
+    own = family_member(family, settings)
     half = len(own.groups) // 4
     if (settings.points is not None and settings.points <= half) or half < 1:
         return np.nan
-    other = member(family, replace(settings, points=half))
-    start = replace(top, w=carried(top.w, own, other, settings.harmonics))
+    other = family_member(family, replace(settings, points=half))
+    start = replace(top, w=carried_displacements(top.w, own, other, settings.harmonics))
     try:
         peak = find_peak(
             other.model,

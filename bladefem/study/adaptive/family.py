@@ -46,7 +46,7 @@ class Family:
     dampers: tuple[str, ...] = ()
 
 
-def member(family: Family, settings: Settings) -> Member:
+def family_member(family: Family, settings: Settings) -> Member:
     """The model of some settings; what does not change the model (samples, errors) is not looked
     at.
     """
@@ -55,7 +55,7 @@ def member(family: Family, settings: Settings) -> Member:
 
 def lowest_harmonics(family: Family, settings: Settings) -> int:
     """Highest harmonic of the excitation and of prescribed normal loads: no balance has fewer."""
-    model = member(family, settings).model
+    model = family_member(family, settings).model
     return max((1, *model.excitation, *model.normal))
 
 
@@ -73,7 +73,7 @@ def with_excited_harmonics(family: Family, settings: Settings) -> Settings:
     return replace(settings, harmonics=lowest, samples=samples)
 
 
-def carried(
+def carried_displacements(
     w: np.ndarray,
     old: Member,
     new: Member,
@@ -96,7 +96,7 @@ def carried(
     return result
 
 
-def coarsened(model: ReducedModel, groups: np.ndarray) -> ReducedModel:
+def coarsened_elements(model: ReducedModel, groups: np.ndarray) -> ReducedModel:
     """The model with contact nodes joined into elements that see the mean motion, weighted by
     stiffness.
 
@@ -109,7 +109,7 @@ def coarsened(model: ReducedModel, groups: np.ndarray) -> ReducedModel:
     m = int(groups.max()) + 1
     if m == len(groups):
         return model
-    elements = joined(model.elements, groups)
+    elements = joined_elements(model.elements, groups)
     pick = _means(model.elements, groups)
     dofs = np.kron(pick, np.eye(elements.tangents + (not model.tangential)))
     damper: RigidBody | tuple[PortModel, ...] | None = model.damper
@@ -132,8 +132,8 @@ def coarsened(model: ReducedModel, groups: np.ndarray) -> ReducedModel:
     )
 
 
-def joined(e: Elements, groups: np.ndarray) -> Elements:
-    """The elements of ``coarsened``."""
+def joined_elements(e: Elements, groups: np.ndarray) -> Elements:
+    """The elements of ``coarsened_elements``."""
     m = int(groups.max()) + 1
     if m == len(groups):
         return e
@@ -193,7 +193,7 @@ def family_of(rich: ReducedModel, patches: Sequence[int] | None = None) -> Famil
         few = replace(
             rich, sides=tuple(side(h, modes) for h in range(min(harmonics + 1, len(rich.sides))))
         )
-        return Member(coarsened(few, groups), groups)
+        return Member(coarsened_elements(few, groups), groups)
 
     def build(settings: Settings) -> Member:
         return thinned(settings.modes, settings.points, shared_harmonics(settings.harmonics))

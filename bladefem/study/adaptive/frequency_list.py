@@ -16,11 +16,11 @@ from ...hbm.solution import Solution
 from ...hbm.solver.fallback import match_harmonics
 from ...hbm.solver.newton import Options
 from ...hbm.sweep import response, size, solve_from
-from .check_points import heights_of, hidden, watched
-from .choice import KEPT, Checked, following, likely, sufficient
-from .family import Family, carried, member, with_excited_harmonics
-from .indicators import Indicators, indicate, judge, judged_orders
-from .settings import Settings, enriched
+from .check_points import heights_of, left_out_motion, points_to_check
+from .choice import KEPT, Checked, likely_settings, next_settings, solver_options
+from .family import Family, carried_displacements, family_member, with_excited_harmonics
+from .indicators import Indicators, indicate_errors, judged_orders, total_error
+from .settings import Settings, enriched_settings
 
 # of richer settings, each round one point
 PASSES = 16
@@ -48,12 +48,12 @@ class _Curve:
     heights: np.ndarray
     # of each point
     used: list[Settings]
-    # of each point what `hidden` gives
+    # of each point what `left_out_motion` gives
     moved: np.ndarray
     # circular frequency of the judged points to the estimated relative error
     errors: dict[float, float]
-    # those of them that no richer model has judged
-    foretold: set[float]
+    # those of them that no richer model has solved
+    predicted: set[float]
 
     @property
     def limit(self) -> float:
@@ -61,7 +61,7 @@ class _Curve:
         return self.accuracy * float(self.heights.max()) / 2
 
 
-def along(
+def adapt_frequency_list(
     family: Family,
     omegas: Sequence[float],
     settings: Settings,
@@ -94,15 +94,15 @@ def along(
         wrong = _first_wrong(curve, limit, final)
         if wrong is None:
             break
-        found = indicate(family, curve.used[wrong], points[wrong], known)
-        better = following(curve.used[wrong], found, 2 * limit / curve.heights[wrong])
+        found = indicate_errors(family, curve.used[wrong], points[wrong], known)
+        better = next_settings(curve.used[wrong], found, 2 * limit / curve.heights[wrong])
         if better is not None:
-            _raise(curve, wrong, better, found)
+            _refine_point(curve, wrong, better, found)
         # there is none, or it was not solved
         if curve.used[wrong] != better:
             final.add(wrong)
         known = {name: found.errors[name] for name in KEPT if found.errors[name] <= accuracy / 20}
-    top, *_ = _judged(curve)
+    top, *_ = _estimated_points(curve)
     return Checked(
         replace(curve.used[top], error=curve.errors[points[top].omega]), points, curve.errors
     )
@@ -126,11 +126,11 @@ def _first_curve(
         raise InputError(
             f"accuracy {accuracy}: expected a relative error above 0 and below 1, such as 0.02"
         )
-    options = sufficient(accuracy)
-    settings = _first(family, with_excited_harmonics(family, settings), accuracy)
+    options = solver_options(accuracy)
+    settings = _first_settings(family, with_excited_harmonics(family, settings), accuracy)
     points = list(
         response(
-            member(family, settings).model,
+            family_member(family, settings).model,
             omegas,
             settings.harmonics,
             settings.samples,
@@ -150,7 +150,7 @@ def _first_curve(
         points,
         heights_of(points),
         used,
-        hidden(family, used, points),
+        left_out_motion(family, used, points),
         {},
         set(),
     )
@@ -162,14 +162,14 @@ def _first_wrong(
     final: set[int],
 ) -> int | None:
     """The first judged point whose error [m] exceeds a limit, and which may still be refined."""
-    for i in _judged(curve):
+    for i in _estimated_points(curve):
         error = curve.errors[curve.points[i].omega] * curve.heights[i]
         if error > limit and i not in final:
             return i
     return None
 
 
-def _first(
+def _first_settings(
     family: Family,
     settings: Settings,
     accuracy: float,
@@ -181,57 +181,58 @@ def _first(
     apart.
     """
     fine, coarse = (
-        likely(family, settings, told) for told in (accuracy, max(accuracy, FIRST_SWEEP_ACCURACY))
+        likely_settings(family, settings, error)
+        for error in (accuracy, max(accuracy, FIRST_SWEEP_ACCURACY))
     )
-    model = member(family, fine).model
+    model = family_member(family, fine).model
     if model.directions == model.elements.tangents:
         return fine
     led = replace(fine, harmonics=coarse.harmonics, samples=coarse.samples)
     return (
-        enriched(led, "modes") or led
+        enriched_settings(led, "modes") or led
         if accuracy < FIRST_SWEEP_ACCURACY and "modes" in led.chosen
         else led
     )
 
 
-def _judged(curve: _Curve) -> Iterator[int]:
+def _estimated_points(curve: _Curve) -> Iterator[int]:
     """Numbers of the points whose error is estimated: those that are watched, the peak first, then
     others that show it.
     """
     places = {p.omega: i for i, p in enumerate(curve.points)}
-    for point in watched(curve.points, curve.heights, curve.moved, curve.accuracy):
+    for point in points_to_check(curve.points, curve.heights, curve.moved, curve.accuracy):
         i = places[point.omega]
         if point.omega not in curve.errors:
-            curve.errors[point.omega] = judge(curve.family, curve.used[i], point).total
-        _confirm(curve, i)
+            curve.errors[point.omega] = total_error(curve.family, curve.used[i], point).total
+        _confirm_prediction(curve, i)
         yield i
     for i in sorted(places[omega] for omega in curve.errors):
-        _confirm(curve, i)
+        _confirm_prediction(curve, i)
         yield i
 
 
-def _confirm(curve: _Curve, i: int) -> None:
+def _confirm_prediction(curve: _Curve, i: int) -> None:
     """Judge a point that was predicted to be too wrong.
 
     Where it is more wrong than that, so are all the others of the same settings; less goes for its
     neighbours only: an error that changes its sign along the curve vanishes somewhere.
     """
     point = curve.points[i]
-    told = curve.errors[point.omega]
-    if point.omega not in curve.foretold or told * curve.heights[i] <= curve.limit:
+    estimate = curve.errors[point.omega]
+    if point.omega not in curve.predicted or estimate * curve.heights[i] <= curve.limit:
         return
-    true = judge(curve.family, curve.used[i], point).total
+    true = total_error(curve.family, curve.used[i], point).total
     for j, other in enumerate(curve.points):
         alike = (
-            other.omega in curve.foretold and curve.used[j] == curve.used[i] and np.isfinite(true)
+            other.omega in curve.predicted and curve.used[j] == curve.used[i] and np.isfinite(true)
         )
-        if alike and (true > told or abs(j - i) <= REPRESENTED_NEIGHBOURS):
-            curve.errors[other.omega] *= max(true / told, MIN_REDUCTION)
+        if alike and (true > estimate or abs(j - i) <= REPRESENTED_NEIGHBOURS):
+            curve.errors[other.omega] *= max(true / estimate, MIN_REDUCTION)
     curve.errors[point.omega] = true
-    curve.foretold.discard(point.omega)
+    curve.predicted.discard(point.omega)
 
 
-def _raise(
+def _refine_point(
     curve: _Curve,
     at: int,
     better: Settings,
@@ -244,9 +245,9 @@ def _raise(
     """
     old = curve.used[at]
     limit = curve.limit
-    between = _between(curve.used[at], better)
+    between = _single_step(curve.used[at], better)
     first: list[tuple[Solution, np.ndarray]] = []
-    changed = {at: _change(curve, at, better, first)}
+    changed = {at: _replace_point(curve, at, better, first)}
     for side in (range(at + 1, len(curve.points)), range(at - 1, -1, -1)):
         quiet = 0
         gained = first.copy()
@@ -254,22 +255,22 @@ def _raise(
         for i in side:
             if curve.used[i] != old or quiet == UNCHANGED_NEIGHBOURS:
                 break
-            changed[i] = _change(curve, i, settings, gained)
+            changed[i] = _replace_point(curve, i, settings, gained)
             quiet = quiet + 1 if changed[i] <= limit else 0
             if between and settings == better and changed[i] <= ONE_STEP * limit:
                 settings = between
                 gained = []
     raised = sorted(i for i in changed if curve.used[i] != old)
     before = curve.moved.copy()
-    curve.moved[raised] = hidden(
+    curve.moved[raised] = left_out_motion(
         curve.family, [curve.used[i] for i in raised], [curve.points[i] for i in raised]
     )
-    if _alike(old, better):
+    if _same_model(old, better):
         solved = {i: changed[i] for i in raised if changed[i] < np.inf and curve.used[i] == better}
-        _foretell(curve, (old, better), solved, before, found)
+        _predict_errors(curve, (old, better), solved, before, found)
 
 
-def _between(old: Settings, better: Settings) -> Settings | None:
+def _single_step(old: Settings, better: Settings) -> Settings | None:
     """With one step of the harmonics in place of two."""
     H = 2 * old.harmonics + 1
     if better.harmonics <= H:
@@ -278,7 +279,7 @@ def _between(old: Settings, better: Settings) -> Settings | None:
     return replace(better, harmonics=H, samples=max(old.samples, samples))
 
 
-def _foretell(
+def _predict_errors(
     curve: _Curve,
     settings: tuple[Settings, Settings],
     changed: dict[int, float],
@@ -288,12 +289,12 @@ def _foretell(
     """The error of points that took more harmonics, from what these changed [m]; no richer model is
     solved.
 
-    What is still left out changes a point by as much of the motion that `hidden` tells as it did
-    where it did most.
+    What is still left out changes a point by as much of the motion that `left_out_motion` gives as
+    it did where it did most.
 
     Args:
         settings: the former and the present ones.
-        before: what `hidden` told of all points with the former ones.
+        before: what `left_out_motion` gave for all points with the former ones.
         found: what the former ones were wrong by, at one of the points.
     """
     places = sorted(changed)
@@ -308,10 +309,10 @@ def _foretell(
     most = by_harmonics * max(changed[i] / curve.heights[i] / max(before[i], TINY) for i in places)
     for i in places:
         curve.errors[curve.points[i].omega] = float(rest + most * curve.moved[i])
-        curve.foretold.add(curve.points[i].omega)
+        curve.predicted.add(curve.points[i].omega)
 
 
-def _change(
+def _replace_point(
     curve: _Curve,
     i: int,
     better: Settings,
@@ -327,13 +328,15 @@ def _change(
     """
     old = curve.points[i]
     settings = curve.used[i]
-    poor = member(curve.family, settings)
-    rich = member(curve.family, better)
-    if _alike(settings, better) and old.converged and sticks_safely(poor.model, old):
+    poor = family_member(curve.family, settings)
+    rich = family_member(curve.family, better)
+    if _same_model(settings, better) and old.converged and sticks_safely(poor.model, old):
         return 0.0
-    carried_over = carried(old.w, poor, rich, better.harmonics)
-    smooth = gained and not (old.states["lift"] and _alike(settings, better))
-    start = replace(old, w=carried_over + _expected(gained, old.omega) if smooth else carried_over)
+    carried_over = carried_displacements(old.w, poor, rich, better.harmonics)
+    smooth = gained and not (old.states["lift"] and _same_model(settings, better))
+    start = replace(
+        old, w=carried_over + _expected_change(gained, old.omega) if smooth else carried_over
+    )
     new = solve_from(
         rich.model,
         old.omega,
@@ -350,14 +353,14 @@ def _change(
     curve.used[i] = better
     curve.heights[i] = size(new) if new.converged else 0.0
     curve.errors.pop(old.omega, None)
-    curve.foretold.discard(old.omega)
+    curve.predicted.discard(old.omega)
     if not old.converged:
         return np.inf
     orders = judged_orders(rich.model)
     return float(np.linalg.norm(new.probe[orders, 0] - old.probe[orders, 0]))
 
 
-def _expected(gained: list[tuple[Solution, np.ndarray]], omega: float) -> np.ndarray:
+def _expected_change(gained: list[tuple[Solution, np.ndarray]], omega: float) -> np.ndarray:
     """The curve through the last of them."""
     at = np.array([p.omega for p, _ in gained[-PREDICTOR_POINTS:]])
     known = np.array([w for _, w in gained[-PREDICTOR_POINTS:]])
@@ -367,7 +370,7 @@ def _expected(gained: list[tuple[Solution, np.ndarray]], omega: float) -> np.nda
     return result
 
 
-def _alike(one: Settings, other: Settings) -> bool:
+def _same_model(one: Settings, other: Settings) -> bool:
     """Whether they differ in harmonics and samples at most, so that what sticks with one sticks
     with the other.
     """

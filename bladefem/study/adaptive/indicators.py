@@ -13,8 +13,8 @@ Where all contacts stick, friction is linear: harmonics and samples are exact an
 point, or a richer model of it, that was not solved gives no indicator: its error is unknown
 (infinite), and nothing is refined because of it.
 
-One model that is richer in all respects at once (`judge`) gives the whole error for the price of
-one; which respect is to blame takes one model each (`indicate`).
+One model that is richer in all respects at once (`total_error`) gives the whole error for the price
+of one; which respect is to blame takes one model each (`indicate_errors`).
 """
 
 from __future__ import annotations
@@ -29,7 +29,7 @@ from ...hbm.model import ReducedModel
 from ...hbm.solution import Solution
 from ...hbm.solve import solve
 from ...hbm.solver.newton import DEFAULTS, Options
-from .family import Family, carried, lowest_harmonics, member
+from .family import Family, carried_displacements, family_member, lowest_harmonics
 from .settings import DAMPERS, DIRECTIONS, Settings
 
 # for a point that only estimates the error of another one
@@ -64,7 +64,7 @@ class Indicators:
         return max(self.errors, key=self.errors.__getitem__)
 
 
-def indicate(
+def indicate_errors(
     family: Family,
     settings: Settings,
     solution: Solution,
@@ -79,17 +79,17 @@ def indicate(
         return Indicators({name: np.inf for name in DIRECTIONS})
     errors = dict(known or {})
     better = {}
-    if sticks_safely(member(family, settings).model, solution):
+    if sticks_safely(family_member(family, settings).model, solution):
         errors |= {"harmonics": 0.0, "samples": 0.0}
     for name in DIRECTIONS:
-        other = None if name in errors else richer(family, settings, name)
+        other = None if name in errors else richer_settings(family, settings, name)
         if other is not None:
-            better[name] = moved(family, settings, solution, other, ESTIMATE_OPTIONS)
+            better[name] = moved_solution(family, settings, solution, other, ESTIMATE_OPTIONS)
             errors[name] = _change(family, settings, solution, better[name])
     return Indicators({name: errors.get(name, 0.0) for name in DIRECTIONS}, better)
 
 
-def judge(
+def total_error(
     family: Family,
     settings: Settings,
     solution: Solution,
@@ -97,38 +97,40 @@ def judge(
     """The whole error of a point at once: against one model that is richer in every respect that
     has a richer one.
 
-    Respects that are at their richest are compared with a poorer model, one by one, as `indicate`
-    does.
+    Respects that are at their richest are compared with a poorer model, one by one, as
+    `indicate_errors` does.
     """
     if not solution.converged:
-        return indicate(family, settings, solution)
+        return indicate_errors(family, settings, solution)
     exact = (
-        ("harmonics", "samples") if sticks_safely(member(family, settings).model, solution) else ()
+        ("harmonics", "samples")
+        if sticks_safely(family_member(family, settings).model, solution)
+        else ()
     )
     rich = settings
     errors = {}
     better = {}
     for name in DIRECTIONS:
-        other = None if name in exact else richer(family, settings, name)
+        other = None if name in exact else richer_settings(family, settings, name)
         if other is None:
             continue
         if _poorer(settings, other, name):
-            point = moved(family, settings, solution, other, ESTIMATE_OPTIONS)
+            point = moved_solution(family, settings, solution, other, ESTIMATE_OPTIONS)
             errors[name] = _change(family, settings, solution, point)
         else:
             rich = replace(rich, **{name: getattr(other, name)})
             rich = replace(rich, samples=max(rich.samples, other.samples))
     if rich != settings:
-        better["together"] = moved(family, settings, solution, rich, ESTIMATE_OPTIONS)
+        better["together"] = moved_solution(family, settings, solution, rich, ESTIMATE_OPTIONS)
         errors["together"] = _change(family, settings, solution, better["together"])
     return Indicators(errors, better)
 
 
-def richest(family: Family, settings: Settings) -> Settings:
+def richest_settings(family: Family, settings: Settings) -> Settings:
     """Settings richer in every respect that has a richer one."""
     rich = settings
     for name in DIRECTIONS:
-        other = richer(family, settings, name)
+        other = richer_settings(family, settings, name)
         if other is not None and not _poorer(settings, other, name):
             rich = replace(rich, **{name: getattr(other, name)})
             rich = replace(rich, samples=max(rich.samples, other.samples))
@@ -144,7 +146,7 @@ def _poorer(
     return name in ("harmonics", "modes") and getattr(other, name) < getattr(settings, name)
 
 
-def richer(
+def richer_settings(
     family: Family,
     settings: Settings,
     name: str,
@@ -173,7 +175,7 @@ def richer(
             settings, modes=more if more > settings.modes else max(1, settings.modes // 2)
         )
     if name == "points":
-        here = member(family, settings).groups
+        here = family_member(family, settings).groups
         return (
             None
             if settings.points is None or here.max() + 1 == len(here)
@@ -183,7 +185,7 @@ def richer(
     return replace(settings, damper=later[-1]) if later else None
 
 
-def moved(
+def moved_solution(
     family: Family,
     settings: Settings,
     solution: Solution,
@@ -191,9 +193,9 @@ def moved(
     options: Options = DEFAULTS,
 ) -> Solution:
     """The point solved with other settings, started from where it is."""
-    old = member(family, settings)
-    new = member(family, other)
-    start = replace(solution, w=carried(solution.w, old, new, other.harmonics))
+    old = family_member(family, settings)
+    new = family_member(family, other)
+    start = replace(solution, w=carried_displacements(solution.w, old, new, other.harmonics))
     return solve(
         new.model, solution.omega, other.harmonics, other.samples, start=start, options=options
     )
@@ -214,7 +216,7 @@ def _change(
 ) -> float:
     if not better.converged:
         return np.inf
-    orders = judged_orders(member(family, settings).model)
+    orders = judged_orders(family_member(family, settings).model)
     old = solution.probe[orders, 0]
     new = better.probe[orders, 0]
     return float(np.linalg.norm(new - old) / max(np.linalg.norm(new), np.finfo(float).tiny))

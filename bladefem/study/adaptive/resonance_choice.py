@@ -19,10 +19,10 @@ from ...errors import NotSolvedError
 from ...hbm.full_stick import sticks_safely
 from ...hbm.peak import Peak, find_peak
 from ...hbm.solution import Solution
-from .choice import sufficient
-from .family import Family, carried, lowest_harmonics, member
-from .indicators import richer
-from .settings import DIRECTIONS, Settings, enriched
+from .choice import solver_options
+from .family import Family, carried_displacements, family_member, lowest_harmonics
+from .indicators import richer_settings
+from .settings import DIRECTIONS, Settings, enriched_settings
 
 # enrichments of one peak before giving up
 ROUNDS = 8
@@ -93,9 +93,9 @@ def peak_from(
     Raises:
         NotSolvedError: a point was not solved, or no maximum was closed in.
     """
-    before = member(family, old)
-    after = member(family, new)
-    start = replace(point, w=carried(point.w, before, after, new.harmonics))
+    before = family_member(family, old)
+    after = family_member(family, new)
+    start = replace(point, w=carried_displacements(point.w, before, after, new.harmonics))
     return find_peak(
         after.model,
         point.omega,
@@ -103,7 +103,7 @@ def peak_from(
         new.samples,
         near=start,
         tolerance=SHARE * accuracy,
-        options=replace(sufficient(accuracy), fallbacks=fallbacks),
+        options=replace(solver_options(accuracy), fallbacks=fallbacks),
     )
 
 
@@ -115,7 +115,11 @@ def peak_errors(
 ) -> PeakErrors:
     """The peak again in a model that is richer in one respect, for each of them."""
     point = peak.solution
-    exact = ("harmonics", "samples") if sticks_safely(member(family, settings).model, point) else ()
+    exact = (
+        ("harmonics", "samples")
+        if sticks_safely(family_member(family, settings).model, point)
+        else ()
+    )
     heights = dict.fromkeys(DIRECTIONS, 0.0)
     shifts = dict.fromkeys(DIRECTIONS, 0.0)
     better = {}
@@ -172,16 +176,16 @@ def judge_settings(
     settings: Settings,
     name: str,
 ) -> Settings | None:
-    """The settings that one respect is judged by: those of ``indicators.richer``, but of contact
-    points only MORE_POINTS times as many.
+    """The settings that one respect is judged by: those of ``indicators.richer_settings``, but of
+    contact points only MORE_POINTS times as many.
 
     Parts of a seat are halved again and again, so that the finer points are parts of the coarser
     ones; all of them cost 20 times as much on the shipped wedge.
     """
-    other = richer(family, settings, name)
+    other = richer_settings(family, settings, name)
     if name != "points" or other is None or settings.points is None:
         return other
-    groups = member(family, settings).groups
+    groups = family_member(family, settings).groups
     more = MORE_POINTS * settings.points
     # two seats
     return replace(settings, points=more) if 2 * more < len(groups) else other
@@ -238,7 +242,7 @@ def _next_settings(
             or needs[name] <= NEGLIGIBLE_SHARE * accuracy
         ):
             continue
-        better = enriched(settings, name, needs[name] / (SUFFICIENT_SHARE * accuracy))
+        better = enriched_settings(settings, name, needs[name] / (SUFFICIENT_SHARE * accuracy))
         if better is not None and not _too_large(family, better, peak.solution, LIFTING):
             return better
     return None
@@ -280,6 +284,6 @@ def _too_large(
     limit: int,
 ) -> bool:
     """Contacts lift off, and the balance would have more unknowns than a limit."""
-    model = member(family, settings).model
+    model = family_member(family, settings).model
     unknowns = model.springs.size * (2 * settings.harmonics + 1)
     return point.states["lift"] > 0 and unknowns > limit

@@ -16,12 +16,12 @@ from .check_points import (
     MIN_SHARE_OF_ACCURACY,
     SHARES,
     heights_of,
-    hidden,
+    left_out_motion,
     peak_of,
 )
-from .choice import Checked, covered, sufficient
-from .family import Family, member
-from .indicators import moved, richer
+from .choice import Checked, covered_band, solver_options
+from .family import Family, family_member
+from .indicators import moved_solution, richer_settings
 from .resonance_choice import (
     PeakErrors,
     choose_at_peak,
@@ -29,7 +29,7 @@ from .resonance_choice import (
     judge_settings,
     peak_from,
 )
-from .settings import Settings, enriched
+from .settings import Settings, enriched_settings
 
 # sweeps of one curve with ever richer settings
 PASSES = 3
@@ -57,13 +57,15 @@ def resonance_curve(
     """
     settings = replace(settings, error=None)
     widen = band is None
-    points = covered(member(family, settings).model, settings, band, mode, 1.0)
+    points = covered_band(family_member(family, settings).model, settings, band, mode, 1.0)
     used = settings
     for _ in range(PASSES):
         used, peak, errors = _chosen(family, used, peak_of(points), accuracy)
         span = band or (points[0].frequency, points[-1].frequency)
         paths = not unfollowed(family, used)
-        points = covered(member(family, used).model, used, span, mode, accuracy, widen, paths)
+        points = covered_band(
+            family_member(family, used).model, used, span, mode, accuracy, widen, paths
+        )
         points = _with_peak(points, peak)
         found = _checked_flanks(family, used, points, errors)
         loud = _checked_loud(family, used, points, accuracy)
@@ -80,7 +82,9 @@ def unfollowed(family: Family, settings: Settings) -> bool:
     """The balance has too many unknowns for following its motions round folds in a curve of many
     points.
     """
-    return member(family, settings).model.springs.size * (2 * settings.harmonics + 1) > FOLLOWED
+    return (
+        family_member(family, settings).model.springs.size * (2 * settings.harmonics + 1) > FOLLOWED
+    )
 
 
 def _chosen(
@@ -146,14 +150,14 @@ def _checked_loud(
     points where harmonics that were left out move the contacts.
     """
     share = heights_of(points) / size(peak_of(points))
-    loud = hidden(family, [settings] * len(points), points) * share
+    loud = left_out_motion(family, [settings] * len(points), points) * share
     order = np.argsort(-loud)[:MAX_CHECKED_PEAKS]
     chosen = [
         points[i]
         for i in order[loud[order] > MIN_SHARE_OF_ACCURACY * accuracy]
         if points[i].converged
     ]
-    other = richer(family, settings, "harmonics")
+    other = richer_settings(family, settings, "harmonics")
     if other is None:
         return {}
     return {p.omega: _change(family, settings, p, other, "harmonics", 1.0) for p in chosen}
@@ -189,11 +193,11 @@ def _change(
     if pair is None:
         return np.inf
     own, judge = pair
-    options = replace(sufficient(1e-2), fallbacks=False)
-    base = point if own == settings else moved(family, settings, point, own, options)
+    options = replace(solver_options(1e-2), fallbacks=False)
+    base = point if own == settings else moved_solution(family, settings, point, own, options)
     if not base.converged:
         return np.inf
-    better = moved(family, own, replace(base, omega=base.omega * shift), judge, options)
+    better = moved_solution(family, own, replace(base, omega=base.omega * shift), judge, options)
     return abs(size(base) / size(better) - 1) if better.converged else np.inf
 
 
@@ -213,5 +217,5 @@ def _harmonics_missed(
         error = loud.get(point.omega, 0.0)
         tolerated = accuracy * size(top) / max(size(point), 1e-6 * size(top))
         if point is not top and np.isfinite(error) and error > tolerated:
-            return enriched(settings, "harmonics")
+            return enriched_settings(settings, "harmonics")
     return None

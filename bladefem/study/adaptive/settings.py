@@ -110,7 +110,7 @@ def first_settings(scene: Scene) -> Settings:
     return _enough_samples(settings)
 
 
-def enriched(
+def enriched_settings(
     settings: Settings,
     name: str,
     need: float = 4.0,

@@ -19,8 +19,8 @@ import pandas as pd
 from ...errors import InputError, NotSolvedError
 from ...hbm.model import ReducedModel
 from ...hbm.sweep import size
-from ..adaptive.choice import adapted, covered
-from ..adaptive.family import Family, member
+from ..adaptive.choice import adapted_settings, covered_band
+from ..adaptive.family import Family, family_member
 from ..adaptive.settings import DAMPERS, Settings
 from .cpu_clock import Clock, running
 from .methods import applicable, balance, methods, tangential
@@ -81,7 +81,7 @@ def chart(
     check_budget(budget)
     with running() as clock:
         begun = clock.now()
-        curve = adapted(family, settings, band, mode, accuracy)
+        curve = adapted_settings(family, settings, band, mode, accuracy)
         chosen = curve.settings
         found = clock.now()
         remarks = [f"automatic choice: {chosen.sentence()}, found in {found - begun:.2g} s"]
@@ -220,14 +220,16 @@ def _simplified(
     family = course.family
     most = replace(course.richest, harmonics=LADDER[-1][0])
     few = replace(most, points=POINTS)
-    model = member(family, replace(few, damper="mass") if "mass" in family.dampers else few).model
+    model = family_member(
+        family, replace(few, damper="mass") if "mass" in family.dampers else few
+    ).model
     reason = applicable(model) if model.directions != 1 else applicable(tangential(model))
     if reason:
         course.remarks.append(
             "paper's iteration, exact events, direct integration and shooting do not apply: "
             + reason
         )
-        return member(family, most).model, shared, reason
+        return family_member(family, most).model, shared, reason
     model = tangential(model)
     omegas = course.omegas
     if family.dampers:
@@ -247,7 +249,7 @@ def _models(course: _Course, poorer: Mapping[str, Family]) -> Iterator[Job]:
     richest = course.richest
     bench = _bench(
         course,
-        lambda H: member(family, replace(richest, harmonics=H)).model,
+        lambda H: family_member(family, replace(richest, harmonics=H)).model,
         course.omegas,
         "models",
     )
@@ -259,7 +261,7 @@ def _models(course: _Course, poorer: Mapping[str, Family]) -> Iterator[Job]:
         yield Job(
             name,
             kind,
-            member(whose, s).model,
+            family_member(whose, s).model,
             balance(s.harmonics, s.samples),
             bench,
             needed=kind == "rich model",
@@ -267,7 +269,7 @@ def _models(course: _Course, poorer: Mapping[str, Family]) -> Iterator[Job]:
     yield Job(
         "automatic",
         "automatic choice",
-        member(family, chosen).model,
+        family_member(family, chosen).model,
         balance(chosen.harmonics, chosen.samples),
         bench,
         needed=True,
@@ -281,7 +283,7 @@ def _variants(family: Family, rich: Settings) -> Iterator[tuple[str, str, Settin
     for modes in (1, 2, 3, 5, 10, 20, 40, 80):
         if modes < family.modes:
             yield _counted(modes, "mode"), "modes", replace(rich, modes=modes)
-    nodes = len(member(family, rich).groups) // 2
+    nodes = len(family_member(family, rich).groups) // 2
     for points in (1, 2, 4, 8, 16, 32, 64):
         if points < nodes:
             yield _counted(points, "point"), "contact points", replace(rich, points=points)
@@ -300,6 +302,6 @@ def _own_frequencies(
     mode: int,
 ) -> np.ndarray:
     """Frequencies round the resonance of the tangential model, which may lie elsewhere."""
-    swept = covered(model, Settings(1, 3, 128, "mass"), None, mode, 0.05)
+    swept = covered_band(model, Settings(1, 3, 128, "mass"), None, mode, 0.05)
     good = [(p.omega, size(p)) for p in swept if p.converged]
     return frequencies(good) if good else omegas

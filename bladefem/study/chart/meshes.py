@@ -27,8 +27,8 @@ from ...scene.tables import Scene
 from ...scene.validate import refuse_given_mesh
 from ...util.communicator import Communicator
 from ..adaptive.check_points import peak_of
-from ..adaptive.choice import covered
-from ..adaptive.family import member
+from ..adaptive.choice import covered_band
+from ..adaptive.family import family_member
 from ..adaptive.settings import Settings
 from ..pipeline.history import FRICTIONLESS, condense_friction, seat_by_history
 from ..pipeline.pipeline import EXACT_HARMONICS, Seating, family_of_case, load_cases
@@ -179,8 +179,8 @@ def _resonance(
     case = load_cases(scene, mesh, Seating(problem, {load: maps}))[0]
     diameters = harmonic_diameters(scene, mesh, EXACT_HARMONICS)
     reduced = reduce_sector(bodies, patches, diameters, settings.modes)
-    model = member(family_of_case(scene, mesh, reduced, patches, case), settings).model
-    points = covered(model, settings, scene.study.band, scene.excitation.mode, PEAK)
+    model = family_member(family_of_case(scene, mesh, reduced, patches, case), settings).model
+    points = covered_band(model, settings, scene.study.band, scene.excitation.mode, PEAK)
     top = peak_of(points)
     return Resonance(top.frequency, height(top), mesh.dimension * len(mesh.points), np.nan)
 

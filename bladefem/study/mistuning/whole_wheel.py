@@ -17,7 +17,7 @@ from ...reduction.assemble import pair_model
 from ...reduction.truncate import truncated
 from ...scene.tables import Scene
 from ...wheel.model import Wheel, engine_order
-from ..adaptive.family import coarsened
+from ..adaptive.family import coarsened_elements
 from ..adaptive.settings import Settings
 from ..pipeline.assemble_model import LoadCase, joint_model
 from ..pipeline.contact_cycle import labels
@@ -96,7 +96,7 @@ def whole_wheel(
     )
     nodes = len(case.elements.kt)
     groups = np.arange(nodes) if settings.points is None else labels(patches, settings.points)
-    model = coarsened(model, groups)
+    model = coarsened_elements(model, groups)
     damper = model.damper[0] if isinstance(model.damper, tuple) else model.damper
     return Wheel(
         count,

@@ -21,8 +21,8 @@ from ...hbm.node_gradients import node_gradients
 from ...hbm.optimum import Optimum, Variation, lowest_peak
 from ...hbm.peak import Peak, with_slope
 from ...scene.tables import Scene
-from ..adaptive.choice import default_band, sufficient
-from ..adaptive.family import Family, joined, member
+from ..adaptive.choice import default_band, solver_options
+from ..adaptive.family import Family, family_member, joined_elements
 from ..adaptive.resonance_choice import choose_at_peak
 from ..adaptive.settings import Settings
 from .assemble_model import LoadCase
@@ -149,7 +149,7 @@ def _search(
         settings.samples,
         start=middle,
         tolerance=SHARE * scene.accuracy,
-        options=sufficient(scene.accuracy),
+        options=solver_options(scene.accuracy),
     )
 
 
@@ -162,15 +162,17 @@ def load_variation(
 
     @cache
     def model_at(load: float) -> ReducedModel:
-        return member(family_of(case_at(load)), settings).model
+        return family_member(family_of(case_at(load)), settings).model
 
     def sloped(
         model: ReducedModel,
         peak: Peak,
         load: float,
     ) -> Peak:
-        groups = member(family_of(case_at(load)), settings).groups
-        low, high = (joined(case_at(load * (1 + sign * STEP)).elements, groups) for sign in (-1, 1))
+        groups = family_member(family_of(case_at(load)), settings).groups
+        low, high = (
+            joined_elements(case_at(load * (1 + sign * STEP)).elements, groups) for sign in (-1, 1)
+        )
         rates = {
             "load": _relative_rate(low.n0, high.n0),
             "kt": _relative_rate(low.kt, high.kt),

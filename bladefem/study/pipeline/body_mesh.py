@@ -19,7 +19,7 @@ from ...hbm.peak import find_peak
 from ...hbm.solution import Solution
 from ...hbm.solver.newton import Options
 from ...hbm.sweep import size
-from ..adaptive.family import Family, member
+from ..adaptive.family import Family, family_member
 from ..adaptive.settings import Settings
 from .assemble_model import LoadCase
 from .ports import blade_ports
@@ -135,7 +135,7 @@ def softened_change(
     """
     try:
         peak = find_peak(
-            member(softer.family(case), settings).model,
+            family_member(softer.family(case), settings).model,
             top.omega * softer.ratio,
             settings.harmonics,
             settings.samples,

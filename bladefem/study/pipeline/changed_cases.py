@@ -6,6 +6,8 @@ from collections.abc import Callable, Sequence
 from dataclasses import replace
 from functools import lru_cache
 
+import numpy as np
+
 from ...contact.frictional_seating import FrictionalProblem
 from ...contact.interface_elements import (
     friction_elements,
@@ -38,8 +40,10 @@ def seated_case(
     """
     ratio = pair_ratio(scene.material.blade, scene.material.damper)
     elements, selection = friction_elements(problem, maps, scene.contact, ratio, tangents)
+    # a layer that is given is that of the seating as well, however stiff
+    stiffest = stiffest_layer(problem) if scene.contact.stiffness == "rigid" else np.inf
     elements, series = split_stiffness(
-        elements, maps, scene.contact, numerical_stiffness(problem), stiffest_layer(problem)
+        elements, maps, scene.contact, numerical_stiffness(problem), stiffest
     )
     return LoadCase(load, elements, selection, mass, series)
 

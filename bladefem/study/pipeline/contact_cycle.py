@@ -22,7 +22,7 @@ from ...friction.equivalent_linear import Approximation, by_harmonic, from_harmo
 from ...friction.fourier import synthesis
 from ...friction.law_table import select_elements
 from ...util.arrays import IntegerArray, RealArray
-from ..adaptive.family import joined
+from ..adaptive.family import joined_elements
 from .assemble_model import LoadCase
 from .loads import Curve
 
@@ -106,8 +106,8 @@ def contact_cycle(
     # of all nodes; the choice may have joined some
     if len(elements.kt) == len(area):
         groups = labels(patches, curve.settings.points)
-        elements = joined(elements, groups)
-        layer = joined(layer, groups)
+        elements = joined_elements(elements, groups)
+        layer = joined_elements(layer, groups)
     series = 1.0 / layer.kt - 1.0 / elements.kt
     elements, w = _in_all_directions(elements, curve.peak.w)
     layer = replace(layer, kn=np.where(elements.kn > 0, layer.kn, 0.0))

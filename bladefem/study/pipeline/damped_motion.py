@@ -22,7 +22,7 @@ from ...hbm.solution import Solution
 from ...reduction.assemble import folded_diameter
 from ...scene.support import area_springs, held_letters
 from ...util.arrays import ComplexArray, RealArray
-from ..adaptive.family import joined
+from ..adaptive.family import joined_elements
 from .assemble_model import LoadCase
 from .contact_cycle import labels
 from .ports import blade_ports
@@ -222,7 +222,7 @@ def _shared_forces(
     groups: np.ndarray,
 ) -> np.ndarray:
     """Forces of joined elements, shared by their nodes as the joined motion weighs them."""
-    whole = joined(elements, groups).kt[groups]
+    whole = joined_elements(elements, groups).kt[groups]
     share = np.divide(elements.kt, whole, out=np.ones_like(whole), where=whole > 0)
     return share[:, None, None] * f[groups]
 

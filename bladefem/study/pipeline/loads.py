@@ -20,9 +20,9 @@ from ...util.arrays import BooleanArray, ComplexArray, IntegerArray, RealArray
 from ...util.communicator import Communicator
 from ...util.progress import Progress, unwatched
 from ..adaptive.check_points import peak_of
-from ..adaptive.choice import checked, estimated
+from ..adaptive.choice import checked_points, estimated_errors
 from ..adaptive.contact_mesh import halved_change
-from ..adaptive.family import Family, member
+from ..adaptive.family import Family, family_member
 from ..adaptive.resonance_curve import resonance_curve, unfollowed
 from ..adaptive.settings import Settings, restarted
 from .assemble_model import LoadCase
@@ -195,10 +195,10 @@ def curve_of(
     """
     models = family(case)
     mode = scene.excitation.mode
-    with named(case, member(models, settings).model, mode, scene.excitation.force):
+    with named(case, family_member(models, settings).model, mode, scene.excitation.force):
         start = restarted(settings)
         curve = resonance_curve(models, start, scene.study.band, mode, scene.accuracy)
-    model = member(models, curve.settings).model
+    model = family_member(models, curve.settings).model
     heights = np.array([size(p) for p in curve.points])
     marks = Stability(np.full(len(heights), ""), np.full(len(heights), np.nan))
     if scene.study.stability:
@@ -219,16 +219,16 @@ def curve_of(
     body_mesh = np.nan if softer is None else softened_change(softer, case, curve.settings, top)
     interval = None
     if scene.study.interval:
-        model = member(models, curve.settings).model
+        model = family_member(models, curve.settings).model
         interval = load_interval(model, curve.settings, top, scene.accuracy, len(curve.points))
     return Curve(
         load=case.load,
         mass=case.mass,
         settings=curve.settings,
         **columns,
-        estimated=estimated(curve),
+        estimated=estimated_errors(curve),
         tolerated=tolerated,
-        checked=checked(curve),
+        checked=checked_points(curve),
         stability=marks.verdict,
         multiplier=marks.multiplier,
         halved=halved,

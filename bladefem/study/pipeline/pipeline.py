@@ -33,11 +33,11 @@ from ...util.communicator import Communicator
 from ...util.message import method, warning
 from ...util.progress import Progress, unwatched
 from ..adaptive.check_points import peak_of
-from ..adaptive.choice import covered
+from ..adaptive.choice import covered_band
 from ..adaptive.contact_mesh import coarse_sentence
-from ..adaptive.family import Family, Member, coarsened, member, shared_harmonics
+from ..adaptive.family import Family, Member, coarsened_elements, family_member, shared_harmonics
 from ..adaptive.resonance_choice import choose_at_peak, peak_from
-from ..adaptive.settings import DAMPERS, Settings, enriched, first_settings
+from ..adaptive.settings import DAMPERS, Settings, enriched_settings, first_settings
 from ..influences import Influence, influences, parameters_of
 from ..modes.clamped_aerofoil import clamped_blade
 from ..modes.stress import strength
@@ -432,7 +432,7 @@ def _response(
             softer,
         )
         band = min(c.frequency[0] for c in curves), max(c.frequency[-1] for c in curves)
-        rich = member(family(cases[-1]), settings).model
+        rich = family_member(family(cases[-1]), settings).model
         limits = linear_limits(rich, scene.excitation.mode, band)
     clock.messages.extend(_remarks(scene, settings, curves, -(-len(cases[0].elements.kt) // 2)))
     return Response(settings, curves, limits)
@@ -652,7 +652,7 @@ def family_of_case(
             settings.damper,
         )
         groups = np.arange(nodes) if settings.points is None else labels(patches, settings.points)
-        return Member(coarsened(model, groups), groups)
+        return Member(coarsened_elements(model, groups), groups)
 
     return Family(
         shared, max(len(body.omega) for body in reduced.sector.values()), 2 * most + 1, DAMPERS
@@ -708,15 +708,15 @@ def reduced_sector(
         if not settings.chosen:
             return settings, reduced
         family = family_of_case(scene, bodies.mesh, reduced, patches, case)
-        model = member(family, settings).model
+        model = family_member(family, settings).model
         mode = scene.excitation.mode
         with named(case, model, mode, scene.excitation.force):
-            rough = covered(model, settings, scene.study.band, mode, 1.0)
+            rough = covered_band(model, settings, scene.study.band, mode, 1.0)
             peak = peak_from(family, settings, peak_of(rough), settings, scene.accuracy)
         settings, _, found = choose_at_peak(
             family, settings, peak, scene.accuracy, fixed=("modes",)
         )
-        more = enriched(settings, "modes")
+        more = enriched_settings(settings, "modes")
         known = "modes" in settings.chosen and np.isfinite(found.height["modes"])
         if not known or found.needs["modes"] <= scene.accuracy / 10 or more is None:
             return settings, reduced

@@ -1,5 +1,5 @@
-"""Every local maximum of a response: its height, how many motions there are at its frequency, and
-by which sweep it is reached.
+"""Every local maximum of a response: its height, the motions at its frequency, and by which slow
+sweep it is reached.
 
 A curve keeps its points in ascending frequency with the number of their piece between folds; the
 paths are put together again from the ends of the pieces.
