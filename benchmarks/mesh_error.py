@@ -6,6 +6,17 @@ Each case is one load on a coarse mesh, and again on a mesh twice as fine in bod
 is the change of the resonance amplitude from the first to the second; "reported" is what the
 first run says: the balance's own error, what half as many contact points change, and what the
 estimated error of the body's elements changes.
+
+Measured on 9 and 4.5 mm elements:
+
+    case               um coarse  um fine   true   reported (balance + half the points + body)
+    shipped, coarse      160.45    167.74   4.4 %   7.0 %  (2.0 % +          + 5.1 %)   (*)
+    soft layer           908.27    913.47   0.6 %   8.5 %  (3.6 % +          + 4.9 %)   (*)
+    stiff layer           65.67     69.93   6.1 %  21.7 %  (8.6 % + 11.5 % + 1.5 %)
+
+(*) before the factor 1.5 of `fem.stiffness_error`. The two imported cases have not been run to the
+end. The shipped scene itself, 80 N: 158.3 um with 4.6 % by the body; after its foot of the shank
+was meshed more finely 151.5 um, 4.5 % less, with 1.0 %.
 """
 
 from __future__ import annotations

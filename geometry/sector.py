@@ -19,7 +19,17 @@ from .parameters import Aerofoil, Disc, MeshSize, Platform, Shank, Wedge
 from .profile import Profile, profile
 from .section import LIFT, outline
 from .sector_check import check_sector
-from .sector_names import edge_curves, link, mark_tip, motions, moved, name_faces, seat, sector
+from .sector_names import (
+    edge_curves,
+    foot_curves,
+    link,
+    mark_tip,
+    motions,
+    moved,
+    name_faces,
+    seat,
+    sector,
+)
 from .session import attempt, gmsh_session
 from .sizing import Sizes, sector_sizes, set_fillet_grid, set_grids, set_sizes
 
@@ -95,7 +105,8 @@ def _prescribe_sizes(
 ) -> None:
     """Element sizes of the volumes, grids on fillet and seats."""
     fillet = groups.faces.get("fillet", [])
-    set_sizes(gmsh, shape, wedge, sizes, edge_curves(gmsh, groups), fillet)
+    foot = foot_curves(gmsh, shape)
+    set_sizes(gmsh, shape, wedge, sizes, edge_curves(gmsh, groups), fillet, foot)
     with attempt("aerofoil.fillet", "mesh the fillet in a grid"):
         set_fillet_grid(gmsh, fillet, sizes, size)
     # an element size on the seats without a number across asks for free triangles

@@ -107,6 +107,21 @@ def edge_curves(gmsh: ModuleType, groups: Groups) -> tuple[list[int], list[int]]
     return sorted(suction & pressure), sorted(trailing)
 
 
+def foot_curves(gmsh: ModuleType, profile: Profile) -> list[int]:
+    """Curves along the re-entrant edges between shank and rim."""
+    rim, half = np.abs(profile.blade[profile.blade[:, 0].argmin()])
+    height = np.sqrt(rim**2 - half**2)
+    # gmsh's boxes are 1e-7 larger than the curves
+    tolerance = 1e-6 * rim + 2e-7
+    found = []
+    for _, curve in gmsh.model.getEntities(1):
+        box = np.array(gmsh.model.getBoundingBox(1, curve)).reshape(2, 3)
+        at_height = np.abs(box[:, 0] - height).max() < tolerance
+        if at_height and np.abs(np.abs(box[:, 1]) - half).max() < tolerance:
+            found.append(curve)
+    return found
+
+
 def sector(count: int) -> Sector:
     """The way to the next blade of a wheel."""
     return Sector(count, turn(2 * np.pi / count), np.zeros(3))
