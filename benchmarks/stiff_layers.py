@@ -1,4 +1,4 @@
-"""Time and error of forced responses of the shipped wedge over the stiffness of its interface layer.
+"""Time and error of forced responses of the shipped wedge over the stiffness of its layer.
 
     python benchmarks/stiff_layers.py [folder] [stiffness in N/mm^3 or "rigid", ...]
 
@@ -83,8 +83,8 @@ def print_response(layer: Layer, name: str, case: LoadCase) -> float:
     lost = int((~curve.converged).sum())
     print(
         f"| {name} | {case.load:g} | {seconds:.1f} | {len(curve.frequency)} | {lost} | "
-        f"{1e6 * curve.peak_amplitude:.1f} | {curve.peak_frequency:.2f} | {100 * curve.error:.1f} | "
-        f"{chosen.harmonics}, {chosen.samples}, {chosen.points}, "
+        f"{1e6 * curve.peak_amplitude:.1f} | {curve.peak_frequency:.2f} | "
+        f"{100 * curve.error:.1f} | {chosen.harmonics}, {chosen.samples}, {chosen.points}, "
         f"{chosen.damper} | {curve.peak.states['lift']} of {len(curve.peak.w)} |",
         flush=True,
     )

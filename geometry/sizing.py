@@ -248,7 +248,7 @@ def _radial_extent(gmsh: ModuleType, curve: int) -> float:
 
 
 def _growing_field(
-    field: object,
+    field: Any,
     kind: str,
     tags: list[int],
     size: float,
