@@ -220,4 +220,7 @@ def test_balance_agrees_with_the_free_ring_in_time(wheel, load, harmonics):
     # the step that each damper makes in a period, at the contact that moves most
     step = (places[-1] - places[-2]).reshape(BLADES, nodes, 3)
     speed = np.linalg.norm(step, axis=2).max(axis=1) * top.omega / (2 * np.pi)
-    assert speed == pytest.approx(np.full(BLADES, top.drift), rel=0.05, abs=1e-7)
+    # amplitudes and phases that still change move the places: no walk is told from less than that
+    unsteady = 3 * np.abs(heights[-1] - heights[-2]).max() * top.omega / (2 * np.pi)
+    assert speed == pytest.approx(np.full(BLADES, top.drift), rel=0.05, abs=unsteady)
+    assert unsteady < 3e-5

@@ -13,7 +13,9 @@ from bladefem.scene.toml import vary
 
 
 def curve(load, amplitude):
-    peak = SimpleNamespace(work=SimpleNamespace(dissipated=1e-3), states={"slip": 2, "lift": 0})
+    peak = SimpleNamespace(
+        work=SimpleNamespace(dissipated=1e-3), states={"slip": 2, "lift": 0}, drift=0.0
+    )
     return SimpleNamespace(
         load=load,
         mass=None,
