@@ -28,9 +28,13 @@ from .settings import DIRECTIONS, Settings, enriched_settings
 ROUNDS = 8
 # of the accuracy: to which a peak that only estimates an error is found
 SHARE = 0.05
+# Newton steps of a point of such a peak
+JUDGE_STEPS = 15
 # of the accuracy: errors that are small enough together, and one that need not be lowered
 SUFFICIENT_SHARE = 0.8
 NEGLIGIBLE_SHARE = 0.05
+# of the accuracy: an error from which on a peak with lift-off is refined only while that helps
+FAR_BEYOND = 4.0
 # unknowns of the largest balance that is chosen where contacts lift off: finer ones cost minutes a
 # curve there
 LIFTING = 1500
@@ -88,7 +92,8 @@ def peak_from(
     """The peak of a model with other settings, uphill of a point solved with the old ones.
 
     Args:
-        fallbacks: where Newton's method fails from that point.
+        fallbacks: where Newton's method fails from that point; without them it takes at most
+            JUDGE_STEPS steps a point, since a peak that only estimates an error is not worth more.
 
     Raises:
         NotSolvedError: a point was not solved, or no maximum was closed in.
@@ -96,6 +101,9 @@ def peak_from(
     before = family_member(family, old)
     after = family_member(family, new)
     start = replace(point, w=carried_displacements(point.w, before, after, new.harmonics))
+    options = solver_options(accuracy)
+    if not fallbacks:
+        options = replace(options, fallbacks=False, iterations=JUDGE_STEPS)
     return find_peak(
         after.model,
         point.omega,
@@ -103,7 +111,7 @@ def peak_from(
         new.samples,
         near=start,
         tolerance=SHARE * accuracy,
-        options=replace(solver_options(accuracy), fallbacks=fallbacks),
+        options=options,
     )
 
 
@@ -112,8 +120,14 @@ def peak_errors(
     settings: Settings,
     peak: Peak,
     accuracy: float,
+    known: Mapping[str, tuple[float, float]] | None = None,
 ) -> PeakErrors:
-    """The peak again in a model that is richer in one respect, for each of them."""
+    """The peak again in a model that is richer in one respect, for each of them.
+
+    Args:
+        known: respect to changes of height and frequency that need not be found again.
+    """
+    known = known or {}
     point = peak.solution
     exact = (
         ("harmonics", "samples")
@@ -126,6 +140,9 @@ def peak_errors(
     for name in DIRECTIONS:
         other = None if name in exact else judge_settings(family, settings, name)
         if other is None:
+            continue
+        if name in known:
+            heights[name], shifts[name] = known[name]
             continue
         heights[name] = np.inf
         shifts[name] = np.inf
@@ -202,14 +219,28 @@ def choose_at_peak(
     accuracy, or the best that may be chosen; the peak with them, and its errors.
 
     Nothing is refined in a respect in which the richer model was not solved: its error is unknown.
+    A respect whose error was negligible is not judged again. Where contacts lift off, refining ends
+    once it does not halve an error that is far beyond the accuracy: such peaks converge slowly, and
+    each round costs more than the one before.
 
     Args:
         peak: found with `settings`.
         fixed: names that may not be changed here although they are not the user's.
     """
+    known: dict[str, tuple[float, float]] = {}
+    before = np.inf
     for _ in range(ROUNDS):
-        errors = peak_errors(family, settings, peak, accuracy)
+        errors = peak_errors(family, settings, peak, accuracy, known)
         settings = replace(settings, error=errors.total)
+        far = peak.solution.states["lift"] > 0 and errors.total > FAR_BEYOND * accuracy
+        if far and before < np.inf and errors.total > before / 2:
+            break
+        before = errors.total
+        known = {
+            name: (errors.height[name], errors.frequency[name])
+            for name, need in errors.needs.items()
+            if need <= NEGLIGIBLE_SHARE * accuracy
+        }
         better = _next_settings(family, settings, peak, errors, accuracy, fixed)
         if better is None:
             break

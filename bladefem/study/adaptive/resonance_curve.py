@@ -23,6 +23,7 @@ from .choice import Checked, covered_band, solver_options
 from .family import Family, family_member
 from .indicators import moved_solution, richer_settings
 from .resonance_choice import (
+    FAR_BEYOND,
     PeakErrors,
     choose_at_peak,
     compared_settings,
@@ -67,6 +68,10 @@ def resonance_curve(
             family_member(family, used).model, used, span, mode, accuracy, widen, paths
         )
         points = _with_peak(points, peak)
+        if used.error is not None and used.error > FAR_BEYOND * accuracy:
+            # the flanks of a peak that is far from right need no look of their own
+            found = {peak_of(points).omega: used.error}
+            break
         found = _checked_flanks(family, used, points, errors)
         loud = _checked_loud(family, used, points, accuracy)
         found = loud | found
