@@ -40,9 +40,6 @@ FIRST_LOOK_INTERVALS = 12
 POINTS_AT_ONCE = 16
 # points after which a sweep gives up refining
 BAND_LIMIT = 400
-BAND_LIMIT_NOTE = (
-    f"the sweep ended after {BAND_LIMIT} points: peaks may be higher by more than the accuracy"
-)
 # Newton steps of one point of a walk from a neighbour: more are better spent on shorter steps
 WALK_ITERATIONS = 20
 # points tried on one walk, and its shortest step as a share of the way
@@ -170,7 +167,10 @@ def sweep(
         if wanted is None:
             return
         if len(solved) >= BAND_LIMIT:
-            notes.append(BAND_LIMIT_NOTE)
+            notes.append(
+                f"the sweep ended after {BAND_LIMIT} points: peaks may be higher by more than the "
+                "accuracy"
+            )
             if not (paths and _normal_loads_follow(model)):
                 return
             break

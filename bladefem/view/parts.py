@@ -232,7 +232,10 @@ def label_platform(
     )
     note(ax, 0.3 * inner + 0.7 * outer, "seat_right of this blade\non damper_left", (-70, 28))
     low = foot * [-0.3, 1] + [0, 0.6]
-    words = f"damper, shape {wedge.shape}\n{said(wedge, 'length')}, {said(wedge, 'clearance')}"
+    words = (
+        f"damper, shape {wedge.shape}, axial {wedge.axial}\n{said(wedge, 'length')}, "
+        f"{said(wedge, 'clearance')}"
+    )
     note(ax, low, words, (20, -44))
     note(
         ax,

@@ -27,7 +27,9 @@ WEDGE = "scenes/wedge.toml"
 
 
 def fake_curve(load, amplitude):
-    peak = SimpleNamespace(work=SimpleNamespace(dissipated=2e-3), states={"slip": 3, "lift": 0})
+    peak = SimpleNamespace(
+        work=SimpleNamespace(dissipated=2e-3), states={"slip": 3, "lift": 0}, drift=0.0
+    )
     return SimpleNamespace(
         load=load,
         mass=None,

@@ -97,7 +97,7 @@ def response(*amplitudes):
             peak_frequency=810.0,
             peak_amplitude=amplitude,
             peak=SimpleNamespace(
-                work=SimpleNamespace(dissipated=1e-3), states={"slip": 1, "lift": 0}
+                work=SimpleNamespace(dissipated=1e-3), states={"slip": 1, "lift": 0}, drift=0.0
             ),
             settings=SimpleNamespace(error=0.01, harmonics=3),
             halved=0.0,
