@@ -380,18 +380,7 @@ def _draw_history_range(ax: Axes, finite: pd.DataFrame, colour: str) -> None:
 def draw_unknown(ax: Axes, finite: pd.DataFrame) -> None:
     """Hollow marks on peaks whose error is not known, because richer models were not solved."""
     unknown = finite[np.isinf(finite["error"])] if "error" in finite else finite.iloc[:0]
-    if len(unknown):
-        ax.plot(
-            unknown["load"],
-            MICRO * unknown["peak_amplitude"],
-            "o",
-            mfc="white",
-            mec=FAILED,
-            ms=7,
-            mew=1.5,
-            zorder=5,
-            label="error unknown",
-        )
+    _draw_hollow(ax, unknown, "peak_amplitude", MICRO, 7, 5, "error unknown")
 
 
 def draw_cut(
@@ -411,27 +400,32 @@ def draw_cut(
             for f, end in zip(summary["peak_frequency"], ends, strict=True)
         ]
     ]
-    if len(cut):
-        axes[0].plot(
-            cut["load"],
-            MICRO * cut["peak_amplitude"],
+    ended = "no peak: end of the frequency band"
+    _draw_hollow(axes[0], cut, "peak_amplitude", MICRO, 8, 6, ended)
+    _draw_hollow(axes[1], cut, "peak_frequency", 1.0, 8, 6)
+
+
+def _draw_hollow(
+    ax: Axes,
+    peaks: pd.DataFrame,
+    column: str,
+    factor: float,
+    size: int,
+    zorder: int,
+    label: str | None = None,
+) -> None:
+    """Hollow red marks on some peaks, none without any."""
+    if len(peaks):
+        ax.plot(
+            peaks["load"],
+            factor * peaks[column],
             "o",
             mfc="white",
             mec=FAILED,
-            ms=8,
+            ms=size,
             mew=1.5,
-            zorder=6,
-            label="no peak: end of the frequency band",
-        )
-        axes[1].plot(
-            cut["load"],
-            cut["peak_frequency"],
-            "o",
-            mfc="white",
-            mec=FAILED,
-            ms=8,
-            mew=1.5,
-            zorder=6,
+            zorder=zorder,
+            label=label,
         )
 
 

@@ -7,6 +7,19 @@ from collections.abc import Iterator
 from ..tables import Scene
 from ..units import show
 
+# faces and node sets that a force can act on, of every blade that is drawn here
+BLADE_FACES = (
+    "clamp",
+    "pressure_side",
+    "seat_left",
+    "seat_right",
+    "suction_side",
+    "tip",
+    "tip_leading",
+    "tip_mid",
+    "tip_trailing",
+)
+
 
 def below(
     name: str,

@@ -5,20 +5,8 @@ from __future__ import annotations
 from collections.abc import Iterator
 
 from ..tables import Scene
-from .conditions import at_most, below
+from .conditions import BLADE_FACES, at_most, below
 from .record import ENGINE_TABLES, Kind, SceneCall
-
-FACES = (
-    "clamp",
-    "pressure_side",
-    "seat_left",
-    "seat_right",
-    "suction_side",
-    "tip",
-    "tip_leading",
-    "tip_mid",
-    "tip_trailing",
-)
 
 
 def conditions(scene: Scene) -> Iterator[str]:
@@ -54,7 +42,7 @@ def thin_parts(scene: Scene) -> dict[str, float]:
 
 def face_names(_: Scene) -> tuple[str, ...]:
     """Faces and node sets of the blade."""
-    return FACES
+    return BLADE_FACES
 
 
 KIND = Kind(

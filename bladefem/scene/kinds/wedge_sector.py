@@ -7,24 +7,11 @@ from math import cos, pi, sin, tan
 
 from ..tables import Scene
 from ..units import show
-from .conditions import at_most, below, known_diameters
+from .conditions import BLADE_FACES, at_most, below, known_diameters
 from .record import ENGINE_TABLES, Kind, SceneCall
 
 SHAPE = ("aerofoil", "platform", "shank", "disc", "damper")
-FACES = (
-    "clamp",
-    "cyclic_high",
-    "cyclic_low",
-    "pressure_side",
-    "seat_left",
-    "seat_right",
-    "suction_side",
-    "tip",
-    "tip_leading",
-    "tip_mid",
-    "tip_trailing",
-    "trailing_edge",
-)
+FACES = (*BLADE_FACES, "cyclic_low", "cyclic_high", "trailing_edge")
 
 
 def conditions(scene: Scene) -> Iterator[str]:
