@@ -9,7 +9,7 @@ next to a fold. (Krack and Gross, Harmonic Balance for Nonlinear Vibration Probl
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
 from itertools import chain, pairwise
 
@@ -20,6 +20,7 @@ from ..friction.fourier import to_real
 from .continuation import PathPoint, follow
 from .linear.condensation import condense
 from .model import ReducedModel
+from .slow_sweep import DOWN, UP, reached_by, visited_pieces
 from .solution import Solution, size
 from .solve import solve
 from .solver.fallback import match_harmonics
@@ -342,12 +343,21 @@ def _sorted_out(
                 point = path.points[i].solution
                 own = (n for n in range(first, len(pieces)) if any(p is point for p in pieces[n]))
                 maxima.append((point, next(own)))
+    frequencies = [np.array([p.omega for p in piece]) for piece in pieces]
+
+    def apart(n: int, i: int, other: int, j: int) -> float:
+        return _distance(pieces[n][i], pieces[other][j])
+
     swept = {
-        way: _swept(pieces, ends.get(end), way) for end, way in (("low", "up"), ("high", "down"))
+        way: visited_pieces(frequencies, ends.get(end), way, apart)
+        for end, way in (("low", UP), ("high", DOWN))
     }
     resonances = [
         Resonance(
-            point, size(point, probe), _count(pieces, point.omega), _reached(swept, point, number)
+            point,
+            size(point, probe),
+            _count(pieces, point.omega),
+            reached_by(swept, number, point.omega),
         )
         for point, number in maxima
     ]
@@ -368,58 +378,9 @@ def _pieces(points: Sequence[PathPoint]) -> list[list[Solution]]:
     return pieces
 
 
-def _swept(
-    pieces: Sequence[Sequence[Solution]],
-    first: int | None,
-    way: str,
-) -> list[tuple[int, float]]:
-    """Pieces that a slow sweep visits, with the frequency at which it comes onto each.
-
-    At the end of a piece it jumps to the nearest motion, in displacements, that leads further; a
-    jump may in truth end elsewhere, which only a march in time tells.
-    """
-    if first is None:
-        return []
-    sign = 1.0 if way == "up" else -1.0
-    last = [max(piece, key=lambda p: sign * p.omega) for piece in pieces]
-    begin = [min(piece, key=lambda p: sign * p.omega) for piece in pieces]
-    visited = [(first, begin[first].omega)]
-    while True:
-        edge = last[visited[-1][0]]
-        onward = [
-            n
-            for n in range(len(pieces))
-            if sign * last[n].omega > sign * edge.omega + 1e-9 * edge.omega
-            and sign * begin[n].omega <= sign * edge.omega
-        ]
-        if not onward or len(visited) > len(pieces):
-            return visited
-        nearest = min(onward, key=lambda n: _distance(_nearest_in(pieces[n], edge.omega), edge))
-        visited.append((nearest, edge.omega))
-
-
-def _nearest_in(piece: Sequence[Solution], omega: float) -> Solution:
-    return min(piece, key=lambda p: abs(p.omega - omega))
-
-
 def _distance(one: Solution, other: Solution) -> float:
     H = max(one.harmonics, other.harmonics)
     return float(np.linalg.norm(match_harmonics(one.w, H) - match_harmonics(other.w, H)))
-
-
-def _reached(
-    swept: Mapping[str, Sequence[tuple[int, float]]],
-    point: Solution,
-    number: int,
-) -> str:
-    """By which sweeps a motion of a piece is reached."""
-    ways = [
-        way
-        for way, visited in swept.items()
-        for piece, entry in visited
-        if piece == number and (point.omega - entry) * (1 if way == "up" else -1) >= 0
-    ]
-    return " and ".join(dict.fromkeys(ways)) or "isolated"
 
 
 def _count(pieces: Sequence[Sequence[Solution]], omega: float) -> int:

@@ -12,15 +12,13 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from ...hbm.slow_sweep import DOWN, ISOLATED, UP, Visit, reached_by, visited_pieces
 from .loads import Curve
 
 # distance of the first harmonics of two ends over the largest one, up to which pieces are joined
 JOINED = 0.2
 # relative difference of two heights that are the same
 SAME_HEIGHT = 1e-6
-UP = "up"
-DOWN = "down"
-ISOLATED = "isolated"
 
 
 @dataclass(frozen=True)
@@ -59,7 +57,8 @@ class _Piece:
 def local_resonances(curve: Curve) -> list[LocalResonance]:
     """The local maxima of a curve by falling height."""
     pieces = _pieces_of(curve)
-    visited = {UP: _visited(pieces, True), DOWN: _visited(pieces, False)}
+    visited = _swept(pieces)
+    places = {piece.number: place for place, piece in enumerate(pieces)}
     found = []
     for path in _paths_of(pieces):
         rows = np.concatenate([piece.rows[order] for piece, order in path])
@@ -77,7 +76,7 @@ def local_resonances(curve: Curve) -> list[LocalResonance]:
                     str(curve.stability[row]),
                     str(curve.bifurcation[row]),
                     sum(p.frequency[0] <= frequency <= p.frequency[-1] for p in pieces),
-                    _reached_by(visited, int(owners[i]), frequency),
+                    reached_by(visited, places[int(owners[i])], frequency),
                 )
             )
     return sorted(found, key=lambda resonance: -resonance.amplitude)
@@ -150,41 +149,17 @@ def _joint(
     return nearest if away[nearest] <= JOINED * size else None
 
 
-def _visited(pieces: Sequence[_Piece], upward: bool) -> list[tuple[int, float]]:
-    """Pieces that a slow sweep visits, and the frequency at which it comes onto each: at the end of
-    a piece it jumps to the nearest motion that leads further.
-    """
+def _swept(pieces: Sequence[_Piece]) -> dict[str, list[Visit]]:
+    """What slow sweeps from both ends of the band visit, by place in the list of pieces."""
     if not pieces:
-        return []
-    sign = 1.0 if upward else -1.0
-    here = min(pieces, key=lambda p: sign * p.frequency[p.end(not upward)])
-    visited = [(here.number, float(here.frequency[here.end(not upward)]))]
-    while len(visited) <= len(pieces):
-        edge = here.end(upward)
-        at = float(here.frequency[edge])
-        onward = [
-            p
-            for p in pieces
-            if sign * p.frequency[p.end(upward)] > sign * at + 1e-9 * at
-            and sign * p.frequency[p.end(not upward)] <= sign * at
-        ]
-        if not onward:
-            break
-        motion = here.first[edge]
-        here = min(onward, key=lambda p: abs(p.first[np.abs(p.frequency - at).argmin()] - motion))
-        visited.append((here.number, at))
-    return visited
+        return {}
+    frequencies = [piece.frequency for piece in pieces]
+    starts = {
+        UP: min(range(len(pieces)), key=lambda n: frequencies[n][0]),
+        DOWN: max(range(len(pieces)), key=lambda n: frequencies[n][-1]),
+    }
 
+    def apart(n: int, i: int, other: int, j: int) -> float:
+        return float(abs(pieces[n].first[i] - pieces[other].first[j]))
 
-def _reached_by(
-    visited: dict[str, list[tuple[int, float]]],
-    number: int,
-    frequency: float,
-) -> str:
-    ways = [
-        way
-        for way, pieces in visited.items()
-        for piece, entry in pieces
-        if piece == number and (frequency - entry) * (1 if way == UP else -1) >= 0
-    ]
-    return " and ".join(dict.fromkeys(ways)) or ISOLATED
+    return {way: visited_pieces(frequencies, start, way, apart) for way, start in starts.items()}
