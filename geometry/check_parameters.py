@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING
 
 from bladefem.errors import InputError, suggestion
 from bladefem.scene.kinds import kind_named
+from bladefem.scene.support import area_springs, held_letters
 
 if TYPE_CHECKING:
     from bladefem.scene.tables import Scene
@@ -35,7 +36,7 @@ def check_parameters(scene: Scene) -> None:
 
 
 def check_names(scene: Scene) -> None:
-    """Refuse an excitation at a face or node set that the shape does not have.
+    """Refuse an excitation or a support at a face or node set that the shape does not have.
 
     Raises:
         InputError: no such name, with the nearest one.
@@ -44,12 +45,18 @@ def check_names(scene: Scene) -> None:
     if face_names is None:
         return
     known = face_names(scene)
-    at = scene.excitation.at
-    if at not in known:
-        raise InputError(
-            f"excitation.at = {at!r}: a {scene.kind} has no face or node set of that "
-            f"name{suggestion(at, known)}"
-        )
+    support = scene.support
+    wanted = [("excitation.at", scene.excitation.at)]
+    # an empty name holds nothing
+    wanted += [("support.clamp", support.clamp)] if support.clamp else []
+    wanted += [("support.springs", face) for face, *_ in area_springs(support)]
+    wanted += [("support.directions", face) for face, _ in held_letters(support)]
+    for field, name in wanted:
+        if name not in known:
+            raise InputError(
+                f"{field} = {name!r}: a {scene.kind} has no face or node set of that "
+                f"name{suggestion(name, known)}"
+            )
 
 
 def _refuse_many(scene: Scene, cells: float) -> None:

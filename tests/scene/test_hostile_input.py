@@ -82,6 +82,8 @@ WITHOUT_A_MESH = [
     ("mesh.scale=0.02", "mesh.scale = 0.02: gives about"),
     ("mesh.size=0.1 mm", "mesh.size = 0.0001 m: gives about"),
     ("mesh.contact_size=1 um", "mesh.contact_size = 1e-06 m: gives about"),
+    ("support.clamp=rooot", "support.clamp = 'rooot': a wedge sector has no face or node set"),
+    ('support.directions=["rim: z"]', "support.directions = 'rim': a wedge sector has no face"),
     ("excitation.at=nowhere", "excitation.at = 'nowhere': a wedge sector has no face or node set"),
     ("excitation.at=tip_midd", "did you mean 'tip_mid'?"),
     ("excitation.at=fillet", "has no face or node set"),
