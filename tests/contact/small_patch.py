@@ -76,16 +76,18 @@ def layer_elements(patch, areal):
     return Elements(stiffness, stiffness, np.full(n, FRICTION), np.full(n, LOAD / n))
 
 
-def patch_model(areal, force):
-    """The model with its stiff layer split, excited by a force [N]."""
+def patch_model(areal, force, split=True):
+    """The model with its stiff layer split, or whole in the elements, excited by a force [N]."""
     patch, local = patch_on_half_space()
     side = blade_side(patch, local)
     problem = problem_of(patch, side)
     elements = layer_elements(patch, areal)
     maps = [PressureMap(patch, elements.n0, np.zeros(len(patch.area)), 0.0)]
-    elements, series = split_stiffness(
-        elements, maps, Contact(), numerical_stiffness(problem), stiffest_layer(problem)
-    )
+    series = None
+    if split:
+        elements, series = split_stiffness(
+            elements, maps, Contact(), numerical_stiffness(problem), stiffest_layer(problem)
+        )
     if series is not None:
         side = in_series(side, series)
     excitation = {1: np.array([force])}
