@@ -6,6 +6,7 @@ BLADEFEM_COARSE=1 for the coarse setting of the tests.
 
 from __future__ import annotations
 
+import os
 import sys
 from pathlib import Path
 
@@ -27,7 +28,7 @@ def make_notebook(demo: Path, folder: Path) -> Path:
     """
     notebook = jupytext.read(demo)
     # a notebook does not know its own file, from which demos find the scenes
-    where = nbformat.v4.new_code_cell(f'__file__ = "{demo.relative_to(HERE)}"')
+    where = nbformat.v4.new_code_cell(f"__file__ = {os.path.relpath(demo, HERE)!r}")
     where.metadata["tags"] = ["remove-cell"]
     notebook.cells.insert(0, where)
     notebook.metadata["kernelspec"] = {
@@ -42,17 +43,17 @@ def make_notebook(demo: Path, folder: Path) -> Path:
     return file
 
 
-def main(names: list[str]) -> int:
-    """Make the notebooks of some demos, or of all."""
+def main(names: list[str], folder: Path = HERE / "notebooks") -> int:
+    """Make the notebooks of some demos, or of all; exit code 2 where one is not known."""
     known = {demo.stem: demo for demo in sorted(DEMOS.glob("*.py"))}
     unknown = [name for name in names if name not in known]
     if unknown:
         print(f"unknown demo {unknown[0]!r}: expected one of {', '.join(known)}", file=sys.stderr)
         return 2
-    folder = HERE / "notebooks"
     folder.mkdir(exist_ok=True)
     for name in names or known:
-        print(make_notebook(known[name], folder).relative_to(HERE), flush=True)
+        file = make_notebook(known[name], folder)
+        print(file.relative_to(HERE) if file.is_relative_to(HERE) else file, flush=True)
     return 0
 
 

@@ -136,7 +136,7 @@ def test_a_failure_in_any_pass_fails_the_whole(failing, place):
         env = {**os.environ, "FAIL": failing, "CODE": "1"}
         done = subprocess.run(command, capture_output=True, text=True, env=env)
         assert done.returncode == 1
-        assert done.stdout.count("python") == 3  # the other passes still run
+        assert done.stdout.count("-m pytest") == 3  # the other passes still run
 
 
 def test_a_pass_without_tests_is_a_failure_unless_tests_were_selected(place):
@@ -163,11 +163,12 @@ def test_linters_are_installed_again_when_their_versions_change(place):
 
 
 def test_ci_runs_linters_and_tests_and_fails_with_either(place):
-    for failing, code in (("mypy", 1), ("on 4", 1), ("nothing", 0)):
+    for failing, code in (("mypy", 1), ("make_notebooks", 1), ("on 4", 1), ("nothing", 0)):
         env = {**os.environ, "FAIL": failing, "CODE": "1"}
         done = subprocess.run(
             ["sh", place / ".ci" / "run"], capture_output=True, text=True, env=env
         )
         assert done.returncode == code
         assert done.stdout.count("linter ") == 4
-        assert done.stdout.count("python") == 3
+        assert done.stdout.count("-m pytest") == 3
+        assert "python docs/make_notebooks.py plain_matrices" in done.stdout
