@@ -7,9 +7,10 @@ from pathlib import Path
 
 import pytest
 
+MISSING = "./run notebooks plain_matrices installs what this needs"
 for package in ("ipykernel", "jupytext", "nbclient"):
-    pytest.importorskip(package, reason="./run notebooks plain_matrices installs what this needs")
-import nbformat
+    pytest.importorskip(package, reason=MISSING)
+nbformat = pytest.importorskip("nbformat", reason=MISSING)
 
 ROOT = Path(__file__).resolve().parents[2]
 
