@@ -26,7 +26,7 @@ from bladefem.hbm.model import ReducedModel
 from bladefem.hbm.peak import Peak, find_peak
 from bladefem.scene.toml import load_scene, vary
 from bladefem.study.adaptive.family import family_member
-from bladefem.study.pipeline import pipeline
+from bladefem.study.pipeline import case_models, pipeline
 from bladefem.study.pipeline.loads import curve_of
 from bladefem.study.pipeline.stages import Bodies
 from bladefem.util.progress import unwatched
@@ -91,15 +91,15 @@ def main(count: int) -> None:
     folder = tempfile.mkdtemp()
     ready = pipeline.run(scene, folder, until="reduction")
     patches = list(ready.contact.problem.patches)
-    cases = pipeline.load_cases(scene, ready.mesh, ready.contact)
-    settings, reduced = pipeline.reduced_sector(
+    cases = case_models.load_cases(scene, ready.mesh, ready.contact)
+    settings, reduced = case_models.reduced_sector(
         scene,
         Bodies(scene, ready.mesh, None, unwatched),
         cases[len(cases) // 2],
         patches,
         lambda name, key, compute: compute(),
     )
-    family = partial(pipeline.family_of_case, scene, ready.mesh, reduced, patches)
+    family = partial(case_models.family_of_case, scene, ready.mesh, reduced, patches)
     print("load [N]  sticking  lowest  given  highest [um]  certificate  random histories [um]")
     for case in cases:
         start = time.process_time()

@@ -20,12 +20,13 @@ import numpy as np
 from bladefem.io.stage_cache import stage
 from bladefem.scene.tables import Scene
 from bladefem.scene.toml import load_scene, vary
-from bladefem.study.adaptive.settings import Settings
+from bladefem.study.adaptive.settings import Settings, first_settings
 from bladefem.study.chart.cpu_clock import running
-from bladefem.study.pipeline import pipeline
+from bladefem.study.pipeline import case_models, pipeline
 from bladefem.study.pipeline.assemble_model import LoadCase
 from bladefem.study.pipeline.loads import curve_of
-from bladefem.study.pipeline.stages import Bodies
+from bladefem.study.pipeline.stage_inputs import stage_key
+from bladefem.study.pipeline.stages import Bodies, harmonic_diameters, reduce_sector
 from bladefem.util.progress import unwatched
 
 LAYERS = ("40", "400", "4000", "10000", "40000", "100000", "rigid")
@@ -61,14 +62,14 @@ def prepared(folder: str, stiffness: str) -> Layer:
     ready = pipeline.run(scene, folder, until="contact")
     patches = list(ready.contact.problem.patches)
     bodies = Bodies(scene, ready.mesh, None, unwatched)
-    diameters = pipeline.harmonic_diameters(scene, ready.mesh, pipeline.EXACT_HARMONICS)
-    key = pipeline.stage_key("reduction", scene, np.array(diameters), MODES)
-    compute = partial(pipeline.reduce_sector, bodies, patches, diameters, MODES)
+    diameters = harmonic_diameters(scene, ready.mesh, case_models.EXACT_HARMONICS)
+    key = stage_key("reduction", scene, np.array(diameters), MODES)
+    compute = partial(reduce_sector, bodies, patches, diameters, MODES)
     reduced, _ = stage(folder, "reduction", key, compute)
-    cases = pipeline.load_cases(scene, ready.mesh, ready.contact)
-    family_of = partial(pipeline.family_of_case, scene, ready.mesh, reduced, patches)
-    settings = pipeline.first_settings(scene)
-    settings = replace(settings, most=pipeline._affordable(cases[0]))
+    cases = case_models.load_cases(scene, ready.mesh, ready.contact)
+    family_of = partial(case_models.family_of_case, scene, ready.mesh, reduced, patches)
+    settings = first_settings(scene)
+    settings = replace(settings, most=case_models.affordable_harmonics(cases[0]))
     return Layer(scene, cases, family_of, settings)
 
 

@@ -11,8 +11,8 @@ import numpy as np
 import pandas as pd
 
 from ..data import Patch
+from ..study.pipeline.case_models import load_cases
 from ..study.pipeline.contact_cycle import ContactCycle, contact_cycle
-from ..study.pipeline.pipeline import load_cases
 from ..study.pipeline.run_records import SolvedRun
 from ..view.contact import save_faces_vtu
 from ..view.response import draw_seat_loops

@@ -19,8 +19,9 @@ from bladefem.contact.seating import solve as seat
 from bladefem.hbm.solve import solve
 from bladefem.reduction.truncate import truncated
 from bladefem.scene.toml import load_scene
-from bladefem.study.pipeline import pipeline
 from bladefem.study.pipeline.assemble_model import joint_model
+from bladefem.study.pipeline.case_models import load_cases
+from bladefem.study.pipeline.run_records import Seating
 from bladefem.study.pipeline.stages import Bodies, build_mesh, reduce_sector, seat_damper
 from bladefem.study.pipeline.validate_mesh import found_patches
 
@@ -167,7 +168,7 @@ def ring(reduced):
 def test_balance_agrees_with_the_free_ring_in_time(wheel, load, harmonics):
     scene = wheel.scene
     maps = {load: seat(wheel.problem, scene.operation.speed, normal=load, bedded=True)}
-    case = pipeline.load_cases(scene, wheel.mesh, pipeline.Seating(wheel.problem, maps))[0]
+    case = load_cases(scene, wheel.mesh, Seating(wheel.problem, maps))[0]
     model = joint_model(scene, wheel.mesh, wheel.reduced, wheel.patches, case, harmonics, "elastic")
     free = wheel.reduced.sector[9].omega[0]
     curve = [solve(model, free * x, 3, 128) for x in np.linspace(1.03, 1.07, 5)]

@@ -21,8 +21,10 @@ from bladefem.hbm.solve import solve
 from bladefem.scene.toml import load_scene
 from bladefem.study.modes.linear_response import excitation_load
 from bladefem.study.pipeline import damped_motion as subject
-from bladefem.study.pipeline import pipeline
 from bladefem.study.pipeline.assemble_model import joint_model
+from bladefem.study.pipeline.case_models import load_cases
+from bladefem.study.pipeline.response_remarks import stress_message
+from bladefem.study.pipeline.run_records import Seating
 from bladefem.study.pipeline.stages import (
     Bodies,
     build_mesh,
@@ -75,7 +77,7 @@ def plane():
     patches = found_patches(scene, mesh, excited=True)
     problem = seat_damper(bodies, patches)
     maps = {LOAD: seat(problem, 0.0, normal=LOAD)}
-    case = pipeline.load_cases(scene, mesh, pipeline.Seating(problem, maps))[0]
+    case = load_cases(scene, mesh, Seating(problem, maps))[0]
     reduced = reduce_sector(bodies, patches, harmonic_diameters(scene, mesh, 3), 20)
     model = joint_model(scene, mesh, reduced, patches, case, 5, "rigid")
     flex = bodies.factorised(0)
@@ -143,7 +145,7 @@ def test_a_wheel_moves_at_the_probe_as_in_the_balance(order):
     patches = found_patches(scene, mesh, excited=True)
     problem = seat_damper(bodies, patches)
     maps = {20.0: seat(problem, scene.operation.speed, normal=20.0, bedded=True)}
-    case = pipeline.load_cases(scene, mesh, pipeline.Seating(problem, maps))[0]
+    case = load_cases(scene, mesh, Seating(problem, maps))[0]
     diameters = harmonic_diameters(scene, mesh, 3)
     reduced = reduce_sector(bodies, patches, diameters, 20)
     model = joint_model(scene, mesh, reduced, patches, case, 3, "elastic")
@@ -159,6 +161,6 @@ def test_a_wheel_moves_at_the_probe_as_in_the_balance(order):
 def test_a_stress_that_the_mesh_does_not_carry_is_a_warning(error, warns):
     curves = [SimpleNamespace(peak_amplitude=2.0), SimpleNamespace(peak_amplitude=1.0)]
     stress = SimpleNamespace(load=80.0, largest=2e7, place=np.zeros(3), mesh_error=error)
-    said = pipeline.stress_message(curves, {1: stress})
+    said = stress_message(curves, {1: stress})
     assert "20 MPa" in said
     assert ("no stress to sign" in said) == warns

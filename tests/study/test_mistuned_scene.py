@@ -15,6 +15,7 @@ from bladefem.study.adaptive.settings import first_settings
 from bladefem.study.mistuning.stage import check_mistuning
 from bladefem.study.mistuning.whole_wheel import reduce_wheel, whole_wheel
 from bladefem.study.pipeline import pipeline
+from bladefem.study.pipeline.case_models import family_of_case, load_cases
 from bladefem.study.pipeline.stages import Bodies
 from bladefem.wheel.model import frequency_pattern
 from bladefem.wheel.solve import free_wheel, solve_wheel
@@ -36,7 +37,7 @@ def reduced():
     run = pipeline.run(scene, None, until="reduction")
     patches = list(run.contact.problem.patches)
     sector = reduce_wheel(Bodies(scene, run.mesh), patches, 6, run.clamped, 3)
-    (case,) = pipeline.load_cases(scene, run.mesh, run.contact)
+    (case,) = load_cases(scene, run.mesh, run.contact)
     settings = first_settings(scene)
     return scene, run, patches, sector, case, settings
 
@@ -44,7 +45,7 @@ def reduced():
 def test_whole_wheel_is_the_tuned_sector(reduced):
     scene, run, patches, sector, case, settings = reduced
     wheel = whole_wheel(scene, run.mesh, sector, patches, case, settings)
-    family = pipeline.family_of_case(scene, run.mesh, run.reduced, patches, case)
+    family = family_of_case(scene, run.mesh, run.reduced, patches, case)
     model = family_member(family, settings).model
     omega = 0.99 * model.side(1).omega[0]
     one = solve(model, omega, 1, 72)

@@ -4,7 +4,7 @@ import pytest
 
 from bladefem.errors import InputError
 from bladefem.scene.tables import Operation, Scene, Study
-from bladefem.study.pipeline.pipeline import studied_loads
+from bladefem.study.pipeline.seated_loads import studied_loads
 
 
 def test_own_load_takes_its_place_among_the_others():

@@ -11,8 +11,9 @@ from bladefem import load_scene
 from bladefem.contact.seating import solve as seat
 from bladefem.hbm.linear.condensation import condense
 from bladefem.hbm.solve import solve
-from bladefem.study.pipeline import pipeline
 from bladefem.study.pipeline.assemble_model import joint_model
+from bladefem.study.pipeline.case_models import load_cases
+from bladefem.study.pipeline.run_records import Seating
 from bladefem.study.pipeline.stages import (
     Bodies,
     build_mesh,
@@ -46,7 +47,7 @@ def model_of(parts, load, *given):
     scene = load_scene("scenes/plane.toml", ["contact.mu=0.001", *given])
     problem = on_layer(scene, problem)
     maps = seat(problem, 0.0, normal=load, bedded=True)
-    case = pipeline.load_cases(scene, mesh, pipeline.Seating(problem, {load: maps}))[0]
+    case = load_cases(scene, mesh, Seating(problem, {load: maps}))[0]
     model = joint_model(scene, mesh, reduced, patches, case, 1, "rigid")
     return model, np.concatenate([m.force for m in maps]), problem
 
@@ -77,7 +78,7 @@ def test_the_static_part_under_another_load_gives_that_pressure_map(parts, stiff
     maps = {load: seat(problem, 0.0, normal=load) for load in (LOAD, OTHER)}
     first, second = (np.concatenate([m.force for m in maps[load]]) for load in (LOAD, OTHER))
     assert np.abs(second - OTHER / LOAD * first).max() > 1e-3 * first.max()
-    case = pipeline.load_cases(scene, mesh, pipeline.Seating(problem, {LOAD: maps[LOAD]}))[0]
+    case = load_cases(scene, mesh, Seating(problem, {LOAD: maps[LOAD]}))[0]
     model = joint_model(scene, mesh, reduced, patches, case, 1, "elastic")
     linear = condense(model, OMEGA, 1)
     rows = slice(None, None, model.directions)

@@ -30,8 +30,9 @@ from ..adaptive.check_points import peak_of
 from ..adaptive.choice import covered_band
 from ..adaptive.family import family_member
 from ..adaptive.settings import Settings
+from ..pipeline.case_models import EXACT_HARMONICS, family_of_case, load_cases
 from ..pipeline.history import FRICTIONLESS, condense_friction, seat_by_history
-from ..pipeline.pipeline import EXACT_HARMONICS, Seating, family_of_case, load_cases
+from ..pipeline.run_records import Seating
 from ..pipeline.stages import (
     Bodies,
     build_mesh,

@@ -15,7 +15,8 @@ from ...scene.tables import Scene
 from ...util.communicator import Communicator
 from ..adaptive.family import Family, family_of
 from ..adaptive.settings import first_for, restarted
-from ..pipeline.pipeline import family_of_case, load_cases, reduced_sector, run
+from ..pipeline.case_models import family_of_case, load_cases, reduced_sector
+from ..pipeline.pipeline import run
 from ..pipeline.stages import Bodies, Reduced
 from .chart import Chart, chart, check_budget
 from .meshes import mesh_table, mesh_variants

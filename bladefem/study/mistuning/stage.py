@@ -18,8 +18,8 @@ from ...wheel.model import Pattern, Wheel, frequency_pattern
 from ...wheel.resonance import Respond
 from ...wheel.scatter import MAX_DEVIATIONS, drawn_patterns
 from ...wheel.statistics import Amplification, scatter_statistics, wheel_respond
+from ..pipeline.case_models import load_cases
 from ..pipeline.loads import Curve
-from ..pipeline.pipeline import load_cases
 from ..pipeline.run_records import SolvedRun
 from ..pipeline.stages import Bodies
 from .pattern_response import (

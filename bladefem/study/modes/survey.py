@@ -26,7 +26,7 @@ from ..pipeline import pipeline
 from ..pipeline.run_records import ModalRun
 from ..pipeline.stage_inputs import stage_key
 from ..pipeline.stages import MODES_SHOWN, Bodies, excited_modes, is_wheel, wheel_modes
-from ..pipeline.validate_mesh import refuse_loads
+from ..pipeline.validate_mesh import check_blade, refuse_loads
 from .campbell import Campbell, campbell
 from .clamped_aerofoil import clamped_blade
 from .comparison import mac
@@ -90,7 +90,7 @@ def survey(
     """
     other = None if wanted.other is None else on_root(comm, partial(_read_other, wanted.other))
     start = pipeline.run(scene, folder, until="mesh", comm=comm, progress=progress)
-    pipeline.check_blade(scene, start.mesh)
+    check_blade(scene, start.mesh)
     if wanted.loads is not None:
         refuse_loads(scene, start.mesh, wanted.loads, wanted.damping)
     bodies = Bodies(scene, start.mesh, comm, progress)

@@ -10,6 +10,7 @@ from ...contact.face_profile import seat_gap
 from ...data import Patch
 from ...errors import InputError, suggestion
 from ...hbm.model import Damping
+from ...scene.kinds import kind_named
 from ...scene.tables import Scene
 from .ports import named_nodes
 from .stages import contact_patches
@@ -83,3 +84,19 @@ def _all_told(looks: Sequence[Callable[[], object]]) -> None:
             problems.append(str(error))
     if problems:
         raise InputError("; and ".join(problems))
+
+
+def check_blade(scene: Scene, mesh: Mesh) -> None:
+    """Modes and responses need a blade, and a blade needs its clamp."""
+    kind = kind_named(scene.kind)
+    if not kind.has_blade:
+        raise InputError(
+            f"kind '{scene.kind}' has no blade to vibrate: 'bladefem run' computes its "
+            f"{kind.result}, 'bladefem mesh' draws it"
+        )
+    clamp = scene.support.clamp
+    if clamp and clamp not in (*mesh.faces, *mesh.nodes):
+        raise InputError(
+            f"the mesh has no face or node set '{clamp}' to hold the blade; it has "
+            f"{', '.join(sorted((*mesh.faces, *mesh.nodes)))}"
+        )

@@ -1,0 +1,150 @@
+"""Models of a load case: from the reduced sector with as many modes as its resonance needs, to all
+harmonics and contact points that the automatic choice may ask for.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import replace
+from functools import lru_cache, partial
+
+import numpy as np
+
+from geometry.mesh import Mesh
+
+from ...data import Patch
+from ...reduction.truncate import truncated
+from ...scene.tables import Scene
+from ..adaptive.check_points import peak_of
+from ..adaptive.choice import covered_band
+from ..adaptive.family import Family, Member, coarsened_elements, family_member, shared_harmonics
+from ..adaptive.resonance_choice import choose_at_peak, peak_from
+from ..adaptive.settings import DAMPERS, Settings, enriched_settings, first_settings
+from .assemble_model import LoadCase, joint_model
+from .body_mesh import ModeErrors, SofterBody, frequency_ratio, softened
+from .changed_cases import seated_case
+from .contact_cycle import labels
+from .liftoff import named
+from .run_records import Seating
+from .stage_inputs import stage_key
+from .stages import Bodies, Reduced, harmonic_diameters, reduce_sector, weighted
+
+# higher ones borrow the nodal diameter next to their own
+EXACT_HARMONICS = 3
+# unknowns of the largest balance that the automatic choice solves; model.harmonics may ask
+# for more
+LARGEST_BALANCE = 6000
+
+
+def load_cases(
+    scene: Scene,
+    mesh: Mesh,
+    contact: Seating,
+) -> list[LoadCase]:
+    """The friction elements of each load, for each mass of the damper."""
+    return [
+        seated_case(scene, contact.problem, contact.maps[load], load, mesh.dimension - 1, mass)
+        for mass in scene.study.masses or (None,)
+        for load in contact.maps
+    ]
+
+
+def family_of_case(
+    scene: Scene,
+    mesh: Mesh,
+    reduced: Reduced,
+    patches: list[Patch],
+    case: LoadCase,
+) -> Family:
+    """All models of a load case that the reduced sector allows."""
+    nodes = len(case.elements.kt)
+    reduced = weighted(reduced, case.mass)
+    most = affordable_harmonics(case)
+
+    def shared(settings: Settings) -> Member:
+        harmonics = max(settings.harmonics, min(shared_harmonics(settings.harmonics), most))
+        return build(replace(settings, harmonics=harmonics))
+
+    # a point's own model and those of its five indicators
+    @lru_cache(maxsize=6)
+    def build(settings: Settings) -> Member:
+        few = {n: truncated(body, settings.modes) for n, body in reduced.sector.items()}
+        model = joint_model(
+            scene,
+            mesh,
+            replace(reduced, sector=few),
+            patches,
+            case,
+            settings.harmonics,
+            settings.damper,
+        )
+        groups = np.arange(nodes) if settings.points is None else labels(patches, settings.points)
+        return Member(coarsened_elements(model, groups), groups)
+
+    return Family(
+        shared, max(len(body.omega) for body in reduced.sector.values()), 2 * most + 1, DAMPERS
+    )
+
+
+def softer_body(
+    scene: Scene,
+    mesh: Mesh,
+    reduced: Reduced,
+    patches: Sequence[Patch],
+    errors: ModeErrors,
+) -> SofterBody | None:
+    """All models of each load case on the blade less the error of its stiffness."""
+    softer = softened(reduced, errors)
+    if softer is None:
+        return None
+    ratio = frequency_ratio(reduced, softer, errors, scene.excitation.mode)
+    return SofterBody(partial(family_of_case, scene, mesh, softer, list(patches)), ratio)
+
+
+def affordable_harmonics(case: LoadCase) -> int:
+    """Harmonics that LARGEST_BALANCE allows with all contact points; twice as many judge them, at
+    single points.
+    """
+    dofs = case.selection.shape[1]
+    return max((h for h in (3, 7, 15, 31) if dofs * (2 * h + 1) <= LARGEST_BALANCE), default=3)
+
+
+def judged_modes(scene: Scene, settings: Settings) -> int:
+    """Modes of each nodal diameter to reduce with: where their number is open, twice as many as the
+    balance takes, which judge it.
+    """
+    return settings.modes if scene.model.modes else 2 * settings.modes
+
+
+def reduced_sector(
+    scene: Scene,
+    bodies: Bodies,
+    case: LoadCase,
+    patches: list[Patch],
+    keep: Callable[[str, str, Callable[[], Reduced]], Reduced],
+) -> tuple[Settings, Reduced]:
+    """The sector with as many modes as the resonance of one load needs, and settings to start the
+    others from.
+    """
+    settings = replace(first_settings(scene), most=affordable_harmonics(case))
+    diameters = harmonic_diameters(scene, bodies.mesh, EXACT_HARMONICS)
+    while True:
+        count = judged_modes(scene, settings)
+        key = stage_key("reduction", scene, np.array(diameters), count)
+        reduced = keep("reduction", key, partial(reduce_sector, bodies, patches, diameters, count))
+        if not settings.chosen:
+            return settings, reduced
+        family = family_of_case(scene, bodies.mesh, reduced, patches, case)
+        model = family_member(family, settings).model
+        mode = scene.excitation.mode
+        with named(case, model, mode, scene.excitation.force):
+            rough = covered_band(model, settings, scene.study.band, mode, 1.0)
+            peak = peak_from(family, settings, peak_of(rough), settings, scene.accuracy)
+        settings, _, found = choose_at_peak(
+            family, settings, peak, scene.accuracy, fixed=("modes",)
+        )
+        more = enriched_settings(settings, "modes")
+        known = "modes" in settings.chosen and np.isfinite(found.height["modes"])
+        if not known or found.needs["modes"] <= scene.accuracy / 10 or more is None:
+            return settings, reduced
+        settings = more

@@ -1,0 +1,126 @@
+"""What a reader of the results has to know: how they were found, and where they may be wrong."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+import numpy as np
+
+from ...scene.tables import Scene
+from ...util.message import method, warning
+from ..adaptive.settings import Settings
+from .best_load import BestLoad
+from .damped_motion import DampedStress
+from .load_interval import interval_sentence
+from .loads import Curve, beyond_tolerance
+from .resonance_list import reach_sentence
+from .stability import stability_sentence, unstable_sentence
+
+# largest estimated error by the mesh of a stress that is no warning
+TRUSTED_STRESS = 0.2
+
+
+def response_remarks(
+    scene: Scene,
+    settings: Settings,
+    curves: list[Curve],
+    nodes: int,
+) -> list[str]:
+    """What a reader of the results has to know; ``nodes`` are the contact points of a seat."""
+    remarks: list[str] = [method(settings.sentence(nodes)), method(settings.method)]
+    if scene.model.static == "uncoupled":
+        remarks.append(
+            method(
+                "mean displacements held as the static contact solution left them (model.static)"
+            )
+        )
+    if scene.study.stability:
+        remarks.append(method(stability_sentence([(c.stability, c.multiplier) for c in curves])))
+    remarks.extend(warning(text) for text in map(unstable_sentence, curves) if text)
+    intervals = [c.interval for c in curves if c.interval is not None]
+    if intervals:
+        remarks.append(interval_sentence([c.load for c in curves], intervals))
+    lost = sum(int((~c.converged).sum()) for c in curves)
+    if lost:
+        remarks.append(
+            warning(
+                f"{lost} of {sum(len(c.frequency) for c in curves)} response points did not "
+                "converge; they are marked in tables and pictures"
+            )
+        )
+    for text in filter(None, map(beyond_tolerance, curves)):
+        remarks.append(warning(text))
+    single = [f"{c.load:g} N" for c in curves if c.unfollowed]
+    if single:
+        remarks.append(
+            warning(
+                f"under {', '.join(single)} contacts lift off, and the response was not followed "
+                "round folds: a sweep sees one motion a frequency, a higher one may exist"
+            )
+        )
+    remarks.extend(warning(text) for text in map(reach_sentence, curves) if text)
+    for c in curves:
+        remarks.extend(map(warning, _resonance_warnings(c, scene.accuracy)))
+    return remarks
+
+
+def _resonance_warnings(c: Curve, accuracy: float) -> Iterator[str]:
+    """Why the highest point of a curve may be wrong."""
+    near = np.flatnonzero(c.frequency == c.peak_frequency)[0] + np.array([-1, 1])
+    if not c.converged[near[(near >= 0) & (near < len(c.frequency))]].all():
+        yield (
+            f"load {c.load:g} N: the highest point that was solved lies next to one that was not; "
+            "the resonance may be higher"
+        )
+    if c.error == np.inf:
+        yield (
+            f"load {c.load:g} N: the error of the resonance amplitude is unknown, since richer "
+            "models of it were not solved; nothing was refined because of that"
+        )
+    elif c.error is not None and c.error > accuracy:
+        yield (
+            f"load {c.load:g} N: estimated error {100 * c.error:.2g} % of the resonance "
+            f"amplitude, above the wanted {100 * accuracy:.2g} %{_of_the_contact_mesh(c)}"
+        )
+
+
+def _of_the_contact_mesh(curve: Curve) -> str:
+    """The part of an estimated error that a finer contact mesh lowers, where it is the larger."""
+    if curve.error is None or not np.isfinite(curve.halved) or curve.halved < curve.error / 2:
+        return ""
+    return (
+        f"; {100 * curve.halved:.2g} % are what half as many contact points change, expected a "
+        "finer contact mesh (mesh.seat_elements, mesh.contact_size)"
+    )
+
+
+def best_load_remarks(scene: Scene, best: tuple[BestLoad, ...]) -> Iterator[str]:
+    """How the best load was found, or why it was not."""
+    for b in best:
+        damper = "" if b.mass is None else f" of a damper of {1e3 * b.mass:.4g} g"
+        if b.reason:
+            yield (
+                f"best load{damper}: not found between {b.searched[0]:.3g} and {b.searched[1]:.3g} "
+                f"N, since {b.reason}"
+            )
+            continue
+        yield (
+            f"best load{damper}: {b.load:.4g} N by exact search between {b.searched[0]:.3g} and "
+            f"{b.searched[1]:.3g} N, {len(b.tried)} loads and {b.points} points; no load near it "
+            f"lowers the amplitude by more than {100 * b.tolerance:.2g} %; {b.settings.sentence()}"
+        )
+
+
+def stress_message(curves: list[Curve], stressed: dict[int, DampedStress]) -> str:
+    """The stress of the lowest resonance, and how far it can be trusted."""
+    best = min(range(len(curves)), key=lambda k: curves[k].peak_amplitude)
+    found = stressed[best]
+    place = ", ".join(f"{1e3 * x:.1f}" for x in found.place)
+    text = (
+        f"alternating stress at the best load, {found.load:.4g} N: {1e-6 * found.largest:.4g} MPa "
+        f"at ({place}) mm, of all modes, harmonics and damper forces; by its mesh "
+        f"{found.mesh_error:.1%} uncertain there"
+    )
+    if found.mesh_error <= TRUSTED_STRESS:
+        return text
+    return warning(f"{text}: a sharp edge or too coarse a mesh, so no stress to sign")

@@ -1,0 +1,206 @@
+"""The response stage: best loads, responses of every load, what they hang on and their stresses."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import replace
+from functools import lru_cache, partial
+
+from geometry.mesh import Mesh
+
+from ...data import Patch
+from ...errors import NotSolvedError
+from ...io.stage_cache import on_root
+from ...scene.kinds import kind_named
+from ...scene.tables import Scene
+from ...util.communicator import Communicator
+from ..adaptive.family import Family, family_member
+from ..adaptive.settings import Settings
+from ..influences import Influence, influences, parameters_of
+from .assemble_model import LoadCase
+from .best_load import BestLoad, chart_loads, find_best_load
+from .body_mesh import SofterBody
+from .case_models import family_of_case, load_cases, softer_body
+from .changed_cases import cases_of, changed_cases
+from .damped_motion import DampedStress, damped_stress
+from .history import FRICTIONLESS
+from .linear_limits import linear_limits
+from .loads import Curve, study_loads
+from .response_remarks import best_load_remarks, response_remarks, stress_message
+from .run_records import ReducedRun, Response, Seating, SolvedRun
+from .seated_loads import seat_at_loads, studied_loads
+from .stage_inputs import stage_key
+from .stage_runner import StageRunner
+from .stages import Bodies
+from .utilisation import utilisation_message
+
+
+def run_response(before: ReducedRun, patches: list[Patch], keep: StageRunner) -> SolvedRun:
+    """The responses of every load of the study, from a reduced sector.
+
+    Args:
+        patches: the contact patches of the mesh.
+        keep: computes what the run folder does not hold.
+
+    Raises:
+        NotSolvedError: no solution, from the balance or the search of the best load.
+    """
+    scene = before.scene
+    mesh = before.mesh
+    settings = before.settings
+    clock = keep.clock
+    family = partial(family_of_case, scene, mesh, before.reduced, patches)
+    with clock("best load"):
+        best = _best_loads(scene, mesh, before.contact, family, settings, keep)
+        clock.messages.extend(best_load_remarks(scene, best))
+    charted = scene.study.loads is None and best and not any(b.reason for b in best)
+    if charted:
+        loads = studied_loads(scene, before.contact.own, chart_loads(best))
+        before = replace(before, contact=seat_at_loads(scene, before.contact, loads, clock))
+    cases = load_cases(scene, mesh, before.contact)
+    softer = softer_body(scene, mesh, before.reduced, patches, before.mode_errors)
+    if softer is None:
+        clock.messages.append(
+            "errors by the body's mesh are not estimated: the reduced model has other modes than "
+            "those of the stage, or its elements are far too large"
+        )
+    response = _load_responses(scene, cases, family, settings, keep, softer)
+    with clock("influences"):
+        found = _influences(scene, mesh, before.contact, family, best, keep)
+    curves = response.curves
+    with clock("stresses"):
+        damped = keep(
+            "damped_stress",
+            stage_key("stress", scene, [(c.load, c.mass, c.peak.f) for c in curves]),
+            lambda: _stresses(before, patches, curves, cases, keep.comm),
+        )
+        clock.messages.append(stress_message(curves, damped))
+    response = replace(response, best=best, influences=found)
+    result = SolvedRun(**vars(before), response=response, damped=damped)
+    clock.messages.extend(filter(None, [utilisation_message(result)]))
+    return result
+
+
+def _stresses(
+    before: ReducedRun,
+    patches: Sequence[Patch],
+    curves: Sequence[Curve],
+    cases: Sequence[LoadCase],
+    comm: Communicator | None,
+) -> dict[int, DampedStress]:
+    """The stress at the lowest resonance and at that of the damper's own load, by number of the
+    curve; on rank 0, whose bodies share one factorisation over the nodal diameters.
+    """
+    own = before.contact.own
+    wanted = {min(range(len(curves)), key=lambda k: curves[k].peak_amplitude)}
+    if own is not None:
+        wanted.add(min(range(len(curves)), key=lambda k: abs(curves[k].load - own)))
+
+    def compute() -> dict[int, DampedStress]:
+        from ...fem.compat import MPI
+
+        alone = Bodies(before.scene, before.mesh, MPI.COMM_SELF)
+        factorised = lru_cache(maxsize=None)(alone.factorised)
+        found = {}
+        for k in sorted(wanted):
+            points = curves[k].settings.points
+            found[k] = damped_stress(
+                alone, patches, before.modes, cases[k], curves[k].peak, points, factorised
+            )
+        return found
+
+    return on_root(comm, compute)
+
+
+def _load_responses(
+    scene: Scene,
+    cases: list[LoadCase],
+    family: Callable[[LoadCase], Family],
+    settings: Settings,
+    keep: StageRunner,
+    softer: SofterBody | None,
+) -> Response:
+    clock = keep.clock
+    with clock("response"):
+        curves = study_loads(
+            scene,
+            cases,
+            family,
+            settings,
+            keep.comm,
+            clock.progress,
+            lambda case, make: keep.alone(
+                f"response_{_case_label(case)}",
+                stage_key("response", scene, case.load, case.mass, replace(settings, error=None)),
+                make,
+            ),
+            softer,
+        )
+        band = min(c.frequency[0] for c in curves), max(c.frequency[-1] for c in curves)
+        rich = family_member(family(cases[-1]), settings).model
+        limits = linear_limits(rich, scene.excitation.mode, band)
+    clock.messages.extend(
+        response_remarks(scene, settings, curves, -(-len(cases[0].elements.kt) // 2))
+    )
+    return Response(settings, curves, limits)
+
+
+def _case_label(case: LoadCase) -> str:
+    """ "90N" or "90N_30g"."""
+    return f"{case.load:g}N" + ("" if case.mass is None else f"_{1e3 * case.mass:g}g")
+
+
+def _best_loads(
+    scene: Scene,
+    mesh: Mesh,
+    contact: Seating,
+    family: Callable[[LoadCase], Family],
+    settings: Settings,
+    keep: StageRunner,
+) -> tuple[BestLoad, ...]:
+    """The best load of each mass of the damper; none where a single load was asked for."""
+    if scene.study.loads is not None and len(scene.study.loads) == 1:
+        return ()
+
+    def search(mass: float | None) -> BestLoad:
+        case_at = cases_of(scene, contact.problem, mesh.dimension - 1, mass, contact.rough)
+        return find_best_load(scene, case_at, family, settings, mass)
+
+    def compute() -> list[BestLoad]:
+        return on_root(keep.comm, lambda: [search(mass) for mass in scene.study.masses or (None,)])
+
+    key = stage_key(
+        "response", scene, "best load", scene.study.masses, replace(settings, error=None)
+    )
+    return tuple(keep("best_load", key, compute))
+
+
+def _influences(
+    scene: Scene,
+    mesh: Mesh,
+    contact: Seating,
+    family: Callable[[LoadCase], Family],
+    best: tuple[BestLoad, ...],
+    keep: StageRunner,
+) -> tuple[Influence, ...]:
+    """What the lowest of the best loads hangs on; none where it was not found or not asked for."""
+    found = [b for b in best if not b.reason]
+    if not found or not scene.study.influences:
+        return ()
+    lowest = min(found, key=lambda b: b.amplitude)
+    changed = changed_cases(scene, contact.problem, mesh.dimension - 1, lowest.mass, contact.rough)
+    # a history of the seating has its friction already
+    frictionless = scene.contact.history == FRICTIONLESS
+    flank_angles = kind_named(scene.kind).flank_angles
+    angles = flank_angles(scene) if flank_angles is not None and frictionless else None
+    parameters = parameters_of(scene, angles)
+
+    def compute() -> list[Influence]:
+        return on_root(keep.comm, lambda: influences(scene, lowest, family, changed, parameters))
+
+    key = stage_key("response", scene, "influences", lowest)
+    try:
+        return tuple(keep("influences", key, compute))
+    except NotSolvedError as error:
+        keep.clock.messages.append(f"what the best load hangs on is not known: {error}")
+        return ()
