@@ -153,7 +153,11 @@ def _further(
     """Motions by Newton from open contacts and from full stick, at some frequencies of the band."""
     simply = replace(options, fallbacks=False, frugal=False)
     for omega in np.linspace(*band, PROBES + 2)[1:-1]:
-        open_contacts = to_real(condense(model, float(omega), H).free.T)
+        try:
+            open_contacts = to_real(condense(model, float(omega), H).free.T)
+        except NotSolvedError:
+            # a resonance without damping, exactly
+            continue
         shape = (*model.springs.shape, 2 * H + 1)
         for start in (replace(like, w=open_contacts.reshape(shape)), None):
             point = solve(model, float(omega), H, samples, start=start, options=simply)

@@ -1,11 +1,14 @@
 """Every motion of a band, against a plain march in time that shares nothing with the library."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
-from models import FOLDING, folding_pair
+from models import FOLDING, folding_pair, rebounding
 
 from bladefem.hbm import sweep as sweep_module
 from bladefem.hbm.branches import find_branches
+from bladefem.hbm.model import Damping
 from bladefem.hbm.solve import solve
 from bladefem.hbm.sweep import response, size, sweep
 
@@ -93,3 +96,13 @@ def test_a_sweep_that_does_not_end_says_so(folding, monkeypatch):
     points = list(sweep(folding, BAND, 3, 128, notes=notes))
     assert "ended after 16 points" in notes[0]
     assert any(p.branch for p in points)
+
+
+def test_a_probe_on_a_resonance_without_damping_is_left_out():
+    """The middle of the band is the only frequency at which nothing but damping holds the mass."""
+    model = replace(rebounding(10.0, 0.2, 0.0), damping=Damping())
+    own = float(model.side(1).omega[0])
+    band = (0.9 * own, 1.1 * own)
+    known = list(response(model, band, 5, 128))
+    found = find_branches(model, band, known, 5, 128)
+    assert found.pieces and not any(p.omega == own for p in found.points)

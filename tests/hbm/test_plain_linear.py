@@ -58,6 +58,18 @@ def test_condensation(name):
         )
 
 
+def test_a_mode_that_only_coupled_damping_holds_is_solved_at_its_own_frequency():
+    model = replace(coupled_modes(), damping=Damping())
+    omega = float(model.side(1).omega[1])
+    found = condense(model, omega, 3)
+    near = condense(model, omega * (1 + 1e-9), 3)
+    for field in ("G", "A", "free", "stuck"):
+        expected = getattr(near, field)
+        np.testing.assert_allclose(
+            getattr(found, field), expected, rtol=0, atol=1e-6 * abs(expected).max()
+        )
+
+
 @pytest.mark.parametrize("name", MODELS)
 def test_residual_and_error(name):
     model, omega = MODELS[name]

@@ -30,7 +30,7 @@ def linear_part(omega, bodies, springs, H):
     residual = bodies.residual
     m = springs.size
     Z = _modal_impedances(omega, H, bodies.own, bodies.viscous, bodies.hysteretic)
-    D = _modal_flexibilities(Z, bodies.own)
+    D = _modal_flexibilities(Z, bodies.own, bodies.coupled.shape[0] > 0)
     full = _coupled_flexibilities(omega, Z, D, bodies.coupled)
     free = np.empty((H + 1, m), np.complex128)
     stuck = np.empty((H + 1, m), np.complex128)
@@ -149,12 +149,16 @@ def _modal_impedances(omega, H, own, viscous, hysteretic):
 
 
 @njit(**INNER_KERNEL)
-def _modal_flexibilities(Z, own):
-    """(H+1, M) flexibilities of the modes; 0 for rigid ones in the mean."""
+def _modal_flexibilities(Z, own, coupled):
+    """(H+1, M) flexibilities of the modes; 0 for rigid ones in the mean, and where a mode whose
+    damping couples it to others is excited at exactly its own frequency.
+    """
     D = np.zeros(Z.shape, np.complex128)
     for h in range(Z.shape[0]):
         for k in range(Z.shape[1]):
-            if h > 0 or own[0, k] > 0.0:
+            rigid = h == 0 and own[0, k] == 0.0
+            # damping may stand off the diagonal alone: `_coupled_flexibilities` has it all
+            if not rigid and not (coupled and Z[h, k] == 0.0):
                 D[h, k] = 1.0 / Z[h, k]
     return D
 
