@@ -56,6 +56,15 @@ CAPTIONS = {
     "estimates.",
     "modes/utilisation": "Alternating stress over the amplitude that lasts at the mean stress "
     "there, at the resonance under the best load.",
+    "wheel/whole_wheel": "The whole wheel with its pattern: the highest blade next to the tuned "
+    "wheel, and the alternating stress of its whole damped motion.",
+    "wheel/blades": "Each blade: deviation of its first family, largest amplitude over the band, "
+    "and friction work of its damper at the wheel's highest point.",
+    "wheel/wheel_motion": "The wheel at its highest point, seen along its axis.",
+    "wheel/fatigue_of_the_worst_blade": "The places of the highest blade that use most of what the "
+    "material lasts, as for the tuned wheel.",
+    "wheel/utilisation_of_the_worst_blade": "Alternating stress of the highest blade over the "
+    "amplitude that lasts at the mean stress there.",
     "contact/pressure_on_both_seats": "Contact pressure on both seats under the load in the "
     "title, seen along their normals.",
     "contact/pressure": "Seats under each static load: normal force, pressed share and pressure.",

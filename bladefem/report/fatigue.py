@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from functools import partial
 from pathlib import Path
 
 import numpy as np
@@ -11,7 +12,13 @@ import pandas as pd
 from ..errors import InputError
 from ..study.fatigue import Utilisation, haigh_diagram
 from ..study.pipeline.run_records import SolvedRun
-from ..study.pipeline.utilisation import blade_nodes, highest_use, lowest_curve, run_utilisation
+from ..study.pipeline.utilisation import (
+    blade_nodes,
+    highest_use,
+    lowest_curve,
+    run_utilisation,
+    wheel_utilisation,
+)
 from ..view.fatigue import draw_utilisation
 from ..view.mesh import save_vtu
 
@@ -25,31 +32,73 @@ def known_utilisation(run: SolvedRun) -> dict[int, Utilisation]:
 
 
 def utilisation_table(run: SolvedRun) -> dict[str, pd.DataFrame]:
-    """The worst places of the blade at each resonance whose whole motion is known; no table
-    without a diagram.
+    """The worst places of the blade at each resonance whose whole motion is known, and those of the
+    worst blade of a mistuned wheel; no table without a diagram.
     """
-    diagram = haigh_diagram(run.scene.fatigue)
     found = known_utilisation(run)
-    if diagram is None or not found:
+    if not found:
         return {}
     rows = []
     for number, used in found.items():
-        bound = highest_use(run, number, used) / max(used.used[used.worst], 1e-300)
-        allowed = diagram.allowed(used.mean)
-        for rank, node in enumerate(used.worst_places(), 1):
-            rows.append(
-                {
-                    "load": run.response.curves[number].load,
-                    "place": rank,
-                    **dict(zip("xyz", used.points[node], strict=True)),
-                    "mean_stress": used.mean[node],
-                    "alternating_stress": used.alternating[node],
-                    "allowed_stress": allowed[node],
-                    "utilisation": used.used[node],
-                    "utilisation_bound": bound * used.used[node],
-                }
-            )
-    return {"modes/fatigue": pd.DataFrame(rows)}
+        load = run.response.curves[number].load
+        rows += _worst_rows(run, {"load": load}, used, highest_use(run, number, used))
+    tables = {"modes/fatigue": pd.DataFrame(rows)}
+    number = lowest_curve(run)
+    rows = []
+    for response, used in zip(run.wheel or [], wheel_utilisation(run), strict=True):
+        first = {"load": response.load, "blade": response.peak.blade + 1}
+        rows += _worst_rows(run, first, used, highest_use(run, number, used, response.stress))
+    return {**tables, "wheel/fatigue_of_the_worst_blade": pd.DataFrame(rows)} if rows else tables
+
+
+def _worst_rows(
+    run: SolvedRun,
+    first: dict[str, float],
+    used: Utilisation,
+    highest: float,
+) -> list[dict[str, float]]:
+    """One row a place.
+
+    Args:
+        first: columns that all rows share.
+        highest: utilisation of the worst place with the upper ends of its errors.
+    """
+    diagram = haigh_diagram(run.scene.fatigue)
+    # the utilisation is known only with a diagram
+    assert diagram is not None
+    bound = highest / max(used.used[used.worst], 1e-300)
+    allowed = diagram.allowed(used.mean)
+    return [
+        {
+            **first,
+            "place": rank,
+            **dict(zip("xyz", used.points[node], strict=True)),
+            "mean_stress": used.mean[node],
+            "alternating_stress": used.alternating[node],
+            "allowed_stress": allowed[node],
+            "utilisation": used.used[node],
+            "utilisation_bound": bound * used.used[node],
+        }
+        for rank, node in enumerate(used.worst_places(), 1)
+    ]
+
+
+def worst_utilisation(run: SolvedRun) -> list[tuple[float, float, float]]:
+    """Of each response of the whole wheel: the utilisation of its highest blade, the same with the
+    upper ends of its errors, and that of the tuned wheel; empty where it is not known.
+    """
+    tuned = known_utilisation(run)
+    if not tuned:
+        return []
+    number = lowest_curve(run)
+    return [
+        (
+            float(used.used[used.worst]),
+            highest_use(run, number, used, response.stress),
+            float(tuned[number].used[tuned[number].worst]),
+        )
+        for response, used in zip(run.wheel or [], wheel_utilisation(run), strict=True)
+    ]
 
 
 def utilisation_drawing(run: SolvedRun) -> dict[str, Callable[[Path], object]]:
@@ -60,7 +109,17 @@ def utilisation_drawing(run: SolvedRun) -> dict[str, Callable[[Path], object]]:
     number = lowest_curve(run)
     load = run.response.curves[number].load
     field = _on_mesh(run, found[number].used)
-    return {"modes/utilisation": lambda file: draw_utilisation(run.mesh, field, load, file)}
+    title = f"utilisation at the resonance under {load:.4g} N"
+    drawings: dict[str, Callable[[Path], object]] = {
+        "modes/utilisation": lambda file: draw_utilisation(run.mesh, field, title, file)
+    }
+    for response, used in zip(run.wheel or [], wheel_utilisation(run), strict=True):
+        words = f"utilisation of blade {response.peak.blade + 1} under {response.load:.4g} N"
+        worst = _on_mesh(run, used.used)
+        drawings["wheel/utilisation_of_the_worst_blade"] = partial(
+            draw_utilisation, run.mesh, worst, words
+        )
+    return drawings
 
 
 def save_fatigue_vtu(run: SolvedRun, file: Path) -> None:
@@ -73,6 +132,10 @@ def save_fatigue_vtu(run: SolvedRun, file: Path) -> None:
         load = f"{run.response.curves[number].load:g} N"
         fields[f"alternating stress, {load} [Pa]"] = _on_mesh(run, used.alternating)
         fields[f"utilisation, {load} [1]"] = _on_mesh(run, used.used)
+    for response, used in zip(run.wheel or [], wheel_utilisation(run), strict=True):
+        name = f"blade {response.peak.blade + 1}, {response.load:g} N"
+        fields[f"alternating stress, {name} [Pa]"] = _on_mesh(run, used.alternating)
+        fields[f"utilisation, {name} [1]"] = _on_mesh(run, used.used)
     save_vtu(run.mesh, file, fields)
 
 

@@ -44,7 +44,13 @@ from ..view.live_curves import live_diameters, live_loops, live_optimum, live_re
 from ..view.live_shapes import live_shapes
 from .best_load import best_load_table
 from .datasets import datasets, table_dataset
-from .fatigue import save_fatigue_vtu, utilisation_drawing, utilisation_table
+from .fatigue import (
+    save_fatigue_vtu,
+    utilisation_drawing,
+    utilisation_table,
+    worst_utilisation,
+)
+from .headlines import Headline
 from .influences import influence_sentence, influence_table
 from .linear import harmonic_table, linear_sentence
 from .nodes import (
@@ -63,7 +69,7 @@ from .pressure import PICTURE, draw_seats, pressure_table, write_points
 from .resonance_table import resonance_table
 from .response_arrays import curve_arrays, loop_arrays, node_arrays, resonance_arrays
 from .tables import units_of, write_tables
-from .wheel import blade_table, pattern_drawings, pattern_sentences, pattern_table
+from .wheel import blade_table, pattern_drawings, pattern_headlines, pattern_table
 from .write import Page, write_report
 
 MESH = (
@@ -153,7 +159,7 @@ def _write(result: SolvedRun, progress: Progress) -> None:
         figures,
         [*filter(None, [moved]), *_report_messages(result, cycles)],
         result.timings,
-        page=Page(_live(result, tables, cycles)),
+        page=Page(_live(result, tables, cycles), more=_wheel_headlines(result)),
     )
 
 
@@ -172,8 +178,6 @@ def _report_messages(result: SolvedRun, cycles: list[ContactCycle]) -> list[str]
         messages.append(influence_sentence(result.response.influences))
     if coefficient is not None:
         messages.append(wear_sentence(cycles, coefficient))
-    if result.wheel is not None:
-        messages.extend(pattern_sentences(result.wheel))
     return messages
 
 
@@ -208,6 +212,13 @@ def _wheel_tables(result: SolvedRun) -> dict[str, pd.DataFrame]:
         "wheel/whole_wheel": pattern_table(result.wheel),
         "wheel/blades": blade_table(result.wheel),
     }
+
+
+def _wheel_headlines(result: SolvedRun) -> list[Headline]:
+    """First numbers of the whole wheel, where blades differ."""
+    if result.wheel is None:
+        return []
+    return pattern_headlines(result.wheel, worst_utilisation(result))
 
 
 def _static_contact(result: SolvedRun) -> str:

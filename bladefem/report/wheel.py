@@ -14,6 +14,7 @@ import pandas as pd
 from ..study.mistuning.pattern_response import PatternResponse
 from ..view import wheel as view
 from ..wheel.statistics import Amplification, best_load, quantile
+from .headlines import Headline
 
 # quantiles of a scatter
 SHARES = (0.5, 0.95, 0.99)
@@ -32,6 +33,7 @@ def pattern_table(found: Sequence[PatternResponse]) -> pd.DataFrame:
                 "peak_frequency": r.peak.omega / (2 * np.pi),
                 "amplification": r.factor,
                 "amplification_free": r.free_factor,
+                "alternating_stress": r.stress.largest,
                 "estimated_error": r.truncation,
                 "unconverged": r.peak.unsolved,
             }
@@ -59,26 +61,32 @@ def blade_table(found: Sequence[PatternResponse]) -> pd.DataFrame:
     return pd.concat(parts, ignore_index=True)
 
 
-def pattern_sentences(found: Sequence[PatternResponse]) -> list[str]:
-    """What a reader has to know."""
-    sentences = []
-    for r in found:
-        error = "unknown" if np.isnan(r.truncation) else f"{100 * r.truncation:.2g} %"
-        text = (
-            f"whole wheel under {r.load:g} N: blade {r.peak.blade + 1} moves "
-            f"{1e6 * r.peak.height:.4g} um, {r.factor:.3g} times the tuned wheel (without dampers "
-            f"{r.free_factor:.3g} times); estimated error by harmonics and samples {error}; "
-            f"{r.peak.unsolved} of {len(r.peak.omegas)} frequencies not solved"
+def pattern_headlines(
+    found: Sequence[PatternResponse],
+    used: Sequence[tuple[float, float, float]] = (),
+) -> list[Headline]:
+    """First numbers of the mistuned wheel.
+
+    Args:
+        used: of each response the utilisation of its highest blade, the same with the upper ends of
+            its errors, and that of the tuned wheel; empty where it is not known.
+    """
+    numbers = []
+    for i, r in enumerate(found):
+        error = (
+            "error unknown: more harmonics were not solved"
+            if np.isnan(r.truncation)
+            else f"± {max(100 * r.truncation, 0.01):.2g} % (harmonics and samples)"
         )
-        if not r.peak.closed_in:
-            text += "; the highest point is an end of the band, the resonance may be higher"
-        sentences.append(text)
-    far = max(abs(r.sector_difference) for r in found)
-    sentences.append(
-        "the whole wheel holds mean displacements in the preload state, which moves the tuned "
-        f"resonance by {100 * far:.2g} % at most"
-    )
-    return sentences
+        remark = f"blade {r.peak.blade + 1} under {r.load:.4g} N, {r.factor:.3g} times the tuned"
+        value = f"{1e6 * r.peak.height:.4g} µm"
+        numbers.append(Headline("highest blade of the mistuned wheel", value, error, remark))
+        if i < len(used):
+            own, highest, tuned = used[i]
+            beside = f"under {r.load:.4g} N; {tuned:.3g} on the tuned wheel"
+            upper = f"up to {highest:.3g} with the errors of mesh and loading history"
+            numbers.append(Headline("utilisation of that blade", f"{own:.3g}", upper, beside))
+    return numbers
 
 
 def pattern_drawings(

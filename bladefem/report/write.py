@@ -74,6 +74,8 @@ class Page:
     stem: str = "report"
     # what the page is about; the scene's kind when left out
     subject: str = ""
+    # numbers after the first ones
+    more: Sequence[Headline] = ()
 
 
 def write_report(
@@ -211,7 +213,8 @@ def _answer(
     found = answer(summary, points, own, tables.get("contact/damper_mass"), searched)
     cautions = [*assumed_stiffness(scene), *wrong_speed(scene, summary), *found.cautions]
     steps = next_steps(scene, cautions, summary, own)
-    return {"numbers": headlines(found, summary, points, searched), "steps": [*steps, *page.steps]}
+    numbers = [*headlines(found, summary, points, searched), *page.more]
+    return {"numbers": numbers, "steps": [*steps, *page.steps]}
 
 
 def _sections(

@@ -21,14 +21,14 @@ SIZE = (1100, 1200)
 def draw_utilisation(
     mesh: Mesh,
     used: np.ndarray,
-    load: float,
+    title: str,
     file: str | Path | None = None,
 ) -> object:
     """The blade coloured by its utilisation; returns the figure.
 
     Args:
         used: (n_points,) alternating stress over the allowed one [1].
-        load: of the damper's seats [N], for the title.
+        title: above the picture.
     """
     blade = replace(mesh, bodies={n: cells for n, cells in mesh.bodies.items() if n != "damper"})
     surface = skin(blade)
@@ -50,7 +50,7 @@ def draw_utilisation(
     image = photograph(parts, direction, RADIAL, SIZE)
     with canvas(file, size=size_for(image, 5.2, beside=1.6)) as ax:
         show_photograph(ax, image, direction, RADIAL)
-        headline(ax.figure, f"utilisation at the resonance under {load:.4g} N")
+        headline(ax.figure, title)
         label = "alternating stress over the allowed one [1]"
         add_colour_bar(ax, Normalize(0, highest), SEQUENTIAL, label)
         return ax.figure

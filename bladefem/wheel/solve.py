@@ -230,6 +230,26 @@ def linear_motion(
     return flex.motion(force, getattr(parts, port), parts.load)
 
 
+def deviation_forces(
+    wheel: Wheel,
+    pattern: Pattern,
+    point: WheelSolution,
+) -> np.ndarray:
+    """(N, q, H+1) forces of the blades' deviations on the port "blade" at a solved point; see
+    `Pattern`.
+    """
+    flex = wheel_flexibility(wheel, point.omega, point.probe.shape[1] - 1, pattern)
+    count = wheel.count
+    beyond = point.f - wheel.springs[:, :, None] * point.w
+    beyond[..., 0] -= wheel.preload(pattern_elements(wheel, pattern))
+    forces = to_complex(beyond.reshape(count, -1, beyond.shape[3]))
+    readings = linear_motion(wheel, flex, "blade")
+    readings = readings - flex.motion(forces, flex.parts.blade, flex.parts.contact)
+    if not len(flex.factors):
+        return np.zeros_like(readings)
+    return -np.einsum("hnij,njh->nih", flex.E, readings)
+
+
 def _homotopy(balance: WheelBalance, options: Options) -> WheelNewton:
     """The excitation raised step by step from nearly stuck to its own, on a secant."""
     iterations = 0

@@ -2,6 +2,7 @@
 before long work.
 """
 
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -9,14 +10,32 @@ import pytest
 
 from bladefem.errors import InputError
 from bladefem.hbm.solve import solve
-from bladefem.scene.toml import load_scene
+from bladefem.hbm.solver.newton import DEFAULTS
+from bladefem.report.fatigue import utilisation_drawing, utilisation_table, worst_utilisation
+from bladefem.report.wheel import pattern_headlines
+from bladefem.scene.tables import Fatigue
+from bladefem.scene.toml import load_scene, vary
 from bladefem.study.adaptive.family import family_member
 from bladefem.study.adaptive.settings import first_settings
-from bladefem.study.mistuning.stage import check_mistuning
-from bladefem.study.mistuning.whole_wheel import reduce_wheel, whole_wheel
+from bladefem.study.fatigue import haigh_diagram, utilisation
+from bladefem.study.mistuning.blade_stress import (
+    WheelShapes,
+    all_modes,
+    blade_motion,
+    blade_stress,
+)
+from bladefem.study.mistuning.stage import check_mistuning, with_whole_wheel
+from bladefem.study.mistuning.whole_wheel import blade_readings, reduce_wheel, whole_wheel
 from bladefem.study.pipeline import pipeline
 from bladefem.study.pipeline.case_models import family_of_case, load_cases
+from bladefem.study.pipeline.damped_motion import damped_stress
 from bladefem.study.pipeline.stages import Bodies
+from bladefem.study.pipeline.utilisation import (
+    blade_nodes,
+    lowest_curve,
+    run_utilisation,
+    wheel_utilisation,
+)
 from bladefem.wheel.model import frequency_pattern
 from bladefem.wheel.solve import free_wheel, solve_wheel
 
@@ -69,6 +88,89 @@ def test_stiffer_blades_raise_the_resonance_by_the_aerofoils_share(reduced):
     np.testing.assert_allclose(np.ptp(size, axis=1), 0, atol=1e-9 * np.max(size))
     rise = grid[int(np.argmax(np.max(size, axis=1)))] / own - 1
     assert 0.002 < rise < 0.0101
+
+
+@pytest.fixture(scope="module")
+def shapes(reduced):
+    scene, run, patches, sector, _, _ = reduced
+    bodies = Bodies(scene, run.mesh)
+    _, readings = blade_readings(bodies, run.clamped, len(sector.families))
+    return WheelShapes(bodies, patches, all_modes(bodies), readings)
+
+
+def test_worst_blade_of_a_tuned_wheel_is_used_as_the_tuned_one(reduced, shapes):
+    """No deviation: the utilisation at every node of every blade is that of the sector."""
+    scene, run, patches, sector, case, settings = reduced
+    wheel = whole_wheel(scene, run.mesh, sector, patches, case, settings)
+    family = family_of_case(scene, run.mesh, run.reduced, patches, case)
+    model = family_member(family, settings).model
+    omega = 0.99 * model.side(1).omega[0]
+    tight = replace(DEFAULTS, tolerance=1e-13)
+    one = solve(model, omega, 1, 72, options=tight)
+    pattern = frequency_pattern(sector.families, np.zeros((36, 3)))
+    found = solve_wheel(wheel, omega, 1, 72, pattern=pattern, options=tight)
+    assert one.converged and one.work.friction > 0
+    points = settings.points
+    stress = damped_stress(shapes.bodies, patches, shapes.modes, case, one, points)
+    diagram = haigh_diagram(Fatigue(endurance=3e8, ultimate=9e8))
+    blade = blade_nodes(run.mesh)
+    place = run.mesh.points[blade]
+    mean = run.strength.mean[blade]
+    tuned = utilisation(diagram, place, stress.field[blade], mean)
+    for number in (0, 17):
+        own = blade_stress(shapes, wheel, pattern, case, found, number, points)
+        used = utilisation(diagram, place, own.field[blade], mean)
+        np.testing.assert_allclose(used.used, tuned.used, rtol=0, atol=1e-9 * tuned.used.max())
+        assert used.worst == tuned.worst
+
+
+def test_blade_of_a_mistuned_wheel_moves_as_in_the_balance(reduced, shapes):
+    """Waves of all nodal diameters add up to the amplitude that the reduced wheel has."""
+    scene, run, patches, sector, case, settings = reduced
+    wheel = whole_wheel(scene, run.mesh, sector, patches, case, settings)
+    omega = 0.99 * wheel.sectors[9].omega[0]
+    deviation = 0.01 * np.random.default_rng(3).normal(size=(36, 3))
+    pattern = frequency_pattern(sector.families, deviation)
+    point = solve_wheel(wheel, omega, 3, 72, pattern=pattern)
+    assert point.converged and np.ptp(point.size()) > 0.05 * point.size().max()
+    for number in (0, int(np.argmax(point.size()))):
+        motion = blade_motion(shapes, wheel, pattern, case, point, number, settings.points)
+        assert motion.mismatch < 2e-3
+        assert abs(motion.probe[0]) == pytest.approx(abs(point.probe[number, 1, 0]), rel=2e-3)
+    # the deviations' own forces are not negligible: without them the motion is another one
+    tuned = replace(pattern, stiffness=np.zeros_like(pattern.stiffness))
+    other = blade_motion(shapes, wheel, tuned, case, point, number, settings.points)
+    assert other.mismatch > 0.02
+
+
+def test_a_second_run_finds_the_wheel(tmp_path):
+    """The sector in all nodal diameters and the wheel's response are kept like other stages."""
+    scene = load_scene(SCENE, COARSE)
+    first = with_whole_wheel(pipeline.run(scene, tmp_path))
+    again = with_whole_wheel(pipeline.run(scene, tmp_path))
+    for name in ("wheel_sector", "whole_wheel"):
+        assert not any(text.startswith(f"{name}: found") for text in first.messages)
+        assert any(text.startswith(f"{name}: found") for text in again.messages)
+    np.testing.assert_array_equal(first.wheel[0].peak.by_blade, again.wheel[0].peak.by_blade)
+    (used,) = wheel_utilisation(again)
+    number = lowest_curve(again)
+    tuned = run_utilisation(again)[number]
+    assert used.used.max() > tuned.used.max()
+    assert used.used.max() / tuned.used.max() == pytest.approx(again.wheel[0].factor, rel=0.1)
+    said = [text for text in again.messages if text.startswith("utilisation of the mistuned wheel")]
+    assert f"blade {again.wheel[0].peak.blade + 1}: {used.used.max():.3g}" in said[0]
+    tables = utilisation_table(again)
+    assert tables["wheel/fatigue_of_the_worst_blade"]["utilisation"][0] == used.used.max()
+    assert "wheel/utilisation_of_the_worst_blade" in utilisation_drawing(again)
+    value, highest, beside = worst_utilisation(again)[0]
+    assert value == used.used.max() <= highest and beside == tuned.used.max()
+    numbers = pattern_headlines(again.wheel, worst_utilisation(again))
+    assert [number.value for number in numbers][1] == f"{value:.3g}"
+    # another pattern is another response of the same sector
+    other = vary(scene, mistuning__pattern=None, mistuning__seed=1)
+    drawn = with_whole_wheel(pipeline.run(other, tmp_path))
+    assert any(text.startswith("wheel_sector: found") for text in drawn.messages)
+    assert not any(text.startswith("whole_wheel: found") for text in drawn.messages)
 
 
 @pytest.mark.parametrize(

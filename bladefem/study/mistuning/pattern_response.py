@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from math import pi
 
@@ -10,15 +11,14 @@ import numpy as np
 from ...errors import InputError
 from ...hbm.linear_resonances import free_resonances
 from ...scene.tables import Scene
-from ...util.progress import Progress, unwatched
 from ...wheel.model import Pattern, Wheel, frequency_pattern
 from ...wheel.resonance import WheelPeak, find_wheel_peak
 from ...wheel.scatter import Scatter, drawn_deviations, read_pattern
 from ...wheel.solve import WheelSolution, free_wheel, solve_wheel, stuck_wheel
 from ...wheel.statistics import wheel_respond
 from ...wheel.tuned import tuned_sector
+from ..pipeline.damped_motion import DampedStress
 from ..pipeline.loads import Curve
-from .whole_wheel import WheelSector
 
 # points of the first look at a band
 GRID = 15
@@ -53,6 +53,8 @@ class PatternResponse:
     # relative difference of the tuned peak from that of the sector's own curve, whose means are
     # free
     sector_difference: float
+    # of the blade that moves most, at its resonance
+    stress: DampedStress
 
     @property
     def factor(self) -> float:
@@ -132,34 +134,22 @@ def _stuck_peaks(
     return fine[inner[np.argsort(-height[inner])[:SHARPEST]]]
 
 
-def pattern_responses(
-    scene: Scene,
-    sector: WheelSector,
-    wheels: list[Wheel],
-    curves: list[Curve],
-    progress: Progress = unwatched,
-) -> list[PatternResponse]:
-    """The wheel with the scene's pattern, under the load of each curve.
-
-    Args:
-        wheels: of each curve, the tuned wheel.
-    """
-    count = wheels[0].count
-    deviation = scene_deviations(scene, count, len(sector.families))
-    pattern = frequency_pattern(sector.families, deviation)
-    pairs = list(zip(wheels, curves, strict=True))
-    return [
-        _one_load(wheel, pattern, deviation, curve)
-        for wheel, curve in progress(pairs, "whole wheel", len(pairs))
-    ]
-
-
-def _one_load(
+def pattern_response(
     wheel: Wheel,
-    pattern: Pattern,
+    families: np.ndarray,
     deviation: np.ndarray,
     curve: Curve,
+    stress: Callable[[Pattern, WheelSolution, int], DampedStress],
 ) -> PatternResponse:
+    """The wheel with one pattern, under the load of a curve.
+
+    Args:
+        wheel: the tuned wheel under that load.
+        families: (q,) circular frequencies of the blade-alone modes [rad/s].
+        deviation: (N, q) relative deviations of these.
+        stress: of a blade, by the pattern, the solution and the blade's number.
+    """
+    pattern = frequency_pattern(families, deviation)
     settings = curve.settings
     H = max(settings.harmonics, *wheel.excitation)
     samples = max(settings.samples, 8 * (H + 1))
@@ -187,7 +177,33 @@ def _one_load(
         _free_factor(wheel, pattern, grid),
         float(change) if richer.converged and solution.converged else float("nan"),
         tuned.height / curve.peak_amplitude - 1,
+        stress(pattern, solution, peak.blade),
     )
+
+
+def pattern_sentences(found: Sequence[PatternResponse]) -> list[str]:
+    """What a reader has to know."""
+    sentences = []
+    for r in found:
+        error = "unknown" if np.isnan(r.truncation) else f"{100 * r.truncation:.2g} %"
+        place = ", ".join(f"{1e3 * x:.1f}" for x in r.stress.place)
+        text = (
+            f"whole wheel under {r.load:g} N: blade {r.peak.blade + 1} moves "
+            f"{1e6 * r.peak.height:.4g} um, {r.factor:.3g} times the tuned wheel (without dampers "
+            f"{r.free_factor:.3g} times); estimated error by harmonics and samples {error}; "
+            f"{r.peak.unsolved} of {len(r.peak.omegas)} frequencies not solved; its alternating "
+            f"stress is {1e-6 * r.stress.largest:.4g} MPa at ({place}) mm, by its mesh "
+            f"{r.stress.mesh_error:.1%} uncertain there"
+        )
+        if not r.peak.closed_in:
+            text += "; the highest point is an end of the band, the resonance may be higher"
+        sentences.append(text)
+    far = max(abs(r.sector_difference) for r in found)
+    sentences.append(
+        "the whole wheel holds mean displacements in the preload state, which moves the tuned "
+        f"resonance by {100 * far:.2g} % at most"
+    )
+    return sentences
 
 
 def _free_factor(

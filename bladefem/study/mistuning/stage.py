@@ -8,7 +8,10 @@ import time
 from collections.abc import Callable
 from dataclasses import replace
 
+import numpy as np
+
 from ...errors import InputError
+from ...io.stage_cache import found_remark, on_root, stage
 from ...scene.fields import value_at
 from ...scene.kinds import kind_named
 from ...scene.tables import Scene
@@ -17,19 +20,27 @@ from ...util.progress import Progress, unwatched
 from ...wheel.model import Pattern, Wheel, frequency_pattern
 from ...wheel.resonance import Respond
 from ...wheel.scatter import MAX_DEVIATIONS, drawn_patterns
+from ...wheel.solve import WheelSolution
 from ...wheel.statistics import Amplification, scatter_statistics, wheel_respond
 from ..pipeline.case_models import load_cases
+from ..pipeline.assemble_model import LoadCase
+from ..pipeline.damped_motion import DampedStress
 from ..pipeline.loads import Curve
 from ..pipeline.run_records import SolvedRun
+from ..pipeline.stage_inputs import stage_key
 from ..pipeline.stages import Bodies
+from ..pipeline.utilisation import wheel_utilisation_message
+from .blade_stress import WheelShapes, all_modes, blade_stress
 from .pattern_response import (
     SEARCH,
+    PatternResponse,
     frequency_grid,
-    pattern_responses,
+    pattern_response,
+    pattern_sentences,
     scene_deviations,
     scene_scatter,
 )
-from .whole_wheel import WheelSector, read_orders, reduce_wheel, whole_wheel
+from .whole_wheel import WheelSector, blade_readings, read_orders, reduce_wheel, whole_wheel
 
 
 def is_mistuned(scene: Scene) -> bool:
@@ -63,10 +74,53 @@ def with_whole_wheel(
     """The run with the whole wheel under the load whose tuned resonance is lowest."""
     start = time.perf_counter()
     best = min(run.response.curves, key=lambda curve: curve.peak_amplitude)
-    sector, wheels = _wheels(run, [best], comm, progress)
-    found = pattern_responses(run.scene, sector, wheels, [best], progress)
-    seconds = time.perf_counter() - start
-    return replace(run, wheel=found, timings={**run.timings, "whole wheel": seconds})
+    bodies = Bodies(run.scene, run.mesh, comm, progress)
+    sector, remarks = _kept_sector(run, [best], bodies, comm)
+    deviation = scene_deviations(run.scene, sector.reduced.sectors, len(sector.families))
+    key = stage_key("whole wheel", run.scene, best.load, best.mass, best.peak.omega, deviation)
+    found, seconds = stage(
+        run.folder,
+        "whole_wheel",
+        key,
+        lambda: on_root(comm, lambda: _best_response(run, sector, deviation, best, bodies)),
+        comm,
+    )
+    if seconds is not None:
+        remarks.append(found_remark("whole_wheel", seconds))
+    result = replace(
+        run,
+        wheel=[found],
+        timings={**run.timings, "whole wheel": time.perf_counter() - start},
+    )
+    said = filter(None, [*pattern_sentences([found]), wheel_utilisation_message(result)])
+    return replace(result, messages=[*run.messages, *remarks, *said])
+
+
+def _best_response(
+    run: SolvedRun,
+    sector: WheelSector,
+    deviation: np.ndarray,
+    curve: Curve,
+    bodies: Bodies,
+) -> PatternResponse:
+    """The response of all blades under the load of a curve, with the stress of the highest one; on
+    one rank.
+    """
+    from ...fem.compat import MPI
+
+    case = _cases(run)[curve.load, curve.mass]
+    (wheel,) = _wheels(run, sector, [curve])
+
+    def stress(pattern: Pattern, solution: WheelSolution, blade: int) -> DampedStress:
+        alone = Bodies(run.scene, run.mesh, MPI.COMM_SELF)
+        alone.kept.update(bodies.kept)
+        _, readings = blade_readings(alone, run.clamped, len(sector.families))
+        patches = list(run.contact.problem.patches)
+        shapes = WheelShapes(alone, patches, all_modes(alone), readings)
+        points = curve.settings.points
+        return blade_stress(shapes, wheel, pattern, case, solution, blade, points)
+
+    return pattern_response(wheel, sector.families, deviation, curve, stress)
 
 
 def scatter_of_run(
@@ -88,7 +142,8 @@ def scatter_of_run(
     curves = run.response.curves
     if len({curve.mass for curve in curves}) > 1:
         raise InputError("study.masses: expected one damper mass for 'bladefem scatter'")
-    sector, made = _wheels(run, curves, comm, progress)
+    sector, _ = _kept_sector(run, curves, Bodies(scene, run.mesh, comm, progress), comm)
+    made = _wheels(run, sector, curves)
     wheels = {curve.load: wheel for curve, wheel in zip(curves, made, strict=True)}
     by_load = {curve.load: curve for curve in curves}
 
@@ -126,21 +181,52 @@ def _respond_by(
     return respond
 
 
-def _wheels(
+def _kept_sector(
     run: SolvedRun,
     curves: list[Curve],
+    bodies: Bodies,
     comm: Communicator | None,
-    progress: Progress,
-) -> tuple[WheelSector, list[Wheel]]:
-    """The sector in all nodal diameters, and the tuned wheel of each curve."""
+) -> tuple[WheelSector, list[str]]:
+    """The sector in all nodal diameters, computed or found in the folder, and the remark that it
+    was.
+    """
     scene = run.scene
     patches = list(run.contact.problem.patches)
-    bodies = Bodies(scene, run.mesh, comm, progress)
     modes = max(curve.settings.modes for curve in curves)
-    sector = reduce_wheel(bodies, patches, modes, run.clamped, scene.mistuning.families)
-    cases = {(case.load, case.mass): case for case in load_cases(scene, run.mesh, run.contact)}
-    wheels = [
-        whole_wheel(scene, run.mesh, sector, patches, cases[curve.load, curve.mass], curve.settings)
+    families = scene.mistuning.families
+
+    def compute() -> WheelSector:
+        # the stress of a blade needs the shapes of the same modes
+        all_modes(bodies, modes)
+        return reduce_wheel(bodies, patches, modes, run.clamped, families)
+
+    key = stage_key("wheel", scene, modes)
+    sector, seconds = stage(run.folder, "wheel_sector", key, compute, comm)
+    return sector, [] if seconds is None else [found_remark("wheel_sector", seconds)]
+
+
+def _cases(run: SolvedRun) -> dict[tuple[float, float | None], LoadCase]:
+    """The friction elements of each load and mass of a damper."""
+    cases = load_cases(run.scene, run.mesh, run.contact)
+    return {(case.load, case.mass): case for case in cases}
+
+
+def _wheels(
+    run: SolvedRun,
+    sector: WheelSector,
+    curves: list[Curve],
+) -> list[Wheel]:
+    """The tuned wheel of each curve."""
+    patches = list(run.contact.problem.patches)
+    cases = _cases(run)
+    return [
+        whole_wheel(
+            run.scene,
+            run.mesh,
+            sector,
+            patches,
+            cases[curve.load, curve.mass],
+            curve.settings,
+        )
         for curve in curves
     ]
-    return sector, wheels

@@ -9,7 +9,7 @@ from math import pi
 
 import numpy as np
 
-from geometry.mesh import Mesh
+from geometry.mesh import Mesh, sector_of
 
 from ...data import ModeSet, Patch
 from ...errors import InputError
@@ -50,6 +50,20 @@ def reduce_wheel(
     Raises:
         InputError: the scene is no wheel, or names no aerofoil.
     """
+    omega, readings = blade_readings(bodies, clamped, families)
+    diameters = range(sector_of(bodies.mesh).count // 2 + 1)
+    reduced = reduce_sector(bodies, patches, list(diameters), modes, readings)
+    return WheelSector(reduced, omega)
+
+
+def blade_readings(
+    bodies: Bodies,
+    clamped: ModeSet | None,
+    families: int,
+) -> tuple[np.ndarray, np.ndarray]:
+    """Circular frequencies (q,) of the blade-alone modes [rad/s], and the columns (n_points*dim, q)
+    that read their coordinates; the arguments are those of `reduce_wheel`.
+    """
     from ...fem.readings import modal_readings
 
     if bodies.mesh.sector is None or "cyclic" not in bodies.mesh.pairs:
@@ -64,10 +78,7 @@ def reduce_wheel(
             f"mistuning.families = {families}: expected at most {len(clamped.frequencies)}"
         )
     omega = 2 * pi * clamped.frequencies[:families]
-    readings = modal_readings(bodies.still_blade, clamped.shapes[:families], omega)
-    diameters = range(bodies.mesh.sector.count // 2 + 1)
-    reduced = reduce_sector(bodies, patches, list(diameters), modes, readings)
-    return WheelSector(reduced, omega)
+    return omega, modal_readings(bodies.still_blade, clamped.shapes[:families], omega)
 
 
 def whole_wheel(

@@ -185,7 +185,7 @@ def blade_loads(
     ports = blade_ports(bodies.mesh, list(patches), scene.excitation)
     contact = ports.matrix[:, ports.names["contact"]]
     excitation = ports.matrix[:, ports.names["load"]].toarray()[:, 0] * scene.excitation.force
-    forces = _node_forces(case, patches, solution, points)
+    forces = node_forces(case, patches, solution.f, points)
     rows = len(forces[0]) if len(forces) else 0
     dim = bodies.mesh.dimension
     following = np.zeros(contact.shape[1], bool)
@@ -199,15 +199,19 @@ def blade_loads(
     return result
 
 
-def _node_forces(
+def node_forces(
     case: LoadCase,
     patches: Sequence[Patch],
-    solution: Solution,
+    f: np.ndarray,
     points: int | None,
 ) -> np.ndarray:
-    """(H+1, elements, 1 + tangents) complex forces of the case's own elements [N]."""
+    """(H+1, elements, 1 + tangents) complex forces of the case's own elements [N].
+
+    Args:
+        f: (n, d, 2H+1) forces of the balance's elements [N].
+        points: friction elements on each patch that they were found with; None for all.
+    """
     elements = case.elements
-    f = solution.f
     if len(f) != len(elements.kt):
         f = _shared_forces(elements, f, labels(list(patches), points))
     missing = 1 + elements.tangents - f.shape[1]

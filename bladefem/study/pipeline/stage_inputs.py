@@ -102,6 +102,18 @@ STAGE_INPUTS = {
         without=("study.loads", "study.masses", "study.own_load"),
         code=("bladefem.hbm", "bladefem.friction", "bladefem.reduction", "bladefem.study"),
     ),
+    # the sector in all nodal diameters, with the coordinates of its blade-alone modes
+    "wheel": StageInputs(
+        after=("modes", "reduction"), fields=("mistuning.families",), code=("bladefem.study",)
+    ),
+    # all blades under one load; the deviations of a pattern file come with the key
+    "whole wheel": StageInputs(
+        after=("wheel", "response", "stress"),
+        fields=("mistuning",),
+        # of the draws of many wheels
+        without=("mistuning.pattern", "mistuning.wheels"),
+        code=("bladefem.wheel",),
+    ),
     "mass pressure": StageInputs(
         after=("mesh",),
         fields=("material", "foundation.skew", "study.loads"),

@@ -9,6 +9,7 @@ from geometry.mesh import Mesh
 from ...errors import InputError
 from ...util.message import warning
 from ..fatigue import Utilisation, haigh_diagram, utilisation
+from .damped_motion import DampedStress
 from .run_records import SolvedRun
 
 
@@ -30,6 +31,23 @@ def run_utilisation(run: SolvedRun) -> dict[int, Utilisation]:
         number: utilisation(diagram, points, found.field[blade], mean)
         for number, found in run.damped.items()
     }
+
+
+def wheel_utilisation(run: SolvedRun) -> list[Utilisation]:
+    """The utilisation at the nodes of the blade that moves most, of each load of the whole wheel.
+
+    Empty where all blades are alike or the scene gives no diagram.
+
+    Raises:
+        InputError: the diagram does not reach a mean stress of the blade.
+    """
+    diagram = haigh_diagram(run.scene.fatigue)
+    if diagram is None or run.wheel is None:
+        return []
+    blade = blade_nodes(run.mesh)
+    points = run.mesh.points[blade]
+    mean = run.strength.mean[blade]
+    return [utilisation(diagram, points, r.stress.field[blade], mean) for r in run.wheel]
 
 
 def blade_nodes(mesh: Mesh) -> np.ndarray:
@@ -60,6 +78,32 @@ def utilisation_message(run: SolvedRun) -> str:
     )
 
 
+def wheel_utilisation_message(run: SolvedRun) -> str:
+    """The highest utilisation of the mistuned wheel next to the tuned one's; empty where it is not
+    known.
+    """
+    try:
+        found = wheel_utilisation(run)
+        tuned = run_utilisation(run)
+    except InputError:
+        # the tuned wheel's message says why
+        return ""
+    if not found or run.wheel is None:
+        return ""
+    number = lowest_curve(run)
+    response, used = run.wheel[0], found[0]
+    worst = used.worst
+    place = ", ".join(f"{1e3 * x:.1f}" for x in used.points[worst])
+    return (
+        f"utilisation of the mistuned wheel under {response.load:.4g} N, blade "
+        f"{response.peak.blade + 1}: {used.used[worst]:.3g} at ({place}) mm, "
+        f"{1e-6 * used.alternating[worst]:.4g} MPa over a mean stress of "
+        f"{1e-6 * used.mean[worst]:.4g} MPa, against {tuned[number].used.max():.3g} of the tuned "
+        f"wheel; {highest_use(run, number, used, response.stress):.3g} with the upper ends of the "
+        "error of the mesh and of the loading history"
+    )
+
+
 def lowest_curve(run: SolvedRun) -> int:
     """Number of the curve with the lowest resonance."""
     curves = run.response.curves
@@ -70,12 +114,17 @@ def highest_use(
     run: SolvedRun,
     number: int,
     used: Utilisation,
+    stress: DampedStress | None = None,
 ) -> float:
     """The largest utilisation with the estimated error of the mesh and the largest amplitude that
     a loading history can leave.
+
+    Args:
+        number: of the curve under the same load.
+        stress: that of the tuned wheel at the curve's resonance when left out.
     """
     curve = run.response.curves[number]
     share = 1.0
     if curve.interval is not None:
         share = max(curve.interval.highest / curve.peak_amplitude, 1.0)
-    return float(used.used[used.worst] * share * (1 + run.damped[number].mesh_error))
+    return float(used.used[used.worst] * share * (1 + (stress or run.damped[number]).mesh_error))

@@ -1,0 +1,175 @@
+"""Stress of one blade of a mistuned wheel: its whole damped motion, of all modes, nodal diameters,
+harmonics and damper forces.
+
+The forces of all contacts, of the excitation and of the deviations act on the tuned wheel, which
+falls into nodal diameters: each is one solve with the sector's finite elements, and one blade's
+motion is the sum of all waves.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import lru_cache
+
+import numpy as np
+
+from geometry.mesh import sector_of
+
+from ...data import ModeSet, Patch
+from ...hbm.model import Damping
+from ...util.arrays import ComplexArray
+from ...wheel.model import Pattern, Wheel
+from ...wheel.solve import WheelSolution, deviation_forces
+from ..pipeline.assemble_model import LoadCase
+from ..pipeline.damped_motion import (
+    COVERED,
+    DampedMotion,
+    DampedStress,
+    node_forces,
+    touched_nodes,
+)
+from ..pipeline.ports import Ports, blade_ports
+from ..pipeline.stages import MODES_SHOWN, Bodies, wheel_modes
+
+# name of the modes that bodies keep
+SHAPES = "modes of all nodal diameters"
+
+
+@dataclass(frozen=True)
+class WheelShapes:
+    """What the motion of every node of a wheel takes."""
+
+    bodies: Bodies
+    patches: list[Patch]
+    # of all nodal diameters 0..N/2
+    modes: Sequence[ModeSet]
+    # (n_points*dim, q) columns of the blade-alone modes' coordinates
+    readings: np.ndarray
+
+
+def all_modes(bodies: Bodies, reduced: int = 0) -> list[ModeSet]:
+    """The modes of all nodal diameters, found once.
+
+    Args:
+        reduced: modes that a reduction of the wheel will need, solved with them.
+    """
+    if SHAPES not in bodies.kept:
+        bodies.kept[SHAPES] = wheel_modes(bodies, MODES_SHOWN, reduced=reduced)
+    return bodies.kept[SHAPES]
+
+
+def blade_stress(
+    shapes: WheelShapes,
+    wheel: Wheel,
+    pattern: Pattern,
+    case: LoadCase,
+    solution: WheelSolution,
+    blade: int,
+    points: int | None = None,
+) -> DampedStress:
+    """The largest alternating stress of one blade.
+
+    Args:
+        pattern: that the solution was made with.
+        blade: number of the blade, from 0.
+        points: friction elements on each patch that it was made with; None for all.
+
+    Raises:
+        NotSolvedError: the modes do not cover a harmonic.
+    """
+    from ...fem.alternating_stress import alternating_stress
+
+    motion = blade_motion(shapes, wheel, pattern, case, solution, blade, points)
+    bodies = shapes.bodies
+    found = alternating_stress(bodies.still_blade, motion.harmonics, touched_nodes(bodies))
+    return DampedStress(
+        case.load,
+        case.mass,
+        found.largest,
+        found.place,
+        found.by_harmonic,
+        found.mesh_error,
+        motion.mismatch,
+        found.field,
+    )
+
+
+def blade_motion(
+    shapes: WheelShapes,
+    wheel: Wheel,
+    pattern: Pattern,
+    case: LoadCase,
+    solution: WheelSolution,
+    blade: int,
+    points: int | None = None,
+) -> DampedMotion:
+    """The displacements of one blade; the arguments are those of `blade_stress`."""
+    from ...fem.forced_motion import forced_motion
+
+    bodies = shapes.bodies
+    ports = blade_ports(bodies.mesh, shapes.patches, bodies.scene.excitation, shapes.readings)
+    forces = port_forces(shapes, ports, wheel, pattern, case, solution, points)
+    by_diameter = np.fft.fft(forces, axis=0)
+    count, H, _ = forces.shape
+    fields = np.zeros((H, len(bodies.mesh.points), bodies.mesh.dimension), complex)
+    factorised = lru_cache(maxsize=1)(bodies.factorised)
+    damping = Damping(ratio=bodies.scene.operation.damping)
+    for found in shapes.modes:
+        n = found.nodal_diameter or 0
+        highest = COVERED * 2 * np.pi * found.frequencies[-1]
+        # a wave of diameter -n is the conjugate of one of diameter n at the negative frequency
+        waves = [
+            (h, d)
+            for h in range(H)
+            for d in sorted({n, -n % count})
+            if (h + 1) * solution.omega < highest
+        ]
+        if not waves:
+            continue
+        mirrored = np.array([d != n for _, d in waves])
+        loads = np.array([by_diameter[d, h] for h, d in waves]).T
+        loads = ports.matrix @ np.where(mirrored, loads.conj(), loads)
+        omega = np.array([(h + 1) * solution.omega for h, _ in waves])
+        omega = omega * np.where(mirrored, -1.0, 1.0)
+        viscous = damping.viscous(2 * np.pi * found.frequencies)
+        u = forced_motion(factorised(n), found, loads, omega, viscous).displacement
+        u = np.where(mirrored, u.conj(), u)
+        for k, (h, d) in enumerate(waves):
+            fields[h] += u[..., k] * np.exp(2j * np.pi * d * blade / count) / count
+    seen = ports.matrix[:, ports.names["probe"]].toarray()[:, 0]
+    probe = fields.reshape(H, -1) @ seen
+    known = solution.probe[blade, 1:, 0]
+    mismatch = float(abs(probe - known).max() / max(abs(known).max(), np.finfo(float).tiny))
+    return DampedMotion(solution.frequency, fields, probe, mismatch)
+
+
+def port_forces(
+    shapes: WheelShapes,
+    ports: Ports,
+    wheel: Wheel,
+    pattern: Pattern,
+    case: LoadCase,
+    solution: WheelSolution,
+    points: int | None,
+) -> ComplexArray:
+    """(N, H, P) forces on each blade at its ports in harmonics 1..H [N].
+
+    Damper s presses blade s with its patch "this" and blade s + 1 with its patch "next".
+    """
+    count = sector_of(shapes.bodies.mesh).count
+    H = solution.probe.shape[1] - 1
+    forces = np.zeros((count, H, ports.matrix.shape[1]), complex)
+    dim = shapes.bodies.mesh.dimension
+    contact = ports.names["contact"]
+    following = np.arange(contact.start, contact.stop)[len(shapes.patches[0].area) * dim :]
+    for s in range(count):
+        by_harmonic = node_forces(case, shapes.patches, solution.f[s], points)[1:]
+        forces[s, :, contact] = -(case.selection @ by_harmonic.reshape(H, -1).T).T
+    forces[:, :, following] = np.roll(forces[:, :, following], 1, axis=0)
+    for h, amplitudes in wheel.excitation.items():
+        if 1 <= h <= H:
+            forces[:, h - 1, ports.names["load"]] = amplitudes
+    deviating = deviation_forces(wheel, pattern, solution)
+    forces[:, :, ports.names["blade"]] = deviating[:, :, 1:].swapaxes(1, 2)
+    return forces
