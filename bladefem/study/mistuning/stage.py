@@ -22,8 +22,8 @@ from ...wheel.resonance import Respond
 from ...wheel.scatter import MAX_DEVIATIONS, drawn_patterns
 from ...wheel.solve import WheelSolution
 from ...wheel.statistics import Amplification, scatter_statistics, wheel_respond
-from ..pipeline.case_models import load_cases
 from ..pipeline.assemble_model import LoadCase
+from ..pipeline.case_models import load_cases
 from ..pipeline.damped_motion import DampedStress
 from ..pipeline.loads import Curve
 from ..pipeline.run_records import SolvedRun
