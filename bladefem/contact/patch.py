@@ -168,12 +168,17 @@ def rigid_ports(
     Moments taken with B^T balance those of the elastic body exactly, which r x f with the nodes'
     own places would not at the patch's edge.
     """
+    motions = rigid_motions(mesh, origin)
+    return port_matrix(patches, mesh, "damper").T @ motions.reshape(-1, motions.shape[2])
+
+
+def rigid_motions(mesh: Mesh, origin: np.ndarray) -> np.ndarray:
+    """(n_points, dim, d) displacements of all nodes by the motions of `rigid_ports`."""
     d = mesh.dimension
     r = mesh.points - np.asarray(origin)
     turns = [np.cross(axis, r) for axis in np.eye(3)[:3] if d == 3 or axis[2]]
     moves = [np.tile(axis, (len(r), 1)) for axis in np.eye(3)[:d]] + turns
-    motions = np.stack(moves, axis=2)[:, :d]
-    return port_matrix(patches, mesh, "damper").T @ motions.reshape(len(r) * d, -1)
+    return np.stack(moves, axis=2)[:, :d]
 
 
 def _patch_ports(

@@ -82,6 +82,9 @@ CAPTIONS = {
     "response/optimum": "Amplitude and frequency of the resonance over the normal load per seat. "
     "The star marks the best load, by exact search where that was made, with the band of loads "
     "that keep within the accuracy of it; dashed lines the blade without damper and in full stick.",
+    "response/damped_motion": "Motion of blade and damper at the resonance under the best load, "
+    "with all modes, harmonics and damper forces, about the mean position; the damper moves as a "
+    "rigid body. Colours: amplitude of each node.",
     "response/hysteresis": "Friction force over relative displacement, summed over each seat, "
     "in one period at each resonance; the enclosed area is the friction work.",
     "response/summary": "Resonance for each normal load. The error is that estimated for the "

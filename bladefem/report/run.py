@@ -35,13 +35,15 @@ from ..study.pipeline.loads import Curve, summary
 from ..study.pipeline.run_records import SolvedRun, folder_of
 from ..study.pipeline.stability import UNIQUE
 from ..study.pipeline.state_check import state_sentence
+from ..util.arrays import ComplexArray
 from ..util.communicator import Communicator
 from ..util.message import method, warning
 from ..util.progress import Progress, unwatched
 from ..view import mesh, modes, response, speed
 from ..view.influence import draw_influences
 from ..view.live_curves import live_diameters, live_loops, live_optimum, live_responses
-from ..view.live_shapes import live_shapes
+from ..view.live_shapes import live_motion, live_shapes
+from ..view.motion import draw_motion
 from .best_load import best_load_table
 from .datasets import datasets, table_dataset
 from .fatigue import (
@@ -72,6 +74,8 @@ from .tables import units_of, write_tables
 from .wheel import blade_table, pattern_drawings, pattern_headlines, pattern_table
 from .write import Page, write_report
 
+# the figure of the blade's motion under the best load
+MOTION = "response/damped_motion"
 MESH = (
     "the estimated errors are those of modes, harmonics, samples, contact points, damper model and "
     "of the mesh, of seats and blade; other meshes are compared by 'bladefem modes --converge' "
@@ -191,6 +195,7 @@ def _live(
     shapes = live_shapes(
         result.mesh, excited, [str(name) for name in tables["modes/modes"]["family"]]
     )
+    motions = live_motion(result.mesh, _motions(result))
     curves = {
         name: live_responses(points, _title(result.scene))
         for name, points in _by_mass(tables["response/points"])
@@ -201,6 +206,21 @@ def _live(
         "response/hysteresis": live_loops(seat_loops(cycles)),
         "modes/frequencies_by_nodal_diameter": live_diameters(tables["modes/nodal_diameters"]),
         **({} if shapes is None else {"modes/first_modes": shapes}),
+        **({} if motions is None else {MOTION: motions}),
+    }
+
+
+def _motions(result: SolvedRun) -> dict[str, ComplexArray]:
+    """Title to the motion at the resonance of each load whose stress was computed, the lowest
+    resonance first.
+    """
+    curves = result.response.curves
+    order = sorted(result.damped, key=lambda number: curves[number].peak_amplitude)
+    return {
+        f"{result.damped[number].load:.4g} N per seat, {curves[number].peak_frequency:.5g} Hz": (
+            result.damped[number].motion
+        )
+        for number in order
     }
 
 
@@ -500,6 +520,8 @@ def _drawings(
             searched=tables.get("response/best_load"),
         ),
     }
+    for title, motion in list(_motions(result).items())[:1]:
+        drawings[MOTION] = partial(draw_motion, geometry, motion, title=title)
     if "response/influences" in tables:
         drawings["response/influences"] = partial(draw_influences, tables["response/influences"])
     if len(result.modes) > 1:

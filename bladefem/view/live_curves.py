@@ -36,9 +36,11 @@ def live_responses(
     data: list[dict[str, Any]] = []
     for load in loads:
         curve = points[points["load"] == load].sort_values("frequency", kind="stable")
-        for piece, unstable in pieces_of(curve):
+        for number, (piece, unstable) in enumerate(pieces_of(curve)):
             colour = matplotlib.colors.to_hex(colours[load])
             lines = _curve_traces(curve.iloc[piece], float(load), colour)
+            # one name a load, for all its pieces
+            lines[0]["showlegend"] = number == 0
             if unstable:
                 lines[0]["line"] = {**lines[0].get("line", {}), "dash": "dash"}
             data += lines
@@ -253,24 +255,30 @@ def live_loops(
         cases: name of the load -> name of the seat -> (displacement (k,) [m], force (k,) [N]).
     """
     data = []
+    dashes = ("solid", "dash")
+    names = next(iter(cases.values()), {})
+    told = ", ".join(f"{dash}: {seat}" for dash, seat in zip(dashes, names, strict=False))
     for number, (load, seats) in enumerate(cases.items()):
-        for dash, (seat, (x, force)) in zip(("solid", "dash"), seats.items(), strict=False):
+        pairs = zip(dashes, seats.items(), strict=False)
+        for first, (dash, (seat, (x, force))) in enumerate(pairs):
             closed = np.append(np.arange(len(x)), 0)
             data.append(
                 {
                     "type": "scatter",
                     "mode": "lines",
-                    "name": f"{load}, {seat}",
+                    "name": load,
                     "legendgroup": load,
+                    # one name for both seats
+                    "showlegend": first == 0,
                     "x": numbers(MICRO * np.asarray(x)[closed]),
                     "y": numbers(np.asarray(force)[closed]),
                     "line": {"color": COLOURS[number % len(COLOURS)], "dash": dash, "width": 1.6},
-                    "hovertemplate": "%{x:.4g} µm, %{y:.4g} N<extra>%{fullData.name}</extra>",
+                    "hovertemplate": f"%{{x:.4g}} µm, %{{y:.4g}} N<extra>{load}, {seat}</extra>",
                 }
             )
     layout = {
         "title": _escape_title("hysteresis loops"),
-        "xaxis": {"title": {"text": "relative displacement [µm]"}},
+        "xaxis": {"title": {"text": f"relative displacement [µm]  ({told})"}},
         "yaxis": {"title": {"text": "friction force [N]"}},
         "hovermode": "closest",
     }

@@ -1,23 +1,27 @@
-"""Mode shapes for a page with script: the skin once, each shape in 16-bit numbers."""
+"""Mode shapes and motions for a page with script: the skin once, each shape in 16-bit numbers."""
 
 from __future__ import annotations
 
 import base64
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
 
 from bladefem.data import ModeSet
+from bladefem.util.arrays import ComplexArray, IntegerArray, RealArray
 from geometry.mesh import Mesh
 
 from .mesh import view_of
 from .modes import best_phase, mode_title, moving, scale_of
+from .motion import amplitude_of, drawn_factor, extreme_phase
 from .skin import skin
 
 # triangles that a browser still turns smoothly
 MOST_TRIANGLES = 60_000
 LARGEST = 32767
+# of the largest displacement: harmonics below it are not seen in the picture
+HARMONIC_SHARE = 0.005
 
 
 def live_shapes(
@@ -49,11 +53,12 @@ def live_shapes(
         found.append(
             {
                 "title": mode_title(modes, i, families[i] if i < len(families) else ""),
-                **_packed_shape(drawn),
+                "harmonics": [{"order": 1, **_packed_shape(drawn)}],
             }
         )
     return {
         "kind": "shape",
+        "choice": "mode",
         "points": _pack_numbers(surface.points, np.float32),
         "triangles": _pack_numbers(surface.triangles, np.uint32),
         "modes": found,
@@ -62,7 +67,61 @@ def live_shapes(
     }
 
 
-def _packed_shape(drawn: np.ndarray) -> dict[str, Any]:
+def live_motion(
+    mesh: Mesh,
+    motions: Mapping[str, ComplexArray],
+) -> dict[str, Any] | None:
+    """Skin and motions of several harmonics, for ``page.js``; None where the skin has too many
+    triangles for a page.
+
+    The displacement at phase phi is Re(sum over h of U_h e^{j h phi}).
+
+    Args:
+        mesh: the sector or body.
+        motions: title -> (H, n_points, dim) complex displacements of harmonics 1..H [m].
+    """
+    first = next(iter(motions.values()), None)
+    if first is None:
+        return None
+    surface = skin(moving(mesh, amplitude_of(first)), coarse=True)
+    if len(surface.triangles) > MOST_TRIANGLES:
+        return None
+    return {
+        "kind": "shape",
+        "choice": "load",
+        "points": _pack_numbers(surface.points, np.float32),
+        "triangles": _pack_numbers(surface.triangles, np.uint32),
+        "modes": [
+            {"title": title, **_packed_motion(mesh, motion, surface.nodes)}
+            for title, motion in motions.items()
+        ],
+        "eye": [float(x) for x in view_of(mesh)],
+        "up": [1.0, 0.0, 0.0],
+    }
+
+
+def _packed_motion(mesh: Mesh, motion: ComplexArray, nodes: IntegerArray) -> dict[str, Any]:
+    """Harmonics as drawn, the largest amplitude of a node [µm], and the phase to begin with."""
+    amplitude = amplitude_of(motion)
+    factor = drawn_factor(mesh, motion)
+    sizes = np.abs(motion).max(axis=(1, 2))
+    kept = np.flatnonzero(sizes > HARMONIC_SHARE * sizes.max(initial=0.0))
+    packed = [
+        {"order": int(h) + 1, **_packed_shape(factor * _solid(motion[h])[nodes])} for h in kept
+    ]
+    return {
+        "amplitude": 1e6 * float(amplitude.max(initial=0.0)),
+        "start": round(np.degrees(extreme_phase(motion)) / 5) * 5 % 360,
+        "harmonics": packed,
+    }
+
+
+def _solid(field: ComplexArray) -> ComplexArray:
+    """(n, 3) of a field that may be plane."""
+    return np.pad(field, ((0, 0), (0, 3 - field.shape[1])))
+
+
+def _packed_shape(drawn: ComplexArray | RealArray) -> dict[str, Any]:
     """Real and imaginary displacement as drawn [m], in shares of their largest component."""
     largest = float(max(np.abs(drawn.real).max(), np.abs(drawn.imag).max(), 1e-300))
     parts = {

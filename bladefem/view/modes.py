@@ -143,13 +143,18 @@ def photograph_shape(
     factor: float,
     direction: tuple[float, float, float],
     size: tuple[int, int] = (1100, 1200),
+    values: np.ndarray | None = None,
 ) -> np.ndarray:
     """Rendering of a deformed sector coloured by relative magnitude, with the undeformed edges in
     grey.
+
+    Args:
+        values: (n_points,) to be coloured by in place of the magnitude of the shape.
     """
     surface = skin(moving(mesh, shape))
-    moved = surface.points + factor * shape[surface.nodes]
-    magnitude = np.linalg.norm(shape, axis=1)
+    drawn = np.pad(shape, ((0, 0), (0, 3 - shape.shape[1])))
+    moved = surface.points + factor * drawn[surface.nodes]
+    magnitude = np.linalg.norm(shape, axis=1) if values is None else values
     body = polydata(surface, moved)
     body.point_data["magnitude"] = magnitude[surface.nodes] / max(magnitude.max(), 1e-300)
     parts = [

@@ -24,7 +24,7 @@ from bladefem.report.pdf import browser_command, print_pdf
 from bladefem.report.write import Page, write_report
 from bladefem.scene.tables import Scene
 from bladefem.view.live_curves import live_optimum, live_responses
-from bladefem.view.live_shapes import live_shapes
+from bladefem.view.live_shapes import live_motion, live_shapes
 from geometry.mesh import Mesh
 
 sys.path.insert(0, str(Path(__file__).parents[1] / "view"))
@@ -81,7 +81,7 @@ async function probe() {
   }
   await pause(500);
   found.hover = hovered && [hovered.x, hovered.y, chart.querySelector(".hoverlayer").textContent];
-  const shape = figures.find((figure) => figure.querySelector("select"));
+  const shape = figures.find((figure) => figure.textContent.includes("mode mode 1"));
   if (shape) {
     const place = shape.querySelector(".live");
     const before = Array.from(place.data[0].x);
@@ -94,6 +94,32 @@ async function probe() {
     await Plotly.relayout(place, {"scene.camera.eye.x": eye + 1});
     found.turned = place._fullLayout.scene.camera.eye.x - eye;
     found.modes = shape.querySelector("select").options.length;
+  }
+  const motion = figures.find((figure) => figure.textContent.includes("amplitude[µm]"));
+  if (motion) {
+    const place = motion.querySelector(".live");
+    const choice = motion.querySelector("select");
+    const slider = motion.querySelector(".phase");
+    const tip = () => [place.data[0].x[1], place.data[0].y[1], place.data[0].z[1]];
+    found.motion = {label: motion.querySelector("label").textContent.trim(), start: slider.value,
+      at: {}, colours: []};
+    for (const phase of ["0", "90", "180"]) {
+      slider.value = phase;
+      slider.dispatchEvent(new Event("input"));
+      await pause(300);
+      found.motion.at[phase] = tip();
+    }
+    found.motion.shown = motion.querySelector("output").textContent;
+    for (const load of ["0", "1"]) {
+      choice.value = load;
+      choice.dispatchEvent(new Event("input"));
+      await pause(300);
+      found.motion.colours.push([place.data[0].cmax, Math.max(...place.data[0].intensity)]);
+    }
+    motion.querySelector("button").click();
+    await pause(800);
+    motion.querySelector("button").click();
+    found.motion.played = slider.value;
   }
   const table = document.querySelector("table.sortable");
   const column = () => [...table.tBodies[0].rows].map((row) => row.cells[2].textContent);
@@ -122,11 +148,17 @@ def page(tmp_path_factory) -> Path:
     picture.write_bytes(PIXEL)
     points = synthetic.points()
     summary = synthetic.summary().assign(error=0.01)
-    names = ("response/forced_response", "response/optimum", "modes/first_modes")
+    names = (
+        "response/forced_response",
+        "response/optimum",
+        "modes/first_modes",
+        "response/damped_motion",
+    )
     live = {
         names[0]: live_responses(points, "a <title> & $\\frac{1}{$"),
         names[1]: live_optimum(summary, 120.0),
         names[2]: tetrahedron_shapes(),
+        names[3]: live_motion(TETRAHEDRON, {"80 N": motion(1e-4), "20 N": motion(3e-4)}),
     }
     tables = {"response/summary": summary, "response/points": points}
     figures = {name: picture for name in names}
@@ -134,15 +166,31 @@ def page(tmp_path_factory) -> Path:
     return write_report(folder, Scene(title="A report"), tables, figures, said, page=Page(live))[0]
 
 
+TETRAHEDRON = Mesh(
+    np.array([[0.0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1]]),
+    "tetra",
+    {"blade": np.array([[0, 1, 2, 3]])},
+    {},
+    {},
+    {},
+)
+
+
 def tetrahedron_shapes() -> dict:
     """Two modes of one element, the second a turning one."""
-    points = np.array([[0.0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1]])
-    mesh = Mesh(points, "tetra", {"blade": np.array([[0, 1, 2, 3]])}, {}, {}, {})
     shapes = np.zeros((2, 4, 3), complex)
     shapes[0, 1] = (1.0, 0.5, 0)
     shapes[1, 1] = (1.0, 0.8j, 0)
     modes = ModeSet(np.array([100.0, 200.0]), shapes, 1, np.zeros(2))
-    return live_shapes(mesh, modes, ["first flap", "first edge"])
+    return live_shapes(TETRAHEDRON, modes, ["first flap", "first edge"])
+
+
+def motion(amplitude: float) -> np.ndarray:
+    """(3, 4, 3) one node that moves along x, and a third of it along y in the third harmonic."""
+    moved = np.zeros((3, 4, 3), complex)
+    moved[0, 1, 0] = amplitude
+    moved[2, 1, 1] = 1j * amplitude / 3
+    return moved
 
 
 def look(page: Path, width: int) -> dict:
@@ -175,7 +223,7 @@ def wide(page):
 
 def test_no_error_and_all_figures_live(wide):
     assert wide["errors"] == []
-    assert [kind["live"] for kind in wide["kinds"]] == [True, True, True]
+    assert [kind["live"] for kind in wide["kinds"]] == [True] * 4
     assert all(kind["picture"] == "none" for kind in wide["kinds"])
 
 
@@ -194,6 +242,24 @@ def test_shapes_move_with_the_phase_and_turn(wide):
     assert wide["turned"] == pytest.approx(1.0)
     drawn = 0.1 / np.hypot(1, 0.5)
     assert wide["moved"] == pytest.approx(drawn, rel=1e-3)
+
+
+def test_a_damped_motion_follows_its_harmonics(wide):
+    """Node 1 rests at (1, 0, 0). Harmonic 1 is a cosine along x, harmonic 3 a quarter period ahead
+    along y: at a quarter of the period x is at rest and y, three quarters of a period on, at +1/3.
+    """
+    found = wide["motion"]
+    assert found["label"].startswith("load")
+    drawn = 0.1 / np.hypot(1, 1 / 3)
+    expected = {"0": (1 + drawn, 0, 0), "90": (1, drawn / 3, 0), "180": (1 - drawn, 0, 0)}
+    for phase, place in expected.items():
+        assert found["at"][phase] == pytest.approx(place, abs=1e-4)
+    assert found["shown"] == "180°"
+    largest = 1e6 * np.hypot(1, 1 / 3)
+    for (top, intensity), size in zip(found["colours"], (1e-4, 3e-4), strict=True):
+        assert top == pytest.approx(size * largest)
+        assert intensity == pytest.approx(size * largest, rel=1e-5)
+    assert found["played"] != "180"
 
 
 def test_tables_sort_both_ways(wide):

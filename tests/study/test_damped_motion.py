@@ -10,6 +10,7 @@ import pytest
 import scipy.sparse as sp
 from scipy.sparse.linalg import splu
 
+from bladefem.contact.patch import port_matrix
 from bladefem.contact.seating import solve as seat
 from bladefem.errors import NotSolvedError
 from bladefem.fem.alternating_stress import alternating_stress
@@ -17,11 +18,12 @@ from bladefem.fem.flexibility import unknown_places
 from bladefem.fem.forced_motion import forced_motion
 from bladefem.fem.modes import modes as normal_modes
 from bladefem.fem.stress import gauss_stress, nodal_stress, von_mises
+from bladefem.friction.fourier import to_complex
 from bladefem.hbm.solve import solve
 from bladefem.scene.toml import load_scene
 from bladefem.study.modes.linear_response import excitation_load
 from bladefem.study.pipeline import damped_motion as subject
-from bladefem.study.pipeline.assemble_model import joint_model
+from bladefem.study.pipeline.assemble_model import joint_model, rigid_body
 from bladefem.study.pipeline.case_models import load_cases
 from bladefem.study.pipeline.response_remarks import stress_message
 from bladefem.study.pipeline.run_records import Seating
@@ -105,6 +107,43 @@ def test_the_probe_moves_as_in_the_balance(plane):
     motion = subject.damped_motion(bodies, patches, [found], case, solution)
     assert motion.mismatch < 1e-3
     assert motion.probe[0] == pytest.approx(solution.probe[1, 0], rel=1e-3)
+
+
+def relative_motion(bodies, patches, solution, moved, phase):
+    """(H, ports) motion of the blades relative to the damper at the contact: the next blade does an
+    interblade phase later what this one does at its other seat."""
+    blade = port_matrix(patches, bodies.mesh, "blade")
+    damper = port_matrix(patches, bodies.mesh, "damper")
+    of_next = np.arange(blade.shape[1]) >= len(patches[0].area) * bodies.mesh.dimension
+    found = []
+    for h, u in enumerate(moved, 1):
+        seen = np.where(of_next, np.exp(1j * h * phase), 1.0) * (blade.T @ u.ravel())
+        found.append(seen - damper.T @ u.ravel())
+    return np.array(found)
+
+
+@pytest.mark.parametrize("damper", ["rigid", "mass"])
+def test_the_damper_moves_as_the_balance_has_it(plane, damper):
+    """Blade by its finite elements, damper by its inertia: the difference at the contact is the
+    relative motion that the balance solved for."""
+    scene, bodies, patches, case, solution, found, _ = plane
+    reduced = reduce_sector(bodies, patches, harmonic_diameters(scene, bodies.mesh, 3), 20)
+    if damper == "mass":
+        model = joint_model(scene, bodies.mesh, reduced, patches, case, 5, damper)
+        solution = solve(model, solution.omega, 5, 256)
+        assert solution.converged
+    body = rigid_body(scene, bodies.mesh, reduced, patches, damper)
+    motion = subject.damped_motion(bodies, patches, [found], case, solution)
+    moved = subject.damper_motion(bodies.mesh, patches, case, solution, body)
+    assert np.abs(motion.harmonics * moved).max() == 0.0
+    there = relative_motion(
+        bodies, patches, solution, motion.harmonics + moved, scene.excitation.phase
+    )
+    n, d, _ = solution.w.shape
+    w = to_complex(solution.w.reshape(n * d, -1)).T[1:]
+    # the paper's damper has tangential motion only
+    rows = np.arange(there.shape[1]).reshape(n, -1)[:, -d:].ravel()
+    assert abs(there[:, rows] - w).max() < 1e-3 * abs(w).max()
 
 
 def test_more_harmonics_are_followed_in_time():

@@ -16,6 +16,7 @@ from bladefem.view.contact import (
     save_pressure_vtu,
     unfold,
 )
+from bladefem.view.live_shapes import live_motion
 from bladefem.view.mesh import carry_round, draw_mesh, draw_wheel, grid, save_vtu
 from bladefem.view.modes import (
     animate_wave,
@@ -26,6 +27,7 @@ from bladefem.view.modes import (
     moving,
     save_modes_vtu,
 )
+from bladefem.view.motion import amplitude_of, draw_motion, extreme_phase
 from bladefem.view.response import (
     between,
     draw_accuracy,
@@ -270,6 +272,30 @@ def test_bodies_at_rest_are_not_drawn(sector, wave):
     still[np.unique(sector.bodies["damper"])] = 0
     assert list(moving(sector, still).bodies) == ["blade"]
     assert list(moving(sector, wave.shapes[0]).bodies) == ["blade", "damper"]
+
+
+def test_a_motion_is_drawn_where_it_is_largest(sector, plane_row, folder):
+    """cos t + cos(3 t) / 3 is largest at the start, sin t at a quarter of the period."""
+    for mesh in (sector, plane_row):
+        motion = np.zeros((3, len(mesh.points), mesh.dimension), complex)
+        motion[0, :, 1] = -1j * mesh.points[:, 0]
+        assert extreme_phase(motion) % np.pi == pytest.approx(np.pi / 2)
+        motion[0], motion[2] = 1j * motion[0], 1j * motion[0] / 3
+        assert extreme_phase(motion) == 0.0
+        largest = np.hypot(1, 1 / 3) * abs(mesh.points[:, 0]).max()
+        assert amplitude_of(motion).max() == pytest.approx(largest)
+        draw_motion(mesh, 1e-4 * motion, folder / "motion.png", title="80 N per seat")
+        assert ink(folder / "motion.png") > 0.02
+
+
+def test_a_motion_on_a_page_keeps_the_harmonics_that_are_seen(sector):
+    motion = np.zeros((3, len(sector.points), 3), complex)
+    motion[0, :, 1], motion[1, :, 1], motion[2, :, 2] = 1e-4, 1e-7, 1e-5j
+    spec = live_motion(sector, {"80 N": motion})
+    (mode,) = spec["modes"]
+    assert [part["order"] for part in mode["harmonics"]] == [1, 3]
+    assert mode["amplitude"] == pytest.approx(1e2 * np.hypot(1, 0.1), rel=1e-4)
+    assert live_motion(sector, {}) is None
 
 
 def test_loop_energy_is_jenkins():

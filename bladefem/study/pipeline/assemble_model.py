@@ -65,10 +65,6 @@ def joint_model(
             "elastic".
         sides: blade sides in pair coordinates, in place of those of the engine order's harmonics.
     """
-    held = scene.damper.axial == HELD
-    if held and damper != "mass":
-        along = axial_motion(mesh, patches)
-        reduced = replace(reduced, damper=hold_translation(reduced.damper, along))
     pick = case.selection.T.toarray()
     whole = pick.shape[0] == pick.shape[1]
     if sides is None:
@@ -83,14 +79,13 @@ def joint_model(
         series = series * np.r_[float(elements.kn.any()), np.ones(elements.tangents)]
         sides = tuple(in_series(side, series) for side in sides)
     other: RigidBody | tuple[PortModel, ...]
-    if damper == "mass":
-        other = mass_damper(mesh, patches, reduced.mass, held)
-    elif damper == "rigid":
-        other = rigid_damper(reduced)
+    if damper == "elastic":
+        free = _with_stop(scene, mesh, reduced, patches).damper
+        other = (free if whole else recombine(free, pick),)
     else:
-        other = (reduced.damper if whole else recombine(reduced.damper, pick),)
-    if isinstance(other, RigidBody) and not whole:
-        other = replace(other, B=pick @ other.B)
+        other = rigid_body(scene, mesh, reduced, patches, damper)
+        if not whole:
+            other = replace(other, B=pick @ other.B)
     return ReducedModel(
         sides,
         elements,
@@ -101,6 +96,31 @@ def joint_model(
         coupled=scene.model.static == "coupled",
         series=series,
     )
+
+
+def rigid_body(
+    scene: Scene,
+    mesh: Mesh,
+    reduced: Reduced,
+    patches: list[Patch],
+    damper: str,
+) -> RigidBody:
+    """The damper without its deformation, on the ports of all contact nodes.
+
+    Args:
+        damper: as for `joint_model`; of an elastic one its rigid motions.
+    """
+    if damper == "mass":
+        return mass_damper(mesh, patches, reduced.mass, scene.damper.axial == HELD)
+    return rigid_damper(_with_stop(scene, mesh, reduced, patches))
+
+
+def _with_stop(scene: Scene, mesh: Mesh, reduced: Reduced, patches: list[Patch]) -> Reduced:
+    """Held along the engine axis where the scene has a stop there."""
+    if scene.damper.axial != HELD:
+        return reduced
+    along = axial_motion(mesh, patches)
+    return replace(reduced, damper=hold_translation(reduced.damper, along))
 
 
 def rigid_damper(reduced: Reduced) -> RigidBody:

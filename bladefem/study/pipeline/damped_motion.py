@@ -13,9 +13,10 @@ from typing import Any
 
 import numpy as np
 
-from geometry.mesh import sector_of
+from geometry.mesh import Mesh, sector_of
 
-from ...data import Elements, ModeSet, Patch
+from ...contact.patch import rigid_motions, rigid_ports
+from ...data import Elements, ModeSet, Patch, RigidBody
 from ...friction.fourier import to_complex
 from ...hbm.model import Damping
 from ...hbm.solution import Solution
@@ -38,7 +39,7 @@ class DampedMotion:
 
     # of harmonic 1 [Hz]
     frequency: float
-    # (H, n_points, dim) complex displacements of harmonics 1..H [m]
+    # (H, n_points, dim) complex displacements of harmonics 1..H [m]; the damper is at rest
     harmonics: ComplexArray
     # (H,) complex, the same at the probe [m]
     probe: ComplexArray
@@ -67,6 +68,9 @@ class DampedStress:
     mismatch: float
     # (n_points,) largest von Mises stress at each node [Pa], see AlternatingStress.field
     field: RealArray
+    # (H, n_points, dim) complex displacements of blade and damper in harmonics 1..H [m], single
+    # precision: for pictures
+    motion: ComplexArray
 
 
 def damped_motion(
@@ -131,12 +135,20 @@ def damped_stress(
     solution: Solution,
     points: int | None = None,
     factorised: Callable[[int], Any] | None = None,
+    damper: RigidBody | None = None,
 ) -> DampedStress:
-    """The largest alternating stress of the motion of `damped_motion`, which has the arguments."""
+    """The largest alternating stress of the motion of `damped_motion`, which has the arguments.
+
+    Args:
+        damper: moves with the contact forces on it, for pictures; left at rest when None.
+    """
     from ...fem.alternating_stress import alternating_stress
 
     motion = damped_motion(bodies, patches, modes, case, solution, points, factorised)
     found = alternating_stress(bodies.still_blade, motion.harmonics, touched_nodes(bodies))
+    moved = motion.harmonics
+    if damper is not None:
+        moved = moved + damper_motion(bodies.mesh, patches, case, solution, damper, points)
     return DampedStress(
         case.load,
         case.mass,
@@ -146,7 +158,37 @@ def damped_stress(
         found.mesh_error,
         motion.mismatch,
         found.field,
+        moved.astype(np.complex64),
     )
+
+
+def damper_motion(
+    mesh: Mesh,
+    patches: Sequence[Patch],
+    case: LoadCase,
+    solution: Solution,
+    damper: RigidBody,
+    points: int | None = None,
+) -> ComplexArray:
+    """(H, n_points, dim) complex displacements of the damper's nodes in harmonics 1..H [m]: its
+    inertia in balance with the contact forces on it, without its deformation.
+
+    Args:
+        damper: on the ports of all contact nodes, see `assemble_model.rigid_body`.
+        points: as for `damped_motion`.
+    """
+    inside = np.unique(mesh.bodies["damper"])
+    origin = mesh.points[inside].mean(axis=0)
+    # which rigid motions of the mesh the generalised displacements are
+    share = np.linalg.lstsq(rigid_ports(patches, mesh, origin), damper.B, rcond=None)[0]
+    unit = rigid_motions(mesh, origin)[inside] @ share
+    forces = _node_forces(case, patches, solution, points)
+    moved = np.zeros((solution.harmonics, len(mesh.points), mesh.dimension), complex)
+    for h in range(1, solution.harmonics + 1):
+        on_damper = damper.B.T @ (case.selection @ forces[h].ravel())
+        acceleration = np.linalg.solve(damper.mass, on_damper)
+        moved[h - 1, inside] = unit @ (-acceleration / (h * solution.omega) ** 2)
+    return moved
 
 
 def touched_nodes(bodies: Bodies) -> np.ndarray:

@@ -17,7 +17,7 @@ from ...util.communicator import Communicator
 from ..adaptive.family import Family, family_member
 from ..adaptive.settings import Settings
 from ..influences import Influence, influences, parameters_of
-from .assemble_model import LoadCase
+from .assemble_model import LoadCase, rigid_body
 from .best_load import BestLoad, chart_loads, find_best_load
 from .body_mesh import SofterBody
 from .case_models import family_of_case, load_cases, softer_body
@@ -31,7 +31,7 @@ from .run_records import ReducedRun, Response, Seating, SolvedRun
 from .seated_loads import seat_at_loads, studied_loads
 from .stage_inputs import stage_key
 from .stage_runner import StageRunner
-from .stages import Bodies
+from .stages import Bodies, weighted
 from .utilisation import utilisation_message
 
 
@@ -71,7 +71,7 @@ def run_response(before: ReducedRun, patches: list[Patch], keep: StageRunner) ->
     with clock("stresses"):
         damped = keep(
             "damped_stress",
-            stage_key("stress", scene, [(c.load, c.mass, c.peak.f) for c in curves]),
+            stage_key("damped motion", scene, [(c.load, c.mass, c.peak.f) for c in curves]),
             lambda: _stresses(before, patches, curves, cases, keep.comm),
         )
         clock.messages.append(stress_message(curves, damped))
@@ -83,7 +83,7 @@ def run_response(before: ReducedRun, patches: list[Patch], keep: StageRunner) ->
 
 def _stresses(
     before: ReducedRun,
-    patches: Sequence[Patch],
+    patches: list[Patch],
     curves: Sequence[Curve],
     cases: Sequence[LoadCase],
     comm: Communicator | None,
@@ -103,9 +103,18 @@ def _stresses(
         factorised = lru_cache(maxsize=None)(alone.factorised)
         found = {}
         for k in sorted(wanted):
-            points = curves[k].settings.points
+            settings = curves[k].settings
+            reduced = weighted(before.reduced, cases[k].mass)
+            damper = rigid_body(before.scene, before.mesh, reduced, patches, settings.damper)
             found[k] = damped_stress(
-                alone, patches, before.modes, cases[k], curves[k].peak, points, factorised
+                alone,
+                patches,
+                before.modes,
+                cases[k],
+                curves[k].peak,
+                settings.points,
+                factorised,
+                damper,
             )
         return found
 

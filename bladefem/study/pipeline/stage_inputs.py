@@ -114,6 +114,11 @@ STAGE_INPUTS = {
         without=("mistuning.pattern", "mistuning.wheels"),
         code=("bladefem.wheel",),
     ),
+    "damped motion": StageInputs(
+        after=("contact", "reduction"),
+        fields=("operation", "excitation", "damper.axial"),
+        code=("bladefem.study",),
+    ),
     "mass pressure": StageInputs(
         after=("mesh",),
         fields=("material", "foundation.skew", "study.loads"),
