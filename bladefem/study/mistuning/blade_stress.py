@@ -92,6 +92,7 @@ def blade_stress(
         found.mesh_error,
         motion.mismatch,
         found.field,
+        motion.harmonics.astype(np.complex64),
     )
 
 

@@ -182,7 +182,7 @@ def damper_motion(
     # which rigid motions of the mesh the generalised displacements are
     share = np.linalg.lstsq(rigid_ports(patches, mesh, origin), damper.B, rcond=None)[0]
     unit = rigid_motions(mesh, origin)[inside] @ share
-    forces = _node_forces(case, patches, solution, points)
+    forces = node_forces(case, patches, solution.f, points)
     moved = np.zeros((solution.harmonics, len(mesh.points), mesh.dimension), complex)
     for h in range(1, solution.harmonics + 1):
         on_damper = damper.B.T @ (case.selection @ forces[h].ravel())
