@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import Any
 
 from ..errors import InputError
+from ..scene.tables import Scene
 from ..util.communicator import Communicator
 from . import tables
 from .commands import prepared, tell
@@ -29,7 +30,7 @@ def scatter(options: argparse.Namespace, comm: Communicator | None) -> None:
     check_mistuning(scene)
     run = pipeline.run(scene, folder, comm=comm, progress=bars)
     found = scatter_of_run(run, comm, bars)
-    table, files = on_root(comm, lambda: _write_results(found, folder))
+    table, files = on_root(comm, lambda: _write_results(found, folder, scene))
     sentences = scatter_sentences(found)
     tell(
         options,
@@ -40,16 +41,28 @@ def scatter(options: argparse.Namespace, comm: Communicator | None) -> None:
     )
 
 
-def _write_results(found: Any, folder: Path) -> tuple[Any, list[Path]]:
+def _write_results(found: Any, folder: Path, scene: Scene) -> tuple[Any, list[Path]]:
     """The table as text, and the files of the folder."""
     from ..report.tables import readable, write_tables
-    from ..report.wheel import scatter_drawings, scatter_table
+    from ..report.wheel import (
+        optimum_table,
+        scatter_drawings,
+        scatter_headlines,
+        scatter_sentences,
+        scatter_table,
+    )
+    from ..report.write import Page, write_report
 
-    table = scatter_table(found)
-    write_tables(table, folder / "scatter", "scatter")
-    files = [folder / "scatter.csv"]
+    parts = {"wheel/scatter": scatter_table(found), "wheel/scatter_optima": optimum_table(found)}
+    files = []
+    for name, table in parts.items():
+        stem = name.split("/")[1]
+        write_tables(table, folder / stem, stem)
+        files.append(folder / f"{stem}.csv")
+    figures = {}
     for name, draw in scatter_drawings(found).items():
-        file = folder / f"{name.split('/')[1]}.png"
-        draw(file)
-        files.append(file)
-    return readable(table), files
+        figures[name] = folder / f"{name.split('/')[1]}.png"
+        draw(figures[name])
+    page = Page(numbers=scatter_headlines(found), stem="report_scatter")
+    pages = write_report(folder, scene, parts, figures, scatter_sentences(found), page=page)
+    return readable(parts["wheel/scatter"]), [*files, *figures.values(), *pages]

@@ -60,6 +60,14 @@ CAPTIONS = {
     "wheel, and the alternating stress of its whole damped motion.",
     "wheel/blades": "Each blade: deviation of its first family, largest amplitude over the band, "
     "and friction work of its damper at the wheel's highest point.",
+    "wheel/scatter": "Highest blade of the drawn wheels over the tuned wheel under the same load: "
+    "quantiles with 95 % intervals, and the worst wheel.",
+    "wheel/scatter_optima": "The load that is best for the tuned wheel, and the one that is best "
+    "for 95 % of the drawn wheels, with 95 % intervals by the bootstrap over the wheels.",
+    "wheel/scatter_chart": "Highest blade against the load: the tuned wheel, and quantiles of the "
+    "drawn wheels with 95 % intervals; dashed the tuned optimum, dotted the robust one with its "
+    "interval in grey.",
+    "wheel/scatter_histogram": "How often an amplification occurs at the tuned wheel's best load.",
     "wheel/wheel_motion": "The wheel at its highest point, seen along its axis.",
     "wheel/fatigue_of_the_worst_blade": "The places of the highest blade that use most of what the "
     "material lasts, as for the tuned wheel.",

@@ -28,11 +28,15 @@ class Column(NamedTuple):
 RPM = 60 / (2 * np.pi)
 COLUMNS = {
     "load": Column("normal load", "N"),
+    "load_low": Column("from", "N"),
+    "load_high": Column("to", "N"),
     "frequency": Column("frequency", "Hz"),
     "engine_order": Column("engine order"),
     "amplitude": Column("amplitude", "m", "µm", 1e6),
     "tuned_amplitude": Column("tuned wheel", "m", "µm", 1e6),
     "highest_amplitude": Column("highest blade", "m", "µm", 1e6),
+    "highest_amplitude_low": Column("from", "m", "µm", 1e6),
+    "highest_amplitude_high": Column("to", "m", "µm", 1e6),
     "highest_blade": Column("its number"),
     "amplification": Column("over the tuned wheel", "1", digits=4),
     "amplification_free": Column("the same without dampers", "1", digits=4),

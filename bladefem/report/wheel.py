@@ -13,7 +13,13 @@ import pandas as pd
 
 from ..study.mistuning.pattern_response import PatternResponse
 from ..view import wheel as view
-from ..wheel.statistics import Amplification, best_load, quantile
+from ..wheel.statistics import (
+    Amplification,
+    RobustOptimum,
+    best_load,
+    quantile,
+    robust_optimum,
+)
 from .headlines import Headline
 
 # quantiles of a scatter
@@ -129,31 +135,110 @@ def scatter_table(found: Amplification) -> pd.DataFrame:
     return pd.DataFrame(rows)
 
 
-def optima(found: Amplification) -> dict[str, tuple[float, float]]:
-    """Name to load [N] and amplitude [m]: of the tuned wheel, and of 95 % of the drawn ones."""
-    p95 = np.array([quantile(row, 0.95).value for row in found.peak])
-    return {
-        "tuned optimum": best_load(found.loads, found.tuned),
-        "robust optimum (95 %)": best_load(found.loads, p95),
-    }
+def optima(found: Amplification) -> tuple[tuple[float, float], RobustOptimum]:
+    """Load [N] and amplitude [m] of the tuned wheel's optimum, and the optimum of 95 % of the drawn
+    wheels.
+    """
+    return best_load(found.loads, found.tuned), robust_optimum(found)
+
+
+def optimum_table(found: Amplification) -> pd.DataFrame:
+    """The tuned optimum, which knows no scatter, and the robust one with its intervals."""
+    (load, height), robust = optima(found)
+    rows = [
+        {"optimum": "tuned wheel", "load": load, "highest_amplitude": height},
+        {
+            "optimum": f"{100 * robust.share:g} % of wheels",
+            "load": robust.load.value,
+            "load_low": robust.load.low,
+            "load_high": robust.load.high,
+            "highest_amplitude": robust.height.value,
+            "highest_amplitude_low": robust.height.low,
+            "highest_amplitude_high": robust.height.high,
+        },
+    ]
+    return pd.DataFrame(rows)
+
+
+def scatter_headlines(found: Amplification) -> list[Headline]:
+    """First numbers of the statistics."""
+    (load, height), robust = optima(found)
+    words = f"{100 * robust.share:g} % of {found.peak.shape[1]} wheels"
+    i = int(np.argmin(found.tuned))
+    factor = quantile(found.factor[i], robust.share)
+    return [
+        Headline(
+            "robust optimum of the load of a seat",
+            f"{robust.load.value:.4g} N",
+            f"95 % interval {robust.load.low:.4g} to {robust.load.high:.4g} N",
+            f"lowest amplitude that {words} stay below, by the bootstrap over the wheels",
+        ),
+        Headline(
+            "optimum of the tuned wheel",
+            f"{load:.4g} N",
+            _bracket(found, load),
+            f"{1e6 * height:.4g} µm where all blades are alike",
+        ),
+        Headline(
+            "highest blade at the robust optimum",
+            f"{1e6 * robust.height.value:.4g} µm",
+            f"95 % interval {1e6 * robust.height.low:.4g} to {1e6 * robust.height.high:.4g} µm",
+            f"{words} stay below",
+        ),
+        Headline(
+            f"amplification at {found.loads[i]:.4g} N, where the tuned wheel is lowest",
+            f"{factor.value:.3g}",
+            f"95 % interval {factor.low:.3g} to {_upper(factor.high)}",
+            f"highest blade over the tuned wheel, {words} stay below",
+        ),
+    ]
+
+
+def _bracket(found: Amplification, load: float) -> str:
+    """The loads studied on both sides."""
+    lower = found.loads[found.loads < load]
+    upper = found.loads[found.loads > load]
+    if not len(lower) or not len(upper):
+        return "an end of the loads studied"
+    return f"between {lower.max():.4g} and {upper.min():.4g} N studied"
+
+
+def _upper(value: float) -> str:
+    return f"{value:.3g}" if np.isfinite(value) else "unknown, too few wheels"
 
 
 def scatter_sentences(found: Amplification) -> list[str]:
     """The answer, and what it is worth."""
-    best = optima(found)
+    (load, height), robust = optima(found)
     sentences = [
-        f"{name}: {load:.4g} N, {1e6 * height:.4g} um" for name, (load, height) in best.items()
+        f"tuned optimum: {load:.4g} N, {1e6 * height:.4g} um",
+        f"robust optimum ({100 * robust.share:g} % of {found.peak.shape[1]} wheels below): "
+        f"{robust.load.value:.4g} N (95 % interval {robust.load.low:.4g} to "
+        f"{robust.load.high:.4g} N), {1e6 * robust.height.value:.4g} um "
+        f"({1e6 * robust.height.low:.4g} to {1e6 * robust.height.high:.4g} um)",
     ]
+    if robust.at_end > 0.025:
+        sentences.append(
+            f"in {100 * robust.at_end:.2g} % of the resamples the robust optimum is the smallest "
+            "or the largest load: the interval is open there, expected a wider study.loads"
+        )
     i = int(np.argmin(found.tuned))
     q = quantile(found.factor[i], 0.95)
-    high = f"{q.high:.3g}" if np.isfinite(q.high) else "unknown, too few wheels"
     sentences.append(
         f"at {found.loads[i]:g} N, where the tuned wheel is lowest, 95 % of {found.peak.shape[1]} "
-        f"wheels stay below {q.value:.3g} times it (95 % interval {q.low:.3g} to {high})"
+        f"wheels stay below {q.value:.3g} times it (95 % interval {q.low:.3g} to {_upper(q.high)})"
     )
     lost = int(found.unsolved.sum())
     sentences.append(f"{lost} of {int(found.points.sum())} points not solved")
     return sentences
+
+
+def marked_optima(found: Amplification) -> list[tuple[str, float, float, float]]:
+    """Name, load and interval of the optima, for the chart."""
+    (load, _), robust = optima(found)
+    name = f"robust optimum ({100 * robust.share:g} %)"
+    own = robust.load
+    return [("tuned optimum", load, load, load), (name, own.value, own.low, own.high)]
 
 
 def scatter_drawings(found: Amplification) -> dict[str, Callable[[Path], object]]:
@@ -170,8 +255,7 @@ def scatter_drawings(found: Amplification) -> dict[str, Callable[[Path], object]
         )
     }
     if len(found.loads) > 1:
-        best = [(name, load) for name, (load, _) in optima(found).items()]
         drawings["wheel/scatter_chart"] = partial(
-            view.draw_bands, found.loads, found.tuned, bands, best
+            view.draw_bands, found.loads, found.tuned, bands, marked_optima(found)
         )
     return drawings

@@ -1,8 +1,10 @@
 """From measured frequency and damping at several amplitudes to the friction of a joint.
 
-One mode with a patch of friction elements in parallel: their whole stiffness is a share of the
-mode's, and element i of n starts to slip at the amplitude x_max ((i - 1/2) / n)^q, as a patch does
-whose pressure falls towards its edge. Each element answers with its first harmonic in closed form.
+One mode with a patch of friction elements in parallel (Iwan 1966, doi:10.1115/1.3625199): their
+whole stiffness is a share of the mode's, and the part (x / x_max)^(1/q) of them slips at amplitudes
+below x, as a patch does whose pressure falls towards its edge. Each element answers with its first
+harmonic in closed form. Slip softens: what it costs in stiffness is tied to the damping that it
+gives. A joint that stiffens again has contacts that close: a stop beyond a clearance, without loss.
 Intervals come from the sensitivities of the fit; what the data do not determine is reported.
 """
 
@@ -20,35 +22,47 @@ from ..friction.closed_form import jenkins
 # frequency with the joint stuck [Hz], damping without friction [1], joint's share of the modal
 # stiffness [1], amplitude at which all of it slips [m], exponent of the distribution [1]
 PARAMETERS = ("stuck_frequency", "damping", "share", "full_slip", "exponent")
-# elements of the patch; doubling them moves damping by less than 1e-3 of it
-ELEMENTS = 200
-# relative weights: what a frequency and a damping were measured to
-FREQUENCY_ERROR = 5e-4
+# amplitude at which further contacts close [m], their share of the modal stiffness [1]
+STOP_PARAMETERS = ("clearance", "stop_share")
+# elements of the patch, graded in their limits; doubling them moves damping by less than 1e-3 of it
+ELEMENTS = 400
+# limit of the first element over the smallest amplitude: below it all slip
+FINEST = 1e-3
+# relative weights: what a frequency and a damping were measured to; frequencies of a joint scatter
+# by more than an instrument, with every loading and temperature
+FREQUENCY_ERROR = 1e-3
 DAMPING_ERROR = 0.05
 # half width of the 95 % interval of a logarithm from which a parameter counts as unknown: times 2
 UNKNOWN = np.log(2.0)
 # slopes q from which the fit starts; the lowest end wins
 STARTS = (0.4, 0.8, 1.6)
+# clearances over the largest amplitude, and shares of the stop, from which the fit starts
+STOP_STARTS = ((0.5, 0.05), (0.7, 0.05), (0.9, 0.05))
 
 
 @dataclass(frozen=True)
 class JointFit:
     """The best parameters and what they are worth."""
 
-    # (5,) in the order of PARAMETERS
+    # (p,) in the order of `names`
     values: np.ndarray
-    # (5, 2) 95 % intervals
+    # (p, 2) 95 % intervals
     intervals: np.ndarray
-    # (5,) whether the data determine the parameter
+    # (p,) whether the data determine the parameter
     known: np.ndarray
     # root of the mean square of the weighted misfit [1]
     misfit: float
     # (k,) of the measured amplitudes: used in the fit
     fitted: np.ndarray
 
+    @property
+    def names(self) -> tuple[str, ...]:
+        """PARAMETERS, with a stop STOP_PARAMETERS after them."""
+        return (PARAMETERS + STOP_PARAMETERS)[: len(self.values)]
+
     def sentence(self) -> str:
         """Which parameters the data determine, and which they do not."""
-        unknown = [name for name, known in zip(PARAMETERS, self.known, strict=True) if not known]
+        unknown = [name for name, known in zip(self.names, self.known, strict=True) if not known]
         if not unknown:
             return "the data determine all parameters of the joint"
         return (
@@ -57,16 +71,36 @@ class JointFit:
 
 
 def joint_curve(values: np.ndarray, amplitude: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Frequency [Hz] and damping [1] at amplitudes [m] for values of PARAMETERS."""
-    stuck, damping, share, full, exponent = values
-    places = (np.arange(ELEMENTS) + 0.5) / ELEMENTS
-    limits = full * places**exponent
+    """Frequency [Hz] and damping [1] at amplitudes [m].
+
+    Args:
+        values: (5,) of PARAMETERS, or (7,) with STOP_PARAMETERS.
+    """
+    stuck, damping, share, full, exponent = values[:5]
+    amplitude = np.asarray(amplitude, dtype=float)
+    edges = np.geomspace(min(FINEST * amplitude.min(), 0.5 * full), full, ELEMENTS + 1)
+    # what slips below the first edge is lost to stiffness and gives no loss
+    part = np.diff((edges / full) ** (1 / exponent))
+    limits = np.sqrt(edges[1:] * edges[:-1])
     # of elements with stiffness and limit 1: each depends on its amplitude over its limit alone
-    law = jenkins(np.asarray(amplitude)[:, None] / limits, 1.0, 1.0)
-    stiffness = share * law.stiffness.mean(axis=1)
-    loss = share * law.damping.mean(axis=1)
+    law = jenkins(amplitude[:, None] / limits, 1.0, 1.0)
+    stiffness = share * (law.stiffness @ part)
+    loss = share * (law.damping @ part)
     squared = 1 - share + stiffness
+    if len(values) > len(PARAMETERS):
+        clearance, stop = values[5:]
+        squared = squared + stop * stop_stiffness(amplitude, clearance)
     return stuck * np.sqrt(squared), damping + loss / (2 * squared)
+
+
+def stop_stiffness(amplitude: np.ndarray, clearance: float) -> np.ndarray:
+    """First-harmonic stiffness of a spring of stiffness 1 behind a clearance on both sides.
+
+    1 - (2 / pi) (asin r + r sqrt(1 - r^2)), r = clearance / amplitude (Gelb and Vander Velde,
+    Multiple-Input Describing Functions, 1968, App. B).
+    """
+    r = np.clip(clearance / np.asarray(amplitude, dtype=float), 0, 1)
+    return 1 - 2 / np.pi * (np.arcsin(r) + r * np.sqrt(1 - r**2))
 
 
 def fit_joint(
@@ -74,12 +108,14 @@ def fit_joint(
     frequency: np.ndarray,
     damping: np.ndarray,
     fitted: np.ndarray | None = None,
+    stop: bool = False,
 ) -> JointFit:
     """Least squares on frequencies and dampings at some of the amplitudes.
 
     Args:
         amplitude: (k,) [m], frequency (k,) [Hz], damping (k,) share of critical [1].
         fitted: (k,) bool, levels that are used; all when left out.
+        stop: also a stop beyond a clearance, for joints that stiffen again.
 
     Raises:
         InputError: too few levels, or numbers that are not positive.
@@ -88,8 +124,9 @@ def fit_joint(
     if not (np.isfinite(measured).all() and (measured > 0).all()):
         raise InputError("measured levels: expected positive finite numbers")
     used = np.ones(measured.shape[1], dtype=bool) if fitted is None else np.asarray(fitted)
-    if used.sum() < 3:
-        raise InputError(f"measured levels: {used.sum()} used, expected at least 3")
+    fewest = 4 if stop else 3
+    if used.sum() < fewest:
+        raise InputError(f"measured levels: {used.sum()} used, expected at least {fewest}")
     a, f, z = measured[:, used]
 
     def misfit(x: np.ndarray) -> np.ndarray:
@@ -98,12 +135,10 @@ def fit_joint(
             [(by_frequency / f - 1) / FREQUENCY_ERROR, (by_damping / z - 1) / DAMPING_ERROR]
         )
 
-    low = np.log([0.5 * f.min(), 1e-7, 1e-5, 1e-3 * a.min(), 0.05])
-    high = np.log([2.0 * f.max(), z.max(), 0.9, 1e4 * a.max(), 8.0])
-    ends = []
-    for exponent in STARTS:
-        start = np.log([f.max(), 0.9 * z.min(), 0.05, 3 * a.max(), exponent])
-        ends.append(least_squares(misfit, np.clip(start, low, high), bounds=(low, high)))
+    starts, (low, high) = _starts(a, f, z, stop)
+    ends = [
+        least_squares(misfit, np.clip(start, low, high), bounds=(low, high)) for start in starts
+    ]
     best = min(ends, key=lambda end: end.cost)
     half = _half_widths(best.jac, best.fun)
     return JointFit(
@@ -115,13 +150,34 @@ def fit_joint(
     )
 
 
+def _starts(
+    a: np.ndarray,
+    f: np.ndarray,
+    z: np.ndarray,
+    stop: bool,
+) -> tuple[list[np.ndarray], tuple[np.ndarray, np.ndarray]]:
+    """Logarithms of the parameters from which the fit starts, and their bounds."""
+    low = [0.5 * f.min(), 1e-7, 1e-5, 1e-3 * a.min(), 0.05]
+    high = [2.0 * f.max(), z.max(), 0.9, 1e4 * a.max(), 8.0]
+    own = [[f.max(), 0.9 * z.min(), 0.05, 3 * a.max(), exponent] for exponent in STARTS]
+    if not stop:
+        return [np.log(start) for start in own], (np.log(low), np.log(high))
+    # without clearance it is a part of the stuck joint, beyond the data it is not seen
+    low += [a.min(), 1e-5]
+    high += [a.max(), 1.0]
+    starts = [
+        np.log([*start, part * a.max(), share]) for start in own for part, share in STOP_STARTS
+    ]
+    return starts, (np.log(low), np.log(high))
+
+
 def _values(x: np.ndarray) -> np.ndarray:
     """Parameters from their logarithms."""
     return np.exp(x)
 
 
 def _half_widths(J: np.ndarray, misfit: np.ndarray) -> np.ndarray:
-    """(5,) half widths of the 95 % intervals of the logarithms; infinite where the data are blind.
+    """(p,) half widths of the 95 % intervals of the logarithms; infinite where the data are blind.
 
     The scatter is that of the misfit, but at least that of the stated errors of measurement.
     """

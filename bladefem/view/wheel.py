@@ -77,7 +77,7 @@ def draw_bands(
     load: np.ndarray,
     tuned: np.ndarray,
     quantiles: dict[str, np.ndarray],
-    best: Sequence[tuple[str, float]],
+    best: Sequence[tuple[str, float, float, float]],
     file: str | Path,
     unit: str = "N",
 ) -> None:
@@ -87,7 +87,7 @@ def draw_bands(
         load: (L,) [N].
         tuned: (L,) [m].
         quantiles: name to (L, 3) value and interval of the highest blade [m].
-        best: names and loads of the optima.
+        best: names of the optima, loads and ends of their intervals.
     """
     with canvas(file) as ax:
         ax.plot(load, 1e6 * tuned, color=COLOURS[6], marker="o", label="tuned wheel")
@@ -95,10 +95,14 @@ def draw_bands(
             middle, low, high = 1e6 * value.T
             ax.plot(load, middle, color=colour, marker="o", label=name)
             ax.fill_between(load, low, np.where(np.isfinite(high), high, middle), alpha=0.18)
-        for place, (name, at) in enumerate(best):
+        for place, (name, at, lowest, highest) in enumerate(best):
             ax.axvline(at, color="#888888", linewidth=1.0, linestyle=("--", ":")[place % 2])
+            words = f"{name}: {at:.4g} {unit}"
+            if highest > lowest:
+                ax.axvspan(lowest, highest, color="#888888", alpha=0.15, linewidth=0)
+                words += f" ({lowest:.4g} to {highest:.4g})"
             ax.annotate(
-                f"{name}: {at:.4g} {unit}",
+                words,
                 (at, 0.97 - 0.06 * place),
                 xycoords=("data", "axes fraction"),
                 textcoords="offset points",

@@ -6,7 +6,7 @@ all wheels.
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 
 import numpy as np
 from scipy import stats
@@ -27,6 +27,8 @@ from .resonance import Respond, WheelPeak, find_wheel_peak
 from .solve import TUNED, WheelSolution, solve_wheel
 
 CONFIDENCE = 0.95
+# of the bootstrap: its intervals then move by a few per cent of their width
+RESAMPLES = 1000
 
 
 @dataclass(frozen=True)
@@ -36,6 +38,20 @@ class Quantile:
     value: float
     low: float
     high: float
+
+
+@dataclass(frozen=True)
+class RobustOptimum:
+    """The load under which a share of all wheels stays lowest, with intervals by the bootstrap."""
+
+    # of the wheels
+    share: float
+    # [N]
+    load: Quantile
+    # quantile of the highest blade there [m]
+    height: Quantile
+    # share of the resamples whose optimum is an end of the loads: they leave it open there
+    at_end: float
 
 
 @dataclass(frozen=True)
@@ -142,6 +158,16 @@ def scatter_statistics(
     )
 
 
+def joined_loads(parts: Sequence[Amplification]) -> Amplification:
+    """The statistics of the same wheels under several loads."""
+    return Amplification(
+        **{
+            one.name: np.concatenate([getattr(part, one.name) for part in parts])
+            for one in fields(Amplification)
+        }
+    )
+
+
 def best_load(loads: np.ndarray, heights: np.ndarray) -> tuple[float, float]:
     """The load with the smallest height, between the loads by a parabola in the logarithms."""
     i = int(np.argmin(heights))
@@ -153,6 +179,39 @@ def best_load(loads: np.ndarray, heights: np.ndarray) -> tuple[float, float]:
     if vertex is None:
         return float(loads[i]), float(heights[i])
     return float(np.exp(vertex[0])), float(np.exp(vertex[1]))
+
+
+def robust_optimum(
+    found: Amplification,
+    share: float = 0.95,
+    confidence: float = CONFIDENCE,
+) -> RobustOptimum:
+    """The load with the smallest quantile of the highest blade, between the loads.
+
+    The interval is the bootstrap's: wheels are drawn again with replacement, each with its peaks
+    under all loads, as the same patterns are under each of them (Efron and Tibshirani, An
+    Introduction to the Bootstrap, 1993, Sect. 13.3). It knows the scatter of the sample, not what
+    lies between the loads.
+
+    Args:
+        share: of the wheels that stay below.
+        confidence: of the intervals.
+    """
+    rng = np.random.default_rng(0)
+    loads, wheels = found.peak.shape
+    drawn = rng.integers(wheels, size=(RESAMPLES, wheels))
+    heights = np.quantile(found.peak[:, drawn], share, axis=2).T
+    ends = np.array([best_load(found.loads, row) for row in heights])
+    tail = 100 * (1 - confidence) / 2
+    low, high = np.percentile(ends, [tail, 100 - tail], axis=0)
+    load, height = best_load(found.loads, np.quantile(found.peak, share, axis=1))
+    lowest = heights.argmin(axis=1)
+    return RobustOptimum(
+        share,
+        Quantile(load, float(low[0]), float(high[0])),
+        Quantile(height, float(low[1]), float(high[1])),
+        float(np.mean((lowest == 0) | (lowest == loads - 1))),
+    )
 
 
 def peak_of_pattern(

@@ -1,5 +1,5 @@
 """A joint's friction from measured levels: known parameters come back, and what cannot be told is
-said; the measured bolted beam is missed as the documentation says.
+said; the measured bolted beam as the documentation says.
 """
 
 from pathlib import Path
@@ -8,7 +8,12 @@ import numpy as np
 import pytest
 
 from bladefem.errors import InputError
-from bladefem.study.joint_identification import PARAMETERS, fit_joint, joint_curve
+from bladefem.study.joint_identification import (
+    PARAMETERS,
+    fit_joint,
+    joint_curve,
+    stop_stiffness,
+)
 
 BEAM = Path(__file__).parents[2] / "benchmarks" / "bolted_beam.csv"
 TRUE = np.array([80.0, 1.5e-3, 0.04, 4e-4, 0.8])
@@ -36,23 +41,72 @@ def test_micro_slip_alone_does_not_tell_the_full_slip():
     np.testing.assert_allclose(predicted[1], further[1], rtol=0.05)
 
 
-def test_bolted_beam_is_predicted_as_far_as_it_goes():
-    """Fitted to four levels of eight. Damping of the others is low by 8 to 22 % (15 % were wanted),
-    and the frequency, which rises again in the test, by up to 0.9 % (0.2 % were wanted): friction
-    alone softens a joint.
+def test_slip_costs_stiffness_as_masing_says():
+    """Elements with evenly spread limits: backbone and loss in closed form.
+
+    The force of unit stiffness at amplitude x is x - x^2 / 2 below full slip 1, the energy of a
+    cycle by Masing's rule 2/3 x^3, and the first-harmonic damping is that energy over pi x^2.
     """
+    values = np.array([80.0, 1e-9, 0.1, 1.0, 1.0])
+    a = np.array([0.05, 0.2, 0.6, 1.0])
+    frequency, damping = joint_curve(values, a)
+    squared = (frequency / 80.0) ** 2
+    np.testing.assert_allclose(2 * squared * damping, 0.1 * 2 / 3 * a / np.pi, rtol=2e-4)
+    # the secant of the first harmonic, by quadrature of the loop
+    phase = (np.arange(20000) + 0.5) * np.pi / 20000
+    for x, found in zip(a, squared, strict=True):
+        gone = x * (1 - np.cos(phase))
+        force = x - x**2 / 2 - (gone - gone**2 / 4)
+        own = 2 / np.pi * np.mean(force * np.cos(phase)) * np.pi / x
+        assert found == pytest.approx(1 - 0.1 + 0.1 * own, rel=1e-5)
+
+
+def test_a_stop_stiffens_beyond_its_clearance():
+    """Against the first harmonic of its force in time."""
+    a = np.array([0.5, 1.0, 1.2, 3.0, 50.0])
+    phase = 2 * np.pi * (np.arange(100000) + 0.5) / 100000
+    x = a[:, None] * np.cos(phase)
+    force = np.sign(x) * np.maximum(abs(x) - 1.0, 0)
+    expected = 2 * np.mean(force * np.cos(phase), axis=1) / a
+    np.testing.assert_allclose(stop_stiffness(a, 1.0), expected, atol=1e-8)
+    values = np.array([*TRUE, 1.5e-4, 0.03])
+    levels = np.geomspace(2e-5, 2e-3, 12)
+    found = fit_joint(levels, *joint_curve(values, levels), stop=True)
+    np.testing.assert_allclose(found.values, values, rtol=0.05)
+    assert found.names[5:] == ("clearance", "stop_share") and found.known.all()
+
+
+def measured_beam():
     lines = [line for line in BEAM.read_text().splitlines() if not line.startswith("#")]
     data = np.genfromtxt(lines, delimiter=",", names=True)
-    a = 1e-6 * data["displacement_um"]
-    f = data["frequency_Hz"]
-    z = data["damping_percent"] / 100
+    return 1e-6 * data["displacement_um"], data["frequency_Hz"], data["damping_percent"] / 100
+
+
+def test_bolted_beam_by_friction_alone():
+    """Fitted to the lowest four levels of eight: the damping of the others within 15 %; the
+    frequency, which rises again in the test, is missed by 0.3 to 1 %, since slip softens a joint.
+    """
+    a, f, z = measured_beam()
     found = fit_joint(a, f, z, np.arange(8) < 4)
     frequency, damping = joint_curve(found.values, a)
     np.testing.assert_allclose(damping[:4], z[:4], rtol=0.05)
     np.testing.assert_allclose(frequency[:4], f[:4], rtol=1e-3)
-    miss = damping[4:] / z[4:] - 1
-    assert miss.max() < -0.05 and miss.min() > -0.25
-    assert -0.01 < (frequency[4:] / f[4:] - 1).min() < -0.002
+    np.testing.assert_allclose(damping[4:], z[4:], rtol=0.15)
+    miss = frequency[4:] / f[4:] - 1
+    assert -0.011 < miss.min() and miss.max() < -0.002
+    assert not found.known[PARAMETERS.index("full_slip")]
+
+
+def test_bolted_beam_with_contacts_that_close():
+    """The fifth level is the first that feels them: fitted to five, the other three are predicted
+    within 5 % in damping and 0.1 % in frequency.
+    """
+    a, f, z = measured_beam()
+    found = fit_joint(a, f, z, np.arange(8) < 5, stop=True)
+    frequency, damping = joint_curve(found.values, a)
+    np.testing.assert_allclose(damping[5:], z[5:], rtol=0.05)
+    np.testing.assert_allclose(frequency[5:], f[5:], rtol=1e-3)
+    assert a[2] < found.values[5] < a[4]
 
 
 def test_bad_levels_are_refused():

@@ -5,7 +5,6 @@ many.
 from __future__ import annotations
 
 import time
-from collections.abc import Callable
 from dataclasses import replace
 
 import numpy as np
@@ -18,10 +17,14 @@ from ...scene.tables import Scene
 from ...util.communicator import Communicator
 from ...util.progress import Progress, unwatched
 from ...wheel.model import Pattern, Wheel, frequency_pattern
-from ...wheel.resonance import Respond
 from ...wheel.scatter import MAX_DEVIATIONS, drawn_patterns
 from ...wheel.solve import WheelSolution
-from ...wheel.statistics import Amplification, scatter_statistics, wheel_respond
+from ...wheel.statistics import (
+    Amplification,
+    joined_loads,
+    scatter_statistics,
+    wheel_respond,
+)
 from ..pipeline.assemble_model import LoadCase
 from ..pipeline.case_models import load_cases
 from ..pipeline.damped_motion import DampedStress
@@ -144,41 +147,48 @@ def scatter_of_run(
         raise InputError("study.masses: expected one damper mass for 'bladefem scatter'")
     sector, _ = _kept_sector(run, curves, Bodies(scene, run.mesh, comm, progress), comm)
     made = _wheels(run, sector, curves)
-    wheels = {curve.load: wheel for curve, wheel in zip(curves, made, strict=True)}
-    by_load = {curve.load: curve for curve in curves}
+    return joined_loads(
+        [
+            _kept_statistics(run, sector, curve, wheel, comm, progress)
+            for curve, wheel in zip(curves, made, strict=True)
+        ]
+    )
 
-    def patterns(wheel: Wheel) -> list[Pattern]:
-        return drawn_patterns(
+
+def _kept_statistics(
+    run: SolvedRun,
+    sector: WheelSector,
+    curve: Curve,
+    wheel: Wheel,
+    comm: Communicator | None,
+    progress: Progress,
+) -> Amplification:
+    """Statistics under the load of one curve, computed or found in the folder."""
+    scene = run.scene
+    spread = MAX_DEVIATIONS * (scene.mistuning.scatter or 0.0) + 0.005
+    H = max(curve.settings.harmonics, *wheel.excitation)
+    samples = max(curve.settings.samples, 8 * (H + 1))
+
+    def compute() -> Amplification:
+        patterns = drawn_patterns(
             wheel,
             scene_scatter(scene),
             scene.mistuning.wheels,
             lambda deviation: frequency_pattern(sector.families, deviation),
         )
+        return scatter_statistics(
+            {curve.load: wheel},
+            {curve.load: patterns},
+            lambda load, pattern: frequency_grid(wheel, curve, pattern, spread),
+            lambda wheel, pattern: wheel_respond(wheel, pattern, H, samples),
+            comm,
+            SEARCH,
+            progress,
+        )
 
-    spread = MAX_DEVIATIONS * scene.mistuning.scatter + 0.005
-    return scatter_statistics(
-        wheels,
-        {load: patterns(wheel) for load, wheel in wheels.items()},
-        lambda load, pattern: frequency_grid(wheels[load], by_load[load], pattern, spread),
-        _respond_by(by_load, wheels),
-        comm,
-        SEARCH,
-        progress,
-    )
-
-
-def _respond_by(
-    curves: dict[float, Curve], wheels: dict[float, Wheel]
-) -> Callable[[Wheel, Pattern], Respond]:
-    """Solves a wheel with the settings of its load's curve."""
-    load_of = {id(wheel): load for load, wheel in wheels.items()}
-
-    def respond(wheel: Wheel, pattern: Pattern) -> Respond:
-        settings = curves[load_of[id(wheel)]].settings
-        H = max(settings.harmonics, *wheel.excitation)
-        return wheel_respond(wheel, pattern, H, max(settings.samples, 8 * (H + 1)))
-
-    return respond
+    key = stage_key("scatter", scene, curve.load, curve.peak.omega)
+    found, _ = stage(run.folder, f"scatter_{curve.load:g}N", key, compute, comm)
+    return found
 
 
 def _kept_sector(

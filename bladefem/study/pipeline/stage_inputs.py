@@ -119,6 +119,13 @@ STAGE_INPUTS = {
         fields=("operation", "excitation", "damper.axial"),
         code=("bladefem.study",),
     ),
+    # many drawn wheels under one load
+    "scatter": StageInputs(
+        after=("wheel", "response"),
+        fields=("mistuning",),
+        without=("mistuning.pattern",),
+        code=("bladefem.wheel",),
+    ),
     "mass pressure": StageInputs(
         after=("mesh",),
         fields=("material", "foundation.skew", "study.loads"),
