@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 from geometry.quality import quality_rows
 
 from ..scene.units import show
+from ..util.message import by_level
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -208,14 +209,31 @@ def table(rows: pd.DataFrame) -> str:
 
 
 def summary(run: Run) -> str:
-    """Messages of the run, where the time went and where the results are."""
+    """Where the time went, what the run has to say, warnings last, and where the results are."""
     total = sum(run.timings.values())
     rows = [
         [name, f"{t:.2f}", f"{100 * t / total if total else 0:.0f}"]
         for name, t in run.timings.items()
     ]
     table = plain([*rows, ["total", f"{total:.2f}", "100"]], ["stage", "time [s]", "share [%]"])
-    return "\n".join([*run.messages, table, f"results: {run.folder}"])
+    said = by_level(run.messages)
+    told = [
+        "\n".join([f"{title}:", *(f"  - {text}" for text in said[level])])
+        for title, level in MESSAGE_TITLES.items()
+        if said[level]
+    ]
+    page = None if run.folder is None else run.folder / "report.html"
+    report = f"report: {page}\n" if page is not None and page.is_file() else ""
+    return "\n\n".join([table, *told, f"{report}results: {run.folder}"])
+
+
+# what a run says, by level; what the reader has to know stands last, next to the prompt
+MESSAGE_TITLES = {
+    "kept": "timing",
+    "method": "method",
+    "information": "information",
+    "warnings": "warning",
+}
 
 
 def _is_number(text: str) -> bool:

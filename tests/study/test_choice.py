@@ -30,7 +30,8 @@ from bladefem.study.adaptive.family import (
 from bladefem.study.adaptive.indicators import indicate_errors, richer_settings
 from bladefem.study.adaptive.settings import Settings, enriched_settings, first_for
 from bladefem.study.pipeline.assemble_model import LoadCase
-from bladefem.study.pipeline.loads import beyond_tolerance, curve_of
+from bladefem.study.pipeline.loads import curve_of
+from bladefem.study.pipeline.response_remarks import beyond_tolerance
 
 
 @pytest.mark.parametrize("accuracy", [0.02, 0.001])
@@ -123,7 +124,7 @@ def test_a_response_reports_told_against_tolerated_error_at_each_point():
     top = curve.frequency == curve.peak_frequency
     assert (curve.estimated < curve.tolerated)[top].all() and curve.checked[top].all()
     missed = int((curve.estimated > curve.tolerated).sum())
-    assert (f"{missed} of {len(top)} points" in beyond_tolerance(curve)) == (missed > 0)
+    assert (f"{missed} of {len(top)} points" in beyond_tolerance([curve])) == (missed > 0)
 
 
 def test_settings_tell_how_many_contact_points_there_are():

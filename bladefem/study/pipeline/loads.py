@@ -261,23 +261,6 @@ def _record(p: Solution) -> dict[str, Any]:
     }
 
 
-def beyond_tolerance(curve: Curve) -> str:
-    """A sentence where points next to the resonance are estimated to be wrong by more than the
-    scene's accuracy of the highest amplitude; empty where all keep it.
-    """
-    away = curve.frequency != curve.peak_frequency
-    missed = away & curve.converged & (curve.estimated > curve.tolerated)
-    if not missed.any():
-        return ""
-    band = curve.frequency[missed]
-    return (
-        f"load {curve.load:g} N: next to the resonance {missed.sum()} of {len(missed)} points, "
-        "from "
-        f"{band.min():.5g} to {band.max():.5g} Hz, are estimated to be off by more than the "
-        "accuracy of the highest amplitude (estimated and tolerated error in the table of points)"
-    )
-
-
 def summary(curves: list[Curve], limits: tuple[Limit, Limit]) -> dict[str, np.ndarray]:
     """The design table: one row a load, from no damper (load 0) to full stick (load inf)."""
     free, stuck = (_linear_row(limit) for limit in limits)

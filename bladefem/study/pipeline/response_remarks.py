@@ -12,7 +12,7 @@ from ..adaptive.settings import Settings
 from .best_load import BestLoad
 from .damped_motion import DampedStress
 from .load_interval import interval_sentence
-from .loads import Curve, beyond_tolerance
+from .loads import Curve
 from .resonance_list import reach_sentence
 from .stability import stability_sentence, unstable_sentence
 
@@ -48,9 +48,7 @@ def response_remarks(
                 "converge; they are marked in tables and pictures"
             )
         )
-    for text in filter(None, map(beyond_tolerance, curves)):
-        remarks.append(warning(text))
-    single = [f"{c.load:g} N" for c in curves if c.unfollowed]
+    single = [load_of(c) for c in curves if c.unfollowed]
     if single:
         remarks.append(
             warning(
@@ -59,38 +57,76 @@ def response_remarks(
             )
         )
     remarks.extend(warning(text) for text in map(reach_sentence, curves) if text)
-    for c in curves:
-        remarks.extend(map(warning, _resonance_warnings(c, scene.accuracy)))
+    remarks.extend(map(warning, resonance_warnings(curves, scene.accuracy)))
+    remarks.extend(map(warning, filter(None, [beyond_tolerance(curves)])))
     return remarks
 
 
-def _resonance_warnings(c: Curve, accuracy: float) -> Iterator[str]:
-    """Why the highest point of a curve may be wrong."""
+def load_of(curve: Curve) -> str:
+    """ "80 N", with the damper's mass where several are studied."""
+    return f"{curve.load:g} N" + ("" if curve.mass is None else f" of {1e3 * curve.mass:.4g} g")
+
+
+def beyond_tolerance(curves: list[Curve]) -> str:
+    """A sentence where points away from the resonance are estimated to be wrong by more than the
+    scene's accuracy of the highest amplitude; empty where all keep it.
+    """
+    missed = {}
+    for c in curves:
+        beyond = c.converged & (c.estimated > c.tolerated) & (c.frequency != c.peak_frequency)
+        if beyond.any():
+            missed[load_of(c)] = f"{beyond.sum()} of {len(beyond)} points"
+    if not missed:
+        return ""
+    each = ", ".join(f"{load} ({count})" for load, count in missed.items())
+    return (
+        "away from the resonance, points of the curves are estimated to be off by more than the "
+        f"accuracy of the highest amplitude: {each}; columns estimated_error and tolerated_error "
+        "of points.csv"
+    )
+
+
+def resonance_warnings(curves: list[Curve], accuracy: float) -> Iterator[str]:
+    """Why the highest points of curves may be wrong: one sentence a reason, with all its loads."""
+    beside = [load_of(c) for c in curves if _beside_unsolved(c)]
+    if beside:
+        yield (
+            f"under {', '.join(beside)} the highest point that was solved lies next to one that "
+            "was not; the resonance may be higher"
+        )
+    unknown = [load_of(c) for c in curves if c.error == np.inf]
+    if unknown:
+        yield (
+            f"under {', '.join(unknown)} the error of the resonance amplitude is unknown, since "
+            "richer models of it were not solved; nothing was refined because of that"
+        )
+    above = [c for c in curves if c.error is not None and accuracy < c.error < np.inf]
+    if above:
+        each = ", ".join(f"{load_of(c)} {100 * (c.error or 0):.2g} %" for c in above)
+        yield (
+            "estimated error of the resonance amplitude above the wanted "
+            f"{100 * accuracy:.2g} %: {each}{_of_the_contact_mesh(above)}"
+        )
+
+
+def _beside_unsolved(c: Curve) -> bool:
+    """Whether a point next to the highest one did not converge."""
     near = np.flatnonzero(c.frequency == c.peak_frequency)[0] + np.array([-1, 1])
-    if not c.converged[near[(near >= 0) & (near < len(c.frequency))]].all():
-        yield (
-            f"load {c.load:g} N: the highest point that was solved lies next to one that was not; "
-            "the resonance may be higher"
-        )
-    if c.error == np.inf:
-        yield (
-            f"load {c.load:g} N: the error of the resonance amplitude is unknown, since richer "
-            "models of it were not solved; nothing was refined because of that"
-        )
-    elif c.error is not None and c.error > accuracy:
-        yield (
-            f"load {c.load:g} N: estimated error {100 * c.error:.2g} % of the resonance "
-            f"amplitude, above the wanted {100 * accuracy:.2g} %{_of_the_contact_mesh(c)}"
-        )
+    return not c.converged[near[(near >= 0) & (near < len(c.frequency))]].all()
 
 
-def _of_the_contact_mesh(curve: Curve) -> str:
-    """The part of an estimated error that a finer contact mesh lowers, where it is the larger."""
-    if curve.error is None or not np.isfinite(curve.halved) or curve.halved < curve.error / 2:
+def _of_the_contact_mesh(curves: list[Curve]) -> str:
+    """The part of estimated errors that a finer contact mesh lowers, where it is the larger."""
+    halved = [
+        f"{100 * c.halved:.2g} % under {load_of(c)}"
+        for c in curves
+        if np.isfinite(c.halved) and c.halved >= (c.error or 0) / 2
+    ]
+    if not halved:
         return ""
     return (
-        f"; {100 * curve.halved:.2g} % are what half as many contact points change, expected a "
-        "finer contact mesh (mesh.seat_elements, mesh.contact_size)"
+        f"; {', '.join(halved)} are what half as many contact points change, expected a finer "
+        "contact mesh (mesh.seat_elements, mesh.contact_size)"
     )
 
 

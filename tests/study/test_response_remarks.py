@@ -1,0 +1,58 @@
+"""Remarks on responses: one sentence a reason, with all the loads that it holds for."""
+
+from __future__ import annotations
+
+from types import SimpleNamespace
+
+import numpy as np
+
+from bladefem.study.pipeline.response_remarks import beyond_tolerance, resonance_warnings
+
+
+def curve(load, error, mass=None, halved=np.nan, estimated=(0.0, 0.0, 0.0), converged=True):
+    """Three points, the resonance in the middle."""
+    return SimpleNamespace(
+        load=load,
+        mass=mass,
+        error=error,
+        halved=halved,
+        frequency=np.array([99.0, 100.0, 101.0]),
+        peak_frequency=100.0,
+        converged=np.array([converged, True, True]),
+        estimated=np.array(estimated),
+        tolerated=np.array([0.1, 0.05, 0.1]),
+    )
+
+
+def test_loads_with_one_reason_share_a_sentence():
+    curves = [curve(9.0, np.inf), curve(18.0, 0.51), curve(36.0, 0.67), curve(73.0, 0.01)]
+    unknown, above = resonance_warnings(curves, 0.05)
+    assert unknown.startswith("under 9 N the error of the resonance amplitude is unknown")
+    assert above == (
+        "estimated error of the resonance amplitude above the wanted 5 %: 18 N 51 %, 36 N 67 %"
+    )
+    assert list(resonance_warnings(curves[3:], 0.05)) == []
+
+
+def test_the_part_of_the_contact_mesh_is_told_where_it_is_the_larger():
+    curves = [curve(18.0, 0.08, halved=0.07), curve(36.0, 0.09, halved=0.01)]
+    (above,) = resonance_warnings(curves, 0.05)
+    assert "; 7 % under 18 N are what half as many contact points change" in above
+
+
+def test_a_resonance_next_to_an_unsolved_point_is_told():
+    curves = [curve(18.0, 0.01, mass=0.02, converged=False), curve(36.0, None)]
+    (told,) = resonance_warnings(curves, 0.05)
+    assert told.startswith("under 18 N of 20 g the highest point that was solved lies next to")
+
+
+def test_points_beyond_their_tolerance_are_counted_for_each_load():
+    """The resonance itself has its own sentence."""
+    curves = [
+        curve(9.0, 0.0, estimated=(0.2, 0.2, np.inf)),
+        curve(18.0, 0.0, estimated=(0.0, 0.2, 0.0)),
+        curve(36.0, 0.0, estimated=(0.2, 0.0, 0.0)),
+    ]
+    told = beyond_tolerance(curves)
+    assert "9 N (2 of 3 points), 36 N (1 of 3 points); columns" in told
+    assert beyond_tolerance(curves[1:2]) == ""
