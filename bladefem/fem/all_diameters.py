@@ -26,7 +26,7 @@ from .eigensolver import Eigensolver
 from .flexibility import Flexibility, flexible
 from .linalg import Folded, apply, combined, dot, inertia, minus, mix
 from .memory import give_back
-from .modes import BLOCKS, SLEPC, TOLERANCE, mode_set, pairs
+from .modes import BLOCKS, SLEPC, TOLERANCE, mode_set, pairs, pairs_together
 
 # modes beyond those asked for, carried along
 GUARD = 2
@@ -36,6 +36,8 @@ MORE = 12
 FIRST = (0, 1, 1 / 3, 1 / 6, 2 / 3)
 # numbers of solved diameters from which the others are guessed
 LEVELS = (3, 4, 5)
+# diameters solved from scratch at a time: more of them would save little and take memory
+TOGETHER = 3
 # columns of a sparse product at a time, to spare memory
 CHUNK = 32
 # error of a vector's direction; that of a frequency is its square
@@ -145,30 +147,47 @@ def eigenpairs(
     solved.
     """
     cons = {n: at_diameter(t, n) for n in diameters}
+    order = _diameter_order(sorted(cons))
+    guessed = len(order) > LEVELS[0] and not direct
+    scratch = order[: LEVELS[0]] if guessed else order
     blocks: list[np.ndarray] = []
+    for first in range(0, len(scratch), TOGETHER):
+        some = [flexible(cons[n]) for n in scratch[first : first + TOGETHER]]
+        solved = pairs_together(some, count, tolerance, MORE if guessed else GUARD, solver)
+        for flex, (lam, X) in zip(some, solved, strict=True):
+            if guessed:
+                blocks.append(X)
+            yield _first_pairs(Eigenpairs(flex, lam, X), count, guessed)
     space = None
-    for i, n in enumerate(_diameter_order(sorted(cons))):
-        if i in LEVELS and not direct:
+    for i, n in enumerate(order[len(scratch) :], len(scratch)):
+        if i in LEVELS:
             give_back()
             space = _extend_space(t, blocks, space)
             blocks = []
-        helps = len(cons) > LEVELS[0] and i < LEVELS[-1] and not direct
+        # always so: the first of the levels comes first
+        assert space is not None
+        helps = i < LEVELS[-1]
         # the last ones need a step or two: guards would not pay
         guess = count + (GUARD if helps else 0)
-        start = (
-            None
-            if space is None
-            else _initial_vectors(space, cons[n], 2 * np.pi * n / t.sectors, guess)
-        )
+        start = _initial_vectors(space, cons[n], 2 * np.pi * n / t.sectors, guess)
         found = _solve_pairs(
             flexible(cons[n]), count, start, solver, tolerance, MORE if helps else GUARD
         )
         if helps:
             blocks.append(found.X)
-        few = slice(0, count + GUARD)
-        yield replace(
-            found, lam=found.lam[few], X=found.X[:, few].copy(order="F") if helps else found.X
-        )
+        yield _first_pairs(found, count, helps)
+
+
+def _first_pairs(
+    found: Eigenpairs,
+    count: int,
+    copied: bool,
+) -> Eigenpairs:
+    """Those wanted and the guards; a copy where the others' memory is needed for something else."""
+    few = slice(0, count + GUARD)
+    return replace(
+        found, lam=found.lam[few], X=found.X[:, few].copy(order="F") if copied else found.X
+    )
 
 
 def _diameter_order(order: list[int]) -> list[int]:

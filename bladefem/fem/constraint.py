@@ -27,6 +27,9 @@ from .linalg import Doubled, Folded, Matrix, combined
 from .ordering import interior_first
 from .supports import held_directions
 
+# largest difference of masses of two directions, of the largest mass: rounding
+SAME_MASS = 1e-14
+
 
 @dataclass(frozen=True)
 class Opened:
@@ -42,6 +45,8 @@ class Opened:
     K: sp.csr_matrix
     # [kg]
     M: sp.csr_matrix
+    # (n_open/dim,)*2 the mass of one direction; None where directions differ
+    nodal_mass: sp.csr_matrix | None
     # K with its interior eliminated
     core: core.Core
 
@@ -180,9 +185,9 @@ def at_diameter(t: Transformation, nodal_diameter: int | None) -> Constrained:
     T = (t.low + phase * high_part(t)).tocsr()
     if t.opened is not None:
         C = T[t.opened.places]
-        return Constrained(
-            t.body, T, own, Folded(t.opened.K, C, t.opened.core), Folded(t.opened.M, C, None), n
-        )
+        stiffness = Folded(t.opened.K, C, t.opened.core)
+        mass = Folded(t.opened.M, C, None, t.opened.nodal_mass)
+        return Constrained(t.body, T, own, stiffness, mass, n)
     if real:
         K, M = (combined(A[0], phase, A[1]) for A in (t.K, t.M))
     else:
@@ -488,9 +493,31 @@ def _open_sector(
     rim = core.rim_of((abs(low) + abs(high))[places].tocsr())
     if len(rim) == len(places):
         return None
-    return Opened(
-        T, places, K, M, core.eliminate(K, rim, order=interior_first(K, rim, places // body.dim))
-    )
+    order = interior_first(K, rim, places // body.dim)
+    nodal = _of_one_direction(M, places, body.dim)
+    return Opened(T, places, K, M, nodal, core.eliminate(K, rim, order=order))
+
+
+def _of_one_direction(
+    M: sp.csr_matrix,
+    places: np.ndarray,
+    dim: int,
+) -> sp.csr_matrix | None:
+    """The nodes' part of a mass matrix that is the same in all directions; None for others."""
+    if len(places) % dim or M.nnz % dim:
+        return None
+    whole = places.reshape(-1, dim) - np.arange(dim)
+    if (whole % dim).any() or (whole != whole[:, :1]).any():
+        return None
+    M.sort_indices()
+    nodal = M[::dim, ::dim].tocsr()
+    nodal.sort_indices()
+    again = sp.kron(nodal, sp.identity(dim), "csr")
+    again.sort_indices()
+    same = np.array_equal(again.indptr, M.indptr) and np.array_equal(again.indices, M.indices)
+    if not same or abs(again.data - M.data).max(initial=0.0) > SAME_MASS * abs(M.data).max():
+        return None
+    return nodal
 
 
 def _project_matrix(A: sp.csr_matrix, T: sp.csr_matrix) -> sp.csr_matrix:

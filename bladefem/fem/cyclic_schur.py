@@ -10,7 +10,6 @@ real and imaginary parts. One rank only.
 from __future__ import annotations
 
 from dataclasses import dataclass
-from functools import partial
 from typing import Any
 
 import numpy as np
@@ -140,12 +139,16 @@ def close(
         return Rim(
             core, inner, on_face, Cb, lu_factor(S), core.factor.negative + _count_negative(S)
         )
+    floats = "the sector's stiffness is not positive definite: it floats, or it has buckled"
     try:
-        return Rim(core, inner, on_face, Cb, cho_factor(S, lower=True), -1)
+        dense = cho_factor(S, lower=True)
     except np.linalg.LinAlgError as error:
-        raise NotSolvedError(
-            "the sector's stiffness is not positive definite: it floats, or it has buckled"
-        ) from error
+        raise NotSolvedError(floats) from error
+    # of a singular matrix rounding leaves a last pivot of either sign
+    pivots = dense[0].diagonal().real ** 2
+    if (pivots < len(S) * np.finfo(float).eps * S.diagonal().real).any():
+        raise NotSolvedError(floats)
+    return Rim(core, inner, on_face, Cb, dense, -1)
 
 
 def negative(core: Core, C: sp.csr_matrix) -> int:
@@ -162,27 +165,61 @@ def solve(rim: Rim, B: np.ndarray) -> np.ndarray:
     """Solve for a block of vectors (n_free, k)."""
     X = np.empty(B.shape, np.result_type(B, rim.C.dtype), order="F")
     made = rim.core.bridge
-    one_go = _solve_two_sweeps if made is None else partial(_solve_one_sweep, made)
     for first in range(0, B.shape[1], BATCH):
         part = slice(first, first + BATCH)
-        X[rim.inner, part], X[rim.masters, part] = one_go(rim, B[:, part])
+        if made is None:
+            X[rim.inner, part], X[rim.masters, part] = _solve_two_sweeps(rim, B[:, part])
+        else:
+            ((inside, on_face),) = _solve_one_sweep(made, [(rim, B[:, part])])
+            X[rim.inner, part] = inside
+            X[rim.masters, part] = on_face
     return X
 
 
-def _solve_one_sweep(made: Bridge, rim: Rim, B: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Solution inside and on the low cut face, by one sweep down and one up."""
-    core = rim.core
-    on_face = []
+def solve_together(systems: list[tuple[Rim, np.ndarray]]) -> list[np.ndarray]:
+    """Solve for a few vectors (n_free, k) in each of several nodal diameters.
+
+    A sweep over the factors of the interior reads them once, whatever the number of vectors: four
+    cost hardly more than one.
+
+    Args:
+        systems: nodal diameters on the same core, and their loads.
+    """
+    made = systems[0][0].core.bridge
+    many = sum(B.shape[1] for _, B in systems) > BATCH
+    if made is None or many or len(systems) == 1:
+        return [solve(rim, B) for rim, B in systems]
+    out = []
+    for (rim, B), (inside, on_face) in zip(systems, _solve_one_sweep(made, systems), strict=True):
+        X = np.empty(B.shape, np.result_type(B, rim.C.dtype), order="F")
+        X[rim.inner] = inside
+        X[rim.masters] = on_face
+        out.append(X)
+    return out
+
+
+def _solve_one_sweep(
+    made: Bridge, systems: list[tuple[Rim, np.ndarray]]
+) -> list[tuple[np.ndarray, np.ndarray]]:
+    """Solutions inside and on the low cut face, by one sweep down and one up for all systems."""
+    core = systems[0][0].core
+    loads = [B.astype(np.result_type(B, rim.C.dtype), copy=False) for rim, B in systems]
+    wide = [_widen_columns(core, B[rim.inner]) for (rim, _), B in zip(systems, loads, strict=True)]
+    ends = np.cumsum([W.shape[1] for W in wide]).tolist()
+    columns = [slice(*pair) for pair in zip([0, *ends], ends, strict=False)]
+    faces: list[np.ndarray] = []
 
     def answer(r: np.ndarray) -> np.ndarray:
-        on_face.append(face_solve(rim, B[rim.masters] + rim.C.conj().T @ _join_parts(r, B)))
-        return _split_parts(rim.C @ on_face[-1], k)
+        moved = []
+        for (rim, _), B, part in zip(systems, loads, columns, strict=True):
+            reduced = rim.C.conj().T @ _join_parts(r[:, part], B)
+            faces.append(face_solve(rim, B[rim.masters] + reduced))
+            moved.append(_split_parts(rim.C @ faces[-1], part.stop - part.start))
+        return np.hstack(moved)
 
-    B = B.astype(np.result_type(B, rim.C.dtype))
-    k = B.shape[1] * (2 if np.iscomplexobj(B) else 1)
-    return _join_parts(
-        through(made, _widen_columns(core, B[rim.inner]), answer)[core.inner], B
-    ), on_face[-1]
+    X = through(made, np.hstack(wide) if len(wide) > 1 else wide[0], answer)[core.inner]
+    insides = [_join_parts(X[:, part], B) for B, part in zip(loads, columns, strict=True)]
+    return list(zip(insides, faces, strict=True))
 
 
 def _solve_two_sweeps(rim: Rim, B: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

@@ -4,10 +4,10 @@ zero with the factors that are there already.
 SLEPc sees a real symmetric pencil. A complex Hermitian one (nodal diameters between 0 and N/2)
 appears as its doubled real twin, whose eigenvalues come in pairs x and j x. In exact arithmetic the
 space built on one real vector holds one of each pair: the Lanczos coefficients of a Hermitian
-matrix are real. Rounding would let the others grow in; ``_Inverse`` takes the components along j
-times the earlier directions off each new one, so that within a few restarts no pair comes twice;
-repeated ones are dropped in the end. What the iteration may miss (the second vector of a truly
-double eigenvalue) is for the inertia count to notice.
+matrix are real. Rounding would let the others grow in; ``_times_inverse`` takes the components
+along j times the earlier directions off each new one, so that within a few restarts no pair comes
+twice; repeated ones are dropped in the end. What the iteration may miss (the second vector of a
+truly double eigenvalue) is for the inertia count to notice.
 
 PETSc options of the user (-eps_ncv 60, -eps_monitor, -eps_type ...) act after the settings here.
 """
@@ -16,6 +16,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass, field
+from functools import partial
 
 import numpy as np
 
@@ -29,6 +30,14 @@ from .linalg import apply, dot, minus, mix
 RESTARTS = 100
 # basis vectors beyond twice the pairs wanted: fewer restart once more, more are not needed
 MORE_VECTORS = 2
+# columns that a growing block of vectors has room for at first
+FIRST_ROOM = 48
+# relative difference up to which a vector is a multiple of another: rounding
+SAME = 1e-14
+# share of earlier directions in a new one that is rounding
+ROUNDING = 1e-14
+# imaginary part of products with earlier directions, of the largest one, that may grow on
+HARMLESS = 1e-12
 # share of a direction beyond which it counts as new, after those that are known
 NEW = 1e-6
 # largest imaginary part of products with earlier directions, for a direction of the same space
@@ -49,6 +58,37 @@ class Eigensolver:
     options: str = ""
 
 
+class _Columns:
+    """Vectors side by side in one array, which grows as they come."""
+
+    def __init__(self) -> None:
+        self._store: np.ndarray = np.empty((0, 0), order="F")
+        self._count = 0
+
+    @property
+    def block(self) -> np.ndarray:
+        """(n_own, k) all of them, columns contiguous."""
+        return self._store[:, : self._count]
+
+    def append(self, column: np.ndarray) -> None:
+        """One more (n_own, 1)."""
+        if self._count == self._store.shape[1]:
+            room = max(2 * self._count, FIRST_ROOM)
+            grown = np.empty((len(column), room), column.dtype, order="F")
+            if self._count:
+                grown[:, : self._count] = self.block
+            self._store = grown
+        self._store[:, self._count] = column[:, 0]
+        self._count += 1
+
+    def clear(self) -> None:
+        """None are left."""
+        self._count = 0
+
+    def __len__(self) -> int:
+        return self._count
+
+
 @dataclass
 class _Pencil:
     """The pencil as SLEPc's vectors see it: real and imaginary parts of an unknown side by side."""
@@ -59,11 +99,15 @@ class _Pencil:
     last: np.ndarray | None = None
     # keep the directions of real pencils too
     kept: bool = False
+    # and its product by M
+    image: np.ndarray | None = None
     # directions solved for, and their products by M (those of complex pencils only)
-    known: list[np.ndarray] = field(default_factory=list)
-    images: list[np.ndarray] = field(default_factory=list)
+    known: _Columns = field(default_factory=lambda: _Columns())
+    images: _Columns = field(default_factory=lambda: _Columns())
     # the first vector has been multiplied
     started: bool = False
+    # what a product or a solve raised, see ``_shielded``
+    failure: BaseException | None = None
 
     @property
     def doubled(self) -> bool:
@@ -85,6 +129,26 @@ class _Pencil:
         vector.setArray(values.view(float))
 
 
+def _shielded(
+    pencil: _Pencil,
+    x: PETSc.Vec,
+    y: PETSc.Vec,
+    product: Callable[[np.ndarray], np.ndarray],
+) -> None:
+    """y = product(x), whose exception waits in the pencil until SLEPc has come to its end.
+
+    On its way through SLEPc it would leave objects behind that cannot be destroyed any more. From
+    then on all products are the identity, with which the iteration ends at once.
+    """
+    if pencil.failure is None:
+        try:
+            pencil.put(product(pencil.column(x)), y)
+            return
+        except BaseException as error:
+            pencil.failure = error
+    x.copy(y)
+
+
 class _Mass:
     """M as a PETSc matrix."""
 
@@ -97,9 +161,36 @@ class _Mass:
         x: PETSc.Vec,
         y: PETSc.Vec,
     ) -> None:
-        pencil = self.pencil
-        pencil.last = pencil.column(x)
-        pencil.put(apply(pencil.con.M, pencil.last), y)
+        _shielded(self.pencil, x, y, partial(_times_mass, self.pencil))
+
+
+def _times_mass(pencil: _Pencil, column: np.ndarray) -> np.ndarray:
+    """M x (n_own, 1)."""
+    # of vectors shared out no rank can tell alone
+    factor = _multiple(pencil.last, column) if pencil.con.body.comm.size == 1 else None
+    if factor is None or pencil.image is None:
+        pencil.image = apply(pencil.con.M, column)
+    else:
+        # SLEPc scales what it has multiplied just now
+        pencil.image = factor * pencil.image
+    pencil.last = column
+    return pencil.image
+
+
+def _multiple(vector: np.ndarray | None, other: np.ndarray) -> float | None:
+    """The real number that makes the other vector (n_own, 1) of this one; None: there is none."""
+    if vector is None or not len(vector):
+        return None
+    place = int(np.argmax(abs(vector.real)))
+    if vector.real[place, 0] == 0:
+        return None
+    factor = float(other.real[place, 0] / vector.real[place, 0])
+    # one entry tells most vectors apart
+    quick = abs(other[0, 0] - factor * vector[0, 0]) <= SAME * abs(other).max()
+    if not quick:
+        return None
+    difference = other - factor * vector
+    return factor if abs(difference).max() <= SAME * abs(other).max() else None
 
 
 class _Stiffness:
@@ -114,8 +205,7 @@ class _Stiffness:
         x: PETSc.Vec,
         y: PETSc.Vec,
     ) -> None:
-        pencil = self.pencil
-        pencil.put(apply(pencil.con.K, pencil.column(x)), y)
+        _shielded(self.pencil, x, y, partial(apply, self.pencil.con.K))
 
 
 class _Inverse:
@@ -130,18 +220,24 @@ class _Inverse:
         x: PETSc.Vec,
         y: PETSc.Vec,
     ) -> None:
-        pencil = self.pencil
-        load = pencil.column(x)
-        found = pencil.inverse(load)
-        if pencil.kept and not pencil.doubled:
-            pencil.known.append(np.asfortranarray(pencil.last))
-        if pencil.doubled:
-            _remember_direction(pencil, np.asfortranarray(load))
+        _shielded(self.pencil, x, y, partial(_times_inverse, self.pencil))
+
+
+def _times_inverse(pencil: _Pencil, load: np.ndarray) -> np.ndarray:
+    """K^-1 b (n_own, 1), without the component along j times the earlier directions."""
+    found = pencil.inverse(load)
+    # SLEPc multiplies by M before it asks for the inverse
+    assert pencil.last is not None
+    if pencil.kept and not pencil.doubled:
+        pencil.known.append(pencil.last)
+    if pencil.doubled:
+        _remember_direction(pencil, load)
+        if len(pencil.known):
             # of the products with earlier directions only the imaginary part is rounding
-            error = dot(pencil.con.body.comm, pencil.images, np.asfortranarray(found)).imag
-            if len(error):
-                found = found - mix(pencil.known, 1j * error)
-        pencil.put(found, y)
+            product = dot(pencil.con.body.comm, pencil.images.block, found)
+            if abs(product.imag).max() > HARMLESS * abs(product).max():
+                found = found - mix(pencil.known.block, 1j * product.imag)
+    return found
 
 
 def _remember_direction(pencil: _Pencil, load: np.ndarray) -> None:
@@ -151,24 +247,29 @@ def _remember_direction(pencil: _Pencil, load: np.ndarray) -> None:
     is none of them: SLEPc multiplies it by K^-1 M before it starts. A direction outside of the
     space (SLEPc starts again after a breakdown) is such a first vector.
     """
+    last = pencil.last
+    # SLEPc multiplies by M before it asks for the inverse
+    assert last is not None
     comm = pencil.con.body.comm
-    product = dot(comm, pencil.images, np.asfortranarray(pencil.last))
-    size = float(dot(comm, load, np.asfortranarray(pencil.last)).real[0, 0])
+    size = float(dot(comm, load, last).real[0, 0])
+    product = np.zeros((0, 1), complex)
+    if len(pencil.known):
+        product = dot(comm, pencil.images.block, last)
     if not pencil.started or abs(product.imag).max(initial=0.0) > STRAY * np.sqrt(size):
         pencil.started = True
         pencil.known.clear()
         pencil.images.clear()
         return
-    direction = pencil.last
+    direction = last
     image = load
-    if pencil.known:
-        share = product.real.astype(complex)
-        direction = direction - mix(pencil.known, share)
-        image = image - mix(pencil.images, share)
-    rest = size - (product.real**2).sum()
+    share = product.real
+    if abs(share).max(initial=0.0) > ROUNDING * np.sqrt(size):
+        direction = direction - mix(pencil.known.block, share.astype(complex))
+        image = image - mix(pencil.images.block, share.astype(complex))
+    rest = size - (share**2).sum()
     if rest > NEW * size:
-        pencil.known.append(np.asfortranarray(direction / np.sqrt(rest)))
-        pencil.images.append(np.asfortranarray(image / np.sqrt(rest)))
+        pencil.known.append(direction / np.sqrt(rest))
+        pencil.images.append(image / np.sqrt(rest))
 
 
 def krylov_schur(
@@ -193,6 +294,8 @@ def krylov_schur(
     eps = _make_solver(pencil, start, count, tolerance, settings or Eigensolver())
     try:
         eps.solve()
+        if pencil.failure is not None:
+            raise pencil.failure
         reason = int(eps.getConvergedReason())
         found = _converged_vectors(pencil, eps)
     finally:
@@ -206,7 +309,7 @@ def krylov_schur(
         raise NotSolvedError(
             f"SLEPc found {len(lam)} of {count} modes: {REASONS.get(reason, 'no convergence')}"
         )
-    if guard and len(lam) < count + guard and pencil.known:
+    if guard and len(lam) < count + guard and len(pencil.known):
         more, rough = _rough_pairs(pencil, X, count + guard - len(lam))
         return np.concatenate([lam, more]), np.asfortranarray(np.hstack([X, rough]))
     return lam, X
@@ -222,7 +325,8 @@ def _rough_pairs(
     """
     con = pencil.con
     MX = apply(con.M, X)
-    basis = np.asfortranarray(np.hstack(pencil.known))
+    # nobody needs them as they are any more
+    basis = pencil.known.block
     basis = minus(basis, [X], dot(con.body.comm, MX, basis))
     rest, _, _ = orthonormal(con, [X], [MX], basis, 1.0)
     lam, Z = np.linalg.eigh(_hermitian_part(dot(con.body.comm, rest, apply(con.K, rest))))

@@ -16,7 +16,7 @@ from scipy.linalg import qr
 
 from .body import rigid_modes
 from .constraint import Constrained, expand, unknowns
-from .linalg import Factor, apply, dense_rows, dot, factorise, scale, solve
+from .linalg import Factor, apply, dense_rows, dot, factorise, scale, solve_together
 
 # of the mean diagonal of K over that of M: squared frequency of a motion that springs do not hold
 SOFT = 1e-12
@@ -55,11 +55,30 @@ def flexible(con: Constrained, prop: float = 1.0) -> Flexibility:
 
 def compliance(flex: Flexibility, B: np.ndarray) -> np.ndarray:
     """K^+ B (n_own, k): loads without their rigid part give displacements without theirs."""
+    return compliances([(flex, B)])[0]
+
+
+def compliances(loaded: list[tuple[Flexibility, np.ndarray]]) -> list[np.ndarray]:
+    """``compliance`` of several bodies at once: nodal diameters of a wheel share work."""
+    balanced = [(flex.factor, _balanced(flex, B)) for flex, B in loaded]
+    return [
+        _without_rigid_motion(flex, X)
+        for (flex, _), X in zip(loaded, solve_together(balanced), strict=True)
+    ]
+
+
+def _balanced(flex: Flexibility, B: np.ndarray) -> np.ndarray:
+    """Loads less their rigid part."""
     if not flex.R.shape[1]:
-        return solve(flex.factor, B)
-    comm = flex.con.body.comm
-    X = solve(flex.factor, B - flex.MR @ dot(comm, flex.R, B))
-    return X - flex.R @ dot(comm, flex.MR, X)
+        return B
+    return B - flex.MR @ dot(flex.con.body.comm, flex.R, B)
+
+
+def _without_rigid_motion(flex: Flexibility, X: np.ndarray) -> np.ndarray:
+    """Displacements less their rigid part."""
+    if not flex.R.shape[1]:
+        return X
+    return X - flex.R @ dot(flex.con.body.comm, flex.MR, X)
 
 
 def rigid_basis(con: Constrained) -> np.ndarray:

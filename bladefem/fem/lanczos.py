@@ -25,6 +25,10 @@ STEPS = 200
 CLEAN = 1e-8
 # least square of a column, of the largest, up to which one normalisation is enough
 EVEN = 1e-6
+# square of a direction, of the largest, below which it is dropped at once
+ROUNDING = 1e-26
+# square of a direction, normalised once, from which on it was more than rounding
+TRUE_DIRECTION = 0.25
 # share of the tolerance below which a direction of the residual waits
 DEFERRED_SHARE = 0.1
 
@@ -108,14 +112,16 @@ def orthonormal(
             dropped, so that Q may have fewer columns than W.
     """
     comm = con.body.comm
-    W, MW, R, spread = _orthogonal_factor(comm, W, apply(con.M, W), 1e-26, size**2)
+    W, MW, R, spread = _orthogonal_factor(comm, W, apply(con.M, W), ROUNDING, ROUNDING * size**2)
     left = dot(comm, MV, W)
     W = minus(W, V, left)
     clean = abs(left).max(initial=0.0) < CLEAN
     MW = minus(MW, MV, left) if clean else apply(con.M, W)
     if clean and spread > EVEN:
         return W, MW, R
-    W, MW, S, _ = _orthogonal_factor(comm, W, MW, 0.25, 1.0)
+    # what is much longer than 1 now came from a direction that was rounding in the first product:
+    # the others are no less true for that
+    W, MW, S, _ = _orthogonal_factor(comm, W, MW, 0.0, TRUE_DIRECTION)
     return W, MW, S @ R
 
 
@@ -173,16 +179,17 @@ def _orthogonal_factor(
     comm: MPI.Comm,
     W: np.ndarray,
     MW: np.ndarray,
+    share: float,
     least: float,
-    largest: float = float(np.finfo(float).tiny),
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray, float]:
     """W Z, M W Z and R with W = (W Z) R, and the least square of a column, of the largest one's.
 
-    Directions whose square is below ``least`` of the largest, and of a given one, are dropped.
+    Directions whose square is below ``least``, or below a share of the largest, are dropped.
     """
     gram = dot(comm, W, MW)
     size, Z = np.linalg.eigh((gram + gram.conj().T) / 2)
-    good = size > least * max(size[-1], largest) if len(size) else size > 0
+    tiny = float(np.finfo(float).tiny)
+    good = size > max(share * size[-1], least, tiny) if len(size) else size > 0
     root = np.sqrt(size[good])
     Z = Z[:, good]
     W, MW = (mix(A, Z / root) for A in (W, MW))

@@ -42,6 +42,9 @@ class Folded:
     C: sp.csr_matrix
     # A with its interior eliminated, shared by all nodal diameters
     core: interior.Core | None
+    # (n_open/dim,)*2 the same for each direction: A is its Kronecker product with the identity,
+    # a third of the numbers to read; None where A couples directions
+    nodal: sp.csr_matrix | None = None
 
 
 Matrix: TypeAlias = PETSc.Mat | Doubled | Folded
@@ -108,10 +111,24 @@ def solve(factor: Factor, B: np.ndarray) -> np.ndarray:
     return solve_matrix(factor.parts, B)
 
 
+def solve_together(systems: list[tuple[Factor, np.ndarray]]) -> list[np.ndarray]:
+    """The same for several matrices at once: nodal diameters that share a core share its sweeps."""
+    rims = [(f.parts, B) for f, B in systems if isinstance(f.parts, interior.Rim)]
+    if len(rims) == len(systems) and all(rim.core is rims[0][0].core for rim, _ in rims):
+        return interior.solve_together(rims)
+    return [solve(factor, B) for factor, B in systems]
+
+
 def apply(A: Matrix, X: np.ndarray) -> np.ndarray:
     """A X for a block of vectors (n_own, k)."""
     if isinstance(A, Folded):
-        return np.asfortranarray(A.C.conj().T @ interior.times(A.A, A.C @ X))
+        open_values = A.C @ X
+        if A.nodal is None:
+            image = interior.times(A.A, open_values)
+        else:
+            by_node = open_values.reshape(A.nodal.shape[0], -1)
+            image = interior.times(A.nodal, by_node).reshape(open_values.shape)
+        return np.asfortranarray(A.C.conj().T @ image)
     if isinstance(A, Doubled):
         return _complex(_times(A.matrix, _real(X)))
     return _join_complex(_times(A, _split_complex(X))) if np.iscomplexobj(X) else _times(A, X)

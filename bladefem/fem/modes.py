@@ -8,17 +8,18 @@ has; so the inertia of K - s M counts the eigenvalues, and what was missed is fo
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 
 import numpy as np
 
 from ..data import ModeSet
 from ..errors import InputError, NotSolvedError
+from ..util.lockstep import run_together
 from .compat import MPI
 from .constraint import Constrained, expand, restrict
 from .cyclic_schur import eliminate, negative
 from .eigensolver import Eigensolver, basis_size, krylov_schur
-from .flexibility import Flexibility, compliance, flexible
+from .flexibility import Flexibility, compliance, compliances, flexible
 from .lanczos import lowest
 from .linalg import Folded, apply, combined, dot, inertia, scale
 
@@ -95,6 +96,7 @@ def pairs(
     start: np.ndarray | None = None,
     guard: int = 0,
     solver: Eigensolver = SLEPC,
+    inverse: Callable[[np.ndarray], np.ndarray] | None = None,
 ) -> tuple[np.ndarray, np.ndarray]:
     """(m,) eigenvalues [rad^2/s^2] and this rank's (n_own, m) M-orthonormal vectors, rigid motions
     first.
@@ -102,12 +104,36 @@ def pairs(
     Args:
         start: (n_own, k) good guesses of the vectors.
         guard: pairs beyond count, as far as they have come.
+        inverse: computes K^+ B in place of ``flexibility.compliance``.
     """
     r = min(flex.R.shape[1], count)
     if r == count:
         return np.zeros(r), flex.R[:, :r]
-    lam, X = elastic_pairs(flex, count - r, tolerance, start=start, guard=guard, solver=solver)
+    lam, X = elastic_pairs(flex, count - r, tolerance, inverse, start, guard, solver)
     return np.concatenate([np.zeros(r), lam]), np.concatenate([flex.R[:, :r], X], axis=1)
+
+
+def pairs_together(
+    bodies: Sequence[Flexibility],
+    count: int,
+    tolerance: float = TOLERANCE,
+    guard: int = 0,
+    solver: Eigensolver = SLEPC,
+) -> list[tuple[np.ndarray, np.ndarray]]:
+    """``pairs`` of several nodal diameters from scratch, with iterations that advance together.
+
+    A solve with one vector takes as long as the factors take to come from memory; the iterations
+    share them, and each stays what it is alone but for rounding.
+    """
+
+    def iteration(flex: Flexibility) -> Callable[..., tuple[np.ndarray, np.ndarray]]:
+        few = min(guard, flex.con.T.shape[1] - count)
+        return lambda ask: pairs(flex, count, tolerance, None, few, solver, ask)
+
+    def answer(asked: list[tuple[int, np.ndarray]]) -> list[np.ndarray]:
+        return compliances([(bodies[i], B) for i, B in asked])
+
+    return run_together([iteration(flex) for flex in bodies], answer)
 
 
 def mode_set(

@@ -10,8 +10,8 @@ from bladefem.fem.compat import SLEPc
 from bladefem.fem.constraint import at_diameter, constrain, transformation
 from bladefem.fem.eigensolver import Eigensolver
 from bladefem.fem.flexibility import flexible
-from bladefem.fem.linalg import Doubled, apply
-from bladefem.fem.modes import BLOCKS, SLEPC, modes, pairs
+from bladefem.fem.linalg import Doubled, apply, solve
+from bladefem.fem.modes import BLOCKS, SLEPC, modes, pairs, pairs_together
 from bladefem.scene.tables import Material
 
 
@@ -107,3 +107,35 @@ def test_options_of_petsc_reach_the_solver(monkeypatch):
     finally:
         for name in ("eps_max_it", "eps_ncv", "eps_tol"):
             PETSc.Options().delValue(name)
+
+
+@pytest.mark.parametrize("solver", [SLEPC, BLOCKS])
+def test_diameters_solved_together_are_those_solved_alone(solver):
+    """Real and complex pencils share the sweeps over the factors, not the iterations."""
+    t = transformation(
+        assemble(sector(12, (5, 2, 2), bump=0.2), "blade", Material()), "clamp", True
+    )
+    bodies = [flexible(at_diameter(t, n)) for n in (0, 3, 6)]
+    together = pairs_together(bodies, 8, 1e-9, 2, solver)
+    for flex, (lam, X) in zip(bodies, together, strict=True):
+        alone, Y = pairs(flex, 8, 1e-9, guard=2, solver=solver)
+        np.testing.assert_allclose(lam[:8], alone[:8], rtol=1e-11)
+        overlap = abs(X[:, :8].conj().T @ apply(flex.con.M, Y[:, :8]))
+        np.testing.assert_allclose(overlap, np.eye(8), atol=1e-6)
+
+
+@pytest.mark.parametrize("error", [NotSolvedError, KeyboardInterrupt])
+def test_what_a_solve_raises_comes_out_of_slepc(error):
+    """An exception that went through SLEPc would leave objects that cannot be destroyed."""
+    flex = flexible(square_beam())
+    left = [3]
+
+    def inverse(B):
+        left[0] -= 1
+        if left[0] < 0:
+            raise error("no")
+        return solve(flex.factor, B)
+
+    with pytest.raises(error, match="no"):
+        pairs(flex, 4, inverse=inverse)
+    assert len(pairs(flex, 4)[0]) == 4
