@@ -11,7 +11,7 @@ import sys
 from collections.abc import Sequence
 from contextlib import ExitStack
 
-from . import commands, ranks, scatter, study
+from . import backbone, commands, ranks, scatter, study
 from .look import add_look, look
 
 _EXAMPLES = """examples:
@@ -77,6 +77,12 @@ _COMMANDS = {
         "statistics of mistuned wheels: amplification of the highest blade for each load",
         "bladefem scatter scenes/mistuned.toml --set mistuning.wheels=100",
         scatter.scatter,
+    ),
+    "backbone": (
+        "nonlinear modes: frequency and friction damping against amplitude for each load, and the "
+        "resonance that they predict",
+        "bladefem backbone scenes/wedge.toml",
+        backbone.backbone,
     ),
     "chart": (
         "time against error of methods and models, with the automatic choice",

@@ -56,6 +56,12 @@ CAPTIONS = {
     "estimates.",
     "modes/utilisation": "Alternating stress over the amplitude that lasts at the mean stress "
     "there, at the resonance under the best load.",
+    "response/backbone_resonances": "Resonances that the nonlinear mode alone predicts, next to "
+    "those of the full balance, and the largest damping by friction.",
+    "response/design_map": "Nonlinear modes: damping and frequency against amplitude for each "
+    "load; dashed the damping that the force needs, so that crossings are resonances, dots those "
+    "of the balance. Right: resonance amplitude and forced response by the mode alone next to the "
+    "balance.",
     "wheel/whole_wheel": "The whole wheel with its pattern: the highest blade next to the tuned "
     "wheel, and the alternating stress of its whole damped motion.",
     "wheel/blades": "Each blade: deviation of its first family, largest amplitude over the band, "

@@ -50,6 +50,12 @@ COLUMNS = {
         for end, title in (("", " of wheels below"), ("_low", " from"), ("_high", " to"))
     },
     "mass": Column("damper mass", "kg", "g", 1e3),
+    "mode_frequency": Column("resonance by the mode", "Hz"),
+    "mode_amplitude": Column("amplitude by the mode", "m", "µm", 1e6),
+    "off": Column("off the balance", "1", "%", 100.0, 2),
+    "most_friction": Column("largest friction damping", "1", "%", 100.0, 3),
+    "own_damping": Column("damping of the blade", "1", "%", 100.0, 3),
+    "drive": Column("force at resonance over the scene's", "1", digits=4),
     "peak_frequency": Column("resonance", "Hz"),
     "peak_amplitude": Column("resonance amplitude", "m", "µm", 1e6),
     "frictionless": Column("mass without friction", "kg", "g", 1e3),

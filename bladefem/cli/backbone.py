@@ -1,0 +1,35 @@
+"""The command of nonlinear modes: frequency and damping against amplitude for each load."""
+
+from __future__ import annotations
+
+import argparse
+
+from ..util.communicator import Communicator
+from . import tables
+from .commands import prepared, tell
+
+
+def backbone(options: argparse.Namespace, comm: Communicator | None) -> None:
+    """Nonlinear modes on top of the run's responses, and the design map."""
+    scene, folder, bars = prepared(options, comm, responds=True)
+    from ..io.stage_cache import on_root
+    from ..report.backbone import backbone_sentences, prediction_table, write_backbones
+    from ..report.tables import readable
+    from ..study.backbone import backbones
+    from ..study.pipeline import pipeline
+
+    run = pipeline.run(scene, folder, comm=comm, progress=bars)
+    found, remarks = backbones(run, comm, bars)
+    files = on_root(comm, lambda: write_backbones(run, found, remarks))
+    tell(
+        options,
+        comm,
+        lambda: "\n".join(
+            [
+                tables.frame(readable(prediction_table(found))),
+                "",
+                *backbone_sentences(found),
+                f"written: {', '.join(map(str, files))}",
+            ]
+        ),
+    )

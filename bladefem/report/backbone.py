@@ -1,0 +1,133 @@
+"""Tables, picture, sentences and page of the nonlinear modes of a run."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+
+import numpy as np
+import pandas as pd
+
+from ..io.run_folder import take_folder
+from ..study.backbone import Backbone
+from ..study.pipeline.run_records import SolvedRun, folder_of
+from ..util.message import warning
+from ..view.backbone import draw_design_map
+from .headlines import Headline
+from .tables import write_tables
+from .write import Page, write_report
+
+
+def prediction_table(found: Sequence[Backbone]) -> pd.DataFrame:
+    """One row a load: the resonance by the mode alone next to the balance's."""
+    return pd.DataFrame(
+        [
+            {
+                "load": one.load,
+                **({} if one.mass is None else {"mass": one.mass}),
+                "mode_frequency": one.predicted[1],
+                "mode_amplitude": one.predicted[0],
+                "peak_frequency": one.balance[1],
+                "peak_amplitude": one.balance[0],
+                "off": one.error,
+                "most_friction": one.friction[one.converged].max(initial=0.0),
+                "unconverged": int((~one.converged).sum()),
+            }
+            for one in found
+        ]
+    )
+
+
+def backbone_table(found: Sequence[Backbone]) -> pd.DataFrame:
+    """One row an amplitude and load."""
+    return pd.concat(
+        [
+            pd.DataFrame(
+                {
+                    "load": one.load,
+                    **({} if one.mass is None else {"mass": one.mass}),
+                    "amplitude": one.amplitude,
+                    "frequency": one.frequency,
+                    "friction_damping": one.friction,
+                    "own_damping": one.own,
+                    "drive": one.drive,
+                    "converged": one.converged,
+                }
+            )
+            for one in found
+        ],
+        ignore_index=True,
+    )
+
+
+def backbone_sentences(found: Sequence[Backbone]) -> list[str]:
+    """What the modes tell, and how well they predict."""
+    most = max(found, key=lambda one: one.friction[one.converged].max(initial=0.0))
+    i = int(np.argmax(np.where(most.converged, most.friction, -np.inf)))
+    sentences = [
+        f"friction damps at most {100 * most.friction[i]:.3g} % of critical, under "
+        f"{most.load:.4g} N at {1e6 * most.amplitude[i]:.4g} um"
+    ]
+    reached = [one for one in found if np.isfinite(one.error)]
+    if reached:
+        worst = max(reached, key=lambda one: abs(one.error))
+        sentences.append(
+            "resonances predicted by the nonlinear mode alone are off by "
+            f"{100 * abs(worst.error):.2g} % of the balance's amplitude at most, under "
+            f"{worst.load:.4g} N"
+        )
+    for one in found:
+        lost = int((~one.converged).sum())
+        if lost:
+            sentences.append(
+                warning(
+                    f"load {one.load:g} N: {lost} of {len(one.converged)} amplitudes not solved"
+                )
+            )
+        if not np.isfinite(one.error):
+            sentences.append(
+                warning(f"load {one.load:g} N: the mode reaches no resonance under this force")
+            )
+    return sentences
+
+
+def write_backbones(
+    run: SolvedRun,
+    found: Sequence[Backbone],
+    remarks: Sequence[str] = (),
+) -> list[Path]:
+    """Tables, the design map and a page in the run's folder; returns the files."""
+    folder = folder_of(run)
+    moved = take_folder(folder, run.scene)
+    tables = {"response/backbone_resonances": prediction_table(found)}
+    write_tables(tables["response/backbone_resonances"], folder / "backbone_resonances", "backbone")
+    write_tables(backbone_table(found), folder / "backbone", "backbone")
+    points = [(c.frequency[c.converged], c.amplitude[c.converged]) for c in run.response.curves]
+    picture = folder / "design_map.png"
+    draw_design_map(found, points, run.scene.title, picture)
+    best = min(found, key=lambda one: one.balance[0])
+    used = best.friction[best.converged].max(initial=0.0)
+    numbers = [
+        Headline(
+            "resonance by the nonlinear mode, at the best load studied",
+            f"{1e6 * best.predicted[0]:.4g} µm",
+            f"off by {100 * best.error:+.2g} % from the balance",
+            f"under {best.load:.4g} N at {best.predicted[1]:.5g} Hz",
+        ),
+        Headline(
+            "largest friction damping under that load",
+            f"{100 * used:.3g} %",
+            "by the model; no excitation enters",
+            "of critical",
+        ),
+    ]
+    pages = write_report(
+        folder,
+        run.scene,
+        tables,
+        {"response/design_map": picture},
+        [*filter(None, [moved]), *remarks, *backbone_sentences(found)],
+        run.timings,
+        page=Page(numbers=numbers, stem="report_backbone"),
+    )
+    return [folder / "backbone_resonances.csv", folder / "backbone.csv", picture, *pages]

@@ -1,0 +1,170 @@
+"""Nonlinear modes of a run's blade and damper: frequency and damping against amplitude for each
+load, and the resonance that they predict next to that of the balance.
+
+Damping by friction and frequency do not depend on the excitation. The resonance amplitude under a
+force is where the damping that friction and blade give meets the one that the force needs,
+|phi^H F| / (2 omega^2 a): a design map, read for any excitation of the same mode.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import partial
+
+import numpy as np
+
+from ..hbm.model import ReducedModel
+from ..hbm.nonlinear_modes import force_at_resonance, nonlinear_mode
+from ..io.stage_cache import found_remark, on_root, stage
+from ..util.arrays import BooleanArray, RealArray
+from ..util.communicator import Communicator
+from ..util.progress import Progress, unwatched
+from .adaptive.family import family_member
+from .pipeline.case_models import family_of_case, load_cases
+from .pipeline.loads import Curve
+from .pipeline.run_records import SolvedRun
+from .pipeline.stage_inputs import stage_key
+
+# amplitudes of each load
+AMPLITUDES = 40
+# ends of the amplitudes over the lowest and the highest resonance of the run
+LOWEST, HIGHEST = 0.03, 3.0
+
+
+@dataclass(frozen=True)
+class Backbone:
+    """One nonlinear mode under one load; k amplitudes, ascending."""
+
+    # [N], and of the damper [kg]
+    load: float
+    mass: float | None
+    # (k,) root of the sum of squares of the harmonics at the probe [m]
+    amplitude: RealArray
+    # (k,) [Hz]
+    frequency: RealArray
+    # (k,) shares of critical damping: by friction, and of blade and disc [1]
+    friction: RealArray
+    own: RealArray
+    # (k,) force that keeps the motion up at its resonance, over the scene's [1]
+    drive: RealArray
+    converged: BooleanArray
+    # resonance amplitude [m] and frequency [Hz] of the balance
+    balance: tuple[float, float]
+
+    @property
+    def predicted(self) -> tuple[float, float]:
+        """Resonance amplitude [m] and frequency [Hz] under the scene's force: the highest crossing
+        of `drive` with 1; NaN where the amplitudes do not reach it.
+        """
+        known = np.flatnonzero(self.converged)
+        drive = self.drive[known]
+        crossings = np.flatnonzero((drive[:-1] <= 1) & (drive[1:] > 1))
+        if not len(crossings):
+            return np.nan, np.nan
+        i, j = known[crossings[-1]], known[crossings[-1] + 1]
+        share = -np.log(self.drive[i]) / np.log(self.drive[j] / self.drive[i])
+        amplitude = self.amplitude[i] * (self.amplitude[j] / self.amplitude[i]) ** share
+        frequency = self.frequency[i] + share * (self.frequency[j] - self.frequency[i])
+        return float(amplitude), float(frequency)
+
+    @property
+    def error(self) -> float:
+        """Relative difference of the predicted resonance amplitude from the balance's."""
+        return self.predicted[0] / self.balance[0] - 1
+
+    def response(self) -> tuple[np.ndarray, np.ndarray]:
+        """Forced response by the mode alone: frequencies (m,) [Hz] and amplitudes (m,) [m], from
+        below the resonance over it to above.
+
+        At each amplitude |omega^2 - Omega^2 + 2i zeta omega Omega| a = |phi^H F| has two
+        frequencies where the force is more than the resonance needs.
+        """
+        kept = self.converged & (self.drive <= 1)
+        omega = 2 * np.pi * self.frequency[kept]
+        rate = 2 * (self.friction + self.own)[kept] * omega
+        half = omega**2 - rate**2 / 2
+        root = np.sqrt(np.maximum(half**2 - omega**4 + (rate * omega / self.drive[kept]) ** 2, 0))
+        amplitude = self.amplitude[kept]
+        below = np.sqrt(np.maximum(half - root, 0)) / (2 * np.pi)
+        above = np.sqrt(half + root) / (2 * np.pi)
+        height, at = self.predicted
+        tip = ([at], [height]) if np.isfinite(height) else ([], [])
+        return (
+            np.concatenate([below, tip[0], above[::-1]]),
+            np.concatenate([amplitude, tip[1], amplitude[::-1]]),
+        )
+
+
+def backbones(
+    run: SolvedRun,
+    comm: Communicator | None = None,
+    progress: Progress = unwatched,
+) -> tuple[list[Backbone], list[str]]:
+    """The nonlinear mode under every load of a run, and remarks on those that were found in the
+    folder; computed on one rank.
+
+    Raises:
+        InputError: a model is too large for dense factors, or its mode is no elastic one.
+    """
+    scene = run.scene
+    curves = run.response.curves
+    peaks = [curve.peak_amplitude for curve in curves]
+    ends = LOWEST * min(peaks), HIGHEST * max(peaks)
+    patches = list(run.contact.problem.patches)
+    cases = {(case.load, case.mass): case for case in load_cases(scene, run.mesh, run.contact)}
+    found = []
+    remarks = []
+
+    def alone(curve: Curve) -> Backbone:
+        case = cases[curve.load, curve.mass]
+        family = family_of_case(scene, run.mesh, run.reduced, patches, case)
+        model = family_member(family, curve.settings).model
+        return backbone(model, curve, scene.excitation.mode - 1, ends)
+
+    def compute(curve: Curve) -> Backbone:
+        return on_root(comm, partial(alone, curve))
+
+    for curve in progress(curves, "nonlinear modes", len(curves)):
+        name = f"backbone_{curve.load:g}N" + (
+            "" if curve.mass is None else f"_{1e3 * curve.mass:g}g"
+        )
+        key = stage_key("response", scene, "backbone", curve.load, curve.mass, *ends)
+        made, seconds = stage(run.folder, name, key, partial(compute, curve), comm)
+        found.append(made)
+        if seconds is not None:
+            remarks.append(found_remark(name, seconds))
+    return found, remarks
+
+
+def backbone(
+    model: ReducedModel,
+    curve: Curve,
+    mode: int,
+    ends: tuple[float, float],
+) -> Backbone:
+    """The nonlinear mode of a model, with the settings of its curve.
+
+    Args:
+        mode: number of the blade mode, from 0.
+        ends: smallest and largest amplitude at the probe [m].
+    """
+    blades = model.blades(1)
+    seen = float(abs(blades.shapes[-1, blades.probe][0, mode]))
+    wanted = [float(a) / seen for a in np.geomspace(*ends, AMPLITUDES)]
+    H = max(curve.settings.harmonics, *model.excitation)
+    points = list(nonlinear_mode(model, wanted, mode, H, curve.settings.samples))
+    force = blades.shapes[-1, blades.load].conj().T @ model.loads(1)[1]
+    viscous = float(blades.viscous[-1][mode])
+    hysteretic = float(blades.hysteretic[-1][mode])
+    omega = np.array([p.omega for p in points])
+    return Backbone(
+        curve.load,
+        curve.mass,
+        np.array([np.linalg.norm(p.probe[1:, 0]) for p in points]),
+        omega / (2 * np.pi),
+        np.array([p.zeta for p in points]),
+        (viscous + hysteretic / omega) / (2 * omega),
+        np.array([force_at_resonance(model, p) for p in points]) / abs(force[mode]),
+        np.array([p.converged for p in points]),
+        (curve.peak_amplitude, curve.peak_frequency),
+    )

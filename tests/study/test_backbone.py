@@ -1,0 +1,92 @@
+"""The design map of nonlinear modes: closed form of one element, the balance's own resonances and
+points, and the command.
+"""
+
+import sys
+from pathlib import Path
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+
+from bladefem.cli.main import main
+from bladefem.friction.closed_form import jenkins
+from bladefem.hbm.peak import find_peak
+from bladefem.hbm.reference_blade import reference_model
+from bladefem.hbm.solve import solve
+from bladefem.report.backbone import backbone_sentences, prediction_table
+from bladefem.study.backbone import backbone
+
+sys.path.insert(0, str(Path(__file__).parents[1] / "hbm"))
+from models import single_mass
+
+PLANE = str(Path(__file__).parents[2] / "scenes" / "plane.toml")
+
+
+def curve_of(height, frequency, harmonics, samples, load=1.0):
+    return SimpleNamespace(
+        load=load,
+        mass=None,
+        settings=SimpleNamespace(harmonics=harmonics, samples=samples),
+        peak_amplitude=height,
+        peak_frequency=frequency,
+    )
+
+
+def test_one_element_in_closed_form():
+    """Damping and frequency of a Jenkins element, and the amplitude at which a force meets them."""
+    kt, limit = 0.6, 0.5
+    model = single_mass(kt, limit)
+    found = backbone(model, curve_of(1.0, 1.0, 1, 0), 0, (0.1, 30.0))
+    assert found.converged.all()
+    law = jenkins(found.amplitude, kt, limit)
+    omega = np.sqrt(1 + law.stiffness)
+    np.testing.assert_allclose(2 * np.pi * found.frequency, omega, rtol=1e-8)
+    np.testing.assert_allclose(found.friction, law.damping / (2 * omega**2), rtol=1e-6, atol=1e-12)
+    force = abs(model.loads(1)[1][0])
+    height, frequency = found.predicted
+    law = jenkins(height, kt, limit)
+    omega = 2 * np.pi * frequency
+    zeta = law.damping / (2 * omega**2) + np.interp(height, found.amplitude, found.own)
+    assert 2 * zeta * omega**2 * height == pytest.approx(force, rel=0.02)
+
+
+@pytest.mark.parametrize("load", [0.3, 2.0, 8.0])
+def test_the_balance_of_the_reference_blade_is_predicted(load):
+    """Height and frequency of the resonance, and points on both flanks."""
+    model = reference_model(load=load, phase=1.0, points=2, modes=8, harmonics=3)
+    peak = find_peak(model, 1.02 * float(model.side(1).omega[0]), 3, 128)
+    curve = curve_of(peak.height, peak.omega / (2 * np.pi), 3, 128, load)
+    found = backbone(model, curve, 0, (0.03 * peak.height, 3 * peak.height))
+    assert found.converged.all()
+    assert abs(found.error) < 0.03
+    assert found.predicted[1] == pytest.approx(found.balance[1], rel=0.005)
+    at, height = found.response()
+    assert np.all(np.isfinite(at)) and np.isfinite(height).all()
+    for side in (0.985, 1.015):
+        point = solve(model, side * peak.omega, 3, 128)
+        own = np.linalg.norm(point.probe[1:, 0])
+        half = at < found.predicted[1] if side < 1 else at > found.predicted[1]
+        order = np.argsort(at[half])
+        drawn = np.interp(side * found.balance[1], at[half][order], height[half][order])
+        assert drawn == pytest.approx(own, rel=0.1)
+    row = prediction_table([found]).iloc[0]
+    assert row["off"] == found.error and row["unconverged"] == 0
+
+
+def test_a_force_that_no_amplitude_meets_is_said():
+    found = backbone(single_mass(0.6, 0.5), curve_of(1.0, 1.0, 1, 0), 0, (1e-6, 2e-6))
+    assert np.isnan(found.error)
+    (_, said) = backbone_sentences([found])
+    assert "reaches no resonance" in said and said.level == "warning"
+
+
+def test_command_writes_the_map_and_finds_it_again(tmp_path, capsys):
+    arguments = ["backbone", PLANE, "-o", str(tmp_path), "--set", "mesh.scale=4"]
+    arguments += ["--set", "study.loads=20 N, 80 N", "--set", "study.influences=false"]
+    assert main(arguments) == 0
+    assert "resonances predicted by the nonlinear mode alone are off by" in capsys.readouterr().out
+    for name in ("design_map.png", "backbone.csv", "backbone_resonances.csv"):
+        assert (tmp_path / name).is_file()
+    assert main(arguments) == 0
+    assert "backbone_20N: found in the folder" in (tmp_path / "report_backbone.md").read_text()
