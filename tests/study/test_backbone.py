@@ -89,4 +89,4 @@ def test_command_writes_the_map_and_finds_it_again(tmp_path, capsys):
     for name in ("design_map.png", "backbone.csv", "backbone_resonances.csv"):
         assert (tmp_path / name).is_file()
     assert main(arguments) == 0
-    assert "backbone_20N: found in the folder" in (tmp_path / "report_backbone.md").read_text()
+    assert "backbone_20N: found in the folder" in (tmp_path / "report_backbone.html").read_text()
