@@ -12,7 +12,9 @@ a plane "antisymmetry_x", ... the two others are zero: the deformed body turns o
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 import scipy.sparse as sp
@@ -82,9 +84,14 @@ class Constrained:
     own: slice
     # (n_free, n_free) [N/m]
     K: Matrix
-    # [kg]
-    M: Matrix
+    # makes M, which static states do without
+    mass: Callable[[], Matrix]
     nodal_diameter: int | None
+
+    @cached_property
+    def M(self) -> Matrix:
+        """(n_free, n_free) [kg]."""
+        return self.mass()
 
     @property
     def dtype(self) -> type:
@@ -177,7 +184,7 @@ def at_diameter(t: Transformation, nodal_diameter: int | None) -> Constrained:
     if nodal_diameter is None:
         if t.high is not None:
             raise InputError("nodal_diameter is None, expected a number: the body has cyclic faces")
-        return Constrained(t.body, t.low, own, t.K[0], t.M[0], None)
+        return Constrained(t.body, t.low, own, t.K[0], lambda: t.M[0], None)
     n = _checked_diameter(nodal_diameter, t.sectors)
     angle = 2 * np.pi * n / t.sectors
     real = 2 * n % t.sectors == 0
@@ -187,7 +194,7 @@ def at_diameter(t: Transformation, nodal_diameter: int | None) -> Constrained:
         C = T[t.opened.places]
         stiffness = Folded(t.opened.K, C, t.opened.core)
         mass = Folded(t.opened.M, C, None, t.opened.nodal_mass)
-        return Constrained(t.body, T, own, stiffness, mass, n)
+        return Constrained(t.body, T, own, stiffness, lambda: mass, n)
     if real:
         K, M = (combined(A[0], phase, A[1]) for A in (t.K, t.M))
     else:
@@ -195,7 +202,7 @@ def at_diameter(t: Transformation, nodal_diameter: int | None) -> Constrained:
             _doubled_matrix(combined(A[0], np.cos(angle), A[1]), A[2], np.sin(angle))
             for A in (t.K, t.M)
         )
-    return Constrained(t.body, T, own, K, M, n)
+    return Constrained(t.body, T, own, K, lambda: M, n)
 
 
 def in_step(body: Body, clamp: str | None = "clamp") -> Constrained:
@@ -217,7 +224,7 @@ def in_step(body: Body, clamp: str | None = "clamp") -> Constrained:
         T,
         slice(int(start[rank]), int(start[rank + 1])),
         body.K.ptap(T0),
-        body.M.ptap(T0),
+        lambda: body.M.ptap(T0),
         None if pair is None else 0,
     )
 
