@@ -136,10 +136,12 @@ def _port_model(model: _Ports, p: Eigenpairs) -> PortModel:
         return port_model(
             p.con, P, model.names, model.count, load, model.kind, p.flex, model.solver
         )
+    _check_ports(p.con, P)
     G, offset = _closed_flexibility(model.shared, rim)
     lam = p.lam[: model.count]
     vectors = canonical(p.con, lam, p.X[:, : model.count])
-    shapes = dot(p.con.body.comm, _restrict_ports(p.con, P), vectors)
+    # one rank has all unknowns, and the ports stay sparse: dense they were the peak of memory
+    shapes = sp.csc_matrix(P).T @ (p.con.T @ vectors)
     ports = P.shape[1]
     return PortModel(
         np.sqrt(lam),
@@ -164,12 +166,17 @@ def flexibility(
 
 
 def _restrict_ports(con: Constrained, P: sp.spmatrix) -> np.ndarray:
+    """(n_own, p) this rank's rows of the port vectors, dense."""
+    _check_ports(con, P)
+    return restrict(con, sp.csc_matrix(P)).astype(con.dtype)
+
+
+def _check_ports(con: Constrained, P: sp.spmatrix) -> None:
     if P.shape[0] != con.T.shape[0]:
         raise InputError(
             f"port vectors have {P.shape[0]} rows, expected {con.T.shape[0]} (nodes times "
             "components)"
         )
-    return restrict(con, sp.csc_matrix(P)).astype(con.dtype)
 
 
 def _interior_flexibility(
