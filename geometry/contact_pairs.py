@@ -51,7 +51,9 @@ def hertz_pair(hertz: HertzPair, size: MeshSize) -> Mesh:
     )
     points = _bend_indenter(mesh, hertz.radius, hertz.half_width)
     bent = replace(mesh, points=points)
-    return replace(bent, report=report(bent, mesh.report["straightened"], mesh.report["size"]))
+    told = {name: mesh.report[name] for name in ("notes",) if name in mesh.report}
+    found = report(bent, mesh.report["straightened"], mesh.report["size"])
+    return replace(bent, report={**found, **told})
 
 
 def punch(block: Punch, size: MeshSize) -> Mesh:

@@ -24,6 +24,8 @@ MAX_CELLS = 3e6
 POOR = 0.1
 # shape quality of a tetrahedron that is refused
 FLAT = 0.02
+# of the element size, one after the other while flat cells are left
+SMALLER = (1.0, 0.8, 0.65)
 ALGORITHMS = {"hxt": 10, "delaunay": 1}
 # master, slave, rotation (3, 3), shift (3,) [m]
 Motion = tuple[str, str, np.ndarray, np.ndarray]
@@ -37,19 +39,34 @@ def mesh_model(
 ) -> Mesh:
     """Generate the mesh of the current model, raise its order, and extract it.
 
+    Where flat cells are left, solids are meshed anew with smaller elements, and a note says so.
+
     Raises:
         InputError: the elements are far too many, or flat ones are left whatever is tried.
     """
     if size.size:
         check_count(gmsh, dimension, size.scale * size.size)
-    gmsh.option.setNumber("Mesh.MeshSizeFactor", size.scale)
-    gmsh.model.mesh.generate(2)
-    if dimension == 3:
-        fill(gmsh, groups, size.algorithm)
-    refuse_flat(_first_order_mesh(gmsh, groups, dimension))
+    smaller = SMALLER if dimension == 3 else SMALLER[:1]
+    for factor in smaller:
+        gmsh.option.setNumber("Mesh.MeshSizeFactor", factor * size.scale)
+        gmsh.model.mesh.generate(2)
+        if dimension == 3:
+            fill(gmsh, groups, size.algorithm)
+        first_order = _first_order_mesh(gmsh, groups, dimension)
+        if _worst_shape(first_order) > FLAT or factor == smaller[-1]:
+            break
+        gmsh.model.mesh.clear()
+    refuse_flat(first_order)
     if size.order == 2:
         second_order(gmsh, size.curved)
-    return extract(gmsh, groups, dimension)
+    mesh = extract(gmsh, groups, dimension)
+    if factor == 1.0:
+        return mesh
+    note = (
+        f"elements are {factor:g} times as large as asked for: parts that nearly coincide left "
+        "flat ones otherwise"
+    )
+    return replace(mesh, report={**mesh.report, "notes": (note,)})
 
 
 def fill(
@@ -175,7 +192,8 @@ def complete(
     mesh = replace(mesh, points=snap(mesh.points, pairs), pairs=pairs, sector=sector)
     points, straightened = straighten(mesh)
     mesh = replace(mesh, points=snap(points, pairs))
-    return replace(mesh, report=report(mesh, straightened, size))
+    told = {name: mesh.report[name] for name in ("notes",) if name in mesh.report}
+    return replace(mesh, report={**report(mesh, straightened, size), **told})
 
 
 def _flatten_faces(mesh: Mesh, names: tuple[str, ...]) -> np.ndarray:

@@ -89,8 +89,8 @@ class Wedge:
         40 * DEG,
         "rad",
         15 * DEG,
-        75 * DEG,
-        "alpha: each flank against the radial plane between two blades",
+        90 * DEG,
+        "alpha: each flank against the radial plane between two blades; 90 deg for a plate",
     )
     angle_next: float | None = quantity(
         None,
@@ -105,7 +105,8 @@ class Wedge:
         "m",
         2e-4,
         0.05,
-        "height of the straight part below the flanks of a wedge (the blunted bottom)",
+        "height of the straight part below the flanks of a wedge (the blunted bottom); the "
+        "thickness of a plate",
     )
     mass: float | None = quantity(None, "kg", 1e-4, 5.0, "mass; sets the density when given")
     clearance: float = quantity(

@@ -215,7 +215,8 @@ def clearing_shift(wedge: Wedge, profile: Profile) -> np.ndarray:
             for angle, side in zip(wedge.angles, (-1, 1), strict=True)
         ]
     )
-    radial, across = np.linalg.solve(normals, np.full(2, -wedge.clearance))
+    # the shortest one: flanks in one plane leave the motion along them open
+    radial, across = np.linalg.lstsq(normals, np.full(2, -wedge.clearance), rcond=1e-9)[0]
     c = np.cos(profile.theta)
     s = np.sin(profile.theta)
     return np.array([radial * c - across * s, radial * s + across * c])

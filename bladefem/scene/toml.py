@@ -111,7 +111,7 @@ def vary(scene: Scene, *pair: Any, **changes: Any) -> Scene:
     >>> vary(Scene(), "damper.angle", "95 deg")
     Traceback (most recent call last):
         ...
-    bladefem.errors.InputError: damper.angle = 95 deg: expected 15 deg to 75 deg
+    bladefem.errors.InputError: damper.angle = 95 deg: expected 15 deg to 90 deg
     """
     if len(pair) % 2:
         raise InputError(f"vary: expected name and value in turn, got {len(pair)} arguments")

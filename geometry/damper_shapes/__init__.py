@@ -4,9 +4,11 @@ list below.
 
 from __future__ import annotations
 
-from . import round_bar, wedge
+from . import plate, round_bar, wedge
 from .record import DamperShape
 
 __all__ = ["SHAPES", "DamperShape"]
 
-SHAPES: dict[str, DamperShape] = {module.SHAPE.name: module.SHAPE for module in (wedge, round_bar)}
+SHAPES: dict[str, DamperShape] = {
+    module.SHAPE.name: module.SHAPE for module in (wedge, round_bar, plate)
+}

@@ -16,6 +16,8 @@ from geometry.damper_shapes import SHAPES
 from geometry.parameters import DEG, Aerofoil, Disc, MeshSize, Platform, Shank, Wedge
 from geometry.profile import profile
 from geometry.sector import wedge_sector
+from geometry.sector_check import check_sector
+from geometry.sector_names import clearing_shift
 
 PARTS = (Aerofoil(), Platform(), Shank(), Disc())
 COARSE = MeshSize(size=0.012)
@@ -37,7 +39,7 @@ def midway_axes(damper: Wedge) -> tuple[np.ndarray, np.ndarray]:
     return flanks @ axes, shape.damper @ axes
 
 
-@pytest.mark.parametrize("angles", [(40, None), (55, 35), (30, 60)])
+@pytest.mark.parametrize("angles", [(40, None), (55, 35), (30, 60), (90, None)])
 @pytest.mark.parametrize("name", list(SHAPES))
 def test_flanks_have_their_angles_and_lie_in_the_outline(name, angles):
     first, second = (None if angle is None else angle * DEG for angle in angles)
@@ -45,6 +47,14 @@ def test_flanks_have_their_angles_and_lie_in_the_outline(name, angles):
     if name == "round bar" and second is not None:
         with pytest.raises(InputError, match="no circle fits"):
             profile(*PARTS[1:], damper)
+        return
+    if name == "plate" and first != pi / 2:
+        with pytest.raises(InputError, match="not in one plane, expected damper.angle = '90 deg'"):
+            profile(*PARTS[1:], damper)
+        return
+    if name != "plate" and first == pi / 2:
+        with pytest.raises(InputError, match=r"damper\.(angle|shape)"):
+            check_sector(*PARTS, damper)
         return
     flanks, corners = midway_axes(damper)
     for (inner, outer), angle in zip(flanks, damper.angles, strict=True):
@@ -77,8 +87,10 @@ def test_round_bar_is_a_circle_with_two_flats():
         Wedge(angle=55 * DEG, angle_next=40 * DEG),
         Wedge(angle=45 * DEG, angle_next=60 * DEG, clearance=5e-5),
         Wedge(shape="round bar", angle=50 * DEG),
+        Wedge(shape="plate", angle=90 * DEG, base=4e-3),
+        Wedge(shape="plate", angle=90 * DEG, base=4e-3, clearance=5e-5),
     ],
-    ids=["asymmetric", "asymmetric with clearance", "round bar"],
+    ids=["asymmetric", "asymmetric with clearance", "round bar", "plate", "plate with clearance"],
 )
 def test_meshes_match_on_both_seats(damper):
     mesh = wedge_sector(*PARTS, damper, COARSE)
@@ -92,6 +104,20 @@ def test_meshes_match_on_both_seats(damper):
         moved = mesh.points[master] @ pair.rotation.T + pair.shift
         assert np.abs(moved - mesh.points[slave]).max() < 1e-12
         assert len(master) >= 9
+
+
+def test_a_plate_is_a_rectangle_pressed_radially():
+    """As wide as both seats and the gap; its clearance moves it along the radial line midway."""
+    damper = Wedge(shape="plate", angle=90 * DEG, base=4e-3, clearance=1e-4)
+    flanks, corners = midway_axes(damper)
+    assert np.ptp(flanks[..., 0]) < 1e-12
+    width = np.ptp(corners[:, 1])
+    platform, theta = PARTS[1], pi / PARTS[3].sectors
+    # the gap is measured across the radial line midway, where the edges of the platforms end
+    assert width == pytest.approx(2 * platform.seat_width + platform.gap, rel=1e-9)
+    assert outline_area(corners) == pytest.approx(width * damper.base, rel=1e-9)
+    shift = clearing_shift(damper, profile(*PARTS[1:], damper))
+    assert shift == pytest.approx(-damper.clearance * np.array([cos(theta), sin(theta)]))
 
 
 def test_clearance_opens_both_flanks_alike():

@@ -26,7 +26,7 @@ REFUSED = [
     # units, types, ranges
     ("damper.angle=20 mm", "'mm' is not a unit of this field, expected deg or rad"),
     ("operation.speed=133 Hz", "expected rpm or rad/s"),
-    ("damper.angle=90 deg", "expected 15 deg to 75 deg"),
+    ("damper.angle=95 deg", "expected 15 deg to 90 deg"),
     ("contact.mu=nan", "finite"),
     ("aerofoil.span=inf", "finite"),
     ("contact.mu=-0.1", "expected 0 to 2"),
@@ -47,7 +47,7 @@ REFUSED = [
     ("material.blade.nu=0.5", "material.blade.nu = 0.5"),
     ("aerofoil.span=auto", "expected a number"),
     # a unit forgotten
-    ("damper.angle=65", "expected 15 deg to 75 deg; did you mean '65 deg'?"),
+    ("damper.angle=65", "expected 15 deg to 90 deg; did you mean '65 deg'?"),
     ("aerofoil.twist=10", "did you mean '10 deg'?"),
     ("mesh.size=8", "did you mean '8 mm'?"),
     ("material.blade.E=210", "did you mean '210 GPa'?"),
