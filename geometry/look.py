@@ -34,13 +34,14 @@ ROUNDOFF = 1e-6
 # from a whole number of sectors
 WHOLE = 0.01
 MOST_SECTORS = 400
-# names that a task needs, and what they are for
 # what a scene says in addition to a STEP file
 DRAWN = (
-    "imported.sectors = number of blades: cut faces and bore are then found by themselves",
     "imported.names, such as 'tip = face_21', for the face of excitation.at",
     "imported.seats = two plane platform faces: the damper is drawn between them",
 )
+# where no cut faces were found in it
+UNCUT = "imported.sectors = number of blades, for a sector of a wheel; 0 for a single blade"
+# names that a task needs, and what they are for
 NEEDED = {
     "clamp": "face or node set that is held",
     "cyclic_low": "cut face of a sector, with cyclic_high on the other side",
@@ -110,7 +111,7 @@ def look_at(file: str | Path) -> Look:
     Raises:
         InputError: the file cannot be read, or holds no solids.
     """
-    drawing = Path(file).suffix.lower() in (".step", ".stp")
+    drawing = is_drawing(Path(file))
     raw = coarse_step(file) if drawing else read_raw(Path(file))
     solid = [cells for word, cells in raw.blocks if DIMENSION.get(FAMILY.get(word, "")) == 3]
     if not solid:
@@ -124,7 +125,7 @@ def look_at(file: str | Path) -> Look:
     if drawing:
         outside, names = _drawn_faces(raw, outside)
     faces = tuple(_face_part(outside, number, name) for number, name in enumerate(names))
-    cut = _cut_faces(raw, outside, faces, float(np.ptp(box, axis=0).max()))
+    cut = _cut_faces(raw, outside, faces, float(np.ptp(box, axis=0).max()), drawing)
     bore = None if cut is None else _bore_face(raw, outside, faces, cut)
     return Look(
         Path(file),
@@ -139,8 +140,13 @@ def look_at(file: str | Path) -> Look:
         faces,
         cut,
         bore,
-        DRAWN if drawing else _missing_names(raw, cut, bore),
+        _missing_in_drawing(cut) if drawing else _missing_names(raw, cut, bore),
     )
+
+
+def is_drawing(file: Path) -> bool:
+    """Whether a file is a STEP file, by its ending."""
+    return file.suffix.lower() in (".step", ".stp")
 
 
 def starting_scene(look: Look) -> str:
@@ -153,19 +159,24 @@ def starting_scene(look: Look) -> str:
             wanted["clamp"] = (look.bore,)
         names = [f"{new} = {' + '.join(old)}" for new, old in wanted.items() if new not in taken]
     axis = AXES[look.cut.axis] if look.cut else AXES["z"]
+    # which states its unit
+    drawing = is_drawing(look.file)
+    origin = "guessed from cut faces" if look.cut else "no cut faces were found"
     lines = [
         f'title = "{look.file.stem}"',
         'kind = "imported"',
         "",
         "[imported]",
         f'file = "{look.file.name}"',
-        f"scale = {look.scale:g}".ljust(32) + "# guessed: to metres",
-        f"sectors = {look.cut.sectors if look.cut else 0}".ljust(32) + "# guessed from cut faces",
+        *([] if drawing else [f"scale = {look.scale:g}".ljust(32) + "# guessed: to metres"]),
+        f"sectors = {look.cut.sectors if look.cut else 0}".ljust(32) + f"# {origin}",
         f"axis = {[float(v) for v in axis]}".ljust(32) + "# of the engine",
     ]
     if names:
         lines += ["names = [", *(f'    "{name}",' for name in names), "]"]
-    if any(NODES[w] == CORNERS[FAMILY[w]] for w in look.cells if DIMENSION[FAMILY[w]] == 3):
+    if not drawing and any(
+        NODES[w] == CORNERS[FAMILY[w]] for w in look.cells if DIMENSION[FAMILY[w]] == 3
+    ):
         lines.append('linear = "promote"'.ljust(32) + "# first-order cells get mid-side nodes")
     lines += ["", "# still missing:", *(f"# {sentence}" for sentence in look.missing), ""]
     return "\n".join(lines)
@@ -267,15 +278,21 @@ def _cut_faces(
     outside: NumberedFaces,
     faces: tuple[FacePart, ...],
     size: float,
+    drawing: bool,
 ) -> CutFaces | None:
-    """Pairs of faces on which nodes match after one turn about an axis through the origin."""
+    """Pairs of faces on which nodes match after one turn about an axis through the origin.
+
+    Args:
+        drawing: the mesh was made for this look, face by face: only the nodes on the edges of its
+            faces match.
+    """
     best: CutFaces | None = None
     most = 0.0
     for axis in AXES:
         pairs: dict[int, list[tuple[int, int]]] = {}
         for i, one in enumerate(faces):
             for j, other in enumerate(faces):
-                if i != j and _similar_faces(one, other):
+                if i != j and _similar_faces(one, other, drawing):
                     sectors = _sector_count(one.centre, other.centre, axis, size)
                     if sectors and _cut_faces_match(
                         raw,
@@ -284,6 +301,7 @@ def _cut_faces(
                         axis,
                         sectors,
                         size,
+                        drawing,
                     ):
                         pairs.setdefault(sectors, []).append((i, j))
         for sectors, some in pairs.items():
@@ -295,8 +313,9 @@ def _cut_faces(
     return best
 
 
-def _similar_faces(one: FacePart, other: FacePart) -> bool:
-    return one.facets == other.facets and abs(one.area - other.area) < 1e-3 * one.area
+def _similar_faces(one: FacePart, other: FacePart, drawing: bool) -> bool:
+    alike = drawing or one.facets == other.facets
+    return alike and abs(one.area - other.area) < 1e-3 * one.area
 
 
 def _sector_count(
@@ -326,11 +345,11 @@ def _cut_faces_match(
     axis: str,
     sectors: int,
     size: float,
+    drawing: bool,
 ) -> bool:
     """Whether the corner nodes of one face, turned, lie on those of the other."""
-    one, other = (
-        np.unique(np.concatenate([c.ravel() for c in face_corners(outside, i)])) for i in pair
-    )
+    chosen = _edge_nodes if drawing else _corner_nodes
+    one, other = (chosen(outside, i) for i in pair)
     if len(one) != len(other):
         return False
     k = "xyz".index(axis)
@@ -341,6 +360,23 @@ def _cut_faces_match(
     x[:, a] = np.cos(angle) * first - np.sin(angle) * x[:, b]
     x[:, b] = np.sin(angle) * first + np.cos(angle) * x[:, b]
     return bool(cKDTree(raw.points[other]).query(x)[0].max() < MATCHED * size)
+
+
+def _corner_nodes(outside: NumberedFaces, number: int) -> np.ndarray:
+    """Nodes at the corners of a face's facets."""
+    return np.unique(np.concatenate([c.ravel() for c in face_corners(outside, number)]))
+
+
+def _edge_nodes(outside: NumberedFaces, number: int) -> np.ndarray:
+    """Nodes on the outline of a face: the sides that one of its facets has alone."""
+    sides = np.concatenate(
+        [
+            np.sort(np.stack([c, np.roll(c, -1, axis=1)], axis=2).reshape(-1, 2), axis=1)
+            for c in face_corners(outside, number)
+        ]
+    )
+    found, count = np.unique(sides, axis=0, return_counts=True)
+    return np.unique(found[count == 1])
 
 
 def _bore_face(
@@ -363,6 +399,11 @@ def _bore_face(
 def _names_of(raw: RawMesh) -> set[str]:
     every = (*raw.groups, *raw.node_sets, *raw.surfaces)
     return {"_".join(name.lower().split()) for name in every}
+
+
+def _missing_in_drawing(cut: CutFaces | None) -> tuple[str, ...]:
+    """What a run of a STEP file needs and its faces do not tell."""
+    return DRAWN if cut is not None else (UNCUT, *DRAWN)
 
 
 def _missing_names(

@@ -8,6 +8,8 @@ import argparse
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from geometry.look import is_drawing
+
 from ..errors import InputError
 from ..util.communicator import Communicator
 from .tables import plain
@@ -54,24 +56,17 @@ def look(options: argparse.Namespace, comm: Communicator | None) -> None:
 
 
 def described(found: Look) -> str:
-    """Everything in words and tables; lengths in the file's unit."""
-    size = found.box[1] - found.box[0]
-    cells = ", ".join(f"{count} {word}" for word, count in found.cells.items())
-    lines = [
-        f"cells: {cells}",
-        f"bodies: {len(found.bodies)} of {', '.join(map(str, found.bodies[:8]))} solid cells",
-        f"size: {size[0]:.6g} x {size[1]:.6g} x {size[2]:.6g} in the file's unit; scale = "
-        f"{found.scale:g} makes it {found.scale * size.max():.4g} m long (guessed)",
-        *found.raw.notes,
-    ]
+    """Everything in words and tables; lengths in the file's unit, those of a drawing in metres."""
+    lines = _of_drawing(found) if is_drawing(found.file) else _of_mesh(found)
     if found.cut is not None:
         lines.append(
             f"cut faces: {' + '.join(found.cut.low)} -> {' + '.join(found.cut.high)}, "
             f"{found.cut.sectors} sectors about {found.cut.axis}"
         )
     else:
-        lines.append("cut faces: none found; the nodes of two faces would match after one turn")
-    sets = [[name, what] for name, what in found.sets.items()]
+        lines.append("cut faces: none found; one turn would carry one face onto the other")
+    # of a drawing they are its faces, which are listed below
+    sets = [] if is_drawing(found.file) else [[n, what] for n, what in found.sets.items()]
     faces = [
         [
             face.name,
@@ -82,10 +77,33 @@ def described(found: Look) -> str:
         ]
         for face in found.faces[:LISTED]
     ]
-    lines += [plain(sets, ["set", "holds"]), ""] if sets else ["no named sets", ""]
+    if sets:
+        lines += [plain(sets, ["set", "holds"]), ""]
+    else:
+        lines += [""] if is_drawing(found.file) else ["no named sets", ""]
     lines.append(plain(faces, ["face", "facets", "area", "centre", "shape"]))
     if len(found.faces) > LISTED:
         lines.append(f"and {len(found.faces) - LISTED} smaller faces")
     if found.missing:
         lines += ["", "not in the file:", *(f"  {sentence}" for sentence in found.missing)]
     return "\n".join(lines)
+
+
+def _of_drawing(found: Look) -> list[str]:
+    """Solids and size of a STEP file."""
+    size = 1e3 * (found.box[1] - found.box[0])
+    count = f"{len(found.bodies)} solid{'s' if len(found.bodies) > 1 else ''}"
+    return [f"{count}, {size[0]:.6g} x {size[1]:.6g} x {size[2]:.6g} mm; centres and areas in m"]
+
+
+def _of_mesh(found: Look) -> list[str]:
+    """Cells, bodies and size of a mesh."""
+    size = found.box[1] - found.box[0]
+    cells = ", ".join(f"{count} {word}" for word, count in found.cells.items())
+    return [
+        f"cells: {cells}",
+        f"bodies: {len(found.bodies)} of {', '.join(map(str, found.bodies[:8]))} solid cells",
+        f"size: {size[0]:.6g} x {size[1]:.6g} x {size[2]:.6g} in the file's unit; scale = "
+        f"{found.scale:g} makes it {found.scale * size.max():.4g} m long (guessed)",
+        *found.raw.notes,
+    ]

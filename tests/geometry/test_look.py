@@ -1,17 +1,20 @@
 """What a mesh file says of itself, and a run of the scene that comes of it."""
 
 import tomllib
+from pathlib import Path
 
 import decks
 import numpy as np
 import pytest
 
+import bladefem
 from bladefem.cli.main import main
 from bladefem.errors import InputError
 from geometry.imported import read_mesh
 from geometry.look import look_at, starting_scene
 from geometry.numbered_faces import face_corners, numbered_faces
 from geometry.raw_mesh import read_raw
+from geometry.session import gmsh_session
 
 
 @pytest.fixture
@@ -86,3 +89,44 @@ def test_a_drawing_is_looked_at_by_its_own_faces():
     assert np.allclose(right.centre, left.centre * [1, -1, 1], atol=1e-9)
     assert right.centre[1] > 0.01
     assert any("imported.seats" in sentence for sentence in found.missing)
+
+
+def test_cut_faces_of_a_drawing_are_guessed():
+    """No nodes match on faces that are meshed one by one: their outlines do."""
+    found = look_at("scenes/own_blade.step")
+    assert (found.cut.axis, found.cut.sectors) == ("z", 36)
+    assert (found.cut.low, found.cut.high) == (("face_1",), ("face_6",))
+    assert found.bore == "face_2"
+    assert not any("imported.sectors" in sentence for sentence in found.missing)
+
+
+def test_the_scene_of_a_drawing_is_meshed_as_it_is_written(tmp_path, capsys):
+    """With what is still missing: the face that is excited."""
+    step = tmp_path / "blade.step"
+    step.write_bytes(Path("scenes/own_blade.step").read_bytes())
+    assert main(["look", str(step), "--scene"]) == 0
+    said = capsys.readouterr().out
+    assert "1 solid, 243.992 x 43.3592 x 60 mm" in said
+    assert "scale" not in said
+    table = tomllib.loads(step.with_suffix(".toml").read_text())["imported"]
+    assert (table["sectors"], table["axis"]) == (36, [0.0, 0.0, 1.0])
+    assert not {"scale", "linear"} & set(table)
+    options = ["-o", str(tmp_path / "run"), "--set", "mesh.size=20 mm", "-q"]
+    assert main(["mesh", str(step.with_suffix(".toml")), *options]) == 0
+    mesh = bladefem.open(tmp_path / "run").mesh
+    assert mesh.sector.count == 36
+    assert len(mesh.pairs["cyclic"].nodes[0]) > 20
+    radius = np.hypot(*mesh.points[np.unique(mesh.faces["clamp"])][:, :2].T)
+    assert np.allclose(radius, 0.12, rtol=1e-3)
+
+
+def test_a_drawing_without_cut_faces_asks_for_the_number_of_blades(tmp_path):
+    """A box has no faces that a turn about an axis of the file carries onto each other."""
+    with gmsh_session() as gmsh:
+        gmsh.model.occ.addBox(0.1, 0.2, 0.3, 0.02, 0.03, 0.05)
+        gmsh.model.occ.synchronize()
+        gmsh.write(str(tmp_path / "box.step"))
+    found = look_at(tmp_path / "box.step")
+    assert found.cut is None
+    assert found.missing[0].startswith("imported.sectors")
+    assert "# no cut faces were found" in starting_scene(found)
