@@ -14,6 +14,7 @@ HERE = Path(__file__).parent
 TABLES = {
     "aerofoil": ["Aerofoil"],
     "platform": ["Platform", "Shank", "Wedge"],
+    "dampers": [],
     "sector": ["Disc"],
     "plane": ["Plane"],
     "z_mass": ["ZMass"],

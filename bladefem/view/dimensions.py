@@ -151,5 +151,7 @@ def note(
         ha="left" if offset[0] > 0 else "right" if offset[0] < 0 else "center",
         va="center",
         arrowprops={"arrowstyle": "-", "color": "#777777", "lw": 0.7},
+        # readable across a line of the drawing
+        bbox={"boxstyle": "square,pad=0.15", "fc": "white", "ec": "none", "alpha": 0.75},
         zorder=6,
     )

@@ -4,13 +4,14 @@ shows.
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from bladefem.scene.units import show
-from geometry.parameters import Aerofoil, Disc, Plane, Platform, Shank, Wedge, ZMass
+from geometry.parameters import DEG, Aerofoil, Disc, Plane, Platform, Shank, Wedge, ZMass
 from geometry.plane import blade_corners, damper_corners
 from geometry.profile import profile
 from geometry.section import centroid, placement
@@ -205,25 +206,10 @@ def label_platform(
     length(ax, corner, corner * mirror, said(platform, "gap"), 3.0)
     length(ax, inner, outer, said(platform, "seat_width"), 2.0)
     length(ax, corner * mirror, outer * mirror, said(platform, "thickness"), 2.5)
-    if wedge.shape == "wedge":
+    if wedge.shape != "round bar":
         length(ax, foot * mirror, inner * mirror, said(wedge, "base"), -2.5)
-    apex = np.array([0.0, inner[1] - inner[0] / np.tan(wedge.angle)])
-    angle(
-        ax,
-        apex,
-        -np.pi / 2 - wedge.angle,
-        -np.pi / 2,
-        0.75 * (apex[1] - inner[1]),
-        said(wedge, "angle"),
-    )
-    angle(
-        ax,
-        apex,
-        -np.pi / 2,
-        wedge.angles[1] - np.pi / 2,
-        0.6 * (apex[1] - inner[1]),
-        "angle_next" if wedge.angle_next is None else said(wedge, "angle_next"),
-    )
+    if wedge.shape != "plate":
+        _label_angles(ax, wedge, inner)
     note(
         ax,
         0.3 * (inner * mirror) + 0.7 * (outer * mirror),
@@ -243,6 +229,60 @@ def label_platform(
         f"shank\n{said(shank, 'width')}\n{said(shank, 'height')}",
         (-20, -24),
     )
+
+
+def _label_angles(ax: Axes, wedge: Wedge, inner: np.ndarray) -> None:
+    """Angles of both flanks against the radial line between the blades."""
+    apex = np.array([0.0, inner[1] - inner[0] / np.tan(wedge.angle)])
+    angle(
+        ax,
+        apex,
+        -np.pi / 2 - wedge.angle,
+        -np.pi / 2,
+        0.75 * (apex[1] - inner[1]),
+        said(wedge, "angle"),
+    )
+    angle(
+        ax,
+        apex,
+        -np.pi / 2,
+        wedge.angles[1] - np.pi / 2,
+        0.6 * (apex[1] - inner[1]),
+        "angle_next" if wedge.angle_next is None else said(wedge, "angle_next"),
+    )
+
+
+def draw_damper_shapes(
+    platform: Platform,
+    shank: Shank,
+    disc: Disc,
+    wedge: Wedge,
+    file: str | Path | None = None,
+) -> object:
+    """Every shape of damper between two platforms, with the scene's other values; returns the
+    figure.
+    """
+    steep = max(wedge.angle - 15 * DEG, 15 * DEG)
+    both = {
+        "wedge": replace(wedge, shape="wedge", angle_next=None),
+        "wedge, angle_next given": replace(wedge, shape="wedge", angle_next=steep),
+        "round bar": replace(wedge, shape="round bar", angle_next=None),
+        "plate": replace(wedge, shape="plate", angle=90 * DEG, angle_next=None),
+    }
+    with canvas(file, size=(11.4, 3.1), grid=(1, len(both)), sharey=True) as axes:
+        for ax, (name, damper) in zip(axes, both.items(), strict=True):
+            cut = profile(platform, shank, disc, damper)
+            # the next blade's side is this one's turned by a sector
+            shape(ax, turned(cut.blade, cut.theta))
+            shape(ax, turned(cut.blade, -cut.theta), NEXT)
+            shape(ax, turned(cut.damper, cut.theta), DAMPER)
+            for seat, side in zip(cut.seats, (1, -1), strict=True):
+                ax.plot(*turned(seat, side * cut.theta).T, color=COLOURS[1], lw=3, zorder=4)
+            bare(ax, name, "circumferential", "radial")
+            middle = MM * cut.underside * np.cos(cut.theta)
+            ax.set(xlim=(-14, 14), ylim=(middle - 13, middle + 14))
+            ax.label_outer()
+        return axes[0].figure
 
 
 def ring(

@@ -508,10 +508,13 @@ def draw_seat_loops(
     with canvas(
         file, None, (3.3 * across + 0.6, 2.9 * down + 0.3), (down, across), squeeze=False
     ) as axes:
-        for ax, (name, seats) in zip(axes.flat, cases.items(), strict=False):
+        for number, (ax, (name, seats)) in enumerate(zip(axes.flat, cases.items(), strict=False)):
             draw_loops(seats, ax=ax, title=name)
-            ax.label_outer()
-            ax.tick_params(labelbottom=True, labelleft=True)
+            # the lowest panel of a column and the first of a row name the axes
+            if number + across < len(cases):
+                ax.set_xlabel("")
+            if number % across:
+                ax.set_ylabel("")
             low, high = ax.get_ylim()
             # room for the legend
             ax.set_ylim(low - 0.2 * (high - low), high)

@@ -8,6 +8,7 @@ from test_pictures import ink
 
 from bladefem.scene.kinds import kind_named
 from bladefem.scene.tables import Scene
+from bladefem.scene.toml import vary
 from bladefem.study.modes.crossings import campbell_crossings, fold
 from bladefem.view.convergence import draw_convergence
 from bladefem.view.maps import draw_map
@@ -134,3 +135,18 @@ def test_names_beside_lines_stay_apart():
     moved = spread(np.array([0.0, 0.4, 0.5, 0.6, 1.2, 3.0]), 0.5)
     assert (np.diff(moved) > 0.5 - 1e-12).all() and moved[-1] == 3.0
     assert moved[:5].mean() == pytest.approx(np.mean([0.0, 0.4, 0.5, 0.6, 1.2]))
+
+
+def test_every_damper_shape_is_drawn():
+    pictures = kind_named("wedge sector").pictures
+    titles = [
+        ax.get_title(loc="left") or ax.get_title() for ax in pictures["dampers"](Scene()).axes
+    ]
+    assert titles == ["wedge", "wedge, angle_next given", "round bar", "plate"]
+
+
+def test_a_plate_is_drawn_without_angles():
+    plate = vary(Scene(), "damper.shape", "plate", "damper.angle", "90 deg", "damper.base", "4 mm")
+    said = texts(kind_named("wedge sector").pictures["platform"](plate))
+    assert "base 4 mm" in said
+    assert "angle" not in said

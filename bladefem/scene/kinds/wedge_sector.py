@@ -109,6 +109,9 @@ KIND = Kind(
         "platform": SceneCall(
             "bladefem.view.parts:draw_platform", ("platform", "shank", "disc", "damper")
         ),
+        "dampers": SceneCall(
+            "bladefem.view.parts:draw_damper_shapes", ("platform", "shank", "disc", "damper")
+        ),
         "sector": SceneCall("bladefem.view.parts:draw_disc", SHAPE),
     },
     conditions=conditions,
