@@ -212,8 +212,8 @@ def _step_2d(x, y, dx, dy, loads, mu, tangents):
 
 
 @njit(**KERNEL)
-def period_map(E, G0, G1, U, R, A, B1, B0, share):
-    """(2M+m, 2M+m) map of disturbances of (q, v, f) over a period.
+def flow_map(E, G0, G1, U, R, A, B1, B0, share, steps):
+    """(2M+m, 2M+m) map of disturbances of (q, v, f) over the first steps of a period.
 
     Args:
         E, G0, G1: of `linear_steps`, the last two applied to -U^T: (2M, m).
@@ -221,6 +221,7 @@ def period_map(E, G0, G1, U, R, A, B1, B0, share):
         A, B1, B0: (S, n, d, d) derivatives of a step's force by the force before, and by the
             displacements after and before [N/m].
         share: (S, n) of each step for which the force before acts.
+        steps: at most S.
     """
     S, n, d, _ = A.shape
     m, M = U.shape
@@ -237,7 +238,7 @@ def period_map(E, G0, G1, U, R, A, B1, B0, share):
     rhs = np.empty((m, size))
     acting = np.empty((m, size))
     inverse = np.empty((m, m))
-    for k in range(1, S + 1):
+    for k in range(1, steps + 1):
         j = k % S
         for row in range(m):
             acting[row] = 2.0 * share[j, row // d] * F[row]

@@ -13,6 +13,7 @@ from dataclasses import dataclass
 from functools import reduce
 
 import numpy as np
+from scipy import linalg
 
 from ..data import PortModel
 from ..errors import InputError
@@ -39,6 +40,11 @@ class SectorModes:
     contact: np.ndarray
     # (m, m) R [m/N]
     residual: np.ndarray
+    # (M, M) modal coordinates of a motion that every blade has handed on to the next one
+    turn: np.ndarray
+    # (r p, M) and (r p, m) the same as U and R for the p probes of each blade
+    probe: np.ndarray
+    probe_residual: np.ndarray
 
 
 def sector_modes(model: ReducedModel) -> SectorModes:
@@ -49,20 +55,21 @@ def sector_modes(model: ReducedModel) -> SectorModes:
     """
     r = blades_of_wave(model)
     parts = [_ring(body, r, sign) for body, sign in _bodies(model, r)]
-    modes = sum(len(part.stiffness) for part in parts)
-    damping = np.zeros((modes, modes))
-    start = 0
-    for part in parts:
-        own = slice(start, start + len(part.stiffness))
-        damping[own, own] = part.damping
-        start = own.stop
     return SectorModes(
         r,
         np.concatenate([part.stiffness for part in parts]),
-        damping,
+        linalg.block_diag(*[part.damping for part in parts]),
         np.hstack([part.contact for part in parts]),
         reduce(np.add, [part.residual for part in parts]),
+        linalg.block_diag(*[part.turn for part in parts]),
+        np.hstack([_probes(part, len(parts[0].probe)) for part in parts]),
+        parts[0].probe_residual,
     )
+
+
+def _probes(part: SectorModes, count: int) -> np.ndarray:
+    """(count, M) readings at the probes, none of which is on a damper."""
+    return part.probe if len(part.probe) else np.zeros((count, len(part.stiffness)))
 
 
 def blades_of_wave(model: ReducedModel) -> int:
@@ -129,15 +136,14 @@ def _ring(
     sign: float,
 ) -> SectorModes:
     """One body in all diameters of a ring of r blades."""
-    stiffness, contact, loss = [], [], []
-    shape = stack.residual[0, stack.contact, stack.contact].shape
-    residual = np.zeros((r, r, *shape))
+    stiffness: list[np.ndarray] = []
+    contact: list[np.ndarray] = []
+    probe: list[np.ndarray] = []
+    loss: list[np.ndarray] = []
+    turned: list[np.ndarray] = []
     blade = np.arange(r)
     for j in range(r):
         row = min(j, len(stack.omega) - 1)
-        flexible = stack.residual[min(j, len(stack.residual) - 1), stack.contact, stack.contact]
-        turn = np.exp(2j * np.pi * j * (blade[:, None] - blade) / r)
-        residual += (turn[:, :, None, None] * flexible).real / r
         if 2 * j > r:
             continue
         own = stack.omega[row]
@@ -146,21 +152,38 @@ def _ring(
         )
         if stack.coupled is not None:
             viscous = viscous + stack.coupled[min(j, len(stack.coupled) - 1)]
-        phase = np.exp(2j * np.pi * j * blade / r)[:, None, None]
-        shapes = (sign * phase * stack.shapes[row, stack.contact]).reshape(-1, len(own))
         double = 0 < 2 * j < r
-        size = np.sqrt((2 if double else 1) / r)
+        size = sign * np.sqrt((2 if double else 1) / r)
+        phase = np.exp(2j * np.pi * j * blade / r)[:, None, None]
+        for rows, found in ((stack.contact, contact), (stack.probe, probe)):
+            shapes = size * (phase * stack.shapes[row, rows]).reshape(-1, len(own))
+            found.extend([shapes.real] + [shapes.imag] * double)
         stiffness.extend([own**2] * (1 + double))
-        contact.extend([size * shapes.real] + [size * shapes.imag] * double)
         loss.append(_real_form(viscous) if double else viscous.real)
-    order = residual.transpose(0, 2, 1, 3).reshape(r * shape[0], r * shape[1])
-    modes = sum(map(len, stiffness))
-    damping = np.zeros((modes, modes))
-    start = 0
-    for part in loss:
-        damping[start : start + len(part), start : start + len(part)] = part
-        start += len(part)
-    return SectorModes(r, np.concatenate(stiffness), damping, np.hstack(contact), order)
+        handed_on = np.exp(-2j * np.pi * j / r) * np.eye(len(own))
+        turned.append(_real_form(handed_on) if double else handed_on.real)
+    return SectorModes(
+        r,
+        np.concatenate(stiffness),
+        linalg.block_diag(*loss),
+        np.hstack(contact),
+        _ring_residual(stack, r, stack.contact),
+        linalg.block_diag(*turned),
+        np.hstack(probe),
+        _ring_residual(stack, r, stack.probe),
+    )
+
+
+def _ring_residual(stack: Stack, r: int, rows: slice) -> np.ndarray:
+    """(r rows, m) residual flexibility between ports of all blades and their contacts."""
+    blade = np.arange(r)
+    shape = stack.residual[0, rows, stack.contact].shape
+    found = np.zeros((r, r, *shape))
+    for j in range(r):
+        flexible = stack.residual[min(j, len(stack.residual) - 1), rows, stack.contact]
+        turn = np.exp(2j * np.pi * j * (blade[:, None] - blade) / r)
+        found += (turn[:, :, None, None] * flexible).real / r
+    return found.transpose(0, 2, 1, 3).reshape(r * shape[0], r * shape[1])
 
 
 def _real_form(matrix: np.ndarray) -> np.ndarray:

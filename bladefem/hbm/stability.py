@@ -7,7 +7,8 @@ carried through one period along the solution (`bladefem.hbm.linearised_flow`): 
 of its multipliers shows how much of a disturbance is left after a period. Nodes that stick
 throughout only add constant multipliers of one, the mean force that stick leaves open, and are
 condensed into the bodies. Travelling waves are judged against all disturbances that repeat after
-the same number of blades as they do.
+the same number r of blades as they do. A disturbance that is carried through 1/r of a period and
+handed on to the next blade meets the same wave again: r such steps make the period.
 
 The named bifurcation is the one through which a motion with such multipliers lost its stability:
 "fold" at +1, "period doubling" at -1, "torus" for a complex pair.
@@ -15,14 +16,14 @@ The named bifurcation is the one through which a motion with such multipliers lo
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from scipy import linalg
 
 from ..errors import InputError
 from ..friction.fourier import synthesis
-from .linearised_flow import contact_steps, linear_steps, period_map
+from .linearised_flow import contact_steps, flow_map, linear_steps
 from .model import ReducedModel
 from .sector_modes import SectorModes, sector_modes
 from .solution import Solution
@@ -39,10 +40,10 @@ INSTANTS = 256
 INSTANT_REFINEMENT = 4
 # distance from one within which it is
 NEAR_ONE = 0.003
-# operations of one verdict above which only those are made that are asked for, some 0.3 s
-AFFORDABLE = 2e9
-# and above which none are made, some 10 s
-MAX_OPERATIONS = 3e10
+# operations of one verdict up to which many are made, some 0.03 s
+AFFORDABLE = 1e9
+# and above which none is made, some 2 s
+MAX_OPERATIONS = 6e10
 # angle of a multiplier to the real axis up to which it is real
 REAL = 1e-3
 
@@ -69,22 +70,18 @@ def stability_verdict(
     """The verdict on a converged solution of the model.
 
     Args:
-        most: operations above which it is not made; see `AFFORDABLE`.
+        most: operations above which it is not made, nor made again with more instants where it is
+            close or the motion unstable.
     """
     if not solution.converged:
         return Verdict(UNKNOWN, reason="not converged")
     if model.directions == model.elements.tangents and model.damped:
         return Verdict(UNIQUE)
-    if model.elements.law is not None:
-        return Verdict(UNKNOWN, reason="a friction law of its own, expected Coulomb's")
-    try:
-        system = model.once("sector modes", lambda: _outcome(model))
-    except InputError as error:
-        return Verdict(UNKNOWN, reason=str(error))
+    system = _system(model)
     if isinstance(system, InputError):
         return Verdict(UNKNOWN, reason=str(system))
     leading = _leading(model, solution, system, INSTANTS, most)
-    if leading is not None and abs(abs(leading) - 1 - GROWTH) < NEAR_ONE:
+    if leading is not None and abs(leading) - 1 - GROWTH > -NEAR_ONE:
         finer = _leading(model, solution, system, INSTANT_REFINEMENT * INSTANTS, most)
         leading = leading if finer is None else finer
     if leading is None:
@@ -94,8 +91,27 @@ def stability_verdict(
     return Verdict(UNSTABLE, float(abs(leading)), _bifurcation(leading))
 
 
-def _outcome(model: ReducedModel) -> SectorModes | InputError:
+def verdict_operations(model: ReducedModel, solution: Solution) -> float:
+    """Operations of a verdict with the fewest instants, roughly; 0 where none are needed or it
+    cannot be made.
+    """
+    if not solution.converged or (model.directions == model.elements.tangents and model.damped):
+        return 0.0
+    system = _system(model)
+    if isinstance(system, InputError):
+        return 0.0
+    moving = system.blades * (len(solution.w) - solution.states["stick"])
+    return _operations(system, moving * model.directions, INSTANTS)
+
+
+def _system(model: ReducedModel) -> SectorModes | InputError:
     """The system in time, or why there is none: found once for a model."""
+    if model.elements.law is not None:
+        return InputError("a friction law of its own, expected Coulomb's")
+    return model.once("sector modes", lambda: _outcome(model))
+
+
+def _outcome(model: ReducedModel) -> SectorModes | InputError:
     try:
         return sector_modes(model)
     except InputError as error:
@@ -132,9 +148,24 @@ def _leading(
     by_contact = -U.T
     nodes = (part[:, moving] for part in (A, B1, B0, share))
     arrays = (E, G0 @ by_contact, G1 @ by_contact, U, R, *nodes)
-    full = period_map(*(np.ascontiguousarray(a) for a in arrays))
-    values = linalg.eigvals(full, check_finite=False)
+    part = flow_map(*(np.ascontiguousarray(a) for a in arrays), S // system.blades)
+    values = linalg.eigvals(_handed_on(system, part), check_finite=False) ** system.blades
     return complex(values[np.argmax(abs(values))])
+
+
+def _handed_on(system: SectorModes, part: np.ndarray) -> np.ndarray:
+    """The map of (q, v, f) through 1/r of a period, seen by the next blade."""
+    if system.blades == 1:
+        return part
+    M = len(system.stiffness)
+    forces = part[2 * M :]
+    return np.concatenate(
+        [
+            system.turn @ part[:M],
+            system.turn @ part[M : 2 * M],
+            np.roll(forces, len(forces) // system.blades, axis=0),
+        ]
+    )
 
 
 def _operations(
@@ -142,11 +173,13 @@ def _operations(
     contacts: int,
     S: int,
 ) -> float:
-    """Of carrying all disturbances through S steps, with so many degrees of freedom in contact."""
+    """Of carrying all disturbances through 1/r of S steps, with so many degrees of freedom in
+    contact.
+    """
     modes = 2.0 * len(system.stiffness)
     columns = modes + contacts
     step = modes * (modes + 3 * contacts) + 2.0 * contacts**2
-    return S * (2 * columns * step + 2.0 * contacts**3)
+    return S / system.blades * (2 * columns * step + 2.0 * contacts**3)
 
 
 def _node_steps(
@@ -155,7 +188,7 @@ def _node_steps(
     blades: int,
     S: int,
 ) -> tuple[np.ndarray, ...]:
-    """A, B1, B0 (S, blades n, d, d) and share of `period_map`, and which nodes stick throughout."""
+    """A, B1, B0 (S, blades n, d, d) and share of `flow_map`, and which nodes stick throughout."""
     e = model.elements
     n, d, K = solution.w.shape
     t = e.tangents
@@ -234,11 +267,12 @@ def _without_stuck(
     R = R - across @ inverse @ across.T
     K = np.diag(system.stiffness) + own.T @ inverse @ own
     values, vectors = np.linalg.eigh((K + K.T) / 2)
-    changed = SectorModes(
-        system.blades,
-        np.maximum(values, 0.0),
-        vectors.T @ system.damping @ vectors,
-        U @ vectors,
-        R,
+    changed = replace(
+        system,
+        stiffness=np.maximum(values, 0.0),
+        damping=vectors.T @ system.damping @ vectors,
+        contact=U @ vectors,
+        residual=R,
+        turn=vectors.T @ system.turn @ vectors,
     )
     return changed, changed.contact, R

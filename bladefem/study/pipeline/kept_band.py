@@ -1,8 +1,10 @@
 """What the blade does where its motion is unstable: marched in time from there, and the amplitudes
 between which it keeps.
 
-The march is exact between changes of contact state (`bladefem.time.event_integrator`), on the same
-reduced model as the balance. It takes contacts with one tangential direction and blades in phase.
+Contacts with one tangential direction and blades in phase are marched exactly between changes of
+contact state (`bladefem.time.event_integrator`), others by steps (`bladefem.hbm.ring_march`), both
+on the same reduced model as the balance. Of a travelling wave all blades are marched, after which
+it repeats.
 """
 
 from __future__ import annotations
@@ -12,8 +14,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from ...damper.branch import state_of
-from ...errors import InputError
+from ...errors import InputError, NotSolvedError
 from ...hbm.model import ReducedModel
+from ...hbm.ring_march import march_operations, march_ring
 from ...hbm.solution import Solution
 from ...hbm.time_model import time_system
 from ...time.event_integrator import State, integrate_periods
@@ -28,13 +31,20 @@ KEPT_PERIODS = 100
 SAMPLES = 256
 # steps of the whole march above which it is not begun: some 20 s
 MAX_STEPS = 4e6
+# the same for marches by steps, in operations
+MAX_MARCH = 4e10
+# periods of these before the amplitudes are taken, and those in which they are
+LEFT_BY_STEPS = 200
+KEPT_BY_STEPS = 50
 # relative width of a band that is one periodic motion
 ONE_MOTION = 2e-3
 
 
 @dataclass(frozen=True)
 class KeptBand:
-    """Amplitudes of single periods, as root of the sum of squares of the harmonics at the probe."""
+    """Amplitudes of single periods, as root of the sum of squares of the harmonics at the probe of
+    each blade.
+    """
 
     # [Hz]
     frequency: float
@@ -45,6 +55,11 @@ class KeptBand:
     periods: int
     # why nothing was marched; else ""
     reason: str = ""
+
+    def holds(self, amplitude: float, accuracy: float) -> bool:
+        """It is known, and within a relative accuracy of an amplitude."""
+        ends = np.array([self.lowest, self.highest])
+        return not self.reason and bool(np.all(abs(ends / amplitude - 1) <= accuracy))
 
     @property
     def sentence(self) -> str:
@@ -63,8 +78,8 @@ def kept_band(model: ReducedModel, point: Solution) -> KeptBand:
     """The band of amplitudes that the model keeps to after an unstable motion."""
     try:
         system = time_system(in_one_body(model), point.harmonics)
-    except InputError as error:
-        return _unknown_band(point, str(error))
+    except InputError:
+        return _band_by_steps(model, point)
     periods = LEFT_PERIODS + KEPT_PERIODS
     steps = periods * max(SAMPLES, 2 * np.pi * system.fastest / point.omega)
     if steps > MAX_STEPS:
@@ -76,8 +91,29 @@ def kept_band(model: ReducedModel, point: Solution) -> KeptBand:
     if kept.reason != "done":
         return _unknown_band(point, kept.reason)
     motion = (kept.q @ system.probe[0]).reshape(KEPT_PERIODS, SAMPLES)
-    lines = 2 / SAMPLES * np.fft.rfft(motion, axis=1)[:, 1 : point.harmonics + 1]
-    amplitudes = np.linalg.norm(lines, axis=1)
+    return _band_of(point, motion, periods)
+
+
+def _band_by_steps(model: ReducedModel, point: Solution) -> KeptBand:
+    """The same with two tangents, and for travelling waves."""
+    periods = LEFT_BY_STEPS + KEPT_BY_STEPS
+    try:
+        operations = march_operations(model, periods)
+        if operations > MAX_MARCH:
+            reason = f"a march takes {operations:.1g} operations, at most {MAX_MARCH:.0e}"
+            return _unknown_band(point, reason)
+        march = march_ring(model, point, DISTURBANCE, periods)
+    except (InputError, NotSolvedError) as error:
+        return _unknown_band(point, str(error))
+    if not (march.settled and np.isfinite(march.motion).all()):
+        return _unknown_band(point, "the contact forces of a step of the march were not found")
+    return _band_of(point, march.motion[LEFT_BY_STEPS:], periods)
+
+
+def _band_of(point: Solution, motion: np.ndarray, periods: int) -> KeptBand:
+    """From motion (..., samples of a period) at the probe."""
+    lines = 2 / motion.shape[-1] * np.fft.rfft(motion, axis=-1)[..., 1 : point.harmonics + 1]
+    amplitudes = np.linalg.norm(lines, axis=-1)
     return KeptBand(point.frequency, float(amplitudes.min()), float(amplitudes.max()), periods)
 
 

@@ -31,7 +31,7 @@ from .kept_band import KeptBand, kept_band
 from .liftoff import named
 from .linear_limits import Limit
 from .load_interval import LoadInterval, load_interval
-from .stability import UNSTABLE, Stability, stability_of
+from .stability import UNSTABLE, Stability, model_in_time, stability_of
 
 Keep: TypeAlias = "Callable[[LoadCase, Callable[[], Curve]], Curve]"
 
@@ -89,7 +89,8 @@ class Curve:
     multiplier: RealArray
     # relative change of the peak's height with half as many contact points; NaN: unknown
     halved: float
-    # the highest converged point that is not unstable
+    # the highest converged point that is not unstable, or that is left for a motion whose amplitude
+    # is its own within the accuracy
     peak: Solution
     # (k,) "fold", "period doubling" or "torus" of unstable points, else ""
     bifurcation: np.ndarray
@@ -202,15 +203,19 @@ def curve_of(
     heights = np.array([size(p) for p in curve.points])
     marks = Stability(np.full(len(heights), ""), np.full(len(heights), np.nan))
     if scene.study.stability:
-        marks = stability_of(model, curve.points)
+        in_time = model_in_time(models, curve.settings)
+        marks = stability_of(in_time, curve.points)
     top = highest = peak_of(curve.points)
     lasting = [
         p
         for p, verdict in zip(curve.points, marks.verdict, strict=True)
         if p.converged and verdict != UNSTABLE
     ]
-    if scene.study.stability and lasting:
-        top = max(lasting, key=size)
+    kept = None
+    if scene.study.stability and highest not in lasting:
+        kept = kept_band(in_time, highest)
+        if lasting and not kept.holds(size(highest), scene.accuracy):
+            top = max(lasting, key=size)
     tolerated = scene.accuracy * size(top) / np.maximum(heights, 1e-6 * size(top))
     rows = [_record(point) for point in curve.points]
     columns = {name: np.array([row[name] for row in rows]) for name in rows[0]}
@@ -234,8 +239,8 @@ def curve_of(
         halved=halved,
         peak=top,
         bifurcation=marks.bifurcation if len(marks.bifurcation) else np.full(len(heights), ""),
-        unstable_peak=None if top is highest else highest,
-        kept=None if top is highest else kept_band(model, highest),
+        unstable_peak=None if kept is None else highest,
+        kept=kept,
         interval=interval,
         unfollowed=lifts and unfollowed(models, curve.settings),
         body_mesh=body_mesh,

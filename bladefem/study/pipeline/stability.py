@@ -1,6 +1,7 @@
 """Are the motions of a curve stable? The verdicts of `bladefem.hbm.stability` on its points.
 
-Every converged point is judged where that is affordable; of larger models the local maxima alone.
+Every converged point is judged where that is affordable; of larger models the local maxima, the
+neighbours of the highest one, and points spread over the curve.
 """
 
 from __future__ import annotations
@@ -14,21 +15,32 @@ import numpy as np
 from ...data import PortModel
 from ...errors import InputError
 from ...hbm.model import ReducedModel
+from ...hbm.sector_modes import blades_of_wave
 from ...hbm.solution import Solution, size
 from ...hbm.stability import (
-    AFFORDABLE,
+    MAX_OPERATIONS,
     STABLE,
     UNIQUE,
     UNKNOWN,
     UNSTABLE,
+    Verdict,
     stability_verdict,
+    verdict_operations,
 )
+from ..adaptive.family import Family, family_member
+from ..adaptive.settings import Settings
 
 if TYPE_CHECKING:
     from .loads import Curve
 
-# local maxima of a curve that are judged whatever that takes
+# local maxima of a curve that are judged first
 MAXIMA = 4
+# operations of all verdicts on a curve, some 1.5 s: about what its points take
+CURVE_OPERATIONS = 5e10
+# points that are judged in addition, as long as the highest one that is not unstable is not judged
+FURTHER = 4
+# harmonics with whose bodies a travelling wave is asked whether it repeats
+RING_HARMONICS = (7, 15, 31)
 
 
 @dataclass(frozen=True)
@@ -46,11 +58,31 @@ class Stability:
 
 
 def stability_of(model: ReducedModel, points: Sequence[Solution]) -> Stability:
-    """Verdicts on solutions of the balance of one model, in the order of a curve."""
-    found = [stability_verdict(model, point, AFFORDABLE) for point in points]
-    for i in _maxima(points):
-        if found[i].verdict == UNKNOWN:
-            found[i] = stability_verdict(model, points[i])
+    """Verdicts on solutions of the balance of one model, in the order of a curve.
+
+    Every point is judged where CURVE_OPERATIONS allow it. Else the local maxima are, then the
+    neighbours of the highest one and points spread evenly over the curve, as far as they allow;
+    and whichever point is then the highest of those that are not unstable.
+    """
+    found = [Verdict(UNKNOWN, reason="it was left out for its cost") for _ in points]
+    costs = [verdict_operations(model, point) for point in points]
+    maxima = _maxima(points)
+    budget = CURVE_OPERATIONS
+    judged: set[int] = set()
+    for i in [*maxima, *_neighbours(maxima, len(points)), *_spread(len(points))]:
+        if i in judged or (i not in maxima and costs[i] > budget):
+            continue
+        # close verdicts and unstable motions are looked at more closely where they are resonances
+        found[i] = stability_verdict(model, points[i], MAX_OPERATIONS if i in maxima else budget)
+        judged.add(i)
+        budget -= costs[i]
+    for _ in range(FURTHER):
+        lasting = [i for i in range(len(points)) if found[i].verdict != UNSTABLE]
+        top = max(lasting, key=lambda i: size(points[i]) * points[i].converged, default=None)
+        if top is None or top in judged:
+            break
+        found[top] = stability_verdict(model, points[top])
+        judged.add(top)
     reasons = [v.reason for v, p in zip(found, points, strict=True) if p.converged and v.reason]
     return Stability(
         np.array([v.verdict for v in found]),
@@ -58,6 +90,34 @@ def stability_of(model: ReducedModel, points: Sequence[Solution]) -> Stability:
         reasons[0] if len(reasons) == len(points) else "",
         np.array([v.bifurcation for v in found], dtype="<U15"),
     )
+
+
+def model_in_time(models: Family, settings: Settings) -> ReducedModel:
+    """The model with bodies of as many harmonics as its wave needs to repeat; that of the settings
+    where none has.
+    """
+    own = family_member(models, settings).model
+    for harmonics in (settings.harmonics, *RING_HARMONICS):
+        if harmonics > models.harmonics:
+            break
+        model = family_member(models, replace(settings, harmonics=harmonics)).model
+        try:
+            blades_of_wave(model)
+        except InputError:
+            continue
+        return model
+    return own
+
+
+def _neighbours(maxima: Sequence[int], count: int) -> list[int]:
+    """Numbers of the points next to the highest maximum."""
+    return [i for m in maxima[:1] for i in (m - 1, m + 1) if 0 <= i < count]
+
+
+def _spread(count: int) -> list[int]:
+    """All numbers, each part of them from the first on spread evenly."""
+    order = list(dict.fromkeys(k for n in range(1, 12) for k in range(0, count, 2 ** (11 - n))))
+    return [*order, *range(count)]
 
 
 def _maxima(points: Sequence[Solution]) -> list[int]:
@@ -117,9 +177,15 @@ def stability_sentence(parts: Sequence[tuple[np.ndarray, np.ndarray]]) -> str:
             "repeats after few blades, and not too many contact nodes that slip)"
         )
     worst = f" (largest Floquet multiplier {np.nanmax(largest):.4g})" if counts[UNSTABLE] else ""
+    left_out = ""
+    if counts[UNKNOWN]:
+        left_out = (
+            " (of curves whose verdicts would cost more than their points, the local maxima, the "
+            "neighbours of the highest and points spread evenly are judged)"
+        )
     return (
         f"stability: {counts[STABLE]} points stable, {counts[UNSTABLE]} unstable{worst}, "
-        f"{counts[UNKNOWN]} not judged"
+        f"{counts[UNKNOWN]} not judged{left_out}"
     )
 
 
@@ -139,9 +205,15 @@ def unstable_sentence(curve: Curve) -> str:
     named = f" ({curve.bifurcation[at]})" if curve.bifurcation[at] else ""
     lost = (
         f"load {curve.load:g} N: the highest motion, {1e6 * size(top):.4g} um at "
-        f"{top.frequency:.5g} Hz, is unstable{named}; the resonance given is the highest one that "
-        f"is not, {1e6 * curve.peak_amplitude:.4g} um at {curve.peak_frequency:.5g} Hz"
+        f"{top.frequency:.5g} Hz, is unstable{named}"
     )
+    if curve.peak is top:
+        lost += "; it is left for one of nearly the same amplitude, and given as the resonance"
+    else:
+        lost += (
+            "; the resonance given is the highest one that is not, "
+            f"{1e6 * curve.peak_amplitude:.4g} um at {curve.peak_frequency:.5g} Hz"
+        )
     if curve.kept is not None:
         lost += f"; {curve.kept.sentence}"
     return f"{folded}; {lost}" if folded else lost
