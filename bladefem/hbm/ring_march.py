@@ -217,10 +217,7 @@ def _contact_forces(c, F, w, f, extra, table, load0, load1, preload):
         for i in range(n):
             first = i * d
             for a in range(first, first + d):
-                moved = c[a]
-                for b in range(m):
-                    moved -= F[a, b] * extra[b]
-                w[a] = moved
+                w[a] = c[a] - _product(F[a], extra)
             node = (table[i], load0[i] + table[i, 1] * old_w[first], load1[i])
             step = _node_force(w, F, first, d, old_w, old_f[i], f[i], node, work, tangents)
             for a in range(d):
@@ -229,6 +226,15 @@ def _contact_forces(c, F, w, f, extra, table, load0, load1, preload):
         if change <= SETTLED * largest:
             return True
     return False
+
+
+# the order of the sum is free, so that it is vectorised
+@njit(fastmath={"reassoc", "contract"}, **INNER_KERNEL)
+def _product(a, b):
+    total = 0.0
+    for k in range(len(a)):
+        total += a[k] * b[k]
+    return total
 
 
 @njit(**INNER_KERNEL)

@@ -40,10 +40,12 @@ INSTANTS = 256
 INSTANT_REFINEMENT = 4
 # distance from one within which it is
 NEAR_ONE = 0.003
+# and below which it is that of a motion that nothing holds, such as a damper's walk
+NEUTRAL = 1e-7
 # operations of one verdict up to which many are made, some 0.03 s
 AFFORDABLE = 1e9
-# and above which none is made, some 2 s
-MAX_OPERATIONS = 6e10
+# and above which none is made, some 1.5 s
+MAX_OPERATIONS = 4e10
 # angle of a multiplier to the real axis up to which it is real
 REAL = 1e-3
 
@@ -81,7 +83,7 @@ def stability_verdict(
     if isinstance(system, InputError):
         return Verdict(UNKNOWN, reason=str(system))
     leading = _leading(model, solution, system, INSTANTS, most)
-    if leading is not None and abs(leading) - 1 - GROWTH > -NEAR_ONE:
+    if leading is not None and _needs_a_closer_look(abs(leading) - 1):
         finer = _leading(model, solution, system, INSTANT_REFINEMENT * INSTANTS, most)
         leading = leading if finer is None else finer
     if leading is None:
@@ -89,6 +91,11 @@ def stability_verdict(
     if abs(leading) <= 1 + GROWTH:
         return Verdict(STABLE, float(abs(leading)))
     return Verdict(UNSTABLE, float(abs(leading)), _bifurcation(leading))
+
+
+def _needs_a_closer_look(growth: float) -> bool:
+    """The multiplier is unstable, or so close that more instants may make it so."""
+    return growth > GROWTH - NEAR_ONE and abs(growth) > NEUTRAL
 
 
 def verdict_operations(model: ReducedModel, solution: Solution) -> float:

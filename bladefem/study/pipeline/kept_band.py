@@ -34,7 +34,7 @@ MAX_STEPS = 4e6
 # the same for marches by steps, in operations
 MAX_MARCH = 4e10
 # periods of these before the amplitudes are taken, and those in which they are
-LEFT_BY_STEPS = 200
+LEFT_BY_STEPS = 150
 KEPT_BY_STEPS = 50
 # relative width of a band that is one periodic motion
 ONE_MOTION = 2e-3

@@ -90,7 +90,7 @@ class Curve:
     # relative change of the peak's height with half as many contact points; NaN: unknown
     halved: float
     # the highest converged point that is not unstable, or that is left for a motion whose amplitude
-    # is its own within the accuracy
+    # is its own within the accuracy, or for one that is not known
     peak: Solution
     # (k,) "fold", "period doubling" or "torus" of unstable points, else ""
     bifurcation: np.ndarray
@@ -214,7 +214,8 @@ def curve_of(
     kept = None
     if scene.study.stability and highest not in lasting:
         kept = kept_band(in_time, highest)
-        if lasting and not kept.holds(size(highest), scene.accuracy):
+        # of an unstable motion whose end is not known the larger amplitude is given
+        if lasting and not (kept.reason or kept.holds(size(highest), scene.accuracy)):
             top = max(lasting, key=size)
     tolerated = scene.accuracy * size(top) / np.maximum(heights, 1e-6 * size(top))
     rows = [_record(point) for point in curve.points]

@@ -13,10 +13,11 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from ...data import PortModel
-from ...errors import InputError
+from ...errors import InputError, NotSolvedError
 from ...hbm.model import ReducedModel
 from ...hbm.sector_modes import blades_of_wave
 from ...hbm.solution import Solution, size
+from ...hbm.solve import solve
 from ...hbm.stability import (
     MAX_OPERATIONS,
     STABLE,
@@ -35,10 +36,13 @@ if TYPE_CHECKING:
 
 # local maxima of a curve that are judged first
 MAXIMA = 4
-# operations of all verdicts on a curve, some 1.5 s: about what its points take
-CURVE_OPERATIONS = 5e10
+# operations of all verdicts on a curve, some 0.7 s: about what its points take
+CURVE_OPERATIONS = 2e10
 # points that are judged in addition, as long as the highest one that is not unstable is not judged
-FURTHER = 4
+FURTHER = 2
+# with which points of one harmonic are judged
+JUDGED_HARMONICS = 7
+JUDGED_SAMPLES = 128
 # harmonics with whose bodies a travelling wave is asked whether it repeats
 RING_HARMONICS = (7, 15, 31)
 
@@ -60,9 +64,9 @@ class Stability:
 def stability_of(model: ReducedModel, points: Sequence[Solution]) -> Stability:
     """Verdicts on solutions of the balance of one model, in the order of a curve.
 
-    Every point is judged where CURVE_OPERATIONS allow it. Else the local maxima are, then the
-    neighbours of the highest one and points spread evenly over the curve, as far as they allow;
-    and whichever point is then the highest of those that are not unstable.
+    Every point is judged where CURVE_OPERATIONS allow it. Else the highest point is, and as far as
+    they allow the other local maxima, its neighbours, and points spread evenly over the curve; at
+    last whichever point is then the highest of those that are not unstable.
     """
     found = [Verdict(UNKNOWN, reason="it was left out for its cost") for _ in points]
     costs = [verdict_operations(model, point) for point in points]
@@ -70,10 +74,11 @@ def stability_of(model: ReducedModel, points: Sequence[Solution]) -> Stability:
     budget = CURVE_OPERATIONS
     judged: set[int] = set()
     for i in [*maxima, *_neighbours(maxima, len(points)), *_spread(len(points))]:
-        if i in judged or (i not in maxima and costs[i] > budget):
+        highest = i in maxima[:1]
+        if i in judged or (costs[i] > budget and not highest):
             continue
-        # close verdicts and unstable motions are looked at more closely where they are resonances
-        found[i] = stability_verdict(model, points[i], MAX_OPERATIONS if i in maxima else budget)
+        motion = _judged_motion(model, points[i])
+        found[i] = stability_verdict(model, motion, MAX_OPERATIONS if highest else costs[i])
         judged.add(i)
         budget -= costs[i]
     for _ in range(FURTHER):
@@ -81,7 +86,7 @@ def stability_of(model: ReducedModel, points: Sequence[Solution]) -> Stability:
         top = max(lasting, key=lambda i: size(points[i]) * points[i].converged, default=None)
         if top is None or top in judged:
             break
-        found[top] = stability_verdict(model, points[top])
+        found[top] = stability_verdict(model, _judged_motion(model, points[top]))
         judged.add(top)
     reasons = [v.reason for v, p in zip(found, points, strict=True) if p.converged and v.reason]
     return Stability(
@@ -90,6 +95,20 @@ def stability_of(model: ReducedModel, points: Sequence[Solution]) -> Stability:
         reasons[0] if len(reasons) == len(points) else "",
         np.array([v.bifurcation for v in found], dtype="<U15"),
     )
+
+
+def _judged_motion(model: ReducedModel, point: Solution) -> Solution:
+    """The point itself, or its motion with more harmonics where it has the first one alone: stick
+    and slip of that one may be called unstable where the motion is not.
+    """
+    if not point.converged or point.harmonics > 1 or verdict_operations(model, point) == 0:
+        return point
+    samples = max(point.samples, JUDGED_SAMPLES)
+    try:
+        richer = solve(model, point.omega, JUDGED_HARMONICS, samples, start=point)
+    except (InputError, NotSolvedError):
+        return point
+    return richer if richer.converged else point
 
 
 def model_in_time(models: Family, settings: Settings) -> ReducedModel:
@@ -207,8 +226,11 @@ def unstable_sentence(curve: Curve) -> str:
         f"load {curve.load:g} N: the highest motion, {1e6 * size(top):.4g} um at "
         f"{top.frequency:.5g} Hz, is unstable{named}"
     )
-    if curve.peak is top:
+    known = curve.kept is not None and not curve.kept.reason
+    if curve.peak is top and known:
         lost += "; it is left for one of nearly the same amplitude, and given as the resonance"
+    elif curve.peak is top:
+        lost += "; it is given as the resonance, being the larger amplitude"
     else:
         lost += (
             "; the resonance given is the highest one that is not, "

@@ -1,0 +1,75 @@
+"""Blades marched in time by steps, against a plain explicit march and against one blade alone."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from scipy import linalg
+from test_stability import bouncing, marched
+
+from bladefem.hbm.linearised_flow import flow_map, linear_steps
+from bladefem.hbm.ring_march import march_ring
+from bladefem.hbm.sector_modes import sector_modes
+from bladefem.hbm.solve import solve
+from bladefem.hbm.stability import _handed_on, _node_steps
+
+PERIODS = 30
+
+
+def heights(motion):
+    """Amplitude of each period from its samples on the last axis."""
+    lines = 2 / motion.shape[-1] * np.fft.rfft(motion, axis=-1)[..., 1:8]
+    return np.linalg.norm(lines, axis=-1)
+
+
+def coupled_wave():
+    """Four blades a quarter of a period apart; their third mode carries the wave's phase."""
+    alone = bouncing()
+    body = alone.sides[0]
+    turned = [np.exp(0.5j * np.pi * h) for h in range(9)]
+    sides = tuple(
+        replace(body, shapes=body.shapes * np.where(np.arange(3) == 2, t, 1.0)) for t in turned
+    )
+    return replace(alone, sides=sides)
+
+
+@pytest.mark.parametrize("omega", [1.3, 1.75])
+def test_a_march_by_steps_is_the_plain_one(omega):
+    model = bouncing()
+    point = solve(model, omega, 15, 1024)
+    plain = heights(marched(model, point, PERIODS))
+    found = march_ring(model, point, 0.0, PERIODS, 512)
+    assert found.settled
+    own = heights(found.motion[:, 0])
+    # where it bounces irregularly, two marches part after some periods
+    kept = 5 if abs(plain[-1] / plain[0] - 1) > 0.02 else PERIODS
+    assert own[1:kept] == pytest.approx(plain[1:kept], rel=0.02)
+
+
+def test_blades_without_coupling_march_as_one_alone():
+    alone = bouncing()
+    body = alone.sides[0]
+    sides = tuple(replace(body, shapes=body.shapes * np.exp(0.5j * np.pi * h)) for h in range(9))
+    wave = replace(alone, sides=sides)
+    one = march_ring(alone, solve(alone, 1.3, 7, 256), 0.0, 10)
+    four = march_ring(wave, solve(wave, 1.3, 7, 256), 0.0, 10)
+    assert four.motion.shape[1] == 4
+    for blade in range(4):
+        found = heights(four.motion[2:, blade])
+        assert found == pytest.approx(heights(one.motion[2:, 0]), rel=5e-3)
+
+
+def test_a_share_of_the_period_has_the_multipliers_of_all_of_it():
+    wave = coupled_wave()
+    system = sector_modes(wave)
+    point = solve(wave, 1.3, 7, 256)
+    S = 128
+    nodes = _node_steps(wave, point, system.blades, S)[:4]
+    E, G0, G1 = linear_steps(system, 2 * np.pi / point.omega / S)
+    U = system.contact
+    arrays = (E, -G0 @ U.T, -G1 @ U.T, U, system.residual, *nodes)
+    arrays = tuple(map(np.ascontiguousarray, arrays))
+    whole = np.sort(abs(linalg.eigvals(flow_map(*arrays, S))))
+    part = _handed_on(system, flow_map(*arrays, S // system.blades))
+    shared = np.sort(abs(linalg.eigvals(part)) ** system.blades)
+    np.testing.assert_allclose(shared[-12:], whole[-12:], rtol=1e-8)

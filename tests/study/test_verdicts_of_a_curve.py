@@ -1,0 +1,102 @@
+"""Which points of a curve are judged, on which bodies, and what is said of an unstable peak."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from bladefem.data import Elements
+from bladefem.hbm.model import ReducedModel
+from bladefem.hbm.solve import solve
+from bladefem.hbm.stability import STABLE, UNKNOWN, UNSTABLE, stability_verdict
+from bladefem.reduction.matrices import port_model_from_matrices
+from bladefem.study.adaptive.family import Family, Member
+from bladefem.study.adaptive.settings import first_for
+from bladefem.study.pipeline import stability
+from bladefem.study.pipeline.kept_band import KeptBand, kept_band
+from bladefem.study.pipeline.stability import model_in_time, stability_of, stability_sentence
+
+
+def bouncing():
+    """Three masses with one contact of two tangents that lifts off."""
+    K = np.array([[2.0, -0.3, 0.1], [-0.3, 1.5, 0.2], [0.1, 0.2, 1.2]])
+    ports = {"contact": [0, 1, 2], "load": [0, 1], "probe": [0]}
+    body = port_model_from_matrices(np.eye(3), K, ports, C=0.02 * K)
+    contact = Elements(*(np.array([x]) for x in (1.0, 2.0, 0.4, 0.15)), tangents=2)
+    return ReducedModel((body,), contact, {1: np.array([0.1, 0.08j])})
+
+
+def wave():
+    """Blades a quarter of a period apart whose third mode carries the wave's phase."""
+    alone = bouncing()
+    body = alone.sides[0]
+    turned = [np.exp(0.5j * np.pi * h) for h in range(9)]
+    sides = tuple(
+        replace(body, shapes=body.shapes * np.where(np.arange(3) == 2, t, 1.0)) for t in turned
+    )
+    return replace(alone, sides=sides)
+
+
+def test_a_wave_of_one_harmonic_is_judged_on_the_bodies_with_which_it_repeats():
+    rich = wave()
+
+    def build(settings):
+        sides = rich.sides[: settings.harmonics + 1]
+        return Member(replace(rich, sides=sides), np.arange(1))
+
+    settings = replace(first_for(3), harmonics=1)
+    family = Family(build, 3, harmonics=8)
+    few = build(settings).model
+    point = solve(few, 1.2, 1, 64)
+    assert stability_verdict(few, point).verdict == UNKNOWN
+    model = model_in_time(family, settings)
+    assert len(model.sides) == 8
+    assert stability_verdict(model, point).verdict in (STABLE, UNSTABLE)
+
+
+def test_a_point_of_one_harmonic_is_judged_by_its_motion_with_more():
+    model = bouncing()
+    rough = solve(model, 1.2, 1, 64)
+    fine = solve(model, 1.2, 7, 128, start=rough)
+    told = stability_of(model, [rough])
+    assert told.multiplier[0] == pytest.approx(stability_verdict(model, fine).multiplier, rel=1e-9)
+    assert told.multiplier[0] != pytest.approx(stability_verdict(model, rough).multiplier, rel=1e-6)
+
+
+def test_where_verdicts_are_dear_the_highest_point_and_some_others_are_judged(monkeypatch):
+    model = bouncing()
+    points = [solve(model, omega, 7, 256) for omega in np.linspace(0.9, 1.4, 12)]
+    everything = stability_of(model, points)
+    assert not np.any(everything.verdict == UNKNOWN)
+    monkeypatch.setattr(stability, "CURVE_OPERATIONS", 0.0)
+    alone = stability_of(model, points)
+    heights = [abs(p.probe[1, 0]) for p in points]
+    top = int(np.argmax(heights))
+    assert alone.verdict[top] == everything.verdict[top]
+    judged = alone.verdict != UNKNOWN
+    assert 1 <= judged.sum() <= 1 + stability.FURTHER
+    said = stability_sentence([(alone.verdict, alone.multiplier)])
+    assert f"{(~judged).sum()} not judged (of curves whose verdicts" in said
+
+
+def test_a_model_with_two_tangents_is_marched_by_steps():
+    model = bouncing()
+    point = solve(model, 1.2, 7, 256)
+    assert stability_verdict(model, point).verdict == STABLE
+    found = kept_band(model, point)
+    assert found.reason == ""
+    assert found.holds(np.linalg.norm(abs(point.probe[1:, 0])), 0.02)
+
+
+@pytest.mark.parametrize(
+    ("lowest", "highest", "reason", "holds"),
+    [
+        (0.99, 1.01, "", True),
+        (0.90, 1.01, "", False),
+        (0.99, 1.10, "", False),
+        (1.0, 1.0, "x", False),
+    ],
+)
+def test_a_band_holds_where_all_of_it_lies_within_the_accuracy(lowest, highest, reason, holds):
+    band = KeptBand(1.0, lowest, highest, 100, reason)
+    assert band.holds(1.0, 0.05) is holds
