@@ -13,6 +13,8 @@ from .compat import MPI
 from .memory import available, needed
 
 Result = TypeVar("Result")
+# tasks of a group up to which none of them helps another
+FEW = 3
 # share of the free memory that groups may fill
 SPARE = 0.8
 
@@ -44,33 +46,54 @@ def shared_out(
     tasks: Sequence[int],
     size: int,
     work: Callable[[MPI.Comm, list[int]], list[Result]],
+    cost: Callable[[int], float] = lambda task: 1.0,
 ) -> list[Result]:
     """Results of all tasks, in their order and on every rank; collective.
 
     Args:
-        size: ranks in a group.
-        work: results of some tasks, neighbours in number, by the ranks of one group, the same on
-            each of them.
+        size: ranks in a group; those that are left over wait.
+        work: results of some tasks by the ranks of one group, the same on each of them.
+        cost: of a task, for an even share of few tasks; many go by neighbours in number, which help
+            each other.
 
     Raises:
         whatever a group raised.
     """
     groups = max(min(comm.size // size, len(tasks)), 1)
     color = comm.rank * groups // comm.size
-    mine = [int(n) for n in np.array_split(sorted(set(tasks)), groups)[color]]
-    part = comm.Split(color, comm.rank)
+    mine = _even_shares(tasks, groups, cost)[color]
+    whole = comm.Split(color, comm.rank)
+    part = whole.Split(0 if whole.rank < size else MPI.UNDEFINED, whole.rank)
     found: dict[int, Result] = {}
     error: Exception | None = None
-    try:
-        found = dict(zip(mine, work(part, mine), strict=True))
-    except Exception as problem:
-        # the other groups must not wait for ever
-        error = problem
-    first = part.rank == 0
-    part.Free()
+    if part != MPI.COMM_NULL:
+        try:
+            found = dict(zip(mine, work(part, mine), strict=True))
+        except Exception as problem:
+            # the other groups must not wait for ever
+            error = problem
+        part.Free()
+    first = whole.rank == 0
+    whole.Free()
     merged: dict[int, Result] = {}
     for results, failure in comm.allgather((found if first and error is None else {}, error)):
         if failure is not None:
             raise failure
         merged |= results
     return [merged[n] for n in tasks]
+
+
+def _even_shares(
+    tasks: Sequence[int],
+    groups: int,
+    cost: Callable[[int], float],
+) -> list[list[int]]:
+    """The tasks of each group, ascending."""
+    some = sorted({int(task) for task in tasks})
+    if len(some) > FEW * groups:
+        return [[int(task) for task in share] for share in np.array_split(some, groups)]
+    shares: list[list[int]] = [[] for _ in range(groups)]
+    # the most expensive first, each to the group that has least to do
+    for task in sorted(some, key=lambda task: (-cost(task), task)):
+        min(shares, key=lambda share: sum(map(cost, share))).append(task)
+    return [sorted(share) for share in shares]

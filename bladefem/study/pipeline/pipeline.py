@@ -28,7 +28,7 @@ from .run_records import ModalRun, ReducedRun, Run, SeatedRun, SolvedRun
 from .seated_loads import seat_every_load
 from .stage_inputs import stage_key
 from .stage_runner import Folder, StageClock, StageRunner
-from .stages import Bodies, build_mesh, excited_modes, find_modes
+from .stages import Bodies, build_mesh, excited_modes, find_modes, on_one_rank
 from .validate_mesh import check_blade, found_patches
 
 STAGES = ("mesh", "modes", "contact", "reduction", "response")
@@ -156,7 +156,7 @@ def _run_modes(
     reduced = judged_modes(before.scene, first_settings(before.scene)) if responds else 0
     with keep.clock("modes"):
         modes = keep("modes", key, lambda: find_modes(bodies, reduced=reduced))
-        clamped = keep("clamped", key, lambda: clamped_blade(bodies))
+        clamped = keep("clamped", key, lambda: on_one_rank(bodies, clamped_blade))
     return ModalRun(**vars(before), modes=modes, clamped=clamped)
 
 
@@ -188,7 +188,11 @@ def _run_reduction(
     mesh = before.mesh
     with keep.clock("stresses"):
         excited = excited_modes(scene, mesh, before.modes)
-        stressed = keep("strength", stage_key("stress", scene), lambda: strength(bodies, excited))
+        stressed = keep(
+            "strength",
+            stage_key("stress", scene),
+            lambda: on_one_rank(bodies, lambda some: strength(some, excited)),
+        )
     cases = load_cases(scene, mesh, before.contact)
     middle = cases[len(cases) // 2]
     with keep.clock("reduction"):
@@ -196,7 +200,7 @@ def _run_reduction(
         errors = keep(
             "mode_errors",
             stage_key("reduction", scene, "mode errors"),
-            lambda: mode_errors(bodies, patches, excited),
+            lambda: on_one_rank(bodies, lambda some: mode_errors(some, patches, excited)),
         )
     return ReducedRun(
         **vars(before),

@@ -27,7 +27,7 @@ from .loads import default_loads
 from .run_records import Seating
 from .stage_inputs import stage_key
 from .stage_runner import StageClock, StageRunner
-from .stages import Bodies, condense_contact, on_layer
+from .stages import Bodies, condense_contact, on_layer, on_one_rank
 
 
 def seat_every_load(
@@ -41,9 +41,17 @@ def seat_every_load(
     key = stage_key("contact", scene)
     rough = None
     if scene.contact.history == FRICTIONLESS:
-        bare = keep("contact", key, lambda: condense_contact(bodies, patches))
+        bare = keep(
+            "contact",
+            key,
+            lambda: on_one_rank(bodies, lambda some: condense_contact(some, patches)),
+        )
     else:
-        rough = keep("contact_friction", key, lambda: condense_friction(bodies, patches))
+        rough = keep(
+            "contact_friction",
+            key,
+            lambda: on_one_rank(bodies, lambda some: condense_friction(some, patches)),
+        )
         bare = normal_part(rough)
     problem = on_layer(scene, bare)
     own = _own_load(scene, problem, rough, clock.messages)

@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, TypeVar
 
 import numpy as np
 
@@ -34,6 +34,7 @@ if TYPE_CHECKING:
     from ...fem.eigensolver import Eigensolver
     from ...fem.flexibility import Flexibility
 
+Result = TypeVar("Result")
 # of each nodal diameter, in tables and pictures
 MODES_SHOWN = 10
 # name of the modes that are kept for the reduction
@@ -63,6 +64,28 @@ class Bodies:
     def kept(self) -> dict[str, Any]:
         """What one stage leaves to a later one: under KEPT_MODES fem.all_diameters.KeptPairs."""
         return {}
+
+    @cached_property
+    def fits_one_rank(self) -> bool:
+        """Each rank has memory for the whole bodies (collective)."""
+        from ...fem.compat import MPI
+        from ...fem.groups import group_size
+
+        comm = self.comm or MPI.COMM_WORLD
+        return comm.size == 1 or group_size(comm, blade_dofs(self.mesh)) == 1
+
+    @cached_property
+    def alone(self) -> Bodies:
+        """The same bodies on this rank alone."""
+        from ...fem.compat import MPI
+
+        if (self.comm or MPI.COMM_WORLD).size == 1:
+            return self
+        return Bodies(self.scene, self.mesh, MPI.COMM_SELF, self.progress)
+
+    def of_group(self, part: Communicator) -> Bodies:
+        """The bodies on a group of ranks."""
+        return self.alone if part.size == 1 else Bodies(self.scene, self.mesh, part, self.progress)
 
     @cached_property
     def still_blade(self) -> Body:
@@ -142,6 +165,20 @@ class Bodies:
         if diameter == 0 and self.blade is self.still_blade:
             return self.still
         return flexible(at_diameter(self.frame, diameter if is_wheel(self.mesh) else None))
+
+
+def on_one_rank(bodies: Bodies, compute: Callable[[Bodies], Result]) -> Result:
+    """What several ranks would not do faster: rank 0 computes it with the factorisations that it
+    has, or all ranks together where one has no memory for the bodies.
+    """
+    if not bodies.fits_one_rank:
+        return compute(bodies)
+    return on_root(bodies.comm, lambda: compute(bodies.alone))
+
+
+def blade_dofs(mesh: Mesh) -> int:
+    """Displacements of the blade's nodes."""
+    return mesh.dimension * len(np.unique(mesh.bodies["blade"]))
 
 
 @dataclass(frozen=True)
@@ -236,8 +273,12 @@ def find_modes(
     from ...fem.modes import modes
 
     if not is_wheel(bodies.mesh):
-        flex = bodies.factorised(0)
-        return [modes(flex.con, count, flex, solver=eigensolver(bodies.scene))]
+
+        def of_blade(some: Bodies) -> list[ModeSet]:
+            flex = some.factorised(0)
+            return [modes(flex.con, count, flex, solver=eigensolver(some.scene))]
+
+        return on_one_rank(bodies, of_blade)
     wanted = (
         diameters
         or bodies.scene.model.nodal_diameters
@@ -288,36 +329,28 @@ def wheel_modes(
     from ...fem.groups import group_size, shared_out
 
     comm = bodies.comm or MPI.COMM_WORLD
-    mesh = bodies.mesh
-    wanted = list(range(sector_of(mesh).count // 2 + 1)) if diameters is None else list(diameters)
+    sectors = sector_of(bodies.mesh).count
+    wanted = list(range(sectors // 2 + 1)) if diameters is None else list(diameters)
     solver = eigensolver(bodies.scene)
-    if comm.size == 1 or len(wanted) == 1:
-        kept = KeptPairs(reduced) if reduced else None
+
+    def of_some(part: Communicator, some: list[int]) -> list[ModeSet]:
+        mine = bodies.of_group(part)
+        kept = KeptPairs(reduced) if reduced and part.size == 1 else None
         found = all_diameters(
-            bodies.frame,
-            count,
-            wanted,
-            direct,
-            progress=bodies.progress,
-            solver=solver,
-            kept=kept,
+            mine.frame, count, some, direct, progress=bodies.progress, solver=solver, kept=kept
         )
-        bodies.kept[KEPT_MODES] = kept
+        mine.kept[KEPT_MODES] = kept
         return found
-    size = group or group_size(comm, mesh.dimension * len(np.unique(mesh.bodies["blade"])))
-    return shared_out(
-        comm,
-        wanted,
-        size,
-        lambda part, some: all_diameters(
-            Bodies(bodies.scene, mesh, part).frame,
-            count,
-            some,
-            direct,
-            progress=bodies.progress,
-            solver=solver,
-        ),
-    )
+
+    if comm.size == 1:
+        return of_some(comm, wanted)
+    size = group or (1 if bodies.fits_one_rank else group_size(comm, blade_dofs(bodies.mesh)))
+    return shared_out(comm, wanted, size, of_some, _real_or_complex(sectors))
+
+
+def _real_or_complex(sectors: int) -> Callable[[int], float]:
+    """The cost of a nodal diameter: complex pencils take twice that of real ones."""
+    return lambda n: 1.0 if 2 * n % sectors == 0 else 2.0
 
 
 def seat_damper(bodies: Bodies, patches: list[Patch]) -> ContactProblem:
@@ -395,27 +428,31 @@ def reduce_sector(
     if is_wheel(mesh):
         sector = _reduced_diameters(bodies, ports, modes, diameters)
     else:
-        flex = bodies.factorised(0)
         kind = scene.model.reduction
+
+        def blade_model(some: Bodies) -> PortModel:
+            flex = some.factorised(0)
+            return port_model(
+                flex.con, ports.matrix, ports.names, modes, kind=kind, flex=flex, solver=solver
+            )
+
+        sector = {0: on_one_rank(bodies, blade_model)}
+
+    def damper_model(some: Bodies) -> tuple[PortModel, float]:
+        flex = some.damper
         model = port_model(
-            flex.con, ports.matrix, ports.names, modes, kind=kind, flex=flex, solver=solver
+            flex.con, other.matrix, other.names, DAMPER_MODES, flex=flex, solver=solver
         )
-        sector = {0: model}
-    floating = port_model(
-        bodies.damper.con,
-        other.matrix,
-        other.names,
-        DAMPER_MODES,
-        flex=bodies.damper,
-        solver=solver,
-    )
+        return model, mass(flex.con.body)
+
+    floating, damper_mass = on_one_rank(bodies, damper_model)
     first = len(patches[0].area) * mesh.dimension
     return Reduced(
         sector,
         floating,
         slice(first, first + len(patches[1].area) * mesh.dimension),
         sector_of(mesh).count if is_wheel(mesh) else 0,
-        mass(bodies.damper.con.body),
+        damper_mass,
     )
 
 
@@ -448,15 +485,16 @@ def _reduced_diameters(
         return dict(bodies.progress(steps, "nodal diameters", len(some)))
 
     wanted = sorted(set(diameters))
-    if comm.size == 1 or len(wanted) == 1:
+    if comm.size == 1:
         return solved(bodies, wanted)
 
-    def of_group(part: Any, some: list[int]) -> list[PortModel]:
-        models = solved(Bodies(scene, bodies.mesh, part), some)
+    def of_some(part: Communicator, some: list[int]) -> list[PortModel]:
+        models = solved(bodies.of_group(part), some)
         return [models[n] for n in some]
 
-    size = group_size(comm, bodies.mesh.dimension * len(np.unique(bodies.mesh.bodies["blade"])))
-    return dict(zip(wanted, shared_out(comm, wanted, size, of_group), strict=True))
+    size = 1 if bodies.fits_one_rank else group_size(comm, blade_dofs(bodies.mesh))
+    cost = _real_or_complex(sector_of(bodies.mesh).count)
+    return dict(zip(wanted, shared_out(comm, wanted, size, of_some, cost), strict=True))
 
 
 def blade_parts(scene: Scene, mesh: Mesh) -> tuple[Mesh, dict[str, Material]]:

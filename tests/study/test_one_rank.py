@@ -1,0 +1,48 @@
+"""What is solved by one rank is the same on all, and later stages find its factorisations again."""
+
+import numpy as np
+import pytest
+from bladefem import load_scene
+from bladefem.fem.compat import MPI
+from bladefem.study.pipeline.stages import (
+    KEPT_MODES,
+    Bodies,
+    build_mesh,
+    contact_patches,
+    find_modes,
+    on_one_rank,
+    reduce_sector,
+)
+
+pytestmark = pytest.mark.mpi
+COARSE = ["mesh.size=14 mm", "mesh.seat_elements=2", "aerofoil.fillet=0 mm"]
+
+
+def test_a_sector_is_reduced_with_the_modes_that_each_rank_has():
+    scene = load_scene("scenes/wedge.toml", COARSE)
+    mesh = build_mesh(scene, MPI.COMM_WORLD)
+    patches = contact_patches(mesh)
+    models = []
+    for comm in (MPI.COMM_WORLD, MPI.COMM_SELF):
+        bodies = Bodies(scene, mesh, comm)
+        modes = find_modes(bodies, [0, 9, 18], 4, reduced=6)
+        kept = bodies.alone.kept.get(KEPT_MODES)
+        if comm.size == 1:
+            assert sorted(kept.pairs) == [0, 9, 18]
+        reduced = reduce_sector(bodies, patches, [0, 9, 18], 6)
+        models.append((modes, reduced))
+    (ranks, joined), (alone, single) = models
+    for a, b in zip(ranks, alone, strict=True):
+        np.testing.assert_allclose(a.frequencies, b.frequencies, rtol=1e-10)
+    for n in (0, 9, 18):
+        np.testing.assert_allclose(joined.sector[n].omega, single.sector[n].omega, rtol=1e-10)
+    assert joined.mass == single.mass
+
+
+def test_one_rank_computes_and_all_have_it():
+    scene = load_scene("scenes/plane.toml", ["mesh.size=8 mm"])
+    bodies = Bodies(scene, build_mesh(scene, MPI.COMM_WORLD), MPI.COMM_WORLD)
+    ran = []
+    found = on_one_rank(bodies, lambda some: ran.append(1) or some.still_blade.comm.size)
+    assert found == 1
+    assert MPI.COMM_WORLD.allreduce(len(ran)) == 1
