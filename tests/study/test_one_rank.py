@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+
 from bladefem import load_scene
 from bladefem.fem.compat import MPI
 from bladefem.study.pipeline.stages import (
