@@ -1,4 +1,4 @@
-"""A mesh file at a glance: its faces in colours, numbered, from two sides, with a legend."""
+"""A mesh file at a glance: its faces in colours, numbered, from four sides, with a legend."""
 
 from __future__ import annotations
 
@@ -15,7 +15,12 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
 # from the object to the eye, in the frame of x radial, z along the engine
-SIDES = ((0.45, -0.75, 0.5), (-0.45, 0.75, -0.5))
+SIDES = {
+    "": (0.45, -0.75, 0.5),
+    "from the other side": (0.45, 0.75, -0.5),
+    "from below": (-0.5, -0.75, 0.45),
+    "from below, the other side": (-0.5, 0.75, -0.45),
+}
 COLOURS = (
     "#8fb8de", "#e3a587", "#a9d18e", "#f2d16b", "#b9a3d6", "#7fc7bf",
     "#d98fb0", "#c2b280", "#9aa5b1", "#e08a8a", "#8ecae6", "#b5d99c",
@@ -28,14 +33,16 @@ LIFT = 0.01
 
 def draw_look(look: Look, file: str | Path) -> None:
     """Write the picture."""
-    images = [_photograph_side(look, side) for side in SIDES]
-    with canvas(file, size=(13.0, 5.6), grid=(1, 3), width_ratios=(1.0, 1.0, 0.62)) as axes:
-        for ax, image in zip(axes, images, strict=False):
+    images = {title: _photograph_side(look, side) for title, side in SIDES.items()}
+    widths = [image.shape[1] / image.shape[0] for image in images.values()]
+    # the legend is as wide as its words, the pictures share the rest
+    share = 0.3 * sum(widths)
+    with canvas(file, size=(15.0, 5.6), grid=(1, 5), width_ratios=(*widths, share)) as axes:
+        for ax, (title, image) in zip(axes, images.items(), strict=False):
             ax.imshow(image, interpolation="lanczos")
             ax.set_axis_off()
-        axes[0].set_title(look.file.name)
-        axes[1].set_title("from the other side")
-        _draw_legend(axes[2], look)
+            ax.set_title(title or look.file.name, fontsize=10)
+        _draw_legend(axes[4], look)
 
 
 def _photograph_side(look: Look, side: tuple[float, float, float]) -> np.ndarray:
@@ -133,6 +140,6 @@ def _draw_legend(ax: Axes, look: Look) -> None:
 
 def _face_roles(look: Look) -> dict[str, str]:
     """Face name -> what it looks like."""
-    said = dict.fromkeys(look.cut.low, "cut face, low") if look.cut else {}
-    said |= dict.fromkeys(look.cut.high, "cut face, high") if look.cut else {}
+    said = dict.fromkeys(look.cut.low, "cut face") if look.cut else {}
+    said |= dict.fromkeys(look.cut.high, "cut face, next") if look.cut else {}
     return said | ({look.bore: "nearest to the axis"} if look.bore else {})
