@@ -45,6 +45,9 @@ TOLERANCE = 1e-9
 PROBES = 7
 # refinements of one local maximum
 REFINEMENTS = 12
+# folds of one path, and of all before no further one is begun: a damper that lifts off everywhere
+# and strikes back has a maze of internal resonances, which leads nowhere
+MOST_FOLDS = 24
 
 
 @dataclass(frozen=True)
@@ -128,7 +131,8 @@ def find_branches(
     for start in chain(solved[:1], solved[-1:], solved, further):
         forward = start is not solved[-1]
         at_end = start is solved[0] or start is solved[-1]
-        if budget <= 0 or (not at_end and len(paths) >= MOST_PATHS) or _on_paths(paths, start):
+        full = len(paths) >= MOST_PATHS or _folds(paths) >= MOST_FOLDS
+        if budget <= 0 or (full and not at_end) or _on_paths(paths, start):
             continue
         path = _followed(model, start, band, forward, budget, notes, options)
         if not at_end:
@@ -139,7 +143,25 @@ def find_branches(
         notes.append(f"paths ended after {limit} points: there may be further motions")
     for path in paths:
         _close_in(model, path, band, peak, options)
-    return _sorted_out(paths, options.probe, notes)
+    left_over = _runs([_on_paths(paths, p) for p in solved], solved)
+    return _sorted_out(paths, left_over, options.probe, notes)
+
+
+def _folds(paths: Sequence[_Path]) -> int:
+    return sum(point.fold for path in paths for point in path.points)
+
+
+def _runs(on_path: Sequence[bool], solved: Sequence[Solution]) -> list[list[Solution]]:
+    """Neighbouring known motions that lie on no path: the budget ended before them."""
+    runs: list[list[Solution]] = []
+    before = True
+    for found, point in zip(on_path, solved, strict=True):
+        if not found:
+            if before:
+                runs.append([])
+            runs[-1].append(point)
+        before = found
+    return runs
 
 
 def _further(
@@ -176,6 +198,7 @@ def _followed(
 ) -> _Path:
     """The path from a solution until it leaves the band, closes on itself, or the budget ends."""
     points: list[PathPoint] = []
+    folds = 0
     options = replace(options, frugal=False)
     bounds = min(band[0], start.omega), max(band[1], start.omega)
     try:
@@ -188,6 +211,13 @@ def _followed(
                     f"a path was begun again at {point.solution.frequency:.6g} Hz: "
                     f"{point.restarted}"
                 )
+            folds += point.fold
+            if folds > MOST_FOLDS:
+                notes.append(
+                    f"a path was left at {point.solution.frequency:.6g} Hz after {MOST_FOLDS} "
+                    "folds: there may be further motions"
+                )
+                break
             if len(points) >= budget or _closed(points, band):
                 break
     except NotSolvedError as error:
@@ -326,10 +356,15 @@ def _finer(
 
 def _sorted_out(
     paths: Sequence[_Path],
+    left_over: Sequence[list[Solution]],
     probe: int,
     notes: list[str],
 ) -> Branches:
-    """Pieces between folds, and the local maxima with what is known of them."""
+    """Pieces between folds, and the local maxima with what is known of them.
+
+    Args:
+        left_over: motions on none of the paths, each run a piece without a known way to it.
+    """
     pieces: list[list[Solution]] = []
     maxima: list[tuple[Solution, int]] = []
     ends: dict[str, int] = {}
@@ -366,6 +401,7 @@ def _sorted_out(
         for point, number in maxima
     ]
     resonances.sort(key=lambda r: -r.height)
+    pieces.extend(left_over)
     return Branches(tuple(map(tuple, pieces)), tuple(resonances), tuple(dict.fromkeys(notes)))
 
 

@@ -4,6 +4,7 @@
 
 from __future__ import annotations
 
+from collections import deque
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
 
@@ -15,7 +16,14 @@ from .model import ReducedModel
 from .parameters import check_parameter, parameter_value, path_coordinate, vary
 from .solution import Solution
 from .solve import as_solution, solve
-from .solver.arclength import Spot, Task, advance_path, spot_at
+from .solver.arclength import (
+    SMALLEST_ARC_STEP,
+    Spot,
+    Task,
+    advance_path,
+    path_distance,
+    spot_at,
+)
 from .solver.fallback import Attempt, solve_balance
 from .solver.newton import DEFAULTS, Newton, Options
 from .solver.residual import Balance, State, evaluate_balance
@@ -26,6 +34,9 @@ MOST_PATH_POINTS = 5000
 RESTARTS = (1e-3, 3e-3, 0.01, 0.03)
 # times that a path is begun again
 MOST_RESTARTS = 4
+# points in which a path has to get farther than that many of its smallest steps: at a jump of
+# sampled friction it would otherwise go to and fro until its points are spent
+CREEPING_POINTS = 12
 
 
 @dataclass(frozen=True)
@@ -81,16 +92,22 @@ def follow(
     yield _path_point(task, spot)
     step, longest = steps
     restarts = 0
+    recent = deque([spot], maxlen=CREEPING_POINTS)
     for _ in range(MOST_PATH_POINTS):
         before = spot
         try:
+            _refuse_creeping(task, recent)
             spot, step, fold = advance_path(task, spot, step, longest)
+            recent.append(spot)
         except NotSolvedError as error:
+            # the direction in which the path came, should it have gone to and fro
+            spot = replace(spot, sign=recent[0].sign)
             restarts += 1
             begun = _begun_again(task, spot, (low, high)) if restarts <= MOST_RESTARTS else None
             if begun is None:
                 raise
             spot, step = begun, steps[0]
+            recent = deque([spot], maxlen=CREEPING_POINTS)
             yield replace(_path_point(task, spot), restarted=str(error))
             continue
         yield _path_point(task, spot, fold, spot.branches(before))
@@ -100,6 +117,24 @@ def follow(
         f"path in {name} stopped at {parameter_value(name, spot.x):.6g} after {MOST_PATH_POINTS} "
         "points"
     )
+
+
+def _refuse_creeping(task: Task, recent: deque[Spot]) -> None:
+    """Raises NotSolvedError where the last CREEPING_POINTS got no farther than as many of the
+    smallest steps.
+    """
+    if len(recent) < CREEPING_POINTS:
+        return
+    first, last = recent[0], recent[-1]
+    size = max(task.size, float(np.linalg.norm(last.state.w)))
+    moved = path_distance(first.state.w, last.state.w) / size
+    length = np.hypot(moved, (last.x - first.x) / task.width)
+    if length < CREEPING_POINTS * SMALLEST_ARC_STEP:
+        raise NotSolvedError(
+            f"path in {task.name} does not advance beyond "
+            f"{parameter_value(task.name, last.x):.6g}: it goes to and fro at a jump of the "
+            "friction forces"
+        )
 
 
 def _begun_again(

@@ -13,7 +13,7 @@ import numpy as np
 
 from ..errors import InputError, NotSolvedError
 from ..util.curve_extremum import find_maxima, parabola_at_middle
-from .branches import find_branches
+from .branches import Branches, find_branches
 from .linear_resonances import free_resonances, stuck_resonances
 from .model import ReducedModel
 from .predictor import PREDICTOR_POINTS, extrapolate_solution
@@ -49,7 +49,7 @@ SHORTEST_WALK_STEP = 0.002
 MORE_SAMPLES = (2, 4)
 # unknowns up to which paths are followed wherever contacts lift off; of larger models, where the
 # sweep shows a jump, too
-FOLLOWED = 600
+FOLLOWED = 700
 # a jump: a share of the highest point between neighbours that this share of the band separates
 JUMP = 0.05
 JUMP_WIDTH = 1e-4
@@ -159,9 +159,15 @@ def sweep(
     solved: dict[float, Solution] = {}
     slope = _slope_of(model, solved, options.probe)
     notes = [] if notes is None else notes
-    for solution in _first_solutions(model, band, H, samples, options):
+    lost: list[float] = []
+    for solution in _first_solutions(model, band, H, samples, options, lost):
         solved[solution.omega] = solution
         yield solution
+    # where the response is followed, paths may lead to them
+    if not (paths and _needs_continuation(model, solved, H, options.probe)):
+        for solution in _solved_again(model, lost, solved.values(), H, samples, options):
+            solved[solution.omega] = solution
+            yield solution
     while not (paths and _needs_continuation(model, solved, H, options.probe)):
         wanted = _next_frequency(solved, slope, (peak, curve), options.probe)
         if wanted is None:
@@ -181,6 +187,14 @@ def sweep(
     found = find_branches(model, band, points, H, samples, peak=peak, options=options)
     notes.extend(found.notes)
     yield from found.points
+    missed = [omega for omega in lost if omega not in solved and not _crossed(found, omega)]
+    yield from _solved_again(model, missed, points, H, samples, options)
+
+
+def _crossed(branches: Branches, omega: float) -> bool:
+    """A path leads through this circular frequency."""
+    ends = ([p.omega for p in piece] for piece in branches.pieces)
+    return any(min(omegas) <= omega <= max(omegas) for omegas in ends)
 
 
 def _first_solutions(
@@ -189,22 +203,34 @@ def _first_solutions(
     H: int,
     samples: int,
     options: Options,
+    lost: list[float],
 ) -> Iterator[Solution]:
-    """The first look of a sweep: upwards without fallbacks, then the points that the neighbour
-    below does not lead to, now that those above are known.
+    """The first look of a sweep: upwards without fallbacks.
+
+    Args:
+        lost: takes the circular frequencies that the neighbour below does not lead to, where
+            fallbacks are allowed.
     """
     simply = replace(options, fallbacks=False)
-    solved = []
-    lost = []
     for solution in response(model, first_look(model, band), H, samples, options=simply):
         if options.fallbacks and not solution.converged:
             lost.append(solution.omega)
-            continue
-        solved.append(solution)
-        yield solution
+        else:
+            yield solution
+
+
+def _solved_again(
+    model: ReducedModel,
+    lost: Sequence[float],
+    known: Iterable[Solution],
+    H: int,
+    samples: int,
+    options: Options,
+) -> Iterator[Solution]:
+    """Points that the first look lost, by walks from neighbours on both sides and by fallbacks."""
+    solved = list(known)
     for omega in lost:
-        near = _neighbours(solved, omega)
-        for solution in _walk_from(model, omega, H, samples, near, options):
+        for solution in _walk_from(model, omega, H, samples, _neighbours(solved, omega), options):
             solved.append(solution)
             yield solution
 

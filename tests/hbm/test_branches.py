@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 from models import FOLDING, folding_pair, rebounding
 
+from bladefem.hbm import branches as branches_module
 from bladefem.hbm import sweep as sweep_module
 from bladefem.hbm.branches import find_branches
 from bladefem.hbm.model import Damping
@@ -106,3 +107,22 @@ def test_a_probe_on_a_resonance_without_damping_is_left_out():
     known = list(response(model, band, 5, 128))
     found = find_branches(model, band, known, 5, 128)
     assert found.pieces and not any(p.omega == own for p in found.points)
+
+
+def test_motions_that_no_path_reached_are_kept(folding, monkeypatch):
+    """Paths that end early must not take the place of what the sweep had found beyond them."""
+    monkeypatch.setattr(branches_module, "MIN_POINTS", 4)
+    monkeypatch.setattr(branches_module, "MAX_POINTS", 4)
+    swept = list(response(folding, np.linspace(*BAND, 15), 3, 128))
+    highest = max(size(p) for p in swept if p.converged)
+    found = find_branches(folding, BAND, swept, 3, 128)
+    assert any("ended after 4 points" in note for note in found.notes)
+    assert max(size(p) for p in found.points) >= highest * (1 - 1e-6)
+    assert all(p.branch > 0 for p in found.points)
+
+
+def test_a_path_through_a_maze_of_folds_is_left(folding, monkeypatch):
+    monkeypatch.setattr(branches_module, "MOST_FOLDS", 0)
+    swept = list(response(folding, np.linspace(*BAND, 15), 3, 128))
+    found = find_branches(folding, BAND, swept, 3, 128)
+    assert any("folds" in note for note in found.notes)

@@ -11,12 +11,14 @@ from models import block, single_mass
 
 from bladefem.data import Elements
 from bladefem.errors import InputError
+from bladefem.hbm import continuation
 from bladefem.hbm import sweep as sweep_module
 from bladefem.hbm.continuation import follow
 from bladefem.hbm.linear.condensation import condense
 from bladefem.hbm.model import Damping, ReducedModel
 from bladefem.hbm.parameters import vary
 from bladefem.hbm.solve import solve
+from bladefem.hbm.solver.arclength import path_distance
 from bladefem.hbm.solver.newton import Options
 from bladefem.hbm.solver.residual import Balance, evaluate_balance
 from bladefem.hbm.sweep import response, size
@@ -204,3 +206,33 @@ def test_bad_bounds():
         next(follow(model, "load", start, (2.0, 3.0)))
     with pytest.raises(InputError, match="did you mean"):
         next(follow(model, "omegas", start, (0.5, 2.0)))
+
+
+def test_a_path_that_goes_to_and_fro_is_begun_again_beyond(monkeypatch):
+    """Sampled friction jumps at the limit of stick; there a path once spent all of its points."""
+    model = single_mass()
+    start = solve(model, 0.6, 3, 128)
+    whole = list(follow(model, "omega", start, (0.6, 1.8)))
+    advance = continuation.advance_path
+    held = []
+
+    def stays(task, spot, step, longest):
+        if spot.x > 0.8 and len(held) < 2 * continuation.CREEPING_POINTS:
+            held.append(spot.x)
+            return spot, step, False
+        return advance(task, spot, step, longest)
+
+    monkeypatch.setattr(continuation, "advance_path", stays)
+    points = list(follow(model, "omega", start, (0.6, 1.8)))
+    assert points[-1].value > 1.8
+    begun = [p for p in points if p.restarted]
+    assert begun and "does not advance" in begun[0].restarted and begun[0].value > held[0]
+    assert len(points) < len(whole) + 4 * continuation.CREEPING_POINTS
+
+
+def test_the_mean_place_of_a_contact_counts_little_in_the_length_of_a_path():
+    one = np.zeros((2, 3, 7))
+    mean, moving = one.copy(), one.copy()
+    mean[:, :, 0] = 1.0
+    moving[:, :, 1] = 1.0
+    assert path_distance(one, mean) == pytest.approx(0.1 * path_distance(one, moving))

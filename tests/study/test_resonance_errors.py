@@ -71,3 +71,37 @@ def test_the_poorest_model_has_no_poorer_one(name):
     family = family_of(reference_model(points=4, load=1.4))
     settings = replace(first_for(family.modes), **{name: 1})
     assert resonance_choice.poorer_settings(family, settings, name) is None
+
+
+def peak_with(lift, height=1.0):
+    """A peak of 16 contacts of which some lift off."""
+    states = {"stick": 0, "slip": 16 - lift, "lift": lift, "open": 0}
+    solution = SimpleNamespace(states=states, w=np.zeros((16, 3, 7)))
+    return KnownPeak(height, 100.0, solution)
+
+
+@pytest.mark.parametrize(("lift", "least"), [(7, 1), (8, 3)])
+def test_one_harmonic_is_not_enough_where_half_of_the_contacts_lift(lift, least, monkeypatch):
+    family = family_of(reference_model(points=8, load=1.4, phase=0.7, modes=10, harmonics=31))
+    monkeypatch.setattr(resonance_choice, "peak_from", lambda *a, **k: peak_with(lift))
+    settings, _, errors = resonance_choice.choose_at_peak(
+        family, first_for(family.modes), peak_with(lift), 0.05
+    )
+    assert settings.harmonics == least and errors.total == 0
+
+
+def test_far_from_right_with_lift_off_the_less_wrong_model_is_kept(monkeypatch):
+    """Harmonics are taken first; where they do not halve the error, the search ends."""
+    family = family_of(reference_model(points=8, load=1.4, phase=0.7, modes=10, harmonics=31))
+    tried = []
+
+    def found(family, old, point, new, accuracy, fallbacks=True):
+        tried.append(new)
+        return peak_with(4, 1.1 + 0.5 * (new.points != 4) - 0.1 / new.harmonics)
+
+    monkeypatch.setattr(resonance_choice, "peak_from", found)
+    settings, peak, errors = resonance_choice.choose_at_peak(
+        family, first_for(family.modes), peak_with(4, 1.0), 0.05
+    )
+    assert settings.points == 4 and settings.harmonics == 7
+    assert 0.2 < errors.total == settings.error and peak.height == pytest.approx(1.1 - 0.1 / 7)

@@ -1,7 +1,9 @@
 """Pseudo-arc-length steps along solutions of the balance: round folds, never onto another branch.
 
-The displacements are measured by their own size and the parameter by the width of its range, so
-that a step means the same in metres and in rad/s. A corrected point that lies farther from its
+The moving harmonics of the displacements are measured by their own size and the parameter by the
+width of its range, so that a step means the same in metres and in rad/s. Mean displacements count
+little: where few contacts stick they hold the damper's mean place alone, which moves by far more
+than the vibration. A corrected point that lies farther from its
 prediction than half a step, or whose tangent turns too far, is refused and the step halved: the
 follower does not jump to another branch. At the limit of stick the mean of a contact, and sampled
 2-D friction, jump a little: such gaps are leapt when they are small, and marked. Exact derivatives
@@ -43,6 +45,10 @@ ONWARD = 0.3
 SMALLEST_COSINE = 0.7
 # distance from prediction to solution, in steps, above which it is halved
 JUMP_GUARD = 0.5
+# Newton steps of a corrector up to which the next step grows, and by which factor
+STEP_GROWTH = ((1, 3.0), (4, 1.5))
+# weight of mean displacements in lengths and angles of a path
+MEAN_WEIGHT = 0.01
 
 
 @dataclass(frozen=True)
@@ -94,8 +100,20 @@ class Spot:
     ) -> tuple[np.ndarray, float]:
         """Unit tangent in displacements over their size and the parameter over its width."""
         dw = self.slope * task.width / size
-        length = self.sign / np.sqrt(np.sum(dw**2) + 1.0)
+        length = self.sign / np.sqrt(_product(dw, dw) + 1.0)
         return dw * length, float(length)
+
+
+def _product(one: np.ndarray, other: np.ndarray) -> float:
+    """Scalar product of two displacements (n, d, K) by which lengths and angles are measured."""
+    whole = np.sum(one * other)
+    return float(whole - (1 - MEAN_WEIGHT) * np.sum(one[:, :, 0] * other[:, :, 0]))
+
+
+def path_distance(one: np.ndarray, other: np.ndarray) -> float:
+    """Distance of two displacements (n, d, K) as lengths of a path measure it [m]."""
+    change = other - one
+    return float(np.sqrt(_product(change, change)))
 
 
 def advance_path(
@@ -114,8 +132,8 @@ def advance_path(
     while step >= SMALLEST_ARC_STEP:
         found, reason = _correct_point(task, spot, step, _path_direction(task, spot))
         if found is not None:
-            easy = found.iterations <= 4
-            return found, min(1.5 * step, longest) if easy else step, found.sign != spot.sign
+            growth = next((g for most, g in STEP_GROWTH if found.iterations <= most), 1.0)
+            return found, min(growth * step, longest), found.sign != spot.sign
         step /= 2
     for share in LEAP_STEPS:
         found = _leap_gap(task, spot, share)
@@ -162,8 +180,8 @@ def _correct_point(
         back = inverse(now.state.residual)
         along = inverse(residual_rate(now.balance, now.state, task.name))
         w = now.state.w
-        off = np.sum(dw * (w - guess.state.w)) / size + dx * (now.x - guess.x) / task.width
-        change = (np.sum(dw * back) / size - off) / (dx / task.width - np.sum(dw * along) / size)
+        off = _product(dw, w - guess.state.w) / size + dx * (now.x - guess.x) / task.width
+        change = (_product(dw, back) / size - off) / (dx / task.width - _product(dw, along) / size)
         return _guess_at(task, now.x + change, w - back - change * along, walk)
 
     run = iterate_newton(
@@ -172,7 +190,7 @@ def _correct_point(
     if not run.converged:
         return None, f"corrector: {run.reason}"
     end = run.state
-    away = np.linalg.norm(end.state.w - guess.state.w) / size
+    away = path_distance(guess.state.w, end.state.w) / size
     if np.hypot(away, (end.x - guess.x) / task.width) > JUMP_GUARD * step:
         return None, "the corrector jumps"
     fault = walk_fault(end.balance, end.state)
@@ -183,7 +201,7 @@ def _correct_point(
     except np.linalg.LinAlgError as error:
         return None, str(error)
     new_dw, new_dx = found.tangent(task, size)
-    turn = np.sum(dw * new_dw) + dx * new_dx
+    turn = _product(dw, new_dw) + dx * new_dx
     if abs(turn) < SMALLEST_COSINE and not corner and step > CORNER:
         return None, "the path turns too sharply"
     return (found if turn > 0 else replace(found, sign=-found.sign)), ""
@@ -229,7 +247,7 @@ def _around_corner(
             slope = -inverse(residual_rate(balance, state, task.name)) * task.width / size
         except np.linalg.LinAlgError:
             continue
-        length = 1.0 / np.sqrt(np.sum(slope**2) + 1.0)
+        length = 1.0 / np.sqrt(_product(slope, slope) + 1.0)
         for sign in (1.0, -1.0):
             direction = sign * length * slope, float(sign * length)
             found, _ = _correct_point(task, spot, share, direction, corner=True)
@@ -237,7 +255,7 @@ def _around_corner(
                 continue
             off_w = (found.state.w - spot.state.w) / size + share * dw
             off_x = (found.x - spot.x) / task.width + share * dx
-            if np.hypot(np.linalg.norm(off_w), off_x) > ONWARD * share:
+            if np.hypot(np.sqrt(_product(off_w, off_w)), off_x) > ONWARD * share:
                 return found
     return None
 

@@ -6,6 +6,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 
 import numpy as np
 
@@ -361,18 +362,22 @@ def response_points(
     Raises:
         NotSolvedError: no point converged.
     """
-    circular = (2 * np.pi * band[0], 2 * np.pi * band[1])
-    swept = sweep(
+    rough = accuracy >= 1
+    swept = partial(
+        sweep,
         model,
-        circular,
+        (2 * np.pi * band[0], 2 * np.pi * band[1]),
         settings.harmonics,
         settings.samples,
         peak=min(accuracy / 10, 1e-2),
-        curve=0.2 if accuracy >= 1 else 0.02,
-        options=solver_options(accuracy),
-        paths=accuracy < 1 if paths is None else paths,
+        curve=0.2 if rough else 0.02,
+        paths=not rough if paths is None else paths,
     )
-    points = sorted(swept, key=lambda s: s.omega)
+    options = solver_options(accuracy)
+    points = list(swept(options=replace(options, fallbacks=not rough)))
+    if rough and 2 * sum(p.converged for p in points) < len(points):
+        points = list(swept(options=options))
+    points.sort(key=lambda s: s.omega)
     if any(p.branch for p in points):
         points = [p for p in points if p.branch or not p.converged]
     if not any(p.converged for p in points):

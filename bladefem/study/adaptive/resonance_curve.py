@@ -29,6 +29,7 @@ from .resonance_choice import (
     compared_settings,
     judge_settings,
     peak_from,
+    rattles,
 )
 from .settings import Settings, enriched_settings
 
@@ -59,6 +60,9 @@ def resonance_curve(
     settings = replace(settings, error=None)
     widen = band is None
     points = covered_band(family_member(family, settings).model, settings, band, mode, 1.0)
+    if rattles(settings, peak_of(points)):
+        settings = enriched_settings(settings, "harmonics") or settings
+        points = covered_band(family_member(family, settings).model, settings, band, mode, 1.0)
     used = settings
     for _ in range(PASSES):
         used, peak, errors = _chosen(family, used, peak_of(points), accuracy)
@@ -103,9 +107,9 @@ def _chosen(
     """
     try:
         peak = peak_from(family, settings, top, settings, accuracy)
+        return choose_at_peak(family, settings, peak, accuracy, fixed=("modes",))
     except NotSolvedError:
         return replace(settings, error=np.inf), None, None
-    return choose_at_peak(family, settings, peak, accuracy, fixed=("modes",))
 
 
 def _height(peak: Peak | None, points: Sequence[Solution]) -> float:
@@ -136,7 +140,7 @@ def _checked_flanks(
     if errors is None or not errors.better:
         return found
     worst = max(errors.better, key=lambda name: errors.needs[name])
-    other = judge_settings(family, settings, worst)
+    other = judge_settings(family, settings, worst, top)
     if other is None:
         return found
     shift = errors.better[worst].omega / top.omega
