@@ -1,19 +1,23 @@
 """Which points of a curve are judged, on which bodies, and what is said of an unstable peak."""
 
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
 
 from bladefem.data import Elements
-from bladefem.hbm.model import ReducedModel
+from bladefem.hbm import sweep as sweep_module
+from bladefem.hbm.model import Damping, ReducedModel
 from bladefem.hbm.solve import solve
 from bladefem.hbm.stability import STABLE, UNKNOWN, UNSTABLE, stability_verdict
 from bladefem.reduction.matrices import port_model_from_matrices
+from bladefem.study.adaptive.choice import covered_band
 from bladefem.study.adaptive.family import Family, Member
 from bladefem.study.adaptive.settings import first_for
 from bladefem.study.pipeline import stability
 from bladefem.study.pipeline.kept_band import KeptBand, kept_band
+from bladefem.study.pipeline.response_remarks import search_sentence
 from bladefem.study.pipeline.stability import model_in_time, stability_of, stability_sentence
 
 
@@ -100,3 +104,17 @@ def test_a_model_with_two_tangents_is_marched_by_steps():
 def test_a_band_holds_where_all_of_it_lies_within_the_accuracy(lowest, highest, reason, holds):
     band = KeptBand(1.0, lowest, highest, 100, reason)
     assert band.holds(1.0, 0.05) is holds
+
+
+def test_what_a_sweep_left_open_reaches_the_remarks(monkeypatch):
+    monkeypatch.setattr(sweep_module, "BAND_LIMIT", 3)
+    model = replace(bouncing(), damping=Damping(ratio=0.001))
+    hertz = np.array([0.9, 1.5]) / (2 * np.pi)
+    notes = []
+    covered_band(model, first_for(3), tuple(hertz), 1, 0.05, paths=False, notes=notes)
+    assert len(notes) == 1 and "the sweep ended after 3 points" in notes[0]
+    curve = SimpleNamespace(load=36.0, mass=None, notes=(*notes, "a", "b", "c"))
+    said = search_sentence(curve)
+    assert said.startswith("load 36 N: the sweep ended after 3 points")
+    assert said.endswith("; a; b; and 1 more of the kind")
+    assert search_sentence(SimpleNamespace(load=36.0, mass=None, notes=())) == ""

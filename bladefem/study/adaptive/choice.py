@@ -48,6 +48,8 @@ class Checked:
     points: list[Solution]
     # circular frequency of the checked points to the estimated relative error
     errors: dict[float, float]
+    # what the sweep could not do, in sentences
+    notes: tuple[str, ...] = ()
 
 
 def choose_settings(
@@ -312,6 +314,7 @@ def covered_band(
     accuracy: float,
     widen: bool = False,
     paths: bool | None = None,
+    notes: list[str] | None = None,
 ) -> list[Solution]:
     """A sweep of a band [Hz], or of one round the resonances; that one is widened until its highest
     point lies inside.
@@ -319,13 +322,15 @@ def covered_band(
     Args:
         widen: a given band may be widened as well.
         paths: whether the response is followed round folds; where accuracy is below 1 if left out.
+        notes: takes what the last sweep could not do, in sentences.
 
     Raises:
         NotSolvedError: no point converged.
     """
     (low, high), limits = band or default_band(model, mode), _halfway(model, mode)
     for _ in range(1 if band and not widen else WIDENINGS):
-        points = response_points(model, settings, (low, high), accuracy, paths)
+        left_open: list[str] = []
+        points = response_points(model, settings, (low, high), accuracy, paths, left_open)
         good = [p.omega for p in points if p.converged]
         top = peak_of(points).omega
         if good[0] < top < good[-1]:
@@ -333,6 +338,8 @@ def covered_band(
         low, high = (low - (high - low), high) if top == good[0] else (low, high + (high - low))
         low = max(low, limits[0])
         high = min(high, limits[1])
+    if notes is not None:
+        notes[:] = left_open
     return points
 
 
@@ -352,6 +359,7 @@ def response_points(
     band: tuple[float, float],
     accuracy: float,
     paths: bool | None = None,
+    notes: list[str] | None = None,
 ) -> list[Solution]:
     """A sweep of a band [Hz], sorted by frequency; an accuracy of 1 asks for no more than the place
     of the peak.
@@ -371,11 +379,14 @@ def response_points(
         settings.samples,
         peak=min(accuracy / 10, 1e-2),
         curve=0.2 if rough else 0.02,
+        notes=notes,
         paths=not rough if paths is None else paths,
     )
     options = solver_options(accuracy)
     points = list(swept(options=replace(options, fallbacks=not rough)))
     if rough and 2 * sum(p.converged for p in points) < len(points):
+        if notes is not None:
+            notes.clear()
         points = list(swept(options=options))
     points.sort(key=lambda s: s.omega)
     if any(p.branch for p in points):

@@ -64,12 +64,13 @@ def resonance_curve(
         settings = enriched_settings(settings, "harmonics") or settings
         points = covered_band(family_member(family, settings).model, settings, band, mode, 1.0)
     used = settings
+    notes: list[str] = []
     for _ in range(PASSES):
         used, peak, errors = _chosen(family, used, peak_of(points), accuracy)
         span = band or (points[0].frequency, points[-1].frequency)
         paths = not unfollowed(family, used)
         points = covered_band(
-            family_member(family, used).model, used, span, mode, accuracy, widen, paths
+            family_member(family, used).model, used, span, mode, accuracy, widen, paths, notes
         )
         points = _with_peak(points, peak)
         if used.error is not None and used.error > FAR_BEYOND * accuracy:
@@ -84,7 +85,7 @@ def resonance_curve(
             used = richer_harmonics
         elif size(peak_of(points)) <= (1 + accuracy / 2) * _height(peak, points):
             break
-    return Checked(used, points, found)
+    return Checked(used, points, found, tuple(notes))
 
 
 def unfollowed(family: Family, settings: Settings) -> bool:

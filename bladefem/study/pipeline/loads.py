@@ -103,6 +103,8 @@ class Curve:
     # contacts lift off and the balance is too large for following its motions round folds: a
     # higher motion may exist
     unfollowed: bool = False
+    # what the sweep could not do, in sentences
+    notes: tuple[str, ...] = ()
     # relative change of the peak's height by the estimated error of the body's mesh; NaN: not
     # estimated
     body_mesh: float = np.nan
@@ -244,6 +246,7 @@ def curve_of(
         kept=kept,
         interval=interval,
         unfollowed=lifts and unfollowed(models, curve.settings),
+        notes=curve.notes,
         body_mesh=body_mesh,
     )
 

@@ -18,6 +18,8 @@ from .stability import stability_sentence, unstable_sentence
 
 # largest estimated error by the mesh of a stress that is no warning
 TRUSTED_STRESS = 0.2
+# sentences on the search of one curve that are quoted
+MAX_NOTES = 3
 
 
 def response_remarks(
@@ -56,10 +58,20 @@ def response_remarks(
                 "round folds: a sweep sees one motion a frequency, a higher one may exist"
             )
         )
+    remarks.extend(warning(text) for text in map(search_sentence, curves) if text)
     remarks.extend(warning(text) for text in map(reach_sentence, curves) if text)
     remarks.extend(map(warning, resonance_warnings(curves, scene.accuracy)))
     remarks.extend(map(warning, filter(None, [beyond_tolerance(curves)])))
     return remarks
+
+
+def search_sentence(curve: Curve) -> str:
+    """What the search for the motions of a curve left open, or ""."""
+    if not curve.notes:
+        return ""
+    said = "; ".join(curve.notes[:MAX_NOTES])
+    more = len(curve.notes) - MAX_NOTES
+    return f"load {load_of(curve)}: {said}" + (f"; and {more} more of the kind" if more > 0 else "")
 
 
 def load_of(curve: Curve) -> str:
