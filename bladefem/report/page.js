@@ -59,8 +59,8 @@ const FONT = {family: "system-ui, 'Segoe UI', 'DejaVu Sans', Arial, sans-serif",
 const CONFIG = {responsive: true, displaylogo: false, displayModeBar: "hover", modeBarButtonsToRemove: ["lasso2d", "select2d"]};
 
 // size of a name in a legend below a chart [px]
-const LEGEND_ENTRY = 130;
-const LEGEND_ROW = 21;
+const LEGEND_ENTRY = 140;
+const LEGEND_ROW = 24;
 
 function makePlace(figure) {
   const place = document.createElement("div");
@@ -78,7 +78,9 @@ async function showChart(figure, spec) {
     // names below the chart, which becomes higher by their rows; bars above it
     const named = spec.data.filter((trace) => trace.showlegend !== false && layout.showlegend !== false);
     const rows = named.length > 1 ? Math.ceil(named.length * LEGEND_ENTRY / place.clientWidth) + 1 : 0;
-    layout.legend = {...layout.legend, orientation: "h", yref: "container", yanchor: "bottom", y: 0};
+    const title = layout.legend && layout.legend.title;
+    layout.legend = {...layout.legend, orientation: "h", yref: "container", yanchor: "bottom", y: 0,
+      tracegroupgap: 0, title: title && {...title, side: "top"}};
     layout.title = undefined;
     layout.margin = {l: 55, r: 8, t: 34, b: 50 + LEGEND_ROW * rows};
     layout.height += LEGEND_ROW * rows;
