@@ -23,6 +23,10 @@ if TYPE_CHECKING:
     from ..study.pipeline.stages import Reduced
 
 
+# letters of the line below a head; help texts in a last column are longer
+WIDEST_RULE = 150
+
+
 def plain(rows: Sequence[Sequence[object]], head: Sequence[str] = ()) -> str:
     """Columns side by side: the first to the left, numbers to the right."""
     cells = [[str(c) for c in row] for row in ([head, *rows] if head else rows)]
@@ -37,7 +41,7 @@ def plain(rows: Sequence[Sequence[object]], head: Sequence[str] = ()) -> str:
         for row in cells
     ]
     if head:
-        lines.insert(1, "-" * max(map(len, lines)))
+        lines.insert(1, "-" * min(max(map(len, lines)), WIDEST_RULE))
     return "\n".join(lines)
 
 

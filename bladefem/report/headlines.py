@@ -147,7 +147,7 @@ def _mass_text(
 ) -> str:
     """Loads grow in proportion to the mass, and so does their bracket."""
     if low is None or high is None:
-        return "open on one side, as the optimum load"
+        return "bounded on one side only, as the optimum load"
     return f"{100 * (low / load - 1):+.0f} to {100 * (high / load - 1):+.0f} %, as the optimum load"
 
 

@@ -7,6 +7,9 @@ import pandas as pd
 
 from bladefem.scene.tables import Scene
 
+from .best_load import found_best
+from .statements import best_mass
+
 # of the damper's own load: nearer to the optimum, another mass changes little
 NEAR_OPTIMUM = 0.15
 
@@ -16,6 +19,8 @@ def next_steps(
     cautions: list[str],
     summary: pd.DataFrame | None,
     own: pd.DataFrame | None,
+    masses: pd.DataFrame | None = None,
+    searched: pd.DataFrame | None = None,
 ) -> list[str]:
     """Sentences in the order of their worth; none where nothing was answered.
 
@@ -23,6 +28,8 @@ def next_steps(
         cautions: why the answer may not be the optimum; each says what to change.
         summary: one row a load, SI columns.
         own: one row: mass [kg], speed [rad/s], load [N] of a seat by that mass alone.
+        masses: mass [kg] that makes each load [N], where friction takes part in the seating.
+        searched: what the exact search for the best load found.
     """
     steps = list(cautions)
     if summary is None or summary.empty:
@@ -32,7 +39,9 @@ def next_steps(
         return steps
     best = finite.loc[finite["peak_amplitude"].idxmin()]
     if not cautions:
-        steps += _mass_step(best, own, "mass" in finite)
+        exact = None if searched is None else found_best(searched, summary)
+        chosen = best if exact is None else exact
+        steps += _mass_step(chosen, own, masses, "mass" in finite)
     steps += _mesh_step(best)
     if scene.contact.normal == "coupled" and not scene.study.stability:
         steps.append(
@@ -45,9 +54,10 @@ def next_steps(
 def _mass_step(
     best: pd.Series,
     own: pd.DataFrame | None,
+    masses: pd.DataFrame | None,
     several: bool,
 ) -> list[str]:
-    """Another mass, where the damper's own load is far from the best one."""
+    """Another mass, where the damper's own load is far from the best one: that of the headline."""
     if own is None or several:
         return []
     mass, load = own[["mass", "load"]].iloc[0]
@@ -55,10 +65,10 @@ def _mass_step(
         return [
             f"The damper's own {1e3 * mass:.3g} g press it nearly at the optimum: keep its mass."
         ]
-    wanted = mass * best["load"] / load
+    wanted, _ = best_mass(best, mass / load, masses)
     return [
-        f"Change the damper's mass from {1e3 * mass:.3g} g to about {1e3 * wanted:.3g} g, and "
-        f"confirm with damper.mass = '{1e3 * wanted:.3g} g' and study.own_load = true."
+        f"Change the damper's mass from {1e3 * mass:.3g} g to {wanted}, and confirm with "
+        f"damper.mass = '{wanted}' and study.own_load = true."
     ]
 
 

@@ -210,9 +210,10 @@ def _answer(
         return {"numbers": list(page.numbers or ()), "steps": list(page.steps)}
     own = tables.get("contact/own_load")
     searched = tables.get("response/best_load")
-    found = answer(summary, points, own, tables.get("contact/damper_mass"), searched)
+    masses = tables.get("contact/damper_mass")
+    found = answer(summary, points, own, masses, searched)
     cautions = [*assumed_stiffness(scene), *wrong_speed(scene, summary), *found.cautions]
-    steps = next_steps(scene, cautions, summary, own)
+    steps = next_steps(scene, cautions, summary, own, masses, searched)
     numbers = [*headlines(found, summary, points, searched), *page.more]
     return {"numbers": numbers, "steps": [*steps, *page.steps]}
 

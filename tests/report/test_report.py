@@ -282,7 +282,11 @@ def test_next_steps_name_the_mass_to_try():
     summary = synthetic.summary()
     own = pd.DataFrame({"mass": [0.012], "speed": [800.0], "load": [100.0]})
     steps = next_steps(Scene(), [], summary, own)
-    assert steps[0].startswith("Change the damper's mass from 12 g to about 24 g")
+    assert steps[0].startswith("Change the damper's mass from 12 g to 24 g, and confirm with")
+    # the mass of the headline: of the load that was searched, not of the nearest one studied
+    searched = pd.DataFrame({"load": [150.0], "amplitude": [1e-6], "frequency": [800.0]})
+    exact = next_steps(Scene(), [], summary, own, None, searched)
+    assert "damper.mass = '18 g'" in exact[0]
     kept = next_steps(Scene(), [], summary, own.assign(load=200.0))
     assert "keep its mass" in kept[0]
     assert next_steps(Scene(), ["widen"], summary, own)[0] == "widen"
