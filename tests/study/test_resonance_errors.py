@@ -7,11 +7,13 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
+from models import single_mass
 
 from bladefem.errors import NotSolvedError
 from bladefem.hbm.reference_blade import reference_model
 from bladefem.study.adaptive import resonance_choice
-from bladefem.study.adaptive.family import family_of
+from bladefem.study.adaptive.family import Family, Member, family_of
+from bladefem.study.adaptive.resonance_curve import resonance_curve
 from bladefem.study.adaptive.settings import first_for
 
 
@@ -105,3 +107,11 @@ def test_far_from_right_with_lift_off_the_less_wrong_model_is_kept(monkeypatch):
     )
     assert settings.points == 4 and settings.harmonics == 7
     assert 0.2 < errors.total == settings.error and peak.height == pytest.approx(1.1 - 0.1 / 7)
+
+
+def test_a_curve_starts_with_the_harmonics_that_are_excited():
+    model = replace(single_mass(), excitation={1: np.array([1.0]), 5: np.array([0.02])})
+    family = Family(lambda _: Member(model, np.arange(1)), 1)
+    start = replace(first_for(1), points=None, chosen=("harmonics", "samples"))
+    found = resonance_curve(family, start, (0.9 / (2 * np.pi), 1.6 / (2 * np.pi)), 1, 0.05)
+    assert found.settings.harmonics >= 5

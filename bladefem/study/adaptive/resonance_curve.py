@@ -20,7 +20,7 @@ from .check_points import (
     peak_of,
 )
 from .choice import Checked, covered_band, solver_options
-from .family import Family, family_member
+from .family import Family, family_member, with_excited_harmonics
 from .indicators import moved_solution, richer_settings
 from .resonance_choice import (
     FAR_BEYOND,
@@ -57,7 +57,7 @@ def resonance_curve(
     Raises:
         NotSolvedError: no point converged.
     """
-    settings = replace(settings, error=None)
+    settings = with_excited_harmonics(family, replace(settings, error=None))
     widen = band is None
     points = covered_band(family_member(family, settings).model, settings, band, mode, 1.0)
     if rattles(settings, peak_of(points)):
