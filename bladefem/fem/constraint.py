@@ -27,7 +27,7 @@ from .body import Body
 from .compat import PETSc
 from .linalg import Doubled, Folded, Matrix, combined
 from .ordering import interior_first
-from .supports import held_directions
+from .supports import held_directions, polar_elimination
 
 # largest difference of masses of two directions, of the largest mass: rounding
 SAME_MASS = 1e-14
@@ -335,7 +335,8 @@ def _constraint_parts(
     free = body.rows >= 0
     free[clamped] = False
     slaves = np.empty(0, int) if pair is None else pair.nodes[1]
-    keep = np.repeat(free, d) & ~_plane_supports(body, pair)
+    held = _plane_supports(body, pair)
+    keep = np.repeat(free, d) & ~held
     keep[d * slaves[:, None] + np.arange(d)] = False
     low = sp.diags(keep.astype(float)).tocsr()
     high = None
@@ -344,9 +345,15 @@ def _constraint_parts(
         rows = pair.nodes[1][alive]
         cols = pair.nodes[0][alive]
         block = sp.coo_matrix((np.ones(len(rows)), (rows, cols)), shape=(n, n))
-        moving = sp.diags((~_plane_supports(body, pair)).astype(float))
+        moving = sp.diags((~held).astype(float))
         high = (moving @ sp.kron(block, pair.rotation[:d, :d])).tocsr()
         high.eliminate_zeros()
+    partner = np.arange(n)
+    if pair is not None:
+        partner[pair.nodes[1]] = pair.nodes[0]
+    polar = polar_elimination(body, body.directions, held.reshape(n, d), partner)
+    if polar is not None:
+        low, high = (A if A is None else (A @ polar).tocsr() for A in (low, high))
     if ties is not None and len(ties):
         tie = _tied_identity(n, d, np.asarray(ties))
         low, high = (A if A is None else (tie @ A @ tie).tocsr() for A in (low, high))

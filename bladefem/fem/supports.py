@@ -4,7 +4,7 @@ elastic root in a disc, and single directions held.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -15,6 +15,14 @@ from . import shape_functions as shape
 from .body import Body
 from .compat import PETSc
 
+# directions along fixed axes
+FIXED = {"x": 0, "y": 1, "z": 2, "a": 2}
+# directions at a node about the z axis
+POLAR = ("r", "t")
+# of the mesh's size: nodes so near to the axis are on it
+ON_AXIS = 1e-9
+# component of a unit vector below which it lies along the other axis
+ALONG_AXIS = 1e-9
 # of the surface element times two shape functions, on curved faces
 DEGREE = 8
 
@@ -55,8 +63,81 @@ def supported(
 
 
 def held_directions(body: Body, directions: Sequence[tuple[str, str]]) -> np.ndarray:
-    """(n_points, dim) true where a displacement is zero by a support in single directions."""
+    """(n_points, dim) true where a displacement along a fixed axis is zero by a support in single
+    directions; "a" is "z".
+    """
     held = np.zeros((len(body.mesh.points), body.dim), bool)
+    for nodes, letters in _nodes_and_letters(body, directions):
+        axes = [FIXED[letter] for letter in letters if letter in FIXED]
+        held[np.ix_(nodes, np.array(axes, int))] = True
+    return held
+
+
+def polar_elimination(
+    body: Body,
+    directions: Sequence[tuple[str, str]],
+    held: np.ndarray,
+    partner: np.ndarray,
+) -> sp.csr_matrix | None:
+    """(n_points*dim,)*2 displacements from those left when radial or tangential ones are zero.
+
+    At a node n . u = 0, with n the radial or the tangential direction there: the displacement along
+    the axis on which n is longest follows from the other one.
+
+    Args:
+        held: (n_points, dim) displacements along fixed axes that are zero already.
+        partner: (n_points,) the node on the low cut face whose motion each node repeats, itself
+            where it repeats none.
+
+    Returns:
+        None where nothing is held like that.
+
+    Raises:
+        InputError: a node on the axis, which has no such directions.
+    """
+    polar = np.zeros((len(body.mesh.points), 2), bool)
+    for nodes, letters in _nodes_and_letters(body, directions):
+        for i, letter in enumerate(POLAR):
+            polar[partner[nodes], i] |= letter in letters
+    some = np.flatnonzero(polar.any(axis=1))
+    if not len(some):
+        return None
+    place = body.mesh.points[some, :2]
+    radius = np.linalg.norm(place, axis=1)
+    if radius.min() <= ON_AXIS * np.ptp(body.mesh.points, axis=0).max():
+        raise InputError(
+            "support.directions: a node on the z axis has no radial and tangential direction, "
+            "expected 'xy' there"
+        )
+    radial = place / radius[:, None]
+    tangential = np.stack([-radial[:, 1], radial[:, 0]], axis=1)
+    normal = np.where(polar[some, :1], radial, tangential)
+    slave = abs(normal).argmax(axis=1)
+    each = np.arange(len(some))
+    ratio = -normal[each, 1 - slave] / normal[each, slave]
+    # both directions are zero, or one is and a fixed axis across it: nothing is left in the plane
+    fixed = held[some, :2].any(axis=1) & (abs(normal) > ALONG_AXIS).all(axis=1)
+    nothing = polar[some].all(axis=1) | fixed
+    d = body.dim
+    keep = np.ones(len(body.mesh.points) * d)
+    keep[d * some + slave] = 0.0
+    keep[d * some[nothing] + 1 - slave[nothing]] = 0.0
+    row = (d * some + slave)[~nothing]
+    column = (d * some + 1 - slave)[~nothing]
+    follow = sp.coo_matrix((ratio[~nothing], (row, column)), shape=(len(keep),) * 2)
+    out = (sp.diags(keep) + follow).tocsr()
+    out.eliminate_zeros()
+    return out
+
+
+def _nodes_and_letters(
+    body: Body, directions: Sequence[tuple[str, str]]
+) -> Iterator[tuple[np.ndarray, str]]:
+    """Nodes of the body and the letters of what is zero there.
+
+    Raises:
+        InputError: no such face or node set, or no such direction in a plane mesh.
+    """
     known = {**body.mesh.faces, **body.mesh.nodes}
     for name, letters in directions:
         if name not in known:
@@ -64,11 +145,14 @@ def held_directions(body: Body, directions: Sequence[tuple[str, str]]) -> np.nda
                 "support.directions: the mesh has no face or node set "
                 f"'{name}'{suggestion(name, known)}"
             )
+        missing = [letter for letter in letters if letter not in "xy"] if body.dim == 2 else []
+        if missing:
+            raise InputError(
+                f"support.directions = '{name}: {letters}': a plane mesh has no direction "
+                f"'{missing[0]}', expected x or y"
+            )
         nodes = np.unique(known[name])
-        nodes = nodes[body.rows[nodes] >= 0]
-        axes = np.array(["xyz".index(letter) for letter in letters])
-        held[np.ix_(nodes, axes)] = True
-    return held
+        yield nodes[body.rows[nodes] >= 0], letters
 
 
 def spring_matrix(body: Body, springs: Sequence[AreaSpring]) -> PETSc.Mat:

@@ -8,7 +8,8 @@ from ..errors import InputError, suggestion
 from .tables import Support
 from .units import parse
 
-LETTERS = ("x", "y", "z")
+# fixed axes, then radial, tangential and axial about the z axis
+LETTERS = ("x", "y", "z", "r", "t", "a")
 SPRINGS = ("normal", "tangential")
 
 
@@ -33,7 +34,7 @@ def held_letters(support: Support) -> list[tuple[str, str]]:
     """Face or node set, and the letters of the displacements held on it.
 
     Raises:
-        InputError: a text that is not "face: x", "face: xy", ...
+        InputError: a text that is not "face: x", "face: xy", "face: ra", ...
     """
     found = []
     for text in support.directions or ():
@@ -41,8 +42,8 @@ def held_letters(support: Support) -> list[tuple[str, str]]:
         letters = letters.replace(",", "").replace(" ", "").lower()
         if not colon or not face or not letters or set(letters) - set(LETTERS):
             raise InputError(
-                f"support.directions = {text!r}: expected one text for each face, such as 'rim: z' "
-                "or 'foot: xy'"
+                f"support.directions = {text!r}: expected one text for each face, such as "
+                "'rim: z', 'foot: xy' or 'bore: ra' (r radial, t tangential, a axial)"
             )
         found.append((face, letters))
     return found

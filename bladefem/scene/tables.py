@@ -336,8 +336,9 @@ class Support:
     )
     directions: tuple[str, ...] | None = quantity(
         None,
-        help="single displacements that are zero on faces or node sets, such as 'rim: z' or "
-        "'foot: xy' (x radial, y circumferential at the middle of the sector, z axial)",
+        help="single displacements that are zero on faces or node sets, such as 'rim: z', "
+        "'foot: xy' (x radial, y circumferential at the middle of the sector, z axial) or "
+        "'bore: ra' (at each node r radial, t tangential, a axial about the z axis)",
     )
 
 

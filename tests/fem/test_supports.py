@@ -1,5 +1,7 @@
 """Springs on faces, single directions, free bodies: closed forms and limits."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from structured import box, sector
@@ -105,3 +107,47 @@ def test_a_free_body_under_rotation_is_refused():
     with pytest.raises(InputError, match=r"expected operation\.stiffening = false"):
         scene_of(tables)
     assert scene_of(tables | {"operation": {"stiffening": False}}).support.clamp == ""
+
+
+def test_torsion_of_a_tube_between_two_sleeves():
+    """Radial and axial displacement held at the bore and outside leave turning, clamped at one end:
+    f = sqrt(G / rho) / (4 L), a closed form.
+    """
+    length = 0.3
+    mesh = sector(12, (1, 2, 4), "hexahedron27", width=length)
+    body = supported(
+        assemble(mesh, "blade", STEEL), "z0", directions=[("x0", "ra"), ("x1", "r"), ("x1", "a")]
+    )
+    found = modes(constrain(body, "z0", 0), 1).frequencies[0]
+    shear = STEEL.E / (2 * (1 + STEEL.nu))
+    assert found == pytest.approx(np.sqrt(shear / STEEL.rho) / (4 * length), rel=2e-4)
+
+
+@pytest.mark.parametrize("letters", ["r", "t", "rt", "ta"])
+def test_directions_at_the_nodes_turn_with_the_body(letters):
+    """Another place of the sector on the wheel, where other components follow: the same modes."""
+    mesh = sector(9, (3, 2, 1), bump=0.2)
+    c, s = np.cos(0.9), np.sin(0.9)
+    turned = replace(mesh, points=mesh.points @ np.array([[c, s, 0], [-s, c, 0], [0, 0, 1.0]]))
+    for n in (0, 2):
+        found = [
+            modes(
+                constrain(
+                    supported(assemble(some, "blade", STEEL), "", directions=[("x1", letters)]),
+                    "clamp",
+                    n,
+                ),
+                5,
+            ).frequencies
+            for some in (mesh, turned)
+        ]
+        np.testing.assert_allclose(*found, rtol=1e-8, atol=1e-3)
+
+
+def test_directions_that_are_not_there_are_refused():
+    body = assemble(box((1, 1, 1), SIZE), "blade", STEEL)
+    with pytest.raises(InputError, match="a node on the z axis"):
+        constrain(supported(body, "", directions=[("x0", "r")]))
+    plane = assemble(box((1, 1), (1.0, 1.0), "quad"), "blade", STEEL)
+    with pytest.raises(InputError, match="a plane mesh has no direction 'z'"):
+        supported(plane, "", directions=[("x0", "z")])
