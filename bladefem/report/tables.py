@@ -43,6 +43,7 @@ COLUMNS = {
     "deviation": Column("deviation of frequency", "1", "%", 100.0, 3),
     "blade": Column("blade"),
     "wheels": Column("wheels"),
+    "law_error": Column("law off the whole wheel by", "1", "%", 100.0, 2),
     "worst": Column("worst wheel", "1", digits=4),
     **{
         f"p{share}{end}": Column(f"{share} %{title}", "1", digits=4)

@@ -125,6 +125,8 @@ def scatter_table(found: Amplification) -> pd.DataFrame:
             q = quantile(found.factor[i], share)
             name = f"p{100 * share:g}"
             row |= {name: q.value, f"{name}_low": q.low, f"{name}_high": q.high}
+        if found.checked.shape[1]:
+            row["law_error"] = abs(found.check_errors[i]).max()
         row |= {
             "worst": found.factor[i].max(),
             "highest_amplitude": found.peak[i].max(),
@@ -228,6 +230,13 @@ def scatter_sentences(found: Amplification) -> list[str]:
         f"at {found.loads[i]:g} N, where the tuned wheel is lowest, 95 % of {found.peak.shape[1]} "
         f"wheels stay below {q.value:.3g} times it (95 % interval {q.low:.3g} to {_upper(q.high)})"
     )
+    if found.checked.shape[1]:
+        errors = 100 * found.check_errors
+        sentences.append(
+            f"wheels by the law of one damper; {found.checked.size} of them solved in full, from "
+            f"the lowest to the highest of each load, are off by {errors.min():+.2g} to "
+            f"{errors.max():+.2g} % in amplification"
+        )
     lost = int(found.unsolved.sum())
     sentences.append(f"{lost} of {int(found.points.sum())} points not solved")
     return sentences

@@ -265,6 +265,15 @@ class Mistuning:
     )
     seed: int = quantity(0, "1", 0, 1000000, "of the draws")
     wheels: int = quantity(30, "1", 2, 100000, "drawn by 'bladefem scatter' for each load")
+    level: str = quantity(
+        "whole wheel",
+        choices=("whole wheel", "damper law"),
+        help="how 'bladefem scatter' solves its wheels: each in full, or all by the law of one "
+        "damper in one harmonic, some of them checked in full",
+    )
+    checks: int = quantity(
+        4, "1", 2, 1000, "wheels of each load that are solved in full where the damper law is asked"
+    )
     families: int = quantity(3, "1", 1, 10, "blade-alone modes that deviate")
     orders: tuple[str, ...] | None = quantity(
         None,

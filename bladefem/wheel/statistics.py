@@ -70,6 +70,15 @@ class Amplification:
     # (L, W) points that were not solved, and points altogether
     unsolved: IntegerArray
     points: IntegerArray
+    # (L, C) numbers of the wheels that were checked by the whole wheel, and their amplification by
+    # it; C = 0 where all wheels are whole
+    checked: IntegerArray
+    whole: RealArray
+
+    @property
+    def check_errors(self) -> np.ndarray:
+        """(L, C) relative difference of the amplification from the whole wheel's."""
+        return np.take_along_axis(self.factor, self.checked, axis=1) / self.whole - 1
 
     @property
     def factor(self) -> np.ndarray:
@@ -155,7 +164,13 @@ def scatter_statistics(
         omegas,
         unsolved.astype(int),
         points.astype(int),
+        *no_checks(len(loads)),
     )
+
+
+def no_checks(loads: int) -> tuple[np.ndarray, np.ndarray]:
+    """`Amplification.checked` and `whole` of statistics whose wheels are whole."""
+    return np.zeros((loads, 0), dtype=int), np.zeros((loads, 0))
 
 
 def joined_loads(parts: Sequence[Amplification]) -> Amplification:

@@ -12,7 +12,7 @@ from bladefem.errors import InputError
 from bladefem.hbm.solve import solve
 from bladefem.hbm.solver.newton import DEFAULTS
 from bladefem.report.fatigue import utilisation_drawing, utilisation_table, worst_utilisation
-from bladefem.report.wheel import pattern_headlines
+from bladefem.report.wheel import pattern_headlines, scatter_sentences, scatter_table
 from bladefem.scene.tables import Fatigue
 from bladefem.scene.toml import load_scene, vary
 from bladefem.study.adaptive.family import family_member
@@ -24,7 +24,7 @@ from bladefem.study.mistuning.blade_stress import (
     blade_motion,
     blade_stress,
 )
-from bladefem.study.mistuning.stage import check_mistuning, with_whole_wheel
+from bladefem.study.mistuning.stage import check_mistuning, scatter_of_run, with_whole_wheel
 from bladefem.study.mistuning.whole_wheel import blade_readings, reduce_wheel, whole_wheel
 from bladefem.study.pipeline import pipeline
 from bladefem.study.pipeline.case_models import family_of_case, load_cases
@@ -143,11 +143,16 @@ def test_blade_of_a_mistuned_wheel_moves_as_in_the_balance(reduced, shapes):
     assert other.mismatch > 0.02
 
 
-def test_a_second_run_finds_the_wheel(tmp_path):
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory):
+    return tmp_path_factory.mktemp("run")
+
+
+def test_a_second_run_finds_the_wheel(folder):
     """The sector in all nodal diameters and the wheel's response are kept like other stages."""
     scene = load_scene(SCENE, COARSE)
-    first = with_whole_wheel(pipeline.run(scene, tmp_path))
-    again = with_whole_wheel(pipeline.run(scene, tmp_path))
+    first = with_whole_wheel(pipeline.run(scene, folder))
+    again = with_whole_wheel(pipeline.run(scene, folder))
     for name in ("wheel_sector", "whole_wheel"):
         assert not any(text.startswith(f"{name}: found") for text in first.messages)
         assert any(text.startswith(f"{name}: found") for text in again.messages)
@@ -168,9 +173,23 @@ def test_a_second_run_finds_the_wheel(tmp_path):
     assert [number.value for number in numbers][1] == f"{value:.3g}"
     # another pattern is another response of the same sector
     other = vary(scene, mistuning__pattern=None, mistuning__seed=1)
-    drawn = with_whole_wheel(pipeline.run(other, tmp_path))
+    drawn = with_whole_wheel(pipeline.run(other, folder))
     assert any(text.startswith("wheel_sector: found") for text in drawn.messages)
     assert not any(text.startswith("whole_wheel: found") for text in drawn.messages)
+
+
+def test_statistics_by_the_damper_law_are_checked_in_full(folder):
+    """Four wheels, the lowest and the highest also in full; a second call finds them."""
+    scene = load_scene(SCENE, COARSE)
+    scene = vary(scene, mistuning__level="damper law", mistuning__wheels=4, mistuning__checks=2)
+    run = pipeline.run(scene, folder)
+    found = scatter_of_run(run)
+    assert found.checked.shape == found.whole.shape == (1, 2)
+    assert found.factor[0, found.checked[0, 0]] == found.factor.max()
+    assert abs(found.check_errors).max() < 0.05
+    assert "solved in full" in " ".join(scatter_sentences(found))
+    assert scatter_table(found)["law_error"][0] == abs(found.check_errors).max()
+    np.testing.assert_array_equal(scatter_of_run(run).peak, found.peak)
 
 
 @pytest.mark.parametrize(
@@ -179,6 +198,10 @@ def test_a_second_run_finds_the_wheel(tmp_path):
         (["mistuning.pattern=nowhere.csv"], "pattern file .*nowhere.csv: not found"),
         (["disc.sectors=35"], "36 blades, expected 35"),
         (["mistuning.orders=10: 0.3 N"], "expected a multiple of excitation.engine_order = 9"),
+        (
+            ["mistuning.orders=18: 0.3 N", "mistuning.level=damper law"],
+            "takes one engine order, expected no mistuning.orders",
+        ),
         (["mistuning.orders=half: 0.3 N"], "expected a whole order and a force"),
     ],
 )

@@ -14,6 +14,7 @@ from bladefem.wheel.statistics import (
     Amplification,
     best_load,
     free_respond,
+    no_checks,
     one_body_respond,
     quantile,
     robust_optimum,
@@ -109,7 +110,8 @@ def peaks_of(loads, optima, sizes):
     peak = sizes * np.exp((np.log(loads)[:, None] - np.log(optima)) ** 2)
     nothing = np.zeros(peak.shape, int)
     tuned = np.exp((np.log(loads) - np.log(5.0)) ** 2)
-    return Amplification(loads, tuned, loads, peak, nothing, peak, nothing, nothing)
+    checks = no_checks(len(loads))
+    return Amplification(loads, tuned, loads, peak, nothing, peak, nothing, nothing, *checks)
 
 
 def test_robust_optimum_of_wheels_with_one_optimum():

@@ -17,8 +17,9 @@ from ...scene.tables import Scene
 from ...util.communicator import Communicator
 from ...util.progress import Progress, unwatched
 from ...wheel.model import Pattern, Wheel, frequency_pattern
+from ...wheel.resonance import find_wheel_peak
 from ...wheel.scatter import MAX_DEVIATIONS, drawn_patterns
-from ...wheel.solve import WheelSolution
+from ...wheel.solve import TUNED, WheelSolution
 from ...wheel.statistics import (
     Amplification,
     joined_loads,
@@ -34,6 +35,7 @@ from ..pipeline.stage_inputs import stage_key
 from ..pipeline.stages import Bodies
 from ..pipeline.utilisation import wheel_utilisation_message
 from .blade_stress import WheelShapes, all_modes, blade_stress
+from .law_level import law_level, with_checks
 from .pattern_response import (
     SEARCH,
     PatternResponse,
@@ -44,6 +46,9 @@ from .pattern_response import (
     scene_scatter,
 )
 from .whole_wheel import WheelSector, blade_readings, read_orders, reduce_wheel, whole_wheel
+
+# mistuning.level: all wheels by the law of one damper
+LAW = "damper law"
 
 
 def is_mistuned(scene: Scene) -> bool:
@@ -66,7 +71,11 @@ def check_mistuning(scene: Scene) -> None:
     if count == 0:
         raise InputError("mistuning: expected a wheel, imported.sectors = 0 has a single blade")
     scene_deviations(scene, count, scene.mistuning.families)
-    read_orders(scene)
+    if read_orders(scene) and scene.mistuning.level == LAW:
+        raise InputError(
+            'mistuning.level = "damper law": takes one engine order, expected no mistuning.orders '
+            'or "whole wheel"'
+        )
 
 
 def with_whole_wheel(
@@ -176,6 +185,21 @@ def _kept_statistics(
             scene.mistuning.wheels,
             lambda deviation: frequency_pattern(sector.families, deviation),
         )
+        if scene.mistuning.level == LAW:
+            grid = frequency_grid(wheel, curve, TUNED, spread)
+            band = float(grid[0]), float(grid[-1])
+            drawn = scene_scatter(scene)
+            mode = scene.excitation.mode - 1
+            cheap = on_root(comm, lambda: law_level(wheel, patterns, drawn, curve, mode, band))
+
+            def whole_peak(pattern: Pattern) -> float:
+                own = frequency_grid(wheel, curve, pattern, spread)
+                return find_wheel_peak(
+                    wheel_respond(wheel, pattern, H, samples), own, SEARCH
+                ).height
+
+            checks = scene.mistuning.checks
+            return with_checks(cheap, patterns, whole_peak, checks, comm, progress)
         return scatter_statistics(
             {curve.load: wheel},
             {curve.load: patterns},

@@ -111,7 +111,12 @@ STAGE_INPUTS = {
         after=("wheel", "response", "stress"),
         fields=("mistuning",),
         # of the draws of many wheels
-        without=("mistuning.pattern", "mistuning.wheels"),
+        without=(
+            "mistuning.pattern",
+            "mistuning.wheels",
+            "mistuning.level",
+            "mistuning.checks",
+        ),
         code=("bladefem.wheel",),
     ),
     "damped motion": StageInputs(

@@ -1,0 +1,120 @@
+"""The cheap level of the statistics of a scene's wheels: all of them by the law of one damper, some
+of them checked by the whole wheel.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import replace
+
+import numpy as np
+
+from ...util.communicator import Communicator
+from ...util.progress import Progress, unwatched
+from ...wheel.damper_law import Family, damper_law, family_of_modes, scaled_elements
+from ...wheel.law_response import LawWheels, ScatteredLaw, law_statistics, pattern_deviations
+from ...wheel.model import Pattern, Wheel
+from ...wheel.scatter import Scatter, drawn_deviations
+from ...wheel.solve import TUNED
+from ...wheel.statistics import Amplification
+from ...wheel.tuned import travelling_order
+from ..pipeline.loads import Curve
+
+# smallest and largest motion of a pair of blades in the table, over the tuned resonance
+SIZES = 0.05, 8.0
+# scattered parameters but the load, which scales exactly
+CHANGED = ("friction", "stiffness")
+# standard deviations at which the changed laws are made
+APART = 1.5
+
+
+def law_level(
+    wheel: Wheel,
+    patterns: list[Pattern],
+    scatter: Scatter,
+    curve: Curve,
+    mode: int,
+    band: tuple[float, float],
+) -> Amplification:
+    """Statistics of all patterns under the load of a curve, by the law of one damper.
+
+    Args:
+        scatter: that the patterns were drawn with.
+        mode: number of the excited mode, from 0.
+        band: ends of the frequencies [rad/s].
+
+    Raises:
+        InputError: the damper has too many contact nodes, or the forces are no travelling wave.
+        NotSolvedError: the damper's small balance has no solution somewhere.
+    """
+    family = family_of_modes(wheel, curve.peak.omega, mode)
+    law = _scattered_law(wheel, family, scatter, curve)
+    draws = drawn_deviations(wheel.count, scatter, len(patterns))
+    factors = {
+        name: 1 + getattr(scatter, name) * draws[:, 1 + i]
+        for i, name in enumerate(("friction", "stiffness", "load"))
+        if getattr(scatter, name) > 0
+    }
+    deviation = pattern_deviations(patterns, family, wheel.count)
+    return law_statistics(LawWheels(family, law, deviation, factors), curve.load, band)
+
+
+def _scattered_law(
+    wheel: Wheel,
+    family: Family,
+    scatter: Scatter,
+    curve: Curve,
+) -> ScatteredLaw:
+    """The law of the nominal damper, and of those with more and less of what scatters."""
+    order = travelling_order(wheel) or 0
+    motion = curve.peak_amplitude / abs(family.probe[order])
+    sizes = SIZES[0] * motion, SIZES[1] * motion
+    samples = max(curve.settings.samples, 16)
+    changed = {}
+    for name in CHANGED:
+        share = APART * getattr(scatter, name)
+        if share > 0:
+            more, less = (
+                damper_law(
+                    wheel, family, sizes, samples, scaled_elements(wheel.elements, name, factor)
+                )
+                for factor in (1 + share, 1 - share)
+            )
+            changed[name] = (more, less, share)
+    return ScatteredLaw(damper_law(wheel, family, sizes, samples), changed)
+
+
+def with_checks(
+    found: Amplification,
+    patterns: list[Pattern],
+    whole_peak: Callable[[Pattern], float],
+    checks: int,
+    comm: Communicator | None,
+    progress: Progress = unwatched,
+) -> Amplification:
+    """Statistics of one load with some wheels solved whole, from the lowest to the highest.
+
+    The tuned peak becomes the whole wheel's, and all peaks keep their amplification: the family's
+    one mode leaves the same part out of both.
+
+    Args:
+        whole_peak: height of a pattern's highest blade by the whole wheel [m].
+        checks: wheels that are solved, dealt out over the ranks.
+    """
+    rank, ranks = (comm.rank, comm.size) if comm is not None else (0, 1)
+    order = np.argsort(found.factor[0])
+    places = np.unique(np.linspace(0, len(order) - 1, checks).round().astype(int))
+    chosen = order[places[::-1]]
+    heights = np.zeros(1 + len(chosen))
+    mine = range(rank, len(heights), ranks)
+    for i in progress(list(mine), f"checks under {found.loads[0]:g} N", len(mine)):
+        heights[i] = whole_peak(TUNED if i == 0 else patterns[chosen[i - 1]])
+    if comm is not None:
+        heights = comm.allreduce(heights)
+    return replace(
+        found,
+        tuned=heights[:1],
+        peak=found.factor * heights[0],
+        checked=chosen[None],
+        whole=(heights[1:] / heights[0])[None],
+    )

@@ -1,0 +1,148 @@
+"""The cheap level of statistics: the law of one damper against its own balance, and wheels solved
+with it against the balance of all blades.
+"""
+
+import numpy as np
+import pytest
+from scipy import linalg
+
+from bladefem.errors import InputError
+from bladefem.wheel import damper_law as subject
+from bladefem.wheel.damper_law import damper_law, family_of_modes, scaled_elements
+from bladefem.wheel.law_response import (
+    LawWheels,
+    ScatteredLaw,
+    law_statistics,
+    pattern_deviations,
+)
+from bladefem.wheel.lumped import LumpedBlades, lumped_matrices, lumped_pattern, lumped_wheel
+from bladefem.wheel.model import Pattern
+from bladefem.wheel.scatter import Scatter, drawn_deviations, drawn_patterns
+from bladefem.wheel.statistics import one_body_respond, scatter_statistics
+
+BLADES = LumpedBlades()
+M, K, _ = lumped_matrices(BLADES)
+OWN = float(np.sqrt(linalg.eigh(K, M)[0][0]))
+SIZES = 1e-6, 5e-3
+
+
+@pytest.fixture(scope="module")
+def made():
+    wheel = lumped_wheel(BLADES, 9, 1.0, 1e5, 3.0)
+    family = family_of_modes(wheel, OWN)
+    return wheel, family, damper_law(wheel, family, SIZES, 64)
+
+
+def amplitudes(count=200):
+    rng = np.random.default_rng(0)
+    size = 10 ** rng.uniform(-5, -3, (2, count))
+    return size * np.exp(2j * np.pi * rng.uniform(size=(2, count)))
+
+
+def test_law_is_the_balance_of_its_damper(made):
+    wheel, family, law = made
+    a, b = amplitudes()
+    imposed = np.outer(a, family.before) + np.outer(b, family.after)
+    start = subject._stuck_motion(wheel, family, imposed)
+    _, force, error = subject._small_balance(wheel, wheel.elements, family, imposed, start, 64)
+    assert error.max() < 1e-6
+    expected = np.array([force @ family.before, force @ family.after])
+    found, _ = law.forces(a, b)
+    off = np.linalg.norm(found - expected, axis=0)
+    assert np.median(off / np.linalg.norm(expected, axis=0)) < 2e-3
+    # of the force of full slip, 4 / pi times the friction limit; the table is too coarse only where
+    # large motions of both blades are nearly alike, and the damper turns its force within a step
+    full = 4 / np.pi * 3.0 * np.linalg.norm(family.before)
+    assert np.quantile(off, 0.95) < 0.03 * full
+    assert off.max() < 0.2 * full
+
+
+def test_law_does_not_see_a_shift_of_time(made):
+    _, _, law = made
+    a, b = amplitudes()
+    turn = np.exp(0.7j)
+    np.testing.assert_allclose(
+        law.forces(a * turn, b * turn)[0], turn * law.forces(a, b)[0], rtol=1e-9
+    )
+
+
+def test_derivatives_are_those_of_the_splines(made):
+    _, _, law = made
+    a, b = amplitudes()
+    _, derivative = law.forces(a, b)
+    step = 1e-6 * abs(a)
+    for i, (da, db) in enumerate([(1, 0), (1j, 0), (0, 1), (0, 1j)]):
+        upper = law.forces(a + step * da, b + step * db)[0]
+        lower = law.forces(a - step * da, b - step * db)[0]
+        slope = ((upper - lower) / (2 * step)).T
+        numeric = np.stack([slope.real, slope.imag], axis=2).reshape(-1, 4)
+        np.testing.assert_allclose(derivative[:, :, i], numeric, atol=1e-5 * abs(derivative).max())
+
+
+def by_law(made, patterns, factors, changed=None):
+    _, family, law = made
+    wheels = LawWheels(
+        family,
+        ScatteredLaw(law, changed or {}),
+        pattern_deviations(patterns, family, BLADES.count),
+        factors,
+    )
+    return law_statistics(wheels, 3.0, (0.96 * OWN, 1.05 * OWN))
+
+
+def by_balance(wheel, patterns):
+    return scatter_statistics(
+        {3.0: wheel},
+        {3.0: patterns},
+        lambda load, pattern: OWN * np.linspace(0.96, 1.05, 61),
+        lambda w, p: one_body_respond(w, p, 1, 64),
+    )
+
+
+def test_wheels_are_those_of_the_balance(made):
+    """At the load of the tuned optimum: amplification within 5 % of the balance of all modes, on
+    the same blade but where two are as high.
+    """
+    wheel, _, _ = made
+    drawn = drawn_patterns(wheel, Scatter(0.02), 6, lambda d: lumped_pattern(BLADES, d))
+    found = by_law(made, drawn, {})
+    whole = by_balance(wheel, drawn)
+    assert not whole.unsolved.any()
+    assert found.tuned[0] == pytest.approx(whole.tuned[0], rel=0.03)
+    np.testing.assert_allclose(found.factor, whole.factor, rtol=0.05)
+    assert np.mean(found.blade == whole.blade) > 0.6
+
+
+def test_dampers_scatter(made):
+    """Friction, stiffness and load of every damper."""
+    wheel, family, _ = made
+    scatter = Scatter(0.01, friction=0.08, stiffness=0.08, load=0.08, seed=2)
+    drawn = drawn_patterns(wheel, scatter, 6, lambda d: lumped_pattern(BLADES, d))
+    draws = drawn_deviations(BLADES.count, scatter, 6)
+    factors = {
+        name: 1 + 0.08 * draws[:, 1 + i] for i, name in enumerate(("friction", "stiffness", "load"))
+    }
+    changed = {
+        name: tuple(
+            damper_law(wheel, family, SIZES, 64, scaled_elements(wheel.elements, name, factor))
+            for factor in (1.1, 0.9)
+        )
+        + (0.1,)
+        for name in ("friction", "stiffness")
+    }
+    found = by_law(made, drawn, factors, changed)
+    without = by_law(made, drawn, {})
+    whole = by_balance(wheel, drawn)
+    np.testing.assert_allclose(found.factor, whole.factor, rtol=0.05)
+    # what the dampers' scatter does is seen, as far as it goes
+    assert np.std(found.factor / whole.factor) < np.std(without.factor / whole.factor)
+
+
+def test_what_has_no_law_is_refused(made):
+    wheel, family, _ = made
+    with pytest.raises(InputError, match="deviations of stiffness, not of mass"):
+        pattern_deviations([Pattern(mass=np.ones((36, 2, 2)))], family, 36)
+    one = lumped_wheel(BLADES, 9, 1.0, 1e5, 3.0)
+    one.excitation[2] = one.excitation[1]
+    with pytest.raises(InputError, match="expected one engine order"):
+        family_of_modes(one, OWN)
