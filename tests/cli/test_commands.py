@@ -292,7 +292,7 @@ def test_a_study_that_breaks_off_leaves_what_is_done(pipeline, tmp_path):
     [
         "damper.angle",
         "damper.angel=1",
-        "damper.angle=30, 80 deg",
+        "damper.angle=30, 95 deg",
         "excitation.force=1, 0 N",
         "aerofoil.twist=10, 20",
         "mesh.size=",
