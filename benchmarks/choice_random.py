@@ -6,6 +6,10 @@ with lift-off, against a fixed rich model.
 The choice finds harmonics and samples for the highest resonance of the band, search included. The
 rich model sweeps the same band with 15 harmonics and 1024 samples. Contacts of these models are no
 neighbours on a surface, so that points and modes stay as they are.
+
+Of the seeds 0 to 32 at 2 % none was wrong; three have no resonance inside their band; six took more
+than 1.1 times the rich model's CPU time, five of them 15 to 40 ms in all, a chain with lift-off
+1.3 s against 0.35 s.
 """
 
 from __future__ import annotations
@@ -38,7 +42,7 @@ def timed(compute: Callable[[], Result]) -> tuple[Result, float]:
 
 
 def main(first: int, last: int, accuracy: float) -> None:
-    wrong, unsure, unsolved = [], [], []
+    wrong, unsure, unsolved, outside = [], [], [], []
     ratios: list[float] = []
     spent = np.zeros(2)
     for seed in range(first, last):
@@ -55,6 +59,11 @@ def main(first: int, last: int, accuracy: float) -> None:
             unsolved.append(seed)
             print(f"seed {seed}, {case.name}: not solved, {error}", flush=True)
             continue
+        places = [peak_of(points).omega for points in (rich, found.points)]
+        if min(places) <= case.band[0] or max(places) >= case.band[1]:
+            # the choice follows a peak beyond the band
+            outside.append(seed)
+            continue
         spent += cheap, dear
         ratios.append(cheap / dear)
         truth = bf.size(peak_of(rich))
@@ -70,7 +79,10 @@ def main(first: int, last: int, accuracy: float) -> None:
                 flush=True,
             )
     slower = sum(r > 1.1 for r in ratios)
-    print(f"accuracy {accuracy:.1%}, {len(ratios)} models, not solved: {unsolved}")
+    print(
+        f"accuracy {accuracy:.1%}, {len(ratios)} models, not solved: {unsolved}, resonance outside "
+        f"the band: {outside}"
+    )
     print(f"wrong beyond the accuracy and not said: {len(wrong)} {wrong}")
     print(f"estimate below half of the true error: {len(unsure)} {unsure}")
     print(
