@@ -127,6 +127,8 @@ def run(
     reduced = _run_reduction(seated, bodies, patches, keep)
     if until == "reduction":
         return reduced
+    # matrices and factors, without which responses get on
+    del bodies
     return run_response(reduced, patches, keep)
 
 
