@@ -20,7 +20,7 @@ from ...wheel.statistics import Amplification
 from ...wheel.tuned import travelling_order
 from ..pipeline.loads import Curve
 
-# smallest and largest motion of a pair of blades in the table, over the tuned resonance: both blades
+# smallest and largest motion of a pair of blades in the table, over the tuned resonance: both
 # amplified by 2.8; far beyond, light dampers lift off and have no one motion
 SIZES = 0.05, 4.0
 # scattered parameters but the load, which scales exactly
