@@ -15,6 +15,7 @@ from scipy import linalg
 
 from ..friction.time_step import step_2d
 from ..util.numba_options import INNER_KERNEL, KERNEL
+from .linear.array_copy import copy_matrix
 from .sector_modes import SectorModes
 
 # periods marched until 2-D forces repeat
@@ -65,7 +66,8 @@ def contact_steps(u, du, N, dN, mu, before, now, load, share, stuck):
     for i in range(n):
         x = u[i, 0, 0]
         y = u[i, 1, 0] if t > 1 else 0.0
-        slips = False
+        # a literal False would compile the step twice
+        slips = bool(0)
         size = mu[i] * max(np.abs(N[i]).max(), 1e-300)
         for cycle in range(CYCLES):
             x0 = x
@@ -233,16 +235,19 @@ def flow_map(E, G0, G1, U, R, A, B1, B0, share, steps):
     for i in range(m):
         F[i, 2 * M + i] = 1.0
     bodies = np.dot(U, np.ascontiguousarray(G1[:M]))
-    flexible = R - bodies
-    W = np.dot(U, np.ascontiguousarray(X[:M])) - np.dot(R, F)
+    flexible = _difference(R, bodies)
+    W = _difference(np.dot(U, np.ascontiguousarray(X[:M])), np.dot(R, F))
     rhs = np.empty((m, size))
     acting = np.empty((m, size))
     inverse = np.empty((m, m))
+    blocks = B1.reshape((S, n * d * d))
     for k in range(1, steps + 1):
         j = k % S
         for row in range(m):
-            acting[row] = 2.0 * share[j, row // d] * F[row]
-        X = np.dot(E, X) + np.dot(G0, acting)
+            for c in range(size):
+                acting[row, c] = 2.0 * share[j, row // d] * F[row, c]
+        X = np.dot(E, X)
+        _add_matrix(np.dot(G0, acting), X)
         free = np.dot(U, np.ascontiguousarray(X[:M]))
         rhs[:] = 0.0
         for i in range(n):
@@ -250,26 +255,63 @@ def flow_map(E, G0, G1, U, R, A, B1, B0, share, steps):
                 row = i * d + a
                 for b in range(d):
                     column = i * d + b
-                    if A[j, i, a, b] != 0.0:
-                        rhs[row] += A[j, i, a, b] * F[column]
-                    if B1[j, i, a, b] != 0.0:
-                        rhs[row] += B1[j, i, a, b] * free[column]
-                    if B0[j, i, a, b] != 0.0:
-                        rhs[row] += B0[j, i, a, b] * W[column]
-        if k == 1 or np.any(B1[j] != B1[k - 1]) or np.any(share[j] != share[k - 1]):
+                    _add_row(A[j, i, a, b], F[column], rhs[row])
+                    _add_row(B1[j, i, a, b], free[column], rhs[row])
+                    _add_row(B0[j, i, a, b], W[column], rhs[row])
+        if k == 1 or _differ(blocks[j], blocks[k - 1]) or _differ(share[j], share[k - 1]):
             for column in range(m):
                 weight = 2.0 * (1.0 - share[j, column // d])
-                flexible[:, column] = R[:, column] - weight * bodies[:, column]
+                for row in range(m):
+                    flexible[row, column] = R[row, column] - weight * bodies[row, column]
             inverse = _inverse_of_contact(B1[j], flexible)
         F = np.dot(inverse, rhs)
         for row in range(m):
-            acting[row] = 2.0 * (1.0 - share[j, row // d]) * F[row]
-        X += np.dot(G1, acting)
-        W = free - np.dot(flexible, F)
+            for c in range(size):
+                acting[row, c] = 2.0 * (1.0 - share[j, row // d]) * F[row, c]
+        _add_matrix(np.dot(G1, acting), X)
+        W = _difference(free, np.dot(flexible, F))
     full = np.empty((size, size))
-    full[: 2 * M] = X
-    full[2 * M :] = F
+    copy_matrix(X, full)
+    copy_matrix(F, full[2 * M :])
     return full
+
+
+# Sums of matrices by plain loops, see `bladefem.hbm.linear.array_copy`.
+
+
+@njit(cache=True, error_model="numpy", inline="always")
+def _add_matrix(part, target):
+    """target (n, k) becomes target + part (n, k)."""
+    for i in range(part.shape[0]):
+        for j in range(part.shape[1]):
+            target[i, j] += part[i, j]
+
+
+@njit(cache=True, error_model="numpy", inline="always")
+def _add_row(factor, row, target):
+    """target (k,) becomes target + factor * row (k,)."""
+    if factor != 0.0:
+        for c in range(target.size):
+            target[c] += factor * row[c]
+
+
+@njit(**INNER_KERNEL)
+def _difference(a, b):
+    """a - b (n, k)."""
+    out = np.empty(a.shape)
+    for i in range(out.shape[0]):
+        for j in range(out.shape[1]):
+            out[i, j] = a[i, j] - b[i, j]
+    return out
+
+
+@njit(**INNER_KERNEL)
+def _differ(a, b):
+    """Whether a and b (k,) differ."""
+    for i in range(a.size):
+        if a[i] != b[i]:
+            return True
+    return False
 
 
 @njit(**INNER_KERNEL)
@@ -280,6 +322,5 @@ def _inverse_of_contact(B, flexible):
     for i in range(n):
         for a in range(d):
             for b in range(d):
-                if B[i, a, b] != 0.0:
-                    matrix[i * d + a] += B[i, a, b] * flexible[i * d + b]
+                _add_row(B[i, a, b], flexible[i * d + b], matrix[i * d + a])
     return np.ascontiguousarray(np.linalg.inv(matrix))

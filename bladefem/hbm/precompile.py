@@ -65,9 +65,11 @@ def compile_1d() -> None:
 
 
 def compile_2d() -> None:
-    """Kernels of 2-D elements with the derivative in single precision, as Newton takes it, and of
-    the judge of stability.
+    """Kernels of 2-D elements with the derivative in single precision, as Newton takes it; then all
+    that solves, measures and judges a point. By then `compile_linear` has left the linear part on
+    disk.
     """
+    evaluate(_plane_model().elements, np.full((1, 3, 5), 0.1), 64, precision="single")
     for force in (0.5, 1.0, 2.0):
         plane = replace(_plane_model(), excitation={1: np.full(1, force)})
         points = list(response(plane, [1.0, 1.1], 2, 64))
@@ -75,15 +77,18 @@ def compile_2d() -> None:
     stability_verdict(plane, points[-1])
 
 
-def compile_solvers() -> None:
-    """Iterations for many unknowns; then the kernels of 2-D elements with the derivative in double
-    precision, as sensitivities take it: by then `compile_2d` has left what both share on disk.
+def compile_linear() -> None:
+    """The linear part and iterations for many unknowns; then the kernels of 2-D elements with the
+    derivative in double precision, as sensitivities take it: by then `compile_2d` has left what
+    both share on disk.
     """
+    plane = _plane_model()
+    # its flexibility without springs is a kernel of its own
+    _ = condense(plane, 1.0, 2).G
     flexibility = np.eye(3, dtype=complex)[None].repeat(3, axis=0)
     inverse = iterative_inverse(flexibility, np.eye(15)[None], motions=np.eye(3)[:, :1].copy())
     inverse(np.ones((3, 5)), 1e-6)
-    # the law alone: the linear part is compiled by the other process
-    evaluate(_plane_model().elements, np.full((1, 3, 5), 0.1), 64)
+    evaluate(plane.elements, np.full((1, 3, 5), 0.1), 64)
 
 
 def _line_model() -> ReducedModel:
@@ -105,7 +110,7 @@ def _model_on(elements: Elements) -> ReducedModel:
     return ReducedModel((body,), elements, {1: np.ones(1)}, Damping(0.01))
 
 
-PARTS: dict[str, Callable[[], None]] = {"2d": compile_2d, "solvers": compile_solvers}
+PARTS: dict[str, Callable[[], None]] = {"2d": compile_2d, "linear": compile_linear}
 
 
 if __name__ == "__main__":

@@ -3,6 +3,9 @@
 import subprocess
 import sys
 
+import numpy as np
+from numba.core import event
+
 
 def test_import_brings_neither_dolfinx_nor_pictures():
     code = (
@@ -31,3 +34,39 @@ def test_the_installation_can_compile_the_kernels_ahead():
         disc_batch.disc_batch,
     ):
         assert kernel.signatures
+
+
+class CompiledKernels(event.Listener):
+    """Names of the kernels of bladefem that numba compiles, but not those that it finds on disk."""
+
+    def __init__(self):
+        self.names = []
+
+    def on_start(self, event):
+        function = event.data["dispatcher"].py_func
+        if function.__module__.startswith("bladefem"):
+            self.names.append(function.__name__)
+
+    def on_end(self, event):
+        pass
+
+
+def test_the_main_job_compiles_nothing_after_the_installation():
+    from bladefem.friction.aft import evaluate
+    from bladefem.hbm import precompile
+    from bladefem.hbm.linear.condensation import condense
+    from bladefem.hbm.stability import stability_verdict
+    from bladefem.hbm.sweep import response
+
+    precompile.compile_kernels()
+    plane = precompile._plane_model()
+    compiled = CompiledKernels()
+    with event.install_listener("numba:compile", compiled):
+        points = list(response(plane, [0.9, 1.0, 1.2], 3, 64))
+        stability_verdict(plane, points[-1])
+        assert np.isfinite(condense(plane, 1.0, 3).G).all()
+        for precision in ("single", "double"):
+            for jacobian in (True, False):
+                w = np.full((1, 3, 7), 0.1)
+                evaluate(plane.elements, w, 64, jacobian, precision=precision)
+    assert compiled.names == []

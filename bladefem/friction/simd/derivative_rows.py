@@ -319,23 +319,28 @@ def add_period(path, fx, fy, pieces, el, tab, trail, scratch, trace, summing):
         _add_slip(trail.slips, tab, scratch)
 
 
+@njit(_nrt=False, **INNER_KERNEL, forceinline=True)
+def _choose_slipping_fours(slips, fours, chosen):
+    """Number of fours in which a sample slips; chosen takes their numbers."""
+    count = 0
+    for q in range(fours.shape[0]):
+        if slips[fours[q, 0]] + slips[fours[q, 1]] + slips[fours[q, 2]] + slips[fours[q, 3]] > 0.0:
+            chosen[count] = q
+            count += 1
+    return count
+
+
 @njit(_nrt=False, cache=True, error_model="numpy", inline="always")
 def _add_slip(slips, tab, scratch):
     """Add the samples that slip, fours without one left out."""
-    count = 0
-    fours = tab.fours
-    for q in range(fours.shape[0]):
-        if slips[fours[q, 0]] + slips[fours[q, 1]] + slips[fours[q, 2]] + slips[fours[q, 3]] > 0.0:
-            scratch.chosen[count] = q
-            count += 1
     add_folded(
         scratch.rows,
         scratch.g,
         scratch.normal,
         scratch.patterns.at,
-        fours,
+        tab.fours,
         scratch.chosen,
-        count,
+        _choose_slipping_fours(slips, tab.fours, scratch.chosen),
         scratch.patterns.weights,
         scratch.J,
     )

@@ -202,7 +202,8 @@ def _derivative_rows(path, walks, found, el, tab, trail, scratch, trace, phi, F,
     unique, fx, fy, gx, gy, _, pieces, cycles = found
     if unique or walks:
         unit_rows(el.kt, tab, scratch.C)
-        add_period(path, gx, gy, pieces, el, tab, trail, scratch, trace, True)
+        # a literal True would compile add_period twice
+        add_period(path, gx, gy, pieces, el, tab, trail, scratch, trace, bool(1))
     else:
         gx, gy = fx, fy = start_force(path[0, 0], path[1, 0], path[2, 0], el.mu)
         start_rows(path[0, 0], path[1, 0], path[2, 0], el, tab, scratch.C)

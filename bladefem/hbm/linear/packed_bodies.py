@@ -49,9 +49,8 @@ class Bodies(NamedTuple):
     # (H+1, p) the same of the probes
     straight: np.ndarray
     # (S, m, m), U (S, m, M), UH (S, M, m), N (S, M, M) of `woodbury.frequency_independent_parts`;
-    # empty where
+    # empty where there are too many modes for it
     A: np.ndarray
-    # there are too many modes for it
     U: np.ndarray
     UH: np.ndarray
     N: np.ndarray

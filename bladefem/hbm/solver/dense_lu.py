@@ -61,8 +61,16 @@ def factorise_large(M, pivots):
         if high < size:
             left = np.ascontiguousarray(M[high:, low:high])
             right = np.ascontiguousarray(M[low:high, high:])
-            M[high:, high:] -= np.dot(left, right)
+            _subtract_matrix(np.dot(left, right), M[high:, high:])
     return True
+
+
+@njit(cache=True, error_model="numpy", inline="always")
+def _subtract_matrix(part, target):
+    """target (n, k) loses part (n, k); by loops, see `bladefem.hbm.linear.array_copy`."""
+    for i in range(part.shape[0]):
+        for j in range(part.shape[1]):
+            target[i, j] -= part[i, j]
 
 
 @njit(**KERNEL)
