@@ -124,18 +124,11 @@ def blade_ring(
     contact = _contact_halves(body, n)
     size = m + 1
     W = _ring_readings(contact, mass, blades)
-    force = np.zeros((blades * size, 3))
-    for b in range(blades):
-        turned = excitation * np.exp(2j * np.pi * waves * b / blades)
-        amplitude = turned * body.shapes[body.ports["load"]][0]
-        force[b * size : b * size + m, 1] = amplitude.real
-        force[b * size : b * size + m, 2] = -amplitude.imag
+    force = _travelling_force(body.shapes[body.ports["load"]][0], excitation, blades, waves)
     probe = np.zeros((1, blades * size))
     probe[0, :m] = body.shapes[body.ports["probe"]][0]
     omega: np.ndarray = np.tile(np.r_[body.omega, 0.0], blades)
-    extra = np.zeros((m, m)) if body.damping is None else np.real(body.damping)
-    one = np.pad(np.diag(2 * ratio * body.omega) + extra, (0, 1))
-    damping: np.ndarray = np.kron(np.eye(blades), one)
+    damping = _ring_damping(body, ratio, blades)
     return System(
         np.square(omega),
         damping,
@@ -148,6 +141,34 @@ def blade_ring(
         np.zeros_like(W),
         probe,
     )
+
+
+def _ring_damping(body: PortModel, ratio: float, blades: int) -> np.ndarray:
+    """(coordinates, coordinates) viscous matrix [1/s] of blades and undamped dampers."""
+    m = len(body.omega)
+    extra = np.zeros((m, m)) if body.damping is None else np.real(body.damping)
+    one = np.pad(np.diag(2 * ratio * body.omega) + extra, (0, 1))
+    return np.kron(np.eye(blades), one)
+
+
+def _travelling_force(
+    shape: np.ndarray,
+    excitation: complex,
+    blades: int,
+    waves: int,
+) -> np.ndarray:
+    """(coordinates, 3) mean, cosine and sine of the modal forces; shape (modes,) at the load port.
+    The coordinate of each damper, after the modes of its blade, carries none.
+    """
+    m = len(shape)
+    size = m + 1
+    force = np.zeros((blades * size, 3))
+    for b in range(blades):
+        turned = excitation * np.exp(2j * np.pi * waves * b / blades)
+        amplitude = turned * shape
+        force[b * size : b * size + m, 1] = amplitude.real
+        force[b * size : b * size + m, 2] = -amplitude.imag
+    return force
 
 
 def _contact_halves(body: PortModel, elements: int) -> np.ndarray:
