@@ -222,9 +222,10 @@ def choose_at_peak(
     peak: Peak,
     accuracy: float,
     fixed: tuple[str, ...] = (),
+    sufficient: float = SUFFICIENT_SHARE,
 ) -> tuple[Settings, Peak, PeakErrors]:
-    """Settings whose estimated errors of height and frequency keep within SUFFICIENT_SHARE of the
-    accuracy, or the best that may be chosen; the peak with them, and its errors.
+    """Settings whose estimated errors of height and frequency keep within a share of the accuracy,
+    or the best that may be chosen; the peak with them, and its errors.
 
     Nothing is refined in a respect in which the richer model was not solved: its error is unknown.
     A respect whose error was negligible is not judged again, nor one that could not be judged where
@@ -236,6 +237,7 @@ def choose_at_peak(
     Args:
         peak: found with `settings`.
         fixed: names that may not be changed here although they are not the user's.
+        sufficient: that share.
 
     Raises:
         NotSolvedError: most contacts lift off, and the peak was not found with three harmonics.
@@ -260,6 +262,8 @@ def choose_at_peak(
             if need <= NEGLIGIBLE_SHARE * accuracy or (far and not np.isfinite(need))
         }
         first = "harmonics" if far else ""
+        if sum(errors.needs.values()) <= sufficient * accuracy:
+            break
         better = _next_settings(family, settings, peak, errors, accuracy, fixed, first)
         if better is None:
             break
@@ -294,15 +298,12 @@ def _next_settings(
     fixed: tuple[str, ...],
     first: str = "",
 ) -> Settings | None:
-    """Richer in the respect that is worst; None where the errors are small enough or nothing
-    helps.
+    """Richer in the respect that is worst; None where nothing helps.
 
     Args:
         first: a respect that is taken before worse ones, and in large steps.
     """
     needs = {name: need for name, need in errors.needs.items() if np.isfinite(need)}
-    if sum(errors.needs.values()) <= SUFFICIENT_SHARE * accuracy:
-        return None
     for name in sorted(needs, key=lambda name: (name != first, -needs[name])):
         if (
             name not in settings.chosen

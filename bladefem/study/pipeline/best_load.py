@@ -41,7 +41,7 @@ SHARE = 0.02
 STEP = 1e-4
 # searches, each with richer settings than the last
 SEARCHES = 3
-# range of a repeated search on each side of the load found before, as a factor
+# range of a search on each side of a load that is known to be near the best, as a factor
 REPEATED_RANGE = 4.0
 
 
@@ -93,34 +93,42 @@ def find_best_load(
         case_at: static load of a seat [N] -> the seated damper's friction elements.
         family_of: load case -> its models.
         settings: where to begin; what is open in them is enriched as the accuracy needs.
-        start: load to begin at [N].
+        start: load near the best one [N]; searched farther only where the best of its
+            neighbourhood lies at an end of that.
     """
     case_at = lru_cache(maxsize=None)(case_at)
     searched = search_range(scene)
-    bounds = searched
+    bounds = searched if start is None else _near(start, searched)
     points = 0
     try:
         for _ in range(SEARCHES):
             found = _search(scene, case_at, family_of, settings, bounds, start)
             points += found.points
+            if found.value in bounds and bounds != searched:
+                found = _search(scene, case_at, family_of, settings, searched, found.value)
+                points += found.points
             if not settings.chosen and settings.error is not None:
                 break
             family = family_of(case_at(found.value))
+            # the whole accuracy: the height changes little with the load, and its errors by the
+            # meshes are estimated for the curves
             richer, _, _ = choose_at_peak(
-                family, settings, found.peak, scene.accuracy, fixed=("modes",)
+                family, settings, found.peak, scene.accuracy, fixed=("modes",), sufficient=1.0
             )
             enough = replace(richer, error=settings.error) == settings
             settings = richer
             if enough:
                 break
             start = found.value
-            bounds = (
-                max(searched[0], found.value / REPEATED_RANGE),
-                min(searched[1], found.value * REPEATED_RANGE),
-            )
+            bounds = _near(start, searched)
     except NotSolvedError as error:
         return _unknown(settings, mass, searched, points, str(error))
     return _record(scene, found, settings, mass, searched, points)
+
+
+def _near(load: float, searched: tuple[float, float]) -> tuple[float, float]:
+    """Loads [N] round one, inside the range that is searched."""
+    return max(searched[0], load / REPEATED_RANGE), min(searched[1], load * REPEATED_RANGE)
 
 
 def search_range(scene: Scene) -> tuple[float, float]:
