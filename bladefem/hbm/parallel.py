@@ -4,7 +4,7 @@ included.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from pathlib import Path
 from typing import TypeVar
 
@@ -25,18 +25,22 @@ def share_work(
     work: Callable[[Item], Result],
     items: Sequence[Item],
     comm: Communicator | None = None,
+    shown: Callable[[Iterable[int]], Iterable[int]] = iter,
 ) -> list[Result]:
     """Results of work on each item, dealt out to the ranks of an mpi4py communicator; every rank
     returns all of them.
+
+    Args:
+        shown: wraps the numbers of the items of this rank, to show how far it is.
 
     Raises:
         Exception: on every rank, what the first item that failed on any of them raised.
     """
     if comm is None or comm.size == 1:
-        return [work(item) for item in items]
+        return [work(items[i]) for i in shown(range(len(items)))]
     done: dict[int, Result] = {}
     failed: tuple[int, Exception] | None = None
-    for i in range(comm.rank, len(items), comm.size):
+    for i in shown(range(comm.rank, len(items), comm.size)):
         try:
             done[i] = work(items[i])
         except Exception as error:

@@ -19,6 +19,7 @@ from geometry.quality import quality_rows
 
 from ..contact.state_table import quasi_static
 from ..data import ModeSet
+from ..hbm.parallel import share_work
 from ..io.run_folder import take_folder
 from ..io.stage_cache import on_root, write_results, write_table
 from ..scene.tables import Scene
@@ -106,23 +107,64 @@ def write_run(
     comm: Communicator | None = None,
     progress: Progress = unwatched,
 ) -> SolvedRun:
-    """Write the folder of a finished run, on rank 0; returns the run with the time that it took."""
+    """Write the folder of a finished run; returns the run with the time that it took.
+
+    Pictures are dealt over the ranks, rank 0 writes the rest.
+    """
     start = time.perf_counter()
-    on_root(comm, lambda: _write(result, progress))
+    folder = folder_of(result)
+    moved = on_root(comm, lambda: take_folder(folder, result.scene))
+    cycles = cycles_of(result)
+    tables = _all_tables(result, cycles)
+    drawings = _all_drawings(result, tables, cycles)
+    figures = {name: folder / f"{name.split('/')[1]}.png" for name in drawings}
+
+    def draw(name: str) -> None:
+        drawings[name](figures[name])
+
+    share_work(draw, list(drawings), comm, lambda items: progress(items, "pictures"))
+    on_root(comm, lambda: _write(result, tables, cycles, figures, [*filter(None, [moved])]))
     return replace(
         result, timings={**result.timings, "pictures and report": time.perf_counter() - start}
     )
 
 
-def _write(result: SolvedRun, progress: Progress) -> None:
-    folder = folder_of(result)
-    moved = take_folder(folder, result.scene)
+def _all_tables(result: SolvedRun, cycles: list[ContactCycle]) -> dict[str, pd.DataFrame]:
     patches = list(result.contact.problem.patches)
-    cycles = cycles_of(result)
     coefficient = result.scene.contact.wear_coefficient
     tables = {**_tables(result), **_wheel_tables(result)}
     if coefficient is not None:
         tables["contact/wear"] = wear_table(patches, cycles, coefficient)
+    return tables
+
+
+def _all_drawings(
+    result: SolvedRun,
+    tables: dict[str, pd.DataFrame],
+    cycles: list[ContactCycle],
+) -> dict[str, Callable[[Path], object]]:
+    """Name of a picture -> what draws it into a file."""
+    patches = list(result.contact.problem.patches)
+    return {
+        **_drawings(result, tables),
+        "response/hysteresis": lambda file: draw_hysteresis(cycles, file),
+        "contact/friction_work": lambda file: draw_wear(patches, cycles[_best(result)], file),
+        **utilisation_drawing(result),
+        **({} if result.wheel is None else pattern_drawings(result.wheel)),
+    }
+
+
+def _write(
+    result: SolvedRun,
+    tables: dict[str, pd.DataFrame],
+    cycles: list[ContactCycle],
+    figures: dict[str, Path],
+    messages: list[str],
+) -> None:
+    """Tables, data sets, files for ParaView and the report."""
+    folder = folder_of(result)
+    patches = list(result.contact.problem.patches)
+    coefficient = result.scene.contact.wear_coefficient
     for name, table in tables.items():
         write_tables(table, folder / name.split("/")[1], name.split("/")[1])
     nodes = node_table(patches, cycles, coefficient)
@@ -140,17 +182,6 @@ def _write(result: SolvedRun, progress: Progress) -> None:
         "loops": loop_arrays(cycles, SEATS),
     }
     write_results(folder / "results.nc", groups, dump(result.scene))
-    drawings = {
-        **_drawings(result, tables),
-        "response/hysteresis": lambda file: draw_hysteresis(cycles, file),
-        "contact/friction_work": lambda file: draw_wear(patches, cycles[_best(result)], file),
-        **utilisation_drawing(result),
-        **({} if result.wheel is None else pattern_drawings(result.wheel)),
-    }
-    figures = {}
-    for name, draw in progress(list(drawings.items()), "pictures"):
-        figures[name] = folder / f"{name.split('/')[1]}.png"
-        draw(figures[name])
     mesh.save_vtu(result.mesh, folder / "mesh.vtu")
     modes.save_modes_vtu(result.mesh, excited_set(result), folder / "modes.vtu")
     save_fatigue_vtu(result, folder / "fatigue.vtu")
@@ -161,7 +192,7 @@ def _write(result: SolvedRun, progress: Progress) -> None:
         result.scene,
         tables,
         figures,
-        [*filter(None, [moved]), *_report_messages(result, cycles)],
+        [*messages, *_report_messages(result, cycles)],
         result.timings,
         page=Page(_live(result, tables, cycles), more=_wheel_headlines(result)),
     )

@@ -27,11 +27,13 @@ from ..contact.numerical_stiffness import physical_stiffness
 from ..errors import NotSolvedError
 from ..hbm.model import ReducedModel
 from ..hbm.node_gradients import node_gradients
+from ..hbm.parallel import share_work
 from ..hbm.parameters import layer_share, vary
 from ..hbm.peak import Peak, find_peak
 from ..hbm.sensitivity import sensitivities
 from ..hbm.solve import solve
 from ..scene.tables import Scene
+from ..util.communicator import Communicator
 from .adaptive.choice import solver_options
 from .adaptive.family import Family, Member, family_member, joined_elements
 from .adaptive.settings import Settings
@@ -157,8 +159,9 @@ def influences(
     family_of: Callable[[LoadCase], Family],
     changed: ChangedCases,
     parameters: Sequence[Parameter],
+    comm: Communicator | None = None,
 ) -> list[Influence]:
-    """The influence of each parameter, the largest on the amplitude first.
+    """The influence of each parameter, the largest on the amplitude first; dealt over the ranks.
 
     Where harmonics and contact points were chosen, a model of at most COARSE_SETTINGS of them gives
     the changes, relative to its own best load.
@@ -177,7 +180,7 @@ def influences(
         )
         if quick.reason:
             raise NotSolvedError(quick.reason)
-        found = influences(scene, quick, family_of, changed, parameters)
+        found = influences(scene, quick, family_of, changed, parameters, comm)
         return [_rescaled(one, quick, best) for one in found]
     study = _Study(scene, best, family_of, changed)
     base = study.peak("kt", 1.0, best.load)
@@ -189,9 +192,19 @@ def influences(
         tilts.append(study.by_frequency(study.model("kt", 1.0, load), base))
     bend = (slopes[1] - slopes[0]) / (2 * STEP)
     tilt = (tilts[1] - tilts[0]) / (2 * STEP)
-    found = [study.influence(p, base, bend, tilt) for p in parameters]
+    found = share_work(lambda p: study.influence(p, base, bend, tilt), parameters, comm)
     found.sort(key=lambda one: -one.span)
-    return [study.solved_again(one) if i < CHECKED else one for i, one in enumerate(found)]
+    ends = [(one, i) for one in found[:CHECKED] for i in (0, 1)]
+    again = share_work(lambda end: study.solved_again(*end), ends, comm)
+    checked = [
+        replace(
+            one,
+            solved=np.array([row for row, _ in again[2 * k : 2 * k + 2]]),
+            reason="; ".join(reason for _, reason in again[2 * k : 2 * k + 2] if reason),
+        )
+        for k, one in enumerate(found[:CHECKED])
+    ]
+    return checked + found[CHECKED:]
 
 
 def _coarse(settings: Settings) -> Settings:
@@ -373,40 +386,34 @@ class _Study:
             solved=np.full((2, 3), np.nan),
         )
 
-    def solved_again(self, one: Influence) -> Influence:
-        """The best load searched again at both ends of the range."""
-        solved = np.full((2, 3), np.nan)
-        reasons = []
-        for i, factor in enumerate((one.parameter.low, one.parameter.high)):
-            name = one.parameter.name
+    def solved_again(self, one: Influence, end: int) -> tuple[np.ndarray, str]:
+        """Load [N], amplitude [m] and frequency [Hz] of the best load searched again at one end of
+        a range, 0 the low and 1 the high one; and why it was not found.
+        """
+        name = one.parameter.name
+        factor = (one.parameter.low, one.parameter.high)[end]
 
-            def family_of(
-                case: LoadCase,
-                name: str = name,
-                factor: float = factor,
-            ) -> Family:
-                family = self.family_of(case)
-                if name != "damping":
-                    return family
+        def family_of(case: LoadCase) -> Family:
+            family = self.family_of(case)
+            if name != "damping":
+                return family
 
-                def build(settings: Settings) -> Member:
-                    made = family.build(settings)
-                    return replace(made, model=vary(made.model, "damping", factor))
+            def build(settings: Settings) -> Member:
+                made = family.build(settings)
+                return replace(made, model=vary(made.model, "damping", factor))
 
-                return replace(family, build=build)
+            return replace(family, build=build)
 
-            found = find_best_load(
-                self.scene,
-                self.changed(name, factor),
-                family_of,
-                replace(self.best.settings, chosen=()),
-                self.best.mass,
-                start=one.predicted[i, 0],
-            )
-            solved[i] = found.load, found.amplitude, found.frequency
-            if found.reason:
-                reasons.append(f"{name} times {factor:.3g}: {found.reason}")
-        return replace(one, solved=solved, reason="; ".join(reasons))
+        found = find_best_load(
+            self.scene,
+            self.changed(name, factor),
+            family_of,
+            replace(self.best.settings, chosen=()),
+            self.best.mass,
+            start=one.predicted[end, 0],
+        )
+        reason = f"{name} times {factor:.3g}: {found.reason}" if found.reason else ""
+        return np.array([found.load, found.amplitude, found.frequency]), reason
 
 
 def _log_rate(low: np.ndarray, high: np.ndarray) -> np.ndarray:

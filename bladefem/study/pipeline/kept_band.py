@@ -9,7 +9,7 @@ it repeats.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -17,10 +17,13 @@ from ...damper.branch import state_of
 from ...errors import InputError, NotSolvedError
 from ...hbm.model import ReducedModel
 from ...hbm.ring_march import march_operations, march_ring
-from ...hbm.solution import Solution
+from ...hbm.solution import Solution, size
 from ...hbm.time_model import time_system
 from ...time.event_integrator import State, integrate_periods
-from .stability import in_one_body
+from ..adaptive.family import Family
+from ..adaptive.indicators import moved_solution
+from ..adaptive.settings import Settings
+from .stability import in_one_body, model_in_time
 
 # disturbance of the unstable motion at the start, relative
 DISTURBANCE = 1e-3
@@ -32,10 +35,12 @@ SAMPLES = 256
 # steps of the whole march above which it is not begun: some 20 s
 MAX_STEPS = 4e6
 # the same for marches by steps, in operations
-MAX_MARCH = 4e10
+MAX_MARCH = 1.5e10
 # periods of these before the amplitudes are taken, and those in which they are
 LEFT_BY_STEPS = 150
 KEPT_BY_STEPS = 50
+# contact points of a patch below which a march is given up rather than made coarser
+FEWEST_POINTS = 4
 # relative width of a band that is one periodic motion
 ONE_MOTION = 2e-3
 
@@ -55,6 +60,8 @@ class KeptBand:
     periods: int
     # why nothing was marched; else ""
     reason: str = ""
+    # on each patch, where a model with fewer of them was marched
+    points: int | None = None
 
     def holds(self, amplitude: float, accuracy: float) -> bool:
         """It is known, and within a relative accuracy of an amplitude."""
@@ -66,12 +73,47 @@ class KeptBand:
         """What is known."""
         if self.reason:
             return f"what the blade does there is not known: {self.reason}"
+        coarse = "" if self.points is None else f" with {self.points} contact points a seat"
         if self.highest <= (1 + ONE_MOTION) * self.lowest:
-            return f"marched in time, it ends on a motion of {1e6 * self.highest:.4g} um there"
+            return (
+                f"marched in time{coarse}, it ends on a motion of {1e6 * self.highest:.4g} um there"
+            )
         return (
-            f"marched in time over {self.periods} periods, it keeps between "
+            f"marched in time{coarse} over {self.periods} periods, it keeps between "
             f"{1e6 * self.lowest:.4g} and {1e6 * self.highest:.4g} um there"
         )
+
+
+def kept_of_family(models: Family, settings: Settings, point: Solution) -> KeptBand:
+    """``kept_band``, with fewer contact points where a march with all of them takes too long.
+
+    The amplitudes of the coarser model are multiplied by what the finer one has more of them at the
+    unstable motion.
+    """
+    fewer = settings
+    while fewer.points is not None and fewer.points > FEWEST_POINTS:
+        if _affordable(model_in_time(models, fewer)):
+            break
+        fewer = replace(fewer, points=max(FEWEST_POINTS, fewer.points // 2))
+    model = model_in_time(models, fewer)
+    if fewer == settings:
+        return kept_band(model, point)
+    moved = moved_solution(models, settings, point, fewer)
+    if not moved.converged:
+        return _unknown_band(point, "its motion with fewer contact points was not solved")
+    band = kept_band(model, moved)
+    ratio = size(point) / size(moved)
+    return replace(
+        band, lowest=ratio * band.lowest, highest=ratio * band.highest, points=fewer.points
+    )
+
+
+def _affordable(model: ReducedModel) -> bool:
+    """A march by steps is not too long, or not possible at all."""
+    try:
+        return march_operations(model, LEFT_BY_STEPS + KEPT_BY_STEPS) <= MAX_MARCH
+    except InputError:
+        return True
 
 
 def kept_band(model: ReducedModel, point: Solution) -> KeptBand:

@@ -27,7 +27,7 @@ from ..adaptive.resonance_curve import resonance_curve, unfollowed
 from ..adaptive.settings import Settings, restarted
 from .assemble_model import LoadCase
 from .body_mesh import SofterBody, softened_change
-from .kept_band import KeptBand, kept_band
+from .kept_band import KeptBand, kept_of_family
 from .liftoff import named
 from .linear_limits import Limit
 from .load_interval import LoadInterval, load_interval
@@ -215,7 +215,7 @@ def curve_of(
     ]
     kept = None
     if scene.study.stability and highest not in lasting:
-        kept = kept_band(in_time, highest)
+        kept = kept_of_family(models, curve.settings, highest)
         # of an unstable motion whose end is not known the larger amplitude is given
         if lasting and not (kept.reason or kept.holds(size(highest), scene.accuracy)):
             top = max(lasting, key=size)

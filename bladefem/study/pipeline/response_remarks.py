@@ -14,7 +14,12 @@ from .damped_motion import DampedStress
 from .load_interval import interval_sentence
 from .loads import Curve
 from .resonance_list import reach_sentence
-from .stability import stability_sentence, unstable_sentence
+from .stability import (
+    folded_sentence,
+    ripple_sentence,
+    stability_sentence,
+    unstable_sentence,
+)
 
 # largest estimated error by the mesh of a stress that is no warning
 TRUSTED_STRESS = 0.2
@@ -38,6 +43,8 @@ def response_remarks(
         )
     if scene.study.stability:
         remarks.append(method(stability_sentence([(c.stability, c.multiplier) for c in curves])))
+    remarks.extend(map(method, filter(None, [ripple_sentence(curves)])))
+    remarks.extend(map(warning, filter(None, [folded_sentence(curves)])))
     remarks.extend(warning(text) for text in map(unstable_sentence, curves) if text)
     intervals = [c.interval for c in curves if c.interval is not None]
     if intervals:

@@ -205,7 +205,7 @@ def _influences(
     parameters = parameters_of(scene, angles)
 
     def compute() -> list[Influence]:
-        return on_root(keep.comm, lambda: influences(scene, lowest, family, changed, parameters))
+        return influences(scene, lowest, family, changed, parameters, keep.comm)
 
     key = stage_key("response", scene, "influences", lowest)
     try:

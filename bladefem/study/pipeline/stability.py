@@ -208,34 +208,58 @@ def stability_sentence(parts: Sequence[tuple[np.ndarray, np.ndarray]]) -> str:
     )
 
 
-def unstable_sentence(curve: Curve) -> str:
-    """What became of a resonance that is unstable, or ""."""
-    several = int(curve.branch.max(initial=0))
-    folded = (
-        f"load {curve.load:g} N: several motions at one frequency, the response has {several} "
-        "pieces between folds"
-        if several > 1
-        else ""
+def ripple_sentence(curves: Sequence[Curve]) -> str:
+    """The resonances that are unstable, but left for a motion of nearly the same amplitude, or "".
+
+    A rigid damper on its contacts has no damping at its own frequencies of some kilohertz: there
+    small ripples grow, and the blade hardly takes note of them.
+    """
+    moved = [
+        max(abs(end / size(c.unstable_peak) - 1) for end in (c.kept.lowest, c.kept.highest))
+        for c in curves
+        if c.unstable_peak is not None and c.kept is not None and _rippled(c)
+    ]
+    if not moved:
+        return ""
+    loads = ", ".join(f"{c.load:g} N" for c in curves if _rippled(c))
+    return (
+        f"under {loads} the motion at the resonance is unstable to a ripple; marched in time from "
+        f"there the amplitude stays within {100 * max(moved):.1f} % of the one given"
     )
+
+
+def _rippled(curve: Curve) -> bool:
+    return (
+        curve.unstable_peak is not None
+        and curve.peak is curve.unstable_peak
+        and curve.kept is not None
+        and not curve.kept.reason
+    )
+
+
+def folded_sentence(curves: Sequence[Curve]) -> str:
+    """The curves with several motions at one frequency, or ""."""
+    pieces = {f"{c.load:g} N": int(c.branch.max(initial=0)) for c in curves}
+    each = ", ".join(f"{load} ({count} pieces)" for load, count in pieces.items() if count > 1)
+    return f"several motions at one frequency, pieces between folds: {each}" if each else ""
+
+
+def unstable_sentence(curve: Curve) -> str:
+    """What became of a resonance that is unstable and not left for a ripple alone, or ""."""
     top = curve.unstable_peak
-    if top is None:
-        return folded
+    if top is None or _rippled(curve):
+        return ""
     at = int(np.flatnonzero(curve.frequency == top.frequency)[0])
     named = f" ({curve.bifurcation[at]})" if curve.bifurcation[at] else ""
     lost = (
         f"load {curve.load:g} N: the highest motion, {1e6 * size(top):.4g} um at "
         f"{top.frequency:.5g} Hz, is unstable{named}"
     )
-    known = curve.kept is not None and not curve.kept.reason
-    if curve.peak is top and known:
-        lost += "; it is left for one of nearly the same amplitude, and given as the resonance"
-    elif curve.peak is top:
+    if curve.peak is top:
         lost += "; it is given as the resonance, being the larger amplitude"
     else:
         lost += (
             "; the resonance given is the highest one that is not, "
             f"{1e6 * curve.peak_amplitude:.4g} um at {curve.peak_frequency:.5g} Hz"
         )
-    if curve.kept is not None:
-        lost += f"; {curve.kept.sentence}"
-    return f"{folded}; {lost}" if folded else lost
+    return lost if curve.kept is None else f"{lost}; {curve.kept.sentence}"
