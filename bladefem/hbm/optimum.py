@@ -26,6 +26,9 @@ from .sweep import first_look, local_maxima, response, size
 
 # values of the parameter tried before giving up
 MOST_LEVELS = 30
+# factor by which a step is shortened where no peak was solved at its end, and how often at most
+SHORTENING = 3.0
+MOST_SHORTENED = 3
 # share of the highest peak below which the others are not solved again
 SOLVED_HEIGHT_SHARE = 0.7
 # first step, as a share of the range (of a factor: of its logarithm)
@@ -274,22 +277,31 @@ def _close_in(search: _Search, levels: dict[float, list[Peak]]) -> int:
     step = FIRST_STEP_SHARE * search.width(*search.bounds)
     narrow = False
     points = 0
+    shortened = 0
     for _ in range(MOST_LEVELS):
         low, high = _bracket_minimum(_highest_peaks(levels))
-        if low is None or high is None:
+        enclosed = low is not None and high is not None
+        if low is not None and high is not None:
+            value, gain = _next_value(search, low, high, narrow)
+            if gain < search.tolerance or search.width(low.value, high.value) < search.finest:
+                return points
+            narrow = not narrow
+        else:
             end, sign = (low, 1.0) if high is None else (high, -1.0)
             # the lowest peak itself is one of the two
             assert end is not None
             value = search.moved(end.value, sign * step)
             if value == end.value:
                 return points
-            step *= 2
-        else:
-            value, gain = _next_value(search, low, high, narrow)
-            if gain < search.tolerance or search.width(low.value, high.value) < search.finest:
-                return points
-            narrow = not narrow
-        levels[value], count = _solve_level(search, value, _nearby_peaks(levels, value))
+        try:
+            levels[value], count = _solve_level(search, value, _nearby_peaks(levels, value))
+        except NotSolvedError:
+            shortened += 1
+            if enclosed or shortened > MOST_SHORTENED:
+                raise
+            step /= SHORTENING
+            continue
+        step *= 2
         points += count
     raise NotSolvedError(
         f"optimum of {search.name} not closed in with {MOST_LEVELS} values, last at {value:.4g}"

@@ -7,6 +7,8 @@ import numpy as np
 import pandas as pd
 import pytest
 
+from bladefem.errors import NotSolvedError
+from bladefem.hbm import optimum as optimum_module
 from bladefem.hbm.optimum import optimum
 from bladefem.hbm.peak import find_peak
 from bladefem.hbm.reference_blade import reference_model
@@ -62,6 +64,41 @@ def test_the_search_follows_a_seating_that_is_not_proportional_to_the_load(best)
     for load in best.between:
         peak = find_peak(family(case_at(load)).build(SETTINGS).model, HZ * best.frequency, 3, 0)
         assert peak.height == pytest.approx(1.01 * best.amplitude, rel=2e-3)
+
+
+def test_a_search_near_a_known_load_looks_farther_where_that_was_wrong(best):
+    """From three times the best load: outside the neighbourhood that is searched first, or inside,
+    the same load is found.
+    """
+    for factor in (0.9, 20.0):
+        again = find_best_load(scene(), case_at, family, SETTINGS, None, start=factor * best.load)
+        assert again.reason == ""
+        assert again.amplitude == pytest.approx(best.amplitude, rel=3 * best.tolerance)
+
+
+@pytest.mark.parametrize("failures", [1, 2])
+def test_a_step_to_a_load_without_a_solved_peak_is_shortened(best, monkeypatch, failures):
+    solve_level = optimum_module._solve_level
+    tried = []
+
+    def sometimes(search, value, near):
+        tried.append(value)
+        if len(tried) <= failures:
+            raise NotSolvedError("no peak")
+        return solve_level(search, value, near)
+
+    monkeypatch.setattr(optimum_module, "_solve_level", sometimes)
+    found = find_best_load(scene(), case_at, family, SETTINGS, None)
+    assert found.reason == "" and len(tried) > failures
+    assert found.amplitude == pytest.approx(best.amplitude, rel=3 * best.tolerance)
+
+
+def test_a_search_without_any_solved_neighbour_says_so(monkeypatch):
+    def never(search, value, near):
+        raise NotSolvedError("no peak at all")
+
+    monkeypatch.setattr(optimum_module, "_solve_level", never)
+    assert "no peak at all" in find_best_load(scene(), case_at, family, SETTINGS, None).reason
 
 
 def test_the_slope_of_a_peak_with_the_load_is_the_difference_of_two_peaks():

@@ -31,7 +31,7 @@ SHARE = 0.05
 # Newton steps of a point of such a peak
 JUDGE_STEPS = 15
 # of the accuracy: errors that are small enough together, and one that need not be lowered
-SUFFICIENT_SHARE = 0.9
+SUFFICIENT_SHARE = 0.8
 NEGLIGIBLE_SHARE = 0.05
 # of the accuracy: an error from which on a peak with lift-off is refined only while that helps
 FAR_BEYOND = 4.0
