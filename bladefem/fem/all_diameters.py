@@ -26,7 +26,7 @@ from .eigensolver import Eigensolver
 from .flexibility import Flexibility, flexible
 from .linalg import Folded, apply, combined, dot, inertia, minus, mix
 from .memory import give_back
-from .modes import BLOCKS, SLEPC, TOLERANCE, mode_set, pairs, pairs_together
+from .modes import BLOCKS, GAP_SHARE, SLEPC, TOLERANCE, mode_set, pairs, pairs_together
 
 # modes beyond those asked for, carried along
 GUARD = 2
@@ -441,8 +441,8 @@ def _count_below(
 
 
 def _widest_gap(lists: list[np.ndarray]) -> float:
-    """A shift in the widest relative gap of all eigenvalues, in the upper half of what every
-    diameter covers.
+    """A shift near the upper end of the widest relative gap of all eigenvalues, in the upper half
+    of what every diameter covers.
     """
     top = min(lam[-1] for lam in lists)
     below = np.unique(np.concatenate([lam[lam <= top] for lam in lists]))
@@ -451,4 +451,4 @@ def _widest_gap(lists: list[np.ndarray]) -> float:
         return float(top) * (1 - 1e-6)
     upper = below[len(below) // 2 - 1 :]
     i = int(np.argmax(np.diff(upper) / upper[1:]))
-    return float(upper[i] + upper[i + 1]) / 2
+    return float(upper[i] + GAP_SHARE * (upper[i + 1] - upper[i]))

@@ -36,8 +36,6 @@ FIRST_ROOM = 48
 SAME = 1e-14
 # share of earlier directions in a new one that is rounding
 ROUNDING = 1e-14
-# imaginary part of products with earlier directions, of the largest one, that may grow on
-HARMLESS = 1e-12
 # share of a direction beyond which it counts as new, after those that are known
 NEW = 1e-6
 # largest imaginary part of products with earlier directions, for a direction of the same space
@@ -234,9 +232,9 @@ def _times_inverse(pencil: _Pencil, load: np.ndarray) -> np.ndarray:
         _remember_direction(pencil, load)
         if len(pencil.known):
             # of the products with earlier directions only the imaginary part is rounding
+            # always: however small, SLEPc takes off the rest and lets them grow
             product = dot(pencil.con.body.comm, pencil.images.block, found)
-            if abs(product.imag).max() > HARMLESS * abs(product).max():
-                found = found - mix(pencil.known.block, 1j * product.imag)
+            found = found - mix(pencil.known.block, 1j * product.imag)
     return found
 
 

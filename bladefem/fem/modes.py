@@ -27,6 +27,8 @@ from .linalg import Folded, apply, combined, dot, inertia, scale
 TOLERANCE = 1e-8
 # the same where modes are looked at, not reduced with
 SHOWN = 1e-6
+# of a gap between eigenvalues: where the inertia is counted
+GAP_SHARE = 0.9
 SLEPC = Eigensolver()
 BLOCKS = Eigensolver("lanczos")
 # bodies with fewer unknowns than this many times the basis are left to blocks, which end cleanly
@@ -252,13 +254,15 @@ def count_below(con: Constrained, lam: float) -> int:
 
 
 def _widest_gap(lam: np.ndarray) -> tuple[float, int]:
-    """A shift [rad^2/s^2] in the widest gap of the upper half, and how many are below it."""
+    """A shift [rad^2/s^2] near the upper end of the widest gap of the upper half, and how many are
+    below it: a gap may be wide because of what is missing in it.
+    """
     if len(lam) < 2:
         return lam[-1] * 1.0001, len(lam)
     half = max(len(lam) // 2, 1)
     scale = np.maximum(lam[half:], np.finfo(float).tiny)
     gap = half + int(np.argmax(np.diff(lam[half - 1 :]) / scale))
-    return (lam[gap - 1] + lam[gap]) / 2, gap
+    return lam[gap - 1] + GAP_SHARE * (lam[gap] - lam[gap - 1]), gap
 
 
 def _column_norms(comm: MPI.Comm, X: np.ndarray) -> np.ndarray:

@@ -131,8 +131,7 @@ def sweep(
     notes: list[str] | None = None,
     paths: bool = True,
 ) -> Iterator[Solution]:
-    """Solve a band of circular frequencies [rad/s]; points come in the order of need, to be sorted
-    by `omega`.
+    """Solve a band of circular frequencies [rad/s]; points come in the order of need.
 
     A first look takes even steps and the resonances of both linear limits. Then every local maximum
     is closed in: the slope of its highest point is exact, and 1/amplitude^2 a parabola in omega^2,
@@ -140,14 +139,13 @@ def sweep(
     until it is no higher than the tolerance allows.
 
     Where contacts lift off there may be several motions at one frequency. Then the response is
-    followed round its folds instead (`bladefem.hbm.branches`), and the points that follow carry the
-    number of their piece in `branch`. Models of many unknowns are followed where the sweep jumps,
-    loses points or does not end.
+    followed round its folds (`bladefem.hbm.branches`), and the points that follow carry the number
+    of their piece in `branch`; of many unknowns only where the sweep jumps, loses points or does
+    not end.
 
     Args:
         peak: relative accuracy of each maximum.
-        curve: how far, as a share of the highest maximum, a point may lie off the line through its
-            neighbours.
+        curve: distance of a point from the line through its neighbours, over the highest maximum.
         notes: takes what the search could not do, in sentences.
         paths: whether the response is followed round folds; otherwise one motion is looked for.
 
@@ -160,28 +158,20 @@ def sweep(
     slope = _slope_of(model, solved, options.probe)
     notes = [] if notes is None else notes
     lost: list[float] = []
-    for solution in _first_solutions(model, band, H, samples, options, lost):
+    for solution in _first_solutions(model, band, H, samples, options, paths, lost):
         solved[solution.omega] = solution
         yield solution
-    # where the response is followed, paths may lead to them
-    if not (paths and _needs_continuation(model, solved, H, options.probe)):
-        for solution in _solved_again(model, lost, solved.values(), H, samples, options):
-            solved[solution.omega] = solution
-            yield solution
     while not (paths and _needs_continuation(model, solved, H, options.probe)):
         wanted = _next_frequency(solved, slope, (peak, curve), options.probe)
         if wanted is None:
             return
         if len(solved) >= BAND_LIMIT:
-            notes.append(
-                f"the sweep ended after {BAND_LIMIT} points: peaks may be higher by more than the "
-                "accuracy"
-            )
+            notes.append(_limit_note())
             if not (paths and _normal_loads_follow(model)):
                 return
             break
-        near = _neighbours(solved.values(), wanted)
-        solved[wanted] = solve_from(model, wanted, H, samples, near, options)
+        starts = _neighbours(solved.values(), wanted)
+        solved[wanted] = solve_from(model, wanted, H, samples, starts, options)
         yield solved[wanted]
     points = list(solved.values())
     found = find_branches(model, band, points, H, samples, peak=peak, options=options)
@@ -203,20 +193,31 @@ def _first_solutions(
     H: int,
     samples: int,
     options: Options,
+    paths: bool,
     lost: list[float],
 ) -> Iterator[Solution]:
-    """The first look of a sweep: upwards without fallbacks.
+    """The first look of a sweep: upwards without fallbacks, then the points that the neighbour
+    below does not lead to; but not where the response is followed, since paths may lead to them.
 
     Args:
-        lost: takes the circular frequencies that the neighbour below does not lead to, where
-            fallbacks are allowed.
+        lost: takes their circular frequencies.
     """
     simply = replace(options, fallbacks=False)
+    solved: dict[float, Solution] = {}
     for solution in response(model, first_look(model, band), H, samples, options=simply):
         if options.fallbacks and not solution.converged:
             lost.append(solution.omega)
-        else:
-            yield solution
+            continue
+        solved[solution.omega] = solution
+        yield solution
+    if not (paths and _needs_continuation(model, solved, H, options.probe)):
+        yield from _solved_again(model, lost, solved.values(), H, samples, options)
+
+
+def _limit_note() -> str:
+    return (
+        f"the sweep ended after {BAND_LIMIT} points: peaks may be higher by more than the accuracy"
+    )
 
 
 def _solved_again(

@@ -5,13 +5,14 @@ import pytest
 from structured import box, sector
 
 from bladefem.errors import NotSolvedError
+from bladefem.fem.all_diameters import _widest_gap as common_gap
 from bladefem.fem.body import assemble
 from bladefem.fem.compat import SLEPc
 from bladefem.fem.constraint import at_diameter, constrain, transformation
 from bladefem.fem.eigensolver import Eigensolver
 from bladefem.fem.flexibility import flexible
 from bladefem.fem.linalg import Doubled, apply, solve
-from bladefem.fem.modes import BLOCKS, SLEPC, modes, pairs, pairs_together
+from bladefem.fem.modes import BLOCKS, SLEPC, _widest_gap, modes, pairs, pairs_together
 from bladefem.scene.tables import Material
 
 
@@ -139,3 +140,12 @@ def test_what_a_solve_raises_comes_out_of_slepc(error):
     with pytest.raises(error, match="no"):
         pairs(flex, 4, inverse=inverse)
     assert len(pairs(flex, 4)[0]) == 4
+
+
+def test_modes_that_are_missing_in_the_widest_gap_are_counted():
+    """Two modes were lost below the highest two found: they made the gap in which inertia counts."""
+    true = np.array([3295.0, 15799, 20930, 49666, 52500, 53190, 98180, 101931]) ** 2
+    found = np.r_[true[:6], np.array([111307.0, 159004]) ** 2]
+    shift, expected = _widest_gap(found)
+    assert expected == 6 and np.count_nonzero(true < shift) == 8
+    assert np.count_nonzero(true < common_gap([found, found])) == 8

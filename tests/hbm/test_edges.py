@@ -125,7 +125,7 @@ def test_the_path_goes_on_with_more_samples():
     by 2e-4.
     """
     model = vary(light_block(), "gap", 0.326)
-    found = solve(model, 1.28, 3, 64)
-    fine = solve(model, 1.28, 3, 2048, start=found)
+    found = solve(model, 1.3, 3, 64)
+    fine = solve(model, 1.3, 3, 2048, start=found)
     assert found.converged and found.samples == 128 and "more samples" in found.method
     np.testing.assert_allclose(found.probe, fine.probe, rtol=0, atol=1e-3 * abs(fine.probe).max())

@@ -17,6 +17,7 @@ from bladefem.report.datasets import resultants
 from bladefem.report.pressure import pressure_table
 from bladefem.scene.tables import Scene
 from bladefem.study.pipeline import pipeline
+from bladefem.study.pipeline.run_records import SeatedRun, Seating
 
 sys.path.insert(0, str(Path(__file__).parents[1] / "study"))
 from test_cycle import strip
@@ -73,12 +74,12 @@ def test_contact_alone_leaves_all_maps(tmp_path, monkeypatch):
     import xarray as xr
 
     maps = pressed()
-    seated = pipeline.SeatedRun(
+    seated = SeatedRun(
         scene=Scene(),
         folder=tmp_path,
         mesh=None,
         modes=[],
-        contact=pipeline.Seating(None, maps),
+        contact=Seating(None, maps),
     )
     monkeypatch.setattr(pipeline, "run", lambda *_, **__: seated)
     result = pressure.run(Scene(), tmp_path)

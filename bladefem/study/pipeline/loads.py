@@ -20,7 +20,7 @@ from ...util.arrays import BooleanArray, ComplexArray, IntegerArray, RealArray
 from ...util.communicator import Communicator
 from ...util.progress import Progress, unwatched
 from ..adaptive.check_points import peak_of
-from ..adaptive.choice import checked_points, estimated_errors
+from ..adaptive.choice import Checked, checked_points, estimated_errors
 from ..adaptive.contact_mesh import halved_change
 from ..adaptive.family import Family, family_member
 from ..adaptive.resonance_curve import resonance_curve, unfollowed
@@ -205,20 +205,8 @@ def curve_of(
     heights = np.array([size(p) for p in curve.points])
     marks = Stability(np.full(len(heights), ""), np.full(len(heights), np.nan))
     if scene.study.stability:
-        in_time = model_in_time(models, curve.settings)
-        marks = stability_of(in_time, curve.points)
-    top = highest = peak_of(curve.points)
-    lasting = [
-        p
-        for p, verdict in zip(curve.points, marks.verdict, strict=True)
-        if p.converged and verdict != UNSTABLE
-    ]
-    kept = None
-    if scene.study.stability and highest not in lasting:
-        kept = kept_of_family(models, curve.settings, highest)
-        # of an unstable motion whose end is not known the larger amplitude is given
-        if lasting and not (kept.reason or kept.holds(size(highest), scene.accuracy)):
-            top = max(lasting, key=size)
+        marks = stability_of(model_in_time(models, curve.settings), curve.points)
+    top, kept = _resonance(models, curve, marks, scene.accuracy)
     tolerated = scene.accuracy * size(top) / np.maximum(heights, 1e-6 * size(top))
     rows = [_record(point) for point in curve.points]
     columns = {name: np.array([row[name] for row in rows]) for name in rows[0]}
@@ -242,13 +230,36 @@ def curve_of(
         halved=halved,
         peak=top,
         bifurcation=marks.bifurcation if len(marks.bifurcation) else np.full(len(heights), ""),
-        unstable_peak=None if kept is None else highest,
+        unstable_peak=None if kept is None else peak_of(curve.points),
         kept=kept,
         interval=interval,
         unfollowed=lifts and unfollowed(models, curve.settings),
         notes=curve.notes,
         body_mesh=body_mesh,
     )
+
+
+def _resonance(
+    models: Family,
+    curve: Checked,
+    marks: Stability,
+    accuracy: float,
+) -> tuple[Solution, KeptBand | None]:
+    """The point that is given as the resonance, and what the blade does at the highest one where
+    that is unstable.
+
+    An unstable one gives way to the highest that is not where the blade is known to keep to less.
+    """
+    highest = peak_of(curve.points)
+    unstable = {id(p) for p, v in zip(curve.points, marks.verdict, strict=True) if v == UNSTABLE}
+    if id(highest) not in unstable:
+        return highest, None
+    kept = kept_of_family(models, curve.settings, highest)
+    lasting = [p for p in curve.points if p.converged and id(p) not in unstable]
+    known = not (kept.reason or kept.holds(size(highest), accuracy))
+    if lasting and known and kept.highest < size(highest):
+        return max(lasting, key=size), kept
+    return highest, kept
 
 
 def _record(p: Solution) -> dict[str, Any]:
