@@ -3,6 +3,7 @@ verdict is had.
 """
 
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pandas as pd
@@ -15,7 +16,14 @@ from bladefem.hbm.reference_blade import reference_model
 from bladefem.hbm.solve import solve
 from bladefem.hbm.sweep import response
 from bladefem.report.tables import readable, units_of
-from bladefem.study.pipeline.stability import in_one_body, stability_of, stability_sentence
+from bladefem.study.pipeline.kept_band import KeptBand
+from bladefem.study.pipeline.stability import (
+    in_one_body,
+    ripple_sentence,
+    stability_of,
+    stability_sentence,
+    unstable_sentence,
+)
 from bladefem.view.response import draw_responses
 
 HZ = 2 * np.pi
@@ -95,3 +103,20 @@ def test_tables_and_pictures_show_it():
     axes = draw_responses(points).axes[0]
     marks = [line for line in axes.get_lines() if line.get_label() == "unstable (1)"]
     assert len(marks) == 1 and list(marks[0].get_xdata()) == [101.0]
+
+
+def rippling(kept):
+    """A curve of one unstable point of 1 mm."""
+    top = SimpleNamespace(frequency=100.0, probe=np.array([[0.0], [1e-3]]), harmonics=1)
+    return SimpleNamespace(
+        load=50.0, frequency=np.array([100.0]), bifurcation=np.array(["torus"]), peak=top,
+        unstable_peak=top, kept=kept, peak_amplitude=1e-3, peak_frequency=100.0,
+    )  # fmt: skip
+
+
+def test_a_ripple_is_told_apart_from_another_amplitude():
+    near, far = (KeptBand(100.0, 0.99e-3, high, 200) for high in (1.02e-3, 1.2e-3))
+    assert "within 2.0 %" in ripple_sentence([rippling(near), rippling(far)], 0.05)
+    assert unstable_sentence(rippling(near), 0.05) == ""
+    assert "keeps between 990 and 1200 um" in unstable_sentence(rippling(far), 0.05)
+    assert ripple_sentence([rippling(far)], 0.05) == ""

@@ -43,9 +43,10 @@ def response_remarks(
         )
     if scene.study.stability:
         remarks.append(method(stability_sentence([(c.stability, c.multiplier) for c in curves])))
-    remarks.extend(map(method, filter(None, [ripple_sentence(curves)])))
+    remarks.extend(map(method, filter(None, [ripple_sentence(curves, scene.accuracy)])))
     remarks.extend(map(warning, filter(None, [folded_sentence(curves)])))
-    remarks.extend(warning(text) for text in map(unstable_sentence, curves) if text)
+    unstable = (unstable_sentence(c, scene.accuracy) for c in curves)
+    remarks.extend(warning(text) for text in unstable if text)
     intervals = [c.interval for c in curves if c.interval is not None]
     if intervals:
         remarks.append(interval_sentence([c.load for c in curves], intervals))

@@ -208,8 +208,9 @@ def stability_sentence(parts: Sequence[tuple[np.ndarray, np.ndarray]]) -> str:
     )
 
 
-def ripple_sentence(curves: Sequence[Curve]) -> str:
-    """The resonances that are unstable, but left for a motion of nearly the same amplitude, or "".
+def ripple_sentence(curves: Sequence[Curve], accuracy: float) -> str:
+    """The resonances that are unstable, but left for a motion of the same amplitude within an
+    accuracy, or "".
 
     A rigid damper on its contacts has no damping at its own frequencies of some kilohertz: there
     small ripples grow, and the blade hardly takes note of them.
@@ -217,24 +218,22 @@ def ripple_sentence(curves: Sequence[Curve]) -> str:
     moved = [
         max(abs(end / size(c.unstable_peak) - 1) for end in (c.kept.lowest, c.kept.highest))
         for c in curves
-        if c.unstable_peak is not None and c.kept is not None and _rippled(c)
+        if c.unstable_peak is not None and c.kept is not None and _rippled(c, accuracy)
     ]
     if not moved:
         return ""
-    loads = ", ".join(f"{c.load:g} N" for c in curves if _rippled(c))
+    loads = ", ".join(f"{c.load:g} N" for c in curves if _rippled(c, accuracy))
     return (
         f"under {loads} the motion at the resonance is unstable to a ripple; marched in time from "
         f"there the amplitude stays within {100 * max(moved):.1f} % of the one given"
     )
 
 
-def _rippled(curve: Curve) -> bool:
-    return (
-        curve.unstable_peak is not None
-        and curve.peak is curve.unstable_peak
-        and curve.kept is not None
-        and not curve.kept.reason
-    )
+def _rippled(curve: Curve, accuracy: float) -> bool:
+    top = curve.unstable_peak
+    if top is None or curve.peak is not top or curve.kept is None:
+        return False
+    return curve.kept.holds(size(top), accuracy)
 
 
 def folded_sentence(curves: Sequence[Curve]) -> str:
@@ -244,10 +243,10 @@ def folded_sentence(curves: Sequence[Curve]) -> str:
     return f"several motions at one frequency, pieces between folds: {each}" if each else ""
 
 
-def unstable_sentence(curve: Curve) -> str:
+def unstable_sentence(curve: Curve, accuracy: float) -> str:
     """What became of a resonance that is unstable and not left for a ripple alone, or ""."""
     top = curve.unstable_peak
-    if top is None or _rippled(curve):
+    if top is None or _rippled(curve, accuracy):
         return ""
     at = int(np.flatnonzero(curve.frequency == top.frequency)[0])
     named = f" ({curve.bifurcation[at]})" if curve.bifurcation[at] else ""
@@ -255,7 +254,9 @@ def unstable_sentence(curve: Curve) -> str:
         f"load {curve.load:g} N: the highest motion, {1e6 * size(top):.4g} um at "
         f"{top.frequency:.5g} Hz, is unstable{named}"
     )
-    if curve.peak is top:
+    if curve.peak is top and curve.kept is not None and not curve.kept.reason:
+        lost += "; it is given as the resonance"
+    elif curve.peak is top:
         lost += "; it is given as the resonance, being the larger amplitude"
     else:
         lost += (
