@@ -267,11 +267,7 @@ def draw_optimum(
         axes[1].set(ylabel="resonance frequency [Hz]", xlabel="normal load per seat [N]")
         log_axis(axes[0], "y")
         log_axis(axes[1], "x")
-        # the curve is a valley, whose middle is free above it
-        place = {"loc": "upper center", "bbox_to_anchor": (0.42, 0.94)}
-        if "mass" in summary:
-            place = {"loc": "center left", "bbox_to_anchor": (1.0, 0.5)}
-        axes[0].legend(**place, frameon=True, framealpha=0.9, edgecolor="none").set_zorder(7)
+        axes[0].legend(loc="center left", bbox_to_anchor=(1.0, 0.5))
         return axes[0].figure
 
 
