@@ -104,12 +104,13 @@ def test_worst_blade_of_a_tuned_wheel_is_used_as_the_tuned_one(reduced, shapes):
     wheel = whole_wheel(scene, run.mesh, sector, patches, case, settings)
     family = family_of_case(scene, run.mesh, run.reduced, patches, case)
     model = family_member(family, settings).model
-    omega = 0.99 * model.side(1).omega[0]
+    # all contacts slip there
+    omega = 1.03 * model.side(1).omega[0]
     tight = replace(DEFAULTS, tolerance=1e-13)
     one = solve(model, omega, 1, 72, options=tight)
     pattern = frequency_pattern(sector.families, np.zeros((36, 3)))
     found = solve_wheel(wheel, omega, 1, 72, pattern=pattern, options=tight)
-    assert one.converged and one.work.friction > 0
+    assert one.converged and one.states["slip"] == len(one.w)
     points = settings.points
     stress = damped_stress(shapes.bodies, patches, shapes.modes, case, one, points)
     diagram = haigh_diagram(Fatigue(endurance=3e8, ultimate=9e8))
