@@ -1,5 +1,7 @@
 """Small models that several tests share."""
 
+from dataclasses import replace
+
 import numpy as np
 
 from bladefem.data import Elements, RigidBody
@@ -97,3 +99,23 @@ def rebounding(stiffness, gap, loss):
     parts = (1e-3, stiffness, 0.0, -gap * stiffness)
     element = Elements(*(np.array([x]) for x in parts), tangents=1)
     return ReducedModel((body,), element, {1: np.array([1.0])})
+
+
+def bouncing():
+    """Three masses with one contact of two tangents that lifts off."""
+    K = np.array([[2.0, -0.3, 0.1], [-0.3, 1.5, 0.2], [0.1, 0.2, 1.2]])
+    ports = {"contact": [0, 1, 2], "load": [0, 1], "probe": [0]}
+    body = port_model_from_matrices(np.eye(3), K, ports, C=0.02 * K)
+    contact = Elements(*(np.array([x]) for x in (1.0, 2.0, 0.4, 0.15)), tangents=2)
+    return ReducedModel((body,), contact, {1: np.array([0.1, 0.08j])})
+
+
+def bouncing_wave():
+    """Four blades a quarter of a period apart; their third mode carries the wave's phase."""
+    alone = bouncing()
+    body = alone.sides[0]
+    turned = [np.exp(0.5j * np.pi * h) for h in range(9)]
+    sides = tuple(
+        replace(body, shapes=body.shapes * np.where(np.arange(3) == 2, t, 1.0)) for t in turned
+    )
+    return replace(alone, sides=sides)

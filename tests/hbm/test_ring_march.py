@@ -4,8 +4,9 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from models import bouncing, bouncing_wave
 from scipy import linalg
-from test_stability import bouncing, marched
+from test_stability import marched
 
 from bladefem.hbm.linearised_flow import flow_map, linear_steps
 from bladefem.hbm.ring_march import march_ring
@@ -20,17 +21,6 @@ def heights(motion):
     """Amplitude of each period from its samples on the last axis."""
     lines = 2 / motion.shape[-1] * np.fft.rfft(motion, axis=-1)[..., 1:8]
     return np.linalg.norm(lines, axis=-1)
-
-
-def coupled_wave():
-    """Four blades a quarter of a period apart; their third mode carries the wave's phase."""
-    alone = bouncing()
-    body = alone.sides[0]
-    turned = [np.exp(0.5j * np.pi * h) for h in range(9)]
-    sides = tuple(
-        replace(body, shapes=body.shapes * np.where(np.arange(3) == 2, t, 1.0)) for t in turned
-    )
-    return replace(alone, sides=sides)
 
 
 @pytest.mark.parametrize("omega", [1.3, 1.75])
@@ -60,7 +50,7 @@ def test_blades_without_coupling_march_as_one_alone():
 
 
 def test_a_share_of_the_period_has_the_multipliers_of_all_of_it():
-    wave = coupled_wave()
+    wave = bouncing_wave()
     system = sector_modes(wave)
     point = solve(wave, 1.3, 7, 256)
     S = 128

@@ -6,17 +6,15 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from models import single_mass
+from models import bouncing, bouncing_wave, single_mass
 
 from bladefem.damper.branch import inclined_contact, state_of
-from bladefem.data import Elements
 from bladefem.hbm.continuation import follow
-from bladefem.hbm.model import Damping, ReducedModel
+from bladefem.hbm.model import Damping
 from bladefem.hbm.sector_modes import blades_of_wave, sector_modes
 from bladefem.hbm.solve import solve
 from bladefem.hbm.stability import STABLE, UNIQUE, UNKNOWN, UNSTABLE, stability_verdict
 from bladefem.hbm.time_model import time_system
-from bladefem.reduction.matrices import port_model_from_matrices
 from bladefem.time.shooting import floquet_multipliers, periodic_solution
 
 HZ = 2 * np.pi
@@ -55,15 +53,6 @@ def test_prescribed_loads_have_one_motion_only():
     model = replace(single_mass(), damping=Damping(ratio=0.01))
     point = solve(model, 1.1, 3, 128)
     assert stability_verdict(model, point).verdict == UNIQUE
-
-
-def bouncing():
-    """Three masses with one contact of two tangents that lifts off."""
-    K = np.array([[2.0, -0.3, 0.1], [-0.3, 1.5, 0.2], [0.1, 0.2, 1.2]])
-    ports = {"contact": [0, 1, 2], "load": [0, 1], "probe": [0]}
-    body = port_model_from_matrices(np.eye(3), K, ports, C=0.02 * K)
-    contact = Elements(*(np.array([x]) for x in (1.0, 2.0, 0.4, 0.15)), tangents=2)
-    return ReducedModel((body,), contact, {1: np.array([0.1, 0.08j])})
 
 
 def marched(model, point, periods, steps=1000):
@@ -121,13 +110,9 @@ def test_a_wave_is_judged_on_the_blades_after_which_it_repeats():
     alone = bouncing()
     ring = replace(alone, sides=tuple(alone.sides[0] for _ in range(9)))
     assert blades_of_wave(ring) == 1
-    body = alone.sides[0]
-    turned = [np.exp(0.5j * np.pi * h) for h in range(9)]
-    sides = tuple(
-        replace(body, shapes=body.shapes * np.where(np.arange(3) == 2, t, 1.0)) for t in turned
-    )
     # the third mode seen with a phase: a similar ring, whose modes are no longer real
-    wave = replace(alone, sides=sides)
+    wave = bouncing_wave()
+    sides = wave.sides
     assert blades_of_wave(wave) == 4
     system = sector_modes(wave)
     assert system.blades == 4 and len(system.stiffness) == 12

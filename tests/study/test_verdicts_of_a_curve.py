@@ -5,13 +5,12 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
+from models import bouncing, bouncing_wave
 
-from bladefem.data import Elements
 from bladefem.hbm import sweep as sweep_module
-from bladefem.hbm.model import Damping, ReducedModel
+from bladefem.hbm.model import Damping
 from bladefem.hbm.solve import solve
 from bladefem.hbm.stability import STABLE, UNKNOWN, UNSTABLE, stability_verdict
-from bladefem.reduction.matrices import port_model_from_matrices
 from bladefem.study.adaptive.choice import covered_band
 from bladefem.study.adaptive.family import Family, Member
 from bladefem.study.adaptive.settings import first_for
@@ -21,28 +20,8 @@ from bladefem.study.pipeline.response_remarks import search_sentence
 from bladefem.study.pipeline.stability import model_in_time, stability_of, stability_sentence
 
 
-def bouncing():
-    """Three masses with one contact of two tangents that lifts off."""
-    K = np.array([[2.0, -0.3, 0.1], [-0.3, 1.5, 0.2], [0.1, 0.2, 1.2]])
-    ports = {"contact": [0, 1, 2], "load": [0, 1], "probe": [0]}
-    body = port_model_from_matrices(np.eye(3), K, ports, C=0.02 * K)
-    contact = Elements(*(np.array([x]) for x in (1.0, 2.0, 0.4, 0.15)), tangents=2)
-    return ReducedModel((body,), contact, {1: np.array([0.1, 0.08j])})
-
-
-def wave():
-    """Blades a quarter of a period apart whose third mode carries the wave's phase."""
-    alone = bouncing()
-    body = alone.sides[0]
-    turned = [np.exp(0.5j * np.pi * h) for h in range(9)]
-    sides = tuple(
-        replace(body, shapes=body.shapes * np.where(np.arange(3) == 2, t, 1.0)) for t in turned
-    )
-    return replace(alone, sides=sides)
-
-
 def test_a_wave_of_one_harmonic_is_judged_on_the_bodies_with_which_it_repeats():
-    rich = wave()
+    rich = bouncing_wave()
 
     def build(settings):
         sides = rich.sides[: settings.harmonics + 1]

@@ -27,7 +27,7 @@ from ..pipeline.damped_motion import (
     DampedMotion,
     DampedStress,
     node_forces,
-    touched_nodes,
+    stress_of_motion,
 )
 from ..pipeline.ports import Ports, blade_ports
 from ..pipeline.stages import MODES_SHOWN, Bodies, wheel_modes
@@ -78,22 +78,8 @@ def blade_stress(
     Raises:
         NotSolvedError: the modes do not cover a harmonic.
     """
-    from ...fem.alternating_stress import alternating_stress
-
     motion = blade_motion(shapes, wheel, pattern, case, solution, blade, points)
-    bodies = shapes.bodies
-    found = alternating_stress(bodies.still_blade, motion.harmonics, touched_nodes(bodies))
-    return DampedStress(
-        case.load,
-        case.mass,
-        found.largest,
-        found.place,
-        found.by_harmonic,
-        found.mesh_error,
-        motion.mismatch,
-        found.field,
-        motion.harmonics.astype(np.complex64),
-    )
+    return stress_of_motion(shapes.bodies, case, motion)
 
 
 def blade_motion(

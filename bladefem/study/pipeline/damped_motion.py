@@ -142,13 +142,27 @@ def damped_stress(
     Args:
         damper: moves with the contact forces on it, for pictures; left at rest when None.
     """
+    motion = damped_motion(bodies, patches, modes, case, solution, points, factorised)
+    if damper is None:
+        return stress_of_motion(bodies, case, motion)
+    moved = damper_motion(bodies.mesh, patches, case, solution, damper, points)
+    return stress_of_motion(bodies, case, motion, motion.harmonics + moved)
+
+
+def stress_of_motion(
+    bodies: Bodies,
+    case: LoadCase,
+    motion: DampedMotion,
+    shown: ComplexArray | None = None,
+) -> DampedStress:
+    """The largest alternating stress of a motion of the blade.
+
+    Args:
+        shown: the same motion with the damper's nodes, for pictures.
+    """
     from ...fem.alternating_stress import alternating_stress
 
-    motion = damped_motion(bodies, patches, modes, case, solution, points, factorised)
     found = alternating_stress(bodies.still_blade, motion.harmonics, touched_nodes(bodies))
-    moved = motion.harmonics
-    if damper is not None:
-        moved = moved + damper_motion(bodies.mesh, patches, case, solution, damper, points)
     return DampedStress(
         case.load,
         case.mass,
@@ -158,7 +172,7 @@ def damped_stress(
         found.mesh_error,
         motion.mismatch,
         found.field,
-        moved.astype(np.complex64),
+        (motion.harmonics if shown is None else shown).astype(np.complex64),
     )
 
 

@@ -68,13 +68,19 @@ def utilisation_message(run: SolvedRun) -> str:
         return ""
     number = lowest_curve(run)
     used = found[number]
+    return (
+        f"utilisation at the best load, {run.response.curves[number].load:.4g} N: "
+        f"{_worst_place(used)}; {highest_use(run, number, used):.3g} "
+        "with the upper ends of the error of the mesh and of the loading history"
+    )
+
+
+def _worst_place(used: Utilisation) -> str:
     worst = used.worst
     place = ", ".join(f"{1e3 * x:.1f}" for x in used.points[worst])
     return (
-        f"utilisation at the best load, {run.response.curves[number].load:.4g} N: "
         f"{used.used[worst]:.3g} at ({place}) mm, {1e-6 * used.alternating[worst]:.4g} MPa over a "
-        f"mean stress of {1e-6 * used.mean[worst]:.4g} MPa; {highest_use(run, number, used):.3g} "
-        "with the upper ends of the error of the mesh and of the loading history"
+        f"mean stress of {1e-6 * used.mean[worst]:.4g} MPa"
     )
 
 
@@ -92,15 +98,11 @@ def wheel_utilisation_message(run: SolvedRun) -> str:
         return ""
     number = lowest_curve(run)
     response, used = run.wheel[0], found[0]
-    worst = used.worst
-    place = ", ".join(f"{1e3 * x:.1f}" for x in used.points[worst])
     return (
         f"utilisation of the mistuned wheel under {response.load:.4g} N, blade "
-        f"{response.peak.blade + 1}: {used.used[worst]:.3g} at ({place}) mm, "
-        f"{1e-6 * used.alternating[worst]:.4g} MPa over a mean stress of "
-        f"{1e-6 * used.mean[worst]:.4g} MPa, against {tuned[number].used.max():.3g} of the tuned "
-        f"wheel; {highest_use(run, number, used, response.stress):.3g} with the upper ends of the "
-        "error of the mesh and of the loading history"
+        f"{response.peak.blade + 1}: {_worst_place(used)}, against "
+        f"{tuned[number].used.max():.3g} of the tuned wheel; "
+        f"{highest_use(run, number, used, response.stress):.3g} with the upper ends of the error of the mesh and of the loading history"
     )
 
 
