@@ -102,7 +102,8 @@ def wheel_utilisation_message(run: SolvedRun) -> str:
         f"utilisation of the mistuned wheel under {response.load:.4g} N, blade "
         f"{response.peak.blade + 1}: {_worst_place(used)}, against "
         f"{tuned[number].used.max():.3g} of the tuned wheel; "
-        f"{highest_use(run, number, used, response.stress):.3g} with the upper ends of the error of the mesh and of the loading history"
+        f"{highest_use(run, number, used, response.stress):.3g} with the upper ends "
+        "of the error of the mesh and of the loading history"
     )
 
 
