@@ -113,7 +113,7 @@ class Patch:
     blade_nodes: IntegerArray
     # (n,) node numbers in the mesh
     damper_nodes: IntegerArray
-    # (n, 3) where their forces act: mean places of what they stand for [m]
+    # (n, 3) where their forces act: centroids of the areas they represent [m]
     places: RealArray | None = None
 
 

@@ -400,7 +400,7 @@ def _single_facets(facets: np.ndarray) -> np.ndarray:
 
 
 def _faces_of_label(word: str, label: str) -> list[tuple[int, ...]]:
-    """Local corners of the faces that a label stands for; all of them without a label."""
+    """Local corners of the faces that a label means; all of them without a label."""
     family = word.rstrip("0123456789")
     if family in ("triangle", "quad"):
         return [tuple(range(3 if family == "triangle" else 4))]

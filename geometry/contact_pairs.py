@@ -51,9 +51,9 @@ def hertz_pair(hertz: HertzPair, size: MeshSize) -> Mesh:
     )
     points = _bend_indenter(mesh, hertz.radius, hertz.half_width)
     bent = replace(mesh, points=points)
-    told = {name: mesh.report[name] for name in ("notes",) if name in mesh.report}
+    notes = {name: mesh.report[name] for name in ("notes",) if name in mesh.report}
     found = report(bent, mesh.report["straightened"], mesh.report["size"])
-    return replace(bent, report={**found, **told})
+    return replace(bent, report={**found, **notes})
 
 
 def punch(block: Punch, size: MeshSize) -> Mesh:

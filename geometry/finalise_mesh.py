@@ -152,7 +152,7 @@ def _first_order_mesh(
     groups: Groups,
     dimension: int,
 ) -> Mesh:
-    """The first-order mesh as it stands, without its faces."""
+    """The present first-order mesh, without its faces."""
     return extract(gmsh, Groups(groups.bodies, {}), dimension)
 
 
@@ -192,8 +192,8 @@ def complete(
     mesh = replace(mesh, points=snap(mesh.points, pairs), pairs=pairs, sector=sector)
     points, straightened = straighten(mesh)
     mesh = replace(mesh, points=snap(points, pairs))
-    told = {name: mesh.report[name] for name in ("notes",) if name in mesh.report}
-    return replace(mesh, report={**report(mesh, straightened, size), **told})
+    notes = {name: mesh.report[name] for name in ("notes",) if name in mesh.report}
+    return replace(mesh, report={**report(mesh, straightened, size), **notes})
 
 
 def _flatten_faces(mesh: Mesh, names: tuple[str, ...]) -> np.ndarray:

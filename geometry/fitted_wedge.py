@@ -139,7 +139,7 @@ def flanks_between(
     """
     here = _plane_face(gmsh, right)
     there = _plane_face(gmsh, left)
-    # the neighbour may stand in either sense of the rotation
+    # the neighbour may be in either sense of the rotation
     turned = min((on, on.T), key=lambda turn: float(np.linalg.norm(turn @ there[0] - here[0])))
     if not np.allclose(turned, on):
         raise InputError(

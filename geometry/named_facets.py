@@ -18,7 +18,7 @@ def named_facets(
 
     Args:
         corners: name -> corner nodes of facets, arrays (m, 2), (m, 3) or (m, 4). A quadrilateral
-            that was split into triangles stands for both of them.
+            that was split into triangles names both of them.
 
     Raises:
         InputError: a face of which no cell has a facet.

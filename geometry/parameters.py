@@ -1,6 +1,6 @@
 """The parameters of every shape that bladefem can draw. SI units, radians; no gmsh here.
 
-Axes, everywhere: z is the engine axis, the middle of a blade stands along +x (radial), y is
+Axes, everywhere: z is the engine axis, the middle of a blade is along +x (radial), y is
 circumferential. A sector spans the angles -pi/N .. +pi/N about z; the next blade is the sector
 turned by +2 pi/N. Plane models lie in x (radial), y (circumferential); z is their out-of-plane
 thickness; the next blade is at +pitch in y.
@@ -45,7 +45,7 @@ class Aerofoil:
 
 @dataclass(frozen=True)
 class Platform:
-    """The plate that the aerofoil stands on; its two inclined undersides are the seats of the
+    """The plate that carries the aerofoil; its two inclined undersides are the seats of the
     dampers.
     """
 

@@ -56,7 +56,7 @@ def shape_quality(
 
 
 def edge_of_middle(mesh: Mesh) -> np.ndarray:
-    """Corner nodes (n, 2) of the edge that each mid-side node stands on; -1 for corner nodes."""
+    """Corner nodes (n, 2) of the edge that each mid-side node lies on; -1 for corner nodes."""
     edges = np.array(EDGES[FAMILY[mesh.cell_type]])
     k = corner_count(mesh.cell_type)
     ends = np.full((len(mesh.points), 2), -1)

@@ -1,4 +1,4 @@
-"""Meshes as they stand in files: points, cells by name, faces by name, node sets by name, in gmsh's
+"""Meshes as files hold them: points, cells by name, faces by name, node sets by name, in gmsh's
 node order.
 
 Each reader only reads; what the names mean is decided in imported.py, what becomes of the cells in

@@ -16,7 +16,7 @@ Part = TypeVar("Part")
 
 
 def read_names(texts: Iterable[str]) -> dict[str, list[str]]:
-    """New name to the old ones that it stands for.
+    """New name to the old ones that it replaces.
 
     Raises:
         InputError: not "new = old" or "new = old + old".

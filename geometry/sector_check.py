@@ -154,7 +154,7 @@ def check_aerofoil(
     platform: Platform,
     section: Profile,
 ) -> None:
-    """Sections that do not cross themselves, and a root that stands on the platform."""
+    """Sections that do not cross themselves, and a root that lies on the platform."""
     for t, name in ((0.0, "thickness_root"), (1.0, "thickness_tip")):
         if crosses_itself(shape(blade, t)):
             raise InputError(

@@ -37,7 +37,7 @@ def communicator() -> Any:
 
 
 def guarded(action: Callable[[Any], None], options: argparse.Namespace) -> int:
-    """The exit code of an action that gets the communicator; errors are told on rank 0."""
+    """The exit code of an action that gets the communicator; errors are reported on rank 0."""
     with _catch_signals() as stopped:
         return _run_guarded(action, stopped)
 

@@ -221,17 +221,17 @@ def summary(run: Run) -> str:
     ]
     table = plain([*rows, ["total", f"{total:.2f}", "100"]], ["stage", "time [s]", "share [%]"])
     said = by_level(run.messages)
-    told = [
+    summary_lines = [
         "\n".join([f"{title}:", *(f"  - {text}" for text in said[level])])
         for title, level in MESSAGE_TITLES.items()
         if said[level]
     ]
     page = None if run.folder is None else run.folder / "report.html"
     report = f"report: {page}\n" if page is not None and page.is_file() else ""
-    return "\n\n".join([table, *told, f"{report}results: {run.folder}"])
+    return "\n\n".join([table, *summary_lines, f"{report}results: {run.folder}"])
 
 
-# what a run says, by level; what the reader has to know stands last, next to the prompt
+# what a run says, by level; what the reader has to know is last, next to the prompt
 MESSAGE_TITLES = {
     "kept": "timing",
     "method": "method",

@@ -29,7 +29,7 @@ def seat_gap(
     contact: Contact,
 ) -> np.ndarray:
     """(n,) gap [m] of a seat with the crowns and edges of [contact], means over what each node
-    stands for.
+    represents.
 
     Distances count from the middle and the edges of the rectangle round the seat, along its t1 (the
     slope) and t2 (the engine axis).

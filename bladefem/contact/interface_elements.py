@@ -20,7 +20,7 @@ from .seating import ContactProblem
 # [contact], or the values of one seat
 Layer = TypeVar("Layer", Contact, Seat)
 
-# stiffness per unit area that stands for rigid faces in the elements [N/m^3]: a layer of
+# stiffness per unit area that represents rigid faces in the elements [N/m^3]: a layer of
 # 1e-8 of the compliance of steel over a millimetre
 RIGID = 1e22
 
@@ -116,7 +116,7 @@ def stiffnesses(
     USUAL.
 
     Args:
-        area: (n,) what each point stands for [m^2]; totals are shared by it.
+        area: (n,) area that each point represents [m^2]; totals are shared in proportion to it.
         mapped: (n,) k_n from the pressure map, in place of a given one.
     """
     if contact.stiffness == "rigid":

@@ -26,7 +26,7 @@ ROUND_OFF = 1e-12
 
 @dataclass(frozen=True)
 class SlipState:
-    """Where a patch stands after a step."""
+    """State of a patch after a step."""
 
     # (n,) tangential forces [N]
     force: np.ndarray

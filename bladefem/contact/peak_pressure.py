@@ -68,7 +68,7 @@ def edge_sentence(
     ):
         return ""
     return (
-        f"peak pressure: under {len(there)} of {len(maps)} loads it stands at a sharp edge of a "
+        f"peak pressure: under {len(there)} of {len(maps)} loads it lies at a sharp edge of a "
         "seat, where it may grow without bound as mesh.contact_size falls; judge by the mean "
         "pressure, or ease the edges (contact.edge_radius)"
     )

@@ -299,9 +299,9 @@ def _project_columns(
     both = t.opened.K, t.opened.M
     inner = _project_interior(both, low, high, faces, new)
     for A, (LL, HL) in zip(both, inner, strict=True):
-        beside = A[faces].T.tocsr()
-        near = np.flatnonzero(np.diff(beside.indptr))
-        LH = low[near].T @ (beside[near] @ high[:, new])
+        coupling = A[faces].T.tocsr()
+        near = np.flatnonzero(np.diff(coupling.indptr))
+        LH = low[near].T @ (coupling[near] @ high[:, new])
         out.append([LL + high.T @ (A[faces][:, faces] @ high[:, new]), LH + HL, LH - HL])
     K, M = out
     return K, M

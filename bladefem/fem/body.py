@@ -51,7 +51,7 @@ class Body:
     # "stress" or "strain", for plane meshes
     plane: str
     comm: MPI.Comm
-    # face or node set that a clamp named "clamp" stands for; "" for none
+    # face or node set that a clamp named "clamp" refers to; "" for none
     hold: str = "clamp"
     # [N/m] springs to the ground, in K already
     spring: PETSc.Mat | None = None

@@ -59,7 +59,7 @@ def lowest(
     """The lowest eigenpairs of K x = lambda M x.
 
     Args:
-        inverse: K^-1 (or what stands for it) on blocks (n_own, k).
+        inverse: K^-1 (or its replacement) on blocks (n_own, k).
         start: (n_own, k) first block.
         tolerance: largest |K^-1 M x - x / lambda| lambda in the M-norm: the direction's error
             times a gap.
@@ -156,13 +156,13 @@ def _extend_basis(
 def _next_block(
     space: _Space,
     rest: np.ndarray,
-    faint: float,
+    rounding: float,
 ) -> tuple[np.ndarray, np.ndarray]:
     """The next block and its product by M, taken out of P: the directions that carry the residuals
     ``rest``.
     """
     U, s, _ = np.linalg.svd(rest)
-    strong = np.count_nonzero(s > faint) if faint else len(U)
+    strong = np.count_nonzero(s > rounding) if rounding else len(U)
     P = space.P
     MP = space.MP
     weak = U[:, strong:]

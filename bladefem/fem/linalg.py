@@ -3,7 +3,7 @@ through PETSc).
 
 - a PETSc matrix: real, distributed;
 - ``Doubled``: the real twin of a complex Hermitian matrix, distributed; real and imaginary part of
-  an unknown stand side by side, so that the memory of a complex vector is that of the doubled one;
+  an unknown are adjacent, so that the memory of a complex vector is that of the doubled one;
 - ``Folded``: C^H A C with the real matrix A of an open sector, for one rank; all nodal diameters
   share one factorisation of A's interior (``core``).
 

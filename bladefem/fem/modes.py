@@ -191,7 +191,7 @@ def elastic_pairs(
     """The lowest elastic eigenpairs of K x = lambda M x.
 
     Args:
-        inverse: what stands for K^+ (fixed interfaces).
+        inverse: its replacement for K^+ (fixed interfaces).
         start: (n_own, k) good guesses, finished by blocks; random loads, the same for any number of
             ranks, when left out.
         guard: pairs beyond count, as far as they have come.

@@ -81,7 +81,7 @@ def free_normals(
     for row, side in zip(*np.nonzero(free), strict=True):
         own = reference[np.flatnonzero(cells[row] == node)]
         flat = reference[facets[side]]
-        # facets beside the node are not faces of it
+        # facets next to the node are not faces of it
         normal = _reference_normal(flat)
         if abs(normal @ (own[0] - flat[0])) > 1e-9:
             continue

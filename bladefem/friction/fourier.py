@@ -2,7 +2,7 @@
 complex twins.
 
 q(tau) = q0 + sum_h (c_h cos h tau + s_h sin h tau) = Re sum_h q_h e^{j h tau}, so that c_h = Re
-q_h, s_h = -Im q_h. The coefficients always stand on the last axis.
+q_h, s_h = -Im q_h. The coefficients are always on the last axis.
 """
 
 from __future__ import annotations

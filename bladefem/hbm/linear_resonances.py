@@ -40,7 +40,7 @@ def _stuck_modes(model: ReducedModel, h: int) -> tuple[np.ndarray, np.ndarray]:
     """Frequencies (m,) [rad/s] and shapes (n, m) of mass 1, the blade's modes first, with all
     contacts sticking.
 
-    The springs stand in series with the residual flexibility, so that the modes see (K^-1 + R)^-1.
+    The springs are in series with the residual flexibility, so that the modes see (K^-1 + R)^-1.
     """
     side = model.side(h)
     rows = np.arange(len(side.residual))[side.ports["contact"]][model.rows]

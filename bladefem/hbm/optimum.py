@@ -223,11 +223,11 @@ def _first_level(search: _Search, value: float) -> tuple[list[Peak], int]:
     known: list[Peak] = []
     points = 0
     reason = "the climb leaves it"
-    seeds = np.concatenate(
+    guesses = np.concatenate(
         [resonances(model) for resonances in (stuck_resonances, free_resonances)]
     )
-    seeds = seeds[(seeds > search.band[0]) & (seeds < search.band[1])]
-    for omega in seeds if seeds.size else [float(np.sqrt(search.band[0] * search.band[1]))]:
+    guesses = guesses[(guesses > search.band[0]) & (guesses < search.band[1])]
+    for omega in guesses if guesses.size else [float(np.sqrt(search.band[0] * search.band[1]))]:
         try:
             peak = search.peak(model, omega)
         except NotSolvedError as error:
@@ -317,7 +317,7 @@ def _highest_peaks(levels: dict[float, list[Peak]]) -> list[Peak]:
 
 
 def _nearby_peaks(levels: dict[float, list[Peak]], value: float) -> list[Peak]:
-    """The peaks of the next levels below and above a value, without those of one that stand where
+    """The peaks of the next levels below and above a value, without those of one that lie where
     the other's do.
     """
     below, above = (

@@ -1,4 +1,4 @@
-"""How the balance changes with a parameter while the displacements stand still: exact, without
+"""How the balance changes with a parameter at fixed displacements: exact, without
 differences.
 
 The friction law scales: f is homogeneous of degree one in (kt, kn, n0), and a function of kt w_t,

@@ -32,7 +32,7 @@ AHEAD = 1.3
 # longest step, as a share of the frequency
 MAX_STEP = 0.05
 # of the frequency: where a search begins instead when its first point is not solved
-BESIDE = (1.005, 1.01, 1.02, 0.99)
+RETRY_RATIOS = (1.005, 1.01, 1.02, 0.99)
 
 
 @dataclass(frozen=True)
@@ -128,7 +128,7 @@ def _solved_near(
 
     Args:
         first: of a search, whose start belongs to a similar model: where it leads nowhere, the
-            same is tried BESIDE the frequency, away from folds.
+            same is tried at RETRY_RATIOS times the frequency, away from folds.
     """
     point = solve(model, omega, H, samples, start=start, options=options)
     if point.converged or start is None:
@@ -138,7 +138,8 @@ def _solved_near(
         return way[-1] if way else point
     simply = replace(options, fallbacks=False)
     tries = (
-        solve(model, omega * beside, H, samples, start=start, options=simply) for beside in BESIDE
+        solve(model, omega * ratio, H, samples, start=start, options=simply)
+        for ratio in RETRY_RATIOS
     )
     return next((other for other in tries if other.converged), point)
 

@@ -390,7 +390,7 @@ def _solve_off_resonance(
 
 
 def local_maxima(points: list[Solution], probe: int = 0) -> list[Solution]:
-    """Those of the points, sorted by frequency, that stand above both neighbours."""
+    """Those of the points, sorted by frequency, that are above both neighbours."""
     heights = np.array([size(point, probe) for point in points])
     return [points[i] for i in find_maxima(heights)]
 
@@ -399,7 +399,7 @@ def first_look(model: ReducedModel, band: tuple[float, float]) -> np.ndarray:
     """Circular frequencies of a coarse look at a band: even steps and the resonances of both linear
     limits [rad/s].
     """
-    seeds = np.concatenate(
+    guesses = np.concatenate(
         [
             resonances(model, h)
             for resonances in (free_resonances, stuck_resonances)
@@ -407,7 +407,7 @@ def first_look(model: ReducedModel, band: tuple[float, float]) -> np.ndarray:
             if h > 0
         ]
     )
-    inside = seeds[(seeds > band[0]) & (seeds < band[1])]
+    inside = guesses[(guesses > band[0]) & (guesses < band[1])]
     if not model.damped:
         inside = inside * (1 + OFF_RESONANCE_UNDAMPED)
     grid = np.linspace(*band, FIRST_LOOK_INTERVALS + 1)

@@ -30,7 +30,7 @@ def time_system(model: ReducedModel, H: int) -> System:
     """The model with its excitation and prescribed loads up to harmonic H as equations in time.
 
     Raises:
-        InputError: the model has no such form; the message says what stands against it.
+        InputError: the model has no such form; the message says why.
     """
     bodies = _bodies_in_time(model)
     blades = bodies[0]

@@ -182,12 +182,12 @@ def _check_amplitudes(
 
 
 def _check_rigid(damper: RigidBody, dofs: int) -> None:
-    freedoms = len(damper.mass)
-    if damper.B.shape != (dofs, freedoms) or not np.isfinite(damper.B).all():
+    damper_dofs = len(damper.mass)
+    if damper.B.shape != (dofs, damper_dofs) or not np.isfinite(damper.B).all():
         raise InputError(
-            f"damper.B of shape {damper.B.shape}: expected ({dofs}, {freedoms}) finite numbers"
+            f"damper.B of shape {damper.B.shape}: expected ({dofs}, {damper_dofs}) finite numbers"
         )
-    symmetric = np.shape(damper.mass) == (freedoms, freedoms) and np.allclose(
+    symmetric = np.shape(damper.mass) == (damper_dofs, damper_dofs) and np.allclose(
         damper.mass, damper.mass.T
     )
     if not symmetric or np.linalg.eigvalsh(damper.mass)[0] <= 0:

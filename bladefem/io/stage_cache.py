@@ -53,8 +53,8 @@ def open_folder(path: str | Path) -> Path:
 
 @contextmanager
 def writing(path: str | Path) -> Iterator[Path]:
-    """A temporary name beside ``path``; renamed to it when the block ends well, removed when it
-    does not.
+    """A temporary name in the folder of ``path``; renamed to it when the block ends well, removed
+    when it does not.
 
     Raises:
         InputError: the disk is full or the folder cannot be written.

@@ -58,7 +58,7 @@ def answer(
     found = None if searched is None else found_best(searched, summary)
     best = finite.loc[finite["peak_amplitude"].idxmin()] if found is None else found
     against = reasons_against(best, summary, points, searched)
-    beside = mass_of(best) or (among(finite) if found is None else flat_range(best))
+    remark = mass_of(best) or (among(finite) if found is None else flat_range(best))
     doubts = cautions(finite, best, points, found is not None)
     if against:
         lowest = (
@@ -69,7 +69,7 @@ def answer(
         said = [f"No optimum load is named: {reason}." for reason in against]
         unknown = ("optimum normal load per seat", "not determined", against[0])
         return Answer([unknown, lowest], [*said, *doubts])
-    numbers = _optimum_numbers(summary, best, beside)
+    numbers = _optimum_numbers(summary, best, remark)
     return Answer(
         [*numbers, *stress(summary, best), *own_mass(finite, best, own, masses)],
         doubts,
@@ -79,11 +79,11 @@ def answer(
 def _optimum_numbers(
     summary: pd.DataFrame,
     best: pd.Series,
-    beside: str,
+    remark: str,
 ) -> list[tuple[str, str, str]]:
     """The best load and the resonance there: what, value, remark."""
     numbers = [
-        ("optimum normal load per seat", f"{best['load']:.4g} N", beside),
+        ("optimum normal load per seat", f"{best['load']:.4g} N", remark),
         (
             "resonance amplitude there",
             f"{1e6 * best['peak_amplitude']:.4g} µm",
@@ -133,12 +133,12 @@ def stress(summary: pd.DataFrame, best: pd.Series) -> list[tuple[str, str, str]]
     if not np.isfinite(best.get("alternating_stress", np.nan)):
         return []
     free = summary.loc[summary["load"] == 0, "alternating_stress"]
-    beside = f"; {1e-6 * free.iloc[0]:.3g} MPa without damper" if len(free) else ""
+    remark = f"; {1e-6 * free.iloc[0]:.3g} MPa without damper" if len(free) else ""
     return [
         (
             "alternating stress there",
             f"{1e-6 * best['alternating_stress']:.3g} MPa",
-            f"largest von Mises stress of all modes, harmonics and damper forces{beside}",
+            f"largest von Mises stress of all modes, harmonics and damper forces{remark}",
         )
     ]
 

@@ -132,7 +132,7 @@ def _number(name: str, scene: Scene) -> float | None:
 
 
 def _axis(name: str, variants: Sequence[Variant]) -> tuple[list[Any], str]:
-    """Where each value stands on the axis, in the unit that people read; texts where they are no
+    """Position of each value on the axis, in the unit that people read; texts where they are no
     numbers.
     """
     read = [_number(name, variant.scene) for variant in variants]

@@ -89,9 +89,9 @@ def pattern_headlines(
         numbers.append(Headline("highest blade of the mistuned wheel", value, error, remark))
         if i < len(used):
             own, highest, tuned = used[i]
-            beside = f"under {r.load:.4g} N; {tuned:.3g} on the tuned wheel"
+            remark = f"under {r.load:.4g} N; {tuned:.3g} on the tuned wheel"
             upper = f"up to {highest:.3g} with the errors of mesh and loading history"
-            numbers.append(Headline("utilisation of that blade", f"{own:.3g}", upper, beside))
+            numbers.append(Headline("utilisation of that blade", f"{own:.3g}", upper, remark))
     return numbers
 
 

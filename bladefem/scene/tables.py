@@ -371,7 +371,7 @@ class Solver:
 
 @dataclass(frozen=True)
 class Foundation:
-    """What the Z-shaped mass stands on, how that moves, and what presses and pulls (the paper's Eq.
+    """The supports of the Z-shaped mass, how they move, and what presses and pulls (the paper's Eq.
     30, Table 1).
     """
 

@@ -1,9 +1,9 @@
 """Units at the border: text with a unit becomes an SI number and back. Nothing inside bladefem
 knows units.
 
-A unit is a product of powers, "N/mm^3", "kg m^2", "rad/s"; everything after one "/" stands below
-the line until the next "/" or the end. Angles are a dimension of their own, so that a frequency in
-Hz and a speed in rad/s cannot be mistaken for each other.
+A unit is a product of powers, "N/mm^3", "kg m^2", "rad/s"; everything after one "/" is in the
+denominator until the next "/" or the end. Angles are a dimension of their own, so that a frequency
+in Hz and a speed in rad/s cannot be mistaken for each other.
 """
 
 from __future__ import annotations

@@ -42,7 +42,7 @@ from .pipeline.best_load import BestLoad, find_best_load
 
 # factor on each side of a stiffness that the scene gives: a joint measured twice
 GIVEN_STIFFNESS = 2.0
-# the same where a measured range of other joints stands in for it
+# the same where a measured range of other joints replaces it
 USUAL_STIFFNESS = 10.0
 # factor on each side of the friction coefficient and of the damping ratio
 FRICTION = 1.3
@@ -334,15 +334,15 @@ class _Study:
         self,
         model: ReducedModel,
         peak: Peak,
-        beside: float = 0.0,
+        shift: float = 0.0,
     ) -> float:
-        """Derivative of the height by the circular frequency at the frequency of a peak, or a share
-        of it beside.
+        """Derivative of the height by the circular frequency at the frequency of a peak, or at
+        that frequency times 1 + shift.
         """
         settings = self.best.settings
         point = solve(
             model,
-            peak.omega * (1 + beside),
+            peak.omega * (1 + shift),
             settings.harmonics,
             settings.samples,
             start=peak.solution,
@@ -377,7 +377,7 @@ class _Study:
         moved_load = -(slopes[1] - slopes[0]) / (2 * STEP) / bend
         model = self.model(name, 1.0, load)
         sides = [
-            self.by_frequency(model, base, beside) for beside in (-CURVATURE_STEP, CURVATURE_STEP)
+            self.by_frequency(model, base, shift) for shift in (-CURVATURE_STEP, CURVATURE_STEP)
         ]
         curvature = (sides[1] - sides[0]) / (2 * CURVATURE_STEP * base.omega)
         tilted = (tilts[1] - tilts[0]) / (2 * STEP) + tilt * moved_load

@@ -1,4 +1,4 @@
-"""Types of arrays by what their numbers are; shapes and units stand in comments beside them."""
+"""Types of arrays by what their numbers are; shapes and units are in comments above them."""
 
 from __future__ import annotations
 

@@ -24,7 +24,7 @@ class _StoppedError(Exception):
 
 
 class _Iteration:
-    """One iteration: it stands at a question, or is done."""
+    """One iteration: it waits at a question, or is done."""
 
     def __init__(self, task: Callable[[Ask[Any, Any]], Any]) -> None:
         self.question: Any = None
@@ -47,7 +47,7 @@ class _Iteration:
         self.settle()
 
     def settle(self) -> None:
-        """Wait until it stands; an interrupt may leave this wait."""
+        """Wait until it pauses; an interrupt may leave this wait."""
         if self._running and not self.done:
             self._stands.acquire()
             self._running = False

@@ -11,8 +11,8 @@ LEVELS = ("warning", "information", "method", "timing")
 class Message(str):
     """A sentence with a level; it prints and compares like the plain text.
 
-    >>> told = Message("the mesh is coarse", "warning")
-    >>> told, told.level
+    >>> note = Message("the mesh is coarse", "warning")
+    >>> note, note.level
     ('the mesh is coarse', 'warning')
     """
 

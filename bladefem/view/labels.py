@@ -63,7 +63,7 @@ def _move_apart(ax: Axes) -> None:
 
 
 def _marker_boxes(line: Any) -> list[Bbox]:
-    """Where the markers of a line stand on the page [pixels]."""
+    """Positions of the markers of a line on the page [pixels]."""
     half = line.get_markersize() / 2 * line.figure.dpi / 72
     places = line.get_transform().transform(np.asarray(line.get_xydata(), float))
     return [Bbox([p - half, p + half]) for p in places if np.isfinite(p).all()]

@@ -97,8 +97,8 @@ def _mark_points(
     style: dict[str, Any],
 ) -> dict[str, Any]:
     """Points with their numbers; names come from the scene and are plain text."""
-    told = ["load", "method", "estimated_error", "slipping"]
-    known = [column for column in told if column in points]
+    hover = ["load", "method", "estimated_error", "slipping"]
+    known = [column for column in hover if column in points]
     texts = [
         "<br>".join(_hover_line(column, row[column]) for column in known)
         for _, row in points.iterrows()
@@ -257,7 +257,7 @@ def live_loops(
     data = []
     dashes = ("solid", "dash")
     names = next(iter(cases.values()), {})
-    told = ", ".join(f"{dash}: {seat}" for dash, seat in zip(dashes, names, strict=False))
+    dash_note = ", ".join(f"{dash}: {seat}" for dash, seat in zip(dashes, names, strict=False))
     for number, (load, seats) in enumerate(cases.items()):
         pairs = zip(dashes, seats.items(), strict=False)
         for first, (dash, (seat, (x, force))) in enumerate(pairs):
@@ -278,7 +278,7 @@ def live_loops(
             )
     layout = {
         "title": _escape_title("hysteresis loops"),
-        "xaxis": {"title": {"text": f"relative displacement [µm]  ({told})"}},
+        "xaxis": {"title": {"text": f"relative displacement [µm]  ({dash_note})"}},
         "yaxis": {"title": {"text": "friction force [N]"}},
         "hovermode": "closest",
     }

@@ -333,7 +333,7 @@ def draw_mesh(
     title: str = "",
     edges: bool = True,
 ) -> object:
-    """Bodies and named faces in colour, as they stand and with the damper pulled away; returns the
+    """Bodies and named faces in colour, as built and with the damper pulled away; returns the
     figure.
     """
     views = (view_of(mesh),) if mesh.dimension == 2 else (FRONT, BELOW)

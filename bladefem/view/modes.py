@@ -62,7 +62,7 @@ def mode_title(
 
 
 def moving(mesh: Mesh, shape: np.ndarray) -> Mesh:
-    """The mesh without bodies that stand still (a damper that is not part of the mode)."""
+    """The mesh without bodies at rest (a damper that is not part of the mode)."""
     bodies = {name: cells for name, cells in mesh.bodies.items() if np.any(shape[cells])}
     return replace(mesh, bodies=bodies) if bodies else mesh
 
@@ -98,7 +98,7 @@ def draw_mode(
     factor = scale_of(mesh, shape)
     direction = view_of(mesh)
     image = photograph_shape(mesh, shape, factor, direction)
-    with canvas(file, size=size_for(image, 5.2, beside=1.6)) as ax:
+    with canvas(file, size=size_for(image, 5.2, margin=1.6)) as ax:
         show_photograph(ax, image, direction, RADIAL)
         headline(ax.figure, mode_title(modes, number, family))
         add_colour_bar(ax, Normalize(0, 1), SEQUENTIAL, "displacement over its largest value [1]")
@@ -301,7 +301,7 @@ def draw_wheel_mode(
         parts.append({"mesh": lines, "color": "black", "line_width": 2.2, "lighting": False})
     direction, up = wheel_camera(mesh)
     image = photograph(parts, direction, up)
-    with canvas(file, size=size_for(image, 5.2, beside=1.0)) as ax:
+    with canvas(file, size=size_for(image, 5.2, margin=1.0)) as ax:
         show_photograph(ax, image)
         headline(ax.figure, mode_title(modes, number, family))
         add_colour_bar(

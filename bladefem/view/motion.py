@@ -39,13 +39,13 @@ def draw_motion(
     factor = drawn_factor(mesh, motion)
     direction = view_of(mesh)
     image = photograph_shape(mesh, shape, factor, direction, values=amplitude)
-    with canvas(file, size=size_for(image, 5.2, beside=1.6)) as ax:
+    with canvas(file, size=size_for(image, 5.2, margin=1.6)) as ax:
         show_photograph(ax, image, direction, RADIAL)
         headline(ax.figure, title or "motion at the resonance")
         largest = 1e6 * float(amplitude.max(initial=0.0))
         add_colour_bar(ax, Normalize(0, largest or 1.0), SEQUENTIAL, "amplitude [µm]")
-        told = f"displacements drawn {factor:.3g} times as large"
-        ax.figure.supxlabel(told, fontsize=7.5, color="#555555")
+        scale_note = f"displacements drawn {factor:.3g} times as large"
+        ax.figure.supxlabel(scale_note, fontsize=7.5, color="#555555")
         return ax.figure
 
 

@@ -69,7 +69,7 @@ def _draw_axes(
     dimension: int,
     title: str,
 ) -> None:
-    """The axis and what stands on it."""
+    """The axis and what is drawn on it."""
     ax.axvline(0, color="#555555", lw=0.8, ls="-.", zorder=3)
     faces = (
         "symmetry_x (x = 0)\nsymmetry_y (y = 0,\nthe drawing's plane)"

@@ -242,7 +242,7 @@ def draw_optimum(
         points: response table; peaks at the end of the frequency band, which are none, are then
             drawn hollow.
         own: load that the damper's mass gives at the operating speed [N].
-        searched: table of best loads by exact search, a row a mass; the star then stands there,
+        searched: table of best loads by exact search, a row a mass; the star is then there,
             in the band of loads whose amplitudes keep within the accuracy of it.
         ax: two axes to draw into, amplitude and frequency.
         title: headline.
@@ -465,8 +465,8 @@ def draw_loops(
         ax: axes to draw into; the legend is then inside them.
         title: headline.
     """
-    beside = {"loc": "center left", "bbox_to_anchor": (1.0, 0.5)}
-    place = beside if ax is None else {"loc": "lower right", "fontsize": 7.5}
+    right_of_axes = {"loc": "center left", "bbox_to_anchor": (1.0, 0.5)}
+    place = right_of_axes if ax is None else {"loc": "lower right", "fontsize": 7.5}
     with canvas(file, ax, (6.4, 4.4)) as ax:
         shades = matplotlib.colormaps["viridis"](np.linspace(0.0, 0.92, max(len(loops), 1)))
         colours = COLOURS if len(loops) <= 6 else shades

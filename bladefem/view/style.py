@@ -235,7 +235,7 @@ def show_photograph(
 def size_for(
     image: np.ndarray,
     height: float,
-    beside: float = 0.3,
+    margin: float = 0.3,
     widest: float = 9.0,
 ) -> tuple[float, float]:
     """Figure size [inch] for a rendering about ``height`` tall, with room next to it and a line
@@ -246,7 +246,7 @@ def size_for(
     if width > widest:
         width = widest
         height = widest * rows / columns
-    return max(width + beside, 4.4), height + 0.8
+    return max(width + margin, 4.4), height + 0.8
 
 
 def headline(figure: Any, text: str) -> None:

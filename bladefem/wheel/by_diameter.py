@@ -30,7 +30,7 @@ UNSEEN = 1e-12
 class DiameterParts:
     """What stays at all frequencies; D = N/2 + 1 nodal diameters, P ports, k modes of both bodies.
 
-    Ports stand in the order contact, blade, load, probe.
+    Ports are in the order contact, blade, load, probe.
     """
 
     # (D, P, P) residual flexibility with contact springs [m/N]

@@ -21,7 +21,7 @@ TIP = 2
 
 @dataclass(frozen=True)
 class LumpedBlades:
-    """Masses [kg] and stiffnesses [N/m] of a sector; the disc stands on the ground."""
+    """Masses [kg] and stiffnesses [N/m] of a sector; springs join the disc to the ground."""
 
     count: int = 36
     tip: float = 0.1

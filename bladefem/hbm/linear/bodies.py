@@ -1,7 +1,7 @@
 """Linear bodies at all harmonics of one frequency: modal flexibilities, receptances, motions under
 forces at the ports.
 
-The ports that the balance uses stand in the order contact, load, probe. Arrays carry the harmonic
+The ports that the balance uses are in the order contact, load, probe. Arrays carry the harmonic
 on their first axis, of length 1 where one body serves all harmonics.
 """
 

@@ -1,7 +1,7 @@
 """The bodies of a model as one tuple of arrays, which numba takes: all that does not depend
 on the frequency.
 
-Both bodies are one: the damper's modes, rigid ones with frequency zero, stand beside the blades'
+Both bodies are one: the damper's modes, rigid ones with frequency zero, follow the blades'
 with the shapes that they give the relative displacement.
 """
 
@@ -44,7 +44,7 @@ class Bodies(NamedTuple):
     across: np.ndarray
     # (H+1, M) excitation of the modes
     push: np.ndarray
-    # (H+1, m) displacement of the contact by the excitation beside the modes
+    # (H+1, m) displacement of the contact by the excitation in addition to the modes
     direct: np.ndarray
     # (H+1, p) the same of the probes
     straight: np.ndarray
@@ -54,7 +54,7 @@ class Bodies(NamedTuple):
     U: np.ndarray
     UH: np.ndarray
     N: np.ndarray
-    # (H+1, m) what the excitation moves beside the modes in full stick, empty as these
+    # (H+1, m) what the excitation moves in addition to the modes in full stick, empty as these
     stuck: np.ndarray
     # (H+1, M) what pushes the modes then
     sprung: np.ndarray
@@ -204,8 +204,8 @@ def _excited_modes(
     push: np.ndarray,
     direct: np.ndarray,
 ) -> tuple[np.ndarray, np.ndarray]:
-    """(H+1, m) what the excitation moves beside the modes in full stick, (H+1, M) what pushes the
-    modes then.
+    """(H+1, m) what the excitation moves in addition to the modes in full stick, (H+1, M) what
+    pushes the modes then.
     """
     A, _, UH, _ = fixed
     if not len(A):

@@ -2,7 +2,7 @@
 
 1. Newton from the given start, then from full stick, its line search on the step and on the
    residual. Small models of 1-D elements, which have a compiled loop for it, begin with the step;
-   elsewhere the residual is cheaper, and on 3-D patches that lift off it arrives where the step
+   elsewhere the residual is cheaper, and on 3-D patches that lift off it converges where the step
    stalls (wedge of 96 nodes at 60 and 90 N: half the time);
 2. twice and four times the samples where Newton came close: sampled 2-D friction jumps a little at
    the limit of stick, and there may be no exact zero; the solution then says how many samples it

@@ -9,7 +9,7 @@ together at nodes that stick: these are eliminated exactly.
 A damper on which every node slips along a motion without stiffness walks: the mean position that
 way has no influence on the forces, and the step by which the motion goes on in each period has. The
 component of the mean displacement along such a motion b (`Balance.walk`, with b^T K b = 1) then
-stands for that step: the law is evaluated with the ramp  b (b^T K w_0)  a period. Equations and
+replaces that step: the law is evaluated with the ramp  b (b^T K w_0)  a period. Equations and
 number of unknowns stay the same; the derivative gains a term of low rank, as the ramp of every node
 depends on the means of all.
 """

@@ -25,7 +25,7 @@ def conditions(scene: Scene) -> Iterator[str]:
     yield from below(
         "shank.width", shank.width, 2 * disc.rim_radius * tan(half), "the pitch at disc.rim_radius"
     )
-    yield from at_most("shank.length", shank.length, disc.width, "disc.width, on which it stands")
+    yield from at_most("shank.length", shank.length, disc.width, "disc.width, on which it is built")
     yield from at_most(
         "shank.length", shank.length, platform.length, "platform.length, which it carries"
     )

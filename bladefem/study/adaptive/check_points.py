@@ -49,7 +49,7 @@ def points_to_check(
     """
     places = [i for i, p in enumerate(points) if p.converged]
     good = [points[i] for i in places]
-    loud = moved[places]
+    motion = moved[places]
     heights = heights[places]
     top = int(heights.argmax())
     chosen = [top]
@@ -65,12 +65,14 @@ def points_to_check(
             if part[i] != part[i + 1]
         }
         chosen += sorted(begin - set(chosen), key=heights.__getitem__)[-1:]
-    loud = loud * heights / heights[top]
-    beside = np.concatenate([[0.0], loud, [0.0]])
+    motion = motion * heights / heights[top]
+    padded = np.concatenate([[0.0], motion, [0.0]])
     maxima = np.flatnonzero(
-        (loud > MIN_SHARE_OF_ACCURACY * accuracy) & (loud >= beside[:-2]) & (loud >= beside[2:])
+        (motion > MIN_SHARE_OF_ACCURACY * accuracy)
+        & (motion >= padded[:-2])
+        & (motion >= padded[2:])
     )
-    chosen += sorted(maxima, key=lambda i: -loud[i])[:MAX_CHECKED_PEAKS]
+    chosen += sorted(maxima, key=lambda i: -motion[i])[:MAX_CHECKED_PEAKS]
     return [good[i] for i in dict.fromkeys(chosen)]
 
 

@@ -297,12 +297,14 @@ def estimated_errors(curve: Checked) -> np.ndarray:
     nothing.
     """
     at = np.array(sorted(curve.errors))
-    told = np.array([curve.errors[w] for w in at])
+    known_errors = np.array([curve.errors[w] for w in at])
     omegas = np.array([p.omega for p in curve.points])
-    if not np.isfinite(told).any():
+    if not np.isfinite(known_errors).any():
         return np.full(len(omegas), np.inf)
-    blind = ~np.isfinite(told[abs(omegas[:, None] - at).argmin(axis=1)])
-    between = np.interp(omegas, at[np.isfinite(told)], told[np.isfinite(told)])
+    blind = ~np.isfinite(known_errors[abs(omegas[:, None] - at).argmin(axis=1)])
+    between = np.interp(
+        omegas, at[np.isfinite(known_errors)], known_errors[np.isfinite(known_errors)]
+    )
     return np.where(blind | [not p.converged for p in curve.points], np.inf, between)
 
 
@@ -364,7 +366,7 @@ def response_points(
     """A sweep of a band [Hz], sorted by frequency; an accuracy of 1 asks for no more than the place
     of the peak.
 
-    Where several motions were followed, their points have a `branch`, and stand in place of those
+    Where several motions were followed, their points have a `branch`, and replace those
     that the sweep solved before.
 
     Raises:

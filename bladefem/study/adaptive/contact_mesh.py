@@ -1,7 +1,7 @@
 """Is the contact mesh fine enough? The indicators of the balance cannot tell: their finest patch is
 that mesh.
 
-What can be told from one mesh is how much its nodes matter: the resonance with half as many. With
+What one mesh shows is how much its nodes matter: the resonance with half as many. With
 one interface law that change is an estimate of the mesh's own error and counts in the reported one:
 on the shipped wedge half the points change amplitudes by 0.2 to 0.7 %, and grids of 4 x 6, 8 x 6
 and 12 x 8 elements give 164.0, 163.4 and 162.0 um at 80 N. Between rigid faces it is not enough,

@@ -1,7 +1,7 @@
 """The models of one load case, from poor to rich: what the choice picks from.
 
 A family turns settings into a model, and knows which contact nodes of the finest model each of its
-elements stands for, so that the displacements of one member start the next. ``family_of`` makes one
+elements represents, so that the displacements of one member start the next. ``family_of`` makes one
 from a rich model alone, by leaving out modes and by joining contact nodes; scenes make theirs in
 ``pipeline``.
 """
@@ -29,7 +29,7 @@ class Member:
     """A model, and how its contact points relate to the finest ones."""
 
     model: ReducedModel
-    # (finest nodes,) number of the element that stands for each node of the finest model
+    # (finest nodes,) number of the element that represents each node of the finest model
     groups: np.ndarray
 
 
@@ -81,7 +81,7 @@ def carried_displacements(
 ) -> np.ndarray:
     """Displacements (n, d, K) of one member as a start (m, d', 2H+1) for another.
 
-    Each new element takes the mean over the finest nodes that it stands for; a normal direction
+    Each new element takes the mean over the finest nodes that it represents; a normal direction
     that the old model did not have starts at zero.
     """
     fine = w[old.groups]

@@ -196,7 +196,7 @@ def _first_settings(
 
 
 def _estimated_points(curve: _Curve) -> Iterator[int]:
-    """Numbers of the points whose error is estimated: those that are watched, the peak first, then
+    """Numbers of the points whose error is estimated: those that are checked, the peak first, then
     others that show it.
     """
     places = {p.omega: i for i, p in enumerate(curve.points)}
@@ -249,14 +249,14 @@ def _refine_point(
     first: list[tuple[Solution, np.ndarray]] = []
     changed = {at: _replace_point(curve, at, better, first)}
     for side in (range(at + 1, len(curve.points)), range(at - 1, -1, -1)):
-        quiet = 0
+        unchanged = 0
         gained = first.copy()
         settings = better
         for i in side:
-            if curve.used[i] != old or quiet == UNCHANGED_NEIGHBOURS:
+            if curve.used[i] != old or unchanged == UNCHANGED_NEIGHBOURS:
                 break
             changed[i] = _replace_point(curve, i, settings, gained)
-            quiet = quiet + 1 if changed[i] <= limit else 0
+            unchanged = unchanged + 1 if changed[i] <= limit else 0
             if between and settings == better and changed[i] <= ONE_STEP * limit:
                 settings = between
                 gained = []

@@ -78,9 +78,9 @@ def resonance_curve(
             found = {peak_of(points).omega: used.error}
             break
         found = _checked_flanks(family, used, points, errors)
-        loud = _checked_loud(family, used, points, accuracy)
-        found = loud | found
-        richer_harmonics = _harmonics_missed(used, points, loud, accuracy)
+        significant = _checked_significant(family, used, points, accuracy)
+        found = significant | found
+        richer_harmonics = _harmonics_missed(used, points, significant, accuracy)
         if richer_harmonics is not None:
             used = richer_harmonics
         elif size(peak_of(points)) <= (1 + accuracy / 2) * _height(peak, points):
@@ -134,7 +134,7 @@ def _checked_flanks(
     for each of SHARES of its height.
 
     A flank is judged in the respect that is worst at the peak, as far from the peak of the richer
-    model as it stands from its own.
+    present model from its own.
     """
     top = peak_of(points)
     found = {top.omega: np.inf if settings.error is None else settings.error}
@@ -150,7 +150,7 @@ def _checked_flanks(
     return found
 
 
-def _checked_loud(
+def _checked_significant(
     family: Family,
     settings: Settings,
     points: Sequence[Solution],
@@ -160,11 +160,11 @@ def _checked_loud(
     points where harmonics that were left out move the contacts.
     """
     share = heights_of(points) / size(peak_of(points))
-    loud = left_out_motion(family, [settings] * len(points), points) * share
-    order = np.argsort(-loud)[:MAX_CHECKED_PEAKS]
+    significant = left_out_motion(family, [settings] * len(points), points) * share
+    order = np.argsort(-significant)[:MAX_CHECKED_PEAKS]
     chosen = [
         points[i]
-        for i in order[loud[order] > MIN_SHARE_OF_ACCURACY * accuracy]
+        for i in order[significant[order] > MIN_SHARE_OF_ACCURACY * accuracy]
         if points[i].converged
     ]
     other = richer_settings(family, settings, "harmonics")
@@ -214,17 +214,17 @@ def _change(
 def _harmonics_missed(
     settings: Settings,
     points: Sequence[Solution],
-    loud: dict[float, float],
+    significant: dict[float, float],
     accuracy: float,
 ) -> Settings | None:
-    """Settings with more harmonics where a loud point away from the peak is wrong beyond its
+    """Settings with more harmonics where a significant point away from the peak is wrong beyond its
     tolerance; None where all hold, or harmonics are not to be chosen.
     """
     top = peak_of(points)
     if "harmonics" not in settings.chosen:
         return None
     for point in points:
-        error = loud.get(point.omega, 0.0)
+        error = significant.get(point.omega, 0.0)
         tolerated = accuracy * size(top) / max(size(point), 1e-6 * size(top))
         if point is not top and np.isfinite(error) and error > tolerated:
             return enriched_settings(settings, "harmonics")

@@ -236,7 +236,7 @@ def _simplified(
         course.remarks.append(
             "methods are compared on the scene's tangential model: prescribed normal load, damper "
             f"a mass, up to {POINTS} contact points on each seat; what that model itself costs in "
-            "accuracy stands among the models"
+            "accuracy is given with the models"
         )
         omegas = _own_frequencies(model, omegas, mode)
     return model, _bench(course, lambda H: model, omegas, "methods"), ""

@@ -31,7 +31,7 @@ HARMONICS = (1, 3, 5, 7, 9, 15, 31)
 PERIODS = 500
 # relative difference of the damper's motion at its contacts that is none
 RIGID_MOTION = 1e-6
-# frequency of the modes that stand for the residual flexibility, over the excitation's
+# frequency of the modes that represent the residual flexibility, over the excitation's
 STIFF = 30.0
 
 

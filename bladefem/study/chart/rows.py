@@ -222,8 +222,8 @@ def _row(job: Job, timing: Timing) -> dict[str, object]:
     if lost:
         return _lost(job, timing.seconds, f"{len(lost)} of {len(points)} frequencies: {lost[0]}")
     peak = resonance(bench.omegas, np.array([p.first for p in points]))
-    told = [p.reason for p in points if "false" in p.reason or "not periodic" in p.reason]
-    reason = f"{len(told)} of {len(points)} frequencies: {told[0]}" if told else ""
+    reasons = [p.reason for p in points if "false" in p.reason or "not periodic" in p.reason]
+    reason = f"{len(reasons)} of {len(points)} frequencies: {reasons[0]}" if reasons else ""
     if not peak.inside:
         reason = "its resonance lies outside the compared frequencies"
     return _lost(job, timing.seconds, reason) | errors(peak, bench.truth) | {"converged": True}

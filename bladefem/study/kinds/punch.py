@@ -60,7 +60,7 @@ class Indented:
     flexibility: RealArray
     # (n, n) of the same under loads odd in x; None in the plane
     tilted: RealArray | None
-    # (n,) mean of x over what each node stands for [m]
+    # (n,) mean of x over the length that each node represents [m]
     arm: RealArray
     # the proof of optimality, see PressureMap
     complementarity: float

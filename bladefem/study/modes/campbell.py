@@ -276,7 +276,7 @@ def _excited_waves(
 ) -> pd.DataFrame:
     """The table with the frequency of the wave that an order excites.
 
-    A pattern that stands still in space runs against the rotation for a rider on the wheel; orders
+    A pattern at rest in space runs against the rotation for a rider on the wheel; orders
     beyond half the number of blades are seen by the blades as a wave in the other sense.
     """
     if not sectors or wave(order, sectors) == "standing":

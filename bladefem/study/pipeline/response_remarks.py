@@ -108,11 +108,11 @@ def beyond_tolerance(curves: list[Curve]) -> str:
 
 def resonance_warnings(curves: list[Curve], accuracy: float) -> Iterator[str]:
     """Why the highest points of curves may be wrong: one sentence a reason, with all its loads."""
-    beside = [load_of(c) for c in curves if _beside_unsolved(c)]
-    if beside:
+    next_to_unsolved = [load_of(c) for c in curves if _beside_unsolved(c)]
+    if next_to_unsolved:
         yield (
-            f"under {', '.join(beside)} the highest point that was solved lies next to one that "
-            "was not; the resonance may be higher"
+            f"under {', '.join(next_to_unsolved)} the highest point that was solved lies next to "
+            "one that was not; the resonance may be higher"
         )
     unknown = [load_of(c) for c in curves if c.error == np.inf]
     if unknown:

@@ -1,7 +1,7 @@
 """What a run has found: one record for each stage that it reached.
 
 A record holds results only, never a place for those still to come: a function that needs responses
-takes a :class:`SolvedRun`, and whoever asks a shorter run for them is told so in one sentence.
+takes a :class:`SolvedRun`, and whoever asks a shorter run for them gets one sentence that says so.
 """
 
 from __future__ import annotations

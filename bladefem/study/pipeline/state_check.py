@@ -88,9 +88,9 @@ def check_states(
     spent = (time.perf_counter() - begin) / len(middles)
     largest = float(np.abs(table.force).max())
     for middle, force in zip(middles, exact, strict=True):
-        found, told = interpolate(table, middle)
+        found, estimated = interpolate(table, middle)
         error = max(error, float(np.abs(found - force).max()) / largest)
-        indicator = max(indicator, told)
+        indicator = max(indicator, estimated)
     return StateCheck(table.force[..., 0].size, error, indicator, spent)
 
 
