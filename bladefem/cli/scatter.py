@@ -6,7 +6,6 @@ import argparse
 from pathlib import Path
 from typing import Any
 
-from ..errors import InputError
 from ..scene.tables import Scene
 from ..util.communicator import Communicator
 from . import tables
@@ -17,17 +16,14 @@ def scatter(options: argparse.Namespace, comm: Communicator | None) -> None:
     """Statistics of many wheels, on top of the run's tuned responses."""
     scene, folder, bars = prepared(options, comm, responds=True)
     # before the tuned responses, which take minutes
-    if scene.mistuning.scatter is None:
-        raise InputError(
-            "mistuning.scatter: expected a relative standard deviation of the blades' "
-            "frequencies, such as '1 %', for 'bladefem scatter'"
-        )
+    from ..study.mistuning.validate import refuse_scatter
+
+    refuse_scatter(scene)
     from ..io.stage_cache import on_root
     from ..report.wheel import scatter_sentences
-    from ..study.mistuning.stage import check_mistuning, scatter_of_run
+    from ..study.mistuning.stage import scatter_of_run
     from ..study.pipeline import pipeline
 
-    check_mistuning(scene)
     run = pipeline.run(scene, folder, comm=comm, progress=bars)
     found = scatter_of_run(run, comm, bars)
     table, files = on_root(comm, lambda: _write_results(found, folder, scene))

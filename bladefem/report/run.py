@@ -25,7 +25,8 @@ from ..io.stage_cache import on_root, write_results, write_table
 from ..scene.tables import Scene
 from ..scene.toml import dump
 from ..scene.units import show
-from ..study.mistuning.stage import check_mistuning, is_mistuned, with_whole_wheel
+from ..study.mistuning.stage import with_whole_wheel
+from ..study.mistuning.validate import check_mistuning, is_mistuned
 from ..study.modes.comparison import family_table
 from ..study.modes.stress import Strength
 from ..study.modes.survey import excited_set

@@ -24,11 +24,13 @@ from bladefem.study.mistuning.blade_stress import (
     blade_motion,
     blade_stress,
 )
-from bladefem.study.mistuning.stage import check_mistuning, scatter_of_run, with_whole_wheel
+from bladefem.study.mistuning.stage import scatter_of_run, with_whole_wheel
+from bladefem.study.mistuning.validate import refuse_scatter
 from bladefem.study.mistuning.whole_wheel import blade_readings, reduce_wheel, whole_wheel
 from bladefem.study.pipeline import pipeline
 from bladefem.study.pipeline.case_models import family_of_case, load_cases
 from bladefem.study.pipeline.damped_motion import damped_stress
+from bladefem.study.pipeline.preflight import refuse_run
 from bladefem.study.pipeline.stages import Bodies
 from bladefem.study.pipeline.utilisation import (
     blade_nodes,
@@ -204,8 +206,32 @@ def test_statistics_by_the_damper_law_are_checked_in_full(folder):
             "takes one engine order, expected no mistuning.orders",
         ),
         (["mistuning.orders=half: 0.3 N"], "expected a whole order and a force"),
+        (["mistuning.orders=13.5: 0.3 N"], "expected a whole order and a force"),
     ],
 )
 def test_bad_input_is_refused_before_long_work(overrides, message):
+    """What 'bladefem check' calls, and every command before its first stage."""
     with pytest.raises(InputError, match=message):
-        check_mistuning(load_scene(SCENE, overrides))
+        refuse_run(load_scene(SCENE, overrides))
+
+
+@pytest.mark.parametrize(
+    ("rows", "message"),
+    [
+        (["1, 0.01"] * 36, "expected blades in order"),
+        ([f"{i}, -1.2" for i in range(1, 37)], "-1.2 of blade 1 leaves it no stiffness"),
+        ([f"{i}, nan" for i in range(1, 37)], "expected finite numbers"),
+        ([f"{i}, 0.01, 0.02" for i in range(1, 37)], "3 columns in blade 1, expected 2"),
+    ],
+)
+def test_bad_pattern_file_is_refused_before_long_work(rows, message, tmp_path):
+    file = tmp_path / "pattern.csv"
+    file.write_text("\n".join(["blade, 1F", *rows]))
+    with pytest.raises(InputError, match=message):
+        refuse_run(load_scene(SCENE, [f"mistuning.pattern={file}"]))
+
+
+def test_scatter_of_several_masses_is_refused_before_long_work():
+    scene = load_scene(SCENE, ["study.masses=10 g, 20 g"])
+    with pytest.raises(InputError, match="study.masses: 2 damper masses, expected one"):
+        refuse_scatter(scene)

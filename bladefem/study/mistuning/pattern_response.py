@@ -8,12 +8,9 @@ from math import pi
 
 import numpy as np
 
-from ...errors import InputError
 from ...hbm.linear_resonances import free_resonances
-from ...scene.tables import Scene
 from ...wheel.model import Pattern, Wheel, frequency_pattern
 from ...wheel.resonance import WheelPeak, find_wheel_peak
-from ...wheel.scatter import Scatter, drawn_deviations, read_pattern
 from ...wheel.solve import WheelSolution, free_wheel, solve_wheel, stuck_wheel
 from ...wheel.statistics import wheel_respond
 from ...wheel.tuned import tuned_sector
@@ -60,39 +57,6 @@ class PatternResponse:
     def factor(self) -> float:
         """Highest blade over the tuned wheel."""
         return self.peak.height / self.tuned
-
-
-def scene_deviations(
-    scene: Scene,
-    count: int,
-    families: int,
-) -> np.ndarray:
-    """(N, q) relative deviations of frequency: of the file, or the first ones drawn.
-
-    Raises:
-        InputError: neither is given, or the file does not fit.
-    """
-    given = scene.mistuning
-    if given.pattern:
-        _, values = read_pattern(given.pattern, count)
-        if values.shape[1] not in (1, families):
-            raise InputError(
-                f"mistuning.pattern: {values.shape[1]} families, expected 1 for all or "
-                f"mistuning.families = {families}"
-            )
-        return np.broadcast_to(values, (count, families)).copy()
-    if given.scatter is None:
-        raise InputError("mistuning: expected a pattern file or a scatter")
-    # the same first wheel as the statistics draw
-    scatter = Scatter(given.scatter, seed=given.seed)
-    deviation = scatter.blades * drawn_deviations(count, scatter, 1)[0, 0]
-    return np.repeat(deviation[:, None], families, axis=1)
-
-
-def scene_scatter(scene: Scene) -> Scatter:
-    """The scene's standard deviations."""
-    m = scene.mistuning
-    return Scatter(m.scatter or 0.0, m.friction, m.stiffness, m.load, m.seed)
 
 
 def frequency_grid(

@@ -9,11 +9,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from ...errors import InputError
 from ...io.stage_cache import found_remark, on_root, stage
-from ...scene.fields import value_at
-from ...scene.kinds import kind_named
-from ...scene.tables import Scene
 from ...util.communicator import Communicator
 from ...util.progress import Progress, unwatched
 from ...wheel.model import Pattern, Wheel, frequency_pattern
@@ -42,40 +38,9 @@ from .pattern_response import (
     frequency_grid,
     pattern_response,
     pattern_sentences,
-    scene_deviations,
-    scene_scatter,
 )
-from .whole_wheel import WheelSector, blade_readings, read_orders, reduce_wheel, whole_wheel
-
-# mistuning.level: all wheels by the law of one damper
-LAW = "damper law"
-
-
-def is_mistuned(scene: Scene) -> bool:
-    """The scene gives how its blades differ."""
-    return scene.mistuning.pattern is not None or scene.mistuning.scatter is not None
-
-
-def check_mistuning(scene: Scene) -> None:
-    """Refuse what cannot be run before long work.
-
-    Raises:
-        InputError: the pattern, the engine orders or the kind of scene do not fit.
-    """
-    if not is_mistuned(scene):
-        return
-    name = kind_named(scene.kind).sectors
-    if name is None:
-        raise InputError(f"mistuning: a scene of kind '{scene.kind}' has no wheel")
-    count = value_at(scene, name)
-    if count == 0:
-        raise InputError("mistuning: expected a wheel, imported.sectors = 0 has a single blade")
-    scene_deviations(scene, count, scene.mistuning.families)
-    if read_orders(scene) and scene.mistuning.level == LAW:
-        raise InputError(
-            'mistuning.level = "damper law": takes one engine order, expected no mistuning.orders '
-            'or "whole wheel"'
-        )
+from .validate import LAW, refuse_scatter, scene_deviations, scene_scatter
+from .whole_wheel import WheelSector, blade_readings, reduce_wheel, whole_wheel
 
 
 def with_whole_wheel(
@@ -146,14 +111,8 @@ def scatter_of_run(
         InputError: the scene has no scatter, or several damper masses.
     """
     scene = run.scene
-    if scene.mistuning.scatter is None:
-        raise InputError(
-            "mistuning.scatter: expected a relative standard deviation of the blades' "
-            "frequencies, such as '1 %', for 'bladefem scatter'"
-        )
+    refuse_scatter(scene)
     curves = run.response.curves
-    if len({curve.mass for curve in curves}) > 1:
-        raise InputError("study.masses: expected one damper mass for 'bladefem scatter'")
     sector, _ = _kept_sector(run, curves, Bodies(scene, run.mesh, comm, progress), comm)
     made = _wheels(run, sector, curves)
     return joined_loads(

@@ -22,6 +22,7 @@ from ..adaptive.settings import Settings
 from ..pipeline.assemble_model import LoadCase, joint_model
 from ..pipeline.contact_cycle import labels
 from ..pipeline.stages import Bodies, Reduced, reduce_sector, weighted
+from .validate import read_orders
 
 
 @dataclass(frozen=True)
@@ -130,33 +131,4 @@ def _excitation(scene: Scene, count: int) -> dict[int, np.ndarray]:
         part = engine_order(count, multiple, np.array([force]), phase)
         harmonic = multiple // order
         found[harmonic] = found.get(harmonic, 0.0) + part
-    return found
-
-
-def read_orders(scene: Scene) -> list[tuple[int, float, float]]:
-    """Order, amplitude [N] and phase [rad] of each entry of mistuning.orders.
-
-    Raises:
-        InputError: an entry is not "18: 0.3 N" or "18: 0.3 N, 90 deg", or no multiple of the
-            engine order.
-    """
-    from ...scene.units import parse
-
-    found = []
-    for entry in scene.mistuning.orders or ():
-        order, colon, rest = entry.partition(":")
-        force, _, phase = rest.partition(";")
-        name = f"mistuning.orders '{entry}'"
-        if not colon or not order.strip().isdigit():
-            raise InputError(
-                f"{name}: expected a whole order and a force, such as '18: 0.3 N; 90 deg'"
-            )
-        base = scene.excitation.engine_order
-        if base == 0 or int(order) % base or int(order) == 0:
-            raise InputError(
-                f"{name}: expected a multiple of excitation.engine_order = {base}, so that all "
-                "orders have one period"
-            )
-        angle = parse(phase.strip(), "rad", name) if phase.strip() else 0.0
-        found.append((int(order), parse(force.strip(), "N", name), angle))
     return found

@@ -7,6 +7,7 @@ from ...scene.kinds import kind_named, load_function
 from ...scene.tables import Scene
 from ...scene.units import show
 from ..fatigue import haigh_diagram
+from ..mistuning.validate import check_mistuning
 
 
 def refuse_run(scene: Scene) -> None:
@@ -16,6 +17,7 @@ def refuse_run(scene: Scene) -> None:
         InputError: the first thing that is wrong, with the field to change.
     """
     haigh_diagram(scene.fatigue)
+    check_mistuning(scene)
     kind = kind_named(scene.kind)
     if kind.preflight is not None:
         load_function(kind.preflight)(scene)

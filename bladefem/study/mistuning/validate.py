@@ -1,0 +1,130 @@
+"""What a mistuned scene asks for, read from the scene alone: refused before any long work where it
+cannot be run.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from ...errors import InputError
+from ...scene.fields import value_at
+from ...scene.kinds import kind_named
+from ...scene.tables import Scene
+from ...wheel.scatter import Scatter, drawn_deviations, read_pattern
+
+# mistuning.level: all wheels by the law of one damper
+LAW = "damper law"
+
+
+def is_mistuned(scene: Scene) -> bool:
+    """The scene gives how its blades differ."""
+    return scene.mistuning.pattern is not None or scene.mistuning.scatter is not None
+
+
+def check_mistuning(scene: Scene) -> None:
+    """Refuse what cannot be run before long work.
+
+    Raises:
+        InputError: the pattern, the engine orders or the kind of scene do not fit.
+    """
+    if not is_mistuned(scene):
+        return
+    name = kind_named(scene.kind).sectors
+    if name is None:
+        raise InputError(f"mistuning: a scene of kind '{scene.kind}' has no wheel")
+    count = value_at(scene, name)
+    if count == 0:
+        raise InputError("mistuning: expected a wheel, imported.sectors = 0 has a single blade")
+    scene_deviations(scene, count, scene.mistuning.families)
+    if read_orders(scene) and scene.mistuning.level == LAW:
+        raise InputError(
+            'mistuning.level = "damper law": takes one engine order, expected no mistuning.orders '
+            'or "whole wheel"'
+        )
+
+
+def refuse_scatter(scene: Scene) -> None:
+    """Refuse what 'bladefem scatter' cannot draw.
+
+    Raises:
+        InputError: the scene has no scatter, or several damper masses.
+    """
+    if scene.mistuning.scatter is None:
+        raise InputError(
+            "mistuning.scatter: expected a relative standard deviation of the blades' "
+            "frequencies, such as '1 %', for 'bladefem scatter'"
+        )
+    if len(scene.study.masses or ()) > 1:
+        raise InputError(
+            f"study.masses: {len(scene.study.masses or ())} damper masses, expected one for "
+            "'bladefem scatter'"
+        )
+
+
+def scene_deviations(
+    scene: Scene,
+    count: int,
+    families: int,
+) -> np.ndarray:
+    """(N, q) relative deviations of frequency: of the file, or the first ones drawn.
+
+    Raises:
+        InputError: neither is given, the file does not fit, or a blade would be unstable.
+    """
+    given = scene.mistuning
+    if given.pattern:
+        _, values = read_pattern(given.pattern, count)
+        if values.shape[1] not in (1, families):
+            raise InputError(
+                f"mistuning.pattern: {values.shape[1]} families, expected 1 for all or "
+                f"mistuning.families = {families}"
+            )
+        if values.min() <= -1:
+            blade = int(np.argmin(values.min(axis=1)))
+            raise InputError(
+                f"mistuning.pattern: deviation {values.min():.4g} of blade {blade + 1} leaves it "
+                "no stiffness, expected relative deviations of frequency above -1"
+            )
+        return np.broadcast_to(values, (count, families)).copy()
+    if given.scatter is None:
+        raise InputError("mistuning: expected a pattern file or a scatter")
+    # the same first wheel as the statistics draw
+    scatter = Scatter(given.scatter, seed=given.seed)
+    deviation = scatter.blades * drawn_deviations(count, scatter, 1)[0, 0]
+    return np.repeat(deviation[:, None], families, axis=1)
+
+
+def scene_scatter(scene: Scene) -> Scatter:
+    """The scene's standard deviations."""
+    m = scene.mistuning
+    return Scatter(m.scatter or 0.0, m.friction, m.stiffness, m.load, m.seed)
+
+
+def read_orders(scene: Scene) -> list[tuple[int, float, float]]:
+    """Order, amplitude [N] and phase [rad] of each entry of mistuning.orders.
+
+    Raises:
+        InputError: an entry is not "18: 0.3 N" or "18: 0.3 N, 90 deg", or no multiple of the
+            engine order.
+    """
+    from ...scene.units import parse
+
+    found = []
+    for entry in scene.mistuning.orders or ():
+        order, colon, rest = entry.partition(":")
+        force, _, phase = rest.partition(";")
+        name = f"mistuning.orders '{entry}'"
+        if not colon or not order.strip().isdigit():
+            raise InputError(
+                f"{name}: expected a whole order and a force, such as '18: 0.3 N; 90 deg'"
+            )
+        base = scene.excitation.engine_order
+        if base == 0 or int(order) % base or int(order) == 0:
+            raise InputError(
+                f"{name}: expected a multiple of excitation.engine_order = {base}, so that all "
+                "orders have one period"
+            )
+        angle = parse(phase.strip(), "rad", name) if phase.strip() else 0.0
+        found.append((int(order), parse(force.strip(), "N", name), angle))
+    return found
+
