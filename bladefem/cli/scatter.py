@@ -20,14 +20,15 @@ def scatter(options: argparse.Namespace, comm: Communicator | None) -> None:
 
     refuse_scatter(scene)
     from ..io.stage_cache import on_root
-    from ..report.wheel import scatter_sentences
-    from ..study.mistuning.stage import scatter_of_run
+    from ..report.wheel import scatter_sentences, use_sentences
+    from ..study.mistuning.stage import scatter_of_run, scatter_utilisation
     from ..study.pipeline import pipeline
 
     run = pipeline.run(scene, folder, comm=comm, progress=bars)
     found = scatter_of_run(run, comm, bars)
-    table, files = on_root(comm, lambda: _write_results(found, folder, scene))
-    sentences = scatter_sentences(found)
+    used, remarks = scatter_utilisation(run, found)
+    sentences = [*scatter_sentences(found), *use_sentences(used), *remarks]
+    table, files = on_root(comm, lambda: _write_results(found, used, sentences, folder, scene))
     tell(
         options,
         comm,
@@ -37,19 +38,28 @@ def scatter(options: argparse.Namespace, comm: Communicator | None) -> None:
     )
 
 
-def _write_results(found: Any, folder: Path, scene: Scene) -> tuple[Any, list[Path]]:
+def _write_results(
+    found: Any,
+    used: Any,
+    sentences: list[str],
+    folder: Path,
+    scene: Scene,
+) -> tuple[Any, list[Path]]:
     """The table as text, and the files of the folder."""
     from ..report.tables import readable, write_tables
     from ..report.wheel import (
         optimum_table,
         scatter_drawings,
         scatter_headlines,
-        scatter_sentences,
         scatter_table,
+        use_headlines,
+        use_table,
     )
     from ..report.write import Page, write_report
 
     parts = {"wheel/scatter": scatter_table(found), "wheel/scatter_optima": optimum_table(found)}
+    if used:
+        parts["wheel/scatter_utilisation"] = use_table(used)
     files = []
     for name, table in parts.items():
         stem = name.split("/")[1]
@@ -59,6 +69,7 @@ def _write_results(found: Any, folder: Path, scene: Scene) -> tuple[Any, list[Pa
     for name, draw in scatter_drawings(found).items():
         figures[name] = folder / f"{name.split('/')[1]}.png"
         draw(figures[name])
-    page = Page(numbers=scatter_headlines(found), stem="report_scatter")
-    pages = write_report(folder, scene, parts, figures, scatter_sentences(found), page=page)
+    numbers = [*scatter_headlines(found), *use_headlines(used)]
+    page = Page(numbers=numbers, stem="report_scatter")
+    pages = write_report(folder, scene, parts, figures, sentences, page=page)
     return readable(parts["wheel/scatter"]), [*files, *figures.values(), *pages]

@@ -70,6 +70,10 @@ CAPTIONS = {
     "quantiles with 95 % intervals, and the worst wheel.",
     "wheel/scatter_optima": "The load that is best for the tuned wheel, and the one that is best "
     "for 95 % of the drawn wheels, with 95 % intervals by the bootstrap over the wheels.",
+    "wheel/scatter_utilisation": "What of the material's endurance the drawn wheels use: the tuned "
+    "wheel's utilisation times the amplification of the highest blade, with the interval that the "
+    "number of wheels leaves; then with the upper ends of the errors of mesh and loading history, "
+    "and the factor by which the alternating stress could grow from there.",
     "wheel/scatter_chart": "Highest blade against the load: the tuned wheel, and quantiles of the "
     "drawn wheels with 95 % intervals; dashed the tuned optimum, dotted the robust one with its "
     "interval in grey.",

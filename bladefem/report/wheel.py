@@ -12,6 +12,7 @@ import numpy as np
 import pandas as pd
 
 from ..study.mistuning.pattern_response import PatternResponse
+from ..study.mistuning.scatter_use import SHARE, ScatteredUse
 from ..view import wheel as view
 from ..wheel.statistics import (
     Amplification,
@@ -160,6 +161,51 @@ def optimum_table(found: Amplification) -> pd.DataFrame:
         },
     ]
     return pd.DataFrame(rows)
+
+
+def use_table(used: Sequence[ScatteredUse]) -> pd.DataFrame:
+    """One row a load whose tuned wheel has a known stress."""
+    return pd.DataFrame(
+        [
+            {
+                "load": one.load,
+                "tuned_utilisation": one.tuned,
+                "p95_utilisation": one.share.value,
+                "p95_utilisation_low": one.share.low,
+                "p95_utilisation_high": one.share.high,
+                "utilisation_bound": one.highest,
+                "stress_margin": one.margin,
+            }
+            for one in used
+        ]
+    )
+
+
+def use_headlines(used: Sequence[ScatteredUse]) -> list[Headline]:
+    """The utilisation that nearly all wheels stay below, at the load where that is lowest."""
+    if not used:
+        return []
+    one = min(used, key=lambda row: row.share.value)
+    return [
+        Headline(
+            f"utilisation that {100 * SHARE:g} % of wheels stay below",
+            f"{one.share.value:.3g}",
+            f"up to {_upper(one.highest)} with the errors of sample, mesh and loading history",
+            f"under {one.load:.4g} N; {one.tuned:.3g} on the tuned wheel",
+        )
+    ]
+
+
+def use_sentences(used: Sequence[ScatteredUse]) -> list[str]:
+    """The same in words, with what it assumes."""
+    return [
+        f"utilisation under {one.load:.4g} N: {100 * SHARE:g} % of wheels stay below "
+        f"{one.share.value:.3g} (95 % interval {one.share.low:.3g} to {_upper(one.share.high)}), "
+        f"the tuned wheel uses {one.tuned:.3g}; with the upper ends of the errors of mesh and "
+        f"loading history {_upper(one.highest)}; the highest blade is taken to move in the tuned "
+        "wheel's shape"
+        for one in used
+    ]
 
 
 def scatter_headlines(found: Amplification) -> list[Headline]:

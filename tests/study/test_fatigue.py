@@ -9,11 +9,14 @@ import pytest
 
 from bladefem.errors import InputError
 from bladefem.fem.stress import signed_von_mises, von_mises
+from bladefem.report.wheel import use_sentences
 from bladefem.scene.tables import Fatigue, Scene
 from bladefem.scene.toml import vary
 from bladefem.study.fatigue import haigh_diagram, utilisation
+from bladefem.study.mistuning.scatter_use import scattered_use
 from bladefem.study.pipeline.preflight import refuse_run
 from bladefem.study.pipeline.utilisation import highest_use, run_utilisation, utilisation_message
+from bladefem.wheel.statistics import Amplification
 
 MPA = 1e6
 TABLE = ["0 MPa: 300 MPa", "400 MPa: 180 MPa"]
@@ -115,6 +118,35 @@ def test_a_run_knows_its_utilisation_and_its_bound():
     )
     assert run_utilisation(run_of(Scene(), 0.0)) == {}
     assert utilisation_message(run_of(Scene(), 0.0)) == ""
+
+
+def amplification(factors: np.ndarray) -> Amplification:
+    """Wheels of a tuned wheel that moves 1 mm under 80 N; nothing else of them is read."""
+    none = np.zeros((1, 0), dtype=int)
+    one = np.array([1e-3])
+    tall = 1e-3 * factors[None]
+    return Amplification(np.array([80.0]), one, one, tall, none, tall, none, none, none, none)
+
+
+def test_the_band_of_the_scatter_enters_the_utilisation():
+    """0.3 of the tuned wheel times the quantile of 1000 wheels, even from 1 to 2: 1.95."""
+    scene = vary(Scene(), fatigue__endurance="300 MPa", fatigue__ultimate="900 MPa")
+    run = run_of(scene, 300 * MPA)
+    (used,) = scattered_use(run, amplification(np.linspace(1, 2, 1000)))
+    assert used.share.value == pytest.approx(0.3 * 1.95, rel=1e-3)
+    # of a binomial count of 1000 with 95 %: 2.5 and 97.5 % are 936 and 963
+    assert used.share.low == pytest.approx(0.3 * 1.936, rel=2e-3)
+    assert used.share.high == pytest.approx(0.3 * 1.963, rel=2e-3)
+    assert used.highest == pytest.approx(used.share.high * 1.2 * 1.1, rel=1e-12)
+    assert used.margin == pytest.approx(1 / used.highest)
+    assert scattered_use(run_of(Scene(), 0.0), amplification(np.ones(9))) == []
+
+
+def test_too_few_wheels_leave_the_utilisation_open_above():
+    scene = vary(Scene(), fatigue__endurance="300 MPa", fatigue__ultimate="900 MPa")
+    (used,) = scattered_use(run_of(scene, 0.0), amplification(np.linspace(1, 2, 20)))
+    assert np.isinf(used.highest) and used.margin == 0
+    assert "unknown, too few wheels" in use_sentences([used])[0]
 
 
 def test_a_diagram_that_is_too_short_is_a_warning_of_the_run():

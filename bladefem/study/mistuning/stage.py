@@ -9,8 +9,10 @@ from dataclasses import replace
 
 import numpy as np
 
+from ...errors import InputError
 from ...io.stage_cache import found_remark, on_root, stage
 from ...util.communicator import Communicator
+from ...util.message import warning
 from ...util.progress import Progress, unwatched
 from ...wheel.model import Pattern, Wheel, frequency_pattern
 from ...wheel.resonance import find_wheel_peak
@@ -39,6 +41,7 @@ from .pattern_response import (
     pattern_response,
     pattern_sentences,
 )
+from .scatter_use import ScatteredUse, scattered_use
 from .validate import LAW, refuse_scatter, scene_deviations, scene_scatter
 from .whole_wheel import WheelSector, blade_readings, reduce_wheel, whole_wheel
 
@@ -121,6 +124,17 @@ def scatter_of_run(
             for curve, wheel in zip(curves, made, strict=True)
         ]
     )
+
+
+def scatter_utilisation(
+    run: SolvedRun,
+    found: Amplification,
+) -> tuple[list[ScatteredUse], list[str]]:
+    """The utilisation with the band of the scatter, and why it is not known."""
+    try:
+        return scattered_use(run, found), []
+    except InputError as error:
+        return [], [warning(f"the utilisation is not known: {error}")]
 
 
 def _kept_statistics(
