@@ -127,4 +127,3 @@ def read_orders(scene: Scene) -> list[tuple[int, float, float]]:
         angle = parse(phase.strip(), "rad", name) if phase.strip() else 0.0
         found.append((int(order), parse(force.strip(), "N", name), angle))
     return found
-
