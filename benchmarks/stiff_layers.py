@@ -1,6 +1,6 @@
 """Time and error of forced responses of the shipped wedge over the stiffness of its layer.
 
-    python benchmarks/stiff_layers.py [folder] [stiffness in N/mm^3 or "rigid", ...]
+    python benchmarks/stiff_layers.py [folder] [stiffness in N/mm^3, "default" or "rigid", ...]
 
 Stages up to the reduction are kept in the folder and serve all layers: only seating and balance
 depend on the layer. The sector keeps MODES modes; harmonics, samples, contact points and the damper
@@ -29,7 +29,7 @@ from bladefem.study.pipeline.stage_inputs import stage_key
 from bladefem.study.pipeline.stages import Bodies, harmonic_diameters, reduce_sector
 from bladefem.util.progress import unwatched
 
-LAYERS = ("40", "400", "4000", "10000", "40000", "100000", "rigid")
+LAYERS = ("40", "400", "4000", "10000", "40000", "100000", "rigid", "default")
 LOADS = (80.0, 320.0)
 MODES = 20
 
@@ -57,6 +57,8 @@ def prepared(folder: str, stiffness: str) -> Layer:
     )
     if stiffness == "rigid":
         scene = vary(scene, "contact.kt_area", None, "contact.stiffness", "rigid")
+    elif stiffness == "default":
+        scene = vary(scene, "contact.kt_area", None)
     else:
         scene = vary(scene, "contact.kt_area", 1e9 * float(stiffness))
     ready = pipeline.run(scene, folder, until="contact")

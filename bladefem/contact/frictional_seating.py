@@ -8,7 +8,8 @@ tangential, is
 
 with f the forces on the damper. The layer carries f in series with the bodies, as the friction
 elements of the vibration do: where pressed, s_n + c(f_n) = 0, and the slip of a step,
--(ds_t + df_t / kt), is along f_t and only where |f_t| = mu f_n. All conditions of a step are one
+-(ds_t + df_t / kt), is along f_t and only where |f_t| = mu f_n; kt grows with the normal force f_n
+at the end of the step as the normal stiffness of the layer does. All conditions of a step are one
 system of projections, solved by Newton's method (Alart, Curnier 1991, DOI
 10.1016/0045-7825(91)90022-X).
 """
@@ -99,6 +100,7 @@ class _Interface:
     """The layer and its friction, (n,) each."""
 
     law: InterfaceLaw
+    # at first touch
     kt: RealArray
     mu: RealArray
 
@@ -183,7 +185,8 @@ def seat_with_friction(
 
     Args:
         law: of the layer, all ports.
-        kt, mu: (n,) tangential stiffness of the layer [N/m] and friction coefficient [1].
+        kt, mu: (n,) tangential stiffness of the layer at first touch [N/m] and friction
+            coefficient [1].
         speeds: [rad/s]; the last one is that of the result.
         normal: wanted mean normal load of a seat at the end [N]; the damper's load is scaled by one
             factor throughout the history. None: the load of its own mass.
@@ -390,14 +393,7 @@ def _projections(
     slope = np.empty((n, d, m + r))
     residual[:, 0] = f[:, 0] - np.maximum(raised, 0.0)
     slope[:, 0] = unit[:, 0] - closed[:, None] * raised_by
-    sigma = 1 / (own[:, 1:].mean(axis=1) + 1 / face.kt)[:, None]
-    slip = -(s - before.moved)[:, 1:] - (f - before.force)[:, 1:] / face.kt[:, None]
-    tau = f[:, 1:] + sigma * slip
-    tau_by = (
-        unit[:, 1:]
-        - sigma[:, :, None] * by_x[:, 1:]
-        - (sigma / face.kt[:, None])[:, :, None] * unit[:, 1:]
-    )
+    tau, tau_by = _sticking_forces(face, before, f, s, (own[:, 1:], by_x[:, 1:], unit))
     length = np.linalg.norm(tau, axis=1)
     limit = face.mu * np.maximum(raised, 0.0)
     sticks = closed & (length <= limit)
@@ -416,6 +412,36 @@ def _projections(
         np.vstack([slope.reshape(m, m + r), held]),
         int((closed & ~sticks).sum()),
     )
+
+
+def _sticking_forces(
+    face: _Interface,
+    before: _State,
+    f: np.ndarray,
+    s: np.ndarray,
+    bodies: tuple[np.ndarray, np.ndarray, np.ndarray],
+) -> tuple[np.ndarray, np.ndarray]:
+    """f_t + sigma slip (n, d-1) of the nodes, where the friction disc cuts nothing off, and its
+    derivative (n, d-1, m + r).
+
+    Args:
+        f, s: (n, d) forces and displacements.
+        bodies: (n, d-1) own tangential flexibility; derivatives of s_t (n, d-1, m + r) and of f
+            (n, d, m + r).
+    """
+    own, moved_by, unit = bodies
+    kt = (face.kt * (1.0 + np.maximum(f[:, 0], 0.0) / face.law.doubling))[:, None]
+    kt_by_force = np.where(f[:, 0] > 0, face.kt / face.law.doubling, 0.0)[:, None]
+    # its size does not move the solution
+    sigma = 1 / (own.mean(axis=1) + 1 / face.kt)[:, None]
+    change = (f - before.force)[:, 1:]
+    slip = -(s - before.moved)[:, 1:] - change / kt
+    slip_by = (
+        -moved_by
+        - unit[:, 1:] / kt[:, :, None]
+        + (change * kt_by_force / kt**2)[:, :, None] * unit[:, :1]
+    )
+    return f[:, 1:] + sigma * slip, unit[:, 1:] + sigma[:, :, None] * slip_by
 
 
 def _seating(

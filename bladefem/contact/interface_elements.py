@@ -14,7 +14,8 @@ import scipy.sparse as sp
 from ..data import Elements, Patch, PressureMap
 from ..errors import InputError
 from ..scene.tables import Contact, Material, Seat
-from .interface_law import InterfaceLaw, rigid_faces, stiffness_at
+from .interface_law import InterfaceLaw, rigid_faces
+from .rough_layer import GROUND_FINISH, TOUCHING_PRESSURE, decay_length
 from .seating import ContactProblem
 
 # [contact], or the values of one seat
@@ -23,9 +24,6 @@ Layer = TypeVar("Layer", Contact, Seat)
 # stiffness per unit area that represents rigid faces in the elements [N/m^3]: a layer of
 # 1e-8 of the compliance of steel over a millimetre
 RIGID = 1e22
-
-# tangential stiffness per unit area where the scene gives none [N/m^3]
-USUAL = 4e10
 
 
 def mindlin_ratio(nu: float) -> float:
@@ -48,14 +46,37 @@ def pair_ratio(a: Material, b: Material) -> float:
 def seat_contact(contact: Contact, patch: str) -> Contact:
     """The values of one seat: "this" is the blade's right one, "next" the next blade's left one.
 
-    A stiffness of the seat itself, total or areal, wins over both of [contact].
+    A stiffness of the seat itself, total or areal, wins over both of [contact]. Where neither gives
+    one, the layer of rough faces is written out (``with_rough_layer``).
     """
     own = {"this": contact.right, "next": contact.left}.get(patch, Seat())
     changes: dict[str, Any] = {} if own.mu is None else {"mu": own.mu}
     for total, areal in (("kt", "kt_area"), ("kn", "kn_area")):
         if getattr(own, total) is not None or getattr(own, areal) is not None:
             changes |= {total: getattr(own, total), areal: getattr(own, areal)}
-    return replace(contact, **changes)
+    return with_rough_layer(replace(contact, **changes))
+
+
+def with_rough_layer(contact: Contact) -> Contact:
+    """The values of a seat; where they give no stiffness, with that of the layer of rough faces:
+    k_n at first touch, and the pressure at which it has doubled.
+
+    ``contact.stiffening`` takes the place of TOUCHING_PRESSURE where it is given.
+    """
+    if contact.stiffness != "given" or _gives(contact, "kt") or _gives(contact, "kn"):
+        return contact
+    pressure = TOUCHING_PRESSURE if contact.stiffening is None else contact.stiffening
+    return replace(contact, kn_area=pressure / decay_length(finish(contact)), stiffening=pressure)
+
+
+def finish(contact: Contact) -> float:
+    """Mean roughness Ra of each face [m]."""
+    return GROUND_FINISH if contact.roughness is None else contact.roughness
+
+
+def rougher_contact(contact: Contact, factor: float) -> Contact:
+    """[contact] with the roughness of its faces times a factor."""
+    return replace(contact, roughness=factor * finish(contact))
 
 
 def gives_stiffness(contact: Contact) -> bool:
@@ -79,7 +100,8 @@ def scaled_contact(
     """[contact] with the tangential and the normal stiffness of all seats times factors.
 
     What follows from the other stiffness by ``ratio`` = k_t / k_n is written out first, so that
-    one changes without the other.
+    one changes without the other. The layer of rough faces stays: it hangs on their roughness
+    (``rougher_contact``).
     """
     followed = {
         "kt": (not _gives(contact, "kt"), "kn", ratio),
@@ -100,8 +122,7 @@ def scaled_contact(
                     changes[f"{name}{kind}"] = factor * value
         return replace(table, **changes)
 
-    whole = contact if gives_stiffness(contact) else replace(contact, kt_area=USUAL)
-    return replace(scaled(whole), left=scaled(contact.left), right=scaled(contact.right))
+    return replace(scaled(contact), left=scaled(contact.left), right=scaled(contact.right))
 
 
 def stiffnesses(
@@ -110,23 +131,53 @@ def stiffnesses(
     area: np.ndarray,
     mapped: np.ndarray | None = None,
 ) -> tuple[np.ndarray, np.ndarray]:
-    """k_t and k_n (n,) [N/m] of the points of a patch.
+    """k_t and k_n (n,) [N/m] of the points of a patch, at first touch of a layer that stiffens.
 
-    Each is as given, else follows from the other by ``ratio`` = k_t / k_n; without either k_t is
-    USUAL.
+    Each is as given, else follows from the other by ``ratio`` = k_t / k_n.
 
     Args:
+        contact: of the seat (``seat_contact``).
         area: (n,) area that each point represents [m^2]; totals are shared in proportion to it.
         mapped: (n,) k_n from the pressure map, in place of a given one.
+
+    Raises:
+        InputError: neither stiffness is given.
     """
     if contact.stiffness == "rigid":
         return RIGID * area, RIGID * area
     kt = _shared(contact.kt, contact.kt_area, area)
     kn = _shared(contact.kn, contact.kn_area, area)
     kn = kn if mapped is None else mapped
-    if kt is None:
-        kt = USUAL * area if kn is None else ratio * kn
-    return kt, kt / ratio if kn is None else kn
+    if kt is not None:
+        return kt, kt / ratio if kn is None else kn
+    if kn is None:
+        raise InputError("contact: no stiffness of the seat is given, expected kt, kn or roughness")
+    return ratio * kn, kn
+
+
+def doubling_force(contact: Contact, area: np.ndarray) -> np.ndarray:
+    """(n,) normal force [N] at which the layer of the points of a patch is twice as stiff as at
+    first touch; infinite for a linear one.
+    """
+    pressure = np.inf if contact.stiffening is None else contact.stiffening
+    return pressure * area
+
+
+def stiffnesses_at(
+    contact: Contact,
+    ratio: float,
+    area: np.ndarray,
+    force: np.ndarray,
+) -> tuple[np.ndarray, np.ndarray]:
+    """k_t and k_n (n,) [N/m] of the points of a patch under normal forces (n,) [N].
+
+    Args:
+        contact: of the scene, where both seats have the same values.
+    """
+    seat = with_rough_layer(contact)
+    growth = 1.0 + force / doubling_force(seat, area)
+    kt, kn = stiffnesses(seat, ratio, area)
+    return kt * growth, kn * growth
 
 
 def interface_law(
@@ -145,9 +196,11 @@ def interface_law(
     area = np.concatenate([patch.area for patch in patches])
     if contact.stiffness != "given":
         return rigid_faces(len(area))
-    kn = [stiffnesses(seat_contact(contact, patch.name), ratio, patch.area)[1] for patch in patches]
-    doubling = np.inf if contact.stiffening is None else contact.stiffening
-    return InterfaceLaw(np.concatenate(kn), doubling * area)
+    seats = [seat_contact(contact, patch.name) for patch in patches]
+    pairs = list(zip(seats, patches, strict=True))
+    kn = [stiffnesses(seat, ratio, patch.area)[1] for seat, patch in pairs]
+    doubling = [doubling_force(seat, patch.area) for seat, patch in pairs]
+    return InterfaceLaw(np.concatenate(kn), np.concatenate(doubling))
 
 
 def layer_friction(
@@ -225,11 +278,10 @@ def friction_elements(
         mapped = [a.T @ k for a, k in zip(members, mapped_stiffness(problem, maps), strict=True)]
     kt, kn = _layer_stiffness(seats, ratio, area, mapped)
     force = np.concatenate([a.T @ m.force for a, m in zip(members, maps, strict=True)])
-    if contact.stiffening is not None:
-        law = InterfaceLaw(kn, contact.stiffening * np.concatenate(area))
-        growth = stiffness_at(law, force) / kn
-        kt = kt * growth
-        kn = kn * growth
+    doubling = [doubling_force(seat, a) for seat, a in zip(seats, area, strict=True)]
+    growth = 1.0 + force / np.concatenate(doubling)
+    kt = kt * growth
+    kn = kn * growth
     gap = np.concatenate([g.T @ m.gap for g, m in zip(G, maps, strict=True)])
     if contact.normal == "prescribed":
         kn = np.zeros_like(kn)

@@ -20,6 +20,7 @@ from ..scene.units import show
 from .face_profile import element_size
 from .hertz import MIN_ELEMENTS_PER_RADIUS, contact_modulus, line_width, point_radius
 from .interface_elements import interface_law, pair_ratio
+from .interface_law import stiffness_at
 
 # half width of a crown's contact over the element size that is advised
 WANTED = 4.0
@@ -62,7 +63,7 @@ def edge_sentence(
         return ""
     modulus = contact_modulus(scene.material.blade, scene.material.damper)
     if all(
-        modulus / areal_stiffness(m.patch, scene) >= EDGE_ELEMENTS * element_size(m.patch, depth)
+        modulus / areal_stiffness(m, scene) >= EDGE_ELEMENTS * element_size(m.patch, depth)
         for seats in maps.values()
         for m in seats
     ):
@@ -74,10 +75,11 @@ def edge_sentence(
     )
 
 
-def areal_stiffness(patch: Patch, scene: Scene) -> float:
-    """Normal stiffness of the interface layer at first touch [N/m^3]; infinite for rigid faces."""
+def areal_stiffness(pressure: PressureMap, scene: Scene) -> float:
+    """Largest normal stiffness of the interface layer [N/m^3]; infinite for rigid faces."""
     ratio = pair_ratio(scene.material.blade, scene.material.damper)
-    return float((interface_law([patch], scene.contact, ratio).stiffness / patch.area).max())
+    law = interface_law([pressure.patch], scene.contact, ratio)
+    return float((stiffness_at(law, pressure.force) / pressure.patch.area).max())
 
 
 def at_edge(pressure: PressureMap) -> bool:
@@ -122,7 +124,7 @@ def narrow_sentence(
             (
                 max(
                     _half_width(m, contact, modulus, depth),
-                    _layer_half_width(m, contact, areal_stiffness(m.patch, scene), depth),
+                    _layer_half_width(m, contact, areal_stiffness(m, scene), depth),
                 ),
                 element_size(m.patch, depth),
             )

@@ -13,6 +13,7 @@ from ..study.pipeline.best_load import BestLoad
 NAMES = {
     "kt": "tangential stiffness",
     "kn": "normal stiffness",
+    "roughness": "roughness of the seats",
     "mu": "friction coefficient",
     "damping": "damping ratio",
     "seat friction": "friction while seating",

@@ -7,7 +7,8 @@ from typing import NamedTuple
 import numpy as np
 import pandas as pd
 
-from bladefem.contact.interface_elements import USUAL, gives_stiffness
+from bladefem.contact.interface_elements import finish, gives_stiffness
+from bladefem.contact.rough_layer import RANGE, SOURCE, decay_length, rough_stiffness
 from bladefem.scene.kinds import kind_named
 from bladefem.scene.tables import Scene
 from bladefem.scene.units import show
@@ -175,14 +176,28 @@ def own_mass(
     ]
 
 
-def assumed_stiffness(scene: Scene) -> list[str]:
-    """A caution where the scene gives no contact stiffness."""
+def assumed_stiffness(scene: Scene, pressed: pd.DataFrame | None = None) -> list[str]:
+    """A caution where the scene gives no contact stiffness: what is taken, and from where.
+
+    Args:
+        pressed: the table "contact/pressure".
+    """
     if gives_stiffness(scene.contact):
         return []
+    roughness = finish(scene.contact)
+    known = "ground seats" if scene.contact.roughness is None else "contact.roughness"
+    at_one = 1e-9 * rough_stiffness(1e6, roughness)
+    there = ""
+    if pressed is not None:
+        mean = pressed["mean_pressure"].to_numpy(float)
+        low, high = (1e-9 * rough_stiffness(p, roughness) for p in (mean.min(), mean.max()))
+        there = f" and {low:.0f} to {high:.0f} N/mm^3 at the mean pressures of the loads studied"
     return [
-        f"The scene gives no contact stiffness: {show(USUAL, 'N/m^3')} (tangential) is assumed, "
-        "while metal joints lie between 1000 and 100 000 N/mm^3. Give contact.kt_area; "
-        "docs/contact.md lists measurements."
+        "The scene gives no contact stiffness: it is taken from the roughness, Ra "
+        f"{show(roughness, 'm')} on each face ({known}), as normal stiffness = pressure / "
+        f"{show(decay_length(roughness), 'm')}, {at_one:.0f} N/mm^3 at 1 MPa{there} "
+        f"({SOURCE}). Published values lie within a factor of {RANGE:g} on each side. Give "
+        "contact.kt_area or contact.roughness; docs/contact.md lists measurements."
     ]
 
 

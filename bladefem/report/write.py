@@ -212,7 +212,11 @@ def _answer(
     searched = tables.get("response/best_load")
     masses = tables.get("contact/damper_mass")
     found = answer(summary, points, own, masses, searched)
-    cautions = [*assumed_stiffness(scene), *wrong_speed(scene, summary), *found.cautions]
+    cautions = [
+        *assumed_stiffness(scene, tables.get("contact/pressure")),
+        *wrong_speed(scene, summary),
+        *found.cautions,
+    ]
     steps = next_steps(scene, cautions, summary, own, masses, searched)
     numbers = [*headlines(found, summary, points, searched), *page.more]
     return {"numbers": numbers, "steps": [*steps, *page.steps]}

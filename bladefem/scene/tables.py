@@ -88,8 +88,8 @@ class Contact:
         "N/m^3",
         1.0,
         1e15,
-        "tangential contact stiffness per unit area; by Mindlin from the normal one, 40 "
-        "N/mm^3 without either",
+        "tangential contact stiffness per unit area; by Mindlin from the normal one, and from "
+        "roughness and pressure without either",
     )
     kt: float | None = quantity(None, "N/m", 1.0, 1e12, "tangential stiffness of one whole patch")
     kn_area: float | None = quantity(
@@ -100,6 +100,14 @@ class Contact:
         "normal contact stiffness per unit area; by Mindlin from the tangential",
     )
     kn: float | None = quantity(None, "N/m", 1.0, 1e12, "normal stiffness of one whole patch")
+    roughness: float | None = quantity(
+        None,
+        "m",
+        1e-8,
+        1e-4,
+        "mean roughness Ra of each face, where no stiffness is given: k_n = pressure / (0.4 times "
+        "the rms roughness of both faces); 0.8 um (ground) when left out",
+    )
     stiffness: str = quantity(
         "given",
         choices=("given", "rigid", "map"),

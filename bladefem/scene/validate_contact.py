@@ -49,9 +49,23 @@ def contact_problems(scene: Scene) -> Iterator[str]:
 
 
 def _without_layer(scene: Scene) -> Iterator[str]:
-    """Fields of an interface layer given for faces that have none."""
+    """Fields of an interface layer given for faces that have none, or that have another."""
     contact = scene.contact
     sides = {"contact.left": contact.left, "contact.right": contact.right}
+    if contact.roughness is not None:
+        given = [
+            f"contact.{key}"
+            for key in ("kt_area", "kt", "kn_area", "kn")
+            if getattr(contact, key) is not None
+        ]
+        given += (
+            [] if contact.stiffness == "given" else [f"contact.stiffness = '{contact.stiffness}'"]
+        )
+        if given:
+            yield (
+                f"contact.roughness: {given[0]} says how stiff the layer is, expected only one of "
+                "the two"
+            )
     if contact.stiffness == "rigid":
         for name, side in {"contact": contact, **sides}.items():
             for key in ("kt_area", "kt", "kn_area", "kn"):

@@ -24,6 +24,7 @@ import numpy as np
 
 from ..contact.interface_elements import gives_stiffness
 from ..contact.numerical_stiffness import physical_stiffness
+from ..contact.rough_layer import RANGE, SOURCE
 from ..errors import NotSolvedError
 from ..hbm.model import ReducedModel
 from ..hbm.node_gradients import node_gradients
@@ -32,7 +33,7 @@ from ..hbm.parameters import layer_share, vary
 from ..hbm.peak import Peak, find_peak
 from ..hbm.sensitivity import sensitivities
 from ..hbm.solve import solve
-from ..scene.tables import Scene
+from ..scene.tables import Contact, Scene
 from ..util.communicator import Communicator
 from .adaptive.choice import solver_options
 from .adaptive.family import Family, Member, family_member, joined_elements
@@ -42,8 +43,6 @@ from .pipeline.best_load import BestLoad, find_best_load
 
 # factor on each side of a stiffness that the scene gives: a joint measured twice
 GIVEN_STIFFNESS = 2.0
-# the same where a measured range of other joints replaces it
-USUAL_STIFFNESS = 10.0
 # factor on each side of the friction coefficient and of the damping ratio
 FRICTION = 1.3
 DAMPING = 2.0
@@ -64,7 +63,7 @@ CHECKED = 2
 class Parameter:
     """One quantity of the scene that is multiplied by a factor."""
 
-    # "kt", "kn", "mu", "damping" or "seat friction"
+    # "kt", "kn", "roughness", "mu", "damping" or "seat friction"
     name: str
     # factors at the ends of its range
     low: float
@@ -108,15 +107,8 @@ def parameters_of(
     Args:
         angles: of both flanks against the radial plane [rad], where the damper is a wedge.
     """
-    stiffness = GIVEN_STIFFNESS if gives_stiffness(scene.contact) else USUAL_STIFFNESS
-    known = "given by the scene" if gives_stiffness(scene.contact) else "measured joints"
-    layer = [
-        Parameter("kt", 1 / stiffness, stiffness, known),
-        Parameter("kn", 1 / stiffness, stiffness, known),
-    ]
-    # rigid faces have no layer whose stiffness could change
-    found = [] if scene.contact.stiffness == "rigid" else layer
-    found += [
+    found = [
+        *_layer_parameters(scene.contact),
         Parameter("mu", 1 / FRICTION, FRICTION, "scatter of friction coefficients"),
         Parameter("damping", 1 / DAMPING, DAMPING, "damping without friction"),
     ]
@@ -124,6 +116,18 @@ def parameters_of(
     if ends is not None:
         found.append(Parameter("seat friction", *ends, "friction while seating"))
     return found
+
+
+def _layer_parameters(contact: Contact) -> list[Parameter]:
+    """What the stiffness of the layer hangs on; nothing of rigid faces."""
+    if contact.stiffness == "rigid":
+        return []
+    if not gives_stiffness(contact):
+        return [Parameter("roughness", 1 / RANGE, RANGE, f"published stiffnesses ({SOURCE})")]
+    return [
+        Parameter(name, 1 / GIVEN_STIFFNESS, GIVEN_STIFFNESS, "given by the scene")
+        for name in ("kt", "kn")
+    ]
 
 
 def seat_friction_range(mu: float, angles: tuple[float, float]) -> tuple[float, float] | None:

@@ -294,7 +294,13 @@ def test_next_steps_name_the_mass_to_try():
 
 def test_an_assumed_contact_stiffness_is_told():
     """Whichever of the stiffnesses is given, for both seats or for each, nothing is assumed."""
-    assert "40 N/mm^3" in assumed_stiffness(Scene())[0]
+    pressed = pd.DataFrame({"mean_pressure": [3.3e5, 3.3e6]})
+    (told,) = assumed_stiffness(Scene(), pressed)
+    # (1 + 0.01) MPa over 0.4 sqrt(2) 1.25 0.8 um
+    assert "Ra 0.8 um on each face (ground seats)" in told and "1785 N/mm^3 at 1 MPa" in told
+    assert "601 to 5851 N/mm^3 at the mean pressures" in told and "Persson" in told
+    (told,) = assumed_stiffness(Scene(contact=Contact(roughness=1.6e-6)))
+    assert "Ra 1.6 um" in told and "893 N/mm^3 at 1 MPa" in told
     seats = Contact(left=Seat(kn=1e7), right=Seat(kt_area=1e12))
     for given in (Contact(kt_area=4e10), Contact(kn=1e7), Contact(stiffness="map"), seats):
         assert assumed_stiffness(Scene(contact=given)) == []

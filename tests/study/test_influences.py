@@ -8,11 +8,11 @@ import pytest
 
 from bladefem.contact.interface_elements import scaled_contact, stiffnesses
 from bladefem.hbm.reference_blade import reference_model
-from bladefem.scene.tables import Contact, Seat
+from bladefem.scene.tables import Contact, Scene, Seat
 from bladefem.scene.toml import load_scene
 from bladefem.study.adaptive.family import family_of
 from bladefem.study.adaptive.settings import Settings
-from bladefem.study.influences import Parameter, influences, seat_friction_range
+from bladefem.study.influences import Parameter, influences, parameters_of, seat_friction_range
 from bladefem.study.pipeline.assemble_model import LoadCase
 from bladefem.study.pipeline.best_load import find_best_load
 
@@ -94,12 +94,11 @@ def test_seat_friction_of_a_wedge():
 @pytest.mark.parametrize(
     "contact",
     [
-        Contact(),
         Contact(kt_area=4e10),
         Contact(kn=3e7),
         Contact(kt=1e7, kn_area=2e11),
         Contact(kt_area=4e10, left=Seat(kn=3e7)),
-        Contact(left=Seat(kn_area=3e11)),
+        Contact(left=Seat(kn_area=3e11), right=Seat(kt=2e6)),
     ],
 )
 def test_one_stiffness_is_scaled_without_the_other(contact):
@@ -113,3 +112,13 @@ def test_one_stiffness_is_scaled_without_the_other(contact):
             scaled = stiffnesses(seat_contact(other, name), 0.8, area)
             for before, after, factor in zip(plain, scaled, factors, strict=True):
                 assert after == pytest.approx(factor * before)
+
+
+def test_roughness_takes_the_place_of_a_stiffness_that_is_not_given():
+    """Over the published range; stiffnesses that are given are varied themselves."""
+    found = {p.name: p for p in parameters_of(Scene())}
+    assert not {"kt", "kn"} & set(found)
+    assert (found["roughness"].low, found["roughness"].high) == (0.2, 5.0)
+    assert "Persson" in found["roughness"].range_from
+    given = {p.name for p in parameters_of(Scene(contact=Contact(kn=1e7)))}
+    assert {"kt", "kn"} <= given and "roughness" not in given

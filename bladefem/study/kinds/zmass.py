@@ -20,7 +20,7 @@ from scipy.spatial import cKDTree
 from geometry.mesh import Mesh
 from geometry.zmass import z_section
 
-from ...contact.interface_elements import pair_ratio, stiffnesses
+from ...contact.interface_elements import pair_ratio, stiffnesses_at
 from ...contact.patch import make_patch
 from ...contact.seating import contact_problem, solve
 from ...damper.loops import Drive, Steady, steady
@@ -71,11 +71,9 @@ def mass_on_foundation(scene: Scene, seat: PressureMap) -> MassOnFoundation:
     label = clusters(seat.patch.points[:, :2], seat.patch.area, scene.contact.points)
     size = np.bincount(label, seat.patch.area)
     share = np.bincount(label, seat.force) / seat.force.sum()
-    kt = float(
-        stiffnesses(scene.contact, pair_ratio(scene.material.blade, scene.material.damper), size)[
-            0
-        ].sum()
-    )
+    ratio = pair_ratio(scene.material.blade, scene.material.damper)
+    force = np.bincount(label, seat.force)
+    kt = float(stiffnesses_at(scene.contact, ratio, size, force)[0].sum())
     points = [np.bincount(label, seat.patch.area * x) / size for x in seat.patch.points[:, :2].T]
     return MassOnFoundation(
         line * area,

@@ -13,6 +13,7 @@ from ...contact.interface_elements import (
     friction_elements,
     layered,
     pair_ratio,
+    rougher_contact,
     scaled_contact,
 )
 from ...contact.numerical_stiffness import numerical_stiffness, split_stiffness, stiffest_layer
@@ -83,8 +84,8 @@ def changed_cases(
 ) -> Callable[[str, float], Callable[[float], LoadCase]]:
     """Name of a parameter and its factor -> the load cases with it.
 
-    "kt", "kn" and "mu" change [contact] on both seats; "seat friction" the normal load that a
-    nominal one makes; "damping" no contact.
+    "kt", "kn", "roughness" and "mu" change [contact] on both seats; "seat friction" the normal load
+    that a nominal one makes; "damping" no contact.
     """
     ratio = pair_ratio(scene.material.blade, scene.material.damper)
 
@@ -92,6 +93,8 @@ def changed_cases(
     def changed(name: str, factor: float) -> Callable[[float], LoadCase]:
         if name in ("kt", "kn"):
             contact = scaled_contact(scene.contact, ratio, **{name: factor})
+        elif name == "roughness":
+            contact = rougher_contact(scene.contact, factor) if factor != 1 else scene.contact
         elif name == "mu":
             contact = _with_friction(scene.contact, factor)
         else:
