@@ -18,7 +18,7 @@ if TYPE_CHECKING:
     from geometry.look import Look
 
 # faces in the table
-LISTED = 24
+MAX_LISTED_FACES = 24
 
 
 def add_look(sub: argparse.ArgumentParser) -> None:
@@ -75,15 +75,15 @@ def described(found: Look) -> str:
             " ".join(f"{v:.4g}" for v in face.centre),
             "plane" if face.plane else "curved",
         ]
-        for face in found.faces[:LISTED]
+        for face in found.faces[:MAX_LISTED_FACES]
     ]
     if sets:
         lines += [plain(sets, ["set", "holds"]), ""]
     else:
         lines += [""] if is_drawing(found.file) else ["no named sets", ""]
     lines.append(plain(faces, ["face", "facets", "area", "centre", "shape"]))
-    if len(found.faces) > LISTED:
-        lines.append(f"and {len(found.faces) - LISTED} smaller faces")
+    if len(found.faces) > MAX_LISTED_FACES:
+        lines.append(f"and {len(found.faces) - MAX_LISTED_FACES} smaller faces")
     if found.missing:
         lines += ["", "not in the file:", *(f"  {sentence}" for sentence in found.missing)]
     return "\n".join(lines)

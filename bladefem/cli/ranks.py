@@ -18,7 +18,7 @@ from ..errors import InputError, NotSolvedError
 from ..util.communicator import Communicator
 
 # [s] that a failed rank waits for the others to fail as well
-PATIENCE = 10.0
+WAIT_FOR_RANKS_SECONDS = 10.0
 
 
 def communicator() -> Any:
@@ -162,7 +162,7 @@ def _all_arrive(meeting: Any) -> bool:
     never come.
     """
     request = meeting.Ibarrier()
-    deadline = time.monotonic() + PATIENCE
+    deadline = time.monotonic() + WAIT_FOR_RANKS_SECONDS
     while not request.Test():
         if time.monotonic() > deadline:
             return False

@@ -24,7 +24,7 @@ if TYPE_CHECKING:
 
 
 # letters of the line below a head; help texts in a last column are longer
-WIDEST_RULE = 150
+MAX_RULE_WIDTH = 150
 
 
 def plain(rows: Sequence[Sequence[object]], head: Sequence[str] = ()) -> str:
@@ -41,7 +41,7 @@ def plain(rows: Sequence[Sequence[object]], head: Sequence[str] = ()) -> str:
         for row in cells
     ]
     if head:
-        lines.insert(1, "-" * min(max(map(len, lines)), WIDEST_RULE))
+        lines.insert(1, "-" * min(max(map(len, lines)), MAX_RULE_WIDTH))
     return "\n".join(lines)
 
 
@@ -166,7 +166,7 @@ def responses(response: Response) -> str:
     undamped = response.free_peak[1]
     curves = response.curves
     rows = pd.DataFrame(summary(curves, response.limits))
-    rows = rows[[name for name in SHOWN if name in rows]]
+    rows = rows[[name for name in SUMMARY_COLUMNS if name in rows]]
     rows.insert(0, "seat load", ["no damper", *map(_case_label, curves), "full stick"])
     best = min(curves, key=lambda c: c.peak_amplitude)
     return (
@@ -175,7 +175,7 @@ def responses(response: Response) -> str:
     )
 
 
-SHOWN = (
+SUMMARY_COLUMNS = (
     "peak_frequency",
     "peak_amplitude",
     "lowest",
@@ -200,7 +200,7 @@ def side_by_side(name: str, best: pd.DataFrame) -> str:
         "value",
         "free_frequency",
         "load",
-        *(c for c in SHOWN if c in best and c not in ("dissipated", "points")),
+        *(c for c in SUMMARY_COLUMNS if c in best and c not in ("dissipated", "points")),
     ]
     return table(best[columns].rename(columns={"value": name}))
 

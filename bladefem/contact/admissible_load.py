@@ -1,9 +1,9 @@
 """What friction may do to the load of the seats: bounds over all friction forces that equilibrium
 and Coulomb's limit admit, whatever the history.
 
-Every node carries a force within its friction cone (a pyramid of EDGES edges, which lies inside);
-the bounds of the mean normal load for a given pull are linear programmes. A wedge of half angle a
-gives F / (2 (sin a + mu cos a)) to F / (2 (sin a - mu cos a)).
+Every node carries a force within its friction cone (a pyramid of FRICTION_CONE_EDGES edges, which
+lies inside); the bounds of the mean normal load for a given pull are linear programmes. A wedge of
+half angle a gives F / (2 (sin a + mu cos a)) to F / (2 (sin a - mu cos a)).
 """
 
 from __future__ import annotations
@@ -13,9 +13,9 @@ from scipy.optimize import linprog
 
 from ..errors import NotSolvedError
 
-EDGES = 16
+FRICTION_CONE_EDGES = 16
 # share of the forces' sum that may stay unbalanced in seats that jam
-BALANCED = 1e-9
+UNBALANCED_FORCE_SHARE = 1e-9
 
 
 def normal_load_bounds(
@@ -61,7 +61,9 @@ def holds_itself(rigid: np.ndarray, mu: np.ndarray) -> bool:
     rows = np.vstack([balance, ones])
     wanted = np.r_[np.zeros(len(balance)), 1.0]
     found = linprog(np.zeros(balance.shape[1]), A_eq=rows, b_eq=wanted, method="highs")
-    return found.status == 0 and float(np.abs(rows @ found.x - wanted).max()) < BALANCED
+    return (
+        found.status == 0 and float(np.abs(rows @ found.x - wanted).max()) < UNBALANCED_FORCE_SHARE
+    )
 
 
 def _cone_edges(rigid: np.ndarray, mu: np.ndarray) -> np.ndarray:
@@ -73,7 +75,7 @@ def _cone_edges(rigid: np.ndarray, mu: np.ndarray) -> np.ndarray:
     if ports.shape[1] == 2:
         directions = np.array([[1.0], [-1.0]])
     else:
-        angle = 2 * np.pi * np.arange(EDGES) / EDGES
+        angle = 2 * np.pi * np.arange(FRICTION_CONE_EDGES) / FRICTION_CONE_EDGES
         directions = np.column_stack([np.cos(angle), np.sin(angle)])
     friction = mu[:, None, None] * np.einsum("et,ntd->ned", directions, ports[:, 1:])
     return (ports[:, None, 0] + friction).reshape(-1, rigid.shape[1]).T

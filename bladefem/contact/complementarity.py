@@ -24,12 +24,12 @@ from .as_array import given
 # relative size below which a force or gap counts as zero when the active set is updated
 ROUND_OFF = 1e-12
 # singular value of R, relative to the largest, below which a rigid direction is not held
-HELD = 1e-6
+RIGID_RANK_TOLERANCE = 1e-6
 # relative part of the load that may stay unbalanced
-UNBALANCED = 1e-8
+UNBALANCED_LOAD_SHARE = 1e-8
 
 
-INDEFINITE = "the contact flexibility is not positive definite"
+INDEFINITE_FLEXIBILITY_MESSAGE = "the contact flexibility is not positive definite"
 
 
 @dataclass(frozen=True)
@@ -101,7 +101,7 @@ def solve_lcp(
             f, y, active, more, settled = _primal_active_set(C, g0, U, reduced)
             its += more
     except LinAlgError:
-        return _unsolved_problem(g0, R, active, INDEFINITE)
+        return _unsolved_problem(g0, R, active, INDEFINITE_FLEXIBILITY_MESSAGE)
     gap = g0 + C @ f + U @ y
     residual = complementarity(f, gap, float(np.abs(C @ f).max()))
     residual = max(residual, _unbalanced_part(U.T @ f - reduced, f))
@@ -167,7 +167,7 @@ def held_directions(R: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     if R.shape[1] == 0:
         return R, np.zeros(0), np.zeros((0, 0))
     U, S, Vt = np.linalg.svd(R, full_matrices=False)
-    held = S > HELD * S[0]
+    held = S > RIGID_RANK_TOLERANCE * S[0]
     return U[:, held], S[held], Vt[held].T
 
 
@@ -181,7 +181,7 @@ def _balance_failure(R: np.ndarray, load: np.ndarray) -> str:
     if size == 0:
         return "the load on the floating body is zero, so nothing presses the faces together"
     _, rest = nnls((R / scale).T, load / scale)
-    if rest <= UNBALANCED * size:
+    if rest <= UNBALANCED_LOAD_SHARE * size:
         return ""
     return (
         f"pressing contact forces can't balance the load ({rest / size:.1%} of it stays): it lifts "
@@ -253,7 +253,7 @@ def _primal_dual(
         gap = g0 + C @ f + U @ y
         keep = active & (f > -ROUND_OFF * np.abs(f).max(initial=0.0))
         new = keep | (~active & (gap < -ROUND_OFF * max(np.abs(gap).max(), np.abs(gap - g0).max())))
-        balanced = np.abs(U.T @ f - load).max(initial=0.0) <= UNBALANCED * (
+        balanced = np.abs(U.T @ f - load).max(initial=0.0) <= UNBALANCED_LOAD_SHARE * (
             np.abs(load).max(initial=0.0) + 1e-300
         )
         if np.array_equal(new, active) and balanced:

@@ -20,7 +20,7 @@ from ..scene.units import show
 from .patch import patch_means
 
 # width of the eased strip over the element size, at least
-RESOLVED = 1.0
+MIN_STRIP_OVER_ELEMENT_SIZE = 1.0
 
 
 def seat_gap(
@@ -80,10 +80,11 @@ def _check_width(
 ) -> None:
     """A strip that falls between two nodes would be felt at random."""
     size = element_size(patch, mesh.depth)
-    if width < RESOLVED * size:
+    if width < MIN_STRIP_OVER_ELEMENT_SIZE * size:
+        narrowest = float(f"{MIN_STRIP_OVER_ELEMENT_SIZE * size:.2g}")
         raise InputError(
             f"contact.edge_width = {show(width, 'm')}: narrower than the elements of the seats, "
-            f"expected at least {show(float(f'{RESOLVED * size:.2g}'), 'm')}, or a smaller "
+            f"expected at least {show(narrowest, 'm')}, or a smaller "
             "mesh.contact_size"
         )
 

@@ -34,19 +34,19 @@ from .patch import initial_gap, port_matrix
 from .seating import ContactProblem, condense_body, rigid_and_load, spin_axis
 
 # number of the translation along the engine axis among the rigid motions of a body in space
-AXIAL = 2
+AXIAL_TRANSLATION = 2
 # accepted residual of a step, over the largest force
-SETTLED = 1e-10
+RESIDUAL_TOLERANCE = 1e-10
 # Newton steps of a load step, and halvings of one
-ITERATIONS = 60
-HALVINGS = 8
+MAX_NEWTON_STEPS = 60
+MAX_HALVINGS = 8
 # load steps of each change of speed: first and most tried
 FIRST_STEPS = 4
 MOST_STEPS = 64
 # change of the tangential forces, over the largest friction limit, at which the steps are enough
-STEPPED = 1e-3
+FORCE_CHANGE_TOLERANCE = 1e-3
 # of the scale of the damper's load
-LOADED = 1e-9
+MIN_LOAD_SHARE = 1e-9
 
 
 @dataclass(frozen=True)
@@ -153,7 +153,7 @@ def hold_axially(problem: Seated) -> Seated:
             'damper.axial = "held": a plane damper does not move along the engine axis, expected '
             '"free"'
         )
-    others = np.arange(len(problem.load)) != AXIAL
+    others = np.arange(len(problem.load)) != AXIAL_TRANSLATION
     return replace(problem, rigid=problem.rigid[:, others], load=problem.load[others])
 
 
@@ -209,7 +209,7 @@ def seat_with_friction(
     for _ in range(30):
         found = _refined(problem, face, speeds, scale, bedded)
         error = float(np.mean([m.force.sum() for m in found.maps])) / normal - 1
-        if abs(error) < LOADED:
+        if abs(error) < MIN_LOAD_SHARE:
             return found
         scale = scale / (1 + error)
     raise NotSolvedError(
@@ -246,7 +246,7 @@ def _refined(
         limit = float((face.mu * after.force[:, 0]).max())
         apart = float(np.abs(after.force[:, 1:] - before.force[:, 1:]).max())
         change = apart / max(limit, float(np.finfo(float).tiny))
-        if change < STEPPED or steps >= MOST_STEPS:
+        if change < FORCE_CHANGE_TOLERANCE or steps >= MOST_STEPS:
             break
         before = after
     return _seating(problem, face, after, scale * speeds[-1] ** 2, scale, steps, change)
@@ -298,15 +298,15 @@ def _step(
     if not before.force.any():
         x = _first_guess(problem, face, s0, load)
     residual, jacobian, slips = _projections(problem, face, before, s0, load, x)
-    for _ in range(ITERATIONS):
+    for _ in range(MAX_NEWTON_STEPS):
         force = x[: n * d].reshape(n, d)
-        if np.abs(residual).max() <= SETTLED * max(size, np.abs(force).max()):
+        if np.abs(residual).max() <= RESIDUAL_TOLERANCE * max(size, np.abs(force).max()):
             if not (force[:, 0] > 0).any():
                 raise NotSolvedError("the damper has lifted off its seats")
             return _State(force, x[n * d :], _moved(problem, s0, x), slips)
         step = _solved(jacobian, residual)
         share = 1.0
-        for _ in range(HALVINGS):
+        for _ in range(MAX_HALVINGS):
             trial = x - share * step
             found = _projections(problem, face, before, s0, load, trial)
             if np.linalg.norm(found[0]) < (1 - 0.1 * share) * np.linalg.norm(residual):
@@ -319,8 +319,8 @@ def _step(
         x = trial
         residual, jacobian, slips = found
     raise NotSolvedError(
-        f"the load step stopped after {ITERATIONS} iterations, {np.abs(residual).max():.1e} N are "
-        "left; expected a history that keeps the damper on its seats"
+        f"the load step stopped after {MAX_NEWTON_STEPS} iterations, {np.abs(residual).max():.1e} "
+        "N are left; expected a history that keeps the damper on its seats"
     )
 
 
@@ -467,7 +467,7 @@ def _seating(
     gap[state.force[:, 0] > 0] = 0.0
     cuts = np.cumsum([len(p.area) for p in problem.patches])[:-1]
     maps = [
-        PressureMap(patch, f[:, 0], g, SETTLED, f[:, 1:])
+        PressureMap(patch, f[:, 0], g, RESIDUAL_TOLERANCE, f[:, 1:])
         for patch, f, g in zip(
             problem.patches, np.split(state.force, cuts), np.split(gap, cuts), strict=True
         )

@@ -23,7 +23,7 @@ Layer = TypeVar("Layer", Contact, Seat)
 
 # stiffness per unit area that represents rigid faces in the elements [N/m^3]: a layer of
 # 1e-8 of the compliance of steel over a millimetre
-RIGID = 1e22
+RIGID_STIFFNESS = 1e22
 
 
 def mindlin_ratio(nu: float) -> float:
@@ -144,7 +144,7 @@ def stiffnesses(
         InputError: neither stiffness is given.
     """
     if contact.stiffness == "rigid":
-        return RIGID * area, RIGID * area
+        return RIGID_STIFFNESS * area, RIGID_STIFFNESS * area
     kt = _shared(contact.kt, contact.kt_area, area)
     kn = _shared(contact.kn, contact.kn_area, area)
     kn = kn if mapped is None else mapped

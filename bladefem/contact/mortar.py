@@ -29,9 +29,9 @@ from .surface import FaceRule, frames, outward, surface
 SLIVER_AREA = 1e-9
 MIN_FACING_COSINE = np.cos(np.radians(75))
 # of Newton's method to the place on a curved face
-STEPS = 8
+MAX_PROJECTION_STEPS = 8
 # a face counts as covered when less than this part of it is left over
-COVERED = 1e-6
+COVERED_AREA_TOLERANCE = 1e-6
 
 
 @dataclass(frozen=True)
@@ -98,7 +98,13 @@ def overlap(mesh: Mesh, pair: str) -> Overlap:
     whole = np.linalg.norm(weighted, axis=2).sum(axis=1)
     found = np.bincount(face[:, 0], weight.sum(axis=1), len(master))
     return Overlap(
-        master, slave, face, at, weight, vector / weight[:, :, None], found > whole * (1 - COVERED)
+        master,
+        slave,
+        face,
+        at,
+        weight,
+        vector / weight[:, :, None],
+        found > whole * (1 - COVERED_AREA_TOLERANCE),
     )
 
 
@@ -282,7 +288,7 @@ def _locate_points(
     """
     s, q, d = target.shape
     at = np.full((s, q, d), 0.0 if d == 1 else 1 / 3)
-    for _ in range(STEPS):
+    for _ in range(MAX_PROJECTION_STEPS):
         there, slopes = _map_points(nodes, at)
         off = (target - there @ view.T)[..., None]
         slopes = (slopes @ view.T).swapaxes(2, 3)

@@ -10,8 +10,8 @@ the same for every k_num; what changes is how fast the iteration converges and h
 see a contact that opens. Rigid faces are 1 / k = 0: k_num then is the penalty of the dynamic
 Lagrangian of Nacivet, Pierre, Thouverez, Jezequel, J. Sound Vib. 265 (2003) 201-219, DOI
 10.1016/S0022-460X(02)01447-5, whose result does not depend on it either. In the balance they keep
-a layer that is stiff compared with the bodies (STIFFEST); a layer given by the scene is used as it
-is.
+a layer that is stiff compared with the bodies (RIGID_FACE_STIFFNESS_RATIO);
+a layer given by the scene is used as it is.
 """
 
 from __future__ import annotations
@@ -32,11 +32,11 @@ from .seating import ContactProblem
 # seat, 3 harmonics and 320 N, 0.006, 0.025 and 0.1 lose 3, 0 and 0 of 12 points without fallbacks,
 # in 320, 210 and 100 iterations; at 80 N, where contacts lift off, 7 harmonics and 4000 N/mm^3 are
 # 6 and 14 % off with 0.006 and without the split.
-MULTIPLE = 0.05
+STIFFNESS_OVER_BODY_STIFFNESS = 0.05
 # Stiffness that represents rigid faces in the balance over the same. Without any layer, forces of
 # short waves are all but undetermined and sweeps lose points; on the shipped wedge under 320 N
 # resonances with 2e5, 3.5e5 and 1e6 N/mm^3 (1.3, 2.3 and 6.5 times) differ by 0.1 %.
-STIFFEST = 6.5
+RIGID_FACE_STIFFNESS_RATIO = 6.5
 
 
 def medium_stiffness(problem: ContactProblem) -> float:
@@ -53,12 +53,12 @@ def medium_stiffness(problem: ContactProblem) -> float:
 
 def numerical_stiffness(problem: ContactProblem) -> float:
     """Stiffness per unit area [N/m^3] above which a layer is split."""
-    return MULTIPLE * medium_stiffness(problem)
+    return STIFFNESS_OVER_BODY_STIFFNESS * medium_stiffness(problem)
 
 
 def stiffest_layer(problem: ContactProblem) -> float:
     """Stiffness per unit area [N/m^3] that represents rigid faces in the balance."""
-    return STIFFEST * medium_stiffness(problem)
+    return RIGID_FACE_STIFFNESS_RATIO * medium_stiffness(problem)
 
 
 def split_stiffness(

@@ -23,7 +23,7 @@ from .interface_elements import interface_law, pair_ratio
 from .interface_law import stiffness_at
 
 # half width of a crown's contact over the element size that is advised
-WANTED = 4.0
+ADVISED_ELEMENTS_PER_HALF_WIDTH = 4.0
 # elements in the length E* / kn from which the pressure at a sharp edge is resolved
 EDGE_ELEMENTS = 4.0
 
@@ -134,7 +134,7 @@ def narrow_sentence(
     )
     if worst >= MIN_ELEMENTS_PER_RADIUS * size:
         return ""
-    wanted = float(f"{worst / WANTED:.2g}")
+    wanted = float(f"{worst / ADVISED_ELEMENTS_PER_HALF_WIDTH:.2g}")
     return (
         f"peak pressure not resolved: under {show(load, 'N')} Hertz' contact on the crowned seats "
         f"has a half width of {show(float(f'{worst:.2g}'), 'm')}, their elements have "

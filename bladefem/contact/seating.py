@@ -45,12 +45,12 @@ from .interface_law import InterfaceLaw, closure_of, compliance_at, rigid_faces
 from .patch import initial_gap, make_patch, normal_ports, port_matrix, rigid_ports
 
 # gaps over elastic displacements beyond which a load is too light to be solved for
-HOVERING = 1e4
+MAX_GAP_OVER_DISPLACEMENT = 1e4
 # accepted part of the load along directions that frictionless seats can't hold
-SIDEWAYS = 0.01
+UNHELD_LOAD_SHARE = 0.01
 # steps of Newton's method on a layer that stiffens, and the relative change of force that ends them
-LAYER_STEPS = 50
-LAYER_SETTLED = 1e-12
+MAX_LAYER_STEPS = 50
+LAYER_TOLERANCE = 1e-12
 
 
 @dataclass(frozen=True)
@@ -280,10 +280,10 @@ def _state(
     _, _, held = held_directions(problem.rigid)
     load = held @ (held.T @ problem.load)
     sideways = np.linalg.norm(problem.load - load) / np.linalg.norm(problem.load)
-    if sideways > SIDEWAYS:
+    if sideways > UNHELD_LOAD_SHARE:
         raise NotSolvedError(
             f"{sideways:.1%} of the damper's load is along a direction in which frictionless seats "
-            f"can't hold it, expected below {SIDEWAYS:.0%}"
+            f"can't hold it, expected below {UNHELD_LOAD_SHARE:.0%}"
         )
     solution = _on_layer(problem, g0 + scale * problem.damper_swell, -scale * load, active)
     if solution.reason:
@@ -303,7 +303,7 @@ def _on_layer(
     """The complementarity problem with the layer in series; Newton's method where it stiffens."""
     law = problem.law
     force = np.zeros(len(g0))
-    for _ in range(LAYER_STEPS):
+    for _ in range(MAX_LAYER_STEPS):
         slope = compliance_at(law, force)
         solution = solve_lcp(
             problem.flexibility + np.diag(slope),
@@ -315,7 +315,7 @@ def _on_layer(
         change = np.abs(solution.force - force).max()
         force = solution.force
         active = solution.active
-        settled = change <= LAYER_SETTLED * np.abs(force).max()
+        settled = change <= LAYER_TOLERANCE * np.abs(force).max()
         if solution.reason or settled or not np.isfinite(law.doubling).any():
             return solution
     return replace(
@@ -337,7 +337,7 @@ def _too_light(
     misfit = float(np.ptp(g0 - U @ (U.T @ g0)))
     yielding = problem.flexibility.diagonal() + compliance_at(problem.law, np.zeros(len(g0)))
     bent = float(yielding.max() * np.linalg.norm(scale * (held.T @ load) / S))
-    if misfit <= HOVERING * bent:
+    if misfit <= MAX_GAP_OVER_DISPLACEMENT * bent:
         return ""
     return (
         " and rests on single points: the load presses bodies and layer together by some "

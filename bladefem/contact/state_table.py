@@ -18,7 +18,7 @@ from ..errors import InputError
 from ..scene.tables import Material
 
 # what "much larger" means in T >> D / c
-MARGIN = 10.0
+MUCH_LARGER_RATIO = 10.0
 
 
 @dataclass(frozen=True)
@@ -122,7 +122,7 @@ class QuasiStatic:
         return (
             f"quasi-static contact {'holds' if self.holds else 'does NOT hold'}: the period "
             f"{self.period:.3g} s is {self.period / self.transit:.3g} wave transits of the patch "
-            f"(at least {MARGIN:g} wanted; up to {self.limit:.3g} Hz)"
+            f"(at least {MUCH_LARGER_RATIO:g} wanted; up to {self.limit:.3g} Hz)"
         )
 
 
@@ -142,5 +142,8 @@ def quasi_static(
     extent = float(np.linalg.norm(np.ptp(patch.points @ patch.frame[0].T, axis=0)))
     transit = extent / np.sqrt(material.E / material.rho)
     return QuasiStatic(
-        1 / frequency, transit, bool(1 / frequency >= MARGIN * transit), 1 / (MARGIN * transit)
+        1 / frequency,
+        transit,
+        bool(1 / frequency >= MUCH_LARGER_RATIO * transit),
+        1 / (MUCH_LARGER_RATIO * transit),
     )

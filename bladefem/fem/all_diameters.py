@@ -26,20 +26,20 @@ from .eigensolver import Eigensolver
 from .flexibility import Flexibility, flexible
 from .linalg import Folded, apply, combined, dot, inertia, minus, mix
 from .memory import give_back
-from .modes import BLOCKS, GAP_SHARE, SLEPC, TOLERANCE, mode_set, pairs, pairs_together
+from .modes import BLOCKS, DIRECTION_TOLERANCE, GAP_SHARE, SLEPC, mode_set, pairs, pairs_together
 
 # modes beyond those asked for, carried along
-GUARD = 2
+GUARD_MODES = 2
 # rough ones beyond, from which other diameters are guessed
-MORE = 12
+EXTRA_ROUGH_MODES = 12
 # places of the diameters solved first: shapes change fastest at low ones
-FIRST = (0, 1, 1 / 3, 1 / 6, 2 / 3)
+FIRST_DIAMETER_PLACES = (0, 1, 1 / 3, 1 / 6, 2 / 3)
 # numbers of solved diameters from which the others are guessed
-LEVELS = (3, 4, 5)
+SOLVED_DIAMETERS_BY_LEVEL = (3, 4, 5)
 # diameters solved from scratch at a time: more of them would save little and take memory
-TOGETHER = 3
+DIAMETERS_AT_A_TIME = 3
 # columns of a sparse product at a time, to spare memory
-CHUNK = 32
+COLUMNS_AT_A_TIME = 32
 # error of a vector's direction; that of a frequency is its square
 VECTOR_TOLERANCE = 5e-6
 
@@ -118,7 +118,7 @@ def all_diameters(
     t = transformation(body, clamp, True) if isinstance(body, Body) else body
     wanted = list(range(t.sectors // 2 + 1)) if diameters is None else list(diameters)
     solved = count if kept is None else max(count, kept.count)
-    tolerance = VECTOR_TOLERANCE if kept is None else TOLERANCE
+    tolerance = VECTOR_TOLERANCE if kept is None else DIRECTION_TOLERANCE
     steps = progress(
         eigenpairs(t, solved, wanted, direct, tolerance, solver), "nodal diameters", len(wanted)
     )
@@ -148,30 +148,37 @@ def eigenpairs(
     """
     cons = {n: at_diameter(t, n) for n in diameters}
     order = _diameter_order(sorted(cons))
-    guessed = len(order) > LEVELS[0] and not direct
-    scratch = order[: LEVELS[0]] if guessed else order
+    guessed = len(order) > SOLVED_DIAMETERS_BY_LEVEL[0] and not direct
+    scratch = order[: SOLVED_DIAMETERS_BY_LEVEL[0]] if guessed else order
     blocks: list[np.ndarray] = []
-    for first in range(0, len(scratch), TOGETHER):
-        some = [flexible(cons[n]) for n in scratch[first : first + TOGETHER]]
-        solved = pairs_together(some, count, tolerance, MORE if guessed else GUARD, solver)
+    for first in range(0, len(scratch), DIAMETERS_AT_A_TIME):
+        some = [flexible(cons[n]) for n in scratch[first : first + DIAMETERS_AT_A_TIME]]
+        solved = pairs_together(
+            some, count, tolerance, EXTRA_ROUGH_MODES if guessed else GUARD_MODES, solver
+        )
         for flex, (lam, X) in zip(some, solved, strict=True):
             if guessed:
                 blocks.append(X)
             yield _first_pairs(Eigenpairs(flex, lam, X), count, guessed)
     space = None
     for i, n in enumerate(order[len(scratch) :], len(scratch)):
-        if i in LEVELS:
+        if i in SOLVED_DIAMETERS_BY_LEVEL:
             give_back()
             space = _extend_space(t, blocks, space)
             blocks = []
         # always so: the first of the levels comes first
         assert space is not None
-        helps = i < LEVELS[-1]
+        helps = i < SOLVED_DIAMETERS_BY_LEVEL[-1]
         # the last ones need a step or two: guards would not pay
-        guess = count + (GUARD if helps else 0)
+        guess = count + (GUARD_MODES if helps else 0)
         start = _initial_vectors(space, cons[n], 2 * np.pi * n / t.sectors, guess)
         found = _solve_pairs(
-            flexible(cons[n]), count, start, solver, tolerance, MORE if helps else GUARD
+            flexible(cons[n]),
+            count,
+            start,
+            solver,
+            tolerance,
+            EXTRA_ROUGH_MODES if helps else GUARD_MODES,
         )
         if helps:
             blocks.append(found.X)
@@ -184,7 +191,7 @@ def _first_pairs(
     copied: bool,
 ) -> Eigenpairs:
     """Those wanted and the guards; a copy where the others' memory is needed for something else."""
-    few = slice(0, count + GUARD)
+    few = slice(0, count + GUARD_MODES)
     return replace(
         found, lam=found.lam[few], X=found.X[:, few].copy(order="F") if copied else found.X
     )
@@ -192,7 +199,7 @@ def _first_pairs(
 
 def _diameter_order(order: list[int]) -> list[int]:
     """Those that guess well between them, then the others."""
-    first = [round(part * (len(order) - 1)) for part in FIRST] if order else []
+    first = [round(part * (len(order) - 1)) for part in FIRST_DIAMETER_PLACES] if order else []
     return [order[i] for i in dict.fromkeys([*first, *range(len(order))])]
 
 
@@ -202,7 +209,7 @@ def _solve_pairs(
     start: np.ndarray | None,
     solver: Eigensolver,
     tolerance: float = VECTOR_TOLERANCE,
-    guard: int = GUARD,
+    guard: int = GUARD_MODES,
 ) -> Eigenpairs:
     guard = min(guard, flex.con.T.shape[1] - count)
     return Eigenpairs(flex, *pairs(flex, count, tolerance, start, guard, solver))
@@ -316,8 +323,8 @@ def _project_interior(
 ) -> list[tuple[np.ndarray, np.ndarray]]:
     """low^T A low and high^T A low of some columns, a few at a time, for K and for M."""
     pieces: list[list[tuple[np.ndarray, np.ndarray]]] = [[], []]
-    for first in range(new.start, low.shape[1], CHUNK):
-        moved = np.ascontiguousarray(low[:, first : first + CHUNK])
+    for first in range(new.start, low.shape[1], COLUMNS_AT_A_TIME):
+        moved = np.ascontiguousarray(low[:, first : first + COLUMNS_AT_A_TIME])
         for piece, A in zip(pieces, both, strict=True):
             image = A @ moved
             piece.append((low.T @ image, high.T @ image[faces]))

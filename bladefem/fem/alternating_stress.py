@@ -13,13 +13,13 @@ from .stress import nodal_stress, stress_jumps, von_mises
 from .stress_error import mesh_error
 
 # instants of a period for each harmonic, the highest one included
-INSTANTS = 16
+INSTANTS_PER_HARMONIC = 16
 # nodes that are followed in time: those with the largest sum of the harmonics' own stresses
-FOLLOWED = 4000
+MAX_NODES_IN_TIME = 4000
 # places where the mesh may hide a larger stress
-RIVALS = 12
+RIVAL_PLACES = 12
 # harmonics below this share of the largest one's displacement are left out
-NEGLIGIBLE = 1e-5
+NEGLIGIBLE_HARMONIC_SHARE = 1e-5
 
 
 @dataclass(frozen=True)
@@ -53,14 +53,14 @@ def alternating_stress(
             estimated error.
     """
     size = np.array([np.abs(u).max() for u in harmonics])
-    kept = [h for h in range(len(harmonics)) if size[h] > NEGLIGIBLE * size.max()]
+    kept = [h for h in range(len(harmonics)) if size[h] > NEGLIGIBLE_HARMONIC_SHARE * size.max()]
     found = np.array([nodal_stress(body, harmonics[h]) for h in kept])
     own = von_mises(found)
     # the sum of the harmonics' own maxima bounds what they reach together
     bound = own.sum(axis=0)
-    count = min(FOLLOWED, bound.size)
+    count = min(MAX_NODES_IN_TIME, bound.size)
     nodes = np.argpartition(bound, -count)[-count:]
-    instants = INSTANTS * (kept[-1] + 1)
+    instants = INSTANTS_PER_HARMONIC * (kept[-1] + 1)
     angle = 2 * np.pi * np.arange(instants) / instants
     turns = np.exp(1j * np.outer(angle, np.array(kept) + 1))
     in_time = [von_mises(np.einsum("h,hns->ns", turn, found[:, nodes]).real) for turn in turns]
@@ -74,7 +74,7 @@ def alternating_stress(
     strongest = int(own[:, node].argmax())
     u = harmonics[kept[strongest]]
     possible = bound + stress_jumps(body, u, found[strongest])
-    rivals = np.argpartition(possible, -min(RIVALS, count))[-min(RIVALS, count) :]
+    rivals = np.argpartition(possible, -min(RIVAL_PLACES, count))[-min(RIVAL_PLACES, count) :]
     highest = [
         bound[rival] * (1 + mesh_error(body, u, found[strongest], int(rival), touched))
         for rival in rivals

@@ -22,7 +22,7 @@ from .mumps import Factorised, factorise_matrix, solve_matrix
 from .schur import Bridge, bridge, schur_complement, through
 
 # complex columns a solve: from 32 real ones on MUMPS runs at the speed of matrix products
-BATCH = 32
+COLUMNS_PER_SOLVE = 32
 
 
 @dataclass(frozen=True)
@@ -165,8 +165,8 @@ def solve(rim: Rim, B: np.ndarray) -> np.ndarray:
     """Solve for a block of vectors (n_free, k)."""
     X = np.empty(B.shape, np.result_type(B, rim.C.dtype), order="F")
     made = rim.core.bridge
-    for first in range(0, B.shape[1], BATCH):
-        part = slice(first, first + BATCH)
+    for first in range(0, B.shape[1], COLUMNS_PER_SOLVE):
+        part = slice(first, first + COLUMNS_PER_SOLVE)
         if made is None:
             X[rim.inner, part], X[rim.masters, part] = _solve_two_sweeps(rim, B[:, part])
         else:
@@ -186,7 +186,7 @@ def solve_together(systems: list[tuple[Rim, np.ndarray]]) -> list[np.ndarray]:
         systems: nodal diameters on the same core, and their loads.
     """
     made = systems[0][0].core.bridge
-    many = sum(B.shape[1] for _, B in systems) > BATCH
+    many = sum(B.shape[1] for _, B in systems) > COLUMNS_PER_SOLVE
     if made is None or many or len(systems) == 1:
         return [solve(rim, B) for rim, B in systems]
     out = []

@@ -27,21 +27,21 @@ from .lanczos import lowest, orthonormal
 from .linalg import apply, dot, minus, mix
 
 # iterations (restarts) until SLEPc gives up
-RESTARTS = 100
+MAX_RESTARTS = 100
 # basis vectors beyond twice the pairs wanted: fewer restart once more, more are not needed
 MORE_VECTORS = 2
 # columns that a growing block of vectors has room for at first
-FIRST_ROOM = 48
+FIRST_BASIS_VECTORS = 48
 # relative difference up to which a vector is a multiple of another: rounding
-SAME = 1e-14
+PARALLEL_TOLERANCE = 1e-14
 # share of earlier directions in a new one that is rounding
-ROUNDING = 1e-14
+ROUNDING_SHARE = 1e-14
 # share of a direction beyond which it counts as new, after those that are known
-NEW = 1e-6
+NEW_DIRECTION_SHARE = 1e-6
 # largest imaginary part of products with earlier directions, for a direction of the same space
-STRAY = 1e-4
+IMAGINARY_PART_TOLERANCE = 1e-4
 # words of EPSConvergedReason
-REASONS = {-1: "too many restarts", -2: "breakdown", -3: "the pencil lost its symmetry"}
+REASON_WORDS = {-1: "too many restarts", -2: "breakdown", -3: "the pencil lost its symmetry"}
 
 
 @dataclass(frozen=True)
@@ -71,7 +71,7 @@ class _Columns:
     def append(self, column: np.ndarray) -> None:
         """One more (n_own, 1)."""
         if self._count == self._store.shape[1]:
-            room = max(2 * self._count, FIRST_ROOM)
+            room = max(2 * self._count, FIRST_BASIS_VECTORS)
             grown = np.empty((len(column), room), column.dtype, order="F")
             if self._count:
                 grown[:, : self._count] = self.block
@@ -184,11 +184,11 @@ def _multiple(vector: np.ndarray | None, other: np.ndarray) -> float | None:
         return None
     factor = float(other.real[place, 0] / vector.real[place, 0])
     # one entry tells most vectors apart
-    quick = abs(other[0, 0] - factor * vector[0, 0]) <= SAME * abs(other).max()
+    quick = abs(other[0, 0] - factor * vector[0, 0]) <= PARALLEL_TOLERANCE * abs(other).max()
     if not quick:
         return None
     difference = other - factor * vector
-    return factor if abs(difference).max() <= SAME * abs(other).max() else None
+    return factor if abs(difference).max() <= PARALLEL_TOLERANCE * abs(other).max() else None
 
 
 class _Stiffness:
@@ -253,7 +253,9 @@ def _remember_direction(pencil: _Pencil, load: np.ndarray) -> None:
     product = np.zeros((0, 1), complex)
     if len(pencil.known):
         product = dot(comm, pencil.images.block, last)
-    if not pencil.started or abs(product.imag).max(initial=0.0) > STRAY * np.sqrt(size):
+    if not pencil.started or abs(product.imag).max(
+        initial=0.0
+    ) > IMAGINARY_PART_TOLERANCE * np.sqrt(size):
         pencil.started = True
         pencil.known.clear()
         pencil.images.clear()
@@ -261,11 +263,11 @@ def _remember_direction(pencil: _Pencil, load: np.ndarray) -> None:
     direction = last
     image = load
     share = product.real
-    if abs(share).max(initial=0.0) > ROUNDING * np.sqrt(size):
+    if abs(share).max(initial=0.0) > ROUNDING_SHARE * np.sqrt(size):
         direction = direction - mix(pencil.known.block, share.astype(complex))
         image = image - mix(pencil.images.block, share.astype(complex))
     rest = size - (share**2).sum()
-    if rest > NEW * size:
+    if rest > NEW_DIRECTION_SHARE * size:
         pencil.known.append(direction / np.sqrt(rest))
         pencil.images.append(image / np.sqrt(rest))
 
@@ -305,7 +307,7 @@ def krylov_schur(
         return lowest(con, inverse, np.asfortranarray(X), count, tolerance, guard)
     if len(lam) < count:
         raise NotSolvedError(
-            f"SLEPc found {len(lam)} of {count} modes: {REASONS.get(reason, 'no convergence')}"
+            f"SLEPc found {len(lam)} of {count} modes: {REASON_WORDS.get(reason, 'no convergence')}"
         )
     if guard and len(lam) < count + guard and len(pencil.known):
         more, rough = _rough_pairs(pencil, X, count + guard - len(lam))
@@ -362,7 +364,7 @@ def _make_solver(
     eps.setTarget(0.0)
     basis = settings.vectors or basis_size(count)
     eps.setDimensions(count, max(basis, count + 1))
-    eps.setTolerances(tolerance, RESTARTS)
+    eps.setTolerances(tolerance, MAX_RESTARTS)
     # done here, for all vectors in one batch
     eps.setPurify(False)
     transform = eps.getST()
@@ -404,7 +406,7 @@ def _purify_vectors(
     """
     if not X.shape[1]:
         return np.zeros(0), X
-    _Q, MQ, _ = orthonormal(con, [], [], X, NEW)
+    _Q, MQ, _ = orthonormal(con, [], [], X, NEW_DIRECTION_SHARE)
     Y = inverse(MQ)
     theta, S = np.linalg.eigh(_hermitian_part(dot(con.body.comm, MQ, Y)))
     theta = theta[::-1][:wanted]

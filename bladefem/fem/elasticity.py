@@ -22,7 +22,7 @@ from .compat import cell_dofs, dolfinx, scalar_space, ufl
 
 # stress from strain, both (dim, dim) expressions of ufl
 Law = Callable[[Any], Any]
-PAIRS = ((0, 0), (1, 1), (2, 2), (1, 2), (2, 0), (0, 1))
+VOIGT_PAIRS = ((0, 0), (1, 1), (2, 2), (1, 2), (2, 0), (0, 1))
 
 
 def is_isotropic(material: Material) -> bool:
@@ -105,7 +105,7 @@ def elastic_law(
             C[i, j] = C[j, i] = piecewise(domain, matrices[owner, i, j])
 
     def law(strain: Any) -> Any:
-        e = [strain[a, b] * (1 if a == b else 2) for a, b in PAIRS]
+        e = [strain[a, b] * (1 if a == b else 2) for a, b in VOIGT_PAIRS]
         s = [sum(C[i, j] * e[j] for j in range(6)) for i in range(6)]
         return ufl.as_tensor([[s[0], s[5], s[4]], [s[5], s[1], s[3]], [s[4], s[3], s[2]]])
 
@@ -123,10 +123,10 @@ def stress_of(
         lam, mu = lame(material, dim, plane)
         trace = np.trace(strain, axis1=-2, axis2=-1)
         return 2 * mu * strain + lam * trace[..., None, None] * np.eye(dim)
-    e = np.stack([strain[..., a, b] * (1 if a == b else 2) for a, b in PAIRS], axis=-1)
+    e = np.stack([strain[..., a, b] * (1 if a == b else 2) for a, b in VOIGT_PAIRS], axis=-1)
     s = e @ stiffness(material)
     stress = np.empty_like(strain)
-    for i, (a, b) in enumerate(PAIRS):
+    for i, (a, b) in enumerate(VOIGT_PAIRS):
         stress[..., a, b] = stress[..., b, a] = s[..., i]
     return stress
 
@@ -171,8 +171,8 @@ def _material_flexibility(material: Material) -> np.ndarray:
 def _turn_stiffness(C: np.ndarray, R: np.ndarray) -> np.ndarray:
     """The same stiffness in axes in which the material's own are the columns of R."""
     full = np.empty((3, 3, 3, 3))
-    for i, (a, b) in enumerate(PAIRS):
-        for j, (c, d) in enumerate(PAIRS):
+    for i, (a, b) in enumerate(VOIGT_PAIRS):
+        for j, (c, d) in enumerate(VOIGT_PAIRS):
             full[a, b, c, d] = full[b, a, c, d] = full[a, b, d, c] = full[b, a, d, c] = C[i, j]
     turned = np.einsum("ia,jb,kc,ld,abcd->ijkl", R, R, R, R, full, optimize=True)
-    return np.array([[turned[a, b, c, d] for c, d in PAIRS] for a, b in PAIRS])
+    return np.array([[turned[a, b, c, d] for c, d in VOIGT_PAIRS] for a, b in VOIGT_PAIRS])

@@ -19,7 +19,7 @@ from .constraint import Constrained, expand, unknowns
 from .linalg import Factor, apply, dense_rows, dot, factorise, scale, solve_together
 
 # of the mean diagonal of K over that of M: squared frequency of a motion that springs do not hold
-SOFT = 1e-12
+UNHELD_FREQUENCY_RATIO = 1e-12
 
 
 @dataclass(frozen=True)
@@ -118,7 +118,7 @@ def _unsprung_motions(con: Constrained, spring: Any, basis: np.ndarray) -> np.nd
     local = np.asfortranarray(moves[mine])
     stiffness = dot(body.comm, local, apply(spring, local))
     lam, Z = np.linalg.eigh((stiffness + stiffness.conj().T) / 2)
-    return basis @ Z[:, lam < SOFT * scale(con.K) / scale(con.M)]
+    return basis @ Z[:, lam < UNHELD_FREQUENCY_RATIO * scale(con.K) / scale(con.M)]
 
 
 def unknown_places(con: Constrained) -> np.ndarray:

@@ -14,9 +14,9 @@ from .memory import available, needed
 
 Result = TypeVar("Result")
 # tasks of a group up to which none of them helps another
-FEW = 3
+MAX_UNGROUPED_TASKS = 3
 # share of the free memory that groups may fill
-SPARE = 0.8
+USABLE_MEMORY_SHARE = 0.8
 
 
 def group_size(
@@ -36,7 +36,10 @@ def group_size(
     together = comm.allreduce(here.size, MPI.MAX)
     here.Free()
     for size in range(1, comm.size):
-        if comm.size % size == 0 and needed(dofs, size) * max(together // size, 1) < SPARE * free:
+        if (
+            comm.size % size == 0
+            and needed(dofs, size) * max(together // size, 1) < USABLE_MEMORY_SHARE * free
+        ):
             return size
     return comm.size
 
@@ -90,7 +93,7 @@ def _even_shares(
 ) -> list[list[int]]:
     """The tasks of each group, ascending."""
     some = sorted({int(task) for task in tasks})
-    if len(some) > FEW * groups:
+    if len(some) > MAX_UNGROUPED_TASKS * groups:
         return [[int(task) for task in share] for share in np.array_split(some, groups)]
     shares: list[list[int]] = [[] for _ in range(groups)]
     # the most expensive first, each to the group that has least to do

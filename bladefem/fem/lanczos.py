@@ -19,14 +19,14 @@ from .compat import MPI
 from .constraint import Constrained
 from .linalg import apply, dot, minus, mix
 
-STEPS = 200
+MAX_STEPS = 200
 # share of old directions in a new one below which its image under M is corrected, not computed
 # again
-CLEAN = 1e-8
+OLD_DIRECTION_SHARE = 1e-8
 # least square of a column, of the largest, up to which one normalisation is enough
-EVEN = 1e-6
+SINGLE_NORMALISATION_SHARE = 1e-6
 # square of a direction, of the largest, below which it is dropped at once
-ROUNDING = 1e-26
+DROPPED_DIRECTION_SHARE = 1e-26
 # square of a direction, normalised once, from which on it was more than rounding
 TRUE_DIRECTION = 0.25
 # share of the tolerance below which a direction of the residual waits
@@ -77,7 +77,7 @@ def lowest(
     """
     space = _Space()
     block, Mblock, _ = orthonormal(con, [], [], start.astype(con.dtype))
-    for _ in range(STEPS):
+    for _ in range(MAX_STEPS):
         _extend_basis(con, space, block, Mblock, inverse(Mblock))
         theta, S = eigh(space.H)
         theta = theta[::-1]
@@ -93,7 +93,8 @@ def lowest(
             space, rest[:, :count], DEFERRED_SHARE * tolerance if k >= count else 0.0
         )
     raise NotSolvedError(
-        f"the modes did not converge in {STEPS} steps (error {error:.1e}, expected {tolerance:.1e})"
+        f"the modes did not converge in {MAX_STEPS} steps (error {error:.1e}, "
+        f"expected {tolerance:.1e})"
     )
 
 
@@ -112,12 +113,14 @@ def orthonormal(
             dropped, so that Q may have fewer columns than W.
     """
     comm = con.body.comm
-    W, MW, R, spread = _orthogonal_factor(comm, W, apply(con.M, W), ROUNDING, ROUNDING * size**2)
+    W, MW, R, spread = _orthogonal_factor(
+        comm, W, apply(con.M, W), DROPPED_DIRECTION_SHARE, DROPPED_DIRECTION_SHARE * size**2
+    )
     left = dot(comm, MV, W)
     W = minus(W, V, left)
-    clean = abs(left).max(initial=0.0) < CLEAN
+    clean = abs(left).max(initial=0.0) < OLD_DIRECTION_SHARE
     MW = minus(MW, MV, left) if clean else apply(con.M, W)
-    if clean and spread > EVEN:
+    if clean and spread > SINGLE_NORMALISATION_SHARE:
         return W, MW, R
     # what is much longer than 1 now came from a direction that was rounding in the first product:
     # the others are no less true for that

@@ -23,7 +23,7 @@ from ..errors import InputError
 from .compat import MPI
 
 # interpreter and libraries of one rank [bytes]
-START = 1.2e8
+BYTES_PER_RANK = 1.2e8
 # bytes: a dofs + b dofs^(4/3)
 ONE_CORE = (3.29e3, 180.5)
 DOUBLED = (1.9e4, 160.0)
@@ -36,7 +36,7 @@ def needed(dofs: int, ranks: int = 1) -> float:
         dofs: degrees of freedom of the body, three a node.
     """
     linear, factors = ONE_CORE if ranks == 1 else DOUBLED
-    return ranks * START + linear * dofs + factors * dofs ** (4 / 3)
+    return ranks * BYTES_PER_RANK + linear * dofs + factors * dofs ** (4 / 3)
 
 
 def available() -> float:

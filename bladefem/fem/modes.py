@@ -24,9 +24,9 @@ from .lanczos import lowest
 from .linalg import Folded, apply, combined, dot, inertia, scale
 
 # error of a vector's direction; that of a frequency is its square
-TOLERANCE = 1e-8
+DIRECTION_TOLERANCE = 1e-8
 # the same where modes are looked at, not reduced with
-SHOWN = 1e-6
+SHOWN_DIRECTION_TOLERANCE = 1e-6
 # of a gap between eigenvalues: where the inertia is counted
 GAP_SHARE = 0.9
 SLEPC = Eigensolver()
@@ -40,7 +40,7 @@ def modes(
     con: Constrained,
     count: int,
     flex: Flexibility | None = None,
-    tolerance: float = SHOWN,
+    tolerance: float = SHOWN_DIRECTION_TOLERANCE,
     solver: Eigensolver = SLEPC,
     prove: bool = True,
 ) -> ModeSet:
@@ -65,7 +65,7 @@ def modes(
 def proven_pairs(
     flex: Flexibility,
     count: int,
-    tolerance: float = TOLERANCE,
+    tolerance: float = DIRECTION_TOLERANCE,
     solver: Eigensolver = SLEPC,
 ) -> tuple[np.ndarray, np.ndarray]:
     """``pairs`` whose number the inertia confirms; those that were missed are found by blocks.
@@ -94,7 +94,7 @@ def proven_pairs(
 def pairs(
     flex: Flexibility,
     count: int,
-    tolerance: float = TOLERANCE,
+    tolerance: float = DIRECTION_TOLERANCE,
     start: np.ndarray | None = None,
     guard: int = 0,
     solver: Eigensolver = SLEPC,
@@ -118,7 +118,7 @@ def pairs(
 def pairs_together(
     bodies: Sequence[Flexibility],
     count: int,
-    tolerance: float = TOLERANCE,
+    tolerance: float = DIRECTION_TOLERANCE,
     guard: int = 0,
     solver: Eigensolver = SLEPC,
 ) -> list[tuple[np.ndarray, np.ndarray]]:
@@ -182,7 +182,7 @@ def _stiffness_scale(con: Constrained, X: np.ndarray) -> float:
 def elastic_pairs(
     flex: Flexibility,
     count: int,
-    tolerance: float = TOLERANCE,
+    tolerance: float = DIRECTION_TOLERANCE,
     inverse: Callable[[np.ndarray], np.ndarray] | None = None,
     start: np.ndarray | None = None,
     guard: int = 0,

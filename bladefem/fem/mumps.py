@@ -18,13 +18,13 @@ from ..errors import NotSolvedError
 from .compat import PETSc, no_error_messages
 
 # columns a solve: MUMPS works on them by matrix products, 256 are no faster
-BATCH = 128
+COLUMNS_PER_SOLVE = 128
 # per cent of memory beyond MUMPS's own estimate
-ROOM = 40
+EXTRA_MEMORY_PERCENT = 40
 # MATOP_LUFACTOR_SYMBOLIC
-ANALYSIS = 25
+SYMBOLIC_FACTORISATION = 25
 # share of non-zero rows below which a right-hand side counts as sparse
-SPARSE = 0.2
+SPARSE_ROW_SHARE = 0.2
 
 
 @dataclass(frozen=True)
@@ -69,7 +69,7 @@ def factorise_matrix(
     A.setOption(PETSc.Mat.Option.SPD, definite)
     pc = _prepare_solver(A, PETSc.PC.Type.CHOLESKY)
     F = pc.getFactorMatrix()
-    F.setMumpsIcntl(14, ROOM)
+    F.setMumpsIcntl(14, EXTRA_MEMORY_PERCENT)
     if not definite:
         # the last block is counted too
         F.setMumpsIcntl(13, 1)
@@ -118,11 +118,11 @@ def solve_matrix(
     F = factor.matrix
     out = np.empty(B.shape, order="F")
     rows = np.flatnonzero(B.any(axis=1)) if F.comm.size == 1 else np.arange(B.shape[0])
-    batch = max(B.shape[1], 1) if whole else BATCH
+    batch = max(B.shape[1], 1) if whole else COLUMNS_PER_SOLVE
     F.setMumpsIcntl(26, -1 if whole else 0)
     for first in range(0, B.shape[1], batch):
         part = slice(first, min(first + batch, B.shape[1]))
-        sparse = 0 < len(rows) < SPARSE * len(B)
+        sparse = 0 < len(rows) < SPARSE_ROW_SHARE * len(B)
         right = (
             _sparse_block(F, rows, B[rows, part])
             if sparse
@@ -225,9 +225,12 @@ def _in_order(
     unsymmetric = _prepare_solver(A, PETSc.PC.Type.LU)
     analysis = ctypes.c_void_p()
     petsc_call(
-        "MatGetOperation", unsymmetric.getFactorMatrix().handle, ANALYSIS, ctypes.byref(analysis)
+        "MatGetOperation",
+        unsymmetric.getFactorMatrix().handle,
+        SYMBOLIC_FACTORISATION,
+        ctypes.byref(analysis),
     )
-    set_operation(F.handle, ANALYSIS, analysis)
+    set_operation(F.handle, SYMBOLIC_FACTORISATION, analysis)
     places = PETSc.IS().createGeneral(order.astype(PETSc.IntType), comm=F.comm)
     # MatFactorInfo, all defaults
     info = (ctypes.c_double * 16)()

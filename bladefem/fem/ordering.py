@@ -19,7 +19,7 @@ import scipy.sparse as sp
 
 # unknowns from which METIS beats AMD
 MIN_METIS_UNKNOWNS = 60_000
-NAMES = ("libmetis.so.5", "libmetis.so", "libmetis.dylib")
+METIS_LIBRARIES = ("libmetis.so.5", "libmetis.so", "libmetis.dylib")
 
 
 def interior_first(
@@ -81,7 +81,7 @@ def _metis_library() -> ctypes.CDLL | None:
     """The library, if it is there and counts in 32 bits: two nodes without edges are the same input
     for both widths.
     """
-    for name in (*NAMES, find_library("metis") or ""):
+    for name in (*METIS_LIBRARIES, find_library("metis") or ""):
         try:
             library = ctypes.CDLL(name) if name else None
         except OSError:

@@ -20,11 +20,11 @@ from .cyclic_schur import Rim, face_solve, inner_solve
 from .eigensolver import Eigensolver
 from .flexibility import Flexibility, compliance, flexible
 from .linalg import apply, dot
-from .modes import SLEPC, TOLERANCE, canonical, elastic_pairs, proven_pairs
+from .modes import DIRECTION_TOLERANCE, SLEPC, canonical, elastic_pairs, proven_pairs
 
 # ports in one sweep
-BATCH = 64
-KINDS = ("rubin", "craig-bampton")
+PORTS_PER_SOLVE = 64
+REDUCTION_KINDS = ("rubin", "craig-bampton")
 
 
 def port_model(
@@ -51,8 +51,8 @@ def port_model(
         InputError: P does not fit the mesh, or knows no such kind.
         NotSolvedError: from the factorisation or the modes.
     """
-    if kind not in KINDS:
-        raise InputError(f"reduction is '{kind}'{suggestion(kind, KINDS)}")
+    if kind not in REDUCTION_KINDS:
+        raise InputError(f"reduction is '{kind}'{suggestion(kind, REDUCTION_KINDS)}")
     F = _restrict_ports(con, P)
     flex = flex or flexible(con)
     columns = (
@@ -101,7 +101,7 @@ def port_models(
         return
     cons = {}
     lam = {}
-    for p in eigenpairs(t, count, diameters, tolerance=TOLERANCE, solver=solver):
+    for p in eigenpairs(t, count, diameters, tolerance=DIRECTION_TOLERANCE, solver=solver):
         diameter = p.con.nodal_diameter
         # None is for bodies without cyclic faces only
         assert diameter is not None
@@ -109,7 +109,10 @@ def port_models(
         lam[diameter] = p.lam
         yield diameter, _port_model(model, p)
     for n, truth in lost_modes(t, cons, lam, count).items():
-        yield n, _port_model(model, found_again(flexible(cons[n]), count, truth, TOLERANCE))
+        yield (
+            n,
+            _port_model(model, found_again(flexible(cons[n]), count, truth, DIRECTION_TOLERANCE)),
+        )
 
 
 @dataclass(frozen=True)
@@ -192,8 +195,8 @@ def _interior_flexibility(
     inside = F[opened.core.inner]
     rim = F[opened.core.rim].toarray()
     G = np.empty((F.shape[1], F.shape[1]))
-    for first in range(0, F.shape[1], BATCH):
-        part = slice(first, first + BATCH)
+    for first in range(0, F.shape[1], PORTS_PER_SOLVE):
+        part = slice(first, first + PORTS_PER_SOLVE)
         Y = inner_solve(opened.core, inside[:, part].toarray())
         G[:, part] = inside.T @ Y
         rim[:, part] -= opened.core.coupling @ Y

@@ -32,11 +32,11 @@ from .loads import centrifugal
 
 AXIS = (0.0, 0.0, 1.0)
 # iterations of one load step
-NEWTON = 25
+MAX_NEWTON_STEPS = 25
 # of the load step before giving up
-HALVINGS = 8
+MAX_LOAD_HALVINGS = 8
 # times the tolerance: an error that falls no further below this is rounding
-ROUNDED = 1e3
+ROUNDING_OVER_TOLERANCE = 1e3
 
 
 @dataclass(frozen=True)
@@ -181,7 +181,7 @@ def _load_steps(
         if isinstance(error, str):
             halvings = halvings + 1
             part = part / 2
-            if halvings > HALVINGS:
+            if halvings > MAX_LOAD_HALVINGS:
                 raise NotSolvedError(
                     f"the preload at {speed:.6g} rad/s was not found: beyond {np.sqrt(done):.0%} "
                     f"of the speed {error}"
@@ -248,11 +248,11 @@ def _solve_newton(
     failure.
     """
     error = np.inf
-    for k in range(NEWTON):
+    for k in range(MAX_NEWTON_STEPS):
         r = restrict(con, _unbalanced_force(con.body, forms, u, speed2))
         before = error
         error = _vector_length(con, r)
-        if error <= limit or (error < ROUNDED * limit and error > before / 2):
+        if error <= limit or (error < ROUNDING_OVER_TOLERANCE * limit and error > before / 2):
             return u, k, "elements turn over" if _turned_over(con.body, u) else error
         if not np.isfinite(error):
             return u, k, "Newton's method diverges"
@@ -266,7 +266,11 @@ def _solve_newton(
                 "the stiffness is no longer positive definite (buckling, or spin softening)",
             )
         u = u + expand(held, step)[:, :, 0].real
-    return u, NEWTON, f"Newton's method has not converged in {NEWTON} iterations"
+    return (
+        u,
+        MAX_NEWTON_STEPS,
+        f"Newton's method has not converged in {MAX_NEWTON_STEPS} iterations",
+    )
 
 
 def _turned_over(body: Body, u: np.ndarray) -> bool:

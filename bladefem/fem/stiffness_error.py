@@ -23,10 +23,10 @@ from .elasticity import stiffness
 from .stress import element_stress, extrapolation_matrix
 
 # cells at a time
-BLOCK = 2000
+CELLS_PER_BLOCK = 2000
 # energy of the error over that of the difference: plane bodies with re-entrant corners are 1.4 to
 # 1.6, on all meshes of a row; the shipped sector is 0.55
-SAFETY = 1.5
+SAFETY_FACTOR = 1.5
 
 
 def stiffness_error(body: Body, shapes: np.ndarray) -> np.ndarray:
@@ -46,7 +46,7 @@ def stiffness_error(body: Body, shapes: np.ndarray) -> np.ndarray:
         for fields in _weighted_differences(body, u, name, material):
             d = fields[:m] + 1j * fields[m:]
             total += d.conj() @ d.T
-    return SAFETY * total
+    return SAFETY_FACTOR * total
 
 
 def _weighted_differences(
@@ -60,7 +60,7 @@ def _weighted_differences(
     """
     mesh = body.mesh
     cells = mesh.bodies[name]
-    blocks = np.array_split(np.arange(len(cells)), len(cells) // BLOCK + 1)
+    blocks = np.array_split(np.arange(len(cells)), len(cells) // CELLS_PER_BLOCK + 1)
     continuation = extrapolation_matrix(mesh.cell_type)
     found = [element_stress(body, u, name, cells[rows]) for rows in blocks]
     mean = _nodal_mean(len(mesh.points), cells, blocks, found, continuation)

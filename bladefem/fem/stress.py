@@ -16,13 +16,13 @@ from . import shape_functions as shape
 from .body import Body
 from .elasticity import lame, stress_of
 
-PAIRS = ((0, 0), (1, 1), (2, 2), (0, 1), (1, 2), (2, 0))
+VOIGT_PAIRS = ((0, 0), (1, 1), (2, 2), (0, 1), (1, 2), (2, 0))
 # cells at a time
-BLOCK = 20000
+CELLS_PER_BLOCK = 20000
 # of a period, for principal stresses of complex fields
-PHASES = 64
+PHASES_PER_PERIOD = 64
 # square of a patch's radius: bounds the weight of Gauss points next to the node
-NEAREST = 0.01
+MIN_SQUARED_DISTANCE = 0.01
 
 
 @dataclass(frozen=True)
@@ -65,7 +65,9 @@ def gauss_stress(
     parts = [
         _of_cells(body, np.asarray(u)[:, : body.dim], name, block, large)
         for name in body.material
-        for block in np.array_split(mesh.bodies[name], len(mesh.bodies[name]) // BLOCK + 1)
+        for block in np.array_split(
+            mesh.bodies[name], len(mesh.bodies[name]) // CELLS_PER_BLOCK + 1
+        )
     ]
     return GaussStress(*(np.concatenate(column) for column in zip(*parts, strict=True)))
 
@@ -111,7 +113,7 @@ def stress_jumps(
     matrix = extrapolation_matrix(body.mesh.cell_type)
     jumps = np.zeros(len(body.mesh.points))
     cells = np.vstack([body.mesh.bodies[name] for name in body.material])
-    for some in np.array_split(np.arange(len(cells)), len(cells) // BLOCK + 1):
+    for some in np.array_split(np.arange(len(cells)), len(cells) // CELLS_PER_BLOCK + 1):
         at_nodes = np.einsum("kq,cqs->cks", matrix, found.stress[some])
         np.maximum.at(jumps, cells[some], von_mises(at_nodes - recovered[cells[some]]))
     return jumps
@@ -149,7 +151,7 @@ def patch_stress(
     linear = np.column_stack([np.ones(len(x)), x])
     squares = [x[:, i] * x[:, j] for i in range(body.dim) for j in range(i, body.dim)]
     quadratic = np.column_stack([linear, *squares])
-    weight = 1 / (NEAREST + (x**2).sum(axis=1))[:, None]
+    weight = 1 / (MIN_SQUARED_DISTANCE + (x**2).sum(axis=1))[:, None]
     first = np.linalg.lstsq(linear[own], values[own], rcond=None)[0][0]
     second = np.linalg.lstsq(quadratic * weight, values * weight, rcond=None)[0][0]
     return first, second
@@ -183,7 +185,7 @@ def principal(stress: np.ndarray) -> np.ndarray:
         return np.linalg.eigvalsh(_stress_tensor(stress))[..., ::-1]
     best = np.full((*stress.shape[:-1], 3), -np.inf)
     # half a period later the sign is the other
-    for turn in np.exp(2j * np.pi * np.arange(PHASES // 2) / PHASES):
+    for turn in np.exp(2j * np.pi * np.arange(PHASES_PER_PERIOD // 2) / PHASES_PER_PERIOD):
         now = _cubic_roots((stress * turn).real)
         best = np.maximum(best, np.maximum(now, -now[..., ::-1]))
     return best
@@ -217,7 +219,7 @@ def _mises_form(a: np.ndarray, b: np.ndarray) -> np.ndarray:
 
 def _stress_tensor(stress: np.ndarray) -> np.ndarray:
     out = np.empty((*stress.shape[:-1], 3, 3), stress.dtype)
-    for i, (a, b) in enumerate(PAIRS):
+    for i, (a, b) in enumerate(VOIGT_PAIRS):
         out[..., a, b] = out[..., b, a] = stress[..., i]
     return out
 
@@ -295,7 +297,7 @@ def element_stress(
 def _stress_vector(stress: np.ndarray, across: np.ndarray | None) -> np.ndarray:
     d = stress.shape[-1]
     out = np.zeros((*stress.shape[:-2], 6), stress.dtype)
-    for i, (a, b) in enumerate(PAIRS):
+    for i, (a, b) in enumerate(VOIGT_PAIRS):
         if max(a, b) < d:
             out[..., i] = stress[..., a, b]
     if across is not None:

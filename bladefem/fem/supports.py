@@ -16,15 +16,15 @@ from .body import Body
 from .compat import PETSc
 
 # directions along fixed axes
-FIXED = {"x": 0, "y": 1, "z": 2, "a": 2}
+FIXED_DIRECTIONS = {"x": 0, "y": 1, "z": 2, "a": 2}
 # directions at a node about the z axis
-POLAR = ("r", "t")
+POLAR_DIRECTIONS = ("r", "t")
 # of the mesh's size: nodes so near to the axis are on it
 ON_AXIS = 1e-9
 # component of a unit vector below which it lies along the other axis
 ALONG_AXIS = 1e-9
 # of the surface element times two shape functions, on curved faces
-DEGREE = 8
+QUADRATURE_DEGREE = 8
 
 
 @dataclass(frozen=True)
@@ -68,7 +68,7 @@ def held_directions(body: Body, directions: Sequence[tuple[str, str]]) -> np.nda
     """
     held = np.zeros((len(body.mesh.points), body.dim), bool)
     for nodes, letters in _nodes_and_letters(body, directions):
-        axes = [FIXED[letter] for letter in letters if letter in FIXED]
+        axes = [FIXED_DIRECTIONS[letter] for letter in letters if letter in FIXED_DIRECTIONS]
         held[np.ix_(nodes, np.array(axes, int))] = True
     return held
 
@@ -97,7 +97,7 @@ def polar_elimination(
     """
     polar = np.zeros((len(body.mesh.points), 2), bool)
     for nodes, letters in _nodes_and_letters(body, directions):
-        for i, letter in enumerate(POLAR):
+        for i, letter in enumerate(POLAR_DIRECTIONS):
             polar[partner[nodes], i] |= letter in letters
     some = np.flatnonzero(polar.any(axis=1))
     if not len(some):
@@ -190,7 +190,9 @@ def _of_face(body: Body, spring: AreaSpring) -> sp.csr_matrix:
     facets = facets[(body.rows[facets] >= 0).all(axis=1)]
     d = body.dim
     kind = shape.FACET_OF[mesh.cell_type]
-    values, tangents, weights = shape.geometry(kind, mesh.points[facets][:, :, :d], DEGREE)
+    values, tangents, weights = shape.geometry(
+        kind, mesh.points[facets][:, :, :d], QUADRATURE_DEGREE
+    )
     if d == 3:
         normal = np.cross(tangents[..., 0], tangents[..., 1])
     else:

@@ -19,7 +19,7 @@ from bladefem.data import Elements
 
 # Step of the differences over the size of the variable: rounding leaves 1e-10 of the derivative,
 # and an increment that is shorter than the step, where laws have a kink, 1e-6.
-DIFFERENCE = 1e-6
+DIFFERENCE_STEP = 1e-6
 
 
 @dataclass(frozen=True)
@@ -179,8 +179,8 @@ def slopes_of(
         return own
     s = state.shape[1]
     t = increment.shape[1]
-    move = DIFFERENCE * sizes
-    push = DIFFERENCE * np.maximum(abs(state).max(axis=1), elements.kt * sizes)
+    move = DIFFERENCE_STEP * sizes
+    push = DIFFERENCE_STEP * np.maximum(abs(state).max(axis=1), elements.kt * sizes)
     args = (state, increment, before, load)
 
     def change(
@@ -202,6 +202,6 @@ def slopes_of(
     return Slopes(
         by_state,
         by_increment,
-        change(2, None, DIFFERENCE * before),
-        change(3, None, DIFFERENCE * load),
+        change(2, None, DIFFERENCE_STEP * before),
+        change(3, None, DIFFERENCE_STEP * load),
     )

@@ -20,16 +20,16 @@ import numpy as np
 
 from bladefem.data import Elements
 from bladefem.friction.fourier import analysis, harmonics_of, synthesis
-from bladefem.friction.law import DIFFERENCE, FrictionLaw, Slopes, slopes_of
+from bladefem.friction.law import DIFFERENCE_STEP, FrictionLaw, Slopes, slopes_of
 from bladefem.friction.law_table import select_elements
 
 # of the largest state of a node: how well it must repeat itself
-TOLERANCE = 1e-12
+PERIODIC_TOLERANCE = 1e-12
 # periods marched before Newton: states that varying loads allow are chosen by marching
 MARCHED_PERIODS = 2
 # singular values of I - Phi below which the state keeps a memory of its start; differences leave
 # errors of 1e-9 in Phi
-SINGULAR = 1e-6
+MIN_SINGULAR_VALUE = 1e-6
 
 
 @dataclass(frozen=True)
@@ -208,7 +208,7 @@ def _periodic_state(
         end = states[-1]
         residual = np.linalg.norm(end - start, axis=1)
         largest = np.maximum(abs(states).max(axis=(0, 2)), np.finfo(float).tiny)
-        used[(residual <= TOLERANCE * largest) & (used < 0)] = cycle
+        used[(residual <= PERIODIC_TOLERANCE * largest) & (used < 0)] = cycle
         if np.all(used > 0) or not np.all(np.isfinite(residual)) or cycle == limit:
             break
         # where Newton's step did not pay, marching goes on from before it
@@ -239,7 +239,7 @@ def _ordered_product(factors: np.ndarray) -> np.ndarray:
 def _inverse_of_change(phi: np.ndarray) -> np.ndarray:
     """(n, s, s) pseudo-inverse of I - Phi, zero in directions that keep their memory."""
     u, sizes, vh = np.linalg.svd(np.eye(phi.shape[1]) - phi)
-    regular = sizes > SINGULAR
+    regular = sizes > MIN_SINGULAR_VALUE
     inverse = np.where(regular, 1 / np.where(regular, sizes, 1.0), 0.0)
     return np.swapaxes(vh, 1, 2) @ (inverse[:, :, None] * np.swapaxes(u, 1, 2))
 
@@ -359,12 +359,12 @@ def _force_slopes(
     ) -> np.ndarray:
         """(S, n, t) derivative with one column of the state, the motion or the load."""
         ends = []
-        for sign in (DIFFERENCE, -DIFFERENCE):
+        for sign in (DIFFERENCE_STEP, -DIFFERENCE_STEP):
             moved = [x.copy() for x in args]
             part = moved[which] if column is None else moved[which][:, column]
             part += sign * size
             ends.append(law.force(moved[0], moved[1], moved[2], period.repeated))
-        slope = (ends[0] - ends[1]) / (2 * DIFFERENCE * size)[:, None]
+        slope = (ends[0] - ends[1]) / (2 * DIFFERENCE_STEP * size)[:, None]
         return np.where(closed, slope.reshape(S, n, t), 0.0)
 
     by_state = np.stack([change(0, column, push) for column in range(s)], axis=3)

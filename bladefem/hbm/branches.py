@@ -24,10 +24,10 @@ from .slow_sweep import DOWN, UP, reached_by, visited_pieces
 from .solution import Solution, size
 from .solve import solve
 from .solver.fallback import match_harmonics
-from .solver.newton import DEFAULTS, Options
+from .solver.newton import DEFAULT_OPTIONS, Options
 
 # first and longest arc-length step, as shares of the band
-STEPS = (0.005, 0.05)
+ARC_STEPS = (0.005, 0.05)
 # steps with which a local maximum is closed in
 PEAK_STEP = 1e-4
 # points of all paths of a band: so many times unknowns, within these bounds
@@ -35,19 +35,19 @@ POINT_BUDGET = 3e5
 MIN_POINTS = 300
 MAX_POINTS = 1500
 # paths of a band in addition to those from its ends
-MOST_PATHS = 6
+MAX_PATHS = 6
 # relative distance of displacements up to which a motion lies on a path, between two of its points
 SAME_MOTION = 0.03
 # residual of points of a path, relative: a looser one lets a path go on beyond a fold, 17 % above
 # the peak at 2e-5
-TOLERANCE = 1e-9
+PATH_TOLERANCE = 1e-9
 # frequencies of the band where motions off the paths are looked for
-PROBES = 7
+PROBED_FREQUENCIES = 7
 # refinements of one local maximum
-REFINEMENTS = 12
+MAX_REFINEMENTS = 12
 # folds of one path, and of all before no further one is begun: a damper that lifts off everywhere
 # and strikes back has a maze of internal resonances, which leads nowhere
-MOST_FOLDS = 24
+MAX_FOLDS = 24
 
 
 @dataclass(frozen=True)
@@ -106,7 +106,7 @@ def find_branches(
     samples: int,
     *,
     peak: float = 1e-3,
-    options: Options = DEFAULTS,
+    options: Options = DEFAULT_OPTIONS,
 ) -> Branches:
     """Paths through a band of circular frequencies [rad/s], from its ends and from known motions.
 
@@ -114,7 +114,7 @@ def find_branches(
         known: solutions in the band, such as those of a sweep.
         peak: relative accuracy of each local maximum.
     """
-    options = replace(options, tolerance=min(options.tolerance, TOLERANCE))
+    options = replace(options, tolerance=min(options.tolerance, PATH_TOLERANCE))
     notes: list[str] = []
     paths: list[_Path] = []
     # points that stick may have been solved with fewer harmonics
@@ -131,7 +131,7 @@ def find_branches(
     for start in chain(solved[:1], solved[-1:], solved, further):
         forward = start is not solved[-1]
         at_end = start is solved[0] or start is solved[-1]
-        full = len(paths) >= MOST_PATHS or _folds(paths) >= MOST_FOLDS
+        full = len(paths) >= MAX_PATHS or _folds(paths) >= MAX_FOLDS
         if budget <= 0 or (full and not at_end) or _on_paths(paths, start):
             continue
         path = _followed(model, start, band, forward, budget, notes, options)
@@ -174,7 +174,7 @@ def _further(
 ) -> Iterable[Solution]:
     """Motions by Newton from open contacts and from full stick, at some frequencies of the band."""
     simply = replace(options, fallbacks=False, frugal=False)
-    for omega in np.linspace(*band, PROBES + 2)[1:-1]:
+    for omega in np.linspace(*band, PROBED_FREQUENCIES + 2)[1:-1]:
         try:
             open_contacts = to_real(condense(model, float(omega), H).free.T)
         except NotSolvedError:
@@ -203,7 +203,7 @@ def _followed(
     bounds = min(band[0], start.omega), max(band[1], start.omega)
     try:
         for point in follow(
-            model, "omega", start, bounds, forward=forward, steps=STEPS, options=options
+            model, "omega", start, bounds, forward=forward, steps=ARC_STEPS, options=options
         ):
             points.append(point)
             if point.restarted:
@@ -212,9 +212,9 @@ def _followed(
                     f"{point.restarted}"
                 )
             folds += point.fold
-            if folds > MOST_FOLDS:
+            if folds > MAX_FOLDS:
                 notes.append(
-                    f"a path was left at {point.solution.frequency:.6g} Hz after {MOST_FOLDS} "
+                    f"a path was left at {point.solution.frequency:.6g} Hz after {MAX_FOLDS} "
                     "folds: there may be further motions"
                 )
                 break
@@ -337,7 +337,7 @@ def _finer(
             steps=(step, step),
             options=options,
         ):
-            if len(found) > 4 * REFINEMENTS:
+            if len(found) > 4 * MAX_REFINEMENTS:
                 break
             if point.value != first.value:
                 found.append(point)

@@ -10,7 +10,7 @@ from pathlib import Path
 from ..io.stage_cache import code_of, key_of, stage
 from .model import ReducedModel
 from .solution import Solution
-from .solver.newton import DEFAULTS, Options
+from .solver.newton import DEFAULT_OPTIONS, Options
 from .sweep import response
 
 
@@ -21,7 +21,7 @@ def response_with_checkpoints(
     H: int = 3,
     samples: int = 128,
     *,
-    options: Options = DEFAULTS,
+    options: Options = DEFAULT_OPTIONS,
 ) -> Iterator[Solution]:
     """`response`, whose points are files of a folder, written one by one and read where they are
     there already.

@@ -25,13 +25,13 @@ from .solver.arclength import (
     spot_at,
 )
 from .solver.fallback import Attempt, solve_balance
-from .solver.newton import DEFAULTS, Newton, Options
+from .solver.newton import DEFAULT_OPTIONS, Newton, Options
 from .solver.residual import Balance, State, evaluate_balance
 
 # points of a path
 MOST_PATH_POINTS = 5000
 # shares of the range beyond a point where the path stops, at which it is begun again
-RESTARTS = (1e-3, 3e-3, 0.01, 0.03)
+RESTART_DISTANCES = (1e-3, 3e-3, 0.01, 0.03)
 # times that a path is begun again
 MOST_RESTARTS = 4
 # points in which a path has to get farther than that many of its smallest steps: at a jump of
@@ -67,7 +67,7 @@ def follow(
     *,
     forward: bool = True,
     steps: tuple[float, float] = (0.02, 0.1),
-    options: Options = DEFAULTS,
+    options: Options = DEFAULT_OPTIONS,
 ) -> Iterator[PathPoint]:
     """The path from a converged solution, with its harmonics and samples, until the parameter
     leaves its bounds.
@@ -145,12 +145,12 @@ def _begun_again(
     """A solution a little ahead in the parameter, by all fallbacks at the farthest; None where
     there is none.
     """
-    for share in RESTARTS:
+    for share in RESTART_DISTANCES:
         x = spot.x + spot.sign * share * task.width
         if not bounds[0] <= x <= bounds[1]:
             return None
         balance = task.balance(x)
-        fallbacks = task.options.fallbacks and share == RESTARTS[-1]
+        fallbacks = task.options.fallbacks and share == RESTART_DISTANCES[-1]
         options = replace(task.options, fallbacks=fallbacks)
         end = solve_balance(balance, spot.state.w, options)[-1].end
         if not end.converged:

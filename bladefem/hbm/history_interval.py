@@ -21,21 +21,21 @@ from ..errors import NotSolvedError
 from .linear.condensation import condense
 from .model import ReducedModel
 from .peak import Peak, find_peak
-from .solver.newton import DEFAULTS, Options
+from .solver.newton import DEFAULT_OPTIONS, Options
 from .traction_gradient import Tractions, farthest, tractions
 
 POINT = "point"
 MONOTONE = "monotone"
 SAMPLED = "sampled"
 # moves towards one end
-MOVES = 15
+MAX_MOVES = 15
 # longest and shortest push of a node, over its friction limit
-LONGEST = 2.0
-SHORTEST = 0.1
+LONGEST_PUSH = 2.0
+SHORTEST_PUSH = 0.1
 # derivative below which a node is pushed less, over the mean of all nodes
 WEAK_DERIVATIVE = 0.1
 # start of the extreme loads, over the friction limit
-BEYOND = 1.5
+EXTREME_LOAD_RATIO = 1.5
 
 
 @dataclass(frozen=True)
@@ -115,7 +115,7 @@ def history_interval(
     *,
     tolerance: float = 1e-4,
     most: int = 150,
-    options: Options = DEFAULTS,
+    options: Options = DEFAULT_OPTIONS,
 ) -> HistoryInterval:
     """The interval of a resonance over all loading histories.
 
@@ -153,7 +153,7 @@ def _extreme_loads(model: ReducedModel, peak: Peak) -> Sequence[np.ndarray]:
     if not length.max() > 0:
         return []
     along = np.divide(by_start, length, out=np.zeros_like(by_start), where=length > 0)
-    limit = BEYOND * elements.mu * np.maximum(elements.n0, 0.0)
+    limit = EXTREME_LOAD_RATIO * elements.mu * np.maximum(elements.n0, 0.0)
     return [sign * limit[:, None] * along for sign in (-1.0, 1.0)]
 
 
@@ -167,13 +167,13 @@ def _climb(
     """
     place = max(search.places, key=lambda one: sign * one.peak.height)
     share = 1.0
-    for _ in range(MOVES):
+    for _ in range(MAX_MOVES):
         if search.points >= most:
             return False
         better = None
-        while better is None and share >= SHORTEST:
+        while better is None and share >= SHORTEST_PUSH:
             better = _gaining(search, place, share * _push(search.model, place, sign), sign)
-            share = share / 2 if better is None else min(2 * share, LONGEST)
+            share = share / 2 if better is None else min(2 * share, LONGEST_PUSH)
         small = better is None or _gain(better, place, sign) < search.tolerance
         place = place if better is None else better
         if not small:

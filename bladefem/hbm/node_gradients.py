@@ -11,7 +11,7 @@ import numpy as np
 from ..errors import InputError
 from .linear.bodies import modal_flexibility, receptance_block
 from .model import ReducedModel
-from .parameter_derivatives import BODIES, contact_rate
+from .parameter_derivatives import LINEAR_PARAMETERS, contact_rate
 from .parameters import check_parameter
 from .solution import Solution
 from .solver.residual import (
@@ -48,9 +48,9 @@ def node_gradients(
             f"solution at {solution.frequency:.6g} Hz is not converged: expected a solved point"
         )
     names = [check_parameter(name) for name in names]
-    if set(names) & set(BODIES):
+    if set(names) & set(LINEAR_PARAMETERS):
         raise InputError(
-            f"parameters {names}: expected contact parameters, not {', '.join(BODIES)}"
+            f"parameters {names}: expected contact parameters, not {', '.join(LINEAR_PARAMETERS)}"
         )
     balance, state = solved_balance(model, solution)
     by_force = size_by_force(model, solution, probe)

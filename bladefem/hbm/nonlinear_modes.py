@@ -29,15 +29,15 @@ from .solver.residual import contact_forces
 from .validate_model import check_point
 
 # Newton steps of one amplitude
-STEPS = 40
+MAX_NEWTON_STEPS = 40
 # amplitudes put in between where Newton fails
-BETWEEN = (4, 16)
+INSERTED_AMPLITUDES = (4, 16)
 # step share below which the search direction is given up
-SHORTEST = 2.0**-10
+SHORTEST_STEP_SHARE = 2.0**-10
 # relative step of frequency and damping in differences of the flexibility
-DIFFERENCE = 1e-7
+DIFFERENCE_STEP = 1e-7
 # residual of the motion, relative to its size
-TOLERANCE = 1e-10
+RESIDUAL_TOLERANCE = 1e-10
 # unknowns of the dense factorisation
 MAX_DENSE_UNKNOWNS = 6000
 
@@ -155,7 +155,7 @@ def _approached(
     found = _solve(frame, amplitude, last)
     if not found.converged and last is not None:
         found = _solve(frame, amplitude, None)
-    for parts in BETWEEN:
+    for parts in INSERTED_AMPLITUDES:
         if found.converged or last is None or not last.converged:
             break
         near = last
@@ -175,8 +175,8 @@ def _solve(
         _residual(frame, _start(frame, amplitude, last), amplitude),
         lambda state: float(np.linalg.norm(state.r) / np.linalg.norm(state.w)),
         lambda state: _line_search(frame, state, amplitude),
-        TOLERANCE,
-        STEPS,
+        RESIDUAL_TOLERANCE,
+        MAX_NEWTON_STEPS,
     )
     state = run.state
     return NonlinearMode(
@@ -336,12 +336,12 @@ def _through_frequency(
     by_omega = drive.real / (2 * state.omega)
     by_zeta = drive.imag / (2 * state.omega**2) - state.zeta / state.omega**2 * drive.real
     here = _flexed(frame, state.f, state.omega, state.zeta)
-    step = DIFFERENCE * state.omega
+    step = DIFFERENCE_STEP * state.omega
     faster = _flexed(frame, state.f, state.omega + step, state.zeta)
-    damped = _flexed(frame, state.f, state.omega, state.zeta + DIFFERENCE)
+    damped = _flexed(frame, state.f, state.omega, state.zeta + DIFFERENCE_STEP)
     columns = [
         to_real((faster - here) / step).ravel(),
-        to_real((damped - here) / DIFFERENCE).ravel(),
+        to_real((damped - here) / DIFFERENCE_STEP).ravel(),
     ]
     return np.outer(columns[0], by_omega) + np.outer(columns[1], by_zeta)
 
@@ -371,7 +371,7 @@ def _line_search(
     return halve_step(
         lambda share: _residual(frame, x - share * step, amplitude),
         lambda trial, share: bool(np.linalg.norm(trial.r) <= (1 - 1e-4 * share) * before),
-        SHORTEST,
+        SHORTEST_STEP_SHARE,
     )
 
 

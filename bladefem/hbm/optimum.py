@@ -21,13 +21,13 @@ from .model import ReducedModel
 from .parameters import check_parameter, parameter_value, path_coordinate, vary
 from .peak import Peak, find_peak, with_slope
 from .solution import Solution
-from .solver.newton import DEFAULTS, Options
+from .solver.newton import DEFAULT_OPTIONS, Options
 from .sweep import first_look, local_maxima, response, size
 
 # values of the parameter tried before giving up
 MOST_LEVELS = 30
 # factor by which a step is shortened where no peak was solved at its end, and how often at most
-SHORTENING = 3.0
+SHORTENING_FACTOR = 3.0
 MOST_SHORTENED = 3
 # share of the highest peak below which the others are not solved again
 SOLVED_HEIGHT_SHARE = 0.7
@@ -175,7 +175,7 @@ def lowest_peak(
     *,
     start: float | None = None,
     tolerance: float = 1e-3,
-    options: Options = DEFAULTS,
+    options: Options = DEFAULT_OPTIONS,
 ) -> Optimum:
     """``optimum`` along any variation of a model, for example with the seating solved for each
     load.
@@ -299,7 +299,7 @@ def _close_in(search: _Search, levels: dict[float, list[Peak]]) -> int:
             shortened += 1
             if enclosed or shortened > MOST_SHORTENED:
                 raise
-            step /= SHORTENING
+            step /= SHORTENING_FACTOR
             continue
         step *= 2
         points += count

@@ -12,7 +12,7 @@ from ..util.communicator import Communicator
 from .checkpoint import response_with_checkpoints
 from .model import ReducedModel
 from .solution import Solution
-from .solver.newton import DEFAULTS, Options
+from .solver.newton import DEFAULT_OPTIONS, Options
 from .sweep import response
 
 Item = TypeVar("Item")
@@ -63,7 +63,7 @@ def shared_response(
     *,
     comm: Communicator | None = None,
     folder: str | Path | None = None,
-    options: Options = DEFAULTS,
+    options: Options = DEFAULT_OPTIONS,
 ) -> list[Solution]:
     """The points of `bladefem.hbm.sweep.response`, in blocks of neighbours that the ranks share
     out.

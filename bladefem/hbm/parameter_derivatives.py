@@ -38,9 +38,9 @@ from .solver.residual import (
 )
 
 # parameters that the contact law does not see
-BODIES = ("omega", "force", "mass", "damping")
+LINEAR_PARAMETERS = ("omega", "force", "mass", "damping")
 # step in the logarithm of a parameter where a law is differentiated by differences
-DIFFERENCE = 1e-5
+DIFFERENCE_STEP = 1e-5
 
 
 def residual_rate(
@@ -56,7 +56,7 @@ def residual_rate(
     if name == "force":
         # the motion in full stick is linear in the loads
         return -as_coefficients(linear.stuck, state.w.shape)
-    if name in BODIES:
+    if name in LINEAR_PARAMETERS:
         moved, _ = body_rate(
             balance.model, linear.omega, as_amplitudes(contact_load(balance.model, state)), name
         )
@@ -127,7 +127,7 @@ def _rate_by_differences(
     walk = walk_ramp(balance, state.w)
     if name == "gap" and model.directions == model.elements.tangents:
         raise InputError("gap: a prescribed normal load has no gap, expected elements.kn > 0")
-    step = DIFFERENCE * (model.compression if name == "gap" else 1.0)
+    step = DIFFERENCE_STEP * (model.compression if name == "gap" else 1.0)
     ends = []
     for sign in (1.0, -1.0):
         value = sign * step if name == "gap" else float(np.exp(sign * step))
@@ -145,7 +145,7 @@ def body_rate(
     name: str,
 ) -> tuple[np.ndarray, np.ndarray]:
     """Derivatives of the bodies' motion under constant contact forces (H+1, m), with a parameter of
-    BODIES.
+    LINEAR_PARAMETERS.
 
     Returns:
         (H+1, m) of the relative contact displacements and (H+1, probes) of the probes.

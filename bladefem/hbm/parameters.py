@@ -94,7 +94,7 @@ def _scale_damping(model: ReducedModel, factor: float) -> ReducedModel:
     )
 
 
-PARAMETERS: dict[str, Callable[[ReducedModel, float], ReducedModel]] = {
+SCALED_PARAMETERS: dict[str, Callable[[ReducedModel, float], ReducedModel]] = {
     # factor of all excitations
     "force": _scale_force,
     # factor of all normal loads
@@ -115,7 +115,7 @@ PARAMETERS: dict[str, Callable[[ReducedModel, float], ReducedModel]] = {
 
 
 # parameters that are no factors
-ADDED = ("omega", "gap")
+SHIFTED_PARAMETERS = ("omega", "gap")
 
 
 def vary(
@@ -129,14 +129,14 @@ def vary(
     Raises:
         InputError: unknown name, a parameter that the model does not have, or a negative factor.
     """
-    if name not in ADDED and not 0 <= value < np.inf:
+    if name not in SHIFTED_PARAMETERS and not 0 <= value < np.inf:
         raise InputError(f"{name} {value}: expected a finite factor, not negative")
-    return PARAMETERS[check_parameter(name)](model, value)
+    return SCALED_PARAMETERS[check_parameter(name)](model, value)
 
 
 def check_parameter(name: str, also: tuple[str, ...] = ()) -> str:
     """The name, if it is known."""
-    known = (*PARAMETERS, *also)
+    known = (*SCALED_PARAMETERS, *also)
     if name not in known:
         raise InputError(f"parameter '{name}' is unknown{suggestion(name, known)}")
     return name
@@ -146,9 +146,9 @@ def path_coordinate(name: str, value: float) -> float:
     """The coordinate in which a parameter is followed and derived: omega and the gap themselves,
     else a logarithm.
     """
-    return value if name in ADDED else float(np.log(value))
+    return value if name in SHIFTED_PARAMETERS else float(np.log(value))
 
 
 def parameter_value(name: str, x: float) -> float:
     """The value of a parameter at such a coordinate."""
-    return x if name in ADDED else float(np.exp(x))
+    return x if name in SHIFTED_PARAMETERS else float(np.exp(x))

@@ -19,16 +19,16 @@ from .parameters import vary
 from .sensitivity import sensitivities
 from .solution import Solution
 from .solve import solve
-from .solver.newton import DEFAULTS, Options
+from .solver.newton import DEFAULT_OPTIONS, Options
 from .sweep import size, walk_in_frequency
 from .validate_model import check_probe
 
 # points spent on one peak before giving up
-STEPS = 40
+MAX_PEAK_POINTS = 40
 # first step, as a share of the frequency
 FIRST_STEP = 1e-3
 # share of a predicted step that is taken, so that the maximum is soon enclosed
-AHEAD = 1.3
+OVERSHOOT_FACTOR = 1.3
 # longest step, as a share of the frequency
 MAX_STEP = 0.05
 # of the frequency: where a search begins instead when its first point is not solved
@@ -66,7 +66,7 @@ def find_peak(
     *,
     near: Peak | Solution | None = None,
     tolerance: float = 1e-4,
-    options: Options = DEFAULTS,
+    options: Options = DEFAULT_OPTIONS,
 ) -> Peak:
     """The local maximum uphill of omega [rad/s].
 
@@ -83,7 +83,7 @@ def find_peak(
     bend, start = (near.bend, near.solution) if isinstance(near, Peak) else (0.0, near)
     reach = FIRST_STEP * omega
     frequency = omega / (2 * np.pi)
-    for count in range(1, STEPS + 1):
+    for count in range(1, MAX_PEAK_POINTS + 1):
         start = _solved_near(model, omega, H, samples, start, last is None, options)
         frequency = start.frequency
         if not start.converged:
@@ -104,14 +104,16 @@ def find_peak(
             best = now
             step = -now.line / bend if bend > 0 else np.sign(now.slope) * reach
             gain = abs(now.slope * step) / now.height if bend > 0 and count > 1 else np.inf
-            target = omega + float(np.clip(AHEAD * step, -MAX_STEP * omega, MAX_STEP * omega))
+            target = omega + float(
+                np.clip(OVERSHOOT_FACTOR * step, -MAX_STEP * omega, MAX_STEP * omega)
+            )
             reach = 2 * reach
         if gain < tolerance / 4:
             return Peak(best.solution, best.height, count, bend=float(max(bend, 0.0)))
         last = now
         omega = target
     raise NotSolvedError(
-        f"peak search found no maximum in {STEPS} points, last at {frequency:.6g} Hz"
+        f"peak search found no maximum in {MAX_PEAK_POINTS} points, last at {frequency:.6g} Hz"
     )
 
 
@@ -200,7 +202,7 @@ def track_peak(
     H: int = 3,
     samples: int = 128,
     *,
-    options: Options = DEFAULTS,
+    options: Options = DEFAULT_OPTIONS,
 ) -> Iterator[Peak]:
     """Follow one peak while a parameter of `bladefem.hbm.parameters` takes the given values: no
     frequency sweeps.

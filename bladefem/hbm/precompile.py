@@ -33,12 +33,12 @@ from .sweep import response
 from .truncation_indicator import truncation_indicator
 
 # argument of the command line for the kernels of 1-D elements
-LATER = "later"
+LATER_ARGUMENT = "later"
 
 
 def compile_kernels() -> None:
     """Reach every kernel by the smallest models, with and without a prescribed normal load."""
-    for part in (*PARTS.values(), compile_1d):
+    for part in (*KERNEL_GROUPS.values(), compile_1d):
         part()
 
 
@@ -47,7 +47,7 @@ def compile_in_parallel() -> int:
     not 0.
     """
     command = [sys.executable, "-m", "bladefem.hbm.precompile"]
-    running = [subprocess.Popen([*command, name]) for name in PARTS]
+    running = [subprocess.Popen([*command, name]) for name in KERNEL_GROUPS]
     codes = [process.wait() for process in running]
     return next((code for code in codes if code), 0)
 
@@ -110,13 +110,13 @@ def _model_on(elements: Elements) -> ReducedModel:
     return ReducedModel((body,), elements, {1: np.ones(1)}, Damping(0.01))
 
 
-PARTS: dict[str, Callable[[], None]] = {"2d": compile_2d, "linear": compile_linear}
+KERNEL_GROUPS: dict[str, Callable[[], None]] = {"2d": compile_2d, "linear": compile_linear}
 
 
 if __name__ == "__main__":
-    if sys.argv[1:] == [LATER]:
+    if sys.argv[1:] == [LATER_ARGUMENT]:
         compile_1d()
     elif len(sys.argv) > 1:
-        PARTS[sys.argv[1]]()
+        KERNEL_GROUPS[sys.argv[1]]()
     else:
         sys.exit(compile_in_parallel())

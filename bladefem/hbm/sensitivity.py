@@ -11,7 +11,13 @@ import numpy as np
 
 from ..errors import InputError
 from .model import ReducedModel
-from .parameter_derivatives import BODIES, body_rate, contact_load, contact_rate, residual_rate
+from .parameter_derivatives import (
+    LINEAR_PARAMETERS,
+    body_rate,
+    contact_load,
+    contact_rate,
+    residual_rate,
+)
 from .solution import Solution, probe_motion
 from .solver.residual import (
     Balance,
@@ -67,7 +73,7 @@ def _one_sensitivity(
     dw = -inverse(residual_rate(balance, state, name), 1e-9)
     df = force_change(balance, state, dw)
     probe = np.zeros_like(solution.probe)
-    if name in BODIES:
+    if name in LINEAR_PARAMETERS:
         load = as_amplitudes(contact_load(model, state))
         direct, probe = body_rate(model, linear.omega, load, name)
     else:

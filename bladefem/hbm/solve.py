@@ -15,7 +15,7 @@ from .model import ReducedModel
 from .point_measures import MEASURES, count_states, measure_point
 from .solution import Solution, Work, probe_motion
 from .solver.fallback import NEWTON_MERITS, Attempt, match_harmonics, solve_balance
-from .solver.newton import DEFAULTS, Options, newton, runs_compiled
+from .solver.newton import DEFAULT_OPTIONS, Options, newton, runs_compiled
 from .solver.point_compiled import compiles_points, solve_each, solve_small
 from .solver.residual import Balance
 from .solver.walking import drift_speed
@@ -33,7 +33,7 @@ def solve(
     samples: int = 128,
     *,
     start: Solution | None = None,
-    options: Options = DEFAULTS,
+    options: Options = DEFAULT_OPTIONS,
 ) -> Solution:
     """The periodic response at circular frequency omega [rad/s] with harmonics 0..H.
 
@@ -78,7 +78,7 @@ def solve_near(
     H: int,
     samples: int,
     start: Solution,
-    options: Options = DEFAULTS,
+    options: Options = DEFAULT_OPTIONS,
 ) -> Solution:
     """The point by Newton from a solved neighbour alone; nothing else is tried where that fails."""
     balance = Balance(model, condense(model, omega, H), samples)

@@ -34,20 +34,20 @@ UNSTABLE = "unstable"
 UNKNOWN = "unknown"
 # growth of a disturbance over a period that counts as instability: less is lost in the error of
 # sampled friction
-GROWTH = 1e-3
+UNSTABLE_GROWTH = 1e-3
 # instants a period, and how many times as many where the verdict is close
-INSTANTS = 256
+INSTANTS_PER_PERIOD = 256
 INSTANT_REFINEMENT = 4
 # distance from one within which it is
 NEAR_ONE = 0.003
 # and below which it is that of a motion that nothing holds, such as a damper's walk
-NEUTRAL = 1e-7
+NEUTRAL_GROWTH = 1e-7
 # operations of one verdict up to which many are made, some 0.03 s
-AFFORDABLE = 1e9
+AFFORDABLE_OPERATIONS = 1e9
 # and above which none is made, some 1.5 s
 MAX_OPERATIONS = 4e10
 # angle of a multiplier to the real axis up to which it is real
-REAL = 1e-3
+REAL_MULTIPLIER_ANGLE = 1e-3
 
 
 @dataclass(frozen=True)
@@ -82,20 +82,20 @@ def stability_verdict(
     system = _system(model)
     if isinstance(system, InputError):
         return Verdict(UNKNOWN, reason=str(system))
-    leading = _leading(model, solution, system, INSTANTS, most)
+    leading = _leading(model, solution, system, INSTANTS_PER_PERIOD, most)
     if leading is not None and _needs_a_closer_look(abs(leading) - 1):
-        finer = _leading(model, solution, system, INSTANT_REFINEMENT * INSTANTS, most)
+        finer = _leading(model, solution, system, INSTANT_REFINEMENT * INSTANTS_PER_PERIOD, most)
         leading = leading if finer is None else finer
     if leading is None:
         return Verdict(UNKNOWN, reason=f"it would take more than {most:.0e} operations")
-    if abs(leading) <= 1 + GROWTH:
+    if abs(leading) <= 1 + UNSTABLE_GROWTH:
         return Verdict(STABLE, float(abs(leading)))
     return Verdict(UNSTABLE, float(abs(leading)), _bifurcation(leading))
 
 
 def _needs_a_closer_look(growth: float) -> bool:
     """The multiplier is unstable, or so close that more instants may make it so."""
-    return growth > GROWTH - NEAR_ONE and abs(growth) > NEUTRAL
+    return growth > UNSTABLE_GROWTH - NEAR_ONE and abs(growth) > NEUTRAL_GROWTH
 
 
 def verdict_operations(model: ReducedModel, solution: Solution) -> float:
@@ -108,7 +108,7 @@ def verdict_operations(model: ReducedModel, solution: Solution) -> float:
     if isinstance(system, InputError):
         return 0.0
     moving = system.blades * (len(solution.w) - solution.states["stick"])
-    return _operations(system, moving * model.directions, INSTANTS)
+    return _operations(system, moving * model.directions, INSTANTS_PER_PERIOD)
 
 
 def _system(model: ReducedModel) -> SectorModes | InputError:
@@ -126,7 +126,7 @@ def _outcome(model: ReducedModel) -> SectorModes | InputError:
 
 
 def _bifurcation(multiplier: complex) -> str:
-    if abs(multiplier.imag) > REAL * abs(multiplier):
+    if abs(multiplier.imag) > REAL_MULTIPLIER_ANGLE * abs(multiplier):
         return "torus"
     return "fold" if multiplier.real > 0 else "period doubling"
 

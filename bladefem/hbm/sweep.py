@@ -21,7 +21,7 @@ from .sensitivity import sensitivities
 from .solution import Solution, size
 from .solve import leading_stuck_solutions, solve, solve_near
 from .solver.fallback import match_harmonics
-from .solver.newton import DEFAULTS, Options
+from .solver.newton import DEFAULT_OPTIONS, Options
 from .solver.point_compiled import solve_along
 from .validate_model import check_point, check_probe
 
@@ -49,9 +49,9 @@ SHORTEST_WALK_STEP = 0.002
 MORE_SAMPLES = (2, 4)
 # unknowns up to which paths are followed wherever contacts lift off; of larger models, where the
 # sweep shows a jump, too
-FOLLOWED = 700
+MAX_PATH_UNKNOWNS = 700
 # a jump: a share of the highest point between neighbours that this share of the band separates
-JUMP = 0.05
+JUMP_HEIGHT_SHARE = 0.05
 JUMP_WIDTH = 1e-4
 
 
@@ -61,7 +61,7 @@ def response(
     H: int = 3,
     samples: int = 128,
     *,
-    options: Options = DEFAULTS,
+    options: Options = DEFAULT_OPTIONS,
     keep: Keep = lambda omega, compute: compute(),
 ) -> Iterator[Solution]:
     """Solve one point after the other, each started from the curve through the last ones.
@@ -127,7 +127,7 @@ def sweep(
     *,
     peak: float = 1e-3,
     curve: float = 0.02,
-    options: Options = DEFAULTS,
+    options: Options = DEFAULT_OPTIONS,
     notes: list[str] | None = None,
     paths: bool = True,
 ) -> Iterator[Solution]:
@@ -271,7 +271,7 @@ def _needs_continuation(
     good = [p for p in points if p.converged]
     if len(good) < 2:
         return False
-    if model.springs.size * (2 * H + 1) <= FOLLOWED:
+    if model.springs.size * (2 * H + 1) <= MAX_PATH_UNKNOWNS:
         opened = {p.states["open"] for p in good}
         return len(opened) > 1 or any(p.states["lift"] for p in good)
     if len(good) < len(points):
@@ -279,7 +279,7 @@ def _needs_continuation(
     heights = np.array([size(p, probe) for p in good])
     steps = np.diff([p.omega for p in good])
     near = steps < JUMP_WIDTH * (good[-1].omega - good[0].omega)
-    return bool(np.any(near & (abs(np.diff(heights)) > JUMP * heights.max())))
+    return bool(np.any(near & (abs(np.diff(heights)) > JUMP_HEIGHT_SHARE * heights.max())))
 
 
 def solve_from(
@@ -288,7 +288,7 @@ def solve_from(
     H: int,
     samples: int,
     starts: Sequence[Solution],
-    options: Options = DEFAULTS,
+    options: Options = DEFAULT_OPTIONS,
 ) -> Solution:
     """The point from the first of several neighbours that leads to it, at once or in small steps,
     before fallbacks, which take far longer.
@@ -347,7 +347,7 @@ def walk_in_frequency(
     H: int,
     samples: int,
     start: Solution,
-    options: Options = DEFAULTS,
+    options: Options = DEFAULT_OPTIONS,
 ) -> list[Solution]:
     """Converged points from a solved one towards a frequency, each by Newton from the curve
     through the last ones; the step is halved where that fails.

@@ -35,10 +35,10 @@ from .solver.residual import (
 )
 
 # instants of a period at which the friction limit is looked at, for each harmonic
-INSTANTS = 64
+INSTANTS_PER_HARMONIC = 64
 # directions of the polygon round an admissible set of two tangents: 3.5 % too wide at most; what
 # lies outside is returned by the march
-DIRECTIONS = 12
+POLYGON_DIRECTIONS = 12
 # largest change of a force, over the largest friction limit
 MAX_FORCE_CHANGE = 20.0
 
@@ -153,7 +153,7 @@ def _mean_change(model: ReducedModel, nodes: np.ndarray) -> tuple[np.ndarray, np
 def _normals(tangents: int) -> np.ndarray:
     if tangents == 1:
         return np.array([[1.0], [-1.0]])
-    angle = 2 * np.pi * np.arange(DIRECTIONS) / DIRECTIONS
+    angle = 2 * np.pi * np.arange(POLYGON_DIRECTIONS) / POLYGON_DIRECTIONS
     return np.column_stack([np.cos(angle), np.sin(angle)])
 
 
@@ -166,7 +166,7 @@ def _bounds(
     """(m, directions) least of mu N(t) - normal . u(t) over the period [N]."""
     elements = model.elements
     H = w.shape[2] // 2
-    instants = INSTANTS * H
+    instants = INSTANTS_PER_HARMONIC * H
     first = model.directions - elements.tangents
     moving = w[nodes].copy()
     moving[:, first:, 0] = 0.0

@@ -17,10 +17,22 @@ from ..scene.tables import Scene
 from ..scene.toml import dump, load_scene
 from .stage_cache import open_folder, write_text
 
-EARLIER = "earlier"
+EARLIER_FOLDER = "earlier"
 # names of the fields that the user gave, in addition to the scene with all its values
-GIVEN = "given.json"
-RESULTS = (".csv", ".gif", ".html", ".json", ".md", ".nc", ".png", ".svg", ".tex", ".txt", ".vtu")
+GIVEN_FIELDS_FILE = "given.json"
+RESULT_SUFFIXES = (
+    ".csv",
+    ".gif",
+    ".html",
+    ".json",
+    ".md",
+    ".nc",
+    ".png",
+    ".svg",
+    ".tex",
+    ".txt",
+    ".vtu",
+)
 
 
 @contextmanager
@@ -95,13 +107,13 @@ def keep_given(folder: str | Path, names: Iterable[str]) -> None:
         names: dotted, "aerofoil.span"; added to those already known where the scene came from the
             folder itself.
     """
-    write_text(Path(folder) / GIVEN, json.dumps(sorted(names), indent=1) + "\n")
+    write_text(Path(folder) / GIVEN_FIELDS_FILE, json.dumps(sorted(names), indent=1) + "\n")
 
 
 def given_fields(folder: str | Path) -> list[str] | None:
     """Dotted names of the fields that the user gave; None where the folder does not know."""
     try:
-        names = json.loads((Path(folder) / GIVEN).read_text(encoding="utf-8"))
+        names = json.loads((Path(folder) / GIVEN_FIELDS_FILE).read_text(encoding="utf-8"))
     except (OSError, ValueError):
         return None
     return [str(name) for name in names] if isinstance(names, list) else None
@@ -120,11 +132,11 @@ def _put_away(folder: Path) -> str:
     results = [
         p
         for p in folder.iterdir()
-        if p.suffix in RESULTS and not p.name.startswith(".") and p.is_file()
+        if p.suffix in RESULT_SUFFIXES and not p.name.startswith(".") and p.is_file()
     ]
     if not results:
         return ""
-    earlier = folder / EARLIER
+    earlier = folder / EARLIER_FOLDER
     try:
         shutil.rmtree(earlier, ignore_errors=True)
         earlier.mkdir()

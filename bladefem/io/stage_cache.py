@@ -31,7 +31,7 @@ if TYPE_CHECKING:
 
 # Raised when the meaning or the layout of stored stages changes: older files are then computed
 # again.
-FORMAT = 4
+STAGE_FORMAT = 4
 Result = TypeVar("Result")
 
 
@@ -73,7 +73,7 @@ def writing(path: str | Path) -> Iterator[Path]:
 
 def key_of(*parts: Any) -> str:
     """Hash of numbers, texts, arrays and dataclasses: equal content, equal key."""
-    digest = hashlib.sha256(f"{FORMAT}".encode())
+    digest = hashlib.sha256(f"{STAGE_FORMAT}".encode())
     _feed(digest, parts)
     return digest.hexdigest()[:20]
 

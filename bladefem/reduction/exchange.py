@@ -13,9 +13,9 @@ import numpy as np
 from ..errors import InputError
 
 # form of a DMIG matrix of which one triangle is given
-SYMMETRIC = 6
+SYMMETRIC_FORM = 6
 # types of complex matrices, single and double
-COMPLEX = (3, 4)
+COMPLEX_TYPES = (3, 4)
 
 
 def read_dmig(path: str | Path) -> dict[str, np.ndarray]:
@@ -47,7 +47,7 @@ def read_dmig(path: str | Path) -> dict[str, np.ndarray]:
             ) from error
     if not entries or {name for name, *_ in entries} - set(forms):
         raise InputError(f"file {path}: expected DMIG matrices, each with its header")
-    wide = [name for name, (form, _) in forms.items() if form not in (1, SYMMETRIC)]
+    wide = [name for name, (form, _) in forms.items() if form not in (1, SYMMETRIC_FORM)]
     if wide:
         raise InputError(
             f"file {path}: {', '.join(wide)} is rectangular, expected square matrices (form 1 or 6)"
@@ -55,14 +55,14 @@ def read_dmig(path: str | Path) -> dict[str, np.ndarray]:
     dofs = sorted({dof for _, column, row, _ in entries for dof in (column, row)})
     place = {dof: i for i, dof in enumerate(dofs)}
     matrices = {
-        name: np.zeros((len(dofs),) * 2, complex if kind in COMPLEX else float)
+        name: np.zeros((len(dofs),) * 2, complex if kind in COMPLEX_TYPES else float)
         for name, (_, kind) in forms.items()
     }
     for name, column, row, value in entries:
         i = place[row]
         j = place[column]
-        matrices[name][i, j] = value if forms[name][1] in COMPLEX else value.real
-        if forms[name][0] == SYMMETRIC:
+        matrices[name][i, j] = value if forms[name][1] in COMPLEX_TYPES else value.real
+        if forms[name][0] == SYMMETRIC_FORM:
             matrices[name][j, i] = matrices[name][i, j]
     return matrices | {"dofs": np.array(dofs)}
 

@@ -16,11 +16,11 @@ from ..errors import InputError
 from .exchange import read_ansys, read_dmig
 
 # eigenvalues below this share of the largest one are rigid modes: omega = 0
-RIGID = 1e-10
+RIGID_EIGENVALUE_SHARE = 1e-10
 # eigenvalues of M below this share of the largest one belong to massless motions
-MASSLESS = 1e-13
+MASSLESS_EIGENVALUE_SHARE = 1e-13
 # negative damping below this share of the largest one is rounding
-ROUNDING = 1e-9
+DAMPING_ROUNDING_SHARE = 1e-9
 
 
 def port_model_from_matrices(
@@ -59,11 +59,11 @@ def port_model_from_matrices(
     except linalg.LinAlgError:
         M, K, C, P, massless = _without_massless(M, K, C, P)
         values, vectors = linalg.eigh(K, M)
-    if values[0] < -RIGID * values[-1]:
+    if values[0] < -RIGID_EIGENVALUE_SHARE * values[-1]:
         raise InputError(
             f"K has the eigenvalue {values[0]:.3g}: expected a positive semidefinite stiffness"
         )
-    values[values < RIGID * values[-1]] = 0.0
+    values[values < RIGID_EIGENVALUE_SHARE * values[-1]] = 0.0
     count = len(values) if count is None else count
     if not np.count_nonzero(values == 0) <= count <= len(values):
         raise InputError(
@@ -164,17 +164,17 @@ def _without_massless(
     statically, and the flexibility (p, p) of the others.
     """
     masses, motions = linalg.eigh(M)
-    if masses[0] < -MASSLESS * masses[-1]:
+    if masses[0] < -MASSLESS_EIGENVALUE_SHARE * masses[-1]:
         raise InputError(
             f"M has the eigenvalue {masses[0]:.3g}: expected a positive semidefinite mass matrix"
         )
-    still = masses <= MASSLESS * masses[-1]
+    still = masses <= MASSLESS_EIGENVALUE_SHARE * masses[-1]
     if still.all():
         raise InputError("M is zero: expected a mass matrix with some mass")
     light = motions[:, still]
     heavy = motions[:, ~still]
     own = light.conj().T @ K @ light
-    if linalg.eigvalsh(own)[0] <= RIGID * abs(K).max():
+    if linalg.eigvalsh(own)[0] <= RIGID_EIGENVALUE_SHARE * abs(K).max():
         raise InputError(
             "M and K: a motion has neither mass nor stiffness, expected one of them in each"
         )
@@ -217,7 +217,7 @@ def _modal_damping(matrix: np.ndarray) -> np.ndarray:
     """
     # the part that does work; what is left of a gyroscopic matrix does none
     lowest = linalg.eigvalsh((matrix + matrix.conj().T) / 2)[0]
-    rounding = ROUNDING * abs(matrix).max()
+    rounding = DAMPING_ROUNDING_SHARE * abs(matrix).max()
     if lowest < -rounding:
         raise InputError(f"C damps a motion by {lowest:.3g} 1/s: expected no negative damping")
     diagonal = np.maximum(np.diag(matrix).real, 0.0)

@@ -12,7 +12,7 @@ from ..study.pipeline.best_load import BestLoad
 
 # share of the excitation's work that friction takes at an optimum that is one of damping; below it
 # the amplitude is low for another reason, such as a stiffer blade
-LEAST_FRICTION = 0.05
+MIN_FRICTION_REDUCTION = 0.05
 # of the ends of the range of a search: a load nearer to one lies at it
 AT_END = 0.01
 
@@ -113,7 +113,7 @@ def _at_end(best: pd.Series) -> list[str]:
 
 def _without_friction(best: pd.Series) -> list[str]:
     work = best.get("input_work", np.nan)
-    if not work > 0 or best["dissipated"] >= LEAST_FRICTION * work:
+    if not work > 0 or best["dissipated"] >= MIN_FRICTION_REDUCTION * work:
         return []
     return [
         f"friction takes only {100 * best['dissipated'] / work:.2g} % of the excitation's work "

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import re
 
-MODE = re.compile(r"modes/mode_(?P<number>\d+)(?P<wheel>_wheel)?")
+MODE_PICTURE = re.compile(r"modes/mode_(?P<number>\d+)(?P<wheel>_wheel)?")
 
 CAPTIONS = {
     "mesh/mesh": "Mesh of blade and damper; coloured faces are those that have names.",
@@ -122,7 +122,7 @@ def caption_of(name: str) -> str:
     """
     if name in CAPTIONS:
         return CAPTIONS[name]
-    mode = MODE.fullmatch(name)
+    mode = MODE_PICTURE.fullmatch(name)
     if mode:
         where = "on the whole wheel" if mode["wheel"] else "on the sector, at rest in grey lines"
         return f"Mode {mode['number']} {where}; displacement over its largest value."

@@ -15,7 +15,7 @@ from .tables import units_of
 if TYPE_CHECKING:
     import xarray as xr
 
-MEANING = {
+VARIABLE_MEANINGS = {
     "force": "contact force on the damper",
     "moment": "its moment about the engine's origin",
     "centre": "force-weighted middle of the contact",
@@ -123,7 +123,7 @@ def resultants(table: pd.DataFrame) -> xr.Dataset:
         data[name] = (
             ("load", "seat", "direction"),
             values,
-            {"units": units[columns[0]], "long_name": MEANING[name]},
+            {"units": units[columns[0]], "long_name": VARIABLE_MEANINGS[name]},
         )
     for name in table.columns.drop(
         ["load", "patch", *(column for some in vectors.values() for column in some)]
@@ -133,7 +133,7 @@ def resultants(table: pd.DataFrame) -> xr.Dataset:
             table[name].to_numpy().reshape(len(loads), len(seats)),
             {
                 "units": units.get(name, "1"),
-                "long_name": MEANING.get(f"{name}s", name.replace("_", " ")),
+                "long_name": VARIABLE_MEANINGS.get(f"{name}s", name.replace("_", " ")),
             },
         )
     return xr.Dataset(

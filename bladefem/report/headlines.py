@@ -15,7 +15,7 @@ from .best_load import found_best
 from .statements import Answer
 
 # what an answer says in place of a number that the data cannot carry
-UNDETERMINED = "not determined"
+NOT_DETERMINED = "not determined"
 
 
 class Headline(NamedTuple):
@@ -52,7 +52,7 @@ def headlines(
             what,
             value,
             "see what to do next"
-            if value == UNDETERMINED
+            if value == NOT_DETERMINED
             else sure.get(_quantity(what), "no estimate"),
             remark,
         )

@@ -10,7 +10,7 @@ import pandas as pd
 from ..study.influences import Influence
 from ..study.pipeline.best_load import BestLoad
 
-NAMES = {
+PARAMETER_NAMES = {
     "kt": "tangential stiffness",
     "kn": "normal stiffness",
     "roughness": "roughness of the seats",
@@ -27,7 +27,7 @@ def influence_table(found: Sequence[Influence], best: BestLoad) -> pd.DataFrame:
     rows = []
     for one in found:
         row = {
-            "parameter": NAMES[one.parameter.name],
+            "parameter": PARAMETER_NAMES[one.parameter.name],
             "low": one.parameter.low,
             "high": one.parameter.high,
             "range_from": one.parameter.range_from,
@@ -55,8 +55,9 @@ def influence_sentence(found: Sequence[Influence]) -> str:
         f"{100 * np.expm1(max(off)):.2g} % of the amplitude there"
     )
     failed = "".join(f"; {one.reason}" for one in found if one.reason)
+    name = PARAMETER_NAMES[top.parameter.name]
     return (
-        f"the best amplitude hangs most on the {NAMES[top.parameter.name]}: over {low:.3g} to "
+        f"the best amplitude depends most on the {name}: over {low:.3g} to "
         f"{high:.3g} times its value it changes by a factor of {np.exp(top.span):.3g} by the exact "
         f"derivative{checked}{failed}"
     )

@@ -34,11 +34,11 @@ from .tables import write_tables
 from .write import Page, write_report
 
 # modes that are drawn
-PICTURES = 4
+MAX_DRAWN_MODES = 4
 # frequencies on the first screen
-HEADLINES = 6
+MAX_HEADLINES = 6
 # sections of tables and pictures; the others are among the modes
-PLACES = {
+SECTION_OF = {
     "convergence": "mesh",
     "convergence_points": "mesh",
     "forced_response": "response",
@@ -56,7 +56,7 @@ def run(
     scene: Scene,
     folder: str | Path,
     wanted: Wanted,
-    pictures: int = PICTURES,
+    pictures: int = MAX_DRAWN_MODES,
     comm: Communicator | None = None,
     progress: Progress = unwatched,
 ) -> Survey:
@@ -194,7 +194,7 @@ def _report(
 def _entry(name: str) -> str:
     """Section and name of a table or picture on the page."""
     stem = Path(name).stem
-    return f"{PLACES.get(stem, 'modes')}/{stem}"
+    return f"{SECTION_OF.get(stem, 'modes')}/{stem}"
 
 
 def _numbers(
@@ -219,7 +219,7 @@ def _numbers(
             else "mesh error not studied",
             f"{diameter}residual {excited.residuals[i]:.0e}",
         )
-        for i in range(min(HEADLINES, len(excited.frequencies)))
+        for i in range(min(MAX_HEADLINES, len(excited.frequencies)))
     ]
 
 
@@ -227,7 +227,7 @@ def _stresses(result: Survey) -> tuple[pd.DataFrame, dict[str, np.ndarray], dict
     """Table of extremes and fields at nodes or in cells: displacement and stress under the
     rotation, of the first modes and of the resonances; collective.
     """
-    states = stress_states(result.bodies, excited_set(result.run), PICTURES, result.answer)
+    states = stress_states(result.bodies, excited_set(result.run), MAX_DRAWN_MODES, result.answer)
     table, nodes, cells = stress_table(result.bodies, states)
     fields, inside = (
         {

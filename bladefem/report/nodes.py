@@ -20,7 +20,7 @@ from ..view.wear import draw_work
 from .linear import linear_columns
 
 # contact pairs in words, as the pictures of pressure have them
-SEATS = {"this": "right seat", "next": "left seat"}
+SEAT_WORDS = {"this": "right seat", "next": "left seat"}
 
 
 def cycles_of(result: SolvedRun) -> list[ContactCycle]:
@@ -189,7 +189,8 @@ def seat_loops(
     """Name of the load -> name of the seat -> (displacement [m], force [N]) of one period."""
     return {
         f"{c.load:.4g} N" + ("" if c.mass is None else f", {1e3 * c.mass:.4g} g"): {
-            SEATS.get(name, name): (loop.displacement, loop.force) for name, loop in c.loops.items()
+            SEAT_WORDS.get(name, name): (loop.displacement, loop.force)
+            for name, loop in c.loops.items()
         }
         for c in cycles
     }

@@ -171,7 +171,7 @@ class RunFolder:
             table = self.summary
         except InputError:
             return f"{head}<br>{escape(str(self.folder))}: no responses"
-        shown = [name for name in SHOWN if name in table]
+        shown = [name for name in SHOWN_COLUMNS if name in table]
         titles = {
             name: f"{COLUMNS[name].title} [{COLUMNS[name].shown or COLUMNS[name].unit}]"
             for name in shown
@@ -224,7 +224,15 @@ class RunFolder:
         return modes.draw_mode(self.mesh, shapes, mode - 1, file)
 
 
-SHOWN = ("load", "mass", "peak_frequency", "peak_amplitude", "reduction", "dissipated", "error")
+SHOWN_COLUMNS = (
+    "load",
+    "mass",
+    "peak_frequency",
+    "peak_amplitude",
+    "reduction",
+    "dissipated",
+    "error",
+)
 
 
 def open_run(folder: str | Path) -> RunFolder:

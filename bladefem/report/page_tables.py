@@ -8,11 +8,11 @@ import numpy as np
 import pandas as pd
 
 # below this share of the largest entry of a column or vector a number is round-off
-ROUNDOFF = 1e-12
+ROUNDOFF_SHARE = 1e-12
 # columns of a vector that share their scale
-VECTORS = ("force", "moment", "centre")
+VECTOR_COLUMNS = ("force", "moment", "centre")
 # table: names of its parts on the page and their columns, where all do not fit next to each other
-COLUMNS: dict[str, dict[str, tuple[str, ...]]] = {
+PAGE_COLUMNS: dict[str, dict[str, tuple[str, ...]]] = {
     "contact/pressure": {
         "contact/pressure": (
             "load",
@@ -52,7 +52,7 @@ COLUMNS: dict[str, dict[str, tuple[str, ...]]] = {
 def page_tables(name: str, table: pd.DataFrame) -> Iterator[tuple[str, pd.DataFrame]]:
     """Names and tables for the page; columns that are in no part are listed in ``attrs``."""
     clean = without_roundoff(table)
-    parts = COLUMNS.get(name)
+    parts = PAGE_COLUMNS.get(name)
     if parts is None:
         yield name, clean
         return
@@ -78,7 +78,7 @@ def without_roundoff(table: pd.DataFrame) -> pd.DataFrame:
     0     30.0      0.0
     """
     clean = table.copy()
-    groups = [[f"{name}_{axis}" for axis in "xyz"] for name in VECTORS] + [list("xyz")]
+    groups = [[f"{name}_{axis}" for axis in "xyz"] for name in VECTOR_COLUMNS] + [list("xyz")]
     known = [[column for column in group if column in clean] for group in groups]
     alone = [
         [column]
@@ -90,5 +90,5 @@ def without_roundoff(table: pd.DataFrame) -> pd.DataFrame:
             continue
         values = clean[group].to_numpy(float)
         size = np.abs(values[np.isfinite(values)]).max(initial=0.0)
-        clean[group] = np.where(np.abs(values) < ROUNDOFF * size, 0.0, values)
+        clean[group] = np.where(np.abs(values) < ROUNDOFF_SHARE * size, 0.0, values)
     return clean

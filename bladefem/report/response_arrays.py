@@ -20,9 +20,12 @@ from .tables import units_of
 if TYPE_CHECKING:
     import xarray as xr
 
-LOAD = {"units": "N", "long_name": "static normal force on each seat; 0 no damper, inf full stick"}
+LOAD_ATTRIBUTES = {
+    "units": "N",
+    "long_name": "static normal force on each seat; 0 no damper, inf full stick",
+}
 # of the response table: name to long name
-CURVES = {
+CURVE_MEANINGS = {
     "amplitude": "amplitude of the motion at the probe",
     "phase": "phase of the first harmonic at the probe",
     "converged": "whether the point was solved; NaN where the curve has no point",
@@ -40,7 +43,7 @@ def curve_arrays(points: pd.DataFrame) -> xr.Dataset:
     Args:
         points: one row a response point, SI columns; the linear limits have no mass.
     """
-    columns = [name for name in CURVES if name in points]
+    columns = [name for name in CURVE_MEANINGS if name in points]
     if "mass" in points:
         points = _for_each_mass(points)
     keys = [name for name in ("mass", "load", "frequency") if name in points]
@@ -48,8 +51,8 @@ def curve_arrays(points: pd.DataFrame) -> xr.Dataset:
     table = points[keys + columns].drop_duplicates(keys).astype({"converged": float})
     data = table.set_index(keys).to_xarray()
     for name in columns:
-        data[name].attrs |= {"units": units.get(name, "1"), "long_name": CURVES[name]}
-    data["load"].attrs |= LOAD
+        data[name].attrs |= {"units": units.get(name, "1"), "long_name": CURVE_MEANINGS[name]}
+    data["load"].attrs |= LOAD_ATTRIBUTES
     data["frequency"].attrs |= {"units": "Hz", "long_name": "excitation frequency"}
     return _with_mass_units(data)
 
@@ -85,7 +88,7 @@ def resonance_arrays(curves: Sequence[Curve], limits: Sequence[Limit] = ()) -> x
     data = xr.combine_by_coords(parts)
     data["motion"].attrs |= {"units": "m", "long_name": "complex amplitude at the probe"}
     data["frequency"].attrs |= {"units": "Hz", "long_name": "frequency of the resonance"}
-    data["load"].attrs |= LOAD
+    data["load"].attrs |= LOAD_ATTRIBUTES
     return _with_mass_units(data)
 
 
@@ -122,7 +125,7 @@ def node_arrays(table: pd.DataFrame) -> xr.Dataset:
     for name in data.variables:
         if name not in ("load", "patch", "node"):
             data[name].attrs |= {"units": units.get(str(name), "1")}
-    data["load"].attrs |= LOAD
+    data["load"].attrs |= LOAD_ATTRIBUTES
     return _with_mass_units(data)
 
 
@@ -155,7 +158,7 @@ def loop_arrays(
     data["displacement"].attrs |= {"units": "m", "long_name": "relative displacement of the seat"}
     data["force"].attrs |= {"units": "N", "long_name": "friction force of the seat"}
     data["phase"].attrs |= {"units": "rad", "long_name": "phase of the period"}
-    data["load"].attrs |= LOAD
+    data["load"].attrs |= LOAD_ATTRIBUTES
     return _with_mass_units(data)
 
 

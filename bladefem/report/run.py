@@ -58,7 +58,7 @@ from .headlines import Headline
 from .influences import influence_sentence, influence_table
 from .linear import harmonic_table, linear_sentence
 from .nodes import (
-    SEATS,
+    SEAT_WORDS,
     cycles_of,
     draw_hysteresis,
     draw_wear,
@@ -77,8 +77,8 @@ from .wheel import blade_table, pattern_drawings, pattern_headlines, pattern_tab
 from .write import Page, write_report
 
 # the figure of the blade's motion under the best load
-MOTION = "response/damped_motion"
-MESH = (
+MOTION_FIGURE = "response/damped_motion"
+MESH_ERROR_NOTE = (
     "the estimated errors are those of modes, harmonics, samples, contact points, damper model and "
     "of the mesh, of seats and blade; other meshes are compared by 'bladefem modes --converge' "
     "(frequencies) and 'bladefem chart --mesh' (resonance)"
@@ -180,7 +180,7 @@ def _write(
         "response": curve_arrays(tables["response/points"]),
         "resonance": resonance_arrays(result.response.curves, result.response.limits),
         "cycle": node_arrays(nodes),
-        "loops": loop_arrays(cycles, SEATS),
+        "loops": loop_arrays(cycles, SEAT_WORDS),
     }
     write_results(folder / "results.nc", groups, dump(result.scene))
     mesh.save_vtu(result.mesh, folder / "mesh.vtu")
@@ -204,7 +204,7 @@ def _report_messages(result: SolvedRun, cycles: list[ContactCycle]) -> list[str]
     coefficient = result.scene.contact.wear_coefficient
     messages = [
         *result.messages,
-        method(MESH),
+        method(MESH_ERROR_NOTE),
         _static_contact(result),
         method(_states(result)),
         method(linear_sentence(cycles)),
@@ -238,7 +238,7 @@ def _live(
         "response/hysteresis": live_loops(seat_loops(cycles)),
         "modes/frequencies_by_nodal_diameter": live_diameters(tables["modes/nodal_diameters"]),
         **({} if shapes is None else {"modes/first_modes": shapes}),
-        **({} if motions is None else {MOTION: motions}),
+        **({} if motions is None else {MOTION_FIGURE: motions}),
     }
 
 
@@ -553,7 +553,7 @@ def _drawings(
         ),
     }
     for title, motion in list(_motions(result).items())[:1]:
-        drawings[MOTION] = partial(draw_motion, geometry, motion, title=title)
+        drawings[MOTION_FIGURE] = partial(draw_motion, geometry, motion, title=title)
     if "response/influences" in tables:
         drawings["response/influences"] = partial(draw_influences, tables["response/influences"])
     if len(result.modes) > 1:

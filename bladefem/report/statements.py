@@ -18,7 +18,7 @@ from .best_load import certainty, flat_range, found_best, reasons_against
 # of the resonance frequency: farther off, an engine order does not drive it
 OFF_RESONANCE = 0.1
 # relative difference below which a load was itself studied; own loads are rounded to four digits
-STUDIED = 1e-3
+SAME_LOAD_TOLERANCE = 1e-3
 
 
 class Answer(NamedTuple):
@@ -158,7 +158,7 @@ def own_mass(
     mass, speed, load = own[["mass", "speed", "load"]].iloc[0]
     table = finite.sort_values("load")
     there = "outside the loads studied"
-    studied = table[np.isclose(table["load"], load, rtol=STUDIED)]
+    studied = table[np.isclose(table["load"], load, rtol=SAME_LOAD_TOLERANCE)]
     if len(studied):
         there = f"resonance amplitude {1e6 * studied['peak_amplitude'].iloc[0]:.4g} µm there"
     elif table["load"].iloc[0] <= load <= table["load"].iloc[-1]:

@@ -279,7 +279,7 @@ def to_latex(table: pd.DataFrame, caption: str = "") -> str:
     return "\n".join(lines) + "\n"
 
 
-LATEX = {
+LATEX_ESCAPES = {
     "\\": r"\textbackslash{}",
     "%": r"\%",
     "&": r"\&",
@@ -299,7 +299,7 @@ LATEX = {
 
 def escape(text: object) -> str:
     """Text that LaTeX prints as it is."""
-    return "".join(LATEX.get(letter, letter) for letter in str(text))
+    return "".join(LATEX_ESCAPES.get(letter, letter) for letter in str(text))
 
 
 def write_tables(

@@ -24,7 +24,7 @@ from ..wheel.statistics import (
 from .headlines import Headline
 
 # quantiles of a scatter
-SHARES = (0.5, 0.95, 0.99)
+SCATTER_QUANTILES = (0.5, 0.95, 0.99)
 
 
 def pattern_table(found: Sequence[PatternResponse]) -> pd.DataFrame:
@@ -122,7 +122,7 @@ def scatter_table(found: Amplification) -> pd.DataFrame:
             "tuned_amplitude": found.tuned[i],
             "wheels": found.factor.shape[1],
         }
-        for share in SHARES:
+        for share in SCATTER_QUANTILES:
             q = quantile(found.factor[i], share)
             name = f"p{100 * share:g}"
             row |= {name: q.value, f"{name}_low": q.low, f"{name}_high": q.high}
@@ -299,11 +299,11 @@ def marked_optima(found: Amplification) -> list[tuple[str, float, float, float]]
 def scatter_drawings(found: Amplification) -> dict[str, Callable[[Path], object]]:
     """Bands against the load, and the histogram at the tuned optimum."""
     bands = {}
-    for share in SHARES[:2]:
+    for share in SCATTER_QUANTILES[:2]:
         rows = [quantile(row, share) for row in found.peak]
         bands[f"{100 * share:g} % of wheels"] = np.array([[q.value, q.low, q.high] for q in rows])
     i = int(np.argmin(found.tuned))
-    marks = {f"{100 * s:g} %": quantile(found.factor[i], s).value for s in SHARES[:2]}
+    marks = {f"{100 * s:g} %": quantile(found.factor[i], s).value for s in SCATTER_QUANTILES[:2]}
     drawings: dict[str, Callable[[Path], object]] = {
         "wheel/scatter_histogram": partial(
             view.draw_histogram, found.factor[i], marks, f"{found.loads[i]:g} N"

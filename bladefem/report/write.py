@@ -46,9 +46,9 @@ SECTIONS = {
     "versions": "Origin",
 }
 # rows of a table on the page; the CSV files hold all
-LONGEST = 40
+MAX_PAGE_ROWS = 40
 # figures that answer most, the best first; the page begins with the first one there is
-LEADS = (
+LEAD_FIGURES = (
     "response/forced_response",
     "response/side_by_side",
     "response/accuracy",
@@ -158,7 +158,9 @@ def contents(
     total = sum(timings.values())
     live = {name: spec for name, spec in (page.live or {}).items() if name in figures}
     keys = {name: f"live-{number}" for number, name in enumerate(live, 1)}
-    lead = next((name for known in LEADS for name in figures if name.startswith(known)), None)
+    lead = next(
+        (name for known in LEAD_FIGURES for name in figures if name.startswith(known)), None
+    )
     numbers = count(1)
     parts = {
         "lead": None if lead is None else _figure(lead, figures[lead], numbers, keys),
@@ -282,15 +284,15 @@ def printed(
     number: int,
 ) -> dict[str, Any]:
     """A table as text, cut to the longest that a page should hold."""
-    text = readable(table.head(LONGEST))
+    text = readable(table.head(MAX_PAGE_ROWS))
     return {
         "number": number,
         "caption": caption_of(name),
-        "frame": table.head(LONGEST),
+        "frame": table.head(MAX_PAGE_ROWS),
         "head": list(text.columns),
         "right": numeric(text),
         "rows": text.to_numpy().tolist(),
-        "left_out": max(len(table) - LONGEST, 0),
+        "left_out": max(len(table) - MAX_PAGE_ROWS, 0),
         "columns_left_out": table.attrs.get("left_out", []),
     }
 

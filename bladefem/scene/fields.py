@@ -13,7 +13,7 @@ from .units import is_plain, parse, readable_units, shortened, show
 
 # of one field: every load is a sweep of its own
 MOST_VALUES = 1000
-QUESTION = "did you mean '"
+SUGGESTION_START = "did you mean '"
 
 
 class Field(NamedTuple):
@@ -58,7 +58,9 @@ def field_at(name: str) -> Field:
     if head in tables:
         inside = [k.rpartition(".")[2] for k in known if _table_name(k) == head]
         near = suggestion(last, inside)
-        raise InputError(f"unknown key '{name}'{near.replace(QUESTION, f'{QUESTION}{head}.')}")
+        raise InputError(
+            f"unknown key '{name}'{near.replace(SUGGESTION_START, f'{SUGGESTION_START}{head}.')}"
+        )
     outside = [*tables, *(k for k in known if not _table_name(k))]
     raise InputError(
         f"unknown key '{name}'{_similar_words(name, known) or suggestion(name, outside)}"

@@ -9,8 +9,8 @@ from .tables import Support
 from .units import parse
 
 # fixed axes, then radial, tangential and axial about the z axis
-LETTERS = ("x", "y", "z", "r", "t", "a")
-SPRINGS = ("normal", "tangential")
+DIRECTION_LETTERS = ("x", "y", "z", "r", "t", "a")
+SPRING_DIRECTIONS = ("normal", "tangential")
 
 
 def area_springs(support: Support) -> Iterator[tuple[str, float, float]]:
@@ -40,7 +40,7 @@ def held_letters(support: Support) -> list[tuple[str, str]]:
     for text in support.directions or ():
         face, colon, letters = (part.strip() for part in text.partition(":"))
         letters = letters.replace(",", "").replace(" ", "").lower()
-        if not colon or not face or not letters or set(letters) - set(LETTERS):
+        if not colon or not face or not letters or set(letters) - set(DIRECTION_LETTERS):
             raise InputError(
                 f"support.directions = {text!r}: expected one text for each face, such as "
                 "'rim: z', 'foot: xy' or 'bore: ra' (r radial, t tangential, a axial)"
@@ -51,9 +51,10 @@ def held_letters(support: Support) -> list[tuple[str, str]]:
 
 def _parse_stiffness(item: str, text: str) -> tuple[str, float]:
     name, _, value = (part.strip() for part in item.partition("="))
-    if name not in SPRINGS:
+    if name not in SPRING_DIRECTIONS:
         raise InputError(
-            f"support.springs = {text!r}: '{name}' is no stiffness{suggestion(name, SPRINGS)}"
+            f"support.springs = {text!r}: '{name}' is no stiffness"
+            f"{suggestion(name, SPRING_DIRECTIONS)}"
         )
     number = parse(value, "N/m^3", f"support.springs, {name}")
     if not number >= 0:

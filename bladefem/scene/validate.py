@@ -21,7 +21,7 @@ from .units import show
 from .validate_contact import contact_problems
 
 # constants of an orthotropic solid
-CONSTANTS = 9
+ORTHOTROPIC_CONSTANTS = 9
 
 
 def validate(scene: Scene) -> None:
@@ -70,7 +70,7 @@ def _check_crystals(scene: Scene) -> Iterator[str]:
     """Nine constants make an orthotropic solid."""
     for name in ("blade", "damper"):
         constants = getattr(scene.material, name).orthotropic
-        if constants is not None and len(constants) != CONSTANTS:
+        if constants is not None and len(constants) != ORTHOTROPIC_CONSTANTS:
             yield (
                 f"material.{name}.orthotropic has {len(constants)} values, expected E1, E2, E3, "
                 "nu12, nu13, nu23, G12, G13, G23"

@@ -9,7 +9,7 @@ from .kinds import kind_named
 from .tables import Scene, Seat
 from .units import show
 
-SHAPE = ("crown", "crown_across", "edge_radius", "edge_width")
+SEAT_SHAPE_FIELDS = ("crown", "crown_across", "edge_radius", "edge_width")
 
 
 def contact_problems(scene: Scene) -> Iterator[str]:
@@ -29,7 +29,7 @@ def contact_problems(scene: Scene) -> Iterator[str]:
     yield from _check_interval(scene)
     yield from _without_layer(scene)
     yield from _check_history(scene)
-    shaped = [key for key in SHAPE if getattr(contact, key) is not None]
+    shaped = [key for key in SEAT_SHAPE_FIELDS if getattr(contact, key) is not None]
     if shaped and contact.bedded:
         yield (
             f"contact.{shaped[0]} = {show(getattr(contact, shaped[0]), 'm')}: bedded seats have "
@@ -148,7 +148,9 @@ def _seats_only(scene: Scene) -> Iterator[str]:
     """Fields that need the two seats of a damper."""
     contact = scene.contact
     name = f"a scene of kind '{scene.kind}' has no two seats"
-    given = [key for key in (*SHAPE, "wear_coefficient") if getattr(contact, key) is not None]
+    given = [
+        key for key in (*SEAT_SHAPE_FIELDS, "wear_coefficient") if getattr(contact, key) is not None
+    ]
     given += ["stiffness = 'map'"] if contact.stiffness == "map" else []
     given += [side for side in ("left", "right") if getattr(contact, side) != Seat()]
     for key in given:

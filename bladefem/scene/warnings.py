@@ -10,11 +10,11 @@ from .tables import Material, Scene
 from .units import show
 
 # Young's modulus [Pa]: plastics to diamond
-STIFF = (1e9, 1e12)
+MODULUS_RANGE = (1e9, 1e12)
 # density [kg/m^3]: foam to osmium
-DENSE = (500.0, 25000.0)
+DENSITY_RANGE = (500.0, 25000.0)
 # [m/s] beyond which no disc holds
-FASTEST = 900.0
+MAX_RIM_SPEED = 900.0
 
 
 def doubts(scene: Scene) -> list[str]:
@@ -33,9 +33,9 @@ def _doubtful_materials(scene: Scene) -> Iterator[str]:
 
 
 def _doubtful_material(name: str, material: Material) -> Iterator[str]:
-    if not STIFF[0] <= material.E <= STIFF[1]:
+    if not MODULUS_RANGE[0] <= material.E <= MODULUS_RANGE[1]:
         yield f"{name}.E = {show(material.E, 'Pa')}: solids for machines have 1 to 1000 GPa"
-    if not DENSE[0] <= material.rho <= DENSE[1]:
+    if not DENSITY_RANGE[0] <= material.rho <= DENSITY_RANGE[1]:
         yield (
             f"{name}.rho = {show(material.rho, 'kg/m^3')}: solids for machines have 500 to 25000 "
             "kg/m^3"
@@ -46,11 +46,11 @@ def _doubtful_speed(scene: Scene) -> Iterator[str]:
     radii = kind_named(scene.kind).radii
     for name, radius in radii(scene).items() if radii is not None else ():
         speed = scene.operation.speed * radius
-        if speed > FASTEST:
+        if speed > MAX_RIM_SPEED:
             yield (
                 f"operation.speed = {show(scene.operation.speed, 'rad/s')}: the {name} at "
-                f"{show(radius, 'm')} moves with {speed:.0f} m/s, more than the {FASTEST:.0f} m/s "
-                "that wheels stand"
+                f"{show(radius, 'm')} moves with {speed:.0f} m/s, more than the "
+                f"{MAX_RIM_SPEED:.0f} m/s that wheels withstand"
             )
             return
 

@@ -10,7 +10,7 @@ import numpy as np
 from ..data import Elements
 from ..errors import InputError, NotSolvedError
 from ..friction.fourier import to_complex, to_real
-from ..hbm.solver.newton import DEFAULTS, Options
+from ..hbm.solver.newton import DEFAULT_OPTIONS, Options
 from ..util.arrays import ComplexArray, RealArray
 from .flexibility import WheelFlexibility, wheel_flexibility
 from .model import Pattern, Wheel, pattern_elements
@@ -75,7 +75,7 @@ def solve_wheel(
     *,
     pattern: Pattern = TUNED,
     start: WheelSolution | None = None,
-    options: Options = DEFAULTS,
+    options: Options = DEFAULT_OPTIONS,
 ) -> WheelSolution:
     """The periodic response of all blades at circular frequency omega [rad/s].
 
@@ -173,7 +173,7 @@ def sweep_wheel(
     samples: int = 128,
     *,
     pattern: Pattern = TUNED,
-    options: Options = DEFAULTS,
+    options: Options = DEFAULT_OPTIONS,
 ) -> Iterator[WheelSolution]:
     """Points at circular frequencies [rad/s], each from the one before."""
     last = None

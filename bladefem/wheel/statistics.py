@@ -16,7 +16,7 @@ from ..hbm.linear.bodies import modal_flexibility
 from ..hbm.model import ReducedModel
 from ..hbm.solution import Solution
 from ..hbm.solve import solve
-from ..hbm.solver.newton import DEFAULTS, Options
+from ..hbm.solver.newton import DEFAULT_OPTIONS, Options
 from ..util.arrays import IntegerArray, RealArray
 from ..util.communicator import Communicator
 from ..util.curve_extremum import parabola_minimum
@@ -246,7 +246,7 @@ def wheel_respond(
     pattern: Pattern,
     H: int,
     samples: int,
-    options: Options = DEFAULTS,
+    options: Options = DEFAULT_OPTIONS,
 ) -> Respond:
     """Amplitudes by the matrix-free balance, each point from the nearest one solved."""
     known: list[WheelSolution] = []
@@ -267,7 +267,7 @@ def one_body_respond(
     pattern: Pattern,
     H: int,
     samples: int,
-    options: Options = DEFAULTS,
+    options: Options = DEFAULT_OPTIONS,
 ) -> Respond:
     """Amplitudes by the balance of `bladefem.hbm` on one body: small wheels, thousands of
     points.

@@ -540,7 +540,7 @@ from pathlib import Path
 from types import SimpleNamespace
 import bladefem.cli.ranks as ranks
 from bladefem.errors import InputError
-ranks.PATIENCE = 1.0
+ranks.WAIT_FOR_RANKS_SECONDS = 1.0
 def action(comm):
     if {all} or comm.rank == 1:
         raise InputError("field = 1: expected 2")

@@ -23,7 +23,7 @@ def test_out_of_memory(bar, monkeypatch):
     """A workspace below MUMPS's own estimate: the code of a real machine without memory is among
     the same.
     """
-    monkeypatch.setattr(mumps, "ROOM", -95)
+    monkeypatch.setattr(mumps, "EXTRA_MEMORY_PERCENT", -95)
     with pytest.raises(
         NotSolvedError, match=r"memory ran out.* fewer unknowns \(INFOG\(1\) = -\d+"
     ):

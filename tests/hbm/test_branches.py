@@ -122,7 +122,7 @@ def test_motions_that_no_path_reached_are_kept(folding, monkeypatch):
 
 
 def test_a_path_through_a_maze_of_folds_is_left(folding, monkeypatch):
-    monkeypatch.setattr(branches_module, "MOST_FOLDS", 0)
+    monkeypatch.setattr(branches_module, "MAX_FOLDS", 0)
     swept = list(response(folding, np.linspace(*BAND, 15), 3, 128))
     found = find_branches(folding, BAND, swept, 3, 128)
     assert any("folds" in note for note in found.notes)

@@ -21,7 +21,7 @@ from bladefem.hbm.sensitivity import sensitivities
 from bladefem.hbm.solve import solve
 from bladefem.hbm.solver import fallback
 from bladefem.hbm.solver.fallback import solve_balance
-from bladefem.hbm.solver.newton import DEFAULTS, Options
+from bladefem.hbm.solver.newton import DEFAULT_OPTIONS, Options
 from bladefem.hbm.solver.residual import Balance
 from bladefem.hbm.sweep import response, size, sweep
 from bladefem.hbm.truncation_indicator import truncation_indicator
@@ -130,11 +130,11 @@ def test_every_fallback_ends_on_the_law(page):
     balance = Balance(model, condense(model, 1.25, 5), 64)
     usual = solve(model, 1.25, 5, 64)
     for name in ("_more_harmonics", "_from_high_load", "_along_excitation"):
-        end = getattr(fallback, name)(balance, DEFAULTS)
+        end = getattr(fallback, name)(balance, DEFAULT_OPTIONS)
         assert end.converged, (name, end.reason)
         np.testing.assert_allclose(end.state.w, usual.w, rtol=0, atol=1e-8)
-    near = solve_balance(balance, None, DEFAULTS)[0].end
-    shot = fallback._from_shooting(balance, near, DEFAULTS)
+    near = solve_balance(balance, None, DEFAULT_OPTIONS)[0].end
+    shot = fallback._from_shooting(balance, near, DEFAULT_OPTIONS)
     assert not shot.converged and "written for Coulomb's law" in shot.reason
 
 

@@ -15,7 +15,7 @@ from bladefem.data import ModeSet
 from bladefem.report.captions import caption_of
 from bladefem.report.chart import write_chart
 from bladefem.report.modes import _numbers
-from bladefem.report.write import LEADS
+from bladefem.report.write import LEAD_FIGURES
 from bladefem.scene.tables import Scene
 from bladefem.study.chart.chart import Chart
 
@@ -58,7 +58,12 @@ def test_frequencies_say_whether_the_mesh_was_studied(studied):
 
 
 def test_captions_are_sentences():
-    names = [*LEADS, "modes/mode_3_wheel", "response/forced_response_12g", "mesh/anything_else"]
+    names = [
+        *LEAD_FIGURES,
+        "modes/mode_3_wheel",
+        "response/forced_response_12g",
+        "mesh/anything_else",
+    ]
     for name in names:
         assert re.match(r"[A-Z].*\.$", caption_of(name)), name
     assert caption_of("response/forced_response_12g").endswith("Damper of 12 g.")

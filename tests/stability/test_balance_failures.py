@@ -18,7 +18,7 @@ from bladefem.hbm.parameters import vary
 from bladefem.hbm.reference_blade import reference_model
 from bladefem.hbm.solve import solve
 from bladefem.hbm.solver.fallback import solve_balance
-from bladefem.hbm.solver.newton import DEFAULTS, newton
+from bladefem.hbm.solver.newton import DEFAULT_OPTIONS, newton
 from bladefem.hbm.solver.residual import Balance, evaluate_balance, start_in_stick
 from bladefem.hbm.sweep import size, sweep
 from bladefem.reduction.matrices import port_model_from_matrices
@@ -90,9 +90,9 @@ def test_F11_newton_on_the_residual_stalls_and_the_chain_does_not():
     model = reference_model(2e7, 0.06, 3.05, phase=np.pi / 3, modes=3, harmonics=31)
     omega = HZ * 1355.4
     balance = Balance(model, condense(model, omega, 31), 2048)
-    stalled = newton(balance, start_in_stick(balance), DEFAULTS, "residual")
+    stalled = newton(balance, start_in_stick(balance), DEFAULT_OPTIONS, "residual")
     assert not stalled.converged and "stalled" in stalled.reason
-    attempts = solve_balance(balance, None, DEFAULTS)
+    attempts = solve_balance(balance, None, DEFAULT_OPTIONS)
     assert attempts[-1].end.converged and sum(a.end.iterations for a in attempts) <= 60
     reached = solve(model, omega, 31, 2048)
     for other in (_by_harmonics(model, omega), _by_load(model, omega)):

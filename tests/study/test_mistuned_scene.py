@@ -10,7 +10,7 @@ import pytest
 
 from bladefem.errors import InputError
 from bladefem.hbm.solve import solve
-from bladefem.hbm.solver.newton import DEFAULTS
+from bladefem.hbm.solver.newton import DEFAULT_OPTIONS
 from bladefem.report.fatigue import utilisation_drawing, utilisation_table, worst_utilisation
 from bladefem.report.wheel import pattern_headlines, scatter_sentences, scatter_table
 from bladefem.scene.tables import Fatigue
@@ -108,7 +108,7 @@ def test_worst_blade_of_a_tuned_wheel_is_used_as_the_tuned_one(reduced, shapes):
     model = family_member(family, settings).model
     # all contacts slip there
     omega = 1.03 * model.side(1).omega[0]
-    tight = replace(DEFAULTS, tolerance=1e-13)
+    tight = replace(DEFAULT_OPTIONS, tolerance=1e-13)
     one = solve(model, omega, 1, 72, options=tight)
     pattern = frequency_pattern(sector.families, np.zeros((36, 3)))
     found = solve_wheel(wheel, omega, 1, 72, pattern=pattern, options=tight)

@@ -16,7 +16,7 @@ from ...errors import InputError, NotSolvedError
 from ...util.arrays import RealArray, RealOrComplex
 
 # frequency of the modes that fill up a harmonic which has fewer [rad/s]: nothing moves them
-SPARE = 1e100
+UNUSED_MODE_FREQUENCY = 1e100
 
 
 @dataclass(frozen=True)
@@ -56,7 +56,7 @@ class Stack:
     P ports.
     """
 
-    # (S, m) [rad/s]; filled up with SPARE where a harmonic has fewer modes
+    # (S, m) [rad/s]; filled up with UNUSED_MODE_FREQUENCY where a harmonic has fewer modes
     omega: RealArray
     # (S, m) modal damping [1/s]
     viscous: RealArray
@@ -97,7 +97,7 @@ def stack_bodies(
         )
     most = max(len(body.omega) for body in bodies)
     order = [np.concatenate(parts) for parts in ports]
-    omega = np.array([_fill_modes(body.omega, most, SPARE) for body in bodies])
+    omega = np.array([_fill_modes(body.omega, most, UNUSED_MODE_FREQUENCY) for body in bodies])
     own = [
         np.zeros(len(body.omega))
         if body.damping is None or body.damping.ndim == 2

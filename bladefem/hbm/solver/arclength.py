@@ -35,12 +35,12 @@ LEAP_STEPS = (1e-4, 1e-3, 5e-3)
 # scaled distance up to which a leap has found the same branch
 LEAP_DISTANCE = 0.05
 # arc lengths at which the direction beyond a corner is looked for
-CORNERS = (1e-4, 1e-3, 5e-3)
+CORNER_ARC_LENGTHS = (1e-4, 1e-3, 5e-3)
 # arc length up to which the path may turn more sharply than STRAIGHT: a corner, where contacts
 # change their state
-CORNER = 1e-3
+MAX_CORNER_ARC_LENGTH = 1e-3
 # distance from the way back, in steps, from which a direction leads on
-ONWARD = 0.3
+MIN_ONWARD_DISTANCE = 0.3
 # cosine between successive tangents below which a step is halved
 SMALLEST_COSINE = 0.7
 # distance from prediction to solution, in steps, above which it is halved
@@ -139,7 +139,7 @@ def advance_path(
         found = _leap_gap(task, spot, share)
         if found is not None:
             return found, share, False
-    for share in CORNERS:
+    for share in CORNER_ARC_LENGTHS:
         found = _around_corner(task, spot, share)
         if found is not None:
             return found, share, found.sign != spot.sign
@@ -202,7 +202,7 @@ def _correct_point(
         return None, str(error)
     new_dw, new_dx = found.tangent(task, size)
     turn = _product(dw, new_dw) + dx * new_dx
-    if abs(turn) < SMALLEST_COSINE and not corner and step > CORNER:
+    if abs(turn) < SMALLEST_COSINE and not corner and step > MAX_CORNER_ARC_LENGTH:
         return None, "the path turns too sharply"
     return (found if turn > 0 else replace(found, sign=-found.sign)), ""
 
@@ -255,7 +255,7 @@ def _around_corner(
                 continue
             off_w = (found.state.w - spot.state.w) / size + share * dw
             off_x = (found.x - spot.x) / task.width + share * dx
-            if np.hypot(np.sqrt(_product(off_w, off_w)), off_x) > ONWARD * share:
+            if np.hypot(np.sqrt(_product(off_w, off_w)), off_x) > MIN_ONWARD_DISTANCE * share:
                 return found
     return None
 

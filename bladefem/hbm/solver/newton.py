@@ -73,7 +73,7 @@ class Options:
             raise InputError(f"iterations {self.iterations}: expected a whole number, at least 1")
 
 
-DEFAULTS = Options()
+DEFAULT_OPTIONS = Options()
 
 
 @dataclass(frozen=True)
@@ -111,7 +111,7 @@ def route_of(loop: str, solvers: Collection[str]) -> str:
 def newton(
     balance: Balance,
     w: np.ndarray,
-    options: Options = DEFAULTS,
+    options: Options = DEFAULT_OPTIONS,
     merit: str = "step",
 ) -> Newton:
     """Solve the balance from the displacements w (n, d, K).
@@ -199,7 +199,7 @@ def _newton_of_one_kind(
 def newton_as_given(
     balance: Balance,
     w: np.ndarray,
-    options: Options = DEFAULTS,
+    options: Options = DEFAULT_OPTIONS,
     merit: str = "step",
 ) -> Newton:
     """`newton` for a balance as it is: whether the damper walks is taken from it."""

@@ -13,7 +13,7 @@ from dataclasses import replace
 import numpy as np
 
 from ...errors import NotSolvedError
-from ...hbm.branches import TOLERANCE
+from ...hbm.branches import PATH_TOLERANCE
 from ...hbm.continuation import follow
 from ...hbm.solution import Solution, size
 from .family import Family, family_member
@@ -76,7 +76,7 @@ def peak_error(
             continue
         height = 0.0
         count = 0
-        options = replace(ESTIMATE_OPTIONS, tolerance=TOLERANCE, frugal=False)
+        options = replace(ESTIMATE_OPTIONS, tolerance=PATH_TOLERANCE, frugal=False)
         forward = top.omega > anchor.omega
         try:
             for point in follow(

@@ -11,7 +11,7 @@ import numpy as np
 
 from ...hbm.model import ReducedModel
 from ...hbm.solution import Solution
-from ...hbm.stability import AFFORDABLE, UNSTABLE, stability_verdict
+from ...hbm.stability import AFFORDABLE_OPERATIONS, UNSTABLE, stability_verdict
 from ...hbm.sweep import size
 from ...hbm.truncation_indicator import truncation_indicator
 from .family import Family, family_member
@@ -120,6 +120,8 @@ def lasting_peak(model: ReducedModel, points: Sequence[Solution]) -> Solution:
     if model.directions == model.elements.tangents:
         return good[0]
     judged = (
-        p for p in good[:JUDGED] if stability_verdict(model, p, AFFORDABLE).verdict != UNSTABLE
+        p
+        for p in good[:JUDGED]
+        if stability_verdict(model, p, AFFORDABLE_OPERATIONS).verdict != UNSTABLE
     )
     return next(judged, good[0])

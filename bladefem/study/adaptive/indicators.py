@@ -28,7 +28,7 @@ from ...hbm.full_stick import sticks_safely
 from ...hbm.model import ReducedModel
 from ...hbm.solution import Solution
 from ...hbm.solve import solve
-from ...hbm.solver.newton import DEFAULTS, Options
+from ...hbm.solver.newton import DEFAULT_OPTIONS, Options
 from .family import Family, carried_displacements, family_member, lowest_harmonics
 from .settings import DAMPERS, DIRECTIONS, Settings
 
@@ -190,7 +190,7 @@ def moved_solution(
     settings: Settings,
     solution: Solution,
     other: Settings,
-    options: Options = DEFAULTS,
+    options: Options = DEFAULT_OPTIONS,
 ) -> Solution:
     """The point solved with other settings, started from where it is."""
     old = family_member(family, settings)

@@ -10,7 +10,7 @@ import numpy as np
 from ...errors import NotSolvedError
 from ...hbm.peak import Peak
 from ...hbm.solution import Solution
-from ...hbm.sweep import FOLLOWED, size
+from ...hbm.sweep import MAX_PATH_UNKNOWNS, size
 from .check_points import (
     MAX_CHECKED_PEAKS,
     MIN_SHARE_OF_ACCURACY,
@@ -93,7 +93,8 @@ def unfollowed(family: Family, settings: Settings) -> bool:
     points.
     """
     return (
-        family_member(family, settings).model.springs.size * (2 * settings.harmonics + 1) > FOLLOWED
+        family_member(family, settings).model.springs.size * (2 * settings.harmonics + 1)
+        > MAX_PATH_UNKNOWNS
     )
 
 

@@ -11,7 +11,7 @@ from geometry.mesh import Mesh
 
 from ...contact.admissible_load import holds_itself, normal_load_bounds
 from ...contact.frictional_seating import (
-    STEPPED,
+    FORCE_CHANGE_TOLERANCE,
     FrictionalProblem,
     FrictionalSeating,
     frictional_problem,
@@ -139,7 +139,7 @@ def coarse_history(seated: dict[float, FrictionalSeating]) -> list[str]:
         f"{100 * found.change:.2g} % of the largest friction limit between {found.steps // 2} and "
         f"{found.steps} load steps"
         for load, found in seated.items()
-        if found.change > STEPPED
+        if found.change > FORCE_CHANGE_TOLERANCE
     ]
 
 
