@@ -33,6 +33,7 @@ from pathlib import Path
 from bladefem.scene.tables import Scene
 from bladefem.scene.toml import load_scene
 from bladefem.study.pipeline import pipeline
+from bladefem.study.pipeline.loads import Curve
 from bladefem.study.pipeline.stages import build_mesh
 from geometry.export import write_msh
 
@@ -117,7 +118,7 @@ CASES = (
 )
 
 
-def solved(case: Case, fine: bool, folder: Path) -> tuple[pipeline.Curve, int, float]:
+def solved(case: Case, fine: bool, folder: Path) -> tuple[Curve, int, float]:
     """Curve, degrees of freedom of the mesh, CPU seconds."""
     start = time.process_time()
     result = pipeline.run(case.scene(fine, folder), None)

@@ -18,7 +18,7 @@ from .abaqus_deck import Keyword, deck_error, keywords_of
 from .raw_mesh import RawMesh, from_vtk_order
 
 # element type up to its first letter behind the number of nodes -> meshio's word
-SOLIDS = {
+SOLID_TYPES = {
     "C3D4": "tetra",
     "C3D10": "tetra10",
     "C3D8": "hexahedron",
@@ -30,10 +30,10 @@ SOLIDS = {
     "C3D13": "pyramid13",
 }
 # triangles and quadrilaterals: shells, membranes, surface elements, plane elements
-FLAT = {3: "triangle", 6: "triangle6", 4: "quad", 8: "quad8"}
+FLAT_CELLS = {3: "triangle", 6: "triangle6", 4: "quad", 8: "quad8"}
 FLAT_PREFIXES = ("S", "SFM3D", "M3D", "CPS", "CPE", "CPEG", "CAX", "STRI", "R3D", "DS", "CPT")
 # corners of the faces S1, S2, ... of a cell
-FACES: dict[str, list[tuple[int, ...]]] = {
+CELL_FACES: dict[str, list[tuple[int, ...]]] = {
     "tetra": [(0, 1, 2), (0, 3, 1), (1, 3, 2), (2, 3, 0)],
     "hexahedron": [
         (0, 1, 2, 3),
@@ -83,8 +83,8 @@ def read_inp(file: Path) -> RawMesh:
             scope = root
         elif keyword.name == "INSTANCE":
             _add_instance(root, parts, keyword)
-        elif keyword.name in READERS:
-            READERS[keyword.name](scope, keyword)
+        elif keyword.name in KEYWORD_READERS:
+            KEYWORD_READERS[keyword.name](scope, keyword)
     return _raw_mesh(root)
 
 
@@ -140,20 +140,20 @@ def _read_elements(scope: _Scope, keyword: Keyword) -> None:
 
 
 NODE_COUNT = {
-    **{word: int(kind[3:]) for kind, word in SOLIDS.items()},
-    **{word: count for count, word in FLAT.items()},
+    **{word: int(kind[3:]) for kind, word in SOLID_TYPES.items()},
+    **{word: count for count, word in FLAT_CELLS.items()},
 }
 
 
 def _word_of(kind: str) -> str | None:
     """meshio's word of an element type, None for one without volume or area."""
     letters = kind.rstrip("ABCDEFGHIJKLMNOPQRSTUVWXYZ")
-    if letters in SOLIDS:
-        return SOLIDS[letters]
+    if letters in SOLID_TYPES:
+        return SOLID_TYPES[letters]
     digits = letters[len(letters.rstrip("0123456789")) :]
     prefix = letters[: len(letters) - len(digits)]
-    if prefix in FLAT_PREFIXES and digits and int(digits) in FLAT:
-        return FLAT[int(digits)]
+    if prefix in FLAT_PREFIXES and digits and int(digits) in FLAT_CELLS:
+        return FLAT_CELLS[int(digits)]
     return None
 
 
@@ -234,7 +234,7 @@ def _read_surface(scope: _Scope, keyword: Keyword) -> None:
             scope.surfaces.setdefault(name, []).append((first, label))
 
 
-READERS = {
+KEYWORD_READERS = {
     "NODE": _read_nodes,
     "ELEMENT": _read_elements,
     "NSET": _read_node_set,
@@ -404,7 +404,7 @@ def _faces_of_label(word: str, label: str) -> list[tuple[int, ...]]:
     family = word.rstrip("0123456789")
     if family in ("triangle", "quad"):
         return [tuple(range(3 if family == "triangle" else 4))]
-    faces = FACES[family]
+    faces = CELL_FACES[family]
     if label.startswith("S") and label[1:].isdigit() and 0 < int(label[1:]) <= len(faces):
         return [faces[int(label[1:]) - 1]]
     return faces if not label else []

@@ -18,7 +18,7 @@ from .raw_mesh import RawMesh, from_vtk_order
 
 # nodes of an element -> (shape, pairs of equal places, places of the nodes that are left in VTK's
 # order); the first that fits
-SHAPES: dict[int, list[tuple[str, list[tuple[int, int]], list[int]]]] = {
+SHAPES_BY_NODE_COUNT: dict[int, list[tuple[str, list[tuple[int, int]], list[int]]]] = {
     4: [("tetra", [], [0, 1, 2, 3])],
     10: [("tetra10", [], list(range(10)))],
     8: [
@@ -43,11 +43,11 @@ SHAPES: dict[int, list[tuple[str, list[tuple[int, int]], list[int]]]] = {
     ],
 }
 # structural solids (MAPDL element library); an archive without ET holds what its node counts say
-SOLIDS = (45, 62, 64, 65, 72, 73, 92, 95, 185, 186, 187, 190, 285)
+SOLID_ELEMENTS = (45, 62, 64, 65, 72, 73, 92, 95, 185, 186, 187, 190, 285)
 # integers before the nodes of an element, and which of them are its type and number
-HEADER = 10
-TYPE = 1
-NUMBER = 8
+HEADER_INTEGERS = 10
+TYPE_POSITION = 1
+NUMBER_POSITION = 8
 
 
 def read_cdb(file: Path) -> RawMesh:
@@ -86,9 +86,9 @@ def _solid_rows(archive: Any) -> tuple[dict[int, np.ndarray], int]:
     found: dict[int, list[np.ndarray]] = {}
     left_out = 0
     for row in archive.elem:
-        kind = library.get(int(row[TYPE]))
-        count = len(row) - HEADER
-        if (kind is None or kind in SOLIDS) and count in SHAPES:
+        kind = library.get(int(row[TYPE_POSITION]))
+        count = len(row) - HEADER_INTEGERS
+        if (kind is None or kind in SOLID_ELEMENTS) and count in SHAPES_BY_NODE_COUNT:
             found.setdefault(count, []).append(row)
         else:
             left_out += 1
@@ -104,20 +104,20 @@ def _cell_blocks(
     blocks = []
     tags = []
     for count, table in rows.items():
-        nodes = table[:, HEADER:]
+        nodes = table[:, HEADER_INTEGERS:]
         rest = np.ones(len(nodes), dtype=bool)
-        for word, equal, kept in SHAPES[count]:
+        for word, equal, kept in SHAPES_BY_NODE_COUNT[count]:
             fits = rest.copy()
             for a, b in equal:
                 fits &= nodes[:, a] == nodes[:, b]
             rest &= ~fits
             if fits.any():
                 cells = nodes[fits][:, kept]
-                _check_nodes(cells, table[fits, NUMBER], numbers, file)
+                _check_nodes(cells, table[fits, NUMBER_POSITION], numbers, file)
                 order = np.argsort(numbers)
                 place = order[np.searchsorted(numbers, cells, sorter=order)]
                 blocks.append((word, from_vtk_order(word, place)))
-                tags.append(table[fits, NUMBER])
+                tags.append(table[fits, NUMBER_POSITION])
     return blocks, tags
 
 

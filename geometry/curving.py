@@ -13,7 +13,7 @@ import numpy as np
 
 from .topology import EDGES, FAMILY, GMSH_TYPES, NODES, corner_count
 
-FLAT = ("Line", "Plane")
+FLAT_ENTITIES = ("Line", "Plane")
 # of the edge: a larger step off its middle means a seam or a pole of the parameters
 MAX_MIDDLE_OFFSET = 0.4
 
@@ -28,7 +28,7 @@ def second_order(gmsh: ModuleType, curved: bool = True) -> None:
         (d, tag): gmsh.model.mesh.getNodes(d, tag, includeBoundary=True)
         for d in (2, 1)
         for _, tag in gmsh.model.getEntities(d)
-        if curved and gmsh.model.getType(d, tag) not in FLAT
+        if curved and gmsh.model.getType(d, tag) not in FLAT_ENTITIES
     }
     gmsh.model.mesh.setOrder(2)
     if not curved:
@@ -38,7 +38,7 @@ def second_order(gmsh: ModuleType, curved: bool = True) -> None:
     for (dimension, entity), nodes in parameters.items():
         moved.update(_of_entity(gmsh, dimension, entity, *nodes))
     for _, entity in gmsh.model.getEntities(1):
-        if gmsh.model.getType(1, entity) in FLAT:
+        if gmsh.model.getType(1, entity) in FLAT_ENTITIES:
             for middle, _ in _second_order_edges(gmsh, 1, entity):
                 moved.pop(int(middle), None)
     for node, place in moved.items():

@@ -11,7 +11,7 @@ from .mesh import Mesh
 from .session import gmsh_session
 from .topology import GMSH_TYPES, face_word
 
-NUMBER = {word: number for number, word in GMSH_TYPES.items()}
+GMSH_NUMBER = {word: number for number, word in GMSH_TYPES.items()}
 
 
 def write_msh(
@@ -72,5 +72,5 @@ def _add_group(
     word: str,
     cells: np.ndarray,
 ) -> None:
-    gmsh.model.mesh.addElementsByType(entity, NUMBER[word], [], (cells + 1).ravel())
+    gmsh.model.mesh.addElementsByType(entity, GMSH_NUMBER[word], [], (cells + 1).ravel())
     gmsh.model.setPhysicalName(dimension, gmsh.model.addPhysicalGroup(dimension, [entity]), name)

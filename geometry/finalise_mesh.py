@@ -21,11 +21,11 @@ from .quality import edge_of_middle, report, shape_quality, straighten
 # cells; far beyond what one machine solves
 MAX_CELLS = 3e6
 # shape quality that asks for a second round of optimisation
-POOR = 0.1
+POOR_QUALITY = 0.1
 # shape quality of a tetrahedron that is refused
-FLAT = 0.02
+REFUSED_QUALITY = 0.02
 # of the element size, one after the other while flat cells are left
-SMALLER = (1.0, 0.8, 0.65)
+SIZE_FACTORS = (1.0, 0.8, 0.65)
 ALGORITHMS = {"hxt": 10, "delaunay": 1}
 # master, slave, rotation (3, 3), shift (3,) [m]
 Motion = tuple[str, str, np.ndarray, np.ndarray]
@@ -46,14 +46,14 @@ def mesh_model(
     """
     if size.size:
         check_count(gmsh, dimension, size.scale * size.size)
-    smaller = SMALLER if dimension == 3 else SMALLER[:1]
+    smaller = SIZE_FACTORS if dimension == 3 else SIZE_FACTORS[:1]
     for factor in smaller:
         gmsh.option.setNumber("Mesh.MeshSizeFactor", factor * size.scale)
         gmsh.model.mesh.generate(2)
         if dimension == 3:
             fill(gmsh, groups, size.algorithm)
         first_order = _first_order_mesh(gmsh, groups, dimension)
-        if _worst_shape(first_order) > FLAT or factor == smaller[-1]:
+        if _worst_shape(first_order) > REFUSED_QUALITY or factor == smaller[-1]:
             break
         gmsh.model.mesh.clear()
     refuse_flat(first_order)
@@ -84,7 +84,7 @@ def fill(
         gmsh.option.setNumber("Mesh.Algorithm3D", ALGORITHMS[algorithm])
         try:
             gmsh.model.mesh.generate(3)
-            if improve(gmsh, groups) > FLAT:
+            if improve(gmsh, groups) > REFUSED_QUALITY:
                 return
         except Exception:
             # gmsh raises the bare class
@@ -96,17 +96,18 @@ def refuse_flat(mesh: Mesh) -> None:
     """Refuse a mesh with flat cells, and say where they are.
 
     Raises:
-        InputError: a cell's shape quality is not above FLAT.
+        InputError: a cell's shape quality is not above REFUSED_QUALITY.
     """
     cells = np.vstack(list(mesh.bodies.values()))
     shape = shape_quality(mesh.points, cells, mesh.cell_type)
-    if shape.min() > FLAT:
+    if shape.min() > REFUSED_QUALITY:
         return
     x, y, z = 1e3 * mesh.points[cells[shape.argmin()]].mean(axis=0)
     raise InputError(
-        f"mesh.size: {np.count_nonzero(shape <= FLAT)} flat cells are left (the worst has shape "
-        f"quality {shape.min():.1g} at x, y, z = {x:.4g}, {y:.4g}, {z:.4g} mm, expected above "
-        f"{FLAT}); choose a smaller mesh.size, or change the parts that nearly coincide there"
+        f"mesh.size: {np.count_nonzero(shape <= REFUSED_QUALITY)} flat cells are left (the worst "
+        f"has shape quality {shape.min():.1g} at x, y, z = {x:.4g}, {y:.4g}, {z:.4g} mm, expected "
+        f"above {REFUSED_QUALITY}); choose a smaller mesh.size, or change the parts that nearly "
+        "coincide there"
     )
 
 
@@ -141,7 +142,7 @@ def improve(gmsh: ModuleType, groups: Groups) -> float:
     Either alone leaves more of them.
     """
     for method in ("Netgen", ""):
-        if (worst := _worst_shape(_first_order_mesh(gmsh, groups, 3))) > POOR:
+        if (worst := _worst_shape(_first_order_mesh(gmsh, groups, 3))) > POOR_QUALITY:
             return worst
         gmsh.model.mesh.optimize(method, True)
     return _worst_shape(_first_order_mesh(gmsh, groups, 3))

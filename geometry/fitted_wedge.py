@@ -22,11 +22,11 @@ from .session import attempt
 # (dimension, name) to entities
 Named = dict[tuple[int, str], list[int]]
 # sine between two planes below which they are one plane
-PARALLEL = 1e-6
+PARALLEL_SINE = 1e-6
 # of a length: what is left of rounding in a STEP file
 ROUNDING_TOLERANCE = 1e-6
 # of a face's size: how far a plane may be from flat
-FLAT = 1e-6
+FLATNESS_TOLERANCE = 1e-6
 
 
 @dataclass(frozen=True)
@@ -150,7 +150,7 @@ def flanks_between(
     normals = (here[1], on @ there[1])
     corners = (here[2], there[2] @ on.T)
     along = np.cross(*normals)
-    if np.linalg.norm(along) < PARALLEL:
+    if np.linalg.norm(along) < PARALLEL_SINE:
         along = axis - (axis @ normals[0]) * normals[0]
     along /= np.linalg.norm(along)
     along *= 1.0 if along @ axis >= 0 else -1.0
@@ -251,7 +251,7 @@ def _is_plane(gmsh: ModuleType, face: int) -> bool:
     points = np.array(gmsh.model.getValue(2, face, grid)).reshape(-1, 3)
     size = np.ptp(corners, axis=0).max()
     away = np.abs((np.concatenate([points, corners]) - centre) @ normal).max()
-    return bool(away < FLAT * size)
+    return bool(away < FLATNESS_TOLERANCE * size)
 
 
 def _plane_face(gmsh: ModuleType, face: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:

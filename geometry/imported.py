@@ -41,11 +41,11 @@ from .topology import CORNERS, DIMENSION, FACETS, FAMILY, boundary, outward
 # files carry few digits; a match within this share of the face is a match, and is then snapped
 MATCH_TOLERANCE = 1e-4
 # cosine between outward normals of two faces that look at each other
-OPPOSITE = -0.98
+OPPOSITE_COSINE = -0.98
 # of a model [m]: beyond these its unit was taken for another
 MIN_MODEL_SIZE = 1e-4
 MAX_MODEL_SIZE = 20.0
-FLIPPED = {
+FLIPPED_CORNERS = {
     "tetra": [0, 2, 1, 3],
     "tetra10": [0, 2, 1, 3, 6, 5, 4, 7, 9, 8],
     "triangle": [0, 2, 1],
@@ -239,12 +239,12 @@ def _positive_cells(
     negative = straight_jacobian(points, cells, word) < 0
     if not negative.any():
         return cells
-    if word not in FLIPPED:
+    if word not in FLIPPED_CORNERS:
         raise InputError(
             f"imported.file = '{source}': {negative.sum()} cells of type {word} are inside out"
         )
     result = cells.copy()
-    result[negative] = cells[negative][:, FLIPPED[word]]
+    result[negative] = cells[negative][:, FLIPPED_CORNERS[word]]
     return result
 
 
@@ -413,7 +413,7 @@ def _faces_look(
     apart = cKDTree(master).query((slave - shift) @ rotation)[0]
     back = cKDTree((slave - shift) @ rotation).query(master)[0]
     near = max((apart < max(edges)).mean(), (back < max(edges)).mean())
-    return bool(near > 0.5 and normals[0] @ (normals[1] @ rotation) < OPPOSITE)
+    return bool(near > 0.5 and normals[0] @ (normals[1] @ rotation) < OPPOSITE_COSINE)
 
 
 def _measure_face(mesh: Mesh, name: str) -> tuple[float, np.ndarray]:

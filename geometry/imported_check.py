@@ -7,10 +7,10 @@ from typing import Any
 
 from bladefem.errors import InputError
 
-from .raw_mesh import READERS
+from .raw_mesh import SUFFIX_READERS
 from .renaming import read_names
 
-STEP = (".step", ".stp")
+STEP_SUFFIXES = (".step", ".stp")
 
 
 def check_imported(imported: Any) -> None:
@@ -23,9 +23,9 @@ def check_imported(imported: Any) -> None:
         InputError: what is wrong, in one sentence.
     """
     suffix = Path(imported.file).suffix.lower()
-    if suffix not in (*READERS, *STEP):
+    if suffix not in (*SUFFIX_READERS, *STEP_SUFFIXES):
         raise InputError(
             f"imported.file = {imported.file!r}: unknown kind of mesh; known are "
-            f"{', '.join(sorted((*READERS, *STEP)))}"
+            f"{', '.join(sorted((*SUFFIX_READERS, *STEP_SUFFIXES)))}"
         )
     read_names(imported.names or ())

@@ -29,12 +29,12 @@ if TYPE_CHECKING:
     from bladefem.scene.tables import Scene
 
 # seconds; the largest meshes that are accepted take a tenth of it
-LIMIT = 900
+TIME_LIMIT_SECONDS = 900
 # element size of the second try
 SECOND_TRY_SIZE = 0.9
 ROOT = Path(__file__).parents[1]
 # a child that saw these would join the ranks
-MPI = ("OMPI_", "PMIX_", "PMI_", "PRTE_", "ORTE_", "HYDRA_", "MPI_")
+MPI_VARIABLES = ("OMPI_", "PMIX_", "PMI_", "PRTE_", "ORTE_", "HYDRA_", "MPI_")
 
 
 def build(scene: Scene) -> Mesh:
@@ -43,7 +43,7 @@ def build(scene: Scene) -> Mesh:
 
     Raises:
         InputError: a parameter has to change; also when every try crashed or took longer than
-            LIMIT.
+            TIME_LIMIT_SECONDS.
         RuntimeError: the child failed in another way; the message holds its last words.
     """
     kind_named(scene.kind)
@@ -79,10 +79,10 @@ def _ask_child(scene: SimpleNamespace) -> Mesh | Exception | str:
                 stdin=subprocess.DEVNULL,
                 capture_output=True,
                 text=True,
-                timeout=LIMIT,
+                timeout=TIME_LIMIT_SECONDS,
             )
         except subprocess.TimeoutExpired:
-            return f"did not end in {LIMIT} s"
+            return f"did not end in {TIME_LIMIT_SECONDS} s"
         if done.returncode < 0:
             return f"crashed (signal {-done.returncode})"
         if done.returncode:
@@ -93,10 +93,12 @@ def _ask_child(scene: SimpleNamespace) -> Mesh | Exception | str:
 
 
 def _child_environment() -> dict[str, str]:
-    """This process's environment without what belongs to MPI, the project's folder first on the
-    path.
+    """This process's environment without what belongs to MPI_VARIABLES, the project's folder first
+    on the path.
     """
-    clean = {name: value for name, value in os.environ.items() if not name.startswith(MPI)}
+    clean = {
+        name: value for name, value in os.environ.items() if not name.startswith(MPI_VARIABLES)
+    }
     path = [str(ROOT), *filter(None, [clean.get("PYTHONPATH")])]
     return clean | {"PYTHONPATH": os.pathsep.join(path)}
 

@@ -23,26 +23,28 @@ from .step_file import coarse_step
 from .topology import CORNERS, DIMENSION, FAMILY, NODES
 
 # lengths [m] of blades and sectors: a factor to metres is right that brings the model between them
-PLAUSIBLE = (0.01, 3.0)
+PLAUSIBLE_LENGTHS = (0.01, 3.0)
 # factors to metres, the likeliest first
-SCALES = (1.0, 1e-3, 0.0254, 1e-2)
+UNIT_FACTORS = (1.0, 1e-3, 0.0254, 1e-2)
 AXES = {"x": (1.0, 0.0, 0.0), "y": (0.0, 1.0, 0.0), "z": (0.0, 0.0, 1.0)}
 # of the model's size: distance of nodes that match after a turn
-MATCHED = 1e-3
+MATCH_TOLERANCE = 1e-3
 # of the largest coordinate of a face's centre
-ROUNDOFF = 1e-6
+ROUNDOFF_SHARE = 1e-6
 # from a whole number of sectors
-WHOLE = 0.01
-MOST_SECTORS = 400
+WHOLE_NUMBER_TOLERANCE = 0.01
+MAX_SECTORS = 400
 # what a scene says in addition to a STEP file
-DRAWN = (
+STEP_FILE_NEEDS = (
     "imported.names, such as 'tip = face_21', for the face of excitation.at",
     "imported.seats = two plane platform faces: the damper is drawn between them",
 )
 # where no cut faces were found in it
-UNCUT = "imported.sectors = number of blades, for a sector of a wheel; 0 for a single blade"
+UNCUT_SECTOR_NEEDS = (
+    "imported.sectors = number of blades, for a sector of a wheel; 0 for a single blade"
+)
 # names that a task needs, and what they are for
-NEEDED = {
+NEEDED_NAMES = {
     "clamp": "face or node set that is held",
     "cyclic_low": "cut face of a sector, with cyclic_high on the other side",
     "tip_mid": "node set or face that the excitation acts on (excitation.at)",
@@ -211,7 +213,7 @@ def _body_sizes(raw: RawMesh) -> tuple[int, ...]:
 
 def _guessed_scale(size: float) -> float:
     """Factor to metres that makes the model as large as blades are."""
-    fitting = [s for s in SCALES if PLAUSIBLE[0] <= s * size <= PLAUSIBLE[1]]
+    fitting = [s for s in UNIT_FACTORS if PLAUSIBLE_LENGTHS[0] <= s * size <= PLAUSIBLE_LENGTHS[1]]
     return fitting[0] if fitting else 1.0
 
 
@@ -262,7 +264,7 @@ def _face_part(
     length = float(np.linalg.norm(mean))
     centre = np.average(outside.centres[mine], axis=0, weights=np.maximum(area, 1e-300))
     # round-off is no coordinate
-    centre[np.abs(centre) < ROUNDOFF * np.abs(centre).max(initial=0.0)] = 0.0
+    centre[np.abs(centre) < ROUNDOFF_SHARE * np.abs(centre).max(initial=0.0)] = 0.0
     return FacePart(
         name,
         int(mine.sum()),
@@ -328,14 +330,21 @@ def _sector_count(
     k = "xyz".index(axis)
     a, b = (k + 1) % 3, (k + 2) % 3
     radii = [np.hypot(x[a], x[b]) for x in (start, end)]
-    if abs(start[k] - end[k]) > MATCHED * size or abs(radii[0] - radii[1]) > MATCHED * size:
+    if (
+        abs(start[k] - end[k]) > MATCH_TOLERANCE * size
+        or abs(radii[0] - radii[1]) > MATCH_TOLERANCE * size
+    ):
         return 0
     angle = (np.arctan2(end[b], end[a]) - np.arctan2(start[b], start[a])) % (2 * np.pi)
     # the other way round is found with the faces exchanged
-    if radii[0] < MATCHED * size or not 2 * np.pi / MOST_SECTORS < angle < np.pi * 0.7:
+    if radii[0] < MATCH_TOLERANCE * size or not 2 * np.pi / MAX_SECTORS < angle < np.pi * 0.7:
         return 0
     count = 2 * np.pi / angle
-    return round(count) if abs(count - round(count)) < WHOLE * max(count / 36, 1.0) else 0
+    return (
+        round(count)
+        if abs(count - round(count)) < WHOLE_NUMBER_TOLERANCE * max(count / 36, 1.0)
+        else 0
+    )
 
 
 def _cut_faces_match(
@@ -359,7 +368,7 @@ def _cut_faces_match(
     first = x[:, a].copy()
     x[:, a] = np.cos(angle) * first - np.sin(angle) * x[:, b]
     x[:, b] = np.sin(angle) * first + np.cos(angle) * x[:, b]
-    return bool(cKDTree(raw.points[other]).query(x)[0].max() < MATCHED * size)
+    return bool(cKDTree(raw.points[other]).query(x)[0].max() < MATCH_TOLERANCE * size)
 
 
 def _corner_nodes(outside: NumberedFaces, number: int) -> np.ndarray:
@@ -403,7 +412,7 @@ def _names_of(raw: RawMesh) -> set[str]:
 
 def _missing_in_drawing(cut: CutFaces | None) -> tuple[str, ...]:
     """What a run of a STEP file needs and its faces do not tell."""
-    return DRAWN if cut is not None else (UNCUT, *DRAWN)
+    return STEP_FILE_NEEDS if cut is not None else (UNCUT_SECTOR_NEEDS, *STEP_FILE_NEEDS)
 
 
 def _missing_names(
@@ -415,5 +424,5 @@ def _missing_names(
     there = _names_of(raw)
     if cut is not None:
         there |= {"cyclic_low", "clamp"} if bore else {"cyclic_low"}
-    needed = [name for name in NEEDED if name not in there]
-    return tuple(f"{name}: {NEEDED[name]}" for name in needed)
+    needed = [name for name in NEEDED_NAMES if name not in there]
+    return tuple(f"{name}: {NEEDED_NAMES[name]}" for name in needed)

@@ -1,8 +1,8 @@
 """The outside of a mesh cut into faces along its edges and numbered, for files without names.
 
-Outer facets that share an edge belong to one face unless they meet there at more than CREASE. Faces
-are numbered from the largest: face_1, face_2, ... The numbers depend on the file alone, not on what
-becomes of its cells, so that a scene may name faces by them.
+Outer facets that share an edge belong to one face unless they meet there at more than CREASE_ANGLE.
+Faces are numbered from the largest: face_1, face_2, ... The numbers depend on the file alone, not
+on what becomes of its cells, so that a scene may name faces by them.
 """
 
 from __future__ import annotations
@@ -19,9 +19,9 @@ from .raw_mesh import RawMesh
 from .topology import CORNERS, DIMENSION, FACETS, FAMILY
 
 # [rad] between normals of neighbours across an edge of the body
-CREASE = np.radians(30.0)
+CREASE_ANGLE = np.radians(30.0)
 # digits to which areas and places count when faces are ordered
-DIGITS = 6
+COMPARED_DIGITS = 6
 
 
 @dataclass(frozen=True)
@@ -117,7 +117,7 @@ def _smooth_parts(corners: np.ndarray, normals: np.ndarray) -> np.ndarray:
     order = np.argsort(number, kind="stable")
     order = order[count[number[order]] == 2]
     one, other = every[order].reshape(-1, 2).T
-    smooth = np.einsum("ij,ij->i", unit[one], unit[other]) > np.cos(CREASE)
+    smooth = np.einsum("ij,ij->i", unit[one], unit[other]) > np.cos(CREASE_ANGLE)
     n = len(corners)
     graph = coo_matrix((np.ones(smooth.sum()), (one[smooth], other[smooth])), shape=(n, n))
     return connected_components(graph, directed=False)[1]
@@ -135,7 +135,7 @@ def _by_size(
     area = np.bincount(part, np.linalg.norm(normals, axis=1))
     members = np.bincount(part)
     size = np.ptp(points, axis=0).max()
-    keys = [np.round(np.bincount(part, x) / members / size, DIGITS) for x in centres.T]
+    keys = [np.round(np.bincount(part, x) / members / size, COMPARED_DIGITS) for x in centres.T]
     rank = np.empty(len(area), dtype=int)
-    rank[np.lexsort([*keys, -np.round(area / area.max(), DIGITS)])] = np.arange(len(area))
+    rank[np.lexsort([*keys, -np.round(area / area.max(), COMPARED_DIGITS)])] = np.arange(len(area))
     return rank

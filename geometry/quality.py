@@ -168,7 +168,7 @@ def _mean_edge(mesh: Mesh) -> float:
     return float(np.linalg.norm(mesh.points[edges[:, 0]] - mesh.points[edges[:, 1]], axis=1).mean())
 
 
-WORDS = {
+COLUMN_WORDS = {
     "size": "element size, wanted [mm]",
     "edge": "mean edge length [mm]",
     "cells": "elements",
@@ -185,7 +185,7 @@ def quality_rows(mesh: Mesh) -> list[tuple[str, str]]:
     """Mesh.report for the eye: what, and its value as text."""
     rows = []
     for name, value in mesh.report.items():
-        words = WORDS.get(name, name)
+        words = COLUMN_WORDS.get(name, name)
         if name == "notes":
             rows += [(words, note) for note in value]
             continue

@@ -70,16 +70,16 @@ def read_raw(file: Path) -> RawMesh:
     if not file.is_file():
         raise InputError(f"imported.file = '{file}': there is no such file")
     suffix = file.suffix.lower()
-    if suffix not in READERS:
+    if suffix not in SUFFIX_READERS:
         raise InputError(
             f"imported.file = '{file}': unknown kind of mesh; known are "
-            f"{', '.join(sorted(READERS))}"
+            f"{', '.join(sorted(SUFFIX_READERS))}"
         )
     said = io.StringIO()
     try:
         # readers of foreign files print and raise whatever they like, SystemExit too
         with contextlib.redirect_stdout(said):
-            raw = READERS[suffix](file)
+            raw = SUFFIX_READERS[suffix](file)
     except InputError:
         raise
     except (Exception, SystemExit) as error:
@@ -214,7 +214,7 @@ def _read_abaqus(file: Path) -> RawMesh:
     return read_inp(file)
 
 
-READERS: dict[str, Callable[[Path], RawMesh]] = {
+SUFFIX_READERS: dict[str, Callable[[Path], RawMesh]] = {
     ".msh": read_by_gmsh,
     ".med": read_by_gmsh,
     ".unv": read_by_gmsh,

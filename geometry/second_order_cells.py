@@ -14,7 +14,7 @@ import numpy as np
 from .topology import CORNERS, EDGES, FAMILY, NODES, QUADS
 
 # family -> the word of its complete second-order cell
-COMPLETE = {
+COMPLETE_CELL = {
     "triangle": "triangle6",
     "quad": "quad9",
     "tetra": "tetra10",
@@ -37,7 +37,7 @@ def completed_cells(points: np.ndarray, blocks: Blocks) -> tuple[np.ndarray, Blo
         if family == "hexahedron":
             points, inside = _with_cell_centres(points, word, cells, middle)
             parts.append(inside)
-        whole.append((COMPLETE[family], np.hstack(parts)))
+        whole.append((COMPLETE_CELL[family], np.hstack(parts)))
     return points, whole
 
 

@@ -9,11 +9,11 @@ import numpy as np
 from .parameters import DEG, Aerofoil
 
 # trailing edge over largest thickness: a spline closed by a short straight edge meshes well
-BLUNT = 0.2
+TRAILING_EDGE_RATIO = 0.2
 # a fillet meets the platform at this angle, since tangent faces are hard on Boolean unions
-LIFT = 15 * DEG
+FILLET_ANGLE = 15 * DEG
 # points on each side
-POINTS = 24
+POINTS_PER_SIDE = 24
 
 
 def half_thickness(
@@ -27,14 +27,18 @@ def half_thickness(
     trailing edge; the biconvex law is a parabola on a rounded base.
     """
     if family == "naca":
-        last = 0.1036 - 0.1 * BLUNT
+        last = 0.1036 - 0.1 * TRAILING_EDGE_RATIO
         return (
             5
             * thickness
             * (0.2969 * np.sqrt(x) - 0.1260 * x - 0.3516 * x**2 + 0.2843 * x**3 - last * x**4)
         )
-    rounded = np.sqrt(1 - (1 - np.minimum(x / (2 * BLUNT * thickness), 1.0)) ** 2)
-    return thickness / 2 * ((1 - BLUNT) * 4 * x * (1 - x) + BLUNT * rounded)
+    rounded = np.sqrt(1 - (1 - np.minimum(x / (2 * TRAILING_EDGE_RATIO * thickness), 1.0)) ** 2)
+    return (
+        thickness
+        / 2
+        * ((1 - TRAILING_EDGE_RATIO) * 4 * x * (1 - x) + TRAILING_EDGE_RATIO * rounded)
+    )
 
 
 def spread(
@@ -59,7 +63,7 @@ def section(
     family: str,
     thickness: float,
     camber: float,
-    points: int = POINTS,
+    points: int = POINTS_PER_SIDE,
 ) -> np.ndarray:
     """Closed section over chord, (2 points - 1, 2): trailing edge (suction side), leading edge,
     trailing edge.

@@ -17,7 +17,7 @@ from .finalise_mesh import complete, mesh_model
 from .mesh import Mesh
 from .parameters import Aerofoil, Disc, MeshSize, Platform, Shank, Wedge
 from .profile import Profile, profile
-from .section import LIFT, outline
+from .section import FILLET_ANGLE, outline
 from .sector_check import check_sector
 from .sector_names import (
     edge_curves,
@@ -154,11 +154,11 @@ def _draw_aerofoil(
             return next(tag for dim, tag in occ.addThruSections(rings, makeSolid=True) if dim == 3)
     with attempt("aerofoil.fillet", "round the root of the aerofoil"):
         # from the platform's plane to the blade's skin
-        arc = np.linspace(LIFT, pi / 2, 6)[:-1]
+        arc = np.linspace(FILLET_ANGLE, pi / 2, 6)[:-1]
         flare = [
             _profile_wire(gmsh, outline(blade, top, t, grow))
             for t, grow in zip(
-                foot * (1 - np.cos(arc) / np.cos(LIFT)),
+                foot * (1 - np.cos(arc) / np.cos(FILLET_ANGLE)),
                 blade.fillet * (1 - np.sin(arc)),
                 strict=True,
             )

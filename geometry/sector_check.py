@@ -16,7 +16,7 @@ from .section import outline, shape
 from .sector_names import clearing_shift
 
 # of a length: a strip of this width keeps the shape quality of its elements above 0.05
-STRIP = 0.02
+MIN_STRIP_SHARE = 0.02
 
 
 def check_sector(
@@ -72,10 +72,10 @@ def _no_strip(
 ) -> None:
     """Two ends that nearly coincide leave a strip that no good element fits into."""
     _at_most(name, value, limit, other)
-    if 0 < limit - value < STRIP * limit:
+    if 0 < limit - value < MIN_STRIP_SHARE * limit:
         raise InputError(
             f"{name} = {value:.6g} m ends {limit - value:.2g} m before {other}, expected the same "
-            f"length or at most {(1 - STRIP) * limit:.4g} m"
+            f"length or at most {(1 - MIN_STRIP_SHARE) * limit:.4g} m"
         )
 
 

@@ -10,7 +10,7 @@ from types import ModuleType
 
 from bladefem.errors import InputError
 
-OPTIONS = {
+GMSH_OPTIONS = {
     "General.Terminal": 0,
     # more threads change the mesh from run to run
     "General.NumThreads": 1,
@@ -43,7 +43,7 @@ def gmsh_session() -> Iterator[ModuleType]:
         raise RuntimeError("a gmsh session is already open; geometry builds do not nest")
     gmsh.initialize(readConfigFiles=False, interruptible=False)
     try:
-        for name, value in OPTIONS.items():
+        for name, value in GMSH_OPTIONS.items():
             gmsh.option.setNumber(name, value)
         gmsh.model.add("bladefem")
         yield gmsh

@@ -13,13 +13,13 @@ from bladefem.errors import InputError
 
 from .parameters import Aerofoil, Disc, MeshSize, Platform, Shank, Wedge
 from .profile import Profile
-from .section import BLUNT, LIFT
+from .section import FILLET_ANGLE, TRAILING_EDGE_RATIO
 
 # element along the leading edge over those of the aerofoil
-NOSE = 0.6
+LEADING_EDGE_SIZE = 0.6
 # elements along a seat at least
-ACROSS = 8
-ALONG = 6
+MIN_ELEMENTS_ACROSS_SEAT = 8
+MIN_ELEMENTS_ALONG_SEAT = 6
 # cells above the rim at the finest, when the size is left open
 MAX_AUTOMATIC_CELLS = 40_000
 # elements over the arc of a fillet: its largest stress is then within some 5 % of the limit
@@ -79,18 +79,20 @@ def sector_sizes(
     thin = 0.6 * min((tip + root) / 2, platform.thickness, shank.width / 2)
     automatic = max(thin, _affordable_size(aerofoil, platform, shank, disc))
     base = size.size or automatic
-    contact = size.contact_size or min(base, platform.seat_width, wedge.length / ALONG)
+    contact = size.contact_size or min(
+        base, platform.seat_width, wedge.length / MIN_ELEMENTS_ALONG_SEAT
+    )
     arc_elements = size.fillet_elements or max(1, round(ARC_ELEMENTS * automatic / base))
     slender = AEROFOIL_COARSENING if aerofoil.fillet and size.size is None else 1.0
     return Sizes(
         base,
         contact,
         max(base, min(3 * base, (disc.rim_radius - disc.bore_radius) / 3)),
-        slender * NOSE * base,
-        slender * min(base, 6 * BLUNT * tip),
+        slender * LEADING_EDGE_SIZE * base,
+        slender * min(base, 6 * TRAILING_EDGE_RATIO * tip),
         base / 3,
         slender * base,
-        (pi / 2 - LIFT) * aerofoil.fillet / arc_elements,
+        (pi / 2 - FILLET_ANGLE) * aerofoil.fillet / arc_elements,
         arc_elements,
         0.0 if size.size else FOOT_SIZE * base,
     )
@@ -193,14 +195,21 @@ def set_grids(
     Raises:
         InputError: a seat is no rectangle with one edge on each side.
     """
-    along = max(2, round(wedge.length / (size.scale * (size.contact_size or wedge.length / ALONG))))
-    across = max(2, round((size.seat_elements or ACROSS) / size.scale))
+    along = max(
+        2,
+        round(
+            wedge.length
+            / (size.scale * (size.contact_size or wedge.length / MIN_ELEMENTS_ALONG_SEAT))
+        ),
+    )
+    wanted = size.seat_elements or MIN_ELEMENTS_ACROSS_SEAT
+    across = max(2, round(wanted / size.scale))
     for seat in seats:
         edges = {abs(tag) for _, tag in gmsh.model.getBoundary([(2, seat)], oriented=False)}
         if len(edges) != 4:
             raise InputError(
-                f"mesh.seat_elements = {size.seat_elements or ACROSS}: a seat has {len(edges)} "
-                "edges, expected 4; give mesh.contact_size alone for free triangles"
+                f"mesh.seat_elements = {wanted}: a seat has {len(edges)} edges, "
+                "expected 4; give mesh.contact_size alone for free triangles"
             )
         for edge in edges:
             _, _, low, _, _, high = gmsh.model.getBoundingBox(1, edge)

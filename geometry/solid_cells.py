@@ -20,7 +20,7 @@ from .split_cells import split_cells, vertex_order
 from .topology import CORNERS, DIMENSION, EDGES, FAMILY, NODES
 
 # what becomes of linear solids
-LINEAR = ("refuse", "promote", "keep")
+LINEAR_SOLID_CHOICES = ("refuse", "promote", "keep")
 
 
 @dataclass(frozen=True)

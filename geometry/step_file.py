@@ -34,10 +34,17 @@ from .session import attempt, gmsh_session
 
 # (dimension, name) to entities
 Named = dict[tuple[int, str], list[int]]
-CONTACT = ("seat_left", "seat_right", "damper_left", "damper_right")
+CONTACT_FACES = ("seat_left", "seat_right", "damper_left", "damper_right")
 # elements along a model that is only looked at
 PREVIEW_ELEMENTS = 30
-PREFIX = {"": 1.0, ".MILLI.": 1e-3, ".CENTI.": 1e-2, ".DECI.": 0.1, ".MICRO.": 1e-6, ".KILO.": 1e3}
+SI_PREFIXES = {
+    "": 1.0,
+    ".MILLI.": 1e-3,
+    ".CENTI.": 1e-2,
+    ".DECI.": 0.1,
+    ".MICRO.": 1e-6,
+    ".KILO.": 1e3,
+}
 
 
 @dataclass(frozen=True)
@@ -98,7 +105,7 @@ def read_step(
         contact = [
             tag
             for (dim, name), tags in named.items()
-            if dim == 2 and name.lower() in CONTACT
+            if dim == 2 and name.lower() in CONTACT_FACES
             for tag in tags
         ]
         with attempt("mesh.size", f"mesh '{file}'"):
@@ -143,7 +150,7 @@ def file_unit(text: str) -> float:
         r"LENGTH_UNIT\(\).{0,80}?SI_UNIT\(\s*(\$|\.\w+\.)\s*,\s*\.METRE\.", text, re.S
     )
     if found:
-        return PREFIX.get(found[1].replace("$", ""), 1e-3)
+        return SI_PREFIXES.get(found[1].replace("$", ""), 1e-3)
     return 0.0254 if re.search(r"CONVERSION_BASED_UNIT\(\s*'INCH'", text, re.I) else 1e-3
 
 

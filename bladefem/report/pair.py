@@ -14,7 +14,7 @@ import pandas as pd
 from bladefem.io.stage_cache import on_root, write_results
 from bladefem.scene.tables import Scene
 from bladefem.scene.toml import dump
-from bladefem.study.kinds.contact_pairs import INNER, PairState, radii, solve_pair
+from bladefem.study.kinds.contact_pairs import COMPARED_RADIUS_SHARE, PairState, radii, solve_pair
 from bladefem.study.kinds.hertz import hertz_pressure
 from bladefem.study.kinds.punch import johnson_pressure
 from bladefem.util.progress import Progress, unwatched
@@ -89,7 +89,9 @@ def pair_summary(states: list[PairState]) -> pd.DataFrame:
 
 
 def _messages(scene: Scene, states: list[PairState]) -> list[str]:
-    where = f" within {INNER:g} of the punch's radius" if scene.kind == "punch" else ""
+    where = (
+        f" within {COMPARED_RADIUS_SHARE:g} of the punch's radius" if scene.kind == "punch" else ""
+    )
     worst = max(state.error for state in states)
     solid = scene.hertz.dimension == 3 if scene.kind == "hertz" else scene.punch.dimension == 3
     known = (

@@ -26,9 +26,9 @@ from .pipeline.run_records import SolvedRun
 from .pipeline.stage_inputs import stage_key
 
 # amplitudes of each load
-AMPLITUDES = 40
+AMPLITUDES_PER_LOAD = 40
 # ends of the amplitudes over the lowest and the highest resonance of the run
-LOWEST, HIGHEST = 0.03, 3.0
+LOWEST_AMPLITUDE_RATIO, HIGHEST_AMPLITUDE_RATIO = 0.03, 3.0
 
 
 @dataclass(frozen=True)
@@ -109,7 +109,7 @@ def backbones(
     scene = run.scene
     curves = run.response.curves
     peaks = [curve.peak_amplitude for curve in curves]
-    ends = LOWEST * min(peaks), HIGHEST * max(peaks)
+    ends = LOWEST_AMPLITUDE_RATIO * min(peaks), HIGHEST_AMPLITUDE_RATIO * max(peaks)
     patches = list(run.contact.problem.patches)
     cases = {(case.load, case.mass): case for case in load_cases(scene, run.mesh, run.contact)}
     found = []
@@ -150,7 +150,7 @@ def backbone(
     """
     blades = model.blades(1)
     seen = float(abs(blades.shapes[-1, blades.probe][0, mode]))
-    wanted = [float(a) / seen for a in np.geomspace(*ends, AMPLITUDES)]
+    wanted = [float(a) / seen for a in np.geomspace(*ends, AMPLITUDES_PER_LOAD)]
     H = max(curve.settings.harmonics, *model.excitation)
     points = list(nonlinear_mode(model, wanted, mode, H, curve.settings.samples))
     force = blades.shapes[-1, blades.load].conj().T @ model.loads(1)[1]

@@ -44,11 +44,11 @@ from .pipeline.best_load import BestLoad, find_best_load
 # factor on each side of a stiffness that the scene gives: a joint measured twice
 GIVEN_STIFFNESS = 2.0
 # factor on each side of the friction coefficient and of the damping ratio
-FRICTION = 1.3
-DAMPING = 2.0
+FRICTION_FACTOR = 1.3
+DAMPING_FACTOR = 2.0
 # relative step of a parameter, and of the load, in differences of exact derivatives; sampled
 # friction ripples: with a tenth of it best loads seemed to move by a factor of 60
-STEP = 2e-2
+DIFFERENCE_STEP = 2e-2
 # share of the frequency on each side of a peak over which its curvature is measured
 CURVATURE_STEP = 5e-4
 # relative difference of heights up to which a peak is the one of the best load
@@ -56,7 +56,7 @@ SAME_PEAK = 0.01
 # most harmonics and contact points of a seat in the model that estimates changes
 COARSE_SETTINGS = {"harmonics": 3, "points": 8}
 # parameters that are solved again at the ends of their ranges
-CHECKED = 2
+MAX_CHECKED_PARAMETERS = 2
 
 
 @dataclass(frozen=True)
@@ -109,8 +109,8 @@ def parameters_of(
     """
     found = [
         *_layer_parameters(scene.contact),
-        Parameter("mu", 1 / FRICTION, FRICTION, "scatter of friction coefficients"),
-        Parameter("damping", 1 / DAMPING, DAMPING, "damping without friction"),
+        Parameter("mu", 1 / FRICTION_FACTOR, FRICTION_FACTOR, "scatter of friction coefficients"),
+        Parameter("damping", 1 / DAMPING_FACTOR, DAMPING_FACTOR, "damping without friction"),
     ]
     ends = None if angles is None else seat_friction_range(scene.contact.mu, angles)
     if ends is not None:
@@ -200,15 +200,15 @@ def influences(
         )
     slopes = []
     tilts = []
-    for load in (best.load * (1 - STEP), best.load * (1 + STEP)):
+    for load in (best.load * (1 - DIFFERENCE_STEP), best.load * (1 + DIFFERENCE_STEP)):
         peak = study.peak("kt", 1.0, load, base)
         slopes.append(study.by_load(peak, "kt", 1.0, load))
         tilts.append(study.by_frequency(study.model("kt", 1.0, load), base))
-    bend = (slopes[1] - slopes[0]) / (2 * STEP)
-    tilt = (tilts[1] - tilts[0]) / (2 * STEP)
+    bend = (slopes[1] - slopes[0]) / (2 * DIFFERENCE_STEP)
+    tilt = (tilts[1] - tilts[0]) / (2 * DIFFERENCE_STEP)
     found = share_work(lambda p: study.influence(p, base, bend, tilt), parameters, comm)
     found.sort(key=lambda one: -one.span)
-    ends = [(one, i) for one in found[:CHECKED] for i in (0, 1)]
+    ends = [(one, i) for one in found[:MAX_CHECKED_PARAMETERS] for i in (0, 1)]
     again = share_work(lambda end: study.solved_again(*end), ends, comm)
     checked = [
         replace(
@@ -216,9 +216,9 @@ def influences(
             solved=np.array([row for row, _ in again[2 * k : 2 * k + 2]]),
             reason="; ".join(reason for _, reason in again[2 * k : 2 * k + 2] if reason),
         )
-        for k, one in enumerate(found[:CHECKED])
+        for k, one in enumerate(found[:MAX_CHECKED_PARAMETERS])
     ]
-    return checked + found[CHECKED:]
+    return checked + found[MAX_CHECKED_PARAMETERS:]
 
 
 def _coarse(settings: Settings) -> Settings:
@@ -291,7 +291,7 @@ class _Study:
     ) -> float:
         """Derivative of ln height by ln load, the seating solved anew."""
         case_at = self.changed(name, factor)
-        ends = [case_at(load * f) for f in (1 - STEP, 1 + STEP)]
+        ends = [case_at(load * f) for f in (1 - DIFFERENCE_STEP, 1 + DIFFERENCE_STEP)]
         return self._by_elements(peak, self.model(name, factor, load), ends)
 
     def by_parameter(
@@ -304,7 +304,10 @@ class _Study:
         if name == "damping":
             slope = sensitivities(model, peak.solution, ["damping"])["damping"].size[0]
             return float(slope) / peak.height
-        ends = [self.changed(name, f)(self.best.load) for f in (1 - STEP, 1 + STEP)]
+        ends = [
+            self.changed(name, f)(self.best.load)
+            for f in (1 - DIFFERENCE_STEP, 1 + DIFFERENCE_STEP)
+        ]
         return self._by_elements(peak, model, ends)
 
     def _by_elements(
@@ -374,17 +377,17 @@ class _Study:
         amplitude = self.by_parameter(base, name)
         slopes = []
         tilts = []
-        for factor in (1 - STEP, 1 + STEP):
+        for factor in (1 - DIFFERENCE_STEP, 1 + DIFFERENCE_STEP):
             peak = self.peak(name, factor, load, base)
             slopes.append(self.by_load(peak, name, factor, load))
             tilts.append(self.by_frequency(self.model(name, factor, load), base))
-        moved_load = -(slopes[1] - slopes[0]) / (2 * STEP) / bend
+        moved_load = -(slopes[1] - slopes[0]) / (2 * DIFFERENCE_STEP) / bend
         model = self.model(name, 1.0, load)
         sides = [
             self.by_frequency(model, base, shift) for shift in (-CURVATURE_STEP, CURVATURE_STEP)
         ]
         curvature = (sides[1] - sides[0]) / (2 * CURVATURE_STEP * base.omega)
-        tilted = (tilts[1] - tilts[0]) / (2 * STEP) + tilt * moved_load
+        tilted = (tilts[1] - tilts[0]) / (2 * DIFFERENCE_STEP) + tilt * moved_load
         moved = -tilted / curvature / base.omega
         centre = np.log([load, base.height, base.solution.frequency])
         by_parameter = [float(moved_load), float(amplitude), float(moved)]
@@ -434,6 +437,6 @@ def _log_rate(low: np.ndarray, high: np.ndarray) -> np.ndarray:
     """(n,) derivative of ln |x| by the logarithm that was stepped; 0 where x is 0 or infinite."""
     finite = np.isfinite(low) & np.isfinite(high)
     middle = np.where(finite, low + high, 0.0) / 2
-    change = np.subtract(high, low, out=np.zeros_like(middle), where=finite) / (2 * STEP)
+    change = np.subtract(high, low, out=np.zeros_like(middle), where=finite) / (2 * DIFFERENCE_STEP)
     rate = np.divide(change, middle, out=np.zeros_like(middle), where=middle != 0)
     return np.where(abs(rate) < 1e-9, 0.0, rate)

@@ -25,17 +25,17 @@ PARAMETERS = ("stuck_frequency", "damping", "share", "full_slip", "exponent")
 # amplitude at which further contacts close [m], their share of the modal stiffness [1]
 STOP_PARAMETERS = ("clearance", "stop_share")
 # elements of the patch, graded in their limits; doubling them moves damping by less than 1e-3 of it
-ELEMENTS = 400
+PATCH_ELEMENTS = 400
 # limit of the first element over the smallest amplitude: below it all slip
-FINEST = 1e-3
+FINEST_LIMIT_RATIO = 1e-3
 # relative weights: what a frequency and a damping were measured to; frequencies of a joint scatter
 # by more than an instrument, with every loading and temperature
 FREQUENCY_ERROR = 1e-3
 DAMPING_ERROR = 0.05
 # half width of the 95 % interval of a logarithm from which a parameter counts as unknown: times 2
-UNKNOWN = np.log(2.0)
+UNKNOWN_LOG_HALF_WIDTH = np.log(2.0)
 # slopes q from which the fit starts; the lowest end wins
-STARTS = (0.4, 0.8, 1.6)
+START_SLOPES = (0.4, 0.8, 1.6)
 # clearances over the largest amplitude, and shares of the stop, from which the fit starts
 STOP_STARTS = ((0.5, 0.05), (0.7, 0.05), (0.9, 0.05))
 
@@ -78,7 +78,9 @@ def joint_curve(values: np.ndarray, amplitude: np.ndarray) -> tuple[np.ndarray, 
     """
     stuck, damping, share, full, exponent = values[:5]
     amplitude = np.asarray(amplitude, dtype=float)
-    edges = np.geomspace(min(FINEST * amplitude.min(), 0.5 * full), full, ELEMENTS + 1)
+    edges = np.geomspace(
+        min(FINEST_LIMIT_RATIO * amplitude.min(), 0.5 * full), full, PATCH_ELEMENTS + 1
+    )
     # what slips below the first edge is lost to stiffness and gives no loss
     part = np.diff((edges / full) ** (1 / exponent))
     limits = np.sqrt(edges[1:] * edges[:-1])
@@ -144,7 +146,7 @@ def fit_joint(
     return JointFit(
         _values(best.x),
         np.exp(np.column_stack([best.x - half, best.x + half])),
-        half < UNKNOWN,
+        half < UNKNOWN_LOG_HALF_WIDTH,
         float(np.sqrt(np.mean(best.fun**2))),
         used,
     )
@@ -159,7 +161,7 @@ def _starts(
     """Logarithms of the parameters from which the fit starts, and their bounds."""
     low = [0.5 * f.min(), 1e-7, 1e-5, 1e-3 * a.min(), 0.05]
     high = [2.0 * f.max(), z.max(), 0.9, 1e4 * a.max(), 8.0]
-    own = [[f.max(), 0.9 * z.min(), 0.05, 3 * a.max(), exponent] for exponent in STARTS]
+    own = [[f.max(), 0.9 * z.min(), 0.05, 3 * a.max(), exponent] for exponent in START_SLOPES]
     if not stop:
         return [np.log(start) for start in own], (np.log(low), np.log(high))
     # without clearance it is a part of the stuck joint, beyond the data it is not seen

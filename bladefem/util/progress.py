@@ -13,7 +13,7 @@ from typing import Any, TypeVar
 
 T = TypeVar("T")
 # of a terminal that does not know its own
-SIZE = {"ncols": 80, "nrows": 24}
+DEFAULT_TERMINAL_SIZE = {"ncols": 80, "nrows": 24}
 # progress(items, label, total): see watch
 Progress = Callable[..., Iterable[Any]]
 
@@ -57,7 +57,7 @@ def watch(
         return
     from tqdm import tqdm
 
-    size = SIZE if _without_size() else {"dynamic_ncols": True}
+    size = DEFAULT_TERMINAL_SIZE if _without_size() else {"dynamic_ncols": True}
     yield from tqdm(
         items, desc=label, total=total, **({"delay": 2.0, "leave": False} | size | options)
     )

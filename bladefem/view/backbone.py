@@ -19,9 +19,9 @@ if TYPE_CHECKING:
 
 MICRO = 1e6
 # smallest damping shown over the largest
-DEPTH = 1e-3
+MIN_DAMPING_SHARE = 1e-3
 # amplitudes below this share of the highest resonance are left out of the response
-SHOWN = 0.03
+MIN_AMPLITUDE_SHARE = 0.03
 
 
 def draw_design_map(
@@ -81,7 +81,7 @@ def _draw_need(ax: Axes, found: Sequence[Backbone], colours: dict[float, Any]) -
         ax.plot(MICRO * height, 100 * need, "o", color=colours[other.load], zorder=4)
     highest = max(float((o.friction + o.own)[o.converged].max()) for o in found)
     lowest = min(float((o.friction + o.own)[o.converged].min()) for o in found)
-    ax.set_ylim(100 * max(0.7 * lowest, DEPTH * highest), 150 * highest)
+    ax.set_ylim(100 * max(0.7 * lowest, MIN_DAMPING_SHARE * highest), 150 * highest)
 
 
 def total_need(one: Backbone) -> np.ndarray:
@@ -104,7 +104,7 @@ def _draw_response(
         ax.plot(frequency, MICRO * amplitude, ".", color=colour, markersize=4)
     ax.set_xlim(min(ends), max(ends))
     log_axis(ax, "y")
-    ax.set_ylim(MICRO * SHOWN * highest, 1.4 * MICRO * highest)
+    ax.set_ylim(MICRO * MIN_AMPLITUDE_SHARE * highest, 1.4 * MICRO * highest)
     ax.set(
         xlabel="excitation frequency [Hz]",
         ylabel="vibration amplitude [µm]",

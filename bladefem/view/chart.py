@@ -13,7 +13,7 @@ from .labels import names_apart
 from .response import draw_accuracy
 from .style import canvas, log_axis
 
-ERRORS = {
+ERROR_LABELS = {
     "error": "resonance amplitude",
     "error_frequency": "resonance frequency",
     "error_phasor": "worst phasor over the highest one",
@@ -66,7 +66,7 @@ def draw_chart(
             ax.legend(loc="center left", bbox_to_anchor=(1.0, 0.5))
             _name_star(ax, what)
             _name_time(ax, what)
-            of = "amplitude or frequency, the larger" if what == "meshes" else ERRORS["error"]
+            of = "amplitude or frequency, the larger" if what == "meshes" else ERROR_LABELS["error"]
             ax.set(ylabel=f"error of the {of} [%]")
         names_apart(*axes[:, 0])
         return axes[0, 0].figure
@@ -85,10 +85,10 @@ def draw_errors(
         tables, file, tolerance, title: as for ``draw_chart``; what a table does not know leaves its
             place empty.
     """
-    size = (5.2 * len(ERRORS) + 1.6, 4.0 * len(tables) + 0.4)
-    with canvas(file, None, size, (len(tables), len(ERRORS)), squeeze=False) as axes:
+    size = (5.2 * len(ERROR_LABELS) + 1.6, 4.0 * len(tables) + 0.4)
+    with canvas(file, None, size, (len(tables), len(ERROR_LABELS)), squeeze=False) as axes:
         for row, (what, table) in zip(axes, tables.items(), strict=True):
-            for ax, (column, of) in zip(row, ERRORS.items(), strict=True):
+            for ax, (column, of) in zip(row, ERROR_LABELS.items(), strict=True):
                 if column not in table or not (table[column] > 0).any():
                     ax.set_axis_off()
                     continue

@@ -25,7 +25,7 @@ if TYPE_CHECKING:
 
 PRESSURE_COLOURS = "inferno_r"
 # faces that nothing presses
-OPEN = "#e6e6e6"
+OPEN_FACE_COLOUR = "#e6e6e6"
 # corners of a face: VTK's number for line, triangle, quadrilateral
 VTK_FACES = {2: 3, 3: 5, 4: 9}
 
@@ -255,7 +255,9 @@ def colour_pressure(
     triangles = split_faces(seat.patch.faces, seat.patch.faces.shape[1]).reshape(-1, 3)
     closed = (seat.force[triangles] > 0).any(axis=1)
     flat = Triangulation(*xy.T, triangles)
-    ax.tripcolor(flat, np.zeros(len(triangles)), cmap=ListedColormap([OPEN]), rasterized=True)
+    ax.tripcolor(
+        flat, np.zeros(len(triangles)), cmap=ListedColormap([OPEN_FACE_COLOUR]), rasterized=True
+    )
     if closed.any():
         flat.set_mask(~closed)
         ax.tripcolor(

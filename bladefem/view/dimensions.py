@@ -12,7 +12,7 @@ from .style import COLOURS
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
-DIMENSION = COLOURS[0]
+DIMENSION_COLOUR = COLOURS[0]
 Point: TypeAlias = Sequence[float] | np.ndarray
 
 
@@ -53,7 +53,7 @@ def length(
     for point, moved in ((first, a), (last, b)):
         ax.plot(
             *np.stack([point, moved + 0.08 * (moved - point)]).T,
-            color=DIMENSION,
+            color=DIMENSION_COLOUR,
             lw=0.6,
             alpha=0.7,
             zorder=3,
@@ -71,7 +71,7 @@ def length(
         rotation_mode="anchor",
         ha="center",
         va="center",
-        color=DIMENSION,
+        color=DIMENSION_COLOUR,
         fontsize=8,
         zorder=5,
         bbox={"boxstyle": "square,pad=0.1", "fc": "white", "ec": "none", "alpha": 0.75},
@@ -86,7 +86,7 @@ def _draw_arrow(ax: Axes, start: np.ndarray, end: np.ndarray) -> None:
         end,
         arrowprops={
             "arrowstyle": "<|-|>",
-            "color": DIMENSION,
+            "color": DIMENSION_COLOUR,
             "lw": 0.9,
             "shrinkA": 0,
             "shrinkB": 0,
@@ -109,12 +109,12 @@ def angle(
     turn = np.linspace(start, end, 40)
     hub = np.asarray(centre, float)
     arc = hub + radius * np.stack([np.cos(turn), np.sin(turn)], axis=1)
-    ax.plot(*arc.T, color=DIMENSION, lw=1.0, zorder=4)
+    ax.plot(*arc.T, color=DIMENSION_COLOUR, lw=1.0, zorder=4)
     if rays:
         for end_point in (arc[0], arc[-1]):
             ax.plot(
                 *np.stack([hub, hub + 1.15 * (end_point - hub)]).T,
-                color=DIMENSION,
+                color=DIMENSION_COLOUR,
                 lw=0.7,
                 ls="--",
                 zorder=3,
@@ -125,7 +125,7 @@ def angle(
         arc[len(arc) // 2],
         (10 * np.cos(middle), 10 * np.sin(middle)),
         textcoords="offset points",
-        color=DIMENSION,
+        color=DIMENSION_COLOUR,
         fontsize=8,
         ha="left" if np.cos(middle) > 0.3 else "right" if np.cos(middle) < -0.3 else "center",
         va="center",

@@ -10,12 +10,12 @@ from matplotlib.colors import Normalize
 
 from geometry.mesh import Mesh
 
-from .mesh import RADIAL, edge_lines, polydata, view_of
+from .mesh import RADIAL_DIRECTION, edge_lines, polydata, view_of
 from .modes import add_colour_bar
 from .skin import skin
-from .style import SEQUENTIAL, canvas, headline, photograph, show_photograph, size_for
+from .style import SEQUENTIAL_COLOURS, canvas, headline, photograph, show_photograph, size_for
 
-SIZE = (1100, 1200)
+PICTURE_PIXELS = (1100, 1200)
 
 
 def draw_utilisation(
@@ -38,7 +38,7 @@ def draw_utilisation(
     body.point_data["utilisation"] = np.clip(used[surface.nodes], 0, highest)
     direction = view_of(blade)
     parts = [
-        {"mesh": body, "scalars": "utilisation", "cmap": SEQUENTIAL, "clim": (0, highest)},
+        {"mesh": body, "scalars": "utilisation", "cmap": SEQUENTIAL_COLOURS, "clim": (0, highest)},
         {
             "mesh": edge_lines(surface, surface.points, direction),
             "color": "black",
@@ -47,10 +47,10 @@ def draw_utilisation(
             "lighting": False,
         },
     ]
-    image = photograph(parts, direction, RADIAL, SIZE)
+    image = photograph(parts, direction, RADIAL_DIRECTION, PICTURE_PIXELS)
     with canvas(file, size=size_for(image, 5.2, margin=1.6)) as ax:
-        show_photograph(ax, image, direction, RADIAL)
+        show_photograph(ax, image, direction, RADIAL_DIRECTION)
         headline(ax.figure, title)
         label = "alternating stress over the allowed one [1]"
-        add_colour_bar(ax, Normalize(0, highest), SEQUENTIAL, label)
+        add_colour_bar(ax, Normalize(0, highest), SEQUENTIAL_COLOURS, label)
         return ax.figure

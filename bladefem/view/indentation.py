@@ -15,7 +15,7 @@ from matplotlib.patches import Patch
 
 from bladefem.data import PressureMap
 
-from .contact import OPEN, PRESSURE_COLOURS, colour_pressure
+from .contact import OPEN_FACE_COLOUR, PRESSURE_COLOURS, colour_pressure
 from .style import COLOURS, canvas, headline
 
 if TYPE_CHECKING:
@@ -85,7 +85,7 @@ def _from_above(
     peak = float(seat.pressure.max())
     norm = Normalize(0, min(peak, most) / 1e6)
     opened = colour_pressure(ax, 1e3 * seat.patch.points[:, :2], seat, norm)
-    handles: list[Any] = [Patch(color=OPEN, label="open")] if opened else []
+    handles: list[Any] = [Patch(color=OPEN_FACE_COLOUR, label="open")] if opened else []
     turn = np.linspace(0, np.pi / 2, 60)
     handles += ax.plot(
         1e3 * edge * np.cos(turn),

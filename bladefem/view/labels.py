@@ -10,7 +10,7 @@ from matplotlib.transforms import Bbox
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
-PLACES = (
+LABEL_PLACES = (
     (6, 7, "left"),
     (6, -13, "left"),
     (-6, 7, "right"),
@@ -45,7 +45,7 @@ def _move_apart(ax: Axes) -> None:
     ]
     inside = ax.get_window_extent()
     for text in list(ax.texts):
-        for x, y, side in PLACES:
+        for x, y, side in LABEL_PLACES:
             text.xyann = (x, y)
             text.set_ha(side)
             box = text.get_window_extent()

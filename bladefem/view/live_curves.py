@@ -10,11 +10,11 @@ import numpy as np
 import pandas as pd
 
 from .response import between, load_colours, load_name, pieces_of
-from .style import COLOURS, FAILED
+from .style import COLOURS, FAILED_COLOUR
 
 MICRO = 1e6
 # significant digits of numbers on the page
-DIGITS = 7
+SIGNIFICANT_DIGITS = 7
 SYMBOLS = ("circle", "diamond", "triangle-up", "square")
 DASHES = {0.0: "dash", np.inf: "dot"}
 
@@ -47,11 +47,13 @@ def live_responses(
     failed = points[~points["converged"].astype(bool) & (points["amplitude"] > 0)]
     if len(failed):
         data.append(
-            _mark_points(failed, f"not converged ({len(failed)})", {"symbol": "x", "color": FAILED})
+            _mark_points(
+                failed, f"not converged ({len(failed)})", {"symbol": "x", "color": FAILED_COLOUR}
+            )
         )
     if "stability" in points and (points["stability"] == "unstable").any():
         unstable = points[points["stability"] == "unstable"]
-        style = {"symbol": "square-open", "color": FAILED, "size": 7}
+        style = {"symbol": "square-open", "color": FAILED_COLOUR, "size": 7}
         data.append(_mark_points(unstable, f"unstable ({len(unstable)})", style))
     layout = {
         "title": _escape_title(title),
@@ -335,7 +337,7 @@ def _log_axis(values: Any) -> dict[str, Any]:
 def numbers(values: Any) -> list[float | None]:
     """Plain numbers with the digits that a page needs; None where there is none."""
     array = np.asarray(values, dtype=float)
-    return [float(f"{v:.{DIGITS}g}") if np.isfinite(v) else None for v in array]
+    return [float(f"{v:.{SIGNIFICANT_DIGITS}g}") if np.isfinite(v) else None for v in array]
 
 
 def _escape_title(words: str) -> dict[str, Any]:

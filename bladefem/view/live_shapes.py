@@ -19,7 +19,7 @@ from .skin import skin
 
 # triangles that a browser still turns smoothly
 MOST_TRIANGLES = 60_000
-LARGEST = 32767
+LARGEST_INT16 = 32767
 # of the largest displacement: harmonics below it are not seen in the picture
 HARMONIC_SHARE = 0.005
 
@@ -125,11 +125,11 @@ def _packed_shape(drawn: ComplexArray | RealArray) -> dict[str, Any]:
     """Real and imaginary displacement as drawn [m], in shares of their largest component."""
     largest = float(max(np.abs(drawn.real).max(), np.abs(drawn.imag).max(), 1e-300))
     parts = {
-        "scale": largest / LARGEST,
-        "real": _pack_numbers(drawn.real * LARGEST / largest, np.int16),
+        "scale": largest / LARGEST_INT16,
+        "real": _pack_numbers(drawn.real * LARGEST_INT16 / largest, np.int16),
     }
     if np.iscomplexobj(drawn) and np.abs(drawn.imag).max() > 1e-6 * largest:
-        parts["imaginary"] = _pack_numbers(drawn.imag * LARGEST / largest, np.int16)
+        parts["imaginary"] = _pack_numbers(drawn.imag * LARGEST_INT16 / largest, np.int16)
     return parts
 
 

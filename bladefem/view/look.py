@@ -9,13 +9,13 @@ import numpy as np
 
 from geometry.look import AXES, Look
 
-from .style import LIGHT, aim, canvas, open_plotter, trim
+from .style import RENDER_OPTIONS, aim, canvas, open_plotter, trim
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
 # from the object to the eye, in the frame of x radial, z along the engine
-SIDES = {
+VIEW_DIRECTIONS = {
     "": (0.45, -0.75, 0.5),
     "from the other side": (0.45, 0.75, -0.5),
     "from below": (-0.5, -0.75, 0.45),
@@ -26,14 +26,14 @@ COLOURS = (
     "#d98fb0", "#c2b280", "#9aa5b1", "#e08a8a", "#8ecae6", "#b5d99c",
 )  # fmt: skip
 # faces in the legend and with a number on the picture
-SHOWN = 24
+MAX_NUMBERED_FACES = 24
 # of the model's size, so that a number floats over its face
-LIFT = 0.01
+LABEL_OFFSET_SHARE = 0.01
 
 
 def draw_look(look: Look, file: str | Path) -> None:
     """Write the picture."""
-    images = {title: _photograph_side(look, side) for title, side in SIDES.items()}
+    images = {title: _photograph_side(look, side) for title, side in VIEW_DIRECTIONS.items()}
     widths = [image.shape[1] / image.shape[0] for image in images.values()]
     # the legend is as wide as its words, the pictures share the rest
     share = 0.3 * sum(widths)
@@ -65,7 +65,7 @@ def _photograph_side(look: Look, side: tuple[float, float, float]) -> np.ndarray
             edge_color="#55606a",
             line_width=0.6,
             name=face.name,
-            **{**LIGHT, "ambient": 0.45, "diffuse": 0.6},
+            **{**RENDER_OPTIONS, "ambient": 0.45, "diffuse": 0.6},
         )
     _number_faces(plotter, look, frame, np.asarray(side))
     used = np.unique(look.outside.corners[look.outside.corners >= 0])
@@ -94,10 +94,10 @@ def _number_faces(
 ) -> None:
     """The number of each large face on a facet of it that looks at the eye."""
     eye = side / np.linalg.norm(side)
-    lift = LIFT * np.ptp(look.box, axis=0).max()
+    lift = LABEL_OFFSET_SHARE * np.ptp(look.box, axis=0).max()
     places = []
     numbers = []
-    for i, face in enumerate(look.faces[:SHOWN]):
+    for i, face in enumerate(look.faces[:MAX_NUMBERED_FACES]):
         mine = np.flatnonzero(look.outside.number == i)
         normals = look.outside.normals[mine] @ frame.T
         towards = mine[normals @ eye > 0.1 * np.linalg.norm(normals, axis=1)]
@@ -124,7 +124,7 @@ def _draw_legend(ax: Axes, look: Look) -> None:
     ax.set_axis_off()
     said = _face_roles(look)
     total = sum(face.area for face in look.faces)
-    shown = look.faces[:SHOWN]
+    shown = look.faces[:MAX_NUMBERED_FACES]
     step = 1.0 / (max(len(shown), 8) + 2)
     ax.set_xlim(0, 1)
     ax.set_ylim(0, 1)
@@ -134,8 +134,10 @@ def _draw_legend(ax: Axes, look: Look) -> None:
         ax.scatter([0.03], [y], s=90, marker="s", color=COLOURS[i % len(COLOURS)])
         words = f"{face.name}   {100 * face.area / total:.1f} %   {said.get(face.name, '')}"
         ax.text(0.09, y, words, va="center", fontsize=9)
-    if len(look.faces) > SHOWN:
-        ax.text(0.0, 0.2 * step, f"and {len(look.faces) - SHOWN} smaller ones", fontsize=9)
+    if len(look.faces) > MAX_NUMBERED_FACES:
+        ax.text(
+            0.0, 0.2 * step, f"and {len(look.faces) - MAX_NUMBERED_FACES} smaller ones", fontsize=9
+        )
 
 
 def _face_roles(look: Look) -> dict[str, str]:

@@ -13,7 +13,7 @@ import pandas as pd
 from matplotlib.colors import BoundaryNorm, ListedColormap
 from matplotlib.patches import Patch as Swatch
 
-from .style import COLOURS, FAILED, SEQUENTIAL, canvas
+from .style import COLOURS, FAILED_COLOUR, SEQUENTIAL_COLOURS, canvas
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -51,7 +51,7 @@ def draw_map(
     columns = np.arange(len(cells.columns))
     rows = np.arange(len(cells.index))
     with canvas(file, None, (7.2, 4.6)) as ax:
-        colours = matplotlib.colormaps[SEQUENTIAL]
+        colours = matplotlib.colormaps[SEQUENTIAL_COLOURS]
         norm = None
         if words:
             colours = ListedColormap(word_colours(codes, len(names)))
@@ -99,7 +99,9 @@ def cross_failed(
     failed = table[~table["converged"].astype(bool)]
     place = cells.columns.get_indexer(failed[x]), cells.index.get_indexer(failed[y])
     ax.plot(*place, "x", color="white", ms=8, mew=3.2)
-    return ax.plot(*place, "x", color=FAILED, ms=6, mew=1.6, label=f"not converged ({len(failed)})")
+    return ax.plot(
+        *place, "x", color=FAILED_COLOUR, ms=6, mew=1.6, label=f"not converged ({len(failed)})"
+    )
 
 
 def tick(axis: Axes, values: pd.Index) -> None:

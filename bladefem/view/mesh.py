@@ -80,15 +80,15 @@ FACE_COLOURS = (
     "#c23b5a",
 )
 # The large faces of a blade in pale shades, so that the small ones that matter stand out.
-PALE = {
+PALE_FACE_COLOURS = {
     "pressure_side": "#a9d3cf",
     "suction_side": "#c4bedd",
     "trailing_edge": "#8d9aa5",
     "tip": "#e8d66c",
 }
-FRONT = (0.35, -0.85, 0.62)
-BELOW = (-0.45, 0.8, 0.65)
-RADIAL = (1.0, 0.0, 0.0)
+FRONT_VIEW = (0.35, -0.85, 0.62)
+VIEW_FROM_BELOW = (-0.45, 0.8, 0.65)
+RADIAL_DIRECTION = (1.0, 0.0, 0.0)
 
 
 def grid(
@@ -268,11 +268,14 @@ def label_colours(mesh: Mesh) -> list[str]:
     """Light colours for bodies, strong ones for named faces."""
     bodies = [BODY_COLOURS[i % len(BODY_COLOURS)] for i in range(len(mesh.bodies))]
     strong = cycle(FACE_COLOURS)
-    return bodies + [PALE[name] if name in PALE else next(strong) for name in mesh.faces]
+    return bodies + [
+        PALE_FACE_COLOURS[name] if name in PALE_FACE_COLOURS else next(strong)
+        for name in mesh.faces
+    ]
 
 
 def view_of(
-    mesh: Mesh, direction: tuple[float, float, float] = FRONT
+    mesh: Mesh, direction: tuple[float, float, float] = FRONT_VIEW
 ) -> tuple[float, float, float]:
     """Plane meshes are seen along their normal (x upwards, y to the left as the wheel turns)."""
     return (0.0, 0.0, 1.0) if mesh.dimension == 2 else direction
@@ -312,7 +315,7 @@ def photograph_mesh(
                 "opacity": 0.6,
             }
         )
-    return photograph(parts, direction, RADIAL)
+    return photograph(parts, direction, RADIAL_DIRECTION)
 
 
 def pulled(mesh: Mesh, share: float = 0.07) -> Mesh:
@@ -336,7 +339,7 @@ def draw_mesh(
     """Bodies and named faces in colour, as built and with the damper pulled away; returns the
     figure.
     """
-    views = (view_of(mesh),) if mesh.dimension == 2 else (FRONT, BELOW)
+    views = (view_of(mesh),) if mesh.dimension == 2 else (FRONT_VIEW, VIEW_FROM_BELOW)
     apart = pulled(mesh)
     shown = (apart,) if mesh.dimension == 2 else (mesh, apart)
     with canvas(
@@ -346,7 +349,7 @@ def draw_mesh(
         width_ratios=[1] * len(views) + [0.6],
     ) as axes:
         for ax, one, direction in zip(axes, shown, views, strict=False):
-            show_photograph(ax, photograph_mesh(one, direction, edges), direction, RADIAL)
+            show_photograph(ax, photograph_mesh(one, direction, edges), direction, RADIAL_DIRECTION)
             if one is apart and "damper" in mesh.bodies:
                 ax.set_title(
                     "damper drawn away from its seats",
@@ -360,7 +363,7 @@ def draw_mesh(
 
 
 # names next to a picture in ordinary size; CAD files have more
-FEW_NAMES = 20
+MAX_NAMES_IN_LEGEND = 20
 
 
 def draw_legend(ax: Axes, mesh: Mesh) -> None:
@@ -372,7 +375,7 @@ def draw_legend(ax: Axes, mesh: Mesh) -> None:
         Swatch(facecolor=c, edgecolor="#555555", lw=0.5, label=f"{name} ({count})")
         for c, name, count in zip(colours, names, counts, strict=True)
     ]
-    many = len(swatches) > FEW_NAMES
+    many = len(swatches) > MAX_NAMES_IN_LEGEND
     ax.legend(
         handles=swatches,
         loc="center left",
@@ -413,7 +416,7 @@ def draw_wheel(
     image = photograph(
         [{"mesh": surface, "scalars": "part", "cmap": palette, "clim": (-0.5, 3.5)}],
         direction,
-        (0.0, 1.0, 0.0) if mesh.dimension == 3 else RADIAL,
+        (0.0, 1.0, 0.0) if mesh.dimension == 3 else RADIAL_DIRECTION,
     )
     what = "full wheel" if mesh.sector and mesh.sector.count else "part of the row"
     with canvas(file, size=size_for(image, 5.8)) as ax:

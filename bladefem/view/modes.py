@@ -16,12 +16,20 @@ from matplotlib.colors import Normalize
 from bladefem.data import ModeSet
 from geometry.mesh import Mesh
 
-from .mesh import FRONT, RADIAL, carry_round, edge_lines, polydata, save_wheel_vtu, view_of
+from .mesh import (
+    FRONT_VIEW,
+    RADIAL_DIRECTION,
+    carry_round,
+    edge_lines,
+    polydata,
+    save_wheel_vtu,
+    view_of,
+)
 from .skin import Skin, skin, wheel_count, wheel_skin
 from .style import (
-    DIVERGING,
-    LIGHT,
-    SEQUENTIAL,
+    DIVERGING_COLOURS,
+    RENDER_OPTIONS,
+    SEQUENTIAL_COLOURS,
     aim,
     canvas,
     headline,
@@ -37,9 +45,9 @@ if TYPE_CHECKING:
 WHEEL_VIEW = (0.0, -0.55, 1.0)
 COMPONENTS = ("radial", "circumferential", "axial")
 # share of the largest displacement below which a sign means nothing
-STILL = 1e-5
+NEGLIGIBLE_DISPLACEMENT_SHARE = 1e-5
 # largest drawn displacement over the sector's height
-EXAGGERATION = 0.1
+DRAWN_DISPLACEMENT_SHARE = 0.1
 
 
 def best_phase(shape: np.ndarray) -> complex:
@@ -73,7 +81,7 @@ def scale_of(mesh: Mesh, shape: np.ndarray) -> float:
     """
     largest = np.max(np.linalg.norm(shape, axis=-1), initial=0.0)
     height = np.ptp(mesh.points[:, 0])
-    return EXAGGERATION * height / largest if largest > 0 else 0.0
+    return DRAWN_DISPLACEMENT_SHARE * height / largest if largest > 0 else 0.0
 
 
 def draw_mode(
@@ -99,9 +107,11 @@ def draw_mode(
     direction = view_of(mesh)
     image = photograph_shape(mesh, shape, factor, direction)
     with canvas(file, size=size_for(image, 5.2, margin=1.6)) as ax:
-        show_photograph(ax, image, direction, RADIAL)
+        show_photograph(ax, image, direction, RADIAL_DIRECTION)
         headline(ax.figure, mode_title(modes, number, family))
-        add_colour_bar(ax, Normalize(0, 1), SEQUENTIAL, "displacement over its largest value [1]")
+        add_colour_bar(
+            ax, Normalize(0, 1), SEQUENTIAL_COLOURS, "displacement over its largest value [1]"
+        )
         say_exaggeration(ax, mesh, modes)
         return ax.figure
 
@@ -118,9 +128,10 @@ def say_exaggeration(
 
 def exaggeration(mesh: Mesh) -> str:
     """ "largest displacement drawn as 12 mm (10 % of the height)"."""
+    drawn = DRAWN_DISPLACEMENT_SHARE * np.ptp(mesh.points[:, 0])
     return (
-        f"largest displacement drawn as {1e3 * EXAGGERATION * np.ptp(mesh.points[:, 0]):.3g} mm "
-        f"({100 * EXAGGERATION:.0f} % of the height)"
+        f"largest displacement drawn as {1e3 * drawn:.3g} mm "
+        f"({100 * DRAWN_DISPLACEMENT_SHARE:.0f} % of the height)"
     )
 
 
@@ -158,7 +169,7 @@ def photograph_shape(
     body = polydata(surface, moved)
     body.point_data["magnitude"] = magnitude[surface.nodes] / max(magnitude.max(), 1e-300)
     parts = [
-        {"mesh": body, "scalars": "magnitude", "cmap": SEQUENTIAL, "clim": (0, 1)},
+        {"mesh": body, "scalars": "magnitude", "cmap": SEQUENTIAL_COLOURS, "clim": (0, 1)},
         {
             "mesh": edge_lines(surface, moved, direction),
             "color": "black",
@@ -172,7 +183,7 @@ def photograph_shape(
     )
     if outline.n_points:
         parts.append({"mesh": outline, "color": "#888888", "line_width": 1.2, "lighting": False})
-    return photograph(parts, direction, RADIAL, size)
+    return photograph(parts, direction, RADIAL_DIRECTION, size)
 
 
 def draw_mode_sheet(
@@ -205,8 +216,8 @@ def draw_mode_sheet(
         )
         headline(axes[0, 0].figure, f"first modes{diameter}")
         axes[0, 0].figure.supxlabel(
-            f"colour: displacement over its largest value, drawn as {100 * EXAGGERATION:.0f} % of "
-            "the height",
+            "colour: displacement over its largest value, drawn as "
+            f"{100 * DRAWN_DISPLACEMENT_SHARE:.0f} % of the height",
             fontsize=7.5,
             color="#555555",
         )
@@ -291,11 +302,13 @@ def draw_wheel_mode(
     surface = polydata(wheel, moved)
     surface.point_data["signed"] = signed.real
     parts: list[dict[str, Any]] = [
-        {"mesh": surface, "scalars": "signed", "cmap": DIVERGING, "clim": (-1, 1)}
+        {"mesh": surface, "scalars": "signed", "cmap": DIVERGING_COLOURS, "clim": (-1, 1)}
     ]
     surface.point_data["envelope"] = np.abs(signed)
     # Where nothing moves (the clamp) the sign is noise, not a nodal line.
-    lines = surface.contour([0.0], scalars="signed").threshold(STILL, scalars="envelope")
+    lines = surface.contour([0.0], scalars="signed").threshold(
+        NEGLIGIBLE_DISPLACEMENT_SHARE, scalars="envelope"
+    )
     if lines.n_points:
         lines.points += 2e-3 * np.ptp(moved[:, 0]) * np.asarray(WHEEL_VIEW)
         parts.append({"mesh": lines, "color": "black", "line_width": 2.2, "lighting": False})
@@ -305,7 +318,10 @@ def draw_wheel_mode(
         show_photograph(ax, image)
         headline(ax.figure, mode_title(modes, number, family))
         add_colour_bar(
-            ax, Normalize(-1, 1), DIVERGING, f"{name} displacement over its largest value [1]"
+            ax,
+            Normalize(-1, 1),
+            DIVERGING_COLOURS,
+            f"{name} displacement over its largest value [1]",
         )
         say_exaggeration(ax, mesh, modes)
         return ax.figure
@@ -313,7 +329,11 @@ def draw_wheel_mode(
 
 def wheel_camera(mesh: Mesh) -> tuple[tuple[float, float, float], tuple[float, float, float]]:
     """Direction and up for a wheel; a flat row is seen along z."""
-    return (WHEEL_VIEW, (0.0, 1.0, 0.0)) if mesh.dimension == 3 else (view_of(mesh, FRONT), RADIAL)
+    return (
+        (WHEEL_VIEW, (0.0, 1.0, 0.0))
+        if mesh.dimension == 3
+        else (view_of(mesh, FRONT_VIEW), RADIAL_DIRECTION)
+    )
 
 
 def animate_wave(
@@ -379,7 +399,9 @@ def wave_frames(
     surface = polydata(wheel, wheel.points.copy())
     surface.point_data["signed"] = signed.real
     plotter = open_plotter((pixels, pixels))
-    plotter.add_mesh(surface, scalars="signed", cmap=DIVERGING, clim=(-1, 1), **LIGHT)
+    plotter.add_mesh(
+        surface, scalars="signed", cmap=DIVERGING_COLOURS, clim=(-1, 1), **RENDER_OPTIONS
+    )
     aim(plotter, *wheel_camera(mesh), wheel.points, border=1.15)
     for k in range(frames):
         turn = np.exp(2j * np.pi * k / frames)

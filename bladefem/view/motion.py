@@ -10,12 +10,12 @@ from matplotlib.colors import Normalize
 from bladefem.util.arrays import ComplexArray, RealArray
 from geometry.mesh import Mesh
 
-from .mesh import RADIAL, view_of
-from .modes import EXAGGERATION, add_colour_bar, photograph_shape
-from .style import SEQUENTIAL, canvas, headline, show_photograph, size_for
+from .mesh import RADIAL_DIRECTION, view_of
+from .modes import DRAWN_DISPLACEMENT_SHARE, add_colour_bar, photograph_shape
+from .style import SEQUENTIAL_COLOURS, canvas, headline, show_photograph, size_for
 
 # phases of a period at which a motion is looked at
-PHASES = 72
+PHASES_PER_PERIOD = 72
 
 
 def draw_motion(
@@ -40,10 +40,10 @@ def draw_motion(
     direction = view_of(mesh)
     image = photograph_shape(mesh, shape, factor, direction, values=amplitude)
     with canvas(file, size=size_for(image, 5.2, margin=1.6)) as ax:
-        show_photograph(ax, image, direction, RADIAL)
+        show_photograph(ax, image, direction, RADIAL_DIRECTION)
         headline(ax.figure, title or "motion at the resonance")
         largest = 1e6 * float(amplitude.max(initial=0.0))
-        add_colour_bar(ax, Normalize(0, largest or 1.0), SEQUENTIAL, "amplitude [µm]")
+        add_colour_bar(ax, Normalize(0, largest or 1.0), SEQUENTIAL_COLOURS, "amplitude [µm]")
         scale_note = f"displacements drawn {factor:.3g} times as large"
         ax.figure.supxlabel(scale_note, fontsize=7.5, color="#555555")
         return ax.figure
@@ -64,7 +64,7 @@ def amplitude_of(motion: ComplexArray) -> RealArray:
 
 def extreme_phase(motion: ComplexArray) -> float:
     """The phase of harmonic 1 [rad] at which some node is displaced most."""
-    phases = np.linspace(0.0, 2 * np.pi, PHASES, endpoint=False)
+    phases = np.linspace(0.0, 2 * np.pi, PHASES_PER_PERIOD, endpoint=False)
     largest = [np.linalg.norm(displaced(motion, phase), axis=1).max() for phase in phases]
     return float(phases[int(np.argmax(largest))])
 
@@ -72,4 +72,8 @@ def extreme_phase(motion: ComplexArray) -> float:
 def drawn_factor(mesh: Mesh, motion: ComplexArray) -> float:
     """Factor that draws the largest amplitude as a tenth of the sector's radial height."""
     largest = amplitude_of(motion).max(initial=0.0)
-    return float(EXAGGERATION * np.ptp(mesh.points[:, 0]) / largest) if largest > 0 else 0.0
+    return (
+        float(DRAWN_DISPLACEMENT_SHARE * np.ptp(mesh.points[:, 0]) / largest)
+        if largest > 0
+        else 0.0
+    )

@@ -17,7 +17,7 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
 MM = 1e3
-DAMPER = "#e3cfa4"
+DAMPER_COLOUR = "#e3cfa4"
 
 
 def draw_hertz(hertz: HertzPair, file: str | Path | None = None) -> object:
@@ -29,7 +29,7 @@ def draw_hertz(hertz: HertzPair, file: str | Path | None = None) -> object:
     cap = np.column_stack([x, radius - np.sqrt(radius**2 - x**2)])
     with canvas(file, size=(7.2, 6.4)) as ax:
         _draw_block(ax, wide)
-        shape(ax, np.vstack([cap, [[wide, wide], [0, wide]]]), DAMPER)
+        shape(ax, np.vstack([cap, [[wide, wide], [0, wide]]]), DAMPER_COLOUR)
         ax.plot([0, SEAT_RATIO * contact], [0, 0], color=COLOURS[1], lw=3.5, zorder=4)
         length(ax, (0, 0), (contact, 0), "", 0.12 * wide)
         note(ax, (0.5 * contact, 0.12 * wide), f"contact_radius {contact:g} mm", (40, 26))
@@ -47,7 +47,7 @@ def draw_punch(punch: Punch, file: str | Path | None = None) -> object:
     radius = MM * punch.radius
     with canvas(file, size=(7.2, 5.2)) as ax:
         _draw_block(ax, wide)
-        shape(ax, np.array([[0, 0], [radius, 0], [radius, radius], [0, radius]]), DAMPER)
+        shape(ax, np.array([[0, 0], [radius, 0], [radius, radius], [0, radius]]), DAMPER_COLOUR)
         ax.plot([0, radius], [0, 0], color=COLOURS[1], lw=3.5, zorder=4)
         length(ax, (0, radius), (radius, radius), "", 0.05 * wide)
         note(ax, (radius / 2, radius + 0.05 * wide), f"radius {radius:g} mm", (50, 12))

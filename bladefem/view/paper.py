@@ -19,7 +19,7 @@ from .style import COLOURS, canvas, log_axis
 
 MICRO = 1e6
 MILLI = 1e3
-LIMIT = "friction limit of a seat [N]"
+LIMIT_LABEL = "friction limit of a seat [N]"
 
 
 def draw_fit(
@@ -157,7 +157,7 @@ def draw_tip_responses(
     file: str | Path | None = None,
     title: str = "",
     dots: Mapping[float, np.ndarray] | None = None,
-    load: str = LIMIT,
+    load: str = LIMIT_LABEL,
     crosses: Mapping[float, np.ndarray] | None = None,
 ) -> object:
     """Tip amplitude over frequency for several loads (Fig. 15); returns the figure.
@@ -196,7 +196,7 @@ def draw_tip_responses(
 def draw_friction_loops(
     loops: Mapping[float, tuple[np.ndarray, np.ndarray]],
     file: str | Path | None = None,
-    load: str = LIMIT,
+    load: str = LIMIT_LABEL,
 ) -> object:
     """Total friction force of a seat over its relative displacement at resonance (Fig. 16); returns
     the figure.
@@ -227,7 +227,7 @@ def draw_peaks(
     curves: Mapping[float, np.ndarray],
     file: str | Path | None = None,
     title: str = "",
-    load: str = LIMIT,
+    load: str = LIMIT_LABEL,
     best: Mapping[float, tuple[float, float]] | None = None,
     loop: np.ndarray | None = None,
 ) -> object:

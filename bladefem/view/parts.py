@@ -25,8 +25,8 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
 MM = 1e3
-DAMPER = "#e3cfa4"
-NEXT = "#eceff2"
+DAMPER_COLOUR = "#e3cfa4"
+NEIGHBOUR_COLOUR = "#eceff2"
 
 
 def said(table: Any, name: str) -> str:
@@ -172,8 +172,8 @@ def draw_platform(
     corner = turned(cut.corners[:1], cut.theta)[0]
     with canvas(file, size=(8.4, 5.6)) as ax:
         shape(ax, blade)
-        shape(ax, turned(cut.blade * [1, -1], cut.theta) * [-1, 1], NEXT)
-        shape(ax, damper, DAMPER)
+        shape(ax, turned(cut.blade * [1, -1], cut.theta) * [-1, 1], NEIGHBOUR_COLOUR)
+        shape(ax, damper, DAMPER_COLOUR)
         ax.plot([0, 0], [foot[1] - 6, corner[1] + 7], color="#555555", lw=0.8, ls="-.", zorder=3)
         next_seat = turned(cut.seats[1] * [1, -1], cut.theta) * [-1, 1]
         for seat in (np.stack([inner, outer]), next_seat):
@@ -274,8 +274,8 @@ def draw_damper_shapes(
             cut = profile(platform, shank, disc, damper)
             # the next blade's side is this one's turned by a sector
             shape(ax, turned(cut.blade, cut.theta))
-            shape(ax, turned(cut.blade, -cut.theta), NEXT)
-            shape(ax, turned(cut.damper, cut.theta), DAMPER)
+            shape(ax, turned(cut.blade, -cut.theta), NEIGHBOUR_COLOUR)
+            shape(ax, turned(cut.damper, cut.theta), DAMPER_COLOUR)
             for seat, side in zip(cut.seats, (1, -1), strict=True):
                 ax.plot(*turned(seat, side * cut.theta).T, color=COLOURS[1], lw=3, zorder=4)
             bare(ax, name, "circumferential", "radial")
@@ -327,7 +327,7 @@ def draw_front(
     """Along the engine axis."""
     shape(ax, ring(disc.bore_radius, disc.rim_radius, cut.theta))
     shape(ax, MM * cut.blade[:, ::-1])
-    shape(ax, MM * cut.damper[:, ::-1], DAMPER)
+    shape(ax, MM * cut.damper[:, ::-1], DAMPER_COLOUR)
     width = [np.ptp(plane_section(aerofoil, t)[0][:, 1]) / 2 for t in (0.0, 1.0)]
     top = MM * cut.top
     tip = MM * (cut.top + aerofoil.span)
@@ -420,8 +420,8 @@ def draw_plane(plane: Plane, file: str | Path | None = None) -> object:
     seat = MM * plane.seat_width
     with canvas(file, size=(6.6, 6.8)) as ax:
         shape(ax, blade)
-        shape(ax, blade + np.array([pitch, 0.0]), NEXT)
-        shape(ax, damper, DAMPER)
+        shape(ax, blade + np.array([pitch, 0.0]), NEIGHBOUR_COLOUR)
+        shape(ax, damper, DAMPER_COLOUR)
         for start in (wide - seat, pitch - wide):
             ax.plot([start, start + seat], [low, low], color=COLOURS[1], lw=3.5, zorder=4)
         ax.fill_between(
@@ -453,7 +453,7 @@ def draw_z_mass(z: ZMass, file: str | Path | None = None) -> object:
     high = MM * z.height / 2
     bar = MM * z.bar
     with canvas(file, size=(6.0, 5.4)) as ax:
-        shape(ax, corners, DAMPER)
+        shape(ax, corners, DAMPER_COLOUR)
         length(ax, (-wide, -high), (wide, -high), said(z, "width"), -6)
         length(ax, (wide, -high), (wide, high), said(z, "height"), -6)
         length(ax, (-wide, high - bar), (-wide, high), said(z, "bar"), 5)

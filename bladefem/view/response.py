@@ -19,7 +19,7 @@ import pandas as pd
 from scipy.interpolate import PchipInterpolator
 
 from .labels import names_apart
-from .style import COLOURS, FAILED, canvas, log_axis
+from .style import COLOURS, FAILED_COLOUR, canvas, log_axis
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -65,7 +65,7 @@ def draw_responses(
                 MICRO * unstable["amplitude"],
                 "s",
                 mfc="white",
-                mec=FAILED,
+                mec=FAILED_COLOUR,
                 ms=4.5,
                 mew=1.2,
                 zorder=5,
@@ -201,7 +201,7 @@ def draw_failed(ax: Axes, failed: pd.DataFrame) -> None:
         failed["frequency"][known],
         amplitude[known],
         "x",
-        color=FAILED,
+        color=FAILED_COLOUR,
         ms=7,
         mew=1.8,
         zorder=5,
@@ -212,7 +212,7 @@ def draw_failed(ax: Axes, failed: pd.DataFrame) -> None:
             failed["frequency"][~known],
             np.full(int((~known).sum()), 0.01),
             "x",
-            color=FAILED,
+            color=FAILED_COLOUR,
             ms=7,
             mew=1.8,
             transform=ax.get_xaxis_transform(),
@@ -297,7 +297,7 @@ def draw_optimum_curve(
             finite["load"][doubtful],
             amplitude[doubtful],
             "x",
-            color=FAILED,
+            color=FAILED_COLOUR,
             ms=9,
             mew=2,
             label="curve with unconverged points",
@@ -417,7 +417,7 @@ def _draw_hollow(
             factor * peaks[column],
             "o",
             mfc="white",
-            mec=FAILED,
+            mec=FAILED_COLOUR,
             ms=size,
             mew=1.5,
             zorder=zorder,
@@ -590,7 +590,7 @@ def _draw_failed_settings(ax: Axes, failed: pd.DataFrame) -> None:
         failed["time"],
         np.full(len(failed), 0.98),
         "x",
-        color=FAILED,
+        color=FAILED_COLOUR,
         ms=7,
         mew=1.8,
         transform=ax.get_xaxis_transform(),
@@ -604,7 +604,7 @@ def _draw_failed_settings(ax: Axes, failed: pd.DataFrame) -> None:
             xycoords=ax.get_xaxis_transform(),
             textcoords="offset points",
             fontsize=7.5,
-            color=FAILED,
+            color=FAILED_COLOUR,
         )
 
 

@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import pandas as pd
 
-from .style import COLOURS, FAILED, canvas
+from .style import COLOURS, FAILED_COLOUR, canvas
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -58,7 +58,7 @@ def draw_campbell(
                 crossings["frequency"],
                 "o",
                 mfc="none",
-                mec=FAILED,
+                mec=FAILED_COLOUR,
                 mew=1.5,
                 ms=9,
                 zorder=5,
@@ -360,7 +360,7 @@ def draw_excitations(
             *np.array(rings).T,
             "o",
             mfc="none",
-            mec=FAILED,
+            mec=FAILED_COLOUR,
             mew=1.6,
             ms=13,
             zorder=5,

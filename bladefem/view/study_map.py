@@ -12,7 +12,7 @@ from .style import COLOURS, canvas, log_axis
 
 MICRO = 1e6
 # luminance below which white letters are read better
-DARK = 0.5
+DARK_LUMINANCE = 0.5
 
 
 def draw_map(
@@ -43,7 +43,7 @@ def draw_map(
         for number, (value, at) in enumerate(zip(amplitude.flat, load.flat, strict=True)):
             shown = f"{MICRO * value:.4g} µm\n{at:.4g} N" if np.isfinite(value) else "not solved"
             red, green, blue, _ = image.cmap(image.norm(MICRO * value))
-            dark = 0.3 * red + 0.59 * green + 0.11 * blue < DARK
+            dark = 0.3 * red + 0.59 * green + 0.11 * blue < DARK_LUMINANCE
             ax.text(
                 number % columns,
                 number // columns,

@@ -21,11 +21,11 @@ if TYPE_CHECKING:
 
 # Okabe and Ito, Color Universal Design (2008); yellow last because it is weak on white.
 COLOURS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9", "#000000", "#F0E442")
-SEQUENTIAL = "viridis"
-DIVERGING = "RdBu_r"
-INK = "#222222"
-FAILED = "#d62728"
-LIGHT = {"show_scalar_bar": False, "ambient": 0.42, "diffuse": 0.62, "specular": 0.05}
+SEQUENTIAL_COLOURS = "viridis"
+DIVERGING_COLOURS = "RdBu_r"
+INK_COLOUR = "#222222"
+FAILED_COLOUR = "#d62728"
+RENDER_OPTIONS = {"show_scalar_bar": False, "ambient": 0.42, "diffuse": 0.62, "specular": 0.05}
 
 STYLE: dict[str, Any] = {
     "font.family": "DejaVu Sans",
@@ -36,8 +36,8 @@ STYLE: dict[str, Any] = {
     "axes.labelsize": 10,
     "axes.edgecolor": "#555555",
     "axes.linewidth": 0.8,
-    "axes.labelcolor": INK,
-    "text.color": INK,
+    "axes.labelcolor": INK_COLOUR,
+    "text.color": INK_COLOUR,
     "xtick.color": "#444444",
     "ytick.color": "#444444",
     "axes.spines.top": False,
@@ -54,7 +54,7 @@ STYLE: dict[str, Any] = {
     "savefig.dpi": 160,
     "savefig.facecolor": "white",
     "axes.prop_cycle": matplotlib.cycler(color=COLOURS),
-    "image.cmap": SEQUENTIAL,
+    "image.cmap": SEQUENTIAL_COLOURS,
     "axes.formatter.useoffset": False,
 }
 
@@ -143,7 +143,7 @@ def photograph(
     """
     plotter = open_plotter(size)
     for part in parts:
-        plotter.add_mesh(**{**LIGHT, **part})
+        plotter.add_mesh(**{**RENDER_OPTIONS, **part})
     aim(plotter, direction, up, np.concatenate([part["mesh"].points for part in parts]))
     image = np.asarray(plotter.screenshot(return_img=True))
     plotter.close()

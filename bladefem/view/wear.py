@@ -23,7 +23,7 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
 WORK_COLOURS = "inferno_r"
-MARKS = {
+STATE_MARKERS = {
     0: ("o", "separated"),
     1: ("s", "stuck"),
     2: ("^", "slips up to half of its contact time"),
@@ -98,7 +98,7 @@ def _draw_face(
         vmax=most,
         rasterized=True,
     )
-    for code, (mark, label) in MARKS.items():
+    for code, (mark, label) in STATE_MARKERS.items():
         if (state == code).any():
             ax.plot(
                 *xy[state == code].T,
@@ -126,7 +126,7 @@ def _draw_line(
     place = xy[:, np.argmax(np.ptp(xy, axis=0))]
     order = np.argsort(place)
     ax.plot(place[order], work[order], "-", color="#999999", lw=1)
-    for code, (mark, label) in MARKS.items():
+    for code, (mark, label) in STATE_MARKERS.items():
         if (state == code).any():
             ax.plot(
                 place[state == code],

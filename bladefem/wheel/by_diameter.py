@@ -23,7 +23,7 @@ from ..util.arrays import ComplexArray, RealArray, RealOrComplex
 from .model import Wheel
 
 # rigid motions that the contact springs resist less than this, relatively, are left out
-UNSEEN = 1e-12
+NEGLIGIBLE_STIFFNESS_SHARE = 1e-12
 
 
 @dataclass(frozen=True)
@@ -204,8 +204,8 @@ def _mean_flexibility(
     Z[np.ix_(rigid, rigid)] = hold * stiff
     size = np.sqrt(np.where(np.diag(stiff).real > 0, np.diag(stiff).real, 1.0))
     values, vectors = np.linalg.eigh(stiff / np.outer(size, size))
-    seen = np.zeros((k, int((values > UNSEEN).sum())), dtype=complex)
-    seen[rigid] = (vectors / size[:, None])[:, values > UNSEEN]
+    seen = np.zeros((k, int((values > NEGLIGIBLE_STIFFNESS_SHARE).sum())), dtype=complex)
+    seen[rigid] = (vectors / size[:, None])[:, values > NEGLIGIBLE_STIFFNESS_SHARE]
     V = np.column_stack([np.eye(k)[:, stiffness > 0], seen])
     return V @ np.linalg.inv(V.conj().T @ (Z + N) @ V) @ V.conj().T
 

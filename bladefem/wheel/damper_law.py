@@ -27,14 +27,14 @@ from .model import Wheel
 from .tuned import travelling_order
 
 # of the table: sizes, ratios and phases of the two amplitudes
-SIZES, RATIOS, PHASES = 32, 13, 20
+TABLE_SIZES, TABLE_RATIOS, TABLE_PHASES = 32, 13, 20
 # Newton steps of one size, and the relative residual at its end
-STEPS = 40
-TOLERANCE = 1e-7
+MAX_NEWTON_STEPS = 40
+RESIDUAL_TOLERANCE = 1e-7
 # share of the pairs that may stay unsolved
-FILLED = 0.02
+MAX_UNSOLVED_SHARE = 0.02
 # halvings of a step
-HALVINGS = 8
+MAX_HALVINGS = 8
 # real unknowns of the small balance
 MOST_UNKNOWNS = 240
 
@@ -65,8 +65,8 @@ class Family:
 class DamperLaw:
     """Forces on the two blades for their amplitudes, as splines over log size, ratio and phase."""
 
-    # (4, SIZES, RATIOS + 2 GHOSTS, PHASES) coefficients: force on the blade before the damper, real
-    # and imaginary, then on the one after, over the size
+    # (4, TABLE_SIZES, TABLE_RATIOS + 2 GHOSTS, TABLE_PHASES) coefficients: force on the blade
+    # before the damper, real and imaginary, then on the one after, over the size
     coefficients: RealArray
     # logarithm of the smallest size, and of one step
     first: float
@@ -243,21 +243,21 @@ def damper_law(
             "fewer contact points (contact.points)"
         )
     e = select_elements(elements or wheel.elements, np.arange(wheel.nodes))
-    log_size = np.log(np.geomspace(sizes[0], sizes[1], SIZES))
-    ratio = np.linspace(0, np.pi / 2, RATIOS)
-    phase = 2 * np.pi * np.arange(PHASES) / PHASES
+    log_size = np.log(np.geomspace(sizes[0], sizes[1], TABLE_SIZES))
+    ratio = np.linspace(0, np.pi / 2, TABLE_RATIOS)
+    phase = 2 * np.pi * np.arange(TABLE_PHASES) / TABLE_PHASES
     first, second = np.meshgrid(ratio, phase, indexing="ij")
     a1 = np.cos(first).ravel().astype(complex)
     a2 = (np.sin(first) * np.exp(1j * second)).ravel()
     imposed = np.outer(a1, family.before) + np.outer(a2, family.after)
-    table = np.empty((4, SIZES, RATIOS, PHASES))
+    table = np.empty((4, TABLE_SIZES, TABLE_RATIOS, TABLE_PHASES))
     stuck = _stuck_motion(wheel, family, imposed)
     motion = stuck
     for i, size in enumerate(np.exp(log_size)):
         motion, force = _one_size(wheel, e, family, size, imposed, (motion, stuck), samples)
         pair = np.array([force @ family.before, force @ family.after])
         parts = [pair[0].real, pair[0].imag, pair[1].real, pair[1].imag]
-        table[:, i] = np.array(parts).reshape(4, RATIOS, PHASES)
+        table[:, i] = np.array(parts).reshape(4, TABLE_RATIOS, TABLE_PHASES)
     return DamperLaw(_spline(table), float(log_size[0]), float(log_size[1] - log_size[0]))
 
 
@@ -278,19 +278,19 @@ def _one_size(
     """
     w, force, error = _small_balance(wheel, e, family, size * imposed, size * starts[0], samples)
     for attempt in range(3):
-        lost = np.flatnonzero(error > TOLERANCE)
+        lost = np.flatnonzero(error > RESIDUAL_TOLERANCE)
         if not len(lost):
             break
         begin = size * starts[1] if attempt == 0 else _next_in_phase(w, (1, -1)[attempt - 1])
         again, forces, errors = _small_balance(
             wheel, e, family, size * imposed[lost], begin[lost], samples
         )
-        better = errors <= TOLERANCE
+        better = errors <= RESIDUAL_TOLERANCE
         w[lost[better]] = again[better]
         force[lost[better]] = forces[better]
         error[lost[better]] = errors[better]
-    lost = np.flatnonzero(error > TOLERANCE)
-    if len(lost) > FILLED * len(w):
+    lost = np.flatnonzero(error > RESIDUAL_TOLERANCE)
+    if len(lost) > MAX_UNSOLVED_SHARE * len(w):
         raise NotSolvedError(
             f"damper law: no solution for {len(lost)} of {len(w)} pairs of amplitudes, the best "
             f"with residual {error[lost].min():.1e}"
@@ -303,7 +303,7 @@ def _one_size(
 
 def _next_in_phase(values: np.ndarray, shift: int) -> np.ndarray:
     """(B, m) values of the neighbour in phase."""
-    whole = values.reshape(RATIOS, PHASES, -1)
+    whole = values.reshape(TABLE_RATIOS, TABLE_PHASES, -1)
     return np.roll(whole, shift, axis=1).reshape(values.shape)
 
 
@@ -313,7 +313,7 @@ def _spline(table: np.ndarray) -> np.ndarray:
     A negative ratio is the second amplitude with the opposite sign; beyond a right angle the first
     one has it, which is both forces and the phase turned by half a period.
     """
-    half = np.roll(table, PHASES // 2, axis=3)
+    half = np.roll(table, TABLE_PHASES // 2, axis=3)
     low = half[:, :, GHOSTS:0:-1]
     high = -half[:, :, -2 : -2 - GHOSTS : -1]
     whole = np.concatenate([low, table, high], axis=2)
@@ -348,15 +348,15 @@ def _small_balance(
     w = start.copy()
     force, change = _contact(wheel, e, w, samples)
     error = np.linalg.norm(w - imposed + force @ family.flexibility.T, axis=1) / size
-    for _ in range(STEPS):
-        open_pairs = np.flatnonzero(error > TOLERANCE)
+    for _ in range(MAX_NEWTON_STEPS):
+        open_pairs = np.flatnonzero(error > RESIDUAL_TOLERANCE)
         if not len(open_pairs):
             break
         now = w[open_pairs]
         r = now - imposed[open_pairs] + force[open_pairs] @ family.flexibility.T
         step = _newton_steps(turned, change[open_pairs], r)
         share = np.ones(len(open_pairs))
-        for _ in range(HALVINGS):
+        for _ in range(MAX_HALVINGS):
             trial = now - share[:, None] * step
             forces, changes = _contact(wheel, e, trial, samples)
             r = trial - imposed[open_pairs] + forces @ family.flexibility.T

@@ -22,13 +22,13 @@ from .model import Pattern
 from .statistics import Amplification, no_checks
 
 # wheels solved together: matrices of 72 x 72 numbers
-BATCH = 200
-STEPS = 30
-TOLERANCE = 1e-7
-HALVINGS = 6
+WHEELS_PER_BATCH = 200
+MAX_NEWTON_STEPS = 30
+RESIDUAL_TOLERANCE = 1e-7
+MAX_HALVINGS = 6
 # frequencies of the first look, and times that the highest point is closed in on
-GRID = 61
-ROUNDS = 4
+FIRST_LOOK_POINTS = 61
+PEAK_ROUNDS = 4
 # relative distance of points that are the same
 SAME_POINT = 1e-7
 
@@ -108,8 +108,8 @@ def solve_law_wheels(
     """
     found = start.copy()
     solved = np.zeros(len(start), dtype=bool)
-    for low in range(0, len(start), BATCH):
-        part = slice(low, low + BATCH)
+    for low in range(0, len(start), WHEELS_PER_BATCH):
+        part = slice(low, low + WHEELS_PER_BATCH)
         found[part], solved[part] = _solve_batch(wheels.part(part), omega[part], start[part])
     return found, solved
 
@@ -124,16 +124,16 @@ def _solve_batch(
     linear = _linear_matrix(z, wheels.deviation)
     a = start
     r, derivative = _residual(wheels, z, a)
-    for _ in range(STEPS):
+    for _ in range(MAX_NEWTON_STEPS):
         error = _error(z, r, a)
-        if error.max() <= TOLERANCE:
+        if error.max() <= RESIDUAL_TOLERANCE:
             break
-        active = error > TOLERANCE
+        active = error > RESIDUAL_TOLERANCE
         J = linear + _contact_matrix(derivative, a.shape)
         right = np.stack([r.real, r.imag], axis=2).reshape(len(a), -1, 1)
         step = np.linalg.solve(J, right).reshape(*a.shape, 2) @ np.array([1.0, 1.0j])
         share = active.astype(float)
-        for _ in range(HALVINGS):
+        for _ in range(MAX_HALVINGS):
             trial = a - share[:, None] * step
             r, derivative = _residual(wheels, z, trial)
             worse = active & (_error(z, r, trial) > error)
@@ -141,7 +141,7 @@ def _solve_batch(
                 break
             share = np.where(worse, 0.5 * share, share)
         a = trial
-    return a, _error(z, r, a) <= TOLERANCE
+    return a, _error(z, r, a) <= RESIDUAL_TOLERANCE
 
 
 def _impedance(family: Family, omega: np.ndarray) -> np.ndarray:
@@ -237,16 +237,16 @@ def _find_peaks(
     and points; by even steps, then by parabolas of 1 / height^2 at the highest point.
     """
     total, count = wheels.deviation.shape
-    omega = np.repeat(np.linspace(*band, GRID)[None], total, axis=0)
-    a = np.zeros((total, GRID, count), dtype=complex)
-    solved = np.zeros((total, GRID), dtype=bool)
+    omega = np.repeat(np.linspace(*band, FIRST_LOOK_POINTS)[None], total, axis=0)
+    a = np.zeros((total, FIRST_LOOK_POINTS, count), dtype=complex)
+    solved = np.zeros((total, FIRST_LOOK_POINTS), dtype=bool)
     last = np.zeros((total, count), dtype=complex)
-    for k in range(GRID):
+    for k in range(FIRST_LOOK_POINTS):
         # far from resonance first: from the top of the band down, where dampers stick
-        i = GRID - 1 - k
+        i = FIRST_LOOK_POINTS - 1 - k
         a[:, i], solved[:, i] = solve_law_wheels(wheels, omega[:, i], last)
         last = np.where(solved[:, i, None], a[:, i], last)
-    for _ in range(ROUNDS):
+    for _ in range(PEAK_ROUNDS):
         omega, a, solved = _closed_in(wheels, omega, a, solved)
     size = np.where(solved[:, :, None], _sizes(wheels.family, a), 0.0)
     highest = size.reshape(total, -1).argmax(axis=1)

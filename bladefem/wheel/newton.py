@@ -22,21 +22,21 @@ from .model import Wheel
 from .preconditioner import Preconditioner, make_preconditioner
 
 # vectors kept by GMRES, and restarts
-BASIS = 60
-RESTARTS = 4
+GMRES_BASIS = 60
+GMRES_RESTARTS = 4
 # relative accuracy of a step: loose far from the solution, tight near it
 LOOSE_STEP_TOLERANCE = 1e-2
-TIGHT = 1e-6
+TIGHT_STEP_TOLERANCE = 1e-6
 # relative accuracy of the step that only measures a trial
 TRIAL_TOLERANCE = 0.1
 # reduction of the residual by one step that needs no further test
-QUADRATIC = 1e-2
+QUADRATIC_REDUCTION = 1e-2
 # weight of the mean in the residual that the line search lowers
-DRIFT = 1e-2
+MEAN_WEIGHT = 1e-2
 # step share below which the search direction is given up
-SHORTEST = 2.0**-8
+SHORTEST_STEP_SHARE = 2.0**-8
 # products of one solve from which a new preconditioner pays
-SLOW = 12
+SLOW_SOLVE_PRODUCTS = 12
 
 
 @dataclass(frozen=True)
@@ -134,7 +134,7 @@ class _Steps:
 
     def step(self, state: WheelState) -> tuple[np.ndarray, bool]:
         """The step (N, n, d, K), and whether GMRES reached its accuracy."""
-        accuracy = float(np.clip(0.1 * state.error, TIGHT, LOOSE_STEP_TOLERANCE))
+        accuracy = float(np.clip(0.1 * state.error, TIGHT_STEP_TOLERANCE, LOOSE_STEP_TOLERANCE))
         goal = accuracy * float(np.linalg.norm(state.residual))
         if self.stale:
             self._renew(state)
@@ -143,7 +143,7 @@ class _Steps:
         if failed:
             self._renew(state)
             found, failed = self._solve(state, state.residual, goal)
-        self.stale = self.products - before > SLOW
+        self.stale = self.products - before > SLOW_SOLVE_PRODUCTS
         return found, not failed
 
     def next_length(
@@ -180,7 +180,9 @@ class _Steps:
         size = state.residual.size
         operator = LinearOperator((size, size), matvec=product, dtype=float)
         # SciPy's versions name the relative tolerance differently: atol rules where it is larger
-        y, failed = gmres(operator, residual.ravel(), atol=goal, restart=BASIS, maxiter=RESTARTS)
+        y, failed = gmres(
+            operator, residual.ravel(), atol=goal, restart=GMRES_BASIS, maxiter=GMRES_RESTARTS
+        )
         return prepare(y.reshape(flat)).reshape(shape), failed != 0
 
 
@@ -202,14 +204,16 @@ def _line_search(
     weighted = _moving_first(state.residual)
 
     def lowers_merit(trial: WheelState, share: float) -> bool:
-        if trial.error <= QUADRATIC * state.error:
+        if trial.error <= QUADRATIC_REDUCTION * state.error:
             return True
         if merit == "residual":
             return bool(_moving_first(trial.residual) <= (1 - 1e-4 * share) * weighted)
         return bool(steps.next_length(state, trial.residual) <= (1 - 0.25 * share) * before)
 
     better = halve_step(
-        lambda share: evaluate_wheel(balance, state.w - share * step), lowers_merit, SHORTEST
+        lambda share: evaluate_wheel(balance, state.w - share * step),
+        lowers_merit,
+        SHORTEST_STEP_SHARE,
     )
     if better is None and not solved:
         raise StepError(Outcome.SINGULAR, f"GMRES did not converge at residual {state.error:.1e}")
@@ -221,4 +225,4 @@ def _moving_first(residual: np.ndarray) -> float:
     nearly no force.
     """
     mean = np.linalg.norm(residual[..., 0])
-    return float(np.hypot(np.linalg.norm(residual[..., 1:]), DRIFT * mean))
+    return float(np.hypot(np.linalg.norm(residual[..., 1:]), MEAN_WEIGHT * mean))

@@ -15,8 +15,8 @@ from ..reduction.assemble import join
 from .model import Pattern, Wheel, pattern_elements
 
 # residual flexibility of the blade readings over that of their modes: no deviation acts on it
-NEGLIGIBLE = 1e-9
-PORTS = ("contact", "blade", "load", "probe")
+NEGLIGIBLE_FLEXIBILITY_SHARE = 1e-9
+PORT_GROUPS = ("contact", "blade", "load", "probe")
 
 
 def one_body_model(
@@ -82,7 +82,8 @@ def _port_rows(wheel: Wheel) -> dict[str, np.ndarray]:
     sectors = size * np.arange(wheel.count)[:, None]
     everything = np.arange(size)
     return {
-        name: (sectors + everything[body.ports.get(name, slice(0, 0))]).ravel() for name in PORTS
+        name: (sectors + everything[body.ports.get(name, slice(0, 0))]).ravel()
+        for name in PORT_GROUPS
     }
 
 
@@ -133,7 +134,7 @@ def _mistuned_modes(
         return omega**2, M
     readings = shapes[rows]
     static = (readings[:, omega > 0] / omega[omega > 0] ** 2) @ readings[:, omega > 0].T
-    if abs(residual[np.ix_(rows, rows)]).max() > NEGLIGIBLE * abs(static).max():
+    if abs(residual[np.ix_(rows, rows)]).max() > NEGLIGIBLE_FLEXIBILITY_SHARE * abs(static).max():
         raise InputError("pattern: expected all modes of the blade readings in a wheel as one body")
     for matrix, change in ((K, pattern.stiffness), (M, pattern.mass)):
         if change is not None:

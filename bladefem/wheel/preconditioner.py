@@ -19,9 +19,9 @@ from .flexibility import WheelFlexibility, from_diameters, to_diameters
 
 # |T N| from which a harmonic is dynamically amplified, and couples all diameters; the mean does
 # always, since dampers that slip throughout have nearly no stiffness in it
-AMPLIFIED = 3.0
+AMPLIFIED_HARMONIC_LIMIT = 3.0
 # |T N| below which a mode is left out of the dense matrix
-IMMOVABLE = 1e-2
+NEGLIGIBLE_MODE_LIMIT = 1e-2
 # unknowns of the dense matrix: 2 s of factorisation
 MAX_DENSE_UNKNOWNS = 2500
 
@@ -71,8 +71,8 @@ def make_preconditioner(flex: WheelFlexibility, change: np.ndarray) -> Precondit
     dense = {}
     for h in range(harmonics):
         amplified = abs(np.einsum("nii,nii->ni", flex.T[:, h], parts.N))
-        kept = np.flatnonzero(amplified.max(axis=0) > IMMOVABLE)
-        coupled = h == 0 or amplified.max() > AMPLIFIED
+        kept = np.flatnonzero(amplified.max(axis=0) > NEGLIGIBLE_MODE_LIMIT)
+        coupled = h == 0 or amplified.max() > AMPLIFIED_HARMONIC_LIMIT
         if coupled and 0 < count * len(kept) <= MAX_DENSE_UNKNOWNS:
             dense[h] = (kept, _dense_factors(flex, C[h].reshape(count, -1, *C.shape[2:]), h, kept))
             continue

@@ -17,17 +17,17 @@ from .model import Pattern, Wheel, pattern_elements
 from .newton import WheelBalance, WheelNewton, evaluate_wheel, newton_wheel
 from .tuned import tuned_displacements
 
-TUNED = Pattern()
+TUNED_PATTERN = Pattern()
 # modal damping ratios within which a solved neighbour is the best start: resonances of a mistuned
 # wheel are that narrow
-NEIGHBOUR = 0.5
+NEIGHBOUR_HALF_WIDTHS = 0.5
 # relative distance at which it is the same point, with other settings
 SAME_FREQUENCY = 1e-6
 # of the load homotopy: first share of the excitation, first and last factor to the next one, and
 # points before it is given up
-GENTLE = 0.02
-FACTOR = 2.0
-LEAST_FACTOR = 1.01
+FIRST_LOAD_SHARE = 0.02
+FIRST_LOAD_FACTOR = 2.0
+LAST_LOAD_FACTOR = 1.01
 HOMOTOPY_POINTS = 60
 
 
@@ -73,7 +73,7 @@ def solve_wheel(
     H: int = 3,
     samples: int = 128,
     *,
-    pattern: Pattern = TUNED,
+    pattern: Pattern = TUNED_PATTERN,
     start: WheelSolution | None = None,
     options: Options = DEFAULT_OPTIONS,
 ) -> WheelSolution:
@@ -119,7 +119,7 @@ def _attempts(
     if start is not None:
         fitted = _fitted(start.w, wheel, H)
         close = abs(start.omega / omega - 1) < max(
-            NEIGHBOUR * np.max(wheel.damping.ratio), SAME_FREQUENCY
+            NEIGHBOUR_HALF_WIDTHS * np.max(wheel.damping.ratio), SAME_FREQUENCY
         )
         ways.insert(0 if close else len(ways), ("newton", lambda: fitted))
     for name, attempt in ways:
@@ -172,7 +172,7 @@ def sweep_wheel(
     H: int = 3,
     samples: int = 128,
     *,
-    pattern: Pattern = TUNED,
+    pattern: Pattern = TUNED_PATTERN,
     options: Options = DEFAULT_OPTIONS,
 ) -> Iterator[WheelSolution]:
     """Points at circular frequencies [rad/s], each from the one before."""
@@ -187,7 +187,7 @@ def stuck_wheel(
     wheel: Wheel,
     omega: float,
     H: int = 1,
-    pattern: Pattern = TUNED,
+    pattern: Pattern = TUNED_PATTERN,
 ) -> np.ndarray:
     """(N, H+1, probes) amplitudes with all contacts closed and sticking [m]."""
     _check_point(wheel, omega, H, 1, pattern)
@@ -199,7 +199,7 @@ def free_wheel(
     wheel: Wheel,
     omega: float,
     H: int = 1,
-    pattern: Pattern = TUNED,
+    pattern: Pattern = TUNED_PATTERN,
 ) -> np.ndarray:
     """(N, H+1, probes) amplitudes without contact forces [m]."""
     return stuck_wheel(without_contact(wheel), omega, H, replace(pattern, elements=None))
@@ -254,8 +254,8 @@ def _homotopy(balance: WheelBalance, options: Options) -> WheelNewton:
     """The excitation raised step by step from nearly stuck to its own, on a secant."""
     iterations = 0
     products = 0
-    share = GENTLE
-    factor = FACTOR
+    share = FIRST_LOAD_SHARE
+    factor = FIRST_LOAD_FACTOR
     path: list[tuple[float, np.ndarray]] = []
     end: WheelNewton | None = None
     for _ in range(HOMOTOPY_POINTS):
@@ -270,9 +270,9 @@ def _homotopy(balance: WheelBalance, options: Options) -> WheelNewton:
             factor = factor**1.5
         else:
             factor = factor**0.4
-        if factor < LEAST_FACTOR:
+        if factor < LAST_LOAD_FACTOR:
             break
-        share = min(1.0, factor * (path[-1][0] if path else GENTLE / FACTOR))
+        share = min(1.0, factor * (path[-1][0] if path else FIRST_LOAD_SHARE / FIRST_LOAD_FACTOR))
     # HOMOTOPY_POINTS is at least one
     assert end is not None
     if share < 1.0:

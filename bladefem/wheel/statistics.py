@@ -24,11 +24,11 @@ from ..util.progress import Progress, unwatched
 from .model import Pattern, Wheel
 from .one_body import one_body_model
 from .resonance import Respond, WheelPeak, find_wheel_peak
-from .solve import TUNED, WheelSolution, solve_wheel
+from .solve import TUNED_PATTERN, WheelSolution, solve_wheel
 
-CONFIDENCE = 0.95
+CONFIDENCE_LEVEL = 0.95
 # of the bootstrap: its intervals then move by a few per cent of their width
-RESAMPLES = 1000
+BOOTSTRAP_RESAMPLES = 1000
 
 
 @dataclass(frozen=True)
@@ -93,7 +93,7 @@ class Amplification:
 def quantile(
     sample: np.ndarray,
     share: float,
-    confidence: float = CONFIDENCE,
+    confidence: float = CONFIDENCE_LEVEL,
 ) -> Quantile:
     """A quantile, with the distribution-free interval of order statistics.
 
@@ -144,7 +144,9 @@ def scatter_statistics(
     for i, load in enumerate(loads):
         wheel = wheels[load]
         mine = range(rank, shape[1], ranks)
-        reference = find_wheel_peak(respond(wheel, TUNED), grid(load, TUNED), tolerance)
+        reference = find_wheel_peak(
+            respond(wheel, TUNED_PATTERN), grid(load, TUNED_PATTERN), tolerance
+        )
         tuned[:, i] = reference.height, reference.omega
         for j in progress(list(mine), f"wheels under {load:g} N", len(mine)):
             pattern = patterns[load][j]
@@ -199,7 +201,7 @@ def best_load(loads: np.ndarray, heights: np.ndarray) -> tuple[float, float]:
 def robust_optimum(
     found: Amplification,
     share: float = 0.95,
-    confidence: float = CONFIDENCE,
+    confidence: float = CONFIDENCE_LEVEL,
 ) -> RobustOptimum:
     """The load with the smallest quantile of the highest blade, between the loads.
 
@@ -214,7 +216,7 @@ def robust_optimum(
     """
     rng = np.random.default_rng(0)
     loads, wheels = found.peak.shape
-    drawn = rng.integers(wheels, size=(RESAMPLES, wheels))
+    drawn = rng.integers(wheels, size=(BOOTSTRAP_RESAMPLES, wheels))
     heights = np.quantile(found.peak[:, drawn], share, axis=2).T
     ends = np.array([best_load(found.loads, row) for row in heights])
     tail = 100 * (1 - confidence) / 2

@@ -16,7 +16,7 @@ from ..reduction.assemble import folded_diameter
 from .model import Wheel
 
 # relative deviation of the forces from a travelling wave
-ROUNDING = 1e-9
+TRAVELLING_WAVE_TOLERANCE = 1e-9
 
 
 def travelling_order(wheel: Wheel) -> int | None:
@@ -25,7 +25,9 @@ def travelling_order(wheel: Wheel) -> int | None:
     for order in range(wheel.count):
         turn = np.exp(2j * np.pi * order * sectors / wheel.count)
         if all(
-            np.allclose(f, turn[:, None] ** h * f[0], rtol=0, atol=ROUNDING * abs(f).max())
+            np.allclose(
+                f, turn[:, None] ** h * f[0], rtol=0, atol=TRAVELLING_WAVE_TOLERANCE * abs(f).max()
+            )
             for h, f in wheel.excitation.items()
         ):
             return order

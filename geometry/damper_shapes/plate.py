@@ -13,7 +13,7 @@ from bladefem.errors import InputError
 from .record import DamperShape
 
 # of the seat's width: how far its ends may lie from one plane
-FLAT = 1e-6
+FLATNESS_TOLERANCE = 1e-6
 
 
 def plate_outline(flanks: np.ndarray, base: float) -> np.ndarray:
@@ -24,7 +24,7 @@ def plate_outline(flanks: np.ndarray, base: float) -> np.ndarray:
     """
     (inner, outer), (inner_next, outer_next) = flanks
     heights = flanks[..., 0]
-    if np.ptp(heights) > FLAT * np.linalg.norm(outer - inner):
+    if np.ptp(heights) > FLATNESS_TOLERANCE * np.linalg.norm(outer - inner):
         raise InputError(
             "damper.shape = 'plate': the seats are not in one plane, expected "
             "damper.angle = '90 deg', or platform faces across the radial line between the blades"

@@ -15,9 +15,9 @@ from bladefem.errors import InputError
 from .record import DamperShape
 
 # of the circle [rad]: each side of the polygon that is drawn for it
-STEP = pi / 9
+POLYGON_ANGLE = pi / 9
 # of the seat's width: the ends of both flanks lie on one circle to this accuracy
-ROUND = 1e-6
+ROUNDNESS_TOLERANCE = 1e-6
 
 
 def bar_outline(flanks: np.ndarray, base: float) -> np.ndarray:
@@ -30,7 +30,7 @@ def bar_outline(flanks: np.ndarray, base: float) -> np.ndarray:
     centre = _centre_between(inner, outer)
     radius = float(np.linalg.norm(outer - centre))
     other = np.linalg.norm(flanks[1] - centre, axis=1)
-    if np.abs(other - radius).max() > ROUND * np.linalg.norm(outer - inner):
+    if np.abs(other - radius).max() > ROUNDNESS_TOLERANCE * np.linalg.norm(outer - inner):
         raise InputError(
             "damper.shape = 'round bar': no circle fits between these seats, expected one angle "
             "and width on both sides"
@@ -57,7 +57,7 @@ def _arc_points(
     last = np.arctan2(*(end - centre)[::-1])
     # across = 0 is passed once: the outline turns from negative to positive across at the top
     turn = (last - first) % (2 * pi)
-    angles = first + np.linspace(0, turn, max(2, ceil(turn / STEP) + 1))[1:-1]
+    angles = first + np.linspace(0, turn, max(2, ceil(turn / POLYGON_ANGLE) + 1))[1:-1]
     return centre + radius * np.column_stack([np.cos(angles), np.sin(angles)])
 
 

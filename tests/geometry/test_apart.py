@@ -77,7 +77,7 @@ def test_a_mistake_in_the_child_is_not_hidden():
 def test_the_child_sees_nothing_of_the_ranks(monkeypatch):
     for name in ("OMPI_COMM_WORLD_RANK", "PMIX_RANK", "PMI_SIZE"):
         monkeypatch.setenv(name, "1")
-    assert not [name for name in apart._child_environment() if name.startswith(apart.MPI)]
+    assert not [name for name in apart._child_environment() if name.startswith(apart.MPI_VARIABLES)]
 
 
 def test_flat_cells_are_refused_with_their_place():

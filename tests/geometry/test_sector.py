@@ -13,7 +13,7 @@ from scipy.integrate import simpson
 from bladefem.errors import InputError
 from geometry.parameters import Aerofoil, Disc, MeshSize, Platform, Shank, Wedge
 from geometry.profile import profile, turn
-from geometry.section import POINTS, outline
+from geometry.section import POINTS_PER_SIDE, outline
 from geometry.section import shape as section
 from geometry.sector import wedge_sector
 from geometry.topology import EDGES, normals
@@ -140,7 +140,9 @@ def test_the_leading_edge_is_a_line_of_nodes_on_a_smooth_nose(coarse_sector):
         coarse_sector.faces["suction_side"], coarse_sector.faces["pressure_side"]
     )
     edge = coarse_sector.points[shared[np.argsort(coarse_sector.points[shared, 0])]]
-    noses = np.array([outline(blade, top, (x - top) / blade.span)[POINTS - 1] for x in edge[:, 0]])
+    noses = np.array(
+        [outline(blade, top, (x - top) / blade.span)[POINTS_PER_SIDE - 1] for x in edge[:, 0]]
+    )
     np.testing.assert_allclose(edge, noses, atol=2e-5)  # the loft is a spline through 5 sections
     assert edge[0, 0] == pytest.approx(top) and edge[-1, 0] == pytest.approx(top + blade.span)
     assert (

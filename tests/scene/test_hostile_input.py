@@ -13,7 +13,7 @@ from bladefem.errors import InputError
 from bladefem.scene.kinds import kind_named
 from bladefem.scene.toml import load_scene, read_tables, scene_of
 from bladefem.scene.units import parse
-from bladefem.study.modes.campbell import MOST_SPEEDS, read_speeds
+from bladefem.study.modes.campbell import MAX_SPEEDS, read_speeds
 from bladefem.view.style import canvas
 
 WEDGE = Path(__file__).with_name("wedge.toml")
@@ -139,7 +139,7 @@ def test_check_refuses_what_a_run_would(scene, overrides, said, capsys):
 
 def test_campbell_range_has_a_limit():
     said = refused(read_speeds, "0, 0.001, ..., 12000 rpm")
-    assert f"1.2e+07 speeds, expected at most {MOST_SPEEDS}" in said
+    assert f"1.2e+07 speeds, expected at most {MAX_SPEEDS}" in said
     assert len(read_speeds("0, 10, ..., 12000 rpm")) == 1201
 
 

@@ -19,7 +19,7 @@ from bladefem.study.adaptive.family import family_of
 from bladefem.study.adaptive.settings import Settings
 from bladefem.study.pipeline.assemble_model import LoadCase
 from bladefem.study.pipeline.best_load import (
-    FACTORS,
+    CHART_LOAD_FACTORS,
     chart_loads,
     find_best_load,
     load_variation,
@@ -113,7 +113,7 @@ def test_the_slope_of_a_peak_with_the_load_is_the_difference_of_two_peaks():
 
 def test_a_chart_reaches_from_an_eighth_of_the_best_to_thirty_times_it(best):
     loads = chart_loads([best])
-    assert len(loads) == len(FACTORS)
+    assert len(loads) == len(CHART_LOAD_FACTORS)
     assert loads[0] == pytest.approx(best.load / 8, rel=0.05)
     assert loads[-1] == pytest.approx(30 * best.load, rel=0.05)
     assert float(f"{best.load:.4g}") in loads

@@ -19,8 +19,8 @@ from bladefem.scene.tables import Material
 from bladefem.scene.toml import load_scene
 from bladefem.study.modes.effective_mass import effective_masses
 from bladefem.study.modes.mesh_convergence import (
-    BELIEVED,
-    RATIOS,
+    PLAUSIBLE_ORDERS,
+    SIZE_RATIOS,
     _convergence_summary,
     converge,
     default_sizes,
@@ -106,7 +106,9 @@ def test_plane_blade_converges():
     left = found.summary["frequency"].to_numpy() / finer - 1
     assert (left < 5 * found.summary["error"] + 1e-5).all()
     assert (found.points["mac"] > 0.99).all()
-    assert ((found.summary["reason"] == "") == found.summary["order"].between(*BELIEVED)).all()
+    assert (
+        (found.summary["reason"] == "") == found.summary["order"].between(*PLAUSIBLE_ORDERS)
+    ).all()
 
 
 def test_modes_that_cross_keep_their_names():
@@ -144,8 +146,8 @@ def test_wrong_sizes():
     with pytest.raises(InputError, match="its mesh is given"):
         converge(replace(scene, kind="imported"), [3, 2, 1])
     fine = replace(scene, mesh=replace(scene.mesh, size=1e-3))
-    assert default_sizes(fine) == pytest.approx([1e-3 * r for r in RATIOS])
-    assert default_sizes(replace(scene, mesh=replace(scene.mesh, size=None))) == list(RATIOS)
+    assert default_sizes(fine) == pytest.approx([1e-3 * r for r in SIZE_RATIOS])
+    assert default_sizes(replace(scene, mesh=replace(scene.mesh, size=None))) == list(SIZE_RATIOS)
 
 
 def test_effective_masses_add_up():

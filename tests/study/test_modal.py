@@ -15,7 +15,7 @@ from bladefem.study.modes.comparison import (
     participation,
     pure_shapes,
 )
-from bladefem.study.modes.mesh_transfer import MIDDLES, nodal_volumes, simplices, transfer
+from bladefem.study.modes.mesh_transfer import MID_SIDE_EDGES, nodal_volumes, simplices, transfer
 from bladefem.study.modes.survey import clamped_blade
 from bladefem.study.pipeline.stages import Bodies, build_mesh, find_modes
 from geometry.mesh import Mesh
@@ -58,7 +58,7 @@ def prism(shape, span=0.12, twist=0.0, chord=0.04, thickness=0.004):
 def second_order(mesh):
     """The same block in P2 tetrahedra, straight sides."""
     cells = simplices(mesh, mesh.bodies["blade"]).reshape(-1, 4)
-    pairs = np.sort(cells[:, list(MIDDLES["tetra10"])].reshape(-1, 2), axis=1)
+    pairs = np.sort(cells[:, list(MID_SIDE_EDGES["tetra10"])].reshape(-1, 2), axis=1)
     unique, inverse = np.unique(pairs, axis=0, return_inverse=True)
     points = np.concatenate([mesh.points, mesh.points[unique].mean(axis=1)])
     return Mesh(

@@ -57,7 +57,7 @@ def test_where_verdicts_are_dear_the_highest_point_and_some_others_are_judged(mo
     top = int(np.argmax(heights))
     assert alone.verdict[top] == everything.verdict[top]
     judged = alone.verdict != UNKNOWN
-    assert 1 <= judged.sum() <= 1 + stability.FURTHER
+    assert 1 <= judged.sum() <= 1 + stability.POINTS_JUDGED_IN_ADDITION
     said = stability_sentence([(alone.verdict, alone.multiplier)])
     assert f"{(~judged).sum()} not judged (of curves whose verdicts" in said
 

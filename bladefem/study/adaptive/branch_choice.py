@@ -21,24 +21,24 @@ from .indicators import ESTIMATE_OPTIONS, moved_solution, richest_settings
 from .settings import Settings
 
 # shares of the peak's height at which a point of the same piece is looked for
-ANCHOR = 0.6
-STARTS = (0.9, 0.75, 0.5)
+ANCHOR_HEIGHT_SHARE = 0.6
+START_HEIGHT_SHARES = (0.9, 0.75, 0.5)
 # arc-length steps of the path to the richer model's peak, as shares of the band
-STEPS = (0.003, 0.015)
+ARC_STEPS = (0.003, 0.015)
 # points of that path
-LONGEST = 150
+MAX_PATH_POINTS = 150
 # unknowns up to which the richer model's peak is followed; of larger ones points right below the
 # peak are compared
-FOLLOWED = 1200
-BELOW = (0.99, 0.95, 0.9, 0.75)
+MAX_FOLLOWED_UNKNOWNS = 1200
+FREQUENCY_SHARES_BELOW = (0.99, 0.95, 0.9, 0.75)
 # fall of the height by which its peak has been passed
-PASSED = 2e-3
+PASSED_HEIGHT_DROP = 2e-3
 
 
 def anchor_of(
     points: Sequence[Solution],
     top: Solution,
-    share: float = ANCHOR,
+    share: float = ANCHOR_HEIGHT_SHARE,
 ) -> Solution:
     """The point on the piece of the peak that has about a share of its height."""
     piece = [p for p in points if p.converged and p.branch == top.branch]
@@ -63,11 +63,11 @@ def peak_error(
     if rich == settings:
         return 0.0
     model = family_member(family, rich).model
-    if model.springs.size * (2 * rich.harmonics + 1) > FOLLOWED:
+    if model.springs.size * (2 * rich.harmonics + 1) > MAX_FOLLOWED_UNKNOWNS:
         return _error_below(family, settings, points, top, rich)
     omegas = [p.omega for p in points]
     bounds = 0.9 * min(omegas), 1.1 * max(omegas)
-    for share in STARTS:
+    for share in START_HEIGHT_SHARES:
         anchor = anchor_of(points, top, share)
         if anchor is top:
             continue
@@ -80,12 +80,12 @@ def peak_error(
         forward = top.omega > anchor.omega
         try:
             for point in follow(
-                model, "omega", start, bounds, forward=forward, steps=STEPS, options=options
+                model, "omega", start, bounds, forward=forward, steps=ARC_STEPS, options=options
             ):
                 count += 1
                 now = size(point.solution)
                 height = max(height, now)
-                if now < (1 - PASSED) * height or count > LONGEST:
+                if now < (1 - PASSED_HEIGHT_DROP) * height or count > MAX_PATH_POINTS:
                     break
         except NotSolvedError:
             continue
@@ -102,7 +102,7 @@ def _error_below(
     rich: Settings,
 ) -> float:
     """Relative error of the height of a point right below the peak."""
-    for share in BELOW:
+    for share in FREQUENCY_SHARES_BELOW:
         point = anchor_of(points, top, share)
         better = moved_solution(family, settings, point, rich, ESTIMATE_OPTIONS)
         if better.converged:

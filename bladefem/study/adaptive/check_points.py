@@ -19,13 +19,13 @@ from .indicators import richer_settings
 from .settings import Settings
 
 # of the peak's height: where a curve is checked on each side in addition to the peak itself
-SHARES = (0.7, 0.25)
+CHECKED_HEIGHT_SHARES = (0.7, 0.25)
 # points that are checked because left-out harmonics move much there,
 MAX_CHECKED_PEAKS = 3
 # from this share of the accuracy on
 MIN_SHARE_OF_ACCURACY = 0.1
 # highest points among which one that is not unstable is looked for
-JUDGED = 100
+MAX_JUDGED_POINTS = 100
 
 
 def points_to_check(
@@ -36,11 +36,11 @@ def points_to_check(
 ) -> list[Solution]:
     """The points that a curve is checked at.
 
-    The peak, one on each flank for each of SHARES of its height, the highest of the others at which
-    contacts begin to slip or to lift, since a short slip needs more samples than a long one, the
-    highest at which more of them do, where the curve has a kink, and the MAX_CHECKED_PEAKS highest
-    maxima of the motion by harmonics that were left out: internal resonances of higher harmonics
-    keep to no height.
+    The peak, one on each flank for each of CHECKED_HEIGHT_SHARES of its height, the highest of the
+    others at which contacts begin to slip or to lift, since a short slip needs more samples than a
+    long one, the highest at which more of them do, where the curve has a kink, and the
+    MAX_CHECKED_PEAKS highest maxima of the motion by harmonics that were left out: internal
+    resonances of higher harmonics keep to no height.
 
     Args:
         heights: (points,) what `heights_of` gives.
@@ -53,7 +53,7 @@ def points_to_check(
     heights = heights[places]
     top = int(heights.argmax())
     chosen = [top]
-    for share in SHARES:
+    for share in CHECKED_HEIGHT_SHARES:
         for side in (range(top), range(top + 1, len(good))):
             if len(side):
                 chosen.append(min(side, key=lambda i: abs(heights[i] - share * heights[top])))
@@ -121,7 +121,7 @@ def lasting_peak(model: ReducedModel, points: Sequence[Solution]) -> Solution:
         return good[0]
     judged = (
         p
-        for p in good[:JUDGED]
+        for p in good[:MAX_JUDGED_POINTS]
         if stability_verdict(model, p, AFFORDABLE_OPERATIONS).verdict != UNSTABLE
     )
     return next(judged, good[0])

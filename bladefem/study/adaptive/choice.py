@@ -23,19 +23,19 @@ from .family import Family, family_member, with_excited_harmonics
 from .indicators import Indicators, indicate_errors, moved_solution, total_error
 from .settings import Settings, enriched_settings
 
-ROUNDS = 12
+MAX_ROUNDS = 12
 # whose indicators, where they are small, outlast a change of the others
-KEPT = ("modes", "damper")
+KEPT_DIRECTIONS = ("modes", "damper")
 # accuracy from which, where contacts slip
-LIKELY = (
+LIKELY_SETTINGS = (
     (0.003, {"harmonics": 7, "samples": 256, "points": 16}),
     (0.03, {"harmonics": 3, "samples": 64, "points": 16}),
 )
 # sweeps of one curve with ever richer settings
-PASSES = 3
-WIDENINGS = 4
+MAX_SWEEPS = 3
+MAX_BAND_WIDENINGS = 4
 # factor by which the accuracy at a lower point is tightened at most, for a peak that is too wrong
-TIGHTER = 0.05
+MIN_ACCURACY_FACTOR = 0.05
 
 
 @dataclass(frozen=True)
@@ -81,7 +81,7 @@ def choose_settings(
         further = moved_solution(family, settings, point, usual) if usual != settings else point
         settings, point = (usual, further) if further.converged else (settings, point)
     found: Indicators
-    for _ in range(ROUNDS):
+    for _ in range(MAX_ROUNDS):
         judged = None if apart else total_error(family, settings, point)
         if judged is not None and judged.total <= accuracy / 2:
             found = judged
@@ -98,7 +98,7 @@ def choose_settings(
             break
         known = {
             name: error
-            for name in KEPT
+            for name in KEPT_DIRECTIONS
             if (error := found.errors[name]) <= accuracy / 20
             and getattr(better, name) == getattr(settings, name)
         } | dict.fromkeys(found.unknown, np.inf)
@@ -116,7 +116,7 @@ def likely_settings(
     """Where a search had better begin than at its first settings: with what most points need whose
     contacts slip.
     """
-    usual = next((usual for finest, usual in LIKELY if accuracy <= finest), {})
+    usual = next((usual for finest, usual in LIKELY_SETTINGS if accuracy <= finest), {})
     most = {"harmonics": min(settings.most, family.harmonics)}
     raised = {
         name: max(getattr(settings, name), min(value, most.get(name, value)))
@@ -195,7 +195,7 @@ def adapted_settings(
         settings, _, _ = choose_settings(family, settings, peak_of(rough), accuracy, fixed)
         band = band or (rough[0].frequency, rough[-1].frequency)
     points: list[Solution] = []
-    for last in [False] * (PASSES - 1) + [True]:
+    for last in [False] * (MAX_SWEEPS - 1) + [True]:
         model = family_member(family, settings).model
         inner = _solvable(points)
         if inner is None:
@@ -242,10 +242,10 @@ def _adapted_branches(
     demanded = accuracy
     top = lasting_peak(family_member(family, settings).model, points)
     error = peak_error(family, settings, points, top)
-    for _ in range(PASSES):
+    for _ in range(MAX_SWEEPS):
         if error <= accuracy / 2 or not np.isfinite(error):
             break
-        demanded *= max(accuracy / 2 / error, TIGHTER)
+        demanded *= max(accuracy / 2 / error, MIN_ACCURACY_FACTOR)
         before = replace(settings, error=None)
         settings, _, _ = choose_settings(family, settings, anchor_of(points, top), demanded, fixed)
         if replace(settings, error=None) == before:
@@ -330,7 +330,7 @@ def covered_band(
         NotSolvedError: no point converged.
     """
     (low, high), limits = band or default_band(model, mode), _halfway(model, mode)
-    for _ in range(1 if band and not widen else WIDENINGS):
+    for _ in range(1 if band and not widen else MAX_BAND_WIDENINGS):
         left_open: list[str] = []
         points = response_points(model, settings, (low, high), accuracy, paths, left_open)
         good = [p.omega for p in points if p.converged]

@@ -21,7 +21,7 @@ from ...reduction.assemble import recombine
 from ...reduction.truncate import truncated
 from .settings import Settings
 
-SHARED = (1, 7, 15, 31, 63)
+SHARED_HARMONICS = (1, 7, 15, 31, 63)
 
 
 @dataclass(frozen=True)
@@ -209,7 +209,7 @@ def shared_harmonics(harmonics: int) -> int:
     """Harmonics of the model that serves several numbers of them: what a model keeps for itself is
     made once.
     """
-    return next((most for most in SHARED if harmonics <= most), harmonics)
+    return next((most for most in SHARED_HARMONICS if harmonics <= most), harmonics)
 
 
 def _runs(sizes: Sequence[int], points: int | None) -> np.ndarray:

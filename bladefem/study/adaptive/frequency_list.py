@@ -17,13 +17,13 @@ from ...hbm.solver.fallback import match_harmonics
 from ...hbm.solver.newton import Options
 from ...hbm.sweep import response, size, solve_from
 from .check_points import heights_of, left_out_motion, points_to_check
-from .choice import KEPT, Checked, likely_settings, next_settings, solver_options
+from .choice import KEPT_DIRECTIONS, Checked, likely_settings, next_settings, solver_options
 from .family import Family, carried_displacements, family_member, with_excited_harmonics
 from .indicators import Indicators, indicate_errors, judged_orders, total_error
 from .settings import Settings, enriched_settings
 
 # of richer settings, each round one point
-PASSES = 16
+MAX_PASSES = 16
 # accuracy that the first sweep is made for where contacts may lift off
 FIRST_SWEEP_ACCURACY = 0.02
 TINY = float(np.finfo(float).tiny)
@@ -89,7 +89,7 @@ def adapt_frequency_list(
     points = curve.points
     final: set[int] = set()
     known: dict[str, float] = {}
-    for _ in range(PASSES):
+    for _ in range(MAX_PASSES):
         limit = curve.limit
         wrong = _first_wrong(curve, limit, final)
         if wrong is None:
@@ -101,7 +101,11 @@ def adapt_frequency_list(
         # there is none, or it was not solved
         if curve.used[wrong] != better:
             final.add(wrong)
-        known = {name: found.errors[name] for name in KEPT if found.errors[name] <= accuracy / 20}
+        known = {
+            name: found.errors[name]
+            for name in KEPT_DIRECTIONS
+            if found.errors[name] <= accuracy / 20
+        }
     top, *_ = _estimated_points(curve)
     return Checked(
         replace(curve.used[top], error=curve.errors[points[top].omega]), points, curve.errors

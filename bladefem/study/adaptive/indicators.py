@@ -30,7 +30,7 @@ from ...hbm.solution import Solution
 from ...hbm.solve import solve
 from ...hbm.solver.newton import DEFAULT_OPTIONS, Options
 from .family import Family, carried_displacements, family_member, lowest_harmonics
-from .settings import DAMPERS, DIRECTIONS, Settings
+from .settings import DAMPER_MODELS, DIRECTIONS, Settings
 
 # for a point that only estimates the error of another one
 ESTIMATE_OPTIONS = Options(1e-5, 30, fallbacks=False, frugal=True)
@@ -181,7 +181,9 @@ def richer_settings(
             if settings.points is None or here.max() + 1 == len(here)
             else replace(settings, points=None)
         )
-    later = [d for d in DAMPERS[DAMPERS.index(settings.damper) + 1 :] if d in family.dampers]
+    later = [
+        d for d in DAMPER_MODELS[DAMPER_MODELS.index(settings.damper) + 1 :] if d in family.dampers
+    ]
     return replace(settings, damper=later[-1]) if later else None
 
 

@@ -25,9 +25,9 @@ from .indicators import richer_settings
 from .settings import DIRECTIONS, Settings, enriched_settings
 
 # enrichments of one peak before giving up
-ROUNDS = 8
+MAX_ENRICHMENTS = 8
 # of the accuracy: to which a peak that only estimates an error is found
-SHARE = 0.05
+PEAK_ACCURACY_SHARE = 0.05
 # Newton steps of a point of such a peak
 JUDGE_STEPS = 15
 # of the accuracy: errors that are small enough together, and one that need not be lowered
@@ -37,12 +37,12 @@ NEGLIGIBLE_SHARE = 0.05
 FAR_BEYOND = 4.0
 # unknowns of the largest balance that is chosen where contacts lift off: finer ones cost minutes a
 # curve there
-LIFTING = 1500
+MAX_LIFTING_UNKNOWNS = 1500
 # the same of a model that only estimates an error there
 LIFTING_JUDGE = 1500
 # harmonics and contact points of a seat of the models that tell an error in another respect where
 # those of the judged one are too large
-FEWER = {"harmonics": (7, 3, 1), "points": (32, 16, 8, 4)}
+REDUCED_SETTINGS = {"harmonics": (7, 3, 1), "points": (32, 16, 8, 4)}
 # contact points of the model that judges, over those of the judged one
 MORE_POINTS = 4
 # weight of a relative shift of the frequency against a relative change of the height: an accuracy
@@ -110,7 +110,7 @@ def peak_from(
         new.harmonics,
         new.samples,
         near=start,
-        tolerance=SHARE * accuracy,
+        tolerance=PEAK_ACCURACY_SHARE * accuracy,
         options=options,
     )
 
@@ -244,7 +244,7 @@ def choose_at_peak(
     """
     known: dict[str, tuple[float, float]] = {}
     before: tuple[Settings, Peak, PeakErrors] | None = None
-    for _ in range(ROUNDS):
+    for _ in range(MAX_ENRICHMENTS):
         if rattles(settings, peak.solution):
             richer = enriched_settings(settings, "harmonics")
             if richer is not None:
@@ -313,7 +313,9 @@ def _next_settings(
             continue
         need = np.inf if name == first else needs[name] / (SUFFICIENT_SHARE * accuracy)
         better = enriched_settings(settings, name, need)
-        if better is not None and not _too_large(family, better, peak.solution, LIFTING):
+        if better is not None and not _too_large(
+            family, better, peak.solution, MAX_LIFTING_UNKNOWNS
+        ):
             return better
     return None
 
@@ -326,8 +328,8 @@ def compared_settings(
     point: Solution,
 ) -> tuple[Settings, Settings] | None:
     """The two models whose difference tells an error: the judged and the richer one, or both with
-    FEWER harmonics, for the error by harmonics with fewer points, where contacts lift off and the
-    richer one is too large; None where that does not help.
+    REDUCED_SETTINGS harmonics, for the error by harmonics with fewer points, where contacts lift
+    off and the richer one is too large; None where that does not help.
 
     The respects are taken as independent of each other then: on the shipped wedge with 4000 N/mm^3
     and 320 N, 16 in place of 63 points a seat change the height by 5.2 % with 3 harmonics and by
@@ -337,7 +339,7 @@ def compared_settings(
         return settings, other
     respect = "points" if name == "harmonics" else "harmonics"
     here = getattr(settings, respect)
-    for fewer in FEWER[respect]:
+    for fewer in REDUCED_SETTINGS[respect]:
         if here is not None and fewer >= here:
             continue
         reduced: dict[str, Any] = {respect: fewer}

@@ -12,9 +12,9 @@ from ...hbm.peak import Peak
 from ...hbm.solution import Solution
 from ...hbm.sweep import MAX_PATH_UNKNOWNS, size
 from .check_points import (
+    CHECKED_HEIGHT_SHARES,
     MAX_CHECKED_PEAKS,
     MIN_SHARE_OF_ACCURACY,
-    SHARES,
     heights_of,
     left_out_motion,
     peak_of,
@@ -34,7 +34,7 @@ from .resonance_choice import (
 from .settings import Settings, enriched_settings
 
 # sweeps of one curve with ever richer settings
-PASSES = 3
+MAX_SWEEPS = 3
 
 
 def resonance_curve(
@@ -65,7 +65,7 @@ def resonance_curve(
         points = covered_band(family_member(family, settings).model, settings, band, mode, 1.0)
     used = settings
     notes: list[str] = []
-    for _ in range(PASSES):
+    for _ in range(MAX_SWEEPS):
         used, peak, errors = _chosen(family, used, peak_of(points), accuracy)
         span = band or (points[0].frequency, points[-1].frequency)
         paths = not unfollowed(family, used)
@@ -132,7 +132,7 @@ def _checked_flanks(
     errors: PeakErrors | None,
 ) -> dict[float, float]:
     """Circular frequency -> estimated relative error: of the peak, and of one point on each flank
-    for each of SHARES of its height.
+    for each of CHECKED_HEIGHT_SHARES of its height.
 
     A flank is judged in the respect that is worst at the peak, as far from the peak of the richer
     present model from its own.
@@ -179,12 +179,14 @@ def _flanks(
     heights: np.ndarray,
     top: Solution,
 ) -> list[Solution]:
-    """Of each side of the peak, the points whose heights are nearest to SHARES of it."""
+    """Of each side of the peak, the points whose heights are nearest to CHECKED_HEIGHT_SHARES of
+    it.
+    """
     omegas = np.array([p.omega for p in points])
     chosen = []
     for side in (omegas < top.omega, omegas > top.omega):
         good = np.flatnonzero(side & (heights > 0))
-        for share in SHARES if len(good) else ():
+        for share in CHECKED_HEIGHT_SHARES if len(good) else ():
             chosen.append(good[np.argmin(abs(heights[good] - share * size(top)))])
     return [points[i] for i in dict.fromkeys(chosen)]
 

@@ -9,13 +9,19 @@ from typing import Any
 from ...scene.tables import Scene
 
 # from poor to rich
-DAMPERS = ("mass", "rigid", "elastic")
+DAMPER_MODELS = ("mass", "rigid", "elastic")
 # in which a model is enriched
 DIRECTIONS = ("harmonics", "samples", "modes", "points", "damper")
-RICHEST = {"modes": 160, "harmonics": 31, "samples": 4096, "points": 4096}
+RICHEST_SETTINGS = {"modes": 160, "harmonics": 31, "samples": 4096, "points": 4096}
 # how many times smaller an error has to be for two steps of the first harmonics at once
 DOUBLE_STEP_RATIO = 40.0
-FIRST: dict[str, Any] = {"modes": 10, "harmonics": 1, "samples": 64, "points": 4, "damper": "rigid"}
+FIRST_SETTINGS: dict[str, Any] = {
+    "modes": 10,
+    "harmonics": 1,
+    "samples": 64,
+    "points": 4,
+    "damper": "rigid",
+}
 
 
 @dataclass(frozen=True)
@@ -27,7 +33,7 @@ class Settings:
     harmonics: int
     # a period
     samples: int
-    # one of DAMPERS
+    # one of DAMPER_MODELS
     damper: str
     # friction elements on each patch; None: all that there are
     points: int | None = None
@@ -91,16 +97,18 @@ def first_for(modes: int, dampers: bool = False) -> Settings:
         dampers: whether there are several damper models.
     """
     names = tuple(name for name in DIRECTIONS if dampers or name != "damper")
-    return Settings(**(FIRST | {"modes": min(FIRST["modes"], modes)}), chosen=names)
+    return Settings(
+        **(FIRST_SETTINGS | {"modes": min(FIRST_SETTINGS["modes"], modes)}), chosen=names
+    )
 
 
 def first_settings(scene: Scene) -> Settings:
     """Where the choice starts: the smallest model that the indicators can judge."""
-    given = {name: getattr(scene.model, name) for name in FIRST if name != "points"}
-    guess = FIRST | {"modes": max(FIRST["modes"], scene.excitation.mode + 6)}
+    given = {name: getattr(scene.model, name) for name in FIRST_SETTINGS if name != "points"}
+    guess = FIRST_SETTINGS | {"modes": max(FIRST_SETTINGS["modes"], scene.excitation.mode + 6)}
     settings = Settings(
         **{name: guess[name] if value is None else value for name, value in given.items()},
-        points=FIRST["points"] if scene.contact.points is None else None,
+        points=FIRST_SETTINGS["points"] if scene.contact.points is None else None,
         chosen=tuple(
             name
             for name, value in (given | {"points": scene.contact.points}).items()
@@ -124,8 +132,10 @@ def enriched_settings(
     """
     value = getattr(settings, name)
     if name == "damper":
-        place = DAMPERS.index(value) + 1
-        return replace(settings, damper=DAMPERS[place]) if place < len(DAMPERS) else None
+        place = DAMPER_MODELS.index(value) + 1
+        return (
+            replace(settings, damper=DAMPER_MODELS[place]) if place < len(DAMPER_MODELS) else None
+        )
     if value is None:
         return None
     if name == "harmonics":
@@ -136,7 +146,7 @@ def enriched_settings(
         more = value * 2 ** min(
             max(ceil(log2(sqrt(max(need, 1.0)))), 1), 2 if name == "points" else 3
         )
-    more = min(more, RICHEST[name], settings.most if name == "harmonics" else more)
+    more = min(more, RICHEST_SETTINGS[name], settings.most if name == "harmonics" else more)
     return _enough_samples(replace(settings, **{name: more})) if more > value else None
 
 
@@ -145,7 +155,9 @@ def restarted(settings: Settings) -> Settings:
     next load case.
     """
     names = [name for name in ("harmonics", "samples", "points") if name in settings.chosen]
-    return _enough_samples(replace(settings, **{name: FIRST[name] for name in names}, error=None))
+    return _enough_samples(
+        replace(settings, **{name: FIRST_SETTINGS[name] for name in names}, error=None)
+    )
 
 
 def _enough_samples(settings: Settings) -> Settings:

@@ -21,19 +21,19 @@ from ...hbm.model import ReducedModel
 from ...hbm.sweep import size
 from ..adaptive.choice import adapted_settings, covered_band
 from ..adaptive.family import Family, family_member
-from ..adaptive.settings import DAMPERS, Settings
+from ..adaptive.settings import DAMPER_MODELS, Settings
 from .cpu_clock import Clock, running
 from .methods import applicable, balance, methods, tangential
 from .rows import Bench, Job, errors, resonance, rows, timed
 
 # frequencies, in half widths of the resonance
-WIDTHS = (-6, -3, -1.5, -0.75, -0.3, 0, 0.3, 0.75, 1.5, 3, 6)
+FREQUENCIES_IN_HALF_WIDTHS = (-6, -3, -1.5, -0.75, -0.3, 0, 0.3, 0.75, 1.5, 3, 6)
 # harmonics and samples of the reference
-LADDER = ((3, 128), (7, 512), (15, 1024), (31, 4096))
+REFERENCE_SETTINGS = ((3, 128), (7, 512), (15, 1024), (31, 4096))
 # on each seat where all methods are compared: the flow's time grows with the square of them
-POINTS = 4
+POINTS_PER_SEAT = 4
 # seconds of compilation worth a remark
-COMPILED = 0.5
+REPORTED_COMPILE_SECONDS = 0.5
 
 
 @dataclass(frozen=True)
@@ -91,7 +91,7 @@ def chart(
         jobs = [*models, *_methods(course, mode, models[0].bench)]
         table = pd.DataFrame(rows(jobs, course.end, clock))
     remarks += [f"{row['name']}: {row['reason']}" for _, row in table.iterrows() if row["reason"]]
-    if clock.compiled > COMPILED:
+    if clock.compiled > REPORTED_COMPILE_SECONDS:
         remarks.append(
             f"{clock.compiled:.2g} s were spent on compilation, once; they are not part of any "
             "time above"
@@ -140,7 +140,7 @@ def frequencies(curve: Iterable[tuple[float, float]]) -> np.ndarray:
     top = int(height.argmax())
     high = omega[height > height[top] / np.sqrt(2)]
     half = max((high[-1] - high[0]) / 2, 1e-4 * omega[top])
-    return np.array([w for w in omega[top] + half * np.array(WIDTHS) if w > 0])
+    return np.array([w for w in omega[top] + half * np.array(FREQUENCIES_IN_HALF_WIDTHS) if w > 0])
 
 
 def _bench(
@@ -159,9 +159,10 @@ def _bench(
     best = None
     before = None
     least = 2 + next(
-        (k for k, (H, _) in enumerate(LADDER) if H >= course.chosen.harmonics), len(LADDER)
+        (k for k, (H, _) in enumerate(REFERENCE_SETTINGS) if H >= course.chosen.harmonics),
+        len(REFERENCE_SETTINGS),
     )
-    for rung, (H, samples) in enumerate(LADDER):
+    for rung, (H, samples) in enumerate(REFERENCE_SETTINGS):
         if rung >= least and used * 6 > budget - (clock.now() - start):
             break
         begun = clock.now()
@@ -181,8 +182,9 @@ def _bench(
         if before
         else {f"error{end}": np.nan for end in ("", "_frequency", "_phasor")}
     )
+    harmonics, samples = REFERENCE_SETTINGS[rung]
     course.remarks.append(
-        f"reference of the {name}: H {LADDER[rung][0]}, {LADDER[rung][1]} samples, resonance "
+        f"reference of the {name}: H {harmonics}, {samples} samples, resonance "
         f"{truth.frequency:.6g} Hz, {truth.amplitude:.6g} m, changed by {doubt['error']:.1e} on "
         "its last rung"
     )
@@ -218,8 +220,8 @@ def _simplified(
     is none such.
     """
     family = course.family
-    most = replace(course.richest, harmonics=LADDER[-1][0])
-    few = replace(most, points=POINTS)
+    most = replace(course.richest, harmonics=REFERENCE_SETTINGS[-1][0])
+    few = replace(most, points=POINTS_PER_SEAT)
     model = family_member(
         family, replace(few, damper="mass") if "mass" in family.dampers else few
     ).model
@@ -235,8 +237,8 @@ def _simplified(
     if family.dampers:
         course.remarks.append(
             "methods are compared on the scene's tangential model: prescribed normal load, damper "
-            f"a mass, up to {POINTS} contact points on each seat; what that model itself costs in "
-            "accuracy is given with the models"
+            f"a mass, up to {POINTS_PER_SEAT} contact points on each seat; what that model itself "
+            "costs in accuracy is given with the models"
         )
         omegas = _own_frequencies(model, omegas, mode)
     return model, _bench(course, lambda H: model, omegas, "methods"), ""
@@ -287,7 +289,7 @@ def _variants(family: Family, rich: Settings) -> Iterator[tuple[str, str, Settin
     for points in (1, 2, 4, 8, 16, 32, 64):
         if points < nodes:
             yield _counted(points, "point"), "contact points", replace(rich, points=points)
-    for damper in DAMPERS:
+    for damper in DAMPER_MODELS:
         if damper in family.dampers and damper != rich.damper:
             yield f"{damper} damper", "damper model", replace(rich, damper=damper)
 

@@ -15,7 +15,7 @@ import pandas as pd
 
 from geometry.mesh import Mesh
 from geometry.parameters import MeshSize
-from geometry.sizing import ACROSS, ALONG
+from geometry.sizing import MIN_ELEMENTS_ACROSS_SEAT, MIN_ELEMENTS_ALONG_SEAT
 
 from ...contact.frictional_seating import normal_part
 from ...contact.seating import solve as seat
@@ -45,11 +45,11 @@ from ..pipeline.stages import (
 from .cpu_clock import running
 
 # of the scene's own element sizes, when none are given
-RATIOS = (1.7, 1.3, 1.0)
+SIZE_RATIOS = (1.7, 1.3, 1.0)
 # at the most: what more of them change does not hang on the mesh
-HARMONICS = 3
+MAX_HARMONICS = 3
 # accuracy at which the sweep looks for the peak: it is found to a tenth of it
-PEAK = 0.01
+SEARCH_ACCURACY = 0.01
 
 
 @dataclass(frozen=True)
@@ -110,7 +110,7 @@ def mesh_variants(
             for size in sorted(sizes, reverse=True)
         ]
     else:
-        listed = [(_size_name(own.size, ratio), ratio, own) for ratio in RATIOS]
+        listed = [(_size_name(own.size, ratio), ratio, own) for ratio in SIZE_RATIOS]
     made = [
         MeshVariant(
             name,
@@ -125,9 +125,9 @@ def mesh_variants(
     if not sizes:
         across = own.seat_elements
         if across is None and own.contact_size is None and kind_named(scene.kind).has_seat_grid:
-            across = ACROSS
+            across = MIN_ELEMENTS_ACROSS_SEAT
         if across:
-            along = own.contact_size or scene.damper.length / ALONG
+            along = own.contact_size or scene.damper.length / MIN_ELEMENTS_ALONG_SEAT
             halved = replace(own, order=2, seat_elements=2 * across, contact_size=along / 2)
         else:
             halved = replace(own, order=2, contact_size=_seat_size(drawn) / (2 * own.scale))
@@ -181,7 +181,7 @@ def _resonance(
     diameters = harmonic_diameters(scene, mesh, EXACT_HARMONICS)
     reduced = reduce_sector(bodies, patches, diameters, settings.modes)
     model = family_member(family_of_case(scene, mesh, reduced, patches, case), settings).model
-    points = covered_band(model, settings, scene.study.band, scene.excitation.mode, PEAK)
+    points = covered_band(model, settings, scene.study.band, scene.excitation.mode, SEARCH_ACCURACY)
     top = peak_of(points)
     return Resonance(top.frequency, height(top), mesh.dimension * len(mesh.points), np.nan)
 
@@ -201,12 +201,12 @@ def mesh_table(
     one before.
 
     Args:
-        settings: of the balance; HARMONICS at the most are used, and all contact points.
+        settings: of the balance; MAX_HARMONICS at the most are used, and all contact points.
         budget: CPU seconds; meshes that are expected to take more than what is left are named and
             left out.
         remarks: what a reader has to know is added here.
     """
-    few = replace(settings, harmonics=min(settings.harmonics, HARMONICS), points=None)
+    few = replace(settings, harmonics=min(settings.harmonics, MAX_HARMONICS), points=None)
     rows = list(_rows(scene, few, load, variants, budget, comm))
     rich = [row for row in rows if row["found"] is not None and row["order"] == 2]
     if not rich:

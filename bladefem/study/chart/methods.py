@@ -28,11 +28,11 @@ from ...time.system import System, blade_ring
 
 HARMONICS = (1, 3, 5, 7, 9, 15, 31)
 # most that are integrated at one frequency
-PERIODS = 500
+MAX_PERIODS = 500
 # relative difference of the damper's motion at its contacts that is none
 RIGID_MOTION = 1e-6
 # frequency of the modes that represent the residual flexibility, over the excitation's
-STIFF = 30.0
+RESIDUAL_MODE_FREQUENCY_RATIO = 30.0
 
 
 @dataclass(frozen=True)
@@ -152,7 +152,7 @@ def paper(H: int, averaged: bool) -> Callable[[ReducedModel, float, object], Poi
 def integrated(steps: int, explicit: bool) -> Callable[[ReducedModel, float, object], Point]:
     """Time steps until the motion repeats; the next frequency starts from the last one's end.
 
-    A stuck damper without damping may ring for ever: after PERIODS the last one counts, and the
+    A stuck damper without damping may ring for ever: after MAX_PERIODS the last one counts, and the
     reason says so.
     """
 
@@ -168,7 +168,7 @@ def integrated(steps: int, explicit: bool) -> Callable[[ReducedModel, float, obj
                 omega,
                 steps,
                 _fitting(start, system) or stuck_start(system, omega),
-                PERIODS,
+                MAX_PERIODS,
                 1e-5,
                 explicit,
             )
@@ -202,12 +202,12 @@ def _fitting(start: Any, system: System) -> Any:
 
 def in_time(model: ReducedModel, omega: float) -> System:
     """The coupled system; faster modes and residual flexibility become stiff modes, quasi-static to
-    (1 / STIFF)^2.
+    (1 / RESIDUAL_MODE_FREQUENCY_RATIO)^2.
     """
     damping = model.damping
     damper = require_rigid_damper(model)
     return blade_ring(
-        _with_stiff_modes(model.side(1), STIFF * omega),
+        _with_stiff_modes(model.side(1), RESIDUAL_MODE_FREQUENCY_RATIO * omega),
         float(np.mean(damping.ratio)),
         model.elements,
         float(damper.mass[0, 0] / damper.B[0, 0] ** 2),

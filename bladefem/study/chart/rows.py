@@ -21,13 +21,13 @@ from .methods import Point
 # times that a variant may cost more than the cheaper one of its kind before it
 MAX_COST_STEP = 3.0
 # of the time that is left, for a variant of unknown cost
-SHARE = 0.1
+UNKNOWN_COST_SHARE = 0.1
 # times that the first frequencies, from rest or at the resonance, may cost more than the mean
 FIRST_CALL_FACTOR = 2.0
 MIN_FREQUENCIES = 3
 # shorter runs [s] are repeated so often at the most; the fastest counts
-BRIEF = 0.02
-REPEATS = 5
+BRIEF_SECONDS = 0.02
+MAX_REPEATS = 5
 
 # model, circular frequency, where the last one ended
 Solve = Callable[[ReducedModel, float, object], Point]
@@ -126,7 +126,7 @@ def timed(
     if spent * len(omegas) > allowed[0]:
         return Timing([], spent)
     best = np.inf
-    for _ in range(REPEATS):
+    for _ in range(MAX_REPEATS):
         points = []
         last = None
         begun = clock.now()
@@ -137,7 +137,7 @@ def timed(
             if spent / k * len(omegas) > allowed[k > MIN_FREQUENCIES] and k < len(omegas):
                 return Timing(points, spent / k)
         best = min(best, spent / len(omegas))
-        if spent > BRIEF:
+        if spent > BRIEF_SECONDS:
             break
     return Timing(points, best)
 
@@ -167,7 +167,11 @@ def rows(
             done[k] = _lost(waiting.pop(k), known.own.get(k, np.nan), reason)
             continue
         share = (
-            np.inf if job.needed else FIRST_CALL_FACTOR * left if k in known.own else SHARE * left
+            np.inf
+            if job.needed
+            else FIRST_CALL_FACTOR * left
+            if k in known.own
+            else UNKNOWN_COST_SHARE * left
         )
         allowed = share, min(left, FIRST_CALL_FACTOR * share) if not job.needed else np.inf
         timing = timed(job.model, job.run, job.bench.omegas, allowed, clock)

@@ -22,7 +22,7 @@ from .hertz import hertz_pressure, hertz_radius, press_pair, second_moment_radiu
 from .punch import Indented, indent, johnson_approach, johnson_pressure
 
 # of the punch's radius: further out its pressure grows without bound
-INNER = 0.8
+COMPARED_RADIUS_SHARE = 0.8
 
 
 @dataclass(frozen=True)
@@ -125,7 +125,7 @@ def _punched(
         exact,
         (a, a),
         (factor * found.approach, space),
-        _difference(seat, exact, found.radius < INNER * a),
+        _difference(seat, exact, found.radius < COMPARED_RADIUS_SHARE * a),
     )
 
 

@@ -34,7 +34,7 @@ from ..pipeline.stage_inputs import stage_key
 from ..pipeline.stages import build_mesh
 
 # largest of a frequency ratio
-DENOMINATOR = 1000
+MAX_DENOMINATOR = 1000
 
 
 @dataclass(frozen=True)
@@ -112,7 +112,7 @@ def drives(scene: Scene) -> list[Drive]:
     """One for each frequency ratio of the scene."""
     base = scene.foundation
     load = mean_load(scene)
-    ratios = [Fraction(r).limit_denominator(DENOMINATOR) for r in base.ratios]
+    ratios = [Fraction(r).limit_denominator(MAX_DENOMINATOR) for r in base.ratios]
     return [
         Drive(r, base.frequency, base.amplitude, base.phase, load, base.pulsation, base.pull)
         for r in ratios

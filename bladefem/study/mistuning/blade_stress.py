@@ -23,7 +23,7 @@ from ...wheel.model import Pattern, Wheel
 from ...wheel.solve import WheelSolution, deviation_forces
 from ..pipeline.assemble_model import LoadCase
 from ..pipeline.damped_motion import (
-    COVERED,
+    MAX_FREQUENCY_RATIO,
     DampedMotion,
     DampedStress,
     node_forces,
@@ -33,7 +33,7 @@ from ..pipeline.ports import Ports, blade_ports
 from ..pipeline.stages import MODES_SHOWN, Bodies, wheel_modes
 
 # name of the modes that bodies keep
-SHAPES = "modes of all nodal diameters"
+SHAPES_KEY = "modes of all nodal diameters"
 
 
 @dataclass(frozen=True)
@@ -54,9 +54,9 @@ def all_modes(bodies: Bodies, reduced: int = 0) -> list[ModeSet]:
     Args:
         reduced: modes that a reduction of the wheel will need, solved with them.
     """
-    if SHAPES not in bodies.kept:
-        bodies.kept[SHAPES] = wheel_modes(bodies, MODES_SHOWN, reduced=reduced)
-    return bodies.kept[SHAPES]
+    if SHAPES_KEY not in bodies.kept:
+        bodies.kept[SHAPES_KEY] = wheel_modes(bodies, MODES_SHOWN, reduced=reduced)
+    return bodies.kept[SHAPES_KEY]
 
 
 def blade_stress(
@@ -104,7 +104,7 @@ def blade_motion(
     damping = Damping(ratio=bodies.scene.operation.damping)
     for found in shapes.modes:
         n = found.nodal_diameter or 0
-        highest = COVERED * 2 * np.pi * found.frequencies[-1]
+        highest = MAX_FREQUENCY_RATIO * 2 * np.pi * found.frequencies[-1]
         # a wave of diameter -n is the conjugate of one of diameter n at the negative frequency
         waves = [
             (h, d)

@@ -15,18 +15,18 @@ from ...wheel.damper_law import Family, damper_law, family_of_modes, scaled_elem
 from ...wheel.law_response import LawWheels, ScatteredLaw, law_statistics, pattern_deviations
 from ...wheel.model import Pattern, Wheel
 from ...wheel.scatter import Scatter, drawn_deviations
-from ...wheel.solve import TUNED
+from ...wheel.solve import TUNED_PATTERN
 from ...wheel.statistics import Amplification
 from ...wheel.tuned import travelling_order
 from ..pipeline.loads import Curve
 
 # smallest and largest motion of a pair of blades in the table, over the tuned resonance: both
 # amplified by 2.8; far beyond, light dampers lift off and have no one motion
-SIZES = 0.05, 4.0
+MOTION_RANGE = 0.05, 4.0
 # scattered parameters but the load, which scales exactly
-CHANGED = ("friction", "stiffness")
+CHANGED_PARAMETERS = ("friction", "stiffness")
 # standard deviations at which the changed laws are made
-APART = 1.5
+DEVIATIONS_OF_CHANGE = 1.5
 
 
 def law_level(
@@ -69,11 +69,11 @@ def _scattered_law(
     """The law of the nominal damper, and of those with more and less of what scatters."""
     order = travelling_order(wheel) or 0
     motion = curve.peak_amplitude / abs(family.probe[order])
-    sizes = SIZES[0] * motion, SIZES[1] * motion
+    sizes = MOTION_RANGE[0] * motion, MOTION_RANGE[1] * motion
     samples = max(curve.settings.samples, 16)
     changed = {}
-    for name in CHANGED:
-        share = APART * getattr(scatter, name)
+    for name in CHANGED_PARAMETERS:
+        share = DEVIATIONS_OF_CHANGE * getattr(scatter, name)
         if share > 0:
             more, less = (
                 damper_law(
@@ -109,7 +109,7 @@ def with_checks(
     heights = np.zeros(1 + len(chosen))
     mine = range(rank, len(heights), ranks)
     for i in progress(list(mine), f"checks under {found.loads[0]:g} N", len(mine)):
-        heights[i] = whole_peak(TUNED if i == 0 else patterns[chosen[i - 1]])
+        heights[i] = whole_peak(TUNED_PATTERN if i == 0 else patterns[chosen[i - 1]])
     if comm is not None:
         heights = comm.allreduce(heights)
     return replace(

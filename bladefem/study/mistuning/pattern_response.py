@@ -18,13 +18,13 @@ from ..pipeline.damped_motion import DampedStress
 from ..pipeline.loads import Curve
 
 # points of the first look at a band
-GRID = 15
+FIRST_LOOK_POINTS = 15
 # of the linear wheel, which costs little
 LINEAR_POINTS = 300
 # resonances with sticking dampers that are looked at
-SHARPEST = 8
+MAX_RESONANCES = 8
 # relative error of a peak's height by the search over frequencies
-SEARCH = 0.01
+SEARCH_TOLERANCE = 0.01
 
 
 @dataclass(frozen=True)
@@ -81,7 +81,9 @@ def frequency_grid(
         ends.append(float(free[np.argmin(abs(free - own))]))
     low = min(ends) * (1 - spread)
     high = max(ends) * (1 + spread)
-    return np.union1d(np.linspace(low, high, GRID), _stuck_peaks(wheel, pattern, low, high))
+    return np.union1d(
+        np.linspace(low, high, FIRST_LOOK_POINTS), _stuck_peaks(wheel, pattern, low, high)
+    )
 
 
 def _stuck_peaks(
@@ -95,7 +97,7 @@ def _stuck_peaks(
     sizes = [stuck_wheel(wheel, w, max(wheel.excitation), pattern)[:, 1:, 0] for w in fine]
     height = np.linalg.norm(np.array(sizes), axis=2).max(axis=1)
     inner = np.flatnonzero((height[1:-1] >= height[:-2]) & (height[1:-1] >= height[2:])) + 1
-    return fine[inner[np.argsort(-height[inner])[:SHARPEST]]]
+    return fine[inner[np.argsort(-height[inner])[:MAX_RESONANCES]]]
 
 
 def pattern_response(
@@ -120,12 +122,12 @@ def pattern_response(
     spread = abs(deviation).max() + 0.005
     grid = frequency_grid(wheel, curve, pattern, spread)
     solved = wheel_respond(wheel, pattern, H, samples)
-    peak = find_wheel_peak(solved, grid, SEARCH)
+    peak = find_wheel_peak(solved, grid, SEARCH_TOLERANCE)
     # the same way to the tuned one, so that the factor compares like with like
     tuned = find_wheel_peak(
         wheel_respond(wheel, Pattern(), H, samples),
         curve.peak.omega * np.array([0.998, 1.0, 1.002]),
-        SEARCH,
+        SEARCH_TOLERANCE,
     )
     solution = solve_wheel(wheel, peak.omega, H, samples, pattern=pattern)
     richer = solve_wheel(wheel, peak.omega, 2 * H + 1, 2 * samples, pattern=pattern, start=solution)
@@ -182,6 +184,6 @@ def _free_factor(
         def sizes(w: float) -> np.ndarray:
             return np.linalg.norm(free_wheel(wheel, w, 1, pattern)[:, 1:, 0], axis=1)
 
-        return find_wheel_peak(sizes, fine, SEARCH).height
+        return find_wheel_peak(sizes, fine, SEARCH_TOLERANCE).height
 
     return respond(pattern) / respond(replace(pattern, stiffness=None, mass=None))

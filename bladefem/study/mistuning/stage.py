@@ -42,7 +42,7 @@ from .pattern_response import (
     pattern_sentences,
 )
 from .scatter_use import ScatteredUse, scattered_use
-from .validate import LAW, refuse_scatter, scene_deviations, scene_scatter
+from .validate import LAW_LEVEL, refuse_scatter, scene_deviations, scene_scatter
 from .whole_wheel import WheelSector, blade_readings, reduce_wheel, whole_wheel
 
 
@@ -158,7 +158,7 @@ def _kept_statistics(
             scene.mistuning.wheels,
             lambda deviation: frequency_pattern(sector.families, deviation),
         )
-        if scene.mistuning.level == LAW:
+        if scene.mistuning.level == LAW_LEVEL:
             grid = frequency_grid(wheel, curve, TUNED, spread)
             band = float(grid[0]), float(grid[-1])
             drawn = scene_scatter(scene)

@@ -13,7 +13,7 @@ from ...scene.tables import Scene
 from ...wheel.scatter import Scatter, drawn_deviations, read_pattern
 
 # mistuning.level: all wheels by the law of one damper
-LAW = "damper law"
+LAW_LEVEL = "damper law"
 
 
 def is_mistuned(scene: Scene) -> bool:
@@ -36,7 +36,7 @@ def check_mistuning(scene: Scene) -> None:
     if count == 0:
         raise InputError("mistuning: expected a wheel, imported.sectors = 0 has a single blade")
     scene_deviations(scene, count, scene.mistuning.families)
-    if read_orders(scene) and scene.mistuning.level == LAW:
+    if read_orders(scene) and scene.mistuning.level == LAW_LEVEL:
         raise InputError(
             'mistuning.level = "damper law": takes one engine order, expected no mistuning.orders '
             'or "whole wheel"'

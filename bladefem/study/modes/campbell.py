@@ -30,9 +30,9 @@ if TYPE_CHECKING:
     from ...fem.body import Body
 
 # modes beyond those asked for: Coriolis forces mix neighbours
-GUARD = 6
+GUARD_MODES = 6
 # of one diagram: more cannot be distinguished in a picture
-MOST_SPEEDS = 2000
+MAX_SPEEDS = 2000
 
 
 @dataclass(frozen=True)
@@ -114,7 +114,7 @@ def campbell_table(
     squares = np.linspace(0.0, max(speeds) ** 2, 3)
     at = [bodies.blade_at(float(np.sqrt(s))) for s in squares]
     sets = [
-        _modes_at_speed(bodies, body, diameters, count + GUARD)
+        _modes_at_speed(bodies, body, diameters, count + GUARD_MODES)
         for body in bodies.progress(at, "speeds")
     ]
     G = coriolis(bodies.still_blade, spin_axis(bodies.mesh))
@@ -151,10 +151,10 @@ def read_speeds(text: str) -> list[float]:
                 "after it"
             )
         step = out[-1] - out[-2]
-        if (end - out[-1]) / step > MOST_SPEEDS:
+        if (end - out[-1]) / step > MAX_SPEEDS:
             raise InputError(
                 f"campbell = {text}: {(end - out[-1]) / step:.3g} speeds, expected at "
-                f"most {MOST_SPEEDS}"
+                f"most {MAX_SPEEDS}"
             )
         out += list(np.arange(out[-1] + step, end - step / 2, step))
     return out
@@ -195,7 +195,7 @@ def _frequency_lines(
     left out.
     """
     count = len(sets[0].frequencies)
-    shown = slice(0, count - GUARD)
+    shown = slice(0, count - GUARD_MODES)
     K, M, g = _project_speeds(at, sets, G)
     outer = np.r_[0:count, 2 * count : 3 * count]
     frames = []

@@ -26,7 +26,7 @@ BEAM_ROOTS = (
     10.995540734875467,
     14.137168391046471,
 )
-SLICES = 16
+RADIAL_SLICES = 16
 
 
 def mac(
@@ -93,8 +93,8 @@ def section_axes(points: np.ndarray, s: np.ndarray) -> tuple[np.ndarray, np.ndar
     """Centre (n, 3) and thin direction (n, 3) of the section at each point, from slices along the
     span.
     """
-    edges = np.linspace(0.0, 1.0, SLICES + 1)
-    slices = np.clip(np.digitize(s, edges) - 1, 0, SLICES - 1)
+    edges = np.linspace(0.0, 1.0, RADIAL_SLICES + 1)
+    slices = np.clip(np.digitize(s, edges) - 1, 0, RADIAL_SLICES - 1)
     height = []
     centre = []
     angle = []

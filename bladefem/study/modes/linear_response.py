@@ -28,7 +28,7 @@ from ..pipeline.stages import Bodies, is_wheel
 if TYPE_CHECKING:
     from ...fem.flexibility import Flexibility
 
-MODES = 20
+DEFAULT_MODES = 20
 
 
 @dataclass(frozen=True)
@@ -75,7 +75,7 @@ def forced(
     bodies: Bodies,
     load: np.ndarray | None = None,
     damping: Damping | None = None,
-    modes: int = MODES,
+    modes: int = DEFAULT_MODES,
 ) -> Forced:
     """What is needed for the response at any frequency: one factorisation and some modes.
 

@@ -30,13 +30,13 @@ from .linear_response import (
 )
 
 # resonances
-SHOWN = 5
+MAX_RESONANCES = 5
 # points across each resonance
-AROUND = 41
+POINTS_PER_RESONANCE = 41
 # points over the whole band
-BETWEEN = 500
+POINTS_OVER_BAND = 500
 # half-widths of a resonance that are drawn closely
-WIDTHS = 12.0
+DENSE_HALF_WIDTHS = 12.0
 # displacement [m] that the stresses of a mode are given for
 REPORTED_DISPLACEMENT = 1e-3
 
@@ -61,7 +61,7 @@ def answer(
     bodies: Bodies,
     loads: Sequence[tuple[str, float]] = (),
     damping: Damping | None = None,
-    count: int = SHOWN,
+    count: int = MAX_RESONANCES,
 ) -> Answer:
     """Response to the engine order over the band of the first modes; collective.
 
@@ -225,10 +225,14 @@ def _response_curve(
     f = found.omega[:count] / (2 * np.pi)
     width = half_widths(found)[:count]
     near = (
-        f + np.outer(np.sinh(np.linspace(-4, 4, AROUND)) / np.sinh(4), WIDTHS * width * f)
+        f
+        + np.outer(
+            np.sinh(np.linspace(-4, 4, POINTS_PER_RESONANCE)) / np.sinh(4),
+            DENSE_HALF_WIDTHS * width * f,
+        )
     ).ravel()
     band = 0.6 * f[0], 1.15 * f[-1]
-    every = np.unique(np.concatenate([np.geomspace(*band, BETWEEN), near]))
+    every = np.unique(np.concatenate([np.geomspace(*band, POINTS_OVER_BAND), near]))
     every = every[(every >= band[0]) & (every <= band[1])]
     seen = probe(found, vector, every)
     return pd.DataFrame({"frequency": every, "amplitude": abs(seen), "phase": np.angle(seen)})

@@ -35,11 +35,11 @@ from .comparison import mac_of
 from .mesh_transfer import nodal_volumes, transfer
 
 # of the scene's own element sizes
-RATIOS = (2.0, 1.7, 1.4, 1.2, 1.0)
+SIZE_RATIOS = (2.0, 1.7, 1.4, 1.2, 1.0)
 # order that is looked for
-HIGHEST = 12.0
+MAX_ORDER = 12.0
 # orders that frequencies can have: from sharp re-entrant edges to 4 for P2, and some luck
-BELIEVED = (1.0, 6.0)
+PLAUSIBLE_ORDERS = (1.0, 6.0)
 # error over change where no order is believed
 UNTRUSTED_FACTOR = 3.0
 # scatter over trend from which there is no trend
@@ -47,9 +47,9 @@ MAX_SCATTER = 0.5
 # MAC of the same mode on two meshes
 MIN_MAC = 0.8
 # modes beyond those asked for, candidates for pairs
-SPARE = 3
+SPARE_MODES = 3
 # nodes that shapes are compared at
-POINTS = 4000
+COMPARED_NODES = 4000
 
 
 @dataclass(frozen=True)
@@ -76,7 +76,8 @@ def converge(
 
     Args:
         sizes: target element sizes [m], at least three, from coarse to fine; where the scene leaves
-            its size open and these are :data:`RATIOS`, they are factors on its automatic sizes.
+            its size open and these are :data:`SIZE_RATIOS`, they are factors on its automatic
+            sizes.
         diameters: nodal diameters of a wheel.
         count: modes of each.
 
@@ -89,7 +90,7 @@ def converge(
             f"converge = {list(sizes)} m: expected at least three element sizes, from coarse to "
             "fine"
         )
-    finest = None if tuple(sizes) == RATIOS else sizes[-1]
+    finest = None if tuple(sizes) == SIZE_RATIOS else sizes[-1]
     runs = []
     for size in progress(list(sizes), "meshes"):
         scale = scene.mesh.scale * size / sizes[-1]
@@ -97,7 +98,7 @@ def converge(
             scene, mesh=replace(scene.mesh, size=finest or scene.mesh.size, scale=scale)
         )
         mesh = build_mesh(refined, comm)
-        runs.append((mesh, find_modes(Bodies(refined, mesh, comm), diameters, count + SPARE)))
+        runs.append((mesh, find_modes(Bodies(refined, mesh, comm), diameters, count + SPARE_MODES)))
     return of_meshes(runs, count)
 
 
@@ -130,7 +131,7 @@ def paired(
     MAC.
     """
     nodes = np.unique(finest.bodies["blade"])
-    nodes = nodes[:: max(len(nodes) // POINTS, 1)]
+    nodes = nodes[:: max(len(nodes) // COMPARED_NODES, 1)]
     blade = replace(mesh, bodies={"blade": mesh.bodies["blade"]})
     theirs = (
         modes.shapes[:, nodes]
@@ -166,8 +167,10 @@ def _mesh_rows(
 
 
 def default_sizes(scene: Scene) -> list[float]:
-    """Element sizes [m] down to the scene's own; where that is open, :data:`RATIOS` themselves."""
-    return [ratio * (scene.mesh.size or 1.0) for ratio in RATIOS]
+    """Element sizes [m] down to the scene's own; where that is open, :data:`SIZE_RATIOS`
+    themselves.
+    """
+    return [ratio * (scene.mesh.size or 1.0) for ratio in SIZE_RATIOS]
 
 
 def element_size(mesh: Mesh, body: str) -> float:
@@ -194,9 +197,9 @@ def richardson(h: np.ndarray, f: np.ndarray) -> tuple[float, float]:
     def miss(p: float) -> float:
         return (h[0] ** p - h[1] ** p) / (h[1] ** p - h[2] ** p) - wanted
 
-    if miss(0.05) * miss(HIGHEST) >= 0:
+    if miss(0.05) * miss(MAX_ORDER) >= 0:
         return float(f[2]), np.nan
-    p = brentq(miss, 0.05, HIGHEST)
+    p = brentq(miss, 0.05, MAX_ORDER)
     return float(f[2] - second * h[2] ** p / (h[1] ** p - h[2] ** p)), float(p)
 
 
@@ -215,7 +218,7 @@ def fitted(h: np.ndarray, f: np.ndarray) -> tuple[float, float, float]:
         x = np.linalg.lstsq(A, f, rcond=None)[0]
         return x, float(np.sum((A @ x - f) ** 2))
 
-    coarse = np.linspace(0.25, HIGHEST, 48)
+    coarse = np.linspace(0.25, MAX_ORDER, 48)
     start = coarse[np.argmin([fit(p)[1] for p in coarse])]
     p = minimize_scalar(
         lambda p: fit(p)[1], bounds=(max(start - 0.5, 0.05), start + 0.5), method="bounded"
@@ -261,6 +264,6 @@ def _order_doubt(order: float, mac: float) -> str:
         return f"the shapes of two meshes differ, MAC {mac:.2f}"
     if np.isnan(order):
         return "the frequencies do not fall into line"
-    if not BELIEVED[0] <= order <= BELIEVED[1]:
+    if not PLAUSIBLE_ORDERS[0] <= order <= PLAUSIBLE_ORDERS[1]:
         return f"order {order:.1f} is none that the elements can have"
     return ""

@@ -8,7 +8,7 @@ from scipy.spatial import cKDTree
 from geometry.mesh import Mesh
 
 # Six tetrahedra of a hexahedron round its diagonal 0-6, two triangles of a quadrilateral.
-SPLIT = {
+SIMPLICES_OF = {
     "hexahedron": (
         (0, 1, 2, 6),
         (0, 2, 3, 6),
@@ -22,7 +22,7 @@ SPLIT = {
     "triangle": ((0, 1, 2),),
 }
 # Edges of gmsh's mid-side nodes.
-MIDDLES = {
+MID_SIDE_EDGES = {
     "tetra10": ((0, 1), (1, 2), (2, 0), (3, 0), (2, 3), (1, 3)),
     "triangle6": ((0, 1), (1, 2), (2, 0)),
 }
@@ -30,7 +30,7 @@ MIDDLES = {
 
 def simplices(mesh: Mesh, cells: np.ndarray) -> np.ndarray:
     """(nc, pieces, corners) straight simplices of each cell."""
-    return cells[:, list(SPLIT[mesh.cell_type.rstrip("0123456789")])]
+    return cells[:, list(SIMPLICES_OF[mesh.cell_type.rstrip("0123456789")])]
 
 
 def nodal_volumes(mesh: Mesh) -> np.ndarray:
@@ -70,9 +70,9 @@ def transfer(
     piece, weights = locate(
         mesh.points[pieces][..., : mesh.dimension], points[:, : mesh.dimension], candidates
     )
-    if mesh.cell_type in MIDDLES:
+    if mesh.cell_type in MID_SIDE_EDGES:
         nodes = cells[owner[piece]]
-        weights = quadratic(weights, MIDDLES[mesh.cell_type])
+        weights = quadratic(weights, MID_SIDE_EDGES[mesh.cell_type])
     else:
         nodes = pieces[piece]
     return np.einsum("kc,mkci->mki", weights, fields[:, nodes])

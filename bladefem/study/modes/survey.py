@@ -35,7 +35,7 @@ from .linear_response_report import Answer, answer
 from .mesh_convergence import Convergence, converge, default_sizes
 
 # engine orders above and below the scene's own, in Campbell and SAFE diagrams
-ORDERS = 3
+NEIGHBOURING_ORDERS = 3
 
 
 @dataclass(frozen=True)
@@ -141,7 +141,7 @@ def _all_modes(bodies: Bodies, direct: bool) -> list[ModeSet]:
 
 def _engine_orders(scene: Scene) -> list[int]:
     order = scene.excitation.engine_order
-    return list(range(max(order - ORDERS, 1), order + ORDERS + 1))
+    return list(range(max(order - NEIGHBOURING_ORDERS, 1), order + NEIGHBOURING_ORDERS + 1))
 
 
 def _stage_seconds(

@@ -21,7 +21,7 @@ from ...scene.tables import Scene
 from .stages import Reduced
 
 # of [damper] axial: a stop
-HELD = "held"
+AXIALLY_HELD = "held"
 # the engine axis
 AXIS = [0.0, 0.0, 1.0]
 # of a translation: what rigid modes may miss of it
@@ -111,13 +111,13 @@ def rigid_body(
         damper: as for `joint_model`; of an elastic one its rigid motions.
     """
     if damper == "mass":
-        return mass_damper(mesh, patches, reduced.mass, scene.damper.axial == HELD)
+        return mass_damper(mesh, patches, reduced.mass, scene.damper.axial == AXIALLY_HELD)
     return rigid_damper(_with_stop(scene, mesh, reduced, patches))
 
 
 def _with_stop(scene: Scene, mesh: Mesh, reduced: Reduced, patches: list[Patch]) -> Reduced:
     """Held along the engine axis where the scene has a stop there."""
-    if scene.damper.axial != HELD:
+    if scene.damper.axial != AXIALLY_HELD:
         return reduced
     along = axial_motion(mesh, patches)
     return replace(reduced, damper=hold_translation(reduced.damper, along))

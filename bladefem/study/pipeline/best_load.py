@@ -32,15 +32,15 @@ FamilyOf = Callable[[LoadCase], Family]
 
 # loads of a design chart over the best one: the branch where the damper slides, the optimum, and
 # the branch where it sticks
-FACTORS = (1 / 8, 1 / 4, 1 / 2, 1.0, 2.0, 4.0, 8.0, 15.0, 30.0)
+CHART_LOAD_FACTORS = (1 / 8, 1 / 4, 1 / 2, 1.0, 2.0, 4.0, 8.0, 15.0, 30.0)
 # range of the search, over the force at which friction could hold the excitation
-RANGE = (0.1, 1e4)
+SEARCH_RANGE = (0.1, 1e4)
 # of the height of the resonance, over the accuracy of the scene: what the search stops at
-SHARE = 0.02
+HEIGHT_TOLERANCE_SHARE = 0.02
 # relative step of the load by which the seating is differentiated
-STEP = 1e-4
+SEATING_DIFFERENCE_STEP = 1e-4
 # searches, each with richer settings than the last
-SEARCHES = 3
+MAX_SEARCHES = 3
 # range of a search on each side of a load that is known to be near the best, as a factor
 REPEATED_RANGE = 4.0
 
@@ -101,7 +101,7 @@ def find_best_load(
     bounds = searched if start is None else _near(start, searched)
     points = 0
     try:
-        for _ in range(SEARCHES):
+        for _ in range(MAX_SEARCHES):
             found = _search(scene, case_at, family_of, settings, bounds, start)
             points += found.points
             if found.value in bounds and bounds != searched:
@@ -134,7 +134,7 @@ def _near(load: float, searched: tuple[float, float]) -> tuple[float, float]:
 def search_range(scene: Scene) -> tuple[float, float]:
     """Loads [N] between which the best one is sought."""
     mu = max(scene.contact.mu, 1e-3)
-    low, high = RANGE
+    low, high = SEARCH_RANGE
     return low * scene.excitation.force / mu, high * scene.excitation.force / mu
 
 
@@ -156,7 +156,7 @@ def _search(
         settings.harmonics,
         settings.samples,
         start=middle,
-        tolerance=SHARE * scene.accuracy,
+        tolerance=HEIGHT_TOLERANCE_SHARE * scene.accuracy,
         options=solver_options(scene.accuracy),
     )
 
@@ -179,14 +179,15 @@ def load_variation(
     ) -> Peak:
         groups = family_member(family_of(case_at(load)), settings).groups
         low, high = (
-            joined_elements(case_at(load * (1 + sign * STEP)).elements, groups) for sign in (-1, 1)
+            joined_elements(case_at(load * (1 + sign * SEATING_DIFFERENCE_STEP)).elements, groups)
+            for sign in (-1, 1)
         )
         rates = {
             "load": _relative_rate(low.n0, high.n0),
             "kt": _relative_rate(low.kt, high.kt),
             "kn": _relative_rate(low.kn, high.kn),
         }
-        proportional = abs(rates["load"] - 1).max() < STEP
+        proportional = abs(rates["load"] - 1).max() < SEATING_DIFFERENCE_STEP
         if proportional and not (rates["kt"].any() or rates["kn"].any()):
             return with_slope(model, peak, "load", load)
         names = [name for name in rates if np.any(rates[name])]
@@ -200,9 +201,9 @@ def load_variation(
 def _relative_rate(low: np.ndarray, high: np.ndarray) -> np.ndarray:
     """(n,) derivative of ln |x| by the logarithm of the load; 0 where x is 0 or hardly changes."""
     middle = (low + high) / 2
-    change = (high - low) / (2 * STEP)
+    change = (high - low) / (2 * SEATING_DIFFERENCE_STEP)
     rate = np.divide(change, middle, out=np.zeros_like(middle), where=middle != 0)
-    return np.where(abs(rate) < STEP, 0.0, rate)
+    return np.where(abs(rate) < SEATING_DIFFERENCE_STEP, 0.0, rate)
 
 
 def _record(
@@ -222,7 +223,7 @@ def _record(
         found.peak.height,
         solution.work.dissipated,
         solution.work.input,
-        SHARE * scene.accuracy,
+        HEIGHT_TOLERANCE_SHARE * scene.accuracy,
         tolerated_loads(tried, scene.accuracy),
         settings,
         np.array([peak.value for peak in tried]),
@@ -280,6 +281,9 @@ def chart_loads(bests: Sequence[BestLoad]) -> tuple[float, ...]:
     largest, each of them included.
     """
     loads = {
-        float(f"{factor * best.load:.2g}") for best in bests for factor in FACTORS if factor != 1.0
+        float(f"{factor * best.load:.2g}")
+        for best in bests
+        for factor in CHART_LOAD_FACTORS
+        if factor != 1.0
     }
     return tuple(sorted(loads | {float(f"{best.load:.4g}") for best in bests}))

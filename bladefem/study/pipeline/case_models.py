@@ -19,7 +19,7 @@ from ..adaptive.check_points import peak_of
 from ..adaptive.choice import covered_band
 from ..adaptive.family import Family, Member, coarsened_elements, family_member, shared_harmonics
 from ..adaptive.resonance_choice import choose_at_peak, peak_from
-from ..adaptive.settings import DAMPERS, Settings, enriched_settings, first_settings
+from ..adaptive.settings import DAMPER_MODELS, Settings, enriched_settings, first_settings
 from .assemble_model import LoadCase, joint_model
 from .body_mesh import ModeErrors, SofterBody, frequency_ratio, softened
 from .changed_cases import seated_case
@@ -82,7 +82,10 @@ def family_of_case(
         return Member(coarsened_elements(model, groups), groups)
 
     return Family(
-        shared, max(len(body.omega) for body in reduced.sector.values()), 2 * most + 1, DAMPERS
+        shared,
+        max(len(body.omega) for body in reduced.sector.values()),
+        2 * most + 1,
+        DAMPER_MODELS,
     )
 
 

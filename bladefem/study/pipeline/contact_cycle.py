@@ -27,7 +27,7 @@ from .assemble_model import LoadCase
 from .loads import Curve
 
 # harmonics that draw the corners of a loop; the balance has fewer
-SMOOTH = 63
+DRAWN_HARMONICS = 63
 
 
 @dataclass(frozen=True)
@@ -201,17 +201,17 @@ def _loop(
     Args:
         series: (n,) compliance of the layer in addition to that of the elements [m/N].
     """
-    fine = np.zeros((len(rows), w.shape[1], 2 * SMOOTH + 1))
+    fine = np.zeros((len(rows), w.shape[1], 2 * DRAWN_HARMONICS + 1))
     fine[..., : w.shape[2]] = w[rows]
     some = select_elements(elements, rows)
-    friction = evaluate(some, fine, 8 * SMOOTH + 8, jacobian=False).f[:, 1:]
+    friction = evaluate(some, fine, 8 * DRAWN_HARMONICS + 8, jacobian=False).f[:, 1:]
     force = friction.sum(0)
     share = some.kt / some.kt.sum()
     across = fine[:, 1:] + series[rows, None, None] * friction
     mean = np.einsum("n,ndk->dk", share, across)
     mean[:, 0] = 0.0
     direction = np.linalg.svd(mean)[0][:, 0]
-    T = synthesis(SMOOTH, 8 * SMOOTH + 8)
+    T = synthesis(DRAWN_HARMONICS, 8 * DRAWN_HARMONICS + 8)
     return Loop(T @ (direction @ mean), T @ (direction @ force))
 
 

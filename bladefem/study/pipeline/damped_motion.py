@@ -30,7 +30,7 @@ from .ports import blade_ports
 from .stages import Bodies, is_wheel
 
 # highest harmonic's frequency over the highest mode's: beyond it the inertia series is too slow
-COVERED = 0.8
+MAX_FREQUENCY_RATIO = 0.8
 
 
 @dataclass(frozen=True)
@@ -105,7 +105,7 @@ def damped_motion(
     fields = np.zeros((solution.harmonics, len(mesh.points), mesh.dimension), complex)
     for found in modes:
         # harmonics of the same nodal diameter are solved together
-        highest = COVERED * 2 * np.pi * found.frequencies[-1]
+        highest = MAX_FREQUENCY_RATIO * 2 * np.pi * found.frequencies[-1]
         own = [
             h
             for h, (n, _) in enumerate(waves)

@@ -26,12 +26,12 @@ from ..adaptive.settings import Settings
 from .stability import in_one_body, model_in_time
 
 # disturbance of the unstable motion at the start, relative
-DISTURBANCE = 1e-3
+DISTURBANCE_SHARE = 1e-3
 # periods before the amplitudes are taken, and those in which they are
 LEFT_PERIODS = 300
 KEPT_PERIODS = 100
 # instants of a period
-SAMPLES = 256
+SAMPLES_PER_PERIOD = 256
 # steps of the whole march above which it is not begun: some 20 s
 MAX_STEPS = 4e6
 # the same for marches by steps, in operations
@@ -123,16 +123,16 @@ def kept_band(model: ReducedModel, point: Solution) -> KeptBand:
     except InputError:
         return _band_by_steps(model, point)
     periods = LEFT_PERIODS + KEPT_PERIODS
-    steps = periods * max(SAMPLES, 2 * np.pi * system.fastest / point.omega)
+    steps = periods * max(SAMPLES_PER_PERIOD, 2 * np.pi * system.fastest / point.omega)
     if steps > MAX_STEPS:
         return _unknown_band(point, f"a march takes {steps:.1g} steps, at most {MAX_STEPS:.0e}")
     start = state_of(point, system)
-    state = State((1 + DISTURBANCE) * start.q, start.v, start.z)
-    left = integrate_periods(system, point.omega, state, SAMPLES, LEFT_PERIODS)
-    kept = integrate_periods(system, point.omega, left.state, SAMPLES, KEPT_PERIODS)
+    state = State((1 + DISTURBANCE_SHARE) * start.q, start.v, start.z)
+    left = integrate_periods(system, point.omega, state, SAMPLES_PER_PERIOD, LEFT_PERIODS)
+    kept = integrate_periods(system, point.omega, left.state, SAMPLES_PER_PERIOD, KEPT_PERIODS)
     if kept.reason != "done":
         return _unknown_band(point, kept.reason)
-    motion = (kept.q @ system.probe[0]).reshape(KEPT_PERIODS, SAMPLES)
+    motion = (kept.q @ system.probe[0]).reshape(KEPT_PERIODS, SAMPLES_PER_PERIOD)
     return _band_of(point, motion, periods)
 
 
@@ -144,7 +144,7 @@ def _band_by_steps(model: ReducedModel, point: Solution) -> KeptBand:
         if operations > MAX_MARCH:
             reason = f"a march takes {operations:.1g} operations, at most {MAX_MARCH:.0e}"
             return _unknown_band(point, reason)
-        march = march_ring(model, point, DISTURBANCE, periods)
+        march = march_ring(model, point, DISTURBANCE_SHARE, periods)
     except (InputError, NotSolvedError) as error:
         return _unknown_band(point, str(error))
     if not (march.settled and np.isfinite(march.motion).all()):

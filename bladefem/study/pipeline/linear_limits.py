@@ -17,11 +17,11 @@ from ...hbm.solve import free_response, stuck_response
 from ...util.arrays import ComplexArray, RealArray
 
 # of the resonance frequency, each side: where its height is looked for
-WIDTH = 0.02
+SEARCH_HALF_WIDTH = 0.02
 # points of that search, before it is refined between the highest and its neighbours
 SEARCH_POINTS = 21
 # points of a drawn curve that crowd round its resonance
-DETAIL = 50
+POINTS_AT_RESONANCE = 50
 
 
 @dataclass(frozen=True)
@@ -70,7 +70,11 @@ def _limit(
     def first(frequency: float) -> complex:
         return complex(response(model, 2 * np.pi * frequency)[1, 0])
 
-    near = omega / (2 * np.pi) * np.linspace(1 - WIDTH, 1 + WIDTH, SEARCH_POINTS)
+    near = (
+        omega
+        / (2 * np.pi)
+        * np.linspace(1 - SEARCH_HALF_WIDTH, 1 + SEARCH_HALF_WIDTH, SEARCH_POINTS)
+    )
     top = min(max(int(np.argmax([abs(first(f)) for f in near])), 1), SEARCH_POINTS - 2)
     found = minimize_scalar(
         lambda f: -abs(first(f)),
@@ -78,7 +82,13 @@ def _limit(
         method="bounded",
         options={"xatol": 1e-6 * near[top]},
     )
-    crowd = found.x * (1 + np.outer((-1, 1), np.geomspace(1e-5, 3 * WIDTH, DETAIL // 2))).ravel()
+    crowd = (
+        found.x
+        * (
+            1
+            + np.outer((-1, 1), np.geomspace(1e-5, 3 * SEARCH_HALF_WIDTH, POINTS_AT_RESONANCE // 2))
+        ).ravel()
+    )
     frequency = np.unique(
         np.concatenate(
             [np.linspace(*band, 40), crowd[(crowd > band[0]) & (crowd < band[1])], [found.x]]

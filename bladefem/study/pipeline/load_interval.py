@@ -16,7 +16,7 @@ from ...hbm.sweep import size
 from ..adaptive.settings import Settings
 
 # tolerance of heights, over the accuracy wanted
-SHARE = 0.02
+HEIGHT_TOLERANCE_SHARE = 0.02
 # points of the balance, over those of the curve, after which no further move begins
 MAX_COST_RATIO = 4
 UNKNOWN = "unknown"
@@ -53,7 +53,7 @@ def load_interval(
     Args:
         points: of the curve; the interval takes at most some MAX_COST_RATIO times as many.
     """
-    tolerance = SHARE * accuracy
+    tolerance = HEIGHT_TOLERANCE_SHARE * accuracy
     try:
         peak = find_peak(
             model,

@@ -16,7 +16,7 @@ from ...hbm.slow_sweep import DOWN, ISOLATED, UP, Visit, reached_by, visited_pie
 from .loads import Curve
 
 # distance of the first harmonics of two ends over the largest one, up to which pieces are joined
-JOINED = 0.2
+MAX_JOINED_DISTANCE = 0.2
 # relative difference of two heights that are the same
 SAME_HEIGHT = 1e-6
 
@@ -146,7 +146,7 @@ def _joint(
         side: abs(before.first[before.end(side)] - piece.first[piece.end(side)]) for side in sides
     }
     nearest = min(away, key=lambda side: away[side])
-    return nearest if away[nearest] <= JOINED * size else None
+    return nearest if away[nearest] <= MAX_JOINED_DISTANCE * size else None
 
 
 def _swept(pieces: Sequence[_Piece]) -> dict[str, list[Visit]]:

@@ -35,11 +35,11 @@ if TYPE_CHECKING:
     from .loads import Curve
 
 # local maxima of a curve that are judged first
-MAXIMA = 4
+MAX_JUDGED_MAXIMA = 4
 # operations of all verdicts on a curve, some 0.7 s: about what its points take
 CURVE_OPERATIONS = 2e10
 # points that are judged in addition, as long as the highest one that is not unstable is not judged
-FURTHER = 2
+POINTS_JUDGED_IN_ADDITION = 2
 # with which points of one harmonic are judged
 JUDGED_HARMONICS = 7
 JUDGED_SAMPLES = 128
@@ -81,7 +81,7 @@ def stability_of(model: ReducedModel, points: Sequence[Solution]) -> Stability:
         found[i] = stability_verdict(model, motion, MAX_OPERATIONS if highest else costs[i])
         judged.add(i)
         budget -= costs[i]
-    for _ in range(FURTHER):
+    for _ in range(POINTS_JUDGED_IN_ADDITION):
         lasting = [i for i in range(len(points)) if found[i].verdict != UNSTABLE]
         top = max(lasting, key=lambda i: size(points[i]) * points[i].converged, default=None)
         if top is None or top in judged:
@@ -140,7 +140,9 @@ def _spread(count: int) -> list[int]:
 
 
 def _maxima(points: Sequence[Solution]) -> list[int]:
-    """Numbers of the local maxima along each piece of the curve, the highest MAXIMA of them."""
+    """Numbers of the local maxima along each piece of the curve, the highest MAX_JUDGED_MAXIMA of
+    them.
+    """
     heights = np.array([size(p) if p.converged else 0.0 for p in points])
     branch = np.array([p.branch for p in points])
     found: list[int] = []
@@ -148,7 +150,7 @@ def _maxima(points: Sequence[Solution]) -> list[int]:
         rows = np.flatnonzero((branch == number) & (heights > 0))
         own = np.concatenate([[0.0], heights[rows], [0.0]])
         found += rows[(own[1:-1] >= own[:-2]) & (own[1:-1] >= own[2:])].tolist()
-    return sorted(found, key=lambda i: -heights[i])[:MAXIMA]
+    return sorted(found, key=lambda i: -heights[i])[:MAX_JUDGED_MAXIMA]
 
 
 def in_one_body(model: ReducedModel) -> ReducedModel:

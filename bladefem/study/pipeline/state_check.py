@@ -17,11 +17,11 @@ from ...errors import NotSolvedError
 from ...scene.tables import Scene
 
 # of each axis
-STATES = 5
+STATES_PER_AXIS = 5
 # of the largest nodal force
 SUFFICIENT_ACCURACY = 0.01
 # of the largest turn of a seat, below which a turn counts as none
-SEEN = 1e-6
+NEGLIGIBLE_ROTATION_SHARE = 1e-6
 
 
 @dataclass(frozen=True)
@@ -74,8 +74,8 @@ def check_states(
     low = min(loads)
     high = max(loads)
     axes = [
-        np.linspace(low, high if high > low else 2 * low, STATES),
-        np.linspace(-travel, travel, STATES),
+        np.linspace(low, high if high > low else 2 * low, STATES_PER_AXIS),
+        np.linspace(-travel, travel, STATES_PER_AXIS),
     ]
     table = state_table(direct, axes)
     error = 0.0
@@ -106,7 +106,7 @@ def platform_tilt(problem: ContactProblem) -> np.ndarray:
     own = len(problem.patches[0].area)
     turns = problem.rigid[:, -1 if problem.rigid.shape[1] < 6 else -3 :]
     spread = np.ptp(turns[:own], axis=0)
-    axis = -1 if spread[-1] > SEEN * spread.max() else int(np.argmax(spread))
+    axis = -1 if spread[-1] > NEGLIGIBLE_ROTATION_SHARE * spread.max() else int(np.argmax(spread))
     tilt = np.zeros(len(turns))
     moved = turns[:own, axis]
     if spread[axis] > 0:
