@@ -17,7 +17,7 @@ from ...util.progress import Progress, unwatched
 from ...wheel.model import Pattern, Wheel, frequency_pattern
 from ...wheel.resonance import find_wheel_peak
 from ...wheel.scatter import MAX_DEVIATIONS, drawn_patterns
-from ...wheel.solve import TUNED, WheelSolution
+from ...wheel.solve import TUNED_PATTERN, WheelSolution
 from ...wheel.statistics import (
     Amplification,
     joined_loads,
@@ -35,7 +35,7 @@ from ..pipeline.utilisation import wheel_utilisation_message
 from .blade_stress import WheelShapes, all_modes, blade_stress
 from .law_level import law_level, with_checks
 from .pattern_response import (
-    SEARCH,
+    SEARCH_TOLERANCE,
     PatternResponse,
     frequency_grid,
     pattern_response,
@@ -159,7 +159,7 @@ def _kept_statistics(
             lambda deviation: frequency_pattern(sector.families, deviation),
         )
         if scene.mistuning.level == LAW_LEVEL:
-            grid = frequency_grid(wheel, curve, TUNED, spread)
+            grid = frequency_grid(wheel, curve, TUNED_PATTERN, spread)
             band = float(grid[0]), float(grid[-1])
             drawn = scene_scatter(scene)
             mode = scene.excitation.mode - 1
@@ -168,7 +168,7 @@ def _kept_statistics(
             def whole_peak(pattern: Pattern) -> float:
                 own = frequency_grid(wheel, curve, pattern, spread)
                 return find_wheel_peak(
-                    wheel_respond(wheel, pattern, H, samples), own, SEARCH
+                    wheel_respond(wheel, pattern, H, samples), own, SEARCH_TOLERANCE
                 ).height
 
             checks = scene.mistuning.checks
@@ -179,7 +179,7 @@ def _kept_statistics(
             lambda load, pattern: frequency_grid(wheel, curve, pattern, spread),
             lambda wheel, pattern: wheel_respond(wheel, pattern, H, samples),
             comm,
-            SEARCH,
+            SEARCH_TOLERANCE,
             progress,
         )
 
