@@ -42,7 +42,7 @@ from structured import box  # noqa: E402
 
 from bladefem.contact.complementarity import solve_lcp  # noqa: E402
 from bladefem.contact.patch import make_patch  # noqa: E402
-from bladefem.contact.seating import contact_problem, solve  # noqa: E402
+from bladefem.contact.seating import contact_problem, solve_seating  # noqa: E402
 from bladefem.fem.body import assemble  # noqa: E402
 from bladefem.fem.constraint import constrain, restrict  # noqa: E402
 from bladefem.fem.flexibility import compliance, flexible  # noqa: E402
@@ -83,8 +83,8 @@ def states():
     start = time.perf_counter()
     problem = contact_problem(mesh, patches, blade, damper)
     condensing = time.perf_counter() - start
-    cold, maps = best(lambda: solve(problem, 838.0, normal=200.0))
-    warm, _ = best(lambda: solve(problem, 838.0, normal=210.0, start=maps))
+    cold, maps = best(lambda: solve_seating(problem, 838.0, normal=200.0))
+    warm, _ = best(lambda: solve_seating(problem, 838.0, normal=210.0, start=maps))
     print(
         f"wedge sector, {len(mesh.points) * 3} dofs, {len(problem.clearance)} contact nodes: "
         f"condensed in {condensing:.1f} s, then a load state costs {cold:.2f} ms, warm {warm:.2f} "

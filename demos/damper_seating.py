@@ -19,7 +19,7 @@ import numpy as np
 from mpi4py import MPI
 
 import bladefem
-from bladefem.contact.seating import solve
+from bladefem.contact.seating import solve_seating
 from bladefem.study.pipeline.stages import contact_patches
 
 coarse = "BLADEFEM_COARSE" in os.environ
@@ -34,7 +34,7 @@ problem = bladefem.seat_damper(bladefem.Bodies(scene, mesh, comm), contact_patch
 
 # %%
 speed = scene.operation.speed
-maps = solve(problem, speed)
+maps = solve_seating(problem, speed)
 pull = np.linalg.norm(problem.load[:2]) * speed**2
 expected = pull / (2 * math.sin(scene.damper.angle))
 

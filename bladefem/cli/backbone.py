@@ -26,7 +26,7 @@ def backbone(options: argparse.Namespace, comm: Communicator | None) -> None:
         comm,
         lambda: "\n".join(
             [
-                tables.frame(readable(prediction_table(found))),
+                tables.frame_table(readable(prediction_table(found))),
                 "",
                 *backbone_sentences(found),
                 f"written: {', '.join(map(str, files))}",

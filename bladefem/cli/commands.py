@@ -67,8 +67,8 @@ def modes(options: argparse.Namespace, comm: Communicator | None) -> None:
 
     refuse_pdf(options)
     scene, folder, bars = prepared(options, comm)
-    found = report.run(scene, folder, modes_wanted(options), options.pictures, comm, bars)
-    tell(options, comm, lambda: tables.survey(found), found.run)
+    found = report.report_survey(scene, folder, modes_wanted(options), options.pictures, comm, bars)
+    tell(options, comm, lambda: tables.survey_tables(found), found.run)
     if options.pictures:
         print_report(options, comm, folder / "report_modes.html")
 
@@ -113,8 +113,8 @@ def contact(options: argparse.Namespace, comm: Communicator | None) -> None:
         return run_kind(scene, folder, options, comm, bars)
     from ..report import pressure
 
-    run = pressure.run(scene, folder, comm, bars)
-    tell(options, comm, lambda: tables.pressures(run.contact.maps), run)
+    run = pressure.report_pressure(scene, folder, comm, bars)
+    tell(options, comm, lambda: tables.pressure_table(run.contact.maps), run)
 
 
 def reduce(options: argparse.Namespace, comm: Communicator | None) -> None:
@@ -125,7 +125,7 @@ def reduce(options: argparse.Namespace, comm: Communicator | None) -> None:
     from ..study.pipeline import pipeline
 
     run = pipeline.run(scene, folder, until="reduction", comm=comm, progress=bars)
-    tell(options, comm, lambda: tables.reduction(run.reduced), run)
+    tell(options, comm, lambda: tables.reduction_table(run.reduced), run)
 
 
 def response(options: argparse.Namespace, comm: Communicator | None) -> None:
@@ -134,7 +134,7 @@ def response(options: argparse.Namespace, comm: Communicator | None) -> None:
     from ..study.pipeline import pipeline
 
     run = pipeline.run(scene, folder, until="response", comm=comm, progress=bars)
-    tell(options, comm, lambda: tables.responses(run.response), run)
+    tell(options, comm, lambda: tables.response_tables(run.response), run)
 
 
 def report(options: argparse.Namespace, comm: Communicator | None) -> None:
@@ -210,11 +210,11 @@ def chart(options: argparse.Namespace, comm: Communicator | None) -> None:
 
 def info(options: argparse.Namespace, comm: Communicator | None) -> None:
     """Versions and threads."""
-    from .info import facts
+    from .info import installation_facts
 
-    rows = facts()
+    rows = installation_facts()
     if comm is None or comm.rank == 0:
-        print(tables.plain(rows))
+        print(tables.plain_table(rows))
 
 
 def prepared(
@@ -292,7 +292,7 @@ def tell(
         return
     print(table())
     if run is not None:
-        print("\n" + tables.summary(run), flush=True)
+        print("\n" + tables.run_summary(run), flush=True)
 
 
 def scene_path(given: str) -> Path:

@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import Any
 
 
-def facts() -> list[tuple[str, str]]:
+def installation_facts() -> list[tuple[str, str]]:
     """Rows of name and value: versions, solvers, BLAS, MPI, threads."""
     from ..io.stage_cache import versions
 

@@ -12,7 +12,7 @@ from geometry.look import is_drawing
 
 from ..errors import InputError
 from ..util.communicator import Communicator
-from .tables import plain
+from .tables import plain_table
 
 if TYPE_CHECKING:
     from geometry.look import Look
@@ -41,7 +41,7 @@ def look(options: argparse.Namespace, comm: Communicator | None) -> None:
     if comm is not None and comm.rank:
         return
     found = look_at(options.file)
-    print(described(found))
+    print(describe_look(found))
     if options.view:
         from ..view.look import draw_look
 
@@ -55,7 +55,7 @@ def look(options: argparse.Namespace, comm: Communicator | None) -> None:
         print(f"scene: {target}")
 
 
-def described(found: Look) -> str:
+def describe_look(found: Look) -> str:
     """Everything in words and tables; lengths in the file's unit, those of a drawing in metres."""
     lines = _of_drawing(found) if is_drawing(found.file) else _of_mesh(found)
     if found.cut is not None:
@@ -78,10 +78,10 @@ def described(found: Look) -> str:
         for face in found.faces[:MAX_LISTED_FACES]
     ]
     if sets:
-        lines += [plain(sets, ["set", "holds"]), ""]
+        lines += [plain_table(sets, ["set", "holds"]), ""]
     else:
         lines += [""] if is_drawing(found.file) else ["no named sets", ""]
-    lines.append(plain(faces, ["face", "facets", "area", "centre", "shape"]))
+    lines.append(plain_table(faces, ["face", "facets", "area", "centre", "shape"]))
     if len(found.faces) > MAX_LISTED_FACES:
         lines.append(f"and {len(found.faces) - MAX_LISTED_FACES} smaller faces")
     if found.missing:

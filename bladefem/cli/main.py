@@ -116,7 +116,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
         options.overrides.append(f"solver.petsc={' '.join(words[cut + 1 :])}")
     # run folders, kept for this command
     with ExitStack() as options.held:
-        return ranks.guarded(lambda comm: options.function(options, comm), options)
+        return ranks.exit_code_of(lambda comm: options.function(options, comm), options)
 
 
 def parser() -> argparse.ArgumentParser:

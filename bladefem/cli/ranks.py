@@ -36,7 +36,7 @@ def communicator() -> Any:
     return MPI.COMM_WORLD
 
 
-def guarded(action: Callable[[Any], None], options: argparse.Namespace) -> int:
+def exit_code_of(action: Callable[[Any], None], options: argparse.Namespace) -> int:
     """The exit code of an action that gets the communicator; errors are reported on rank 0."""
     with _catch_signals() as stopped:
         return _run_guarded(action, stopped)

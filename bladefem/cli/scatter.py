@@ -33,7 +33,7 @@ def scatter(options: argparse.Namespace, comm: Communicator | None) -> None:
         options,
         comm,
         lambda: "\n".join(
-            [tables.frame(table), "", *sentences, f"written: {', '.join(map(str, files))}"]
+            [tables.frame_table(table), "", *sentences, f"written: {', '.join(map(str, files))}"]
         ),
     )
 

@@ -81,7 +81,7 @@ def study(options: argparse.Namespace, comm: Communicator | None) -> None:
         if done:
             on_root(comm, partial(_borrow_stages, Path(parts[0].output), Path(one.output)))
         run = _solve_variant(one, comm)
-        tell(options, comm, partial(tables.responses, run.response), run)
+        tell(options, comm, partial(tables.response_tables, run.response), run)
         # not before the first line: it is slow to load
         from ..report.study import Variant
 
@@ -140,7 +140,7 @@ def _scatter_plan(options: argparse.Namespace) -> Plan:
 
         return write_scatter(names, variants, folder)
 
-    return Plan(names, halton_values(ranges, options.samples), write, tables.table)
+    return Plan(names, halton_values(ranges, options.samples), write, tables.report_table)
 
 
 def _write_one(name: str) -> Callable[[Sequence[Any], Path], tuple[Any, list[Path]]]:
@@ -166,7 +166,7 @@ def _write_map(
 def _map_table(table: Any) -> str:
     """The columns that fit on a terminal."""
     shown = [*table.columns[:2], "load", "peak_frequency", "peak_amplitude", "reduction", "error"]
-    return tables.table(table[shown])
+    return tables.report_table(table[shown])
 
 
 def _parse_variation(text: str) -> tuple[str, list[str]]:

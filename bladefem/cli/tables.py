@@ -27,7 +27,7 @@ if TYPE_CHECKING:
 MAX_RULE_WIDTH = 150
 
 
-def plain(rows: Sequence[Sequence[object]], head: Sequence[str] = ()) -> str:
+def plain_table(rows: Sequence[Sequence[object]], head: Sequence[str] = ()) -> str:
     """Columns side by side: the first to the left, numbers to the right."""
     cells = [[str(c) for c in row] for row in ([head, *rows] if head else rows)]
     if not cells:
@@ -45,15 +45,15 @@ def plain(rows: Sequence[Sequence[object]], head: Sequence[str] = ()) -> str:
     return "\n".join(lines)
 
 
-def frame(table: pd.DataFrame) -> str:
+def frame_table(table: pd.DataFrame) -> str:
     """A pandas table of texts, titles at the head."""
-    return plain(table.to_numpy().tolist(), list(table.columns))
+    return plain_table(table.to_numpy().tolist(), list(table.columns))
 
 
 def resolved_scene(rows: Sequence[Any]) -> str:
     """Every value of a scene; what the user gave carries a star."""
     lines = [[row.name, row.value, "" if row.is_default else "*", row.help] for row in rows]
-    return plain(lines, ["field", "value", "given", "meaning"])
+    return plain_table(lines, ["field", "value", "given", "meaning"])
 
 
 def mesh_quality(mesh: Mesh) -> str:
@@ -63,10 +63,10 @@ def mesh_quality(mesh: Mesh) -> str:
     rows += [[f"volume {name}, cells", len(part)] for name, part in mesh.parts.items()]
     rows += [[f"face {name}, cells", len(cells)] for name, cells in mesh.faces.items()]
     rows += [row for row in quality_rows(mesh) if row[0] not in ("elements", "nodes")]
-    return plain(rows, ["mesh", "value"])
+    return plain_table(rows, ["mesh", "value"])
 
 
-def frequencies(sets: Sequence[ModeSet]) -> str:
+def frequency_table(sets: Sequence[ModeSet]) -> str:
     """Natural frequencies, a row for each nodal diameter."""
     count = max(len(s.frequencies) for s in sets)
     head = ["nodal diameter", *(f"f{i + 1} [Hz]" for i in range(count)), "residual"]
@@ -75,10 +75,10 @@ def frequencies(sets: Sequence[ModeSet]) -> str:
         name = "none" if s.nodal_diameter is None else s.nodal_diameter
         values = [f"{f:.2f}" for f in s.frequencies]
         rows.append([name, *values, *[""] * (count - len(values)), f"{max(s.residuals):.1e}"])
-    return plain(rows, head)
+    return plain_table(rows, head)
 
 
-def reduction(reduced: Reduced) -> str:
+def reduction_table(reduced: Reduced) -> str:
     """Size of the reduced bodies: a row for each nodal diameter of the blade, one for the
     damper.
     """
@@ -90,21 +90,21 @@ def reduction(reduced: Reduced) -> str:
         row(f"sector, nodal diameter {n}" if reduced.sectors else "blade", body)
         for n, body in reduced.sector.items()
     ]
-    return plain(
+    return plain_table(
         [*rows, row("damper", reduced.damper)], ["body", "modes", "highest [Hz]", "port dofs"]
     )
 
 
-def survey(found: Survey) -> str:
+def survey_tables(found: Survey) -> str:
     """Frequencies, and the short tables of what was asked for in addition."""
-    parts = [frequencies(found.run.modes)]
+    parts = [frequency_table(found.run.modes)]
     if found.campbell is not None:
         rows = [
             [row.engine_order, row.mode, f"{row.frequency:.2f}", f"{30 * row.speed / pi:.1f}"]
             for row in found.campbell.crossings.itertuples()
         ]
         parts.append(
-            plain(rows, ["engine order", "mode", "crossing [Hz]", "speed [rpm]"])
+            plain_table(rows, ["engine order", "mode", "crossing [Hz]", "speed [rpm]"])
             if rows
             else "no engine order crosses a mode in this range of speeds"
         )
@@ -121,19 +121,23 @@ def survey(found: Survey) -> str:
             for row in found.convergence.summary.itertuples()
         ]
         parts.append(
-            plain(rows, ["mode", "finest [Hz]", "limit [Hz]", "order", "error [%]", "why no limit"])
+            plain_table(
+                rows, ["mode", "finest [Hz]", "limit [Hz]", "order", "error [%]", "why no limit"]
+            )
         )
     if found.answer is not None:
         parts.append(
-            table(found.answer.resonances[["mode", "frequency", "amplitude", "phase", "largest"]])
+            report_table(
+                found.answer.resonances[["mode", "frequency", "amplitude", "phase", "largest"]]
+            )
         )
     if found.mac is not None:
         rows = [[i + 1, row.argmax() + 1, f"{row.max():.4f}"] for i, row in enumerate(found.mac)]
-        parts.append(plain(rows, ["mode", "mode of the other run", "MAC"]))
+        parts.append(plain_table(rows, ["mode", "mode of the other run", "MAC"]))
     return "\n\n".join(parts)
 
 
-def pressures(maps: Mapping[float, Sequence[PressureMap]]) -> str:
+def pressure_table(maps: Mapping[float, Sequence[PressureMap]]) -> str:
     """Force and pressure of each face, for each load."""
     rows = []
     for load, seats in maps.items():
@@ -150,12 +154,12 @@ def pressures(maps: Mapping[float, Sequence[PressureMap]]) -> str:
                     f"{seat.complementarity:.1e}",
                 ]
             )
-    return plain(
+    return plain_table(
         rows, ["load", "face", "nodes", "force [N]", "peak [MPa]", "pressed [%]", "complementarity"]
     )
 
 
-def responses(response: Response) -> str:
+def response_tables(response: Response) -> str:
     """Resonance against load, and what damping is gained over no damper; in the units of the
     report.
     """
@@ -170,7 +174,7 @@ def responses(response: Response) -> str:
     rows.insert(0, "seat load", ["no damper", *map(_case_label, curves), "full stick"])
     best = min(curves, key=lambda c: c.peak_amplitude)
     return (
-        f"{table(rows)}\nbest of these loads: {_case_label(best)}, amplitude divided by "
+        f"{report_table(rows)}\nbest of these loads: {_case_label(best)}, amplitude divided by "
         f"{undamped / best.peak_amplitude:.3g}"
     )
 
@@ -202,24 +206,26 @@ def side_by_side(name: str, best: pd.DataFrame) -> str:
         "load",
         *(c for c in SUMMARY_COLUMNS if c in best and c not in ("dissipated", "points")),
     ]
-    return table(best[columns].rename(columns={"value": name}))
+    return report_table(best[columns].rename(columns={"value": name}))
 
 
-def table(rows: pd.DataFrame) -> str:
+def report_table(rows: pd.DataFrame) -> str:
     """A pandas table of SI columns, in the units of the report."""
     from ..report.tables import readable
 
-    return frame(readable(rows))
+    return frame_table(readable(rows))
 
 
-def summary(run: Run) -> str:
+def run_summary(run: Run) -> str:
     """Where the time went, what the run has to say, warnings last, and where the results are."""
     total = sum(run.timings.values())
     rows = [
         [name, f"{t:.2f}", f"{100 * t / total if total else 0:.0f}"]
         for name, t in run.timings.items()
     ]
-    table = plain([*rows, ["total", f"{total:.2f}", "100"]], ["stage", "time [s]", "share [%]"])
+    table = plain_table(
+        [*rows, ["total", f"{total:.2f}", "100"]], ["stage", "time [s]", "share [%]"]
+    )
     said = by_level(run.messages)
     summary_lines = [
         "\n".join([f"{title}:", *(f"  - {text}" for text in said[level])])
@@ -250,7 +256,7 @@ def _is_number(text: str) -> bool:
 
 def run_table(run: SolvedRun) -> str:
     """What a run of a blade with its damper ends with."""
-    return responses(run.response)
+    return response_tables(run.response)
 
 
 def mass_table(run: Any) -> str:
@@ -258,7 +264,7 @@ def mass_table(run: Any) -> str:
     from ..report.tables import readable
     from ..report.zmass import motion_table
 
-    return frame(readable(motion_table(run.motions)))
+    return frame_table(readable(motion_table(run.motions)))
 
 
 def pair_table(run: Any) -> str:
@@ -266,4 +272,4 @@ def pair_table(run: Any) -> str:
     from ..report.pair import pair_summary
     from ..report.tables import readable
 
-    return frame(readable(pair_summary(run.states)))
+    return frame_table(readable(pair_summary(run.states)))

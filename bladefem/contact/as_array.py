@@ -8,7 +8,7 @@ from numpy.typing import ArrayLike
 from ..errors import InputError
 
 
-def given(
+def as_float_array(
     name: str,
     value: ArrayLike,
     shape: tuple[int | None, ...],

@@ -19,7 +19,7 @@ from scipy.optimize import nnls
 
 from ..errors import InputError
 from ..util.arrays import BooleanArray, RealArray
-from .as_array import given
+from .as_array import as_float_array
 
 # relative size below which a force or gap counts as zero when the active set is updated
 ROUND_OFF = 1e-12
@@ -94,7 +94,11 @@ def solve_lcp(
     # closes even gaps, however wide, before round-off could drown the elastic ones in them
     travel = -(U.T @ g0)
     g0 = g0 + U @ travel
-    active = _winkler_set(C, g0, U, reduced) if start is None else given("start", start, (n,)) > 0
+    active = (
+        _winkler_set(C, g0, U, reduced)
+        if start is None
+        else as_float_array("start", start, (n,)) > 0
+    )
     try:
         f, y, active, its, settled = _primal_dual(C, g0, U, reduced, active, max_iterations)
         if not settled:
@@ -138,16 +142,16 @@ def _check_arrays(
     """All four as arrays that fit each other, without floating body and load where these are left
     out.
     """
-    g0 = given("g0", g0, (None,))
+    g0 = as_float_array("g0", g0, (None,))
     if len(g0) == 0:
         raise InputError("g0 is empty, expected the gap of at least one contact node")
     if R is None and load is not None:
         raise InputError(
             "load is given without R, expected the rigid motions of the body that it acts on"
         )
-    R = np.zeros((len(g0), 0)) if R is None else given("R", R, (len(g0), None))
-    load = np.zeros(R.shape[1]) if load is None else given("load", load, (R.shape[1],))
-    return given("C", C, (len(g0), len(g0))), g0, R, load
+    R = np.zeros((len(g0), 0)) if R is None else as_float_array("R", R, (len(g0), None))
+    load = np.zeros(R.shape[1]) if load is None else as_float_array("load", load, (R.shape[1],))
+    return as_float_array("C", C, (len(g0), len(g0))), g0, R, load
 
 
 def complementarity(

@@ -58,7 +58,7 @@ def traction_shape(corners: int, points: np.ndarray) -> np.ndarray:
     return (hats + 2 * dual) / 3
 
 
-def shape(
+def face_shape_functions(
     nodes: int,
     corners: int,
     points: np.ndarray,

@@ -66,17 +66,19 @@ def with_rough_layer(contact: Contact) -> Contact:
     if contact.stiffness != "given" or _gives(contact, "kt") or _gives(contact, "kn"):
         return contact
     pressure = TOUCHING_PRESSURE if contact.stiffening is None else contact.stiffening
-    return replace(contact, kn_area=pressure / decay_length(finish(contact)), stiffening=pressure)
+    return replace(
+        contact, kn_area=pressure / decay_length(mean_roughness(contact)), stiffening=pressure
+    )
 
 
-def finish(contact: Contact) -> float:
+def mean_roughness(contact: Contact) -> float:
     """Mean roughness Ra of each face [m]."""
     return GROUND_FINISH if contact.roughness is None else contact.roughness
 
 
 def rougher_contact(contact: Contact, factor: float) -> Contact:
     """[contact] with the roughness of its faces times a factor."""
-    return replace(contact, roughness=factor * finish(contact))
+    return replace(contact, roughness=factor * mean_roughness(contact))
 
 
 def gives_stiffness(contact: Contact) -> bool:
@@ -219,7 +221,7 @@ def layer_friction(
     return np.concatenate(kt), np.concatenate(mu)
 
 
-def layered(
+def with_interface_law(
     problem: ContactProblem,
     contact: Contact,
     ratio: float,
@@ -267,7 +269,7 @@ def friction_elements(
     Raises:
         InputError: a normal load that follows the motion needs a normal stiffness.
     """
-    G = [aggregation(m.patch, contact.points) for m in maps]
+    G = [aggregation_matrix(m.patch, contact.points) for m in maps]
     members = _members(G)
     seats = [seat_contact(contact, m.patch.name) for m in maps]
     area = [a.T @ m.patch.area for a, m in zip(members, maps, strict=True)]
@@ -347,7 +349,7 @@ def mapped_stiffness(problem: ContactProblem, maps: Sequence[PressureMap]) -> li
     return found
 
 
-def aggregation(patch: Patch, points: int | None) -> sp.csr_matrix:
+def aggregation_matrix(patch: Patch, points: int | None) -> sp.csr_matrix:
     """G (n, m): share of each node in its element by area; the columns sum to 1. The identity when
     points is None.
 

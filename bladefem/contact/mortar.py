@@ -22,8 +22,14 @@ from geometry.mesh import Mesh
 from ..data import Patch
 from ..errors import InputError
 from ..util.arrays import BooleanArray, IntegerArray, RealArray
-from .face_elements import LINEAR, corner_count, face_quadrature, shape, traction_shape
-from .surface import FaceRule, frames, outward, surface
+from .face_elements import (
+    LINEAR,
+    corner_count,
+    face_quadrature,
+    face_shape_functions,
+    traction_shape,
+)
+from .surface import FaceRule, outward_signs, surface_quadrature, tangent_frames
 
 # pieces below this part of a face's area are dropped
 SLIVER_AREA = 1e-9
@@ -54,7 +60,7 @@ class Overlap:
     covered: BooleanArray
 
 
-def overlap(mesh: Mesh, pair: str) -> Overlap:
+def mortar_overlap(mesh: Mesh, pair: str) -> Overlap:
     """Cut the two faces of a pair against each other.
 
     Raises:
@@ -73,8 +79,8 @@ def overlap(mesh: Mesh, pair: str) -> Overlap:
     places = (mesh.points, (mesh.points - p.shift) @ p.rotation)
     X = places[0][master[:, :d]]
     Y = places[1][slave[:, :d]]
-    weighted, _ = surface(mesh, master)
-    sign = outward(mesh, master, weighted.sum(axis=1))
+    weighted, _ = surface_quadrature(mesh, master)
+    sign = outward_signs(mesh, master, weighted.sum(axis=1))
     view = _view_axes(weighted.sum(axis=1) * sign[:, None], d, pair)
     close = np.array(_close_pairs(X, Y), dtype=int).reshape(-1, 2)
     # The corners of the slave in the master's own coordinates, in which its edges are taken as
@@ -115,13 +121,13 @@ def mortar_patch(mesh: Mesh, pair: str) -> Patch:
     """
     p = mesh.pairs[pair]
     d = mesh.dimension
-    o = overlap(mesh, pair)
+    o = mortar_overlap(mesh, pair)
     used = np.unique(o.face[:, 0])
     faces = o.master[used]
     nodes, numbers = np.unique(faces[:, :d], return_inverse=True)
-    weighted, _ = surface(mesh, faces)
+    weighted, _ = surface_quadrature(mesh, faces)
     normals = np.zeros((len(mesh.points), 3))
-    direction = weighted.sum(axis=1) * outward(mesh, faces, weighted.sum(axis=1))[:, None]
+    direction = weighted.sum(axis=1) * outward_signs(mesh, faces, weighted.sum(axis=1))[:, None]
     np.add.at(normals, faces[:, :d], direction[:, None, :])
     area: np.ndarray = np.bincount(
         o.master[o.face[:, 0], :d].ravel(),
@@ -135,7 +141,7 @@ def mortar_patch(mesh: Mesh, pair: str) -> Patch:
         pair,
         mesh.points[nodes],
         area[nodes],
-        frames(normal, d),
+        tangent_frames(normal, d),
         numbers.reshape(-1, d),
         nodes,
         across[nearest],
@@ -148,12 +154,12 @@ def mortar_faces(
     side: str,
 ) -> FaceRule:
     """The quadrature rule of the patch on one of its sides."""
-    o = overlap(mesh, patch.name)
+    o = mortar_overlap(mesh, patch.name)
     s = 0 if side == "blade" else 1
     faces = (o.master, o.slave)[s][o.face[:, s]]
     d = o.at[s].shape[2] + 1
     q = o.at[s].shape[1]
-    N, _ = shape(faces.shape[1], d, o.at[s].reshape(-1, d - 1))
+    N, _ = face_shape_functions(faces.shape[1], d, o.at[s].reshape(-1, d - 1))
     number = np.full(len(mesh.points), -1)
     number[patch.blade_nodes] = np.arange(len(patch.blade_nodes))
     return FaceRule(
@@ -309,7 +315,7 @@ def _map_points(nodes: np.ndarray, at: np.ndarray) -> tuple[np.ndarray, np.ndarr
     """
     s, q, d = at.shape
     m = nodes.shape[1]
-    N, dN = shape(m, d + 1, at.reshape(-1, d))
+    N, dN = face_shape_functions(m, d + 1, at.reshape(-1, d))
     return (
         np.einsum("sqm,smi->sqi", N.reshape(s, q, m), nodes),
         np.einsum("sqmd,smi->sqdi", dN.reshape(s, q, m, d), nodes),

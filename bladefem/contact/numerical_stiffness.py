@@ -23,7 +23,7 @@ import numpy as np
 
 from ..data import Elements, PressureMap
 from ..scene.tables import Contact
-from .interface_elements import aggregation
+from .interface_elements import aggregation_matrix
 from .seating import ContactProblem
 
 # Numerical stiffness over that of the bodies under a medium wave of pressure. The part of the
@@ -114,5 +114,5 @@ def physical_stiffness(elements: Elements, series: np.ndarray | None) -> Element
 
 def _element_areas(pressure: PressureMap, contact: Contact) -> np.ndarray:
     """(m,) area that each element of a patch represents [m^2]."""
-    groups = aggregation(pressure.patch, contact.points).indices
+    groups = aggregation_matrix(pressure.patch, contact.points).indices
     return np.bincount(groups, pressure.patch.area)

@@ -19,7 +19,7 @@ import numpy as np
 from scipy.linalg import LinAlgError, cho_factor, cho_solve
 
 from ..errors import InputError, NotSolvedError
-from .as_array import given
+from .as_array import as_float_array
 
 ROUND_OFF = 1e-12
 
@@ -65,13 +65,13 @@ def slip_step(
             values that are not finite.
         NotSolvedError: the active sets did not settle.
     """
-    limit, n = given("limit", limit, (None,)), len(limit)
-    C = given("C", C, (n, n))
+    limit, n = as_float_array("limit", limit, (None,)), len(limit)
+    C = as_float_array("C", C, (n, n))
     if (limit < 0).any():
         raise InputError(f"limit of a node is {limit.min():g} N, expected at least 0 N")
     for name, value in (("shift", shift), ("total", total)):
         if value is not None:
-            given(name, value, ())
+            as_float_array(name, value, ())
     if (shift is None) == (total is None):
         raise InputError("slip_step needs exactly one of shift and total")
     if total is not None and not abs(total) < limit.sum():
@@ -80,7 +80,7 @@ def slip_step(
             f"{limit.sum():g} N"
         )
     before = before or SlipState(np.zeros(n), 0.0, np.zeros(n), np.zeros(n, int), 0.0)
-    given("before.force", before.force, (n,))
+    as_float_array("before.force", before.force, (n,))
     state = np.where(limit > 0, before.state, 1)
     seen = set()
     for _ in range(max_iterations):

@@ -22,9 +22,9 @@ from geometry.mesh import Mesh
 
 from ..data import Patch
 from ..errors import InputError
-from .face_elements import corner_count, face_quadrature, shape
+from .face_elements import corner_count, face_quadrature, face_shape_functions
 from .mortar import mortar_faces, mortar_patch
-from .surface import FaceRule, frames, outward, surface
+from .surface import FaceRule, outward_signs, surface_quadrature, tangent_frames
 
 
 def make_patch(mesh: Mesh, pair: str) -> Patch:
@@ -59,11 +59,11 @@ def _matched_patch(mesh: Mesh, pair: str) -> Patch:
     faces, slave = patch_faces(mesh, pair)
     corners = corner_count(mesh.dimension, faces.shape[1])
     nodes, numbers = np.unique(faces[:, :corners], return_inverse=True)
-    weighted, hats = surface(mesh, faces)
+    weighted, hats = surface_quadrature(mesh, faces)
     normals = np.zeros((len(nodes), 3))
     area = np.zeros(len(nodes))
     numbers = numbers.reshape(-1, corners)
-    sign = outward(mesh, faces, weighted.sum(axis=1))
+    sign = outward_signs(mesh, faces, weighted.sum(axis=1))
     for k in range(corners):
         np.add.at(
             normals, numbers[:, k], np.einsum("fqi,q->fi", weighted, hats[:, k]) * sign[:, None]
@@ -74,7 +74,7 @@ def _matched_patch(mesh: Mesh, pair: str) -> Patch:
         pair,
         mesh.points[nodes],
         area,
-        frames(normals, mesh.dimension),
+        tangent_frames(normals, mesh.dimension),
         numbers,
         nodes,
         slave[nodes],
@@ -191,7 +191,7 @@ def _patch_ports(
     """
     d = mesh.dimension
     rule = _side_rule(patch, mesh, side)
-    frame = frames(rule.normal.reshape(-1, 3), d, patch.frame[:, 0])
+    frame = tangent_frames(rule.normal.reshape(-1, 3), d, patch.frame[:, 0])
     if side != "blade":
         frame = frame @ mesh.pairs[patch.name].rotation.T
     frame = frame[:, :d, :d].reshape(*rule.normal.shape[:2], d, d)
@@ -221,11 +221,11 @@ def _side_rule(
     if not mesh.pairs[patch.name].nodes.size:
         return mortar_faces(patch, mesh, side)
     faces, slave = patch_faces(mesh, patch.name)
-    weighted, chi = surface(mesh, faces)
+    weighted, chi = surface_quadrature(mesh, faces)
     corners = chi.shape[1]
     size = np.linalg.norm(weighted, axis=2)
-    N, _ = shape(faces.shape[1], corners, face_quadrature(corners)[0])
-    sign = outward(mesh, faces, weighted.sum(axis=1))
+    N, _ = face_shape_functions(faces.shape[1], corners, face_quadrature(corners)[0])
+    sign = outward_signs(mesh, faces, weighted.sum(axis=1))
     return FaceRule(
         faces if side == "blade" else slave[faces],
         patch.faces,

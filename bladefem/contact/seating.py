@@ -39,7 +39,7 @@ from ..fem.loads import centrifugal, mass
 from ..scene.tables import Materials
 from ..util.arrays import RealArray
 from ..util.communicator import Communicator
-from .as_array import given
+from .as_array import as_float_array
 from .complementarity import LCPSolution, held_directions, solve_lcp
 from .interface_law import InterfaceLaw, closure_of, compliance_at, rigid_faces
 from .patch import initial_gap, make_patch, normal_ports, port_matrix, rigid_ports
@@ -101,8 +101,8 @@ def contact_problem(
         clearance: gap before seating [m] on top of the one that the mesh has
             (``patch.initial_gap``), one number or (n,) values (means over the ports' weights, see
             ``patch.patch_means``); negative for an interference.
-        pull: (n_points*dim,) load on the damper [N] instead of its centrifugal load; ``solve`` it
-            with ``normal``.
+        pull: (n_points*dim,) load on the damper [N] instead of its centrifugal load;
+            ``solve_seating`` it with ``normal``.
 
     Raises:
         InputError: the blade is not in nodal diameter 0, or the clearance does not fit the ports.
@@ -128,13 +128,13 @@ def contact_problem(
         C = C + C_damper
     rigid, load = rigid_and_load(mesh, patches, body, pull)
     gap = np.concatenate([initial_gap(p, mesh) for p in patches])
-    gap = gap + given("clearance", clearance, gap.shape if np.ndim(clearance) else ())
+    gap = gap + as_float_array("clearance", clearance, gap.shape if np.ndim(clearance) else ())
     return ContactProblem(
         tuple(patches), C, gap, -blade_swell, damper_swell, rigid[ports], load, mass(body)
     )
 
 
-def solve(
+def solve_seating(
     problem: ContactProblem,
     speed: float,
     normal: float | None = None,
@@ -166,7 +166,9 @@ def solve(
     _check_load(speed, normal, damper_mass)
     active = None if start is None else np.concatenate([m.force > 0 for m in start])
     problem = _fitted(problem) if bedded else problem
-    moved = 0.0 if approach is None else given("approach", approach, problem.clearance.shape)
+    moved = (
+        0.0 if approach is None else as_float_array("approach", approach, problem.clearance.shape)
+    )
     g0 = problem.clearance + speed**2 * problem.blade_swell - moved
     if normal is None:
         scale = speed**2 * (1.0 if damper_mass is None else damper_mass / problem.mass)
@@ -195,7 +197,7 @@ def _check_load(
         raise InputError(f"damper_mass is {damper_mass} kg, expected a positive, finite one")
 
 
-def seat(
+def solve_mesh_seating(
     mesh: Mesh,
     material: Materials,
     speed: float,
@@ -203,8 +205,8 @@ def seat(
     normal: float | None = None,
     comm: Communicator | None = None,
 ) -> list[PressureMap]:
-    """Everything from the mesh to the pressure maps of "this" and "next" in one call (``solve``
-    tells the arguments).
+    """Everything from the mesh to the pressure maps of "this" and "next" in one call
+    (``solve_seating`` tells the arguments).
 
     Assembles and factorises both bodies; keep the ContactProblem of ``contact_problem`` where more
     states follow.
@@ -213,7 +215,7 @@ def seat(
     diameter = 0 if "cyclic" in mesh.pairs else None
     blade = flexible(constrain(assemble(mesh, "blade", material.blade, comm), "clamp", diameter))
     damper = flexible(constrain(assemble(mesh, "damper", material.damper, comm), None))
-    return solve(contact_problem(mesh, patches, blade, damper, clearance), speed, normal)
+    return solve_seating(contact_problem(mesh, patches, blade, damper, clearance), speed, normal)
 
 
 def spin_axis(mesh: Mesh) -> tuple[float, float, float]:

@@ -57,7 +57,7 @@ def state_table(solve: Callable[..., np.ndarray], axes: Sequence[np.ndarray]) ->
     )
 
 
-def interpolate(table: StateTable, point: Sequence[float]) -> tuple[np.ndarray, float]:
+def interpolate_states(table: StateTable, point: Sequence[float]) -> tuple[np.ndarray, float]:
     """Forces (n,) by multilinear interpolation, and an error indicator relative to the table's
     largest force.
 

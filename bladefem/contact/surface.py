@@ -13,7 +13,7 @@ from geometry.mesh import Mesh
 
 from ..errors import InputError
 from ..util.arrays import IntegerArray, RealArray
-from .face_elements import corner_count, face_quadrature, shape, traction_shape
+from .face_elements import corner_count, face_quadrature, face_shape_functions, traction_shape
 
 BODY_CORNERS = {"triangle": 3, "quad": 4, "tetra": 4, "hexahedron": 8, "wedge": 6, "pyramid": 5}
 
@@ -34,13 +34,13 @@ class FaceRule:
     normal: RealArray
 
 
-def surface(mesh: Mesh, faces: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+def surface_quadrature(mesh: Mesh, faces: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Normal vectors times quadrature weight and depth (nf, q, 3) [m^2], and traction functions (q,
     corners).
     """
     corners = corner_count(mesh.dimension, faces.shape[1])
     points, weights = face_quadrature(corners)
-    _, dN = shape(faces.shape[1], corners, points)
+    _, dN = face_shape_functions(faces.shape[1], corners, points)
     tangents = np.einsum("qkd,fki->fqdi", dN, mesh.points[faces])
     if mesh.dimension == 2:
         normals = np.cross(tangents[:, :, 0], [0.0, 0.0, mesh.depth])
@@ -49,7 +49,7 @@ def surface(mesh: Mesh, faces: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     return normals * weights[:, None], traction_shape(corners, points)
 
 
-def outward(
+def outward_signs(
     mesh: Mesh,
     faces: np.ndarray,
     normals: np.ndarray,
@@ -81,7 +81,7 @@ def outward(
     return sign
 
 
-def frames(
+def tangent_frames(
     normals: np.ndarray,
     dimension: int,
     like: np.ndarray | None = None,

@@ -18,7 +18,7 @@ from bladefem.errors import InputError, NotSolvedError
 
 from ..time.event_integrator import State, state_at_rest
 from ..time.system import System
-from .explicit import Cycle, March, check_steps, explicit_march, sampled, settle
+from .explicit import Cycle, March, check_steps, explicit_march, march_to_periodic, sample_fourier
 
 
 def direct(
@@ -45,7 +45,7 @@ def direct(
     if explicit:
         check_steps(system, omega, steps)
     march = (explicit_march if explicit else newmark_march)(system, omega, steps)
-    return settle(march, start or state_at_rest(system), most, tolerance)
+    return march_to_periodic(march, start or state_at_rest(system), most, tolerance)
 
 
 def newmark_march(
@@ -79,7 +79,7 @@ def newmark_march(
         system.W @ lag,
         system.V @ lag,
     )
-    inputs = tuple(sampled(a, steps) for a in (system.force, system.drive, system.normal))
+    inputs = tuple(sample_fourier(a, steps) for a in (system.force, system.drive, system.normal))
 
     def march(state: State) -> tuple[State, np.ndarray, np.ndarray, np.ndarray]:
         y = np.r_[state.q, state.v, state.z]

@@ -82,12 +82,12 @@ def damper_cycle(
         InputError: the step is beyond the stability limit.
     """
     check_steps(system, omega, steps)
-    return settle(
+    return march_to_periodic(
         explicit_march(system, omega, steps), start or state_at_rest(system), most, tolerance
     )
 
 
-def settle(
+def march_to_periodic(
     march: March,
     start: State,
     most: int,
@@ -131,7 +131,7 @@ def explicit_march(
     if np.abs(system.damping - np.diag(np.diag(system.damping))).max() > 0:
         raise InputError("System.damping: expected a diagonal matrix for explicit integration")
     d = len(system.stiffness)
-    inputs = tuple(sampled(a, steps) for a in (system.force, system.drive, system.normal))
+    inputs = tuple(sample_fourier(a, steps) for a in (system.force, system.drive, system.normal))
     arrays = tuple(
         np.ascontiguousarray(a)
         for a in (
@@ -154,7 +154,7 @@ def explicit_march(
     return march
 
 
-def sampled(coefficients: np.ndarray, steps: int) -> np.ndarray:
+def sample_fourier(coefficients: np.ndarray, steps: int) -> np.ndarray:
     """Values (steps + 1, rows) of Fourier coefficients (rows, 2H+1) at steps + 1 instants of one
     period.
     """

@@ -12,7 +12,7 @@ import numpy as np
 import pandas as pd
 
 from .best_load import found_best
-from .statements import Answer
+from .statements import ResponseAnswer
 
 # what an answer says in place of a number that the data cannot carry
 NOT_DETERMINED = "not determined"
@@ -29,7 +29,7 @@ class Headline(NamedTuple):
 
 
 def headlines(
-    answer: Answer,
+    answer: ResponseAnswer,
     summary: pd.DataFrame | None,
     points: pd.DataFrame | None,
     searched: pd.DataFrame | None = None,

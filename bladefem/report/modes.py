@@ -52,7 +52,7 @@ MESH_STEP = (
 )
 
 
-def run(
+def report_survey(
     scene: Scene,
     folder: str | Path,
     wanted: Wanted,

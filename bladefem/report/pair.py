@@ -40,7 +40,7 @@ class PairRun:
     messages: list[str]
 
 
-def run(
+def report_pair(
     scene: Scene,
     folder: str | Path,
     comm: Communicator | None = None,

@@ -36,7 +36,7 @@ MESH_STEP = (
 Maps = Mapping[float, Sequence[PressureMap]]
 
 
-def run(
+def report_pressure(
     scene: Scene,
     folder: str | Path,
     comm: Communicator | None = None,

@@ -85,7 +85,7 @@ MESH_ERROR_NOTE = (
 )
 
 
-def run(
+def report_run(
     scene: Scene,
     folder: str | Path,
     comm: Communicator | None = None,

@@ -7,7 +7,7 @@ from typing import NamedTuple
 import numpy as np
 import pandas as pd
 
-from bladefem.contact.interface_elements import finish, gives_stiffness
+from bladefem.contact.interface_elements import gives_stiffness, mean_roughness
 from bladefem.contact.rough_layer import RANGE, SOURCE, decay_length, rough_stiffness
 from bladefem.scene.kinds import kind_named
 from bladefem.scene.tables import Scene
@@ -21,7 +21,7 @@ OFF_RESONANCE = 0.1
 SAME_LOAD_TOLERANCE = 1e-3
 
 
-class Answer(NamedTuple):
+class ResponseAnswer(NamedTuple):
     """What the engineer asked for."""
 
     # what, value, remark
@@ -29,13 +29,13 @@ class Answer(NamedTuple):
     cautions: list[str]
 
 
-def answer(
+def response_answer(
     summary: pd.DataFrame | None,
     points: pd.DataFrame | None = None,
     own: pd.DataFrame | None = None,
     masses: pd.DataFrame | None = None,
     searched: pd.DataFrame | None = None,
-) -> Answer:
+) -> ResponseAnswer:
     """The best load and what it brings; no optimum is named where the data cannot carry it.
 
     Args:
@@ -52,14 +52,14 @@ def answer(
             (``best_load.best_load_table``); without it the best of the loads studied is named.
     """
     if summary is None or summary.empty:
-        return Answer([], [])
+        return ResponseAnswer([], [])
     finite = summary[(summary["load"] > 0) & np.isfinite(summary["load"])]
     if finite.empty:
-        return Answer([], ["No damper load was studied."])
+        return ResponseAnswer([], ["No damper load was studied."])
     found = None if searched is None else found_best(searched, summary)
     best = finite.loc[finite["peak_amplitude"].idxmin()] if found is None else found
     against = reasons_against(best, summary, points, searched)
-    remark = mass_of(best) or (among(finite) if found is None else flat_range(best))
+    remark = mass_of(best) or (best_of_studied(finite) if found is None else flat_range(best))
     doubts = cautions(finite, best, points, found is not None)
     if against:
         lowest = (
@@ -69,9 +69,9 @@ def answer(
         )
         said = [f"No optimum load is named: {reason}." for reason in against]
         unknown = ("optimum normal load per seat", "not determined", against[0])
-        return Answer([unknown, lowest], [*said, *doubts])
+        return ResponseAnswer([unknown, lowest], [*said, *doubts])
     numbers = _optimum_numbers(summary, best, remark)
-    return Answer(
+    return ResponseAnswer(
         [*numbers, *stress(summary, best), *own_mass(finite, best, own, masses)],
         doubts,
     )
@@ -90,8 +90,12 @@ def _optimum_numbers(
             f"{1e6 * best['peak_amplitude']:.4g} µm",
             ", ".join(filter(None, [reduction(summary, best), certainty(best)])),
         ),
-        *history(best),
-        ("resonance frequency there", f"{best['peak_frequency']:.5g} Hz", shift(summary, best)),
+        *history_range(best),
+        (
+            "resonance frequency there",
+            f"{best['peak_frequency']:.5g} Hz",
+            frequency_shift_sentence(summary, best),
+        ),
     ]
     if np.isfinite(best.get("friction_damping", np.nan)):
         numbers.append(
@@ -106,12 +110,12 @@ def _optimum_numbers(
     return numbers
 
 
-def among(finite: pd.DataFrame) -> str:
+def best_of_studied(finite: pd.DataFrame) -> str:
     """That the load is the best of those studied, which is not the optimum."""
     return f"best of {len(finite)} loads studied" if len(finite) > 1 else ""
 
 
-def history(best: pd.Series) -> list[tuple[str, str, str]]:
+def history_range(best: pd.Series) -> list[tuple[str, str, str]]:
     """How far the loading history may move the answer."""
     if not np.isfinite(best.get("lowest", np.nan)):
         return []
@@ -184,7 +188,7 @@ def assumed_stiffness(scene: Scene, pressed: pd.DataFrame | None = None) -> list
     """
     if gives_stiffness(scene.contact):
         return []
-    roughness = finish(scene.contact)
+    roughness = mean_roughness(scene.contact)
     known = "ground seats" if scene.contact.roughness is None else "contact.roughness"
     at_one = 1e-9 * rough_stiffness(1e6, roughness)
     there = ""
@@ -256,7 +260,7 @@ def reduction(summary: pd.DataFrame, best: pd.Series) -> str:
     return ""
 
 
-def shift(summary: pd.DataFrame, best: pd.Series) -> str:
+def frequency_shift_sentence(summary: pd.DataFrame, best: pd.Series) -> str:
     """Where the resonance lies between the free and the stuck blade."""
     ends = [summary.loc[summary["load"] == load, "peak_frequency"] for load in (0.0, np.inf)]
     words = ("free", "in full stick")
@@ -321,7 +325,7 @@ def cut_peaks(finite: pd.DataFrame, points: pd.DataFrame | None) -> list[float]:
     ]
 
 
-def trust(points: pd.DataFrame | None) -> tuple[list[str], pd.DataFrame]:
+def reliability(points: pd.DataFrame | None) -> tuple[list[str], pd.DataFrame]:
     """Sentences on convergence, and a row for each load with points that failed or needed a
     fallback.
 

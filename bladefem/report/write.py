@@ -30,7 +30,7 @@ from .headlines import Headline, headlines
 from .library import chart_library
 from .next_steps import next_steps
 from .page_tables import page_tables
-from .statements import answer, assumed_stiffness, trust, wrong_speed
+from .statements import assumed_stiffness, reliability, response_answer, wrong_speed
 from .tables import numeric, readable, to_markdown
 
 SECTIONS = {
@@ -112,7 +112,7 @@ def write_report(
     import jinja2
 
     page = page or Page()
-    check(tables, figures)
+    check_names(tables, figures)
     folder = open_folder(folder)
     given = given_fields(folder) if given is None else given
     found = contents(scene, tables, figures, list(messages), dict(timings or {}), given, page)
@@ -130,7 +130,7 @@ def write_report(
     )
 
 
-def check(tables: Mapping[str, Any], figures: Mapping[str, str | Path]) -> None:
+def check_names(tables: Mapping[str, Any], figures: Mapping[str, str | Path]) -> None:
     """Sections are known, figures are there."""
     for name in (*tables, *figures):
         if name.split("/")[0] not in SECTIONS:
@@ -193,7 +193,7 @@ def _shown_tables(
     tables: Mapping[str, pd.DataFrame],
 ) -> tuple[list[str], dict[str, pd.DataFrame]]:
     """Statements on convergence, and the tables that are printed."""
-    statements, doubtful = trust(tables.get("response/points"))
+    statements, doubtful = reliability(tables.get("response/points"))
     shown = {name: table for name, table in tables.items() if name != "response/points"}
     if len(doubtful):
         shown["accuracy/loads_with_doubtful_points"] = doubtful
@@ -213,7 +213,7 @@ def _answer(
     own = tables.get("contact/own_load")
     searched = tables.get("response/best_load")
     masses = tables.get("contact/damper_mass")
-    found = answer(summary, points, own, masses, searched)
+    found = response_answer(summary, points, own, masses, searched)
     cautions = [
         *assumed_stiffness(scene, tables.get("contact/pressure")),
         *wrong_speed(scene, summary),
@@ -253,7 +253,7 @@ def _sections(
                 if name.split("/")[0] == key
             ],
             "tables": [
-                printed(part, piece, next(table_numbers))
+                page_table(part, piece, next(table_numbers))
                 for name, table in tables.items()
                 if name.split("/")[0] == key
                 for part, piece in page_tables(name, table)
@@ -278,7 +278,7 @@ def _figure(
     }
 
 
-def printed(
+def page_table(
     name: str,
     table: pd.DataFrame,
     number: int,

@@ -40,7 +40,7 @@ class MassRun:
     messages: list[str]
 
 
-def run(
+def report_zmass(
     scene: Scene,
     folder: str | Path,
     comm: Communicator | None = None,

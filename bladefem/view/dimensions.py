@@ -16,7 +16,7 @@ DIMENSION_COLOUR = COLOURS[0]
 Point: TypeAlias = Sequence[float] | np.ndarray
 
 
-def shape(ax: Axes, corners: np.ndarray, colour: str = "#d5dbe1", **style: Any) -> None:
+def draw_outline(ax: Axes, corners: np.ndarray, colour: str = "#d5dbe1", **style: Any) -> None:
     """A filled outline, (n, 2) corners."""
     ax.fill(
         *np.asarray(corners).T,
@@ -24,7 +24,7 @@ def shape(ax: Axes, corners: np.ndarray, colour: str = "#d5dbe1", **style: Any) 
     )
 
 
-def length(
+def draw_length(
     ax: Axes,
     start: Point,
     end: Point,
@@ -96,7 +96,7 @@ def _draw_arrow(ax: Axes, start: np.ndarray, end: np.ndarray) -> None:
     )
 
 
-def angle(
+def draw_angle(
     ax: Axes,
     centre: Point,
     start: float,
@@ -134,7 +134,7 @@ def angle(
     )
 
 
-def note(
+def draw_note(
     ax: Axes,
     point: Point,
     text: str,

@@ -9,7 +9,7 @@ import matplotlib.colors
 import numpy as np
 import pandas as pd
 
-from .response import between, load_colours, load_name, pieces_of
+from .response import load_colours, load_name, pieces_of, smooth_curve
 from .style import COLOURS, FAILED_COLOUR
 
 MICRO = 1e6
@@ -77,15 +77,15 @@ def _curve_traces(
     good = curve["converged"].to_numpy(bool)
     frequency = curve["frequency"].to_numpy(float)
     amplitude = np.where(good, MICRO * curve["amplitude"].to_numpy(float), np.nan)
-    x, y = between(frequency, amplitude)
+    x, y = smooth_curve(frequency, amplitude)
     name = load_name(load)
     line = {
         "type": "scatter",
         "mode": "lines",
         "name": name,
         "legendgroup": name,
-        "x": numbers(x),
-        "y": numbers(y),
+        "x": json_numbers(x),
+        "y": json_numbers(y),
         "line": {"color": colour, "dash": DASHES.get(load, "solid"), "width": 2},
         "hoverinfo": "skip",
     }
@@ -109,8 +109,8 @@ def _mark_points(
         "type": "scatter",
         "mode": "markers",
         "name": name,
-        "x": numbers(points["frequency"]),
-        "y": numbers(MICRO * points["amplitude"]),
+        "x": json_numbers(points["frequency"]),
+        "y": json_numbers(MICRO * points["amplitude"]),
         "marker": style,
         "text": texts,
         "hovertemplate": "%{x:.3f} Hz, %{y:.4g} µm<br>%{text}<extra></extra>",
@@ -186,7 +186,7 @@ def _optimum_curve(
         "mode": "lines+markers",
         "name": name,
         "legendgroup": name,
-        "x": numbers(finite["load"]),
+        "x": json_numbers(finite["load"]),
         "line": {"color": colour},
     }
     best = int(np.argmin(amplitude))
@@ -195,14 +195,14 @@ def _optimum_curve(
     bars = np.where(np.isfinite(error), error * amplitude, 0.0)
     upper = {
         **common,
-        "y": numbers(amplitude),
+        "y": json_numbers(amplitude),
         "marker": {"symbol": symbols, "size": sizes},
-        "error_y": {"type": "data", "array": numbers(bars), "thickness": 1},
+        "error_y": {"type": "data", "array": json_numbers(bars), "thickness": 1},
         "hovertemplate": "%{x:.4g} N, %{y:.4g} µm<extra></extra>",
     }
     lower = {
         **common,
-        "y": numbers(finite["peak_frequency"]),
+        "y": json_numbers(finite["peak_frequency"]),
         "xaxis": "x2",
         "yaxis": "y2",
         "showlegend": False,
@@ -272,8 +272,8 @@ def live_loops(
                     "legendgroup": load,
                     # one name for both seats
                     "showlegend": first == 0,
-                    "x": numbers(MICRO * np.asarray(x)[closed]),
-                    "y": numbers(np.asarray(force)[closed]),
+                    "x": json_numbers(MICRO * np.asarray(x)[closed]),
+                    "y": json_numbers(np.asarray(force)[closed]),
                     "line": {"color": COLOURS[number % len(COLOURS)], "dash": dash, "width": 1.6},
                     "hovertemplate": f"%{{x:.4g}} µm, %{{y:.4g}} N<extra>{load}, {seat}</extra>",
                 }
@@ -299,8 +299,8 @@ def live_diameters(table: pd.DataFrame) -> dict[str, Any]:
             "type": "scatter",
             "mode": "markers",
             "name": str(name),
-            "x": numbers(table.loc[names == name, "nodal_diameter"]),
-            "y": numbers(table.loc[names == name, "frequency"]),
+            "x": json_numbers(table.loc[names == name, "nodal_diameter"]),
+            "y": json_numbers(table.loc[names == name, "frequency"]),
             "marker": {
                 "color": COLOURS[i % len(COLOURS)],
                 "symbol": SYMBOLS[i // len(COLOURS) % len(SYMBOLS)],
@@ -334,7 +334,7 @@ def _log_axis(values: Any) -> dict[str, Any]:
     return {"type": "log", "tickvals": ticks, "ticktext": [f"{tick:g}" for tick in ticks]}
 
 
-def numbers(values: Any) -> list[float | None]:
+def json_numbers(values: Any) -> list[float | None]:
     """Plain numbers with the digits that a page needs; None where there is none."""
     array = np.asarray(values, dtype=float)
     return [float(f"{v:.{SIGNIFICANT_DIGITS}g}") if np.isfinite(v) else None for v in array]

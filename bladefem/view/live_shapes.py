@@ -13,7 +13,7 @@ from bladefem.util.arrays import ComplexArray, IntegerArray, RealArray
 from geometry.mesh import Mesh
 
 from .mesh import view_of
-from .modes import best_phase, mode_title, moving, scale_of
+from .modes import best_phase, mode_title, moving_bodies, scale_of
 from .motion import amplitude_of, drawn_factor, extreme_phase
 from .skin import skin
 
@@ -43,7 +43,7 @@ def live_shapes(
     shown = range(min(count, len(modes.frequencies)))
     if not shown:
         return None
-    surface = skin(moving(mesh, modes.shapes[0]), coarse=True)
+    surface = skin(moving_bodies(mesh, modes.shapes[0]), coarse=True)
     if len(surface.triangles) > MOST_TRIANGLES:
         return None
     found = []
@@ -83,7 +83,7 @@ def live_motion(
     first = next(iter(motions.values()), None)
     if first is None:
         return None
-    surface = skin(moving(mesh, amplitude_of(first)), coarse=True)
+    surface = skin(moving_bodies(mesh, amplitude_of(first)), coarse=True)
     if len(surface.triangles) > MOST_TRIANGLES:
         return None
     return {

@@ -9,7 +9,7 @@ import numpy as np
 
 from geometry.look import AXES, Look
 
-from .style import RENDER_OPTIONS, aim, canvas, open_plotter, trim
+from .style import RENDER_OPTIONS, aim_camera, canvas, open_plotter, trim_border
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -69,10 +69,10 @@ def _photograph_side(look: Look, side: tuple[float, float, float]) -> np.ndarray
         )
     _number_faces(plotter, look, frame, np.asarray(side))
     used = np.unique(look.outside.corners[look.outside.corners >= 0])
-    aim(plotter, side, (1.0, 0.0, 0.0), points[used])
+    aim_camera(plotter, side, (1.0, 0.0, 0.0), points[used])
     image = np.asarray(plotter.screenshot(return_img=True))
     plotter.close()
-    return trim(image)
+    return trim_border(image)
 
 
 def _model_axes(look: Look) -> np.ndarray:

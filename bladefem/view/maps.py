@@ -71,8 +71,8 @@ def draw_map(
         handles += cross_failed(ax, table, cells, x, y)
         if not words:
             ax.figure.colorbar(image, ax=ax, label=labels[2], aspect=25)
-        tick(ax.xaxis, cells.columns)
-        tick(ax.yaxis, cells.index)
+        label_ticks(ax.xaxis, cells.columns)
+        label_ticks(ax.yaxis, cells.index)
         ax.set(xlabel=labels[0], ylabel=labels[1], title=title or labels[2])
         if handles:
             ax.legend(handles=handles, loc="upper center", bbox_to_anchor=(0.5, -0.16), ncols=4)
@@ -104,7 +104,7 @@ def cross_failed(
     )
 
 
-def tick(axis: Axes, values: pd.Index) -> None:
+def label_ticks(axis: Axes, values: pd.Index) -> None:
     """At most ten labels, the values themselves: the grid need not be even."""
     chosen = np.unique(np.linspace(0, len(values) - 1, min(len(values), 10)).astype(int))
     axis.set_ticks(chosen, [f"{values[i]:.4g}" for i in chosen])

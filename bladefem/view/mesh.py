@@ -91,7 +91,7 @@ VIEW_FROM_BELOW = (-0.45, 0.8, 0.65)
 RADIAL_DIRECTION = (1.0, 0.0, 0.0)
 
 
-def grid(
+def pyvista_grid(
     mesh: Mesh,
     fields: dict[str, np.ndarray] | None = None,
     inside: dict[str, np.ndarray] | None = None,
@@ -143,9 +143,9 @@ def save_vtu(
     fields: dict[str, np.ndarray] | None = None,
     inside: dict[str, np.ndarray] | None = None,
 ) -> Path:
-    """Write the mesh and its fields, see ``grid``, as a compressed VTU file."""
+    """Write the mesh and its fields, see ``pyvista_grid``, as a compressed VTU file."""
     Path(file).parent.mkdir(parents=True, exist_ok=True)
-    grid(mesh, fields, inside).save(str(file))
+    pyvista_grid(mesh, fields, inside).save(str(file))
     return Path(file)
 
 
@@ -318,7 +318,7 @@ def photograph_mesh(
     return photograph(parts, direction, RADIAL_DIRECTION)
 
 
-def pulled(mesh: Mesh, share: float = 0.07) -> Mesh:
+def damper_pulled_inwards(mesh: Mesh, share: float = 0.07) -> Mesh:
     """The same mesh with the damper moved inwards by a share of the height, so that the contact
     faces can be seen.
     """
@@ -340,7 +340,7 @@ def draw_mesh(
     figure.
     """
     views = (view_of(mesh),) if mesh.dimension == 2 else (FRONT_VIEW, VIEW_FROM_BELOW)
-    apart = pulled(mesh)
+    apart = damper_pulled_inwards(mesh)
     shown = (apart,) if mesh.dimension == 2 else (mesh, apart)
     with canvas(
         file,

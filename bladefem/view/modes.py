@@ -30,7 +30,7 @@ from .style import (
     DIVERGING_COLOURS,
     RENDER_OPTIONS,
     SEQUENTIAL_COLOURS,
-    aim,
+    aim_camera,
     canvas,
     headline,
     open_plotter,
@@ -69,7 +69,7 @@ def mode_title(
     )
 
 
-def moving(mesh: Mesh, shape: np.ndarray) -> Mesh:
+def moving_bodies(mesh: Mesh, shape: np.ndarray) -> Mesh:
     """The mesh without bodies at rest (a damper that is not part of the mode)."""
     bodies = {name: cells for name, cells in mesh.bodies.items() if np.any(shape[cells])}
     return replace(mesh, bodies=bodies) if bodies else mesh
@@ -162,7 +162,7 @@ def photograph_shape(
     Args:
         values: (n_points,) to be coloured by in place of the magnitude of the shape.
     """
-    surface = skin(moving(mesh, shape))
+    surface = skin(moving_bodies(mesh, shape))
     drawn = np.pad(shape, ((0, 0), (0, 3 - shape.shape[1])))
     moved = surface.points + factor * drawn[surface.nodes]
     magnitude = np.linalg.norm(shape, axis=1) if values is None else values
@@ -230,7 +230,7 @@ def wheel_motion(
     nodal_diameter: int,
 ) -> tuple[Skin, np.ndarray]:
     """The skin of the wheel and the complex displacement (n, 3) of its points."""
-    wheel = wheel_skin(moving(mesh, shape))
+    wheel = wheel_skin(moving_bodies(mesh, shape))
     one = wheel.nodes[: len(wheel.nodes) // wheel_count(mesh)]
     return wheel, np.asarray(
         carry_round(mesh, shape[one] * best_phase(shape), nodal_diameter), dtype=complex
@@ -402,7 +402,7 @@ def wave_frames(
     plotter.add_mesh(
         surface, scalars="signed", cmap=DIVERGING_COLOURS, clim=(-1, 1), **RENDER_OPTIONS
     )
-    aim(plotter, *wheel_camera(mesh), wheel.points, border=1.15)
+    aim_camera(plotter, *wheel_camera(mesh), wheel.points, border=1.15)
     for k in range(frames):
         turn = np.exp(2j * np.pi * k / frames)
         surface.points = wheel.points + factor * (motion * turn).real

@@ -18,7 +18,7 @@ from geometry.section import centroid, placement
 from geometry.section import shape as section_shape
 from geometry.zmass import z_corners
 
-from .dimensions import angle, length, note, shape
+from .dimensions import draw_angle, draw_length, draw_note, draw_outline
 from .style import COLOURS, canvas, headline
 
 if TYPE_CHECKING:
@@ -29,13 +29,13 @@ DAMPER_COLOUR = "#e3cfa4"
 NEIGHBOUR_COLOUR = "#eceff2"
 
 
-def said(table: Any, name: str) -> str:
+def parameter_words(table: Any, name: str) -> str:
     """ "span 120 mm", from a parameter table."""
     field = type(table).__dataclass_fields__[name]
     return f"{name} {show(getattr(table, name), field.metadata['unit'] or '1')}"
 
 
-def bare(
+def equal_axes(
     ax: Axes,
     title: str,
     horizontal: str,
@@ -64,7 +64,7 @@ def draw_section(ax: Axes, blade: Aerofoil) -> None:
     """The root section along its chord, with thickness and camber."""
     chord = MM * blade.chord_root
     points = chord * section_shape(blade, 0.0)
-    shape(ax, points)
+    draw_outline(ax, points)
     half = len(points) // 2
     upper = points[: half + 1][::-1]
     lower = points[half:]
@@ -72,17 +72,17 @@ def draw_section(ax: Axes, blade: Aerofoil) -> None:
     ax.plot(*middle.T, color=COLOURS[1], lw=1, ls="-.", zorder=3)
     ax.plot([0, chord], [0, 0], color="#555555", lw=0.8, ls="--", zorder=3)
     thick = np.argmax(np.hypot(*(upper - lower).T))
-    length(ax, lower[thick], upper[thick], "", 0.0)
-    note(ax, upper[thick], f"{said(blade, 'thickness_root')} of the chord", (0, 26))
+    draw_length(ax, lower[thick], upper[thick], "", 0.0)
+    draw_note(ax, upper[thick], f"{parameter_words(blade, 'thickness_root')} of the chord", (0, 26))
     high = np.argmax(middle[:, 1])
-    note(
+    draw_note(
         ax,
         middle[high] + [0.25 * chord, -0.2 * middle[high][1]],
-        f"mean line, {said(blade, 'camber')}",
+        f"mean line, {parameter_words(blade, 'camber')}",
         (20, 30),
     )
-    length(ax, (0, 0), (chord, 0), said(blade, "chord_root"), -0.22 * chord)
-    bare(ax, f'root section, "{blade.section}"', "along the chord", "across it")
+    draw_length(ax, (0, 0), (chord, 0), parameter_words(blade, "chord_root"), -0.22 * chord)
+    equal_axes(ax, f'root section, "{blade.section}"', "along the chord", "across it")
     ax.set(xlim=(-0.15 * chord, 1.35 * chord), ylim=(-0.4 * chord, 0.45 * chord))
 
 
@@ -101,16 +101,21 @@ def draw_stacking(ax: Axes, blade: Aerofoil) -> None:
     """Root and tip sections over each other: stagger, twist, lean and sweep."""
     for t, colour, name in ((0.0, "#d5dbe1", "root"), (1.0, "#9fc5e0", "tip")):
         points, chord = plane_section(blade, t)
-        shape(ax, points, colour, alpha=0.85)
+        draw_outline(ax, points, colour, alpha=0.85)
         ax.plot(*chord.T, color="#555555", lw=0.8, ls="--", zorder=3)
-        note(ax, points[np.argmin(points[:, 0])], name, (10, -16) if t else (-8, 16))
+        draw_note(ax, points[np.argmin(points[:, 0])], name, (10, -16) if t else (-8, 16))
     reach = MM * blade.chord_root
     ax.plot([0, 0.8 * reach], [0, 0], color="#333333", lw=0.8, ls="-.", zorder=1)
-    angle(ax, (0, 0), 0.0, blade.stagger, 0.62 * reach, said(blade, "stagger"))
-    angle(
-        ax, (0, 0), blade.stagger, blade.stagger + blade.twist, 0.74 * reach, said(blade, "twist")
+    draw_angle(ax, (0, 0), 0.0, blade.stagger, 0.62 * reach, parameter_words(blade, "stagger"))
+    draw_angle(
+        ax,
+        (0, 0),
+        blade.stagger,
+        blade.stagger + blade.twist,
+        0.74 * reach,
+        parameter_words(blade, "twist"),
     )
-    bare(ax, "root and tip, seen along the span", "z, engine axis", "y, circumferential")
+    equal_axes(ax, "root and tip, seen along the span", "z, engine axis", "y, circumferential")
     ax.set(xlim=(-0.6 * reach, 1.25 * reach), ylim=(-0.6 * reach, 0.75 * reach))
 
 
@@ -121,29 +126,34 @@ def draw_side(ax: Axes, blade: Aerofoil) -> None:
     height = MM * blade.span * shares
     low = np.array([e.min() for e in extents])
     high = np.array([e.max() for e in extents])
-    shape(ax, np.concatenate([np.stack([low, height], 1), np.stack([high, height], 1)[::-1]]))
+    draw_outline(
+        ax, np.concatenate([np.stack([low, height], 1), np.stack([high, height], 1)[::-1]])
+    )
     tip = MM * blade.chord_tip
-    length(ax, (low.min(), 0), (low.min(), height[-1]), said(blade, "span"), 0.25 * tip)
-    note(
+    draw_length(
+        ax, (low.min(), 0), (low.min(), height[-1]), parameter_words(blade, "span"), 0.25 * tip
+    )
+    draw_note(
         ax,
         (high[-1], height[-1]),
-        f"{said(blade, 'chord_tip')}\n{said(blade, 'thickness_tip')}\n(turned)",
+        f"{parameter_words(blade, 'chord_tip')}\n{parameter_words(blade, 'thickness_tip')}\n"
+        "(turned)",
         (14, -14),
     )
     axis = MM * np.array([placement(blade, 0.0, t)[0][2] for t in (0.0, 1.0)])
     ax.plot(axis, [0, height[-1]], color=COLOURS[1], lw=1, ls="-.", zorder=3)
-    note(
+    draw_note(
         ax,
         (float(np.mean(axis)), 0.5 * height[-1]),
-        f"stacking line\n{said(blade, 'lean')}\n{said(blade, 'sweep')}",
+        f"stacking line\n{parameter_words(blade, 'lean')}\n{parameter_words(blade, 'sweep')}",
         (44, 0),
     )
-    note(ax, (high[0], 0), said(blade, "fillet"), (12, 16))
-    bare(ax, "side view", "z, engine axis", "x above the platform")
+    draw_note(ax, (high[0], 0), parameter_words(blade, "fillet"), (12, 16))
+    equal_axes(ax, "side view", "z, engine axis", "x above the platform")
     ax.set_xlim(low.min() - 0.6 * tip, high.max() + 1.1 * tip)
 
 
-def turned(points: np.ndarray, theta: float) -> np.ndarray:
+def about_seat_plane(points: np.ndarray, theta: float) -> np.ndarray:
     """(n, 2) x, y to (across, radial) [mm] about the radial plane between this blade and the
     next.
     """
@@ -165,22 +175,24 @@ def draw_platform(
     the figure.
     """
     cut = profile(platform, shank, disc, wedge)
-    blade = turned(cut.blade, cut.theta)
-    damper = turned(cut.damper, cut.theta)
-    inner, outer = turned(cut.seats[0], cut.theta)
+    blade = about_seat_plane(cut.blade, cut.theta)
+    damper = about_seat_plane(cut.damper, cut.theta)
+    inner, outer = about_seat_plane(cut.seats[0], cut.theta)
     foot = inner - [0, MM * wedge.base]
-    corner = turned(cut.corners[:1], cut.theta)[0]
+    corner = about_seat_plane(cut.corners[:1], cut.theta)[0]
     with canvas(file, size=(8.4, 5.6)) as ax:
-        shape(ax, blade)
-        shape(ax, turned(cut.blade * [1, -1], cut.theta) * [-1, 1], NEIGHBOUR_COLOUR)
-        shape(ax, damper, DAMPER_COLOUR)
+        draw_outline(ax, blade)
+        draw_outline(
+            ax, about_seat_plane(cut.blade * [1, -1], cut.theta) * [-1, 1], NEIGHBOUR_COLOUR
+        )
+        draw_outline(ax, damper, DAMPER_COLOUR)
         ax.plot([0, 0], [foot[1] - 6, corner[1] + 7], color="#555555", lw=0.8, ls="-.", zorder=3)
-        next_seat = turned(cut.seats[1] * [1, -1], cut.theta) * [-1, 1]
+        next_seat = about_seat_plane(cut.seats[1] * [1, -1], cut.theta) * [-1, 1]
         for seat in (np.stack([inner, outer]), next_seat):
             ax.plot(*seat.T, color=COLOURS[1], lw=3, zorder=4)
         label_platform(ax, platform, shank, wedge, np.stack([foot, inner, outer, corner]))
         span = max(2.6 * abs(inner[0]), 4 * MM * platform.thickness)
-        bare(
+        equal_axes(
             ax,
             "platforms and damper, seen along the engine axis",
             "circumferential, from the gap",
@@ -203,30 +215,30 @@ def label_platform(
     """
     foot, inner, outer, corner = corners
     mirror = np.array([-1, 1])
-    length(ax, corner, corner * mirror, said(platform, "gap"), 3.0)
-    length(ax, inner, outer, said(platform, "seat_width"), 2.0)
-    length(ax, corner * mirror, outer * mirror, said(platform, "thickness"), 2.5)
+    draw_length(ax, corner, corner * mirror, parameter_words(platform, "gap"), 3.0)
+    draw_length(ax, inner, outer, parameter_words(platform, "seat_width"), 2.0)
+    draw_length(ax, corner * mirror, outer * mirror, parameter_words(platform, "thickness"), 2.5)
     if wedge.shape != "round bar":
-        length(ax, foot * mirror, inner * mirror, said(wedge, "base"), -2.5)
+        draw_length(ax, foot * mirror, inner * mirror, parameter_words(wedge, "base"), -2.5)
     if wedge.shape != "plate":
         _label_angles(ax, wedge, inner)
-    note(
+    draw_note(
         ax,
         0.3 * (inner * mirror) + 0.7 * (outer * mirror),
         "seat_left of the next blade\non damper_right",
         (60, -10),
     )
-    note(ax, 0.3 * inner + 0.7 * outer, "seat_right of this blade\non damper_left", (-70, 28))
+    draw_note(ax, 0.3 * inner + 0.7 * outer, "seat_right of this blade\non damper_left", (-70, 28))
     low = foot * [-0.3, 1] + [0, 0.6]
     words = (
-        f"damper, shape {wedge.shape}, axial {wedge.axial}\n{said(wedge, 'length')}, "
-        f"{said(wedge, 'clearance')}"
+        f"damper, shape {wedge.shape}, axial {wedge.axial}\n{parameter_words(wedge, 'length')}, "
+        f"{parameter_words(wedge, 'clearance')}"
     )
-    note(ax, low, words, (20, -44))
-    note(
+    draw_note(ax, low, words, (20, -44))
+    draw_note(
         ax,
         inner * [4, 1] - [0, 4],
-        f"shank\n{said(shank, 'width')}\n{said(shank, 'height')}",
+        f"shank\n{parameter_words(shank, 'width')}\n{parameter_words(shank, 'height')}",
         (-20, -24),
     )
 
@@ -234,21 +246,21 @@ def label_platform(
 def _label_angles(ax: Axes, wedge: Wedge, inner: np.ndarray) -> None:
     """Angles of both flanks against the radial line between the blades."""
     apex = np.array([0.0, inner[1] - inner[0] / np.tan(wedge.angle)])
-    angle(
+    draw_angle(
         ax,
         apex,
         -np.pi / 2 - wedge.angle,
         -np.pi / 2,
         0.75 * (apex[1] - inner[1]),
-        said(wedge, "angle"),
+        parameter_words(wedge, "angle"),
     )
-    angle(
+    draw_angle(
         ax,
         apex,
         -np.pi / 2,
         wedge.angles[1] - np.pi / 2,
         0.6 * (apex[1] - inner[1]),
-        "angle_next" if wedge.angle_next is None else said(wedge, "angle_next"),
+        "angle_next" if wedge.angle_next is None else parameter_words(wedge, "angle_next"),
     )
 
 
@@ -273,19 +285,21 @@ def draw_damper_shapes(
         for ax, (name, damper) in zip(axes, both.items(), strict=True):
             cut = profile(platform, shank, disc, damper)
             # the next blade's side is this one's turned by a sector
-            shape(ax, turned(cut.blade, cut.theta))
-            shape(ax, turned(cut.blade, -cut.theta), NEIGHBOUR_COLOUR)
-            shape(ax, turned(cut.damper, cut.theta), DAMPER_COLOUR)
+            draw_outline(ax, about_seat_plane(cut.blade, cut.theta))
+            draw_outline(ax, about_seat_plane(cut.blade, -cut.theta), NEIGHBOUR_COLOUR)
+            draw_outline(ax, about_seat_plane(cut.damper, cut.theta), DAMPER_COLOUR)
             for seat, side in zip(cut.seats, (1, -1), strict=True):
-                ax.plot(*turned(seat, side * cut.theta).T, color=COLOURS[1], lw=3, zorder=4)
-            bare(ax, name, "circumferential", "radial")
+                ax.plot(
+                    *about_seat_plane(seat, side * cut.theta).T, color=COLOURS[1], lw=3, zorder=4
+                )
+            equal_axes(ax, name, "circumferential", "radial")
             middle = MM * cut.underside * np.cos(cut.theta)
             ax.set(xlim=(-14, 14), ylim=(middle - 13, middle + 14))
             ax.label_outer()
         return axes[0].figure
 
 
-def ring(
+def ring_segment(
     inner: float,
     outer: float,
     theta: float,
@@ -325,17 +339,19 @@ def draw_front(
     disc: Disc,
 ) -> None:
     """Along the engine axis."""
-    shape(ax, ring(disc.bore_radius, disc.rim_radius, cut.theta))
-    shape(ax, MM * cut.blade[:, ::-1])
-    shape(ax, MM * cut.damper[:, ::-1], DAMPER_COLOUR)
+    draw_outline(ax, ring_segment(disc.bore_radius, disc.rim_radius, cut.theta))
+    draw_outline(ax, MM * cut.blade[:, ::-1])
+    draw_outline(ax, MM * cut.damper[:, ::-1], DAMPER_COLOUR)
     width = [np.ptp(plane_section(aerofoil, t)[0][:, 1]) / 2 for t in (0.0, 1.0)]
     top = MM * cut.top
     tip = MM * (cut.top + aerofoil.span)
-    shape(ax, np.array([[-width[0], top], [width[0], top], [width[1], tip], [-width[1], tip]]))
-    corner = ring(disc.bore_radius, disc.rim_radius, cut.theta)
+    draw_outline(
+        ax, np.array([[-width[0], top], [width[0], top], [width[1], tip], [-width[1], tip]])
+    )
+    corner = ring_segment(disc.bore_radius, disc.rim_radius, cut.theta)
     for side in (-1, 1):
         ax.plot([0, side * corner[0, 0]], [0, corner[0, 1]], color="#999999", lw=0.7, ls="--")
-    angle(
+    draw_angle(
         ax,
         (0, 0),
         np.pi / 2 - cut.theta,
@@ -344,10 +360,10 @@ def draw_front(
         "360° / sectors",
         rays=False,
     )
-    note(ax, corner[20], f"clamp\n{said(disc, 'bore_radius')}", (30, -14))
-    note(ax, 0.5 * (corner[0] + corner[-1]), "cyclic_low", (-14, -10))
-    note(ax, 0.5 * (corner[30] + corner[31]), "cyclic_high", (14, 0))
-    bare(ax, "along the engine axis", "y, circumferential", "x, radial")
+    draw_note(ax, corner[20], f"clamp\n{parameter_words(disc, 'bore_radius')}", (30, -14))
+    draw_note(ax, 0.5 * (corner[0] + corner[-1]), "cyclic_low", (-14, -10))
+    draw_note(ax, 0.5 * (corner[30] + corner[31]), "cyclic_high", (14, 0))
+    equal_axes(ax, "along the engine axis", "y, circumferential", "x, radial")
     ax.set(xlim=(-0.28 * tip, 0.28 * tip), ylim=(-0.05 * tip, 1.06 * tip))
 
 
@@ -364,7 +380,7 @@ def draw_meridian(
     for low, high, width in zip(
         levels[:3], levels[1:4], (disc.width, shank.length, platform.length), strict=True
     ):
-        shape(
+        draw_outline(
             ax,
             MM
             * np.array(
@@ -376,34 +392,40 @@ def draw_meridian(
     height = MM * (cut.top + aerofoil.span * shares)
     low = np.array([e.min() for e in extents])
     high = np.array([e.max() for e in extents])
-    shape(ax, np.concatenate([np.stack([low, height], 1), np.stack([high, height], 1)[::-1]]))
+    draw_outline(
+        ax, np.concatenate([np.stack([low, height], 1), np.stack([high, height], 1)[::-1]])
+    )
     left = -MM * max(disc.width, platform.length) / 2
-    length(
+    draw_length(
         ax,
         (-MM * disc.width / 2, MM * levels[0]),
         (MM * disc.width / 2, MM * levels[0]),
-        said(disc, "width"),
+        parameter_words(disc, "width"),
         -9,
     )
-    length(ax, (left, 0), (left, MM * levels[1]), said(disc, "rim_radius"), 22)
-    length(ax, (left, MM * levels[1]), (left, MM * levels[2]), said(shank, "height"), 9)
-    note(
+    draw_length(ax, (left, 0), (left, MM * levels[1]), parameter_words(disc, "rim_radius"), 22)
+    draw_length(
+        ax, (left, MM * levels[1]), (left, MM * levels[2]), parameter_words(shank, "height"), 9
+    )
+    draw_note(
         ax,
         (MM * shank.length / 2, MM * 0.5 * (levels[1] + levels[2])),
-        f"shank\n{said(shank, 'length')}",
+        f"shank\n{parameter_words(shank, 'length')}",
         (16, -16),
     )
-    note(
+    draw_note(
         ax,
         (MM * platform.length / 2, MM * 0.5 * (levels[2] + levels[3])),
-        f"platform\n{said(platform, 'length')}",
+        f"platform\n{parameter_words(platform, 'length')}",
         (10, 6),
     )
     right = MM * platform.length / 2
-    length(ax, (right, MM * levels[3]), (right, MM * levels[4]), said(aerofoil, "span"), -26)
+    draw_length(
+        ax, (right, MM * levels[3]), (right, MM * levels[4]), parameter_words(aerofoil, "span"), -26
+    )
     ax.axhline(0, color="#333333", lw=1, ls="-.")
-    note(ax, (1.1 * right, 0), "engine axis", (6, 12))
-    bare(ax, "from the side", "z, engine axis", "")
+    draw_note(ax, (1.1 * right, 0), "engine axis", (6, 12))
+    equal_axes(ax, "from the side", "z, engine axis", "")
     ax.set(xlim=(-0.28 * MM * levels[4], 0.28 * MM * levels[4]), ylabel="")
 
 
@@ -419,29 +441,40 @@ def draw_plane(plane: Plane, file: str | Path | None = None) -> object:
     thick = MM * plane.platform_thickness
     seat = MM * plane.seat_width
     with canvas(file, size=(6.6, 6.8)) as ax:
-        shape(ax, blade)
-        shape(ax, blade + np.array([pitch, 0.0]), NEIGHBOUR_COLOUR)
-        shape(ax, damper, DAMPER_COLOUR)
+        draw_outline(ax, blade)
+        draw_outline(ax, blade + np.array([pitch, 0.0]), NEIGHBOUR_COLOUR)
+        draw_outline(ax, damper, DAMPER_COLOUR)
         for start in (wide - seat, pitch - wide):
             ax.plot([start, start + seat], [low, low], color=COLOURS[1], lw=3.5, zorder=4)
         ax.fill_between(
             [-3 * half, pitch + 3 * half], -4, 0, hatch="////", fc="none", ec="#777777", lw=0
         )
-        length(ax, (-wide, 0), (-wide, long), said(plane, "length"), 14)
-        length(ax, (-wide, 0), (-wide, low), said(plane, "platform_height"), 5)
-        length(ax, (-half, long), (half, long), said(plane, "thickness"), 5)
-        length(ax, (-wide, low + thick), (wide, low + thick), said(plane, "platform_width"), 10)
-        length(ax, (0, 0.75 * long), (pitch, 0.75 * long), said(plane, "pitch"))
-        length(ax, (wide - seat, low), (wide, low), said(plane, "seat_width"), -16)
-        note(ax, (pitch + wide, low + thick / 2), said(plane, "platform_thickness"), (-24, 60))
-        note(
+        draw_length(ax, (-wide, 0), (-wide, long), parameter_words(plane, "length"), 14)
+        draw_length(ax, (-wide, 0), (-wide, low), parameter_words(plane, "platform_height"), 5)
+        draw_length(ax, (-half, long), (half, long), parameter_words(plane, "thickness"), 5)
+        draw_length(
+            ax,
+            (-wide, low + thick),
+            (wide, low + thick),
+            parameter_words(plane, "platform_width"),
+            10,
+        )
+        draw_length(ax, (0, 0.75 * long), (pitch, 0.75 * long), parameter_words(plane, "pitch"))
+        draw_length(ax, (wide - seat, low), (wide, low), parameter_words(plane, "seat_width"), -16)
+        draw_note(
+            ax,
+            (pitch + wide, low + thick / 2),
+            parameter_words(plane, "platform_thickness"),
+            (-24, 60),
+        )
+        draw_note(
             ax,
             damper.mean(axis=0) * [1.2, 1],
-            f"flat damper\n{said(plane, 'damper_height')}",
+            f"flat damper\n{parameter_words(plane, 'damper_height')}",
             (60, -34),
         )
-        note(ax, (0, 2), f"clamp; {said(plane, 'depth')}", (16, 14))
-        bare(ax, "plane blades with flat dampers", "y, circumferential", "x, radial")
+        draw_note(ax, (0, 2), f"clamp; {parameter_words(plane, 'depth')}", (16, 14))
+        equal_axes(ax, "plane blades with flat dampers", "y, circumferential", "x, radial")
         ax.margins(0.06)
         return ax.figure
 
@@ -453,11 +486,13 @@ def draw_z_mass(z: ZMass, file: str | Path | None = None) -> object:
     high = MM * z.height / 2
     bar = MM * z.bar
     with canvas(file, size=(6.0, 5.4)) as ax:
-        shape(ax, corners, DAMPER_COLOUR)
-        length(ax, (-wide, -high), (wide, -high), said(z, "width"), -6)
-        length(ax, (wide, -high), (wide, high), said(z, "height"), -6)
-        length(ax, (-wide, high - bar), (-wide, high), said(z, "bar"), 5)
-        length(ax, corners[4] - [bar, 0], corners[4], "bar", -8)
-        note(ax, (0, -0.75 * high), f"{said(z, 'thickness')}, footprint at z = 0", (0, 0))
-        bare(ax, "Z mass, seen from above", "x", "y")
+        draw_outline(ax, corners, DAMPER_COLOUR)
+        draw_length(ax, (-wide, -high), (wide, -high), parameter_words(z, "width"), -6)
+        draw_length(ax, (wide, -high), (wide, high), parameter_words(z, "height"), -6)
+        draw_length(ax, (-wide, high - bar), (-wide, high), parameter_words(z, "bar"), 5)
+        draw_length(ax, corners[4] - [bar, 0], corners[4], "bar", -8)
+        draw_note(
+            ax, (0, -0.75 * high), f"{parameter_words(z, 'thickness')}, footprint at z = 0", (0, 0)
+        )
+        equal_axes(ax, "Z mass, seen from above", "x", "y")
         return ax.figure

@@ -117,7 +117,7 @@ def draw_curve(
     # stable pieces first: the legend shows their line
     for piece, unstable in sorted(pieces_of(curve), key=lambda part: part[1]):
         line = "--" if unstable else style
-        ax.plot(*between(frequency[piece], amplitude[piece]), line, color=colour, label=label)
+        ax.plot(*smooth_curve(frequency[piece], amplitude[piece]), line, color=colour, label=label)
         label = "_nolegend_"
     if 0 < load < np.inf:
         ax.plot(frequency, amplitude, ".", color=colour, ms=2.5)
@@ -163,7 +163,7 @@ def pieces_of(curve: pd.DataFrame) -> list[tuple[np.ndarray, bool]]:
     return parts
 
 
-def between(
+def smooth_curve(
     x: np.ndarray,
     y: np.ndarray,
     steps: int = 8,

@@ -136,7 +136,7 @@ def name_lines(
     leads to a moved one.
     """
     names = sorted(names)
-    places = spread(np.array([height for height, _, _ in names]), 0.03 * top)
+    places = spread_labels(np.array([height for height, _, _ in names]), 0.03 * top)
     for place, (height, text, colour) in zip(places, names, strict=True):
         moved = abs(place - height) > 0.004 * top
         ax.annotate(
@@ -152,7 +152,7 @@ def name_lines(
         )
 
 
-def spread(heights: np.ndarray, apart: float) -> np.ndarray:
+def spread_labels(heights: np.ndarray, apart: float) -> np.ndarray:
     """Ascending heights moved as little as leaves them ``apart``: groups that collide are centred
     on their mean.
     """

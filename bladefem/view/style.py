@@ -144,10 +144,10 @@ def photograph(
     plotter = open_plotter(size)
     for part in parts:
         plotter.add_mesh(**{**RENDER_OPTIONS, **part})
-    aim(plotter, direction, up, np.concatenate([part["mesh"].points for part in parts]))
+    aim_camera(plotter, direction, up, np.concatenate([part["mesh"].points for part in parts]))
     image = np.asarray(plotter.screenshot(return_img=True))
     plotter.close()
-    return trim(image) if crop else image
+    return trim_border(image) if crop else image
 
 
 def open_plotter(size: tuple[int, int]) -> Any:
@@ -177,7 +177,7 @@ def screen_axes(
     return np.stack([right, np.cross(eye, right), eye])
 
 
-def aim(
+def aim_camera(
     plotter: Any,
     direction: tuple[float, float, float],
     up: tuple[float, float, float],
@@ -200,7 +200,7 @@ def aim(
     plotter.renderer.ResetCameraClippingRange()
 
 
-def trim(image: np.ndarray, margin: int = 12) -> np.ndarray:
+def trim_border(image: np.ndarray, margin: int = 12) -> np.ndarray:
     """Cut the white border off a picture."""
     inked = np.any(image < 250, axis=2)
     rows = np.flatnonzero(inked.any(axis=1))

@@ -9,7 +9,7 @@ from wedge import wedge_mesh
 
 import bladefem
 from bladefem.contact.interface_elements import (
-    aggregation,
+    aggregation_matrix,
     friction_elements,
     mindlin_ratio,
     normal_stiffness,
@@ -17,8 +17,8 @@ from bladefem.contact.interface_elements import (
 )
 from bladefem.contact.patch import patch_means
 from bladefem.contact.resultants import resultant
-from bladefem.contact.seating import solve
-from bladefem.contact.state_table import interpolate, quasi_static, state_table
+from bladefem.contact.seating import solve_seating
+from bladefem.contact.state_table import interpolate_states, quasi_static, state_table
 from bladefem.data import PressureMap
 from bladefem.errors import InputError
 from bladefem.scene.tables import Contact, Material, Seat
@@ -32,7 +32,7 @@ def problem():
 
 @pytest.fixture(scope="module")
 def maps(problem):
-    return solve(problem, SPEED)
+    return solve_seating(problem, SPEED)
 
 
 def test_mindlin_ratio():
@@ -158,7 +158,7 @@ def test_a_layer_without_stiffness_is_refused(maps, name, value):
 
 def test_elements_of_a_patch_are_connected_halves(maps):
     patch = maps[0].patch
-    G = aggregation(patch, 2)
+    G = aggregation_matrix(patch, 2)
     label = np.asarray(G.argmax(axis=1)).ravel()
     z = patch.points[:, 2]  # the longer side of this seat is axial
     assert z[label == 0].max() <= z[label == 1].min() + 1e-12
@@ -194,7 +194,7 @@ def tilted(problem):
 
     def direct(load, tilt):
         return np.concatenate(
-            [m.force for m in solve(problem, SPEED, normal=load, approach=tilt * lean)]
+            [m.force for m in solve_seating(problem, SPEED, normal=load, approach=tilt * lean)]
         )
 
     return direct
@@ -235,7 +235,10 @@ def test_what_the_floating_damper_follows_moves_no_force(problem):
 
 def direct_force(problem, approach):
     return np.concatenate(
-        [m.force for m in solve(problem, SPEED, normal=80.0, approach=approach, bedded=True)]
+        [
+            m.force
+            for m in solve_seating(problem, SPEED, normal=80.0, approach=approach, bedded=True)
+        ]
     )
 
 
@@ -251,7 +254,7 @@ def test_a_seat_that_faces_the_axis_and_one_without_extent(problem):
 
 def test_a_table_of_open_states_has_no_error():
     table = state_table(lambda load, lift: np.zeros(4), [[0.0, 1.0, 2.0], [0.0, 1.0, 2.0]])
-    force, indicator = interpolate(table, (0.5, 1.5))
+    force, indicator = interpolate_states(table, (0.5, 1.5))
     assert (force == 0).all() and indicator == 0
 
 
@@ -266,7 +269,7 @@ def test_table_of_states_and_its_indicator(problem):
         table = state_table(
             direct, [np.linspace(100, 200, steps + 1), np.linspace(-1e-6, 1e-6, steps + 1)]
         )
-        found = [interpolate(table, p) for p in points]
+        found = [interpolate_states(table, p) for p in points]
         errors.append(
             max(np.abs(f - direct(*p)).max() for (f, _), p in zip(found, points, strict=True))
             / table.force.max()
@@ -297,22 +300,22 @@ def test_indicator_of_a_kink_and_of_a_parabola(kink):
     """Exact for the largest error of one kink in the cell; four times that of a smooth force."""
     axes = [np.linspace(0, 1, 6), np.linspace(0, 1, 3)]
     bent = state_table(lambda x, y: np.array([abs(x - kink), 1.0]), axes)
-    force, told = interpolate(bent, (0.5, 0.0))
+    force, told = interpolate_states(bent, (0.5, 0.0))
     assert told == pytest.approx((kink - 0.4) * (0.6 - kink) * 2 / 0.2, abs=1e-15)
     if kink == 0.5:
         assert told == pytest.approx(force[0])
     curved = state_table(lambda x, y: np.array([x**2, 1.0]), axes)
-    force, told = interpolate(curved, (0.5, 0.0))
+    force, told = interpolate_states(curved, (0.5, 0.0))
     assert told == pytest.approx(4 * (force[0] - 0.25))
 
 
 def test_table_is_exact_on_its_points(problem):
     direct = tilted(problem)
     table = state_table(direct, [[100.0, 150.0, 200.0], [-1e-6, 0.0, 1e-6]])
-    force, indicator = interpolate(table, (150.0, 1e-6))
+    force, indicator = interpolate_states(table, (150.0, 1e-6))
     assert np.allclose(force, direct(150.0, 1e-6), atol=1e-9) and indicator == 0
     with pytest.raises(InputError, match="inside the table"):
-        interpolate(table, (99.0, 0.0))
+        interpolate_states(table, (99.0, 0.0))
     with pytest.raises(InputError, match="ascending"):
         state_table(direct, [[1.0, 2.0], [0.0, 1.0, 2.0]])
 

@@ -14,7 +14,7 @@ from bladefem.contact.frictional_seating import (
 )
 from bladefem.contact.interface_law import InterfaceLaw
 from bladefem.contact.patch import make_patch
-from bladefem.contact.seating import contact_problem, solve
+from bladefem.contact.seating import contact_problem, solve_seating
 from bladefem.errors import InputError, NotSolvedError
 from bladefem.fem.body import assemble
 from bladefem.fem.constraint import constrain
@@ -62,7 +62,7 @@ def forces_of(found):
 def test_without_friction_it_is_the_frictionless_seating(problems):
     rough, smooth = problems
     law, _ = layer(rough)
-    plain = solve(replace(smooth, layer=law), SPEED)
+    plain = solve_seating(replace(smooth, layer=law), SPEED)
     found = seated(rough, mu=1e-4, bedded=False)
     for rubbed, free in zip(found.maps, plain, strict=True):
         assert rubbed.force == pytest.approx(free.force, rel=5e-3, abs=1e-3 * free.force.max())
@@ -157,15 +157,15 @@ def test_a_stop_along_the_axis_takes_the_load_along_it(problems):
         with pytest.raises(InputError, match='damper.axial = "held": a plane damper'):
             hold_axially(smooth)
         return
-    plain = np.concatenate([m.force for m in solve(smooth, SPEED)])
-    held = np.concatenate([m.force for m in solve(hold_axially(smooth), SPEED)])
+    plain = np.concatenate([m.force for m in solve_seating(smooth, SPEED)])
+    held = np.concatenate([m.force for m in solve_seating(hold_axially(smooth), SPEED)])
     np.testing.assert_allclose(held, plain, rtol=0, atol=1e-9 * plain.max())
     axial = np.zeros(6)
     axial[2] = 0.1 * np.linalg.norm(rough.load[:2])
     pushed = replace(smooth, load=smooth.load + axial)
     with pytest.raises(NotSolvedError, match="frictionless seats can't hold"):
-        solve(pushed, SPEED)
-    stopped = np.concatenate([m.force for m in solve(hold_axially(pushed), SPEED)])
+        solve_seating(pushed, SPEED)
+    stopped = np.concatenate([m.force for m in solve_seating(hold_axially(pushed), SPEED)])
     np.testing.assert_allclose(stopped, plain, rtol=0, atol=1e-9 * plain.max())
     one, other = (
         forces_of(seated(hold_axially(replace(rough, load=rough.load + x))))

@@ -9,7 +9,7 @@ import pytest
 from test_seat import ALPHA, SPEED, condensed
 from wedge import wedge_mesh
 
-from bladefem.contact.interface_elements import friction_elements, interface_law, layered
+from bladefem.contact.interface_elements import friction_elements, interface_law, with_interface_law
 from bladefem.contact.interface_law import (
     InterfaceLaw,
     closure_of,
@@ -18,7 +18,7 @@ from bladefem.contact.interface_law import (
     rigid_faces,
     stiffness_at,
 )
-from bladefem.contact.seating import solve
+from bladefem.contact.seating import solve_seating
 from bladefem.errors import InputError
 from bladefem.scene.tables import Contact
 
@@ -59,8 +59,8 @@ def test_a_layer_whose_force_does_not_grow_is_refused(value):
 @pytest.mark.parametrize("name", LAYERS)
 def test_the_seated_state_obeys_the_law_and_the_bodies(problem, name):
     """Judged by the equations themselves: what the bodies leave open is what the layer closes."""
-    bedded = layered(problem, LAYERS[name], 0.8)
-    maps = solve(bedded, SPEED, normal=80.0)
+    bedded = with_interface_law(problem, LAYERS[name], 0.8)
+    maps = solve_seating(bedded, SPEED, normal=80.0)
     force = np.concatenate([m.force for m in maps])
     gap = np.concatenate([m.gap for m in maps])
     opening = gap - closure_of(bedded.law, force)
@@ -84,7 +84,8 @@ def test_rigid_faces_are_the_limit_of_stiff_layers(problem):
     """The map converges in proportion to the compliance of the layer."""
     exact = pressed(problem)
     apart = [
-        np.abs(pressed(layered(problem, Contact(kn_area=k), 0.8)) - exact).max() / exact.max()
+        np.abs(pressed(with_interface_law(problem, Contact(kn_area=k), 0.8)) - exact).max()
+        / exact.max()
         for k in (1e15, 1e16, 1e17)
     ]
     assert apart[0] < 0.05
@@ -94,14 +95,15 @@ def test_rigid_faces_are_the_limit_of_stiff_layers(problem):
 
 def test_a_soft_layer_presses_evenly(problem):
     """E* / kn of 115 m: flat seats whose damper does not tilt share the load by area."""
-    soft = layered(problem, Contact(kn_area=1e9), 0.8)
-    for m in solve(soft, 0.0, normal=80.0, bedded=True):
+    soft = with_interface_law(problem, Contact(kn_area=1e9), 0.8)
+    for m in solve_seating(soft, 0.0, normal=80.0, bedded=True):
         assert np.ptp(m.pressure) < 2e-3 * m.pressure.mean()
 
 
 def test_a_layer_that_hardly_stiffens_is_linear(problem):
     linear, almost = (
-        pressed(layered(problem, Contact(kn_area=4e10, stiffening=p), 0.8)) for p in (None, 1e12)
+        pressed(with_interface_law(problem, Contact(kn_area=4e10, stiffening=p), 0.8))
+        for p in (None, 1e12)
     )
     assert np.abs(linear - almost).max() < 1e-6 * linear.max()
 
@@ -112,8 +114,8 @@ def test_elements_rest_in_the_seated_state(problem, name):
     gap.
     """
     contact = LAYERS[name]
-    bedded = layered(problem, contact, 0.8)
-    maps = solve(bedded, SPEED, normal=80.0)
+    bedded = with_interface_law(problem, contact, 0.8)
+    maps = solve_seating(bedded, SPEED, normal=80.0)
     force = np.concatenate([m.force for m in maps])
     gap = np.concatenate([m.gap for m in maps])
     e, _ = friction_elements(bedded, maps, contact, 0.8)
@@ -133,4 +135,4 @@ def test_values_of_one_seat_reach_its_layer(problem):
 
 
 def pressed(problem):
-    return np.concatenate([m.force for m in solve(problem, SPEED, normal=80.0)])
+    return np.concatenate([m.force for m in solve_seating(problem, SPEED, normal=80.0)])

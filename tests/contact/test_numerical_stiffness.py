@@ -9,7 +9,7 @@ import pytest
 from test_seat import ALPHA, condensed
 from wedge import wedge_mesh
 
-from bladefem.contact.interface_elements import gives_stiffness, layered, pair_ratio
+from bladefem.contact.interface_elements import gives_stiffness, pair_ratio, with_interface_law
 from bladefem.contact.numerical_stiffness import (
     numerical_stiffness,
     physical_stiffness,
@@ -134,7 +134,7 @@ def test_every_search_solves_the_split_layer():
     for given, value in (("contact.stiffness", "rigid"), ("contact.kt_area", 1e15)):
         scene = vary_scene(Scene(), given, value, "contact.mu", 0.3)
         ratio = pair_ratio(scene.material.blade, scene.material.damper)
-        problem = layered(condensed(wedge_mesh(ALPHA)), scene.contact, ratio)
+        problem = with_interface_law(condensed(wedge_mesh(ALPHA)), scene.contact, ratio)
         case = cases_of(scene, problem, 2)(120.0)
         assert case.series is not None and (case.series < 0).all()
         area = np.concatenate([patch.area for patch in problem.patches])

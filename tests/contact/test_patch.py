@@ -11,7 +11,12 @@ from test_seat import ALPHA, SPEED, condensed
 from wedge import wedge_mesh
 
 from bladefem.contact.complementarity import solve_lcp
-from bladefem.contact.face_elements import corner_count, face_quadrature, shape, traction_shape
+from bladefem.contact.face_elements import (
+    corner_count,
+    face_quadrature,
+    face_shape_functions,
+    traction_shape,
+)
 from bladefem.contact.patch import (
     initial_gap,
     make_patch,
@@ -21,8 +26,8 @@ from bladefem.contact.patch import (
     rigid_ports,
 )
 from bladefem.contact.resultants import resultant
-from bladefem.contact.seating import solve
-from bladefem.contact.surface import outward, surface
+from bladefem.contact.seating import solve_seating
+from bladefem.contact.surface import outward_signs, surface_quadrature
 from bladefem.errors import InputError
 from bladefem.fem.body import assemble
 from bladefem.fem.constraint import constrain, expand, restrict
@@ -39,17 +44,23 @@ def test_shape_functions(dimension, nodes):
     """Partition of unity, gradients against finite differences, areas of the traction functions."""
     k = corner_count(dimension, nodes)
     x, w = face_quadrature(k)
-    N, dN = shape(nodes, k, x)
+    N, dN = face_shape_functions(nodes, k, x)
     assert np.allclose(N.sum(axis=1), 1) and np.allclose(dN.sum(axis=1), 0)
     for a in range(x.shape[1]):
         step = np.eye(x.shape[1])[a] * 1e-6
         assert np.allclose(
-            (shape(nodes, k, x + step)[0] - shape(nodes, k, x - step)[0]) / 2e-6,
+            (
+                face_shape_functions(nodes, k, x + step)[0]
+                - face_shape_functions(nodes, k, x - step)[0]
+            )
+            / 2e-6,
             dN[:, :, a],
             atol=1e-8,
         )
     chi = traction_shape(k, x)
-    assert np.allclose(chi.sum(axis=1), 1) and np.allclose(w @ chi, w @ shape(k, k, x)[0])
+    assert np.allclose(chi.sum(axis=1), 1) and np.allclose(
+        w @ chi, w @ face_shape_functions(k, k, x)[0]
+    )
 
 
 def test_frames_and_areas_of_a_wedge():
@@ -150,8 +161,8 @@ def test_non_matching_wedge_is_balanced_too():
     """
     mesh = wedge_mesh(ALPHA)
     pairs = {k: replace(p, nodes=np.zeros((2, 0), int)) for k, p in mesh.pairs.items()}
-    loose = solve(condensed(replace(mesh, pairs=pairs)), SPEED)
-    for a, b in zip(loose, solve(condensed(mesh), SPEED), strict=True):
+    loose = solve_seating(condensed(replace(mesh, pairs=pairs)), SPEED)
+    for a, b in zip(loose, solve_seating(condensed(mesh), SPEED), strict=True):
         assert np.abs(a.force - b.force).max() < 1e-7 * b.force.max()
     this, following = (resultant(m) for m in loose)
     moment = this.moment + mesh.sector.rotation @ following.moment
@@ -187,10 +198,12 @@ def test_patch_test_on_curved_faces(dimension, matching):
     seen = []
     for side, name, sign in (("blade", "seat_right", 1), ("damper", "damper_left", -1)):
         P, faces = port_matrix([patch], mesh, side), mesh.faces[name]
-        weighted, _ = surface(mesh, faces)
-        weighted = weighted * (sign * outward(mesh, faces, weighted.sum(axis=1)))[:, None, None]
+        weighted, _ = surface_quadrature(mesh, faces)
+        weighted = (
+            weighted * (sign * outward_signs(mesh, faces, weighted.sum(axis=1)))[:, None, None]
+        )
         corners = corner_count(dimension, faces.shape[1])
-        N, _ = shape(faces.shape[1], corners, face_quadrature(corners)[0])
+        N, _ = face_shape_functions(faces.shape[1], corners, face_quadrature(corners)[0])
         own = np.zeros((len(mesh.points), 3))
         np.add.at(own, faces, np.einsum("fqi,qm->fmi", weighted, N))
         loads = (P[:, normal] @ patch.area).reshape(-1, dimension)
@@ -265,7 +278,7 @@ def test_receding_contact_is_linear_in_the_load():
     speed squared.
     """
     problem = condensed(wedge_mesh(ALPHA))
-    one, two = solve(problem, SPEED), solve(problem, 2 * SPEED)
+    one, two = solve_seating(problem, SPEED), solve_seating(problem, 2 * SPEED)
     for a, b in zip(one, two, strict=True):
         assert (a.force == 0).any()  # it does recede
         assert np.array_equal(a.force > 0, b.force > 0)

@@ -21,7 +21,7 @@ from bladefem.contact.hertz import (
 )
 from bladefem.contact.patch import make_patch, patch_means
 from bladefem.contact.peak_pressure import narrow_sentence, peak_remarks
-from bladefem.contact.seating import solve
+from bladefem.contact.seating import solve_seating
 from bladefem.data import PressureMap
 from bladefem.errors import InputError
 from bladefem.fem.body import assemble
@@ -190,7 +190,7 @@ def seated(bodies, *given, kind=None):
             material=found.scene.material,
         )
     patches = [make_patch(found.mesh, name) for name in ("this", "next")]
-    return solve(seat_damper(found, patches), 0.0, normal=500.0)
+    return solve_seating(seat_damper(found, patches), 0.0, normal=500.0)
 
 
 def test_a_crowned_damper_presses_in_the_middle(bodies):

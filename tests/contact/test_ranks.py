@@ -7,7 +7,7 @@ import pytest
 from test_seat import ALPHA, SPEED
 from wedge import wedge_mesh
 
-from bladefem.contact.seating import seat
+from bladefem.contact.seating import solve_mesh_seating
 from bladefem.fem.compat import MPI
 from bladefem.scene.tables import Materials
 
@@ -18,7 +18,8 @@ pytestmark = pytest.mark.mpi
 def test_pressure_does_not_depend_on_ranks(dimension):
     mesh = wedge_mesh(ALPHA, dimension=dimension)
     together, alone = (
-        seat(mesh, Materials(), SPEED, comm=comm) for comm in (MPI.COMM_WORLD, MPI.COMM_SELF)
+        solve_mesh_seating(mesh, Materials(), SPEED, comm=comm)
+        for comm in (MPI.COMM_WORLD, MPI.COMM_SELF)
     )
     for a, b in zip(together, alone, strict=True):
         assert np.abs(a.force - b.force).max() < 1e-9 * b.force.max()

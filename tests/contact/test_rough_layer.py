@@ -12,12 +12,12 @@ from bladefem.contact.frictional_seating import _Interface, _projections, _State
 from bladefem.contact.interface_elements import (
     friction_elements,
     interface_law,
-    layered,
     rougher_contact,
+    with_interface_law,
 )
 from bladefem.contact.interface_law import InterfaceLaw, closure_of
 from bladefem.contact.rough_layer import TOUCHING_PRESSURE, decay_length, rough_stiffness
-from bladefem.contact.seating import solve
+from bladefem.contact.seating import solve_seating
 from bladefem.errors import InputError
 from bladefem.scene.tables import Contact, Scene, Seat
 from bladefem.scene.validate import validate
@@ -46,7 +46,7 @@ def test_stiffness_is_the_pressure_over_the_decay_length(problem):
     and exactly so in the seating.
     """
     contact = Contact()
-    maps = solve(layered(problem, contact, 0.8), 0.0, normal=2000.0, bedded=True)
+    maps = solve_seating(with_interface_law(problem, contact, 0.8), 0.0, normal=2000.0, bedded=True)
     elements, _ = friction_elements(None, maps, contact, 0.8)
     area = np.concatenate([m.patch.area for m in maps])
     pressure = np.concatenate([m.pressure for m in maps])
@@ -72,7 +72,9 @@ def test_published_stiffnesses_at_a_known_finish(roughness, measured):
 
 def test_rougher_faces_are_softer(problem):
     """In proportion; the roughness of the scene counts, and a layer given by the scene stays."""
-    maps = solve(layered(problem, Contact(), 0.8), 0.0, normal=2000.0, bedded=True)
+    maps = solve_seating(
+        with_interface_law(problem, Contact(), 0.8), 0.0, normal=2000.0, bedded=True
+    )
     fine, rough = (
         friction_elements(None, maps, rougher_contact(Contact(), factor), 0.8)[0]
         for factor in (1.0, 3.0)

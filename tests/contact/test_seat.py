@@ -10,7 +10,7 @@ from wedge import wedge_mesh
 
 import bladefem
 from bladefem.contact.patch import make_patch
-from bladefem.contact.seating import contact_problem, seat, solve
+from bladefem.contact.seating import contact_problem, solve_mesh_seating, solve_seating
 from bladefem.errors import InputError, NotSolvedError
 from bladefem.fem.body import assemble
 from bladefem.fem.constraint import constrain
@@ -42,7 +42,7 @@ def test_wedge_balance(dimension, rigid):
     """N = F / (2 sin alpha) on each flank."""
     problem = condensed(wedge_mesh(ALPHA, dimension=dimension), rigid)
     pull = np.linalg.norm(problem.load[:dimension]) * SPEED**2
-    for seat_map in solve(problem, SPEED):
+    for seat_map in solve_seating(problem, SPEED):
         assert seat_map.force.sum() == pytest.approx(pull / (2 * np.sin(ALPHA)), rel=1e-8)
         assert seat_map.complementarity < 1e-12
         assert (seat_map.gap >= 0).all() and (seat_map.force >= 0).all()
@@ -50,7 +50,7 @@ def test_wedge_balance(dimension, rigid):
 
 def test_force_on_damper_is_radial_and_through_its_centre(solid):
     """All six balances, moments taken with the consistent port vectors."""
-    f = np.concatenate([m.force for m in solve(solid, SPEED)])
+    f = np.concatenate([m.force for m in solve_seating(solid, SPEED)])
     unbalanced = solid.rigid.T @ f + SPEED**2 * solid.load
     assert np.abs(unbalanced).max() < 1e-9 * SPEED**2 * np.abs(solid.load).max()
 
@@ -61,7 +61,7 @@ def test_props_of_the_floating_damper_have_no_influence():
     """
     mesh = wedge_mesh(ALPHA)
     soft, hard = (
-        np.concatenate([m.force for m in solve(condensed(mesh, prop=p), SPEED)])
+        np.concatenate([m.force for m in solve_seating(condensed(mesh, prop=p), SPEED)])
         for p in (1e-3, 1e3)
     )
     assert np.abs(soft - hard).max() < 1e-9 * soft.max()
@@ -77,17 +77,19 @@ def test_receding_contact_of_a_drawn_sector_is_linear_in_the_load():
     )
     mesh = bladefem.build_mesh(scene)
     problem = bladefem.seat_damper(bladefem.Bodies(scene, mesh), contact_patches(mesh))
-    for one, two in zip(solve(problem, SPEED), solve(problem, 2 * SPEED), strict=True):
+    for one, two in zip(
+        solve_seating(problem, SPEED), solve_seating(problem, 2 * SPEED), strict=True
+    ):
         assert 0.5 < (one.force == 0).mean() < 0.9  # measured 33 and 32 of 48
         assert np.array_equal(one.force > 0, two.force > 0)
         assert np.abs(4 * one.force - two.force).max() < 1e-8 * two.force.max()  # measured 4e-10
 
 
 def test_wanted_normal_load_and_damper_mass(solid):
-    for seat_map in solve(solid, SPEED, normal=123.0):
+    for seat_map in solve_seating(solid, SPEED, normal=123.0):
         assert seat_map.force.sum() == pytest.approx(123.0, rel=1e-8)
-    single = solve(solid, SPEED)[0].force.sum()
-    assert solve(solid, SPEED, damper_mass=2 * solid.mass)[0].force.sum() == pytest.approx(
+    single = solve_seating(solid, SPEED)[0].force.sum()
+    assert solve_seating(solid, SPEED, damper_mass=2 * solid.mass)[0].force.sum() == pytest.approx(
         2 * single, rel=1e-8
     )
 
@@ -95,7 +97,7 @@ def test_wanted_normal_load_and_damper_mass(solid):
 def test_clearance_is_taken_up_by_rigid_motion(solid):
     """An even clearance moves the damper outwards by c / sin alpha and changes no force."""
     wide = condensed(wedge_mesh(ALPHA), clearance=1e-4)
-    for a, b in zip(solve(solid, SPEED), solve(wide, SPEED), strict=True):
+    for a, b in zip(solve_seating(solid, SPEED), solve_seating(wide, SPEED), strict=True):
         assert np.abs(a.force - b.force).max() < 1e-8 * a.force.max()
 
 
@@ -104,7 +106,9 @@ def test_a_wide_even_clearance_under_a_tiny_load(solid):
     taken out first.
     """
     wide = condensed(wedge_mesh(ALPHA), clearance=2e-3)
-    for a, b in zip(solve(solid, 0.0, normal=1e-3), solve(wide, 0.0, normal=1e-3), strict=True):
+    for a, b in zip(
+        solve_seating(solid, 0.0, normal=1e-3), solve_seating(wide, 0.0, normal=1e-3), strict=True
+    ):
         assert np.abs(a.force - b.force).max() < 1e-3 * a.force.max()  # measured 1.3e-4
         assert b.complementarity < 1e-9
 
@@ -114,17 +118,19 @@ def test_a_load_too_light_for_uneven_gaps_is_told(solid):
     on single points.
     """
     rough = replace(solid, clearance=2e-5 * np.random.default_rng(3).random(len(solid.clearance)))
-    assert sum(m.force.sum() for m in solve(rough, 0.0, normal=100.0)) == pytest.approx(200.0)
+    assert sum(m.force.sum() for m in solve_seating(rough, 0.0, normal=100.0)) == pytest.approx(
+        200.0
+    )
     with pytest.raises(
         NotSolvedError, match=r"load 1e-09 N .*hardly touches; expected a larger study\.loads"
     ):
-        solve(rough, 0.0, normal=1e-9)
+        solve_seating(rough, 0.0, normal=1e-9)
 
 
 def test_bedded_faces_forget_gaps_and_rotation(solid):
     """Worn faces: only the load's direction and size are left of the rotation."""
-    slow = solve(solid, SPEED, normal=50.0, bedded=True)
-    fast = solve(
+    slow = solve_seating(solid, SPEED, normal=50.0, bedded=True)
+    fast = solve_seating(
         condensed(wedge_mesh(ALPHA), clearance=np.linspace(0, 1e-5, 50)),
         3 * SPEED,
         normal=50.0,
@@ -135,28 +141,28 @@ def test_bedded_faces_forget_gaps_and_rotation(solid):
 
 
 def test_warm_start_gives_the_same(solid):
-    first = solve(solid, SPEED)
-    cold, warm = solve(solid, 0.9 * SPEED), solve(solid, 0.9 * SPEED, start=first)
+    first = solve_seating(solid, SPEED)
+    cold, warm = solve_seating(solid, 0.9 * SPEED), solve_seating(solid, 0.9 * SPEED, start=first)
     for a, b in zip(cold, warm, strict=True):
         assert np.abs(a.force - b.force).max() < 1e-11 * a.force.max()
 
 
 def test_one_call_equals_the_stages(solid):
-    maps = seat(wedge_mesh(ALPHA), Materials(), SPEED)
-    for a, b in zip(maps, solve(solid, SPEED), strict=True):
+    maps = solve_mesh_seating(wedge_mesh(ALPHA), Materials(), SPEED)
+    for a, b in zip(maps, solve_seating(solid, SPEED), strict=True):
         assert np.abs(a.force - b.force).max() < 1e-11 * a.force.max()
 
 
 def test_a_load_that_lifts_off_is_refused(solid):
     with pytest.raises(NotSolvedError, match="lifts the body off"):
-        solve(replace(solid, load=-solid.load), SPEED)
+        solve_seating(replace(solid, load=-solid.load), SPEED)
 
 
 def test_a_load_that_slides_sideways_is_refused(solid):
     axial = solid.load.copy()
     axial[2] = np.linalg.norm(axial)
     with pytest.raises(NotSolvedError, match="frictionless seats"):
-        solve(replace(solid, load=axial), SPEED)
+        solve_seating(replace(solid, load=axial), SPEED)
 
 
 @pytest.mark.parametrize(
@@ -174,7 +180,7 @@ def test_a_load_that_slides_sideways_is_refused(solid):
 )
 def test_no_load_is_bad_input(solid, speed, given, word):
     with pytest.raises(InputError, match=word):
-        solve(solid, speed, **given)
+        solve_seating(solid, speed, **given)
 
 
 @pytest.mark.parametrize("clearance", [np.nan, np.zeros(3)])

@@ -11,7 +11,7 @@ from structured import box, sector
 from writers import write_cdb, write_inp, write_step
 
 from bladefem.contact.resultants import resultant
-from bladefem.contact.seating import seat
+from bladefem.contact.seating import solve_mesh_seating
 from bladefem.errors import InputError
 from bladefem.fem.loads import volume
 from bladefem.scene.tables import Materials
@@ -109,7 +109,10 @@ def test_seats_with_other_nodes_than_the_damper(coarse_sector, tmp_path):
     found = read_mesh(tmp_path / "a.msh", sectors=36)
     assert all(found.pairs[name].nodes.shape == (2, 0) for name in ("this", "next"))
     assert found.pairs["cyclic"].nodes.shape == coarse_sector.pairs["cyclic"].nodes.shape
-    ours, theirs = (seat(mesh, Materials(), 838.0, normal=100.0) for mesh in (found, coarse_sector))
+    ours, theirs = (
+        solve_mesh_seating(mesh, Materials(), 838.0, normal=100.0)
+        for mesh in (found, coarse_sector)
+    )
     for a, b in zip(ours, theirs, strict=True):
         assert a.force.sum() == pytest.approx(100.0, rel=1e-9) and a.complementarity < 1e-9
         assert a.patch.area.sum() == pytest.approx(

@@ -15,7 +15,7 @@ import numpy as np
 import pytest
 from numba import njit
 
-from bladefem.contact.seating import solve as seat
+from bladefem.contact.seating import solve_seating as seat
 from bladefem.hbm.solve import solve
 from bladefem.reduction.truncate import truncated
 from bladefem.scene.toml import load_scene

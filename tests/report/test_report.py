@@ -15,7 +15,13 @@ from bladefem.io.run_folder import keep_given
 from bladefem.report.headlines import headlines
 from bladefem.report.next_steps import next_steps
 from bladefem.report.page_tables import page_tables, without_roundoff
-from bladefem.report.statements import Answer, answer, assumed_stiffness, trust, wrong_speed
+from bladefem.report.statements import (
+    ResponseAnswer,
+    assumed_stiffness,
+    reliability,
+    response_answer,
+    wrong_speed,
+)
 from bladefem.report.tables import readable, to_latex, to_markdown, write_tables
 from bladefem.report.write import inputs_hash, write_report
 from bladefem.scene.tables import Contact, Excitation, Operation, Scene, Seat
@@ -102,7 +108,7 @@ def test_written_csv_is_si_with_units(tmp_path):
 
 
 def test_answer_names_the_optimum():
-    found = answer(synthetic.summary(), synthetic.points())
+    found = response_answer(synthetic.summary(), synthetic.points())
     values = [value for _, value, _ in found.numbers]
     assert values[:3] == ["200 N", "37.04 µm", "892 Hz"]
     assert "92.6 % below" in found.numbers[1][2]
@@ -119,7 +125,7 @@ def test_answer_says_which_mass_would_press_best():
         }
     )
     own = pd.DataFrame({"mass": [0.012], "speed": [800.0], "load": [np.sqrt(2) * 200.0]})
-    found = answer(summary, None, own).numbers
+    found = response_answer(summary, None, own).numbers
     assert found[0][2] == "best of 3 loads studied"
     assert found[-2][1:] == (
         "282.8 N",
@@ -149,19 +155,20 @@ def test_a_speed_that_does_not_drive_the_resonance_is_named():
 def test_answer_warns_at_the_edge_of_loads_band_and_convergence():
     few = synthetic.summary().query("20 <= load <= 400").iloc[-1:]
     more = synthetic.summary().query("400 <= load <= 800")
-    assert any("Only one load" in text for text in answer(few).cautions)
-    assert any("smallest" in text for text in answer(more).cautions)
-    assert any("did not converge" in text for text in answer(few).cautions)
+    assert any("Only one load" in text for text in response_answer(few).cautions)
+    assert any("smallest" in text for text in response_answer(more).cautions)
+    assert any("did not converge" in text for text in response_answer(few).cautions)
     points = synthetic.points().query("load == 200 and frequency <= 892")
     assert any(
-        "end of the frequency band" in text for text in answer(synthetic.summary(), points).cautions
+        "end of the frequency band" in text
+        for text in response_answer(synthetic.summary(), points).cautions
     )
-    assert answer(None).numbers == []
+    assert response_answer(None).numbers == []
 
 
 def test_failed_points_and_fallbacks_are_counted():
     points = synthetic.points()
-    text, doubtful = trust(points)
+    text, doubtful = reliability(points)
     failed, fallback = (
         (~points["converged"]).sum(),
         ((points["method"] == "homotopy") & points["converged"]).sum(),
@@ -226,7 +233,7 @@ def test_levels_stay_apart(tmp_path):
 
 def test_every_headline_says_how_sure_it_is():
     summary = synthetic.summary().assign(error=0.012)
-    found = headlines(answer(summary, synthetic.points()), summary, synthetic.points())
+    found = headlines(response_answer(summary, synthetic.points()), summary, synthetic.points())
     assert all(one.uncertainty for one in found)
     sure = {one.what: one.uncertainty for one in found}
     assert sure["optimum normal load per seat"] == "between 100 and 400 N"
@@ -239,7 +246,7 @@ def test_every_headline_says_how_sure_it_is():
 )
 def test_unknown_errors_are_said_to_be_unknown(error, said):
     summary = synthetic.summary().assign(error=error)
-    found = headlines(answer(summary), summary, None)
+    found = headlines(response_answer(summary), summary, None)
     assert said in found[1].uncertainty
 
 
@@ -311,13 +318,15 @@ def test_an_own_load_that_was_studied_has_its_own_amplitude():
     """No interpolation between loads where the load itself is among them."""
     summary = synthetic.summary()
     own = pd.DataFrame({"mass": [0.012], "speed": [800.0], "load": [199.96]})
-    remark = next(r for what, _, r in answer(summary, None, own).numbers if "own mass" in what)
+    remark = next(
+        r for what, _, r in response_answer(summary, None, own).numbers if "own mass" in what
+    )
     assert "resonance amplitude 37.04 µm there" in remark
     assert "between the loads studied" not in remark
 
 
 def test_what_is_not_determined_has_no_bracket():
     summary = synthetic.summary().assign(error=0.01)
-    told = Answer([("optimum normal load per seat", "not determined", "why")], [])
+    told = ResponseAnswer([("optimum normal load per seat", "not determined", "why")], [])
     (found,) = headlines(told, summary, None)
     assert found.uncertainty == "see what to do next"

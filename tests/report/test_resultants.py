@@ -82,7 +82,7 @@ def test_contact_alone_leaves_all_maps(tmp_path, monkeypatch):
         contact=Seating(None, maps),
     )
     monkeypatch.setattr(pipeline, "run", lambda *_, **__: seated)
-    result = pressure.run(Scene(), tmp_path)
+    result = pressure.report_pressure(Scene(), tmp_path)
     assert "tables and picture" in result.timings
     forces = {load: np.concatenate([m.force for m in seats]) for load, seats in maps.items()}
     points, table = (
@@ -105,5 +105,5 @@ def test_contact_alone_leaves_all_maps(tmp_path, monkeypatch):
         tmp_path / "results.nc",
         {"points": xr.Dataset({"amplitude": ("point", [1.0], {"units": "m"})})},
     )
-    pressure.run(Scene(), tmp_path)
+    pressure.report_pressure(Scene(), tmp_path)
     assert float(read_results(tmp_path / "results.nc", "points")["amplitude"][0]) == 1.0

@@ -13,7 +13,7 @@ from bladefem.hbm.optimum import optimum
 from bladefem.hbm.peak import find_peak
 from bladefem.hbm.reference_blade import reference_model
 from bladefem.report.best_load import best_load_table, reasons_against
-from bladefem.report.statements import answer
+from bladefem.report.statements import response_answer
 from bladefem.scene.toml import load_scene
 from bladefem.study.adaptive.family import family_of
 from bladefem.study.adaptive.settings import Settings
@@ -155,7 +155,7 @@ def tables(best, **changes):
 )
 def test_a_headline_is_refused_when_its_data_cannot_carry_it(best, changes, said):
     summary, table = tables(best, **changes)
-    found = answer(summary, searched=table)
+    found = response_answer(summary, searched=table)
     assert found.numbers[0][1] == "not determined"
     assert any(said in caution for caution in found.cautions)
 
@@ -177,6 +177,6 @@ def test_a_headline_is_refused_beside_a_point_that_was_not_solved(best):
 
 def test_a_headline_tells_its_tolerance_and_the_loads_that_do_as_well(best):
     summary, table = tables(best)
-    found = answer(summary, searched=table).numbers
+    found = response_answer(summary, searched=table).numbers
     assert found[0][1] == f"{best.load:.4g} N" and "by exact search" in found[0][2]
     assert "search closed to" in found[1][2] and "estimated error" in found[1][2]

@@ -11,7 +11,7 @@ import scipy.sparse as sp
 from scipy.sparse.linalg import splu
 
 from bladefem.contact.patch import port_matrix
-from bladefem.contact.seating import solve as seat
+from bladefem.contact.seating import solve_seating as seat
 from bladefem.errors import NotSolvedError
 from bladefem.fem.alternating_stress import alternating_stress
 from bladefem.fem.flexibility import unknown_places

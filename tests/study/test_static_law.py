@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from bladefem import load_scene
-from bladefem.contact.seating import solve as seat
+from bladefem.contact.seating import solve_seating as seat
 from bladefem.hbm.linear.condensation import condense
 from bladefem.hbm.solve import solve
 from bladefem.study.pipeline.assemble_model import joint_model

@@ -17,7 +17,7 @@ from bladefem.view.speed import (
     draw_interference,
     draw_nodal_diameters,
     folded,
-    spread,
+    spread_labels,
 )
 
 
@@ -131,8 +131,8 @@ def test_names_beside_lines_stay_apart():
     """Two that collide part about their mean, and push no third that is far; a chain of them stays
     in order.
     """
-    np.testing.assert_allclose(spread(np.array([1.0, 1.1, 5.0]), 0.5), [0.8, 1.3, 5.0])
-    moved = spread(np.array([0.0, 0.4, 0.5, 0.6, 1.2, 3.0]), 0.5)
+    np.testing.assert_allclose(spread_labels(np.array([1.0, 1.1, 5.0]), 0.5), [0.8, 1.3, 5.0])
+    moved = spread_labels(np.array([0.0, 0.4, 0.5, 0.6, 1.2, 3.0]), 0.5)
     assert (np.diff(moved) > 0.5 - 1e-12).all() and moved[-1] == 3.0
     assert moved[:5].mean() == pytest.approx(np.mean([0.0, 0.4, 0.5, 0.6, 1.2]))
 

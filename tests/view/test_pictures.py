@@ -17,19 +17,18 @@ from bladefem.view.contact import (
     unfold,
 )
 from bladefem.view.live_shapes import live_motion
-from bladefem.view.mesh import carry_round, draw_mesh, draw_wheel, grid, save_vtu
+from bladefem.view.mesh import carry_round, draw_mesh, draw_wheel, pyvista_grid, save_vtu
 from bladefem.view.modes import (
     animate_wave,
     best_phase,
     draw_mode,
     draw_mode_sheet,
     draw_wheel_mode,
-    moving,
+    moving_bodies,
     save_modes_vtu,
 )
 from bladefem.view.motion import amplitude_of, draw_motion, extreme_phase
 from bladefem.view.response import (
-    between,
     draw_accuracy,
     draw_loops,
     draw_optimum,
@@ -37,6 +36,7 @@ from bladefem.view.response import (
     draw_seat_loops,
     loop_energy,
     pareto_front,
+    smooth_curve,
 )
 from bladefem.view.skin import skin, wheel_skin
 
@@ -55,7 +55,7 @@ def test_grid_volume_is_the_sectors_volume(sector):
     """VTK integrates the straight-sided cells: chords of the polar grid, exact formula for each
     prism ring.
     """
-    cells = grid(sector).compute_cell_sizes(length=False, area=False)
+    cells = pyvista_grid(sector).compute_cell_sizes(length=False, area=False)
     disc = 0.04 * 8 * 0.5 * np.sin(2 * np.pi / 12 / 8) * (0.16**2 - 0.1**2)
     blade = 0.04 * 2 * 0.5 * np.sin(2 * np.pi / 12 / 8) * (0.28**2 - 0.16**2)
     body = np.asarray(cells["body"]) == 0
@@ -97,7 +97,7 @@ def test_hexahedra_and_vtk_order(count):
         points, "hexahedron" + (str(count) if count > 8 else ""), {"blade": np.arange(count)[None]}
     )
     assert np.isclose(area(skin(cube)).sum(), 6.0)
-    assert np.isclose(grid(cube).compute_cell_sizes()["Volume"][0], 1.0)
+    assert np.isclose(pyvista_grid(cube).compute_cell_sizes()["Volume"][0], 1.0)
 
 
 def test_unknown_cells_are_refused():
@@ -115,7 +115,7 @@ def test_wheel_has_no_cut_faces_and_closes(sector):
     wheel = wheel_skin(sector)
     a, b, c = (wheel.points[wheel.triangles[:, i]] for i in range(3))
     volume = np.einsum("ij,ij->", a, np.cross(b, c)) / 6
-    cells = grid(sector).compute_cell_sizes(length=False, area=False)
+    cells = pyvista_grid(sector).compute_cell_sizes(length=False, area=False)
     assert np.isclose(volume, 12 * np.sum(cells["Volume"]), rtol=1e-9)
 
 
@@ -251,7 +251,7 @@ def test_response_charts(folder):
 def test_a_curve_between_its_points_stays_between_them():
     """No overshoot at a sharp peak, a gap where a point is missing, and the points themselves."""
     x, y = np.arange(7.0), np.array([1.0, 2.0, 50.0, 3.0, np.nan, 4.0, 5.0])
-    fine, drawn = between(x, y)
+    fine, drawn = smooth_curve(x, y)
     assert np.nanmax(drawn) == pytest.approx(50.0) and np.nanmin(drawn) == pytest.approx(1.0)
     assert not ((fine > 3) & (fine < 5)).any() and np.isnan(drawn).sum() == 3
     assert set(x[np.isfinite(y)]) <= set(fine)
@@ -270,8 +270,8 @@ def test_peaks_at_the_end_of_the_band_are_hollow():
 def test_bodies_at_rest_are_not_drawn(sector, wave):
     still = wave.shapes[0].copy()
     still[np.unique(sector.bodies["damper"])] = 0
-    assert list(moving(sector, still).bodies) == ["blade"]
-    assert list(moving(sector, wave.shapes[0]).bodies) == ["blade", "damper"]
+    assert list(moving_bodies(sector, still).bodies) == ["blade"]
+    assert list(moving_bodies(sector, wave.shapes[0]).bodies) == ["blade", "damper"]
 
 
 def test_a_motion_is_drawn_where_it_is_largest(sector, plane_row, folder):

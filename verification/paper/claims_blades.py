@@ -13,7 +13,7 @@ from pathlib import Path
 
 import numpy as np
 
-from bladefem.contact.seating import solve as seat
+from bladefem.contact.seating import solve_seating as seat
 from bladefem.friction.fourier import synthesis
 from bladefem.hbm.model import ReducedModel
 from bladefem.hbm.sweep import size, sweep

@@ -16,7 +16,7 @@ from typing import Any
 import numpy as np
 
 from bladefem.contact.interface_elements import friction_elements, pair_ratio
-from bladefem.contact.seating import ContactProblem, solve
+from bladefem.contact.seating import ContactProblem, solve_seating
 from bladefem.data import RigidBody
 from bladefem.errors import InputError
 from bladefem.hbm.model import ReducedModel
@@ -112,7 +112,7 @@ def whole_model(
 def _joint(
     scene: Scene, problem: ContactProblem, row: Row, load: float, damper: str, harmonics: int
 ) -> ReducedModel:
-    maps = solve(problem, 0.0, normal=load, bedded=scene.contact.bedded)
+    maps = solve_seating(problem, 0.0, normal=load, bedded=scene.contact.bedded)
     ratio = pair_ratio(scene.material.blade, scene.material.damper)
     elements, selection = friction_elements(
         problem, maps, scene.contact, ratio, row.mesh.dimension - 1

@@ -22,7 +22,7 @@ from geometry.zmass import z_section
 
 from ...contact.interface_elements import pair_ratio, stiffnesses_at
 from ...contact.patch import make_patch
-from ...contact.seating import contact_problem, solve
+from ...contact.seating import contact_problem, solve_seating
 from ...damper.loops import Drive, Steady, steady
 from ...damper.zmass import Footprint, MassOnFoundation
 from ...data import PressureMap
@@ -153,4 +153,4 @@ def _press(scene: Scene, comm: Communicator | None) -> Pressed:
     block = flexible(constrain(assemble(mesh, "blade", scene.material.blade, comm), "clamp"))
     patch = make_patch(mesh, "this")
     problem = contact_problem(mesh, [patch], block, flexible(constrain(mass, None)), pull=load)
-    return Pressed(mesh, solve(problem, 0.0, normal=mean_load(scene))[0])
+    return Pressed(mesh, solve_seating(problem, 0.0, normal=mean_load(scene))[0])

@@ -11,14 +11,14 @@ import numpy as np
 from ...contact.frictional_seating import FrictionalProblem
 from ...contact.interface_elements import (
     friction_elements,
-    layered,
     pair_ratio,
     rougher_contact,
     scaled_contact,
+    with_interface_law,
 )
 from ...contact.numerical_stiffness import numerical_stiffness, split_stiffness, stiffest_layer
 from ...contact.seating import ContactProblem
-from ...contact.seating import solve as seat
+from ...contact.seating import solve_seating as seat
 from ...data import PressureMap
 from ...scene.tables import Contact, Scene, Seat
 from .assemble_model import LoadCase
@@ -100,7 +100,9 @@ def changed_cases(
         else:
             contact = scene.contact
         there = replace(scene, contact=contact)
-        case_at = cases_of(there, layered(problem, contact, ratio), tangents, mass, rough)
+        case_at = cases_of(
+            there, with_interface_law(problem, contact, ratio), tangents, mass, rough
+        )
         by_load = factor if name == "seat friction" else 1.0
 
         @lru_cache(maxsize=64)

@@ -13,7 +13,7 @@ from itertools import pairwise
 
 import numpy as np
 
-from ...contact.interface_elements import aggregation
+from ...contact.interface_elements import aggregation_matrix
 from ...contact.numerical_stiffness import physical_stiffness
 from ...data import Elements, Patch
 from ...friction.aft import Forces, evaluate
@@ -219,7 +219,7 @@ def labels(patches: Sequence[Patch], points: int | None) -> np.ndarray:
     """(nodes of all patches,) number of the element that each belongs to, ``points`` elements on
     each patch.
     """
-    parts = [aggregation(patch, points) for patch in patches]
+    parts = [aggregation_matrix(patch, points) for patch in patches]
     starts = np.cumsum([0] + [part.shape[1] for part in parts])
     return np.concatenate(
         [start + part.indices for start, part in zip(starts, parts, strict=False)]

@@ -9,7 +9,7 @@ import numpy as np
 
 from ...contact.frictional_seating import FrictionalProblem, normal_part
 from ...contact.seating import ContactProblem
-from ...contact.seating import solve as seat
+from ...contact.seating import solve_seating as seat
 from ...data import Patch
 from ...errors import InputError, NotSolvedError
 from ...scene.tables import Scene

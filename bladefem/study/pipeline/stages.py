@@ -11,7 +11,7 @@ import numpy as np
 
 from geometry.mesh import Mesh, sector_of
 
-from ...contact.interface_elements import layered, pair_ratio
+from ...contact.interface_elements import pair_ratio, with_interface_law
 from ...contact.patch import make_patch
 from ...contact.seating import ContactProblem, spin_axis
 from ...data import ModeSet, Patch, PortModel
@@ -358,7 +358,7 @@ def seat_damper(bodies: Bodies, patches: list[Patch]) -> ContactProblem:
     after it, each load state costs milliseconds.
 
     Returns:
-        contact.seating.ContactProblem, for :func:`bladefem.contact.seating.solve`.
+        contact.seating.ContactProblem, for :func:`bladefem.contact.seating.solve_seating`.
     """
     return on_layer(bodies.scene, condense_contact(bodies, patches))
 
@@ -366,7 +366,7 @@ def seat_damper(bodies: Bodies, patches: list[Patch]) -> ContactProblem:
 def on_layer(scene: Scene, problem: ContactProblem) -> ContactProblem:
     """A contact problem with the scene's interface layer between its faces."""
     ratio = pair_ratio(scene.material.blade, scene.material.damper)
-    return layered(problem, scene.contact, ratio)
+    return with_interface_law(problem, scene.contact, ratio)
 
 
 def condense_contact(bodies: Bodies, patches: list[Patch]) -> ContactProblem:

@@ -11,8 +11,8 @@ from itertools import product
 
 import numpy as np
 
-from ...contact.seating import ContactProblem, solve
-from ...contact.state_table import interpolate, state_table
+from ...contact.seating import ContactProblem, solve_seating
+from ...contact.state_table import interpolate_states, state_table
 from ...errors import NotSolvedError
 from ...scene.tables import Scene
 
@@ -62,7 +62,7 @@ def check_states(
     tilt = platform_tilt(problem)
 
     def direct(load: float, approach: float) -> np.ndarray:
-        maps = solve(
+        maps = solve_seating(
             problem,
             scene.operation.speed,
             normal=load,
@@ -88,7 +88,7 @@ def check_states(
     spent = (time.perf_counter() - begin) / len(middles)
     largest = float(np.abs(table.force).max())
     for middle, force in zip(middles, exact, strict=True):
-        found, estimated = interpolate(table, middle)
+        found, estimated = interpolate_states(table, middle)
         error = max(error, float(np.abs(found - force).max()) / largest)
         indicator = max(indicator, estimated)
     return StateCheck(table.force[..., 0].size, error, indicator, spent)
