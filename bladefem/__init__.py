@@ -21,7 +21,7 @@ _WHERE = {
     "load_scene": ".scene.toml",
     "open": ".report.opened:open_run",
     "reduce_sector": ".study.pipeline.stages",
-    "run": ".report.run",
+    "run": ".report.run:report_run",
     "seat_damper": ".study.pipeline.stages",
     "study_loads": ".study.pipeline.loads",
     "vary": ".scene.toml",
